@@ -1,0 +1,113 @@
+# One function per outside library: it finds it, or stops with the name of the Debian package that brings it.
+# A folder's CMakeLists.txt calls those it needs, so a part of the house asks for nothing that it doesn't link.
+
+macro(touchstone_missing library package)
+  message(FATAL_ERROR "${library} was not found. Install Debian's '${package}' "
+                      "(script/bootstrap installs all that Touchstone needs).")
+endmacro()
+
+macro(touchstone_require_package library package)
+  find_package(${library} QUIET ${ARGN})
+  if(NOT ${library}_FOUND)
+    touchstone_missing(${library} ${package})
+  endif()
+endmacro()
+
+macro(touchstone_need_eigen)
+  touchstone_require_package(Eigen3 libeigen3-dev NO_MODULE)
+endmacro()
+
+macro(touchstone_need_fmt)
+  touchstone_require_package(fmt libfmt-dev)
+endmacro()
+
+macro(touchstone_need_spdlog)
+  touchstone_require_package(spdlog libspdlog-dev)
+endmacro()
+
+macro(touchstone_need_yaml)
+  touchstone_require_package(yaml-cpp libyaml-cpp-dev)
+endmacro()
+
+macro(touchstone_need_json)
+  touchstone_require_package(nlohmann_json nlohmann-json3-dev)
+endmacro()
+
+macro(touchstone_need_opencv)
+  touchstone_require_package(OpenCV libopencv-dev COMPONENTS ${ARGN})
+endmacro()
+
+macro(touchstone_need_tbb)
+  touchstone_require_package(TBB libtbb-dev)
+endmacro()
+
+macro(touchstone_need_embree)
+  touchstone_require_package(embree libembree-dev 3)
+endmacro()
+
+macro(touchstone_need_openimageio)
+  touchstone_require_package(OpenImageIO "libopenimageio-dev openimageio-tools")
+endmacro()
+
+macro(touchstone_need_openssl)
+  touchstone_require_package(OpenSSL libssl-dev)
+endmacro()
+
+macro(touchstone_need_hdf5)
+  set(HDF5_PREFER_PARALLEL FALSE)
+  touchstone_require_package(HDF5 libhdf5-dev COMPONENTS C HL)
+endmacro()
+
+macro(touchstone_need_cli11)
+  touchstone_require_package(CLI11 libcli11-dev)
+endmacro()
+
+macro(touchstone_need_gtest)
+  touchstone_require_package(GTest "libgtest-dev libgmock-dev")
+endmacro()
+
+macro(touchstone_need_benchmark)
+  touchstone_require_package(benchmark libbenchmark-dev)
+endmacro()
+
+# Libraries without a CMake config: header and library are looked up, an imported target is made.
+macro(touchstone_plain_library target package header)
+  if(NOT TARGET ${target})
+    string(MAKE_C_IDENTIFIER "${target}" _id)
+    find_path(${_id}_INCLUDE ${header})
+    set(_links "")
+    foreach(_name ${ARGN})
+      find_library(${_id}_${_name}_LIBRARY ${_name})
+      if(NOT ${_id}_${_name}_LIBRARY)
+        touchstone_missing(${_name} ${package})
+      endif()
+      list(APPEND _links "${${_id}_${_name}_LIBRARY}")
+    endforeach()
+    if(NOT ${_id}_INCLUDE)
+      touchstone_missing(${header} ${package})
+    endif()
+    add_library(${target} INTERFACE IMPORTED)
+    target_include_directories(${target} SYSTEM INTERFACE "${${_id}_INCLUDE}")
+    target_link_libraries(${target} INTERFACE ${_links})
+  endif()
+endmacro()
+
+macro(touchstone_need_random123)
+  touchstone_plain_library(Random123::Random123 librandom123-dev Random123/philox.h)
+endmacro()
+
+macro(touchstone_need_tetgen)
+  touchstone_plain_library(TetGen::TetGen libtet1.5-dev tetgen.h tet)
+endmacro()
+
+macro(touchstone_need_mumps)
+  touchstone_plain_library(Mumps::Mumps libmumps-seq-dev dmumps_c.h dmumps_seq mumps_common_seq)
+endmacro()
+
+macro(touchstone_need_openblas)
+  touchstone_plain_library(OpenBLAS::OpenBLAS libopenblas-dev openblas_config.h openblas)
+endmacro()
+
+macro(touchstone_need_tinygltf)
+  touchstone_plain_library(TinyGLTF::Headers libtinygltf-dev tiny_gltf.h tinygltf)
+endmacro()

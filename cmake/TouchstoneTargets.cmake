@@ -1,0 +1,41 @@
+# touchstone_library(NAME sources...) makes the library of one folder: target touchstone_NAME, alias Touchstone::NAME.
+# touchstone_test(NAME LABELS ... SOURCES ... LINKS ...) makes one GoogleTest program, its cases known to ctest.
+
+add_library(touchstone_options INTERFACE)
+target_compile_features(touchstone_options INTERFACE cxx_std_20)
+target_compile_options(touchstone_options INTERFACE
+  $<BUILD_INTERFACE:-Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion -Wno-psabi>)
+if(TOUCHSTONE_WERROR)
+  target_compile_options(touchstone_options INTERFACE $<BUILD_INTERFACE:-Werror>)
+endif()
+# Contraction of a*b+c depends on the surrounding code; off, the same source gives the same bytes in every build.
+target_compile_options(touchstone_options INTERFACE $<BUILD_INTERFACE:-ffp-contract=off>)
+if(TOUCHSTONE_SANITIZE)
+  target_compile_options(touchstone_options INTERFACE
+    $<BUILD_INTERFACE:-fsanitize=${TOUCHSTONE_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer>)
+  target_link_options(touchstone_options INTERFACE $<BUILD_INTERFACE:-fsanitize=${TOUCHSTONE_SANITIZE}>)
+endif()
+
+function(touchstone_library name)
+  add_library(touchstone_${name} STATIC ${ARGN})
+  add_library(Touchstone::${name} ALIAS touchstone_${name})
+  set_target_properties(touchstone_${name} PROPERTIES EXPORT_NAME ${name} OUTPUT_NAME touchstone_${name})
+  target_include_directories(touchstone_${name} PUBLIC
+    $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>
+    $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/touchstone>)
+  target_link_libraries(touchstone_${name} PRIVATE $<BUILD_INTERFACE:touchstone_options>)
+  target_compile_features(touchstone_${name} PUBLIC cxx_std_20)
+  set_property(GLOBAL APPEND PROPERTY TOUCHSTONE_LIBRARIES touchstone_${name})
+endfunction()
+
+function(touchstone_test name)
+  cmake_parse_arguments(arg "" "" "LABELS;SOURCES;LINKS" ${ARGN})
+  touchstone_need_gtest()
+  include(GoogleTest)
+  add_executable(${name} ${arg_SOURCES})
+  target_link_libraries(${name} PRIVATE ${arg_LINKS} GTest::gtest GTest::gmock GTest::gtest_main touchstone_options)
+  target_include_directories(${name} PRIVATE "${PROJECT_SOURCE_DIR}")
+  target_compile_definitions(${name} PRIVATE
+    TOUCHSTONE_SOURCE_DIR="${PROJECT_SOURCE_DIR}" TOUCHSTONE_BINARY_DIR="${PROJECT_BINARY_DIR}")
+  gtest_discover_tests(${name} DISCOVERY_TIMEOUT 120 PROPERTIES LABELS "${arg_LABELS}" TIMEOUT 900)
+endfunction()

@@ -1,0 +1,181 @@
+#include "core/yaml_reader.h"
+
+#include <yaml-cpp/yaml.h>
+
+#include <charconv>
+#include <cmath>
+
+#include "core/nearest_name.h"
+#include "core/whole_file.h"
+
+namespace touchstone {
+
+bool Allowed::holds(double value) const {
+  return (low_itself ? value >= low : value > low) && (high_itself ? value <= high : value < high);
+}
+
+std::string Allowed::text() const {
+  const bool has_low = std::isfinite(low);
+  const bool has_high = std::isfinite(high);
+  if (has_low && has_high) {
+    return fmt::format("{} {} {} {}", low_itself ? "from" : "above", low, high_itself ? "to" : "and below", high);
+  }
+  if (has_low) return fmt::format("{} {}", low_itself ? "at least" : "above", low);
+  if (has_high) return fmt::format("{} {}", high_itself ? "at most" : "below", high);
+  return "a finite number";
+}
+
+struct YamlReader::Node {
+  YAML::Node yaml;
+  std::string file;
+  std::string path;                        // keys from the root, with dots
+  mutable std::vector<std::string> asked;  // keys that some field asked for
+
+  int line() const { return yaml.Mark().is_null() ? 0 : yaml.Mark().line + 1; }
+};
+
+namespace {
+
+template <typename T>
+std::optional<T> whole_number(const std::string& text) {
+  T value{};
+  const char* begin = text.data() + (text.starts_with('+') ? 1 : 0);
+  const char* end = text.data() + text.size();
+  const auto result = std::from_chars(begin, end, value);
+  if (begin == end || result.ec != std::errc() || result.ptr != end) return std::nullopt;
+  return value;
+}
+
+}  // namespace
+
+YamlReader YamlReader::open(const std::filesystem::path& file) {
+  return parse(read_whole_file(file), file.string());
+}
+
+YamlReader YamlReader::parse(const std::string& text, const std::string& name) {
+  auto node = std::make_shared<Node>();
+  node->file = name;
+  try {
+    node->yaml = YAML::Load(text);
+  } catch (const YAML::Exception& error) {
+    throw Error({name, error.mark.is_null() ? 0 : error.mark.line + 1}, "isn't YAML: " + error.msg);
+  }
+  YamlReader reader(node);
+  reader.require_map();
+  return reader;
+}
+
+bool YamlReader::has(const std::string& key) const {
+  node_->asked.push_back(key);
+  const YAML::Node& map = node_->yaml;
+  return map.IsMap() && map[key].IsDefined();
+}
+
+SourceLocation YamlReader::where() const { return {node_->file, node_->line()}; }
+
+SourceLocation YamlReader::where(const std::string& key) const {
+  const YAML::Node& map = node_->yaml;
+  if (map.IsMap()) {
+    const YAML::Node value = map[key];
+    if (value.IsDefined() && !value.Mark().is_null()) return {node_->file, value.Mark().line + 1};
+  }
+  return where();
+}
+
+std::filesystem::path YamlReader::folder() const { return std::filesystem::path(node_->file).parent_path(); }
+
+std::string YamlReader::context() const { return node_->path.empty() ? "" : node_->path + ": "; }
+
+void YamlReader::require_map() const {
+  if (!node_->yaml.IsMap()) fail_at(where(), "{}a map of fields is needed here", context());
+}
+
+std::optional<YamlReader> YamlReader::child(const std::string& key) {
+  node_->asked.push_back(key);
+  const YAML::Node& map = node_->yaml;
+  const YAML::Node value = map[key];
+  if (!value.IsDefined()) return std::nullopt;
+  auto node = std::make_shared<Node>();
+  node->yaml = value;
+  node->file = node_->file;
+  node->path = node_->path.empty() ? key : node_->path + "." + key;
+  return YamlReader(node);
+}
+
+std::vector<YamlReader> YamlReader::items() const {
+  if (!node_->yaml.IsSequence()) fail_at(where(), "{}a list is needed here", context());
+  std::vector<YamlReader> result;
+  for (std::size_t i = 0; i < node_->yaml.size(); ++i) {
+    auto node = std::make_shared<Node>();
+    node->yaml = node_->yaml[i];
+    node->file = node_->file;
+    node->path = fmt::format("{}[{}]", node_->path, i);
+    result.push_back(YamlReader(node));
+  }
+  return result;
+}
+
+std::string YamlReader::scalar(const char* kind) const {
+  if (!node_->yaml.IsScalar()) fail_at(where(), "{}{} is needed here", context(), kind);
+  return node_->yaml.Scalar();
+}
+
+double YamlReader::number(Allowed allowed) const {
+  const std::string text = scalar("a number");
+  const auto value = whole_number<double>(text);
+  if (!value || !std::isfinite(*value)) {
+    fail_at(where(), "{}'{}' isn't a finite number; allowed is {}", context(), text, allowed.text());
+  }
+  if (!allowed.holds(*value)) fail_at(where(), "{}{} is not allowed; allowed is {}", context(), text, allowed.text());
+  return *value;
+}
+
+std::int64_t YamlReader::integer(Allowed allowed) const {
+  const std::string text = scalar("a whole number");
+  const auto value = whole_number<std::int64_t>(text);
+  if (!value) fail_at(where(), "{}'{}' isn't a whole number", context(), text);
+  if (!allowed.holds(static_cast<double>(*value))) {
+    fail_at(where(), "{}{} is not allowed; allowed is {}", context(), text, allowed.text());
+  }
+  return *value;
+}
+
+std::uint64_t YamlReader::unsigned_integer(Allowed allowed) const {
+  const std::string text = scalar("a whole number");
+  const auto value = whole_number<std::uint64_t>(text);
+  if (!value) fail_at(where(), "{}'{}' isn't a whole number from 0 up", context(), text);
+  if (!allowed.holds(static_cast<double>(*value))) {
+    fail_at(where(), "{}{} is not allowed; allowed is {}", context(), text, allowed.text());
+  }
+  return *value;
+}
+
+void YamlReader::read(bool& value, Allowed) {
+  const std::string text = scalar("true or false");
+  if (text != "true" && text != "false") fail_at(where(), "{}'{}' is neither true nor false", context(), text);
+  value = text == "true";
+}
+
+void YamlReader::finish() const {
+  std::vector<std::string> seen;
+  for (const auto& entry : node_->yaml) {
+    const int line = entry.first.Mark().is_null() ? 0 : entry.first.Mark().line + 1;
+    if (!entry.first.IsScalar()) throw Error({node_->file, line}, context() + "a key must be a plain word");
+    const std::string key = entry.first.Scalar();
+    if (std::find(seen.begin(), seen.end(), key) != seen.end()) {
+      throw Error({node_->file, line}, fmt::format("{}'{}' stands here a second time", context(), key));
+    }
+    seen.push_back(key);
+    if (std::find(node_->asked.begin(), node_->asked.end(), key) == node_->asked.end()) {
+      throw Error({node_->file, line},
+                  fmt::format("{}unknown key '{}'{}", context(), key, did_you_mean(key, node_->asked)));
+    }
+  }
+}
+
+void YamlReader::refuse_name(const std::string& name, const std::vector<std::string>& known) const {
+  fail_at(where(), "{}'{}' is not known{}; allowed is one of: {}", context(), name, did_you_mean(name, known),
+          fmt::join(known, ", "));
+}
+
+}  // namespace touchstone
