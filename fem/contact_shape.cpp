@@ -1,0 +1,136 @@
+#include "fem/contact_shape.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "core/error.h"
+
+namespace touchstone::fem {
+namespace {
+
+struct Interval {
+  double enter = -std::numeric_limits<double>::infinity();
+  double leave = std::numeric_limits<double>::infinity();
+  bool empty() const { return enter > leave; }
+};
+
+/// The part of a line where low <= coordinate <= high.
+Interval between(double low, double high, double start, double slope) {
+  if (slope == 0.0) return start < low || start > high ? Interval{1.0, 0.0} : Interval{};
+  double a = (low - start) / slope;
+  double b = (high - start) / slope;
+  if (a > b) std::swap(a, b);
+  return {a, b};
+}
+
+Interval common(const Interval& a, const Interval& b) {
+  return {std::max(a.enter, b.enter), std::min(a.leave, b.leave)};
+}
+
+/// The part of a line inside the endless cylinder of `radius` about z.
+Interval inside_cylinder(double radius, const Eigen::Vector3d& p, const Eigen::Vector3d& d) {
+  const double across2 = d.x() * d.x() + d.y() * d.y();
+  const double along = p.x() * d.x() + p.y() * d.y();
+  if (across2 < 1e-30) return p.x() * p.x() + p.y() * p.y() > radius * radius ? Interval{1.0, 0.0} : Interval{};
+  const double middle = -along / across2;
+  // The line's distance from the axis by a cross product, which doesn't cancel for far points.
+  const double cross = p.x() * d.y() - p.y() * d.x();
+  const double rest = radius * radius - cross * cross / across2;
+  if (rest < 0.0) return {1.0, 0.0};
+  const double half = std::sqrt(rest / across2);
+  return {middle - half, middle + half};
+}
+
+void check_positive(double value, const char* what) {
+  if (!(value > 0.0) || !std::isfinite(value)) fail("{} is {} mm, it must be above 0 and finite", what, value);
+}
+
+}  // namespace
+
+void check_shape(const ContactShape& shape) {
+  if (const auto* sphere = std::get_if<SphereShape>(&shape)) {
+    check_positive(sphere->radius, "the sphere's radius");
+  } else if (const auto* cylinder = std::get_if<RoundedCylinder>(&shape)) {
+    check_positive(cylinder->radius, "the cylinder's radius");
+    check_positive(cylinder->height, "the cylinder's height");
+    const double largest = std::min(cylinder->radius, cylinder->height);
+    if (!(cylinder->edge_radius >= 0.0) || cylinder->edge_radius > largest) {
+      fail("the cylinder's edge radius is {} mm, it must be from 0 to {}", cylinder->edge_radius, largest);
+    }
+  } else if (const auto* box = std::get_if<BoxShape>(&shape)) {
+    for (int a = 0; a < 3; ++a) check_positive(box->size[a], "the box's edge length");
+  }
+}
+
+std::optional<double> first_entry(const SphereShape& shape, const Eigen::Vector3d& p, const Eigen::Vector3d& d) {
+  const double along = p.dot(d);
+  const double rest = shape.radius * shape.radius - (p - along * d).squaredNorm();
+  if (rest < 0.0) return std::nullopt;
+  return -along - std::sqrt(rest);
+}
+
+std::optional<double> first_entry(const BoxShape& shape, const Eigen::Vector3d& p, const Eigen::Vector3d& d) {
+  Interval inside;
+  for (int a = 0; a < 3; ++a) inside = common(inside, between(-0.5 * shape.size[a], 0.5 * shape.size[a], p[a], d[a]));
+  if (inside.empty()) return std::nullopt;
+  return inside.enter;
+}
+
+std::optional<double> first_entry(const RoundedCylinder& shape, const Eigen::Vector3d& p, const Eigen::Vector3d& d) {
+  const Interval inside = common(inside_cylinder(shape.radius, p, d), between(0.0, shape.height, p.z(), d.z()));
+  if (inside.empty()) return std::nullopt;
+  const double r = shape.edge_radius;
+  const double core = shape.radius - r;
+  // The rounded body is a ball of radius r swept over the core {rho <= core, z >= r}, so the distance to the core less r
+  // is convex along the line: Newton's steps from the sharp body's entry approach the first root from one side.
+  double t = inside.enter;
+  for (int iteration = 0; iteration < 200; ++iteration) {
+    const Eigen::Vector3d q = p + t * d;
+    const double rho = std::hypot(q.x(), q.y());
+    const double out = rho - core;
+    const double below = r - q.z();
+    if (out <= 0.0 || below <= 0.0) return t;  // not in the corner: the sharp body is the rounded one there
+    const double distance = std::hypot(out, below);
+    const double value = distance - r;
+    if (value <= 1e-15 * shape.radius) return t;
+    const double slope = (out * (q.x() * d.x() + q.y() * d.y()) / rho - below * d.z()) / distance;
+    if (slope >= 0.0) return std::nullopt;
+    const double next = t - value / slope;
+    if (next > inside.leave) return std::nullopt;
+    if (next <= t) return t;
+    t = next;
+  }
+  return t;
+}
+
+std::optional<double> first_entry(const MeshShape& shape, const Eigen::Vector3d& p, const Eigen::Vector3d& d) {
+  return shape.first_entry(p, d);
+}
+
+std::optional<double> first_entry(const ContactShape& shape, const Eigen::Vector3d& p, const Eigen::Vector3d& d) {
+  return std::visit([&](const auto& body) { return first_entry(body, p, d); }, shape);
+}
+
+BoundingBall bounding_ball(const ContactShape& shape) {
+  if (const auto* sphere = std::get_if<SphereShape>(&shape)) return {Eigen::Vector3d::Zero(), sphere->radius};
+  if (const auto* cylinder = std::get_if<RoundedCylinder>(&shape)) {
+    const Eigen::Vector3d centre(0.0, 0.0, 0.5 * cylinder->height);
+    return {centre, std::hypot(cylinder->radius, 0.5 * cylinder->height)};
+  }
+  if (const auto* box = std::get_if<BoxShape>(&shape)) return {Eigen::Vector3d::Zero(), 0.5 * box->size.norm()};
+  const auto& vertices = std::get<MeshShape>(shape).mesh().vertices;
+  Eigen::Vector3d low = vertices.front();
+  Eigen::Vector3d high = low;
+  for (const auto& v : vertices) {
+    low = low.cwiseMin(v);
+    high = high.cwiseMax(v);
+  }
+  const Eigen::Vector3d centre = 0.5 * (low + high);
+  double radius2 = 0.0;
+  for (const auto& v : vertices) radius2 = std::max(radius2, (v - centre).squaredNorm());
+  return {centre, std::sqrt(radius2)};
+}
+
+}  // namespace touchstone::fem

@@ -1,0 +1,56 @@
+#pragma once
+// Rigid bodies that touch the gel, each in its own object frame (mm).
+
+#include <Eigen/Core>
+#include <optional>
+#include <variant>
+
+#include "fem/mesh_shape.h"
+
+namespace touchstone::fem {
+
+/// A ball centred at the origin.
+struct SphereShape {
+  double radius = 1.0;
+};
+
+/// A cylinder about the z axis: flat face in the plane z = 0, body at 0 <= z <= height. The rim of the face z = 0 is a
+/// quarter torus of `edge_radius` (0: a sharp edge); the other rim is sharp.
+struct RoundedCylinder {
+  double radius = 1.0;
+  double edge_radius = 0.0;
+  double height = 1.0;
+};
+
+/// A box centred at the origin, `size` being its whole edge lengths.
+struct BoxShape {
+  Eigen::Vector3d size = Eigen::Vector3d::Ones();
+};
+
+using ContactShape = std::variant<SphereShape, RoundedCylinder, BoxShape, MeshShape>;
+
+/// Refuses sizes that aren't finite and positive, and an edge radius above the cylinder's radius or height.
+/// @throws Error
+void check_shape(const ContactShape& shape);
+
+/// Signed distance along the line from `point` (object frame) in the unit direction `direction` to where the line first
+/// enters the body, searching from minus infinity; nothing if the line misses. A line that touches counts as a hit.
+std::optional<double> first_entry(const SphereShape& shape, const Eigen::Vector3d& point,
+                                  const Eigen::Vector3d& direction);
+std::optional<double> first_entry(const RoundedCylinder& shape, const Eigen::Vector3d& point,
+                                  const Eigen::Vector3d& direction);
+std::optional<double> first_entry(const BoxShape& shape, const Eigen::Vector3d& point,
+                                  const Eigen::Vector3d& direction);
+std::optional<double> first_entry(const MeshShape& shape, const Eigen::Vector3d& point,
+                                  const Eigen::Vector3d& direction);
+std::optional<double> first_entry(const ContactShape& shape, const Eigen::Vector3d& point,
+                                  const Eigen::Vector3d& direction);
+
+/// A ball that holds the whole body: centre in the object frame and radius.
+struct BoundingBall {
+  Eigen::Vector3d centre;
+  double radius;
+};
+BoundingBall bounding_ball(const ContactShape& shape);
+
+}  // namespace touchstone::fem

@@ -1,0 +1,90 @@
+#pragma once
+// The path tracer: from a scene and a camera to the irradiance on each pixel.
+
+#include <cstdint>
+#include <memory>
+#include <opencv2/core/mat.hpp>
+#include <optional>
+
+#include "render/pinhole_camera.h"
+#include "render/scene.h"
+
+namespace touchstone::render {
+
+/// A pixel is sampled until its standard error, in electrons, is below `fraction` times the imager's own noise there,
+/// sqrt(signal + read_noise_e^2 + quantisation_e^2).
+struct NoiseTarget {
+  Spectrum electrons_per_irradiance;  ///< electrons in a pixel per W/m^2 in each band (exposure, area, efficiency)
+  double read_noise_e = 0.0;
+  double quantisation_e = 0.0;  ///< standard deviation of rounding to a digital number: step / sqrt(12)
+  double fraction = 0.5;
+};
+
+struct RenderSettings {
+  std::uint64_t seed = 0;
+  int min_samples = 16;   ///< paths per pixel before the first look at the error; powers of two sample best
+  int max_samples = 256;  ///< with no noise target each pixel gets exactly `min_samples`
+  int max_depth = 8;      ///< diffuse or metallic reflections on a path; refractions don't count. Russian roulette from 3
+  std::optional<NoiseTarget> noise;
+};
+
+/// How many rays were traced. A "ray" is a path's straight leg from event to event, with or without an Embree call.
+struct RayCounts {
+  std::uint64_t paths = 0;        ///< camera samples
+  std::uint64_t primary = 0;      ///< legs before the first diffuse or metallic hit
+  std::uint64_t connections = 0;  ///< connections to lamps that were tested for occlusion
+  std::uint64_t bounces = 0;      ///< legs after that hit
+  RayCounts& operator+=(const RayCounts& other);
+};
+
+/// `irradiance`: CV_32FC(N), W/m^2 on the sensor in each band, mean over the pixel's area. `standard_error`: CV_32FC1,
+/// of the irradiance summed over the bands. `samples`: CV_32S, paths spent. Pixels outside the mask are zero.
+struct RenderedImage {
+  cv::Mat irradiance;
+  cv::Mat standard_error;
+  cv::Mat samples;
+  RayCounts counts;
+};
+
+/// A scene made ready for tracing. Building it costs a few ms for some thousand triangles, so a deforming scene gets a
+/// new one for each frame.
+///
+/// What is simulated: lamp light on diffuse and metallic surfaces by exact connections through the flat faces
+/// (layer_connection.h), bounced light by path tracing with all refractions and internal reflections at faces and
+/// Refractive surfaces. Flat faces keep the s and p polarisations apart along a straight chain of faces.
+/// Paths carry basic radiance, L / n^2, which is the same on both sides of a face but for Fresnel's loss.
+///
+/// What is biased, and where: a connection from a point *beyond* a Refractive surface (an object that is near the gel
+/// but doesn't touch it) treats that surface as flat and horizontal at the height found straight below the point; a
+/// connection that passes Refractive surfaces in other ways goes straight through them. Lamp light mirrored by faces or
+/// focused by curved surfaces onto matt surfaces (caustics of the lamp) is left out, as is the lamp's own mirror image.
+/// A path after 64 smooth refractions or reflections is taken to have left the scene.
+///
+/// A path is a pure function of (seed, pixel, sample), a pixel of (seed, pixel): the same bytes for any number of threads
+/// and with any mask.
+class Tracer {
+ public:
+  /// Throws Error if the scene is faulty (check_scene) or has a number of bands other than 1 or 3.
+  explicit Tracer(const Scene& scene);
+  ~Tracer();
+  Tracer(Tracer&&) noexcept;
+  Tracer& operator=(Tracer&&) noexcept;
+
+  /// Renders the pixels where `mask` (CV_8UC1, the camera's size) isn't zero; an empty mask means all.
+  RenderedImage render(const PinholeCamera& camera, const RenderSettings& settings, const cv::Mat& mask = {}) const;
+
+  /// A preview without noise, for finding what changed between two scenes: one ray through the hole's centre for each
+  /// block of `stride` x `stride` pixels (at the block's centre), lamps as points, direct light only. CV_32FC(N) of
+  /// ceil(height/stride) x ceil(width/stride).
+  cv::Mat preview(const PinholeCamera& camera, int stride) const;
+
+  /// What the paths themselves do, for tests and tools: mean basic radiance seen along a ray of the gel frame.
+  Spectrum radiance(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, const RenderSettings& settings) const;
+
+  struct Prepared;  ///< one per number of bands; defined where it's used
+
+ private:
+  std::unique_ptr<Prepared> prepared_;
+};
+
+}  // namespace touchstone::render

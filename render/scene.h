@@ -1,0 +1,98 @@
+#pragma once
+// What the tracer sees: a stack of infinite flat faces (air | glass | gel), surfaces and balls, lamps, surroundings.
+// All in the gel frame (core/transform.h), lengths in mm.
+
+#include <Eigen/Core>
+#include <variant>
+#include <vector>
+
+#include "core/triangle_mesh.h"
+#include "render/spectrum.h"
+
+namespace touchstone::render {
+
+/// A homogeneous clear substance. `absorption` is per mm (Beer-Lambert, natural logarithm); an empty spectrum is none.
+struct Medium {
+  double index = 1.0;
+  Spectrum absorption;
+};
+
+/// Ideally matt: the reflected radiance is albedo / pi times the irradiance. Both sides reflect.
+struct Lambertian {
+  Spectrum albedo;
+};
+
+/// Metal: GGX microfacets of width `roughness` (the alpha of Walter et al. 2007, 1e-3 to 1), Fresnel reflectance by
+/// Schlick's formula from the `reflectance` at normal incidence. Light that a facet sends to another facet is lost, as
+/// usual with this model: a white metal of roughness 0.5 reflects some 5 % too little.
+struct RoughConductor {
+  Spectrum reflectance;
+  double roughness = 0.3;
+};
+
+/// Reflects nothing.
+struct Black {};
+
+/// A smooth boundary of two media (indices into Scene::media); its outward normal points to `medium_outside`. Where the
+/// two indices are equal nothing happens to a ray but the change of medium.
+struct Refractive {
+  int medium_inside = 0;
+  int medium_outside = 0;
+};
+
+using Material = std::variant<Lambertian, RoughConductor, Black, Refractive>;
+
+/// A triangle surface, open or closed. A Refractive surface is shaded with normals interpolated from its vertices, so
+/// that a deformed gel refracts as the curved surface it stands for; others with the normal of the triangle.
+struct Surface {
+  TriangleMesh mesh;
+  Material material;
+};
+
+struct Ball {
+  Eigen::Vector3d centre;
+  double radius = 0.0;
+  Material material;
+};
+
+/// The infinite plane z = const where `medium_below` meets `medium_above`.
+struct FlatFace {
+  double z = 0.0;
+  int medium_below = 0;
+  int medium_above = 0;
+};
+
+/// A small projection lens: a disc of `lens_radius` (0 is a point) at `position`, facing `direction`. Each point of the
+/// lens sends the same intensity (W/sr) into every direction within `half_angle` of `direction`, falling smoothly to
+/// zero over a further `soft_angle` (radians; together below pi/2). `power_W` is all it emits, in each band.
+/// The lens isn't seen by the camera nor by bounced light; it only lights.
+struct SpotLamp {
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();
+  double lens_radius = 0.0;
+  double half_angle = 0.5;
+  double soft_angle = 0.05;
+  Spectrum power_W;
+};
+
+/// A scene. The number of bands is the length of `environment`.
+///
+/// Faces are given from low z to high z; the medium above one is the medium below the next; coincident faces (a layer
+/// of no thickness) are allowed. With no faces all space is media[0]. A ray's medium is the state of its path: it
+/// changes at faces and Refractive surfaces, so a gel surface may have holes where an object is pressed on: a ray in the
+/// gel then meets the object directly. A ray that slips through such a hole beside the object stays "in the gel" until
+/// it meets the next boundary or leaves the scene.
+struct Scene {
+  std::vector<Medium> media = {Medium{}};
+  std::vector<FlatFace> faces;
+  std::vector<Surface> surfaces;
+  std::vector<Ball> balls;
+  std::vector<SpotLamp> lamps;
+  Spectrum environment;         ///< radiance of the surroundings, in air, W/m^2/sr in each band
+  bool interreflection = true;  ///< false: only lamp light on what the camera sees, and the surroundings seen directly
+};
+
+/// Throws Error if anything in the scene can't be rendered: it names the part, the value and what is allowed.
+void check_scene(const Scene& scene);
+
+}  // namespace touchstone::render

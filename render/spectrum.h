@@ -1,0 +1,21 @@
+#pragma once
+
+#include <Eigen/Core>
+
+namespace touchstone::render {
+
+/// The most bands that a description may have.
+inline constexpr int kMaxBands = 16;
+
+/// One number per band, in a description: a scene has 1 band (grey) or 3 (blue to red, or whatever its author means by
+/// them); all spectra of a scene have the same length. Coefficient-wise arithmetic; no allocation.
+using Spectrum = Eigen::Array<double, Eigen::Dynamic, 1, 0, kMaxBands, 1>;
+
+/// One number per band inside the tracer, where the count is known to the compiler.
+template <int N>
+using Bands = Eigen::Array<double, N, 1>;
+
+/// The same value in each of `bands` bands.
+inline Spectrum flat_spectrum(int bands, double value) { return Spectrum::Constant(bands, value); }
+
+}  // namespace touchstone::render

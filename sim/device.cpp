@@ -1,0 +1,157 @@
+#include "sim/device.h"
+
+namespace touchstone::sim {
+namespace {
+
+Allowed part_of_one() { return Allowed::within(0.0, 1.0); }
+
+void check_beads_fit(const DeviceSpec& device, const SourceLocation& where) {
+  const BeadSpec& beads = *device.beads;
+  const GelSpec& gel = device.gel;
+  const double radius = beads.diameter_mm / 2;
+  if (beads.depth_mm < radius || beads.depth_mm > gel.thickness_mm - radius) {
+    fail_at(where, "beads.depth_mm: {} puts beads of diameter {} mm out of a gel of {} mm; allowed is from {} to {}",
+            beads.depth_mm, beads.diameter_mm, gel.thickness_mm, radius, gel.thickness_mm - radius);
+  }
+  const double half_grid = (beads.grid - 1) * beads.spacing_mm / 2 + radius;
+  if (half_grid > std::min(gel.size_x_mm, gel.size_y_mm) / 2) {
+    fail_at(where, "beads: a grid of {0} x {0} at {1} mm doesn't fit in a gel of {2} x {3} mm", beads.grid,
+            beads.spacing_mm, gel.size_x_mm, gel.size_y_mm);
+  }
+  if (beads.grid > 1 && beads.spacing_mm <= beads.diameter_mm) {
+    fail_at(where, "beads.spacing_mm: {} lets beads of diameter {} mm overlap; it must be above that",
+            beads.spacing_mm, beads.diameter_mm);
+  }
+}
+
+void check_camera_outside(const DeviceSpec& device, const SourceLocation& where) {
+  const double plate_face = -device.gel.thickness_mm - device.plate.thickness_mm;
+  if (device.camera->hole_position_mm.z() >= plate_face) {
+    fail_at(where, "camera.hole_position_mm: z = {} is not in front of the plate, whose lower face is at z = {}",
+            device.camera->hole_position_mm.z(), plate_face);
+  }
+  if ((device.camera->look_at_mm - device.camera->hole_position_mm).norm() < 1e-6) {
+    fail_at(where, "camera.look_at_mm: is the hole's own position; the camera has no direction");
+  }
+}
+
+}  // namespace
+
+EnumNames<BayerLayout> enum_names(BayerLayout) {
+  return {{"none", BayerLayout::none},
+          {"rggb", BayerLayout::rggb},
+          {"bggr", BayerLayout::bggr},
+          {"grbg", BayerLayout::grbg},
+          {"gbrg", BayerLayout::gbrg}};
+}
+
+void fields(YamlReader& in, GelSpec& gel) {
+  in.required("size_x_mm", gel.size_x_mm, Allowed::above_up_to(0.0, 1000.0));
+  in.required("size_y_mm", gel.size_y_mm, Allowed::above_up_to(0.0, 1000.0));
+  in.required("thickness_mm", gel.thickness_mm, Allowed::above_up_to(0.0, 1000.0));
+  in.required("youngs_modulus_MPa", gel.youngs_modulus_MPa, Allowed::above_up_to(0.0, 1e6));
+  in.optional("poisson_ratio", gel.poisson_ratio, Allowed::within(0.0, 0.5));
+  in.optional("refractive_index", gel.refractive_index, Allowed::within(1.0, 4.0));
+  in.optional("absorption_per_mm", gel.absorption_per_mm, Allowed::at_least(0.0));
+}
+
+void fields(YamlReader& in, MeshSpec& mesh) {
+  in.optional("fine_mm", mesh.fine_mm, Allowed::above(0.0));
+  in.optional("coarse_mm", mesh.coarse_mm, Allowed::at_least(mesh.fine_mm));
+  in.optional("fine_half_extent_mm", mesh.fine_half_extent_mm, Allowed::above(0.0));
+  in.optional("fine_depth_mm", mesh.fine_depth_mm, Allowed::above(0.0));
+}
+
+void fields(YamlReader& in, BeadSpec& beads) {
+  in.required("grid", beads.grid, Allowed::within(1, 100));
+  in.required("spacing_mm", beads.spacing_mm, Allowed::above(0.0));
+  in.required("diameter_mm", beads.diameter_mm, Allowed::above(0.0));
+  in.required("depth_mm", beads.depth_mm, Allowed::above(0.0));
+  in.optional("reflectance", beads.reflectance, part_of_one());
+  in.optional("roughness", beads.roughness, Allowed::within(0.02, 1.0));
+}
+
+void fields(YamlReader& in, PlateSpec& plate) {
+  in.required("thickness_mm", plate.thickness_mm, Allowed::above(0.0));
+  in.required("refractive_index", plate.refractive_index, Allowed::within(1.0, 4.0));
+}
+
+void fields(YamlReader& in, LampSpec& lamp) {
+  in.required("position_mm", lamp.position_mm);
+  in.required("target_mm", lamp.target_mm);
+  in.required("lens_radius_mm", lamp.lens_radius_mm, Allowed::above(0.0));
+  in.required("half_angle_deg", lamp.half_angle_deg, Allowed::above_up_to(0.0, 80.0));
+  in.optional("soft_angle_deg", lamp.soft_angle_deg, Allowed::within(0.0, 80.0 - lamp.half_angle_deg));
+  in.required("power_W", lamp.power_W, Allowed::at_least(0.0));
+  if ((lamp.target_mm - lamp.position_mm).norm() < 1e-9) {
+    fail_at(in.where("target_mm"), "target_mm: is the lamp's own position; the lamp has no direction");
+  }
+}
+
+void fields(YamlReader& in, CameraSpec& camera) {
+  in.required("width", camera.width, Allowed::within(1, 8192));
+  in.required("height", camera.height, Allowed::within(1, 8192));
+  in.optional("frame_rate_Hz", camera.frame_rate_Hz, Allowed::above(0.0));
+  in.required("pixel_pitch_um", camera.pixel_pitch_um, Allowed::above(0.0));
+  camera.active_area_um2 = camera.pixel_pitch_um * camera.pixel_pitch_um;
+  in.optional("active_area_um2", camera.active_area_um2, Allowed::above_up_to(0.0, camera.active_area_um2));
+  in.required("hole_diameter_um", camera.hole_diameter_um, Allowed::above(0.0));
+  in.optional("foil_thickness_um", camera.foil_thickness_um, Allowed::at_least(0.0));
+  in.required("hole_to_sensor_mm", camera.hole_to_sensor_mm, Allowed::above(0.0));
+  in.required("hole_position_mm", camera.hole_position_mm);
+  in.required("look_at_mm", camera.look_at_mm);
+  in.required("exposure_us", camera.exposure_us, Allowed::at_least(0.0));
+  in.optional("bits", camera.bits, Allowed::within(6, 16));
+  in.optional("bayer", camera.bayer);
+  in.optional("quantum_efficiency_red", camera.quantum_efficiency_red, part_of_one());
+  in.optional("quantum_efficiency_green", camera.quantum_efficiency_green, part_of_one());
+  in.optional("quantum_efficiency_blue", camera.quantum_efficiency_blue, part_of_one());
+  in.optional("white_balance", camera.white_balance, Allowed::above(0.0));
+  in.required("full_well_e", camera.full_well_e, Allowed::above(0.0));
+  in.optional("read_noise_e", camera.read_noise_e, Allowed::at_least(0.0));
+  in.optional("dark_current_e_per_s", camera.dark_current_e_per_s, Allowed::at_least(0.0));
+  in.optional("prnu", camera.prnu, Allowed::within(0.0, 0.5));
+  in.optional("dsnu_e", camera.dsnu_e, Allowed::at_least(0.0));
+  in.optional("black_level_DN", camera.black_level_DN, Allowed::at_least(0.0));
+  if (camera.exposure_us > 1e6 / camera.frame_rate_Hz) {
+    fail_at(in.where("exposure_us"), "exposure_us: {} is longer than a frame of {} us at {} Hz", camera.exposure_us,
+            1e6 / camera.frame_rate_Hz, camera.frame_rate_Hz);
+  }
+}
+
+void fields(YamlReader& in, DeviceSpec& device) {
+  device.where = in.where();
+  in.required("name", device.name);
+  in.required("gel", device.gel);
+  in.optional("mesh", device.mesh);
+  in.optional("beads", device.beads);
+  in.required("plate", device.plate);
+  in.optional("lamps", device.lamps);
+  in.optional("band_wavelengths_nm", device.band_wavelengths_nm, Allowed::within(300.0, 1200.0));
+  in.optional("room_radiance", device.room_radiance, Allowed::at_least(0.0));
+  in.optional("camera", device.camera);
+  if (device.beads) check_beads_fit(device, in.where("beads"));
+  if (device.camera) check_camera_outside(device, in.where("camera"));
+  const double plate_face = -device.gel.thickness_mm - device.plate.thickness_mm;
+  for (const LampSpec& lamp : device.lamps) {
+    if (lamp.position_mm.z() >= plate_face) {
+      fail_at(in.where("lamps"), "lamps: a lamp at z = {} is not in front of the plate, whose lower face is at z = {}",
+              lamp.position_mm.z(), plate_face);
+    }
+  }
+}
+
+DeviceSpec read_device(const std::filesystem::path& file) { return read_yaml<DeviceSpec>(file); }
+
+std::vector<Eigen::Vector3d> bead_centres(const BeadSpec& beads) {
+  std::vector<Eigen::Vector3d> centres;
+  const double half = (beads.grid - 1) * beads.spacing_mm / 2;
+  for (int row = 0; row < beads.grid; ++row) {
+    for (int column = 0; column < beads.grid; ++column) {
+      centres.emplace_back(column * beads.spacing_mm - half, half - row * beads.spacing_mm, -beads.depth_mm);
+    }
+  }
+  return centres;
+}
+
+}  // namespace touchstone::sim

@@ -1,0 +1,117 @@
+#pragma once
+// A device file: a gel, its beads, its plate, its lamps and its camera. See docs/file-formats.md.
+
+#include <Eigen/Core>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/yaml_reader.h"
+
+namespace touchstone::sim {
+
+/// The soft pad, clamped to the plate on its lower face. Gel frame: outer surface z = 0, lower face z = -thickness.
+struct GelSpec {
+  double size_x_mm = 0.0;
+  double size_y_mm = 0.0;
+  double thickness_mm = 0.0;
+  double youngs_modulus_MPa = 0.0;
+  double poisson_ratio = 0.49;
+  double refractive_index = 1.0;
+  double absorption_per_mm = 0.0;  ///< natural logarithm, all bands
+};
+
+/// How fine the gel is meshed: `fine_mm` where contact and beads are, graded to `coarse_mm` elsewhere.
+struct MeshSpec {
+  double fine_mm = 0.5;
+  double coarse_mm = 1.5;
+  Eigen::Vector2d fine_half_extent_mm = {5.0, 5.0};
+  double fine_depth_mm = 1.25;
+};
+
+/// A square grid of balls embedded in the gel.
+struct BeadSpec {
+  int grid = 3;             ///< beads a side
+  double spacing_mm = 2.0;  ///< between neighbours
+  double diameter_mm = 0.5;
+  double depth_mm = 0.5;  ///< of the centres, below the outer surface
+  Eigen::Vector3d reflectance = {0.5, 0.5, 0.5};
+  double roughness = 0.3;  ///< GGX alpha
+};
+
+/// The flat plate that holds the gel, between it and the camera.
+struct PlateSpec {
+  double thickness_mm = 0.0;
+  double refractive_index = 1.0;
+};
+
+/// A lamp with a projecting lens: uniform within `half_angle_deg`, smooth to dark over `soft_angle_deg` more.
+struct LampSpec {
+  Eigen::Vector3d position_mm = Eigen::Vector3d::Zero();
+  Eigen::Vector3d target_mm = Eigen::Vector3d::Zero();
+  double lens_radius_mm = 1.0;
+  double half_angle_deg = 20.0;
+  double soft_angle_deg = 3.0;
+  Eigen::Vector3d power_W = Eigen::Vector3d::Zero();  ///< radiated in the bands red, green, blue
+};
+
+enum class BayerLayout { none, rggb, bggr, grbg, gbrg };
+EnumNames<BayerLayout> enum_names(BayerLayout);
+
+/// A pinhole camera and its imager (EMVA 1288 terms).
+struct CameraSpec {
+  int width = 0;
+  int height = 0;
+  double frame_rate_Hz = 30.0;
+  double pixel_pitch_um = 0.0;
+  double active_area_um2 = 0.0;
+  double hole_diameter_um = 0.0;
+  double foil_thickness_um = 0.0;
+  double hole_to_sensor_mm = 0.0;
+  Eigen::Vector3d hole_position_mm = Eigen::Vector3d::Zero();
+  Eigen::Vector3d look_at_mm = Eigen::Vector3d::Zero();
+  double exposure_us = 1000.0;
+  int bits = 8;
+  BayerLayout bayer = BayerLayout::none;
+  Eigen::Vector3d quantum_efficiency_red = {1, 0, 0};    ///< of the red pixels, in the bands red, green, blue
+  Eigen::Vector3d quantum_efficiency_green = {0, 1, 0};  ///< likewise, green pixels; a grey camera has these only
+  Eigen::Vector3d quantum_efficiency_blue = {0, 0, 1};
+  std::optional<Eigen::Vector3d> white_balance;  ///< fixed gains of red, green, blue; absent: the lamps' light is grey
+  double full_well_e = 0.0;
+  double read_noise_e = 0.0;
+  double dark_current_e_per_s = 0.0;
+  double prnu = 0.0;    ///< relative
+  double dsnu_e = 0.0;
+  double black_level_DN = 0.0;
+};
+
+struct DeviceSpec {
+  std::string name;
+  GelSpec gel;
+  MeshSpec mesh;
+  std::optional<BeadSpec> beads;
+  PlateSpec plate;
+  std::vector<LampSpec> lamps;
+  Eigen::Vector3d band_wavelengths_nm = {610, 540, 455};  ///< centres of the bands red, green, blue
+  double room_radiance = 0.0;                             ///< W/m^2/sr a band
+  std::optional<CameraSpec> camera;
+  SourceLocation where;
+};
+
+void fields(YamlReader& in, GelSpec& gel);
+void fields(YamlReader& in, MeshSpec& mesh);
+void fields(YamlReader& in, BeadSpec& beads);
+void fields(YamlReader& in, PlateSpec& plate);
+void fields(YamlReader& in, LampSpec& lamp);
+void fields(YamlReader& in, CameraSpec& camera);
+void fields(YamlReader& in, DeviceSpec& device);
+
+/// Reads and checks a device file. @throws Error with file and line
+DeviceSpec read_device(const std::filesystem::path& file);
+
+/// Rest positions of the beads' centres in the gel frame, row by row: y falls from row to row and x grows along a row,
+/// as the upright picture shows them.
+std::vector<Eigen::Vector3d> bead_centres(const BeadSpec& beads);
+
+}  // namespace touchstone::sim

@@ -1,0 +1,47 @@
+#include "sim/motion.h"
+
+namespace touchstone::sim {
+
+int MotionSpec::frame_count() const {
+  int count = 1;
+  for (const MotionKey& key : keys) count += key.frames;
+  return count;
+}
+
+bool MotionSpec::is_tangential() const {
+  for (const MotionKey& key : keys) {
+    if (key.angles_deg && *key.angles_deg != start_angles_deg) return true;
+    for (const auto& [axis, start] : {std::pair{key.x, start_mm.x()}, std::pair{key.y, start_mm.y()}}) {
+      if (!axis) continue;
+      if (axis->force_N) return true;
+      if (axis->position_mm && *axis->position_mm != start) return true;
+    }
+  }
+  return start_angles_deg != Eigen::Vector3d::Zero();
+}
+
+void fields(YamlReader& in, AxisKey& axis) {
+  in.optional("position_mm", axis.position_mm);
+  in.optional("force_N", axis.force_N);
+  if (axis.position_mm.has_value() == axis.force_N.has_value()) {
+    fail_at(in.where(), "an axis has either position_mm or force_N");
+  }
+}
+
+void fields(YamlReader& in, MotionKey& key) {
+  key.where = in.where();
+  in.required("frames", key.frames, Allowed::within(1, 1e7));
+  in.optional("x", key.x);
+  in.optional("y", key.y);
+  in.optional("z", key.z);
+  in.optional("angles_deg", key.angles_deg, Allowed::within(-180.0, 180.0));
+}
+
+void fields(YamlReader& in, MotionSpec& motion) {
+  in.required("start_mm", motion.start_mm);
+  in.optional("start_angles_deg", motion.start_angles_deg, Allowed::within(-180.0, 180.0));
+  in.optional("frame_rate_Hz", motion.frame_rate_Hz, Allowed::above_up_to(0.0, 1e6));
+  in.required("keys", motion.keys);
+}
+
+}  // namespace touchstone::sim

@@ -1,0 +1,181 @@
+#include "sim/object.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/units.h"
+#include "sim/gltf_mesh.h"
+
+namespace touchstone::sim {
+namespace {
+
+constexpr int kAround = 96;  // segments of a turned body
+
+/// The body that a profile of (radius, z) pairs sweeps about the z axis, from its lower pole or disc to its upper one.
+/// The profile starts and ends on the axis.
+TriangleMesh turned_body(const std::vector<Eigen::Vector2d>& profile) {
+  TriangleMesh mesh;
+  std::vector<int> first_of_ring;
+  for (const Eigen::Vector2d& p : profile) {
+    first_of_ring.push_back(static_cast<int>(mesh.vertices.size()));
+    const int points = p.x() == 0.0 ? 1 : kAround;
+    for (int i = 0; i < points; ++i) {
+      const double angle = 2.0 * kPi * i / kAround;
+      mesh.vertices.emplace_back(p.x() * std::cos(angle), p.x() * std::sin(angle), p.y());
+    }
+  }
+  for (std::size_t ring = 0; ring + 1 < profile.size(); ++ring) {
+    const int low = first_of_ring[ring];
+    const int high = first_of_ring[ring + 1];
+    const bool low_pole = profile[ring].x() == 0.0;
+    const bool high_pole = profile[ring + 1].x() == 0.0;
+    for (int i = 0; i < kAround; ++i) {
+      const int j = (i + 1) % kAround;
+      const int low_i = low_pole ? low : low + i;
+      const int low_j = low_pole ? low : low + j;
+      const int high_i = high_pole ? high : high + i;
+      const int high_j = high_pole ? high : high + j;
+      if (!low_pole) mesh.triangles.push_back({low_i, low_j, high_i});
+      if (!high_pole) mesh.triangles.push_back({low_j, high_j, high_i});
+    }
+  }
+  return mesh;
+}
+
+TriangleMesh sphere_mesh(double radius) {
+  constexpr int kRings = 48;
+  std::vector<Eigen::Vector2d> profile;
+  for (int i = 0; i <= kRings; ++i) {
+    const double angle = kPi * i / kRings;
+    const bool pole = i == 0 || i == kRings;
+    profile.emplace_back(pole ? 0.0 : radius * std::sin(angle), -radius * std::cos(angle));
+  }
+  return turned_body(profile);
+}
+
+TriangleMesh rounded_cylinder_mesh(const ShapeSpec& shape) {
+  constexpr int kArc = 12;
+  const double edge = shape.edge_radius_mm;
+  std::vector<Eigen::Vector2d> profile = {{0.0, 0.0}};
+  if (edge < shape.radius_mm) profile.emplace_back(shape.radius_mm - edge, 0.0);
+  for (int i = 1; i <= kArc && edge > 0.0; ++i) {
+    const double angle = kPi / 2 * i / kArc;
+    profile.emplace_back(shape.radius_mm - edge + edge * std::sin(angle), edge - edge * std::cos(angle));
+  }
+  if (edge < shape.height_mm) profile.emplace_back(shape.radius_mm, shape.height_mm);
+  profile.emplace_back(0.0, shape.height_mm);
+  return turned_body(profile);
+}
+
+TriangleMesh box_mesh(const Eigen::Vector3d& size) {
+  TriangleMesh mesh;
+  for (int corner = 0; corner < 8; ++corner) {
+    const Eigen::Vector3d sign((corner & 1) ? 0.5 : -0.5, (corner & 2) ? 0.5 : -0.5, (corner & 4) ? 0.5 : -0.5);
+    mesh.vertices.push_back(sign.cwiseProduct(size));
+  }
+  mesh.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
+                    {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+  return mesh;
+}
+
+TriangleMesh read_mesh(const ShapeSpec& shape) {
+  if (!std::filesystem::exists(shape.file)) {
+    fail_at(shape.where, "shape.file: there is no file {}", shape.file.string());
+  }
+  return read_gltf_mesh(shape.file, shape.mm_per_unit);
+}
+
+}  // namespace
+
+EnumNames<ShapeKind> enum_names(ShapeKind) {
+  return {{"sphere", ShapeKind::sphere},
+          {"rounded_cylinder", ShapeKind::rounded_cylinder},
+          {"box", ShapeKind::box},
+          {"mesh", ShapeKind::mesh}};
+}
+
+void fields(YamlReader& in, ShapeSpec& shape) {
+  shape.where = in.where();
+  in.required("type", shape.type);
+  switch (shape.type) {
+    case ShapeKind::sphere:
+      in.required("radius_mm", shape.radius_mm, Allowed::above_up_to(0.0, 1e4));
+      break;
+    case ShapeKind::rounded_cylinder:
+      in.required("radius_mm", shape.radius_mm, Allowed::above_up_to(0.0, 1e4));
+      in.required("height_mm", shape.height_mm, Allowed::above_up_to(0.0, 1e4));
+      in.required("edge_radius_mm", shape.edge_radius_mm,
+                  Allowed::within(0.0, std::min(shape.radius_mm, shape.height_mm)));
+      break;
+    case ShapeKind::box:
+      in.required("size_mm", shape.size_mm, Allowed::above_up_to(0.0, 1e4));
+      break;
+    case ShapeKind::mesh: {
+      std::string file;
+      in.required("file", file);
+      shape.file = in.folder() / file;
+      shape.where = in.where("file");
+      in.optional("mm_per_unit", shape.mm_per_unit, Allowed::above(0.0));
+      break;
+    }
+  }
+}
+
+void fields(YamlReader& in, HolderSpec& holder) {
+  in.required("radius_mm", holder.radius_mm, Allowed::above(0.0));
+  in.required("behind_mm", holder.behind_mm, Allowed::above(0.0));
+  in.optional("albedo", holder.albedo, Allowed::within(0.0, 1.0));
+}
+
+void fields(YamlReader& in, ObjectSpec& object) {
+  in.required("name", object.name);
+  in.required("shape", object.shape);
+  in.optional("albedo", object.albedo, Allowed::within(0.0, 1.0));
+  in.optional("friction", object.friction, Allowed::at_least(0.0));
+  in.optional("holder", object.holder);
+}
+
+ObjectSpec read_object(const std::filesystem::path& file) { return read_yaml<ObjectSpec>(file); }
+
+fem::ContactShape contact_shape(const ShapeSpec& shape) {
+  switch (shape.type) {
+    case ShapeKind::sphere:
+      return fem::SphereShape{shape.radius_mm};
+    case ShapeKind::rounded_cylinder:
+      return fem::RoundedCylinder{shape.radius_mm, shape.edge_radius_mm, shape.height_mm};
+    case ShapeKind::box:
+      return fem::BoxShape{shape.size_mm};
+    case ShapeKind::mesh:
+      return fem::MeshShape(read_mesh(shape));
+  }
+  TS_ASSERT(false);
+  return {};
+}
+
+TriangleMesh visible_mesh(const ShapeSpec& shape) {
+  switch (shape.type) {
+    case ShapeKind::sphere:
+      return sphere_mesh(shape.radius_mm);
+    case ShapeKind::rounded_cylinder:
+      return rounded_cylinder_mesh(shape);
+    case ShapeKind::box:
+      return box_mesh(shape.size_mm);
+    case ShapeKind::mesh:
+      return read_mesh(shape);
+  }
+  TS_ASSERT(false);
+  return {};
+}
+
+TriangleMesh visible_mesh(const HolderSpec& holder) {
+  constexpr double kThickness = 1.0;
+  ShapeSpec disc;
+  disc.type = ShapeKind::rounded_cylinder;
+  disc.radius_mm = holder.radius_mm;
+  disc.height_mm = kThickness;
+  TriangleMesh mesh = rounded_cylinder_mesh(disc);
+  for (Eigen::Vector3d& vertex : mesh.vertices) vertex.z() += holder.behind_mm;
+  return mesh;
+}
+
+}  // namespace touchstone::sim

@@ -1,0 +1,59 @@
+#pragma once
+// An object file: the shape of a rigid body and how it looks. See docs/file-formats.md.
+
+#include <Eigen/Core>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "core/triangle_mesh.h"
+#include "core/yaml_reader.h"
+#include "fem/contact_shape.h"
+
+namespace touchstone::sim {
+
+enum class ShapeKind { sphere, rounded_cylinder, box, mesh };
+EnumNames<ShapeKind> enum_names(ShapeKind);
+
+/// Only the fields that belong to `type` may stand in the file.
+struct ShapeSpec {
+  ShapeKind type = ShapeKind::sphere;
+  double radius_mm = 0.0;       ///< sphere, rounded_cylinder
+  double edge_radius_mm = 0.0;  ///< rounded_cylinder
+  double height_mm = 0.0;       ///< rounded_cylinder
+  Eigen::Vector3d size_mm = Eigen::Vector3d::Zero();  ///< box
+  std::filesystem::path file;                         ///< mesh: glTF, relative to the object file
+  double mm_per_unit = 1000.0;                        ///< mesh: glTF's unit is the metre
+  SourceLocation where;
+};
+
+/// A disc behind the object that carries it, seen by the camera but never touched: normal +z of the object frame.
+struct HolderSpec {
+  double radius_mm = 0.0;
+  double behind_mm = 0.0;  ///< z of its front face in the object frame
+  Eigen::Vector3d albedo = {0.5, 0.5, 0.5};
+};
+
+struct ObjectSpec {
+  std::string name;
+  ShapeSpec shape;
+  Eigen::Vector3d albedo = {0.5, 0.5, 0.5};  ///< in the bands red, green, blue
+  double friction = 0.0;                     ///< Coulomb coefficient against the gel
+  std::optional<HolderSpec> holder;
+};
+
+void fields(YamlReader& in, ShapeSpec& shape);
+void fields(YamlReader& in, HolderSpec& holder);
+void fields(YamlReader& in, ObjectSpec& object);
+
+ObjectSpec read_object(const std::filesystem::path& file);
+
+/// The body as the contact solver sees it. Reads the mesh file if there is one.
+/// @throws Error for a mesh that is missing, open or crosses itself
+fem::ContactShape contact_shape(const ShapeSpec& shape);
+
+/// The body as the renderer sees it: a closed surface in the object frame.
+TriangleMesh visible_mesh(const ShapeSpec& shape);
+TriangleMesh visible_mesh(const HolderSpec& holder);
+
+}  // namespace touchstone::sim

@@ -1,0 +1,143 @@
+#include "sim/plan.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/units.h"
+
+namespace touchstone::sim {
+namespace {
+
+/// Fresnel reflectance of unpolarised light that meets a face from index n1 at sine `sine` towards index n2.
+double fresnel(double n1, double n2, double sine) {
+  const double sine2 = n1 / n2 * sine;
+  if (sine2 >= 1.0) return 1.0;
+  const double c1 = std::sqrt(1.0 - sine * sine);
+  const double c2 = std::sqrt(1.0 - sine2 * sine2);
+  const double s = (n1 * c1 - n2 * c2) / (n1 * c1 + n2 * c2);
+  const double p = (n1 * c2 - n2 * c1) / (n1 * c2 + n2 * c1);
+  return (s * s + p * p) / 2;
+}
+
+/// Part of a disc of radius `radius` that its copy moved sideways by `shift` covers.
+double disc_overlap(double radius, double shift) {
+  const double x = shift / (2.0 * radius);
+  if (x >= 1.0) return 0.0;
+  return 2.0 / kPi * (std::acos(x) - x * std::sqrt(1.0 - x * x));
+}
+
+/// Radius of the largest disc of the object that the gel can be wetted by.
+double bright_radius(const ObjectSpec& object) {
+  switch (object.shape.type) {
+    case ShapeKind::sphere:
+    case ShapeKind::rounded_cylinder:
+      return object.shape.radius_mm;
+    case ShapeKind::box:
+      return object.shape.size_mm.head<2>().norm() / 2;
+    case ShapeKind::mesh:
+      break;
+  }
+  double radius = 0.0;
+  for (const Eigen::Vector3d& vertex : visible_mesh(object.shape).vertices) {
+    radius = std::max(radius, vertex.head<2>().norm());
+  }
+  return radius;
+}
+
+class Table {
+ public:
+  explicit Table(Plan& plan) : plan_(plan) {}
+
+  bool add(const std::string& name, bool on, const std::string& why, const std::string& cost) {
+    plan_.effects.push_back({name, on, why, on ? cost : "nothing"});
+    return on;
+  }
+
+  bool add(const std::string& name, Switch forced, bool called_for, const std::string& why, const std::string& cost) {
+    if (forced == Switch::automatic) return add(name, called_for, why, cost);
+    const bool on = forced == Switch::on;
+    return add(name, on, fmt::format("the scene switches it {}; by itself: {}", on ? "on" : "off", why), cost);
+  }
+
+ private:
+  Plan& plan_;
+};
+
+void plan_mechanics(const SceneSpec& scene, Plan& plan, Table& table) {
+  table.add("gel mechanics", true, "truth is always asked for",
+            "set-up once a gel (seconds, kept in the cache), then about a millisecond a frame");
+  const bool tangential = scene.motion.is_tangential();
+  const std::string why = scene.object.friction == 0.0 ? "the object's friction is 0"
+                          : tangential ? fmt::format("the motion has a tangential part and friction is {}",
+                                                     scene.object.friction)
+                                       : "the motion is a straight press: no tangential part, no tilt";
+  plan.friction = table.add("friction", scene.effects.friction, tangential && scene.object.friction > 0.0, why,
+                            "a few milliseconds a frame");
+}
+
+void plan_light(const SceneSpec& scene, Plan& plan, Table& table) {
+  const bool images = scene.outputs.frames || scene.outputs.ideal || scene.outputs.radiance;
+  plan.camera = table.add("camera and renderer", images,
+                          images ? "an image is asked for" : "no image is asked for: truth alone needs none",
+                          "most of the time of a frame");
+  if (!images) return;
+  if (!scene.device.camera) {
+    fail_at(scene.where, "outputs: an image is asked for, but the device '{}' ({}) has no camera", scene.device.name,
+            scene.device.where.file);
+  }
+  const GelSpec& gel = scene.device.gel;
+  const PlateSpec& plate = scene.device.plate;
+  const bool refracts = gel.refractive_index != 1.0 || plate.refractive_index != 1.0;
+  plan.refraction = table.add(
+      "refraction", refracts,
+      refracts ? fmt::format("plate of index {} and gel of index {} stand before the camera", plate.refractive_index,
+                             gel.refractive_index)
+               : "no index differs from 1",
+      "closed form at the flat faces: under a tenth of the rays' time");
+
+  const double albedo = scene.object.albedo.maxCoeff();
+  const double gain = interreflection_estimate(gel, plate, albedo, bright_radius(scene.object));
+  plan.interreflection = table.add(
+      "interreflection", scene.effects.interreflection, gain > scene.light.interreflection_tolerance,
+      fmt::format("an object of albedo {:.2g} gives itself {:.1f} % of its light back through the plate; allowed to "
+                  "leave out is {:.1f} %",
+                  albedo, 100 * gain, 100 * scene.light.interreflection_tolerance),
+      "3 to 5 times the rays");
+  table.add("spectral bands", true, "a colour camera and lamps without narrow lines: 3 bands", "3 bands a path");
+  const bool noise = scene.outputs.frames;
+  plan.sensor_noise =
+      table.add("sensor noise", scene.effects.sensor_noise, noise,
+                noise ? "frames are asked for as the camera delivers them" : "only ideal pictures are asked for",
+                "a few milliseconds a frame");
+}
+
+}  // namespace
+
+double interreflection_estimate(const GelSpec& gel, const PlateSpec& plate, double albedo, double disc_radius_mm) {
+  // A Lambertian disc sends 2 sin cos d(theta) of its light at theta; that part is reflected at the plate's lower face
+  // (and little at the face between gel and plate, left out) and comes down moved sideways.
+  constexpr int kSteps = 2000;
+  double once = 0.0;
+  for (int i = 0; i < kSteps; ++i) {
+    const double sine = (i + 0.5) / kSteps;
+    const double invariant = gel.refractive_index * sine;
+    if (invariant >= plate.refractive_index) continue;
+    const double plate_sine = invariant / plate.refractive_index;
+    const double shift = 2.0 * (gel.thickness_mm * sine / std::sqrt(1.0 - sine * sine) +
+                                plate.thickness_mm * plate_sine / std::sqrt(1.0 - plate_sine * plate_sine));
+    once += 2.0 * sine / kSteps * fresnel(plate.refractive_index, 1.0, plate_sine) *
+            disc_overlap(disc_radius_mm, shift);
+  }
+  const double gain = albedo * once;
+  return gain / (1.0 - gain);
+}
+
+Plan make_plan(const SceneSpec& scene) {
+  Plan plan;
+  Table table(plan);
+  plan_mechanics(scene, plan, table);
+  plan_light(scene, plan, table);
+  return plan;
+}
+
+}  // namespace touchstone::sim

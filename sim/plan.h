@@ -1,0 +1,37 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "sim/scene.h"
+
+namespace touchstone::sim {
+
+/// One effect of the table in docs/ARCHITECTURE.md: simulated or not, why, and what it costs.
+struct Effect {
+  std::string name;
+  bool on = false;
+  std::string why;
+  std::string cost;
+};
+
+/// What a scene calls for. No code runs for an effect that is off.
+struct Plan {
+  bool camera = false;
+  bool friction = false;
+  bool refraction = false;
+  bool interreflection = false;
+  bool sensor_noise = false;
+  std::vector<Effect> effects;  ///< the same for people, with reasons
+};
+
+/// Decides each effect from the scene's own content and from the outputs asked for.
+/// @throws Error if an output can't be had (an image from a device without a camera)
+Plan make_plan(const SceneSpec& scene);
+
+/// Part of the light leaving a bright disc of albedo `albedo` and radius `disc_radius_mm` on the outer surface that comes
+/// back to it by reflection at the plate's lower face, the first term of the interreflection series. Light beyond the
+/// critical angle returns whole but sideways by 2 sum h_i tan(theta_i), so a small disc doesn't meet it again.
+double interreflection_estimate(const GelSpec& gel, const PlateSpec& plate, double albedo, double disc_radius_mm);
+
+}  // namespace touchstone::sim

@@ -1,0 +1,56 @@
+#include "sim/scene.h"
+
+namespace touchstone::sim {
+namespace {
+
+/// Reads the file that a scene names under `key`, relative to the scene's own folder.
+template <typename T>
+void read_named_file(YamlReader& in, const std::string& key, T& value) {
+  std::string name;
+  in.required(key, name);
+  const std::filesystem::path file = in.folder() / name;
+  if (!std::filesystem::is_regular_file(file)) fail_at(in.where(key), "{}: there is no file {}", key, file.string());
+  value = read_yaml<T>(file);
+}
+
+}  // namespace
+
+EnumNames<Switch> enum_names(Switch) {
+  return {{"auto", Switch::automatic}, {"on", Switch::on}, {"off", Switch::off}};
+}
+
+void fields(YamlReader& in, OutputSpec& outputs) {
+  in.optional("frames", outputs.frames);
+  in.optional("ideal", outputs.ideal);
+  in.optional("radiance", outputs.radiance);
+}
+
+void fields(YamlReader& in, LightSpec& light) {
+  in.optional("noise_fraction", light.noise_fraction, Allowed::above(0.0));
+  in.optional("min_samples", light.min_samples, Allowed::within(1, 1 << 16));
+  in.optional("max_samples", light.max_samples, Allowed::within(light.min_samples, 1 << 20));
+  in.optional("interreflection_tolerance", light.interreflection_tolerance, Allowed::within(0.0, 1.0));
+  in.optional("change_tolerance", light.change_tolerance, Allowed::at_least(0.0));
+}
+
+void fields(YamlReader& in, EffectSwitches& effects) {
+  in.optional("friction", effects.friction);
+  in.optional("interreflection", effects.interreflection);
+  in.optional("sensor_noise", effects.sensor_noise);
+}
+
+void fields(YamlReader& in, SceneSpec& scene) {
+  scene.where = in.where();
+  read_named_file(in, "device", scene.device);
+  read_named_file(in, "object", scene.object);
+  read_named_file(in, "motion", scene.motion);
+  in.optional("start_mm", scene.motion.start_mm);
+  in.optional("outputs", scene.outputs);
+  in.optional("light", scene.light);
+  in.optional("effects", scene.effects);
+  in.optional("seed", scene.seed);
+}
+
+SceneSpec read_scene(const std::filesystem::path& file) { return read_yaml<SceneSpec>(file); }
+
+}  // namespace touchstone::sim

@@ -1,0 +1,60 @@
+#pragma once
+// A scene file: a device, the object that touches it, a motion, and the outputs asked for. See docs/file-formats.md.
+
+#include <filesystem>
+#include <map>
+#include <string>
+
+#include "core/yaml_reader.h"
+#include "sim/device.h"
+#include "sim/motion.h"
+#include "sim/object.h"
+
+namespace touchstone::sim {
+
+/// What a scene's owner wants to have. Truth (forces, beads, surface) is always there.
+struct OutputSpec {
+  bool frames = true;      ///< what the camera delivers: PNG
+  bool ideal = false;      ///< frames without noise beside them: PNG
+  bool radiance = false;   ///< linear irradiance on the sensor: EXR, W/m^2 a band
+};
+
+/// How exact the light has to be.
+struct LightSpec {
+  double noise_fraction = 1.0;  ///< a pixel is sampled until its standard error is this part of the imager's noise
+  int min_samples = 8;
+  int max_samples = 64;
+  double interreflection_tolerance = 0.05;  ///< part of a surface's light that may be left out
+  double change_tolerance = 0.25;  ///< a pixel that changed by less than this part of the noise keeps its old light
+};
+
+enum class Switch { automatic, on, off };
+EnumNames<Switch> enum_names(Switch);
+
+/// A scene may force an effect on or off; `automatic` leaves it to the plan.
+struct EffectSwitches {
+  Switch friction = Switch::automatic;
+  Switch interreflection = Switch::automatic;
+  Switch sensor_noise = Switch::automatic;
+};
+
+struct SceneSpec {
+  DeviceSpec device;
+  ObjectSpec object;
+  MotionSpec motion;
+  OutputSpec outputs;
+  LightSpec light;
+  EffectSwitches effects;
+  std::uint64_t seed = 0;
+  SourceLocation where;
+};
+
+void fields(YamlReader& in, OutputSpec& outputs);
+void fields(YamlReader& in, LightSpec& light);
+void fields(YamlReader& in, EffectSwitches& effects);
+void fields(YamlReader& in, SceneSpec& scene);
+
+/// Reads a scene and the device and object files that it names. @throws Error with file and line
+SceneSpec read_scene(const std::filesystem::path& file);
+
+}  // namespace touchstone::sim

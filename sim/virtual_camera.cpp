@@ -1,0 +1,143 @@
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "core/units.h"
+#include "render/path_tracer.h"
+#include "sim/virtual_sensor.h"
+#include "sim/visible_scene.h"
+
+namespace touchstone::sim {
+namespace {
+
+constexpr int kPreviewStride = 2;
+// The first frame's light stays in every later frame where nothing changes, so it is rendered better than they are.
+constexpr double kFirstFrameFraction = 0.5;
+constexpr int kFirstFrameSamples = 4;
+
+/// Radius in pixels of the disc that a point of the scene is blurred to by the hole, at its nearest.
+double blur_radius_px(const DeviceSpec& device) {
+  const CameraSpec& camera = *device.camera;
+  const double nearest = std::max(1e-3, -device.gel.thickness_mm - camera.hole_position_mm.z());
+  return camera.hole_diameter_um / 2 * (1.0 + camera.hole_to_sensor_mm / nearest) / camera.pixel_pitch_um;
+}
+
+/// The response of the channel that the eye and most trackers lean on: green of three, or the grey one.
+render::NoiseTarget noise_target(const render::ImagerResponse& response, double fraction) {
+  render::NoiseTarget target;
+  const int channel = response.electrons_per_irradiance.rows() == 1 ? 0 : 1;
+  target.electrons_per_irradiance = response.electrons_per_irradiance.row(channel).transpose().array();
+  target.read_noise_e = response.read_noise_e;
+  target.quantisation_e = response.quantisation_e / std::sqrt(12.0);
+  target.fraction = fraction;
+  return target;
+}
+
+}  // namespace
+
+struct VirtualCamera::Parts {
+  SceneSpec scene;
+  Plan plan;
+  std::shared_ptr<const fem::Compliance> gel;
+  VisibleObject object;
+  render::PinholeCamera camera;
+  render::Imager imager;
+  render::Imager ideal_imager;
+  render::ImagerResponse response;
+  render::FixedPattern pattern;
+  render::RenderSettings settings;
+  cv::Mat first_light;    // irradiance of the first frame
+  cv::Mat first_preview;  // its preview without noise
+
+  render::Tracer tracer(const Truth& truth) const {
+    return render::Tracer(visible_scene(scene, plan, object, *gel, truth.press));
+  }
+
+  /// Which pixels changed against the first frame by more than the tolerance, widened by the hole's blur.
+  cv::Mat changed(const cv::Mat& preview) const {
+    cv::Mat mask(preview.size(), CV_8U, cv::Scalar(0));
+    const auto& per_irradiance = settings.noise->electrons_per_irradiance;
+    for (int row = 0; row < preview.rows; ++row) {
+      const auto* now = preview.ptr<cv::Vec3f>(row);
+      const auto* before = first_preview.ptr<cv::Vec3f>(row);
+      auto* out = mask.ptr<unsigned char>(row);
+      for (int column = 0; column < preview.cols; ++column) {
+        double electrons = 0.0;
+        double change = 0.0;
+        for (int band = 0; band < 3; ++band) {
+          electrons += per_irradiance[band] * before[column][band];
+          change += std::abs(per_irradiance[band] * (now[column][band] - before[column][band]));
+        }
+        if (change > scene.light.change_tolerance * render::noise_e(response, electrons)) out[column] = 255;
+      }
+    }
+    const int radius = 1 + static_cast<int>(std::ceil(blur_radius_px(scene.device) / kPreviewStride));
+    cv::dilate(mask, mask, cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * radius + 1, 2 * radius + 1}));
+    cv::Mat whole;
+    cv::resize(mask, whole, {mask.cols * kPreviewStride, mask.rows * kPreviewStride}, 0, 0, cv::INTER_NEAREST);
+    return whole(cv::Rect(0, 0, camera.width, camera.height)).clone();
+  }
+
+  Capture develop(const cv::Mat& irradiance, const Truth& truth, const render::RayCounts& counts,
+                  std::int64_t pixels) const {
+    Capture capture;
+    capture.paths_traced = static_cast<std::int64_t>(counts.paths);
+    capture.pixels_traced = pixels;
+    const auto picture = [&](const render::Imager& sensor) {
+      return render::develop(
+          render::expose(irradiance, sensor, pattern, scene.seed, static_cast<std::uint64_t>(truth.frame)), sensor);
+    };
+    if (scene.outputs.frames) capture.frame = picture(imager);
+    if (scene.outputs.ideal) capture.ideal = picture(ideal_imager);
+    if (scene.outputs.radiance) capture.radiance = irradiance;
+    return capture;
+  }
+};
+
+VirtualCamera::VirtualCamera(const SceneSpec& scene, const Plan& plan, std::shared_ptr<const fem::Compliance> gel,
+                             const Truth& first) {
+  TS_ASSERT(plan.camera && scene.device.camera);
+  auto parts = std::make_unique<Parts>();
+  parts->scene = scene;
+  parts->plan = plan;
+  parts->gel = std::move(gel);
+  parts->object = visible_object(scene.object);
+  parts->camera = pinhole_camera(*scene.device.camera);
+  parts->imager = imager(scene.device, plan.sensor_noise);
+  parts->ideal_imager = imager(scene.device, false);
+  parts->response = render::response_of(parts->imager);
+  parts->pattern = render::fixed_pattern(parts->imager, {parts->camera.width, parts->camera.height}, scene.seed);
+
+  render::RenderSettings settings;
+  settings.seed = scene.seed;
+  settings.min_samples = scene.light.min_samples;
+  settings.max_samples = scene.light.max_samples;
+  settings.noise = noise_target(parts->response, scene.light.noise_fraction);
+  parts->settings = settings;
+
+  const render::Tracer tracer = parts->tracer(first);
+  settings.noise->fraction *= kFirstFrameFraction;
+  settings.max_samples *= kFirstFrameSamples;
+  parts->first_light = tracer.render(parts->camera, settings).irradiance;
+  parts->first_preview = tracer.preview(parts->camera, kPreviewStride);
+  parts_ = std::move(parts);
+}
+
+VirtualCamera::~VirtualCamera() = default;
+
+Capture VirtualCamera::capture(const Truth& truth) const {
+  const render::Tracer tracer = parts_->tracer(truth);
+  const cv::Mat mask = parts_->changed(tracer.preview(parts_->camera, kPreviewStride));
+  const int pixels = cv::countNonZero(mask);
+  if (pixels == 0) return parts_->develop(parts_->first_light, truth, {}, 0);
+  const render::RenderedImage image = tracer.render(parts_->camera, parts_->settings, mask);
+  cv::Mat light = parts_->first_light.clone();
+  image.irradiance.copyTo(light, mask);
+  return parts_->develop(light, truth, image.counts, pixels);
+}
+
+Capture VirtualCamera::capture_whole(const Truth& truth) const {
+  const render::RenderedImage image = parts_->tracer(truth).render(parts_->camera, parts_->settings);
+  return parts_->develop(image.irradiance, truth, image.counts, image.irradiance.total());
+}
+
+}  // namespace touchstone::sim

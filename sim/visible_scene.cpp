@@ -1,0 +1,162 @@
+#include "sim/visible_scene.h"
+
+#include <cmath>
+
+#include "core/units.h"
+
+namespace touchstone::sim {
+namespace {
+
+enum MediumIndex { kAir = 0, kPlate = 1, kGel = 2 };
+
+render::Spectrum bands(const Eigen::Vector3d& values) { return values.array(); }
+
+/// The outer surface as it is displaced, without the triangles that the object wets.
+TriangleMesh dry_surface(const fem::Compliance& gel, const fem::PressState& press) {
+  TriangleMesh mesh;
+  mesh.vertices = gel.vertices;
+  for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
+    mesh.vertices[i] += press.surface_displacement.row(static_cast<Eigen::Index>(i)).transpose();
+  }
+  const auto touches = [&](int vertex) { return press.node_state[vertex] != fem::NodeState::open; };
+  for (const auto& t : gel.triangles) {
+    if (!(touches(t[0]) && touches(t[1]) && touches(t[2]))) mesh.triangles.push_back(t);
+  }
+  return mesh;
+}
+
+/// The frame that holds the gel: black walls round the pad's sides, from the plate to its outer surface.
+TriangleMesh pad_walls(const GelSpec& gel) {
+  const double x = gel.size_x_mm / 2;
+  const double y = gel.size_y_mm / 2;
+  const Eigen::Vector2d corners[4] = {{-x, -y}, {x, -y}, {x, y}, {-x, y}};
+  TriangleMesh mesh;
+  for (const Eigen::Vector2d& corner : corners) {
+    mesh.vertices.emplace_back(corner.x(), corner.y(), -gel.thickness_mm);
+    mesh.vertices.emplace_back(corner.x(), corner.y(), 0.0);
+  }
+  for (int side = 0; side < 4; ++side) {
+    const int a = 2 * side;
+    const int b = 2 * ((side + 1) % 4);
+    mesh.triangles.push_back({a, b, a + 1});
+    mesh.triangles.push_back({b, b + 1, a + 1});
+  }
+  return mesh;
+}
+
+TriangleMesh placed(TriangleMesh mesh, const RigidTransform& gel_from_object) {
+  for (Eigen::Vector3d& vertex : mesh.vertices) vertex = gel_from_object * vertex;
+  return mesh;
+}
+
+render::BayerPattern bayer_pattern(BayerLayout layout) {
+  switch (layout) {
+    case BayerLayout::none:
+      return render::BayerPattern::none;
+    case BayerLayout::rggb:
+      return render::BayerPattern::rggb;
+    case BayerLayout::bggr:
+      return render::BayerPattern::bggr;
+    case BayerLayout::grbg:
+      return render::BayerPattern::grbg;
+    case BayerLayout::gbrg:
+      return render::BayerPattern::gbrg;
+  }
+  TS_ASSERT(false);
+  return {};
+}
+
+}  // namespace
+
+VisibleObject visible_object(const ObjectSpec& object) {
+  VisibleObject visible;
+  visible.body = visible_mesh(object.shape);
+  if (object.holder) visible.holder = visible_mesh(*object.holder);
+  return visible;
+}
+
+render::Scene visible_scene(const SceneSpec& scene, const Plan& plan, const VisibleObject& object,
+                            const fem::Compliance& gel, const fem::PressState& press) {
+  const DeviceSpec& device = scene.device;
+  render::Scene out;
+  out.media.resize(3);
+  out.media[kPlate].index = device.plate.refractive_index;
+  out.media[kGel].index = device.gel.refractive_index;
+  out.media[kGel].absorption = render::flat_spectrum(3, device.gel.absorption_per_mm);
+  out.faces = {{-device.gel.thickness_mm - device.plate.thickness_mm, kAir, kPlate},
+               {-device.gel.thickness_mm, kPlate, kGel}};
+  out.surfaces.push_back({dry_surface(gel, press), render::Refractive{kGel, kAir}});
+  out.surfaces.push_back({pad_walls(device.gel), render::Black{}});
+  out.surfaces.push_back({placed(object.body, press.gel_from_object), render::Lambertian{bands(scene.object.albedo)}});
+  if (object.holder) {
+    out.surfaces.push_back(
+        {placed(*object.holder, press.gel_from_object), render::Lambertian{bands(scene.object.holder->albedo)}});
+  }
+  if (device.beads) {
+    const std::vector<Eigen::Vector3d> centres = bead_centres(*device.beads);
+    const render::RoughConductor metal{bands(device.beads->reflectance), device.beads->roughness};
+    for (std::size_t i = 0; i < centres.size(); ++i) {
+      const Eigen::Vector3d moved = press.bead_displacement.row(static_cast<Eigen::Index>(i));
+      out.balls.push_back({centres[i] + moved, device.beads->diameter_mm / 2, metal});
+    }
+  }
+  for (const LampSpec& lamp : device.lamps) {
+    out.lamps.push_back({lamp.position_mm, (lamp.target_mm - lamp.position_mm).normalized(), lamp.lens_radius_mm,
+                         lamp.half_angle_deg * kRadiansPerDegree, lamp.soft_angle_deg * kRadiansPerDegree,
+                         bands(lamp.power_W)});
+  }
+  out.environment = render::flat_spectrum(3, device.room_radiance);
+  out.interreflection = plan.interreflection;
+  return out;
+}
+
+render::PinholeCamera pinhole_camera(const CameraSpec& camera) {
+  render::PinholeCamera out;
+  out.width = camera.width;
+  out.height = camera.height;
+  out.pixel_pitch_um = camera.pixel_pitch_um;
+  out.hole_diameter_um = camera.hole_diameter_um;
+  out.foil_thickness_um = camera.foil_thickness_um;
+  out.distance_mm = camera.hole_to_sensor_mm;
+  // The upright picture has +y of the gel frame up. A camera that looks straight along y has +z up instead.
+  const Eigen::Vector3d view = (camera.look_at_mm - camera.hole_position_mm).normalized();
+  const Eigen::Vector3d down = std::abs(view.y()) > 0.999 ? Eigen::Vector3d(0, 0, -1) : Eigen::Vector3d(0, -1, 0);
+  out.gel_from_camera = look_at(camera.hole_position_mm, camera.look_at_mm, down);
+  return out;
+}
+
+render::Imager imager(const DeviceSpec& device, bool with_noise) {
+  const CameraSpec& camera = *device.camera;
+  render::Imager out;
+  out.bits = camera.bits;
+  out.active_area_um2 = camera.active_area_um2;
+  out.exposure_s = camera.exposure_us / kMicrosecondsPerSecond;
+  out.wavelengths_nm = bands(device.band_wavelengths_nm);
+  if (camera.bayer == BayerLayout::none) {
+    out.quantum_efficiency = camera.quantum_efficiency_green.transpose();
+  } else {
+    Eigen::Matrix3d efficiency;
+    efficiency << camera.quantum_efficiency_red.transpose(), camera.quantum_efficiency_green.transpose(),
+        camera.quantum_efficiency_blue.transpose();
+    out.quantum_efficiency = efficiency;
+  }
+  out.full_well_e = camera.full_well_e;
+  out.read_noise_e = camera.read_noise_e;
+  out.dark_current_e_per_s = camera.dark_current_e_per_s;
+  out.prnu = camera.prnu;
+  out.dsnu_e = camera.dsnu_e;
+  out.bayer = bayer_pattern(camera.bayer);
+  out.black_level_DN = camera.black_level_DN;
+  out.gain_DN_per_e = ((1 << camera.bits) - 1 - camera.black_level_DN) / camera.full_well_e;
+  out.ideal = !with_noise;
+  if (camera.white_balance) {
+    out.white_balance = *camera.white_balance;
+  } else if (camera.bayer != BayerLayout::none) {
+    Eigen::Vector3d light = Eigen::Vector3d::Zero();
+    for (const LampSpec& lamp : device.lamps) light += lamp.power_W;
+    if (light.sum() > 0.0) out.white_balance = render::grey_gains(out, bands(light));
+  }
+  return out;
+}
+
+}  // namespace touchstone::sim

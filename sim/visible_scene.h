@@ -1,0 +1,32 @@
+#pragma once
+// What the camera of a device sees of a pressed gel, in the renderer's terms.
+
+#include "fem/compliance.h"
+#include "fem/press.h"
+#include "render/imager.h"
+#include "render/pinhole_camera.h"
+#include "render/scene.h"
+#include "sim/plan.h"
+#include "sim/scene.h"
+
+namespace touchstone::sim {
+
+/// The meshes of an object file, read and turned once for all frames; object frame.
+struct VisibleObject {
+  TriangleMesh body;
+  std::optional<TriangleMesh> holder;
+};
+
+VisibleObject visible_object(const ObjectSpec& object);
+
+/// Plate, gel, beads, object and lamps as they stand at `press`. Where the gel is wetted by the object (all three corners
+/// of a surface triangle in contact) there is no face between them: the light goes on into the object.
+render::Scene visible_scene(const SceneSpec& scene, const Plan& plan, const VisibleObject& object,
+                            const fem::Compliance& gel, const fem::PressState& press);
+
+render::PinholeCamera pinhole_camera(const CameraSpec& camera);
+
+/// The imager of a device; its bands are those of the device, red, green, blue.
+render::Imager imager(const DeviceSpec& device, bool with_noise);
+
+}  // namespace touchstone::sim
