@@ -49,6 +49,7 @@ std::string sha256_of_file(const std::filesystem::path& path) {
   while (in.read(buffer.data(), buffer.size()) || in.gcount() > 0) {
     sum.add(buffer.data(), static_cast<std::size_t>(in.gcount()));
   }
+  if (in.bad()) fail("{}: can't be read", path.string());  // a folder, for one
   return sum.digest();
 }
 

@@ -1,5 +1,7 @@
 #include "core/transform.h"
 
+#include <cmath>
+
 #include "core/error.h"
 
 namespace touchstone {
@@ -12,9 +14,12 @@ Eigen::Matrix3d rotation_from_xyz(const Eigen::Vector3d& angles) {
 }
 
 RigidTransform look_at(const Eigen::Vector3d& eye, const Eigen::Vector3d& target, const Eigen::Vector3d& down) {
-  const Eigen::Vector3d z = (target - eye).normalized();
-  const Eigen::Vector3d y = (down - down.dot(z) * z).normalized();
-  TS_ASSERT(z.allFinite() && y.allFinite());
+  const double distance = (target - eye).norm();
+  TS_ASSERT(distance > 0.0 && std::isfinite(distance));
+  const Eigen::Vector3d z = (target - eye) / distance;
+  const Eigen::Vector3d across = down - down.dot(z) * z;
+  TS_ASSERT(across.norm() > 1e-12 * down.norm());  // `down` isn't along the view
+  const Eigen::Vector3d y = across.normalized();
   RigidTransform frame;
   frame.rotation.col(0) = y.cross(z);
   frame.rotation.col(1) = y;

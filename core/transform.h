@@ -27,7 +27,7 @@ struct RigidTransform {
   RigidTransform inverse() const { return {rotation.transpose(), -(rotation.transpose() * translation)}; }
 };
 
-/// Rotation by intrinsic angles about x, then y, then z (radians): R = Rz Ry Rx.
+/// Rotation about the fixed axes x, then y, then z by the given angles (radians): R = Rz Ry Rx.
 Eigen::Matrix3d rotation_from_xyz(const Eigen::Vector3d& angles);
 
 /// A camera at `eye` that looks at `target`, the image's downward direction being nearest to `down`.

@@ -2,6 +2,7 @@
 
 #include <yaml-cpp/yaml.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 
@@ -31,7 +32,9 @@ struct YamlReader::Node {
   std::string path;                        // keys from the root, with dots
   mutable std::vector<std::string> asked;  // keys that some field asked for
 
-  int line() const { return yaml.Mark().is_null() ? 0 : yaml.Mark().line + 1; }
+  int empty_line = 0;                      // line of the key, if nothing stands after it: YAML marks the next token
+
+  int line() const { return empty_line > 0 ? empty_line : yaml.Mark().is_null() ? 0 : yaml.Mark().line + 1; }
 };
 
 namespace {
@@ -41,6 +44,7 @@ std::optional<T> whole_number(const std::string& text) {
   T value{};
   const char* begin = text.data() + (text.starts_with('+') ? 1 : 0);
   const char* end = text.data() + text.size();
+  if (begin != end && begin != text.data() && *begin == '-') return std::nullopt;  // "+-5"
   const auto result = std::from_chars(begin, end, value);
   if (begin == end || result.ec != std::errc() || result.ptr != end) return std::nullopt;
   return value;
@@ -56,7 +60,12 @@ YamlReader YamlReader::parse(const std::string& text, const std::string& name) {
   auto node = std::make_shared<Node>();
   node->file = name;
   try {
-    node->yaml = YAML::Load(text);
+    const std::vector<YAML::Node> documents = YAML::LoadAll(text);
+    if (documents.size() > 1) {
+      const YAML::Mark mark = documents[1].Mark();
+      throw Error({name, mark.is_null() ? 0 : mark.line + 1}, "a second document begins here; one is read");
+    }
+    if (!documents.empty()) node->yaml = documents[0];
   } catch (const YAML::Exception& error) {
     throw Error({name, error.mark.is_null() ? 0 : error.mark.line + 1}, "isn't YAML: " + error.msg);
   }
@@ -99,6 +108,11 @@ std::optional<YamlReader> YamlReader::child(const std::string& key) {
   node->yaml = value;
   node->file = node_->file;
   node->path = node_->path.empty() ? key : node_->path + "." + key;
+  if (value.IsNull()) {
+    for (const auto& entry : map) {
+      if (entry.first.IsScalar() && entry.first.Scalar() == key) node->empty_line = entry.first.Mark().line + 1;
+    }
+  }
   return YamlReader(node);
 }
 
@@ -138,6 +152,15 @@ std::int64_t YamlReader::integer(Allowed allowed) const {
     fail_at(where(), "{}{} is not allowed; allowed is {}", context(), text, allowed.text());
   }
   return *value;
+}
+
+int YamlReader::small_integer(Allowed allowed) const {
+  const std::int64_t value = integer(allowed);
+  using Limits = std::numeric_limits<int>;
+  if (value < Limits::min() || value > Limits::max()) {
+    fail_at(where(), "{}{} is not allowed; allowed is from {} to {}", context(), value, Limits::min(), Limits::max());
+  }
+  return static_cast<int>(value);
 }
 
 std::uint64_t YamlReader::unsigned_integer(Allowed allowed) const {

@@ -56,7 +56,7 @@ class YamlReader {
   /// Reads the field `key`, which must be there.
   template <typename T>
   void required(const std::string& key, T& value, Allowed allowed = {}) {
-    const auto node = child(key);
+    auto node = child(key);
     if (!node) fail_at(where(), "{}'{}' is missing", context(), key);
     node->read(value, allowed);
   }
@@ -64,7 +64,7 @@ class YamlReader {
   /// Reads the field `key` if it's there, else leaves `value` as it is.
   template <typename T>
   void optional(const std::string& key, T& value, Allowed allowed = {}) {
-    if (const auto node = child(key)) node->read(value, allowed);
+    if (auto node = child(key)) node->read(value, allowed);
   }
 
   bool has(const std::string& key) const;
@@ -95,12 +95,13 @@ class YamlReader {
 
   double number(Allowed allowed) const;
   void read(double& value, Allowed allowed) { value = number(allowed); }
-  void read(int& value, Allowed allowed) { value = static_cast<int>(integer(allowed)); }
+  void read(int& value, Allowed allowed) { value = small_integer(allowed); }
   void read(std::int64_t& value, Allowed allowed) { value = integer(allowed); }
   void read(std::uint64_t& value, Allowed allowed) { value = unsigned_integer(allowed); }
   void read(bool& value, Allowed);
   void read(std::string& value, Allowed) { value = scalar("text"); }
   std::int64_t integer(Allowed allowed) const;
+  int small_integer(Allowed allowed) const;
   std::uint64_t unsigned_integer(Allowed allowed) const;
 
   template <int N>

@@ -15,6 +15,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kLongestName = 1024;  // longer texts are data (a glTF buffer inline), not names of files
+constexpr int kDeepest = 64;                // a YAML alias may hold itself
 
 /// JSON is YAML, so that a .gltf file's buffers are found like a scene's device.
 bool can_name_others(const fs::path& file) {
@@ -22,13 +23,14 @@ bool can_name_others(const fs::path& file) {
   return ending == ".yaml" || ending == ".yml" || ending == ".gltf";
 }
 
-void collect_names(const YAML::Node& node, std::vector<std::string>& names) {
+void collect_names(const YAML::Node& node, std::vector<std::string>& names, int depth = 0) {
+  if (depth > kDeepest) return;
   if (node.IsScalar()) {
     if (!node.Scalar().empty() && node.Scalar().size() <= kLongestName) names.push_back(node.Scalar());
   } else if (node.IsSequence()) {
-    for (const YAML::Node& item : node) collect_names(item, names);
+    for (const YAML::Node& item : node) collect_names(item, names, depth + 1);
   } else if (node.IsMap()) {
-    for (const auto& entry : node) collect_names(entry.second, names);
+    for (const auto& entry : node) collect_names(entry.second, names, depth + 1);
   }
 }
 

@@ -9,7 +9,6 @@ PreparedJob prepare_job(const std::filesystem::path& file) {
   prepared.file = file;
   prepared.job = read_job(file);
   prepared.text = read_whole_file(file);
-  prepared.inputs = input_files(file);
   for (const JobScene& entry : prepared.job.scenes) {
     PreparedScene scene;
     scene.entry = entry;
@@ -32,6 +31,7 @@ PreparedJob prepare_job(const std::filesystem::path& file) {
     prepared.samples += scene.samples;
     prepared.scenes.push_back(std::move(scene));
   }
+  prepared.inputs = input_files(file);
   return prepared;
 }
 

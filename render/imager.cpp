@@ -67,9 +67,13 @@ void require_finite(const char* name, double value, double low, bool low_itself 
   }
 }
 
-double largest_number(const Imager& imager) { return static_cast<double>((1 << imager.bits) - 1); }
+double largest_number(const Imager& imager) {
+  return static_cast<double>((1 << imager.bits) - 1);
+}
 
-int raw_type(const Imager& imager) { return imager.bits == 8 ? CV_8UC1 : CV_16UC1; }
+int raw_type(const Imager& imager) {
+  return imager.bits == 8 ? CV_8UC1 : CV_16UC1;
+}
 
 // Everything a pixel of the inner loop needs.
 struct PixelModel {
@@ -320,7 +324,9 @@ double noise_e(const ImagerResponse& response, double electrons) {
                    response.quantisation_e * response.quantisation_e / 12.0);
 }
 
-int channel_of(BayerPattern bayer, int column, int row) { return channels_of(bayer)[2 * (row & 1) + (column & 1)]; }
+int channel_of(BayerPattern bayer, int column, int row) {
+  return channels_of(bayer)[2 * (row & 1) + (column & 1)];
+}
 
 Eigen::Vector3d grey_gains(const Imager& imager, const Spectrum& white) {
   check(imager);

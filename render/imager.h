@@ -2,9 +2,9 @@
 // From light on the sensor to digital numbers, after the linear camera model of EMVA 1288 (release 4.0 linear):
 //
 //   mean photons    mu_p = sum over bands of E_b A t lambda_b / (h c)          irradiance, active area, exposure
-//   mean electrons  mu_e = sum over bands of eta_b mu_p,b                      quantum efficiency of the pixel's channel
-//   electrons       n    = min(Poisson(mu_e (1 + PRNU) + dark current t), full well)
-//   digital number  y    = clamp(floor(black + K (n + DSNU + read noise) + 1/2), 0, 2^bits - 1)
+//   mean electrons  mu_e = sum over bands of eta_b mu_p,b                      quantum efficiency of the pixel's
+//   channel electrons       n    = min(Poisson(mu_e (1 + PRNU) + dark current t), full well) digital number  y    =
+//   clamp(floor(black + K (n + DSNU + read noise) + 1/2), 0, 2^bits - 1)
 //
 // so that mean and temporal variance of a pixel below saturation lie on the photon transfer line
 // var_y = K^2 var_d + 1/12 + K (mu_y - mu_dark).
@@ -25,20 +25,21 @@ using QuantumEfficiency = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 
 
 /// A sensor and its read-out.
 struct Imager {
-  int bits = 8;                           ///< 8 gives CV_8U, 9 to 16 give CV_16U
-  double active_area_um2 = 0.0;           ///< light-collecting area of one pixel
-  double exposure_s = 0.0;                ///< 0 is legal: a dark frame
-  QuantumEfficiency quantum_efficiency;   ///< channels x bands
-  Spectrum wavelengths_nm;                ///< of the bands
-  double full_well_e = 0.0;               ///< electrons at which a pixel saturates
-  double read_noise_e = 0.0;              ///< standard deviation of the temporal dark noise
-  double dark_current_e_per_s = 0.0;      ///< mean thermal electrons, with shot noise of their own
-  double prnu = 0.0;                      ///< standard deviation over pixels of the relative sensitivity
-  double dsnu_e = 0.0;                    ///< standard deviation over pixels of the dark offset
+  int bits = 8;                          ///< 8 gives CV_8U, 9 to 16 give CV_16U
+  double active_area_um2 = 0.0;          ///< light-collecting area of one pixel
+  double exposure_s = 0.0;               ///< 0 is legal: a dark frame
+  QuantumEfficiency quantum_efficiency;  ///< channels x bands
+  Spectrum wavelengths_nm;               ///< of the bands
+  double full_well_e = 0.0;              ///< electrons at which a pixel saturates
+  double read_noise_e = 0.0;             ///< standard deviation of the temporal dark noise
+  double dark_current_e_per_s = 0.0;     ///< mean thermal electrons, with shot noise of their own
+  double prnu = 0.0;                     ///< standard deviation over pixels of the relative sensitivity
+  double dsnu_e = 0.0;                   ///< standard deviation over pixels of the dark offset
   BayerPattern bayer = BayerPattern::none;
-  double gain_DN_per_e = 1.0;             ///< K
-  double black_level_DN = 0.0;            ///< added before quantisation, taken off again by `develop`
-  Eigen::Vector3d white_balance{1, 1, 1}; ///< gains of R, G, B in `develop`; each at least 0; (1,1,1) for a grey sensor
+  double gain_DN_per_e = 1.0;   ///< K
+  double black_level_DN = 0.0;  ///< added before quantisation, taken off again by `develop`
+  Eigen::Vector3d white_balance{1, 1,
+                                1};  ///< gains of R, G, B in `develop`; each at least 0; (1,1,1) for a grey sensor
   /// An ideal image: no shot noise, read noise, dark current, PRNU or DSNU. What stays is the sensor's colour filters,
   /// the clip at full well and at the largest number, and rounding to the nearest whole number: inside the range
   /// |y - (black + K mu_e)| <= 1/2.
@@ -98,11 +99,11 @@ int channel_of(BayerPattern bayer, int column, int row);
 Eigen::Vector3d grey_gains(const Imager& imager, const Spectrum& white);
 
 /// A colour camera with Sony's IMX273 read out by 2x2 skipping, as in the vhs sensor: 640x480 pixels at a pitch of
-/// 6.9 um, each the light of one 3.45 um pixel (area 11.9 um^2). Full well 10.5 ke- and 2.8 e- of dark noise follow from
-/// the published SNR (40.2 dB) and dynamic range (71.4 dB). Bands at 450, 540 and 610 nm; their quantum efficiencies are
-/// typical of what camera makers' data sheets plot for this generation of colour sensors (peak about 0.6), good to about
-/// 0.05. PRNU 0.5 %, DSNU 1 e-, dark current 10 e-/s are typical too. The gain takes the full well to the largest
-/// number, the black level is four times the read noise, rounded up. RGGB.
+/// 6.9 um, each the light of one 3.45 um pixel (area 11.9 um^2). Full well 10.5 ke- and 2.8 e- of dark noise follow
+/// from the published SNR (40.2 dB) and dynamic range (71.4 dB). Bands at 450, 540 and 610 nm; their quantum
+/// efficiencies are typical of what camera makers' data sheets plot for this generation of colour sensors (peak about
+/// 0.6), good to about 0.05. PRNU 0.5 %, DSNU 1 e-, dark current 10 e-/s are typical too. The gain takes the full well
+/// to the largest number, the black level is four times the read noise, rounded up. RGGB.
 Imager imx273_skipping(int bits, double exposure_s);
 
 }  // namespace touchstone::render

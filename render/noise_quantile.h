@@ -1,6 +1,7 @@
 #pragma once
-// Noise by inversion: one uniform number gives one noisy value, monotonic in the uniform number and in the mean. Rejection
-// methods draw a varying number of times, which would make a pixel's noise jump when its light changes a little.
+// Noise by inversion: one uniform number gives one noisy value, monotonic in the uniform number and in the mean.
+// Rejection methods draw a varying number of times, which would make a pixel's noise jump when its light changes a
+// little.
 
 #include <algorithm>
 #include <cmath>
@@ -33,8 +34,8 @@ inline double normal_quantile(double u) {
   return q < 0.0 ? -value : value;
 }
 
-/// The smallest whole number at or below which a share u of a Poisson distribution lies. Exact by summing up to a mean of
-/// 32; above, the Cornish-Fisher expansion to O(1/mean) (M. Giles 2016, "Algorithm 955: approximation of the inverse
+/// The smallest whole number at or below which a share u of a Poisson distribution lies. Exact by summing up to a mean
+/// of 32; above, the Cornish-Fisher expansion to O(1/mean) (M. Giles 2016, "Algorithm 955: approximation of the inverse
 /// Poisson cumulative distribution function", eq. for the normal asymptotic), which gives the neighbouring number for
 /// less than one u in a thousand. @pre mean >= 0 and finite, u in [0, 1)
 inline double poisson_quantile(double mean, double u) {

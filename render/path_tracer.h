@@ -24,7 +24,7 @@ struct RenderSettings {
   std::uint64_t seed = 0;
   int min_samples = 16;   ///< paths per pixel before the first look at the error; powers of two sample best
   int max_samples = 256;  ///< with no noise target each pixel gets exactly `min_samples`
-  int max_depth = 8;      ///< diffuse or metallic reflections on a path; refractions don't count. Russian roulette from 3
+  int max_depth = 8;  ///< diffuse or metallic reflections on a path; refractions don't count. Russian roulette from 3
   std::optional<NoiseTarget> noise;
 };
 
@@ -38,7 +38,8 @@ struct RayCounts {
 };
 
 /// `irradiance`: CV_32FC(N), W/m^2 on the sensor in each band, mean over the pixel's area. `standard_error`: CV_32FC1,
-/// of the irradiance summed over the bands. `samples`: CV_32S, paths spent. Pixels outside the mask are zero.
+/// of the irradiance summed over the bands (infinite below 8 samples). `samples`: CV_32S, paths spent. Pixels outside
+/// the mask are zero.
 struct RenderedImage {
   cv::Mat irradiance;
   cv::Mat standard_error;
@@ -60,8 +61,8 @@ struct RenderedImage {
 /// focused by curved surfaces onto matt surfaces (caustics of the lamp) is left out, as is the lamp's own mirror image.
 /// A path after 64 smooth refractions or reflections is taken to have left the scene.
 ///
-/// A path is a pure function of (seed, pixel, sample), a pixel of (seed, pixel): the same bytes for any number of threads
-/// and with any mask.
+/// A path is a pure function of (seed, pixel, sample), a pixel of (seed, pixel): the same bytes for any number of
+/// threads and with any mask.
 class Tracer {
  public:
   /// Throws Error if the scene is faulty (check_scene) or has a number of bands other than 1 or 3.
@@ -79,7 +80,8 @@ class Tracer {
   cv::Mat preview(const PinholeCamera& camera, int stride) const;
 
   /// What the paths themselves do, for tests and tools: mean basic radiance seen along a ray of the gel frame.
-  Spectrum radiance(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, const RenderSettings& settings) const;
+  Spectrum radiance(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
+                    const RenderSettings& settings) const;
 
   struct Prepared;  ///< one per number of bands; defined where it's used
 

@@ -79,9 +79,9 @@ struct SpotLamp {
 ///
 /// Faces are given from low z to high z; the medium above one is the medium below the next; coincident faces (a layer
 /// of no thickness) are allowed. With no faces all space is media[0]. A ray's medium is the state of its path: it
-/// changes at faces and Refractive surfaces, so a gel surface may have holes where an object is pressed on: a ray in the
-/// gel then meets the object directly. A ray that slips through such a hole beside the object stays "in the gel" until
-/// it meets the next boundary or leaves the scene.
+/// changes at faces and Refractive surfaces, so a gel surface may have holes where an object is pressed on: a ray in
+/// the gel then meets the object directly. A ray that slips through such a hole beside the object stays "in the gel"
+/// until it meets the next boundary or leaves the scene.
 struct Scene {
   std::vector<Medium> media = {Medium{}};
   std::vector<FlatFace> faces;

@@ -16,6 +16,8 @@ template <int N>
 using Bands = Eigen::Array<double, N, 1>;
 
 /// The same value in each of `bands` bands.
-inline Spectrum flat_spectrum(int bands, double value) { return Spectrum::Constant(bands, value); }
+inline Spectrum flat_spectrum(int bands, double value) {
+  return Spectrum::Constant(bands, value);
+}
 
 }  // namespace touchstone::render

@@ -26,9 +26,10 @@ struct ForceSamples {
 struct TrainingSettings {
   MatrixForm form = MatrixForm::kAsymmetric;
   StopRule stop = StopRule::kLossDrop;
-  double loss_drop = 100.0;         ///< for StopRule::kLossDrop
-  double least_improvement = 1e-9;  ///< for StopRule::kConvergence: relative, an iteration, over the last 100
-  bool momentum = false;            ///< Nesterov's, restarted whenever the loss would rise
+  double loss_drop = 100.0;  ///< for StopRule::kLossDrop
+  /// A step that would lower the loss by less than this part of it ends the descent, under either rule.
+  double least_improvement = 1e-10;
+  bool momentum = false;  ///< Nesterov's, begun anew whenever it points uphill
   std::int64_t max_iterations = 1'000'000;
 
   /// The text's rule: plain descent until the loss is a hundredth.

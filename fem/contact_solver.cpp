@@ -1,0 +1,391 @@
+#include "fem/contact_solver.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/error.h"
+
+namespace touchstone::fem {
+namespace {
+
+constexpr int kMostPivots = 500;
+constexpr int kBlockTries = 10;
+constexpr int kMostNewton = 120;
+constexpr int kPatience = 6;
+constexpr int kSweeps = 40;
+
+Eigen::VectorXd times_sparse(const Eigen::MatrixXd& a, const Eigen::VectorXd& z) {
+  Eigen::VectorXd result = Eigen::VectorXd::Zero(a.rows());
+  for (Eigen::Index j = 0; j < z.size(); ++j) {
+    if (z[j] != 0.0) result += z[j] * a.col(j);
+  }
+  return result;
+}
+
+}  // namespace
+
+ContactAnswer solve_frictionless(const ContactProblem& problem, const Eigen::VectorXd& start) {
+  TS_ASSERT(problem.components == 1);
+  const Eigen::MatrixXd& a = *problem.compliance;
+  const auto m = static_cast<int>(problem.gap.size());
+  const auto k = static_cast<int>(problem.border.cols());
+  ContactAnswer answer;
+  answer.shift = Eigen::VectorXd::Zero(k);
+  std::vector<char> active(m, 0);
+  bool any = false;
+  for (int i = 0; i < m; ++i) {
+    const bool able = std::isfinite(problem.gap[i]);
+    active[i] = able && (start.size() == m ? start[i] > 0.0 : problem.gap[i] < 0.0);
+    any = any || active[i];
+  }
+  if (!any && k > 0) {
+    int nearest = -1;
+    for (int i = 0; i < m; ++i) {
+      if (nearest < 0 || problem.gap[i] / problem.border(i, 0) < problem.gap[nearest] / problem.border(nearest, 0)) {
+        nearest = i;
+      }
+    }
+    if (nearest < 0 || !std::isfinite(problem.gap[nearest])) return answer;
+    active[nearest] = 1;
+  }
+  int fewest = std::numeric_limits<int>::max();
+  int tries = kBlockTries;
+  std::vector<int> set;
+  for (int pivot = 0; pivot < kMostPivots; ++pivot) {
+    set.clear();
+    for (int i = 0; i < m; ++i) {
+      if (active[i]) set.push_back(i);
+    }
+    const auto size = static_cast<Eigen::Index>(set.size());
+    answer.z = Eigen::VectorXd::Zero(m);
+    if (size > 0) {
+      const Eigen::MatrixXd sub = a(set, set);
+      const Eigen::LLT<Eigen::MatrixXd> factor(sub);
+      Eigen::VectorXd p = factor.solve(-problem.gap(set));
+      if (k > 0) {
+        const Eigen::MatrixXd border = problem.border(set, Eigen::all);
+        const Eigen::MatrixXd through = factor.solve(border);
+        const Eigen::MatrixXd schur = border.transpose() * through;
+        answer.shift = schur.partialPivLu().solve(border.transpose() * p - problem.force);
+        p -= through * answer.shift;
+      }
+      answer.z(set) = p;
+      ++answer.factorisations;
+    }
+    ++answer.iterations;
+    answer.response = times_sparse(a, answer.z);
+    if (!answer.z.allFinite()) return answer;
+    const Eigen::VectorXd g = problem.gap + answer.response + problem.border * answer.shift;
+    const double largest = answer.z.size() > 0 ? answer.z.cwiseAbs().maxCoeff() : 0.0;
+    int violated = 0;
+    int last = -1;
+    double worst = 0.0;
+    std::vector<char> flip(m, 0);
+    for (int i = 0; i < m; ++i) {
+      if (!std::isfinite(problem.gap[i])) continue;
+      const double noise = 1e-13 * largest;
+      const bool wrong = active[i] ? answer.z[i] < -noise : g[i] / a(i, i) < -noise - 1e-300;
+      if (!wrong) continue;
+      worst = std::max(worst, active[i] ? -answer.z[i] : -g[i] / a(i, i));
+      flip[i] = 1;
+      ++violated;
+      last = i;
+    }
+    answer.residual = largest > 0.0 ? worst / largest : worst;
+    if (violated == 0) {
+      // The exact answer of the last set; tensions within rounding are zero.
+      answer.state.assign(m, NodeState::open);
+      for (const int i : set) {
+        answer.z[i] = std::max(0.0, answer.z[i]);
+        answer.state[i] = NodeState::slip;
+      }
+      answer.converged = true;
+      return answer;
+    }
+    if (violated < fewest) {
+      fewest = violated;
+      tries = kBlockTries;
+    } else if (tries > 0) {
+      --tries;
+    } else {
+      std::fill(flip.begin(), flip.end(), 0);
+      flip[last] = 1;
+    }
+    int left = 0;
+    for (int i = 0; i < m; ++i) {
+      if (flip[i]) active[i] = !active[i];
+      left += active[i];
+    }
+    // A wanted force needs somebody to carry it.
+    if (left == 0 && k > 0) {
+      Eigen::Index best = 0;
+      answer.z.maxCoeff(&best);
+      active[best] = 1;
+    }
+  }
+  return answer;
+}
+
+namespace {
+
+/// The frictional problem at one iterate, and the pieces of Newton's step.
+class FrictionalNewton {
+ public:
+  FrictionalNewton(const ContactProblem& problem, const Eigen::VectorXd& start, const Eigen::VectorXd& shift)
+      : problem_(problem),
+        a_(*problem.compliance),
+        m_(static_cast<int>(problem.gap.size())),
+        k_(static_cast<int>(problem.border.cols())) {
+    answer.z = start.size() == 3 * m_ ? start : Eigen::VectorXd::Zero(3 * m_);
+    answer.shift = shift.size() == k_ ? shift : Eigen::VectorXd::Zero(k_);
+    answer.state.assign(m_, NodeState::open);
+    for (int i = 0; i < m_; ++i) {
+      if (!(answer.z[3 * i] > 0.0) || !std::isfinite(problem.gap[i])) answer.z.segment<3>(3 * i).setZero();
+    }
+    refresh();
+  }
+
+  ContactAnswer answer;
+
+  /// Response, states and residual at the current z and shift.
+  void refresh() {
+    answer.response = times_sparse(a_, answer.z);
+    slack_ = answer.response + problem_.border * answer.shift;
+    double largest = 0.0;
+    for (int i = 0; i < m_; ++i) largest = std::max(largest, answer.z[3 * i]);
+    double worst = 0.0;
+    for (int i = 0; i < m_; ++i) {
+      if (!std::isfinite(problem_.gap[i])) {
+        answer.state[i] = NodeState::open;
+        continue;
+      }
+      const double p = answer.z[3 * i];
+      const double wanted = std::max(0.0, p - gap_at(i) / a_(3 * i, 3 * i));
+      worst = std::max(worst, std::abs(p - wanted));
+      if (wanted <= 0.0) {
+        answer.state[i] = NodeState::open;
+        worst = std::max(worst, answer.z.segment<2>(3 * i + 1).norm());
+        continue;
+      }
+      const Eigen::Vector2d v = predicted(i);
+      const double limit = problem_.friction * std::max(0.0, p);
+      const Eigen::Vector2d t = answer.z.segment<2>(3 * i + 1);
+      if (std::isinf(problem_.friction) || v.norm() <= limit) {
+        answer.state[i] = NodeState::stick;
+        worst = std::max(worst, (t - v).norm());
+      } else {
+        answer.state[i] = NodeState::slip;
+        worst = std::max(worst, (t - limit * v.normalized()).norm());
+      }
+    }
+    for (int b = 0; b < k_; ++b) {
+      const double missing = problem_.border.col(b).dot(answer.z) - problem_.force[b];
+      worst = std::max(worst, std::abs(missing) / problem_.border.col(b).cwiseAbs().maxCoeff());
+    }
+    answer.residual = largest > 0.0 ? worst / largest : (worst > 0.0 ? 1.0 : 0.0);
+    if (!std::isfinite(answer.residual)) answer.residual = std::numeric_limits<double>::infinity();
+  }
+
+  /// One Newton step; with `keep` the last factorised Jacobian serves again if the sets are those it was made for.
+  bool step(bool keep) {
+    for (int i = 0; i < m_; ++i) {
+      if (answer.state[i] == NodeState::open) answer.z.segment<3>(3 * i).setZero();
+    }
+    answer.response = times_sparse(a_, answer.z);
+    slack_ = answer.response + problem_.border * answer.shift;
+    if (!keep || answer.state != factored_state_) {
+      if (!factorise()) return false;
+    }
+    const auto size = static_cast<Eigen::Index>(3 * set_.size());
+    Eigen::VectorXd right(size + k_);
+    for (std::size_t row = 0; row < set_.size(); ++row) {
+      const int i = set_[row];
+      const auto at = static_cast<Eigen::Index>(3 * row);
+      right[at] = -gap_at(i);
+      if (answer.state[i] == NodeState::stick) {
+        right.segment<2>(at + 1) = -slip_at(i);
+      } else {
+        const Eigen::Vector2d v = predicted(i);
+        const Eigen::Vector2d t = answer.z.segment<2>(3 * i + 1);
+        const double limit = problem_.friction * std::max(0.0, answer.z[3 * i]);
+        right.segment<2>(at + 1) = -tangential_scale(i) * (t - limit * v.normalized());
+      }
+    }
+    if (k_ > 0) right.tail(k_) = problem_.force - problem_.border.transpose() * answer.z;
+    Eigen::VectorXd change = lu_.solve(right);
+    ++answer.iterations;
+    if (!change.allFinite()) return false;
+    for (std::size_t row = 0; row < set_.size(); ++row) {
+      answer.z.segment<3>(3 * set_[row]) += change.segment<3>(static_cast<Eigen::Index>(3 * row));
+    }
+    if (k_ > 0) answer.shift += change.tail(k_);
+    refresh();
+    return true;
+  }
+
+  /// Block Gauss-Seidel at fixed shift: each vertex in turn gets the traction that its own law asks for.
+  void sweep(int sweeps) {
+    for (int i = 0; i < m_; ++i) {
+      if (!std::isfinite(problem_.gap[i])) answer.z.segment<3>(3 * i).setZero();
+    }
+    answer.response = times_sparse(a_, answer.z);
+    const Eigen::VectorXd rigid = problem_.border * answer.shift;
+    for (int count = 0; count < sweeps; ++count) {
+      for (int i = 0; i < m_; ++i) {
+        if (!std::isfinite(problem_.gap[i])) continue;
+        const Eigen::Vector3d before = answer.z.segment<3>(3 * i);
+        Eigen::Vector3d now = before;
+        const double normal = a_(3 * i, 3 * i);
+        now[0] = std::max(0.0, before[0] - (problem_.gap[i] + answer.response[3 * i] + rigid[3 * i]) / normal);
+        const double scale = tangential_scale(i);
+        const Eigen::Vector2d d = answer.response.segment<2>(3 * i + 1) + rigid.segment<2>(3 * i + 1) -
+                                  problem_.drag.segment<2>(2 * i) +
+                                  (now[0] - before[0]) * a_.block<2, 1>(3 * i + 1, 3 * i);
+        Eigen::Vector2d t = before.tail<2>() - d / scale;
+        const double limit = problem_.friction * now[0];
+        if (now[0] == 0.0) {
+          t.setZero();
+        } else if (t.norm() > limit) {
+          t *= limit / t.norm();
+        }
+        now.tail<2>() = t;
+        const Eigen::Vector3d change = now - before;
+        if (change.isZero(0.0)) continue;
+        answer.z.segment<3>(3 * i) = now;
+        answer.response.noalias() += a_.middleCols<3>(3 * i) * change;
+      }
+      ++answer.sweeps;
+    }
+    factored_state_.clear();
+    refresh();
+  }
+
+ private:
+  double gap_at(int i) const { return problem_.gap[i] + slack_[3 * i]; }
+  Eigen::Vector2d slip_at(int i) const { return slack_.segment<2>(3 * i + 1) - problem_.drag.segment<2>(2 * i); }
+  double tangential_scale(int i) const { return std::max(a_(3 * i + 1, 3 * i + 1), a_(3 * i + 2, 3 * i + 2)); }
+  Eigen::Vector2d predicted(int i) const {
+    return answer.z.segment<2>(3 * i + 1) - slip_at(i) / tangential_scale(i);
+  }
+
+  bool factorise() {
+    factored_state_ = answer.state;
+    set_.clear();
+    for (int i = 0; i < m_; ++i) {
+      if (answer.state[i] != NodeState::open) set_.push_back(i);
+    }
+    if (set_.empty()) return false;
+    const auto size = static_cast<Eigen::Index>(3 * set_.size());
+    Eigen::MatrixXd jacobian(size + k_, size + k_);
+    std::vector<int> dofs;
+    for (const int i : set_) {
+      for (int c = 0; c < 3; ++c) dofs.push_back(3 * i + c);
+    }
+    jacobian.topLeftCorner(size, size) = a_(dofs, dofs);
+    if (k_ > 0) {
+      jacobian.topRightCorner(size, k_) = problem_.border(dofs, Eigen::all);
+      jacobian.bottomLeftCorner(k_, size) = jacobian.topRightCorner(size, k_).transpose();
+      jacobian.bottomRightCorner(k_, k_).setZero();
+    }
+    for (std::size_t row = 0; row < set_.size(); ++row) {
+      const int i = set_[row];
+      if (answer.state[i] != NodeState::slip) continue;
+      const auto at = static_cast<Eigen::Index>(3 * row) + 1;
+      const double scale = tangential_scale(i);
+      const Eigen::Vector2d v = predicted(i);
+      const double length = v.norm();
+      const Eigen::Vector2d along = v / length;
+      // Derivative of t - mu p v/|v| with v = t - d/scale, times scale. The factor is at most 1 at the answer; far
+      // from it the clamp keeps the step from pointing away (Hueber, Stadler and Wohlmuth, SIAM J. Sci. Comput. 30, 2008).
+      const double factor = std::min(1.0, problem_.friction * std::max(0.0, answer.z[3 * i]) / length);
+      const Eigen::Matrix2d across = factor * (Eigen::Matrix2d::Identity() - along * along.transpose());
+      jacobian.middleRows<2>(at) = (across * jacobian.middleRows<2>(at)).eval();
+      jacobian.block<2, 2>(at, at) += scale * (Eigen::Matrix2d::Identity() - across);
+      jacobian.block<2, 1>(at, at - 1) -= scale * problem_.friction * along;
+    }
+    lu_.compute(jacobian);
+    ++answer.factorisations;
+    return true;
+  }
+
+  const ContactProblem& problem_;
+  const Eigen::MatrixXd& a_;
+  const int m_;
+  const int k_;
+  Eigen::VectorXd slack_;
+  std::vector<NodeState> factored_state_;
+  std::vector<int> set_;
+  Eigen::PartialPivLU<Eigen::MatrixXd> lu_;
+};
+
+/// The answer without friction, as (p, 0, 0) per vertex: where Newton starts from nothing.
+ContactAnswer frictionless_start(const ContactProblem& problem) {
+  const auto m = static_cast<int>(problem.gap.size());
+  const auto k = static_cast<int>(problem.border.cols());
+  std::vector<int> normals(m);
+  for (int i = 0; i < m; ++i) normals[i] = 3 * i;
+  std::vector<int> columns;
+  for (int b = 0; b < k; ++b) {
+    const double normal = problem.border(normals, b).cwiseAbs().maxCoeff();
+    if (normal > 1e-9 * problem.border.col(b).cwiseAbs().maxCoeff()) columns.push_back(b);
+  }
+  const Eigen::MatrixXd compliance = (*problem.compliance)(normals, normals);
+  ContactProblem part;
+  part.compliance = &compliance;
+  part.gap = problem.gap;
+  part.border = problem.border(normals, columns);
+  part.force = problem.force(columns);
+  const ContactAnswer found = solve_frictionless(part, {});
+  ContactAnswer start;
+  start.z = Eigen::VectorXd::Zero(3 * m);
+  start.shift = Eigen::VectorXd::Zero(k);
+  if (found.converged) {
+    start.z(normals) = found.z;
+    start.shift(columns) = found.shift;
+  }
+  return start;
+}
+
+}  // namespace
+
+ContactAnswer solve_frictional(const ContactProblem& problem, const Eigen::VectorXd& start, double tolerance) {
+  TS_ASSERT(problem.components == 3);
+  ContactAnswer without;
+  if (start.size() == 0) without = frictionless_start(problem);
+  FrictionalNewton newton(problem, start.size() == 0 ? without.z : start, without.shift);
+  double best = std::numeric_limits<double>::infinity();
+  Eigen::VectorXd best_z = newton.answer.z;
+  Eigen::VectorXd best_shift = newton.answer.shift;
+  int since_best = 0;
+  bool keep = false;
+  for (int iteration = 0; iteration < kMostNewton; ++iteration) {
+    const double before = newton.answer.residual;
+    if (before < best) {
+      best = before;
+      best_z = newton.answer.z;
+      best_shift = newton.answer.shift;
+      since_best = 0;
+    } else if (++since_best > kPatience) {
+      newton.answer.z = best_z;
+      newton.answer.shift = best_shift;
+      newton.refresh();
+      newton.sweep(kSweeps);
+      best = newton.answer.residual;
+      best_z = newton.answer.z;
+      since_best = 0;
+      keep = false;
+    }
+    if (newton.answer.residual <= tolerance) {
+      newton.answer.converged = true;
+      break;
+    }
+    if (!newton.step(keep)) break;
+    keep = newton.answer.residual < 0.2 * before;
+  }
+  return newton.answer;
+}
+
+}  // namespace touchstone::fem

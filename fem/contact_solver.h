@@ -1,0 +1,55 @@
+#pragma once
+// Unilateral contact with Coulomb friction on a small block of surface vertices, as algebra.
+//
+// Unknown per vertex: z = (p, t1, t2): pressure and the tangential traction on the gel in the vertex's own axes (MPa).
+// With c components a vertex (1 without friction, 3 with it), m vertices and k rigid shifts s of the object (mm):
+//   normal:      g = gap + (A z + B s)_n >= 0,  p >= 0,  p g = 0
+//   tangential:  d = (A z + B s)_t - drag,  |t| <= mu p,  d = 0 where |t| < mu p,  t = -mu p d/|d| where it slips
+//   rigid:       B^T z = force
+// (Wriggers, Computational Contact Mechanics, 2nd ed., sec. 5; the friction law as a projection: Alart and Curnier,
+// Comput. Methods Appl. Mech. Eng. 92, 1991.)
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+namespace touchstone::fem {
+
+/// What a surface vertex does: no contact; in contact and carried along by the object; in contact and sliding on it
+/// (without friction every vertex in contact slides).
+enum class NodeState : std::uint8_t { open = 0, stick = 1, slip = 2 };
+
+/// One contact problem. `compliance` is A, symmetric positive definite, (c m) x (c m), mm^3 per MPa.
+struct ContactProblem {
+  const Eigen::MatrixXd* compliance = nullptr;
+  int components = 1;        ///< c: 1 or 3
+  Eigen::VectorXd gap;       ///< m, mm^3; infinity: can't touch
+  Eigen::VectorXd drag;      ///< 2 m, mm^3; with friction only
+  double friction = 0.0;     ///< mu; infinity: what touches sticks
+  Eigen::MatrixXd border;    ///< (c m) x k
+  Eigen::VectorXd force;     ///< k, N
+};
+
+struct ContactAnswer {
+  Eigen::VectorXd z;              ///< c m, MPa
+  Eigen::VectorXd shift;          ///< k, mm
+  Eigen::VectorXd response;       ///< A z, mm^3
+  std::vector<NodeState> state;   ///< m
+  int iterations = 0;             ///< systems solved
+  int factorisations = 0;
+  int sweeps = 0;                 ///< of block Gauss-Seidel, where Newton stalled
+  double residual = 0.0;          ///< largest change of a traction by the laws' projection, relative to the largest pressure
+  bool converged = false;
+};
+
+/// Frictionless (components == 1): block principal pivoting (Judice and Pires, Computers Ops Res. 21, 1994), which is
+/// the primal-dual active set where that converges and ends also where that would cycle. `start` gives the first active
+/// set (p > 0); it may be empty. With one border column, `force` must be above zero.
+ContactAnswer solve_frictionless(const ContactProblem& problem, const Eigen::VectorXd& start);
+
+/// With friction (components == 3): semismooth Newton on the projection equations, the factorised Jacobian kept while
+/// the sets of open, sticking and slipping vertices stay and it converges fast; block Gauss-Seidel sweeps with
+/// projection on the disc where it stalls. `start` is z to begin with, or empty. Ends when `residual` <= tolerance.
+ContactAnswer solve_frictional(const ContactProblem& problem, const Eigen::VectorXd& start, double tolerance);
+
+}  // namespace touchstone::fem

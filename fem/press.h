@@ -1,0 +1,105 @@
+#pragma once
+// A rigid body pressed on the gel, step by step along a motion.
+//
+// Linear elasticity and unilateral contact with Coulomb friction. What is kept of large motion: the gap is looked up
+// where the gel's tangential displacement has carried each surface point (a sheared gel stays under the object that
+// holds it), and the object's own rotation is finite. Contact acts along the undeformed surface's normal.
+//
+// Friction remembers: each step adds the relative motion of object and gel since the last one, and what sticks is
+// carried along. A step that starts out of contact takes its history from the touch on: with all axes
+// position-controlled, from where the straight way from the last pose first touches; with z force-controlled (or at the
+// very first step) from straight above the target.
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <vector>
+
+#include "core/transform.h"
+#include "fem/compliance.h"
+#include "fem/contact_shape.h"
+#include "fem/contact_solver.h"
+
+namespace touchstone::fem {
+
+/// What one translation axis of the object is told: its position (mm, the object frame's origin in the gel frame) or the
+/// force on the object (N, gel frame; pressing gives Fz > 0).
+struct AxisControl {
+  enum class Kind { position, force };
+  Kind kind = Kind::position;
+  double value = 0.0;
+
+  static AxisControl at(double position) { return {Kind::position, position}; }
+  static AxisControl with_force(double force) { return {Kind::force, force}; }
+};
+
+struct PressTarget {
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< gel from object
+  std::array<AxisControl, 3> axis;                         ///< x, y, z
+};
+
+/// When a step is good enough.
+struct PressTolerance {
+  double force = 1e-6;       ///< of a wanted force, relative or N, whichever is larger
+  double gap_mm = 1e-7;      ///< how far the gap may still move with the gel's tangential displacement
+  double traction = 1e-10;   ///< of the contact laws, relative to the largest pressure
+  double largest_motion = std::numeric_limits<double>::infinity();  ///< mm: steps with friction are cut into equal parts
+                                                                    ///< whose translations are no longer than this
+  int most_halvings = 7;     ///< of a step that doesn't converge
+};
+
+/// What a step left behind. n surface vertices, m beads. All zero out of contact.
+struct PressState {
+  RigidTransform gel_from_object;
+  Eigen::Matrix<double, 6, 1> wrench = Eigen::Matrix<double, 6, 1>::Zero();  ///< on the object: force (N), torque (N mm)
+                                                                             ///< about the gel frame's origin
+  Eigen::MatrixX3d traction;              ///< n x 3, MPa, on the gel, P1
+  Eigen::MatrixX3d surface_displacement;  ///< n x 3, mm: the L2 projection on P1, mass^-1 * surface * traction
+  Eigen::MatrixX3d bead_displacement;     ///< m x 3, mm
+  std::vector<NodeState> node_state;      ///< n
+
+  double largest_penetration = 0.0;   ///< mm, weighted gap over weight
+  double largest_tension = 0.0;       ///< MPa
+  double cone_violation = 0.0;        ///< excess of |t| over mu p, relative to mu times the largest pressure
+  double force_residual = 0.0;        ///< N, over the force-controlled axes
+  double contact_residual = 0.0;      ///< see ContactAnswer::residual
+  double largest_gradient = 0.0;      ///< of the surface displacement (see largest_surface_gradient): strain and tilt
+  double largest_strain = 0.0;        ///< the larger of largest_gradient and |normal displacement| / thickness. Linear
+                                      ///< elasticity is first-order in it: above some 0.2, don't trust percents
+  double contact_area = 0.0;          ///< mm^2: weights of the vertices in contact
+  int contact_vertices = 0;
+  bool under_resolved = false;        ///< in contact with fewer than 13 vertices (a contact radius under two edges):
+                                      ///< forces may be several percent off
+  int candidates = 0;                 ///< vertices in the dense block
+  int geometry_updates = 0;           ///< gap evaluations, over all parts of the step
+  int solves = 0;                     ///< linear systems solved
+  int factorisations = 0;
+  int sweeps = 0;                     ///< Gauss-Seidel
+  int parts = 0;                      ///< in how many parts the step was made
+};
+
+class Press {
+ public:
+  /// `friction` is Coulomb's mu >= 0; infinity: what has touched sticks. The compliance must outlive this.
+  /// @throws Error for a shape or a friction that isn't allowed
+  Press(const Compliance& gel, ContactShape shape, double friction, PressTolerance tolerance = {});
+  Press(Press&&) noexcept;
+  Press& operator=(Press&&) noexcept;
+  ~Press();
+
+  /// Moves the object to the target. Force-controlled axes start where they were (0 at the first step).
+  /// @throws Error, the state being as before the step, if: the target has NaN or infinity or isn't a rotation; the
+  /// normal force is negative; the body reaches deeper than the gel; a shear is wanted that friction can't hold ("gross
+  /// slip: ..."); a force is wanted but the body isn't over the gel; the iteration doesn't converge (with its residual)
+  const PressState& step(const PressTarget& target);
+
+  const PressState& state() const;
+
+ private:
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+}  // namespace touchstone::fem

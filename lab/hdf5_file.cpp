@@ -1,0 +1,265 @@
+#include "lab/hdf5_file.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "core/error.h"
+
+namespace touchstone::lab {
+namespace {
+
+constexpr std::int64_t kChunkBytes = 256 * 1024;  // well under HDF5's cache of 1 MB a dataset: each is packed once
+constexpr unsigned kDeflateLevel = 4;             // of 9; higher ones cost time and win a percent
+
+/// Closes one HDF5 object.
+class Handle {
+ public:
+  Handle(hid_t id, herr_t (*close)(hid_t)) : id_(id), close_(close) {}
+  Handle(Handle&& other) noexcept : id_(std::exchange(other.id_, -1)), close_(other.close_) {}
+  Handle& operator=(Handle&&) = delete;
+  ~Handle() {
+    if (id_ >= 0) close_(id_);
+  }
+  operator hid_t() const { return id_; }
+
+ private:
+  hid_t id_;
+  herr_t (*close_)(hid_t);
+};
+
+/// HDF5 prints its own stack of errors unless told not to; ours are exceptions.
+void keep_hdf5_quiet() { H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr); }
+
+Handle text_type(std::size_t length) {
+  const hid_t type = H5Tcopy(H5T_C_S1);
+  H5Tset_size(type, std::max<std::size_t>(1, length));
+  H5Tset_strpad(type, H5T_STR_NULLPAD);
+  H5Tset_cset(type, H5T_CSET_UTF8);
+  return {type, H5Tclose};
+}
+
+}  // namespace
+
+template <>
+hid_t hdf5_type<std::uint8_t>() {
+  return H5T_NATIVE_UINT8;
+}
+template <>
+hid_t hdf5_type<std::int32_t>() {
+  return H5T_NATIVE_INT32;
+}
+template <>
+hid_t hdf5_type<std::int64_t>() {
+  return H5T_NATIVE_INT64;
+}
+template <>
+hid_t hdf5_type<float>() {
+  return H5T_NATIVE_FLOAT;
+}
+template <>
+hid_t hdf5_type<double>() {
+  return H5T_NATIVE_DOUBLE;
+}
+
+hid_t Hdf5Writer::check(hid_t id, const char* what) const {
+  if (id < 0) fail("{}: can't be written ({})", name_, what);
+  return id;
+}
+
+void Hdf5Writer::check_done(herr_t result, const char* what) const {
+  if (result < 0) fail("{}: can't be written ({})", name_, what);
+}
+
+Hdf5Writer::Hdf5Writer(const std::filesystem::path& file) : name_(file.string()) {
+  keep_hdf5_quiet();
+  const Handle access(check(H5Pcreate(H5P_FILE_ACCESS), "file access"), H5Pclose);
+  check_done(H5Pset_libver_bounds(access, H5F_LIBVER_V110, H5F_LIBVER_V110), "format version");
+  const Handle creation(check(H5Pcreate(H5P_FILE_CREATE), "file creation"), H5Pclose);
+  check_done(H5Pset_obj_track_times(creation, 0), "times");
+  file_ = check(H5Fcreate(name_.c_str(), H5F_ACC_TRUNC, creation, access), "creating the file");
+}
+
+Hdf5Writer::~Hdf5Writer() {
+  for (auto& [path, dataset] : datasets_) H5Dclose(dataset.id);
+  if (file_ >= 0) H5Fclose(file_);
+}
+
+void Hdf5Writer::add_dataset(const Hdf5Description& description, hid_t type, std::size_t item_bytes,
+                             std::int64_t rows, const std::vector<std::int64_t>& row_shape) {
+  TS_ASSERT(!datasets_.contains(description.path) && rows >= 0);
+  Dataset dataset;
+  dataset.shape.push_back(static_cast<hsize_t>(rows));
+  for (const std::int64_t extent : row_shape) dataset.shape.push_back(static_cast<hsize_t>(extent));
+  std::vector<hsize_t> chunk = dataset.shape;
+  auto row_bytes = static_cast<std::int64_t>(item_bytes);
+  for (const std::int64_t extent : row_shape) row_bytes *= extent;
+  const bool empty = rows == 0 || row_bytes == 0;
+  const Handle creation(check(H5Pcreate(H5P_DATASET_CREATE), "dataset creation"), H5Pclose);
+  check_done(H5Pset_obj_track_times(creation, 0), "times");
+  if (!empty) {
+    chunk[0] = static_cast<hsize_t>(std::clamp<std::int64_t>(kChunkBytes / row_bytes, 1, rows));
+    check_done(H5Pset_chunk(creation, static_cast<int>(chunk.size()), chunk.data()), "chunks");
+    check_done(H5Pset_shuffle(creation), "shuffle");
+    check_done(H5Pset_deflate(creation, kDeflateLevel), "compression");
+  }
+  const Handle space(check(H5Screate_simple(static_cast<int>(dataset.shape.size()), dataset.shape.data(), nullptr),
+                           "shape"),
+                     H5Sclose);
+  dataset.id = check(H5Dcreate2(file_, description.path.c_str(), type, space, H5P_DEFAULT, creation, H5P_DEFAULT),
+                     description.path.c_str());
+  const hid_t id = dataset.id;
+  datasets_.emplace(description.path, std::move(dataset));
+  describe(id, description);
+}
+
+void Hdf5Writer::write_rows(const std::string& path, hid_t type, std::int64_t first, std::int64_t count,
+                            const void* values, std::size_t size) {
+  const auto found = datasets_.find(path);
+  TS_ASSERT(found != datasets_.end());
+  const Dataset& dataset = found->second;
+  std::vector<hsize_t> start(dataset.shape.size(), 0);
+  std::vector<hsize_t> extent = dataset.shape;
+  start[0] = static_cast<hsize_t>(first);
+  extent[0] = static_cast<hsize_t>(count);
+  std::size_t wanted = 1;
+  for (const hsize_t part : extent) wanted *= part;
+  TS_ASSERT(size == wanted && start[0] + extent[0] <= dataset.shape[0]);
+  if (size == 0) return;
+  const Handle memory(check(H5Screate_simple(static_cast<int>(extent.size()), extent.data(), nullptr), "shape"),
+                      H5Sclose);
+  const Handle place(check(H5Dget_space(dataset.id), "shape"), H5Sclose);
+  check_done(H5Sselect_hyperslab(place, H5S_SELECT_SET, start.data(), nullptr, extent.data(), nullptr), "rows");
+  check_done(H5Dwrite(dataset.id, type, memory, place, H5P_DEFAULT, values), path.c_str());
+}
+
+void Hdf5Writer::write_texts(const Hdf5Description& description, const std::vector<std::string>& texts) {
+  std::size_t longest = 1;
+  for (const std::string& text : texts) longest = std::max(longest, text.size());
+  std::vector<char> padded(longest * texts.size(), '\0');
+  for (std::size_t i = 0; i < texts.size(); ++i) {
+    std::copy(texts[i].begin(), texts[i].end(), padded.begin() + static_cast<std::ptrdiff_t>(i * longest));
+  }
+  const Handle type = text_type(longest);
+  const hsize_t count = texts.size();
+  const Handle space(check(H5Screate_simple(1, &count, nullptr), "shape"), H5Sclose);
+  const Handle creation(check(H5Pcreate(H5P_DATASET_CREATE), "dataset creation"), H5Pclose);
+  check_done(H5Pset_obj_track_times(creation, 0), "times");
+  const Handle dataset(
+      check(H5Dcreate2(file_, description.path.c_str(), type, space, H5P_DEFAULT, creation, H5P_DEFAULT),
+            description.path.c_str()),
+      H5Dclose);
+  if (!texts.empty()) {
+    check_done(H5Dwrite(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, padded.data()), description.path.c_str());
+  }
+  describe(dataset, description);
+}
+
+void Hdf5Writer::describe(hid_t object, const Hdf5Description& description) {
+  text_attribute(object, "unit", description.unit);
+  text_attribute(object, "shape", description.shape);
+  if (!description.frame.empty()) text_attribute(object, "frame", description.frame);
+  text_attribute(object, "meaning", description.meaning);
+}
+
+void Hdf5Writer::text_attribute(hid_t object, const std::string& name, const std::string& value) {
+  const Handle type = text_type(value.size());
+  const Handle space(check(H5Screate(H5S_SCALAR), "attribute"), H5Sclose);
+  const Handle attribute(check(H5Acreate2(object, name.c_str(), type, space, H5P_DEFAULT, H5P_DEFAULT), name.c_str()),
+                         H5Aclose);
+  check_done(H5Awrite(attribute, type, value.c_str()), name.c_str());
+}
+
+void Hdf5Writer::set_attribute(const std::string& name, const std::string& value) {
+  text_attribute(file_, name, value);
+}
+
+void Hdf5Writer::set_attribute(const std::string& name, std::int64_t value) {
+  const Handle space(check(H5Screate(H5S_SCALAR), "attribute"), H5Sclose);
+  const Handle attribute(
+      check(H5Acreate2(file_, name.c_str(), H5T_STD_I64LE, space, H5P_DEFAULT, H5P_DEFAULT), name.c_str()), H5Aclose);
+  check_done(H5Awrite(attribute, H5T_NATIVE_INT64, &value), name.c_str());
+}
+
+void Hdf5Writer::close() {
+  herr_t worst = 0;
+  for (auto& [path, dataset] : datasets_) worst = std::min(worst, H5Dclose(dataset.id));
+  datasets_.clear();
+  worst = std::min(worst, H5Fflush(file_, H5F_SCOPE_LOCAL));
+  worst = std::min(worst, H5Fclose(std::exchange(file_, -1)));
+  check_done(worst, "closing the file");
+}
+
+Hdf5Reader::Hdf5Reader(const std::filesystem::path& file) : name_(file.string()) {
+  keep_hdf5_quiet();
+  if (!std::filesystem::is_regular_file(file)) fail("{}: there is no such file", name_);
+  file_ = H5Fopen(name_.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
+  if (file_ < 0) fail("{}: isn't an HDF5 file, or is broken off", name_);
+}
+
+Hdf5Reader::~Hdf5Reader() { H5Fclose(file_); }
+
+bool Hdf5Reader::has(const std::string& path) const { return H5Lexists(file_, path.c_str(), H5P_DEFAULT) > 0; }
+
+std::vector<std::int64_t> Hdf5Reader::shape_of(const std::string& path, std::size_t& size) const {
+  const Handle dataset(H5Dopen2(file_, path.c_str(), H5P_DEFAULT), H5Dclose);
+  if (dataset < 0) fail("{}: has no dataset '{}'", name_, path);
+  const Handle space(H5Dget_space(dataset), H5Sclose);
+  const int rank = H5Sget_simple_extent_ndims(space);
+  if (rank < 0) fail("{}: '{}' isn't an array", name_, path);
+  std::vector<hsize_t> extent(static_cast<std::size_t>(rank));
+  if (rank > 0) H5Sget_simple_extent_dims(space, extent.data(), nullptr);
+  size = 1;
+  for (const hsize_t part : extent) size *= part;
+  return {extent.begin(), extent.end()};
+}
+
+void Hdf5Reader::read_into(const std::string& path, hid_t type, void* values) const {
+  const Handle dataset(H5Dopen2(file_, path.c_str(), H5P_DEFAULT), H5Dclose);
+  if (H5Dread(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) < 0) {
+    fail("{}: '{}' can't be read; it isn't of the kind that is needed, or the file is damaged", name_, path);
+  }
+}
+
+std::vector<std::string> Hdf5Reader::read_texts(const std::string& path) const {
+  std::size_t count = 0;
+  shape_of(path, count);
+  const Handle dataset(H5Dopen2(file_, path.c_str(), H5P_DEFAULT), H5Dclose);
+  const Handle type(H5Dget_type(dataset), H5Tclose);
+  if (H5Tget_class(type) != H5T_STRING || H5Tis_variable_str(type) > 0) {
+    fail("{}: '{}' doesn't hold texts of fixed length", name_, path);
+  }
+  const std::size_t length = H5Tget_size(type);
+  std::vector<char> padded(length * count);
+  if (count > 0 && H5Dread(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, padded.data()) < 0) {
+    fail("{}: '{}' can't be read", name_, path);
+  }
+  std::vector<std::string> texts;
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::string padded_text(padded.data() + i * length, length);
+    texts.push_back(padded_text.substr(0, padded_text.find('\0')));
+  }
+  return texts;
+}
+
+std::string Hdf5Reader::text_attribute(const std::string& path, const std::string& name) const {
+  const Handle attribute(H5Aopen_by_name(file_, path.c_str(), name.c_str(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
+  if (attribute < 0) fail("{}: '{}' has no attribute '{}'", name_, path, name);
+  const Handle type(H5Aget_type(attribute), H5Tclose);
+  if (H5Tget_class(type) != H5T_STRING || H5Tis_variable_str(type) > 0) {
+    fail("{}: the attribute '{}' of '{}' isn't a text of fixed length", name_, name, path);
+  }
+  std::string value(H5Tget_size(type), '\0');
+  if (H5Aread(attribute, type, value.data()) < 0) fail("{}: attribute '{}' can't be read", name_, name);
+  return value.substr(0, value.find('\0'));
+}
+
+std::int64_t Hdf5Reader::integer_attribute(const std::string& path, const std::string& name) const {
+  const Handle attribute(H5Aopen_by_name(file_, path.c_str(), name.c_str(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
+  std::int64_t value = 0;
+  if (attribute < 0 || H5Aread(attribute, H5T_NATIVE_INT64, &value) < 0) {
+    fail("{}: '{}' has no whole number '{}'", name_, path, name);
+  }
+  return value;
+}
+
+}  // namespace touchstone::lab

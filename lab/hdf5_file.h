@@ -1,0 +1,120 @@
+#pragma once
+// HDF5 files that are the same bytes whenever they hold the same values: no time stamps, fixed format version. Not for
+// use from several threads at once (Debian's library has one state for all).
+
+#include <hdf5.h>
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace touchstone::lab {
+
+/// The HDF5 type that holds a C++ one: std::uint8_t, std::int32_t, std::int64_t, float, double.
+template <typename T>
+hid_t hdf5_type();
+
+/// What a dataset holds, written beside it as attributes.
+struct Hdf5Description {
+  std::string path;     ///< "/wrench"
+  std::string unit;     ///< "N", "mm"; "1" for pure numbers
+  std::string shape;    ///< names of the axes: "samples x 6"
+  std::string frame;    ///< coordinates that vectors are in: "gel"; empty where there are none
+  std::string meaning;  ///< one sentence
+};
+
+/// Writes a new file. Each function throws Error, naming the file, if HDF5 can't do what is asked (a full disk).
+class Hdf5Writer {
+ public:
+  explicit Hdf5Writer(const std::filesystem::path& file);
+  ~Hdf5Writer();
+  Hdf5Writer(const Hdf5Writer&) = delete;
+  Hdf5Writer& operator=(const Hdf5Writer&) = delete;
+
+  /// Makes a dataset of `rows` rows, each of `row_shape`, chunked by whole rows and compressed.
+  template <typename T>
+  void add_rows(const Hdf5Description& description, std::int64_t rows, const std::vector<std::int64_t>& row_shape) {
+    add_dataset(description, hdf5_type<T>(), sizeof(T), rows, row_shape);
+  }
+  /// Writes one row of a dataset that add_rows made with the same T. @pre `values` has the row's size
+  template <typename T>
+  void write_row(const std::string& path, std::int64_t row, std::span<const T> values) {
+    write_rows(path, hdf5_type<T>(), row, 1, values.data(), values.size());
+  }
+  /// Makes and fills a whole dataset: `values` holds `rows` rows of `row_shape`.
+  template <typename T>
+  void write(const Hdf5Description& description, std::int64_t rows, const std::vector<std::int64_t>& row_shape,
+             std::span<const T> values) {
+    add_rows<T>(description, rows, row_shape);
+    write_rows(description.path, hdf5_type<T>(), 0, rows, values.data(), values.size());
+  }
+  /// A list of texts, as one dataset of texts of equal length, padded with zeros.
+  void write_texts(const Hdf5Description& description, const std::vector<std::string>& texts);
+  /// An attribute of the file itself.
+  void set_attribute(const std::string& name, const std::string& value);
+  void set_attribute(const std::string& name, std::int64_t value);
+
+  /// Ends the file; without this call the file is broken off.
+  void close();
+
+ private:
+  struct Dataset {
+    hid_t id = -1;
+    std::vector<hsize_t> shape;
+  };
+  void add_dataset(const Hdf5Description& description, hid_t type, std::size_t item_bytes, std::int64_t rows,
+                   const std::vector<std::int64_t>& row_shape);
+  void write_rows(const std::string& path, hid_t type, std::int64_t first, std::int64_t count, const void* values,
+                  std::size_t size);
+  void describe(hid_t object, const Hdf5Description& description);
+  void text_attribute(hid_t object, const std::string& name, const std::string& value);
+  hid_t check(hid_t id, const char* what) const;
+  void check_done(herr_t result, const char* what) const;
+
+  std::string name_;
+  hid_t file_ = -1;
+  std::map<std::string, Dataset> datasets_;
+};
+
+/// A dataset read whole, in row-major order.
+template <typename T>
+struct Hdf5Array {
+  std::vector<std::int64_t> shape;
+  std::vector<T> values;
+};
+
+/// Reads files of any HDF5 writer. Each function throws Error, naming file and dataset.
+class Hdf5Reader {
+ public:
+  explicit Hdf5Reader(const std::filesystem::path& file);
+  ~Hdf5Reader();
+  Hdf5Reader(const Hdf5Reader&) = delete;
+  Hdf5Reader& operator=(const Hdf5Reader&) = delete;
+
+  template <typename T>
+  Hdf5Array<T> read(const std::string& path) const {
+    Hdf5Array<T> array;
+    std::size_t size = 0;
+    array.shape = shape_of(path, size);
+    array.values.resize(size);
+    read_into(path, hdf5_type<T>(), array.values.data());
+    return array;
+  }
+  std::vector<std::string> read_texts(const std::string& path) const;
+  /// A text attribute of a dataset, or of the file if `path` is "/".
+  std::string text_attribute(const std::string& path, const std::string& name) const;
+  std::int64_t integer_attribute(const std::string& path, const std::string& name) const;
+  bool has(const std::string& path) const;
+
+ private:
+  std::vector<std::int64_t> shape_of(const std::string& path, std::size_t& size) const;
+  void read_into(const std::string& path, hid_t type, void* values) const;
+
+  std::string name_;
+  hid_t file_ = -1;
+};
+
+}  // namespace touchstone::lab

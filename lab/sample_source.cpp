@@ -1,0 +1,19 @@
+#include "lab/sample_source.h"
+
+namespace touchstone::lab {
+
+SampleSource simulator(const std::filesystem::path& cache_folder) {
+  SampleSource source;
+  source.set_up_gel = [cache_folder](const sim::DeviceSpec& device, const Progress& progress) {
+    return sim::set_up_gel(device, cache_folder, progress);
+  };
+  source.play_motion = sim::play_motion;
+  source.set_up_camera = [](const sim::SceneSpec& scene, const sim::Plan& plan,
+                            std::shared_ptr<const fem::Compliance> gel, const sim::Truth& first) {
+    auto camera = std::make_shared<const sim::VirtualCamera>(scene, plan, std::move(gel), first);
+    return [camera](const sim::Truth& truth) { return camera->capture(truth); };
+  };
+  return source;
+}
+
+}  // namespace touchstone::lab

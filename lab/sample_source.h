@@ -1,0 +1,29 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "sim/virtual_sensor.h"
+
+namespace touchstone::lab {
+
+/// What a data set's samples come from: the simulator; in tests, something that counts or fails on purpose. Each
+/// function is a pure function of its arguments and may be called from several threads at once.
+struct SampleSource {
+  using Camera = std::function<sim::Capture(const sim::Truth&)>;
+
+  std::function<std::shared_ptr<const fem::Compliance>(const sim::DeviceSpec&, const Progress&)> set_up_gel;
+  std::function<std::vector<sim::Truth>(const sim::SceneSpec&, const sim::Plan&, const fem::Compliance&,
+                                        const Progress&)>
+      play_motion;
+  std::function<Camera(const sim::SceneSpec&, const sim::Plan&, std::shared_ptr<const fem::Compliance>,
+                       const sim::Truth& first)>
+      set_up_camera;
+};
+
+/// The simulator, with its set-up results kept in `cache_folder`.
+SampleSource simulator(const std::filesystem::path& cache_folder);
+
+}  // namespace touchstone::lab

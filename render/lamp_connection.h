@@ -1,0 +1,139 @@
+#pragma once
+// The light that one point of a lamp's lens sends to a point of the scene: layers between them, Fresnel, absorption,
+// shadow.
+
+#include <Eigen/Core>
+#include <cmath>
+#include <numbers>
+
+#include "render/layer_connection.h"
+#include "render/prepared_scene.h"
+
+namespace touchstone::render {
+
+/// A point that light may reach, and the state of the path there.
+struct Receiver {
+  Eigen::Vector3d position;
+  Eigen::Vector3d normal;  ///< unit, on the side that is lit
+  int layer = 0;
+  int medium = 0;
+};
+
+/// Light arriving: the unit direction it comes from (in the receiver's medium) and the irradiance in W/m^2 on an area
+/// square to it.
+template <int N>
+struct Arrival {
+  Eigen::Vector3d direction;
+  Bands<N> irradiance;
+};
+
+/// Light from the point `source` of lamp `lamp` to the receiver. False where none arrives: out of the lamp's lobe,
+/// from behind the receiver's surface or the lens, in shadow. `connections` counts shadow tests.
+///
+/// Layers are those between the two heights. A receiver whose medium isn't that of its layer stands beyond a Refractive
+/// surface (an object just off the gel): that surface is taken as flat and horizontal at the height where a vertical
+/// from the receiver meets it, which is exact for a flat gel, and biased where the gel slopes.
+template <int N>
+bool connect_to_lamp(const PreparedScene<N>& scene, const PreparedLamp<N>& lamp, const Eigen::Vector3d& source,
+                     const Receiver& receiver, std::uint64_t& connections, Arrival<N>& arrival) {
+  const Eigen::Vector3d& p = receiver.position;
+  const bool up = source.z() <= p.z();  // light runs up to the receiver
+  Layer layers[kMaxLayers];
+  int media[kMaxLayers];
+  int count = 0;
+  double z = source.z();
+  const auto add_layer = [&](double until, int medium) {
+    layers[count] = {std::abs(until - z), scene.media[medium].index};
+    media[count++] = medium;
+    z = until;
+  };
+  if (up) {
+    for (int k = lamp.layer; k < receiver.layer; ++k)
+      add_layer(std::max(z, scene.faces[k].z), scene.medium_of_layer(k));
+  } else {
+    for (int k = lamp.layer; k > receiver.layer; --k) {
+      add_layer(std::min(z, scene.faces[k - 1].z), scene.medium_of_layer(k));
+    }
+  }
+  const int usual = scene.medium_of_layer(receiver.layer);
+  if (receiver.medium != usual) {
+    const double off = scene.rays.refractive_along_z(p, !up, std::abs(p.z() - z));
+    if (off >= 0.0) add_layer(up ? std::max(z, p.z() - off) : std::min(z, p.z() + off), usual);
+  }
+  add_layer(p.z(), receiver.medium);
+
+  Bands<N> light = lamp.intensity_on_axis;
+  Eigen::Vector3d from_lamp;  // unit direction of emission
+  double per_area = 0.0;      // solid angle at the lamp per mm^2 at the receiver
+  bool bends = false;
+  for (int k = 1; k < count; ++k) bends = bends || layers[k].index != layers[0].index;
+
+  if (!bends) {
+    const Eigen::Vector3d way = p - source;
+    const double distance2 = way.squaredNorm();
+    if (!(distance2 > 1e-18)) return false;
+    const double distance = std::sqrt(distance2);
+    from_lamp = way / distance;
+    arrival.direction = -from_lamp;
+    if (arrival.direction.dot(receiver.normal) <= 0.0) return false;
+    per_area = 1.0 / distance2;
+    const double height = std::abs(way.z());
+    for (int k = 0; k < count; ++k) {
+      if (!scene.media[media[k]].absorbs) continue;
+      const double share = height > 0.0 ? layers[k].thickness / height : (k + 1 == count ? 1.0 : 0.0);
+      light *= (-scene.media[media[k]].absorption * (distance * share)).exp();
+    }
+  } else {
+    const Eigen::Vector2d flat = (p - source).head<2>();
+    const double lateral = flat.norm();
+    const Eigen::Vector2d toward = lateral > 0.0 ? Eigen::Vector2d(flat / lateral) : Eigen::Vector2d::UnitX();
+    const auto path = solve_layer_path({layers, static_cast<std::size_t>(count)}, lateral);
+    if (!path) return false;
+    const double sense = up ? 1.0 : -1.0;
+    const auto direction_in = [&](int k) {
+      const double sine = path->tangent[k] * path->cosine[k];
+      return Eigen::Vector3d(sine * toward.x(), sine * toward.y(), sense * path->cosine[k]);
+    };
+    arrival.direction = -direction_in(count - 1);
+    if (arrival.direction.dot(receiver.normal) <= 0.0) return false;
+    from_lamp = direction_in(0);
+    per_area = path->jacobian * path->transmittance;
+    for (int k = 0; k < count; ++k) {
+      if (!scene.media[media[k]].absorbs) continue;
+      light *= (-scene.media[media[k]].absorption * (layers[k].thickness / path->cosine[k])).exp();
+    }
+    const double on_lens = from_lamp.dot(lamp.frame.z);
+    if (on_lens <= 0.0 || spot_profile(lamp.lamp, on_lens) <= 0.0) return false;
+
+    // Shadows, leg by leg from the receiver back to the lamp; a leg that no opaque thing's height reaches costs
+    // nothing.
+    ++connections;
+    Eigen::Vector3d end = p + RayScene::leave_distance(p) * receiver.normal;
+    Eigen::Vector3d corner = p;
+    for (int k = count - 1; k >= 0; --k) {
+      Eigen::Vector3d next = source;
+      if (k > 0) {
+        const double step = layers[k].thickness * path->tangent[k];
+        next = {corner.x() - step * toward.x(), corner.y() - step * toward.y(),
+                corner.z() - sense * layers[k].thickness};
+      }
+      if (scene.rays.occluded(end, next)) return false;
+      corner = next;
+      end = next;
+    }
+  }
+
+  const double cosine = from_lamp.dot(lamp.frame.z);
+  if (cosine <= 0.0) return false;
+  const double profile = cosine >= lamp.cos_full ? 1.0 : spot_profile(lamp.lamp, cosine);
+  if (profile <= 0.0) return false;
+  if (!bends) {
+    ++connections;
+    if (scene.rays.occluded(p + RayScene::leave_distance(p) * receiver.normal, source)) return false;
+  }
+  constexpr double kSquareMillimetresPerSquareMetre = 1e6;
+  arrival.irradiance = light * (profile * per_area * kSquareMillimetresPerSquareMetre);
+  return true;
+}
+
+}  // namespace touchstone::render

@@ -1,0 +1,271 @@
+#include "render/path_tracer.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <variant>
+#include <vector>
+
+#include "core/error.h"
+#include "render/path_integrator.h"
+
+namespace touchstone::render {
+namespace {
+
+constexpr int kTile = 16;  // pixels a side
+
+void check_settings(const RenderSettings& settings, Eigen::Index bands) {
+  if (settings.min_samples < 1 || settings.max_samples < settings.min_samples || settings.max_samples > (1 << 24)) {
+    fail("render: min_samples {} and max_samples {}; they must be 1 <= min <= max <= 16777216", settings.min_samples,
+         settings.max_samples);
+  }
+  if (settings.max_depth < 0 || settings.max_depth > 10000) {
+    fail("render: max_depth is {}; it must be from 0 to 10000", settings.max_depth);
+  }
+  if (!settings.noise) return;
+  const NoiseTarget& noise = *settings.noise;
+  if (noise.electrons_per_irradiance.size() != bands) {
+    fail("render: electrons_per_irradiance has {} bands; the scene has {}", noise.electrons_per_irradiance.size(),
+         bands);
+  }
+  for (double value : noise.electrons_per_irradiance) {
+    if (!(value >= 0.0) || !std::isfinite(value)) {
+      fail("render: electrons_per_irradiance is {}; it must be finite and 0 or more", value);
+    }
+  }
+  if (!(noise.read_noise_e >= 0.0 && noise.quantisation_e >= 0.0 && noise.fraction > 0.0) ||
+      !std::isfinite(noise.read_noise_e + noise.quantisation_e + noise.fraction)) {
+    fail("render: noise target read {} e, quantisation {} e, fraction {}; all finite, the fraction above 0",
+         noise.read_noise_e, noise.quantisation_e, noise.fraction);
+  }
+}
+
+void check_mask(const cv::Mat& mask, const PinholeCamera& camera) {
+  if (mask.empty()) return;
+  if (mask.type() != CV_8UC1 || mask.cols != camera.width || mask.rows != camera.height) {
+    fail("render: the mask is {} x {} of OpenCV type {}; it must be {} x {} of type {} (CV_8UC1)", mask.cols, mask.rows,
+         mask.type(), camera.width, camera.height, CV_8UC1);
+  }
+}
+
+/// Mean and standard error of a pixel's scalar signal. The samples of a block of four are stratified among themselves,
+/// so the spread of block means says more truly how good the mean is than that of single samples.
+class ErrorEstimate {
+ public:
+  void add(double value) {
+    block_ += value;
+    if (++in_block_ < kBlock) return;
+    const double mean = block_ / kBlock;
+    block_ = 0.0;
+    in_block_ = 0;
+    ++blocks_;
+    const double off = mean - mean_;
+    mean_ += off / blocks_;
+    squares_ += off * (mean - mean_);
+  }
+  double mean() const { return mean_; }
+  double standard_error() const {
+    if (blocks_ < 2) return std::numeric_limits<double>::infinity();
+    return std::sqrt(squares_ / (static_cast<double>(blocks_ - 1) * blocks_));
+  }
+
+ private:
+  static constexpr int kBlock = 4;
+  double block_ = 0.0;
+  int in_block_ = 0;
+  int blocks_ = 0;
+  double mean_ = 0.0;
+  double squares_ = 0.0;
+};
+
+template <int N>
+struct PixelResult {
+  Bands<N> irradiance = Bands<N>::Zero();
+  double standard_error = 0.0;
+  int samples = 0;
+};
+
+/// Takes turns of min, 1.5 min, 2 min, 3 min, 4 min ... samples.
+int next_turn(int samples, int min_samples, int max_samples) {
+  int power = min_samples;
+  while (power <= samples / 2) power *= 2;
+  const int next = samples == power ? samples + std::max(4, power / 2) : 2 * power;
+  return std::min(max_samples, std::max(next, samples + 1));
+}
+
+template <int N>
+PixelResult<N> sample_pixel(const PathIntegrator<N>& integrator, const PinholeCamera& camera,
+                            const RenderSettings& settings, double camera_index, int column, int row,
+                            RayCounts& counts) {
+  PixelResult<N> pixel;
+  ErrorEstimate total;
+  ErrorEstimate electrons;
+  Bands<N> sum = Bands<N>::Zero();
+  Bands<N> electrons_per_irradiance = Bands<N>::Zero();
+  if (settings.noise) electrons_per_irradiance = settings.noise->electrons_per_irradiance;
+  const std::uint64_t number =
+      static_cast<std::uint64_t>(row) * static_cast<std::uint64_t>(camera.width) + static_cast<std::uint64_t>(column);
+  const RigidTransform& gel_from_camera = camera.gel_from_camera;
+  int target = settings.min_samples;
+  for (;;) {
+    for (; pixel.samples < target; ++pixel.samples) {
+      SampleSequence numbers(settings.seed, number, static_cast<std::uint32_t>(pixel.samples));
+      const auto [px, py] = numbers.next_pair();
+      const auto [hu, hv] = numbers.next_pair();
+      ++counts.paths;
+      Bands<N> value = Bands<N>::Zero();
+      if (const auto ray = pinhole_ray(camera, column + px, row + py, hu, hv)) {
+        const Bands<N> basic =
+            integrator.trace(gel_from_camera * ray->origin, gel_from_camera.turn(ray->direction), numbers, counts);
+        value = basic * (ray->weight * camera_index * camera_index);
+      }
+      sum += value;
+      total.add(value.sum());
+      if (settings.noise) electrons.add((value * electrons_per_irradiance).sum());
+    }
+    if (!settings.noise || pixel.samples >= settings.max_samples) break;
+    const NoiseTarget& noise = *settings.noise;
+    const double imager_noise = std::sqrt(std::max(0.0, electrons.mean()) + noise.read_noise_e * noise.read_noise_e +
+                                          noise.quantisation_e * noise.quantisation_e);
+    if (electrons.standard_error() <= noise.fraction * imager_noise) break;
+    target = next_turn(pixel.samples, settings.min_samples, settings.max_samples);
+  }
+  pixel.irradiance = sum / static_cast<double>(pixel.samples);
+  pixel.standard_error = total.standard_error();
+  return pixel;
+}
+
+template <int N>
+RenderedImage render_image(const PreparedScene<N>& scene, const PinholeCamera& camera, const RenderSettings& settings,
+                           const cv::Mat& mask) {
+  RenderedImage image;
+  image.irradiance = cv::Mat::zeros(camera.height, camera.width, CV_32FC(N));
+  image.standard_error = cv::Mat::zeros(camera.height, camera.width, CV_32FC1);
+  image.samples = cv::Mat::zeros(camera.height, camera.width, CV_32SC1);
+  const PathIntegrator<N> integrator(scene, settings.max_depth, scene.interreflection);
+  const Eigen::Vector3d eye = camera.gel_from_camera.translation;
+  const double camera_index = scene.media[scene.medium_of_layer(scene.layer_at(eye.z()))].index;
+  const int tiles_across = (camera.width + kTile - 1) / kTile;
+  const int tiles = tiles_across * ((camera.height + kTile - 1) / kTile);
+  std::vector<RayCounts> tile_counts(tiles);
+
+  tbb::parallel_for(0, tiles, [&](int tile) {
+    const int left = (tile % tiles_across) * kTile;
+    const int top = (tile / tiles_across) * kTile;
+    RayCounts counts;
+    for (int row = top; row < std::min(top + kTile, camera.height); ++row) {
+      auto* irradiance = image.irradiance.ptr<float>(row);
+      auto* error = image.standard_error.ptr<float>(row);
+      auto* samples = image.samples.ptr<int>(row);
+      const auto* wanted = mask.empty() ? nullptr : mask.ptr<unsigned char>(row);
+      for (int column = left; column < std::min(left + kTile, camera.width); ++column) {
+        if (wanted != nullptr && wanted[column] == 0) continue;
+        const PixelResult<N> pixel = sample_pixel(integrator, camera, settings, camera_index, column, row, counts);
+        for (int band = 0; band < N; ++band) irradiance[N * column + band] = static_cast<float>(pixel.irradiance[band]);
+        error[column] = static_cast<float>(pixel.standard_error);
+        samples[column] = pixel.samples;
+      }
+    }
+    tile_counts[tile] = counts;
+  });
+  for (const RayCounts& counts : tile_counts) image.counts += counts;
+  return image;
+}
+
+template <int N>
+cv::Mat preview_image(const PreparedScene<N>& scene, const PinholeCamera& camera, int stride) {
+  const int rows = (camera.height + stride - 1) / stride;
+  const int columns = (camera.width + stride - 1) / stride;
+  cv::Mat image = cv::Mat::zeros(rows, columns, CV_32FC(N));
+  const PathIntegrator<N> integrator(scene, 0, false);
+  const Eigen::Vector3d eye = camera.gel_from_camera.translation;
+  const double camera_index = scene.media[scene.medium_of_layer(scene.layer_at(eye.z()))].index;
+  tbb::parallel_for(0, rows, [&](int row) {
+    auto* irradiance = image.ptr<float>(row);
+    RayCounts counts;
+    for (int column = 0; column < columns; ++column) {
+      SampleSequence numbers = SampleSequence::centre();
+      const auto ray = pinhole_ray(camera, (column + 0.5) * stride, (row + 0.5) * stride, 0.5, 0.5);
+      if (!ray) continue;
+      const Bands<N> basic = integrator.trace(camera.gel_from_camera * ray->origin,
+                                              camera.gel_from_camera.turn(ray->direction), numbers, counts);
+      for (int band = 0; band < N; ++band) {
+        irradiance[N * column + band] = static_cast<float>(basic[band] * ray->weight * camera_index * camera_index);
+      }
+    }
+  });
+  return image;
+}
+
+template <int N>
+Spectrum mean_radiance(const PreparedScene<N>& scene, const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
+                       const RenderSettings& settings) {
+  const PathIntegrator<N> integrator(scene, settings.max_depth, scene.interreflection);
+  Bands<N> sum = Bands<N>::Zero();
+  RayCounts counts;
+  for (int sample = 0; sample < settings.min_samples; ++sample) {
+    SampleSequence numbers(settings.seed, 0, static_cast<std::uint32_t>(sample));
+    sum += integrator.trace(origin, direction, numbers, counts);
+  }
+  return sum / static_cast<double>(settings.min_samples);
+}
+
+}  // namespace
+
+RayCounts& RayCounts::operator+=(const RayCounts& other) {
+  paths += other.paths;
+  primary += other.primary;
+  connections += other.connections;
+  bounces += other.bounces;
+  return *this;
+}
+
+struct Tracer::Prepared {
+  std::variant<std::unique_ptr<PreparedScene<1>>, std::unique_ptr<PreparedScene<3>>> scene;
+  Eigen::Index bands = 0;
+};
+
+Tracer::Tracer(const Scene& scene) : prepared_(std::make_unique<Prepared>()) {
+  check_scene(scene);
+  prepared_->bands = scene.environment.size();
+  switch (prepared_->bands) {
+    case 1:
+      prepared_->scene = std::make_unique<PreparedScene<1>>(scene);
+      break;
+    case 3:
+      prepared_->scene = std::make_unique<PreparedScene<3>>(scene);
+      break;
+    default:
+      fail("scene: {} bands; the tracer carries 1 or 3", prepared_->bands);
+  }
+}
+
+Tracer::~Tracer() = default;
+Tracer::Tracer(Tracer&&) noexcept = default;
+Tracer& Tracer::operator=(Tracer&&) noexcept = default;
+
+RenderedImage Tracer::render(const PinholeCamera& camera, const RenderSettings& settings, const cv::Mat& mask) const {
+  check_camera(camera);
+  check_settings(settings, prepared_->bands);
+  check_mask(mask, camera);
+  return std::visit([&](const auto& scene) { return render_image(*scene, camera, settings, mask); }, prepared_->scene);
+}
+
+cv::Mat Tracer::preview(const PinholeCamera& camera, int stride) const {
+  check_camera(camera);
+  if (stride < 1) fail("preview: stride is {}; it must be 1 or more", stride);
+  return std::visit([&](const auto& scene) { return preview_image(*scene, camera, stride); }, prepared_->scene);
+}
+
+Spectrum Tracer::radiance(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
+                          const RenderSettings& settings) const {
+  check_settings(settings, prepared_->bands);
+  if (!origin.allFinite() || !direction.allFinite() || !(direction.norm() > 1e-9)) {
+    fail("radiance: origin and direction must be finite, the direction not zero");
+  }
+  return std::visit([&](const auto& scene) { return mean_radiance(*scene, origin, direction.normalized(), settings); },
+                    prepared_->scene);
+}
+
+}  // namespace touchstone::render

@@ -1,0 +1,114 @@
+#include "render/pinhole_camera.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/error.h"
+#include "render/warps.h"
+
+namespace touchstone::render {
+namespace {
+
+/// The part of one disc that another covers, as slices across the line of centres. The first disc's centre is the
+/// origin, the second's lies at distance `shift` along +e.
+struct DiscOverlap {
+  double radius_a, radius_b, shift;
+  double half_height;  // of the overlap, along v
+
+  DiscOverlap(double a, double b, double d) : radius_a(a), radius_b(b), shift(d), half_height(0.0) {
+    if (d >= a + b) return;
+    if (d <= std::abs(a - b)) {
+      half_height = std::min(a, b);
+      return;
+    }
+    const double chord = (d * d + a * a - b * b) / (2.0 * d);  // of the two circles' crossings, along e
+    if (chord < 0.0) {
+      half_height = a;
+    } else if (chord > d) {
+      half_height = b;
+    } else {
+      half_height = std::sqrt(std::max(0.0, a * a - chord * chord));
+    }
+  }
+
+  void slice(double v, double& low, double& high) const {
+    const double half_a = std::sqrt(std::max(0.0, radius_a * radius_a - v * v));
+    const double half_b = std::sqrt(std::max(0.0, radius_b * radius_b - v * v));
+    low = std::max(-half_a, shift - half_b);
+    high = std::min(half_a, shift + half_b);
+  }
+};
+
+}  // namespace
+
+void check_camera(const PinholeCamera& camera) {
+  const auto positive = [](double value, const char* name) {
+    if (!(value > 0.0) || !std::isfinite(value)) fail("camera: {} is {}; it must be above 0", name, value);
+  };
+  if (camera.width < 1 || camera.height < 1 || camera.width > 65536 || camera.height > 65536) {
+    fail("camera: a size of {} x {} pixels; each side must be 1 to 65536", camera.width, camera.height);
+  }
+  positive(camera.pixel_pitch_um, "pixel_pitch_um");
+  positive(camera.hole_diameter_um, "hole_diameter_um");
+  positive(camera.distance_mm, "distance_mm");
+  if (!(camera.foil_thickness_um >= 0.0) || !(camera.foil_thickness_um * 1e-3 < camera.distance_mm)) {
+    fail("camera: foil_thickness_um is {}; it must be 0 or more and less than the distance to the sensor, {} mm",
+         camera.foil_thickness_um, camera.distance_mm);
+  }
+  const Eigen::Matrix3d& rotation = camera.gel_from_camera.rotation;
+  if (!rotation.allFinite() || !camera.gel_from_camera.translation.allFinite() ||
+      !(rotation * rotation.transpose()).isIdentity(1e-6) || rotation.determinant() < 0.0) {
+    fail("camera: gel_from_camera isn't a finite rotation and translation");
+  }
+}
+
+std::optional<PinholeRay> pinhole_ray(const PinholeCamera& camera, double x, double y, double u, double v) {
+  const double pitch = camera.pixel_pitch_um * 1e-3;
+  const double radius = 0.5e-3 * camera.hole_diameter_um;
+  const double half_foil = 0.5e-3 * camera.foil_thickness_um;
+  const double distance = camera.distance_mm;
+  // Light crosses over in the hole, read-out turns the picture upright again.
+  const Eigen::Vector3d sensor(-(x - 0.5 * camera.width) * pitch, -(y - 0.5 * camera.height) * pitch, -distance);
+
+  // Both rims as the sensor point sees them in the hole's middle plane: discs scaled about the sensor point.
+  const double scale_near = distance / (distance - half_foil);  // the rim on the sensor's side
+  const double scale_far = distance / (distance + half_foil);
+  const Eigen::Vector2d centre_near = (1.0 - scale_near) * sensor.head<2>();
+  const Eigen::Vector2d centre_far = (1.0 - scale_far) * sensor.head<2>();
+  const Eigen::Vector2d between = centre_far - centre_near;
+  const double shift = between.norm();
+  const DiscOverlap overlap(radius * scale_near, radius * scale_far, shift);
+  if (overlap.half_height <= 0.0) return std::nullopt;
+  const Eigen::Vector2d e = shift > 0.0 ? Eigen::Vector2d(between / shift) : Eigen::Vector2d::UnitX();
+  const Eigen::Vector2d across(-e.y(), e.x());
+
+  // A uniform point of the unit disc, each of its slices across v stretched onto the overlap's slice at the same
+  // relative height: for a thin foil almost uniform, so that the weight hardly varies.
+  const Eigen::Vector2d disc = square_to_disc(u, v);
+  const double half_slice = std::sqrt(std::max(1e-24, 1.0 - disc.y() * disc.y()));
+  const double height = overlap.half_height * disc.y();
+  double low = 0.0;
+  double high = 0.0;
+  overlap.slice(height, low, high);
+  if (!(high > low)) return std::nullopt;
+  const double along = 0.5 * (low + high) + 0.5 * (high - low) * (disc.x() / half_slice);
+  const double area = kPi * overlap.half_height * (high - low) / (2.0 * half_slice);
+
+  const Eigen::Vector2d hole = centre_near + along * e + height * across;
+  PinholeRay ray;
+  ray.origin = {hole.x(), hole.y(), 0.0};
+  const Eigen::Vector3d through = ray.origin - sensor;
+  const double length2 = through.squaredNorm();
+  ray.direction = through / std::sqrt(length2);
+  const double cosine = ray.direction.z();
+  ray.weight = area * cosine * cosine / length2;
+  return ray;
+}
+
+Eigen::Vector2d project(const PinholeCamera& camera, const Eigen::Vector3d& point_in_camera) {
+  TS_ASSERT(point_in_camera.z() > 0.0);
+  const double scale = camera.distance_mm / (point_in_camera.z() * camera.pixel_pitch_um * 1e-3);
+  return {0.5 * camera.width + scale * point_in_camera.x(), 0.5 * camera.height + scale * point_in_camera.y()};
+}
+
+}  // namespace touchstone::render

@@ -1,0 +1,101 @@
+#pragma once
+// A scene with its number of bands known to the compiler and all that can be computed ahead computed.
+
+#include <Eigen/Core>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "render/ray_scene.h"
+#include "render/scene.h"
+#include "render/spectrum.h"
+#include "render/spot_light.h"
+#include "render/warps.h"
+
+namespace touchstone::render {
+
+template <int N>
+struct PreparedMedium {
+  double index;
+  bool absorbs;
+  Bands<N> absorption;
+};
+
+enum class SurfaceKind { kLambertian, kConductor, kBlack, kRefractive };
+
+template <int N>
+struct PreparedMaterial {
+  SurfaceKind kind = SurfaceKind::kBlack;
+  Bands<N> colour = Bands<N>::Zero();  ///< albedo, or reflectance at normal incidence
+  double roughness = 0.0;
+  int inside = 0, outside = 0;
+};
+
+template <int N>
+struct PreparedLamp {
+  SpotLamp lamp;
+  NormalFrame frame;
+  double cos_full;             ///< within this cosine the lobe is at its top
+  Bands<N> intensity_on_axis;  ///< W/sr
+  int layer;                   ///< number of faces below it
+};
+
+/// See Scene. Layer k lies between face k-1 and face k.
+template <int N>
+struct PreparedScene {
+  std::vector<PreparedMedium<N>> media;
+  std::vector<FlatFace> faces;
+  std::vector<PreparedMaterial<N>> materials;  ///< by RayHit::object
+  std::vector<PreparedLamp<N>> lamps;
+  Bands<N> environment;
+  bool interreflection;
+  RayScene rays;
+
+  explicit PreparedScene(const Scene& scene)
+      : faces(scene.faces), environment(scene.environment), interreflection(scene.interreflection), rays(scene) {
+    for (const Medium& medium : scene.media) {
+      Bands<N> absorption = Bands<N>::Zero();
+      if (medium.absorption.size() > 0) absorption = medium.absorption;
+      media.push_back({medium.index, (absorption > 0.0).any(), absorption});
+    }
+    for (const Surface& surface : scene.surfaces) materials.push_back(prepare(surface.material));
+    for (const Ball& ball : scene.balls) materials.push_back(prepare(ball.material));
+    for (const SpotLamp& lamp : scene.lamps) {
+      const Bands<N> intensity = Bands<N>(lamp.power_W) / spot_solid_angle(lamp);
+      lamps.push_back({lamp, NormalFrame(lamp.direction.normalized()), std::cos(lamp.half_angle), intensity,
+                       layer_at(lamp.position.z())});
+    }
+  }
+
+  int layer_at(double z) const {
+    int layer = 0;
+    while (layer < static_cast<int>(faces.size()) && faces[layer].z < z) ++layer;
+    return layer;
+  }
+
+  /// The medium of a layer where no Refractive surface says otherwise.
+  int medium_of_layer(int layer) const {
+    if (faces.empty()) return 0;
+    return layer == 0 ? faces.front().medium_below : faces[layer - 1].medium_above;
+  }
+
+ private:
+  static PreparedMaterial<N> prepare(const Material& material) {
+    PreparedMaterial<N> made;
+    if (const auto* lambertian = std::get_if<Lambertian>(&material)) {
+      made.kind = SurfaceKind::kLambertian;
+      made.colour = lambertian->albedo;
+    } else if (const auto* conductor = std::get_if<RoughConductor>(&material)) {
+      made.kind = SurfaceKind::kConductor;
+      made.colour = conductor->reflectance;
+      made.roughness = conductor->roughness;
+    } else if (const auto* refractive = std::get_if<Refractive>(&material)) {
+      made.kind = SurfaceKind::kRefractive;
+      made.inside = refractive->medium_inside;
+      made.outside = refractive->medium_outside;
+    }
+    return made;
+  }
+};
+
+}  // namespace touchstone::render

@@ -1,0 +1,256 @@
+#include "render/ray_scene.h"
+
+#include <embree3/rtcore.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "core/error.h"
+
+namespace touchstone::render {
+namespace {
+
+/// One Embree device for the process. Trees are built by the calling thread alone: the same tree in every run.
+RTCDevice device() {
+  static const RTCDevice shared = [] {
+    const RTCDevice made = rtcNewDevice("threads=1,user_threads=1,set_affinity=0");
+    if (made == nullptr) fail("Embree can't start on this processor (error {})", int(rtcGetDeviceError(nullptr)));
+    return made;
+  }();
+  return shared;
+}
+
+struct HeightRange {
+  double low = std::numeric_limits<double>::infinity();
+  double high = -std::numeric_limits<double>::infinity();
+
+  void add(double a, double b) {
+    low = std::min(low, a);
+    high = std::max(high, b);
+  }
+  /// Padded by what single precision may add to a box.
+  bool misses(double z0, double z1) const {
+    constexpr double kPad = 1e-3;
+    return std::max(z0, z1) < low - kPad || std::min(z0, z1) > high + kPad;
+  }
+};
+
+bool finite(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  return std::isfinite(a.x() + a.y() + a.z() + b.x() + b.y() + b.z());
+}
+
+RTCRay embree_ray(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double most) {
+  RTCRay ray;
+  ray.org_x = static_cast<float>(origin.x());
+  ray.org_y = static_cast<float>(origin.y());
+  ray.org_z = static_cast<float>(origin.z());
+  ray.tnear = 0.0f;
+  ray.dir_x = static_cast<float>(direction.x());
+  ray.dir_y = static_cast<float>(direction.y());
+  ray.dir_z = static_cast<float>(direction.z());
+  ray.time = 0.0f;
+  ray.tfar = static_cast<float>(most);
+  ray.mask = 0xffffffffu;
+  ray.id = 0;
+  ray.flags = 0;
+  return ray;
+}
+
+}  // namespace
+
+struct RayScene::State {
+  struct Mesh {
+    TriangleMesh mesh;
+    std::vector<Eigen::Vector3d> vertex_normals;  // empty: shade with the triangle's normal
+  };
+  std::vector<Mesh> meshes;
+  std::vector<Ball> balls;
+  std::vector<int> opaque_balls, refractive_balls;  // Embree's primitive number -> ball
+  RTCScene all = nullptr, opaque = nullptr, refractive = nullptr;
+  HeightRange all_heights, opaque_heights;
+
+  ~State() {
+    for (RTCScene scene : {all, opaque, refractive}) {
+      if (scene != nullptr) rtcReleaseScene(scene);
+    }
+  }
+
+  void attach(RTCGeometry geometry, unsigned id, bool is_refractive) {
+    rtcCommitGeometry(geometry);
+    rtcAttachGeometryByID(all, geometry, id);
+    rtcAttachGeometryByID(is_refractive ? refractive : opaque, geometry, id);
+    rtcReleaseGeometry(geometry);
+  }
+
+  void add_mesh(unsigned id, bool is_refractive) {
+    const TriangleMesh& mesh = meshes[id].mesh;
+    if (mesh.triangles.empty()) return;
+    RTCGeometry geometry = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_TRIANGLE);
+    auto* vertices = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                                                 3 * sizeof(float), mesh.vertices.size()));
+    auto* corners = static_cast<unsigned*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                                                   3 * sizeof(unsigned), mesh.triangles.size()));
+    if (vertices == nullptr || corners == nullptr) fail("surface {}: no memory for its triangles", id);
+    for (const Eigen::Vector3d& vertex : mesh.vertices) {
+      for (int a = 0; a < 3; ++a) *vertices++ = static_cast<float>(vertex[a]);
+    }
+    for (const auto& triangle : mesh.triangles) {
+      for (int corner : triangle) {
+        *corners++ = static_cast<unsigned>(corner);
+        const double z = mesh.vertices[corner].z();
+        all_heights.add(z, z);
+        if (!is_refractive) opaque_heights.add(z, z);
+      }
+    }
+    attach(geometry, id, is_refractive);
+  }
+
+  void add_balls(unsigned id, const std::vector<int>& which, bool is_refractive) {
+    if (which.empty()) return;
+    RTCGeometry geometry = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_SPHERE_POINT);
+    auto* points = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT4,
+                                                               4 * sizeof(float), which.size()));
+    if (points == nullptr) fail("no memory for {} balls", which.size());
+    for (int index : which) {
+      const Ball& ball = balls[index];
+      for (int a = 0; a < 3; ++a) *points++ = static_cast<float>(ball.centre[a]);
+      *points++ = static_cast<float>(ball.radius);
+      all_heights.add(ball.centre.z() - ball.radius, ball.centre.z() + ball.radius);
+      if (!is_refractive) opaque_heights.add(ball.centre.z() - ball.radius, ball.centre.z() + ball.radius);
+    }
+    attach(geometry, id, is_refractive);
+  }
+};
+
+RayScene::RayScene(const Scene& scene) : state_(std::make_unique<State>()) {
+  State& state = *state_;
+  for (RTCScene* made : {&state.all, &state.opaque, &state.refractive}) {
+    *made = rtcNewScene(device());
+    // Robust: no ray slips through the common edge of two triangles.
+    rtcSetSceneFlags(*made, RTC_SCENE_FLAG_ROBUST);
+    rtcSetSceneBuildQuality(*made, RTC_BUILD_QUALITY_MEDIUM);
+  }
+  const auto is_refractive = [](const Material& material) { return std::holds_alternative<Refractive>(material); };
+
+  for (const Surface& surface : scene.surfaces) {
+    State::Mesh mesh{surface.mesh, {}};
+    if (is_refractive(surface.material)) {
+      mesh.vertex_normals.assign(mesh.mesh.vertices.size(), Eigen::Vector3d::Zero());
+      for (const auto& t : mesh.mesh.triangles) {
+        const auto& p = mesh.mesh.vertices;
+        const Eigen::Vector3d doubled_area = (p[t[1]] - p[t[0]]).cross(p[t[2]] - p[t[0]]);
+        for (int corner : t) mesh.vertex_normals[corner] += doubled_area;
+      }
+      for (Eigen::Vector3d& normal : mesh.vertex_normals)
+        normal.normalize();  // leaves an unused vertex's zero as it is
+    }
+    state.meshes.push_back(std::move(mesh));
+  }
+  state.balls = scene.balls;
+  for (int i = 0; i < static_cast<int>(scene.balls.size()); ++i) {
+    (is_refractive(scene.balls[i].material) ? state.refractive_balls : state.opaque_balls).push_back(i);
+  }
+  for (unsigned i = 0; i < state.meshes.size(); ++i) {
+    state.add_mesh(i, is_refractive(scene.surfaces[i].material));
+  }
+  const auto first_ball = static_cast<unsigned>(state.meshes.size());
+  state.add_balls(first_ball, state.opaque_balls, false);
+  state.add_balls(first_ball + 1, state.refractive_balls, true);
+  for (RTCScene made : {state.all, state.opaque, state.refractive}) rtcCommitScene(made);
+  const RTCError error = rtcGetDeviceError(device());
+  if (error != RTC_ERROR_NONE) fail("Embree can't take the scene (error {})", static_cast<int>(error));
+}
+
+RayScene::~RayScene() = default;
+
+bool RayScene::intersect(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double most,
+                         RayHit& hit) const {
+  const State& state = *state_;
+  const double end = std::isinf(most) ? (direction.z() == 0.0 ? origin.z() : std::copysign(1e30, direction.z()))
+                                      : origin.z() + most * direction.z();
+  if (!(most > 0.0) || state.all_heights.misses(origin.z(), end) || !finite(origin, direction)) return false;
+
+  RTCRayHit found;
+  found.ray = embree_ray(origin, direction, most);
+  found.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+  found.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  rtcIntersect1(state.all, &context, &found);
+  if (found.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
+
+  const unsigned geometry = found.hit.geomID;
+  if (geometry < state.meshes.size()) {
+    const State::Mesh& mesh = state.meshes[geometry];
+    const auto& t = mesh.mesh.triangles[found.hit.primID];
+    const Eigen::Vector3d& a = mesh.mesh.vertices[t[0]];
+    const Eigen::Vector3d ab = mesh.mesh.vertices[t[1]] - a;
+    const Eigen::Vector3d ac = mesh.mesh.vertices[t[2]] - a;
+    hit.position = a + double(found.hit.u) * ab + double(found.hit.v) * ac;
+    hit.normal = ab.cross(ac).normalized();
+    hit.distance = (hit.position - origin).dot(direction);
+    hit.object = static_cast<int>(geometry);
+    hit.shading_normal = hit.normal;
+    if (!mesh.vertex_normals.empty()) {
+      const double w = 1.0 - double(found.hit.u) - double(found.hit.v);
+      const Eigen::Vector3d smooth = w * mesh.vertex_normals[t[0]] + double(found.hit.u) * mesh.vertex_normals[t[1]] +
+                                     double(found.hit.v) * mesh.vertex_normals[t[2]];
+      const double length = smooth.norm();
+      // A fold sharper than that isn't a smooth surface.
+      if (length > 0.1 && smooth.dot(hit.normal) > 0.5 * length) hit.shading_normal = smooth / length;
+    }
+    return true;
+  }
+
+  const auto& which = geometry == state.meshes.size() ? state.opaque_balls : state.refractive_balls;
+  const int index = which[found.hit.primID];
+  const Ball& ball = state.balls[index];
+  const Eigen::Vector3d to_centre = ball.centre - origin;
+  const double nearest = to_centre.dot(direction);
+  const double half2 = ball.radius * ball.radius - (to_centre - nearest * direction).squaredNorm();
+  const double half = std::sqrt(std::max(0.0, half2));
+  const double first = nearest - half;
+  const double t = std::abs(first - double(found.ray.tfar)) <= half ? first : nearest + half;
+  const Eigen::Vector3d radial = origin + t * direction - ball.centre;
+  hit.normal = radial.normalized();
+  hit.shading_normal = hit.normal;
+  hit.position = ball.centre + ball.radius * hit.normal;
+  hit.distance = t;
+  hit.object = static_cast<int>(state.meshes.size()) + index;
+  return std::isfinite(hit.position.sum());
+}
+
+bool RayScene::occluded(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const {
+  const State& state = *state_;
+  if (state.opaque_heights.misses(from.z(), to.z()) || !finite(from, to)) return false;
+  const Eigen::Vector3d way = to - from;
+  const double length = way.norm();
+  if (!(length > 0.0)) return false;
+  RTCRay ray = embree_ray(from, way / length, length * (1.0 - 1e-6));
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  rtcOccluded1(state.opaque, &context, &ray);
+  return ray.tfar < 0.0f;
+}
+
+bool RayScene::nothing_beyond(double z, bool up) const {
+  return state_->all_heights.misses(z, std::copysign(1e30, up ? 1.0 : -1.0));
+}
+
+double RayScene::refractive_along_z(const Eigen::Vector3d& origin, bool up, double most) const {
+  const Eigen::Vector3d direction(0.0, 0.0, up ? 1.0 : -1.0);
+  if (!finite(origin, direction) || !(most > 0.0)) return -1.0;
+  RTCRayHit found;
+  found.ray = embree_ray(origin, direction, most);
+  found.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+  found.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  rtcIntersect1(state_->refractive, &context, &found);
+  return found.hit.geomID == RTC_INVALID_GEOMETRY_ID ? -1.0 : double(found.ray.tfar);
+}
+
+}  // namespace touchstone::render

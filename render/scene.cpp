@@ -1,0 +1,143 @@
+#include "render/scene.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "core/error.h"
+#include "core/units.h"
+#include "render/layer_connection.h"
+
+namespace touchstone::render {
+namespace {
+
+template <typename... Ts>
+struct Overloaded : Ts... {
+  using Ts::operator()...;
+};
+template <typename... Ts>
+Overloaded(Ts...) -> Overloaded<Ts...>;
+
+void check_spectrum(const Spectrum& values, Eigen::Index bands, double most, const std::string& what) {
+  if (values.size() != bands) {
+    fail("{} has {} bands; the scene's environment has {}", what, values.size(), bands);
+  }
+  for (Eigen::Index i = 0; i < bands; ++i) {
+    if (!(values[i] >= 0.0 && values[i] <= most)) {
+      if (std::isinf(most)) fail("{} is {} in band {}; it must be finite and 0 or more", what, values[i], i);
+      fail("{} is {} in band {}; it must be from 0 to {}", what, values[i], i, most);
+    }
+    if (!std::isfinite(values[i])) fail("{} is {} in band {}; it must be finite", what, values[i], i);
+  }
+}
+
+void check_medium_index(int medium, const Scene& scene, const std::string& what) {
+  if (medium < 0 || medium >= static_cast<int>(scene.media.size())) {
+    fail("{} is medium {}; the scene has media 0 to {}", what, medium, scene.media.size() - 1);
+  }
+}
+
+void check_material(const Material& material, const Scene& scene, const std::string& what) {
+  const Eigen::Index bands = scene.environment.size();
+  std::visit(Overloaded{[&](const Lambertian& m) { check_spectrum(m.albedo, bands, 1.0, what + ": albedo"); },
+                        [&](const RoughConductor& m) {
+                          check_spectrum(m.reflectance, bands, 1.0, what + ": reflectance");
+                          if (!(m.roughness >= 1e-3 && m.roughness <= 1.0)) {
+                            fail("{}: roughness is {}; it must be from 0.001 to 1", what, m.roughness);
+                          }
+                        },
+                        [](const Black&) {},
+                        [&](const Refractive& m) {
+                          check_medium_index(m.medium_inside, scene, what + ": medium_inside");
+                          check_medium_index(m.medium_outside, scene, what + ": medium_outside");
+                        }},
+             material);
+}
+
+void check_mesh(const TriangleMesh& mesh, const std::string& what) {
+  for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
+    if (!mesh.vertices[i].allFinite()) fail("{}: vertex {} isn't finite", what, i);
+    if (mesh.vertices[i].cwiseAbs().maxCoeff() > 1e5) fail("{}: vertex {} is over 100 m from the origin", what, i);
+  }
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+    const auto& triangle = mesh.triangles[i];
+    for (int corner : triangle) {
+      if (corner < 0 || corner >= static_cast<int>(mesh.vertices.size())) {
+        fail("{}: triangle {} names vertex {}; there are {}", what, i, corner, mesh.vertices.size());
+      }
+    }
+    const Eigen::Vector3d ab = mesh.vertices[triangle[1]] - mesh.vertices[triangle[0]];
+    const Eigen::Vector3d ac = mesh.vertices[triangle[2]] - mesh.vertices[triangle[0]];
+    const double longest = std::max({ab.squaredNorm(), ac.squaredNorm(), (ac - ab).squaredNorm()});
+    // Below this the normal is noise.
+    if (!(ab.cross(ac).norm() > 1e-12 * longest)) fail("{}: triangle {} has no area", what, i);
+  }
+}
+
+}  // namespace
+
+void check_scene(const Scene& scene) {
+  const Eigen::Index bands = scene.environment.size();
+  if (bands < 1) fail("scene: the environment has no band; give a radiance (0 for darkness) for each band");
+  check_spectrum(scene.environment, bands, INFINITY, "environment");
+
+  if (scene.media.empty()) fail("scene: no medium; media[0] fills the space");
+  for (std::size_t i = 0; i < scene.media.size(); ++i) {
+    const Medium& medium = scene.media[i];
+    if (!(medium.index >= 1.0 && medium.index <= 5.0)) {
+      fail("medium {}: index is {}; it must be from 1 to 5", i, medium.index);
+    }
+    if (medium.absorption.size() > 0) {
+      check_spectrum(medium.absorption, bands, INFINITY, fmt::format("medium {}: absorption", i));
+    }
+  }
+
+  if (scene.faces.size() > kMaxLayers - 3) {
+    fail("scene: {} flat faces; {} are allowed", scene.faces.size(), kMaxLayers - 3);
+  }
+  for (std::size_t i = 0; i < scene.faces.size(); ++i) {
+    const FlatFace& face = scene.faces[i];
+    const std::string what = fmt::format("face {}", i);
+    if (!std::isfinite(face.z)) fail("{}: z is {}; it must be finite", what, face.z);
+    check_medium_index(face.medium_below, scene, what + ": medium_below");
+    check_medium_index(face.medium_above, scene, what + ": medium_above");
+    if (i == 0) continue;
+    const FlatFace& below = scene.faces[i - 1];
+    if (face.z < below.z)
+      fail("{}: z is {}; faces run from low to high and the one before is at {}", what, face.z, below.z);
+    if (face.medium_below != below.medium_above) {
+      fail("{}: medium_below is {}; the face below it ends in medium {}", what, face.medium_below, below.medium_above);
+    }
+  }
+
+  for (std::size_t i = 0; i < scene.surfaces.size(); ++i) {
+    const std::string what = fmt::format("surface {}", i);
+    check_mesh(scene.surfaces[i].mesh, what);
+    check_material(scene.surfaces[i].material, scene, what);
+  }
+  for (std::size_t i = 0; i < scene.balls.size(); ++i) {
+    const Ball& ball = scene.balls[i];
+    const std::string what = fmt::format("ball {}", i);
+    if (!ball.centre.allFinite()) fail("{}: its centre isn't finite", what);
+    if (!(ball.radius > 0.0 && ball.radius < 1e5)) fail("{}: radius is {} mm; it must be above 0", what, ball.radius);
+    check_material(ball.material, scene, what);
+  }
+  for (std::size_t i = 0; i < scene.lamps.size(); ++i) {
+    const SpotLamp& lamp = scene.lamps[i];
+    const std::string what = fmt::format("lamp {}", i);
+    if (!lamp.position.allFinite()) fail("{}: its position isn't finite", what);
+    if (!lamp.direction.allFinite() || !(lamp.direction.norm() > 1e-9)) fail("{}: it has no direction", what);
+    if (!(lamp.lens_radius >= 0.0 && lamp.lens_radius < 1e5)) {
+      fail("{}: lens_radius is {} mm; it must be 0 or more", what, lamp.lens_radius);
+    }
+    if (!(lamp.half_angle >= 0.0 && lamp.soft_angle >= 0.0 && lamp.half_angle + lamp.soft_angle > 1e-4 &&
+          lamp.half_angle + lamp.soft_angle <= 0.5 * kPi)) {
+      fail("{}: half_angle {} and soft_angle {} rad; each must be 0 or more, together above 0 and at most pi/2", what,
+           lamp.half_angle, lamp.soft_angle);
+    }
+    check_spectrum(lamp.power_W, bands, INFINITY, what + ": power_W");
+  }
+}
+
+}  // namespace touchstone::render

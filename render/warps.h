@@ -1,0 +1,46 @@
+#pragma once
+// Maps from the unit square to the shapes that light is sampled over, and the frame round a normal.
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+
+#include "core/units.h"
+
+namespace touchstone::render {
+
+/// Uniform on the unit disc, area-preserving and continuous (Shirley and Chiu 1997).
+inline Eigen::Vector2d square_to_disc(double u, double v) {
+  const double a = 2.0 * u - 1.0;
+  const double b = 2.0 * v - 1.0;
+  if (a == 0.0 && b == 0.0) return {0.0, 0.0};
+  if (std::abs(a) > std::abs(b)) {
+    const double angle = 0.25 * kPi * (b / a);
+    return {a * std::cos(angle), a * std::sin(angle)};
+  }
+  const double angle = 0.5 * kPi - 0.25 * kPi * (a / b);
+  return {b * std::cos(angle), b * std::sin(angle)};
+}
+
+/// A direction about +z with density cos(theta) / pi (Malley's method).
+inline Eigen::Vector3d square_to_cosine_hemisphere(double u, double v) {
+  const Eigen::Vector2d disc = square_to_disc(u, v);
+  return {disc.x(), disc.y(), std::sqrt(std::max(0.0, 1.0 - disc.squaredNorm()))};
+}
+
+/// A right-handed orthonormal frame whose third axis is a given unit vector (Duff et al. 2017).
+struct NormalFrame {
+  Eigen::Vector3d x, y, z;
+
+  explicit NormalFrame(const Eigen::Vector3d& normal) : z(normal) {
+    const double sign = std::copysign(1.0, normal.z());
+    const double a = -1.0 / (sign + normal.z());
+    const double b = normal.x() * normal.y() * a;
+    x = {1.0 + sign * normal.x() * normal.x() * a, sign * b, -sign * normal.x()};
+    y = {b, sign + normal.y() * normal.y() * a, -normal.y()};
+  }
+  Eigen::Vector3d to_world(const Eigen::Vector3d& v) const { return v.x() * x + v.y() * y + v.z() * z; }
+  Eigen::Vector3d to_local(const Eigen::Vector3d& v) const { return {v.dot(x), v.dot(y), v.dot(z)}; }
+};
+
+}  // namespace touchstone::render

@@ -1,0 +1,279 @@
+#include "sensors/bead_window.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <opencv2/core.hpp>
+
+#include "core/error.h"
+
+namespace touchstone::sensors {
+
+namespace {
+
+// OpenCV's weights of blue, green and red, in 1/2^15.
+constexpr int kBlue = 3735;
+constexpr int kGreen = 19235;
+constexpr int kRed = 9798;
+constexpr int kWeightBits = 15;
+
+template <typename T>
+int grey_of_bgr(const T* pixel) {
+  // 16-bit values times 15-bit weights need 31 bits and their sum exactly 32 at most: unsigned holds it.
+  const auto sum = static_cast<unsigned>(kBlue) * pixel[0] + static_cast<unsigned>(kGreen) * pixel[1] +
+                   static_cast<unsigned>(kRed) * pixel[2];
+  return static_cast<int>((sum + (1u << (kWeightBits - 1))) >> kWeightBits);
+}
+
+std::uint8_t to_level(double value) {
+  return static_cast<std::uint8_t>(std::clamp(value + 0.5, 0.0, 255.0));
+}
+
+/// What a window's grey values become in step iv, and how they're spread.
+struct Contrast {
+  std::array<std::uint8_t, 256> of_grey;
+  std::array<int, 256> histogram;  ///< of the contrast values
+};
+
+std::array<int, 256> grey_histogram(const GreyWindow& window) {
+  // Four histograms in turn, so that equal neighbours don't wait for each other's increment.
+  std::array<std::array<std::uint16_t, 256>, 4> part{};
+  const std::size_t count = static_cast<std::size_t>(window.width) * static_cast<std::size_t>(window.height);
+  std::size_t i = 0;
+  for (; i + 4 <= count; i += 4) {
+    ++part[0][window.grey[i]];
+    ++part[1][window.grey[i + 1]];
+    ++part[2][window.grey[i + 2]];
+    ++part[3][window.grey[i + 3]];
+  }
+  for (; i < count; ++i) ++part[0][window.grey[i]];
+  std::array<int, 256> histogram;
+  for (std::size_t v = 0; v < 256; ++v) histogram[v] = part[0][v] + part[1][v] + part[2][v] + part[3][v];
+  return histogram;
+}
+
+Contrast contrast_of(const std::array<int, 256>& grey, int count, BeadPolarity polarity, double factor) {
+  std::int64_t sum = 0;
+  for (int v = 0; v < 256; ++v) sum += static_cast<std::int64_t>(v) * grey[static_cast<std::size_t>(v)];
+  const double mean = static_cast<double>(sum) / count;
+  const double sign = polarity == BeadPolarity::kDark ? -factor : factor;
+  Contrast contrast;
+  contrast.histogram.fill(0);
+  for (int v = 0; v < 256; ++v) {
+    const std::uint8_t value = to_level(sign * (v - mean));
+    contrast.of_grey[static_cast<std::size_t>(v)] = value;
+    contrast.histogram[value] += grey[static_cast<std::size_t>(v)];
+  }
+  return contrast;
+}
+
+/// Difference of the mean grey values on both sides of a contrast threshold, among contrasts of at least `first`.
+double class_difference(const std::array<int, 256>& grey, const Contrast& contrast, int first, int threshold) {
+  double sum[2] = {0.0, 0.0};
+  double count[2] = {0.0, 0.0};
+  for (std::size_t v = 0; v < 256; ++v) {
+    if (contrast.of_grey[v] < first) continue;
+    const int side = contrast.of_grey[v] > threshold ? 1 : 0;
+    sum[side] += static_cast<double>(v) * grey[v];
+    count[side] += grey[v];
+  }
+  if (count[0] == 0.0 || count[1] == 0.0) return 0.0;
+  return std::abs(sum[1] / count[1] - sum[0] / count[0]);
+}
+
+void binarise(const GreyWindow& window, const Contrast& contrast, int threshold, BitWindow& bits) {
+  std::array<std::uint8_t, 256> is_bead;
+  for (std::size_t v = 0; v < 256; ++v) is_bead[v] = contrast.of_grey[v] > threshold ? 1 : 0;
+  bits.width = window.width;
+  bits.height = window.height;
+  const std::uint8_t* grey = window.grey.data();
+  for (int y = 0; y < window.height; ++y) {
+    std::uint64_t row = 0;
+    for (int x = 0; x < window.width; ++x) row |= static_cast<std::uint64_t>(is_bead[*grey++]) << x;
+    bits.rows[static_cast<std::size_t>(y)] = row;
+  }
+}
+
+bool touches_border(const BitWindow& region) {
+  const std::uint64_t last = std::uint64_t{1} << (region.width - 1);
+  std::uint64_t all = 0;
+  for (int y = 0; y < region.height; ++y) all |= region.rows[static_cast<std::size_t>(y)];
+  return (all & 1u) != 0 || (all & last) != 0 || region.rows[0] != 0 ||
+         region.rows[static_cast<std::size_t>(region.height - 1)] != 0;
+}
+
+/// Centroid with each pixel weighted by the part of it that the bead covers, judged by where its contrast lies between
+/// the background's and the bead's. Only pixels within 2 px of the region count.
+Eigen::Vector2d weighted_centroid(const GreyWindow& window, const Contrast& contrast, const BitWindow& region,
+                                  int threshold, const Eigen::Vector2d& fallback) {
+  double bead_sum = 0.0, bead_count = 0.0, back_sum = 0.0, back_count = 0.0;
+  for (int v = 0; v < 256; ++v) {
+    const double count = contrast.histogram[static_cast<std::size_t>(v)];
+    (v > threshold ? bead_sum : back_sum) += count * v;
+    (v > threshold ? bead_count : back_count) += count;
+  }
+  const double bead = bead_sum / bead_count;
+  const double back = back_sum / back_count;
+  BitWindow near = region;
+  dilate(near, 2);
+  double weight_sum = 0.0, x_sum = 0.0, y_sum = 0.0;
+  for (int y = 0; y < near.height; ++y) {
+    for (std::uint64_t bits = near.rows[static_cast<std::size_t>(y)]; bits != 0; bits &= bits - 1) {
+      const int x = std::countr_zero(bits);
+      const std::uint8_t grey = window.grey[static_cast<std::size_t>(y * window.width + x)];
+      const double weight = std::clamp((contrast.of_grey[grey] - back) / (bead - back), 0.0, 1.0);
+      weight_sum += weight;
+      x_sum += weight * x;
+      y_sum += weight * y;
+    }
+  }
+  if (weight_sum <= 0.0) return fallback;
+  return {x_sum / weight_sum + 0.5, y_sum / weight_sum + 0.5};
+}
+
+}  // namespace
+
+void BrightnessScale::set(double factor) {
+  factor_ = factor;
+  for (std::size_t v = 0; v < table_.size(); ++v) table_[v] = to_level(factor * static_cast<double>(v));
+}
+
+void BrightnessScale::read(const cv::Mat& image, int x, int y, int stride, int count, std::uint8_t* out) const {
+  switch (image.type()) {
+    case CV_8UC1: {
+      const std::uint8_t* in = image.ptr<std::uint8_t>(y) + x;
+      for (int i = 0; i < count; ++i, in += stride) out[i] = table_[*in];
+      return;
+    }
+    case CV_8UC3: {
+      const std::uint8_t* in = image.ptr<std::uint8_t>(y) + 3 * x;
+      for (int i = 0; i < count; ++i, in += 3 * stride) out[i] = table_[static_cast<std::size_t>(grey_of_bgr(in))];
+      return;
+    }
+    case CV_16UC1: {
+      const std::uint16_t* in = image.ptr<std::uint16_t>(y) + x;
+      for (int i = 0; i < count; ++i, in += stride) out[i] = to_level(factor_ * *in);
+      return;
+    }
+    case CV_16UC3: {
+      const std::uint16_t* in = image.ptr<std::uint16_t>(y) + 3 * x;
+      for (int i = 0; i < count; ++i, in += 3 * stride) out[i] = to_level(factor_ * grey_of_bgr(in));
+      return;
+    }
+    default:
+      TS_ASSERT(!"image types are checked before");
+  }
+}
+
+double mean_grey(const cv::Mat& image, const cv::Rect& part) {
+  const cv::Scalar mean = cv::mean(image(part));
+  if (image.channels() == 1) return mean[0];
+  return (kBlue * mean[0] + kGreen * mean[1] + kRed * mean[2]) / (1 << kWeightBits);
+}
+
+bool read_window(const cv::Mat& image, const BrightnessScale& scale, const Eigen::Vector2d& centre, int side,
+                 int stride, GreyWindow& window) {
+  const int left = static_cast<int>(std::lround(centre.x() - 0.5 * side));
+  const int top = static_cast<int>(std::lround(centre.y() - 0.5 * side));
+  const int right = std::min(left + side, image.cols);
+  const int bottom = std::min(top + side, image.rows);
+  window.x = std::max(left, 0);
+  window.y = std::max(top, 0);
+  if (window.x >= right || window.y >= bottom) return false;
+  window.stride = stride;
+  window.width = (right - window.x + stride - 1) / stride;
+  window.height = (bottom - window.y + stride - 1) / stride;
+  TS_ASSERT(window.width <= BitWindow::kMaxSide && window.height <= BitWindow::kMaxSide);
+  std::uint8_t* out = window.grey.data();
+  for (int row = 0; row < window.height; ++row, out += window.width) {
+    scale.read(image, window.x, window.y + row * stride, stride, window.width, out);
+  }
+  return true;
+}
+
+std::optional<int> otsu_threshold(const std::array<int, 256>& histogram, int first) {
+  std::int64_t count = 0, sum = 0;
+  for (int v = first; v < 256; ++v) {
+    count += histogram[static_cast<std::size_t>(v)];
+    sum += static_cast<std::int64_t>(v) * histogram[static_cast<std::size_t>(v)];
+  }
+  std::int64_t low_count = 0, low_sum = 0;
+  double best = 0.0;
+  std::optional<int> threshold;
+  for (int v = first; v < 256; ++v) {
+    const int here = histogram[static_cast<std::size_t>(v)];
+    if (here == 0) continue;  // the classes are as for the value before
+    low_count += here;
+    low_sum += static_cast<std::int64_t>(v) * here;
+    if (low_count == count) break;
+    const double high_count = static_cast<double>(count - low_count);
+    const double difference =
+        static_cast<double>(low_sum) / static_cast<double>(low_count) - static_cast<double>(sum - low_sum) / high_count;
+    const double between = static_cast<double>(low_count) * high_count * difference * difference;
+    if (between > best) {
+      best = between;
+      threshold = v;
+    }
+  }
+  return threshold;
+}
+
+std::optional<BeadMeasurement> measure_bead(const GreyWindow& window, const BeadSearch& search) {
+  const BeadTrackerSettings& settings = search.settings;
+  const BeadLook& look = settings.look;
+  const int count = window.width * window.height;
+  const std::array<int, 256> grey = grey_histogram(window);
+  const Contrast contrast = contrast_of(grey, count, look.polarity, settings.contrast);
+
+  const double pixel_area = static_cast<double>(window.stride) * window.stride;
+  double least_area = look.min_area_px;
+  double most_area = look.max_area_fraction * settings.roi_b_px * settings.roi_b_px;
+  if (search.expected_area_px > 0.0) {
+    least_area = std::max(least_area, search.expected_area_px / look.max_area_change);
+    most_area = std::min(most_area, search.expected_area_px * look.max_area_change);
+  }
+  const int radius = window.stride == 1 ? settings.morphology_px / 2 : 0;
+
+  // The second round takes only what the first has highlighted, to part a bead from something half as dark beside it.
+  constexpr int kRounds = 2;
+  int first = 0;
+  for (int round = 0; round < kRounds; ++round) {
+    const std::optional<int> threshold = otsu_threshold(contrast.histogram, first);
+    if (!threshold) return std::nullopt;
+    const double difference = class_difference(grey, contrast, first, *threshold);
+    first = *threshold + 1;
+    if (difference < look.min_difference) return std::nullopt;
+
+    BitWindow bits;
+    binarise(window, contrast, *threshold, bits);
+    if (radius > 0) {
+      open_regions(bits, radius);
+      close_regions(bits, radius);
+    }
+    std::optional<BeadMeasurement> best;
+    double best_rank = 0.0;
+    BitWindow region, best_region;
+    while (take_region(bits, region)) {
+      const RegionMoments moments = moments_of(region);
+      const double area = moments.area * pixel_area;
+      if (area < least_area || area > most_area || moments.elongation > look.max_elongation) continue;
+      const Eigen::Vector2d half(0.5, 0.5);
+      const Eigen::Vector2d centroid =
+          Eigen::Vector2d(window.x, window.y) + window.stride * (moments.centroid - half) + half;
+      const double rank = search.take_largest ? -area : (centroid - search.near).squaredNorm();
+      if (best && rank >= best_rank) continue;
+      best_rank = rank;
+      best = BeadMeasurement{centroid, area, difference, touches_border(region)};
+      best_region = region;
+    }
+    if (!best) continue;
+    if (settings.centroid == CentroidKind::kWeighted && window.stride == 1) {
+      const Eigen::Vector2d origin(window.x, window.y);
+      best->centroid = origin + weighted_centroid(window, contrast, best_region, *threshold, best->centroid - origin);
+    }
+    return best;
+  }
+  return std::nullopt;
+}
+
+}  // namespace touchstone::sensors

@@ -1,0 +1,257 @@
+// What the tracker does with frames that show no beads, or not all, or aren't what they should be.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <opencv2/imgproc.hpp>
+
+#include "core/error.h"
+#include "core/random.h"
+#include "sensors/bead_tracker.h"
+#include "tests/sensors/rendered_beads.h"
+
+namespace touchstone::sensors {
+namespace {
+
+using test::BeadPainter;
+using test::grid_positions;
+using testing::Each;
+using testing::HasSubstr;
+
+constexpr std::int64_t kIntervalUs = 1663;
+const Eigen::Vector2d kGone(std::nan(""), 0.0);
+
+class BeadTrackerFaults : public testing::Test {
+ protected:
+  const TrackedBeads& next(const std::vector<Eigen::Vector2d>& beads) { return next(painter.paint(beads)); }
+  const TrackedBeads& next(const cv::Mat& image) { return tracker.track({image, t_us += kIntervalUs}); }
+
+  static void expect_finite(const TrackedBeads& tracked) {
+    for (std::size_t i = 0; i < tracked.positions.size(); ++i) {
+      EXPECT_TRUE(tracked.positions[i].allFinite() && tracked.measured[i].allFinite()) << i;
+    }
+    EXPECT_TRUE(std::isfinite(tracked.mean_grey));
+  }
+
+  BeadPainter painter{{.noise = 2.0}};
+  const std::vector<Eigen::Vector2d> rest = grid_positions(3, 71.0, {320.0, 240.0});
+  BeadTracker tracker{{}};
+  std::int64_t t_us = 0;
+};
+
+TEST_F(BeadTrackerFaults, HiddenBeadIsHeldThenResetThenFoundAgain) {
+  auto beads = rest;
+  for (Eigen::Vector2d& bead : beads) bead += Eigen::Vector2d(4.0, -3.0);
+  for (int i = 0; i < 5; ++i) ASSERT_EQ(next(beads).found(), 9);
+  const Eigen::Vector2d last = next(beads).positions[4];
+  auto hidden = beads;
+  hidden[4] = kGone;
+  for (int i = 0; i < tracker.settings().max_hidden_frames; ++i) {
+    const TrackedBeads& tracked = next(hidden);
+    ASSERT_EQ(tracked.status[4], BeadStatus::kHidden) << i;
+    EXPECT_EQ(tracked.positions[4], last);
+    EXPECT_EQ(tracked.area_px[4], 0.0);
+    EXPECT_EQ(tracked.found(), 8);
+  }
+  for (int i = 0; i < 5; ++i) EXPECT_EQ(next(hidden).status[4], BeadStatus::kReset);
+  // It comes back where the window round the cell's centre doesn't reach it.
+  beads[4] += Eigen::Vector2d(20.0, 24.0);
+  const TrackedBeads& tracked = next(beads);
+  EXPECT_EQ(tracked.status[4], BeadStatus::kFoundAgain);
+  EXPECT_LT((tracked.positions[4] - beads[4]).norm(), 0.3);
+  EXPECT_EQ(next(beads).status[4], BeadStatus::kFound);
+}
+
+TEST_F(BeadTrackerFaults, BeadThatLeavesItsCellIsReset) {
+  auto beads = rest;
+  bool reset = false;
+  for (int step = 0; step < 40 && !reset; ++step) {
+    const TrackedBeads& tracked = next(beads);
+    const BeadStatus status = tracked.status[8];
+    if (status == BeadStatus::kReset) {
+      reset = true;
+      // The corner cell's centre, seen from the mean bead, is a cell's side away.
+      EXPECT_LT((tracked.positions[8] - rest[8]).norm(), 10.0);
+      EXPECT_GT((tracked.positions[8] - beads[8]).norm(), 25.0);
+    } else {
+      ASSERT_EQ(status, BeadStatus::kFound) << step;
+    }
+    beads[8] += Eigen::Vector2d(2.0, 0.0);
+  }
+  EXPECT_TRUE(reset);
+  beads[8] = rest[8] + Eigen::Vector2d(8.0, 0.0);
+  next(beads);
+  EXPECT_EQ(next(beads).status[8], BeadStatus::kFound);
+}
+
+TEST_F(BeadTrackerFaults, JumpOfMoreThanAWindowIsFoundInTheSameFrame) {
+  ASSERT_EQ(next(rest).found(), 9);
+  auto beads = rest;
+  beads[0] += Eigen::Vector2d(-22.0, 25.0);
+  const TrackedBeads& tracked = next(beads);
+  EXPECT_EQ(tracked.status[0], BeadStatus::kFoundAgain);
+  EXPECT_LT((tracked.positions[0] - beads[0]).norm(), 0.3);
+  EXPECT_EQ(tracked.found(), 9);
+}
+
+TEST_F(BeadTrackerFaults, BeadCutByTheWindowIsMeasuredWhole) {
+  ASSERT_EQ(next(rest).found(), 9);
+  auto beads = rest;
+  for (Eigen::Vector2d& bead : beads) bead += Eigen::Vector2d(11.0, -10.0);  // a few px of each leave the window
+  const TrackedBeads& tracked = next(beads);
+  for (std::size_t i = 0; i < 9; ++i) {
+    EXPECT_EQ(tracked.status[i], BeadStatus::kFound);
+    EXPECT_LT((tracked.measured[i] - beads[i]).norm(), 0.3);
+  }
+}
+
+TEST_F(BeadTrackerFaults, DroppedFramesOnlyMakeTheStepLonger) {
+  RandomStream random(3, 0, Purpose::kTest);
+  for (int i = 0; i < 200; ++i) {
+    auto beads = rest;
+    for (Eigen::Vector2d& bead : beads) bead += Eigen::Vector2d(6.0 * std::sin(0.1 * i), 6.0 * std::cos(0.1 * i));
+    t_us += kIntervalUs;
+    if (random.uniform() < 0.3) continue;
+    const TrackedBeads& tracked = tracker.track({painter.paint(beads), t_us});
+    ASSERT_EQ(tracked.found(), 9);
+    for (std::size_t k = 0; k < 9; ++k) ASSERT_LT((tracked.positions[k] - beads[k]).norm(), 0.5) << "frame " << i;
+  }
+}
+
+TEST_F(BeadTrackerFaults, BlackWhiteAndFlatFramesAreSaidSoAndSurvived) {
+  for (int i = 0; i < 3; ++i) ASSERT_EQ(next(rest).found(), 9);
+  const struct {
+    int value;
+    FrameLight light;
+  } cases[] = {{0, FrameLight::kDark}, {1, FrameLight::kDark}, {120, FrameLight::kFlat}, {255, FrameLight::kSaturated}};
+  for (const auto& [value, light] : cases) {
+    const TrackedBeads& tracked = next(cv::Mat(480, 640, CV_8U, cv::Scalar(value)));
+    EXPECT_EQ(tracked.light, light) << value;
+    EXPECT_EQ(tracked.found(), 0);
+    EXPECT_THAT(tracked.status, Each(BeadStatus::kHidden));
+    expect_finite(tracked);
+  }
+  const TrackedBeads& tracked = next(rest);
+  EXPECT_EQ(tracked.light, FrameLight::kNormal);
+  EXPECT_THAT(tracked.status, Each(BeadStatus::kFound));
+}
+
+TEST_F(BeadTrackerFaults, LongDarknessResetsAndLightFindsAll) {
+  next(rest);
+  for (int i = 0; i < 50; ++i) expect_finite(next(cv::Mat::zeros(480, 640, CV_8U)));
+  EXPECT_THAT(tracker.track({cv::Mat::zeros(480, 640, CV_8U), t_us += kIntervalUs}).status, Each(BeadStatus::kReset));
+  EXPECT_EQ(next(rest).found(), 9);
+}
+
+TEST_F(BeadTrackerFaults, FramesThatNeverShowABeadAreReset) {
+  RandomStream random(4, 0, Purpose::kTest);
+  for (int i = 0; i < 10; ++i) {
+    cv::Mat image(480, 640, CV_8U);
+    for (auto& value : cv::Mat_<std::uint8_t>(image)) {
+      value = cv::saturate_cast<std::uint8_t>(140.0 + 8.0 * random.normal());
+    }
+    const TrackedBeads& tracked = next(image);
+    EXPECT_EQ(tracked.found(), 0);
+    EXPECT_THAT(tracked.status, Each(BeadStatus::kReset));
+    EXPECT_EQ(tracked.light, FrameLight::kNormal);
+    expect_finite(tracked);
+  }
+}
+
+TEST_F(BeadTrackerFaults, SpeckBesideABeadIsNotTakenForIt) {
+  for (int i = 0; i < 3; ++i) next(rest);
+  cv::Mat image = painter.paint(rest);
+  cv::circle(image, {static_cast<int>(rest[4].x()) + 13, static_cast<int>(rest[4].y()) + 3}, 2, cv::Scalar(10), -1);
+  const TrackedBeads& tracked = next(image);
+  EXPECT_EQ(tracked.status[4], BeadStatus::kFound);
+  EXPECT_LT((tracked.measured[4] - rest[4]).norm(), 0.25);
+
+  auto hidden = rest;  // nor when the bead itself is gone
+  hidden[4] = kGone;
+  image = painter.paint(hidden);
+  cv::circle(image, {static_cast<int>(rest[4].x()) + 6, static_cast<int>(rest[4].y()) + 3}, 3, cv::Scalar(10), -1);
+  EXPECT_EQ(next(image).status[4], BeadStatus::kHidden);
+}
+
+TEST_F(BeadTrackerFaults, BeadsAtTheImagesBorderAreNoTrouble) {
+  BeadTracker corner({.first_centre_px = Eigen::Vector2d(2.0, 478.0)});
+  BeadPainter plain({});
+  for (int i = 0; i < 30; ++i) {
+    const TrackedBeads& tracked = corner.track({plain.paint(rest), i});
+    expect_finite(tracked);
+  }
+  BeadTracker beside({.first_centre_px = Eigen::Vector2d(-1e9, 1e9)});
+  expect_finite(beside.track({plain.paint(rest), 0}));
+}
+
+template <typename Call>
+std::string error_of(Call call) {
+  try {
+    call();
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "(no error)";
+}
+
+TEST_F(BeadTrackerFaults, WrongFramesAreRefusedAndLeaveNoTrace) {
+  next(rest);
+  BeadTracker untouched({});
+  // A copy of the tracker's history, without the frames that are refused.
+  RandomStream random(5, 0, Purpose::kTest);
+  const cv::Mat good = painter.paint(rest);
+  BeadTracker disturbed({});
+  untouched.track({good, 100});
+  disturbed.track({good, 100});
+
+  const auto refused = [&](const cv::Mat& image, std::int64_t at) {
+    return error_of([&] { disturbed.track({image, at}); });
+  };
+  EXPECT_THAT(refused(cv::Mat(), 200), HasSubstr("empty"));
+  EXPECT_THAT(refused(cv::Mat(240, 320, CV_8U, cv::Scalar(100)), 200), HasSubstr("320 x 240"));
+  EXPECT_THAT(refused(cv::Mat(480, 640, CV_8UC3, cv::Scalar::all(100)), 200), HasSubstr("CV_8UC3"));
+  EXPECT_THAT(refused(cv::Mat(480, 640, CV_32F, cv::Scalar(100)), 200), HasSubstr("CV_32FC1"));
+  EXPECT_THAT(refused(cv::Mat(480, 640, CV_8UC4, cv::Scalar::all(100)), 200), HasSubstr("CV_8UC4"));
+  EXPECT_THAT(refused(good, 100), HasSubstr("t = 100 us follows one at t = 100 us"));
+  EXPECT_THAT(refused(good, 99), HasSubstr("times must increase"));
+  EXPECT_THAT(refused(good, std::numeric_limits<std::int64_t>::min()), HasSubstr("times must increase"));
+
+  const cv::Mat later = painter.paint(grid_positions(3, 72.0, {321.0, 240.0}));
+  EXPECT_EQ(untouched.track({later, 300}).positions, disturbed.track({later, 300}).positions);
+
+  const cv::Mat last = painter.paint(rest);
+  const TrackedBeads& tracked = untouched.track({last, std::numeric_limits<std::int64_t>::max()});
+  expect_finite(tracked);
+}
+
+TEST_F(BeadTrackerFaults, TooSmallAFirstFrameIsRefused) {
+  BeadTracker fresh({});
+  EXPECT_THAT(error_of([&] { fresh.track({cv::Mat(20, 640, CV_8U, cv::Scalar(100)), 0}); }), HasSubstr("640 x 20"));
+  EXPECT_EQ(fresh.track({painter.paint(rest), 0}).found(), 9);
+}
+
+TEST_F(BeadTrackerFaults, SettingsOutOfRangeAreRefusedByName) {
+  const auto refused = [](auto change) {
+    BeadTrackerSettings settings;
+    change(settings);
+    return error_of([&] { BeadTracker refusing(settings); });
+  };
+  const double nan = std::nan("");
+  EXPECT_THAT(refused([](auto& s) { s.grid = 1; }), HasSubstr("grid is 1"));
+  EXPECT_THAT(refused([](auto& s) { s.roi_b_px = 65; }), HasSubstr("roi_b_px is 65"));
+  EXPECT_THAT(refused([](auto& s) { s.roi_a_px = 60; }), HasSubstr("roi_b_px is 30"));
+  EXPECT_THAT(refused([](auto& s) { s.morphology_px = 2; }), HasSubstr("morphology_px is 2"));
+  EXPECT_THAT(refused([&](auto& s) { s.mean_brightness = nan; }), HasSubstr("mean_brightness is nan"));
+  EXPECT_THAT(refused([&](auto& s) { s.contrast = nan; }), HasSubstr("contrast"));
+  EXPECT_THAT(refused([](auto& s) { s.look.max_area_fraction = 1.5; }), HasSubstr("look.max_area_fraction"));
+  EXPECT_THAT(refused([&](auto& s) { s.look.min_difference = nan; }), HasSubstr("look.min_difference"));
+  EXPECT_THAT(refused([](auto& s) { s.filter.measurement_px = 0.0; }), HasSubstr("filter.measurement_px"));
+  EXPECT_THAT(refused([](auto& s) { s.filter.acceleration_px_per_s2 = -1.0; }), HasSubstr("filter.acceleration"));
+  EXPECT_THAT(refused([](auto& s) { s.max_hidden_frames = -1; }), HasSubstr("max_hidden_frames"));
+  EXPECT_THAT(refused([&](auto& s) { s.first_centre_px = Eigen::Vector2d(1.0, nan); }), HasSubstr("first_centre_px"));
+}
+
+}  // namespace
+}  // namespace touchstone::sensors

@@ -1,0 +1,91 @@
+#include "sim/plan.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace touchstone::sim {
+namespace {
+
+using ::testing::HasSubstr;
+
+SceneSpec shipped(const std::string& name) {
+  return read_scene(std::filesystem::path(TOUCHSTONE_SOURCE_DIR) / "scenes/vhs" / name);
+}
+
+const Effect& effect(const Plan& plan, const std::string& name) {
+  for (const Effect& one : plan.effects) {
+    if (one.name == name) return one;
+  }
+  throw std::runtime_error("no effect " + name);
+}
+
+TEST(Plan, AStraightPressCallsForNoFriction) {
+  EXPECT_FALSE(make_plan(shipped("ball-press.yaml")).friction);
+  EXPECT_TRUE(make_plan(shipped("cycle.yaml")).friction);
+}
+
+TEST(Plan, ASmoothObjectCallsForNoFriction) {
+  SceneSpec scene = shipped("cycle.yaml");
+  scene.object.friction = 0.0;
+  EXPECT_FALSE(make_plan(scene).friction);
+}
+
+TEST(Plan, TruthAloneCallsForNoCamera) {
+  SceneSpec scene = shipped("cycle.yaml");
+  scene.outputs.frames = false;
+  const Plan plan = make_plan(scene);
+  EXPECT_FALSE(plan.camera);
+  EXPECT_EQ(effect(plan, "camera and renderer").cost, "nothing");
+}
+
+TEST(Plan, AnImageFromADeviceWithoutACameraIsRefused) {
+  SceneSpec scene = shipped("cycle.yaml");
+  scene.device.camera.reset();
+  try {
+    make_plan(scene);
+    FAIL() << "no error";
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("has no camera"));
+    EXPECT_GT(error.where().line, 0);
+  }
+}
+
+TEST(Plan, ASwitchOverrulesAndSaysSo) {
+  SceneSpec scene = shipped("ball-press.yaml");
+  scene.effects.friction = Switch::on;
+  const Plan plan = make_plan(scene);
+  EXPECT_TRUE(plan.friction);
+  EXPECT_THAT(effect(plan, "friction").why, HasSubstr("the scene switches it on"));
+}
+
+TEST(Plan, ATighterToleranceCallsForInterreflection) {
+  SceneSpec scene = shipped("cycle.yaml");
+  EXPECT_FALSE(make_plan(scene).interreflection);
+  scene.light.interreflection_tolerance = 1e-4;
+  EXPECT_TRUE(make_plan(scene).interreflection);
+}
+
+// Under a layer that is thin against the disc nothing gets away sideways, so what comes back at once is the internal
+// diffuse reflectance of an index of 1.5, 0.596 (Duntley's formula, e.g. Walsh 1926), less the light that the shifts of
+// the last grazing angles take away.
+TEST(Plan, AWideBrightDiscGetsBackTheDiffuseReflectanceOfTheFace) {
+  GelSpec gel;
+  gel.thickness_mm = 0.001;
+  gel.refractive_index = 1.5;
+  const PlateSpec plate{0.001, 1.5};
+  const double albedo = 0.5;
+  const double expected = albedo * 0.596 / (1.0 - albedo * 0.596);
+  EXPECT_NEAR(interreflection_estimate(gel, plate, albedo, 100.0), expected, 0.01 * expected);
+}
+
+TEST(Plan, ANarrowDiscGetsBackOnlyWhatFresnelReflectsSteeply) {
+  GelSpec gel;
+  gel.thickness_mm = 5.0;
+  gel.refractive_index = 1.5;
+  const PlateSpec plate{2.0, 1.5};
+  EXPECT_LT(interreflection_estimate(gel, plate, 0.6, 3.0), 0.02);
+  EXPECT_GT(interreflection_estimate(gel, plate, 0.6, 30.0), 0.3);
+}
+
+}  // namespace
+}  // namespace touchstone::sim

@@ -1,0 +1,151 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/whole_file.h"
+#include "sim/scene.h"
+#include "tests/support/temporary_folder.h"
+
+namespace touchstone::sim {
+namespace {
+
+using ::testing::HasSubstr;
+
+const std::filesystem::path kScenes = std::filesystem::path(TOUCHSTONE_SOURCE_DIR) / "scenes";
+
+const char* const kDevice = R"(name: small
+gel:
+  size_x_mm: 10
+  size_y_mm: 10
+  thickness_mm: 4
+  youngs_modulus_MPa: 0.3
+plate: {thickness_mm: 1, refractive_index: 1.5}
+)";
+
+/// The message that reading a device text ends with, or the empty string.
+std::string error_of_device(const std::string& text) {
+  try {
+    parse_yaml<DeviceSpec>(text, "device.yaml");
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+std::string error_of_object(const std::string& text) {
+  try {
+    parse_yaml<ObjectSpec>(text, "object.yaml");
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+std::string replaced(std::string text, const std::string& what, const std::string& by) {
+  const auto at = text.find(what);
+  EXPECT_NE(at, std::string::npos) << what;
+  return text.replace(at, what.size(), by);
+}
+
+TEST(SceneFiles, EveryShippedSceneReads) {
+  int scenes = 0;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(kScenes / "vhs")) {
+    if (entry.path().extension() != ".yaml") continue;
+    EXPECT_NO_THROW(read_scene(entry.path())) << entry.path();
+    ++scenes;
+  }
+  EXPECT_GE(scenes, 3);
+}
+
+TEST(SceneFiles, EveryShippedObjectReadsAndHasASolidMesh) {
+  for (const auto& entry : std::filesystem::directory_iterator(kScenes / "objects")) {
+    if (entry.path().extension() != ".yaml") continue;
+    EXPECT_EQ(fault_of_closed_mesh(visible_mesh(read_object(entry.path()).shape)), "") << entry.path();
+  }
+}
+
+TEST(SceneFiles, TheSmallDeviceReads) {
+  const auto device = parse_yaml<DeviceSpec>(kDevice, "device.yaml");
+  EXPECT_EQ(device.gel.thickness_mm, 4.0);
+  EXPECT_EQ(device.gel.poisson_ratio, 0.49) << "the default";
+  EXPECT_FALSE(device.camera);
+}
+
+TEST(SceneFiles, AnUnknownKeyNamesItsLineAndTheNearestOne) {
+  EXPECT_EQ(error_of_device(replaced(kDevice, "thickness_mm: 4", "thicknes_mm: 4")),
+            "device.yaml:3: gel: 'thickness_mm' is missing");
+  EXPECT_EQ(error_of_device(replaced(kDevice, "  thickness_mm: 4\n", "  thickness_mm: 4\n  poison_ratio: 0.4\n")),
+            "device.yaml:6: gel: unknown key 'poison_ratio' (did you mean 'poisson_ratio'?)");
+}
+
+TEST(SceneFiles, ANegativeThicknessSaysWhatIsAllowed) {
+  EXPECT_EQ(error_of_device(replaced(kDevice, "thickness_mm: 4", "thickness_mm: -4")),
+            "device.yaml:5: gel.thickness_mm: -4 is not allowed; allowed is above 0 to 1000");
+  EXPECT_THAT(error_of_device(replaced(kDevice, "thickness_mm: 4", "thickness_mm: 0")), HasSubstr("0 is not allowed"));
+}
+
+TEST(SceneFiles, NanAndInfinityAreRefused) {
+  for (const char* value : {".nan", "nan", ".inf", "-.inf", "1e999", "4mm", "''"}) {
+    EXPECT_THAT(error_of_device(replaced(kDevice, "thickness_mm: 4", std::string("thickness_mm: ") + value)),
+                HasSubstr("device.yaml:5: gel.thickness_mm: "))
+        << value;
+  }
+}
+
+TEST(SceneFiles, PoissonsRatioMayBeAHalfAndNotMore) {
+  EXPECT_EQ(error_of_device(replaced(kDevice, "  thickness", "  poisson_ratio: 0.5\n  thickness")), "");
+  EXPECT_THAT(error_of_device(replaced(kDevice, "  thickness", "  poisson_ratio: 0.51\n  thickness")),
+              HasSubstr("from 0 to 0.5"));
+}
+
+TEST(SceneFiles, BeadsMustLieInTheGel) {
+  const std::string beads = "beads: {grid: 3, spacing_mm: 2, diameter_mm: 0.5, depth_mm: 0.2}\n";
+  EXPECT_THAT(error_of_device(kDevice + beads), HasSubstr("beads.depth_mm: 0.2 puts beads"));
+  EXPECT_THAT(error_of_device(kDevice + replaced(beads, "spacing_mm: 2", "spacing_mm: 6")), HasSubstr("depth"));
+  EXPECT_THAT(error_of_device(kDevice + replaced(replaced(beads, "0.2", "1"), "spacing_mm: 2", "spacing_mm: 6")),
+              HasSubstr("doesn't fit"));
+}
+
+TEST(SceneFiles, AShapeTakesOnlyItsOwnFields) {
+  EXPECT_EQ(error_of_object("name: a\nshape: {type: sphere, radius_mm: 2}\n"), "");
+  EXPECT_THAT(error_of_object("name: a\nshape: {type: sphere, radius_mm: 2, height_mm: 3}\n"),
+              HasSubstr("unknown key 'height_mm'"));
+  EXPECT_THAT(error_of_object("name: a\nshape: {type: spere, radius_mm: 2}\n"), HasSubstr("did you mean 'sphere'"));
+  EXPECT_THAT(error_of_object("name: a\nshape: {type: rounded_cylinder, radius_mm: 2, height_mm: 3, "
+                              "edge_radius_mm: 2.5}\n"),
+              HasSubstr("from 0 to 2"));
+}
+
+TEST(SceneFiles, AMissingFileIsNamedWithTheLineThatAsksForIt) {
+  test::TemporaryFolder folder;
+  folder.write("device.yaml", kDevice);
+  const auto scene = folder.write("scene.yaml", "device: device.yaml\nobject: nowhere.yaml\nmotion: m.yaml\n");
+  try {
+    read_scene(scene);
+    FAIL() << "no error";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.where().line, 2);
+    EXPECT_THAT(error.what(), HasSubstr("nowhere.yaml"));
+  }
+}
+
+TEST(SceneFiles, AMissingMeshIsNamedWithTheLineThatAsksForIt) {
+  const auto object =
+      parse_yaml<ObjectSpec>("name: a\nshape:\n  type: mesh\n  file: nowhere.glb\n", "/tmp/none/object.yaml");
+  try {
+    contact_shape(object.shape);
+    FAIL() << "no error";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.where().line, 4);
+    EXPECT_THAT(error.what(), HasSubstr("nowhere.glb"));
+  }
+}
+
+TEST(SceneFiles, AnAxisHasEitherAPositionOrAForce) {
+  const std::string start = "start_mm: [0, 0, 1]\nkeys:\n  - {frames: 2, z: ";
+  EXPECT_EQ(parse_yaml<MotionSpec>(start + "{force_N: 1}}\n", "m").frame_count(), 3);
+  EXPECT_THROW(parse_yaml<MotionSpec>(start + "{force_N: 1, position_mm: 2}}\n", "m"), Error);
+  EXPECT_THROW(parse_yaml<MotionSpec>(start + "{}}\n", "m"), Error);
+}
+
+}  // namespace
+}  // namespace touchstone::sim

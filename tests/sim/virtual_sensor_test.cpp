@@ -1,0 +1,154 @@
+#include "sim/virtual_sensor.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "render/imager.h"
+#include "sim/visible_scene.h"
+#include "tests/support/temporary_folder.h"
+
+namespace touchstone::sim {
+namespace {
+
+using ::testing::HasSubstr;
+
+/// A pad of 12 x 12 x 4 mm with 2 x 2 beads, a camera of 96 x 72 pixels with a small hole, and a flat probe of 3 mm.
+SceneSpec small_scene(const std::string& keys) {
+  SceneSpec scene;
+  scene.device = parse_yaml<DeviceSpec>(R"(
+name: small
+gel: {size_x_mm: 12, size_y_mm: 12, thickness_mm: 4, youngs_modulus_MPa: 0.3, poisson_ratio: 0.49, refractive_index: 1.45}
+mesh: {fine_mm: 0.8, coarse_mm: 2, fine_half_extent_mm: [3, 3], fine_depth_mm: 1}
+beads: {grid: 2, spacing_mm: 2, diameter_mm: 0.6, depth_mm: 0.8}
+plate: {thickness_mm: 1, refractive_index: 1.5}
+lamps:
+  - {position_mm: [0, -10, -16], target_mm: [0, 0, -2], lens_radius_mm: 1, half_angle_deg: 25, power_W: [3, 3, 3]}
+room_radiance: 0.1
+camera:
+  width: 96
+  height: 72
+  pixel_pitch_um: 30
+  hole_diameter_um: 100
+  foil_thickness_um: 50
+  hole_to_sensor_mm: 5
+  hole_position_mm: [0, 0, -18]
+  look_at_mm: [0, 0, 0]
+  exposure_us: 500
+  full_well_e: 50000
+  read_noise_e: 5
+)",
+                                        "small.yaml");
+  scene.object = parse_yaml<ObjectSpec>(
+      "name: probe\nshape: {type: rounded_cylinder, radius_mm: 1.5, edge_radius_mm: 0.3, height_mm: 4}\n"
+      "friction: 0.7\nholder: {radius_mm: 8, behind_mm: 4}\n",
+      "probe.yaml");
+  scene.motion = parse_yaml<MotionSpec>("start_mm: [0, 0, 0.5]\nkeys:\n" + keys, "motion.yaml");
+  scene.light.max_samples = 32;
+  scene.seed = 7;
+  return scene;
+}
+
+const test::TemporaryFolder& cache() {
+  static const test::TemporaryFolder folder;
+  return folder;
+}
+
+struct Played {
+  SceneSpec scene;
+  Plan plan;
+  std::shared_ptr<const fem::Compliance> gel;
+  std::vector<Truth> truths;
+};
+
+Played play(const std::string& keys) {
+  Played played;
+  played.scene = small_scene(keys);
+  played.plan = make_plan(played.scene);
+  played.gel = set_up_gel(played.scene.device, cache().path());
+  played.truths = play_motion(played.scene, played.plan, *played.gel);
+  return played;
+}
+
+TEST(PlayMotion, ForcesFollowTheKeys) {
+  const Played p = play("  - {frames: 4, z: {force_N: 1}}\n  - {frames: 2, x: {force_N: 0.3}}\n");
+  ASSERT_EQ(p.truths.size(), 7u);
+  EXPECT_EQ(p.truths[0].press.wrench.norm(), 0.0) << "it starts in the air";
+  for (int i = 1; i <= 4; ++i) EXPECT_NEAR(p.truths[i].press.wrench[2], 0.25 * i, 1e-5);
+  const double shear_at_rest = p.truths[4].press.wrench[0];
+  EXPECT_NEAR(p.truths[5].press.wrench[0], (shear_at_rest + 0.3) / 2, 1e-5) << "a ramp starts at the force there was";
+  EXPECT_NEAR(p.truths[6].press.wrench[0], 0.3, 1e-5);
+  EXPECT_NEAR(p.truths[6].press.wrench[2], 1.0, 1e-5) << "an axis that isn't named keeps its force";
+}
+
+TEST(PlayMotion, TimesAreThoseOfTheFrameRate) {
+  const Played p = play("  - {frames: 3, z: {position_mm: 0.4}}\n");
+  EXPECT_EQ(p.truths[0].t_us, 0);
+  EXPECT_EQ(p.truths[1].t_us, 33333);
+  EXPECT_EQ(p.truths[3].t_us, 100000);
+}
+
+TEST(PlayMotion, AForceThatCannotBeMetNamesTheKeysLine) {
+  try {
+    play("  - {frames: 2, z: {force_N: 0.5}}\n  - {frames: 2, x: {force_N: 3}}\n");
+    FAIL() << "no error";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.where().line, 4);
+    EXPECT_THAT(error.what(), HasSubstr("slip"));
+  }
+}
+
+// Light of the pixels that were not traced again must be what tracing the whole frame would give, within the noise.
+TEST(VirtualCamera, ThePartialFrameAgreesWithTheWholeOne) {
+  Played p = play("  - {frames: 2, z: {force_N: 1}}\n");
+  p.scene.outputs = {.frames = false, .ideal = false, .radiance = true};
+  p.scene.light.max_samples = 64;
+  p.plan = make_plan(p.scene);
+  const VirtualCamera camera(p.scene, p.plan, p.gel, p.truths.front());
+  const Capture part = camera.capture(p.truths.back());
+  const Capture whole = camera.capture_whole(p.truths.back());
+  EXPECT_LT(part.pixels_traced, whole.pixels_traced) << "nothing was saved";
+  EXPECT_GT(part.pixels_traced, 0);
+
+  const render::ImagerResponse response = render::response_of(imager(p.scene.device, true));
+  double square = 0.0;
+  for (int row = 0; row < whole.radiance.rows; ++row) {
+    for (int column = 0; column < whole.radiance.cols; ++column) {
+      const auto a = part.radiance.at<cv::Vec3f>(row, column);
+      const auto b = whole.radiance.at<cv::Vec3f>(row, column);
+      double electrons = 0.0;
+      double difference = 0.0;
+      for (int band = 0; band < 3; ++band) {
+        electrons += response.electrons_per_irradiance(0, band) * b[band];
+        difference += response.electrons_per_irradiance(0, band) * (a[band] - b[band]);
+      }
+      const double noise = render::noise_e(response, electrons);
+      square += difference * difference / (noise * noise);
+    }
+  }
+  const double rms = std::sqrt(square / static_cast<double>(whole.radiance.total()));
+  // Two renderings, each with a standard error of at most the noise where its samples suffice, and the tolerated change.
+  EXPECT_LT(rms, 1.5) << "in units of the imager's noise";
+}
+
+TEST(VirtualCamera, AnObjectThatDoesNotMoveCostsNothing) {
+  const Played p = play("  - {frames: 1, z: {position_mm: 0.5}}\n");
+  const VirtualCamera camera(p.scene, p.plan, p.gel, p.truths.front());
+  const Capture capture = camera.capture(p.truths.back());
+  EXPECT_EQ(capture.pixels_traced, 0);
+  EXPECT_EQ(capture.paths_traced, 0);
+}
+
+TEST(VirtualCamera, TheSameTruthGivesTheSameBytes) {
+  const Played p = play("  - {frames: 2, z: {force_N: 1}}\n");
+  const VirtualCamera one(p.scene, p.plan, p.gel, p.truths.front());
+  const VirtualCamera other(p.scene, p.plan, p.gel, p.truths.front());
+  const cv::Mat a = one.capture(p.truths.back()).frame;
+  const cv::Mat b = other.capture(p.truths.back()).frame;
+  ASSERT_EQ(a.size(), b.size());
+  EXPECT_EQ(cv::norm(a, b, cv::NORM_INF), 0.0);
+  const cv::Mat c = one.capture(p.truths.front()).frame;
+  EXPECT_GT(cv::norm(a, c, cv::NORM_INF), 0.0) << "the press can't be seen";
+}
+
+}  // namespace
+}  // namespace touchstone::sim

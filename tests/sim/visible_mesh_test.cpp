@@ -1,0 +1,60 @@
+#include <gtest/gtest.h>
+
+#include "core/units.h"
+#include "sim/object.h"
+
+namespace touchstone::sim {
+namespace {
+
+ShapeSpec sphere(double radius) {
+  ShapeSpec shape;
+  shape.type = ShapeKind::sphere;
+  shape.radius_mm = radius;
+  return shape;
+}
+
+ShapeSpec cylinder(double radius, double edge, double height) {
+  ShapeSpec shape;
+  shape.type = ShapeKind::rounded_cylinder;
+  shape.radius_mm = radius;
+  shape.edge_radius_mm = edge;
+  shape.height_mm = height;
+  return shape;
+}
+
+TEST(VisibleMesh, EachShapeIsASolid) {
+  ShapeSpec box;
+  box.type = ShapeKind::box;
+  box.size_mm = {1, 2, 3};
+  for (const ShapeSpec& shape :
+       {sphere(2), cylinder(3, 0.3, 6), cylinder(3, 0, 6), cylinder(3, 3, 6), cylinder(2, 2, 2), box}) {
+    EXPECT_EQ(fault_of_closed_mesh(visible_mesh(shape)), "");
+  }
+  EXPECT_EQ(fault_of_closed_mesh(visible_mesh(HolderSpec{15, 6, {0.5, 0.5, 0.5}})), "");
+}
+
+TEST(VisibleMesh, VolumesAreThoseOfTheSolids) {
+  EXPECT_NEAR(enclosed_volume(visible_mesh(sphere(2))), 4.0 / 3 * kPi * 8, 0.005 * 4.0 / 3 * kPi * 8);
+  EXPECT_NEAR(enclosed_volume(visible_mesh(cylinder(3, 0, 6))), kPi * 9 * 6, 0.005 * kPi * 9 * 6);
+  ShapeSpec box;
+  box.type = ShapeKind::box;
+  box.size_mm = {1, 2, 3};
+  EXPECT_NEAR(enclosed_volume(visible_mesh(box)), 6.0, 1e-12);
+}
+
+// The contact solver and the camera must see the same body: where a line enters the one, it enters the other.
+TEST(VisibleMesh, ItIsTheBodyThatTheContactSolverFeels) {
+  const auto shape = cylinder(3, 0.5, 6);
+  const auto felt = contact_shape(shape);
+  const fem::ContactShape seen = fem::MeshShape(visible_mesh(shape));
+  for (double r = 0.05; r < 2.95; r += 0.1) {
+    const Eigen::Vector3d below(r * 0.6, r * 0.8, -1.0);
+    const auto a = fem::first_entry(felt, below, Eigen::Vector3d::UnitZ());
+    const auto b = fem::first_entry(seen, below, Eigen::Vector3d::UnitZ());
+    ASSERT_TRUE(a && b) << r;
+    EXPECT_NEAR(*a, *b, 0.01) << r;
+  }
+}
+
+}  // namespace
+}  // namespace touchstone::sim
