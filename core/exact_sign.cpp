@@ -58,10 +58,14 @@ Expansion sum(Expansion x, const Expansion& y, double sign) {
   return x;
 }
 
-int sign_of(double value) { return (value > 0.0) - (value < 0.0); }
+int sign_of(double value) {
+  return (value > 0.0) - (value < 0.0);
+}
 
 // The largest part is the last one, and outweighs all the others together.
-int sign_of(const Expansion& value) { return value.empty() ? 0 : sign_of(value.back()); }
+int sign_of(const Expansion& value) {
+  return value.empty() ? 0 : sign_of(value.back());
+}
 
 Expansion cross(const Expansion& ax, const Expansion& ay, const Expansion& bx, const Expansion& by) {
   return sum(product(ax, by), product(ay, bx), -1.0);
@@ -107,8 +111,8 @@ int side_of_line(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen
   const double size = std::abs(left) + std::abs(right);
   if (std::abs(determinant) > (3.0 + 16.0 * kEpsilon) * kEpsilon * size) return sign_of(determinant);
   if (size == 0.0) return 0;
-  return sign_of(cross(difference(a.x(), c.x()), difference(a.y(), c.y()), difference(b.x(), c.x()),
-                       difference(b.y(), c.y())));
+  return sign_of(
+      cross(difference(a.x(), c.x()), difference(a.y(), c.y()), difference(b.x(), c.x()), difference(b.y(), c.y())));
 }
 
 }  // namespace touchstone

@@ -24,7 +24,9 @@ void Sha256::add(const void* bytes, std::size_t size) {
   TS_ASSERT(EVP_DigestUpdate(context_->md, bytes, size) == 1);
 }
 
-void Sha256::add(std::string_view text) { add(text.data(), text.size()); }
+void Sha256::add(std::string_view text) {
+  add(text.data(), text.size());
+}
 
 std::string Sha256::digest() {
   std::array<unsigned char, EVP_MAX_MD_SIZE> bytes{};

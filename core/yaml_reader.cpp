@@ -32,7 +32,7 @@ struct YamlReader::Node {
   std::string path;                        // keys from the root, with dots
   mutable std::vector<std::string> asked;  // keys that some field asked for
 
-  int empty_line = 0;                      // line of the key, if nothing stands after it: YAML marks the next token
+  int empty_line = 0;  // line of the key, if nothing stands after it: YAML marks the next token
 
   int line() const { return empty_line > 0 ? empty_line : yaml.Mark().is_null() ? 0 : yaml.Mark().line + 1; }
 };
@@ -80,7 +80,9 @@ bool YamlReader::has(const std::string& key) const {
   return map.IsMap() && map[key].IsDefined();
 }
 
-SourceLocation YamlReader::where() const { return {node_->file, node_->line()}; }
+SourceLocation YamlReader::where() const {
+  return {node_->file, node_->line()};
+}
 
 SourceLocation YamlReader::where(const std::string& key) const {
   const YAML::Node& map = node_->yaml;
@@ -91,9 +93,13 @@ SourceLocation YamlReader::where(const std::string& key) const {
   return where();
 }
 
-std::filesystem::path YamlReader::folder() const { return std::filesystem::path(node_->file).parent_path(); }
+std::filesystem::path YamlReader::folder() const {
+  return std::filesystem::path(node_->file).parent_path();
+}
 
-std::string YamlReader::context() const { return node_->path.empty() ? "" : node_->path + ": "; }
+std::string YamlReader::context() const {
+  return node_->path.empty() ? "" : node_->path + ": ";
+}
 
 void YamlReader::require_map() const {
   if (!node_->yaml.IsMap()) fail_at(where(), "{}a map of fields is needed here", context());

@@ -129,7 +129,7 @@ class YamlReader {
   }
 
   template <typename T>
-    requires std::is_enum_v<T>
+  requires std::is_enum_v<T>
   void read(T& value, Allowed) {
     const std::string name = scalar("a name");
     std::vector<std::string> known;
@@ -144,10 +144,7 @@ class YamlReader {
   }
 
   template <typename T>
-    requires(std::is_class_v<T>)
-  void read(T& value, Allowed) {
-    read_struct(value);
-  }
+  requires(std::is_class_v<T>) void read(T& value, Allowed) { read_struct(value); }
 
   [[noreturn]] void refuse_name(const std::string& name, const std::vector<std::string>& known) const;
 

@@ -4,9 +4,13 @@
 #include <Eigen/Core>
 #include <Eigen/SparseCore>
 #include <array>
+#include <span>
+#include <string>
 #include <vector>
 
+#include "core/progress.h"
 #include "fem/elastic_material.h"
+#include "fem/tet_mesh.h"
 
 namespace touchstone::fem {
 
@@ -16,16 +20,41 @@ struct Bead {
   double radius = 0.0;
 };
 
+/// What making a compliance took, and how good its mesh is. The same mesh gives the same report, but for memory.
+struct ComplianceReport {
+  int tetrahedra = 0;
+  int unknowns = 0;                    ///< displacements and pressures
+  double smallest_dihedral_deg = 0.0;  ///< under some 5 degrees, expect loss of accuracy
+  double factor_entries = 0.0;
+  double operations = 0.0;  ///< floating-point operations of the elimination
+  double memory_mb = 0.0;   ///< of the factorisation
+  std::string note;         ///< from the cache: empty, or what was wrong with the file there; not stored
+};
+
 /// Linear response of the gel to tractions on its outer surface, which are P1 on its triangles. Degree of freedom
 /// 3*i + a is component a (gel frame) at surface vertex i.
 struct Compliance {
   double thickness = 0.0;  ///< mm
   ElasticMaterial material;
-  std::vector<Eigen::Vector3d> vertices;         ///< n vertices of the outer surface, mm
-  std::vector<std::array<int, 3>> triangles;     ///< over `vertices`, normal out
-  Eigen::SparseMatrix<double> mass;              ///< n x n: int phi_i phi_j dA, mm^2 (P1 hats); its row sums are the weights
-  Eigen::MatrixXd surface;                       ///< 3n x 3n, symmetric positive definite: int phi_i u_a dA (mm^3) per traction (MPa)
-  Eigen::MatrixXd beads;                         ///< 3m x 3n: mean displacement of a bead's surface (mm) per traction (MPa)
+  std::vector<Eigen::Vector3d> vertices;      ///< n vertices of the outer surface, mm
+  std::vector<std::array<int, 3>> triangles;  ///< over `vertices`, normal out
+  Eigen::SparseMatrix<double> mass;  ///< n x n: int phi_i phi_j dA, mm^2 (P1 hats); its row sums are the weights
+  Eigen::MatrixXd surface;  ///< 3n x 3n, symmetric positive definite: int phi_i u_a dA (mm^3) per traction (MPa)
+  Eigen::MatrixXd beads;    ///< 3m x 3n: mean displacement of a bead's surface (mm) per traction (MPa)
+  ComplianceReport report;
 };
+
+/// Eliminates the gel's inside once. The Taylor-Hood system K is bordered by the rows C that take displacements to what
+/// is asked for (int phi_i u_a over the outer surface; the mean over each bead's surface); the Schur complement of
+/// [K C^T; C 0] on the border is -C K^-1 C^T. A bead is a rigid sphere that moves with the gel and doesn't stiffen it:
+/// it goes where the gel's mean over its surface goes (Faxen's law for a sphere without a force on it). The vertices
+/// keep the mesh's order. `thickness` is copied.
+/// @throws Error for an unfit mesh (see fault_of) or material, for a bead that isn't wholly inside the gel, for more
+/// than kMostSurfaceVertices, or if memory runs out
+Compliance compute_compliance(const TetMesh& mesh, const ElasticMaterial& material, std::span<const Bead> beads,
+                              double thickness, const Progress& progress = {});
+
+/// The compliance of more surface vertices would take over 4.6 GB.
+inline constexpr int kMostSurfaceVertices = 8000;
 
 }  // namespace touchstone::fem

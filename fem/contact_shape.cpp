@@ -79,20 +79,27 @@ std::optional<double> first_entry(const BoxShape& shape, const Eigen::Vector3d& 
 }
 
 std::optional<double> first_entry(const RoundedCylinder& shape, const Eigen::Vector3d& p, const Eigen::Vector3d& d) {
-  const Interval inside = common(inside_cylinder(shape.radius, p, d), between(0.0, shape.height, p.z(), d.z()));
-  if (inside.empty()) return std::nullopt;
   const double r = shape.edge_radius;
   const double core = shape.radius - r;
-  // The rounded body is a ball of radius r swept over the core {rho <= core, z >= r}, so the distance to the core less r
-  // is convex along the line: Newton's steps from the sharp body's entry approach the first root from one side.
+  if (d.x() * d.x() + d.y() * d.y() < 1e-30 && d.z() > 0.0) {  // along the axis, as a punch on a flat gel
+    const double rho2 = p.x() * p.x() + p.y() * p.y();
+    if (rho2 > shape.radius * shape.radius) return std::nullopt;
+    if (rho2 <= core * core) return -p.z();
+    const double out = std::sqrt(rho2) - core;
+    return r - std::sqrt(std::max(0.0, (r - out) * (r + out))) - p.z();
+  }
+  const Interval inside = common(inside_cylinder(shape.radius, p, d), between(0.0, shape.height, p.z(), d.z()));
+  if (inside.empty()) return std::nullopt;
+  // The rounded body is a ball of radius r swept over the core {rho <= core, z >= r}, so the distance to the core less
+  // r is convex along the line: Newton's steps from the sharp body's entry approach the first root from one side.
   double t = inside.enter;
   for (int iteration = 0; iteration < 200; ++iteration) {
     const Eigen::Vector3d q = p + t * d;
-    const double rho = std::hypot(q.x(), q.y());
+    const double rho = std::sqrt(q.x() * q.x() + q.y() * q.y());
     const double out = rho - core;
     const double below = r - q.z();
     if (out <= 0.0 || below <= 0.0) return t;  // not in the corner: the sharp body is the rounded one there
-    const double distance = std::hypot(out, below);
+    const double distance = std::sqrt(out * out + below * below);
     const double value = distance - r;
     if (value <= 1e-15 * shape.radius) return t;
     const double slope = (out * (q.x() * d.x() + q.y() * d.y()) / rho - below * d.z()) / distance;

@@ -1,6 +1,5 @@
 #include "fem/contact_solver.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -13,9 +12,11 @@ namespace {
 
 constexpr int kMostPivots = 500;
 constexpr int kBlockTries = 10;
-constexpr int kMostNewton = 120;
-constexpr int kPatience = 6;
-constexpr int kSweeps = 40;
+constexpr int kMostNewton = 80;
+constexpr int kPatience = 3;  // Newton steps without progress before sweeps
+constexpr int kSweeps = 30;
+constexpr int kFirstSweeps = 10;
+constexpr double kFarFromSets = 1e-2;  // residual above which sweeps go first
 
 Eigen::VectorXd times_sparse(const Eigen::MatrixXd& a, const Eigen::VectorXd& z) {
   Eigen::VectorXd result = Eigen::VectorXd::Zero(a.rows());
@@ -27,7 +28,7 @@ Eigen::VectorXd times_sparse(const Eigen::MatrixXd& a, const Eigen::VectorXd& z)
 
 }  // namespace
 
-ContactAnswer solve_frictionless(const ContactProblem& problem, const Eigen::VectorXd& start) {
+ContactAnswer solve_frictionless(const ContactProblem& problem, const Eigen::VectorXd& start, ContactMemory& memory) {
   TS_ASSERT(problem.components == 1);
   const Eigen::MatrixXd& a = *problem.compliance;
   const auto m = static_cast<int>(problem.gap.size());
@@ -62,18 +63,25 @@ ContactAnswer solve_frictionless(const ContactProblem& problem, const Eigen::Vec
     const auto size = static_cast<Eigen::Index>(set.size());
     answer.z = Eigen::VectorXd::Zero(m);
     if (size > 0) {
-      const Eigen::MatrixXd sub = a(set, set);
-      const Eigen::LLT<Eigen::MatrixXd> factor(sub);
-      Eigen::VectorXd p = factor.solve(-problem.gap(set));
+      std::vector<NodeState> wanted(m, NodeState::open);
+      for (const int i : set) wanted[i] = NodeState::slip;
+      if (memory.state != wanted) {
+        if (!memory.cholesky.compute(a(set, set))) {
+          memory.forget();
+          return answer;
+        }
+        memory.state = std::move(wanted);
+        ++answer.factorisations;
+      }
+      Eigen::VectorXd p = memory.cholesky.solve(-problem.gap(set));
       if (k > 0) {
         const Eigen::MatrixXd border = problem.border(set, Eigen::all);
-        const Eigen::MatrixXd through = factor.solve(border);
+        const Eigen::MatrixXd through = memory.cholesky.solve(border);
         const Eigen::MatrixXd schur = border.transpose() * through;
         answer.shift = schur.partialPivLu().solve(border.transpose() * p - problem.force);
         p -= through * answer.shift;
       }
       answer.z(set) = p;
-      ++answer.factorisations;
     }
     ++answer.iterations;
     answer.response = times_sparse(a, answer.z);
@@ -134,8 +142,10 @@ namespace {
 /// The frictional problem at one iterate, and the pieces of Newton's step.
 class FrictionalNewton {
  public:
-  FrictionalNewton(const ContactProblem& problem, const Eigen::VectorXd& start, const Eigen::VectorXd& shift)
+  FrictionalNewton(const ContactProblem& problem, const Eigen::VectorXd& start, const Eigen::VectorXd& shift,
+                   ContactMemory& memory)
       : problem_(problem),
+        memory_(memory),
         a_(*problem.compliance),
         m_(static_cast<int>(problem.gap.size())),
         k_(static_cast<int>(problem.border.cols())) {
@@ -196,9 +206,18 @@ class FrictionalNewton {
     }
     answer.response = times_sparse(a_, answer.z);
     slack_ = answer.response + problem_.border * answer.shift;
-    if (!keep || answer.state != factored_state_) {
-      if (!factorise()) return false;
+    if (std::all_of(answer.state.begin(), answer.state.end(), [](NodeState x) { return x == NodeState::open; })) {
+      if (k_ > 0) return false;  // nobody carries the force
+      refresh();
+      return true;
     }
+    set_.clear();
+    for (int i = 0; i < m_; ++i) {
+      if (answer.state[i] != NodeState::open) set_.push_back(i);
+    }
+    const auto unknowns = static_cast<Eigen::Index>(3 * set_.size()) + k_;
+    const bool remembered = answer.state == memory_.state && memory_.lu.size() == unknowns;
+    if (!(keep && remembered) && !factorise()) return false;
     const auto size = static_cast<Eigen::Index>(3 * set_.size());
     Eigen::VectorXd right(size + k_);
     for (std::size_t row = 0; row < set_.size(); ++row) {
@@ -215,7 +234,7 @@ class FrictionalNewton {
       }
     }
     if (k_ > 0) right.tail(k_) = problem_.force - problem_.border.transpose() * answer.z;
-    Eigen::VectorXd change = lu_.solve(right);
+    Eigen::VectorXd change = memory_.lu.solve(right);
     ++answer.iterations;
     if (!change.allFinite()) return false;
     for (std::size_t row = 0; row < set_.size(); ++row) {
@@ -259,7 +278,6 @@ class FrictionalNewton {
       }
       ++answer.sweeps;
     }
-    factored_state_.clear();
     refresh();
   }
 
@@ -267,23 +285,14 @@ class FrictionalNewton {
   double gap_at(int i) const { return problem_.gap[i] + slack_[3 * i]; }
   Eigen::Vector2d slip_at(int i) const { return slack_.segment<2>(3 * i + 1) - problem_.drag.segment<2>(2 * i); }
   double tangential_scale(int i) const { return std::max(a_(3 * i + 1, 3 * i + 1), a_(3 * i + 2, 3 * i + 2)); }
-  Eigen::Vector2d predicted(int i) const {
-    return answer.z.segment<2>(3 * i + 1) - slip_at(i) / tangential_scale(i);
-  }
+  Eigen::Vector2d predicted(int i) const { return answer.z.segment<2>(3 * i + 1) - slip_at(i) / tangential_scale(i); }
 
   bool factorise() {
-    factored_state_ = answer.state;
-    set_.clear();
-    for (int i = 0; i < m_; ++i) {
-      if (answer.state[i] != NodeState::open) set_.push_back(i);
-    }
-    if (set_.empty()) return false;
+    memory_.forget();
     const auto size = static_cast<Eigen::Index>(3 * set_.size());
     Eigen::MatrixXd jacobian(size + k_, size + k_);
-    std::vector<int> dofs;
-    for (const int i : set_) {
-      for (int c = 0; c < 3; ++c) dofs.push_back(3 * i + c);
-    }
+    std::vector<int> dofs(3 * set_.size());
+    for (std::size_t row = 0; row < dofs.size(); ++row) dofs[row] = 3 * set_[row / 3] + static_cast<int>(row % 3);
     jacobian.topLeftCorner(size, size) = a_(dofs, dofs);
     if (k_ > 0) {
       jacobian.topRightCorner(size, k_) = problem_.border(dofs, Eigen::all);
@@ -299,70 +308,73 @@ class FrictionalNewton {
       const double length = v.norm();
       const Eigen::Vector2d along = v / length;
       // Derivative of t - mu p v/|v| with v = t - d/scale, times scale. The factor is at most 1 at the answer; far
-      // from it the clamp keeps the step from pointing away (Hueber, Stadler and Wohlmuth, SIAM J. Sci. Comput. 30, 2008).
+      // from it the clamp keeps the step from pointing away (Hueber, Stadler and Wohlmuth, SIAM J. Sci. Comput. 30,
+      // 2008).
       const double factor = std::min(1.0, problem_.friction * std::max(0.0, answer.z[3 * i]) / length);
       const Eigen::Matrix2d across = factor * (Eigen::Matrix2d::Identity() - along * along.transpose());
       jacobian.middleRows<2>(at) = (across * jacobian.middleRows<2>(at)).eval();
       jacobian.block<2, 2>(at, at) += scale * (Eigen::Matrix2d::Identity() - across);
       jacobian.block<2, 1>(at, at - 1) -= scale * problem_.friction * along;
     }
-    lu_.compute(jacobian);
     ++answer.factorisations;
+    if (!memory_.lu.compute(std::move(jacobian))) return false;
+    memory_.state = answer.state;
     return true;
   }
 
   const ContactProblem& problem_;
+  ContactMemory& memory_;
   const Eigen::MatrixXd& a_;
   const int m_;
   const int k_;
   Eigen::VectorXd slack_;
-  std::vector<NodeState> factored_state_;
   std::vector<int> set_;
-  Eigen::PartialPivLU<Eigen::MatrixXd> lu_;
 };
 
 /// The answer without friction, as (p, 0, 0) per vertex: where Newton starts from nothing.
 ContactAnswer frictionless_start(const ContactProblem& problem) {
   const auto m = static_cast<int>(problem.gap.size());
   const auto k = static_cast<int>(problem.border.cols());
-  std::vector<int> normals(m);
-  for (int i = 0; i < m; ++i) normals[i] = 3 * i;
+  const auto normals = Eigen::seqN(Eigen::fix<0>, m, Eigen::fix<3>);
   std::vector<int> columns;
   for (int b = 0; b < k; ++b) {
-    const double normal = problem.border(normals, b).cwiseAbs().maxCoeff();
+    const double normal = problem.border.col(b)(normals).cwiseAbs().maxCoeff();
     if (normal > 1e-9 * problem.border.col(b).cwiseAbs().maxCoeff()) columns.push_back(b);
   }
   const Eigen::MatrixXd compliance = (*problem.compliance)(normals, normals);
+  const auto pushing = static_cast<Eigen::Index>(columns.size());
   ContactProblem part;
   part.compliance = &compliance;
   part.gap = problem.gap;
-  part.border = problem.border(normals, columns);
-  part.force = problem.force(columns);
-  const ContactAnswer found = solve_frictionless(part, {});
+  part.border.resize(m, pushing);
+  part.force.resize(pushing);
+  for (Eigen::Index b = 0; b < pushing; ++b) {
+    part.border.col(b) = problem.border.col(columns[b])(normals);
+    part.force[b] = problem.force[columns[b]];
+  }
+  ContactMemory none;
+  const ContactAnswer found = solve_frictionless(part, {}, none);
   ContactAnswer start;
   start.z = Eigen::VectorXd::Zero(3 * m);
   start.shift = Eigen::VectorXd::Zero(k);
   if (found.converged) {
     start.z(normals) = found.z;
-    start.shift(columns) = found.shift;
+    for (Eigen::Index b = 0; b < pushing; ++b) start.shift[columns[b]] = found.shift[b];
   }
   return start;
 }
 
-}  // namespace
-
-ContactAnswer solve_frictional(const ContactProblem& problem, const Eigen::VectorXd& start, double tolerance) {
-  TS_ASSERT(problem.components == 3);
-  ContactAnswer without;
-  if (start.size() == 0) without = frictionless_start(problem);
-  FrictionalNewton newton(problem, start.size() == 0 ? without.z : start, without.shift);
+ContactAnswer newton_with_sweeps(const ContactProblem& problem, const Eigen::VectorXd& start,
+                                 const Eigen::VectorXd& shift, double tolerance, ContactMemory& memory) {
+  FrictionalNewton newton(problem, start, shift, memory);
   double best = std::numeric_limits<double>::infinity();
-  Eigen::VectorXd best_z = newton.answer.z;
-  Eigen::VectorXd best_shift = newton.answer.shift;
+  Eigen::VectorXd best_z;
+  Eigen::VectorXd best_shift;
   int since_best = 0;
-  bool keep = false;
+  bool keep = true;
+  if (problem.border.cols() == 0 && newton.answer.residual > kFarFromSets) newton.sweep(kFirstSweeps);
   for (int iteration = 0; iteration < kMostNewton; ++iteration) {
-    const double before = newton.answer.residual;
+    double before = newton.answer.residual;
     if (before < best) {
       best = before;
       best_z = newton.answer.z;
@@ -373,12 +385,12 @@ ContactAnswer solve_frictional(const ContactProblem& problem, const Eigen::Vecto
       newton.answer.shift = best_shift;
       newton.refresh();
       newton.sweep(kSweeps);
-      best = newton.answer.residual;
+      best = before = newton.answer.residual;
       best_z = newton.answer.z;
       since_best = 0;
       keep = false;
     }
-    if (newton.answer.residual <= tolerance) {
+    if (before <= tolerance) {
       newton.answer.converged = true;
       break;
     }
@@ -386,6 +398,17 @@ ContactAnswer solve_frictional(const ContactProblem& problem, const Eigen::Vecto
     keep = newton.answer.residual < 0.2 * before;
   }
   return newton.answer;
+}
+
+}  // namespace
+
+ContactAnswer solve_frictional(const ContactProblem& problem, const Eigen::VectorXd& start, double tolerance,
+                               ContactMemory& memory) {
+  TS_ASSERT(problem.components == 3);
+  ContactAnswer begin;
+  begin.z = start;
+  if (start.size() == 0) begin = frictionless_start(problem);
+  return newton_with_sweeps(problem, begin.z, begin.shift, tolerance, memory);
 }
 
 }  // namespace touchstone::fem

@@ -13,6 +13,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "fem/dense_factor.h"
+
 namespace touchstone::fem {
 
 /// What a surface vertex does: no contact; in contact and carried along by the object; in contact and sliding on it
@@ -22,34 +24,45 @@ enum class NodeState : std::uint8_t { open = 0, stick = 1, slip = 2 };
 /// One contact problem. `compliance` is A, symmetric positive definite, (c m) x (c m), mm^3 per MPa.
 struct ContactProblem {
   const Eigen::MatrixXd* compliance = nullptr;
-  int components = 1;        ///< c: 1 or 3
-  Eigen::VectorXd gap;       ///< m, mm^3; infinity: can't touch
-  Eigen::VectorXd drag;      ///< 2 m, mm^3; with friction only
-  double friction = 0.0;     ///< mu; infinity: what touches sticks
-  Eigen::MatrixXd border;    ///< (c m) x k
-  Eigen::VectorXd force;     ///< k, N
+  int components = 1;      ///< c: 1 or 3
+  Eigen::VectorXd gap;     ///< m, mm^3; infinity: can't touch
+  Eigen::VectorXd drag;    ///< 2 m, mm^3; with friction only
+  double friction = 0.0;   ///< mu; infinity: what touches sticks
+  Eigen::MatrixXd border;  ///< (c m) x k
+  Eigen::VectorXd force;   ///< k, N
+};
+
+/// The last factorised system, which serves again while the same vertices are in contact in the same way. It belongs to
+/// one compliance matrix and border: forget it when they change.
+struct ContactMemory {
+  std::vector<NodeState> state;  ///< empty: nothing is remembered
+  DenseCholesky cholesky;        ///< frictionless: of the active rows and columns
+  DenseLu lu;                    ///< with friction: of the Jacobian
+  void forget() { state.clear(); }
 };
 
 struct ContactAnswer {
-  Eigen::VectorXd z;              ///< c m, MPa
-  Eigen::VectorXd shift;          ///< k, mm
-  Eigen::VectorXd response;       ///< A z, mm^3
-  std::vector<NodeState> state;   ///< m
-  int iterations = 0;             ///< systems solved
+  Eigen::VectorXd z;             ///< c m, MPa
+  Eigen::VectorXd shift;         ///< k, mm
+  Eigen::VectorXd response;      ///< A z, mm^3
+  std::vector<NodeState> state;  ///< m
+  int iterations = 0;            ///< systems solved
   int factorisations = 0;
-  int sweeps = 0;                 ///< of block Gauss-Seidel, where Newton stalled
-  double residual = 0.0;          ///< largest change of a traction by the laws' projection, relative to the largest pressure
+  int sweeps = 0;         ///< of block Gauss-Seidel, where Newton stalled
+  double residual = 0.0;  ///< largest change of a traction by the laws' projection, relative to the largest pressure
   bool converged = false;
 };
 
 /// Frictionless (components == 1): block principal pivoting (Judice and Pires, Computers Ops Res. 21, 1994), which is
 /// the primal-dual active set where that converges and ends also where that would cycle. `start` gives the first active
 /// set (p > 0); it may be empty. With one border column, `force` must be above zero.
-ContactAnswer solve_frictionless(const ContactProblem& problem, const Eigen::VectorXd& start);
+ContactAnswer solve_frictionless(const ContactProblem& problem, const Eigen::VectorXd& start, ContactMemory& memory);
 
 /// With friction (components == 3): semismooth Newton on the projection equations, the factorised Jacobian kept while
 /// the sets of open, sticking and slipping vertices stay and it converges fast; block Gauss-Seidel sweeps with
-/// projection on the disc where it stalls. `start` is z to begin with, or empty. Ends when `residual` <= tolerance.
-ContactAnswer solve_frictional(const ContactProblem& problem, const Eigen::VectorXd& start, double tolerance);
+/// projection on the disc before it, to find the sets, and where it stalls. `start` is z to begin with, or empty. Ends
+/// when `residual` <= tolerance.
+ContactAnswer solve_frictional(const ContactProblem& problem, const Eigen::VectorXd& start, double tolerance,
+                               ContactMemory& memory);
 
 }  // namespace touchstone::fem

@@ -1,4 +1,5 @@
 #include "fem/mesh_shape.h"
+#include <Eigen/Geometry>
 
 #include <algorithm>
 #include <cmath>
@@ -121,10 +122,10 @@ std::optional<double> MeshShape::first_entry(const Eigen::Vector3d& point, const
       const bool inside = (e0 >= 0 && e1 >= 0 && e2 >= 0) || (e0 <= 0 && e1 <= 0 && e2 <= 0);
       const double sum = e0 + e1 + e2;
       if (!inside || sum == 0.0) continue;  // seen edge-on: its neighbours are hit
-      const double along = (e0 * direction.dot(mesh_.vertices[t[0]] - point) +
-                            e1 * direction.dot(mesh_.vertices[t[1]] - point) +
-                            e2 * direction.dot(mesh_.vertices[t[2]] - point)) /
-                           sum;
+      const double along =
+          (e0 * direction.dot(mesh_.vertices[t[0]] - point) + e1 * direction.dot(mesh_.vertices[t[1]] - point) +
+           e2 * direction.dot(mesh_.vertices[t[2]] - point)) /
+          sum;
       nearest = std::min(nearest, along);
       hit = true;
     }

@@ -2,8 +2,9 @@
 // A rigid body pressed on the gel, step by step along a motion.
 //
 // Linear elasticity and unilateral contact with Coulomb friction. What is kept of large motion: the gap is looked up
-// where the gel's tangential displacement has carried each surface point (a sheared gel stays under the object that
-// holds it), and the object's own rotation is finite. Contact acts along the undeformed surface's normal.
+// where the contact patch's mean motion along the surface (translation and spin, weighted by pressure) has carried the
+// gel, so a sheared gel stays under the object that holds it; and the object's own rotation is finite. Contact acts
+// along the undeformed surface's normal.
 //
 // Friction remembers: each step adds the relative motion of object and gel since the last one, and what sticks is
 // carried along. A step that starts out of contact takes its history from the touch on: with all axes
@@ -24,8 +25,8 @@
 
 namespace touchstone::fem {
 
-/// What one translation axis of the object is told: its position (mm, the object frame's origin in the gel frame) or the
-/// force on the object (N, gel frame; pressing gives Fz > 0).
+/// What one translation axis of the object is told: its position (mm, the object frame's origin in the gel frame) or
+/// the force on the object (N, gel frame; pressing gives Fz > 0).
 struct AxisControl {
   enum class Kind { position, force };
   Kind kind = Kind::position;
@@ -42,47 +43,52 @@ struct PressTarget {
 
 /// When a step is good enough.
 struct PressTolerance {
-  double force = 1e-6;       ///< of a wanted force, relative or N, whichever is larger
-  double gap_mm = 1e-7;      ///< how far the gap may still move with the gel's tangential displacement
-  double traction = 1e-10;   ///< of the contact laws, relative to the largest pressure
-  double largest_motion = std::numeric_limits<double>::infinity();  ///< mm: steps with friction are cut into equal parts
-                                                                    ///< whose translations are no longer than this
-  int most_halvings = 7;     ///< of a step that doesn't converge
+  double force = 1e-6;      ///< of a wanted force, relative or N, whichever is larger
+  double lookup_mm = 1e-6;  ///< between where the gap is looked up and where the contact patch has gone; a hundred
+                            ///< times that where the iteration doesn't settle (see PressState::lookup_error)
+  double traction = 1e-10;  ///< of the contact laws, relative to the largest pressure
+  double largest_motion =
+      std::numeric_limits<double>::infinity();  ///< mm: steps with friction are cut into equal parts
+                                                ///< whose translations are no longer than this
+  int most_halvings = 7;                        ///< of a step that doesn't converge
 };
 
 /// What a step left behind. n surface vertices, m beads. All zero out of contact.
 struct PressState {
   RigidTransform gel_from_object;
-  Eigen::Matrix<double, 6, 1> wrench = Eigen::Matrix<double, 6, 1>::Zero();  ///< on the object: force (N), torque (N mm)
-                                                                             ///< about the gel frame's origin
-  Eigen::MatrixX3d traction;              ///< n x 3, MPa, on the gel, P1
+  Eigen::Matrix<double, 6, 1> wrench = Eigen::Matrix<double, 6, 1>::Zero();  ///< on the object: force (N), torque (N
+                                                                             ///< mm) about the gel frame's origin
+  Eigen::MatrixX3d traction;                                                 ///< n x 3, MPa, on the gel, P1
   Eigen::MatrixX3d surface_displacement;  ///< n x 3, mm: the L2 projection on P1, mass^-1 * surface * traction
   Eigen::MatrixX3d bead_displacement;     ///< m x 3, mm
   std::vector<NodeState> node_state;      ///< n
 
-  double largest_penetration = 0.0;   ///< mm, weighted gap over weight
-  double largest_tension = 0.0;       ///< MPa
-  double cone_violation = 0.0;        ///< excess of |t| over mu p, relative to mu times the largest pressure
-  double force_residual = 0.0;        ///< N, over the force-controlled axes
-  double contact_residual = 0.0;      ///< see ContactAnswer::residual
-  double largest_gradient = 0.0;      ///< of the surface displacement (see largest_surface_gradient): strain and tilt
-  double largest_strain = 0.0;        ///< the larger of largest_gradient and |normal displacement| / thickness. Linear
-                                      ///< elasticity is first-order in it: above some 0.2, don't trust percents
-  double contact_area = 0.0;          ///< mm^2: weights of the vertices in contact
+  double largest_penetration = 0.0;  ///< mm, weighted gap over weight
+  double largest_tension = 0.0;      ///< MPa
+  double cone_violation = 0.0;       ///< excess of |t| over mu p, relative to mu times the largest pressure
+  double lookup_error = 0.0;         ///< mm, see PressTolerance::lookup_mm
+  double force_residual = 0.0;       ///< N, over the force-controlled axes
+  double contact_residual = 0.0;     ///< see ContactAnswer::residual
+  double largest_gradient = 0.0;     ///< of the surface displacement (see largest_surface_gradient): strain and tilt
+  double largest_strain = 0.0;       ///< the larger of largest_gradient and |normal displacement| / thickness. Linear
+                                     ///< elasticity is first-order in it: above some 0.2, don't trust percents
+  double contact_area = 0.0;         ///< mm^2: weights of the vertices in contact
   int contact_vertices = 0;
-  bool under_resolved = false;        ///< in contact with fewer than 13 vertices (a contact radius under two edges):
-                                      ///< forces may be several percent off
-  int candidates = 0;                 ///< vertices in the dense block
-  int geometry_updates = 0;           ///< gap evaluations, over all parts of the step
-  int solves = 0;                     ///< linear systems solved
+  bool under_resolved = false;  ///< overlapping, but in contact with fewer than 13 vertices (a contact radius under
+                                ///< two edges): forces may be several percent off, or zero for a touch between
+                                ///< vertices
+  int candidates = 0;           ///< vertices in the dense block
+  int geometry_updates = 0;     ///< gap evaluations, over all parts of the step
+  int solves = 0;               ///< linear systems solved
   int factorisations = 0;
-  int sweeps = 0;                     ///< Gauss-Seidel
-  int parts = 0;                      ///< in how many parts the step was made
+  int sweeps = 0;  ///< Gauss-Seidel
+  int parts = 0;   ///< in how many parts the step was made
 };
 
 class Press {
  public:
-  /// `friction` is Coulomb's mu >= 0; infinity: what has touched sticks. The compliance must outlive this.
+  /// `friction` is Coulomb's mu >= 0; infinity: what touches sticks (a step in which that has no answer, because a
+  /// vertex can shed its shear only by opening, is made with mu = 100). The compliance must outlive this.
   /// @throws Error for a shape or a friction that isn't allowed
   Press(const Compliance& gel, ContactShape shape, double friction, PressTolerance tolerance = {});
   Press(Press&&) noexcept;

@@ -83,6 +83,7 @@ class Run {
 
   void mechanics() {
     gel_ = source_.set_up_gel(job_.scenes.front().spec.device, progress_);
+    report_.warning = gel_->report.note;
     clock_.end("gel");
     truths_.resize(job_.scenes.size());
     Counter counter(progress_, "mechanics", job_.samples);
@@ -167,8 +168,8 @@ class Run {
     timings.stages = clock_.stages;
     timings.threads = options.threads > 0 ? options.threads : tbb::info::default_concurrency();
     timings.samples_rendered = report_.rendered;
-    write_whole_file(out_ / "dataset.json",
-                     manifest_text(job_, identity, arrays_, files, work, options.timings ? &timings : nullptr));
+    write_whole_file(out_ / "dataset.json", manifest_text(job_, identity, gel_->report, arrays_, files, work,
+                                                          options.timings ? &timings : nullptr));
   }
 
   GenerateReport report() const {
@@ -185,8 +186,8 @@ class Run {
   void make_folders() const {
     for (const PreparedScene& scene : job_.scenes) {
       const PictureKinds kinds(scene);
-      for (const auto& [name, wanted] :
-           {std::pair{"frames", kinds.frames}, std::pair{"ideal", kinds.ideal}, std::pair{"radiance", kinds.radiance}}) {
+      for (const auto& [name, wanted] : {std::pair{"frames", kinds.frames}, std::pair{"ideal", kinds.ideal},
+                                         std::pair{"radiance", kinds.radiance}}) {
         if (!wanted) continue;
         const fs::path folder = out_ / name / scene.entry.name;
         std::error_code error;

@@ -8,6 +8,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <string>
 
 #include "core/progress.h"
 #include "lab/sample_source.h"
@@ -26,6 +27,7 @@ struct GenerateReport {
   std::int64_t samples = 0;
   std::int64_t rendered = 0;  ///< samples whose pictures were made by this run
   std::int64_t kept = 0;      ///< samples whose pictures an earlier, unfinished run had made
+  std::string warning;        ///< what was wrong with the cache of set-up results; it was made anew
 };
 
 /// Generates the data set of a job file in folder `out`, or goes on with one that was broken off. All of the mechanics

@@ -64,6 +64,8 @@ FolderLock::FolderLock(const std::filesystem::path& file) {
   }
 }
 
-FolderLock::~FolderLock() { close(descriptor_); }
+FolderLock::~FolderLock() {
+  close(descriptor_);
+}
 
 }  // namespace touchstone::lab

@@ -1,6 +1,11 @@
 #include "lab/hdf5_file.h"
 
+#include <hdf5.h>
+
 #include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <fstream>
 #include <utility>
 
 #include "core/error.h"
@@ -9,7 +14,14 @@ namespace touchstone::lab {
 namespace {
 
 constexpr std::int64_t kChunkBytes = 256 * 1024;  // well under HDF5's cache of 1 MB a dataset: each is packed once
-constexpr unsigned kDeflateLevel = 4;             // of 9; higher ones cost time and win a percent
+constexpr std::size_t kMemoryStep = 4 << 20;
+constexpr unsigned kDeflateLevel = 4;  // of 9; higher ones cost time and win a percent
+
+static_assert(std::is_same_v<hid_t, Hdf5Id> || sizeof(hid_t) == sizeof(Hdf5Id));
+
+std::vector<hsize_t> extents(const std::vector<std::int64_t>& shape) {
+  return {shape.begin(), shape.end()};
+}
 
 /// Closes one HDF5 object.
 class Handle {
@@ -28,7 +40,9 @@ class Handle {
 };
 
 /// HDF5 prints its own stack of errors unless told not to; ours are exceptions.
-void keep_hdf5_quiet() { H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr); }
+void keep_hdf5_quiet() {
+  H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+}
 
 Handle text_type(std::size_t length) {
   const hid_t type = H5Tcopy(H5T_C_S1);
@@ -41,39 +55,43 @@ Handle text_type(std::size_t length) {
 }  // namespace
 
 template <>
-hid_t hdf5_type<std::uint8_t>() {
+Hdf5Id hdf5_type<std::uint8_t>() {
   return H5T_NATIVE_UINT8;
 }
 template <>
-hid_t hdf5_type<std::int32_t>() {
+Hdf5Id hdf5_type<std::int32_t>() {
   return H5T_NATIVE_INT32;
 }
 template <>
-hid_t hdf5_type<std::int64_t>() {
+Hdf5Id hdf5_type<std::int64_t>() {
   return H5T_NATIVE_INT64;
 }
 template <>
-hid_t hdf5_type<float>() {
+Hdf5Id hdf5_type<float>() {
   return H5T_NATIVE_FLOAT;
 }
 template <>
-hid_t hdf5_type<double>() {
+Hdf5Id hdf5_type<double>() {
   return H5T_NATIVE_DOUBLE;
 }
 
-hid_t Hdf5Writer::check(hid_t id, const char* what) const {
+Hdf5Id Hdf5Writer::check(Hdf5Id id, const char* what) const {
   if (id < 0) fail("{}: can't be written ({})", name_, what);
   return id;
 }
 
-void Hdf5Writer::check_done(herr_t result, const char* what) const {
+void Hdf5Writer::check_done(int result, const char* what) const {
   if (result < 0) fail("{}: can't be written ({})", name_, what);
 }
 
 Hdf5Writer::Hdf5Writer(const std::filesystem::path& file) : name_(file.string()) {
   keep_hdf5_quiet();
   const Handle access(check(H5Pcreate(H5P_FILE_ACCESS), "file access"), H5Pclose);
-  check_done(H5Pset_libver_bounds(access, H5F_LIBVER_V110, H5F_LIBVER_V110), "format version");
+  // Later versions mark a file as open for writing until it's closed.
+  check_done(H5Pset_libver_bounds(access, H5F_LIBVER_V18, H5F_LIBVER_V18), "format version");
+  // In memory until it's whole: HDF5 can't close a file of which it can't write the last bytes (a full disk), and then
+  // crashes at the end of the process.
+  check_done(H5Pset_fapl_core(access, kMemoryStep, 0), "memory");
   const Handle creation(check(H5Pcreate(H5P_FILE_CREATE), "file creation"), H5Pclose);
   check_done(H5Pset_obj_track_times(creation, 0), "times");
   file_ = check(H5Fcreate(name_.c_str(), H5F_ACC_TRUNC, creation, access), "creating the file");
@@ -84,13 +102,14 @@ Hdf5Writer::~Hdf5Writer() {
   if (file_ >= 0) H5Fclose(file_);
 }
 
-void Hdf5Writer::add_dataset(const Hdf5Description& description, hid_t type, std::size_t item_bytes,
-                             std::int64_t rows, const std::vector<std::int64_t>& row_shape) {
+void Hdf5Writer::add_dataset(const Hdf5Description& description, Hdf5Id type, std::size_t item_bytes, std::int64_t rows,
+                             const std::vector<std::int64_t>& row_shape) {
   TS_ASSERT(!datasets_.contains(description.path) && rows >= 0);
   Dataset dataset;
-  dataset.shape.push_back(static_cast<hsize_t>(rows));
-  for (const std::int64_t extent : row_shape) dataset.shape.push_back(static_cast<hsize_t>(extent));
-  std::vector<hsize_t> chunk = dataset.shape;
+  dataset.shape.push_back(rows);
+  dataset.shape.insert(dataset.shape.end(), row_shape.begin(), row_shape.end());
+  const std::vector<hsize_t> shape = extents(dataset.shape);
+  std::vector<hsize_t> chunk = shape;
   auto row_bytes = static_cast<std::int64_t>(item_bytes);
   for (const std::int64_t extent : row_shape) row_bytes *= extent;
   const bool empty = rows == 0 || row_bytes == 0;
@@ -102,28 +121,26 @@ void Hdf5Writer::add_dataset(const Hdf5Description& description, hid_t type, std
     check_done(H5Pset_shuffle(creation), "shuffle");
     check_done(H5Pset_deflate(creation, kDeflateLevel), "compression");
   }
-  const Handle space(check(H5Screate_simple(static_cast<int>(dataset.shape.size()), dataset.shape.data(), nullptr),
-                           "shape"),
-                     H5Sclose);
+  const Handle space(check(H5Screate_simple(static_cast<int>(shape.size()), shape.data(), nullptr), "shape"), H5Sclose);
   dataset.id = check(H5Dcreate2(file_, description.path.c_str(), type, space, H5P_DEFAULT, creation, H5P_DEFAULT),
                      description.path.c_str());
-  const hid_t id = dataset.id;
+  const Hdf5Id id = dataset.id;
   datasets_.emplace(description.path, std::move(dataset));
   describe(id, description);
 }
 
-void Hdf5Writer::write_rows(const std::string& path, hid_t type, std::int64_t first, std::int64_t count,
+void Hdf5Writer::write_rows(const std::string& path, Hdf5Id type, std::int64_t first, std::int64_t count,
                             const void* values, std::size_t size) {
   const auto found = datasets_.find(path);
   TS_ASSERT(found != datasets_.end());
   const Dataset& dataset = found->second;
   std::vector<hsize_t> start(dataset.shape.size(), 0);
-  std::vector<hsize_t> extent = dataset.shape;
+  std::vector<hsize_t> extent = extents(dataset.shape);
   start[0] = static_cast<hsize_t>(first);
   extent[0] = static_cast<hsize_t>(count);
   std::size_t wanted = 1;
   for (const hsize_t part : extent) wanted *= part;
-  TS_ASSERT(size == wanted && start[0] + extent[0] <= dataset.shape[0]);
+  TS_ASSERT(size == wanted && first + count <= dataset.shape[0]);
   if (size == 0) return;
   const Handle memory(check(H5Screate_simple(static_cast<int>(extent.size()), extent.data(), nullptr), "shape"),
                       H5Sclose);
@@ -154,14 +171,14 @@ void Hdf5Writer::write_texts(const Hdf5Description& description, const std::vect
   describe(dataset, description);
 }
 
-void Hdf5Writer::describe(hid_t object, const Hdf5Description& description) {
+void Hdf5Writer::describe(Hdf5Id object, const Hdf5Description& description) {
   text_attribute(object, "unit", description.unit);
   text_attribute(object, "shape", description.shape);
   if (!description.frame.empty()) text_attribute(object, "frame", description.frame);
   text_attribute(object, "meaning", description.meaning);
 }
 
-void Hdf5Writer::text_attribute(hid_t object, const std::string& name, const std::string& value) {
+void Hdf5Writer::text_attribute(Hdf5Id object, const std::string& name, const std::string& value) {
   const Handle type = text_type(value.size());
   const Handle space(check(H5Screate(H5S_SCALAR), "attribute"), H5Sclose);
   const Handle attribute(check(H5Acreate2(object, name.c_str(), type, space, H5P_DEFAULT, H5P_DEFAULT), name.c_str()),
@@ -181,12 +198,18 @@ void Hdf5Writer::set_attribute(const std::string& name, std::int64_t value) {
 }
 
 void Hdf5Writer::close() {
-  herr_t worst = 0;
-  for (auto& [path, dataset] : datasets_) worst = std::min(worst, H5Dclose(dataset.id));
+  for (auto& [path, dataset] : datasets_) H5Dclose(dataset.id);
   datasets_.clear();
-  worst = std::min(worst, H5Fflush(file_, H5F_SCOPE_LOCAL));
-  worst = std::min(worst, H5Fclose(std::exchange(file_, -1)));
-  check_done(worst, "closing the file");
+  check_done(H5Fflush(file_, H5F_SCOPE_GLOBAL), "flush");
+  const ssize_t size = H5Fget_file_image(file_, nullptr, 0);
+  void* memory = nullptr;  // the image's own copy has a wrong checksum in its superblock (HDF5 1.10.8)
+  if (size < 0 || H5Fget_vfd_handle(file_, H5P_DEFAULT, &memory) < 0) fail("{}: can't be written (its memory)", name_);
+  std::ofstream out(name_, std::ios::binary);
+  out.write(*static_cast<const char* const*>(memory), size);
+  out.close();
+  const int why = errno;
+  check_done(H5Fclose(std::exchange(file_, -1)), "closing the file");
+  if (!out) fail("{}: can't be written ({})", name_, std::strerror(why));
 }
 
 Hdf5Reader::Hdf5Reader(const std::filesystem::path& file) : name_(file.string()) {
@@ -196,9 +219,13 @@ Hdf5Reader::Hdf5Reader(const std::filesystem::path& file) : name_(file.string())
   if (file_ < 0) fail("{}: isn't an HDF5 file, or is broken off", name_);
 }
 
-Hdf5Reader::~Hdf5Reader() { H5Fclose(file_); }
+Hdf5Reader::~Hdf5Reader() {
+  H5Fclose(file_);
+}
 
-bool Hdf5Reader::has(const std::string& path) const { return H5Lexists(file_, path.c_str(), H5P_DEFAULT) > 0; }
+bool Hdf5Reader::has(const std::string& path) const {
+  return H5Lexists(file_, path.c_str(), H5P_DEFAULT) > 0;
+}
 
 std::vector<std::int64_t> Hdf5Reader::shape_of(const std::string& path, std::size_t& size) const {
   const Handle dataset(H5Dopen2(file_, path.c_str(), H5P_DEFAULT), H5Dclose);
@@ -213,7 +240,7 @@ std::vector<std::int64_t> Hdf5Reader::shape_of(const std::string& path, std::siz
   return {extent.begin(), extent.end()};
 }
 
-void Hdf5Reader::read_into(const std::string& path, hid_t type, void* values) const {
+void Hdf5Reader::read_into(const std::string& path, Hdf5Id type, void* values) const {
   const Handle dataset(H5Dopen2(file_, path.c_str(), H5P_DEFAULT), H5Dclose);
   if (H5Dread(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) < 0) {
     fail("{}: '{}' can't be read; it isn't of the kind that is needed, or the file is damaged", name_, path);

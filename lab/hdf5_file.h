@@ -2,8 +2,6 @@
 // HDF5 files that are the same bytes whenever they hold the same values: no time stamps, fixed format version. Not for
 // use from several threads at once (Debian's library has one state for all).
 
-#include <hdf5.h>
-
 #include <cstdint>
 #include <filesystem>
 #include <map>
@@ -13,9 +11,12 @@
 
 namespace touchstone::lab {
 
+/// HDF5's own handle (hid_t), without its header.
+using Hdf5Id = std::int64_t;
+
 /// The HDF5 type that holds a C++ one: std::uint8_t, std::int32_t, std::int64_t, float, double.
 template <typename T>
-hid_t hdf5_type();
+Hdf5Id hdf5_type();
 
 /// What a dataset holds, written beside it as attributes.
 struct Hdf5Description {
@@ -26,7 +27,8 @@ struct Hdf5Description {
   std::string meaning;  ///< one sentence
 };
 
-/// Writes a new file. Each function throws Error, naming the file, if HDF5 can't do what is asked (a full disk).
+/// Makes a new file in memory and writes it when it's closed. Each function throws Error, naming the file, if it can't
+/// do what is asked.
 class Hdf5Writer {
  public:
   explicit Hdf5Writer(const std::filesystem::path& file);
@@ -57,25 +59,25 @@ class Hdf5Writer {
   void set_attribute(const std::string& name, const std::string& value);
   void set_attribute(const std::string& name, std::int64_t value);
 
-  /// Ends the file; without this call the file is broken off.
+  /// Writes the file; without this call there is none.
   void close();
 
  private:
   struct Dataset {
-    hid_t id = -1;
-    std::vector<hsize_t> shape;
+    Hdf5Id id = -1;
+    std::vector<std::int64_t> shape;
   };
-  void add_dataset(const Hdf5Description& description, hid_t type, std::size_t item_bytes, std::int64_t rows,
+  void add_dataset(const Hdf5Description& description, Hdf5Id type, std::size_t item_bytes, std::int64_t rows,
                    const std::vector<std::int64_t>& row_shape);
-  void write_rows(const std::string& path, hid_t type, std::int64_t first, std::int64_t count, const void* values,
+  void write_rows(const std::string& path, Hdf5Id type, std::int64_t first, std::int64_t count, const void* values,
                   std::size_t size);
-  void describe(hid_t object, const Hdf5Description& description);
-  void text_attribute(hid_t object, const std::string& name, const std::string& value);
-  hid_t check(hid_t id, const char* what) const;
-  void check_done(herr_t result, const char* what) const;
+  void describe(Hdf5Id object, const Hdf5Description& description);
+  void text_attribute(Hdf5Id object, const std::string& name, const std::string& value);
+  Hdf5Id check(Hdf5Id id, const char* what) const;
+  void check_done(int result, const char* what) const;
 
   std::string name_;
-  hid_t file_ = -1;
+  Hdf5Id file_ = -1;
   std::map<std::string, Dataset> datasets_;
 };
 
@@ -111,10 +113,10 @@ class Hdf5Reader {
 
  private:
   std::vector<std::int64_t> shape_of(const std::string& path, std::size_t& size) const;
-  void read_into(const std::string& path, hid_t type, void* values) const;
+  void read_into(const std::string& path, Hdf5Id type, void* values) const;
 
   std::string name_;
-  hid_t file_ = -1;
+  Hdf5Id file_ = -1;
 };
 
 }  // namespace touchstone::lab

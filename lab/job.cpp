@@ -17,7 +17,9 @@ bool is_folder_name(const std::string& name) {
 
 }  // namespace
 
-EnumNames<Split> enum_names(Split) { return {{"train", Split::train}, {"verify", Split::verify}, {"test", Split::test}}; }
+EnumNames<Split> enum_names(Split) {
+  return {{"train", Split::train}, {"verify", Split::verify}, {"test", Split::test}};
+}
 
 std::string name_of(Split split) {
   for (const auto& [name, value] : enum_names(Split{})) {
@@ -68,8 +70,12 @@ void fields(YamlReader& in, Job& job) {
   }
 }
 
-Job read_job(const std::filesystem::path& file) { return read_yaml<Job>(file); }
+Job read_job(const std::filesystem::path& file) {
+  return read_yaml<Job>(file);
+}
 
-bool is_job_file(const std::filesystem::path& file) { return YamlReader::open(file).has("scenes"); }
+bool is_job_file(const std::filesystem::path& file) {
+  return YamlReader::open(file).has("scenes");
+}
 
 }  // namespace touchstone::lab

@@ -2,6 +2,7 @@
 
 #include <tbb/parallel_for.h>
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "core/error.h"
@@ -61,8 +62,9 @@ std::string picture_name(const std::string& folder, const std::string& scene, st
   return fmt::format("{}/{}/{:06}.{}", folder, scene, frame, ending);
 }
 
-std::string manifest_text(const PreparedJob& job, const RunIdentity& identity, const std::vector<ArrayShape>& arrays,
-                          const std::vector<WrittenFile>& files, const CountedWork& work, const RunTimings* timings) {
+std::string manifest_text(const PreparedJob& job, const RunIdentity& identity, const fem::ComplianceReport& gel,
+                          const std::vector<ArrayShape>& arrays, const std::vector<WrittenFile>& files,
+                          const CountedWork& work, const RunTimings* timings) {
   ordered_json manifest = {{"format", kFormat},
                            {"format_version", kFormatVersion},
                            {"content_sha256", ""},
@@ -78,6 +80,9 @@ std::string manifest_text(const PreparedJob& job, const RunIdentity& identity, c
   for (const InputFile& input : job.inputs) {
     manifest["inputs"].push_back({{"file", input.name}, {"sha256", input.sha256}});
   }
+  manifest["gel_mesh"] = {{"tetrahedra", gel.tetrahedra},
+                          {"unknowns", gel.unknowns},
+                          {"smallest_dihedral_deg", std::round(100.0 * gel.smallest_dihedral_deg) / 100.0}};
   for (const PreparedScene& scene : job.scenes) {
     manifest["scenes"].push_back(scene_json(scene, job.file.parent_path()));
   }

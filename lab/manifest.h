@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "fem/compliance.h"
 #include "lab/prepared_job.h"
 #include "lab/run_identity.h"
 #include "lab/run_journal.h"
@@ -38,8 +39,9 @@ struct ArrayShape {
 /// The manifest's text. `timings` may be null: then nothing in it differs between runs. The member `content_sha256` is
 /// the SHA-256 of the manifest, as JSON without white space, without `content_sha256` and `timings`; because the
 /// manifest holds the checksum of every file, it stands for the whole data set.
-std::string manifest_text(const PreparedJob& job, const RunIdentity& identity, const std::vector<ArrayShape>& arrays,
-                          const std::vector<WrittenFile>& files, const CountedWork& work, const RunTimings* timings);
+std::string manifest_text(const PreparedJob& job, const RunIdentity& identity, const fem::ComplianceReport& gel,
+                          const std::vector<ArrayShape>& arrays, const std::vector<WrittenFile>& files,
+                          const CountedWork& work, const RunTimings* timings);
 
 /// A scene as its data set tells it.
 struct ManifestScene {

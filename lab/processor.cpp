@@ -1,6 +1,9 @@
 #include "lab/processor.h"
 
-extern "C" char* openblas_get_corename(void);
+extern "C" {
+char* openblas_get_corename(void);
+void openblas_set_num_threads(int threads);
+}
 
 namespace touchstone::lab {
 
@@ -17,8 +20,16 @@ std::string vector_instructions() {
   return "baseline";
 }
 
-std::string blas_core() { return openblas_get_corename(); }
+std::string blas_core() {
+  return openblas_get_corename();
+}
 
-std::string processor_kind() { return vector_instructions() + ", BLAS for " + blas_core(); }
+void use_one_blas_thread() {
+  openblas_set_num_threads(1);
+}
+
+std::string processor_kind() {
+  return vector_instructions() + ", BLAS for " + blas_core();
+}
 
 }  // namespace touchstone::lab

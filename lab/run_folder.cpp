@@ -4,7 +4,7 @@
 
 #include <algorithm>
 #include <memory>
-#include <regex>
+#include <string>
 
 #include "core/error.h"
 #include "core/sha256.h"
@@ -15,10 +15,22 @@ namespace {
 
 namespace fs = std::filesystem;
 
+bool is_number(const std::string& text) {
+  return !text.empty() &&
+         std::all_of(text.begin(), text.end(), [](char digit) { return digit >= '0' && digit <= '9'; });
+}
+
 /// The names that core/whole_file.h gives to files that aren't whole: .name.process.serial.part.ending
 bool is_temporary(const fs::path& file) {
-  static const std::regex name(R"(\..*\.[0-9]+\.[0-9]+\.part(\.[^.]*)?)");
-  return std::regex_match(file.filename().string(), name);
+  const std::string name = file.filename().string();
+  const std::size_t part = name.rfind(".part");
+  if (!name.starts_with('.') || part == 0 || part == std::string::npos) return false;
+  if (part + 5 != name.size() && name[part + 5] != '.') return false;
+  const std::size_t serial = name.rfind('.', part - 1);
+  if (serial == 0 || serial == std::string::npos) return false;
+  const std::size_t process = name.rfind('.', serial - 1);
+  return process != 0 && process != std::string::npos && is_number(name.substr(process + 1, serial - process - 1)) &&
+         is_number(name.substr(serial + 1, part - serial - 1));
 }
 
 fs::path topmost_missing(const fs::path& folder) {
@@ -34,9 +46,10 @@ void refuse_unless_equal(const fs::path& out, const RunIdentity& identity) {
   const fs::path file = out / kUnfinished / "run.json";
   const std::string differs = difference(run_identity_from_json(read_whole_file(file), file.string()), identity);
   if (!differs.empty()) {
-    fail("{}: holds an unfinished data set, and since it was begun {} has changed; "
-         "finish it as it was begun, or give another folder",
-         out.string(), differs);
+    fail(
+        "{}: holds an unfinished data set, and since it was begun {} has changed; "
+        "finish it as it was begun, or give another folder",
+        out.string(), differs);
   }
 }
 
@@ -113,9 +126,13 @@ std::vector<FrameRecord> RunFolder::whole_records() const {
   return kept;
 }
 
-fs::path RunFolder::journal() const { return out_ / kUnfinished / "frames.log"; }
+fs::path RunFolder::journal() const {
+  return out_ / kUnfinished / "frames.log";
+}
 
-void RunFolder::keep() { keep_ = true; }
+void RunFolder::keep() {
+  keep_ = true;
+}
 
 void RunFolder::remove_temporary_files() const {
   std::vector<fs::path> temporary;

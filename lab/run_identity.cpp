@@ -19,7 +19,9 @@ constexpr const char* kFormat = "touchstone-run";
 
 }  // namespace
 
-std::string program_version() { return TOUCHSTONE_VERSION; }
+std::string program_version() {
+  return TOUCHSTONE_VERSION;
+}
 
 RunIdentity identity_of(const PreparedJob& job) {
   RunIdentity identity;

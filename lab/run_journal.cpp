@@ -36,7 +36,8 @@ std::optional<FrameRecord> record_of(const std::string& line) {
     record.pixels_traced = parsed.at("pixels").get<std::int64_t>();
     record.paths_traced = parsed.at("paths").get<std::int64_t>();
     for (const json& file : parsed.at("files")) {
-      record.files.push_back({file.at(0).get<std::string>(), file.at(1).get<std::string>(), file.at(2).get<std::int64_t>()});
+      record.files.push_back(
+          {file.at(0).get<std::string>(), file.at(1).get<std::string>(), file.at(2).get<std::int64_t>()});
     }
     return record;
   } catch (const json::exception&) {
@@ -64,7 +65,9 @@ RunJournal::RunJournal(const std::filesystem::path& file, const std::vector<Fram
   if (descriptor_ < 0) fail("{}: can't be written ({})", name_, std::strerror(errno));
 }
 
-RunJournal::~RunJournal() { close(descriptor_); }
+RunJournal::~RunJournal() {
+  close(descriptor_);
+}
 
 void RunJournal::append(const FrameRecord& record) {
   const std::string line = line_of(record);

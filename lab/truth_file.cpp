@@ -107,12 +107,11 @@ struct TruthFileWriter::Parts {
     column<std::uint8_t>({"/under_resolved", "1", "samples", "",
                           "1 where the contact spans too few nodes for its force to be exact to a percent."},
                          {});
-    column<double>({"/residual_penetration_mm", "mm", "samples", "",
-                    "Error bar: largest overlap that the contact solver left."},
-                   {});
-    column<double>({"/residual_tension_MPa", "MPa", "samples", "",
-                    "Error bar: largest pull that the contact solver left."},
-                   {});
+    column<double>(
+        {"/residual_penetration_mm", "mm", "samples", "", "Error bar: largest overlap that the contact solver left."},
+        {});
+    column<double>(
+        {"/residual_tension_MPa", "MPa", "samples", "", "Error bar: largest pull that the contact solver left."}, {});
     column<double>({"/residual_friction_cone", "1", "samples", "",
                     "Error bar: largest violation of Coulomb's cone, relative to its radius at the largest pressure."},
                    {});
@@ -183,7 +182,9 @@ void TruthFileWriter::close() {
   parts_->file.close();
 }
 
-const std::vector<ArrayShape>& TruthFileWriter::arrays() const { return parts_->arrays; }
+const std::vector<ArrayShape>& TruthFileWriter::arrays() const {
+  return parts_->arrays;
+}
 
 TruthTable read_truth_table(const std::filesystem::path& path) {
   const Hdf5Reader file(path);

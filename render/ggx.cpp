@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/units.h"
+#include "render/sample_sequence.h"
 
 namespace touchstone::render {
 
@@ -50,6 +51,31 @@ double ggx_reflection(const Eigen::Vector3d& out, const Eigen::Vector3d& in, dou
   if (out.z() <= 0.0 || in.z() <= 0.0) return 0.0;
   const double cos_m = (out + in).normalized().z();
   return ggx_distribution(cos_m, alpha) * ggx_masking_shadowing(in.z(), out.z(), alpha) / (4.0 * out.z() * in.z());
+}
+
+GgxAlbedo::GgxAlbedo(double alpha) {
+  constexpr std::uint32_t kReflections = 512;
+  for (int k = 0; k < kNodes; ++k) {
+    const double root = std::max(k, 1) / static_cast<double>(kNodes - 1);  // at grazing take the next node's value
+    const double cosine = root * root;
+    const Eigen::Vector3d out(std::sqrt(1.0 - cosine * cosine), 0.0, cosine);
+    double sum = 0.0;
+    for (std::uint32_t i = 0; i < kReflections; ++i) {
+      SampleSequence numbers(0, static_cast<std::uint64_t>(k), i);
+      const auto [u, v] = numbers.next_pair();
+      const Eigen::Vector3d facet = sample_visible_normal(out, alpha, u, v);
+      const Eigen::Vector3d in = 2.0 * out.dot(facet) * facet - out;
+      if (in.z() > 0.0) sum += ggx_masking_shadowing(in.z(), cosine, alpha);
+    }
+    table_[k] = std::clamp(sum / (kReflections * ggx_masking(cosine, alpha)), 1e-3, 1.0);
+  }
+}
+
+double GgxAlbedo::operator()(double cosine) const {
+  const double place = std::sqrt(std::clamp(cosine, 0.0, 1.0)) * (kNodes - 1);
+  const int node = std::min(static_cast<int>(place), kNodes - 2);
+  const double part = place - node;
+  return (1.0 - part) * table_[node] + part * table_[node + 1];
 }
 
 double schlick_weight(double cos_half) {

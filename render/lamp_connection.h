@@ -4,7 +4,6 @@
 
 #include <Eigen/Core>
 #include <cmath>
-#include <numbers>
 
 #include "render/layer_connection.h"
 #include "render/prepared_scene.h"

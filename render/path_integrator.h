@@ -58,7 +58,7 @@ class PathIntegrator {
     double s_share;  // of the light, polarised square to the plane of incidence at the flat faces
     int layer, medium;
     int depth;   // diffuse and metallic reflections so far
-    int smooth;  // refractions and mirror reflections so far
+    int smooth;  // refractions, mirror reflections and crossings of Refractive surfaces so far
   };
 
   struct Branches {
@@ -144,8 +144,8 @@ class PathIntegrator {
     const Eigen::Vector3d facing = entering ? hit.normal : Eigen::Vector3d(-hit.normal);
     const double n_from = scene_.media[leg.medium].index;
     const double n_to = scene_.media[to].index;
+    ++leg.smooth;
     if (n_from != n_to) {
-      ++leg.smooth;
       Eigen::Vector3d normal = entering ? hit.shading_normal : Eigen::Vector3d(-hit.shading_normal);
       if (-leg.direction.dot(normal) <= 1e-6) normal = facing;
       double cosine = -leg.direction.dot(normal);
@@ -210,7 +210,8 @@ class PathIntegrator {
         const Eigen::Vector3d out = frame.to_local(-leg.direction);
         const Eigen::Vector3d in = frame.to_local(arrival.direction);
         const double schlick = schlick_weight((out + in).normalized().dot(out));
-        const Bands<N> colour = material.colour + (1.0 - material.colour) * schlick;
+        const Bands<N> colour = (material.colour + (1.0 - material.colour) * schlick) *
+                                (1.0 + material.colour * material.single_albedo.missing_ratio(out.z()));
         sum += leg.throughput * colour * arrival.irradiance *
                (weight * cosine * ggx_reflection(out, in, material.roughness));
       }
@@ -235,7 +236,8 @@ class PathIntegrator {
       if (in.z() <= 0.0) return false;
       const double kept =
           ggx_masking_shadowing(in.z(), out.z(), material.roughness) / ggx_masking(out.z(), material.roughness);
-      leg.throughput *= (material.colour + (1.0 - material.colour) * schlick_weight(out.dot(facet))) * kept;
+      leg.throughput *= (material.colour + (1.0 - material.colour) * schlick_weight(out.dot(facet))) *
+                        (kept * (1.0 + material.colour * material.single_albedo.missing_ratio(out.z())));
     }
     if (in.z() <= 1e-9) return false;
     ++leg.depth;

@@ -3,7 +3,9 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 #include <variant>
 #include <vector>
 
@@ -49,34 +51,43 @@ void check_mask(const cv::Mat& mask, const PinholeCamera& camera) {
   }
 }
 
-/// Mean and standard error of a pixel's scalar signal. The samples of a block of four are stratified among themselves,
-/// so the spread of block means says more truly how good the mean is than that of single samples.
+/// Mean and standard error of a pixel's scalar signal, from the spread of the means of blocks of samples. An aligned
+/// block of 2^k samples is stratified in itself, so the spread of blocks says more truly how good the mean is than that
+/// of single samples; blocks hold 4 samples at first and are joined in pairs when there are 32 of them.
 class ErrorEstimate {
  public:
   void add(double value) {
     block_ += value;
-    if (++in_block_ < kBlock) return;
-    const double mean = block_ / kBlock;
+    if (++in_block_ < block_size_) return;
+    sums_[blocks_++] = block_;
     block_ = 0.0;
     in_block_ = 0;
-    ++blocks_;
-    const double off = mean - mean_;
-    mean_ += off / blocks_;
-    squares_ += off * (mean - mean_);
+    if (blocks_ < kMostBlocks) return;
+    for (int i = 0; i < kMostBlocks / 2; ++i) sums_[i] = sums_[2 * i] + sums_[2 * i + 1];
+    blocks_ = kMostBlocks / 2;
+    block_size_ *= 2;
   }
-  double mean() const { return mean_; }
+  /// Of the whole blocks; infinite below two.
   double standard_error() const {
     if (blocks_ < 2) return std::numeric_limits<double>::infinity();
-    return std::sqrt(squares_ / (static_cast<double>(blocks_ - 1) * blocks_));
+    const double centre = mean();
+    double squares = 0.0;
+    for (int i = 0; i < blocks_; ++i) squares += std::pow(sums_[i] / block_size_ - centre, 2);
+    return std::sqrt(squares / (static_cast<double>(blocks_ - 1) * blocks_));
+  }
+  double mean() const {
+    double sum = 0.0;
+    for (int i = 0; i < blocks_; ++i) sum += sums_[i];
+    return blocks_ > 0 ? sum / (static_cast<double>(blocks_) * block_size_) : 0.0;
   }
 
  private:
-  static constexpr int kBlock = 4;
+  static constexpr int kMostBlocks = 32;
+  std::array<double, kMostBlocks> sums_;  // the first blocks_ are in use
   double block_ = 0.0;
   int in_block_ = 0;
+  int block_size_ = 4;
   int blocks_ = 0;
-  double mean_ = 0.0;
-  double squares_ = 0.0;
 };
 
 template <int N>

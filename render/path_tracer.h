@@ -12,7 +12,8 @@
 namespace touchstone::render {
 
 /// A pixel is sampled until its standard error, in electrons, is below `fraction` times the imager's own noise there,
-/// sqrt(signal + read_noise_e^2 + quantisation_e^2).
+/// sqrt(signal + read_noise_e^2 + quantisation_e^2). The error is judged from the samples themselves: something that
+/// fills less than about 1 / min_samples of what a pixel sees through the hole may be missed.
 struct NoiseTarget {
   Spectrum electrons_per_irradiance;  ///< electrons in a pixel per W/m^2 in each band (exposure, area, efficiency)
   double read_noise_e = 0.0;

@@ -3,9 +3,10 @@
 
 #include <Eigen/Core>
 #include <cmath>
-#include <numbers>
+
 #include <vector>
 
+#include "render/ggx.h"
 #include "render/ray_scene.h"
 #include "render/scene.h"
 #include "render/spectrum.h"
@@ -28,6 +29,7 @@ struct PreparedMaterial {
   SurfaceKind kind = SurfaceKind::kBlack;
   Bands<N> colour = Bands<N>::Zero();  ///< albedo, or reflectance at normal incidence
   double roughness = 0.0;
+  GgxAlbedo single_albedo;  ///< of a conductor
   int inside = 0, outside = 0;
 };
 
@@ -80,7 +82,7 @@ struct PreparedScene {
   }
 
  private:
-  static PreparedMaterial<N> prepare(const Material& material) {
+  PreparedMaterial<N> prepare(const Material& material) const {
     PreparedMaterial<N> made;
     if (const auto* lambertian = std::get_if<Lambertian>(&material)) {
       made.kind = SurfaceKind::kLambertian;
@@ -89,6 +91,9 @@ struct PreparedScene {
       made.kind = SurfaceKind::kConductor;
       made.colour = conductor->reflectance;
       made.roughness = conductor->roughness;
+      const bool as_before = !materials.empty() && materials.back().kind == SurfaceKind::kConductor &&
+                             materials.back().roughness == made.roughness;
+      made.single_albedo = as_before ? materials.back().single_albedo : GgxAlbedo(made.roughness);
     } else if (const auto* refractive = std::get_if<Refractive>(&material)) {
       made.kind = SurfaceKind::kRefractive;
       made.inside = refractive->medium_inside;

@@ -1,6 +1,7 @@
 #include "render/ray_scene.h"
 
 #include <embree3/rtcore.h>
+#include <tbb/task_arena.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -13,10 +14,10 @@
 namespace touchstone::render {
 namespace {
 
-/// One Embree device for the process. Trees are built by the calling thread alone: the same tree in every run.
+/// One Embree device for the process. Its `threads` option stays alone: it would limit oneTBB in the whole process.
 RTCDevice device() {
   static const RTCDevice shared = [] {
-    const RTCDevice made = rtcNewDevice("threads=1,user_threads=1,set_affinity=0");
+    const RTCDevice made = rtcNewDevice(nullptr);
     if (made == nullptr) fail("Embree can't start on this processor (error {})", int(rtcGetDeviceError(nullptr)));
     return made;
   }();
@@ -159,7 +160,11 @@ RayScene::RayScene(const Scene& scene) : state_(std::make_unique<State>()) {
   const auto first_ball = static_cast<unsigned>(state.meshes.size());
   state.add_balls(first_ball, state.opaque_balls, false);
   state.add_balls(first_ball + 1, state.refractive_balls, true);
-  for (RTCScene made : {state.all, state.opaque, state.refractive}) rtcCommitScene(made);
+  // Built by one thread: the same tree, and so the same choice among equal hits, for any number of threads.
+  tbb::task_arena alone(1);
+  alone.execute([&] {
+    for (RTCScene made : {state.all, state.opaque, state.refractive}) rtcCommitScene(made);
+  });
   const RTCError error = rtcGetDeviceError(device());
   if (error != RTC_ERROR_NONE) fail("Embree can't take the scene (error {})", static_cast<int>(error));
 }

@@ -23,8 +23,8 @@ struct Lambertian {
 };
 
 /// Metal: GGX microfacets of width `roughness` (the alpha of Walter et al. 2007, 1e-3 to 1), Fresnel reflectance by
-/// Schlick's formula from the `reflectance` at normal incidence. Light that a facet sends to another facet is lost, as
-/// usual with this model: a white metal of roughness 0.5 reflects some 5 % too little.
+/// Schlick's formula from the `reflectance` at normal incidence. Light that a facet sends to another facet is
+/// given back in the shape of the single reflection (ggx.h, GgxAlbedo), so that a white metal loses nothing.
 struct RoughConductor {
   Spectrum reflectance;
   double roughness = 0.3;

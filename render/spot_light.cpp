@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "core/units.h"
-#include "render/warps.h"
 
 namespace touchstone::render {
 
@@ -29,13 +28,6 @@ double spot_solid_angle(const SpotLamp& lamp) {
     rim += value * ((i == 0 || i == kIntervals) ? 1.0 : (i % 2 == 1 ? 4.0 : 2.0));
   }
   return hard + 2.0 * kPi * rim * step / 3.0;
-}
-
-Eigen::Vector3d lens_point(const SpotLamp& lamp, double u, double v) {
-  if (lamp.lens_radius == 0.0) return lamp.position;
-  const NormalFrame frame(lamp.direction.normalized());
-  const Eigen::Vector2d disc = lamp.lens_radius * square_to_disc(u, v);
-  return lamp.position + disc.x() * frame.x + disc.y() * frame.y;
 }
 
 }  // namespace touchstone::render

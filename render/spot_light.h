@@ -1,7 +1,5 @@
 #pragma once
 
-#include <Eigen/Core>
-
 #include "render/scene.h"
 
 namespace touchstone::render {
@@ -12,8 +10,5 @@ double spot_profile(const SpotLamp& lamp, double cosine);
 
 /// The solid angle that the lobe stands for, int profile d omega in sr: intensity on the axis = power / this.
 double spot_solid_angle(const SpotLamp& lamp);
-
-/// A place on the lens, uniform for (u, v) uniform in [0,1)^2.
-Eigen::Vector3d lens_point(const SpotLamp& lamp, double u, double v);
 
 }  // namespace touchstone::render

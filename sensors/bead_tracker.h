@@ -64,12 +64,12 @@ struct BeadTrackerSettings {
   double mean_brightness = 150.0;  ///< to which ROI-A's mean grey value is scaled
   double contrast = 2.0;           ///< factor of step iv
   int morphology_px = 3;           ///< side of the square element of step vi, odd; 1 = no opening and closing
-  BeadLook look;
+  BeadLook look = {};
   CentroidKind centroid = CentroidKind::kBinary;
   int max_hidden_frames = 10;
-  BeadFilterSettings filter;
+  BeadFilterSettings filter = {};
   /// Centre of ROI-A in the first frame, in px; the image's centre if not given.
-  std::optional<Eigen::Vector2d> first_centre_px;
+  std::optional<Eigen::Vector2d> first_centre_px = std::nullopt;
 };
 
 enum class BeadStatus : std::uint8_t {

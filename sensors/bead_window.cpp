@@ -29,67 +29,101 @@ std::uint8_t to_level(double value) {
   return static_cast<std::uint8_t>(std::clamp(value + 0.5, 0.0, 255.0));
 }
 
-/// What a window's grey values become in step iv, and how they're spread.
-struct Contrast {
-  std::array<std::uint8_t, 256> of_grey;
-  std::array<int, 256> histogram;  ///< of the contrast values
+/// How often each grey value occurs in a window; only values from `lowest` to `highest` do.
+struct GreyHistogram {
+  std::array<int, 256> count;
+  int lowest;
+  int highest;
 };
 
-std::array<int, 256> grey_histogram(const GreyWindow& window) {
+GreyHistogram grey_histogram(const GreyWindow& window) {
   // Four histograms in turn, so that equal neighbours don't wait for each other's increment.
   std::array<std::array<std::uint16_t, 256>, 4> part{};
-  const std::size_t count = static_cast<std::size_t>(window.width) * static_cast<std::size_t>(window.height);
+  const std::size_t pixels = static_cast<std::size_t>(window.width) * static_cast<std::size_t>(window.height);
   std::size_t i = 0;
-  for (; i + 4 <= count; i += 4) {
+  for (; i + 4 <= pixels; i += 4) {
     ++part[0][window.grey[i]];
     ++part[1][window.grey[i + 1]];
     ++part[2][window.grey[i + 2]];
     ++part[3][window.grey[i + 3]];
   }
-  for (; i < count; ++i) ++part[0][window.grey[i]];
-  std::array<int, 256> histogram;
-  for (std::size_t v = 0; v < 256; ++v) histogram[v] = part[0][v] + part[1][v] + part[2][v] + part[3][v];
+  for (; i < pixels; ++i) ++part[0][window.grey[i]];
+  GreyHistogram histogram;
+  for (std::size_t v = 0; v < 256; ++v) {
+    histogram.count[v] = part[0][v] + part[1][v] + part[2][v] + part[3][v];
+  }
+  histogram.lowest = 0;
+  histogram.highest = 255;
+  while (histogram.count[static_cast<std::size_t>(histogram.lowest)] == 0) ++histogram.lowest;
+  while (histogram.count[static_cast<std::size_t>(histogram.highest)] == 0) --histogram.highest;
   return histogram;
 }
 
-Contrast contrast_of(const std::array<int, 256>& grey, int count, BeadPolarity polarity, double factor) {
+/// What a window's grey values become in step iv, and how they're spread. It rises with the grey value, or falls where
+/// beads are dark; only grey values that occur have an entry.
+struct Contrast {
+  std::array<std::uint8_t, 256> of_grey;
+  std::array<int, 256> histogram;  ///< of the contrast values
+};
+
+Contrast contrast_of(const GreyHistogram& grey, int pixels, BeadPolarity polarity, double factor) {
   std::int64_t sum = 0;
-  for (int v = 0; v < 256; ++v) sum += static_cast<std::int64_t>(v) * grey[static_cast<std::size_t>(v)];
-  const double mean = static_cast<double>(sum) / count;
+  for (int v = grey.lowest; v <= grey.highest; ++v) {
+    sum += static_cast<std::int64_t>(v) * grey.count[static_cast<std::size_t>(v)];
+  }
+  const double mean = static_cast<double>(sum) / pixels;
   const double sign = polarity == BeadPolarity::kDark ? -factor : factor;
   Contrast contrast;
   contrast.histogram.fill(0);
-  for (int v = 0; v < 256; ++v) {
+  for (int v = grey.lowest; v <= grey.highest; ++v) {
     const std::uint8_t value = to_level(sign * (v - mean));
     contrast.of_grey[static_cast<std::size_t>(v)] = value;
-    contrast.histogram[value] += grey[static_cast<std::size_t>(v)];
+    contrast.histogram[value] += grey.count[static_cast<std::size_t>(v)];
   }
   return contrast;
 }
 
 /// Difference of the mean grey values on both sides of a contrast threshold, among contrasts of at least `first`.
-double class_difference(const std::array<int, 256>& grey, const Contrast& contrast, int first, int threshold) {
-  double sum[2] = {0.0, 0.0};
-  double count[2] = {0.0, 0.0};
-  for (std::size_t v = 0; v < 256; ++v) {
-    if (contrast.of_grey[v] < first) continue;
-    const int side = contrast.of_grey[v] > threshold ? 1 : 0;
-    sum[side] += static_cast<double>(v) * grey[v];
-    count[side] += grey[v];
+double class_difference(const GreyHistogram& grey, const Contrast& contrast, int first, int threshold) {
+  std::int64_t sum[2] = {0, 0};
+  std::int64_t pixels[2] = {0, 0};
+  for (int v = grey.lowest; v <= grey.highest; ++v) {
+    const auto i = static_cast<std::size_t>(v);
+    if (contrast.of_grey[i] < first) continue;
+    const int side = contrast.of_grey[i] > threshold ? 1 : 0;
+    sum[side] += static_cast<std::int64_t>(v) * grey.count[i];
+    pixels[side] += grey.count[i];
   }
-  if (count[0] == 0.0 || count[1] == 0.0) return 0.0;
-  return std::abs(sum[1] / count[1] - sum[0] / count[0]);
+  if (pixels[0] == 0 || pixels[1] == 0) return 0.0;
+  return std::abs(static_cast<double>(sum[1]) / static_cast<double>(pixels[1]) -
+                  static_cast<double>(sum[0]) / static_cast<double>(pixels[0]));
 }
 
-void binarise(const GreyWindow& window, const Contrast& contrast, int threshold, BitWindow& bits) {
-  std::array<std::uint8_t, 256> is_bead;
-  for (std::size_t v = 0; v < 256; ++v) is_bead[v] = contrast.of_grey[v] > threshold ? 1 : 0;
+/// One bit a pixel: set where the contrast is above the threshold.
+void binarise(const GreyWindow& window, const GreyHistogram& grey, const Contrast& contrast, int threshold,
+              BeadPolarity polarity, BitWindow& bits) {
+  // Contrast is monotonic in the grey value, so the bead's values are one range of them.
+  int low = grey.lowest;
+  int high = grey.highest;
+  if (polarity == BeadPolarity::kDark) {
+    while (high >= low && contrast.of_grey[static_cast<std::size_t>(high)] <= threshold) --high;
+  } else {
+    while (low <= high && contrast.of_grey[static_cast<std::size_t>(low)] <= threshold) ++low;
+  }
   bits.width = window.width;
   bits.height = window.height;
-  const std::uint8_t* grey = window.grey.data();
-  for (int y = 0; y < window.height; ++y) {
+  const auto width = static_cast<std::size_t>(window.width);
+  const std::uint8_t* in = window.grey.data();
+  std::array<std::uint8_t, BitWindow::kMaxSide> is_bead{};
+  for (int y = 0; y < window.height; ++y, in += width) {
+    for (std::size_t x = 0; x < width; ++x) is_bead[x] = in[x] >= low && in[x] <= high ? 1 : 0;
     std::uint64_t row = 0;
-    for (int x = 0; x < window.width; ++x) row |= static_cast<std::uint64_t>(is_bead[*grey++]) << x;
+    for (std::size_t x = 0; x < width; x += 8) {
+      // The product brings byte i's lowest bit to bit 56 + i.
+      std::uint64_t eight = 0;
+      for (std::size_t i = 0; i < 8; ++i) eight |= static_cast<std::uint64_t>(is_bead[x + i]) << (8 * i);
+      row |= ((eight * 0x0102040810204080u) >> 56) << x;
+    }
     bits.rows[static_cast<std::size_t>(y)] = row;
   }
 }
@@ -206,10 +240,10 @@ std::optional<int> otsu_threshold(const std::array<int, 256>& histogram, int fir
     low_count += here;
     low_sum += static_cast<std::int64_t>(v) * here;
     if (low_count == count) break;
-    const double high_count = static_cast<double>(count - low_count);
-    const double difference =
-        static_cast<double>(low_sum) / static_cast<double>(low_count) - static_cast<double>(sum - low_sum) / high_count;
-    const double between = static_cast<double>(low_count) * high_count * difference * difference;
+    // Variance between the classes times the squared count: n1 n2 (m1 - m2)^2 with one division.
+    const auto difference = static_cast<double>(low_sum * count - sum * low_count);
+    const double between =
+        difference * difference / (static_cast<double>(low_count) * static_cast<double>(count - low_count));
     if (between > best) {
       best = between;
       threshold = v;
@@ -222,7 +256,7 @@ std::optional<BeadMeasurement> measure_bead(const GreyWindow& window, const Bead
   const BeadTrackerSettings& settings = search.settings;
   const BeadLook& look = settings.look;
   const int count = window.width * window.height;
-  const std::array<int, 256> grey = grey_histogram(window);
+  const GreyHistogram grey = grey_histogram(window);
   const Contrast contrast = contrast_of(grey, count, look.polarity, settings.contrast);
 
   const double pixel_area = static_cast<double>(window.stride) * window.stride;
@@ -245,7 +279,7 @@ std::optional<BeadMeasurement> measure_bead(const GreyWindow& window, const Bead
     if (difference < look.min_difference) return std::nullopt;
 
     BitWindow bits;
-    binarise(window, contrast, *threshold, bits);
+    binarise(window, grey, contrast, *threshold, look.polarity, bits);
     if (radius > 0) {
       open_regions(bits, radius);
       close_regions(bits, radius);

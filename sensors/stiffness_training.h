@@ -36,7 +36,9 @@ struct TrainingSettings {
   static TrainingSettings as_published() { return {}; }
   /// Descent with momentum until it no longer gets better. Where 5 N are to be known within 0.1 N this is needed: a
   /// hundredth of the loss is a tenth of the RMS force, so an error near 0.3 N on z may be left by the text's rule.
-  static TrainingSettings to_convergence() { return {.stop = StopRule::kConvergence, .momentum = true}; }
+  static TrainingSettings to_convergence() {
+    return {.stop = StopRule::kConvergence, .least_improvement = 1e-14, .momentum = true};
+  }
 };
 
 enum class TrainingEnd : std::uint8_t {

@@ -82,7 +82,11 @@ TriangleMesh read_mesh(const ShapeSpec& shape) {
   if (!std::filesystem::exists(shape.file)) {
     fail_at(shape.where, "shape.file: there is no file {}", shape.file.string());
   }
-  return read_gltf_mesh(shape.file, shape.mm_per_unit);
+  try {
+    return read_gltf_mesh(shape.file, shape.mm_per_unit);
+  } catch (const Error& error) {
+    fail_at(shape.where, "shape.file: {}", error.what());
+  }
 }
 
 }  // namespace
@@ -135,7 +139,9 @@ void fields(YamlReader& in, ObjectSpec& object) {
   in.optional("holder", object.holder);
 }
 
-ObjectSpec read_object(const std::filesystem::path& file) { return read_yaml<ObjectSpec>(file); }
+ObjectSpec read_object(const std::filesystem::path& file) {
+  return read_yaml<ObjectSpec>(file);
+}
 
 fem::ContactShape contact_shape(const ShapeSpec& shape) {
   switch (shape.type) {

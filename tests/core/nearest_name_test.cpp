@@ -10,11 +10,11 @@ namespace {
 const std::vector<std::string> kKnown = {"thickness_mm", "poisson_ratio", "youngs_modulus_MPa", "mu", "size_mm"};
 
 TEST(NearestName, FindsSlipsOfTheKey) {
-  EXPECT_EQ(nearest_name("thicknes_mm", kKnown), "thickness_mm");      // a letter missing
-  EXPECT_EQ(nearest_name("thickness_mmm", kKnown), "thickness_mm");    // one too many
-  EXPECT_EQ(nearest_name("poison_ratoi", kKnown), "poisson_ratio");    // several
-  EXPECT_EQ(nearest_name("thickness_mm", kKnown), "thickness_mm");     // none
-  EXPECT_EQ(nearest_name("my", kKnown), "mu");                         // one is allowed in a short name
+  EXPECT_EQ(nearest_name("thicknes_mm", kKnown), "thickness_mm");    // a letter missing
+  EXPECT_EQ(nearest_name("thickness_mmm", kKnown), "thickness_mm");  // one too many
+  EXPECT_EQ(nearest_name("poison_ratoi", kKnown), "poisson_ratio");  // several
+  EXPECT_EQ(nearest_name("thickness_mm", kKnown), "thickness_mm");   // none
+  EXPECT_EQ(nearest_name("my", kKnown), "mu");                       // one is allowed in a short name
 }
 
 TEST(NearestName, SaysNothingWhenNothingIsNear) {
@@ -24,7 +24,9 @@ TEST(NearestName, SaysNothingWhenNothingIsNear) {
   EXPECT_EQ(did_you_mean("colour", kKnown), "");
 }
 
-TEST(NearestName, AsksPolitely) { EXPECT_EQ(did_you_mean("sizemm", kKnown), " (did you mean 'size_mm'?)"); }
+TEST(NearestName, AsksPolitely) {
+  EXPECT_EQ(did_you_mean("sizemm", kKnown), " (did you mean 'size_mm'?)");
+}
 
 }  // namespace
 }  // namespace touchstone

@@ -87,7 +87,8 @@ TEST_F(WholeFile, BadPlacesAreErrorsThatNameThem) {
 TEST_F(WholeFile, ManyWritersLeaveOneWholeFile) {
   std::vector<std::thread> writers;
   for (int i = 0; i < 8; ++i) {
-    writers.emplace_back([&, i] { write_whole_file(folder_ / "a.txt", std::string(10000, static_cast<char>('a' + i))); });
+    writers.emplace_back(
+        [&, i] { write_whole_file(folder_ / "a.txt", std::string(10000, static_cast<char>('a' + i))); });
   }
   for (std::thread& writer : writers) writer.join();
   const std::string content = read_whole_file(folder_ / "a.txt");

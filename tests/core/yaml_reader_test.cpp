@@ -14,7 +14,9 @@ namespace {
 using testing::HasSubstr;
 
 enum class Shape { sphere, box };
-EnumNames<Shape> enum_names(Shape) { return {{"sphere", Shape::sphere}, {"box", Shape::box}}; }
+EnumNames<Shape> enum_names(Shape) {
+  return {{"sphere", Shape::sphere}, {"box", Shape::box}};
+}
 
 struct Layer {
   double thickness_mm = 0.0;
@@ -50,7 +52,9 @@ void fields(YamlReader& in, Device& device) {
   in.optional("skin", device.skin);
 }
 
-Device read(const std::string& text) { return parse_yaml<Device>(text, "device.yaml"); }
+Device read(const std::string& text) {
+  return parse_yaml<Device>(text, "device.yaml");
+}
 
 // The text's error begins with the place and has the words.
 void expect_error(const std::string& text, int line, const std::vector<std::string>& words) {

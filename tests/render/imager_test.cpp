@@ -53,9 +53,13 @@ double irradiance_for(const Imager& imager, double electrons, int channel = 0) {
   return electrons / response_of(imager).electrons_per_irradiance(channel, channel);
 }
 
-cv::Mat flat(int width, int height, double irradiance) { return cv::Mat(height, width, CV_32FC1, cv::Scalar(irradiance)); }
+cv::Mat flat(int width, int height, double irradiance) {
+  return cv::Mat(height, width, CV_32FC1, cv::Scalar(irradiance));
+}
 
-double mean_of(const cv::Mat& image) { return cv::mean(image)[0]; }
+double mean_of(const cv::Mat& image) {
+  return cv::mean(image)[0];
+}
 
 // Half the variance of the difference: what changes from frame to frame, without the fixed pattern.
 double temporal_variance(const cv::Mat& a, const cv::Mat& b) {
@@ -100,8 +104,7 @@ TEST(NoiseQuantile, PoissonQuantileInvertsTheDistribution) {
     constexpr int kSteps = 20000;
     for (int i = 0; i < kSteps; ++i) {
       const double u = (i + 0.5) / kSteps;
-      const double expected =
-          static_cast<double>(std::upper_bound(share.begin(), share.end(), u) - share.begin());
+      const double expected = static_cast<double>(std::upper_bound(share.begin(), share.end(), u) - share.begin());
       const double got = poisson_quantile(mean, u);
       if (got != expected) ++wrong;
       ASSERT_LE(std::abs(got - expected), 1.0) << "mean " << mean << ", u " << u;
@@ -125,8 +128,7 @@ TEST(Imager, PhotonTransferIsALine) {
     const cv::Mat light = flat(size.width, size.height, irradiance_for(imager, electrons));
     const cv::Mat a = expose(light, imager, pattern, 7, 1);
     const cv::Mat b = expose(light, imager, pattern, 7, 2);
-    const double expected =
-        gain * gain * dark_variance + 1.0 / 12.0 + gain * (mean_of(a) - mean_dark);
+    const double expected = gain * gain * dark_variance + 1.0 / 12.0 + gain * (mean_of(a) - mean_dark);
     // The standard error of a variance of n samples is sqrt(2/n) of it: 0.35 % here.
     EXPECT_NEAR(temporal_variance(a, b) / expected, 1.0, 0.015) << electrons << " electrons";
   }
@@ -153,8 +155,8 @@ TEST(Imager, BandsAddUp) {
   imager.wavelengths_nm << 450.0, 540.0, 610.0;
   imager.ideal = true;
   const cv::Mat light(1, 1, CV_32FC3, cv::Scalar(0.1, 0.2, 0.3));
-  const double electrons = 10e-12 * 1e-3 / kPlanckTimesLight * 1e-9 *
-                           (0.1 * 450.0 * 0.2 + 0.2 * 540.0 * 0.5 + 0.3 * 610.0 * 0.3);
+  const double electrons =
+      10e-12 * 1e-3 / kPlanckTimesLight * 1e-9 * (0.1 * 450.0 * 0.2 + 0.2 * 540.0 * 0.5 + 0.3 * 610.0 * 0.3);
   ASSERT_LT(electrons, imager.full_well_e);
   EXPECT_NEAR(expose(light, imager, 1, 1).at<std::uint16_t>(0, 0), 20.0 + 0.35 * electrons, 0.5001);
 }
@@ -294,9 +296,9 @@ TEST(Imager, IdealImageIsTheRoundedExpectation) {
 
 TEST(Imager, RedLightIsSeenByTheRedPixelsAndDevelopsToRed) {
   const std::vector<std::pair<BayerPattern, cv::Point>> red_at = {{BayerPattern::rggb, {0, 0}},
-                                                                   {BayerPattern::bggr, {1, 1}},
-                                                                   {BayerPattern::grbg, {1, 0}},
-                                                                   {BayerPattern::gbrg, {0, 1}}};
+                                                                  {BayerPattern::bggr, {1, 1}},
+                                                                  {BayerPattern::grbg, {1, 0}},
+                                                                  {BayerPattern::gbrg, {0, 1}}};
   for (const auto& [bayer, red] : red_at) {
     Imager imager = colour_imager(bayer);
     imager.ideal = true;
@@ -321,8 +323,7 @@ TEST(Imager, RedLightIsSeenByTheRedPixelsAndDevelopsToRed) {
 }
 
 TEST(Imager, EachBandDevelopsToItsOwnChannel) {
-  for (const BayerPattern bayer :
-       {BayerPattern::rggb, BayerPattern::bggr, BayerPattern::grbg, BayerPattern::gbrg}) {
+  for (const BayerPattern bayer : {BayerPattern::rggb, BayerPattern::bggr, BayerPattern::grbg, BayerPattern::gbrg}) {
     for (int band = 0; band < 3; ++band) {
       Imager imager = colour_imager(bayer);
       imager.ideal = true;

@@ -131,7 +131,7 @@ TEST(BeadTracker, LoadCycleIsFollowedWithoutALoss) {
   constexpr int kFrames = 600;
   for (int frame = 0; frame < kFrames; ++frame) {
     const double phase = 2.0 * 3.14159265358979 * frame / kFrames;
-    const double normal = 1.0 - std::cos(phase);               // 0..2
+    const double normal = 1.0 - std::cos(phase);  // 0..2
     const Eigen::Vector2d shear(8.0 * std::sin(3.0 * phase), 8.0 * std::sin(4.0 * phase));
     std::vector<Eigen::Vector2d> beads;
     for (const Eigen::Vector2d& place : rest) {

@@ -31,7 +31,9 @@ cv::Mat to_mat(const BitWindow& window) {
   return mat;
 }
 
-bool same(const cv::Mat& a, const cv::Mat& b) { return cv::norm(a, b, cv::NORM_INF) == 0.0; }
+bool same(const cv::Mat& a, const cv::Mat& b) {
+  return cv::norm(a, b, cv::NORM_INF) == 0.0;
+}
 
 const std::pair<int, int> kSizes[] = {{1, 1}, {1, 9}, {9, 1}, {7, 5}, {30, 30}, {63, 20}, {64, 64}};
 
@@ -115,7 +117,8 @@ TEST(BitWindow, DiscIsRoundAndABarIsNot) {
       const double r2 = (x - 20.0) * (x - 20.0) + (y - 17.0) * (y - 17.0);
       if (r2 <= 81.0) disc.rows[static_cast<std::size_t>(y)] |= std::uint64_t{1} << x;
       // a bar along the diagonal: the ratio must not depend on direction
-      if (std::abs(x - y) <= 2 && x + y >= 20 && x + y <= 60) bar.rows[static_cast<std::size_t>(y)] |= std::uint64_t{1} << x;
+      if (std::abs(x - y) <= 2 && x + y >= 20 && x + y <= 60)
+        bar.rows[static_cast<std::size_t>(y)] |= std::uint64_t{1} << x;
     }
   }
   EXPECT_NEAR(moments_of(disc).elongation, 1.0, 1e-9);

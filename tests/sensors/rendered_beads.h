@@ -19,10 +19,10 @@ struct BeadPicture {
   double background = 170.0;
   double bead = 40.0;
   double radius_px = 9.0;
-  double blur_px = 0.8;     ///< standard deviation of the rim's blur
-  double texture = 4.0;     ///< amplitude of a fine wavy pattern, in grey levels
-  double fall_off_px = 0.0; ///< > 0: shade by cos^4 of the angle atan(distance from the centre / fall_off_px)
-  double noise = 0.0;       ///< standard deviation, grey levels
+  double blur_px = 0.8;      ///< standard deviation of the rim's blur
+  double texture = 4.0;      ///< amplitude of a fine wavy pattern, in grey levels
+  double fall_off_px = 0.0;  ///< > 0: shade by cos^4 of the angle atan(distance from the centre / fall_off_px)
+  double noise = 0.0;        ///< standard deviation, grey levels
 };
 
 /// Nominal positions of an n x n grid, row-major.
@@ -47,7 +47,8 @@ class BeadPainter {
         const double dx = x + 0.5 - 0.5 * picture.width;
         const double dy = y + 0.5 - 0.5 * picture.height;
         const double cosine_squared =
-            picture.fall_off_px > 0 ? 1.0 / (1.0 + (dx * dx + dy * dy) / (picture.fall_off_px * picture.fall_off_px)) : 1.0;
+            picture.fall_off_px > 0 ? 1.0 / (1.0 + (dx * dx + dy * dy) / (picture.fall_off_px * picture.fall_off_px))
+                                    : 1.0;
         shade_at_.push_back(static_cast<float>(cosine_squared * cosine_squared));
         const double wave = std::sin(0.9 * x + 0.3 * y) * std::sin(0.7 * y - 0.4 * x);
         background_.at<float>(y, x) = static_cast<float>(picture.background + picture.texture * wave);

@@ -1,0 +1,42 @@
+#include "apps/blas_kind.h"
+
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdlib>
+#include <string>
+
+#include "lab/processor.h"
+
+namespace touchstone::apps {
+namespace {
+
+constexpr const char* kCoreType = "OPENBLAS_CORETYPE";
+constexpr const char* kRestarted = "TOUCHSTONE_BLAS_RESTARTED";
+
+/// OpenBLAS's names of x86 processors without AVX2: what it says of one that it doesn't know.
+bool is_old(const std::string& core) {
+  static constexpr std::array kOld = {"Generic",   "Katmai", "Coppermine", "Northwood",  "Prescott",
+                                      "Banias",    "Core2",  "Penryn",     "Dunnington", "Atom",
+                                      "Nehalem",   "Athlon", "Opteron",    "Nano",       "Opteron_SSE3",
+                                      "Barcelona", "Bobcat", "Unknown",    "Sandybridge"};
+  return std::find(kOld.begin(), kOld.end(), core) != kOld.end();
+}
+
+}  // namespace
+
+void choose_blas_kind(char** argv) {
+  lab::use_one_blas_thread();
+  if (std::getenv(kCoreType) != nullptr || std::getenv(kRestarted) != nullptr) return;
+  const std::string instructions = lab::vector_instructions();
+  if (instructions == "baseline" || !is_old(lab::blas_core())) return;
+  setenv(kCoreType, instructions == "avx512" ? "SkylakeX" : "Haswell", 1);
+  setenv(kRestarted, "1", 1);
+  execv("/proc/self/exe", argv);
+  spdlog::warn("OpenBLAS takes this processor for '{}' and will be slow; set {}={}", lab::blas_core(), kCoreType,
+               std::getenv(kCoreType));
+}
+
+}  // namespace touchstone::apps

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <functional>
+
+namespace touchstone::apps {
+
+/// Options that stand before the command.
+struct GlobalOptions {
+  int threads = 0;  ///< 0: as many as the machine has
+  bool quiet = false;
+  std::filesystem::path cache;
+};
+
+/// What the command line has chosen. It runs after the line was read; mistakes are thrown as Error.
+using Action = std::function<void()>;
+
+// Each adds one command to the line. When it is chosen, it sets `action`. `global` is read when the action runs.
+void add_plan_command(CLI::App& app, const GlobalOptions& global, Action& action);
+void add_render_command(CLI::App& app, const GlobalOptions& global, Action& action);
+void add_generate_command(CLI::App& app, const GlobalOptions& global, Action& action);
+void add_calibrate_command(CLI::App& app, const GlobalOptions& global, Action& action);
+void add_estimate_command(CLI::App& app, const GlobalOptions& global, Action& action);
+void add_validate_command(CLI::App& app, const GlobalOptions& global, Action& action);
+void add_inspect_command(CLI::App& app, const GlobalOptions& global, Action& action);
+
+/// @throws Error if a result can't be written at `file`: its folder isn't there, or it's a folder itself
+void require_writable_place(const std::filesystem::path& file);
+
+/// @throws Error that names the nearest one if `sensor` isn't one that has an estimator in this command
+void require_known_sensor(const std::string& sensor);
+
+}  // namespace touchstone::apps

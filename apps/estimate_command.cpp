@@ -1,0 +1,107 @@
+#include <memory>
+
+#include "apps/command.h"
+#include "apps/tracker_options.h"
+#include "core/error.h"
+#include "core/whole_file.h"
+#include "sensors/stiffness_model_file.h"
+
+namespace touchstone::apps {
+namespace {
+
+constexpr const char* kAxes = "xyz";
+
+struct EstimateOptions {
+  std::string sensor;
+  std::filesystem::path model;
+  std::filesystem::path out;
+  std::string rest = "model";
+};
+
+std::string csv_of(const std::vector<lab::ForceRecord>& records) {
+  std::string csv =
+      "sequence,frame,t_us,force_x_N,force_y_N,force_z_N,true_x_N,true_y_N,true_z_N,extrapolated,beads_missing\n";
+  for (const lab::ForceRecord& record : records) {
+    const Eigen::Vector3d& force = record.estimate.force;
+    csv += fmt::format("{},{},{},{:.6f},{:.6f},{:.6f},", record.sequence, record.frame, record.estimate.t_us, force.x(),
+                       force.y(), force.z());
+    if (record.truth) {
+      csv += fmt::format("{:.6f},{:.6f},{:.6f}", record.truth->x(), record.truth->y(), record.truth->z());
+    } else {
+      csv += ",,";
+    }
+    csv += fmt::format(",{},{}\n", record.estimate.extrapolated ? 1 : 0, record.estimate.beads_missing);
+  }
+  return csv;
+}
+
+void print_errors(const std::string& title, const std::array<lab::AxisErrors, 3>& errors) {
+  fmt::print("\n{}\n", title);
+  fmt::print("  axis  frames  mean error N    RMS N    max N   published N\n");
+  for (int axis = 0; axis < 3; ++axis) {
+    if (errors[axis].frames == 0) continue;
+    fmt::print("  {:<4}  {:>6}  {:>12.4f} {:>8.4f} {:>8.4f}   below {:.1f}\n", kAxes[axis], errors[axis].frames,
+               errors[axis].mean_absolute, errors[axis].rms, errors[axis].largest, lab::kPublishedForceError_N);
+  }
+}
+
+/// The table of sec. 4.4: load by load, true and estimated.
+void print_verification(const lab::Verification& verification) {
+  fmt::print("  axis    load N  frames    true N  estimated N  mean error N   published N\n");
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const lab::LoadLevel& level : verification.levels[axis]) {
+      fmt::print("  {:<4}  {:>8.1f}  {:>6}  {:>8.3f}  {:>11.3f}  {:>12.4f}   below {:.1f}\n", kAxes[axis], level.load,
+                 level.frames, level.mean_true, level.mean_estimated, level.mean_absolute_error,
+                 lab::kPublishedForceError_N);
+    }
+  }
+  print_errors("Over these loads:", verification.errors);
+  if (verification.error_at_5N_percent) {
+    fmt::print("  at 5 N: {:.2f} % (published 2 %)\n", *verification.error_at_5N_percent);
+  }
+}
+
+void estimate(const EstimateOptions& options, const FrameOptions& frames, const GlobalOptions& global) {
+  require_known_sensor(options.sensor);
+  if (!options.out.empty()) require_writable_place(options.out);
+  const sensors::StiffnessForceModel model = sensors::load_stiffness_model(options.model);
+  FrameOptions with_grid = frames;
+  with_grid.tracker.grid = model.grid;
+  const std::vector<lab::TrackedSequence> tracked = tracked_frames(with_grid, global);
+  const lab::RestChoice rest = options.rest == "first" ? lab::RestChoice::first_frame : lab::RestChoice::model;
+  const std::vector<lab::ForceRecord> records = lab::estimate_forces(tracked, model, rest);
+  if (!options.out.empty()) {
+    write_whole_file(options.out, csv_of(records));
+  }
+  const bool truth_is_known = std::any_of(records.begin(), records.end(),
+                                          [](const lab::ForceRecord& record) { return record.truth.has_value(); });
+  if (!truth_is_known) {
+    if (options.out.empty()) fmt::print("{}", csv_of(records));
+    return;
+  }
+  fmt::print("Force by load, {}:\n", frames.data.empty() ? "recorded frames" : "split '" + frames.split + "'");
+  print_verification(lab::verify_forces(records));
+  print_errors("Over all frames:", lab::force_errors(records));
+}
+
+}  // namespace
+
+void add_estimate_command(CLI::App& app, const GlobalOptions& global, Action& action) {
+  CLI::App* command =
+      app.add_subcommand("estimate", "Force from a sensor's frames; where the true forces are known, the errors too");
+  auto options = std::make_shared<EstimateOptions>();
+  command->add_option("SENSOR", options->sensor, "vhs")->required();
+  command->add_option("--model", options->model, "The model that `touchstone calibrate` made")->required();
+  const auto frames = add_frame_options(*command, "verify");
+  command->add_option("-o,--out", options->out, "The forces: a .csv file, one line a frame");
+  command
+      ->add_option("--rest", options->rest,
+                   "Displacements are measured from the 'model's rest positions, or from the 'first' frame's")
+      ->check(CLI::IsMember({"model", "first"}))
+      ->capture_default_str();
+  command->callback([&action, &global, options, frames] {
+    action = [options, frames, &global] { estimate(*options, *frames, global); };
+  });
+}
+
+}  // namespace touchstone::apps

@@ -1,0 +1,62 @@
+#include <memory>
+
+#include "apps/command.h"
+#include "core/error.h"
+#include "lab/contact_sheet.h"
+#include "lab/frame_sequence.h"
+#include "sim/image_file.h"
+
+namespace touchstone::apps {
+namespace {
+
+struct InspectOptions {
+  std::filesystem::path data;
+  std::filesystem::path out;
+  int columns = 6;
+  int tiles_per_scene = 6;
+  int tile_width = 240;
+};
+
+/// `count` numbers spread evenly from 0 to `size` - 1, both ends among them.
+std::vector<std::size_t> spread(std::size_t size, std::size_t count) {
+  std::vector<std::size_t> chosen;
+  count = std::min(size, count);
+  for (std::size_t i = 0; i < count; ++i) chosen.push_back(count == 1 ? size - 1 : i * (size - 1) / (count - 1));
+  return chosen;
+}
+
+void inspect(const InspectOptions& options) {
+  if (options.out.extension() != ".png") fail("{}: the picture's name must end in .png", options.out.string());
+  require_writable_place(options.out);
+  std::vector<cv::Mat> pictures;
+  std::vector<std::string> captions;
+  for (const lab::FrameSequence& sequence : lab::frames_of_data_set(options.data, std::nullopt)) {
+    for (const std::size_t i : spread(sequence.frames.size(), static_cast<std::size_t>(options.tiles_per_scene))) {
+      const lab::LabelledFrame& frame = sequence.frames[i];
+      pictures.push_back(sim::read_image(frame.file));
+      captions.push_back(fmt::format("{} {}\n{:.2f} {:.2f} {:.2f} N", sequence.name, frame.frame, frame.force->x(),
+                                     frame.force->y(), frame.force->z()));
+    }
+  }
+  sim::write_png(options.out, lab::contact_sheet(pictures, captions, options.columns, options.tile_width));
+  fmt::print("{}: {} frames with their forces x, y, z on the object\n", options.out.string(), pictures.size());
+}
+
+}  // namespace
+
+void add_inspect_command(CLI::App& app, const GlobalOptions&, Action& action) {
+  CLI::App* command = app.add_subcommand("inspect", "Look at a data set: a sheet of its frames with their forces");
+  auto options = std::make_shared<InspectOptions>();
+  command->add_option("DIR", options->data, "A data set that `touchstone generate` made")->required();
+  command->add_option("-o,--out", options->out, "The sheet: a .png file")->required();
+  command->add_option("--per-scene", options->tiles_per_scene, "Frames of each scene, spread evenly over it")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  command->add_option("--columns", options->columns, "Frames a row")->check(CLI::Range(1, 100))->capture_default_str();
+  command->add_option("--tile-width", options->tile_width, "Of each frame, px")
+      ->check(CLI::Range(32, 4096))
+      ->capture_default_str();
+  command->callback([&action, options] { action = [options] { inspect(*options); }; });
+}
+
+}  // namespace touchstone::apps

@@ -1,0 +1,86 @@
+#include "apps/progress_bar.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+namespace touchstone::apps {
+namespace {
+
+constexpr double kTerminalInterval_s = 0.1;
+constexpr double kPlainInterval_s = 5.0;
+constexpr int kBarWidth = 24;
+
+double seconds_between(std::chrono::steady_clock::time_point from, std::chrono::steady_clock::time_point to) {
+  return std::chrono::duration<double>(to - from).count();
+}
+
+}  // namespace
+
+std::string duration_text(double seconds) {
+  const auto whole = std::lround(std::clamp(seconds, 0.0, 1e9));
+  if (whole < 60) return fmt::format("{} s", whole);
+  if (whole < 3600) return fmt::format("{} min {:02} s", whole / 60, whole % 60);
+  return fmt::format("{} h {:02} min", whole / 3600, whole / 60 % 60);
+}
+
+ProgressBar::ProgressBar(bool quiet) : quiet_(quiet), terminal_(isatty(STDERR_FILENO) == 1) {}
+
+ProgressBar::~ProgressBar() {
+  end_stage();
+}
+
+Progress ProgressBar::listener() {
+  if (quiet_) return {};
+  return [this](const std::string& stage, std::int64_t done, std::int64_t total) { show(stage, done, total); };
+}
+
+void ProgressBar::show(const std::string& stage, std::int64_t done, std::int64_t total) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const Clock::time_point now = Clock::now();
+  if (stage != stage_) {
+    end_stage();
+    stage_ = stage;
+    done_ = 0;
+    begun_ = last_drawn_ = now;
+    drawn_ = -1;
+  }
+  total_ = total;
+  done_ = std::max(done_, done);
+  if (seconds_between(last_drawn_, now) >= (terminal_ ? kTerminalInterval_s : kPlainInterval_s)) draw(now);
+}
+
+void ProgressBar::draw(Clock::time_point now) {
+  const double elapsed = seconds_between(begun_, now);
+  const double rate = elapsed > 0.0 ? static_cast<double>(done_) / elapsed : 0.0;
+  const double part = total_ > 0 ? static_cast<double>(done_) / static_cast<double>(total_) : 0.0;
+  std::string text = fmt::format("{}/{}", done_, total_);
+  if (rate > 0.0) text += fmt::format("  {:.3g}/s", rate);
+  if (done_ >= total_) {
+    text += "  in " + duration_text(elapsed);
+  } else if (rate > 0.0) {
+    text += "  " + duration_text(static_cast<double>(total_ - done_) / rate) + " left";
+  }
+  if (terminal_) {
+    const int full = std::clamp(static_cast<int>(part * kBarWidth), 0, kBarWidth);
+    const std::string bar = std::string(full, '#') + std::string(kBarWidth - full, '.');
+    fmt::print(stderr, "\r\x1b[K{:<10} [{}] {:3.0f} %  {}", stage_, bar, 100.0 * part, text);
+  } else {
+    fmt::print(stderr, "{}: {:.0f} %  {}\n", stage_, 100.0 * part, text);
+  }
+  std::fflush(stderr);
+  last_drawn_ = now;
+  drawn_ = done_;
+}
+
+void ProgressBar::end_stage() {
+  if (drawn_ < 0) return;  // too short to have been shown
+  if (drawn_ != done_) draw(Clock::now());
+  if (terminal_) fmt::print(stderr, "\n");
+  drawn_ = -1;
+}
+
+}  // namespace touchstone::apps

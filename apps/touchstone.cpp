@@ -1,0 +1,101 @@
+// The one command. Exit codes: 0 done, 2 a mistake in what was given (one line on stderr says where), 1 anything else.
+
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <new>
+#include <optional>
+
+#include "apps/blas_kind.h"
+#include "apps/command.h"
+#include "core/error.h"
+#include "core/nearest_name.h"
+#include "lab/run_identity.h"
+#include "sim/virtual_sensor.h"
+
+namespace touchstone::apps {
+namespace {
+
+constexpr int kDone = 0;
+constexpr int kInternalFailure = 1;
+constexpr int kUserMistake = 2;
+
+int complain(int code, const std::string& message) {
+  std::string line = message;
+  std::replace(line.begin(), line.end(), '\n', ' ');
+  std::fputs(("touchstone: " + line + "\n").c_str(), stderr);  // fmt would throw where stderr can't be written
+  return code;
+}
+
+/// CLI11 only says that an unknown command "was not expected".
+void refuse_unknown_command(const CLI::App& app, int argc, char** argv) {
+  if (argc < 2 || argv[1][0] == '-') return;
+  std::vector<std::string> known;
+  for (const CLI::App* command : app.get_subcommands({})) known.push_back(command->get_name());
+  const std::string name = argv[1];
+  if (std::find(known.begin(), known.end(), name) != known.end()) return;
+  fail("'{}' is not a command{}; there are: {}", name, did_you_mean(name, known), fmt::join(known, ", "));
+}
+
+int run(int argc, char** argv) {
+  CLI::App app("Simulates vision-based tactile sensors and tests their estimators against known forces.", "touchstone");
+  app.set_version_flag("--version", "touchstone " + lab::program_version());
+  app.require_subcommand(1);
+  app.fallthrough();
+  GlobalOptions global;
+  global.cache = sim::default_cache_folder();
+  app.add_option("--threads", global.threads, "At most so many threads (default: all of the machine)")
+      ->check(CLI::Range(1, 4096));
+  app.add_flag("--quiet", global.quiet, "No progress on stderr");
+  app.add_option("--cache", global.cache,
+                 "Folder of set-up results (default: $TOUCHSTONE_CACHE or ~/.cache/touchstone)");
+  Action action;
+  add_plan_command(app, global, action);
+  add_render_command(app, global, action);
+  add_generate_command(app, global, action);
+  add_calibrate_command(app, global, action);
+  add_estimate_command(app, global, action);
+  add_validate_command(app, global, action);
+  add_inspect_command(app, global, action);
+
+  refuse_unknown_command(app, argc, argv);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
+    return complain(kUserMistake, error.what());
+  }
+  std::optional<tbb::global_control> limit;
+  if (global.threads > 0) {
+    limit.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(global.threads));
+  }
+  action();
+  return kDone;
+}
+
+int guarded_run(int argc, char** argv) {
+  try {
+    return run(argc, argv);
+  } catch (const Error& error) {
+    return complain(kUserMistake, error.what());
+  } catch (const std::bad_alloc&) {
+    return complain(kInternalFailure, "there isn't enough memory");
+  } catch (const std::exception& error) {
+    return complain(kInternalFailure, std::string("internal failure: ") + error.what());
+  } catch (...) {
+    return complain(kInternalFailure, "internal failure of an unknown kind");
+  }
+}
+
+}  // namespace
+}  // namespace touchstone::apps
+
+int main(int argc, char** argv) {
+  spdlog::set_default_logger(spdlog::stderr_color_mt("touchstone"));
+  spdlog::set_pattern("touchstone: %l: %v");
+  touchstone::apps::choose_blas_kind(argv);
+  return touchstone::apps::guarded_run(argc, argv);
+}

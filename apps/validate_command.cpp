@@ -1,0 +1,76 @@
+#include <unistd.h>
+
+#include <memory>
+
+#include "apps/command.h"
+#include "apps/progress_bar.h"
+#include "core/error.h"
+#include "core/whole_file.h"
+#include "lab/scenes_folder.h"
+#include "lab/validation.h"
+
+namespace touchstone::apps {
+namespace {
+
+struct Options {
+  std::vector<std::string> groups;
+  bool quick = false;
+  std::filesystem::path json;
+};
+
+/// A folder of this run's own, removed at its end.
+class Scratch {
+ public:
+  Scratch() {
+    std::string name = (std::filesystem::temp_directory_path() / "touchstone-validate-XXXXXX").string();
+    if (mkdtemp(name.data()) == nullptr) fail("{}: can't be made", name);
+    path_ = name;
+  }
+  ~Scratch() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  Scratch(const Scratch&) = delete;
+  Scratch& operator=(const Scratch&) = delete;
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+void validate(const Options& options, const GlobalOptions& global) {
+  if (!options.json.empty()) require_writable_place(options.json);
+  const Scratch scratch;
+  lab::ValidateOptions how;
+  how.quick = options.quick;
+  how.cache = global.cache;
+  how.scenes = lab::scenes_folder();
+  how.scratch = scratch.path();
+  std::vector<lab::ValidationRow> rows;
+  {
+    ProgressBar bar(global.quiet);
+    how.progress = bar.listener();
+    rows = lab::validate(options.groups, lab::validation_groups(), how);
+  }
+  if (!options.json.empty()) write_whole_file(options.json, lab::to_json(rows));
+  fmt::print("{}", lab::to_table(rows));
+  const auto missed = std::count_if(rows.begin(), rows.end(), [](const lab::ValidationRow& row) { return !row.holds; });
+  fmt::print("{} of {} rows hold\n", rows.size() - static_cast<std::size_t>(missed), rows.size());
+}
+
+}  // namespace
+
+void add_validate_command(CLI::App& app, const GlobalOptions& global, Action& action) {
+  CLI::App* command = app.add_subcommand(
+      "validate", "Hold the simulator and its estimators against closed forms and published figures");
+  auto options = std::make_shared<Options>();
+  std::string known = "all";
+  for (const lab::ValidationGroup& group : lab::validation_groups()) known += ", " + group.name;
+  options->groups = {"all"};
+  command->add_option("GROUP", options->groups, "What: " + known);
+  command->add_flag("--quick", options->quick, "Coarser or fewer cases: minutes");
+  command->add_option("--json", options->json, "Write the rows to this file");
+  command->callback([&action, &global, options] { action = [options, &global] { validate(*options, global); }; });
+}
+
+}  // namespace touchstone::apps

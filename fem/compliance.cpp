@@ -1,0 +1,89 @@
+#include "fem/compliance.h"
+
+#include <cmath>
+#include <numbers>
+
+#include "core/error.h"
+#include "fem/elimination_order.h"
+#include "fem/surface_coupling.h"
+#include "fem/taylor_hood.h"
+
+namespace touchstone::fem {
+namespace {
+
+/// Adds three rows of the border, one a component, for each row over nodes.
+void add_border(const TaylorHoodSpace& space, const Eigen::SparseMatrix<double>& rows, double scale, int first,
+                SymmetricEntries& matrix) {
+  for (int node = 0; node < rows.outerSize(); ++node) {
+    if (space.clamped[node]) {
+      continue;  // it doesn't move
+    }
+    for (Eigen::SparseMatrix<double>::InnerIterator entry(rows, node); entry; ++entry) {
+      for (int a = 0; a < 3; ++a) {
+        matrix.add(space.displacement[node] + a, first + 3 * static_cast<int>(entry.row()) + a, scale * entry.value());
+      }
+    }
+  }
+}
+
+}  // namespace
+
+Compliance compute_compliance(const TetMesh& mesh, const ElasticMaterial& material, std::span<const Bead> beads,
+                              double thickness, const Progress& progress) {
+  const auto tell = [&](int step) {
+    if (progress) {
+      progress("elasticity", step, 3);
+    }
+  };
+  check(material);
+  if (!std::isfinite(thickness) || thickness <= 0.0) {
+    fail("the gel's thickness is {} mm; it must be finite and above zero", thickness);
+  }
+  tell(0);
+  const TaylorHoodSpace space = make_space(mesh);
+  const Scales scales = make_scales(mesh, material);
+  const OuterSurface surface = outer_surface(mesh);
+  const int n = static_cast<int>(surface.mesh_vertex.size());
+  const int m = static_cast<int>(beads.size());
+  if (n > kMostSurfaceVertices) {
+    fail("the gel's outer surface has {} vertices; at most {} are allowed: mesh it coarser", n, kMostSurfaceVertices);
+  }
+
+  // Without units, a surface row is int phi_i u / length^2, a bead's row a mean. Both are scaled so that the border is
+  // of the order of one beside the elements' blocks.
+  const double edge = 1.0 / std::sqrt(static_cast<double>(mesh.outer.size()));
+  const double surface_scale = 1.0 / (scales.length * scales.length * edge);
+  SymmetricEntries matrix = assemble(space, scales);
+  add_border(space, surface_coupling(space, surface), surface_scale, space.unknowns, matrix);
+  add_border(space, bead_means(space, beads), 1.0, space.unknowns + 3 * n, matrix);
+  matrix.size = space.unknowns + 3 * (n + m);
+  tell(1);
+
+  FactorReport factor;
+  const Eigen::MatrixXd schur = schur_complement(matrix, 3 * (n + m), elimination_order(space), &factor);
+  tell(2);
+
+  Compliance gel;
+  gel.thickness = thickness;
+  gel.material = material;
+  for (const int vertex : surface.mesh_vertex) {
+    gel.vertices.push_back(mesh.vertices[vertex]);
+  }
+  gel.triangles = surface.triangles;
+  gel.mass = surface_mass(mesh, surface);
+  // A nodal traction loads the displacements by its coupling row: a border row over surface_scale.
+  const double displacement_per_traction = scales.length / scales.stress / (scales.length * scales.length);
+  gel.surface = schur.topLeftCorner(3 * n, 3 * n) * (-displacement_per_traction / (surface_scale * surface_scale));
+  gel.beads = schur.bottomLeftCorner(3 * m, 3 * n) * (-displacement_per_traction / surface_scale);
+
+  gel.report.tetrahedra = static_cast<int>(mesh.tetrahedra.size());
+  gel.report.unknowns = space.unknowns;
+  gel.report.smallest_dihedral_deg = smallest_dihedral_angle(mesh) * 180.0 / std::numbers::pi;
+  gel.report.factor_entries = static_cast<double>(factor.factor_entries);
+  gel.report.operations = factor.operations;
+  gel.report.memory_mb = factor.memory_mb;
+  tell(3);
+  return gel;
+}
+
+}  // namespace touchstone::fem

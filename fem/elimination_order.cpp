@@ -1,0 +1,256 @@
+#include "fem/elimination_order.h"
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <span>
+
+#include "core/error.h"
+
+namespace touchstone::fem {
+namespace {
+
+/// Parts of no more nodes than this aren't cut any further.
+constexpr std::size_t kLeafNodes = 40;
+/// Where planes are tried, as parts of the nodes below them.
+constexpr std::array<double, 5> kCuts = {0.42, 0.46, 0.5, 0.54, 0.58};
+
+/// Neighbours of each node, in one list.
+struct Graph {
+  std::vector<int> first;
+  std::vector<int> list;
+
+  std::span<const int> around(int node) const {
+    return {list.data() + first[node], static_cast<std::size_t>(first[node + 1] - first[node])};
+  }
+};
+
+Graph graph_of(const TaylorHoodSpace& space) {
+  std::vector<std::vector<int>> around(space.nodes);
+  for (const auto& nodes : space.elements) {
+    for (const int a : nodes) {
+      for (const int b : nodes) {
+        if (a != b) {
+          around[a].push_back(b);
+        }
+      }
+    }
+  }
+  Graph graph;
+  graph.first.push_back(0);
+  for (auto& list : around) {
+    std::sort(list.begin(), list.end());
+    list.erase(std::unique(list.begin(), list.end()), list.end());
+    graph.list.insert(graph.list.end(), list.begin(), list.end());
+    graph.first.push_back(static_cast<int>(graph.list.size()));
+  }
+  return graph;
+}
+
+enum class Side : char { none, low, high };
+
+class Dissection {
+ public:
+  explicit Dissection(const TaylorHoodSpace& space)
+      : graph_(graph_of(space)), side_(space.nodes, Side::none), match_(space.nodes, -1), seen_(space.nodes, 0) {
+    for (int node = 0; node < space.nodes; ++node) {
+      positions_.push_back(space.position(node));
+    }
+  }
+
+  /// Appends the nodes in the order of their elimination.
+  void order(std::vector<int> nodes, std::vector<int>& result) {
+    if (nodes.size() <= kLeafNodes) {
+      result.insert(result.end(), nodes.begin(), nodes.end());
+      return;
+    }
+    std::vector<int> best_nodes;
+    std::vector<int> best_separator;
+    std::size_t best_cut = 0;
+    double best_cost = std::numeric_limits<double>::infinity();
+    for (int axis = 0; axis < 3; ++axis) {
+      std::sort(nodes.begin(), nodes.end(), [&](int a, int b) {
+        const double xa = positions_[a][axis];
+        const double xb = positions_[b][axis];
+        return xa != xb ? xa < xb : a < b;
+      });
+      for (const double part : kCuts) {
+        const auto cut = static_cast<std::size_t>(part * static_cast<double>(nodes.size()));
+        std::vector<int> separator = cover(nodes, cut);
+        // Eliminating a separator costs its cube; a lopsided cut leaves more to be cut.
+        const double lopsided = std::abs(part - 0.5);
+        const double cost = static_cast<double>(separator.size()) * (1.0 + lopsided);
+        if (cost < best_cost) {
+          best_cost = cost;
+          best_nodes = nodes;
+          best_cut = cut;
+          best_separator = std::move(separator);
+        }
+      }
+    }
+    for (const int node : best_separator) {
+      seen_[node] = 1;
+    }
+    std::vector<int> low;
+    std::vector<int> high;
+    for (std::size_t i = 0; i < best_nodes.size(); ++i) {
+      if (!seen_[best_nodes[i]]) {
+        (i < best_cut ? low : high).push_back(best_nodes[i]);
+      }
+    }
+    for (const int node : best_separator) {
+      seen_[node] = 0;
+    }
+    nodes.clear();
+    best_nodes.clear();
+    if (low.size() + high.size() == 0) {
+      result.insert(result.end(), best_separator.begin(), best_separator.end());
+      return;
+    }
+    order(std::move(low), result);
+    order(std::move(high), result);
+    result.insert(result.end(), best_separator.begin(), best_separator.end());
+  }
+
+ private:
+  /// Fewest nodes that cover every edge between nodes[0..cut) and the rest.
+  std::vector<int> cover(const std::vector<int>& nodes, std::size_t cut) {
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+      side_[nodes[i]] = i < cut ? Side::low : Side::high;
+    }
+    std::vector<int> left;  // nodes of the low side with an edge across
+    for (std::size_t i = 0; i < cut; ++i) {
+      const auto around = graph_.around(nodes[i]);
+      if (std::any_of(around.begin(), around.end(), [&](int other) { return side_[other] == Side::high; })) {
+        left.push_back(nodes[i]);
+      }
+    }
+    // A largest matching by augmenting paths; most nodes are matched greedily.
+    for (const int node : left) {
+      for (const int other : graph_.around(node)) {
+        if (side_[other] == Side::high && match_[other] < 0) {
+          match_[other] = node;
+          match_[node] = other;
+          break;
+        }
+      }
+    }
+    for (const int node : left) {
+      if (match_[node] < 0) {
+        visited_.clear();
+        augment(node);
+        forget_visits();
+      }
+    }
+    // Koenig: from the unmatched left nodes along alternating paths; the cover is the left nodes not reached and the
+    // right nodes reached.
+    visited_.clear();
+    std::vector<int> stack;
+    for (const int node : left) {
+      if (match_[node] < 0) {
+        visit(node);
+        stack.push_back(node);
+      }
+    }
+    while (!stack.empty()) {
+      const int node = stack.back();
+      stack.pop_back();
+      for (const int other : graph_.around(node)) {
+        if (side_[other] == Side::high && !seen_[other]) {
+          visit(other);
+          const int next = match_[other];
+          TS_ASSERT(next >= 0);  // else the matching could grow
+          if (!seen_[next]) {
+            visit(next);
+            stack.push_back(next);
+          }
+        }
+      }
+    }
+    std::vector<int> result;
+    for (const int node : left) {
+      if (!seen_[node]) {
+        result.push_back(node);
+      }
+    }
+    for (const int node : visited_) {
+      if (side_[node] == Side::high) {
+        result.push_back(node);
+      }
+    }
+    std::sort(result.begin(), result.end());
+    forget_visits();
+    for (const int node : left) {
+      if (match_[node] >= 0) {
+        match_[match_[node]] = -1;
+        match_[node] = -1;
+      }
+    }
+    for (const int node : nodes) {
+      side_[node] = Side::none;
+    }
+    return result;
+  }
+
+  bool augment(int node) {
+    for (const int other : graph_.around(node)) {
+      if (side_[other] != Side::high || seen_[other]) {
+        continue;
+      }
+      visit(other);
+      if (match_[other] < 0 || augment(match_[other])) {
+        match_[other] = node;
+        match_[node] = other;
+        return true;
+      }
+    }
+    return false;
+  }
+
+  void visit(int node) {
+    seen_[node] = 1;
+    visited_.push_back(node);
+  }
+  void forget_visits() {
+    for (const int node : visited_) {
+      seen_[node] = 0;
+    }
+    visited_.clear();
+  }
+
+  Graph graph_;
+  std::vector<Eigen::Vector3d> positions_;
+  std::vector<Side> side_;  // of the part that is being cut
+  std::vector<int> match_;
+  std::vector<char> seen_;
+  std::vector<int> visited_;
+};
+
+}  // namespace
+
+std::vector<int> elimination_order(const TaylorHoodSpace& space) {
+  std::vector<int> nodes;
+  for (int node = 0; node < space.nodes; ++node) {
+    if (!space.clamped[node] || node < space.vertices) {
+      nodes.push_back(node);
+    }
+  }
+  std::vector<int> order;
+  Dissection(space).order(std::move(nodes), order);
+  std::vector<int> unknowns;
+  unknowns.reserve(space.unknowns);
+  for (const int node : order) {
+    if (!space.clamped[node]) {
+      for (int a = 0; a < 3; ++a) {
+        unknowns.push_back(space.displacement[node] + a);
+      }
+    }
+    if (node < space.vertices) {
+      unknowns.push_back(space.pressure[node]);
+    }
+  }
+  TS_ASSERT(static_cast<int>(unknowns.size()) == space.unknowns);
+  return unknowns;
+}
+
+}  // namespace touchstone::fem

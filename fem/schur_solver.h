@@ -1,0 +1,55 @@
+#pragma once
+// Sparse symmetric indefinite systems by MUMPS (sequential): the one file that knows it.
+// (Amestoy, Duff, L'Excellent, Koster, SIAM J. Matrix Anal. Appl. 23, 2001; Users' Guide 5.5, the Schur
+// complement: 3.18)
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace touchstone::fem {
+
+/// One triangle of a symmetric matrix, as a list of entries; entries of the same place add up. Row and column count
+/// from zero.
+struct SymmetricEntries {
+  int size = 0;
+  std::vector<int> rows;
+  std::vector<int> columns;
+  std::vector<double> values;
+
+  void add(int row, int column, double value) {
+    rows.push_back(row);
+    columns.push_back(column);
+    values.push_back(value);
+  }
+};
+
+/// What a factorisation took.
+struct FactorReport {
+  std::int64_t factor_entries = 0;
+  double operations = 0.0;  ///< floating-point operations of the elimination
+  double memory_mb = 0.0;   ///< working memory of MUMPS
+  int negative_pivots = 0;
+  int delayed_pivots = 0;
+  double analysis_seconds = 0.0;
+  double factor_seconds = 0.0;
+};
+
+/// The Schur complement A22 - A21 A11^-1 A12 of the last `last` unknowns, symmetric, with no right-hand side solved.
+/// `order` lists all unknowns but the last ones, first to be eliminated first (see elimination_order). One thread; the
+/// same input gives the same bytes. @throws Error if the matrix is singular or there isn't enough memory
+Eigen::MatrixXd schur_complement(const SymmetricEntries& matrix, int last, std::span<const int> order,
+                                 FactorReport* report = nullptr);
+
+/// Solves matrix * x = right (each column), with two steps of iterative refinement; `order` lists all unknowns.
+/// @throws Error as above
+Eigen::MatrixXd solve_symmetric(const SymmetricEntries& matrix, std::span<const int> order,
+                                const Eigen::MatrixXd& right, FactorReport* report = nullptr);
+
+/// The kernel that OpenBLAS chose for this processor ("Zen", "Cooperlake"; "Prescott" on a recent processor means that
+/// it guessed wrong and runs five times slower: set OPENBLAS_CORETYPE).
+std::string blas_core_name();
+
+}  // namespace touchstone::fem

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <string>
+#include <vector>
+
+namespace touchstone::fem {
+
+/// A solid of straight-sided tetrahedra. Lengths in mm. A tetrahedron (a, b, c, d) has positive volume:
+/// (b - a) x (c - a) . (d - a) > 0.
+struct TetMesh {
+  std::vector<Eigen::Vector3d> vertices;
+  std::vector<std::array<int, 4>> tetrahedra;
+  std::vector<std::array<int, 3>> outer;   ///< triangles of the free outer surface that can be touched, normal out
+  std::vector<std::array<int, 3>> bonded;  ///< triangles clamped to the plate
+};
+
+/// Faces that belong to one tetrahedron only, normal out, in the order of the tetrahedra.
+std::vector<std::array<int, 3>> boundary_faces(const TetMesh& mesh);
+
+/// The first thing wrong with a mesh, in one sentence without a full stop, or the empty string: finite vertices,
+/// indices in range, no tetrahedron of zero or negative volume (flat to rounding counts as zero), no vertex without a
+/// tetrahedron, no face in more than two tetrahedra, `outer` and `bonded` are boundary faces, `outer` isn't empty and
+/// its normals point out, no triangle in both, and each connected piece is bonded.
+std::string fault_of(const TetMesh& mesh);
+
+/// Signed volume of one tetrahedron, mm^3.
+double volume(const TetMesh& mesh, const std::array<int, 4>& tetrahedron);
+
+/// Smallest angle between two faces of a tetrahedron, over the whole mesh, in radians (70.5 degrees at best, zero for a
+/// sliver that is flat).
+double smallest_dihedral_angle(const TetMesh& mesh);
+
+}  // namespace touchstone::fem

@@ -1,0 +1,129 @@
+#include "lab/frame_sequence.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <sstream>
+
+#include "core/units.h"
+#include "core/whole_file.h"
+#include "lab/manifest.h"
+#include "lab/truth_file.h"
+
+namespace touchstone::lab {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kForceColumns = "file,t_us,force_x_N,force_y_N,force_z_N";
+
+std::vector<std::string> cells_of(const std::string& line) {
+  std::vector<std::string> cells;
+  std::istringstream in(line);
+  for (std::string cell; std::getline(in, cell, ',');) cells.push_back(cell);
+  return cells;
+}
+
+template <typename T>
+std::optional<T> number_of(const std::string& text) {
+  T value{};
+  const auto result = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (result.ec != std::errc() || result.ptr != text.data() + text.size()) return std::nullopt;
+  return value;
+}
+
+}  // namespace
+
+std::vector<FrameSequence> frames_of_data_set(const fs::path& folder, std::optional<Split> split) {
+  const Manifest manifest = read_manifest(folder);
+  const TruthTable truth = read_truth_table(folder / "truth.h5");
+  if (truth.samples() != manifest.samples) {
+    fail("{}: truth.h5 has {} samples, dataset.json {}", folder.string(), truth.samples(), manifest.samples);
+  }
+  std::vector<FrameSequence> sequences;
+  for (const ManifestScene& scene : manifest.scenes) {
+    if (split && scene.split != *split) continue;
+    if (!scene.has_frames) fail("{}: the scene '{}' has no frames", folder.string(), scene.name);
+    if (scene.first_sample < 0 || scene.samples < 0 || scene.first_sample + scene.samples > truth.samples()) {
+      fail("{}: the scene '{}' has samples that there aren't", folder.string(), scene.name);
+    }
+    FrameSequence sequence;
+    sequence.name = scene.name;
+    for (std::int64_t i = scene.first_sample; i < scene.first_sample + scene.samples; ++i) {
+      const auto at = static_cast<std::size_t>(i);
+      LabelledFrame frame;
+      frame.frame = truth.frame[at];
+      frame.file = folder / picture_name("frames", scene.name, frame.frame, "png");
+      frame.t_us = truth.t_us[at];
+      frame.force = truth.wrench[at].head<3>();
+      sequence.frames.push_back(std::move(frame));
+    }
+    sequences.push_back(std::move(sequence));
+  }
+  if (sequences.empty()) {
+    fail("{}: has no scene of the split '{}'", folder.string(), split ? name_of(*split) : "any");
+  }
+  return sequences;
+}
+
+FrameSequence frames_of_folder(const fs::path& folder, double frame_rate_Hz) {
+  if (!fs::is_directory(folder)) fail("{}: isn't a folder", folder.string());
+  if (!(frame_rate_Hz > 0.0) || !std::isfinite(frame_rate_Hz)) fail("frame rate {}: must be above 0", frame_rate_Hz);
+  FrameSequence sequence;
+  sequence.name = folder.filename().string();
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    if (entry.is_regular_file() && entry.path().extension() == ".png")
+      sequence.frames.push_back({entry.path(), 0, 0, {}});
+  }
+  if (sequence.frames.empty()) fail("{}: has no .png file", folder.string());
+  std::sort(sequence.frames.begin(), sequence.frames.end(),
+            [](const LabelledFrame& a, const LabelledFrame& b) { return a.file < b.file; });
+  for (std::size_t i = 0; i < sequence.frames.size(); ++i) {
+    sequence.frames[i].frame = static_cast<int>(i);
+    sequence.frames[i].t_us = std::llround(static_cast<double>(i) * kMicrosecondsPerSecond / frame_rate_Hz);
+  }
+  return sequence;
+}
+
+FrameSequence frames_of_force_table(const fs::path& folder, const fs::path& csv) {
+  std::istringstream lines(read_whole_file(csv));
+  FrameSequence sequence;
+  sequence.name = folder.filename().string();
+  int number = 0;
+  for (std::string line; std::getline(lines, line);) {
+    ++number;
+    const SourceLocation where{csv.string(), number};
+    if (!line.empty() && line.back() == '\r') line.pop_back();
+    if (number == 1) {
+      if (line != kForceColumns) fail_at(where, "the first line is '{}'; it must be '{}'", line, kForceColumns);
+      continue;
+    }
+    if (line.empty()) continue;
+    const std::vector<std::string> cells = cells_of(line);
+    if (cells.size() != 5) fail_at(where, "has {} cells; 5 are needed: {}", cells.size(), kForceColumns);
+    LabelledFrame frame;
+    frame.file = folder / cells[0];
+    if (!fs::is_regular_file(frame.file)) fail_at(where, "there is no file {}", frame.file.string());
+    const auto t_us = number_of<std::int64_t>(cells[1]);
+    if (!t_us) fail_at(where, "t_us: '{}' isn't a whole number", cells[1]);
+    if (!sequence.frames.empty() && *t_us <= sequence.frames.back().t_us) {
+      fail_at(where, "t_us: {} isn't later than the line before", *t_us);
+    }
+    frame.t_us = *t_us;
+    frame.frame = static_cast<int>(sequence.frames.size());
+    Eigen::Vector3d force;
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto value = number_of<double>(cells[static_cast<std::size_t>(2 + axis)]);
+      if (!value || !std::isfinite(*value)) {
+        fail_at(where, "'{}' isn't a finite number", cells[static_cast<std::size_t>(2 + axis)]);
+      }
+      force[axis] = *value;
+    }
+    frame.force = force;
+    sequence.frames.push_back(std::move(frame));
+  }
+  if (sequence.frames.empty()) fail("{}: has no frame", csv.string());
+  return sequence;
+}
+
+}  // namespace touchstone::lab

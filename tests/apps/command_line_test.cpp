@@ -1,0 +1,195 @@
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/apps/run_program.h"
+#include "tests/support/small_job.h"
+
+namespace touchstone {
+namespace {
+
+namespace fs = std::filesystem;
+using test::ProgramRun;
+using test::run_program;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+/// A mistake is one line on stderr, exit code 2, and nothing on stdout.
+void expect_refused(const ProgramRun& run, const std::string& part) {
+  EXPECT_EQ(run.exit_code, 2) << run.err;
+  EXPECT_THAT(run.err, AllOf(::testing::StartsWith("touchstone: "), HasSubstr(part)));
+  EXPECT_EQ(std::count(run.err.begin(), run.err.end(), '\n'), 1) << run.err;
+  EXPECT_EQ(run.out, "");
+}
+
+class BadInput : public ::testing::Test {
+ protected:
+  BadInput() : job_(test::write_small_job(folder_)) {}
+
+  /// Each command that reads the scene refuses it in the same words, and nothing new is in the folder.
+  void expect_all_refuse(const std::string& where, const std::string& part) {
+    const auto before = test::contents_of(folder_.path());
+    const std::string scene = (folder_.path() / "scene.yaml").string();
+    const std::vector<std::vector<std::string>> commands = {
+        {"plan", scene},
+        {"plan", job_.string()},
+        {"render", scene, "-o", (folder_.path() / "picture.png").string()},
+        {"generate", job_.string(), "-o", (folder_.path() / "new/out").string()}};
+    for (const auto& command : commands) {
+      const ProgramRun run = run_program(command);
+      expect_refused(run, part);
+      EXPECT_THAT(run.err, HasSubstr((folder_.path() / where).string() + ":"));
+    }
+    EXPECT_EQ(test::contents_of(folder_.path()), before);
+    EXPECT_FALSE(fs::exists(folder_.path() / "new"));
+  }
+
+  void change(const std::string& file, const std::string& from, const std::string& to) {
+    std::string text = read_whole_file(folder_.path() / file);
+    const std::size_t at = text.find(from);
+    ASSERT_NE(at, std::string::npos) << from;
+    folder_.write(file, text.replace(at, from.size(), to));
+  }
+
+  test::TemporaryFolder folder_;
+  fs::path job_;
+};
+
+TEST_F(BadInput, UnknownKeyNamesTheNearest) {
+  change("device.yaml", "thickness_mm: 3", "thicknes_mm: 3");
+  expect_all_refuse("device.yaml:2", "'thickness_mm' is missing");
+  test::write_small_job(folder_);
+  change("object.yaml", "friction", "frictoin");
+  expect_all_refuse("object.yaml:4", "did you mean 'friction'?");
+}
+
+TEST_F(BadInput, NegativeThickness) {
+  change("device.yaml", "thickness_mm: 3", "thickness_mm: -3");
+  expect_all_refuse("device.yaml:2", "gel.thickness_mm: -3 is not allowed");
+}
+
+TEST_F(BadInput, NotANumber) {
+  change("motion.yaml", "1.7", ".nan");
+  expect_all_refuse("motion.yaml:3", "isn't a finite number");
+}
+
+TEST_F(BadInput, DeviceWithoutCameraButAnImageAskedFor) {
+  folder_.write("device.yaml", test::kSmallDevice);
+  expect_all_refuse("scene.yaml", "has no camera");
+}
+
+TEST_F(BadInput, MissingSceneFiles) {
+  fs::remove(folder_.path() / "motion.yaml");
+  expect_all_refuse("scene.yaml:3", "there is no file");
+}
+
+TEST_F(BadInput, BrokenYaml) {
+  folder_.write("object.yaml", "name: [ball\n");
+  expect_all_refuse("object.yaml", "isn't YAML");
+}
+
+/// Meshes are read where they're needed: not by `plan` of a scene.
+class BadMesh : public BadInput {
+ protected:
+  void expect_refused_mesh(const std::string& part) {
+    const auto before = test::contents_of(folder_.path());
+    const ProgramRun run = run_program({"generate", job_.string(), "-o", (folder_.path() / "out").string()});
+    expect_refused(run, part);
+    EXPECT_THAT(run.err, HasSubstr("object.yaml:2"));
+    EXPECT_EQ(test::contents_of(folder_.path()), before);
+    EXPECT_FALSE(fs::exists(folder_.path() / "out"));
+  }
+};
+
+TEST_F(BadMesh, Missing) {
+  change("object.yaml", "{type: sphere, radius_mm: 2}", "{type: mesh, file: none.glb}");
+  expect_refused_mesh("there is no file");
+}
+
+/// A glTF file with its buffer beside it. Three numbers a vertex, three indices a triangle.
+void write_gltf(const test::TemporaryFolder& folder, const std::vector<float>& vertices,
+                const std::vector<std::uint16_t>& triangles) {
+  const std::size_t position_bytes = vertices.size() * sizeof(float);
+  const std::size_t index_bytes = triangles.size() * sizeof(std::uint16_t);
+  std::string bytes(reinterpret_cast<const char*>(vertices.data()), position_bytes);
+  bytes.append(reinterpret_cast<const char*>(triangles.data()), index_bytes);
+  folder.write("mesh.bin", bytes);
+  folder.write("mesh.gltf",
+               fmt::format(R"({{"asset": {{"version": "2.0"}}, "scene": 0, "scenes": [{{"nodes": [0]}}],
+"nodes": [{{"mesh": 0}}], "meshes": [{{"primitives": [{{"attributes": {{"POSITION": 0}}, "indices": 1}}]}}],
+"buffers": [{{"byteLength": {0}, "uri": "mesh.bin"}}],
+"bufferViews": [{{"buffer": 0, "byteLength": {1}}}, {{"buffer": 0, "byteOffset": {1}, "byteLength": {2}}}],
+"accessors": [{{"bufferView": 0, "componentType": 5126, "count": {3}, "type": "VEC3", "min": [0, 0, 0], "max": [2, 2, 2]}},
+{{"bufferView": 1, "componentType": 5123, "count": {4}, "type": "SCALAR"}}]}})",
+                           bytes.size(), position_bytes, index_bytes, vertices.size() / 3, triangles.size()));
+}
+
+const std::vector<float> kTetrahedron = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
+const std::vector<std::uint16_t> kTetrahedronFaces = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3};
+
+TEST_F(BadMesh, Open) {
+  write_gltf(folder_, kTetrahedron, {kTetrahedronFaces.begin(), kTetrahedronFaces.end() - 3});
+  change("object.yaml", "{type: sphere, radius_mm: 2}", "{type: mesh, file: mesh.gltf, mm_per_unit: 1}");
+  expect_refused_mesh("open");
+}
+
+TEST_F(BadMesh, SelfCrossing) {
+  std::vector<float> vertices = kTetrahedron;
+  std::vector<std::uint16_t> faces = kTetrahedronFaces;
+  for (const float x : kTetrahedron) vertices.push_back(x + 0.1F);
+  for (const std::uint16_t i : kTetrahedronFaces) faces.push_back(static_cast<std::uint16_t>(i + 4));
+  write_gltf(folder_, vertices, faces);
+  change("object.yaml", "{type: sphere, radius_mm: 2}", "{type: mesh, file: mesh.gltf, mm_per_unit: 1}");
+  expect_refused_mesh("cross");
+}
+
+TEST_F(BadMesh, AGoodOneIsTaken) {
+  write_gltf(folder_, kTetrahedron, kTetrahedronFaces);
+  change("object.yaml", "{type: sphere, radius_mm: 2}", "{type: mesh, file: mesh.gltf, mm_per_unit: 1}");
+  const ProgramRun run = run_program({"plan", job_.string()});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+}
+
+TEST(CommandLine, HelpOfEachCommand) {
+  for (const std::string command : {"plan", "render", "generate", "calibrate", "estimate", "validate", "inspect"}) {
+    const ProgramRun run = run_program({command, "--help"});
+    EXPECT_EQ(run.exit_code, 0) << command;
+    EXPECT_THAT(run.out, HasSubstr("Usage: touchstone " + command));
+    EXPECT_EQ(run.err, "");
+  }
+  EXPECT_THAT(run_program({"--help"}).out, HasSubstr("Subcommands:"));
+  EXPECT_THAT(run_program({"--version"}).out, ::testing::StartsWith("touchstone "));
+}
+
+TEST(CommandLine, MistakesOnTheLineItself) {
+  expect_refused(run_program({"generat"}), "did you mean 'generate'?");
+  expect_refused(run_program({}), "subcommand");
+  expect_refused(run_program({"generate"}), "JOB");
+  expect_refused(run_program({"plan", "a.yaml", "--thread", "2"}), "--thread");
+  expect_refused(run_program({"--threads", "0", "plan", "a.yaml"}), "--threads");
+  expect_refused(run_program({"plan", "/nonexistent.yaml"}), "/nonexistent.yaml");
+  expect_refused(run_program({"validate", "mecanics"}), "mecanics");
+  expect_refused(run_program({"calibrate", "vhx", "--data", ".", "-o", "m.json"}), "did you mean 'vhs'?");
+  expect_refused(run_program({"calibrate", "vhs", "-o", "m.json"}), "--data");
+  expect_refused(run_program({"estimate", "vhs", "--model", "/none.json", "--data", "."}), "/none.json");
+  expect_refused(run_program({"inspect", "/nonexistent", "-o", "sheet.png"}), "isn't a data set");
+}
+
+TEST_F(BadInput, ResultsThatCantBeWrittenAreRefusedBeforeTheWork) {
+  const std::string scene = (folder_.path() / "scene.yaml").string();
+  expect_refused(run_program({"render", scene, "-o", "/nonexistent/a.png"}), "there is no folder");
+  expect_refused(run_program({"render", scene, "-o", "a.jpg"}), ".png");
+  expect_refused(run_program({"render", scene, "-o", (folder_.path() / "a.png").string(), "--frame", "99"}),
+                 "frames 0 to 5");
+  expect_refused(run_program({"generate", job_.string(), "-o", scene}), "isn't a folder");
+  expect_refused(run_program({"generate", job_.string(), "-o", folder_.path().string()}), "isn't empty");
+}
+
+TEST_F(BadInput, PlanShowsReasons) {
+  const ProgramRun run = run_program({"plan", job_.string()});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.out, AllOf(HasSubstr("2 scenes, 12 samples"), HasSubstr("friction"), HasSubstr("refraction")));
+}
+
+}  // namespace
+}  // namespace touchstone

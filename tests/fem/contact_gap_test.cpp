@@ -1,0 +1,143 @@
+#include "fem/contact_gap.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "core/units.h"
+#include "tests/support/half_space_gel.h"
+
+namespace touchstone::fem {
+namespace {
+
+Compliance flat_gel(double half_width, double spacing) {
+  return test::half_space_gel(half_width, spacing, {1.0, 0.3}, 10.0);
+}
+
+RigidTransform at(double x, double y, double z) {
+  return {Eigen::Matrix3d::Identity(), {x, y, z}};
+}
+
+TEST(WeightedGap, OfALargeFlatFaceIsTheWeightTimesTheGap) {
+  const Compliance gel = flat_gel(2.0, 0.5);
+  const ContactSurface surface(gel);
+  const WeightedGap gap = weighted_gap(surface, BoxShape{{10, 10, 1}}, at(0, 0, 0.5 - 0.2), {});
+  EXPECT_NEAR(gap.deepest, -0.2, 1e-15);
+  for (Eigen::Index i = 0; i < gap.weighted.size(); ++i) {
+    EXPECT_NEAR(gap.weighted[i], -0.2 * surface.weight[i], 1e-15);
+    EXPECT_NEAR(gap.lowest[i], -0.2, 1e-15);
+  }
+}
+
+TEST(WeightedGap, OfASphereIsItsQuadraticGapExactly) {
+  // Far inside its radius a sphere's gap is r^2/(2R) + ..., and against hats the rule of degree 5 is exact for the
+  // square.
+  const Compliance gel = flat_gel(1.0, 0.25);
+  const ContactSurface surface(gel);
+  const double radius = 1000.0;
+  const WeightedGap gap = weighted_gap(surface, SphereShape{radius}, at(0, 0, radius - 0.001), {});
+  for (std::size_t v = 0; v < gel.vertices.size(); ++v) {
+    // int phi r^2 over the triangles around v: exact moments of hats by the mass matrix.
+    double moment = 0.0;
+    for (const auto& t : gel.triangles) {
+      for (int k = 0; k < 3; ++k) {
+        if (t[k] != static_cast<int>(v)) continue;
+        const double area = 0.5 * 0.25 * 0.25;
+        for (int a = 0; a < 3; ++a) {
+          for (int b = 0; b < 3; ++b) {
+            // int phi_k phi_a phi_b = 2A a!b!c!/(a+b+c+2)!
+            int power[3] = {0, 0, 0};
+            ++power[k], ++power[a], ++power[b];
+            const double factorial[4] = {1, 1, 2, 6};
+            const double integral =
+                2.0 * area * factorial[power[0]] * factorial[power[1]] * factorial[power[2]] / 120.0;
+            moment += integral * gel.vertices[t[a]].dot(gel.vertices[t[b]]);
+          }
+        }
+      }
+    }
+    const double wanted = moment / (2.0 * radius) - 0.001 * surface.weight[static_cast<Eigen::Index>(v)];
+    EXPECT_NEAR(gap.weighted[static_cast<Eigen::Index>(v)], wanted, 1e-10);
+  }
+}
+
+TEST(WeightedGap, MovesContinuouslyWithASharpPunch) {
+  const Compliance gel = flat_gel(2.0, 0.5);
+  const ContactSurface surface(gel);
+  const RoundedCylinder punch{1.1, 0.0, 1.0};
+  const WeightedGap here = weighted_gap(surface, punch, at(0.0123, 0.0345, -0.1), {});
+  const WeightedGap there = weighted_gap(surface, punch, at(0.0123 + 1e-9, 0.0345, -0.1), {});
+  int finite = 0;
+  for (Eigen::Index i = 0; i < here.weighted.size(); ++i) {
+    ASSERT_EQ(std::isfinite(here.weighted[i]), std::isfinite(there.weighted[i]));
+    if (!std::isfinite(here.weighted[i])) continue;
+    ++finite;
+    EXPECT_NEAR(here.weighted[i], there.weighted[i], 1e-8);
+  }
+  EXPECT_GT(finite, 10);
+}
+
+TEST(WeightedGap, CoversThePunchOnAverage) {
+  // Vertices whose gap is the plain depth carry the punch: their weights sum to its area, on average over positions.
+  const Compliance gel = flat_gel(3.0, 0.25);
+  const ContactSurface surface(gel);
+  const RoundedCylinder punch{1.5, 0.0, 1.0};
+  double area = 0.0;
+  const int positions = 40;
+  for (int k = 0; k < positions; ++k) {
+    const WeightedGap gap =
+        weighted_gap(surface, punch, at(0.25 * k / positions, 0.25 * std::fmod(k * 0.618, 1.0), -0.1), {});
+    for (Eigen::Index i = 0; i < gap.weighted.size(); ++i) {
+      if (std::isfinite(gap.weighted[i]) && gap.weighted[i] < -0.05 * surface.weight[i]) area += surface.weight[i];
+    }
+  }
+  EXPECT_NEAR(area / positions, kPi * 1.5 * 1.5, 0.03 * kPi * 1.5 * 1.5);
+}
+
+TEST(WeightedGap, SeesANeedleBetweenItsPoints) {
+  const Compliance gel = flat_gel(2.0, 1.0);
+  const ContactSurface surface(gel);
+  for (int k = 0; k < 20; ++k) {
+    const WeightedGap gap = weighted_gap(surface, RoundedCylinder{0.2, 0.05, 0.3}, at(0.05 * k, 0.031 * k, -0.1), {});
+    EXPECT_NEAR(gap.deepest, -0.1, 1e-12) << k;
+  }
+}
+
+TEST(WeightedGap, FollowsTheGelsTangentialDisplacement) {
+  const Compliance gel = flat_gel(1.0, 0.25);
+  const ContactSurface surface(gel);
+  const SphereShape sphere{5.0};
+  const std::vector<Eigen::Vector3d> carried(gel.vertices.size(), Eigen::Vector3d(0.3, -0.2, 0.7));
+  const WeightedGap moved = weighted_gap(surface, sphere, at(0.3, -0.2, 4.9), carried);
+  const WeightedGap rest = weighted_gap(surface, sphere, at(0, 0, 4.9), {});
+  for (Eigen::Index i = 0; i < rest.weighted.size(); ++i) EXPECT_NEAR(moved.weighted[i], rest.weighted[i], 1e-14);
+}
+
+TEST(WeightedGap, IsFarWhereTheLinesMiss) {
+  const Compliance gel = flat_gel(1.0, 0.25);
+  const ContactSurface surface(gel);
+  const WeightedGap gap = weighted_gap(surface, SphereShape{1.0}, at(50, 0, 0), {});
+  EXPECT_TRUE(std::isinf(gap.deepest));
+  for (Eigen::Index i = 0; i < gap.weighted.size(); ++i) EXPECT_TRUE(std::isinf(gap.weighted[i]));
+}
+
+TEST(WeightedGap, OfSomeVerticesIsThatOfAll) {
+  const Compliance gel = flat_gel(1.0, 0.25);
+  const ContactSurface surface(gel);
+  const SphereShape sphere{2.0};
+  const WeightedGap all = weighted_gap(surface, sphere, at(0, 0, 1.9), {});
+  std::vector<char> wanted(gel.vertices.size(), 0);
+  for (std::size_t v = 0; v < wanted.size(); v += 3) wanted[v] = 1;
+  const WeightedGap some = weighted_gap(surface, sphere, at(0, 0, 1.9), {}, wanted);
+  for (std::size_t v = 0; v < wanted.size(); ++v) {
+    const auto i = static_cast<Eigen::Index>(v);
+    if (wanted[v]) {
+      EXPECT_EQ(some.weighted[i], all.weighted[i]);
+    } else {
+      EXPECT_TRUE(std::isinf(some.weighted[i]));
+    }
+  }
+}
+
+}  // namespace
+}  // namespace touchstone::fem

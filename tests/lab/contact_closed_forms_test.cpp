@@ -1,0 +1,84 @@
+#include "lab/contact_closed_forms.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "core/error.h"
+#include "core/units.h"
+
+namespace touchstone::lab {
+namespace {
+
+TEST(LayerReference, MeetsHayesTable) {
+  for (const double ratio : {0.2, 0.4, 1.0, 2.0}) {
+    const double nu = 0.3;
+    const double g = 1.0 / (2.0 * (1.0 + nu));
+    const LayerContact found = flat_punch_on_layer(1.0, nu, 1.0 / ratio, 1.0, 0.01);
+    EXPECT_NEAR(found.force * (1.0 - nu) / (4.0 * g * 0.01), hayes_kappa(ratio), 1e-5 * hayes_kappa(ratio)) << ratio;
+  }
+}
+
+TEST(LayerReference, ThickLayerIsAHalfSpace) {
+  const double thickness = 1e5;
+  EXPECT_NEAR(flat_punch_on_layer(2.0, 0.45, thickness, 1.5, 0.1).force, flat_punch_force(2.0, 0.45, 1.5, 0.1), 1e-4);
+  const LayerContact sphere = sphere_on_layer(2.0, 0.45, thickness, 4.0, 0.5);
+  EXPECT_NEAR(sneddon_sphere_depth(4.0, sphere.contact_radius), 0.5, 1e-5);
+  EXPECT_NEAR(sphere.force, sneddon_sphere_force(2.0, 0.45, 4.0, sphere.contact_radius), 1e-4);
+}
+
+TEST(LayerReference, VeryThinIncompressibleLayerSqueezesLikeAFilm) {
+  // F = pi E a^6 / (96 R h^3), d = a^2/(4R), in the limit a/h -> infinity.
+  const double radius = 100.0;
+  const double depth = 1.0 / (4.0 * radius);
+  double error[2];
+  for (int k = 0; k < 2; ++k) {
+    const double h = k == 0 ? 0.16 : 0.08;
+    const LayerContact found = sphere_on_layer(1.0, 0.5, h, radius, depth);
+    const double a = found.contact_radius;
+    error[k] = found.force * 96.0 * radius * h * h * h / (kPi * std::pow(a, 6.0)) - 1.0;
+  }
+  EXPECT_GT(error[0], 0.0);
+  EXPECT_GT(error[1], 0.0);
+  EXPECT_LT(error[1], 0.6 * error[0]);
+  EXPECT_LT(error[1], 0.25);
+}
+
+TEST(LayerReference, ThinCompressibleLayerHasTheConfinedModulus) {
+  const double nu = 0.3;
+  const double confined = (1.0 - nu) / ((1.0 + nu) * (1.0 - 2.0 * nu));
+  EXPECT_NEAR(bonded_layer_kernel(nu, 1e-4) * 2.0 * (1.0 - nu * nu) / 1e-4, 1.0 / confined, 1e-6);
+  EXPECT_NEAR(bonded_layer_kernel(nu, 1e-3 * (1.0 - 1e-9)), bonded_layer_kernel(nu, 1e-3 * (1.0 + 1e-9)), 1e-9);
+  EXPECT_NEAR(bonded_layer_kernel(nu, 40.0), 1.0, 1e-12);
+}
+
+TEST(SneddonSphere, IsHertzWhenShallow) {
+  const double a = 0.05, radius = 10.0;
+  const double depth = sneddon_sphere_depth(radius, a);
+  EXPECT_NEAR(depth, a * a / radius, 1e-5 * depth);
+  EXPECT_NEAR(sneddon_sphere_force(1.0, 0.3, radius, a), hertz_force(1.0, 0.3, radius, depth), 1e-8);
+}
+
+TEST(PointForces, ObeyBettiReciprocity) {
+  // Work of a push at A through Cerruti's sinking there, against work of the shear at B through Boussinesq's drift.
+  const double x = 0.7, y = -0.4;
+  const Eigen::Vector3d at_push = cerruti_displacement(2.0, 0.37, 1.0, x, y);
+  const Eigen::Vector3d at_shear = boussinesq_displacement(2.0, 0.37, 1.0, -x, -y);
+  EXPECT_NEAR(-at_push.z(), at_shear.x(), 1e-14);
+  EXPECT_LT(boussinesq_displacement(2.0, 0.37, 1.0, x, y).z(), 0.0);
+}
+
+TEST(Mindlin, SlipsAsAWholeAtTheLimit) {
+  EXPECT_DOUBLE_EQ(mindlin_stick_ratio(0.5, 0.5, 1.0), 0.0);
+  EXPECT_DOUBLE_EQ(mindlin_stick_ratio(0.0, 0.5, 1.0), 1.0);
+  const double small = 1e-6;  // bonded disc: Q = 16 G a d / (2 (2 - nu))... the linear limit of the displacement
+  const double g = 1.0 / 2.6;
+  EXPECT_NEAR(mindlin_displacement(1.0, 0.3, 2.0, small, 0.5, 1.0), (2.0 - 0.3) * small / (8.0 * g * 2.0), 1e-11);
+}
+
+TEST(Hayes, RefusesWhatIsNotTabulated) {
+  EXPECT_THROW(hayes_kappa(0.3), Error);
+}
+
+}  // namespace
+}  // namespace touchstone::lab

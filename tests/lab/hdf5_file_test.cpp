@@ -1,0 +1,98 @@
+#include "lab/hdf5_file.h"
+
+#include <gtest/gtest.h>
+
+#include <thread>
+
+#include "core/error.h"
+#include "core/whole_file.h"
+#include "tests/support/temporary_folder.h"
+
+namespace touchstone::lab {
+namespace {
+
+constexpr std::int64_t kRows = 700;  // several chunks
+
+std::vector<float> row_of(std::int64_t i) {
+  std::vector<float> row(300);
+  for (std::size_t k = 0; k < row.size(); ++k) row[k] = static_cast<float>(i) * 0.5F + static_cast<float>(k);
+  return row;
+}
+
+void write_file(const std::filesystem::path& file) {
+  Hdf5Writer writer(file);
+  writer.set_attribute("format", "test");
+  writer.set_attribute("version", std::int64_t{3});
+  writer.add_rows<float>({"/field", "mm", "samples x nodes x 3", "gel", "A field."}, kRows, {100, 3});
+  writer.add_rows<std::int64_t>({"/t_us", "us", "samples", "", "Time."}, kRows, {});
+  for (std::int64_t i = 0; i < kRows; ++i) {
+    writer.write_row<float>("/field", i, row_of(i));
+    writer.write_row<std::int64_t>("/t_us", i, std::vector<std::int64_t>{1000 * i});
+  }
+  writer.write<double>({"/points", "mm", "points x 3", "gel", "Points."}, 2, {3},
+                       std::vector<double>{1, 2, 3, 4, 5, 6});
+  writer.write<double>({"/nothing", "mm", "points x 3", "gel", "No points."}, 0, {3}, {});
+  writer.write_texts({"/names", "1", "names", "", "Names."}, {"one", "a longer one", ""});
+  writer.close();
+}
+
+TEST(Hdf5File, ReadsBackWhatWasWritten) {
+  const test::TemporaryFolder folder;
+  write_file(folder.path() / "a.h5");
+  const Hdf5Reader reader(folder.path() / "a.h5");
+  const auto field = reader.read<float>("/field");
+  EXPECT_EQ(field.shape, (std::vector<std::int64_t>{kRows, 100, 3}));
+  for (std::int64_t i = 0; i < kRows; ++i) {
+    const auto at = field.values.begin() + 300 * i;
+    ASSERT_EQ(std::vector<float>(at, at + 300), row_of(i));
+  }
+  EXPECT_EQ(reader.read<std::int64_t>("/t_us").values[699], 699000);
+  EXPECT_EQ(reader.read<double>("/points").values, (std::vector<double>{1, 2, 3, 4, 5, 6}));
+  EXPECT_EQ(reader.read<double>("/nothing").shape, (std::vector<std::int64_t>{0, 3}));
+  EXPECT_EQ(reader.read_texts("/names"), (std::vector<std::string>{"one", "a longer one", ""}));
+  EXPECT_EQ(reader.text_attribute("/field", "unit"), "mm");
+  EXPECT_EQ(reader.text_attribute("/field", "shape"), "samples x nodes x 3");
+  EXPECT_EQ(reader.text_attribute("/field", "frame"), "gel");
+  EXPECT_EQ(reader.text_attribute("/", "format"), "test");
+  EXPECT_EQ(reader.integer_attribute("/", "version"), 3);
+}
+
+TEST(Hdf5File, SameValuesGiveTheSameBytesAtAnotherTime) {
+  const test::TemporaryFolder folder;
+  write_file(folder.path() / "a.h5");
+  std::this_thread::sleep_for(std::chrono::milliseconds(1100));  // HDF5's time stamps count seconds
+  write_file(folder.path() / "b.h5");
+  EXPECT_EQ(read_whole_file(folder.path() / "a.h5"), read_whole_file(folder.path() / "b.h5"));
+}
+
+TEST(Hdf5File, IsCompressed) {
+  const test::TemporaryFolder folder;
+  write_file(folder.path() / "a.h5");
+  EXPECT_LT(std::filesystem::file_size(folder.path() / "a.h5"), kRows * 300 * sizeof(float) / 2);
+}
+
+TEST(Hdf5File, SaysWhatItCantRead) {
+  const test::TemporaryFolder folder;
+  write_file(folder.path() / "a.h5");
+  EXPECT_THROW(Hdf5Reader(folder.path() / "none.h5"), Error);
+  EXPECT_THROW(Hdf5Reader(folder.write("text.h5", "this is no HDF5")), Error);
+  const Hdf5Reader reader(folder.path() / "a.h5");
+  EXPECT_THROW(reader.read<double>("/none"), Error);
+  EXPECT_THROW(reader.read<double>("/names"), Error);
+  EXPECT_THROW(reader.read_texts("/field"), Error);
+  EXPECT_THROW(reader.text_attribute("/field", "none"), Error);
+}
+
+TEST(Hdf5File, ABrokenOffFileIsRefused) {
+  const test::TemporaryFolder folder;
+  write_file(folder.path() / "a.h5");
+  std::filesystem::resize_file(folder.path() / "a.h5", std::filesystem::file_size(folder.path() / "a.h5") / 2);
+  EXPECT_THROW(Hdf5Reader(folder.path() / "a.h5"), Error);
+}
+
+TEST(Hdf5File, AFolderThatIsntThereIsAnError) {
+  EXPECT_THROW(write_file("/nonexistent/a.h5"), Error);
+}
+
+}  // namespace
+}  // namespace touchstone::lab

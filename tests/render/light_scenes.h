@@ -1,0 +1,72 @@
+#pragma once
+// Small scenes that several tests of light use.
+
+#include <array>
+#include <opencv2/core.hpp>
+
+#include "render/path_tracer.h"
+
+namespace touchstone::render {
+
+inline Spectrum grey(double value) {
+  return Spectrum::Constant(1, value);
+}
+
+/// The square |x|, |y| <= half at height z; normal up, or down.
+inline TriangleMesh square_sheet(double half, double z, bool up = true) {
+  TriangleMesh mesh;
+  mesh.vertices = {{-half, -half, z}, {half, -half, z}, {half, half, z}, {-half, half, z}};
+  if (up) {
+    mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
+  } else {
+    mesh.triangles = {{0, 2, 1}, {0, 3, 2}};
+  }
+  return mesh;
+}
+
+/// One grey band, surroundings of the given radiance, nothing else.
+inline Scene empty_scene(double environment) {
+  Scene scene;
+  scene.environment = grey(environment);
+  return scene;
+}
+
+/// Air below z = -7, glass to z = -5, gel above; media 0 air, 1 glass, 2 gel.
+inline Scene sensor_stack(double environment) {
+  Scene scene = empty_scene(environment);
+  scene.media = {Medium{1.0, {}}, Medium{1.52, {}}, Medium{1.41, {}}};
+  scene.faces = {{-7.0, 0, 1}, {-5.0, 1, 2}};
+  return scene;
+}
+
+/// A point lamp that shines evenly into the half space round `direction`, of the given intensity (W/sr).
+inline SpotLamp half_space_lamp(const Eigen::Vector3d& position, const Eigen::Vector3d& direction, double intensity) {
+  SpotLamp lamp;
+  lamp.position = position;
+  lamp.direction = direction;
+  lamp.half_angle = 1.5707963267948966;
+  lamp.soft_angle = 0.0;
+  lamp.power_W = grey(intensity * 6.283185307179586);
+  return lamp;
+}
+
+inline RenderSettings samples(int count, int max_depth = 10000) {
+  RenderSettings settings;
+  settings.seed = 7;
+  settings.min_samples = settings.max_samples = count;
+  settings.max_depth = max_depth;
+  return settings;
+}
+
+/// A camera 20 mm below the stack's glass that looks up at the gel.
+inline PinholeCamera small_camera(int width, int height) {
+  PinholeCamera camera;
+  camera.width = width;
+  camera.height = height;
+  camera.pixel_pitch_um = 2000.0 / width;
+  camera.distance_mm = 3.0;
+  camera.gel_from_camera = look_at({0, 0, -27}, {0, 0, 0}, {0, 1, 0});
+  return camera;
+}
+
+}  // namespace touchstone::render

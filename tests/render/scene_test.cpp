@@ -1,0 +1,104 @@
+// A faulty scene is refused with one line that names the part.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+
+#include "core/error.h"
+#include "light_scenes.h"
+
+namespace touchstone::render {
+namespace {
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+Scene good_scene() {
+  Scene scene = sensor_stack(1.0);
+  scene.surfaces.push_back({square_sheet(10.0, 0.0), Refractive{2, 0}});
+  scene.balls.push_back({{0, 0, -1}, 0.25, RoughConductor{grey(0.6), 0.3}});
+  scene.lamps.push_back(half_space_lamp({0, 0, -20}, {0, 0, 1}, 1.0));
+  return scene;
+}
+
+void expect_refused(const std::function<void(Scene&)>& spoil, const std::string& part) {
+  Scene scene = good_scene();
+  spoil(scene);
+  try {
+    const Tracer tracer(scene);
+    ADD_FAILURE() << "taken, though " << part << " is faulty";
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), testing::HasSubstr(part));
+    EXPECT_THAT(std::string(error.what()), testing::Not(testing::HasSubstr("\n")));
+  }
+}
+
+TEST(SceneCheck, AGoodSceneIsTaken) {
+  EXPECT_NO_THROW(Tracer{good_scene()});
+}
+
+TEST(SceneCheck, FaultsAreRefusedByName) {
+  expect_refused([](Scene& s) { s.surfaces[0].mesh.vertices[2].y() = kNan; }, "surface 0: vertex 2");
+  expect_refused([](Scene& s) { s.surfaces[0].mesh.vertices[1] = s.surfaces[0].mesh.vertices[0]; },
+                 "surface 0: triangle 0 has no area");
+  expect_refused([](Scene& s) { s.surfaces[0].mesh.triangles[1][2] = 4; }, "triangle 1 names vertex 4");
+  expect_refused([](Scene& s) { s.surfaces[0].material = Refractive{2, 3}; }, "medium_outside");
+  expect_refused([](Scene& s) { s.surfaces[0].material = Lambertian{grey(1.5)}; }, "albedo is 1.5");
+  expect_refused([](Scene& s) { s.surfaces[0].material = Lambertian{Spectrum::Constant(3, 0.5)}; }, "3 bands");
+  expect_refused([](Scene& s) { s.balls[0].radius = -0.25; }, "ball 0: radius is -0.25");
+  expect_refused([](Scene& s) { s.balls[0].centre.x() = INFINITY; }, "ball 0");
+  expect_refused([](Scene& s) { s.balls[0].material = RoughConductor{grey(0.5), 0.0}; }, "roughness is 0");
+  expect_refused([](Scene& s) { s.media[1].index = kNan; }, "medium 1: index");
+  expect_refused([](Scene& s) { s.media[1].index = 0.5; }, "medium 1: index is 0.5");
+  expect_refused([](Scene& s) { s.media[2].absorption = grey(-1.0); }, "medium 2: absorption");
+  expect_refused([](Scene& s) { s.faces[1].z = -8.0; }, "face 1");
+  expect_refused([](Scene& s) { s.faces[1].medium_below = 0; }, "face 1");
+  expect_refused([](Scene& s) { s.lamps[0].direction.setZero(); }, "lamp 0");
+  expect_refused([](Scene& s) { s.lamps[0].power_W = grey(kNan); }, "lamp 0: power_W");
+  expect_refused([](Scene& s) { s.lamps[0].half_angle = 2.0; }, "half_angle 2");
+  expect_refused([](Scene& s) { s.environment = grey(INFINITY); }, "environment");
+  expect_refused([](Scene& s) { s.environment = Spectrum(); }, "no band");
+  expect_refused([](Scene& s) { s.media.clear(); }, "no medium");
+}
+
+TEST(SceneCheck, TwoBandsAreRefused) {
+  Scene scene;
+  scene.environment = Spectrum::Constant(2, 1.0);
+  EXPECT_THROW(Tracer{scene}, Error);
+}
+
+TEST(RenderCheck, FaultySettingsCameraAndMaskAreRefused) {
+  const Tracer tracer(good_scene());
+  const PinholeCamera camera = small_camera(8, 6);
+  const RenderSettings settings = samples(1);
+  EXPECT_NO_THROW(tracer.render(camera, settings));
+
+  RenderSettings bad_settings = settings;
+  bad_settings.min_samples = 0;
+  EXPECT_THROW(tracer.render(camera, bad_settings), Error);
+  bad_settings = settings;
+  bad_settings.noise = NoiseTarget{Spectrum::Constant(3, 1.0), 1.0, 1.0, 0.5};
+  EXPECT_THROW(tracer.render(camera, bad_settings), Error);
+  bad_settings.noise = NoiseTarget{grey(1.0), 1.0, 1.0, 0.0};
+  EXPECT_THROW(tracer.render(camera, bad_settings), Error);
+
+  PinholeCamera bad_camera = camera;
+  bad_camera.width = 0;
+  EXPECT_THROW(tracer.render(bad_camera, settings), Error);
+  bad_camera = camera;
+  bad_camera.hole_diameter_um = kNan;
+  EXPECT_THROW(tracer.render(bad_camera, settings), Error);
+  bad_camera = camera;
+  bad_camera.gel_from_camera.rotation *= 2.0;
+  EXPECT_THROW(tracer.render(bad_camera, settings), Error);
+
+  EXPECT_THROW(tracer.render(camera, settings, cv::Mat::ones(6, 7, CV_8UC1)), Error);
+  EXPECT_THROW(tracer.render(camera, settings, cv::Mat::ones(6, 8, CV_32FC1)), Error);
+  EXPECT_THROW(tracer.preview(camera, 0), Error);
+  EXPECT_THROW(tracer.radiance({0, 0, 0}, {0, 0, 0}, settings), Error);
+}
+
+}  // namespace
+}  // namespace touchstone::render

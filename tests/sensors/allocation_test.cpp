@@ -1,0 +1,109 @@
+// After the first frame nothing is allocated: neither by operator new nor by OpenCV for its images.
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <new>
+#include <opencv2/core.hpp>
+
+#include "tests/sensors/force_samples.h"
+#include "tests/sensors/rendered_beads.h"
+
+namespace {
+
+std::atomic<long> allocations = 0;
+
+}  // namespace
+
+// Not inlined: the compiler would take the pair of new and free for a mistake.
+[[gnu::noinline]] void* operator new(std::size_t size) {
+  ++allocations;
+  if (void* memory = std::malloc(size)) return memory;
+  throw std::bad_alloc();
+}
+[[gnu::noinline]] void* operator new(std::size_t size, std::align_val_t alignment) {
+  ++allocations;
+  const auto align = static_cast<std::size_t>(alignment);
+  if (void* memory = std::aligned_alloc(align, (size + align - 1) / align * align)) return memory;
+  throw std::bad_alloc();
+}
+[[gnu::noinline]] void operator delete(void* memory) noexcept {
+  std::free(memory);
+}
+[[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept {
+  std::free(memory);
+}
+[[gnu::noinline]] void operator delete(void* memory, std::align_val_t) noexcept {
+  std::free(memory);
+}
+[[gnu::noinline]] void operator delete(void* memory, std::size_t, std::align_val_t) noexcept {
+  std::free(memory);
+}
+
+namespace touchstone::sensors {
+namespace {
+
+/// Counts the images that OpenCV makes, which don't go through operator new.
+class CountingAllocator : public cv::MatAllocator {
+ public:
+  cv::UMatData* allocate(int dims, const int* sizes, int type, void* data, std::size_t* step, cv::AccessFlag flags,
+                         cv::UMatUsageFlags usage) const override {
+    ++allocations;
+    return cv::Mat::getStdAllocator()->allocate(dims, sizes, type, data, step, flags, usage);
+  }
+  bool allocate(cv::UMatData* data, cv::AccessFlag flags, cv::UMatUsageFlags usage) const override {
+    ++allocations;
+    return cv::Mat::getStdAllocator()->allocate(data, flags, usage);
+  }
+  void deallocate(cv::UMatData* data) const override { cv::Mat::getStdAllocator()->deallocate(data); }
+};
+
+class Allocation : public testing::Test {
+ protected:
+  Allocation() { cv::Mat::setDefaultAllocator(&allocator); }
+  ~Allocation() override { cv::Mat::setDefaultAllocator(nullptr); }
+  CountingAllocator allocator;
+};
+
+TEST_F(Allocation, IsCounted) {
+  const long before = allocations;
+  const auto number = std::make_unique<int>(3);
+  EXPECT_EQ(allocations, before + 1);
+  const cv::Mat image(4, 4, CV_8U);
+  EXPECT_GT(allocations, before + 1);
+}
+
+TEST_F(Allocation, NoneAfterTheFirstFrame) {
+  for (const int type : {CV_8UC1, CV_8UC3, CV_16UC1, CV_16UC3}) {
+    for (const CentroidKind centroid : {CentroidKind::kBinary, CentroidKind::kWeighted}) {
+      test::BeadPainter painter({.noise = 2.0});
+      const auto rest = test::grid_positions(3, 70.0, {320.0, 240.0});
+      std::vector<cv::Mat> images;
+      for (int i = 0; i < 12; ++i) {
+        auto beads = rest;
+        for (auto& bead : beads) bead += 0.5 * i * Eigen::Vector2d(1.0, -0.7);
+        if (i >= 5) beads[2] = {std::nan(""), 0.0};           // hidden, searched for
+        if (i == 7) beads[3] += Eigen::Vector2d(22.0, 20.0);  // jumps
+        cv::Mat image = painter.paint(beads);
+        if (i == 9) image.setTo(0);
+        if (i == 10) image.setTo(100);
+        if (CV_MAT_CN(type) == 3) cv::merge(std::vector<cv::Mat>{image, image, image}, image);
+        image.convertTo(image, CV_MAT_DEPTH(type), CV_MAT_DEPTH(type) == CV_16U ? 16.0 : 1.0);
+        images.push_back(image);
+      }
+      const StiffnessForceModel model = test::known_model(3, MatrixForm::kAsymmetric, 1);
+      BeadTracker tracker({.centroid = centroid});
+      Eigen::Vector3d sum = estimate(model, tracker.track({images[0], 0})).force;
+      std::vector<Frame> frames;
+      for (int i = 1; i < 12; ++i) frames.push_back({images[static_cast<std::size_t>(i)], i * 1663});
+      const long before = allocations;
+      for (const Frame& frame : frames) sum += estimate(model, tracker.track(frame)).force;
+      EXPECT_EQ(allocations, before) << "type " << type;
+      EXPECT_TRUE(sum.allFinite());
+    }
+  }
+}
+
+}  // namespace
+}  // namespace touchstone::sensors
