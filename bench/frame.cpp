@@ -33,8 +33,8 @@ const Setting& setting() {
 void count(benchmark::State& state, const sim::Capture& capture) {
   state.counters["Mpaths"] = static_cast<double>(capture.paths_traced) / 1e6;
   state.counters["pixels"] = static_cast<double>(capture.pixels_traced);
-  state.counters["paths/s"] = benchmark::Counter(static_cast<double>(capture.paths_traced),
-                                                 benchmark::Counter::kIsIterationInvariantRate);
+  state.counters["paths/s"] =
+      benchmark::Counter(static_cast<double>(capture.paths_traced), benchmark::Counter::kIsIterationInvariantRate);
 }
 
 void WholeFrame(benchmark::State& state) {

@@ -3,7 +3,9 @@
 namespace touchstone::sim {
 namespace {
 
-Allowed part_of_one() { return Allowed::within(0.0, 1.0); }
+Allowed part_of_one() {
+  return Allowed::within(0.0, 1.0);
+}
 
 void check_beads_fit(const DeviceSpec& device, const SourceLocation& where) {
   const BeadSpec& beads = *device.beads;
@@ -19,8 +21,8 @@ void check_beads_fit(const DeviceSpec& device, const SourceLocation& where) {
             beads.spacing_mm, gel.size_x_mm, gel.size_y_mm);
   }
   if (beads.grid > 1 && beads.spacing_mm <= beads.diameter_mm) {
-    fail_at(where, "beads.spacing_mm: {} lets beads of diameter {} mm overlap; it must be above that",
-            beads.spacing_mm, beads.diameter_mm);
+    fail_at(where, "beads.spacing_mm: {} lets beads of diameter {} mm overlap; it must be above that", beads.spacing_mm,
+            beads.diameter_mm);
   }
 }
 
@@ -141,14 +143,16 @@ void fields(YamlReader& in, DeviceSpec& device) {
   }
 }
 
-DeviceSpec read_device(const std::filesystem::path& file) { return read_yaml<DeviceSpec>(file); }
+DeviceSpec read_device(const std::filesystem::path& file) {
+  return read_yaml<DeviceSpec>(file);
+}
 
 std::vector<Eigen::Vector3d> bead_centres(const BeadSpec& beads) {
   std::vector<Eigen::Vector3d> centres;
   const double half = (beads.grid - 1) * beads.spacing_mm / 2;
   for (int row = 0; row < beads.grid; ++row) {
     for (int column = 0; column < beads.grid; ++column) {
-      centres.emplace_back(column * beads.spacing_mm - half, half - row * beads.spacing_mm, -beads.depth_mm);
+      centres.emplace_back(column * beads.spacing_mm - half, row * beads.spacing_mm - half, -beads.depth_mm);
     }
   }
   return centres;

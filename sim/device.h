@@ -81,7 +81,7 @@ struct CameraSpec {
   double full_well_e = 0.0;
   double read_noise_e = 0.0;
   double dark_current_e_per_s = 0.0;
-  double prnu = 0.0;    ///< relative
+  double prnu = 0.0;  ///< relative
   double dsnu_e = 0.0;
   double black_level_DN = 0.0;
 };
@@ -110,7 +110,7 @@ void fields(YamlReader& in, DeviceSpec& device);
 /// Reads and checks a device file. @throws Error with file and line
 DeviceSpec read_device(const std::filesystem::path& file);
 
-/// Rest positions of the beads' centres in the gel frame, row by row: y falls from row to row and x grows along a row,
+/// Rest positions of the beads' centres in the gel frame, row by row: y grows from row to row and x along a row,
 /// as the upright picture shows them.
 std::vector<Eigen::Vector3d> bead_centres(const BeadSpec& beads);
 

@@ -6,9 +6,8 @@
 namespace touchstone::sim {
 
 std::filesystem::path default_cache_folder() {
-  for (const auto& [variable, below] :
-       {std::pair{"TOUCHSTONE_CACHE", ""}, std::pair{"XDG_CACHE_HOME", "touchstone"},
-        std::pair{"HOME", ".cache/touchstone"}}) {
+  for (const auto& [variable, below] : {std::pair{"TOUCHSTONE_CACHE", ""}, std::pair{"XDG_CACHE_HOME", "touchstone"},
+                                        std::pair{"HOME", ".cache/touchstone"}}) {
     const char* value = std::getenv(variable);
     if (value != nullptr && *value != '\0') return std::filesystem::path(value) / below;
   }

@@ -125,10 +125,10 @@ void fields(YamlReader& in, ShapeSpec& shape) {
   }
 }
 
-void fields(YamlReader& in, HolderSpec& holder) {
-  in.required("radius_mm", holder.radius_mm, Allowed::above(0.0));
-  in.required("behind_mm", holder.behind_mm, Allowed::above(0.0));
-  in.optional("albedo", holder.albedo, Allowed::within(0.0, 1.0));
+void fields(YamlReader& in, ScreenSpec& screen) {
+  in.required("radius_mm", screen.radius_mm, Allowed::above(0.0));
+  in.required("behind_mm", screen.behind_mm, Allowed::above(0.0));
+  in.optional("albedo", screen.albedo, Allowed::within(0.0, 1.0));
 }
 
 void fields(YamlReader& in, ObjectSpec& object) {
@@ -136,7 +136,7 @@ void fields(YamlReader& in, ObjectSpec& object) {
   in.required("shape", object.shape);
   in.optional("albedo", object.albedo, Allowed::within(0.0, 1.0));
   in.optional("friction", object.friction, Allowed::at_least(0.0));
-  in.optional("holder", object.holder);
+  in.optional("screen", object.screen);
 }
 
 ObjectSpec read_object(const std::filesystem::path& file) {
@@ -173,14 +173,14 @@ TriangleMesh visible_mesh(const ShapeSpec& shape) {
   return {};
 }
 
-TriangleMesh visible_mesh(const HolderSpec& holder) {
+TriangleMesh visible_mesh(const ScreenSpec& screen) {
   constexpr double kThickness = 1.0;
   ShapeSpec disc;
   disc.type = ShapeKind::rounded_cylinder;
-  disc.radius_mm = holder.radius_mm;
+  disc.radius_mm = screen.radius_mm;
   disc.height_mm = kThickness;
   TriangleMesh mesh = rounded_cylinder_mesh(disc);
-  for (Eigen::Vector3d& vertex : mesh.vertices) vertex.z() += holder.behind_mm;
+  for (Eigen::Vector3d& vertex : mesh.vertices) vertex.z() += screen.behind_mm;
   return mesh;
 }
 

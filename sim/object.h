@@ -18,19 +18,19 @@ EnumNames<ShapeKind> enum_names(ShapeKind);
 /// Only the fields that belong to `type` may stand in the file.
 struct ShapeSpec {
   ShapeKind type = ShapeKind::sphere;
-  double radius_mm = 0.0;       ///< sphere, rounded_cylinder
-  double edge_radius_mm = 0.0;  ///< rounded_cylinder
-  double height_mm = 0.0;       ///< rounded_cylinder
+  double radius_mm = 0.0;                             ///< sphere, rounded_cylinder
+  double edge_radius_mm = 0.0;                        ///< rounded_cylinder
+  double height_mm = 0.0;                             ///< rounded_cylinder
   Eigen::Vector3d size_mm = Eigen::Vector3d::Zero();  ///< box
   std::filesystem::path file;                         ///< mesh: glTF, relative to the object file
   double mm_per_unit = 1000.0;                        ///< mesh: glTF's unit is the metre
   SourceLocation where;
 };
 
-/// A disc behind the object that carries it, seen by the camera but never touched: normal +z of the object frame.
-struct HolderSpec {
+/// A disc behind the object that the camera sees and that is never touched. It stays where the motion starts, level.
+struct ScreenSpec {
   double radius_mm = 0.0;
-  double behind_mm = 0.0;  ///< z of its front face in the object frame
+  double behind_mm = 0.0;  ///< its front face above the object's origin at the start
   Eigen::Vector3d albedo = {0.5, 0.5, 0.5};
 };
 
@@ -39,11 +39,11 @@ struct ObjectSpec {
   ShapeSpec shape;
   Eigen::Vector3d albedo = {0.5, 0.5, 0.5};  ///< in the bands red, green, blue
   double friction = 0.0;                     ///< Coulomb coefficient against the gel
-  std::optional<HolderSpec> holder;
+  std::optional<ScreenSpec> screen;
 };
 
 void fields(YamlReader& in, ShapeSpec& shape);
-void fields(YamlReader& in, HolderSpec& holder);
+void fields(YamlReader& in, ScreenSpec& screen);
 void fields(YamlReader& in, ObjectSpec& object);
 
 ObjectSpec read_object(const std::filesystem::path& file);
@@ -54,6 +54,6 @@ fem::ContactShape contact_shape(const ShapeSpec& shape);
 
 /// The body as the renderer sees it: a closed surface in the object frame.
 TriangleMesh visible_mesh(const ShapeSpec& shape);
-TriangleMesh visible_mesh(const HolderSpec& holder);
+TriangleMesh visible_mesh(const ScreenSpec& screen);
 
 }  // namespace touchstone::sim

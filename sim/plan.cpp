@@ -67,10 +67,10 @@ void plan_mechanics(const SceneSpec& scene, Plan& plan, Table& table) {
   table.add("gel mechanics", true, "truth is always asked for",
             "set-up once a gel (seconds, kept in the cache), then about a millisecond a frame");
   const bool tangential = scene.motion.is_tangential();
-  const std::string why = scene.object.friction == 0.0 ? "the object's friction is 0"
-                          : tangential ? fmt::format("the motion has a tangential part and friction is {}",
-                                                     scene.object.friction)
-                                       : "the motion is a straight press: no tangential part, no tilt";
+  const std::string why =
+      scene.object.friction == 0.0 ? "the object's friction is 0"
+      : tangential ? fmt::format("the motion has a tangential part and friction is {}", scene.object.friction)
+                   : "the motion is a straight press: no tangential part, no tilt";
   plan.friction = table.add("friction", scene.effects.friction, tangential && scene.object.friction > 0.0, why,
                             "a few milliseconds a frame");
 }
@@ -88,12 +88,11 @@ void plan_light(const SceneSpec& scene, Plan& plan, Table& table) {
   const GelSpec& gel = scene.device.gel;
   const PlateSpec& plate = scene.device.plate;
   const bool refracts = gel.refractive_index != 1.0 || plate.refractive_index != 1.0;
-  plan.refraction = table.add(
-      "refraction", refracts,
-      refracts ? fmt::format("plate of index {} and gel of index {} stand before the camera", plate.refractive_index,
-                             gel.refractive_index)
-               : "no index differs from 1",
-      "closed form at the flat faces: under a tenth of the rays' time");
+  plan.refraction = table.add("refraction", refracts,
+                              refracts ? fmt::format("plate of index {} and gel of index {} stand before the camera",
+                                                     plate.refractive_index, gel.refractive_index)
+                                       : "no index differs from 1",
+                              "closed form at the flat faces: under a tenth of the rays' time");
 
   const double albedo = scene.object.albedo.maxCoeff();
   const double gain = interreflection_estimate(gel, plate, albedo, bright_radius(scene.object));
@@ -125,8 +124,8 @@ double interreflection_estimate(const GelSpec& gel, const PlateSpec& plate, doub
     const double plate_sine = invariant / plate.refractive_index;
     const double shift = 2.0 * (gel.thickness_mm * sine / std::sqrt(1.0 - sine * sine) +
                                 plate.thickness_mm * plate_sine / std::sqrt(1.0 - plate_sine * plate_sine));
-    once += 2.0 * sine / kSteps * fresnel(plate.refractive_index, 1.0, plate_sine) *
-            disc_overlap(disc_radius_mm, shift);
+    once +=
+        2.0 * sine / kSteps * fresnel(plate.refractive_index, 1.0, plate_sine) * disc_overlap(disc_radius_mm, shift);
   }
   const double gain = albedo * once;
   return gain / (1.0 - gain);

@@ -29,9 +29,9 @@ struct Plan {
 /// @throws Error if an output can't be had (an image from a device without a camera)
 Plan make_plan(const SceneSpec& scene);
 
-/// Part of the light leaving a bright disc of albedo `albedo` and radius `disc_radius_mm` on the outer surface that comes
-/// back to it by reflection at the plate's lower face, the first term of the interreflection series. Light beyond the
-/// critical angle returns whole but sideways by 2 sum h_i tan(theta_i), so a small disc doesn't meet it again.
+/// Part of the light leaving a bright disc of albedo `albedo` and radius `disc_radius_mm` on the outer surface that
+/// comes back to it by reflection at the plate's lower face, the first term of the interreflection series. Light beyond
+/// the critical angle returns whole but sideways by 2 sum h_i tan(theta_i), so a small disc doesn't meet it again.
 double interreflection_estimate(const GelSpec& gel, const PlateSpec& plate, double albedo, double disc_radius_mm);
 
 }  // namespace touchstone::sim

@@ -58,8 +58,8 @@ std::vector<Truth> play_motion(const SceneSpec& scene, const Plan& plan, const f
     const std::optional<AxisKey>* axis_keys[3] = {&key.x, &key.y, &key.z};
     std::array<Ramp, 3> ramps;
     for (int axis = 0; axis < 3; ++axis) {
-      ramps[axis] = ramp_of(*axis_keys[axis], target.axis[axis], now.gel_from_object.translation[axis],
-                            now.wrench[axis]);
+      ramps[axis] =
+          ramp_of(*axis_keys[axis], target.axis[axis], now.gel_from_object.translation[axis], now.wrench[axis]);
     }
     const Eigen::Vector3d from_angles = angles_deg;
     const Eigen::Vector3d to_angles = key.angles_deg.value_or(angles_deg);

@@ -51,6 +51,8 @@ void fields(YamlReader& in, SceneSpec& scene) {
   in.optional("seed", scene.seed);
 }
 
-SceneSpec read_scene(const std::filesystem::path& file) { return read_yaml<SceneSpec>(file); }
+SceneSpec read_scene(const std::filesystem::path& file) {
+  return read_yaml<SceneSpec>(file);
+}
 
 }  // namespace touchstone::sim

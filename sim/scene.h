@@ -14,9 +14,9 @@ namespace touchstone::sim {
 
 /// What a scene's owner wants to have. Truth (forces, beads, surface) is always there.
 struct OutputSpec {
-  bool frames = true;      ///< what the camera delivers: PNG
-  bool ideal = false;      ///< frames without noise beside them: PNG
-  bool radiance = false;   ///< linear irradiance on the sensor: EXR, W/m^2 a band
+  bool frames = true;     ///< what the camera delivers: PNG
+  bool ideal = false;     ///< frames without noise beside them: PNG
+  bool radiance = false;  ///< linear irradiance on the sensor: EXR, W/m^2 a band
 };
 
 /// How exact the light has to be.

@@ -9,7 +9,9 @@ namespace {
 
 enum MediumIndex { kAir = 0, kPlate = 1, kGel = 2 };
 
-render::Spectrum bands(const Eigen::Vector3d& values) { return values.array(); }
+render::Spectrum bands(const Eigen::Vector3d& values) {
+  return values.array();
+}
 
 /// The outer surface as it is displaced, without the triangles that the object wets.
 TriangleMesh dry_surface(const fem::Compliance& gel, const fem::PressState& press) {
@@ -71,7 +73,7 @@ render::BayerPattern bayer_pattern(BayerLayout layout) {
 VisibleObject visible_object(const ObjectSpec& object) {
   VisibleObject visible;
   visible.body = visible_mesh(object.shape);
-  if (object.holder) visible.holder = visible_mesh(*object.holder);
+  if (object.screen) visible.screen = visible_mesh(*object.screen);
   return visible;
 }
 
@@ -88,9 +90,9 @@ render::Scene visible_scene(const SceneSpec& scene, const Plan& plan, const Visi
   out.surfaces.push_back({dry_surface(gel, press), render::Refractive{kGel, kAir}});
   out.surfaces.push_back({pad_walls(device.gel), render::Black{}});
   out.surfaces.push_back({placed(object.body, press.gel_from_object), render::Lambertian{bands(scene.object.albedo)}});
-  if (object.holder) {
-    out.surfaces.push_back(
-        {placed(*object.holder, press.gel_from_object), render::Lambertian{bands(scene.object.holder->albedo)}});
+  if (object.screen) {
+    out.surfaces.push_back({placed(*object.screen, {Eigen::Matrix3d::Identity(), scene.motion.start_mm}),
+                            render::Lambertian{bands(scene.object.screen->albedo)}});
   }
   if (device.beads) {
     const std::vector<Eigen::Vector3d> centres = bead_centres(*device.beads);
@@ -118,9 +120,10 @@ render::PinholeCamera pinhole_camera(const CameraSpec& camera) {
   out.hole_diameter_um = camera.hole_diameter_um;
   out.foil_thickness_um = camera.foil_thickness_um;
   out.distance_mm = camera.hole_to_sensor_mm;
-  // The upright picture has +y of the gel frame up. A camera that looks straight along y has +z up instead.
+  // The camera looks out of the gel, along +z: with +y of the gel frame down the picture, +x runs to its right and
+  // nothing is mirrored. A camera that looks straight along y has +z down instead.
   const Eigen::Vector3d view = (camera.look_at_mm - camera.hole_position_mm).normalized();
-  const Eigen::Vector3d down = std::abs(view.y()) > 0.999 ? Eigen::Vector3d(0, 0, -1) : Eigen::Vector3d(0, -1, 0);
+  const Eigen::Vector3d down = std::abs(view.y()) > 0.999 ? Eigen::Vector3d(0, 0, 1) : Eigen::Vector3d(0, 1, 0);
   out.gel_from_camera = look_at(camera.hole_position_mm, camera.look_at_mm, down);
   return out;
 }

@@ -14,13 +14,13 @@ namespace touchstone::sim {
 /// The meshes of an object file, read and turned once for all frames; object frame.
 struct VisibleObject {
   TriangleMesh body;
-  std::optional<TriangleMesh> holder;
+  std::optional<TriangleMesh> screen;
 };
 
 VisibleObject visible_object(const ObjectSpec& object);
 
-/// Plate, gel, beads, object and lamps as they stand at `press`. Where the gel is wetted by the object (all three corners
-/// of a surface triangle in contact) there is no face between them: the light goes on into the object.
+/// Plate, gel, beads, object and lamps as they stand at `press`. Where the gel is wetted by the object (all three
+/// corners of a surface triangle in contact) there is no face between them: the light goes on into the object.
 render::Scene visible_scene(const SceneSpec& scene, const Plan& plan, const VisibleObject& object,
                             const fem::Compliance& gel, const fem::PressState& press);
 

@@ -40,7 +40,7 @@ camera:
                                         "small.yaml");
   scene.object = parse_yaml<ObjectSpec>(
       "name: probe\nshape: {type: rounded_cylinder, radius_mm: 1.5, edge_radius_mm: 0.3, height_mm: 4}\n"
-      "friction: 0.7\nholder: {radius_mm: 8, behind_mm: 4}\n",
+      "friction: 0.7\nscreen: {radius_mm: 8, behind_mm: 4}\n",
       "probe.yaml");
   scene.motion = parse_yaml<MotionSpec>("start_mm: [0, 0, 0.5]\nkeys:\n" + keys, "motion.yaml");
   scene.light.max_samples = 32;
@@ -126,7 +126,8 @@ TEST(VirtualCamera, ThePartialFrameAgreesWithTheWholeOne) {
     }
   }
   const double rms = std::sqrt(square / static_cast<double>(whole.radiance.total()));
-  // Two renderings, each with a standard error of at most the noise where its samples suffice, and the tolerated change.
+  // Two renderings, each with a standard error of at most the noise where its samples suffice, and the tolerated
+  // change.
   EXPECT_LT(rms, 1.5) << "in units of the imager's noise";
 }
 

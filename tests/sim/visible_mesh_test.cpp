@@ -30,7 +30,7 @@ TEST(VisibleMesh, EachShapeIsASolid) {
        {sphere(2), cylinder(3, 0.3, 6), cylinder(3, 0, 6), cylinder(3, 3, 6), cylinder(2, 2, 2), box}) {
     EXPECT_EQ(fault_of_closed_mesh(visible_mesh(shape)), "");
   }
-  EXPECT_EQ(fault_of_closed_mesh(visible_mesh(HolderSpec{15, 6, {0.5, 0.5, 0.5}})), "");
+  EXPECT_EQ(fault_of_closed_mesh(visible_mesh(ScreenSpec{15, 6, {0.5, 0.5, 0.5}})), "");
 }
 
 TEST(VisibleMesh, VolumesAreThoseOfTheSolids) {
