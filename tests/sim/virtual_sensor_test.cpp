@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <opencv2/core.hpp>
+
 #include "render/imager.h"
 #include "sim/visible_scene.h"
 #include "tests/support/temporary_folder.h"
