@@ -83,8 +83,11 @@ TEST(Plan, ANarrowDiscGetsBackOnlyWhatFresnelReflectsSteeply) {
   gel.thickness_mm = 5.0;
   gel.refractive_index = 1.5;
   const PlateSpec plate{2.0, 1.5};
-  EXPECT_LT(interreflection_estimate(gel, plate, 0.6, 3.0), 0.02);
-  EXPECT_GT(interreflection_estimate(gel, plate, 0.6, 30.0), 0.3);
+  const double narrow = interreflection_estimate(gel, plate, 0.6, 3.0);
+  const double wide = interreflection_estimate(gel, plate, 0.6, 30.0);
+  EXPECT_LT(narrow, 0.02) << "beyond the critical angle light comes down 13 mm away or more";
+  EXPECT_GT(wide, 5.0 * narrow);
+  EXPECT_LT(wide, 0.6 * 0.596 / (1.0 - 0.6 * 0.596)) << "no disc gets back more than an endless one";
 }
 
 }  // namespace
