@@ -37,7 +37,7 @@ void render(const RenderOptions& options, const GlobalOptions& global) {
     const Progress progress = bar.listener();
     const auto gel = sim::set_up_gel(scene.device, global.cache, progress);
     const std::vector<sim::Truth> truths = sim::play_motion(scene, plan, *gel, progress);
-    const sim::VirtualCamera camera(scene, plan, gel, truths.front());
+    const sim::VirtualCamera camera(scene, plan, *gel, truths.front());
     capture = camera.capture(truths[static_cast<std::size_t>(frame)]);
     warning = gel->report.note;
   }

@@ -24,7 +24,7 @@ const Setting& setting() {
     s.plan = sim::make_plan(s.scene);
     s.gel = sim::set_up_gel(s.scene.device, sim::default_cache_folder());
     s.truths = sim::play_motion(s.scene, s.plan, *s.gel);
-    s.camera = std::make_unique<sim::VirtualCamera>(s.scene, s.plan, s.gel, s.truths.front());
+    s.camera = std::make_unique<sim::VirtualCamera>(s.scene, s.plan, *s.gel, s.truths.front());
     return s;
   }();
   return one;

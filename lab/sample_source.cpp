@@ -10,7 +10,7 @@ SampleSource simulator(const std::filesystem::path& cache_folder) {
   source.play_motion = sim::play_motion;
   source.set_up_camera = [](const sim::SceneSpec& scene, const sim::Plan& plan,
                             std::shared_ptr<const fem::Compliance> gel, const sim::Truth& first) {
-    auto camera = std::make_shared<const sim::VirtualCamera>(scene, plan, std::move(gel), first);
+    auto camera = std::make_shared<const sim::VirtualCamera>(scene, plan, *gel, first);
     return [camera](const sim::Truth& truth) { return camera->capture(truth); };
   };
   return source;

@@ -35,9 +35,25 @@ render::NoiseTarget noise_target(const render::ImagerResponse& response, double 
 }  // namespace
 
 struct VirtualCamera::Parts {
+  Parts(const SceneSpec& scene_of, const Plan& plan_of, const fem::Compliance& gel_of)
+      : scene(scene_of),
+        plan(plan_of),
+        gel(gel_of),
+        object(visible_object(scene.object)),
+        camera(pinhole_camera(*scene.device.camera)),
+        imager(sim::imager(scene.device, plan.sensor_noise)),
+        ideal_imager(sim::imager(scene.device, false)),
+        response(render::response_of(imager)),
+        pattern(render::fixed_pattern(imager, {camera.width, camera.height}, scene.seed)) {
+    settings.seed = scene.seed;
+    settings.min_samples = scene.light.min_samples;
+    settings.max_samples = scene.light.max_samples;
+    settings.noise = noise_target(response, scene.light.noise_fraction);
+  }
+
   SceneSpec scene;
   Plan plan;
-  std::shared_ptr<const fem::Compliance> gel;
+  VisibleGel gel;
   VisibleObject object;
   render::PinholeCamera camera;
   render::Imager imager;
@@ -49,7 +65,7 @@ struct VirtualCamera::Parts {
   cv::Mat first_preview;  // its preview without noise
 
   render::Tracer tracer(const Truth& truth) const {
-    return render::Tracer(visible_scene(scene, plan, object, *gel, truth.press));
+    return render::Tracer(visible_scene(scene, plan, object, gel, truth.press));
   }
 
   /// Which pixels changed against the first frame by more than the tolerance, widened by the hole's blur.
@@ -93,27 +109,10 @@ struct VirtualCamera::Parts {
   }
 };
 
-VirtualCamera::VirtualCamera(const SceneSpec& scene, const Plan& plan, std::shared_ptr<const fem::Compliance> gel,
-                             const Truth& first) {
+VirtualCamera::VirtualCamera(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel, const Truth& first) {
   TS_ASSERT(plan.camera && scene.device.camera);
-  auto parts = std::make_unique<Parts>();
-  parts->scene = scene;
-  parts->plan = plan;
-  parts->gel = std::move(gel);
-  parts->object = visible_object(scene.object);
-  parts->camera = pinhole_camera(*scene.device.camera);
-  parts->imager = imager(scene.device, plan.sensor_noise);
-  parts->ideal_imager = imager(scene.device, false);
-  parts->response = render::response_of(parts->imager);
-  parts->pattern = render::fixed_pattern(parts->imager, {parts->camera.width, parts->camera.height}, scene.seed);
-
-  render::RenderSettings settings;
-  settings.seed = scene.seed;
-  settings.min_samples = scene.light.min_samples;
-  settings.max_samples = scene.light.max_samples;
-  settings.noise = noise_target(parts->response, scene.light.noise_fraction);
-  parts->settings = settings;
-
+  auto parts = std::make_unique<Parts>(scene, plan, gel);
+  render::RenderSettings settings = parts->settings;
   const render::Tracer tracer = parts->tracer(first);
   settings.noise->fraction *= kFirstFrameFraction;
   settings.max_samples *= kFirstFrameSamples;

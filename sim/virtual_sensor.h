@@ -47,8 +47,7 @@ std::vector<Truth> play_motion(const SceneSpec& scene, const Plan& plan, const f
 /// changed. `capture` is a pure function of its arguments and may be called from several threads.
 class VirtualCamera {
  public:
-  VirtualCamera(const SceneSpec& scene, const Plan& plan, std::shared_ptr<const fem::Compliance> gel,
-                const Truth& first);
+  VirtualCamera(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel, const Truth& first);
   ~VirtualCamera();
   Capture capture(const Truth& truth) const;
   /// The same without the short cut: every pixel is traced.

@@ -13,20 +13,6 @@ render::Spectrum bands(const Eigen::Vector3d& values) {
   return values.array();
 }
 
-/// The outer surface as it is displaced, without the triangles that the object wets.
-TriangleMesh dry_surface(const fem::Compliance& gel, const fem::PressState& press) {
-  TriangleMesh mesh;
-  mesh.vertices = gel.vertices;
-  for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
-    mesh.vertices[i] += press.surface_displacement.row(static_cast<Eigen::Index>(i)).transpose();
-  }
-  const auto touches = [&](int vertex) { return press.node_state[vertex] != fem::NodeState::open; };
-  for (const auto& t : gel.triangles) {
-    if (!(touches(t[0]) && touches(t[1]) && touches(t[2]))) mesh.triangles.push_back(t);
-  }
-  return mesh;
-}
-
 /// The frame that holds the gel: black walls round the pad's sides, from the plate to its outer surface.
 TriangleMesh pad_walls(const GelSpec& gel) {
   const double x = gel.size_x_mm / 2;
@@ -71,14 +57,13 @@ render::BayerPattern bayer_pattern(BayerLayout layout) {
 }  // namespace
 
 VisibleObject visible_object(const ObjectSpec& object) {
-  VisibleObject visible;
-  visible.body = visible_mesh(object.shape);
+  VisibleObject visible{contact_shape(object.shape), visible_mesh(object.shape), {}};
   if (object.screen) visible.screen = visible_mesh(*object.screen);
   return visible;
 }
 
 render::Scene visible_scene(const SceneSpec& scene, const Plan& plan, const VisibleObject& object,
-                            const fem::Compliance& gel, const fem::PressState& press) {
+                            const VisibleGel& gel, const fem::PressState& press) {
   const DeviceSpec& device = scene.device;
   render::Scene out;
   out.media.resize(3);
@@ -87,7 +72,7 @@ render::Scene visible_scene(const SceneSpec& scene, const Plan& plan, const Visi
   out.media[kGel].absorption = render::flat_spectrum(3, device.gel.absorption_per_mm);
   out.faces = {{-device.gel.thickness_mm - device.plate.thickness_mm, kAir, kPlate},
                {-device.gel.thickness_mm, kPlate, kGel}};
-  out.surfaces.push_back({dry_surface(gel, press), render::Refractive{kGel, kAir}});
+  out.surfaces.push_back({gel.dry_surface(press, object.felt), render::Refractive{kGel, kAir}});
   out.surfaces.push_back({pad_walls(device.gel), render::Black{}});
   out.surfaces.push_back({placed(object.body, press.gel_from_object), render::Lambertian{bands(scene.object.albedo)}});
   if (object.screen) {

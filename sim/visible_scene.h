@@ -1,28 +1,30 @@
 #pragma once
 // What the camera of a device sees of a pressed gel, in the renderer's terms.
 
-#include "fem/compliance.h"
+#include "fem/contact_shape.h"
 #include "fem/press.h"
 #include "render/imager.h"
 #include "render/pinhole_camera.h"
 #include "render/scene.h"
 #include "sim/plan.h"
 #include "sim/scene.h"
+#include "sim/visible_gel.h"
 
 namespace touchstone::sim {
 
-/// The meshes of an object file, read and turned once for all frames; object frame.
+/// The shape of an object file, read and turned once for all frames; object frame.
 struct VisibleObject {
+  fem::ContactShape felt;
   TriangleMesh body;
   std::optional<TriangleMesh> screen;
 };
 
 VisibleObject visible_object(const ObjectSpec& object);
 
-/// Plate, gel, beads, object and lamps as they stand at `press`. Where the gel is wetted by the object (all three
-/// corners of a surface triangle in contact) there is no face between them: the light goes on into the object.
+/// Plate, gel, beads, object and lamps as they stand at `press`. Where the gel is wetted by the object there is no
+/// face between them: the light goes on into the object.
 render::Scene visible_scene(const SceneSpec& scene, const Plan& plan, const VisibleObject& object,
-                            const fem::Compliance& gel, const fem::PressState& press);
+                            const VisibleGel& gel, const fem::PressState& press);
 
 render::PinholeCamera pinhole_camera(const CameraSpec& camera);
 

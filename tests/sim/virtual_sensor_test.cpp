@@ -105,7 +105,7 @@ TEST(VirtualCamera, ThePartialFrameAgreesWithTheWholeOne) {
   p.scene.outputs = {.frames = false, .ideal = false, .radiance = true};
   p.scene.light.max_samples = 64;
   p.plan = make_plan(p.scene);
-  const VirtualCamera camera(p.scene, p.plan, p.gel, p.truths.front());
+  const VirtualCamera camera(p.scene, p.plan, *p.gel, p.truths.front());
   const Capture part = camera.capture(p.truths.back());
   const Capture whole = camera.capture_whole(p.truths.back());
   EXPECT_LT(part.pixels_traced, whole.pixels_traced) << "nothing was saved";
@@ -135,7 +135,7 @@ TEST(VirtualCamera, ThePartialFrameAgreesWithTheWholeOne) {
 
 TEST(VirtualCamera, AnObjectThatDoesNotMoveCostsNothing) {
   const Played p = play("  - {frames: 1, z: {position_mm: 0.5}}\n");
-  const VirtualCamera camera(p.scene, p.plan, p.gel, p.truths.front());
+  const VirtualCamera camera(p.scene, p.plan, *p.gel, p.truths.front());
   const Capture capture = camera.capture(p.truths.back());
   EXPECT_EQ(capture.pixels_traced, 0);
   EXPECT_EQ(capture.paths_traced, 0);
@@ -143,8 +143,8 @@ TEST(VirtualCamera, AnObjectThatDoesNotMoveCostsNothing) {
 
 TEST(VirtualCamera, TheSameTruthGivesTheSameBytes) {
   const Played p = play("  - {frames: 2, z: {force_N: 1}}\n");
-  const VirtualCamera one(p.scene, p.plan, p.gel, p.truths.front());
-  const VirtualCamera other(p.scene, p.plan, p.gel, p.truths.front());
+  const VirtualCamera one(p.scene, p.plan, *p.gel, p.truths.front());
+  const VirtualCamera other(p.scene, p.plan, *p.gel, p.truths.front());
   const cv::Mat a = one.capture(p.truths.back()).frame;
   const cv::Mat b = other.capture(p.truths.back()).frame;
   ASSERT_EQ(a.size(), b.size());

@@ -1,0 +1,158 @@
+#include "sim/visible_gel.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include "core/error.h"
+#include "core/units.h"
+
+namespace touchstone::sim {
+namespace {
+
+constexpr int kSubdivisions = 2;
+constexpr std::size_t kParts = 16;   // 4^kSubdivisions
+constexpr double kWettedMm = 1e-3;   // a film of air thinner than this isn't there for the light
+
+using Weights = Eigen::SparseMatrix<double, Eigen::RowMajor>;
+
+struct Edge {
+  int new_vertex = 0;
+  std::array<int, 2> opposite = {-1, -1};  // the second one is -1 on the surface's edge
+};
+
+/// One step of Loop's subdivision: triangles become four each (in place of the old one), the returned weights give the
+/// new vertices from the old.
+Weights subdivide(std::vector<std::array<int, 3>>& triangles, int vertices) {
+  std::map<std::pair<int, int>, Edge> edges;
+  int next = vertices;
+  const auto key = [](int a, int b) { return std::pair(std::min(a, b), std::max(a, b)); };
+  for (const auto& t : triangles) {
+    for (int k = 0; k < 3; ++k) {
+      const auto [edge, is_new] = edges.try_emplace(key(t[k], t[(k + 1) % 3]));
+      if (is_new) edge->second.new_vertex = next++;
+      edge->second.opposite[is_new ? 0 : 1] = t[(k + 2) % 3];
+    }
+  }
+
+  std::vector<std::vector<int>> around(vertices);
+  std::vector<char> on_border(vertices, 0);
+  std::vector<Eigen::Triplet<double>> weights;
+  for (const auto& [ends, edge] : edges) {
+    const auto [a, b] = ends;
+    around[a].push_back(b);
+    around[b].push_back(a);
+    const bool border = edge.opposite[1] < 0;
+    if (border) on_border[a] = on_border[b] = 1;
+    for (int end : {a, b}) weights.emplace_back(edge.new_vertex, end, border ? 0.5 : 0.375);
+    if (!border) {
+      for (int far : edge.opposite) weights.emplace_back(edge.new_vertex, far, 0.125);
+    }
+  }
+  for (int i = 0; i < vertices; ++i) {
+    const auto n = static_cast<double>(around[i].size());
+    if (on_border[i] || n < 3) {
+      weights.emplace_back(i, i, 1.0);
+      continue;
+    }
+    const double share = (0.625 - std::pow(0.375 + 0.25 * std::cos(2.0 * kPi / n), 2)) / n;
+    weights.emplace_back(i, i, 1.0 - n * share);
+    for (int j : around[i]) weights.emplace_back(i, j, share);
+  }
+
+  std::vector<std::array<int, 3>> finer;
+  finer.reserve(4 * triangles.size());
+  for (const auto& [a, b, c] : triangles) {
+    const int ab = edges.at(key(a, b)).new_vertex;
+    const int bc = edges.at(key(b, c)).new_vertex;
+    const int ca = edges.at(key(c, a)).new_vertex;
+    finer.insert(finer.end(), {{a, ab, ca}, {ab, b, bc}, {ca, bc, c}, {ab, bc, ca}});
+  }
+  triangles = std::move(finer);
+  Weights matrix(next, vertices);
+  matrix.setFromTriplets(weights.begin(), weights.end());
+  return matrix;
+}
+
+/// Where lines straight up through points of the gel meet the body.
+class Above {
+ public:
+  Above(const fem::ContactShape& shape, const RigidTransform& gel_from_object)
+      : shape_(shape),
+        object_from_gel_(gel_from_object.inverse()),
+        up_(object_from_gel_.turn(Eigen::Vector3d::UnitZ())) {
+    const fem::BoundingBall ball = fem::bounding_ball(shape);
+    centre_ = gel_from_object * ball.centre;
+    radius_ = ball.radius;
+  }
+
+  /// Height of the body's surface above the point, negative where the point lies inside; nothing beside the body.
+  std::optional<double> gap(const Eigen::Vector3d& point) const {
+    if ((point - centre_).head<2>().squaredNorm() > radius_ * radius_) return std::nullopt;
+    return fem::first_entry(shape_, object_from_gel_ * point, up_);
+  }
+
+ private:
+  const fem::ContactShape& shape_;
+  RigidTransform object_from_gel_;
+  Eigen::Vector3d up_;
+  Eigen::Vector3d centre_;
+  double radius_ = 0.0;
+};
+
+}  // namespace
+
+VisibleGel::VisibleGel(const fem::Compliance& gel) : coarse_(gel.triangles), fine_(gel.triangles) {
+  const auto n = static_cast<int>(gel.vertices.size());
+  rest_.resize(n, 3);
+  for (int i = 0; i < n; ++i) rest_.row(i) = gel.vertices[i].transpose();
+  fine_from_coarse_.resize(n, n);
+  fine_from_coarse_.setIdentity();
+  for (int i = 0; i < kSubdivisions; ++i) {
+    const Weights step = subdivide(fine_, static_cast<int>(fine_from_coarse_.rows()));
+    fine_from_coarse_ = Weights(step * fine_from_coarse_);
+  }
+  TS_ASSERT(fine_.size() == kParts * coarse_.size());
+}
+
+TriangleMesh VisibleGel::dry_surface(const fem::PressState& press, const fem::ContactShape& shape) const {
+  const Above above(shape, press.gel_from_object);
+  const auto touches = [&](int vertex) { return press.node_state[vertex] != fem::NodeState::open; };
+  Eigen::MatrixX3d coarse = rest_ + press.surface_displacement;
+  for (Eigen::Index i = 0; i < coarse.rows(); ++i) {
+    if (!touches(static_cast<int>(i))) continue;
+    coarse(i, 2) += above.gap(coarse.row(i).transpose()).value_or(0.0);
+  }
+  const Eigen::MatrixX3d fine = fine_from_coarse_ * coarse;
+
+  std::vector<char> in_contact(fine.rows(), 0);  // inside the contact as mechanics has it
+  std::vector<char> contact_triangle(coarse_.size(), 0);
+  for (std::size_t i = 0; i < coarse_.size(); ++i) {
+    const auto& t = coarse_[i];
+    contact_triangle[i] = touches(t[0]) && touches(t[1]) && touches(t[2]);
+    if (!contact_triangle[i]) continue;
+    for (std::size_t k = 0; k < kParts; ++k) {
+      for (int corner : fine_[i * kParts + k]) in_contact[corner] = 1;
+    }
+  }
+
+  TriangleMesh mesh;
+  mesh.vertices.resize(fine.rows());
+  std::vector<char> wet(in_contact);
+  for (Eigen::Index i = 0; i < fine.rows(); ++i) {
+    mesh.vertices[i] = fine.row(i).transpose();
+    const std::optional<double> gap = above.gap(mesh.vertices[i]);
+    if (gap && (in_contact[i] || *gap < kWettedMm)) {
+      mesh.vertices[i].z() += *gap;
+      wet[i] = 1;
+    }
+  }
+  for (std::size_t i = 0; i < fine_.size(); ++i) {
+    const auto& t = fine_[i];
+    if (!contact_triangle[i / kParts] && !(wet[t[0]] && wet[t[1]] && wet[t[2]])) mesh.triangles.push_back(t);
+  }
+  return mesh;
+}
+
+}  // namespace touchstone::sim

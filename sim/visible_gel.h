@@ -1,0 +1,34 @@
+#pragma once
+// The gel's outer surface as the camera sees it: finer and smoother than the mesh that carries the forces, and true to
+// the body that presses on it.
+
+#include <Eigen/SparseCore>
+#include <array>
+#include <vector>
+
+#include "core/triangle_mesh.h"
+#include "fem/compliance.h"
+#include "fem/contact_shape.h"
+#include "fem/press.h"
+
+namespace touchstone::sim {
+
+/// The elements' edges (half a millimetre) are wide against what a camera resolves, and the displacement that mechanics
+/// gives per vertex overshoots beside a sharp rim (it's a projection on hat functions). Seen through the gel both would
+/// show: as a many-cornered edge of contact with glints on it. So the surface is subdivided twice (Loop 1987; the pad's
+/// edge by straight halving) from vertices that lie on the body where they're in contact, and where the fine surface
+/// reaches into the body it's laid onto it. Made once a gel; safe to use from many threads.
+class VisibleGel {
+ public:
+  explicit VisibleGel(const fem::Compliance& gel);
+
+  /// The displaced surface without what the body wets: triangles all of whose corners lie on it. Gel frame, mm.
+  TriangleMesh dry_surface(const fem::PressState& press, const fem::ContactShape& shape) const;
+
+ private:
+  Eigen::MatrixX3d rest_;                                   // of the mechanics' vertices
+  Eigen::SparseMatrix<double, Eigen::RowMajor> fine_from_coarse_;
+  std::vector<std::array<int, 3>> coarse_, fine_;  // triangles; those of coarse triangle i begin at fine_[i * kParts]
+};
+
+}  // namespace touchstone::sim
