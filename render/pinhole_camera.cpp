@@ -39,6 +39,43 @@ struct DiscOverlap {
   }
 };
 
+/// The height of one slice of an overlap, and its probability density (per mm).
+struct SliceHeight {
+  double v, density;
+};
+
+/// Takes u in [0,1) to slices so that points drawn uniformly along them cover the overlap of two discs of about the same
+/// radius uniformly; what the radii's difference does to the width is left to the weight. With heights v = sin(phi) in
+/// units of the smaller radius the width is 2 cos(phi) - q and the area below phi is
+/// g = phi + sin(phi) cos(phi) - q sin(phi); g is concave, so Newton's method from the tangent at 0 never overshoots.
+SliceHeight slice_height(const DiscOverlap& overlap, double u) {
+  const double radius = std::min(overlap.radius_a, overlap.radius_b);
+  double low = 0.0;
+  double high = 0.0;
+  overlap.slice(0.0, low, high);
+  const double q = std::max(0.0, 2.0 - (high - low) / radius);
+  const double most = std::acos(std::min(1.0, 0.5 * q));
+  const double sin_most = std::sin(most);
+  const double area = most + sin_most * (0.5 * q) - q * sin_most;
+  if (!(area > 0.0)) return {0.0, 0.5 / overlap.half_height};
+  constexpr int kMostSteps = 30;
+  const double x = 2.0 * u - 1.0;
+  const double wanted = std::abs(x) * area;
+  double phi = wanted / (2.0 - q);
+  double sine = std::sin(phi);
+  double cosine = std::cos(phi);
+  for (int step = 0; step < kMostSteps; ++step) {
+    const double rest = wanted - (phi + sine * cosine - q * sine);
+    if (rest <= 1e-6 * area) break;
+    phi = std::min(most, phi + rest / (cosine * (2.0 * cosine - q)));
+    sine = std::sin(phi);
+    cosine = std::cos(phi);
+  }
+  const double scale = overlap.half_height / sin_most;
+  const double width = std::max(1e-9, 2.0 * cosine - q);
+  return {std::copysign(sine * scale, x), width / (2.0 * area * scale)};
+}
+
 }  // namespace
 
 void check_camera(const PinholeCamera& camera) {
@@ -82,19 +119,15 @@ std::optional<PinholeRay> pinhole_ray(const PinholeCamera& camera, double x, dou
   const Eigen::Vector2d e = shift > 0.0 ? Eigen::Vector2d(between / shift) : Eigen::Vector2d::UnitX();
   const Eigen::Vector2d across(-e.y(), e.x());
 
-  // A uniform point of the unit disc, each of its slices across v stretched onto the overlap's slice at the same
-  // relative height: for a thin foil almost uniform, so that the weight hardly varies.
-  const Eigen::Vector2d disc = square_to_disc(u, v);
-  const double half_slice = std::sqrt(std::max(1e-24, 1.0 - disc.y() * disc.y()));
-  const double height = overlap.half_height * disc.y();
+  const SliceHeight height = slice_height(overlap, u);
   double low = 0.0;
   double high = 0.0;
-  overlap.slice(height, low, high);
+  overlap.slice(height.v, low, high);
   if (!(high > low)) return std::nullopt;
-  const double along = 0.5 * (low + high) + 0.5 * (high - low) * (disc.x() / half_slice);
-  const double area = kPi * overlap.half_height * (high - low) / (2.0 * half_slice);
+  const double along = low + v * (high - low);
+  const double area = (high - low) / height.density;
 
-  const Eigen::Vector2d hole = centre_near + along * e + height * across;
+  const Eigen::Vector2d hole = centre_near + along * e + height.v * across;
   PinholeRay ray;
   ray.origin = {hole.x(), hole.y(), 0.0};
   const Eigen::Vector3d through = ray.origin - sensor;

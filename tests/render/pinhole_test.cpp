@@ -67,8 +67,8 @@ TEST(PinholeImage, IsUprightAndWhereProjectSays) {
   PinholeCamera camera = small_camera(60, 40);
   const Eigen::Vector3d in_camera(3.0, 1.5, 20.0);
   scene.balls.push_back({camera.gel_from_camera * in_camera, 0.6, Black{}});
-  const cv::Mat with = Tracer(scene).render(camera, samples(64)).irradiance;
-  const cv::Mat without = Tracer(empty_scene(1.0)).render(camera, samples(64)).irradiance;
+  const cv::Mat with = Tracer(scene).render(camera, samples(1024)).irradiance;
+  const cv::Mat without = Tracer(empty_scene(1.0)).render(camera, samples(1024)).irradiance;
   Eigen::Vector2d centroid(0, 0);
   double weight = 0.0;
   for (int row = 0; row < 40; ++row) {
@@ -82,7 +82,7 @@ TEST(PinholeImage, IsUprightAndWhereProjectSays) {
   const Eigen::Vector2d expected = project(camera, in_camera);
   EXPECT_GT(expected.x(), 40.0);
   EXPECT_GT(expected.y(), 25.0);
-  EXPECT_NEAR((centroid - expected).norm(), 0.0, 0.05);
+  EXPECT_NEAR((centroid - expected).norm(), 0.0, 0.03);
 }
 
 TEST(PinholeImage, OnePixelSensorIsThePlainMean) {
