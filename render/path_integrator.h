@@ -182,10 +182,11 @@ class PathIntegrator {
                       Bands<N>& sum) const {
     const auto lamp_count = static_cast<int>(scene_.lamps.size());
     if (lamp_count == 0) return;
-    // What the camera sees is lit by all lamps, what lies behind a bounce by one of them.
+    // One lamp a hit, chosen by a stratified number: the samples of a pixel share the lamps evenly. A preview has just
+    // one sample and takes them all.
     int first = 0;
     int last = lamp_count;
-    if (leg.depth > 0 && lamp_count > 1) {
+    if (lamp_count > 1 && !numbers.is_centre()) {
       first = std::min(lamp_count - 1, static_cast<int>(numbers.next() * lamp_count));
       last = first + 1;
     }

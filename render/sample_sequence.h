@@ -56,6 +56,7 @@ class SampleSequence {
     sequence.fixed_ = true;
     return sequence;
   }
+  bool is_centre() const { return fixed_; }
 
   std::array<double, 2> next_pair() {
     if (fixed_) return {0.5, 0.5};
