@@ -268,6 +268,11 @@ class PathIntegrator {
         absorb(leg, hit.distance);
         const PreparedMaterial<N>& material = scene_.materials[hit.object];
         if (material.kind == SurfaceKind::kBlack) return;
+        if (material.kind == SurfaceKind::kEmitter) {
+          const double index = scene_.media[leg.medium].index;
+          sum += leg.throughput * material.colour / (index * index);
+          return;
+        }
         if (material.kind == SurfaceKind::kRefractive) {
           meet_boundary(leg, hit, material, branches, numbers, sum);
         } else {

@@ -22,12 +22,12 @@ struct PreparedMedium {
   Bands<N> absorption;
 };
 
-enum class SurfaceKind { kLambertian, kConductor, kBlack, kRefractive };
+enum class SurfaceKind { kLambertian, kConductor, kBlack, kEmitter, kRefractive };
 
 template <int N>
 struct PreparedMaterial {
   SurfaceKind kind = SurfaceKind::kBlack;
-  Bands<N> colour = Bands<N>::Zero();  ///< albedo, or reflectance at normal incidence
+  Bands<N> colour = Bands<N>::Zero();  ///< albedo, reflectance at normal incidence, or radiance
   double roughness = 0.0;
   GgxAlbedo single_albedo;  ///< of a conductor
   int inside = 0, outside = 0;
@@ -94,6 +94,9 @@ struct PreparedScene {
       const bool as_before = !materials.empty() && materials.back().kind == SurfaceKind::kConductor &&
                              materials.back().roughness == made.roughness;
       made.single_albedo = as_before ? materials.back().single_albedo : GgxAlbedo(made.roughness);
+    } else if (const auto* emitter = std::get_if<Emitter>(&material)) {
+      made.kind = SurfaceKind::kEmitter;
+      made.colour = emitter->radiance;
     } else if (const auto* refractive = std::get_if<Refractive>(&material)) {
       made.kind = SurfaceKind::kRefractive;
       made.inside = refractive->medium_inside;

@@ -48,6 +48,10 @@ void check_material(const Material& material, const Scene& scene, const std::str
                           }
                         },
                         [](const Black&) {},
+                        [&](const Emitter& m) {
+                          check_spectrum(m.radiance, bands, std::numeric_limits<double>::infinity(),
+                                         what + ": radiance");
+                        },
                         [&](const Refractive& m) {
                           check_medium_index(m.medium_inside, scene, what + ": medium_inside");
                           check_medium_index(m.medium_outside, scene, what + ": medium_outside");

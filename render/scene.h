@@ -33,6 +33,12 @@ struct RoughConductor {
 /// Reflects nothing.
 struct Black {};
 
+/// A luminous panel: sends the same radiance (W/m^2/sr in each band, in the medium before it) everywhere and reflects
+/// nothing. It is seen directly and by bounced light; without interreflection it lights nothing.
+struct Emitter {
+  Spectrum radiance;
+};
+
 /// A smooth boundary of two media (indices into Scene::media); its outward normal points to `medium_outside`. Where the
 /// two indices are equal nothing happens to a ray but the change of medium.
 struct Refractive {
@@ -40,7 +46,7 @@ struct Refractive {
   int medium_outside = 0;
 };
 
-using Material = std::variant<Lambertian, RoughConductor, Black, Refractive>;
+using Material = std::variant<Lambertian, RoughConductor, Black, Emitter, Refractive>;
 
 /// A triangle surface, open or closed. A Refractive surface is shaded with normals interpolated from its vertices, so
 /// that a deformed gel refracts as the curved surface it stands for; others with the normal of the triangle.

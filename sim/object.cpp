@@ -128,7 +128,7 @@ void fields(YamlReader& in, ShapeSpec& shape) {
 void fields(YamlReader& in, ScreenSpec& screen) {
   in.required("radius_mm", screen.radius_mm, Allowed::above(0.0));
   in.required("behind_mm", screen.behind_mm, Allowed::above(0.0));
-  in.optional("albedo", screen.albedo, Allowed::within(0.0, 1.0));
+  in.required("radiance", screen.radiance, Allowed::at_least(0.0));
 }
 
 void fields(YamlReader& in, ObjectSpec& object) {

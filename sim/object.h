@@ -27,11 +27,12 @@ struct ShapeSpec {
   SourceLocation where;
 };
 
-/// A disc behind the object that the camera sees and that is never touched. It stays where the motion starts, level.
+/// A luminous disc round or behind the object that the camera sees and that is never touched: a light panel. It stays
+/// where the motion starts, level.
 struct ScreenSpec {
   double radius_mm = 0.0;
   double behind_mm = 0.0;  ///< its front face above the object's origin at the start
-  Eigen::Vector3d albedo = {0.5, 0.5, 0.5};
+  Eigen::Vector3d radiance = {1.0, 1.0, 1.0};  ///< W/m^2/sr in the bands red, green, blue
 };
 
 struct ObjectSpec {

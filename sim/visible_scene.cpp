@@ -77,7 +77,7 @@ render::Scene visible_scene(const SceneSpec& scene, const Plan& plan, const Visi
   out.surfaces.push_back({placed(object.body, press.gel_from_object), render::Lambertian{bands(scene.object.albedo)}});
   if (object.screen) {
     out.surfaces.push_back({placed(*object.screen, {Eigen::Matrix3d::Identity(), scene.motion.start_mm}),
-                            render::Lambertian{bands(scene.object.screen->albedo)}});
+                            render::Emitter{bands(scene.object.screen->radiance)}});
   }
   if (device.beads) {
     const std::vector<Eigen::Vector3d> centres = bead_centres(*device.beads);

@@ -42,7 +42,7 @@ camera:
                                         "small.yaml");
   scene.object = parse_yaml<ObjectSpec>(
       "name: probe\nshape: {type: rounded_cylinder, radius_mm: 1.5, edge_radius_mm: 0.3, height_mm: 4}\n"
-      "friction: 0.7\nscreen: {radius_mm: 8, behind_mm: 4}\n",
+      "friction: 0.7\nscreen: {radius_mm: 8, behind_mm: 4, radiance: [2, 2, 2]}\n",
       "probe.yaml");
   scene.motion = parse_yaml<MotionSpec>("start_mm: [0, 0, 0.5]\nkeys:\n" + keys, "motion.yaml");
   scene.light.max_samples = 32;
