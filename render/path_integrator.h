@@ -39,9 +39,11 @@ class PathIntegrator {
     const int layer = scene_.layer_at(origin.z());
     branches.legs[branches.count++] = {origin, direction, Bands<N>::Ones(), 0.5, layer, scene_.medium_of_layer(layer),
                                        0,      0};
+    // Drawn before the path's smooth events draw theirs, so that a pixel's samples share lamps and lenses evenly.
+    const LampNumbers at_first_hit = lamp_numbers(numbers);
     while (branches.count > 0) {
       Leg leg = branches.legs[--branches.count];
-      follow(leg, branches, numbers, counts, sum);
+      follow(leg, branches, at_first_hit, numbers, counts, sum);
     }
     return sum;
   }
@@ -60,6 +62,57 @@ class PathIntegrator {
     int depth;   // diffuse and metallic reflections so far
     int smooth;  // refractions, mirror reflections and crossings of Refractive surfaces so far
   };
+
+  /// Which lamp lights a hit, and which point of its lens.
+  struct LampNumbers {
+    double lamp;
+    std::array<double, 2> lens;
+  };
+  static LampNumbers lamp_numbers(SampleSequence& numbers) {
+    const double lamp = numbers.next();
+    return {lamp, numbers.next_pair()};
+  }
+
+  struct LampChoice {
+    int lamp;
+    double probability;
+  };
+
+  /// A lamp with a probability in proportion to what it would send without shadow, Fresnel's loss or lobe: by its power,
+  /// distance and, for a matt surface, the cosine after refraction as if all of the way were in the lamp's medium. No lamp
+  /// that shines is left without a chance.
+  LampChoice choose_lamp(const Receiver& receiver, const PreparedMaterial<N>& material, double number) const {
+    const auto lamp_count = static_cast<int>(scene_.lamps.size());
+    if (lamp_count == 1) return {0, 1.0};
+    constexpr double kLeastCosine = 0.05;
+    constexpr int kMostWeighed = 32;
+    if (lamp_count > kMostWeighed) {
+      return {std::min(lamp_count - 1, static_cast<int>(number * lamp_count)), 1.0 / lamp_count};
+    }
+    std::array<double, kMostWeighed> weights{};
+    double total = 0.0;
+    for (int i = 0; i < lamp_count; ++i) {
+      const PreparedLamp<N>& lamp = scene_.lamps[i];
+      const Eigen::Vector3d way = lamp.lamp.position - receiver.position;
+      const double distance2 = std::max(1e-12, way.squaredNorm());
+      double cosine = 1.0;
+      if (material.kind == SurfaceKind::kLambertian) {
+        const double bend = scene_.media[scene_.medium_of_layer(lamp.layer)].index / scene_.media[receiver.medium].index;
+        const double lateral2 = std::min(1.0, bend * bend * way.head<2>().squaredNorm() / distance2);
+        const double shrink = bend / std::sqrt(distance2);
+        const double height = std::copysign(std::sqrt(1.0 - lateral2), way.z());
+        cosine = std::max(kLeastCosine, receiver.normal.x() * way.x() * shrink +
+                                            receiver.normal.y() * way.y() * shrink + receiver.normal.z() * height);
+      }
+      weights[i] = lamp.total_power * cosine / distance2;
+      total += weights[i];
+    }
+    if (!(total > 0.0)) return {0, 1.0};
+    double rest = number * total;
+    int i = 0;
+    while (i + 1 < lamp_count && rest >= weights[i]) rest -= weights[i++];
+    return {i, weights[i] / total};
+  }
 
   struct Branches {
     std::array<Leg, kMostBranches> legs;  // uninitialised on purpose, see Leg
@@ -178,26 +231,22 @@ class PathIntegrator {
 
   /// Lamp light that the surface sends back along the leg. `normal` faces the leg.
   void add_lamp_light(const Leg& leg, const RayHit& hit, const Eigen::Vector3d& normal,
-                      const PreparedMaterial<N>& material, SampleSequence& numbers, RayCounts& counts,
+                      const PreparedMaterial<N>& material, const LampNumbers& chosen, bool all_lamps, RayCounts& counts,
                       Bands<N>& sum) const {
     const auto lamp_count = static_cast<int>(scene_.lamps.size());
     if (lamp_count == 0) return;
-    // One lamp a hit, chosen by a stratified number: the samples of a pixel share the lamps evenly. A preview has just
-    // one sample and takes them all.
-    int first = 0;
-    int last = lamp_count;
-    if (lamp_count > 1 && !numbers.is_centre()) {
-      first = std::min(lamp_count - 1, static_cast<int>(numbers.next() * lamp_count));
-      last = first + 1;
-    }
     const double index = scene_.media[leg.medium].index;
-    const double weight = static_cast<double>(lamp_count) / (last - first) / (index * index);
     const Receiver receiver{hit.position, normal, leg.layer, leg.medium};
+    // One lamp a hit. A preview has just one sample and takes them all.
+    const LampChoice choice = all_lamps ? LampChoice{0, 1.0} : choose_lamp(receiver, material, chosen.lamp);
+    const int first = choice.lamp;
+    const int last = all_lamps ? lamp_count : first + 1;
+    const double weight = 1.0 / (choice.probability * index * index);
     for (int i = first; i < last; ++i) {
       const PreparedLamp<N>& lamp = scene_.lamps[i];
       Eigen::Vector3d source = lamp.lamp.position;
       if (lamp.lamp.lens_radius > 0.0) {
-        const auto [u, v] = numbers.next_pair();
+        const auto [u, v] = chosen.lens;
         const Eigen::Vector2d disc = lamp.lamp.lens_radius * square_to_disc(u, v);
         source += disc.x() * lamp.frame.x + disc.y() * lamp.frame.y;
       }
@@ -253,7 +302,7 @@ class PathIntegrator {
     return leg.throughput.maxCoeff() > 0.0;
   }
 
-  void follow(Leg& leg, Branches& branches, SampleSequence& numbers, RayCounts& counts, Bands<N>& sum) const {
+  void follow(Leg& leg, Branches& branches, const LampNumbers& at_first_hit, SampleSequence& numbers, RayCounts& counts, Bands<N>& sum) const {
     const int face_count = static_cast<int>(scene_.faces.size());
     for (;;) {
       ++(leg.depth == 0 ? counts.primary : counts.bounces);
@@ -278,7 +327,8 @@ class PathIntegrator {
         } else {
           const Eigen::Vector3d normal =
               leg.direction.dot(hit.normal) < 0.0 ? hit.normal : Eigen::Vector3d(-hit.normal);
-          add_lamp_light(leg, hit, normal, material, numbers, counts, sum);
+          add_lamp_light(leg, hit, normal, material, leg.depth == 0 ? at_first_hit : lamp_numbers(numbers),
+                         numbers.is_centre(), counts, sum);
           if (!scatter(leg, hit, normal, material, numbers)) return;
         }
       } else if (std::isfinite(to_face)) {

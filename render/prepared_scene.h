@@ -39,6 +39,7 @@ struct PreparedLamp {
   NormalFrame frame;
   double cos_full;             ///< within this cosine the lobe is at its top
   Bands<N> intensity_on_axis;  ///< W/sr
+  double total_power;          ///< W, over the bands
   int layer;                   ///< number of faces below it
 };
 
@@ -65,7 +66,7 @@ struct PreparedScene {
     for (const SpotLamp& lamp : scene.lamps) {
       const Bands<N> intensity = Bands<N>(lamp.power_W) / spot_solid_angle(lamp);
       lamps.push_back({lamp, NormalFrame(lamp.direction.normalized()), std::cos(lamp.half_angle), intensity,
-                       layer_at(lamp.position.z())});
+                       lamp.power_W.sum(), layer_at(lamp.position.z())});
     }
   }
 
