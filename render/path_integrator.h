@@ -318,8 +318,7 @@ class PathIntegrator {
         const PreparedMaterial<N>& material = scene_.materials[hit.object];
         if (material.kind == SurfaceKind::kBlack) return;
         if (material.kind == SurfaceKind::kEmitter) {
-          const double index = scene_.media[leg.medium].index;
-          sum += leg.throughput * material.colour / (index * index);
+          sum += leg.throughput * material.colour;
           return;
         }
         if (material.kind == SurfaceKind::kRefractive) {

@@ -134,7 +134,8 @@ void fields(YamlReader& in, ScreenSpec& screen) {
 void fields(YamlReader& in, ObjectSpec& object) {
   in.required("name", object.name);
   in.required("shape", object.shape);
-  in.optional("albedo", object.albedo, Allowed::within(0.0, 1.0));
+  in.optional("radiance", object.radiance, Allowed::at_least(0.0));
+  if (!object.radiance) in.optional("albedo", object.albedo, Allowed::within(0.0, 1.0));
   in.optional("friction", object.friction, Allowed::at_least(0.0));
   in.optional("screen", object.screen);
 }

@@ -39,6 +39,7 @@ struct ObjectSpec {
   std::string name;
   ShapeSpec shape;
   Eigen::Vector3d albedo = {0.5, 0.5, 0.5};  ///< in the bands red, green, blue
+  std::optional<Eigen::Vector3d> radiance;   ///< W/m^2/sr in air: a diffuser lit from behind, which has no albedo
   double friction = 0.0;                     ///< Coulomb coefficient against the gel
   std::optional<ScreenSpec> screen;
 };

@@ -94,7 +94,7 @@ void plan_light(const SceneSpec& scene, Plan& plan, Table& table) {
                                        : "no index differs from 1",
                               "closed form at the flat faces: under a tenth of the rays' time");
 
-  const double albedo = scene.object.albedo.maxCoeff();
+  const double albedo = scene.object.radiance ? 0.0 : scene.object.albedo.maxCoeff();
   const double gain = interreflection_estimate(gel, plate, albedo, bright_radius(scene.object));
   plan.interreflection = table.add(
       "interreflection", scene.effects.interreflection, gain > scene.light.interreflection_tolerance,

@@ -107,6 +107,8 @@ VisibleGel::VisibleGel(const fem::Compliance& gel) : coarse_(gel.triangles), fin
   const auto n = static_cast<int>(gel.vertices.size());
   rest_.resize(n, 3);
   for (int i = 0; i < n; ++i) rest_.row(i) = gel.vertices[i].transpose();
+  averaged_ = gel.mass;
+  for (int i = 0; i < n; ++i) averaged_.row(i) /= averaged_.row(i).sum();
   fine_from_coarse_.resize(n, n);
   fine_from_coarse_.setIdentity();
   for (int i = 0; i < kSubdivisions; ++i) {
@@ -119,7 +121,7 @@ VisibleGel::VisibleGel(const fem::Compliance& gel) : coarse_(gel.triangles), fin
 TriangleMesh VisibleGel::dry_surface(const fem::PressState& press, const fem::ContactShape& shape) const {
   const Above above(shape, press.gel_from_object);
   const auto touches = [&](int vertex) { return press.node_state[vertex] != fem::NodeState::open; };
-  Eigen::MatrixX3d coarse = rest_ + press.surface_displacement;
+  Eigen::MatrixX3d coarse = rest_ + averaged_ * press.surface_displacement;
   for (Eigen::Index i = 0; i < coarse.rows(); ++i) {
     if (!touches(static_cast<int>(i))) continue;
     coarse(i, 2) += above.gap(coarse.row(i).transpose()).value_or(0.0);

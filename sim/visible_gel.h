@@ -14,7 +14,8 @@
 namespace touchstone::sim {
 
 /// The elements' edges (half a millimetre) are wide against what a camera resolves, and the displacement that mechanics
-/// gives per vertex overshoots beside a sharp rim (it's a projection on hat functions). Seen through the gel both would
+/// gives per vertex overshoots beside a sharp rim (it's a projection on hat functions; here its means over the hats are
+/// taken). Seen through the gel both would
 /// show: as a many-cornered edge of contact with glints on it. So the surface is subdivided twice (Loop 1987; the pad's
 /// edge by straight halving) from vertices that lie on the body where they're in contact, and where the fine surface
 /// reaches into the body it's laid onto it. Made once a gel; safe to use from many threads.
@@ -26,7 +27,8 @@ class VisibleGel {
   TriangleMesh dry_surface(const fem::PressState& press, const fem::ContactShape& shape) const;
 
  private:
-  Eigen::MatrixX3d rest_;                                   // of the mechanics' vertices
+  Eigen::MatrixX3d rest_;                       // of the mechanics' vertices
+  Eigen::SparseMatrix<double, Eigen::RowMajor> averaged_;  // hat-weighted means from values at the vertices
   Eigen::SparseMatrix<double, Eigen::RowMajor> fine_from_coarse_;
   std::vector<std::array<int, 3>> coarse_, fine_;  // triangles; those of coarse triangle i begin at fine_[i * kParts]
 };

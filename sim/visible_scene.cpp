@@ -37,6 +37,11 @@ TriangleMesh placed(TriangleMesh mesh, const RigidTransform& gel_from_object) {
   return mesh;
 }
 
+render::Material material_of(const ObjectSpec& object) {
+  if (object.radiance) return render::Emitter{bands(*object.radiance)};
+  return render::Lambertian{bands(object.albedo)};
+}
+
 render::BayerPattern bayer_pattern(BayerLayout layout) {
   switch (layout) {
     case BayerLayout::none:
@@ -74,7 +79,7 @@ render::Scene visible_scene(const SceneSpec& scene, const Plan& plan, const Visi
                {-device.gel.thickness_mm, kPlate, kGel}};
   out.surfaces.push_back({gel.dry_surface(press, object.felt), render::Refractive{kGel, kAir}});
   out.surfaces.push_back({pad_walls(device.gel), render::Black{}});
-  out.surfaces.push_back({placed(object.body, press.gel_from_object), render::Lambertian{bands(scene.object.albedo)}});
+  out.surfaces.push_back({placed(object.body, press.gel_from_object), material_of(scene.object)});
   if (object.screen) {
     out.surfaces.push_back({placed(*object.screen, {Eigen::Matrix3d::Identity(), scene.motion.start_mm}),
                             render::Emitter{bands(scene.object.screen->radiance)}});
