@@ -55,6 +55,7 @@ void fields(YamlReader& in, GelSpec& gel) {
   in.optional("poisson_ratio", gel.poisson_ratio, Allowed::within(0.0, 0.5));
   in.optional("refractive_index", gel.refractive_index, Allowed::within(1.0, 4.0));
   in.optional("absorption_per_mm", gel.absorption_per_mm, Allowed::at_least(0.0));
+  in.optional("frame_albedo", gel.frame_albedo, Allowed::within(0.0, 1.0));
 }
 
 void fields(YamlReader& in, MeshSpec& mesh) {

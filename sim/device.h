@@ -20,6 +20,7 @@ struct GelSpec {
   double poisson_ratio = 0.49;
   double refractive_index = 1.0;
   double absorption_per_mm = 0.0;  ///< natural logarithm, all bands
+  double frame_albedo = 0.0;       ///< of the frame that holds the pad at its sides, all bands; 0 is black
 };
 
 /// How fine the gel is meshed: `fine_mm` where contact and beads are, graded to `coarse_mm` elsewhere.

@@ -13,7 +13,7 @@ render::Spectrum bands(const Eigen::Vector3d& values) {
   return values.array();
 }
 
-/// The frame that holds the gel: black walls round the pad's sides, from the plate to its outer surface.
+/// The frame that holds the gel: walls round the pad's sides, from the plate to its outer surface.
 TriangleMesh pad_walls(const GelSpec& gel) {
   const double x = gel.size_x_mm / 2;
   const double y = gel.size_y_mm / 2;
@@ -78,7 +78,8 @@ render::Scene visible_scene(const SceneSpec& scene, const Plan& plan, const Visi
   out.faces = {{-device.gel.thickness_mm - device.plate.thickness_mm, kAir, kPlate},
                {-device.gel.thickness_mm, kPlate, kGel}};
   out.surfaces.push_back({gel.dry_surface(press, object.felt), render::Refractive{kGel, kAir}});
-  out.surfaces.push_back({pad_walls(device.gel), render::Black{}});
+  out.surfaces.push_back(
+      {pad_walls(device.gel), render::Lambertian{render::flat_spectrum(3, device.gel.frame_albedo)}});
   out.surfaces.push_back({placed(object.body, press.gel_from_object), material_of(scene.object)});
   if (object.screen) {
     out.surfaces.push_back({placed(*object.screen, {Eigen::Matrix3d::Identity(), scene.motion.start_mm}),
