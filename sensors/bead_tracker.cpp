@@ -36,6 +36,9 @@ void check(const BeadTrackerSettings& s) {
           "between 0 and 255");
   require(s.look.max_elongation > 1, "look.max_elongation", s.look.max_elongation, "above 1");
   require(s.look.max_area_change > 1, "look.max_area_change", s.look.max_area_change, "above 1");
+  require(s.look.least_core > 0 && s.look.least_core <= 1, "look.least_core", s.look.least_core, "above 0, up to 1");
+  require(s.look.core_elongation > 1, "look.core_elongation", s.look.core_elongation, "above 1");
+  require(s.look.core_shift_px >= 0, "look.core_shift_px", s.look.core_shift_px, "at least 0");
   require(s.max_hidden_frames >= 0, "max_hidden_frames", s.max_hidden_frames, "at least 0");
   const BeadFilterSettings& f = s.filter;
   require(f.measurement_px > 0 && std::isfinite(f.measurement_px), "filter.measurement_px", f.measurement_px,
@@ -236,8 +239,10 @@ void BeadTracker::State::accept(std::size_t bead, const BeadMeasurement& measure
   state.filtering = true;
   state.reset = false;
   state.hidden_frames = 0;
-  if (state.usual_area_px == 0.0) state.usual_area_px = measurement.area_px;
-  state.usual_area_px += kAreaLearning * (measurement.area_px - state.usual_area_px);
+  if (!measurement.is_core) {
+    if (state.usual_area_px == 0.0) state.usual_area_px = measurement.area_px;
+    state.usual_area_px += kAreaLearning * (measurement.area_px - state.usual_area_px);
+  }
   result.status[bead] = status;
   result.positions[bead] = state.filter.position;
   result.measured[bead] = measurement.centroid;

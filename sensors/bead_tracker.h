@@ -10,8 +10,8 @@
 //   and for bright beads alike.
 // - Step vii takes the centroid of all highlighted pixels. Where several connected regions are left, this tracker takes
 //   the one whose centroid is nearest to the bead's last position, among those that look like a bead (BeadLook).
-//   If a threshold gives no such region, Otsu's method is applied once more to the highlighted class alone: a bead that
-//   touches something half dark comes apart from it so.
+//   Otsu's method is then applied again to the highlighted class alone: where a bead touches something half as dark, this
+//   core lies elsewhere than the whole region, and its centroid is taken.
 // - A region that touches the window's border is cut by it: the window is moved onto it, and it is measured again.
 // - A window in which nothing looks like a bead gives no measurement, where Otsu's method alone would invent one. Then
 //   the whole cell is searched, coarsely; if there's no bead either, the bead is `hidden`: its position is held for
@@ -46,6 +46,11 @@ struct BeadLook {
   double max_elongation = 4.0;
   /// Largest ratio, either way, between the region's area and the bead's own area in the frames before.
   double max_area_change = 2.0;
+  /// A bead's core: what Otsu's method highlights among the bead's own pixels. Its least part of the usual area, its
+  /// largest elongation, and how far its centroid may lie from the bead's before the core's is taken instead.
+  double least_core = 0.2;
+  double core_elongation = 2.0;
+  double core_shift_px = 0.8;
 };
 
 /// The filter of sec. 3.2.2: position and velocity, for each bead and axis; the acceleration is white noise.

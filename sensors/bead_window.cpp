@@ -252,62 +252,105 @@ std::optional<int> otsu_threshold(const std::array<int, 256>& histogram, int fir
   return threshold;
 }
 
-std::optional<BeadMeasurement> measure_bead(const GreyWindow& window, const BeadSearch& search) {
-  const BeadTrackerSettings& settings = search.settings;
-  const BeadLook& look = settings.look;
-  const int count = window.width * window.height;
-  const GreyHistogram grey = grey_histogram(window);
-  const Contrast contrast = contrast_of(grey, count, look.polarity, settings.contrast);
+namespace {
 
-  const double pixel_area = static_cast<double>(window.stride) * window.stride;
-  double least_area = look.min_area_px;
-  double most_area = look.max_area_fraction * settings.roi_b_px * settings.roi_b_px;
-  if (search.expected_area_px > 0.0) {
-    least_area = std::max(least_area, search.expected_area_px / look.max_area_change);
-    most_area = std::min(most_area, search.expected_area_px * look.max_area_change);
+/// The areas that a region may have, px.
+struct AreaRange {
+  double least, most;
+};
+
+/// Steps iv to vii at the threshold that Otsu's method finds among contrasts of at least `first`, which it moves on.
+class ThresholdRound {
+ public:
+  ThresholdRound(const GreyWindow& window, const BeadSearch& search)
+      : window_(window),
+        search_(search),
+        settings_(search.settings),
+        grey_(grey_histogram(window)),
+        contrast_(contrast_of(grey_, window.width * window.height, settings_.look.polarity, settings_.contrast)) {}
+
+  /// False if there's no further threshold, or one that doesn't part two clearly different classes.
+  bool next_threshold() {
+    const std::optional<int> threshold = otsu_threshold(contrast_.histogram, first_);
+    if (!threshold) return false;
+    threshold_ = *threshold;
+    difference_ = class_difference(grey_, contrast_, first_, threshold_);
+    first_ = threshold_ + 1;
+    return difference_ >= settings_.look.min_difference;
   }
-  const int radius = window.stride == 1 ? settings.morphology_px / 2 : 0;
 
-  // The second round takes only what the first has highlighted, to part a bead from something half as dark beside it.
-  constexpr int kRounds = 2;
-  int first = 0;
-  for (int round = 0; round < kRounds; ++round) {
-    const std::optional<int> threshold = otsu_threshold(contrast.histogram, first);
-    if (!threshold) return std::nullopt;
-    const double difference = class_difference(grey, contrast, first, *threshold);
-    first = *threshold + 1;
-    if (difference < look.min_difference) return std::nullopt;
-
+  /// The region at this threshold that looks like a bead and is nearest to the expected place (or the largest).
+  std::optional<BeadMeasurement> find(const AreaRange& areas, double max_elongation) {
     BitWindow bits;
-    binarise(window, grey, contrast, *threshold, look.polarity, bits);
+    binarise(window_, grey_, contrast_, threshold_, settings_.look.polarity, bits);
+    const int radius = window_.stride == 1 ? settings_.morphology_px / 2 : 0;
     if (radius > 0) {
       open_regions(bits, radius);
       close_regions(bits, radius);
     }
+    const double pixel_area = static_cast<double>(window_.stride) * window_.stride;
     std::optional<BeadMeasurement> best;
     double best_rank = 0.0;
     BitWindow region, best_region;
     while (take_region(bits, region)) {
       const RegionMoments moments = moments_of(region);
       const double area = moments.area * pixel_area;
-      if (area < least_area || area > most_area || moments.elongation > look.max_elongation) continue;
+      if (area < areas.least || area > areas.most || moments.elongation > max_elongation) continue;
       const Eigen::Vector2d half(0.5, 0.5);
       const Eigen::Vector2d centroid =
-          Eigen::Vector2d(window.x, window.y) + window.stride * (moments.centroid - half) + half;
-      const double rank = search.take_largest ? -area : (centroid - search.near).squaredNorm();
+          Eigen::Vector2d(window_.x, window_.y) + window_.stride * (moments.centroid - half) + half;
+      const double rank = search_.take_largest ? -area : (centroid - search_.near).squaredNorm();
       if (best && rank >= best_rank) continue;
       best_rank = rank;
-      best = BeadMeasurement{centroid, area, difference, touches_border(region)};
+      best = BeadMeasurement{centroid, area, difference_, touches_border(region), false};
       best_region = region;
     }
-    if (!best) continue;
-    if (settings.centroid == CentroidKind::kWeighted && window.stride == 1) {
-      const Eigen::Vector2d origin(window.x, window.y);
-      best->centroid = origin + weighted_centroid(window, contrast, best_region, *threshold, best->centroid - origin);
+    if (best && settings_.centroid == CentroidKind::kWeighted && window_.stride == 1) {
+      const Eigen::Vector2d origin(window_.x, window_.y);
+      best->centroid = origin + weighted_centroid(window_, contrast_, best_region, threshold_, best->centroid - origin);
     }
     return best;
   }
-  return std::nullopt;
+
+ private:
+  const GreyWindow& window_;
+  const BeadSearch& search_;
+  const BeadTrackerSettings& settings_;
+  GreyHistogram grey_;
+  Contrast contrast_;
+  int first_ = 0;
+  int threshold_ = 0;
+  double difference_ = 0.0;
+};
+
+}  // namespace
+
+std::optional<BeadMeasurement> measure_bead(const GreyWindow& window, const BeadSearch& search) {
+  const BeadTrackerSettings& settings = search.settings;
+  const BeadLook& look = settings.look;
+  AreaRange whole{look.min_area_px, look.max_area_fraction * settings.roi_b_px * settings.roi_b_px};
+  AreaRange core = whole;
+  if (search.expected_area_px > 0.0) {
+    whole.least = std::max(whole.least, search.expected_area_px / look.max_area_change);
+    whole.most = std::min(whole.most, search.expected_area_px * look.max_area_change);
+    core.least = std::max(core.least, search.expected_area_px * look.least_core);
+    core.most = std::min(core.most, search.expected_area_px);
+  }
+  ThresholdRound round(window, search);
+  if (!round.next_threshold()) return std::nullopt;
+  const std::optional<BeadMeasurement> bead = round.find(whole, look.max_elongation);
+
+  // The core: what stands out of the highlighted pixels themselves. Of a bead alone it is the bead's own middle; where
+  // something half as dark touches the bead, only the core tells where the bead is.
+  constexpr int kCoreRounds = 2;
+  for (int i = 0; i < kCoreRounds && round.next_threshold(); ++i) {
+    std::optional<BeadMeasurement> middle = round.find(core, look.core_elongation);
+    if (!middle || middle->cut) continue;
+    if (bead && !bead->cut && (middle->centroid - bead->centroid).norm() <= look.core_shift_px) return bead;
+    middle->is_core = true;
+    return middle;
+  }
+  return bead;
 }
 
 }  // namespace touchstone::sensors

@@ -48,6 +48,7 @@ struct BeadMeasurement {
   double area_px = 0.0;
   double difference = 0.0;  ///< between the mean grey values of background and bead class
   bool cut = false;         ///< the region touches the window's border
+  bool is_core = false;     ///< only the middle of the bead, see BeadLook::core_shift_px
 };
 
 /// What measure_bead looks for.
