@@ -80,6 +80,7 @@ struct CameraSpec {
   Eigen::Vector3d quantum_efficiency_blue = {0, 0, 1};
   std::optional<Eigen::Vector3d> white_balance;  ///< fixed gains of red, green, blue; absent: the lamps' light is grey
   double full_well_e = 0.0;
+  double gain_dB = 0.0;  ///< analogue: at 0 the full well gives the largest number, at 20 a tenth of it does
   double read_noise_e = 0.0;
   double dark_current_e_per_s = 0.0;
   double prnu = 0.0;  ///< relative

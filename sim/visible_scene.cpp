@@ -141,7 +141,9 @@ render::Imager imager(const DeviceSpec& device, bool with_noise) {
   out.dsnu_e = camera.dsnu_e;
   out.bayer = bayer_pattern(camera.bayer);
   out.black_level_DN = camera.black_level_DN;
-  out.gain_DN_per_e = ((1 << camera.bits) - 1 - camera.black_level_DN) / camera.full_well_e;
+  constexpr double kDecibelsPerDecade = 20.0;
+  out.gain_DN_per_e = ((1 << camera.bits) - 1 - camera.black_level_DN) / camera.full_well_e *
+                      std::pow(10.0, camera.gain_dB / kDecibelsPerDecade);
   out.ideal = !with_noise;
   if (camera.white_balance) {
     out.white_balance = *camera.white_balance;
