@@ -11,7 +11,7 @@ namespace {
 struct CalibrateOptions {
   std::string sensor;
   std::filesystem::path out;
-  std::string stop = "converged";
+  std::string stop = "text";
   std::string form = "asymmetric";
 };
 

@@ -223,7 +223,7 @@ TEST(Metal, LampLightAndSurroundingsUseTheSameReflectance) {
       lit.lamps.push_back(half_space_lamp(distance * from, -from, solid_angle * distance * distance * 1e-6));
     }
   }
-  by_lamps = Tracer(lit).radiance(eye, -eye, samples(1))[0];
+  by_lamps = Tracer(lit).radiance(eye, -eye, samples(1 << 18))[0];
   EXPECT_NEAR(by_lamps / by_paths, 1.0, 0.01);
 }
 

@@ -59,10 +59,16 @@ TEST(Plan, ASwitchOverrulesAndSaysSo) {
 }
 
 TEST(Plan, ATighterToleranceCallsForInterreflection) {
-  SceneSpec scene = shipped("cycle.yaml");
+  SceneSpec scene = shipped("ball-press.yaml");
   EXPECT_FALSE(make_plan(scene).interreflection);
   scene.light.interreflection_tolerance = 1e-4;
   EXPECT_TRUE(make_plan(scene).interreflection);
+}
+
+TEST(Plan, ALuminousProbeReflectsNothing) {
+  SceneSpec scene = shipped("cycle.yaml");
+  scene.light.interreflection_tolerance = 1e-12;
+  EXPECT_FALSE(make_plan(scene).interreflection);
 }
 
 // Under a layer that is thin against the disc nothing gets away sideways, so what comes back at once is the internal
