@@ -150,6 +150,58 @@ TEST(BeadTracker, LoadCycleIsFollowedWithoutALoss) {
   EXPECT_LT(std::sqrt(squares / (9.0 * kFrames)), 0.1);
 }
 
+struct Worst {
+  double error_px = 0.0;
+  int lost = 0;
+};
+
+/// As where the slope of the gel beside a pressed object crosses a bead: a stripe about as wide as the bead and `depth`
+/// as dark runs past the middle column of beads.
+Worst track_past_a_stripe(double depth, const BeadTrackerSettings& settings) {
+  BeadPicture picture = kSmall;
+  picture.noise = 3.0;
+  picture.blur_px = 3.0;
+  BeadPainter painter(picture);
+  const auto beads = grid_positions(3, 70.0, {160.0, 160.0});
+  BeadTracker tracker(settings);
+  tracker.track({painter.paint(beads), 0});
+  Worst worst;
+  for (int frame = 1; frame <= 60; ++frame) {
+    cv::Mat image = painter.paint(beads);
+    const double stripe_at = 160.0 - 30.0 + frame;
+    for (int y = 0; y < image.rows; ++y) {
+      for (int x = 0; x < image.cols; ++x) {
+        const double across = (x + 0.5 - stripe_at) / 6.0;
+        const double behind =
+            picture.background - depth * (picture.background - picture.bead) * std::exp(-across * across);
+        auto& value = image.at<std::uint8_t>(y, x);  // the stripe lies behind the beads
+        value = std::min(value, static_cast<std::uint8_t>(behind + 0.5));
+      }
+    }
+    const TrackedBeads& tracked = tracker.track({image, frame * kIntervalUs});
+    for (std::size_t i = 0; i < beads.size(); ++i) {
+      if (!is_found(tracked.status[i])) {
+        ++worst.lost;
+        continue;
+      }
+      worst.error_px = std::max(worst.error_px, (tracked.measured[i] - beads[i]).norm());
+    }
+  }
+  return worst;
+}
+
+TEST(BeadTracker, AHalfDarkStripeDoesNotDragABead) {
+  const double depth = 0.8;
+  const Worst with_core = track_past_a_stripe(depth, {});
+  EXPECT_EQ(with_core.lost, 0);
+  EXPECT_LT(with_core.error_px, 0.5);
+  BeadTrackerSettings whole_region;
+  whole_region.look.least_core = 1.0;  // a core is never that large
+  const Worst without = track_past_a_stripe(depth, whole_region);
+  EXPECT_TRUE(without.lost > 0 || without.error_px > 3.0 * with_core.error_px)
+      << "the stripe is no trial: " << without.lost << " lost, " << without.error_px << " px";
+}
+
 TEST(BeadTracker, RoiAFollowsTheMeanBead) {
   // All beads drift further than a cell is wide: only a grid that moves with them keeps each in its cell.
   BeadPainter painter({.width = 480, .height = 320});
