@@ -9,15 +9,9 @@ std::vector<ValidationRow> validate_vhs(const ValidateOptions& options);
 
 const std::vector<ValidationGroup>& validation_groups() {
   static const std::vector<ValidationGroup> groups = {
-#ifdef TOUCHSTONE_VALIDATE_MECHANICS
       {"mechanics", validate_mechanics},
-#endif
-#ifdef TOUCHSTONE_VALIDATE_LIGHT
       {"light", validate_light},
-#endif
-#ifdef TOUCHSTONE_VALIDATE_VHS
       {"vhs", validate_vhs},
-#endif
   };
   return groups;
 }

@@ -78,9 +78,9 @@ class PathIntegrator {
     double probability;
   };
 
-  /// A lamp with a probability in proportion to what it would send without shadow, Fresnel's loss or lobe: by its power,
-  /// distance and, for a matt surface, the cosine after refraction as if all of the way were in the lamp's medium. No lamp
-  /// that shines is left without a chance.
+  /// A lamp with a probability in proportion to what it would send without shadow, Fresnel's loss or lobe: by its
+  /// power, distance and, for a matt surface, the cosine after refraction as if all of the way were in the lamp's
+  /// medium. No lamp that shines is left without a chance.
   LampChoice choose_lamp(const Receiver& receiver, const PreparedMaterial<N>& material, double number) const {
     const auto lamp_count = static_cast<int>(scene_.lamps.size());
     if (lamp_count == 1) return {0, 1.0};
@@ -97,7 +97,8 @@ class PathIntegrator {
       const double distance2 = std::max(1e-12, way.squaredNorm());
       double cosine = 1.0;
       if (material.kind == SurfaceKind::kLambertian) {
-        const double bend = scene_.media[scene_.medium_of_layer(lamp.layer)].index / scene_.media[receiver.medium].index;
+        const double bend =
+            scene_.media[scene_.medium_of_layer(lamp.layer)].index / scene_.media[receiver.medium].index;
         const double lateral2 = std::min(1.0, bend * bend * way.head<2>().squaredNorm() / distance2);
         const double shrink = bend / std::sqrt(distance2);
         const double height = std::copysign(std::sqrt(1.0 - lateral2), way.z());
@@ -302,7 +303,8 @@ class PathIntegrator {
     return leg.throughput.maxCoeff() > 0.0;
   }
 
-  void follow(Leg& leg, Branches& branches, const LampNumbers& at_first_hit, SampleSequence& numbers, RayCounts& counts, Bands<N>& sum) const {
+  void follow(Leg& leg, Branches& branches, const LampNumbers& at_first_hit, SampleSequence& numbers, RayCounts& counts,
+              Bands<N>& sum) const {
     const int face_count = static_cast<int>(scene_.faces.size());
     for (;;) {
       ++(leg.depth == 0 ? counts.primary : counts.bounces);

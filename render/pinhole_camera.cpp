@@ -44,10 +44,10 @@ struct SliceHeight {
   double v, density;
 };
 
-/// Takes u in [0,1) to slices so that points drawn uniformly along them cover the overlap of two discs of about the same
-/// radius uniformly; what the radii's difference does to the width is left to the weight. With heights v = sin(phi) in
-/// units of the smaller radius the width is 2 cos(phi) - q and the area below phi is
-/// g = phi + sin(phi) cos(phi) - q sin(phi); g is concave, so Newton's method from the tangent at 0 never overshoots.
+/// Takes u in [0,1) to slices so that points drawn uniformly along them cover the overlap of two discs of about the
+/// same radius uniformly; what the radii's difference does to the width is left to the weight. With heights v =
+/// sin(phi) in units of the smaller radius the width is 2 cos(phi) - q and the area below phi is g = phi + sin(phi)
+/// cos(phi) - q sin(phi); g is concave, so Newton's method from the tangent at 0 never overshoots.
 SliceHeight slice_height(const DiscOverlap& overlap, double u) {
   const double radius = std::min(overlap.radius_a, overlap.radius_b);
   double low = 0.0;

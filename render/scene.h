@@ -33,9 +33,10 @@ struct RoughConductor {
 /// Reflects nothing.
 struct Black {};
 
-/// A luminous body, a diffuser lit from behind: shows the same radiance from everywhere and reflects nothing. `radiance`
-/// is that in air, W/m^2/sr in each band; in a medium of index n that wets it n^2 times as much, as Fresnel's loss at the
-/// body's own face is left out. It is seen directly and by bounced light; without interreflection it lights nothing.
+/// A luminous body, a diffuser lit from behind: shows the same radiance from everywhere and reflects nothing.
+/// `radiance` is that in air, W/m^2/sr in each band; in a medium of index n that wets it n^2 times as much, as
+/// Fresnel's loss at the body's own face is left out. It is seen directly and by bounced light; without interreflection
+/// it lights nothing.
 struct Emitter {
   Spectrum radiance;
 };

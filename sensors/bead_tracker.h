@@ -10,8 +10,8 @@
 //   and for bright beads alike.
 // - Step vii takes the centroid of all highlighted pixels. Where several connected regions are left, this tracker takes
 //   the one whose centroid is nearest to the bead's last position, among those that look like a bead (BeadLook).
-//   Otsu's method is then applied again to the highlighted class alone: where a bead touches something half as dark, this
-//   core lies elsewhere than the whole region, and its centroid is taken.
+//   Otsu's method is then applied again to the highlighted class alone: where a bead touches something half as dark,
+//   this core lies elsewhere than the whole region, and its centroid is taken.
 // - A region that touches the window's border is cut by it: the window is moved onto it, and it is measured again.
 // - A window in which nothing looks like a bead gives no measurement, where Otsu's method alone would invent one. Then
 //   the whole cell is searched, coarsely; if there's no bead either, the bead is `hidden`: its position is held for

@@ -31,7 +31,7 @@ struct ShapeSpec {
 /// where the motion starts, level.
 struct ScreenSpec {
   double radius_mm = 0.0;
-  double behind_mm = 0.0;  ///< its front face above the object's origin at the start
+  double behind_mm = 0.0;                      ///< its front face above the object's origin at the start
   Eigen::Vector3d radiance = {1.0, 1.0, 1.0};  ///< W/m^2/sr in the bands red, green, blue
 };
 

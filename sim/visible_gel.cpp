@@ -12,8 +12,8 @@ namespace touchstone::sim {
 namespace {
 
 constexpr int kSubdivisions = 2;
-constexpr std::size_t kParts = 16;   // 4^kSubdivisions
-constexpr double kWettedMm = 1e-3;   // a film of air thinner than this isn't there for the light
+constexpr std::size_t kParts = 16;  // 4^kSubdivisions
+constexpr double kWettedMm = 1e-3;  // a film of air thinner than this isn't there for the light
 
 using Weights = Eigen::SparseMatrix<double, Eigen::RowMajor>;
 

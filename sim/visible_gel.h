@@ -27,7 +27,7 @@ class VisibleGel {
   TriangleMesh dry_surface(const fem::PressState& press, const fem::ContactShape& shape) const;
 
  private:
-  Eigen::MatrixX3d rest_;                       // of the mechanics' vertices
+  Eigen::MatrixX3d rest_;                                  // of the mechanics' vertices
   Eigen::SparseMatrix<double, Eigen::RowMajor> averaged_;  // hat-weighted means from values at the vertices
   Eigen::SparseMatrix<double, Eigen::RowMajor> fine_from_coarse_;
   std::vector<std::array<int, 3>> coarse_, fine_;  // triangles; those of coarse triangle i begin at fine_[i * kParts]
