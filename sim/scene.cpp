@@ -48,6 +48,7 @@ void fields(YamlReader& in, SceneSpec& scene) {
   in.optional("outputs", scene.outputs);
   in.optional("light", scene.light);
   in.optional("effects", scene.effects);
+  in.optional("lamp_level", scene.lamp_level, Allowed::within(0.0, 1.0));
   in.optional("seed", scene.seed);
 }
 

@@ -45,6 +45,7 @@ struct SceneSpec {
   OutputSpec outputs;
   LightSpec light;
   EffectSwitches effects;
+  double lamp_level = 1.0;  ///< the device's lamps are dimmed to this part of their power
   std::uint64_t seed = 0;
   SourceLocation where;
 };

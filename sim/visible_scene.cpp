@@ -96,7 +96,7 @@ render::Scene visible_scene(const SceneSpec& scene, const Plan& plan, const Visi
   for (const LampSpec& lamp : device.lamps) {
     out.lamps.push_back({lamp.position_mm, (lamp.target_mm - lamp.position_mm).normalized(), lamp.lens_radius_mm,
                          lamp.half_angle_deg * kRadiansPerDegree, lamp.soft_angle_deg * kRadiansPerDegree,
-                         bands(lamp.power_W)});
+                         scene.lamp_level * bands(lamp.power_W)});
   }
   out.environment = render::flat_spectrum(3, device.room_radiance);
   out.interreflection = plan.interreflection;
