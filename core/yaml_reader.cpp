@@ -3,6 +3,7 @@
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 
@@ -200,6 +201,22 @@ void YamlReader::finish() const {
                   fmt::format("{}unknown key '{}'{}", context(), key, did_you_mean(key, node_->asked)));
     }
   }
+}
+
+void YamlReader::refuse_missing(const std::string& key) const {
+  // A key that is nearly the missing one is what was meant.
+  for (const auto& entry : node_->yaml) {
+    if (!entry.first.IsScalar()) continue;
+    const std::string there = entry.first.Scalar();
+    const std::array<std::string, 1> wanted = {key};
+    if (std::find(node_->asked.begin(), node_->asked.end(), there) == node_->asked.end() &&
+        nearest_name(there, wanted)) {
+      const int line = entry.first.Mark().is_null() ? 0 : entry.first.Mark().line + 1;
+      throw Error({node_->file, line},
+                  fmt::format("{}unknown key '{}'{}", context(), there, did_you_mean(there, wanted)));
+    }
+  }
+  fail_at(where(), "{}'{}' is missing", context(), key);
 }
 
 void YamlReader::refuse_name(const std::string& name, const std::vector<std::string>& known) const {

@@ -57,7 +57,7 @@ class YamlReader {
   template <typename T>
   void required(const std::string& key, T& value, Allowed allowed = {}) {
     auto node = child(key);
-    if (!node) fail_at(where(), "{}'{}' is missing", context(), key);
+    if (!node) refuse_missing(key);
     node->read(value, allowed);
   }
 
@@ -92,6 +92,7 @@ class YamlReader {
   std::string context() const;  ///< "gel.thickness_mm: " or ""
   void require_map() const;
   void finish() const;
+  [[noreturn]] void refuse_missing(const std::string& key) const;
 
   double number(Allowed allowed) const;
   void read(double& value, Allowed allowed) { value = number(allowed); }
