@@ -57,7 +57,7 @@ class BadInput : public ::testing::Test {
 
 TEST_F(BadInput, UnknownKeyNamesTheNearest) {
   change("device.yaml", "thickness_mm: 3", "thicknes_mm: 3");
-  expect_all_refuse("device.yaml:2", "'thickness_mm' is missing");
+  expect_all_refuse("device.yaml:2", "unknown key 'thicknes_mm' (did you mean 'thickness_mm'?)");
   test::write_small_job(folder_);
   change("object.yaml", "friction", "frictoin");
   expect_all_refuse("object.yaml:4", "did you mean 'friction'?");

@@ -86,7 +86,7 @@ TEST(Job, AYamlFileThatHoldsItselfEnds) {
 
 TEST(JobErrors, NameFileAndLine) {
   EXPECT_THAT(message_of_job("name: a\nseed: 1\nscenes:\n  - {name: x, scene: scene.yaml, splitt: train}\n"),
-              AllOf(HasSubstr("job.yaml:4:"), HasSubstr("'split' is missing")));
+              AllOf(HasSubstr("job.yaml:4:"), HasSubstr("unknown key 'splitt' (did you mean 'split'?)")));
   EXPECT_THAT(message_of_job("name: a\nseed: 1\nscens: []\n"), AllOf(HasSubstr("job.yaml:"), HasSubstr("'scenes'")));
   EXPECT_THAT(message_of_job("name: a\nseed: 1\nscenes: []\n"), AllOf(HasSubstr("job.yaml:3:"), HasSubstr("no scene")));
   EXPECT_THAT(message_of_job("name: a\nseed: -1\nscenes: []\n"), HasSubstr("job.yaml:2:"));

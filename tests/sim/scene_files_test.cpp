@@ -72,7 +72,7 @@ TEST(SceneFiles, TheSmallDeviceReads) {
 
 TEST(SceneFiles, AnUnknownKeyNamesItsLineAndTheNearestOne) {
   EXPECT_EQ(error_of_device(replaced(kDevice, "thickness_mm: 4", "thicknes_mm: 4")),
-            "device.yaml:3: gel: 'thickness_mm' is missing");
+            "device.yaml:5: gel: unknown key 'thicknes_mm' (did you mean 'thickness_mm'?)");
   EXPECT_EQ(error_of_device(replaced(kDevice, "  thickness_mm: 4\n", "  thickness_mm: 4\n  poison_ratio: 0.4\n")),
             "device.yaml:6: gel: unknown key 'poison_ratio' (did you mean 'poisson_ratio'?)");
 }
