@@ -26,45 +26,29 @@ using Eigen::Vector3d;
 
 constexpr double kModulus = 1.0;  // MPa
 
-/// Work that rows share: the gels, set up when first asked for.
+/// The gels that rows share; set up once, then read from the cache.
 class Gels {
  public:
   explicit Gels(const ValidateOptions& options) : cache_(options.cache) {}
 
   /// 60 mm thick, 120 mm wide, fine in the middle: a half space to 1 % for contacts below 1.2 mm.
   fem::Compliance thick(double poisson_ratio) const {
-    fem::SlabMesh slab;
-    slab.size_x = slab.size_y = 120.0;
-    slab.thickness = 60.0;
-    slab.fine = 0.2;
-    slab.coarse = 14.0;
-    slab.fine_half_x = slab.fine_half_y = 1.3;
-    slab.fine_depth = 0.3;
-    return fem::cached_compliance(slab, {kModulus, poisson_ratio}, {}, cache_);
+    return square({120.0, 120.0, 60.0, 0.2, 14.0, 1.3, 1.3, 0.3}, poisson_ratio);
   }
   /// 5 mm thick, half-width 4 thicknesses.
   fem::Compliance layer(double poisson_ratio) const {
-    fem::SlabMesh slab;
-    slab.size_x = slab.size_y = 40.0;
-    slab.thickness = 5.0;
-    slab.fine = 0.4;
-    slab.coarse = 2.5;
-    slab.fine_half_x = slab.fine_half_y = 2.4;
-    slab.fine_depth = 0.6;
-    return fem::cached_compliance(slab, {kModulus, poisson_ratio}, {}, cache_);
+    return square({40.0, 40.0, 5.0, 0.4, 2.5, 2.4, 2.4, 0.6}, poisson_ratio);
   }
   /// 2 mm thick, half-width 6 thicknesses, evenly meshed: for loads all over its face.
   fem::Compliance even(double poisson_ratio) const {
-    fem::SlabMesh slab;
-    slab.size_x = slab.size_y = 24.0;
-    slab.thickness = 2.0;
-    slab.fine = slab.coarse = 0.9;
-    slab.fine_half_x = slab.fine_half_y = 12.0;
-    slab.fine_depth = 1.0;
-    return fem::cached_compliance(slab, {kModulus, poisson_ratio}, {}, cache_);
+    return square({24.0, 24.0, 2.0, 0.9, 0.9, 12.0, 12.0, 1.0}, poisson_ratio);
   }
 
  private:
+  fem::Compliance square(const fem::SlabMesh& slab, double poisson_ratio) const {
+    return fem::cached_compliance(slab, {kModulus, poisson_ratio}, {}, cache_);
+  }
+
   std::filesystem::path cache_;
 };
 
