@@ -53,6 +53,27 @@ TEST(PinholeImage, At30DegreesAFoilOfHalfTheHoleLeaves36Percent) {
   EXPECT_NEAR(lab::pinhole_irradiance(1.0, 0.1, 5.0, kPi / 6.0, 0.0) / centre, 0.5625, 1e-9);
 }
 
+// Far off the axis the two rims leave a lens of the hole open. Drawn uniformly over it a sample's weight varies only
+// with the way's own length and slant.
+TEST(PinholeRay, WeightHardlyVariesOverTheHole) {
+  const PinholeCamera camera = wide_camera(50.0);
+  for (double x : {30.5, 45.0, 54.0}) {  // 0, 19 and 29 degrees
+    double sum = 0.0;
+    double squares = 0.0;
+    constexpr int kSide = 200;
+    for (int i = 0; i < kSide * kSide; ++i) {
+      const auto ray = pinhole_ray(camera, x, 20.5, (i % kSide + 0.5) / kSide, (i / kSide + 0.5) / kSide);
+      ASSERT_TRUE(ray);
+      sum += ray->weight;
+      squares += ray->weight * ray->weight;
+    }
+    const double mean = sum / (kSide * kSide);
+    EXPECT_LT(std::sqrt(std::max(0.0, squares / (kSide * kSide) - mean * mean)) / mean, 0.015) << x;
+    const double angle = std::atan(0.12 * std::abs(x - 30.5) / 5.0);
+    EXPECT_NEAR(mean / lab::pinhole_irradiance(1.0, 0.1, 5.0, angle, 0.05), 1.0, 0.012) << "good to foil / distance";
+  }
+}
+
 TEST(PinholeImage, AThickFoilHidesTheCorners) {
   PinholeCamera camera = wide_camera(400.0);
   const cv::Mat image = Tracer(empty_scene(1.0)).render(camera, samples(16)).irradiance;

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <opencv2/core.hpp>
+#include <vector>
 
 #include "core/units.h"
 #include "lab/light_closed_forms.h"
@@ -146,6 +147,64 @@ TEST(PointLamp, ShadowIsDarkThroughTheStack) {
   EXPECT_FALSE(lit(on_path + Eigen::Vector3d(0.2, 0, 0)));
   EXPECT_TRUE(lit(on_path + Eigen::Vector3d(0.35, 0, 0)));
   EXPECT_TRUE(lit(on_path - Eigen::Vector3d(0.35, 0, 0)));
+}
+
+// One lamp is traced a hit; over the samples of a pixel it must be all of them, also the dark one and many.
+TEST(ManyLamps, AddUp) {
+  for (const int count : {3, 40}) {
+    Scene scene = empty_scene(0.0);
+    scene.interreflection = false;
+    scene.balls.push_back({{0, 0, 0}, 2.0, Lambertian{grey(0.7)}});
+    std::vector<SpotLamp> lamps;
+    for (int i = 0; i < count; ++i) {
+      const double angle = 2.0 * kPi * i / count;
+      const Eigen::Vector3d position(12 * std::cos(angle), 12 * std::sin(angle), -10.0);
+      lamps.push_back(half_space_lamp(position, -position, i == 1 ? 0.0 : 1.0 + i % 5));
+    }
+    const Eigen::Vector3d eye(0, 0, -30);
+    for (const Eigen::Vector3d& target : {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(1.6, 0.3, 0)}) {
+      double sum = 0.0;
+      for (const SpotLamp& lamp : lamps) {
+        scene.lamps = {lamp};
+        sum += Tracer(scene).radiance(eye, target - eye, samples(1))[0];
+      }
+      scene.lamps = lamps;
+      // Few lamps are weighed, so that samples hardly differ; many are drawn evenly.
+      const double seen = Tracer(scene).radiance(eye, target - eye, samples(count > 32 ? 1 << 16 : 1 << 12))[0];
+      EXPECT_NEAR(seen / sum, 1.0, 2e-3) << count << " lamps";
+    }
+  }
+}
+
+TEST(ManyLamps, AllDarkGiveNoLight) {
+  Scene scene = empty_scene(0.0);
+  scene.surfaces.push_back({square_sheet(50.0, 0.0, false), Lambertian{grey(0.7)}});
+  for (int i = 0; i < 3; ++i) scene.lamps.push_back(half_space_lamp({1.0 * i, 0, -4}, {0, 0, 1}, 0.0));
+  EXPECT_EQ(Tracer(scene).radiance({0, 0, -1}, {0, 0, 1}, samples(16))[0], 0.0);
+}
+
+TEST(Panel, ShowsItsRadianceAndNothingElse) {
+  Scene scene = empty_scene(5.0);
+  scene.surfaces.push_back({square_sheet(50.0, 2.0, false), Emitter{grey(3.0)}});
+  scene.lamps.push_back(half_space_lamp({0, 0, -4}, {0, 0, 1}, 100.0));
+  for (double angle : {0.0, 0.5, 1.2}) {
+    EXPECT_DOUBLE_EQ(Tracer(scene).radiance({0, 0, 0}, slanted(angle), samples(4))[0], 3.0);
+  }
+}
+
+// Through a gel the panel loses Fresnel's share at the gel's own face; wetted by the gel it shows all of its light.
+TEST(Panel, IsSeenThroughAGelAsFresnelSays) {
+  const auto seen = [](bool wet) {
+    Scene scene = empty_scene(0.0);
+    scene.media = {Medium{1.0, {}}, Medium{1.5, {}}};
+    scene.faces = {{0.0, 0, 1}};
+    if (!wet) scene.faces.push_back({3.0, 1, 0});
+    scene.surfaces.push_back({square_sheet(50.0, 3.0 + 1e-3, false), Emitter{grey(1.0)}});
+    return Tracer(scene).radiance({0, 0, -5}, {0, 0, 1}, samples(4096))[0];
+  };
+  const double face = 0.04;
+  EXPECT_NEAR(seen(true), 1.0 - face, 1e-3);
+  EXPECT_NEAR(seen(false), (1.0 - face) / (1.0 + face), 1e-3) << "a plate before a panel that reflects nothing";
 }
 
 TEST(Surroundings, AreHiddenByADiscAndASphereAsTheirFormFactorsSay) {

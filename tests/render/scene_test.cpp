@@ -47,6 +47,8 @@ TEST(SceneCheck, FaultsAreRefusedByName) {
   expect_refused([](Scene& s) { s.surfaces[0].material = Refractive{2, 3}; }, "medium_outside");
   expect_refused([](Scene& s) { s.surfaces[0].material = Lambertian{grey(1.5)}; }, "albedo is 1.5");
   expect_refused([](Scene& s) { s.surfaces[0].material = Lambertian{Spectrum::Constant(3, 0.5)}; }, "3 bands");
+  expect_refused([](Scene& s) { s.surfaces[0].material = Emitter{grey(-1.0)}; }, "radiance is -1");
+  expect_refused([](Scene& s) { s.surfaces[0].material = Emitter{grey(kNan)}; }, "radiance");
   expect_refused([](Scene& s) { s.balls[0].radius = -0.25; }, "ball 0: radius is -0.25");
   expect_refused([](Scene& s) { s.balls[0].centre.x() = INFINITY; }, "ball 0");
   expect_refused([](Scene& s) { s.balls[0].material = RoughConductor{grey(0.5), 0.0}; }, "roughness is 0");
