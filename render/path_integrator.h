@@ -112,6 +112,7 @@ class PathIntegrator {
     double rest = number * total;
     int i = 0;
     while (i + 1 < lamp_count && rest >= weights[i]) rest -= weights[i++];
+    while (weights[i] == 0.0) --i;  // rounding may have run past the last lamp that shines
     return {i, weights[i] / total};
   }
 
