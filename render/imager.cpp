@@ -56,7 +56,7 @@ int opencv_code(BayerPattern bayer, Demosaic method) {
     case BayerPattern::none:
       break;
   }
-  TS_ASSERT(!"a grey sensor has no colour to fill in");
+  TS_ASSERT(false && "a grey sensor has no colour to fill in");
   return 0;
 }
 
@@ -104,7 +104,7 @@ struct PixelModel {
            i % bands, values[i]);
     }
   }
-  TS_ASSERT(!"the row holds a bad irradiance");
+  TS_ASSERT(false && "the row holds a bad irradiance");
   std::abort();
 }
 

@@ -195,7 +195,7 @@ void BrightnessScale::read(const cv::Mat& image, int x, int y, int stride, int c
       return;
     }
     default:
-      TS_ASSERT(!"image types are checked before");
+      TS_ASSERT(false && "image types are checked before");
   }
 }
 
