@@ -120,6 +120,32 @@ std::optional<double> first_entry(const ContactShape& shape, const Eigen::Vector
   return std::visit([&](const auto& body) { return first_entry(body, p, d); }, shape);
 }
 
+std::optional<double> silhouette_distance(const SphereShape& shape, const Eigen::Vector3d& p,
+                                          const Eigen::Vector3d& d) {
+  return shape.radius - (p - p.dot(d) * d).norm();
+}
+
+std::optional<double> silhouette_distance(const RoundedCylinder& shape, const Eigen::Vector3d& p,
+                                          const Eigen::Vector3d& d) {
+  if (d.x() * d.x() + d.y() * d.y() >= 1e-30) return std::nullopt;
+  return shape.radius - std::sqrt(p.x() * p.x() + p.y() * p.y());
+}
+
+std::optional<double> silhouette_distance(const BoxShape& shape, const Eigen::Vector3d& p, const Eigen::Vector3d& d) {
+  for (int axis = 0; axis < 3; ++axis) {
+    const int u = (axis + 1) % 3;
+    const int v = (axis + 2) % 3;
+    if (d[u] == 0.0 && d[v] == 0.0) {
+      return std::min(0.5 * shape.size[u] - std::abs(p[u]), 0.5 * shape.size[v] - std::abs(p[v]));
+    }
+  }
+  return std::nullopt;
+}
+
+std::optional<double> silhouette_distance(const MeshShape&, const Eigen::Vector3d&, const Eigen::Vector3d&) {
+  return std::nullopt;
+}
+
 BoundingBall bounding_ball(const ContactShape& shape) {
   if (const auto* sphere = std::get_if<SphereShape>(&shape)) return {Eigen::Vector3d::Zero(), sphere->radius};
   if (const auto* cylinder = std::get_if<RoundedCylinder>(&shape)) {

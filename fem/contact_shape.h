@@ -46,6 +46,18 @@ std::optional<double> first_entry(const MeshShape& shape, const Eigen::Vector3d&
 std::optional<double> first_entry(const ContactShape& shape, const Eigen::Vector3d& point,
                                   const Eigen::Vector3d& direction);
 
+/// How far inside the body's silhouette the line lies: the signed distance, across the direction, from the line to the
+/// silhouette's outline, positive where the line hits; outside a corner it may be less than the distance. Nothing where
+/// there is no closed form for this direction. Continuous in `point`.
+std::optional<double> silhouette_distance(const SphereShape& shape, const Eigen::Vector3d& point,
+                                          const Eigen::Vector3d& direction);
+std::optional<double> silhouette_distance(const RoundedCylinder& shape, const Eigen::Vector3d& point,
+                                          const Eigen::Vector3d& direction);
+std::optional<double> silhouette_distance(const BoxShape& shape, const Eigen::Vector3d& point,
+                                          const Eigen::Vector3d& direction);
+std::optional<double> silhouette_distance(const MeshShape& shape, const Eigen::Vector3d& point,
+                                          const Eigen::Vector3d& direction);
+
 /// A ball that holds the whole body: centre in the object frame and radius.
 struct BoundingBall {
   Eigen::Vector3d centre;

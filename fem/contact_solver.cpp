@@ -181,9 +181,9 @@ class FrictionalNewton {
         continue;
       }
       const Eigen::Vector2d v = predicted(i);
-      const double limit = problem_.friction * std::max(0.0, p);
+      const double limit = problem_.friction[i] * std::max(0.0, p);
       const Eigen::Vector2d t = answer.z.segment<2>(3 * i + 1);
-      if (std::isinf(problem_.friction) || v.norm() <= limit) {
+      if (std::isinf(problem_.friction[i]) || v.norm() <= limit) {
         answer.state[i] = NodeState::stick;
         worst = std::max(worst, (t - v).norm());
       } else {
@@ -229,19 +229,45 @@ class FrictionalNewton {
       } else {
         const Eigen::Vector2d v = predicted(i);
         const Eigen::Vector2d t = answer.z.segment<2>(3 * i + 1);
-        const double limit = problem_.friction * std::max(0.0, answer.z[3 * i]);
+        const double limit = problem_.friction[i] * std::max(0.0, answer.z[3 * i]);
         right.segment<2>(at + 1) = -tangential_scale(i) * (t - limit * v.normalized());
       }
     }
     if (k_ > 0) right.tail(k_) = problem_.force - problem_.border.transpose() * answer.z;
-    Eigen::VectorXd change = memory_.lu.solve(right);
-    ++answer.iterations;
+    const Eigen::VectorXd change = memory_.lu.solve(right);
     if (!change.allFinite()) return false;
-    for (std::size_t row = 0; row < set_.size(); ++row) {
-      answer.z.segment<3>(3 * set_[row]) += change.segment<3>(static_cast<Eigen::Index>(3 * row));
+    take(change);
+    return true;
+  }
+
+  /// One step with the remembered sets and Jacobian, whatever the current iterate looks like: what stuck goes on
+  /// sticking, what slid goes on sliding the same way. False if nothing fitting is remembered.
+  bool predict() {
+    if (static_cast<int>(memory_.state.size()) != m_) return false;
+    for (int i = 0; i < m_; ++i) {
+      if (memory_.state[i] != NodeState::open && !std::isfinite(problem_.gap[i])) return false;
     }
-    if (k_ > 0) answer.shift += change.tail(k_);
-    refresh();
+    set_.clear();
+    for (int i = 0; i < m_; ++i) {
+      if (memory_.state[i] != NodeState::open) {
+        set_.push_back(i);
+      } else {
+        answer.z.segment<3>(3 * i).setZero();
+      }
+    }
+    const auto size = static_cast<Eigen::Index>(3 * set_.size());
+    if (set_.empty() || memory_.lu.size() != size + k_) return false;
+    answer.response = times_sparse(a_, answer.z);
+    slack_ = answer.response + problem_.border * answer.shift;
+    Eigen::VectorXd right = Eigen::VectorXd::Zero(size + k_);
+    for (std::size_t row = 0; row < set_.size(); ++row) {
+      const int i = set_[row];
+      const auto at = static_cast<Eigen::Index>(3 * row);
+      right[at] = -gap_at(i);
+      if (memory_.state[i] == NodeState::stick) right.segment<2>(at + 1) = -slip_at(i);
+    }
+    if (k_ > 0) right.tail(k_) = problem_.force - problem_.border.transpose() * answer.z;
+    take(memory_.lu.solve(right));
     return true;
   }
 
@@ -264,7 +290,7 @@ class FrictionalNewton {
                                   problem_.drag.segment<2>(2 * i) +
                                   (now[0] - before[0]) * a_.block<2, 1>(3 * i + 1, 3 * i);
         Eigen::Vector2d t = before.tail<2>() - d / scale;
-        const double limit = problem_.friction * now[0];
+        const double limit = problem_.friction[i] * now[0];
         if (now[0] == 0.0) {
           t.setZero();
         } else if (t.norm() > limit) {
@@ -282,6 +308,16 @@ class FrictionalNewton {
   }
 
  private:
+  /// Adds a step over the vertices of `set_` and the shifts.
+  void take(const Eigen::VectorXd& change) {
+    ++answer.iterations;
+    for (std::size_t row = 0; row < set_.size(); ++row) {
+      answer.z.segment<3>(3 * set_[row]) += change.segment<3>(static_cast<Eigen::Index>(3 * row));
+    }
+    if (k_ > 0) answer.shift += change.tail(k_);
+    refresh();
+  }
+
   double gap_at(int i) const { return problem_.gap[i] + slack_[3 * i]; }
   Eigen::Vector2d slip_at(int i) const { return slack_.segment<2>(3 * i + 1) - problem_.drag.segment<2>(2 * i); }
   double tangential_scale(int i) const { return std::max(a_(3 * i + 1, 3 * i + 1), a_(3 * i + 2, 3 * i + 2)); }
@@ -310,11 +346,11 @@ class FrictionalNewton {
       // Derivative of t - mu p v/|v| with v = t - d/scale, times scale. The factor is at most 1 at the answer; far
       // from it the clamp keeps the step from pointing away (Hueber, Stadler and Wohlmuth, SIAM J. Sci. Comput. 30,
       // 2008).
-      const double factor = std::min(1.0, problem_.friction * std::max(0.0, answer.z[3 * i]) / length);
+      const double factor = std::min(1.0, problem_.friction[i] * std::max(0.0, answer.z[3 * i]) / length);
       const Eigen::Matrix2d across = factor * (Eigen::Matrix2d::Identity() - along * along.transpose());
       jacobian.middleRows<2>(at) = (across * jacobian.middleRows<2>(at)).eval();
       jacobian.block<2, 2>(at, at) += scale * (Eigen::Matrix2d::Identity() - across);
-      jacobian.block<2, 1>(at, at - 1) -= scale * problem_.friction * along;
+      jacobian.block<2, 1>(at, at - 1) -= scale * problem_.friction[i] * along;
     }
     ++answer.factorisations;
     if (!memory_.lu.compute(std::move(jacobian))) return false;
@@ -372,7 +408,8 @@ ContactAnswer newton_with_sweeps(const ContactProblem& problem, const Eigen::Vec
   Eigen::VectorXd best_shift;
   int since_best = 0;
   bool keep = true;
-  if (problem.border.cols() == 0 && newton.answer.residual > kFarFromSets) newton.sweep(kFirstSweeps);
+  const bool predicted = newton.predict();
+  if (!predicted && problem.border.cols() == 0 && newton.answer.residual > kFarFromSets) newton.sweep(kFirstSweeps);
   for (int iteration = 0; iteration < kMostNewton; ++iteration) {
     double before = newton.answer.residual;
     if (before < best) {

@@ -24,12 +24,12 @@ enum class NodeState : std::uint8_t { open = 0, stick = 1, slip = 2 };
 /// One contact problem. `compliance` is A, symmetric positive definite, (c m) x (c m), mm^3 per MPa.
 struct ContactProblem {
   const Eigen::MatrixXd* compliance = nullptr;
-  int components = 1;      ///< c: 1 or 3
-  Eigen::VectorXd gap;     ///< m, mm^3; infinity: can't touch
-  Eigen::VectorXd drag;    ///< 2 m, mm^3; with friction only
-  double friction = 0.0;   ///< mu; infinity: what touches sticks
-  Eigen::MatrixXd border;  ///< (c m) x k
-  Eigen::VectorXd force;   ///< k, N
+  int components = 1;        ///< c: 1 or 3
+  Eigen::VectorXd gap;       ///< m, mm^3; infinity: can't touch
+  Eigen::VectorXd drag;      ///< 2 m, mm^3; with friction only
+  Eigen::VectorXd friction;  ///< m, mu, with friction only; infinity: what touches sticks
+  Eigen::MatrixXd border;    ///< (c m) x k
+  Eigen::VectorXd force;     ///< k, N
 };
 
 /// The last factorised system, which serves again while the same vertices are in contact in the same way. It belongs to
@@ -60,8 +60,9 @@ ContactAnswer solve_frictionless(const ContactProblem& problem, const Eigen::Vec
 
 /// With friction (components == 3): semismooth Newton on the projection equations, the factorised Jacobian kept while
 /// the sets of open, sticking and slipping vertices stay and it converges fast; block Gauss-Seidel sweeps with
-/// projection on the disc before it, to find the sets, and where it stalls. `start` is z to begin with, or empty. Ends
-/// when `residual` <= tolerance.
+/// projection on the disc where it stalls. It begins with the remembered sets, as if all went on sticking, sliding the
+/// same way or staying apart, or, without memory, with sweeps. `start` is z to begin with, or empty. Ends when
+/// `residual` <= tolerance.
 ContactAnswer solve_frictional(const ContactProblem& problem, const Eigen::VectorXd& start, double tolerance,
                                ContactMemory& memory);
 
