@@ -14,6 +14,7 @@ constexpr int kSilhouetteSplits = 2;     // levels of splitting on the silhouett
 constexpr int kBisections = 34;          // of a cell's edge: a quarter of a triangle's to 1e-11
 constexpr int kFalsePositions = 40;      // likewise, where the distance to the silhouette is known: some 5 do
 constexpr double kSplitAboveBody = 1.0;  // a cell larger than this times the body's radius is split
+constexpr double kSteep = 2.0;           // rise within a triangle, in its size, from which the body's side is seen
 constexpr double kBodiesLarge = 4.0;     // bodies larger than this times a triangle can't hide between its corners
 
 /// Radon's rule of degree 5 on a triangle (J. Radon, Monatsh. Math. Phys. 52, 1948): barycentric points and weights.
@@ -59,8 +60,12 @@ class TriangleGap {
     return first_entry(shape_, object_from_gel_ * corner, object_from_gel_.turn(normal)).value_or(kInfinity);
   }
 
+  /// Where the gap is more than `steep` above `level` the body's side is seen, which doesn't bear: it fades out, up to
+  /// twice that.
   void integrate(const std::array<Eigen::Vector3d, 3>& corners, const std::array<Eigen::Vector3d, 3>& normals,
-                 bool one_normal, double area) {
+                 bool one_normal, double area, double level, double steep) {
+    level_ = level;
+    steep_ = steep;
     gap.setZero();
     covered.setZero();
     lowest = kInfinity;
@@ -213,6 +218,7 @@ class TriangleGap {
   }
 
   void add(const Eigen::Vector3d& b, double value, double weight) {
+    weight *= std::clamp(2.0 - (value - level_) / steep_, 0.0, 1.0);
     gap += weight * value * b;
     covered += weight * b;
     lowest = std::min(lowest, value);
@@ -226,6 +232,8 @@ class TriangleGap {
   bool one_normal_ = true;
   bool has_silhouette_ = false;
   double area_ = 0.0;
+  double level_ = 0.0;
+  double steep_ = 1.0;
 };
 
 bool is_convex(const ContactShape& shape) {
@@ -300,12 +308,11 @@ WeightedGap weighted_gap(const ContactSurface& surface, const ContactShape& shap
   std::visit(
       [&](const auto& body) {
         TriangleGap triangle(body, gel_from_object.inverse(), ball.radius);
-        Eigen::VectorXd corner_gap;
+        Eigen::VectorXd corner_gap(n);
+        for (std::size_t v = 0; v < moved.size(); ++v) {
+          corner_gap[static_cast<Eigen::Index>(v)] = triangle.corner_gap(moved[v], surface.normals[v]);
+        }
         if (may_skip) {
-          corner_gap.resize(n);
-          for (std::size_t v = 0; v < moved.size(); ++v) {
-            corner_gap[static_cast<Eigen::Index>(v)] = triangle.corner_gap(moved[v], surface.normals[v]);
-          }
           const double least = corner_gap.minCoeff();
           result.reach = std::max(0.0, least) + asked.margin + asked.of_depth * std::max(0.0, -least);
         }
@@ -321,9 +328,9 @@ WeightedGap weighted_gap(const ContactSurface& surface, const ContactShape& shap
             const double limit = size + ball.radius;
             if (away.squaredNorm() - std::pow(away.dot(normals[0]), 2) > limit * limit) continue;
           }
+          double least = std::min({corner_gap[index[0]], corner_gap[index[1]], corner_gap[index[2]]});
           if (may_skip && ball.radius > kBodiesLarge * size) {
             // A convex body's gap is convex along the surface; steeper than 45 degrees it is beside the contact.
-            const double least = std::min({corner_gap[index[0]], corner_gap[index[1]], corner_gap[index[2]]});
             const double most = std::max({corner_gap[index[0]], corner_gap[index[1]], corner_gap[index[2]]});
             if (std::isfinite(most) && least > result.reach + size) {
               for (const int v : index) skipped[v] = 1;
@@ -331,7 +338,11 @@ WeightedGap weighted_gap(const ContactSurface& surface, const ContactShape& shap
             }
           }
           // Integrals over the undeformed surface: the moved triangle only says where to look.
-          triangle.integrate(corners, normals, one_normal, surface.triangle_area[t]);
+          for (int k = 0; k < 3 && !std::isfinite(least); ++k) {
+            for (const int u : surface.around[index[k]]) least = std::min(least, corner_gap[u]);
+          }
+          if (!std::isfinite(least)) least = std::numeric_limits<double>::max();  // a small body between the vertices
+          triangle.integrate(corners, normals, one_normal, surface.triangle_area[t], least, kSteep * size);
           for (int k = 0; k < 3; ++k) {
             result.plain[index[k]] += triangle.gap[k];
             covered[index[k]] += triangle.covered[k];

@@ -26,6 +26,25 @@ Eigen::VectorXd times_sparse(const Eigen::MatrixXd& a, const Eigen::VectorXd& z)
   return result;
 }
 
+/// Sees to it that each wanted force has a vertex that can carry it: the nearest one. False if there is none.
+bool somebody_carries(const ContactProblem& problem, std::vector<char>& active) {
+  const auto m = static_cast<int>(problem.gap.size());
+  for (Eigen::Index b = 0; b < problem.border.cols(); ++b) {
+    int nearest = -1;
+    bool carried = problem.hold.size() > b && problem.hold[b] > 0.0;
+    for (int i = 0; i < m && !carried; ++i) {
+      const double weight = problem.border(i, b);
+      if (weight == 0.0 || !std::isfinite(problem.gap[i])) continue;
+      carried = active[i] != 0;
+      if (nearest < 0 || problem.gap[i] * problem.border(nearest, b) < problem.gap[nearest] * weight) nearest = i;
+    }
+    if (carried) continue;
+    if (nearest < 0) return false;
+    active[nearest] = 1;
+  }
+  return true;
+}
+
 }  // namespace
 
 ContactAnswer solve_frictionless(const ContactProblem& problem, const Eigen::VectorXd& start, ContactMemory& memory) {
@@ -36,22 +55,11 @@ ContactAnswer solve_frictionless(const ContactProblem& problem, const Eigen::Vec
   ContactAnswer answer;
   answer.shift = Eigen::VectorXd::Zero(k);
   std::vector<char> active(m, 0);
-  bool any = false;
   for (int i = 0; i < m; ++i) {
     const bool able = std::isfinite(problem.gap[i]);
     active[i] = able && (start.size() == m ? start[i] > 0.0 : problem.gap[i] < 0.0);
-    any = any || active[i];
   }
-  if (!any && k > 0) {
-    int nearest = -1;
-    for (int i = 0; i < m; ++i) {
-      if (nearest < 0 || problem.gap[i] / problem.border(i, 0) < problem.gap[nearest] / problem.border(nearest, 0)) {
-        nearest = i;
-      }
-    }
-    if (nearest < 0 || !std::isfinite(problem.gap[nearest])) return answer;
-    active[nearest] = 1;
-  }
+  if (!somebody_carries(problem, active)) return answer;
   int fewest = std::numeric_limits<int>::max();
   int tries = kBlockTries;
   std::vector<int> set;
@@ -77,7 +85,8 @@ ContactAnswer solve_frictionless(const ContactProblem& problem, const Eigen::Vec
       if (k > 0) {
         const Eigen::MatrixXd border = problem.border(set, Eigen::all);
         const Eigen::MatrixXd through = memory.cholesky.solve(border);
-        const Eigen::MatrixXd schur = border.transpose() * through;
+        Eigen::MatrixXd schur = border.transpose() * through;
+        if (problem.hold.size() == k) schur.diagonal() += problem.hold;
         answer.shift = schur.partialPivLu().solve(border.transpose() * p - problem.force);
         p -= through * answer.shift;
       }
@@ -122,17 +131,10 @@ ContactAnswer solve_frictionless(const ContactProblem& problem, const Eigen::Vec
       std::fill(flip.begin(), flip.end(), 0);
       flip[last] = 1;
     }
-    int left = 0;
     for (int i = 0; i < m; ++i) {
       if (flip[i]) active[i] = !active[i];
-      left += active[i];
     }
-    // A wanted force needs somebody to carry it.
-    if (left == 0 && k > 0) {
-      Eigen::Index best = 0;
-      answer.z.maxCoeff(&best);
-      active[best] = 1;
-    }
+    if (!somebody_carries(problem, active)) return answer;
   }
   return answer;
 }
@@ -192,7 +194,7 @@ class FrictionalNewton {
       }
     }
     for (int b = 0; b < k_; ++b) {
-      const double missing = problem_.border.col(b).dot(answer.z) - problem_.force[b];
+      const double missing = problem_.border.col(b).dot(answer.z) - held(b) - problem_.force[b];
       worst = std::max(worst, std::abs(missing) / problem_.border.col(b).cwiseAbs().maxCoeff());
     }
     answer.residual = largest > 0.0 ? worst / largest : (worst > 0.0 ? 1.0 : 0.0);
@@ -233,7 +235,9 @@ class FrictionalNewton {
         right.segment<2>(at + 1) = -tangential_scale(i) * (t - limit * v.normalized());
       }
     }
-    if (k_ > 0) right.tail(k_) = problem_.force - problem_.border.transpose() * answer.z;
+    for (Eigen::Index b = 0; b < k_; ++b) {
+      right[size + b] = problem_.force[b] + held(b) - problem_.border.col(b).dot(answer.z);
+    }
     const Eigen::VectorXd change = memory_.lu.solve(right);
     if (!change.allFinite()) return false;
     take(change);
@@ -266,7 +270,9 @@ class FrictionalNewton {
       right[at] = -gap_at(i);
       if (memory_.state[i] == NodeState::stick) right.segment<2>(at + 1) = -slip_at(i);
     }
-    if (k_ > 0) right.tail(k_) = problem_.force - problem_.border.transpose() * answer.z;
+    for (Eigen::Index b = 0; b < k_; ++b) {
+      right[size + b] = problem_.force[b] + held(b) - problem_.border.col(b).dot(answer.z);
+    }
     take(memory_.lu.solve(right));
     return true;
   }
@@ -318,6 +324,7 @@ class FrictionalNewton {
     refresh();
   }
 
+  double held(Eigen::Index b) const { return problem_.hold.size() == k_ ? problem_.hold[b] * answer.shift[b] : 0.0; }
   double gap_at(int i) const { return problem_.gap[i] + slack_[3 * i]; }
   Eigen::Vector2d slip_at(int i) const { return slack_.segment<2>(3 * i + 1) - problem_.drag.segment<2>(2 * i); }
   double tangential_scale(int i) const { return std::max(a_(3 * i + 1, 3 * i + 1), a_(3 * i + 2, 3 * i + 2)); }
@@ -334,6 +341,7 @@ class FrictionalNewton {
       jacobian.topRightCorner(size, k_) = problem_.border(dofs, Eigen::all);
       jacobian.bottomLeftCorner(k_, size) = jacobian.topRightCorner(size, k_).transpose();
       jacobian.bottomRightCorner(k_, k_).setZero();
+      if (problem_.hold.size() == k_) jacobian.bottomRightCorner(k_, k_).diagonal() = -problem_.hold;
     }
     for (std::size_t row = 0; row < set_.size(); ++row) {
       const int i = set_[row];
@@ -384,9 +392,11 @@ ContactAnswer frictionless_start(const ContactProblem& problem) {
   part.gap = problem.gap;
   part.border.resize(m, pushing);
   part.force.resize(pushing);
+  if (problem.hold.size() == k) part.hold.resize(pushing);
   for (Eigen::Index b = 0; b < pushing; ++b) {
     part.border.col(b) = problem.border.col(columns[b])(normals);
     part.force[b] = problem.force[columns[b]];
+    if (problem.hold.size() == k) part.hold[b] = problem.hold[columns[b]];
   }
   ContactMemory none;
   const ContactAnswer found = solve_frictionless(part, {}, none);

@@ -5,7 +5,7 @@
 // With c components a vertex (1 without friction, 3 with it), m vertices and k rigid shifts s of the object (mm):
 //   normal:      g = gap + (A z + B s)_n >= 0,  p >= 0,  p g = 0
 //   tangential:  d = (A z + B s)_t - drag,  |t| <= mu p,  d = 0 where |t| < mu p,  t = -mu p d/|d| where it slips
-//   rigid:       B^T z = force
+//   rigid:       B^T z - hold s = force
 // (Wriggers, Computational Contact Mechanics, 2nd ed., sec. 5; the friction law as a projection: Alart and Curnier,
 // Comput. Methods Appl. Mech. Eng. 92, 1991.)
 
@@ -30,6 +30,7 @@ struct ContactProblem {
   Eigen::VectorXd friction;  ///< m, mu, with friction only; infinity: what touches sticks
   Eigen::MatrixXd border;    ///< (c m) x k
   Eigen::VectorXd force;     ///< k, N
+  Eigen::VectorXd hold;      ///< k, >= 0: stiffness that holds a shift back, N per mm; empty: none
 };
 
 /// The last factorised system, which serves again while the same vertices are in contact in the same way. It belongs to
@@ -55,7 +56,8 @@ struct ContactAnswer {
 
 /// Frictionless (components == 1): block principal pivoting (Judice and Pires, Computers Ops Res. 21, 1994), which is
 /// the primal-dual active set where that converges and ends also where that would cycle. `start` gives the first active
-/// set (p > 0); it may be empty. With one border column, `force` must be above zero.
+/// set (p > 0); it may be empty. A border column that pushes one way (all its entries of one sign) must have a `force`
+/// above zero.
 ContactAnswer solve_frictionless(const ContactProblem& problem, const Eigen::VectorXd& start, ContactMemory& memory);
 
 /// With friction (components == 3): semismooth Newton on the projection equations, the factorised Jacobian kept while

@@ -22,8 +22,10 @@ constexpr double kBulge = 0.5;
 constexpr double kLeastReach = 0.02;    // of the thickness
 constexpr double kSharpestCurve = 0.3;  // of a triangle: radius down to which a gap counts as smooth
 constexpr double kSlopeStep = 3e-4;     // of a triangle
-constexpr double kLargestTurn = 0.1;    // radians an update, under torque control
-constexpr double kMostTurn = 0.8;       // radians in all
+constexpr double kHoldFades = 0.25;     // an update, after the first few
+constexpr int kHeldUpdates = 2;
+constexpr double kLargestTurn = 0.1;  // radians an update, under torque control
+constexpr double kMostTurn = 0.8;     // radians in all
 
 /// Turns an answer without friction into one with three components a vertex.
 void widen(ContactAnswer& answer, const Eigen::MatrixXd& compliance) {
@@ -379,6 +381,9 @@ ContactProblem PartSolver::problem(const PressSnapshot& from, const std::vector<
     combined_normal_ = combined_(normals, normals);
     memory_.forget();
   }
+  for (const PartTarget& target : targets) {
+    if (target.turned[0] || target.turned[1] || target.turned[2]) memory_.forget();  // its border changes
+  }
   result.compliance = c == 3 ? &compliance() : elastic_ ? &combined_normal_ : &block_.normal_compliance();
   result.gap.resize(m);
   for (Eigen::Index j = 0; j < m; ++j) result.gap[j] = now.gap(vertices[j]);
@@ -397,6 +402,7 @@ ContactProblem PartSolver::problem(const PressSnapshot& from, const std::vector<
   }
   result.border = Eigen::MatrixXd::Zero(c * m, columns);
   result.force.resize(columns);
+  result.hold = Eigen::VectorXd::Zero(columns);
   Eigen::Index column = 0;
   for (std::size_t b = 0; b < targets.size(); ++b) {
     const PartTarget& target = targets[b];
@@ -404,6 +410,12 @@ ContactProblem PartSolver::problem(const PressSnapshot& from, const std::vector<
       const bool rotation = a >= 3;
       if (!(rotation ? target.turned[a - 3] : target.forced[a])) continue;
       result.force[column] = rotation ? target.torque[a - 3] : target.force[a];
+      if (rotation) {
+        // A turn is held back at first, when the contact may be a point or a line that doesn't resist it.
+        const double radius = std::max(now.bodies[b].patch_radius, size_);
+        result.hold[column] = 8.0 * shear_modulus(gel_.material) * std::pow(radius, 3) *
+                              std::pow(kHoldFades, std::max(0, now.updates - kHeldUpdates));
+      }
       const Eigen::Vector3d axis = Eigen::Vector3d::Unit(a % 3);
       for (Eigen::Index j = 0; j < m; ++j) {
         const int v = vertices[j];

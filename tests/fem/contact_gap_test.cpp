@@ -114,6 +114,21 @@ TEST(WeightedGap, FollowsTheGelsTangentialDisplacement) {
   for (Eigen::Index i = 0; i < rest.weighted.size(); ++i) EXPECT_NEAR(moved.weighted[i], rest.weighted[i], 1e-14);
 }
 
+TEST(WeightedGap, OfAPunchTiltedALittleIsThatOfTheStraightOne) {
+  // A sharp punch that leans by a milliradian shows its side, three millimetres high, as a rim of three micrometres.
+  const Compliance gel = flat_gel(2.0, 0.25);
+  const ContactSurface surface(gel);
+  const RoundedCylinder punch{1.1, 0.0, 3.0};
+  const WeightedGap straight = weighted_gap(surface, punch, at(0.01, 0.02, -0.1));
+  RigidTransform leaning = at(0.01, 0.02, -0.1);
+  leaning.rotation = rotation_from_xyz({1e-3, 0.0, 0.0});
+  const WeightedGap tilted = weighted_gap(surface, punch, leaning);
+  for (Eigen::Index i = 0; i < straight.weighted.size(); ++i) {
+    if (!std::isfinite(straight.weighted[i])) continue;
+    EXPECT_NEAR(tilted.weighted[i] / surface.weight[i], straight.weighted[i] / surface.weight[i], 0.005);
+  }
+}
+
 TEST(WeightedGap, IsFarWhereTheLinesMiss) {
   const Compliance gel = flat_gel(1.0, 0.25);
   const ContactSurface surface(gel);
