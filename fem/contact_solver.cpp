@@ -217,8 +217,7 @@ class FrictionalNewton {
     for (int i = 0; i < m_; ++i) {
       if (answer.state[i] != NodeState::open) set_.push_back(i);
     }
-    const auto unknowns = static_cast<Eigen::Index>(3 * set_.size()) + k_;
-    const bool remembered = answer.state == memory_.state && memory_.lu.size() == unknowns;
+    const bool remembered = answer.state == memory_.state;
     if (!(keep && remembered) && !factorise()) return false;
     const auto size = static_cast<Eigen::Index>(3 * set_.size());
     Eigen::VectorXd right(size + k_);
@@ -238,10 +237,7 @@ class FrictionalNewton {
     for (Eigen::Index b = 0; b < k_; ++b) {
       right[size + b] = problem_.force[b] + held(b) - problem_.border.col(b).dot(answer.z);
     }
-    const Eigen::VectorXd change = memory_.lu.solve(right);
-    if (!change.allFinite()) return false;
-    take(change);
-    return true;
+    return take(right);
   }
 
   /// One step with the remembered sets and Jacobian, whatever the current iterate looks like: what stuck goes on
@@ -260,7 +256,7 @@ class FrictionalNewton {
       }
     }
     const auto size = static_cast<Eigen::Index>(3 * set_.size());
-    if (set_.empty() || memory_.lu.size() != size + k_) return false;
+    if (set_.empty()) return false;
     answer.response = times_sparse(a_, answer.z);
     slack_ = answer.response + problem_.border * answer.shift;
     Eigen::VectorXd right = Eigen::VectorXd::Zero(size + k_);
@@ -273,8 +269,7 @@ class FrictionalNewton {
     for (Eigen::Index b = 0; b < k_; ++b) {
       right[size + b] = problem_.force[b] + held(b) - problem_.border.col(b).dot(answer.z);
     }
-    take(memory_.lu.solve(right));
-    return true;
+    return take(right);
   }
 
   /// Block Gauss-Seidel at fixed shift: each vertex in turn gets the traction that its own law asks for.
@@ -314,14 +309,67 @@ class FrictionalNewton {
   }
 
  private:
-  /// Adds a step over the vertices of `set_` and the shifts.
-  void take(const Eigen::VectorXd& change) {
-    ++answer.iterations;
+  /// Unknowns of the reduced system: three for a sticking vertex, two for a slipping one (pressure, and the traction
+  /// across the slip: the one along it follows the pressure), the shifts.
+  Eigen::Index reduced_size() const {
+    Eigen::Index size = k_;
+    for (const int i : set_) size += memory_.state[i] == NodeState::slip ? 2 : 3;
+    return size;
+  }
+  static Eigen::Vector2d across(const Eigen::Vector2d& along) { return {-along.y(), along.x()}; }
+
+  /// Solves for the step with the right-hand side over the vertices of `set_` (three each) and the shifts, by the
+  /// remembered factors, and adds it. False if it isn't finite.
+  bool take(const Eigen::VectorXd& right) {
+    const auto size = static_cast<Eigen::Index>(3 * set_.size());
+    // What the slipping vertices' own equations ask for along the slip is known beforehand.
+    Eigen::VectorXd known = Eigen::VectorXd::Zero(answer.z.size());
+    bool any = false;
     for (std::size_t row = 0; row < set_.size(); ++row) {
-      answer.z.segment<3>(3 * set_[row]) += change.segment<3>(static_cast<Eigen::Index>(3 * row));
+      const int i = set_[row];
+      if (memory_.state[i] != NodeState::slip) continue;
+      const Eigen::Vector2d& along = memory_.slip[i].along;
+      const double asked = along.dot(right.segment<2>(static_cast<Eigen::Index>(3 * row) + 1)) / tangential_scale(i);
+      known.segment<2>(3 * i + 1) = asked * along;
+      any = any || asked != 0.0;
+    }
+    const Eigen::VectorXd response = any ? times_sparse(a_, known) : Eigen::VectorXd::Zero(answer.z.size());
+    Eigen::VectorXd reduced(reduced_size());
+    Eigen::Index at = 0;
+    for (std::size_t row = 0; row < set_.size(); ++row) {
+      const int i = set_[row];
+      const auto from = static_cast<Eigen::Index>(3 * row);
+      reduced[at++] = right[from] - response[3 * i];
+      if (memory_.state[i] == NodeState::slip) {
+        const Eigen::Vector2d side = across(memory_.slip[i].along);
+        reduced[at++] =
+            side.dot(right.segment<2>(from + 1)) - memory_.slip[i].turn * side.dot(response.segment<2>(3 * i + 1));
+      } else {
+        reduced.segment<2>(at) = right.segment<2>(from + 1) - response.segment<2>(3 * i + 1);
+        at += 2;
+      }
+    }
+    for (Eigen::Index b = 0; b < k_; ++b) reduced[at + b] = right[size + b] - problem_.border.col(b).dot(known);
+    if (memory_.lu.size() != reduced.size()) return false;
+    const Eigen::VectorXd change = memory_.lu.solve(reduced);
+    ++answer.iterations;
+    if (!change.allFinite()) return false;
+    at = 0;
+    for (const int i : set_) {
+      const double p = change[at++];
+      answer.z[3 * i] += p;
+      if (memory_.state[i] == NodeState::slip) {
+        const SlipFrame& slip = memory_.slip[i];
+        answer.z.segment<2>(3 * i + 1) +=
+            problem_.friction[i] * p * slip.along + change[at++] * across(slip.along) + known.segment<2>(3 * i + 1);
+      } else {
+        answer.z.segment<2>(3 * i + 1) += change.segment<2>(at);
+        at += 2;
+      }
     }
     if (k_ > 0) answer.shift += change.tail(k_);
     refresh();
+    return true;
   }
 
   double held(Eigen::Index b) const { return problem_.hold.size() == k_ ? problem_.hold[b] * answer.shift[b] : 0.0; }
@@ -331,38 +379,73 @@ class FrictionalNewton {
   Eigen::Vector2d predicted(int i) const { return answer.z.segment<2>(3 * i + 1) - slip_at(i) / tangential_scale(i); }
 
   bool factorise() {
-    memory_.forget();
-    const auto size = static_cast<Eigen::Index>(3 * set_.size());
-    Eigen::MatrixXd jacobian(size + k_, size + k_);
-    std::vector<int> dofs(3 * set_.size());
-    for (std::size_t row = 0; row < dofs.size(); ++row) dofs[row] = 3 * set_[row / 3] + static_cast<int>(row % 3);
-    jacobian.topLeftCorner(size, size) = a_(dofs, dofs);
-    if (k_ > 0) {
-      jacobian.topRightCorner(size, k_) = problem_.border(dofs, Eigen::all);
-      jacobian.bottomLeftCorner(k_, size) = jacobian.topRightCorner(size, k_).transpose();
-      jacobian.bottomRightCorner(k_, k_).setZero();
-      if (problem_.hold.size() == k_) jacobian.bottomRightCorner(k_, k_).diagonal() = -problem_.hold;
-    }
-    for (std::size_t row = 0; row < set_.size(); ++row) {
-      const int i = set_[row];
+    memory_.state = answer.state;
+    memory_.slip.assign(m_, {});
+    for (const int i : set_) {
       if (answer.state[i] != NodeState::slip) continue;
-      const auto at = static_cast<Eigen::Index>(3 * row) + 1;
-      const double scale = tangential_scale(i);
       const Eigen::Vector2d v = predicted(i);
       const double length = v.norm();
-      const Eigen::Vector2d along = v / length;
-      // Derivative of t - mu p v/|v| with v = t - d/scale, times scale. The factor is at most 1 at the answer; far
-      // from it the clamp keeps the step from pointing away (Hueber, Stadler and Wohlmuth, SIAM J. Sci. Comput. 30,
-      // 2008).
-      const double factor = std::min(1.0, problem_.friction[i] * std::max(0.0, answer.z[3 * i]) / length);
-      const Eigen::Matrix2d across = factor * (Eigen::Matrix2d::Identity() - along * along.transpose());
-      jacobian.middleRows<2>(at) = (across * jacobian.middleRows<2>(at)).eval();
-      jacobian.block<2, 2>(at, at) += scale * (Eigen::Matrix2d::Identity() - across);
-      jacobian.block<2, 1>(at, at - 1) -= scale * problem_.friction[i] * along;
+      // At most 1 at the answer; far from it the clamp keeps the step from pointing away (Hueber, Stadler and Wohlmuth,
+      // SIAM J. Sci. Comput. 30, 2008).
+      memory_.slip[i] = {v / length, std::min(1.0, problem_.friction[i] * std::max(0.0, answer.z[3 * i]) / length)};
+    }
+    const Eigen::Index size = reduced_size();
+    Eigen::MatrixXd jacobian(size, size);
+    Eigen::VectorXd response(a_.rows());
+    Eigen::Index column = 0;
+    // Derivative of t - mu p v/|v| with v = t - d/scale, times scale, across the slip; the rows along it are
+    // eliminated.
+    const auto add_column = [&](int j, const Eigen::Vector3d& change) {
+      response = a_.middleCols<3>(3 * j) * change;
+      Eigen::Index row = 0;
+      for (const int i : set_) {
+        jacobian(row++, column) = response[3 * i];
+        if (memory_.state[i] == NodeState::slip) {
+          const SlipFrame& slip = memory_.slip[i];
+          const Eigen::Vector2d side = across(slip.along);
+          jacobian(row, column) = slip.turn * side.dot(response.segment<2>(3 * i + 1));
+          if (i == j) jacobian(row, column) += (1.0 - slip.turn) * tangential_scale(i) * side.dot(change.tail<2>());
+          ++row;
+        } else {
+          jacobian.block<2, 1>(row, column) = response.segment<2>(3 * i + 1);
+          row += 2;
+        }
+      }
+      for (Eigen::Index b = 0; b < k_; ++b) {
+        jacobian(row + b, column) = problem_.border.block<3, 1>(3 * j, b).dot(change);
+      }
+      ++column;
+    };
+    for (const int j : set_) {
+      if (memory_.state[j] == NodeState::slip) {
+        const Eigen::Vector2d& along = memory_.slip[j].along;
+        const double friction = problem_.friction[j];
+        add_column(j, {1.0, friction * along.x(), friction * along.y()});
+        add_column(j, {0.0, across(along).x(), across(along).y()});
+      } else {
+        for (int a = 0; a < 3; ++a) add_column(j, Eigen::Vector3d::Unit(a));
+      }
+    }
+    for (Eigen::Index b = 0; b < k_; ++b, ++column) {
+      Eigen::Index row = 0;
+      for (const int i : set_) {
+        const Eigen::Vector3d border = problem_.border.block<3, 1>(3 * i, b);
+        jacobian(row++, column) = border[0];
+        if (memory_.state[i] == NodeState::slip) {
+          jacobian(row++, column) = memory_.slip[i].turn * across(memory_.slip[i].along).dot(border.tail<2>());
+        } else {
+          jacobian.block<2, 1>(row, column) = border.tail<2>();
+          row += 2;
+        }
+      }
+      jacobian.block(row, column, k_, 1).setZero();
+      if (problem_.hold.size() == k_) jacobian(row + b, column) = -problem_.hold[b];
     }
     ++answer.factorisations;
-    if (!memory_.lu.compute(std::move(jacobian))) return false;
-    memory_.state = answer.state;
+    if (!memory_.lu.compute(std::move(jacobian))) {
+      memory_.forget();
+      return false;
+    }
     return true;
   }
 

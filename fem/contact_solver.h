@@ -33,12 +33,19 @@ struct ContactProblem {
   Eigen::VectorXd hold;      ///< k, >= 0: stiffness that holds a shift back, N per mm; empty: none
 };
 
+/// How a slipping vertex may change its traction: along the slip only as Coulomb's law says.
+struct SlipFrame {
+  Eigen::Vector2d along = Eigen::Vector2d::Zero();  ///< direction of the friction
+  double turn = 0.0;  ///< in 0..1: how far the traction follows when the slip turns (mu p over the predicted traction)
+};
+
 /// The last factorised system, which serves again while the same vertices are in contact in the same way. It belongs to
 /// one compliance matrix and border: forget it when they change.
 struct ContactMemory {
   std::vector<NodeState> state;  ///< empty: nothing is remembered
   DenseCholesky cholesky;        ///< frictionless: of the active rows and columns
-  DenseLu lu;                    ///< with friction: of the Jacobian
+  DenseLu lu;                    ///< with friction: of the Jacobian, the slipping vertices' directions eliminated
+  std::vector<SlipFrame> slip;   ///< with friction: per vertex, what the Jacobian was made with
   void forget() { state.clear(); }
 };
 
