@@ -73,8 +73,9 @@ Compliance compute_compliance(const TetMesh& mesh, const ElasticMaterial& materi
   gel.mass = surface_mass(mesh, surface);
   // A nodal traction loads the displacements by its coupling row: a border row over surface_scale.
   const double displacement_per_traction = scales.length / scales.stress / (scales.length * scales.length);
-  gel.surface = schur.topLeftCorner(3 * n, 3 * n) * (-displacement_per_traction / (surface_scale * surface_scale));
-  gel.beads = schur.bottomLeftCorner(3 * m, 3 * n) * (-displacement_per_traction / surface_scale);
+  gel.surface = Eigen::MatrixXd(schur.topLeftCorner(3 * n, 3 * n) *
+                                (-displacement_per_traction / (surface_scale * surface_scale)));
+  gel.beads = Eigen::MatrixXd(schur.bottomLeftCorner(3 * m, 3 * n) * (-displacement_per_traction / surface_scale));
 
   gel.report.tetrahedra = static_cast<int>(mesh.tetrahedra.size());
   gel.report.unknowns = space.unknowns;

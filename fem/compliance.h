@@ -10,6 +10,7 @@
 
 #include "core/progress.h"
 #include "fem/elastic_material.h"
+#include "fem/shared_matrix.h"
 #include "fem/tet_mesh.h"
 
 namespace touchstone::fem {
@@ -39,8 +40,8 @@ struct Compliance {
   std::vector<Eigen::Vector3d> vertices;      ///< n vertices of the outer surface, mm
   std::vector<std::array<int, 3>> triangles;  ///< over `vertices`, normal out
   Eigen::SparseMatrix<double> mass;  ///< n x n: int phi_i phi_j dA, mm^2 (P1 hats); its row sums are the weights
-  Eigen::MatrixXd surface;  ///< 3n x 3n, symmetric positive definite: int phi_i u_a dA (mm^3) per traction (MPa)
-  Eigen::MatrixXd beads;    ///< 3m x 3n: mean displacement of a bead's surface (mm) per traction (MPa)
+  SharedMatrix surface;  ///< 3n x 3n, symmetric positive definite: int phi_i u_a dA (mm^3) per traction (MPa)
+  SharedMatrix beads;    ///< 3m x 3n: mean displacement of a bead's surface (mm) per traction (MPa)
   ComplianceReport report;
 };
 

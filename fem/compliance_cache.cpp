@@ -39,7 +39,7 @@ struct Writer {
     value(static_cast<std::uint64_t>(count));
     raw(data, count * sizeof(T));
   }
-  void matrix(const Eigen::MatrixXd& matrix) {
+  void matrix(const SharedMatrix::View& matrix) {
     value(static_cast<std::int64_t>(matrix.rows()));
     value(static_cast<std::int64_t>(matrix.cols()));
     raw(matrix.data(), sizeof(double) * static_cast<std::size_t>(matrix.size()));
@@ -99,8 +99,8 @@ void write_body(const Compliance& gel, Writer& out) {
   out.array(gel.mass.outerIndexPtr(), static_cast<std::size_t>(gel.mass.outerSize() + 1));
   out.array(gel.mass.innerIndexPtr(), static_cast<std::size_t>(gel.mass.nonZeros()));
   out.array(gel.mass.valuePtr(), static_cast<std::size_t>(gel.mass.nonZeros()));
-  out.matrix(gel.surface);
-  out.matrix(gel.beads);
+  out.matrix(gel.surface.view());
+  out.matrix(gel.beads.view());
   const ComplianceReport& report = gel.report;
   out.value(report.tetrahedra);
   out.value(report.unknowns);

@@ -298,7 +298,7 @@ std::optional<PressSnapshot> PartSolver::accept(const ContactAnswer& answer, Ite
     if (answer.state[k] == NodeState::open) continue;
     next.state[v] = answer.state[k];
     next.traction.segment<3>(3 * v) = now.traction.segment<3>(3 * v);
-    next.weighted.noalias() += gel_.surface.middleCols<3>(3 * v) * next.traction.segment<3>(3 * v);
+    next.weighted.noalias() += gel_.surface.view().middleCols<3>(3 * v) * next.traction.segment<3>(3 * v);
     next.force -= surface_.weight[v] * next.traction.segment<3>(3 * v);
     next.touching = true;
   }

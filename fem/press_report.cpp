@@ -36,7 +36,7 @@ PressState report(const Compliance& gel, const ContactSurface& surface, const Su
     for (int v = 0; v < n; ++v) {
       if (snapshot.state[v] == NodeState::open) continue;
       const Eigen::Vector3d t = snapshot.traction.segment<3>(3 * v);
-      if (beads.size() > 0) beads += gel.beads.middleCols<3>(3 * v) * t;
+      if (beads.size() > 0) beads += gel.beads.view().middleCols<3>(3 * v) * t;
       const double pressure = -surface.normals[v].dot(t);
       largest_pressure = std::max(largest_pressure, pressure);
       s.largest_tension = std::max(s.largest_tension, -pressure);

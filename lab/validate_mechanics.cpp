@@ -152,7 +152,7 @@ double point_force(const Gels& gels, int axis, const std::function<Vector3d(doub
   }
   Eigen::VectorXd traction = Eigen::VectorXd::Zero(3 * n);
   traction[3 * source + axis] = (axis == 2 ? -1.0 : 1.0) / weight[source];
-  const Eigen::VectorXd response = gel.surface * traction;
+  const Eigen::VectorXd response = gel.surface.view() * traction;
   Eigen::MatrixX3d difference(n, 3);
   Eigen::MatrixX3d expected(n, 3);
   int rows = 0;
@@ -186,7 +186,7 @@ double response_in_the_middle(const fem::Compliance& gel, int axis,
   Eigen::VectorXd nodal(n);
   Eigen::VectorXd traction = Eigen::VectorXd::Zero(3 * n);
   for (Eigen::Index i = 0; i < n; ++i) traction[3 * i + axis] = nodal[i] = load(gel.vertices[i]);
-  const Eigen::VectorXd response = gel.surface * traction;
+  const Eigen::VectorXd response = gel.surface.view() * traction;
   const Eigen::VectorXd means = gel.mass * nodal;  // of the load, over the hats
   double product = 0.0;
   double square = 0.0;

@@ -105,7 +105,7 @@ struct Patch {
   explicit Patch(double friction, double drag) {
     const Compliance gel = test::half_space_gel(1.0, 0.2, {1.0, 0.4}, 5.0);
     const auto m = static_cast<Eigen::Index>(gel.vertices.size());
-    a = gel.surface;
+    a = gel.surface.view();
     const Eigen::VectorXd weight = gel.mass * Eigen::VectorXd::Ones(m);
     for (Eigen::Index i = 0; i < m; ++i) {
       a.row(3 * i + 2) *= -1.0;
