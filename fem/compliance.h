@@ -10,6 +10,7 @@
 
 #include "core/progress.h"
 #include "fem/elastic_material.h"
+#include "fem/mesh_error_table.h"
 #include "fem/shared_matrix.h"
 #include "fem/tet_mesh.h"
 
@@ -43,6 +44,7 @@ struct Compliance {
   SharedMatrix surface;  ///< 3n x 3n, symmetric positive definite: int phi_i u_a dA (mm^3) per traction (MPa)
   SharedMatrix beads;    ///< 3m x 3n: mean displacement of a bead's surface (mm) per traction (MPa)
   ComplianceReport report;
+  MeshErrorTable mesh_error;  ///< empty if it wasn't measured (see fem/mesh_error.h)
 };
 
 /// Eliminates the gel's inside once. The Taylor-Hood system K is bordered by the rows C that take displacements to what
