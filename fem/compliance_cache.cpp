@@ -5,6 +5,7 @@
 #include "core/error.h"
 #include "core/sha256.h"
 #include "fem/compliance_file.h"
+#include "fem/mesh_error.h"
 
 namespace touchstone::fem {
 
@@ -62,7 +63,9 @@ Compliance cached_compliance(const SlabMesh& slab, const ElasticMaterial& materi
   check(slab);
   check(material);
   return cached_compliance(compliance_key(slab, material, beads), cache_dir, [&] {
-    return compute_compliance(mesh_slab(slab), material, beads, slab.thickness, progress);
+    Compliance gel = compute_compliance(mesh_slab(slab), material, beads, slab.thickness, progress);
+    gel.mesh_error = measure_mesh_error(gel, ladder_of(slab, material, beads), progress);
+    return gel;
   });
 }
 

@@ -28,7 +28,8 @@ std::filesystem::path compliance_file(const std::filesystem::path& cache_dir, co
 Compliance cached_compliance(const std::string& key, const std::filesystem::path& cache_dir,
                              const std::function<Compliance()>& make);
 
-/// The slab's compliance in the same way. @throws Error as mesh_slab() and compute_compliance() do
+/// The slab's compliance with its table of mesh errors in the same way. @throws Error as mesh_slab() and
+/// compute_compliance() do
 Compliance cached_compliance(const SlabMesh& slab, const ElasticMaterial& material, std::span<const Bead> beads,
                              const std::filesystem::path& cache_dir, const Progress& progress = {});
 

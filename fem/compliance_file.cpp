@@ -124,6 +124,23 @@ struct Reader {
   }
 };
 
+void write_errors(const BodyErrors& body, Writer& out) {
+  out.array(body.radius_per_edge.data(), body.radius_per_edge.size());
+  for (const RelativeErrors& errors : body.errors) out.raw(errors.values.data(), sizeof(errors.values));
+  out.raw(body.mesh_order.values.data(), sizeof(body.mesh_order.values));
+  out.raw(body.size_order.values.data(), sizeof(body.size_order.values));
+}
+
+BodyErrors read_errors(Reader& in) {
+  BodyErrors body;
+  body.radius_per_edge = in.array<double>();
+  body.errors.resize(body.radius_per_edge.size());
+  for (RelativeErrors& errors : body.errors) in.raw(errors.values.data(), sizeof(errors.values));
+  in.raw(body.mesh_order.values.data(), sizeof(body.mesh_order.values));
+  in.raw(body.size_order.values.data(), sizeof(body.size_order.values));
+  return body;
+}
+
 void write_body(const Compliance& gel, Writer& out) {
   out.value(gel.thickness);
   out.value(gel.material.youngs_modulus);
@@ -141,6 +158,8 @@ void write_body(const Compliance& gel, Writer& out) {
   out.value(report.factor_entries);
   out.value(report.operations);
   out.value(report.memory_mb);
+  write_errors(gel.mesh_error.smooth, out);
+  write_errors(gel.mesh_error.sharp, out);
 }
 
 Compliance read_body(Reader& in) {
@@ -176,6 +195,8 @@ Compliance read_body(Reader& in) {
   gel.report.factor_entries = in.value<double>();
   gel.report.operations = in.value<double>();
   gel.report.memory_mb = in.value<double>();
+  gel.mesh_error.smooth = read_errors(in);
+  gel.mesh_error.sharp = read_errors(in);
   if (!in.bytes.empty()) {
     fail("it is longer than it should be");
   }

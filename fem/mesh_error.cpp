@@ -10,6 +10,7 @@
 #include <numbers>
 #include <vector>
 
+#include "core/error.h"
 #include "fem/press.h"
 
 namespace touchstone::fem {
@@ -26,7 +27,10 @@ constexpr std::array<std::array<double, 2>, 6> kPlaces = {
 constexpr std::array<double, 6> kRadiusFactors = {0.95, 1.07, 0.89, 1.01, 1.13, 0.96};
 /// At the first so many of them it is sheared as well.
 constexpr std::size_t kShearedPlaces = 3;
-constexpr std::array<double, 2> kFactors = {1.5, 2.0};
+/// The ladder's factors; if the gel can't be meshed so coarsely, the coarsest that it can be and that one's root.
+constexpr double kMiddle = 1.5;
+constexpr double kCoarsest = 2.0;
+constexpr double kLeastCoarsest = 1.3;
 /// Contacts smaller than this, in edges, may fall between the vertices of a level: they say nothing of its order.
 constexpr double kLeastRadius = 0.9;
 /// Spheres are pressed by this part of the contact's radius, but no more than a tenth of the thickness.
@@ -98,7 +102,7 @@ struct ReferenceBody {
   double reach = 0.0;   ///< mm: displacements are compared this far from its axis
 };
 
-/// What one press on one level said; fields on the vertices of level 0.
+/// What one press on one level said; fields on the vertices of level 0. Zero where the press has no answer.
 struct Reading {
   double normal = 0.0;
   double shear = 0.0;
@@ -118,7 +122,7 @@ PressTarget target_at(const Vector3d& position) {
 Reading read(const Level& level, const ReferenceBody& body, const Vector3d& place, bool sheared) {
   const Vector3d pressed = place - Vector3d(0.0, 0.0, body.lowest + body.depth);
   Reading result;
-  {
+  try {
     Press press(level.gel, body.shape, 0.0);
     const PressState& state = press.step(target_at(pressed));
     result.normal = state.wrench[2];
@@ -126,22 +130,25 @@ Reading read(const Level& level, const ReferenceBody& body, const Vector3d& plac
     result.displacement = level.to_first * state.surface_displacement;
     result.traction = level.to_first * state.traction;
     result.beads = state.bead_displacement;
+    if (!sheared) return result;
+    Press glued(level.gel, body.shape, std::numeric_limits<double>::infinity());
+    glued.step(target_at(pressed));
+    const PressState& dragged = glued.step(target_at(pressed + Vector3d(kShearPerDepth * body.depth, 0.0, 0.0)));
+    result.shear = -dragged.wrench[0];  // it holds the object back
+    result.cross = dragged.wrench[1];
+  } catch (const Error&) {
+    // A press that can't be made says nothing; there are others.
   }
-  if (!sheared) return result;
-  Press press(level.gel, body.shape, std::numeric_limits<double>::infinity());
-  press.step(target_at(pressed));
-  const PressState& state = press.step(target_at(pressed + Vector3d(kShearPerDepth * body.depth, 0.0, 0.0)));
-  result.shear = state.wrench[0];
-  result.cross = state.wrench[1];
   return result;
 }
 
-/// How two readings of the same press differ; the first sets the scale.
+/// How two readings of the same press differ; the first sets the scale. Zero for what they don't tell.
 RelativeErrors difference(const Compliance& gel, const Eigen::VectorXd& weight, const Vector3d& place, double reach,
                           const Reading& first, const Reading& other) {
   RelativeErrors result;
+  if (first.normal <= 0.0 || other.displacement.rows() == 0) return result;
   result[ErrorOf::normal_force] = (other.normal - first.normal) / first.normal;
-  if (first.shear != 0.0) {
+  if (first.shear > 0.0 && other.shear > 0.0) {
     result[ErrorOf::shear_force] = (other.shear - first.shear) / first.shear;
     result[ErrorOf::cross_force] = (other.cross - first.cross) / first.normal;
   }
@@ -257,26 +264,33 @@ BodyErrors measure_body(const std::vector<Level>& levels, const LadderGel& ladde
     double area = 0.0;
     for (const Reading& reading : readings.front()) area += reading.area / static_cast<double>(places.size());
     const double contact = std::sqrt(area / std::numbers::pi) / ladder.edge;
+    if (contact <= 0.0) continue;
     result.radius_per_edge.push_back(contact);
     for (std::size_t i = 1; i < levels.size(); ++i) {
       if (radius < kLeastRadius * levels[i].factor) continue;
       RelativeErrors squares;
+      std::array<int, kErrorKinds> told{};
       for (std::size_t k = 0; k < places.size(); ++k) {
         const RelativeErrors one = difference(gel, weight, places[k], bodies[k].reach, readings[0][k], readings[i][k]);
-        for (int kind = 0; kind < kErrorKinds; ++kind) squares.values[kind] += one.values[kind] * one.values[kind];
+        for (int kind = 0; kind < kErrorKinds; ++kind) {
+          squares.values[kind] += one.values[kind] * one.values[kind];
+          told[kind] += one.values[kind] != 0.0;
+        }
       }
       for (int kind = 0; kind < kErrorKinds; ++kind) {
-        const bool of_shear =
-            kind == static_cast<int>(ErrorOf::shear_force) || kind == static_cast<int>(ErrorOf::cross_force);
-        const double mean =
-            std::sqrt(squares.values[kind] / static_cast<double>(of_shear ? kShearedPlaces : places.size()));
-        if (mean > 0.0) samples[kind].push_back({contact, levels[i].factor, mean});
+        if (told[kind] > 0) {
+          samples[kind].push_back({contact, levels[i].factor, std::sqrt(squares.values[kind] / told[kind])});
+        }
       }
     }
   }
   result.errors.resize(result.radius_per_edge.size());
   for (int kind = 0; kind < kErrorKinds; ++kind) {
-    if (samples[kind].empty()) continue;
+    if (samples[kind].empty()) {
+      const bool nothing_to_tell = kind == static_cast<int>(ErrorOf::beads) && gel.beads.rows() == 0;
+      for (RelativeErrors& errors : result.errors) errors.values[kind] = nothing_to_tell ? 0.0 : 1.0;
+      continue;
+    }
     // Beside a sharp edge the traction rises like the inverse root of the distance: its square has no finite mean, and
     // no mesh comes nearer to it in the root mean square.
     const bool no_limit = sharp && kind == static_cast<int>(ErrorOf::traction);
@@ -333,17 +347,29 @@ LadderGel ladder_of(const SlabMesh& slab, const ElasticMaterial& material, std::
   return ladder;
 }
 
-MeshErrorTable measure_mesh_error(const Compliance& gel, const LadderGel& ladder) {
+MeshErrorTable measure_mesh_error(const Compliance& gel, const LadderGel& ladder, const Progress& progress) {
+  const double coarsest = std::min(kCoarsest, ladder.largest_factor);
+  if (coarsest < kLeastCoarsest) return {};
   std::vector<Level> levels(1);
   levels.front().gel = gel;
   levels.front().to_first = field_transfer(gel, gel);
-  for (const double factor : kFactors) {
-    if (factor > ladder.largest_factor) continue;
-    levels.push_back({factor, ladder.with_edges(factor), {}});
+  const std::array<double, 2> factors = {coarsest == kCoarsest ? kMiddle : std::sqrt(coarsest), coarsest};
+  for (std::size_t k = 0; k < factors.size(); ++k) {
+    if (progress) progress("mesh error", static_cast<std::int64_t>(k), factors.size() + 2);
+    try {
+      levels.push_back({factors[k], ladder.with_edges(factors[k]), {}});
+    } catch (const Error&) {
+      continue;  // one level less to learn from
+    }
     levels.back().to_first = field_transfer(levels.back().gel, gel);
   }
   if (levels.size() < 2) return {};
-  return {measure_body(levels, ladder, false), measure_body(levels, ladder, true)};
+  MeshErrorTable table;
+  table.smooth = measure_body(levels, ladder, false);
+  if (progress) progress("mesh error", factors.size() + 1, factors.size() + 2);
+  table.sharp = measure_body(levels, ladder, true);
+  if (progress) progress("mesh error", factors.size() + 2, factors.size() + 2);
+  return table;
 }
 
 }  // namespace touchstone::fem

@@ -32,7 +32,8 @@ struct LadderGel {
 /// The ladder of a slab: radii as far as the fine box goes, edges up to its thickness.
 LadderGel ladder_of(const SlabMesh& slab, const ElasticMaterial& material, std::span<const Bead> beads);
 
-/// Measures the table for `gel`, which is the ladder's with factor 1. Empty if not even two levels can be made.
-MeshErrorTable measure_mesh_error(const Compliance& gel, const LadderGel& ladder);
+/// Measures the table for `gel`, which is the ladder's with factor 1. Empty if the gel can't be meshed 1.3 times as
+/// coarsely: its edges are about its thickness, and nothing is known of its errors but that they are large.
+MeshErrorTable measure_mesh_error(const Compliance& gel, const LadderGel& ladder, const Progress& progress = {});
 
 }  // namespace touchstone::fem
