@@ -111,3 +111,7 @@ endmacro()
 macro(touchstone_need_tinygltf)
   touchstone_plain_library(TinyGLTF::Headers libtinygltf-dev tiny_gltf.h tinygltf)
 endmacro()
+
+macro(touchstone_need_xxhash)
+  touchstone_plain_library(XXHash::XXHash libxxhash-dev xxhash.h xxhash)
+endmacro()

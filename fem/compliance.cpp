@@ -45,8 +45,11 @@ Compliance compute_compliance(const TetMesh& mesh, const ElasticMaterial& materi
   const OuterSurface surface = outer_surface(mesh);
   const int n = static_cast<int>(surface.mesh_vertex.size());
   const int m = static_cast<int>(beads.size());
-  if (n > kMostSurfaceVertices) {
-    fail("the gel's outer surface has {} vertices; at most {} are allowed: mesh it coarser", n, kMostSurfaceVertices);
+  if (std::sqrt(static_cast<double>(n) * (n + m)) > kMostSurfaceVertices) {
+    fail(
+        "the gel's outer surface has {} vertices and there are {} beads: their compliance would take {:.0f} MB; "
+        "at most {:.0f} are allowed: mesh the surface coarser",
+        n, m, 72e-6 * n * (static_cast<double>(n) + m), 72e-6 * kMostSurfaceVertices * kMostSurfaceVertices);
   }
 
   // Without units, a surface row is int phi_i u / length^2, a bead's row a mean. Both are scaled so that the border is

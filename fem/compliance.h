@@ -10,6 +10,7 @@
 
 #include "core/progress.h"
 #include "fem/elastic_material.h"
+#include "fem/mesh_error_table.h"
 #include "fem/shared_matrix.h"
 #include "fem/tet_mesh.h"
 
@@ -43,6 +44,7 @@ struct Compliance {
   SharedMatrix surface;  ///< 3n x 3n, symmetric positive definite: int phi_i u_a dA (mm^3) per traction (MPa)
   SharedMatrix beads;    ///< 3m x 3n: mean displacement of a bead's surface (mm) per traction (MPa)
   ComplianceReport report;
+  MeshErrorTable mesh_error;  ///< empty if it wasn't measured (see fem/mesh_error.h)
 };
 
 /// Eliminates the gel's inside once. The Taylor-Hood system K is bordered by the rows C that take displacements to what
@@ -51,11 +53,11 @@ struct Compliance {
 /// it goes where the gel's mean over its surface goes (Faxen's law for a sphere without a force on it). The vertices
 /// keep the mesh's order. `thickness` is copied.
 /// @throws Error for an unfit mesh (see fault_of) or material, for a bead that isn't wholly inside the gel, for more
-/// than kMostSurfaceVertices, or if memory runs out
+/// vertices and beads than kMostSurfaceVertices allows, or if memory runs out
 Compliance compute_compliance(const TetMesh& mesh, const ElasticMaterial& material, std::span<const Bead> beads,
                               double thickness, const Progress& progress = {});
 
-/// The compliance of more surface vertices would take over 4.6 GB.
-inline constexpr int kMostSurfaceVertices = 8000;
+/// Vertices n and beads m may have sqrt(n (n + m)) up to this: the compliance then takes 487 MB.
+inline constexpr int kMostSurfaceVertices = 2600;
 
 }  // namespace touchstone::fem

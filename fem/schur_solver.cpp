@@ -190,6 +190,7 @@ Eigen::MatrixXd schur_complement(const SymmetricEntries& matrix, int last, std::
   mumps.control(19) = 2;  // the lower triangle, by columns
   mumps.data().schur_lld = last;
   mumps.control(7) = kGivenOrder;
+  mumps.control(31) = 1;  // the factor isn't kept: nothing will be solved with it, and it's two thirds of the memory
   mumps.data().perm_in = places.data();
   mumps.analyse_and_factorise(report);
   stop_unless_finite(schur);
