@@ -32,27 +32,6 @@ double volume_within(const SlabMesh& slab, double distance) {
   return x * y * std::min(slab.thickness, slab.fine_depth + distance);
 }
 
-/// Planes across one axis for the background grid: the box's own, and some between them and the slab's ends.
-std::vector<double> grid_planes(double low, double high, double fine_low, double fine_high) {
-  const double margin = 0.05 * (high - low);  // TetGen must find each point of the slab inside the background
-  std::vector<double> planes = {low - margin, high + margin};
-  const auto add = [&](double from, double to) {
-    for (int k = 0; k <= 4; ++k) {
-      planes.push_back(from + (to - from) * k / 4.0);
-    }
-  };
-  add(low, std::max(low, fine_low));
-  add(std::min(high, fine_high), high);
-  std::sort(planes.begin(), planes.end());
-  std::vector<double> apart;
-  for (const double plane : planes) {
-    if (apart.empty() || plane - apart.back() > 1e-3 * (high - low)) {
-      apart.push_back(plane);
-    }
-  }
-  return apart;
-}
-
 /// Points in the fine part of the outer face: a lattice of equilateral triangles, mirrored in x and y.
 std::vector<Eigen::Vector2d> fine_lattice(const SlabMesh& slab) {
   // The face's own edges are TetGen's to split.
@@ -95,8 +74,9 @@ FillInput fill_input(const SlabMesh& slab) {
   for (int point = 8; point < static_cast<int>(input.points.size()); ++point) {
     input.facets[0].polygons.push_back({point});  // a lone point in the face
   }
-  input.grid = {grid_planes(-x, x, -slab.fine_half_x, slab.fine_half_x),
-                grid_planes(-y, y, -slab.fine_half_y, slab.fine_half_y), grid_planes(z, 0.0, -slab.fine_depth, 0.0)};
+  input.grid = {graded_planes(-x, x, -slab.fine_half_x, slab.fine_half_x),
+                graded_planes(-y, y, -slab.fine_half_y, slab.fine_half_y),
+                graded_planes(z, 0.0, -slab.fine_depth, 0.0)};
   input.edge = [slab](const Eigen::Vector3d& at) {
     return wanted_edge(slab, distance_to_fine_box(slab, at.x(), at.y(), at.z()));
   };

@@ -7,6 +7,13 @@
 
 namespace touchstone::fem {
 
+/// What holds or touches a face of a gel's boundary.
+enum class FaceKind : char {
+  side,   ///< free, but nothing touches it
+  outer,  ///< free, can be touched
+  bonded  ///< clamped
+};
+
 /// A solid of straight-sided tetrahedra. Lengths in mm. A tetrahedron (a, b, c, d) has positive volume:
 /// (b - a) x (c - a) . (d - a) > 0.
 struct TetMesh {

@@ -13,6 +13,8 @@ namespace {
 
 /// TetGen keeps circumradii under the metric; a regular tetrahedron of edge h has 0.61 h.
 constexpr double kMetricPerEdge = 1.0;
+/// Five degrees: a mesh with less is tried again with other bounds on its elements' quality.
+constexpr double kGoodDihedral = 5.0 * 3.14159265358979 / 180.0;
 
 /// The size field as TetGen reads it: a grid of boxes, each cut into six tetrahedra, with a metric at each vertex.
 void fill_background(const FillInput& from, tetgenio& background) {
@@ -128,42 +130,66 @@ bool boundary_was_kept(const FillInput& input, const TetMesh& mesh) {
   return wanted == made && same_points;
 }
 
-}  // namespace
-
-Filling fill_with_tetrahedra(const FillInput& from, const std::string& what) {
-  for (const Eigen::Vector3d& point : from.points) TS_ASSERT(point.allFinite());
+Filling fill_once(const FillInput& from, const std::string& quality, const std::string& what) {
   tetgenio input;
   tetgenio output;
   tetgenio background;
   fill_boundary(from, input);
   fill_background(from, background);
   tetgenbehavior behavior;
-  std::string switches = from.keep_boundary ? "pYMq1.4/14mzQ" : "pq1.4/14mzQ";
+  std::string switches = fmt::format("p{}q{}mzQ", from.keep_boundary ? "YM" : "", quality);
   if (from.most_points >= 0) switches += fmt::format("S{}", from.most_points);
   TS_ASSERT(behavior.parse_commandline(switches.data()));
-  {
-    // TetGen keeps its predicates' error bounds in globals.
-    static std::mutex one_at_a_time;
-    const std::lock_guard lock(one_at_a_time);
-    try {
-      tetrahedralize(&behavior, &input, &output, nullptr, &background);
-    } catch (int code) {
-      fail("{}: TetGen gave up on it (code {})", what, code);
-    }
+  // TetGen keeps its predicates' error bounds in globals.
+  static std::mutex one_at_a_time;
+  const std::lock_guard lock(one_at_a_time);
+  try {
+    tetrahedralize(&behavior, &input, &output, nullptr, &background);
+  } catch (int code) {
+    fail("{}: TetGen gave up on it (code {})", what, code);
   }
-  Filling filling = filling_of(output);
-  if (from.keep_boundary && !boundary_was_kept(from, filling.mesh)) {
-    fail("{}: TetGen couldn't fill it without changing its surface", what);
-  }
-  return filling;
+  return filling_of(output);
 }
 
-std::vector<double> even_planes(double low, double high, int parts) {
+}  // namespace
+
+Filling fill_with_tetrahedra(const FillInput& input, const std::string& what) {
+  for (const Eigen::Vector3d& point : input.points) TS_ASSERT(point.allFinite());
+  Filling best;
+  double best_angle = -1.0;
+  for (const std::string quality : {"1.4/14", "1.3/14", "1.5/12", "1.4/16", "1.6/10", "1.25/18"}) {
+    Filling filling = fill_once(input, quality, what);
+    const double angle = smallest_dihedral_angle(filling.mesh);
+    if (angle > best_angle) {
+      best_angle = angle;
+      best = std::move(filling);
+    }
+    if (best_angle > kGoodDihedral) break;
+  }
+  if (input.keep_boundary && !boundary_was_kept(input, best.mesh)) {
+    fail("{}: TetGen couldn't fill it without changing its surface", what);
+  }
+  return best;
+}
+
+std::vector<double> graded_planes(double low, double high, double fine_low, double fine_high) {
   const double margin = 0.05 * (high - low);  // TetGen must find each point of the solid inside the background
-  std::vector<double> planes = {low - margin};
-  for (int k = 0; k <= parts; ++k) planes.push_back(low + (high - low) * k / parts);
-  planes.push_back(high + margin);
-  return planes;
+  std::vector<double> planes = {low - margin, high + margin};
+  const auto add = [&](double from, double to) {
+    for (int k = 0; k <= 4; ++k) {
+      planes.push_back(from + (to - from) * k / 4.0);
+    }
+  };
+  add(low, std::max(low, fine_low));
+  add(std::min(high, fine_high), high);
+  std::sort(planes.begin(), planes.end());
+  std::vector<double> apart;
+  for (const double plane : planes) {
+    if (apart.empty() || plane - apart.back() > 1e-3 * (high - low)) {
+      apart.push_back(plane);
+    }
+  }
+  return apart;
 }
 
 }  // namespace touchstone::fem

@@ -36,12 +36,13 @@ struct Filling {
 };
 
 /// Constrained Delaunay tetrahedra, refined to the wanted edges (radius-edge ratio 1.4 and dihedral angles of 14
-/// degrees where the boundary lets them). The same input gives the same mesh. One call at a time: TetGen has globals.
+/// degrees where the boundary lets them; where slivers below 5 degrees are left, other bounds are tried and the best
+/// mesh is taken). The same input gives the same mesh. One call at a time: TetGen has globals.
 /// @throws Error that begins with `what` if TetGen gives up, or changed a boundary that was to be kept
 Filling fill_with_tetrahedra(const FillInput& input, const std::string& what);
 
-/// Planes for FillInput::grid: from low to high with a margin beyond, `parts` between them.
-std::vector<double> even_planes(double low, double high, int parts);
+/// Planes for FillInput::grid: the solid's ends with a margin beyond, those of its fine part, and some between them.
+std::vector<double> graded_planes(double low, double high, double fine_low, double fine_high);
 
 /// Tetrahedra per (mm^3 / edge^3), measured on what TetGen makes of a wanted edge.
 inline constexpr double kTetrahedraPerCube = 8.0;
