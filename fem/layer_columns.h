@@ -12,9 +12,10 @@
 
 namespace touchstone::fem {
 
-/// Longest edge of a prism over its height. Measured on a layer under a Gaussian pressure
-/// (tests/fem/gel_body_test.cpp): at 200 the compliance is as exact as at 10.
-inline constexpr double kFlattestPrism = 200.0;
+/// Longest edge of a prism over its height. Measured: layers of 1 um to 0.5 mm, a tenth to a hundred times as stiff as
+/// the body below, on edges of 0.45 mm growing to 3 mm, are as exact as no layer (0.1 % of the work of a Gaussian
+/// pressure, nu = 0.3), up to 3000 times as wide as high.
+inline constexpr double kFlattestPrism = 1000.0;
 
 /// Sheets of nodes through the layers, from the outer surface inwards.
 struct LayerSheets {

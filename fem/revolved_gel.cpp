@@ -14,8 +14,9 @@ namespace {
 
 using Eigen::Vector3d;
 constexpr double kPi = std::numbers::pi;
-/// Rings lie nearer to each other than points in a ring: rows of equilateral triangles would be at 0.87.
-constexpr double kRingSpacing = 0.93;
+/// Rings lie nearer to each other than points in a ring: rows of equilateral triangles would be at 0.87. Where TetGen
+/// leaves slivers, the next one is tried.
+constexpr std::array<double, 5> kRingSpacings = {0.93, 0.89, 0.97, 0.85, 1.01};
 
 /// Both kinds of gel: a cap of `sphere` down to the radius `base`, on a cylinder down to -thickness.
 struct Outline {
@@ -206,7 +207,8 @@ struct Ring {
 
 class Rings {
  public:
-  explicit Rings(const Outline& outline) : o_(outline), depth_(total_thickness(outline.layers)) {
+  Rings(const Outline& outline, double spacing)
+      : o_(outline), spacing_(spacing), depth_(total_thickness(outline.layers)) {
     add_cap();
     if (o_.cylinder() > 0.0) add_side();
     add_base();
@@ -241,7 +243,7 @@ class Rings {
     const double rim = o_.rim_angle();
     const auto spacing = [&](double s) {
       const double angle = s / o_.sphere;
-      return kRingSpacing *
+      return spacing_ *
              o_.edge_at({o_.sphere * std::sin(angle), 0.0, -2.0 * o_.sphere * std::pow(std::sin(angle / 2.0), 2)});
     };
     const Outline o = o_;
@@ -268,7 +270,7 @@ class Rings {
     const double sleeve_top = -o.thickness + o.sleeve;
     const auto add_part = [&](double from, double to, FaceKind kind) {
       if (from - to <= 1e-9 * o.thickness) return;
-      const auto spacing = [&](double s) { return kRingSpacing * o.edge_at({o.base, 0.0, from - s}); };
+      const auto spacing = [&](double s) { return spacing_ * o.edge_at({o.base, 0.0, from - s}); };
       const std::vector<double> down = stations(from - to, spacing, 1);
       for (std::size_t k = 1; k < down.size(); ++k) {
         const double z = k + 1 == down.size() ? to : from - down[k];
@@ -287,7 +289,7 @@ class Rings {
   void add_base() {
     const double z = -o_.thickness;
     const double radius = list_.back().at(depth_).x();
-    const auto spacing = [&](double s) { return kRingSpacing * o_.edge_at({radius - s, 0.0, z}); };
+    const auto spacing = [&](double s) { return spacing_ * o_.edge_at({radius - s, 0.0, z}); };
     const std::vector<double> inwards = stations(radius, spacing, 2);
     for (std::size_t k = 1; k < inwards.size(); ++k) {
       const double r = k + 1 == inwards.size() ? 0.0 : radius - inwards[k];
@@ -296,6 +298,7 @@ class Rings {
   }
 
   Outline o_;
+  double spacing_;  ///< of rings, over the wanted edge
   double depth_;
   std::vector<Ring> list_;
 };
@@ -346,10 +349,8 @@ CoreSurface core_surface(const Rings& rings) {
   return surface;
 }
 
-TetMesh mesh(const Outline& outline) {
-  check(outline);
-  const Rings rings(outline);
-  const CoreSurface surface = core_surface(rings);
+/// What lies under the layers, without faces.
+TetMesh core_mesh(const Outline& outline, const CoreSurface& surface) {
   FillInput input;
   input.points = surface.points;
   for (const auto& t : surface.triangles) input.facets.push_back({{{t[0], t[1], t[2]}}, 1});
@@ -360,10 +361,13 @@ TetMesh mesh(const Outline& outline) {
   input.grid = {
       graded_planes(-outline.base, outline.base, -fine, fine), graded_planes(-outline.base, outline.base, -fine, fine),
       graded_planes(-outline.thickness, 0.0, -outline.fine_depth - fine * fine / (2.0 * outline.sphere), 0.0)};
-  TetMesh mesh = fill_with_tetrahedra(
-                     input, fmt::format("{} of radius {} mm, {} mm thick, with edges of {} to {} mm", outline.name,
-                                        outline.sphere, outline.thickness, outline.fine, outline.coarse))
-                     .mesh;
+  return fill_with_tetrahedra(input,
+                              fmt::format("{} of radius {} mm, {} mm thick, with edges of {} to {} mm", outline.name,
+                                          outline.sphere, outline.thickness, outline.fine, outline.coarse))
+      .mesh;
+}
+
+TetMesh mesh_with(const Outline& outline, const Rings& rings, const CoreSurface& surface, TetMesh mesh) {
   LayerColumns columns;
   for (std::size_t t = 0; t < surface.triangles.size(); ++t) {
     const Ring& band = rings.list()[surface.band[t]];
@@ -386,6 +390,24 @@ TetMesh mesh(const Outline& outline) {
     add_layers(layer_sheets(outline.layers, outline.fine, outline.fine_depth), columns, mesh);
   }
   return mesh;
+}
+
+TetMesh mesh(const Outline& outline) {
+  check(outline);
+  TetMesh best;
+  double best_angle = -1.0;
+  for (const double spacing : kRingSpacings) {
+    const Rings rings(outline, spacing);
+    const CoreSurface surface = core_surface(rings);
+    TetMesh core = core_mesh(outline, surface);
+    const double angle = smallest_dihedral_angle(core);
+    if (angle > best_angle) {
+      best_angle = angle;
+      best = mesh_with(outline, rings, surface, std::move(core));
+    }
+    if (angle > kGoodDihedral) break;
+  }
+  return best;
 }
 
 }  // namespace

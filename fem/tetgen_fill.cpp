@@ -13,8 +13,6 @@ namespace {
 
 /// TetGen keeps circumradii under the metric; a regular tetrahedron of edge h has 0.61 h.
 constexpr double kMetricPerEdge = 1.0;
-/// Five degrees: a mesh with less is tried again with other bounds on its elements' quality.
-constexpr double kGoodDihedral = 5.0 * 3.14159265358979 / 180.0;
 
 /// The size field as TetGen reads it: a grid of boxes, each cut into six tetrahedra, with a metric at each vertex.
 void fill_background(const FillInput& from, tetgenio& background) {

@@ -36,8 +36,8 @@ struct Filling {
 };
 
 /// Constrained Delaunay tetrahedra, refined to the wanted edges (radius-edge ratio 1.4 and dihedral angles of 14
-/// degrees where the boundary lets them; where slivers below 5 degrees are left, other bounds are tried and the best
-/// mesh is taken). The same input gives the same mesh. One call at a time: TetGen has globals.
+/// degrees where the boundary lets them; where slivers below kGoodDihedral are left, other bounds are tried and the
+/// best mesh is taken). The same input gives the same mesh. One call at a time: TetGen has globals.
 /// @throws Error that begins with `what` if TetGen gives up, or changed a boundary that was to be kept
 Filling fill_with_tetrahedra(const FillInput& input, const std::string& what);
 
@@ -49,6 +49,9 @@ inline constexpr double kTetrahedraPerCube = 8.0;
 
 /// More tetrahedra than this are refused before they are made: the elimination would take some 6 GB and a minute.
 inline constexpr double kMostTetrahedra = 60000.0;
+
+/// Five degrees, in radians: a mesh without smaller dihedral angles is good.
+inline constexpr double kGoodDihedral = 0.0872664625997165;
 
 /// Growth of the wanted edge length per mm away from where it is fine.
 inline constexpr double kEdgeGrowth = 0.4;
