@@ -9,16 +9,19 @@
 
 namespace touchstone::fem {
 
-std::string compliance_key(const SlabMesh& slab, const ElasticMaterial& material, std::span<const Bead> beads) {
+std::string compliance_key(const GelBody& body, std::span<const ElasticMaterial> materials,
+                           std::span<const Bead> beads) {
   Sha256 sum;
-  sum.add("touchstone compliance of a slab, format " + std::to_string(kComplianceFormat));
+  sum.add("touchstone compliance of a gel, format " + std::to_string(kComplianceFormat));
+  add_to(sum, body);
   const auto add = [&](double value) {
     value += 0.0;  // -0 and 0 are one gel
     sum.add(&value, sizeof(value));
   };
-  for (const double value : {slab.size_x, slab.size_y, slab.thickness, slab.fine, slab.coarse, slab.fine_half_x,
-                             slab.fine_half_y, slab.fine_depth, material.youngs_modulus, material.poisson_ratio}) {
-    add(value);
+  add(static_cast<double>(materials.size()));
+  for (const ElasticMaterial& material : materials) {
+    add(material.youngs_modulus);
+    add(material.poisson_ratio);
   }
   for (const Bead& bead : beads) {
     add(bead.centre.x());
@@ -27,6 +30,10 @@ std::string compliance_key(const SlabMesh& slab, const ElasticMaterial& material
     add(bead.radius);
   }
   return sum.digest();
+}
+
+std::string compliance_key(const SlabMesh& slab, const ElasticMaterial& material, std::span<const Bead> beads) {
+  return compliance_key(SlabGel{slab, {}}, std::span(&material, 1), beads);
 }
 
 std::filesystem::path compliance_file(const std::filesystem::path& cache_dir, const std::string& key) {
@@ -58,15 +65,24 @@ Compliance cached_compliance(const std::string& key, const std::filesystem::path
   return gel;
 }
 
-Compliance cached_compliance(const SlabMesh& slab, const ElasticMaterial& material, std::span<const Bead> beads,
-                             const std::filesystem::path& cache_dir, const Progress& progress) {
-  check(slab);
-  check(material);
-  return cached_compliance(compliance_key(slab, material, beads), cache_dir, [&] {
-    Compliance gel = compute_compliance(mesh_slab(slab), material, beads, slab.thickness, progress);
-    gel.mesh_error = measure_mesh_error(gel, ladder_of(slab, material, beads), progress);
+Compliance cached_compliance(const GelBody& body, std::span<const ElasticMaterial> materials,
+                             std::span<const Bead> beads, const std::filesystem::path& cache_dir,
+                             const Progress& progress) {
+  check(body);
+  for (const ElasticMaterial& material : materials) check(material);
+  if (static_cast<int>(materials.size()) != material_count(body)) {
+    fail("the gel takes {} materials, but {} are given", material_count(body), materials.size());
+  }
+  return cached_compliance(compliance_key(body, materials, beads), cache_dir, [&] {
+    Compliance gel = compute_compliance(mesh_gel(body), materials, beads, thickness_of(body), progress);
+    gel.mesh_error = measure_mesh_error(gel, ladder_of(body, materials, beads), progress);
     return gel;
   });
+}
+
+Compliance cached_compliance(const SlabMesh& slab, const ElasticMaterial& material, std::span<const Bead> beads,
+                             const std::filesystem::path& cache_dir, const Progress& progress) {
+  return cached_compliance(SlabGel{slab, {}}, std::span(&material, 1), beads, cache_dir, progress);
 }
 
 }  // namespace touchstone::fem

@@ -8,12 +8,14 @@
 
 #include "core/progress.h"
 #include "fem/compliance.h"
-#include "fem/slab.h"
+#include "fem/gel_body.h"
 
 namespace touchstone::fem {
 
-/// SHA-256 of all that a compliance depends on: mesh parameters, material, beads, kComplianceFormat
-/// (see fem/compliance_file.h).
+/// SHA-256 of all that a compliance depends on: shape and mesh parameters, materials, beads, kComplianceFormat (see
+/// fem/compliance_file.h).
+std::string compliance_key(const GelBody& body, std::span<const ElasticMaterial> materials,
+                           std::span<const Bead> beads);
 std::string compliance_key(const SlabMesh& slab, const ElasticMaterial& material, std::span<const Bead> beads);
 
 /// Where it is kept: `compliance-<key>.bin`.
@@ -28,8 +30,12 @@ std::filesystem::path compliance_file(const std::filesystem::path& cache_dir, co
 Compliance cached_compliance(const std::string& key, const std::filesystem::path& cache_dir,
                              const std::function<Compliance()>& make);
 
-/// The slab's compliance with its table of mesh errors in the same way. @throws Error as mesh_slab() and
-/// compute_compliance() do
+/// The gel's compliance with its table of mesh errors in the same way. `materials`: the body's, then the layers' from
+/// the outer surface inwards (material_count). @throws Error as mesh_gel() and compute_compliance() do
+Compliance cached_compliance(const GelBody& body, std::span<const ElasticMaterial> materials,
+                             std::span<const Bead> beads, const std::filesystem::path& cache_dir,
+                             const Progress& progress = {});
+/// The same for a slab of one material.
 Compliance cached_compliance(const SlabMesh& slab, const ElasticMaterial& material, std::span<const Bead> beads,
                              const std::filesystem::path& cache_dir, const Progress& progress = {});
 

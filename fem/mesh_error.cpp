@@ -37,6 +37,8 @@ constexpr double kLeastRadius = 0.9;
 constexpr double kDepthPerRadius = 0.25;
 constexpr double kMostDepthPerThickness = 0.1;
 constexpr double kShearPerDepth = 0.2;
+/// How far contacts may go in the fine part of a mesh.
+constexpr double kFinePart = 0.8;
 
 /// The weights of a triangle's corners at its point nearest to `p`, and the distance squared.
 std::pair<Vector3d, double> nearest_in_triangle(const Vector3d& p, const Vector3d& a, const Vector3d& b,
@@ -333,18 +335,23 @@ RelativeErrors errors_at(const BodyErrors& body, double radius_per_edge) {
   return result;
 }
 
-LadderGel ladder_of(const SlabMesh& slab, const ElasticMaterial& material, std::span<const Bead> beads) {
+LadderGel ladder_of(const GelBody& body, std::span<const ElasticMaterial> materials, std::span<const Bead> beads) {
   LadderGel ladder;
-  ladder.edge = slab.fine;
-  ladder.largest_radius = 0.8 * std::min(slab.fine_half_x, slab.fine_half_y);
-  ladder.largest_factor = std::min({slab.size_x, slab.size_y, slab.thickness}) / slab.fine;
-  ladder.with_edges = [slab, material, all = std::vector<Bead>(beads.begin(), beads.end())](double factor) {
-    SlabMesh other = slab;
-    other.fine *= factor;
-    other.coarse *= factor;
-    return compute_compliance(mesh_slab(other), material, all, slab.thickness);
+  ladder.edge = fine_edge(body);
+  ladder.largest_radius = kFinePart * fine_reach(body);
+  ladder.largest_factor = thickness_of(body) / ladder.edge;
+  if (const auto* slab = std::get_if<SlabGel>(&body)) {
+    ladder.largest_factor = std::min({slab->mesh.size_x, slab->mesh.size_y, slab->mesh.thickness}) / ladder.edge;
+  }
+  ladder.with_edges = [body, own = std::vector<ElasticMaterial>(materials.begin(), materials.end()),
+                       all = std::vector<Bead>(beads.begin(), beads.end())](double factor) {
+    return compute_compliance(mesh_gel(with_edges(body, factor)), own, all, thickness_of(body));
   };
   return ladder;
+}
+
+LadderGel ladder_of(const SlabMesh& slab, const ElasticMaterial& material, std::span<const Bead> beads) {
+  return ladder_of(SlabGel{slab, {}}, std::span(&material, 1), beads);
 }
 
 MeshErrorTable measure_mesh_error(const Compliance& gel, const LadderGel& ladder, const Progress& progress) {

@@ -15,7 +15,7 @@
 #include <span>
 
 #include "fem/compliance.h"
-#include "fem/slab.h"
+#include "fem/gel_body.h"
 
 namespace touchstone::fem {
 
@@ -29,7 +29,8 @@ struct LadderGel {
   double largest_factor = 2.0;  ///< coarser isn't a mesh of that gel any more
 };
 
-/// The ladder of a slab: radii as far as the fine box goes, edges up to its thickness.
+/// The ladder of a gel: radii as far as its fine part goes, edges up to its thickness.
+LadderGel ladder_of(const GelBody& body, std::span<const ElasticMaterial> materials, std::span<const Bead> beads);
 LadderGel ladder_of(const SlabMesh& slab, const ElasticMaterial& material, std::span<const Bead> beads);
 
 /// Measures the table for `gel`, which is the ladder's with factor 1. Empty if the gel can't be meshed 1.3 times as

@@ -7,6 +7,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "core/error.h"
 #include "fem/elimination_order.h"
@@ -67,6 +68,7 @@ Eigen::Matrix<double, 3, 10> shape_gradients(const Eigen::Matrix<double, 3, 4>& 
 /// What one element needs for its blocks, without units.
 struct ElementShape {
   double volume = 0.0;
+  Scales::Region scales;
   std::array<Eigen::Matrix<double, 3, 10>, 4> gradients;  // at the points of stiffness_rule
 };
 
@@ -75,6 +77,7 @@ ElementShape element_shape(const TaylorHoodSpace& space, const Scales& scales, i
   const Eigen::Matrix<double, 3, 4> flat = barycentric_gradients(corners) * scales.length;
   ElementShape shape;
   shape.volume = volume(*space.mesh, space.mesh->tetrahedra[element]) / std::pow(scales.length, 3);
+  shape.scales = scales.regions[space.mesh->region_of(element)];
   for (int q = 0; q < 4; ++q) {
     shape.gradients[q] = shape_gradients(flat, stiffness_rule()[q].barycentric);
   }
@@ -82,7 +85,8 @@ ElementShape element_shape(const TaylorHoodSpace& space, const Scales& scales, i
 }
 
 /// Coupling of two of an element's nodes: rows and columns 0..2 displacement, 3 pressure (for corners).
-Eigen::Matrix4d element_block(const ElementShape& shape, const Scales& scales, int i, int j) {
+Eigen::Matrix4d element_block(const ElementShape& shape, int i, int j) {
+  const Scales::Region& scales = shape.scales;
   Eigen::Matrix4d block = Eigen::Matrix4d::Zero();
   for (int q = 0; q < 4; ++q) {
     const SimplexPoint<4>& point = stiffness_rule()[q];
@@ -90,7 +94,8 @@ Eigen::Matrix4d element_block(const ElementShape& shape, const Scales& scales, i
     const Eigen::Vector3d gi = shape.gradients[q].col(i);
     const Eigen::Vector3d gj = shape.gradients[q].col(j);
     // 2 eps(N_i e_a) : eps(N_j e_b) = (gi.gj) delta_ab + gi_b gj_a
-    block.topLeftCorner<3, 3>() += weight * (gi.dot(gj) * Eigen::Matrix3d::Identity() + gj * gi.transpose());
+    block.topLeftCorner<3, 3>() +=
+        (weight * scales.shear) * (gi.dot(gj) * Eigen::Matrix3d::Identity() + gj * gi.transpose());
     if (i < 4) {
       block.bottomLeftCorner<1, 3>() -= (weight * scales.pressure_scale * point.barycentric[i]) * gj.transpose();
     }
@@ -104,23 +109,50 @@ Eigen::Matrix4d element_block(const ElementShape& shape, const Scales& scales, i
   return block;
 }
 
-/// Elements around each node, in their order: element * 10 + place of the node in it.
-std::vector<std::vector<int>> elements_around(const TaylorHoodSpace& space) {
-  std::vector<std::vector<int>> around(space.nodes);
-  for (std::size_t e = 0; e < space.elements.size(); ++e) {
-    for (int k = 0; k < 10; ++k) {
-      around[space.elements[e][k]].push_back(static_cast<int>(e) * 10 + k);
+/// What carries unknowns: a node (its displacement and, at a vertex, its first pressure), or one of a vertex' further
+/// pressures.
+struct Carriers {
+  explicit Carriers(const TaylorHoodSpace& from)
+      : space(from), count(from.nodes + static_cast<int>(from.pressure.size()) - from.vertices) {}
+
+  const TaylorHoodSpace& space;
+  int count;
+
+  int of_pressure(int pressure) const {
+    return pressure < space.vertices ? pressure : space.nodes + pressure - space.vertices;
+  }
+  /// The unknown of a carrier's component (3: pressure), or -1.
+  int unknown(int carrier, int component) const {
+    if (carrier >= space.nodes) {
+      return component == 3 ? space.pressure[carrier - space.nodes + space.vertices] : -1;
+    }
+    if (component == 3) {
+      return carrier < space.vertices ? space.pressure[carrier] : -1;
+    }
+    return space.clamped[carrier] ? -1 : space.displacement[carrier] + component;
+  }
+};
+
+/// Which rows of an element's blocks go to a carrier.
+struct Member {
+  int carrier;
+  int local;  ///< place of the node in the element
+  int first;  ///< rows first..last: 0..3 all, 0..2 displacement alone, 3..3 pressure alone
+  int last;
+};
+
+std::vector<Member> members_of(const Carriers& carriers, int element) {
+  std::vector<Member> members;
+  const TaylorHoodSpace& space = carriers.space;
+  for (int k = 0; k < 10; ++k) {
+    const int node = space.elements[element][k];
+    const int pressure = k < 4 ? carriers.of_pressure(space.element_pressures[element][k]) : node;
+    members.push_back({node, k, 0, pressure == node ? 3 : 2});
+    if (pressure != node) {
+      members.push_back({pressure, k, 3, 3});
     }
   }
-  return around;
-}
-
-/// The unknown of a node's component (3: pressure), or -1.
-int unknown_of(const TaylorHoodSpace& space, int node, int component) {
-  if (component == 3) {
-    return node < space.vertices ? space.pressure[node] : -1;
-  }
-  return space.clamped[node] ? -1 : space.displacement[node] + component;
+  return members;
 }
 
 /// Right-hand side from loads on the body and its free faces, without units.
@@ -213,11 +245,43 @@ int TaylorHoodSpace::middle(int a, int b) const {
   return vertices + static_cast<int>(found - edges.begin());
 }
 
-TaylorHoodSpace make_space(const TetMesh& mesh) {
-  const std::string fault = fault_of(mesh);
-  if (!fault.empty()) {
-    fail("the gel's mesh can't be used: {}", fault);
+namespace {
+
+/// A vertex has one pressure in each group of regions around it; the least group's is the vertex' own.
+void number_pressures(const std::vector<int>& group, TaylorHoodSpace& space) {
+  const TetMesh& mesh = *space.mesh;
+  std::vector<std::array<int, 2>> pairs;  // vertex, group
+  for (std::size_t e = 0; e < mesh.tetrahedra.size(); ++e) {
+    for (const int vertex : mesh.tetrahedra[e]) {
+      pairs.push_back({vertex, group[mesh.region_of(e)]});
+    }
   }
+  std::sort(pairs.begin(), pairs.end());
+  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+  space.pressure_vertex.resize(space.vertices);
+  std::iota(space.pressure_vertex.begin(), space.pressure_vertex.end(), 0);
+  std::vector<int> place(pairs.size());
+  for (std::size_t k = 0; k < pairs.size(); ++k) {
+    const int vertex = pairs[k][0];
+    if (k == 0 || pairs[k - 1][0] != vertex) {
+      place[k] = vertex;
+    } else {
+      place[k] = static_cast<int>(space.pressure_vertex.size());
+      space.pressure_vertex.push_back(vertex);
+    }
+  }
+  for (std::size_t e = 0; e < mesh.tetrahedra.size(); ++e) {
+    std::array<int, 4> pressures{};
+    for (int k = 0; k < 4; ++k) {
+      const std::array<int, 2> pair = {mesh.tetrahedra[e][k], group[mesh.region_of(e)]};
+      pressures[k] = place[std::lower_bound(pairs.begin(), pairs.end(), pair) - pairs.begin()];
+    }
+    space.element_pressures.push_back(pressures);
+  }
+}
+
+/// `group` per region: the pressure is continuous within a group.
+TaylorHoodSpace space_of(const TetMesh& mesh, const std::vector<int>& group) {
   TaylorHoodSpace space;
   space.mesh = &mesh;
   space.vertices = static_cast<int>(mesh.vertices.size());
@@ -245,7 +309,8 @@ TaylorHoodSpace make_space(const TetMesh& mesh) {
     }
   }
   space.displacement.assign(space.nodes, -1);
-  space.pressure.assign(space.vertices, -1);
+  number_pressures(group, space);
+  space.pressure.assign(space.pressure_vertex.size(), -1);
   for (int node = 0; node < space.nodes; ++node) {
     if (!space.clamped[node]) {
       space.displacement[node] = space.unknowns;
@@ -255,59 +320,138 @@ TaylorHoodSpace make_space(const TetMesh& mesh) {
       space.pressure[node] = space.unknowns++;
     }
   }
+  for (std::size_t k = space.vertices; k < space.pressure.size(); ++k) {
+    space.pressure[k] = space.unknowns++;
+  }
   return space;
 }
 
-Scales make_scales(const TetMesh& mesh, const ElasticMaterial& material) {
-  check(material);
-  double total = 0.0;
-  for (const auto& tetrahedron : mesh.tetrahedra) {
-    total += volume(mesh, tetrahedron);
+void require_sound(const TetMesh& mesh) {
+  const std::string fault = fault_of(mesh);
+  if (!fault.empty()) {
+    fail("the gel's mesh can't be used: {}", fault);
   }
-  const double ratio = lame_ratio(material);
+}
+
+void require_materials(const TetMesh& mesh, std::span<const ElasticMaterial> materials) {
+  for (const ElasticMaterial& material : materials) {
+    check(material);
+  }
+  if (static_cast<int>(materials.size()) < region_count(mesh)) {
+    fail("the gel's mesh has {} regions, but {} materials are given", region_count(mesh), materials.size());
+  }
+}
+
+bool alike(const ElasticMaterial& a, const ElasticMaterial& b) {
+  return a.youngs_modulus == b.youngs_modulus && a.poisson_ratio == b.poisson_ratio;
+}
+
+}  // namespace
+
+TaylorHoodSpace make_space(const TetMesh& mesh) {
+  require_sound(mesh);
+  std::vector<int> group(region_count(mesh));
+  std::iota(group.begin(), group.end(), 0);
+  return space_of(mesh, group);
+}
+
+TaylorHoodSpace make_space(const TetMesh& mesh, std::span<const ElasticMaterial> materials) {
+  require_sound(mesh);
+  require_materials(mesh, materials);
+  std::vector<int> group(region_count(mesh));
+  for (std::size_t r = 0; r < group.size(); ++r) {
+    const auto first = std::find_if(materials.begin(), materials.end(),
+                                    [&](const ElasticMaterial& other) { return alike(other, materials[r]); });
+    group[r] = static_cast<int>(first - materials.begin());
+  }
+  return space_of(mesh, group);
+}
+
+Scales make_scales(const TetMesh& mesh, std::span<const ElasticMaterial> materials) {
+  require_materials(mesh, materials);
+  double total = 0.0;
+  std::vector<double> part(materials.size(), 0.0);
+  for (std::size_t e = 0; e < mesh.tetrahedra.size(); ++e) {
+    const double size = volume(mesh, mesh.tetrahedra[e]);
+    total += size;
+    part[mesh.region_of(e)] += size;
+  }
   Scales scales;
   scales.length = std::cbrt(total);
-  scales.stress = shear_modulus(material);
-  // sqrt(lambda/G) while lambda < G makes the pressure's block -1 there; beyond, p itself is of the order of G.
-  scales.pressure_scale = std::sqrt(std::min(ratio, 1.0));
-  scales.compressibility = ratio <= 1.0 ? 1.0 : 1.0 / ratio;
+  scales.stress = shear_modulus(materials[0]);
+  if (!std::all_of(materials.begin(), materials.end(),
+                   [&](const ElasticMaterial& material) { return shear_modulus(material) == scales.stress; })) {
+    double logarithm = 0.0;
+    for (std::size_t r = 0; r < materials.size(); ++r) {
+      logarithm += part[r] / total * std::log(shear_modulus(materials[r]));
+    }
+    scales.stress = std::exp(logarithm);
+  }
+  for (const ElasticMaterial& material : materials) {
+    const double ratio = lame_ratio(material);
+    Scales::Region region;
+    region.shear = shear_modulus(material) / scales.stress;
+    // Of the order of G is p beyond lambda = G; below, sqrt(lambda/G) makes the pressure's block -1. Beside a stiffer
+    // material the square root of its G keeps the blocks' sizes alike.
+    region.pressure_scale = std::sqrt(region.shear * std::min(ratio, 1.0));
+    region.compressibility = ratio <= 1.0 ? 1.0 : 1.0 / ratio;
+    scales.regions.push_back(region);
+  }
   return scales;
 }
 
+Scales make_scales(const TetMesh& mesh, const ElasticMaterial& material) {
+  return make_scales(mesh, std::vector<ElasticMaterial>(region_count(mesh), material));
+}
+
 SymmetricEntries assemble(const TaylorHoodSpace& space, const Scales& scales) {
-  const auto around = elements_around(space);
+  const Carriers carriers(space);
   std::vector<ElementShape> shapes(space.elements.size());
-  tbb::parallel_for(std::size_t{0}, shapes.size(),
-                    [&](std::size_t e) { shapes[e] = element_shape(space, scales, static_cast<int>(e)); });
-  std::vector<SymmetricEntries> rows(space.nodes);
-  tbb::parallel_for(0, space.nodes, [&](int node) {
+  std::vector<std::vector<Member>> members(space.elements.size());
+  tbb::parallel_for(std::size_t{0}, shapes.size(), [&](std::size_t e) {
+    shapes[e] = element_shape(space, scales, static_cast<int>(e));
+    members[e] = members_of(carriers, static_cast<int>(e));
+  });
+  // Elements around each carrier, in their order, and the carrier's place among the element's members.
+  std::vector<std::vector<std::array<int, 2>>> around(carriers.count);
+  for (std::size_t e = 0; e < members.size(); ++e) {
+    for (std::size_t k = 0; k < members[e].size(); ++k) {
+      around[members[e][k].carrier].push_back({static_cast<int>(e), static_cast<int>(k)});
+    }
+  }
+  std::vector<SymmetricEntries> rows(carriers.count);
+  tbb::parallel_for(0, carriers.count, [&](int carrier) {
     std::vector<int> neighbours;
-    for (const int place : around[node]) {
-      for (const int other : space.elements[place / 10]) {
-        if (other >= node) {
-          neighbours.push_back(other);
+    for (const auto& [element, place] : around[carrier]) {
+      for (const Member& other : members[element]) {
+        if (other.carrier >= carrier) {
+          neighbours.push_back(other.carrier);
         }
       }
     }
     std::sort(neighbours.begin(), neighbours.end());
     neighbours.erase(std::unique(neighbours.begin(), neighbours.end()), neighbours.end());
     std::vector<Eigen::Matrix4d> blocks(neighbours.size(), Eigen::Matrix4d::Zero());
-    for (const int place : around[node]) {
-      const auto& nodes = space.elements[place / 10];
-      for (int k = 0; k < 10; ++k) {
-        if (nodes[k] >= node) {
-          const auto found = std::lower_bound(neighbours.begin(), neighbours.end(), nodes[k]);
-          blocks[found - neighbours.begin()] += element_block(shapes[place / 10], scales, place % 10, k);
+    for (const auto& [element, place] : around[carrier]) {
+      const Member& own = members[element][place];
+      for (const Member& other : members[element]) {
+        if (other.carrier >= carrier) {
+          const auto found = std::lower_bound(neighbours.begin(), neighbours.end(), other.carrier);
+          const Eigen::Matrix4d block = element_block(shapes[element], own.local, other.local);
+          Eigen::Matrix4d& sum = blocks[found - neighbours.begin()];
+          const int height = own.last - own.first + 1;
+          const int width = other.last - other.first + 1;
+          sum.block(own.first, other.first, height, width) += block.block(own.first, other.first, height, width);
         }
       }
     }
     for (std::size_t n = 0; n < neighbours.size(); ++n) {
       for (int a = 0; a < 4; ++a) {
-        for (int b = neighbours[n] == node ? a : 0; b < 4; ++b) {
-          const int row = unknown_of(space, node, a);
-          const int column = unknown_of(space, neighbours[n], b);
+        for (int b = neighbours[n] == carrier ? a : 0; b < 4; ++b) {
+          const int row = carriers.unknown(carrier, a);
+          const int column = carriers.unknown(neighbours[n], b);
           if (row >= 0 && column >= 0) {
-            rows[node].add(row, column, blocks[n](a, b));
+            rows[carrier].add(row, column, blocks[n](a, b));
           }
         }
       }
@@ -332,7 +476,13 @@ SymmetricEntries assemble(const TaylorHoodSpace& space, const Scales& scales) {
 
 ElasticSolution solve_elastic(const TaylorHoodSpace& space, const ElasticMaterial& material,
                               const ElasticLoads& loads) {
-  const Scales scales = make_scales(*space.mesh, material);
+  return solve_elastic(space, std::vector<ElasticMaterial>(region_count(*space.mesh), material), loads);
+}
+
+ElasticSolution solve_elastic(const TaylorHoodSpace& space, std::span<const ElasticMaterial> materials,
+                              const ElasticLoads& loads) {
+  const Scales scales = make_scales(*space.mesh, materials);
+  const Carriers carriers(space);
   Eigen::VectorXd right = load_vector(space, scales, loads);
   ElasticSolution solution;
   solution.displacement = Eigen::MatrixX3d::Zero(space.nodes, 3);
@@ -349,16 +499,17 @@ ElasticSolution solve_elastic(const TaylorHoodSpace& space, const ElasticMateria
         continue;
       }
       const ElementShape shape = element_shape(space, scales, static_cast<int>(e));
+      const std::vector<Member> members = members_of(carriers, static_cast<int>(e));
       for (int j = 0; j < 10; ++j) {
         if (!space.clamped[nodes[j]]) {
           continue;
         }
         Eigen::Vector4d given = Eigen::Vector4d::Zero();
         given.head<3>() = solution.displacement.row(nodes[j]).transpose() / scales.length;
-        for (int i = 0; i < 10; ++i) {
-          const Eigen::Vector4d pull = element_block(shape, scales, i, j) * given;
-          for (int a = 0; a < 4; ++a) {
-            const int row = unknown_of(space, nodes[i], a);
+        for (const Member& member : members) {
+          const Eigen::Vector4d pull = element_block(shape, member.local, j) * given;
+          for (int a = member.first; a <= member.last; ++a) {
+            const int row = carriers.unknown(member.carrier, a);
             if (row >= 0) {
               right[row] -= pull[a];
             }
@@ -373,9 +524,12 @@ ElasticSolution solve_elastic(const TaylorHoodSpace& space, const ElasticMateria
       solution.displacement.row(node) = scales.length * found.segment<3>(space.displacement[node]).transpose();
     }
   }
-  solution.pressure.resize(space.vertices);
-  for (int vertex = 0; vertex < space.vertices; ++vertex) {
-    solution.pressure[vertex] = scales.stress * scales.pressure_scale * found[space.pressure[vertex]];
+  solution.pressure.resize(static_cast<Eigen::Index>(space.pressure.size()));
+  for (std::size_t e = 0; e < space.elements.size(); ++e) {
+    const double scale = scales.regions[space.mesh->region_of(e)].pressure_scale;
+    for (const int pressure : space.element_pressures[e]) {
+      solution.pressure[pressure] = scales.stress * scale * found[space.pressure[pressure]];
+    }
   }
   return solution;
 }
@@ -394,7 +548,7 @@ double pressure_at(const TaylorHoodSpace& space, const ElasticSolution& solution
                    const Eigen::Vector4d& barycentric) {
   double value = 0.0;
   for (int k = 0; k < 4; ++k) {
-    value += barycentric[k] * solution.pressure[space.elements[element][k]];
+    value += barycentric[k] * solution.pressure[space.element_pressures[element][k]];
   }
   return value;
 }
