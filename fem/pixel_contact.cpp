@@ -1,0 +1,271 @@
+#include "fem/pixel_contact.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/error.h"
+
+namespace touchstone::fem {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+/// Sums that don't depend on the number of threads: each row by itself, then the rows in order.
+struct Sums {
+  double a = 0.0;
+  double b = 0.0;
+  double highest = -kInfinity;
+  double lowest = kInfinity;
+  std::size_t count = 0;
+
+  void add(const Sums& other) {
+    a += other.a;
+    b += other.b;
+    highest = std::max(highest, other.highest);
+    lowest = std::min(lowest, other.lowest);
+    count += other.count;
+  }
+};
+
+class Solver {
+ public:
+  Solver(const LayerResponse& layer, const PixelContact& contact, const PixelTolerance& tolerance)
+      : layer_(layer),
+        grid_(layer.grid()),
+        gap_(contact.gap),
+        forced_(contact.force.has_value()),
+        pressure_sum_(forced_ ? *contact.force / grid_.pixel_area() : 0.0),
+        tolerance_(tolerance),
+        scratch_(layer.make_scratch()),
+        rows_(static_cast<std::size_t>(grid_.ny)) {}
+
+  PixelContactAnswer solve(std::span<const double> start) {
+    const std::size_t n = grid_.size();
+    answer_.pressure.assign(n, 0.0);
+    answer_.displacement.assign(n, 0.0);
+    direction_.assign(n, 0.0);
+    response_.assign(n, 0.0);
+    if (!start.empty()) answer_.pressure.assign(start.begin(), start.end());
+    begin();
+    respond();
+    double last_square = 0.0;  // of the gaps at the last step; 0: begin anew along the gap
+    for (;;) {
+      const Sums state = take_gaps();
+      answer_.converged = answer_.largest_gap <= tolerance_.gap_mm && answer_.largest_overlap <= tolerance_.gap_mm;
+      if (answer_.converged || answer_.iterations >= tolerance_.most_iterations || state.count == 0) break;
+      ++answer_.iterations;
+      const double square = state.b;
+      step(square, last_square > 0.0 ? square / last_square : 0.0);
+      last_square = fresh_ ? 0.0 : square;
+    }
+    finish();
+    return std::move(answer_);
+  }
+
+ private:
+  template <typename Row>
+  Sums over_rows(const Row& row) {
+    tbb::parallel_for(0, grid_.ny, [&](int j) {
+      Sums sums;
+      const std::size_t begin = grid_.at(0, j);
+      for (std::size_t k = begin; k < begin + grid_.nx; ++k) row(k, sums);
+      rows_[static_cast<std::size_t>(j)] = sums;
+    });
+    Sums total;
+    for (const Sums& sums : rows_) total.add(sums);
+    return total;
+  }
+
+  /// A pressure to begin with: what there is, brought to the force; else uniform where the body is.
+  void begin() {
+    const Sums found = over_rows([&](std::size_t k, Sums& s) {
+      double& p = answer_.pressure[k];
+      p = gap_[k] < kInfinity ? std::max(0.0, p) : 0.0;
+      s.a += p;
+      s.count += gap_[k] < kInfinity;
+      s.lowest = std::min(s.lowest, gap_[k]);
+    });
+    lowest_gap_ = found.lowest;
+    if (forced_ && pressure_sum_ > 0.0 && !(found.a > 0.0)) {
+      const double uniform = pressure_sum_ / static_cast<double>(found.count);
+      over_rows([&](std::size_t k, Sums&) { answer_.pressure[k] = gap_[k] < kInfinity ? uniform : 0.0; });
+    } else if (forced_) {
+      scale(found.a);
+    }
+  }
+
+  void scale(double sum) {
+    const double factor = sum > 0.0 ? pressure_sum_ / sum : 0.0;
+    over_rows([&](std::size_t k, Sums&) { answer_.pressure[k] *= factor; });
+  }
+
+  void respond() {
+    layer_.apply(answer_.pressure, answer_.displacement, *scratch_);
+    ++answer_.applications;
+  }
+
+  double raw_gap(std::size_t k) const { return gap_[k] + answer_.displacement[k]; }
+
+  /// Sets the shift and how well the laws of contact are met. Returns count and squared gaps (b) where there's
+  /// pressure.
+  Sums take_gaps() {
+    answer_.shift = 0.0;
+    if (forced_) {
+      const Sums mean = over_rows([&](std::size_t k, Sums& s) {
+        if (answer_.pressure[k] > 0.0) {
+          s.a += raw_gap(k);
+          ++s.count;
+        }
+      });
+      if (mean.count > 0) answer_.shift = -mean.a / static_cast<double>(mean.count);
+    }
+    const double shift = answer_.shift;
+    Sums state = over_rows([&](std::size_t k, Sums& s) {
+      if (!(gap_[k] < kInfinity)) return;
+      const double g = raw_gap(k) + shift;
+      if (answer_.pressure[k] > 0.0) {
+        s.b += g * g;
+        s.highest = std::max(s.highest, std::abs(g));
+        ++s.count;
+      } else {
+        s.lowest = std::min(s.lowest, g);
+      }
+    });
+    answer_.largest_gap = std::max(0.0, state.highest);
+    answer_.largest_overlap = std::max(0.0, -state.lowest);
+    answer_.pixels_in_contact = static_cast<int>(state.count);
+    if (!forced_ && state.count == 0 && state.lowest < 0.0) state.count = 1;  // nothing loaded yet, but overlapping
+    return state;
+  }
+
+  /// One step along the conjugate direction; `conjugate` is the weight of the last direction.
+  void step(double square, double conjugate) {
+    const double shift = answer_.shift;
+    auto& p = answer_.pressure;
+    over_rows([&](std::size_t k, Sums&) {
+      direction_[k] = p[k] > 0.0 ? raw_gap(k) + shift + conjugate * direction_[k] : 0.0;
+    });
+    double length = 0.0;
+    if (square > 0.0) {
+      layer_.apply(direction_, response_, *scratch_);
+      ++answer_.applications;
+      double mean = 0.0;
+      if (forced_) {
+        const Sums sum = over_rows([&](std::size_t k, Sums& s) {
+          if (p[k] > 0.0) {
+            s.a += response_[k];
+            ++s.count;
+          }
+        });
+        mean = sum.a / static_cast<double>(sum.count);
+      }
+      const Sums product = over_rows([&](std::size_t k, Sums& s) {
+        if (p[k] > 0.0) {
+          s.a += (raw_gap(k) + shift) * direction_[k];
+          s.b += (response_[k] - mean) * direction_[k];
+        }
+      });
+      length = product.b > 0.0 ? product.a / product.b : 0.0;
+    }
+    if (length > 0.0) last_length_ = length;
+
+    // Pixels that pressure would leave become open; open ones that overlap are loaded, which spoils conjugacy.
+    const double loading = loading_length();
+    const Sums after = over_rows([&](std::size_t k, Sums& s) {
+      if (!(gap_[k] < kInfinity)) return;
+      if (p[k] > 0.0) {
+        const double next = p[k] - length * direction_[k];
+        if (next <= 0.0) ++s.count;
+        p[k] = std::max(0.0, next);
+      } else if (const double g = raw_gap(k) + shift; g < 0.0) {
+        p[k] = -loading * g;
+        s.b += 1.0;
+      }
+      s.a += p[k];
+    });
+    fresh_ = after.b > 0.0;
+    if (forced_ && !(after.a > 0.0)) {
+      fresh_ = true;
+      begin();
+      respond();
+      return;
+    }
+    const double factor = forced_ ? pressure_sum_ / after.a : 1.0;
+    if (after.count > 0 || fresh_) {
+      if (forced_) over_rows([&](std::size_t k, Sums&) { p[k] *= factor; });
+      respond();
+    } else {
+      over_rows([&](std::size_t k, Sums&) {
+        answer_.displacement[k] = factor * (answer_.displacement[k] - length * response_[k]);
+        p[k] *= factor;
+      });
+    }
+  }
+
+  /// Pressure (MPa) per overlap (mm) by which a pixel is loaded that comes into contact.
+  double loading_length() {
+    if (last_length_ > 0.0) return last_length_;
+    // Nothing was loaded before: the stiffness of one pixel by itself.
+    std::vector<double> one(grid_.size(), 0.0);
+    const std::size_t middle = grid_.at(grid_.nx / 2, grid_.ny / 2);
+    one[middle] = 1.0;
+    layer_.apply(one, response_, *scratch_);
+    ++answer_.applications;
+    last_length_ = 1.0 / response_[middle];
+    return last_length_;
+  }
+
+  void finish() {
+    const Sums sum = over_rows([&](std::size_t k, Sums& s) { s.a += answer_.pressure[k]; });
+    answer_.force = sum.a * grid_.pixel_area();
+    if (!forced_) return;
+    answer_.force_residual = std::abs(answer_.force - pressure_sum_ * grid_.pixel_area());
+    if (answer_.pixels_in_contact == 0) {
+      answer_.shift = lowest_gap_ < kInfinity ? std::max(0.0, -lowest_gap_) : 0.0;
+      answer_.largest_overlap = 0.0;
+      answer_.converged = true;
+    }
+  }
+
+  const LayerResponse& layer_;
+  const PixelGrid grid_;
+  std::span<const double> gap_;
+  bool forced_;
+  double pressure_sum_;  // over the pixels, MPa
+  PixelTolerance tolerance_;
+  std::unique_ptr<LayerResponse::Scratch> scratch_;
+  std::vector<Sums> rows_;
+  std::vector<double> direction_, response_;
+  double lowest_gap_ = kInfinity;
+  double last_length_ = 0.0;
+  bool fresh_ = false;  // the last step loaded pixels
+  PixelContactAnswer answer_;
+};
+
+}  // namespace
+
+PixelContactAnswer solve_pixel_contact(const LayerResponse& layer, const PixelContact& contact,
+                                       const PixelTolerance& tolerance, std::span<const double> start) {
+  const std::size_t n = layer.grid().size();
+  TS_ASSERT(contact.gap.size() == n && (start.empty() || start.size() == n));
+  bool body = false;
+  for (std::size_t k = 0; k < n; ++k) {
+    if (std::isnan(contact.gap[k]) || contact.gap[k] == -kInfinity) {
+      fail("the gap at pixel {} is {}; it must be a number or infinity", k, contact.gap[k]);
+    }
+    body = body || contact.gap[k] < kInfinity;
+    if (!start.empty() && !std::isfinite(start[k])) fail("the pressure to begin with at pixel {} is {}", k, start[k]);
+  }
+  if (contact.force) {
+    if (!std::isfinite(*contact.force) || *contact.force < 0.0) {
+      fail("a force of {} N is wanted on the relief; it must be finite and at least 0", *contact.force);
+    }
+    if (*contact.force > 0.0 && !body) fail("a force of {} N is wanted where no body is over the grid", *contact.force);
+  }
+  return Solver(layer, contact, tolerance).solve(start);
+}
+
+}  // namespace touchstone::fem
