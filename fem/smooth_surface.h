@@ -1,0 +1,74 @@
+#pragma once
+// The displacement of a flat outer surface under a coarse press, at any point and free of the mesh's wiggles.
+
+#include <Eigen/Core>
+#include <Eigen/SparseCholesky>
+#include <Eigen/SparseCore>
+#include <memory>
+#include <vector>
+
+#include "fem/compliance.h"
+#include "fem/layer_response.h"
+#include "fem/press.h"
+
+namespace touchstone::fem {
+
+/// A smooth field over a rectangle: three components on uniform bicubic B-splines, twice continuously differentiable.
+struct SplineField {
+  Eigen::Vector2d first = Eigen::Vector2d::Zero();  ///< knot (0, 0), mm; splines -1 to nx + 1 reach over the rectangle
+  double spacing = 1.0;                             ///< mm between knots
+  int nx = 0;                                       ///< knot intervals
+  int ny = 0;
+  Eigen::MatrixX3d coefficients;  ///< (nx + 3)(ny + 3), x fastest
+
+  /// Beyond the rectangle: the value at its nearest point.
+  Eigen::Vector3d at(const Eigen::Vector2d& point) const;
+};
+
+/// What a coarse press does to the surface, in two parts: what an endless layer does under the coarse pressure, which
+/// is as rough as that pressure; and all the rest, which is smooth.
+struct SmoothDisplacement {
+  /// Components x and y: the surface's tangential displacement. z: its normal displacement less what the endless layer
+  /// does under the coarse pressure alone (sides of the pad, layers below, friction's pull): mm.
+  SplineField rest;
+  double largest_misfit = 0.0;  ///< mm, of `rest.z` to the mesh's hat means where there's pressure: the mesh's wiggles
+  double force = 0.0;           ///< N, of the coarse pressure
+};
+
+/// Takes the mesh's wiggles out. The coarse mesh and the endless layer (fem/layer_response.h) are given the same P1
+/// pressure; the difference of what they answer, as means over the hats, has no detail of the size of an edge but for
+/// the mesh's own error, so smoothing splines are fitted to it (knots a quarter of the thickness or two and a half
+/// edges apart, the bending below a wavelength of four knots held back) and the wiggles stay behind. Made once a gel;
+/// safe to use from many threads.
+class SmoothSurface {
+ public:
+  /// The compliance must outlive this.
+  /// @throws Error unless the gel's outer surface lies in the plane z = 0
+  explicit SmoothSurface(const Compliance& gel);
+  ~SmoothSurface();
+
+  SmoothDisplacement displacement(const PressState& press) const;
+
+  /// Normal displacement (mm, negative under pressure) of the coarse press at the pixels of reference_grid(): the
+  /// endless layer's plus the rest. As smooth as the coarse pressure lets it be.
+  std::vector<double> normal_displacement(const PressState& press) const;
+  const PixelGrid& reference_grid() const { return layer_->grid(); }
+
+  const Compliance& gel() const { return gel_; }
+  double edge() const { return edge_; }  ///< mm, of the finest triangles
+
+ private:
+  std::vector<double> layer_answer(const PressState& press) const;
+
+  const Compliance& gel_;
+  double edge_ = 0.0;
+  std::unique_ptr<LayerResponse> layer_;               // over the whole surface
+  Eigen::SparseMatrix<double, Eigen::RowMajor> hats_;  // pixels x vertices: P1 values at pixel centres
+  Eigen::VectorXd weight_;                             // per vertex, mm^2, by the mass matrix
+  Eigen::VectorXd pixel_weight_;                       // the same in pixels
+  SplineField empty_;                                  // the splines' places
+  Eigen::SparseMatrix<double> means_;                  // vertices x splines: hat means
+  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> fit_;
+};
+
+}  // namespace touchstone::fem
