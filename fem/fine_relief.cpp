@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "core/error.h"
+#include "fem/patch_motion.h"
 
 namespace touchstone::fem {
 namespace {
@@ -58,6 +59,31 @@ PixelBox pressed_box(const Compliance& gel, const PressState& press, double marg
   }
   const Eigen::Vector2d around = Eigen::Vector2d::Constant(margin);
   return box_around(low - around, high + around, pitch);
+}
+
+/// Puts the patch's mean motion in place of the tangential displacement. Uniform splines whose coefficients are a
+/// linear field's values at the knots are that field.
+void move_as_a_whole(const Compliance& gel, const PressState& press, SplineField& rest) {
+  std::vector<Eigen::Vector3d> points, normals, displacements;
+  std::vector<double> pressures;
+  const Eigen::VectorXd weight = gel.mass * Eigen::VectorXd::Ones(gel.mass.cols());
+  const Eigen::MatrixX3d weighted = gel.mass * press.surface_displacement;
+  for (std::size_t v = 0; v < gel.vertices.size(); ++v) {
+    const auto row = static_cast<Eigen::Index>(v);
+    if (!(press.traction(row, 2) < 0.0)) continue;
+    points.push_back(gel.vertices[v]);
+    normals.push_back(Eigen::Vector3d::UnitZ());
+    displacements.push_back(weighted.row(row).transpose() / weight[row]);
+    pressures.push_back(-weight[row] * press.traction(row, 2));
+  }
+  const PatchMotion patch = mean_patch_motion(points, normals, displacements, pressures);
+  for (int j = 0; j < rest.ny + 3; ++j) {
+    for (int i = 0; i < rest.nx + 3; ++i) {
+      const Eigen::Vector2d knot = rest.first + rest.spacing * Eigen::Vector2d(i - 1, j - 1);
+      const Eigen::Vector3d moved = patch.displacement({knot.x(), knot.y(), 0.0});
+      rest.coefficients.row(j * (rest.nx + 3) + i).head<2>() = moved.head<2>().transpose();
+    }
+  }
 }
 
 /// Gap per pixel from the plane z = rest up to the object, looked up where the gel has moved to along the surface.
@@ -144,6 +170,7 @@ ReliefAnswer solve_fine_relief(const SmoothSurface& surface, const PressState& p
   const SmoothDisplacement coarse = surface.displacement(press);
   ReliefAnswer answer;
   answer.rest = coarse.rest;
+  if (!settings.follow_surface) move_as_a_whole(gel, press, answer.rest);
   answer.coarse_force = coarse.force;
   answer.misfit = coarse.largest_misfit;
   answer.solved.converged = true;
@@ -157,7 +184,7 @@ ReliefAnswer solve_fine_relief(const SmoothSurface& surface, const PressState& p
     const PixelGrid grid = box.grid(settings.pitch);
     check(grid);
     const LayerResponse layer(gel.material, gel.thickness, grid, GridEdges::free);
-    const std::vector<double> gap = gaps(grid, coarse.rest, shape, press.gel_from_object);
+    const std::vector<double> gap = gaps(grid, answer.rest, shape, press.gel_from_object);
     PixelContact contact{gap, {}};
     if (settings.control == ReliefControl::force) contact.force = coarse.force;
     start = carried_over(answer.grid.size() > 0 ? &answer : previous, grid);

@@ -28,6 +28,10 @@ struct ReliefSettings {
   /// the thickness, the larger. It is widened where the fine contact reaches its border.
   double margin = -1.0;
   ReliefControl control = ReliefControl::force;
+  /// The object is looked up where the surface has gone along itself, point by point: what a picture needs. Without
+  /// this, where the contact patch has gone as a whole, as the coarse press does: linear theory, for comparisons (a
+  /// frictionless flat punch of 3 mm pressed by a tenth of a gel of 5 mm meets 5 % less of it when followed).
+  bool follow_surface = true;
   PixelTolerance tolerance;
 };
 
