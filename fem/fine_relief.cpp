@@ -63,7 +63,7 @@ PixelBox pressed_box(const Compliance& gel, const PressState& press, double marg
 
 /// Puts the patch's mean motion in place of the tangential displacement. Uniform splines whose coefficients are a
 /// linear field's values at the knots are that field.
-void move_as_a_whole(const Compliance& gel, const PressState& press, SplineField& rest) {
+void move_as_a_whole(const Compliance& gel, const PressState& press, SplineField& along) {
   std::vector<Eigen::Vector3d> points, normals, displacements;
   std::vector<double> pressures;
   const Eigen::VectorXd weight = gel.mass * Eigen::VectorXd::Ones(gel.mass.cols());
@@ -77,17 +77,14 @@ void move_as_a_whole(const Compliance& gel, const PressState& press, SplineField
     pressures.push_back(-weight[row] * press.traction(row, 2));
   }
   const PatchMotion patch = mean_patch_motion(points, normals, displacements, pressures);
-  for (int j = 0; j < rest.ny + 3; ++j) {
-    for (int i = 0; i < rest.nx + 3; ++i) {
-      const Eigen::Vector2d knot = rest.first + rest.spacing * Eigen::Vector2d(i - 1, j - 1);
-      const Eigen::Vector3d moved = patch.displacement({knot.x(), knot.y(), 0.0});
-      rest.coefficients.row(j * (rest.nx + 3) + i).head<2>() = moved.head<2>().transpose();
-    }
+  for (Eigen::Index row = 0; row < along.coefficients.rows(); ++row) {
+    const Eigen::Vector2d knot = along.knot(row);
+    along.coefficients.row(row) = patch.displacement({knot.x(), knot.y(), 0.0}).transpose();
   }
 }
 
 /// Gap per pixel from the plane z = rest up to the object, looked up where the gel has moved to along the surface.
-std::vector<double> gaps(const PixelGrid& grid, const SplineField& rest, const ContactShape& shape,
+std::vector<double> gaps(const PixelGrid& grid, const SmoothDisplacement& coarse, const ContactShape& shape,
                          const RigidTransform& gel_from_object) {
   const RigidTransform object_from_gel = gel_from_object.inverse();
   const Eigen::Vector3d up = object_from_gel.turn(Eigen::Vector3d::UnitZ());
@@ -97,11 +94,11 @@ std::vector<double> gaps(const PixelGrid& grid, const SplineField& rest, const C
   tbb::parallel_for(0, grid.ny, [&](int j) {
     for (int i = 0; i < grid.nx; ++i) {
       const Eigen::Vector2d at = grid.centre(i, j);
-      const Eigen::Vector3d moved = rest.at(at);
+      const Eigen::Vector3d moved = coarse.along.at(at);
       const Eigen::Vector3d point(at.x() + moved.x(), at.y() + moved.y(), 0.0);
       if ((point - centre).head<2>().squaredNorm() > ball.radius * ball.radius) continue;
       if (const auto entry = first_entry(shape, object_from_gel * point, up)) {
-        gap[grid.at(i, j)] = *entry - moved.z();
+        gap[grid.at(i, j)] = *entry - coarse.rest.at(at).z();
       }
     }
   });
@@ -167,10 +164,10 @@ ReliefAnswer solve_fine_relief(const SmoothSurface& surface, const PressState& p
   }
   if (!(settings.tolerance.gap_mm > 0.0)) fail("the relief's tolerance is {} mm", settings.tolerance.gap_mm);
   const Compliance& gel = surface.gel();
-  const SmoothDisplacement coarse = surface.displacement(press);
+  SmoothDisplacement coarse = surface.displacement(press);
   ReliefAnswer answer;
-  answer.rest = coarse.rest;
-  if (!settings.follow_surface) move_as_a_whole(gel, press, answer.rest);
+  if (!settings.follow_surface) move_as_a_whole(gel, press, coarse.along);
+  answer.along = coarse.along;
   answer.coarse_force = coarse.force;
   answer.misfit = coarse.largest_misfit;
   answer.solved.converged = true;
@@ -184,7 +181,7 @@ ReliefAnswer solve_fine_relief(const SmoothSurface& surface, const PressState& p
     const PixelGrid grid = box.grid(settings.pitch);
     check(grid);
     const LayerResponse layer(gel.material, gel.thickness, grid, GridEdges::free);
-    const std::vector<double> gap = gaps(grid, answer.rest, shape, press.gel_from_object);
+    const std::vector<double> gap = gaps(grid, coarse, shape, press.gel_from_object);
     PixelContact contact{gap, {}};
     if (settings.control == ReliefControl::force) contact.force = coarse.force;
     start = carried_over(answer.grid.size() > 0 ? &answer : previous, grid);
@@ -214,7 +211,7 @@ ReliefAnswer solve_fine_relief(const SmoothSurface& surface, const PressState& p
 
 HeightField::HeightField(const SmoothSurface& surface, const PressState& press, const ReliefAnswer* fine)
     : coarse_grid_(surface.reference_grid()) {
-  rest_ = surface.displacement(press).rest;
+  along_ = fine != nullptr ? fine->along : surface.displacement(press).along;
   coarse_ = surface.normal_displacement(press);
   if (fine != nullptr && fine->grid.size() > 0) {
     fine_grid_ = fine->grid;
@@ -222,7 +219,7 @@ HeightField::HeightField(const SmoothSurface& surface, const PressState& press, 
   }
 }
 
-double HeightField::rest_height(const Eigen::Vector2d& material) const {
+double HeightField::material_height(const Eigen::Vector2d& material) const {
   if (!fine_.empty()) {
     const Eigen::Vector2d place = (material - fine_grid_.first) / fine_grid_.pitch;
     if (place.x() >= 0.0 && place.y() >= 0.0 && place.x() <= fine_grid_.nx - 1 && place.y() <= fine_grid_.ny - 1) {
@@ -236,12 +233,12 @@ double HeightField::at(const Eigen::Vector2d& point) const {
   // Which material point has come to stand over this place: a fixed point, since strains are well below one.
   Eigen::Vector2d material = point;
   for (int k = 0; k < 12; ++k) {
-    const Eigen::Vector2d next = point - rest_.at(material).head<2>();
+    const Eigen::Vector2d next = point - along_.at(material).head<2>();
     const bool settled = (next - material).norm() < 1e-7;
     material = next;
     if (settled) break;
   }
-  return rest_height(material);
+  return material_height(material);
 }
 
 }  // namespace touchstone::fem

@@ -42,13 +42,13 @@ struct ReliefAnswer {
   std::vector<double> pressure;  ///< MPa, of the object on the gel
   std::vector<double> height;    ///< mm, normal displacement: below 0 under the object
   std::vector<char> contact;     ///< 1: in contact
-  SplineField rest;              ///< see SmoothDisplacement; components x and y are the tangential displacement
+  SplineField along;             ///< components x and y: the tangential displacement, mm
   PixelContactAnswer solved;     ///< shift, residuals, work; its pressure and displacement are moved into the above
   double coarse_force = 0.0;     ///< N
   double misfit = 0.0;           ///< mm, see SmoothDisplacement::largest_misfit
   bool at_the_edge = false;      ///< contact reaches the surface's own edge, where the layer isn't endless
 
-  Eigen::Vector2d tangential(const Eigen::Vector2d& point) const { return rest.at(point).head<2>(); }
+  Eigen::Vector2d tangential(const Eigen::Vector2d& point) const { return along.at(point).head<2>(); }
 };
 
 /// Solves the fine contact of `shape`, in all its detail, as `press` has it placed. A pure function of its arguments;
@@ -69,9 +69,9 @@ class HeightField {
   double at(const Eigen::Vector2d& point) const;
 
  private:
-  double rest_height(const Eigen::Vector2d& material) const;
+  double material_height(const Eigen::Vector2d& material) const;
 
-  SplineField rest_;
+  SplineField along_;
   PixelGrid coarse_grid_, fine_grid_;
   std::vector<double> coarse_, fine_;
 };

@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 #include "core/error.h"
 
@@ -16,82 +15,9 @@ constexpr double kPixelsAnEdge = 8.0;
 constexpr int kMostReferencePixels = 768;  // a side
 constexpr double kKnotsAThickness = 4.0;
 constexpr double kEdgesAKnot = 2.5;
-constexpr double kKnotsAWave = 4.0;  // the wavelength at which the fit follows by half
-
-/// Values of the four uniform cubic B-splines that reach over a place t in [0, 1] of its interval.
-std::array<double, 4> splines(double t) {
-  const double s = 1.0 - t;
-  return {s * s * s / 6.0, (4.0 - 3.0 * t * t * (2.0 - t)) / 6.0, (4.0 - 3.0 * s * s * (2.0 - s)) / 6.0,
-          t * t * t / 6.0};
-}
-
-/// The interval that a coordinate (in knots) lies in, and where.
-std::pair<int, double> interval(double x, int intervals) {
-  x = std::clamp(x, 0.0, static_cast<double>(intervals));
-  const int i = std::min(static_cast<int>(x), intervals - 1);
-  return {i, x - i};
-}
-
-/// Calls visit(spline, value) for the 16 splines that reach over a point.
-template <typename Visit>
-void for_splines(const SplineField& field, const Eigen::Vector2d& point, const Visit& visit) {
-  const auto [i, u] = interval((point.x() - field.first.x()) / field.spacing, field.nx);
-  const auto [j, v] = interval((point.y() - field.first.y()) / field.spacing, field.ny);
-  const auto along_x = splines(u);
-  const auto along_y = splines(v);
-  for (int b = 0; b < 4; ++b) {
-    for (int a = 0; a < 4; ++a) visit((j + b) * (field.nx + 3) + i + a, along_x[a] * along_y[b]);
-  }
-}
-
-/// int s_i^(p) s_j^(p) over the line, in knots, for p = 0, 1, 2, by Gauss' rule of three points and the splines' own
-/// polynomials (degree 6 in 4 points is exact).
-std::array<Eigen::MatrixXd, 3> line_products(int intervals) {
-  const int n = intervals + 3;
-  std::array<Eigen::MatrixXd, 3> products;
-  for (auto& m : products) m = Eigen::MatrixXd::Zero(n, n);
-  const std::array<double, 4> x = {0.0694318442029737, 0.3300094782075719, 0.6699905217924281, 0.9305681557970263};
-  const std::array<double, 4> w = {0.1739274225687269, 0.3260725774312731, 0.3260725774312731, 0.1739274225687269};
-  for (int q = 0; q < 4; ++q) {
-    const double t = x[q];
-    const double s = 1.0 - t;
-    const std::array<std::array<double, 4>, 3> value = {
-        splines(t), std::array<double, 4>{-0.5 * s * s, 1.5 * t * t - 2.0 * t, -1.5 * s * s + 2.0 * s, 0.5 * t * t},
-        std::array<double, 4>{s, 3.0 * t - 2.0, 3.0 * s - 2.0, t}};
-    for (int p = 0; p < 3; ++p) {
-      for (int i = 0; i < intervals; ++i) {
-        for (int a = 0; a < 4; ++a) {
-          for (int b = 0; b < 4; ++b) products[p](i + a, i + b) += w[q] * value[p][a] * value[p][b];
-        }
-      }
-    }
-  }
-  return products;
-}
-
-/// int |second derivatives|^2 of the field, times spacing^2: the thin plate's bending.
-Eigen::SparseMatrix<double> bending(int nx, int ny) {
-  const auto x = line_products(nx);
-  const auto y = line_products(ny);
-  std::vector<Eigen::Triplet<double>> entries;
-  const auto near = [](int i, int n) { return std::pair(std::max(0, i - 3), std::min(n - 1, i + 3)); };
-  for (int j = 0; j < ny + 3; ++j) {
-    for (int i = 0; i < nx + 3; ++i) {
-      const auto [jl, jh] = near(j, ny + 3);
-      const auto [il, ih] = near(i, nx + 3);
-      for (int l = jl; l <= jh; ++l) {
-        for (int k = il; k <= ih; ++k) {
-          entries.emplace_back(j * (nx + 3) + i, l * (nx + 3) + k,
-                               x[2](i, k) * y[0](j, l) + 2.0 * x[1](i, k) * y[1](j, l) + x[0](i, k) * y[2](j, l));
-        }
-      }
-    }
-  }
-  const int n = (nx + 3) * (ny + 3);
-  Eigen::SparseMatrix<double> result(n, n);
-  result.setFromTriplets(entries.begin(), entries.end());
-  return result;
-}
+constexpr double kKnotsAWave = 4.0;       // the wavelength that the fit follows by half
+constexpr double kEdgesAKnotAlong = 1.5;  // the same for the tangential displacement, which follows friction's detail
+constexpr double kEdgesAWaveAlong = 3.0;
 
 struct Box {
   Eigen::Vector2d low = Eigen::Vector2d::Constant(std::numeric_limits<double>::infinity());
@@ -154,12 +80,6 @@ Eigen::SparseMatrix<double, Eigen::RowMajor> sampled_hats(const Compliance& gel,
 
 }  // namespace
 
-Eigen::Vector3d SplineField::at(const Eigen::Vector2d& point) const {
-  Eigen::Vector3d value = Eigen::Vector3d::Zero();
-  for_splines(*this, point, [&](int spline, double weight) { value += weight * coefficients.row(spline).transpose(); });
-  return value;
-}
-
 SmoothSurface::SmoothSurface(const Compliance& gel) : gel_(gel), edge_(shortest_edge(gel)) {
   const Box box = box_of(gel.vertices);
   const Eigen::Vector2d size = box.high - box.low;
@@ -181,35 +101,14 @@ SmoothSurface::SmoothSurface(const Compliance& gel) : gel_(gel), edge_(shortest_
   hats_ = sampled_hats(gel, grid);
   weight_ = gel.mass * Eigen::VectorXd::Ones(gel.mass.cols());
   pixel_weight_ = grid.pixel_area() * (hats_.transpose() * Eigen::VectorXd::Ones(hats_.rows()));
-
-  empty_.spacing = std::max(gel.thickness / kKnotsAThickness, kEdgesAKnot * edge_);
-  empty_.nx = std::max(1, static_cast<int>(std::ceil(size.x() / empty_.spacing)));
-  empty_.ny = std::max(1, static_cast<int>(std::ceil(size.y() / empty_.spacing)));
-  empty_.first = 0.5 * (box.low + box.high) - 0.5 * empty_.spacing * Eigen::Vector2d(empty_.nx, empty_.ny);
-  std::vector<Eigen::Triplet<double>> entries;
-  for (int j = 0; j < grid.ny; ++j) {
-    for (int i = 0; i < grid.nx; ++i) {
-      for_splines(empty_, grid.centre(i, j), [&](int spline, double value) {
-        entries.emplace_back(static_cast<int>(grid.at(i, j)), spline, value);
-      });
-    }
-  }
-  const int count = (empty_.nx + 3) * (empty_.ny + 3);
-  Eigen::SparseMatrix<double, Eigen::RowMajor> sampled(hats_.rows(), count);
-  sampled.setFromTriplets(entries.begin(), entries.end());
-  means_ = hats_.transpose() * sampled;
   for (Eigen::Index v = 0; v < pixel_weight_.size(); ++v) {
-    if (pixel_weight_[v] <= 0.0) pixel_weight_[v] = grid.pixel_area();  // a sliver between the pixels: its row is empty
+    if (!(pixel_weight_[v] > 0.0)) pixel_weight_[v] = grid.pixel_area();  // a sliver between the pixels' centres
   }
-  means_ = (grid.pixel_area() * pixel_weight_.cwiseInverse()).asDiagonal() * means_;
-  // min sum weight (mean - data)^2 + stiffness int |bending|^2: waves of number k follow by 1/(1 + stiffness k^4).
-  const double half_k = 2.0 * std::numbers::pi / (kKnotsAWave * empty_.spacing);
-  const double stiffness = std::pow(half_k, -4.0) / (empty_.spacing * empty_.spacing);
-  const Eigen::SparseMatrix<double> normal =
-      Eigen::SparseMatrix<double>(means_.transpose() * weight_.asDiagonal() * means_) +
-      stiffness * bending(empty_.nx, empty_.ny);
-  fit_.compute(normal);
-  TS_ASSERT(fit_.info() == Eigen::Success);
+
+  const double knots = std::max(gel.thickness / kKnotsAThickness, kEdgesAKnot * edge_);
+  rest_fit_ = std::make_unique<SplineFit>(grid, hats_, weight_, box.low, box.high, knots, kKnotsAWave * knots);
+  along_fit_ = std::make_unique<SplineFit>(grid, hats_, weight_, box.low, box.high, kEdgesAKnotAlong * edge_,
+                                           kEdgesAWaveAlong * edge_);
 }
 
 SmoothSurface::~SmoothSurface() = default;
@@ -232,10 +131,13 @@ SmoothDisplacement SmoothSurface::displacement(const PressState& press) const {
   means.col(2) += layer_means;
 
   SmoothDisplacement result;
-  result.rest = empty_;
-  const Eigen::MatrixX3d right = means_.transpose() * weight_.asDiagonal() * means;
-  result.rest.coefficients = fit_.solve(right);
-  const Eigen::VectorXd misfit = means_ * result.rest.coefficients.col(2) - means.col(2);
+  Eigen::MatrixX3d part = means;
+  part.col(2).setZero();
+  result.along = along_fit_->fit(part);
+  part.setZero();
+  part.col(2) = means.col(2);
+  result.rest = rest_fit_->fit(part);
+  const Eigen::VectorXd misfit = rest_fit_->means_of(result.rest).col(2) - means.col(2);
   for (Eigen::Index v = 0; v < misfit.size(); ++v) {
     if (press.traction(v, 2) != 0.0) result.largest_misfit = std::max(result.largest_misfit, std::abs(misfit[v]));
   }

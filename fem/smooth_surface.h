@@ -2,7 +2,6 @@
 // The displacement of a flat outer surface under a coarse press, at any point and free of the mesh's wiggles.
 
 #include <Eigen/Core>
-#include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>
 #include <memory>
 #include <vector>
@@ -10,27 +9,16 @@
 #include "fem/compliance.h"
 #include "fem/layer_response.h"
 #include "fem/press.h"
+#include "fem/spline_field.h"
 
 namespace touchstone::fem {
-
-/// A smooth field over a rectangle: three components on uniform bicubic B-splines, twice continuously differentiable.
-struct SplineField {
-  Eigen::Vector2d first = Eigen::Vector2d::Zero();  ///< knot (0, 0), mm; splines -1 to nx + 1 reach over the rectangle
-  double spacing = 1.0;                             ///< mm between knots
-  int nx = 0;                                       ///< knot intervals
-  int ny = 0;
-  Eigen::MatrixX3d coefficients;  ///< (nx + 3)(ny + 3), x fastest
-
-  /// Beyond the rectangle: the value at its nearest point.
-  Eigen::Vector3d at(const Eigen::Vector2d& point) const;
-};
 
 /// What a coarse press does to the surface, in two parts: what an endless layer does under the coarse pressure, which
 /// is as rough as that pressure; and all the rest, which is smooth.
 struct SmoothDisplacement {
-  /// Components x and y: the surface's tangential displacement. z: its normal displacement less what the endless layer
-  /// does under the coarse pressure alone (sides of the pad, layers below, friction's pull): mm.
-  SplineField rest;
+  SplineField along;  ///< components x and y: the surface's tangential displacement, mm
+  SplineField rest;   ///< component z: the normal displacement less what the endless layer does under the coarse
+                      ///< pressure alone (sides of the pad, layers below, friction's pull), mm
   double largest_misfit = 0.0;  ///< mm, of `rest.z` to the mesh's hat means where there's pressure: the mesh's wiggles
   double force = 0.0;           ///< N, of the coarse pressure
 };
@@ -66,9 +54,7 @@ class SmoothSurface {
   Eigen::SparseMatrix<double, Eigen::RowMajor> hats_;  // pixels x vertices: P1 values at pixel centres
   Eigen::VectorXd weight_;                             // per vertex, mm^2, by the mass matrix
   Eigen::VectorXd pixel_weight_;                       // the same in pixels
-  SplineField empty_;                                  // the splines' places
-  Eigen::SparseMatrix<double> means_;                  // vertices x splines: hat means
-  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> fit_;
+  std::unique_ptr<SplineFit> rest_fit_, along_fit_;
 };
 
 }  // namespace touchstone::fem
