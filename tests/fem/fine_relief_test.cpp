@@ -238,6 +238,55 @@ TEST(FineRelief, TheNumberOfThreadsChangesNoBit) {
   EXPECT_EQ(one, solve_fine_relief(coarse_surface(), press, ball).height);
 }
 
+/// A flat stamp whose face bears waves of `period` along x, `amplitude` from trough to crest.
+ReliefShape wavy_stamp(double period, double amplitude) {
+  constexpr int kPoints = 64;
+  std::vector<float> heights;
+  for (int i = 0; i < kPoints; ++i) {
+    heights.push_back(static_cast<float>(0.5 * amplitude * (1.0 - std::cos(2.0 * std::numbers::pi * i / kPoints))));
+  }
+  const Eigen::Vector2d spacing(period / kPoints, 1.0);
+  return {RoundedCylinder{2.0, 0.2, 3.0}, std::make_shared<const ReliefMap>(kPoints, 1, Eigen::Vector2d(0, 0), spacing,
+                                                                            std::array{true, true}, heights)};
+}
+
+/// Trough to crest of the membrane in the stamp's middle, over a period beside the axis.
+double imprint(const ReliefShape& stamp, double period, double depth) {
+  ReliefShape plain = stamp;
+  plain.relief = std::make_shared<const ReliefMap>(stamp.relief->blurred(0.5));
+  const PressState press = pressed(coarse_gel(), plain, 0.0, 0.0, -depth);
+  ReliefSettings settings;
+  settings.pitch = 0.01;
+  const ReliefAnswer answer = solve_fine_relief(coarse_surface(), press, stamp, settings);
+  EXPECT_TRUE(answer.solved.converged);
+  const HeightField height(coarse_surface(), press, &answer);
+  double low = 1.0;
+  double high = -1.0;
+  for (double x = 0.0; x < period; x += 0.002) {
+    low = std::min(low, height.at({x, 0.0}));
+    high = std::max(high, height.at({x, 0.0}));
+  }
+  return high - low;
+}
+
+// In the stamp's middle the pressure is nearly uniform, so Johnson's critical pressure decides whether the waves are
+// filled: p* = pi E* (amplitude/2) / period.
+TEST(FineRelief, WavesAreFilledOrBridgedAsJohnsonSays) {
+  const double plane_modulus = 0.33 / (1.0 - 0.49 * 0.49);
+  const double depth = 0.15;
+  const PressState press = pressed(coarse_gel(), RoundedCylinder{2.0, 0.2, 3.0}, 0.0, 0.0, -depth);
+  const ReliefAnswer answer = solve_fine_relief(coarse_surface(), press, RoundedCylinder{2.0, 0.2, 3.0});
+  const PixelGrid& grid = answer.grid;
+  const double pressure = answer.pressure[grid.at(grid.nx / 2, grid.ny / 2)];
+  const double period = 0.4;
+  const double critical = 2.0 * period * pressure / (std::numbers::pi * plane_modulus);  // amplitude filled just so
+  ASSERT_GT(critical, 0.003);
+  EXPECT_NEAR(imprint(wavy_stamp(period, 0.7 * critical), period, depth), 0.7 * critical, 0.01 * critical);
+  const double bridged = imprint(wavy_stamp(period, 4.0 * critical), period, depth);
+  EXPECT_LT(bridged, 2.5 * critical);
+  EXPECT_GT(bridged, 0.5 * critical);
+}
+
 TEST(FineRelief, RefusesWhatItCantDo) {
   const SphereShape ball{3.0};
   const PressState press = pressed(coarse_gel(), ball, 0.0, 0.0, 2.7);
