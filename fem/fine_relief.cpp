@@ -219,7 +219,7 @@ HeightField::HeightField(const SmoothSurface& surface, const PressState& press, 
   }
 }
 
-double HeightField::material_height(const Eigen::Vector2d& material) const {
+double HeightField::at_material(const Eigen::Vector2d& material) const {
   if (!fine_.empty()) {
     const Eigen::Vector2d place = (material - fine_grid_.first) / fine_grid_.pitch;
     if (place.x() >= 0.0 && place.y() >= 0.0 && place.x() <= fine_grid_.nx - 1 && place.y() <= fine_grid_.ny - 1) {
@@ -238,7 +238,7 @@ double HeightField::at(const Eigen::Vector2d& point) const {
     material = next;
     if (settled) break;
   }
-  return material_height(material);
+  return at_material(material);
 }
 
 }  // namespace touchstone::fem

@@ -67,10 +67,10 @@ class HeightField {
   HeightField(const SmoothSurface& surface, const PressState& press, const ReliefAnswer* fine);
 
   double at(const Eigen::Vector2d& point) const;
+  /// The same for the material point that stood at `material` on the undeformed surface.
+  double at_material(const Eigen::Vector2d& material) const;
 
  private:
-  double material_height(const Eigen::Vector2d& material) const;
-
   SplineField along_;
   PixelGrid coarse_grid_, fine_grid_;
   std::vector<double> coarse_, fine_;
