@@ -17,7 +17,6 @@ namespace touchstone::fem {
 namespace {
 
 constexpr int kColumnsAtOnce = 8;
-constexpr double kWidestPixel = 0.25;  // of the thickness
 
 /// FFTW's planner isn't safe for threads; its transforms are.
 std::mutex& planner() {
@@ -111,7 +110,7 @@ LayerResponse::Scratch::~Scratch() {
 }
 
 LayerResponse::LayerResponse(const ElasticMaterial& material, double thickness, const PixelGrid& grid, GridEdges edges)
-    : grid_(grid), edges_(edges) {
+    : grid_(grid), edges_(edges), material_(material), thickness_(thickness) {
   fem::check(material);
   fem::check(grid);
   if (!(thickness > 0.0) || !std::isfinite(thickness)) {
@@ -119,19 +118,19 @@ LayerResponse::LayerResponse(const ElasticMaterial& material, double thickness, 
   }
   if (edges == GridEdges::periodic) {
     transform_ = std::make_unique<Transform>(grid.nx, grid.ny, grid.ny);
-    fill_periodic(material, thickness);
+    fill_periodic();
     return;
   }
   if (grid.pitch > kWidestPixel * thickness) {
     fail("pixels of {} mm are too wide for a layer of {} mm; they may have a quarter of it", grid.pitch, thickness);
   }
   transform_ = std::make_unique<Transform>(quick_length(2 * grid.nx - 1), quick_length(2 * grid.ny - 1), grid.ny);
-  fill_free(material, thickness);
+  fill_free();
 }
 
 LayerResponse::~LayerResponse() = default;
 
-void LayerResponse::fill_periodic(const ElasticMaterial& material, double thickness) {
+void LayerResponse::fill_periodic() {
   const Transform& t = *transform_;
   symbol_ = std::make_unique<double[]>(t.stride * static_cast<std::size_t>(t.height));
   const double pixels = static_cast<double>(t.width) * t.height;
@@ -140,19 +139,19 @@ void LayerResponse::fill_periodic(const ElasticMaterial& material, double thickn
     for (int i = 0; i <= t.width / 2; ++i) {
       const double kx = 2.0 * std::numbers::pi / (t.width * grid_.pitch) * i;
       symbol_[t.stride * static_cast<std::size_t>(j) + i] =
-          layer_compliance(material, thickness, std::hypot(kx, ky)) / pixels;
+          layer_compliance(material_, thickness_, std::hypot(kx, ky)) / pixels;
     }
   });
 }
 
-void LayerResponse::fill_free(const ElasticMaterial& material, double thickness) {
+void LayerResponse::fill_free() {
   const Transform& t = *transform_;
   const int nx = grid_.nx;
   const int ny = grid_.ny;
   const double pitch = grid_.pitch;
-  const LayerCorrection correction(material.poisson_ratio, std::hypot(nx, ny) * pitch / thickness);
-  const double nu = std::min(material.poisson_ratio, kLargestPoissonRatio);
-  const double half_space = (1.0 - nu * nu) / (std::numbers::pi * material.youngs_modulus);
+  const LayerCorrection correction(material_.poisson_ratio, std::hypot(nx, ny) * pitch / thickness_);
+  const double nu = std::min(material_.poisson_ratio, kLargestPoissonRatio);
+  const double half_space = (1.0 - nu * nu) / (std::numbers::pi * material_.youngs_modulus);
   const double area = grid_.pixel_area();
 
   std::vector<double> corners(static_cast<std::size_t>(nx + 1) * (ny + 1));
@@ -165,13 +164,13 @@ void LayerResponse::fill_free(const ElasticMaterial& material, double thickness)
   tbb::parallel_for(0, ny, [&](int j) {
     for (int i = 0; i < nx; ++i) {
       const double r = std::hypot(i, j) * pitch;
-      const double rho = r / thickness;
+      const double rho = r / thickness_;
       double influence = 0.0;
       if (rho <= LayerCorrection::kReach) {
         const auto at = [&](int di, int dj) { return corners[static_cast<std::size_t>(j + dj) * (nx + 1) + i + di]; };
         const double mean_of_correction =
-            correction.value(rho) + area / (24.0 * thickness * thickness) * correction.laplacian(rho);
-        influence = half_space * (at(1, 1) - at(0, 1) - at(1, 0) + at(0, 0) + area / thickness * mean_of_correction);
+            correction.value(rho) + area / (24.0 * thickness_ * thickness_) * correction.laplacian(rho);
+        influence = half_space * (at(1, 1) - at(0, 1) - at(1, 0) + at(0, 0) + area / thickness_ * mean_of_correction);
       }
       for (const int y : {j, (t.height - j) % t.height}) {
         for (const int x : {i, (t.width - i) % t.width}) t.row(room.data_, y)[x] = influence;

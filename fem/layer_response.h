@@ -24,6 +24,9 @@ struct PixelGrid {
   bool operator==(const PixelGrid&) const = default;
 };
 
+/// Pixels of a free grid may have this part of the thickness.
+inline constexpr double kWidestPixel = 0.25;
+
 /// The most pixels that a side may have.
 inline constexpr int kMostPixelsASide = 2048;
 
@@ -47,8 +50,8 @@ class LayerResponse {
   /// Room for one application of a response.
   class Scratch;
 
-  /// @throws Error for a material, thickness or grid that isn't allowed, or if pixels of a free grid are wider than a
-  /// quarter of the thickness (then the layer's correction isn't smooth over a pixel)
+  /// @throws Error for a material, thickness or grid that isn't allowed, or if pixels of a free grid are wider than
+  /// kWidestPixel allows (then the layer's correction isn't smooth over a pixel)
   LayerResponse(const ElasticMaterial& material, double thickness, const PixelGrid& grid, GridEdges edges);
   ~LayerResponse();
   LayerResponse(const LayerResponse&) = delete;
@@ -56,6 +59,8 @@ class LayerResponse {
 
   const PixelGrid& grid() const { return grid_; }
   GridEdges edges() const { return edges_; }
+  const ElasticMaterial& material() const { return material_; }
+  double thickness() const { return thickness_; }
 
   std::unique_ptr<Scratch> make_scratch() const;
   /// @pre both spans have a value per pixel, and the scratch is of this response; they may be the same array
@@ -63,11 +68,13 @@ class LayerResponse {
 
  private:
   struct Transform;
-  void fill_free(const ElasticMaterial& material, double thickness);
-  void fill_periodic(const ElasticMaterial& material, double thickness);
+  void fill_free();
+  void fill_periodic();
 
   PixelGrid grid_;
   GridEdges edges_;
+  ElasticMaterial material_;
+  double thickness_;
   std::unique_ptr<const Transform> transform_;
   std::unique_ptr<double[]> symbol_;  // real: of the padded grid's half spectrum, over the number of its pixels
 };

@@ -12,6 +12,8 @@ namespace touchstone::fem {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr int kLeastNestedPixels = 48;    // a side, for a start from wider pixels
+constexpr double kNestedLooseness = 2.0;  // of their tolerance
 
 /// Sums that don't depend on the number of threads: each row by itself, then the rows in order.
 struct Sums {
@@ -247,6 +249,65 @@ class Solver {
 
 }  // namespace
 
+namespace {
+
+/// Four pixels in one: the mean gap of those with a body over them.
+std::vector<double> halved(const PixelGrid& fine, const PixelGrid& coarse, std::span<const double> gap) {
+  std::vector<double> result(coarse.size(), kInfinity);
+  for (int j = 0; j < coarse.ny; ++j) {
+    for (int i = 0; i < coarse.nx; ++i) {
+      double sum = 0.0;
+      int count = 0;
+      for (int b = 2 * j; b < std::min(2 * j + 2, fine.ny); ++b) {
+        for (int a = 2 * i; a < std::min(2 * i + 2, fine.nx); ++a) {
+          if (!(gap[fine.at(a, b)] < kInfinity)) continue;
+          sum += gap[fine.at(a, b)];
+          ++count;
+        }
+      }
+      if (count > 0) result[coarse.at(i, j)] = sum / count;
+    }
+  }
+  return result;
+}
+
+/// Bilinear between the coarse pixels' centres.
+std::vector<double> doubled(const PixelGrid& coarse, const PixelGrid& fine, const std::vector<double>& pressure) {
+  std::vector<double> result(fine.size());
+  tbb::parallel_for(0, fine.ny, [&](int j) {
+    const int near_j = j / 2;
+    const int far_j = std::clamp(near_j + (j % 2 == 0 ? -1 : 1), 0, coarse.ny - 1);
+    for (int i = 0; i < fine.nx; ++i) {
+      const int near_i = i / 2;
+      const int far_i = std::clamp(near_i + (i % 2 == 0 ? -1 : 1), 0, coarse.nx - 1);
+      result[fine.at(i, j)] = 0.5625 * pressure[coarse.at(near_i, near_j)] +
+                              0.1875 * pressure[coarse.at(far_i, near_j)] +
+                              0.1875 * pressure[coarse.at(near_i, far_j)] + 0.0625 * pressure[coarse.at(far_i, far_j)];
+    }
+  });
+  return result;
+}
+
+/// A pressure to begin with, from wider pixels; empty where they would be too few or too wide.
+std::vector<double> nested_start(const LayerResponse& layer, const PixelContact& contact,
+                                 const PixelTolerance& tolerance) {
+  const PixelGrid& fine = layer.grid();
+  const double pitch = 2.0 * fine.pitch;
+  if (layer.edges() != GridEdges::free || pitch > kWidestPixel * layer.thickness() ||
+      std::min(fine.nx, fine.ny) < kLeastNestedPixels) {
+    return {};
+  }
+  const PixelGrid coarse{(fine.nx + 1) / 2, (fine.ny + 1) / 2, pitch,
+                         fine.first + Eigen::Vector2d::Constant(0.5 * fine.pitch)};
+  const LayerResponse wide(layer.material(), layer.thickness(), coarse, GridEdges::free);
+  const std::vector<double> gap = halved(fine, coarse, contact.gap);
+  PixelTolerance loose = tolerance;
+  loose.gap_mm *= kNestedLooseness;
+  return doubled(coarse, fine, solve_pixel_contact(wide, {gap, contact.force}, loose).pressure);
+}
+
+}  // namespace
+
 PixelContactAnswer solve_pixel_contact(const LayerResponse& layer, const PixelContact& contact,
                                        const PixelTolerance& tolerance, std::span<const double> start) {
   const std::size_t n = layer.grid().size();
@@ -265,7 +326,8 @@ PixelContactAnswer solve_pixel_contact(const LayerResponse& layer, const PixelCo
     }
     if (*contact.force > 0.0 && !body) fail("a force of {} N is wanted where no body is over the grid", *contact.force);
   }
-  return Solver(layer, contact, tolerance).solve(start);
+  if (!start.empty()) return Solver(layer, contact, tolerance).solve(start);
+  return Solver(layer, contact, tolerance).solve(nested_start(layer, contact, tolerance));
 }
 
 }  // namespace touchstone::fem

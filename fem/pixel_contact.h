@@ -37,7 +37,8 @@ struct PixelContactAnswer {
 };
 
 /// Constrained conjugate gradients of Polonsky and Keer (Wear 231, 1999). `start` may hold a pressure to begin with
-/// (one a pixel, e.g. the answer of the frame before), or be empty. The same input gives the same bytes.
+/// (one a pixel, e.g. the answer of the frame before); where it is empty, free grids begin with the answer on pixels of
+/// twice the width, and that so on. The same input gives the same bytes.
 /// @throws Error for NaN in the gap or the start, a gap of minus infinity, a force that isn't finite or is below zero,
 /// and a force above zero where no pixel has a body over it
 PixelContactAnswer solve_pixel_contact(const LayerResponse& layer, const PixelContact& contact,

@@ -106,7 +106,9 @@ void plan_relief(const SceneSpec& scene, Plan& plan, Table& table) {
               : fmt::format("the object has detail of {:.3g} mm, the gel's edges have {:.3g} mm", *detail, edge);
   plan.fine_relief = table.add("fine relief", scene.effects.fine_relief, fine && seen, why, "0.1 to 1 second a frame");
   const double pixel = scene.membrane.pixel_um / kMicrometresPerMillimetre;
-  if (plan.fine_relief && detail && scene.object.relief && *detail < 2.0 * pixel) {
+  // A picture may be smoother than its pixels; waves and hairs are as fine as they say.
+  const bool known = scene.object.relief && scene.object.relief->type != ReliefKind::image;
+  if (plan.fine_relief && known && *detail < 2.0 * pixel) {
     fail_at(scene.membrane.where,
             "membrane.pixel_um: {} is too wide for the object's relief of {:.3g} mm; at most {:.3g}",
             scene.membrane.pixel_um, *detail, 0.5 * *detail * kMicrometresPerMillimetre);
