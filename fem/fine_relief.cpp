@@ -212,11 +212,13 @@ ReliefAnswer solve_fine_relief(const SmoothSurface& surface, const PressState& p
 HeightField::HeightField(const SmoothSurface& surface, const PressState& press, const ReliefAnswer* fine)
     : coarse_grid_(surface.reference_grid()) {
   along_ = fine != nullptr ? fine->along : surface.displacement(press).along;
-  coarse_ = surface.normal_displacement(press);
-  if (fine != nullptr && fine->grid.size() > 0) {
-    fine_grid_ = fine->grid;
-    fine_ = fine->height;
+  if (fine == nullptr || fine->grid.size() == 0) {
+    coarse_ = surface.normal_displacement(press);
+    return;
   }
+  coarse_ = surface.normal_displacement(press, fine->grid, fine->pressure);
+  fine_grid_ = fine->grid;
+  fine_ = fine->height;
 }
 
 double HeightField::at_material(const Eigen::Vector2d& material) const {

@@ -128,7 +128,33 @@ LayerResponse::LayerResponse(const ElasticMaterial& material, double thickness, 
   fill_free();
 }
 
+LayerResponse::LayerResponse(const LayerResponse& of, Inverse)
+    : grid_(of.grid_), edges_(of.edges_), material_(of.material_), thickness_(of.thickness_) {
+  const bool free = edges_ == GridEdges::free;
+  transform_ = std::make_unique<Transform>(free ? quick_length(grid_.nx) : grid_.nx,
+                                           free ? quick_length(grid_.ny) : grid_.ny, grid_.ny);
+  fill_periodic();
+  const Transform& t = *transform_;
+  const double pixels = static_cast<double>(t.width) * t.height;
+  for (int j = 0; j < t.height; ++j) {
+    for (int i = 0; i <= t.width / 2; ++i) {
+      double& symbol = symbol_[t.stride * static_cast<std::size_t>(j) + i];
+      symbol = 1.0 / (pixels * pixels * symbol);
+    }
+  }
+  // The mean is what a nearly incompressible layer answers with next to nothing; it's treated as the longest wave.
+  if (t.width > 1) {
+    symbol_[0] = symbol_[1];
+  } else if (t.height > 1) {
+    symbol_[0] = symbol_[t.stride];
+  }
+}
+
 LayerResponse::~LayerResponse() = default;
+
+std::unique_ptr<const LayerResponse> LayerResponse::rough_inverse() const {
+  return std::unique_ptr<const LayerResponse>(new LayerResponse(*this, Inverse{}));
+}
 
 void LayerResponse::fill_periodic() {
   const Transform& t = *transform_;

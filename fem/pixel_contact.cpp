@@ -41,7 +41,9 @@ class Solver {
         forced_(contact.force.has_value()),
         pressure_sum_(forced_ ? *contact.force / grid_.pixel_area() : 0.0),
         tolerance_(tolerance),
+        inverse_(layer.rough_inverse()),
         scratch_(layer.make_scratch()),
+        inverse_scratch_(inverse_->make_scratch()),
         rows_(static_cast<std::size_t>(grid_.ny)) {}
 
   PixelContactAnswer solve(std::span<const double> start) {
@@ -50,18 +52,18 @@ class Solver {
     answer_.displacement.assign(n, 0.0);
     direction_.assign(n, 0.0);
     response_.assign(n, 0.0);
+    residual_.assign(n, 0.0);
+    last_residual_.assign(n, 0.0);
+    takes_part_.assign(n, 0);
     if (!start.empty()) answer_.pressure.assign(start.begin(), start.end());
     begin();
     respond();
-    double last_square = 0.0;  // of the gaps at the last step; 0: begin anew along the gap
     for (;;) {
-      const Sums state = take_gaps();
+      const std::size_t count = take_gaps();
       answer_.converged = answer_.largest_gap <= tolerance_.gap_mm && answer_.largest_overlap <= tolerance_.gap_mm;
-      if (answer_.converged || answer_.iterations >= tolerance_.most_iterations || state.count == 0) break;
+      if (answer_.converged || answer_.iterations >= tolerance_.most_iterations || count == 0) break;
       ++answer_.iterations;
-      const double square = state.b;
-      step(square, last_square > 0.0 ? square / last_square : 0.0);
-      last_square = fresh_ ? 0.0 : square;
+      step();
     }
     finish();
     return std::move(answer_);
@@ -111,9 +113,9 @@ class Solver {
 
   double raw_gap(std::size_t k) const { return gap_[k] + answer_.displacement[k]; }
 
-  /// Sets the shift and how well the laws of contact are met. Returns count and squared gaps (b) where there's
-  /// pressure.
-  Sums take_gaps() {
+  /// Sets the shift, how well the laws of contact are met, and which pixels take part in the next step: those with
+  /// pressure, and those that overlap without. Returns how many there are.
+  std::size_t take_gaps() {
     answer_.shift = 0.0;
     if (forced_) {
       const Sums mean = over_rows([&](std::size_t k, Sums& s) {
@@ -125,78 +127,83 @@ class Solver {
       if (mean.count > 0) answer_.shift = -mean.a / static_cast<double>(mean.count);
     }
     const double shift = answer_.shift;
-    Sums state = over_rows([&](std::size_t k, Sums& s) {
+    const Sums state = over_rows([&](std::size_t k, Sums& s) {
+      residual_[k] = 0.0;
+      takes_part_[k] = 0;
       if (!(gap_[k] < kInfinity)) return;
       const double g = raw_gap(k) + shift;
       if (answer_.pressure[k] > 0.0) {
-        s.b += g * g;
         s.highest = std::max(s.highest, std::abs(g));
         ++s.count;
       } else {
         s.lowest = std::min(s.lowest, g);
+        if (!(g < 0.0)) return;
+        s.a += 1.0;
       }
+      takes_part_[k] = 1;
+      residual_[k] = g;
     });
     answer_.largest_gap = std::max(0.0, state.highest);
     answer_.largest_overlap = std::max(0.0, -state.lowest);
     answer_.pixels_in_contact = static_cast<int>(state.count);
-    if (!forced_ && state.count == 0 && state.lowest < 0.0) state.count = 1;  // nothing loaded yet, but overlapping
-    return state;
+    return state.count + static_cast<std::size_t>(state.a);
   }
 
-  /// One step along the conjugate direction; `conjugate` is the weight of the last direction.
-  void step(double square, double conjugate) {
-    const double shift = answer_.shift;
-    auto& p = answer_.pressure;
-    over_rows([&](std::size_t k, Sums&) {
-      direction_[k] = p[k] > 0.0 ? raw_gap(k) + shift + conjugate * direction_[k] : 0.0;
-    });
-    double length = 0.0;
-    if (square > 0.0) {
-      layer_.apply(direction_, response_, *scratch_);
-      ++answer_.applications;
-      double mean = 0.0;
-      if (forced_) {
-        const Sums sum = over_rows([&](std::size_t k, Sums& s) {
-          if (p[k] > 0.0) {
-            s.a += response_[k];
-            ++s.count;
-          }
-        });
-        mean = sum.a / static_cast<double>(sum.count);
-      }
-      const Sums product = over_rows([&](std::size_t k, Sums& s) {
-        if (p[k] > 0.0) {
-          s.a += (raw_gap(k) + shift) * direction_[k];
-          s.b += (response_[k] - mean) * direction_[k];
+  /// Takes from the pixels that take part their mean, if the force is given, and makes the others zero.
+  void project(std::vector<double>& values) {
+    double mean = 0.0;
+    if (forced_) {
+      const Sums sum = over_rows([&](std::size_t k, Sums& s) {
+        if (takes_part_[k]) {
+          s.a += values[k];
+          ++s.count;
         }
       });
-      length = product.b > 0.0 ? product.a / product.b : 0.0;
+      mean = sum.count > 0 ? sum.a / static_cast<double>(sum.count) : 0.0;
     }
-    if (length > 0.0) last_length_ = length;
+    over_rows([&](std::size_t k, Sums&) { values[k] = takes_part_[k] ? values[k] - mean : 0.0; });
+  }
 
-    // Pixels that pressure would leave become open; open ones that overlap are loaded, which spoils conjugacy.
-    const double loading = loading_length();
+  /// One step along the conjugate direction (Polak and Ribiere's, which begins anew by itself where the set changed).
+  void step() {
+    auto& p = answer_.pressure;
+    inverse_->apply(residual_, response_, *inverse_scratch_);
+    project(response_);
+    const Sums products = over_rows([&](std::size_t k, Sums& s) {
+      s.a += response_[k] * residual_[k];
+      s.b += response_[k] * last_residual_[k];
+    });
+    const double conjugate = last_square_ > 0.0 ? std::max(0.0, (products.a - products.b) / last_square_) : 0.0;
+    last_square_ = products.a;
+    over_rows([&](std::size_t k, Sums&) {
+      direction_[k] = takes_part_[k] ? response_[k] + conjugate * direction_[k] : 0.0;
+      last_residual_[k] = residual_[k];
+    });
+    project(direction_);
+    layer_.apply(direction_, response_, *scratch_);
+    ++answer_.applications;
+    const Sums along = over_rows([&](std::size_t k, Sums& s) {
+      s.a += residual_[k] * direction_[k];
+      s.b += response_[k] * direction_[k];
+    });
+    const double length = along.b > 0.0 ? along.a / along.b : 0.0;
+
     const Sums after = over_rows([&](std::size_t k, Sums& s) {
-      if (!(gap_[k] < kInfinity)) return;
-      if (p[k] > 0.0) {
+      if (takes_part_[k]) {
         const double next = p[k] - length * direction_[k];
-        if (next <= 0.0) ++s.count;
+        s.count += next < 0.0;
         p[k] = std::max(0.0, next);
-      } else if (const double g = raw_gap(k) + shift; g < 0.0) {
-        p[k] = -loading * g;
-        s.b += 1.0;
       }
       s.a += p[k];
     });
-    fresh_ = after.b > 0.0;
     if (forced_ && !(after.a > 0.0)) {
-      fresh_ = true;
+      last_square_ = 0.0;
       begin();
       respond();
       return;
     }
     const double factor = forced_ ? pressure_sum_ / after.a : 1.0;
-    if (after.count > 0 || fresh_) {
+    if (after.count > 0) {
       if (forced_) over_rows([&](std::size_t k, Sums&) { p[k] *= factor; });
       respond();
     } else {
@@ -205,19 +212,6 @@ class Solver {
         p[k] *= factor;
       });
     }
-  }
-
-  /// Pressure (MPa) per overlap (mm) by which a pixel is loaded that comes into contact.
-  double loading_length() {
-    if (last_length_ > 0.0) return last_length_;
-    // Nothing was loaded before: the stiffness of one pixel by itself.
-    std::vector<double> one(grid_.size(), 0.0);
-    const std::size_t middle = grid_.at(grid_.nx / 2, grid_.ny / 2);
-    one[middle] = 1.0;
-    layer_.apply(one, response_, *scratch_);
-    ++answer_.applications;
-    last_length_ = 1.0 / response_[middle];
-    return last_length_;
   }
 
   void finish() {
@@ -238,12 +232,13 @@ class Solver {
   bool forced_;
   double pressure_sum_;  // over the pixels, MPa
   PixelTolerance tolerance_;
-  std::unique_ptr<LayerResponse::Scratch> scratch_;
+  std::unique_ptr<const LayerResponse> inverse_;
+  std::unique_ptr<LayerResponse::Scratch> scratch_, inverse_scratch_;
   std::vector<Sums> rows_;
-  std::vector<double> direction_, response_;
+  std::vector<double> direction_, response_, residual_, last_residual_;
+  std::vector<char> takes_part_;
   double lowest_gap_ = kInfinity;
-  double last_length_ = 0.0;
-  bool fresh_ = false;  // the last step loaded pixels
+  double last_square_ = 0.0;
   PixelContactAnswer answer_;
 };
 

@@ -78,6 +78,30 @@ Eigen::SparseMatrix<double, Eigen::RowMajor> sampled_hats(const Compliance& gel,
   return hats;
 }
 
+/// Pressure of fine pixels on wider ones, shared bilinearly: force and torque stay.
+std::vector<double> gathered(const PixelGrid& fine, std::span<const double> pressure, const PixelGrid& wide) {
+  std::vector<double> result(wide.size(), 0.0);
+  const double share = fine.pixel_area() / wide.pixel_area();
+  for (int j = 0; j < fine.ny; ++j) {
+    for (int i = 0; i < fine.nx; ++i) {
+      const double p = share * pressure[fine.at(i, j)];
+      if (p == 0.0) continue;
+      const Eigen::Vector2d place = (fine.centre(i, j) - wide.first) / wide.pitch;
+      const double x = std::clamp(place.x(), 0.0, wide.nx - 1.0);
+      const double y = std::clamp(place.y(), 0.0, wide.ny - 1.0);
+      const int a = std::min(static_cast<int>(x), std::max(0, wide.nx - 2));
+      const int b = std::min(static_cast<int>(y), std::max(0, wide.ny - 2));
+      const int a1 = std::min(a + 1, wide.nx - 1);
+      const int b1 = std::min(b + 1, wide.ny - 1);
+      result[wide.at(a, b)] += p * (1.0 - (x - a)) * (1.0 - (y - b));
+      result[wide.at(a1, b)] += p * (x - a) * (1.0 - (y - b));
+      result[wide.at(a, b1)] += p * (1.0 - (x - a)) * (y - b);
+      result[wide.at(a1, b1)] += p * (x - a) * (y - b);
+    }
+  }
+  return result;
+}
+
 }  // namespace
 
 SmoothSurface::SmoothSurface(const Compliance& gel) : gel_(gel), edge_(shortest_edge(gel)) {
@@ -113,16 +137,19 @@ SmoothSurface::SmoothSurface(const Compliance& gel) : gel_(gel), edge_(shortest_
 
 SmoothSurface::~SmoothSurface() = default;
 
-std::vector<double> SmoothSurface::layer_answer(const PressState& press) const {
+std::vector<double> SmoothSurface::coarse_pressure(const PressState& press) const {
   const Eigen::VectorXd pressure = hats_ * (-press.traction.col(2));
+  return {pressure.data(), pressure.data() + pressure.size()};
+}
+
+std::vector<double> SmoothSurface::layer_answer(std::span<const double> pressure) const {
   std::vector<double> answer(reference_grid().size());
-  const auto scratch = layer_->make_scratch();
-  layer_->apply({pressure.data(), answer.size()}, answer, *scratch);
+  layer_->apply(pressure, answer, *layer_->make_scratch());
   return answer;
 }
 
 SmoothDisplacement SmoothSurface::displacement(const PressState& press) const {
-  const std::vector<double> layer = layer_answer(press);
+  const std::vector<double> layer = layer_answer(coarse_pressure(press));
   const Eigen::Map<const Eigen::VectorXd> into(layer.data(), static_cast<Eigen::Index>(layer.size()));
   Eigen::MatrixX3d means = gel_.mass * press.surface_displacement;
   means = weight_.cwiseInverse().asDiagonal() * means;
@@ -145,8 +172,10 @@ SmoothDisplacement SmoothSurface::displacement(const PressState& press) const {
   return result;
 }
 
-std::vector<double> SmoothSurface::normal_displacement(const PressState& press) const {
-  std::vector<double> displacement = layer_answer(press);
+std::vector<double> SmoothSurface::normal_displacement(const PressState& press, const PixelGrid& fine,
+                                                       std::span<const double> pressure) const {
+  std::vector<double> displacement =
+      layer_answer(pressure.empty() ? coarse_pressure(press) : gathered(fine, pressure, reference_grid()));
   const SmoothDisplacement smooth = this->displacement(press);
   const PixelGrid& grid = reference_grid();
   for (int j = 0; j < grid.ny; ++j) {

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <Eigen/SparseCore>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "fem/compliance.h"
@@ -37,16 +38,19 @@ class SmoothSurface {
 
   SmoothDisplacement displacement(const PressState& press) const;
 
-  /// Normal displacement (mm, negative under pressure) of the coarse press at the pixels of reference_grid(): the
-  /// endless layer's plus the rest. As smooth as the coarse pressure lets it be.
-  std::vector<double> normal_displacement(const PressState& press) const;
+  /// Normal displacement (mm, negative under pressure) at the pixels of reference_grid(): the rest, and what the
+  /// endless layer does under the coarse pressure; or, if a finer pressure is given, under that one. As smooth as the
+  /// pressure.
+  std::vector<double> normal_displacement(const PressState& press, const PixelGrid& fine = {},
+                                          std::span<const double> pressure = {}) const;
   const PixelGrid& reference_grid() const { return layer_->grid(); }
 
   const Compliance& gel() const { return gel_; }
   double edge() const { return edge_; }  ///< mm, of the finest triangles
 
  private:
-  std::vector<double> layer_answer(const PressState& press) const;
+  std::vector<double> coarse_pressure(const PressState& press) const;
+  std::vector<double> layer_answer(std::span<const double> pressure) const;
 
   const Compliance& gel_;
   double edge_ = 0.0;
