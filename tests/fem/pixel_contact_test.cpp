@@ -80,9 +80,9 @@ TEST(PixelContact, TheWavySurfacesErrorFallsWithThePixel) {
   }
 }
 
-// The isotropic wave h = amplitude (cos x + cos y) of Johnson, Greenwood and Higginson (Int. J. Mech. Sci. 27, 1985): it
-// is filled when both cosines are, each of which alone takes pi E* amplitude / lambda; under light loads each crest is
-// Hertz' sphere of curvature 4 pi^2 amplitude / lambda^2.
+// The isotropic wave h = amplitude (cos x + cos y) of Johnson, Greenwood and Higginson (Int. J. Mech. Sci. 27, 1985):
+// it is filled when both cosines are, each of which alone takes pi E* amplitude / lambda; under light loads each crest
+// is Hertz' sphere of curvature 4 pi^2 amplitude / lambda^2.
 TEST(PixelContact, AnIsotropicWaveMeetsBothLimits) {
   const double amplitude = 0.01;
   const PixelGrid grid{256, 256, 1.0 / 256, {0, 0}};
