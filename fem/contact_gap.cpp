@@ -237,7 +237,7 @@ class TriangleGap {
 };
 
 bool is_convex(const ContactShape& shape) {
-  return !std::holds_alternative<MeshShape>(shape);
+  return !std::holds_alternative<MeshShape>(shape) && !std::holds_alternative<ReliefShape>(shape);
 }
 
 }  // namespace

@@ -1,5 +1,8 @@
 #include "lab/sample_source.h"
 
+#include "core/error.h"
+#include "sim/membrane.h"
+
 namespace touchstone::lab {
 
 SampleSource simulator(const std::filesystem::path& cache_folder) {
@@ -10,8 +13,17 @@ SampleSource simulator(const std::filesystem::path& cache_folder) {
   source.play_motion = sim::play_motion;
   source.set_up_camera = [](const sim::SceneSpec& scene, const sim::Plan& plan,
                             std::shared_ptr<const fem::Compliance> gel, const sim::Truth& first) {
+    if (!plan.camera) {
+      TS_ASSERT(scene.outputs.height);
+      auto membrane = std::make_shared<const sim::Membrane>(scene, plan, *gel);
+      return SampleSource::Camera([membrane, gel](const sim::Truth& truth) {
+        sim::Capture capture;
+        capture.height = membrane->height(truth.press, membrane->relief(truth.press));
+        return capture;
+      });
+    }
     auto camera = std::make_shared<const sim::VirtualCamera>(scene, plan, *gel, first);
-    return [camera](const sim::Truth& truth) { return camera->capture(truth); };
+    return SampleSource::Camera([camera](const sim::Truth& truth) { return camera->capture(truth); });
   };
   return source;
 }

@@ -8,6 +8,9 @@
 namespace touchstone::sim {
 namespace {
 
+constexpr double kEdgesADetail = 4.0;  // a wave needs so many for its shape
+constexpr double kMicrometresPerMillimetre = 1000.0;
+
 /// Fresnel reflectance of unpolarised light that meets a face from index n1 at sine `sine` towards index n2.
 double fresnel(double n1, double n2, double sine) {
   const double sine2 = n1 / n2 * sine;
@@ -73,6 +76,43 @@ void plan_mechanics(const SceneSpec& scene, Plan& plan, Table& table) {
                    : "the motion is a straight press: no tangential part, no tilt";
   plan.friction = table.add("friction", scene.effects.friction, tangential && scene.object.friction > 0.0, why,
                             "a few milliseconds a frame");
+}
+
+/// Finest detail of the object, mm: of its relief, or the middle one of its mesh's edges.
+std::optional<double> finest_detail(const ObjectSpec& object) {
+  if (object.relief) return finest_detail(*object.relief);
+  if (object.shape.type != ShapeKind::mesh) return std::nullopt;
+  const TriangleMesh mesh = visible_mesh(object.shape);
+  std::vector<double> edges;
+  for (const auto& t : mesh.triangles) {
+    for (int k = 0; k < 3; ++k) edges.push_back((mesh.vertices[t[k]] - mesh.vertices[t[(k + 1) % 3]]).norm());
+  }
+  const auto middle = edges.begin() + static_cast<std::ptrdiff_t>(edges.size() / 2);
+  std::nth_element(edges.begin(), middle, edges.end());
+  return *middle;
+}
+
+void plan_relief(const SceneSpec& scene, Plan& plan, Table& table) {
+  const bool seen = scene.outputs.frames || scene.outputs.ideal || scene.outputs.radiance || scene.outputs.height;
+  const double edge = scene.device.mesh.fine_mm;
+  const std::optional<double> detail = finest_detail(scene.object);
+  const bool fine = detail && *detail < kEdgesADetail * edge;
+  const std::string why =
+      !detail ? "the object's shape is smooth: the gel's mesh has all of it"
+      : !fine
+          ? fmt::format("the object's finest detail of {:.3g} mm has {:.0f} or more of the gel's edges of {:.3g} mm",
+                        *detail, kEdgesADetail, edge)
+      : !seen ? "neither a picture nor a height map is asked for"
+              : fmt::format("the object has detail of {:.3g} mm, the gel's edges have {:.3g} mm", *detail, edge);
+  plan.fine_relief = table.add("fine relief", scene.effects.fine_relief, fine && seen, why, "0.1 to 1 second a frame");
+  const double pixel = scene.membrane.pixel_um / kMicrometresPerMillimetre;
+  // A picture may be smoother than its pixels; waves and hairs are as fine as they say.
+  const bool known = scene.object.relief && scene.object.relief->type != ReliefKind::image;
+  if (plan.fine_relief && known && *detail < 2.0 * pixel) {
+    fail_at(scene.membrane.where,
+            "membrane.pixel_um: {} is too wide for the object's relief of {:.3g} mm; at most {:.3g}",
+            scene.membrane.pixel_um, *detail, 0.5 * *detail * kMicrometresPerMillimetre);
+  }
 }
 
 void plan_light(const SceneSpec& scene, Plan& plan, Table& table) {
@@ -141,6 +181,7 @@ Plan make_plan(const SceneSpec& scene) {
   Plan plan;
   Table table(plan);
   plan_mechanics(scene, plan, table);
+  plan_relief(scene, plan, table);
   plan_light(scene, plan, table);
   return plan;
 }

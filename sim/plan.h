@@ -19,6 +19,7 @@ struct Effect {
 struct Plan {
   bool camera = false;
   bool friction = false;
+  bool fine_relief = false;
   bool refraction = false;
   bool interreflection = false;
   bool sensor_noise = false;

@@ -33,7 +33,8 @@ std::int64_t frame_time(int frame, double rate) {
 std::vector<Truth> play_motion(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel,
                                const Progress& progress) {
   const MotionSpec& motion = scene.motion;
-  fem::Press press(gel, contact_shape(scene.object.shape), plan.friction ? scene.object.friction : 0.0);
+  fem::Press press(gel, coarse_contact_shape(scene.object, scene.device.mesh.fine_mm),
+                   plan.friction ? scene.object.friction : 0.0);
 
   fem::PressTarget target;
   Eigen::Vector3d angles_deg = motion.start_angles_deg;
