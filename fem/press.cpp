@@ -24,6 +24,7 @@ struct Path {
   RigidTransform to;
   std::array<bool, 3> forced;
   Eigen::Vector3d force;
+  double seconds = 0.0;
 };
 
 struct Effort {
@@ -43,6 +44,9 @@ RigidTransform between(const RigidTransform& a, const RigidTransform& b, double 
 }
 
 void check_target(const PressTarget& target) {
+  if (!std::isfinite(target.seconds) || target.seconds < 0.0) {
+    fail("a step takes {} s; it must be finite and at least 0", target.seconds);
+  }
   const char* const names[] = {"x", "y", "z"};
   for (int a = 0; a < 3; ++a) {
     if (!std::isfinite(target.axis[a].value)) {
@@ -64,11 +68,11 @@ void check_target(const PressTarget& target) {
 }  // namespace
 
 struct Press::Parts {
-  Parts(const Compliance& compliance, ContactShape shape, double mu, PressTolerance wanted)
+  Parts(const Compliance& compliance, ContactShape shape, double mu, PressTolerance wanted, PronySeries relaxation)
       : gel(compliance),
         friction(mu),
         tolerance(wanted),
-        solver(gel, std::move(shape), wanted.lookup_mm, wanted.traction),
+        solver(gel, std::move(shape), wanted.lookup_mm, wanted.traction, std::move(relaxation)),
         n(static_cast<int>(gel.vertices.size())) {
     mass.compute(gel.mass);
     if (mass.info() != Eigen::Success) fail("the gel's surface mass matrix isn't positive definite");
@@ -90,7 +94,7 @@ struct Press::Parts {
     return weighted_gap(solver.surface(), solver.shape(), pose, {}).deepest;
   }
   std::optional<RigidTransform> straight_above(RigidTransform pose) const;
-  std::optional<PressSnapshot> before_touch(const PressTarget& target, RigidTransform& to) const;
+  std::optional<PressSnapshot> before_touch(const PressTarget& target, RigidTransform& to, double& seconds) const;
   std::optional<PressSnapshot> advance(const Path& path, const PressSnapshot& from, double begin, double end,
                                        int halvings, Effort& effort);
   std::optional<PressSnapshot> walk(const Path& path, int halvings, Effort& effort);
@@ -117,7 +121,7 @@ std::optional<PressSnapshot> Press::Parts::advance(const Path& path, const Press
     if (path.forced[a]) to.translation[a] = from.pose.translation[a];
   }
   const Eigen::Vector3d force = end >= 1.0 ? path.force : path.start.force + end * (path.force - path.start.force);
-  if (auto next = solver.solve(from, {to, path.forced, force}, effort.part)) {
+  if (auto next = solver.solve(from, {to, path.forced, force, (end - begin) * path.seconds}, effort.part)) {
     ++effort.parts;
     return next;
   }
@@ -129,8 +133,10 @@ std::optional<PressSnapshot> Press::Parts::advance(const Path& path, const Press
 }
 
 /// Where the path of a step that starts out of contact begins: a pose that just touches. `to` is the step's end with
-/// its force-controlled axes as they are before it; z is set to the touch if it's force-controlled. Nothing on a miss.
-std::optional<PressSnapshot> Press::Parts::before_touch(const PressTarget& target, RigidTransform& to) const {
+/// its force-controlled axes as they are before it; z is set to the touch if it's force-controlled. `seconds`, the
+/// step's time, is set to what is left of it. Nothing on a miss.
+std::optional<PressSnapshot> Press::Parts::before_touch(const PressTarget& target, RigidTransform& to,
+                                                        double& seconds) const {
   if (target.axis[2].kind == Kind::force) {
     const auto touch = straight_above(to);
     if (!touch) {
@@ -138,16 +144,19 @@ std::optional<PressSnapshot> Press::Parts::before_touch(const PressTarget& targe
     }
     to = *touch;
     if (target.axis[2].value == 0.0) return std::nullopt;
-    return untouched(to, n);
+    return solver.apart(now, to, 0.0);
   }
   const double deepest = deepest_at(to);
   if (-deepest > gel.thickness) {
     fail("the object reaches {:.4g} mm into a gel of {:.4g} mm", -deepest, gel.thickness);
   }
-  if (!(deepest < 0.0)) return std::nullopt;
+  if (!(deepest < 0.0)) {
+    if (now.history.empty()) return std::nullopt;
+    return solver.apart(now, to, 0.0);  // what still bulges beside an old dent may be touched
+  }
   if (!placed || !(deepest_at(now.pose) >= 0.0)) {
     const auto touch = straight_above(to);
-    return untouched(touch ? *touch : to, n);
+    return solver.apart(now, touch ? *touch : to, 0.0);
   }
   double clear = 0.0;
   double overlapping = 1.0;
@@ -155,13 +164,16 @@ std::optional<PressSnapshot> Press::Parts::before_touch(const PressTarget& targe
     const double middle = 0.5 * (clear + overlapping);
     (deepest_at(between(now.pose, to, middle)) < 0.0 ? overlapping : clear) = middle;
   }
-  return untouched(between(now.pose, to, clear), n);
+  const double before = clear * seconds;
+  seconds -= before;
+  return solver.apart(now, between(now.pose, to, clear), before);
 }
 
 PressSnapshot Press::Parts::follow(const PressTarget& target, Effort& effort) {
   Path path;
   path.to = {target.rotation, now.pose.translation};
   path.force.setZero();
+  path.seconds = target.seconds;
   for (int a = 0; a < 3; ++a) {
     path.forced[a] = target.axis[a].kind == Kind::force;
     if (path.forced[a]) {
@@ -191,11 +203,11 @@ PressSnapshot Press::Parts::follow(const PressTarget& target, Effort& effort) {
   if (now.touching && !no_force) {
     path.start = now;
   } else {
-    const auto start = before_touch(target, path.to);
+    const auto start = before_touch(target, path.to, path.seconds);
     if (!start) {
       if (shear > 0.0)
         fail("gross slip: a shear force of {:.6g} N is wanted, but the object doesn't touch the gel", shear);
-      return untouched(path.to, n);
+      return solver.apart(now, path.to, target.seconds);
     }
     path.start = *start;
   }
@@ -276,10 +288,12 @@ const PressState& Press::Parts::step(const PressTarget& target) {
   return state;
 }
 
-Press::Press(const Compliance& gel, ContactShape shape, double friction, PressTolerance tolerance) {
+Press::Press(const Compliance& gel, ContactShape shape, double friction, PressTolerance tolerance,
+             PronySeries relaxation) {
   check_shape(shape);
   if (!(friction >= 0.0)) fail("the friction coefficient is {}, it must be at least 0", friction);
-  parts_ = std::make_unique<Parts>(gel, std::move(shape), friction, tolerance);
+  check(relaxation);
+  parts_ = std::make_unique<Parts>(gel, std::move(shape), friction, tolerance, std::move(relaxation));
 }
 
 Press::Press(Press&&) noexcept = default;

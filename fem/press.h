@@ -22,6 +22,7 @@
 #include "fem/compliance.h"
 #include "fem/contact_shape.h"
 #include "fem/contact_solver.h"
+#include "fem/relaxation.h"
 
 namespace touchstone::fem {
 
@@ -39,6 +40,7 @@ struct AxisControl {
 struct PressTarget {
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< gel from object
   std::array<AxisControl, 3> axis;                         ///< x, y, z
+  double seconds = 0.0;                                    ///< since the last step; matters to a gel that relaxes only
 };
 
 /// When a step is good enough.
@@ -89,16 +91,24 @@ class Press {
  public:
   /// `friction` is Coulomb's mu >= 0; infinity: what touches sticks (a step in which that has no answer, because a
   /// vertex can shed its shear only by opening, is made with mu = 100). The compliance must outlive this.
-  /// @throws Error for a shape or a friction that isn't allowed
-  Press(const Compliance& gel, ContactShape shape, double friction, PressTolerance tolerance = {});
+  /// @throws Error for a shape, a friction or a relaxation that isn't allowed
+  ///
+  /// `relaxation`: the gel's moduli relax by this series from those of the compliance, which are the instantaneous
+  /// ones. Over each step (each part of it where it's cut, see PressState::parts) the displacement is taken to go
+  /// linearly. While nothing touches, the gel recovers; a step that starts out of contact and has its z
+  /// position-controlled begins to load at the share of its time at which its straight way touches the undeformed face,
+  /// else with its whole time.
+  Press(const Compliance& gel, ContactShape shape, double friction, PressTolerance tolerance = {},
+        PronySeries relaxation = {});
   Press(Press&&) noexcept;
   Press& operator=(Press&&) noexcept;
   ~Press();
 
   /// Moves the object to the target. Force-controlled axes start where they were (0 at the first step).
   /// @throws Error, the state being as before the step, if: the target has NaN or infinity or isn't a rotation; the
-  /// normal force is negative; the body reaches deeper than the gel; a shear is wanted that friction can't hold ("gross
-  /// slip: ..."); a force is wanted but the body isn't over the gel; the iteration doesn't converge (with its residual)
+  /// normal force or the time is negative; the body reaches deeper than the gel; a shear is wanted that friction can't
+  /// hold ("gross slip: ..."); a force is wanted but the body isn't over the gel; the iteration doesn't converge (with
+  /// its residual)
   const PressState& step(const PressTarget& target);
 
   const PressState& state() const;

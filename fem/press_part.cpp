@@ -55,11 +55,13 @@ PressSnapshot untouched(const RigidTransform& pose, int n) {
   return s;
 }
 
-PartSolver::PartSolver(const Compliance& gel, ContactShape shape, double lookup_mm, double traction)
+PartSolver::PartSolver(const Compliance& gel, ContactShape shape, double lookup_mm, double traction,
+                       PronySeries relaxation)
     : gel_(gel),
       shape_(std::move(shape)),
       lookup_mm_(lookup_mm),
       traction_(traction),
+      relaxation_(std::move(relaxation)),
       surface_(gel),
       block_(gel, surface_) {
   for (const auto& normal : surface_.normals) flat_ = flat_ && normal == surface_.normals.front();
@@ -205,6 +207,62 @@ ContactProblem PartSolver::problem(const WeightedGap& gap, const PressSnapshot& 
   return result;
 }
 
+// With relaxation a step's weighted displacement is (H0 t - H0 r) / G of the traction t (relaxation.h). Multiplied by
+// G, the contact laws are those of the unrelaxed compliance H0 with other gaps and drags, so factors stay what they
+// are.
+
+void PartSolver::relax(ContactProblem& contact) const {
+  if (carried_.size() == 0) return;
+  const double g = relaxation_step_.stiffness;
+  const auto& vertices = block_.vertices();
+  const auto n = static_cast<Eigen::Index>(gel_.vertices.size());
+  for (Eigen::Index j = 0; j < contact.gap.size(); ++j) {
+    const int v = vertices[j];
+    const Eigen::Vector3d own = block_.axes(v).transpose() * carried_.segment<3>(3 * (n + v));
+    contact.gap[j] = g * contact.gap[j] - own[0];
+    if (contact.components == 3) contact.drag.segment<2>(2 * j) = g * contact.drag.segment<2>(2 * j) + own.tail<2>();
+  }
+}
+
+void PartSolver::relax(ContactAnswer& answer) const {
+  if (carried_.size() == 0) return;
+  const double g = relaxation_step_.stiffness;
+  const auto& vertices = block_.vertices();
+  const auto n = static_cast<Eigen::Index>(gel_.vertices.size());
+  answer.shift /= g;
+  for (Eigen::Index j = 0; j < static_cast<Eigen::Index>(vertices.size()); ++j) {
+    const int v = vertices[j];
+    const Eigen::Vector3d own = block_.axes(v).transpose() * carried_.segment<3>(3 * (n + v));
+    answer.response.segment<3>(3 * j) = (answer.response.segment<3>(3 * j) - own) / g;
+  }
+}
+
+/// Turns the elastic answer H0 t in `next.weighted` into the relaxed one, and keeps what the gel remembers.
+void PartSolver::remember(const RelaxationStep& step, const PressSnapshot& from, PressSnapshot& next) const {
+  if (relaxation_.empty() || (from.history.empty() && !next.touching)) return;
+  Eigen::VectorXd both(next.traction.size() + next.weighted.size());
+  both << next.traction, next.weighted;
+  next.history = after_step(step, from.history, both);
+  next.weighted = next.history.elastic.tail(next.weighted.size());
+}
+
+PressSnapshot PartSolver::apart(const PressSnapshot& from, const RigidTransform& pose, double seconds) const {
+  PressSnapshot next = untouched(pose, static_cast<int>(gel_.vertices.size()));
+  if (!relaxation_.empty()) remember(relaxation_step(relaxation_, seconds), from, next);
+  return next;
+}
+
+/// Whether the gel, not yet recovered from an earlier press, would stand out into the body if nothing touched it.
+bool PartSolver::bulges_into(const WeightedGap& gap) const {
+  if (carried_.size() == 0) return false;
+  const auto n = static_cast<Eigen::Index>(gel_.vertices.size());
+  for (Eigen::Index v = 0; v < n; ++v) {
+    const double out = -surface_.normals[v].dot(carried_.segment<3>(3 * (n + v))) / relaxation_step_.stiffness;
+    if (gap.weighted[v] < out) return true;
+  }
+  return false;
+}
+
 /// Moves the pose by what the forces ask for, no faster than the block can follow. False if the object slides away.
 bool PartSolver::take_shift(const ContactAnswer& answer, const WeightedGap& gap, const PartTarget& target,
                             Iterate& now) {
@@ -285,7 +343,8 @@ void PartSolver::follow_patch(const ContactAnswer& answer, Iterate& now) const {
 
 /// The answer over all vertices, by the one pass over the whole compliance; nothing if a vertex outside the block
 /// penetrates, which is then required.
-std::optional<PressSnapshot> PartSolver::accept(const ContactAnswer& answer, Iterate& now, PartEffort& effort) const {
+std::optional<PressSnapshot> PartSolver::accept(const ContactAnswer& answer, const PressSnapshot& from, Iterate& now,
+                                                PartEffort& effort) const {
   const int n = static_cast<int>(gel_.vertices.size());
   const auto& vertices = block_.vertices();
   PressSnapshot next = untouched(now.pose, n);
@@ -302,6 +361,7 @@ std::optional<PressSnapshot> PartSolver::accept(const ContactAnswer& answer, Ite
     next.force -= surface_.weight[v] * next.traction.segment<3>(3 * v);
     next.touching = true;
   }
+  remember(relaxation_step_, from, next);
   const WeightedGap gap = weighted_gap(surface_, shape_, now.pose, now.lookup);
   ++effort.geometry_updates;
   refuse_too_deep(gap.deepest);
@@ -316,6 +376,12 @@ std::optional<PressSnapshot> PartSolver::accept(const ContactAnswer& answer, Ite
   }
   if (now.grew) return std::nullopt;
   next.overlapping = gap.deepest < 0.0;
+  if (carried_.size() > 0) {  // the face isn't flat: a body may hang in the dent of an earlier press
+    next.overlapping = false;
+    for (int v = 0; v < n && !next.overlapping; ++v) {
+      next.overlapping = gap.lowest[v] < surface_.normals[v].dot(lumped(next.weighted, v));
+    }
+  }
   next.penetration = deepest;
   next.lookup_error = now.lookup_error;
   next.residual = answer.residual;
@@ -331,6 +397,10 @@ std::optional<PressSnapshot> PartSolver::solve(const PressSnapshot& from, const 
   Iterate now;
   now.pose = target.pose;
   begin(from, now);
+  if (!relaxation_.empty()) {
+    relaxation_step_ = relaxation_step(relaxation_, target.seconds);
+    carried_ = carried_over(relaxation_step_, from.history, 6 * static_cast<Eigen::Index>(n));
+  }
   std::vector<char> wanted;  // empty: all vertices
   for (now.updates = 0; now.updates < kMostUpdates; ++now.updates) {
     const WeightedGap gap = weighted_gap(surface_, shape_, now.pose, now.lookup, wanted);
@@ -342,16 +412,17 @@ std::optional<PressSnapshot> PartSolver::solve(const PressSnapshot& from, const 
     } else {
       refuse_too_deep(gap.deepest);
       const bool alone = std::none_of(now.active.begin(), now.active.end(), [](char x) { return x != 0; });
-      if (alone && gap.deepest >= 0.0) return untouched(now.pose, n);
+      if (alone && gap.deepest >= 0.0 && !bulges_into(gap)) return apart(from, now.pose, target.seconds);
     }
     for (int v = 0; v < n; ++v) {
       if (!std::isfinite(gap.weighted[v])) now.active[v] = now.required[v] = 0;
     }
     if (block_.hold(candidates(gap, now, target.forced[2]))) memory_.forget();
     const auto& vertices = block_.vertices();
-    if (vertices.empty()) return untouched(now.pose, n);
+    if (vertices.empty()) return apart(from, now.pose, target.seconds);
 
-    const ContactProblem contact = problem(gap, from, target, now);
+    ContactProblem contact = problem(gap, from, target, now);
+    relax(contact);
     const int c = contact.components;
     Eigen::VectorXd start(now.warm ? c * contact.gap.size() : 0);
     for (Eigen::Index j = 0; now.warm && j < contact.gap.size(); ++j) {
@@ -369,6 +440,7 @@ std::optional<PressSnapshot> PartSolver::solve(const PressSnapshot& from, const 
       return std::nullopt;
     }
     if (c == 1) widen(answer, block_.compliance());
+    relax(answer);
 
     now.grew = false;
     if (!take_shift(answer, gap, target, now)) return std::nullopt;
@@ -384,7 +456,7 @@ std::optional<PressSnapshot> PartSolver::solve(const PressSnapshot& from, const 
     }
     const double allowed = now.updates < kStrictUpdates ? lookup_mm_ : 100.0 * lookup_mm_;
     if (!now.grew && std::max(now.lookup_error, now.edge_change) <= allowed) {
-      if (auto next = accept(answer, now, effort)) return next;
+      if (auto next = accept(answer, from, now, effort)) return next;
     }
     for (int v = 0; v < n; ++v) now.lookup[v] += now.relaxation * now.last_residual[v];
     wanted.assign(n, 0);

@@ -13,6 +13,7 @@
 #include "fem/contact_shape.h"
 #include "fem/contact_solver.h"
 #include "fem/patch_motion.h"
+#include "fem/relaxation.h"
 
 namespace touchstone::fem {
 
@@ -28,6 +29,8 @@ struct PressSnapshot {
   double penetration = 0.0;   ///< mm, the largest over all vertices
   double lookup_error = 0.0;  ///< mm
   double residual = 0.0;      ///< of the contact laws
+  RelaxationHistory
+      history;  ///< of (traction; weighted as by the instantaneous modulus), 6 n; empty without relaxation
 };
 
 /// No contact at `pose`, for a surface of n vertices.
@@ -39,6 +42,7 @@ struct PartTarget {
   RigidTransform pose;
   std::array<bool, 3> forced{};
   Eigen::Vector3d force = Eigen::Vector3d::Zero();
+  double seconds = 0.0;  ///< that the part takes; matters with relaxation only
 };
 
 /// What it took.
@@ -54,8 +58,8 @@ struct PartEffort {
 class PartSolver {
  public:
   /// `lookup_mm`: how well the place where the gap is looked up follows the contact patch. `traction`: relative
-  /// residual of the contact laws.
-  PartSolver(const Compliance& gel, ContactShape shape, double lookup_mm, double traction);
+  /// residual of the contact laws. `relaxation`: the compliance is that of the instantaneous modulus.
+  PartSolver(const Compliance& gel, ContactShape shape, double lookup_mm, double traction, PronySeries relaxation);
 
   const ContactSurface& surface() const { return surface_; }
   const ContactShape& shape() const { return shape_; }
@@ -68,6 +72,9 @@ class PartSolver {
   std::optional<PressSnapshot> solve(const PressSnapshot& from, const PartTarget& target, PartEffort& effort);
   const std::string& why_not() const { return why_not_; }
 
+  /// The gel left alone for so long after `from`, nothing touching it, the object at `pose`.
+  PressSnapshot apart(const PressSnapshot& from, const RigidTransform& pose, double seconds) const;
+
  private:
   struct Iterate;
   std::vector<int> candidates(const WeightedGap& gap, const Iterate& now, bool z_forced) const;
@@ -77,16 +84,24 @@ class PartSolver {
   void begin(const PressSnapshot& from, Iterate& now) const;
   bool take_shift(const ContactAnswer& answer, const WeightedGap& gap, const PartTarget& target, Iterate& now);
   void follow_patch(const ContactAnswer& answer, Iterate& now) const;
-  std::optional<PressSnapshot> accept(const ContactAnswer& answer, Iterate& now, PartEffort& effort) const;
+  std::optional<PressSnapshot> accept(const ContactAnswer& answer, const PressSnapshot& from, Iterate& now,
+                                      PartEffort& effort) const;
   PatchMotion motion_of(const std::vector<int>& vertices, const std::vector<Eigen::Vector3d>& displacements,
                         const std::vector<double>& pressures) const;
   Eigen::Vector3d lumped(const Eigen::VectorXd& weighted, int vertex) const;
   void refuse_too_deep(double deepest) const;
+  void relax(ContactProblem& problem) const;
+  void relax(ContactAnswer& answer) const;
+  void remember(const RelaxationStep& step, const PressSnapshot& from, PressSnapshot& next) const;
+  bool bulges_into(const WeightedGap& gap) const;
 
   const Compliance& gel_;
   ContactShape shape_;
   double lookup_mm_;
   double traction_;
+  PronySeries relaxation_;
+  RelaxationStep relaxation_step_;  ///< of the part that is being solved
+  Eigen::VectorXd carried_;         ///< its r, see relaxation.h; empty without relaxation
   double friction_ = 0.0;
   bool flat_ = true;  ///< one normal all over: a shift along it moves all gaps alike
   ContactSurface surface_;

@@ -26,17 +26,21 @@ PressState report(const Compliance& gel, const ContactSurface& surface, const Su
   s.largest_penetration = snapshot.penetration;
   s.lookup_error = snapshot.lookup_error;
   s.contact_residual = snapshot.residual;
-  if (snapshot.touching) {
+  if (snapshot.touching || !snapshot.history.empty()) {
     Eigen::MatrixX3d weighted(n, 3);
     for (int v = 0; v < n; ++v) weighted.row(v) = snapshot.weighted.segment<3>(3 * v);
     s.surface_displacement = mass.solve(weighted);
     Eigen::VectorXd beads = Eigen::VectorXd::Zero(gel.beads.rows());
+    const Eigen::VectorXd& moving = snapshot.history.empty() ? snapshot.traction : snapshot.history.elastic;
+    for (int v = 0; v < n && beads.size() > 0; ++v) {
+      const Eigen::Vector3d t = moving.segment<3>(3 * v);
+      if (!t.isZero(0.0)) beads += gel.beads.middleCols<3>(3 * v) * t;
+    }
     double largest_pressure = 0.0;
     double excess = 0.0;
     for (int v = 0; v < n; ++v) {
       if (snapshot.state[v] == NodeState::open) continue;
       const Eigen::Vector3d t = snapshot.traction.segment<3>(3 * v);
-      if (beads.size() > 0) beads += gel.beads.middleCols<3>(3 * v) * t;
       const double pressure = -surface.normals[v].dot(t);
       largest_pressure = std::max(largest_pressure, pressure);
       s.largest_tension = std::max(s.largest_tension, -pressure);
