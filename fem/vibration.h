@@ -13,6 +13,7 @@
 #include <complex>
 #include <memory>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "fem/compliance.h"
