@@ -29,6 +29,7 @@ struct GelVibration {
   Eigen::MatrixXd effective_mass;  ///< 3 x k: the part of `mass` that follows the mode when the plate shakes along an
                                    ///< axis, tonne
   double mass = 0.0;               ///< of the gel, tonne
+  std::string note;                ///< from the cache: empty, or what was wrong with the file there
 };
 
 /// The `count` lowest modes of the gel that compute_compliance makes of the same arguments. `density` in tonne/mm^3
