@@ -8,16 +8,25 @@
 #include <vector>
 
 #include "core/yaml_reader.h"
+#include "fem/relaxation.h"
 
 namespace touchstone::sim {
+
+/// One term of the gel's relaxation: `share` of the instantaneous modulus fades with the time constant `time_s`.
+struct RelaxationTermSpec {
+  double share = 0.0;
+  double time_s = 0.0;
+};
 
 /// The soft pad, clamped to the plate on its lower face. Gel frame: outer surface z = 0, lower face z = -thickness.
 struct GelSpec {
   double size_x_mm = 0.0;
   double size_y_mm = 0.0;
   double thickness_mm = 0.0;
-  double youngs_modulus_MPa = 0.0;
-  double poisson_ratio = 0.49;
+  double youngs_modulus_MPa = 0.0;  ///< instantaneous, where the gel relaxes
+  double poisson_ratio = 0.49;      ///< constant in time
+  double density_kg_m3 = 1000.0;
+  std::vector<RelaxationTermSpec> relaxation;  ///< of the modulus: a Prony series; empty: elastic
   double refractive_index = 1.0;
   double absorption_per_mm = 0.0;  ///< natural logarithm, all bands
   double frame_albedo = 0.0;       ///< of the frame that holds the pad at its sides, all bands; 0 is black
@@ -101,6 +110,7 @@ struct DeviceSpec {
   SourceLocation where;
 };
 
+void fields(YamlReader& in, RelaxationTermSpec& term);
 void fields(YamlReader& in, GelSpec& gel);
 void fields(YamlReader& in, MeshSpec& mesh);
 void fields(YamlReader& in, BeadSpec& beads);
@@ -111,6 +121,9 @@ void fields(YamlReader& in, DeviceSpec& device);
 
 /// Reads and checks a device file. @throws Error with file and line
 DeviceSpec read_device(const std::filesystem::path& file);
+
+/// The gel's relaxation as mechanics takes it.
+fem::PronySeries prony_series(const GelSpec& gel);
 
 /// Rest positions of the beads' centres in the gel frame, row by row: y grows from row to row and x along a row,
 /// as the upright picture shows them.

@@ -34,6 +34,8 @@ EnumNames<Switch> enum_names(Switch);
 /// A scene may force an effect on or off; `automatic` leaves it to the plan.
 struct EffectSwitches {
   Switch friction = Switch::automatic;
+  Switch relaxation = Switch::automatic;
+  Switch inertia = Switch::automatic;
   Switch interreflection = Switch::automatic;
   Switch sensor_noise = Switch::automatic;
 };
