@@ -44,9 +44,9 @@ Eigen::VectorXcd times(const Eigen::MatrixXd& a, const Eigen::VectorXcd& x) {
 }  // namespace
 
 GelVibration compute_vibration(const TetMesh& mesh, const ElasticMaterial& material, std::span<const Bead> beads,
-                               double density, int count) {
+                               double density, int count, std::span<const int> held) {
   const TaylorHoodSpace space = make_space(mesh);
-  const Eigenmodes modes = lowest_eigenmodes(space, material, density, count);
+  const Eigenmodes modes = lowest_eigenmodes(space, material, density, count, held);
   GelVibration vibration;
   vibration.angular_frequency = modes.angular_frequency;
   vibration.surface = seen_by(surface_coupling(space, outer_surface(mesh)), modes.displacement);

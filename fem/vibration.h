@@ -34,9 +34,11 @@ struct GelVibration {
 
 /// The `count` lowest modes of the gel that compute_compliance makes of the same arguments. `density` in tonne/mm^3
 /// (1e-12 per kg/m^3). Beads have the gel's own density: nine steel beads of 0.5 mm would add 0.2 % to the vhs gel.
+/// With `held`, vertices of the surface that a body at rest sticks to (see lowest_eigenmodes), they are the modes under
+/// that body; StuckPatch wants those of the free gel.
 /// @throws Error as lowest_eigenmodes and compute_compliance do
 GelVibration compute_vibration(const TetMesh& mesh, const ElasticMaterial& material, std::span<const Bead> beads,
-                               double density, int count);
+                               double density, int count, std::span<const int> held = {});
 
 /// Lowest frequency (Hz) of a wide layer of this thickness (mm), bonded below: a quarter of a shear wave,
 /// sqrt(G / rho) / (4 h). A slab with free sides is softer: on 4 thicknesses square its lowest is some percent lower.

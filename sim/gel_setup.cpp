@@ -11,33 +11,6 @@ namespace {
 
 constexpr int kModes = 80;  // of the vhs gel: to 1.5 kHz, three times the lowest
 
-fem::SlabMesh slab_of(const DeviceSpec& device) {
-  fem::SlabMesh mesh;
-  mesh.size_x = device.gel.size_x_mm;
-  mesh.size_y = device.gel.size_y_mm;
-  mesh.thickness = device.gel.thickness_mm;
-  mesh.fine = device.mesh.fine_mm;
-  mesh.coarse = device.mesh.coarse_mm;
-  mesh.fine_half_x = device.mesh.fine_half_extent_mm.x();
-  mesh.fine_half_y = device.mesh.fine_half_extent_mm.y();
-  mesh.fine_depth = device.mesh.fine_depth_mm;
-  return mesh;
-}
-
-fem::ElasticMaterial material_of(const DeviceSpec& device) {
-  return {device.gel.youngs_modulus_MPa, device.gel.poisson_ratio};
-}
-
-std::vector<fem::Bead> beads_of(const DeviceSpec& device) {
-  std::vector<fem::Bead> beads;
-  if (device.beads) {
-    for (const Eigen::Vector3d& centre : bead_centres(*device.beads)) {
-      beads.push_back({centre, device.beads->diameter_mm / 2});
-    }
-  }
-  return beads;
-}
-
 }  // namespace
 
 std::filesystem::path default_cache_folder() {
@@ -49,24 +22,44 @@ std::filesystem::path default_cache_folder() {
   return std::filesystem::temp_directory_path() / "touchstone-cache";
 }
 
+GelParts gel_parts(const DeviceSpec& device) {
+  const GelSpec& gel = device.gel;
+  GelParts parts;
+  parts.slab.size_x = gel.size_x_mm;
+  parts.slab.size_y = gel.size_y_mm;
+  parts.slab.thickness = gel.thickness_mm;
+  parts.slab.fine = device.mesh.fine_mm;
+  parts.slab.coarse = device.mesh.coarse_mm;
+  parts.slab.fine_half_x = device.mesh.fine_half_extent_mm.x();
+  parts.slab.fine_half_y = device.mesh.fine_half_extent_mm.y();
+  parts.slab.fine_depth = device.mesh.fine_depth_mm;
+  parts.material = {gel.youngs_modulus_MPa, gel.poisson_ratio};
+  if (device.beads) {
+    for (const Eigen::Vector3d& centre : bead_centres(*device.beads)) {
+      parts.beads.push_back({centre, device.beads->diameter_mm / 2});
+    }
+  }
+  parts.density = gel.density_kg_m3 * kTonnePerMm3;
+  return parts;
+}
+
 std::shared_ptr<const fem::Compliance> set_up_gel(const DeviceSpec& device, const std::filesystem::path& cache_folder,
                                                   const Progress& progress) {
+  const GelParts gel = gel_parts(device);
   return std::make_shared<const fem::Compliance>(
-      fem::cached_compliance(slab_of(device), material_of(device), beads_of(device), cache_folder, progress));
+      fem::cached_compliance(gel.slab, gel.material, gel.beads, cache_folder, progress));
 }
 
 std::shared_ptr<const fem::GelVibration> set_up_vibration(const SceneSpec& scene, const Plan& plan,
                                                           const std::filesystem::path& cache_folder) {
   if (!plan.inertia || scene.motion.highest_vibration_Hz() == 0.0) return nullptr;
-  const DeviceSpec& device = scene.device;
-  const fem::SlabMesh slab = slab_of(device);
-  const auto beads = beads_of(device);
+  const GelParts gel = gel_parts(scene.device);
   // Scenes of one gel ask for the same modes at once: the first makes them, the others read them.
   static std::mutex one_at_a_time;
   const std::lock_guard lock(one_at_a_time);
   return std::make_shared<const fem::GelVibration>(fem::cached_vibration(
-      fem::compliance_key(slab, material_of(device), beads), [&] { return mesh_slab(slab); }, material_of(device),
-      beads, device.gel.density_kg_m3 * kTonnePerMm3, kModes, cache_folder));
+      fem::compliance_key(gel.slab, gel.material, gel.beads), [&] { return fem::mesh_slab(gel.slab); }, gel.material,
+      gel.beads, gel.density, kModes, cache_folder));
 }
 
 }  // namespace touchstone::sim

@@ -9,6 +9,7 @@
 #include "core/progress.h"
 #include "fem/compliance.h"
 #include "fem/press.h"
+#include "fem/slab.h"
 #include "fem/vibration.h"
 #include "sim/plan.h"
 #include "sim/scene.h"
@@ -38,6 +39,15 @@ std::filesystem::path default_cache_folder();
 /// A device set up for pressing. Set-up is shared by all scenes with the same gel, mesh and beads.
 std::shared_ptr<const fem::Compliance> set_up_gel(const DeviceSpec& device, const std::filesystem::path& cache_folder,
                                                   const Progress& progress = {});
+
+/// What a device's gel is made of, as mechanics takes it.
+struct GelParts {
+  fem::SlabMesh slab;
+  fem::ElasticMaterial material;
+  std::vector<fem::Bead> beads;
+  double density = 0.0;  ///< tonne/mm^3
+};
+GelParts gel_parts(const DeviceSpec& device);
 
 /// The modes of the device's gel, where the plan wants inertia for a motion that vibrates; else nothing.
 std::shared_ptr<const fem::GelVibration> set_up_vibration(const SceneSpec& scene, const Plan& plan,
