@@ -91,13 +91,13 @@ class Press {
  public:
   /// `friction` is Coulomb's mu >= 0; infinity: what touches sticks (a step in which that has no answer, because a
   /// vertex can shed its shear only by opening, is made with mu = 100). The compliance must outlive this.
-  /// @throws Error for a shape, a friction or a relaxation that isn't allowed
   ///
   /// `relaxation`: the gel's moduli relax by this series from those of the compliance, which are the instantaneous
   /// ones. Over each step (each part of it where it's cut, see PressState::parts) the displacement is taken to go
   /// linearly. While nothing touches, the gel recovers; a step that starts out of contact and has its z
   /// position-controlled begins to load at the share of its time at which its straight way touches the undeformed face,
   /// else with its whole time.
+  /// @throws Error for a shape, a friction or a relaxation that isn't allowed
   Press(const Compliance& gel, ContactShape shape, double friction, PressTolerance tolerance = {},
         PronySeries relaxation = {});
   Press(Press&&) noexcept;
