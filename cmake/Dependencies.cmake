@@ -112,6 +112,10 @@ macro(touchstone_need_fftw)
   touchstone_plain_library(FFTW::FFTW libfftw3-dev fftw3.h fftw3)
 endmacro()
 
+macro(touchstone_need_spectra)
+  touchstone_plain_library(Spectra::Headers libspectra-dev Spectra/SymGEigsShiftSolver.h)
+endmacro()
+
 macro(touchstone_need_tinygltf)
   touchstone_plain_library(TinyGLTF::Headers libtinygltf-dev tiny_gltf.h tinygltf)
 endmacro()

@@ -19,9 +19,10 @@ ElasticBody::ElasticBody(const Compliance& body)
       outer_(body.vertices, body.triangles),
       weight_(body.mass * Eigen::VectorXd::Ones(body.mass.rows())) {}
 
-void ElasticBody::add_to(Eigen::MatrixXd& compliance, const ContactSurface& surface, const std::vector<int>& vertices,
-                         const std::vector<char>& mine, const std::vector<Eigen::Matrix3d>& axes,
-                         const RigidTransform& gel_from_object, const PatchMotion& lookup) const {
+void ElasticBody::add_to(Eigen::MatrixXd& compliance, double scale, const ContactSurface& surface,
+                         const std::vector<int>& vertices, const std::vector<char>& mine,
+                         const std::vector<Eigen::Matrix3d>& axes, const RigidTransform& gel_from_object,
+                         const PatchMotion& lookup) const {
   TS_ASSERT(mine.size() == vertices.size());
   static const std::vector<SimplexPoint<3>> rule = triangle_rule(kRuleDegree);
   const RigidTransform object_from_gel = gel_from_object.inverse();
@@ -87,7 +88,7 @@ void ElasticBody::add_to(Eigen::MatrixXd& compliance, const ContactSurface& surf
       if (!mine[i]) continue;
       Eigen::Matrix3d block;
       for (int a = 0; a < 3; ++a) {
-        for (int b = 0; b < 3; ++b) block(a, b) = seen[a][b](i, j);
+        for (int b = 0; b < 3; ++b) block(a, b) = scale * seen[a][b](i, j);
       }
       compliance.block<3, 3>(3 * i, 3 * j).noalias() +=
           (gel_from_object.rotation.transpose() * axes[i]).transpose() * (block * turn_j);

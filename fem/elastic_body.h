@@ -23,10 +23,10 @@ class ElasticBody {
   /// `body`: in the object's frame, bonded where the object is held; it must outlive this.
   explicit ElasticBody(const Compliance& body);
 
-  /// Adds the body's part for the gel's `vertices` to `compliance` (3 m x 3 m, in the vertices' own `axes`). `mine` is
-  /// a flag per entry of `vertices`: those that touch this body.
-  void add_to(Eigen::MatrixXd& compliance, const ContactSurface& surface, const std::vector<int>& vertices,
-              const std::vector<char>& mine, const std::vector<Eigen::Matrix3d>& axes,
+  /// Adds `scale` times the body's part for the gel's `vertices` to `compliance` (3 m x 3 m, in the vertices' own
+  /// `axes`). `mine` is a flag per entry of `vertices`: those that touch this body.
+  void add_to(Eigen::MatrixXd& compliance, double scale, const ContactSurface& surface,
+              const std::vector<int>& vertices, const std::vector<char>& mine, const std::vector<Eigen::Matrix3d>& axes,
               const RigidTransform& gel_from_object, const PatchMotion& lookup) const;
 
  private:

@@ -23,6 +23,7 @@ using Kind = AxisControl::Kind;
 struct Path {
   PressSnapshot start;
   std::vector<PartTarget> to;
+  double seconds = 0.0;
 };
 
 struct Effort {
@@ -47,6 +48,9 @@ Eigen::Vector3d torque_on(const BodySnapshot& body) {
 }
 
 void check_target(const PressTarget& target) {
+  if (!std::isfinite(target.seconds) || target.seconds < 0.0) {
+    fail("a step takes {} s; it must be finite and at least 0", target.seconds);
+  }
   const char* const names[] = {"x", "y", "z"};
   for (int a = 0; a < 3; ++a) {
     if (!std::isfinite(target.axis[a].value)) {
@@ -73,11 +77,12 @@ void check_target(const PressTarget& target) {
 }  // namespace
 
 struct Press::Parts {
-  Parts(const Compliance& compliance, std::vector<PressBody> bodies, PressTolerance wanted, PressOutput what)
+  Parts(const Compliance& compliance, std::vector<PressBody> bodies, PressTolerance wanted, PronySeries relaxation,
+        PressOutput what)
       : gel(compliance),
         tolerance(wanted),
         output(what),
-        solver(gel, std::move(bodies), wanted.lookup_mm, wanted.traction),
+        solver(gel, std::move(bodies), wanted.lookup_mm, wanted.traction, std::move(relaxation)),
         n(static_cast<int>(gel.vertices.size())),
         placed(solver.bodies().size(), 0) {
     if (output == PressOutput::fields) {
@@ -103,8 +108,9 @@ struct Press::Parts {
     return weighted_gap(solver.surface(), solver.bodies()[body].shape, pose).deepest;
   }
   std::optional<RigidTransform> straight_above(std::size_t body, RigidTransform pose) const;
-  std::optional<RigidTransform> before_touch(std::size_t body, const PressTarget& target, RigidTransform& to) const;
-  void add_way(std::size_t body, const PressTarget& target, Path& path) const;
+  std::optional<RigidTransform> before_touch(std::size_t body, const PressTarget& target, RigidTransform& to,
+                                             double& clear) const;
+  double add_way(std::size_t body, const PressTarget& target, Path& path) const;
   std::optional<PressSnapshot> advance(const Path& path, const PressSnapshot& from, double begin, double end,
                                        int halvings, Effort& effort);
   std::optional<PressSnapshot> walk(const Path& path, int halvings, Effort& effort);
@@ -145,7 +151,7 @@ std::optional<PressSnapshot> Press::Parts::advance(const Path& path, const Press
       target.torque = torque_on(start) + end * (target.torque - torque_on(start));
     }
   }
-  if (auto next = solver.solve(from, targets, effort.part)) {
+  if (auto next = solver.solve(from, targets, (end - begin) * path.seconds, effort.part)) {
     ++effort.parts;
     return next;
   }
@@ -157,9 +163,11 @@ std::optional<PressSnapshot> Press::Parts::advance(const Path& path, const Press
 }
 
 /// Where the path of a body that starts out of contact begins: a pose that just touches. `to` is the step's end with
-/// its force-controlled axes as they are before it; z is set to the touch if it's force-controlled. Nothing on a miss.
+/// its force-controlled axes as they are before it; z is set to the touch if it's force-controlled. `clear` is set to
+/// the share of the step that goes before. Nothing on a miss.
 std::optional<RigidTransform> Press::Parts::before_touch(std::size_t body, const PressTarget& target,
-                                                         RigidTransform& to) const {
+                                                         RigidTransform& to, double& clear) const {
+  clear = 0.0;
   if (target.axis[2].kind == Kind::force) {
     const auto touch = straight_above(body, to);
     if (!touch) {
@@ -173,10 +181,12 @@ std::optional<RigidTransform> Press::Parts::before_touch(std::size_t body, const
   if (-deepest > gel.thickness) {
     fail("the object reaches {:.4g} mm into a gel of {:.4g} mm", -deepest, gel.thickness);
   }
-  if (!(deepest < 0.0)) return std::nullopt;
+  if (!(deepest < 0.0)) {
+    if (now.history.empty()) return std::nullopt;
+    return to;  // what still bulges beside an old dent may be touched
+  }
   const RigidTransform& here = now.bodies[body].pose;
   if (!placed[body] || !(deepest_at(body, here) >= 0.0)) return straight_above(body, to).value_or(to);
-  double clear = 0.0;
   double overlapping = 1.0;
   for (int k = 0; k < 50; ++k) {
     const double middle = 0.5 * (clear + overlapping);
@@ -185,8 +195,9 @@ std::optional<RigidTransform> Press::Parts::before_touch(std::size_t body, const
   return between(here, to, clear);
 }
 
-/// Sets one body's start and end.
-void Press::Parts::add_way(std::size_t b, const PressTarget& target, Path& path) const {
+/// Sets one body's start and end. The share of the step after which it may touch.
+double Press::Parts::add_way(std::size_t b, const PressTarget& target, Path& path) const {
+  double clear = 0.0;
   const BodySnapshot& here = now.bodies[b];
   BodySnapshot& start = path.start.bodies[b];
   PartTarget to;
@@ -229,12 +240,13 @@ void Press::Parts::add_way(std::size_t b, const PressTarget& target, Path& path)
   const bool no_force = to.forced[2] && to.force[2] == 0.0;
   bool meets = here.touching && !no_force;
   if (!meets) {
-    const auto touch = before_touch(b, target, to.pose);
+    const auto touch = before_touch(b, target, to.pose, clear);
     meets = touch.has_value();
     if (!meets && shear > 0.0) {
       fail("gross slip: a shear force of {:.6g} N is wanted, but the object doesn't touch the gel", shear);
     }
     start.pose = touch.value_or(to.pose);
+    if (!touch) clear = 1.0;
   }
   if (!here.touching || no_force) path.start.forget(static_cast<int>(b));
   if (!meets) to.forced = to.turned = {};  // nothing to push against: it goes where it is told and turns no further
@@ -249,12 +261,19 @@ void Press::Parts::add_way(std::size_t b, const PressTarget& target, Path& path)
     }
   }
   path.to.push_back(to);
+  return clear;
 }
 
 PressSnapshot Press::Parts::follow(std::span<const PressTarget> targets, Effort& effort) {
   Path path;
   path.start = now;
-  for (std::size_t b = 0; b < targets.size(); ++b) add_way(b, targets[b], path);
+  path.seconds = targets.front().seconds;
+  double clear = 1.0;
+  for (std::size_t b = 0; b < targets.size(); ++b) clear = std::min(clear, add_way(b, targets[b], path));
+  if (solver.relaxes() && clear > 0.0 && clear < 1.0) {  // nothing touches yet: the gel recovers on the way
+    path.start = solver.apart(now, path.start.bodies, clear * path.seconds);
+    path.seconds *= 1.0 - clear;
+  }
   std::vector<double> mu;
   bool bonded = false;
   bool any_friction = false;
@@ -346,17 +365,21 @@ const PressState& Press::Parts::step(std::span<const PressTarget> targets) {
   return state;
 }
 
-Press::Press(const Compliance& gel, std::vector<PressBody> bodies, PressTolerance tolerance, PressOutput output) {
+Press::Press(const Compliance& gel, std::vector<PressBody> bodies, PressTolerance tolerance, PronySeries relaxation,
+             PressOutput output) {
   TS_ASSERT(!bodies.empty());
+  check(relaxation);
   for (const PressBody& body : bodies) {
     check_shape(body.shape);
     if (!(body.friction >= 0.0)) fail("the friction coefficient is {}, it must be at least 0", body.friction);
   }
-  parts_ = std::make_unique<Parts>(gel, std::move(bodies), tolerance, output);
+  parts_ = std::make_unique<Parts>(gel, std::move(bodies), tolerance, std::move(relaxation), output);
 }
 
-Press::Press(const Compliance& gel, ContactShape shape, double friction, PressTolerance tolerance, PressOutput output)
-    : Press(gel, std::vector<PressBody>{{std::move(shape), friction, nullptr}}, tolerance, output) {}
+Press::Press(const Compliance& gel, ContactShape shape, double friction, PressTolerance tolerance,
+             PronySeries relaxation, PressOutput output)
+    : Press(gel, std::vector<PressBody>{{std::move(shape), friction, nullptr}}, tolerance, std::move(relaxation),
+            output) {}
 
 Press::Press(Press&&) noexcept = default;
 Press& Press::operator=(Press&&) noexcept = default;

@@ -25,6 +25,7 @@
 #include "fem/contact_shape.h"
 #include "fem/contact_solver.h"
 #include "fem/press_body.h"
+#include "fem/relaxation.h"
 
 namespace touchstone::fem {
 
@@ -44,7 +45,8 @@ struct PressTarget {
   std::array<AxisControl, 3> axis;                         ///< x, y, z
   /// Torque on the object about its origin, N mm, along the gel frame's x, y, z. Where one is given, the object turns
   /// about that axis, beyond `rotation`, until it is reached (by at most 0.8 rad); without contact it stays.
-  std::array<std::optional<double>, 3> torque;
+  std::array<std::optional<double>, 3> torque = {};
+  double seconds = 0.0;  ///< since the last step; matters to a gel that relaxes only
 };
 
 /// When a step is good enough.
@@ -114,20 +116,28 @@ class Press {
   /// One rigid body. `friction` is Coulomb's mu >= 0; infinity: what touches sticks (a step in which that has no
   /// answer, because a vertex can shed its shear only by opening, is made with mu = 100). The compliance must outlive
   /// this.
-  /// @throws Error for a shape or a friction that isn't allowed
+  ///
+  /// `relaxation`: the gel's moduli relax by this series from those of the compliance, which are the instantaneous
+  /// ones. Over each step (each part of it where it's cut, see PressState::parts) the displacement is taken to go
+  /// linearly. While nothing touches, the gel recovers; a step that starts out of contact and has its z
+  /// position-controlled begins to load at the share of its time at which its straight way touches the undeformed face,
+  /// else with its whole time.
+  /// @throws Error for a shape, a friction or a relaxation that isn't allowed
   Press(const Compliance& gel, ContactShape shape, double friction, PressTolerance tolerance = {},
-        PressOutput output = PressOutput::fields);
+        PronySeries relaxation = {}, PressOutput output = PressOutput::fields);
   /// Several bodies at once, which may be elastic. They touch the gel, not each other; where two are over one vertex,
   /// the nearer one touches. @pre at least one
   Press(const Compliance& gel, std::vector<PressBody> bodies, PressTolerance tolerance = {},
-        PressOutput output = PressOutput::fields);
+        PronySeries relaxation = {}, PressOutput output = PressOutput::fields);
   Press(Press&&) noexcept;
   Press& operator=(Press&&) noexcept;
   ~Press();
 
-  /// Moves the bodies to their targets, all at once. Force-controlled axes start where they were (0 at the first step).
+  /// Moves the bodies to their targets, all at once and in the same time. Force-controlled axes start where they were
+  /// (0 at the first step).
   /// @throws Error, the state being as before the step, if: a target has NaN or infinity or isn't a rotation; a normal
-  /// force is negative; a body reaches deeper than the gel; a shear is wanted that friction can't hold ("gross slip:
+  /// force or a time is negative; a body reaches deeper than the gel; a shear is wanted that friction can't hold
+  /// ("gross slip:
   /// ..."); a force is wanted but the body isn't over the gel; the iteration doesn't converge (with its residual)
   const PressState& step(std::span<const PressTarget> targets);
   /// The same for one body.

@@ -98,13 +98,16 @@ bool PressSnapshot::touching() const {
 }
 
 void PressSnapshot::forget(int body) {
+  bool any = false;
   for (std::size_t v = 0; v < state.size(); ++v) {
     if (owner[v] != body) continue;
+    any = true;
     state[v] = NodeState::open;
     owner[v] = -1;
     traction.segment<3>(static_cast<Eigen::Index>(3 * v)).setZero();
-    known.assign(known.size(), 0);
   }
+  // An elastic gel is at once what the other bodies make of it; a relaxing one still has its dent.
+  if (any && history.empty()) known.assign(known.size(), 0);
   bodies[body].force.setZero();
   bodies[body].moment.setZero();
   bodies[body].touching = bodies[body].overlapping = false;
@@ -127,11 +130,13 @@ PressSnapshot untouched(std::vector<BodySnapshot> bodies, int n) {
   return s;
 }
 
-PartSolver::PartSolver(const Compliance& gel, std::vector<PressBody> bodies, double lookup_mm, double traction)
+PartSolver::PartSolver(const Compliance& gel, std::vector<PressBody> bodies, double lookup_mm, double traction,
+                       PronySeries relaxation)
     : gel_(gel),
       bodies_(std::move(bodies)),
       lookup_mm_(lookup_mm),
       traction_(traction),
+      relaxation_(std::move(relaxation)),
       mu_(bodies_.size(), 0.0),
       surface_(gel),
       block_(gel, surface_),
@@ -375,7 +380,8 @@ ContactProblem PartSolver::problem(const PressSnapshot& from, const std::vector<
       if (!soft_[b]) continue;
       std::vector<char> mine;
       for (const int v : vertices) mine.push_back(now.owner[v] == static_cast<int>(b));
-      soft_[b]->add_to(combined_, surface_, vertices, mine, axes, now.bodies[b].pose, now.bodies[b].lookup);
+      soft_[b]->add_to(combined_, relaxation_.stiffness(), surface_, vertices, mine, axes, now.bodies[b].pose,
+                       now.bodies[b].lookup);
     }
     const auto normals = Eigen::seqN(Eigen::fix<0>, m, Eigen::fix<3>);
     combined_normal_ = combined_(normals, normals);
@@ -520,6 +526,10 @@ void PartSolver::follow_patches(const ContactAnswer& answer, Iterate& now) const
     for (Eigen::Index j = 0; j < answer.z.size(); ++j) {
       if (answer.z[j] != 0.0) own += answer.z[j] * block_.compliance().col(j);
     }
+    for (Eigen::Index j = 0; j < m; ++j) {
+      own.segment<3>(3 * j) -= block_.axes(vertices[j]).transpose() * relaxation_.carried(vertices[j]);
+    }
+    own /= relaxation_.stiffness();
   }
   now.weighted.resize(3 * m);
   for (Eigen::Index j = 0; j < m; ++j) {
@@ -579,7 +589,8 @@ void PartSolver::follow_patches(const ContactAnswer& answer, Iterate& now) const
 
 /// The answer as a snapshot; nothing if a vertex outside the block may penetrate, which is then required, or if the gel
 /// rises higher than was looked.
-std::optional<PressSnapshot> PartSolver::accept(const ContactAnswer& answer, Iterate& now, PartEffort& effort) {
+std::optional<PressSnapshot> PartSolver::accept(const ContactAnswer& answer, const PressSnapshot& from, Iterate& now,
+                                                PartEffort& effort) {
   const int n = static_cast<int>(gel_.vertices.size());
   const auto& vertices = block_.vertices();
   std::vector<BodySnapshot> bodies(now.bodies.size());
@@ -619,6 +630,7 @@ std::optional<PressSnapshot> PartSolver::accept(const ContactAnswer& answer, Ite
     body.moment -= arm.cross(traction);
     body.touching = true;
   }
+  remember(from, next);
   for (const Body& body : now.bodies) {
     const double looked = body.gap.reach - std::max(0.0, body.gap.deepest);
     if (highest > looked) {
@@ -639,6 +651,14 @@ std::optional<PressSnapshot> PartSolver::accept(const ContactAnswer& answer, Ite
     deepest = std::max(deepest, -g);
   }
   if (now.grew) return std::nullopt;
+  if (relaxation_.on()) {  // the face isn't flat: a body may hang in the dent of an earlier press
+    for (BodySnapshot& body : next.bodies) body.overlapping = false;
+    for (int v = 0; v < n; ++v) {
+      if (now.owner[v] < 0) continue;
+      const double risen = surface_.normals[v].dot(next.weighted.segment<3>(3 * v)) / surface_.weight[v];
+      if (now.bodies[now.owner[v]].gap.lowest[v] < risen) next.bodies[now.owner[v]].overlapping = true;
+    }
+  }
   next.penetration = deepest;
   next.lookup_error = now.lookup_error;
   next.residual = answer.residual;
@@ -646,8 +666,45 @@ std::optional<PressSnapshot> PartSolver::accept(const ContactAnswer& answer, Ite
   return next;
 }
 
+/// With relaxation: what the gel remembers, and its displacement all over, by the one pass over the whole compliance.
+void PartSolver::remember(const PressSnapshot& from, PressSnapshot& next) const {
+  if (!relaxation_.on() || (from.history.empty() && !next.touching())) return;
+  const auto n = static_cast<Eigen::Index>(gel_.vertices.size());
+  Eigen::VectorXd elastic = Eigen::VectorXd::Zero(3 * n);
+  for (Eigen::Index v = 0; v < n; ++v) {
+    if (next.state[static_cast<std::size_t>(v)] == NodeState::open) continue;
+    elastic.noalias() += gel_.surface.view().middleCols<3>(3 * v) * next.traction.segment<3>(3 * v);
+  }
+  next.history = relaxation_.after(from.history, next.traction, elastic);
+  next.weighted = next.history.elastic.tail(3 * n);
+  for (Eigen::Index v = 0; v < n; ++v) {
+    char& known = next.known[static_cast<std::size_t>(v)];
+    if (!known) next.relative.segment<3>(3 * v) = next.weighted.segment<3>(3 * v);
+    known = 1;
+  }
+}
+
+PressSnapshot PartSolver::apart(const PressSnapshot& from, std::vector<BodySnapshot> bodies, double seconds) {
+  const int n = static_cast<int>(gel_.vertices.size());
+  PressSnapshot next = untouched(std::move(bodies), n);
+  relaxation_.begin(from.history, seconds, n);
+  remember(from, next);
+  next.relative = next.weighted;
+  return next;
+}
+
+/// Whether the gel, not yet recovered from an earlier press, would stand out into a body if nothing touched it.
+bool PartSolver::bulges_into(const Iterate& now) const {
+  if (!relaxation_.on()) return false;
+  for (int v = 0; v < static_cast<int>(gel_.vertices.size()); ++v) {
+    const double out = -surface_.normals[v].dot(relaxation_.carried(v)) / relaxation_.stiffness();
+    if (now.gap(v) < out) return true;
+  }
+  return false;
+}
+
 std::optional<PressSnapshot> PartSolver::solve(const PressSnapshot& from, const std::vector<PartTarget>& targets,
-                                               PartEffort& effort) {
+                                               double seconds, PartEffort& effort) {
   const int n = static_cast<int>(gel_.vertices.size());
   TS_ASSERT(targets.size() == bodies_.size() && from.bodies.size() == bodies_.size());
   bool z_forced = false;
@@ -661,18 +718,19 @@ std::optional<PressSnapshot> PartSolver::solve(const PressSnapshot& from, const 
   }
   Iterate now;
   begin(from, targets, now);
+  relaxation_.begin(from.history, seconds, n);
   const auto out_of_contact = [&] {
     std::vector<BodySnapshot> bodies(now.bodies.size());
     for (std::size_t b = 0; b < bodies.size(); ++b) {
       bodies[b].pose = now.bodies[b].pose;
       bodies[b].turn = now.bodies[b].turn;
     }
-    return untouched(std::move(bodies), n);
+    return apart(from, std::move(bodies), seconds);
   };
   for (now.updates = 0; now.updates < kMostUpdates; ++now.updates) {
     look_up(now, targets, effort);
     const bool alone = std::none_of(now.active.begin(), now.active.end(), [](char x) { return x != 0; });
-    if (!z_forced && alone && now.deepest >= 0.0) return out_of_contact();
+    if (!z_forced && alone && now.deepest >= 0.0 && !bulges_into(now)) return out_of_contact();
     for (int v = 0; v < n; ++v) {
       if (now.owner[v] < 0) now.active[v] = now.required[v] = 0;
     }
@@ -683,7 +741,8 @@ std::optional<PressSnapshot> PartSolver::solve(const PressSnapshot& from, const 
     const auto& vertices = block_.vertices();
     if (vertices.empty()) return out_of_contact();
 
-    const ContactProblem contact = problem(from, targets, now);
+    ContactProblem contact = problem(from, targets, now);
+    relaxation_.prepare(contact, block_);
     const int c = contact.components;
     Eigen::VectorXd start(now.warm ? c * contact.gap.size() : 0);
     for (Eigen::Index j = 0; now.warm && j < contact.gap.size(); ++j) {
@@ -701,6 +760,7 @@ std::optional<PressSnapshot> PartSolver::solve(const PressSnapshot& from, const 
       return std::nullopt;
     }
     if (c == 1) widen(answer, compliance());
+    relaxation_.finish(answer, block_);
 
     now.grew = false;
     if (!take_shift(answer, targets, now)) return std::nullopt;
@@ -716,7 +776,7 @@ std::optional<PressSnapshot> PartSolver::solve(const PressSnapshot& from, const 
     }
     const double allowed = now.updates < kStrictUpdates ? lookup_mm_ : 100.0 * lookup_mm_;
     if (!now.grew && std::max(now.lookup_error, now.edge_change) <= allowed) {
-      if (auto next = accept(answer, now, effort)) return next;
+      if (auto next = accept(answer, from, now, effort)) return next;
     }
     for (Body& body : now.bodies) {
       if (body.touching) body.lookup = body.next_lookup;

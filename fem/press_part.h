@@ -13,6 +13,7 @@
 #include "fem/contact_gap.h"
 #include "fem/contact_solver.h"
 #include "fem/elastic_body.h"
+#include "fem/part_relaxation.h"
 #include "fem/patch_motion.h"
 #include "fem/press_body.h"
 
@@ -41,6 +42,7 @@ struct PressSnapshot {
   double penetration = 0.0;      ///< mm, the largest over all vertices
   double lookup_error = 0.0;     ///< mm
   double residual = 0.0;         ///< of the contact laws
+  RelaxationHistory history;     ///< of (traction; weighted displacement by the unrelaxed gel), 6 n; may be empty
 
   bool touching() const;
   /// As if this body had never touched.
@@ -73,8 +75,9 @@ struct PartEffort {
 class PartSolver {
  public:
   /// `lookup_mm`: how well the place where the gap is looked up follows the contact patch. `traction`: relative
-  /// residual of the contact laws.
-  PartSolver(const Compliance& gel, std::vector<PressBody> bodies, double lookup_mm, double traction);
+  /// residual of the contact laws. `relaxation`: the compliance is that of the instantaneous modulus.
+  PartSolver(const Compliance& gel, std::vector<PressBody> bodies, double lookup_mm, double traction,
+             PronySeries relaxation);
   ~PartSolver();
 
   const ContactSurface& surface() const { return surface_; }
@@ -83,10 +86,15 @@ class PartSolver {
   /// The friction to solve with from now on, for each body.
   void set_friction(const std::vector<double>& friction);
 
-  /// The snapshot at the end of the part, or nothing if it doesn't converge; why_not() then says why.
+  /// The snapshot at the end of the part, which takes so many seconds, or nothing if it doesn't converge; why_not()
+  /// then says why.
   /// @throws Error if a body reaches deeper than the gel, or a force is wanted where the body isn't over the gel
-  std::optional<PressSnapshot> solve(const PressSnapshot& from, const std::vector<PartTarget>& targets,
+  std::optional<PressSnapshot> solve(const PressSnapshot& from, const std::vector<PartTarget>& targets, double seconds,
                                      PartEffort& effort);
+
+  /// The gel left alone for so long after `from`, nothing touching it.
+  PressSnapshot apart(const PressSnapshot& from, std::vector<BodySnapshot> bodies, double seconds);
+  bool relaxes() const { return relaxation_.on(); }
   const std::string& why_not() const { return why_not_; }
 
   /// int phi u dA of the gel at one vertex, mm^3, computed if it isn't known.
@@ -103,7 +111,10 @@ class PartSolver {
   void begin(const PressSnapshot& from, const std::vector<PartTarget>& targets, Iterate& now) const;
   bool take_shift(const ContactAnswer& answer, const std::vector<PartTarget>& targets, Iterate& now);
   void follow_patches(const ContactAnswer& answer, Iterate& now) const;
-  std::optional<PressSnapshot> accept(const ContactAnswer& answer, Iterate& now, PartEffort& effort);
+  std::optional<PressSnapshot> accept(const ContactAnswer& answer, const PressSnapshot& from, Iterate& now,
+                                      PartEffort& effort);
+  void remember(const PressSnapshot& from, PressSnapshot& next) const;
+  bool bulges_into(const Iterate& now) const;
   PatchMotion motion_of(const std::vector<int>& vertices, const std::vector<Eigen::Vector3d>& displacements,
                         const std::vector<double>& pressures) const;
   Eigen::Vector3d relative_at(const PressSnapshot& snapshot, int vertex) const;
@@ -118,6 +129,7 @@ class PartSolver {
   double lookup_mm_;
   double traction_;
   double size_ = 1.0;  ///< mm, of a mean triangle
+  PartRelaxation relaxation_;
   std::vector<double> mu_;
   ContactSurface surface_;
   ContactBlock block_;

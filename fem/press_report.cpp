@@ -16,12 +16,15 @@ void add_fields(const Compliance& gel, const ContactSurface& surface, const Surf
                 const PressSnapshot& snapshot, PressState& s) {
   const int n = static_cast<int>(gel.vertices.size());
   s.surface_displacement = Eigen::MatrixX3d::Zero(n, 3);
-  if (!snapshot.touching()) return;
-  const auto compliance = gel.surface.view();
-  Eigen::VectorXd response = Eigen::VectorXd::Zero(3 * n);
-  for (int v = 0; v < n; ++v) {
-    if (snapshot.state[v] == NodeState::open) continue;
-    response.noalias() += compliance.middleCols<3>(3 * v) * snapshot.traction.segment<3>(3 * v);
+  if (!snapshot.touching() && snapshot.history.empty()) return;
+  Eigen::VectorXd response = snapshot.weighted;
+  if (snapshot.history.empty()) {
+    const auto compliance = gel.surface.view();
+    response.setZero();
+    for (int v = 0; v < n; ++v) {
+      if (snapshot.state[v] == NodeState::open) continue;
+      response.noalias() += compliance.middleCols<3>(3 * v) * snapshot.traction.segment<3>(3 * v);
+    }
   }
   Eigen::MatrixX3d weighted(n, 3);
   for (int v = 0; v < n; ++v) weighted.row(v) = response.segment<3>(3 * v);
@@ -59,11 +62,16 @@ PressState report(const Compliance& gel, const PartSolver& solver, const Surface
 
   const auto bead_compliance = gel.beads.view();
   Eigen::VectorXd beads = Eigen::VectorXd::Zero(gel.beads.rows());
+  // A gel that relaxes is displaced as by its pseudo-elastic traction, also where nothing touches it any more.
+  const Eigen::VectorXd& moving = snapshot.history.empty() ? snapshot.traction : snapshot.history.elastic;
+  for (int v = 0; v < n && beads.size() > 0; ++v) {
+    const Eigen::Vector3d t = moving.segment<3>(3 * v);
+    if (!t.isZero(0.0)) beads += bead_compliance.middleCols<3>(3 * v) * t;
+  }
   double largest_pressure = 0.0;
   for (int v = 0; v < n; ++v) {
     if (snapshot.state[v] == NodeState::open) continue;
     const Eigen::Vector3d t = snapshot.traction.segment<3>(3 * v);
-    if (beads.size() > 0) beads += bead_compliance.middleCols<3>(3 * v) * t;
     const double pressure = -surface.normals[v].dot(t);
     largest_pressure = std::max(largest_pressure, pressure);
     s.largest_tension = std::max(s.largest_tension, -pressure);

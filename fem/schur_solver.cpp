@@ -220,6 +220,41 @@ Eigen::MatrixXd solve_symmetric(const SymmetricEntries& matrix, std::span<const 
   return solution;
 }
 
+struct SymmetricFactor::Parts {
+  Parts(const SymmetricEntries& matrix, std::span<const int> order)
+      : values(matrix.values), places(places_of(order, matrix.size)), mumps(matrix) {
+    mumps.data().a = values.data();
+  }
+  std::vector<double> values;  // the matrix itself may not live as long
+  std::vector<int> places;
+  Mumps mumps;
+};
+
+SymmetricFactor::SymmetricFactor(const SymmetricEntries& matrix, std::span<const int> order, FactorReport* report) {
+  TS_ASSERT(static_cast<int>(order.size()) == matrix.size);
+  parts_ = std::make_unique<Parts>(matrix, order);
+  parts_->mumps.control(7) = kGivenOrder;
+  parts_->mumps.data().perm_in = parts_->places.data();
+  parts_->mumps.analyse_and_factorise(report);
+}
+
+SymmetricFactor::~SymmetricFactor() = default;
+
+int SymmetricFactor::size() const {
+  return static_cast<int>(parts_->places.size());
+}
+
+Eigen::VectorXd SymmetricFactor::solve(Eigen::VectorXd right) const {
+  TS_ASSERT(right.size() == size());
+  Mumps& mumps = parts_->mumps;
+  mumps.data().nrhs = 1;
+  mumps.data().lrhs = size();
+  mumps.data().rhs = right.data();
+  mumps.run(kSolve);
+  stop_unless_finite(right);
+  return right;
+}
+
 std::string blas_core_name() {
   return openblas_get_corename();
 }

@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
@@ -47,6 +48,25 @@ Eigen::MatrixXd schur_complement(const SymmetricEntries& matrix, int last, std::
 /// @throws Error as above
 Eigen::MatrixXd solve_symmetric(const SymmetricEntries& matrix, std::span<const int> order,
                                 const Eigen::MatrixXd& right, FactorReport* report = nullptr);
+
+/// A symmetric matrix factorised once, to be solved with many right-hand sides one after the other. MUMPS has global
+/// state: while one lives, every other factorisation of the program waits, so don't make a second in the same thread.
+class SymmetricFactor {
+ public:
+  /// `order` as in solve_symmetric. @throws Error as above
+  SymmetricFactor(const SymmetricEntries& matrix, std::span<const int> order, FactorReport* report = nullptr);
+  ~SymmetricFactor();
+  SymmetricFactor(const SymmetricFactor&) = delete;
+  SymmetricFactor& operator=(const SymmetricFactor&) = delete;
+
+  int size() const;
+  /// matrix^-1 * right, without iterative refinement. The same input gives the same bytes.
+  Eigen::VectorXd solve(Eigen::VectorXd right) const;
+
+ private:
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+};
 
 /// The kernel that OpenBLAS chose for this processor ("Zen", "Cooperlake"; "Prescott" on a recent processor means that
 /// it guessed wrong and runs five times slower: set OPENBLAS_CORETYPE).

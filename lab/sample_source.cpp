@@ -10,7 +10,11 @@ SampleSource simulator(const std::filesystem::path& cache_folder) {
   source.set_up_gel = [cache_folder](const sim::DeviceSpec& device, const Progress& progress) {
     return sim::set_up_gel(device, cache_folder, progress);
   };
-  source.play_motion = sim::play_motion;
+  source.play_motion = [cache_folder](const sim::SceneSpec& scene, const sim::Plan& plan, const fem::Compliance& gel,
+                                      const Progress& progress) {
+    const auto vibration = sim::set_up_vibration(scene, plan, cache_folder);
+    return sim::play_motion(scene, plan, gel, progress, vibration.get());
+  };
   source.set_up_camera = [](const sim::SceneSpec& scene, const sim::Plan& plan,
                             std::shared_ptr<const fem::Compliance> gel, const sim::Truth& first) {
     if (!plan.camera) {

@@ -4,12 +4,14 @@
 #include <cmath>
 
 #include "core/units.h"
+#include "fem/vibration.h"
 
 namespace touchstone::sim {
 namespace {
 
 constexpr double kEdgesADetail = 4.0;  // a wave needs so many for its shape
 constexpr double kMicrometresPerMillimetre = 1000.0;
+constexpr double kAllowedInertia = 0.04;  // of a vibration's force: a fifth of the lowest eigenfrequency
 
 /// Fresnel reflectance of unpolarised light that meets a face from index n1 at sine `sine` towards index n2.
 double fresnel(double n1, double n2, double sine) {
@@ -76,6 +78,30 @@ void plan_mechanics(const SceneSpec& scene, Plan& plan, Table& table) {
                    : "the motion is a straight press: no tangential part, no tilt";
   plan.friction = table.add("friction", scene.effects.friction, tangential && scene.object.friction > 0.0, why,
                             "a few milliseconds a frame");
+
+  const fem::PronySeries series = prony_series(scene.device.gel);
+  const double seconds = (scene.motion.frame_count() - 1) / scene.motion.frame_rate_Hz;
+  const bool relaxes = fem::lasting_share(series) < 1.0;
+  plan.relaxation = table.add(
+      "stress relaxation", scene.effects.relaxation, relaxes,
+      relaxes
+          ? fmt::format("the gel's modulus falls by {:.1f} % within the motion's {:.3g} s and by {:.1f} % in the end",
+                        100 * (1.0 - fem::relaxation_at(series, seconds)), seconds,
+                        100 * (1.0 - fem::lasting_share(series)))
+          : "the gel has no Prony series: it is elastic",
+      "some vectors of the surface's size a frame");
+
+  const double frequency = scene.motion.highest_vibration_Hz();
+  const double missing = inertia_estimate(scene.device.gel, frequency);
+  const bool fast = missing > kAllowedInertia;
+  plan.inertia = table.add(
+      "gel dynamics (inertia)", scene.effects.inertia, fast,
+      frequency == 0.0 ? "the motion doesn't vibrate"
+                       : fmt::format("the motion vibrates at {:.4g} Hz, a layer like the gel has its lowest "
+                                     "eigenfrequency at {:.4g} Hz: leaving inertia out errs by up to some {:.2g} % of "
+                                     "the vibration's force; allowed is {:.2g} %",
+                                     frequency, frequency / std::sqrt(missing), 100 * missing, 100 * kAllowedInertia),
+      "the gel's modes once (half a minute, kept in the cache), then milliseconds a frame");
 }
 
 /// Finest detail of the object, mm: of its relief, or the middle one of its mesh's edges.
@@ -175,6 +201,12 @@ double interreflection_estimate(const GelSpec& gel, const PlateSpec& plate, doub
   }
   const double gain = albedo * once;
   return gain / (1.0 - gain);
+}
+
+double inertia_estimate(const GelSpec& gel, double frequency_Hz) {
+  const double lowest = fem::layer_shear_frequency({gel.youngs_modulus_MPa, gel.poisson_ratio},
+                                                   gel.density_kg_m3 * kTonnePerMm3, gel.thickness_mm);
+  return std::pow(frequency_Hz / lowest, 2);
 }
 
 Plan make_plan(const SceneSpec& scene) {

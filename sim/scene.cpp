@@ -37,6 +37,8 @@ void fields(YamlReader& in, LightSpec& light) {
 void fields(YamlReader& in, EffectSwitches& effects) {
   in.optional("friction", effects.friction);
   in.optional("fine_relief", effects.fine_relief);
+  in.optional("relaxation", effects.relaxation);
+  in.optional("inertia", effects.inertia);
   in.optional("interreflection", effects.interreflection);
   in.optional("sensor_noise", effects.sensor_noise);
 }

@@ -45,6 +45,8 @@ EnumNames<Switch> enum_names(Switch);
 struct EffectSwitches {
   Switch friction = Switch::automatic;
   Switch fine_relief = Switch::automatic;
+  Switch relaxation = Switch::automatic;
+  Switch inertia = Switch::automatic;
   Switch interreflection = Switch::automatic;
   Switch sensor_noise = Switch::automatic;
 };

@@ -35,7 +35,10 @@ const SmoothSurface& coarse_surface() {
 PressState pressed(const Compliance& gel, const ContactShape& shape, double x, double y, double z,
                    const Eigen::Matrix3d& rotation = Eigen::Matrix3d::Identity(), double friction = 0.0) {
   Press press(gel, shape, friction);
-  return press.step({rotation, {AxisControl::at(x), AxisControl::at(y), AxisControl::at(z)}});
+  PressTarget target;
+  target.rotation = rotation;
+  target.axis = {AxisControl::at(x), AxisControl::at(y), AxisControl::at(z)};
+  return press.step(target);
 }
 
 double force_of(const ReliefAnswer& answer) {

@@ -97,6 +97,52 @@ TEST(SceneFiles, PoissonsRatioMayBeAHalfAndNotMore) {
               HasSubstr("from 0 to 0.5"));
 }
 
+TEST(SceneFiles, AGelMayRelaxButSomethingMustLast) {
+  const auto with = [](const std::string& terms) {
+    return replaced(kDevice, "  thickness", "  relaxation: [" + terms + "]\n  thickness");
+  };
+  const auto device = parse_yaml<DeviceSpec>(with("{share: 0.2, time_s: 0.1}, {share: 0.3, time_s: 4}"), "device.yaml");
+  const fem::PronySeries series = prony_series(device.gel);
+  ASSERT_EQ(series.size(), 2u);
+  EXPECT_EQ(series[1].share, 0.3);
+  EXPECT_EQ(series[1].time, 4.0);
+  EXPECT_THAT(error_of_device(with("{share: 0.5, time_s: 1}, {share: 0.5, time_s: 2}")),
+              HasSubstr("device.yaml:5: relaxation: the shares sum to 1; something must last"));
+  EXPECT_THAT(error_of_device(with("{share: -0.1, time_s: 1}")), HasSubstr("-0.1 is not allowed"));
+  EXPECT_THAT(error_of_device(with("{share: 0.1, time_s: 0}")), HasSubstr("0 is not allowed"));
+  EXPECT_THAT(error_of_device(with("{share: 0.1}")), HasSubstr("time_s"));
+}
+
+TEST(SceneFiles, TheGelsDensityIsThatOfWaterUnlessSaid) {
+  EXPECT_EQ(parse_yaml<DeviceSpec>(kDevice, "d").gel.density_kg_m3, 1000.0);
+  EXPECT_THAT(error_of_device(replaced(kDevice, "  thickness", "  density_kg_m3: 0\n  thickness")),
+              HasSubstr("0 is not allowed"));
+}
+
+TEST(SceneFiles, AVibrationNeedsAPositionAndAFrequency) {
+  const std::string start = "start_mm: [0, 0, 1]\nkeys:\n  - {frames: 2, ";
+  const auto motion =
+      parse_yaml<MotionSpec>(start + "vibration: {axis: y, amplitude_mm: 0.1, frequency_Hz: 30}}\n", "m");
+  EXPECT_EQ(motion.keys[0].vibration->axis, Axis::y);
+  EXPECT_EQ(motion.highest_vibration_Hz(), 30.0);
+  EXPECT_TRUE(motion.is_tangential());
+  const auto error = [&](const std::string& rest) {
+    try {
+      parse_yaml<MotionSpec>(start + rest + "}\n", "m");
+    } catch (const Error& thrown) {
+      return std::string(thrown.what());
+    }
+    return std::string();
+  };
+  EXPECT_THAT(error("vibration: {axis: w, amplitude_mm: 0.1, frequency_Hz: 30}"), HasSubstr("axis"));
+  EXPECT_THAT(error("vibration: {axis: z, amplitude_mm: -0.1, frequency_Hz: 30}"), HasSubstr("-0.1 is not allowed"));
+  EXPECT_THAT(error("vibration: {axis: z, amplitude_mm: 0.1, frequency_Hz: 0}"), HasSubstr("0 is not allowed"));
+  EXPECT_THAT(error("vibration: {axis: z, amplitude_mm: 0.1}"), HasSubstr("frequency_Hz"));
+  EXPECT_THAT(error("z: {force_N: 1}, vibration: {axis: z, amplitude_mm: 0.1, frequency_Hz: 30}"),
+              HasSubstr("needs a position"));
+  EXPECT_EQ(error("z: {position_mm: 1}, vibration: {axis: z, amplitude_mm: 0.1, frequency_Hz: 30}"), "");
+}
+
 TEST(SceneFiles, BeadsMustLieInTheGel) {
   const std::string beads = "beads: {grid: 3, spacing_mm: 2, diameter_mm: 0.5, depth_mm: 0.2}\n";
   EXPECT_THAT(error_of_device(kDevice + beads), HasSubstr("beads.depth_mm: 0.2 puts beads"));
