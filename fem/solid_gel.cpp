@@ -45,7 +45,8 @@ double distance_to_triangle(const Vector3d& p, const Vector3d& a, const Vector3d
 
 /// TetGen runs away on features far below the wanted edges.
 void refuse_nearly_coincident(const SolidGel& solid) {
-  const auto& [vertices, triangles] = solid.surface;
+  const std::vector<Vector3d>& vertices = solid.surface.vertices;
+  const auto& triangles = solid.surface.triangles;
   const double allowed = kNearestVertices * solid.fine;
   // Along x, so that only neighbours are compared.
   std::vector<int> order(vertices.size());
