@@ -1,6 +1,8 @@
 #include "fem/tetgen_fill.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 #include <mutex>
 
 #include "core/error.h"
@@ -71,9 +73,8 @@ void fill_boundary(const FillInput& from, tetgenio& input) {
   }
   input.numberoffacets = static_cast<int>(from.facets.size());
   input.facetlist = new tetgenio::facet[from.facets.size()];
-  input.facetmarkerlist = new int[from.facets.size()];
   for (std::size_t f = 0; f < from.facets.size(); ++f) {
-    const auto& polygons = from.facets[f].polygons;
+    const auto& polygons = from.facets[f];
     tetgenio::facet& facet = input.facetlist[f];
     tetgenio::init(&facet);
     facet.numberofpolygons = static_cast<int>(polygons.size());
@@ -83,13 +84,11 @@ void fill_boundary(const FillInput& from, tetgenio& input) {
       facet.polygonlist[p].vertexlist = new int[polygons[p].size()];
       std::copy(polygons[p].begin(), polygons[p].end(), facet.polygonlist[p].vertexlist);
     }
-    input.facetmarkerlist[f] = from.facets[f].marker;
   }
 }
 
-Filling filling_of(const tetgenio& output) {
-  Filling filling;
-  TetMesh& mesh = filling.mesh;
+TetMesh mesh_of(const tetgenio& output) {
+  TetMesh mesh;
   for (int i = 0; i < output.numberofpoints; ++i) {
     mesh.vertices.emplace_back(output.pointlist[3 * i], output.pointlist[3 * i + 1], output.pointlist[3 * i + 2]);
   }
@@ -101,12 +100,7 @@ Filling filling_of(const tetgenio& output) {
     }
     mesh.tetrahedra.push_back(tetrahedron);
   }
-  for (int f = 0; f < output.numberoftrifaces; ++f) {
-    const int* corner = output.trifacelist + 3 * f;
-    filling.faces.push_back({corner[0], corner[1], corner[2]});
-    filling.markers.push_back(output.trifacemarkerlist == nullptr ? 0 : output.trifacemarkerlist[f]);
-  }
-  return filling;
+  return mesh;
 }
 
 bool boundary_was_kept(const FillInput& input, const TetMesh& mesh) {
@@ -116,7 +110,7 @@ bool boundary_was_kept(const FillInput& input, const TetMesh& mesh) {
   };
   std::vector<std::array<int, 3>> wanted;
   for (const auto& facet : input.facets) {
-    const auto& corners = facet.polygons.front();
+    const auto& corners = facet.front();
     wanted.push_back(sorted({corners[0], corners[1], corners[2]}));
   }
   std::vector<std::array<int, 3>> made;
@@ -128,66 +122,70 @@ bool boundary_was_kept(const FillInput& input, const TetMesh& mesh) {
   return wanted == made && same_points;
 }
 
-Filling fill_once(const FillInput& from, const std::string& quality, const std::string& what) {
+/// The wanted edges, for TetGen's call-back, which takes no context. Set under the lock.
+const FillInput* in_work = nullptr;
+
+/// Whether a tetrahedron's circumradius is above the wanted edge at its middle.
+bool too_large(REAL* a, REAL* b, REAL* c, REAL* d, REAL*, REAL) {
+  const Eigen::Map<const Eigen::Vector3d> pa(a), pb(b), pc(c), pd(d);
+  const Eigen::Vector3d u = pb - pa;
+  const Eigen::Vector3d v = pc - pa;
+  const Eigen::Vector3d w = pd - pa;
+  const double six_volumes = u.dot(v.cross(w));
+  const Eigen::Vector3d to_centre =
+      u.squaredNorm() * v.cross(w) + v.squaredNorm() * w.cross(u) + w.squaredNorm() * u.cross(v);
+  const double wanted = kMetricPerEdge * in_work->edge(0.25 * (pa + pb + pc + pd));
+  return to_centre.norm() > 2.0 * std::abs(six_volumes) * wanted;
+}
+
+TetMesh fill_once(const FillInput& from, const std::string& quality, const std::string& what) {
   tetgenio input;
   tetgenio output;
   tetgenio background;
   fill_boundary(from, input);
-  fill_background(from, background);
+  // A background mesh makes TetGen end the process where it tries a vertex outside of it, as it does beside a boundary
+  // that it may not split; a call-back doesn't.
+  if (from.keep_boundary) {
+    input.tetunsuitable = too_large;
+  } else {
+    fill_background(from, background);
+  }
   tetgenbehavior behavior;
-  std::string switches = fmt::format("p{}q{}mzQ", from.keep_boundary ? "YM" : "", quality);
+  std::string switches =
+      fmt::format("p{}q{}{}zQ", from.keep_boundary ? "YM" : "", quality, from.keep_boundary ? "" : "m");
   if (from.most_points >= 0) switches += fmt::format("S{}", from.most_points);
   TS_ASSERT(behavior.parse_commandline(switches.data()));
   // TetGen keeps its predicates' error bounds in globals.
   static std::mutex one_at_a_time;
   const std::lock_guard lock(one_at_a_time);
+  in_work = &from;
   try {
-    tetrahedralize(&behavior, &input, &output, nullptr, &background);
+    tetrahedralize(&behavior, &input, &output, nullptr, from.keep_boundary ? nullptr : &background);
   } catch (int code) {
     fail("{}: TetGen gave up on it (code {})", what, code);
   }
-  return filling_of(output);
+  return mesh_of(output);
 }
 
 }  // namespace
 
-Filling fill_with_tetrahedra(const FillInput& input, const std::string& what) {
+TetMesh fill_with_tetrahedra(const FillInput& input, const std::string& what) {
   for (const Eigen::Vector3d& point : input.points) TS_ASSERT(point.allFinite());
-  Filling best;
+  TetMesh best;
   double best_angle = -1.0;
   for (const std::string quality : {"1.4/14", "1.3/14", "1.5/12", "1.4/16", "1.6/10", "1.25/18"}) {
-    Filling filling = fill_once(input, quality, what);
-    const double angle = smallest_dihedral_angle(filling.mesh);
+    TetMesh mesh = fill_once(input, quality, what);
+    const double angle = smallest_dihedral_angle(mesh);
     if (angle > best_angle) {
       best_angle = angle;
-      best = std::move(filling);
+      best = std::move(mesh);
     }
     if (best_angle > kGoodDihedral) break;
   }
-  if (input.keep_boundary && !boundary_was_kept(input, best.mesh)) {
+  if (input.keep_boundary && !boundary_was_kept(input, best)) {
     fail("{}: TetGen couldn't fill it without changing its surface", what);
   }
   return best;
-}
-
-std::vector<double> graded_planes(double low, double high, double fine_low, double fine_high) {
-  const double margin = 0.05 * (high - low);  // TetGen must find each point of the solid inside the background
-  std::vector<double> planes = {low - margin, high + margin};
-  const auto add = [&](double from, double to) {
-    for (int k = 0; k <= 4; ++k) {
-      planes.push_back(from + (to - from) * k / 4.0);
-    }
-  };
-  add(low, std::max(low, fine_low));
-  add(std::min(high, fine_high), high);
-  std::sort(planes.begin(), planes.end());
-  std::vector<double> apart;
-  for (const double plane : planes) {
-    if (apart.empty() || plane - apart.back() > 1e-3 * (high - low)) {
-      apart.push_back(plane);
-    }
-  }
-  return apart;
 }
 
 }  // namespace touchstone::fem
