@@ -3,9 +3,11 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <mutex>
+#include <cstring>
+#include <optional>
 
 #include "core/error.h"
+#include "core/isolated_call.h"
 
 #define TETLIBRARY
 #include <tetgen.h>
@@ -15,6 +17,7 @@ namespace {
 
 /// TetGen keeps circumradii under the metric; a regular tetrahedron of edge h has 0.61 h.
 constexpr double kMetricPerEdge = 1.0;
+constexpr int kMostSeconds = 120;
 
 /// The size field as TetGen reads it: a grid of boxes, each cut into six tetrahedra, with a metric at each vertex.
 void fill_background(const FillInput& from, tetgenio& background) {
@@ -87,18 +90,38 @@ void fill_boundary(const FillInput& from, tetgenio& input) {
   }
 }
 
-TetMesh mesh_of(const tetgenio& output) {
+/// The mesh as bytes: two counts, the vertices, the tetrahedra.
+std::string bytes_of(const tetgenio& output) {
+  std::string bytes;
+  const auto add = [&](const void* data, std::size_t size) { bytes.append(static_cast<const char*>(data), size); };
+  add(&output.numberofpoints, sizeof(int));
+  add(&output.numberoftetrahedra, sizeof(int));
+  add(output.pointlist, sizeof(REAL) * 3 * static_cast<std::size_t>(output.numberofpoints));
+  add(output.tetrahedronlist, sizeof(int) * 4 * static_cast<std::size_t>(output.numberoftetrahedra));
+  return bytes;
+}
+
+TetMesh mesh_of(const std::string& bytes) {
+  const char* at = bytes.data();
+  const auto take = [&](void* data, std::size_t size) {
+    TS_ASSERT(size <= static_cast<std::size_t>(bytes.data() + bytes.size() - at));
+    std::memcpy(data, at, size);
+    at += size;
+  };
+  int points = 0;
+  int tetrahedra = 0;
+  take(&points, sizeof(int));
+  take(&tetrahedra, sizeof(int));
   TetMesh mesh;
-  for (int i = 0; i < output.numberofpoints; ++i) {
-    mesh.vertices.emplace_back(output.pointlist[3 * i], output.pointlist[3 * i + 1], output.pointlist[3 * i + 2]);
-  }
-  for (int e = 0; e < output.numberoftetrahedra; ++e) {
-    const int* corner = output.tetrahedronlist + 4 * e;
-    std::array<int, 4> tetrahedron = {corner[0], corner[1], corner[2], corner[3]};
+  mesh.vertices.resize(static_cast<std::size_t>(points));
+  mesh.tetrahedra.resize(static_cast<std::size_t>(tetrahedra));
+  static_assert(sizeof(Eigen::Vector3d) == 3 * sizeof(REAL));
+  for (auto& vertex : mesh.vertices) take(vertex.data(), sizeof(REAL) * 3);
+  for (auto& tetrahedron : mesh.tetrahedra) {
+    take(tetrahedron.data(), sizeof(int) * 4);
     if (volume(mesh, tetrahedron) < 0.0) {
       std::swap(tetrahedron[2], tetrahedron[3]);
     }
-    mesh.tetrahedra.push_back(tetrahedron);
   }
   return mesh;
 }
@@ -122,7 +145,7 @@ bool boundary_was_kept(const FillInput& input, const TetMesh& mesh) {
   return wanted == made && same_points;
 }
 
-/// The wanted edges, for TetGen's call-back, which takes no context. Set under the lock.
+/// The wanted edges, for TetGen's call-back, which takes no context. Set in a process of its own.
 const FillInput* in_work = nullptr;
 
 /// Whether a tetrahedron's circumradius is above the wanted edge at its middle.
@@ -138,7 +161,7 @@ bool too_large(REAL* a, REAL* b, REAL* c, REAL* d, REAL*, REAL) {
   return to_centre.norm() > 2.0 * std::abs(six_volumes) * wanted;
 }
 
-TetMesh fill_once(const FillInput& from, const std::string& quality, const std::string& what) {
+std::string call_tetgen(const FillInput& from, const std::string& quality) {
   tetgenio input;
   tetgenio output;
   tetgenio background;
@@ -155,16 +178,23 @@ TetMesh fill_once(const FillInput& from, const std::string& quality, const std::
       fmt::format("p{}q{}{}zQ", from.keep_boundary ? "YM" : "", quality, from.keep_boundary ? "" : "m");
   if (from.most_points >= 0) switches += fmt::format("S{}", from.most_points);
   TS_ASSERT(behavior.parse_commandline(switches.data()));
-  // TetGen keeps its predicates' error bounds in globals.
-  static std::mutex one_at_a_time;
-  const std::lock_guard lock(one_at_a_time);
   in_work = &from;
   try {
     tetrahedralize(&behavior, &input, &output, nullptr, from.keep_boundary ? nullptr : &background);
   } catch (int code) {
-    fail("{}: TetGen gave up on it (code {})", what, code);
+    fail("code {}", code);
   }
-  return mesh_of(output);
+  return bytes_of(output);
+}
+
+/// The mesh, or none if TetGen gave up, with the reason.
+std::optional<TetMesh> fill_once(const FillInput& from, const std::string& quality, std::string& why_not) {
+  try {
+    return mesh_of(isolated_call([&] { return call_tetgen(from, quality); }, kMostSeconds));
+  } catch (const Error& error) {
+    why_not = error.what();
+    return std::nullopt;
+  }
 }
 
 }  // namespace
@@ -173,15 +203,18 @@ TetMesh fill_with_tetrahedra(const FillInput& input, const std::string& what) {
   for (const Eigen::Vector3d& point : input.points) TS_ASSERT(point.allFinite());
   TetMesh best;
   double best_angle = -1.0;
+  std::string why_not;
   for (const std::string quality : {"1.4/14", "1.3/14", "1.5/12", "1.4/16", "1.6/10", "1.25/18"}) {
-    TetMesh mesh = fill_once(input, quality, what);
-    const double angle = smallest_dihedral_angle(mesh);
+    std::optional<TetMesh> mesh = fill_once(input, quality, why_not);
+    if (!mesh) continue;
+    const double angle = smallest_dihedral_angle(*mesh);
     if (angle > best_angle) {
       best_angle = angle;
-      best = std::move(mesh);
+      best = std::move(*mesh);
     }
     if (best_angle > kGoodDihedral) break;
   }
+  if (best_angle < 0.0) fail("{}: TetGen gave up on it ({})", what, why_not);
   if (input.keep_boundary && !boundary_was_kept(input, best)) {
     fail("{}: TetGen couldn't fill it without changing its surface", what);
   }

@@ -1,6 +1,7 @@
 #pragma once
-// The one place that calls TetGen 1.5. It aborts the process on NaN, crashes on crossing facets and runs away on nearly
-// coincident ones, so callers check what they pass; what comes back is checked here.
+// The one place that calls TetGen 1.5. It aborts on NaN, crashes on crossing facets, runs away on nearly coincident
+// ones and now and then fails an assertion of its own on sound input. So callers check what they pass, TetGen runs in a
+// process of its own, and what comes back is checked here.
 
 #include <Eigen/Core>
 #include <array>
@@ -33,7 +34,7 @@ struct FillInput {
 /// Constrained Delaunay tetrahedra, refined to the wanted edges (radius-edge ratio 1.4 and dihedral angles of 14
 /// degrees where the boundary lets them; where slivers below kGoodDihedral are left, other bounds are tried and the
 /// best mesh is taken). The input's points come first; `outer` and `bonded` are still empty. The same input gives the
-/// same mesh. One call at a time: TetGen has globals. @throws Error that begins with `what` if TetGen gives up, or
+/// same mesh. @throws Error that begins with `what` if TetGen gives up, or
 /// changed a boundary that was to be kept
 TetMesh fill_with_tetrahedra(const FillInput& input, const std::string& what);
 
