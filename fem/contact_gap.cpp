@@ -44,8 +44,11 @@ const RadonRule& radon_rule() {
 template <typename Shape>
 class TriangleGap {
  public:
-  TriangleGap(const Shape& shape, const RigidTransform& object_from_gel, double body_radius)
-      : shape_(shape), object_from_gel_(object_from_gel), body_radius_(body_radius) {}
+  TriangleGap(const Shape& shape, const RigidTransform& object_from_gel, double body_radius, double farthest_behind)
+      : shape_(shape),
+        object_from_gel_(object_from_gel),
+        body_radius_(body_radius),
+        farthest_behind_(farthest_behind) {}
 
   /// int phi_k gap dA, int phi_k dA over the part that hits, and the least gap.
   Eigen::Vector3d gap;
@@ -72,8 +75,11 @@ class TriangleGap {
  private:
   std::optional<double> at(const Eigen::Vector3d& b) const {
     const Eigen::Vector3d point = points_ * b;
-    if (one_normal_) return first_entry(shape_, point, normals_.col(0));
-    return first_entry(shape_, point, (normals_ * b).normalized());
+    const Eigen::Vector3d normal = one_normal_ ? normals_.col(0) : (normals_ * b).normalized();
+    const auto entry = first_entry(shape_, point, normal);
+    if (!entry || *entry >= -farthest_behind_) return entry;
+    const auto back = first_entry(shape_, point, -normal);  // where the line leaves the body, seen from outside
+    return back && -*back < -farthest_behind_ ? std::nullopt : entry;
   }
 
   /// `cell` holds the barycentric corners as columns.
@@ -174,6 +180,7 @@ class TriangleGap {
   const Shape& shape_;
   const RigidTransform object_from_gel_;
   const double body_radius_;
+  const double farthest_behind_;
   Eigen::Matrix3d points_;
   Eigen::Matrix3d normals_;
   bool one_normal_ = true;
@@ -239,6 +246,9 @@ ContactSurface::ContactSurface(const Compliance& gel) : vertices(gel.vertices), 
     around[v].erase(std::unique(around[v].begin(), around[v].end()), around[v].end());
   }
   weight = gel.mass * Eigen::VectorXd::Ones(static_cast<Eigen::Index>(n));
+  const bool flat =
+      std::all_of(normals.begin(), normals.end(), [&](const auto& one) { return one == normals.front(); });
+  if (!flat) farthest_behind = 0.5 * gel.thickness;
 }
 
 WeightedGap weighted_gap(const ContactSurface& surface, const ContactShape& shape,
@@ -252,7 +262,7 @@ WeightedGap weighted_gap(const ContactSurface& surface, const ContactShape& shap
   Eigen::VectorXd covered = Eigen::VectorXd::Zero(n);
   std::visit(
       [&](const auto& body) {
-        TriangleGap triangle(body, gel_from_object.inverse(), bounding_ball(shape).radius);
+        TriangleGap triangle(body, gel_from_object.inverse(), bounding_ball(shape).radius, surface.farthest_behind);
         for_each_near(surface, shape, gel_from_object, tangential, wanted,
                       [&](std::size_t t, const auto& corners, const auto& normals) {
                         triangle.integrate(corners, normals);

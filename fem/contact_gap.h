@@ -22,6 +22,9 @@ struct ContactSurface {
   std::vector<Eigen::Vector3d> normals;  ///< unit, outward, the triangles' mean weighted by area
   Eigen::VectorXd weight;                ///< int phi_i dA, mm^2
   std::vector<std::vector<int>> around;  ///< neighbours of each vertex by edges, rising
+  /// mm: of a curved gel the line through a surface point leaves it again on its far side; a body that lies wholly more
+  /// than this behind the point is there and not in contact here. Half the gel's thickness, infinite for a flat gel.
+  double farthest_behind = std::numeric_limits<double>::infinity();
 };
 
 /// The weighted gap per surface vertex where there is one.
