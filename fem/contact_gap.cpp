@@ -47,8 +47,11 @@ const RadonRule& radon_rule() {
 template <typename Shape>
 class TriangleGap {
  public:
-  TriangleGap(const Shape& shape, const RigidTransform& object_from_gel, double body_radius)
-      : shape_(shape), object_from_gel_(object_from_gel), body_radius_(body_radius) {}
+  TriangleGap(const Shape& shape, const RigidTransform& object_from_gel, double body_radius, double farthest_behind)
+      : shape_(shape),
+        object_from_gel_(object_from_gel),
+        body_radius_(body_radius),
+        farthest_behind_(farthest_behind) {}
 
   /// int phi_k gap dA, int phi_k dA over the part that hits, and the least gap.
   Eigen::Vector3d gap;
@@ -57,7 +60,7 @@ class TriangleGap {
 
   /// Gap at one surface point.
   double corner_gap(const Eigen::Vector3d& corner, const Eigen::Vector3d& normal) const {
-    return first_entry(shape_, object_from_gel_ * corner, object_from_gel_.turn(normal)).value_or(kInfinity);
+    return entry(object_from_gel_ * corner, object_from_gel_.turn(normal)).value_or(kInfinity);
   }
 
   /// Where the gap is more than `steep` above `level` the body's side is seen, which doesn't bear: it fades out, up to
@@ -90,8 +93,13 @@ class TriangleGap {
  private:
   std::optional<double> at(const Eigen::Vector3d& b) const {
     const Eigen::Vector3d point = points_ * b;
-    if (one_normal_) return first_entry(shape_, point, normals_.col(0));
-    return first_entry(shape_, point, (normals_ * b).normalized());
+    return entry(point, one_normal_ ? Eigen::Vector3d(normals_.col(0)) : (normals_ * b).normalized());
+  }
+  std::optional<double> entry(const Eigen::Vector3d& point, const Eigen::Vector3d& normal) const {
+    const auto found = first_entry(shape_, point, normal);
+    if (!found || *found >= -farthest_behind_) return found;
+    const auto back = first_entry(shape_, point, -normal);  // where the line leaves the body, seen from outside
+    return back && -*back < -farthest_behind_ ? std::nullopt : found;
   }
   /// Signed, positive inside.
   double silhouette(const Eigen::Vector3d& b) const {
@@ -227,6 +235,7 @@ class TriangleGap {
   const Shape& shape_;
   const RigidTransform object_from_gel_;
   const double body_radius_;
+  const double farthest_behind_;
   Eigen::Matrix3d points_;
   Eigen::Matrix3d normals_;
   bool one_normal_ = true;
@@ -273,6 +282,7 @@ ContactSurface::ContactSurface(const Compliance& gel) : vertices(gel.vertices), 
   }
   weight = gel.mass * Eigen::VectorXd::Ones(static_cast<Eigen::Index>(n));
   for (const Eigen::Vector3d& normal : normals) flat = flat && normal == normals.front();
+  if (!flat) farthest_behind = 0.5 * gel.thickness;
 }
 
 void WeightedGap::move_along_normals(const Eigen::VectorXd& weight, double distance) {
@@ -307,7 +317,7 @@ WeightedGap weighted_gap(const ContactSurface& surface, const ContactShape& shap
   }
   std::visit(
       [&](const auto& body) {
-        TriangleGap triangle(body, gel_from_object.inverse(), ball.radius);
+        TriangleGap triangle(body, gel_from_object.inverse(), ball.radius, surface.farthest_behind);
         Eigen::VectorXd corner_gap(n);
         for (std::size_t v = 0; v < moved.size(); ++v) {
           corner_gap[static_cast<Eigen::Index>(v)] = triangle.corner_gap(moved[v], surface.normals[v]);

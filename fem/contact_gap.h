@@ -25,6 +25,9 @@ struct ContactSurface {
   std::vector<double> triangle_size;     ///< mm, from a triangle's middle to its farthest corner
   std::vector<double> triangle_area;     ///< mm^2
   bool flat = true;                      ///< one normal all over
+  /// mm: of a curved gel the line through a surface point leaves it again on its far side; a body that lies wholly more
+  /// than this behind the point is there and not in contact here. Half the gel's thickness, infinite for a flat gel.
+  double farthest_behind = std::numeric_limits<double>::infinity();
 };
 
 /// The weighted gap per surface vertex where there is one.

@@ -57,7 +57,8 @@ struct Pair {
 class TwoMaterials : public testing::TestWithParam<Pair> {};
 
 TEST_P(TwoMaterials, PatchTestAcrossTheirInterface) {
-  const auto& [lower, upper] = GetParam();
+  const ElasticMaterial lower = GetParam().lower;
+  const ElasticMaterial upper = GetParam().upper;
   const TetMesh mesh = two_layers({3, 2, 1.5}, 3, 3, 3, 1);
   Matrix3d below;
   below << 0.010, -0.020, 0.005, 0.013, -0.004, 0.017, -0.008, 0.006, 0.011;
@@ -92,7 +93,8 @@ TEST_P(TwoMaterials, PatchTestAcrossTheirInterface) {
 
 /// A column of layers under uniform pressure, its sides kept from moving out, and under uniform shear.
 TEST_P(TwoMaterials, ABlockGivesTheSumOfItsLayers) {
-  const auto& [lower, upper] = GetParam();
+  const ElasticMaterial lower = GetParam().lower;
+  const ElasticMaterial upper = GetParam().upper;
   const TetMesh mesh = two_layers({3, 2, 1.5}, 3, 3, 3, 1);
   const std::vector<ElasticMaterial> materials = {lower, upper};
   const TaylorHoodSpace space = make_space(mesh, materials);
