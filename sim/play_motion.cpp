@@ -45,7 +45,8 @@ std::vector<Truth> play_motion(const SceneSpec& scene, const Plan& plan, const f
   const auto step = [&](const SourceLocation& where) {
     const int frame = static_cast<int>(truths.size());
     try {
-      truths.push_back({frame, frame_time(frame, motion.frame_rate_Hz), press.step(target)});
+      truths.push_back({frame, frame_time(frame, motion.frame_rate_Hz), press.step(target), {}});
+      truths.back().error = fem::estimate_error(gel, truths.back().press);
     } catch (const Error& error) {
       fail_at(where, "frame {}: {}", frame, error.what());
     }
