@@ -1,5 +1,6 @@
 #include "fem/compliance_cache.h"
 
+#include <algorithm>
 #include <system_error>
 
 #include "core/error.h"
@@ -8,6 +9,18 @@
 #include "fem/mesh_error.h"
 
 namespace touchstone::fem {
+namespace {
+
+/// Coarse edges over fine ones where the edges are found by a goal.
+constexpr double kCoarsePerFine = 3.0;
+
+SlabMesh with_fine(SlabMesh slab, double edge) {
+  slab.fine = edge;
+  slab.coarse = kCoarsePerFine * edge;
+  return slab;
+}
+
+}  // namespace
 
 std::string compliance_key(const SlabMesh& slab, const ElasticMaterial& material, std::span<const Bead> beads) {
   Sha256 sum;
@@ -25,6 +38,17 @@ std::string compliance_key(const SlabMesh& slab, const ElasticMaterial& material
     add(bead.centre.y());
     add(bead.centre.z());
     add(bead.radius);
+  }
+  return sum.digest();
+}
+
+std::string compliance_key(const SlabMesh& slab, const ErrorGoal& goal, const ElasticMaterial& material,
+                           std::span<const Bead> beads) {
+  const SlabMesh free = with_fine(slab, 1.0);
+  Sha256 sum;
+  sum.add("edges by goal " + compliance_key(free, material, beads));
+  for (const double value : {goal.force_error, goal.contact_radius, goal.sharp_bodies ? 1.0 : 0.0}) {
+    sum.add(&value, sizeof(value));
   }
   return sum.digest();
 }
@@ -64,8 +88,30 @@ Compliance cached_compliance(const SlabMesh& slab, const ElasticMaterial& materi
   check(material);
   return cached_compliance(compliance_key(slab, material, beads), cache_dir, [&] {
     Compliance gel = compute_compliance(mesh_slab(slab), material, beads, slab.thickness, progress);
+    gel.report.fine_edge = slab.fine;
     gel.mesh_error = measure_mesh_error(gel, ladder_of(slab, material, beads), progress);
     return gel;
+  });
+}
+
+Compliance cached_compliance(const SlabMesh& slab, const ErrorGoal& goal, const ElasticMaterial& material,
+                             std::span<const Bead> beads, const std::filesystem::path& cache_dir,
+                             const Progress& progress) {
+  check(goal);
+  check(material);
+  if (goal.contact_radius > std::min(slab.fine_half_x, slab.fine_half_y)) {
+    fail("the contact radius is {} mm; it must be within the finely meshed box's half extents, {} x {} mm",
+         goal.contact_radius, slab.fine_half_x, slab.fine_half_y);
+  }
+  return cached_compliance(compliance_key(slab, goal, material, beads), cache_dir, [&] {
+    GelOfEdge gel;
+    gel.coarsest = std::min({slab.size_x, slab.size_y, slab.thickness}) / 2.0;
+    gel.check = [&](double edge) { check(with_fine(slab, edge)); };
+    gel.make = [&](double edge) {
+      return compute_compliance(mesh_slab(with_fine(slab, edge)), material, beads, slab.thickness, progress);
+    };
+    gel.ladder = [&](double edge) { return ladder_of(with_fine(slab, edge), material, beads); };
+    return gel_within(goal, gel, progress);
   });
 }
 

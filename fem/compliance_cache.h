@@ -8,6 +8,7 @@
 
 #include "core/progress.h"
 #include "fem/compliance.h"
+#include "fem/mesh_goal.h"
 #include "fem/slab.h"
 
 namespace touchstone::fem {
@@ -32,5 +33,15 @@ Compliance cached_compliance(const std::string& key, const std::filesystem::path
 /// compute_compliance() do
 Compliance cached_compliance(const SlabMesh& slab, const ElasticMaterial& material, std::span<const Bead> beads,
                              const std::filesystem::path& cache_dir, const Progress& progress = {});
+
+/// The slab's compliance with edges that meet a goal instead of the slab's own: `fine` is chosen, `coarse` three times
+/// that. Kept under the goal, so that the search isn't repeated. @throws Error as gel_within() does
+Compliance cached_compliance(const SlabMesh& slab, const ErrorGoal& goal, const ElasticMaterial& material,
+                             std::span<const Bead> beads, const std::filesystem::path& cache_dir,
+                             const Progress& progress = {});
+
+/// The key of that.
+std::string compliance_key(const SlabMesh& slab, const ErrorGoal& goal, const ElasticMaterial& material,
+                           std::span<const Bead> beads);
 
 }  // namespace touchstone::fem

@@ -32,6 +32,11 @@ std::shared_ptr<const fem::Compliance> set_up_gel(const DeviceSpec& device, cons
       beads.push_back({centre, device.beads->diameter_mm / 2});
     }
   }
+  if (device.mesh.force_error) {
+    const fem::ErrorGoal goal{*device.mesh.force_error, device.mesh.contact_radius_mm, device.mesh.sharp_bodies};
+    return std::make_shared<const fem::Compliance>(
+        fem::cached_compliance(mesh, goal, {gel.youngs_modulus_MPa, gel.poisson_ratio}, beads, cache_folder, progress));
+  }
   return std::make_shared<const fem::Compliance>(
       fem::cached_compliance(mesh, {gel.youngs_modulus_MPa, gel.poisson_ratio}, beads, cache_folder, progress));
 }
