@@ -78,7 +78,7 @@ class Pool {
 
  private:
   static constexpr std::size_t kSmallest = std::size_t{1} << 14;
-  static constexpr std::size_t kLargestKept = std::size_t{1} << 28;
+  static constexpr std::size_t kLargestKept = std::size_t{1} << 26;
   std::mutex gate_;
   std::array<std::vector<Numbers>, 64> free_;
 };
