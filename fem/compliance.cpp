@@ -2,9 +2,11 @@
 
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 #include "core/error.h"
 #include "fem/elimination_order.h"
+#include "fem/quasi_definite_schur.h"
 #include "fem/surface_coupling.h"
 #include "fem/taylor_hood.h"
 
@@ -68,7 +70,10 @@ Compliance compute_compliance(const TetMesh& mesh, std::span<const ElasticMateri
   tell(1);
 
   FactorReport factor;
-  const Eigen::MatrixXd schur = schur_complement(matrix, 3 * (n + m), elimination_order(space), &factor);
+  const EliminationTree tree = elimination_tree(space);
+  std::optional<Eigen::MatrixXd> found = quasi_definite_schur(matrix, 3 * (n + m), tree, &factor);
+  if (!found) found = schur_complement(matrix, 3 * (n + m), tree.order, &factor);  // slower, but it can pivot
+  const Eigen::MatrixXd& schur = *found;
   tell(2);
 
   Compliance gel;

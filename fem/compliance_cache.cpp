@@ -1,5 +1,6 @@
 #include "fem/compliance_cache.h"
 
+#include <algorithm>
 #include <system_error>
 
 #include "core/error.h"
@@ -8,6 +9,23 @@
 #include "fem/mesh_error.h"
 
 namespace touchstone::fem {
+namespace {
+
+/// Coarse edges over fine ones where the edges are found by a goal.
+constexpr double kCoarsePerFine = 3.0;
+
+GelBody with_fine(const GelBody& body, double edge) {
+  return with_edges(body, edge, kCoarsePerFine * edge);
+}
+
+void check_materials(const GelBody& body, std::span<const ElasticMaterial> materials) {
+  for (const ElasticMaterial& material : materials) check(material);
+  if (static_cast<int>(materials.size()) != material_count(body)) {
+    fail("the gel takes {} materials, but {} are given", material_count(body), materials.size());
+  }
+}
+
+}  // namespace
 
 std::string compliance_key(const GelBody& body, std::span<const ElasticMaterial> materials,
                            std::span<const Bead> beads) {
@@ -34,6 +52,16 @@ std::string compliance_key(const GelBody& body, std::span<const ElasticMaterial>
 
 std::string compliance_key(const SlabMesh& slab, const ElasticMaterial& material, std::span<const Bead> beads) {
   return compliance_key(SlabGel{slab, {}}, std::span(&material, 1), beads);
+}
+
+std::string compliance_key(const GelBody& body, const ErrorGoal& goal, std::span<const ElasticMaterial> materials,
+                           std::span<const Bead> beads) {
+  Sha256 sum;
+  sum.add("edges by goal " + compliance_key(with_fine(body, 1.0), materials, beads));
+  for (const double value : {goal.force_error, goal.contact_radius, goal.sharp_bodies ? 1.0 : 0.0}) {
+    sum.add(&value, sizeof(value));
+  }
+  return sum.digest();
 }
 
 std::filesystem::path compliance_file(const std::filesystem::path& cache_dir, const std::string& key) {
@@ -69,12 +97,10 @@ Compliance cached_compliance(const GelBody& body, std::span<const ElasticMateria
                              std::span<const Bead> beads, const std::filesystem::path& cache_dir,
                              const Progress& progress) {
   check(body);
-  for (const ElasticMaterial& material : materials) check(material);
-  if (static_cast<int>(materials.size()) != material_count(body)) {
-    fail("the gel takes {} materials, but {} are given", material_count(body), materials.size());
-  }
+  check_materials(body, materials);
   return cached_compliance(compliance_key(body, materials, beads), cache_dir, [&] {
     Compliance gel = compute_compliance(mesh_gel(body), materials, beads, thickness_of(body), progress);
+    gel.report.fine_edge = fine_edge(body);
     gel.mesh_error = measure_mesh_error(gel, ladder_of(body, materials, beads), progress);
     return gel;
   });
@@ -83,6 +109,27 @@ Compliance cached_compliance(const GelBody& body, std::span<const ElasticMateria
 Compliance cached_compliance(const SlabMesh& slab, const ElasticMaterial& material, std::span<const Bead> beads,
                              const std::filesystem::path& cache_dir, const Progress& progress) {
   return cached_compliance(SlabGel{slab, {}}, std::span(&material, 1), beads, cache_dir, progress);
+}
+
+Compliance cached_compliance(const GelBody& body, const ErrorGoal& goal, std::span<const ElasticMaterial> materials,
+                             std::span<const Bead> beads, const std::filesystem::path& cache_dir,
+                             const Progress& progress) {
+  check(goal);
+  check_materials(body, materials);
+  if (goal.contact_radius > fine_reach(body)) {
+    fail("the contact radius is {} mm; it must be within the finely meshed part, {} mm from its middle",
+         goal.contact_radius, fine_reach(body));
+  }
+  return cached_compliance(compliance_key(body, goal, materials, beads), cache_dir, [&] {
+    GelOfEdge gel;
+    gel.coarsest = least_extent(body) / 2.0;
+    gel.check = [&](double edge) { check(with_fine(body, edge)); };
+    gel.make = [&](double edge) {
+      return compute_compliance(mesh_gel(with_fine(body, edge)), materials, beads, thickness_of(body), progress);
+    };
+    gel.ladder = [&](double edge) { return ladder_of(with_fine(body, edge), materials, beads); };
+    return gel_within(goal, gel, progress);
+  });
 }
 
 }  // namespace touchstone::fem

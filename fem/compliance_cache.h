@@ -9,6 +9,7 @@
 #include "core/progress.h"
 #include "fem/compliance.h"
 #include "fem/gel_body.h"
+#include "fem/mesh_goal.h"
 
 namespace touchstone::fem {
 
@@ -38,5 +39,15 @@ Compliance cached_compliance(const GelBody& body, std::span<const ElasticMateria
 /// The same for a slab of one material.
 Compliance cached_compliance(const SlabMesh& slab, const ElasticMaterial& material, std::span<const Bead> beads,
                              const std::filesystem::path& cache_dir, const Progress& progress = {});
+
+/// The gel's compliance with edges that meet a goal instead of its own: the fine one is chosen, the coarse one three
+/// times that. Kept under the goal, so that the search isn't repeated. @throws Error as gel_within() does
+Compliance cached_compliance(const GelBody& body, const ErrorGoal& goal, std::span<const ElasticMaterial> materials,
+                             std::span<const Bead> beads, const std::filesystem::path& cache_dir,
+                             const Progress& progress = {});
+
+/// The key of that.
+std::string compliance_key(const GelBody& body, const ErrorGoal& goal, std::span<const ElasticMaterial> materials,
+                           std::span<const Bead> beads);
 
 }  // namespace touchstone::fem

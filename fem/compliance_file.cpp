@@ -155,6 +155,7 @@ void write_body(const Compliance& gel, Writer& out) {
   out.value(report.tetrahedra);
   out.value(report.unknowns);
   out.value(report.smallest_dihedral_deg);
+  out.value(report.fine_edge);
   out.value(report.factor_entries);
   out.value(report.operations);
   out.value(report.memory_mb);
@@ -192,6 +193,7 @@ Compliance read_body(Reader& in) {
   gel.report.tetrahedra = in.value<int>();
   gel.report.unknowns = in.value<int>();
   gel.report.smallest_dihedral_deg = in.value<double>();
+  gel.report.fine_edge = in.value<double>();
   gel.report.factor_entries = in.value<double>();
   gel.report.operations = in.value<double>();
   gel.report.memory_mb = in.value<double>();

@@ -129,15 +129,39 @@ double fine_reach(const GelBody& body) {
   return std::min(solid.fine_half_x, solid.fine_half_y);
 }
 
+double least_extent(const GelBody& body) {
+  if (const auto* slab = std::get_if<SlabGel>(&body)) {
+    return std::min({slab->mesh.size_x, slab->mesh.size_y, slab->mesh.thickness});
+  }
+  return thickness_of(body);
+}
+
+namespace {
+
+/// Calls act(fine, coarse) on the body's two edge lengths.
+template <typename Act>
+void on_edges(GelBody& body, const Act& act) {
+  if (auto* slab = std::get_if<SlabGel>(&body)) act(slab->mesh.fine, slab->mesh.coarse);
+  if (auto* dome = std::get_if<DomeGel>(&body)) act(dome->fine, dome->coarse);
+  if (auto* tip = std::get_if<FingertipGel>(&body)) act(tip->fine, tip->coarse);
+  if (auto* solid = std::get_if<SolidGel>(&body)) act(solid->fine, solid->coarse);
+}
+
+}  // namespace
+
 GelBody with_edges(GelBody body, double factor) {
-  const auto scale = [factor](auto& mesh) {
-    mesh.fine *= factor;
-    mesh.coarse *= factor;
-  };
-  if (auto* slab = std::get_if<SlabGel>(&body)) scale(slab->mesh);
-  if (auto* dome = std::get_if<DomeGel>(&body)) scale(*dome);
-  if (auto* tip = std::get_if<FingertipGel>(&body)) scale(*tip);
-  if (auto* solid = std::get_if<SolidGel>(&body)) scale(*solid);
+  on_edges(body, [factor](double& fine, double& coarse) {
+    fine *= factor;
+    coarse *= factor;
+  });
+  return body;
+}
+
+GelBody with_edges(GelBody body, double fine, double coarse) {
+  on_edges(body, [=](double& own_fine, double& own_coarse) {
+    own_fine = fine;
+    own_coarse = coarse;
+  });
   return body;
 }
 

@@ -37,8 +37,12 @@ double thickness_of(const GelBody& body);
 double fine_edge(const GelBody& body);
 double fine_reach(const GelBody& body);
 
-/// The same gel with all edge lengths multiplied.
+/// Shortest side of a slab, else the thickness, mm.
+double least_extent(const GelBody& body);
+
+/// The same gel with all edge lengths multiplied, or with these.
 GelBody with_edges(GelBody body, double factor);
+GelBody with_edges(GelBody body, double fine, double coarse);
 
 /// How many tetrahedra it will take, within a factor of 2.
 double estimated_tetrahedra(const GelBody& body);

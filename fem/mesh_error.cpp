@@ -339,10 +339,7 @@ LadderGel ladder_of(const GelBody& body, std::span<const ElasticMaterial> materi
   LadderGel ladder;
   ladder.edge = fine_edge(body);
   ladder.largest_radius = kFinePart * fine_reach(body);
-  ladder.largest_factor = thickness_of(body) / ladder.edge;
-  if (const auto* slab = std::get_if<SlabGel>(&body)) {
-    ladder.largest_factor = std::min({slab->mesh.size_x, slab->mesh.size_y, slab->mesh.thickness}) / ladder.edge;
-  }
+  ladder.largest_factor = least_extent(body) / ladder.edge;
   ladder.with_edges = [body, own = std::vector<ElasticMaterial>(materials.begin(), materials.end()),
                        all = std::vector<Bead>(beads.begin(), beads.end())](double factor) {
     return compute_compliance(mesh_gel(with_edges(body, factor)), own, all, thickness_of(body));

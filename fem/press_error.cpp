@@ -144,7 +144,9 @@ PressError estimate_error(const Compliance& gel, const PressState& state) {
     traction += std::pow(of(ErrorOf::traction) * patch.force.norm() / patch.area, 2) * patch.area;
     area += patch.area;
   }
-  error.displacement = displacement * state.surface_displacement.rowwise().norm().maxCoeff();
+  if (state.surface_displacement.rows() > 0) {
+    error.displacement = displacement * state.surface_displacement.rowwise().norm().maxCoeff();
+  }
   if (state.bead_displacement.rows() > 0) error.beads = beads * state.bead_displacement.rowwise().norm().maxCoeff();
   error.traction = std::sqrt(traction / area);
   return error;

@@ -11,7 +11,8 @@ namespace touchstone::fem {
 /// (see PressState::largest_strain), and the contact solver's own residuals.
 struct PressError {
   Eigen::Vector3d force = Eigen::Vector3d::Zero();  ///< N, of each component of the force in the gel frame
-  double displacement = 0.0;  ///< mm, of the surface within twice the contact's radius, root mean square
+  double displacement = 0.0;  ///< mm, of the surface within twice the contact's radius, root mean square; 0 where
+                              ///< the press left the surface's displacement out
   double beads = 0.0;         ///< mm, of the bead that is furthest off
   double traction = 0.0;      ///< MPa, over the contact, root mean square
 };

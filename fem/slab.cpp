@@ -160,6 +160,24 @@ double estimated_tetrahedra(const SlabMesh& slab) {
   return kTetrahedraPerCube * sum;
 }
 
+double estimated_surface_vertices(const SlabMesh& slab) {
+  // Vertices per (mm^2 / edge^2): of equilateral triangles, and what TetGen adds to them.
+  constexpr double kVerticesPerSquare = 1.155 * 1.09;
+  const auto area_within = [&](double distance) {
+    return std::min(slab.size_x, 2.0 * (slab.fine_half_x + distance)) *
+           std::min(slab.size_y, 2.0 * (slab.fine_half_y + distance));
+  };
+  const double farthest = std::max(slab.size_x, slab.size_y) / 2.0;
+  double sum = area_within(0.0) / std::pow(slab.fine, 2);
+  constexpr int kShells = 400;
+  for (int k = 0; k < kShells; ++k) {
+    const double inner = farthest * k / kShells;
+    const double outer = farthest * (k + 1) / kShells;
+    sum += (area_within(outer) - area_within(inner)) / std::pow(wanted_edge(slab, 0.5 * (inner + outer)), 2);
+  }
+  return kVerticesPerSquare * sum;
+}
+
 TetMesh mesh_slab(const SlabMesh& slab) {
   check(slab);
   TetMesh mesh = fill_with_tetrahedra(

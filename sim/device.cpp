@@ -130,10 +130,20 @@ void fields(YamlReader& in, GelSpec& gel) {
 }
 
 void fields(YamlReader& in, MeshSpec& mesh) {
-  in.optional("fine_mm", mesh.fine_mm, Allowed::above(0.0));
-  in.optional("coarse_mm", mesh.coarse_mm, Allowed::at_least(mesh.fine_mm));
   in.optional("fine_half_extent_mm", mesh.fine_half_extent_mm, Allowed::above(0.0));
   in.optional("fine_depth_mm", mesh.fine_depth_mm, Allowed::above(0.0));
+  if (!in.has("force_error")) {
+    in.optional("fine_mm", mesh.fine_mm, Allowed::above(0.0));
+    in.optional("coarse_mm", mesh.coarse_mm, Allowed::at_least(mesh.fine_mm));
+    return;
+  }
+  for (const char* edge : {"fine_mm", "coarse_mm"}) {
+    if (in.has(edge)) fail_at(in.where(edge), "{}: can't stand beside force_error, from which it's found", edge);
+  }
+  in.optional("force_error", mesh.force_error, Allowed::within(1e-4, 0.5));
+  in.required("contact_radius_mm", mesh.contact_radius_mm,
+              Allowed::above_up_to(0.0, mesh.fine_half_extent_mm.minCoeff()));
+  in.optional("sharp_bodies", mesh.sharp_bodies);
 }
 
 void fields(YamlReader& in, BeadSpec& beads) {

@@ -58,13 +58,17 @@ struct GelSpec {
   double frame_albedo = 0.0;       ///< of the frame that holds the pad at its sides, all bands; 0 is black
 };
 
-/// How fine the gel is meshed: `fine_mm` where contact and beads are, graded to `coarse_mm` elsewhere. On a dome or a
-/// fingertip the fine part is round: the larger half extent is its radius along the surface.
+/// How fine the gel is meshed: `fine_mm` where contact and beads are, graded to `coarse_mm` elsewhere; or, in their
+/// place, how far the force may be off (see fem::ErrorGoal), from which set-up finds them. On a dome or a fingertip the
+/// fine part is round: the larger half extent is its radius along the surface.
 struct MeshSpec {
   double fine_mm = 0.5;
   double coarse_mm = 1.5;
   Eigen::Vector2d fine_half_extent_mm = {5.0, 5.0};
   double fine_depth_mm = 1.25;
+  std::optional<double> force_error;  ///< relative, one standard error
+  double contact_radius_mm = 0.0;     ///< of contacts of this radius or larger
+  bool sharp_bodies = false;          ///< also of bodies with sharp edges
 };
 
 /// A square grid of balls embedded in the gel.

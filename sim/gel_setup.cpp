@@ -2,6 +2,7 @@
 
 #include <cstdlib>
 #include <mutex>
+#include <optional>
 
 #include "core/error.h"
 #include "core/units.h"
@@ -14,6 +15,11 @@ namespace touchstone::sim {
 namespace {
 
 constexpr int kModes = 80;  // of the vhs gel: to 1.5 kHz, three times the lowest
+
+std::optional<fem::ErrorGoal> goal_of(const MeshSpec& mesh) {
+  if (!mesh.force_error) return std::nullopt;
+  return fem::ErrorGoal{*mesh.force_error, mesh.contact_radius_mm, mesh.sharp_bodies};
+}
 
 }  // namespace
 
@@ -67,16 +73,32 @@ std::vector<fem::Bead> gel_beads(const DeviceSpec& device) {
   return beads;
 }
 
+std::string gel_key(const DeviceSpec& device) {
+  const fem::GelBody body = gel_body(device);
+  const std::vector<fem::ElasticMaterial> materials = gel_materials(device.gel);
+  const std::vector<fem::Bead> beads = gel_beads(device);
+  const std::optional<fem::ErrorGoal> goal = goal_of(device.mesh);
+  return goal ? fem::compliance_key(body, *goal, materials, beads) : fem::compliance_key(body, materials, beads);
+}
+
 std::shared_ptr<const fem::Compliance> set_up_gel(const DeviceSpec& device, const std::filesystem::path& cache_folder,
                                                   const Progress& progress) {
+  const fem::GelBody body = gel_body(device);
+  const std::vector<fem::ElasticMaterial> materials = gel_materials(device.gel);
+  const std::vector<fem::Bead> beads = gel_beads(device);
+  const std::optional<fem::ErrorGoal> goal = goal_of(device.mesh);
   return std::make_shared<const fem::Compliance>(
-      fem::cached_compliance(gel_body(device), gel_materials(device.gel), gel_beads(device), cache_folder, progress));
+      goal ? fem::cached_compliance(body, *goal, materials, beads, cache_folder, progress)
+           : fem::cached_compliance(body, materials, beads, cache_folder, progress));
 }
 
 std::shared_ptr<const fem::GelVibration> set_up_vibration(const SceneSpec& scene, const Plan& plan,
                                                           const std::filesystem::path& cache_folder) {
   if (!plan.inertia || scene.motion.highest_vibration_Hz() == 0.0) return nullptr;
   const DeviceSpec& device = scene.device;
+  if (device.mesh.force_error) {
+    fail_at(scene.where, "inertia needs a mesh that is given by fine_mm; effects.inertia: off leaves it out");
+  }
   if (!device.gel.layers.empty()) {
     fail_at(scene.where, "the inertia of a gel with layers isn't simulated; effects.inertia: off leaves it out");
   }

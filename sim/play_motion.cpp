@@ -59,7 +59,8 @@ std::vector<Truth> play_motion(const SceneSpec& scene, const Plan& plan, const f
   truths.reserve(motion.frame_count());
   const auto keep = [&](fem::PressState state) {
     const int frame = static_cast<int>(truths.size());
-    truths.push_back({frame, frame_time(frame, motion.frame_rate_Hz), std::move(state)});
+    truths.push_back({frame, frame_time(frame, motion.frame_rate_Hz), std::move(state), {}});
+    truths.back().error = fem::estimate_error(gel, truths.back().press);
     if (progress) progress("mechanics", frame + 1, motion.frame_count());
   };
   const auto at_frame = [&](const SourceLocation& where, const auto& act) {

@@ -9,7 +9,7 @@
 #include "core/progress.h"
 #include "fem/compliance.h"
 #include "fem/press.h"
-#include "fem/slab.h"
+#include "fem/press_error.h"
 #include "fem/vibration.h"
 #include "sim/plan.h"
 #include "sim/scene.h"
@@ -21,6 +21,7 @@ struct Truth {
   int frame = 0;
   std::int64_t t_us = 0;
   fem::PressState press;
+  fem::PressError error;  ///< what the mesh makes of it
 };
 
 /// What a camera makes of one Truth. Pictures that weren't asked for are empty.

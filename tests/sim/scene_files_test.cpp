@@ -215,6 +215,20 @@ TEST(SceneFiles, AGelTakesOnlyItsOwnFieldsAndShapesThatCanBe) {
               HasSubstr("must not be longer than its cylinder"));
 }
 
+TEST(SceneFiles, AForceErrorMayStandInPlaceOfAMesh) {
+  const auto with_mesh = [](const std::string& mesh) { return kDevice + ("mesh: " + mesh + "\n"); };
+  const auto device = parse_yaml<DeviceSpec>(with_mesh("{force_error: 0.01, contact_radius_mm: 1}"), "device.yaml");
+  EXPECT_EQ(device.mesh.force_error, 0.01);
+  EXPECT_EQ(device.mesh.contact_radius_mm, 1.0);
+  EXPECT_FALSE(device.mesh.sharp_bodies);
+  EXPECT_THAT(error_of_device(with_mesh("{force_error: 0.01, contact_radius_mm: 1, fine_mm: 0.5}")),
+              HasSubstr("fine_mm: can't stand beside force_error"));
+  EXPECT_THAT(error_of_device(with_mesh("{force_error: 0.01}")), HasSubstr("contact_radius_mm"));
+  EXPECT_THAT(error_of_device(with_mesh("{force_error: 0, contact_radius_mm: 1}")), HasSubstr("force_error"));
+  EXPECT_THAT(error_of_device(with_mesh("{force_error: 0.01, contact_radius_mm: 7}")), HasSubstr("contact_radius_mm"));
+  EXPECT_THAT(error_of_device(with_mesh("{fine_mm: 0.5, contact_radius_mm: 1}")), HasSubstr("contact_radius_mm"));
+}
+
 TEST(SceneFiles, BeadsMustLieInTheGel) {
   const std::string beads = "beads: {grid: 3, spacing_mm: 2, diameter_mm: 0.5, depth_mm: 0.2}\n";
   EXPECT_THAT(error_of_device(kDevice + beads), HasSubstr("beads.depth_mm: 0.2 puts beads"));
