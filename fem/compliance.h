@@ -26,7 +26,7 @@ struct Bead {
 struct ComplianceReport {
   int tetrahedra = 0;
   int unknowns = 0;                    ///< displacements and pressures
-  double smallest_dihedral_deg = 0.0;  ///< under some 5 degrees, expect loss of accuracy
+  double smallest_dihedral_deg = 0.0;  ///< under some 5 degrees, expect loss of accuracy, but in flat prisms of layers
   double fine_edge = 0.0;              ///< mm, where contact is made; 0 if who asked for the mesh didn't say
   double factor_entries = 0.0;
   double operations = 0.0;  ///< floating-point operations of the elimination
