@@ -1,0 +1,207 @@
+// Contact with a half space: a gel so thick and wide that its plate and sides don't matter to half a percent.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <utility>
+
+#include "core/error.h"
+#include "core/units.h"
+#include "fem/press.h"
+#include "lab/contact_closed_forms.h"
+#include "lab/mechanics_press.h"
+#include "lab/mechanics_rows.h"
+
+namespace touchstone::lab {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double kCoarse = 0.2;  // edges under the contact, mm
+constexpr double kFine = 0.1;
+
+/// Worst error of the force over Poisson's ratios and depths, on the finest mesh; all meshes in the series.
+MechanicsFinding hertz(const MechanicsGels& gels, const std::vector<double>& edges) {
+  MechanicsFinding finding;
+  finding.series = ValidationSeries{"edge of the mesh, mm", "worst relative error of the force", {}};
+  for (const double edge : edges) {
+    double worst = 0.0;
+    for (double nu : {0.3, 0.4999}) {
+      const fem::Compliance gel = gels.thick(nu, edge);
+      for (double depth : {0.05, 0.1, 0.15}) {
+        worst = std::max(worst, relative_error(normal_force(gel, fem::SphereShape{8.0}, 8.0 - depth),
+                                               hertz_force(kValidationModulus, nu, 8.0, depth)));
+      }
+    }
+    finding.series->points.emplace_back(edge, worst);
+    finding.ours = worst;
+  }
+  return finding;
+}
+
+/// Force of a sharp flat punch of 1 mm radius, 0.02 mm deep: the mean over positions on a mesh of these edges. A sharp
+/// edge's pressure is infinite, and where the edge cuts the mesh moves the force by some percent.
+double mean_flat_force(const fem::Compliance& gel, double edge) {
+  constexpr int kPlaces = 4;
+  double sum = 0.0;
+  for (int i = 0; i < kPlaces; ++i) {
+    for (int j = 0; j < kPlaces; ++j) {
+      const double x = edge * (i + 0.5) / kPlaces;
+      const double y = std::sqrt(0.75) * edge * (j + 0.5) / kPlaces;
+      fem::Press press(gel, fem::RoundedCylinder{1.0, 0.0, 3.0}, 0.0);
+      sum += press.step(press_target(x, y, -0.02)).wrench[2];
+    }
+  }
+  return sum / (kPlaces * kPlaces);
+}
+
+/// On one mesh its own error; on two, the first having edges twice as long, that of the force extrapolated to no edge
+/// length, the error being of first order there.
+MechanicsFinding flat_punch(const MechanicsGels& gels, const std::vector<double>& edges) {
+  MechanicsFinding finding;
+  finding.series = ValidationSeries{"edge of the mesh, mm", "relative error of the mean force, worse nu", {}};
+  for (const double edge : edges) finding.series->points.emplace_back(edge, 0.0);
+  for (double nu : {0.3, 0.4999}) {
+    const double reference = flat_punch_force(kValidationModulus, nu, 1.0, 0.02);
+    std::vector<double> forces;
+    for (std::size_t k = 0; k < edges.size(); ++k) {
+      forces.push_back(mean_flat_force(gels.thick(nu, edges[k]), edges[k]));
+      double& worst = finding.series->points[k].second;
+      worst = std::max(worst, relative_error(forces.back(), reference));
+    }
+    const double force = forces.size() == 1 ? forces[0] : 2.0 * forces[1] - forces[0];
+    finding.ours = std::max(finding.ours, relative_error(force, reference));
+  }
+  return finding;
+}
+
+/// A sphere held by friction and sheared: normal and tangential loads don't couple at nu = 0.5, as the theory assumes.
+struct ShearedSphere {
+  static constexpr double kNu = 0.4999;
+  static constexpr double kFriction = 0.3;
+  static constexpr double kForce = 0.25;
+
+  explicit ShearedSphere(const fem::Compliance& compliance)
+      : gel(compliance), press(gel, fem::SphereShape{8.0}, kFriction), target(press_target(0.0, 0.0, 0.0)) {
+    target.axis[2] = fem::AxisControl::with_force(kForce);
+    contact_radius = hertz_contact_radius(8.0, 8.0 - press.step(target).gel_from_object.translation.z());
+  }
+
+  /// Shear to this share of sliding.
+  const fem::PressState& shear(double share) {
+    target.axis[0] = fem::AxisControl::with_force(-share * kFriction * kForce);
+    return press.step(target);
+  }
+
+  const fem::Compliance& gel;
+  fem::Press press;
+  fem::PressTarget target;
+  double contact_radius = 0.0;
+};
+
+MechanicsFinding mindlin(const MechanicsGels& gels, double edge, const std::vector<double>& shares) {
+  const fem::Compliance gel = gels.thick(ShearedSphere::kNu, edge);
+  ShearedSphere sphere(gel);
+  double worst = 0.0;
+  for (const double share : shares) {
+    const double found = sphere.shear(share).gel_from_object.translation.x();
+    const double wanted = mindlin_displacement(kValidationModulus, ShearedSphere::kNu, sphere.contact_radius,
+                                               share * ShearedSphere::kFriction * ShearedSphere::kForce,
+                                               ShearedSphere::kFriction, ShearedSphere::kForce);
+    worst = std::max(worst, relative_error(found, wanted));
+  }
+  return {worst, {}};
+}
+
+/// The radius of the circle whose area is that of the sticking vertices, over that of the touching ones.
+MechanicsFinding stick_radius(const MechanicsGels& gels, double edge) {
+  const fem::Compliance gel = gels.thick(ShearedSphere::kNu, edge);
+  const Eigen::VectorXd weight = gel.mass * Eigen::VectorXd::Ones(gel.mass.rows());
+  ShearedSphere sphere(gel);
+  double worst = 0.0;
+  for (double share : {0.3, 0.6, 0.9}) {
+    const fem::PressState& state = sphere.shear(share);
+    double sticking = 0.0;
+    for (Eigen::Index i = 0; i < weight.size(); ++i) {
+      if (state.node_state[i] == fem::NodeState::stick) sticking += weight[i];
+    }
+    const double wanted = mindlin_stick_ratio(share, 1.0, 1.0) * sphere.contact_radius;
+    worst = std::max(worst, std::abs(std::sqrt(sticking / kPi) - wanted) / sphere.contact_radius);
+  }
+  return {worst, {}};
+}
+
+/// Surface displacements 0.7 to 1.2 mm from a force on one vertex; differences to those at the outer radius, so that
+/// what the plate holds back below 60 mm falls out. Root mean square error over that of the closed form.
+double point_force(const MechanicsGels& gels, int axis, const std::function<Vector3d(double, double)>& closed_form) {
+  const fem::Compliance gel = gels.thick(0.3);
+  const Eigen::VectorXd weight = gel.mass * Eigen::VectorXd::Ones(gel.mass.rows());
+  const auto n = static_cast<Eigen::Index>(gel.vertices.size());
+  Eigen::Index source = 0;
+  for (Eigen::Index i = 0; i < n; ++i) {
+    if (gel.vertices[i].norm() < gel.vertices[source].norm()) source = i;
+  }
+  Eigen::VectorXd traction = Eigen::VectorXd::Zero(3 * n);
+  traction[3 * source + axis] = (axis == 2 ? -1.0 : 1.0) / weight[source];
+  const Eigen::VectorXd response = gel.surface * traction;
+  Eigen::MatrixX3d difference(n, 3);
+  Eigen::MatrixX3d expected(n, 3);
+  int rows = 0;
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const Vector3d from = gel.vertices[i] - gel.vertices[source];
+    if (from.norm() < 0.7 || from.norm() > 1.2) continue;
+    const Vector3d found = response.segment<3>(3 * i) / weight[i];
+    expected.row(rows) = closed_form(from.x(), from.y()).transpose();
+    difference.row(rows) = found.transpose() - expected.row(rows);
+    ++rows;
+  }
+  const Eigen::RowVector3d held_back = difference.topRows(rows).colwise().mean();
+  const auto error = difference.topRows(rows).rowwise() - held_back;
+  return error.norm() / expected.topRows(rows).norm();
+}
+
+MechanicsFinding boussinesq(const MechanicsGels& gels) {
+  const double error = point_force(
+      gels, 2, [](double x, double y) { return boussinesq_displacement(kValidationModulus, 0.3, 1.0, x, y); });
+  return {error, {}};
+}
+
+MechanicsFinding cerruti(const MechanicsGels& gels) {
+  const double error =
+      point_force(gels, 0, [](double x, double y) { return cerruti_displacement(kValidationModulus, 0.3, 1.0, x, y); });
+  return {error, {}};
+}
+
+}  // namespace
+
+std::vector<MechanicsCase> half_space_cases(bool quick) {
+  const std::vector<double> edges = quick ? std::vector<double>{kCoarse} : std::vector<double>{kCoarse, kFine};
+  const double edge = edges.back();
+  const std::string mesh = fmt::format("edges of {} mm", edge);
+  return {
+      {"mechanics.hertz",
+       fmt::format("a sphere on a thick gel, nu 0.3 and 0.4999, 3 to {:.0f} edges a contact radius", 1.1 / edge), 0.0,
+       Better::lower, 0.01, [edges](const MechanicsGels& gels) { return hertz(gels, edges); }},
+      {"mechanics.flat_punch",
+       quick ? "a sharp flat punch on a thick gel, mean over 16 places, 5 edges a radius"
+             : "a sharp flat punch on a thick gel, mean over 16 places, extrapolated from 5 and 10 edges a radius",
+       0.0, Better::lower, quick ? 0.035 : 0.01,
+       [edges](const MechanicsGels& gels) { return flat_punch(gels, edges); }},
+      {"mechanics.cattaneo_mindlin", "a sheared sphere's displacement to 90 % of sliding, " + mesh, 0.0, Better::lower,
+       0.01,
+       [edge](const MechanicsGels& gels) {
+         return mindlin(gels, edge, {0.3, 0.6, 0.9});
+       }},
+      {"mechanics.tangential_stiffness", "a held sphere's tangential stiffness at 2 % of sliding, " + mesh, 0.0,
+       Better::lower, 0.01, [edge](const MechanicsGels& gels) { return mindlin(gels, edge, {0.02}); }},
+      {"mechanics.stick_radius",
+       "radius of the sticking vertices at 30, 60 and 90 % of sliding, error over contact radius, " + mesh, 0.0,
+       Better::lower, 0.5 * edge / 1.04, [edge](const MechanicsGels& gels) { return stick_radius(gels, edge); }},
+      // A force on one vertex is a cone of 0.4 mm, its response a mean over such a cone: (0.2/0.7)^2 / 4 of 1/r.
+      {"mechanics.boussinesq", "a normal point force's surface displacement", 0.0, Better::lower, 0.03, boussinesq},
+      {"mechanics.cerruti", "a tangential point force's surface displacement", 0.0, Better::lower, 0.03, cerruti},
+  };
+}
+
+}  // namespace touchstone::lab
