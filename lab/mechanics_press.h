@@ -2,6 +2,7 @@
 // The presses of the validation's rows, in the fewest words.
 
 #include <cmath>
+#include <vector>
 
 #include "fem/press.h"
 
@@ -22,5 +23,13 @@ inline double relative_error(double value, double expected) {
 inline double normal_force(const fem::Compliance& gel, const fem::ContactShape& shape, double z) {
   return fem::Press(gel, shape, 0.0).step(press_target(0.013, 0.021, z)).wrench[2];
 }
+
+/// Force of a sharp flat punch of this radius, pressed to `depth`: the mean over 16 places on a mesh of these edges. A
+/// sharp edge's pressure is infinite, and where the edge cuts the mesh moves the force by some percent.
+double mean_flat_punch(const fem::Compliance& gel, double radius, double depth, double edge);
+
+/// The mean force of a flat punch where edges have no length: from two meshes, the first with edges twice as long as
+/// the second, the error being of first order there. One mesh: its own force.
+double extrapolated(const std::vector<double>& forces);
 
 }  // namespace touchstone::lab

@@ -23,13 +23,13 @@ class MechanicsGels {
   fem::Compliance thick(double poisson_ratio, double fine = 0.2) const {
     return slab({600.0, 600.0, 300.0, fine, 100.0, 1.3, 1.3, 0.25}, poisson_ratio);
   }
-  /// 5 mm thick, half-width 4 thicknesses, edges of 0.4 mm where it's touched.
-  fem::Compliance layer(double poisson_ratio) const {
-    return slab({40.0, 40.0, 5.0, 0.4, 2.5, 2.4, 2.4, 0.6}, poisson_ratio);
+  /// 5 mm thick, half-width 4 thicknesses, edges of `fine` where it's touched.
+  fem::Compliance layer(double poisson_ratio, double fine = 0.4) const {
+    return slab({40.0, 40.0, 5.0, fine, 2.5, 2.4, 2.4, 0.6}, poisson_ratio);
   }
-  /// 2 mm thick, half-width 6 thicknesses, evenly meshed: for loads all over its face.
-  fem::Compliance even(double poisson_ratio) const {
-    return slab({24.0, 24.0, 2.0, 0.9, 0.9, 12.0, 12.0, 1.0}, poisson_ratio);
+  /// 2 mm thick, `width` wide, evenly meshed: for loads all over its face.
+  fem::Compliance even(double poisson_ratio, double width = 24.0) const {
+    return slab({width, width, 2.0, 0.9, 0.9, 0.5 * width, 0.5 * width, 1.0}, poisson_ratio);
   }
   fem::Compliance slab(const fem::SlabMesh& mesh, double poisson_ratio) const {
     return fem::cached_compliance(mesh, {kValidationModulus, poisson_ratio}, {}, cache_);
