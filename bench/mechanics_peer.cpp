@@ -2,7 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <cmath>
+#include <limits>
+#include <map>
+#include <optional>
 
 #include "bench/getfem_peer.h"
 #include "bench/mechanics_sections.h"
@@ -57,6 +61,22 @@ std::string percent(double value, double wanted) {
   return std::isfinite(wanted) ? fmt::format("{:+.2f}", 100.0 * (value / wanted - 1.0)) : std::string("-");
 }
 
+/// The answers of both programs to one problem on the mesh before.
+struct Before {
+  double theirs = 0.0;
+  double ours = 0.0;
+};
+
+/// The error bars, by what each program's answer changed since the mesh before, in percent of it; and whether the two
+/// answers lie within both.
+std::array<std::string, 3> error_bars(double theirs, double ours, const std::optional<Before>& before) {
+  if (!before) return {"-", "-", "-"};
+  const double peer_bar = std::abs(theirs - before->theirs);
+  const double our_bar = std::abs(ours - before->ours);
+  return {fmt::format("{:.2f}", 100.0 * peer_bar / theirs), fmt::format("{:.2f}", 100.0 * our_bar / ours),
+          std::abs(theirs - ours) <= peer_bar + our_bar ? "yes" : "NO"};
+}
+
 }  // namespace
 
 ResultTable peer_table(const std::vector<LadderStep>& ladder, const BenchOptions& options) {
@@ -69,6 +89,9 @@ ResultTable peer_table(const std::vector<LadderStep>& ladder, const BenchOptions
                    "peer",
                    "ours",
                    "they differ by",
+                   "peer's bar, %",
+                   "our bar, %",
+                   "within bars",
                    "peer's error, %",
                    "our error, %",
                    "peer's solve, s",
@@ -94,6 +117,7 @@ ResultTable peer_table(const std::vector<LadderStep>& ladder, const BenchOptions
                                         {"P1 (GetFEM)", {}, false},
                                         {"ours, set-up", {}, false},
                                         {"ours, a press", {}, false}};
+  std::map<std::string, std::optional<Before>> before;
   double least_ratio = std::numeric_limits<double>::infinity();
   double worst_sphere = 0.0;
   for (const LadderStep& step : ladder) {
@@ -108,11 +132,14 @@ ResultTable peer_table(const std::vector<LadderStep>& ladder, const BenchOptions
       const OurAnswer our = ours(step, problem);
       const double theirs = problem.load == "pressure" ? peer.work : peer.force;
       const double wanted = reference(problem);
+      std::optional<Before>& last = before[problem.load + problem.element];
+      const std::array<std::string, 3> bars = error_bars(theirs, our.value, last);
+      last = Before{theirs, our.value};
       const double ratio = peer.total_seconds / our.seconds;
       table.rows.push_back({fmt::format("{}", step.edge), problem.load, problem.element,
                             fmt::format("{:.8g}{}", theirs, peer.converged ? "" : " (not converged)"),
                             fmt::format("{:.8g}", our.value), fmt::format("{:.1e}", std::abs(theirs / our.value - 1.0)),
-                            percent(theirs, wanted), percent(our.value, wanted),
+                            bars[0], bars[1], bars[2], percent(theirs, wanted), percent(our.value, wanted),
                             fmt::format("{:.2f}", peer.total_seconds), fmt::format("{:.2f}", peer.newton_seconds),
                             fmt::format("{:.2f}", peer.factorise_seconds), fmt::format("{:.2f}", step.setup_seconds),
                             fmt::format("{:.3f}", 1e3 * our.seconds), fmt::format("{:.0f}", ratio)});
@@ -132,6 +159,9 @@ ResultTable peer_table(const std::vector<LadderStep>& ladder, const BenchOptions
       fmt::format("A press of a sphere after set-up is at least {:.0f} times faster than the peer's solve on the same "
                   "mesh, at the same error: the two forces differ by at most {:.0e}.",
                   least_ratio, worst_sphere),
+      "A bar is what a program's answer has changed since the mesh before; an error is against the integral equation "
+      "of "
+      "an endless layer.",
       "GetFEM 5.4 with its basic contact brick (symmetric augmented Lagrangian, semismooth Newton) and MUMPS, one BLAS "
       "thread; its solve is mesh and spaces, gaps, assembly and Newton, without reading the file and starting Python. "
       "Its multipliers are P1 with weighted gaps as ours are, so on one mesh both have the same error; under a sharp "
