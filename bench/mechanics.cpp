@@ -53,10 +53,12 @@ void measure(const std::filesystem::path& folder, bool quick, bool peer, const s
     fmt::print("{}", text);
     std::fflush(stdout);
   };
-  const std::vector<bench::LadderStep> ladder = bench::make_ladder(options);
-  take(mesh_table(ladder));
-  take(tolerance_table(ladder[quick ? 0 : 3]));
-  if (peer) take(peer_table(ladder, options));
+  {
+    const std::vector<bench::LadderStep> ladder = bench::make_ladder(options);
+    take(mesh_table(ladder));
+    take(tolerance_table(ladder[quick ? 0 : 3]));
+    if (peer) take(peer_table(ladder, options));
+  }  // its memory is given back before that of other gels is measured
   // Whatever else scales with the surface gets its table here.
   const std::vector<std::function<ResultTable(const bench::BenchOptions&)>> scaling = {bench::throughput_table,
                                                                                        bench::growth_table};

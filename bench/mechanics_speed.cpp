@@ -128,7 +128,7 @@ ResultTable growth_table(const BenchOptions& options) {
     const double edge = std::sqrt(3.0 * 400.0 / (unknowns * std::sqrt(0.75)));
     const fem::SlabMesh slab{20.0, 20.0, 5.0, edge, std::max(edge, 2.5), 10.0, 10.0, 0.0};
     const double foreseen = last_seconds * std::pow(unknowns / last_unknowns, 2.0);
-    if (foreseen > 240.0) {
+    if (foreseen > 120.0) {
       stop = fmt::format("{:.0f} surface unknowns would take some {:.0f} s of set-up: left out.", unknowns, foreseen);
       break;
     }
