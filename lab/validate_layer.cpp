@@ -257,10 +257,10 @@ std::vector<MechanicsCase> layer_cases(bool quick) {
   // Below 0.4 mm what is left, some 0.05 %, is the mesh further out, which isn't made finer with the rest.
   const std::vector<double> edges =
       quick ? std::vector<double>{1.2, 0.8, 0.5} : std::vector<double>{1.2, 1.0, 0.8, 0.6, 0.5, 0.4};
-  const std::vector<double> flat_edges = quick ? std::vector<double>{0.4} : std::vector<double>{0.4, 0.2};
-  const std::string flat_mesh = quick ? "mean over 16 places, 5 edges a radius"
-                                      : "mean over 16 places, extrapolated from 5 and 10 edges a radius";
-  const double flat_bound = quick ? 0.035 : 0.01;
+  const std::vector<double> flat_edges = quick ? std::vector<double>{0.8, 0.4} : std::vector<double>{0.4, 0.2};
+  const std::string flat_mesh = fmt::format("mean over 16 places, extrapolated from {} and {} edges a radius",
+                                            kPunch / flat_edges[0], kPunch / flat_edges[1]);
+  const double flat_bound = quick ? 0.02 : 0.01;
   const std::vector<double> nearly = quick ? std::vector<double>{0.5} : std::vector<double>{0.4999, 0.5};
   const double wavy_width = quick ? 24.0 : 36.0;
   const double thin_edge = quick ? 0.8 : 0.6;
