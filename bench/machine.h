@@ -21,7 +21,8 @@ std::string describe(const Machine& machine);
 
 /// Largest memory that the process has held since start or the last call of forget_peak_memory, MB (10^6 bytes).
 double peak_memory_mb();
-/// Sets the peak back to what is held now; where the system doesn't allow that, the peak stays that of the process.
+/// Gives back what is free and sets the peak to what is held now; where the system doesn't allow that, the peak stays
+/// that of the process.
 void forget_peak_memory();
 
 }  // namespace touchstone::bench

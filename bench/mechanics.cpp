@@ -41,6 +41,9 @@ void measure(const std::filesystem::path& folder, bool quick, bool peer, const s
   std::vector<std::string> where = {"Touchstone " + lab::program_version() + (quick ? ", quick form" : ""),
                                     describe(machine)};
   if (!date.empty()) where.push_back(date);
+  if (machine.load_before > 0.25 * machine.cpus) {
+    where.push_back("Others were at work on this machine: ratios hold better than seconds");
+  }
   for (const std::string& line : where) fmt::print("{}\n", line);
   const ScratchFolder scratch;
   const bench::BenchOptions options{quick, scratch.path()};

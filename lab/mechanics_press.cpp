@@ -1,8 +1,14 @@
 #include "lab/mechanics_press.h"
 
+#include <utility>
+
 #include "core/error.h"
 
 namespace touchstone::lab {
+
+double normal_force(const fem::Compliance& gel, fem::ContactShape shape, double z) {
+  return fem::Press(gel, std::move(shape), 0.0).step(press_target(0.013, 0.021, z)).wrench[2];
+}
 
 double mean_flat_punch(const fem::Compliance& gel, double radius, double depth, double edge) {
   constexpr int kPlaces = 4;
