@@ -276,10 +276,12 @@ std::vector<MechanicsCase> layer_cases(bool quick) {
        [](const MechanicsGels& gels) {
          return sphere_errors(gels, {0.3, 0.49}, {0.3, 0.5});
        }},
+      // Where contact ends the displacement is in H^(5/2) only: order 3/2 in the energy's norm (Hild and Renard, SIAM
+      // J. Numer. Anal. 50, 2012), twice that in the energy, whose derivative the force is.
       {"mechanics.order_force",
        fmt::format("order of the force's error in the edge length, {} to {} mm, a sphere on a bonded layer",
                    edges.front(), edges.back()),
-       2.0, Better::higher, 1.5, [edges](const MechanicsGels& gels) { return order_of_force(gels, edges); }},
+       3.0, Better::higher, 2.0, [edges](const MechanicsGels& gels) { return order_of_force(gels, edges); }},
       {"mechanics.layer_flat",
        "a flat punch on a bonded layer, nu 0.3 and 0.49, against integral equations, " + flat_mesh, 0.0, Better::lower,
        flat_bound,
