@@ -276,8 +276,9 @@ std::vector<MechanicsCase> layer_cases(bool quick) {
        [](const MechanicsGels& gels) {
          return sphere_errors(gels, {0.3, 0.49}, {0.3, 0.5});
        }},
-      // Where contact ends the displacement is in H^(5/2) only: order 3/2 in the energy's norm (Hild and Renard, SIAM
-      // J. Numer. Anal. 50, 2012), twice that in the energy, whose derivative the force is.
+      // Where contact ends the displacement is smooth up to H^(5/2) only, so that quadratic elements reach order 3/2 in
+      // the energy's norm (Belhachmi and Ben Belgacem, Math. Comp. 72, 2003); twice that in the energy, whose
+      // derivative the force is.
       {"mechanics.order_force",
        fmt::format("order of the force's error in the edge length, {} to {} mm, a sphere on a bonded layer",
                    edges.front(), edges.back()),
