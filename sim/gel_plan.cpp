@@ -55,7 +55,7 @@ std::string describe(const GelPlan& plan) {
   }
   if (!plan.sized) {
     return fmt::format(
-        "gel: will be set up once and kept in {} (at most {:.0f} MB)\n", file,
+        "gel: will be set up once, with a mesh whose size isn't known before, and kept in {} (at most {:.0f} MB)\n", file,
         72e-6 * fem::kMostSurfaceVertices * fem::kMostSurfaceVertices);
   }
   return fmt::format(

@@ -60,7 +60,7 @@ TEST(GelPlan, AMeshFoundByItsErrorIsSizedAtSetUp) {
   const DeviceSpec goal = device("{force_error: 0.1, contact_radius_mm: 1.5, fine_half_extent_mm: [2, 2]}");
   const GelPlan before = plan_gel(goal, cache.path());
   EXPECT_FALSE(before.sized);
-  EXPECT_THAT(describe(before), HasSubstr("that meets its force_error"));
+  EXPECT_THAT(describe(before), HasSubstr("isn't known before"));
   const auto gel = set_up_gel(goal, cache.path());
   EXPECT_GT(gel->report.fine_edge, 0.0);
   const GelPlan after = plan_gel(goal, cache.path());
