@@ -85,7 +85,7 @@ TEST(MeshGoal, BadGoalsAreRefused) {
   EXPECT_THAT(refusal({0.0, 1.0, false}), HasSubstr("the wanted force error is 0"));
   EXPECT_THAT(refusal({std::numeric_limits<double>::quiet_NaN(), 1.0, false}), HasSubstr("the wanted force error is"));
   EXPECT_THAT(refusal({0.01, -1.0, false}), HasSubstr("the contact radius is -1 mm"));
-  EXPECT_THAT(refusal({0.01, 2.5, false}), HasSubstr("within the finely meshed box"));
+  EXPECT_THAT(refusal({0.01, 2.5, false}), HasSubstr("within the finely meshed part"));
 }
 
 TEST(MeshGoal, EachGoalHasItsOwnKey) {
