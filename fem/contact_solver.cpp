@@ -19,6 +19,7 @@ constexpr int kFirstSweeps = 10;
 constexpr double kFarFromSets = 1e-2;  // residual above which sweeps go first
 
 Eigen::VectorXd times_sparse(const Eigen::MatrixXd& a, const Eigen::VectorXd& z) {
+  if (2 * (z.array() != 0.0).count() > z.size()) return a * z;
   Eigen::VectorXd result = Eigen::VectorXd::Zero(a.rows());
   for (Eigen::Index j = 0; j < z.size(); ++j) {
     if (z[j] != 0.0) result += z[j] * a.col(j);
@@ -390,7 +391,8 @@ class FrictionalNewton {
       memory_.slip[i] = {v / length, std::min(1.0, problem_.friction[i] * std::max(0.0, answer.z[3 * i]) / length)};
     }
     const Eigen::Index size = reduced_size();
-    Eigen::MatrixXd jacobian(size, size);
+    Eigen::MatrixXd& jacobian = memory_.jacobian;
+    jacobian.resize(size, size);
     Eigen::VectorXd response(a_.rows());
     Eigen::Index column = 0;
     // Derivative of t - mu p v/|v| with v = t - d/scale, times scale, across the slip; the rows along it are
@@ -442,7 +444,7 @@ class FrictionalNewton {
       if (problem_.hold.size() == k_) jacobian(row + b, column) = -problem_.hold[b];
     }
     ++answer.factorisations;
-    if (!memory_.lu.compute(std::move(jacobian))) {
+    if (!memory_.lu.compute(jacobian)) {
       memory_.forget();
       return false;
     }

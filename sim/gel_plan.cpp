@@ -35,8 +35,7 @@ GelPlan plan_gel(const DeviceSpec& device, const std::filesystem::path& cache_fo
   plan.sized = plan.ready || (slab != nullptr && !device.mesh.force_error);
   plan.press_mb = fem::press_bytes(edge, fem::fine_reach(body)) / 1e6;
   if (plan.ready || !plan.sized) return plan;
-  const fem::SetupEstimate estimate =
-      fem::estimate_setup(slab->mesh, static_cast<int>(gel_beads(device).size()));
+  const fem::SetupEstimate estimate = fem::estimate_setup(slab->mesh, static_cast<int>(gel_beads(device).size()));
   plan.surface_vertices = estimate.surface_vertices;
   plan.file_mb = estimate.file_bytes / 1e6;
   plan.setup_mb = estimate.setup_bytes / 1e6;
@@ -55,8 +54,8 @@ std::string describe(const GelPlan& plan) {
   }
   if (!plan.sized) {
     return fmt::format(
-        "gel: will be set up once, with a mesh whose size isn't known before, and kept in {} (at most {:.0f} MB)\n", file,
-        72e-6 * fem::kMostSurfaceVertices * fem::kMostSurfaceVertices);
+        "gel: will be set up once, with a mesh whose size isn't known before, and kept in {} (at most {:.0f} MB)\n",
+        file, 72e-6 * fem::kMostSurfaceVertices * fem::kMostSurfaceVertices);
   }
   return fmt::format(
       "gel: will be set up once, about {:.0f} surface vertices, with some {:.0f} MB of memory, and kept in {} (about "
