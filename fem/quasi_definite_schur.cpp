@@ -104,7 +104,7 @@ struct Group {
 class Elimination {
  public:
   Elimination(const SymmetricEntries& matrix, int last, const EliminationTree& tree)
-      : matrix_(matrix), free_(matrix.size - last), last_(last), groups_(tree.parent.size()) {
+      : matrix_(matrix), free_(matrix.size - last), groups_(tree.parent.size()) {
     place_unknowns(tree);
     sort_entries(tree);
     for (std::size_t g = 0; g < groups_.size(); ++g) {
@@ -317,7 +317,6 @@ class Elimination {
 
   const SymmetricEntries& matrix_;
   int free_;
-  int last_;
   std::vector<Group> groups_;
   std::vector<int> roots_;
   std::vector<int> place_;     ///< of each unknown in the order of elimination
