@@ -18,7 +18,8 @@ struct SlabMesh {
   double fine_depth = 1.0;
 };
 
-/// More tetrahedra than this are refused before they are made: the elimination would take some 6 GB and a minute.
+/// More tetrahedra than this are refused before they are made: the elimination would take over 3 GB, and half a minute
+/// on four cores.
 inline constexpr double kMostSlabTetrahedra = 60000.0;
 
 /// @throws Error if a size isn't finite and above zero (fine_half_x, fine_half_y and fine_depth may be zero), if fine >
