@@ -22,7 +22,7 @@ struct Bead {
   double radius = 0.0;
 };
 
-/// What making a compliance took, and how good its mesh is. The same mesh gives the same report, but for memory.
+/// What making a compliance took, and how good its mesh is. The same mesh gives the same report.
 struct ComplianceReport {
   int tetrahedra = 0;
   int unknowns = 0;                    ///< displacements and pressures
@@ -30,7 +30,7 @@ struct ComplianceReport {
   double fine_edge = 0.0;              ///< mm, where contact is made; 0 if who asked for the mesh didn't say
   double factor_entries = 0.0;
   double operations = 0.0;  ///< floating-point operations of the elimination
-  double memory_mb = 0.0;   ///< of the factorisation
+  double memory_mb = 0.0;   ///< of the elimination on one thread
   std::string note;         ///< from the cache: empty, or what was wrong with the file there; not stored
 };
 

@@ -37,14 +37,14 @@ struct ContactSurface {
 /// of the hat's support whose lines hit the body, scaled up from that part to the whole support: beyond the body's
 /// silhouette the gap is continued by its mean, and so it is where the body's steep side is seen (a rise of more than
 /// twice a triangle's size within it): a punch that is tilted a little bears as one that isn't. Where the covered share
-/// c of the support is under one half, `weighted[i]` has the depth of the deepest overlap times (0.5 - c) / 0.1 added
+/// c of the support is under 0.59, `weighted[i]` has the depth of the deepest overlap times (0.59 - c) / 0.1 added
 /// to the mean: such vertices stay open (a sharp punch's edge then lies, on average over its position in the mesh,
 /// where it should) while the answer stays continuous as the body moves. Vertices with c < 0.25 have no gap: they are
 /// infinitely far.
 struct WeightedGap {
   Eigen::VectorXd weighted;  ///< mm^3; infinity: far
   Eigen::VectorXd plain;     ///< mm^3, without the edge's part
-  Eigen::VectorXd edge;      ///< mm^2: how much `weighted` holds of the deepest overlap, 0 where c >= 0.5
+  Eigen::VectorXd edge;      ///< mm^2: how much `weighted` holds of the deepest overlap, 0 where c >= 0.59
   Eigen::VectorXd lowest;    ///< mm, the least gap seen within the hat's support; infinity: far
   double deepest = std::numeric_limits<double>::infinity();  ///< mm, the least gap of all; negative: overlap
   double reach = std::numeric_limits<double>::infinity();  ///< mm: vertices that come nearer than this aren't left out

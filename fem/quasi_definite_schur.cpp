@@ -9,6 +9,7 @@
 #include <atomic>
 #include <bit>
 #include <chrono>
+#include <cmath>
 #include <mutex>
 #include <new>
 #include <utility>
@@ -104,7 +105,7 @@ struct Group {
 class Elimination {
  public:
   Elimination(const SymmetricEntries& matrix, int last, const EliminationTree& tree)
-      : matrix_(matrix), free_(matrix.size - last), last_(last), groups_(tree.parent.size()) {
+      : matrix_(matrix), free_(matrix.size - last), groups_(tree.parent.size()) {
     place_unknowns(tree);
     sort_entries(tree);
     for (std::size_t g = 0; g < groups_.size(); ++g) {
@@ -143,8 +144,10 @@ class Elimination {
       report.factor_entries += static_cast<std::int64_t>(k * n - k * (k - 1.0) / 2.0);
       report.negative_pivots += group.negative;
     }
-    for (const int root : roots_) report.operations += groups_[root].work;
-    report.memory_mb = static_cast<double>(most_bytes_) / 1e6;
+    for (const int root : roots_) {
+      report.operations += groups_[root].work;
+      report.memory_mb = std::max(report.memory_mb, sizeof(double) * peak(root) / 1e6);
+    }
   }
 
  private:
@@ -241,7 +244,7 @@ class Elimination {
     if (failed_) return {};
 
     const auto size = static_cast<std::ptrdiff_t>(group.rows.size());
-    Numbers room = take(size * size);
+    Numbers room = pool_.take(static_cast<std::size_t>(size * size));
     double* const front = room.get();
     each(size, [&](std::ptrdiff_t j) { std::fill(front + j * size + j, front + (j + 1) * size, 0.0); });
     const auto place_in_front = [&](int place) {
@@ -257,11 +260,11 @@ class Elimination {
     }
     for (Update& update : updates) {
       add(update, place_in_front, front, size);
-      give_back(std::move(update.values), packed(static_cast<std::ptrdiff_t>(update.rows.size())));
+      pool_.give_back(std::move(update.values));
     }
     if (!eliminate_front(front, static_cast<int>(size), group.positive, group.negative)) failed_ = true;
     Update result = left_over(group, front, size);
-    give_back(std::move(room), size * size);
+    pool_.give_back(std::move(room));
     return result;
   }
 
@@ -283,7 +286,7 @@ class Elimination {
     const std::ptrdiff_t count = size - pivots;
     Update result;
     result.rows.assign(group.rows.begin() + pivots, group.rows.end());
-    result.values = take(packed(count));
+    result.values = pool_.take(static_cast<std::size_t>(packed(count)));
     each(count, [&](std::ptrdiff_t j) {
       const double* column = front + (pivots + j) * size + pivots;
       std::copy(column + j, column + count, result.values.get() + j * count - j * (j - 1) / 2);
@@ -302,22 +305,22 @@ class Elimination {
 
   static std::ptrdiff_t packed(std::ptrdiff_t size) { return size * (size + 1) / 2; }
 
-  /// Keeps account of the memory that is in use.
-  Numbers take(std::ptrdiff_t count) {
-    bytes_ += count * static_cast<std::ptrdiff_t>(sizeof(double));
-    std::ptrdiff_t most = most_bytes_;
-    while (bytes_ > most && !most_bytes_.compare_exchange_weak(most, bytes_)) {
+  /// Doubles at the peak of a branch that is eliminated by itself, one front at a time.
+  double peak(int number) const {
+    const Group& group = groups_[number];
+    double kept = 0.0;
+    double most = 0.0;
+    for (const int child : group.children) {
+      most = std::max(most, kept + peak(child));
+      const Group& below = groups_[child];
+      kept +=
+          static_cast<double>(packed(static_cast<std::ptrdiff_t>(below.rows.size()) - below.positive - below.negative));
     }
-    return pool_.take(static_cast<std::size_t>(count));
-  }
-  void give_back(Numbers numbers, std::ptrdiff_t count) {
-    bytes_ -= count * static_cast<std::ptrdiff_t>(sizeof(double));
-    pool_.give_back(std::move(numbers));
+    return std::max(most, kept + std::pow(static_cast<double>(group.rows.size()), 2));
   }
 
   const SymmetricEntries& matrix_;
   int free_;
-  int last_;
   std::vector<Group> groups_;
   std::vector<int> roots_;
   std::vector<int> place_;     ///< of each unknown in the order of elimination
@@ -326,8 +329,6 @@ class Elimination {
   std::size_t border_entries_ = 0;  ///< from here on in `sorted_`
   Pool pool_;
   std::atomic<bool> failed_{false};
-  std::atomic<std::ptrdiff_t> bytes_{0};
-  std::atomic<std::ptrdiff_t> most_bytes_{0};
 };
 
 }  // namespace

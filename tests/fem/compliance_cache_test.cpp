@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/wait.h>
+#include <tbb/global_control.h>
 #include <unistd.h>
 #include <xxhash.h>
 
@@ -253,6 +254,16 @@ TEST_F(ComplianceCache, MakersAtTheSameTimeBothEndWithASoundFile) {
   expect_same(get(), alone);
   EXPECT_EQ(computed, 0);
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 1);  // no temporary file is left
+}
+
+TEST_F(ComplianceCache, FileHasTheSameBytesFromOneThreadAndFromMany) {
+  slab.fine = 0.4;
+  get();
+  const std::string many = read_whole_file(file());
+  std::filesystem::remove(file());
+  const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
+  get();
+  EXPECT_TRUE(read_whole_file(file()) == many);
 }
 
 TEST_F(ComplianceCache, FileIsAsLargeAsForetold) {

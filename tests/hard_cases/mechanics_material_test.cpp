@@ -69,8 +69,8 @@ TEST(HardCase5, UnderASharpPunchTheForceConvergesAndThePeakPressureDoesNot) {
     constexpr int kPlaces = 12;
     for (int k = 0; k < kPlaces; ++k) {
       Press press(gel, RoundedCylinder{1.9, 0.0, 3.0}, 0.0);
-      const PressState& state =
-          press.step(at(fine * (0.618 * k - std::floor(0.618 * k) - 0.5), fine * (0.755 * k - std::floor(0.755 * k) - 0.5), -0.1));
+      const PressState& state = press.step(
+          at(fine * (0.618 * k - std::floor(0.618 * k) - 0.5), fine * (0.755 * k - std::floor(0.755 * k) - 0.5), -0.1));
       square += std::pow(state.wrench[2] / expected - 1.0, 2) / kPlaces;
       peak += -state.traction.col(2).minCoeff() / kPlaces;
     }

@@ -29,7 +29,7 @@ plate: {thickness_mm: 1, refractive_index: 1.5}
 )",
                                         "small.yaml");
   scene.object = parse_yaml<ObjectSpec>(
-      "name: probe\nshape: {type: rounded_cylinder, radius_mm: 1.6, edge_radius_mm: 0.0, height_mm: 4}\nfriction: 1\n",
+      "name: probe\nshape: {type: rounded_cylinder, radius_mm: 1.9, edge_radius_mm: 0.0, height_mm: 4}\nfriction: 1\n",
       "probe.yaml");
   scene.motion = parse_yaml<MotionSpec>("start_mm: [0, 0, 0]\nframe_rate_Hz: 1000\nkeys:\n" + keys, "motion.yaml");
   scene.outputs.frames = false;
