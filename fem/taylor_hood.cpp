@@ -123,68 +123,6 @@ int unknown_of(const TaylorHoodSpace& space, int node, int component) {
   return space.clamped[node] ? -1 : space.displacement[node] + component;
 }
 
-/// Right-hand side from loads on the body and its free faces, without units.
-Eigen::VectorXd load_vector(const TaylorHoodSpace& space, const Scales& scales, const ElasticLoads& loads) {
-  const TetMesh& mesh = *space.mesh;
-  Eigen::MatrixX3d force = Eigen::MatrixX3d::Zero(space.nodes, 3);  // N
-  if (loads.body_force) {
-    const auto rule = tetrahedron_rule(6);
-    for (std::size_t e = 0; e < mesh.tetrahedra.size(); ++e) {
-      const double size = volume(mesh, mesh.tetrahedra[e]);
-      const auto corners = corners_of(mesh, static_cast<int>(e));
-      for (const auto& point : rule) {
-        Eigen::Vector3d x = Eigen::Vector3d::Zero();
-        for (int k = 0; k < 4; ++k) {
-          x += point.barycentric[k] * corners[k];
-        }
-        const Eigen::Vector3d f = loads.body_force(x) * (point.weight * size);
-        const auto shape = quadratic_shape(point.barycentric);
-        for (int k = 0; k < 10; ++k) {
-          force.row(space.elements[e][k]) += shape[k] * f.transpose();
-        }
-      }
-    }
-  }
-  if (loads.traction) {
-    auto bonded = mesh.bonded;
-    const auto key = [](std::array<int, 3> face) {
-      std::sort(face.begin(), face.end());
-      return face;
-    };
-    std::transform(bonded.begin(), bonded.end(), bonded.begin(), key);
-    std::sort(bonded.begin(), bonded.end());
-    const auto rule = triangle_rule(6);
-    for (const auto& face : boundary_faces(mesh)) {
-      if (std::binary_search(bonded.begin(), bonded.end(), key(face))) {
-        continue;
-      }
-      const Eigen::Vector3d a = mesh.vertices[face[0]];
-      const Eigen::Vector3d b = mesh.vertices[face[1]];
-      const Eigen::Vector3d c = mesh.vertices[face[2]];
-      const Eigen::Vector3d cross = (b - a).cross(c - a);
-      const double area = 0.5 * cross.norm();
-      for (const auto& point : rule) {
-        const Eigen::Vector3d& l = point.barycentric;
-        const Eigen::Vector3d f =
-            loads.traction(l[0] * a + l[1] * b + l[2] * c, cross.normalized()) * (point.weight * area);
-        for (int k = 0; k < 3; ++k) {
-          force.row(face[k]) += l[k] * (2.0 * l[k] - 1.0) * f.transpose();
-          const int next = (k + 1) % 3;
-          force.row(space.middle(face[k], face[next])) += 4.0 * l[k] * l[next] * f.transpose();
-        }
-      }
-    }
-  }
-  Eigen::VectorXd right = Eigen::VectorXd::Zero(space.unknowns);
-  for (int node = 0; node < space.nodes; ++node) {
-    if (!space.clamped[node]) {
-      right.segment<3>(space.displacement[node]) =
-          force.row(node).transpose() / (scales.stress * scales.length * scales.length);
-    }
-  }
-  return right;
-}
-
 }  // namespace
 
 Eigen::Matrix<double, 10, 1> quadratic_shape(const Eigen::Vector4d& at) {
@@ -196,6 +134,11 @@ Eigen::Matrix<double, 10, 1> quadratic_shape(const Eigen::Vector4d& at) {
     values[4 + k] = 4.0 * at[kTetEdges[k][0]] * at[kTetEdges[k][1]];
   }
   return values;
+}
+
+Eigen::Matrix<double, 3, 10> quadratic_gradients(const std::array<Eigen::Vector3d, 4>& corners,
+                                                 const Eigen::Vector4d& barycentric) {
+  return shape_gradients(barycentric_gradients(corners), barycentric);
 }
 
 Eigen::Vector3d TaylorHoodSpace::position(int node) const {
@@ -328,6 +271,67 @@ SymmetricEntries assemble(const TaylorHoodSpace& space, const Scales& scales) {
     matrix.values.insert(matrix.values.end(), row.values.begin(), row.values.end());
   }
   return matrix;
+}
+
+Eigen::VectorXd load_vector(const TaylorHoodSpace& space, const Scales& scales, const ElasticLoads& loads) {
+  const TetMesh& mesh = *space.mesh;
+  Eigen::MatrixX3d force = Eigen::MatrixX3d::Zero(space.nodes, 3);  // N
+  if (loads.body_force) {
+    const auto rule = tetrahedron_rule(6);
+    for (std::size_t e = 0; e < mesh.tetrahedra.size(); ++e) {
+      const double size = volume(mesh, mesh.tetrahedra[e]);
+      const auto corners = corners_of(mesh, static_cast<int>(e));
+      for (const auto& point : rule) {
+        Eigen::Vector3d x = Eigen::Vector3d::Zero();
+        for (int k = 0; k < 4; ++k) {
+          x += point.barycentric[k] * corners[k];
+        }
+        const Eigen::Vector3d f = loads.body_force(x) * (point.weight * size);
+        const auto shape = quadratic_shape(point.barycentric);
+        for (int k = 0; k < 10; ++k) {
+          force.row(space.elements[e][k]) += shape[k] * f.transpose();
+        }
+      }
+    }
+  }
+  if (loads.traction) {
+    auto bonded = mesh.bonded;
+    const auto key = [](std::array<int, 3> face) {
+      std::sort(face.begin(), face.end());
+      return face;
+    };
+    std::transform(bonded.begin(), bonded.end(), bonded.begin(), key);
+    std::sort(bonded.begin(), bonded.end());
+    const auto rule = triangle_rule(6);
+    for (const auto& face : boundary_faces(mesh)) {
+      if (std::binary_search(bonded.begin(), bonded.end(), key(face))) {
+        continue;
+      }
+      const Eigen::Vector3d a = mesh.vertices[face[0]];
+      const Eigen::Vector3d b = mesh.vertices[face[1]];
+      const Eigen::Vector3d c = mesh.vertices[face[2]];
+      const Eigen::Vector3d cross = (b - a).cross(c - a);
+      const double area = 0.5 * cross.norm();
+      for (const auto& point : rule) {
+        const Eigen::Vector3d& l = point.barycentric;
+        const Eigen::Vector3d f =
+            loads.traction(l[0] * a + l[1] * b + l[2] * c, cross.normalized()) * (point.weight * area);
+        for (int k = 0; k < 3; ++k) {
+          force.row(face[k]) += l[k] * (2.0 * l[k] - 1.0) * f.transpose();
+          const int next = (k + 1) % 3;
+          force.row(space.middle(face[k], face[next])) += 4.0 * l[k] * l[next] * f.transpose();
+        }
+      }
+    }
+  }
+  Eigen::VectorXd right = Eigen::VectorXd::Zero(space.unknowns);
+  for (int node = 0; node < space.nodes; ++node) {
+    if (!space.clamped[node]) {
+      right.segment<3>(space.displacement[node]) =
+          force.row(node).transpose() / (scales.stress * scales.length * scales.length);
+    }
+  }
+  return right;
 }
 
 ElasticSolution solve_elastic(const TaylorHoodSpace& space, const ElasticMaterial& material,
