@@ -2,43 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/error.h"
+#include "fem/covered_triangle.h"
 
 namespace touchstone::fem {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kLeastShare = 0.25;     // covered share below which a vertex is far
-constexpr int kSilhouetteSplits = 2;     // levels of splitting on the silhouette
-constexpr int kBisections = 34;          // of a cell's edge: a quarter of a triangle's to 1e-11
 constexpr double kSplitAboveBody = 1.0;  // a cell larger than this times the body's radius is split
-
-/// Radon's rule of degree 5 on a triangle (J. Radon, Monatsh. Math. Phys. 52, 1948): barycentric points and weights.
-struct RadonRule {
-  std::array<Eigen::Vector3d, 7> points;
-  std::array<double, 7> weights;
-  RadonRule() {
-    const double root = std::sqrt(15.0);
-    points[0] = Eigen::Vector3d::Constant(1.0 / 3.0);
-    weights[0] = 9.0 / 40.0;
-    for (int family = 0; family < 2; ++family) {
-      const double sign = family == 0 ? -1.0 : 1.0;
-      const double a = (6.0 + sign * root) / 21.0;
-      for (int k = 0; k < 3; ++k) {
-        Eigen::Vector3d b = Eigen::Vector3d::Constant(a);
-        b[k] = 1.0 - 2.0 * a;
-        points[1 + 3 * family + k] = b;
-        weights[1 + 3 * family + k] = (155.0 + sign * root) / 1200.0;
-      }
-    }
-  }
-};
-
-const RadonRule& radon_rule() {
-  static const RadonRule rule;
-  return rule;
-}
 
 /// Integrates over one surface triangle; coordinates inside it are barycentric.
 template <typename Shape>
@@ -62,11 +36,9 @@ class TriangleGap {
     }
     one_normal_ = normals[0] == normals[1] && normals[0] == normals[2];
     area_ = 0.5 * (corners[1] - corners[0]).cross(corners[2] - corners[0]).norm();
-    const double size = std::sqrt(2.0 * area_);
-    // Bodies smaller than the triangle must not fall between its points.
-    int splits = 0;
-    for (double s = size; s > kSplitAboveBody * body_radius_ && splits < 6; s *= 0.5) ++splits;
-    cell(Eigen::Matrix3d::Identity(), splits, kSilhouetteSplits);
+    const auto line = [this](const Eigen::Vector3d& b) { return at(b); };
+    const auto visit = [this](const Eigen::Vector3d& b, double value, double weight) { add(b, value, weight * area_); };
+    CoveredTriangle(line, visit).integrate(splits_for_body(area_, body_radius_));
   }
 
  private:
@@ -74,95 +46,6 @@ class TriangleGap {
     const Eigen::Vector3d point = points_ * b;
     if (one_normal_) return first_entry(shape_, point, normals_.col(0));
     return first_entry(shape_, point, (normals_ * b).normalized());
-  }
-
-  /// `cell` holds the barycentric corners as columns.
-  void cell(const Eigen::Matrix3d& corners, int forced_splits, int silhouette_splits) {
-    if (forced_splits > 0) {
-      split(corners, forced_splits - 1, silhouette_splits);
-      return;
-    }
-    const RadonRule& rule = radon_rule();
-    std::array<std::optional<double>, 7> value;
-    std::array<bool, 3> corner_hit;
-    int hits = 0;
-    for (int k = 0; k < 3; ++k) {
-      corner_hit[k] = at(corners.col(k)).has_value();
-      hits += corner_hit[k];
-    }
-    const int corner_hits = hits;
-    for (int k = 0; k < 7; ++k) {
-      value[k] = at(corners * rule.points[k]);
-      hits += value[k].has_value();
-    }
-    if (hits == 0) return;
-    if (hits == 10) {
-      const double area = area_ * std::abs(corners.determinant());
-      for (int k = 0; k < 7; ++k) add(corners * rule.points[k], *value[k], rule.weights[k] * area);
-      return;
-    }
-    if (silhouette_splits > 0) {
-      split(corners, 0, silhouette_splits - 1);
-      return;
-    }
-    if (corner_hits == 3) {
-      piece(corners.col(0), corners.col(1), corners.col(2));
-    } else if (corner_hits > 0) {
-      clip(corners, corner_hit, corner_hits);
-    }
-  }
-
-  void split(const Eigen::Matrix3d& c, int forced_splits, int silhouette_splits) {
-    const Eigen::Vector3d m01 = 0.5 * (c.col(0) + c.col(1));
-    const Eigen::Vector3d m12 = 0.5 * (c.col(1) + c.col(2));
-    const Eigen::Vector3d m20 = 0.5 * (c.col(2) + c.col(0));
-    const auto corners = [](const Eigen::Vector3d& x, const Eigen::Vector3d& y, const Eigen::Vector3d& z) {
-      Eigen::Matrix3d m;
-      m << x, y, z;
-      return m;
-    };
-    cell(corners(c.col(0), m01, m20), forced_splits, silhouette_splits);
-    cell(corners(m01, c.col(1), m12), forced_splits, silhouette_splits);
-    cell(corners(m20, m12, c.col(2)), forced_splits, silhouette_splits);
-    cell(corners(m01, m12, m20), forced_splits, silhouette_splits);
-  }
-
-  /// The point on the edge from a hit to a miss where the silhouette crosses it.
-  Eigen::Vector3d crossing(Eigen::Vector3d hit, Eigen::Vector3d miss) const {
-    for (int k = 0; k < kBisections; ++k) {
-      const Eigen::Vector3d middle = 0.5 * (hit + miss);
-      (at(middle) ? hit : miss) = middle;
-    }
-    return hit;
-  }
-
-  void clip(const Eigen::Matrix3d& c, const std::array<bool, 3>& hit, int hits) {
-    // Turn so that corner 0 is the odd one out.
-    int odd = 0;
-    while (hit[odd] != (hits == 1)) ++odd;
-    const Eigen::Vector3d a = c.col(odd);
-    const Eigen::Vector3d b = c.col((odd + 1) % 3);
-    const Eigen::Vector3d d = c.col((odd + 2) % 3);
-    if (hits == 1) {
-      piece(a, crossing(a, b), crossing(a, d));
-    } else {
-      const Eigen::Vector3d ab = crossing(b, a);
-      const Eigen::Vector3d ad = crossing(d, a);
-      piece(ab, b, d);
-      piece(ab, d, ad);
-    }
-  }
-
-  /// A cell that hits all over, but for slivers at a curved silhouette.
-  void piece(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& d) {
-    Eigen::Matrix3d corners;
-    corners << a, b, d;
-    const double area = area_ * std::abs(corners.determinant());
-    const RadonRule& rule = radon_rule();
-    for (int k = 0; k < 7; ++k) {
-      const Eigen::Vector3d point = corners * rule.points[k];
-      if (const auto value = at(point)) add(point, *value, rule.weights[k] * area);
-    }
   }
 
   void add(const Eigen::Vector3d& b, double value, double weight) {
@@ -214,10 +97,43 @@ void for_each_near(const ContactSurface& surface, const ContactShape& shape, con
 
 }  // namespace
 
-ContactSurface::ContactSurface(const Compliance& gel) : vertices(gel.vertices), triangles(gel.triangles) {
+RadonRule::RadonRule() {
+  const double root = std::sqrt(15.0);
+  points[0] = Eigen::Vector3d::Constant(1.0 / 3.0);
+  weights[0] = 9.0 / 40.0;
+  for (int family = 0; family < 2; ++family) {
+    const double sign = family == 0 ? -1.0 : 1.0;
+    const double a = (6.0 + sign * root) / 21.0;
+    for (int k = 0; k < 3; ++k) {
+      Eigen::Vector3d b = Eigen::Vector3d::Constant(a);
+      b[k] = 1.0 - 2.0 * a;
+      points[1 + 3 * family + k] = b;
+      weights[1 + 3 * family + k] = (155.0 + sign * root) / 1200.0;
+    }
+  }
+}
+
+const RadonRule& radon_rule() {
+  static const RadonRule rule;
+  return rule;
+}
+
+int splits_for_body(double area, double body_radius) {
+  int splits = 0;
+  for (double size = std::sqrt(2.0 * area); size > kSplitAboveBody * body_radius && splits < 6; size *= 0.5) ++splits;
+  return splits;
+}
+
+ContactSurface::ContactSurface(const Compliance& gel) : ContactSurface(gel.vertices, gel.triangles, gel.mass) {
+  TS_ASSERT(static_cast<std::size_t>(gel.surface.rows()) == 3 * vertices.size());
+  TS_ASSERT(gel.surface.cols() == gel.surface.rows());
+}
+
+ContactSurface::ContactSurface(std::vector<Eigen::Vector3d> places, std::vector<std::array<int, 3>> faces,
+                               const Eigen::SparseMatrix<double>& mass)
+    : vertices(std::move(places)), triangles(std::move(faces)) {
   const std::size_t n = vertices.size();
-  TS_ASSERT(static_cast<std::size_t>(gel.mass.rows()) == n);
-  TS_ASSERT(static_cast<std::size_t>(gel.surface.rows()) == 3 * n && gel.surface.cols() == gel.surface.rows());
+  TS_ASSERT(static_cast<std::size_t>(mass.rows()) == n);
   normals.assign(n, Eigen::Vector3d::Zero());
   around.resize(n);
   for (const auto& t : triangles) {
@@ -238,7 +154,7 @@ ContactSurface::ContactSurface(const Compliance& gel) : vertices(gel.vertices), 
     std::sort(around[v].begin(), around[v].end());
     around[v].erase(std::unique(around[v].begin(), around[v].end()), around[v].end());
   }
-  weight = gel.mass * Eigen::VectorXd::Ones(static_cast<Eigen::Index>(n));
+  weight = mass * Eigen::VectorXd::Ones(static_cast<Eigen::Index>(n));
 }
 
 WeightedGap weighted_gap(const ContactSurface& surface, const ContactShape& shape,

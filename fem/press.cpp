@@ -31,6 +31,8 @@ struct Effort {
   int parts = 0;
 };
 
+}  // namespace
+
 RigidTransform between(const RigidTransform& a, const RigidTransform& b, double fraction) {
   if (fraction >= 1.0) return b;
   RigidTransform result;
@@ -60,8 +62,6 @@ void check_target(const PressTarget& target) {
     fail("a normal force of {} N is wanted: contact can't pull, it must be at least 0", target.axis[2].value);
   }
 }
-
-}  // namespace
 
 struct Press::Parts {
   Parts(const Compliance& compliance, ContactShape shape, double mu, PressTolerance wanted)

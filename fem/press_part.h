@@ -16,6 +16,8 @@
 
 namespace touchstone::fem {
 
+struct PressTarget;
+
 /// A converged point of the path.
 struct PressSnapshot {
   RigidTransform pose;                              ///< gel from object
@@ -29,6 +31,12 @@ struct PressSnapshot {
   double lookup_error = 0.0;  ///< mm
   double residual = 0.0;      ///< of the contact laws
 };
+
+/// The pose at `fraction` of the straight way from a to b (rotations by slerp).
+RigidTransform between(const RigidTransform& a, const RigidTransform& b, double fraction);
+
+/// @throws Error unless the target is finite, its rotation one, and its normal force not negative
+void check_target(const PressTarget& target);
 
 /// No contact at `pose`, for a surface of n vertices.
 PressSnapshot untouched(const RigidTransform& pose, int n);

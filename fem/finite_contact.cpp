@@ -1,0 +1,185 @@
+#include "fem/finite_contact.h"
+
+#include <tbb/parallel_for.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "fem/covered_triangle.h"
+
+namespace touchstone::fem {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kLeastShare = 0.25;  // covered share below which a vertex is far, as in weighted_gap
+constexpr double kStep = 1e-5;        // of a triangle's size: for the body's slope by central differences
+constexpr double kSteepest = 3.0;     // slopes beyond this (a body's flank) push no more sideways
+
+/// Values of the six quadratic functions of a triangle: corners, then the edges 01, 12, 20.
+Eigen::Matrix<double, 6, 1> face_shape(const Eigen::Vector3d& b) {
+  Eigen::Matrix<double, 6, 1> values;
+  for (int k = 0; k < 3; ++k) {
+    values[k] = b[k] * (2.0 * b[k] - 1.0);
+    values[3 + k] = 4.0 * b[k] * b[(k + 1) % 3];
+  }
+  return values;
+}
+
+/// What one triangle adds to its three vertices.
+struct TrianglePart {
+  Eigen::Vector3d gap = Eigen::Vector3d::Zero();
+  Eigen::Vector3d covered = Eigen::Vector3d::Zero();
+  Eigen::Matrix<double, 3, 18> gradient = Eigen::Matrix<double, 3, 18>::Zero();
+  double lowest = kInfinity;
+};
+
+/// One deformed triangle in the object's frame.
+template <typename Shape>
+struct DeformedTriangle {
+  const Shape& shape;
+  Eigen::Matrix<double, 3, 6> points;
+  Eigen::Matrix3d normals;
+  Eigen::Matrix3d gel_from_object;
+  double area = 0.0;  // undeformed
+  double step = 0.0;
+
+  Eigen::Vector3d direction(const Eigen::Vector3d& b) const { return (normals * b).normalized(); }
+
+  /// The gap's gradient by the point's place, gel frame.
+  Eigen::Vector3d slope(const Eigen::Vector3d& point, const Eigen::Vector3d& along, double gap) const {
+    Eigen::Vector3d result = -along;
+    const Eigen::Vector3d first = along.unitOrthogonal();
+    for (const Eigen::Vector3d& across : {first, Eigen::Vector3d(along.cross(first))}) {
+      const auto up = first_entry(shape, point + step * across, along);
+      const auto down = first_entry(shape, point - step * across, along);
+      if (!up && !down) continue;
+      const double rise = (up.value_or(gap) - down.value_or(gap)) / ((up ? step : 0.0) + (down ? step : 0.0));
+      result += std::clamp(rise, -kSteepest, kSteepest) * across;
+    }
+    return gel_from_object * result;
+  }
+
+  void integrate(double body_radius, TrianglePart& part) const {
+    const auto line = [this](const Eigen::Vector3d& b) {
+      return first_entry(shape, points * face_shape(b), direction(b));
+    };
+    const auto visit = [&](const Eigen::Vector3d& b, double gap, double share) {
+      const double weight = share * area;
+      const Eigen::Matrix<double, 6, 1> values = face_shape(b);
+      const Eigen::Vector3d gradient = slope(points * values, direction(b), gap);
+      part.gap += weight * gap * b;
+      part.covered += weight * b;
+      part.lowest = std::min(part.lowest, gap);
+      for (int node = 0; node < 6; ++node) {
+        part.gradient.middleCols<3>(3 * node) += (weight * values[node]) * b * gradient.transpose();
+      }
+    };
+    CoveredTriangle(line, visit).integrate(splits_for_body(area, body_radius));
+  }
+};
+
+std::array<int, 6> nodes_of(const TaylorHoodSpace& space, const std::array<int, 3>& face) {
+  return {face[0],
+          face[1],
+          face[2],
+          space.middle(face[0], face[1]),
+          space.middle(face[1], face[2]),
+          space.middle(face[2], face[0])};
+}
+
+}  // namespace
+
+DeformedGap deformed_gap(const TaylorHoodSpace& space, const OuterSurface& surface, const Eigen::VectorXd& weight,
+                         const Eigen::MatrixX3d& displacement, const ContactShape& shape,
+                         const RigidTransform& gel_from_object, double overlap) {
+  const TetMesh& mesh = *space.mesh;
+  const auto n = static_cast<Eigen::Index>(surface.mesh_vertex.size());
+  const RigidTransform object_from_gel = gel_from_object.inverse();
+  const BoundingBall ball = bounding_ball(shape);
+  const auto place = [&](int node) -> Eigen::Vector3d {
+    return space.position(node) + displacement.row(node).transpose();
+  };
+  std::vector<Eigen::Vector3d> normals(surface.mesh_vertex.size(), Eigen::Vector3d::Zero());
+  for (const auto& t : surface.triangles) {
+    const Eigen::Vector3d a = place(surface.mesh_vertex[t[0]]);
+    const Eigen::Vector3d twice_area =
+        (place(surface.mesh_vertex[t[1]]) - a).cross(place(surface.mesh_vertex[t[2]]) - a);
+    for (const int v : t) normals[v] += twice_area;
+  }
+  for (auto& normal : normals) normal.normalize();
+
+  std::vector<TrianglePart> parts(surface.triangles.size());
+  std::vector<std::array<int, 6>> nodes(surface.triangles.size());
+  tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t t) {
+    nodes[t] = nodes_of(space, mesh.outer[t]);
+    std::visit(
+        [&](const auto& body) {
+          DeformedTriangle<std::decay_t<decltype(body)>> triangle{body, {}, {}, {}, 0.0, 0.0};
+          for (int k = 0; k < 6; ++k) triangle.points.col(k) = object_from_gel * place(nodes[t][k]);
+          for (int k = 0; k < 3; ++k) {
+            triangle.normals.col(k) = object_from_gel.turn(normals[surface.triangles[t][k]]);
+          }
+          triangle.gel_from_object = gel_from_object.rotation;
+          const Eigen::Vector3d middle = triangle.points.template leftCols<3>().rowwise().mean();
+          const Eigen::Vector3d along = triangle.normals.rowwise().mean();
+          double reach = 0.0;
+          for (int k = 0; k < 6; ++k) reach = std::max(reach, (triangle.points.col(k) - middle).norm());
+          const Eigen::Vector3d away = ball.centre - middle;
+          // Lines that spread with the normals reach further aside the further the body is.
+          const Eigen::Vector3d axis = along.normalized();
+          double spread = 0.0;
+          for (int k = 0; k < 3; ++k) spread = std::max(spread, (triangle.normals.col(k) - axis).norm());
+          const double aside = (away - away.dot(axis) * axis).norm();
+          if (aside > reach + ball.radius + 2.0 * spread * (away.norm() + ball.radius)) return;
+          const Eigen::Vector3d a = mesh.vertices[mesh.outer[t][0]];
+          triangle.area = 0.5 * (mesh.vertices[mesh.outer[t][1]] - a).cross(mesh.vertices[mesh.outer[t][2]] - a).norm();
+          triangle.step = kStep * std::sqrt(triangle.area);
+          triangle.integrate(ball.radius, parts[t]);
+        },
+        shape);
+  });
+
+  DeformedGap result;
+  result.weighted = Eigen::VectorXd::Zero(n);
+  Eigen::VectorXd covered = Eigen::VectorXd::Zero(n);
+  for (std::size_t t = 0; t < parts.size(); ++t) {
+    for (int k = 0; k < 3; ++k) {
+      result.weighted[surface.triangles[t][k]] += parts[t].gap[k];
+      covered[surface.triangles[t][k]] += parts[t].covered[k];
+    }
+    result.deepest = std::min(result.deepest, parts[t].lowest);
+  }
+  Eigen::VectorXd scale = Eigen::VectorXd::Zero(n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const double share = covered[i] / weight[i];
+    if (share < kLeastShare) {
+      result.weighted[i] = kInfinity;
+      continue;
+    }
+    scale[i] = weight[i] / covered[i];
+    result.weighted[i] *= scale[i];
+    if (share < 0.5) result.weighted[i] += weight[i] * (0.5 - share) / 0.1 * overlap;
+  }
+  std::vector<Eigen::Triplet<double>> entries;
+  result.direction = Eigen::MatrixX3d::Zero(n, 3);
+  for (std::size_t t = 0; t < parts.size(); ++t) {
+    for (int k = 0; k < 3; ++k) {
+      const int v = surface.triangles[t][k];
+      if (scale[v] == 0.0) continue;
+      for (int node = 0; node < 6; ++node) {
+        for (int a = 0; a < 3; ++a) {
+          const double value = scale[v] * parts[t].gradient(k, 3 * node + a);
+          entries.emplace_back(v, 3 * nodes[t][node] + a, value);
+          result.direction(v, a) += value;
+        }
+      }
+    }
+  }
+  result.gradient.resize(n, 3 * static_cast<Eigen::Index>(space.nodes));
+  result.gradient.setFromTriplets(entries.begin(), entries.end());
+  return result;
+}
+
+}  // namespace touchstone::fem

@@ -1,0 +1,40 @@
+#pragma once
+// The gap between the gel's deformed surface and a rigid body, and how it changes as the surface moves.
+
+#include <Eigen/Core>
+#include <Eigen/SparseCore>
+#include <array>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "core/transform.h"
+#include "fem/contact_shape.h"
+#include "fem/surface_coupling.h"
+#include "fem/taylor_hood.h"
+
+namespace touchstone::fem {
+
+/// The gap of each surface vertex at a deformed state.
+///
+/// gap(x) is the distance from the deformed surface point x (the quadratic displacement itself, not its projection)
+/// along the deformed surface's normal there to where the line enters the body. `weighted[i]` = int phi_i gap dA over
+/// the undeformed hat's hit part, scaled up to the whole hat, as in weighted_gap, which it becomes at rest. `gradient`
+/// is its derivative by the displacement at held direction of the lines (as the gap closes, how the lines turn stops
+/// mattering): the vertex's pressure p_i pushes the gel by p_i times it. So contact forces act along the body's normals
+/// and derive from a potential: without friction the force on the body is the derivative of the stored energy.
+struct DeformedGap {
+  Eigen::VectorXd weighted;  ///< n, mm^3; infinity: far
+  /// n x (3 nodes), mm^2: row i holds d weighted_i / d u_node, 3 * node + component
+  Eigen::SparseMatrix<double, Eigen::RowMajor> gradient;
+  Eigen::MatrixX3d direction;  ///< n x 3, mm^2: the gradient's sum over nodes, d weighted_i / d (shift of the gel)
+  double deepest = std::numeric_limits<double>::infinity();  ///< mm, the least gap of all; negative: overlap
+};
+
+/// `weight` is int phi_i dA. Vertices that the body covers by less than half of their hats stay open: their gap is
+/// raised by up to `overlap` (mm, >= 0: how deep the body reaches under the undeformed surface), as in weighted_gap.
+DeformedGap deformed_gap(const TaylorHoodSpace& space, const OuterSurface& surface, const Eigen::VectorXd& weight,
+                         const Eigen::MatrixX3d& displacement, const ContactShape& shape,
+                         const RigidTransform& gel_from_object, double overlap);
+
+}  // namespace touchstone::fem
