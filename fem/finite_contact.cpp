@@ -13,9 +13,11 @@ namespace touchstone::fem {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kLeastShare = 0.25;  // covered share below which a vertex is far, as in weighted_gap
-constexpr double kStep = 1e-5;        // of a triangle's size: for the body's slope by central differences
-constexpr double kSteepest = 3.0;     // slopes beyond this (a body's flank) push no more sideways
+constexpr double kLeastShare = 0.25;    // covered share below which a vertex is far, as in weighted_gap
+constexpr double kStep = 1e-5;          // of a triangle's size: for the body's slope by central differences
+constexpr double kWideStep = 0.02;      // of a triangle's size: for the body's curvature by second differences
+constexpr double kMostCurvature = 3.0;  // over a triangle's size
+constexpr double kSteepest = 3.0;       // slope of the body against the gel beyond which a line only grazes its flank
 
 /// Values of the six quadratic functions of a triangle: corners, then the edges 01, 12, 20.
 Eigen::Matrix<double, 6, 1> face_shape(const Eigen::Vector3d& b) {
@@ -32,6 +34,7 @@ struct TrianglePart {
   Eigen::Vector3d gap = Eigen::Vector3d::Zero();
   Eigen::Vector3d covered = Eigen::Vector3d::Zero();
   Eigen::Matrix<double, 3, 18> gradient = Eigen::Matrix<double, 3, 18>::Zero();
+  Eigen::Matrix<double, 18, 18> curvature = Eigen::Matrix<double, 18, 18>::Zero();
   double lowest = kInfinity;
 };
 
@@ -42,38 +45,71 @@ struct DeformedTriangle {
   Eigen::Matrix<double, 3, 6> points;
   Eigen::Matrix3d normals;
   Eigen::Matrix3d gel_from_object;
-  double area = 0.0;  // undeformed
-  double step = 0.0;
+  Eigen::Vector3d pressure;  // of the corners
+  double area = 0.0;         // undeformed
+  double size = 0.0;
 
   Eigen::Vector3d direction(const Eigen::Vector3d& b) const { return (normals * b).normalized(); }
 
-  /// The gap's gradient by the point's place, gel frame.
+  /// The gap's second derivative by the point's place, in the object's frame. Along the line the gap is linear.
+  Eigen::Matrix3d bend(const Eigen::Vector3d& point, const Eigen::Vector3d& along, double gap) const {
+    const double step = kWideStep * size;
+    const Eigen::Vector3d x = along.unitOrthogonal();
+    const Eigen::Vector3d y = along.cross(x);
+    const auto second = [&](const Eigen::Vector3d& across) {
+      const auto up = first_entry(shape, point + step * across, along);
+      const auto down = first_entry(shape, point - step * across, along);
+      if (!up || !down) return 0.0;
+      const double most = kMostCurvature / size;
+      return std::clamp((*up + *down - 2.0 * gap) / (step * step), -most, most);
+    };
+    const double xx = second(x);
+    const double yy = second(y);
+    const double xy = 0.5 * (second((x + y).normalized()) - second((x - y).normalized()));
+    return xx * x * x.transpose() + yy * y * y.transpose() + xy * (x * y.transpose() + y * x.transpose());
+  }
+
+  /// The gap's gradient by the point's place, in the object's frame.
   Eigen::Vector3d slope(const Eigen::Vector3d& point, const Eigen::Vector3d& along, double gap) const {
+    const double step = kStep * size;
     Eigen::Vector3d result = -along;
     const Eigen::Vector3d first = along.unitOrthogonal();
     for (const Eigen::Vector3d& across : {first, Eigen::Vector3d(along.cross(first))}) {
       const auto up = first_entry(shape, point + step * across, along);
       const auto down = first_entry(shape, point - step * across, along);
       if (!up && !down) continue;
-      const double rise = (up.value_or(gap) - down.value_or(gap)) / ((up ? step : 0.0) + (down ? step : 0.0));
-      result += std::clamp(rise, -kSteepest, kSteepest) * across;
+      result += (up.value_or(gap) - down.value_or(gap)) / ((up ? step : 0.0) + (down ? step : 0.0)) * across;
     }
-    return gel_from_object * result;
+    return result;
   }
 
   void integrate(double body_radius, TrianglePart& part) const {
-    const auto line = [this](const Eigen::Vector3d& b) {
-      return first_entry(shape, points * face_shape(b), direction(b));
+    // A line that grazes a flank of the body (beside a punch, where the gel's face is tilted towards it) is a miss.
+    const auto line = [this](const Eigen::Vector3d& b) -> std::optional<double> {
+      const Eigen::Vector3d point = points * face_shape(b);
+      const Eigen::Vector3d along = direction(b);
+      const auto gap = first_entry(shape, point, along);
+      if (gap && slope(point, along, *gap).squaredNorm() > 1.0 + kSteepest * kSteepest) return std::nullopt;
+      return gap;
     };
     const auto visit = [&](const Eigen::Vector3d& b, double gap, double share) {
       const double weight = share * area;
       const Eigen::Matrix<double, 6, 1> values = face_shape(b);
-      const Eigen::Vector3d gradient = slope(points * values, direction(b), gap);
+      const Eigen::Vector3d gradient = gel_from_object * slope(points * values, direction(b), gap);
       part.gap += weight * gap * b;
       part.covered += weight * b;
       part.lowest = std::min(part.lowest, gap);
       for (int node = 0; node < 6; ++node) {
         part.gradient.middleCols<3>(3 * node) += (weight * values[node]) * b * gradient.transpose();
+      }
+      const double push = weight * b.dot(pressure);
+      if (push == 0.0) return;
+      const Eigen::Matrix3d turned =
+          gel_from_object * bend(points * values, direction(b), gap) * gel_from_object.transpose();
+      for (int i = 0; i < 6; ++i) {
+        for (int j = 0; j < 6; ++j) {
+          part.curvature.block<3, 3>(3 * i, 3 * j) += (push * values[i] * values[j]) * turned;
+        }
       }
     };
     CoveredTriangle(line, visit).integrate(splits_for_body(area, body_radius));
@@ -93,7 +129,7 @@ std::array<int, 6> nodes_of(const TaylorHoodSpace& space, const std::array<int, 
 
 DeformedGap deformed_gap(const TaylorHoodSpace& space, const OuterSurface& surface, const Eigen::VectorXd& weight,
                          const Eigen::MatrixX3d& displacement, const ContactShape& shape,
-                         const RigidTransform& gel_from_object, double overlap) {
+                         const RigidTransform& gel_from_object, double overlap, const Eigen::VectorXd& pressure) {
   const TetMesh& mesh = *space.mesh;
   const auto n = static_cast<Eigen::Index>(surface.mesh_vertex.size());
   const RigidTransform object_from_gel = gel_from_object.inverse();
@@ -116,7 +152,7 @@ DeformedGap deformed_gap(const TaylorHoodSpace& space, const OuterSurface& surfa
     nodes[t] = nodes_of(space, mesh.outer[t]);
     std::visit(
         [&](const auto& body) {
-          DeformedTriangle<std::decay_t<decltype(body)>> triangle{body, {}, {}, {}, 0.0, 0.0};
+          DeformedTriangle<std::decay_t<decltype(body)>> triangle{body, {}, {}, {}, {}, 0.0, 0.0};
           for (int k = 0; k < 6; ++k) triangle.points.col(k) = object_from_gel * place(nodes[t][k]);
           for (int k = 0; k < 3; ++k) {
             triangle.normals.col(k) = object_from_gel.turn(normals[surface.triangles[t][k]]);
@@ -135,7 +171,8 @@ DeformedGap deformed_gap(const TaylorHoodSpace& space, const OuterSurface& surfa
           if (aside > reach + ball.radius + 2.0 * spread * (away.norm() + ball.radius)) return;
           const Eigen::Vector3d a = mesh.vertices[mesh.outer[t][0]];
           triangle.area = 0.5 * (mesh.vertices[mesh.outer[t][1]] - a).cross(mesh.vertices[mesh.outer[t][2]] - a).norm();
-          triangle.step = kStep * std::sqrt(triangle.area);
+          triangle.size = std::sqrt(triangle.area);
+          for (int k = 0; k < 3; ++k) triangle.pressure[k] = pressure[surface.triangles[t][k]];
           triangle.integrate(ball.radius, parts[t]);
         },
         shape);
@@ -163,8 +200,16 @@ DeformedGap deformed_gap(const TaylorHoodSpace& space, const OuterSurface& surfa
     if (share < 0.5) result.weighted[i] += weight[i] * (0.5 - share) / 0.1 * overlap;
   }
   std::vector<Eigen::Triplet<double>> entries;
+  std::vector<Eigen::Triplet<double>> bends;
   result.direction = Eigen::MatrixX3d::Zero(n, 3);
   for (std::size_t t = 0; t < parts.size(); ++t) {
+    if (!parts[t].curvature.isZero(0.0)) {
+      for (int i = 0; i < 18; ++i) {
+        for (int j = 0; j < 18; ++j) {
+          bends.emplace_back(3 * nodes[t][i / 3] + i % 3, 3 * nodes[t][j / 3] + j % 3, parts[t].curvature(i, j));
+        }
+      }
+    }
     for (int k = 0; k < 3; ++k) {
       const int v = surface.triangles[t][k];
       if (scale[v] == 0.0) continue;
@@ -177,7 +222,10 @@ DeformedGap deformed_gap(const TaylorHoodSpace& space, const OuterSurface& surfa
       }
     }
   }
-  result.gradient.resize(n, 3 * static_cast<Eigen::Index>(space.nodes));
+  const auto unknowns = 3 * static_cast<Eigen::Index>(space.nodes);
+  result.curvature.resize(unknowns, unknowns);
+  result.curvature.setFromTriplets(bends.begin(), bends.end());
+  result.gradient.resize(n, unknowns);
   result.gradient.setFromTriplets(entries.begin(), entries.end());
   return result;
 }

@@ -28,13 +28,18 @@ struct DeformedGap {
   /// n x (3 nodes), mm^2: row i holds d weighted_i / d u_node, 3 * node + component
   Eigen::SparseMatrix<double, Eigen::RowMajor> gradient;
   Eigen::MatrixX3d direction;  ///< n x 3, mm^2: the gradient's sum over nodes, d weighted_i / d (shift of the gel)
+  /// (3 nodes) x (3 nodes), MPa mm: the sum of pressure_i d^2 weighted_i / du^2, by the body's curvature under the
+  /// lines.
+  Eigen::SparseMatrix<double> curvature;
   double deepest = std::numeric_limits<double>::infinity();  ///< mm, the least gap of all; negative: overlap
 };
 
 /// `weight` is int phi_i dA. Vertices that the body covers by less than half of their hats stay open: their gap is
 /// raised by up to `overlap` (mm, >= 0: how deep the body reaches under the undeformed surface), as in weighted_gap.
+/// `pressure` (n, MPa) is for `curvature` alone, which is meant for Newton's method: second differences, of no more
+/// curvature than the mesh can follow.
 DeformedGap deformed_gap(const TaylorHoodSpace& space, const OuterSurface& surface, const Eigen::VectorXd& weight,
                          const Eigen::MatrixX3d& displacement, const ContactShape& shape,
-                         const RigidTransform& gel_from_object, double overlap);
+                         const RigidTransform& gel_from_object, double overlap, const Eigen::VectorXd& pressure);
 
 }  // namespace touchstone::fem

@@ -27,8 +27,11 @@ constexpr double kBalanced = 1e-8;    // residual over the elements' forces
 constexpr double kLargestPart = 0.1;  // of the thickness: the way of one part
 constexpr double kLargestForceGrowth = 3.0;
 constexpr double kFirstTouch = 0.02;   // of the thickness: where a force-controlled press begins
+constexpr double kHold = 10.0;         // stiffness that holds what touches, over the surface's own
 constexpr double kReach = 0.5;         // of a vertex's own size: open gaps below this are candidates
 constexpr int kResolvedVertices = 13;  // as in press_report.cpp
+
+using RowSparse = Eigen::SparseMatrix<double, Eigen::RowMajor>;
 
 /// A converged state of gel and object.
 struct Snapshot {
@@ -123,6 +126,7 @@ struct FinitePress::Parts {
   bool arrived(const Snapshot& from, const PartTarget& target, const Iteration& at, const Eigen::VectorXd& scale,
                double& error) const;
   Eigen::Vector2d slid(const Snapshot& from, const Snapshot& at, int vertex, const Eigen::Matrix3d& axes) const;
+  void add_curvature(const DeformedGap& gap, const std::vector<int>& forced, SymmetricEntries& matrix) const;
   std::optional<Snapshot> solve(const Snapshot& from, const PartTarget& target, Effort& effort);
   std::optional<Snapshot> advance(const Snapshot& start, const PartTarget& target, const Snapshot& from, double begin,
                                   double end, int halvings, Effort& effort);
@@ -151,7 +155,7 @@ Eigen::MatrixX3d FinitePress::Parts::nodal_forces(const Snapshot& at) const {
   Eigen::MatrixX3d forces = gel.coupling.transpose() * at.shear;
   for (int v = 0; v < n; ++v) {
     if (at.pressure[v] == 0.0) continue;
-    for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator it(at.gap.gradient, v); it; ++it) {
+    for (RowSparse::InnerIterator it(at.gap.gradient, v); it; ++it) {
       forces(it.col() / 3, it.col() % 3) += at.pressure[v] * it.value();
     }
   }
@@ -192,7 +196,7 @@ Eigen::Vector2d FinitePress::Parts::slid(const Snapshot& from, const Snapshot& a
                                          const Eigen::Matrix3d& axes) const {
   const RigidTransform motion = at.pose * from.pose.inverse();
   Eigen::Vector3d way = Eigen::Vector3d::Zero();
-  for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator it(gel.coupling, vertex); it; ++it) {
+  for (RowSparse::InnerIterator it(gel.coupling, vertex); it; ++it) {
     const int node = static_cast<int>(it.col());
     const Eigen::Vector3d place = gel.space.position(node);
     const Eigen::Vector3d was = place + from.elastic.displacement.row(node).transpose();
@@ -245,6 +249,32 @@ bool FinitePress::Parts::arrived(const Snapshot& from, const PartTarget& target,
   return error <= 1.0;
 }
 
+/// How the forces of contact turn as the gel moves over the body, or the body over the gel.
+void FinitePress::Parts::add_curvature(const DeformedGap& gap, const std::vector<int>& forced,
+                                       SymmetricEntries& matrix) const {
+  const Scales& scales = gel.problem.scales();
+  const double unit = scales.length / (scales.stress * scales.length * scales.length);
+  for (Eigen::Index column = 0; column < gap.curvature.outerSize(); ++column) {
+    for (Eigen::SparseMatrix<double>::InnerIterator it(gap.curvature, column); it; ++it) {
+      const auto unknown = [&](Eigen::Index place) {
+        const auto node = static_cast<int>(place / 3);
+        return gel.space.clamped[node] ? -1 : gel.space.displacement[node] + static_cast<int>(place % 3);
+      };
+      const int i = unknown(it.row());
+      const int j = unknown(it.col());
+      const double value = unit * it.value();
+      if (i >= 0 && j >= i) matrix.add(i, j, -value);
+      for (int b = 0; b < static_cast<int>(forced.size()); ++b) {
+        if (forced[b] != it.col() % 3) continue;
+        if (i >= 0) matrix.add(i, gel.space.unknowns + b, value);
+        for (int a = 0; a <= b; ++a) {
+          if (forced[a] == it.row() % 3) matrix.add(gel.space.unknowns + a, gel.space.unknowns + b, -value);
+        }
+      }
+    }
+  }
+}
+
 std::optional<Snapshot> FinitePress::Parts::solve(const Snapshot& from, const PartTarget& target, Effort& effort) {
   const Scales& scales = gel.problem.scales();
   const TaylorHoodSpace& space = gel.space;
@@ -253,12 +283,12 @@ std::optional<Snapshot> FinitePress::Parts::solve(const Snapshot& from, const Pa
   for (int a = 0; a < 3; ++a) {
     if (target.forced[a]) forced.push_back(a);
   }
-  const auto k = static_cast<Eigen::Index>(forced.size());
+  const int k = static_cast<int>(forced.size());
   Iteration iterate;
   iterate.at = from;
   iterate.at.pose = target.pose;
   const double border_scale = std::sqrt(static_cast<double>(gel.mesh.outer.size())) / (scales.length * scales.length);
-  const double compliance_scale = scales.length / scales.stress / (scales.length * scales.length);
+  const double force_scale = scales.stress * scales.length * scales.length;  // N
   double least = gel.problem.smallest_volume_ratio(iterate.at.elastic);
   Eigen::VectorXd tangential_scale;  // mm^3 per MPa, per vertex
   double error = 0.0;
@@ -266,7 +296,8 @@ std::optional<Snapshot> FinitePress::Parts::solve(const Snapshot& from, const Pa
   const auto evaluate = [&] {
     Snapshot& at = iterate.at;
     const double depth = std::max(0.0, overlap(at.pose));
-    at.gap = deformed_gap(space, gel.outer, gel.rest.weight, at.elastic.displacement, shape, at.pose, depth);
+    at.gap =
+        deformed_gap(space, gel.outer, gel.rest.weight, at.elastic.displacement, shape, at.pose, depth, at.pressure);
     ++effort.updates;
     for (int v = 0; v < n; ++v) {
       if (std::isfinite(at.gap.weighted[v])) continue;
@@ -308,72 +339,97 @@ std::optional<Snapshot> FinitePress::Parts::solve(const Snapshot& from, const Pa
     }
     effort.candidates = std::max(effort.candidates, static_cast<int>(m));
 
-    // Rows of the block's laws over the displacements.
-    SymmetricEntries matrix = gel.problem.tangent(at.elastic);
-    const int first = matrix.size;
-    std::vector<Eigen::Triplet<double>> rows;
+    // Rows of the block's laws over the gel's unknowns and the object's shift along the forced axes, mm^3 per mm.
+    const int inner = space.unknowns + static_cast<int>(k);
+    std::vector<std::vector<std::pair<int, double>>> rows(static_cast<std::size_t>(c * m));
+    Eigen::VectorXd opening(c * m);  // of the laws, at this iterate: gap and slid way
     for (Eigen::Index j = 0; j < m; ++j) {
       const int v = block[static_cast<std::size_t>(j)];
-      for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator it(at.gap.gradient, v); it; ++it) {
+      const Eigen::Matrix3d& axes = iterate.axes[v];
+      auto* row = &rows[static_cast<std::size_t>(c * j)];
+      opening[c * j] = at.gap.weighted[v];
+      for (RowSparse::InnerIterator it(at.gap.gradient, v); it; ++it) {
         const int node = static_cast<int>(it.col() / 3);
         if (space.clamped[node]) continue;
-        rows.emplace_back(c * static_cast<int>(j), space.displacement[node] + static_cast<int>(it.col() % 3),
-                          it.value());
+        row[0].emplace_back(space.displacement[node] + static_cast<int>(it.col() % 3), it.value());
       }
-      for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator it(gel.coupling, v); c == 3 && it; ++it) {
+      for (RowSparse::InnerIterator it(gel.coupling, v); c == 3 && it; ++it) {
         const int node = static_cast<int>(it.col());
         if (space.clamped[node]) continue;
         for (int t = 1; t < 3; ++t) {
-          for (int a = 0; a < 3; ++a) {
-            rows.emplace_back(c * static_cast<int>(j) + t, space.displacement[node] + a,
-                              it.value() * iterate.axes[v](a, t));
+          for (int a = 0; a < 3; ++a) row[t].emplace_back(space.displacement[node] + a, it.value() * axes(a, t));
+        }
+      }
+      if (c == 3) opening.segment<2>(c * j + 1) = slid(from, at, v, axes);
+      for (int b = 0; b < k; ++b) {
+        const int a = forced[b];
+        row[0].emplace_back(space.unknowns + b, -at.gap.direction(v, a));
+        for (int t = 1; t < c; ++t) row[t].emplace_back(space.unknowns + b, -gel.rest.weight[v] * axes(a, t));
+      }
+    }
+    SymmetricEntries matrix = gel.problem.tangent(at.elastic);
+    Eigen::VectorXd right(inner);
+    right.head(space.unknowns) = -iterate.inside;
+    for (int b = 0; b < k; ++b) right[space.unknowns + b] = -target.force[forced[b]] / force_scale;
+    // A gel under pressure is stable in the hold of its contact, not under the same pressure as dead load (from a
+    // pressure of some 2 G on). What is held is therefore made stiff, by terms that vanish where it holds (the
+    // augmented Lagrangian of Hestenes and Powell), so that the compliance stays positive definite.
+    for (Eigen::Index j = 0; j < m; ++j) {
+      const int v = block[static_cast<std::size_t>(j)];
+      if (at.state[v] == NodeState::open) continue;
+      const double stiffness = kHold * scales.stress / std::pow(gel.rest.weight[v], 1.5);  // MPa per mm^3
+      for (int t = 0; t < (at.state[v] == NodeState::stick ? c : 1); ++t) {
+        const auto& row = rows[static_cast<std::size_t>(c * j + t)];
+        for (const auto& [i, x] : row) {
+          right[i] -= stiffness * x * opening[c * j + t] / force_scale;
+          for (const auto& [l, y] : row) {
+            if (l >= i) matrix.add(i, l, stiffness * x * y * scales.length / force_scale);
           }
         }
       }
     }
-    Eigen::SparseMatrix<double> border(c * m, space.unknowns);
-    border.setFromTriplets(rows.begin(), rows.end());
-    for (const auto& entry : rows) {
-      matrix.add(entry.col(), first + entry.row(), border_scale * entry.value());
+    add_curvature(at.gap, forced, matrix);
+    for (std::size_t r = 0; r < rows.size(); ++r) {
+      for (const auto& [i, x] : rows[r]) matrix.add(i, inner + static_cast<int>(r), border_scale * x);
     }
-    matrix.size = first + c * static_cast<int>(m);
+    matrix.size = inner + c * static_cast<int>(m);
+    const auto along = [&](const Eigen::VectorXd& unknowns) {  // what the laws see of a change, mm^3
+      Eigen::VectorXd seen = Eigen::VectorXd::Zero(c * m);
+      for (std::size_t r = 0; r < rows.size(); ++r) {
+        for (const auto& [i, x] : rows[r]) seen[static_cast<Eigen::Index>(r)] += scales.length * x * unknowns[i];
+      }
+      return seen;
+    };
 
     ContactAnswer answer;
     Eigen::VectorXd change;
     try {
-      BorderedFactor factor(matrix, c * static_cast<int>(m), gel.order);
+      std::vector<int> order = gel.order;
+      for (int b = 0; b < k; ++b) order.push_back(space.unknowns + b);
+      BorderedFactor factor(matrix, c * static_cast<int>(m), order);
       ++effort.factorisations;
-      const Eigen::MatrixXd compliance = factor.complement() * (-compliance_scale / (border_scale * border_scale));
-      // Where the gel would go if contact let go of it at once.
-      const Eigen::VectorXd back = factor.solve(-iterate.inside);
-      const Eigen::VectorXd response = border * back * scales.length;
+      const Eigen::MatrixXd compliance =
+          factor.complement() * (-scales.length / force_scale / (border_scale * border_scale));
+      // Where gel and object would go if contact let go at once.
+      const Eigen::VectorXd back = factor.solve(right);
+      const Eigen::VectorXd ahead = opening + along(back);
       ContactProblem contact;
       contact.compliance = &compliance;
       contact.components = c;
       contact.friction = friction;
       contact.gap.resize(m);
-      contact.border.resize(c * m, k);
-      contact.force.resize(k);
+      contact.border.resize(c * m, 0);
       if (c == 3) contact.drag.resize(2 * m);
-      for (Eigen::Index b = 0; b < k; ++b) contact.force[b] = target.force[forced[static_cast<std::size_t>(b)]];
       Eigen::VectorXd start(c * m);
       tangential_scale = Eigen::VectorXd::Zero(n);
       for (Eigen::Index j = 0; j < m; ++j) {
         const int v = block[static_cast<std::size_t>(j)];
-        contact.gap[j] = at.gap.weighted[v] + response[c * j];
+        contact.gap[j] = ahead[c * j];
         start[c * j] = at.pressure[v];
         if (c == 3) {
-          contact.drag.segment<2>(2 * j) = -slid(from, at, v, iterate.axes[v]) - response.segment<2>(c * j + 1);
+          contact.drag.segment<2>(2 * j) = -ahead.segment<2>(c * j + 1);
           start.segment<2>(c * j + 1) = iterate.axes[v].rightCols<2>().transpose() * at.shear.row(v).transpose();
           tangential_scale[v] = std::max(compliance(c * j + 1, c * j + 1), compliance(c * j + 2, c * j + 2));
-        }
-        for (Eigen::Index b = 0; b < k; ++b) {
-          const int a = forced[static_cast<std::size_t>(b)];
-          contact.border(c * j, b) = -at.gap.direction(v, a);
-          if (c == 3) {
-            contact.border.block<2, 1>(c * j + 1, b) =
-                -gel.rest.weight[v] * iterate.axes[v].row(a).rightCols<2>().transpose();
-          }
         }
       }
       if (!at.touching && iteration == 0) start.resize(0);
@@ -387,7 +443,10 @@ std::optional<Snapshot> FinitePress::Parts::solve(const Snapshot& from, const Pa
                               answer.residual, m);
         return std::nullopt;
       }
-      const Eigen::VectorXd push = border.transpose() * answer.z / (scales.stress * scales.length * scales.length);
+      Eigen::VectorXd push = Eigen::VectorXd::Zero(inner);
+      for (std::size_t r = 0; r < rows.size(); ++r) {
+        for (const auto& [i, x] : rows[r]) push[i] += x * answer.z[static_cast<Eigen::Index>(r)] / force_scale;
+      }
       change = back + factor.solve(push);
     } catch (const Error& singular) {
       why_not = singular.what();
@@ -402,8 +461,8 @@ std::optional<Snapshot> FinitePress::Parts::solve(const Snapshot& from, const Pa
       next = gel.problem.moved(at.elastic, change, factor);
       const double ratio = gel.problem.smallest_volume_ratio(next);
       pose = at.pose;
-      for (Eigen::Index b = 0; b < k; ++b) {
-        pose.translation[forced[static_cast<std::size_t>(b)]] += factor * answer.shift[b];
+      for (int b = 0; b < k; ++b) {
+        pose.translation[forced[b]] += factor * scales.length * change[space.unknowns + b];
       }
       if (!(ratio > kLeastShrink * least)) {
         why_not = fmt::format("a tetrahedron turns inside out (its volume falls to {:.2g} of what it was)", ratio);
@@ -444,6 +503,32 @@ std::optional<Snapshot> FinitePress::Parts::solve(const Snapshot& from, const Pa
         }
       }
       return found;
+    }
+    if (getenv("TRACE")) {
+      double go = 0, gc = 0;
+      int wo = -1, wc = -1;
+      int na = 0;
+      for (int v = 0; v < n; ++v) {
+        if (!std::isfinite(at.gap.weighted[v])) continue;
+        double g = at.gap.weighted[v] / gel.rest.weight[v];
+        if (at.state[v] == NodeState::open) {
+          if (-g > go) {
+            go = -g;
+            wo = v;
+          }
+        } else {
+          ++na;
+          if (std::abs(g) > gc) {
+            gc = std::abs(g);
+            wc = v;
+          }
+        }
+      }
+      fmt::print(stderr,
+                 "it {} bal {:.2e} open pen {:.2e} ({}) closed {:.2e} ({}) active {} m {} factor {} err {:.2e} change "
+                 "{:.2e} F {:.6f} J {:.3f}\n",
+                 iteration, iterate.balance, go, wo, gc, wc, na, m, factor, error,
+                 change.head(space.unknowns).cwiseAbs().maxCoeff() * scales.length, at.force.z(), least);
     }
     if (!std::isfinite(iterate.balance)) break;
   }
