@@ -17,6 +17,7 @@ constexpr double kLeastShare = 0.25;    // covered share below which a vertex is
 constexpr double kStep = 1e-5;          // of a triangle's size: for the body's slope by central differences
 constexpr double kWideStep = 0.02;      // of a triangle's size: for the body's curvature by second differences
 constexpr double kMostCurvature = 3.0;  // over a triangle's size
+constexpr double kBulge = 4.0;          // an edge's stiffness over pressure times length
 constexpr double kSteepest = 3.0;       // slope of the body against the gel beyond which a line only grazes its flank
 
 /// Values of the six quadratic functions of a triangle: corners, then the edges 01, 12, 20.
@@ -35,6 +36,7 @@ struct TrianglePart {
   Eigen::Vector3d covered = Eigen::Vector3d::Zero();
   Eigen::Matrix<double, 3, 18> gradient = Eigen::Matrix<double, 3, 18>::Zero();
   Eigen::Matrix<double, 18, 18> curvature = Eigen::Matrix<double, 18, 18>::Zero();
+  std::vector<EdgeBulge> bulges;
   double lowest = kInfinity;
 };
 
@@ -83,15 +85,15 @@ struct DeformedTriangle {
     return result;
   }
 
-  void integrate(double body_radius, TrianglePart& part) const {
+  std::optional<double> gap_at(const Eigen::Vector3d& point, const Eigen::Vector3d& along) const {
+    const auto gap = first_entry(shape, point, along);
     // A line that grazes a flank of the body (beside a punch, where the gel's face is tilted towards it) is a miss.
-    const auto line = [this](const Eigen::Vector3d& b) -> std::optional<double> {
-      const Eigen::Vector3d point = points * face_shape(b);
-      const Eigen::Vector3d along = direction(b);
-      const auto gap = first_entry(shape, point, along);
-      if (gap && slope(point, along, *gap).squaredNorm() > 1.0 + kSteepest * kSteepest) return std::nullopt;
-      return gap;
-    };
+    if (gap && slope(point, along, *gap).squaredNorm() > 1.0 + kSteepest * kSteepest) return std::nullopt;
+    return gap;
+  }
+
+  void integrate(double body_radius, TrianglePart& part) const {
+    const auto line = [this](const Eigen::Vector3d& b) { return gap_at(points * face_shape(b), direction(b)); };
     const auto visit = [&](const Eigen::Vector3d& b, double gap, double share) {
       const double weight = share * area;
       const Eigen::Matrix<double, 6, 1> values = face_shape(b);
@@ -115,6 +117,27 @@ struct DeformedTriangle {
     CoveredTriangle(line, visit).integrate(splits_for_body(area, body_radius));
   }
 };
+
+/// The bulge of the triangle's edge from corner k to the next, its stiffness left open; nothing if a line misses.
+template <typename Shape>
+std::optional<EdgeBulge> bulge_of(const DeformedTriangle<Shape>& triangle, const std::array<int, 6>& nodes, int k) {
+  EdgeBulge bulge;
+  const int next = (k + 1) % 3;
+  bulge.nodes = {nodes[3 + k], nodes[k], nodes[next]};
+  const Eigen::Vector3d one = Eigen::Vector3d::Unit(k);
+  const Eigen::Vector3d other = Eigen::Vector3d::Unit(next);
+  const std::array<Eigen::Vector3d, 3> at = {0.5 * (one + other), one, other};
+  for (int i = 0; i < 3; ++i) {
+    const Eigen::Vector3d point = triangle.points * face_shape(at[i]);
+    const Eigen::Vector3d along = triangle.direction(at[i]);
+    const auto gap = triangle.gap_at(point, along);
+    if (!gap) return std::nullopt;
+    const double share = i == 0 ? 1.0 : -0.5;
+    bulge.value += share * *gap;
+    bulge.gradient[i] = share * (triangle.gel_from_object * triangle.slope(point, along, *gap));
+  }
+  return bulge;
+}
 
 std::array<int, 6> nodes_of(const TaylorHoodSpace& space, const std::array<int, 3>& face) {
   return {face[0],
@@ -174,6 +197,17 @@ DeformedGap deformed_gap(const TaylorHoodSpace& space, const OuterSurface& surfa
           triangle.size = std::sqrt(triangle.area);
           for (int k = 0; k < 3; ++k) triangle.pressure[k] = pressure[surface.triangles[t][k]];
           triangle.integrate(ball.radius, parts[t]);
+          for (int k = 0; k < 3; ++k) {
+            const int next = (k + 1) % 3;
+            // Each edge once, from the triangle that goes along it from its lower vertex.
+            if (surface.triangles[t][k] > surface.triangles[t][next]) continue;
+            if (triangle.pressure[k] <= 0.0 || triangle.pressure[next] <= 0.0) continue;
+            const double length = (mesh.vertices[mesh.outer[t][k]] - mesh.vertices[mesh.outer[t][next]]).norm();
+            if (auto bulge = bulge_of(triangle, nodes[t], k)) {
+              bulge->stiffness = kBulge * 0.5 * (triangle.pressure[k] + triangle.pressure[next]) * length;
+              parts[t].bulges.push_back(*bulge);
+            }
+          }
         },
         shape);
   });
@@ -187,6 +221,7 @@ DeformedGap deformed_gap(const TaylorHoodSpace& space, const OuterSurface& surfa
       covered[surface.triangles[t][k]] += parts[t].covered[k];
     }
     result.deepest = std::min(result.deepest, parts[t].lowest);
+    result.bulges.insert(result.bulges.end(), parts[t].bulges.begin(), parts[t].bulges.end());
   }
   Eigen::VectorXd scale = Eigen::VectorXd::Zero(n);
   for (Eigen::Index i = 0; i < n; ++i) {

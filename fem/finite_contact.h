@@ -15,6 +15,17 @@
 
 namespace touchstone::fem {
 
+/// What holds the middle of an edge in contact between its ends. The hats' mean gaps leave the quadratic part of the
+/// surface free, and under a pressure of some 2 G those modes buckle (in the continuum, contact holds them): so each
+/// edge resists bulging against the body with a stiffness in proportion to the pressure on it. Where contact is close
+/// it has nothing to resist, and for small loads it vanishes beside the gel's own stiffness.
+struct EdgeBulge {
+  std::array<int, 3> nodes{};  ///< middle, then the two ends
+  double value = 0.0;          ///< mm: gap in the middle less the ends' mean
+  double stiffness = 0.0;      ///< N/mm
+  std::array<Eigen::Vector3d, 3> gradient;
+};
+
 /// The gap of each surface vertex at a deformed state.
 ///
 /// gap(x) is the distance from the deformed surface point x (the quadratic displacement itself, not its projection)
@@ -31,13 +42,14 @@ struct DeformedGap {
   /// (3 nodes) x (3 nodes), MPa mm: the sum of pressure_i d^2 weighted_i / du^2, by the body's curvature under the
   /// lines.
   Eigen::SparseMatrix<double> curvature;
+  std::vector<EdgeBulge> bulges;
   double deepest = std::numeric_limits<double>::infinity();  ///< mm, the least gap of all; negative: overlap
 };
 
 /// `weight` is int phi_i dA. Vertices that the body covers by less than half of their hats stay open: their gap is
 /// raised by up to `overlap` (mm, >= 0: how deep the body reaches under the undeformed surface), as in weighted_gap.
-/// `pressure` (n, MPa) is for `curvature` alone, which is meant for Newton's method: second differences, of no more
-/// curvature than the mesh can follow.
+/// `pressure` (n, MPa) is for `bulges` and `curvature`; the latter is meant for Newton's method: second differences, of
+/// no more curvature than the mesh can follow.
 DeformedGap deformed_gap(const TaylorHoodSpace& space, const OuterSurface& surface, const Eigen::VectorXd& weight,
                          const Eigen::MatrixX3d& displacement, const ContactShape& shape,
                          const RigidTransform& gel_from_object, double overlap, const Eigen::VectorXd& pressure);

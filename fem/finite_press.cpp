@@ -120,6 +120,7 @@ struct FinitePress::Parts {
   }
   void refuse_too_deep(const RigidTransform& pose) const;
   Eigen::MatrixX3d nodal_forces(const Snapshot& at) const;
+  Eigen::MatrixX3d bulge_forces(const Snapshot& at) const;
   Eigen::VectorXd free_part(const Eigen::MatrixX3d& nodal) const;
   std::vector<int> candidates(const Snapshot& at) const;
   struct Iteration;
@@ -150,7 +151,18 @@ void FinitePress::Parts::refuse_too_deep(const RigidTransform& pose) const {
   if (depth > gel.thickness) fail("the object reaches {:.4g} mm into a gel of {:.4g} mm", depth, gel.thickness);
 }
 
-/// What contact does to the gel's nodes, N.
+/// What the edges in contact do to the gel's nodes against their bulging, N.
+Eigen::MatrixX3d FinitePress::Parts::bulge_forces(const Snapshot& at) const {
+  Eigen::MatrixX3d forces = Eigen::MatrixX3d::Zero(gel.space.nodes, 3);
+  for (const EdgeBulge& bulge : at.gap.bulges) {
+    for (int i = 0; i < 3; ++i) {
+      forces.row(bulge.nodes[i]) -= (bulge.stiffness * bulge.value) * bulge.gradient[i].transpose();
+    }
+  }
+  return forces;
+}
+
+/// What the tractions of contact do to the gel's nodes, N.
 Eigen::MatrixX3d FinitePress::Parts::nodal_forces(const Snapshot& at) const {
   Eigen::MatrixX3d forces = gel.coupling.transpose() * at.shear;
   for (int v = 0; v < n; ++v) {
@@ -316,8 +328,10 @@ std::optional<Snapshot> FinitePress::Parts::solve(const Snapshot& from, const Pa
       }
     }
     const Eigen::MatrixX3d nodal = nodal_forces(at);
-    at.force = -nodal.colwise().sum().transpose();
+    const Eigen::MatrixX3d bulges = bulge_forces(at);
+    at.force = -(nodal + bulges).colwise().sum().transpose();
     iterate.residual = gel.problem.residual(at.elastic);
+    iterate.residual.values -= free_part(bulges);
     iterate.inside = iterate.residual.values;
     const Eigen::VectorXd outside = free_part(nodal);
     iterate.residual.values -= outside;
@@ -389,6 +403,19 @@ std::optional<Snapshot> FinitePress::Parts::solve(const Snapshot& from, const Pa
       }
     }
     add_curvature(at.gap, forced, matrix);
+    for (const EdgeBulge& bulge : at.gap.bulges) {
+      for (int i = 0; i < 9; ++i) {
+        for (int l = 0; l < 9; ++l) {
+          const int one = bulge.nodes[i / 3];
+          const int other = bulge.nodes[l / 3];
+          if (space.clamped[one] || space.clamped[other]) continue;
+          const int row = space.displacement[one] + i % 3;
+          const int column = space.displacement[other] + l % 3;
+          const double value = bulge.stiffness * bulge.gradient[i / 3][i % 3] * bulge.gradient[l / 3][l % 3];
+          if (column >= row) matrix.add(row, column, value * scales.length / force_scale);
+        }
+      }
+    }
     for (std::size_t r = 0; r < rows.size(); ++r) {
       for (const auto& [i, x] : rows[r]) matrix.add(i, inner + static_cast<int>(r), border_scale * x);
     }
@@ -670,7 +697,7 @@ PressState FinitePress::Parts::report(const Snapshot& at) const {
   s.contact_residual = at.residual;
   if (at.touching) {
     s.surface_displacement = mass.solve(gel.coupling * at.elastic.displacement);
-    const Eigen::MatrixX3d nodal = nodal_forces(at);
+    const Eigen::MatrixX3d nodal = nodal_forces(at) + bulge_forces(at);
     s.wrench.head<3>() = at.force;
     for (int node = 0; node < gel.space.nodes; ++node) {
       const Eigen::Vector3d place = gel.space.position(node) + at.elastic.displacement.row(node).transpose();
