@@ -27,7 +27,7 @@ constexpr double kBalanced = 1e-8;    // residual over the elements' forces
 constexpr double kLargestPart = 0.1;  // of the thickness: the way of one part
 constexpr double kLargestForceGrowth = 3.0;
 constexpr double kFirstTouch = 0.02;   // of the thickness: where a force-controlled press begins
-constexpr double kHold = 10.0;         // stiffness that holds what touches, over the surface's own
+constexpr double kHold = 1000.0;       // stiffness that holds what touches, over the surface's own
 constexpr double kReach = 0.5;         // of a vertex's own size: open gaps below this are candidates
 constexpr int kResolvedVertices = 13;  // as in press_report.cpp
 
@@ -64,6 +64,15 @@ Eigen::Matrix3d axes_along(const Eigen::Vector3d& direction) {
   Eigen::Matrix3d axes;
   axes << first, second, first.cross(second);
   return axes;
+}
+
+/// Adds factor * row row^T, upper triangle.
+void add_square(const std::vector<std::pair<int, double>>& row, double factor, SymmetricEntries& matrix) {
+  for (const auto& [i, x] : row) {
+    for (const auto& [j, y] : row) {
+      if (j >= i) matrix.add(i, j, factor * x * y);
+    }
+  }
 }
 
 }  // namespace
@@ -221,9 +230,10 @@ Eigen::Vector2d FinitePress::Parts::slid(const Snapshot& from, const Snapshot& a
 /// One Newton iterate.
 struct FinitePress::Parts::Iteration {
   Snapshot at;
-  FiniteStrain::Residual residual;    ///< with the forces of contact
-  Eigen::VectorXd inside;             ///< without them
-  std::vector<Eigen::Matrix3d> axes;  ///< per vertex; only where it has a gap
+  FiniteStrain::Residual residual;                   ///< with the forces of contact
+  Eigen::VectorXd inside;                            ///< without them
+  Eigen::Vector3d bulges = Eigen::Vector3d::Zero();  ///< sum of bulge_forces, N
+  std::vector<Eigen::Matrix3d> axes;                 ///< per vertex; only where it has a gap
   double balance = 0.0;
 };
 
@@ -329,6 +339,7 @@ std::optional<Snapshot> FinitePress::Parts::solve(const Snapshot& from, const Pa
     }
     const Eigen::MatrixX3d nodal = nodal_forces(at);
     const Eigen::MatrixX3d bulges = bulge_forces(at);
+    iterate.bulges = bulges.colwise().sum();
     at.force = -(nodal + bulges).colwise().sum().transpose();
     iterate.residual = gel.problem.residual(at.elastic);
     iterate.residual.values -= free_part(bulges);
@@ -384,7 +395,9 @@ std::optional<Snapshot> FinitePress::Parts::solve(const Snapshot& from, const Pa
     SymmetricEntries matrix = gel.problem.tangent(at.elastic);
     Eigen::VectorXd right(inner);
     right.head(space.unknowns) = -iterate.inside;
-    for (int b = 0; b < k; ++b) right[space.unknowns + b] = -target.force[forced[b]] / force_scale;
+    for (int b = 0; b < k; ++b) {
+      right[space.unknowns + b] = -(target.force[forced[b]] + iterate.bulges[forced[b]]) / force_scale;
+    }
     // A gel under pressure is stable in the hold of its contact, not under the same pressure as dead load (from a
     // pressure of some 2 G on). What is held is therefore made stiff, by terms that vanish where it holds (the
     // augmented Lagrangian of Hestenes and Powell), so that the compliance stays positive definite.
@@ -396,25 +409,22 @@ std::optional<Snapshot> FinitePress::Parts::solve(const Snapshot& from, const Pa
         const auto& row = rows[static_cast<std::size_t>(c * j + t)];
         for (const auto& [i, x] : row) {
           right[i] -= stiffness * x * opening[c * j + t] / force_scale;
-          for (const auto& [l, y] : row) {
-            if (l >= i) matrix.add(i, l, stiffness * x * y * scales.length / force_scale);
-          }
         }
+        add_square(row, stiffness * scales.length / force_scale, matrix);
       }
     }
     add_curvature(at.gap, forced, matrix);
     for (const EdgeBulge& bulge : at.gap.bulges) {
+      std::vector<std::pair<int, double>> row;
       for (int i = 0; i < 9; ++i) {
-        for (int l = 0; l < 9; ++l) {
-          const int one = bulge.nodes[i / 3];
-          const int other = bulge.nodes[l / 3];
-          if (space.clamped[one] || space.clamped[other]) continue;
-          const int row = space.displacement[one] + i % 3;
-          const int column = space.displacement[other] + l % 3;
-          const double value = bulge.stiffness * bulge.gradient[i / 3][i % 3] * bulge.gradient[l / 3][l % 3];
-          if (column >= row) matrix.add(row, column, value * scales.length / force_scale);
-        }
+        const int node = bulge.nodes[i / 3];
+        if (!space.clamped[node]) row.emplace_back(space.displacement[node] + i % 3, bulge.gradient[i / 3][i % 3]);
       }
+      for (int b = 0; b < k; ++b) {
+        const int a = forced[b];
+        row.emplace_back(space.unknowns + b, -(bulge.gradient[0][a] + bulge.gradient[1][a] + bulge.gradient[2][a]));
+      }
+      add_square(row, bulge.stiffness * scales.length / force_scale, matrix);
     }
     for (std::size_t r = 0; r < rows.size(); ++r) {
       for (const auto& [i, x] : rows[r]) matrix.add(i, inner + static_cast<int>(r), border_scale * x);
@@ -530,32 +540,6 @@ std::optional<Snapshot> FinitePress::Parts::solve(const Snapshot& from, const Pa
         }
       }
       return found;
-    }
-    if (getenv("TRACE")) {
-      double go = 0, gc = 0;
-      int wo = -1, wc = -1;
-      int na = 0;
-      for (int v = 0; v < n; ++v) {
-        if (!std::isfinite(at.gap.weighted[v])) continue;
-        double g = at.gap.weighted[v] / gel.rest.weight[v];
-        if (at.state[v] == NodeState::open) {
-          if (-g > go) {
-            go = -g;
-            wo = v;
-          }
-        } else {
-          ++na;
-          if (std::abs(g) > gc) {
-            gc = std::abs(g);
-            wc = v;
-          }
-        }
-      }
-      fmt::print(stderr,
-                 "it {} bal {:.2e} open pen {:.2e} ({}) closed {:.2e} ({}) active {} m {} factor {} err {:.2e} change "
-                 "{:.2e} F {:.6f} J {:.3f}\n",
-                 iteration, iterate.balance, go, wo, gc, wc, na, m, factor, error,
-                 change.head(space.unknowns).cwiseAbs().maxCoeff() * scales.length, at.force.z(), least);
     }
     if (!std::isfinite(iterate.balance)) break;
   }
