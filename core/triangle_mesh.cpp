@@ -113,7 +113,8 @@ double enclosed_volume(const TriangleMesh& mesh) {
   return six_volumes / 6.0;
 }
 
-TriangleMesh weld(const TriangleMesh& mesh, double distance) {
+TriangleMesh weld(const TriangleMesh& mesh, double distance, std::vector<int>* kept) {
+  if (kept != nullptr) kept->clear();
   // Cells as wide as the distance: what is nearer lies in the same or a neighbouring cell. Cell numbers are doubles,
   // which can't overflow.
   using Cell = std::array<double, 3>;
@@ -163,14 +164,17 @@ TriangleMesh weld(const TriangleMesh& mesh, double distance) {
     new_index[i] = index;
   }
   const auto count = static_cast<int>(mesh.vertices.size());
-  for (const auto& t : mesh.triangles) {
-    std::array<int, 3> triangle = t;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    std::array<int, 3> triangle = mesh.triangles[t];
     for (int& vertex : triangle) {
       // An index out of range stays out of range.
       vertex = vertex >= 0 && vertex < count ? new_index[vertex] : std::numeric_limits<int>::max();
     }
     const bool collapsed = triangle[0] == triangle[1] || triangle[1] == triangle[2] || triangle[2] == triangle[0];
-    if (!collapsed || triangle[0] == std::numeric_limits<int>::max()) welded.triangles.push_back(triangle);
+    if (!collapsed || triangle[0] == std::numeric_limits<int>::max()) {
+      welded.triangles.push_back(triangle);
+      if (kept != nullptr) kept->push_back(static_cast<int>(t));
+    }
   }
   return welded;
 }

@@ -25,7 +25,8 @@ std::string fault_of_closed_mesh(const TriangleMesh& mesh);
 double enclosed_volume(const TriangleMesh& mesh);
 
 /// Joins vertices that are nearer than `distance` (mm) and drops the triangles that collapse. glTF files split
-/// vertices at seams of normals or texture; the solid is the same.
-TriangleMesh weld(const TriangleMesh& mesh, double distance);
+/// vertices at seams of normals or texture; the solid is the same. `kept`, if given, becomes the former number of each
+/// triangle that is left.
+TriangleMesh weld(const TriangleMesh& mesh, double distance, std::vector<int>* kept = nullptr);
 
 }  // namespace touchstone

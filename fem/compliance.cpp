@@ -30,18 +30,23 @@ void add_border(const TaylorHoodSpace& space, const Eigen::SparseMatrix<double>&
 
 Compliance compute_compliance(const TetMesh& mesh, const ElasticMaterial& material, std::span<const Bead> beads,
                               double thickness, const Progress& progress) {
+  return compute_compliance(mesh, std::vector<ElasticMaterial>(region_count(mesh), material), beads, thickness,
+                            progress);
+}
+
+Compliance compute_compliance(const TetMesh& mesh, std::span<const ElasticMaterial> materials,
+                              std::span<const Bead> beads, double thickness, const Progress& progress) {
   const auto tell = [&](int step) {
     if (progress) {
       progress("elasticity", step, 3);
     }
   };
-  check(material);
   if (!std::isfinite(thickness) || thickness <= 0.0) {
     fail("the gel's thickness is {} mm; it must be finite and above zero", thickness);
   }
   tell(0);
-  const TaylorHoodSpace space = make_space(mesh);
-  const Scales scales = make_scales(mesh, material);
+  const TaylorHoodSpace space = make_space(mesh, materials);
+  const Scales scales = make_scales(mesh, materials);
   const OuterSurface surface = outer_surface(mesh);
   const int n = static_cast<int>(surface.mesh_vertex.size());
   const int m = static_cast<int>(beads.size());
@@ -65,7 +70,7 @@ Compliance compute_compliance(const TetMesh& mesh, const ElasticMaterial& materi
 
   Compliance gel;
   gel.thickness = thickness;
-  gel.material = material;
+  gel.material = materials.front();
   for (const int vertex : surface.mesh_vertex) {
     gel.vertices.push_back(mesh.vertices[vertex]);
   }

@@ -34,8 +34,8 @@ struct ComplianceReport {
 /// Linear response of the gel to tractions on its outer surface, which are P1 on its triangles. Degree of freedom
 /// 3*i + a is component a (gel frame) at surface vertex i.
 struct Compliance {
-  double thickness = 0.0;  ///< mm
-  ElasticMaterial material;
+  double thickness = 0.0;                     ///< mm
+  ElasticMaterial material;                   ///< of region 0: the gel's body
   std::vector<Eigen::Vector3d> vertices;      ///< n vertices of the outer surface, mm
   std::vector<std::array<int, 3>> triangles;  ///< over `vertices`, normal out
   Eigen::SparseMatrix<double> mass;  ///< n x n: int phi_i phi_j dA, mm^2 (P1 hats); its row sums are the weights
@@ -48,11 +48,13 @@ struct Compliance {
 /// is asked for (int phi_i u_a over the outer surface; the mean over each bead's surface); the Schur complement of
 /// [K C^T; C 0] on the border is -C K^-1 C^T. A bead is a rigid sphere that moves with the gel and doesn't stiffen it:
 /// it goes where the gel's mean over its surface goes (Faxen's law for a sphere without a force on it). The vertices
-/// keep the mesh's order. `thickness` is copied.
+/// keep the mesh's order. `materials` has one entry for each region of the mesh. `thickness` is copied.
 /// @throws Error for an unfit mesh (see fault_of) or material, for a bead that isn't wholly inside the gel, for more
 /// than kMostSurfaceVertices, or if memory runs out
+Compliance compute_compliance(const TetMesh& mesh, std::span<const ElasticMaterial> materials,
+                              std::span<const Bead> beads, double thickness, const Progress& progress = {});
 Compliance compute_compliance(const TetMesh& mesh, const ElasticMaterial& material, std::span<const Bead> beads,
-                              double thickness, const Progress& progress = {});
+                              double thickness, const Progress& progress = {});  ///< the same in all regions
 
 /// The compliance of more surface vertices would take over 4.6 GB.
 inline constexpr int kMostSurfaceVertices = 8000;

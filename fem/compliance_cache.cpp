@@ -185,16 +185,19 @@ void write_file(const std::filesystem::path& path, const std::string& key, const
 
 }  // namespace
 
-std::string compliance_key(const SlabMesh& slab, const ElasticMaterial& material, std::span<const Bead> beads) {
+std::string compliance_key(const GelBody& body, std::span<const ElasticMaterial> materials,
+                           std::span<const Bead> beads) {
   Sha256 sum;
-  sum.add("touchstone compliance of a slab, format " + std::to_string(kComplianceFormat));
+  sum.add("touchstone compliance of a gel, format " + std::to_string(kComplianceFormat));
+  add_to(sum, body);
   const auto add = [&](double value) {
     value += 0.0;  // -0 and 0 are one gel
     sum.add(&value, sizeof(value));
   };
-  for (const double value : {slab.size_x, slab.size_y, slab.thickness, slab.fine, slab.coarse, slab.fine_half_x,
-                             slab.fine_half_y, slab.fine_depth, material.youngs_modulus, material.poisson_ratio}) {
-    add(value);
+  add(static_cast<double>(materials.size()));
+  for (const ElasticMaterial& material : materials) {
+    add(material.youngs_modulus);
+    add(material.poisson_ratio);
   }
   for (const Bead& bead : beads) {
     add(bead.centre.x());
@@ -205,15 +208,28 @@ std::string compliance_key(const SlabMesh& slab, const ElasticMaterial& material
   return sum.digest();
 }
 
+std::string compliance_key(const SlabMesh& slab, const ElasticMaterial& material, std::span<const Bead> beads) {
+  return compliance_key(SlabGel{slab, {}}, std::span(&material, 1), beads);
+}
+
 std::filesystem::path compliance_file(const std::filesystem::path& cache_dir, const std::string& key) {
   return cache_dir / ("compliance-" + key + ".bin");
 }
 
 Compliance cached_compliance(const SlabMesh& slab, const ElasticMaterial& material, std::span<const Bead> beads,
                              const std::filesystem::path& cache_dir, const Progress& progress) {
-  check(slab);
-  check(material);
-  const std::string key = compliance_key(slab, material, beads);
+  return cached_compliance(SlabGel{slab, {}}, std::span(&material, 1), beads, cache_dir, progress);
+}
+
+Compliance cached_compliance(const GelBody& body, std::span<const ElasticMaterial> materials,
+                             std::span<const Bead> beads, const std::filesystem::path& cache_dir,
+                             const Progress& progress) {
+  check(body);
+  for (const ElasticMaterial& material : materials) check(material);
+  if (static_cast<int>(materials.size()) != material_count(body)) {
+    fail("the gel takes {} materials, but {} are given", material_count(body), materials.size());
+  }
+  const std::string key = compliance_key(body, materials, beads);
   const std::filesystem::path path = compliance_file(cache_dir, key);
   const bool keep = !cache_dir.empty();
   std::string note;
@@ -225,7 +241,7 @@ Compliance cached_compliance(const SlabMesh& slab, const ElasticMaterial& materi
       note = fmt::format("the cached compliance {} was made anew: {}", path.string(), error.what());
     }
   }
-  Compliance gel = compute_compliance(mesh_slab(slab), material, beads, slab.thickness, progress);
+  Compliance gel = compute_compliance(mesh_gel(body), materials, beads, thickness_of(body), progress);
   if (keep) {
     try {
       std::filesystem::create_directories(cache_dir, ignored);

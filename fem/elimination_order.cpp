@@ -237,6 +237,11 @@ std::vector<int> elimination_order(const TaylorHoodSpace& space) {
   }
   std::vector<int> order;
   Dissection(space).order(std::move(nodes), order);
+  // A vertex' further pressures meet no node that the vertex itself doesn't: they follow it.
+  std::vector<std::vector<int>> further(space.vertices);
+  for (std::size_t k = space.vertices; k < space.pressure.size(); ++k) {
+    further[space.pressure_vertex[k]].push_back(space.pressure[k]);
+  }
   std::vector<int> unknowns;
   unknowns.reserve(space.unknowns);
   for (const int node : order) {
@@ -247,6 +252,7 @@ std::vector<int> elimination_order(const TaylorHoodSpace& space) {
     }
     if (node < space.vertices) {
       unknowns.push_back(space.pressure[node]);
+      unknowns.insert(unknowns.end(), further[node].begin(), further[node].end());
     }
   }
   TS_ASSERT(static_cast<int>(unknowns.size()) == space.unknowns);

@@ -77,10 +77,11 @@ void add_square(const std::vector<std::pair<int, double>>& row, double factor, S
 
 }  // namespace
 
-FiniteGel::FiniteGel(TetMesh given, const ElasticMaterial& material, std::span<const Bead> beads, double depth)
+FiniteGel::FiniteGel(TetMesh given, std::span<const ElasticMaterial> materials, std::span<const Bead> beads,
+                     double depth)
     : mesh(std::move(given)),
-      space(make_space(mesh)),
-      problem(space, material),
+      space(make_space(mesh, materials)),
+      problem(space, materials),
       thickness(depth),
       order(elimination_order(space)),
       outer(outer_surface(mesh)),

@@ -24,8 +24,8 @@ namespace touchstone::fem {
 
 /// A gel and all that its presses share. Stays where it was made.
 struct FiniteGel {
-  /// @throws Error as compute_compliance
-  FiniteGel(TetMesh mesh, const ElasticMaterial& material, std::span<const Bead> beads, double thickness);
+  /// One material a region of the mesh. @throws Error as compute_compliance
+  FiniteGel(TetMesh mesh, std::span<const ElasticMaterial> materials, std::span<const Bead> beads, double thickness);
   FiniteGel(const FiniteGel&) = delete;
   FiniteGel& operator=(const FiniteGel&) = delete;
 

@@ -29,7 +29,7 @@ using ElementGradients = std::array<Eigen::Matrix<double, 3, 10>, kPoints>;
 
 /// What one element's blocks need at each point.
 struct FiniteStrain::ElementState {
-  std::array<int, 10> nodes{};
+  NeoHookean material;
   ElementGradients gradients;                        // over the undeformed mesh
   std::array<Eigen::Matrix3d, kPoints> to_deformed;  // F^-T
   std::array<double, kPoints> volume_ratio{};        // J
@@ -38,25 +38,25 @@ struct FiniteStrain::ElementState {
   std::array<Eigen::Matrix3d, kPoints> deformation;  // F
 };
 
-FiniteStrain::FiniteStrain(const TaylorHoodSpace& space, const ElasticMaterial& material)
-    : space_(space), scales_(make_scales(*space.mesh, material)), material_(scales_), around_(space.nodes) {
+FiniteStrain::FiniteStrain(const TaylorHoodSpace& space, std::span<const ElasticMaterial> materials)
+    : space_(space), scales_(make_scales(*space.mesh, materials)) {
   TS_ASSERT(symmetric_tetrahedron_rule().size() == kPoints);
-  for (std::size_t e = 0; e < space.elements.size(); ++e) {
-    for (int k = 0; k < 10; ++k) {
-      around_[space.elements[e][k]].push_back(static_cast<int>(e) * 10 + k);
-    }
-  }
 }
 
+FiniteStrain::FiniteStrain(const TaylorHoodSpace& space, const ElasticMaterial& material)
+    : FiniteStrain(space, std::vector<ElasticMaterial>(region_count(*space.mesh), material)) {}
+
 ElasticSolution FiniteStrain::at_rest() const {
-  return {Eigen::MatrixX3d::Zero(space_.nodes, 3), Eigen::VectorXd::Zero(space_.vertices)};
+  return {Eigen::MatrixX3d::Zero(space_.nodes, 3),
+          Eigen::VectorXd::Zero(static_cast<Eigen::Index>(space_.pressure.size()))};
 }
 
 FiniteStrain::ElementState FiniteStrain::element_state(const ElasticSolution& state, int element) const {
   const TetMesh& mesh = *space_.mesh;
   const auto& rule = symmetric_tetrahedron_rule();
   ElementState result;
-  result.nodes = space_.elements[element];
+  const std::array<int, 10>& nodes = space_.elements[element];
+  result.material = scales_.regions[mesh.region_of(element)];
   std::array<Eigen::Vector3d, 4> corners;
   for (int k = 0; k < 4; ++k) {
     corners[k] = mesh.vertices[mesh.tetrahedra[element][k]];
@@ -64,12 +64,12 @@ FiniteStrain::ElementState FiniteStrain::element_state(const ElasticSolution& st
   Eigen::Matrix<double, 3, 10> displacement;
   Eigen::Vector4d q;
   for (int k = 0; k < 10; ++k) {
-    displacement.col(k) = state.displacement.row(result.nodes[k]).transpose() / scales_.length;
+    displacement.col(k) = state.displacement.row(nodes[k]).transpose() / scales_.length;
   }
   // The scale is zero where there's no pressure at all (nu = 0).
-  const double per_unknown = scales_.stress * scales_.pressure_scale;
+  const double per_unknown = scales_.stress * result.material.pressure_scale;
   for (int k = 0; k < 4; ++k) {
-    q[k] = per_unknown > 0.0 ? state.pressure[result.nodes[k]] / per_unknown : 0.0;
+    q[k] = per_unknown > 0.0 ? state.pressure[space_.element_pressures[element][k]] / per_unknown : 0.0;
   }
   const double size = volume(mesh, mesh.tetrahedra[element]) / std::pow(scales_.length, 3);
   for (int i = 0; i < kPoints; ++i) {
@@ -83,28 +83,29 @@ FiniteStrain::ElementState FiniteStrain::element_state(const ElasticSolution& st
   return result;
 }
 
-/// Coupling of one of an element's nodes (rows: displacement 0..2, pressure 3) with all ten (columns), or with those
-/// of no lower number only. With G a shape
-/// function's gradient and g = F^-T G: (G_i . G_j) I + (1 + s q J) g_j g_i^T - s q J g_i g_j^T, and -s J N g.
-std::array<Eigen::Matrix4d, 10> FiniteStrain::element_row(const ElementState& state, int node, bool upper) const {
+/// Coupling of one of an element's nodes (rows: displacement 0..2, pressure 3) with the wanted ones of all ten
+/// (columns). With G a shape
+/// function's gradient and g = F^-T G: shear (G_i . G_j) I + (shear + s q J) g_j g_i^T - s q J g_i g_j^T, and -s J N g.
+ElementRow FiniteStrain::element_row(const ElementState& state, int node, const std::array<bool, 10>& wanted) const {
+  const NeoHookean& material = state.material;
   const auto& rule = symmetric_tetrahedron_rule();
-  std::array<Eigen::Matrix4d, 10> row;
+  ElementRow row;
   row.fill(Eigen::Matrix4d::Zero());
   for (int point = 0; point < kPoints; ++point) {
     const double weight = state.weight[point];
-    const double scale = weight * material_.pressure_scale * state.volume_ratio[point];
+    const double scale = weight * material.pressure_scale * state.volume_ratio[point];
     const double pressure = scale * state.q[point];
     const Eigen::Matrix<double, 3, 10> deformed = state.to_deformed[point] * state.gradients[point];
     const Eigen::Vector3d own = deformed.col(node);
-    const Eigen::Vector3d own_flat = weight * state.gradients[point].col(node);
+    const Eigen::Vector3d own_flat = (weight * material.shear) * state.gradients[point].col(node);
     const Eigen::Vector4d& linear = rule[point].barycentric;
     for (int j = 0; j < 10; ++j) {
-      if (upper && state.nodes[j] < state.nodes[node]) {
+      if (!wanted[j]) {
         continue;
       }
       const Eigen::Vector3d other = deformed.col(j);
       Eigen::Matrix4d& block = row[j];
-      block.topLeftCorner<3, 3>().noalias() += other * ((weight + pressure) * own.transpose());
+      block.topLeftCorner<3, 3>().noalias() += other * ((weight * material.shear + pressure) * own.transpose());
       block.topLeftCorner<3, 3>().noalias() -= own * (pressure * other.transpose());
       block.diagonal().head<3>().array() += own_flat.dot(state.gradients[point].col(j));
       if (node < 4) {
@@ -114,7 +115,7 @@ std::array<Eigen::Matrix4d, 10> FiniteStrain::element_row(const ElementState& st
         block.topRightCorner<3, 1>() -= (scale * linear[j]) * own;
       }
       if (node < 4 && j < 4) {
-        block(3, 3) -= weight * material_.compressibility * linear[node] * linear[j];
+        block(3, 3) -= weight * material.compressibility * linear[node] * linear[j];
       }
     }
   }
@@ -126,7 +127,7 @@ double FiniteStrain::stored_energy(const ElasticSolution& state) const {
   tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t e) {
     const ElementState element = element_state(state, static_cast<int>(e));
     for (int i = 0; i < kPoints; ++i) {
-      parts[e] += element.weight[i] * energy(material_, element.deformation[i], element.q[i]);
+      parts[e] += element.weight[i] * energy(element.material, element.deformation[i], element.q[i]);
     }
   });
   double sum = 0.0;
@@ -156,7 +157,7 @@ FiniteStrain::Residual FiniteStrain::residual(const ElasticSolution& state) cons
     const ElementState element = element_state(state, static_cast<int>(e));
     forces[e].setZero();
     for (int i = 0; i < kPoints; ++i) {
-      const NeoHookeanStress at = stress(material_, element.deformation[i], element.q[i]);
+      const NeoHookeanStress at = stress(element.material, element.deformation[i], element.q[i]);
       forces[e].topRows<3>() += element.weight[i] * at.stress * element.gradients[i];
       forces[e].bottomLeftCorner<1, 4>() += (element.weight[i] * at.volume) * rule[i].barycentric.transpose();
     }
@@ -172,7 +173,7 @@ FiniteStrain::Residual FiniteStrain::residual(const ElasticSolution& state) cons
         result.values.segment<3>(space_.displacement[node]) += forces[e].col(k).head<3>();
       }
       if (k < 4) {
-        result.values[space_.pressure[node]] += forces[e](3, k);
+        result.values[space_.pressure[space_.element_pressures[e][k]]] += forces[e](3, k);
       }
     }
   }
@@ -181,65 +182,12 @@ FiniteStrain::Residual FiniteStrain::residual(const ElasticSolution& state) cons
 }
 
 SymmetricEntries FiniteStrain::tangent(const ElasticSolution& state) const {
-  const auto unknown_of = [&](int node, int component) {
-    if (component == 3) {
-      return node < space_.vertices ? space_.pressure[node] : -1;
-    }
-    return space_.clamped[node] ? -1 : space_.displacement[node] + component;
-  };
-  SymmetricEntries matrix;
-  matrix.size = space_.unknowns;
-  std::vector<SymmetricEntries> rows(space_.nodes);
   std::vector<ElementState> elements(space_.elements.size());
   tbb::parallel_for(std::size_t{0}, elements.size(),
                     [&](std::size_t e) { elements[e] = element_state(state, static_cast<int>(e)); });
-  tbb::parallel_for(0, space_.nodes, [&](int node) {
-    std::vector<int> neighbours;
-    for (const int place : around_[node]) {
-      for (const int other : space_.elements[place / 10]) {
-        if (other >= node) {
-          neighbours.push_back(other);
-        }
-      }
-    }
-    std::sort(neighbours.begin(), neighbours.end());
-    neighbours.erase(std::unique(neighbours.begin(), neighbours.end()), neighbours.end());
-    std::vector<Eigen::Matrix4d> sums(neighbours.size(), Eigen::Matrix4d::Zero());
-    for (const int place : around_[node]) {
-      const auto& nodes = space_.elements[place / 10];
-      const std::array<Eigen::Matrix4d, 10> row = element_row(elements[place / 10], place % 10, true);
-      for (int k = 0; k < 10; ++k) {
-        if (nodes[k] >= node) {
-          const auto found = std::lower_bound(neighbours.begin(), neighbours.end(), nodes[k]);
-          sums[found - neighbours.begin()] += row[k];
-        }
-      }
-    }
-    for (std::size_t n = 0; n < neighbours.size(); ++n) {
-      for (int a = 0; a < 4; ++a) {
-        for (int b = neighbours[n] == node ? a : 0; b < 4; ++b) {
-          const int row = unknown_of(node, a);
-          const int column = unknown_of(neighbours[n], b);
-          if (row >= 0 && column >= 0) {
-            rows[node].add(row, column, sums[n](a, b));
-          }
-        }
-      }
-    }
+  return assemble_rows(space_, [&](int element, int node, const std::array<bool, 10>& wanted) {
+    return element_row(elements[element], node, wanted);
   });
-  std::size_t total = 0;
-  for (const SymmetricEntries& row : rows) {
-    total += row.values.size();
-  }
-  matrix.rows.reserve(total);
-  matrix.columns.reserve(total);
-  matrix.values.reserve(total);
-  for (const SymmetricEntries& row : rows) {
-    matrix.rows.insert(matrix.rows.end(), row.rows.begin(), row.rows.end());
-    matrix.columns.insert(matrix.columns.end(), row.columns.begin(), row.columns.end());
-    matrix.values.insert(matrix.values.end(), row.values.begin(), row.values.end());
-  }
-  return matrix;
 }
 
 Eigen::VectorXd FiniteStrain::clamped_pull(const ElasticSolution& state, const Eigen::MatrixX3d& change) const {
@@ -250,8 +198,10 @@ Eigen::VectorXd FiniteStrain::clamped_pull(const ElasticSolution& state, const E
       continue;
     }
     const ElementState element = element_state(state, static_cast<int>(e));
+    std::array<bool, 10> wanted{};
+    std::transform(nodes.begin(), nodes.end(), wanted.begin(), [&](int node) { return space_.clamped[node] != 0; });
     for (int j = 0; j < 10; ++j) {
-      const std::array<Eigen::Matrix4d, 10> row = element_row(element, j, false);
+      const ElementRow row = element_row(element, j, wanted);
       Eigen::Vector4d sum = Eigen::Vector4d::Zero();
       for (int k = 0; k < 10; ++k) {
         if (space_.clamped[nodes[k]]) {
@@ -262,7 +212,7 @@ Eigen::VectorXd FiniteStrain::clamped_pull(const ElasticSolution& state, const E
         pull.segment<3>(space_.displacement[nodes[j]]) += sum.head<3>();
       }
       if (j < 4) {
-        pull[space_.pressure[nodes[j]]] += sum[3];
+        pull[space_.pressure[space_.element_pressures[e][j]]] += sum[3];
       }
     }
   }
@@ -277,8 +227,12 @@ ElasticSolution FiniteStrain::moved(const ElasticSolution& state, const Eigen::V
           factor * scales_.length * change.segment<3>(space_.displacement[node]).transpose();
     }
   }
-  for (int vertex = 0; vertex < space_.vertices; ++vertex) {
-    result.pressure[vertex] += factor * scales_.stress * scales_.pressure_scale * change[space_.pressure[vertex]];
+  // A pressure's scale is that of its region.
+  for (std::size_t e = 0; e < space_.elements.size(); ++e) {
+    const double unit = scales_.stress * scales_.regions[space_.mesh->region_of(e)].pressure_scale;
+    for (const int pressure : space_.element_pressures[e]) {
+      result.pressure[pressure] = state.pressure[pressure] + factor * unit * change[space_.pressure[pressure]];
+    }
   }
   return result;
 }
@@ -288,8 +242,8 @@ namespace {
 /// Newton's method towards fixed loads.
 class NewtonPath {
  public:
-  NewtonPath(const TaylorHoodSpace& space, const ElasticMaterial& material, const ElasticLoads& loads)
-      : problem_(space, material),
+  NewtonPath(const TaylorHoodSpace& space, std::span<const ElasticMaterial> materials, const ElasticLoads& loads)
+      : problem_(space, materials),
         order_(elimination_order(space)),
         load_(load_vector(space, problem_.scales(), loads)),
         given_(Eigen::MatrixX3d::Zero(space.nodes, 3)) {
@@ -402,7 +356,12 @@ class NewtonPath {
 
 ElasticSolution solve_finite_strain(const TaylorHoodSpace& space, const ElasticMaterial& material,
                                     const ElasticLoads& loads, FiniteStrainEffort* effort) {
-  NewtonPath path(space, material, loads);
+  return solve_finite_strain(space, std::vector<ElasticMaterial>(region_count(*space.mesh), material), loads, effort);
+}
+
+ElasticSolution solve_finite_strain(const TaylorHoodSpace& space, std::span<const ElasticMaterial> materials,
+                                    const ElasticLoads& loads, FiniteStrainEffort* effort) {
+  NewtonPath path(space, materials, loads);
   FiniteStrainEffort took;
   ElasticSolution state = path.problem().at_rest();
   double done = 0.0;

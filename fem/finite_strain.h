@@ -5,6 +5,7 @@
 // stationary (W: fem/neo_hookean.h). Where the tangent at rest is the linear system of fem/taylor_hood.h.
 
 #include <Eigen/Core>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -15,11 +16,12 @@
 namespace touchstone::fem {
 
 /// Energy, residual and tangent of one gel at any state. A state is an ElasticSolution: displacement of all nodes (mm,
-/// clamped ones included) and pressure (MPa). Vectors over the space's unknowns are without units, as in assemble().
+/// clamped ones included) and pressures (MPa). Vectors over the space's unknowns are without units, as in assemble().
 class FiniteStrain {
  public:
-  /// The space must outlive this. @throws Error for a bad material
-  FiniteStrain(const TaylorHoodSpace& space, const ElasticMaterial& material);
+  /// One material a region. The space must outlive this. @throws Error for a bad material
+  FiniteStrain(const TaylorHoodSpace& space, std::span<const ElasticMaterial> materials);
+  FiniteStrain(const TaylorHoodSpace& space, const ElasticMaterial& material);  ///< the same in all regions
 
   const TaylorHoodSpace& space() const { return space_; }
   const Scales& scales() const { return scales_; }
@@ -54,12 +56,10 @@ class FiniteStrain {
  private:
   struct ElementState;
   ElementState element_state(const ElasticSolution& state, int element) const;
-  std::array<Eigen::Matrix4d, 10> element_row(const ElementState& state, int node, bool upper) const;
+  ElementRow element_row(const ElementState& state, int node, const std::array<bool, 10>& wanted) const;
 
   const TaylorHoodSpace& space_;
   Scales scales_;
-  NeoHookean material_;
-  std::vector<std::vector<int>> around_;  ///< elements around each node: element * 10 + place of the node in it
 };
 
 /// What a solution took.
@@ -73,6 +73,8 @@ struct FiniteStrainEffort {
 /// Tractions and body forces are nominal (per undeformed area and volume, of fixed direction).
 /// @throws Error for a bad mesh or material, or where the smallest part of the load allowed still fails: what stopped
 /// it
+ElasticSolution solve_finite_strain(const TaylorHoodSpace& space, std::span<const ElasticMaterial> materials,
+                                    const ElasticLoads& loads, FiniteStrainEffort* effort = nullptr);
 ElasticSolution solve_finite_strain(const TaylorHoodSpace& space, const ElasticMaterial& material,
                                     const ElasticLoads& loads, FiniteStrainEffort* effort = nullptr);
 

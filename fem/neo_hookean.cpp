@@ -11,7 +11,7 @@ double energy(const NeoHookean& material, const Eigen::Matrix3d& gradient, doubl
   if (!(volume_ratio > 0.0)) {
     return std::numeric_limits<double>::infinity();
   }
-  return 0.5 * (gradient.squaredNorm() - 3.0) - std::log(volume_ratio) -
+  return material.shear * (0.5 * (gradient.squaredNorm() - 3.0) - std::log(volume_ratio)) -
          material.pressure_scale * q * (volume_ratio - 1.0) - 0.5 * material.compressibility * q * q;
 }
 
@@ -19,7 +19,7 @@ NeoHookeanStress stress(const NeoHookean& material, const Eigen::Matrix3d& gradi
   const double volume_ratio = gradient.determinant();
   const Eigen::Matrix3d inverse = gradient.inverse().transpose();
   NeoHookeanStress result;
-  result.stress = gradient - (1.0 + material.pressure_scale * q * volume_ratio) * inverse;
+  result.stress = material.shear * gradient - (material.shear + material.pressure_scale * q * volume_ratio) * inverse;
   result.volume = -material.pressure_scale * (volume_ratio - 1.0) - material.compressibility * q;
   return result;
 }
@@ -31,7 +31,8 @@ NeoHookeanStress stress_change(const NeoHookean& material, const Eigen::Matrix3d
   const double pressure = material.pressure_scale * q * volume_ratio;
   const double dilation = inverse.cwiseProduct(gradient_change).sum();  // dJ / J
   NeoHookeanStress result;
-  result.stress = gradient_change + (1.0 + pressure) * inverse * gradient_change.transpose() * inverse -
+  result.stress = material.shear * gradient_change +
+                  (material.shear + pressure) * inverse * gradient_change.transpose() * inverse -
                   (pressure * dilation + material.pressure_scale * volume_ratio * q_change) * inverse;
   result.volume = -material.pressure_scale * volume_ratio * dilation - material.compressibility * q_change;
   return result;

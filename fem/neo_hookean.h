@@ -8,7 +8,7 @@
 // lambda/2 (ln J)^2). At small strain it is the linear elasticity of fem/taylor_hood.h with the same G, lambda and the
 // same pressure, so the tangent at rest is the linear system itself; lambda may be infinite (nu = 0.5).
 //
-// Without units: stresses over G, and p = G * pressure_scale * q, as in Scales.
+// Without units: stresses over Scales::stress, and p = stress * pressure_scale * q, as there.
 
 #include <Eigen/Core>
 
@@ -16,22 +16,16 @@
 
 namespace touchstone::fem {
 
-/// The material without units: all that is left of it is how the pressure is scaled.
-struct NeoHookean {
-  double pressure_scale = 1.0;
-  double compressibility = 0.0;  ///< G pressure_scale^2 / lambda; zero would be incompressible
+/// A region's material without units.
+using NeoHookean = Scales::Region;
 
-  explicit NeoHookean(const Scales& scales)
-      : pressure_scale(scales.pressure_scale), compressibility(scales.compressibility) {}
-};
-
-/// First derivatives of W / G at a deformation gradient F and a pressure unknown q. J must be above zero.
+/// First derivatives of W at a deformation gradient F and a pressure unknown q. J must be above zero.
 struct NeoHookeanStress {
-  Eigen::Matrix3d stress;  ///< dW/dF: first Piola-Kirchhoff, F - F^-T - pressure_scale q J F^-T
+  Eigen::Matrix3d stress;  ///< dW/dF: first Piola-Kirchhoff, shear (F - F^-T) - pressure_scale q J F^-T
   double volume = 0.0;     ///< dW/dq: -pressure_scale (J - 1) - compressibility q
 };
 
-/// W / G. Infinite where J <= 0.
+/// W. Infinite where J <= 0.
 double energy(const NeoHookean& material, const Eigen::Matrix3d& gradient, double q);
 
 NeoHookeanStress stress(const NeoHookean& material, const Eigen::Matrix3d& gradient, double q);

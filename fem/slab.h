@@ -18,11 +18,8 @@ struct SlabMesh {
   double fine_depth = 1.0;
 };
 
-/// More tetrahedra than this are refused before they are made: the elimination would take some 6 GB and a minute.
-inline constexpr double kMostSlabTetrahedra = 60000.0;
-
 /// @throws Error if a size isn't finite and above zero (fine_half_x, fine_half_y and fine_depth may be zero), if fine >
-/// coarse, if the slab is over 200 times as wide as thick, or if it would take more than kMostSlabTetrahedra
+/// coarse, if the slab is over 200 times as wide as thick, or if it would take more than kMostTetrahedra
 void check(const SlabMesh& slab);
 
 /// How many tetrahedra mesh_slab will make, within some 40 %: the size field's integral.

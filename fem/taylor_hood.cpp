@@ -7,6 +7,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "core/error.h"
 #include "fem/elimination_order.h"
@@ -67,6 +68,7 @@ Eigen::Matrix<double, 3, 10> shape_gradients(const Eigen::Matrix<double, 3, 4>& 
 /// What one element needs for its blocks, without units.
 struct ElementShape {
   double volume = 0.0;
+  Scales::Region scales;
   std::array<Eigen::Matrix<double, 3, 10>, 4> gradients;  // at the points of stiffness_rule
 };
 
@@ -75,6 +77,7 @@ ElementShape element_shape(const TaylorHoodSpace& space, const Scales& scales, i
   const Eigen::Matrix<double, 3, 4> flat = barycentric_gradients(corners) * scales.length;
   ElementShape shape;
   shape.volume = volume(*space.mesh, space.mesh->tetrahedra[element]) / std::pow(scales.length, 3);
+  shape.scales = scales.regions[space.mesh->region_of(element)];
   for (int q = 0; q < 4; ++q) {
     shape.gradients[q] = shape_gradients(flat, stiffness_rule()[q].barycentric);
   }
@@ -82,7 +85,8 @@ ElementShape element_shape(const TaylorHoodSpace& space, const Scales& scales, i
 }
 
 /// Coupling of two of an element's nodes: rows and columns 0..2 displacement, 3 pressure (for corners).
-Eigen::Matrix4d element_block(const ElementShape& shape, const Scales& scales, int i, int j) {
+Eigen::Matrix4d element_block(const ElementShape& shape, int i, int j) {
+  const Scales::Region& scales = shape.scales;
   Eigen::Matrix4d block = Eigen::Matrix4d::Zero();
   for (int q = 0; q < 4; ++q) {
     const SimplexPoint<4>& point = stiffness_rule()[q];
@@ -90,7 +94,8 @@ Eigen::Matrix4d element_block(const ElementShape& shape, const Scales& scales, i
     const Eigen::Vector3d gi = shape.gradients[q].col(i);
     const Eigen::Vector3d gj = shape.gradients[q].col(j);
     // 2 eps(N_i e_a) : eps(N_j e_b) = (gi.gj) delta_ab + gi_b gj_a
-    block.topLeftCorner<3, 3>() += weight * (gi.dot(gj) * Eigen::Matrix3d::Identity() + gj * gi.transpose());
+    block.topLeftCorner<3, 3>() +=
+        (weight * scales.shear) * (gi.dot(gj) * Eigen::Matrix3d::Identity() + gj * gi.transpose());
     if (i < 4) {
       block.bottomLeftCorner<1, 3>() -= (weight * scales.pressure_scale * point.barycentric[i]) * gj.transpose();
     }
@@ -104,23 +109,50 @@ Eigen::Matrix4d element_block(const ElementShape& shape, const Scales& scales, i
   return block;
 }
 
-/// Elements around each node, in their order: element * 10 + place of the node in it.
-std::vector<std::vector<int>> elements_around(const TaylorHoodSpace& space) {
-  std::vector<std::vector<int>> around(space.nodes);
-  for (std::size_t e = 0; e < space.elements.size(); ++e) {
-    for (int k = 0; k < 10; ++k) {
-      around[space.elements[e][k]].push_back(static_cast<int>(e) * 10 + k);
+/// What carries unknowns: a node (its displacement and, at a vertex, its first pressure), or one of a vertex' further
+/// pressures.
+struct Carriers {
+  explicit Carriers(const TaylorHoodSpace& from)
+      : space(from), count(from.nodes + static_cast<int>(from.pressure.size()) - from.vertices) {}
+
+  const TaylorHoodSpace& space;
+  int count;
+
+  int of_pressure(int pressure) const {
+    return pressure < space.vertices ? pressure : space.nodes + pressure - space.vertices;
+  }
+  /// The unknown of a carrier's component (3: pressure), or -1.
+  int unknown(int carrier, int component) const {
+    if (carrier >= space.nodes) {
+      return component == 3 ? space.pressure[carrier - space.nodes + space.vertices] : -1;
+    }
+    if (component == 3) {
+      return carrier < space.vertices ? space.pressure[carrier] : -1;
+    }
+    return space.clamped[carrier] ? -1 : space.displacement[carrier] + component;
+  }
+};
+
+/// Which rows of an element's blocks go to a carrier.
+struct Member {
+  int carrier;
+  int local;  ///< place of the node in the element
+  int first;  ///< rows first..last: 0..3 all, 0..2 displacement alone, 3..3 pressure alone
+  int last;
+};
+
+std::vector<Member> members_of(const Carriers& carriers, int element) {
+  std::vector<Member> members;
+  const TaylorHoodSpace& space = carriers.space;
+  for (int k = 0; k < 10; ++k) {
+    const int node = space.elements[element][k];
+    const int pressure = k < 4 ? carriers.of_pressure(space.element_pressures[element][k]) : node;
+    members.push_back({node, k, 0, pressure == node ? 3 : 2});
+    if (pressure != node) {
+      members.push_back({pressure, k, 3, 3});
     }
   }
-  return around;
-}
-
-/// The unknown of a node's component (3: pressure), or -1.
-int unknown_of(const TaylorHoodSpace& space, int node, int component) {
-  if (component == 3) {
-    return node < space.vertices ? space.pressure[node] : -1;
-  }
-  return space.clamped[node] ? -1 : space.displacement[node] + component;
+  return members;
 }
 
 }  // namespace
@@ -141,116 +173,73 @@ Eigen::Matrix<double, 3, 10> quadratic_gradients(const std::array<Eigen::Vector3
   return shape_gradients(barycentric_gradients(corners), barycentric);
 }
 
-Eigen::Vector3d TaylorHoodSpace::position(int node) const {
-  if (node < vertices) {
-    return mesh->vertices[node];
-  }
-  const auto [a, b] = edges[node - vertices];
-  return 0.5 * (mesh->vertices[a] + mesh->vertices[b]);
-}
-
-int TaylorHoodSpace::middle(int a, int b) const {
-  const std::array<int, 2> edge = {std::min(a, b), std::max(a, b)};
-  const auto found = std::lower_bound(edges.begin(), edges.end(), edge);
-  TS_ASSERT(found != edges.end() && *found == edge);
-  return vertices + static_cast<int>(found - edges.begin());
-}
-
-TaylorHoodSpace make_space(const TetMesh& mesh) {
-  const std::string fault = fault_of(mesh);
-  if (!fault.empty()) {
-    fail("the gel's mesh can't be used: {}", fault);
-  }
-  TaylorHoodSpace space;
-  space.mesh = &mesh;
-  space.vertices = static_cast<int>(mesh.vertices.size());
-  for (const auto& tetrahedron : mesh.tetrahedra) {
-    for (const auto& [i, j] : kTetEdges) {
-      space.edges.push_back({std::min(tetrahedron[i], tetrahedron[j]), std::max(tetrahedron[i], tetrahedron[j])});
-    }
-  }
-  std::sort(space.edges.begin(), space.edges.end());
-  space.edges.erase(std::unique(space.edges.begin(), space.edges.end()), space.edges.end());
-  space.nodes = space.vertices + static_cast<int>(space.edges.size());
-  for (const auto& tetrahedron : mesh.tetrahedra) {
-    std::array<int, 10> nodes{};
-    std::copy(tetrahedron.begin(), tetrahedron.end(), nodes.begin());
-    for (int k = 0; k < 6; ++k) {
-      nodes[4 + k] = space.middle(tetrahedron[kTetEdges[k][0]], tetrahedron[kTetEdges[k][1]]);
-    }
-    space.elements.push_back(nodes);
-  }
-  space.clamped.assign(space.nodes, 0);
-  for (const auto& face : mesh.bonded) {
-    for (int k = 0; k < 3; ++k) {
-      space.clamped[face[k]] = 1;
-      space.clamped[space.middle(face[k], face[(k + 1) % 3])] = 1;
-    }
-  }
-  space.displacement.assign(space.nodes, -1);
-  space.pressure.assign(space.vertices, -1);
-  for (int node = 0; node < space.nodes; ++node) {
-    if (!space.clamped[node]) {
-      space.displacement[node] = space.unknowns;
-      space.unknowns += 3;
-    }
-    if (node < space.vertices) {
-      space.pressure[node] = space.unknowns++;
-    }
-  }
-  return space;
-}
-
-Scales make_scales(const TetMesh& mesh, const ElasticMaterial& material) {
-  check(material);
-  double total = 0.0;
-  for (const auto& tetrahedron : mesh.tetrahedra) {
-    total += volume(mesh, tetrahedron);
-  }
-  const double ratio = lame_ratio(material);
-  Scales scales;
-  scales.length = std::cbrt(total);
-  scales.stress = shear_modulus(material);
-  // sqrt(lambda/G) while lambda < G makes the pressure's block -1 there; beyond, p itself is of the order of G.
-  scales.pressure_scale = std::sqrt(std::min(ratio, 1.0));
-  scales.compressibility = ratio <= 1.0 ? 1.0 : 1.0 / ratio;
-  return scales;
-}
-
 SymmetricEntries assemble(const TaylorHoodSpace& space, const Scales& scales) {
-  const auto around = elements_around(space);
   std::vector<ElementShape> shapes(space.elements.size());
   tbb::parallel_for(std::size_t{0}, shapes.size(),
                     [&](std::size_t e) { shapes[e] = element_shape(space, scales, static_cast<int>(e)); });
-  std::vector<SymmetricEntries> rows(space.nodes);
-  tbb::parallel_for(0, space.nodes, [&](int node) {
+  return assemble_rows(space, [&](int element, int node, const std::array<bool, 10>& wanted) {
+    ElementRow row;
+    for (int k = 0; k < 10; ++k) {
+      if (wanted[k]) {
+        row[k] = element_block(shapes[element], node, k);
+      }
+    }
+    return row;
+  });
+}
+
+SymmetricEntries assemble_rows(
+    const TaylorHoodSpace& space,
+    const std::function<ElementRow(int element, int node, const std::array<bool, 10>& wanted)>& row_of) {
+  const Carriers carriers(space);
+  std::vector<std::vector<Member>> members(space.elements.size());
+  tbb::parallel_for(std::size_t{0}, members.size(),
+                    [&](std::size_t e) { members[e] = members_of(carriers, static_cast<int>(e)); });
+  // Elements around each carrier, in their order, and the carrier's place among the element's members.
+  std::vector<std::vector<std::array<int, 2>>> around(carriers.count);
+  for (std::size_t e = 0; e < members.size(); ++e) {
+    for (std::size_t k = 0; k < members[e].size(); ++k) {
+      around[members[e][k].carrier].push_back({static_cast<int>(e), static_cast<int>(k)});
+    }
+  }
+  std::vector<SymmetricEntries> rows(carriers.count);
+  tbb::parallel_for(0, carriers.count, [&](int carrier) {
     std::vector<int> neighbours;
-    for (const int place : around[node]) {
-      for (const int other : space.elements[place / 10]) {
-        if (other >= node) {
-          neighbours.push_back(other);
+    for (const auto& [element, place] : around[carrier]) {
+      for (const Member& other : members[element]) {
+        if (other.carrier >= carrier) {
+          neighbours.push_back(other.carrier);
         }
       }
     }
     std::sort(neighbours.begin(), neighbours.end());
     neighbours.erase(std::unique(neighbours.begin(), neighbours.end()), neighbours.end());
     std::vector<Eigen::Matrix4d> blocks(neighbours.size(), Eigen::Matrix4d::Zero());
-    for (const int place : around[node]) {
-      const auto& nodes = space.elements[place / 10];
-      for (int k = 0; k < 10; ++k) {
-        if (nodes[k] >= node) {
-          const auto found = std::lower_bound(neighbours.begin(), neighbours.end(), nodes[k]);
-          blocks[found - neighbours.begin()] += element_block(shapes[place / 10], scales, place % 10, k);
+    for (const auto& [element, place] : around[carrier]) {
+      const Member& own = members[element][place];
+      std::array<bool, 10> wanted{};
+      for (const Member& other : members[element]) {
+        wanted[other.local] = wanted[other.local] || other.carrier >= carrier;
+      }
+      const ElementRow row = row_of(element, own.local, wanted);
+      for (const Member& other : members[element]) {
+        if (other.carrier >= carrier) {
+          const auto found = std::lower_bound(neighbours.begin(), neighbours.end(), other.carrier);
+          const Eigen::Matrix4d& block = row[other.local];
+          Eigen::Matrix4d& sum = blocks[found - neighbours.begin()];
+          const int height = own.last - own.first + 1;
+          const int width = other.last - other.first + 1;
+          sum.block(own.first, other.first, height, width) += block.block(own.first, other.first, height, width);
         }
       }
     }
     for (std::size_t n = 0; n < neighbours.size(); ++n) {
       for (int a = 0; a < 4; ++a) {
-        for (int b = neighbours[n] == node ? a : 0; b < 4; ++b) {
-          const int row = unknown_of(space, node, a);
-          const int column = unknown_of(space, neighbours[n], b);
+        for (int b = neighbours[n] == carrier ? a : 0; b < 4; ++b) {
+          const int row = carriers.unknown(carrier, a);
+          const int column = carriers.unknown(neighbours[n], b);
           if (row >= 0 && column >= 0) {
-            rows[node].add(row, column, blocks[n](a, b));
+            rows[carrier].add(row, column, blocks[n](a, b));
           }
         }
       }
@@ -336,7 +325,13 @@ Eigen::VectorXd load_vector(const TaylorHoodSpace& space, const Scales& scales, 
 
 ElasticSolution solve_elastic(const TaylorHoodSpace& space, const ElasticMaterial& material,
                               const ElasticLoads& loads) {
-  const Scales scales = make_scales(*space.mesh, material);
+  return solve_elastic(space, std::vector<ElasticMaterial>(region_count(*space.mesh), material), loads);
+}
+
+ElasticSolution solve_elastic(const TaylorHoodSpace& space, std::span<const ElasticMaterial> materials,
+                              const ElasticLoads& loads) {
+  const Scales scales = make_scales(*space.mesh, materials);
+  const Carriers carriers(space);
   Eigen::VectorXd right = load_vector(space, scales, loads);
   ElasticSolution solution;
   solution.displacement = Eigen::MatrixX3d::Zero(space.nodes, 3);
@@ -353,16 +348,17 @@ ElasticSolution solve_elastic(const TaylorHoodSpace& space, const ElasticMateria
         continue;
       }
       const ElementShape shape = element_shape(space, scales, static_cast<int>(e));
+      const std::vector<Member> members = members_of(carriers, static_cast<int>(e));
       for (int j = 0; j < 10; ++j) {
         if (!space.clamped[nodes[j]]) {
           continue;
         }
         Eigen::Vector4d given = Eigen::Vector4d::Zero();
         given.head<3>() = solution.displacement.row(nodes[j]).transpose() / scales.length;
-        for (int i = 0; i < 10; ++i) {
-          const Eigen::Vector4d pull = element_block(shape, scales, i, j) * given;
-          for (int a = 0; a < 4; ++a) {
-            const int row = unknown_of(space, nodes[i], a);
+        for (const Member& member : members) {
+          const Eigen::Vector4d pull = element_block(shape, member.local, j) * given;
+          for (int a = member.first; a <= member.last; ++a) {
+            const int row = carriers.unknown(member.carrier, a);
             if (row >= 0) {
               right[row] -= pull[a];
             }
@@ -377,9 +373,12 @@ ElasticSolution solve_elastic(const TaylorHoodSpace& space, const ElasticMateria
       solution.displacement.row(node) = scales.length * found.segment<3>(space.displacement[node]).transpose();
     }
   }
-  solution.pressure.resize(space.vertices);
-  for (int vertex = 0; vertex < space.vertices; ++vertex) {
-    solution.pressure[vertex] = scales.stress * scales.pressure_scale * found[space.pressure[vertex]];
+  solution.pressure.resize(static_cast<Eigen::Index>(space.pressure.size()));
+  for (std::size_t e = 0; e < space.elements.size(); ++e) {
+    const double scale = scales.regions[space.mesh->region_of(e)].pressure_scale;
+    for (const int pressure : space.element_pressures[e]) {
+      solution.pressure[pressure] = scales.stress * scale * found[space.pressure[pressure]];
+    }
   }
   return solution;
 }
@@ -398,7 +397,7 @@ double pressure_at(const TaylorHoodSpace& space, const ElasticSolution& solution
                    const Eigen::Vector4d& barycentric) {
   double value = 0.0;
   for (int k = 0; k < 4; ++k) {
-    value += barycentric[k] * solution.pressure[space.elements[element][k]];
+    value += barycentric[k] * solution.pressure[space.element_pressures[element][k]];
   }
   return value;
 }

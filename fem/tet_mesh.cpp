@@ -77,6 +77,14 @@ std::string fault_of_tetrahedra(const TetMesh& mesh) {
       return fmt::format("tetrahedron {} has a volume of {} mm^3; it must be above zero", e, volume(mesh, tetrahedron));
     }
   }
+  if (!mesh.region.empty() && mesh.region.size() != mesh.tetrahedra.size()) {
+    return fmt::format("{} tetrahedra have {} regions", mesh.tetrahedra.size(), mesh.region.size());
+  }
+  const auto negative = std::find_if(mesh.region.begin(), mesh.region.end(), [](int region) { return region < 0; });
+  if (negative != mesh.region.end()) {
+    return fmt::format("tetrahedron {} is of region {}; regions count from 0", negative - mesh.region.begin(),
+                       *negative);
+  }
   const auto lonely = std::find(used.begin(), used.end(), false);
   if (lonely != used.end()) {
     return fmt::format("vertex {} belongs to no tetrahedron", lonely - used.begin());
@@ -142,6 +150,11 @@ std::string fault_of_bond(const TetMesh& mesh) {
 }
 
 }  // namespace
+
+int region_count(const TetMesh& mesh) {
+  const auto largest = std::max_element(mesh.region.begin(), mesh.region.end());
+  return largest == mesh.region.end() ? 1 : *largest + 1;
+}
 
 std::vector<std::array<int, 3>> boundary_faces(const TetMesh& mesh) {
   const auto uses = face_uses(mesh);

@@ -49,24 +49,29 @@ GaussRule gauss_rule(int count) {
 /// int_0^inf (1 - M(q)) cos(q y) dq, y >= 0 in thicknesses.
 class KernelTransform {
  public:
-  explicit KernelTransform(double poisson_ratio) {
+  /// 1 - M must be negligible beyond `end`.
+  KernelTransform(const std::function<double(double)>& kernel, double end) {
     const GaussRule rule = gauss_rule(12);
-    const int panels = static_cast<int>(kEnd / kPanel);
-    for (int p = 0; p < panels; ++p) {
+    for (double q = 0.0; q < end;) {
+      const double panel = std::clamp(q / 40.0, kPanel, 8.0 * kPanel);
       for (int g = 0; g < rule.nodes.size(); ++g) {
-        const double q = kPanel * (p + rule.nodes[g]);
-        points_.emplace_back(q, kPanel * rule.weights[g] * (1.0 - bonded_layer_kernel(poisson_ratio, q)));
+        const double at = q + panel * rule.nodes[g];
+        points_.emplace_back(at, panel * rule.weights[g] * (1.0 - kernel(at)));
       }
+      q += panel;
     }
   }
+  explicit KernelTransform(double poisson_ratio)
+      : KernelTransform([poisson_ratio](double q) { return bonded_layer_kernel(poisson_ratio, q); }, kEnd) {}
   double operator()(double y) const {
     double sum = 0.0;
     for (const auto& [q, weight] : points_) sum += weight * std::cos(q * y);
     return sum;
   }
 
- private:
   static constexpr double kEnd = 24.0;  // 1 - M falls as q^2 exp(-2q)
+
+ private:
   static constexpr double kPanel = 0.5;
   std::vector<std::pair<double, double>> points_;
 };
@@ -201,10 +206,65 @@ LayerContact flat_punch_on_layer(double youngs_modulus, double poisson_ratio, do
   return {2.0 * kPi * density.integral, radius};
 }
 
-LayerContact profile_on_layer(double youngs_modulus, double poisson_ratio, double thickness,
-                              const std::function<double(double)>& slope, double depth, double largest_radius) {
-  const KernelTransform transform(poisson_ratio);
-  const double scale = 2.0 / (kPi * half_space_factor(youngs_modulus, poisson_ratio));
+double layered_kernel(std::span<const ElasticLayer> layers, double wave_number) {
+  double total = 0.0;
+  for (const ElasticLayer& layer : layers) total += layer.thickness;
+  // For long waves the exponentials are nearly dependent; there M is k times a series in k^2.
+  constexpr double kLong = 0.02;
+  if (wave_number * total < kLong) {
+    const double k1 = kLong / total;
+    const double k2 = 1.5 * k1;
+    const double m1 = layered_kernel(layers, k1) / k1;
+    const double m2 = layered_kernel(layers, k2) / k2;
+    const double curve = (m2 - m1) / (k2 * k2 - k1 * k1);
+    return wave_number * (m1 + curve * (wave_number * wave_number - k1 * k1));
+  }
+  const double k = wave_number;
+  const auto count = static_cast<Eigen::Index>(layers.size());
+  Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(4 * count, 4 * count);
+  Eigen::VectorXd right = Eigen::VectorXd::Zero(4 * count);
+  // Rows u, w (over k^2 / 2G0) and shear, normal stress (over k^3) of a layer's four functions at `height` over its
+  // lower face; z in units of 1/k, out of the body. G0 is the outermost layer's.
+  const auto shear = [&](Eigen::Index n) { return shear_modulus(layers[n].youngs_modulus, layers[n].poisson_ratio); };
+  const auto rows_at = [&](Eigen::Index n, double height) {
+    const double nu = layers[n].poisson_ratio;
+    const double softness = shear(0) / shear(n);
+    const double h = k * layers[n].thickness;
+    Eigen::Matrix4d rows;
+    for (int column = 0; column < 4; ++column) {
+      const double sign = column < 2 ? 1.0 : -1.0;  // grows, or falls, with z
+      const double distance = column < 2 ? height - h : height;
+      const double e = std::exp(sign * distance);
+      const bool linear = column % 2 == 1;
+      const double f = (linear ? distance : 1.0) * e;
+      const double f1 = linear ? (1.0 + sign * distance) * e : sign * e;
+      const double f2 = linear ? (2.0 * sign + distance) * e : e;
+      const double f3 = linear ? (3.0 + sign * distance) * e : sign * e;
+      rows(0, column) = softness * f1;
+      rows(1, column) = softness * ((1.0 - 2.0 * nu) * f2 - 2.0 * (1.0 - nu) * f);
+      rows(2, column) = -(nu * f2 + (1.0 - nu) * f);
+      rows(3, column) = (1.0 - nu) * f3 - (2.0 - nu) * f1;
+    }
+    return rows;
+  };
+  const Eigen::Matrix4d top = rows_at(0, k * layers[0].thickness);
+  matrix.block<2, 4>(0, 0) = top.bottomRows<2>();
+  right[1] = -1.0;  // a unit pressure
+  for (Eigen::Index n = 0; n + 1 < count; ++n) {
+    matrix.block<4, 4>(2 + 4 * n, 4 * n) = rows_at(n, 0.0);
+    matrix.block<4, 4>(2 + 4 * n, 4 * n + 4) = -rows_at(n + 1, k * layers[n + 1].thickness);
+  }
+  matrix.block<2, 4>(4 * count - 2, 4 * count - 4) = rows_at(count - 1, 0.0).topRows<2>();
+  const Eigen::VectorXd found = matrix.fullPivLu().solve(right);
+  // w = (rows) k^2 / (2 G0) for a pressure of k^3: -w / p = (rows) / (2 G0 k), against (1 - nu) / (G0 k).
+  return -top.row(1).dot(found.head<4>()) / (2.0 * (1.0 - layers[0].poisson_ratio));
+}
+
+namespace {
+
+LayerContact profile_contact(const KernelTransform& transform, double half_space, double thickness,
+                             const std::function<double(double)>& slope, double depth, double largest_radius) {
+  const double scale = 2.0 / (kPi * half_space);
   static const GaussRule rule = gauss_rule(64);
   // F(t) = scale (d - t int_0^t f'(r) / sqrt(t^2 - r^2) dr), r = t sin(angle).
   const auto wanted = [&](double t) {
@@ -243,10 +303,29 @@ LayerContact profile_on_layer(double youngs_modulus, double poisson_ratio, doubl
   return {2.0 * kPi * last.integral, radius};
 }
 
+}  // namespace
+
+LayerContact profile_on_layer(double youngs_modulus, double poisson_ratio, double thickness,
+                              const std::function<double(double)>& slope, double depth, double largest_radius) {
+  return profile_contact(KernelTransform(poisson_ratio), half_space_factor(youngs_modulus, poisson_ratio), thickness,
+                         slope, depth, largest_radius);
+}
+
 LayerContact sphere_on_layer(double youngs_modulus, double poisson_ratio, double thickness, double radius,
                              double depth) {
   return profile_on_layer(
       youngs_modulus, poisson_ratio, thickness,
+      [&](double r) { return r / std::sqrt(std::max(1e-300, radius * radius - r * r)); }, depth, 0.999 * radius);
+}
+
+LayerContact sphere_on_layers(std::span<const ElasticLayer> layers, double radius, double depth) {
+  double total = 0.0;
+  const double outermost = layers[0].thickness;
+  for (const ElasticLayer& layer : layers) total += layer.thickness;
+  const KernelTransform transform([&](double q) { return layered_kernel(layers, q / total); },
+                                  KernelTransform::kEnd * total / outermost);
+  return profile_contact(
+      transform, half_space_factor(layers[0].youngs_modulus, layers[0].poisson_ratio), total,
       [&](double r) { return r / std::sqrt(std::max(1e-300, radius * radius - r * r)); }, depth, 0.999 * radius);
 }
 

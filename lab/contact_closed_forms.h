@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 #include <functional>
+#include <span>
 
 namespace touchstone::lab {
 
@@ -47,6 +48,19 @@ double gent_lindley_modulus(double youngs_modulus, double radius, double thickne
 /// M(q) = [(3-4nu) sinh 2q - 2q] / [(3-4nu) cosh 2q + 2q^2 + 5 - 12nu + 8nu^2].
 double bonded_layer_kernel(double poisson_ratio, double q);
 
+/// One of several layers that are bonded to each other; the innermost to a rigid base.
+struct ElasticLayer {
+  double thickness = 0.0;  ///< mm
+  double youngs_modulus = 0.0;
+  double poisson_ratio = 0.0;
+};
+
+/// Surface compliance of layers, listed from the outside inwards, for pressure of wave number k (1/mm), over that of a
+/// half space of the outermost material. Love's function of each layer, (A + B z) exp(kz) + (C + D z) exp(-kz), is
+/// matched at the interfaces (Muki's formulas; see Johnson, Contact Mechanics, appendix 3, for the plane analogue).
+/// Equals bonded_layer_kernel for one layer.
+double layered_kernel(std::span<const ElasticLayer> layers, double wave_number);
+
 /// Frictionless contact of a rigid body of revolution with an endless layer bonded below.
 struct LayerContact {
   double force = 0.0;           ///< N
@@ -63,5 +77,7 @@ LayerContact profile_on_layer(double youngs_modulus, double poisson_ratio, doubl
 /// A true sphere: profile_on_layer with f' = r / sqrt(R^2 - r^2).
 LayerContact sphere_on_layer(double youngs_modulus, double poisson_ratio, double thickness, double radius,
                              double depth);
+/// The same on several layers, from the outside inwards.
+LayerContact sphere_on_layers(std::span<const ElasticLayer> layers, double radius, double depth);
 
 }  // namespace touchstone::lab

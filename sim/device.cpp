@@ -1,5 +1,9 @@
 #include "sim/device.h"
 
+#include "fem/gel_body.h"
+#include "sim/gel_setup.h"
+#include "sim/gltf_mesh.h"
+
 namespace touchstone::sim {
 namespace {
 
@@ -15,6 +19,7 @@ void check_beads_fit(const DeviceSpec& device, const SourceLocation& where) {
     fail_at(where, "beads.depth_mm: {} puts beads of diameter {} mm out of a gel of {} mm; allowed is from {} to {}",
             beads.depth_mm, beads.diameter_mm, gel.thickness_mm, radius, gel.thickness_mm - radius);
   }
+  if (gel.shape != GelShape::slab) return;  // set-up says where a bead isn't wholly inside the gel
   const double half_grid = (beads.grid - 1) * beads.spacing_mm / 2 + radius;
   if (half_grid > std::min(gel.size_x_mm, gel.size_y_mm) / 2) {
     fail_at(where, "beads: a grid of {0} x {0} at {1} mm doesn't fit in a gel of {2} x {3} mm", beads.grid,
@@ -23,6 +28,17 @@ void check_beads_fit(const DeviceSpec& device, const SourceLocation& where) {
   if (beads.grid > 1 && beads.spacing_mm <= beads.diameter_mm) {
     fail_at(where, "beads.spacing_mm: {} lets beads of diameter {} mm overlap; it must be above that", beads.spacing_mm,
             beads.diameter_mm);
+  }
+}
+
+/// The gel can be meshed as it is asked for.
+void check_gel(DeviceSpec& device, const SourceLocation& where) {
+  try {
+    const fem::GelBody body = gel_body(device);
+    fem::check(body);
+    device.gel.thickness_mm = fem::thickness_of(body);
+  } catch (const Error& error) {
+    fail_at(where, "gel: {}", error.what());
   }
 }
 
@@ -47,10 +63,52 @@ EnumNames<BayerLayout> enum_names(BayerLayout) {
           {"gbrg", BayerLayout::gbrg}};
 }
 
+EnumNames<GelShape> enum_names(GelShape) {
+  return {
+      {"slab", GelShape::slab}, {"dome", GelShape::dome}, {"fingertip", GelShape::fingertip}, {"mesh", GelShape::mesh}};
+}
+
+void fields(YamlReader& in, GelLayerSpec& layer) {
+  in.optional("name", layer.name);
+  in.required("thickness_mm", layer.thickness_mm, Allowed::above_up_to(0.0, 1000.0));
+  in.required("youngs_modulus_MPa", layer.youngs_modulus_MPa, Allowed::above_up_to(0.0, 1e6));
+  in.optional("poisson_ratio", layer.poisson_ratio, Allowed::within(0.0, 0.5));
+}
+
 void fields(YamlReader& in, GelSpec& gel) {
-  in.required("size_x_mm", gel.size_x_mm, Allowed::above_up_to(0.0, 1000.0));
-  in.required("size_y_mm", gel.size_y_mm, Allowed::above_up_to(0.0, 1000.0));
-  in.required("thickness_mm", gel.thickness_mm, Allowed::above_up_to(0.0, 1000.0));
+  const Allowed length = Allowed::above_up_to(0.0, 1000.0);
+  const Allowed length_or_none = Allowed::within(0.0, 1000.0);
+  in.optional("shape", gel.shape);
+  switch (gel.shape) {
+    case GelShape::slab:
+      in.required("size_x_mm", gel.size_x_mm, length);
+      in.required("size_y_mm", gel.size_y_mm, length);
+      in.required("thickness_mm", gel.thickness_mm, length);
+      break;
+    case GelShape::dome:
+      in.required("sphere_radius_mm", gel.sphere_radius_mm, Allowed::above_up_to(0.0, 1e5));
+      in.required("base_radius_mm", gel.base_radius_mm, length);
+      in.optional("thickness_mm", gel.thickness_mm, length);
+      break;
+    case GelShape::fingertip:
+      in.required("radius_mm", gel.radius_mm, length);
+      in.required("length_mm", gel.length_mm, length_or_none);
+      in.required("sleeve_mm", gel.sleeve_mm, length_or_none);
+      break;
+    case GelShape::mesh: {
+      std::string file;
+      in.required("file", file);
+      gel.file = in.folder() / file;
+      in.optional("mm_per_unit", gel.mm_per_unit, Allowed::above(0.0));
+      try {
+        gel.surface = std::make_shared<const GelSurface>(read_gltf_gel(gel.file, gel.mm_per_unit));
+      } catch (const Error& error) {
+        fail_at(in.where("file"), "gel.file: {}", error.what());
+      }
+      break;
+    }
+  }
+  if (gel.shape != GelShape::mesh) in.optional("layers", gel.layers);
   in.required("youngs_modulus_MPa", gel.youngs_modulus_MPa, Allowed::above_up_to(0.0, 1e6));
   in.optional("poisson_ratio", gel.poisson_ratio, Allowed::within(0.0, 0.5));
   in.optional("refractive_index", gel.refractive_index, Allowed::within(1.0, 4.0));
@@ -134,6 +192,7 @@ void fields(YamlReader& in, DeviceSpec& device) {
   in.optional("band_wavelengths_nm", device.band_wavelengths_nm, Allowed::within(300.0, 1200.0));
   in.optional("room_radiance", device.room_radiance, Allowed::at_least(0.0));
   in.optional("camera", device.camera);
+  check_gel(device, in.where("gel"));
   if (device.beads) check_beads_fit(device, in.where("beads"));
   if (device.camera) check_camera_outside(device, in.where("camera"));
   const double plate_face = -device.gel.thickness_mm - device.plate.thickness_mm;

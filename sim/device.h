@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -11,19 +12,45 @@
 
 namespace touchstone::sim {
 
-/// The soft pad, clamped to the plate on its lower face. Gel frame: outer surface z = 0, lower face z = -thickness.
-struct GelSpec {
-  double size_x_mm = 0.0;
-  double size_y_mm = 0.0;
+struct GelSurface;
+
+enum class GelShape { slab, dome, fingertip, mesh };
+EnumNames<GelShape> enum_names(GelShape);
+
+/// A layer of a gel. Optically it is the gel's body.
+struct GelLayerSpec {
+  std::string name;  ///< for the reader; may be empty
   double thickness_mm = 0.0;
   double youngs_modulus_MPa = 0.0;
+  double poisson_ratio = 0.49;
+};
+
+/// The soft body, clamped to the plate on its back. Gel frame: origin in the middle of the outer surface, +z out of the
+/// gel, back at z = -thickness. Only the fields that belong to `shape` may stand in the file (see the structs of
+/// fem/gel_body.h).
+struct GelSpec {
+  GelShape shape = GelShape::slab;
+  double size_x_mm = 0.0;         ///< slab
+  double size_y_mm = 0.0;         ///< slab
+  double thickness_mm = 0.0;      ///< all: of a slab and a dome as given, else worked out; layers are part of it
+  double sphere_radius_mm = 0.0;  ///< dome
+  double base_radius_mm = 0.0;    ///< dome
+  double radius_mm = 0.0;         ///< fingertip
+  double length_mm = 0.0;         ///< fingertip
+  double sleeve_mm = 0.0;         ///< fingertip
+  std::filesystem::path file;     ///< mesh: glTF with named faces, relative to the device file
+  double mm_per_unit = 1000.0;    ///< mesh: glTF's unit is the metre
+  std::shared_ptr<const GelSurface> surface;  ///< mesh: as read
+  std::vector<GelLayerSpec> layers;           ///< from the outer surface inwards; not for a mesh
+  double youngs_modulus_MPa = 0.0;            ///< of the body below the layers
   double poisson_ratio = 0.49;
   double refractive_index = 1.0;
   double absorption_per_mm = 0.0;  ///< natural logarithm, all bands
   double frame_albedo = 0.0;       ///< of the frame that holds the pad at its sides, all bands; 0 is black
 };
 
-/// How fine the gel is meshed: `fine_mm` where contact and beads are, graded to `coarse_mm` elsewhere.
+/// How fine the gel is meshed: `fine_mm` where contact and beads are, graded to `coarse_mm` elsewhere. On a dome or a
+/// fingertip the fine part is round: the larger half extent is its radius along the surface.
 struct MeshSpec {
   double fine_mm = 0.5;
   double coarse_mm = 1.5;
@@ -101,6 +128,7 @@ struct DeviceSpec {
   SourceLocation where;
 };
 
+void fields(YamlReader& in, GelLayerSpec& layer);
 void fields(YamlReader& in, GelSpec& gel);
 void fields(YamlReader& in, MeshSpec& mesh);
 void fields(YamlReader& in, BeadSpec& beads);

@@ -1,6 +1,10 @@
+#include "sim/gel_setup.h"
+
 #include <cstdlib>
 
+#include "core/error.h"
 #include "fem/compliance_cache.h"
+#include "sim/gltf_mesh.h"
 #include "sim/virtual_sensor.h"
 
 namespace touchstone::sim {
@@ -14,26 +18,51 @@ std::filesystem::path default_cache_folder() {
   return std::filesystem::temp_directory_path() / "touchstone-cache";
 }
 
-std::shared_ptr<const fem::Compliance> set_up_gel(const DeviceSpec& device, const std::filesystem::path& cache_folder,
-                                                  const Progress& progress) {
+fem::GelBody gel_body(const DeviceSpec& device) {
   const GelSpec& gel = device.gel;
-  fem::SlabMesh mesh;
-  mesh.size_x = gel.size_x_mm;
-  mesh.size_y = gel.size_y_mm;
-  mesh.thickness = gel.thickness_mm;
-  mesh.fine = device.mesh.fine_mm;
-  mesh.coarse = device.mesh.coarse_mm;
-  mesh.fine_half_x = device.mesh.fine_half_extent_mm.x();
-  mesh.fine_half_y = device.mesh.fine_half_extent_mm.y();
-  mesh.fine_depth = device.mesh.fine_depth_mm;
+  const MeshSpec& mesh = device.mesh;
+  const Eigen::Vector2d& half = mesh.fine_half_extent_mm;
+  std::vector<double> layers;
+  for (const GelLayerSpec& layer : gel.layers) layers.push_back(layer.thickness_mm);
+  switch (gel.shape) {
+    case GelShape::slab:
+      return fem::SlabGel{{gel.size_x_mm, gel.size_y_mm, gel.thickness_mm, mesh.fine_mm, mesh.coarse_mm, half.x(),
+                           half.y(), mesh.fine_depth_mm},
+                          layers};
+    case GelShape::dome:
+      return fem::DomeGel{gel.sphere_radius_mm, gel.base_radius_mm, gel.thickness_mm,   mesh.fine_mm,
+                          mesh.coarse_mm,       half.maxCoeff(),    mesh.fine_depth_mm, layers};
+    case GelShape::fingertip:
+      return fem::FingertipGel{gel.radius_mm,  gel.length_mm,   gel.sleeve_mm,      mesh.fine_mm,
+                               mesh.coarse_mm, half.maxCoeff(), mesh.fine_depth_mm, layers};
+    case GelShape::mesh:
+      break;
+  }
+  TS_ASSERT(gel.surface != nullptr);
+  return fem::SolidGel{gel.surface->mesh, gel.surface->faces, mesh.fine_mm,      mesh.coarse_mm,
+                       half.x(),          half.y(),           mesh.fine_depth_mm};
+}
+
+std::vector<fem::ElasticMaterial> gel_materials(const GelSpec& gel) {
+  std::vector<fem::ElasticMaterial> materials = {{gel.youngs_modulus_MPa, gel.poisson_ratio}};
+  for (const GelLayerSpec& layer : gel.layers) materials.push_back({layer.youngs_modulus_MPa, layer.poisson_ratio});
+  return materials;
+}
+
+std::vector<fem::Bead> gel_beads(const DeviceSpec& device) {
   std::vector<fem::Bead> beads;
   if (device.beads) {
     for (const Eigen::Vector3d& centre : bead_centres(*device.beads)) {
       beads.push_back({centre, device.beads->diameter_mm / 2});
     }
   }
+  return beads;
+}
+
+std::shared_ptr<const fem::Compliance> set_up_gel(const DeviceSpec& device, const std::filesystem::path& cache_folder,
+                                                  const Progress& progress) {
   return std::make_shared<const fem::Compliance>(
-      fem::cached_compliance(mesh, {gel.youngs_modulus_MPa, gel.poisson_ratio}, beads, cache_folder, progress));
+      fem::cached_compliance(gel_body(device), gel_materials(device.gel), gel_beads(device), cache_folder, progress));
 }
 
 }  // namespace touchstone::sim

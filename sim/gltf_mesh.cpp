@@ -13,6 +13,7 @@
 #include <tiny_gltf.h>
 
 #include "core/error.h"
+#include "core/nearest_name.h"
 #include "core/whole_file.h"
 
 namespace touchstone::sim {
@@ -33,6 +34,24 @@ class GltfSolid {
   }
 
   const TriangleMesh& mesh() const { return mesh_; }
+
+  /// What the name of triangle `index`'s material or mesh says it is.
+  fem::FaceKind kind(int index) const {
+    static const std::vector<std::string> known = {"side", "outer", "bonded"};  // as fem::FaceKind counts
+    const auto [material, mesh] = origin_[static_cast<std::size_t>(index)];
+    if (material >= static_cast<int>(model_.materials.size())) {
+      refuse("mesh {} names material {}, which isn't there", mesh, material);
+    }
+    const std::string name = material >= 0 ? model_.materials[static_cast<std::size_t>(material)].name : "";
+    const std::string& label = name.empty() ? model_.meshes[static_cast<std::size_t>(mesh)].name : name;
+    const auto found = std::find(known.begin(), known.end(), label);
+    if (found != known.end()) return static_cast<fem::FaceKind>(found - known.begin());
+    if (!name.empty()) {
+      refuse("material '{}' isn't a face of a gel; known are outer, bonded and side{}", name,
+             did_you_mean(name, known));
+    }
+    return fem::FaceKind::side;
+  }
 
  private:
   template <typename... Args>
@@ -264,6 +283,7 @@ class GltfSolid {
       std::array<int, 3> triangle = {corner(i), corner(i + 1), corner(i + 2)};
       if (mirrored) std::swap(triangle[1], triangle[2]);
       mesh_.triangles.push_back(triangle);
+      origin_.push_back({primitive.material, mesh_index});
     }
   }
 
@@ -271,23 +291,47 @@ class GltfSolid {
   tinygltf::Model model_;
   std::vector<bool> visited_;
   TriangleMesh mesh_;
+  std::vector<std::array<int, 2>> origin_;  // per triangle: material or -1, mesh
 };
 
-}  // namespace
-
-TriangleMesh read_gltf_mesh(const std::filesystem::path& path, double mm_per_unit) {
+GltfSolid read_solid(const std::filesystem::path& path, double mm_per_unit) {
   if (!(mm_per_unit > 0.0 && std::isfinite(mm_per_unit))) {
     fail("{}: {} mm per unit; allowed is a finite number above 0", path.string(), mm_per_unit);
   }
-  const GltfSolid solid(path, mm_per_unit);
+  GltfSolid solid(path, mm_per_unit);
   if (solid.mesh().triangles.empty()) fail("{}: holds no triangles", path.string());
+  return solid;
+}
+
+TriangleMesh welded(const GltfSolid& solid, const std::filesystem::path& path, std::vector<int>* kept) {
   Eigen::AlignedBox3d box;
   for (const Eigen::Vector3d& vertex : solid.mesh().vertices) box.extend(vertex);
-  TriangleMesh mesh = weld(solid.mesh(), kWeldShare * box.diagonal().norm());
+  TriangleMesh mesh = weld(solid.mesh(), kWeldShare * box.diagonal().norm(), kept);
   if (const std::string fault = fault_of_closed_mesh(mesh); !fault.empty()) {
     fail("{}: isn't a closed solid: {}", path.string(), fault);
   }
   return mesh;
+}
+
+}  // namespace
+
+TriangleMesh read_gltf_mesh(const std::filesystem::path& path, double mm_per_unit) {
+  return welded(read_solid(path, mm_per_unit), path, nullptr);
+}
+
+GelSurface read_gltf_gel(const std::filesystem::path& path, double mm_per_unit) {
+  const GltfSolid solid = read_solid(path, mm_per_unit);
+  std::vector<int> kept;
+  GelSurface surface;
+  surface.mesh = welded(solid, path, &kept);
+  for (const int triangle : kept) surface.faces.push_back(solid.kind(triangle));
+  for (const auto& [kind, name] :
+       {std::pair(fem::FaceKind::bonded, "bonded"), std::pair(fem::FaceKind::outer, "outer")}) {
+    if (std::find(surface.faces.begin(), surface.faces.end(), kind) == surface.faces.end()) {
+      fail("{}: has no face named '{}': give its triangles a material of that name", path.string(), name);
+    }
+  }
+  return surface;
 }
 
 }  // namespace touchstone::sim

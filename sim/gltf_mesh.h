@@ -1,8 +1,10 @@
 #pragma once
 
 #include <filesystem>
+#include <vector>
 
 #include "core/triangle_mesh.h"
+#include "fem/tet_mesh.h"
 
 namespace touchstone::sim {
 
@@ -15,5 +17,17 @@ namespace touchstone::sim {
 ///   compressed, quantised, skinned or morphed geometry; nodes in a circle; numbers that aren't finite; a surface that
 ///   isn't closed, crosses itself or is inside out (fault_of_closed_mesh)
 TriangleMesh read_gltf_mesh(const std::filesystem::path& path, double mm_per_unit);
+
+/// A gel's surface: what each of its triangles is.
+struct GelSurface {
+  TriangleMesh mesh;
+  std::vector<fem::FaceKind> faces;
+};
+
+/// Reads a gel's solid as read_gltf_mesh does. A triangle list whose material is named `outer` can be touched, one
+/// named `bonded` is clamped to the plate, one named `side` is free and not touched. Where a list has no material (or
+/// one without a name), the name of its mesh says so; with another name it is a free side.
+/// @throws Error as read_gltf_mesh; for a material of another name; if no face is bonded, or none outer
+GelSurface read_gltf_gel(const std::filesystem::path& path, double mm_per_unit);
 
 }  // namespace touchstone::sim

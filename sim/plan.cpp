@@ -86,6 +86,12 @@ void plan_light(const SceneSpec& scene, Plan& plan, Table& table) {
             scene.device.where.file);
   }
   const GelSpec& gel = scene.device.gel;
+  if (gel.shape != GelShape::slab) {
+    fail_at(scene.where,
+            "outputs: an image is asked for, but the gel of the device '{}' ({}) isn't a slab, and the renderer draws "
+            "slabs only; truth alone can be had with frames, ideal and radiance all false",
+            scene.device.name, scene.device.where.file);
+  }
   const PlateSpec& plate = scene.device.plate;
   const bool refracts = gel.refractive_index != 1.0 || plate.refractive_index != 1.0;
   plan.refraction = table.add("refraction", refracts,

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <vector>
 
 #include "core/error.h"
 #include "core/units.h"
@@ -50,6 +51,46 @@ TEST(LayerReference, ThinCompressibleLayerHasTheConfinedModulus) {
   EXPECT_NEAR(bonded_layer_kernel(nu, 1e-4) * 2.0 * (1.0 - nu * nu) / 1e-4, 1.0 / confined, 1e-6);
   EXPECT_NEAR(bonded_layer_kernel(nu, 1e-3 * (1.0 - 1e-9)), bonded_layer_kernel(nu, 1e-3 * (1.0 + 1e-9)), 1e-9);
   EXPECT_NEAR(bonded_layer_kernel(nu, 40.0), 1.0, 1e-12);
+}
+
+TEST(LayeredKernel, OfLayersThatAreAlikeIsTheOneLayers) {
+  for (const double nu : {0.0, 0.3, 0.49, 0.5}) {
+    const std::vector<ElasticLayer> one = {{5.0, 1.0, nu}};
+    const std::vector<ElasticLayer> three = {{0.7, 1.0, nu}, {1.3, 1.0, nu}, {3.0, 1.0, nu}};
+    for (const double q : {0.05, 0.3, 1.0, 3.0, 10.0, 40.0}) {
+      const double wanted = bonded_layer_kernel(nu, q);
+      EXPECT_NEAR(layered_kernel(one, q / 5.0), wanted, 1e-10 * wanted) << nu << ' ' << q;
+      EXPECT_NEAR(layered_kernel(three, q / 5.0), wanted, 1e-10 * wanted) << nu << ' ' << q;
+    }
+  }
+}
+
+TEST(LayeredKernel, HasTheRightLimits) {
+  const std::vector<ElasticLayer> layers = {{0.5, 10.0, 0.3}, {2.0, 1.0, 0.4}};
+  const auto half_space = [](const ElasticLayer& m) {
+    return 2.0 * (1.0 - m.poisson_ratio * m.poisson_ratio) / m.youngs_modulus;
+  };
+  EXPECT_NEAR(layered_kernel(layers, 60.0), 1.0, 1e-9) << "short waves see the coating only";
+  // Long waves squeeze the layers between two plates.
+  double soft = 0.0;
+  for (const ElasticLayer& m : layers) {
+    const double nu = m.poisson_ratio;
+    soft += m.thickness * (1.0 + nu) * (1.0 - 2.0 * nu) / ((1.0 - nu) * m.youngs_modulus);
+  }
+  const double k = 1e-4;
+  EXPECT_NEAR(layered_kernel(layers, k) * half_space(layers[0]) / k, soft, 1e-5 * soft);
+  // A coating that is nothing leaves the body's own kernel.
+  const std::vector<ElasticLayer> bare = {{1e-7, 10.0, 0.3}, {2.0, 1.0, 0.4}};
+  for (const double wave : {0.2, 1.0, 5.0}) {
+    const double body = bonded_layer_kernel(0.4, 2.0 * wave) * half_space(bare[1]);
+    EXPECT_NEAR(layered_kernel(bare, wave) * half_space(bare[0]), body, 1e-4 * body) << wave;
+  }
+}
+
+TEST(LayeredKernel, ASphereOnLayersThatAreAlikeIsOnOne) {
+  const std::vector<ElasticLayer> layers = {{1.0, 1.0, 0.45}, {4.0, 1.0, 0.45}};
+  const double wanted = sphere_on_layer(1.0, 0.45, 5.0, 8.0, 0.3).force;
+  EXPECT_NEAR(sphere_on_layers(layers, 8.0, 0.3).force, wanted, 1e-7 * wanted);
 }
 
 TEST(SneddonSphere, IsHertzWhenShallow) {

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstring>
@@ -16,6 +17,9 @@
 #include "core/random.h"
 #include "core/units.h"
 #include "core/whole_file.h"
+#include "fem/gel_body.h"
+#include "sim/device.h"
+#include "sim/gel_setup.h"
 
 namespace touchstone::sim {
 namespace {
@@ -323,6 +327,105 @@ TEST_F(GltfMesh, DamagedFilesNeverGiveABadMesh) {
     }
   }
   EXPECT_GT(refused, 100);
+}
+
+/// The cube as three triangle lists: its six faces (12 indices of 2 bytes each) as side, side, ... with the last two
+/// (axis z: lower, upper) named by materials.
+std::string named_cube(const Cube& cube, const std::string& sides, const std::string& lower, const std::string& upper,
+                       const std::string& mesh_name = "gel") {
+  std::string text = cube.embedded();
+  const auto list = [](int accessor, int material) {
+    return R"({"attributes": {"POSITION": 0}, "indices": )" + std::to_string(accessor) +
+           (material < 0 ? "" : R"(, "material": )" + std::to_string(material)) + R"(, "mode": 4})";
+  };
+  text = replaced(text, R"({"attributes": {"POSITION": 0}, "indices": 1, "mode": 4}])",
+                  list(1, sides.empty() ? -1 : 0) + "," + list(2, lower.empty() ? -1 : 1) + "," +
+                      list(3, upper.empty() ? -1 : 2) + R"(], "name": ")" + mesh_name + "\"");
+  text = replaced(text, R"("count": 36, "type": "SCALAR"})",
+                  R"("count": 24, "type": "SCALAR"},
+      {"bufferView": 1, "byteOffset": 48, "componentType": 5123, "count": 6, "type": "SCALAR"},
+      {"bufferView": 1, "byteOffset": 60, "componentType": 5123, "count": 6, "type": "SCALAR"})");
+  return replaced(text, R"("accessors")",
+                  R"("materials": [{"name": ")" + sides + R"("}, {"name": ")" + lower + R"("}, {"name": ")" + upper +
+                      R"("}], "accessors")");
+}
+
+TEST_F(GltfMesh, AGelsFacesAreNamedByTheirMaterials) {
+  for (const char* sides : {"side", ""}) {
+    const GelSurface gel = read_gltf_gel(file(named_cube(cube_, sides, "bonded", "outer")), 1.0);
+    ASSERT_EQ(gel.faces.size(), gel.mesh.triangles.size());
+    EXPECT_EQ(gel.faces.size(), 12u);
+    for (std::size_t t = 0; t < gel.faces.size(); ++t) {
+      double z = 0.0;
+      for (const int v : gel.mesh.triangles[t]) z += gel.mesh.vertices[v].z() / 3.0;
+      EXPECT_EQ(gel.faces[t], z > 0.9 ? fem::FaceKind::outer : z < -0.9 ? fem::FaceKind::bonded : fem::FaceKind::side);
+    }
+  }
+  // A mesh's name stands in where there is no material.
+  const GelSurface held = read_gltf_gel(file(named_cube(cube_, "", "", "outer", "bonded")), 1.0);
+  EXPECT_EQ(std::count(held.faces.begin(), held.faces.end(), fem::FaceKind::bonded), 10);
+}
+
+TEST_F(GltfMesh, AGelsNamesThatAreNoneAreRefused) {
+  const auto error_of = [&](const std::string& content) -> std::string {
+    try {
+      read_gltf_gel(file(content), 1.0);
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "no error";
+  };
+  EXPECT_THAT(
+      error_of(named_cube(cube_, "side", "bondd", "outer")),
+      HasSubstr("material 'bondd' isn't a face of a gel; known are outer, bonded and side (did you mean 'bonded'?)"));
+  EXPECT_THAT(error_of(named_cube(cube_, "side", "side", "outer")), HasSubstr("no face named 'bonded'"));
+  EXPECT_THAT(error_of(named_cube(cube_, "side", "bonded", "side")), HasSubstr("no face named 'outer'"));
+  EXPECT_THAT(error_of(cube_.embedded()), HasSubstr("no face named 'bonded'"));
+  EXPECT_THAT(error_of(replaced(named_cube(cube_, "side", "bonded", "outer"), R"("material": 2)", R"("material": 7)")),
+              HasSubstr("material 7"));
+  Cube open = cube_;
+  open.indices[33] = open.indices[30];
+  open.indices[34] = open.indices[31];
+  open.indices[35] = open.indices[32];
+  EXPECT_THAT(error_of(named_cube(open, "side", "bonded", "outer")), HasSubstr("isn't a closed solid"));
+}
+
+TEST_F(GltfMesh, VerticesANanometreApartAreOneInAGel) {
+  Cube cube = cube_;
+  cube.vertices[3][0] += 1e-7F;
+  const GelSurface gel = read_gltf_gel(file(named_cube(cube, "side", "bonded", "outer")), 1.0);
+  EXPECT_EQ(gel.mesh.vertices.size(), 8u);
+}
+
+TEST_F(GltfMesh, AGelOfTheFileIsSetUpByTheDeviceThatNamesIt) {
+  // The cube of edge 2 about the origin, lowered by 1: its top is z = 0.
+  file(replaced(named_cube(cube_, "side", "bonded", "outer"), R"({"mesh": 0})",
+                R"({"mesh": 0, "translation": [0, 0, -1]})"),
+       "pad.gltf");
+  const std::string device = R"(name: pad
+gel:
+  shape: mesh
+  file: pad.gltf
+  mm_per_unit: 2
+  youngs_modulus_MPa: 0.3
+mesh: {fine_mm: 0.8, coarse_mm: 1.2, fine_half_extent_mm: [1, 1], fine_depth_mm: 0.5}
+plate: {thickness_mm: 1, refractive_index: 1.5}
+)";
+  file(device, "pad.yaml");
+  const DeviceSpec pad = read_device(folder_ / "pad.yaml");
+  EXPECT_NEAR(pad.gel.thickness_mm, 4.0, 1e-6);
+  const fem::TetMesh mesh = fem::mesh_gel(gel_body(pad));
+  double total = 0.0;
+  for (const auto& t : mesh.tetrahedra) total += fem::volume(mesh, t);
+  EXPECT_NEAR(total, 64.0, 1e-6);
+  file(replaced(device, "pad.gltf", "pat.gltf"), "bad.yaml");
+  try {
+    read_device(folder_ / "bad.yaml");
+    FAIL() << "no error";
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("bad.yaml:4: gel.file: "));
+    EXPECT_THAT(error.what(), HasSubstr("pat.gltf"));
+  }
 }
 
 }  // namespace

@@ -50,6 +50,24 @@ TEST(Plan, AnImageFromADeviceWithoutACameraIsRefused) {
   }
 }
 
+TEST(Plan, AnImageOfAGelThatIsNoSlabIsRefusedAndItsTruthIsnt) {
+  SceneSpec scene = shipped("cycle.yaml");
+  for (const GelShape shape : {GelShape::dome, GelShape::fingertip, GelShape::mesh}) {
+    scene.device.gel.shape = shape;
+    scene.outputs = {};
+    scene.outputs.frames = true;
+    try {
+      make_plan(scene);
+      FAIL() << "no error";
+    } catch (const Error& error) {
+      EXPECT_THAT(error.what(), HasSubstr("isn't a slab"));
+      EXPECT_GT(error.where().line, 0);
+    }
+    scene.outputs.frames = scene.outputs.ideal = scene.outputs.radiance = false;
+    EXPECT_FALSE(make_plan(scene).camera);
+  }
+}
+
 TEST(Plan, ASwitchOverrulesAndSaysSo) {
   SceneSpec scene = shipped("ball-press.yaml");
   scene.effects.friction = Switch::on;

@@ -1,7 +1,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "core/whole_file.h"
+#include "sim/gel_setup.h"
 #include "sim/scene.h"
 #include "tests/support/temporary_folder.h"
 
@@ -95,6 +98,75 @@ TEST(SceneFiles, PoissonsRatioMayBeAHalfAndNotMore) {
   EXPECT_EQ(error_of_device(replaced(kDevice, "  thickness", "  poisson_ratio: 0.5\n  thickness")), "");
   EXPECT_THAT(error_of_device(replaced(kDevice, "  thickness", "  poisson_ratio: 0.51\n  thickness")),
               HasSubstr("from 0 to 0.5"));
+}
+
+const char* const kDome = R"(name: dome
+gel:
+  shape: dome
+  sphere_radius_mm: 20
+  base_radius_mm: 8
+  youngs_modulus_MPa: 0.3
+plate: {thickness_mm: 1, refractive_index: 1.5}
+)";
+
+const char* const kFingertip = R"(name: tip
+gel:
+  shape: fingertip
+  radius_mm: 8
+  length_mm: 8
+  sleeve_mm: 6
+  youngs_modulus_MPa: 0.3
+  layers:
+    - {name: skin, thickness_mm: 0.3, youngs_modulus_MPa: 1.2, poisson_ratio: 0.48}
+plate: {thickness_mm: 1, refractive_index: 1.5}
+)";
+
+TEST(SceneFiles, ADomeReadsAndItsThicknessIsWorkedOut) {
+  const auto device = parse_yaml<DeviceSpec>(kDome, "device.yaml");
+  EXPECT_EQ(device.gel.shape, GelShape::dome);
+  EXPECT_NEAR(device.gel.thickness_mm, 20.0 - std::sqrt(336.0), 1e-12);
+  const auto body = std::get<fem::DomeGel>(gel_body(device));
+  EXPECT_EQ(body.sphere_radius, 20.0);
+  EXPECT_EQ(body.fine_radius, 5.0) << "the larger of the mesh's half extents";
+  EXPECT_NO_THROW(fem::mesh_gel(body));
+  EXPECT_EQ(
+      parse_yaml<DeviceSpec>(replaced(kDome, "radius_mm: 8", "radius_mm: 8\n  thickness_mm: 5"), "d").gel.thickness_mm,
+      5.0);
+}
+
+TEST(SceneFiles, AFingertipWithASkinReads) {
+  const auto device = parse_yaml<DeviceSpec>(kFingertip, "device.yaml");
+  EXPECT_EQ(device.gel.thickness_mm, 16.0);
+  ASSERT_EQ(device.gel.layers.size(), 1u);
+  EXPECT_EQ(device.gel.layers[0].name, "skin");
+  const auto body = std::get<fem::FingertipGel>(gel_body(device));
+  EXPECT_EQ(body.layers, std::vector<double>{0.3});
+  const auto materials = gel_materials(device.gel);
+  ASSERT_EQ(materials.size(), 2u);
+  EXPECT_EQ(materials[0].youngs_modulus, 0.3) << "the body comes first";
+  EXPECT_EQ(materials[1].youngs_modulus, 1.2);
+  EXPECT_EQ(materials[1].poisson_ratio, 0.48);
+}
+
+TEST(SceneFiles, ASlabTakesLayersAndIsASlabWithoutBeingAsked) {
+  const std::string layered = replaced(
+      kDevice, "  thickness_mm: 4\n",
+      "  thickness_mm: 4\n  layers:\n    - {thickness_mm: 0.2, youngs_modulus_MPa: 0.4, poisson_ratio: 0.5}\n");
+  const auto device = parse_yaml<DeviceSpec>(layered, "device.yaml");
+  EXPECT_EQ(device.gel.shape, GelShape::slab);
+  EXPECT_EQ(std::get<fem::SlabGel>(gel_body(device)).layers, std::vector<double>{0.2});
+  EXPECT_THAT(error_of_device(replaced(layered, "0.2,", "4,")), HasSubstr("device.yaml:3: gel: the slab's layers are"));
+  EXPECT_THAT(error_of_device(replaced(layered, "0.2,", "0,")), HasSubstr("thickness_mm: 0 is not allowed"));
+}
+
+TEST(SceneFiles, AGelTakesOnlyItsOwnFieldsAndShapesThatCanBe) {
+  EXPECT_THAT(error_of_device(replaced(kDome, "base_radius_mm: 8", "base_radius_mm: 8\n  sleeve_mm: 2")),
+              HasSubstr("unknown key 'sleeve_mm'"));
+  EXPECT_THAT(error_of_device(replaced(kDome, "shape: dome", "shape: dom")), HasSubstr("did you mean 'dome'"));
+  EXPECT_THAT(error_of_device(replaced(kDome, "base_radius_mm: 8", "base_radius_mm: 28")),
+              HasSubstr("device.yaml:3: gel: the dome's base radius is 28 mm; it must not be above"));
+  EXPECT_THAT(error_of_device(replaced(kFingertip, "sleeve_mm: 6", "sleeve_mm: 9")),
+              HasSubstr("must not be longer than its cylinder"));
 }
 
 TEST(SceneFiles, BeadsMustLieInTheGel) {

@@ -1,0 +1,228 @@
+#include "fem/solid_gel.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "core/error.h"
+#include "fem/tetgen_fill.h"
+
+namespace touchstone::fem {
+namespace {
+
+using Eigen::Vector3d;
+
+Eigen::AlignedBox3d box_of(const SolidGel& solid) {
+  Eigen::AlignedBox3d box;
+  for (const Vector3d& vertex : solid.surface.vertices) box.extend(vertex);
+  return box;
+}
+
+double wanted_edge(const SolidGel& solid, double longest, const Vector3d& x) {
+  const double distance = std::max(
+      {0.0, std::abs(x.x()) - solid.fine_half_x, std::abs(x.y()) - solid.fine_half_y, -x.z() - solid.fine_depth});
+  return std::min(solid.fine + kEdgeGrowth * distance, std::max(solid.fine, std::min(solid.coarse, longest)));
+}
+
+/// Edges longer than the solid's thinnest side make no sense.
+double longest_edge(const SolidGel& solid) {
+  return box_of(solid).sizes().minCoeff();
+}
+
+double distance_to_triangle(const Vector3d& p, const Vector3d& a, const Vector3d& b, const Vector3d& c) {
+  const Vector3d normal = (b - a).cross(c - a).normalized();
+  const auto inside_of = [&](const Vector3d& from, const Vector3d& to) {
+    return normal.cross(to - from).dot(p - from) >= 0.0;
+  };
+  if (inside_of(a, b) && inside_of(b, c) && inside_of(c, a)) return std::abs(normal.dot(p - a));
+  const auto to_edge = [&](const Vector3d& from, const Vector3d& to) {
+    const double t = std::clamp((p - from).dot(to - from) / (to - from).squaredNorm(), 0.0, 1.0);
+    return (p - from - t * (to - from)).norm();
+  };
+  return std::min({to_edge(a, b), to_edge(b, c), to_edge(c, a)});
+}
+
+/// TetGen runs away on features far below the wanted edges.
+void refuse_nearly_coincident(const SolidGel& solid) {
+  const std::vector<Vector3d>& vertices = solid.surface.vertices;
+  const auto& triangles = solid.surface.triangles;
+  const double allowed = kNearestVertices * solid.fine;
+  // Along x, so that only neighbours are compared.
+  std::vector<int> order(vertices.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::sort(order.begin(), order.end(), [&](int a, int b) {
+    return vertices[a].x() != vertices[b].x() ? vertices[a].x() < vertices[b].x() : a < b;
+  });
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    for (std::size_t j = i + 1; j < order.size() && vertices[order[j]].x() - vertices[order[i]].x() < allowed; ++j) {
+      const double apart = (vertices[order[j]] - vertices[order[i]]).norm();
+      if (apart < allowed) {
+        fail(
+            "the gel's surface has vertices {} and {} at ({}, {}, {}) mm, {:.3g} mm apart; they must be at least "
+            "{:.3g} "
+            "mm apart, a hundredth of the fine edge length",
+            std::min(order[i], order[j]), std::max(order[i], order[j]), vertices[order[i]].x(), vertices[order[i]].y(),
+            vertices[order[i]].z(), apart, allowed);
+      }
+    }
+  }
+  for (std::size_t t = 0; t < triangles.size(); ++t) {
+    const auto& corner = triangles[t];
+    Eigen::AlignedBox3d box;
+    for (const int v : corner) box.extend(vertices[v]);
+    const Vector3d low = box.min().array() - allowed;
+    const Vector3d high = box.max().array() + allowed;
+    const auto begin =
+        std::lower_bound(order.begin(), order.end(), low.x(), [&](int v, double x) { return vertices[v].x() < x; });
+    for (auto at = begin; at != order.end() && vertices[*at].x() <= high.x(); ++at) {
+      const Vector3d& p = vertices[*at];
+      if (p.y() < low.y() || p.y() > high.y() || p.z() < low.z() || p.z() > high.z()) continue;
+      if (std::find(corner.begin(), corner.end(), *at) != corner.end()) continue;
+      const double apart = distance_to_triangle(p, vertices[corner[0]], vertices[corner[1]], vertices[corner[2]]);
+      if (apart < allowed) {
+        fail(
+            "the gel's surface has vertex {} at ({}, {}, {}) mm {:.3g} mm beside triangle {}; it must be at least "
+            "{:.3g} "
+            "mm from it, a hundredth of the fine edge length",
+            *at, p.x(), p.y(), p.z(), apart, t, allowed);
+      }
+    }
+  }
+}
+
+double area_of(const std::vector<Vector3d>& vertices, const std::array<int, 3>& t) {
+  return 0.5 * (vertices[t[1]] - vertices[t[0]]).cross(vertices[t[2]] - vertices[t[0]]).norm();
+}
+
+}  // namespace
+
+void check(const SolidGel& solid) {
+  const auto require = [](const char* what, double value, bool zero) {
+    if (!std::isfinite(value) || value < 0.0 || (value == 0.0 && !zero)) {
+      fail("the gel's {} is {} mm; it must be finite and {} zero", what, value, zero ? "not below" : "above");
+    }
+  };
+  require("fine edge length", solid.fine, false);
+  require("coarse edge length", solid.coarse, false);
+  require("fine half extent in x", solid.fine_half_x, true);
+  require("fine half extent in y", solid.fine_half_y, true);
+  require("fine depth", solid.fine_depth, true);
+  if (solid.fine > solid.coarse) {
+    fail("the gel's fine edge length is {} mm; it must not be above the coarse one, {} mm", solid.fine, solid.coarse);
+  }
+  if (solid.surface.triangles.size() > kMostSolidTriangles) {
+    fail("the gel's surface has {} triangles; at most {} are allowed", solid.surface.triangles.size(),
+         kMostSolidTriangles);
+  }
+  if (const std::string fault = fault_of_closed_mesh(solid.surface); !fault.empty()) {
+    fail("the gel's surface isn't a closed solid: {}", fault);
+  }
+  if (solid.faces.size() != solid.surface.triangles.size()) {
+    fail("the gel's surface has {} triangles, but {} of them are named", solid.surface.triangles.size(),
+         solid.faces.size());
+  }
+  for (const auto& [kind, name] : {std::pair(FaceKind::bonded, "bonded"), std::pair(FaceKind::outer, "outer")}) {
+    if (std::find(solid.faces.begin(), solid.faces.end(), kind) == solid.faces.end()) {
+      fail("the gel's surface has no {} face", name);
+    }
+  }
+  const Vector3d size = box_of(solid).sizes();
+  if (size.maxCoeff() > 200.0 * size.minCoeff()) {
+    fail("the gel is {} x {} x {} mm; its longest side must be at most 200 times its shortest", size.x(), size.y(),
+         size.z());
+  }
+  refuse_nearly_coincident(solid);
+  const double tetrahedra = estimated_tetrahedra(solid);
+  if (!(tetrahedra <= kMostTetrahedra)) {
+    fail(
+        "the gel would take some {:.3g} tetrahedra; at most {} are allowed: make its fine edge length ({} mm) larger "
+        "or "
+        "its fine box smaller",
+        tetrahedra, kMostTetrahedra, solid.fine);
+  }
+}
+
+double thickness_of(const SolidGel& solid) {
+  return box_of(solid).sizes().z();
+}
+
+double estimated_tetrahedra(const SolidGel& solid) {
+  const Eigen::AlignedBox3d box = box_of(solid);
+  const double longest = longest_edge(solid);
+  constexpr int kSteps = 40;
+  double sum = 0.0;
+  for (int i = 0; i < kSteps; ++i) {
+    for (int j = 0; j < kSteps; ++j) {
+      for (int k = 0; k < kSteps; ++k) {
+        const Vector3d part((i + 0.5) / kSteps, (j + 0.5) / kSteps, (k + 0.5) / kSteps);
+        sum += std::pow(wanted_edge(solid, longest, box.min() + part.cwiseProduct(box.sizes())), -3);
+      }
+    }
+  }
+  return kTetrahedraPerCube * enclosed_volume(solid.surface) * sum / (kSteps * kSteps * kSteps);
+}
+
+TetMesh mesh_solid(const SolidGel& solid) {
+  check(solid);
+  const Eigen::AlignedBox3d box = box_of(solid);
+  const double longest = longest_edge(solid);
+  FillInput input;
+  input.points = solid.surface.vertices;
+  for (std::size_t t = 0; t < solid.surface.triangles.size(); ++t) {
+    const auto& corner = solid.surface.triangles[t];
+    input.facets.push_back({{{corner[0], corner[1], corner[2]}}, 1 + static_cast<int>(solid.faces[t])});
+  }
+  // A run-away ends here, and is then refused: a mesh has about five tetrahedra a vertex.
+  input.most_points = static_cast<int>(kMostTetrahedra / 4.0);
+  input.edge = [&](const Vector3d& x) { return wanted_edge(solid, longest, x); };
+  const auto planes = [&](int axis, double low, double high) {
+    const double from = box.min()[axis];
+    const double to = box.max()[axis];
+    return graded_planes(from, to, std::clamp(low, from, to), std::clamp(high, from, to));
+  };
+  input.grid = {planes(0, -solid.fine_half_x, solid.fine_half_x), planes(1, -solid.fine_half_y, solid.fine_half_y),
+                planes(2, -solid.fine_depth, box.max().z())};
+  Filling filling = fill_with_tetrahedra(input, "the gel's mesh");
+  TetMesh mesh = std::move(filling.mesh);
+  if (static_cast<double>(mesh.tetrahedra.size()) > 1.5 * kMostTetrahedra) {
+    fail(
+        "the gel took {} tetrahedra; at most {} are allowed: its surface has features far below its fine edge length, "
+        "{} mm",
+        mesh.tetrahedra.size(), 1.5 * kMostTetrahedra, solid.fine);
+  }
+  // TetGen gives faces in either sense.
+  const auto sorted = [](std::array<int, 3> face) {
+    std::sort(face.begin(), face.end());
+    return face;
+  };
+  std::vector<std::pair<std::array<int, 3>, int>> marked;
+  for (std::size_t f = 0; f < filling.faces.size(); ++f) {
+    marked.emplace_back(sorted(filling.faces[f]), filling.markers[f]);
+  }
+  std::sort(marked.begin(), marked.end());
+  std::array<double, 3> area{};
+  for (const auto& face : boundary_faces(mesh)) {
+    const auto key = sorted(face);
+    const auto found = std::lower_bound(marked.begin(), marked.end(), std::pair(key, 0));
+    if (found == marked.end() || found->first != key || found->second < 1 || found->second > 3) {
+      fail("TetGen lost a face of the gel's surface");
+    }
+    const auto kind = static_cast<FaceKind>(found->second - 1);
+    area[found->second - 1] += area_of(mesh.vertices, face);
+    if (kind == FaceKind::outer) mesh.outer.push_back(face);
+    if (kind == FaceKind::bonded) mesh.bonded.push_back(face);
+  }
+  for (std::size_t t = 0; t < solid.faces.size(); ++t) {
+    area[static_cast<int>(solid.faces[t])] -= area_of(solid.surface.vertices, solid.surface.triangles[t]);
+  }
+  const double size = box.sizes().squaredNorm();
+  for (const double off : area) {
+    if (!(std::abs(off) < 1e-6 * size)) {
+      fail("TetGen's mesh of the gel has other faces than its surface: {:.3g} mm^2 differ", std::abs(off));
+    }
+  }
+  return mesh;
+}
+
+}  // namespace touchstone::fem

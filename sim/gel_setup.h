@@ -1,0 +1,19 @@
+#pragma once
+// From a device's file to what fem asks for.
+
+#include <vector>
+
+#include "fem/compliance.h"
+#include "fem/gel_body.h"
+#include "sim/device.h"
+
+namespace touchstone::sim {
+
+fem::GelBody gel_body(const DeviceSpec& device);
+
+/// The body's, then the layers' from the outer surface inwards.
+std::vector<fem::ElasticMaterial> gel_materials(const GelSpec& gel);
+
+std::vector<fem::Bead> gel_beads(const DeviceSpec& device);
+
+}  // namespace touchstone::sim

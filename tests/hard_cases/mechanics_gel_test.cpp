@@ -1,0 +1,195 @@
+// Hard cases of gels as bodies and meshes: the right answer, or a refusal that says why, before TetGen sees them.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "core/error.h"
+#include "fem/compliance.h"
+#include "fem/gel_body.h"
+#include "fem/press.h"
+#include "lab/contact_closed_forms.h"
+
+namespace touchstone::fem {
+namespace {
+
+using Eigen::Vector3d;
+using ::testing::HasSubstr;
+
+/// A box, z from -size.z() to 0, top outer and bottom bonded.
+SolidGel box_gel(const Vector3d& size) {
+  SolidGel gel;
+  for (int corner = 0; corner < 8; ++corner) {
+    const Vector3d at((corner & 1) ? 0.5 : -0.5, (corner & 2) ? 0.5 : -0.5, (corner & 4) ? 0.0 : -1.0);
+    gel.surface.vertices.push_back(at.cwiseProduct(size));
+  }
+  gel.surface.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
+                           {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+  gel.faces.assign(12, FaceKind::side);
+  gel.faces[0] = gel.faces[1] = FaceKind::bonded;
+  gel.faces[2] = gel.faces[3] = FaceKind::outer;
+  return gel;
+}
+
+std::string error_of(const GelBody& body) {
+  try {
+    mesh_gel(body);
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST(HardCase3, AnEdgeAsSharpAsASliverIsRefusedAndItsAngleNamed) {
+  // A wedge that ends at some degree: no mesh inside can be better.
+  SolidGel knife = box_gel({10, 8, 3});
+  for (const int v : {0, 2}) knife.surface.vertices[v].z() = -0.2;
+  for (const int v : {1, 3}) knife.surface.vertices[v] += Vector3d(0.0, 0.0, 3.0 - 0.02);
+  EXPECT_THAT(error_of(knife), HasSubstr("degrees"));
+}
+
+TEST(HardCase3, TheSmallestAngleIsReported) {
+  const SolidGel gel = box_gel({6, 6, 3});
+  const TetMesh mesh = mesh_gel(gel);
+  const Compliance made = compute_compliance(mesh, ElasticMaterial{0.33, 0.49}, {}, 3.0);
+  EXPECT_NEAR(made.report.smallest_dihedral_deg, smallest_dihedral_angle(mesh) * 180.0 / 3.14159265358979, 1e-9);
+  EXPECT_GT(made.report.smallest_dihedral_deg, kSmallestDihedralDeg);
+}
+
+TEST(HardCase4, AVeryThinLayerMeetsTheKernel) {
+  const SlabMesh slab{7.0, 7.0, 0.2, 0.2, 0.6, 2.4, 2.4, 0.2};
+  for (const double nu : {0.3, 0.45}) {
+    const Compliance gel = compute_compliance(mesh_slab(slab), {1.0, nu}, {}, slab.thickness);
+    Press press(gel, SphereShape{60.0}, 0.0);
+    PressTarget target;
+    target.axis = {AxisControl::at(0.013), AxisControl::at(0.021), AxisControl::at(60.0 - 0.04)};
+    const PressState& state = press.step(target);
+    const auto slope = [](double r) { return r / std::sqrt(3600.0 - r * r); };
+    const lab::LayerContact wanted = lab::profile_on_layer(1.0, nu, slab.thickness, slope, 0.04, 4.0);
+    ASSERT_LT(slab.thickness / wanted.contact_radius, 0.1);
+    EXPECT_NEAR(state.wrench[2], wanted.force, 0.02 * wanted.force) << nu;
+  }
+}
+
+TEST(HardCase4, AVeryThinCoatingNeedsNoFinerMesh) {
+  SlabGel coated{{10.0, 10.0, 3.0, 0.5, 1.5, 2.0, 2.0, 0.5}, {0.002}};
+  EXPECT_EQ(error_of(coated), "no error");
+  coated.layers = {0.0005};
+  EXPECT_THAT(error_of(coated), HasSubstr("at most 1000 times as wide as high"));
+}
+
+TEST(HardCase13, CoincidentAndNearlyCoincidentVerticesAreRefusedByName) {
+  // The same place twice: two sheets that share a corner's place but not its vertex.
+  SolidGel twice = box_gel({6, 6, 3});
+  twice.surface.vertices.push_back(twice.surface.vertices[7]);
+  twice.surface.triangles[3][1] = 8;
+  EXPECT_THAT(error_of(twice), HasSubstr("isn't a closed solid: the edge between vertices"));
+  // 1e-9 mm apart: closed, and with a needle of a triangle.
+  SolidGel near = box_gel({6, 6, 3});
+  near.surface.vertices.push_back(near.surface.vertices[7] + Vector3d(0, 0, -1e-9));
+  near.surface.triangles[7] = {3, 6, 8};
+  near.surface.triangles[11] = {3, 8, 5};
+  near.surface.triangles.push_back({6, 7, 8});
+  near.surface.triangles.push_back({7, 5, 8});
+  near.faces.resize(14, FaceKind::side);
+  EXPECT_THAT(error_of(near), HasSubstr("vertices 7 and 8 at"));
+  EXPECT_THAT(error_of(near), HasSubstr("they must be at least 0.005 mm apart"));
+}
+
+TEST(HardCase13, AVertexThatAllButTouchesAFaceIsRefused) {
+  // A notch in the top that stops 1e-9 mm above the bottom.
+  SolidGel notched = box_gel({6, 6, 3});
+  notched.surface.vertices.push_back(Vector3d(0.5, 0.25, -3.0 + 1e-9));
+  notched.surface.triangles[2] = {4, 5, 8};
+  notched.surface.triangles[3] = {5, 7, 8};
+  notched.surface.triangles.push_back({7, 6, 8});
+  notched.surface.triangles.push_back({6, 4, 8});
+  notched.faces.resize(14, FaceKind::outer);
+  EXPECT_THAT(error_of(notched), HasSubstr("vertex 8 at (0.5, 0.25"));
+  EXPECT_THAT(error_of(notched), HasSubstr("beside triangle"));
+}
+
+TEST(HardCase14, ASolidWithANumberThatIsNoneIsRefused) {
+  for (const double bad : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+    SolidGel gel = box_gel({6, 6, 3});
+    gel.surface.vertices[3].y() = bad;
+    EXPECT_THAT(error_of(gel), HasSubstr("vertex 3 isn't finite"));
+    gel = box_gel({6, 6, 3});
+    gel.fine = bad;
+    EXPECT_THAT(error_of(gel), HasSubstr("must be finite"));
+  }
+}
+
+TEST(HardCase15, ABoundaryThatCrossesItselfIsRefused) {
+  SolidGel gel = box_gel({6, 6, 3});
+  gel.surface.vertices[7] = Vector3d(-1.0, -1.0, -5.0);  // a corner pulled through the bottom
+  EXPECT_THAT(error_of(gel), HasSubstr("cross"));
+}
+
+TEST(HardCase16, NoThicknessIsRefused) {
+  SolidGel flat = box_gel({6, 6, 3});
+  for (auto& vertex : flat.surface.vertices) vertex.z() = 0.0;
+  EXPECT_THAT(error_of(flat), HasSubstr("isn't a closed solid"));
+  SolidGel film = box_gel({6, 6, 1e-9});
+  EXPECT_THAT(error_of(film), HasSubstr("at most 200 times its shortest"));
+  SlabGel slab;
+  slab.mesh.thickness = 0.0;
+  EXPECT_THAT(error_of(slab), HasSubstr("thickness is 0 mm"));
+  DomeGel dome;
+  dome.base_radius = 0.0;
+  EXPECT_THAT(error_of(dome), HasSubstr("base radius is 0 mm"));
+  FingertipGel tip;
+  tip.radius = 0.0;
+  EXPECT_THAT(error_of(tip), HasSubstr("is 0 mm"));
+}
+
+TEST(HardCase17, AnAspectOf1000IsRefused) {
+  EXPECT_THAT(error_of(box_gel({1000, 1000, 1})), HasSubstr("at most 200 times its shortest"));
+  SlabGel slab;
+  slab.mesh.size_x = slab.mesh.size_y = 1000.0;
+  slab.mesh.thickness = 1.0;
+  EXPECT_THAT(error_of(slab), HasSubstr("at most 200 times its shortest"));
+  DomeGel dome;
+  dome.sphere_radius = 1e6;
+  dome.base_radius = 500.0;
+  dome.thickness = 1.0;
+  EXPECT_THAT(error_of(dome), HasSubstr("at most 200 times the other"));
+  FingertipGel tip;
+  tip.length = 8000.0;
+  EXPECT_THAT(error_of(tip), HasSubstr("at most 200 times the other"));
+  // Below that the budget decides.
+  SolidGel wide = box_gel({100, 100, 1});
+  wide.fine = 0.5;
+  wide.coarse = 100.0;
+  EXPECT_THAT(error_of(wide), HasSubstr("at most 60000 are allowed"));
+}
+
+TEST(HardCase18, AnOpenOrNonManifoldSurfaceIsRefused) {
+  SolidGel open = box_gel({6, 6, 3});
+  open.surface.triangles.pop_back();
+  open.faces.pop_back();
+  EXPECT_THAT(error_of(open), HasSubstr("the surface is open"));
+  SolidGel fin = box_gel({6, 6, 3});
+  fin.surface.vertices.push_back(Vector3d(0, 0, 2));
+  fin.surface.triangles.push_back({5, 6, 8});
+  fin.surface.triangles.push_back({6, 5, 8});
+  fin.faces.resize(14, FaceKind::side);
+  EXPECT_THAT(error_of(fin), HasSubstr("the surface isn't manifold"));
+  SolidGel inside_out = box_gel({6, 6, 3});
+  for (auto& t : inside_out.surface.triangles) std::swap(t[1], t[2]);
+  EXPECT_THAT(error_of(inside_out), HasSubstr("it is inside out"));
+}
+
+TEST(HardCase18, ASolidWithoutABondOrAnOuterFaceIsRefused) {
+  SolidGel loose = box_gel({6, 6, 3});
+  loose.faces[0] = loose.faces[1] = FaceKind::side;
+  EXPECT_THAT(error_of(loose), HasSubstr("has no bonded face"));
+  SolidGel closed = box_gel({6, 6, 3});
+  closed.faces[2] = closed.faces[3] = FaceKind::bonded;
+  EXPECT_THAT(error_of(closed), HasSubstr("has no outer face"));
+}
+
+}  // namespace
+}  // namespace touchstone::fem
