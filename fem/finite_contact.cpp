@@ -50,6 +50,7 @@ struct DeformedTriangle {
   Eigen::Vector3d pressure;  // of the corners
   double area = 0.0;         // undeformed
   double size = 0.0;
+  double deepest = 0.0;  // no point of the gel's surface can be further inside the body
 
   Eigen::Vector3d direction(const Eigen::Vector3d& b) const { return (normals * b).normalized(); }
 
@@ -87,6 +88,8 @@ struct DeformedTriangle {
 
   std::optional<double> gap_at(const Eigen::Vector3d& point, const Eigen::Vector3d& along) const {
     const auto gap = first_entry(shape, point, along);
+    // A line from a part of the gel that faces away may come out of the body's far side.
+    if (gap && -*gap > deepest) return std::nullopt;
     // A line that grazes a flank of the body (beside a punch, where the gel's face is tilted towards it) is a miss.
     if (gap && slope(point, along, *gap).squaredNorm() > 1.0 + kSteepest * kSteepest) return std::nullopt;
     return gap;
@@ -175,7 +178,7 @@ DeformedGap deformed_gap(const TaylorHoodSpace& space, const OuterSurface& surfa
     nodes[t] = nodes_of(space, mesh.outer[t]);
     std::visit(
         [&](const auto& body) {
-          DeformedTriangle<std::decay_t<decltype(body)>> triangle{body, {}, {}, {}, {}, 0.0, 0.0};
+          DeformedTriangle<std::decay_t<decltype(body)>> triangle{body, {}, {}, {}, {}, 0.0, 0.0, 0.0};
           for (int k = 0; k < 6; ++k) triangle.points.col(k) = object_from_gel * place(nodes[t][k]);
           for (int k = 0; k < 3; ++k) {
             triangle.normals.col(k) = object_from_gel.turn(normals[surface.triangles[t][k]]);
@@ -195,6 +198,7 @@ DeformedGap deformed_gap(const TaylorHoodSpace& space, const OuterSurface& surfa
           const Eigen::Vector3d a = mesh.vertices[mesh.outer[t][0]];
           triangle.area = 0.5 * (mesh.vertices[mesh.outer[t][1]] - a).cross(mesh.vertices[mesh.outer[t][2]] - a).norm();
           triangle.size = std::sqrt(triangle.area);
+          triangle.deepest = 2.0 * overlap + triangle.size;
           for (int k = 0; k < 3; ++k) triangle.pressure[k] = pressure[surface.triangles[t][k]];
           triangle.integrate(ball.radius, parts[t]);
           for (int k = 0; k < 3; ++k) {
