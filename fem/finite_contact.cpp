@@ -208,7 +208,10 @@ DeformedGap deformed_gap(const TaylorHoodSpace& space, const OuterSurface& surfa
             if (triangle.pressure[k] <= 0.0 || triangle.pressure[next] <= 0.0) continue;
             const double length = (mesh.vertices[mesh.outer[t][k]] - mesh.vertices[mesh.outer[t][next]]).norm();
             if (auto bulge = bulge_of(triangle, nodes[t], k)) {
-              bulge->stiffness = kBulge * 0.5 * (triangle.pressure[k] + triangle.pressure[next]) * length;
+              // The harmonic mean: a vertex that just begins to touch changes nothing at once.
+              const double one = triangle.pressure[k];
+              const double other = triangle.pressure[next];
+              bulge->stiffness = kBulge * 2.0 * one * other / (one + other) * length;
               parts[t].bulges.push_back(*bulge);
             }
           }
