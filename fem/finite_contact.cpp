@@ -89,18 +89,34 @@ struct DeformedTriangle {
   std::optional<double> gap_at(const Eigen::Vector3d& point, const Eigen::Vector3d& along) const {
     const auto gap = first_entry(shape, point, along);
     // A line from a part of the gel that faces away may come out of the body's far side.
-    if (gap && -*gap > deepest) return std::nullopt;
-    // A line that grazes a flank of the body (beside a punch, where the gel's face is tilted towards it) is a miss.
-    if (gap && slope(point, along, *gap).squaredNorm() > 1.0 + kSteepest * kSteepest) return std::nullopt;
+    if (gap && -*gap > deepest + size) return std::nullopt;
     return gap;
   }
 
-  void integrate(double body_radius, TrianglePart& part) const {
-    const auto line = [this](const Eigen::Vector3d& b) { return gap_at(points * face_shape(b), direction(b)); };
-    const auto visit = [&](const Eigen::Vector3d& b, double gap, double share) {
-      const double weight = share * area;
+  void cover(double body_radius, std::vector<GapLines::Point>& points_found) const {
+    const auto line = [this](const Eigen::Vector3d& b) -> std::optional<double> {
+      const Eigen::Vector3d point = points * face_shape(b);
+      const Eigen::Vector3d along = direction(b);
+      const auto gap = gap_at(point, along);
+      // A line that grazes a flank of the body (beside a punch, where the gel's face is tilted towards it) is a miss.
+      if (gap && slope(point, along, *gap).squaredNorm() > 1.0 + kSteepest * kSteepest) return std::nullopt;
+      return gap;
+    };
+    const auto visit = [&](const Eigen::Vector3d& b, double, double share) {
+      points_found.push_back({b, share * area});
+    };
+    CoveredTriangle(line, visit).integrate(splits_for_body(area, body_radius));
+  }
+
+  void integrate(const std::vector<GapLines::Point>& covering, TrianglePart& part) const {
+    for (const auto& [b, weight] : covering) {
       const Eigen::Matrix<double, 6, 1> values = face_shape(b);
-      const Eigen::Vector3d gradient = gel_from_object * slope(points * values, direction(b), gap);
+      const Eigen::Vector3d point = points * values;
+      const Eigen::Vector3d along = direction(b);
+      const auto hit = gap_at(point, along);
+      if (!hit) continue;
+      const double gap = *hit;
+      const Eigen::Vector3d gradient = gel_from_object * slope(point, along, gap);
       part.gap += weight * gap * b;
       part.covered += weight * b;
       part.lowest = std::min(part.lowest, gap);
@@ -108,16 +124,14 @@ struct DeformedTriangle {
         part.gradient.middleCols<3>(3 * node) += (weight * values[node]) * b * gradient.transpose();
       }
       const double push = weight * b.dot(pressure);
-      if (push == 0.0) return;
-      const Eigen::Matrix3d turned =
-          gel_from_object * bend(points * values, direction(b), gap) * gel_from_object.transpose();
+      if (push == 0.0) continue;
+      const Eigen::Matrix3d turned = gel_from_object * bend(point, along, gap) * gel_from_object.transpose();
       for (int i = 0; i < 6; ++i) {
         for (int j = 0; j < 6; ++j) {
           part.curvature.block<3, 3>(3 * i, 3 * j) += (push * values[i] * values[j]) * turned;
         }
       }
-    };
-    CoveredTriangle(line, visit).integrate(splits_for_body(area, body_radius));
+    }
   }
 };
 
@@ -151,61 +165,102 @@ std::array<int, 6> nodes_of(const TaylorHoodSpace& space, const std::array<int, 
           space.middle(face[2], face[0])};
 }
 
+Eigen::Vector3d moved(const TaylorHoodSpace& space, const Eigen::MatrixX3d& displacement, int node) {
+  return space.position(node) + displacement.row(node).transpose();
+}
+
+/// The t-th triangle of the surface, in the object's frame.
+template <typename Shape>
+DeformedTriangle<Shape> triangle_of(const TaylorHoodSpace& space, const OuterSurface& surface, std::size_t t,
+                                    const GapLines& lines, const Eigen::MatrixX3d& displacement, const Shape& shape,
+                                    const RigidTransform& gel_from_object) {
+  const TetMesh& mesh = *space.mesh;
+  const RigidTransform object_from_gel = gel_from_object.inverse();
+  const std::array<int, 6> nodes = nodes_of(space, mesh.outer[t]);
+  DeformedTriangle<Shape> triangle{shape, {}, {}, {}, Eigen::Vector3d::Zero(), 0.0, 0.0, lines.deepest};
+  for (int k = 0; k < 6; ++k) triangle.points.col(k) = object_from_gel * moved(space, displacement, nodes[k]);
+  for (int k = 0; k < 3; ++k) {
+    triangle.normals.col(k) = object_from_gel.turn(lines.normals[surface.triangles[t][k]]);
+  }
+  triangle.gel_from_object = gel_from_object.rotation;
+  const Eigen::Vector3d a = mesh.vertices[mesh.outer[t][0]];
+  triangle.area = 0.5 * (mesh.vertices[mesh.outer[t][1]] - a).cross(mesh.vertices[mesh.outer[t][2]] - a).norm();
+  triangle.size = std::sqrt(triangle.area);
+  return triangle;
+}
+
+/// Whether a line of the triangle may hit a ball about the body.
+template <typename Shape>
+bool may_hit(const DeformedTriangle<Shape>& triangle, const BoundingBall& ball) {
+  const Eigen::Vector3d middle = triangle.points.template leftCols<3>().rowwise().mean();
+  const Eigen::Vector3d axis = triangle.normals.rowwise().mean().normalized();
+  double reach = 0.0;
+  for (int k = 0; k < 6; ++k) reach = std::max(reach, (triangle.points.col(k) - middle).norm());
+  // Lines that spread with the normals reach further aside the further the body is.
+  double spread = 0.0;
+  for (int k = 0; k < 3; ++k) spread = std::max(spread, (triangle.normals.col(k) - axis).norm());
+  const Eigen::Vector3d away = ball.centre - middle;
+  const double aside = (away - away.dot(axis) * axis).norm();
+  return aside <= reach + ball.radius + 2.0 * spread * (away.norm() + ball.radius);
+}
+
 }  // namespace
 
+GapLines gap_lines(const TaylorHoodSpace& space, const OuterSurface& surface, const Eigen::MatrixX3d& displacement,
+                   const ContactShape& shape, const RigidTransform& gel_from_object, double overlap) {
+  GapLines lines;
+  lines.deepest = 2.0 * overlap;
+  lines.normals.assign(surface.mesh_vertex.size(), Eigen::Vector3d::Zero());
+  const auto corner = [&](int vertex) { return moved(space, displacement, surface.mesh_vertex[vertex]); };
+  for (const auto& t : surface.triangles) {
+    const Eigen::Vector3d a = corner(t[0]);
+    const Eigen::Vector3d twice_area = (corner(t[1]) - a).cross(corner(t[2]) - a);
+    for (const int v : t) lines.normals[v] += twice_area;
+  }
+  for (auto& normal : lines.normals) normal.normalize();
+  const BoundingBall ball = bounding_ball(shape);
+  lines.points.resize(surface.triangles.size());
+  tbb::parallel_for(std::size_t{0}, lines.points.size(), [&](std::size_t t) {
+    std::visit(
+        [&](const auto& body) {
+          const auto triangle = triangle_of(space, surface, t, lines, displacement, body, gel_from_object);
+          if (may_hit(triangle, ball)) triangle.cover(ball.radius, lines.points[t]);
+        },
+        shape);
+  });
+  return lines;
+}
+
 DeformedGap deformed_gap(const TaylorHoodSpace& space, const OuterSurface& surface, const Eigen::VectorXd& weight,
-                         const Eigen::MatrixX3d& displacement, const ContactShape& shape,
+                         const GapLines& lines, const Eigen::MatrixX3d& displacement, const ContactShape& shape,
                          const RigidTransform& gel_from_object, double overlap, const Eigen::VectorXd& pressure) {
   const TetMesh& mesh = *space.mesh;
   const auto n = static_cast<Eigen::Index>(surface.mesh_vertex.size());
-  const RigidTransform object_from_gel = gel_from_object.inverse();
-  const BoundingBall ball = bounding_ball(shape);
-  const auto place = [&](int node) -> Eigen::Vector3d {
-    return space.position(node) + displacement.row(node).transpose();
-  };
-  std::vector<Eigen::Vector3d> normals(surface.mesh_vertex.size(), Eigen::Vector3d::Zero());
-  for (const auto& t : surface.triangles) {
-    const Eigen::Vector3d a = place(surface.mesh_vertex[t[0]]);
-    const Eigen::Vector3d twice_area =
-        (place(surface.mesh_vertex[t[1]]) - a).cross(place(surface.mesh_vertex[t[2]]) - a);
-    for (const int v : t) normals[v] += twice_area;
+  // The pressure that a point of a partly covered hat carries.
+  Eigen::VectorXd share = Eigen::VectorXd::Zero(n);
+  for (std::size_t t = 0; t < lines.points.size(); ++t) {
+    for (const auto& point : lines.points[t]) {
+      for (int k = 0; k < 3; ++k) share[surface.triangles[t][k]] += point.weight * point.barycentric[k];
+    }
   }
-  for (auto& normal : normals) normal.normalize();
-
+  const Eigen::VectorXd carried = pressure.array() * weight.array() / share.array().max(kLeastShare * weight.array());
   std::vector<TrianglePart> parts(surface.triangles.size());
   std::vector<std::array<int, 6>> nodes(surface.triangles.size());
   tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t t) {
     nodes[t] = nodes_of(space, mesh.outer[t]);
+    if (lines.points[t].empty()) return;
     std::visit(
         [&](const auto& body) {
-          DeformedTriangle<std::decay_t<decltype(body)>> triangle{body, {}, {}, {}, {}, 0.0, 0.0, 0.0};
-          for (int k = 0; k < 6; ++k) triangle.points.col(k) = object_from_gel * place(nodes[t][k]);
-          for (int k = 0; k < 3; ++k) {
-            triangle.normals.col(k) = object_from_gel.turn(normals[surface.triangles[t][k]]);
-          }
-          triangle.gel_from_object = gel_from_object.rotation;
-          const Eigen::Vector3d middle = triangle.points.template leftCols<3>().rowwise().mean();
-          const Eigen::Vector3d along = triangle.normals.rowwise().mean();
-          double reach = 0.0;
-          for (int k = 0; k < 6; ++k) reach = std::max(reach, (triangle.points.col(k) - middle).norm());
-          const Eigen::Vector3d away = ball.centre - middle;
-          // Lines that spread with the normals reach further aside the further the body is.
-          const Eigen::Vector3d axis = along.normalized();
-          double spread = 0.0;
-          for (int k = 0; k < 3; ++k) spread = std::max(spread, (triangle.normals.col(k) - axis).norm());
-          const double aside = (away - away.dot(axis) * axis).norm();
-          if (aside > reach + ball.radius + 2.0 * spread * (away.norm() + ball.radius)) return;
-          const Eigen::Vector3d a = mesh.vertices[mesh.outer[t][0]];
-          triangle.area = 0.5 * (mesh.vertices[mesh.outer[t][1]] - a).cross(mesh.vertices[mesh.outer[t][2]] - a).norm();
-          triangle.size = std::sqrt(triangle.area);
-          triangle.deepest = 2.0 * overlap + triangle.size;
-          for (int k = 0; k < 3; ++k) triangle.pressure[k] = pressure[surface.triangles[t][k]];
-          triangle.integrate(ball.radius, parts[t]);
+          auto triangle = triangle_of(space, surface, t, lines, displacement, body, gel_from_object);
+          for (int k = 0; k < 3; ++k) triangle.pressure[k] = carried[surface.triangles[t][k]];
+          triangle.integrate(lines.points[t], parts[t]);
           for (int k = 0; k < 3; ++k) {
             const int next = (k + 1) % 3;
             // Each edge once, from the triangle that goes along it from its lower vertex.
             if (surface.triangles[t][k] > surface.triangles[t][next]) continue;
+            const auto whole = [&](int v) { return share[v] > 0.99 * weight[v]; };  // not on the body's rim
             if (triangle.pressure[k] <= 0.0 || triangle.pressure[next] <= 0.0) continue;
+            if (!whole(surface.triangles[t][k]) || !whole(surface.triangles[t][next])) continue;
             const double length = (mesh.vertices[mesh.outer[t][k]] - mesh.vertices[mesh.outer[t][next]]).norm();
             if (auto bulge = bulge_of(triangle, nodes[t], k)) {
               // The harmonic mean: a vertex that just begins to touch changes nothing at once.
@@ -232,14 +287,14 @@ DeformedGap deformed_gap(const TaylorHoodSpace& space, const OuterSurface& surfa
   }
   Eigen::VectorXd scale = Eigen::VectorXd::Zero(n);
   for (Eigen::Index i = 0; i < n; ++i) {
-    const double share = covered[i] / weight[i];
-    if (share < kLeastShare) {
+    const double hit = covered[i] / weight[i];
+    if (hit < kLeastShare) {
       result.weighted[i] = kInfinity;
       continue;
     }
     scale[i] = weight[i] / covered[i];
     result.weighted[i] *= scale[i];
-    if (share < 0.5) result.weighted[i] += weight[i] * (0.5 - share) / 0.1 * overlap;
+    if (hit < 0.5) result.weighted[i] += weight[i] * (0.5 - hit) / 0.1 * overlap;
   }
   std::vector<Eigen::Triplet<double>> entries;
   std::vector<Eigen::Triplet<double>> bends;

@@ -15,6 +15,21 @@
 
 namespace touchstone::fem {
 
+/// The lines along which gaps are looked up: points of the undeformed surface whose lines hit the body, and directions.
+struct GapLines {
+  struct Point {
+    Eigen::Vector3d barycentric;
+    double weight = 0.0;  ///< mm^2, of undeformed surface
+  };
+  std::vector<std::vector<Point>> points;  ///< per triangle
+  std::vector<Eigen::Vector3d> normals;    ///< per vertex; in between they are interpolated
+  double deepest = 0.0;                    ///< mm: a line that enters the body further back than this is a miss
+};
+
+/// The lines of a deformed surface. `overlap` (mm, >= 0) is how deep the body reaches under the undeformed surface.
+GapLines gap_lines(const TaylorHoodSpace& space, const OuterSurface& surface, const Eigen::MatrixX3d& displacement,
+                   const ContactShape& shape, const RigidTransform& gel_from_object, double overlap);
+
 /// What holds the middle of an edge in contact between its ends. The hats' mean gaps leave the quadratic part of the
 /// surface free, and under a pressure of some 2 G those modes buckle (in the continuum, contact holds them): so each
 /// edge resists bulging against the body with a stiffness in proportion to the pressure on it. Where contact is close
@@ -29,11 +44,11 @@ struct EdgeBulge {
 /// The gap of each surface vertex at a deformed state.
 ///
 /// gap(x) is the distance from the deformed surface point x (the quadratic displacement itself, not its projection)
-/// along the deformed surface's normal there to where the line enters the body. `weighted[i]` = int phi_i gap dA over
-/// the undeformed hat's hit part, scaled up to the whole hat, as in weighted_gap, which it becomes at rest. `gradient`
-/// is its derivative by the displacement at held direction of the lines (as the gap closes, how the lines turn stops
-/// mattering): the vertex's pressure p_i pushes the gel by p_i times it. So contact forces act along the body's normals
-/// and derive from a potential: without friction the force on the body is the derivative of the stored energy.
+/// along its line to where that enters the body. `weighted[i]` = int phi_i gap dA over the undeformed hat's hit part,
+/// scaled up to the whole hat, as in weighted_gap, which it becomes at rest. `gradient` is its derivative by the
+/// displacement at held lines, exactly (as the gap closes, how the lines turn stops mattering): the vertex's pressure
+/// p_i pushes the gel by p_i times it. So contact forces act along the body's normals and derive from a potential:
+/// without friction the force on the body is the derivative of the stored energy.
 struct DeformedGap {
   Eigen::VectorXd weighted;  ///< n, mm^3; infinity: far
   /// n x (3 nodes), mm^2: row i holds d weighted_i / d u_node, 3 * node + component
@@ -47,11 +62,11 @@ struct DeformedGap {
 };
 
 /// `weight` is int phi_i dA. Vertices that the body covers by less than half of their hats stay open: their gap is
-/// raised by up to `overlap` (mm, >= 0: how deep the body reaches under the undeformed surface), as in weighted_gap.
-/// `pressure` (n, MPa) is for `bulges` and `curvature`; the latter is meant for Newton's method: second differences, of
-/// no more curvature than the mesh can follow.
+/// raised by up to `overlap` (as in gap_lines), as in weighted_gap. `pressure` (n, MPa) is for `bulges` and
+/// `curvature`; the latter is meant for Newton's method: second differences, of no more curvature than the mesh can
+/// follow.
 DeformedGap deformed_gap(const TaylorHoodSpace& space, const OuterSurface& surface, const Eigen::VectorXd& weight,
-                         const Eigen::MatrixX3d& displacement, const ContactShape& shape,
+                         const GapLines& lines, const Eigen::MatrixX3d& displacement, const ContactShape& shape,
                          const RigidTransform& gel_from_object, double overlap, const Eigen::VectorXd& pressure);
 
 }  // namespace touchstone::fem

@@ -21,6 +21,7 @@ namespace touchstone::fem {
 namespace {
 
 constexpr int kMostNewton = 25;
+static const int kTurningSteps = getenv("TURN") ? atoi(getenv("TURN")) : 4;
 constexpr int kMostBacktracks = 5;
 constexpr double kLeastShrink = 0.2;  // of the least J in one Newton step
 constexpr double kBalanced = 1e-8;    // residual over the elements' forces
@@ -251,6 +252,9 @@ bool FinitePress::Parts::arrived(const Snapshot& from, const PartTarget& target,
     }
     const double gap = at.gap.weighted[v] / gel.rest.weight[v];
     const double wrong = at.state[v] == NodeState::open ? std::max(0.0, -gap) : std::abs(gap);
+    if (at.state[v] == NodeState::open && at.pressure[v] > 1e-9 * largest) {
+      error = std::numeric_limits<double>::infinity();  // a shortened step leaves some
+    }
     error = std::max(error, wrong / tolerance.lookup_mm);
     if (friction == 0.0 || at.state[v] == NodeState::open || scale.size() == 0) continue;
     if (!(scale[v] > 0.0)) {
@@ -315,12 +319,18 @@ std::optional<Snapshot> FinitePress::Parts::solve(const Snapshot& from, const Pa
   double least = gel.problem.smallest_volume_ratio(iterate.at.elastic);
   Eigen::VectorXd tangential_scale;  // mm^3 per MPa, per vertex
   double error = 0.0;
+  GapLines lines;
 
-  const auto evaluate = [&] {
+  const auto evaluate = [&](int step) {
     Snapshot& at = iterate.at;
     const double depth = std::max(0.0, overlap(at.pose));
-    at.gap =
-        deformed_gap(space, gel.outer, gel.rest.weight, at.elastic.displacement, shape, at.pose, depth, at.pressure);
+    // How the lines turn, and which of them hit, isn't in the tangent. It hardly matters but at an edge as narrow as
+    // the mesh, where Newton's steps may alternate; so the lines stay once they are nearly right.
+    if (step < kTurningSteps) {
+      lines = gap_lines(space, gel.outer, at.elastic.displacement, shape, at.pose, depth);
+    }
+    at.gap = deformed_gap(space, gel.outer, gel.rest.weight, lines, at.elastic.displacement, shape, at.pose, depth,
+                          at.pressure);
     ++effort.updates;
     for (int v = 0; v < n; ++v) {
       if (std::isfinite(at.gap.weighted[v])) continue;
@@ -350,7 +360,7 @@ std::optional<Snapshot> FinitePress::Parts::solve(const Snapshot& from, const Pa
     const double size = std::max(iterate.residual.scale, outside.norm());
     iterate.balance = size > 0.0 ? iterate.residual.values.norm() / size : 0.0;
   };
-  evaluate();
+  evaluate(0);
 
   for (int iteration = 0; iteration < kMostNewton; ++iteration) {
     Snapshot& at = iterate.at;
@@ -530,8 +540,8 @@ std::optional<Snapshot> FinitePress::Parts::solve(const Snapshot& from, const Pa
     }
     at.state = std::move(states);
     at.residual = answer.residual;
-    evaluate();
-    if (arrived(from, target, iterate, tangential_scale, error) && factor == 1.0) {
+    evaluate(iteration + 1);
+    if (arrived(from, target, iterate, tangential_scale, error)) {
       Snapshot found = std::move(iterate.at);
       if (!found.touching) return untouched_at(found.pose);
       found.penetration = 0.0;
@@ -541,6 +551,33 @@ std::optional<Snapshot> FinitePress::Parts::solve(const Snapshot& from, const Pa
         }
       }
       return found;
+    }
+    if (getenv("TRACE")) {
+      double go = 0, gc = 0;
+      int wo = -1, wc = -1;
+      int na = 0;
+      for (int v = 0; v < n; ++v) {
+        if (!std::isfinite(at.gap.weighted[v])) continue;
+        double g = at.gap.weighted[v] / gel.rest.weight[v];
+        if (at.state[v] == NodeState::open) {
+          if (-g > go) {
+            go = -g;
+            wo = v;
+          }
+        } else {
+          ++na;
+          if (std::abs(g) > gc) {
+            gc = std::abs(g);
+            wc = v;
+          }
+        }
+      }
+      fmt::print(stderr,
+                 "it {} bal {:.2e} open pen {:.2e} ({}) closed {:.2e} ({}) active {} m {} factor {} err {:.2e} change "
+                 "{:.2e} F {:.6f} J {:.3f} bulges {}\n",
+                 iteration, iterate.balance, go, wo, gc, wc, na, m, factor, error,
+                 change.head(space.unknowns).cwiseAbs().maxCoeff() * scales.length, at.force.z(), least,
+                 at.gap.bulges.size());
     }
     if (!std::isfinite(iterate.balance)) break;
   }
