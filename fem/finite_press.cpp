@@ -21,7 +21,8 @@ namespace touchstone::fem {
 namespace {
 
 constexpr int kMostNewton = 25;
-static const int kTurningSteps = getenv("TURN") ? atoi(getenv("TURN")) : 4;
+constexpr int kPlainSteps = 2;    // before Aitken's rule
+constexpr int kTurningSteps = 4;  // after these the lines of contact stay
 constexpr int kMostBacktracks = 5;
 constexpr double kLeastShrink = 0.2;  // of the least J in one Newton step
 constexpr double kBalanced = 1e-8;    // residual over the elements' forces
@@ -320,6 +321,8 @@ std::optional<Snapshot> FinitePress::Parts::solve(const Snapshot& from, const Pa
   Eigen::VectorXd tangential_scale;  // mm^3 per MPa, per vertex
   double error = 0.0;
   GapLines lines;
+  Eigen::VectorXd last_change;
+  double last_factor = 1.0;
 
   const auto evaluate = [&](int step) {
     Snapshot& at = iterate.at;
@@ -501,7 +504,13 @@ std::optional<Snapshot> FinitePress::Parts::solve(const Snapshot& from, const Pa
       return std::nullopt;
     }
 
+    // Aitken's rule (Irons and Tuck 1969) against steps that alternate.
     double factor = 1.0;
+    if (last_change.size() == change.size() && iteration >= kPlainSteps) {
+      const double ratio = change.dot(last_change) / last_change.squaredNorm();
+      if (ratio < 0.0) factor = std::clamp(last_factor / (1.0 - ratio), 0.1, 1.0);
+    }
+    last_change = change;
     ElasticSolution next;
     RigidTransform pose;
     for (int tries = 0;; factor *= 0.5, ++tries) {
@@ -523,6 +532,7 @@ std::optional<Snapshot> FinitePress::Parts::solve(const Snapshot& from, const Pa
       least = ratio;
       break;
     }
+    last_factor = factor;
     at.elastic = std::move(next);
     at.pose = pose;
     at.pressure *= 1.0 - factor;
@@ -551,33 +561,6 @@ std::optional<Snapshot> FinitePress::Parts::solve(const Snapshot& from, const Pa
         }
       }
       return found;
-    }
-    if (getenv("TRACE")) {
-      double go = 0, gc = 0;
-      int wo = -1, wc = -1;
-      int na = 0;
-      for (int v = 0; v < n; ++v) {
-        if (!std::isfinite(at.gap.weighted[v])) continue;
-        double g = at.gap.weighted[v] / gel.rest.weight[v];
-        if (at.state[v] == NodeState::open) {
-          if (-g > go) {
-            go = -g;
-            wo = v;
-          }
-        } else {
-          ++na;
-          if (std::abs(g) > gc) {
-            gc = std::abs(g);
-            wc = v;
-          }
-        }
-      }
-      fmt::print(stderr,
-                 "it {} bal {:.2e} open pen {:.2e} ({}) closed {:.2e} ({}) active {} m {} factor {} err {:.2e} change "
-                 "{:.2e} F {:.6f} J {:.3f} bulges {}\n",
-                 iteration, iterate.balance, go, wo, gc, wc, na, m, factor, error,
-                 change.head(space.unknowns).cwiseAbs().maxCoeff() * scales.length, at.force.z(), least,
-                 at.gap.bulges.size());
     }
     if (!std::isfinite(iterate.balance)) break;
   }
