@@ -16,6 +16,9 @@ namespace touchstone::fem {
 /// What contact asks of the outer surface's geometry, made once.
 struct ContactSurface {
   explicit ContactSurface(const Compliance& gel);
+  /// `mass` is n x n: int phi_i phi_j dA (P1 hats).
+  ContactSurface(std::vector<Eigen::Vector3d> vertices, std::vector<std::array<int, 3>> triangles,
+                 const Eigen::SparseMatrix<double>& mass);
 
   std::vector<Eigen::Vector3d> vertices;
   std::vector<std::array<int, 3>> triangles;

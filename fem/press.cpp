@@ -31,6 +31,8 @@ struct Effort {
   int parts = 0;
 };
 
+}  // namespace
+
 RigidTransform between(const RigidTransform& a, const RigidTransform& b, double fraction) {
   if (fraction >= 1.0) return b;
   RigidTransform result;
@@ -42,10 +44,14 @@ RigidTransform between(const RigidTransform& a, const RigidTransform& b, double 
   return result;
 }
 
+namespace {
+
 /// About the body's origin.
 Eigen::Vector3d torque_on(const BodySnapshot& body) {
   return body.moment - body.pose.translation.cross(body.force);
 }
+
+}  // namespace
 
 void check_target(const PressTarget& target) {
   if (!std::isfinite(target.seconds) || target.seconds < 0.0) {
@@ -73,8 +79,6 @@ void check_target(const PressTarget& target) {
     fail("a normal force of {} N is wanted: contact can't pull, it must be at least 0", target.axis[2].value);
   }
 }
-
-}  // namespace
 
 struct Press::Parts {
   Parts(const Compliance& compliance, std::vector<PressBody> bodies, PressTolerance wanted, PronySeries relaxation,

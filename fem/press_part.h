@@ -19,6 +19,8 @@
 
 namespace touchstone::fem {
 
+struct PressTarget;
+
 /// One body at a converged point of the path.
 struct BodySnapshot {
   RigidTransform pose;                               ///< gel from object
@@ -48,6 +50,12 @@ struct PressSnapshot {
   /// As if this body had never touched.
   void forget(int body);
 };
+
+/// The pose at `fraction` of the straight way from a to b (rotations by slerp).
+RigidTransform between(const RigidTransform& a, const RigidTransform& b, double fraction);
+
+/// @throws Error unless the target is finite, its rotation one, and its normal force and its time not negative
+void check_target(const PressTarget& target);
 
 /// No contact, for a surface of n vertices.
 PressSnapshot untouched(std::vector<BodySnapshot> bodies, int n);

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "core/error.h"
 
@@ -95,6 +96,30 @@ std::vector<SpherePoint> sphere_rule(int degree) {
       rule.push_back({{ring * std::cos(angle), ring * std::sin(angle), height.x}, 0.5 * height.weight / around});
     }
   }
+  return rule;
+}
+
+const std::vector<SimplexPoint<4>>& symmetric_tetrahedron_rule() {
+  static const std::vector<SimplexPoint<4>> rule = [] {
+    std::vector<SimplexPoint<4>> points;
+    for (const auto& [a, weight] : {std::pair{0.31088591926330060980, 0.11268792571801585080},
+                                    std::pair{0.09273525031089122640, 0.07349304311636194954}}) {
+      for (int k = 0; k < 4; ++k) {
+        SimplexPoint<4> point{Eigen::Vector4d::Constant(a), weight};
+        point.barycentric[k] = 1.0 - 3.0 * a;
+        points.push_back(point);
+      }
+    }
+    constexpr double kEdge = 0.04550370412564964949;
+    for (int k = 0; k < 4; ++k) {
+      for (int l = k + 1; l < 4; ++l) {
+        SimplexPoint<4> point{Eigen::Vector4d::Constant(kEdge), 0.04254602077708146644};
+        point.barycentric[k] = point.barycentric[l] = 0.5 - kEdge;
+        points.push_back(point);
+      }
+    }
+    return points;
+  }();
   return rule;
 }
 

@@ -18,6 +18,10 @@ struct SimplexPoint {
 std::vector<SimplexPoint<4>> tetrahedron_rule(int degree);
 std::vector<SimplexPoint<3>> triangle_rule(int degree);
 
+/// Walkington's rule of degree 5 with 14 points (Quadrature on simplices of arbitrary dimension, 2000): symmetric in
+/// the corners, so that a symmetric mesh keeps its symmetry.
+const std::vector<SimplexPoint<4>>& symmetric_tetrahedron_rule();
+
 struct SpherePoint {
   Eigen::Vector3d direction;  ///< unit vector
   double weight = 0.0;

@@ -174,28 +174,59 @@ std::vector<int> places_of(std::span<const int> order, int size) {
 
 }  // namespace
 
-Eigen::MatrixXd schur_complement(const SymmetricEntries& matrix, int last, std::span<const int> order,
-                                 FactorReport* report) {
+struct BorderedFactor::Parts {
+  Parts(const SymmetricEntries& matrix, int last, std::span<const int> order)
+      : places(places_of(order, matrix.size)), kept(last), mumps(matrix) {
+    std::iota(kept.begin(), kept.end(), matrix.size - last + 1);
+  }
+  std::vector<int> places;
+  std::vector<int> kept;
+  Mumps mumps;
+};
+
+BorderedFactor::BorderedFactor(const SymmetricEntries& matrix, int last, std::span<const int> order,
+                               FactorReport* report, bool keep_factor) {
   TS_ASSERT(last > 0 && last < matrix.size && static_cast<int>(order.size()) == matrix.size - last);
-  std::vector<int> places = places_of(order, matrix.size);
-  std::vector<int> kept(last);
-  std::iota(kept.begin(), kept.end(), matrix.size - last + 1);
-  Eigen::MatrixXd schur = Eigen::MatrixXd::Zero(last, last);
-  Mumps mumps(matrix);
+  parts_ = std::make_unique<Parts>(matrix, last, order);
+  complement_ = Eigen::MatrixXd::Zero(last, last);
+  Mumps& mumps = parts_->mumps;
   mumps.data().size_schur = last;
-  mumps.data().listvar_schur = kept.data();
-  mumps.data().schur = schur.data();
+  mumps.data().listvar_schur = parts_->kept.data();
+  mumps.data().schur = complement_.data();
   mumps.data().nprow = mumps.data().npcol = 1;
   mumps.data().mblock = mumps.data().nblock = 100;
   mumps.control(19) = 2;  // the lower triangle, by columns
   mumps.data().schur_lld = last;
   mumps.control(7) = kGivenOrder;
-  mumps.control(31) = 1;  // the factor isn't kept: nothing will be solved with it, and it's two thirds of the memory
-  mumps.data().perm_in = places.data();
+  // Where nothing will be solved with it the factor isn't kept: it's two thirds of the memory.
+  mumps.control(31) = keep_factor ? 0 : 1;
+  mumps.data().perm_in = parts_->places.data();
   mumps.analyse_and_factorise(report);
-  stop_unless_finite(schur);
-  schur.triangularView<Eigen::StrictlyUpper>() = schur.transpose();
-  return schur;
+  stop_unless_finite(complement_);
+  complement_.triangularView<Eigen::StrictlyUpper>() = complement_.transpose();
+}
+
+BorderedFactor::~BorderedFactor() = default;
+
+Eigen::VectorXd BorderedFactor::solve(const Eigen::VectorXd& right) {
+  Mumps& mumps = parts_->mumps;
+  const Eigen::Index inner = mumps.data().n - complement_.rows();
+  TS_ASSERT(right.size() == inner);
+  Eigen::VectorXd x = Eigen::VectorXd::Zero(mumps.data().n);
+  x.head(inner) = right;
+  mumps.control(26) = 0;  // the system without its last unknowns
+  mumps.data().nrhs = 1;
+  mumps.data().lrhs = mumps.data().n;
+  mumps.data().rhs = x.data();
+  mumps.run(kSolve);
+  Eigen::VectorXd solution = x.head(inner);
+  stop_unless_finite(solution);
+  return solution;
+}
+
+Eigen::MatrixXd schur_complement(const SymmetricEntries& matrix, int last, std::span<const int> order,
+                                 FactorReport* report) {
+  return BorderedFactor(matrix, last, order, report, false).take_complement();
 }
 
 Eigen::MatrixXd solve_symmetric(const SymmetricEntries& matrix, std::span<const int> order,

@@ -8,6 +8,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace touchstone::fem {
@@ -66,6 +67,29 @@ class SymmetricFactor {
  private:
   struct Parts;
   std::unique_ptr<Parts> parts_;
+};
+
+/// Both of one factorisation: the Schur complement of the last unknowns, and solutions with the block A11 of the
+/// others. MUMPS allows one instance at a time: while this lives, other solutions wait (in the same thread: for ever).
+class BorderedFactor {
+ public:
+  /// As schur_complement. Without `keep_factor`, solve() can't be called. @throws Error as there
+  BorderedFactor(const SymmetricEntries& matrix, int last, std::span<const int> order, FactorReport* report = nullptr,
+                 bool keep_factor = true);
+  ~BorderedFactor();
+  BorderedFactor(const BorderedFactor&) = delete;
+  BorderedFactor& operator=(const BorderedFactor&) = delete;
+
+  /// A22 - A21 A11^-1 A12, symmetric.
+  const Eigen::MatrixXd& complement() const { return complement_; }
+  Eigen::MatrixXd take_complement() && { return std::move(complement_); }
+  /// A11^-1 right, without refinement. `right` has the size of A11.
+  Eigen::VectorXd solve(const Eigen::VectorXd& right);
+
+ private:
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+  Eigen::MatrixXd complement_;
 };
 
 /// The kernel that OpenBLAS chose for this processor ("Zen", "Cooperlake"; "Prescott" on a recent processor means that

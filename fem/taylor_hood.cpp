@@ -155,7 +155,113 @@ std::vector<Member> members_of(const Carriers& carriers, int element) {
   return members;
 }
 
-/// Right-hand side from loads on the body and its free faces, without units.
+}  // namespace
+
+Eigen::Matrix<double, 10, 1> quadratic_shape(const Eigen::Vector4d& at) {
+  Eigen::Matrix<double, 10, 1> values;
+  for (int k = 0; k < 4; ++k) {
+    values[k] = at[k] * (2.0 * at[k] - 1.0);
+  }
+  for (int k = 0; k < 6; ++k) {
+    values[4 + k] = 4.0 * at[kTetEdges[k][0]] * at[kTetEdges[k][1]];
+  }
+  return values;
+}
+
+Eigen::Matrix<double, 3, 10> quadratic_gradients(const std::array<Eigen::Vector3d, 4>& corners,
+                                                 const Eigen::Vector4d& barycentric) {
+  return shape_gradients(barycentric_gradients(corners), barycentric);
+}
+
+SymmetricEntries assemble(const TaylorHoodSpace& space, const Scales& scales) {
+  std::vector<ElementShape> shapes(space.elements.size());
+  tbb::parallel_for(std::size_t{0}, shapes.size(),
+                    [&](std::size_t e) { shapes[e] = element_shape(space, scales, static_cast<int>(e)); });
+  return assemble_rows(space, [&](int element, int node, const std::array<bool, 10>& wanted) {
+    ElementRow row;
+    for (int k = 0; k < 10; ++k) {
+      if (wanted[k]) {
+        row[k] = element_block(shapes[element], node, k);
+      }
+    }
+    return row;
+  });
+}
+
+SymmetricEntries assemble_rows(
+    const TaylorHoodSpace& space,
+    const std::function<ElementRow(int element, int node, const std::array<bool, 10>& wanted)>& row_of) {
+  const Carriers carriers(space);
+  std::vector<std::vector<Member>> members(space.elements.size());
+  tbb::parallel_for(std::size_t{0}, members.size(),
+                    [&](std::size_t e) { members[e] = members_of(carriers, static_cast<int>(e)); });
+  // Elements around each carrier, in their order, and the carrier's place among the element's members.
+  std::vector<std::vector<std::array<int, 2>>> around(carriers.count);
+  for (std::size_t e = 0; e < members.size(); ++e) {
+    for (std::size_t k = 0; k < members[e].size(); ++k) {
+      around[members[e][k].carrier].push_back({static_cast<int>(e), static_cast<int>(k)});
+    }
+  }
+  std::vector<SymmetricEntries> rows(carriers.count);
+  tbb::parallel_for(0, carriers.count, [&](int carrier) {
+    std::vector<int> neighbours;
+    for (const auto& [element, place] : around[carrier]) {
+      for (const Member& other : members[element]) {
+        if (other.carrier >= carrier) {
+          neighbours.push_back(other.carrier);
+        }
+      }
+    }
+    std::sort(neighbours.begin(), neighbours.end());
+    neighbours.erase(std::unique(neighbours.begin(), neighbours.end()), neighbours.end());
+    std::vector<Eigen::Matrix4d> blocks(neighbours.size(), Eigen::Matrix4d::Zero());
+    for (const auto& [element, place] : around[carrier]) {
+      const Member& own = members[element][place];
+      std::array<bool, 10> wanted{};
+      for (const Member& other : members[element]) {
+        wanted[other.local] = wanted[other.local] || other.carrier >= carrier;
+      }
+      const ElementRow row = row_of(element, own.local, wanted);
+      for (const Member& other : members[element]) {
+        if (other.carrier >= carrier) {
+          const auto found = std::lower_bound(neighbours.begin(), neighbours.end(), other.carrier);
+          const Eigen::Matrix4d& block = row[other.local];
+          Eigen::Matrix4d& sum = blocks[found - neighbours.begin()];
+          const int height = own.last - own.first + 1;
+          const int width = other.last - other.first + 1;
+          sum.block(own.first, other.first, height, width) += block.block(own.first, other.first, height, width);
+        }
+      }
+    }
+    for (std::size_t n = 0; n < neighbours.size(); ++n) {
+      for (int a = 0; a < 4; ++a) {
+        for (int b = neighbours[n] == carrier ? a : 0; b < 4; ++b) {
+          const int row = carriers.unknown(carrier, a);
+          const int column = carriers.unknown(neighbours[n], b);
+          if (row >= 0 && column >= 0) {
+            rows[carrier].add(row, column, blocks[n](a, b));
+          }
+        }
+      }
+    }
+  });
+  SymmetricEntries matrix;
+  matrix.size = space.unknowns;
+  std::size_t total = 0;
+  for (const SymmetricEntries& row : rows) {
+    total += row.values.size();
+  }
+  matrix.rows.reserve(total);
+  matrix.columns.reserve(total);
+  matrix.values.reserve(total);
+  for (const SymmetricEntries& row : rows) {
+    matrix.rows.insert(matrix.rows.end(), row.rows.begin(), row.rows.end());
+    matrix.columns.insert(matrix.columns.end(), row.columns.begin(), row.columns.end());
+    matrix.values.insert(matrix.values.end(), row.values.begin(), row.values.end());
+  }
+  return matrix;
+}
+
 Eigen::VectorXd load_vector(const TaylorHoodSpace& space, const Scales& scales, const ElasticLoads& loads) {
   const TetMesh& mesh = *space.mesh;
   Eigen::MatrixX3d force = Eigen::MatrixX3d::Zero(space.nodes, 3);  // N
@@ -215,89 +321,6 @@ Eigen::VectorXd load_vector(const TaylorHoodSpace& space, const Scales& scales, 
     }
   }
   return right;
-}
-
-}  // namespace
-
-Eigen::Matrix<double, 10, 1> quadratic_shape(const Eigen::Vector4d& at) {
-  Eigen::Matrix<double, 10, 1> values;
-  for (int k = 0; k < 4; ++k) {
-    values[k] = at[k] * (2.0 * at[k] - 1.0);
-  }
-  for (int k = 0; k < 6; ++k) {
-    values[4 + k] = 4.0 * at[kTetEdges[k][0]] * at[kTetEdges[k][1]];
-  }
-  return values;
-}
-
-SymmetricEntries assemble(const TaylorHoodSpace& space, const Scales& scales) {
-  const Carriers carriers(space);
-  std::vector<ElementShape> shapes(space.elements.size());
-  std::vector<std::vector<Member>> members(space.elements.size());
-  tbb::parallel_for(std::size_t{0}, shapes.size(), [&](std::size_t e) {
-    shapes[e] = element_shape(space, scales, static_cast<int>(e));
-    members[e] = members_of(carriers, static_cast<int>(e));
-  });
-  // Elements around each carrier, in their order, and the carrier's place among the element's members.
-  std::vector<std::vector<std::array<int, 2>>> around(carriers.count);
-  for (std::size_t e = 0; e < members.size(); ++e) {
-    for (std::size_t k = 0; k < members[e].size(); ++k) {
-      around[members[e][k].carrier].push_back({static_cast<int>(e), static_cast<int>(k)});
-    }
-  }
-  std::vector<SymmetricEntries> rows(carriers.count);
-  tbb::parallel_for(0, carriers.count, [&](int carrier) {
-    std::vector<int> neighbours;
-    for (const auto& [element, place] : around[carrier]) {
-      for (const Member& other : members[element]) {
-        if (other.carrier >= carrier) {
-          neighbours.push_back(other.carrier);
-        }
-      }
-    }
-    std::sort(neighbours.begin(), neighbours.end());
-    neighbours.erase(std::unique(neighbours.begin(), neighbours.end()), neighbours.end());
-    std::vector<Eigen::Matrix4d> blocks(neighbours.size(), Eigen::Matrix4d::Zero());
-    for (const auto& [element, place] : around[carrier]) {
-      const Member& own = members[element][place];
-      for (const Member& other : members[element]) {
-        if (other.carrier >= carrier) {
-          const auto found = std::lower_bound(neighbours.begin(), neighbours.end(), other.carrier);
-          const Eigen::Matrix4d block = element_block(shapes[element], own.local, other.local);
-          Eigen::Matrix4d& sum = blocks[found - neighbours.begin()];
-          const int height = own.last - own.first + 1;
-          const int width = other.last - other.first + 1;
-          sum.block(own.first, other.first, height, width) += block.block(own.first, other.first, height, width);
-        }
-      }
-    }
-    for (std::size_t n = 0; n < neighbours.size(); ++n) {
-      for (int a = 0; a < 4; ++a) {
-        for (int b = neighbours[n] == carrier ? a : 0; b < 4; ++b) {
-          const int row = carriers.unknown(carrier, a);
-          const int column = carriers.unknown(neighbours[n], b);
-          if (row >= 0 && column >= 0) {
-            rows[carrier].add(row, column, blocks[n](a, b));
-          }
-        }
-      }
-    }
-  });
-  SymmetricEntries matrix;
-  matrix.size = space.unknowns;
-  std::size_t total = 0;
-  for (const SymmetricEntries& row : rows) {
-    total += row.values.size();
-  }
-  matrix.rows.reserve(total);
-  matrix.columns.reserve(total);
-  matrix.values.reserve(total);
-  for (const SymmetricEntries& row : rows) {
-    matrix.rows.insert(matrix.rows.end(), row.rows.begin(), row.rows.end());
-    matrix.columns.insert(matrix.columns.end(), row.columns.begin(), row.columns.end());
-    matrix.values.insert(matrix.values.end(), row.values.begin(), row.values.end());
-  }
-  return matrix;
 }
 
 ElasticSolution solve_elastic(const TaylorHoodSpace& space, const ElasticMaterial& material,

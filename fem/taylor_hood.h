@@ -28,6 +28,10 @@ Eigen::Matrix<double, 10, 1> quadratic_shape(const Eigen::Vector4d& barycentric)
 /// The two corners of each edge, in the order of the shape functions.
 inline constexpr std::array<std::array<int, 2>, 6> kTetEdges = {{{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}}};
 
+/// Gradients (columns) of the ten quadratic shape functions of a tetrahedron with these corners (1/mm).
+Eigen::Matrix<double, 3, 10> quadratic_gradients(const std::array<Eigen::Vector3d, 4>& corners,
+                                                 const Eigen::Vector4d& barycentric);
+
 /// Numbering of nodes and unknowns on a mesh, which must outlive it.
 struct TaylorHoodSpace {
   const TetMesh* mesh = nullptr;
@@ -73,6 +77,15 @@ Scales make_scales(const TetMesh& mesh, const ElasticMaterial& material);  ///< 
 /// the elements' order whatever the number of threads.
 SymmetricEntries assemble(const TaylorHoodSpace& space, const Scales& scales);
 
+/// One element's coupling of a node (rows: displacement 0..2, pressure 3) with its ten nodes (columns likewise).
+using ElementRow = std::array<Eigen::Matrix4d, 10>;
+
+/// Adds up a symmetric matrix over the space's unknowns from the elements' rows. `row_of(element, node, wanted)` is
+/// called from several threads; only its wanted blocks are used. In the elements' order whatever the number of threads.
+SymmetricEntries assemble_rows(
+    const TaylorHoodSpace& space,
+    const std::function<ElementRow(int element, int node, const std::array<bool, 10>& wanted)>& row_of);
+
 /// What drives a problem. Each is optional.
 struct ElasticLoads {
   std::function<Eigen::Vector3d(const Eigen::Vector3d& x)> body_force;  ///< N/mm^3
@@ -80,6 +93,10 @@ struct ElasticLoads {
   std::function<Eigen::Vector3d(const Eigen::Vector3d& x, const Eigen::Vector3d& normal)> traction;
   std::function<Eigen::Vector3d(const Eigen::Vector3d& x)> bonded_displacement;  ///< mm
 };
+
+/// Right-hand side over the space's unknowns, without units, of the loads on the body and its free faces; what is
+/// given at the bonded faces isn't in it.
+Eigen::VectorXd load_vector(const TaylorHoodSpace& space, const Scales& scales, const ElasticLoads& loads);
 
 struct ElasticSolution {
   Eigen::MatrixX3d displacement;  ///< nodes x 3, mm

@@ -29,6 +29,22 @@ TEST(Quadrature, TetrahedronRuleIsExactUpToItsDegree) {
   }
 }
 
+TEST(Quadrature, SymmetricTetrahedronRuleIsExactUpToDegreeFive) {
+  for (int a = 0; a <= 5; ++a) {
+    for (int b = 0; a + b <= 5; ++b) {
+      for (int c = 0; a + b + c <= 5; ++c) {
+        double mean = 0.0;
+        for (const auto& point : symmetric_tetrahedron_rule()) {
+          mean += point.weight * std::pow(point.barycentric[1], a) * std::pow(point.barycentric[2], b) *
+                  std::pow(point.barycentric[3], c);
+        }
+        const double exact = 6.0 * factorial(a) * factorial(b) * factorial(c) / factorial(a + b + c + 3);
+        EXPECT_NEAR(mean, exact, 1e-15) << a << ' ' << b << ' ' << c;
+      }
+    }
+  }
+}
+
 TEST(Quadrature, TriangleRuleIsExactUpToItsDegree) {
   for (int degree = 0; degree <= 8; ++degree) {
     for (int a = 0; a <= degree; ++a) {

@@ -58,6 +58,19 @@ TEST(SchurSolver, SchurComplementIsWhatDenseAlgebraSays) {
   }
 }
 
+TEST(SchurSolver, OneFactorisationGivesTheComplementAndSolvesTheInnerBlock) {
+  const Eigen::MatrixXd matrix = quasi_definite(60);
+  BorderedFactor factor(upper_entries(matrix), 7, rising(53));
+  const Eigen::VectorXd right = Eigen::VectorXd::LinSpaced(53, -1.0, 2.0);
+  const Eigen::VectorXd expected = matrix.topLeftCorner(53, 53).partialPivLu().solve(right);
+  EXPECT_LT((factor.solve(right) - expected).norm(), 1e-12 * expected.norm());
+  EXPECT_LT((factor.solve(2.0 * right) - 2.0 * expected).norm(), 1e-12 * expected.norm());
+  const Eigen::MatrixXd complement = matrix.bottomRightCorner(7, 7) -
+                                     matrix.bottomLeftCorner(7, 53) *
+                                         matrix.topLeftCorner(53, 53).partialPivLu().solve(matrix.topRightCorner(53, 7));
+  EXPECT_LT((factor.complement() - complement).norm(), 1e-12 * complement.norm());
+}
+
 TEST(SchurSolver, SolvesEveryColumn) {
   const Eigen::MatrixXd matrix = quasi_definite(60);
   const Eigen::MatrixXd right = Eigen::MatrixXd::Random(60, 3);

@@ -1,0 +1,277 @@
+#include "fem/finite_press.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "core/error.h"
+#include "fem/finite_part.h"
+#include "fem/press_report.h"
+#include "fem/surface_strain.h"
+
+namespace touchstone::fem {
+namespace {
+
+constexpr double kLargestPart = 0.1;  // of the thickness: the way of one part
+constexpr double kLargestForceGrowth = 3.0;
+constexpr double kFirstTouch = 0.02;   // of the thickness: where a force-controlled press begins
+constexpr int kResolvedVertices = 13;  // as in press_report.cpp
+
+struct Effort {
+  PartEffort part;
+  int parts = 0;
+};
+
+}  // namespace
+
+struct FinitePress::Parts {
+  Parts(const FiniteGel& on, ContactShape shape, double mu, PressTolerance wanted)
+      : gel(on),
+        friction(mu),
+        tolerance(wanted),
+        solver(on, std::move(shape), mu, wanted),
+        n(static_cast<int>(gel.rest.vertices.size())) {
+    mass.compute(gel.mass);
+    if (mass.info() != Eigen::Success) fail("the gel's surface mass matrix isn't positive definite");
+    now = untouched(gel, {});
+    state = report(now);
+  }
+
+  const FiniteGel& gel;
+  double friction;
+  PressTolerance tolerance;
+  FinitePartSolver solver;
+  int n;
+  SurfaceMassFactor mass;
+  FiniteSnapshot now;
+  bool placed = false;
+  PressState state;
+
+  double overlap(const RigidTransform& pose) const { return solver.overlap(pose); }
+  void refuse_too_deep(const RigidTransform& pose) const;
+  std::optional<FiniteSnapshot> advance(const FiniteSnapshot& start, const PartTarget& target,
+                                        const FiniteSnapshot& from, double begin, double end, int halvings,
+                                        Effort& effort);
+  std::optional<RigidTransform> straight_above(RigidTransform pose) const;
+  FiniteSnapshot follow(const PressTarget& target, Effort& effort);
+  PressState report(const FiniteSnapshot& at) const;
+};
+
+void FinitePress::Parts::refuse_too_deep(const RigidTransform& pose) const {
+  const double depth = overlap(pose);
+  if (depth > gel.thickness) fail("the object reaches {:.4g} mm into a gel of {:.4g} mm", depth, gel.thickness);
+}
+
+/// From the share `begin` of the way from `start` to the target to the share `end`, halved where it doesn't converge.
+std::optional<FiniteSnapshot> FinitePress::Parts::advance(const FiniteSnapshot& start, const PartTarget& target,
+                                                          const FiniteSnapshot& from, double begin, double end,
+                                                          int halvings, Effort& effort) {
+  PartTarget part = target;
+  part.pose = between(start.pose, target.pose, end);
+  if (end < 1.0) part.force = start.force + end * (target.force - start.force);
+  for (int a = 0; a < 3; ++a) {
+    if (target.forced[a]) part.pose.translation[a] = from.pose.translation[a];
+  }
+  if (auto next = solver.solve(from, part, effort.part)) {
+    ++effort.parts;
+    return next;
+  }
+  if (halvings == 0) return std::nullopt;
+  const double middle = 0.5 * (begin + end);
+  const auto half = advance(start, target, from, begin, middle, halvings - 1, effort);
+  if (!half) return std::nullopt;
+  return advance(start, target, *half, middle, end, halvings - 1, effort);
+}
+
+/// The pose straight above `pose` in which the body just touches the undeformed gel; nothing if it isn't over it.
+std::optional<RigidTransform> FinitePress::Parts::straight_above(RigidTransform pose) const {
+  for (int k = 0; k < 30; ++k) {
+    const double depth = overlap(pose);
+    if (!std::isfinite(depth)) return std::nullopt;
+    pose.translation.z() += depth;
+    if (std::abs(depth) < 1e-12 * (std::abs(pose.translation.z()) + gel.thickness)) break;
+  }
+  return pose;
+}
+
+FiniteSnapshot FinitePress::Parts::follow(const PressTarget& target, Effort& effort) {
+  PartTarget to;
+  to.pose = {target.rotation, now.pose.translation};
+  for (int a = 0; a < 3; ++a) {
+    to.forced[a] = target.axis[a].kind == AxisControl::Kind::force;
+    (to.forced[a] ? to.force[a] : to.pose.translation[a]) = target.axis[a].value;
+  }
+  double shear = 0.0;
+  for (int a = 0; a < 2; ++a) {
+    if (to.forced[a]) shear = std::hypot(shear, to.force[a]);
+  }
+  if (shear > 0.0 && friction == 0.0) {
+    fail("gross slip: a shear force of {:.6g} N is wanted without friction", shear);
+  }
+  const double held = to.force[2] > 0.0 && friction > 0.0 ? friction * to.force[2] : 0.0;
+  if (shear > 0.0 && to.forced[2] && shear >= held * (1.0 - 1e-9)) {
+    fail(
+        "gross slip: a shear force of {:.6g} N is wanted, but a normal force of {:.6g} N with a friction of {:.4g} "
+        "holds less than {:.6g} N",
+        shear, to.force[2], friction, held);
+  }
+  // A forced axis that nothing can push on stays where it is: without friction, along the surface.
+  for (int a = 0; a < 2 && friction == 0.0; ++a) to.forced[a] = false;
+
+  FiniteSnapshot start = now;
+  const bool no_force = to.forced[2] && to.force[2] == 0.0;
+  if (!now.touching || no_force) {
+    std::optional<RigidTransform> touch = straight_above(to.pose);
+    if (to.forced[2]) {
+      if (!touch) fail("the object isn't over the gel: a force of {:.4g} N can't be reached", to.force[2]);
+      if (no_force) return untouched(gel, *touch);
+      to.pose = *touch;
+    } else {
+      refuse_too_deep(to.pose);
+      if (!(overlap(to.pose) > 0.0)) {
+        if (shear > 0.0) {
+          fail("gross slip: a shear force of {:.6g} N is wanted, but the object doesn't touch the gel", shear);
+        }
+        return untouched(gel, to.pose);
+      }
+      if (placed && !(overlap(now.pose) > 0.0)) {
+        double clear = 0.0;
+        double overlapping = 1.0;
+        for (int k = 0; k < 50; ++k) {
+          const double middle = 0.5 * (clear + overlapping);
+          (overlap(between(now.pose, to.pose, middle)) > 0.0 ? overlapping : clear) = middle;
+        }
+        touch = between(now.pose, to.pose, clear);
+      }
+    }
+    start = untouched(gel, touch ? *touch : to.pose);
+  }
+  if (!to.forced[2]) refuse_too_deep(to.pose);
+  if (to.forced[2] && !start.touching) {
+    // A little by position first: a force has nothing to act on yet.
+    PartTarget first;
+    first.pose = to.pose;
+    first.pose.translation.z() -= kFirstTouch * gel.thickness;
+    auto begun = advance(start, first, start, 0.0, 1.0, tolerance.most_halvings, effort);
+    if (!begun || !begun->touching)
+      fail("the press doesn't converge: {}", begun ? "no vertex touches" : solver.why_not());
+    start = std::move(*begun);
+  }
+
+  double parts = 1.0;
+  Eigen::Vector3d way = to.pose.translation - start.pose.translation;
+  for (int a = 0; a < 3; ++a) {
+    if (to.forced[a]) way[a] = 0.0;
+  }
+  parts = std::max(parts, std::ceil(way.norm() / std::min(kLargestPart * gel.thickness, tolerance.largest_motion)));
+  FiniteSnapshot at = start;
+  if (to.forced[2]) {
+    // Forces grow by a factor at a time, not by equal amounts: a contact that widens follows its tangent only so far.
+    while (at.force.z() * kLargestForceGrowth < to.force.z() * 0.999) {
+      PartTarget part = to;
+      part.force = to.force * (at.force.z() * kLargestForceGrowth / to.force.z());
+      part.pose = between(start.pose, to.pose, 1.0);
+      auto next = advance(at, part, at, 0.0, 1.0, tolerance.most_halvings, effort);
+      if (!next) fail("the press doesn't converge: {}", solver.why_not());
+      at = std::move(*next);
+    }
+    start = at;
+  }
+  for (int part = 0; part < static_cast<int>(parts); ++part) {
+    const double end = part + 1 >= parts ? 1.0 : (part + 1) / parts;
+    auto next = advance(start, to, at, part / parts, end, tolerance.most_halvings, effort);
+    if (!next) fail("the press doesn't converge: {}", solver.why_not());
+    at = std::move(*next);
+  }
+  return at;
+}
+
+PressState FinitePress::Parts::report(const FiniteSnapshot& at) const {
+  PressState s;
+  s.gel_from_object = at.pose;
+  s.node_state = at.state;
+  s.traction = Eigen::MatrixX3d::Zero(n, 3);
+  s.surface_displacement = Eigen::MatrixX3d::Zero(n, 3);
+  s.bead_displacement = gel.bead_weight * at.elastic.displacement;
+  s.largest_penetration = at.penetration;
+  s.contact_residual = at.residual;
+  if (at.touching) {
+    s.surface_displacement = mass.solve(gel.coupling * at.elastic.displacement);
+    const Eigen::MatrixX3d nodal = traction_forces(gel, at) + bulge_forces(gel, at);
+    s.wrench.head<3>() = at.force;
+    for (int node = 0; node < gel.space.nodes; ++node) {
+      const Eigen::Vector3d place = gel.space.position(node) + at.elastic.displacement.row(node).transpose();
+      s.wrench.tail<3>() -= place.cross(Eigen::Vector3d(nodal.row(node)));
+    }
+    double excess = 0.0;
+    for (int v = 0; v < n; ++v) {
+      if (at.state[v] == NodeState::open) continue;
+      s.traction.row(v) = at.pressure[v] * at.gap.direction.row(v) / gel.rest.weight[v] + at.shear.row(v);
+      s.largest_tension = std::max(s.largest_tension, -at.pressure[v]);
+      if (std::isfinite(friction)) {
+        excess = std::max(excess, at.shear.row(v).norm() - friction * std::max(0.0, at.pressure[v]));
+      }
+      s.contact_area += gel.rest.weight[v];
+      ++s.contact_vertices;
+    }
+    const double largest = at.pressure.maxCoeff();
+    if (friction > 0.0 && largest > 0.0) s.cone_violation = excess / (friction * largest);
+    s.largest_gradient = largest_surface_gradient(gel.rest.vertices, gel.rest.triangles, s.surface_displacement);
+    double deepest = 0.0;
+    for (int v = 0; v < n; ++v) {
+      deepest = std::max(deepest, std::abs(gel.rest.normals[v].dot(s.surface_displacement.row(v))));
+    }
+    s.largest_strain = std::max(s.largest_gradient, deepest / gel.thickness);
+  }
+  s.under_resolved = (at.touching || overlap(at.pose) > 0.0) && s.contact_vertices < kResolvedVertices;
+  return s;
+}
+
+FinitePress::FinitePress(const FiniteGel& gel, ContactShape shape, double friction, PressTolerance tolerance) {
+  check_shape(shape);
+  if (!(friction >= 0.0)) fail("the friction coefficient is {}, it must be at least 0", friction);
+  parts_ = std::make_unique<Parts>(gel, std::move(shape), friction, tolerance);
+}
+
+FinitePress::FinitePress(FinitePress&&) noexcept = default;
+FinitePress& FinitePress::operator=(FinitePress&&) noexcept = default;
+FinitePress::~FinitePress() = default;
+
+const PressState& FinitePress::step(const PressTarget& target) {
+  check_target(target);
+  Parts& p = *parts_;
+  Effort effort;
+  FiniteSnapshot next = p.follow(target, effort);
+  p.now = std::move(next);
+  p.placed = true;
+  p.state = p.report(p.now);
+  for (int a = 0; a < 3; ++a) {
+    if (target.axis[a].kind == AxisControl::Kind::force) {
+      p.state.force_residual = std::max(p.state.force_residual, std::abs(p.now.force[a] - target.axis[a].value));
+    }
+  }
+  p.state.candidates = effort.part.candidates;
+  p.state.geometry_updates = effort.part.geometry_updates;
+  p.state.solves = effort.part.solves;
+  p.state.factorisations = effort.part.factorisations;
+  p.state.sweeps = effort.part.sweeps;
+  p.state.parts = effort.parts;
+  return p.state;
+}
+
+const PressState& FinitePress::state() const {
+  return parts_->state;
+}
+
+const ElasticSolution& FinitePress::solution() const {
+  return parts_->now.elastic;
+}
+
+double FinitePress::stored_energy() const {
+  return parts_->gel.problem.stored_energy(parts_->now.elastic);
+}
+
+}  // namespace touchstone::fem

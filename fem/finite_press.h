@@ -1,0 +1,48 @@
+#pragma once
+// A rigid body pressed on a neo-Hookean gel at finite strain, step by step along a motion: what fem/press.h does in
+// linear elasticity, slower (a factorisation of the whole gel each Newton iteration) and without its limits.
+//
+// Each Newton iterate factorises the tangent bordered by the rows of the vertices that may touch. The Schur complement
+// is the surface compliance at that state, so contact with Coulomb friction is solved on it as in the linear case, and
+// the volume follows by two solutions with the same factorisation. Gaps and the direction of contact forces belong to
+// the deformed surface (fem/finite_contact.h). Tractions are nominal: force per undeformed area. Friction acts in the
+// plane across the vertex's mean contact direction, against the motion relative to the object since the last step.
+
+#include <memory>
+
+#include "fem/contact_shape.h"
+#include "fem/finite_gel.h"
+#include "fem/press.h"
+
+namespace touchstone::fem {
+
+class FinitePress {
+ public:
+  /// `friction` as for Press. The gel must outlive this. Of the tolerance, `force`, `lookup_mm` (here: what the gaps
+  /// are closed to) and `traction` (of the laws of friction; a hundred times that) count.
+  /// @throws Error for a shape or a friction that isn't allowed
+  FinitePress(const FiniteGel& gel, ContactShape shape, double friction, PressTolerance tolerance = {});
+  FinitePress(FinitePress&&) noexcept;
+  FinitePress& operator=(FinitePress&&) noexcept;
+  ~FinitePress();
+
+  /// Moves the object to the target, in parts of no more than a tenth of the gel's thickness, halved where Newton's
+  /// method doesn't converge. In the state, `solves` counts contact problems, `factorisations` those of the gel,
+  /// `parts` the parts; `lookup_error` is zero.
+  /// @throws Error, the state being as before the step, as Press::step; and if a tetrahedron would turn inside out or
+  /// Newton's method stalls in the smallest part allowed
+  const PressState& step(const PressTarget& target);
+
+  const PressState& state() const;
+
+  /// The gel's displacement and pressure at the last step.
+  const ElasticSolution& solution() const;
+  /// N mm, elastic energy at the last step.
+  double stored_energy() const;
+
+ private:
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+}  // namespace touchstone::fem
