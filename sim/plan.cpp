@@ -94,6 +94,11 @@ void plan_mechanics(const SceneSpec& scene, Plan& plan, Table& table) {
   const double frequency = scene.motion.highest_vibration_Hz();
   const double missing = inertia_estimate(scene.device.gel, frequency);
   const bool fast = missing > kAllowedInertia;
+  const bool inertia = scene.effects.inertia == Switch::automatic ? fast : scene.effects.inertia == Switch::on;
+  if (inertia && scene.motion.is_turned()) {
+    fail_at(scene.where,
+            "inertia isn't simulated for an object that is led by torques; effects.inertia: off leaves it out");
+  }
   plan.inertia = table.add(
       "gel dynamics (inertia)", scene.effects.inertia, fast,
       frequency == 0.0 ? "the motion doesn't vibrate"

@@ -3,31 +3,14 @@
 #include <optional>
 
 #include "core/units.h"
+#include "sim/motion_track.h"
 #include "sim/shaken_press.h"
 #include "sim/virtual_sensor.h"
 
 namespace touchstone::sim {
 namespace {
 
-using fem::AxisControl;
-
 constexpr double kStepsAPeriod = 12.0;
-
-/// What an axis is led to over the frames of a key.
-struct Ramp {
-  AxisControl::Kind kind = AxisControl::Kind::position;
-  double from = 0.0;
-  double to = 0.0;
-};
-
-Ramp ramp_of(const std::optional<AxisKey>& key, const AxisControl& held, double position, double force) {
-  if (!key) return {held.kind, held.value, held.value};
-  if (key->position_mm) {
-    return {AxisControl::Kind::position, held.kind == AxisControl::Kind::position ? held.value : position,
-            *key->position_mm};
-  }
-  return {AxisControl::Kind::force, held.kind == AxisControl::Kind::force ? held.value : force, *key->force_N};
-}
 
 std::int64_t frame_time(int frame, double rate) {
   return static_cast<std::int64_t>(std::llround(frame * kMicrosecondsPerSecond / rate));
@@ -50,11 +33,7 @@ std::vector<Truth> play_motion(const SceneSpec& scene, const Plan& plan, const f
   std::optional<ShakenPress> shaken;
   if (vibration != nullptr) shaken.emplace(gel, *vibration, relaxation, friction);
 
-  fem::PressTarget target;
-  Eigen::Vector3d angles_deg = motion.start_angles_deg;
-  target.rotation = rotation_from_xyz(angles_deg * kRadiansPerDegree);
-  for (int axis = 0; axis < 3; ++axis) target.axis[axis] = {AxisControl::Kind::position, motion.start_mm[axis]};
-
+  MotionTrack track(motion);
   std::vector<Truth> truths;
   truths.reserve(motion.frame_count());
   const auto keep = [&](fem::PressState state) {
@@ -70,48 +49,21 @@ std::vector<Truth> play_motion(const SceneSpec& scene, const Plan& plan, const f
       fail_at(where, "frame {}: {}", truths.size(), error.what());
     }
   };
-  at_frame(motion.keys.empty() ? scene.where : motion.keys.front().where, [&] { keep(press.step(target)); });
+  at_frame(motion.keys.empty() ? scene.where : motion.keys.front().where, [&] { keep(press.step(track.start())); });
 
-  for (const MotionKey& key : motion.keys) {
-    const fem::PressState& now = press.state();
-    const std::optional<AxisKey>* axis_keys[3] = {&key.x, &key.y, &key.z};
-    const bool shakes = key.vibration && key.vibration->amplitude_mm > 0.0;
-    if (shakes) {
-      AxisControl& along = target.axis[static_cast<int>(key.vibration->axis)];
-      if (along.kind == AxisControl::Kind::force) {
-        along = AxisControl::at(now.gel_from_object.translation[static_cast<int>(key.vibration->axis)]);
-      }
-    }
-    std::array<Ramp, 3> ramps;
-    for (int axis = 0; axis < 3; ++axis) {
-      ramps[axis] =
-          ramp_of(*axis_keys[axis], target.axis[axis], now.gel_from_object.translation[axis], now.wrench[axis]);
-    }
-    const Eigen::Vector3d from_angles = angles_deg;
-    const Eigen::Vector3d to_angles = key.angles_deg.value_or(angles_deg);
+  for (int frame = 1; frame < motion.frame_count(); ++frame) {
+    track.next_frame(press.state().bodies.front());
+    const MotionKey& key = track.key();
     const int steps = shaken ? 1 : steps_a_frame(key, motion, plan);
-    const auto step = [&](double frames) {
-      const double part = frames / key.frames;
-      for (int axis = 0; axis < 3; ++axis) {
-        target.axis[axis] = {ramps[axis].kind, ramps[axis].from + part * (ramps[axis].to - ramps[axis].from)};
+    at_frame(key.where, [&] {
+      for (int k = 1; k <= steps; ++k) {
+        fem::PressTarget target = track.at(static_cast<double>(k) / steps, !shaken);
+        target.seconds = 1.0 / (steps * motion.frame_rate_Hz);
+        press.step(target);
       }
-      angles_deg = from_angles + part * (to_angles - from_angles);
-      target.rotation = rotation_from_xyz(angles_deg * kRadiansPerDegree);
-      target.seconds = 1.0 / (steps * motion.frame_rate_Hz);
-      fem::PressTarget there = target;
-      if (shakes && !shaken) {
-        there.axis[static_cast<int>(key.vibration->axis)].value +=
-            key.vibration->amplitude_mm *
-            std::sin(2.0 * kPi * key.vibration->frequency_Hz * frames / motion.frame_rate_Hz);
-      }
-      press.step(there);
-    };
-    for (int i = 1; i <= key.frames; ++i) {
-      at_frame(key.where, [&] {
-        for (int k = 1; k <= steps; ++k) step(k == steps ? i : i - 1 + static_cast<double>(k) / steps);
-        keep(shakes && shaken ? shaken->at(press.state(), *key.vibration, i / motion.frame_rate_Hz) : press.state());
-      });
-    }
+      const bool shakes = shaken && key.vibration && key.vibration->amplitude_mm > 0.0;
+      keep(shakes ? shaken->at(press.state(), *key.vibration, track.seconds_in_key()) : press.state());
+    });
   }
   return truths;
 }
