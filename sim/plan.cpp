@@ -68,6 +68,25 @@ class Table {
   Plan& plan_;
 };
 
+void plan_elastic_objects(const SceneSpec& scene, Plan& plan, Table& table) {
+  const ElasticSpec* softest = nullptr;
+  for (const MovedObject& moved : moved_objects(scene)) {
+    const auto& elastic = moved.object.elastic;
+    if (elastic && (softest == nullptr || elastic->youngs_modulus_MPa < softest->youngs_modulus_MPa)) {
+      softest = &*elastic;
+    }
+  }
+  if (softest == nullptr && scene.effects.elastic_object == Switch::on) {
+    fail_at(scene.where, "effects.elastic_object: on, but no object has the field `elastic` with its modulus");
+  }
+  plan.elastic_object =
+      table.add("elastic object", scene.effects.elastic_object, softest != nullptr,
+                softest == nullptr ? "no object has a finite Young's modulus: all are rigid"
+                                   : fmt::format("an object's Young's modulus is {:.3g} MPa, the gel's {:.3g} MPa",
+                                                 softest->youngs_modulus_MPa, scene.device.gel.youngs_modulus_MPa),
+                "set-up once an object (seconds, kept in the cache), then some tens of milliseconds a frame");
+}
+
 void plan_mechanics(const SceneSpec& scene, Plan& plan, Table& table) {
   table.add("gel mechanics", true, "truth is always asked for",
             "set-up once a gel (seconds, kept in the cache), then about a millisecond a frame");
@@ -78,6 +97,8 @@ void plan_mechanics(const SceneSpec& scene, Plan& plan, Table& table) {
                    : "the motion is a straight press: no tangential part, no tilt";
   plan.friction = table.add("friction", scene.effects.friction, tangential && scene.object.friction > 0.0, why,
                             "a few milliseconds a frame");
+
+  plan_elastic_objects(scene, plan, table);
 
   const fem::PronySeries series = prony_series(scene.device.gel);
   const double seconds = (scene.motion.frame_count() - 1) / scene.motion.frame_rate_Hz;
@@ -98,6 +119,9 @@ void plan_mechanics(const SceneSpec& scene, Plan& plan, Table& table) {
   if (inertia && scene.motion.is_turned()) {
     fail_at(scene.where,
             "inertia isn't simulated for an object that is led by torques; effects.inertia: off leaves it out");
+  }
+  if (inertia && plan.elastic_object) {
+    fail_at(scene.where, "inertia isn't simulated with an elastic object; switch one of them off in effects");
   }
   plan.inertia = table.add(
       "gel dynamics (inertia)", scene.effects.inertia, fast,
@@ -136,6 +160,9 @@ void plan_relief(const SceneSpec& scene, Plan& plan, Table& table) {
       : !seen ? "neither a picture nor a height map is asked for"
               : fmt::format("the object has detail of {:.3g} mm, the gel's edges have {:.3g} mm", *detail, edge);
   plan.fine_relief = table.add("fine relief", scene.effects.fine_relief, fine && seen, why, "0.1 to 1 second a frame");
+  if (plan.fine_relief && plan.elastic_object) {
+    fail_at(scene.where, "fine relief isn't simulated with an elastic object; switch one of them off in effects");
+  }
   const double pixel = scene.membrane.pixel_um / kMicrometresPerMillimetre;
   // A picture may be smoother than its pixels; waves and hairs are as fine as they say.
   const bool known = scene.object.relief && scene.object.relief->type != ReliefKind::image;

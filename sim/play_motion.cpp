@@ -25,11 +25,21 @@ int steps_a_frame(const MotionKey& key, const MotionSpec& motion, const Plan& pl
 }  // namespace
 
 std::vector<Truth> play_motion(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel,
-                               const Progress& progress, const fem::GelVibration* vibration) {
+                               const Progress& progress, const fem::GelVibration* vibration,
+                               const std::vector<std::shared_ptr<const fem::Compliance>>& elastic) {
+  TS_ASSERT(elastic.size() == (plan.elastic_object ? moved_objects(scene).size() : 0));
   const MotionSpec& motion = scene.motion;
   const double friction = plan.friction ? scene.object.friction : 0.0;
   const fem::PronySeries relaxation = plan.relaxation ? prony_series(scene.device.gel) : fem::PronySeries{};
-  fem::Press press(gel, coarse_contact_shape(scene.object, scene.device.mesh.fine_mm), friction, {}, relaxation);
+  std::vector<fem::PressBody> bodies;
+  for (const MovedObject& moved : moved_objects(scene)) {
+    fem::PressBody body;
+    body.shape = coarse_contact_shape(moved.object, scene.device.mesh.fine_mm);
+    body.friction = plan.friction ? moved.object.friction : 0.0;
+    if (plan.elastic_object) body.elastic = elastic[bodies.size()];
+    bodies.push_back(std::move(body));
+  }
+  fem::Press press(gel, std::move(bodies), {}, relaxation);
   std::optional<ShakenPress> shaken;
   if (vibration != nullptr) shaken.emplace(gel, *vibration, relaxation, friction);
 

@@ -15,6 +15,10 @@ void read_named_file(YamlReader& in, const std::string& key, T& value) {
 
 }  // namespace
 
+std::vector<MovedObject> moved_objects(const SceneSpec& scene) {
+  return {{scene.object, scene.motion}};
+}
+
 EnumNames<Switch> enum_names(Switch) {
   return {{"auto", Switch::automatic}, {"on", Switch::on}, {"off", Switch::off}};
 }
@@ -36,6 +40,7 @@ void fields(YamlReader& in, LightSpec& light) {
 
 void fields(YamlReader& in, EffectSwitches& effects) {
   in.optional("friction", effects.friction);
+  in.optional("elastic_object", effects.elastic_object);
   in.optional("fine_relief", effects.fine_relief);
   in.optional("relaxation", effects.relaxation);
   in.optional("inertia", effects.inertia);

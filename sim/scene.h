@@ -5,6 +5,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "core/yaml_reader.h"
 #include "sim/device.h"
@@ -44,6 +45,7 @@ EnumNames<Switch> enum_names(Switch);
 /// A scene may force an effect on or off; `automatic` leaves it to the plan.
 struct EffectSwitches {
   Switch friction = Switch::automatic;
+  Switch elastic_object = Switch::automatic;
   Switch fine_relief = Switch::automatic;
   Switch relaxation = Switch::automatic;
   Switch inertia = Switch::automatic;
@@ -63,6 +65,15 @@ struct SceneSpec {
   std::uint64_t seed = 0;
   SourceLocation where;
 };
+
+/// One object of a scene with its motion; they belong to the scene.
+struct MovedObject {
+  const ObjectSpec& object;
+  const MotionSpec& motion;
+};
+
+/// All objects, the first one first.
+std::vector<MovedObject> moved_objects(const SceneSpec& scene);
 
 void fields(YamlReader& in, OutputSpec& outputs);
 void fields(YamlReader& in, LightSpec& light);
