@@ -17,7 +17,8 @@ std::int64_t frame_time(int frame, double rate) {
 }
 
 /// Steps a frame, so that a press that remembers follows a quasi-static vibration.
-int steps_a_frame(const MotionKey& key, const MotionSpec& motion, const Plan& plan) {
+int steps_a_frame(const MotionTrack& track, const MotionSpec& motion, const Plan& plan) {
+  const MotionKey& key = track.key();
   if (!key.vibration || !(plan.friction || plan.relaxation)) return 1;
   return std::max(1, static_cast<int>(std::ceil(kStepsAPeriod * key.vibration->frequency_Hz / motion.frame_rate_Hz)));
 }
@@ -29,10 +30,11 @@ std::vector<Truth> play_motion(const SceneSpec& scene, const Plan& plan, const f
                                const std::vector<std::shared_ptr<const fem::Compliance>>& elastic) {
   TS_ASSERT(elastic.size() == (plan.elastic_object ? moved_objects(scene).size() : 0));
   const MotionSpec& motion = scene.motion;
+  const std::vector<MovedObject> objects = moved_objects(scene);
   const double friction = plan.friction ? scene.object.friction : 0.0;
   const fem::PronySeries relaxation = plan.relaxation ? prony_series(scene.device.gel) : fem::PronySeries{};
   std::vector<fem::PressBody> bodies;
-  for (const MovedObject& moved : moved_objects(scene)) {
+  for (const MovedObject& moved : objects) {
     fem::PressBody body;
     body.shape = coarse_contact_shape(moved.object, scene.device.mesh.fine_mm);
     body.friction = plan.friction ? moved.object.friction : 0.0;
@@ -43,7 +45,11 @@ std::vector<Truth> play_motion(const SceneSpec& scene, const Plan& plan, const f
   std::optional<ShakenPress> shaken;
   if (vibration != nullptr) shaken.emplace(gel, *vibration, relaxation, friction);
 
-  MotionTrack track(motion);
+  std::vector<MotionTrack> tracks;
+  for (const MovedObject& moved : objects) tracks.emplace_back(moved.motion);
+  std::vector<fem::PressTarget> targets;
+  for (const MotionTrack& track : tracks) targets.push_back(track.start());
+
   std::vector<Truth> truths;
   truths.reserve(motion.frame_count());
   const auto keep = [&](fem::PressState state) {
@@ -59,20 +65,28 @@ std::vector<Truth> play_motion(const SceneSpec& scene, const Plan& plan, const f
       fail_at(where, "frame {}: {}", truths.size(), error.what());
     }
   };
-  at_frame(motion.keys.empty() ? scene.where : motion.keys.front().where, [&] { keep(press.step(track.start())); });
+  // A key is to blame only where there is one object.
+  const bool single = objects.size() == 1;
+  at_frame(motion.keys.empty() || !single ? scene.where : motion.keys.front().where,
+           [&] { keep(press.step(targets)); });
 
   for (int frame = 1; frame < motion.frame_count(); ++frame) {
-    track.next_frame(press.state().bodies.front());
-    const MotionKey& key = track.key();
-    const int steps = shaken ? 1 : steps_a_frame(key, motion, plan);
-    at_frame(key.where, [&] {
+    int steps = 1;
+    for (std::size_t b = 0; b < tracks.size(); ++b) {
+      tracks[b].next_frame(press.state().bodies[b]);
+      if (!shaken) steps = std::max(steps, steps_a_frame(tracks[b], motion, plan));
+    }
+    const MotionKey& key = tracks.front().key();
+    at_frame(single ? key.where : scene.where, [&] {
       for (int k = 1; k <= steps; ++k) {
-        fem::PressTarget target = track.at(static_cast<double>(k) / steps, !shaken);
-        target.seconds = 1.0 / (steps * motion.frame_rate_Hz);
-        press.step(target);
+        for (std::size_t b = 0; b < tracks.size(); ++b) {
+          targets[b] = tracks[b].at(static_cast<double>(k) / steps, !shaken);
+          targets[b].seconds = 1.0 / (steps * motion.frame_rate_Hz);
+        }
+        press.step(targets);
       }
       const bool shakes = shaken && key.vibration && key.vibration->amplitude_mm > 0.0;
-      keep(shakes ? shaken->at(press.state(), *key.vibration, track.seconds_in_key()) : press.state());
+      keep(shakes ? shaken->at(press.state(), *key.vibration, tracks.front().seconds_in_key()) : press.state());
     });
   }
   return truths;

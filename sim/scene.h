@@ -1,5 +1,6 @@
 #pragma once
-// A scene file: a device, the object that touches it, a motion, and the outputs asked for. See docs/file-formats.md.
+// A scene file: a device, the objects that touch it, their motions, and the outputs asked for. See
+// docs/file-formats.md.
 
 #include <filesystem>
 #include <map>
@@ -53,10 +54,18 @@ struct EffectSwitches {
   Switch sensor_noise = Switch::automatic;
 };
 
+/// An object beside the scene's first one, moved at the same time.
+struct AddedObject {
+  ObjectSpec object;
+  MotionSpec motion;  ///< of as many frames at the same rate as the first object's
+  SourceLocation where;
+};
+
 struct SceneSpec {
   DeviceSpec device;
   ObjectSpec object;
   MotionSpec motion;
+  std::vector<AddedObject> more_objects;
   OutputSpec outputs;
   LightSpec light;
   EffectSwitches effects;
@@ -75,6 +84,7 @@ struct MovedObject {
 /// All objects, the first one first.
 std::vector<MovedObject> moved_objects(const SceneSpec& scene);
 
+void fields(YamlReader& in, AddedObject& added);
 void fields(YamlReader& in, OutputSpec& outputs);
 void fields(YamlReader& in, LightSpec& light);
 void fields(YamlReader& in, EffectSwitches& effects);
