@@ -37,7 +37,8 @@ void render(const RenderOptions& options, const GlobalOptions& global) {
     const Progress progress = bar.listener();
     const auto gel = sim::set_up_gel(scene.device, global.cache, progress);
     const auto vibration = sim::set_up_vibration(scene, plan, global.cache);
-    const std::vector<sim::Truth> truths = sim::play_motion(scene, plan, *gel, progress, vibration.get());
+    const auto elastic = sim::set_up_elastic_objects(scene, plan, global.cache);
+    const std::vector<sim::Truth> truths = sim::play_motion(scene, plan, *gel, progress, vibration.get(), elastic);
     const sim::VirtualCamera camera(scene, plan, *gel, truths.front());
     capture = camera.capture(truths[static_cast<std::size_t>(frame)]);
     warning = gel->report.note;

@@ -280,7 +280,12 @@ std::vector<int> PartSolver::candidates(const Iterate& now, bool z_forced) const
   count = std::max(count, std::min(near.size(), kFirstCandidates));
   std::vector<char> chosen(now.active);
   for (int v = 0; v < n; ++v) chosen[v] = chosen[v] || now.required[v];
-  for (std::size_t k = 0; k < count; ++k) chosen[near[k].second] = 1;
+  // Each body has its own first ones: under a flat body there are enough to leave none to another that is led by force.
+  std::vector<std::size_t> seen(bodies_.size(), 0);
+  for (std::size_t k = 0; k < near.size(); ++k) {
+    const std::size_t place = seen[now.owner[near[k].second]]++;
+    if (k < count || place < kFirstCandidates) chosen[near[k].second] = 1;
+  }
   std::vector<int> result;
   for (int v = 0; v < n; ++v) {
     if (now.owner[v] < 0) continue;

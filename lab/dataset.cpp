@@ -135,6 +135,7 @@ class Run {
     header.job_name = job_.job.name;
     header.version = program_version();
     header.samples = job_.samples;
+    header.objects = static_cast<std::int64_t>(sim::moved_objects(job_.scenes.front().spec).size());
     for (const PreparedScene& scene : job_.scenes) header.scenes.push_back(scene.entry.name);
     const auto& beads = job_.scenes.front().spec.device.beads;
     if (beads) header.bead_rest = sim::bead_centres(*beads);

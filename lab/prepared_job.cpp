@@ -18,12 +18,16 @@ PreparedJob prepare_job(const std::filesystem::path& file) {
     if (prepared.job.outputs) scene.spec.outputs = *prepared.job.outputs;
     scene.plan = sim::make_plan(scene.spec);
     // Reads and checks a mesh or relief file now, before anything is written.
-    sim::contact_shape(scene.spec.object);
+    for (const sim::MovedObject& moved : sim::moved_objects(scene.spec)) sim::contact_shape(moved.object);
     if (!prepared.scenes.empty()) {
       const PreparedScene& first = prepared.scenes.front();
       if (!std::filesystem::equivalent(scene.spec.device.where.file, first.spec.device.where.file)) {
         fail_at(entry.where, "scenes: '{}' shows the device of {}, but '{}' that of {}; a data set holds one device",
                 entry.name, scene.spec.device.where.file, first.entry.name, first.spec.device.where.file);
+      }
+      if (scene.spec.more_objects.size() != first.spec.more_objects.size()) {
+        fail_at(entry.where, "scenes: '{}' has {} objects, but '{}' has {}; all scenes of a data set have as many",
+                entry.name, 1 + scene.spec.more_objects.size(), first.entry.name, 1 + first.spec.more_objects.size());
       }
     }
     scene.first_sample = prepared.samples;

@@ -13,7 +13,8 @@ SampleSource simulator(const std::filesystem::path& cache_folder) {
   source.play_motion = [cache_folder](const sim::SceneSpec& scene, const sim::Plan& plan, const fem::Compliance& gel,
                                       const Progress& progress) {
     const auto vibration = sim::set_up_vibration(scene, plan, cache_folder);
-    return sim::play_motion(scene, plan, gel, progress, vibration.get());
+    const auto elastic = sim::set_up_elastic_objects(scene, plan, cache_folder);
+    return sim::play_motion(scene, plan, gel, progress, vibration.get(), elastic);
   };
   source.set_up_camera = [](const sim::SceneSpec& scene, const sim::Plan& plan,
                             std::shared_ptr<const fem::Compliance> gel, const sim::Truth& first) {

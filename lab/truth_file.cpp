@@ -21,6 +21,16 @@ std::vector<float> rows_of(const Eigen::MatrixX3d& field) {
   return rows;
 }
 
+/// 3 x 4, row by row: the rotation, then the position.
+std::vector<double> numbers_of(const RigidTransform& pose) {
+  std::vector<double> numbers;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) numbers.push_back(pose.rotation(i, j));
+    numbers.push_back(pose.translation[i]);
+  }
+  return numbers;
+}
+
 std::vector<double> flat(const std::vector<Eigen::Vector3d>& points) {
   std::vector<double> values;
   for (const Eigen::Vector3d& p : points) values.insert(values.end(), {p.x(), p.y(), p.z()});
@@ -91,14 +101,20 @@ struct TruthFileWriter::Parts {
     column<double>({"/wrench", "N, N mm", "samples x 6", "gel",
                     "On the object, by the gel: force x y z, torque x y z about the gel frame's origin."},
                    {6});
+    column<double>({"/objects/pose", "mm (last column)", "samples x objects x 3 x 4", "gel",
+                    "gel_from_object of each object of the scene; the first one's is also in /pose."},
+                   {header.objects, 3, 4});
+    column<double>({"/objects/wrench", "N, N mm", "samples x objects x 6", "gel",
+                    "On each object, by the gel: force x y z, torque x y z about the gel frame's origin."},
+                   {header.objects, 6});
     column<float>({"/bead_displacement_mm", "mm", "samples x beads x 3", "gel", "Displacement of each bead's centre."},
                   {beads, 3});
     column<float>({"/surface_displacement_mm", "mm", "samples x nodes x 3", "gel",
                    "Displacement of each node of the outer surface."},
                   {nodes, 3});
-    column<float>({"/traction_MPa", "MPa", "samples x nodes x 3", "gel", "On the gel, at each node, by the object."},
+    column<float>({"/traction_MPa", "MPa", "samples x nodes x 3", "gel", "On the gel, at each node, by the objects."},
                   {nodes, 3});
-    column<std::uint8_t>({"/contact", "1", "samples x nodes", "", "1 where the node touches the object."}, {nodes});
+    column<std::uint8_t>({"/contact", "1", "samples x nodes", "", "1 where the node touches an object."}, {nodes});
     column<std::uint8_t>({"/node_state", "1", "samples x nodes", "", "0 open, 1 stick, 2 slip."}, {nodes});
     column<double>({"/contact_area_mm2", "mm^2", "samples", "", "Area of contact."}, {});
     column<double>({"/largest_strain", "1", "samples", "",
@@ -165,13 +181,19 @@ void TruthFileWriter::append(int scene, Split split, const sim::Truth& truth) {
   to.value<std::int32_t>("/scene", scene);
   to.value<std::uint8_t>("/split", static_cast<std::uint8_t>(split));
   to.value<std::int32_t>("/frame", truth.frame);
-  std::vector<double> pose;
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) pose.push_back(press.gel_from_object.rotation(i, j));
-    pose.push_back(press.gel_from_object.translation[i]);
+  std::vector<double> poses = numbers_of(press.gel_from_object);
+  std::vector<double> wrenches(press.wrench.data(), press.wrench.data() + 6);
+  to.row<double>("/pose", poses);
+  to.row<double>("/wrench", wrenches);
+  TS_ASSERT(to.header.objects == 1 || to.header.objects == static_cast<std::int64_t>(press.bodies.size()));
+  for (std::int64_t k = 1; k < to.header.objects; ++k) {
+    const fem::BodyState& body = press.bodies[static_cast<std::size_t>(k)];
+    const std::vector<double> pose = numbers_of(body.gel_from_object);
+    poses.insert(poses.end(), pose.begin(), pose.end());
+    wrenches.insert(wrenches.end(), body.wrench.data(), body.wrench.data() + 6);
   }
-  to.row<double>("/pose", pose);
-  to.row<double>("/wrench", {press.wrench.data(), press.wrench.data() + 6});
+  to.row<double>("/objects/pose", poses);
+  to.row<double>("/objects/wrench", wrenches);
   to.row<float>("/bead_displacement_mm", rows_of(press.bead_displacement));
   to.row<float>("/surface_displacement_mm", rows_of(press.surface_displacement));
   to.row<float>("/traction_MPa", rows_of(press.traction));

@@ -20,6 +20,7 @@ struct TruthHeader {
   std::string job_name;
   std::string version;                     ///< of the program
   std::int64_t samples = 0;                ///< N
+  std::int64_t objects = 1;                ///< K, in every scene
   std::vector<std::string> scenes;         ///< names, in the job's order
   std::vector<Eigen::Vector3d> bead_rest;  ///< m centres without load, gel frame, mm
 };

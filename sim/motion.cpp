@@ -10,7 +10,13 @@ int MotionSpec::frame_count() const {
   return count;
 }
 
+bool MotionSpec::is_turned() const {
+  return std::any_of(keys.begin(), keys.end(),
+                     [](const MotionKey& key) { return key.turn_x || key.turn_y || key.turn_z; });
+}
+
 bool MotionSpec::is_tangential() const {
+  if (is_turned()) return true;
   for (const MotionKey& key : keys) {
     if (key.vibration && key.vibration->axis != Axis::z && key.vibration->amplitude_mm > 0.0) return true;
     if (key.angles_deg && *key.angles_deg != start_angles_deg) return true;
@@ -49,6 +55,10 @@ void fields(YamlReader& in, VibrationSpec& vibration) {
   in.required("frequency_Hz", vibration.frequency_Hz, Allowed::above_up_to(0.0, 1e5));
 }
 
+void fields(YamlReader& in, TurnKey& turn) {
+  in.required("torque_Nmm", turn.torque_Nmm);
+}
+
 void fields(YamlReader& in, MotionKey& key) {
   key.where = in.where();
   in.required("frames", key.frames, Allowed::within(1, 1e7));
@@ -56,6 +66,12 @@ void fields(YamlReader& in, MotionKey& key) {
   in.optional("y", key.y);
   in.optional("z", key.z);
   in.optional("angles_deg", key.angles_deg, Allowed::within(-180.0, 180.0));
+  in.optional("turn_x", key.turn_x);
+  in.optional("turn_y", key.turn_y);
+  in.optional("turn_z", key.turn_z);
+  if (key.angles_deg && (key.turn_x || key.turn_y || key.turn_z)) {
+    fail_at(in.where("angles_deg"), "a key leads the object's rotation by angles_deg or by torques, not by both");
+  }
   in.optional("vibration", key.vibration);
   if (key.vibration) {
     const std::optional<AxisKey>* const axes[] = {&key.x, &key.y, &key.z};

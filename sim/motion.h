@@ -28,16 +28,22 @@ struct VibrationSpec {
   double frequency_Hz = 0.0;
 };
 
+/// The object is free to turn about an axis of the gel frame, until the torque on it is this one.
+struct TurnKey {
+  double torque_Nmm = 0.0;  ///< on the object, about its origin
+};
+
 /// What holds at the end of `frames` more frames. An axis that isn't named keeps what it had.
 struct MotionKey {
   int frames = 1;
   std::optional<AxisKey> x, y, z;
-  std::optional<Eigen::Vector3d> angles_deg;  ///< about x, then y, then z
+  std::optional<Eigen::Vector3d> angles_deg;      ///< about x, then y, then z; ends all torques
+  std::optional<TurnKey> turn_x, turn_y, turn_z;  ///< not beside angles_deg
   std::optional<VibrationSpec> vibration;
   SourceLocation where;
 };
 
-/// The first frame shows the start; each key adds its frames. A ramp of force starts at the force that was there.
+/// The first frame shows the start; each key adds its frames. A ramp of force or torque starts at what was there.
 struct MotionSpec {
   Eigen::Vector3d start_mm = {0, 0, 1};
   Eigen::Vector3d start_angles_deg = Eigen::Vector3d::Zero();
@@ -45,7 +51,9 @@ struct MotionSpec {
   std::vector<MotionKey> keys;
 
   int frame_count() const;
-  /// Tangential motion, tilt or shear force anywhere in it: what calls for friction.
+  /// Whether any key leads it by torques.
+  bool is_turned() const;
+  /// Tangential motion, tilt, torque or shear force anywhere in it: what calls for friction.
   bool is_tangential() const;
   /// The highest frequency at which it vibrates, 0 if it doesn't.
   double highest_vibration_Hz() const;
@@ -53,6 +61,7 @@ struct MotionSpec {
 
 void fields(YamlReader& in, AxisKey& axis);
 void fields(YamlReader& in, VibrationSpec& vibration);
+void fields(YamlReader& in, TurnKey& turn);
 void fields(YamlReader& in, MotionKey& key);
 void fields(YamlReader& in, MotionSpec& motion);
 

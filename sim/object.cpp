@@ -131,12 +131,22 @@ void fields(YamlReader& in, ScreenSpec& screen) {
   in.required("radiance", screen.radiance, Allowed::at_least(0.0));
 }
 
+void fields(YamlReader& in, ElasticSpec& elastic) {
+  elastic.where = in.where();
+  in.required("youngs_modulus_MPa", elastic.youngs_modulus_MPa, Allowed::above_up_to(0.0, 1e7));
+  in.required("poisson_ratio", elastic.poisson_ratio, Allowed::within(0.0, 0.5));
+  in.required("mesh_mm", elastic.mesh_mm, Allowed::above_up_to(0.0, 1e3));
+  in.optional("fine_radius_mm", elastic.fine_radius_mm, Allowed::at_least(0.0));
+  in.optional("held_above_mm", elastic.held_above_mm);
+}
+
 void fields(YamlReader& in, ObjectSpec& object) {
   in.required("name", object.name);
   in.required("shape", object.shape);
   in.optional("relief", object.relief);
   in.optional("radiance", object.radiance, Allowed::at_least(0.0));
   if (!object.radiance) in.optional("albedo", object.albedo, Allowed::within(0.0, 1.0));
+  in.optional("elastic", object.elastic);
   in.optional("friction", object.friction, Allowed::at_least(0.0));
   in.optional("screen", object.screen);
 }

@@ -1,5 +1,5 @@
 #pragma once
-// An object file: the shape of a rigid body and how it looks. See docs/file-formats.md.
+// An object file: the shape of a body, how it gives way and how it looks. See docs/file-formats.md.
 
 #include <Eigen/Core>
 #include <filesystem>
@@ -36,18 +36,32 @@ struct ScreenSpec {
   Eigen::Vector3d radiance = {1.0, 1.0, 1.0};  ///< W/m^2/sr in the bands red, green, blue
 };
 
+/// A body that isn't rigid: linear elastic, held on its upper side.
+struct ElasticSpec {
+  double youngs_modulus_MPa = 0.0;
+  double poisson_ratio = 0.0;
+  double mesh_mm = 0.0;                  ///< its edges on the underside; they grow to three times that
+  std::optional<double> fine_radius_mm;  ///< how far from its z axis they are so fine; without it, all of the underside
+  /// Faces wholly at or above this z of the object frame are held. Without it: of a sphere, the cap above half its
+  /// radius; of others, the faces within a hundredth of the height from the top.
+  std::optional<double> held_above_mm;
+  SourceLocation where;
+};
+
 struct ObjectSpec {
   std::string name;
   ShapeSpec shape;
   std::optional<ReliefSpec> relief;          ///< on the shape's lower side
   Eigen::Vector3d albedo = {0.5, 0.5, 0.5};  ///< in the bands red, green, blue
   std::optional<Eigen::Vector3d> radiance;   ///< W/m^2/sr in air: a diffuser lit from behind, which has no albedo
+  std::optional<ElasticSpec> elastic;        ///< without it the object is rigid
   double friction = 0.0;                     ///< Coulomb coefficient against the gel
   std::optional<ScreenSpec> screen;
 };
 
 void fields(YamlReader& in, ShapeSpec& shape);
 void fields(YamlReader& in, ScreenSpec& screen);
+void fields(YamlReader& in, ElasticSpec& elastic);
 void fields(YamlReader& in, ObjectSpec& object);
 
 ObjectSpec read_object(const std::filesystem::path& file);

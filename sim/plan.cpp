@@ -68,16 +68,44 @@ class Table {
   Plan& plan_;
 };
 
+void plan_elastic_objects(const SceneSpec& scene, Plan& plan, Table& table) {
+  const ElasticSpec* softest = nullptr;
+  for (const MovedObject& moved : moved_objects(scene)) {
+    const auto& elastic = moved.object.elastic;
+    if (elastic && (softest == nullptr || elastic->youngs_modulus_MPa < softest->youngs_modulus_MPa)) {
+      softest = &*elastic;
+    }
+  }
+  if (softest == nullptr && scene.effects.elastic_object == Switch::on) {
+    fail_at(scene.where, "effects.elastic_object: on, but no object has the field `elastic` with its modulus");
+  }
+  plan.elastic_object =
+      table.add("elastic object", scene.effects.elastic_object, softest != nullptr,
+                softest == nullptr ? "no object has a finite Young's modulus: all are rigid"
+                                   : fmt::format("an object's Young's modulus is {:.3g} MPa, the gel's {:.3g} MPa",
+                                                 softest->youngs_modulus_MPa, scene.device.gel.youngs_modulus_MPa),
+                "set-up once an object (seconds, kept in the cache), then some tens of milliseconds a frame");
+}
+
 void plan_mechanics(const SceneSpec& scene, Plan& plan, Table& table) {
   table.add("gel mechanics", true, "truth is always asked for",
             "set-up once a gel (seconds, kept in the cache), then about a millisecond a frame");
-  const bool tangential = scene.motion.is_tangential();
-  const std::string why =
-      scene.object.friction == 0.0 ? "the object's friction is 0"
-      : tangential ? fmt::format("the motion has a tangential part and friction is {}", scene.object.friction)
-                   : "the motion is a straight press: no tangential part, no tilt";
-  plan.friction = table.add("friction", scene.effects.friction, tangential && scene.object.friction > 0.0, why,
-                            "a few milliseconds a frame");
+  const std::vector<MovedObject> objects = moved_objects(scene);
+  // Of the object whose friction is called for, or else of the first.
+  const auto rubs = [](const MovedObject& moved) {
+    return moved.motion.is_tangential() && moved.object.friction > 0.0;
+  };
+  const auto rubbing = std::find_if(objects.begin(), objects.end(), rubs);
+  const MovedObject& judged = rubbing == objects.end() ? objects.front() : *rubbing;
+  const double mu = judged.object.friction;
+  const bool tangential = judged.motion.is_tangential();
+  const std::string why = mu == 0.0    ? "the object's friction is 0"
+                          : tangential ? fmt::format("the motion has a tangential part and friction is {}", mu)
+                                       : "the motion is a straight press: no tangential part, no tilt";
+  plan.friction =
+      table.add("friction", scene.effects.friction, rubbing != objects.end(), why, "a few milliseconds a frame");
+
+  plan_elastic_objects(scene, plan, table);
 
   const fem::PronySeries series = prony_series(scene.device.gel);
   const double seconds = (scene.motion.frame_count() - 1) / scene.motion.frame_rate_Hz;
@@ -91,9 +119,25 @@ void plan_mechanics(const SceneSpec& scene, Plan& plan, Table& table) {
           : "the gel has no Prony series: it is elastic",
       "some vectors of the surface's size a frame");
 
-  const double frequency = scene.motion.highest_vibration_Hz();
+  double frequency = 0.0;
+  bool turned = false;
+  for (const MovedObject& moved : objects) {
+    frequency = std::max(frequency, moved.motion.highest_vibration_Hz());
+    turned = turned || moved.motion.is_turned();
+  }
   const double missing = inertia_estimate(scene.device.gel, frequency);
   const bool fast = missing > kAllowedInertia;
+  const bool inertia = scene.effects.inertia == Switch::automatic ? fast : scene.effects.inertia == Switch::on;
+  if (inertia && objects.size() > 1) {
+    fail_at(scene.where, "inertia isn't simulated with several objects; effects.inertia: off leaves it out");
+  }
+  if (inertia && turned) {
+    fail_at(scene.where,
+            "inertia isn't simulated for an object that is led by torques; effects.inertia: off leaves it out");
+  }
+  if (inertia && plan.elastic_object) {
+    fail_at(scene.where, "inertia isn't simulated with an elastic object; switch one of them off in effects");
+  }
   plan.inertia = table.add(
       "gel dynamics (inertia)", scene.effects.inertia, fast,
       frequency == 0.0 ? "the motion doesn't vibrate"
@@ -121,7 +165,11 @@ std::optional<double> finest_detail(const ObjectSpec& object) {
 void plan_relief(const SceneSpec& scene, Plan& plan, Table& table) {
   const bool seen = scene.outputs.frames || scene.outputs.ideal || scene.outputs.radiance || scene.outputs.height;
   const double edge = scene.device.mesh.fine_mm;
-  const std::optional<double> detail = finest_detail(scene.object);
+  std::optional<double> detail;
+  for (const MovedObject& moved : moved_objects(scene)) {
+    const std::optional<double> one = finest_detail(moved.object);
+    if (one) detail = detail ? std::min(*detail, *one) : one;
+  }
   const bool fine = detail && *detail < kEdgesADetail * edge;
   const std::string why =
       !detail ? "the object's shape is smooth: the gel's mesh has all of it"
@@ -131,6 +179,12 @@ void plan_relief(const SceneSpec& scene, Plan& plan, Table& table) {
       : !seen ? "neither a picture nor a height map is asked for"
               : fmt::format("the object has detail of {:.3g} mm, the gel's edges have {:.3g} mm", *detail, edge);
   plan.fine_relief = table.add("fine relief", scene.effects.fine_relief, fine && seen, why, "0.1 to 1 second a frame");
+  if (plan.fine_relief && !scene.more_objects.empty()) {
+    fail_at(scene.where, "fine relief isn't simulated with several objects; effects.fine_relief: off leaves it out");
+  }
+  if (plan.fine_relief && plan.elastic_object) {
+    fail_at(scene.where, "fine relief isn't simulated with an elastic object; switch one of them off in effects");
+  }
   const double pixel = scene.membrane.pixel_um / kMicrometresPerMillimetre;
   // A picture may be smoother than its pixels; waves and hairs are as fine as they say.
   const bool known = scene.object.relief && scene.object.relief->type != ReliefKind::image;
@@ -166,8 +220,16 @@ void plan_light(const SceneSpec& scene, Plan& plan, Table& table) {
                                        : "no index differs from 1",
                               "closed form at the flat faces: under a tenth of the rays' time");
 
-  const double albedo = scene.object.radiance ? 0.0 : scene.object.albedo.maxCoeff();
-  const double gain = interreflection_estimate(gel, plate, albedo, bright_radius(scene.object));
+  double albedo = 0.0;
+  double gain = 0.0;
+  for (const MovedObject& moved : moved_objects(scene)) {
+    const double own = moved.object.radiance ? 0.0 : moved.object.albedo.maxCoeff();
+    const double own_gain = interreflection_estimate(gel, plate, own, bright_radius(moved.object));
+    if (own_gain > gain) {
+      albedo = own;
+      gain = own_gain;
+    }
+  }
   plan.interreflection = table.add(
       "interreflection", scene.effects.interreflection, gain > scene.light.interreflection_tolerance,
       fmt::format("an object of albedo {:.2g} gives itself {:.1f} % of its light back through the plate; allowed to "

@@ -19,6 +19,7 @@ struct Effect {
 struct Plan {
   bool camera = false;
   bool friction = false;
+  bool elastic_object = false;
   bool fine_relief = false;
   bool relaxation = false;
   bool inertia = false;

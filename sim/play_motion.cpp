@@ -3,38 +3,22 @@
 #include <optional>
 
 #include "core/units.h"
+#include "sim/motion_track.h"
 #include "sim/shaken_press.h"
 #include "sim/virtual_sensor.h"
 
 namespace touchstone::sim {
 namespace {
 
-using fem::AxisControl;
-
 constexpr double kStepsAPeriod = 12.0;
-
-/// What an axis is led to over the frames of a key.
-struct Ramp {
-  AxisControl::Kind kind = AxisControl::Kind::position;
-  double from = 0.0;
-  double to = 0.0;
-};
-
-Ramp ramp_of(const std::optional<AxisKey>& key, const AxisControl& held, double position, double force) {
-  if (!key) return {held.kind, held.value, held.value};
-  if (key->position_mm) {
-    return {AxisControl::Kind::position, held.kind == AxisControl::Kind::position ? held.value : position,
-            *key->position_mm};
-  }
-  return {AxisControl::Kind::force, held.kind == AxisControl::Kind::force ? held.value : force, *key->force_N};
-}
 
 std::int64_t frame_time(int frame, double rate) {
   return static_cast<std::int64_t>(std::llround(frame * kMicrosecondsPerSecond / rate));
 }
 
 /// Steps a frame, so that a press that remembers follows a quasi-static vibration.
-int steps_a_frame(const MotionKey& key, const MotionSpec& motion, const Plan& plan) {
+int steps_a_frame(const MotionTrack& track, const MotionSpec& motion, const Plan& plan) {
+  const MotionKey& key = track.key();
   if (!key.vibration || !(plan.friction || plan.relaxation)) return 1;
   return std::max(1, static_cast<int>(std::ceil(kStepsAPeriod * key.vibration->frequency_Hz / motion.frame_rate_Hz)));
 }
@@ -42,18 +26,29 @@ int steps_a_frame(const MotionKey& key, const MotionSpec& motion, const Plan& pl
 }  // namespace
 
 std::vector<Truth> play_motion(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel,
-                               const Progress& progress, const fem::GelVibration* vibration) {
+                               const Progress& progress, const fem::GelVibration* vibration,
+                               const std::vector<std::shared_ptr<const fem::Compliance>>& elastic) {
+  TS_ASSERT(elastic.size() == (plan.elastic_object ? moved_objects(scene).size() : 0));
   const MotionSpec& motion = scene.motion;
+  const std::vector<MovedObject> objects = moved_objects(scene);
   const double friction = plan.friction ? scene.object.friction : 0.0;
   const fem::PronySeries relaxation = plan.relaxation ? prony_series(scene.device.gel) : fem::PronySeries{};
-  fem::Press press(gel, coarse_contact_shape(scene.object, scene.device.mesh.fine_mm), friction, {}, relaxation);
+  std::vector<fem::PressBody> bodies;
+  for (const MovedObject& moved : objects) {
+    fem::PressBody body;
+    body.shape = coarse_contact_shape(moved.object, scene.device.mesh.fine_mm);
+    body.friction = plan.friction ? moved.object.friction : 0.0;
+    if (plan.elastic_object) body.elastic = elastic[bodies.size()];
+    bodies.push_back(std::move(body));
+  }
+  fem::Press press(gel, std::move(bodies), {}, relaxation);
   std::optional<ShakenPress> shaken;
   if (vibration != nullptr) shaken.emplace(gel, *vibration, relaxation, friction);
 
-  fem::PressTarget target;
-  Eigen::Vector3d angles_deg = motion.start_angles_deg;
-  target.rotation = rotation_from_xyz(angles_deg * kRadiansPerDegree);
-  for (int axis = 0; axis < 3; ++axis) target.axis[axis] = {AxisControl::Kind::position, motion.start_mm[axis]};
+  std::vector<MotionTrack> tracks;
+  for (const MovedObject& moved : objects) tracks.emplace_back(moved.motion);
+  std::vector<fem::PressTarget> targets;
+  for (const MotionTrack& track : tracks) targets.push_back(track.start());
 
   std::vector<Truth> truths;
   truths.reserve(motion.frame_count());
@@ -70,48 +65,29 @@ std::vector<Truth> play_motion(const SceneSpec& scene, const Plan& plan, const f
       fail_at(where, "frame {}: {}", truths.size(), error.what());
     }
   };
-  at_frame(motion.keys.empty() ? scene.where : motion.keys.front().where, [&] { keep(press.step(target)); });
+  // A key is to blame only where there is one object.
+  const bool single = objects.size() == 1;
+  at_frame(motion.keys.empty() || !single ? scene.where : motion.keys.front().where,
+           [&] { keep(press.step(targets)); });
 
-  for (const MotionKey& key : motion.keys) {
-    const fem::PressState& now = press.state();
-    const std::optional<AxisKey>* axis_keys[3] = {&key.x, &key.y, &key.z};
-    const bool shakes = key.vibration && key.vibration->amplitude_mm > 0.0;
-    if (shakes) {
-      AxisControl& along = target.axis[static_cast<int>(key.vibration->axis)];
-      if (along.kind == AxisControl::Kind::force) {
-        along = AxisControl::at(now.gel_from_object.translation[static_cast<int>(key.vibration->axis)]);
-      }
+  for (int frame = 1; frame < motion.frame_count(); ++frame) {
+    int steps = 1;
+    for (std::size_t b = 0; b < tracks.size(); ++b) {
+      tracks[b].next_frame(press.state().bodies[b]);
+      if (!shaken) steps = std::max(steps, steps_a_frame(tracks[b], motion, plan));
     }
-    std::array<Ramp, 3> ramps;
-    for (int axis = 0; axis < 3; ++axis) {
-      ramps[axis] =
-          ramp_of(*axis_keys[axis], target.axis[axis], now.gel_from_object.translation[axis], now.wrench[axis]);
-    }
-    const Eigen::Vector3d from_angles = angles_deg;
-    const Eigen::Vector3d to_angles = key.angles_deg.value_or(angles_deg);
-    const int steps = shaken ? 1 : steps_a_frame(key, motion, plan);
-    const auto step = [&](double frames) {
-      const double part = frames / key.frames;
-      for (int axis = 0; axis < 3; ++axis) {
-        target.axis[axis] = {ramps[axis].kind, ramps[axis].from + part * (ramps[axis].to - ramps[axis].from)};
+    const MotionKey& key = tracks.front().key();
+    at_frame(single ? key.where : scene.where, [&] {
+      for (int k = 1; k <= steps; ++k) {
+        for (std::size_t b = 0; b < tracks.size(); ++b) {
+          targets[b] = tracks[b].at(static_cast<double>(k) / steps, !shaken);
+          targets[b].seconds = 1.0 / (steps * motion.frame_rate_Hz);
+        }
+        press.step(targets);
       }
-      angles_deg = from_angles + part * (to_angles - from_angles);
-      target.rotation = rotation_from_xyz(angles_deg * kRadiansPerDegree);
-      target.seconds = 1.0 / (steps * motion.frame_rate_Hz);
-      fem::PressTarget there = target;
-      if (shakes && !shaken) {
-        there.axis[static_cast<int>(key.vibration->axis)].value +=
-            key.vibration->amplitude_mm *
-            std::sin(2.0 * kPi * key.vibration->frequency_Hz * frames / motion.frame_rate_Hz);
-      }
-      press.step(there);
-    };
-    for (int i = 1; i <= key.frames; ++i) {
-      at_frame(key.where, [&] {
-        for (int k = 1; k <= steps; ++k) step(k == steps ? i : i - 1 + static_cast<double>(k) / steps);
-        keep(shakes && shaken ? shaken->at(press.state(), *key.vibration, i / motion.frame_rate_Hz) : press.state());
-      });
-    }
+      const bool shakes = shaken && key.vibration && key.vibration->amplitude_mm > 0.0;
+      keep(shakes ? shaken->at(press.state(), *key.vibration, tracks.front().seconds_in_key()) : press.state());
+    });
   }
   return truths;
 }

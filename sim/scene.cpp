@@ -15,8 +15,21 @@ void read_named_file(YamlReader& in, const std::string& key, T& value) {
 
 }  // namespace
 
+std::vector<MovedObject> moved_objects(const SceneSpec& scene) {
+  std::vector<MovedObject> all = {{scene.object, scene.motion}};
+  for (const AddedObject& added : scene.more_objects) all.push_back({added.object, added.motion});
+  return all;
+}
+
 EnumNames<Switch> enum_names(Switch) {
   return {{"auto", Switch::automatic}, {"on", Switch::on}, {"off", Switch::off}};
+}
+
+void fields(YamlReader& in, AddedObject& added) {
+  added.where = in.where();
+  read_named_file(in, "object", added.object);
+  read_named_file(in, "motion", added.motion);
+  in.optional("start_mm", added.motion.start_mm);
 }
 
 void fields(YamlReader& in, OutputSpec& outputs) {
@@ -36,6 +49,7 @@ void fields(YamlReader& in, LightSpec& light) {
 
 void fields(YamlReader& in, EffectSwitches& effects) {
   in.optional("friction", effects.friction);
+  in.optional("elastic_object", effects.elastic_object);
   in.optional("fine_relief", effects.fine_relief);
   in.optional("relaxation", effects.relaxation);
   in.optional("inertia", effects.inertia);
@@ -55,6 +69,19 @@ void fields(YamlReader& in, SceneSpec& scene) {
   read_named_file(in, "object", scene.object);
   read_named_file(in, "motion", scene.motion);
   in.optional("start_mm", scene.motion.start_mm);
+  in.optional("more_objects", scene.more_objects);
+  for (const AddedObject& added : scene.more_objects) {
+    const int frames = scene.motion.frame_count();
+    if (added.motion.frame_count() != frames) {
+      fail_at(added.where, "more_objects: the motion has {} frames, that of the first object {}; all must have as many",
+              added.motion.frame_count(), frames);
+    }
+    if (added.motion.frame_rate_Hz != scene.motion.frame_rate_Hz) {
+      fail_at(added.where,
+              "more_objects: the motion has {} frames a second, that of the first object {}; all must have the same",
+              added.motion.frame_rate_Hz, scene.motion.frame_rate_Hz);
+    }
+  }
   in.optional("outputs", scene.outputs);
   in.optional("light", scene.light);
   in.optional("effects", scene.effects);

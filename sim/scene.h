@@ -1,10 +1,12 @@
 #pragma once
-// A scene file: a device, the object that touches it, a motion, and the outputs asked for. See docs/file-formats.md.
+// A scene file: a device, the objects that touch it, their motions, and the outputs asked for. See
+// docs/file-formats.md.
 
 #include <filesystem>
 #include <map>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "core/yaml_reader.h"
 #include "sim/device.h"
@@ -44,6 +46,7 @@ EnumNames<Switch> enum_names(Switch);
 /// A scene may force an effect on or off; `automatic` leaves it to the plan.
 struct EffectSwitches {
   Switch friction = Switch::automatic;
+  Switch elastic_object = Switch::automatic;
   Switch fine_relief = Switch::automatic;
   Switch relaxation = Switch::automatic;
   Switch inertia = Switch::automatic;
@@ -51,10 +54,18 @@ struct EffectSwitches {
   Switch sensor_noise = Switch::automatic;
 };
 
+/// An object beside the scene's first one, moved at the same time.
+struct AddedObject {
+  ObjectSpec object;
+  MotionSpec motion;  ///< of as many frames at the same rate as the first object's
+  SourceLocation where;
+};
+
 struct SceneSpec {
   DeviceSpec device;
   ObjectSpec object;
   MotionSpec motion;
+  std::vector<AddedObject> more_objects;
   OutputSpec outputs;
   LightSpec light;
   EffectSwitches effects;
@@ -64,6 +75,16 @@ struct SceneSpec {
   SourceLocation where;
 };
 
+/// One object of a scene with its motion; they belong to the scene.
+struct MovedObject {
+  const ObjectSpec& object;
+  const MotionSpec& motion;
+};
+
+/// All objects, the first one first.
+std::vector<MovedObject> moved_objects(const SceneSpec& scene);
+
+void fields(YamlReader& in, AddedObject& added);
 void fields(YamlReader& in, OutputSpec& outputs);
 void fields(YamlReader& in, LightSpec& light);
 void fields(YamlReader& in, EffectSwitches& effects);

@@ -75,6 +75,7 @@ fem::PressState ShakenPress::at(const fem::PressState& mean, const VibrationSpec
   fem::PressState state = mean;
   const double phase = 2.0 * kPi * vibration.frequency_Hz * seconds;
   state.gel_from_object.translation[static_cast<int>(vibration.axis)] += vibration.amplitude_mm * std::sin(phase);
+  if (!state.bodies.empty()) state.bodies.front().gel_from_object = state.gel_from_object;
   if (mean.contact_vertices == 0 || vibration.amplitude_mm == 0.0) return state;
   const fem::SteadyVibration steady = parts_->answer(mean, vibration);
   parts_->refuse_unless_it_holds(mean, steady, vibration);
@@ -97,6 +98,7 @@ fem::PressState ShakenPress::at(const fem::PressState& mean, const VibrationSpec
       state.wrench.tail<3>() -= it.value() * Eigen::Vector3d(at.row(it.row())).cross(t);
     }
   }
+  if (!state.bodies.empty()) state.bodies.front().wrench = state.wrench;
   return state;
 }
 

@@ -40,7 +40,7 @@ struct VirtualCamera::Parts {
         plan(plan_of),
         gel(gel_of),
         membrane(plan.fine_relief || scene.outputs.height ? std::make_unique<Membrane>(scene, plan, gel_of) : nullptr),
-        object(visible_object(scene.object, scene.device.mesh.fine_mm)),
+        objects(visible_objects(scene)),
         camera(pinhole_camera(*scene.device.camera)),
         imager(sim::imager(scene.device, plan.sensor_noise)),
         ideal_imager(sim::imager(scene.device, false)),
@@ -56,7 +56,7 @@ struct VirtualCamera::Parts {
   Plan plan;
   VisibleGel gel;
   std::unique_ptr<const Membrane> membrane;  // if it's called for
-  VisibleObject object;
+  std::vector<VisibleObject> objects;
   render::PinholeCamera camera;
   render::Imager imager;
   render::Imager ideal_imager;
@@ -72,9 +72,9 @@ struct VirtualCamera::Parts {
 
   render::Tracer tracer(const Truth& truth, const std::optional<fem::ReliefAnswer>& relief) const {
     if (relief && relief->grid.size() > 0) {
-      return render::Tracer(visible_scene(scene, plan, object, *membrane, truth.press, *relief));
+      return render::Tracer(visible_scene(scene, plan, objects, *membrane, truth.press, *relief));
     }
-    return render::Tracer(visible_scene(scene, plan, object, gel, truth.press));
+    return render::Tracer(visible_scene(scene, plan, objects, gel, truth.press));
   }
 
   /// Which pixels changed against the first frame by more than the tolerance, widened by the hole's blur.

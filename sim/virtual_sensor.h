@@ -11,6 +11,7 @@
 #include "fem/press.h"
 #include "fem/press_error.h"
 #include "fem/vibration.h"
+#include "sim/elastic_object.h"
 #include "sim/plan.h"
 #include "sim/scene.h"
 
@@ -49,10 +50,11 @@ std::shared_ptr<const fem::GelVibration> set_up_vibration(const SceneSpec& scene
 /// Plays a scene's motion from its start: one Truth a frame. Sequential, because friction and relaxation remember.
 /// `vibration` is what set_up_vibration gives; without it vibrations are quasi-static: with it, over a key that
 /// vibrates, the steady answer of the gel to a body that sticks where it touches is added to the press of the mean
-/// motion.
+/// motion. `elastic` is what set_up_elastic_objects gives.
 /// @throws Error if a wanted force can't be met or the press leaves what the model can do
 std::vector<Truth> play_motion(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel,
-                               const Progress& progress = {}, const fem::GelVibration* vibration = nullptr);
+                               const Progress& progress = {}, const fem::GelVibration* vibration = nullptr,
+                               const std::vector<std::shared_ptr<const fem::Compliance>>& elastic = {});
 
 /// The camera of a scene. Its constructor renders the first frame well; each capture traces again only the pixels that
 /// changed. `capture` is a pure function of its arguments and may be called from several threads.

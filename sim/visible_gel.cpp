@@ -119,12 +119,28 @@ VisibleGel::VisibleGel(const fem::Compliance& gel) : coarse_(gel.triangles), fin
 }
 
 TriangleMesh VisibleGel::dry_surface(const fem::PressState& press, const fem::ContactShape& shape) const {
-  const Above above(shape, press.gel_from_object);
+  const PlacedShape body{shape, press.gel_from_object};
+  return dry_surface(press, std::span(&body, 1));
+}
+
+TriangleMesh VisibleGel::dry_surface(const fem::PressState& press, std::span<const PlacedShape> bodies) const {
+  std::vector<Above> above;
+  for (const PlacedShape& body : bodies) above.emplace_back(body.shape, body.gel_from_object);
+  const auto owner = [&](int vertex) { return bodies.size() == 1 ? 0 : press.node_owner[vertex]; };
+  // To the body that comes first on the way up, or reaches deepest.
+  const auto nearest_gap = [&](const Eigen::Vector3d& point) {
+    std::optional<double> nearest;
+    for (const Above& body : above) {
+      const std::optional<double> gap = body.gap(point);
+      if (gap && (!nearest || *gap < *nearest)) nearest = gap;
+    }
+    return nearest;
+  };
   const auto touches = [&](int vertex) { return press.node_state[vertex] != fem::NodeState::open; };
   Eigen::MatrixX3d coarse = rest_ + averaged_ * press.surface_displacement;
   for (Eigen::Index i = 0; i < coarse.rows(); ++i) {
     if (!touches(static_cast<int>(i))) continue;
-    coarse(i, 2) += above.gap(coarse.row(i).transpose()).value_or(0.0);
+    coarse(i, 2) += above[owner(static_cast<int>(i))].gap(coarse.row(i).transpose()).value_or(0.0);
   }
   const Eigen::MatrixX3d fine = fine_from_coarse_ * coarse;
 
@@ -144,7 +160,7 @@ TriangleMesh VisibleGel::dry_surface(const fem::PressState& press, const fem::Co
   std::vector<char> wet(in_contact);
   for (Eigen::Index i = 0; i < fine.rows(); ++i) {
     mesh.vertices[i] = fine.row(i).transpose();
-    const std::optional<double> gap = above.gap(mesh.vertices[i]);
+    const std::optional<double> gap = nearest_gap(mesh.vertices[i]);
     if (gap && (in_contact[i] || *gap < kWettedMm)) {
       mesh.vertices[i].z() += *gap;
       wet[i] = 1;

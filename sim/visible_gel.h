@@ -4,6 +4,7 @@
 
 #include <Eigen/SparseCore>
 #include <array>
+#include <span>
 #include <vector>
 
 #include "core/triangle_mesh.h"
@@ -12,6 +13,12 @@
 #include "fem/press.h"
 
 namespace touchstone::sim {
+
+/// A body where it stands.
+struct PlacedShape {
+  const fem::ContactShape& shape;
+  RigidTransform gel_from_object;
+};
 
 /// The elements' edges (half a millimetre) are wide against what a camera resolves, and the displacement that mechanics
 /// gives per vertex overshoots beside a sharp rim (it's a projection on hat functions; here its means over the hats are
@@ -24,6 +31,9 @@ class VisibleGel {
   explicit VisibleGel(const fem::Compliance& gel);
 
   /// The displaced surface without what the body wets: triangles all of whose corners lie on it. Gel frame, mm.
+  /// The bodies are those of the press, in their order.
+  TriangleMesh dry_surface(const fem::PressState& press, std::span<const PlacedShape> bodies) const;
+  /// The same for a press with one body.
   TriangleMesh dry_surface(const fem::PressState& press, const fem::ContactShape& shape) const;
 
  private:

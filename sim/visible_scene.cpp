@@ -67,11 +67,26 @@ VisibleObject visible_object(const ObjectSpec& object, double edge_mm) {
   return visible;
 }
 
+std::vector<VisibleObject> visible_objects(const SceneSpec& scene) {
+  std::vector<VisibleObject> all;
+  for (const MovedObject& moved : moved_objects(scene)) {
+    all.push_back(visible_object(moved.object, scene.device.mesh.fine_mm));
+  }
+  return all;
+}
+
 namespace {
 
+/// Where the objects stand. The first one's pose has its own vibration in it.
+std::vector<RigidTransform> poses_of(const fem::PressState& press) {
+  std::vector<RigidTransform> poses = {press.gel_from_object};
+  for (std::size_t k = 1; k < press.bodies.size(); ++k) poses.push_back(press.bodies[k].gel_from_object);
+  return poses;
+}
+
 /// All but the gel's outer surface.
-render::Scene scene_without_surface(const SceneSpec& scene, const Plan& plan, const VisibleObject& object,
-                                    const RigidTransform& gel_from_object, const fem::PressState& press) {
+render::Scene scene_without_surface(const SceneSpec& scene, const Plan& plan, const std::vector<VisibleObject>& objects,
+                                    const std::vector<RigidTransform>& poses, const fem::PressState& press) {
   const DeviceSpec& device = scene.device;
   render::Scene out;
   out.media.resize(3);
@@ -82,10 +97,12 @@ render::Scene scene_without_surface(const SceneSpec& scene, const Plan& plan, co
                {-device.gel.thickness_mm, kPlate, kGel}};
   out.surfaces.push_back(
       {pad_walls(device.gel), render::Lambertian{render::flat_spectrum(3, device.gel.frame_albedo)}});
-  out.surfaces.push_back({placed(object.body, gel_from_object), material_of(scene.object)});
-  if (object.screen) {
-    out.surfaces.push_back({placed(*object.screen, {Eigen::Matrix3d::Identity(), scene.motion.start_mm}),
-                            render::Emitter{bands(scene.object.screen->radiance)}});
+  const std::vector<MovedObject> all = moved_objects(scene);
+  for (std::size_t k = 0; k < objects.size(); ++k) {
+    out.surfaces.push_back({placed(objects[k].body, poses[k]), material_of(all[k].object)});
+    if (!objects[k].screen) continue;
+    out.surfaces.push_back({placed(*objects[k].screen, {Eigen::Matrix3d::Identity(), all[k].motion.start_mm}),
+                            render::Emitter{bands(all[k].object.screen->radiance)}});
   }
   if (device.beads) {
     const std::vector<Eigen::Vector3d> centres = bead_centres(*device.beads);
@@ -107,18 +124,23 @@ render::Scene scene_without_surface(const SceneSpec& scene, const Plan& plan, co
 
 }  // namespace
 
-render::Scene visible_scene(const SceneSpec& scene, const Plan& plan, const VisibleObject& object,
+render::Scene visible_scene(const SceneSpec& scene, const Plan& plan, const std::vector<VisibleObject>& objects,
                             const VisibleGel& gel, const fem::PressState& press) {
-  render::Scene out = scene_without_surface(scene, plan, object, press.gel_from_object, press);
-  out.surfaces.insert(out.surfaces.begin(), {gel.dry_surface(press, object.felt), render::Refractive{kGel, kAir}});
+  const std::vector<RigidTransform> poses = poses_of(press);
+  TS_ASSERT(poses.size() == objects.size());
+  render::Scene out = scene_without_surface(scene, plan, objects, poses, press);
+  std::vector<PlacedShape> felt;
+  for (std::size_t k = 0; k < objects.size(); ++k) felt.push_back({objects[k].felt, poses[k]});
+  out.surfaces.insert(out.surfaces.begin(), {gel.dry_surface(press, felt), render::Refractive{kGel, kAir}});
   return out;
 }
 
-render::Scene visible_scene(const SceneSpec& scene, const Plan& plan, const VisibleObject& object,
+render::Scene visible_scene(const SceneSpec& scene, const Plan& plan, const std::vector<VisibleObject>& objects,
                             const Membrane& membrane, const fem::PressState& press, const fem::ReliefAnswer& relief) {
+  TS_ASSERT(objects.size() == 1);
   RigidTransform shifted = press.gel_from_object;
   shifted.translation.z() += relief.solved.shift;
-  render::Scene out = scene_without_surface(scene, plan, object, shifted, press);
+  render::Scene out = scene_without_surface(scene, plan, objects, {shifted}, press);
   Membrane::Sheet sheet = membrane.sheet(press, relief);
   out.surfaces.insert(out.surfaces.begin(), {std::move(sheet.dry), render::Refractive{kGel, kAir}});
   out.surfaces.push_back({std::move(sheet.wet), material_of(scene.object)});

@@ -1,6 +1,8 @@
 #pragma once
 // What the camera of a device sees of a pressed gel, in the renderer's terms.
 
+#include <vector>
+
 #include "fem/contact_shape.h"
 #include "fem/press.h"
 #include "render/imager.h"
@@ -23,14 +25,17 @@ struct VisibleObject {
 /// `edge_mm` of the gel's mesh: what the gel's coarse surface can be laid onto has no finer detail.
 VisibleObject visible_object(const ObjectSpec& object, double edge_mm);
 
-/// Plate, gel, beads, object and lamps as they stand at `press`. Where the gel is wetted by the object there is no
+/// All of a scene's.
+std::vector<VisibleObject> visible_objects(const SceneSpec& scene);
+
+/// Plate, gel, beads, objects and lamps as they stand at `press`. Where the gel is wetted by the object there is no
 /// face between them: the light goes on into the object.
-render::Scene visible_scene(const SceneSpec& scene, const Plan& plan, const VisibleObject& object,
+render::Scene visible_scene(const SceneSpec& scene, const Plan& plan, const std::vector<VisibleObject>& objects,
                             const VisibleGel& gel, const fem::PressState& press);
 
-/// The same with the surface of a fine relief: what lies on the object has the object's own look, and the object stands
-/// where the fine contact shifted it to.
-render::Scene visible_scene(const SceneSpec& scene, const Plan& plan, const VisibleObject& object,
+/// The same with the surface of a fine relief: what lies on the object has the object's own look, and the object, a
+/// single one, stands where the fine contact shifted it to.
+render::Scene visible_scene(const SceneSpec& scene, const Plan& plan, const std::vector<VisibleObject>& objects,
                             const Membrane& membrane, const fem::PressState& press, const fem::ReliefAnswer& relief);
 
 render::PinholeCamera pinhole_camera(const CameraSpec& camera);

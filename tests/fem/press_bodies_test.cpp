@@ -128,6 +128,18 @@ TEST(SeveralBodies, AreHeldByTheirOwnForces) {
   EXPECT_THROW(pair.step(targets[0]), Error);  // one target for two bodies
 }
 
+TEST(SeveralBodies, AFlatOneLeavesTheOtherItsFirstContact) {
+  // Both are led by force from the air; the punch alone has more vertices right under it than the first block takes.
+  Press pair(flat_gel(),
+             std::vector<PressBody>{{RoundedCylinder{1.2, 0.2, 3.0}, 0.5, nullptr}, {SphereShape{2.0}, 0.5, nullptr}});
+  std::array<PressTarget, 2> targets = {at(-1.5, 0, 0.5), at(1.5, 0, 2.5)};
+  targets[0].axis[2] = AxisControl::with_force(0.1);
+  targets[1].axis[2] = AxisControl::with_force(0.03);
+  const PressState& state = pair.step(targets);
+  EXPECT_NEAR(state.bodies[0].wrench[2], 0.1, 1e-6);
+  EXPECT_NEAR(state.bodies[1].wrench[2], 0.03, 1e-6);
+}
+
 /// The slab turned over, as the compliance of a box of its size: outer face down, bonded on top.
 PressBody elastic_box(double stiffness, double friction) {
   auto soft = std::make_shared<Compliance>(slab_gel());

@@ -76,6 +76,36 @@ TEST_F(DataSet, HoldsFramesTruthAndManifest) {
   EXPECT_TRUE(contents.contains("dataset.json"));
 }
 
+TEST_F(DataSet, TruthHasAllObjects) {
+  fem::Compliance gel;
+  gel.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  gel.triangles = {{0, 1, 2}};
+  sim::Truth truth;
+  truth.press.bodies.resize(2);
+  truth.press.bodies[0].wrench << 1, 2, 3, 4, 5, 6;
+  truth.press.bodies[1].wrench << 7, 8, 9, 10, 11, 12;
+  truth.press.bodies[1].gel_from_object.translation = {0.5, -0.5, 2};
+  truth.press.wrench = truth.press.bodies[0].wrench;
+  truth.press.traction = truth.press.surface_displacement = Eigen::MatrixX3d::Zero(3, 3);
+  truth.press.node_state.assign(3, fem::NodeState::open);
+  TruthHeader header;
+  header.samples = 1;
+  header.objects = 2;
+  header.scenes = {"pair"};
+  const fs::path path = folder_.path() / "pair.h5";
+  TruthFileWriter writer(path, header, gel);
+  writer.append(0, Split::test, truth);
+  writer.close();
+  const Hdf5Reader file(path);
+  const auto wrench = file.read<double>("/objects/wrench");
+  EXPECT_EQ(wrench.shape, (std::vector<std::int64_t>{1, 2, 6}));
+  EXPECT_EQ(wrench.values, (std::vector<double>{1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12}));
+  const auto pose = file.read<double>("/objects/pose");
+  EXPECT_EQ(pose.shape, (std::vector<std::int64_t>{1, 2, 3, 4}));
+  EXPECT_EQ(std::vector<double>(pose.values.end() - 12, pose.values.end()),
+            (std::vector<double>{1, 0, 0, 0.5, 0, 1, 0, -0.5, 0, 0, 1, 2}));
+}
+
 TEST_F(DataSet, TruthIsInItsRows) {
   run();
   const TruthTable table = read_truth_table(out_ / "truth.h5");
@@ -94,6 +124,10 @@ TEST_F(DataSet, TruthIsInItsRows) {
   const auto force_error = file.read<double>("/error/force_N");
   EXPECT_EQ(force_error.shape, (std::vector<std::int64_t>{12, 3}));
   EXPECT_EQ(force_error.values[3 * 11 + 2], 0.003 * 5);
+  const auto objects = file.read<double>("/objects/wrench");
+  EXPECT_EQ(objects.shape, (std::vector<std::int64_t>{12, 1, 6}));
+  EXPECT_EQ(objects.values, file.read<double>("/wrench").values);
+  EXPECT_EQ(file.read<double>("/objects/pose").values, file.read<double>("/pose").values);
   EXPECT_EQ(file.read<double>("/error/displacement_mm").values[11], 0.004 * 5);
   EXPECT_EQ(file.read<double>("/error/bead_mm").values[11], 0.005 * 5);
   EXPECT_EQ(file.read<double>("/error/traction_MPa").values[11], 0.006 * 5);

@@ -130,6 +130,19 @@ TEST(JobErrors, TwoDevicesInOneDataSetAreRefused) {
   EXPECT_THAT(message_of([&] { prepare_job(file); }), AllOf(HasSubstr("job.yaml:5:"), HasSubstr("one device")));
 }
 
+TEST(JobErrors, ScenesOfUnlikeNumbersOfObjectsAreRefused) {
+  const test::TemporaryFolder folder;
+  test::write_small_job(folder);
+  folder.write("scene2.yaml",
+               "device: device.yaml\nobject: object.yaml\nmotion: motion.yaml\n"
+               "more_objects: [{object: object.yaml, motion: motion.yaml, start_mm: [3, 0, 1]}]\n");
+  const auto file = folder.write("job.yaml",
+                                 "name: a\nseed: 1\nscenes:\n  - {name: x, scene: scene.yaml, split: train}\n"
+                                 "  - {name: y, scene: scene2.yaml, split: test}\n");
+  EXPECT_THAT(message_of([&] { prepare_job(file); }),
+              AllOf(HasSubstr("job.yaml:5:"), HasSubstr("'y' has 2 objects, but 'x' has 1")));
+}
+
 TEST(JobErrors, ImageWithoutACameraIsRefused) {
   const test::TemporaryFolder folder;
   const auto file = test::write_small_job(folder);

@@ -146,6 +146,29 @@ TEST(SceneFiles, AVibrationNeedsAPositionAndAFrequency) {
   EXPECT_EQ(error("z: {position_mm: 1}, vibration: {axis: z, amplitude_mm: 0.1, frequency_Hz: 30}"), "");
 }
 
+TEST(SceneFiles, ARotationIsLedByAnglesOrByTorques) {
+  const std::string start = "start_mm: [0, 0, 1]\nkeys:\n  - {frames: 2, ";
+  const auto motion = parse_yaml<MotionSpec>(start + "turn_y: {torque_Nmm: -2}}\n", "m");
+  ASSERT_TRUE(motion.keys[0].turn_y);
+  EXPECT_EQ(motion.keys[0].turn_y->torque_Nmm, -2.0);
+  EXPECT_FALSE(motion.keys[0].turn_x);
+  EXPECT_TRUE(motion.is_turned());
+  EXPECT_TRUE(motion.is_tangential()) << "a tilt calls for friction";
+  EXPECT_FALSE(parse_yaml<MotionSpec>(start + "z: {force_N: 1}}\n", "m").is_turned());
+  const auto error = [&](const std::string& rest) {
+    try {
+      parse_yaml<MotionSpec>(start + rest + "}\n", "m");
+    } catch (const Error& thrown) {
+      return std::string(thrown.what());
+    }
+    return std::string();
+  };
+  EXPECT_THAT(error("angles_deg: [0, 0, 0], turn_x: {torque_Nmm: 0}"), HasSubstr("m:3: "));
+  EXPECT_THAT(error("angles_deg: [0, 0, 0], turn_x: {torque_Nmm: 0}"), HasSubstr("by angles_deg or by torques"));
+  EXPECT_THAT(error("turn_x: {force_N: 0}"), HasSubstr("torque_Nmm"));
+  EXPECT_THAT(error("turn_x: {torque_Nmm: .nan}"), HasSubstr("torque_Nmm"));
+}
+
 const char* const kDome = R"(name: dome
 gel:
   shape: dome

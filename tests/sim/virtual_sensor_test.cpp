@@ -89,6 +89,37 @@ TEST(PlayMotion, TimesAreThoseOfTheFrameRate) {
   EXPECT_EQ(p.truths[3].t_us, 100000);
 }
 
+TEST(PlayMotion, ATiltedPlateAlignsItselfAndIsLedByAnglesAgain) {
+  SceneSpec scene = small_scene(
+      "  - {frames: 1, angles_deg: [3, -2, 0]}\n"
+      "  - {frames: 2, z: {force_N: 1}}\n"
+      "  - {frames: 4, turn_x: {torque_Nmm: 0}, turn_y: {torque_Nmm: 0}}\n"
+      "  - {frames: 1, z: {force_N: 1.2}}\n"
+      "  - {frames: 2, angles_deg: [2, 0, 0]}\n");
+  scene.object.shape.type = ShapeKind::box;
+  scene.object.shape.size_mm = {4.0, 4.0, 1.0};
+  scene.motion.start_mm.z() = 1.0;
+  const Plan plan = make_plan(scene);
+  const auto gel = set_up_gel(scene.device, cache().path());
+  const std::vector<Truth> truths = play_motion(scene, plan, *gel);
+  ASSERT_EQ(truths.size(), 11u);
+  const auto torque = [&](std::size_t i) {
+    const auto& press = truths[i].press;
+    return Eigen::Vector3d(Eigen::Vector3d(press.wrench.tail<3>()) -
+                           press.gel_from_object.translation.cross(Eigen::Vector3d(press.wrench.head<3>())));
+  };
+  const auto tilt = [&](std::size_t i) { return std::acos(truths[i].press.gel_from_object.rotation(2, 2)); };
+  const Eigen::Vector3d before = torque(3);
+  EXPECT_GT(before.norm(), 0.1) << "held at an angle";
+  EXPECT_LT((torque(5) - before / 2).head<2>().norm(), 1e-3) << "a ramp starts at the torque that was there";
+  EXPECT_LT(torque(7).head<2>().norm(), 1e-4);
+  EXPECT_LT(tilt(7), 0.2 * tilt(3));
+  EXPECT_LT(torque(8).head<2>().norm(), 1e-4) << "a torque stays";
+  const double degree = std::acos(-1.0) / 180.0;
+  EXPECT_NEAR(tilt(10), 2.0 * degree, 1e-9) << "angles lead again";
+  EXPECT_NEAR(tilt(9), 1.0 * degree, tilt(8)) << "from where the torques had turned it";
+}
+
 TEST(PlayMotion, AForceThatCannotBeMetNamesTheKeysLine) {
   try {
     play("  - {frames: 2, z: {force_N: 0.5}}\n  - {frames: 2, x: {force_N: 3}}\n");

@@ -89,6 +89,44 @@ TEST(VisibleGel, KeepsAnAffineDisplacementExactly) {
   }
 }
 
+// Each of two punches wets its own disc, at its own depth.
+TEST(VisibleGel, TwoPunchesWetTwoDiscs) {
+  const fem::Compliance gel = flat_pad();
+  const fem::RoundedCylinder punch{1.5, 0.0, 4.0};
+  const RigidTransform left{Eigen::Matrix3d::Identity(), {-2.5, 0, -0.1}};
+  const RigidTransform right{Eigen::Matrix3d::Identity(), {2.5, 0, -0.3}};
+  fem::PressState press = at_rest(gel);
+  press.node_owner.assign(gel.vertices.size(), -1);
+  for (std::size_t i = 0; i < gel.vertices.size(); ++i) {
+    const Eigen::Vector3d& p = gel.vertices[i];
+    const int owner = (p - left.translation).head<2>().norm() <= 1.5    ? 0
+                      : (p - right.translation).head<2>().norm() <= 1.5 ? 1
+                                                                        : -1;
+    if (owner < 0) continue;
+    press.node_owner[i] = owner;
+    press.node_state[i] = fem::NodeState::stick;
+    // A little off the bodies: the surface is laid onto them.
+    press.surface_displacement(static_cast<Eigen::Index>(i), 2) = owner == 0 ? -0.12 : -0.25;
+  }
+  const fem::ContactShape shape = punch;
+  const PlacedShape bodies[] = {{shape, left}, {shape, right}};
+  const TriangleMesh mesh = VisibleGel(gel).dry_surface(press, bodies);
+  // To within a fine triangle, a quarter of a step, all round both rims.
+  const double rims = 2.0 * 2.0 * 3.14159 * 1.5;
+  EXPECT_NEAR(4.0 * kHalf * kHalf - area_of(mesh), 0.5 * 1.5 * rims, 0.25 * kStep * rims);
+  // What is left of the surface at a rim is at that body's depth.
+  double deepest_left = 0.0;
+  double deepest_right = 0.0;
+  for (const auto& t : mesh.triangles) {
+    for (const int v : t) {
+      double& deepest = mesh.vertices[v].x() < 0.0 ? deepest_left : deepest_right;
+      deepest = std::min(deepest, mesh.vertices[v].z());
+    }
+  }
+  EXPECT_NEAR(deepest_left, -0.1, 1e-9);
+  EXPECT_NEAR(deepest_right, -0.3, 1e-9);
+}
+
 // What is left out is the disc that the punch wets, to within a fine triangle at its rim, and not the many-cornered
 // union of whole elements.
 TEST(VisibleGel, AFlatPunchWetsADisc) {
