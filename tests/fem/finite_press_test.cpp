@@ -262,7 +262,7 @@ TEST(FinitePress, AWantedForceIsMet) {
 
 TEST(FinitePress, ForceConvergesAsTheMeshGetsFiner) {
   double force[3];
-  const int cells[] = {6, 8, 12};
+  const int cells[] = {6, 10, 14};
   for (int k = 0; k < 3; ++k) {
     const FiniteGel gel(pad(cells[k]), kSoft, {}, kThickness);
     FinitePress press(gel, SphereShape{kRadius}, 0.0);
