@@ -4,6 +4,7 @@
 #include "apps/command.h"
 #include "core/error.h"
 #include "lab/prepared_job.h"
+#include "sim/gel_plan.h"
 
 namespace touchstone::apps {
 namespace {
@@ -24,9 +25,11 @@ bool equal(const sim::Plan& a, const sim::Plan& b) {
                     });
 }
 
-void plan(const std::filesystem::path& file) {
+void plan(const std::filesystem::path& file, const std::filesystem::path& cache) {
   if (!lab::is_job_file(file)) {
-    print_plan(sim::make_plan(sim::read_scene(file)));
+    const sim::SceneSpec scene = sim::read_scene(file);
+    print_plan(sim::make_plan(scene));
+    fmt::print("\n{}", describe(sim::plan_gel(scene.device, cache)));
     return;
   }
   const lab::PreparedJob job = lab::prepare_job(file);
@@ -40,15 +43,16 @@ void plan(const std::filesystem::path& file) {
     if (!as_before) print_plan(scene.plan);
     before = &scene;
   }
+  fmt::print("\n{}", describe(sim::plan_gel(job.scenes.front().spec.device, cache)));
 }
 
 }  // namespace
 
-void add_plan_command(CLI::App& app, const GlobalOptions&, Action& action) {
+void add_plan_command(CLI::App& app, const GlobalOptions& global, Action& action) {
   CLI::App* command = app.add_subcommand("plan", "Show which effects a scene or job calls for, why, and their cost");
   auto file = std::make_shared<std::filesystem::path>();
   command->add_option("SCENE|JOB", *file, "Scene or job file")->required();
-  command->callback([&action, file] { action = [file] { plan(*file); }; });
+  command->callback([&action, &global, file] { action = [&global, file] { plan(*file, global.cache); }; });
 }
 
 }  // namespace touchstone::apps

@@ -36,7 +36,8 @@ void render(const RenderOptions& options, const GlobalOptions& global) {
     ProgressBar bar(global.quiet);
     const Progress progress = bar.listener();
     const auto gel = sim::set_up_gel(scene.device, global.cache, progress);
-    const std::vector<sim::Truth> truths = sim::play_motion(scene, plan, *gel, progress);
+    const auto vibration = sim::set_up_vibration(scene, plan, global.cache);
+    const std::vector<sim::Truth> truths = sim::play_motion(scene, plan, *gel, progress, vibration.get());
     const sim::VirtualCamera camera(scene, plan, *gel, truths.front());
     capture = camera.capture(truths[static_cast<std::size_t>(frame)]);
     warning = gel->report.note;

@@ -6,8 +6,11 @@
 #include "apps/progress_bar.h"
 #include "core/error.h"
 #include "core/whole_file.h"
+#include "lab/processor.h"
+#include "lab/run_identity.h"
 #include "lab/scenes_folder.h"
 #include "lab/validation.h"
+#include "lab/validation_page.h"
 
 namespace touchstone::apps {
 namespace {
@@ -16,6 +19,8 @@ struct Options {
   std::vector<std::string> groups;
   bool quick = false;
   std::filesystem::path json;
+  std::filesystem::path page;
+  std::string date;
 };
 
 /// A folder of this run's own, removed at its end.
@@ -40,6 +45,17 @@ class Scratch {
 
 void validate(const Options& options, const GlobalOptions& global) {
   if (!options.json.empty()) require_writable_place(options.json);
+  std::filesystem::path markdown = options.page;
+  if (!options.page.empty()) {
+    if (options.page.extension() != ".html") {
+      fail("--page is '{}'; its name must end with .html (the Markdown form is put beside it)", options.page.string());
+    }
+    markdown.replace_extension(".md");
+    require_writable_place(options.page);
+    require_writable_place(markdown);
+  } else if (!options.date.empty()) {
+    fail("--date '{}' is for the page: give --page too", options.date);
+  }
   const Scratch scratch;
   lab::ValidateOptions how;
   how.quick = options.quick;
@@ -53,6 +69,11 @@ void validate(const Options& options, const GlobalOptions& global) {
     rows = lab::validate(options.groups, lab::validation_groups(), how);
   }
   if (!options.json.empty()) write_whole_file(options.json, lab::to_json(rows));
+  if (!options.page.empty()) {
+    const lab::PageHeader header{lab::program_version(), lab::processor_kind(), options.date};
+    write_whole_file(options.page, lab::to_html(rows, header));
+    write_whole_file(markdown, lab::to_markdown(rows, header));
+  }
   fmt::print("{}", lab::to_table(rows));
   const auto missed = std::count_if(rows.begin(), rows.end(), [](const lab::ValidationRow& row) { return !row.holds; });
   fmt::print("{} of {} rows hold\n", rows.size() - static_cast<std::size_t>(missed), rows.size());
@@ -70,6 +91,8 @@ void add_validate_command(CLI::App& app, const GlobalOptions& global, Action& ac
   command->add_option("GROUP", options->groups, "What: " + known);
   command->add_flag("--quick", options->quick, "Coarser or fewer cases: minutes");
   command->add_option("--json", options->json, "Write the rows to this file");
+  command->add_option("--page", options->page, "Write a page for people, FILE.html, and FILE.md beside it");
+  command->add_option("--date", options->date, "What the page shall say for its date");
   command->callback([&action, &global, options] { action = [options, &global] { validate(*options, global); }; });
 }
 

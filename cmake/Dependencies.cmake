@@ -108,6 +108,18 @@ macro(touchstone_need_openblas)
   touchstone_plain_library(OpenBLAS::OpenBLAS libopenblas-dev openblas_config.h openblas)
 endmacro()
 
+macro(touchstone_need_fftw)
+  touchstone_plain_library(FFTW::FFTW libfftw3-dev fftw3.h fftw3)
+endmacro()
+
+macro(touchstone_need_spectra)
+  touchstone_plain_library(Spectra::Headers libspectra-dev Spectra/SymGEigsShiftSolver.h)
+endmacro()
+
 macro(touchstone_need_tinygltf)
   touchstone_plain_library(TinyGLTF::Headers libtinygltf-dev tiny_gltf.h tinygltf)
+endmacro()
+
+macro(touchstone_need_xxhash)
+  touchstone_plain_library(XXHash::XXHash libxxhash-dev xxhash.h xxhash)
 endmacro()

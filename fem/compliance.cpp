@@ -2,9 +2,11 @@
 
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 #include "core/error.h"
 #include "fem/elimination_order.h"
+#include "fem/quasi_definite_schur.h"
 #include "fem/surface_coupling.h"
 #include "fem/taylor_hood.h"
 
@@ -50,8 +52,11 @@ Compliance compute_compliance(const TetMesh& mesh, std::span<const ElasticMateri
   const OuterSurface surface = outer_surface(mesh);
   const int n = static_cast<int>(surface.mesh_vertex.size());
   const int m = static_cast<int>(beads.size());
-  if (n > kMostSurfaceVertices) {
-    fail("the gel's outer surface has {} vertices; at most {} are allowed: mesh it coarser", n, kMostSurfaceVertices);
+  if (std::sqrt(static_cast<double>(n) * (n + m)) > kMostSurfaceVertices) {
+    fail(
+        "the gel's outer surface has {} vertices and there are {} beads: their compliance would take {:.0f} MB; "
+        "at most {:.0f} are allowed: mesh the surface coarser",
+        n, m, 72e-6 * n * (static_cast<double>(n) + m), 72e-6 * kMostSurfaceVertices * kMostSurfaceVertices);
   }
 
   // Without units, a surface row is int phi_i u / length^2, a bead's row a mean. Both are scaled so that the border is
@@ -65,7 +70,10 @@ Compliance compute_compliance(const TetMesh& mesh, std::span<const ElasticMateri
   tell(1);
 
   FactorReport factor;
-  const Eigen::MatrixXd schur = schur_complement(matrix, 3 * (n + m), elimination_order(space), &factor);
+  const EliminationTree tree = elimination_tree(space);
+  std::optional<Eigen::MatrixXd> found = quasi_definite_schur(matrix, 3 * (n + m), tree, &factor);
+  if (!found) found = schur_complement(matrix, 3 * (n + m), tree.order, &factor);  // slower, but it can pivot
+  const Eigen::MatrixXd& schur = *found;
   tell(2);
 
   Compliance gel;
@@ -78,8 +86,9 @@ Compliance compute_compliance(const TetMesh& mesh, std::span<const ElasticMateri
   gel.mass = surface_mass(mesh, surface);
   // A nodal traction loads the displacements by its coupling row: a border row over surface_scale.
   const double displacement_per_traction = scales.length / scales.stress / (scales.length * scales.length);
-  gel.surface = schur.topLeftCorner(3 * n, 3 * n) * (-displacement_per_traction / (surface_scale * surface_scale));
-  gel.beads = schur.bottomLeftCorner(3 * m, 3 * n) * (-displacement_per_traction / surface_scale);
+  gel.surface = Eigen::MatrixXd(schur.topLeftCorner(3 * n, 3 * n) *
+                                (-displacement_per_traction / (surface_scale * surface_scale)));
+  gel.beads = Eigen::MatrixXd(schur.bottomLeftCorner(3 * m, 3 * n) * (-displacement_per_traction / surface_scale));
 
   gel.report.tetrahedra = static_cast<int>(mesh.tetrahedra.size());
   gel.report.unknowns = space.unknowns;

@@ -10,6 +10,8 @@
 
 #include "core/progress.h"
 #include "fem/elastic_material.h"
+#include "fem/mesh_error_table.h"
+#include "fem/shared_matrix.h"
 #include "fem/tet_mesh.h"
 
 namespace touchstone::fem {
@@ -20,14 +22,15 @@ struct Bead {
   double radius = 0.0;
 };
 
-/// What making a compliance took, and how good its mesh is. The same mesh gives the same report, but for memory.
+/// What making a compliance took, and how good its mesh is. The same mesh gives the same report.
 struct ComplianceReport {
   int tetrahedra = 0;
   int unknowns = 0;                    ///< displacements and pressures
-  double smallest_dihedral_deg = 0.0;  ///< under some 5 degrees, expect loss of accuracy
+  double smallest_dihedral_deg = 0.0;  ///< under some 5 degrees, expect loss of accuracy, but in flat prisms of layers
+  double fine_edge = 0.0;              ///< mm, where contact is made; 0 if who asked for the mesh didn't say
   double factor_entries = 0.0;
   double operations = 0.0;  ///< floating-point operations of the elimination
-  double memory_mb = 0.0;   ///< of the factorisation
+  double memory_mb = 0.0;   ///< of the elimination on one thread
   std::string note;         ///< from the cache: empty, or what was wrong with the file there; not stored
 };
 
@@ -39,9 +42,10 @@ struct Compliance {
   std::vector<Eigen::Vector3d> vertices;      ///< n vertices of the outer surface, mm
   std::vector<std::array<int, 3>> triangles;  ///< over `vertices`, normal out
   Eigen::SparseMatrix<double> mass;  ///< n x n: int phi_i phi_j dA, mm^2 (P1 hats); its row sums are the weights
-  Eigen::MatrixXd surface;  ///< 3n x 3n, symmetric positive definite: int phi_i u_a dA (mm^3) per traction (MPa)
-  Eigen::MatrixXd beads;    ///< 3m x 3n: mean displacement of a bead's surface (mm) per traction (MPa)
+  SharedMatrix surface;  ///< 3n x 3n, symmetric positive definite: int phi_i u_a dA (mm^3) per traction (MPa)
+  SharedMatrix beads;    ///< 3m x 3n: mean displacement of a bead's surface (mm) per traction (MPa)
   ComplianceReport report;
+  MeshErrorTable mesh_error;  ///< empty if it wasn't measured (see fem/mesh_error.h)
 };
 
 /// Eliminates the gel's inside once. The Taylor-Hood system K is bordered by the rows C that take displacements to what
@@ -50,13 +54,13 @@ struct Compliance {
 /// it goes where the gel's mean over its surface goes (Faxen's law for a sphere without a force on it). The vertices
 /// keep the mesh's order. `materials` has one entry for each region of the mesh. `thickness` is copied.
 /// @throws Error for an unfit mesh (see fault_of) or material, for a bead that isn't wholly inside the gel, for more
-/// than kMostSurfaceVertices, or if memory runs out
+/// vertices and beads than kMostSurfaceVertices allows, or if memory runs out
 Compliance compute_compliance(const TetMesh& mesh, std::span<const ElasticMaterial> materials,
                               std::span<const Bead> beads, double thickness, const Progress& progress = {});
 Compliance compute_compliance(const TetMesh& mesh, const ElasticMaterial& material, std::span<const Bead> beads,
                               double thickness, const Progress& progress = {});  ///< the same in all regions
 
-/// The compliance of more surface vertices would take over 4.6 GB.
-inline constexpr int kMostSurfaceVertices = 8000;
+/// Vertices n and beads m may have sqrt(n (n + m)) up to this: the compliance then takes 487 MB.
+inline constexpr int kMostSurfaceVertices = 2600;
 
 }  // namespace touchstone::fem

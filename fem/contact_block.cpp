@@ -25,13 +25,14 @@ bool ContactBlock::hold(const std::vector<int>& needed) {
   vertices_ = needed;
   const auto m = static_cast<Eigen::Index>(vertices_.size());
   compliance_.resize(3 * m, 3 * m);
+  const SharedMatrix::View surface_compliance = gel_.surface.view();
   for (Eigen::Index j = 0; j < m; ++j) {
     const int vj = vertices_[j];
     place_[vj] = static_cast<int>(j);
     for (Eigen::Index i = 0; i < m; ++i) {
       const int vi = vertices_[i];
       compliance_.block<3, 3>(3 * i, 3 * j).noalias() =
-          axes_[vi].transpose() * (gel_.surface.block<3, 3>(3 * vi, 3 * vj) * axes_[vj]);
+          axes_[vi].transpose() * (surface_compliance.block<3, 3>(3 * vi, 3 * vj) * axes_[vj]);
     }
   }
   const auto normals = Eigen::seqN(Eigen::fix<0>, m, Eigen::fix<3>);

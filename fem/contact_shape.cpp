@@ -10,6 +10,8 @@
 namespace touchstone::fem {
 namespace {
 
+constexpr int kReliefIterations = 40;
+
 struct Interval {
   double enter = -std::numeric_limits<double>::infinity();
   double leave = std::numeric_limits<double>::infinity();
@@ -47,21 +49,65 @@ void check_positive(double value, const char* what) {
   if (!(value > 0.0) || !std::isfinite(value)) fail("{} is {} mm, it must be above 0 and finite", what, value);
 }
 
+void check_one(const SphereShape& sphere) {
+  check_positive(sphere.radius, "the sphere's radius");
+}
+
+void check_one(const RoundedCylinder& cylinder) {
+  check_positive(cylinder.radius, "the cylinder's radius");
+  check_positive(cylinder.height, "the cylinder's height");
+  const double largest = std::min(cylinder.radius, cylinder.height);
+  if (!(cylinder.edge_radius >= 0.0) || cylinder.edge_radius > largest) {
+    fail("the cylinder's edge radius is {} mm, it must be from 0 to {}", cylinder.edge_radius, largest);
+  }
+}
+
+void check_one(const BoxShape& box) {
+  for (int a = 0; a < 3; ++a) check_positive(box.size[a], "the box's edge length");
+}
+
+void check_one(const MeshShape&) {}
+
+void check_one(const ReliefShape& shape) {
+  TS_ASSERT(shape.relief != nullptr);
+  std::visit([](const auto& body) { check_one(body); }, shape.base);
+}
+
+BoundingBall ball_of(const SphereShape& sphere) {
+  return {Eigen::Vector3d::Zero(), sphere.radius};
+}
+
+BoundingBall ball_of(const RoundedCylinder& cylinder) {
+  return {{0.0, 0.0, 0.5 * cylinder.height}, std::hypot(cylinder.radius, 0.5 * cylinder.height)};
+}
+
+BoundingBall ball_of(const BoxShape& box) {
+  return {Eigen::Vector3d::Zero(), 0.5 * box.size.norm()};
+}
+
+BoundingBall ball_of(const MeshShape& shape) {
+  const auto& vertices = shape.mesh().vertices;
+  Eigen::Vector3d low = vertices.front();
+  Eigen::Vector3d high = low;
+  for (const auto& v : vertices) {
+    low = low.cwiseMin(v);
+    high = high.cwiseMax(v);
+  }
+  const Eigen::Vector3d centre = 0.5 * (low + high);
+  double radius2 = 0.0;
+  for (const auto& v : vertices) radius2 = std::max(radius2, (v - centre).squaredNorm());
+  return {centre, std::sqrt(radius2)};
+}
+
+BoundingBall ball_of(const ReliefShape& shape) {
+  const BoundingBall plain = std::visit([](const auto& body) { return ball_of(body); }, shape.base);
+  return {plain.centre, plain.radius + shape.relief->highest()};
+}
+
 }  // namespace
 
 void check_shape(const ContactShape& shape) {
-  if (const auto* sphere = std::get_if<SphereShape>(&shape)) {
-    check_positive(sphere->radius, "the sphere's radius");
-  } else if (const auto* cylinder = std::get_if<RoundedCylinder>(&shape)) {
-    check_positive(cylinder->radius, "the cylinder's radius");
-    check_positive(cylinder->height, "the cylinder's height");
-    const double largest = std::min(cylinder->radius, cylinder->height);
-    if (!(cylinder->edge_radius >= 0.0) || cylinder->edge_radius > largest) {
-      fail("the cylinder's edge radius is {} mm, it must be from 0 to {}", cylinder->edge_radius, largest);
-    }
-  } else if (const auto* box = std::get_if<BoxShape>(&shape)) {
-    for (int a = 0; a < 3; ++a) check_positive(box->size[a], "the box's edge length");
-  }
+  std::visit([](const auto& body) { check_one(body); }, shape);
 }
 
 std::optional<double> first_entry(const SphereShape& shape, const Eigen::Vector3d& p, const Eigen::Vector3d& d) {
@@ -116,28 +162,65 @@ std::optional<double> first_entry(const MeshShape& shape, const Eigen::Vector3d&
   return shape.first_entry(p, d);
 }
 
+std::optional<double> first_entry(const ReliefShape& shape, const Eigen::Vector3d& p, const Eigen::Vector3d& d) {
+  // The plain body moved down by the height where the line will meet it: the same as the line moved up by that.
+  const auto entry = [&](double height) {
+    const Eigen::Vector3d lifted = p + height * Eigen::Vector3d::UnitZ();
+    return std::visit([&](const auto& body) { return first_entry(body, lifted, d); }, shape.base);
+  };
+  std::optional<double> t = entry(0.0);
+  if (!t || d.z() <= 0.0) return t;
+  const bool tilted = d.x() != 0.0 || d.y() != 0.0;
+  double height = 0.0;
+  for (int iteration = 0; iteration < kReliefIterations; ++iteration) {
+    const Eigen::Vector3d at = p + *t * d;
+    const double found = shape.relief->at(at.x(), at.y());
+    const double change = found - height;
+    height += iteration < kReliefIterations / 2 ? change : 0.5 * change;
+    const auto next = entry(height);
+    if (!next) return t;  // at the very silhouette
+    t = next;
+    if (!tilted || std::abs(change) < 1e-10) break;
+  }
+  return t;
+}
+
 std::optional<double> first_entry(const ContactShape& shape, const Eigen::Vector3d& p, const Eigen::Vector3d& d) {
   return std::visit([&](const auto& body) { return first_entry(body, p, d); }, shape);
 }
 
+std::optional<double> silhouette_distance(const SphereShape& shape, const Eigen::Vector3d& p,
+                                          const Eigen::Vector3d& d) {
+  return shape.radius - (p - p.dot(d) * d).norm();
+}
+
+std::optional<double> silhouette_distance(const RoundedCylinder& shape, const Eigen::Vector3d& p,
+                                          const Eigen::Vector3d& d) {
+  if (d.x() * d.x() + d.y() * d.y() >= 1e-30) return std::nullopt;
+  return shape.radius - std::sqrt(p.x() * p.x() + p.y() * p.y());
+}
+
+std::optional<double> silhouette_distance(const BoxShape& shape, const Eigen::Vector3d& p, const Eigen::Vector3d& d) {
+  for (int axis = 0; axis < 3; ++axis) {
+    const int u = (axis + 1) % 3;
+    const int v = (axis + 2) % 3;
+    if (d[u] == 0.0 && d[v] == 0.0) {
+      return std::min(0.5 * shape.size[u] - std::abs(p[u]), 0.5 * shape.size[v] - std::abs(p[v]));
+    }
+  }
+  return std::nullopt;
+}
+
+std::optional<double> silhouette_distance(const MeshShape&, const Eigen::Vector3d&, const Eigen::Vector3d&) {
+  return std::nullopt;
+}
+
+std::optional<double> silhouette_distance(const ReliefShape&, const Eigen::Vector3d&, const Eigen::Vector3d&) {
+  return std::nullopt;
+}
+
 BoundingBall bounding_ball(const ContactShape& shape) {
-  if (const auto* sphere = std::get_if<SphereShape>(&shape)) return {Eigen::Vector3d::Zero(), sphere->radius};
-  if (const auto* cylinder = std::get_if<RoundedCylinder>(&shape)) {
-    const Eigen::Vector3d centre(0.0, 0.0, 0.5 * cylinder->height);
-    return {centre, std::hypot(cylinder->radius, 0.5 * cylinder->height)};
-  }
-  if (const auto* box = std::get_if<BoxShape>(&shape)) return {Eigen::Vector3d::Zero(), 0.5 * box->size.norm()};
-  const auto& vertices = std::get<MeshShape>(shape).mesh().vertices;
-  Eigen::Vector3d low = vertices.front();
-  Eigen::Vector3d high = low;
-  for (const auto& v : vertices) {
-    low = low.cwiseMin(v);
-    high = high.cwiseMax(v);
-  }
-  const Eigen::Vector3d centre = 0.5 * (low + high);
-  double radius2 = 0.0;
-  for (const auto& v : vertices) radius2 = std::max(radius2, (v - centre).squaredNorm());
-  return {centre, std::sqrt(radius2)};
+  return std::visit([](const auto& body) { return ball_of(body); }, shape);
 }
 
 }  // namespace touchstone::fem

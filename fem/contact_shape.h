@@ -2,10 +2,12 @@
 // Rigid bodies that touch the gel, each in its own object frame (mm).
 
 #include <Eigen/Core>
+#include <memory>
 #include <optional>
 #include <variant>
 
 #include "fem/mesh_shape.h"
+#include "fem/relief_map.h"
 
 namespace touchstone::fem {
 
@@ -27,7 +29,18 @@ struct BoxShape {
   Eigen::Vector3d size = Eigen::Vector3d::Ones();
 };
 
-using ContactShape = std::variant<SphereShape, RoundedCylinder, BoxShape, MeshShape>;
+using PlainShape = std::variant<SphereShape, RoundedCylinder, BoxShape, MeshShape>;
+
+/// A body whose lower side bears a relief: at each (x, y) of the object frame the surface that looks to -z lies lower
+/// than the plain body's by the map's height. Lines that run up (direction.z > 0) meet the relief; others the plain
+/// body. Tilted lines are followed by a fixed point: right where the relief's slope times the tangent of the tilt is
+/// below one.
+struct ReliefShape {
+  PlainShape base;
+  std::shared_ptr<const ReliefMap> relief;
+};
+
+using ContactShape = std::variant<SphereShape, RoundedCylinder, BoxShape, MeshShape, ReliefShape>;
 
 /// Refuses sizes that aren't finite and positive, and an edge radius above the cylinder's radius or height.
 /// @throws Error
@@ -43,8 +56,24 @@ std::optional<double> first_entry(const BoxShape& shape, const Eigen::Vector3d& 
                                   const Eigen::Vector3d& direction);
 std::optional<double> first_entry(const MeshShape& shape, const Eigen::Vector3d& point,
                                   const Eigen::Vector3d& direction);
+std::optional<double> first_entry(const ReliefShape& shape, const Eigen::Vector3d& point,
+                                  const Eigen::Vector3d& direction);
 std::optional<double> first_entry(const ContactShape& shape, const Eigen::Vector3d& point,
                                   const Eigen::Vector3d& direction);
+
+/// How far inside the body's silhouette the line lies: the signed distance, across the direction, from the line to the
+/// silhouette's outline, positive where the line hits; outside a corner it may be less than the distance. Nothing where
+/// there is no closed form for this direction. Continuous in `point`.
+std::optional<double> silhouette_distance(const SphereShape& shape, const Eigen::Vector3d& point,
+                                          const Eigen::Vector3d& direction);
+std::optional<double> silhouette_distance(const RoundedCylinder& shape, const Eigen::Vector3d& point,
+                                          const Eigen::Vector3d& direction);
+std::optional<double> silhouette_distance(const BoxShape& shape, const Eigen::Vector3d& point,
+                                          const Eigen::Vector3d& direction);
+std::optional<double> silhouette_distance(const MeshShape& shape, const Eigen::Vector3d& point,
+                                          const Eigen::Vector3d& direction);
+std::optional<double> silhouette_distance(const ReliefShape& shape, const Eigen::Vector3d& point,
+                                          const Eigen::Vector3d& direction);
 
 /// A ball that holds the whole body: centre in the object frame and radius.
 struct BoundingBall {

@@ -19,11 +19,31 @@ constexpr int kFirstSweeps = 10;
 constexpr double kFarFromSets = 1e-2;  // residual above which sweeps go first
 
 Eigen::VectorXd times_sparse(const Eigen::MatrixXd& a, const Eigen::VectorXd& z) {
+  if (2 * (z.array() != 0.0).count() > z.size()) return a * z;
   Eigen::VectorXd result = Eigen::VectorXd::Zero(a.rows());
   for (Eigen::Index j = 0; j < z.size(); ++j) {
     if (z[j] != 0.0) result += z[j] * a.col(j);
   }
   return result;
+}
+
+/// Sees to it that each wanted force has a vertex that can carry it: the nearest one. False if there is none.
+bool somebody_carries(const ContactProblem& problem, std::vector<char>& active) {
+  const auto m = static_cast<int>(problem.gap.size());
+  for (Eigen::Index b = 0; b < problem.border.cols(); ++b) {
+    int nearest = -1;
+    bool carried = problem.hold.size() > b && problem.hold[b] > 0.0;
+    for (int i = 0; i < m && !carried; ++i) {
+      const double weight = problem.border(i, b);
+      if (weight == 0.0 || !std::isfinite(problem.gap[i])) continue;
+      carried = active[i] != 0;
+      if (nearest < 0 || problem.gap[i] * problem.border(nearest, b) < problem.gap[nearest] * weight) nearest = i;
+    }
+    if (carried) continue;
+    if (nearest < 0) return false;
+    active[nearest] = 1;
+  }
+  return true;
 }
 
 }  // namespace
@@ -36,22 +56,11 @@ ContactAnswer solve_frictionless(const ContactProblem& problem, const Eigen::Vec
   ContactAnswer answer;
   answer.shift = Eigen::VectorXd::Zero(k);
   std::vector<char> active(m, 0);
-  bool any = false;
   for (int i = 0; i < m; ++i) {
     const bool able = std::isfinite(problem.gap[i]);
     active[i] = able && (start.size() == m ? start[i] > 0.0 : problem.gap[i] < 0.0);
-    any = any || active[i];
   }
-  if (!any && k > 0) {
-    int nearest = -1;
-    for (int i = 0; i < m; ++i) {
-      if (nearest < 0 || problem.gap[i] / problem.border(i, 0) < problem.gap[nearest] / problem.border(nearest, 0)) {
-        nearest = i;
-      }
-    }
-    if (nearest < 0 || !std::isfinite(problem.gap[nearest])) return answer;
-    active[nearest] = 1;
-  }
+  if (!somebody_carries(problem, active)) return answer;
   int fewest = std::numeric_limits<int>::max();
   int tries = kBlockTries;
   std::vector<int> set;
@@ -77,7 +86,8 @@ ContactAnswer solve_frictionless(const ContactProblem& problem, const Eigen::Vec
       if (k > 0) {
         const Eigen::MatrixXd border = problem.border(set, Eigen::all);
         const Eigen::MatrixXd through = memory.cholesky.solve(border);
-        const Eigen::MatrixXd schur = border.transpose() * through;
+        Eigen::MatrixXd schur = border.transpose() * through;
+        if (problem.hold.size() == k) schur.diagonal() += problem.hold;
         answer.shift = schur.partialPivLu().solve(border.transpose() * p - problem.force);
         p -= through * answer.shift;
       }
@@ -122,17 +132,10 @@ ContactAnswer solve_frictionless(const ContactProblem& problem, const Eigen::Vec
       std::fill(flip.begin(), flip.end(), 0);
       flip[last] = 1;
     }
-    int left = 0;
     for (int i = 0; i < m; ++i) {
       if (flip[i]) active[i] = !active[i];
-      left += active[i];
     }
-    // A wanted force needs somebody to carry it.
-    if (left == 0 && k > 0) {
-      Eigen::Index best = 0;
-      answer.z.maxCoeff(&best);
-      active[best] = 1;
-    }
+    if (!somebody_carries(problem, active)) return answer;
   }
   return answer;
 }
@@ -181,9 +184,9 @@ class FrictionalNewton {
         continue;
       }
       const Eigen::Vector2d v = predicted(i);
-      const double limit = problem_.friction * std::max(0.0, p);
+      const double limit = problem_.friction[i] * std::max(0.0, p);
       const Eigen::Vector2d t = answer.z.segment<2>(3 * i + 1);
-      if (std::isinf(problem_.friction) || v.norm() <= limit) {
+      if (std::isinf(problem_.friction[i]) || v.norm() <= limit) {
         answer.state[i] = NodeState::stick;
         worst = std::max(worst, (t - v).norm());
       } else {
@@ -192,7 +195,7 @@ class FrictionalNewton {
       }
     }
     for (int b = 0; b < k_; ++b) {
-      const double missing = problem_.border.col(b).dot(answer.z) - problem_.force[b];
+      const double missing = problem_.border.col(b).dot(answer.z) - held(b) - problem_.force[b];
       worst = std::max(worst, std::abs(missing) / problem_.border.col(b).cwiseAbs().maxCoeff());
     }
     answer.residual = largest > 0.0 ? worst / largest : (worst > 0.0 ? 1.0 : 0.0);
@@ -215,8 +218,7 @@ class FrictionalNewton {
     for (int i = 0; i < m_; ++i) {
       if (answer.state[i] != NodeState::open) set_.push_back(i);
     }
-    const auto unknowns = static_cast<Eigen::Index>(3 * set_.size()) + k_;
-    const bool remembered = answer.state == memory_.state && memory_.lu.size() == unknowns;
+    const bool remembered = answer.state == memory_.state;
     if (!(keep && remembered) && !factorise()) return false;
     const auto size = static_cast<Eigen::Index>(3 * set_.size());
     Eigen::VectorXd right(size + k_);
@@ -229,20 +231,46 @@ class FrictionalNewton {
       } else {
         const Eigen::Vector2d v = predicted(i);
         const Eigen::Vector2d t = answer.z.segment<2>(3 * i + 1);
-        const double limit = problem_.friction * std::max(0.0, answer.z[3 * i]);
+        const double limit = problem_.friction[i] * std::max(0.0, answer.z[3 * i]);
         right.segment<2>(at + 1) = -tangential_scale(i) * (t - limit * v.normalized());
       }
     }
-    if (k_ > 0) right.tail(k_) = problem_.force - problem_.border.transpose() * answer.z;
-    Eigen::VectorXd change = memory_.lu.solve(right);
-    ++answer.iterations;
-    if (!change.allFinite()) return false;
-    for (std::size_t row = 0; row < set_.size(); ++row) {
-      answer.z.segment<3>(3 * set_[row]) += change.segment<3>(static_cast<Eigen::Index>(3 * row));
+    for (Eigen::Index b = 0; b < k_; ++b) {
+      right[size + b] = problem_.force[b] + held(b) - problem_.border.col(b).dot(answer.z);
     }
-    if (k_ > 0) answer.shift += change.tail(k_);
-    refresh();
-    return true;
+    return take(right);
+  }
+
+  /// One step with the remembered sets and Jacobian, whatever the current iterate looks like: what stuck goes on
+  /// sticking, what slid goes on sliding the same way. False if nothing fitting is remembered.
+  bool predict() {
+    if (static_cast<int>(memory_.state.size()) != m_) return false;
+    for (int i = 0; i < m_; ++i) {
+      if (memory_.state[i] != NodeState::open && !std::isfinite(problem_.gap[i])) return false;
+    }
+    set_.clear();
+    for (int i = 0; i < m_; ++i) {
+      if (memory_.state[i] != NodeState::open) {
+        set_.push_back(i);
+      } else {
+        answer.z.segment<3>(3 * i).setZero();
+      }
+    }
+    const auto size = static_cast<Eigen::Index>(3 * set_.size());
+    if (set_.empty()) return false;
+    answer.response = times_sparse(a_, answer.z);
+    slack_ = answer.response + problem_.border * answer.shift;
+    Eigen::VectorXd right = Eigen::VectorXd::Zero(size + k_);
+    for (std::size_t row = 0; row < set_.size(); ++row) {
+      const int i = set_[row];
+      const auto at = static_cast<Eigen::Index>(3 * row);
+      right[at] = -gap_at(i);
+      if (memory_.state[i] == NodeState::stick) right.segment<2>(at + 1) = -slip_at(i);
+    }
+    for (Eigen::Index b = 0; b < k_; ++b) {
+      right[size + b] = problem_.force[b] + held(b) - problem_.border.col(b).dot(answer.z);
+    }
+    return take(right);
   }
 
   /// Block Gauss-Seidel at fixed shift: each vertex in turn gets the traction that its own law asks for.
@@ -264,7 +292,7 @@ class FrictionalNewton {
                                   problem_.drag.segment<2>(2 * i) +
                                   (now[0] - before[0]) * a_.block<2, 1>(3 * i + 1, 3 * i);
         Eigen::Vector2d t = before.tail<2>() - d / scale;
-        const double limit = problem_.friction * now[0];
+        const double limit = problem_.friction[i] * now[0];
         if (now[0] == 0.0) {
           t.setZero();
         } else if (t.norm() > limit) {
@@ -282,43 +310,144 @@ class FrictionalNewton {
   }
 
  private:
+  /// Unknowns of the reduced system: three for a sticking vertex, two for a slipping one (pressure, and the traction
+  /// across the slip: the one along it follows the pressure), the shifts.
+  Eigen::Index reduced_size() const {
+    Eigen::Index size = k_;
+    for (const int i : set_) size += memory_.state[i] == NodeState::slip ? 2 : 3;
+    return size;
+  }
+  static Eigen::Vector2d across(const Eigen::Vector2d& along) { return {-along.y(), along.x()}; }
+
+  /// Solves for the step with the right-hand side over the vertices of `set_` (three each) and the shifts, by the
+  /// remembered factors, and adds it. False if it isn't finite.
+  bool take(const Eigen::VectorXd& right) {
+    const auto size = static_cast<Eigen::Index>(3 * set_.size());
+    // What the slipping vertices' own equations ask for along the slip is known beforehand.
+    Eigen::VectorXd known = Eigen::VectorXd::Zero(answer.z.size());
+    bool any = false;
+    for (std::size_t row = 0; row < set_.size(); ++row) {
+      const int i = set_[row];
+      if (memory_.state[i] != NodeState::slip) continue;
+      const Eigen::Vector2d& along = memory_.slip[i].along;
+      const double asked = along.dot(right.segment<2>(static_cast<Eigen::Index>(3 * row) + 1)) / tangential_scale(i);
+      known.segment<2>(3 * i + 1) = asked * along;
+      any = any || asked != 0.0;
+    }
+    const Eigen::VectorXd response = any ? times_sparse(a_, known) : Eigen::VectorXd::Zero(answer.z.size());
+    Eigen::VectorXd reduced(reduced_size());
+    Eigen::Index at = 0;
+    for (std::size_t row = 0; row < set_.size(); ++row) {
+      const int i = set_[row];
+      const auto from = static_cast<Eigen::Index>(3 * row);
+      reduced[at++] = right[from] - response[3 * i];
+      if (memory_.state[i] == NodeState::slip) {
+        const Eigen::Vector2d side = across(memory_.slip[i].along);
+        reduced[at++] =
+            side.dot(right.segment<2>(from + 1)) - memory_.slip[i].turn * side.dot(response.segment<2>(3 * i + 1));
+      } else {
+        reduced.segment<2>(at) = right.segment<2>(from + 1) - response.segment<2>(3 * i + 1);
+        at += 2;
+      }
+    }
+    for (Eigen::Index b = 0; b < k_; ++b) reduced[at + b] = right[size + b] - problem_.border.col(b).dot(known);
+    if (memory_.lu.size() != reduced.size()) return false;
+    const Eigen::VectorXd change = memory_.lu.solve(reduced);
+    ++answer.iterations;
+    if (!change.allFinite()) return false;
+    at = 0;
+    for (const int i : set_) {
+      const double p = change[at++];
+      answer.z[3 * i] += p;
+      if (memory_.state[i] == NodeState::slip) {
+        const SlipFrame& slip = memory_.slip[i];
+        answer.z.segment<2>(3 * i + 1) +=
+            problem_.friction[i] * p * slip.along + change[at++] * across(slip.along) + known.segment<2>(3 * i + 1);
+      } else {
+        answer.z.segment<2>(3 * i + 1) += change.segment<2>(at);
+        at += 2;
+      }
+    }
+    if (k_ > 0) answer.shift += change.tail(k_);
+    refresh();
+    return true;
+  }
+
+  double held(Eigen::Index b) const { return problem_.hold.size() == k_ ? problem_.hold[b] * answer.shift[b] : 0.0; }
   double gap_at(int i) const { return problem_.gap[i] + slack_[3 * i]; }
   Eigen::Vector2d slip_at(int i) const { return slack_.segment<2>(3 * i + 1) - problem_.drag.segment<2>(2 * i); }
   double tangential_scale(int i) const { return std::max(a_(3 * i + 1, 3 * i + 1), a_(3 * i + 2, 3 * i + 2)); }
   Eigen::Vector2d predicted(int i) const { return answer.z.segment<2>(3 * i + 1) - slip_at(i) / tangential_scale(i); }
 
   bool factorise() {
-    memory_.forget();
-    const auto size = static_cast<Eigen::Index>(3 * set_.size());
-    Eigen::MatrixXd jacobian(size + k_, size + k_);
-    std::vector<int> dofs(3 * set_.size());
-    for (std::size_t row = 0; row < dofs.size(); ++row) dofs[row] = 3 * set_[row / 3] + static_cast<int>(row % 3);
-    jacobian.topLeftCorner(size, size) = a_(dofs, dofs);
-    if (k_ > 0) {
-      jacobian.topRightCorner(size, k_) = problem_.border(dofs, Eigen::all);
-      jacobian.bottomLeftCorner(k_, size) = jacobian.topRightCorner(size, k_).transpose();
-      jacobian.bottomRightCorner(k_, k_).setZero();
-    }
-    for (std::size_t row = 0; row < set_.size(); ++row) {
-      const int i = set_[row];
+    memory_.state = answer.state;
+    memory_.slip.assign(m_, {});
+    for (const int i : set_) {
       if (answer.state[i] != NodeState::slip) continue;
-      const auto at = static_cast<Eigen::Index>(3 * row) + 1;
-      const double scale = tangential_scale(i);
       const Eigen::Vector2d v = predicted(i);
       const double length = v.norm();
-      const Eigen::Vector2d along = v / length;
-      // Derivative of t - mu p v/|v| with v = t - d/scale, times scale. The factor is at most 1 at the answer; far
-      // from it the clamp keeps the step from pointing away (Hueber, Stadler and Wohlmuth, SIAM J. Sci. Comput. 30,
-      // 2008).
-      const double factor = std::min(1.0, problem_.friction * std::max(0.0, answer.z[3 * i]) / length);
-      const Eigen::Matrix2d across = factor * (Eigen::Matrix2d::Identity() - along * along.transpose());
-      jacobian.middleRows<2>(at) = (across * jacobian.middleRows<2>(at)).eval();
-      jacobian.block<2, 2>(at, at) += scale * (Eigen::Matrix2d::Identity() - across);
-      jacobian.block<2, 1>(at, at - 1) -= scale * problem_.friction * along;
+      // At most 1 at the answer; far from it the clamp keeps the step from pointing away (Hueber, Stadler and Wohlmuth,
+      // SIAM J. Sci. Comput. 30, 2008).
+      memory_.slip[i] = {v / length, std::min(1.0, problem_.friction[i] * std::max(0.0, answer.z[3 * i]) / length)};
+    }
+    const Eigen::Index size = reduced_size();
+    Eigen::MatrixXd& jacobian = memory_.jacobian;
+    jacobian.resize(size, size);
+    Eigen::VectorXd response(a_.rows());
+    Eigen::Index column = 0;
+    // Derivative of t - mu p v/|v| with v = t - d/scale, times scale, across the slip; the rows along it are
+    // eliminated.
+    const auto add_column = [&](int j, const Eigen::Vector3d& change) {
+      response = a_.middleCols<3>(3 * j) * change;
+      Eigen::Index row = 0;
+      for (const int i : set_) {
+        jacobian(row++, column) = response[3 * i];
+        if (memory_.state[i] == NodeState::slip) {
+          const SlipFrame& slip = memory_.slip[i];
+          const Eigen::Vector2d side = across(slip.along);
+          jacobian(row, column) = slip.turn * side.dot(response.segment<2>(3 * i + 1));
+          if (i == j) jacobian(row, column) += (1.0 - slip.turn) * tangential_scale(i) * side.dot(change.tail<2>());
+          ++row;
+        } else {
+          jacobian.block<2, 1>(row, column) = response.segment<2>(3 * i + 1);
+          row += 2;
+        }
+      }
+      for (Eigen::Index b = 0; b < k_; ++b) {
+        jacobian(row + b, column) = problem_.border.block<3, 1>(3 * j, b).dot(change);
+      }
+      ++column;
+    };
+    for (const int j : set_) {
+      if (memory_.state[j] == NodeState::slip) {
+        const Eigen::Vector2d& along = memory_.slip[j].along;
+        const double friction = problem_.friction[j];
+        add_column(j, {1.0, friction * along.x(), friction * along.y()});
+        add_column(j, {0.0, across(along).x(), across(along).y()});
+      } else {
+        for (int a = 0; a < 3; ++a) add_column(j, Eigen::Vector3d::Unit(a));
+      }
+    }
+    for (Eigen::Index b = 0; b < k_; ++b, ++column) {
+      Eigen::Index row = 0;
+      for (const int i : set_) {
+        const Eigen::Vector3d border = problem_.border.block<3, 1>(3 * i, b);
+        jacobian(row++, column) = border[0];
+        if (memory_.state[i] == NodeState::slip) {
+          jacobian(row++, column) = memory_.slip[i].turn * across(memory_.slip[i].along).dot(border.tail<2>());
+        } else {
+          jacobian.block<2, 1>(row, column) = border.tail<2>();
+          row += 2;
+        }
+      }
+      jacobian.block(row, column, k_, 1).setZero();
+      if (problem_.hold.size() == k_) jacobian(row + b, column) = -problem_.hold[b];
     }
     ++answer.factorisations;
-    if (!memory_.lu.compute(std::move(jacobian))) return false;
-    memory_.state = answer.state;
+    if (!memory_.lu.compute(jacobian)) {
+      memory_.forget();
+      return false;
+    }
     return true;
   }
 
@@ -348,9 +477,11 @@ ContactAnswer frictionless_start(const ContactProblem& problem) {
   part.gap = problem.gap;
   part.border.resize(m, pushing);
   part.force.resize(pushing);
+  if (problem.hold.size() == k) part.hold.resize(pushing);
   for (Eigen::Index b = 0; b < pushing; ++b) {
     part.border.col(b) = problem.border.col(columns[b])(normals);
     part.force[b] = problem.force[columns[b]];
+    if (problem.hold.size() == k) part.hold[b] = problem.hold[columns[b]];
   }
   ContactMemory none;
   const ContactAnswer found = solve_frictionless(part, {}, none);
@@ -372,7 +503,8 @@ ContactAnswer newton_with_sweeps(const ContactProblem& problem, const Eigen::Vec
   Eigen::VectorXd best_shift;
   int since_best = 0;
   bool keep = true;
-  if (problem.border.cols() == 0 && newton.answer.residual > kFarFromSets) newton.sweep(kFirstSweeps);
+  const bool predicted = newton.predict();
+  if (!predicted && problem.border.cols() == 0 && newton.answer.residual > kFarFromSets) newton.sweep(kFirstSweeps);
   for (int iteration = 0; iteration < kMostNewton; ++iteration) {
     double before = newton.answer.residual;
     if (before < best) {

@@ -5,7 +5,7 @@
 // With c components a vertex (1 without friction, 3 with it), m vertices and k rigid shifts s of the object (mm):
 //   normal:      g = gap + (A z + B s)_n >= 0,  p >= 0,  p g = 0
 //   tangential:  d = (A z + B s)_t - drag,  |t| <= mu p,  d = 0 where |t| < mu p,  t = -mu p d/|d| where it slips
-//   rigid:       B^T z = force
+//   rigid:       B^T z - hold s = force
 // (Wriggers, Computational Contact Mechanics, 2nd ed., sec. 5; the friction law as a projection: Alart and Curnier,
 // Comput. Methods Appl. Mech. Eng. 92, 1991.)
 
@@ -24,12 +24,19 @@ enum class NodeState : std::uint8_t { open = 0, stick = 1, slip = 2 };
 /// One contact problem. `compliance` is A, symmetric positive definite, (c m) x (c m), mm^3 per MPa.
 struct ContactProblem {
   const Eigen::MatrixXd* compliance = nullptr;
-  int components = 1;      ///< c: 1 or 3
-  Eigen::VectorXd gap;     ///< m, mm^3; infinity: can't touch
-  Eigen::VectorXd drag;    ///< 2 m, mm^3; with friction only
-  double friction = 0.0;   ///< mu; infinity: what touches sticks
-  Eigen::MatrixXd border;  ///< (c m) x k
-  Eigen::VectorXd force;   ///< k, N
+  int components = 1;        ///< c: 1 or 3
+  Eigen::VectorXd gap;       ///< m, mm^3; infinity: can't touch
+  Eigen::VectorXd drag;      ///< 2 m, mm^3; with friction only
+  Eigen::VectorXd friction;  ///< m, mu, with friction only; infinity: what touches sticks
+  Eigen::MatrixXd border;    ///< (c m) x k
+  Eigen::VectorXd force;     ///< k, N
+  Eigen::VectorXd hold;      ///< k, >= 0: stiffness that holds a shift back, N per mm; empty: none
+};
+
+/// How a slipping vertex may change its traction: along the slip only as Coulomb's law says.
+struct SlipFrame {
+  Eigen::Vector2d along = Eigen::Vector2d::Zero();  ///< direction of the friction
+  double turn = 0.0;  ///< in 0..1: how far the traction follows when the slip turns (mu p over the predicted traction)
 };
 
 /// The last factorised system, which serves again while the same vertices are in contact in the same way. It belongs to
@@ -37,7 +44,9 @@ struct ContactProblem {
 struct ContactMemory {
   std::vector<NodeState> state;  ///< empty: nothing is remembered
   DenseCholesky cholesky;        ///< frictionless: of the active rows and columns
-  DenseLu lu;                    ///< with friction: of the Jacobian
+  RoughLu lu;                    ///< with friction: of the Jacobian, the slipping vertices' directions eliminated
+  Eigen::MatrixXd jacobian;      ///< its room, kept
+  std::vector<SlipFrame> slip;   ///< with friction: per vertex, what the Jacobian was made with
   void forget() { state.clear(); }
 };
 
@@ -55,13 +64,15 @@ struct ContactAnswer {
 
 /// Frictionless (components == 1): block principal pivoting (Judice and Pires, Computers Ops Res. 21, 1994), which is
 /// the primal-dual active set where that converges and ends also where that would cycle. `start` gives the first active
-/// set (p > 0); it may be empty. With one border column, `force` must be above zero.
+/// set (p > 0); it may be empty. A border column that pushes one way (all its entries of one sign) must have a `force`
+/// above zero.
 ContactAnswer solve_frictionless(const ContactProblem& problem, const Eigen::VectorXd& start, ContactMemory& memory);
 
 /// With friction (components == 3): semismooth Newton on the projection equations, the factorised Jacobian kept while
 /// the sets of open, sticking and slipping vertices stay and it converges fast; block Gauss-Seidel sweeps with
-/// projection on the disc before it, to find the sets, and where it stalls. `start` is z to begin with, or empty. Ends
-/// when `residual` <= tolerance.
+/// projection on the disc where it stalls. It begins with the remembered sets, as if all went on sticking, sliding the
+/// same way or staying apart, or, without memory, with sweeps. `start` is z to begin with, or empty. Ends when
+/// `residual` <= tolerance.
 ContactAnswer solve_frictional(const ContactProblem& problem, const Eigen::VectorXd& start, double tolerance,
                                ContactMemory& memory);
 

@@ -6,16 +6,19 @@
 
 namespace touchstone::fem {
 
-/// A = P L U with partial pivoting (dgetrf).
-class DenseLu {
+/// A = P L U with partial pivoting in single precision (sgetrf), rows and columns scaled: twice as fast as in double,
+/// and enough for the steps of an iteration that corrects itself.
+class RoughLu {
  public:
-  /// Takes the square matrix over. False if it's singular to working precision.
-  bool compute(Eigen::MatrixXd matrix);
+  /// False if the square matrix is singular, or as good as.
+  bool compute(const Eigen::MatrixXd& matrix);
+  /// To some five digits, fewer where the matrix is badly conditioned.
   Eigen::VectorXd solve(const Eigen::VectorXd& right) const;
   Eigen::Index size() const { return factor_.rows(); }
 
  private:
-  Eigen::MatrixXd factor_;
+  Eigen::MatrixXf factor_;
+  Eigen::VectorXd scale_;  ///< of rows and columns
   std::vector<int> pivots_;
 };
 

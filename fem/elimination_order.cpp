@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <initializer_list>
 #include <limits>
 #include <span>
 
@@ -47,6 +48,26 @@ Graph graph_of(const TaylorHoodSpace& space) {
   return graph;
 }
 
+/// Nodes in the order of their elimination.
+struct NodeGroups {
+  std::vector<int> nodes;
+  std::vector<std::size_t> end;  ///< of each group
+  std::vector<int> parent;       ///< a later group, or -1
+
+  int add(const std::vector<int>& group, std::initializer_list<int> children) {
+    const int number = static_cast<int>(parent.size());
+    nodes.insert(nodes.end(), group.begin(), group.end());
+    end.push_back(nodes.size());
+    parent.push_back(-1);
+    for (const int child : children) {
+      if (child >= 0) {
+        parent[child] = number;
+      }
+    }
+    return number;
+  }
+};
+
 enum class Side : char { none, low, high };
 
 class Dissection {
@@ -58,11 +79,10 @@ class Dissection {
     }
   }
 
-  /// Appends the nodes in the order of their elimination.
-  void order(std::vector<int> nodes, std::vector<int>& result) {
+  /// Appends the nodes in the order of their elimination, as groups. Returns the last group, -1 if there are no nodes.
+  int order(std::vector<int> nodes, NodeGroups& result) {
     if (nodes.size() <= kLeafNodes) {
-      result.insert(result.end(), nodes.begin(), nodes.end());
-      return;
+      return nodes.empty() ? -1 : result.add(nodes, {});
     }
     std::vector<int> best_nodes;
     std::vector<int> best_separator;
@@ -103,13 +123,9 @@ class Dissection {
     }
     nodes.clear();
     best_nodes.clear();
-    if (low.size() + high.size() == 0) {
-      result.insert(result.end(), best_separator.begin(), best_separator.end());
-      return;
-    }
-    order(std::move(low), result);
-    order(std::move(high), result);
-    result.insert(result.end(), best_separator.begin(), best_separator.end());
+    const int below = order(std::move(low), result);
+    const int above = order(std::move(high), result);
+    return result.add(best_separator, {below, above});
   }
 
  private:
@@ -229,34 +245,45 @@ class Dissection {
 }  // namespace
 
 std::vector<int> elimination_order(const TaylorHoodSpace& space) {
+  return elimination_tree(space).order;
+}
+
+EliminationTree elimination_tree(const TaylorHoodSpace& space) {
   std::vector<int> nodes;
   for (int node = 0; node < space.nodes; ++node) {
     if (!space.clamped[node] || node < space.vertices) {
       nodes.push_back(node);
     }
   }
-  std::vector<int> order;
-  Dissection(space).order(std::move(nodes), order);
+  NodeGroups groups;
+  Dissection(space).order(std::move(nodes), groups);
+  EliminationTree tree;
+  tree.parent = std::move(groups.parent);
   // A vertex' further pressures meet no node that the vertex itself doesn't: they follow it.
   std::vector<std::vector<int>> further(space.vertices);
   for (std::size_t k = space.vertices; k < space.pressure.size(); ++k) {
     further[space.pressure_vertex[k]].push_back(space.pressure[k]);
   }
-  std::vector<int> unknowns;
+  std::vector<int>& unknowns = tree.order;
   unknowns.reserve(space.unknowns);
-  for (const int node : order) {
-    if (!space.clamped[node]) {
-      for (int a = 0; a < 3; ++a) {
-        unknowns.push_back(space.displacement[node] + a);
+  std::size_t next = 0;
+  for (const std::size_t end : groups.end) {
+    for (; next < end; ++next) {
+      const int node = groups.nodes[next];
+      if (!space.clamped[node]) {
+        for (int a = 0; a < 3; ++a) {
+          unknowns.push_back(space.displacement[node] + a);
+        }
+      }
+      if (node < space.vertices) {
+        unknowns.push_back(space.pressure[node]);
+        unknowns.insert(unknowns.end(), further[node].begin(), further[node].end());
       }
     }
-    if (node < space.vertices) {
-      unknowns.push_back(space.pressure[node]);
-      unknowns.insert(unknowns.end(), further[node].begin(), further[node].end());
-    }
+    tree.end.push_back(static_cast<int>(unknowns.size()));
   }
   TS_ASSERT(static_cast<int>(unknowns.size()) == space.unknowns);
-  return unknowns;
+  return tree;
 }
 
 }  // namespace touchstone::fem

@@ -114,6 +114,57 @@ double thickness_of(const GelBody& body) {
                     body);
 }
 
+double fine_edge(const GelBody& body) {
+  if (const auto* slab = std::get_if<SlabGel>(&body)) return slab->mesh.fine;
+  if (const auto* dome = std::get_if<DomeGel>(&body)) return dome->fine;
+  if (const auto* tip = std::get_if<FingertipGel>(&body)) return tip->fine;
+  return std::get<SolidGel>(body).fine;
+}
+
+double fine_reach(const GelBody& body) {
+  if (const auto* slab = std::get_if<SlabGel>(&body)) return std::min(slab->mesh.fine_half_x, slab->mesh.fine_half_y);
+  if (const auto* dome = std::get_if<DomeGel>(&body)) return dome->fine_radius;
+  if (const auto* tip = std::get_if<FingertipGel>(&body)) return tip->fine_radius;
+  const SolidGel& solid = std::get<SolidGel>(body);
+  return std::min(solid.fine_half_x, solid.fine_half_y);
+}
+
+double least_extent(const GelBody& body) {
+  if (const auto* slab = std::get_if<SlabGel>(&body)) {
+    return std::min({slab->mesh.size_x, slab->mesh.size_y, slab->mesh.thickness});
+  }
+  return thickness_of(body);
+}
+
+namespace {
+
+/// Calls act(fine, coarse) on the body's two edge lengths.
+template <typename Act>
+void on_edges(GelBody& body, const Act& act) {
+  if (auto* slab = std::get_if<SlabGel>(&body)) act(slab->mesh.fine, slab->mesh.coarse);
+  if (auto* dome = std::get_if<DomeGel>(&body)) act(dome->fine, dome->coarse);
+  if (auto* tip = std::get_if<FingertipGel>(&body)) act(tip->fine, tip->coarse);
+  if (auto* solid = std::get_if<SolidGel>(&body)) act(solid->fine, solid->coarse);
+}
+
+}  // namespace
+
+GelBody with_edges(GelBody body, double factor) {
+  on_edges(body, [factor](double& fine, double& coarse) {
+    fine *= factor;
+    coarse *= factor;
+  });
+  return body;
+}
+
+GelBody with_edges(GelBody body, double fine, double coarse) {
+  on_edges(body, [=](double& own_fine, double& own_coarse) {
+    own_fine = fine;
+    own_coarse = coarse;
+  });
+  return body;
+}
+
 double estimated_tetrahedra(const GelBody& body) {
   return std::visit(Overloaded{[](const SlabGel& gel) { return estimated(gel); },
                                [](const auto& gel) { return estimated_tetrahedra(gel); }},

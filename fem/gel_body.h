@@ -33,6 +33,17 @@ void check(const GelBody& body);
 /// Depth of the gel under the middle of its outer surface, mm: no press may go deeper.
 double thickness_of(const GelBody& body);
 
+/// Edge length where contact is made, and how far from the middle of the outer surface the edges are so fine, mm.
+double fine_edge(const GelBody& body);
+double fine_reach(const GelBody& body);
+
+/// Shortest side of a slab, else the thickness, mm.
+double least_extent(const GelBody& body);
+
+/// The same gel with all edge lengths multiplied, or with these.
+GelBody with_edges(GelBody body, double factor);
+GelBody with_edges(GelBody body, double fine, double coarse);
+
 /// How many tetrahedra it will take, within a factor of 2.
 double estimated_tetrahedra(const GelBody& body);
 

@@ -14,6 +14,8 @@ struct PatchMotion {
 
   /// The displacement (mm) of the surface point `point`.
   Eigen::Vector3d displacement(const Eigen::Vector3d& point) const;
+
+  bool operator==(const PatchMotion&) const = default;
 };
 
 /// The rigid motion that fits the displacements (mm) of the points best in the weighted square mean. Weights >= 0; if

@@ -11,58 +11,92 @@ namespace {
 
 constexpr int kResolvedVertices = 13;
 
+/// Displacements of the whole surface, and the strain measures.
+void add_fields(const Compliance& gel, const ContactSurface& surface, const SurfaceMassFactor& mass,
+                const PressSnapshot& snapshot, PressState& s) {
+  const int n = static_cast<int>(gel.vertices.size());
+  s.surface_displacement = Eigen::MatrixX3d::Zero(n, 3);
+  if (!snapshot.touching() && snapshot.history.empty()) return;
+  Eigen::VectorXd response = snapshot.weighted;
+  if (snapshot.history.empty()) {
+    const auto compliance = gel.surface.view();
+    response.setZero();
+    for (int v = 0; v < n; ++v) {
+      if (snapshot.state[v] == NodeState::open) continue;
+      response.noalias() += compliance.middleCols<3>(3 * v) * snapshot.traction.segment<3>(3 * v);
+    }
+  }
+  Eigen::MatrixX3d weighted(n, 3);
+  for (int v = 0; v < n; ++v) weighted.row(v) = response.segment<3>(3 * v);
+  s.surface_displacement = mass.solve(weighted);
+  s.largest_gradient = largest_surface_gradient(gel.vertices, gel.triangles, s.surface_displacement);
+  double deepest = 0.0;
+  for (int v = 0; v < n; ++v) {
+    deepest = std::max(deepest, std::abs(surface.normals[v].dot(s.surface_displacement.row(v))));
+  }
+  s.largest_strain = std::max(s.largest_gradient, deepest / gel.thickness);
+}
+
 }  // namespace
 
-PressState report(const Compliance& gel, const ContactSurface& surface, const SurfaceMassFactor& mass, double friction,
+PressState report(const Compliance& gel, const PartSolver& solver, const SurfaceMassFactor& mass, PressOutput output,
                   const PressSnapshot& snapshot) {
+  const ContactSurface& surface = solver.surface();
   const int n = static_cast<int>(gel.vertices.size());
   PressState s;
-  s.gel_from_object = snapshot.pose;
+  for (const BodySnapshot& body : snapshot.bodies) {
+    BodyState state;
+    state.gel_from_object = body.pose;
+    state.wrench << body.force, body.moment;
+    s.bodies.push_back(state);
+  }
+  s.gel_from_object = s.bodies.front().gel_from_object;
+  s.wrench = s.bodies.front().wrench;
   s.node_state = snapshot.state;
+  s.node_owner = snapshot.owner;
   s.traction.resize(n, 3);
   for (int v = 0; v < n; ++v) s.traction.row(v) = snapshot.traction.segment<3>(3 * v);
-  s.surface_displacement = Eigen::MatrixX3d::Zero(n, 3);
-  s.bead_displacement = Eigen::MatrixX3d::Zero(gel.beads.rows() / 3, 3);
   s.largest_penetration = snapshot.penetration;
   s.lookup_error = snapshot.lookup_error;
   s.contact_residual = snapshot.residual;
-  if (snapshot.touching) {
-    Eigen::MatrixX3d weighted(n, 3);
-    for (int v = 0; v < n; ++v) weighted.row(v) = snapshot.weighted.segment<3>(3 * v);
-    s.surface_displacement = mass.solve(weighted);
-    Eigen::VectorXd beads = Eigen::VectorXd::Zero(gel.beads.rows());
-    double largest_pressure = 0.0;
-    double excess = 0.0;
-    for (int v = 0; v < n; ++v) {
-      if (snapshot.state[v] == NodeState::open) continue;
-      const Eigen::Vector3d t = snapshot.traction.segment<3>(3 * v);
-      if (beads.size() > 0) beads += gel.beads.middleCols<3>(3 * v) * t;
-      const double pressure = -surface.normals[v].dot(t);
-      largest_pressure = std::max(largest_pressure, pressure);
-      s.largest_tension = std::max(s.largest_tension, -pressure);
-      const double shear = (t + pressure * surface.normals[v]).norm();
-      if (std::isfinite(friction)) excess = std::max(excess, shear - friction * std::max(0.0, pressure));
-      s.contact_area += surface.weight[v];
-      ++s.contact_vertices;
-      // Exact for P1 tractions at P1 displaced points.
-      for (Eigen::SparseMatrix<double>::InnerIterator it(gel.mass, v); it; ++it) {
-        const auto u = it.row();
-        const Eigen::Vector3d at =
-            gel.vertices[static_cast<std::size_t>(u)] + s.surface_displacement.row(u).transpose();
-        s.wrench.tail<3>() -= it.value() * at.cross(t);
-      }
-    }
-    s.wrench.head<3>() = snapshot.force;
-    for (Eigen::Index b = 0; b < s.bead_displacement.rows(); ++b) s.bead_displacement.row(b) = beads.segment<3>(3 * b);
-    if (friction > 0.0 && largest_pressure > 0.0) s.cone_violation = excess / (friction * largest_pressure);
-    s.largest_gradient = largest_surface_gradient(gel.vertices, gel.triangles, s.surface_displacement);
-    double deepest = 0.0;
-    for (int v = 0; v < n; ++v) {
-      deepest = std::max(deepest, std::abs(surface.normals[v].dot(s.surface_displacement.row(v))));
-    }
-    s.largest_strain = std::max(s.largest_gradient, deepest / gel.thickness);
+
+  const auto bead_compliance = gel.beads.view();
+  Eigen::VectorXd beads = Eigen::VectorXd::Zero(gel.beads.rows());
+  // A gel that relaxes is displaced as by its pseudo-elastic traction, also where nothing touches it any more.
+  const Eigen::VectorXd& moving = snapshot.history.empty() ? snapshot.traction : snapshot.history.elastic;
+  for (int v = 0; v < n && beads.size() > 0; ++v) {
+    const Eigen::Vector3d t = moving.segment<3>(3 * v);
+    if (!t.isZero(0.0)) beads += bead_compliance.middleCols<3>(3 * v) * t;
   }
-  s.under_resolved = (snapshot.touching || snapshot.overlapping) && s.contact_vertices < kResolvedVertices;
+  double largest_pressure = 0.0;
+  for (int v = 0; v < n; ++v) {
+    if (snapshot.state[v] == NodeState::open) continue;
+    const Eigen::Vector3d t = snapshot.traction.segment<3>(3 * v);
+    const double pressure = -surface.normals[v].dot(t);
+    largest_pressure = std::max(largest_pressure, pressure);
+    s.largest_tension = std::max(s.largest_tension, -pressure);
+    s.contact_area += surface.weight[v];
+    ++s.contact_vertices;
+    s.bodies[snapshot.owner[v]].contact_area += surface.weight[v];
+    ++s.bodies[snapshot.owner[v]].contact_vertices;
+  }
+  for (int v = 0; v < n && largest_pressure > 0.0; ++v) {
+    if (snapshot.state[v] == NodeState::open) continue;
+    const double friction = solver.bodies()[snapshot.owner[v]].friction;
+    if (!(friction > 0.0) || std::isinf(friction)) continue;
+    const Eigen::Vector3d t = snapshot.traction.segment<3>(3 * v);
+    const double pressure = -surface.normals[v].dot(t);
+    const double excess = (t + pressure * surface.normals[v]).norm() - friction * std::max(0.0, pressure);
+    s.cone_violation = std::max(s.cone_violation, excess / (friction * largest_pressure));
+  }
+  s.bead_displacement.resize(gel.beads.rows() / 3, 3);
+  for (Eigen::Index b = 0; b < s.bead_displacement.rows(); ++b) s.bead_displacement.row(b) = beads.segment<3>(3 * b);
+  if (output == PressOutput::fields) add_fields(gel, surface, mass, snapshot, s);
+  for (std::size_t b = 0; b < snapshot.bodies.size(); ++b) {
+    const BodySnapshot& body = snapshot.bodies[b];
+    s.under_resolved =
+        s.under_resolved || ((body.touching || body.overlapping) && s.bodies[b].contact_vertices < kResolvedVertices);
+  }
   return s;
 }
 

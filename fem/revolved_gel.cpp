@@ -195,18 +195,13 @@ CoreSurface core_surface(const Rings& rings) {
 TetMesh core_mesh(const Outline& outline, const CoreSurface& surface) {
   FillInput input;
   input.points = surface.points;
-  for (const auto& t : surface.triangles) input.facets.push_back({{{t[0], t[1], t[2]}}, 1});
+  for (const auto& t : surface.triangles) input.facets.push_back({{t[0], t[1], t[2]}});
   input.keep_boundary = true;
   input.most_points = static_cast<int>(kMostTetrahedra / 4.0);
   input.edge = [&](const Vector3d& x) { return outline.edge_at(x); };
-  const double fine = std::min(outline.fine_radius, outline.base);
-  input.grid = {
-      graded_planes(-outline.base, outline.base, -fine, fine), graded_planes(-outline.base, outline.base, -fine, fine),
-      graded_planes(-outline.thickness, 0.0, -outline.fine_depth - fine * fine / (2.0 * outline.sphere), 0.0)};
-  return fill_with_tetrahedra(input,
-                              fmt::format("{} of radius {} mm, {} mm thick, with edges of {} to {} mm", outline.name,
-                                          outline.sphere, outline.thickness, outline.fine, outline.coarse))
-      .mesh;
+  return fill_with_tetrahedra(
+      input, fmt::format("{} of radius {} mm, {} mm thick, with edges of {} to {} mm", outline.name, outline.sphere,
+                         outline.thickness, outline.fine, outline.coarse));
 }
 
 TetMesh mesh_with(const Outline& outline, const Rings& rings, const CoreSurface& surface, TetMesh mesh) {

@@ -185,7 +185,7 @@ struct BorderedFactor::Parts {
 };
 
 BorderedFactor::BorderedFactor(const SymmetricEntries& matrix, int last, std::span<const int> order,
-                               FactorReport* report) {
+                               FactorReport* report, bool keep) {
   TS_ASSERT(last > 0 && last < matrix.size && static_cast<int>(order.size()) == matrix.size - last);
   parts_ = std::make_unique<Parts>(matrix, last, order);
   complement_ = Eigen::MatrixXd::Zero(last, last);
@@ -198,6 +198,7 @@ BorderedFactor::BorderedFactor(const SymmetricEntries& matrix, int last, std::sp
   mumps.control(19) = 2;  // the lower triangle, by columns
   mumps.data().schur_lld = last;
   mumps.control(7) = kGivenOrder;
+  mumps.control(31) = keep ? 0 : 1;  // else the factor isn't kept: it's two thirds of the memory
   mumps.data().perm_in = parts_->places.data();
   mumps.analyse_and_factorise(report);
   stop_unless_finite(complement_);
@@ -224,7 +225,7 @@ Eigen::VectorXd BorderedFactor::solve(const Eigen::VectorXd& right) {
 
 Eigen::MatrixXd schur_complement(const SymmetricEntries& matrix, int last, std::span<const int> order,
                                  FactorReport* report) {
-  return BorderedFactor(matrix, last, order, report).take_complement();
+  return BorderedFactor(matrix, last, order, report, false).take_complement();
 }
 
 Eigen::MatrixXd solve_symmetric(const SymmetricEntries& matrix, std::span<const int> order,
@@ -247,6 +248,41 @@ Eigen::MatrixXd solve_symmetric(const SymmetricEntries& matrix, std::span<const 
   }
   stop_unless_finite(solution);
   return solution;
+}
+
+struct SymmetricFactor::Parts {
+  Parts(const SymmetricEntries& matrix, std::span<const int> order)
+      : values(matrix.values), places(places_of(order, matrix.size)), mumps(matrix) {
+    mumps.data().a = values.data();
+  }
+  std::vector<double> values;  // the matrix itself may not live as long
+  std::vector<int> places;
+  Mumps mumps;
+};
+
+SymmetricFactor::SymmetricFactor(const SymmetricEntries& matrix, std::span<const int> order, FactorReport* report) {
+  TS_ASSERT(static_cast<int>(order.size()) == matrix.size);
+  parts_ = std::make_unique<Parts>(matrix, order);
+  parts_->mumps.control(7) = kGivenOrder;
+  parts_->mumps.data().perm_in = parts_->places.data();
+  parts_->mumps.analyse_and_factorise(report);
+}
+
+SymmetricFactor::~SymmetricFactor() = default;
+
+int SymmetricFactor::size() const {
+  return static_cast<int>(parts_->places.size());
+}
+
+Eigen::VectorXd SymmetricFactor::solve(Eigen::VectorXd right) const {
+  TS_ASSERT(right.size() == size());
+  Mumps& mumps = parts_->mumps;
+  mumps.data().nrhs = 1;
+  mumps.data().lrhs = size();
+  mumps.data().rhs = right.data();
+  mumps.run(kSolve);
+  stop_unless_finite(right);
+  return right;
 }
 
 std::string blas_core_name() {

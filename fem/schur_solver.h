@@ -32,7 +32,7 @@ struct SymmetricEntries {
 struct FactorReport {
   std::int64_t factor_entries = 0;
   double operations = 0.0;  ///< floating-point operations of the elimination
-  double memory_mb = 0.0;   ///< working memory of MUMPS
+  double memory_mb = 0.0;   ///< working memory; of quasi_definite_schur() on one thread, up to twice that on four
   int negative_pivots = 0;
   int delayed_pivots = 0;
   double analysis_seconds = 0.0;
@@ -54,8 +54,9 @@ Eigen::MatrixXd solve_symmetric(const SymmetricEntries& matrix, std::span<const 
 /// others. MUMPS allows one instance at a time: while this lives, other solutions wait (in the same thread: for ever).
 class BorderedFactor {
  public:
-  /// As schur_complement. @throws Error as there
-  BorderedFactor(const SymmetricEntries& matrix, int last, std::span<const int> order, FactorReport* report = nullptr);
+  /// As schur_complement. `keep`: the factor, for solve(). @throws Error as there
+  BorderedFactor(const SymmetricEntries& matrix, int last, std::span<const int> order, FactorReport* report = nullptr,
+                 bool keep = true);
   ~BorderedFactor();
   BorderedFactor(const BorderedFactor&) = delete;
   BorderedFactor& operator=(const BorderedFactor&) = delete;
@@ -70,6 +71,25 @@ class BorderedFactor {
   struct Parts;
   std::unique_ptr<Parts> parts_;
   Eigen::MatrixXd complement_;
+};
+
+/// A symmetric matrix factorised once, to be solved with many right-hand sides one after the other. MUMPS has global
+/// state: while one lives, every other factorisation of the program waits, so don't make a second in the same thread.
+class SymmetricFactor {
+ public:
+  /// `order` as in solve_symmetric. @throws Error as above
+  SymmetricFactor(const SymmetricEntries& matrix, std::span<const int> order, FactorReport* report = nullptr);
+  ~SymmetricFactor();
+  SymmetricFactor(const SymmetricFactor&) = delete;
+  SymmetricFactor& operator=(const SymmetricFactor&) = delete;
+
+  int size() const;
+  /// matrix^-1 * right, without iterative refinement. The same input gives the same bytes.
+  Eigen::VectorXd solve(Eigen::VectorXd right) const;
+
+ private:
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
 };
 
 /// The kernel that OpenBLAS chose for this processor ("Zen", "Cooperlake"; "Prescott" on a recent processor means that

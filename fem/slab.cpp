@@ -10,8 +10,6 @@
 namespace touchstone::fem {
 namespace {
 
-enum FaceMarker { side = 1, outer_face = 2, bonded_face = 3 };
-
 double coarse_edge(const SlabMesh& slab) {
   return std::max(slab.fine, std::min(slab.coarse, slab.thickness));
 }
@@ -30,6 +28,28 @@ double volume_within(const SlabMesh& slab, double distance) {
   const double x = std::min(slab.size_x, 2.0 * (slab.fine_half_x + distance));
   const double y = std::min(slab.size_y, 2.0 * (slab.fine_half_y + distance));
   return x * y * std::min(slab.thickness, slab.fine_depth + distance);
+}
+
+/// Planes across one axis for the background grid: the slab's ends with a margin beyond, those of its fine part, and
+/// some between them.
+std::vector<double> graded_planes(double low, double high, double fine_low, double fine_high) {
+  const double margin = 0.05 * (high - low);  // TetGen must find each point of the solid inside the background
+  std::vector<double> planes = {low - margin, high + margin};
+  const auto add = [&](double from, double to) {
+    for (int k = 0; k <= 4; ++k) {
+      planes.push_back(from + (to - from) * k / 4.0);
+    }
+  };
+  add(low, std::max(low, fine_low));
+  add(std::min(high, fine_high), high);
+  std::sort(planes.begin(), planes.end());
+  std::vector<double> apart;
+  for (const double plane : planes) {
+    if (apart.empty() || plane - apart.back() > 1e-3 * (high - low)) {
+      apart.push_back(plane);
+    }
+  }
+  return apart;
 }
 
 /// Points in the fine part of the outer face: a lattice of equilateral triangles, mirrored in x and y.
@@ -67,12 +87,11 @@ FillInput fill_input(const SlabMesh& slab) {
   }
   const std::vector<std::vector<int>> corners = {{4, 5, 6, 7}, {0, 3, 2, 1}, {0, 1, 5, 4},
                                                  {1, 2, 6, 5}, {2, 3, 7, 6}, {3, 0, 4, 7}};
-  const std::vector<int> markers = {outer_face, bonded_face, side, side, side, side};
   for (std::size_t f = 0; f < corners.size(); ++f) {
-    input.facets.push_back({{corners[f]}, markers[f]});
+    input.facets.push_back({corners[f]});
   }
   for (int point = 8; point < static_cast<int>(input.points.size()); ++point) {
-    input.facets[0].polygons.push_back({point});  // a lone point in the face
+    input.facets[0].push_back({point});  // a lone point in the face
   }
   input.grid = {graded_planes(-x, x, -slab.fine_half_x, slab.fine_half_x),
                 graded_planes(-y, y, -slab.fine_half_y, slab.fine_half_y),
@@ -141,12 +160,29 @@ double estimated_tetrahedra(const SlabMesh& slab) {
   return kTetrahedraPerCube * sum;
 }
 
+double estimated_surface_vertices(const SlabMesh& slab) {
+  // Vertices per (mm^2 / edge^2): of equilateral triangles, and what TetGen adds to them.
+  constexpr double kVerticesPerSquare = 1.155 * 1.09;
+  const auto area_within = [&](double distance) {
+    return std::min(slab.size_x, 2.0 * (slab.fine_half_x + distance)) *
+           std::min(slab.size_y, 2.0 * (slab.fine_half_y + distance));
+  };
+  const double farthest = std::max(slab.size_x, slab.size_y) / 2.0;
+  double sum = area_within(0.0) / std::pow(slab.fine, 2);
+  constexpr int kShells = 400;
+  for (int k = 0; k < kShells; ++k) {
+    const double inner = farthest * k / kShells;
+    const double outer = farthest * (k + 1) / kShells;
+    sum += (area_within(outer) - area_within(inner)) / std::pow(wanted_edge(slab, 0.5 * (inner + outer)), 2);
+  }
+  return kVerticesPerSquare * sum;
+}
+
 TetMesh mesh_slab(const SlabMesh& slab) {
   check(slab);
-  TetMesh mesh = fill_with_tetrahedra(fill_input(slab),
-                                      fmt::format("the slab of {} x {} x {} mm with edges of {} to {} mm", slab.size_x,
-                                                  slab.size_y, slab.thickness, slab.fine, slab.coarse))
-                     .mesh;
+  TetMesh mesh = fill_with_tetrahedra(
+      fill_input(slab), fmt::format("the slab of {} x {} x {} mm with edges of {} to {} mm", slab.size_x, slab.size_y,
+                                    slab.thickness, slab.fine, slab.coarse));
   for (const auto& face : boundary_faces(mesh)) {
     const auto all_at = [&](double z) {
       return std::all_of(face.begin(), face.end(), [&](int v) { return mesh.vertices[v].z() == z; });

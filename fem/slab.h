@@ -25,6 +25,9 @@ void check(const SlabMesh& slab);
 /// How many tetrahedra mesh_slab will make, within some 40 %: the size field's integral.
 double estimated_tetrahedra(const SlabMesh& slab);
 
+/// How many vertices its outer face will have, within some 10 %.
+double estimated_surface_vertices(const SlabMesh& slab);
+
 /// Meshes the slab with TetGen 1.5 (constrained Delaunay, refined to a size field). `outer` is the face z = 0, `bonded`
 /// the face z = -thickness; the sides are free. Edges are never longer than about the thickness. The same input gives
 /// the same mesh. @throws Error as check(), or if TetGen gives up

@@ -1,9 +1,13 @@
 #include "fem/tetgen_fill.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
-#include <mutex>
+#include <cmath>
+#include <cstring>
+#include <optional>
 
 #include "core/error.h"
+#include "core/isolated_call.h"
 
 #define TETLIBRARY
 #include <tetgen.h>
@@ -13,6 +17,7 @@ namespace {
 
 /// TetGen keeps circumradii under the metric; a regular tetrahedron of edge h has 0.61 h.
 constexpr double kMetricPerEdge = 1.0;
+constexpr int kMostSeconds = 120;
 
 /// The size field as TetGen reads it: a grid of boxes, each cut into six tetrahedra, with a metric at each vertex.
 void fill_background(const FillInput& from, tetgenio& background) {
@@ -71,9 +76,8 @@ void fill_boundary(const FillInput& from, tetgenio& input) {
   }
   input.numberoffacets = static_cast<int>(from.facets.size());
   input.facetlist = new tetgenio::facet[from.facets.size()];
-  input.facetmarkerlist = new int[from.facets.size()];
   for (std::size_t f = 0; f < from.facets.size(); ++f) {
-    const auto& polygons = from.facets[f].polygons;
+    const auto& polygons = from.facets[f];
     tetgenio::facet& facet = input.facetlist[f];
     tetgenio::init(&facet);
     facet.numberofpolygons = static_cast<int>(polygons.size());
@@ -83,30 +87,43 @@ void fill_boundary(const FillInput& from, tetgenio& input) {
       facet.polygonlist[p].vertexlist = new int[polygons[p].size()];
       std::copy(polygons[p].begin(), polygons[p].end(), facet.polygonlist[p].vertexlist);
     }
-    input.facetmarkerlist[f] = from.facets[f].marker;
   }
 }
 
-Filling filling_of(const tetgenio& output) {
-  Filling filling;
-  TetMesh& mesh = filling.mesh;
-  for (int i = 0; i < output.numberofpoints; ++i) {
-    mesh.vertices.emplace_back(output.pointlist[3 * i], output.pointlist[3 * i + 1], output.pointlist[3 * i + 2]);
-  }
-  for (int e = 0; e < output.numberoftetrahedra; ++e) {
-    const int* corner = output.tetrahedronlist + 4 * e;
-    std::array<int, 4> tetrahedron = {corner[0], corner[1], corner[2], corner[3]};
+/// The mesh as bytes: two counts, the vertices, the tetrahedra.
+std::string bytes_of(const tetgenio& output) {
+  std::string bytes;
+  const auto add = [&](const void* data, std::size_t size) { bytes.append(static_cast<const char*>(data), size); };
+  add(&output.numberofpoints, sizeof(int));
+  add(&output.numberoftetrahedra, sizeof(int));
+  add(output.pointlist, sizeof(REAL) * 3 * static_cast<std::size_t>(output.numberofpoints));
+  add(output.tetrahedronlist, sizeof(int) * 4 * static_cast<std::size_t>(output.numberoftetrahedra));
+  return bytes;
+}
+
+TetMesh mesh_of(const std::string& bytes) {
+  const char* at = bytes.data();
+  const auto take = [&](void* data, std::size_t size) {
+    TS_ASSERT(size <= static_cast<std::size_t>(bytes.data() + bytes.size() - at));
+    std::memcpy(data, at, size);
+    at += size;
+  };
+  int points = 0;
+  int tetrahedra = 0;
+  take(&points, sizeof(int));
+  take(&tetrahedra, sizeof(int));
+  TetMesh mesh;
+  mesh.vertices.resize(static_cast<std::size_t>(points));
+  mesh.tetrahedra.resize(static_cast<std::size_t>(tetrahedra));
+  static_assert(sizeof(Eigen::Vector3d) == 3 * sizeof(REAL));
+  for (auto& vertex : mesh.vertices) take(vertex.data(), sizeof(REAL) * 3);
+  for (auto& tetrahedron : mesh.tetrahedra) {
+    take(tetrahedron.data(), sizeof(int) * 4);
     if (volume(mesh, tetrahedron) < 0.0) {
       std::swap(tetrahedron[2], tetrahedron[3]);
     }
-    mesh.tetrahedra.push_back(tetrahedron);
   }
-  for (int f = 0; f < output.numberoftrifaces; ++f) {
-    const int* corner = output.trifacelist + 3 * f;
-    filling.faces.push_back({corner[0], corner[1], corner[2]});
-    filling.markers.push_back(output.trifacemarkerlist == nullptr ? 0 : output.trifacemarkerlist[f]);
-  }
-  return filling;
+  return mesh;
 }
 
 bool boundary_was_kept(const FillInput& input, const TetMesh& mesh) {
@@ -116,7 +133,7 @@ bool boundary_was_kept(const FillInput& input, const TetMesh& mesh) {
   };
   std::vector<std::array<int, 3>> wanted;
   for (const auto& facet : input.facets) {
-    const auto& corners = facet.polygons.front();
+    const auto& corners = facet.front();
     wanted.push_back(sorted({corners[0], corners[1], corners[2]}));
   }
   std::vector<std::array<int, 3>> made;
@@ -128,66 +145,80 @@ bool boundary_was_kept(const FillInput& input, const TetMesh& mesh) {
   return wanted == made && same_points;
 }
 
-Filling fill_once(const FillInput& from, const std::string& quality, const std::string& what) {
+/// The wanted edges, for TetGen's call-back, which takes no context. Set in a process of its own.
+const FillInput* in_work = nullptr;
+
+/// Whether a tetrahedron's circumradius is above the wanted edge at its middle.
+bool too_large(REAL* a, REAL* b, REAL* c, REAL* d, REAL*, REAL) {
+  const Eigen::Map<const Eigen::Vector3d> pa(a), pb(b), pc(c), pd(d);
+  const Eigen::Vector3d u = pb - pa;
+  const Eigen::Vector3d v = pc - pa;
+  const Eigen::Vector3d w = pd - pa;
+  const double six_volumes = u.dot(v.cross(w));
+  const Eigen::Vector3d to_centre =
+      u.squaredNorm() * v.cross(w) + v.squaredNorm() * w.cross(u) + w.squaredNorm() * u.cross(v);
+  const double wanted = kMetricPerEdge * in_work->edge(0.25 * (pa + pb + pc + pd));
+  return to_centre.norm() > 2.0 * std::abs(six_volumes) * wanted;
+}
+
+std::string call_tetgen(const FillInput& from, const std::string& quality) {
   tetgenio input;
   tetgenio output;
   tetgenio background;
   fill_boundary(from, input);
-  fill_background(from, background);
+  // A background mesh makes TetGen end the process where it tries a vertex outside of it, as it does beside a boundary
+  // that it may not split; a call-back doesn't.
+  if (from.keep_boundary) {
+    input.tetunsuitable = too_large;
+  } else {
+    fill_background(from, background);
+  }
   tetgenbehavior behavior;
-  std::string switches = fmt::format("p{}q{}mzQ", from.keep_boundary ? "YM" : "", quality);
+  std::string switches =
+      fmt::format("p{}q{}{}zQ", from.keep_boundary ? "YM" : "", quality, from.keep_boundary ? "" : "m");
   if (from.most_points >= 0) switches += fmt::format("S{}", from.most_points);
   TS_ASSERT(behavior.parse_commandline(switches.data()));
-  // TetGen keeps its predicates' error bounds in globals.
-  static std::mutex one_at_a_time;
-  const std::lock_guard lock(one_at_a_time);
+  in_work = &from;
   try {
-    tetrahedralize(&behavior, &input, &output, nullptr, &background);
+    tetrahedralize(&behavior, &input, &output, nullptr, from.keep_boundary ? nullptr : &background);
   } catch (int code) {
-    fail("{}: TetGen gave up on it (code {})", what, code);
+    fail("code {}", code);
   }
-  return filling_of(output);
+  return bytes_of(output);
+}
+
+/// The mesh, or none if TetGen gave up, with the reason.
+std::optional<TetMesh> fill_once(const FillInput& from, const std::string& quality, std::string& why_not) {
+  try {
+    return mesh_of(isolated_call([&] { return call_tetgen(from, quality); }, kMostSeconds));
+  } catch (const Error& error) {
+    why_not = error.what();
+    return std::nullopt;
+  }
 }
 
 }  // namespace
 
-Filling fill_with_tetrahedra(const FillInput& input, const std::string& what) {
+TetMesh fill_with_tetrahedra(const FillInput& input, const std::string& what) {
   for (const Eigen::Vector3d& point : input.points) TS_ASSERT(point.allFinite());
-  Filling best;
+  TetMesh best;
   double best_angle = -1.0;
+  std::string why_not;
   for (const std::string quality : {"1.4/14", "1.3/14", "1.5/12", "1.4/16", "1.6/10", "1.25/18"}) {
-    Filling filling = fill_once(input, quality, what);
-    const double angle = smallest_dihedral_angle(filling.mesh);
+    std::optional<TetMesh> mesh = fill_once(input, quality, why_not);
+    if (!mesh) continue;
+    const double angle = smallest_dihedral_angle(*mesh);
     if (angle > best_angle) {
       best_angle = angle;
-      best = std::move(filling);
+      best = std::move(*mesh);
     }
     if (best_angle > kGoodDihedral) break;
   }
-  if (input.keep_boundary && !boundary_was_kept(input, best.mesh)) {
+  if (best_angle < 0.0) fail("{}: TetGen gave up on it ({})", what, why_not);
+  if (input.keep_boundary && !boundary_was_kept(input, best)) {
     fail("{}: TetGen couldn't fill it without changing its surface", what);
   }
   return best;
-}
-
-std::vector<double> graded_planes(double low, double high, double fine_low, double fine_high) {
-  const double margin = 0.05 * (high - low);  // TetGen must find each point of the solid inside the background
-  std::vector<double> planes = {low - margin, high + margin};
-  const auto add = [&](double from, double to) {
-    for (int k = 0; k <= 4; ++k) {
-      planes.push_back(from + (to - from) * k / 4.0);
-    }
-  };
-  add(low, std::max(low, fine_low));
-  add(std::min(high, fine_high), high);
-  std::sort(planes.begin(), planes.end());
-  std::vector<double> apart;
-  for (const double plane : planes) {
-    if (apart.empty() || plane - apart.back() > 1e-3 * (high - low)) {
-      apart.push_back(plane);
-    }
-  }
-  return apart;
 }
 
 }  // namespace touchstone::fem

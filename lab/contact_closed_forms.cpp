@@ -184,6 +184,17 @@ double gent_lindley_modulus(double youngs_modulus, double radius, double thickne
   return youngs_modulus * (1.0 + 2.0 * shape * shape);
 }
 
+double dimitriadis_force(double youngs_modulus, double radius, double thickness, double depth) {
+  const double x = std::sqrt(radius * depth) / thickness;
+  const double series = 1.0 + x * (1.133 + x * (1.283 + x * (0.769 + x * 0.0975)));
+  return 16.0 / 9.0 * youngs_modulus * std::sqrt(radius) * std::pow(depth, 1.5) * series;
+}
+
+double thin_layer_force(double youngs_modulus, double radius, double thickness, double depth) {
+  const double a = 2.0 * std::sqrt(radius * depth);
+  return kPi * youngs_modulus * std::pow(a, 6) / (96.0 * radius * std::pow(thickness, 3));
+}
+
 double bonded_layer_kernel(double poisson_ratio, double q) {
   const double nu = poisson_ratio;
   const double b = 3.0 - 4.0 * nu;

@@ -44,6 +44,15 @@ double hayes_kappa(double radius_over_thickness);
 /// E (1 + 2 S^2), S = R/(2t). Approximate at small S.
 double gent_lindley_modulus(double youngs_modulus, double radius, double thickness);
 
+/// Force of a rigid sphere of radius R pressed by `depth` into an incompressible layer bonded below (Dimitriadis et
+/// al., Biophys. J. 82, 2002, eq. 12): 16/9 E sqrt(R) d^1.5 (1 + 1.133 x + 1.283 x^2 + 0.769 x^3 + 0.0975 x^4), where
+/// x = sqrt(R d) / thickness. A series in x: 0.2 % low at 0.1, 1.1 % at 0.2, 2.7 % at 0.3.
+double dimitriadis_force(double youngs_modulus, double radius, double thickness, double depth);
+
+/// The same where the contact is much wider than the layer (Johnson, Contact Mechanics, sec. 5.8): the contact radius
+/// a = 2 sqrt(R d), F = pi E a^6 / (96 R thickness^3). 15 % low at a = 10 thicknesses, 5 % at 20.
+double thin_layer_force(double youngs_modulus, double radius, double thickness, double depth);
+
 /// Surface compliance of a bonded layer over that of a half space, for pressure of wave number k, q = k * thickness:
 /// M(q) = [(3-4nu) sinh 2q - 2q] / [(3-4nu) cosh 2q + 2q^2 + 5 - 12nu + 8nu^2].
 double bonded_layer_kernel(double poisson_ratio, double q);

@@ -60,13 +60,14 @@ WrittenFile written(const fs::path& out, const std::string& name) {
 
 /// The kinds of picture that a scene's outputs ask for.
 struct PictureKinds {
-  bool frames = false, ideal = false, radiance = false;
+  bool frames = false, ideal = false, radiance = false, height = false;
 
   explicit PictureKinds(const PreparedScene& scene)
       : frames(scene.plan.camera && scene.spec.outputs.frames),
         ideal(scene.plan.camera && scene.spec.outputs.ideal),
-        radiance(scene.plan.camera && scene.spec.outputs.radiance) {}
-  bool any() const { return frames || ideal || radiance; }
+        radiance(scene.plan.camera && scene.spec.outputs.radiance),
+        height(scene.spec.outputs.height) {}
+  bool any() const { return frames || ideal || radiance || height; }
 };
 
 /// One sample's place in the job.
@@ -187,7 +188,7 @@ class Run {
     for (const PreparedScene& scene : job_.scenes) {
       const PictureKinds kinds(scene);
       for (const auto& [name, wanted] : {std::pair{"frames", kinds.frames}, std::pair{"ideal", kinds.ideal},
-                                         std::pair{"radiance", kinds.radiance}}) {
+                                         std::pair{"radiance", kinds.radiance}, std::pair{"height", kinds.height}}) {
         if (!wanted) continue;
         const fs::path folder = out_ / name / scene.entry.name;
         std::error_code error;
@@ -245,6 +246,13 @@ class Run {
     if (kinds.radiance) {
       const std::string name = picture_name("radiance", scene.entry.name, place.frame, "exr");
       sim::write_exr(out_ / name, capture.radiance, {"R", "G", "B"});
+      record.files.push_back(written(out_, name));
+    }
+    if (kinds.height) {
+      const std::string name = picture_name("height", scene.entry.name, place.frame, "exr");
+      const sim::ImageMetadata metadata = {{"unit", "mm"},
+                                           {"pixel_um", fmt::format("{}", scene.spec.membrane.pixel_um)}};
+      sim::write_exr(out_ / name, capture.height, {"height"}, metadata);
       record.files.push_back(written(out_, name));
     }
     return record;

@@ -122,11 +122,23 @@ void Hdf5Writer::add_dataset(const Hdf5Description& description, Hdf5Id type, st
     check_done(H5Pset_deflate(creation, kDeflateLevel), "compression");
   }
   const Handle space(check(H5Screate_simple(static_cast<int>(shape.size()), shape.data(), nullptr), "shape"), H5Sclose);
+  make_group_of(description.path);
   dataset.id = check(H5Dcreate2(file_, description.path.c_str(), type, space, H5P_DEFAULT, creation, H5P_DEFAULT),
                      description.path.c_str());
   const Hdf5Id id = dataset.id;
   datasets_.emplace(description.path, std::move(dataset));
   describe(id, description);
+}
+
+void Hdf5Writer::make_group_of(const std::string& path) {
+  for (std::size_t end = path.find('/', 1); end != std::string::npos; end = path.find('/', end + 1)) {
+    const std::string group = path.substr(0, end);
+    if (H5Lexists(file_, group.c_str(), H5P_DEFAULT) > 0) continue;
+    const Handle creation(check(H5Pcreate(H5P_GROUP_CREATE), "group creation"), H5Pclose);
+    check_done(H5Pset_obj_track_times(creation, 0), "times");
+    const Handle made(check(H5Gcreate2(file_, group.c_str(), H5P_DEFAULT, creation, H5P_DEFAULT), group.c_str()),
+                      H5Gclose);
+  }
 }
 
 void Hdf5Writer::write_rows(const std::string& path, Hdf5Id type, std::int64_t first, std::int64_t count,

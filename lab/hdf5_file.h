@@ -67,6 +67,8 @@ class Hdf5Writer {
     Hdf5Id id = -1;
     std::vector<std::int64_t> shape;
   };
+  /// Makes the groups that the path stands in, where there aren't any yet.
+  void make_group_of(const std::string& path);
   void add_dataset(const Hdf5Description& description, Hdf5Id type, std::size_t item_bytes, std::int64_t rows,
                    const std::vector<std::int64_t>& row_shape);
   void write_rows(const std::string& path, Hdf5Id type, std::int64_t first, std::int64_t count, const void* values,

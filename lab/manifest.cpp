@@ -40,7 +40,8 @@ ordered_json scene_json(const PreparedScene& scene, const std::filesystem::path&
                        {"outputs",
                         {{"frames", scene.plan.camera && spec.outputs.frames},
                          {"ideal", scene.plan.camera && spec.outputs.ideal},
-                         {"radiance", scene.plan.camera && spec.outputs.radiance}}}};
+                         {"radiance", scene.plan.camera && spec.outputs.radiance},
+                         {"height", spec.outputs.height}}}};
   if (scene.plan.camera && spec.device.camera) {
     json["picture"] = {{"width", spec.device.camera->width}, {"height", spec.device.camera->height}};
   }

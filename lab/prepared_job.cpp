@@ -17,8 +17,8 @@ PreparedJob prepare_job(const std::filesystem::path& file) {
     if (entry.start_mm) scene.spec.motion.start_mm = *entry.start_mm;
     if (prepared.job.outputs) scene.spec.outputs = *prepared.job.outputs;
     scene.plan = sim::make_plan(scene.spec);
-    // Reads and checks a mesh file now, before anything is written.
-    sim::contact_shape(scene.spec.object.shape);
+    // Reads and checks a mesh or relief file now, before anything is written.
+    sim::contact_shape(scene.spec.object);
     if (!prepared.scenes.empty()) {
       const PreparedScene& first = prepared.scenes.front();
       if (!std::filesystem::equivalent(scene.spec.device.where.file, first.spec.device.where.file)) {

@@ -1,5 +1,8 @@
 #include "lab/sample_source.h"
 
+#include "core/error.h"
+#include "sim/membrane.h"
+
 namespace touchstone::lab {
 
 SampleSource simulator(const std::filesystem::path& cache_folder) {
@@ -7,11 +10,24 @@ SampleSource simulator(const std::filesystem::path& cache_folder) {
   source.set_up_gel = [cache_folder](const sim::DeviceSpec& device, const Progress& progress) {
     return sim::set_up_gel(device, cache_folder, progress);
   };
-  source.play_motion = sim::play_motion;
+  source.play_motion = [cache_folder](const sim::SceneSpec& scene, const sim::Plan& plan, const fem::Compliance& gel,
+                                      const Progress& progress) {
+    const auto vibration = sim::set_up_vibration(scene, plan, cache_folder);
+    return sim::play_motion(scene, plan, gel, progress, vibration.get());
+  };
   source.set_up_camera = [](const sim::SceneSpec& scene, const sim::Plan& plan,
                             std::shared_ptr<const fem::Compliance> gel, const sim::Truth& first) {
+    if (!plan.camera) {
+      TS_ASSERT(scene.outputs.height);
+      auto membrane = std::make_shared<const sim::Membrane>(scene, plan, *gel);
+      return SampleSource::Camera([membrane, gel](const sim::Truth& truth) {
+        sim::Capture capture;
+        capture.height = membrane->height(truth.press, membrane->relief(truth.press));
+        return capture;
+      });
+    }
     auto camera = std::make_shared<const sim::VirtualCamera>(scene, plan, *gel, first);
-    return [camera](const sim::Truth& truth) { return camera->capture(truth); };
+    return SampleSource::Camera([camera](const sim::Truth& truth) { return camera->capture(truth); });
   };
   return source;
 }

@@ -118,6 +118,23 @@ struct TruthFileWriter::Parts {
     column<double>({"/residual_force_N", "N", "samples", "",
                     "Error bar: largest difference to a wanted force, under force control."},
                    {});
+    column<double>({"/lookup_error_mm", "mm", "samples", "",
+                    "Error bar: how far the contact patch lies from where the gap was looked up."},
+                   {});
+    column<double>({"/error/force_N", "N", "samples x 3", "gel",
+                    "Standard error from the mesh of the force at this pose; where an axis is led by force, what the "
+                    "pose's error amounts to."},
+                   {3});
+    column<double>({"/error/displacement_mm", "mm", "samples", "",
+                    "Standard error from the mesh of the outer surface's displacement within twice the contact's "
+                    "radius."},
+                   {});
+    column<double>({"/error/bead_mm", "mm", "samples", "",
+                    "Standard error from the mesh of the displacement of the bead that is furthest off."},
+                   {});
+    column<double>({"/error/traction_MPa", "MPa", "samples", "",
+                    "Standard error from the mesh of the traction in contact, root mean square over it."},
+                   {});
     column<double>({"/residual_contact", "1", "samples", "",
                     "Error bar: how far the contact laws are from being met, relative to the largest pressure."},
                    {});
@@ -174,6 +191,11 @@ void TruthFileWriter::append(int scene, Split split, const sim::Truth& truth) {
   to.value<double>("/residual_friction_cone", press.cone_violation);
   to.value<double>("/residual_force_N", press.force_residual);
   to.value<double>("/residual_contact", press.contact_residual);
+  to.value<double>("/lookup_error_mm", press.lookup_error);
+  to.row<double>("/error/force_N", {truth.error.force.data(), truth.error.force.data() + 3});
+  to.value<double>("/error/displacement_mm", truth.error.displacement);
+  to.value<double>("/error/bead_mm", truth.error.beads);
+  to.value<double>("/error/traction_MPa", truth.error.traction);
   ++to.next;
 }
 

@@ -17,6 +17,13 @@ namespace touchstone::lab {
 enum class Better { lower, higher, near };
 std::string name_of(Better better);
 
+/// How a row's error goes with what it costs or how finely it was made, for a logarithmic plot.
+struct ValidationSeries {
+  std::string x_label;
+  std::string y_label;
+  std::vector<std::pair<double, double>> points;
+};
+
 /// One row. Either `published` (a figure of a text) or `reference` (a closed form) is given, as a rule.
 struct ValidationRow {
   std::string id;     ///< "vhs.force.error_x_N"
@@ -27,9 +34,10 @@ struct ValidationRow {
   double ours = 0.0;
   std::optional<std::pair<double, double>> ci95;  ///< 95 % interval of `ours` over seeds
   Better better = Better::lower;
-  bool holds = false;    ///< whether ours meets the row
-  bool quick = false;    ///< made by the quick form
-  double seconds = 0.0;  ///< wall time that the row took
+  bool holds = false;                      ///< whether ours meets the row
+  bool quick = false;                      ///< made by the quick form
+  double seconds = 0.0;                    ///< wall time that the row took
+  std::optional<ValidationSeries> series;  ///< drawn on the page (validation_page.h); not in the JSON
 };
 
 struct ValidateOptions {

@@ -75,6 +75,11 @@ void fields(YamlReader& in, GelLayerSpec& layer) {
   in.optional("poisson_ratio", layer.poisson_ratio, Allowed::within(0.0, 0.5));
 }
 
+void fields(YamlReader& in, RelaxationTermSpec& term) {
+  in.required("share", term.share, Allowed::within(0.0, 1.0));
+  in.required("time_s", term.time_s, Allowed::above(0.0));
+}
+
 void fields(YamlReader& in, GelSpec& gel) {
   const Allowed length = Allowed::above_up_to(0.0, 1000.0);
   const Allowed length_or_none = Allowed::within(0.0, 1000.0);
@@ -111,16 +116,34 @@ void fields(YamlReader& in, GelSpec& gel) {
   if (gel.shape != GelShape::mesh) in.optional("layers", gel.layers);
   in.required("youngs_modulus_MPa", gel.youngs_modulus_MPa, Allowed::above_up_to(0.0, 1e6));
   in.optional("poisson_ratio", gel.poisson_ratio, Allowed::within(0.0, 0.5));
+  in.optional("density_kg_m3", gel.density_kg_m3, Allowed::above_up_to(0.0, 1e5));
+  in.optional("relaxation", gel.relaxation);
+  double relaxing = 0.0;
+  for (const RelaxationTermSpec& term : gel.relaxation) relaxing += term.share;
+  if (relaxing >= 1.0) {
+    fail_at(in.where("relaxation"), "relaxation: the shares sum to {}; something must last: allowed is below 1",
+            relaxing);
+  }
   in.optional("refractive_index", gel.refractive_index, Allowed::within(1.0, 4.0));
   in.optional("absorption_per_mm", gel.absorption_per_mm, Allowed::at_least(0.0));
   in.optional("frame_albedo", gel.frame_albedo, Allowed::within(0.0, 1.0));
 }
 
 void fields(YamlReader& in, MeshSpec& mesh) {
-  in.optional("fine_mm", mesh.fine_mm, Allowed::above(0.0));
-  in.optional("coarse_mm", mesh.coarse_mm, Allowed::at_least(mesh.fine_mm));
   in.optional("fine_half_extent_mm", mesh.fine_half_extent_mm, Allowed::above(0.0));
   in.optional("fine_depth_mm", mesh.fine_depth_mm, Allowed::above(0.0));
+  if (!in.has("force_error")) {
+    in.optional("fine_mm", mesh.fine_mm, Allowed::above(0.0));
+    in.optional("coarse_mm", mesh.coarse_mm, Allowed::at_least(mesh.fine_mm));
+    return;
+  }
+  for (const char* edge : {"fine_mm", "coarse_mm"}) {
+    if (in.has(edge)) fail_at(in.where(edge), "{}: can't stand beside force_error, from which it's found", edge);
+  }
+  in.optional("force_error", mesh.force_error, Allowed::within(1e-4, 0.5));
+  in.required("contact_radius_mm", mesh.contact_radius_mm,
+              Allowed::above_up_to(0.0, mesh.fine_half_extent_mm.minCoeff()));
+  in.optional("sharp_bodies", mesh.sharp_bodies);
 }
 
 void fields(YamlReader& in, BeadSpec& beads) {
@@ -206,6 +229,12 @@ void fields(YamlReader& in, DeviceSpec& device) {
 
 DeviceSpec read_device(const std::filesystem::path& file) {
   return read_yaml<DeviceSpec>(file);
+}
+
+fem::PronySeries prony_series(const GelSpec& gel) {
+  fem::PronySeries series;
+  for (const RelaxationTermSpec& term : gel.relaxation) series.push_back({term.share, term.time_s});
+  return series;
 }
 
 std::vector<Eigen::Vector3d> bead_centres(const BeadSpec& beads) {

@@ -9,8 +9,15 @@
 #include <vector>
 
 #include "core/yaml_reader.h"
+#include "fem/relaxation.h"
 
 namespace touchstone::sim {
+
+/// One term of the gel's relaxation: `share` of the instantaneous modulus fades with the time constant `time_s`.
+struct RelaxationTermSpec {
+  double share = 0.0;
+  double time_s = 0.0;
+};
 
 struct GelSurface;
 
@@ -42,20 +49,26 @@ struct GelSpec {
   double mm_per_unit = 1000.0;    ///< mesh: glTF's unit is the metre
   std::shared_ptr<const GelSurface> surface;  ///< mesh: as read
   std::vector<GelLayerSpec> layers;           ///< from the outer surface inwards; not for a mesh
-  double youngs_modulus_MPa = 0.0;            ///< of the body below the layers
-  double poisson_ratio = 0.49;
+  double youngs_modulus_MPa = 0.0;            ///< of the body below the layers; instantaneous, where the gel relaxes
+  double poisson_ratio = 0.49;                ///< constant in time
+  double density_kg_m3 = 1000.0;
+  std::vector<RelaxationTermSpec> relaxation;  ///< of all moduli: a Prony series; empty: elastic
   double refractive_index = 1.0;
   double absorption_per_mm = 0.0;  ///< natural logarithm, all bands
   double frame_albedo = 0.0;       ///< of the frame that holds the pad at its sides, all bands; 0 is black
 };
 
-/// How fine the gel is meshed: `fine_mm` where contact and beads are, graded to `coarse_mm` elsewhere. On a dome or a
-/// fingertip the fine part is round: the larger half extent is its radius along the surface.
+/// How fine the gel is meshed: `fine_mm` where contact and beads are, graded to `coarse_mm` elsewhere; or, in their
+/// place, how far the force may be off (see fem::ErrorGoal), from which set-up finds them. On a dome or a fingertip the
+/// fine part is round: the larger half extent is its radius along the surface.
 struct MeshSpec {
   double fine_mm = 0.5;
   double coarse_mm = 1.5;
   Eigen::Vector2d fine_half_extent_mm = {5.0, 5.0};
   double fine_depth_mm = 1.25;
+  std::optional<double> force_error;  ///< relative, one standard error
+  double contact_radius_mm = 0.0;     ///< of contacts of this radius or larger
+  bool sharp_bodies = false;          ///< also of bodies with sharp edges
 };
 
 /// A square grid of balls embedded in the gel.
@@ -129,6 +142,7 @@ struct DeviceSpec {
 };
 
 void fields(YamlReader& in, GelLayerSpec& layer);
+void fields(YamlReader& in, RelaxationTermSpec& term);
 void fields(YamlReader& in, GelSpec& gel);
 void fields(YamlReader& in, MeshSpec& mesh);
 void fields(YamlReader& in, BeadSpec& beads);
@@ -139,6 +153,9 @@ void fields(YamlReader& in, DeviceSpec& device);
 
 /// Reads and checks a device file. @throws Error with file and line
 DeviceSpec read_device(const std::filesystem::path& file);
+
+/// The gel's relaxation as mechanics takes it.
+fem::PronySeries prony_series(const GelSpec& gel);
 
 /// Rest positions of the beads' centres in the gel frame, row by row: y grows from row to row and x along a row,
 /// as the upright picture shows them.

@@ -1,6 +1,7 @@
 #pragma once
 // From a device's file to what fem asks for.
 
+#include <string>
 #include <vector>
 
 #include "fem/compliance.h"
@@ -15,5 +16,8 @@ fem::GelBody gel_body(const DeviceSpec& device);
 std::vector<fem::ElasticMaterial> gel_materials(const GelSpec& gel);
 
 std::vector<fem::Bead> gel_beads(const DeviceSpec& device);
+
+/// Under what the gel's set-up is kept in the cache.
+std::string gel_key(const DeviceSpec& device);
 
 }  // namespace touchstone::sim

@@ -1,5 +1,7 @@
 #include "sim/motion.h"
 
+#include <algorithm>
+
 namespace touchstone::sim {
 
 int MotionSpec::frame_count() const {
@@ -10,6 +12,7 @@ int MotionSpec::frame_count() const {
 
 bool MotionSpec::is_tangential() const {
   for (const MotionKey& key : keys) {
+    if (key.vibration && key.vibration->axis != Axis::z && key.vibration->amplitude_mm > 0.0) return true;
     if (key.angles_deg && *key.angles_deg != start_angles_deg) return true;
     for (const auto& [axis, start] : {std::pair{key.x, start_mm.x()}, std::pair{key.y, start_mm.y()}}) {
       if (!axis) continue;
@@ -20,12 +23,30 @@ bool MotionSpec::is_tangential() const {
   return start_angles_deg != Eigen::Vector3d::Zero();
 }
 
+double MotionSpec::highest_vibration_Hz() const {
+  double highest = 0.0;
+  for (const MotionKey& key : keys) {
+    if (key.vibration && key.vibration->amplitude_mm > 0.0) highest = std::max(highest, key.vibration->frequency_Hz);
+  }
+  return highest;
+}
+
+EnumNames<Axis> enum_names(Axis) {
+  return {{"x", Axis::x}, {"y", Axis::y}, {"z", Axis::z}};
+}
+
 void fields(YamlReader& in, AxisKey& axis) {
   in.optional("position_mm", axis.position_mm);
   in.optional("force_N", axis.force_N);
   if (axis.position_mm.has_value() == axis.force_N.has_value()) {
     fail_at(in.where(), "an axis has either position_mm or force_N");
   }
+}
+
+void fields(YamlReader& in, VibrationSpec& vibration) {
+  in.required("axis", vibration.axis);
+  in.required("amplitude_mm", vibration.amplitude_mm, Allowed::at_least(0.0));
+  in.required("frequency_Hz", vibration.frequency_Hz, Allowed::above_up_to(0.0, 1e5));
 }
 
 void fields(YamlReader& in, MotionKey& key) {
@@ -35,6 +56,14 @@ void fields(YamlReader& in, MotionKey& key) {
   in.optional("y", key.y);
   in.optional("z", key.z);
   in.optional("angles_deg", key.angles_deg, Allowed::within(-180.0, 180.0));
+  in.optional("vibration", key.vibration);
+  if (key.vibration) {
+    const std::optional<AxisKey>* const axes[] = {&key.x, &key.y, &key.z};
+    const auto& along = *axes[static_cast<int>(key.vibration->axis)];
+    if (along && along->force_N) {
+      fail_at(in.where("vibration"), "vibration: the same key leads that axis to a force; it needs a position");
+    }
+  }
 }
 
 void fields(YamlReader& in, MotionSpec& motion) {

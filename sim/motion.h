@@ -17,11 +17,23 @@ struct AxisKey {
   std::optional<double> force_N;
 };
 
+enum class Axis { x, y, z };
+EnumNames<Axis> enum_names(Axis);
+
+/// A steady vibration over a key's frames: amplitude_mm * sin(2 pi frequency_Hz t), t counted from the key's start, is
+/// added to the position along `axis`. Its mean is led as the key says; an axis that had a force is held where it was.
+struct VibrationSpec {
+  Axis axis = Axis::z;
+  double amplitude_mm = 0.0;
+  double frequency_Hz = 0.0;
+};
+
 /// What holds at the end of `frames` more frames. An axis that isn't named keeps what it had.
 struct MotionKey {
   int frames = 1;
   std::optional<AxisKey> x, y, z;
   std::optional<Eigen::Vector3d> angles_deg;  ///< about x, then y, then z
+  std::optional<VibrationSpec> vibration;
   SourceLocation where;
 };
 
@@ -35,9 +47,12 @@ struct MotionSpec {
   int frame_count() const;
   /// Tangential motion, tilt or shear force anywhere in it: what calls for friction.
   bool is_tangential() const;
+  /// The highest frequency at which it vibrates, 0 if it doesn't.
+  double highest_vibration_Hz() const;
 };
 
 void fields(YamlReader& in, AxisKey& axis);
+void fields(YamlReader& in, VibrationSpec& vibration);
 void fields(YamlReader& in, MotionKey& key);
 void fields(YamlReader& in, MotionSpec& motion);
 

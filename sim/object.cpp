@@ -134,6 +134,7 @@ void fields(YamlReader& in, ScreenSpec& screen) {
 void fields(YamlReader& in, ObjectSpec& object) {
   in.required("name", object.name);
   in.required("shape", object.shape);
+  in.optional("relief", object.relief);
   in.optional("radiance", object.radiance, Allowed::at_least(0.0));
   if (!object.radiance) in.optional("albedo", object.albedo, Allowed::within(0.0, 1.0));
   in.optional("friction", object.friction, Allowed::at_least(0.0));
@@ -157,6 +158,31 @@ fem::ContactShape contact_shape(const ShapeSpec& shape) {
   }
   TS_ASSERT(false);
   return {};
+}
+
+namespace {
+
+fem::ContactShape with_relief(const fem::ContactShape& shape, fem::ReliefMap relief) {
+  fem::ReliefShape body;
+  std::visit(
+      [&]<typename Shape>(const Shape& plain) {
+        if constexpr (!std::is_same_v<Shape, fem::ReliefShape>) body.base = plain;
+      },
+      shape);
+  body.relief = std::make_shared<const fem::ReliefMap>(std::move(relief));
+  return body;
+}
+
+}  // namespace
+
+fem::ContactShape contact_shape(const ObjectSpec& object) {
+  const fem::ContactShape plain = contact_shape(object.shape);
+  return object.relief ? with_relief(plain, relief_map(*object.relief)) : plain;
+}
+
+fem::ContactShape coarse_contact_shape(const ObjectSpec& object, double edge_mm) {
+  const fem::ContactShape plain = contact_shape(object.shape);
+  return object.relief ? with_relief(plain, relief_map(*object.relief).blurred(edge_mm)) : plain;
 }
 
 TriangleMesh visible_mesh(const ShapeSpec& shape) {

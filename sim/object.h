@@ -9,6 +9,7 @@
 #include "core/triangle_mesh.h"
 #include "core/yaml_reader.h"
 #include "fem/contact_shape.h"
+#include "sim/relief.h"
 
 namespace touchstone::sim {
 
@@ -38,6 +39,7 @@ struct ScreenSpec {
 struct ObjectSpec {
   std::string name;
   ShapeSpec shape;
+  std::optional<ReliefSpec> relief;          ///< on the shape's lower side
   Eigen::Vector3d albedo = {0.5, 0.5, 0.5};  ///< in the bands red, green, blue
   std::optional<Eigen::Vector3d> radiance;   ///< W/m^2/sr in air: a diffuser lit from behind, which has no albedo
   double friction = 0.0;                     ///< Coulomb coefficient against the gel
@@ -53,6 +55,10 @@ ObjectSpec read_object(const std::filesystem::path& file);
 /// The body as the contact solver sees it. Reads the mesh file if there is one.
 /// @throws Error for a mesh that is missing, open or crosses itself
 fem::ContactShape contact_shape(const ShapeSpec& shape);
+/// The same with the object's relief on it, in all its detail. @throws Error also for a relief that can't be read
+fem::ContactShape contact_shape(const ObjectSpec& object);
+/// What a gel meshed with edges of `edge_mm` can tell of the object: its relief is blurred by that.
+fem::ContactShape coarse_contact_shape(const ObjectSpec& object, double edge_mm);
 
 /// The body as the renderer sees it: a closed surface in the object frame.
 TriangleMesh visible_mesh(const ShapeSpec& shape);

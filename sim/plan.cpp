@@ -4,9 +4,14 @@
 #include <cmath>
 
 #include "core/units.h"
+#include "fem/vibration.h"
 
 namespace touchstone::sim {
 namespace {
+
+constexpr double kEdgesADetail = 4.0;  // a wave needs so many for its shape
+constexpr double kMicrometresPerMillimetre = 1000.0;
+constexpr double kAllowedInertia = 0.04;  // of a vibration's force: a fifth of the lowest eigenfrequency
 
 /// Fresnel reflectance of unpolarised light that meets a face from index n1 at sine `sine` towards index n2.
 double fresnel(double n1, double n2, double sine) {
@@ -73,6 +78,67 @@ void plan_mechanics(const SceneSpec& scene, Plan& plan, Table& table) {
                    : "the motion is a straight press: no tangential part, no tilt";
   plan.friction = table.add("friction", scene.effects.friction, tangential && scene.object.friction > 0.0, why,
                             "a few milliseconds a frame");
+
+  const fem::PronySeries series = prony_series(scene.device.gel);
+  const double seconds = (scene.motion.frame_count() - 1) / scene.motion.frame_rate_Hz;
+  const bool relaxes = fem::lasting_share(series) < 1.0;
+  plan.relaxation = table.add(
+      "stress relaxation", scene.effects.relaxation, relaxes,
+      relaxes
+          ? fmt::format("the gel's modulus falls by {:.1f} % within the motion's {:.3g} s and by {:.1f} % in the end",
+                        100 * (1.0 - fem::relaxation_at(series, seconds)), seconds,
+                        100 * (1.0 - fem::lasting_share(series)))
+          : "the gel has no Prony series: it is elastic",
+      "some vectors of the surface's size a frame");
+
+  const double frequency = scene.motion.highest_vibration_Hz();
+  const double missing = inertia_estimate(scene.device.gel, frequency);
+  const bool fast = missing > kAllowedInertia;
+  plan.inertia = table.add(
+      "gel dynamics (inertia)", scene.effects.inertia, fast,
+      frequency == 0.0 ? "the motion doesn't vibrate"
+                       : fmt::format("the motion vibrates at {:.4g} Hz, a layer like the gel has its lowest "
+                                     "eigenfrequency at {:.4g} Hz: leaving inertia out errs by up to some {:.2g} % of "
+                                     "the vibration's force; allowed is {:.2g} %",
+                                     frequency, frequency / std::sqrt(missing), 100 * missing, 100 * kAllowedInertia),
+      "the gel's modes once (half a minute, kept in the cache), then milliseconds a frame");
+}
+
+/// Finest detail of the object, mm: of its relief, or the middle one of its mesh's edges.
+std::optional<double> finest_detail(const ObjectSpec& object) {
+  if (object.relief) return finest_detail(*object.relief);
+  if (object.shape.type != ShapeKind::mesh) return std::nullopt;
+  const TriangleMesh mesh = visible_mesh(object.shape);
+  std::vector<double> edges;
+  for (const auto& t : mesh.triangles) {
+    for (int k = 0; k < 3; ++k) edges.push_back((mesh.vertices[t[k]] - mesh.vertices[t[(k + 1) % 3]]).norm());
+  }
+  const auto middle = edges.begin() + static_cast<std::ptrdiff_t>(edges.size() / 2);
+  std::nth_element(edges.begin(), middle, edges.end());
+  return *middle;
+}
+
+void plan_relief(const SceneSpec& scene, Plan& plan, Table& table) {
+  const bool seen = scene.outputs.frames || scene.outputs.ideal || scene.outputs.radiance || scene.outputs.height;
+  const double edge = scene.device.mesh.fine_mm;
+  const std::optional<double> detail = finest_detail(scene.object);
+  const bool fine = detail && *detail < kEdgesADetail * edge;
+  const std::string why =
+      !detail ? "the object's shape is smooth: the gel's mesh has all of it"
+      : !fine
+          ? fmt::format("the object's finest detail of {:.3g} mm has {:.0f} or more of the gel's edges of {:.3g} mm",
+                        *detail, kEdgesADetail, edge)
+      : !seen ? "neither a picture nor a height map is asked for"
+              : fmt::format("the object has detail of {:.3g} mm, the gel's edges have {:.3g} mm", *detail, edge);
+  plan.fine_relief = table.add("fine relief", scene.effects.fine_relief, fine && seen, why, "0.1 to 1 second a frame");
+  const double pixel = scene.membrane.pixel_um / kMicrometresPerMillimetre;
+  // A picture may be smoother than its pixels; waves and hairs are as fine as they say.
+  const bool known = scene.object.relief && scene.object.relief->type != ReliefKind::image;
+  if (plan.fine_relief && known && *detail < 2.0 * pixel) {
+    fail_at(scene.membrane.where,
+            "membrane.pixel_um: {} is too wide for the object's relief of {:.3g} mm; at most {:.3g}",
+            scene.membrane.pixel_um, *detail, 0.5 * *detail * kMicrometresPerMillimetre);
+  }
 }
 
 void plan_light(const SceneSpec& scene, Plan& plan, Table& table) {
@@ -137,10 +203,17 @@ double interreflection_estimate(const GelSpec& gel, const PlateSpec& plate, doub
   return gain / (1.0 - gain);
 }
 
+double inertia_estimate(const GelSpec& gel, double frequency_Hz) {
+  const double lowest = fem::layer_shear_frequency({gel.youngs_modulus_MPa, gel.poisson_ratio},
+                                                   gel.density_kg_m3 * kTonnePerMm3, gel.thickness_mm);
+  return std::pow(frequency_Hz / lowest, 2);
+}
+
 Plan make_plan(const SceneSpec& scene) {
   Plan plan;
   Table table(plan);
   plan_mechanics(scene, plan, table);
+  plan_relief(scene, plan, table);
   plan_light(scene, plan, table);
   return plan;
 }

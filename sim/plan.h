@@ -19,6 +19,9 @@ struct Effect {
 struct Plan {
   bool camera = false;
   bool friction = false;
+  bool fine_relief = false;
+  bool relaxation = false;
+  bool inertia = false;
   bool refraction = false;
   bool interreflection = false;
   bool sensor_noise = false;
@@ -28,6 +31,10 @@ struct Plan {
 /// Decides each effect from the scene's own content and from the outputs asked for.
 /// @throws Error if an output can't be had (an image from a device without a camera)
 Plan make_plan(const SceneSpec& scene);
+
+/// Part of the force that a quasi-static press leaves out at this frequency, (f / f0)^2 with f0 the gel's lowest
+/// eigenfrequency, taken as that of a wide layer: the order of it, from above for a body that rests on the gel.
+double inertia_estimate(const GelSpec& gel, double frequency_Hz);
 
 /// Part of the light leaving a bright disc of albedo `albedo` and radius `disc_radius_mm` on the outer surface that
 /// comes back to it by reflection at the plate's lower face, the first term of the interreflection series. Light beyond

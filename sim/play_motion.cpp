@@ -1,12 +1,17 @@
+#include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "core/units.h"
+#include "sim/shaken_press.h"
 #include "sim/virtual_sensor.h"
 
 namespace touchstone::sim {
 namespace {
 
 using fem::AxisControl;
+
+constexpr double kStepsAPeriod = 12.0;
 
 /// What an axis is led to over the frames of a key.
 struct Ramp {
@@ -28,12 +33,22 @@ std::int64_t frame_time(int frame, double rate) {
   return static_cast<std::int64_t>(std::llround(frame * kMicrosecondsPerSecond / rate));
 }
 
+/// Steps a frame, so that a press that remembers follows a quasi-static vibration.
+int steps_a_frame(const MotionKey& key, const MotionSpec& motion, const Plan& plan) {
+  if (!key.vibration || !(plan.friction || plan.relaxation)) return 1;
+  return std::max(1, static_cast<int>(std::ceil(kStepsAPeriod * key.vibration->frequency_Hz / motion.frame_rate_Hz)));
+}
+
 }  // namespace
 
 std::vector<Truth> play_motion(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel,
-                               const Progress& progress) {
+                               const Progress& progress, const fem::GelVibration* vibration) {
   const MotionSpec& motion = scene.motion;
-  fem::Press press(gel, contact_shape(scene.object.shape), plan.friction ? scene.object.friction : 0.0);
+  const double friction = plan.friction ? scene.object.friction : 0.0;
+  const fem::PronySeries relaxation = plan.relaxation ? prony_series(scene.device.gel) : fem::PronySeries{};
+  fem::Press press(gel, coarse_contact_shape(scene.object, scene.device.mesh.fine_mm), friction, {}, relaxation);
+  std::optional<ShakenPress> shaken;
+  if (vibration != nullptr) shaken.emplace(gel, *vibration, relaxation, friction);
 
   fem::PressTarget target;
   Eigen::Vector3d angles_deg = motion.start_angles_deg;
@@ -42,20 +57,31 @@ std::vector<Truth> play_motion(const SceneSpec& scene, const Plan& plan, const f
 
   std::vector<Truth> truths;
   truths.reserve(motion.frame_count());
-  const auto step = [&](const SourceLocation& where) {
+  const auto keep = [&](fem::PressState state) {
     const int frame = static_cast<int>(truths.size());
-    try {
-      truths.push_back({frame, frame_time(frame, motion.frame_rate_Hz), press.step(target)});
-    } catch (const Error& error) {
-      fail_at(where, "frame {}: {}", frame, error.what());
-    }
+    truths.push_back({frame, frame_time(frame, motion.frame_rate_Hz), std::move(state), {}});
+    truths.back().error = fem::estimate_error(gel, truths.back().press);
     if (progress) progress("mechanics", frame + 1, motion.frame_count());
   };
-  step(motion.keys.empty() ? scene.where : motion.keys.front().where);
+  const auto at_frame = [&](const SourceLocation& where, const auto& act) {
+    try {
+      act();
+    } catch (const Error& error) {
+      fail_at(where, "frame {}: {}", truths.size(), error.what());
+    }
+  };
+  at_frame(motion.keys.empty() ? scene.where : motion.keys.front().where, [&] { keep(press.step(target)); });
 
   for (const MotionKey& key : motion.keys) {
     const fem::PressState& now = press.state();
     const std::optional<AxisKey>* axis_keys[3] = {&key.x, &key.y, &key.z};
+    const bool shakes = key.vibration && key.vibration->amplitude_mm > 0.0;
+    if (shakes) {
+      AxisControl& along = target.axis[static_cast<int>(key.vibration->axis)];
+      if (along.kind == AxisControl::Kind::force) {
+        along = AxisControl::at(now.gel_from_object.translation[static_cast<int>(key.vibration->axis)]);
+      }
+    }
     std::array<Ramp, 3> ramps;
     for (int axis = 0; axis < 3; ++axis) {
       ramps[axis] =
@@ -63,14 +89,28 @@ std::vector<Truth> play_motion(const SceneSpec& scene, const Plan& plan, const f
     }
     const Eigen::Vector3d from_angles = angles_deg;
     const Eigen::Vector3d to_angles = key.angles_deg.value_or(angles_deg);
-    for (int i = 1; i <= key.frames; ++i) {
-      const double part = static_cast<double>(i) / key.frames;
+    const int steps = shaken ? 1 : steps_a_frame(key, motion, plan);
+    const auto step = [&](double frames) {
+      const double part = frames / key.frames;
       for (int axis = 0; axis < 3; ++axis) {
         target.axis[axis] = {ramps[axis].kind, ramps[axis].from + part * (ramps[axis].to - ramps[axis].from)};
       }
       angles_deg = from_angles + part * (to_angles - from_angles);
       target.rotation = rotation_from_xyz(angles_deg * kRadiansPerDegree);
-      step(key.where);
+      target.seconds = 1.0 / (steps * motion.frame_rate_Hz);
+      fem::PressTarget there = target;
+      if (shakes && !shaken) {
+        there.axis[static_cast<int>(key.vibration->axis)].value +=
+            key.vibration->amplitude_mm *
+            std::sin(2.0 * kPi * key.vibration->frequency_Hz * frames / motion.frame_rate_Hz);
+      }
+      press.step(there);
+    };
+    for (int i = 1; i <= key.frames; ++i) {
+      at_frame(key.where, [&] {
+        for (int k = 1; k <= steps; ++k) step(k == steps ? i : i - 1 + static_cast<double>(k) / steps);
+        keep(shakes && shaken ? shaken->at(press.state(), *key.vibration, i / motion.frame_rate_Hz) : press.state());
+      });
     }
   }
   return truths;

@@ -23,6 +23,7 @@ void fields(YamlReader& in, OutputSpec& outputs) {
   in.optional("frames", outputs.frames);
   in.optional("ideal", outputs.ideal);
   in.optional("radiance", outputs.radiance);
+  in.optional("height", outputs.height);
 }
 
 void fields(YamlReader& in, LightSpec& light) {
@@ -35,12 +36,21 @@ void fields(YamlReader& in, LightSpec& light) {
 
 void fields(YamlReader& in, EffectSwitches& effects) {
   in.optional("friction", effects.friction);
+  in.optional("fine_relief", effects.fine_relief);
+  in.optional("relaxation", effects.relaxation);
+  in.optional("inertia", effects.inertia);
   in.optional("interreflection", effects.interreflection);
   in.optional("sensor_noise", effects.sensor_noise);
 }
 
+void fields(YamlReader& in, MembraneSpec& membrane) {
+  membrane.where = in.where();
+  in.optional("pixel_um", membrane.pixel_um, Allowed::within(1.0, 1000.0));
+  in.optional("height_size_mm", membrane.height_size_mm, Allowed::above_up_to(0.0, 1000.0));
+}
+
 void fields(YamlReader& in, SceneSpec& scene) {
-  scene.where = in.where();
+  scene.where = scene.membrane.where = in.where();
   read_named_file(in, "device", scene.device);
   read_named_file(in, "object", scene.object);
   read_named_file(in, "motion", scene.motion);
@@ -48,6 +58,7 @@ void fields(YamlReader& in, SceneSpec& scene) {
   in.optional("outputs", scene.outputs);
   in.optional("light", scene.light);
   in.optional("effects", scene.effects);
+  in.optional("membrane", scene.membrane);
   in.optional("lamp_level", scene.lamp_level, Allowed::within(0.0, 1.0));
   in.optional("seed", scene.seed);
 }

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 
 #include "core/yaml_reader.h"
@@ -17,6 +18,7 @@ struct OutputSpec {
   bool frames = true;     ///< what the camera delivers: PNG
   bool ideal = false;     ///< frames without noise beside them: PNG
   bool radiance = false;  ///< linear irradiance on the sensor: EXR, W/m^2 a band
+  bool height = false;    ///< the membrane's height: EXR, mm
 };
 
 /// How exact the light has to be.
@@ -28,12 +30,23 @@ struct LightSpec {
   double change_tolerance = 0.25;  ///< a pixel that changed by less than this part of the noise keeps its old light
 };
 
+/// Pixels of the fine contact and of the height map: square, the map centred on the gel's origin.
+struct MembraneSpec {
+  double pixel_um = 20.0;  ///< a third of the finest detail, or finer
+  /// Of the height map; without it, the part of the surface that the device meshes finely.
+  std::optional<Eigen::Vector2d> height_size_mm;
+  SourceLocation where;
+};
+
 enum class Switch { automatic, on, off };
 EnumNames<Switch> enum_names(Switch);
 
 /// A scene may force an effect on or off; `automatic` leaves it to the plan.
 struct EffectSwitches {
   Switch friction = Switch::automatic;
+  Switch fine_relief = Switch::automatic;
+  Switch relaxation = Switch::automatic;
+  Switch inertia = Switch::automatic;
   Switch interreflection = Switch::automatic;
   Switch sensor_noise = Switch::automatic;
 };
@@ -45,6 +58,7 @@ struct SceneSpec {
   OutputSpec outputs;
   LightSpec light;
   EffectSwitches effects;
+  MembraneSpec membrane;
   double lamp_level = 1.0;  ///< the device's lamps are dimmed to this part of their power
   std::uint64_t seed = 0;
   SourceLocation where;
@@ -53,6 +67,7 @@ struct SceneSpec {
 void fields(YamlReader& in, OutputSpec& outputs);
 void fields(YamlReader& in, LightSpec& light);
 void fields(YamlReader& in, EffectSwitches& effects);
+void fields(YamlReader& in, MembraneSpec& membrane);
 void fields(YamlReader& in, SceneSpec& scene);
 
 /// Reads a scene and the device and object files that it names. @throws Error with file and line

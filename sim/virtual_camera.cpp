@@ -39,7 +39,8 @@ struct VirtualCamera::Parts {
       : scene(scene_of),
         plan(plan_of),
         gel(gel_of),
-        object(visible_object(scene.object)),
+        membrane(plan.fine_relief || scene.outputs.height ? std::make_unique<Membrane>(scene, plan, gel_of) : nullptr),
+        object(visible_object(scene.object, scene.device.mesh.fine_mm)),
         camera(pinhole_camera(*scene.device.camera)),
         imager(sim::imager(scene.device, plan.sensor_noise)),
         ideal_imager(sim::imager(scene.device, false)),
@@ -54,6 +55,7 @@ struct VirtualCamera::Parts {
   SceneSpec scene;
   Plan plan;
   VisibleGel gel;
+  std::unique_ptr<const Membrane> membrane;  // if it's called for
   VisibleObject object;
   render::PinholeCamera camera;
   render::Imager imager;
@@ -64,7 +66,14 @@ struct VirtualCamera::Parts {
   cv::Mat first_light;    // irradiance of the first frame
   cv::Mat first_preview;  // its preview without noise
 
-  render::Tracer tracer(const Truth& truth) const {
+  std::optional<fem::ReliefAnswer> relief(const Truth& truth) const {
+    return membrane ? membrane->relief(truth.press) : std::nullopt;
+  }
+
+  render::Tracer tracer(const Truth& truth, const std::optional<fem::ReliefAnswer>& relief) const {
+    if (relief && relief->grid.size() > 0) {
+      return render::Tracer(visible_scene(scene, plan, object, *membrane, truth.press, *relief));
+    }
     return render::Tracer(visible_scene(scene, plan, object, gel, truth.press));
   }
 
@@ -93,9 +102,10 @@ struct VirtualCamera::Parts {
     return whole(cv::Rect(0, 0, camera.width, camera.height)).clone();
   }
 
-  Capture develop(const cv::Mat& irradiance, const Truth& truth, const render::RayCounts& counts,
-                  std::int64_t pixels) const {
+  Capture develop(const cv::Mat& irradiance, const Truth& truth, const std::optional<fem::ReliefAnswer>& relief,
+                  const render::RayCounts& counts, std::int64_t pixels) const {
     Capture capture;
+    if (scene.outputs.height) capture.height = membrane->height(truth.press, relief);
     capture.paths_traced = static_cast<std::int64_t>(counts.paths);
     capture.pixels_traced = pixels;
     const auto picture = [&](const render::Imager& sensor) {
@@ -113,7 +123,7 @@ VirtualCamera::VirtualCamera(const SceneSpec& scene, const Plan& plan, const fem
   TS_ASSERT(plan.camera && scene.device.camera);
   auto parts = std::make_unique<Parts>(scene, plan, gel);
   render::RenderSettings settings = parts->settings;
-  const render::Tracer tracer = parts->tracer(first);
+  const render::Tracer tracer = parts->tracer(first, parts->relief(first));
   settings.noise->fraction *= kFirstFrameFraction;
   settings.max_samples *= kFirstFrameSamples;
   parts->first_light = tracer.render(parts->camera, settings).irradiance;
@@ -124,19 +134,21 @@ VirtualCamera::VirtualCamera(const SceneSpec& scene, const Plan& plan, const fem
 VirtualCamera::~VirtualCamera() = default;
 
 Capture VirtualCamera::capture(const Truth& truth) const {
-  const render::Tracer tracer = parts_->tracer(truth);
+  const auto relief = parts_->relief(truth);
+  const render::Tracer tracer = parts_->tracer(truth, relief);
   const cv::Mat mask = parts_->changed(tracer.preview(parts_->camera, kPreviewStride));
   const int pixels = cv::countNonZero(mask);
-  if (pixels == 0) return parts_->develop(parts_->first_light, truth, {}, 0);
+  if (pixels == 0) return parts_->develop(parts_->first_light, truth, relief, {}, 0);
   const render::RenderedImage image = tracer.render(parts_->camera, parts_->settings, mask);
   cv::Mat light = parts_->first_light.clone();
   image.irradiance.copyTo(light, mask);
-  return parts_->develop(light, truth, image.counts, pixels);
+  return parts_->develop(light, truth, relief, image.counts, pixels);
 }
 
 Capture VirtualCamera::capture_whole(const Truth& truth) const {
-  const render::RenderedImage image = parts_->tracer(truth).render(parts_->camera, parts_->settings);
-  return parts_->develop(image.irradiance, truth, image.counts, image.irradiance.total());
+  const auto relief = parts_->relief(truth);
+  const render::RenderedImage image = parts_->tracer(truth, relief).render(parts_->camera, parts_->settings);
+  return parts_->develop(image.irradiance, truth, relief, image.counts, image.irradiance.total());
 }
 
 }  // namespace touchstone::sim

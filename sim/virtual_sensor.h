@@ -9,6 +9,8 @@
 #include "core/progress.h"
 #include "fem/compliance.h"
 #include "fem/press.h"
+#include "fem/press_error.h"
+#include "fem/vibration.h"
 #include "sim/plan.h"
 #include "sim/scene.h"
 
@@ -19,6 +21,7 @@ struct Truth {
   int frame = 0;
   std::int64_t t_us = 0;
   fem::PressState press;
+  fem::PressError error;  ///< what the mesh makes of it
 };
 
 /// What a camera makes of one Truth. Pictures that weren't asked for are empty.
@@ -26,6 +29,7 @@ struct Capture {
   cv::Mat frame;     ///< 8 bit BGR or grey, with noise as planned
   cv::Mat ideal;     ///< the same without noise
   cv::Mat radiance;  ///< CV_32FC3 (red, green, blue bands), W/m^2 on the sensor
+  cv::Mat height;    ///< CV_32FC1, mm: the membrane, see sim/membrane.h
   std::int64_t paths_traced = 0;
   std::int64_t pixels_traced = 0;
 };
@@ -38,10 +42,17 @@ std::filesystem::path default_cache_folder();
 std::shared_ptr<const fem::Compliance> set_up_gel(const DeviceSpec& device, const std::filesystem::path& cache_folder,
                                                   const Progress& progress = {});
 
-/// Plays a scene's motion from its start: one Truth a frame. Sequential, because friction remembers.
+/// The modes of the device's gel, where the plan wants inertia for a motion that vibrates; else nothing.
+std::shared_ptr<const fem::GelVibration> set_up_vibration(const SceneSpec& scene, const Plan& plan,
+                                                          const std::filesystem::path& cache_folder);
+
+/// Plays a scene's motion from its start: one Truth a frame. Sequential, because friction and relaxation remember.
+/// `vibration` is what set_up_vibration gives; without it vibrations are quasi-static: with it, over a key that
+/// vibrates, the steady answer of the gel to a body that sticks where it touches is added to the press of the mean
+/// motion.
 /// @throws Error if a wanted force can't be met or the press leaves what the model can do
 std::vector<Truth> play_motion(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel,
-                               const Progress& progress = {});
+                               const Progress& progress = {}, const fem::GelVibration* vibration = nullptr);
 
 /// The camera of a scene. Its constructor renders the first frame well; each capture traces again only the pixels that
 /// changed. `capture` is a pure function of its arguments and may be called from several threads.

@@ -61,14 +61,17 @@ render::BayerPattern bayer_pattern(BayerLayout layout) {
 
 }  // namespace
 
-VisibleObject visible_object(const ObjectSpec& object) {
-  VisibleObject visible{contact_shape(object.shape), visible_mesh(object.shape), {}};
+VisibleObject visible_object(const ObjectSpec& object, double edge_mm) {
+  VisibleObject visible{coarse_contact_shape(object, edge_mm), visible_mesh(object.shape), {}};
   if (object.screen) visible.screen = visible_mesh(*object.screen);
   return visible;
 }
 
-render::Scene visible_scene(const SceneSpec& scene, const Plan& plan, const VisibleObject& object,
-                            const VisibleGel& gel, const fem::PressState& press) {
+namespace {
+
+/// All but the gel's outer surface.
+render::Scene scene_without_surface(const SceneSpec& scene, const Plan& plan, const VisibleObject& object,
+                                    const RigidTransform& gel_from_object, const fem::PressState& press) {
   const DeviceSpec& device = scene.device;
   render::Scene out;
   out.media.resize(3);
@@ -77,10 +80,9 @@ render::Scene visible_scene(const SceneSpec& scene, const Plan& plan, const Visi
   out.media[kGel].absorption = render::flat_spectrum(3, device.gel.absorption_per_mm);
   out.faces = {{-device.gel.thickness_mm - device.plate.thickness_mm, kAir, kPlate},
                {-device.gel.thickness_mm, kPlate, kGel}};
-  out.surfaces.push_back({gel.dry_surface(press, object.felt), render::Refractive{kGel, kAir}});
   out.surfaces.push_back(
       {pad_walls(device.gel), render::Lambertian{render::flat_spectrum(3, device.gel.frame_albedo)}});
-  out.surfaces.push_back({placed(object.body, press.gel_from_object), material_of(scene.object)});
+  out.surfaces.push_back({placed(object.body, gel_from_object), material_of(scene.object)});
   if (object.screen) {
     out.surfaces.push_back({placed(*object.screen, {Eigen::Matrix3d::Identity(), scene.motion.start_mm}),
                             render::Emitter{bands(scene.object.screen->radiance)}});
@@ -100,6 +102,26 @@ render::Scene visible_scene(const SceneSpec& scene, const Plan& plan, const Visi
   }
   out.environment = render::flat_spectrum(3, device.room_radiance);
   out.interreflection = plan.interreflection;
+  return out;
+}
+
+}  // namespace
+
+render::Scene visible_scene(const SceneSpec& scene, const Plan& plan, const VisibleObject& object,
+                            const VisibleGel& gel, const fem::PressState& press) {
+  render::Scene out = scene_without_surface(scene, plan, object, press.gel_from_object, press);
+  out.surfaces.insert(out.surfaces.begin(), {gel.dry_surface(press, object.felt), render::Refractive{kGel, kAir}});
+  return out;
+}
+
+render::Scene visible_scene(const SceneSpec& scene, const Plan& plan, const VisibleObject& object,
+                            const Membrane& membrane, const fem::PressState& press, const fem::ReliefAnswer& relief) {
+  RigidTransform shifted = press.gel_from_object;
+  shifted.translation.z() += relief.solved.shift;
+  render::Scene out = scene_without_surface(scene, plan, object, shifted, press);
+  Membrane::Sheet sheet = membrane.sheet(press, relief);
+  out.surfaces.insert(out.surfaces.begin(), {std::move(sheet.dry), render::Refractive{kGel, kAir}});
+  out.surfaces.push_back({std::move(sheet.wet), material_of(scene.object)});
   return out;
 }
 

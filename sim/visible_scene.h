@@ -6,6 +6,7 @@
 #include "render/imager.h"
 #include "render/pinhole_camera.h"
 #include "render/scene.h"
+#include "sim/membrane.h"
 #include "sim/plan.h"
 #include "sim/scene.h"
 #include "sim/visible_gel.h"
@@ -19,12 +20,18 @@ struct VisibleObject {
   std::optional<TriangleMesh> screen;
 };
 
-VisibleObject visible_object(const ObjectSpec& object);
+/// `edge_mm` of the gel's mesh: what the gel's coarse surface can be laid onto has no finer detail.
+VisibleObject visible_object(const ObjectSpec& object, double edge_mm);
 
 /// Plate, gel, beads, object and lamps as they stand at `press`. Where the gel is wetted by the object there is no
 /// face between them: the light goes on into the object.
 render::Scene visible_scene(const SceneSpec& scene, const Plan& plan, const VisibleObject& object,
                             const VisibleGel& gel, const fem::PressState& press);
+
+/// The same with the surface of a fine relief: what lies on the object has the object's own look, and the object stands
+/// where the fine contact shifted it to.
+render::Scene visible_scene(const SceneSpec& scene, const Plan& plan, const VisibleObject& object,
+                            const Membrane& membrane, const fem::PressState& press, const fem::ReliefAnswer& relief);
 
 render::PinholeCamera pinhole_camera(const CameraSpec& camera);
 

@@ -182,6 +182,9 @@ TEST_F(BadInput, ResultsThatCantBeWrittenAreRefusedBeforeTheWork) {
   expect_refused(run_program({"render", scene, "-o", (folder_.path() / "a.png").string(), "--frame", "99"}),
                  "frames 0 to 5");
   expect_refused(run_program({"generate", job_.string(), "-o", scene}), "isn't a folder");
+  expect_refused(run_program({"validate", "light", "--page", "/nonexistent/a.html"}), "there is no folder");
+  expect_refused(run_program({"validate", "light", "--page", "a.pdf"}), ".html");
+  expect_refused(run_program({"validate", "light", "--date", "today"}), "--page");
   expect_refused(run_program({"generate", job_.string(), "-o", folder_.path().string()}), "isn't empty");
 }
 

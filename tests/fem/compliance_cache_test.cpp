@@ -2,13 +2,20 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <tbb/global_control.h>
+#include <unistd.h>
+#include <xxhash.h>
 
 #include <Eigen/SparseCore>
+#include <cstdint>
+#include <cstring>
 #include <set>
+#include <thread>
 
 #include "core/error.h"
-#include "core/sha256.h"
 #include "core/whole_file.h"
+#include "fem/compliance_file.h"
 #include "tests/support/temporary_folder.h"
 
 namespace touchstone::fem {
@@ -25,11 +32,33 @@ class ComplianceCache : public ::testing::Test {
   int computed = 0;  // times that elasticity was solved
 
   Compliance get() {
-    return cached_compliance(
-        slab, material, beads, folder.path(),
-        [&](const std::string&, std::int64_t done, std::int64_t total) { computed += done == total; });
+    return cached_compliance(slab, material, beads, folder.path(),
+                             [&](const std::string& stage, std::int64_t done, std::int64_t total) {
+                               computed += stage == "elasticity" && done == total;
+                             });
+  }
+  // Places in the file (fem/compliance_file.h).
+  static constexpr std::size_t kFormatAt = 8;
+  static constexpr std::size_t kFileSizeAt = 80;
+  static constexpr std::size_t kChecksumAt = 152;
+  static constexpr std::size_t kHeaderSize = 168;
+
+  /// The content with the checksum that belongs to it.
+  static std::string sealed(std::string content) {
+    const std::string summed = content.substr(0, kChecksumAt) + content.substr(kHeaderSize);
+    XXH128_canonical_t sum;
+    XXH128_canonicalFromHash(&sum, XXH3_128bits(summed.data(), summed.size()));
+    std::memcpy(content.data() + kChecksumAt, &sum, sizeof(sum));
+    return content;
   }
   std::filesystem::path file() const { return compliance_file(folder.path(), compliance_key(slab, material, beads)); }
+  static void expect_same(const BodyErrors& a, const BodyErrors& b) {
+    EXPECT_EQ(a.radius_per_edge, b.radius_per_edge);
+    ASSERT_EQ(a.errors.size(), b.errors.size());
+    for (std::size_t k = 0; k < a.errors.size(); ++k) EXPECT_EQ(a.errors[k].values, b.errors[k].values);
+    EXPECT_EQ(a.mesh_order.values, b.mesh_order.values);
+    EXPECT_EQ(a.size_order.values, b.size_order.values);
+  }
   static void expect_same(const Compliance& a, const Compliance& b) {
     EXPECT_EQ(a.thickness, b.thickness);
     EXPECT_EQ(a.material.youngs_modulus, b.material.youngs_modulus);
@@ -37,11 +66,13 @@ class ComplianceCache : public ::testing::Test {
     EXPECT_EQ(a.vertices, b.vertices);
     EXPECT_EQ(a.triangles, b.triangles);
     EXPECT_EQ(Eigen::MatrixXd(a.mass), Eigen::MatrixXd(b.mass));
-    EXPECT_TRUE(a.surface == b.surface);
-    EXPECT_TRUE(a.beads == b.beads);
+    EXPECT_TRUE(a.surface.view() == b.surface.view());
+    EXPECT_TRUE(a.beads.view() == b.beads.view());
     EXPECT_EQ(a.report.unknowns, b.report.unknowns);
     EXPECT_EQ(a.report.tetrahedra, b.report.tetrahedra);
     EXPECT_EQ(a.report.smallest_dihedral_deg, b.report.smallest_dihedral_deg);
+    expect_same(a.mesh_error.smooth, b.mesh_error.smooth);
+    expect_same(a.mesh_error.sharp, b.mesh_error.sharp);
   }
   /// The file is spoilt; the next call must notice, make it anew, say why, and leave a sound file.
   void expect_rebuilt(const std::string& spoilt, const std::string& reason) {
@@ -115,27 +146,45 @@ TEST_F(ComplianceCache, NegativeZeroIsZero) {
   EXPECT_EQ(compliance_key(slab, material, beads), key);
 }
 
-TEST_F(ComplianceCache, CorruptFileIsMadeAnew) {
+TEST_F(ComplianceCache, AnyChangedByteIsNoticed) {
   get();
-  std::string content = read_whole_file(file());
-  content[content.size() / 2] = static_cast<char>(content[content.size() / 2] ^ 1);
-  expect_rebuilt(content, "its checksum is wrong");
+  const std::string content = read_whole_file(file());
+  const Compliance good = get();
+  // All of the header and of the end; in between some hundred places, the padding between the parts among them.
+  std::vector<std::size_t> places;
+  for (std::size_t k = 0; k < 200; ++k) {
+    places.insert(places.end(), {k, content.size() - 1 - k, 4095 - 3 * k, (content.size() / 200) * k});
+  }
+  for (const std::size_t place : places) {
+    std::string spoilt = content;
+    spoilt[place] = static_cast<char>(spoilt[place] ^ 1);
+    write_whole_file(file(), spoilt);
+    EXPECT_THROW(read_compliance(file(), compliance_key(slab, material, beads)), Error) << place;
+  }
+  std::string spoilt = content;
+  spoilt[content.size() / 2] = static_cast<char>(spoilt[content.size() / 2] ^ 1);
+  expect_rebuilt(spoilt, "its checksum is wrong");
 }
 
 TEST_F(ComplianceCache, TruncatedFileIsMadeAnew) {
   get();
   const std::string content = read_whole_file(file());
-  expect_rebuilt(content.substr(0, content.size() - 1000), "its checksum is wrong");
+  expect_rebuilt(content.substr(0, content.size() - 1), "it ends early");
+  expect_rebuilt(content.substr(0, content.size() - 5000), "it ends early");
   expect_rebuilt(content.substr(0, 40), "it ends early");
-  expect_rebuilt("", "it ends early");
+  expect_rebuilt(content + "more", "it is longer than it should be");
+  expect_rebuilt("", "it isn't a compliance");
 }
 
 TEST_F(ComplianceCache, OtherVersionIsMadeAnew) {
   get();
   std::string content = read_whole_file(file());
-  ++content[8];  // the format's number follows the eight letters of the magic
-  content.replace(content.size() - 64, 64, sha256_of(content.substr(0, content.size() - 64)));
-  expect_rebuilt(content, "it has format 2");
+  --content[kFormatAt];
+  expect_rebuilt(sealed(content), fmt::format("it has format {}", kComplianceFormat - 1));
+  // What format 1 looked like: the same magic and place of the number, the key and a body right after it.
+  std::string old = "TSCOMPLY";
+  old += std::string("\1\0\0\0", 4) + compliance_key(slab, material, beads) + std::string(100000, '\3');
+  expect_rebuilt(old, "it has format 1");
 }
 
 TEST_F(ComplianceCache, FileOfAnotherGelIsMadeAnew) {
@@ -149,15 +198,78 @@ TEST_F(ComplianceCache, FileOfAnotherKindIsMadeAnew) {
   expect_rebuilt(std::string(100000, 'x'), "it isn't a compliance");
 }
 
-TEST_F(ComplianceCache, SoundSealOnAnUnsoundBodyIsMadeAnew) {
+TEST_F(ComplianceCache, SoundSealOnAnUnsoundHeaderIsMadeAnew) {
   get();
   const std::string content = read_whole_file(file());
-  std::string body = content.substr(0, content.size() - 64 - 8);  // short by one number, but sealed
-  body += sha256_of(body);
-  expect_rebuilt(body, "it ends early");
-  body = content.substr(0, content.size() - 64) + "more";
-  body += sha256_of(body);
-  expect_rebuilt(body, "it is longer than it should be");
+  // The header's numbers from the body's offset on, each made far too large, then a little wrong.
+  for (std::size_t place = kFileSizeAt + 8; place < kChecksumAt; place += 8) {
+    std::string huge = content;
+    huge[place + 7] = 0x7f;
+    expect_rebuilt(sealed(huge), "it");
+    std::string off = content;
+    off[place] = static_cast<char>(off[place] + 8);
+    write_whole_file(file(), sealed(off));
+    EXPECT_THROW(read_compliance(file(), compliance_key(slab, material, beads)), Error) << place;
+  }
+}
+
+TEST_F(ComplianceCache, MatricesLieInTheMappedFileAndOutliveItsName) {
+  const Compliance first = get();
+  const Compliance second = get();
+  EXPECT_EQ(reinterpret_cast<std::uintptr_t>(second.surface.view().data()) % 4096, 0u);
+  const Compliance made = cached_compliance(slab, material, beads, {});
+  std::filesystem::remove(file());
+  expect_same(second, made);
+  write_whole_file(file(), "another file of that name");
+  expect_same(second, made);
+  const Compliance copy = second;
+  EXPECT_EQ(copy.surface.view().data(), second.surface.view().data());
+}
+
+TEST_F(ComplianceCache, MakersAtTheSameTimeBothEndWithASoundFile) {
+  std::vector<pid_t> children;  // processes, while this one has no threads yet, then threads
+  for (int k = 0; k < 2; ++k) {
+    children.push_back(fork());
+    if (children.back() == 0) {
+      const Compliance one = cached_compliance(slab, material, beads, folder.path());
+      _exit(one.report.note.empty() && one.surface.size() > 0 ? 0 : 1);
+    }
+  }
+  std::vector<Compliance> made(4);
+  std::vector<std::jthread> makers;
+  for (Compliance& one : made) {
+    makers.emplace_back([&] { one = cached_compliance(slab, material, beads, folder.path()); });
+  }
+  makers.clear();
+  for (const pid_t child : children) {
+    int status = 0;
+    waitpid(child, &status, 0);
+    EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0);
+  }
+  const Compliance alone = cached_compliance(slab, material, beads, {});
+  for (const Compliance& one : made) {
+    expect_same(one, alone);
+    EXPECT_EQ(one.report.note, "");
+  }
+  expect_same(get(), alone);
+  EXPECT_EQ(computed, 0);
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 1);  // no temporary file is left
+}
+
+TEST_F(ComplianceCache, FileHasTheSameBytesFromOneThreadAndFromMany) {
+  slab.fine = 0.4;
+  get();
+  const std::string many = read_whole_file(file());
+  std::filesystem::remove(file());
+  const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
+  get();
+  EXPECT_TRUE(read_whole_file(file()) == many);
+}
+
+TEST_F(ComplianceCache, FileIsAsLargeAsForetold) {
+  const Compliance gel = get();
+  const double size = static_cast<double>(std::filesystem::file_size(file()));
+  EXPECT_NEAR(compliance_file_bytes(static_cast<int>(gel.vertices.size()), 2), size, 3 * 4096.0);
 }
 
 TEST_F(ComplianceCache, FolderIsMadeAndEmptyPathKeepsNothing) {

@@ -105,7 +105,7 @@ struct Patch {
   explicit Patch(double friction, double drag) {
     const Compliance gel = test::half_space_gel(1.0, 0.2, {1.0, 0.4}, 5.0);
     const auto m = static_cast<Eigen::Index>(gel.vertices.size());
-    a = gel.surface;
+    a = gel.surface.view();
     const Eigen::VectorXd weight = gel.mass * Eigen::VectorXd::Ones(m);
     for (Eigen::Index i = 0; i < m; ++i) {
       a.row(3 * i + 2) *= -1.0;
@@ -114,7 +114,7 @@ struct Patch {
       a.col(3 * i).swap(a.col(3 * i + 2));
     }
     problem.components = 3;
-    problem.friction = friction;
+    problem.friction = Eigen::VectorXd::Constant(m, friction);
     problem.gap.resize(m);
     problem.drag = Eigen::VectorXd::Zero(2 * m);
     problem.border.resize(3 * m, 0);
@@ -141,12 +141,12 @@ void expect_coulomb(const Patch& patch, const ContactAnswer& answer, double tole
     const double stiffness = 1.0 / patch.a(3 * i, 3 * i);
     EXPECT_GE(p, -tolerance * largest);
     EXPECT_GE((patch.problem.gap[i] + slack[3 * i]) * stiffness, -tolerance * largest);
-    EXPECT_LE(t.norm(), patch.problem.friction * std::max(0.0, p) + tolerance * largest);
+    EXPECT_LE(t.norm(), patch.problem.friction[i] * std::max(0.0, p) + tolerance * largest);
     if (answer.state[i] == NodeState::stick) {
       EXPECT_LT(slip.norm() * stiffness, tolerance * largest);
     }
     if (answer.state[i] == NodeState::slip) {
-      EXPECT_NEAR(t.norm(), patch.problem.friction * p, tolerance * largest);
+      EXPECT_NEAR(t.norm(), patch.problem.friction[i] * p, tolerance * largest);
       EXPECT_NEAR(t.dot(slip), -t.norm() * slip.norm(), tolerance * largest * slip.norm());  // friction opposes slip
     }
   }

@@ -68,7 +68,7 @@ TEST(FinitePress, TheGapAtRestIsTheLinearOne) {
   for (const ContactShape& shape : {ContactShape(SphereShape{kRadius}), ContactShape(BoxShape{{3.1, 2.3, 1.0}})}) {
     RigidTransform pose;
     pose.translation = {0.13, -0.21, bounding_ball(shape).radius - 0.5};
-    const WeightedGap linear = weighted_gap(gel.rest, shape, pose, {});
+    const WeightedGap linear = weighted_gap(gel.rest, shape, pose);
     const ElasticSolution rest = gel.problem.at_rest();
     const double overlap = std::max(0.0, -linear.deepest);
     const GapLines lines = gap_lines(gel.space, gel.outer, rest.displacement, shape, pose, overlap);

@@ -31,7 +31,7 @@ inline double gaussian_work(const Compliance& gel, double s) {
   for (Eigen::Index i = 0; i < n; ++i) {
     traction[3 * i + 2] = -pressure[i];
   }
-  return traction.dot(gel.surface * traction);
+  return traction.dot(gel.surface.view() * traction);
 }
 
 }  // namespace touchstone::fem::test

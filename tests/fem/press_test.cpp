@@ -130,7 +130,7 @@ TEST(Press, TheReportedDisplacementIsTheTractionsResponse) {
   const auto n = static_cast<Eigen::Index>(gel().vertices.size());
   Eigen::VectorXd traction(3 * n);
   for (Eigen::Index v = 0; v < n; ++v) traction.segment<3>(3 * v) = state.traction.row(v);
-  const Eigen::VectorXd weighted = gel().surface * traction;
+  const Eigen::VectorXd weighted = gel().surface.view() * traction;
   const Eigen::MatrixX3d back = gel().mass * state.surface_displacement;
   for (Eigen::Index v = 0; v < n; ++v) {
     EXPECT_LT((back.row(v).transpose() - weighted.segment<3>(3 * v)).norm(), 1e-13);
@@ -393,7 +393,7 @@ TEST(Press, ScalesWithUnits) {
   for (auto& v : scaled.vertices) v *= length;
   scaled.thickness *= length;
   scaled.mass *= length * length;
-  scaled.surface *= length * length * length / stress;
+  scaled.surface = Eigen::MatrixXd(scaled.surface.view() * (length * length * length / stress));
   PressTolerance tolerance = tight();
   Press plain(gel(), SphereShape{kRadius}, 0.4, tolerance);
   tolerance.lookup_mm *= length;

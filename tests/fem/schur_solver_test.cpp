@@ -4,6 +4,7 @@
 
 #include <Eigen/LU>
 #include <cmath>
+#include <memory>
 #include <numeric>
 
 #include "core/error.h"
@@ -75,6 +76,19 @@ TEST(SchurSolver, SolvesEveryColumn) {
   const Eigen::MatrixXd right = Eigen::MatrixXd::Random(60, 3);
   const Eigen::MatrixXd x = solve_symmetric(upper_entries(matrix), rising(60), right);
   EXPECT_LT((matrix * x - right).cwiseAbs().maxCoeff(), 1e-13);
+}
+
+TEST(SchurSolver, AFactorServesManyTimesAndOutlivesItsMatrix) {
+  const Eigen::MatrixXd matrix = quasi_definite(60);
+  auto entries = std::make_unique<SymmetricEntries>(upper_entries(matrix));
+  const SymmetricFactor factor(*entries, rising(60));
+  entries.reset();
+  for (int k = 0; k < 3; ++k) {
+    const Eigen::VectorXd right = Eigen::VectorXd::Random(60);
+    const Eigen::VectorXd x = factor.solve(right);
+    EXPECT_LT((matrix * x - right).cwiseAbs().maxCoeff(), 1e-12);
+    EXPECT_EQ(factor.solve(right), x);
+  }
 }
 
 TEST(SchurSolver, OrderOfEliminationDoesntChangeTheAnswer) {

@@ -75,6 +75,8 @@ void expect_contact_laws(const PressState& state) {
 /// The same gel seen in another frame, its vertices in another order.
 Compliance transformed(const Compliance& from, const Eigen::Matrix3d& turn, const std::vector<int>& order) {
   Compliance to = from;
+  Eigen::MatrixXd surface = from.surface.view();
+  Eigen::MatrixXd beads = from.beads.view();
   const auto n = static_cast<int>(from.vertices.size());
   std::vector<int> place(n);
   for (int k = 0; k < n; ++k) place[order[k]] = k;
@@ -84,15 +86,17 @@ Compliance transformed(const Compliance& from, const Eigen::Matrix3d& turn, cons
       mass.emplace_back(place[it.row()], place[j], it.value());
     }
     to.vertices[place[j]] = turn * from.vertices[j];
-    to.beads.middleCols<3>(3 * place[j]) = from.beads.middleCols<3>(3 * j) * turn.transpose();
+    beads.middleCols<3>(3 * place[j]) = from.beads.view().middleCols<3>(3 * j) * turn.transpose();
     for (int i = 0; i < n; ++i) {
-      to.surface.block<3, 3>(3 * place[i], 3 * place[j]) =
-          turn * from.surface.block<3, 3>(3 * i, 3 * j) * turn.transpose();
+      surface.block<3, 3>(3 * place[i], 3 * place[j]) =
+          turn * from.surface.view().block<3, 3>(3 * i, 3 * j) * turn.transpose();
     }
   }
-  for (Eigen::Index b = 0; b + 2 < to.beads.rows(); b += 3) {
-    to.beads.middleRows<3>(b) = (turn * to.beads.middleRows<3>(b)).eval();
+  for (Eigen::Index b = 0; b + 2 < beads.rows(); b += 3) {
+    beads.middleRows<3>(b) = (turn * beads.middleRows<3>(b)).eval();
   }
+  to.surface = std::move(surface);
+  to.beads = std::move(beads);
   to.mass.setFromTriplets(mass.begin(), mass.end());
   const bool mirrored = turn.determinant() < 0.0;
   for (auto& t : to.triangles) {
@@ -214,7 +218,8 @@ TEST(HardCase21, AUniformPressureComesBackAsUniformMultipliers) {
   // A frictionless body of just the shape that a uniform pressure presses into the gel.
   const double pressure = 0.02;
   const auto n = static_cast<Eigen::Index>(gel().vertices.size());
-  const Eigen::MatrixXd normal = gel().surface(Eigen::seqN(2, n, Eigen::fix<3>), Eigen::seqN(2, n, Eigen::fix<3>));
+  const Eigen::MatrixXd normal =
+      gel().surface.view()(Eigen::seqN(2, n, Eigen::fix<3>), Eigen::seqN(2, n, Eigen::fix<3>));
   ContactProblem problem;
   problem.compliance = &normal;
   problem.gap = -(normal * Eigen::VectorXd::Constant(n, pressure));
@@ -252,7 +257,7 @@ TEST(HardCase23, UnloadingLeavesNoForceWithoutHistory) {
 }
 
 TEST(HardCase24, TheComplianceIsSymmetricPositiveDefinite) {
-  const Eigen::MatrixXd& surface = gel().surface;
+  const Eigen::MatrixXd surface = gel().surface.view();
   EXPECT_LT((surface - surface.transpose()).cwiseAbs().maxCoeff(), 1e-12 * surface.cwiseAbs().maxCoeff());
   const Eigen::LLT<Eigen::MatrixXd> factor(surface);
   EXPECT_EQ(factor.info(), Eigen::Success);

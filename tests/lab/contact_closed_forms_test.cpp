@@ -117,6 +117,33 @@ TEST(Mindlin, SlipsAsAWholeAtTheLimit) {
   EXPECT_NEAR(mindlin_displacement(1.0, 0.3, 2.0, small, 0.5, 1.0), (2.0 - 0.3) * small / (8.0 * g * 2.0), 1e-11);
 }
 
+TEST(Dimitriadis, IsHertzOnAThickLayerAndMeetsIntegralEquationsOnAThinnerOne) {
+  EXPECT_NEAR(dimitriadis_force(2.0, 5.0, 1e9, 0.01) / hertz_force(2.0, 0.5, 5.0, 0.01), 1.0, 1e-9);
+  const double radius = 200.0;  // so flat that sphere and paraboloid are one
+  double before = 1e-4;
+  for (const double chi : {0.05, 0.1, 0.2}) {
+    const double depth = std::pow(chi * 5.0, 2) / radius;
+    const double exact = sphere_on_layer(1.0, 0.5, 5.0, radius, depth).force;
+    const double error = 1.0 - dimitriadis_force(1.0, radius, 5.0, depth) / exact;
+    EXPECT_GT(error, before) << "the series is cut: the farther, the more it lacks";
+    EXPECT_LT(error, 0.3 * chi * chi);
+    before = error;
+  }
+}
+
+TEST(ThinLayer, FormulaIsApproachedFromBelowAsTheContactWidens) {
+  double before = 1.0;
+  for (const double ratio : {5.0, 10.0, 20.0}) {
+    const double radius = 100.0 * ratio * ratio;
+    const double depth = 1.0 / 400.0;  // a = 2 sqrt(R d) is `ratio` thicknesses
+    const double exact = sphere_on_layer(1.0, 0.5, 1.0, radius, depth).force;
+    const double error = 1.0 - thin_layer_force(1.0, radius, 1.0, depth) / exact;
+    EXPECT_GT(error, 0.0);
+    EXPECT_LT(error, 0.5 * before);
+    before = error;
+  }
+}
+
 TEST(Hayes, RefusesWhatIsNotTabulated) {
   EXPECT_THROW(hayes_kappa(0.3), Error);
 }

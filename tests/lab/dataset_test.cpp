@@ -91,6 +91,13 @@ TEST_F(DataSet, TruthIsInItsRows) {
   EXPECT_EQ(file.read<float>("/bead_displacement_mm").values[11 * 12], 0.125F * 5);
   EXPECT_EQ(file.read<double>("/bead_rest_mm").shape, (std::vector<std::int64_t>{4, 3}));
   EXPECT_EQ(file.read<std::uint8_t>("/contact").values[1], 1);
+  const auto force_error = file.read<double>("/error/force_N");
+  EXPECT_EQ(force_error.shape, (std::vector<std::int64_t>{12, 3}));
+  EXPECT_EQ(force_error.values[3 * 11 + 2], 0.003 * 5);
+  EXPECT_EQ(file.read<double>("/error/displacement_mm").values[11], 0.004 * 5);
+  EXPECT_EQ(file.read<double>("/error/bead_mm").values[11], 0.005 * 5);
+  EXPECT_EQ(file.read<double>("/error/traction_MPa").values[11], 0.006 * 5);
+  EXPECT_EQ(file.read<double>("/lookup_error_mm").values[11], 1e-7 * 5);
   EXPECT_EQ(file.read<std::uint8_t>("/node_state").values[2], 2);
   const auto pose = file.read<double>("/pose");
   EXPECT_EQ(pose.shape, (std::vector<std::int64_t>{12, 3, 4}));

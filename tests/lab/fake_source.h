@@ -39,6 +39,8 @@ inline lab::SampleSource fake_source(FakeCalls& calls) {
       truth.press.node_state = {fem::NodeState::open, fem::NodeState::stick, fem::NodeState::slip,
                                 fem::NodeState::open};
       truth.press.largest_strain = 0.01 * frame;
+      truth.press.lookup_error = 1e-7 * frame;
+      truth.error = {{0.001 * frame, 0.002 * frame, 0.003 * frame}, 0.004 * frame, 0.005 * frame, 0.006 * frame};
       truths.push_back(std::move(truth));
     }
     return truths;

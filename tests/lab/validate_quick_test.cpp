@@ -17,6 +17,7 @@ std::vector<ValidationRow> quick(const std::string& group) {
   options.quick = true;
   options.cache = folder.path();
   options.scratch = folder.path();
+  options.scenes = std::filesystem::path(TOUCHSTONE_SOURCE_DIR) / "scenes";
   return validate({group}, validation_groups(), options);
 }
 
@@ -34,7 +35,7 @@ TEST_P(QuickValidation, EveryRowHoldsAndIsNamedAfterItsGroup) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Groups, QuickValidation, testing::Values("mechanics", "light"));
+INSTANTIATE_TEST_SUITE_P(Groups, QuickValidation, testing::Values("mechanics", "vibration", "light"));
 
 }  // namespace
 }  // namespace touchstone::lab

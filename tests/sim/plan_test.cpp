@@ -89,6 +89,40 @@ TEST(Plan, ALuminousProbeReflectsNothing) {
   EXPECT_FALSE(make_plan(scene).interreflection);
 }
 
+TEST(Plan, AGelWithAPronySeriesCallsForRelaxation) {
+  SceneSpec scene = shipped("ball-press.yaml");
+  EXPECT_FALSE(make_plan(scene).relaxation);
+  scene.device.gel.relaxation = {{0.2, 0.1}, {0.1, 5.0}};
+  EXPECT_TRUE(make_plan(scene).relaxation);
+  EXPECT_THAT(effect(make_plan(scene), "stress relaxation").why, HasSubstr("by 30.0 % in the end"));
+  scene.effects.relaxation = Switch::off;
+  EXPECT_FALSE(make_plan(scene).relaxation);
+  scene.effects.relaxation = Switch::automatic;
+  scene.device.gel.relaxation = {{0.0, 0.1}};
+  EXPECT_FALSE(make_plan(scene).relaxation);
+}
+
+TEST(Plan, AVibrationAboveAFifthOfTheLowestEigenfrequencyCallsForInertia) {
+  SceneSpec scene = shipped("vibration.yaml");
+  EXPECT_EQ(scene.motion.highest_vibration_Hz(), 100.0);
+  const double lowest = 100.0 / std::sqrt(inertia_estimate(scene.device.gel, 100.0));
+  EXPECT_NEAR(lowest, 513.5, 0.5) << "sqrt(G/rho)/(4h)";
+  EXPECT_FALSE(make_plan(scene).inertia) << "100 Hz is 0.195 of it";
+  EXPECT_THAT(effect(make_plan(scene), "gel dynamics (inertia)").why, HasSubstr("3.8 %"));
+  scene.motion.keys.back().vibration->frequency_Hz = 0.201 * lowest;
+  EXPECT_TRUE(make_plan(scene).inertia);
+  scene.motion.keys.back().vibration->amplitude_mm = 0.0;
+  EXPECT_FALSE(make_plan(scene).inertia);
+  EXPECT_FALSE(make_plan(shipped("cycle.yaml")).inertia);
+}
+
+TEST(Plan, AVibrationAlongTheSurfaceCallsForFriction) {
+  SceneSpec scene = shipped("vibration.yaml");
+  EXPECT_FALSE(make_plan(scene).friction);
+  scene.motion.keys.back().vibration->axis = Axis::x;
+  EXPECT_TRUE(make_plan(scene).friction);
+}
+
 // Under a layer that is thin against the disc nothing gets away sideways, so what comes back at once is the internal
 // diffuse reflectance of an index of 1.5, 0.596 (Duntley's formula, e.g. Walsh 1926), less the light that the shifts of
 // the last grazing angles take away.

@@ -100,6 +100,52 @@ TEST(SceneFiles, PoissonsRatioMayBeAHalfAndNotMore) {
               HasSubstr("from 0 to 0.5"));
 }
 
+TEST(SceneFiles, AGelMayRelaxButSomethingMustLast) {
+  const auto with = [](const std::string& terms) {
+    return replaced(kDevice, "  thickness", "  relaxation: [" + terms + "]\n  thickness");
+  };
+  const auto device = parse_yaml<DeviceSpec>(with("{share: 0.2, time_s: 0.1}, {share: 0.3, time_s: 4}"), "device.yaml");
+  const fem::PronySeries series = prony_series(device.gel);
+  ASSERT_EQ(series.size(), 2u);
+  EXPECT_EQ(series[1].share, 0.3);
+  EXPECT_EQ(series[1].time, 4.0);
+  EXPECT_THAT(error_of_device(with("{share: 0.5, time_s: 1}, {share: 0.5, time_s: 2}")),
+              HasSubstr("device.yaml:5: relaxation: the shares sum to 1; something must last"));
+  EXPECT_THAT(error_of_device(with("{share: -0.1, time_s: 1}")), HasSubstr("-0.1 is not allowed"));
+  EXPECT_THAT(error_of_device(with("{share: 0.1, time_s: 0}")), HasSubstr("0 is not allowed"));
+  EXPECT_THAT(error_of_device(with("{share: 0.1}")), HasSubstr("time_s"));
+}
+
+TEST(SceneFiles, TheGelsDensityIsThatOfWaterUnlessSaid) {
+  EXPECT_EQ(parse_yaml<DeviceSpec>(kDevice, "d").gel.density_kg_m3, 1000.0);
+  EXPECT_THAT(error_of_device(replaced(kDevice, "  thickness", "  density_kg_m3: 0\n  thickness")),
+              HasSubstr("0 is not allowed"));
+}
+
+TEST(SceneFiles, AVibrationNeedsAPositionAndAFrequency) {
+  const std::string start = "start_mm: [0, 0, 1]\nkeys:\n  - {frames: 2, ";
+  const auto motion =
+      parse_yaml<MotionSpec>(start + "vibration: {axis: y, amplitude_mm: 0.1, frequency_Hz: 30}}\n", "m");
+  EXPECT_EQ(motion.keys[0].vibration->axis, Axis::y);
+  EXPECT_EQ(motion.highest_vibration_Hz(), 30.0);
+  EXPECT_TRUE(motion.is_tangential());
+  const auto error = [&](const std::string& rest) {
+    try {
+      parse_yaml<MotionSpec>(start + rest + "}\n", "m");
+    } catch (const Error& thrown) {
+      return std::string(thrown.what());
+    }
+    return std::string();
+  };
+  EXPECT_THAT(error("vibration: {axis: w, amplitude_mm: 0.1, frequency_Hz: 30}"), HasSubstr("axis"));
+  EXPECT_THAT(error("vibration: {axis: z, amplitude_mm: -0.1, frequency_Hz: 30}"), HasSubstr("-0.1 is not allowed"));
+  EXPECT_THAT(error("vibration: {axis: z, amplitude_mm: 0.1, frequency_Hz: 0}"), HasSubstr("0 is not allowed"));
+  EXPECT_THAT(error("vibration: {axis: z, amplitude_mm: 0.1}"), HasSubstr("frequency_Hz"));
+  EXPECT_THAT(error("z: {force_N: 1}, vibration: {axis: z, amplitude_mm: 0.1, frequency_Hz: 30}"),
+              HasSubstr("needs a position"));
+  EXPECT_EQ(error("z: {position_mm: 1}, vibration: {axis: z, amplitude_mm: 0.1, frequency_Hz: 30}"), "");
+}
+
 const char* const kDome = R"(name: dome
 gel:
   shape: dome
@@ -167,6 +213,20 @@ TEST(SceneFiles, AGelTakesOnlyItsOwnFieldsAndShapesThatCanBe) {
               HasSubstr("device.yaml:3: gel: the dome's base radius is 28 mm; it must not be above"));
   EXPECT_THAT(error_of_device(replaced(kFingertip, "sleeve_mm: 6", "sleeve_mm: 9")),
               HasSubstr("must not be longer than its cylinder"));
+}
+
+TEST(SceneFiles, AForceErrorMayStandInPlaceOfAMesh) {
+  const auto with_mesh = [](const std::string& mesh) { return kDevice + ("mesh: " + mesh + "\n"); };
+  const auto device = parse_yaml<DeviceSpec>(with_mesh("{force_error: 0.01, contact_radius_mm: 1}"), "device.yaml");
+  EXPECT_EQ(device.mesh.force_error, 0.01);
+  EXPECT_EQ(device.mesh.contact_radius_mm, 1.0);
+  EXPECT_FALSE(device.mesh.sharp_bodies);
+  EXPECT_THAT(error_of_device(with_mesh("{force_error: 0.01, contact_radius_mm: 1, fine_mm: 0.5}")),
+              HasSubstr("fine_mm: can't stand beside force_error"));
+  EXPECT_THAT(error_of_device(with_mesh("{force_error: 0.01}")), HasSubstr("contact_radius_mm"));
+  EXPECT_THAT(error_of_device(with_mesh("{force_error: 0, contact_radius_mm: 1}")), HasSubstr("force_error"));
+  EXPECT_THAT(error_of_device(with_mesh("{force_error: 0.01, contact_radius_mm: 7}")), HasSubstr("contact_radius_mm"));
+  EXPECT_THAT(error_of_device(with_mesh("{fine_mm: 0.5, contact_radius_mm: 1}")), HasSubstr("contact_radius_mm"));
 }
 
 TEST(SceneFiles, BeadsMustLieInTheGel) {

@@ -77,16 +77,17 @@ fem::Compliance half_space_gel(double half_width, double spacing, const fem::Ela
   const auto n = static_cast<Eigen::Index>(gel.vertices.size());
   const Eigen::VectorXd weight = gel.mass * Eigen::VectorXd::Ones(n);
   const double shear_modulus = material.youngs_modulus / (2.0 * (1.0 + material.poisson_ratio));
-  gel.surface.resize(3 * n, 3 * n);
+  Eigen::MatrixXd surface(3 * n, 3 * n);
   for (Eigen::Index j = 0; j < n; ++j) {
     for (Eigen::Index i = 0; i < n; ++i) {
       const Eigen::Vector3d between = gel.vertices[i] - gel.vertices[j];
-      gel.surface.block<3, 3>(3 * i, 3 * j) =
+      surface.block<3, 3>(3 * i, 3 * j) =
           weight[i] * weight[j] *
           response(between.x(), between.y(), kDepthOfResponse * spacing, shear_modulus, material.poisson_ratio);
     }
   }
-  gel.beads.resize(0, 3 * n);
+  gel.surface = std::move(surface);
+  gel.beads = Eigen::MatrixXd(0, 3 * n);
   return gel;
 }
 

@@ -1,0 +1,16 @@
+#pragma once
+
+#include <functional>
+#include <string>
+
+namespace touchstone {
+
+/// Runs `work` in a child process and returns what it returned, so that a library that ends the process on bad input,
+/// or never comes back, ends only the child. The child sees a copy of this process' memory; nothing that it changes
+/// comes back but the string, and what it prints to standard error is lost. Other threads don't run in it: `work` must
+/// not use what they might hold locked (memory may be allocated).
+/// @throws Error with the message of an Error that `work` threw; or, as the second half of a sentence, that the child
+/// was ended by a signal, took more than `cpu_seconds`, or couldn't be started
+std::string isolated_call(const std::function<std::string()>& work, int cpu_seconds);
+
+}  // namespace touchstone
