@@ -2,7 +2,10 @@
 #include <cmath>
 #include <optional>
 
+#include "core/error.h"
 #include "core/units.h"
+#include "fem/finite_press.h"
+#include "sim/gel_setup.h"
 #include "sim/shaken_press.h"
 #include "sim/virtual_sensor.h"
 
@@ -33,6 +36,33 @@ std::int64_t frame_time(int frame, double rate) {
   return static_cast<std::int64_t>(std::llround(frame * kMicrosecondsPerSecond / rate));
 }
 
+/// The press that the plan calls for, of one rigid body.
+class PlannedPress {
+ public:
+  PlannedPress(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel) {
+    const double friction = plan.friction ? scene.object.friction : 0.0;
+    const fem::ContactShape shape = coarse_contact_shape(scene.object, scene.device.mesh.fine_mm);
+    if (plan.finite_strain) {
+      finite_gel_ = set_up_finite_gel(scene.device);
+      TS_ASSERT(finite_gel_->rest.vertices == gel.vertices);
+      finite_.emplace(*finite_gel_, shape, friction);
+    } else {
+      const auto series = plan.relaxation ? prony_series(scene.device.gel) : fem::PronySeries{};
+      linear_.emplace(gel, shape, friction, fem::PressTolerance{}, series);
+    }
+  }
+
+  const fem::PressState& step(const fem::PressTarget& target) {
+    return finite_ ? finite_->step(target) : linear_->step(target);
+  }
+  const fem::PressState& state() const { return finite_ ? finite_->state() : linear_->state(); }
+
+ private:
+  std::shared_ptr<const fem::FiniteGel> finite_gel_;
+  std::optional<fem::FinitePress> finite_;
+  std::optional<fem::Press> linear_;
+};
+
 /// Steps a frame, so that a press that remembers follows a quasi-static vibration.
 int steps_a_frame(const MotionKey& key, const MotionSpec& motion, const Plan& plan) {
   if (!key.vibration || !(plan.friction || plan.relaxation)) return 1;
@@ -46,7 +76,7 @@ std::vector<Truth> play_motion(const SceneSpec& scene, const Plan& plan, const f
   const MotionSpec& motion = scene.motion;
   const double friction = plan.friction ? scene.object.friction : 0.0;
   const fem::PronySeries relaxation = plan.relaxation ? prony_series(scene.device.gel) : fem::PronySeries{};
-  fem::Press press(gel, coarse_contact_shape(scene.object, scene.device.mesh.fine_mm), friction, {}, relaxation);
+  PlannedPress press(scene, plan, gel);
   std::optional<ShakenPress> shaken;
   if (vibration != nullptr) shaken.emplace(gel, *vibration, relaxation, friction);
 

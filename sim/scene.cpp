@@ -19,6 +19,10 @@ EnumNames<Switch> enum_names(Switch) {
   return {{"auto", Switch::automatic}, {"on", Switch::on}, {"off", Switch::off}};
 }
 
+EnumNames<Elasticity> enum_names(Elasticity) {
+  return {{"linear", Elasticity::linear}, {"neo_hookean", Elasticity::neo_hookean}};
+}
+
 void fields(YamlReader& in, OutputSpec& outputs) {
   in.optional("frames", outputs.frames);
   in.optional("ideal", outputs.ideal);
@@ -35,6 +39,7 @@ void fields(YamlReader& in, LightSpec& light) {
 }
 
 void fields(YamlReader& in, EffectSwitches& effects) {
+  in.optional("elasticity", effects.elasticity);
   in.optional("friction", effects.friction);
   in.optional("fine_relief", effects.fine_relief);
   in.optional("relaxation", effects.relaxation);
