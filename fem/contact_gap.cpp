@@ -11,16 +11,11 @@ namespace touchstone::fem {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-// Covered share from which a vertex bears. With a half, a sharp punch's contact ended 0.11 edges too far out and was 4
-// to 6 % too stiff (radius of 5 and 2.5 edges, nu 0.3 to 0.5, against integral equations, mean over places); this
-// leaves 1 % and less.
-constexpr double kBearingShare = 0.59;
-constexpr double kFade = 0.1;            // share over which a vertex comes to bear
-constexpr double kLeastShare = 0.25;     // covered share below which a vertex is far
-constexpr int kSilhouetteSplits = 2;     // levels of splitting on the silhouette
-constexpr int kFalsePositions = 40;      // where the distance to the silhouette is known: some 5 do
-constexpr double kSteep = 2.0;           // rise within a triangle, in its size, from which the body's side is seen
-constexpr double kBodiesLarge = 4.0;     // bodies larger than this times a triangle can't hide between its corners
+constexpr int kSilhouetteSplits = 2;  // levels of splitting on the silhouette
+constexpr int kBisections = 34;       // of a cell's edge: a quarter of a triangle's to 1e-11
+constexpr int kFalsePositions = 40;   // likewise, where the distance to the silhouette is known: some 5 do
+constexpr double kSteep = 2.0;        // rise within a triangle, in its size, from which the body's side is seen
+constexpr double kBodiesLarge = 4.0;  // bodies larger than this times a triangle can't hide between its corners
 
 /// Integrates over one surface triangle; coordinates inside it are barycentric.
 template <typename Shape>
@@ -58,16 +53,13 @@ class TriangleGap {
     one_normal_ = one_normal;
     area_ = area;
     has_silhouette_ = one_normal_ && silhouette_distance(shape_, points_.col(0), normals_.col(0)).has_value();
+    // Bodies smaller than the triangle must not fall between its points.
     const int splits = splits_for_body(area_, body_radius_);
     if (has_silhouette_) {
-      cell(Eigen::Matrix3d::Identity(), splits + kSilhouetteSplits);
-      return;
+      cell(Eigen::Matrix3d::Identity(), 0, splits + kSilhouetteSplits);
+    } else {
+      cell(Eigen::Matrix3d::Identity(), splits, kSilhouetteSplits);
     }
-    const auto line = [this](const Eigen::Vector3d& point) { return at(point); };
-    const auto visit = [this](const Eigen::Vector3d& point, double value, double weight) {
-      add(point, value, weight * area_);
-    };
-    CoveredTriangle(line, visit).integrate(splits);
   }
 
  private:
@@ -86,38 +78,58 @@ class TriangleGap {
     return *silhouette_distance(shape_, points_ * b, normals_.col(0));
   }
 
-  /// Where the distance to the silhouette is known. `corners` holds the barycentric corners as columns.
-  void cell(const Eigen::Matrix3d& corners, int splits) {
-    const Eigen::Vector3d middle = corners.rowwise().mean();
-    double reach2 = 0.0;
-    for (int k = 0; k < 3; ++k) reach2 = std::max(reach2, (points_ * (corners.col(k) - middle)).squaredNorm());
-    const double inside = silhouette(middle);
-    if (inside * inside > reach2) {
-      if (inside > 0.0) whole(corners);
+  /// `cell` holds the barycentric corners as columns.
+  void cell(const Eigen::Matrix3d& corners, int forced_splits, int silhouette_splits) {
+    if (forced_splits > 0) {
+      split(corners, forced_splits - 1, silhouette_splits);
       return;
     }
-    if (splits > 0) {
-      split(corners, splits - 1);
-      return;
+    std::array<bool, 3> corner_hit;
+    int corner_hits = 0;
+    if (has_silhouette_) {
+      const Eigen::Vector3d middle = corners.rowwise().mean();
+      double reach2 = 0.0;
+      for (int k = 0; k < 3; ++k) reach2 = std::max(reach2, (points_ * (corners.col(k) - middle)).squaredNorm());
+      const double inside = silhouette(middle);
+      if (inside * inside > reach2) {
+        if (inside > 0.0) whole(corners);
+        return;
+      }
+      for (int k = 0; k < 3; ++k) corner_hits += corner_hit[k] = silhouette(corners.col(k)) >= 0.0;
+    } else {
+      int hits = 0;
+      for (int k = 0; k < 3; ++k) corner_hits += corner_hit[k] = at(corners.col(k)).has_value();
+      std::array<std::optional<double>, 7> value;
+      for (int k = 0; k < 7; ++k) {
+        value[k] = at(corners * radon_rule().points[k]);
+        hits += value[k].has_value();
+      }
+      if (hits + corner_hits == 0) return;
+      if (hits + corner_hits == 10) {
+        const double area = area_ * std::abs(corners.determinant());
+        for (int k = 0; k < 7; ++k) {
+          add(corners * radon_rule().points[k], *value[k], radon_rule().weights[k] * area);
+        }
+        return;
+      }
     }
-    std::array<bool, 3> hit;
-    int hits = 0;
-    for (int k = 0; k < 3; ++k) hits += hit[k] = silhouette(corners.col(k)) >= 0.0;
-    if (hits == 3) {
+    if (silhouette_splits > 0) {
+      split(corners, 0, silhouette_splits - 1);
+    } else if (corner_hits == 3) {
       whole(corners);
-    } else if (hits > 0) {
-      clip(corners, hit, hits);
+    } else if (corner_hits > 0) {
+      clip(corners, corner_hit, corner_hits);
     }
   }
 
-  void split(const Eigen::Matrix3d& c, int splits) {
+  void split(const Eigen::Matrix3d& c, int forced_splits, int silhouette_splits) {
     const Eigen::Vector3d m01 = 0.5 * (c.col(0) + c.col(1));
     const Eigen::Vector3d m12 = 0.5 * (c.col(1) + c.col(2));
     const Eigen::Vector3d m20 = 0.5 * (c.col(2) + c.col(0));
-    cell(triangle(c.col(0), m01, m20), splits);
-    cell(triangle(m01, c.col(1), m12), splits);
-    cell(triangle(m20, m12, c.col(2)), splits);
-    cell(triangle(m01, m12, m20), splits);
+    cell(triangle(c.col(0), m01, m20), forced_splits, silhouette_splits);
+    cell(triangle(m01, c.col(1), m12), forced_splits, silhouette_splits);
+    cell(triangle(m20, m12, c.col(2)), forced_splits, silhouette_splits);
+    cell(triangle(m01, m12, m20), forced_splits, silhouette_splits);
   }
 
   static Eigen::Matrix3d triangle(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
@@ -128,6 +140,13 @@ class TriangleGap {
 
   /// The point on the edge from a hit to a miss where the silhouette crosses it.
   Eigen::Vector3d crossing(Eigen::Vector3d hit, Eigen::Vector3d miss) const {
+    if (!has_silhouette_) {
+      for (int k = 0; k < kBisections; ++k) {
+        const Eigen::Vector3d middle = 0.5 * (hit + miss);
+        (at(middle) ? hit : miss) = middle;
+      }
+      return hit;
+    }
     // False position with the Illinois rule: the kept end's value is halved when it is kept twice.
     double at_hit = silhouette(hit);
     double at_miss = silhouette(miss);
@@ -204,14 +223,14 @@ bool is_convex(const ContactShape& shape) {
 
 }  // namespace
 
-ContactSurface::ContactSurface(const Compliance& gel) : ContactSurface(gel.vertices, gel.triangles, gel.mass) {
+ContactSurface::ContactSurface(const Compliance& gel)
+    : ContactSurface(gel.vertices, gel.triangles, gel.mass, gel.thickness) {
   TS_ASSERT(static_cast<std::size_t>(gel.surface.rows()) == 3 * vertices.size());
   TS_ASSERT(gel.surface.cols() == gel.surface.rows());
-  if (!flat) farthest_behind = 0.5 * gel.thickness;
 }
 
 ContactSurface::ContactSurface(std::vector<Eigen::Vector3d> places, std::vector<std::array<int, 3>> faces,
-                               const Eigen::SparseMatrix<double>& mass)
+                               const Eigen::SparseMatrix<double>& mass, double thickness)
     : vertices(std::move(places)), triangles(std::move(faces)) {
   const std::size_t n = vertices.size();
   TS_ASSERT(static_cast<std::size_t>(mass.rows()) == n);
@@ -242,6 +261,7 @@ ContactSurface::ContactSurface(std::vector<Eigen::Vector3d> places, std::vector<
   }
   weight = mass * Eigen::VectorXd::Ones(static_cast<Eigen::Index>(n));
   for (const Eigen::Vector3d& normal : normals) flat = flat && normal == normals.front();
+  if (!flat) farthest_behind = 0.5 * thickness;
 }
 
 void WeightedGap::move_along_normals(const Eigen::VectorXd& weight, double distance) {
@@ -329,7 +349,7 @@ WeightedGap weighted_gap(const ContactSurface& surface, const ContactShape& shap
       result.weighted[i] = result.plain[i] = result.lowest[i] = kInfinity;
       continue;
     }
-    if (share < kBearingShare) result.edge[i] = surface.weight[i] * (kBearingShare - share) / kFade;
+    if (share < kBearingShare) result.edge[i] = surface.weight[i] * (kBearingShare - share) / kBearingFade;
     result.plain[i] *= surface.weight[i] / covered[i];
     result.weighted[i] = result.plain[i] + result.edge[i] * depth;
   }

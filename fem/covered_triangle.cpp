@@ -1,12 +1,9 @@
 #include "fem/covered_triangle.h"
 
-#include <cmath>
-
 namespace touchstone::fem {
 namespace {
 
-constexpr double kSplitAboveBody = 1.0;  // a triangle larger than this times the body's radius is split
-constexpr int kMostSplits = 6;
+constexpr double kSplitAboveBody = 1.0;  // a cell larger than this times the body's radius is split
 
 }  // namespace
 
@@ -33,9 +30,7 @@ const RadonRule& radon_rule() {
 
 int splits_for_body(double area, double body_radius) {
   int splits = 0;
-  for (double size = std::sqrt(2.0 * area); size > kSplitAboveBody * body_radius && splits < kMostSplits; size *= 0.5) {
-    ++splits;
-  }
+  for (double size = std::sqrt(2.0 * area); size > kSplitAboveBody * body_radius && splits < 6; size *= 0.5) ++splits;
   return splits;
 }
 

@@ -7,13 +7,13 @@
 #include <cmath>
 #include <optional>
 
+#include "fem/contact_gap.h"
 #include "fem/covered_triangle.h"
 
 namespace touchstone::fem {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kLeastShare = 0.25;    // covered share below which a vertex is far, as in weighted_gap
 constexpr double kStep = 1e-5;          // of a triangle's size: for the body's slope by central differences
 constexpr double kWideStep = 0.02;      // of a triangle's size: for the body's curvature by second differences
 constexpr double kMostCurvature = 3.0;  // over a triangle's size
@@ -294,7 +294,7 @@ DeformedGap deformed_gap(const TaylorHoodSpace& space, const OuterSurface& surfa
     }
     scale[i] = weight[i] / covered[i];
     result.weighted[i] *= scale[i];
-    if (hit < 0.5) result.weighted[i] += weight[i] * (0.5 - hit) / 0.1 * overlap;
+    if (hit < kBearingShare) result.weighted[i] += weight[i] * (kBearingShare - hit) / kBearingFade * overlap;
   }
   std::vector<Eigen::Triplet<double>> entries;
   std::vector<Eigen::Triplet<double>> bends;

@@ -25,7 +25,7 @@ FiniteGel::FiniteGel(TetMesh given, std::span<const ElasticMaterial> materials, 
             for (const int v : outer.mesh_vertex) vertices.push_back(mesh.vertices[v]);
             return vertices;
           }(),
-          outer.triangles, mass) {
+          outer.triangles, mass, depth) {
   if (!std::isfinite(thickness) || thickness <= 0.0) {
     fail("the gel's thickness is {} mm; it must be finite and above zero", thickness);
   }

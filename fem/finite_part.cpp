@@ -19,6 +19,7 @@ constexpr int kPlainSteps = 2;    // before Aitken's rule
 constexpr int kTurningSteps = 4;  // after these the lines of contact stay
 constexpr int kMostBacktracks = 5;
 constexpr double kLeastShrink = 0.2;  // of the least J in one Newton step
+constexpr double kLeastRatio = 0.1;   // J: below, elements have found a way out that the gel hasn't
 constexpr double kBalanced = 1e-8;    // residual over the elements' forces
 constexpr double kHold = 1000.0;      // stiffness that holds what touches, over the surface's own
 constexpr double kReach = 0.5;        // of a vertex's own size: open gaps below this are candidates
@@ -105,7 +106,7 @@ FinitePartSolver::FinitePartSolver(const FiniteGel& gel, ContactShape shape, dou
       n_(static_cast<int>(gel.rest.vertices.size())) {}
 
 double FinitePartSolver::overlap(const RigidTransform& pose) const {
-  return -weighted_gap(gel_.rest, shape_, pose, {}).deepest;
+  return -weighted_gap(gel_.rest, shape_, pose).deepest;
 }
 
 /// Gap, forces and residual at the iterate's state; along the lines given, or new ones.
@@ -263,7 +264,7 @@ bool FinitePartSolver::find_step(const FiniteSnapshot& from, const PartTarget& t
     ContactProblem contact;
     contact.compliance = &compliance;
     contact.components = c;
-    if (c == 3) contact.friction = Eigen::VectorXd::Constant(m, friction_);
+    contact.friction = Eigen::VectorXd::Constant(m, friction_);
     contact.gap.resize(m);
     contact.border.resize(c * m, 0);
     if (c == 3) contact.drag.resize(2 * m);
@@ -381,6 +382,11 @@ std::optional<FiniteSnapshot> FinitePartSolver::solve(const FiniteSnapshot& from
     evaluate(iteration < kTurningSteps ? nullptr : &iterate.lines, iterate, effort);
     error = error_of(from, target, iterate);
     if (error <= 1.0) {
+      if (iterate.least < kLeastRatio) {
+        why_not_ = fmt::format(
+            "a tetrahedron keeps but {:.2g} of its volume: the mesh is too coarse where it's strained", iterate.least);
+        return std::nullopt;
+      }
       FiniteSnapshot& found = iterate.at;
       if (!found.touching) return untouched(gel_, found.pose);
       found.penetration = 0.0;

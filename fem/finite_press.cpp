@@ -98,6 +98,9 @@ std::optional<RigidTransform> FinitePress::Parts::straight_above(RigidTransform 
 }
 
 FiniteSnapshot FinitePress::Parts::follow(const PressTarget& target, Effort& effort) {
+  if (target.torque[0] || target.torque[1] || target.torque[2]) {
+    fail("a press at finite strain can't be led by torques, only by forces and poses");
+  }
   PartTarget to;
   to.pose = {target.rotation, now.pose.translation};
   for (int a = 0; a < 3; ++a) {
@@ -226,6 +229,11 @@ PressState FinitePress::Parts::report(const FiniteSnapshot& at) const {
     }
     s.largest_strain = std::max(s.largest_gradient, deepest / gel.thickness);
   }
+  s.node_owner.assign(n, -1);
+  for (int v = 0; v < n; ++v) {
+    if (at.state[v] != NodeState::open) s.node_owner[v] = 0;
+  }
+  s.bodies = {{s.gel_from_object, s.wrench, s.contact_area, s.contact_vertices}};
   s.under_resolved = (at.touching || overlap(at.pose) > 0.0) && s.contact_vertices < kResolvedVertices;
   return s;
 }

@@ -29,8 +29,8 @@ class FinitePress {
   /// Moves the object to the target, in parts of no more than a tenth of the gel's thickness, halved where Newton's
   /// method doesn't converge. In the state, `solves` counts contact problems, `factorisations` those of the gel,
   /// `parts` the parts; `lookup_error` is zero.
-  /// @throws Error, the state being as before the step, as Press::step; and if a tetrahedron would turn inside out or
-  /// Newton's method stalls in the smallest part allowed
+  /// @throws Error, the state being as before the step, as Press::step; for a target with torques; and if a tetrahedron
+  /// would turn inside out or Newton's method stalls in the smallest part allowed
   const PressState& step(const PressTarget& target);
 
   const PressState& state() const;

@@ -185,7 +185,7 @@ struct BorderedFactor::Parts {
 };
 
 BorderedFactor::BorderedFactor(const SymmetricEntries& matrix, int last, std::span<const int> order,
-                               FactorReport* report, bool keep_factor) {
+                               FactorReport* report, bool keep) {
   TS_ASSERT(last > 0 && last < matrix.size && static_cast<int>(order.size()) == matrix.size - last);
   parts_ = std::make_unique<Parts>(matrix, last, order);
   complement_ = Eigen::MatrixXd::Zero(last, last);
@@ -198,8 +198,7 @@ BorderedFactor::BorderedFactor(const SymmetricEntries& matrix, int last, std::sp
   mumps.control(19) = 2;  // the lower triangle, by columns
   mumps.data().schur_lld = last;
   mumps.control(7) = kGivenOrder;
-  // Where nothing will be solved with it the factor isn't kept: it's two thirds of the memory.
-  mumps.control(31) = keep_factor ? 0 : 1;
+  mumps.control(31) = keep ? 0 : 1;  // else the factor isn't kept: it's two thirds of the memory
   mumps.data().perm_in = parts_->places.data();
   mumps.analyse_and_factorise(report);
   stop_unless_finite(complement_);

@@ -50,6 +50,29 @@ Eigen::MatrixXd schur_complement(const SymmetricEntries& matrix, int last, std::
 Eigen::MatrixXd solve_symmetric(const SymmetricEntries& matrix, std::span<const int> order,
                                 const Eigen::MatrixXd& right, FactorReport* report = nullptr);
 
+/// Both of one factorisation: the Schur complement of the last unknowns, and solutions with the block A11 of the
+/// others. MUMPS allows one instance at a time: while this lives, other solutions wait (in the same thread: for ever).
+class BorderedFactor {
+ public:
+  /// As schur_complement. `keep`: the factor, for solve(). @throws Error as there
+  BorderedFactor(const SymmetricEntries& matrix, int last, std::span<const int> order, FactorReport* report = nullptr,
+                 bool keep = true);
+  ~BorderedFactor();
+  BorderedFactor(const BorderedFactor&) = delete;
+  BorderedFactor& operator=(const BorderedFactor&) = delete;
+
+  /// A22 - A21 A11^-1 A12, symmetric.
+  const Eigen::MatrixXd& complement() const { return complement_; }
+  Eigen::MatrixXd take_complement() && { return std::move(complement_); }
+  /// A11^-1 right, without refinement. `right` has the size of A11.
+  Eigen::VectorXd solve(const Eigen::VectorXd& right);
+
+ private:
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+  Eigen::MatrixXd complement_;
+};
+
 /// A symmetric matrix factorised once, to be solved with many right-hand sides one after the other. MUMPS has global
 /// state: while one lives, every other factorisation of the program waits, so don't make a second in the same thread.
 class SymmetricFactor {
@@ -67,29 +90,6 @@ class SymmetricFactor {
  private:
   struct Parts;
   std::unique_ptr<Parts> parts_;
-};
-
-/// Both of one factorisation: the Schur complement of the last unknowns, and solutions with the block A11 of the
-/// others. MUMPS allows one instance at a time: while this lives, other solutions wait (in the same thread: for ever).
-class BorderedFactor {
- public:
-  /// As schur_complement. Without `keep_factor`, solve() can't be called. @throws Error as there
-  BorderedFactor(const SymmetricEntries& matrix, int last, std::span<const int> order, FactorReport* report = nullptr,
-                 bool keep_factor = true);
-  ~BorderedFactor();
-  BorderedFactor(const BorderedFactor&) = delete;
-  BorderedFactor& operator=(const BorderedFactor&) = delete;
-
-  /// A22 - A21 A11^-1 A12, symmetric.
-  const Eigen::MatrixXd& complement() const { return complement_; }
-  Eigen::MatrixXd take_complement() && { return std::move(complement_); }
-  /// A11^-1 right, without refinement. `right` has the size of A11.
-  Eigen::VectorXd solve(const Eigen::VectorXd& right);
-
- private:
-  struct Parts;
-  std::unique_ptr<Parts> parts_;
-  Eigen::MatrixXd complement_;
 };
 
 /// The kernel that OpenBLAS chose for this processor ("Zen", "Cooperlake"; "Prescott" on a recent processor means that

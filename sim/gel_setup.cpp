@@ -73,6 +73,12 @@ std::vector<fem::Bead> gel_beads(const DeviceSpec& device) {
   return beads;
 }
 
+std::shared_ptr<const fem::FiniteGel> set_up_finite_gel(const DeviceSpec& device) {
+  const fem::GelBody body = gel_body(device);
+  return std::make_shared<const fem::FiniteGel>(fem::mesh_gel(body), gel_materials(device.gel), gel_beads(device),
+                                                fem::thickness_of(body));
+}
+
 std::string gel_key(const DeviceSpec& device) {
   const fem::GelBody body = gel_body(device);
   const std::vector<fem::ElasticMaterial> materials = gel_materials(device.gel);

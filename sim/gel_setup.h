@@ -1,10 +1,12 @@
 #pragma once
 // From a device's file to what fem asks for.
 
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "fem/compliance.h"
+#include "fem/finite_gel.h"
 #include "fem/gel_body.h"
 #include "sim/device.h"
 
@@ -16,6 +18,9 @@ fem::GelBody gel_body(const DeviceSpec& device);
 std::vector<fem::ElasticMaterial> gel_materials(const GelSpec& gel);
 
 std::vector<fem::Bead> gel_beads(const DeviceSpec& device);
+
+/// The gel for presses at finite strain: the mesh that its compliance was made with. The mesh must be given by fine_mm.
+std::shared_ptr<const fem::FiniteGel> set_up_finite_gel(const DeviceSpec& device);
 
 /// Under what the gel's set-up is kept in the cache.
 std::string gel_key(const DeviceSpec& device);

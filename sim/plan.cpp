@@ -90,6 +90,13 @@ void plan_elastic_objects(const SceneSpec& scene, Plan& plan, Table& table) {
 void plan_mechanics(const SceneSpec& scene, Plan& plan, Table& table) {
   table.add("gel mechanics", true, "truth is always asked for",
             "set-up once a gel (seconds, kept in the cache), then about a millisecond a frame");
+  plan.finite_strain = table.add(
+      "finite strain", scene.effects.elasticity == Elasticity::neo_hookean,
+      scene.effects.elasticity == Elasticity::neo_hookean
+          ? "the scene asks for neo-Hookean elasticity"
+          : "linear elasticity is the default; where truth's largest strain is above some 0.2, effects.elasticity: "
+            "neo_hookean is worth its time",
+      "some five factorisations of the whole gel for every tenth of its thickness: seconds to minutes a frame");
   const std::vector<MovedObject> objects = moved_objects(scene);
   // Of the object whose friction is called for, or else of the first.
   const auto rubs = [](const MovedObject& moved) {
@@ -106,6 +113,14 @@ void plan_mechanics(const SceneSpec& scene, Plan& plan, Table& table) {
       table.add("friction", scene.effects.friction, rubbing != objects.end(), why, "a few milliseconds a frame");
 
   plan_elastic_objects(scene, plan, table);
+
+  if (plan.finite_strain) {
+    const char* what = objects.size() > 1 ? "several objects" : plan.elastic_object ? "an elastic object" : nullptr;
+    if (what != nullptr) fail_at(scene.where, "effects.elasticity: neo_hookean can't be had with {} yet", what);
+    if (objects.front().motion.is_turned()) {
+      fail_at(scene.where, "effects.elasticity: neo_hookean can't be had with motions led by torques yet");
+    }
+  }
 
   const fem::PronySeries series = prony_series(scene.device.gel);
   const double seconds = (scene.motion.frame_count() - 1) / scene.motion.frame_rate_Hz;
@@ -146,6 +161,13 @@ void plan_mechanics(const SceneSpec& scene, Plan& plan, Table& table) {
                                      "the vibration's force; allowed is {:.2g} %",
                                      frequency, frequency / std::sqrt(missing), 100 * missing, 100 * kAllowedInertia),
       "the gel's modes once (half a minute, kept in the cache), then milliseconds a frame");
+  if (plan.finite_strain && (plan.relaxation || plan.inertia)) {
+    fail_at(scene.where, "effects.elasticity: neo_hookean goes without {}; switch one of them off",
+            plan.relaxation ? "relaxation" : "inertia");
+  }
+  if (plan.finite_strain && scene.device.mesh.force_error) {
+    fail_at(scene.where, "effects.elasticity: neo_hookean needs a mesh that is given by fine_mm");
+  }
 }
 
 /// Finest detail of the object, mm: of its relief, or the middle one of its mesh's edges.

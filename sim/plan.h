@@ -18,6 +18,7 @@ struct Effect {
 /// What a scene calls for. No code runs for an effect that is off.
 struct Plan {
   bool camera = false;
+  bool finite_strain = false;
   bool friction = false;
   bool elastic_object = false;
   bool fine_relief = false;
@@ -30,7 +31,7 @@ struct Plan {
 };
 
 /// Decides each effect from the scene's own content and from the outputs asked for.
-/// @throws Error if an output can't be had (an image from a device without a camera)
+/// @throws Error if an output can't be had (an image from a device without a camera), or effects that don't go together
 Plan make_plan(const SceneSpec& scene);
 
 /// Part of the force that a quasi-static press leaves out at this frequency, (f / f0)^2 with f0 the gel's lowest

@@ -2,7 +2,10 @@
 #include <cmath>
 #include <optional>
 
+#include "core/error.h"
 #include "core/units.h"
+#include "fem/finite_press.h"
+#include "sim/gel_setup.h"
 #include "sim/motion_track.h"
 #include "sim/shaken_press.h"
 #include "sim/virtual_sensor.h"
@@ -15,6 +18,32 @@ constexpr double kStepsAPeriod = 12.0;
 std::int64_t frame_time(int frame, double rate) {
   return static_cast<std::int64_t>(std::llround(frame * kMicrosecondsPerSecond / rate));
 }
+
+/// The press that the plan calls for: at finite strain of one rigid body only.
+class PlannedPress {
+ public:
+  PlannedPress(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel, std::vector<fem::PressBody> bodies,
+               const fem::PronySeries& relaxation) {
+    if (plan.finite_strain) {
+      TS_ASSERT(bodies.size() == 1);
+      finite_gel_ = set_up_finite_gel(scene.device);
+      TS_ASSERT(finite_gel_->rest.vertices == gel.vertices);
+      finite_.emplace(*finite_gel_, bodies.front().shape, bodies.front().friction);
+    } else {
+      linear_.emplace(gel, std::move(bodies), fem::PressTolerance{}, relaxation);
+    }
+  }
+
+  const fem::PressState& step(std::span<const fem::PressTarget> targets) {
+    return finite_ ? finite_->step(targets.front()) : linear_->step(targets);
+  }
+  const fem::PressState& state() const { return finite_ ? finite_->state() : linear_->state(); }
+
+ private:
+  std::shared_ptr<const fem::FiniteGel> finite_gel_;
+  std::optional<fem::FinitePress> finite_;
+  std::optional<fem::Press> linear_;
+};
 
 /// Steps a frame, so that a press that remembers follows a quasi-static vibration.
 int steps_a_frame(const MotionTrack& track, const MotionSpec& motion, const Plan& plan) {
@@ -41,7 +70,7 @@ std::vector<Truth> play_motion(const SceneSpec& scene, const Plan& plan, const f
     if (plan.elastic_object) body.elastic = elastic[bodies.size()];
     bodies.push_back(std::move(body));
   }
-  fem::Press press(gel, std::move(bodies), {}, relaxation);
+  PlannedPress press(scene, plan, gel, std::move(bodies), relaxation);
   std::optional<ShakenPress> shaken;
   if (vibration != nullptr) shaken.emplace(gel, *vibration, relaxation, friction);
 

@@ -32,6 +32,10 @@ void fields(YamlReader& in, AddedObject& added) {
   in.optional("start_mm", added.motion.start_mm);
 }
 
+EnumNames<Elasticity> enum_names(Elasticity) {
+  return {{"linear", Elasticity::linear}, {"neo_hookean", Elasticity::neo_hookean}};
+}
+
 void fields(YamlReader& in, OutputSpec& outputs) {
   in.optional("frames", outputs.frames);
   in.optional("ideal", outputs.ideal);
@@ -48,6 +52,7 @@ void fields(YamlReader& in, LightSpec& light) {
 }
 
 void fields(YamlReader& in, EffectSwitches& effects) {
+  in.optional("elasticity", effects.elasticity);
   in.optional("friction", effects.friction);
   in.optional("elastic_object", effects.elastic_object);
   in.optional("fine_relief", effects.fine_relief);

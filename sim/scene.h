@@ -43,8 +43,16 @@ struct MembraneSpec {
 enum class Switch { automatic, on, off };
 EnumNames<Switch> enum_names(Switch);
 
+/// How the gel answers to large strain.
+enum class Elasticity {
+  linear,      ///< fast, and good while PressState::largest_strain is small
+  neo_hookean  ///< at finite strain (fem/finite_press.h): seconds a frame
+};
+EnumNames<Elasticity> enum_names(Elasticity);
+
 /// A scene may force an effect on or off; `automatic` leaves it to the plan.
 struct EffectSwitches {
+  Elasticity elasticity = Elasticity::linear;
   Switch friction = Switch::automatic;
   Switch elastic_object = Switch::automatic;
   Switch fine_relief = Switch::automatic;

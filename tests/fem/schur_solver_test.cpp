@@ -65,9 +65,9 @@ TEST(SchurSolver, OneFactorisationGivesTheComplementAndSolvesTheInnerBlock) {
   const Eigen::VectorXd expected = matrix.topLeftCorner(53, 53).partialPivLu().solve(right);
   EXPECT_LT((factor.solve(right) - expected).norm(), 1e-12 * expected.norm());
   EXPECT_LT((factor.solve(2.0 * right) - 2.0 * expected).norm(), 1e-12 * expected.norm());
-  const Eigen::MatrixXd complement = matrix.bottomRightCorner(7, 7) -
-                                     matrix.bottomLeftCorner(7, 53) *
-                                         matrix.topLeftCorner(53, 53).partialPivLu().solve(matrix.topRightCorner(53, 7));
+  const Eigen::MatrixXd complement =
+      matrix.bottomRightCorner(7, 7) -
+      matrix.bottomLeftCorner(7, 53) * matrix.topLeftCorner(53, 53).partialPivLu().solve(matrix.topRightCorner(53, 7));
   EXPECT_LT((factor.complement() - complement).norm(), 1e-12 * complement.norm());
 }
 

@@ -30,6 +30,19 @@ TEST(Plan, ASmoothObjectCallsForNoFriction) {
   EXPECT_FALSE(make_plan(scene).friction);
 }
 
+TEST(Plan, FiniteStrainIsOnWhereTheSceneAsksForIt) {
+  SceneSpec scene = shipped("ball-press.yaml");
+  const Plan linear = make_plan(scene);
+  EXPECT_FALSE(linear.finite_strain);
+  EXPECT_EQ(effect(linear, "finite strain").cost, "nothing");
+  scene.effects.elasticity = Elasticity::neo_hookean;
+  const Plan plan = make_plan(scene);
+  EXPECT_TRUE(plan.finite_strain);
+  EXPECT_THAT(effect(plan, "finite strain").why, HasSubstr("the scene asks for"));
+  scene.effects.relaxation = Switch::on;
+  EXPECT_THROW(make_plan(scene), Error);
+}
+
 TEST(Plan, TruthAloneCallsForNoCamera) {
   SceneSpec scene = shipped("cycle.yaml");
   scene.outputs.frames = false;

@@ -82,6 +82,21 @@ TEST(PlayMotion, ForcesFollowTheKeys) {
   EXPECT_NEAR(p.truths[6].press.wrench[2], 1.0, 1e-5) << "an axis that isn't named keeps its force";
 }
 
+TEST(PlayMotion, FiniteStrainChangesALargePressAndHardlyASmallOne) {
+  const std::string keys = "  - {frames: 1, z: {position_mm: -0.02}}\n  - {frames: 1, z: {position_mm: -0.6}}\n";
+  const Played linear = play(keys);
+  SceneSpec scene = small_scene(keys);
+  scene.effects.elasticity = Elasticity::neo_hookean;
+  const std::vector<Truth> finite = play_motion(scene, make_plan(scene), *linear.gel);
+  ASSERT_EQ(finite.size(), 3u);
+  EXPECT_EQ(finite[0].press.wrench.norm(), 0.0);
+  const double small = finite[1].press.wrench[2] / linear.truths[1].press.wrench[2] - 1.0;
+  const double large = finite[2].press.wrench[2] / linear.truths[2].press.wrench[2] - 1.0;
+  EXPECT_LT(std::abs(small), 0.03);
+  EXPECT_GT(std::abs(large), std::abs(small));
+  EXPECT_EQ(finite[2].press.bead_displacement.rows(), linear.truths[2].press.bead_displacement.rows());
+}
+
 TEST(PlayMotion, TimesAreThoseOfTheFrameRate) {
   const Played p = play("  - {frames: 3, z: {position_mm: 0.4}}\n");
   EXPECT_EQ(p.truths[0].t_us, 0);
