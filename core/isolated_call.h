@@ -10,7 +10,8 @@ namespace touchstone {
 /// comes back but the string, and what it prints to standard error is lost. Other threads don't run in it: `work` must
 /// not use what they might hold locked (memory may be allocated).
 /// @throws Error with the message of an Error that `work` threw; or, as the second half of a sentence, that the child
-/// was ended by a signal, took more than `cpu_seconds`, or couldn't be started
-std::string isolated_call(const std::function<std::string()>& work, int cpu_seconds);
+/// was ended by a signal, took more than `cpu_seconds` of computing or `wall_seconds` of waiting, or couldn't be
+/// started
+std::string isolated_call(const std::function<std::string()>& work, int cpu_seconds, int wall_seconds);
 
 }  // namespace touchstone

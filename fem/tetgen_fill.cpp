@@ -17,7 +17,7 @@ namespace {
 
 /// TetGen keeps circumradii under the metric; a regular tetrahedron of edge h has 0.61 h.
 constexpr double kMetricPerEdge = 1.0;
-constexpr int kMostSeconds = 120;
+constexpr int kMostSeconds = 120;  // of computing; twenty times of waiting, as other work may hold the cores
 
 /// The size field as TetGen reads it: a grid of boxes, each cut into six tetrahedra, with a metric at each vertex.
 void fill_background(const FillInput& from, tetgenio& background) {
@@ -190,7 +190,7 @@ std::string call_tetgen(const FillInput& from, const std::string& quality) {
 /// The mesh, or none if TetGen gave up, with the reason.
 std::optional<TetMesh> fill_once(const FillInput& from, const std::string& quality, std::string& why_not) {
   try {
-    return mesh_of(isolated_call([&] { return call_tetgen(from, quality); }, kMostSeconds));
+    return mesh_of(isolated_call([&] { return call_tetgen(from, quality); }, kMostSeconds, 20 * kMostSeconds));
   } catch (const Error& error) {
     why_not = error.what();
     return std::nullopt;

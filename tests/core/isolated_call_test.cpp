@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <csignal>
@@ -14,9 +15,9 @@ namespace {
 
 using ::testing::HasSubstr;
 
-std::string error_of(const std::function<std::string()>& work, int seconds = 60) {
+std::string error_of(const std::function<std::string()>& work, int cpu_seconds = 60, int wall_seconds = 600) {
   try {
-    isolated_call(work, seconds);
+    isolated_call(work, cpu_seconds, wall_seconds);
   } catch (const Error& error) {
     return error.what();
   }
@@ -24,10 +25,10 @@ std::string error_of(const std::function<std::string()>& work, int seconds = 60)
 }
 
 TEST(IsolatedCall, BringsBackWhatItsWorkReturns) {
-  EXPECT_EQ(isolated_call([] { return std::string("abc\0def", 7); }, 60), std::string("abc\0def", 7));
-  EXPECT_EQ(isolated_call([] { return std::string(); }, 60), "");
+  EXPECT_EQ(isolated_call([] { return std::string("abc\0def", 7); }, 60, 600), std::string("abc\0def", 7));
+  EXPECT_EQ(isolated_call([] { return std::string(); }, 60, 600), "");
   const std::string large(3'000'000, 'x');  // far more than a pipe holds
-  EXPECT_EQ(isolated_call([&] { return large; }, 60), large);
+  EXPECT_EQ(isolated_call([&] { return large; }, 60, 600), large);
 }
 
 TEST(IsolatedCall, ChangesNothingHere) {
@@ -37,7 +38,7 @@ TEST(IsolatedCall, ChangesNothingHere) {
         value = 2;
         return std::string();
       },
-      60);
+      60, 600);
   EXPECT_EQ(value, 1);
 }
 
@@ -64,6 +65,12 @@ TEST(IsolatedCall, WhatNeverComesBackIsEnded) {
                   },
                   1),
               HasSubstr("more than 1 s"));
+  EXPECT_EQ(error_of(
+                []() -> std::string {
+                  for (;;) pause();
+                },
+                60, 1),
+            "it gave no answer within 1 s");
 }
 
 }  // namespace
