@@ -11,7 +11,8 @@
 // - Step vii takes the centroid of all highlighted pixels. Where several connected regions are left, this tracker takes
 //   the one whose centroid is nearest to the bead's last position, among those that look like a bead (BeadLook).
 //   Otsu's method is then applied again to the highlighted class alone: where a bead touches something half as dark,
-//   this core lies elsewhere than the whole region, and its centroid is taken.
+//   this core lies elsewhere than the whole region, and its centroid is taken. Where what touches it is nearly as dark,
+//   so that neither looks like a bead alone, the window's darkest pixels are taken (a fifth of the bead's usual area).
 // - A region that touches the window's border is cut by it: the window is moved onto it, and it is measured again.
 // - A window in which nothing looks like a bead gives no measurement, where Otsu's method alone would invent one. Then
 //   the whole cell is searched, coarsely; if there's no bead either, the bead is `hidden`: its position is held for
@@ -46,8 +47,9 @@ struct BeadLook {
   double max_elongation = 4.0;
   /// Largest ratio, either way, between the region's area and the bead's own area in the frames before.
   double max_area_change = 2.0;
-  /// A bead's core: what Otsu's method highlights among the bead's own pixels. Its least part of the usual area, its
-  /// largest elongation, and how far its centroid may lie from the bead's before the core's is taken instead.
+  /// A bead's core: what Otsu's method highlights among the bead's own pixels. Its least part of the usual area (also
+  /// that of the darkest pixels, where there is no such core; 1 = no cores), its largest elongation, and how far its
+  /// centroid may lie from the bead's before the core's is taken instead.
   double least_core = 0.2;
   double core_elongation = 2.0;
   double core_shift_px = 0.8;

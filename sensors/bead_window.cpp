@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <limits>
 #include <opencv2/core.hpp>
 
 #include "core/error.h"
@@ -279,6 +280,19 @@ class ThresholdRound {
     return difference_ >= settings_.look.min_difference;
   }
 
+  /// Moves the threshold to where about so many of the window's pixels are above it.
+  void highlight(double pixels) {
+    int above = 0;
+    threshold_ = 255;
+    while (threshold_ > 0) {
+      const int more = contrast_.histogram[static_cast<std::size_t>(threshold_)];
+      if (above > 0 && above + more > pixels) break;
+      above += more;
+      --threshold_;
+    }
+    difference_ = class_difference(grey_, contrast_, 0, threshold_);
+  }
+
   /// The region at this threshold that looks like a bead and is nearest to the expected place (or the largest).
   std::optional<BeadMeasurement> find(const AreaRange& areas, double max_elongation) {
     BitWindow bits;
@@ -302,7 +316,7 @@ class ThresholdRound {
       const double rank = search_.take_largest ? -area : (centroid - search_.near).squaredNorm();
       if (best && rank >= best_rank) continue;
       best_rank = rank;
-      best = BeadMeasurement{centroid, area, difference_, touches_border(region), false};
+      best = BeadMeasurement{centroid, area, difference_, touches_border(region), false, moments.elongation};
       best_region = region;
     }
     if (best && settings_.centroid == CentroidKind::kWeighted && window_.stride == 1) {
@@ -339,6 +353,13 @@ std::optional<BeadMeasurement> measure_bead(const GreyWindow& window, const Bead
   ThresholdRound round(window, search);
   if (!round.next_threshold()) return std::nullopt;
   const std::optional<BeadMeasurement> bead = round.find(whole, look.max_elongation);
+  // A region of more than the bead's area, and not its shape: the bead and something that touches it.
+  bool joined = search.expected_area_px > 0.0 && look.least_core < 1.0 &&
+                (!bead || bead->cut || bead->elongation > look.core_elongation);
+  if (joined) {
+    const AreaRange larger{search.expected_area_px, std::numeric_limits<double>::infinity()};
+    joined = round.find(larger, std::numeric_limits<double>::infinity()).has_value();
+  }
 
   // The core: what stands out of the highlighted pixels themselves. Of a bead alone it is the bead's own middle; where
   // something half as dark touches the bead, only the core tells where the bead is.
@@ -349,6 +370,17 @@ std::optional<BeadMeasurement> measure_bead(const GreyWindow& window, const Bead
     if (bead && !bead->cut && (middle->centroid - bead->centroid).norm() <= look.core_shift_px) return bead;
     middle->is_core = true;
     return middle;
+  }
+  // What touches the bead is nearly as dark: only the bead's darkest pixels are its own.
+  if (joined) {
+    round.highlight(look.least_core * search.expected_area_px);
+    const AreaRange darkest{std::max(look.min_area_px, 0.5 * look.least_core * search.expected_area_px),
+                            look.least_core * search.expected_area_px};
+    std::optional<BeadMeasurement> middle = round.find(darkest, look.max_elongation);
+    if (middle && !middle->cut && middle->difference >= look.min_difference) {
+      middle->is_core = true;
+      return middle;
+    }
   }
   return bead;
 }

@@ -49,6 +49,7 @@ struct BeadMeasurement {
   double difference = 0.0;  ///< between the mean grey values of background and bead class
   bool cut = false;         ///< the region touches the window's border
   bool is_core = false;     ///< only the middle of the bead, see BeadLook::core_shift_px
+  double elongation = 1.0;  ///< ratio of its principal second moments
 };
 
 /// What measure_bead looks for.

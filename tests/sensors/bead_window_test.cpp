@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <numbers>
 #include <opencv2/imgproc.hpp>
 
 #include "core/random.h"
@@ -176,6 +178,35 @@ TEST(MeasureBead, BeadOnADarkEdgeComesApartFromIt) {
   const auto measured = measure_bead(window_of(image), {settings, {15.0, 15.0}, 113.0, false});
   ASSERT_TRUE(measured.has_value());
   EXPECT_LT((measured->centroid - Eigen::Vector2d(15.2, 14.7)).norm(), 0.5);
+}
+
+TEST(MeasureBead, ARimNearlyAsDarkDoesNotCarryTheBeadAway) {
+  // A blurred bead of depth 0.9 beside the slope round a pressed probe, a blurred line of depth 0.7 that ends at it.
+  BeadTrackerSettings settings;
+  RandomStream random(5, 0, Purpose::kTest);
+  const Eigen::Vector2d bead(15.2, 14.7);
+  double worst = 0.0;
+  for (const double beside : {2.0, 4.0, 6.0}) {
+    for (int angle = 0; angle < 12; ++angle) {
+      const Eigen::Vector2d along(std::cos(angle * std::numbers::pi / 6.0), std::sin(angle * std::numbers::pi / 6.0));
+      cv::Mat image(30, 30, CV_8U);
+      for (int y = 0; y < 30; ++y) {
+        for (int x = 0; x < 30; ++x) {
+          const Eigen::Vector2d at = Eigen::Vector2d(x + 0.5, y + 0.5) - bead;
+          const double across = (along.x() * at.y() - along.y() * at.x() - beside) / 3.5;
+          const double end = 0.5 + 0.5 * std::tanh(at.dot(along) / 3.0);
+          const double through =
+              (1.0 - 0.9 * std::exp(-at.squaredNorm() / 40.0)) * (1.0 - 0.7 * end * std::exp(-across * across));
+          image.at<std::uint8_t>(y, x) = cv::saturate_cast<std::uint8_t>(170.0 * through + 2.0 * random.normal());
+        }
+      }
+      const auto measured = measure_bead(window_of(image), {settings, {15.0, 15.0}, 110.0, false});
+      ASSERT_TRUE(measured.has_value()) << "line " << beside << " px beside it, at " << 30 * angle << " degrees";
+      EXPECT_FALSE(measured->cut);
+      worst = std::max(worst, (measured->centroid - bead).norm());
+    }
+  }
+  EXPECT_LT(worst, 2.0);  // of a bead 13 px wide
 }
 
 }  // namespace
