@@ -63,8 +63,8 @@ void measure(const std::filesystem::path& folder, bool quick, bool peer, const s
     if (peer) take(peer_table(ladder, options));
   }  // its memory is given back before that of other gels is measured
   // Whatever else scales with the surface gets its table here.
-  const std::vector<std::function<ResultTable(const bench::BenchOptions&)>> scaling = {bench::throughput_table,
-                                                                                       bench::growth_table};
+  const std::vector<std::function<ResultTable(const bench::BenchOptions&)>> scaling = {
+      bench::throughput_table, bench::growth_table, bench::pixel_growth_table};
   for (const auto& table : scaling) take(table(options));
   write_whole_file(folder / "mechanics.md", page);
   fmt::print("\nWritten to {}\n", folder.string());

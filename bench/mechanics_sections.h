@@ -54,5 +54,6 @@ ResultTable peer_table(const std::vector<LadderStep>& ladder, const BenchOptions
 ResultTable tolerance_table(const LadderStep& pad);
 ResultTable throughput_table(const BenchOptions& options);
 ResultTable growth_table(const BenchOptions& options);
+ResultTable pixel_growth_table(const BenchOptions& options);
 
 }  // namespace touchstone::bench

@@ -4,12 +4,14 @@
 
 #include <atomic>
 #include <cmath>
+#include <numbers>
 #include <thread>
 
 #include "bench/machine.h"
 #include "bench/mechanics_sections.h"
 #include "core/error.h"
 #include "fem/compliance_cache.h"
+#include "fem/pixel_contact.h"
 #include "sim/virtual_sensor.h"
 
 namespace touchstone::bench {
@@ -25,7 +27,7 @@ double steps_per_second(const fem::Compliance& gel, const fem::ContactShape& sha
   std::vector<std::thread> workers;
   for (int k = 0; k < threads; ++k) {
     workers.emplace_back([&] {
-      fem::Press press(gel, shape, friction);
+      fem::Press press(gel, shape, friction, {}, {}, fem::PressOutput::forces);
       press.step(one);
       press.step(other);
       ++ready;
@@ -74,7 +76,7 @@ ResultTable throughput_table(const BenchOptions& options) {
     const double load_seconds = load.seconds();
     const auto add = [&](const char* name, double friction, const fem::PressTarget& one,
                          const fem::PressTarget& other) {
-      fem::Press press(*gel, probe, friction);
+      fem::Press press(*gel, probe, friction, {}, {}, fem::PressOutput::forces);
       const double median = median_step(press, one, other);
       std::vector<std::string> row = {fmt::format("{}", edge),
                                       fmt::format("{}", 3 * gel->vertices.size()),
@@ -101,7 +103,7 @@ ResultTable throughput_table(const BenchOptions& options) {
   }
   table.remarks = {
       "The probe is the vhs text's, 6 mm wide with an edge of 0.3 mm radius. Presses are independent objects over one "
-      "compliance, a thread each."};
+      "compliance, a thread each, for forces and beads without the surface's displacement (PressOutput::forces)."};
   if (forces.size() > 1) {
     table.remarks.push_back(fmt::format("From {} to {} mm edges the frictionless force changes by {:.2f} %.", edges[0],
                                         edges[1], 100.0 * std::abs(forces[0] / forces[1] - 1.0)));
@@ -171,6 +173,64 @@ ResultTable growth_table(const BenchOptions& options) {
       "A pad of 20 x 20 x 5 mm, meshed evenly on all of its face and growing coarser below it; a sphere of 8 mm radius "
       "goes 0.3 mm deep. The compliance is a full matrix: memory and file grow with the square of the unknowns."};
   if (!stop.empty()) table.remarks.push_back(stop);
+  return table;
+}
+
+ResultTable pixel_growth_table(const BenchOptions& options) {
+  ResultTable table;
+  table.name = "mechanics-pixel-growth";
+  table.title = "Growth of the contact of fine relief with its pixels";
+  table.columns = {"pixels",     "pitch, um",  "set-up, s",  "solve, s",
+                   "memory, MB", "iterations", "in contact", "gap moved, um"};
+  constexpr double kSide = 5.0;        // mm
+  constexpr double kWave = 0.5;        // mm, of the bumps that the ball bears
+  constexpr double kBump = 0.01;       // mm
+  constexpr double kBallRadius = 8.0;  // mm
+  constexpr double kForce = 1.0;       // N
+  const std::vector<int> sides =
+      options.quick ? std::vector<int>{64, 128} : std::vector<int>{64, 128, 256, 512, 1024, 2048};
+  lab::PlotCurve solve_curve{"solve, s", {}, false};
+  lab::PlotCurve memory_curve{"peak memory, GB", {}, false};
+  double before = 0.0;
+  for (const int side : sides) {
+    const double pitch = kSide / side;
+    const double first = -0.5 * kSide + 0.5 * pitch;
+    fem::PixelGrid grid{side, side, pitch, {first, first}};
+    std::vector<double> gap(grid.size());
+    for (int j = 0; j < side; ++j) {
+      for (int i = 0; i < side; ++i) {
+        const Eigen::Vector2d at = grid.centre(i, j);
+        const double k = 2.0 * std::numbers::pi / kWave;
+        gap[grid.at(i, j)] =
+            at.squaredNorm() / (2.0 * kBallRadius) + kBump * (1.0 - std::cos(k * at.x()) * std::cos(k * at.y()));
+      }
+    }
+    forget_peak_memory();
+    const double resting = peak_memory_mb();
+    const Stopwatch setup;
+    const fem::LayerResponse layer({0.33, 0.49}, 5.0, grid, fem::GridEdges::free);
+    const double setup_seconds = setup.seconds();
+    const Stopwatch solve;
+    const fem::PixelContactAnswer answer = fem::solve_pixel_contact(layer, {gap, kForce});
+    const double solve_seconds = solve.seconds();
+    if (!answer.converged) fail("{} x {} pixels don't converge", side, side);
+    const double peak = peak_memory_mb() - resting;
+    const double pixels = static_cast<double>(grid.size());
+    table.rows.push_back({fmt::format("{}", grid.size()), fmt::format("{:.1f}", 1e3 * pitch),
+                          fmt::format("{:.3f}", setup_seconds), fmt::format("{:.3f}", solve_seconds),
+                          fmt::format("{:.0f}", peak), fmt::format("{}", answer.iterations),
+                          fmt::format("{}", answer.pixels_in_contact),
+                          before == 0.0 ? "" : fmt::format("{:.2f}", 1e3 * std::abs(answer.shift - before))});
+    before = answer.shift;
+    solve_curve.points.emplace_back(pixels, solve_seconds);
+    memory_curve.points.emplace_back(pixels, peak / 1e3);
+  }
+  table.plots = {{"Cost against pixels", "pixels", "seconds, GB", true, true, {solve_curve, memory_curve}}};
+  table.remarks = {
+      fmt::format("A ball of {} mm radius with bumps of {} mm, {} mm apart, pressed with {} N on {} x {} mm of a layer "
+                  "5 mm thick. Each pixel is an unknown; by Fourier transforms, so cost grows as n log n. The "
+                  "last column is by how much the ball moves when pixels are halved.",
+                  kBallRadius, 2.0 * kBump, kWave, kForce, kSide, kSide)};
   return table;
 }
 

@@ -55,6 +55,7 @@ struct FinitePress::Parts {
   std::optional<FiniteSnapshot> advance(const FiniteSnapshot& start, const PartTarget& target,
                                         const FiniteSnapshot& from, double begin, double end, int halvings,
                                         Effort& effort);
+  [[noreturn]] void fail_to_converge(const Effort& effort) const;
   std::optional<RigidTransform> straight_above(RigidTransform pose) const;
   FiniteSnapshot follow(const PressTarget& target, Effort& effort);
   PressState report(const FiniteSnapshot& at) const;
@@ -79,11 +80,16 @@ std::optional<FiniteSnapshot> FinitePress::Parts::advance(const FiniteSnapshot& 
     ++effort.parts;
     return next;
   }
-  if (halvings == 0) return std::nullopt;
+  if (halvings == 0 || effort.part.factorisations >= tolerance.most_factorisations) return std::nullopt;
   const double middle = 0.5 * (begin + end);
   const auto half = advance(start, target, from, begin, middle, halvings - 1, effort);
   if (!half) return std::nullopt;
   return advance(start, target, *half, middle, end, halvings - 1, effort);
+}
+
+void FinitePress::Parts::fail_to_converge(const Effort& effort) const {
+  fail("the press doesn't converge: {} (after {} factorisations; it gives up at {})", solver.why_not(),
+       effort.part.factorisations, tolerance.most_factorisations);
 }
 
 /// The pose straight above `pose` in which the body just touches the undeformed gel; nothing if it isn't over it.
@@ -159,8 +165,8 @@ FiniteSnapshot FinitePress::Parts::follow(const PressTarget& target, Effort& eff
     first.pose = to.pose;
     first.pose.translation.z() -= kFirstTouch * gel.thickness;
     auto begun = advance(start, first, start, 0.0, 1.0, tolerance.most_halvings, effort);
-    if (!begun || !begun->touching)
-      fail("the press doesn't converge: {}", begun ? "no vertex touches" : solver.why_not());
+    if (!begun) fail_to_converge(effort);
+    if (!begun->touching) fail("the press doesn't converge: no vertex touches");
     start = std::move(*begun);
   }
 
@@ -178,7 +184,7 @@ FiniteSnapshot FinitePress::Parts::follow(const PressTarget& target, Effort& eff
       part.force = to.force * (at.force.z() * kLargestForceGrowth / to.force.z());
       part.pose = between(start.pose, to.pose, 1.0);
       auto next = advance(at, part, at, 0.0, 1.0, tolerance.most_halvings, effort);
-      if (!next) fail("the press doesn't converge: {}", solver.why_not());
+      if (!next) fail_to_converge(effort);
       at = std::move(*next);
     }
     start = at;
@@ -186,7 +192,7 @@ FiniteSnapshot FinitePress::Parts::follow(const PressTarget& target, Effort& eff
   for (int part = 0; part < static_cast<int>(parts); ++part) {
     const double end = part + 1 >= parts ? 1.0 : (part + 1) / parts;
     auto next = advance(start, to, at, part / parts, end, tolerance.most_halvings, effort);
-    if (!next) fail("the press doesn't converge: {}", solver.why_not());
+    if (!next) fail_to_converge(effort);
     at = std::move(*next);
   }
   return at;

@@ -1,5 +1,6 @@
 #include "fem/linear_range.h"
 
+#include <chrono>
 #include <cmath>
 #include <limits>
 
@@ -28,7 +29,9 @@ std::vector<LinearRangeRow> measure_linear_range(const Compliance& linear, const
                                                  std::span<const double> depths, const Progress& progress) {
   TS_ASSERT(linear.vertices.size() == gel.rest.vertices.size());
   Press press(linear, shape, friction);
-  FinitePress finite(gel, shape, friction);
+  PressTolerance tolerance;
+  tolerance.most_factorisations = kRangeFactorisations;
+  FinitePress finite(gel, shape, friction, tolerance);
   const double height = touching_height(gel, shape);
   std::vector<LinearRangeRow> range;
   double before = 0.0;
@@ -40,10 +43,15 @@ std::vector<LinearRangeRow> measure_linear_range(const Compliance& linear, const
     PressTarget target;
     target.axis[2] = AxisControl::at(height - row.depth);
     try {
+      const auto begun = std::chrono::steady_clock::now();
       const PressState& state = press.step(target);
+      const auto between = std::chrono::steady_clock::now();
       row.linear_force = state.wrench[2];
       row.largest_strain = state.largest_strain;
       row.finite_force = finite.step(target).wrench[2];
+      const auto ended = std::chrono::steady_clock::now();
+      row.linear_seconds = std::chrono::duration<double>(between - begun).count();
+      row.finite_seconds = std::chrono::duration<double>(ended - between).count();
     } catch (const Error&) {
       break;  // the rows so far are what can be said
     }

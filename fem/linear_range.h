@@ -17,10 +17,15 @@ struct LinearRangeRow {
   double linear_force = 0.0;    ///< N
   double finite_force = 0.0;    ///< N, neo-Hookean
   double largest_strain = 0.0;  ///< PressState::largest_strain of the linear press
+  double linear_seconds = 0.0;  ///< what the step took on the clock
+  double finite_seconds = 0.0;
 
   /// How far the linear force is off, as a part of the finite one.
   double difference() const { return linear_force / finite_force - 1.0; }
 };
+
+/// What a reference press may take; one that takes more has no answer.
+inline constexpr int kRangeFactorisations = 40;
 
 /// Parts of the thickness that reference presses go down to.
 inline constexpr double kRangeDepths[] = {0.05, 0.1, 0.2};

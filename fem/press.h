@@ -59,6 +59,7 @@ struct PressTolerance {
       std::numeric_limits<double>::infinity();  ///< mm: steps with friction are cut into equal parts
                                                 ///< whose translations are no longer than this
   int most_halvings = 7;                        ///< of a step that doesn't converge
+  int most_factorisations = 300;                ///< of the whole gel in a step at finite strain, which then gives up
 };
 
 /// What a step computes.

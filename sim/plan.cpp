@@ -95,7 +95,7 @@ void plan_mechanics(const SceneSpec& scene, Plan& plan, Table& table) {
       scene.effects.elasticity == Elasticity::neo_hookean
           ? "the scene asks for neo-Hookean elasticity"
           : "linear elasticity is the default; where truth's largest strain is above some 0.2, effects.elasticity: "
-            "neo_hookean is worth its time",
+            "neo_hookean is worth its time (`touchstone plan --linear-range` tells)",
       "some five factorisations of the whole gel for every tenth of its thickness: seconds to minutes a frame");
   const std::vector<MovedObject> objects = moved_objects(scene);
   // Of the object whose friction is called for, or else of the first.
