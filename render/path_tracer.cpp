@@ -233,7 +233,9 @@ RayCounts& RayCounts::operator+=(const RayCounts& other) {
 }
 
 struct Tracer::Prepared {
-  std::variant<std::unique_ptr<PreparedScene<1>>, std::unique_ptr<PreparedScene<3>>> scene;
+  std::variant<std::unique_ptr<PreparedScene<1>>, std::unique_ptr<PreparedScene<3>>, std::unique_ptr<PreparedScene<8>>,
+               std::unique_ptr<PreparedScene<16>>>
+      scene;
   Eigen::Index bands = 0;
 };
 
@@ -247,8 +249,14 @@ Tracer::Tracer(const Scene& scene) : prepared_(std::make_unique<Prepared>()) {
     case 3:
       prepared_->scene = std::make_unique<PreparedScene<3>>(scene);
       break;
+    case 8:
+      prepared_->scene = std::make_unique<PreparedScene<8>>(scene);
+      break;
+    case 16:
+      prepared_->scene = std::make_unique<PreparedScene<16>>(scene);
+      break;
     default:
-      fail("scene: {} bands; the tracer carries 1 or 3", prepared_->bands);
+      fail("scene: {} bands; the tracer carries 1, 3, 8 or 16", prepared_->bands);
   }
 }
 

@@ -8,6 +8,7 @@
 #include <opencv2/core.hpp>
 #include <thread>
 
+#include "core/error.h"
 #include "light_scenes.h"
 
 namespace touchstone::render {
@@ -82,16 +83,19 @@ TEST(Determinism, AMaskedPixelIsThePixelOfTheWholeImage) {
 
 TEST(Determinism, BandsOfEqualContentAreEqualAndEqualToGrey) {
   const PinholeCamera camera = small_camera(12, 9);
-  const cv::Mat colour = Tracer(busy_scene(3)).render(camera, samples(8)).irradiance;
   const cv::Mat grey_image = Tracer(busy_scene(1)).render(camera, samples(8)).irradiance;
-  for (int row = 0; row < 9; ++row) {
-    for (int column = 0; column < 12; ++column) {
-      const cv::Vec3f value = colour.at<cv::Vec3f>(row, column);
-      EXPECT_EQ(value[0], value[1]);
-      EXPECT_EQ(value[0], value[2]);
-      EXPECT_NEAR(value[0], grey_image.at<float>(row, column), 1e-5 * value[0]);
+  for (const int bands : {3, 8, 16}) {
+    const cv::Mat image = Tracer(busy_scene(bands)).render(camera, samples(8)).irradiance;
+    ASSERT_EQ(image.channels(), bands);
+    for (int row = 0; row < 9; ++row) {
+      for (int column = 0; column < 12; ++column) {
+        const float* value = image.ptr<float>(row, column);
+        for (int k = 1; k < bands; ++k) EXPECT_EQ(value[0], value[k]);
+        EXPECT_NEAR(value[0], grey_image.at<float>(row, column), 1e-5 * value[0]);
+      }
     }
   }
+  EXPECT_THROW(Tracer(busy_scene(2)), Error);
 }
 
 /// Pixels smaller than the hole's blur, as a real sensor has: at most a soft edge within a pixel's view.
