@@ -376,7 +376,8 @@ std::optional<BeadMeasurement> measure_bead(const GreyWindow& window, const Bead
     round.highlight(look.least_core * search.expected_area_px);
     const AreaRange darkest{std::max(look.min_area_px, 0.5 * look.least_core * search.expected_area_px),
                             look.least_core * search.expected_area_px};
-    std::optional<BeadMeasurement> middle = round.find(darkest, look.max_elongation);
+    // So few pixels are often in a row; a line alone is longer still.
+    std::optional<BeadMeasurement> middle = round.find(darkest, 2.0 * look.max_elongation);
     if (middle && !middle->cut && middle->difference >= look.min_difference) {
       middle->is_core = true;
       return middle;
