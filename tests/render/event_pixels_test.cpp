@@ -1,0 +1,525 @@
+// Event pixels against closed forms: counts and times of ramps, the low-pass, rates of leak and noise.
+#include "render/event_pixels.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <opencv2/core.hpp>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "core/error.h"
+#include "core/random.h"
+#include "core/sha256.h"
+#include "core/units.h"
+#include "render/log_photocurrent.h"
+
+namespace touchstone::render {
+namespace {
+
+// Pixels without noise or lag, all alike, that hardly see the dark's current.
+EventPixelSettings ideal(double on = 0.2, double off = 0.2) {
+  EventPixelSettings settings;
+  settings.on_threshold = on;
+  settings.off_threshold = off;
+  settings.dark_intensity = 1e-9;
+  return settings;
+}
+
+cv::Mat flat(double intensity, int width = 1, int height = 1) {
+  return cv::Mat(height, width, CV_32FC1, cv::Scalar(intensity));
+}
+
+// The events of one picture after the other; light(t) is the same for all pixels.
+std::vector<Event> watch(EventPixels& pixels, const std::function<double(double)>& light, std::int64_t begin_us,
+                         std::int64_t end_us, std::int64_t step_us) {
+  std::vector<Event> events;
+  for (std::int64_t t = begin_us; t <= end_us; t += step_us) {
+    pixels.advance(flat(light(static_cast<double>(t)), pixels.size().width, pixels.size().height), t, events);
+  }
+  return events;
+}
+
+std::string message_of(const std::function<void()>& action) {
+  try {
+    action();
+  } catch (const Error& error) {
+    return error.what();
+  }
+  ADD_FAILURE() << "nothing was refused";
+  return {};
+}
+
+auto order_of(const Event& event) {
+  return std::tuple(event.t_us, event.y, event.x, event.on);
+}
+
+bool in_order(const std::vector<Event>& events) {
+  return std::is_sorted(events.begin(), events.end(),
+                        [](const Event& a, const Event& b) { return order_of(a) < order_of(b); });
+}
+
+TEST(LogPhotocurrent, IsTheLogarithmOverAllMagnitudes) {
+  RandomStream random(1, 0, Purpose::kTest);
+  double worst = 0.0;
+  for (int i = 0; i < 200000; ++i) {
+    const auto x = static_cast<float>(std::exp2(120.0 * random.uniform() - 60.0));
+    worst = std::max(worst, std::abs(level_of(x) / kLevelPerLog2 - std::log2(static_cast<double>(x))));
+  }
+  EXPECT_LT(worst, 2e-7);
+  for (int e = -60; e <= 60; ++e) {
+    EXPECT_EQ(level_of(static_cast<float>(std::exp2(e))), e * (1 << 24));
+  }
+}
+
+TEST(LogPhotocurrent, NeverFallsWhereTheLightGrows) {
+  std::int32_t last = level_of(1.0F);
+  float x = 1.0F;
+  for (int i = 0; i < 2000000; ++i) {
+    x = std::nextafter(x, 10.0F);
+    const std::int32_t level = level_of(x);
+    ASSERT_GE(level, last - 1) << x;  // one unit, 6e-8 in log2, is what rounding may do
+    last = std::max(last, level);
+  }
+}
+
+TEST(LogPhotocurrent, RelaxationIsTheExponential) {
+  for (double e = 1e-12; e < 1e6; e *= 1.07) {
+    const Relaxation relaxed = relaxation(static_cast<float>(e));
+    const double x = static_cast<float>(e);
+    EXPECT_NEAR(relaxed.gone / -std::expm1(-x), 1.0, 1e-6) << e;
+    if (e < 50.0) {
+      EXPECT_NEAR(relaxed.mean_left / (-std::expm1(-x) / x), 1.0, 1e-6) << e;
+    }
+  }
+}
+
+TEST(EventPixels, ARampGivesItsChangeOverTheThreshold) {
+  for (const double threshold : {0.05, 0.2, 0.31}) {
+    for (const double change : {0.9999, 3.0, -5.7}) {
+      for (const int steps : {1, 7, 100, 20000}) {
+        EventPixels pixels(ideal(threshold, 1.5 * threshold), {1, 1}, 1, 1);
+        const auto light = [&](double t) { return 40.0 * std::exp(change * t / (100.0 * steps)); };
+        const std::vector<Event> events = watch(pixels, light, 0, 100 * steps, 100);
+        const double each = change > 0.0 ? threshold : 1.5 * threshold;
+        EXPECT_NEAR(static_cast<double>(events.size()), std::floor(std::abs(change) / each), 1.0);
+        // Unless a crossing falls on the end to within float's rounding, the count is exact.
+        const double share = std::abs(change) / each - std::floor(std::abs(change) / each);
+        if (share > 1e-3 && share < 1.0 - 1e-3) {
+          EXPECT_EQ(events.size(), static_cast<std::size_t>(std::abs(change) / each)) << threshold << " " << change;
+        }
+        for (const Event& event : events) EXPECT_EQ(event.on, change > 0.0);
+      }
+    }
+  }
+}
+
+TEST(EventPixels, NoRemainderIsLostInSwingsOfThousandsOfFrames) {
+  // Up and down 200 times through 10.5 thresholds each way: whatever was lost or gained in a turn would add up.
+  EventPixels pixels(ideal(), {1, 1}, 1, 1);
+  const auto light = [](double t) {
+    const double phase = std::fmod(t / 5000.0, 2.0);
+    return 3.0 * std::exp(2.1 * (phase < 1.0 ? phase : 2.0 - phase));
+  };
+  const std::vector<Event> events = watch(pixels, light, 0, 200 * 10000, 50);
+  // First way up 10; each way down and up again from the last event's level another 10 of each kind.
+  EXPECT_EQ(events.size(), 200u * 20u);
+  EXPECT_EQ(std::count_if(events.begin(), events.end(), [](const Event& event) { return event.on; }), 2000);
+  EXPECT_TRUE(in_order(events));
+}
+
+TEST(EventPixels, RampsCrossAtTheirTimes) {
+  for (const std::int64_t step : {100, 1000, 100000}) {
+    EventPixels pixels(ideal(), {3, 2}, 1, 1);
+    const double rate = 37.0 * 1e-6;  // per us
+    const std::vector<Event> events = watch(
+        pixels, [&](double t) { return 2.0 * std::exp(rate * t); }, 0, 400000, step);
+    ASSERT_EQ(events.size(), 6u * 74u);  // 14.8 / 0.2, the last at the very end
+    for (std::size_t i = 0; i < events.size(); ++i) {
+      const double crossing = 0.2 * static_cast<double>(i / 6 + 1) / rate;
+      EXPECT_NEAR(static_cast<double>(events[i].t_us), std::ceil(crossing), 1.0) << step;
+      EXPECT_EQ(events[i].y, (i % 6) / 3);
+      EXPECT_EQ(events[i].x, i % 3);
+    }
+  }
+}
+
+TEST(EventPixels, TheFirstIntervalHasItsEvents) {
+  EventPixels pixels(ideal(), {1, 1}, 1, 1);
+  std::vector<Event> events;
+  const cv::Mat image = flat(1.0);
+  pixels.advance(image, 0, events);
+  EXPECT_TRUE(events.empty());
+  image.at<float>(0, 0) = static_cast<float>(std::exp(1.1));  // the same memory: nothing may be kept of it
+  pixels.advance(image, 1000, events);
+  EXPECT_EQ(events.size(), 5u);
+}
+
+TEST(EventPixels, RisingAndFallingLightMirrorEachOther) {
+  EventPixels up(ideal(), {1, 1}, 1, 1);
+  EventPixels down(ideal(), {1, 1}, 1, 1);
+  const auto wave = [](double t) { return 1.3 * std::sin(t / 3000.0) + 0.4 * std::sin(t / 700.0); };
+  const std::vector<Event> a = watch(
+      up, [&](double t) { return std::exp(wave(t)); }, 0, 60000, 200);
+  const std::vector<Event> b = watch(
+      down, [&](double t) { return std::exp(-wave(t)); }, 0, 60000, 200);
+  ASSERT_EQ(a.size(), b.size());
+  EXPECT_GT(a.size(), 60u);
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    EXPECT_NEAR(static_cast<double>(a[i].t_us), static_cast<double>(b[i].t_us), 1.0);
+    EXPECT_NE(a[i].on, b[i].on);
+  }
+}
+
+TEST(EventPixels, ConstantLightIsSilent) {
+  for (const double light : {0.0, 1e-12, 1.0, 1e6}) {
+    EventPixelSettings settings = ideal(kLeastEventThreshold, kLeastEventThreshold);
+    settings.bandwidth_hz = 100.0;
+    settings.reference_intensity = 1.0;
+    settings.refractory_us = 3;
+    EventPixels pixels(settings, {5, 4}, 1, 1);
+    EXPECT_TRUE(watch(
+                    pixels, [light](double) { return light; }, 0, 1000000, 500)
+                    .empty())
+        << light;
+  }
+}
+
+TEST(EventPixels, TheLowPassIsTheExponentialHoweverDenselyFramesCome) {
+  EventPixelSettings settings = ideal();
+  settings.bandwidth_hz = 30.0;
+  settings.reference_intensity = 2.0;
+  settings.dark_intensity = 0.01;
+  for (const double light : {0.5, 2.0}) {
+    const double tau_us = 1e6 / (2.0 * kPi * 30.0 * (light + 0.01) / 2.0);
+    for (const std::int64_t step : {20, 1000, 7000}) {
+      EventPixels pixels(settings, {1, 1}, 1, 1);
+      std::vector<Event> events;
+      pixels.advance(flat(0.1), -1, events);
+      pixels.advance(flat(light), 0, events);  // a step within 1 us
+      const double change = std::log(light + 0.01) - std::log(0.11);
+      for (std::int64_t t = step; t <= 14000; t += step) {
+        pixels.advance(flat(light), t, events);
+        const double expected = std::log(light + 0.01) - change * std::exp(-static_cast<double>(t) / tau_us);
+        EXPECT_NEAR(pixels.photoreceptor_output().at<double>(0, 0), expected, 2e-4 * change) << step << " " << t;
+      }
+    }
+  }
+}
+
+TEST(EventPixels, ALaggingPixelFollowsARampBehindByItsTimeConstant) {
+  // At a bandwidth that hardly changes along the ramp, v = u - rate tau once it has settled.
+  EventPixelSettings settings = ideal();
+  settings.bandwidth_hz = 50.0;
+  settings.reference_intensity = 1.0;
+  settings.dark_intensity = 100.0;  // nearly all of the current: f3dB = 50 * 101 Hz and hardly changes
+  EventPixels pixels(settings, {1, 1}, 1, 1);
+  std::vector<Event> events;
+  for (std::int64_t t = 0; t <= 20000; t += 100) {
+    pixels.advance(flat(100.0 * (1e-3 * static_cast<double>(t) / 20000.0)), t, events);
+  }
+  const double tau_us = 1e6 / (2.0 * kPi * 50.0 * 100.1);
+  const double expected = std::log(100.1) - 1e-3 / 20000.0 * tau_us;
+  EXPECT_NEAR(pixels.photoreceptor_output().at<double>(0, 0), expected, 4e-7);
+}
+
+TEST(EventPixels, TheDarkIsSlow) {
+  EventPixelSettings settings = ideal();
+  settings.bandwidth_hz = 100.0;
+  settings.reference_intensity = 1.0;
+  settings.dark_intensity = 1e-4;
+  std::vector<std::int64_t> first;
+  for (const double light : {1.0, 0.01}) {
+    EventPixels pixels(settings, {1, 1}, 1, 1);
+    const std::vector<Event> events = watch(
+        pixels, [&](double t) { return t < 50.0 ? light : 2.0 * light; }, 0, 1000000, 100);
+    ASSERT_FALSE(events.empty());
+    first.push_back(events.front().t_us);
+  }
+  EXPECT_GT(first[1], 50 * first[0]);
+}
+
+TEST(EventPixels, LeakGivesOnEventsAtItsRate) {
+  EventPixelSettings settings = ideal(0.25, 0.2);
+  settings.leak_rate_hz = 3.0;
+  const cv::Size size(40, 30);
+  for (const std::int64_t step : {1000, 250000}) {
+    EventPixels pixels(settings, size, 1, 1);
+    const std::vector<Event> events = watch(
+        pixels, [](double) { return 1.0; }, 0, 5000000, step);
+    // A ramp at a random phase: 15 events of each pixel, but for one at either end.
+    EXPECT_NEAR(static_cast<double>(events.size()), 15.0 * size.area(), 2.0);
+    std::vector<std::int64_t> last(static_cast<std::size_t>(size.area()), -1);
+    for (const Event& event : events) {
+      EXPECT_TRUE(event.on);
+      std::int64_t& before = last[static_cast<std::size_t>(event.y * size.width + event.x)];
+      if (before >= 0) {
+        EXPECT_NEAR(static_cast<double>(event.t_us - before), 1e6 / 3.0, 1.5);
+      }
+      before = event.t_us;
+    }
+    // The pixels don't leak in step.
+    const auto early = std::count_if(events.begin(), events.end(), [](const Event& e) { return e.t_us < 166667; });
+    EXPECT_NEAR(static_cast<double>(early), 600.0, 6.0 * std::sqrt(300.0));
+  }
+}
+
+TEST(EventPixels, ALeakOfLongStandingLosesNothing) {
+  EventPixelSettings settings = ideal();
+  settings.leak_rate_hz = 1e4;
+  EventPixels pixels(settings, {1, 1}, 1, 1);
+  // 2000 log units in one interval: more than 32 bits of level hold.
+  const std::vector<Event> events = watch(
+      pixels, [](double) { return 1.0; }, 0, 1000000, 1000000);
+  EXPECT_NEAR(static_cast<double>(events.size()), 10000.0, 1.0);
+}
+
+TEST(EventPixels, ShotNoiseIsPoissonAndFallsWithTheLight) {
+  EventPixelSettings settings = ideal();
+  settings.shot_rate_hz = 4.0;
+  settings.shot_half_intensity = 2.0;
+  const cv::Size size(64, 40);
+  for (const double light : {0.0, 2.0, 14.0}) {
+    const double rate = 4.0 / (1.0 + light / 2.0);
+    for (const std::int64_t step : {500, 500000}) {
+      EventPixels pixels(settings, size, 1, 77);
+      const std::vector<Event> events = watch(
+          pixels, [light](double) { return light; }, 0, 2000000, step);
+      const double mean = 2.0 * rate * size.area();
+      const auto count = static_cast<double>(events.size());
+      EXPECT_NEAR(count, mean, 4.5 * std::sqrt(mean)) << light;
+      const auto on = std::count_if(events.begin(), events.end(), [](const Event& event) { return event.on; });
+      EXPECT_NEAR(static_cast<double>(on), 0.5 * count, 4.5 * 0.5 * std::sqrt(count));
+      // Counts of the pixels: variance equals mean.
+      cv::Mat counts = cv::Mat::zeros(size, CV_64F);
+      for (const Event& event : events) counts.at<double>(event.y, event.x) += 1.0;
+      cv::Scalar average, deviation;
+      cv::meanStdDev(counts, average, deviation);
+      const double variance = deviation[0] * deviation[0];
+      const double m = average[0];
+      EXPECT_NEAR(variance, m, 4.5 * std::sqrt((2.0 * m * m + m) / size.area()));
+      EXPECT_TRUE(in_order(events));
+    }
+  }
+}
+
+TEST(EventPixels, NoiseDoesntDependOnHowDenselyFramesCome) {
+  EventPixelSettings settings = ideal();
+  settings.shot_rate_hz = 20.0;
+  settings.shot_half_intensity = 1.0;
+  std::vector<std::vector<Event>> runs;
+  for (const std::int64_t step : {1000, 50000}) {
+    EventPixels pixels(settings, {16, 16}, 1, 5);
+    runs.push_back(watch(
+        pixels, [](double) { return 0.5; }, 0, 500000, step));
+  }
+  ASSERT_EQ(runs[0].size(), runs[1].size());
+  for (std::size_t i = 0; i < runs[0].size(); ++i) {
+    EXPECT_NEAR(static_cast<double>(runs[0][i].t_us), static_cast<double>(runs[1][i].t_us), 1.0);
+  }
+}
+
+TEST(EventPixels, TheRefractoryTimeBoundsTheRate) {
+  EventPixelSettings settings = ideal();
+  settings.refractory_us = 300;
+  settings.shot_rate_hz = 2000.0;
+  settings.shot_half_intensity = 1e9;
+  for (const std::int64_t step : {50, 1000, 20000}) {
+    EventPixels pixels(settings, {4, 4}, 1, 9);
+    const std::vector<Event> events = watch(
+        pixels, [](double t) { return std::exp(2.0 * std::sin(t / 1000.0)); }, 0, 100000, step);
+    EXPECT_GT(events.size(), 1000u);
+    std::vector<std::int64_t> last(16, -1000);
+    for (const Event& event : events) {
+      std::int64_t& before = last[static_cast<std::size_t>(event.y * 4 + event.x)];
+      ASSERT_GE(event.t_us - before, 300);
+      before = event.t_us;
+    }
+  }
+}
+
+TEST(EventPixels, ARefractoryPixelBeginsAnewAtItsEnd) {
+  // On a ramp an event comes every C / rate + refractory time, however frames fall.
+  EventPixelSettings settings = ideal();
+  settings.refractory_us = 700;
+  for (const std::int64_t step : {90, 1000, 30000}) {
+    EventPixels pixels(settings, {1, 1}, 1, 1);
+    const double rate = 1e-4;
+    const std::vector<Event> events = watch(
+        pixels, [&](double t) { return 1e-3 * std::exp(rate * t); }, 0, 180000, step);
+    ASSERT_GE(events.size(), 66u);
+    for (std::size_t i = 0; i < events.size(); ++i) {
+      EXPECT_NEAR(static_cast<double>(events[i].t_us), 2000.0 + 2700.0 * static_cast<double>(i), 2.0) << step;
+    }
+  }
+}
+
+TEST(EventPixels, ThresholdsAreGaussianAndTheUnitsOwn) {
+  EventPixelSettings settings = ideal(0.3, 0.2);
+  settings.threshold_spread = 0.02;
+  const cv::Size size(200, 150);
+  const EventPixels one(settings, size, 1, 1);
+  const EventPixels again(settings, size, 1, 2);
+  const EventPixels other(settings, size, 2, 1);
+  cv::Scalar mean, deviation;
+  cv::meanStdDev(one.thresholds(), mean, deviation);
+  EXPECT_NEAR(mean[0], 0.3, 5.0 * 0.02 / std::sqrt(30000.0));
+  EXPECT_NEAR(mean[1], 0.2, 5.0 * 0.02 / std::sqrt(30000.0));
+  EXPECT_NEAR(deviation[0], 0.02, 5.0 * 0.02 / std::sqrt(60000.0));
+  EXPECT_NEAR(deviation[1], 0.02, 5.0 * 0.02 / std::sqrt(60000.0));
+  EXPECT_EQ(cv::norm(one.thresholds(), again.thresholds(), cv::NORM_INF), 0.0);
+  EXPECT_GT(cv::norm(one.thresholds(), other.thresholds(), cv::NORM_INF), 0.05);
+  // A pixel of a larger picture is the same pixel.
+  const EventPixels larger(settings, {300, 200}, 1, 1);
+  EXPECT_EQ(cv::norm(one.thresholds(), larger.thresholds()(cv::Rect(0, 0, 200, 150)), cv::NORM_INF), 0.0);
+  settings.threshold_spread = 0.2;  // half the tail would be below zero
+  const EventPixels uneven(settings, size, 1, 1);
+  EXPECT_GE(uneven.smallest_threshold(), 0.02 - 1e-6);
+}
+
+TEST(EventPixels, ZeroAndHugeStepsStayFinite) {
+  EventPixelSettings settings = ideal();
+  settings.dark_intensity = 1.0;
+  EventPixels pixels(settings, {2, 1}, 1, 1);
+  std::vector<Event> events;
+  pixels.advance(flat(0.0, 2), 0, events);
+  pixels.advance(flat(1e6 - 1.0, 2), 1000, events);  // 13.8155 log units
+  EXPECT_EQ(events.size(), 2u * 69u);
+  EXPECT_TRUE(in_order(events));
+  events.clear();
+  pixels.advance(flat(0.0, 2), 1001, events);  // all within one microsecond
+  EXPECT_EQ(events.size(), 2u * 69u);
+  for (const Event& event : events) {
+    EXPECT_EQ(event.t_us, 1001);
+    EXPECT_FALSE(event.on);
+  }
+  EXPECT_TRUE(in_order(events));
+}
+
+TEST(EventPixels, TwoEventsOfAMicrosecondBothCome) {
+  EventPixels pixels(ideal(), {1, 1}, 1, 1);
+  std::vector<Event> events;
+  pixels.advance(flat(1.0), 10, events);
+  pixels.advance(flat(std::exp(0.5)), 11, events);
+  pixels.advance(flat(1.0), 12, events);
+  ASSERT_EQ(events.size(), 4u);
+  EXPECT_EQ(events[0].t_us, 11);
+  EXPECT_EQ(events[1].t_us, 11);
+  EXPECT_TRUE(events[0].on && events[1].on);
+  EXPECT_EQ(events[3].t_us, 12);
+  EXPECT_FALSE(events[2].on || events[3].on);
+}
+
+TEST(EventPixels, AnyNumberOfThreadsGivesTheSameEvents) {
+  EventPixelSettings settings = davis240c(1000.0);
+  settings.shot_rate_hz = 200.0;
+  std::vector<std::string> hashes;
+  for (const int threads : {1, 2, 4}) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
+    EventPixels pixels(settings, {kDavis240cWidth, kDavis240cHeight}, 3, 4);
+    std::vector<Event> events;
+    cv::Mat image(kDavis240cHeight, kDavis240cWidth, CV_32FC1);
+    for (int frame = 0; frame <= 40; ++frame) {
+      for (int y = 0; y < image.rows; ++y) {
+        for (int x = 0; x < image.cols; ++x) {
+          image.at<float>(y, x) = static_cast<float>(300.0 + 290.0 * std::sin(0.1 * x + 0.07 * y + 0.15 * frame));
+        }
+      }
+      pixels.advance(image, frame * 1000, events);
+    }
+    EXPECT_TRUE(in_order(events));
+    EXPECT_GT(events.size(), 10000u);
+    Sha256 hash;
+    for (const Event& event : events) {
+      const std::string line = std::to_string(event.t_us) + " " + std::to_string(event.x) + " " +
+                               std::to_string(event.y) + (event.on ? " +" : " -");
+      hash.update(line.data(), line.size());
+    }
+    hashes.push_back(hash.hex());
+  }
+  EXPECT_EQ(hashes[0], hashes[1]);
+  EXPECT_EQ(hashes[0], hashes[2]);
+}
+
+TEST(EventPixels, BadPicturesAreRefusedAndChangeNothing) {
+  EventPixels pixels(ideal(), {60, 50}, 1, 1);
+  std::vector<Event> events;
+  pixels.advance(flat(1.0, 60, 50), 100, events);
+  const cv::Mat before = pixels.photoreceptor_output();
+  for (const float bad :
+       {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(), -1e-3F, 1e30F}) {
+    cv::Mat image = flat(5.0, 60, 50);
+    image.at<float>(41, 7) = bad;
+    image.at<float>(42, 3) = bad;
+    EXPECT_THAT(message_of([&] { pixels.advance(image, 200, events); }), testing::HasSubstr("column 7, row 41"));
+  }
+  EXPECT_THAT(message_of([&] { pixels.advance(flat(1.0, 61, 50), 200, events); }), testing::HasSubstr("60 x 50"));
+  EXPECT_THROW(pixels.advance(cv::Mat(50, 60, CV_8UC1, cv::Scalar(1)), 200, events), Error);
+  EXPECT_THROW(pixels.advance(cv::Mat(), 200, events), Error);
+  EXPECT_THAT(message_of([&] { pixels.advance(flat(1.0, 60, 50), 100, events); }), testing::HasSubstr("100 us"));
+  EXPECT_THROW(pixels.advance(flat(1.0, 60, 50), 99, events), Error);
+  EXPECT_THROW(pixels.advance(flat(1.0, 60, 50), std::numeric_limits<std::int64_t>::max(), events), Error);
+  EXPECT_TRUE(events.empty());
+  EXPECT_EQ(cv::norm(before, pixels.photoreceptor_output(), cv::NORM_INF), 0.0);
+  pixels.advance(flat(std::exp(0.3), 60, 50), 200, events);
+  EXPECT_EQ(events.size(), 3000u);
+  EXPECT_THROW(EventPixels(ideal(), {2, 2}, 1, 1).photoreceptor_output(), Error);
+}
+
+TEST(EventPixels, BadSettingsAreRefusedNamingTheField) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const auto refused = [](const char* field, const std::function<void(EventPixelSettings&)>& spoil) {
+    EventPixelSettings settings = davis240c(1.0);
+    ASSERT_NO_THROW(check(settings));
+    spoil(settings);
+    EXPECT_THAT(message_of([&] { EventPixels(settings, {2, 2}, 1, 1); }), testing::HasSubstr(field));
+  };
+  refused("on_threshold", [](auto& s) { s.on_threshold = 0.5 * kLeastEventThreshold; });
+  refused("on_threshold", [nan](auto& s) { s.on_threshold = nan; });
+  refused("off_threshold", [](auto& s) { s.off_threshold = 0.0; });
+  refused("off_threshold", [](auto& s) { s.off_threshold = 11.0; });
+  refused("threshold_spread", [](auto& s) { s.threshold_spread = -0.1; });
+  refused("threshold_spread", [](auto& s) { s.threshold_spread = 0.21; });
+  refused("dark_intensity", [](auto& s) { s.dark_intensity = 0.0; });
+  refused("bandwidth_hz", [](auto& s) { s.bandwidth_hz = -1.0; });
+  refused("reference_intensity", [](auto& s) { s.reference_intensity = 0.0; });
+  refused("refractory_us", [](auto& s) { s.refractory_us = -1; });
+  refused("leak_rate_hz", [nan](auto& s) { s.leak_rate_hz = nan; });
+  refused("shot_rate_hz", [](auto& s) { s.shot_rate_hz = -1.0; });
+  refused("shot_half_intensity", [nan](auto& s) { s.shot_half_intensity = nan; });
+  EXPECT_THROW(EventPixels(ideal(), {0, 2}, 1, 1), Error);
+  EXPECT_THROW(EventPixels(ideal(), {2, 70000}, 1, 1), Error);
+  EXPECT_THROW(davis240c(0.0), Error);
+  EXPECT_THROW(davis240c(nan), Error);
+}
+
+TEST(NeededSubdivisions, KeepEveryStepUnderHalfAThreshold) {
+  const EventPixelSettings settings = ideal();
+  const cv::Mat before = log_intensity(flat(1.0, 5, 4), settings);
+  EXPECT_EQ(needed_subdivisions(before, before, 0.2), 0);
+  for (const double change : {0.05, 0.099, 0.101, 0.35, -2.0, 7.77}) {
+    cv::Mat light = flat(1.0, 5, 4);
+    light.at<float>(2, 3) = static_cast<float>(std::exp(change));
+    const int between = needed_subdivisions(before, log_intensity(light, settings), 0.2);
+    EXPECT_LT(std::abs(change) / (between + 1), 0.1 + 1e-6);
+    if (between > 0) {
+      EXPECT_GE(std::abs(change) / between, 0.1 - 1e-6);
+    }
+  }
+  EXPECT_THROW(needed_subdivisions(before, flat(0.0, 4, 4), 0.2), Error);
+  EXPECT_THROW(needed_subdivisions(before, before, 0.0), Error);
+  EXPECT_THROW(needed_subdivisions(before, flat(std::numeric_limits<double>::infinity(), 5, 4), 0.2), Error);
+  EXPECT_THROW(log_intensity(flat(-1.0), settings), Error);
+  EXPECT_THROW(log_intensity(cv::Mat(), settings), Error);
+  // No light at all is the dark's current.
+  EXPECT_NEAR(log_intensity(flat(0.0), settings).at<float>(0, 0), std::log(1e-9), 1e-5);
+}
+
+}  // namespace
+}  // namespace touchstone::render
