@@ -26,7 +26,7 @@ struct EventPixels::Interval {
   bool all_fire = false;        ///< no pixel can be told by 32 bits not to fire
   float per_dark = 0.0F;        ///< photocurrent of an intensity of 1
   float relaxations = 0.0F;     ///< of the photoreceptor at the dark's current
-  double dark_waits = 0.0;      ///< mean number of noise events in the dark
+  float dark_waits = 0.0F;      ///< mean number of noise events in the dark
   float waits_fall = 0.0F;      ///< by how much a photocurrent of 1 thins them out
 };
 
@@ -215,7 +215,7 @@ void EventPixels::advance(const cv::Mat& intensity, std::int64_t t_us, std::vect
         2.0 * kPi * seconds * settings_.bandwidth_hz * settings_.dark_intensity / settings_.reference_intensity, 1e18));
   }
   if (!wait_.empty()) {
-    interval.dark_waits = seconds * settings_.shot_rate_hz;
+    interval.dark_waits = static_cast<float>(seconds * settings_.shot_rate_hz);
     interval.waits_fall = static_cast<float>(std::min(settings_.dark_intensity / settings_.shot_half_intensity, 1e18));
   }
   last_us_ = t_us;
@@ -241,7 +241,9 @@ void EventPixels::watch_row(const Interval& interval, const float* light, int ro
   const std::size_t first = static_cast<std::size_t>(row) * static_cast<std::size_t>(size_.width);
   std::array<std::int32_t, kBlock> rise;
   std::array<std::int32_t, kBlock> calls;  // for a closer look
-  std::array<double, kBlock> waits;
+  std::array<float, kBlock> now, mean;     // photocurrent
+  std::array<float, kBlock> exponent, gone, catch_up;
+  std::array<float, kBlock> waits;
   for (int column = 0; column < size_.width; column += kBlock) {
     const int count = std::min(kBlock, size_.width - column);
     const std::size_t begin = first + static_cast<std::size_t>(column);
@@ -251,36 +253,35 @@ void EventPixels::watch_row(const Interval& interval, const float* light, int ro
     std::int32_t* level = level_.data() + begin;
     std::int32_t* change = change_.data() + begin;
 
+    // Several short loops over small arrays: compilers make vector code of each.
+    for (int i = 0; i < count; ++i) now[i] = 1.0F + in[i] * interval.per_dark;
+    for (int i = 0; i < count; ++i) {
+      const std::int32_t level_now = level_of(now[i]);
+      rise[i] = level_now - level[i];
+      level[i] = level_now;
+    }
     if constexpr (kLagging || kNoisy) {
       float* photocurrent = photocurrent_.data() + begin;
       for (int i = 0; i < count; ++i) {
-        const float now = 1.0F + in[i] * interval.per_dark;
-        const float mean = 0.5F * (photocurrent[i] + now);
-        const std::int32_t level_now = level_of(now);
-        const std::int32_t step = level_now - level[i];
-        rise[i] = step;
-        if constexpr (kLagging) {
-          // The exact answer to a straight line of the input, from dv/dE = u - v:
-          // lag' = lag exp(-E) - step (1 - exp(-E)) / E, with the integral E of the rate over the interval.
-          const Relaxation relaxed = relaxation(interval.relaxations * mean);
-          const double before = lag_[begin + i];
-          const double after = before - before * relaxed.gone - step * (1.0 / kLevelPerLog2) * relaxed.mean_left;
-          lag_[begin + i] = after;
-          rise[i] +=
-              static_cast<std::int32_t>(after * kLevelPerLog2) - static_cast<std::int32_t>(before * kLevelPerLog2);
-        }
-        if constexpr (kNoisy) {
-          waits[i] = interval.dark_waits / (1.0 + (mean - 1.0F) * interval.waits_fall);
-          wait_[begin + i] -= waits[i];
-        }
-        photocurrent[i] = now;
-        level[i] = level_now;
+        mean[i] = 0.5F * (photocurrent[i] + now[i]);
+        photocurrent[i] = now[i];
       }
-    } else {
+    }
+    if constexpr (kLagging) {
+      // The exact answer to a straight line of the input, from dv/dE = u - v:
+      // lag' = lag exp(-E) - step (1 - exp(-E)) / E, with the integral E of the rate over the interval.
+      double* lag = lag_.data() + begin;
+      for (int i = 0; i < count; ++i) exponent[i] = relaxation_exponent(interval.relaxations * mean[i]);
       for (int i = 0; i < count; ++i) {
-        const std::int32_t level_now = level_of(1.0F + in[i] * interval.per_dark);
-        rise[i] = level_now - level[i];
-        level[i] = level_now;
+        const Relaxation relaxed = relaxation(exponent[i]);
+        gone[i] = relaxed.gone;
+        catch_up[i] = relaxed.mean_left * (static_cast<float>(rise[i]) * static_cast<float>(1.0 / kLevelPerLog2));
+      }
+      for (int i = 0; i < count; ++i) {
+        const double before = lag[i];
+        const double after = before - before * gone[i] - catch_up[i];
+        lag[i] = after;
+        rise[i] += static_cast<std::int32_t>(after * kLevelPerLog2) - static_cast<std::int32_t>(before * kLevelPerLog2);
       }
     }
 
@@ -289,22 +290,20 @@ void EventPixels::watch_row(const Interval& interval, const float* light, int ro
       const std::int32_t after = change[i] + rise[i] + interval.small_leak;
       change[i] = after;
       calls[i] = static_cast<std::int32_t>(after >= on[i]) | static_cast<std::int32_t>(after <= -off[i]);
-      any |= calls[i];
     }
     if constexpr (kNoisy) {
+      double* wait = wait_.data() + begin;
       for (int i = 0; i < count; ++i) {
-        const auto due = static_cast<std::int32_t>(wait_[begin + i] <= 0.0);
-        calls[i] |= due;
-        any |= due;
+        waits[i] = interval.dark_waits / (1.0F + (mean[i] - 1.0F) * interval.waits_fall);
       }
+      for (int i = 0; i < count; ++i) wait[i] -= waits[i];
+      for (int i = 0; i < count; ++i) calls[i] |= static_cast<std::int32_t>(static_cast<float>(wait[i]) <= 0.0F);
     }
     if (!blind_us_.empty()) {
-      for (int i = 0; i < count; ++i) {
-        const auto blind = static_cast<std::int32_t>(blind_us_[begin + i] > 0.0);
-        calls[i] |= blind;
-        any |= blind;
-      }
+      const double* blind = blind_us_.data() + begin;
+      for (int i = 0; i < count; ++i) calls[i] |= static_cast<std::int32_t>(static_cast<float>(blind[i]) > 0.0F);
     }
+    for (int i = 0; i < count; ++i) any |= calls[i];
     if (any == 0) continue;
 
     for (int i = 0; i < count; ++i) {

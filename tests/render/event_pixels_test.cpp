@@ -91,7 +91,7 @@ TEST(LogPhotocurrent, NeverFallsWhereTheLightGrows) {
 
 TEST(LogPhotocurrent, RelaxationIsTheExponential) {
   for (double e = 1e-12; e < 1e6; e *= 1.07) {
-    const Relaxation relaxed = relaxation(static_cast<float>(e));
+    const Relaxation relaxed = relaxation(relaxation_exponent(static_cast<float>(e)));
     const double x = static_cast<float>(e);
     EXPECT_NEAR(relaxed.gone / -std::expm1(-x), 1.0, 1e-6) << e;
     if (e < 50.0) {
