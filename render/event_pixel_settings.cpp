@@ -9,7 +9,7 @@
 namespace touchstone::render {
 namespace {
 
-constexpr double kLargestThreshold = 10.0;
+constexpr double kLargestThreshold = 5.0;
 constexpr double kLongestRefractory_us = 1e9;
 constexpr double kFastestRate_hz = 1e6;  // one a microsecond, the finest time there is
 

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -13,6 +12,7 @@
 #include "core/error.h"
 #include "core/random.h"
 #include "core/units.h"
+#include "render/event_order.h"
 #include "render/log_photocurrent.h"
 
 namespace touchstone::render {
@@ -64,9 +64,11 @@ NoiseEvent noise_event(std::uint64_t seed, std::uint32_t x, std::uint32_t y, std
   return {wait, stream.uniform() < 0.5};
 }
 
+// Of one pixel. The most sensitive tail is cut, or a pixel at zero would fire for ever, and so is what 32 bits of level
+// wouldn't hold together with the largest change of light.
 std::int32_t threshold_level(double mean, double spread, double normal) {
-  // A unit's least sensitive tail isn't cut; its most sensitive one is, or a pixel at zero would fire for ever.
-  const double threshold = std::max({mean + spread * normal, 0.1 * mean, kLeastEventThreshold});
+  constexpr double kLargest = 20.0;
+  const double threshold = std::clamp(mean + spread * normal, std::max(0.1 * mean, kLeastEventThreshold), kLargest);
   return static_cast<std::int32_t>(std::lround(threshold * kLevelPerLog));
 }
 
@@ -113,7 +115,7 @@ EventPixels::EventPixels(const EventPixelSettings& settings, cv::Size size, std:
     wait_.resize(pixels);
     noise_count_.resize(pixels);
   }
-  bands_.resize(static_cast<std::size_t>((size.height + kRowsOfBand - 1) / kRowsOfBand));
+  band_events_.resize(static_cast<std::size_t>((size.height + kRowsOfBand - 1) / kRowsOfBand));
 
   tbb::parallel_for(0, size.height, [&](int y) {
     std::size_t pixel = static_cast<std::size_t>(y) * static_cast<std::size_t>(size.width);
@@ -219,12 +221,18 @@ void EventPixels::advance(const cv::Mat& intensity, std::int64_t t_us, std::vect
     interval.waits_fall = static_cast<float>(std::min(settings_.dark_intensity / settings_.shot_half_intensity, 1e18));
   }
   last_us_ = t_us;
-  tbb::parallel_for(0, static_cast<int>(bands_.size()), [&](int band) { watch_band(interval, intensity, band); });
-  sort_into(interval, events);
+  tbb::parallel_for(0, static_cast<int>(band_events_.size()), [&](int band) { watch_band(interval, intensity, band); });
+  collected_.clear();
+  for (const std::vector<Event>& of_band : band_events_) {
+    collected_.insert(collected_.end(), of_band.begin(), of_band.end());
+  }
+  // Bands come in the order of (y, x, t, polarity); sorted by t and else left as it was, that is (t, y, x, polarity).
+  sort_by_time(collected_, spare_, interval.begin_us, t_us);
+  events.insert(events.end(), collected_.begin(), collected_.end());
 }
 
 void EventPixels::watch_band(const Interval& interval, const cv::Mat& intensity, int band) {
-  std::vector<Event>& events = bands_[static_cast<std::size_t>(band)].events;
+  std::vector<Event>& events = band_events_[static_cast<std::size_t>(band)];
   events.clear();
   const int end = std::min(size_.height, (band + 1) * kRowsOfBand);
   for (int row = band * kRowsOfBand; row < end; ++row) {
@@ -404,34 +412,6 @@ void EventPixels::fire_with_noise(const Interval& interval, const PixelChange& c
   change_[change.pixel] = static_cast<std::int32_t>(std::clamp(std::nearbyint(level), 1.0 - off, on - 1.0));
   if (!blind_us_.empty()) blind_us_[change.pixel] = blind_left;
   if (noise_at < kNever) wait_[change.pixel] = (noise_at - length) * waits_per_us;
-}
-
-void EventPixels::sort_into(const Interval& interval, std::vector<Event>& events) {
-  // The bands come in the order of (y, x, t, polarity); a stable sort by t gives (t, y, x, polarity). By digits of the
-  // time since the interval's begin, from the lowest.
-  std::size_t total = 0;
-  for (const Band& band : bands_) total += band.events.size();
-  if (total == 0) return;
-  unsorted_.clear();
-  unsorted_.reserve(total);
-  for (const Band& band : bands_) unsorted_.insert(unsorted_.end(), band.events.begin(), band.events.end());
-  half_sorted_.resize(total);
-  constexpr int kDigitBits = 11;
-  constexpr std::uint64_t kDigitMask = (1u << kDigitBits) - 1;
-  const auto bits = static_cast<int>(std::bit_width(static_cast<std::uint64_t>(interval.length_us)));
-  std::array<std::size_t, kDigitMask + 1> begin_of;
-  for (int shift = 0; shift < bits; shift += kDigitBits) {
-    const auto digit = [&](const Event& event) {
-      return (static_cast<std::uint64_t>(event.t_us - interval.begin_us) >> shift) & kDigitMask;
-    };
-    begin_of.fill(0);
-    for (const Event& event : unsorted_) ++begin_of[digit(event)];
-    std::size_t sum = 0;
-    for (std::size_t& begin : begin_of) sum += std::exchange(begin, sum);
-    for (const Event& event : unsorted_) half_sorted_[begin_of[digit(event)]++] = event;
-    std::swap(unsorted_, half_sorted_);
-  }
-  events.insert(events.end(), unsorted_.begin(), unsorted_.end());
 }
 
 }  // namespace touchstone::render

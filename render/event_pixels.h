@@ -98,9 +98,6 @@ class EventPixels {
  private:
   struct Interval;
   struct PixelChange;
-  struct Band {
-    std::vector<Event> events;
-  };
 
   void start(const cv::Mat& intensity);
   template <bool kLagging, bool kNoisy>
@@ -108,7 +105,6 @@ class EventPixels {
   void watch_band(const Interval& interval, const cv::Mat& intensity, int band);
   void fire(const Interval& interval, const PixelChange& change, std::vector<Event>& events);
   void fire_with_noise(const Interval& interval, const PixelChange& change, std::vector<Event>& events);
-  void sort_into(const Interval& interval, std::vector<Event>& events);
 
   EventPixelSettings settings_;
   cv::Size size_;
@@ -127,8 +123,8 @@ class EventPixels {
   std::vector<double> wait_;                        // until the next noise event, in mean waiting times
   std::vector<std::uint32_t> noise_count_;
 
-  std::vector<Band> bands_;  // rows are watched in bands, whatever the threads
-  std::vector<Event> unsorted_, half_sorted_;
+  std::vector<std::vector<Event>> band_events_;  // rows are watched in bands, whatever the threads
+  std::vector<Event> collected_, spare_;
 };
 
 }  // namespace touchstone::render

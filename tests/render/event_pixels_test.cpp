@@ -18,6 +18,7 @@
 #include "core/random.h"
 #include "core/sha256.h"
 #include "core/units.h"
+#include "render/event_order.h"
 #include "render/log_photocurrent.h"
 
 namespace touchstone::render {
@@ -98,6 +99,43 @@ TEST(LogPhotocurrent, RelaxationIsTheExponential) {
       EXPECT_NEAR(relaxed.mean_left / (-std::expm1(-x) / x), 1.0, 1e-6) << e;
     }
   }
+}
+
+TEST(EventOrder, IsByTimeAndElseAsItWas) {
+  RandomStream random(2, 0, Purpose::kTest);
+  for (const std::int64_t length : {std::int64_t{1}, std::int64_t{2047}, std::int64_t{2048}, std::int64_t{1} << 40}) {
+    std::vector<Event> events;
+    for (int i = 0; i < 5000; ++i) {
+      const auto us = static_cast<std::int64_t>(random.uniform() * static_cast<double>(length));
+      events.push_back({-7 + 1 + us, static_cast<std::uint16_t>(i), 0, false});
+    }
+    std::vector<Event> expected = events;
+    std::stable_sort(expected.begin(), expected.end(), [](const Event& a, const Event& b) { return a.t_us < b.t_us; });
+    std::vector<Event> spare;
+    sort_by_time(events, spare, -7, -7 + length);
+    for (std::size_t i = 0; i < events.size(); ++i) ASSERT_EQ(order_of(events[i]), order_of(expected[i])) << length;
+  }
+}
+
+TEST(EventPixels, TheLargestThresholdsAndStepsStayInTheirBits) {
+  EventPixelSettings settings = ideal(5.0, 5.0);
+  settings.threshold_spread = 5.0;
+  settings.dark_intensity = 1.0;
+  settings.leak_rate_hz = 0.3;
+  const cv::Size size(100, 80);
+  EventPixels pixels(settings, size, 1, 1);
+  std::vector<Event> events;
+  const auto largest = static_cast<double>(static_cast<float>(kLargestPhotocurrent) * 0.99F);
+  pixels.advance(flat(0.0, size.width, size.height), 0, events);
+  pixels.advance(flat(largest, size.width, size.height), 8000000, events);
+  const double change = std::log(largest) + 12.0;  // light and leak
+  double expected = 0.0;
+  for (int y = 0; y < size.height; ++y) {
+    for (int x = 0; x < size.width; ++x) expected += change / pixels.thresholds().at<cv::Vec2f>(y, x)[0];
+  }
+  // The leak begins at a random phase, so the mean count is the change over the threshold, rounded without bias.
+  EXPECT_NEAR(static_cast<double>(events.size()), expected, 5.0 * 0.5 * std::sqrt(size.area()));
+  EXPECT_TRUE(std::all_of(events.begin(), events.end(), [](const Event& event) { return event.on; }));
 }
 
 TEST(EventPixels, ARampGivesItsChangeOverTheThreshold) {
@@ -483,7 +521,7 @@ TEST(EventPixels, BadSettingsAreRefusedNamingTheField) {
   refused("on_threshold", [](auto& s) { s.on_threshold = 0.5 * kLeastEventThreshold; });
   refused("on_threshold", [nan](auto& s) { s.on_threshold = nan; });
   refused("off_threshold", [](auto& s) { s.off_threshold = 0.0; });
-  refused("off_threshold", [](auto& s) { s.off_threshold = 11.0; });
+  refused("off_threshold", [](auto& s) { s.off_threshold = 5.1; });
   refused("threshold_spread", [](auto& s) { s.threshold_spread = -0.1; });
   refused("threshold_spread", [](auto& s) { s.threshold_spread = 0.21; });
   refused("dark_intensity", [](auto& s) { s.dark_intensity = 0.0; });
