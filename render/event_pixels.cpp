@@ -373,9 +373,8 @@ void EventPixels::fire_with_noise(const Interval& interval, const PixelChange& c
   };
 
   for (;;) {
-    if (blind_until > at) {  // what happens meanwhile is lost, and d begins anew
+    if (blind_until > at) {  // the level stays at 0, and noise that comes meanwhile is lost
       while (noise_at <= std::min(blind_until, length)) next_noise();
-      level = 0.0;
       if (blind_until >= length) {
         blind_left = blind_until - length;
         break;
