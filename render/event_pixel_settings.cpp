@@ -56,7 +56,7 @@ EventPixelSettings davis240c(double intensity_at_1klux) {
   settings.refractory_us = 500;
   settings.leak_rate_hz = 0.1;
   settings.shot_rate_hz = 5.0;
-  settings.shot_half_intensity = intensity_at_1klux / 3.0;
+  settings.shot_half_intensity = 1e-3 * intensity_at_1klux;
   return settings;
 }
 

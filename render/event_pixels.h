@@ -49,13 +49,14 @@ inline constexpr int kDavis240cWidth = 240;
 inline constexpr int kDavis240cHeight = 180;
 
 /// The DAVIS 240C (C. Brandli et al. 2014, "A 240x180 130 dB 3 us latency global shutter spatiotemporal vision
-/// sensor"), where `intensity_at_1klux` is the intensity of a white surface under 1 klux. Published: threshold mismatch
-/// 3.5 % contrast (Brandli), smallest threshold 11 % and 0.1 noise events per pixel and second at 25 degrees in steady
-/// light (G. Gallego et al. 2020, "Event-based vision: a survey", table 1), taken as the leak; bandwidth 3 kHz at 1
-/// klux (Lichtsteiner 2008, of the same photoreceptor), dynamic range 120 dB (survey) up to 100 klux, hence the dark's
-/// current as of 0.1 lux. What the biases of a camera decide isn't published as one number: thresholds of 0.2 and a
-/// refractory time of 0.5 ms, and shot noise of 5 events/s in the dark that falls to a quarter in full light, are what
-/// the v2e program takes for DAVIS cameras.
+/// sensor"), where `intensity_at_1klux` is the intensity of a white surface under 1 klux.
+/// Published: threshold mismatch 3.5 % contrast (Brandli); 0.1 events per pixel and second in steady light at 25
+/// degrees and a dynamic range of 120 dB (G. Gallego et al. 2020, "Event-based vision: a survey", table 1), taken as
+/// the leak and, up to 100 klux, as a dark current like that of 0.1 lux; bandwidth 3 kHz at 1 klux (Lichtsteiner 2008,
+/// the DVS128, whose photoreceptor it has). Set by a camera's biases, so not one number: thresholds of 0.2 (the
+/// smallest published is 0.11) and a refractory time of 0.5 ms, which the v2e program takes for such cameras, as well
+/// as 5 shot events/s where it's dark. That they are half as many at 1 lux is our choice: above some 50 lux the leak is
+/// then more than they are.
 EventPixelSettings davis240c(double intensity_at_1klux);
 
 /// The natural logarithms of `intensity` + dark, CV_32FC1.

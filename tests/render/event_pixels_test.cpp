@@ -524,6 +524,21 @@ TEST(EventPixels, AnyNumberOfThreadsGivesTheSameEvents) {
   EXPECT_EQ(hashes[0], hashes[2]);
 }
 
+TEST(EventPixels, PresetMeetsThePublishedNoiseOfTheSensor) {
+  const cv::Size size(kDavis240cWidth, kDavis240cHeight);
+  const double klux = 2e4;
+  EventPixels steady(davis240c(klux), size, 1, 1);
+  const double bright = static_cast<double>(watch(
+                                                steady, [&](double) { return klux; }, 0, 5000000, 1000000)
+                                                .size());
+  EXPECT_NEAR(bright / (5.0 * size.area()), 0.1, 0.01);  // per pixel and second
+  EventPixels unlit(davis240c(klux), size, 1, 1);
+  const double dark = static_cast<double>(watch(
+                                              unlit, [](double) { return 0.0; }, 0, 500000, 100000)
+                                              .size());
+  EXPECT_NEAR(dark / (0.5 * size.area()), 5.0, 0.15);
+}
+
 TEST(EventPixels, BadPicturesAreRefusedAndChangeNothing) {
   EventPixels pixels(ideal(), {60, 50}, 1, 1);
   std::vector<Event> events;
