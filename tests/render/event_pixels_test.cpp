@@ -1,4 +1,4 @@
-// Event pixels against closed forms: counts and times of ramps, the low-pass, rates of leak and noise.
+// Event pixels without noise against closed forms: counts and times; hard light and bad input.
 #include "render/event_pixels.h"
 
 #include <gmock/gmock.h>
@@ -11,95 +11,17 @@
 #include <limits>
 #include <opencv2/core.hpp>
 #include <string>
-#include <tuple>
 #include <vector>
 
 #include "core/error.h"
 #include "core/random.h"
 #include "core/sha256.h"
-#include "core/units.h"
+#include "event_light.h"
 #include "render/event_order.h"
 #include "render/log_photocurrent.h"
 
 namespace touchstone::render {
 namespace {
-
-// Pixels without noise or lag, all alike, that hardly see the dark's current.
-EventPixelSettings ideal(double on = 0.2, double off = 0.2) {
-  EventPixelSettings settings;
-  settings.on_threshold = on;
-  settings.off_threshold = off;
-  settings.dark_intensity = 1e-9;
-  return settings;
-}
-
-cv::Mat flat(double intensity, int width = 1, int height = 1) {
-  return cv::Mat(height, width, CV_32FC1, cv::Scalar(intensity));
-}
-
-// The events of one picture after the other; light(t) is the same for all pixels.
-std::vector<Event> watch(EventPixels& pixels, const std::function<double(double)>& light, std::int64_t begin_us,
-                         std::int64_t end_us, std::int64_t step_us) {
-  std::vector<Event> events;
-  for (std::int64_t t = begin_us; t <= end_us; t += step_us) {
-    pixels.advance(flat(light(static_cast<double>(t)), pixels.size().width, pixels.size().height), t, events);
-  }
-  return events;
-}
-
-std::string message_of(const std::function<void()>& action) {
-  try {
-    action();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  ADD_FAILURE() << "nothing was refused";
-  return {};
-}
-
-auto order_of(const Event& event) {
-  return std::tuple(event.t_us, event.y, event.x, event.on);
-}
-
-bool in_order(const std::vector<Event>& events) {
-  return std::is_sorted(events.begin(), events.end(),
-                        [](const Event& a, const Event& b) { return order_of(a) < order_of(b); });
-}
-
-TEST(LogPhotocurrent, IsTheLogarithmOverAllMagnitudes) {
-  RandomStream random(1, 0, Purpose::kTest);
-  double worst = 0.0;
-  for (int i = 0; i < 200000; ++i) {
-    const auto x = static_cast<float>(std::exp2(120.0 * random.uniform() - 60.0));
-    worst = std::max(worst, std::abs(level_of(x) / kLevelPerLog2 - std::log2(static_cast<double>(x))));
-  }
-  EXPECT_LT(worst, 2e-7);
-  for (int e = -60; e <= 60; ++e) {
-    EXPECT_EQ(level_of(static_cast<float>(std::exp2(e))), e * (1 << 24));
-  }
-}
-
-TEST(LogPhotocurrent, NeverFallsWhereTheLightGrows) {
-  std::int32_t last = level_of(1.0F);
-  float x = 1.0F;
-  for (int i = 0; i < 2000000; ++i) {
-    x = std::nextafter(x, 10.0F);
-    const std::int32_t level = level_of(x);
-    ASSERT_GE(level, last - 1) << x;  // one unit, 6e-8 in log2, is what rounding may do
-    last = std::max(last, level);
-  }
-}
-
-TEST(LogPhotocurrent, RelaxationIsTheExponential) {
-  for (double e = 1e-12; e < 1e6; e *= 1.07) {
-    const Relaxation relaxed = relaxation(relaxation_exponent(static_cast<float>(e)));
-    const double x = static_cast<float>(e);
-    EXPECT_NEAR(relaxed.gone / -std::expm1(-x), 1.0, 1e-6) << e;
-    if (e < 50.0) {
-      EXPECT_NEAR(relaxed.mean_left / (-std::expm1(-x) / x), 1.0, 1e-6) << e;
-    }
-  }
-}
 
 TEST(EventOrder, IsByTimeAndElseAsItWas) {
   RandomStream random(2, 0, Purpose::kTest);
@@ -231,235 +153,6 @@ TEST(EventPixels, ConstantLightIsSilent) {
   }
 }
 
-TEST(EventPixels, TheLowPassIsTheExponentialHoweverDenselyFramesCome) {
-  EventPixelSettings settings = ideal();
-  settings.bandwidth_hz = 30.0;
-  settings.reference_intensity = 2.0;
-  settings.dark_intensity = 0.01;
-  for (const double light : {0.5, 2.0}) {
-    const double tau_us = 1e6 / (2.0 * kPi * 30.0 * (light + 0.01) / 2.0);
-    for (const std::int64_t step : {20, 1000, 7000}) {
-      EventPixels pixels(settings, {1, 1}, 1, 1);
-      std::vector<Event> events;
-      pixels.advance(flat(0.1), -1, events);
-      pixels.advance(flat(light), 0, events);  // a step within 1 us
-      const double change = std::log(light + 0.01) - std::log(0.11);
-      for (std::int64_t t = step; t <= 14000; t += step) {
-        pixels.advance(flat(light), t, events);
-        const double expected = std::log(light + 0.01) - change * std::exp(-static_cast<double>(t) / tau_us);
-        EXPECT_NEAR(pixels.photoreceptor_output().at<double>(0, 0), expected, 2e-4 * change) << step << " " << t;
-      }
-    }
-  }
-}
-
-TEST(EventPixels, ALaggingPixelFollowsARampBehindByItsTimeConstant) {
-  // At a bandwidth that hardly changes along the ramp, v = u - rate tau once it has settled.
-  EventPixelSettings settings = ideal();
-  settings.bandwidth_hz = 50.0;
-  settings.reference_intensity = 1.0;
-  settings.dark_intensity = 100.0;  // nearly all of the current: f3dB = 50 * 101 Hz and hardly changes
-  EventPixels pixels(settings, {1, 1}, 1, 1);
-  std::vector<Event> events;
-  for (std::int64_t t = 0; t <= 20000; t += 100) {
-    pixels.advance(flat(100.0 * (1e-3 * static_cast<double>(t) / 20000.0)), t, events);
-  }
-  const double tau_us = 1e6 / (2.0 * kPi * 50.0 * 100.1);
-  const double expected = std::log(100.1) - 1e-3 / 20000.0 * tau_us;
-  EXPECT_NEAR(pixels.photoreceptor_output().at<double>(0, 0), expected, 4e-7);
-}
-
-TEST(EventPixels, TheLowPassConvergesWithTheSquareOfTheFrameInterval) {
-  // Light, and with it the bandwidth, grows 20 fold: an interval's answer is exact for a straight line at the mean
-  // rate.
-  EventPixelSettings settings = ideal();
-  settings.bandwidth_hz = 40.0;
-  settings.reference_intensity = 1.0;
-  const auto output = [&](std::int64_t step) {
-    EventPixels pixels(settings, {1, 1}, 1, 1);
-    watch(
-        pixels, [](double t) { return 0.2 * std::exp(3.0 * std::pow(t / 16000.0, 2)); }, 0, 16000, step);
-    return pixels.photoreceptor_output().at<double>(0, 0);
-  };
-  const double truth = output(5);
-  EXPECT_GT(std::log(0.2) + 3.0 - truth, 0.05);  // it lags
-  const double coarse = output(500) - truth;
-  const double fine = output(250) - truth;
-  EXPECT_NEAR(coarse / fine, 4.0, 0.6);
-  EXPECT_LT(std::abs(fine), 2e-3);
-}
-
-TEST(EventPixels, TheDarkIsSlow) {
-  EventPixelSettings settings = ideal();
-  settings.bandwidth_hz = 100.0;
-  settings.reference_intensity = 1.0;
-  settings.dark_intensity = 1e-4;
-  std::vector<std::int64_t> first;
-  for (const double light : {1.0, 0.01}) {
-    EventPixels pixels(settings, {1, 1}, 1, 1);
-    const std::vector<Event> events = watch(
-        pixels, [&](double t) { return t < 50.0 ? light : 2.0 * light; }, 0, 1000000, 100);
-    ASSERT_FALSE(events.empty());
-    first.push_back(events.front().t_us);
-  }
-  EXPECT_GT(first[1], 50 * first[0]);
-}
-
-TEST(EventPixels, LeakGivesOnEventsAtItsRate) {
-  EventPixelSettings settings = ideal(0.25, 0.2);
-  settings.leak_rate_hz = 3.0;
-  const cv::Size size(40, 30);
-  for (const std::int64_t step : {1000, 250000}) {
-    EventPixels pixels(settings, size, 1, 1);
-    const std::vector<Event> events = watch(
-        pixels, [](double) { return 1.0; }, 0, 5000000, step);
-    // A ramp at a random phase: 15 events of each pixel, but for one at either end.
-    EXPECT_NEAR(static_cast<double>(events.size()), 15.0 * size.area(), 2.0);
-    std::vector<std::int64_t> last(static_cast<std::size_t>(size.area()), -1);
-    for (const Event& event : events) {
-      EXPECT_TRUE(event.on);
-      std::int64_t& before = last[static_cast<std::size_t>(event.y * size.width + event.x)];
-      if (before >= 0) {
-        EXPECT_NEAR(static_cast<double>(event.t_us - before), 1e6 / 3.0, 1.5);
-      }
-      before = event.t_us;
-    }
-    // The pixels don't leak in step.
-    const auto early = std::count_if(events.begin(), events.end(), [](const Event& e) { return e.t_us < 166667; });
-    EXPECT_NEAR(static_cast<double>(early), 600.0, 6.0 * std::sqrt(300.0));
-  }
-}
-
-TEST(EventPixels, ALeakOfLongStandingLosesNothing) {
-  EventPixelSettings settings = ideal();
-  settings.leak_rate_hz = 1e4;
-  EventPixels pixels(settings, {1, 1}, 1, 1);
-  // 2000 log units in one interval: more than 32 bits of level hold.
-  const std::vector<Event> events = watch(
-      pixels, [](double) { return 1.0; }, 0, 1000000, 1000000);
-  EXPECT_NEAR(static_cast<double>(events.size()), 10000.0, 1.0);
-}
-
-TEST(EventPixels, ShotNoiseIsPoissonAndFallsWithTheLight) {
-  EventPixelSettings settings = ideal();
-  settings.shot_rate_hz = 4.0;
-  settings.shot_half_intensity = 2.0;
-  const cv::Size size(64, 40);
-  for (const double light : {0.0, 2.0, 14.0}) {
-    const double rate = 4.0 / (1.0 + light / 2.0);
-    for (const std::int64_t step : {500, 500000}) {
-      EventPixels pixels(settings, size, 1, 77);
-      const std::vector<Event> events = watch(
-          pixels, [light](double) { return light; }, 0, 2000000, step);
-      const double mean = 2.0 * rate * size.area();
-      const auto count = static_cast<double>(events.size());
-      EXPECT_NEAR(count, mean, 4.5 * std::sqrt(mean)) << light;
-      const auto on = std::count_if(events.begin(), events.end(), [](const Event& event) { return event.on; });
-      EXPECT_NEAR(static_cast<double>(on), 0.5 * count, 4.5 * 0.5 * std::sqrt(count));
-      // Counts of the pixels: variance equals mean.
-      cv::Mat counts = cv::Mat::zeros(size, CV_64F);
-      for (const Event& event : events) counts.at<double>(event.y, event.x) += 1.0;
-      cv::Scalar average, deviation;
-      cv::meanStdDev(counts, average, deviation);
-      const double variance = deviation[0] * deviation[0];
-      const double m = average[0];
-      EXPECT_NEAR(variance, m, 4.5 * std::sqrt((2.0 * m * m + m) / size.area()));
-      EXPECT_TRUE(in_order(events));
-    }
-  }
-}
-
-TEST(EventPixels, ShotNoiseFollowsTheLightBetweenFrames) {
-  // Light grows from 0 to 6 times the half light, by 4.1 log units: below the thresholds, so that all events are noise.
-  // Over frames that come densely the rate is integrated, over a single interval it's that of the mean light.
-  EventPixelSettings settings = ideal(5.0, 5.0);
-  settings.dark_intensity = 0.1;
-  settings.shot_rate_hz = 30.0;
-  settings.shot_half_intensity = 1.0;
-  const cv::Size size(64, 50);
-  for (const std::int64_t step : {10000, 1000000}) {
-    EventPixels pixels(settings, size, 1, 3);
-    const std::vector<Event> events = watch(
-        pixels, [](double t) { return 6.0 * t / 1e6; }, 0, 1000000, step);
-    const double mean = 30.0 * (step == 1000000 ? 1.0 / 4.0 : std::log(7.0) / 6.0) * size.area();
-    EXPECT_NEAR(static_cast<double>(events.size()), mean, 4.5 * std::sqrt(mean)) << step;
-  }
-}
-
-TEST(EventPixels, NoiseDoesntDependOnHowDenselyFramesCome) {
-  EventPixelSettings settings = ideal();
-  settings.shot_rate_hz = 20.0;
-  settings.shot_half_intensity = 1.0;
-  std::vector<std::vector<Event>> runs;
-  for (const std::int64_t step : {1000, 50000}) {
-    EventPixels pixels(settings, {16, 16}, 1, 5);
-    runs.push_back(watch(
-        pixels, [](double) { return 0.5; }, 0, 500000, step));
-  }
-  ASSERT_EQ(runs[0].size(), runs[1].size());
-  for (std::size_t i = 0; i < runs[0].size(); ++i) {
-    EXPECT_NEAR(static_cast<double>(runs[0][i].t_us), static_cast<double>(runs[1][i].t_us), 1.0);
-  }
-}
-
-TEST(EventPixels, TheRefractoryTimeBoundsTheRate) {
-  EventPixelSettings settings = ideal();
-  settings.refractory_us = 300;
-  settings.shot_rate_hz = 2000.0;
-  settings.shot_half_intensity = 1e9;
-  for (const std::int64_t step : {50, 1000, 20000}) {
-    EventPixels pixels(settings, {4, 4}, 1, 9);
-    const std::vector<Event> events = watch(
-        pixels, [](double t) { return std::exp(2.0 * std::sin(t / 1000.0)); }, 0, 100000, step);
-    EXPECT_GT(events.size(), 1000u);
-    std::vector<std::int64_t> last(16, -1000);
-    for (const Event& event : events) {
-      std::int64_t& before = last[static_cast<std::size_t>(event.y * 4 + event.x)];
-      ASSERT_GE(event.t_us - before, 300);
-      before = event.t_us;
-    }
-  }
-}
-
-TEST(EventPixels, ARefractoryPixelBeginsAnewAtItsEnd) {
-  // On a ramp an event comes every C / rate + refractory time, however frames fall.
-  EventPixelSettings settings = ideal();
-  settings.refractory_us = 700;
-  for (const std::int64_t step : {90, 1000, 30000}) {
-    EventPixels pixels(settings, {1, 1}, 1, 1);
-    const double rate = 1e-4;
-    const std::vector<Event> events = watch(
-        pixels, [&](double t) { return 1e-3 * std::exp(rate * t); }, 0, 180000, step);
-    ASSERT_GE(events.size(), 66u);
-    for (std::size_t i = 0; i < events.size(); ++i) {
-      EXPECT_NEAR(static_cast<double>(events[i].t_us), 2000.0 + 2700.0 * static_cast<double>(i), 2.0) << step;
-    }
-  }
-}
-
-TEST(EventPixels, ThresholdsAreGaussianAndTheUnitsOwn) {
-  EventPixelSettings settings = ideal(0.3, 0.2);
-  settings.threshold_spread = 0.02;
-  const cv::Size size(200, 150);
-  const EventPixels one(settings, size, 1, 1);
-  const EventPixels again(settings, size, 1, 2);
-  const EventPixels other(settings, size, 2, 1);
-  cv::Scalar mean, deviation;
-  cv::meanStdDev(one.thresholds(), mean, deviation);
-  EXPECT_NEAR(mean[0], 0.3, 5.0 * 0.02 / std::sqrt(30000.0));
-  EXPECT_NEAR(mean[1], 0.2, 5.0 * 0.02 / std::sqrt(30000.0));
-  EXPECT_NEAR(deviation[0], 0.02, 5.0 * 0.02 / std::sqrt(60000.0));
-  EXPECT_NEAR(deviation[1], 0.02, 5.0 * 0.02 / std::sqrt(60000.0));
-  EXPECT_EQ(cv::norm(one.thresholds(), again.thresholds(), cv::NORM_INF), 0.0);
-  EXPECT_GT(cv::norm(one.thresholds(), other.thresholds(), cv::NORM_INF), 0.05);
-  // A pixel of a larger picture is the same pixel.
-  const EventPixels larger(settings, {300, 200}, 1, 1);
-  EXPECT_EQ(cv::norm(one.thresholds(), larger.thresholds()(cv::Rect(0, 0, 200, 150)), cv::NORM_INF), 0.0);
-  settings.threshold_spread = 0.2;  // half the tail would be below zero
-  const EventPixels uneven(settings, size, 1, 1);
-  EXPECT_GE(uneven.smallest_threshold(), 0.02 - 1e-6);
-}
-
 TEST(EventPixels, ZeroAndHugeStepsStayFinite) {
   EventPixelSettings settings = ideal();
   settings.dark_intensity = 1.0;
@@ -522,21 +215,6 @@ TEST(EventPixels, AnyNumberOfThreadsGivesTheSameEvents) {
   }
   EXPECT_EQ(hashes[0], hashes[1]);
   EXPECT_EQ(hashes[0], hashes[2]);
-}
-
-TEST(EventPixels, PresetMeetsThePublishedNoiseOfTheSensor) {
-  const cv::Size size(kDavis240cWidth, kDavis240cHeight);
-  const double klux = 2e4;
-  EventPixels steady(davis240c(klux), size, 1, 1);
-  const double bright = static_cast<double>(watch(
-                                                steady, [&](double) { return klux; }, 0, 5000000, 1000000)
-                                                .size());
-  EXPECT_NEAR(bright / (5.0 * size.area()), 0.1, 0.01);  // per pixel and second
-  EventPixels unlit(davis240c(klux), size, 1, 1);
-  const double dark = static_cast<double>(watch(
-                                              unlit, [](double) { return 0.0; }, 0, 500000, 100000)
-                                              .size());
-  EXPECT_NEAR(dark / (0.5 * size.area()), 5.0, 0.15);
 }
 
 TEST(EventPixels, BadPicturesAreRefusedAndChangeNothing) {
