@@ -12,6 +12,8 @@ enum class Purpose : std::uint32_t {
   kImagerPattern = 3,
   kPlacement = 4,
   kMotion = 5,
+  kEventThreshold = 6,
+  kEventNoise = 7,
   kTest = 99,
 };
 
