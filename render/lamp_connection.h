@@ -28,8 +28,8 @@ struct Arrival {
 
 /// What ThinFilms between two points of one medium let through.
 template <int N>
-Bands<N> passed_by_films(const PreparedScene<N>& scene, const Eigen::Vector3d& from, const Eigen::Vector3d& to,
-                         int medium) {
+[[gnu::noinline]] Bands<N> passed_by_films(const PreparedScene<N>& scene, const Eigen::Vector3d& from,
+                                           const Eigen::Vector3d& to, int medium) {
   Bands<N> passed = Bands<N>::Ones();
   const Eigen::Vector3d way = to - from;
   const double length = way.norm();
@@ -139,7 +139,7 @@ bool connect_to_lamp(const PreparedScene<N>& scene, const PreparedLamp<N>& lamp,
                 corner.z() - sense * layers[k].thickness};
       }
       if (scene.rays.occluded(end, next)) return false;
-      if (scene.rays.has_films()) light *= passed_by_films(scene, end, next, media[k]);
+      if (scene.has_films) light *= passed_by_films(scene, end, next, media[k]);
       corner = next;
       end = next;
     }
@@ -153,7 +153,7 @@ bool connect_to_lamp(const PreparedScene<N>& scene, const PreparedLamp<N>& lamp,
     ++connections;
     const Eigen::Vector3d end = p + RayScene::leave_distance(p) * receiver.normal;
     if (scene.rays.occluded(end, source)) return false;
-    if (scene.rays.has_films()) light *= passed_by_films(scene, end, source, receiver.medium);
+    if (scene.has_films) light *= passed_by_films(scene, end, source, receiver.medium);
   }
   constexpr double kSquareMillimetresPerSquareMetre = 1e6;
   arrival.irradiance = light * (profile * per_area * kSquareMillimetresPerSquareMetre);

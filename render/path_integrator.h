@@ -6,7 +6,6 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <optional>
 
 #include "render/fresnel.h"
 #include "render/ggx.h"
@@ -134,7 +133,7 @@ class PathIntegrator {
 
   /// The way to the leg's end was free.
   void pass(Leg& leg, const Flight<N>* flight, double distance) const {
-    if (flight == nullptr) {
+    if (flight == nullptr) [[likely]] {
       absorb(leg, distance);
     } else {
       leg.throughput *= weight_of_passing(scene_.media[leg.medium].extinction, *flight, distance);
@@ -248,8 +247,8 @@ class PathIntegrator {
   }
 
   /// The leg ends on a film: it goes on straight, and where the film mirrors one of two ways as in part().
-  void meet_film(Leg& leg, const RayHit& hit, const PreparedMaterial<N>& material, Branches& branches,
-                 SampleSequence& numbers) const {
+  [[gnu::noinline]] void meet_film(Leg& leg, const RayHit& hit, const PreparedMaterial<N>& material, Branches& branches,
+                                   SampleSequence& numbers) const {
     ++leg.smooth;
     const double along = leg.direction.dot(hit.normal);
     const Eigen::Vector3d facing = along < 0.0 ? hit.normal : Eigen::Vector3d(-hit.normal);
@@ -396,9 +395,14 @@ class PathIntegrator {
     return leg.throughput.maxCoeff() > 0.0;
   }
 
+  [[gnu::noinline]] Flight<N> fly(const Leg& leg, SampleSequence& numbers) const {
+    const auto [u, v] = numbers.next_pair();
+    return sample_flight<N>(scene_.media[leg.medium].extinction, leg.throughput, u, v);
+  }
+
   /// The leg ends at a particle of its medium, at its origin. Goes on in a new direction; false where the path ends.
-  bool scatter_in_medium(Leg& leg, const LampNumbers& chosen, SampleSequence& numbers, RayCounts& counts,
-                         Bands<N>& sum) const {
+  [[gnu::noinline]] bool scatter_in_medium(Leg& leg, const LampNumbers& chosen, SampleSequence& numbers,
+                                           RayCounts& counts, Bands<N>& sum) const {
     if (!(leg.throughput.maxCoeff() > 0.0)) return false;
     add_lamp_light_of_particle(leg, chosen, counts, sum);
     if (!interreflection_) return false;
@@ -437,13 +441,13 @@ class PathIntegrator {
         const double face_z = scene_.faces[up ? leg.layer : leg.layer - 1].z;
         to_face = std::max(0.0, (face_z - leg.origin.z()) / leg.direction.z());
       }
-      std::optional<Flight<N>> drawn;
+      Flight<N> drawn;  // uninitialised unless the medium scatters
       const Flight<N>* flight = nullptr;
       double most = to_face;
-      if (const PreparedMedium<N>& medium = scene_.media[leg.medium]; medium.scatters && !numbers.is_centre()) {
-        const auto [u, v] = numbers.next_pair();
-        flight = &drawn.emplace(sample_flight<N>(medium.extinction, leg.throughput, u, v));
-        most = std::min(most, flight->distance);
+      if (scene_.media[leg.medium].scatters && !numbers.is_centre()) [[unlikely]] {
+        drawn = fly(leg, numbers);
+        flight = &drawn;
+        most = std::min(most, drawn.distance);
       }
       RayHit hit;
       if (scene_.rays.intersect(leg.origin, leg.direction, most, hit)) {
@@ -464,9 +468,10 @@ class PathIntegrator {
               leg.direction.dot(hit.normal) < 0.0 ? hit.normal : Eigen::Vector3d(-hit.normal);
           const Bands<N>& colour = colour_at(material, hit);
           const LampNumbers chosen = leg.is_first_sight() ? at_first_hit : lamp_numbers(numbers);
-          add_lamp_light(leg, hit, normal, material, colour, chosen, numbers.is_centre(), counts, sum);
-          if (material.kind == SurfaceKind::kTransmitter) {
-            add_lamp_light(leg, hit, -normal, material, material.passed, chosen, numbers.is_centre(), counts, sum);
+          const int sides = material.kind == SurfaceKind::kTransmitter ? 2 : 1;
+          for (int side = 0; side < sides; ++side) {  // one call, so that the compiler inlines it
+            add_lamp_light(leg, hit, side == 0 ? normal : Eigen::Vector3d(-normal), material,
+                           side == 0 ? colour : material.passed, chosen, numbers.is_centre(), counts, sum);
           }
           if (!scatter(leg, hit, normal, material, colour, numbers)) return;
         }
@@ -481,7 +486,8 @@ class PathIntegrator {
         leg.origin += to_face * leg.direction;
         meet_face(leg, up, branches, numbers, sum);
       } else {
-        if (flight != nullptr) pass(leg, flight, to_face);
+        if (flight != nullptr) [[unlikely]]
+          pass(leg, flight, to_face);
         sum += leg.throughput * scene_.environment;
         return;
       }

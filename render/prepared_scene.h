@@ -80,9 +80,14 @@ struct PreparedScene {
   Bands<N> environment;
   bool interreflection;
   RayScene rays;
+  bool has_films;
 
   explicit PreparedScene(const Scene& scene)
-      : faces(scene.faces), environment(scene.environment), interreflection(scene.interreflection), rays(scene) {
+      : faces(scene.faces),
+        environment(scene.environment),
+        interreflection(scene.interreflection),
+        rays(scene),
+        has_films(rays.has_films()) {
     for (const Medium& medium : scene.media) {
       Bands<N> absorption = Bands<N>::Zero();
       if (medium.absorption.size() > 0) absorption = medium.absorption;
