@@ -12,6 +12,7 @@
 #include "render/lamp_connection.h"
 #include "render/path_tracer.h"
 #include "render/prepared_scene.h"
+#include "render/rough_dielectric.h"
 #include "render/sample_sequence.h"
 #include "render/scattering.h"
 #include "render/thin_film.h"
@@ -282,6 +283,67 @@ class PathIntegrator {
     branches.legs[branches.count++] = weaker;
   }
 
+  /// The leg ends on a RoughRefractive surface: lamp light from both sides, then one way on. False where the path ends.
+  [[gnu::noinline]] bool meet_rough_boundary(Leg& leg, const RayHit& hit, const PreparedMaterial<N>& material,
+                                             const LampNumbers& at_first_hit, Branches& branches,
+                                             SampleSequence& numbers, RayCounts& counts, Bands<N>& sum) const {
+    const bool entering = leg.direction.dot(hit.normal) < 0.0;
+    const int to = entering ? material.inside : material.outside;
+    const double n_out = scene_.media[leg.medium].index;
+    const double n_in = scene_.media[to].index;
+    if (n_out == n_in) {
+      meet_boundary(leg, hit, material, branches, numbers, sum);
+      return true;
+    }
+    const Eigen::Vector3d normal = entering ? hit.normal : Eigen::Vector3d(-hit.normal);
+    const NormalFrame frame(normal);
+    const Eigen::Vector3d out = frame.to_local(-leg.direction);
+    const LampNumbers chosen = leg.is_first_sight() ? at_first_hit : lamp_numbers(numbers);
+    for (int side = 0; side < 2 && !scene_.lamps.empty(); ++side) {
+      const Receiver receiver{hit.position, side == 0 ? normal : Eigen::Vector3d(-normal), leg.layer,
+                              side == 0 ? leg.medium : to};
+      // A preview has one sample and takes all lamps.
+      const int lamp_count = static_cast<int>(scene_.lamps.size());
+      const LampChoice choice = numbers.is_centre() ? LampChoice{0, 1.0} : choose_lamp(receiver, false, chosen.lamp);
+      const int last = numbers.is_centre() ? lamp_count : choice.lamp + 1;
+      for (int i = choice.lamp; i < last; ++i) {
+        const PreparedLamp<N>& lamp = scene_.lamps[i];
+        Arrival<N> arrival;
+        if (!connect_to_lamp(scene_, lamp, point_of_lens(lamp, chosen), receiver, counts.connections, arrival)) {
+          continue;
+        }
+        const Eigen::Vector3d in = frame.to_local(arrival.direction);
+        sum += leg.throughput * arrival.irradiance *
+               (rough_dielectric(out, in, material.roughness, n_out, n_in) * std::abs(in.z()) /
+                (choice.probability * n_out * n_out));
+      }
+    }
+
+    if (!interreflection_ || leg.depth >= max_depth_) return false;
+    const auto [u, v] = numbers.next_pair();
+    const RoughSample sample = sample_rough_dielectric(out, material.roughness, n_out, n_in, u, v, numbers.next());
+    leg.throughput *= sample.weight;
+    if (!(sample.weight > 0.0) || std::abs(sample.in.z()) <= 1e-9 || !survives(leg, numbers)) return false;
+    const bool passes = sample.in.z() < 0.0;
+    leg.direction = frame.to_world(sample.in).normalized();
+    const double leave = RayScene::leave_distance(hit.position);
+    leg.origin = hit.position + (passes ? -leave : leave) * normal;
+    if (passes) leg.medium = to;
+    leg.s_share = 0.5;
+    return leg.throughput.maxCoeff() > 0.0;
+  }
+
+  /// Counts a reflection and lets chance end paths that carry little (Russian roulette).
+  bool survives(Leg& leg, SampleSequence& numbers) const {
+    ++leg.depth;
+    if (leg.depth >= kRouletteFrom) {
+      const double survival = std::min(1.0, leg.throughput.maxCoeff());
+      if (!(numbers.next() < survival)) return false;
+      leg.throughput /= survival;
+    }
+    return true;
+  }
+
   /// What the surface's own colour is at a hit.
   const Bands<N>& colour_at(const PreparedMaterial<N>& material, const RayHit& hit) const {
     return material.print < 0 ? material.colour : scene_.prints[material.print].colour(hit, material.colour);
@@ -382,13 +444,7 @@ class PathIntegrator {
       leg.throughput *= (colour + (1.0 - colour) * schlick_weight(out.dot(facet))) *
                         (kept * (1.0 + colour * material.single_albedo.missing_ratio(out.z())));
     }
-    if (in.z() <= 1e-9) return false;
-    ++leg.depth;
-    if (leg.depth >= kRouletteFrom) {
-      const double survival = std::min(1.0, leg.throughput.maxCoeff());
-      if (!(numbers.next() < survival)) return false;
-      leg.throughput /= survival;
-    }
+    if (in.z() <= 1e-9 || !survives(leg, numbers)) return false;
     leg.direction = frame.to_world(in).normalized();
     leg.origin = hit.position + RayScene::leave_distance(hit.position) * normal;
     leg.s_share = 0.5;
@@ -460,6 +516,8 @@ class PathIntegrator {
         }
         if (material.kind == SurfaceKind::kRefractive) {
           meet_boundary(leg, hit, material, branches, numbers, sum);
+        } else if (material.kind == SurfaceKind::kRoughRefractive) {
+          if (!meet_rough_boundary(leg, hit, material, at_first_hit, branches, numbers, counts, sum)) return;
         } else if (material.kind == SurfaceKind::kFilm) {
           meet_film(leg, hit, material, branches, numbers);
           if (!(leg.throughput.maxCoeff() > 0.0)) return;

@@ -27,7 +27,16 @@ struct PreparedMedium {
   double anisotropy;
 };
 
-enum class SurfaceKind { kLambertian, kConductor, kBlack, kEmitter, kRefractive, kTransmitter, kFilm };
+enum class SurfaceKind {
+  kLambertian,
+  kConductor,
+  kBlack,
+  kEmitter,
+  kRefractive,
+  kTransmitter,
+  kFilm,
+  kRoughRefractive
+};
 
 template <int N>
 struct PreparedMaterial {
@@ -149,6 +158,11 @@ struct PreparedScene {
       made.kind = SurfaceKind::kRefractive;
       made.inside = refractive->medium_inside;
       made.outside = refractive->medium_outside;
+    } else if (const auto* rough = std::get_if<RoughRefractive>(&material)) {
+      made.kind = SurfaceKind::kRoughRefractive;
+      made.inside = rough->medium_inside;
+      made.outside = rough->medium_outside;
+      made.roughness = rough->roughness;
     } else if (const auto* transmitter = std::get_if<DiffuseTransmitter>(&material)) {
       made.kind = SurfaceKind::kTransmitter;
       made.colour = transmitter->reflectance;

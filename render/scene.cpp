@@ -42,14 +42,18 @@ void check_index(double index, const std::string& what) {
   if (!(index >= 1.0 && index <= 5.0)) fail("{}: index is {}; it must be from 1 to 5", what, index);
 }
 
+void check_roughness(double roughness, const std::string& what) {
+  if (!(roughness >= 1e-3 && roughness <= 1.0)) {
+    fail("{}: roughness is {}; it must be from 0.001 to 1", what, roughness);
+  }
+}
+
 void check_material(const Material& material, const Scene& scene, const std::string& what) {
   const Eigen::Index bands = scene.environment.size();
   std::visit(Overloaded{[&](const Lambertian& m) { check_spectrum(m.albedo, bands, 1.0, what + ": albedo"); },
                         [&](const RoughConductor& m) {
                           check_spectrum(m.reflectance, bands, 1.0, what + ": reflectance");
-                          if (!(m.roughness >= 1e-3 && m.roughness <= 1.0)) {
-                            fail("{}: roughness is {}; it must be from 0.001 to 1", what, m.roughness);
-                          }
+                          check_roughness(m.roughness, what);
                         },
                         [](const Black&) {},
                         [&](const Emitter& m) {
@@ -59,6 +63,11 @@ void check_material(const Material& material, const Scene& scene, const std::str
                         [&](const Refractive& m) {
                           check_medium_index(m.medium_inside, scene, what + ": medium_inside");
                           check_medium_index(m.medium_outside, scene, what + ": medium_outside");
+                        },
+                        [&](const RoughRefractive& m) {
+                          check_medium_index(m.medium_inside, scene, what + ": medium_inside");
+                          check_medium_index(m.medium_outside, scene, what + ": medium_outside");
+                          check_roughness(m.roughness, what);
                         },
                         [&](const DiffuseTransmitter& m) {
                           check_spectrum(m.reflectance, bands, 1.0, what + ": reflectance");

@@ -10,6 +10,7 @@
 #include "core/triangle_mesh.h"
 #include "render/diffuse_transmitter.h"
 #include "render/print.h"
+#include "render/rough_dielectric.h"
 #include "render/spectrum.h"
 #include "render/thin_film.h"
 
@@ -55,7 +56,8 @@ struct Refractive {
   int medium_outside = 0;
 };
 
-using Material = std::variant<Lambertian, RoughConductor, Black, Emitter, Refractive, DiffuseTransmitter, ThinFilm>;
+using Material =
+    std::variant<Lambertian, RoughConductor, Black, Emitter, Refractive, DiffuseTransmitter, ThinFilm, RoughRefractive>;
 
 /// A triangle surface, open or closed. A Refractive surface is shaded with normals interpolated from its vertices, so
 /// that a deformed gel refracts as the curved surface it stands for; others with the normal of the triangle. A

@@ -75,6 +75,8 @@ TEST(SceneCheck, FaultySheetsAndFilmsAreRefusedByName) {
   expect_refused([](Scene& s) { s.balls[0].material = DiffuseTransmitter{grey(0.1), {}}; }, "transmittance has 0");
   expect_refused([](Scene& s) { s.balls[0].material = ThinFilm{grey(1.2)}; }, "transmittance is 1.2");
   expect_refused([](Scene& s) { s.balls[0].material = ThinFilm{grey(0.5), 0.9}; }, "index is 0.9");
+  expect_refused([](Scene& s) { s.balls[0].material = RoughRefractive{1, 0, 0.0}; }, "roughness is 0");
+  expect_refused([](Scene& s) { s.balls[0].material = RoughRefractive{3, 0, 0.1}; }, "medium_inside is medium 3");
   Scene scene = good_scene();
   scene.balls[0].material = DiffuseTransmitter{grey(0.9), grey(0.1)};
   EXPECT_NO_THROW(Tracer{scene});
