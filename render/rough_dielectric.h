@@ -5,8 +5,9 @@
 //
 // The boundary is made of small smooth facets whose normals follow GGX of width `roughness` (alpha, as for
 // RoughConductor); each mirrors and refracts by Fresnel's equations (Walter et al. 2007, "Microfacet models for
-// refraction through rough surfaces"). Light that a facet sends to another facet is lost: nothing to speak of for alpha
-// up to 0.1, some per cent at 0.3, more for light that grazes. Where the two indices are equal light goes straight on.
+// refraction through rough surfaces"). Light that a facet sends to another facet is lost at each passage: a clear ball
+// of index 1.5 under an even sky, which light passes twice and more, shows 0.9999 of it at alpha 0.01, 0.984 at 0.1,
+// 0.86 at 0.3 and 0.68 at 0.5. Where the two indices are equal light goes straight on.
 //
 // It scatters, so it counts as a reflection for RenderSettings::max_depth, and lamps light it from both sides; what
 // lies behind it is lit by way of it, not by connections to lamps: of those it is a shadow caster, as light doesn't

@@ -81,7 +81,7 @@ Bands<N> weight_of_scattering(const Bands<N>& extinction, const Bands<N>& scatte
 /// A walk in a medium that takes nothing away may last for ever. After kFreeScatterings, and each time the count has
 /// doubled since, one walk in two ends and the other goes on with twice its weight: no bias, and a finite mean length
 /// even in a half space of albedo one, where the chance to be still inside after n scatterings falls as n^(-1/2).
-inline constexpr std::int64_t kFreeScatterings = 4096;
+inline constexpr std::int64_t kFreeScatterings = 65536;
 inline bool roulette_is_due(std::int64_t scatterings) {
   return scatterings >= kFreeScatterings && (scatterings & (scatterings - 1)) == 0;
 }

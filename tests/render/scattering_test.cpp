@@ -244,7 +244,7 @@ TEST(ScatteringMedium, ThatTakesNothingAwayIsAWhiteFurnace) {
 
 TEST(ScatteringMedium, BallOfItIsAWhiteFurnace) {
   Scene scene = empty_scene(1.0);
-  scene.media = {Medium{}, Medium{1.41, {}, grey(20.0), 0.7}};
+  scene.media = {Medium{}, Medium{1.41, {}, grey(200.0), 0.7}};
   scene.balls.push_back({{0, 0, 0}, 2.0, Refractive{1, 0}});
   const Estimate seen = view(scene, {0.4, 0.2, 10}, {0, 0.02, -1}, 60);
   EXPECT_NEAR(seen.mean, 1.0, 4.0 * seen.error + 1e-6);
@@ -325,7 +325,7 @@ TEST(ScatteringMedium, UnequalBandsGiveNoFireflies) {
     RenderSettings settings = samples(1);
     settings.seed = static_cast<std::uint64_t>(i);
     const Spectrum seen = tracer.radiance({0, 0, 1}, {0.3, 0, -1}, settings);
-    EXPECT_LT(seen.sum(), 24.0);  // 3, times 2 at each doubling of the walk beyond 4096
+    EXPECT_LT(seen.sum(), 24.0);  // 3, times 2 at each doubling of the walk beyond kFreeScatterings
     sum += seen;
     squares += seen * seen;
   }
