@@ -13,7 +13,7 @@ namespace touchstone::render {
 /// A point that light may reach, and the state of the path there.
 struct Receiver {
   Eigen::Vector3d position;
-  Eigen::Vector3d normal;  ///< unit, on the side that is lit
+  Eigen::Vector3d normal;  ///< unit, on the side that is lit; zero for a particle, which is lit from all sides
   int layer = 0;
   int medium = 0;
 };
@@ -26,6 +26,27 @@ struct Arrival {
   Bands<N> irradiance;
 };
 
+/// What ThinFilms between two points of one medium let through.
+template <int N>
+[[gnu::noinline]] Bands<N> passed_by_films(const PreparedScene<N>& scene, const Eigen::Vector3d& from,
+                                           const Eigen::Vector3d& to, int medium) {
+  Bands<N> passed = Bands<N>::Ones();
+  const Eigen::Vector3d way = to - from;
+  const double length = way.norm();
+  if (!(length > 0.0)) return passed;
+  const Eigen::Vector3d direction = way / length;
+  double at = 0.0;
+  RayHit hit;
+  while (scene.rays.intersect_film(from + at * direction, direction, length - at, hit)) {
+    const PreparedMaterial<N>& film = scene.materials[hit.object];
+    const double cosine = std::abs(direction.dot(hit.normal));
+    passed *= film_light<N>(film.colour, film.film_index, film.film_mirrors, scene.media[medium].index, cosine).passed;
+    if (!(passed.maxCoeff() > 0.0)) break;
+    at += std::max(0.0, hit.distance) + RayScene::leave_distance(hit.position) / std::max(cosine, 1e-3);
+  }
+  return passed;
+}
+
 /// Light from the point `source` of lamp `lamp` to the receiver. False where none arrives: out of the lamp's lobe,
 /// from behind the receiver's surface or the lens, in shadow. `connections` counts shadow tests.
 ///
@@ -37,6 +58,7 @@ bool connect_to_lamp(const PreparedScene<N>& scene, const PreparedLamp<N>& lamp,
                      const Receiver& receiver, std::uint64_t& connections, Arrival<N>& arrival) {
   const Eigen::Vector3d& p = receiver.position;
   const bool up = source.z() <= p.z();  // light runs up to the receiver
+  const bool is_particle = receiver.normal.isZero(0.0);
   Layer layers[kMaxLayers];
   int media[kMaxLayers];
   int count = 0;
@@ -74,13 +96,13 @@ bool connect_to_lamp(const PreparedScene<N>& scene, const PreparedLamp<N>& lamp,
     const double distance = std::sqrt(distance2);
     from_lamp = way / distance;
     arrival.direction = -from_lamp;
-    if (arrival.direction.dot(receiver.normal) <= 0.0) return false;
+    if (!is_particle && arrival.direction.dot(receiver.normal) <= 0.0) return false;
     per_area = 1.0 / distance2;
     const double height = std::abs(way.z());
     for (int k = 0; k < count; ++k) {
-      if (!scene.media[media[k]].absorbs) continue;
+      if (!scene.media[media[k]].weakens) continue;
       const double share = height > 0.0 ? layers[k].thickness / height : (k + 1 == count ? 1.0 : 0.0);
-      light *= (-scene.media[media[k]].absorption * (distance * share)).exp();
+      light *= (-scene.media[media[k]].extinction * (distance * share)).exp();
     }
   } else {
     const Eigen::Vector2d flat = (p - source).head<2>();
@@ -94,12 +116,12 @@ bool connect_to_lamp(const PreparedScene<N>& scene, const PreparedLamp<N>& lamp,
       return Eigen::Vector3d(sine * toward.x(), sine * toward.y(), sense * path->cosine[k]);
     };
     arrival.direction = -direction_in(count - 1);
-    if (arrival.direction.dot(receiver.normal) <= 0.0) return false;
+    if (!is_particle && arrival.direction.dot(receiver.normal) <= 0.0) return false;
     from_lamp = direction_in(0);
     per_area = path->jacobian * path->transmittance;
     for (int k = 0; k < count; ++k) {
-      if (!scene.media[media[k]].absorbs) continue;
-      light *= (-scene.media[media[k]].absorption * (layers[k].thickness / path->cosine[k])).exp();
+      if (!scene.media[media[k]].weakens) continue;
+      light *= (-scene.media[media[k]].extinction * (layers[k].thickness / path->cosine[k])).exp();
     }
     const double on_lens = from_lamp.dot(lamp.frame.z);
     if (on_lens <= 0.0 || spot_profile(lamp.lamp, on_lens) <= 0.0) return false;
@@ -117,6 +139,7 @@ bool connect_to_lamp(const PreparedScene<N>& scene, const PreparedLamp<N>& lamp,
                 corner.z() - sense * layers[k].thickness};
       }
       if (scene.rays.occluded(end, next)) return false;
+      if (scene.has_films) light *= passed_by_films(scene, end, next, media[k]);
       corner = next;
       end = next;
     }
@@ -128,7 +151,9 @@ bool connect_to_lamp(const PreparedScene<N>& scene, const PreparedLamp<N>& lamp,
   if (profile <= 0.0) return false;
   if (!bends) {
     ++connections;
-    if (scene.rays.occluded(p + RayScene::leave_distance(p) * receiver.normal, source)) return false;
+    const Eigen::Vector3d end = p + RayScene::leave_distance(p) * receiver.normal;
+    if (scene.rays.occluded(end, source)) return false;
+    if (scene.has_films) light *= passed_by_films(scene, end, source, receiver.medium);
   }
   constexpr double kSquareMillimetresPerSquareMetre = 1e6;
   arrival.irradiance = light * (profile * per_area * kSquareMillimetresPerSquareMetre);

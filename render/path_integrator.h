@@ -12,7 +12,10 @@
 #include "render/lamp_connection.h"
 #include "render/path_tracer.h"
 #include "render/prepared_scene.h"
+#include "render/rough_dielectric.h"
 #include "render/sample_sequence.h"
+#include "render/scattering.h"
+#include "render/thin_film.h"
 #include "render/warps.h"
 
 namespace touchstone::render {
@@ -37,8 +40,8 @@ class PathIntegrator {
     Bands<N> sum = Bands<N>::Zero();
     Branches branches;
     const int layer = scene_.layer_at(origin.z());
-    branches.legs[branches.count++] = {origin, direction, Bands<N>::Ones(), 0.5, layer, scene_.medium_of_layer(layer),
-                                       0,      0};
+    branches.legs[branches.count++] = {
+        origin, direction, Bands<N>::Ones(), 0.5, layer, scene_.medium_of_layer(layer), 0, 0, 0};
     // Drawn before the path's smooth events draw theirs, so that a pixel's samples share lamps and lenses evenly.
     const LampNumbers at_first_hit = lamp_numbers(numbers);
     while (branches.count > 0) {
@@ -60,7 +63,10 @@ class PathIntegrator {
     double s_share;  // of the light, polarised square to the plane of incidence at the flat faces
     int layer, medium;
     int depth;   // diffuse and metallic reflections so far
-    int smooth;  // refractions, mirror reflections and crossings of Refractive surfaces so far
+    int smooth;  // mirror reflections and crossings of faces, Refractive surfaces and films since the last scattering
+    std::int64_t scatterings;  // in media so far
+
+    bool is_first_sight() const { return depth == 0 && scatterings == 0; }
   };
 
   /// Which lamp lights a hit, and which point of its lens.
@@ -81,7 +87,7 @@ class PathIntegrator {
   /// A lamp with a probability in proportion to what it would send without shadow, Fresnel's loss or lobe: by its
   /// power, distance and, for a matt surface, the cosine after refraction as if all of the way were in the lamp's
   /// medium. No lamp that shines is left without a chance.
-  LampChoice choose_lamp(const Receiver& receiver, const PreparedMaterial<N>& material, double number) const {
+  LampChoice choose_lamp(const Receiver& receiver, bool is_matt, double number) const {
     const auto lamp_count = static_cast<int>(scene_.lamps.size());
     if (lamp_count == 1) return {0, 1.0};
     constexpr double kLeastCosine = 0.05;
@@ -96,7 +102,7 @@ class PathIntegrator {
       const Eigen::Vector3d way = lamp.lamp.position - receiver.position;
       const double distance2 = std::max(1e-12, way.squaredNorm());
       double cosine = 1.0;
-      if (material.kind == SurfaceKind::kLambertian) {
+      if (is_matt) {
         const double bend =
             scene_.media[scene_.medium_of_layer(lamp.layer)].index / scene_.media[receiver.medium].index;
         const double lateral2 = std::min(1.0, bend * bend * way.head<2>().squaredNorm() / distance2);
@@ -123,13 +129,23 @@ class PathIntegrator {
 
   void absorb(Leg& leg, double distance) const {
     const auto& medium = scene_.media[leg.medium];
-    if (medium.absorbs) leg.throughput *= (-medium.absorption * distance).exp();
+    if (medium.weakens) leg.throughput *= (-medium.absorption * distance).exp();
+  }
+
+  /// The way to the leg's end was free.
+  void pass(Leg& leg, const Flight<N>* flight, double distance) const {
+    if (flight == nullptr) [[likely]] {
+      absorb(leg, distance);
+    } else {
+      leg.throughput *= weight_of_passing(scene_.media[leg.medium].extinction, *flight, distance);
+    }
   }
 
   /// Has the leg nothing before it but the surroundings?
   bool leaves(const Leg& leg) const {
     const bool up = leg.direction.z() > 0.0;
     if (up ? leg.layer < static_cast<int>(scene_.faces.size()) : leg.layer > 0) return false;
+    if (scene_.media[leg.medium].scatters) return false;
     return scene_.rays.nothing_beyond(leg.origin.z(), up);
   }
 
@@ -142,7 +158,7 @@ class PathIntegrator {
     const auto share = [](double piece, double whole) { return whole > 0.0 ? piece / whole : 0.5; };
     mirrored.s_share = share(s * reflectance_s, reflectance);
     refracted.s_share = share(s * (1.0 - reflectance_s), transmittance);
-    if (leg.depth > 0 || branches.count == kMostBranches || reflectance >= 1.0) {
+    if (!leg.is_first_sight() || branches.count == kMostBranches || reflectance >= 1.0) {
       leg = reflectance >= 1.0 || numbers.next() < reflectance ? mirrored : refracted;
       return;
     }
@@ -231,55 +247,192 @@ class PathIntegrator {
     leg.medium = to;
   }
 
-  /// Lamp light that the surface sends back along the leg. `normal` faces the leg.
+  /// The leg ends on a film: it goes on straight, and where the film mirrors one of two ways as in part().
+  [[gnu::noinline]] void meet_film(Leg& leg, const RayHit& hit, const PreparedMaterial<N>& material, Branches& branches,
+                                   SampleSequence& numbers) const {
+    ++leg.smooth;
+    const double along = leg.direction.dot(hit.normal);
+    const Eigen::Vector3d facing = along < 0.0 ? hit.normal : Eigen::Vector3d(-hit.normal);
+    const FilmLight<N> light = film_light<N>(material.colour, material.film_index, material.film_mirrors,
+                                             scene_.media[leg.medium].index, std::abs(along));
+    const double leave = RayScene::leave_distance(hit.position);
+    Leg mirrored = leg;
+    leg.origin = hit.position - leave * facing;
+    leg.throughput *= light.passed;
+    if (!material.film_mirrors) return;
+
+    leg.s_share = mirrored.s_share = 0.5;
+    mirrored.origin = hit.position + leave * facing;
+    mirrored.direction = (leg.direction + 2.0 * std::abs(along) * facing).normalized();
+    mirrored.throughput *= light.reflected;
+    const double on = leg.throughput.sum();
+    const double back = mirrored.throughput.sum();
+    if (!(on + back > 0.0)) return;
+    if (!leg.is_first_sight() || branches.count == kMostBranches) {
+      const double chance = back / (on + back);
+      const bool turns = numbers.next() < chance;
+      if (turns) leg = mirrored;
+      leg.throughput /= turns ? chance : 1.0 - chance;
+      return;
+    }
+    Leg weaker = on < back ? leg : mirrored;
+    if (on < back) leg = mirrored;
+    const double chance = std::min(1.0, weaker.throughput.maxCoeff() / kFaintest);
+    if (!(numbers.next() < chance)) return;
+    weaker.throughput /= chance;
+    branches.legs[branches.count++] = weaker;
+  }
+
+  /// The leg ends on a RoughRefractive surface: lamp light from both sides, then one way on. False where the path ends.
+  [[gnu::noinline]] bool meet_rough_boundary(Leg& leg, const RayHit& hit, const PreparedMaterial<N>& material,
+                                             const LampNumbers& at_first_hit, Branches& branches,
+                                             SampleSequence& numbers, RayCounts& counts, Bands<N>& sum) const {
+    const bool entering = leg.direction.dot(hit.normal) < 0.0;
+    const int to = entering ? material.inside : material.outside;
+    const double n_out = scene_.media[leg.medium].index;
+    const double n_in = scene_.media[to].index;
+    if (n_out == n_in) {
+      meet_boundary(leg, hit, material, branches, numbers, sum);
+      return true;
+    }
+    const Eigen::Vector3d normal = entering ? hit.normal : Eigen::Vector3d(-hit.normal);
+    const NormalFrame frame(normal);
+    const Eigen::Vector3d out = frame.to_local(-leg.direction);
+    const LampNumbers chosen = leg.is_first_sight() ? at_first_hit : lamp_numbers(numbers);
+    for (int side = 0; side < 2 && !scene_.lamps.empty(); ++side) {
+      const Receiver receiver{hit.position, side == 0 ? normal : Eigen::Vector3d(-normal), leg.layer,
+                              side == 0 ? leg.medium : to};
+      // A preview has one sample and takes all lamps.
+      const int lamp_count = static_cast<int>(scene_.lamps.size());
+      const LampChoice choice = numbers.is_centre() ? LampChoice{0, 1.0} : choose_lamp(receiver, false, chosen.lamp);
+      const int last = numbers.is_centre() ? lamp_count : choice.lamp + 1;
+      for (int i = choice.lamp; i < last; ++i) {
+        const PreparedLamp<N>& lamp = scene_.lamps[i];
+        Arrival<N> arrival;
+        if (!connect_to_lamp(scene_, lamp, point_of_lens(lamp, chosen), receiver, counts.connections, arrival)) {
+          continue;
+        }
+        const Eigen::Vector3d in = frame.to_local(arrival.direction);
+        sum += leg.throughput * arrival.irradiance *
+               (rough_dielectric(out, in, material.roughness, n_out, n_in) * std::abs(in.z()) /
+                (choice.probability * n_out * n_out));
+      }
+    }
+
+    if (!interreflection_ || leg.depth >= max_depth_) return false;
+    const auto [u, v] = numbers.next_pair();
+    const RoughSample sample = sample_rough_dielectric(out, material.roughness, n_out, n_in, u, v, numbers.next());
+    leg.throughput *= sample.weight;
+    if (!(sample.weight > 0.0) || std::abs(sample.in.z()) <= 1e-9 || !survives(leg, numbers)) return false;
+    const bool passes = sample.in.z() < 0.0;
+    leg.direction = frame.to_world(sample.in).normalized();
+    const double leave = RayScene::leave_distance(hit.position);
+    leg.origin = hit.position + (passes ? -leave : leave) * normal;
+    if (passes) leg.medium = to;
+    leg.s_share = 0.5;
+    return leg.throughput.maxCoeff() > 0.0;
+  }
+
+  /// Counts a reflection and lets chance end paths that carry little (Russian roulette).
+  bool survives(Leg& leg, SampleSequence& numbers) const {
+    ++leg.depth;
+    if (leg.depth >= kRouletteFrom) {
+      const double survival = std::min(1.0, leg.throughput.maxCoeff());
+      if (!(numbers.next() < survival)) return false;
+      leg.throughput /= survival;
+    }
+    return true;
+  }
+
+  /// What the surface's own colour is at a hit.
+  const Bands<N>& colour_at(const PreparedMaterial<N>& material, const RayHit& hit) const {
+    return material.print < 0 ? material.colour : scene_.prints[material.print].colour(hit, material.colour);
+  }
+
+  /// Lamp light that a particle of the medium at the leg's origin sends against the leg's direction.
+  void add_lamp_light_of_particle(const Leg& leg, const LampNumbers& chosen, RayCounts& counts, Bands<N>& sum) const {
+    if (scene_.lamps.empty()) return;
+    const PreparedMedium<N>& medium = scene_.media[leg.medium];
+    const Receiver receiver{leg.origin, Eigen::Vector3d::Zero(), leg.layer, leg.medium};
+    const LampChoice choice = choose_lamp(receiver, false, chosen.lamp);
+    const PreparedLamp<N>& lamp = scene_.lamps[choice.lamp];
+    Arrival<N> arrival;
+    if (!connect_to_lamp(scene_, lamp, point_of_lens(lamp, chosen), receiver, counts.connections, arrival)) return;
+    const double phase = henyey_greenstein(arrival.direction.dot(leg.direction), medium.anisotropy);
+    sum += leg.throughput * arrival.irradiance * (phase / (choice.probability * medium.index * medium.index));
+  }
+
+  static Eigen::Vector3d point_of_lens(const PreparedLamp<N>& lamp, const LampNumbers& chosen) {
+    Eigen::Vector3d source = lamp.lamp.position;
+    if (lamp.lamp.lens_radius > 0.0) {
+      const auto [u, v] = chosen.lens;
+      const Eigen::Vector2d disc = lamp.lamp.lens_radius * square_to_disc(u, v);
+      source += disc.x() * lamp.frame.x + disc.y() * lamp.frame.y;
+    }
+    return source;
+  }
+
+  /// Lamp light that the surface sends along the leg, out of its side `normal`: the side that faces the leg, or the
+  /// other one of a diffuse transmitter.
   void add_lamp_light(const Leg& leg, const RayHit& hit, const Eigen::Vector3d& normal,
-                      const PreparedMaterial<N>& material, const LampNumbers& chosen, bool all_lamps, RayCounts& counts,
-                      Bands<N>& sum) const {
+                      const PreparedMaterial<N>& material, const Bands<N>& surface_colour, const LampNumbers& chosen,
+                      bool all_lamps, RayCounts& counts, Bands<N>& sum) const {
     const auto lamp_count = static_cast<int>(scene_.lamps.size());
     if (lamp_count == 0) return;
     const double index = scene_.media[leg.medium].index;
+    const bool is_matt = material.kind != SurfaceKind::kConductor;
     const Receiver receiver{hit.position, normal, leg.layer, leg.medium};
     // One lamp a hit. A preview has just one sample and takes them all.
-    const LampChoice choice = all_lamps ? LampChoice{0, 1.0} : choose_lamp(receiver, material, chosen.lamp);
+    const LampChoice choice = all_lamps ? LampChoice{0, 1.0} : choose_lamp(receiver, is_matt, chosen.lamp);
     const int first = choice.lamp;
     const int last = all_lamps ? lamp_count : first + 1;
     const double weight = 1.0 / (choice.probability * index * index);
     for (int i = first; i < last; ++i) {
       const PreparedLamp<N>& lamp = scene_.lamps[i];
-      Eigen::Vector3d source = lamp.lamp.position;
-      if (lamp.lamp.lens_radius > 0.0) {
-        const auto [u, v] = chosen.lens;
-        const Eigen::Vector2d disc = lamp.lamp.lens_radius * square_to_disc(u, v);
-        source += disc.x() * lamp.frame.x + disc.y() * lamp.frame.y;
-      }
+      const Eigen::Vector3d source = point_of_lens(lamp, chosen);
       Arrival<N> arrival;
       if (!connect_to_lamp(scene_, lamp, source, receiver, counts.connections, arrival)) continue;
       const double cosine = arrival.direction.dot(normal);
-      if (material.kind == SurfaceKind::kLambertian) {
-        sum += leg.throughput * material.colour * arrival.irradiance * (weight * cosine / kPi);
+      if (is_matt) {
+        sum += leg.throughput * surface_colour * arrival.irradiance * (weight * cosine / kPi);
       } else {
         const NormalFrame frame(normal);
         const Eigen::Vector3d out = frame.to_local(-leg.direction);
         const Eigen::Vector3d in = frame.to_local(arrival.direction);
         const double schlick = schlick_weight((out + in).normalized().dot(out));
-        const Bands<N> colour = (material.colour + (1.0 - material.colour) * schlick) *
-                                (1.0 + material.colour * material.single_albedo.missing_ratio(out.z()));
+        const Bands<N> colour = (surface_colour + (1.0 - surface_colour) * schlick) *
+                                (1.0 + surface_colour * material.single_albedo.missing_ratio(out.z()));
         sum += leg.throughput * colour * arrival.irradiance *
                (weight * cosine * ggx_reflection(out, in, material.roughness));
       }
     }
   }
 
-  /// Turns the leg into the next one after a diffuse or metallic reflection. False where the path ends.
-  bool scatter(Leg& leg, const RayHit& hit, const Eigen::Vector3d& normal, const PreparedMaterial<N>& material,
-               SampleSequence& numbers) const {
+  /// Turns the leg into the next one after a diffuse or metallic reflection or a diffuse transmission. False where the
+  /// path ends.
+  bool scatter(Leg& leg, const RayHit& hit, const Eigen::Vector3d& facing, const PreparedMaterial<N>& material,
+               const Bands<N>& surface_colour, SampleSequence& numbers) const {
     if (!interreflection_ || leg.depth >= max_depth_) return false;
+    Eigen::Vector3d normal = facing;
+    Bands<N> colour = surface_colour;
+    if (material.kind == SurfaceKind::kTransmitter) {
+      const double back = (leg.throughput * surface_colour).sum();
+      const double through = (leg.throughput * material.passed).sum();
+      if (!(back + through > 0.0)) return false;
+      const double chance = back / (back + through);
+      if (numbers.next() < chance) {
+        colour /= chance;
+      } else {
+        colour = material.passed / (1.0 - chance);
+        normal = -facing;
+      }
+    }
     const NormalFrame frame(normal);
     const auto [u, v] = numbers.next_pair();
     Eigen::Vector3d in;
-    if (material.kind == SurfaceKind::kLambertian) {
+    if (material.kind != SurfaceKind::kConductor) {
       in = square_to_cosine_hemisphere(u, v);
-      leg.throughput *= material.colour;
+      leg.throughput *= colour;
     } else {
       const Eigen::Vector3d out = frame.to_local(-leg.direction);
       if (out.z() <= 0.0) return false;
@@ -288,36 +441,73 @@ class PathIntegrator {
       if (in.z() <= 0.0) return false;
       const double kept =
           ggx_masking_shadowing(in.z(), out.z(), material.roughness) / ggx_masking(out.z(), material.roughness);
-      leg.throughput *= (material.colour + (1.0 - material.colour) * schlick_weight(out.dot(facet))) *
-                        (kept * (1.0 + material.colour * material.single_albedo.missing_ratio(out.z())));
+      leg.throughput *= (colour + (1.0 - colour) * schlick_weight(out.dot(facet))) *
+                        (kept * (1.0 + colour * material.single_albedo.missing_ratio(out.z())));
     }
-    if (in.z() <= 1e-9) return false;
-    ++leg.depth;
-    if (leg.depth >= kRouletteFrom) {
-      const double survival = std::min(1.0, leg.throughput.maxCoeff());
-      if (!(numbers.next() < survival)) return false;
-      leg.throughput /= survival;
-    }
+    if (in.z() <= 1e-9 || !survives(leg, numbers)) return false;
     leg.direction = frame.to_world(in).normalized();
     leg.origin = hit.position + RayScene::leave_distance(hit.position) * normal;
     leg.s_share = 0.5;
     return leg.throughput.maxCoeff() > 0.0;
   }
 
+  [[gnu::noinline]] Flight<N> fly(const Leg& leg, SampleSequence& numbers) const {
+    const auto [u, v] = numbers.next_pair();
+    return sample_flight<N>(scene_.media[leg.medium].extinction, leg.throughput, u, v);
+  }
+
+  /// The leg ends at a particle of its medium, at its origin. Goes on in a new direction; false where the path ends.
+  [[gnu::noinline]] bool scatter_in_medium(Leg& leg, const LampNumbers& chosen, SampleSequence& numbers,
+                                           RayCounts& counts, Bands<N>& sum) const {
+    if (!(leg.throughput.maxCoeff() > 0.0)) return false;
+    add_lamp_light_of_particle(leg, chosen, counts, sum);
+    if (!interreflection_) return false;
+    ++leg.scatterings;
+    leg.smooth = 0;
+    leg.s_share = 0.5;
+    if (leg.scatterings >= kRouletteFrom) {
+      const double survival = std::min(1.0, leg.throughput.maxCoeff());
+      if (survival < 1.0) {
+        if (!(numbers.next() < survival)) return false;
+        leg.throughput /= survival;
+      }
+      if (roulette_is_due(leg.scatterings)) {
+        if (numbers.next() < 0.5) return false;
+        leg.throughput *= 2.0;
+      }
+    }
+    const auto [u, v] = numbers.next_pair();
+    const double cosine = sample_henyey_greenstein(scene_.media[leg.medium].anisotropy, u);
+    const double sine = std::sqrt(std::max(0.0, 1.0 - cosine * cosine));
+    const double angle = 2.0 * kPi * v;
+    const NormalFrame frame(leg.direction);
+    leg.direction =
+        frame.to_world(Eigen::Vector3d(sine * std::cos(angle), sine * std::sin(angle), cosine)).normalized();
+    return true;
+  }
+
   void follow(Leg& leg, Branches& branches, const LampNumbers& at_first_hit, SampleSequence& numbers, RayCounts& counts,
               Bands<N>& sum) const {
     const int face_count = static_cast<int>(scene_.faces.size());
     for (;;) {
-      ++(leg.depth == 0 ? counts.primary : counts.bounces);
+      ++(leg.is_first_sight() ? counts.primary : counts.bounces);
       const bool up = leg.direction.z() > 0.0;
       double to_face = std::numeric_limits<double>::infinity();
       if (leg.direction.z() != 0.0 && (up ? leg.layer < face_count : leg.layer > 0)) {
         const double face_z = scene_.faces[up ? leg.layer : leg.layer - 1].z;
         to_face = std::max(0.0, (face_z - leg.origin.z()) / leg.direction.z());
       }
+      Flight<N> drawn;  // uninitialised unless the medium scatters
+      const Flight<N>* flight = nullptr;
+      double most = to_face;
+      if (scene_.media[leg.medium].scatters && !numbers.is_centre()) [[unlikely]] {
+        drawn = fly(leg, numbers);
+        flight = &drawn;
+        most = std::min(most, drawn.distance);
+      }
       RayHit hit;
-      if (scene_.rays.intersect(leg.origin, leg.direction, to_face, hit)) {
-        absorb(leg, hit.distance);
+      if (scene_.rays.intersect(leg.origin, leg.direction, most, hit)) {
+        pass(leg, flight, hit.distance);
         const PreparedMaterial<N>& material = scene_.materials[hit.object];
         if (material.kind == SurfaceKind::kBlack) return;
         if (material.kind == SurfaceKind::kEmitter) {
@@ -326,18 +516,36 @@ class PathIntegrator {
         }
         if (material.kind == SurfaceKind::kRefractive) {
           meet_boundary(leg, hit, material, branches, numbers, sum);
+        } else if (material.kind == SurfaceKind::kRoughRefractive) {
+          if (!meet_rough_boundary(leg, hit, material, at_first_hit, branches, numbers, counts, sum)) return;
+        } else if (material.kind == SurfaceKind::kFilm) {
+          meet_film(leg, hit, material, branches, numbers);
+          if (!(leg.throughput.maxCoeff() > 0.0)) return;
         } else {
           const Eigen::Vector3d normal =
               leg.direction.dot(hit.normal) < 0.0 ? hit.normal : Eigen::Vector3d(-hit.normal);
-          add_lamp_light(leg, hit, normal, material, leg.depth == 0 ? at_first_hit : lamp_numbers(numbers),
-                         numbers.is_centre(), counts, sum);
-          if (!scatter(leg, hit, normal, material, numbers)) return;
+          const Bands<N>& colour = colour_at(material, hit);
+          const LampNumbers chosen = leg.is_first_sight() ? at_first_hit : lamp_numbers(numbers);
+          const int sides = material.kind == SurfaceKind::kTransmitter ? 2 : 1;
+          for (int side = 0; side < sides; ++side) {  // one call, so that the compiler inlines it
+            add_lamp_light(leg, hit, side == 0 ? normal : Eigen::Vector3d(-normal), material,
+                           side == 0 ? colour : material.passed, chosen, numbers.is_centre(), counts, sum);
+          }
+          if (!scatter(leg, hit, normal, material, colour, numbers)) return;
         }
+      } else if (most < to_face) {
+        const PreparedMedium<N>& medium = scene_.media[leg.medium];
+        leg.origin += most * leg.direction;
+        leg.throughput *= weight_of_scattering<N>(medium.extinction, medium.scattering, *flight);
+        const LampNumbers chosen = leg.is_first_sight() ? at_first_hit : lamp_numbers(numbers);
+        if (!scatter_in_medium(leg, chosen, numbers, counts, sum)) return;
       } else if (std::isfinite(to_face)) {
-        absorb(leg, to_face);
+        pass(leg, flight, to_face);
         leg.origin += to_face * leg.direction;
         meet_face(leg, up, branches, numbers, sum);
       } else {
+        if (flight != nullptr) [[unlikely]]
+          pass(leg, flight, to_face);
         sum += leg.throughput * scene_.environment;
         return;
       }

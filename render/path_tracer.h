@@ -25,7 +25,7 @@ struct RenderSettings {
   std::uint64_t seed = 0;
   int min_samples = 16;   ///< paths per pixel before the first look at the error; powers of two sample best
   int max_samples = 256;  ///< with no noise target each pixel gets exactly `min_samples`
-  int max_depth = 8;  ///< diffuse or metallic reflections on a path; refractions don't count. Russian roulette from 3
+  int max_depth = 8;  ///< diffuse or metallic reflections on a path; refractions and scatterings in media don't count
   std::optional<NoiseTarget> noise;
 };
 
@@ -34,7 +34,7 @@ struct RayCounts {
   std::uint64_t paths = 0;        ///< camera samples
   std::uint64_t primary = 0;      ///< legs before the first diffuse or metallic hit
   std::uint64_t connections = 0;  ///< connections to lamps that were tested for occlusion
-  std::uint64_t bounces = 0;      ///< legs after that hit
+  std::uint64_t bounces = 0;      ///< legs after that hit or a scattering in a medium
   RayCounts& operator+=(const RayCounts& other);
 };
 
@@ -56,11 +56,17 @@ struct RenderedImage {
 /// Refractive surfaces. Flat faces keep the s and p polarisations apart along a straight chain of faces.
 /// Paths carry basic radiance, L / n^2, which is the same on both sides of a face but for Fresnel's loss.
 ///
+/// Diffuse transmitters and rough boundaries are lit by connections on both sides; lamps shine through thin films; in
+/// scattering media each scattering is lit by one connection, weakened by absorption and scattering on its way.
+///
 /// What is biased, and where: a connection from a point *beyond* a Refractive surface (an object that is near the gel
 /// but doesn't touch it) treats that surface as flat and horizontal at the height found straight below the point; a
 /// connection that passes Refractive surfaces in other ways goes straight through them. Lamp light mirrored by faces or
 /// focused by curved surfaces onto matt surfaces (caustics of the lamp) is left out, as is the lamp's own mirror image.
-/// A path after 64 smooth refractions or reflections is taken to have left the scene.
+/// A connection from inside a scattering body that Refractive surfaces bound (not flat faces) takes the surface towards
+/// the lamp as flat in the same way: right for a membrane, wrong for a lamp at the side of a milky ball.
+/// A path after 64 smooth refractions or reflections since its last scattering in a medium is taken to have left the
+/// scene. Paths that carry little end by Russian roulette from the third reflection or scattering on.
 ///
 /// A path is a pure function of (seed, pixel, sample), a pixel of (seed, pixel): the same bytes for any number of
 /// threads and with any mask.

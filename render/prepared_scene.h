@@ -2,8 +2,9 @@
 // A scene with its number of bands known to the compiler and all that can be computed ahead computed.
 
 #include <Eigen/Core>
+#include <array>
 #include <cmath>
-
+#include <utility>
 #include <vector>
 
 #include "render/ggx.h"
@@ -18,19 +19,53 @@ namespace touchstone::render {
 template <int N>
 struct PreparedMedium {
   double index;
-  bool absorbs;
+  bool weakens;  ///< does light get less on its way?
   Bands<N> absorption;
+  bool scatters;
+  Bands<N> scattering;
+  Bands<N> extinction;  ///< absorption + scattering
+  double anisotropy;
 };
 
-enum class SurfaceKind { kLambertian, kConductor, kBlack, kEmitter, kRefractive };
+enum class SurfaceKind {
+  kLambertian,
+  kConductor,
+  kBlack,
+  kEmitter,
+  kRefractive,
+  kTransmitter,
+  kFilm,
+  kRoughRefractive
+};
 
 template <int N>
 struct PreparedMaterial {
   SurfaceKind kind = SurfaceKind::kBlack;
-  Bands<N> colour = Bands<N>::Zero();  ///< albedo, reflectance at normal incidence, or radiance
+  Bands<N> colour = Bands<N>::Zero();  ///< albedo, reflectance at normal incidence, radiance, or a film's dye
+  Bands<N> passed = Bands<N>::Zero();  ///< transmittance of a diffuse transmitter
   double roughness = 0.0;
+  double film_index = 1.0;
+  bool film_mirrors = false;
+  int print = -1;           ///< index into PreparedScene::prints
   GgxAlbedo single_albedo;  ///< of a conductor
   int inside = 0, outside = 0;
+};
+
+template <int N>
+struct PreparedPrint {
+  std::vector<Eigen::Vector2d> points;
+  std::vector<std::array<int, 3>> triangles;
+  std::vector<Bands<N>> disc_colours;
+  PrintIndex index;
+
+  /// The ink at a hit, or `plain` beside the discs.
+  const Bands<N>& colour(const RayHit& hit, const Bands<N>& plain) const {
+    const auto& t = triangles[hit.triangle];
+    const Eigen::Vector2d at =
+        (1.0 - hit.weight_1 - hit.weight_2) * points[t[0]] + hit.weight_1 * points[t[1]] + hit.weight_2 * points[t[2]];
+    const int disc = index.disc_at(at);
+    return disc < 0 ? plain : disc_colours[disc];
+  }
 };
 
 template <int N>
@@ -49,19 +84,32 @@ struct PreparedScene {
   std::vector<PreparedMedium<N>> media;
   std::vector<FlatFace> faces;
   std::vector<PreparedMaterial<N>> materials;  ///< by RayHit::object
+  std::vector<PreparedPrint<N>> prints;
   std::vector<PreparedLamp<N>> lamps;
   Bands<N> environment;
   bool interreflection;
   RayScene rays;
+  bool has_films;
 
   explicit PreparedScene(const Scene& scene)
-      : faces(scene.faces), environment(scene.environment), interreflection(scene.interreflection), rays(scene) {
+      : faces(scene.faces),
+        environment(scene.environment),
+        interreflection(scene.interreflection),
+        rays(scene),
+        has_films(rays.has_films()) {
     for (const Medium& medium : scene.media) {
       Bands<N> absorption = Bands<N>::Zero();
       if (medium.absorption.size() > 0) absorption = medium.absorption;
-      media.push_back({medium.index, (absorption > 0.0).any(), absorption});
+      Bands<N> scattering = Bands<N>::Zero();
+      if (medium.scattering.size() > 0) scattering = medium.scattering;
+      const Bands<N> extinction = absorption + scattering;
+      media.push_back({medium.index, (extinction > 0.0).any(), absorption, (scattering > 0.0).any(), scattering,
+                       extinction, medium.anisotropy});
     }
-    for (const Surface& surface : scene.surfaces) materials.push_back(prepare(surface.material));
+    for (const Surface& surface : scene.surfaces) {
+      materials.push_back(prepare(surface.material));
+      if (surface.print) add_print(surface);
+    }
     for (const Ball& ball : scene.balls) materials.push_back(prepare(ball.material));
     for (const SpotLamp& lamp : scene.lamps) {
       const Bands<N> intensity = Bands<N>(lamp.power_W) / spot_solid_angle(lamp);
@@ -83,6 +131,14 @@ struct PreparedScene {
   }
 
  private:
+  void add_print(const Surface& surface) {
+    const Print& print = *surface.print;
+    PreparedPrint<N> made{print.material_mm, surface.mesh.triangles, {}, PrintIndex(print.discs)};
+    for (const PrintedDisc& disc : print.discs) made.disc_colours.push_back(print.inks[disc.ink]);
+    materials.back().print = static_cast<int>(prints.size());
+    prints.push_back(std::move(made));
+  }
+
   PreparedMaterial<N> prepare(const Material& material) const {
     PreparedMaterial<N> made;
     if (const auto* lambertian = std::get_if<Lambertian>(&material)) {
@@ -102,6 +158,20 @@ struct PreparedScene {
       made.kind = SurfaceKind::kRefractive;
       made.inside = refractive->medium_inside;
       made.outside = refractive->medium_outside;
+    } else if (const auto* rough = std::get_if<RoughRefractive>(&material)) {
+      made.kind = SurfaceKind::kRoughRefractive;
+      made.inside = rough->medium_inside;
+      made.outside = rough->medium_outside;
+      made.roughness = rough->roughness;
+    } else if (const auto* transmitter = std::get_if<DiffuseTransmitter>(&material)) {
+      made.kind = SurfaceKind::kTransmitter;
+      made.colour = transmitter->reflectance;
+      made.passed = transmitter->transmittance;
+    } else if (const auto* film = std::get_if<ThinFilm>(&material)) {
+      made.kind = SurfaceKind::kFilm;
+      made.colour = film->transmittance;
+      made.film_index = film->index;
+      made.film_mirrors = film->fresnel;
     }
     return made;
   }

@@ -5,6 +5,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <vector>
@@ -60,6 +61,14 @@ RTCRay embree_ray(const Eigen::Vector3d& origin, const Eigen::Vector3d& directio
   return ray;
 }
 
+/// How light gets on through a thing.
+enum class Passage { kNone, kRefracted, kFilm };
+
+Passage passage_of(const Material& material) {
+  if (std::holds_alternative<Refractive>(material)) return Passage::kRefracted;
+  return std::holds_alternative<ThinFilm>(material) ? Passage::kFilm : Passage::kNone;
+}
+
 }  // namespace
 
 struct RayScene::State {
@@ -69,24 +78,30 @@ struct RayScene::State {
   };
   std::vector<Mesh> meshes;
   std::vector<Ball> balls;
-  std::vector<int> opaque_balls, refractive_balls;  // Embree's primitive number -> ball
-  RTCScene all = nullptr, opaque = nullptr, refractive = nullptr;
+  std::array<std::vector<int>, 3> balls_by_passage;  // Embree's primitive number -> ball
+  RTCScene all = nullptr, opaque = nullptr, refractive = nullptr, films = nullptr;
+  bool has_films = false;
   HeightRange all_heights, opaque_heights;
 
   ~State() {
-    for (RTCScene scene : {all, opaque, refractive}) {
+    for (RTCScene scene : {all, opaque, refractive, films}) {
       if (scene != nullptr) rtcReleaseScene(scene);
     }
   }
 
-  void attach(RTCGeometry geometry, unsigned id, bool is_refractive) {
+  bool nearest(RTCScene scene, const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double most,
+               RayHit& hit) const;
+
+  void attach(RTCGeometry geometry, unsigned id, Passage passage) {
     rtcCommitGeometry(geometry);
     rtcAttachGeometryByID(all, geometry, id);
-    rtcAttachGeometryByID(is_refractive ? refractive : opaque, geometry, id);
+    const RTCScene own = passage == Passage::kNone ? opaque : passage == Passage::kFilm ? films : refractive;
+    rtcAttachGeometryByID(own, geometry, id);
+    has_films = has_films || passage == Passage::kFilm;
     rtcReleaseGeometry(geometry);
   }
 
-  void add_mesh(unsigned id, bool is_refractive) {
+  void add_mesh(unsigned id, Passage passage) {
     const TriangleMesh& mesh = meshes[id].mesh;
     if (mesh.triangles.empty()) return;
     RTCGeometry geometry = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_TRIANGLE);
@@ -103,13 +118,14 @@ struct RayScene::State {
         *corners++ = static_cast<unsigned>(corner);
         const double z = mesh.vertices[corner].z();
         all_heights.add(z, z);
-        if (!is_refractive) opaque_heights.add(z, z);
+        if (passage == Passage::kNone) opaque_heights.add(z, z);
       }
     }
-    attach(geometry, id, is_refractive);
+    attach(geometry, id, passage);
   }
 
-  void add_balls(unsigned id, const std::vector<int>& which, bool is_refractive) {
+  void add_balls(unsigned id, Passage passage) {
+    const std::vector<int>& which = balls_by_passage[static_cast<std::size_t>(passage)];
     if (which.empty()) return;
     RTCGeometry geometry = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_SPHERE_POINT);
     auto* points = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT4,
@@ -120,25 +136,23 @@ struct RayScene::State {
       for (int a = 0; a < 3; ++a) *points++ = static_cast<float>(ball.centre[a]);
       *points++ = static_cast<float>(ball.radius);
       all_heights.add(ball.centre.z() - ball.radius, ball.centre.z() + ball.radius);
-      if (!is_refractive) opaque_heights.add(ball.centre.z() - ball.radius, ball.centre.z() + ball.radius);
+      if (passage == Passage::kNone) opaque_heights.add(ball.centre.z() - ball.radius, ball.centre.z() + ball.radius);
     }
-    attach(geometry, id, is_refractive);
+    attach(geometry, id, passage);
   }
 };
 
 RayScene::RayScene(const Scene& scene) : state_(std::make_unique<State>()) {
   State& state = *state_;
-  for (RTCScene* made : {&state.all, &state.opaque, &state.refractive}) {
+  for (RTCScene* made : {&state.all, &state.opaque, &state.refractive, &state.films}) {
     *made = rtcNewScene(device());
     // Robust: no ray slips through the common edge of two triangles.
     rtcSetSceneFlags(*made, RTC_SCENE_FLAG_ROBUST);
     rtcSetSceneBuildQuality(*made, RTC_BUILD_QUALITY_MEDIUM);
   }
-  const auto is_refractive = [](const Material& material) { return std::holds_alternative<Refractive>(material); };
-
   for (const Surface& surface : scene.surfaces) {
     State::Mesh mesh{surface.mesh, {}};
-    if (is_refractive(surface.material)) {
+    if (passage_of(surface.material) == Passage::kRefracted) {
       mesh.vertex_normals.assign(mesh.mesh.vertices.size(), Eigen::Vector3d::Zero());
       for (const auto& t : mesh.mesh.triangles) {
         const auto& p = mesh.mesh.vertices;
@@ -152,18 +166,19 @@ RayScene::RayScene(const Scene& scene) : state_(std::make_unique<State>()) {
   }
   state.balls = scene.balls;
   for (int i = 0; i < static_cast<int>(scene.balls.size()); ++i) {
-    (is_refractive(scene.balls[i].material) ? state.refractive_balls : state.opaque_balls).push_back(i);
+    state.balls_by_passage[static_cast<std::size_t>(passage_of(scene.balls[i].material))].push_back(i);
   }
   for (unsigned i = 0; i < state.meshes.size(); ++i) {
-    state.add_mesh(i, is_refractive(scene.surfaces[i].material));
+    state.add_mesh(i, passage_of(scene.surfaces[i].material));
   }
   const auto first_ball = static_cast<unsigned>(state.meshes.size());
-  state.add_balls(first_ball, state.opaque_balls, false);
-  state.add_balls(first_ball + 1, state.refractive_balls, true);
+  for (Passage passage : {Passage::kNone, Passage::kRefracted, Passage::kFilm}) {
+    state.add_balls(first_ball + static_cast<unsigned>(passage), passage);
+  }
   // Built by one thread: the same tree, and so the same choice among equal hits, for any number of threads.
   tbb::task_arena alone(1);
   alone.execute([&] {
-    for (RTCScene made : {state.all, state.opaque, state.refractive}) rtcCommitScene(made);
+    for (RTCScene made : {state.all, state.opaque, state.refractive, state.films}) rtcCommitScene(made);
   });
   const RTCError error = rtcGetDeviceError(device());
   if (error != RTC_ERROR_NONE) fail("Embree can't take the scene (error {})", static_cast<int>(error));
@@ -171,25 +186,20 @@ RayScene::RayScene(const Scene& scene) : state_(std::make_unique<State>()) {
 
 RayScene::~RayScene() = default;
 
-bool RayScene::intersect(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double most,
-                         RayHit& hit) const {
-  const State& state = *state_;
-  const double end = std::isinf(most) ? (direction.z() == 0.0 ? origin.z() : std::copysign(1e30, direction.z()))
-                                      : origin.z() + most * direction.z();
-  if (!(most > 0.0) || state.all_heights.misses(origin.z(), end) || !finite(origin, direction)) return false;
-
+bool RayScene::State::nearest(RTCScene scene, const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
+                              double most, RayHit& hit) const {
   RTCRayHit found;
   found.ray = embree_ray(origin, direction, most);
   found.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   found.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
-  rtcIntersect1(state.all, &context, &found);
+  rtcIntersect1(scene, &context, &found);
   if (found.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
 
   const unsigned geometry = found.hit.geomID;
-  if (geometry < state.meshes.size()) {
-    const State::Mesh& mesh = state.meshes[geometry];
+  if (geometry < meshes.size()) {
+    const Mesh& mesh = meshes[geometry];
     const auto& t = mesh.mesh.triangles[found.hit.primID];
     const Eigen::Vector3d& a = mesh.mesh.vertices[t[0]];
     const Eigen::Vector3d ab = mesh.mesh.vertices[t[1]] - a;
@@ -198,6 +208,9 @@ bool RayScene::intersect(const Eigen::Vector3d& origin, const Eigen::Vector3d& d
     hit.normal = ab.cross(ac).normalized();
     hit.distance = (hit.position - origin).dot(direction);
     hit.object = static_cast<int>(geometry);
+    hit.triangle = static_cast<int>(found.hit.primID);
+    hit.weight_1 = double(found.hit.u);
+    hit.weight_2 = double(found.hit.v);
     hit.shading_normal = hit.normal;
     if (!mesh.vertex_normals.empty()) {
       const double w = 1.0 - double(found.hit.u) - double(found.hit.v);
@@ -210,9 +223,9 @@ bool RayScene::intersect(const Eigen::Vector3d& origin, const Eigen::Vector3d& d
     return true;
   }
 
-  const auto& which = geometry == state.meshes.size() ? state.opaque_balls : state.refractive_balls;
+  const auto& which = balls_by_passage[geometry - meshes.size()];
   const int index = which[found.hit.primID];
-  const Ball& ball = state.balls[index];
+  const Ball& ball = balls[index];
   const Eigen::Vector3d to_centre = ball.centre - origin;
   const double nearest = to_centre.dot(direction);
   const double half2 = ball.radius * ball.radius - (to_centre - nearest * direction).squaredNorm();
@@ -224,8 +237,28 @@ bool RayScene::intersect(const Eigen::Vector3d& origin, const Eigen::Vector3d& d
   hit.shading_normal = hit.normal;
   hit.position = ball.centre + ball.radius * hit.normal;
   hit.distance = t;
-  hit.object = static_cast<int>(state.meshes.size()) + index;
+  hit.object = static_cast<int>(meshes.size()) + index;
   return std::isfinite(hit.position.sum());
+}
+
+bool RayScene::intersect(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double most,
+                         RayHit& hit) const {
+  const State& state = *state_;
+  const double end = std::isinf(most) ? (direction.z() == 0.0 ? origin.z() : std::copysign(1e30, direction.z()))
+                                      : origin.z() + most * direction.z();
+  if (!(most > 0.0) || state.all_heights.misses(origin.z(), end) || !finite(origin, direction)) return false;
+
+  return state.nearest(state.all, origin, direction, most, hit);
+}
+
+bool RayScene::has_films() const {
+  return state_->has_films;
+}
+
+bool RayScene::intersect_film(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double most,
+                              RayHit& hit) const {
+  if (!(most > 0.0) || !finite(origin, direction)) return false;
+  return state_->nearest(state_->films, origin, direction, most, hit);
 }
 
 bool RayScene::occluded(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const {

@@ -17,9 +17,11 @@ namespace touchstone::render {
 struct RayHit {
   double distance = 0.0;
   Eigen::Vector3d position;
-  Eigen::Vector3d normal;          ///< of the true geometry
-  Eigen::Vector3d shading_normal;  ///< interpolated from the vertices on Refractive surfaces, else `normal`
-  int object = -1;                 ///< index of the surface, or surfaces.size() + index of the ball
+  Eigen::Vector3d normal;                 ///< of the true geometry
+  Eigen::Vector3d shading_normal;         ///< interpolated from the vertices on Refractive surfaces, else `normal`
+  int object = -1;                        ///< index of the surface, or surfaces.size() + index of the ball
+  int triangle = -1;                      ///< of the surface's mesh; only told for surfaces
+  double weight_1 = 0.0, weight_2 = 0.0;  ///< barycentric weights of the triangle's second and third vertex
 };
 
 class RayScene {
@@ -33,8 +35,14 @@ class RayScene {
   /// The nearest hit within `most` (mm, may be infinity) along a unit direction. A ray that isn't finite hits nothing.
   bool intersect(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double most, RayHit& hit) const;
 
-  /// Does anything opaque (not Refractive) stand between the two points?
+  /// Does anything opaque (neither Refractive nor ThinFilm) stand between the two points?
   bool occluded(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const;
+
+  /// Are there ThinFilms?
+  bool has_films() const;
+
+  /// The nearest ThinFilm within `most` (mm, finite): only distance, normal and object of `hit` are told.
+  bool intersect_film(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double most, RayHit& hit) const;
 
   /// Distance to the nearest Refractive surface straight along +z (`up`) or -z within `most`; negative if there is
   /// none.

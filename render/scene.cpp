@@ -38,14 +38,22 @@ void check_medium_index(int medium, const Scene& scene, const std::string& what)
   }
 }
 
+void check_index(double index, const std::string& what) {
+  if (!(index >= 1.0 && index <= 5.0)) fail("{}: index is {}; it must be from 1 to 5", what, index);
+}
+
+void check_roughness(double roughness, const std::string& what) {
+  if (!(roughness >= 1e-3 && roughness <= 1.0)) {
+    fail("{}: roughness is {}; it must be from 0.001 to 1", what, roughness);
+  }
+}
+
 void check_material(const Material& material, const Scene& scene, const std::string& what) {
   const Eigen::Index bands = scene.environment.size();
   std::visit(Overloaded{[&](const Lambertian& m) { check_spectrum(m.albedo, bands, 1.0, what + ": albedo"); },
                         [&](const RoughConductor& m) {
                           check_spectrum(m.reflectance, bands, 1.0, what + ": reflectance");
-                          if (!(m.roughness >= 1e-3 && m.roughness <= 1.0)) {
-                            fail("{}: roughness is {}; it must be from 0.001 to 1", what, m.roughness);
-                          }
+                          check_roughness(m.roughness, what);
                         },
                         [](const Black&) {},
                         [&](const Emitter& m) {
@@ -55,8 +63,56 @@ void check_material(const Material& material, const Scene& scene, const std::str
                         [&](const Refractive& m) {
                           check_medium_index(m.medium_inside, scene, what + ": medium_inside");
                           check_medium_index(m.medium_outside, scene, what + ": medium_outside");
+                        },
+                        [&](const RoughRefractive& m) {
+                          check_medium_index(m.medium_inside, scene, what + ": medium_inside");
+                          check_medium_index(m.medium_outside, scene, what + ": medium_outside");
+                          check_roughness(m.roughness, what);
+                        },
+                        [&](const DiffuseTransmitter& m) {
+                          check_spectrum(m.reflectance, bands, 1.0, what + ": reflectance");
+                          check_spectrum(m.transmittance, bands, 1.0, what + ": transmittance");
+                          for (Eigen::Index i = 0; i < bands; ++i) {
+                            // Decimal fractions that add up to one may miss it by a rounding.
+                            if (m.reflectance[i] + m.transmittance[i] > 1.0 + 1e-12) {
+                              fail("{}: reflectance {} and transmittance {} in band {}; their sum must be at most 1",
+                                   what, m.reflectance[i], m.transmittance[i], i);
+                            }
+                          }
+                        },
+                        [&](const ThinFilm& m) {
+                          check_spectrum(m.transmittance, bands, 1.0, what + ": transmittance");
+                          check_index(m.index, what);
                         }},
              material);
+}
+
+void check_print(const Print& print, const Surface& surface, Eigen::Index bands, const std::string& what) {
+  if (!std::holds_alternative<Lambertian>(surface.material) &&
+      !std::holds_alternative<RoughConductor>(surface.material)) {
+    fail("{}: only a Lambertian or RoughConductor can be printed on", what);
+  }
+  if (print.material_mm.size() != surface.mesh.vertices.size()) {
+    fail("{}: {} material points; the mesh has {} vertices", what, print.material_mm.size(),
+         surface.mesh.vertices.size());
+  }
+  for (std::size_t i = 0; i < print.material_mm.size(); ++i) {
+    if (!print.material_mm[i].allFinite()) fail("{}: material point {} isn't finite", what, i);
+  }
+  for (std::size_t i = 0; i < print.inks.size(); ++i) {
+    check_spectrum(print.inks[i], bands, 1.0, fmt::format("{}: ink {}", what, i));
+  }
+  for (std::size_t i = 0; i < print.discs.size(); ++i) {
+    const PrintedDisc& disc = print.discs[i];
+    if (!disc.centre.allFinite() || disc.centre.cwiseAbs().maxCoeff() > 1e5)
+      fail("{}: the centre of disc {} isn't within 100 m", what, i);
+    if (!(disc.radius > 0.0 && disc.radius < 1e5)) {
+      fail("{}: the radius of disc {} is {} mm; it must be above 0", what, i, disc.radius);
+    }
+    if (disc.ink < 0 || disc.ink >= static_cast<int>(print.inks.size())) {
+      fail("{}: disc {} has ink {}; there are {}", what, i, disc.ink, print.inks.size());
+    }
+  }
 }
 
 void check_mesh(const TriangleMesh& mesh, const std::string& what) {
@@ -89,11 +145,16 @@ void check_scene(const Scene& scene) {
   if (scene.media.empty()) fail("scene: no medium; media[0] fills the space");
   for (std::size_t i = 0; i < scene.media.size(); ++i) {
     const Medium& medium = scene.media[i];
-    if (!(medium.index >= 1.0 && medium.index <= 5.0)) {
-      fail("medium {}: index is {}; it must be from 1 to 5", i, medium.index);
-    }
+    check_index(medium.index, fmt::format("medium {}", i));
     if (medium.absorption.size() > 0) {
       check_spectrum(medium.absorption, bands, INFINITY, fmt::format("medium {}: absorption", i));
+    }
+    if (medium.scattering.size() > 0) {
+      // A mean free path of less than a micrometre is a white surface, and no more than the rays' own rounding.
+      check_spectrum(medium.scattering, bands, 1000.0, fmt::format("medium {}: scattering", i));
+    }
+    if (!(std::abs(medium.anisotropy) <= 0.999)) {
+      fail("medium {}: anisotropy is {}; it must be from -0.999 to 0.999", i, medium.anisotropy);
     }
   }
 
@@ -119,6 +180,7 @@ void check_scene(const Scene& scene) {
     const std::string what = fmt::format("surface {}", i);
     check_mesh(scene.surfaces[i].mesh, what);
     check_material(scene.surfaces[i].material, scene, what);
+    if (scene.surfaces[i].print) check_print(*scene.surfaces[i].print, scene.surfaces[i], bands, what + ": print");
   }
   for (std::size_t i = 0; i < scene.balls.size(); ++i) {
     const Ball& ball = scene.balls[i];

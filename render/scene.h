@@ -3,18 +3,26 @@
 // All in the gel frame (core/transform.h), lengths in mm.
 
 #include <Eigen/Core>
+#include <optional>
 #include <variant>
 #include <vector>
 
 #include "core/triangle_mesh.h"
+#include "render/diffuse_transmitter.h"
+#include "render/print.h"
+#include "render/rough_dielectric.h"
 #include "render/spectrum.h"
+#include "render/thin_film.h"
 
 namespace touchstone::render {
 
-/// A homogeneous clear substance. `absorption` is per mm (Beer-Lambert, natural logarithm); an empty spectrum is none.
+/// A homogeneous substance. `absorption` (Beer-Lambert) and `scattering` (scattering.h) are per mm, natural logarithm;
+/// an empty spectrum is none. `anisotropy` is the mean cosine of a scattering, -0.999 to 0.999.
 struct Medium {
   double index = 1.0;
-  Spectrum absorption;
+  Spectrum absorption = {};
+  Spectrum scattering = {};
+  double anisotropy = 0.0;
 };
 
 /// Ideally matt: the reflected radiance is albedo / pi times the irradiance. Both sides reflect.
@@ -48,13 +56,16 @@ struct Refractive {
   int medium_outside = 0;
 };
 
-using Material = std::variant<Lambertian, RoughConductor, Black, Emitter, Refractive>;
+using Material =
+    std::variant<Lambertian, RoughConductor, Black, Emitter, Refractive, DiffuseTransmitter, ThinFilm, RoughRefractive>;
 
 /// A triangle surface, open or closed. A Refractive surface is shaded with normals interpolated from its vertices, so
-/// that a deformed gel refracts as the curved surface it stands for; others with the normal of the triangle.
+/// that a deformed gel refracts as the curved surface it stands for; others with the normal of the triangle. A
+/// Lambertian or RoughConductor may be printed on.
 struct Surface {
   TriangleMesh mesh;
   Material material;
+  std::optional<Print> print = std::nullopt;
 };
 
 struct Ball {

@@ -55,6 +55,10 @@ TEST(SceneCheck, FaultsAreRefusedByName) {
   expect_refused([](Scene& s) { s.media[1].index = kNan; }, "medium 1: index");
   expect_refused([](Scene& s) { s.media[1].index = 0.5; }, "medium 1: index is 0.5");
   expect_refused([](Scene& s) { s.media[2].absorption = grey(-1.0); }, "medium 2: absorption");
+  expect_refused([](Scene& s) { s.media[2].scattering = grey(kNan); }, "medium 2: scattering");
+  expect_refused([](Scene& s) { s.media[2].scattering = grey(2000.0); }, "medium 2: scattering is 2000");
+  expect_refused([](Scene& s) { s.media[2].anisotropy = 1.0; }, "medium 2: anisotropy is 1");
+  expect_refused([](Scene& s) { s.media[2].anisotropy = kNan; }, "medium 2: anisotropy");
   expect_refused([](Scene& s) { s.faces[1].z = -8.0; }, "face 1");
   expect_refused([](Scene& s) { s.faces[1].medium_below = 0; }, "face 1");
   expect_refused([](Scene& s) { s.lamps[0].direction.setZero(); }, "lamp 0");
@@ -63,6 +67,49 @@ TEST(SceneCheck, FaultsAreRefusedByName) {
   expect_refused([](Scene& s) { s.environment = grey(INFINITY); }, "environment");
   expect_refused([](Scene& s) { s.environment = Spectrum(); }, "no band");
   expect_refused([](Scene& s) { s.media.clear(); }, "no medium");
+}
+
+TEST(SceneCheck, FaultySheetsAndFilmsAreRefusedByName) {
+  expect_refused([](Scene& s) { s.balls[0].material = DiffuseTransmitter{grey(0.6), grey(0.5)}; }, "sum must be");
+  expect_refused([](Scene& s) { s.balls[0].material = DiffuseTransmitter{grey(-0.1), grey(0.5)}; }, "reflectance");
+  expect_refused([](Scene& s) { s.balls[0].material = DiffuseTransmitter{grey(0.1), {}}; }, "transmittance has 0");
+  expect_refused([](Scene& s) { s.balls[0].material = ThinFilm{grey(1.2)}; }, "transmittance is 1.2");
+  expect_refused([](Scene& s) { s.balls[0].material = ThinFilm{grey(0.5), 0.9}; }, "index is 0.9");
+  expect_refused([](Scene& s) { s.balls[0].material = RoughRefractive{1, 0, 0.0}; }, "roughness is 0");
+  expect_refused([](Scene& s) { s.balls[0].material = RoughRefractive{3, 0, 0.1}; }, "medium_inside is medium 3");
+  Scene scene = good_scene();
+  scene.balls[0].material = DiffuseTransmitter{grey(0.9), grey(0.1)};
+  EXPECT_NO_THROW(Tracer{scene});
+}
+
+TEST(SceneCheck, FaultyPrintsAreRefusedByName) {
+  const auto spoil = [](const std::function<void(Print&)>& change) {
+    return [change](Scene& s) {
+      s.surfaces[0].material = Lambertian{grey(0.9)};
+      Print print;
+      print.material_mm = {{-1, -1}, {1, -1}, {1, 1}, {-1, 1}};
+      print.inks = {grey(0.1)};
+      print.discs = {{{0, 0}, 0.5, 0}};
+      change(print);
+      s.surfaces[0].print = print;
+    };
+  };
+  Scene scene = good_scene();
+  spoil([](Print&) {})(scene);
+  EXPECT_NO_THROW(Tracer{scene});
+  expect_refused(spoil([](Print& p) { p.material_mm.pop_back(); }), "surface 0: print: 3 material points");
+  expect_refused(spoil([](Print& p) { p.material_mm[2].x() = kNan; }), "material point 2");
+  expect_refused(spoil([](Print& p) { p.inks[0] = grey(1.1); }), "ink 0 is 1.1");
+  expect_refused(spoil([](Print& p) { p.discs[0].radius = 0.0; }), "radius of disc 0 is 0");
+  expect_refused(spoil([](Print& p) { p.discs[0].radius = kNan; }), "radius of disc 0");
+  expect_refused(spoil([](Print& p) { p.discs[0].centre.y() = kNan; }), "centre of disc 0");
+  expect_refused(spoil([](Print& p) { p.discs[0].ink = 1; }), "disc 0 has ink 1");
+  expect_refused(
+      [&](Scene& s) {
+        spoil([](Print&) {})(s);
+        s.surfaces[0].material = Refractive{2, 0};
+      },
+      "can be printed on");
 }
 
 TEST(SceneCheck, TwoBandsAreRefused) {

@@ -1,0 +1,360 @@
+// Random walks in scattering media against the theory of radiative transfer.
+
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+#include <cmath>
+#include <vector>
+
+#include "core/random.h"
+#include "core/units.h"
+#include "light_scenes.h"
+#include "render/scattering.h"
+
+namespace touchstone::render {
+namespace {
+
+struct Estimate {
+  double mean = 0.0;
+  double error = 0.0;
+};
+
+/// Mean radiance along a ray over `runs` runs of 16 paths, and its standard error.
+Estimate view(const Scene& scene, const Eigen::Vector3d& from, const Eigen::Vector3d& direction, int runs) {
+  const Tracer tracer(scene);
+  double sum = 0.0;
+  double squares = 0.0;
+  for (int i = 0; i < runs; ++i) {
+    RenderSettings settings = samples(16);
+    settings.seed = static_cast<std::uint64_t>(i);
+    const double value = tracer.radiance(from, direction, settings)[0];
+    sum += value;
+    squares += value * value;
+  }
+  const double mean = sum / runs;
+  return {mean, std::sqrt(std::max(0.0, squares / runs - mean * mean) / (runs - 1))};
+}
+
+/// A direction down (-z) or up at the given |cosine|.
+Eigen::Vector3d at_cosine(double cosine, bool up) {
+  return {std::sqrt(1.0 - cosine * cosine), 0.0, up ? cosine : -cosine};
+}
+
+/// A medium with an extinction of 1 per mm.
+Medium particles(double albedo, double g, double index = 1.0) {
+  return Medium{index, grey(1.0 - albedo), grey(albedo), g};
+}
+
+/// Air above z = 0, the medium below it, down to z = -thickness (0: for ever) where air follows.
+Scene slab(const Medium& medium, double thickness, double environment) {
+  Scene scene = empty_scene(environment);
+  scene.media = {Medium{}, medium};
+  if (thickness > 0.0) {
+    scene.faces = {{-thickness, 0, 1}, {0.0, 1, 0}};
+  } else {
+    scene.faces = {{0.0, 1, 0}};
+  }
+  return scene;
+}
+
+/// Gauss and Legendre's nodes and weights on (0, 1), by Newton on the Legendre polynomial.
+struct Quadrature {
+  std::vector<double> node, weight;
+};
+Quadrature gauss(int count) {
+  Quadrature rule;
+  for (int i = 0; i < count; ++i) {
+    double x = std::cos(kPi * (i + 0.75) / (count + 0.5));
+    double slope = 1.0;
+    for (int step = 0; step < 50; ++step) {
+      double p0 = 1.0;
+      double p1 = x;
+      for (int l = 2; l <= count; ++l) {
+        const double p2 = ((2.0 * l - 1.0) * x * p1 - (l - 1.0) * p0) / l;
+        p0 = p1;
+        p1 = p2;
+      }
+      slope = count * (x * p1 - p0) / (x * x - 1.0);
+      x -= p1 / slope;
+    }
+    rule.node.push_back(0.5 * (1.0 - x));
+    rule.weight.push_back(1.0 / ((1.0 - x * x) * slope * slope));
+  }
+  return rule;
+}
+
+/// Chandrasekhar's H for isotropic scattering (Radiative Transfer, ch. V), from
+/// 1 / H(mu) = sqrt(1 - albedo) + albedo / 2 int_0^1 x H(x) / (mu + x) dx.
+class ChandrasekharH {
+ public:
+  explicit ChandrasekharH(double albedo) : albedo_(albedo), rule_(gauss(64)), at_nodes_(64, 1.0) {
+    for (int step = 0; step < 2000; ++step) {
+      std::vector<double> next;
+      for (double mu : rule_.node) next.push_back((*this)(mu));
+      at_nodes_ = next;
+    }
+  }
+  double operator()(double mu) const {
+    double sum = std::sqrt(1.0 - albedo_);
+    for (std::size_t i = 0; i < at_nodes_.size(); ++i) {
+      sum += 0.5 * albedo_ * rule_.weight[i] * rule_.node[i] * at_nodes_[i] / (mu + rule_.node[i]);
+    }
+    return 1.0 / sum;
+  }
+
+ private:
+  double albedo_;
+  Quadrature rule_;
+  std::vector<double> at_nodes_;
+};
+
+/// What a slab sends back and lets through of an even sky, at the nodes of `rule`: by doubling (van de Hulst 1980, ch.
+/// 4) of a layer so thin that it scatters once, from Henyey and Greenstein's phase function averaged over azimuth.
+struct SlabOfSky {
+  Eigen::VectorXd reflected, passed;
+};
+SlabOfSky double_up(const Quadrature& rule, double albedo, double g, double thickness) {
+  const int n = static_cast<int>(rule.node.size());
+  const auto phase = [&](double a, double b) {  // mean over azimuth, 4 pi p
+    double sum = 0.0;
+    double factor = 1.0;
+    double a0 = 1.0, a1 = a, b0 = 1.0, b1 = b;
+    for (int l = 0; l < 2 * n; ++l) {
+      sum += (2.0 * l + 1.0) * factor * a0 * b0;
+      factor *= g;
+      const double a2 = ((2.0 * l + 3.0) * a * a1 - (l + 1.0) * a0) / (l + 2.0);
+      const double b2 = ((2.0 * l + 3.0) * b * b1 - (l + 1.0) * b0) / (l + 2.0);
+      a0 = a1, a1 = a2, b0 = b1, b1 = b2;
+    }
+    return sum;
+  };
+  constexpr int kDoublings = 24;
+  const double thin = thickness / (1 << kDoublings);
+  Eigen::MatrixXd back(n, n);
+  Eigen::MatrixXd on(n, n);
+  for (int i = 0; i < n; ++i) {
+    for (int j = 0; j < n; ++j) {
+      const double share = albedo * thin * rule.weight[j] / (2.0 * rule.node[i]);
+      back(i, j) = share * phase(rule.node[i], -rule.node[j]);
+      on(i, j) = share * phase(rule.node[i], rule.node[j]) + (i == j ? 1.0 - thin / rule.node[i] : 0.0);
+    }
+  }
+  const Eigen::MatrixXd one = Eigen::MatrixXd::Identity(n, n);
+  for (int k = 0; k < kDoublings; ++k) {
+    const Eigen::MatrixXd between = (one - back * back).inverse();
+    const Eigen::MatrixXd new_back = back + on * back * between * on;
+    on = on * between * on;
+    back = new_back;
+  }
+  return {back.rowwise().sum(), on.rowwise().sum()};
+}
+
+TEST(HenyeyGreenstein, IsOneOverTheSphereAndHasItsMean) {
+  for (double g : {-0.9, -0.3, 0.0, 1e-9, 0.5, 0.95}) {
+    constexpr int kSteps = 400000;
+    double total = 0.0;
+    double mean = 0.0;
+    for (int i = 0; i < kSteps; ++i) {
+      const double cosine = 2.0 * (i + 0.5) / kSteps - 1.0;
+      const double part = henyey_greenstein(cosine, g) * 4.0 * kPi / kSteps;
+      total += part;
+      mean += part * cosine;
+    }
+    EXPECT_NEAR(total, 1.0, 1e-6);
+    EXPECT_NEAR(mean, g, 1e-6);
+  }
+}
+
+TEST(HenyeyGreenstein, SamplerHasItsDensityAndMean) {
+  constexpr int kBins = 40;
+  constexpr int kCount = 200000;
+  for (double g : {-0.7, 0.0, 0.3, 0.9}) {
+    RandomStream stream(3, 0, Purpose::kTest);
+    std::vector<double> counts(kBins, 0.0);
+    double sum = 0.0;
+    double squares = 0.0;
+    for (int i = 0; i < kCount; ++i) {
+      const double cosine = sample_henyey_greenstein(g, stream.uniform());
+      ASSERT_LE(std::abs(cosine), 1.0);
+      sum += cosine;
+      squares += cosine * cosine;
+      counts[std::min(kBins - 1, static_cast<int>(0.5 * (cosine + 1.0) * kBins))] += 1.0;
+    }
+    const double mean = sum / kCount;
+    EXPECT_NEAR(mean, g, 4.0 * std::sqrt((squares / kCount - mean * mean) / kCount)) << g;
+    double statistic = 0.0;
+    for (int bin = 0; bin < kBins; ++bin) {
+      double expected = 0.0;
+      for (int k = 0; k < 1000; ++k) {
+        const double cosine = 2.0 * (bin + (k + 0.5) / 1000.0) / kBins - 1.0;
+        expected += henyey_greenstein(cosine, g) * 4.0 * kPi / kBins / 1000.0 * kCount;
+      }
+      statistic += std::pow(counts[bin] - expected, 2) / expected;
+    }
+    EXPECT_LT(statistic, 100.0) << g;  // 39 degrees of freedom: passed once in 3e-7
+  }
+}
+
+TEST(Flight, BandsTogetherLoseNothingAndGainNothing) {
+  const Bands<3> extinction(0.01, 1.0, 300.0);
+  RandomStream stream(4, 0, Purpose::kTest);
+  for (int i = 0; i < 2000; ++i) {
+    const Bands<3> throughput(stream.uniform(), stream.uniform() * 1e-3, 1.0);
+    const double u = stream.uniform();
+    const Flight<3> flight = sample_flight<3>(extinction, throughput, u, stream.uniform());
+    const Bands<3> scattered = throughput * weight_of_scattering<3>(extinction, extinction, flight);
+    EXPECT_NEAR(scattered.sum(), throughput.sum(), 1e-9);
+    const double free_way = flight.distance * stream.uniform();
+    EXPECT_NEAR((throughput * weight_of_passing<3>(extinction, flight, free_way)).sum(), throughput.sum(), 1e-9);
+  }
+}
+
+TEST(Flight, EndlessWayPassesOnlyTheClearBand) {
+  const Flight<3> flight = sample_flight<3>({0.0, 1.0, 2.0}, {1.0, 1.0, 1.0}, 0.1, 0.5);
+  ASSERT_TRUE(std::isinf(flight.distance));
+  const Bands<3> weight = weight_of_passing<3>({0.0, 1.0, 2.0}, flight, flight.distance);
+  EXPECT_NEAR(weight[0], 3.0, 1e-12);
+  EXPECT_EQ(weight[1], 0.0);
+  EXPECT_EQ(weight[2], 0.0);
+}
+
+// Without interreflection only what wasn't scattered arrives: Beer-Lambert with absorption + scattering.
+TEST(ScatteringMedium, UnscatteredLightFollowsBeerLambert) {
+  Scene scene = empty_scene(0.0);
+  scene.media = {Medium{1.0, grey(0.2), grey(0.3), 0.4}};
+  scene.interreflection = false;
+  scene.balls.push_back({{0, 0, 4}, 1.0, Emitter{grey(1.0)}});
+  const Estimate seen = view(scene, {0, 0, 0}, {0, 0, 1}, 2000);
+  EXPECT_NEAR(seen.mean, std::exp(-1.5), 4.0 * seen.error);
+  EXPECT_LT(seen.error, 0.003);
+}
+
+TEST(ScatteringMedium, ThatTakesNothingAwayIsAWhiteFurnace) {
+  for (double index : {1.0, 1.41}) {
+    for (double g : {-0.5, 0.0, 0.9}) {
+      Scene scene = slab(particles(1.0, g, index), 3.0, 1.0);
+      scene.balls.push_back({{0, 0, -1.5}, 0.5, Lambertian{grey(1.0)}});
+      scene.balls.push_back({{1.5, 0, -1.5}, 0.5, Refractive{0, 1}});
+      const Estimate seen = view(scene, {0.4, 0.2, 5}, {0.05, 0.02, -1}, 60);
+      EXPECT_NEAR(seen.mean, 1.0, 4.0 * seen.error + 1e-9) << index << " " << g;
+      EXPECT_LT(seen.error, 0.01);
+    }
+  }
+}
+
+TEST(ScatteringMedium, BallOfItIsAWhiteFurnace) {
+  Scene scene = empty_scene(1.0);
+  scene.media = {Medium{}, Medium{1.41, {}, grey(200.0), 0.7}};
+  scene.balls.push_back({{0, 0, 0}, 2.0, Refractive{1, 0}});
+  const Estimate seen = view(scene, {0.4, 0.2, 10}, {0, 0.02, -1}, 60);
+  EXPECT_NEAR(seen.mean, 1.0, 4.0 * seen.error + 1e-6);
+  EXPECT_LT(seen.error, 0.01);
+}
+
+// Under an even sky a half space shows 1 - H(mu) sqrt(1 - albedo).
+TEST(ScatteringMedium, HalfSpaceUnderASkyFollowsChandrasekhar) {
+  for (double albedo : {0.5, 0.9, 0.99}) {
+    const ChandrasekharH h(albedo);
+    for (double mu : {0.1, 0.5, 1.0}) {
+      const Estimate seen = view(slab(particles(albedo, 0.0), 0.0, 1.0), {0, 0, 1}, at_cosine(mu, false), 2000);
+      EXPECT_NEAR(seen.mean, 1.0 - h(mu) * std::sqrt(1.0 - albedo), 4.0 * seen.error) << albedo << " " << mu;
+      EXPECT_LT(seen.error, 0.003);
+    }
+  }
+}
+
+// Under a far lamp it shows albedo / (4 pi) E mu0 / (mu + mu0) H(mu) H(mu0), E square to the light.
+TEST(ScatteringMedium, HalfSpaceUnderALampFollowsChandrasekhar) {
+  constexpr double kFar = 1e4;
+  for (double albedo : {0.5, 0.95}) {
+    const ChandrasekharH h(albedo);
+    for (double mu0 : {0.3, 0.9}) {
+      Scene scene = slab(particles(albedo, 0.0), 0.0, 0.0);
+      const Eigen::Vector3d way = at_cosine(mu0, true);
+      scene.lamps.push_back(half_space_lamp(kFar * way, -way, kFar * kFar * 1e-6));  // E = 1
+      for (double mu : {0.2, 1.0}) {
+        const Estimate seen = view(scene, {0, 0, 1}, at_cosine(mu, false), 1500);
+        const double expected = albedo / (4.0 * kPi) * mu0 / (mu + mu0) * h(mu) * h(mu0);
+        EXPECT_NEAR(seen.mean / expected, 1.0, 4.0 * seen.error / expected + 1e-3) << albedo << " " << mu0 << " " << mu;
+        EXPECT_LT(seen.error / expected, 0.01);
+      }
+    }
+  }
+}
+
+TEST(ScatteringMedium, SlabUnderASkyFollowsDoubling) {
+  const Quadrature rule = gauss(24);
+  struct Case {
+    double albedo, g, thickness;
+  };
+  for (const Case& c : {Case{0.9, 0.0, 1.0}, Case{0.99, 0.7, 4.0}, Case{0.6, -0.4, 0.5}, Case{1.0, 0.5, 8.0}}) {
+    const SlabOfSky expected = double_up(rule, c.albedo, c.g, c.thickness);
+    // Sky above and a black floor below shows what is sent back; a luminous floor under a dark sky what passes.
+    Scene lit_above = slab(particles(c.albedo, c.g), c.thickness, 1.0);
+    lit_above.surfaces.push_back({square_sheet(1e4, -c.thickness - 0.01), Black{}});
+    Scene lit_below = slab(particles(c.albedo, c.g), c.thickness, 0.0);
+    lit_below.surfaces.push_back({square_sheet(1e4, -c.thickness - 0.01), Emitter{grey(1.0)}});
+    for (int node : {4, 12, 23}) {
+      const Eigen::Vector3d direction = at_cosine(rule.node[node], false);
+      const Estimate back = view(lit_above, {0, 0, 0.01}, direction, 1000);
+      const Estimate through = view(lit_below, {0, 0, 0.01}, direction, 1000);
+      SCOPED_TRACE(testing::Message() << "albedo " << c.albedo << " g " << c.g << " mu " << rule.node[node]);
+      EXPECT_NEAR(back.mean, expected.reflected[node], 4.0 * back.error + 3e-4);
+      EXPECT_NEAR(through.mean, expected.passed[node], 4.0 * through.error + 3e-4);
+      EXPECT_LT(std::max(back.error, through.error), 0.005);
+      if (c.albedo == 1.0) {
+        EXPECT_NEAR(back.mean + through.mean, 1.0, 4.0 * std::hypot(back.error, through.error));
+      }
+    }
+  }
+}
+
+// The three bands' coefficients differ by 1e5; no path may carry more than the three skies it can bring.
+TEST(ScatteringMedium, UnequalBandsGiveNoFireflies) {
+  Scene scene;
+  scene.environment = Spectrum::Constant(3, 1.0);
+  Medium medium;
+  medium.scattering = Bands<3>(0.001, 1.0, 100.0);
+  scene.media = {Medium{}, medium};
+  scene.faces = {{-2.0, 0, 1}, {0.0, 1, 0}};
+  const Tracer tracer(scene);
+  Spectrum sum = Spectrum::Zero(3);
+  Spectrum squares = Spectrum::Zero(3);
+  constexpr int kPaths = 4000;
+  for (int i = 0; i < kPaths; ++i) {
+    RenderSettings settings = samples(1);
+    settings.seed = static_cast<std::uint64_t>(i);
+    const Spectrum seen = tracer.radiance({0, 0, 1}, {0.3, 0, -1}, settings);
+    EXPECT_LT(seen.sum(), 24.0);  // 3, times 2 at each doubling of the walk beyond kFreeScatterings
+    sum += seen;
+    squares += seen * seen;
+  }
+  for (int band = 0; band < 3; ++band) {
+    const double mean = sum[band] / kPaths;
+    EXPECT_NEAR(mean, 1.0, 4.0 * std::sqrt((squares[band] / kPaths - mean * mean) / kPaths) + 1e-9) << band;
+  }
+}
+
+// 5000 mean free paths thick, indices that mirror, a lamp close by: finite, and the energy is the sky's.
+TEST(ScatteringMedium, VeryThickIsFiniteAndMakesNoEnergy) {
+  Scene scene = slab(Medium{1.41, {}, grey(1000.0), 0.0}, 5.0, 1.0);
+  const Estimate sky = view(scene, {0, 0, 1}, {0.2, 0, -1}, 20);
+  EXPECT_NEAR(sky.mean, 1.0, 4.0 * sky.error + 1e-9);
+  scene.environment = grey(0.0);
+  scene.lamps.push_back(half_space_lamp({0, 0, 2}, {0, 0, -1}, 1.0));
+  const Estimate lamp = view(scene, {0, 0, 1}, {0.2, 0, -1}, 20);
+  EXPECT_TRUE(std::isfinite(lamp.mean));
+  EXPECT_GT(lamp.mean, 0.0);
+}
+
+TEST(ScatteringMedium, PreviewHasNoNoise) {
+  Scene scene = slab(particles(0.9, 0.0), 1.0, 1.0);
+  const PinholeCamera camera = small_camera(8, 6);
+  const cv::Mat once = Tracer(scene).preview(camera, 1);
+  scene.media[1] = Medium{1.0, grey(0.1)};
+  const cv::Mat clear = Tracer(scene).preview(camera, 1);
+  EXPECT_EQ(cv::norm(once, clear, cv::NORM_INF), 0.0);
+}
+
+}  // namespace
+}  // namespace touchstone::render
