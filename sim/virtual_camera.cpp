@@ -26,6 +26,19 @@ render::NoiseTarget noise_target(const render::ImagerResponse& response, double 
   return target;
 }
 
+/// Sets what lies within `radius` pixels of a set pixel.
+void widen(cv::Mat& mask, int radius) {
+  constexpr int kLargeRadius = 16;  // a lens out of focus; dilation's time grows with the square of the radius
+  if (radius <= kLargeRadius) {
+    cv::dilate(mask, mask, cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * radius + 1, 2 * radius + 1}));
+    return;
+  }
+  if (cv::countNonZero(mask) == 0) return;
+  cv::Mat distance;
+  cv::distanceTransform(mask == 0, distance, cv::DIST_L2, cv::DIST_MASK_PRECISE);
+  mask = (distance <= radius);
+}
+
 }  // namespace
 
 struct VirtualCamera::Parts {
@@ -93,7 +106,7 @@ struct VirtualCamera::Parts {
     }
     const double nearest = std::max(1e-3, -scene.device.gel.thickness_mm - scene.device.camera->hole_position_mm.z());
     const int radius = 1 + static_cast<int>(std::ceil(blur_radius_px(camera, nearest) / kPreviewStride));
-    cv::dilate(mask, mask, cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * radius + 1, 2 * radius + 1}));
+    widen(mask, radius);
     cv::Mat whole;
     cv::resize(mask, whole, {mask.cols * kPreviewStride, mask.rows * kPreviewStride}, 0, 0, cv::INTER_NEAREST);
     return whole(cv::Rect({0, 0}, size)).clone();
