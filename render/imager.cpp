@@ -72,7 +72,7 @@ double largest_number(const Imager& imager) {
 }
 
 int raw_type(const Imager& imager) {
-  return imager.bits == 8 ? CV_8UC1 : CV_16UC1;
+  return imager.bits <= 8 ? CV_8UC1 : CV_16UC1;
 }
 
 // Everything a pixel of the inner loop needs.
@@ -166,7 +166,7 @@ cv::Mat expose_as(const cv::Mat& irradiance, const Imager& imager, const FixedPa
 }  // namespace
 
 void check(const Imager& imager) {
-  if (imager.bits < 8 || imager.bits > 16) fail("imager: bits is {}; allowed is from 8 to 16", imager.bits);
+  if (imager.bits < 1 || imager.bits > 16) fail("imager: bits is {}; allowed is from 1 to 16", imager.bits);
   require_finite("active_area_um2", imager.active_area_um2, 0.0, false);
   require_finite("exposure_s", imager.exposure_s, 0.0);
   require_finite("full_well_e", imager.full_well_e, 0.0, false);
@@ -246,7 +246,7 @@ cv::Mat expose(const cv::Mat& irradiance, const Imager& imager, const FixedPatte
                       pattern.gain.type() == CV_32FC1 && pattern.offset_e.type() == CV_32FC1;
     if (!fits) fail("the fixed pattern isn't of the irradiance's size, {}x{}", irradiance.cols, irradiance.rows);
   }
-  return imager.bits == 8 ? expose_as<std::uint8_t>(irradiance, imager, pattern, seed, frame_index)
+  return imager.bits <= 8 ? expose_as<std::uint8_t>(irradiance, imager, pattern, seed, frame_index)
                           : expose_as<std::uint16_t>(irradiance, imager, pattern, seed, frame_index);
 }
 
@@ -259,7 +259,7 @@ cv::Mat develop(const cv::Mat& raw, const Imager& imager, Demosaic method) {
   check(imager);
   if (raw.empty() || raw.type() != raw_type(imager)) {
     fail("a raw image of {} bits must have one channel of {} bit numbers and not be empty", imager.bits,
-         imager.bits == 8 ? 8 : 16);
+         imager.bits <= 8 ? 8 : 16);
   }
   const bool grey = imager.bayer == BayerPattern::none;
   if (!grey && (raw.cols < 2 || raw.rows < 2)) {
@@ -283,7 +283,7 @@ cv::Mat develop(const cv::Mat& raw, const Imager& imager, Demosaic method) {
         out[column] = static_cast<std::uint16_t>(std::clamp(value + 0.5, 0.0, kFullScale));
       }
     };
-    if (imager.bits == 8) {
+    if (imager.bits <= 8) {
       balance(raw.ptr<std::uint8_t>(row));
     } else {
       balance(raw.ptr<std::uint16_t>(row));
@@ -362,7 +362,7 @@ Imager imx273_skipping(int bits, double exposure_s) {
   imager.prnu = 0.005;
   imager.dsnu_e = 1.0;
   imager.bayer = BayerPattern::rggb;
-  if (bits < 8 || bits > 16) check(imager);
+  if (bits < 8 || bits > 16) fail("imager: an IMX273 of {} bits; allowed is from 8 to 16", bits);
   // Black level and gain hang together: full well + black level fill the range.
   const double largest = largest_number(imager);
   imager.black_level_DN = std::ceil(4.0 * imager.read_noise_e * largest / imager.full_well_e);

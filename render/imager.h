@@ -25,7 +25,7 @@ using QuantumEfficiency = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 
 
 /// A sensor and its read-out.
 struct Imager {
-  int bits = 8;                          ///< 8 gives CV_8U, 9 to 16 give CV_16U
+  int bits = 8;                          ///< 1 to 8 give CV_8U (6 bits: 0 to 63), 9 to 16 give CV_16U
   double active_area_um2 = 0.0;          ///< light-collecting area of one pixel
   double exposure_s = 0.0;               ///< 0 is legal: a dark frame
   QuantumEfficiency quantum_efficiency;  ///< channels x bands

@@ -43,7 +43,8 @@ void check_settings(const RenderSettings& settings, Eigen::Index bands) {
   }
 }
 
-void check_mask(const cv::Mat& mask, const PinholeCamera& camera) {
+template <typename AnyCamera>
+void check_mask(const cv::Mat& mask, const AnyCamera& camera) {
   if (mask.empty()) return;
   if (mask.type() != CV_8UC1 || mask.cols != camera.width || mask.rows != camera.height) {
     fail("render: the mask is {} x {} of OpenCV type {}; it must be {} x {} of type {} (CV_8UC1)", mask.cols, mask.rows,
@@ -105,8 +106,8 @@ int next_turn(int samples, int min_samples, int max_samples) {
   return std::min(max_samples, std::max(next, samples + 1));
 }
 
-template <int N>
-PixelResult<N> sample_pixel(const PathIntegrator<N>& integrator, const PinholeCamera& camera,
+template <int N, typename AnyCamera>
+PixelResult<N> sample_pixel(const PathIntegrator<N>& integrator, const AnyCamera& camera,
                             const RenderSettings& settings, double camera_index, int column, int row,
                             RayCounts& counts) {
   PixelResult<N> pixel;
@@ -126,7 +127,7 @@ PixelResult<N> sample_pixel(const PathIntegrator<N>& integrator, const PinholeCa
       const auto [hu, hv] = numbers.next_pair();
       ++counts.paths;
       Bands<N> value = Bands<N>::Zero();
-      if (const auto ray = pinhole_ray(camera, column + px, row + py, hu, hv)) {
+      if (const auto ray = camera_ray(camera, column + px, row + py, hu, hv)) {
         const Bands<N> basic =
             integrator.trace(gel_from_camera * ray->origin, gel_from_camera.turn(ray->direction), numbers, counts);
         value = basic * (ray->weight * camera_index * camera_index);
@@ -147,8 +148,8 @@ PixelResult<N> sample_pixel(const PathIntegrator<N>& integrator, const PinholeCa
   return pixel;
 }
 
-template <int N>
-RenderedImage render_image(const PreparedScene<N>& scene, const PinholeCamera& camera, const RenderSettings& settings,
+template <int N, typename AnyCamera>
+RenderedImage render_image(const PreparedScene<N>& scene, const AnyCamera& camera, const RenderSettings& settings,
                            const cv::Mat& mask) {
   RenderedImage image;
   image.irradiance = cv::Mat::zeros(camera.height, camera.width, CV_32FC(N));
@@ -184,8 +185,8 @@ RenderedImage render_image(const PreparedScene<N>& scene, const PinholeCamera& c
   return image;
 }
 
-template <int N>
-cv::Mat preview_image(const PreparedScene<N>& scene, const PinholeCamera& camera, int stride) {
+template <int N, typename AnyCamera>
+cv::Mat preview_image(const PreparedScene<N>& scene, const AnyCamera& camera, int stride) {
   const int rows = (camera.height + stride - 1) / stride;
   const int columns = (camera.width + stride - 1) / stride;
   cv::Mat image = cv::Mat::zeros(rows, columns, CV_32FC(N));
@@ -197,7 +198,7 @@ cv::Mat preview_image(const PreparedScene<N>& scene, const PinholeCamera& camera
     RayCounts counts;
     for (int column = 0; column < columns; ++column) {
       SampleSequence numbers = SampleSequence::centre();
-      const auto ray = pinhole_ray(camera, (column + 0.5) * stride, (row + 0.5) * stride, 0.5, 0.5);
+      const auto ray = camera_ray(camera, (column + 0.5) * stride, (row + 0.5) * stride, 0.5, 0.5);
       if (!ray) continue;
       const Bands<N> basic = integrator.trace(camera.gel_from_camera * ray->origin,
                                               camera.gel_from_camera.turn(ray->direction), numbers, counts);
@@ -264,17 +265,22 @@ Tracer::~Tracer() = default;
 Tracer::Tracer(Tracer&&) noexcept = default;
 Tracer& Tracer::operator=(Tracer&&) noexcept = default;
 
-RenderedImage Tracer::render(const PinholeCamera& camera, const RenderSettings& settings, const cv::Mat& mask) const {
-  check_camera(camera);
+RenderedImage Tracer::render(const Camera& camera, const RenderSettings& settings, const cv::Mat& mask) const {
+  const ReadyCamera ready = make_ready(camera);
   check_settings(settings, prepared_->bands);
-  check_mask(mask, camera);
-  return std::visit([&](const auto& scene) { return render_image(*scene, camera, settings, mask); }, prepared_->scene);
+  return std::visit(
+      [&](const auto& scene, const auto& one) {
+        check_mask(mask, one);
+        return render_image(*scene, one, settings, mask);
+      },
+      prepared_->scene, ready);
 }
 
-cv::Mat Tracer::preview(const PinholeCamera& camera, int stride) const {
-  check_camera(camera);
+cv::Mat Tracer::preview(const Camera& camera, int stride) const {
+  const ReadyCamera ready = make_ready(camera);
   if (stride < 1) fail("preview: stride is {}; it must be 1 or more", stride);
-  return std::visit([&](const auto& scene) { return preview_image(*scene, camera, stride); }, prepared_->scene);
+  return std::visit([&](const auto& scene, const auto& one) { return preview_image(*scene, one, stride); },
+                    prepared_->scene, ready);
 }
 
 Spectrum Tracer::radiance(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,

@@ -6,14 +6,14 @@
 #include <opencv2/core/mat.hpp>
 #include <optional>
 
-#include "render/pinhole_camera.h"
+#include "render/camera.h"
 #include "render/scene.h"
 
 namespace touchstone::render {
 
 /// A pixel is sampled until its standard error, in electrons, is below `fraction` times the imager's own noise there,
 /// sqrt(signal + read_noise_e^2 + quantisation_e^2). The error is judged from the samples themselves: something that
-/// fills less than about 1 / min_samples of what a pixel sees through the hole may be missed.
+/// fills less than about 1 / min_samples of what a pixel sees through hole or lens may be missed.
 struct NoiseTarget {
   Spectrum electrons_per_irradiance;  ///< electrons in a pixel per W/m^2 in each band (exposure, area, efficiency)
   double read_noise_e = 0.0;
@@ -79,12 +79,12 @@ class Tracer {
   Tracer& operator=(Tracer&&) noexcept;
 
   /// Renders the pixels where `mask` (CV_8UC1, the camera's size) isn't zero; an empty mask means all.
-  RenderedImage render(const PinholeCamera& camera, const RenderSettings& settings, const cv::Mat& mask = {}) const;
+  RenderedImage render(const Camera& camera, const RenderSettings& settings, const cv::Mat& mask = {}) const;
 
-  /// A preview without noise, for finding what changed between two scenes: one ray through the hole's centre for each
-  /// block of `stride` x `stride` pixels (at the block's centre), lamps as points, direct light only. CV_32FC(N) of
-  /// ceil(height/stride) x ceil(width/stride).
-  cv::Mat preview(const PinholeCamera& camera, int stride) const;
+  /// A preview without noise, for finding what changed between two scenes: one ray through the hole's or lens's centre
+  /// for each block of `stride` x `stride` pixels (at the block's centre), lamps as points, direct light only.
+  /// CV_32FC(N) of ceil(height/stride) x ceil(width/stride).
+  cv::Mat preview(const Camera& camera, int stride) const;
 
   /// What the paths themselves do, for tests and tools: mean basic radiance seen along a ray of the gel frame.
   Spectrum radiance(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,

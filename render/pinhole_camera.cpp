@@ -99,7 +99,7 @@ void check_camera(const PinholeCamera& camera) {
   }
 }
 
-std::optional<PinholeRay> pinhole_ray(const PinholeCamera& camera, double x, double y, double u, double v) {
+std::optional<CameraRay> pinhole_ray(const PinholeCamera& camera, double x, double y, double u, double v) {
   const double pitch = camera.pixel_pitch_um * 1e-3;
   const double radius = 0.5e-3 * camera.hole_diameter_um;
   const double half_foil = 0.5e-3 * camera.foil_thickness_um;
@@ -128,7 +128,7 @@ std::optional<PinholeRay> pinhole_ray(const PinholeCamera& camera, double x, dou
   const double area = (high - low) / height.density;
 
   const Eigen::Vector2d hole = centre_near + along * e + height.v * across;
-  PinholeRay ray;
+  CameraRay ray;
   ray.origin = {hole.x(), hole.y(), 0.0};
   const Eigen::Vector3d through = ray.origin - sensor;
   const double length2 = through.squaredNorm();

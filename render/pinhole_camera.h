@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "core/transform.h"
+#include "render/camera_ray.h"
 
 namespace touchstone::render {
 
@@ -25,17 +26,10 @@ struct PinholeCamera {
 /// Throws Error naming the first field that is out of range.
 void check_camera(const PinholeCamera& camera);
 
-/// One way for light from the scene to a point of the sensor. Frame: the camera's, mm.
-struct PinholeRay {
-  Eigen::Vector3d origin;     ///< in the hole's middle plane
-  Eigen::Vector3d direction;  ///< unit, into the scene
-  double weight = 0.0;        ///< irradiance (W/m^2) at the sensor point per radiance (W/m^2/sr) along the ray
-};
-
 /// The ray from the image point (`x`, `y`) in pixels through the place in the hole given by (`u`, `v`) in [0,1)^2. The
 /// mean of `weight` over u, v is the exact solid-angle integral of cos over the part of the hole that the point sees
 /// past both rims, so cos^4 fall-off and the foil's shadow come out of the geometry. nullopt where the foil hides all.
-std::optional<PinholeRay> pinhole_ray(const PinholeCamera& camera, double x, double y, double u, double v);
+std::optional<CameraRay> pinhole_ray(const PinholeCamera& camera, double x, double y, double u, double v);
 
 /// Where a point of the camera frame in front of the hole appears (pixels), seen through the hole's centre in air.
 Eigen::Vector2d project(const PinholeCamera& camera, const Eigen::Vector3d& point_in_camera);

@@ -1,6 +1,7 @@
 #include "sim/device.h"
 
 #include "fem/gel_body.h"
+#include "sim/device_camera.h"
 #include "sim/gel_setup.h"
 #include "sim/gltf_mesh.h"
 
@@ -44,13 +45,36 @@ void check_gel(DeviceSpec& device, const SourceLocation& where) {
 
 void check_camera_outside(const DeviceSpec& device, const SourceLocation& where) {
   const double plate_face = -device.gel.thickness_mm - device.plate.thickness_mm;
+  const char* key = device.camera->type == CameraType::lens ? "lens_position_mm" : "hole_position_mm";
   if (device.camera->hole_position_mm.z() >= plate_face) {
-    fail_at(where, "camera.hole_position_mm: z = {} is not in front of the plate, whose lower face is at z = {}",
+    fail_at(where, "camera.{}: z = {} is not in front of the plate, whose lower face is at z = {}", key,
             device.camera->hole_position_mm.z(), plate_face);
   }
-  if ((device.camera->look_at_mm - device.camera->hole_position_mm).norm() < 1e-6) {
-    fail_at(where, "camera.look_at_mm: is the hole's own position; the camera has no direction");
+}
+
+/// The fields of a lens.
+void lens_fields(YamlReader& in, CameraSpec& camera) {
+  const Allowed length = Allowed::above(0.0);
+  if (in.has("focal_length_mm") == in.has("camera_matrix")) {
+    fail_at(in.where(), "camera: a lens has either focal_length_mm or camera_matrix, {}",
+            in.has("focal_length_mm") ? "not both" : "and this has neither");
   }
+  in.optional("focal_length_mm", camera.focal_length_mm, length);
+  in.optional("camera_matrix", camera.camera_matrix);
+  in.required("f_number", camera.f_number, Allowed::within(0.5, 1000.0));
+  in.optional("focus_distance_mm", camera.focus_distance_mm, length);
+  if (in.has("sensor_distance_mm") && (camera.camera_matrix || camera.focus_distance_mm)) {
+    fail_at(in.where("sensor_distance_mm"), "sensor_distance_mm: can't stand beside {}, which tells it",
+            camera.camera_matrix ? "camera_matrix" : "focus_distance_mm");
+  }
+  in.optional("sensor_distance_mm", camera.sensor_distance_mm, length);
+  in.optional("distortion", camera.distortion);
+  const std::size_t numbers = camera.distortion.size();
+  if (in.has("distortion") && numbers != 4 && numbers != 5 && numbers != 8) {
+    fail_at(in.where("distortion"), "distortion: {} numbers; allowed are 4, 5 or 8: k1 k2 p1 p2 [k3 [k4 k5 k6]]",
+            numbers);
+  }
+  in.required("lens_position_mm", camera.hole_position_mm);
 }
 
 }  // namespace
@@ -61,6 +85,10 @@ EnumNames<BayerLayout> enum_names(BayerLayout) {
           {"bggr", BayerLayout::bggr},
           {"grbg", BayerLayout::grbg},
           {"gbrg", BayerLayout::gbrg}};
+}
+
+EnumNames<CameraType> enum_names(CameraType) {
+  return {{"pinhole", CameraType::pinhole}, {"lens", CameraType::lens}};
 }
 
 EnumNames<GelShape> enum_names(GelShape) {
@@ -173,19 +201,24 @@ void fields(YamlReader& in, LampSpec& lamp) {
 }
 
 void fields(YamlReader& in, CameraSpec& camera) {
+  in.optional("type", camera.type);
   in.required("width", camera.width, Allowed::within(1, 8192));
   in.required("height", camera.height, Allowed::within(1, 8192));
   in.optional("frame_rate_Hz", camera.frame_rate_Hz, Allowed::above(0.0));
   in.required("pixel_pitch_um", camera.pixel_pitch_um, Allowed::above(0.0));
   camera.active_area_um2 = camera.pixel_pitch_um * camera.pixel_pitch_um;
   in.optional("active_area_um2", camera.active_area_um2, Allowed::above_up_to(0.0, camera.active_area_um2));
-  in.required("hole_diameter_um", camera.hole_diameter_um, Allowed::above(0.0));
-  in.optional("foil_thickness_um", camera.foil_thickness_um, Allowed::at_least(0.0));
-  in.required("hole_to_sensor_mm", camera.hole_to_sensor_mm, Allowed::above(0.0));
-  in.required("hole_position_mm", camera.hole_position_mm);
+  if (camera.type == CameraType::lens) {
+    lens_fields(in, camera);
+  } else {
+    in.required("hole_diameter_um", camera.hole_diameter_um, Allowed::above(0.0));
+    in.optional("foil_thickness_um", camera.foil_thickness_um, Allowed::at_least(0.0));
+    in.required("hole_to_sensor_mm", camera.hole_to_sensor_mm, Allowed::above(0.0));
+    in.required("hole_position_mm", camera.hole_position_mm);
+  }
   in.required("look_at_mm", camera.look_at_mm);
   in.required("exposure_us", camera.exposure_us, Allowed::at_least(0.0));
-  in.optional("bits", camera.bits, Allowed::within(6, 16));
+  in.optional("bits", camera.bits, Allowed::within(1, 16));
   in.optional("bayer", camera.bayer);
   in.optional("quantum_efficiency_red", camera.quantum_efficiency_red, part_of_one());
   in.optional("quantum_efficiency_green", camera.quantum_efficiency_green, part_of_one());
@@ -201,6 +234,14 @@ void fields(YamlReader& in, CameraSpec& camera) {
   if (camera.exposure_us > 1e6 / camera.frame_rate_Hz) {
     fail_at(in.where("exposure_us"), "exposure_us: {} is longer than a frame of {} us at {} Hz", camera.exposure_us,
             1e6 / camera.frame_rate_Hz, camera.frame_rate_Hz);
+  }
+  if ((camera.look_at_mm - camera.hole_position_mm).norm() < 1e-6) {
+    fail_at(in.where("look_at_mm"), "camera.look_at_mm: is the camera's own position; the camera has no direction");
+  }
+  try {
+    camera_of(camera);
+  } catch (const Error& error) {
+    fail_at(in.where(), "{}", error.what());
   }
 }
 

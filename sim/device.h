@@ -100,20 +100,32 @@ struct LampSpec {
 enum class BayerLayout { none, rggb, bggr, grbg, gbrg };
 EnumNames<BayerLayout> enum_names(BayerLayout);
 
-/// A pinhole camera and its imager (EMVA 1288 terms).
+enum class CameraType { pinhole, lens };
+EnumNames<CameraType> enum_names(CameraType);
+
+/// A camera and its imager (EMVA 1288 terms). Only the fields that belong to `type` may stand in the file: of a lens
+/// either focal_length_mm or camera_matrix, and at most one of focus_distance_mm and sensor_distance_mm (neither: sharp
+/// at infinity; with a camera matrix, which tells the sensor's distance, focus_distance_mm only).
 struct CameraSpec {
+  CameraType type = CameraType::pinhole;
   int width = 0;
   int height = 0;
   double frame_rate_Hz = 30.0;
   double pixel_pitch_um = 0.0;
   double active_area_um2 = 0.0;
-  double hole_diameter_um = 0.0;
-  double foil_thickness_um = 0.0;
-  double hole_to_sensor_mm = 0.0;
-  Eigen::Vector3d hole_position_mm = Eigen::Vector3d::Zero();
+  double hole_diameter_um = 0.0;                 ///< pinhole
+  double foil_thickness_um = 0.0;                ///< pinhole
+  double hole_to_sensor_mm = 0.0;                ///< pinhole
+  std::optional<double> focal_length_mm;         ///< lens
+  std::optional<Eigen::Vector4d> camera_matrix;  ///< lens: OpenCV's fx, fy, cx, cy, pixels (centres are whole numbers)
+  double f_number = 0.0;                         ///< lens: focal length / diameter of the stop
+  std::optional<double> focus_distance_mm;       ///< lens: to what is sharp, in air
+  std::optional<double> sensor_distance_mm;      ///< lens
+  std::vector<double> distortion;                ///< lens: OpenCV's k1 k2 p1 p2 [k3 [k4 k5 k6]]; empty: none
+  Eigen::Vector3d hole_position_mm = Eigen::Vector3d::Zero();  ///< of a lens its centre: `lens_position_mm` in the file
   Eigen::Vector3d look_at_mm = Eigen::Vector3d::Zero();
   double exposure_us = 1000.0;
-  int bits = 8;
+  int bits = 8;  ///< 1 to 16
   BayerLayout bayer = BayerLayout::none;
   Eigen::Vector3d quantum_efficiency_red = {1, 0, 0};    ///< of the red pixels, in the bands red, green, blue
   Eigen::Vector3d quantum_efficiency_green = {0, 1, 0};  ///< likewise, green pixels; a grey camera has these only

@@ -3,6 +3,7 @@
 
 #include "core/units.h"
 #include "render/path_tracer.h"
+#include "sim/device_camera.h"
 #include "sim/virtual_sensor.h"
 #include "sim/visible_scene.h"
 
@@ -13,13 +14,6 @@ constexpr int kPreviewStride = 2;
 // The first frame's light stays in every later frame where nothing changes, so it is rendered better than they are.
 constexpr double kFirstFrameFraction = 0.5;
 constexpr int kFirstFrameSamples = 4;
-
-/// Radius in pixels of the disc that a point of the scene is blurred to by the hole, at its nearest.
-double blur_radius_px(const DeviceSpec& device) {
-  const CameraSpec& camera = *device.camera;
-  const double nearest = std::max(1e-3, -device.gel.thickness_mm - camera.hole_position_mm.z());
-  return camera.hole_diameter_um / 2 * (1.0 + camera.hole_to_sensor_mm / nearest) / camera.pixel_pitch_um;
-}
 
 /// The response of the channel that the eye and most trackers lean on: green of three, or the grey one.
 render::NoiseTarget noise_target(const render::ImagerResponse& response, double fraction) {
@@ -32,6 +26,19 @@ render::NoiseTarget noise_target(const render::ImagerResponse& response, double 
   return target;
 }
 
+/// Sets what lies within `radius` pixels of a set pixel.
+void widen(cv::Mat& mask, int radius) {
+  constexpr int kLargeRadius = 16;  // a lens out of focus; dilation's time grows with the square of the radius
+  if (radius <= kLargeRadius) {
+    cv::dilate(mask, mask, cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * radius + 1, 2 * radius + 1}));
+    return;
+  }
+  if (cv::countNonZero(mask) == 0) return;
+  cv::Mat distance;
+  cv::distanceTransform(mask == 0, distance, cv::DIST_L2, cv::DIST_MASK_PRECISE);
+  mask = (distance <= radius);
+}
+
 }  // namespace
 
 struct VirtualCamera::Parts {
@@ -41,11 +48,12 @@ struct VirtualCamera::Parts {
         gel(gel_of),
         membrane(plan.fine_relief || scene.outputs.height ? std::make_unique<Membrane>(scene, plan, gel_of) : nullptr),
         objects(visible_objects(scene)),
-        camera(pinhole_camera(*scene.device.camera)),
+        camera(camera_of(*scene.device.camera)),
+        size(render::size_of(camera).x(), render::size_of(camera).y()),
         imager(sim::imager(scene.device, plan.sensor_noise)),
         ideal_imager(sim::imager(scene.device, false)),
         response(render::response_of(imager)),
-        pattern(render::fixed_pattern(imager, {camera.width, camera.height}, scene.seed)) {
+        pattern(render::fixed_pattern(imager, size, scene.seed)) {
     settings.seed = scene.seed;
     settings.min_samples = scene.light.min_samples;
     settings.max_samples = scene.light.max_samples;
@@ -57,7 +65,8 @@ struct VirtualCamera::Parts {
   VisibleGel gel;
   std::unique_ptr<const Membrane> membrane;  // if it's called for
   std::vector<VisibleObject> objects;
-  render::PinholeCamera camera;
+  render::Camera camera;
+  cv::Size size;
   render::Imager imager;
   render::Imager ideal_imager;
   render::ImagerResponse response;
@@ -77,7 +86,7 @@ struct VirtualCamera::Parts {
     return render::Tracer(visible_scene(scene, plan, objects, gel, truth.press));
   }
 
-  /// Which pixels changed against the first frame by more than the tolerance, widened by the hole's blur.
+  /// Which pixels changed against the first frame by more than the tolerance, widened by the blur of hole or lens.
   cv::Mat changed(const cv::Mat& preview) const {
     cv::Mat mask(preview.size(), CV_8U, cv::Scalar(0));
     const auto& per_irradiance = settings.noise->electrons_per_irradiance;
@@ -95,11 +104,12 @@ struct VirtualCamera::Parts {
         if (change > scene.light.change_tolerance * render::noise_e(response, electrons)) out[column] = 255;
       }
     }
-    const int radius = 1 + static_cast<int>(std::ceil(blur_radius_px(scene.device) / kPreviewStride));
-    cv::dilate(mask, mask, cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * radius + 1, 2 * radius + 1}));
+    const double nearest = std::max(1e-3, -scene.device.gel.thickness_mm - scene.device.camera->hole_position_mm.z());
+    const int radius = 1 + static_cast<int>(std::ceil(blur_radius_px(camera, nearest) / kPreviewStride));
+    widen(mask, radius);
     cv::Mat whole;
     cv::resize(mask, whole, {mask.cols * kPreviewStride, mask.rows * kPreviewStride}, 0, 0, cv::INTER_NEAREST);
-    return whole(cv::Rect(0, 0, camera.width, camera.height)).clone();
+    return whole(cv::Rect({0, 0}, size)).clone();
   }
 
   Capture develop(const cv::Mat& irradiance, const Truth& truth, const std::optional<fem::ReliefAnswer>& relief,

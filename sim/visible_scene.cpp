@@ -147,6 +147,14 @@ render::Scene visible_scene(const SceneSpec& scene, const Plan& plan, const std:
   return out;
 }
 
+RigidTransform pose_of(const CameraSpec& camera) {
+  // The camera looks out of the gel, along +z: with +y of the gel frame down the picture, +x runs to its right and
+  // nothing is mirrored. A camera that looks straight along y has +z down instead.
+  const Eigen::Vector3d view = (camera.look_at_mm - camera.hole_position_mm).normalized();
+  const Eigen::Vector3d down = std::abs(view.y()) > 0.999 ? Eigen::Vector3d(0, 0, 1) : Eigen::Vector3d(0, 1, 0);
+  return look_at(camera.hole_position_mm, camera.look_at_mm, down);
+}
+
 render::PinholeCamera pinhole_camera(const CameraSpec& camera) {
   render::PinholeCamera out;
   out.width = camera.width;
@@ -155,11 +163,7 @@ render::PinholeCamera pinhole_camera(const CameraSpec& camera) {
   out.hole_diameter_um = camera.hole_diameter_um;
   out.foil_thickness_um = camera.foil_thickness_um;
   out.distance_mm = camera.hole_to_sensor_mm;
-  // The camera looks out of the gel, along +z: with +y of the gel frame down the picture, +x runs to its right and
-  // nothing is mirrored. A camera that looks straight along y has +z down instead.
-  const Eigen::Vector3d view = (camera.look_at_mm - camera.hole_position_mm).normalized();
-  const Eigen::Vector3d down = std::abs(view.y()) > 0.999 ? Eigen::Vector3d(0, 0, 1) : Eigen::Vector3d(0, 1, 0);
-  out.gel_from_camera = look_at(camera.hole_position_mm, camera.look_at_mm, down);
+  out.gel_from_camera = pose_of(camera);
   return out;
 }
 

@@ -40,6 +40,9 @@ render::Scene visible_scene(const SceneSpec& scene, const Plan& plan, const std:
 
 render::PinholeCamera pinhole_camera(const CameraSpec& camera);
 
+/// Where the camera stands and looks.
+RigidTransform pose_of(const CameraSpec& camera);
+
 /// The imager of a device; its bands are those of the device, red, green, blue.
 render::Imager imager(const DeviceSpec& device, bool with_noise);
 

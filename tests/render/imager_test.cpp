@@ -438,7 +438,7 @@ TEST(Imager, BadSettingsAreRefusedNamingTheField) {
   };
   refused("exposure_s", [](Imager& i) { i.exposure_s = -1.0; });
   refused("exposure_s", [nan](Imager& i) { i.exposure_s = nan; });
-  refused("bits", [](Imager& i) { i.bits = 7; });
+  refused("bits", [](Imager& i) { i.bits = 0; });
   refused("bits", [](Imager& i) { i.bits = 17; });
   refused("active_area_um2", [](Imager& i) { i.active_area_um2 = 0.0; });
   refused("full_well_e", [](Imager& i) { i.full_well_e = 0.0; });

@@ -146,8 +146,7 @@ TEST(PlayMotion, AForceThatCannotBeMetNamesTheKeysLine) {
 }
 
 // Light of the pixels that were not traced again must be what tracing the whole frame would give, within the noise.
-TEST(VirtualCamera, ThePartialFrameAgreesWithTheWholeOne) {
-  Played p = play("  - {frames: 2, z: {force_N: 1}}\n");
+void expect_partial_frame_agrees(Played p) {
   p.scene.outputs = {.frames = false, .ideal = false, .radiance = true};
   p.scene.light.max_samples = 64;
   p.plan = make_plan(p.scene);
@@ -177,6 +176,22 @@ TEST(VirtualCamera, ThePartialFrameAgreesWithTheWholeOne) {
   // Two renderings, each with a standard error of at most the noise where its samples suffice, and the tolerated
   // change.
   EXPECT_LT(rms, 1.5) << "in units of the imager's noise";
+}
+
+TEST(VirtualCamera, ThePartialFrameAgreesWithTheWholeOne) {
+  expect_partial_frame_agrees(play("  - {frames: 2, z: {force_N: 1}}\n"));
+}
+
+TEST(VirtualCamera, ThePartialFrameAgreesWithTheWholeOneThroughALens) {
+  Played p = play("  - {frames: 2, z: {force_N: 1}}\n");
+  CameraSpec& camera = *p.scene.device.camera;
+  camera.type = CameraType::lens;
+  camera.focal_length_mm = 4.0;
+  camera.f_number = 8.0;
+  camera.focus_distance_mm = 16.0;
+  camera.distortion = {-0.1, 0.0, 0.001, 0.0};
+  camera.exposure_us = 20.0;
+  expect_partial_frame_agrees(p);
 }
 
 TEST(VirtualCamera, AnObjectThatDoesNotMoveCostsNothing) {

@@ -1,0 +1,59 @@
+#include "sim/device_camera.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "sim/visible_scene.h"
+
+namespace touchstone::sim {
+namespace {
+
+/// The list as OpenCV orders it; what isn't there is 0.
+render::LensDistortion distortion_of(const std::vector<double>& list) {
+  const auto at = [&list](std::size_t i) { return i < list.size() ? list[i] : 0.0; };
+  return {at(0), at(1), at(2), at(3), at(4), at(5), at(6), at(7)};
+}
+
+render::LensCamera lens_camera(const CameraSpec& camera) {
+  render::LensCamera out;
+  out.width = camera.width;
+  out.height = camera.height;
+  out.pixel_pitch_um = camera.pixel_pitch_um;
+  out.distortion = distortion_of(camera.distortion);
+  if (camera.focus_distance_mm) out.focus_distance_mm = *camera.focus_distance_mm;
+  if (camera.camera_matrix) {
+    const Eigen::Vector4d& matrix = *camera.camera_matrix;
+    out.matrix = {matrix[0], matrix[1], matrix[2], matrix[3]};
+  } else {
+    const double focal = *camera.focal_length_mm;
+    if (camera.sensor_distance_mm) out.focus_distance_mm = render::focus_of_sensor(focal, *camera.sensor_distance_mm);
+    out.matrix =
+        render::matrix_of_lens(focal, out.focus_distance_mm, camera.pixel_pitch_um, camera.width, camera.height);
+  }
+  out.aperture_mm = render::focal_length_mm(out) / camera.f_number;
+  out.gel_from_camera = pose_of(camera);
+  return out;
+}
+
+}  // namespace
+
+render::Camera camera_of(const CameraSpec& camera) {
+  if (camera.type == CameraType::pinhole) return pinhole_camera(camera);
+  render::LensCamera lens = lens_camera(camera);
+  check_camera(lens);
+  return lens;
+}
+
+double blur_radius_px(const render::Camera& camera, double nearest_mm) {
+  if (const auto* lens = std::get_if<render::LensCamera>(&camera)) {
+    // A disc's diameter grows with the distance from the plane of focus on either side.
+    const double infinite = std::numeric_limits<double>::infinity();
+    const double blur = std::max(render::blur_circle_mm(*lens, nearest_mm), render::blur_circle_mm(*lens, infinite));
+    return 0.5e3 * blur / lens->pixel_pitch_um;
+  }
+  const auto& pinhole = std::get<render::PinholeCamera>(camera);
+  return pinhole.hole_diameter_um / 2 * (1.0 + pinhole.distance_mm / nearest_mm) / pinhole.pixel_pitch_um;
+}
+
+}  // namespace touchstone::sim

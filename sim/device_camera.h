@@ -1,0 +1,17 @@
+#pragma once
+// From a device file's camera to the renderer's.
+
+#include "render/camera.h"
+#include "sim/device.h"
+
+namespace touchstone::sim {
+
+/// The pinhole or the lens of a device. @throws Error if a lens can't be made: it can't focus so near, or its
+/// distortion can't be inverted inside the picture
+render::Camera camera_of(const CameraSpec& camera);
+
+/// The largest radius in pixels of the disc to which a point of the scene, from `nearest_mm` before the camera to
+/// any distance, is blurred by hole or lens.
+double blur_radius_px(const render::Camera& camera, double nearest_mm);
+
+}  // namespace touchstone::sim
