@@ -10,18 +10,23 @@
 #include <vector>
 
 #include "core/error.h"
+#include "render/embree_device.h"
 
 namespace touchstone::render {
-namespace {
 
-/// One Embree device for the process. Its `threads` option stays alone: it would limit oneTBB in the whole process.
-RTCDevice device() {
+RTCDevice embree_device() {
   static const RTCDevice shared = [] {
     const RTCDevice made = rtcNewDevice(nullptr);
     if (made == nullptr) fail("Embree can't start on this processor (error {})", int(rtcGetDeviceError(nullptr)));
     return made;
   }();
   return shared;
+}
+
+namespace {
+
+RTCDevice device() {
+  return embree_device();
 }
 
 struct HeightRange {

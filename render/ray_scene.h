@@ -1,5 +1,5 @@
 #pragma once
-// Rays against surfaces and balls. The only part that knows Embree.
+// Single rays against surfaces and balls. Only this and packet_scene.h know Embree.
 //
 // Embree works in single precision; what it hits is found again here in double precision (on the triangle's plane, on
 // the ball's exact sphere), and rays leave a surface from a point set off along its normal by leave_distance(), some

@@ -1,0 +1,31 @@
+#pragma once
+// How far a shadow ray can meet anything at all.
+
+#include <memory>
+#include <vector>
+
+#include "render/scene.h"
+
+namespace touchstone::render {
+
+/// A coarse map, seen along z, of how steep a membrane is and what else there is. Where the first surface is a
+/// connected sheet whose triangles all face the same way along z (a height field), a ray that leaves it and climbs
+/// faster than the sheet does anywhere under its way can't meet it. Other things are cylinders along z over the cells
+/// they cover. All answers are safe: a ray that meets something is never cut short of it.
+class ShadowReach {
+ public:
+  explicit ShadowReach(const Scene& scene);
+
+  /// The part of a ray's `far` within which it may meet something, 0 where it can't. The ray leaves object `from`
+  /// (RayHit's numbers).
+  float length(float x, float y, float z, float dx, float dy, float dz, float far, int from) const;
+
+ private:
+  bool sheet_ = false;
+  float low_ = 0.0f, high_ = 0.0f;  // of everything, padded
+  float left_ = 0.0f, bottom_ = 0.0f, cell_ = 1.0f;
+  int columns_ = 0, rows_ = 0;
+  std::vector<float> slope_;  // of the sheet, rise per mm; endless where something else is
+};
+
+}  // namespace touchstone::render
