@@ -77,6 +77,11 @@ struct RayScene::State {
   std::vector<int> opaque_balls, refractive_balls;  // Embree's primitive number -> ball
   RTCScene all = nullptr, opaque = nullptr, refractive = nullptr;
   HeightRange all_heights, opaque_heights;
+  std::vector<RecordedRay>* recorded = nullptr;
+
+  void keep(const RTCRay& ray, bool shadow) const {
+    recorded->push_back({{ray.org_x, ray.org_y, ray.org_z}, {ray.dir_x, ray.dir_y, ray.dir_z}, ray.tfar, shadow});
+  }
 
   ~State() {
     for (RTCScene scene : {all, opaque, refractive}) {
@@ -187,6 +192,7 @@ bool RayScene::intersect(const Eigen::Vector3d& origin, const Eigen::Vector3d& d
   found.ray = embree_ray(origin, direction, most);
   found.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   found.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+  if (state.recorded != nullptr) state.keep(found.ray, false);
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   rtcIntersect1(state.all, &context, &found);
@@ -240,10 +246,46 @@ bool RayScene::occluded(const Eigen::Vector3d& from, const Eigen::Vector3d& to) 
   const double length = way.norm();
   if (!(length > 0.0)) return false;
   RTCRay ray = embree_ray(from, way / length, length * (1.0 - 1e-6));
+  if (state.recorded != nullptr) state.keep(ray, true);
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   rtcOccluded1(state.opaque, &context, &ray);
   return ray.tfar < 0.0f;
+}
+
+void RayScene::record(std::vector<RecordedRay>* into) const {
+  state_->recorded = into;
+}
+
+std::uint64_t RayScene::trace_bare(std::span<const RecordedRay> rays) const {
+  std::uint64_t met = 0;
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  for (const RecordedRay& one : rays) {
+    RTCRayHit found;
+    found.ray = {one.origin[0],
+                 one.origin[1],
+                 one.origin[2],
+                 0.0f,
+                 one.direction[0],
+                 one.direction[1],
+                 one.direction[2],
+                 0.0f,
+                 one.far,
+                 0xffffffffu,
+                 0,
+                 0};
+    if (one.shadow) {
+      rtcOccluded1(state_->opaque, &context, &found.ray);
+      met += found.ray.tfar < 0.0f ? 1 : 0;
+    } else {
+      found.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+      found.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+      rtcIntersect1(state_->all, &context, &found);
+      met += found.hit.geomID != RTC_INVALID_GEOMETRY_ID ? 1 : 0;
+    }
+  }
+  return met;
 }
 
 bool RayScene::nothing_beyond(double z, bool up) const {

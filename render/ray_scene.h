@@ -6,7 +6,10 @@
 // tens of float steps: more than Embree's rounding, less than a tenth of a micrometre in a scene of a few cm.
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <memory>
+#include <span>
+#include <vector>
 
 #include "render/scene.h"
 
@@ -20,6 +23,12 @@ struct RayHit {
   Eigen::Vector3d normal;          ///< of the true geometry
   Eigen::Vector3d shading_normal;  ///< interpolated from the vertices on Refractive surfaces, else `normal`
   int object = -1;                 ///< index of the surface, or surfaces.size() + index of the ball
+};
+
+/// A ray as Embree gets it.
+struct RecordedRay {
+  float origin[3], direction[3], far;
+  bool shadow;  ///< asked only whether anything opaque is in the way
 };
 
 class RayScene {
@@ -42,6 +51,13 @@ class RayScene {
 
   /// Is all of the scene's geometry below (`up`) or above (not `up`) the height z?
   bool nothing_beyond(double z, bool up) const;
+
+  /// From now on keeps a copy of each ray that intersect and occluded hand to Embree; nullptr ends it. For benches: one
+  /// thread at a time.
+  void record(std::vector<RecordedRay>* into) const;
+
+  /// Only Embree's part of tracing these rays: how many met something.
+  std::uint64_t trace_bare(std::span<const RecordedRay> rays) const;
 
   /// How far off a surface, along its normal, a ray must start not to meet it again (mm).
   static double leave_distance(const Eigen::Vector3d& position) {
