@@ -121,6 +121,7 @@ struct DirectRenderer::Parts {
   DirectSettings settings;
   CameraRays rays;
   PacketScene tree;
+  bool connected;                          // the first surface
   std::map<double, GgxAlbedo> conductors;  // by roughness
   std::vector<NormalFrame> lens_frames;
   std::vector<double> lamp_index;  // refractive index of the medium that a lamp stands in
@@ -135,7 +136,8 @@ struct DirectRenderer::Parts {
         camera(camera_of),
         settings(settings_of),
         rays(trace_to_layer(field.fixture, camera, field.layer, settings.samples, settings.seed)),
-        tree(rest) {
+        tree(rest),
+        connected(!rest.surfaces.empty() && is_connected(rest.surfaces[0].mesh)) {
     const std::vector<FlatFace>& faces = field.fixture.faces;
     low = field.layer > 0 ? faces[field.layer - 1].z : -INFINITY;
     high = field.layer < static_cast<int>(faces.size()) ? faces[field.layer].z : INFINITY;
@@ -226,7 +228,8 @@ DirectImage DirectRenderer::render(const Scene& scene) {
   std::vector<DirectMaterial> materials;
   for (const Surface& surface : scene.surfaces) materials.push_back(parts.prepare(surface.material));
   for (const Ball& ball : scene.balls) materials.push_back(parts.prepare(ball.material));
-  const ShadowReach shadow_reach(scene);
+  const ShadowReach shadow_reach(
+      scene, other ? !scene.surfaces.empty() && is_connected(scene.surfaces[0].mesh) : parts.connected);
 
   const int bands = parts.rays.bands;
   const int lamps = field.lamp_count();

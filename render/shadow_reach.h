@@ -14,7 +14,8 @@ namespace touchstone::render {
 /// they cover. All answers are safe: a ray that meets something is never cut short of it.
 class ShadowReach {
  public:
-  explicit ShadowReach(const Scene& scene);
+  /// `connected`: what is_connected says of the first surface, kept by those who draw the same triangles again.
+  ShadowReach(const Scene& scene, bool connected);
 
   /// The part of a ray's `far` within which it may meet something, 0 where it can't. The ray leaves object `from`
   /// (RayHit's numbers).
@@ -25,7 +26,11 @@ class ShadowReach {
   float low_ = 0.0f, high_ = 0.0f;  // of everything, padded
   float left_ = 0.0f, bottom_ = 0.0f, cell_ = 1.0f;
   int columns_ = 0, rows_ = 0;
-  std::vector<float> slope_;  // of the sheet, rise per mm; endless where something else is
+  std::vector<float> slope_;   // of the sheet, rise per mm; endless where something else is
+  std::vector<float> around_;  // the most of slope_ that a ray no flatter than kUsual meets before it is clear of all
 };
+
+/// Do the triangles hang together by common vertices? True without any.
+bool is_connected(const TriangleMesh& mesh);
 
 }  // namespace touchstone::render

@@ -340,7 +340,7 @@ TEST(ShadowReach, NeverCutsARayThatMeetsSomething) {
   scene.surfaces.push_back({sheet(7.0, 60, dent), Lambertian{grey(0.5)}});
   scene.surfaces.push_back({square_sheet(0.5, -1.2), Black{}});
   scene.balls.push_back({{-3, 2, -0.9}, 0.4, Black{}});
-  const ShadowReach reach(scene);
+  const ShadowReach reach(scene, is_connected(scene.surfaces[0].mesh));
   const RayScene rays(scene);
   std::mt19937 random(5);
   std::uniform_real_distribution<double> unit(-1.0, 1.0);
@@ -376,7 +376,7 @@ TEST(ShadowReach, SparesNothingOverAFold) {
   for (const auto& vertex : lower.vertices) two.vertices.push_back(vertex);
   for (const auto& t : lower.triangles) two.triangles.push_back({t[0] + 4, t[1] + 4, t[2] + 4});
   scene.surfaces.push_back({two, Lambertian{grey(0.5)}});
-  const ShadowReach reach(scene);
+  const ShadowReach reach(scene, is_connected(scene.surfaces[0].mesh));
   EXPECT_GE(reach.length(0.0f, 0.0f, -1e-4f, 0.0f, 0.0f, -1.0f, 50.0f, 0), 1.0f);
 }
 
