@@ -185,14 +185,15 @@ namespace {
 /// What a packet's lanes met.
 struct Met {
   float place[3][kPacket];
-  float normal[3][kPacket];  // unit, facing the camera ray
+  float normal[3][kPacket];        // unit, facing the camera ray
+  float safe_steepness2[kPacket];  // see ShadowReach; squared
   const DirectMaterial* material[kPacket];
 };
 
 /// Light of one lamp at the lanes: cosine times irradiance of unit intensity, and the direction that it comes from.
 struct LampLight {
   float amount[kPacket];
-  float towards[3][kPacket];
+  float towards[3][kPacket];  // not of unit length
 };
 
 struct Counts {
@@ -300,6 +301,8 @@ DirectImage DirectRenderer::render(const Scene& scene) {
           const float scale = (along < 0.0f ? 1.0f : -1.0f) / std::sqrt(std::max(length2, 1e-30f));
           float normal[3];
           for (int a = 0; a < 3; ++a) met.normal[a][lane] = normal[a] = scale * hits.normal[a][lane];
+          const float steepness = shadow_reach.safe_steepness(place[0], place[1], hits.object[lane]);
+          met.safe_steepness2[lane] = steepness * steepness;
           const FieldCell cell = find_cell(field, place[0], place[1], place[2]);
           float flow[4 * kMostLamps];
           look_up_flow(field, cell, flow);
@@ -336,21 +339,25 @@ DirectImage DirectRenderer::render(const Scene& scene) {
           }
         }
 
-        for (int lamp = 0; lamp < lamps; ++lamp) {
+        for (int lamp = 0; lamp < lamps && parts.settings.shadows; ++lamp) {
           LampLight& one = light[lamp];
+          bool may_meet[kPacket];
           bool any = false;
           for (int lane = 0; lane < kPacket; ++lane) {
-            shadow.valid[lane] = 0;
+            may_meet[lane] = false;
             if (one.amount[lane] == 0.0f) continue;
-            float length2 = 0.0f;
-            for (int a = 0; a < 3; ++a) length2 += one.towards[a][lane] * one.towards[a][lane];
-            if (!(length2 > 0.0f)) continue;
-            const float scale = 1.0f / std::sqrt(length2);
-            for (int a = 0; a < 3; ++a) one.towards[a][lane] *= scale;
+            const float x = one.towards[0][lane];
+            const float y = one.towards[1][lane];
+            const float z = one.towards[2][lane];
+            may_meet[lane] = !(z * z >= met.safe_steepness2[lane] * (x * x + y * y));
+            any = any || may_meet[lane];
+            counts.spared += may_meet[lane] ? 0 : 1;
           }
-          if (!parts.settings.shadows) continue;
+          if (!any) continue;
+          any = false;
           for (int lane = 0; lane < kPacket; ++lane) {
-            if (one.amount[lane] == 0.0f) {
+            shadow.valid[lane] = 0;
+            if (!may_meet[lane]) {
               for (int a = 0; a < 3; ++a) {
                 shadow.origin[a][lane] = 0.0f;
                 shadow.direction[a][lane] = a == 2 ? 1.0f : 0.0f;
@@ -358,14 +365,16 @@ DirectImage DirectRenderer::render(const Scene& scene) {
               shadow.far[lane] = 0.0f;
               continue;
             }
+            const Eigen::Vector3f towards =
+                Eigen::Vector3f(one.towards[0][lane], one.towards[1][lane], one.towards[2][lane]).normalized();
             float most = 0.0f;
             for (int a = 0; a < 3; ++a) most = std::max(most, std::abs(met.place[a][lane]));
             const float leave = 8e-6f * (1.0f + most);
             for (int a = 0; a < 3; ++a) {
               shadow.origin[a][lane] = met.place[a][lane] + leave * met.normal[a][lane];
-              shadow.direction[a][lane] = one.towards[a][lane];
+              shadow.direction[a][lane] = towards[a];
             }
-            const double rise = one.towards[2][lane];
+            const double rise = towards.z();
             double far = 1e6;
             const double limit = rise > 0.0 ? parts.high : parts.low;
             if (std::isfinite(limit) && rise != 0.0) far = std::max(0.0, (limit - met.place[2][lane]) / rise);
@@ -435,8 +444,10 @@ DirectImage DirectRenderer::render(const Scene& scene) {
                   Eigen::Vector3d(met.normal[0][lane], met.normal[1][lane], met.normal[2][lane]).normalized());
               const Eigen::Vector3d leaving = frame.to_local(
                   -Eigen::Vector3d(rays.direction[0][lane], rays.direction[1][lane], rays.direction[2][lane]));
-              const Eigen::Vector3d coming = frame.to_local(
-                  {light[lamp].towards[0][lane], light[lamp].towards[1][lane], light[lamp].towards[2][lane]});
+              const Eigen::Vector3d coming =
+                  frame.to_local(Eigen::Vector3d(light[lamp].towards[0][lane], light[lamp].towards[1][lane],
+                                                 light[lamp].towards[2][lane])
+                                     .normalized());
               const double schlick = schlick_weight((leaving + coming).normalized().dot(leaving));
               const double lobe = ggx_reflection(leaving, coming, material->roughness);
               const double missing = material->albedo->missing_ratio(leaving.z());

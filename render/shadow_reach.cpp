@@ -145,6 +145,14 @@ ShadowReach::ShadowReach(const Scene& scene, bool connected) {
   sheet_ = true;
 }
 
+float ShadowReach::safe_steepness(float x, float y, int from) const {
+  if (!sheet_ || from != 0) return kEndless;
+  const int i = static_cast<int>(std::floor((x - left_) / cell_));
+  const int j = static_cast<int>(std::floor((y - bottom_) / cell_));
+  if (i < 0 || j < 0 || i >= columns_ || j >= rows_) return kEndless;
+  return std::max(kUsual, around_[static_cast<std::size_t>(j) * columns_ + i]);
+}
+
 float ShadowReach::length(float x, float y, float z, float dx, float dy, float dz, float far, int from) const {
   // Above or below everything.
   const float limit = dz > 0.0f ? high_ : low_;
@@ -155,8 +163,6 @@ float ShadowReach::length(float x, float y, float z, float dx, float dy, float d
   const float climb = std::abs(dz);
   int i = static_cast<int>(std::floor((x - left_) / cell_));
   int j = static_cast<int>(std::floor((y - bottom_) / cell_));
-  if (i < 0 || j < 0 || i >= columns_ || j >= rows_) return far;
-  if (climb >= kUsual * across && climb >= around_[static_cast<std::size_t>(j) * columns_ + i] * across) return 0.0f;
   // Runs cell by cell; `clear` is the least that it can be above the sheet.
   float clear = 0.0f;
   float t = 0.0f;

@@ -17,8 +17,12 @@ class ShadowReach {
   /// `connected`: what is_connected says of the first surface, kept by those who draw the same triangles again.
   ShadowReach(const Scene& scene, bool connected);
 
-  /// The part of a ray's `far` within which it may meet something, 0 where it can't. The ray leaves object `from`
-  /// (RayHit's numbers).
+  /// Rays from here, off object `from` (RayHit's numbers), that rise or fall by this much or more per mm across meet
+  /// nothing: |dz| >= value * |(dx, dy)|. Infinite where that can't be said.
+  float safe_steepness(float x, float y, int from) const;
+
+  /// The part of a ray's `far` within which it may meet something, 0 where it can't. The ray leaves object
+  /// `from`.
   float length(float x, float y, float z, float dx, float dy, float dz, float far, int from) const;
 
  private:

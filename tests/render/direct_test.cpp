@@ -346,7 +346,8 @@ TEST(ShadowReach, NeverCutsARayThatMeetsSomething) {
   std::uniform_real_distribution<double> unit(-1.0, 1.0);
   int met = 0;
   int spared = 0;
-  for (int k = 0; k < 20000; ++k) {
+  int by_look = 0;
+  for (int k = 0; k < 40000; ++k) {
     // From a place on the sheet, to its lower side.
     RayHit start;
     if (!rays.intersect({6.9 * unit(random), 6.9 * unit(random), 3.0}, {0, 0, -1}, 10.0, start)) continue;
@@ -357,9 +358,13 @@ TEST(ShadowReach, NeverCutsARayThatMeetsSomething) {
     const Eigen::Vector3d from = start.position - RayScene::leave_distance(start.position) * start.normal;
     const float length = reach.length(float(from.x()), float(from.y()), float(from.z()), float(direction.x()),
                                       float(direction.y()), float(direction.z()), 50.0f, 0);
+    const bool steep = std::abs(direction.z()) >=
+                       double(reach.safe_steepness(float(from.x()), float(from.y()), 0)) * direction.head<2>().norm();
+    by_look += steep ? 1 : 0;
     RayHit hit;
     if (rays.intersect(from, direction, 50.0, hit)) {
       ++met;
+      EXPECT_FALSE(steep);
       EXPECT_GE(length, hit.distance * (1.0 - 1e-5));
     } else {
       spared += length == 0.0f ? 1 : 0;
@@ -367,6 +372,7 @@ TEST(ShadowReach, NeverCutsARayThatMeetsSomething) {
   }
   EXPECT_GT(met, 300);
   EXPECT_GT(spared, 5000);
+  EXPECT_GT(by_look, 1000);
 }
 
 TEST(ShadowReach, SparesNothingOverAFold) {
