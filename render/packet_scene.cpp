@@ -1,5 +1,6 @@
 #include "render/packet_scene.h"
 
+#include <embree3/rtcore.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
