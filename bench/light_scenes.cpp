@@ -22,7 +22,7 @@ render::Scene bench_scene(int triangles, int lamps, int bands, bool interreflect
       const double y = kBenchHalf * (2.0 * j / n - 1.0);
       const double r2 = (x - shift) * (x - shift) + y * y;
       const double s2 = (x - shift - 3.0) * (x - shift - 3.0) + (y - 1.0) * (y - 1.0);
-      mesh.vertices.emplace_back(x, y, -0.8 * std::exp(-r2 / 1.5) - 0.3 * std::exp(-s2 / 0.3));
+      mesh.vertices.emplace_back(x, y, -0.8 * std::exp(-r2 / 0.5) - 0.3 * std::exp(-s2 / 0.05));
     }
   }
   for (int j = 0; j < n; ++j) {
@@ -33,10 +33,15 @@ render::Scene bench_scene(int triangles, int lamps, int bands, bool interreflect
     }
   }
   scene.surfaces.push_back({std::move(mesh), render::Lambertian{flat_spectrum(bands, 0.6)}});
+  for (int bead = 0; bead < 9; ++bead) {
+    scene.balls.push_back({{2.0 * (bead % 3) - 4.0, 2.0 * (bead / 3) - 2.0, -1.2},  // clear of the imprint
+                           0.25,
+                           render::Lambertian{flat_spectrum(bands, 0.1)}});
+  }
   for (int k = 0; k < lamps; ++k) {
     const double angle = 2.0 * kPi * k / lamps;
     render::SpotLamp lamp;
-    lamp.position = {17.5 * std::cos(angle), 17.5 * std::sin(angle), -20.0};
+    lamp.position = {30.0 * std::cos(angle), 30.0 * std::sin(angle), -12.0};
     lamp.direction = (Eigen::Vector3d(0, 0, -3) - lamp.position).normalized();
     lamp.lens_radius = 1.0;
     lamp.half_angle = 30.0 * kRadiansPerDegree;

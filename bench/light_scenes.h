@@ -10,8 +10,9 @@ namespace touchstone::bench {
 
 inline constexpr double kBenchHalf = 10.0;  // mm, of the membrane; the camera sees 8.8
 
-/// Glass of 2 mm under 5 mm of gel; `lamps` on a ring of 17.5 mm, 20 mm below the membrane, of 0.5 W in all bands. The
-/// membrane has about `triangles` triangles and an imprint of 0.8 mm with a smaller one beside it, moved by `shift` mm.
+/// Glass of 2 mm under 5 mm of gel; `lamps` low on a ring of 30 mm, 12 mm below the membrane, of 0.5 W in each band.
+/// The membrane has about `triangles` triangles and an imprint of 0.8 mm with a smaller one beside it, moved by `shift`
+/// mm; nine beads stand before it. Beads and imprints cast shadows.
 render::Scene bench_scene(int triangles, int lamps, int bands, bool interreflection, double shift = 0.0);
 
 /// All that the membrane of bench_scene may reach.
