@@ -11,18 +11,23 @@
 #include <vector>
 
 #include "core/error.h"
+#include "render/embree_device.h"
 
 namespace touchstone::render {
-namespace {
 
-/// One Embree device for the process. Its `threads` option stays alone: it would limit oneTBB in the whole process.
-RTCDevice device() {
+RTCDevice embree_device() {
   static const RTCDevice shared = [] {
     const RTCDevice made = rtcNewDevice(nullptr);
     if (made == nullptr) fail("Embree can't start on this processor (error {})", int(rtcGetDeviceError(nullptr)));
     return made;
   }();
   return shared;
+}
+
+namespace {
+
+RTCDevice device() {
+  return embree_device();
 }
 
 struct HeightRange {
@@ -82,6 +87,11 @@ struct RayScene::State {
   RTCScene all = nullptr, opaque = nullptr, refractive = nullptr, films = nullptr;
   bool has_films = false;
   HeightRange all_heights, opaque_heights;
+  std::vector<RecordedRay>* recorded = nullptr;
+
+  void keep(const RTCRay& ray, bool shadow) const {
+    recorded->push_back({{ray.org_x, ray.org_y, ray.org_z}, {ray.dir_x, ray.dir_y, ray.dir_z}, ray.tfar, shadow});
+  }
 
   ~State() {
     for (RTCScene scene : {all, opaque, refractive, films}) {
@@ -192,6 +202,7 @@ bool RayScene::State::nearest(RTCScene scene, const Eigen::Vector3d& origin, con
   found.ray = embree_ray(origin, direction, most);
   found.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   found.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+  if (recorded != nullptr) keep(found.ray, false);
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   rtcIntersect1(scene, &context, &found);
@@ -268,10 +279,46 @@ bool RayScene::occluded(const Eigen::Vector3d& from, const Eigen::Vector3d& to) 
   const double length = way.norm();
   if (!(length > 0.0)) return false;
   RTCRay ray = embree_ray(from, way / length, length * (1.0 - 1e-6));
+  if (state.recorded != nullptr) state.keep(ray, true);
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   rtcOccluded1(state.opaque, &context, &ray);
   return ray.tfar < 0.0f;
+}
+
+void RayScene::record(std::vector<RecordedRay>* into) const {
+  state_->recorded = into;
+}
+
+std::uint64_t RayScene::trace_bare(std::span<const RecordedRay> rays) const {
+  std::uint64_t met = 0;
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  for (const RecordedRay& one : rays) {
+    RTCRayHit found;
+    found.ray = {one.origin[0],
+                 one.origin[1],
+                 one.origin[2],
+                 0.0f,
+                 one.direction[0],
+                 one.direction[1],
+                 one.direction[2],
+                 0.0f,
+                 one.far,
+                 0xffffffffu,
+                 0,
+                 0};
+    if (one.shadow) {
+      rtcOccluded1(state_->opaque, &context, &found.ray);
+      met += found.ray.tfar < 0.0f ? 1 : 0;
+    } else {
+      found.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+      found.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+      rtcIntersect1(state_->all, &context, &found);
+      met += found.hit.geomID != RTC_INVALID_GEOMETRY_ID ? 1 : 0;
+    }
+  }
+  return met;
 }
 
 bool RayScene::nothing_beyond(double z, bool up) const {

@@ -1,12 +1,15 @@
 #pragma once
-// Rays against surfaces and balls. The only part that knows Embree.
+// Single rays against surfaces and balls. Only this and packet_scene.h know Embree.
 //
 // Embree works in single precision; what it hits is found again here in double precision (on the triangle's plane, on
 // the ball's exact sphere), and rays leave a surface from a point set off along its normal by leave_distance(), some
 // tens of float steps: more than Embree's rounding, less than a tenth of a micrometre in a scene of a few cm.
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <memory>
+#include <span>
+#include <vector>
 
 #include "render/scene.h"
 
@@ -22,6 +25,12 @@ struct RayHit {
   int object = -1;                        ///< index of the surface, or surfaces.size() + index of the ball
   int triangle = -1;                      ///< of the surface's mesh; only told for surfaces
   double weight_1 = 0.0, weight_2 = 0.0;  ///< barycentric weights of the triangle's second and third vertex
+};
+
+/// A ray as Embree gets it.
+struct RecordedRay {
+  float origin[3], direction[3], far;
+  bool shadow;  ///< asked only whether anything opaque is in the way
 };
 
 class RayScene {
@@ -50,6 +59,13 @@ class RayScene {
 
   /// Is all of the scene's geometry below (`up`) or above (not `up`) the height z?
   bool nothing_beyond(double z, bool up) const;
+
+  /// From now on keeps a copy of each ray that intersect and occluded hand to Embree; nullptr ends it. For benches: one
+  /// thread at a time.
+  void record(std::vector<RecordedRay>* into) const;
+
+  /// Only Embree's part of tracing these rays: how many met something.
+  std::uint64_t trace_bare(std::span<const RecordedRay> rays) const;
 
   /// How far off a surface, along its normal, a ray must start not to meet it again (mm).
   static double leave_distance(const Eigen::Vector3d& position) {

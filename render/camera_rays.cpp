@@ -1,0 +1,181 @@
+#include "render/camera_rays.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "render/fresnel.h"
+#include "render/layer_connection.h"
+#include "render/sample_sequence.h"
+
+namespace touchstone::render {
+namespace {
+
+constexpr float kFarAway = 1e6f;  // mm
+
+int layer_at(const Scene& scene, double z) {
+  int layer = 0;
+  while (layer < static_cast<int>(scene.faces.size()) && scene.faces[layer].z < z) ++layer;
+  return layer;
+}
+
+const Medium& medium_of(const Scene& scene, int layer) {
+  if (scene.faces.empty()) return scene.media[0];
+  return scene.media[layer == 0 ? scene.faces.front().medium_below : scene.faces[layer - 1].medium_above];
+}
+
+/// A face on the way, and the layer before it.
+struct Passed {
+  double reflectance_s, reflectance_p;
+  double way;  // in the layer before the face
+  const Medium* before;
+};
+
+struct Followed {
+  bool arrives = false;
+  Eigen::Vector3d origin, direction;
+  double far = kFarAway;
+  Spectrum transmittance;  // of basic radiance
+  Spectrum reflectance;
+};
+
+/// Reflectance and transmittance of several faces for one polarisation, all reflections between them summed: a face of
+/// reflectance r before a stack (R, T) with the share a surviving a pass of the layer between gives
+/// r + (1-r)^2 a^2 R / (1 - r a^2 R) and (1-r) a T / (1 - r a^2 R).
+void add_stack(const std::array<Passed, kMaxLayers>& passed, int count, int band, bool s_polarised, double& reflected,
+               double& through) {
+  reflected = 0.0;
+  through = 1.0;
+  for (int k = count - 1; k >= 0; --k) {
+    // The stack behind face k begins with a layer that is crossed on the way to face k + 1.
+    double pass = 1.0;
+    if (k + 1 < count && passed[k + 1].before->absorption.size() > 0) {
+      pass = std::exp(-passed[k + 1].before->absorption[band] * passed[k + 1].way);
+    }
+    const double r = s_polarised ? passed[k].reflectance_s : passed[k].reflectance_p;
+    const double inner = pass * pass * reflected;
+    const double rounds = 1.0 - r * inner;
+    const double t = rounds > 0.0 ? (1.0 - r) / rounds : 0.0;
+    through = t * pass * through;
+    reflected = r + (1.0 - r) * t * inner;
+  }
+  if (count > 0 && passed[0].before->absorption.size() > 0) {
+    const double pass = std::exp(-passed[0].before->absorption[band] * passed[0].way);
+    through *= pass;
+    reflected *= pass * pass;
+  }
+}
+
+Followed follow(const Scene& scene, Eigen::Vector3d origin, Eigen::Vector3d direction, int layer) {
+  const auto bands = static_cast<int>(scene.environment.size());
+  Followed result;
+  result.transmittance = flat_spectrum(bands, 1.0);
+  result.reflectance = flat_spectrum(bands, 0.0);
+  int at = layer_at(scene, origin.z());
+  const bool up = direction.z() > 0.0;
+  std::array<Passed, kMaxLayers> passed;
+  int count = 0;
+  bool total = false;
+  while (at != layer) {
+    if (direction.z() == 0.0 || up != (layer > at)) return result;  // leads away
+    const Medium& before = medium_of(scene, at);
+    const double way = std::max(0.0, (scene.faces[up ? at : at - 1].z - origin.z()) / direction.z());
+    origin += way * direction;
+    origin.z() = scene.faces[up ? at : at - 1].z;
+    at += up ? 1 : -1;
+    const double n_from = before.index;
+    const double n_to = medium_of(scene, at).index;
+    const FresnelFace face = fresnel(n_from, n_to, std::abs(direction.z()));
+    passed[count++] = {face.reflectance_s, face.reflectance_p, way, &before};
+    total = face.cos_refracted <= 0.0;
+    if (total) break;
+    const double eta = n_from / n_to;
+    direction = Eigen::Vector3d(eta * direction.x(), eta * direction.y(), up ? face.cos_refracted : -face.cos_refracted)
+                    .normalized();
+  }
+  for (int band = 0; band < bands; ++band) {
+    double r[2];
+    double t[2];
+    for (int p = 0; p < 2; ++p) add_stack(passed, count, band, p == 0, r[p], t[p]);
+    result.reflectance[band] = 0.5 * (r[0] + r[1]);
+    result.transmittance[band] = total ? 0.0 : 0.5 * (t[0] + t[1]);
+  }
+  if (total) return result;
+  result.arrives = true;
+  result.origin = origin;
+  result.direction = direction;
+  const int face_count = static_cast<int>(scene.faces.size());
+  if (direction.z() != 0.0 && (up ? layer < face_count : layer > 0)) {
+    const double face_z = scene.faces[up ? layer : layer - 1].z;
+    result.far = std::clamp((face_z - origin.z()) / direction.z(), 0.0, double(kFarAway));
+  }
+  return result;
+}
+
+}  // namespace
+
+CameraRays trace_to_layer(const Scene& fixture, const PinholeCamera& camera, int layer, int samples,
+                          std::uint64_t seed) {
+  CameraRays rays;
+  rays.bands = static_cast<int>(fixture.environment.size());
+  rays.tiles_across = (camera.width + CameraRays::kSide - 1) / CameraRays::kSide;
+  rays.tiles = rays.tiles_across * ((camera.height + CameraRays::kSide - 1) / CameraRays::kSide);
+  const auto packet_count = static_cast<std::size_t>(rays.tiles) * samples;
+  const std::size_t bands = rays.bands;
+  rays.packets.resize(packet_count);
+  rays.through.assign(packet_count * kPacket * bands, 0.0f);
+  const bool dark = (fixture.environment == 0.0).all();
+  if (!dark) rays.veil.assign(packet_count * kPacket * bands, 0.0f);
+  const double camera_index = medium_of(fixture, layer_at(fixture, camera.gel_from_camera.translation.z())).index;
+
+  tbb::parallel_for(0, rays.tiles, [&](int tile) {
+    const int left = tile % rays.tiles_across * CameraRays::kSide;
+    const int top = tile / rays.tiles_across * CameraRays::kSide;
+    for (int sample = 0; sample < samples; ++sample) {
+      const std::size_t number = static_cast<std::size_t>(sample) * rays.tiles + tile;
+      RayPacket& packet = rays.packets[number];
+      for (int lane = 0; lane < kPacket; ++lane) {
+        packet.valid[lane] = 0;
+        packet.far[lane] = 0.0f;
+        for (int a = 0; a < 3; ++a) {
+          packet.origin[a][lane] = 0.0f;
+          packet.direction[a][lane] = a == 2 ? 1.0f : 0.0f;
+        }
+        const int column = left + lane % CameraRays::kSide;
+        const int row = top + lane / CameraRays::kSide;
+        if (column >= camera.width || row >= camera.height) continue;
+        const std::uint64_t pixel =
+            static_cast<std::uint64_t>(row) * static_cast<std::uint64_t>(camera.width) + std::uint64_t(column);
+        SampleSequence numbers = samples == 1 ? SampleSequence::centre() : SampleSequence(seed, pixel, sample);
+        const auto [px, py] = numbers.next_pair();
+        const auto [hu, hv] = numbers.next_pair();
+        const auto ray = pinhole_ray(camera, column + px, row + py, hu, hv);
+        if (!ray) continue;
+        const Followed end =
+            follow(fixture, camera.gel_from_camera * ray->origin, camera.gel_from_camera.turn(ray->direction), layer);
+        const double weight = ray->weight * camera_index * camera_index / samples;
+        const std::size_t slot = (number * kPacket + lane) * bands;
+        for (std::size_t band = 0; band < bands; ++band) {
+          const double beyond = end.arrives ? 0.0 : end.transmittance[band];
+          if (!dark) {
+            rays.veil[slot + band] =
+                static_cast<float>(weight * fixture.environment[band] * (end.reflectance[band] + beyond));
+          }
+          rays.through[slot + band] = static_cast<float>(weight * end.transmittance[band]);
+        }
+        if (!end.arrives) continue;
+        packet.valid[lane] = -1;
+        packet.far[lane] = static_cast<float>(end.far);
+        for (int a = 0; a < 3; ++a) {
+          packet.origin[a][lane] = static_cast<float>(end.origin[a]);
+          packet.direction[a][lane] = static_cast<float>(end.direction[a]);
+        }
+      }
+    }
+  });
+  return rays;
+}
+
+}  // namespace touchstone::render
