@@ -198,6 +198,9 @@ bool RayScene::intersect(const Eigen::Vector3d& origin, const Eigen::Vector3d& d
     hit.normal = ab.cross(ac).normalized();
     hit.distance = (hit.position - origin).dot(direction);
     hit.object = static_cast<int>(geometry);
+    hit.triangle = static_cast<int>(found.hit.primID);
+    hit.u = found.hit.u;
+    hit.v = found.hit.v;
     hit.shading_normal = hit.normal;
     if (!mesh.vertex_normals.empty()) {
       const double w = 1.0 - double(found.hit.u) - double(found.hit.v);
@@ -225,6 +228,7 @@ bool RayScene::intersect(const Eigen::Vector3d& origin, const Eigen::Vector3d& d
   hit.position = ball.centre + ball.radius * hit.normal;
   hit.distance = t;
   hit.object = static_cast<int>(state.meshes.size()) + index;
+  hit.triangle = -1;
   return std::isfinite(hit.position.sum());
 }
 

@@ -20,6 +20,8 @@ struct RayHit {
   Eigen::Vector3d normal;          ///< of the true geometry
   Eigen::Vector3d shading_normal;  ///< interpolated from the vertices on Refractive surfaces, else `normal`
   int object = -1;                 ///< index of the surface, or surfaces.size() + index of the ball
+  int triangle = -1;               ///< of the surface; -1 on a ball
+  double u = 0.0, v = 0.0;         ///< on a triangle: position = (1 - u - v) a + u b + v c
 };
 
 class RayScene {

@@ -12,6 +12,7 @@
 #include "fem/press_error.h"
 #include "fem/vibration.h"
 #include "sim/elastic_object.h"
+#include "sim/image_file.h"
 #include "sim/plan.h"
 #include "sim/scene.h"
 
@@ -31,6 +32,7 @@ struct Capture {
   cv::Mat ideal;     ///< the same without noise
   cv::Mat radiance;  ///< CV_32FC3 (red, green, blue bands), W/m^2 on the sensor
   cv::Mat height;    ///< CV_32FC1, mm: the membrane, see sim/membrane.h
+  LinearImage pixel_truth;  ///< the layers of sim/pixel_truth.h that were asked for
   std::int64_t paths_traced = 0;
   std::int64_t pixels_traced = 0;
 };

@@ -124,6 +124,15 @@ TriangleMesh VisibleGel::dry_surface(const fem::PressState& press, const fem::Co
 }
 
 TriangleMesh VisibleGel::dry_surface(const fem::PressState& press, std::span<const PlacedShape> bodies) const {
+  GelSheet whole = sheet(press, bodies);
+  TriangleMesh dry{std::move(whole.mesh.vertices), {}};
+  for (std::size_t i = 0; i < whole.wet.size(); ++i) {
+    if (!whole.wet[i]) dry.triangles.push_back(whole.mesh.triangles[i]);
+  }
+  return dry;
+}
+
+GelSheet VisibleGel::sheet(const fem::PressState& press, std::span<const PlacedShape> bodies) const {
   std::vector<Above> above;
   for (const PlacedShape& body : bodies) above.emplace_back(body.shape, body.gel_from_object);
   const auto owner = [&](int vertex) { return bodies.size() == 1 ? 0 : press.node_owner[vertex]; };
@@ -155,8 +164,11 @@ TriangleMesh VisibleGel::dry_surface(const fem::PressState& press, std::span<con
     }
   }
 
-  TriangleMesh mesh;
+  GelSheet sheet;
+  TriangleMesh& mesh = sheet.mesh;
   mesh.vertices.resize(fine.rows());
+  const Eigen::MatrixX3d fine_rest = fine_from_coarse_ * rest_;
+  for (Eigen::Index i = 0; i < fine.rows(); ++i) sheet.rest.emplace_back(fine_rest.row(i).transpose());
   std::vector<char> wet(in_contact);
   for (Eigen::Index i = 0; i < fine.rows(); ++i) {
     mesh.vertices[i] = fine.row(i).transpose();
@@ -166,11 +178,12 @@ TriangleMesh VisibleGel::dry_surface(const fem::PressState& press, std::span<con
       wet[i] = 1;
     }
   }
+  mesh.triangles = fine_;
   for (std::size_t i = 0; i < fine_.size(); ++i) {
     const auto& t = fine_[i];
-    if (!contact_triangle[i / kParts] && !(wet[t[0]] && wet[t[1]] && wet[t[2]])) mesh.triangles.push_back(t);
+    sheet.wet.push_back(contact_triangle[i / kParts] || (wet[t[0]] && wet[t[1]] && wet[t[2]]));
   }
-  return mesh;
+  return sheet;
 }
 
 }  // namespace touchstone::sim
