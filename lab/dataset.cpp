@@ -189,9 +189,9 @@ class Run {
   void make_folders() const {
     for (const PreparedScene& scene : job_.scenes) {
       const PictureKinds kinds(scene);
-      for (const auto& [name, wanted] : {std::pair{"frames", kinds.frames}, std::pair{"ideal", kinds.ideal},
-                                         std::pair{"radiance", kinds.radiance}, std::pair{"height", kinds.height},
-                                         std::pair{"pixels", kinds.pixels}}) {
+      for (const auto& [name, wanted] :
+           {std::pair{"frames", kinds.frames}, std::pair{"ideal", kinds.ideal}, std::pair{"radiance", kinds.radiance},
+            std::pair{"height", kinds.height}, std::pair{"pixels", kinds.pixels}}) {
         if (!wanted) continue;
         const fs::path folder = out_ / name / scene.entry.name;
         std::error_code error;

@@ -13,9 +13,9 @@ namespace touchstone::render {
 
 /// Where a pixel's ray ends, in the gel frame (mm).
 struct FirstHit {
-  int object = -1;         ///< index of the surface, or surfaces.size() + index of the ball; -1: it meets nothing
-  int triangle = -1;       ///< of the surface; -1 on a ball
-  double u = 0.0, v = 0.0; ///< on a triangle a b c the position is (1 - u - v) a + u b + v c
+  int object = -1;          ///< index of the surface, or surfaces.size() + index of the ball; -1: it meets nothing
+  int triangle = -1;        ///< of the surface; -1 on a ball
+  double u = 0.0, v = 0.0;  ///< on a triangle a b c the position is (1 - u - v) a + u b + v c
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();  ///< outward; interpolated on Refractive surfaces (see Surface)
 };

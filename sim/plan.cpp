@@ -228,9 +228,10 @@ void plan_light(const SceneSpec& scene, Plan& plan, Table& table) {
             scene.device.where.file);
   }
   const bool hits = scene.outputs.first_hits();
-  table.add("truth of pixels", hits,
-            hits ? "depth, normals, ids, contact or flow is asked for" : "none of depth, normals, ids, contact, flow is",
-            "one ray a pixel: some 0.1 s a frame of 640x480");
+  table.add(
+      "truth of pixels", hits,
+      hits ? "depth, normals, ids, contact or flow is asked for" : "none of depth, normals, ids, contact, flow is",
+      "one ray a pixel: some 0.1 s a frame of 640x480");
   const GelSpec& gel = scene.device.gel;
   if (gel.shape != GelShape::slab) {
     fail_at(scene.where,

@@ -117,8 +117,9 @@ struct VirtualCamera::Parts {
     return capture;
   }
 
-  Capture develop(const cv::Mat& irradiance, const cv::Mat& error, const Truth& truth, const std::optional<fem::ReliefAnswer>& relief,
-                  const render::RayCounts& counts, std::int64_t pixels) const {
+  Capture develop(const cv::Mat& irradiance, const cv::Mat& error, const Truth& truth,
+                  const std::optional<fem::ReliefAnswer>& relief, const render::RayCounts& counts,
+                  std::int64_t pixels) const {
     Capture capture = geometry(truth, relief);
     if (scene.outputs.error) add_channel(capture.pixel_truth, error, "error.irradiance");
     capture.paths_traced = static_cast<std::int64_t>(counts.paths);

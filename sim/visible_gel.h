@@ -23,7 +23,7 @@ struct PlacedShape {
 /// The whole of a gel's outer surface as it's seen, with what its points were before. Gel frame, mm.
 struct GelSheet {
   TriangleMesh mesh;
-  std::vector<char> wet;              ///< per triangle: it lies on a body
+  std::vector<int> touched;           ///< per triangle: the body that it lies on, -1 where it's free
   std::vector<Eigen::Vector3d> rest;  ///< per vertex: the same material point on the undeformed gel
 };
 
