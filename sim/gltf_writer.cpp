@@ -33,7 +33,7 @@ void append(std::string& bytes, T value) {  // glTF is little-endian, as are the
 }
 
 ordered_json numbers(const Eigen::Vector3f& v) {
-  return {v.x(), v.y(), v.z()};
+  return ordered_json::array({v.x(), v.y(), v.z()});
 }
 
 /// glTF's y-up axes from the gel's: (x, y, z) -> (x, z, -y).
@@ -60,9 +60,11 @@ class Glb {
   Glb() {
     json_["asset"] = {{"version", "2.0"}, {"generator", "Touchstone"}};
     json_["scene"] = 0;
-    json_["scenes"] = {{{"nodes", {0}}}};
-    json_["nodes"] = {
-        {{"name", "gel frame, mm"}, {"matrix", matrix(kMetresPerMm * y_up_from_gel(), Eigen::Vector3d::Zero())}}};
+    ordered_json scene = ordered_json::object();
+    scene["nodes"] = ordered_json::array({0});
+    json_["scenes"].push_back(std::move(scene));
+    json_["nodes"].push_back(
+        {{"name", "gel frame, mm"}, {"matrix", matrix(kMetresPerMm * y_up_from_gel(), Eigen::Vector3d::Zero())}});
   }
 
   void add(const GltfPart& part) {
@@ -77,11 +79,14 @@ class Glb {
                                {"roughnessFactor", part.metal ? 0.3 : 0.9}}}};
     if (part.opacity < 1.0) material["alphaMode"] = "BLEND";
     const auto mesh = json_["meshes"].size();
-    json_["meshes"].push_back({{"name", part.name},
-                               {"primitives",
-                                {{{"attributes", {{"POSITION", positions}}},
-                                  {"indices", corners},
-                                  {"material", json_["materials"].size()}}}}});
+    ordered_json primitive = ordered_json::object();
+    primitive["attributes"]["POSITION"] = positions;
+    primitive["indices"] = corners;
+    primitive["material"] = json_["materials"].size();
+    ordered_json one = ordered_json::object();
+    one["name"] = part.name;
+    one["primitives"].push_back(std::move(primitive));
+    json_["meshes"].push_back(std::move(one));
     json_["materials"].push_back(std::move(material));
     for (std::size_t i = 0; i < part.places.size(); ++i) {
       ordered_json node = {{"name", part.places.size() == 1 ? part.name : fmt::format("{} {}", part.name, i)},
@@ -111,7 +116,11 @@ class Glb {
   }
 
   std::string bytes() {
-    if (!binary_.empty()) json_["buffers"] = {{{"byteLength", binary_.size()}}};
+    if (!binary_.empty()) {
+      ordered_json buffer = ordered_json::object();
+      buffer["byteLength"] = binary_.size();
+      json_["buffers"].push_back(std::move(buffer));
+    }
     std::string text = json_.dump();
     text.resize((text.size() + 3) / 4 * 4, ' ');
     const std::size_t total = 12 + 8 + text.size() + (binary_.empty() ? 0 : 8 + binary_.size());
