@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <opencv2/core.hpp>
 
 #include "core/error.h"
 #include "render/first_hits.h"
