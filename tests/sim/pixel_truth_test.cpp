@@ -164,7 +164,6 @@ TEST(PixelTruth, TheContactIsWhereTheObjectIsAndAsLargeAsTruthHasIt) {
   const LinearImage truth = p.last().pixel_truth;
   const cv::Mat contact = channel(truth, "contact.Y"), ids = channel(truth, "id.ID");
   const cv::Mat nx = channel(truth, "normal.X"), ny = channel(truth, "normal.Y"), nz = channel(truth, "normal.Z");
-  const render::PinholeCamera camera = pinhole_camera(*p.scene.device.camera);
   const Eigen::Vector3d centre = p.truths.back().press.gel_from_object * Eigen::Vector3d(0, 0, 4.0);
   // A pixel's size on the gel, from the apparent depth on the axis.
   const double apparent = 13.0 + 1.0 / 1.5 + 4.0 / 1.45;
