@@ -27,10 +27,6 @@ void add_beads(const BeadSpec& beads, const fem::PressState& press, std::vector<
   ball.type = ShapeKind::sphere;
   ball.radius_mm = beads.diameter_mm / 2;
   GltfPart part{"bead", visible_mesh(ball), beads.reflectance, 1.0, true, {}};
-  // A sphere's origin in an object file is its lowest point; a bead's place is its centre.
-  Eigen::AlignedBox3d box;
-  for (const Eigen::Vector3d& vertex : part.mesh.vertices) box.extend(vertex);
-  for (Eigen::Vector3d& vertex : part.mesh.vertices) vertex -= box.center();
   const std::vector<Eigen::Vector3d> rest = bead_centres(beads);
   for (std::size_t i = 0; i < rest.size(); ++i) {
     part.places.emplace_back(rest[i] + press.bead_displacement.row(static_cast<Eigen::Index>(i)).transpose());

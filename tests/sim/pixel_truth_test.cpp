@@ -47,7 +47,7 @@ camera:
                                         "small.yaml");
   scene.object =
       parse_yaml<ObjectSpec>("name: ball\nshape: {type: sphere, radius_mm: 4}\nfriction: 0.7\n", "ball.yaml");
-  scene.motion = parse_yaml<MotionSpec>("start_mm: [0, 0, 0.5]\nkeys:\n" + keys, "motion.yaml");
+  scene.motion = parse_yaml<MotionSpec>("start_mm: [0, 0, 4.5]\nkeys:\n" + keys, "motion.yaml");
   scene.outputs = parse_yaml<OutputSpec>(
       "{frames: false, depth: true, normals: true, ids: true, contact: true, flow: true}", "outputs.yaml");
   scene.light.max_samples = 16;
@@ -73,7 +73,7 @@ struct Played {
   Capture last() const { return VirtualCamera(scene, plan, *gel, truths.front()).capture(truths.back()); }
 };
 
-const char* const kPress = "  - {frames: 1, z: {position_mm: -0.4}}\n  - {frames: 1, x: {position_mm: 0.15}}\n";
+const char* const kPress = "  - {frames: 1, z: {position_mm: 3.6}}\n  - {frames: 1, x: {position_mm: 0.15}}\n";
 
 const Played& pressed() {
   static const Played played(small_scene(kPress));
@@ -108,7 +108,7 @@ Eigen::Vector2d projected_by_bisection(const DeviceSpec& device, const Eigen::Ve
 }
 
 TEST(PixelTruth, AFlatGelIsAtItsTrueDepthAndDoesNotFlow) {
-  SceneSpec scene = small_scene("  - {frames: 1, z: {position_mm: 0.4}}\n");
+  SceneSpec scene = small_scene("  - {frames: 1, z: {position_mm: 4.4}}\n");
   scene.device.beads.reset();
   const Capture capture = Played(scene).last();
   EXPECT_TRUE(capture.frame.empty());
@@ -164,7 +164,7 @@ TEST(PixelTruth, TheContactIsWhereTheObjectIsAndAsLargeAsTruthHasIt) {
   const LinearImage truth = p.last().pixel_truth;
   const cv::Mat contact = channel(truth, "contact.Y"), ids = channel(truth, "id.ID");
   const cv::Mat nx = channel(truth, "normal.X"), ny = channel(truth, "normal.Y"), nz = channel(truth, "normal.Z");
-  const Eigen::Vector3d centre = p.truths.back().press.gel_from_object * Eigen::Vector3d(0, 0, 4.0);
+  const Eigen::Vector3d centre = p.truths.back().press.gel_from_object.translation;
   // A pixel's size on the gel, from the apparent depth on the axis.
   const double apparent = 13.0 + 1.0 / 1.5 + 4.0 / 1.45;
   const double pixel = 0.018 * apparent / 5.0;
@@ -211,7 +211,7 @@ TEST(PixelTruth, ItIsTheSameBytesOnAnyNumberOfThreadsAndRoundTripsAsExr) {
 }
 
 TEST(PixelTruth, OnlyWhatIsAskedForIsMade) {
-  SceneSpec scene = small_scene("  - {frames: 1, z: {position_mm: -0.2}}\n");
+  SceneSpec scene = small_scene("  - {frames: 1, z: {position_mm: 3.8}}\n");
   scene.outputs = parse_yaml<OutputSpec>("{frames: false, error: true, flow: true}", "outputs.yaml");
   const Capture capture = Played(scene).last();
   EXPECT_EQ(capture.pixel_truth.channel_names, (std::vector<std::string>{"flow.X", "flow.Y", "error.irradiance"}));
@@ -223,7 +223,7 @@ TEST(PixelTruth, OnlyWhatIsAskedForIsMade) {
 }
 
 TEST(PixelTruth, ADeviceWithoutACameraIsRefused) {
-  SceneSpec scene = small_scene("  - {frames: 1, z: {position_mm: 0.4}}\n");
+  SceneSpec scene = small_scene("  - {frames: 1, z: {position_mm: 4.4}}\n");
   scene.device.camera.reset();
   scene.outputs = parse_yaml<OutputSpec>("{frames: false, depth: true}", "outputs.yaml");
   try {
