@@ -60,14 +60,15 @@ WrittenFile written(const fs::path& out, const std::string& name) {
 
 /// The kinds of picture that a scene's outputs ask for.
 struct PictureKinds {
-  bool frames = false, ideal = false, radiance = false, height = false;
+  bool frames = false, ideal = false, radiance = false, height = false, pixels = false;
 
   explicit PictureKinds(const PreparedScene& scene)
       : frames(scene.plan.camera && scene.spec.outputs.frames),
         ideal(scene.plan.camera && scene.spec.outputs.ideal),
         radiance(scene.plan.camera && scene.spec.outputs.radiance),
-        height(scene.spec.outputs.height) {}
-  bool any() const { return frames || ideal || radiance || height; }
+        height(scene.spec.outputs.height),
+        pixels(scene.plan.camera && scene.spec.outputs.pixel_truth()) {}
+  bool any() const { return frames || ideal || radiance || height || pixels; }
 };
 
 /// One sample's place in the job.
@@ -188,8 +189,9 @@ class Run {
   void make_folders() const {
     for (const PreparedScene& scene : job_.scenes) {
       const PictureKinds kinds(scene);
-      for (const auto& [name, wanted] : {std::pair{"frames", kinds.frames}, std::pair{"ideal", kinds.ideal},
-                                         std::pair{"radiance", kinds.radiance}, std::pair{"height", kinds.height}}) {
+      for (const auto& [name, wanted] :
+           {std::pair{"frames", kinds.frames}, std::pair{"ideal", kinds.ideal}, std::pair{"radiance", kinds.radiance},
+            std::pair{"height", kinds.height}, std::pair{"pixels", kinds.pixels}}) {
         if (!wanted) continue;
         const fs::path folder = out_ / name / scene.entry.name;
         std::error_code error;
@@ -254,6 +256,11 @@ class Run {
       const sim::ImageMetadata metadata = {{"unit", "mm"},
                                            {"pixel_um", fmt::format("{}", scene.spec.membrane.pixel_um)}};
       sim::write_exr(out_ / name, capture.height, {"height"}, metadata);
+      record.files.push_back(written(out_, name));
+    }
+    if (kinds.pixels) {
+      const std::string name = picture_name("pixels", scene.entry.name, place.frame, "exr");
+      sim::write_exr(out_ / name, capture.pixel_truth.image, capture.pixel_truth.channel_names);
       record.files.push_back(written(out_, name));
     }
     return record;

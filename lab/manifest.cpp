@@ -42,6 +42,11 @@ ordered_json scene_json(const PreparedScene& scene, const std::filesystem::path&
                          {"ideal", scene.plan.camera && spec.outputs.ideal},
                          {"radiance", scene.plan.camera && spec.outputs.radiance},
                          {"height", spec.outputs.height}}}};
+  for (const auto& [name, wanted] : {std::pair{"depth", spec.outputs.depth}, std::pair{"normals", spec.outputs.normals},
+                                     std::pair{"ids", spec.outputs.ids}, std::pair{"contact", spec.outputs.contact},
+                                     std::pair{"flow", spec.outputs.flow}, std::pair{"error", spec.outputs.error}}) {
+    json["outputs"][name] = scene.plan.camera && wanted;
+  }
   if (scene.plan.camera && spec.device.camera) {
     json["picture"] = {{"width", spec.device.camera->width}, {"height", spec.device.camera->height}};
   }

@@ -249,6 +249,7 @@ bool RayScene::State::nearest(RTCScene scene, const Eigen::Vector3d& origin, con
   hit.position = ball.centre + ball.radius * hit.normal;
   hit.distance = t;
   hit.object = static_cast<int>(meshes.size()) + index;
+  hit.triangle = -1;
   return std::isfinite(hit.position.sum());
 }
 

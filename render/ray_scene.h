@@ -23,7 +23,7 @@ struct RayHit {
   Eigen::Vector3d normal;                 ///< of the true geometry
   Eigen::Vector3d shading_normal;         ///< interpolated from the vertices on Refractive surfaces, else `normal`
   int object = -1;                        ///< index of the surface, or surfaces.size() + index of the ball
-  int triangle = -1;                      ///< of the surface's mesh; only told for surfaces
+  int triangle = -1;                      ///< of the surface's mesh; -1 on a ball
   double weight_1 = 0.0, weight_2 = 0.0;  ///< barycentric weights of the triangle's second and third vertex
 };
 

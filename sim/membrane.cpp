@@ -89,6 +89,7 @@ Membrane::Sheet Membrane::sheet(const fem::PressState& press, const fem::ReliefA
       const Eigen::Vector2d material(x[static_cast<std::size_t>(i)], y[static_cast<std::size_t>(j)]);
       const Eigen::Vector2d along = relief.tangential(material);
       vertices[k] << material + along, field.at_material(material);
+      sheet.rest.emplace_back(material.x(), material.y(), surface_.gel().vertices.front().z());
       const int gi = i - left;
       const int gj = j - bottom;
       if (gi >= 0 && gj >= 0 && gi < grid.nx && gj < grid.ny) wet[k] = relief.contact[grid.at(gi, gj)];

@@ -32,6 +32,7 @@ class Membrane {
   struct Sheet {
     TriangleMesh dry;
     TriangleMesh wet;
+    std::vector<Eigen::Vector3d> rest;  ///< per vertex of either: the same material point on the undeformed gel
   };
   Sheet sheet(const fem::PressState& press, const fem::ReliefAnswer& relief) const;
 

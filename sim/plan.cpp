@@ -185,7 +185,7 @@ std::optional<double> finest_detail(const ObjectSpec& object) {
 }
 
 void plan_relief(const SceneSpec& scene, Plan& plan, Table& table) {
-  const bool seen = scene.outputs.frames || scene.outputs.ideal || scene.outputs.radiance || scene.outputs.height;
+  const bool seen = scene.outputs.light() || scene.outputs.first_hits() || scene.outputs.height;
   const double edge = scene.device.mesh.fine_mm;
   std::optional<double> detail;
   for (const MovedObject& moved : moved_objects(scene)) {
@@ -218,7 +218,7 @@ void plan_relief(const SceneSpec& scene, Plan& plan, Table& table) {
 }
 
 void plan_light(const SceneSpec& scene, Plan& plan, Table& table) {
-  const bool images = scene.outputs.frames || scene.outputs.ideal || scene.outputs.radiance;
+  const bool images = scene.outputs.light() || scene.outputs.first_hits();
   plan.camera = table.add("camera and renderer", images,
                           images ? "an image is asked for" : "no image is asked for: truth alone needs none",
                           "most of the time of a frame");
@@ -227,6 +227,15 @@ void plan_light(const SceneSpec& scene, Plan& plan, Table& table) {
     fail_at(scene.where, "outputs: an image is asked for, but the device '{}' ({}) has no camera", scene.device.name,
             scene.device.where.file);
   }
+  const bool hits = scene.outputs.first_hits();
+  if (hits && scene.device.camera->type == CameraType::lens) {
+    fail_at(scene.where, "outputs: depth, normals, ids, contact and flow can't be had with a lens (device '{}') yet",
+            scene.device.name);
+  }
+  table.add(
+      "truth of pixels", hits,
+      hits ? "depth, normals, ids, contact or flow is asked for" : "none of depth, normals, ids, contact, flow is",
+      "one ray a pixel: some 0.1 s a frame of 640x480");
   const GelSpec& gel = scene.device.gel;
   if (gel.shape != GelShape::slab) {
     fail_at(scene.where,

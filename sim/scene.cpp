@@ -41,6 +41,12 @@ void fields(YamlReader& in, OutputSpec& outputs) {
   in.optional("ideal", outputs.ideal);
   in.optional("radiance", outputs.radiance);
   in.optional("height", outputs.height);
+  in.optional("depth", outputs.depth);
+  in.optional("normals", outputs.normals);
+  in.optional("ids", outputs.ids);
+  in.optional("contact", outputs.contact);
+  in.optional("flow", outputs.flow);
+  in.optional("error", outputs.error);
 }
 
 void fields(YamlReader& in, LightSpec& light) {

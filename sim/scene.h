@@ -21,6 +21,19 @@ struct OutputSpec {
   bool ideal = false;     ///< frames without noise beside them: PNG
   bool radiance = false;  ///< linear irradiance on the sensor: EXR, W/m^2 a band
   bool height = false;    ///< the membrane's height: EXR, mm
+  // Truth of each pixel, layers of one EXR (sim/pixel_truth.h).
+  bool depth = false;
+  bool normals = false;
+  bool ids = false;
+  bool contact = false;
+  bool flow = false;
+  bool error = false;  ///< the achieved standard error of the light
+
+  /// Is light to be traced?
+  bool light() const { return frames || ideal || radiance || error; }
+  /// Is anything asked for that comes from a pixel's first hit?
+  bool first_hits() const { return depth || normals || ids || contact || flow; }
+  bool pixel_truth() const { return first_hits() || error; }
 };
 
 /// How exact the light has to be.

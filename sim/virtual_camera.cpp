@@ -4,6 +4,7 @@
 #include "core/units.h"
 #include "render/path_tracer.h"
 #include "sim/device_camera.h"
+#include "sim/pixel_truth.h"
 #include "sim/virtual_sensor.h"
 #include "sim/visible_scene.h"
 
@@ -73,6 +74,7 @@ struct VirtualCamera::Parts {
   render::FixedPattern pattern;
   render::RenderSettings settings;
   cv::Mat first_light;    // irradiance of the first frame
+  cv::Mat first_error;    // its standard error
   cv::Mat first_preview;  // its preview without noise
 
   std::optional<fem::ReliefAnswer> relief(const Truth& truth) const {
@@ -112,10 +114,24 @@ struct VirtualCamera::Parts {
     return whole(cv::Rect({0, 0}, size)).clone();
   }
 
-  Capture develop(const cv::Mat& irradiance, const Truth& truth, const std::optional<fem::ReliefAnswer>& relief,
-                  const render::RayCounts& counts, std::int64_t pixels) const {
+  /// What needs no light.
+  Capture geometry(const Truth& truth, const std::optional<fem::ReliefAnswer>& relief) const {
     Capture capture;
     if (scene.outputs.height) capture.height = membrane->height(truth.press, relief);
+    if (scene.outputs.first_hits()) {
+      const SeenGeometry seen = relief && relief->grid.size() > 0
+                                    ? seen_geometry(scene, objects, *membrane, truth.press, *relief)
+                                    : seen_geometry(scene, objects, gel, truth.press);
+      capture.pixel_truth = pixel_truth(seen, std::get<render::PinholeCamera>(camera), scene.outputs);
+    }
+    return capture;
+  }
+
+  Capture develop(const cv::Mat& irradiance, const cv::Mat& error, const Truth& truth,
+                  const std::optional<fem::ReliefAnswer>& relief, const render::RayCounts& counts,
+                  std::int64_t pixels) const {
+    Capture capture = geometry(truth, relief);
+    if (scene.outputs.error) add_channel(capture.pixel_truth, error, "error.irradiance");
     capture.paths_traced = static_cast<std::int64_t>(counts.paths);
     capture.pixels_traced = pixels;
     const auto picture = [&](const render::Imager& sensor) {
@@ -132,11 +148,17 @@ struct VirtualCamera::Parts {
 VirtualCamera::VirtualCamera(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel, const Truth& first) {
   TS_ASSERT(plan.camera && scene.device.camera);
   auto parts = std::make_unique<Parts>(scene, plan, gel);
+  if (!scene.outputs.light()) {
+    parts_ = std::move(parts);
+    return;
+  }
   render::RenderSettings settings = parts->settings;
   const render::Tracer tracer = parts->tracer(first, parts->relief(first));
   settings.noise->fraction *= kFirstFrameFraction;
   settings.max_samples *= kFirstFrameSamples;
-  parts->first_light = tracer.render(parts->camera, settings).irradiance;
+  const render::RenderedImage image = tracer.render(parts->camera, settings);
+  parts->first_light = image.irradiance;
+  parts->first_error = image.standard_error;
   parts->first_preview = tracer.preview(parts->camera, kPreviewStride);
   parts_ = std::move(parts);
 }
@@ -145,20 +167,24 @@ VirtualCamera::~VirtualCamera() = default;
 
 Capture VirtualCamera::capture(const Truth& truth) const {
   const auto relief = parts_->relief(truth);
+  if (!parts_->scene.outputs.light()) return parts_->geometry(truth, relief);
   const render::Tracer tracer = parts_->tracer(truth, relief);
   const cv::Mat mask = parts_->changed(tracer.preview(parts_->camera, kPreviewStride));
   const int pixels = cv::countNonZero(mask);
-  if (pixels == 0) return parts_->develop(parts_->first_light, truth, relief, {}, 0);
+  if (pixels == 0) return parts_->develop(parts_->first_light, parts_->first_error, truth, relief, {}, 0);
   const render::RenderedImage image = tracer.render(parts_->camera, parts_->settings, mask);
   cv::Mat light = parts_->first_light.clone();
   image.irradiance.copyTo(light, mask);
-  return parts_->develop(light, truth, relief, image.counts, pixels);
+  cv::Mat error = parts_->first_error.clone();
+  image.standard_error.copyTo(error, mask);
+  return parts_->develop(light, error, truth, relief, image.counts, pixels);
 }
 
 Capture VirtualCamera::capture_whole(const Truth& truth) const {
   const auto relief = parts_->relief(truth);
+  if (!parts_->scene.outputs.light()) return parts_->geometry(truth, relief);
   const render::RenderedImage image = parts_->tracer(truth, relief).render(parts_->camera, parts_->settings);
-  return parts_->develop(image.irradiance, truth, relief, image.counts, image.irradiance.total());
+  return parts_->develop(image.irradiance, image.standard_error, truth, relief, image.counts, image.irradiance.total());
 }
 
 }  // namespace touchstone::sim

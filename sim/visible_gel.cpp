@@ -124,15 +124,24 @@ TriangleMesh VisibleGel::dry_surface(const fem::PressState& press, const fem::Co
 }
 
 TriangleMesh VisibleGel::dry_surface(const fem::PressState& press, std::span<const PlacedShape> bodies) const {
+  GelSheet whole = sheet(press, bodies);
+  TriangleMesh dry{std::move(whole.mesh.vertices), {}};
+  for (std::size_t i = 0; i < whole.touched.size(); ++i) {
+    if (whole.touched[i] < 0) dry.triangles.push_back(whole.mesh.triangles[i]);
+  }
+  return dry;
+}
+
+GelSheet VisibleGel::sheet(const fem::PressState& press, std::span<const PlacedShape> bodies) const {
   std::vector<Above> above;
   for (const PlacedShape& body : bodies) above.emplace_back(body.shape, body.gel_from_object);
   const auto owner = [&](int vertex) { return bodies.size() == 1 ? 0 : press.node_owner[vertex]; };
   // To the body that comes first on the way up, or reaches deepest.
   const auto nearest_gap = [&](const Eigen::Vector3d& point) {
-    std::optional<double> nearest;
-    for (const Above& body : above) {
-      const std::optional<double> gap = body.gap(point);
-      if (gap && (!nearest || *gap < *nearest)) nearest = gap;
+    std::optional<std::pair<double, int>> nearest;
+    for (std::size_t k = 0; k < above.size(); ++k) {
+      const std::optional<double> gap = above[k].gap(point);
+      if (gap && (!nearest || *gap < nearest->first)) nearest = {*gap, static_cast<int>(k)};
     }
     return nearest;
   };
@@ -155,22 +164,33 @@ TriangleMesh VisibleGel::dry_surface(const fem::PressState& press, std::span<con
     }
   }
 
-  TriangleMesh mesh;
+  GelSheet sheet;
+  TriangleMesh& mesh = sheet.mesh;
   mesh.vertices.resize(fine.rows());
-  std::vector<char> wet(in_contact);
+  const Eigen::MatrixX3d fine_rest = fine_from_coarse_ * rest_;
+  for (Eigen::Index i = 0; i < fine.rows(); ++i) sheet.rest.emplace_back(fine_rest.row(i).transpose());
+  std::vector<int> touched(fine.rows(), -1);
   for (Eigen::Index i = 0; i < fine.rows(); ++i) {
     mesh.vertices[i] = fine.row(i).transpose();
-    const std::optional<double> gap = nearest_gap(mesh.vertices[i]);
-    if (gap && (in_contact[i] || *gap < kWettedMm)) {
-      mesh.vertices[i].z() += *gap;
-      wet[i] = 1;
+    const auto nearest = nearest_gap(mesh.vertices[i]);
+    if (nearest && (in_contact[i] || nearest->first < kWettedMm)) {
+      mesh.vertices[i].z() += nearest->first;
+      touched[i] = nearest->second;
     }
   }
+  mesh.triangles = fine_;
   for (std::size_t i = 0; i < fine_.size(); ++i) {
     const auto& t = fine_[i];
-    if (!contact_triangle[i / kParts] && !(wet[t[0]] && wet[t[1]] && wet[t[2]])) mesh.triangles.push_back(t);
+    const auto wet = [&](int vertex) { return in_contact[vertex] || touched[vertex] >= 0; };
+    if (contact_triangle[i / kParts]) {
+      sheet.touched.push_back(touched[t[0]] >= 0 ? touched[t[0]] : owner(coarse_[i / kParts][0]));
+    } else if (wet(t[0]) && wet(t[1]) && wet(t[2])) {
+      sheet.touched.push_back(std::max({touched[t[0]], touched[t[1]], touched[t[2]], 0}));
+    } else {
+      sheet.touched.push_back(-1);
+    }
   }
-  return mesh;
+  return sheet;
 }
 
 }  // namespace touchstone::sim

@@ -20,6 +20,13 @@ struct PlacedShape {
   RigidTransform gel_from_object;
 };
 
+/// The whole of a gel's outer surface as it's seen, with what its points were before. Gel frame, mm.
+struct GelSheet {
+  TriangleMesh mesh;
+  std::vector<int> touched;           ///< per triangle: the body that it lies on, -1 where it's free
+  std::vector<Eigen::Vector3d> rest;  ///< per vertex: the same material point on the undeformed gel
+};
+
 /// The elements' edges (half a millimetre) are wide against what a camera resolves, and the displacement that mechanics
 /// gives per vertex overshoots beside a sharp rim (it's a projection on hat functions; here its means over the hats are
 /// taken). Seen through the gel both would
@@ -30,6 +37,8 @@ class VisibleGel {
  public:
   explicit VisibleGel(const fem::Compliance& gel);
 
+  /// The displaced surface. The bodies are those of the press, in their order.
+  GelSheet sheet(const fem::PressState& press, std::span<const PlacedShape> bodies) const;
   /// The displaced surface without what the body wets: triangles all of whose corners lie on it. Gel frame, mm.
   /// The bodies are those of the press, in their order.
   TriangleMesh dry_surface(const fem::PressState& press, std::span<const PlacedShape> bodies) const;

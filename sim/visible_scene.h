@@ -29,7 +29,8 @@ VisibleObject visible_object(const ObjectSpec& object, double edge_mm);
 std::vector<VisibleObject> visible_objects(const SceneSpec& scene);
 
 /// Plate, gel, beads, objects and lamps as they stand at `press`. Where the gel is wetted by the object there is no
-/// face between them: the light goes on into the object.
+/// face between them: the light goes on into the object. Surfaces: the gel's dry surface, its frame, then each object
+/// followed by its screen if it has one. Balls: the beads in their order.
 render::Scene visible_scene(const SceneSpec& scene, const Plan& plan, const std::vector<VisibleObject>& objects,
                             const VisibleGel& gel, const fem::PressState& press);
 

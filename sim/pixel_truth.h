@@ -1,0 +1,40 @@
+#pragma once
+// What is true of each pixel, for other people's networks: layers of one EXR. All come from one ray a pixel, through
+// the hole's centre and the pixel's, bent at the flat faces (render/first_hits.h), so an edge is a step and blur by the
+// hole isn't in them. The gel's outer surface counts as the first hit even where the gel is clear.
+//
+// | output  | channels                     | meaning                                                               |
+// | depth   | depth.Z                      | mm from the hole's centre along the optical axis, to the true place   |
+// | normals | normal.X normal.Y normal.Z   | unit, gel frame, outward of the surface (+z on an undeformed gel)     |
+// | ids     | id.ID                        | see PixelId                                                           |
+// | contact | contact.Y                    | 1 where the gel's outer surface lies on an object, else 0             |
+// | flow    | flow.X flow.Y                | px: where the material point was in the picture of the undeformed gel,|
+// |         |                              | less where it is; the frame's is 0, an object beside the gel has none |
+// | error   | error.irradiance             | W/m^2, standard error over all bands (render::RenderedImage)          |
+//
+// Where a pixel sees nothing depth, normal and flow are NaN, id and contact 0.
+
+#include "render/pinhole_camera.h"
+#include "sim/image_file.h"
+#include "sim/scene.h"
+#include "sim/seen_geometry.h"
+
+namespace touchstone::sim {
+
+/// What is seen. The numbers are part of the file format. Where the gel lies on object k its id is kFirstObject + k.
+struct PixelId {
+  static constexpr int kNothing = 0;
+  static constexpr int kGel = 1;
+  static constexpr int kFrame = 2;
+  static constexpr int kFirstObject = 1'000;
+  static constexpr int kFirstScreen = 2'000;
+  static constexpr int kFirstBead = 10'000;
+};
+
+/// The layers that `outputs` asks for, in the order of the table, but for `error`. Pure.
+LinearImage pixel_truth(const SeenGeometry& seen, const render::PinholeCamera& camera, const OutputSpec& outputs);
+
+/// Adds a CV_32FC1 picture of the same size as another channel.
+void add_channel(LinearImage& image, const cv::Mat& channel, const std::string& name);
+
+}  // namespace touchstone::sim

@@ -1,0 +1,266 @@
+#include "sim/pixel_truth.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <cmath>
+#include <cstring>
+#include <opencv2/core.hpp>
+#include <set>
+
+#include "core/error.h"
+#include "render/first_hits.h"
+#include "sim/virtual_sensor.h"
+#include "tests/support/temporary_folder.h"
+
+namespace touchstone::sim {
+namespace {
+
+using ::testing::HasSubstr;
+
+/// A pad of 12 x 12 x 4 mm with 2 x 2 beads, a camera of 160 x 120 pixels that looks straight up through the plate.
+SceneSpec small_scene(const std::string& keys) {
+  SceneSpec scene;
+  scene.device = parse_yaml<DeviceSpec>(R"(
+name: small
+gel: {size_x_mm: 12, size_y_mm: 12, thickness_mm: 4, youngs_modulus_MPa: 0.3, poisson_ratio: 0.49, refractive_index: 1.45}
+mesh: {fine_mm: 0.8, coarse_mm: 2, fine_half_extent_mm: [3, 3], fine_depth_mm: 1}
+beads: {grid: 2, spacing_mm: 5, diameter_mm: 0.6, depth_mm: 0.8}
+plate: {thickness_mm: 1, refractive_index: 1.5}
+lamps:
+  - {position_mm: [0, -10, -16], target_mm: [0, 0, -2], lens_radius_mm: 1, half_angle_deg: 25, power_W: [3, 3, 3]}
+room_radiance: 0.1
+camera:
+  width: 160
+  height: 120
+  pixel_pitch_um: 18
+  hole_diameter_um: 100
+  foil_thickness_um: 50
+  hole_to_sensor_mm: 5
+  hole_position_mm: [0, 0, -18]
+  look_at_mm: [0, 0, 0]
+  exposure_us: 500
+  full_well_e: 50000
+  read_noise_e: 5
+)",
+                                        "small.yaml");
+  scene.object =
+      parse_yaml<ObjectSpec>("name: ball\nshape: {type: sphere, radius_mm: 4}\nfriction: 0.7\n", "ball.yaml");
+  scene.motion = parse_yaml<MotionSpec>("start_mm: [0, 0, 4.5]\nkeys:\n" + keys, "motion.yaml");
+  scene.outputs = parse_yaml<OutputSpec>(
+      "{frames: false, depth: true, normals: true, ids: true, contact: true, flow: true}", "outputs.yaml");
+  scene.light.max_samples = 16;
+  scene.light.min_samples = 8;
+  return scene;
+}
+
+const test::TemporaryFolder& cache() {
+  static const test::TemporaryFolder folder;
+  return folder;
+}
+
+struct Played {
+  SceneSpec scene;
+  Plan plan;
+  std::shared_ptr<const fem::Compliance> gel;
+  std::vector<Truth> truths;
+
+  explicit Played(SceneSpec scene_of) : scene(std::move(scene_of)), plan(make_plan(scene)) {
+    gel = set_up_gel(scene.device, cache().path());
+    truths = play_motion(scene, plan, *gel);
+  }
+  Capture last() const { return VirtualCamera(scene, plan, *gel, truths.front()).capture(truths.back()); }
+};
+
+const char* const kPress = "  - {frames: 1, z: {position_mm: 3.6}}\n  - {frames: 1, x: {position_mm: 0.15}}\n";
+
+const Played& pressed() {
+  static const Played played(small_scene(kPress));
+  return played;
+}
+
+cv::Mat channel(const LinearImage& image, const std::string& name) {
+  const auto found = std::find(image.channel_names.begin(), image.channel_names.end(), name);
+  EXPECT_NE(found, image.channel_names.end()) << name;
+  cv::Mat plane;
+  cv::extractChannel(image.image, plane, static_cast<int>(found - image.channel_names.begin()));
+  return plane;
+}
+
+/// Where a point appears: the angle in air by bisection, on the sum of the layers' ways by Snell's law.
+Eigen::Vector2d projected_by_bisection(const DeviceSpec& device, const Eigen::Vector3d& point) {
+  const CameraSpec& camera = *device.camera;
+  const double glass_low = -device.gel.thickness_mm - device.plate.thickness_mm;
+  const double air = glass_low - camera.hole_position_mm.z();
+  const double r = point.head<2>().norm();
+  double low = 0.0, high = 1.5;
+  for (int i = 0; i < 200; ++i) {
+    const double angle = 0.5 * (low + high);
+    const double in_glass = std::asin(std::sin(angle) / device.plate.refractive_index);
+    const double in_gel = std::asin(std::sin(angle) / device.gel.refractive_index);
+    const double way = air * std::tan(angle) + device.plate.thickness_mm * std::tan(in_glass) +
+                       (point.z() + device.gel.thickness_mm) * std::tan(in_gel);
+    (way < r ? low : high) = angle;
+  }
+  const double scale = std::tan(low) * camera.hole_to_sensor_mm / (camera.pixel_pitch_um * 1e-3) / std::max(r, 1e-12);
+  return {0.5 * camera.width + scale * point.x(), 0.5 * camera.height + scale * point.y()};
+}
+
+TEST(PixelTruth, AFlatGelIsAtItsTrueDepthAndDoesNotFlow) {
+  SceneSpec scene = small_scene("  - {frames: 1, z: {position_mm: 4.4}}\n");
+  scene.device.beads.reset();
+  const Capture capture = Played(scene).last();
+  EXPECT_TRUE(capture.frame.empty());
+  EXPECT_EQ(capture.paths_traced, 0) << "no light is asked for";
+  const cv::Mat depth = channel(capture.pixel_truth, "depth.Z"), ids = channel(capture.pixel_truth, "id.ID");
+  const cv::Mat x = channel(capture.pixel_truth, "flow.X"), nz = channel(capture.pixel_truth, "normal.Z");
+  int gel = 0;
+  for (int row = 0; row < 120; ++row) {
+    for (int column = 0; column < 160; ++column) {
+      if (ids.at<float>(row, column) != PixelId::kGel) continue;
+      ++gel;
+      ASSERT_NEAR(depth.at<float>(row, column), 18.0, 1e-4) << "the true place, not the raised image";
+      ASSERT_NEAR(x.at<float>(row, column), 0.0, 1e-3);
+      ASSERT_NEAR(nz.at<float>(row, column), 1.0, 1e-6);
+    }
+  }
+  // The picture's half height at the gel: 1.08 mm on the sensor 5 mm behind the hole, bent in plate and gel.
+  EXPECT_EQ(gel, 160 * 120);
+}
+
+TEST(PixelTruth, BeadsAreCountedAndFlowAsTheirDisplacementSays) {
+  const Played& p = pressed();
+  const Capture capture = p.last();
+  const cv::Mat ids = channel(capture.pixel_truth, "id.ID");
+  const cv::Mat x = channel(capture.pixel_truth, "flow.X"), y = channel(capture.pixel_truth, "flow.Y");
+  std::set<int> beads;
+  double largest = 0.0;
+  const std::vector<Eigen::Vector3d> rest = bead_centres(*p.scene.device.beads);
+  for (int k = 0; k < 4; ++k) {
+    // The bead's point that faces the camera on the plumb line of its centre.
+    const Eigen::Vector3d was = rest[static_cast<std::size_t>(k)] - Eigen::Vector3d(0, 0, 0.3);
+    const Eigen::Vector3d is = was + p.truths.back().press.bead_displacement.row(k).transpose();
+    const Eigen::Vector2d here = projected_by_bisection(p.scene.device, is);
+    const Eigen::Vector2d expected = projected_by_bisection(p.scene.device, was) - here;
+    const int column = static_cast<int>(here.x()), row = static_cast<int>(here.y());
+    EXPECT_EQ(ids.at<float>(row, column), PixelId::kFirstBead + k);
+    EXPECT_NEAR(x.at<float>(row, column), expected.x(), 0.05);
+    EXPECT_NEAR(y.at<float>(row, column), expected.y(), 0.05);
+    largest = std::max(largest, expected.norm());
+  }
+  EXPECT_GT(largest, 0.3) << "the beads move far enough to tell";
+  for (int row = 0; row < ids.rows; ++row) {
+    for (int column = 0; column < ids.cols; ++column) {
+      const int id = static_cast<int>(ids.at<float>(row, column));
+      if (id >= PixelId::kFirstBead) beads.insert(id);
+    }
+  }
+  EXPECT_EQ(beads, (std::set<int>{10000, 10001, 10002, 10003}));
+}
+
+TEST(PixelTruth, TheContactIsWhereTheObjectIsAndAsLargeAsTruthHasIt) {
+  const Played& p = pressed();
+  const LinearImage truth = p.last().pixel_truth;
+  const cv::Mat contact = channel(truth, "contact.Y"), ids = channel(truth, "id.ID");
+  const cv::Mat nx = channel(truth, "normal.X"), ny = channel(truth, "normal.Y"), nz = channel(truth, "normal.Z");
+  const Eigen::Vector3d centre = p.truths.back().press.gel_from_object.translation;
+  // A pixel's size on the gel, from the apparent depth on the axis.
+  const double apparent = 13.0 + 1.0 / 1.5 + 4.0 / 1.45;
+  const double pixel = 0.018 * apparent / 5.0;
+  int count = 0;
+  double worst = 0.0;
+  const cv::Mat depth = channel(truth, "depth.Z");
+  for (int row = 0; row < 120; ++row) {
+    for (int column = 0; column < 160; ++column) {
+      const bool touches = contact.at<float>(row, column) == 1.0f;
+      ASSERT_EQ(touches, ids.at<float>(row, column) == PixelId::kFirstObject);
+      if (!touches) continue;
+      ++count;
+      // Depth gives z (the camera looks along +z); the sphere's underside has its normal there.
+      const double z = depth.at<float>(row, column) - 18.0;
+      const double across = std::hypot(nx.at<float>(row, column), ny.at<float>(row, column));
+      const double rise = std::sqrt(std::max(0.0, 16.0 - std::pow(centre.z() - z, 2))) / 4.0;
+      if (rise < 0.2) worst = std::max(worst, std::abs(across - rise));
+    }
+  }
+  const double area = count * pixel * pixel;
+  const double wanted = p.truths.back().press.contact_area;
+  const double radius = std::sqrt(wanted / 3.141592653589793);
+  // Truth's area is a sum of the vertices' weights: its own rim is half an edge (0.4 mm) wide; ours a pixel.
+  EXPECT_NEAR(std::sqrt(area / 3.141592653589793), radius, 0.4 + pixel);
+  EXPECT_GT(count, 300);
+  EXPECT_LT(worst, 0.05) << "the imprint's slope is the sphere's";
+  EXPECT_LT(nz.at<float>(60, 80), 1.0001f);
+}
+
+TEST(PixelTruth, ItIsTheSameBytesOnAnyNumberOfThreadsAndRoundTripsAsExr) {
+  const Played& p = pressed();
+  const LinearImage many = p.last().pixel_truth;
+  const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+  const LinearImage alone = p.last().pixel_truth;
+  ASSERT_EQ(many.image.total(), alone.image.total());
+  EXPECT_EQ(std::memcmp(many.image.data, alone.image.data, many.image.total() * many.image.elemSize()), 0);
+  const test::TemporaryFolder folder;
+  write_exr(folder.path() / "t.exr", many.image, many.channel_names);
+  const LinearImage back = read_exr(folder.path() / "t.exr");
+  EXPECT_EQ(std::set<std::string>(back.channel_names.begin(), back.channel_names.end()),
+            std::set<std::string>(many.channel_names.begin(), many.channel_names.end()));
+  const cv::Mat a = channel(many, "depth.Z"), b = channel(back, "depth.Z");
+  EXPECT_EQ(std::memcmp(a.data, b.data, a.total() * 4), 0);
+}
+
+TEST(PixelTruth, OnlyWhatIsAskedForIsMade) {
+  SceneSpec scene = small_scene("  - {frames: 1, z: {position_mm: 3.8}}\n");
+  scene.outputs = parse_yaml<OutputSpec>("{frames: false, error: true, flow: true}", "outputs.yaml");
+  const Capture capture = Played(scene).last();
+  EXPECT_EQ(capture.pixel_truth.channel_names, (std::vector<std::string>{"flow.X", "flow.Y", "error.irradiance"}));
+  const cv::Mat error = channel(capture.pixel_truth, "error.irradiance");
+  EXPECT_GT(cv::countNonZero(error > 0.0f), 160 * 120 / 2);
+  EXPECT_GT(capture.paths_traced, 0);
+  scene.outputs = parse_yaml<OutputSpec>("{frames: false}", "outputs.yaml");
+  EXPECT_FALSE(make_plan(scene).camera);
+}
+
+TEST(PixelTruth, ADeviceWithoutACameraIsRefused) {
+  SceneSpec scene = small_scene("  - {frames: 1, z: {position_mm: 4.4}}\n");
+  scene.device.camera.reset();
+  scene.outputs = parse_yaml<OutputSpec>("{frames: false, depth: true}", "outputs.yaml");
+  try {
+    make_plan(scene);
+    FAIL() << "depth needs a camera";
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("no camera"));
+  }
+}
+
+TEST(FirstHits, ProjectionIsTheWayBackFromEveryHitOfATiltedCamera) {
+  const Played& p = pressed();
+  SceneSpec scene = p.scene;
+  scene.device.camera->hole_position_mm = {3.0, -2.0, -16.0};
+  const std::vector<VisibleObject> objects = visible_objects(scene);
+  const SeenGeometry seen = seen_geometry(scene, objects, VisibleGel(*p.gel), p.truths.back().press);
+  const render::PinholeCamera camera = pinhole_camera(*scene.device.camera);
+  const std::vector<render::FirstHit> hits = render::first_hits(seen.inside, camera);
+  int checked = 0;
+  for (std::size_t i = 0; i < hits.size(); i += 7) {
+    if (hits[i].object < 0) continue;
+    const auto back = render::project_through_faces(seen.inside, camera, hits[i].position);
+    ASSERT_TRUE(back);
+    EXPECT_NEAR(back->x(), static_cast<double>(i % 160) + 0.5, 5e-3);
+    EXPECT_NEAR(back->y(), static_cast<double>(i / 160) + 0.5, 5e-3);
+    ++checked;
+  }
+  EXPECT_GT(checked, 1000);
+}
+
+TEST(FirstHits, APointBehindTheCameraIsNotSeen) {
+  const render::PinholeCamera camera = pinhole_camera(*pressed().scene.device.camera);
+  render::Scene scene;
+  scene.environment = render::flat_spectrum(3, 0.0);
+  EXPECT_FALSE(render::project_through_faces(scene, camera, {0, 0, -19}));
+  EXPECT_TRUE(render::project_through_faces(scene, camera, {0, 0, -17}));
+}
+
+}  // namespace
+}  // namespace touchstone::sim
