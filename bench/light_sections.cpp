@@ -258,8 +258,8 @@ ResultTable direct_frames_table(const LightOptions& options) {
   ResultTable table;
   table.name = "light-frames";
   table.title = "Pictures a second of direct light, one sample a pixel";
-  table.columns = {"pixels",       "lamps",       "shadows", "ms",          "frames/s",
-                   "processor ms", "shadow rays", "spared",  "RMS error, %"};
+  table.columns = {"pixels",       "lamps",       "shadows", "ms",           "frames/s",
+                   "processor ms", "shadow rays", "spared",  "RMS error, %", "with a sharp hole, %"};
   double field_seconds = 0.0;
   double field_error = 0.0;
   for (const auto& [width, height] : {std::pair{320, 240}, std::pair{640, 480}}) {
@@ -268,16 +268,24 @@ ResultTable direct_frames_table(const LightOptions& options) {
       const render::PinholeCamera camera = bench_camera(width, height);
       const cv::Mat mask = sparse_mask(camera, width / 40);
       const cv::Mat reference = Tracer(scene).render(camera, paths(options.quick ? 512 : 4096), mask).irradiance;
+      render::PinholeCamera sharp = camera;  // no blur but the pixel's own
+      sharp.hole_diameter_um = 1.0;
+      sharp.foil_thickness_um = 0.0;
+      const cv::Mat sharp_reference = Tracer(scene).render(sharp, paths(options.quick ? 512 : 4096), mask).irradiance;
       render::LightField field;
       field_seconds = least_seconds(1, [&] { field = render::make_light_field(scene, bench_reach()); });
       field_error = field.error;
       for (bool shadows : {true, false}) {
+        render::DirectSettings settings;
+        settings.shadows = shadows;
+        const cv::Mat sharp_image = DirectRenderer(field, sharp, scene, settings).render(scene).irradiance;
         const FrameTime frame = direct_frame(50000, lamps, 3, width, height, options.quick ? 20 : 60, shadows);
         table.rows.push_back({fmt::format("{} x {}", width, height), fmt::format("{}", lamps), shadows ? "yes" : "no",
                               fmt::format("{:.2f}", 1e3 * frame.seconds), fmt::format("{:.0f}", 1.0 / frame.seconds),
                               fmt::format("{:.1f}", 1e3 * frame.processor_seconds),
                               fmt::format("{}", frame.image.shadow_rays), fmt::format("{}", frame.image.shadow_spared),
-                              fmt::format("{:.2f}", 100 * relative_rms(frame.image.irradiance, reference, mask))});
+                              fmt::format("{:.2f}", 100 * relative_rms(frame.image.irradiance, reference, mask)),
+                              fmt::format("{:.2f}", 100 * relative_rms(sharp_image, sharp_reference, mask))});
       }
     }
   }
