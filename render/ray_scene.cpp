@@ -26,10 +26,6 @@ RTCDevice embree_device() {
 
 namespace {
 
-RTCDevice device() {
-  return embree_device();
-}
-
 struct HeightRange {
   double low = std::numeric_limits<double>::infinity();
   double high = -std::numeric_limits<double>::infinity();
@@ -114,7 +110,7 @@ struct RayScene::State {
   void add_mesh(unsigned id, Passage passage) {
     const TriangleMesh& mesh = meshes[id].mesh;
     if (mesh.triangles.empty()) return;
-    RTCGeometry geometry = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_TRIANGLE);
+    RTCGeometry geometry = rtcNewGeometry(embree_device(), RTC_GEOMETRY_TYPE_TRIANGLE);
     auto* vertices = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
                                                                  3 * sizeof(float), mesh.vertices.size()));
     auto* corners = static_cast<unsigned*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
@@ -137,7 +133,7 @@ struct RayScene::State {
   void add_balls(unsigned id, Passage passage) {
     const std::vector<int>& which = balls_by_passage[static_cast<std::size_t>(passage)];
     if (which.empty()) return;
-    RTCGeometry geometry = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_SPHERE_POINT);
+    RTCGeometry geometry = rtcNewGeometry(embree_device(), RTC_GEOMETRY_TYPE_SPHERE_POINT);
     auto* points = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT4,
                                                                4 * sizeof(float), which.size()));
     if (points == nullptr) fail("no memory for {} balls", which.size());
@@ -155,7 +151,7 @@ struct RayScene::State {
 RayScene::RayScene(const Scene& scene) : state_(std::make_unique<State>()) {
   State& state = *state_;
   for (RTCScene* made : {&state.all, &state.opaque, &state.refractive, &state.films}) {
-    *made = rtcNewScene(device());
+    *made = rtcNewScene(embree_device());
     // Robust: no ray slips through the common edge of two triangles.
     rtcSetSceneFlags(*made, RTC_SCENE_FLAG_ROBUST);
     rtcSetSceneBuildQuality(*made, RTC_BUILD_QUALITY_MEDIUM);
@@ -190,7 +186,7 @@ RayScene::RayScene(const Scene& scene) : state_(std::make_unique<State>()) {
   alone.execute([&] {
     for (RTCScene made : {state.all, state.opaque, state.refractive, state.films}) rtcCommitScene(made);
   });
-  const RTCError error = rtcGetDeviceError(device());
+  const RTCError error = rtcGetDeviceError(embree_device());
   if (error != RTC_ERROR_NONE) fail("Embree can't take the scene (error {})", static_cast<int>(error));
 }
 

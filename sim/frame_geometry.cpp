@@ -41,10 +41,7 @@ FrameGeometry frame_geometry(const SceneSpec& scene, const fem::Compliance& gel,
   FrameGeometry out;
   const std::vector<VisibleObject> objects = visible_objects(scene);
   const std::vector<MovedObject> all = moved_objects(scene);
-  std::vector<PlacedShape> felt;
-  for (std::size_t k = 0; k < objects.size(); ++k) {
-    felt.push_back({objects[k].felt, k == 0 ? press.gel_from_object : press.bodies[k].gel_from_object});
-  }
+  const std::vector<PlacedShape> felt = placed_shapes(objects, press);
   add_gel(VisibleGel(gel).sheet(press, felt), out.parts);
   if (scene.device.beads) add_beads(*scene.device.beads, press, out.parts);
   for (std::size_t k = 0; k < objects.size(); ++k) {

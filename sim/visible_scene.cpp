@@ -75,16 +75,30 @@ std::vector<VisibleObject> visible_objects(const SceneSpec& scene) {
   return all;
 }
 
-namespace {
-
-/// Where the objects stand. The first one's pose has its own vibration in it.
 std::vector<RigidTransform> poses_of(const fem::PressState& press) {
   std::vector<RigidTransform> poses = {press.gel_from_object};
   for (std::size_t k = 1; k < press.bodies.size(); ++k) poses.push_back(press.bodies[k].gel_from_object);
   return poses;
 }
 
-/// All but the gel's outer surface.
+std::vector<RigidTransform> poses_of(const fem::PressState& press, const fem::ReliefAnswer& relief) {
+  RigidTransform shifted = press.gel_from_object;
+  shifted.translation.z() += relief.solved.shift;
+  return {shifted};
+}
+
+std::vector<PlacedShape> placed_shapes(const std::vector<VisibleObject>& objects, const fem::PressState& press) {
+  const std::vector<RigidTransform> poses = poses_of(press);
+  TS_ASSERT(poses.size() == objects.size());
+  std::vector<PlacedShape> placed;
+  for (std::size_t k = 0; k < objects.size(); ++k) placed.push_back({objects[k].felt, poses[k]});
+  return placed;
+}
+
+render::Surface gel_surface(TriangleMesh mesh) {
+  return {std::move(mesh), render::Refractive{kGel, kAir}};
+}
+
 render::Scene scene_without_surface(const SceneSpec& scene, const Plan& plan, const std::vector<VisibleObject>& objects,
                                     const std::vector<RigidTransform>& poses, const fem::PressState& press) {
   const DeviceSpec& device = scene.device;
@@ -122,27 +136,19 @@ render::Scene scene_without_surface(const SceneSpec& scene, const Plan& plan, co
   return out;
 }
 
-}  // namespace
-
 render::Scene visible_scene(const SceneSpec& scene, const Plan& plan, const std::vector<VisibleObject>& objects,
                             const VisibleGel& gel, const fem::PressState& press) {
-  const std::vector<RigidTransform> poses = poses_of(press);
-  TS_ASSERT(poses.size() == objects.size());
-  render::Scene out = scene_without_surface(scene, plan, objects, poses, press);
-  std::vector<PlacedShape> felt;
-  for (std::size_t k = 0; k < objects.size(); ++k) felt.push_back({objects[k].felt, poses[k]});
-  out.surfaces.insert(out.surfaces.begin(), {gel.dry_surface(press, felt), render::Refractive{kGel, kAir}});
+  render::Scene out = scene_without_surface(scene, plan, objects, poses_of(press), press);
+  out.surfaces.insert(out.surfaces.begin(), gel_surface(gel.dry_surface(press, placed_shapes(objects, press))));
   return out;
 }
 
 render::Scene visible_scene(const SceneSpec& scene, const Plan& plan, const std::vector<VisibleObject>& objects,
                             const Membrane& membrane, const fem::PressState& press, const fem::ReliefAnswer& relief) {
   TS_ASSERT(objects.size() == 1);
-  RigidTransform shifted = press.gel_from_object;
-  shifted.translation.z() += relief.solved.shift;
-  render::Scene out = scene_without_surface(scene, plan, objects, {shifted}, press);
+  render::Scene out = scene_without_surface(scene, plan, objects, poses_of(press, relief), press);
   Membrane::Sheet sheet = membrane.sheet(press, relief);
-  out.surfaces.insert(out.surfaces.begin(), {std::move(sheet.dry), render::Refractive{kGel, kAir}});
+  out.surfaces.insert(out.surfaces.begin(), gel_surface(std::move(sheet.dry)));
   out.surfaces.push_back({std::move(sheet.wet), material_of(scene.object)});
   return out;
 }

@@ -28,6 +28,22 @@ VisibleObject visible_object(const ObjectSpec& object, double edge_mm);
 /// All of a scene's.
 std::vector<VisibleObject> visible_objects(const SceneSpec& scene);
 
+/// Where the objects stand. The first one's pose has its own vibration in it.
+std::vector<RigidTransform> poses_of(const fem::PressState& press);
+/// With a fine relief: its single object stands where the fine contact shifted it to.
+std::vector<RigidTransform> poses_of(const fem::PressState& press, const fem::ReliefAnswer& relief);
+
+/// What the gel feels of each object, where it stands.
+std::vector<PlacedShape> placed_shapes(const std::vector<VisibleObject>& objects, const fem::PressState& press);
+
+/// The gel's outer surface with what is on its two sides.
+render::Surface gel_surface(TriangleMesh mesh);
+
+/// All of visible_scene but the gel's outer surface: its frame first, then each object followed by its screen if it has
+/// one.
+render::Scene scene_without_surface(const SceneSpec& scene, const Plan& plan, const std::vector<VisibleObject>& objects,
+                                    const std::vector<RigidTransform>& poses, const fem::PressState& press);
+
 /// Plate, gel, beads, objects and lamps as they stand at `press`. Where the gel is wetted by the object there is no
 /// face between them: the light goes on into the object. Surfaces: the gel's dry surface, its frame, then each object
 /// followed by its screen if it has one. Balls: the beads in their order.

@@ -12,26 +12,6 @@
 namespace touchstone::render {
 namespace {
 
-/// Mean of many seeds and its standard error.
-struct Estimate {
-  double mean = 0.0;
-  double error = 0.0;
-};
-Estimate view(const Scene& scene, const Eigen::Vector3d& from, const Eigen::Vector3d& direction, int runs) {
-  const Tracer tracer(scene);
-  double sum = 0.0;
-  double squares = 0.0;
-  for (int i = 0; i < runs; ++i) {
-    RenderSettings settings = samples(16);
-    settings.seed = static_cast<std::uint64_t>(i);
-    const double value = tracer.radiance(from, direction, settings)[0];
-    sum += value;
-    squares += value * value;
-  }
-  const double mean = sum / runs;
-  return {mean, std::sqrt(std::max(0.0, squares / runs - mean * mean) / (runs - 1))};
-}
-
 TEST(ThinFilm, DyeFollowsTheWayInside) {
   const Bands<3> dye(0.9, 0.5, 0.01);
   for (double angle : {0.0, 0.4, 1.0, 1.5}) {

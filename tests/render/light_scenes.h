@@ -1,7 +1,10 @@
 #pragma once
 // Small scenes that several tests of light use.
 
+#include <algorithm>
 #include <array>
+#include <cmath>
+#include <cstdint>
 #include <opencv2/core.hpp>
 
 #include "render/path_tracer.h"
@@ -56,6 +59,28 @@ inline RenderSettings samples(int count, int max_depth = 10000) {
   settings.min_samples = settings.max_samples = count;
   settings.max_depth = max_depth;
   return settings;
+}
+
+/// A mean and its standard error.
+struct Estimate {
+  double mean = 0.0;
+  double error = 0.0;
+};
+
+/// Mean radiance (first band) along a ray over `runs` runs of 16 paths, each of its own seed.
+inline Estimate view(const Scene& scene, const Eigen::Vector3d& from, const Eigen::Vector3d& direction, int runs) {
+  const Tracer tracer(scene);
+  double sum = 0.0;
+  double squares = 0.0;
+  for (int i = 0; i < runs; ++i) {
+    RenderSettings settings = samples(16);
+    settings.seed = static_cast<std::uint64_t>(i);
+    const double value = tracer.radiance(from, direction, settings)[0];
+    sum += value;
+    squares += value * value;
+  }
+  const double mean = sum / runs;
+  return {mean, std::sqrt(std::max(0.0, squares / runs - mean * mean) / (runs - 1))};
 }
 
 /// A camera 20 mm below the stack's glass that looks up at the gel.
