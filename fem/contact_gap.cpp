@@ -171,20 +171,9 @@ class TriangleGap {
   }
 
   void clip(const Eigen::Matrix3d& c, const std::array<bool, 3>& hit, int hits) {
-    // Turn so that corner 0 is the odd one out.
-    int odd = 0;
-    while (hit[odd] != (hits == 1)) ++odd;
-    const Eigen::Vector3d a = c.col(odd);
-    const Eigen::Vector3d b = c.col((odd + 1) % 3);
-    const Eigen::Vector3d d = c.col((odd + 2) % 3);
-    if (hits == 1) {
-      whole(triangle(a, crossing(a, b), crossing(a, d)));
-    } else {
-      const Eigen::Vector3d ab = crossing(b, a);
-      const Eigen::Vector3d ad = crossing(d, a);
-      whole(triangle(ab, b, d));
-      whole(triangle(ab, d, ad));
-    }
+    clip_to_hits(
+        c, hit, hits, [&](const auto& in, const auto& out) { return crossing(in, out); },
+        [&](const auto& a, const auto& b, const auto& d) { whole(triangle(a, b, d)); });
   }
 
   /// A cell that hits all over, but for slivers at a curved silhouette.

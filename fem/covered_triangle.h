@@ -17,6 +17,27 @@ struct RadonRule {
 };
 const RadonRule& radon_rule();
 
+/// The part of a cell on the side of its corners that hit, one or two of them: `piece(a, b, c)` is called for each of
+/// its triangles; `crossing(hit, miss)` is the point of an edge where the silhouette crosses it. Corners are columns.
+template <typename Crossing, typename Piece>
+void clip_to_hits(const Eigen::Matrix3d& corners, const std::array<bool, 3>& hit, int hits, const Crossing& crossing,
+                  const Piece& piece) {
+  // Turn so that corner 0 is the odd one out.
+  int odd = 0;
+  while (hit[odd] != (hits == 1)) ++odd;
+  const Eigen::Vector3d a = corners.col(odd);
+  const Eigen::Vector3d b = corners.col((odd + 1) % 3);
+  const Eigen::Vector3d d = corners.col((odd + 2) % 3);
+  if (hits == 1) {
+    piece(a, crossing(a, b), crossing(a, d));
+  } else {
+    const Eigen::Vector3d ab = crossing(b, a);
+    const Eigen::Vector3d ad = crossing(d, a);
+    piece(ab, b, d);
+    piece(ab, d, ad);
+  }
+}
+
 /// Visits points that cover the hit part of a triangle: `visit(barycentric, value, weight)`, the weights summing to the
 /// hit share of its area. `line(barycentric)` is the value there, or nothing for a miss. Cells on the silhouette are
 /// split and at last clipped at it, so that the answer is continuous as the body moves.
@@ -93,20 +114,9 @@ class CoveredTriangle {
   }
 
   void clip(const Eigen::Matrix3d& c, const std::array<bool, 3>& hit, int hits) {
-    // Turn so that corner 0 is the odd one out.
-    int odd = 0;
-    while (hit[odd] != (hits == 1)) ++odd;
-    const Eigen::Vector3d a = c.col(odd);
-    const Eigen::Vector3d b = c.col((odd + 1) % 3);
-    const Eigen::Vector3d d = c.col((odd + 2) % 3);
-    if (hits == 1) {
-      piece(a, crossing(a, b), crossing(a, d));
-    } else {
-      const Eigen::Vector3d ab = crossing(b, a);
-      const Eigen::Vector3d ad = crossing(d, a);
-      piece(ab, b, d);
-      piece(ab, d, ad);
-    }
+    clip_to_hits(
+        c, hit, hits, [&](const auto& in, const auto& out) { return crossing(in, out); },
+        [&](const auto& a, const auto& b, const auto& d) { piece(a, b, d); });
   }
 
   /// A cell that hits all over, but for slivers at a curved silhouette.

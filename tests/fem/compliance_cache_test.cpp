@@ -238,10 +238,18 @@ TEST_F(ComplianceCache, DISABLED_OneOfSeveralMakers) {
   EXPECT_GT(one.surface.size(), 0);
 }
 
-TEST_F(ComplianceCache, MakersAtTheSameTimeBothEndWithASoundFile) {
+/// Makers in one process. AddressSanitizer's allocator (of gcc 12) isn't safe over fork(), as glibc's is:
+/// TetGen's process would wait for ever for a lock that a thread of its parent held.
+#ifdef __SANITIZE_ADDRESS__
+constexpr int kThreads = 1;
+#else
+constexpr int kThreads = 4;
+#endif
+
+TEST_F(ComplianceCache, MakersAtTheSameTimeAllEndWithASoundFile) {
   const std::string self = std::filesystem::read_symlink("/proc/self/exe").string();
   std::array<touchstone::test::ProgramRun, 2> processes;
-  std::vector<Compliance> made(4);
+  std::vector<Compliance> made(kThreads);
   {
     std::vector<std::jthread> makers;
     for (touchstone::test::ProgramRun& process : processes) {
