@@ -60,32 +60,14 @@ double value_of(std::string_view cell, CurveKind kind, const SourceLocation& whe
   return *value;
 }
 
-/// All points of the curves within a band, and its ends: between them each curve is linear.
-std::vector<double> knots_of(std::span<const SpectralCurve> curves, double from_nm, double to_nm) {
-  std::vector<double> knots = {from_nm, to_nm};
-  for (const SpectralCurve& curve : curves) {
-    for (const double at : curve.wavelengths_nm) {
-      if (at > from_nm && at < to_nm) knots.push_back(at);
-    }
+/// All points of the curve within a range, and its ends: between them the curve is linear.
+std::vector<double> knots_of(const SpectralCurve& curve, double from_nm, double to_nm) {
+  std::vector<double> knots = {from_nm};
+  for (const double at : curve.wavelengths_nm) {
+    if (at > from_nm && at < to_nm) knots.push_back(at);
   }
-  std::sort(knots.begin(), knots.end());
+  knots.push_back(to_nm);
   return knots;
-}
-
-/// Mean of the curves' product over a band, by Simpson's rule between the knots: exact for up to three of them.
-double product_mean(std::span<const SpectralCurve> curves, double from_nm, double to_nm) {
-  const auto product = [&](double at) {
-    double value = 1.0;
-    for (const SpectralCurve& curve : curves) value *= curve.at(at);
-    return value;
-  };
-  const std::vector<double> knots = knots_of(curves, from_nm, to_nm);
-  double sum = 0.0;
-  for (std::size_t k = 1; k < knots.size(); ++k) {
-    const double middle = 0.5 * (knots[k - 1] + knots[k]);
-    sum += (knots[k] - knots[k - 1]) / 6.0 * (product(knots[k - 1]) + 4.0 * product(middle) + product(knots[k]));
-  }
-  return sum / (to_nm - from_nm);
 }
 
 }  // namespace
@@ -102,7 +84,7 @@ double SpectralCurve::at(double wavelength_nm) const {
 
 double SpectralCurve::integral(double from_nm, double to_nm) const {
   TS_ASSERT(from_nm <= to_nm);
-  const std::vector<double> knots = knots_of({this, 1}, from_nm, to_nm);
+  const std::vector<double> knots = knots_of(*this, from_nm, to_nm);
   double sum = 0.0;
   for (std::size_t k = 1; k < knots.size(); ++k) {
     sum += 0.5 * (knots[k] - knots[k - 1]) * (at(knots[k - 1]) + at(knots[k]));
@@ -146,78 +128,6 @@ SpectralCurve read_spectral_curve(const std::filesystem::path& file, CurveKind k
     fail("{}: all values are 0; a lamp's spectrum must have light in it", file.string());
   }
   return curve;
-}
-
-Spectrum SpectralBands::centres_nm() const {
-  Spectrum centres(count());
-  for (int k = 0; k < count(); ++k) {
-    const auto band = static_cast<std::size_t>(k);
-    centres[k] = 0.5 * (edges_nm[band] + edges_nm[band + 1]);
-  }
-  return centres;
-}
-
-SpectralBands even_bands(double from_nm, double to_nm, int count) {
-  if (!(from_nm > 0.0 && to_nm > from_nm && std::isfinite(to_nm))) {
-    fail("spectral bands from {} to {} nm; they must lie above 0 and rise", from_nm, to_nm);
-  }
-  if (count < 1 || count > kMaxBands) fail("{} spectral bands; 1 to {} are allowed", count, kMaxBands);
-  SpectralBands bands;
-  for (int k = 0; k <= count; ++k) bands.edges_nm.push_back(from_nm + (to_nm - from_nm) * k / count);
-  return bands;
-}
-
-Spectrum band_means(const SpectralCurve& curve, const SpectralBands& bands) {
-  Spectrum means(bands.count());
-  for (int k = 0; k < bands.count(); ++k) {
-    const auto band = static_cast<std::size_t>(k);
-    means[k] = curve.mean(bands.edges_nm[band], bands.edges_nm[band + 1]);
-  }
-  return means;
-}
-
-Spectrum band_powers(const SpectralCurve& emission, double power_W, const SpectralBands& bands) {
-  const double first = emission.wavelengths_nm.front();
-  const double last = emission.wavelengths_nm.back();
-  const double all = emission.integral(first, last);
-  Spectrum powers(bands.count());
-  for (int k = 0; k < bands.count(); ++k) {
-    // Beyond its points a lamp has no light that was measured.
-    const double from = std::clamp(bands.edges_nm[static_cast<std::size_t>(k)], first, last);
-    const double to = std::clamp(bands.edges_nm[static_cast<std::size_t>(k) + 1], first, last);
-    powers[k] = power_W * emission.integral(from, to) / all;
-  }
-  if (power_W > 0.0 && !(powers.sum() > 0.0)) {
-    fail("the bands from {} to {} nm see nothing of a lamp that radiates from {} to {} nm", bands.edges_nm.front(),
-         bands.edges_nm.back(), first, last);
-  }
-  return powers;
-}
-
-double band_product_error(std::span<const SpectralCurve> curves, const SpectralBands& bands) {
-  double worst = 0.0;
-  double largest = 0.0;
-  for (int k = 0; k < bands.count(); ++k) {
-    const double from = bands.edges_nm[static_cast<std::size_t>(k)];
-    const double to = bands.edges_nm[static_cast<std::size_t>(k) + 1];
-    const double exact = product_mean(curves, from, to);
-    double of_means = 1.0;
-    for (const SpectralCurve& curve : curves) of_means *= curve.mean(from, to);
-    worst = std::max(worst, std::abs(of_means - exact));
-    largest = std::max(largest, exact);
-  }
-  return worst == 0.0 ? 0.0 : worst / largest;
-}
-
-int bands_needed(std::span<const std::vector<SpectralCurve>> products, double from_nm, double to_nm, double tolerance) {
-  for (const int count : {1, 3, 8}) {
-    const SpectralBands bands = even_bands(from_nm, to_nm, count);
-    const bool all = std::all_of(products.begin(), products.end(), [&](const std::vector<SpectralCurve>& product) {
-      return band_product_error(product, bands) <= tolerance;
-    });
-    if (all) return count;
-  }
-  return kMaxBands;
 }
 
 }  // namespace touchstone::render
