@@ -69,7 +69,7 @@ void render(const RenderOptions& options, const GlobalOptions& global) {
   if (picture) sim::write_png(options.out, options.ideal ? capture.ideal : capture.frame);
   if (options.exr) {
     std::filesystem::path exr = options.out;
-    sim::write_exr(exr.replace_extension(".exr"), capture.radiance, {"R", "G", "B"});
+    sim::write_exr(exr.replace_extension(".exr"), capture.radiance, sim::channel_names(plan.bands));
   }
 }
 

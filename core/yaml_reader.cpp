@@ -136,6 +136,16 @@ std::vector<YamlReader> YamlReader::items() const {
   return result;
 }
 
+bool YamlReader::is_list() const {
+  return node_->yaml.IsSequence();
+}
+
+std::vector<double> YamlReader::numbers(Allowed allowed) const {
+  std::vector<double> all;
+  for (const YamlReader& item : items()) all.push_back(item.number(allowed));
+  return all;
+}
+
 std::string YamlReader::scalar(const char* kind) const {
   if (!node_->yaml.IsScalar()) fail_at(where(), "{}{} is needed here", context(), kind);
   return node_->yaml.Scalar();

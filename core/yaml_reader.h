@@ -74,6 +74,14 @@ class YamlReader {
   /// The folder of the file, against which relative paths in it are meant.
   std::filesystem::path folder() const;
 
+  // For types that may stand in several forms: they have, in the place of `fields`, a function
+  // `read_value(YamlReader& in, T& value, Allowed allowed)` that looks what stands there.
+  bool is_list() const;
+  std::string text() const { return scalar("a number, a list or a file's name"); }
+  double number(Allowed allowed) const;
+  std::vector<double> numbers(Allowed allowed) const;  ///< of a list
+  std::string context() const;                         ///< the field, for messages: "gel.thickness_mm: " or ""
+
   /// Reads this whole map into a struct by its `fields`, and refuses keys that it didn't ask for.
   template <typename T>
   void read_struct(T& value) {
@@ -89,12 +97,10 @@ class YamlReader {
   std::optional<YamlReader> child(const std::string& key);
   std::vector<YamlReader> items() const;  ///< of a sequence
   std::string scalar(const char* kind) const;
-  std::string context() const;  ///< "gel.thickness_mm: " or ""
   void require_map() const;
   void finish() const;
   [[noreturn]] void refuse_missing(const std::string& key) const;
 
-  double number(Allowed allowed) const;
   void read(double& value, Allowed allowed) { value = number(allowed); }
   void read(int& value, Allowed allowed) { value = small_integer(allowed); }
   void read(std::int64_t& value, Allowed allowed) { value = integer(allowed); }
@@ -105,11 +111,11 @@ class YamlReader {
   int small_integer(Allowed allowed) const;
   std::uint64_t unsigned_integer(Allowed allowed) const;
 
-  template <int N>
-  void read(Eigen::Matrix<double, N, 1>& value, Allowed allowed) {
-    const auto parts = items();
+  template <typename Scalar, int N>
+  void read(Eigen::Matrix<Scalar, N, 1>& value, Allowed allowed) {
+    auto parts = items();
     if (parts.size() != N) fail_at(where(), "{}has {} numbers, {} are needed", context(), parts.size(), N);
-    for (int i = 0; i < N; ++i) value[i] = parts[i].number(allowed);
+    for (int i = 0; i < N; ++i) parts[i].read(value[i], allowed);
   }
 
   template <typename T>
@@ -145,7 +151,13 @@ class YamlReader {
   }
 
   template <typename T>
-  requires(std::is_class_v<T>) void read(T& value, Allowed) { read_struct(value); }
+  requires(std::is_class_v<T>) void read(T& value, Allowed allowed) {
+    if constexpr (requires { read_value(*this, value, allowed); }) {
+      read_value(*this, value, allowed);
+    } else {
+      read_struct(value);
+    }
+  }
 
   [[noreturn]] void refuse_name(const std::string& name, const std::vector<std::string>& known) const;
 

@@ -248,7 +248,7 @@ class Run {
     if (kinds.ideal) png("ideal", capture.ideal);
     if (kinds.radiance) {
       const std::string name = picture_name("radiance", scene.entry.name, place.frame, "exr");
-      sim::write_exr(out_ / name, capture.radiance, {"R", "G", "B"});
+      sim::write_exr(out_ / name, capture.radiance, sim::channel_names(scene.plan.bands));
       record.files.push_back(written(out_, name));
     }
     if (kinds.height) {

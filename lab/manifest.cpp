@@ -50,6 +50,11 @@ ordered_json scene_json(const PreparedScene& scene, const std::filesystem::path&
   if (scene.plan.camera && spec.device.camera) {
     json["picture"] = {{"width", spec.device.camera->width}, {"height", spec.device.camera->height}};
   }
+  if (scene.plan.camera) {
+    const render::Spectrum& centres = scene.plan.bands.centres_nm;
+    json["band_centres_nm"] = std::vector<double>(centres.begin(), centres.end());
+    if (scene.plan.bands.ranges) json["band_edges_nm"] = scene.plan.bands.ranges->edges_nm;
+  }
   json["plan"] = plan_json(scene.plan);
   return json;
 }

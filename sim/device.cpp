@@ -1,5 +1,8 @@
 #include "sim/device.h"
 
+#include <algorithm>
+#include <iterator>
+
 #include "fem/gel_body.h"
 #include "sim/device_camera.h"
 #include "sim/gel_setup.h"
@@ -7,6 +10,8 @@
 
 namespace touchstone::sim {
 namespace {
+
+constexpr int kBandCounts[] = {1, 3, 8, 16};  // what the tracer is compiled for
 
 Allowed part_of_one() {
   return Allowed::within(0.0, 1.0);
@@ -29,6 +34,21 @@ void check_beads_fit(const DeviceSpec& device, const SourceLocation& where) {
   if (beads.grid > 1 && beads.spacing_mm <= beads.diameter_mm) {
     fail_at(where, "beads.spacing_mm: {} lets beads of diameter {} mm overlap; it must be above that", beads.spacing_mm,
             beads.diameter_mm);
+  }
+}
+
+/// A lamp's spectrum, if it has one.
+void read_emission(YamlReader& in, LampSpec& lamp) {
+  if (!in.has("spectrum")) return;
+  std::string file;
+  in.required("spectrum", file);
+  try {
+    lamp.spectrum = render::read_spectral_curve(in.folder() / file, render::CurveKind::relative);
+  } catch (const Error& error) {
+    fail_at(in.where("spectrum"), "spectrum: {}", error.what());
+  }
+  if (lamp.power_W.numbers.size() != 1) {
+    fail_at(in.where("power_W"), "power_W: beside a spectrum it must be one number, all that the lamp radiates");
   }
 }
 
@@ -78,6 +98,10 @@ void lens_fields(YamlReader& in, CameraSpec& camera) {
 }
 
 }  // namespace
+
+EnumNames<CoatingType> enum_names(CoatingType) {
+  return {{"matt", CoatingType::matt}, {"metal", CoatingType::metal}};
+}
 
 EnumNames<BayerLayout> enum_names(BayerLayout) {
   return {{"none", BayerLayout::none},
@@ -154,7 +178,9 @@ void fields(YamlReader& in, GelSpec& gel) {
   }
   in.optional("refractive_index", gel.refractive_index, Allowed::within(1.0, 4.0));
   in.optional("absorption_per_mm", gel.absorption_per_mm, Allowed::at_least(0.0));
-  in.optional("frame_albedo", gel.frame_albedo, Allowed::within(0.0, 1.0));
+  in.optional("scattering_per_mm", gel.scattering_per_mm, Allowed::within(0.0, 1000.0));
+  in.optional("scattering_anisotropy", gel.scattering_anisotropy, Allowed::within(-0.999, 0.999));
+  in.optional("frame_albedo", gel.frame_albedo, part_of_one());
 }
 
 void fields(YamlReader& in, MeshSpec& mesh) {
@@ -188,6 +214,41 @@ void fields(YamlReader& in, PlateSpec& plate) {
   in.required("refractive_index", plate.refractive_index, Allowed::within(1.0, 4.0));
 }
 
+void fields(YamlReader& in, PrintSpec& print) {
+  in.required("grid", print.grid, Allowed::within(1, 1000));
+  in.required("spacing_mm", print.spacing_mm, Allowed::above(0.0));
+  in.required("diameter_mm", print.diameter_mm, Allowed::above(0.0));
+  in.optional("jitter_mm", print.jitter_mm, Allowed::at_least(0.0));
+  in.optional("seed", print.seed);
+  in.optional("colour", print.colour, part_of_one());
+}
+
+void fields(YamlReader& in, CoatingSpec& coating) {
+  in.required("type", coating.type);
+  in.required(coating.type == CoatingType::matt ? "albedo" : "reflectance", coating.albedo, part_of_one());
+  if (coating.type == CoatingType::metal) in.optional("roughness", coating.roughness, Allowed::within(0.02, 1.0));
+  in.optional("print", coating.print);
+}
+
+void fields(YamlReader& in, FilmSpec& films) {
+  in.required("grid", films.grid, Allowed::within(1, 1000));
+  in.required("spacing_mm", films.spacing_mm, Allowed::above(0.0));
+  in.required("side_mm", films.side_mm, Allowed::above_up_to(0.0, films.spacing_mm.minCoeff()));
+  in.optional("refractive_index", films.refractive_index, Allowed::within(1.0, 4.0));
+  in.required("transmittance", films.transmittance, part_of_one());
+}
+
+void fields(YamlReader& in, BandsSpec& bands) {
+  bands.where = in.where();
+  in.optional("from_nm", bands.from_nm, Allowed::within(200.0, 2000.0));
+  in.optional("to_nm", bands.to_nm, Allowed::within(bands.from_nm + 64.0, 3000.0));
+  in.optional("tolerance", bands.tolerance, Allowed::within(1e-4, 1.0));
+  in.optional("count", bands.count);
+  if (bands.count && std::ranges::find(kBandCounts, *bands.count) == std::end(kBandCounts)) {
+    fail_at(in.where("count"), "bands.count: {}; allowed are 1, 3, 8 and 16", *bands.count);
+  }
+}
+
 void fields(YamlReader& in, LampSpec& lamp) {
   in.required("position_mm", lamp.position_mm);
   in.required("target_mm", lamp.target_mm);
@@ -195,6 +256,7 @@ void fields(YamlReader& in, LampSpec& lamp) {
   in.required("half_angle_deg", lamp.half_angle_deg, Allowed::above_up_to(0.0, 80.0));
   in.optional("soft_angle_deg", lamp.soft_angle_deg, Allowed::within(0.0, 80.0 - lamp.half_angle_deg));
   in.required("power_W", lamp.power_W, Allowed::at_least(0.0));
+  read_emission(in, lamp);
   if ((lamp.target_mm - lamp.position_mm).norm() < 1e-9) {
     fail_at(in.where("target_mm"), "target_mm: is the lamp's own position; the lamp has no direction");
   }
@@ -253,7 +315,17 @@ void fields(YamlReader& in, DeviceSpec& device) {
   in.optional("beads", device.beads);
   in.required("plate", device.plate);
   in.optional("lamps", device.lamps);
+  in.optional("coating", device.coating);
+  in.optional("films", device.films);
+  in.optional("bands", device.bands);
   in.optional("band_wavelengths_nm", device.band_wavelengths_nm, Allowed::within(300.0, 1200.0));
+  if (device.bands && in.has("band_wavelengths_nm")) {
+    fail_at(in.where("band_wavelengths_nm"), "band_wavelengths_nm: can't stand beside bands, which tell them");
+  }
+  if (std::ranges::find(kBandCounts, static_cast<int>(device.band_wavelengths_nm.size())) == std::end(kBandCounts)) {
+    fail_at(in.where("band_wavelengths_nm"), "band_wavelengths_nm: {} wavelengths; allowed are 1, 3, 8 or 16 of them",
+            device.band_wavelengths_nm.size());
+  }
   in.optional("room_radiance", device.room_radiance, Allowed::at_least(0.0));
   in.optional("camera", device.camera);
   check_gel(device, in.where("gel"));

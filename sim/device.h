@@ -10,6 +10,7 @@
 
 #include "core/yaml_reader.h"
 #include "fem/relaxation.h"
+#include "sim/colour.h"
 
 namespace touchstone::sim {
 
@@ -54,8 +55,10 @@ struct GelSpec {
   double density_kg_m3 = 1000.0;
   std::vector<RelaxationTermSpec> relaxation;  ///< of all moduli: a Prony series; empty: elastic
   double refractive_index = 1.0;
-  double absorption_per_mm = 0.0;  ///< natural logarithm, all bands
-  double frame_albedo = 0.0;       ///< of the frame that holds the pad at its sides, all bands; 0 is black
+  Colour absorption_per_mm = 0.0;      ///< natural logarithm
+  Colour scattering_per_mm = 0.0;      ///< of a milky gel
+  double scattering_anisotropy = 0.0;  ///< mean cosine of a scattering
+  Colour frame_albedo = 0.0;           ///< of the frame that holds the pad at its sides; 0 is black
 };
 
 /// How fine the gel is meshed: `fine_mm` where contact and beads are, graded to `coarse_mm` elsewhere; or, in their
@@ -77,7 +80,7 @@ struct BeadSpec {
   double spacing_mm = 2.0;  ///< between neighbours
   double diameter_mm = 0.5;
   double depth_mm = 0.5;  ///< of the centres, below the outer surface
-  Eigen::Vector3d reflectance = {0.5, 0.5, 0.5};
+  Colour reflectance = 0.5;
   double roughness = 0.3;  ///< GGX alpha
 };
 
@@ -87,6 +90,37 @@ struct PlateSpec {
   double refractive_index = 1.0;
 };
 
+/// Round markers on the inside of a coating: a grid, or with `jitter_mm` a semi-random field. They stretch with it.
+struct PrintSpec {
+  Eigen::Vector2i grid = {1, 1};            ///< markers along x and y, centred on the gel's origin
+  Eigen::Vector2d spacing_mm = {1.0, 1.0};  ///< between neighbours' centres
+  double diameter_mm = 0.0;
+  double jitter_mm = 0.0;  ///< each centre is moved along x and y by up to this, evenly distributed
+  std::uint64_t seed = 0;  ///< of the jitter
+  Colour colour = 0.05;
+};
+
+enum class CoatingType { matt, metal };
+EnumNames<CoatingType> enum_names(CoatingType);
+
+/// An opaque coat on the gel's outer surface, seen from within; the camera then sees nothing of the objects. For
+/// mechanics it isn't there: give a layer (GelLayerSpec) if it is stiff.
+struct CoatingSpec {
+  CoatingType type = CoatingType::matt;
+  Colour albedo = 0.5;     ///< of a matt one; of a metal one the reflectance at normal incidence
+  double roughness = 0.3;  ///< of a metal one: GGX alpha
+  std::optional<PrintSpec> print;
+};
+
+/// Squares of a clear coloured film between plate and gel, as yellow filters over markers. Wetted on both sides.
+struct FilmSpec {
+  Eigen::Vector2i grid = {1, 1};
+  Eigen::Vector2d spacing_mm = {1.0, 1.0};
+  double side_mm = 0.0;
+  double refractive_index = 1.5;
+  Colour transmittance = 1.0;  ///< of one passage at normal incidence
+};
+
 /// A lamp with a projecting lens: uniform within `half_angle_deg`, smooth to dark over `soft_angle_deg` more.
 struct LampSpec {
   Eigen::Vector3d position_mm = Eigen::Vector3d::Zero();
@@ -94,7 +128,8 @@ struct LampSpec {
   double lens_radius_mm = 1.0;
   double half_angle_deg = 20.0;
   double soft_angle_deg = 3.0;
-  Eigen::Vector3d power_W = Eigen::Vector3d::Zero();  ///< radiated in the bands red, green, blue
+  Colour power_W = 0.0;                           ///< in each band; with a spectrum one number, all that it radiates
+  std::optional<render::SpectralCurve> spectrum;  ///< relative, for a device that has `bands`
 };
 
 enum class BayerLayout { none, rggb, bggr, grbg, gbrg };
@@ -127,9 +162,9 @@ struct CameraSpec {
   double exposure_us = 1000.0;
   int bits = 8;  ///< 1 to 16
   BayerLayout bayer = BayerLayout::none;
-  Eigen::Vector3d quantum_efficiency_red = {1, 0, 0};    ///< of the red pixels, in the bands red, green, blue
-  Eigen::Vector3d quantum_efficiency_green = {0, 1, 0};  ///< likewise, green pixels; a grey camera has these only
-  Eigen::Vector3d quantum_efficiency_blue = {0, 0, 1};
+  Colour quantum_efficiency_red = {1, 0, 0};    ///< of the red pixels
+  Colour quantum_efficiency_green = {0, 1, 0};  ///< likewise, green pixels; a grey camera has these only
+  Colour quantum_efficiency_blue = {0, 0, 1};
   std::optional<Eigen::Vector3d> white_balance;  ///< fixed gains of red, green, blue; absent: the lamps' light is grey
   double full_well_e = 0.0;
   double gain_dB = 0.0;  ///< analogue: at 0 the full well gives the largest number, at 20 a tenth of it does
@@ -140,15 +175,27 @@ struct CameraSpec {
   double black_level_DN = 0.0;
 };
 
+/// The range of wavelengths that is simulated, and into how many bands it is cut.
+struct BandsSpec {
+  double from_nm = 400.0;
+  double to_nm = 720.0;
+  std::optional<int> count;  ///< 1, 3, 8 or 16; without it as many as `tolerance` takes
+  double tolerance = 0.02;   ///< relative, of what a pixel reads on any of the device's light paths
+  SourceLocation where;
+};
+
 struct DeviceSpec {
   std::string name;
   GelSpec gel;
   MeshSpec mesh;
   std::optional<BeadSpec> beads;
   PlateSpec plate;
+  std::optional<CoatingSpec> coating;
+  std::optional<FilmSpec> films;
   std::vector<LampSpec> lamps;
-  Eigen::Vector3d band_wavelengths_nm = {610, 540, 455};  ///< centres of the bands red, green, blue
-  double room_radiance = 0.0;                             ///< W/m^2/sr a band
+  std::optional<BandsSpec> bands;                             ///< for spectra; else:
+  std::vector<double> band_wavelengths_nm = {610, 540, 455};  ///< centres of the bands, which are just numbers
+  Colour room_radiance = 0.0;                                 ///< W/m^2/sr in each band
   std::optional<CameraSpec> camera;
   SourceLocation where;
 };
@@ -159,6 +206,10 @@ void fields(YamlReader& in, GelSpec& gel);
 void fields(YamlReader& in, MeshSpec& mesh);
 void fields(YamlReader& in, BeadSpec& beads);
 void fields(YamlReader& in, PlateSpec& plate);
+void fields(YamlReader& in, PrintSpec& print);
+void fields(YamlReader& in, CoatingSpec& coating);
+void fields(YamlReader& in, FilmSpec& films);
+void fields(YamlReader& in, BandsSpec& bands);
 void fields(YamlReader& in, LampSpec& lamp);
 void fields(YamlReader& in, CameraSpec& camera);
 void fields(YamlReader& in, DeviceSpec& device);

@@ -27,7 +27,7 @@ void add_beads(const BeadSpec& beads, const fem::PressState& press, std::vector<
   ShapeSpec ball;
   ball.type = ShapeKind::sphere;
   ball.radius_mm = beads.diameter_mm / 2;
-  GltfPart part{"bead", visible_mesh(ball), beads.reflectance, 1.0, true, {}};
+  GltfPart part{"bead", visible_mesh(ball), display_colour(beads.reflectance), 1.0, true, {}};
   const std::vector<Eigen::Vector3d> rest = bead_centres(beads);
   for (std::size_t i = 0; i < rest.size(); ++i) {
     part.places.emplace_back(rest[i] + press.bead_displacement.row(static_cast<Eigen::Index>(i)).transpose());
@@ -46,7 +46,7 @@ FrameGeometry frame_geometry(const SceneSpec& scene, const fem::Compliance& gel,
   if (scene.device.beads) add_beads(*scene.device.beads, press, out.parts);
   for (std::size_t k = 0; k < objects.size(); ++k) {
     const ObjectSpec& object = all[k].object;
-    out.parts.push_back({object.name, moved(objects[k].body, felt[k].gel_from_object), object.albedo});
+    out.parts.push_back({object.name, moved(objects[k].body, felt[k].gel_from_object), display_colour(object.albedo)});
     if (!objects[k].screen) continue;
     const RigidTransform start{Eigen::Matrix3d::Identity(), all[k].motion.start_mm};
     out.parts.push_back({object.name + " screen", moved(*objects[k].screen, start), {1.0, 1.0, 1.0}});

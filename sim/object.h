@@ -9,6 +9,7 @@
 #include "core/triangle_mesh.h"
 #include "core/yaml_reader.h"
 #include "fem/contact_shape.h"
+#include "sim/colour.h"
 #include "sim/relief.h"
 
 namespace touchstone::sim {
@@ -32,8 +33,8 @@ struct ShapeSpec {
 /// where the motion starts, level.
 struct ScreenSpec {
   double radius_mm = 0.0;
-  double behind_mm = 0.0;                      ///< its front face above the object's origin at the start
-  Eigen::Vector3d radiance = {1.0, 1.0, 1.0};  ///< W/m^2/sr in the bands red, green, blue
+  double behind_mm = 0.0;  ///< its front face above the object's origin at the start
+  Colour radiance = 1.0;   ///< W/m^2/sr in each band
 };
 
 /// A body that isn't rigid: linear elastic, held on its upper side.
@@ -51,11 +52,11 @@ struct ElasticSpec {
 struct ObjectSpec {
   std::string name;
   ShapeSpec shape;
-  std::optional<ReliefSpec> relief;          ///< on the shape's lower side
-  Eigen::Vector3d albedo = {0.5, 0.5, 0.5};  ///< in the bands red, green, blue
-  std::optional<Eigen::Vector3d> radiance;   ///< W/m^2/sr in air: a diffuser lit from behind, which has no albedo
-  std::optional<ElasticSpec> elastic;        ///< without it the object is rigid
-  double friction = 0.0;                     ///< Coulomb coefficient against the gel
+  std::optional<ReliefSpec> relief;  ///< on the shape's lower side
+  Colour albedo = 0.5;
+  std::optional<Colour> radiance;      ///< W/m^2/sr in air: a diffuser lit from behind, which has no albedo
+  std::optional<ElasticSpec> elastic;  ///< without it the object is rigid
+  double friction = 0.0;               ///< Coulomb coefficient against the gel
   std::optional<ScreenSpec> screen;
 };
 

@@ -5,6 +5,7 @@
 
 #include "core/units.h"
 #include "fem/vibration.h"
+#include "sim/scene_bands.h"
 
 namespace touchstone::sim {
 namespace {
@@ -217,6 +218,53 @@ void plan_relief(const SceneSpec& scene, Plan& plan, Table& table) {
   }
 }
 
+void plan_interreflection(const SceneSpec& scene, Plan& plan, Table& table) {
+  const DeviceSpec& device = scene.device;
+  const GelSpec& gel = device.gel;
+  plan.scattering = table.add("scattering", gel.scattering_per_mm.largest() > 0.0,
+                              gel.scattering_per_mm.largest() > 0.0
+                                  ? fmt::format("the gel scatters {:.3g} times a mm", gel.scattering_per_mm.largest())
+                                  : "the gel is clear",
+                              "every scattering is a ray, and every frame is traced whole");
+  double albedo = 0.0;
+  double gain = 0.0;
+  const auto judge = [&](double own, double radius) {
+    const double own_gain = interreflection_estimate(gel, device.plate, own, radius);
+    if (own_gain > gain) {
+      albedo = own;
+      gain = own_gain;
+    }
+  };
+  if (device.coating) {
+    judge(device.coating->albedo.largest(), 0.5 * std::hypot(gel.size_x_mm, gel.size_y_mm));
+  } else {
+    for (const MovedObject& moved : moved_objects(scene)) {
+      judge(moved.object.radiance ? 0.0 : moved.object.albedo.largest(), bright_radius(moved.object));
+    }
+  }
+  const std::string why = fmt::format(
+      "{} of albedo {:.2g} gives itself {:.1f} % of its light back through the plate; allowed to leave out is {:.1f} %",
+      device.coating ? "a coating" : "an object", albedo, 100 * gain, 100 * scene.light.interreflection_tolerance);
+  plan.interreflection = table.add(
+      "interreflection", scene.effects.interreflection, plan.scattering || gain > scene.light.interreflection_tolerance,
+      plan.scattering ? "light is scattered many times in a milky gel" : why, "3 to 5 times the rays");
+}
+
+void plan_bands(const SceneSpec& scene, Plan& plan, Table& table) {
+  plan.bands = choose_bands(scene);
+  check_colours(scene, plan.bands);
+  const int count = plan.bands.count();
+  const std::string why =
+      plan.bands.ranges
+          ? fmt::format(
+                "between {:.4g} and {:.4g} nm they get what a pixel reads wrong by up to {:.2g} % (wanted {:.2g} %)",
+                scene.device.bands->from_nm, scene.device.bands->to_nm, 100 * band_error(scene, plan.bands),
+                100 * scene.device.bands->tolerance)
+          : fmt::format("the device gives its colours as numbers for {}",
+                        count == 1 ? "one band" : fmt::format("{} bands", count));
+  table.add("spectral bands", true, why, fmt::format("{} band{} a path", count, count == 1 ? "" : "s"));
+}
+
 void plan_light(const SceneSpec& scene, Plan& plan, Table& table) {
   const bool images = scene.outputs.light() || scene.outputs.first_hits();
   plan.camera = table.add("camera and renderer", images,
@@ -251,23 +299,8 @@ void plan_light(const SceneSpec& scene, Plan& plan, Table& table) {
                                        : "no index differs from 1",
                               "closed form at the flat faces: under a tenth of the rays' time");
 
-  double albedo = 0.0;
-  double gain = 0.0;
-  for (const MovedObject& moved : moved_objects(scene)) {
-    const double own = moved.object.radiance ? 0.0 : moved.object.albedo.maxCoeff();
-    const double own_gain = interreflection_estimate(gel, plate, own, bright_radius(moved.object));
-    if (own_gain > gain) {
-      albedo = own;
-      gain = own_gain;
-    }
-  }
-  plan.interreflection = table.add(
-      "interreflection", scene.effects.interreflection, gain > scene.light.interreflection_tolerance,
-      fmt::format("an object of albedo {:.2g} gives itself {:.1f} % of its light back through the plate; allowed to "
-                  "leave out is {:.1f} %",
-                  albedo, 100 * gain, 100 * scene.light.interreflection_tolerance),
-      "3 to 5 times the rays");
-  table.add("spectral bands", true, "a colour camera and lamps without narrow lines: 3 bands", "3 bands a path");
+  plan_interreflection(scene, plan, table);
+  plan_bands(scene, plan, table);
   const bool noise = scene.outputs.frames;
   plan.sensor_noise =
       table.add("sensor noise", scene.effects.sensor_noise, noise,

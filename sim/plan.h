@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "sim/colour.h"
 #include "sim/scene.h"
 
 namespace touchstone::sim {
@@ -26,7 +27,9 @@ struct Plan {
   bool inertia = false;
   bool refraction = false;
   bool interreflection = false;
+  bool scattering = false;
   bool sensor_noise = false;
+  SceneBands bands;             ///< of the light; none without a picture
   std::vector<Effect> effects;  ///< the same for people, with reasons
 };
 

@@ -27,13 +27,14 @@ struct SeenGeometry {
   std::vector<SeenBody> bodies;        ///< what each of `beyond.surfaces` is
   GelSheet sheet;                      ///< surfaces[0] of `inside` with its meaning
   Eigen::MatrixX3d bead_displacement;  ///< m x 3, mm
+  render::PrintIndex markers;          ///< printed on the outer surface; none without a coating
 };
 
 /// As the elements' surface has it. @pre the gel is a slab
-SeenGeometry seen_geometry(const SceneSpec& scene, const std::vector<VisibleObject>& objects, const VisibleGel& gel,
-                           const fem::PressState& press);
+SeenGeometry seen_geometry(const SceneSpec& scene, const Plan& plan, const std::vector<VisibleObject>& objects,
+                           const VisibleGel& gel, const fem::PressState& press);
 /// As the fine relief has it. @pre the relief has contact
-SeenGeometry seen_geometry(const SceneSpec& scene, const std::vector<VisibleObject>& objects, const Membrane& membrane,
-                           const fem::PressState& press, const fem::ReliefAnswer& relief);
+SeenGeometry seen_geometry(const SceneSpec& scene, const Plan& plan, const std::vector<VisibleObject>& objects,
+                           const Membrane& membrane, const fem::PressState& press, const fem::ReliefAnswer& relief);
 
 }  // namespace touchstone::sim

@@ -51,8 +51,8 @@ struct VirtualCamera::Parts {
         objects(visible_objects(scene)),
         camera(camera_of(*scene.device.camera)),
         size(render::size_of(camera).x(), render::size_of(camera).y()),
-        imager(sim::imager(scene.device, plan.sensor_noise)),
-        ideal_imager(sim::imager(scene.device, false)),
+        imager(sim::imager(scene.device, plan.bands, plan.sensor_noise)),
+        ideal_imager(sim::imager(scene.device, plan.bands, false)),
         response(render::response_of(imager)),
         pattern(render::fixed_pattern(imager, size, scene.seed)) {
     settings.seed = scene.seed;
@@ -92,16 +92,18 @@ struct VirtualCamera::Parts {
   cv::Mat changed(const cv::Mat& preview) const {
     cv::Mat mask(preview.size(), CV_8U, cv::Scalar(0));
     const auto& per_irradiance = settings.noise->electrons_per_irradiance;
+    const int bands = plan.bands.count();
     for (int row = 0; row < preview.rows; ++row) {
-      const auto* now = preview.ptr<cv::Vec3f>(row);
-      const auto* before = first_preview.ptr<cv::Vec3f>(row);
+      const auto* now = preview.ptr<float>(row);
+      const auto* before = first_preview.ptr<float>(row);
       auto* out = mask.ptr<unsigned char>(row);
       for (int column = 0; column < preview.cols; ++column) {
         double electrons = 0.0;
         double change = 0.0;
-        for (int band = 0; band < 3; ++band) {
-          electrons += per_irradiance[band] * before[column][band];
-          change += std::abs(per_irradiance[band] * (now[column][band] - before[column][band]));
+        for (int band = 0; band < bands; ++band) {
+          const int at = bands * column + band;
+          electrons += per_irradiance[band] * before[at];
+          change += std::abs(per_irradiance[band] * (now[at] - before[at]));
         }
         if (change > scene.light.change_tolerance * render::noise_e(response, electrons)) out[column] = 255;
       }
@@ -120,8 +122,8 @@ struct VirtualCamera::Parts {
     if (scene.outputs.height) capture.height = membrane->height(truth.press, relief);
     if (scene.outputs.first_hits()) {
       const SeenGeometry seen = relief && relief->grid.size() > 0
-                                    ? seen_geometry(scene, objects, *membrane, truth.press, *relief)
-                                    : seen_geometry(scene, objects, gel, truth.press);
+                                    ? seen_geometry(scene, plan, objects, *membrane, truth.press, *relief)
+                                    : seen_geometry(scene, plan, objects, gel, truth.press);
       capture.pixel_truth = pixel_truth(seen, std::get<render::PinholeCamera>(camera), scene.outputs);
     }
     return capture;
@@ -148,7 +150,7 @@ struct VirtualCamera::Parts {
 VirtualCamera::VirtualCamera(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel, const Truth& first) {
   TS_ASSERT(plan.camera && scene.device.camera);
   auto parts = std::make_unique<Parts>(scene, plan, gel);
-  if (!scene.outputs.light()) {
+  if (!scene.outputs.light() || plan.scattering) {
     parts_ = std::move(parts);
     return;
   }
@@ -166,6 +168,8 @@ VirtualCamera::VirtualCamera(const SceneSpec& scene, const Plan& plan, const fem
 VirtualCamera::~VirtualCamera() = default;
 
 Capture VirtualCamera::capture(const Truth& truth) const {
+  // A preview knows nothing of scattered light.
+  if (parts_->plan.scattering) return capture_whole(truth);
   const auto relief = parts_->relief(truth);
   if (!parts_->scene.outputs.light()) return parts_->geometry(truth, relief);
   const render::Tracer tracer = parts_->tracer(truth, relief);

@@ -30,7 +30,7 @@ struct Truth {
 struct Capture {
   cv::Mat frame;            ///< 8 bit BGR or grey, with noise as planned
   cv::Mat ideal;            ///< the same without noise
-  cv::Mat radiance;         ///< CV_32FC3 (red, green, blue bands), W/m^2 on the sensor
+  cv::Mat radiance;         ///< CV_32FC(bands), W/m^2 on the sensor in each of Plan::bands
   cv::Mat height;           ///< CV_32FC1, mm: the membrane, see sim/membrane.h
   LinearImage pixel_truth;  ///< the layers of sim/pixel_truth.h that were asked for
   std::int64_t paths_traced = 0;

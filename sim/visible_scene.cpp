@@ -2,16 +2,16 @@
 
 #include <cmath>
 
+#include "core/random.h"
 #include "core/units.h"
+#include "sim/scene_bands.h"
 
 namespace touchstone::sim {
 namespace {
 
 enum MediumIndex { kAir = 0, kPlate = 1, kGel = 2 };
 
-render::Spectrum bands(const Eigen::Vector3d& values) {
-  return values.array();
-}
+constexpr double kFilmInGelMm = 1e-3;  // so that film and face don't coincide
 
 /// The frame that holds the gel: walls round the pad's sides, from the plate to its outer surface.
 TriangleMesh pad_walls(const GelSpec& gel) {
@@ -37,9 +37,45 @@ TriangleMesh placed(TriangleMesh mesh, const RigidTransform& gel_from_object) {
   return mesh;
 }
 
-render::Material material_of(const ObjectSpec& object) {
-  if (object.radiance) return render::Emitter{bands(*object.radiance)};
-  return render::Lambertian{bands(object.albedo)};
+render::Material material_of(const ObjectSpec& object, const SceneBands& bands) {
+  if (object.radiance) return render::Emitter{in_bands(*object.radiance, bands, "radiance")};
+  return render::Lambertian{in_bands(object.albedo, bands, "albedo")};
+}
+
+/// Centres of a grid about the origin, row by row.
+std::vector<Eigen::Vector2d> grid_centres(const Eigen::Vector2i& grid, const Eigen::Vector2d& spacing) {
+  std::vector<Eigen::Vector2d> centres;
+  for (int row = 0; row < grid.y(); ++row) {
+    for (int column = 0; column < grid.x(); ++column) {
+      centres.emplace_back((column - 0.5 * (grid.x() - 1)) * spacing.x(), (row - 0.5 * (grid.y() - 1)) * spacing.y());
+    }
+  }
+  return centres;
+}
+
+render::Print print_of(const PrintSpec& spec, const SceneBands& bands, const std::vector<Eigen::Vector3d>& rest) {
+  render::Print print;
+  for (const Eigen::Vector3d& point : rest) print.material_mm.emplace_back(point.head<2>());
+  print.inks = {in_bands(spec.colour, bands, "coating.print.colour")};
+  print.discs = printed_discs(spec);
+  return print;
+}
+
+/// All of a device's film squares as one sheet, just inside the gel.
+render::Surface film_sheet(const FilmSpec& films, const SceneBands& bands, double thickness_mm) {
+  TriangleMesh mesh;
+  const double half = films.side_mm / 2;
+  const double z = -thickness_mm + kFilmInGelMm;
+  for (const Eigen::Vector2d& centre : grid_centres(films.grid, films.spacing_mm)) {
+    const int first = static_cast<int>(mesh.vertices.size());
+    for (const Eigen::Vector2d& corner : {Eigen::Vector2d(-half, -half), {half, -half}, {half, half}, {-half, half}}) {
+      mesh.vertices.emplace_back(centre.x() + corner.x(), centre.y() + corner.y(), z);
+    }
+    mesh.triangles.push_back({first, first + 1, first + 2});
+    mesh.triangles.push_back({first, first + 2, first + 3});
+  }
+  return {std::move(mesh),
+          render::ThinFilm{in_bands(films.transmittance, bands, "films.transmittance"), films.refractive_index, false}};
 }
 
 render::BayerPattern bayer_pattern(BayerLayout layout) {
@@ -99,28 +135,48 @@ render::Surface gel_surface(TriangleMesh mesh) {
   return {std::move(mesh), render::Refractive{kGel, kAir}};
 }
 
+render::Surface coated_surface(const DeviceSpec& device, const SceneBands& bands, GelSheet sheet) {
+  const CoatingSpec& coating = *device.coating;
+  render::Surface out;
+  if (coating.type == CoatingType::matt) {
+    out.material = render::Lambertian{in_bands(coating.albedo, bands, "coating.albedo")};
+  } else {
+    out.material = render::RoughConductor{in_bands(coating.albedo, bands, "coating.reflectance"), coating.roughness};
+  }
+  if (coating.print) out.print = print_of(*coating.print, bands, sheet.rest);
+  out.mesh = std::move(sheet.mesh);
+  return out;
+}
+
 render::Scene scene_without_surface(const SceneSpec& scene, const Plan& plan, const std::vector<VisibleObject>& objects,
                                     const std::vector<RigidTransform>& poses, const fem::PressState& press) {
   const DeviceSpec& device = scene.device;
+  const SceneBands& bands = plan.bands;
   render::Scene out;
   out.media.resize(3);
   out.media[kPlate].index = device.plate.refractive_index;
   out.media[kGel].index = device.gel.refractive_index;
-  out.media[kGel].absorption = render::flat_spectrum(3, device.gel.absorption_per_mm);
+  out.media[kGel].absorption = in_bands(device.gel.absorption_per_mm, bands, "gel.absorption_per_mm");
+  if (plan.scattering) {
+    out.media[kGel].scattering = in_bands(device.gel.scattering_per_mm, bands, "gel.scattering_per_mm");
+    out.media[kGel].anisotropy = device.gel.scattering_anisotropy;
+  }
   out.faces = {{-device.gel.thickness_mm - device.plate.thickness_mm, kAir, kPlate},
                {-device.gel.thickness_mm, kPlate, kGel}};
   out.surfaces.push_back(
-      {pad_walls(device.gel), render::Lambertian{render::flat_spectrum(3, device.gel.frame_albedo)}});
+      {pad_walls(device.gel), render::Lambertian{in_bands(device.gel.frame_albedo, bands, "gel.frame_albedo")}});
   const std::vector<MovedObject> all = moved_objects(scene);
   for (std::size_t k = 0; k < objects.size(); ++k) {
-    out.surfaces.push_back({placed(objects[k].body, poses[k]), material_of(all[k].object)});
+    out.surfaces.push_back({placed(objects[k].body, poses[k]), material_of(all[k].object, bands)});
     if (!objects[k].screen) continue;
     out.surfaces.push_back({placed(*objects[k].screen, {Eigen::Matrix3d::Identity(), all[k].motion.start_mm}),
-                            render::Emitter{bands(all[k].object.screen->radiance)}});
+                            render::Emitter{in_bands(all[k].object.screen->radiance, bands, "screen.radiance")}});
   }
+  if (device.films) out.surfaces.push_back(film_sheet(*device.films, bands, device.gel.thickness_mm));
   if (device.beads) {
     const std::vector<Eigen::Vector3d> centres = bead_centres(*device.beads);
-    const render::RoughConductor metal{bands(device.beads->reflectance), device.beads->roughness};
+    const render::RoughConductor metal{in_bands(device.beads->reflectance, bands, "beads.reflectance"),
+                                       device.beads->roughness};
     for (std::size_t i = 0; i < centres.size(); ++i) {
       const Eigen::Vector3d moved = press.bead_displacement.row(static_cast<Eigen::Index>(i));
       out.balls.push_back({centres[i] + moved, device.beads->diameter_mm / 2, metal});
@@ -129,28 +185,71 @@ render::Scene scene_without_surface(const SceneSpec& scene, const Plan& plan, co
   for (const LampSpec& lamp : device.lamps) {
     out.lamps.push_back({lamp.position_mm, (lamp.target_mm - lamp.position_mm).normalized(), lamp.lens_radius_mm,
                          lamp.half_angle_deg * kRadiansPerDegree, lamp.soft_angle_deg * kRadiansPerDegree,
-                         scene.lamp_level * bands(lamp.power_W)});
+                         scene.lamp_level * lamp_power(lamp, bands)});
   }
-  out.environment = render::flat_spectrum(3, device.room_radiance);
+  out.environment = in_bands(device.room_radiance, bands, "room_radiance");
   out.interreflection = plan.interreflection;
   return out;
 }
 
+namespace {
+
+/// What the camera of a coated device sees beside the coating.
+render::Scene scene_in_coating(const SceneSpec& scene, const Plan& plan, const fem::PressState& press) {
+  return scene_without_surface(scene, plan, {}, {}, press);
+}
+
+}  // namespace
+
 render::Scene visible_scene(const SceneSpec& scene, const Plan& plan, const std::vector<VisibleObject>& objects,
                             const VisibleGel& gel, const fem::PressState& press) {
+  const std::vector<PlacedShape> felt = placed_shapes(objects, press);
+  if (scene.device.coating) {
+    render::Scene out = scene_in_coating(scene, plan, press);
+    out.surfaces.insert(out.surfaces.begin(), coated_surface(scene.device, plan.bands, gel.sheet(press, felt)));
+    return out;
+  }
   render::Scene out = scene_without_surface(scene, plan, objects, poses_of(press), press);
-  out.surfaces.insert(out.surfaces.begin(), gel_surface(gel.dry_surface(press, placed_shapes(objects, press))));
+  out.surfaces.insert(out.surfaces.begin(), gel_surface(gel.dry_surface(press, felt)));
   return out;
 }
 
 render::Scene visible_scene(const SceneSpec& scene, const Plan& plan, const std::vector<VisibleObject>& objects,
                             const Membrane& membrane, const fem::PressState& press, const fem::ReliefAnswer& relief) {
   TS_ASSERT(objects.size() == 1);
+  if (scene.device.coating) {
+    render::Scene out = scene_in_coating(scene, plan, press);
+    out.surfaces.insert(out.surfaces.begin(),
+                        coated_surface(scene.device, plan.bands, whole_sheet(membrane.sheet(press, relief))));
+    return out;
+  }
   render::Scene out = scene_without_surface(scene, plan, objects, poses_of(press, relief), press);
   Membrane::Sheet sheet = membrane.sheet(press, relief);
   out.surfaces.insert(out.surfaces.begin(), gel_surface(std::move(sheet.dry)));
-  out.surfaces.push_back({std::move(sheet.wet), material_of(scene.object)});
+  out.surfaces.push_back({std::move(sheet.wet), material_of(scene.object, plan.bands)});
   return out;
+}
+
+GelSheet whole_sheet(Membrane::Sheet fine) {
+  GelSheet sheet;
+  sheet.mesh = std::move(fine.dry);
+  sheet.touched.assign(sheet.mesh.triangles.size(), -1);
+  sheet.mesh.triangles.insert(sheet.mesh.triangles.end(), fine.wet.triangles.begin(), fine.wet.triangles.end());
+  sheet.touched.resize(sheet.mesh.triangles.size(), 0);
+  sheet.rest = std::move(fine.rest);
+  return sheet;
+}
+
+std::vector<render::PrintedDisc> printed_discs(const PrintSpec& print) {
+  std::vector<render::PrintedDisc> discs;
+  std::uint64_t index = 0;
+  for (const Eigen::Vector2d& centre : grid_centres(print.grid, print.spacing_mm)) {
+    RandomStream random(print.seed, index++, Purpose::kPlacement);
+    const double dx = print.jitter_mm * (2.0 * random.uniform() - 1.0);
+    const double dy = print.jitter_mm * (2.0 * random.uniform() - 1.0);
+    discs.push_back({centre + Eigen::Vector2d(dx, dy), print.diameter_mm / 2, 0});
+  }
+  return discs;
 }
 
 RigidTransform pose_of(const CameraSpec& camera) {
@@ -173,20 +272,21 @@ render::PinholeCamera pinhole_camera(const CameraSpec& camera) {
   return out;
 }
 
-render::Imager imager(const DeviceSpec& device, bool with_noise) {
+render::Imager imager(const DeviceSpec& device, const SceneBands& bands, bool with_noise) {
   const CameraSpec& camera = *device.camera;
   render::Imager out;
   out.bits = camera.bits;
   out.active_area_um2 = camera.active_area_um2;
   out.exposure_s = camera.exposure_us / kMicrosecondsPerSecond;
-  out.wavelengths_nm = bands(device.band_wavelengths_nm);
+  out.wavelengths_nm = bands.centres_nm;
+  const auto green = in_bands(camera.quantum_efficiency_green, bands, "camera.quantum_efficiency_green");
   if (camera.bayer == BayerLayout::none) {
-    out.quantum_efficiency = camera.quantum_efficiency_green.transpose();
+    out.quantum_efficiency = green.matrix().transpose();
   } else {
-    Eigen::Matrix3d efficiency;
-    efficiency << camera.quantum_efficiency_red.transpose(), camera.quantum_efficiency_green.transpose(),
-        camera.quantum_efficiency_blue.transpose();
-    out.quantum_efficiency = efficiency;
+    out.quantum_efficiency.resize(3, bands.count());
+    out.quantum_efficiency.row(0) = in_bands(camera.quantum_efficiency_red, bands, "camera.quantum_efficiency_red");
+    out.quantum_efficiency.row(1) = green;
+    out.quantum_efficiency.row(2) = in_bands(camera.quantum_efficiency_blue, bands, "camera.quantum_efficiency_blue");
   }
   out.full_well_e = camera.full_well_e;
   out.read_noise_e = camera.read_noise_e;
@@ -202,9 +302,9 @@ render::Imager imager(const DeviceSpec& device, bool with_noise) {
   if (camera.white_balance) {
     out.white_balance = *camera.white_balance;
   } else if (camera.bayer != BayerLayout::none) {
-    Eigen::Vector3d light = Eigen::Vector3d::Zero();
-    for (const LampSpec& lamp : device.lamps) light += lamp.power_W;
-    if (light.sum() > 0.0) out.white_balance = render::grey_gains(out, bands(light));
+    render::Spectrum light = render::flat_spectrum(bands.count(), 0.0);
+    for (const LampSpec& lamp : device.lamps) light += lamp_power(lamp, bands);
+    if (light.sum() > 0.0) out.white_balance = render::grey_gains(out, light);
   }
   return out;
 }

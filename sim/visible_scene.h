@@ -36,17 +36,27 @@ std::vector<RigidTransform> poses_of(const fem::PressState& press, const fem::Re
 /// What the gel feels of each object, where it stands.
 std::vector<PlacedShape> placed_shapes(const std::vector<VisibleObject>& objects, const fem::PressState& press);
 
-/// The gel's outer surface with what is on its two sides.
+/// A clear gel's outer surface with what is on its two sides.
 render::Surface gel_surface(TriangleMesh mesh);
 
+/// The sheet of a fine relief in one piece.
+GelSheet whole_sheet(Membrane::Sheet fine);
+
+/// The markers in material coordinates, row by row, y growing from row to row.
+std::vector<render::PrintedDisc> printed_discs(const PrintSpec& print);
+
+/// A coated gel's outer surface. @pre the device has a coating
+render::Surface coated_surface(const DeviceSpec& device, const SceneBands& bands, GelSheet sheet);
+
 /// All of visible_scene but the gel's outer surface: its frame first, then each object followed by its screen if it has
-/// one.
+/// one, then the films.
 render::Scene scene_without_surface(const SceneSpec& scene, const Plan& plan, const std::vector<VisibleObject>& objects,
                                     const std::vector<RigidTransform>& poses, const fem::PressState& press);
 
 /// Plate, gel, beads, objects and lamps as they stand at `press`. Where the gel is wetted by the object there is no
-/// face between them: the light goes on into the object. Surfaces: the gel's dry surface, its frame, then each object
-/// followed by its screen if it has one. Balls: the beads in their order.
+/// face between them: the light goes on into the object. A coated gel shows its coating and nothing of what is beyond.
+/// Surfaces: the gel's outer surface (of a clear gel where it's dry), its frame, then each object followed by its
+/// screen if it has one (not with a coating), then the films. Balls: the beads in their order.
 render::Scene visible_scene(const SceneSpec& scene, const Plan& plan, const std::vector<VisibleObject>& objects,
                             const VisibleGel& gel, const fem::PressState& press);
 
@@ -60,7 +70,7 @@ render::PinholeCamera pinhole_camera(const CameraSpec& camera);
 /// Where the camera stands and looks.
 RigidTransform pose_of(const CameraSpec& camera);
 
-/// The imager of a device; its bands are those of the device, red, green, blue.
-render::Imager imager(const DeviceSpec& device, bool with_noise);
+/// The imager of a device for light in these bands.
+render::Imager imager(const DeviceSpec& device, const SceneBands& bands, bool with_noise);
 
 }  // namespace touchstone::sim

@@ -239,7 +239,7 @@ TEST(FirstHits, ProjectionIsTheWayBackFromEveryHitOfATiltedCamera) {
   SceneSpec scene = p.scene;
   scene.device.camera->hole_position_mm = {3.0, -2.0, -16.0};
   const std::vector<VisibleObject> objects = visible_objects(scene);
-  const SeenGeometry seen = seen_geometry(scene, objects, VisibleGel(*p.gel), p.truths.back().press);
+  const SeenGeometry seen = seen_geometry(scene, make_plan(scene), objects, VisibleGel(*p.gel), p.truths.back().press);
   const render::PinholeCamera camera = pinhole_camera(*scene.device.camera);
   const std::vector<render::FirstHit> hits = render::first_hits(seen.inside, camera);
   int checked = 0;

@@ -156,7 +156,7 @@ void expect_partial_frame_agrees(Played p) {
   EXPECT_LT(part.pixels_traced, whole.pixels_traced) << "nothing was saved";
   EXPECT_GT(part.pixels_traced, 0);
 
-  const render::ImagerResponse response = render::response_of(imager(p.scene.device, true));
+  const render::ImagerResponse response = render::response_of(imager(p.scene.device, p.plan.bands, true));
   double square = 0.0;
   for (int row = 0; row < whole.radiance.rows; ++row) {
     for (int column = 0; column < whole.radiance.cols; ++column) {

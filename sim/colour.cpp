@@ -1,0 +1,75 @@
+#include "sim/colour.h"
+
+#include <algorithm>
+
+namespace touchstone::sim {
+
+double Colour::largest() const {
+  const std::vector<double>& values = curve ? curve->values : numbers;
+  return values.empty() ? 0.0 : *std::max_element(values.begin(), values.end());
+}
+
+void read_value(YamlReader& in, Colour& colour, Allowed allowed) {
+  colour = Colour();
+  colour.where = in.where();
+  if (in.is_list()) {
+    colour.numbers = in.numbers(allowed);
+    if (colour.numbers.empty() || colour.numbers.size() > render::kMaxBands) {
+      fail_at(in.where(), "{}has {} numbers; allowed are 1 to {}, one a band", in.context(), colour.numbers.size(),
+              render::kMaxBands);
+    }
+    return;
+  }
+  const std::string text = in.text();
+  if (!text.ends_with(".csv")) {
+    colour.numbers = {in.number(allowed)};
+    return;
+  }
+  const auto kind = allowed.high <= 1.0 ? render::CurveKind::share : render::CurveKind::per_mm;
+  try {
+    colour.curve = render::read_spectral_curve(in.folder() / text, kind);
+  } catch (const Error& error) {
+    fail_at(in.where(), "{}{}", in.context(), error.what());
+  }
+}
+
+render::Spectrum in_bands(const Colour& colour, const SceneBands& bands, const char* what) {
+  if (colour.curve) {
+    if (!bands.ranges) {
+      fail_at(colour.where,
+              "{}: is a spectrum, but the device doesn't say its `bands`, which it could be averaged over", what);
+    }
+    return render::band_means(*colour.curve, *bands.ranges);
+  }
+  const auto given = static_cast<int>(colour.numbers.size());
+  if (given == 1) return render::flat_spectrum(bands.count(), colour.numbers[0]);
+  if (given != bands.count()) {
+    fail_at(colour.where, "{}: has {} numbers, but the scene has {} bands; allowed is one number for all, {}{}", what,
+            given, bands.count(), bands.count() > 1 ? fmt::format("or {}", bands.count()) : "no list",
+            bands.ranges ? ", or a spectrum's file" : "");
+  }
+  return Eigen::Map<const Eigen::ArrayXd>(colour.numbers.data(), given);
+}
+
+std::vector<std::string> channel_names(const SceneBands& bands) {
+  const render::Spectrum& at = bands.centres_nm;
+  if (at.size() == 1) return {"Y"};
+  if (at.size() == 3 && at[0] > at[1] && at[1] > at[2]) return {"R", "G", "B"};
+  std::vector<std::string> names;
+  for (const double nm : at) {
+    std::string name = fmt::format("S0.{:.1f}nm", nm);
+    std::ranges::replace(name.begin() + 3, name.end(), '.', ',');
+    names.push_back(name);
+  }
+  return names;
+}
+
+Eigen::Vector3d display_colour(const Colour& colour) {
+  if (colour.curve) return {colour.curve->mean(600, 700), colour.curve->mean(500, 600), colour.curve->mean(400, 500)};
+  if (colour.numbers.size() == 3) return {colour.numbers[0], colour.numbers[1], colour.numbers[2]};
+  double mean = 0.0;
+  for (const double value : colour.numbers) mean += value / static_cast<double>(colour.numbers.size());
+  return Eigen::Vector3d::Constant(mean);
+}
+
+}  // namespace touchstone::sim
