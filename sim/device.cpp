@@ -282,9 +282,13 @@ void fields(YamlReader& in, CameraSpec& camera) {
   in.required("exposure_us", camera.exposure_us, Allowed::at_least(0.0));
   in.optional("bits", camera.bits, Allowed::within(1, 16));
   in.optional("bayer", camera.bayer);
-  in.optional("quantum_efficiency_red", camera.quantum_efficiency_red, part_of_one());
-  in.optional("quantum_efficiency_green", camera.quantum_efficiency_green, part_of_one());
-  in.optional("quantum_efficiency_blue", camera.quantum_efficiency_blue, part_of_one());
+  if (camera.bayer == BayerLayout::none) camera.quantum_efficiency_green = 1.0;
+  for (auto [key, efficiency] : {std::pair{"quantum_efficiency_red", &camera.quantum_efficiency_red},
+                                 std::pair{"quantum_efficiency_green", &camera.quantum_efficiency_green},
+                                 std::pair{"quantum_efficiency_blue", &camera.quantum_efficiency_blue}}) {
+    in.optional(key, *efficiency, part_of_one());
+    efficiency->where = in.where(key);
+  }
   in.optional("white_balance", camera.white_balance, Allowed::above(0.0));
   in.required("full_well_e", camera.full_well_e, Allowed::above(0.0));
   in.optional("gain_dB", camera.gain_dB, Allowed::within(0.0, 48.0));

@@ -162,8 +162,10 @@ struct CameraSpec {
   double exposure_us = 1000.0;
   int bits = 8;  ///< 1 to 16
   BayerLayout bayer = BayerLayout::none;
-  Colour quantum_efficiency_red = {1, 0, 0};    ///< of the red pixels
-  Colour quantum_efficiency_green = {0, 1, 0};  ///< likewise, green pixels; a grey camera has these only
+  // Of the red, green and blue pixels; a grey camera has the green one only, by itself 1 in all bands. A colour camera's
+  // own three are for the bands red, green and blue.
+  Colour quantum_efficiency_red = {1, 0, 0};
+  Colour quantum_efficiency_green = {0, 1, 0};
   Colour quantum_efficiency_blue = {0, 0, 1};
   std::optional<Eigen::Vector3d> white_balance;  ///< fixed gains of red, green, blue; absent: the lamps' light is grey
   double full_well_e = 0.0;
