@@ -33,8 +33,7 @@ bool same_fixture(const Scene& a, const Scene& b) {
                     [](const FlatFace& f, const FlatFace& g) {
                       return f.z == g.z && f.medium_below == g.medium_below && f.medium_above == g.medium_above;
                     }) &&
-         std::equal(a.lamps.begin(), a.lamps.end(), b.lamps.begin(), b.lamps.end(),
-                    same_lamp) &&
+         std::equal(a.lamps.begin(), a.lamps.end(), b.lamps.begin(), b.lamps.end(), same_lamp) &&
          same(a.environment, b.environment);
 }
 

@@ -1,10 +1,11 @@
 #pragma once
 // The light that a GuideLamp sends to a point of the scene, by way of mirror images in its plate.
 //
-// Unfold the plate: light that is mirrored at its faces goes straight on through a pile of plates, so that the exit face
-// becomes an endless upright strip in which a place of the plate sees whatever rises steeply enough. Looking back along
-// a direction with the rise V over the way to the exit face, one counts the faces that it crosses; each costs Fresnel's
-// reflectance at that angle, and an odd number turns the lobe upside down. So the vector irradiance at a receiver is
+// Unfold the plate: light that is mirrored at its faces goes straight on through a pile of plates, so that the exit
+// face becomes an endless upright strip in which a place of the plate sees whatever rises steeply enough. Looking back
+// along a direction with the rise V over the way to the exit face, one counts the faces that it crosses; each costs
+// Fresnel's reflectance at that angle, and an odd number turns the lobe upside down. So the vector irradiance at a
+// receiver is
 //   F = - int L(w') T_up(w) R_low(w)^i R_high(w)^j w dw  over the directions w whose line back meets the strip's width,
 // L the exit face's radiance, w' = w or its mirror image, T what the faces on the way from plate to receiver pass.
 // A direction of the lobe stands for a point of the lamp: it is drawn with the lobe's own density, which leaves an
@@ -41,8 +42,7 @@ bool connect_to_guide(const PreparedScene<N>& scene, const PreparedLamp<N>& lamp
   const Eigen::Vector2d disc = square_to_disc(u, v);
   const double inside = disc.squaredNorm();
   const double lobe_cosine = std::pow(std::max(0.0, 1.0 - inside), 1.0 / (lamp.exponent + 1.0));
-  const double spread =
-      inside > 0.0 ? std::sqrt(std::max(0.0, 1.0 - lobe_cosine * lobe_cosine) / inside) : 0.0;
+  const double spread = inside > 0.0 ? std::sqrt(std::max(0.0, 1.0 - lobe_cosine * lobe_cosine) / inside) : 0.0;
   Eigen::Vector3d way = lamp.frame.to_world({spread * disc.x(), spread * disc.y(), lobe_cosine});
   const double forward = way.dot(lamp.exit_normal);
   if (!(forward > 1e-9) || std::abs(way.z()) < 1e-9) return false;
@@ -52,7 +52,9 @@ bool connect_to_guide(const PreparedScene<N>& scene, const PreparedLamp<N>& lamp
     way.z() = std::copysign(way.z(), receiver.layer > plate ? 1.0 : -1.0);
   }
   const auto mirrored = [](const Eigen::Vector3d& w) { return Eigen::Vector3d(w.x(), w.y(), -w.z()); };
-  const auto lobe = [&](const Eigen::Vector3d& w) { return std::pow(std::max(0.0, w.dot(lamp.frame.z)), lamp.exponent); };
+  const auto lobe = [&](const Eigen::Vector3d& w) {
+    return std::pow(std::max(0.0, w.dot(lamp.frame.z)), lamp.exponent);
+  };
   // Relative to (m + 1) / (2 pi).
   const double density = (lobe(way) + lobe(mirrored(way))) * (receiver.layer == plate ? 0.5 : 1.0);
 
@@ -85,8 +87,7 @@ bool connect_to_guide(const PreparedScene<N>& scene, const PreparedLamp<N>& lamp
     cosine = std::sqrt(1.0 - sine * sine);
     const double sine_before = sine_in(scene.media[before].index);
     if (!(sine_before < 1.0)) return false;
-    const FresnelFace face =
-        fresnel(scene.media[before].index, index, std::sqrt(1.0 - sine_before * sine_before));
+    const FresnelFace face = fresnel(scene.media[before].index, index, std::sqrt(1.0 - sine_before * sine_before));
     through_s *= 1.0 - face.reflectance_s;
     through_p *= 1.0 - face.reflectance_p;
     const double step = std::abs(corner.z() - z) * sine / cosine;

@@ -172,8 +172,7 @@ void check(const AreaLamp& lamp, const std::vector<FlatFace>& faces, const std::
   check_lobe(lamp.half_power_angle, lamp.visible, what);
   const Eigen::Vector3d normal = lamp.direction.normalized();
   const Eigen::Vector3d along = (lamp.along - lamp.along.dot(normal) * normal).normalized();
-  const double rise =
-      0.5 * (lamp.width * std::abs(along.z()) + lamp.height * std::abs(normal.cross(along).z()));
+  const double rise = 0.5 * (lamp.width * std::abs(along.z()) + lamp.height * std::abs(normal.cross(along).z()));
   check_in_one_layer(lamp.centre.z(), rise, faces, what);
 }
 

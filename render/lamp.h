@@ -11,7 +11,8 @@
 // How lamp light gets to a place:
 //  - through the flat faces between the two straight on, exactly, by one connection to a point of the lamp
 //    (lamp_connection.h);
-//  - by mirror images of a lamp in flat faces, and through curved faces: only where a path hits the lamp itself, so only
+//  - by mirror images of a lamp in flat faces, and through curved faces: only where a path hits the lamp itself, so
+//  only
 //    that of lamps with `visible` set and some size (lamp_bodies.h). A GuideLamp has its mirror images in its plate
 //    built in. For other lamps light mirrored by a face on its way is left out.
 
@@ -45,9 +46,9 @@ inline constexpr double kLambertianHalfPower = 1.0471975511965976;  // pi / 3
 /// into the half space before it, m from `half_power_angle` (lobe_exponent), the angle where the intensity is half of
 /// that on the axis. Data sheets give the full angle: a "30 degree" LED has a half-power angle of 15.
 ///
-/// `visible`: it is a black disc with a luminous front: seen by the camera and by bounced light, and in the way of light.
-/// Needs a radius above 0 and a half-power angle of at most pi/3 (beyond it the radiance grows without end towards the
-/// edge).
+/// `visible`: it is a black disc with a luminous front: seen by the camera and by bounced light, and in the way of
+/// light. Needs a radius above 0 and a half-power angle of at most pi/3 (beyond it the radiance grows without end
+/// towards the edge).
 struct LedLamp {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
   Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();
@@ -90,10 +91,10 @@ struct ProjectedLamp {
 /// angle a in air shows asin(sin(a) / n) in a plate of index n.
 ///
 /// Light that meets the plate's faces is mirrored there by Fresnel's equations as often as its way has it (fully, where
-/// the angle is beyond the critical one), which is taken from mirror images of the exit face (guide_connection.h). Where
-/// the medium next to the plate has a lower index, rays flatter than the critical angle stay in the plate: a gel of
-/// index 1.41 on acrylic of 1.49 gets no light that rises by less than 19 degrees. The layer's faces are endless, there
-/// is no far end that sends light back.
+/// the angle is beyond the critical one), which is taken from mirror images of the exit face (guide_connection.h).
+/// Where the medium next to the plate has a lower index, rays flatter than the critical angle stay in the plate: a gel
+/// of index 1.41 on acrylic of 1.49 gets no light that rises by less than 19 degrees. The layer's faces are endless,
+/// there is no far end that sends light back.
 struct GuideLamp {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   Eigen::Vector3d direction = Eigen::Vector3d::UnitX();

@@ -1,7 +1,8 @@
 #pragma once
 // Rows and rings of LEDs, each a little unlike the next.
 //
-//   for (const LedLamp& led : led_strip(like, {-6, -8, -7}, {6, -8, -7}, 8, {.seed = 3, .power = 0.1})) scene.lamps.push_back(led);
+//   for (const LedLamp& led : led_strip(like, {-6, -8, -7}, {6, -8, -7}, 8, {.seed = 3, .power = 0.1}))
+//   scene.lamps.push_back(led);
 
 #include <cstdint>
 #include <vector>

@@ -49,8 +49,8 @@ template <int N>
   return passed;
 }
 
-/// Light from the point `source` of lamp `lamp` (not a guide's) to the receiver. False where none arrives: out of the lamp's lobe,
-/// from behind the receiver's surface or the lens, in shadow. `connections` counts shadow tests.
+/// Light from the point `source` of lamp `lamp` (not a guide's) to the receiver. False where none arrives: out of the
+/// lamp's lobe, from behind the receiver's surface or the lens, in shadow. `connections` counts shadow tests.
 ///
 /// Layers are those between the two heights. A receiver whose medium isn't that of its layer stands beyond a Refractive
 /// surface (an object just off the gel): that surface is taken as flat and horizontal at the height where a vertical

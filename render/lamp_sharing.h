@@ -48,7 +48,8 @@ double angle_per_lamp_area(const PreparedScene<N>& scene, const PreparedLamp<N>&
   return path->jacobian * ratio * ratio * std::abs(from_lamp.dot(lamp.frame.z));
 }
 
-/// Would a connection from this point of the lamp to the receiver take a Refractive surface over or under the receiver as flat?
+/// Would a connection from this point of the lamp to the receiver take a Refractive surface over or under the receiver
+/// as flat?
 template <int N>
 bool bends_at_surface(const PreparedScene<N>& scene, const PreparedLamp<N>& lamp, const Eigen::Vector3d& point,
                       const Receiver& receiver) {

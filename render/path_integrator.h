@@ -441,7 +441,8 @@ class PathIntegrator {
     const Eigen::Vector3d point = leg.origin + seen.distance * leg.direction;
     double weight = 1.0;
     if (departure.sharing != Departure::Sharing::kAllToPath) {
-      if (departure.sharing == Departure::Sharing::kAllToConnection || bends_at_surface(scene_, lamp, point, departure.from)) {
+      if (departure.sharing == Departure::Sharing::kAllToConnection ||
+          bends_at_surface(scene_, lamp, point, departure.from)) {
         return;
       }
       const double of_connection = chance_of_lamp(departure.from, departure.is_matt, seen.lamp) /
@@ -474,7 +475,8 @@ class PathIntegrator {
       const double share = weight / parts;
       for (int part = 0; part < parts; ++part) {
         std::array<double, 2> place = chosen.lens;
-        if (parts > 1) place = {(part % kGuidePreview + 0.5) / kGuidePreview, (part / kGuidePreview + 0.5) / kGuidePreview};
+        if (parts > 1)
+          place = {(part % kGuidePreview + 0.5) / kGuidePreview, (part / kGuidePreview + 0.5) / kGuidePreview};
         Arrival<N> arrival;
         if (!connect(scene_, lamp, place, receiver, counts.connections, arrival)) continue;
         if (lamp.visible && interreflection_ && leg.depth < max_depth_) {
@@ -602,8 +604,7 @@ class PathIntegrator {
       RayHit hit;
       const bool meets = scene_.rays.intersect(leg.origin, leg.direction, most, hit);
       if (lamps_are_seen_) [[unlikely]] {
-        const LampBodies::Hit seen =
-            scene_.lamp_bodies.nearest(leg.origin, leg.direction, meets ? hit.distance : most);
+        const LampBodies::Hit seen = scene_.lamp_bodies.nearest(leg.origin, leg.direction, meets ? hit.distance : most);
         if (seen.lamp >= 0) {
           pass(leg, flight, seen.distance);
           add_lamp_seen(leg, seen, departure, sum);
@@ -625,7 +626,7 @@ class PathIntegrator {
           if (!meet_rough_boundary(leg, hit, material, at_first_hit, branches, numbers, counts, sum)) return;
           // Where nothing was scattered the surface still was in the way of connections.
           departure.sharing = leg.depth == before.depth || !lamps_are_seen_ ? Departure::Sharing::kAllToPath
-                                                                           : Departure::Sharing::kAllToConnection;
+                                                                            : Departure::Sharing::kAllToConnection;
         } else if (material.kind == SurfaceKind::kFilm) {
           meet_film(leg, hit, material, branches, numbers);
           if (!(leg.throughput.maxCoeff() > 0.0)) return;

@@ -47,10 +47,10 @@ struct PreparedLamp {
   double area = 0.0;                           ///< mm^2
   bool visible = false;
 
-  SpotLamp spot;                                   ///< kSpot: its lobe
-  double cos_full = 1.0;                           ///< kSpot: within this cosine the lobe is at its top
-  double exponent = 1.0;                           ///< kLobe and kGuide
-  std::shared_ptr<const PreparedPattern> pattern;  ///< kProjector
+  SpotLamp spot;                                           ///< kSpot: its lobe
+  double cos_full = 1.0;                                   ///< kSpot: within this cosine the lobe is at its top
+  double exponent = 1.0;                                   ///< kLobe and kGuide
+  std::shared_ptr<const PreparedPattern> pattern;          ///< kProjector
   Eigen::Vector3d exit_normal = Eigen::Vector3d::UnitX();  ///< kGuide: of its exit face
 
   explicit PreparedLamp(const Eigen::Vector3d& axis) : frame(axis) {}
@@ -167,7 +167,8 @@ Bands<N> lamp_radiance(const PreparedLamp<N>& lamp, const Eigen::Vector3d& from_
   constexpr double kSquareMillimetresPerSquareMetre = 1e6;
   const double cosine = from_lamp.dot(lamp.frame.z);
   if (!(cosine > 0.0)) return Bands<N>::Zero();
-  return lamp.intensity_on_axis * (std::pow(cosine, lamp.exponent - 1.0) / lamp.area * kSquareMillimetresPerSquareMetre);
+  return lamp.intensity_on_axis *
+         (std::pow(cosine, lamp.exponent - 1.0) / lamp.area * kSquareMillimetresPerSquareMetre);
 }
 
 }  // namespace touchstone::render

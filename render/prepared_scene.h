@@ -106,8 +106,8 @@ struct PreparedScene {
       lamps.push_back(prepare_lamp<N>(lamp, scene.faces));
       const PreparedLamp<N>& one = lamps.back();
       if (!one.visible) continue;
-      lamp_bodies.add({one.frame, one.position, one.radius, one.half_width, one.half_height,
-                       static_cast<int>(lamps.size()) - 1});
+      lamp_bodies.add(
+          {one.frame, one.position, one.radius, one.half_width, one.half_height, static_cast<int>(lamps.size()) - 1});
     }
   }
 
