@@ -1,6 +1,7 @@
 #include "sim/device.h"
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 
 #include "fem/gel_body.h"
@@ -37,21 +38,6 @@ void check_beads_fit(const DeviceSpec& device, const SourceLocation& where) {
   }
 }
 
-/// A lamp's spectrum, if it has one.
-void read_emission(YamlReader& in, LampSpec& lamp) {
-  if (!in.has("spectrum")) return;
-  std::string file;
-  in.required("spectrum", file);
-  try {
-    lamp.spectrum = render::read_spectral_curve(in.folder() / file, render::CurveKind::relative);
-  } catch (const Error& error) {
-    fail_at(in.where("spectrum"), "spectrum: {}", error.what());
-  }
-  if (lamp.power_W.numbers.size() != 1) {
-    fail_at(in.where("power_W"), "power_W: beside a spectrum it must be one number, all that the lamp radiates");
-  }
-}
-
 /// The gel can be meshed as it is asked for.
 void check_gel(DeviceSpec& device, const SourceLocation& where) {
   try {
@@ -69,6 +55,21 @@ void check_camera_outside(const DeviceSpec& device, const SourceLocation& where)
   if (device.camera->hole_position_mm.z() >= plate_face) {
     fail_at(where, "camera.{}: z = {} is not in front of the plate, whose lower face is at z = {}", key,
             device.camera->hole_position_mm.z(), plate_face);
+  }
+}
+
+/// No lamp is in the gel; those with a lens are before the plate, the others may be in it.
+void check_lamps_outside(const DeviceSpec& device, const SourceLocation& where) {
+  const double gel_face = -device.gel.thickness_mm;
+  const double plate_face = gel_face - device.plate.thickness_mm;
+  for (const LampSpec& lamp : device.lamps) {
+    const bool has_lens = lamp.type == LampType::spot || lamp.type == LampType::projector;
+    const double z = std::max(lamp.position_mm.z(), lamp.type == LampType::led_strip ? lamp.to_mm.z() : -INFINITY);
+    if (has_lens && z >= plate_face) {
+      fail_at(where, "lamps: a lamp at z = {} is not in front of the plate, whose lower face is at z = {}", z,
+              plate_face);
+    }
+    if (z >= gel_face) fail_at(where, "lamps: a lamp at z = {} is in the gel, which begins at z = {}", z, gel_face);
   }
 }
 
@@ -249,19 +250,6 @@ void fields(YamlReader& in, BandsSpec& bands) {
   }
 }
 
-void fields(YamlReader& in, LampSpec& lamp) {
-  in.required("position_mm", lamp.position_mm);
-  in.required("target_mm", lamp.target_mm);
-  in.required("lens_radius_mm", lamp.lens_radius_mm, Allowed::above(0.0));
-  in.required("half_angle_deg", lamp.half_angle_deg, Allowed::above_up_to(0.0, 80.0));
-  in.optional("soft_angle_deg", lamp.soft_angle_deg, Allowed::within(0.0, 80.0 - lamp.half_angle_deg));
-  in.required("power_W", lamp.power_W, Allowed::at_least(0.0));
-  read_emission(in, lamp);
-  if ((lamp.target_mm - lamp.position_mm).norm() < 1e-9) {
-    fail_at(in.where("target_mm"), "target_mm: is the lamp's own position; the lamp has no direction");
-  }
-}
-
 void fields(YamlReader& in, CameraSpec& camera) {
   in.optional("type", camera.type);
   in.required("width", camera.width, Allowed::within(1, 8192));
@@ -335,13 +323,7 @@ void fields(YamlReader& in, DeviceSpec& device) {
   check_gel(device, in.where("gel"));
   if (device.beads) check_beads_fit(device, in.where("beads"));
   if (device.camera) check_camera_outside(device, in.where("camera"));
-  const double plate_face = -device.gel.thickness_mm - device.plate.thickness_mm;
-  for (const LampSpec& lamp : device.lamps) {
-    if (lamp.position_mm.z() >= plate_face) {
-      fail_at(in.where("lamps"), "lamps: a lamp at z = {} is not in front of the plate, whose lower face is at z = {}",
-              lamp.position_mm.z(), plate_face);
-    }
-  }
+  check_lamps_outside(device, in.where("lamps"));
 }
 
 DeviceSpec read_device(const std::filesystem::path& file) {

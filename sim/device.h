@@ -11,6 +11,7 @@
 #include "core/yaml_reader.h"
 #include "fem/relaxation.h"
 #include "sim/colour.h"
+#include "sim/device_lamps.h"
 
 namespace touchstone::sim {
 
@@ -121,17 +122,6 @@ struct FilmSpec {
   Colour transmittance = 1.0;  ///< of one passage at normal incidence
 };
 
-/// A lamp with a projecting lens: uniform within `half_angle_deg`, smooth to dark over `soft_angle_deg` more.
-struct LampSpec {
-  Eigen::Vector3d position_mm = Eigen::Vector3d::Zero();
-  Eigen::Vector3d target_mm = Eigen::Vector3d::Zero();
-  double lens_radius_mm = 1.0;
-  double half_angle_deg = 20.0;
-  double soft_angle_deg = 3.0;
-  Colour power_W = 0.0;                           ///< in each band; with a spectrum one number, all that it radiates
-  std::optional<render::SpectralCurve> spectrum;  ///< relative, for a device that has `bands`
-};
-
 enum class BayerLayout { none, rggb, bggr, grbg, gbrg };
 EnumNames<BayerLayout> enum_names(BayerLayout);
 
@@ -162,8 +152,8 @@ struct CameraSpec {
   double exposure_us = 1000.0;
   int bits = 8;  ///< 1 to 16
   BayerLayout bayer = BayerLayout::none;
-  // Of the red, green and blue pixels; a grey camera has the green one only, by itself 1 in all bands. A colour camera's
-  // own three are for the bands red, green and blue.
+  // Of the red, green and blue pixels; a grey camera has the green one only, by itself 1 in all bands. A colour
+  // camera's own three are for the bands red, green and blue.
   Colour quantum_efficiency_red = {1, 0, 0};
   Colour quantum_efficiency_green = {0, 1, 0};
   Colour quantum_efficiency_blue = {0, 0, 1};
@@ -212,7 +202,6 @@ void fields(YamlReader& in, PrintSpec& print);
 void fields(YamlReader& in, CoatingSpec& coating);
 void fields(YamlReader& in, FilmSpec& films);
 void fields(YamlReader& in, BandsSpec& bands);
-void fields(YamlReader& in, LampSpec& lamp);
 void fields(YamlReader& in, CameraSpec& camera);
 void fields(YamlReader& in, DeviceSpec& device);
 

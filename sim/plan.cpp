@@ -252,7 +252,7 @@ void plan_interreflection(const SceneSpec& scene, Plan& plan, Table& table) {
 
 void plan_bands(const SceneSpec& scene, Plan& plan, Table& table) {
   plan.bands = choose_bands(scene);
-  check_colours(scene, plan.bands);
+  check_light(scene, plan.bands);
   const int count = plan.bands.count();
   const std::string why =
       plan.bands.ranges

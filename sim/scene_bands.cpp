@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "sim/visible_scene.h"
+
 namespace touchstone::sim {
 namespace {
 
@@ -150,7 +152,7 @@ double band_error(const SceneSpec& scene, const SceneBands& bands) {
   return worst;
 }
 
-void check_colours(const SceneSpec& scene, const SceneBands& bands) {
+void check_light(const SceneSpec& scene, const SceneBands& bands) {
   const DeviceSpec& device = scene.device;
   for (const NamedColour& named : reflecting(scene)) in_bands(named.colour, bands, named.name);
   for (const NamedColour& named : efficiencies(*device.camera)) in_bands(named.colour, bands, named.name);
@@ -158,22 +160,18 @@ void check_colours(const SceneSpec& scene, const SceneBands& bands) {
   in_bands(device.gel.scattering_per_mm, bands, "gel.scattering_per_mm");
   in_bands(device.room_radiance, bands, "room_radiance");
   if (device.films) in_bands(device.films->transmittance, bands, "films.transmittance");
-  for (const LampSpec& lamp : device.lamps) lamp_power(lamp, bands);
+  for (const LampSpec& lamp : device.lamps) {
+    for (const render::Lamp& one : lamps_of(lamp, bands, 1.0)) {
+      try {
+        render::check_lamp(one, bands.count(), flat_faces(device), "lamps");
+      } catch (const Error& error) {
+        fail_at(lamp.where, "{}", error.what());
+      }
+    }
+  }
   for (const MovedObject& moved : moved_objects(scene)) {
     if (moved.object.radiance) in_bands(*moved.object.radiance, bands, "radiance");
     if (moved.object.screen) in_bands(moved.object.screen->radiance, bands, "screen.radiance");
-  }
-}
-
-render::Spectrum lamp_power(const LampSpec& lamp, const SceneBands& bands) {
-  if (!lamp.spectrum) return in_bands(lamp.power_W, bands, "lamps.power_W");
-  if (!bands.ranges) {
-    fail_at(lamp.power_W.where, "lamps.spectrum: the device doesn't say its `bands`, which it could be shared out to");
-  }
-  try {
-    return render::band_powers(*lamp.spectrum, lamp.power_W.numbers[0], *bands.ranges);
-  } catch (const Error& error) {
-    fail_at(lamp.power_W.where, "lamps.spectrum: {}", error.what());
   }
 }
 

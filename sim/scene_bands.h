@@ -15,10 +15,8 @@ SceneBands choose_bands(const SceneSpec& scene);
 /// The largest relative error that the bands make of what a pixel reads; 0 where bands are just numbers.
 double band_error(const SceneSpec& scene, const SceneBands& bands);
 
-/// Every colour of the scene fits the bands. @throws Error with file and line of the first that doesn't
-void check_colours(const SceneSpec& scene, const SceneBands& bands);
-
-/// What a lamp radiates in each band, W.
-render::Spectrum lamp_power(const LampSpec& lamp, const SceneBands& bands);
+/// Every colour of the scene fits the bands, and every lamp can be made. @throws Error with file and line of the first
+/// that doesn't
+void check_light(const SceneSpec& scene, const SceneBands& bands);
 
 }  // namespace touchstone::sim

@@ -131,6 +131,11 @@ std::vector<PlacedShape> placed_shapes(const std::vector<VisibleObject>& objects
   return placed;
 }
 
+std::vector<render::FlatFace> flat_faces(const DeviceSpec& device) {
+  return {{-device.gel.thickness_mm - device.plate.thickness_mm, kAir, kPlate},
+          {-device.gel.thickness_mm, kPlate, kGel}};
+}
+
 render::Surface gel_surface(TriangleMesh mesh) {
   return {std::move(mesh), render::Refractive{kGel, kAir}};
 }
@@ -161,8 +166,7 @@ render::Scene scene_without_surface(const SceneSpec& scene, const Plan& plan, co
     out.media[kGel].scattering = in_bands(device.gel.scattering_per_mm, bands, "gel.scattering_per_mm");
     out.media[kGel].anisotropy = device.gel.scattering_anisotropy;
   }
-  out.faces = {{-device.gel.thickness_mm - device.plate.thickness_mm, kAir, kPlate},
-               {-device.gel.thickness_mm, kPlate, kGel}};
+  out.faces = flat_faces(device);
   out.surfaces.push_back(
       {pad_walls(device.gel), render::Lambertian{in_bands(device.gel.frame_albedo, bands, "gel.frame_albedo")}});
   const std::vector<MovedObject> all = moved_objects(scene);
@@ -183,9 +187,7 @@ render::Scene scene_without_surface(const SceneSpec& scene, const Plan& plan, co
     }
   }
   for (const LampSpec& lamp : device.lamps) {
-    out.lamps.push_back({lamp.position_mm, (lamp.target_mm - lamp.position_mm).normalized(), lamp.lens_radius_mm,
-                         lamp.half_angle_deg * kRadiansPerDegree, lamp.soft_angle_deg * kRadiansPerDegree,
-                         scene.lamp_level * lamp_power(lamp, bands)});
+    for (render::Lamp& one : lamps_of(lamp, bands, scene.lamp_level)) out.lamps.push_back(std::move(one));
   }
   out.environment = in_bands(device.room_radiance, bands, "room_radiance");
   out.interreflection = plan.interreflection;
@@ -303,7 +305,9 @@ render::Imager imager(const DeviceSpec& device, const SceneBands& bands, bool wi
     out.white_balance = *camera.white_balance;
   } else if (camera.bayer != BayerLayout::none) {
     render::Spectrum light = render::flat_spectrum(bands.count(), 0.0);
-    for (const LampSpec& lamp : device.lamps) light += lamp_power(lamp, bands);
+    for (const LampSpec& lamp : device.lamps) {
+      for (const render::Lamp& one : lamps_of(lamp, bands, 1.0)) light += render::lamp_power(one);
+    }
     if (light.sum() > 0.0) out.white_balance = render::grey_gains(out, light);
   }
   return out;

@@ -36,6 +36,9 @@ std::vector<RigidTransform> poses_of(const fem::PressState& press, const fem::Re
 /// What the gel feels of each object, where it stands.
 std::vector<PlacedShape> placed_shapes(const std::vector<VisibleObject>& objects, const fem::PressState& press);
 
+/// Where air, plate and gel meet.
+std::vector<render::FlatFace> flat_faces(const DeviceSpec& device);
+
 /// A clear gel's outer surface with what is on its two sides.
 render::Surface gel_surface(TriangleMesh mesh);
 
