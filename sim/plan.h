@@ -27,6 +27,10 @@ struct Plan {
   bool refraction = false;
   bool interreflection = false;
   bool sensor_noise = false;
+  bool motion_blur = false;
+  bool rolling_shutter = false;
+  bool events = false;
+  int states_a_frame = 1;       ///< pressed states that are kept from one frame to the next
   std::vector<Effect> effects;  ///< the same for people, with reasons
 };
 
