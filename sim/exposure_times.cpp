@@ -20,24 +20,6 @@ std::int64_t frame_time_us(int frame, double frame_rate_Hz) {
   return static_cast<std::int64_t>(std::llround(frame * kMicrosecondsPerSecond / frame_rate_Hz));
 }
 
-double exposure_window_s(const SceneSpec& scene, const Plan& plan) {
-  double window_us = 0.0;
-  if (plan.motion_blur) window_us += scene.device.camera->exposure_us;
-  if (plan.rolling_shutter) window_us += scene.device.camera->row_time_us * (scene.device.camera->height - 1);
-  return window_us / kMicrosecondsPerSecond;
-}
-
-void keep_within_exposures(std::vector<Truth>& truths, double now_s, double window_s, double frame_rate_Hz,
-                           const fem::PressState& state) {
-  if (window_s == 0.0) return;
-  std::shared_ptr<const fem::PressState> shared;
-  for (auto truth = truths.rbegin(); truth != truths.rend(); ++truth) {
-    if (!truth->later.empty() && truth->later.back().after_s >= window_s) break;  // as those before it
-    if (!shared) shared = std::make_shared<const fem::PressState>(state);
-    truth->later.push_back({now_s - truth->frame / frame_rate_Hz, shared});
-  }
-}
-
 fem::PressState state_after(const Truth& truth, double after_s) {
   TS_ASSERT(after_s >= 0.0);
   double before_s = 0.0;
@@ -52,22 +34,51 @@ fem::PressState state_after(const Truth& truth, double after_s) {
   return *before;
 }
 
-std::vector<double> exposure_times(const SceneSpec& scene, const Truth& truth, double window_s) {
-  const ImageScale scale(scene.device);
-  const double radius = largest_object_radius(scene);
+ExposureTimes::ExposureTimes(const SceneSpec& scene, const Plan& plan)
+    : frame_rate_Hz_(scene.motion.frame_rate_Hz), tolerance_px_(scene.light.motion_tolerance_px) {
+  double window_us = 0.0;
+  if (plan.motion_blur) window_us += scene.device.camera->exposure_us;
+  if (plan.rolling_shutter) window_us += scene.device.camera->row_time_us * (scene.device.camera->height - 1);
+  window_s_ = window_us / kMicrosecondsPerSecond;
+  if (window_s_ == 0.0) return;
+  between_states_s_ = 1.0 / (frame_rate_Hz_ * plan.states_a_frame);
+  scale_.emplace(scene.device);
+  object_radius_mm_ = largest_object_radius(scene);
+}
+
+void ExposureTimes::keep(std::vector<Truth>& truths, double now_s, const fem::PressState& state) const {
+  if (window_s_ == 0.0) return;
+  std::shared_ptr<const fem::PressState> shared;
+  for (auto truth = truths.rbegin(); truth != truths.rend(); ++truth) {
+    const double after_s = now_s - truth->frame / frame_rate_Hz_;
+    const bool whole = after_s - between_states_s_ >= (1.0 - 1e-9) * window_s_;  // with the state before this one
+    if (whole) break;                                                            // and so are those before it
+    if (!shared) shared = std::make_shared<const fem::PressState>(state);
+    truth->later.push_back({after_s, shared});
+    if (after_s >= window_s_ && pixels(*truth) <= tolerance_px_) truth->later.clear();
+  }
+}
+
+double ExposureTimes::pixels(const Truth& truth) const {
   double pixels = 0.0;
   const fem::PressState* before = &truth.press;
   double before_s = 0.0;
   for (const LaterState& later : truth.later) {
-    const double part = std::clamp((window_s - before_s) / (later.after_s - before_s), 0.0, 1.0);
-    pixels += part * image_motion(scale, *before, *later.press, radius);
+    const double part = std::clamp((window_s_ - before_s) / (later.after_s - before_s), 0.0, 1.0);
+    pixels += part * image_motion(*scale_, *before, *later.press, object_radius_mm_);
     before = later.press.get();
     before_s = later.after_s;
   }
-  if (pixels <= scene.light.motion_tolerance_px) return {0.0};
-  const int intervals = std::clamp(static_cast<int>(std::ceil(pixels / kPixelsApart)), 1, kMostIntervals);
+  return pixels;
+}
+
+std::vector<double> ExposureTimes::of(const Truth& truth) const {
+  if (window_s_ == 0.0) return {0.0};
+  const double moved = pixels(truth);
+  if (moved <= tolerance_px_) return {0.0};
+  const int intervals = std::clamp(static_cast<int>(std::ceil(moved / kPixelsApart)), 1, kMostIntervals);
   std::vector<double> times;
-  for (int i = 0; i <= intervals; ++i) times.push_back(window_s * i / intervals);
+  for (int i = 0; i <= intervals; ++i) times.push_back(window_s_ * i / intervals);
   return times;
 }
 

@@ -118,12 +118,12 @@ std::vector<Truth> play_motion(const SceneSpec& scene, const Plan& plan, const f
                                const Progress& progress, const fem::GelVibration* vibration,
                                const std::vector<std::shared_ptr<const fem::Compliance>>& elastic) {
   const MotionSpec& motion = scene.motion;
-  const double window_s = exposure_window_s(scene, plan);
+  const ExposureTimes exposure(scene, plan);
   std::vector<Truth> truths;
   truths.reserve(motion.frame_count());
   play_states(scene, plan, gel, vibration, elastic, [&](int frame, int part, const fem::PressState& state) {
     const double now_s = (frame - 1 + static_cast<double>(part) / plan.states_a_frame) / motion.frame_rate_Hz;
-    keep_within_exposures(truths, now_s, window_s, motion.frame_rate_Hz, state);
+    exposure.keep(truths, now_s, state);
     if (part < plan.states_a_frame) return;
     Truth truth;
     truth.frame = frame;

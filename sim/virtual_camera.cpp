@@ -3,13 +3,12 @@
 
 #include "core/random.h"
 #include "core/units.h"
-#include "render/path_tracer.h"
 #include "render/rolling_shutter.h"
 #include "sim/device_camera.h"
 #include "sim/exposure_times.h"
 #include "sim/pixel_truth.h"
+#include "sim/scene_sight.h"
 #include "sim/virtual_sensor.h"
-#include "sim/visible_scene.h"
 
 namespace touchstone::sim {
 namespace {
@@ -45,13 +44,10 @@ void widen(cv::Mat& mask, int radius) {
 
 }  // namespace
 
-struct VirtualCamera::Parts {
+struct VirtualCamera::Parts : SceneSight {
   Parts(const SceneSpec& scene_of, const Plan& plan_of, const fem::Compliance& gel_of)
-      : scene(scene_of),
-        plan(plan_of),
-        gel(gel_of),
-        membrane(plan.fine_relief || scene.outputs.height ? std::make_unique<Membrane>(scene, plan, gel_of) : nullptr),
-        objects(visible_objects(scene)),
+      : SceneSight(scene_of, plan_of, gel_of),
+        exposure(scene_of, plan_of),
         camera(camera_of(*scene.device.camera)),
         size(render::size_of(camera).x(), render::size_of(camera).y()),
         imager(sim::imager(scene.device, plan.sensor_noise)),
@@ -64,11 +60,7 @@ struct VirtualCamera::Parts {
     settings.noise = noise_target(response, scene.light.noise_fraction);
   }
 
-  SceneSpec scene;
-  Plan plan;
-  VisibleGel gel;
-  std::unique_ptr<const Membrane> membrane;  // if it's called for
-  std::vector<VisibleObject> objects;
+  ExposureTimes exposure;
   render::Camera camera;
   cv::Size size;
   render::Imager imager;
@@ -79,19 +71,6 @@ struct VirtualCamera::Parts {
   cv::Mat first_light;    // irradiance of the first frame
   cv::Mat first_error;    // its standard error
   cv::Mat first_preview;  // its preview without noise
-
-  std::optional<fem::ReliefAnswer> relief(const fem::PressState& press) const {
-    return membrane ? membrane->relief(press) : std::nullopt;
-  }
-
-  render::Tracer tracer(const fem::PressState& press, const std::optional<fem::ReliefAnswer>& relief) const {
-    if (relief && relief->grid.size() > 0) {
-      return render::Tracer(visible_scene(scene, plan, objects, *membrane, press, *relief));
-    }
-    return render::Tracer(visible_scene(scene, plan, objects, gel, press));
-  }
-
-  render::Tracer tracer(const fem::PressState& press) const { return tracer(press, relief(press)); }
 
   /// Which pixels changed against the first frame by more than the tolerance, widened by the blur of hole or lens.
   cv::Mat changed(const cv::Mat& preview) const {
@@ -152,11 +131,8 @@ struct VirtualCamera::Parts {
   Capture take(const Truth& truth, bool whole) const {
     const auto now = relief(truth.press);
     if (!scene.outputs.light()) return geometry(truth, now);
-    const double window_s = exposure_window_s(scene, plan);
-    if (window_s > 0.0) {
-      const std::vector<double> times = exposure_times(scene, truth, window_s);
-      if (times.size() > 1) return take_over_time(truth, now, times, whole);
-    }
+    const std::vector<double> times = exposure.of(truth);
+    if (times.size() > 1) return take_over_time(truth, now, times, whole);
     const render::Tracer at_once = tracer(truth.press, now);
     const cv::Mat mask = whole ? all_pixels() : changed(at_once.preview(camera, kPreviewStride));
     const int pixels = cv::countNonZero(mask);
@@ -182,18 +158,17 @@ struct VirtualCamera::Parts {
     render::RenderSettings of_moment = settings;
     const double intervals_of_row = timing.exposure_s / times.back() * static_cast<double>(times.size() - 1);
     of_moment.noise = noise_target(response, scene.light.noise_fraction * std::sqrt(std::max(1.0, intervals_of_row)));
-    render::RollingExposure exposure(times, timing, size, first_light.channels());
+    render::RollingExposure sum(times, timing, size, first_light.channels());
     render::RayCounts counts;
     for (std::size_t i = 0; i < times.size(); ++i) {
       RandomStream seeds(scene.seed, i, Purpose::kMotion);
       of_moment.seed = (std::uint64_t{seeds()} << 32) | seeds();
       const render::RenderedImage image = tracer(state_after(truth, times[i])).render(camera, of_moment, mask);
-      exposure.add(i, image.irradiance, image.standard_error);
+      sum.add(i, image.irradiance, image.standard_error);
       counts += image.counts;
     }
-    return develop(with_first(exposure.irradiance(), first_light, mask),
-                   with_first(exposure.standard_error(), first_error, mask), truth, now, counts,
-                   static_cast<std::int64_t>(times.size()) * pixels);
+    return develop(with_first(sum.irradiance(), first_light, mask), with_first(sum.standard_error(), first_error, mask),
+                   truth, now, counts, static_cast<std::int64_t>(times.size()) * pixels);
   }
 
   cv::Mat all_pixels() const { return {size, CV_8U, cv::Scalar(255)}; }
