@@ -35,6 +35,7 @@ class EventWatch {
 
   void begin(Moment& moment) {
     moment.picture = light_.first(moment.press);
+    count(moment.picture);
     show(moment, moment);
   }
 
