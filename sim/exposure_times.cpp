@@ -11,7 +11,7 @@
 namespace touchstone::sim {
 namespace {
 
-constexpr double kPixelsApart = 0.5;  // light is taken as linear in time between moments that far apart
+constexpr double kPixelsApart = 0.25;  // light is taken as linear in time between moments so far apart
 constexpr int kMostIntervals = 64;
 
 }  // namespace

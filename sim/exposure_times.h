@@ -31,8 +31,8 @@ class ExposureTimes {
   void keep(std::vector<Truth>& truths, double now_s, const fem::PressState& state) const;
 
   /// The moments, s after a frame's begin, at which its light is computed: evenly over the window, so densely that
-  /// nothing moves more than half a pixel from one to the next, at least two and at most 65. A single one, the begin,
-  /// where nothing moves by more than the scene's `light.motion_tolerance_px`.
+  /// nothing moves more than a quarter of a pixel from one to the next, at least two and at most 65. A single one, the
+  /// begin, where nothing moves by more than the scene's `light.motion_tolerance_px`.
   std::vector<double> of(const Truth& truth) const;
 
  private:

@@ -9,9 +9,9 @@
 namespace touchstone::sim {
 namespace {
 
-// Between kept states all runs straight. A press bends little over such a way, and a vibration is a polygon with 4 %
-// less than its height.
-constexpr double kWayBetweenStates_mm = 0.05;
+// Between kept states all runs straight. A point of the gel that the object meets in between is then off by at most a
+// quarter of the way, and a vibration is a polygon that lacks 4 % of its height.
+constexpr double kWayBetweenStates_mm = 0.02;
 constexpr double kStatesAPeriod = 12.0;
 constexpr int kStatesUnderForce = 4;  // the way isn't known beforehand
 constexpr int kMostStates = 64;
@@ -58,7 +58,7 @@ void plan_time(const SceneSpec& scene, Plan& plan, PlanTable& table) {
   const double blur = speed.pixels_per_s * camera.exposure_us / kMicrosecondsPerSecond;
   const double skew = speed.pixels_per_s * camera.row_time_us * (camera.height - 1) / kMicrosecondsPerSecond;
   const char* about = speed.led_by_force ? "some " : "";
-  const char* cost = "a picture of what moves for every half pixel";
+  const char* cost = "a picture of what moves for every quarter of a pixel";
 
   plan.motion_blur = table.add(
       "motion blur", light ? scene.effects.motion_blur : Switch::automatic, light && blur > tolerance,
