@@ -18,11 +18,18 @@ double focal_pixels(const render::Camera& camera) {
   return 1e3 * pinhole.distance_mm / pinhole.pixel_pitch_um;
 }
 
-double object_radius(const ObjectSpec& object) {
-  double radius = 0.0;
-  for (const Eigen::Vector3d& vertex : visible_mesh(object.shape).vertices) radius = std::max(radius, vertex.norm());
-  return radius;
-}
+/// Of an object, from its origin and from its z axis to the farthest point.
+struct Reach {
+  double from_origin = 0.0;
+  double from_axis = 0.0;
+
+  explicit Reach(const ObjectSpec& object) {
+    for (const Eigen::Vector3d& vertex : visible_mesh(object.shape).vertices) {
+      from_origin = std::max(from_origin, vertex.norm());
+      from_axis = std::max(from_axis, vertex.head<2>().norm());
+    }
+  }
+};
 
 /// What is known of one axis while its keys are gone through.
 struct AxisWay {
@@ -87,7 +94,7 @@ double image_motion(const ImageScale& scale, const fem::PressState& from, const 
 
 double largest_object_radius(const SceneSpec& scene) {
   double radius = 0.0;
-  for (const MovedObject& moved : moved_objects(scene)) radius = std::max(radius, object_radius(moved.object));
+  for (const MovedObject& moved : moved_objects(scene)) radius = std::max(radius, Reach(moved.object).from_origin);
   return radius;
 }
 
@@ -97,8 +104,8 @@ MotionSpeed motion_speed(const SceneSpec& scene) {
   const GelSpec& gel = scene.device.gel;
   MotionSpeed speed;
   for (const MovedObject& moved : moved_objects(scene)) {
-    const double radius = object_radius(moved.object);
-    const double stiffness = gel.youngs_modulus_MPa * radius / (1.0 - gel.poisson_ratio * gel.poisson_ratio);
+    const Reach reach(moved.object);
+    const double stiffness = gel.youngs_modulus_MPa * reach.from_axis / (1.0 - gel.poisson_ratio * gel.poisson_ratio);
     AxisWay ways[3];
     for (int a = 0; a < 3; ++a) ways[a].position_mm = moved.motion.start_mm[a];
     Eigen::Vector3d angles_deg = moved.motion.start_angles_deg;
@@ -117,7 +124,7 @@ MotionSpeed motion_speed(const SceneSpec& scene) {
       }
       double turning = 0.0;  // mm/s of the farthest point
       if (key.angles_deg) {
-        turning = (*key.angles_deg - angles_deg).cwiseAbs().sum() * kRadiansPerDegree / seconds * radius;
+        turning = (*key.angles_deg - angles_deg).cwiseAbs().sum() * kRadiansPerDegree / seconds * reach.from_origin;
         angles_deg = *key.angles_deg;
       }
       speed.mm_per_s = std::max(speed.mm_per_s, velocity.norm() + turning);

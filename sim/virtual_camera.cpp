@@ -146,9 +146,15 @@ struct VirtualCamera::Parts : SceneSight {
   /// samples of their own, so that their noise is averaged, too.
   Capture take_over_time(const Truth& truth, const std::optional<fem::ReliefAnswer>& now,
                          const std::vector<double>& times, bool whole) const {
-    cv::Mat mask = whole ? all_pixels() : cv::Mat(size, CV_8U, cv::Scalar(0));
+    std::vector<fem::PressState> states;
+    std::vector<std::optional<fem::ReliefAnswer>> reliefs;  // which cost more than a tracer
     for (const double time : times) {
-      if (!whole) mask |= changed(tracer(state_after(truth, time)).preview(camera, kPreviewStride));
+      states.push_back(state_after(truth, time));
+      reliefs.push_back(relief(states.back()));
+    }
+    cv::Mat mask = whole ? all_pixels() : cv::Mat(size, CV_8U, cv::Scalar(0));
+    for (std::size_t i = 0; i < times.size() && !whole; ++i) {
+      mask |= changed(tracer(states[i], reliefs[i]).preview(camera, kPreviewStride));
     }
     const int pixels = cv::countNonZero(mask);
     if (pixels == 0) return develop(first_light, first_error, truth, now, {}, 0);
@@ -163,7 +169,7 @@ struct VirtualCamera::Parts : SceneSight {
     for (std::size_t i = 0; i < times.size(); ++i) {
       RandomStream seeds(scene.seed, i, Purpose::kMotion);
       of_moment.seed = (std::uint64_t{seeds()} << 32) | seeds();
-      const render::RenderedImage image = tracer(state_after(truth, times[i])).render(camera, of_moment, mask);
+      const render::RenderedImage image = tracer(states[i], reliefs[i]).render(camera, of_moment, mask);
       sum.add(i, image.irradiance, image.standard_error);
       counts += image.counts;
     }
