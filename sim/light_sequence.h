@@ -31,8 +31,8 @@ struct SequencePicture {
 /// `light.max_samples`, made of the same random numbers: what doesn't move keeps its value to the bit, what moves
 /// changes by what the same paths see. (A count that follows the noise would differ from picture to picture, and with
 /// it the noise.) So a picture doesn't depend on those before it, but for pixels that are left alone: those whose
-/// light, by a preview without noise and by the contrast around them times the motion, changed by under a twentieth of
-/// the smallest threshold since they were traced.
+/// light can be expected to have changed by under a twentieth of the smallest threshold since they were traced, by a
+/// preview without noise and by the contrast around them times the motion.
 class LightSequence {
  public:
   /// @param smallest_threshold of the event pixels
