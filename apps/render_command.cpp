@@ -113,7 +113,9 @@ void render(const RenderOptions& options, const GlobalOptions& global) {
     }
     if (events) {
       const sim::EventStreamReport report = write_events(options, scene, plan, *gel, wanted.t_us, global, progress);
-      summary = fmt::format("{} events from {} pictures", report.events, report.pictures);
+      summary =
+          fmt::format("{} events from {} pictures; {} times a pixel passed more than a threshold from one to the next",
+                      report.events, report.pictures, report.coarse_steps);
     }
     warning = gel->report.note;
   }

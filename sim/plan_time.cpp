@@ -25,6 +25,11 @@ int states_a_frame(const SceneSpec& scene, const MotionSpeed& speed) {
   return std::clamp(static_cast<int>(std::ceil(std::min<double>(states, kMostStates))), least, kMostStates);
 }
 
+/// Where the outputs are asked for: in the scene, if not on the command line.
+const SourceLocation& where_outputs(const SceneSpec& scene) {
+  return scene.outputs.where.file.empty() ? scene.where : scene.outputs.where;
+}
+
 void refuse_impossible(const SceneSpec& scene) {
   const CameraSpec& camera = *scene.device.camera;
   const double frame_us = kMicrosecondsPerSecond / scene.motion.frame_rate_Hz;
@@ -35,7 +40,7 @@ void refuse_impossible(const SceneSpec& scene) {
         scene.device.name, camera.exposure_us, frame_us, scene.motion.frame_rate_Hz);
   }
   if (scene.outputs.events && !camera.events) {
-    fail_at(scene.outputs.where,
+    fail_at(where_outputs(scene),
             "outputs.events: the camera of the device '{}' ({}) has no event pixels: no block camera.events",
             scene.device.name, scene.device.where.file);
   }
@@ -80,7 +85,7 @@ void plan_time(const SceneSpec& scene, Plan& plan, PlanTable& table) {
                           "a picture of what changes for every half threshold that a pixel passes");
   if (plan.motion_blur || plan.rolling_shutter || plan.events) plan.states_a_frame = states_a_frame(scene, speed);
   if (plan.events && scene.motion.frame_rate_Hz * plan.states_a_frame > kMicrosecondsPerSecond) {
-    fail_at(scene.outputs.where,
+    fail_at(where_outputs(scene),
             "outputs.events: the motion has {} frames a second of {} states; events count whole us",
             scene.motion.frame_rate_Hz, plan.states_a_frame);
   }
