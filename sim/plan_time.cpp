@@ -83,7 +83,9 @@ void plan_time(const SceneSpec& scene, Plan& plan, PlanTable& table) {
   plan.events = table.add("event pixels", scene.outputs.events,
                           scene.outputs.events ? "a stream of events is asked for" : "no events are asked for",
                           "a picture of what changes for every half threshold that a pixel passes");
-  if (plan.motion_blur || plan.rolling_shutter || plan.events) plan.states_a_frame = states_a_frame(scene, speed);
+  // At finite strain a state costs more than all its light, and exposures do with straight ways from frame to frame.
+  const bool exposed = (plan.motion_blur || plan.rolling_shutter) && !plan.finite_strain;
+  if (exposed || plan.events) plan.states_a_frame = states_a_frame(scene, speed);
   if (plan.events && scene.motion.frame_rate_Hz * plan.states_a_frame > kMicrosecondsPerSecond) {
     fail_at(where_outputs(scene),
             "outputs.events: the motion has {} frames a second of {} states; events count whole us",
