@@ -48,14 +48,15 @@ ExposureTimes::ExposureTimes(const SceneSpec& scene, const Plan& plan)
 
 void ExposureTimes::keep(std::vector<Truth>& truths, double now_s, const fem::PressState& state) const {
   if (window_s_ == 0.0) return;
+  const double enough_s = (1.0 - 1e-9) * window_s_;  // times are sums of rounded numbers
   std::shared_ptr<const fem::PressState> shared;
   for (auto truth = truths.rbegin(); truth != truths.rend(); ++truth) {
     const double after_s = now_s - truth->frame / frame_rate_Hz_;
-    const bool whole = after_s - between_states_s_ >= (1.0 - 1e-9) * window_s_;  // with the state before this one
-    if (whole) break;                                                            // and so are those before it
+    const bool whole = after_s - between_states_s_ >= enough_s;  // with the state before this one
+    if (whole) break;                                            // and so are those before it
     if (!shared) shared = std::make_shared<const fem::PressState>(state);
     truth->later.push_back({after_s, shared});
-    if (after_s >= window_s_ && pixels(*truth) <= tolerance_px_) truth->later.clear();
+    if (after_s >= enough_s && pixels(*truth) <= tolerance_px_) truth->later.clear();
   }
 }
 
