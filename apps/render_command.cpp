@@ -5,6 +5,11 @@
 #include "apps/command.h"
 #include "apps/progress_bar.h"
 #include "core/error.h"
+#include "core/whole_file.h"
+#include "lab/event_file.h"
+#include "lab/run_identity.h"
+#include "lab/sample_source.h"
+#include "sim/event_picture.h"
 #include "sim/frame_geometry.h"
 #include "sim/gltf_writer.h"
 #include "sim/image_file.h"
@@ -18,6 +23,8 @@ struct RenderOptions {
   std::filesystem::path out;
   std::filesystem::path gltf;
   std::filesystem::path truth;
+  std::filesystem::path events;
+  std::filesystem::path events_picture;
   int frame = -1;
   bool ideal = false;
   bool exr = false;
@@ -29,18 +36,59 @@ void require_ending(const std::filesystem::path& file, const char* ending, const
   require_writable_place(file);
 }
 
+/// Writes the events of the whole scene, and a picture of those of the last 20 ms before the frame's begin.
+sim::EventStreamReport write_events(const RenderOptions& options, const sim::SceneSpec& scene, const sim::Plan& plan,
+                                    const fem::Compliance& gel, std::int64_t frame_us, const GlobalOptions& global,
+                                    const Progress& progress) {
+  constexpr std::int64_t kShown_us = 20'000;
+  const cv::Size size(scene.device.camera->width, scene.device.camera->height);
+  std::vector<Event> shown;
+  std::unique_ptr<lab::EventFileWriter> writer;
+  const auto sink = [&](std::span<const Event> events) {
+    if (writer) writer->append(events);
+    for (const Event& event : events) {
+      if (event.t_us > frame_us - kShown_us && event.t_us <= frame_us) shown.push_back(event);
+    }
+  };
+  const auto watch = [&] {
+    return lab::simulator(global.cache).watch_events(scene, plan, gel, scene.seed, sink, progress);
+  };
+  sim::EventStreamReport report;
+  if (options.events.empty()) {
+    report = watch();
+  } else {
+    write_whole_file(options.events, [&](const std::filesystem::path& temporary) {
+      writer = std::make_unique<lab::EventFileWriter>(temporary, size, lab::program_version());
+      report = watch();
+      writer->close();
+    });
+  }
+  if (!options.events_picture.empty()) sim::write_png(options.events_picture, sim::event_picture(shown, size));
+  return report;
+}
+
 void render(const RenderOptions& options, const GlobalOptions& global) {
   const bool picture = !options.out.empty();
   const bool truth = !options.truth.empty();
   require_ending(options.out, ".png", "the picture's");
   require_ending(options.gltf, ".glb", "the geometry's");
   require_ending(options.truth, ".exr", "the truth's");
-  if (!picture && !truth && options.gltf.empty()) fail("nothing to make: give --out, --truth or --gltf");
+  require_ending(options.events, ".h5", "the events'");
+  require_ending(options.events_picture, ".png", "the events' picture's");
+  const bool events = !options.events.empty() || !options.events_picture.empty();
+  if (!picture && !truth && !events && options.gltf.empty()) {
+    fail("nothing to make: give --out, --truth, --gltf or --events");
+  }
   if (options.exr && !picture) fail("--exr: is written beside the picture; give --out");
   sim::SceneSpec scene = sim::read_scene(options.scene);
-  scene.outputs = {.frames = picture && !options.ideal, .ideal = picture && options.ideal, .radiance = options.exr};
+  const SourceLocation outputs = scene.outputs.where;
+  scene.outputs = {.frames = picture && !options.ideal,
+                   .ideal = picture && options.ideal,
+                   .radiance = options.exr,
+                   .where = outputs};
   scene.outputs.depth = scene.outputs.normals = scene.outputs.ids = truth;
   scene.outputs.contact = scene.outputs.flow = truth;
+  scene.outputs.events = events;
   const int frames = scene.motion.frame_count();
   const int frame = options.frame < 0 ? frames - 1 : options.frame;
   if (frame >= frames) {
@@ -49,6 +97,7 @@ void render(const RenderOptions& options, const GlobalOptions& global) {
   const sim::Plan plan = sim::make_plan(scene);
   sim::Capture capture;
   std::string warning;
+  std::string summary;
   {
     ProgressBar bar(global.quiet);
     const Progress progress = bar.listener();
@@ -57,14 +106,21 @@ void render(const RenderOptions& options, const GlobalOptions& global) {
     const auto elastic = sim::set_up_elastic_objects(scene, plan, global.cache);
     const std::vector<sim::Truth> truths = sim::play_motion(scene, plan, *gel, progress, vibration.get(), elastic);
     const sim::Truth& wanted = truths[static_cast<std::size_t>(frame)];
-    if (plan.camera) capture = sim::VirtualCamera(scene, plan, *gel, truths.front()).capture(wanted);
+    if (picture || truth) capture = sim::VirtualCamera(scene, plan, *gel, truths.front()).capture(wanted);
     if (!options.gltf.empty()) {
       const sim::FrameGeometry geometry = sim::frame_geometry(scene, *gel, wanted.press);
       sim::write_glb(options.gltf, geometry.parts, geometry.cameras);
     }
+    if (events) {
+      const sim::EventStreamReport report = write_events(options, scene, plan, *gel, wanted.t_us, global, progress);
+      summary =
+          fmt::format("{} events from {} pictures; {} times a pixel passed more than a threshold from one to the next",
+                      report.events, report.pictures, report.coarse_steps);
+    }
     warning = gel->report.note;
   }
   if (!warning.empty()) spdlog::warn("{}", warning);
+  if (!summary.empty()) spdlog::info("{}", summary);
   if (truth) sim::write_exr(options.truth, capture.pixel_truth.image, capture.pixel_truth.channel_names);
   if (picture) sim::write_png(options.out, options.ideal ? capture.ideal : capture.frame);
   if (options.exr) {
@@ -86,6 +142,9 @@ void add_render_command(CLI::App& app, const GlobalOptions& global, Action& acti
   command->add_flag("--exr", options->exr, "Beside it the linear irradiance on the sensor, as .exr (W/m^2 a band)");
   command->add_option("--truth", options->truth,
                       "Depth, normals, ids, contact and flow of each pixel, as layers of one .exr file");
+  command->add_option("--events", options->events, "All events from the first frame to the last: an .h5 file");
+  command->add_option("--events-picture", options->events_picture,
+                      "The events of the 20 ms before the frame, ON red and OFF blue: a .png file");
   command->add_option("--gltf", options->gltf, "The frame's geometry for 3D viewers: a .glb file (glTF 2.0)");
   command->callback([&action, &global, options] { action = [options, &global] { render(*options, global); }; });
 }

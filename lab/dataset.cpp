@@ -10,8 +10,10 @@
 #include <optional>
 
 #include "core/error.h"
+#include "core/random.h"
 #include "core/sha256.h"
 #include "core/whole_file.h"
+#include "lab/event_file.h"
 #include "lab/manifest.h"
 #include "lab/prepared_job.h"
 #include "lab/run_folder.h"
@@ -100,12 +102,11 @@ class Run {
 
   /// Makes the pictures of all samples that `kept` doesn't hold.
   void pictures(RunFolder& folder, const std::vector<FrameRecord>& kept) {
-    records_.assign(static_cast<std::size_t>(job_.samples), std::nullopt);
+    records_.assign(static_cast<std::size_t>(job_.samples) + job_.scenes.size(), std::nullopt);
     for (const FrameRecord& record : kept) {
-      if (record.sample >= 0 && record.sample < job_.samples) {
-        records_[static_cast<std::size_t>(record.sample)] = record;
-        ++report_.kept;
-      }
+      if (record.sample < 0 || record.sample >= static_cast<std::int64_t>(records_.size())) continue;
+      records_[static_cast<std::size_t>(record.sample)] = record;
+      if (record.sample < job_.samples) ++report_.kept;
     }
     make_folders();
     RunJournal journal(folder.journal(), kept);
@@ -129,6 +130,7 @@ class Run {
     });
     report_.rendered = static_cast<std::int64_t>(missing.size());
     clock_.end("frames");
+    events(journal);
   }
 
   void truth() {
@@ -161,7 +163,7 @@ class Run {
     for (const auto& record : records_) {
       if (!record) continue;
       files.insert(files.end(), record->files.begin(), record->files.end());
-      work.pictures += static_cast<std::int64_t>(record->files.size());
+      if (record->sample < job_.samples) work.pictures += static_cast<std::int64_t>(record->files.size());
       work.pixels_traced += record->pixels_traced;
       work.paths_traced += record->paths_traced;
     }
@@ -182,6 +184,43 @@ class Run {
   }
 
  private:
+  /// Writes the streams of events that `records_` doesn't hold, one after the other: each keeps all threads busy.
+  void events(RunJournal& journal) {
+    bool any = false;
+    for (std::size_t i = 0; i < job_.scenes.size(); ++i) {
+      const PreparedScene& scene = job_.scenes[i];
+      if (!scene.plan.events || stream_of(i)) continue;
+      any = true;
+      std::error_code error;
+      fs::create_directories(out_ / "events", error);
+      if (error) fail("{}: can't be made ({})", (out_ / "events").string(), error.message());
+      const std::string name = "events/" + scene.entry.name + ".h5";
+      RandomStream seeds(scene.spec.seed, static_cast<std::uint64_t>(scene.first_sample), Purpose::kEventNoise);
+      const std::uint64_t noise_seed = (std::uint64_t{seeds()} << 32) | seeds();
+      const sim::CameraSpec& camera = scene.spec.device.camera.value();
+      FrameRecord record;
+      record.sample = job_.samples + static_cast<std::int64_t>(i);
+      write_whole_file(out_ / name, [&](const fs::path& temporary) {
+        EventFileWriter writer(temporary, {camera.width, camera.height}, program_version());
+        const sim::EventStreamReport report = source_.watch_events(
+            scene.spec, scene.plan, *gel_, noise_seed, [&](std::span<const Event> events) { writer.append(events); },
+            progress_);
+        writer.close();
+        record.pixels_traced = report.pixels_traced;
+        record.paths_traced = report.paths_traced;
+      });
+      record.files.push_back(written(out_, name));
+      stream_of(i) = record;
+      journal.append(record);
+    }
+    if (any) clock_.end("events");
+  }
+
+  /// The record of a scene's stream of events; they come after those of all samples.
+  std::optional<FrameRecord>& stream_of(std::size_t scene) {
+    return records_[static_cast<std::size_t>(job_.samples) + scene];
+  }
+
   std::optional<FrameRecord>& record_of(SamplePlace place) {
     return records_[static_cast<std::size_t>(job_.scenes[place.scene].first_sample + place.frame)];
   }
@@ -272,8 +311,8 @@ class Run {
   const Progress& progress_;
   StageClock clock_;
   std::shared_ptr<const fem::Compliance> gel_;
-  std::vector<std::vector<sim::Truth>> truths_;  // a list a scene
-  std::vector<std::optional<FrameRecord>> records_;
+  std::vector<std::vector<sim::Truth>> truths_;      // a list a scene
+  std::vector<std::optional<FrameRecord>> records_;  // of each sample, then of each scene's stream of events
   std::vector<ArrayShape> arrays_;
   GenerateReport report_;
 };

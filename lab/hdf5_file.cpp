@@ -59,6 +59,10 @@ Hdf5Id hdf5_type<std::uint8_t>() {
   return H5T_NATIVE_UINT8;
 }
 template <>
+Hdf5Id hdf5_type<std::uint16_t>() {
+  return H5T_NATIVE_UINT16;
+}
+template <>
 Hdf5Id hdf5_type<std::int32_t>() {
   return H5T_NATIVE_INT32;
 }
@@ -128,6 +132,38 @@ void Hdf5Writer::add_dataset(const Hdf5Description& description, Hdf5Id type, st
   const Hdf5Id id = dataset.id;
   datasets_.emplace(description.path, std::move(dataset));
   describe(id, description);
+}
+
+void Hdf5Writer::add_growing_dataset(const Hdf5Description& description, Hdf5Id type, std::size_t item_bytes) {
+  TS_ASSERT(!datasets_.contains(description.path));
+  const Handle creation(check(H5Pcreate(H5P_DATASET_CREATE), "dataset creation"), H5Pclose);
+  check_done(H5Pset_obj_track_times(creation, 0), "times");
+  const hsize_t chunk = static_cast<hsize_t>(kChunkBytes) / item_bytes;
+  check_done(H5Pset_chunk(creation, 1, &chunk), "chunks");
+  check_done(H5Pset_shuffle(creation), "shuffle");
+  check_done(H5Pset_deflate(creation, kDeflateLevel), "compression");
+  const hsize_t none = 0;
+  const hsize_t endless = H5S_UNLIMITED;
+  const Handle space(check(H5Screate_simple(1, &none, &endless), "shape"), H5Sclose);
+  make_group_of(description.path);
+  Dataset dataset;
+  dataset.shape = {0};
+  dataset.id = check(H5Dcreate2(file_, description.path.c_str(), type, space, H5P_DEFAULT, creation, H5P_DEFAULT),
+                     description.path.c_str());
+  const Hdf5Id id = dataset.id;
+  datasets_.emplace(description.path, std::move(dataset));
+  describe(id, description);
+}
+
+void Hdf5Writer::append_numbers(const std::string& path, Hdf5Id type, const void* values, std::int64_t count) {
+  const auto found = datasets_.find(path);
+  TS_ASSERT(found != datasets_.end() && found->second.shape.size() == 1);
+  if (count == 0) return;
+  const std::int64_t first = found->second.shape[0];
+  found->second.shape[0] += count;
+  const auto size = static_cast<hsize_t>(found->second.shape[0]);
+  check_done(H5Dset_extent(found->second.id, &size), path.c_str());
+  write_rows(path, type, first, count, values, static_cast<std::size_t>(count));
 }
 
 void Hdf5Writer::make_group_of(const std::string& path) {

@@ -14,7 +14,7 @@ namespace touchstone::lab {
 /// HDF5's own handle (hid_t), without its header.
 using Hdf5Id = std::int64_t;
 
-/// The HDF5 type that holds a C++ one: std::uint8_t, std::int32_t, std::int64_t, float, double.
+/// The HDF5 type that holds a C++ one: std::uint8_t, std::uint16_t, std::int32_t, std::int64_t, float, double.
 template <typename T>
 Hdf5Id hdf5_type();
 
@@ -53,6 +53,16 @@ class Hdf5Writer {
     add_rows<T>(description, rows, row_shape);
     write_rows(description.path, hdf5_type<T>(), 0, rows, values.data(), values.size());
   }
+  /// Makes a dataset of numbers that grows by `append`, chunked and compressed.
+  template <typename T>
+  void add_growing(const Hdf5Description& description) {
+    add_growing_dataset(description, hdf5_type<T>(), sizeof(T));
+  }
+  /// Puts numbers behind those of a dataset that add_growing made with the same T.
+  template <typename T>
+  void append(const std::string& path, std::span<const T> values) {
+    append_numbers(path, hdf5_type<T>(), values.data(), static_cast<std::int64_t>(values.size()));
+  }
   /// A list of texts, as one dataset of texts of equal length, padded with zeros.
   void write_texts(const Hdf5Description& description, const std::vector<std::string>& texts);
   /// An attribute of the file itself.
@@ -71,6 +81,8 @@ class Hdf5Writer {
   void make_group_of(const std::string& path);
   void add_dataset(const Hdf5Description& description, Hdf5Id type, std::size_t item_bytes, std::int64_t rows,
                    const std::vector<std::int64_t>& row_shape);
+  void add_growing_dataset(const Hdf5Description& description, Hdf5Id type, std::size_t item_bytes);
+  void append_numbers(const std::string& path, Hdf5Id type, const void* values, std::int64_t count);
   void write_rows(const std::string& path, Hdf5Id type, std::int64_t first, std::int64_t count, const void* values,
                   std::size_t size);
   void describe(Hdf5Id object, const Hdf5Description& description);

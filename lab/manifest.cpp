@@ -44,7 +44,8 @@ ordered_json scene_json(const PreparedScene& scene, const std::filesystem::path&
                          {"height", spec.outputs.height}}}};
   for (const auto& [name, wanted] : {std::pair{"depth", spec.outputs.depth}, std::pair{"normals", spec.outputs.normals},
                                      std::pair{"ids", spec.outputs.ids}, std::pair{"contact", spec.outputs.contact},
-                                     std::pair{"flow", spec.outputs.flow}, std::pair{"error", spec.outputs.error}}) {
+                                     std::pair{"flow", spec.outputs.flow}, std::pair{"error", spec.outputs.error},
+                                     std::pair{"events", spec.outputs.events}}) {
     json["outputs"][name] = scene.plan.camera && wanted;
   }
   if (scene.plan.camera && spec.device.camera) {

@@ -30,6 +30,12 @@ SampleSource simulator(const std::filesystem::path& cache_folder) {
     auto camera = std::make_shared<const sim::VirtualCamera>(scene, plan, *gel, first);
     return SampleSource::Camera([camera](const sim::Truth& truth) { return camera->capture(truth); });
   };
+  source.watch_events = [cache_folder](const sim::SceneSpec& scene, const sim::Plan& plan, const fem::Compliance& gel,
+                                       std::uint64_t noise_seed, const sim::EventSink& sink, const Progress& progress) {
+    const auto vibration = sim::set_up_vibration(scene, plan, cache_folder);
+    const auto elastic = sim::set_up_elastic_objects(scene, plan, cache_folder);
+    return sim::watch_events(scene, plan, gel, noise_seed, sink, progress, vibration.get(), elastic);
+  };
   return source;
 }
 

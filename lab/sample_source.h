@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "sim/event_stream.h"
 #include "sim/virtual_sensor.h"
 
 namespace touchstone::lab {
@@ -21,6 +22,10 @@ struct SampleSource {
   std::function<Camera(const sim::SceneSpec&, const sim::Plan&, std::shared_ptr<const fem::Compliance>,
                        const sim::Truth& first)>
       set_up_camera;
+  /// For scenes whose plan has event pixels. `noise_seed` as in sim::watch_events.
+  std::function<sim::EventStreamReport(const sim::SceneSpec&, const sim::Plan&, const fem::Compliance&,
+                                       std::uint64_t noise_seed, const sim::EventSink&, const Progress&)>
+      watch_events;
 };
 
 /// The simulator, with its set-up results kept in `cache_folder`.

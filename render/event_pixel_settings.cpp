@@ -9,10 +9,6 @@
 namespace touchstone::render {
 namespace {
 
-constexpr double kLargestThreshold = 5.0;
-constexpr double kLongestRefractory_us = 1e9;
-constexpr double kFastestRate_hz = 1e6;  // one a microsecond, the finest time there is
-
 void require(const char* name, double value, double low, double high) {
   if (!(value >= low && value <= high)) {
     fail("event pixels: {} is {}; allowed is a number from {} to {}", name, value, low, high);
@@ -28,8 +24,8 @@ void require_where(const char* name, double value, const char* needed_by) {
 }  // namespace
 
 void check(const EventPixelSettings& settings) {
-  require("on_threshold", settings.on_threshold, kLeastEventThreshold, kLargestThreshold);
-  require("off_threshold", settings.off_threshold, kLeastEventThreshold, kLargestThreshold);
+  require("on_threshold", settings.on_threshold, kLeastEventThreshold, kLargestEventThreshold);
+  require("off_threshold", settings.off_threshold, kLeastEventThreshold, kLargestEventThreshold);
   require("threshold_spread", settings.threshold_spread, 0.0, std::min(settings.on_threshold, settings.off_threshold));
   require("dark_intensity", settings.dark_intensity, 1e-30, 1e18);
   require("bandwidth_hz", settings.bandwidth_hz, 0.0, 1e12);
@@ -37,8 +33,8 @@ void check(const EventPixelSettings& settings) {
     require_where("reference_intensity", settings.reference_intensity, "bandwidth_hz");
   }
   require("refractory_us", static_cast<double>(settings.refractory_us), 0.0, kLongestRefractory_us);
-  require("leak_rate_hz", settings.leak_rate_hz, 0.0, kFastestRate_hz);
-  require("shot_rate_hz", settings.shot_rate_hz, 0.0, kFastestRate_hz);
+  require("leak_rate_hz", settings.leak_rate_hz, 0.0, kFastestEventRate_hz);
+  require("shot_rate_hz", settings.shot_rate_hz, 0.0, kFastestEventRate_hz);
   if (settings.shot_rate_hz > 0.0) {
     require_where("shot_half_intensity", settings.shot_half_intensity, "shot_rate_hz");
   }

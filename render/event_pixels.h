@@ -40,6 +40,9 @@ struct EventPixelSettings {
 /// The smallest mean threshold that is taken. The most sensitive pixel known fires at 0.003 (T. Delbruck, R. Berner
 /// 2010, "Temporal contrast AER pixel with 0.3%-contrast event threshold").
 inline constexpr double kLeastEventThreshold = 0.001;
+inline constexpr double kLargestEventThreshold = 5.0;
+inline constexpr double kLongestRefractory_us = 1e9;
+inline constexpr double kFastestEventRate_hz = 1e6;  ///< one a microsecond, the finest time there is
 
 /// Refuses settings that make no sense. @throws Error that names field, value and what is allowed
 void check(const EventPixelSettings& settings);

@@ -1,5 +1,7 @@
 #include "render/imager_presets.h"
 
+#include <fmt/ranges.h>
+
 #include <array>
 #include <cmath>
 #include <utility>
@@ -11,8 +13,8 @@ namespace {
 
 using Maker = ImagerPreset (*)(double);
 constexpr std::array<std::pair<std::string_view, Maker>, 4> kPresets = {{{"imx273", imx273_preset},
-                                                                         {"c310-class", c310_class_preset},
-                                                                         {"davis240c-frames", davis240c_frames_preset},
+                                                                         {"c310", c310_class_preset},
+                                                                         {"davis240c", davis240c_frames_preset},
                                                                          {"adns2620", adns2620_preset}}};
 
 /// What all presets share: exposure and bands.
@@ -68,7 +70,7 @@ ImagerPreset c310_class_preset(double exposure_s) {
   fill_range(imager);
   // 720 rows and some 30 of blanking in a thirtieth of a second.
   constexpr double kLinesPerFrame = 750.0;
-  return {.name = "c310-class",
+  return {.name = "c310",
           .imager = imager,
           .width = 1280,
           .height = 720,
@@ -97,7 +99,7 @@ ImagerPreset davis240c_frames_preset(double exposure_s) {
   imager.prnu = 0.005;
   imager.dsnu_e = 0.005 * imager.full_well_e;
   fill_range(imager);
-  return {.name = "davis240c-frames",
+  return {.name = "davis240c",
           .imager = imager,
           .width = 240,
           .height = 180,
@@ -151,7 +153,7 @@ ImagerPreset imager_preset(std::string_view name, double exposure_s) {
   for (const auto& [known, maker] : kPresets) {
     if (name == known) return maker(exposure_s);
   }
-  fail("there is no imager preset \"{}\"; allowed are imx273, c310-class, davis240c-frames and adns2620", name);
+  fail("there is no imager preset \"{}\"; allowed are {}", name, fmt::join(imager_preset_names(), ", "));
 }
 
 }  // namespace touchstone::render

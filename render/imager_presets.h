@@ -35,7 +35,7 @@ ImagerPreset davis240c_frames_preset(double exposure_s);
 /// Avago's optical mouse sensor ADNS-2620: 18x18 grey pixels, 6 bits. Its statistics: mouse_statistics.h.
 ImagerPreset adns2620_preset(double exposure_s);
 
-/// The names that `imager_preset` knows: imx273, c310-class, davis240c-frames, adns2620.
+/// The names that `imager_preset` knows: imx273, c310, davis240c, adns2620.
 std::vector<std::string_view> imager_preset_names();
 
 /// @throws Error for an unknown name or an exposure that is negative or not finite

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <opencv2/core.hpp>
 
 #include "core/error.h"
 
@@ -46,13 +47,52 @@ std::vector<double> exposure_shares(const std::vector<double>& times_s, double f
   return shares;
 }
 
-cv::Mat rolling_exposure(const std::vector<TimedIrradiance>& instants, const ShutterTiming& timing) {
-  if (instants.empty()) fail("exposure: there is no instant to take light from");
+RollingExposure::RollingExposure(const std::vector<double>& times_s, const ShutterTiming& timing, cv::Size size,
+                                 int bands)
+    : sum_(size, CV_64FC(bands), cv::Scalar::all(0.0)), variance_(size, CV_64FC1, cv::Scalar(0.0)) {
   if (!(timing.exposure_s >= 0.0) || !std::isfinite(timing.exposure_s) || !std::isfinite(timing.start_s) ||
       !std::isfinite(timing.line_time_s)) {
     fail("exposure: start {} s, exposure {} s, line time {} s; all must be finite, the exposure 0 or more",
          timing.start_s, timing.exposure_s, timing.line_time_s);
   }
+  for (int row = 0; row < size.height; ++row) {
+    const double from = timing.start_s + row * timing.line_time_s;
+    shares_.push_back(exposure_shares(times_s, from, from + timing.exposure_s));
+  }
+}
+
+void RollingExposure::add(std::size_t instant, const cv::Mat& irradiance, const cv::Mat& standard_error) {
+  TS_ASSERT(irradiance.size() == sum_.size() && irradiance.type() == CV_32FC(sum_.channels()));
+  TS_ASSERT(standard_error.empty() || (standard_error.size() == sum_.size() && standard_error.type() == CV_32FC1));
+  const int numbers = sum_.cols * sum_.channels();
+  for (int row = 0; row < sum_.rows; ++row) {
+    const double share = shares_[static_cast<std::size_t>(row)].at(instant);
+    if (share == 0.0) continue;
+    const auto* light = irradiance.ptr<float>(row);
+    auto* sum = sum_.ptr<double>(row);
+    for (int i = 0; i < numbers; ++i) sum[i] += share * light[i];
+    if (standard_error.empty()) continue;
+    const auto* error = standard_error.ptr<float>(row);
+    auto* variance = variance_.ptr<double>(row);
+    for (int i = 0; i < sum_.cols; ++i) variance[i] += share * share * error[i] * error[i];
+  }
+}
+
+cv::Mat RollingExposure::irradiance() const {
+  cv::Mat mean;
+  sum_.convertTo(mean, CV_32F);
+  return mean;
+}
+
+cv::Mat RollingExposure::standard_error() const {
+  cv::Mat error;
+  cv::sqrt(variance_, error);
+  error.convertTo(error, CV_32F);
+  return error;
+}
+
+cv::Mat rolling_exposure(const std::vector<TimedIrradiance>& instants, const ShutterTiming& timing) {
+  if (instants.empty()) fail("exposure: there is no instant to take light from");
   const cv::Mat& first = instants.front().irradiance;
   if (first.empty() || first.depth() != CV_32F || first.dims != 2) {
     fail("exposure: irradiance must be pictures of 32 bit floats that aren't empty");
@@ -64,22 +104,9 @@ cv::Mat rolling_exposure(const std::vector<TimedIrradiance>& instants, const Shu
     }
     times.push_back(instant.time_s);
   }
-  cv::Mat out(first.size(), first.type());
-  const int numbers = first.cols * first.channels();
-  std::vector<double> sum(static_cast<std::size_t>(numbers));
-  for (int row = 0; row < first.rows; ++row) {
-    const double from = timing.start_s + row * timing.line_time_s;
-    const std::vector<double> shares = exposure_shares(times, from, from + timing.exposure_s);
-    std::fill(sum.begin(), sum.end(), 0.0);
-    for (std::size_t k = 0; k < instants.size(); ++k) {
-      if (shares[k] == 0.0) continue;
-      const auto* light = instants[k].irradiance.ptr<float>(row);
-      for (int i = 0; i < numbers; ++i) sum[i] += shares[k] * light[i];
-    }
-    auto* mean = out.ptr<float>(row);
-    for (int i = 0; i < numbers; ++i) mean[i] = static_cast<float>(sum[i]);
-  }
-  return out;
+  RollingExposure exposure(times, timing, first.size(), first.channels());
+  for (std::size_t k = 0; k < instants.size(); ++k) exposure.add(k, instants[k].irradiance);
+  return exposure.irradiance();
 }
 
 }  // namespace touchstone::render

@@ -25,6 +25,25 @@ struct ShutterTiming {
 /// @throws Error if the times don't grow or don't cover the span
 std::vector<double> exposure_shares(const std::vector<double>& times_s, double from_s, double to_s);
 
+/// The same as rolling_exposure for instants that are handed over one by one and not kept.
+class RollingExposure {
+ public:
+  /// @throws Error as rolling_exposure
+  RollingExposure(const std::vector<double>& times_s, const ShutterTiming& timing, cv::Size size, int bands);
+
+  /// The light at the time number `instant` and its standard error (CV_32FC1; may be empty: then nowhere any).
+  void add(std::size_t instant, const cv::Mat& irradiance, const cv::Mat& standard_error = {});
+  /// CV_32FC(bands). @pre each instant was added once
+  cv::Mat irradiance() const;
+  /// CV_32FC1, the instants' errors being independent.
+  cv::Mat standard_error() const;
+
+ private:
+  std::vector<std::vector<double>> shares_;  // of each row: of each instant
+  cv::Mat sum_;                              // CV_64FC(bands)
+  cv::Mat variance_;                         // CV_64FC1
+};
+
 /// The mean irradiance of each row over its own exposure, linear in time between the instants: what an imager
 /// (`expose`, imager.h) sees of a moving scene. Exact for light that changes linearly from instant to instant; how many
 /// instants that needs is the caller's choice.

@@ -35,6 +35,9 @@ void read_value(YamlReader& in, Colour& colour, Allowed allowed) {
 
 render::Spectrum in_bands(const Colour& colour, const SceneBands& bands, const char* what) {
   if (colour.curve) {
+    if (!bands.ranges && colour.smooth) {
+      return bands.centres_nm.unaryExpr([&](double nm) { return colour.curve->at(nm); });
+    }
     if (!bands.ranges) {
       fail_at(colour.where,
               "{}: is a spectrum, but the device doesn't say its `bands`, which it could be averaged over", what);

@@ -19,6 +19,7 @@ namespace touchstone::sim {
 struct Colour {
   std::vector<double> numbers;                 ///< one for all bands, or one a band
   std::optional<render::SpectralCurve> curve;  ///< in the numbers' place
+  bool smooth = false;                         ///< a curve that may be read at single wavelengths, where bands are such
   SourceLocation where;
 
   Colour() = default;

@@ -4,7 +4,9 @@
 #include <cmath>
 #include <iterator>
 
+#include "core/units.h"
 #include "fem/gel_body.h"
+#include "sim/camera_preset.h"
 #include "sim/device_camera.h"
 #include "sim/gel_setup.h"
 #include "sim/gltf_mesh.h"
@@ -251,13 +253,18 @@ void fields(YamlReader& in, BandsSpec& bands) {
 }
 
 void fields(YamlReader& in, CameraSpec& camera) {
+  const bool preset = read_preset(in, camera);
+  const auto needed = [&](const char* key, auto& value, Allowed allowed) {
+    preset ? in.optional(key, value, allowed) : in.required(key, value, allowed);
+  };
   in.optional("type", camera.type);
-  in.required("width", camera.width, Allowed::within(1, 8192));
-  in.required("height", camera.height, Allowed::within(1, 8192));
+  needed("width", camera.width, Allowed::within(1, 8192));
+  needed("height", camera.height, Allowed::within(1, 8192));
   in.optional("frame_rate_Hz", camera.frame_rate_Hz, Allowed::above(0.0));
-  in.required("pixel_pitch_um", camera.pixel_pitch_um, Allowed::above(0.0));
-  camera.active_area_um2 = camera.pixel_pitch_um * camera.pixel_pitch_um;
-  in.optional("active_area_um2", camera.active_area_um2, Allowed::above_up_to(0.0, camera.active_area_um2));
+  needed("pixel_pitch_um", camera.pixel_pitch_um, Allowed::above(0.0));
+  const double whole_area = camera.pixel_pitch_um * camera.pixel_pitch_um;
+  if (!preset || in.has("pixel_pitch_um")) camera.active_area_um2 = whole_area;
+  in.optional("active_area_um2", camera.active_area_um2, Allowed::above_up_to(0.0, whole_area));
   if (camera.type == CameraType::lens) {
     lens_fields(in, camera);
   } else {
@@ -268,9 +275,10 @@ void fields(YamlReader& in, CameraSpec& camera) {
   }
   in.required("look_at_mm", camera.look_at_mm);
   in.required("exposure_us", camera.exposure_us, Allowed::at_least(0.0));
+  in.optional("row_time_us", camera.row_time_us, Allowed::at_least(0.0));
   in.optional("bits", camera.bits, Allowed::within(1, 16));
   in.optional("bayer", camera.bayer);
-  if (camera.bayer == BayerLayout::none) camera.quantum_efficiency_green = 1.0;
+  if (camera.bayer == BayerLayout::none && !preset) camera.quantum_efficiency_green = 1.0;
   for (auto [key, efficiency] : {std::pair{"quantum_efficiency_red", &camera.quantum_efficiency_red},
                                  std::pair{"quantum_efficiency_green", &camera.quantum_efficiency_green},
                                  std::pair{"quantum_efficiency_blue", &camera.quantum_efficiency_blue}}) {
@@ -278,16 +286,22 @@ void fields(YamlReader& in, CameraSpec& camera) {
     efficiency->where = in.where(key);
   }
   in.optional("white_balance", camera.white_balance, Allowed::above(0.0));
-  in.required("full_well_e", camera.full_well_e, Allowed::above(0.0));
+  needed("full_well_e", camera.full_well_e, Allowed::above(0.0));
   in.optional("gain_dB", camera.gain_dB, Allowed::within(0.0, 48.0));
   in.optional("read_noise_e", camera.read_noise_e, Allowed::at_least(0.0));
   in.optional("dark_current_e_per_s", camera.dark_current_e_per_s, Allowed::at_least(0.0));
   in.optional("prnu", camera.prnu, Allowed::within(0.0, 0.5));
   in.optional("dsnu_e", camera.dsnu_e, Allowed::at_least(0.0));
   in.optional("black_level_DN", camera.black_level_DN, Allowed::at_least(0.0));
-  if (camera.exposure_us > 1e6 / camera.frame_rate_Hz) {
+  in.optional("events", camera.events);
+  const double frame_us = kMicrosecondsPerSecond / camera.frame_rate_Hz;
+  if (camera.exposure_us > frame_us) {
     fail_at(in.where("exposure_us"), "exposure_us: {} is longer than a frame of {} us at {} Hz", camera.exposure_us,
-            1e6 / camera.frame_rate_Hz, camera.frame_rate_Hz);
+            frame_us, camera.frame_rate_Hz);
+  }
+  if (camera.row_time_us * camera.height > frame_us) {
+    fail_at(in.where("row_time_us"), "row_time_us: {} for each of {} rows is longer than a frame of {} us at {} Hz",
+            camera.row_time_us, camera.height, frame_us, camera.frame_rate_Hz);
   }
   if ((camera.look_at_mm - camera.hole_position_mm).norm() < 1e-6) {
     fail_at(in.where("look_at_mm"), "camera.look_at_mm: is the camera's own position; the camera has no direction");

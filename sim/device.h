@@ -12,6 +12,7 @@
 #include "fem/relaxation.h"
 #include "sim/colour.h"
 #include "sim/device_lamps.h"
+#include "sim/event_camera_spec.h"
 
 namespace touchstone::sim {
 
@@ -130,7 +131,8 @@ EnumNames<CameraType> enum_names(CameraType);
 
 /// A camera and its imager (EMVA 1288 terms). Only the fields that belong to `type` may stand in the file: of a lens
 /// either focal_length_mm or camera_matrix, and at most one of focus_distance_mm and sensor_distance_mm (neither: sharp
-/// at infinity; with a camera matrix, which tells the sensor's distance, focus_distance_mm only).
+/// at infinity; with a camera matrix, which tells the sensor's distance, focus_distance_mm only). A `preset` in the
+/// file gives the imager's figures, which the other fields override (sim/camera_preset.h).
 struct CameraSpec {
   CameraType type = CameraType::pinhole;
   int width = 0;
@@ -150,7 +152,8 @@ struct CameraSpec {
   Eigen::Vector3d hole_position_mm = Eigen::Vector3d::Zero();  ///< of a lens its centre: `lens_position_mm` in the file
   Eigen::Vector3d look_at_mm = Eigen::Vector3d::Zero();
   double exposure_us = 1000.0;
-  int bits = 8;  ///< 1 to 16
+  double row_time_us = 0.0;  ///< from row to row of a rolling shutter, the top row first; 0: all rows at once
+  int bits = 8;              ///< 1 to 16
   BayerLayout bayer = BayerLayout::none;
   // Of the red, green and blue pixels; a grey camera has the green one only, by itself 1 in all bands. A colour
   // camera's own three are for the bands red, green and blue.
@@ -165,6 +168,7 @@ struct CameraSpec {
   double prnu = 0.0;  ///< relative
   double dsnu_e = 0.0;
   double black_level_DN = 0.0;
+  std::optional<EventCameraSpec> events;  ///< its pixels also, or only, tell changes of their light
 };
 
 /// The range of wavelengths that is simulated, and into how many bands it is cut.

@@ -5,6 +5,8 @@
 
 #include "core/units.h"
 #include "fem/vibration.h"
+#include "sim/plan_table.h"
+#include "sim/plan_time.h"
 #include "sim/scene_bands.h"
 
 namespace touchstone::sim {
@@ -50,26 +52,7 @@ double bright_radius(const ObjectSpec& object) {
   return radius;
 }
 
-class Table {
- public:
-  explicit Table(Plan& plan) : plan_(plan) {}
-
-  bool add(const std::string& name, bool on, const std::string& why, const std::string& cost) {
-    plan_.effects.push_back({name, on, why, on ? cost : "nothing"});
-    return on;
-  }
-
-  bool add(const std::string& name, Switch forced, bool called_for, const std::string& why, const std::string& cost) {
-    if (forced == Switch::automatic) return add(name, called_for, why, cost);
-    const bool on = forced == Switch::on;
-    return add(name, on, fmt::format("the scene switches it {}; by itself: {}", on ? "on" : "off", why), cost);
-  }
-
- private:
-  Plan& plan_;
-};
-
-void plan_elastic_objects(const SceneSpec& scene, Plan& plan, Table& table) {
+void plan_elastic_objects(const SceneSpec& scene, Plan& plan, PlanTable& table) {
   const ElasticSpec* softest = nullptr;
   for (const MovedObject& moved : moved_objects(scene)) {
     const auto& elastic = moved.object.elastic;
@@ -88,7 +71,7 @@ void plan_elastic_objects(const SceneSpec& scene, Plan& plan, Table& table) {
                 "set-up once an object (seconds, kept in the cache), then some tens of milliseconds a frame");
 }
 
-void plan_mechanics(const SceneSpec& scene, Plan& plan, Table& table) {
+void plan_mechanics(const SceneSpec& scene, Plan& plan, PlanTable& table) {
   table.add("gel mechanics", true, "truth is always asked for",
             "set-up once a gel (seconds, kept in the cache), then about a millisecond a frame");
   plan.finite_strain = table.add(
@@ -185,8 +168,8 @@ std::optional<double> finest_detail(const ObjectSpec& object) {
   return *middle;
 }
 
-void plan_relief(const SceneSpec& scene, Plan& plan, Table& table) {
-  const bool seen = scene.outputs.light() || scene.outputs.first_hits() || scene.outputs.height;
+void plan_relief(const SceneSpec& scene, Plan& plan, PlanTable& table) {
+  const bool seen = scene.outputs.camera() || scene.outputs.height;
   const double edge = scene.device.mesh.fine_mm;
   std::optional<double> detail;
   for (const MovedObject& moved : moved_objects(scene)) {
@@ -218,7 +201,7 @@ void plan_relief(const SceneSpec& scene, Plan& plan, Table& table) {
   }
 }
 
-void plan_interreflection(const SceneSpec& scene, Plan& plan, Table& table) {
+void plan_interreflection(const SceneSpec& scene, Plan& plan, PlanTable& table) {
   const DeviceSpec& device = scene.device;
   const GelSpec& gel = device.gel;
   plan.scattering = table.add("scattering", gel.scattering_per_mm.largest() > 0.0,
@@ -250,7 +233,7 @@ void plan_interreflection(const SceneSpec& scene, Plan& plan, Table& table) {
       plan.scattering ? "light is scattered many times in a milky gel" : why, "3 to 5 times the rays");
 }
 
-void plan_bands(const SceneSpec& scene, Plan& plan, Table& table) {
+void plan_bands(const SceneSpec& scene, Plan& plan, PlanTable& table) {
   plan.bands = choose_bands(scene);
   check_light(scene, plan.bands);
   const int count = plan.bands.count();
@@ -265,11 +248,12 @@ void plan_bands(const SceneSpec& scene, Plan& plan, Table& table) {
   table.add("spectral bands", true, why, fmt::format("{} band{} a path", count, count == 1 ? "" : "s"));
 }
 
-void plan_light(const SceneSpec& scene, Plan& plan, Table& table) {
-  const bool images = scene.outputs.light() || scene.outputs.first_hits();
-  plan.camera = table.add("camera and renderer", images,
-                          images ? "an image is asked for" : "no image is asked for: truth alone needs none",
-                          "most of the time of a frame");
+void plan_light(const SceneSpec& scene, Plan& plan, PlanTable& table) {
+  const bool images = scene.outputs.camera();
+  plan.camera = table.add(
+      "camera and renderer", images,
+      images ? "an image or a stream of events is asked for" : "no image is asked for: truth alone needs none",
+      "most of the time of a frame");
   if (!images) return;
   if (!scene.device.camera) {
     fail_at(scene.where, "outputs: an image is asked for, but the device '{}' ({}) has no camera", scene.device.name,
@@ -337,10 +321,11 @@ double inertia_estimate(const GelSpec& gel, double frequency_Hz) {
 
 Plan make_plan(const SceneSpec& scene) {
   Plan plan;
-  Table table(plan);
+  PlanTable table(plan);
   plan_mechanics(scene, plan, table);
   plan_relief(scene, plan, table);
   plan_light(scene, plan, table);
+  if (plan.camera) plan_time(scene, plan, table);
   return plan;
 }
 

@@ -30,6 +30,10 @@ struct Plan {
   bool scattering = false;
   bool sensor_noise = false;
   SceneBands bands;             ///< of the light; none without a picture
+  bool motion_blur = false;
+  bool rolling_shutter = false;
+  bool events = false;
+  int states_a_frame = 1;       ///< pressed states that are kept from one frame to the next
   std::vector<Effect> effects;  ///< the same for people, with reasons
 };
 

@@ -3,10 +3,11 @@
 #include <optional>
 
 #include "core/error.h"
-#include "core/units.h"
 #include "fem/finite_press.h"
+#include "sim/exposure_times.h"
 #include "sim/gel_setup.h"
 #include "sim/motion_track.h"
+#include "sim/played_states.h"
 #include "sim/shaken_press.h"
 #include "sim/virtual_sensor.h"
 
@@ -14,10 +15,6 @@ namespace touchstone::sim {
 namespace {
 
 constexpr double kStepsAPeriod = 12.0;
-
-std::int64_t frame_time(int frame, double rate) {
-  return static_cast<std::int64_t>(std::llround(frame * kMicrosecondsPerSecond / rate));
-}
 
 /// The press that the plan calls for: at finite strain of one rigid body only.
 class PlannedPress {
@@ -54,11 +51,12 @@ int steps_a_frame(const MotionTrack& track, const MotionSpec& motion, const Plan
 
 }  // namespace
 
-std::vector<Truth> play_motion(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel,
-                               const Progress& progress, const fem::GelVibration* vibration,
-                               const std::vector<std::shared_ptr<const fem::Compliance>>& elastic) {
+void play_states(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel,
+                 const fem::GelVibration* vibration, const std::vector<std::shared_ptr<const fem::Compliance>>& elastic,
+                 const StateVisitor& visit) {
   TS_ASSERT(elastic.size() == (plan.elastic_object ? moved_objects(scene).size() : 0));
   const MotionSpec& motion = scene.motion;
+  const int kept = plan.states_a_frame;
   const std::vector<MovedObject> objects = moved_objects(scene);
   const double friction = plan.friction ? scene.object.friction : 0.0;
   const fem::PronySeries relaxation = plan.relaxation ? prony_series(scene.device.gel) : fem::PronySeries{};
@@ -79,45 +77,62 @@ std::vector<Truth> play_motion(const SceneSpec& scene, const Plan& plan, const f
   std::vector<fem::PressTarget> targets;
   for (const MotionTrack& track : tracks) targets.push_back(track.start());
 
-  std::vector<Truth> truths;
-  truths.reserve(motion.frame_count());
-  const auto keep = [&](fem::PressState state) {
-    const int frame = static_cast<int>(truths.size());
-    truths.push_back({frame, frame_time(frame, motion.frame_rate_Hz), std::move(state), {}});
-    truths.back().error = fem::estimate_error(gel, truths.back().press);
-    if (progress) progress("mechanics", frame + 1, motion.frame_count());
-  };
+  int frame = 0;
   const auto at_frame = [&](const SourceLocation& where, const auto& act) {
     try {
       act();
     } catch (const Error& error) {
-      fail_at(where, "frame {}: {}", truths.size(), error.what());
+      fail_at(where, "frame {}: {}", frame, error.what());
     }
   };
   // A key is to blame only where there is one object.
   const bool single = objects.size() == 1;
   at_frame(motion.keys.empty() || !single ? scene.where : motion.keys.front().where,
-           [&] { keep(press.step(targets)); });
+           [&] { visit(0, kept, press.step(targets)); });
 
-  for (int frame = 1; frame < motion.frame_count(); ++frame) {
-    int steps = 1;
+  for (frame = 1; frame < motion.frame_count(); ++frame) {
+    int steps = 1;  // from one kept state to the next
     for (std::size_t b = 0; b < tracks.size(); ++b) {
       tracks[b].next_frame(press.state().bodies[b]);
-      if (!shaken) steps = std::max(steps, steps_a_frame(tracks[b], motion, plan));
+      if (!shaken) steps = std::max(steps, (steps_a_frame(tracks[b], motion, plan) + kept - 1) / kept);
     }
     const MotionKey& key = tracks.front().key();
+    const bool shakes = shaken && key.vibration && key.vibration->amplitude_mm > 0.0;
     at_frame(single ? key.where : scene.where, [&] {
-      for (int k = 1; k <= steps; ++k) {
+      for (int k = 1; k <= steps * kept; ++k) {
+        const double part = static_cast<double>(k) / (steps * kept);
         for (std::size_t b = 0; b < tracks.size(); ++b) {
-          targets[b] = tracks[b].at(static_cast<double>(k) / steps, !shaken);
-          targets[b].seconds = 1.0 / (steps * motion.frame_rate_Hz);
+          targets[b] = tracks[b].at(part, !shaken);
+          targets[b].seconds = 1.0 / (steps * kept * motion.frame_rate_Hz);
         }
         press.step(targets);
+        if (k % steps != 0) continue;
+        const double seconds = tracks.front().seconds_in_key() - (1.0 - part) / motion.frame_rate_Hz;
+        visit(frame, k / steps, shakes ? shaken->at(press.state(), *key.vibration, seconds) : press.state());
       }
-      const bool shakes = shaken && key.vibration && key.vibration->amplitude_mm > 0.0;
-      keep(shakes ? shaken->at(press.state(), *key.vibration, tracks.front().seconds_in_key()) : press.state());
     });
   }
+}
+
+std::vector<Truth> play_motion(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel,
+                               const Progress& progress, const fem::GelVibration* vibration,
+                               const std::vector<std::shared_ptr<const fem::Compliance>>& elastic) {
+  const MotionSpec& motion = scene.motion;
+  const ExposureTimes exposure(scene, plan);
+  std::vector<Truth> truths;
+  truths.reserve(motion.frame_count());
+  play_states(scene, plan, gel, vibration, elastic, [&](int frame, int part, const fem::PressState& state) {
+    const double now_s = (frame - 1 + static_cast<double>(part) / plan.states_a_frame) / motion.frame_rate_Hz;
+    exposure.keep(truths, now_s, state);
+    if (part < plan.states_a_frame) return;
+    Truth truth;
+    truth.frame = frame;
+    truth.t_us = frame_time_us(frame, motion.frame_rate_Hz);
+    truth.press = state;
+    truth.error = fem::estimate_error(gel, state);
+    truths.push_back(std::move(truth));
+    if (progress) progress("mechanics", frame + 1, motion.frame_count());
+  });
   return truths;
 }
 

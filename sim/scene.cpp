@@ -37,6 +37,7 @@ EnumNames<Elasticity> enum_names(Elasticity) {
 }
 
 void fields(YamlReader& in, OutputSpec& outputs) {
+  outputs.where = in.where();
   in.optional("frames", outputs.frames);
   in.optional("ideal", outputs.ideal);
   in.optional("radiance", outputs.radiance);
@@ -47,6 +48,7 @@ void fields(YamlReader& in, OutputSpec& outputs) {
   in.optional("contact", outputs.contact);
   in.optional("flow", outputs.flow);
   in.optional("error", outputs.error);
+  in.optional("events", outputs.events);
 }
 
 void fields(YamlReader& in, LightSpec& light) {
@@ -54,6 +56,7 @@ void fields(YamlReader& in, LightSpec& light) {
   in.optional("min_samples", light.min_samples, Allowed::within(1, 1 << 16));
   in.optional("max_samples", light.max_samples, Allowed::within(light.min_samples, 1 << 20));
   in.optional("interreflection_tolerance", light.interreflection_tolerance, Allowed::within(0.0, 1.0));
+  in.optional("motion_tolerance_px", light.motion_tolerance_px, Allowed::at_least(0.0));
   in.optional("change_tolerance", light.change_tolerance, Allowed::at_least(0.0));
 }
 
@@ -65,6 +68,8 @@ void fields(YamlReader& in, EffectSwitches& effects) {
   in.optional("relaxation", effects.relaxation);
   in.optional("inertia", effects.inertia);
   in.optional("interreflection", effects.interreflection);
+  in.optional("motion_blur", effects.motion_blur);
+  in.optional("rolling_shutter", effects.rolling_shutter);
   in.optional("sensor_noise", effects.sensor_noise);
 }
 

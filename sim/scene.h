@@ -27,13 +27,17 @@ struct OutputSpec {
   bool ids = false;
   bool contact = false;
   bool flow = false;
-  bool error = false;  ///< the achieved standard error of the light
+  bool error = false;   ///< the achieved standard error of the light
+  bool events = false;  ///< what event pixels tell from the first frame to the last; by itself it asks for no picture
+  SourceLocation where = {};
 
   /// Is light to be traced?
   bool light() const { return frames || ideal || radiance || error; }
   /// Is anything asked for that comes from a pixel's first hit?
   bool first_hits() const { return depth || normals || ids || contact || flow; }
   bool pixel_truth() const { return first_hits() || error; }
+  /// Is a camera needed?
+  bool camera() const { return light() || first_hits() || events; }
 };
 
 /// How exact the light has to be.
@@ -42,7 +46,8 @@ struct LightSpec {
   int min_samples = 8;
   int max_samples = 64;
   double interreflection_tolerance = 0.05;  ///< part of a surface's light that may be left out
-  double change_tolerance = 0.25;  ///< a pixel that changed by less than this part of the noise keeps its old light
+  double motion_tolerance_px = 0.1;  ///< image motion during an exposure that needn't show as blur or rolling shutter
+  double change_tolerance = 0.25;    ///< a pixel that changed by less than this part of the noise keeps its old light
 };
 
 /// Pixels of the fine contact and of the height map: square, the map centred on the gel's origin.
@@ -72,6 +77,8 @@ struct EffectSwitches {
   Switch relaxation = Switch::automatic;
   Switch inertia = Switch::automatic;
   Switch interreflection = Switch::automatic;
+  Switch motion_blur = Switch::automatic;
+  Switch rolling_shutter = Switch::automatic;
   Switch sensor_noise = Switch::automatic;
 };
 

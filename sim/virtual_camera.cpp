@@ -1,12 +1,14 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "core/random.h"
 #include "core/units.h"
-#include "render/path_tracer.h"
+#include "render/rolling_shutter.h"
 #include "sim/device_camera.h"
+#include "sim/exposure_times.h"
 #include "sim/pixel_truth.h"
+#include "sim/scene_sight.h"
 #include "sim/virtual_sensor.h"
-#include "sim/visible_scene.h"
 
 namespace touchstone::sim {
 namespace {
@@ -42,13 +44,10 @@ void widen(cv::Mat& mask, int radius) {
 
 }  // namespace
 
-struct VirtualCamera::Parts {
+struct VirtualCamera::Parts : SceneSight {
   Parts(const SceneSpec& scene_of, const Plan& plan_of, const fem::Compliance& gel_of)
-      : scene(scene_of),
-        plan(plan_of),
-        gel(gel_of),
-        membrane(plan.fine_relief || scene.outputs.height ? std::make_unique<Membrane>(scene, plan, gel_of) : nullptr),
-        objects(visible_objects(scene)),
+      : SceneSight(scene_of, plan_of, gel_of),
+        exposure(scene_of, plan_of),
         camera(camera_of(*scene.device.camera)),
         size(render::size_of(camera).x(), render::size_of(camera).y()),
         imager(sim::imager(scene.device, plan.bands, plan.sensor_noise)),
@@ -61,11 +60,7 @@ struct VirtualCamera::Parts {
     settings.noise = noise_target(response, scene.light.noise_fraction);
   }
 
-  SceneSpec scene;
-  Plan plan;
-  VisibleGel gel;
-  std::unique_ptr<const Membrane> membrane;  // if it's called for
-  std::vector<VisibleObject> objects;
+  ExposureTimes exposure;
   render::Camera camera;
   cv::Size size;
   render::Imager imager;
@@ -76,17 +71,6 @@ struct VirtualCamera::Parts {
   cv::Mat first_light;    // irradiance of the first frame
   cv::Mat first_error;    // its standard error
   cv::Mat first_preview;  // its preview without noise
-
-  std::optional<fem::ReliefAnswer> relief(const Truth& truth) const {
-    return membrane ? membrane->relief(truth.press) : std::nullopt;
-  }
-
-  render::Tracer tracer(const Truth& truth, const std::optional<fem::ReliefAnswer>& relief) const {
-    if (relief && relief->grid.size() > 0) {
-      return render::Tracer(visible_scene(scene, plan, objects, *membrane, truth.press, *relief));
-    }
-    return render::Tracer(visible_scene(scene, plan, objects, gel, truth.press));
-  }
 
   /// Which pixels changed against the first frame by more than the tolerance, widened by the blur of hole or lens.
   cv::Mat changed(const cv::Mat& preview) const {
@@ -145,6 +129,64 @@ struct VirtualCamera::Parts {
     if (scene.outputs.radiance) capture.radiance = irradiance;
     return capture;
   }
+
+  Capture take(const Truth& truth, bool whole) const {
+    const auto now = relief(truth.press);
+    if (!scene.outputs.light()) return geometry(truth, now);
+    const std::vector<double> times = exposure.of(truth);
+    if (times.size() > 1) return take_over_time(truth, now, times, whole);
+    const render::Tracer at_once = tracer(truth.press, now);
+    const cv::Mat mask = whole ? all_pixels() : changed(at_once.preview(camera, kPreviewStride));
+    const int pixels = cv::countNonZero(mask);
+    if (pixels == 0) return develop(first_light, first_error, truth, now, {}, 0);
+    const render::RenderedImage image = at_once.render(camera, settings, mask);
+    return develop(with_first(image.irradiance, first_light, mask), with_first(image.standard_error, first_error, mask),
+                   truth, now, image.counts, pixels);
+  }
+
+  /// Light of the moments `times` (s) after the frame's begin, each row's mean over its own exposure. The moments have
+  /// samples of their own, so that their noise is averaged, too.
+  Capture take_over_time(const Truth& truth, const std::optional<fem::ReliefAnswer>& now,
+                         const std::vector<double>& times, bool whole) const {
+    std::vector<fem::PressState> states;
+    std::vector<std::optional<fem::ReliefAnswer>> reliefs;  // which cost more than a tracer
+    for (const double time : times) {
+      states.push_back(state_after(truth, time));
+      reliefs.push_back(relief(states.back()));
+    }
+    cv::Mat mask = whole ? all_pixels() : cv::Mat(size, CV_8U, cv::Scalar(0));
+    for (std::size_t i = 0; i < times.size() && !whole; ++i) {
+      mask |= changed(tracer(states[i], reliefs[i]).preview(camera, kPreviewStride));
+    }
+    const int pixels = cv::countNonZero(mask);
+    if (pixels == 0) return develop(first_light, first_error, truth, now, {}, 0);
+    render::ShutterTiming timing;
+    if (plan.motion_blur) timing.exposure_s = scene.device.camera->exposure_us / kMicrosecondsPerSecond;
+    if (plan.rolling_shutter) timing.line_time_s = scene.device.camera->row_time_us / kMicrosecondsPerSecond;
+    render::RenderSettings of_moment = settings;
+    const double intervals_of_row = timing.exposure_s / times.back() * static_cast<double>(times.size() - 1);
+    of_moment.noise = noise_target(response, scene.light.noise_fraction * std::sqrt(std::max(1.0, intervals_of_row)));
+    render::RollingExposure sum(times, timing, size, plan.bands.count());
+    render::RayCounts counts;
+    for (std::size_t i = 0; i < times.size(); ++i) {
+      RandomStream seeds(scene.seed, i, Purpose::kMotion);
+      of_moment.seed = (std::uint64_t{seeds()} << 32) | seeds();
+      const render::RenderedImage image = tracer(states[i], reliefs[i]).render(camera, of_moment, mask);
+      sum.add(i, image.irradiance, image.standard_error);
+      counts += image.counts;
+    }
+    return develop(with_first(sum.irradiance(), first_light, mask), with_first(sum.standard_error(), first_error, mask),
+                   truth, now, counts, static_cast<std::int64_t>(times.size()) * pixels);
+  }
+
+  cv::Mat all_pixels() const { return {size, CV_8U, cv::Scalar(255)}; }
+
+  /// The picture where the mask is set, the first frame's elsewhere.
+  static cv::Mat with_first(const cv::Mat& picture, const cv::Mat& first, const cv::Mat& mask) {
+    cv::Mat out = first.clone();
+    picture.copyTo(out, mask);
+    return out;
+  }
 };
 
 VirtualCamera::VirtualCamera(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel, const Truth& first) {
@@ -155,7 +197,7 @@ VirtualCamera::VirtualCamera(const SceneSpec& scene, const Plan& plan, const fem
     return;
   }
   render::RenderSettings settings = parts->settings;
-  const render::Tracer tracer = parts->tracer(first, parts->relief(first));
+  const render::Tracer tracer = parts->tracer(first.press);
   settings.noise->fraction *= kFirstFrameFraction;
   settings.max_samples *= kFirstFrameSamples;
   const render::RenderedImage image = tracer.render(parts->camera, settings);
@@ -169,26 +211,11 @@ VirtualCamera::~VirtualCamera() = default;
 
 Capture VirtualCamera::capture(const Truth& truth) const {
   // A preview knows nothing of scattered light.
-  if (parts_->plan.scattering) return capture_whole(truth);
-  const auto relief = parts_->relief(truth);
-  if (!parts_->scene.outputs.light()) return parts_->geometry(truth, relief);
-  const render::Tracer tracer = parts_->tracer(truth, relief);
-  const cv::Mat mask = parts_->changed(tracer.preview(parts_->camera, kPreviewStride));
-  const int pixels = cv::countNonZero(mask);
-  if (pixels == 0) return parts_->develop(parts_->first_light, parts_->first_error, truth, relief, {}, 0);
-  const render::RenderedImage image = tracer.render(parts_->camera, parts_->settings, mask);
-  cv::Mat light = parts_->first_light.clone();
-  image.irradiance.copyTo(light, mask);
-  cv::Mat error = parts_->first_error.clone();
-  image.standard_error.copyTo(error, mask);
-  return parts_->develop(light, error, truth, relief, image.counts, pixels);
+  return parts_->take(truth, parts_->plan.scattering);
 }
 
 Capture VirtualCamera::capture_whole(const Truth& truth) const {
-  const auto relief = parts_->relief(truth);
-  if (!parts_->scene.outputs.light()) return parts_->geometry(truth, relief);
-  const render::RenderedImage image = parts_->tracer(truth, relief).render(parts_->camera, parts_->settings);
-  return parts_->develop(image.irradiance, image.standard_error, truth, relief, image.counts, image.irradiance.total());
+  return parts_->take(truth, true);
 }
 
 }  // namespace touchstone::sim

@@ -18,12 +18,20 @@
 
 namespace touchstone::sim {
 
-/// What is true at one frame.
+/// A state some time after a frame's begin.
+struct LaterState {
+  double after_s = 0.0;
+  std::shared_ptr<const fem::PressState> press;
+};
+
+/// What is true at one frame, at the begin of its exposure.
 struct Truth {
   int frame = 0;
   std::int64_t t_us = 0;
   fem::PressState press;
-  fem::PressError error;  ///< what the mesh makes of it
+  fem::PressError error;          ///< what the mesh makes of it
+  std::vector<LaterState> later;  ///< where the plan has motion blur or a rolling shutter: the states on from there,
+                                  ///< in order, to the first at or after the exposure's end or the motion's end
 };
 
 /// What a camera makes of one Truth. Pictures that weren't asked for are empty.

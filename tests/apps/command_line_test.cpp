@@ -78,6 +78,39 @@ TEST_F(BadInput, DeviceWithoutCameraButAnImageAskedFor) {
   expect_all_refuse("scene.yaml", "has no camera");
 }
 
+TEST_F(BadInput, EventsOfACameraWithoutEventPixels) {
+  change("scene.yaml", "radiance: true", "events: true");
+  expect_refused(run_program({"plan", job_.string()}), "no block camera.events");
+  const std::string scene = (folder_.path() / "scene.yaml").string();
+  expect_refused(run_program({"render", scene, "--events", (folder_.path() / "e.h5").string()}),
+                 "no block camera.events");
+  expect_refused(run_program({"render", scene, "--events", (folder_.path() / "e.txt").string()}), ".h5");
+  EXPECT_FALSE(fs::exists(folder_.path() / "e.h5"));
+}
+
+TEST_F(BadInput, NegativeEventThreshold) {
+  change("device.yaml", "  read_noise_e: 5\n", "  events: {dark_e_per_s: 10, on_threshold: -0.1}\n");
+  expect_all_refuse("device.yaml:20", "on_threshold");
+}
+
+TEST_F(BadInput, ExposureLongerThanAFrameOfTheMotion) {
+  change("motion.yaml", "start_mm", "frame_rate_Hz: 5000\nstart_mm");
+  expect_all_refuse("scene.yaml:1", "longer than a frame of the motion");
+}
+
+TEST_F(BadInput, RenderWritesTheEventsOfAScene) {
+  change("device.yaml", "  read_noise_e: 5\n", "  events: {dark_e_per_s: 1000}\n");
+  const std::string scene = (folder_.path() / "scene.yaml").string();
+  const fs::path file = folder_.path() / "e.h5";
+  const fs::path picture = folder_.path() / "e.png";
+  const ProgramRun run =
+      run_program({"render", scene, "--events", file.string(), "--events-picture", picture.string()});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.err, HasSubstr("events from"));
+  EXPECT_TRUE(fs::exists(file));
+  EXPECT_TRUE(fs::exists(picture));
+}
+
 TEST_F(BadInput, MissingSceneFiles) {
   fs::remove(folder_.path() / "motion.yaml");
   expect_all_refuse("scene.yaml:3", "there is no file");

@@ -9,6 +9,7 @@
 
 #include "core/error.h"
 #include "core/whole_file.h"
+#include "lab/event_file.h"
 #include "lab/folder_lock.h"
 #include "lab/hdf5_file.h"
 #include "lab/manifest.h"
@@ -210,6 +211,36 @@ TEST_F(DataSet, KeptFramesAreKept) {
   run_broken_off(9);
   const GenerateReport report = run();
   EXPECT_GE(report.kept, 7) << "two threads may have been at work on two more";
+}
+
+TEST_F(DataSet, StreamsOfEventsAreWrittenCheckedAndKept) {
+  folder_.write("device.yaml", std::string(test::kSmallDevice) + test::kSmallCamera + "  events: {dark_e_per_s: 10}\n");
+  folder_.write("scene.yaml",
+                std::string(test::kSmallScene).replace(std::string(test::kSmallScene).find("radiance"), 8, "events"));
+  const auto whole = whole_set();
+  EXPECT_EQ(calls_.streams, 2);
+  const EventFile middle = read_event_file(folder_.path() / "whole/events/middle.h5");
+  const EventFile beside = read_event_file(folder_.path() / "whole/events/beside.h5");
+  EXPECT_EQ(middle.size, cv::Size(48, 36));
+  ASSERT_EQ(middle.events.size(), 500u);
+  EXPECT_EQ(middle.events[203].t_us, 2003);
+  EXPECT_EQ(middle.events[203].y, 2);
+  EXPECT_FALSE(middle.events[204].on);
+  EXPECT_TRUE(middle.events[3].on);
+  EXPECT_NE(middle.events[0].x, beside.events[0].x) << "two scenes have the same noise";
+  const auto manifest = nlohmann::json::parse(read_whole_file(folder_.path() / "whole/dataset.json"));
+  EXPECT_TRUE(manifest["scenes"][0]["outputs"]["events"]);
+  EXPECT_EQ(manifest["work"]["pictures"], 12);
+
+  calls_.streams = 0;
+  calls_.fail_at_stream = 1;
+  EXPECT_THROW(run(), std::runtime_error);
+  EXPECT_FALSE(fs::exists(out_ / "events/beside.h5")) << "half a stream";
+  calls_.fail_at_stream = -1;
+  calls_.streams = 0;
+  EXPECT_EQ(run().rendered, 0);
+  EXPECT_EQ(calls_.streams, 1) << "the finished stream is kept";
+  EXPECT_EQ(contents_of(out_), whole);
 }
 
 TEST_F(DataSet, LostChangedAndCutFramesAreMadeAgain) {

@@ -12,6 +12,8 @@ namespace touchstone::test {
 struct FakeCalls {
   std::atomic<int> pictures{0};
   std::atomic<int> cameras{0};
+  std::atomic<int> streams{0};
+  int fail_at_stream = -1;   ///< in the middle of the stream of this number, likewise
   int fail_at_picture = -1;  ///< the picture of this number throws, as if the process ended there
 };
 
@@ -65,6 +67,23 @@ inline lab::SampleSource fake_source(FakeCalls& calls) {
       capture.paths_traced = 100;
       return capture;
     };
+  };
+  source.watch_events = [&calls](const sim::SceneSpec& scene, const sim::Plan&, const fem::Compliance&,
+                                 std::uint64_t noise_seed, const sim::EventSink& sink, const Progress&) {
+    const bool fails = calls.streams++ == calls.fail_at_stream;
+    sim::EventStreamReport report;
+    for (int portion = 0; portion < 5; ++portion) {
+      std::vector<Event> events;
+      for (int i = 0; i < 100; ++i) {
+        const auto x = static_cast<std::uint16_t>((noise_seed + i) % scene.device.camera->width);
+        events.push_back({1000 * portion + i, x, static_cast<std::uint16_t>(portion), i % 3 == 0});
+      }
+      if (fails && portion == 3) throw std::runtime_error("the process ends here");
+      report.events += 100;
+      report.paths_traced += 7;
+      sink(events);
+    }
+    return report;
   };
   return source;
 }

@@ -57,6 +57,31 @@ TEST(Hdf5File, ReadsBackWhatWasWritten) {
   EXPECT_EQ(reader.integer_attribute("/", "version"), 3);
 }
 
+TEST(Hdf5File, AGrowingDatasetKeepsAllThatWasAppended) {
+  const test::TemporaryFolder folder;
+  constexpr int kPortions = 300;
+  {
+    Hdf5Writer writer(folder.path() / "a.h5");
+    writer.add_growing<std::uint16_t>({"/events/x", "pixels", "events", "", "Columns."});
+    writer.add_growing<std::int64_t>({"/nothing", "us", "events", "", "Nothing."});
+    std::vector<std::uint16_t> portion;
+    for (int i = 0; i < kPortions; ++i) {
+      writer.append<std::uint16_t>("/events/x", portion);  // the first one is empty
+      portion.assign(static_cast<std::size_t>(3 * i), static_cast<std::uint16_t>(i));
+    }
+    writer.append<std::uint16_t>("/events/x", portion);
+    writer.close();
+  }
+  const Hdf5Reader reader(folder.path() / "a.h5");
+  const auto x = reader.read<std::uint16_t>("/events/x").values;
+  ASSERT_EQ(x.size(), static_cast<std::size_t>(3 * kPortions * (kPortions - 1) / 2));
+  std::size_t at = 0;
+  for (int i = 0; i < kPortions; ++i) {
+    for (int k = 0; k < 3 * i; ++k) ASSERT_EQ(x[at++], i);
+  }
+  EXPECT_EQ(reader.read<std::int64_t>("/nothing").shape, (std::vector<std::int64_t>{0}));
+}
+
 TEST(Hdf5File, SameValuesGiveTheSameBytesAtAnotherTime) {
   const test::TemporaryFolder folder;
   write_file(folder.path() / "a.h5");

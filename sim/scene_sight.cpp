@@ -1,0 +1,23 @@
+#include "sim/scene_sight.h"
+
+namespace touchstone::sim {
+
+SceneSight::SceneSight(const SceneSpec& scene_of, const Plan& plan_of, const fem::Compliance& gel_of)
+    : scene(scene_of),
+      plan(plan_of),
+      gel(gel_of),
+      membrane(plan.fine_relief || scene.outputs.height ? std::make_unique<Membrane>(scene, plan, gel_of) : nullptr),
+      objects(visible_objects(scene)) {}
+
+std::optional<fem::ReliefAnswer> SceneSight::relief(const fem::PressState& press) const {
+  return membrane ? membrane->relief(press) : std::nullopt;
+}
+
+render::Tracer SceneSight::tracer(const fem::PressState& press, const std::optional<fem::ReliefAnswer>& relief) const {
+  if (relief && relief->grid.size() > 0) {
+    return render::Tracer(visible_scene(scene, plan, objects, *membrane, press, *relief));
+  }
+  return render::Tracer(visible_scene(scene, plan, objects, gel, press));
+}
+
+}  // namespace touchstone::sim

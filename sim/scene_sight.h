@@ -1,0 +1,32 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "render/path_tracer.h"
+#include "sim/membrane.h"
+#include "sim/plan.h"
+#include "sim/scene.h"
+#include "sim/visible_gel.h"
+#include "sim/visible_scene.h"
+
+namespace touchstone::sim {
+
+/// All of a scene that can be seen, ready to be traced at any of its states. Safe to use from many threads.
+struct SceneSight {
+  SceneSight(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel);
+
+  /// The fine contact, where it's called for.
+  std::optional<fem::ReliefAnswer> relief(const fem::PressState& press) const;
+  render::Tracer tracer(const fem::PressState& press, const std::optional<fem::ReliefAnswer>& relief) const;
+  render::Tracer tracer(const fem::PressState& press) const { return tracer(press, relief(press)); }
+
+  SceneSpec scene;
+  Plan plan;
+  VisibleGel gel;
+  std::unique_ptr<const Membrane> membrane;  ///< for the fine contact and height maps; null where neither is wanted
+  std::vector<VisibleObject> objects;
+};
+
+}  // namespace touchstone::sim
