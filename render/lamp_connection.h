@@ -108,20 +108,20 @@ bool connect_to_lamp(const PreparedScene<N>& scene, const PreparedLamp<N>& lamp,
     const Eigen::Vector2d flat = (p - source).head<2>();
     const double lateral = flat.norm();
     const Eigen::Vector2d toward = lateral > 0.0 ? Eigen::Vector2d(flat / lateral) : Eigen::Vector2d::UnitX();
-    const auto path = solve_layer_path({layers, static_cast<std::size_t>(count)}, lateral);
-    if (!path) return false;
+    LayerPath path;
+    if (!solve_layer_path({layers, static_cast<std::size_t>(count)}, lateral, path)) return false;
     const double sense = up ? 1.0 : -1.0;
     const auto direction_in = [&](int k) {
-      const double sine = path->tangent[k] * path->cosine[k];
-      return Eigen::Vector3d(sine * toward.x(), sine * toward.y(), sense * path->cosine[k]);
+      const double sine = path.tangent[k] * path.cosine[k];
+      return Eigen::Vector3d(sine * toward.x(), sine * toward.y(), sense * path.cosine[k]);
     };
     arrival.direction = -direction_in(count - 1);
     if (!is_particle && arrival.direction.dot(receiver.normal) <= 0.0) return false;
     from_lamp = direction_in(0);
-    per_area = path->jacobian * path->transmittance;
+    per_area = path.jacobian * path.transmittance;
     for (int k = 0; k < count; ++k) {
       if (!scene.media[media[k]].weakens) continue;
-      light *= (-scene.media[media[k]].extinction * (layers[k].thickness / path->cosine[k])).exp();
+      light *= (-scene.media[media[k]].extinction * (layers[k].thickness / path.cosine[k])).exp();
     }
     const double on_lens = from_lamp.dot(lamp.frame.z);
     if (on_lens <= 0.0 || spot_profile(lamp.lamp, on_lens) <= 0.0) return false;
@@ -134,7 +134,7 @@ bool connect_to_lamp(const PreparedScene<N>& scene, const PreparedLamp<N>& lamp,
     for (int k = count - 1; k >= 0; --k) {
       Eigen::Vector3d next = source;
       if (k > 0) {
-        const double step = layers[k].thickness * path->tangent[k];
+        const double step = layers[k].thickness * path.tangent[k];
         next = {corner.x() - step * toward.x(), corner.y() - step * toward.y(),
                 corner.z() - sense * layers[k].thickness};
       }
