@@ -79,47 +79,10 @@ class PathIntegrator {
     return {lamp, numbers.next_pair()};
   }
 
-  struct LampChoice {
-    int lamp;
-    double probability;
-  };
-
-  /// A lamp with a probability in proportion to what it would send without shadow, Fresnel's loss or lobe: by its
-  /// power, distance and, for a matt surface, the cosine after refraction as if all of the way were in the lamp's
-  /// medium. No lamp that shines is left without a chance.
+  /// One lamp of the scene for a receiver, see LampChooser.
   LampChoice choose_lamp(const Receiver& receiver, bool is_matt, double number) const {
-    const auto lamp_count = static_cast<int>(scene_.lamps.size());
-    if (lamp_count == 1) return {0, 1.0};
-    constexpr double kLeastCosine = 0.05;
-    constexpr int kMostWeighed = 32;
-    if (lamp_count > kMostWeighed) {
-      return {std::min(lamp_count - 1, static_cast<int>(number * lamp_count)), 1.0 / lamp_count};
-    }
-    std::array<double, kMostWeighed> weights{};
-    double total = 0.0;
-    for (int i = 0; i < lamp_count; ++i) {
-      const PreparedLamp<N>& lamp = scene_.lamps[i];
-      const Eigen::Vector3d way = lamp.lamp.position - receiver.position;
-      const double distance2 = std::max(1e-12, way.squaredNorm());
-      double cosine = 1.0;
-      if (is_matt) {
-        const double bend =
-            scene_.media[scene_.medium_of_layer(lamp.layer)].index / scene_.media[receiver.medium].index;
-        const double lateral2 = std::min(1.0, bend * bend * way.head<2>().squaredNorm() / distance2);
-        const double shrink = bend / std::sqrt(distance2);
-        const double height = std::copysign(std::sqrt(1.0 - lateral2), way.z());
-        cosine = std::max(kLeastCosine, receiver.normal.x() * way.x() * shrink +
-                                            receiver.normal.y() * way.y() * shrink + receiver.normal.z() * height);
-      }
-      weights[i] = lamp.total_power * cosine / distance2;
-      total += weights[i];
-    }
-    if (!(total > 0.0)) return {0, 1.0};
-    double rest = number * total;
-    int i = 0;
-    while (i + 1 < lamp_count && rest >= weights[i]) rest -= weights[i++];
-    while (weights[i] == 0.0) --i;  // rounding may have run past the last lamp that shines
-    return {i, weights[i] / total};
+    return scene_.lamp_chooser.choose(receiver.position, is_matt ? &receiver.normal : nullptr,
+                                      scene_.media[receiver.medium].index, number);
   }
 
   struct Branches {

@@ -2,12 +2,14 @@
 // A scene with its number of bands known to the compiler and all that can be computed ahead computed.
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <utility>
 #include <vector>
 
 #include "render/ggx.h"
+#include "render/lamp_choice.h"
 #include "render/ray_scene.h"
 #include "render/scene.h"
 #include "render/spectrum.h"
@@ -86,6 +88,7 @@ struct PreparedScene {
   std::vector<PreparedMaterial<N>> materials;  ///< by RayHit::object
   std::vector<PreparedPrint<N>> prints;
   std::vector<PreparedLamp<N>> lamps;
+  LampChooser lamp_chooser;
   Bands<N> environment;
   bool interreflection;
   RayScene rays;
@@ -115,6 +118,12 @@ struct PreparedScene {
       const Bands<N> intensity = Bands<N>(lamp.power_W) / spot_solid_angle(lamp);
       lamps.push_back({lamp, NormalFrame(lamp.direction.normalized()), std::cos(lamp.half_angle), intensity,
                        lamp.power_W.sum(), layer_at(lamp.position.z())});
+    }
+    double strongest = 0.0;
+    for (const auto& lamp : lamps) strongest = std::max(strongest, lamp.total_power);
+    for (const auto& lamp : lamps) {
+      lamp_chooser.add(lamp.lamp.position, strongest > 0.0 ? lamp.total_power / strongest : 0.0,
+                       media[medium_of_layer(lamp.layer)].index);
     }
   }
 
