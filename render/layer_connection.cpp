@@ -52,10 +52,11 @@ bool solve_layer_path(std::span<const Layer> layers, double lateral, LayerPath& 
       slope += rate3;
       turn += rate3 * stretch2 * bend[k];
     }
-    const double newton = (lateral - reach_per_t * t) / slope;
+    const double rest = lateral - reach_per_t * t;
     // Halley's step where the curve bends little on the way to Newton's root, else Newton's own, which can't diverge.
-    const double curving = 1.5 * t * turn * newton / slope;
-    const double increment = std::abs(curving) < 0.5 ? newton / (1.0 - curving) : newton;
+    const double curving = 1.5 * t * turn * rest;  // in units of slope^2
+    const double slope2 = slope * slope;
+    const double increment = std::abs(curving) < 0.5 * slope2 ? rest * slope / (slope2 - curving) : rest / slope;
     t += increment;
     if (!(t < 1e12)) return false;
     if (t <= 0.0) break;
