@@ -66,7 +66,7 @@ class SliceHeights {
     const int row = std::min(static_cast<int>(place), kRows - 1);
     const double part = place - row;
     const double x = 2.0 * u - 1.0;
-    const double y = std::sqrt(1.0 - std::abs(x));
+    const double y = std::sqrt(std::sqrt(1.0 - std::abs(x)));
     const int cell = std::min(static_cast<int>(y * kCells), kCells - 1);
     const double along = y * kCells - cell;
     double height = 0.0;
@@ -78,7 +78,7 @@ class SliceHeights {
       height += share * (a.height - along / kCells * (a.slope + 0.5 * along * rise));
       slope += share * (a.slope + along * rise);
     }
-    return {std::copysign(height * overlap.half_height, x), y / (slope * overlap.half_height)};
+    return {std::copysign(height * overlap.half_height, x), 2.0 * y * y * y / (slope * overlap.half_height)};
   }
 
  private:
@@ -101,12 +101,10 @@ class SliceHeights {
       double high = most;
       for (int halving = 0; halving < 60; ++halving) {
         const double middle = 0.5 * (low + high);
-        (area_below(middle) < (1.0 - y * y) * area ? low : high) = middle;
+        (area_below(middle) < (1.0 - y * y * y * y) * area ? low : high) = middle;
       }
       const double width = 2.0 * std::cos(low) - q;
-      // At the tip the width falls in proportion to the distance from it, or like its root at q = 0.
-      nodes[i].slope = i > 0 ? 2.0 * y * area / (width * std::sin(most))
-                             : std::sqrt(0.5 * q * area / std::sin(most)) / std::sin(most);
+      nodes[i].slope = i > 0 ? 4.0 * y * y * y * area / (width * std::sin(most)) : 0.0;
     }
     nodes[0].height = 0.0;
     for (int i = 0; i < kCells; ++i) {
