@@ -162,7 +162,8 @@ ResultTable bare_rays_table(const LightOptions& options) {
     const render::Scene scene = bench_scene(one.triangles, 8, 3, one.interreflection);
     const render::PinholeCamera camera = bench_camera(160, 120);
     const Tracer tracer(scene);
-    const render::PreparedScene<3> prepared(scene);
+    render::PreparedScene<3> prepared(scene);
+    render::weigh_lamps(prepared);
     const std::vector<render::RecordedRay> rays = rays_of(prepared, camera, settings);
     double traced = INFINITY;
     double bare = INFINITY;

@@ -16,6 +16,7 @@ struct Receiver {
   Eigen::Vector3d normal;  ///< unit, on the side that is lit; zero for a particle, which is lit from all sides
   int layer = 0;
   int medium = 0;
+  bool shadowed = true;  ///< false: as if nothing stood in the way
 };
 
 /// Light arriving: the unit direction it comes from (in the receiver's medium) and the irradiance in W/m^2 on an area
@@ -124,7 +125,7 @@ bool connect_to_lamp(const PreparedScene<N>& scene, const PreparedLamp<N>& lamp,
       light *= (-scene.media[media[k]].extinction * (layers[k].thickness / path.cosine[k])).exp();
     }
     const double on_lens = from_lamp.dot(lamp.frame.z);
-    if (on_lens <= 0.0 || spot_profile(lamp.lamp, on_lens) <= 0.0) return false;
+    if (on_lens <= 0.0 || (on_lens < lamp.cos_full && spot_profile(lamp.lamp, on_lens) <= 0.0)) return false;
 
     // Shadows, leg by leg from the receiver back to the lamp; a leg that no opaque thing's height reaches costs
     // nothing.
@@ -138,7 +139,7 @@ bool connect_to_lamp(const PreparedScene<N>& scene, const PreparedLamp<N>& lamp,
         next = {corner.x() - step * toward.x(), corner.y() - step * toward.y(),
                 corner.z() - sense * layers[k].thickness};
       }
-      if (scene.rays.occluded(end, next)) return false;
+      if (receiver.shadowed && scene.rays.occluded(end, next)) return false;
       if (scene.has_films) light *= passed_by_films(scene, end, next, media[k]);
       corner = next;
       end = next;
@@ -152,12 +153,28 @@ bool connect_to_lamp(const PreparedScene<N>& scene, const PreparedLamp<N>& lamp,
   if (!bends) {
     ++connections;
     const Eigen::Vector3d end = p + RayScene::leave_distance(p) * receiver.normal;
-    if (scene.rays.occluded(end, source)) return false;
+    if (receiver.shadowed && scene.rays.occluded(end, source)) return false;
     if (scene.has_films) light *= passed_by_films(scene, end, source, receiver.medium);
   }
   constexpr double kSquareMillimetresPerSquareMetre = 1e6;
   arrival.irradiance = light * (profile * per_area * kSquareMillimetresPerSquareMetre);
   return true;
+}
+
+/// Lets the choice of lamps know what light arrives where (LampChooser::lay_grid), all over the scene's things.
+template <int N>
+void weigh_lamps(PreparedScene<N>& scene) {
+  scene.lamp_chooser.lay_grid(scene.rays.bounds(), [&](int lamp, const Eigen::Vector3d& place) {
+    const int layer = scene.layer_at(place.z());
+    const Receiver receiver{place, Eigen::Vector3d::Zero(), layer, scene.medium_of_layer(layer), false};
+    Arrival<N> arrival;
+    std::uint64_t uncounted = 0;
+    const PreparedLamp<N>& one = scene.lamps[lamp];
+    if (!connect_to_lamp(scene, one, one.lamp.position, receiver, uncounted, arrival)) {
+      return Eigen::Vector3d(Eigen::Vector3d::Zero());
+    }
+    return Eigen::Vector3d(arrival.irradiance.sum() * arrival.direction);
+  });
 }
 
 }  // namespace touchstone::render

@@ -2,7 +2,6 @@
 // A scene with its number of bands known to the compiler and all that can be computed ahead computed.
 
 #include <Eigen/Core>
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <utility>
@@ -119,11 +118,8 @@ struct PreparedScene {
       lamps.push_back({lamp, NormalFrame(lamp.direction.normalized()), std::cos(lamp.half_angle), intensity,
                        lamp.power_W.sum(), layer_at(lamp.position.z())});
     }
-    double strongest = 0.0;
-    for (const auto& lamp : lamps) strongest = std::max(strongest, lamp.total_power);
     for (const auto& lamp : lamps) {
-      lamp_chooser.add(lamp.lamp.position, strongest > 0.0 ? lamp.total_power / strongest : 0.0,
-                       media[medium_of_layer(lamp.layer)].index);
+      lamp_chooser.add(lamp.lamp.position, lamp.total_power, media[medium_of_layer(lamp.layer)].index);
     }
   }
 
