@@ -111,14 +111,9 @@ LampChooser::Lanes LampChooser::rule_of_thumb(const Group& group, const Eigen::A
   return weights * ((n.x() * x + n.y() * y) * shrink + n.z() * upright).max(kLeastCosine);
 }
 
-LampChoice LampChooser::choose(const Eigen::Vector3d& position, const Eigen::Vector3d* normal, double index,
-                               double number) const {
-  TS_ASSERT(count_ > 0);
-  if (count_ == 1) return {0, 1.0};
-  const LampChoice even = {std::min(count_ - 1, static_cast<int>(number * count_)), 1.0 / count_};
-  if (count_ > kMostWeighed) return even;
-
-  std::array<float, kMostWeighed> below;  // the sum of the weights up to and with each lamp's
+bool LampChooser::weigh(const Eigen::Vector3d& position, const Eigen::Vector3d* normal, double index,
+                        Sums& sums) const {
+  if (count_ > kMostWeighed) return false;
   float total = 0.0f;
   const CellLight* cell = light_at(position);
   for (std::size_t g = 0; g < groups_.size(); ++g) {
@@ -131,16 +126,33 @@ LampChoice LampChooser::choose(const Eigen::Vector3d& position, const Eigen::Vec
       const Eigen::Array3f n = normal->cast<float>();
       weights = (cell[g].x * n.x() + cell[g].y * n.y() + cell[g].z * n.z()).max(cell[g].least);
     }
-    for (int lane = 0; lane < kLanes; ++lane) below[kLanes * g + lane] = total += weights[lane];
+    for (int lane = 0; lane < kLanes; ++lane) sums.up_to[kLanes * g + lane] = total += weights[lane];
   }
-  if (!(total > 0.0f) || !std::isfinite(total)) return even;
+  sums.total = total;
+  return total > 0.0f && std::isfinite(total);
+}
 
-  const float at = std::min(static_cast<float>(number), 1.0f - 0x1p-24f) * total;
+LampChoice LampChooser::choose(const Eigen::Vector3d& position, const Eigen::Vector3d* normal, double index,
+                               double number) const {
+  TS_ASSERT(count_ > 0);
+  if (count_ == 1) return {0, 1.0};
+  Sums sums;
+  if (!weigh(position, normal, index, sums)) {
+    return {std::min(count_ - 1, static_cast<int>(number * count_)), 1.0 / count_};
+  }
+  const float at = std::min(static_cast<float>(number), 1.0f - 0x1p-24f) * sums.total;
   int lamp = 0;
-  for (int i = 0; i + 1 < count_; ++i) lamp += at >= below[i] ? 1 : 0;
-  const auto weight = [&](int i) { return below[i] - (i > 0 ? below[i - 1] : 0.0f); };
-  while (lamp > 0 && !(weight(lamp) > 0.0f)) --lamp;  // rounding may have run past the last lamp that shines
-  return {lamp, static_cast<double>(weight(lamp)) / static_cast<double>(total)};
+  for (int i = 0; i + 1 < count_; ++i) lamp += at >= sums.up_to[i] ? 1 : 0;
+  while (lamp > 0 && !(sums.chance(lamp) > 0.0)) --lamp;  // rounding may have run past the last lamp that shines
+  return {lamp, sums.chance(lamp)};
+}
+
+double LampChooser::chance_of(int lamp, const Eigen::Vector3d& position, const Eigen::Vector3d* normal,
+                              double index) const {
+  TS_ASSERT(lamp >= 0 && lamp < count_);
+  if (count_ == 1) return 1.0;
+  Sums sums;
+  return weigh(position, normal, index, sums) ? sums.chance(lamp) : 1.0 / count_;
 }
 
 }  // namespace touchstone::render

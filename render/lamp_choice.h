@@ -37,9 +37,13 @@ class LampChooser {
   /// @pre there is a lamp
   LampChoice choose(const Eigen::Vector3d& position, const Eigen::Vector3d* normal, double index, double number) const;
 
+  /// The probability with which choose() takes lamp number `lamp`.
+  double chance_of(int lamp, const Eigen::Vector3d& position, const Eigen::Vector3d* normal, double index) const;
+
+  static constexpr int kMostWeighed = 32;  ///< of more lamps each has the same chance
+
  private:
   static constexpr int kLanes = 8;
-  static constexpr int kMostWeighed = 32;  // of more lamps each has the same chance
   using Lanes = Eigen::Array<float, kLanes, 1>;
   struct Group {  // lamps that aren't there have no power
     Lanes x = Lanes::Zero(), y = Lanes::Zero(), z = Lanes::Zero();
@@ -59,6 +63,18 @@ class LampChooser {
       return (static_cast<std::size_t>(k) * count.y() + j) * static_cast<std::size_t>(count.x()) + i;
     }
   };
+
+  /// The sums of the lamps' weights up to and with each lamp's.
+  struct Sums {
+    std::array<float, kMostWeighed> up_to;  // the first count_ are in use
+    float total = 0.0f;
+
+    double chance(int lamp) const {
+      return static_cast<double>(up_to[lamp] - (lamp > 0 ? up_to[lamp - 1] : 0.0f)) / static_cast<double>(total);
+    }
+  };
+  /// False where no weight is of use: too many lamps, or none shines.
+  bool weigh(const Eigen::Vector3d& position, const Eigen::Vector3d* normal, double index, Sums& sums) const;
 
   const CellLight* light_at(const Eigen::Vector3d& position) const;
   Lanes rule_of_thumb(const Group& group, const Eigen::Array3f& p, const Eigen::Vector3d* normal, float index) const;

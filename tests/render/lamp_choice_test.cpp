@@ -41,7 +41,9 @@ void expect_stated_chances(const LampChooser& chooser, const Eigen::Vector3d& pl
     const LampChoice choice = chooser.choose(place, normal, 1.41, (i + 0.5) / kNumbers);
     ASSERT_GE(choice.lamp, 0);
     ASSERT_LT(choice.lamp, 11);
-    ++times[choice.lamp];
+    if (++times[choice.lamp] == 1) {
+      EXPECT_EQ(chooser.chance_of(choice.lamp, place, normal, 1.41), choice.probability);
+    }
     stated[choice.lamp] = choice.probability;
   }
   double sum = 0.0;
