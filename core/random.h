@@ -14,6 +14,7 @@ enum class Purpose : std::uint32_t {
   kMotion = 5,
   kEventThreshold = 6,
   kEventNoise = 7,
+  kLampSpread = 8,
   kTest = 99,
 };
 

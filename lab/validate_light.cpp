@@ -241,7 +241,7 @@ double lamp_choice(std::uint64_t seed, int effort) {
   Scene scene = empty_scene(0.0);
   scene.interreflection = false;
   scene.balls.push_back({{0, 0, 0}, 2.0, Lambertian{grey(0.7)}});
-  std::vector<render::SpotLamp> lamps;
+  std::vector<render::Lamp> lamps;
   for (int i = 0; i < 8; ++i) {
     const double angle = kPi / 4 * i;
     lamps.push_back(point_lamp({12 * std::cos(angle), 12 * std::sin(angle), -8.0 - i},
@@ -252,7 +252,7 @@ double lamp_choice(std::uint64_t seed, int effort) {
        {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(1.2, 0.3, 0), Eigen::Vector3d(-0.4, 1.6, 0)}) {
     const Eigen::Vector3d eye(0, 0, -30);
     double sum = 0.0;
-    for (const render::SpotLamp& lamp : lamps) {
+    for (const render::Lamp& lamp : lamps) {
       scene.lamps = {lamp};
       sum += Tracer(scene).radiance(eye, target - eye, samples(1, seed))[0];
     }

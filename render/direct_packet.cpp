@@ -25,7 +25,8 @@ DirectFixture::DirectFixture(const LightField& of) : field(of) {
     absorption[band] = static_cast<float>(medium.absorption[band]);
     absorbs = absorbs || medium.absorption[band] > 0.0;
   }
-  for (const SpotLamp& lamp : field.fixture.lamps) {
+  for (const Lamp& one : field.fixture.lamps) {
+    const auto& lamp = std::get<SpotLamp>(one);  // a light field has no others
     lens_frames.emplace_back(lamp.direction.normalized());
     int layer = 0;
     while (layer < static_cast<int>(faces.size()) && faces[layer].z < lamp.position.z()) ++layer;
@@ -97,7 +98,7 @@ void DirectPacket::light_lane(int lane) {
 void DirectPacket::choose_lens_points(int lane, double u, double v) {
   if (material_[lane] == nullptr || !is_lit(material_[lane]->kind)) return;
   for (int lamp = 0; lamp < lamps_; ++lamp) {
-    const double radius = field_.fixture.lamps[lamp].lens_radius;
+    const double radius = std::get<SpotLamp>(field_.fixture.lamps[lamp]).lens_radius;
     LampLight& one = light_[lamp];
     if (one.amount[lane] == 0.0f || radius == 0.0) continue;
     const Eigen::Vector2d lens = radius * square_to_disc(u, v);
@@ -179,7 +180,7 @@ void DirectPacket::shadow_ray(int lane, int lamp) {
     far = std::max(0.0f, (static_cast<float>(limit) - place.z()) / towards.z());
   }
   if (fixture.lamp_in_layer[lamp]) {
-    far = std::min(far, static_cast<float>((field_.fixture.lamps[lamp].position - place.cast<double>()).norm()));
+    far = std::min(far, static_cast<float>((lamp_position(field_.fixture.lamps[lamp]) - place.cast<double>()).norm()));
   }
   if (!origin.allFinite() || !towards.allFinite()) return;
   for (int a = 0; a < 3; ++a) {

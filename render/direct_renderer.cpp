@@ -33,11 +33,7 @@ bool same_fixture(const Scene& a, const Scene& b) {
                     [](const FlatFace& f, const FlatFace& g) {
                       return f.z == g.z && f.medium_below == g.medium_below && f.medium_above == g.medium_above;
                     }) &&
-         std::equal(a.lamps.begin(), a.lamps.end(), b.lamps.begin(), b.lamps.end(),
-                    [](const SpotLamp& l, const SpotLamp& m) {
-                      return l.position == m.position && l.direction == m.direction && l.lens_radius == m.lens_radius &&
-                             l.half_angle == m.half_angle && l.soft_angle == m.soft_angle && same(l.power_W, m.power_W);
-                    }) &&
+         std::equal(a.lamps.begin(), a.lamps.end(), b.lamps.begin(), b.lamps.end(), same_lamp) &&
          same(a.environment, b.environment);
 }
 

@@ -25,6 +25,8 @@ template <int N>
 struct Arrival {
   Eigen::Vector3d direction;
   Bands<N> irradiance;
+  double angle_per_lamp_area = 0.0;  ///< sr of directions at the receiver a mm^2 of the lamp; 0 if it has no area
+  bool bends_at_surface = false;     ///< crosses a Refractive surface, which connections take as flat
 };
 
 /// What ThinFilms between two points of one medium let through.
@@ -48,8 +50,8 @@ template <int N>
   return passed;
 }
 
-/// Light from the point `source` of lamp `lamp` to the receiver. False where none arrives: out of the lamp's lobe,
-/// from behind the receiver's surface or the lens, in shadow. `connections` counts shadow tests.
+/// Light from the point `source` of lamp `lamp` (not a guide's) to the receiver. False where none arrives: out of the
+/// lamp's lobe, from behind the receiver's surface or the lens, in shadow. `connections` counts shadow tests.
 ///
 /// Layers are those between the two heights. A receiver whose medium isn't that of its layer stands beyond a Refractive
 /// surface (an object just off the gel): that surface is taken as flat and horizontal at the height where a vertical
@@ -80,6 +82,7 @@ bool connect_to_lamp(const PreparedScene<N>& scene, const PreparedLamp<N>& lamp,
   const int usual = scene.medium_of_layer(receiver.layer);
   if (receiver.medium != usual) {
     const double off = scene.rays.refractive_along_z(p, !up, std::abs(p.z() - z));
+    arrival.bends_at_surface = off >= 0.0;
     if (off >= 0.0) add_layer(up ? std::max(z, p.z() - off) : std::min(z, p.z() + off), usual);
   }
   add_layer(p.z(), receiver.medium);
@@ -99,6 +102,7 @@ bool connect_to_lamp(const PreparedScene<N>& scene, const PreparedLamp<N>& lamp,
     arrival.direction = -from_lamp;
     if (!is_particle && arrival.direction.dot(receiver.normal) <= 0.0) return false;
     per_area = 1.0 / distance2;
+    arrival.angle_per_lamp_area = per_area;
     const double height = std::abs(way.z());
     for (int k = 0; k < count; ++k) {
       if (!scene.media[media[k]].weakens) continue;
@@ -119,13 +123,14 @@ bool connect_to_lamp(const PreparedScene<N>& scene, const PreparedLamp<N>& lamp,
     arrival.direction = -direction_in(count - 1);
     if (!is_particle && arrival.direction.dot(receiver.normal) <= 0.0) return false;
     from_lamp = direction_in(0);
+    arrival.angle_per_lamp_area =
+        path.jacobian * std::pow(layers[0].index / layers[count - 1].index, 2);  // by reciprocity
     per_area = path.jacobian * path.transmittance;
     for (int k = 0; k < count; ++k) {
       if (!scene.media[media[k]].weakens) continue;
       light *= (-scene.media[media[k]].extinction * (layers[k].thickness / path.cosine[k])).exp();
     }
-    const double on_lens = from_lamp.dot(lamp.frame.z);
-    if (on_lens <= 0.0 || (on_lens < lamp.cos_full && spot_profile(lamp.lamp, on_lens) <= 0.0)) return false;
+    if (emission_profile(lamp, from_lamp) <= 0.0) return false;
 
     // Shadows, leg by leg from the receiver back to the lamp; a leg that no opaque thing's height reaches costs
     // nothing.
@@ -139,24 +144,23 @@ bool connect_to_lamp(const PreparedScene<N>& scene, const PreparedLamp<N>& lamp,
         next = {corner.x() - step * toward.x(), corner.y() - step * toward.y(),
                 corner.z() - sense * layers[k].thickness};
       }
-      if (receiver.shadowed && scene.rays.occluded(end, next)) return false;
+      if (receiver.shadowed && scene.blocked(end, next)) return false;
       if (scene.has_films) light *= passed_by_films(scene, end, next, media[k]);
       corner = next;
       end = next;
     }
   }
 
-  const double cosine = from_lamp.dot(lamp.frame.z);
-  if (cosine <= 0.0) return false;
-  const double profile = cosine >= lamp.cos_full ? 1.0 : spot_profile(lamp.lamp, cosine);
+  const double profile = emission_profile(lamp, from_lamp);
   if (profile <= 0.0) return false;
   if (!bends) {
     ++connections;
     const Eigen::Vector3d end = p + RayScene::leave_distance(p) * receiver.normal;
-    if (receiver.shadowed && scene.rays.occluded(end, source)) return false;
+    if (receiver.shadowed && scene.blocked(end, source)) return false;
     if (scene.has_films) light *= passed_by_films(scene, end, source, receiver.medium);
   }
   constexpr double kSquareMillimetresPerSquareMetre = 1e6;
+  arrival.angle_per_lamp_area *= from_lamp.dot(lamp.frame.z);
   arrival.irradiance = light * (profile * per_area * kSquareMillimetresPerSquareMetre);
   return true;
 }
@@ -164,13 +168,16 @@ bool connect_to_lamp(const PreparedScene<N>& scene, const PreparedLamp<N>& lamp,
 /// Lets the choice of lamps know what light arrives where (LampChooser::lay_grid), all over the scene's things.
 template <int N>
 void weigh_lamps(PreparedScene<N>& scene) {
+  for (const PreparedLamp<N>& lamp : scene.lamps) {
+    if (lamp.kind == LampKind::kGuide) return;  // its light takes other ways
+  }
   scene.lamp_chooser.lay_grid(scene.rays.bounds(), [&](int lamp, const Eigen::Vector3d& place) {
     const int layer = scene.layer_at(place.z());
     const Receiver receiver{place, Eigen::Vector3d::Zero(), layer, scene.medium_of_layer(layer), false};
     Arrival<N> arrival;
     std::uint64_t uncounted = 0;
     const PreparedLamp<N>& one = scene.lamps[lamp];
-    if (!connect_to_lamp(scene, one, one.lamp.position, receiver, uncounted, arrival)) {
+    if (!connect_to_lamp(scene, one, one.position, receiver, uncounted, arrival)) {
       return Eigen::Vector3d(Eigen::Vector3d::Zero());
     }
     return Eigen::Vector3d(arrival.irradiance.sum() * arrival.direction);

@@ -24,8 +24,9 @@ Scene single_band(const Scene& fixture, int band) {
     if (band >= 0 && medium.absorption.size() > 0) one.absorption = flat_spectrum(1, medium.absorption[band]);
     scene.media.push_back(one);
   }
-  for (SpotLamp lamp : fixture.lamps) {
-    lamp.power_W = flat_spectrum(1, spot_solid_angle(lamp));
+  for (Lamp lamp : fixture.lamps) {
+    const double unit = emission_integral(lamp);
+    std::visit([&](auto& one) { one.power_W = flat_spectrum(1, unit); }, lamp);
     scene.lamps.push_back(lamp);
   }
   return scene;
@@ -35,13 +36,12 @@ Scene single_band(const Scene& fixture, int band) {
 Eigen::Vector4d flow_at(const PreparedScene<1>& scene, int number, int layer, const Eigen::Vector3d& place,
                         int lens_points) {
   const PreparedLamp<1>& lamp = scene.lamps[number];
-  const int side = lamp.lamp.lens_radius > 0.0 ? lens_points : 1;
+  const int side = lamp.area > 0.0 ? lens_points : 1;
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   std::uint64_t uncounted = 0;
   for (int i = 0; i < side; ++i) {
     for (int j = 0; j < side; ++j) {
-      const Eigen::Vector2d disc = lamp.lamp.lens_radius * square_to_disc((i + 0.5) / side, (j + 0.5) / side);
-      const Eigen::Vector3d source = lamp.lamp.position + disc.x() * lamp.frame.x + disc.y() * lamp.frame.y;
+      const Eigen::Vector3d source = point_on_lamp(lamp, {(i + 0.5) / side, (j + 0.5) / side});
       // Light that is bent at level faces keeps its azimuth and its sense along z, so a receiver that faces the source
       // isn't lit from behind.
       const Receiver receiver{place, (source - place).normalized(), layer, scene.medium_of_layer(layer)};
@@ -147,7 +147,10 @@ void check_reach(const Scene& fixture, const Eigen::AlignedBox3d& reach) {
     }
   }
   for (std::size_t i = 0; i < fixture.lamps.size(); ++i) {
-    const SpotLamp& lamp = fixture.lamps[i];
+    if (!std::holds_alternative<SpotLamp>(fixture.lamps[i])) {
+      fail("light field: lamp {} isn't a SpotLamp; other kinds are for the path tracer", i);
+    }
+    const SpotLamp& lamp = std::get<SpotLamp>(fixture.lamps[i]);
     if (reach.exteriorDistance(lamp.position) <= lamp.lens_radius) {
       fail("light field: lamp {} at ({}, {}, {}) reaches into the box; the field is endless there", i,
            lamp.position.x(), lamp.position.y(), lamp.position.z());
@@ -171,7 +174,7 @@ LightField make_light_field(const Scene& fixture, const Eigen::AlignedBox3d& rea
   // By the box's middle, since it may end just on a face.
   const double middle = reach.center().z();
   for (const FlatFace& face : fixture.faces) field.layer += face.z < middle ? 1 : 0;
-  for (const SpotLamp& lamp : fixture.lamps) field.intensity.push_back(lamp.power_W / spot_solid_angle(lamp));
+  for (const Lamp& lamp : fixture.lamps) field.intensity.push_back(lamp_power(lamp) / emission_integral(lamp));
 
   Maker maker{settings, PreparedScene<1>(single_band(fixture, -1)), {}};
   field.index = maker.clear.media[maker.clear.medium_of_layer(field.layer)].index;

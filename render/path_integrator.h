@@ -8,7 +8,8 @@
 #include <limits>
 
 #include "render/ggx.h"
-#include "render/lamp_connection.h"
+#include "render/guide_connection.h"
+#include "render/lamp_sharing.h"
 #include "render/path_leg.h"
 #include "render/path_tracer.h"
 #include "render/prepared_scene.h"
@@ -25,7 +26,11 @@ template <int N>
 class PathIntegrator {
  public:
   PathIntegrator(const PreparedScene<N>& scene, int max_depth, bool interreflection)
-      : scene_(scene), max_depth_(max_depth), interreflection_(interreflection), smooth_(scene) {}
+      : scene_(scene),
+        max_depth_(max_depth),
+        interreflection_(interreflection),
+        smooth_(scene),
+        lamps_are_seen_(!scene.lamp_bodies.empty()) {}
 
   /// Basic radiance that arrives at `origin` against `direction` (unit).
   Bands<N> trace(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, SampleSequence& numbers,
@@ -47,6 +52,7 @@ class PathIntegrator {
  private:
   static constexpr int kMostSmoothEvents = 64;
   static constexpr int kRouletteFrom = 3;
+  static constexpr int kGuidePreview = 6;
 
   using Leg = PathLeg<N>;
   using Branches = PathBranches<N>;
@@ -65,6 +71,12 @@ class PathIntegrator {
   LampChoice choose_lamp(const Receiver& receiver, bool is_matt, double number) const {
     return scene_.lamp_chooser.choose(receiver.position, is_matt ? &receiver.normal : nullptr,
                                       scene_.media[receiver.medium].index, number);
+  }
+
+  /// The probability with which choose_lamp takes a lamp.
+  double chance_of_lamp(const Receiver& receiver, bool is_matt, int lamp) const {
+    return scene_.lamp_chooser.chance_of(lamp, receiver.position, is_matt ? &receiver.normal : nullptr,
+                                         scene_.media[receiver.medium].index);
   }
 
   void absorb(Leg& leg, double distance) const {
@@ -107,9 +119,7 @@ class PathIntegrator {
       for (int i = choice.lamp; i < last; ++i) {
         const PreparedLamp<N>& lamp = scene_.lamps[i];
         Arrival<N> arrival;
-        if (!connect_to_lamp(scene_, lamp, point_of_lens(lamp, chosen), receiver, counts.connections, arrival)) {
-          continue;
-        }
+        if (!connect(scene_, lamp, chosen.lens, receiver, counts.connections, arrival)) continue;
         const Eigen::Vector3d in = frame.to_local(arrival.direction);
         sum += leg.throughput * arrival.irradiance *
                (rough_dielectric(out, in, material.roughness, n_out, n_in) * std::abs(in.z()) /
@@ -155,19 +165,80 @@ class PathIntegrator {
     const LampChoice choice = choose_lamp(receiver, false, chosen.lamp);
     const PreparedLamp<N>& lamp = scene_.lamps[choice.lamp];
     Arrival<N> arrival;
-    if (!connect_to_lamp(scene_, lamp, point_of_lens(lamp, chosen), receiver, counts.connections, arrival)) return;
+    if (!connect(scene_, lamp, chosen.lens, receiver, counts.connections, arrival)) return;
+    if (lamp.visible && interreflection_) {
+      share_with_paths(lamp, choice, receiver,
+                       henyey_greenstein(arrival.direction.dot(leg.direction), medium.anisotropy), arrival);
+    }
     const double phase = henyey_greenstein(arrival.direction.dot(leg.direction), medium.anisotropy);
     sum += leg.throughput * arrival.irradiance * (phase / (choice.probability * medium.index * medium.index));
   }
 
-  static Eigen::Vector3d point_of_lens(const PreparedLamp<N>& lamp, const LampNumbers& chosen) {
-    Eigen::Vector3d source = lamp.lamp.position;
-    if (lamp.lamp.lens_radius > 0.0) {
-      const auto [u, v] = chosen.lens;
-      const Eigen::Vector2d disc = lamp.lamp.lens_radius * square_to_disc(u, v);
-      source += disc.x() * lamp.frame.x + disc.y() * lamp.frame.y;
+  /// Density per sr of the directions in which a path goes on from a surface: those that scatter() draws for this leg,
+  /// or 0 where connections keep the light for themselves. `normal` is the surface's, on either side.
+  double scattering_density(const Leg& leg, const Eigen::Vector3d& normal, const PreparedMaterial<N>& material,
+                            const Eigen::Vector3d& in) const {
+    const double side = leg.direction.dot(normal) < 0.0 ? 1.0 : -1.0;
+    const double cosine = side * in.dot(normal);
+    if (material.kind == SurfaceKind::kConductor) {
+      const NormalFrame frame(side * normal);
+      return visible_reflection_density(frame.to_local(-leg.direction), frame.to_local(in), material.roughness);
     }
-    return source;
+    if (material.kind == SurfaceKind::kTransmitter) {
+      const double back = (leg.throughput * material.colour).sum();
+      const double through = (leg.throughput * material.passed).sum();
+      if (!(back + through > 0.0)) return 0.0;
+      return std::abs(cosine) / kPi * (cosine > 0.0 ? back : through) / (back + through);
+    }
+    return std::max(0.0, cosine) / kPi;
+  }
+
+  /// Leaves to paths that run into the lamp their share of what a connection has found; `density` is that of such a
+  /// path's direction.
+  void share_with_paths(const PreparedLamp<N>& lamp, const LampChoice& choice, const Receiver& receiver, double density,
+                        Arrival<N>& arrival) const {
+    if (!(arrival.angle_per_lamp_area > 0.0)) return;
+    if (arrival.bends_at_surface || passes_refractive(scene_, lamp, receiver, arrival.direction)) return;
+    const double of_connection = choice.probability / (lamp.area * arrival.angle_per_lamp_area);
+    arrival.irradiance *= of_connection / (of_connection + density);
+  }
+
+  /// How the light of a lamp that the path runs into is shared with the connections of where the path last scattered.
+  struct Departure {
+    enum class Sharing { kAllToPath, kShared, kAllToConnection } sharing = Sharing::kAllToPath;
+    Receiver from;
+    bool is_matt = false;
+    double density = 0.0;
+  };
+
+  /// After a smooth event at a face or surface of this normal: mirrored light is found by paths only.
+  static void note_smooth_event(Departure& departure, const Eigen::Vector3d& before, const Eigen::Vector3d& after,
+                                const Eigen::Vector3d& normal, bool is_refractive_surface) {
+    if ((before.dot(normal) > 0.0) != (after.dot(normal) > 0.0)) {
+      departure.sharing = Departure::Sharing::kAllToPath;
+    } else if (is_refractive_surface && departure.sharing == Departure::Sharing::kShared) {
+      departure.sharing = Departure::Sharing::kAllToConnection;
+    }
+  }
+
+  /// The leg runs into a lamp.
+  [[gnu::noinline]] void add_lamp_seen(const Leg& leg, const LampBodies::Hit& seen, const Departure& departure,
+                                       Bands<N>& sum) const {
+    const PreparedLamp<N>& lamp = scene_.lamps[seen.lamp];
+    if (!(leg.direction.dot(lamp.frame.z) < 0.0)) return;  // its back
+    const Eigen::Vector3d point = leg.origin + seen.distance * leg.direction;
+    double weight = 1.0;
+    if (departure.sharing != Departure::Sharing::kAllToPath) {
+      if (departure.sharing == Departure::Sharing::kAllToConnection ||
+          bends_at_surface(scene_, lamp, point, departure.from)) {
+        return;
+      }
+      const double of_connection = chance_of_lamp(departure.from, departure.is_matt, seen.lamp) /
+                                   (lamp.area * angle_per_lamp_area(scene_, lamp, point, departure.from));
+      weight = departure.density / (departure.density + of_connection);
+    }
+    const double index = scene_.media[leg.medium].index;
+    sum += leg.throughput * lamp_radiance(lamp, Eigen::Vector3d(-leg.direction)) * (weight / (index * index));
   }
 
   /// Lamp light that the surface sends along the leg, out of its side `normal`: the side that faces the leg, or the
@@ -180,28 +251,39 @@ class PathIntegrator {
     const double index = scene_.media[leg.medium].index;
     const bool is_matt = material.kind != SurfaceKind::kConductor;
     const Receiver receiver{hit.position, normal, leg.layer, leg.medium};
-    // One lamp a hit. A preview has just one sample and takes them all.
+    // One lamp a hit. A preview has just one sample and takes them all, guides by several directions.
     const LampChoice choice = all_lamps ? LampChoice{0, 1.0} : choose_lamp(receiver, is_matt, chosen.lamp);
     const int first = choice.lamp;
     const int last = all_lamps ? lamp_count : first + 1;
     const double weight = 1.0 / (choice.probability * index * index);
     for (int i = first; i < last; ++i) {
       const PreparedLamp<N>& lamp = scene_.lamps[i];
-      const Eigen::Vector3d source = point_of_lens(lamp, chosen);
-      Arrival<N> arrival;
-      if (!connect_to_lamp(scene_, lamp, source, receiver, counts.connections, arrival)) continue;
-      const double cosine = arrival.direction.dot(normal);
-      if (is_matt) {
-        sum += leg.throughput * surface_colour * arrival.irradiance * (weight * cosine / kPi);
-      } else {
-        const NormalFrame frame(normal);
-        const Eigen::Vector3d out = frame.to_local(-leg.direction);
-        const Eigen::Vector3d in = frame.to_local(arrival.direction);
-        const double schlick = schlick_weight((out + in).normalized().dot(out));
-        const Bands<N> colour = (surface_colour + (1.0 - surface_colour) * schlick) *
-                                (1.0 + surface_colour * material.single_albedo.missing_ratio(out.z()));
-        sum += leg.throughput * colour * arrival.irradiance *
-               (weight * cosine * ggx_reflection(out, in, material.roughness));
+      // The middle of a guide's lobe may get nowhere: its preview takes several directions.
+      const int parts = all_lamps && lamp.kind == LampKind::kGuide ? kGuidePreview * kGuidePreview : 1;
+      const double share = weight / parts;
+      for (int part = 0; part < parts; ++part) {
+        std::array<double, 2> place = chosen.lens;
+        if (parts > 1)
+          place = {(part % kGuidePreview + 0.5) / kGuidePreview, (part / kGuidePreview + 0.5) / kGuidePreview};
+        Arrival<N> arrival;
+        if (!connect(scene_, lamp, place, receiver, counts.connections, arrival)) continue;
+        if (lamp.visible && interreflection_ && leg.depth < max_depth_) {
+          share_with_paths(lamp, choice, receiver, scattering_density(leg, hit.normal, material, arrival.direction),
+                           arrival);
+        }
+        const double cosine = arrival.direction.dot(normal);
+        if (is_matt) {
+          sum += leg.throughput * surface_colour * arrival.irradiance * (share * cosine / kPi);
+        } else {
+          const NormalFrame frame(normal);
+          const Eigen::Vector3d out = frame.to_local(-leg.direction);
+          const Eigen::Vector3d in = frame.to_local(arrival.direction);
+          const double schlick = schlick_weight((out + in).normalized().dot(out));
+          const Bands<N> colour = (surface_colour + (1.0 - surface_colour) * schlick) *
+                                  (1.0 + surface_colour * material.single_albedo.missing_ratio(out.z()));
+          sum += leg.throughput * colour * arrival.irradiance *
+                 (share * cosine * ggx_reflection(out, in, material.roughness));
+        }
       }
     }
   }
@@ -287,7 +369,11 @@ class PathIntegrator {
   void follow(Leg& leg, Branches& branches, const LampNumbers& at_first_hit, SampleSequence& numbers, RayCounts& counts,
               Bands<N>& sum) const {
     const int face_count = static_cast<int>(scene_.faces.size());
+    Departure departure;  // this and the next are kept up only where a lamp is visible
+    Leg before = leg;
     for (;;) {
+      if (lamps_are_seen_) [[unlikely]]
+        before = leg;
       ++(leg.is_first_sight() ? counts.primary : counts.bounces);
       const bool up = leg.direction.z() > 0.0;
       double to_face = std::numeric_limits<double>::infinity();
@@ -304,7 +390,16 @@ class PathIntegrator {
         most = std::min(most, drawn.distance);
       }
       RayHit hit;
-      if (scene_.rays.intersect(leg.origin, leg.direction, most, hit)) {
+      const bool meets = scene_.rays.intersect(leg.origin, leg.direction, most, hit);
+      if (lamps_are_seen_) [[unlikely]] {
+        const LampBodies::Hit seen = scene_.lamp_bodies.nearest(leg.origin, leg.direction, meets ? hit.distance : most);
+        if (seen.lamp >= 0) {
+          pass(leg, flight, seen.distance);
+          add_lamp_seen(leg, seen, departure, sum);
+          return;
+        }
+      }
+      if (meets) {
         pass(leg, flight, hit.distance);
         const PreparedMaterial<N>& material = scene_.materials[hit.object];
         if (material.kind == SurfaceKind::kBlack) return;
@@ -314,11 +409,16 @@ class PathIntegrator {
         }
         if (material.kind == SurfaceKind::kRefractive) {
           smooth_.meet_boundary(leg, hit, material, branches, numbers, sum);
+          if (lamps_are_seen_) note_smooth_event(departure, before.direction, leg.direction, hit.normal, true);
         } else if (material.kind == SurfaceKind::kRoughRefractive) {
           if (!meet_rough_boundary(leg, hit, material, at_first_hit, branches, numbers, counts, sum)) return;
+          // Where nothing was scattered the surface still was in the way of connections.
+          departure.sharing = leg.depth == before.depth || !lamps_are_seen_ ? Departure::Sharing::kAllToPath
+                                                                            : Departure::Sharing::kAllToConnection;
         } else if (material.kind == SurfaceKind::kFilm) {
           smooth_.meet_film(leg, hit, material, branches, numbers);
           if (!(leg.throughput.maxCoeff() > 0.0)) return;
+          if (lamps_are_seen_) note_smooth_event(departure, before.direction, leg.direction, hit.normal, false);
         } else {
           const Eigen::Vector3d normal =
               leg.direction.dot(hit.normal) < 0.0 ? hit.normal : Eigen::Vector3d(-hit.normal);
@@ -330,6 +430,13 @@ class PathIntegrator {
                            side == 0 ? colour : material.passed, chosen, numbers.is_centre(), counts, sum);
           }
           if (!scatter(leg, hit, normal, material, colour, numbers)) return;
+          if (lamps_are_seen_) [[unlikely]] {
+            const Eigen::Vector3d lit = leg.direction.dot(normal) > 0.0 ? normal : Eigen::Vector3d(-normal);
+            departure = {Departure::Sharing::kShared,
+                         {hit.position, lit, before.layer, before.medium},
+                         material.kind != SurfaceKind::kConductor,
+                         scattering_density(before, hit.normal, material, leg.direction)};
+          }
         }
       } else if (most < to_face) {
         const PreparedMedium<N>& medium = scene_.media[leg.medium];
@@ -337,10 +444,19 @@ class PathIntegrator {
         leg.throughput *= weight_of_scattering<N>(medium.extinction, medium.scattering, *flight);
         const LampNumbers chosen = leg.is_first_sight() ? at_first_hit : lamp_numbers(numbers);
         if (!scatter_in_medium(leg, chosen, numbers, counts, sum)) return;
+        if (lamps_are_seen_) [[unlikely]] {
+          departure = {Departure::Sharing::kShared,
+                       {leg.origin, Eigen::Vector3d::Zero(), leg.layer, leg.medium},
+                       false,
+                       henyey_greenstein(leg.direction.dot(before.direction), medium.anisotropy)};
+        }
       } else if (std::isfinite(to_face)) {
         pass(leg, flight, to_face);
         leg.origin += to_face * leg.direction;
         smooth_.meet_face(leg, up, branches, numbers, sum);
+        if (lamps_are_seen_) {
+          note_smooth_event(departure, before.direction, leg.direction, Eigen::Vector3d::UnitZ(), false);
+        }
       } else {
         if (flight != nullptr) [[unlikely]]
           pass(leg, flight, to_face);
@@ -358,6 +474,7 @@ class PathIntegrator {
   int max_depth_;
   bool interreflection_;
   SmoothEvents<N> smooth_;
+  bool lamps_are_seen_;  // some lamp is visible
 };
 
 }  // namespace touchstone::render

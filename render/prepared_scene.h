@@ -8,12 +8,12 @@
 #include <vector>
 
 #include "render/ggx.h"
+#include "render/lamp_bodies.h"
 #include "render/lamp_choice.h"
+#include "render/prepared_lamp.h"
 #include "render/ray_scene.h"
 #include "render/scene.h"
 #include "render/spectrum.h"
-#include "render/spot_light.h"
-#include "render/warps.h"
 
 namespace touchstone::render {
 
@@ -69,16 +69,6 @@ struct PreparedPrint {
   }
 };
 
-template <int N>
-struct PreparedLamp {
-  SpotLamp lamp;
-  NormalFrame frame;
-  double cos_full;             ///< within this cosine the lobe is at its top
-  Bands<N> intensity_on_axis;  ///< W/sr
-  double total_power;          ///< W, over the bands
-  int layer;                   ///< number of faces below it
-};
-
 /// See Scene. Layer k lies between face k-1 and face k.
 template <int N>
 struct PreparedScene {
@@ -91,6 +81,7 @@ struct PreparedScene {
   Bands<N> environment;
   bool interreflection;
   RayScene rays;
+  LampBodies lamp_bodies;
   bool has_films;
 
   explicit PreparedScene(const Scene& scene)
@@ -113,21 +104,24 @@ struct PreparedScene {
       if (surface.print) add_print(surface);
     }
     for (const Ball& ball : scene.balls) materials.push_back(prepare(ball.material));
-    for (const SpotLamp& lamp : scene.lamps) {
-      const Bands<N> intensity = Bands<N>(lamp.power_W) / spot_solid_angle(lamp);
-      lamps.push_back({lamp, NormalFrame(lamp.direction.normalized()), std::cos(lamp.half_angle), intensity,
-                       lamp.power_W.sum(), layer_at(lamp.position.z())});
+    for (const Lamp& lamp : scene.lamps) {
+      lamps.push_back(prepare_lamp<N>(lamp, scene.faces));
+      const PreparedLamp<N>& one = lamps.back();
+      if (!one.visible) continue;
+      lamp_bodies.add(
+          {one.frame, one.position, one.radius, one.half_width, one.half_height, static_cast<int>(lamps.size()) - 1});
     }
     for (const auto& lamp : lamps) {
-      lamp_chooser.add(lamp.lamp.position, lamp.total_power, media[medium_of_layer(lamp.layer)].index);
+      lamp_chooser.add(lamp.position, lamp.total_power, media[medium_of_layer(lamp.layer)].index);
     }
   }
 
-  int layer_at(double z) const {
-    int layer = 0;
-    while (layer < static_cast<int>(faces.size()) && faces[layer].z < z) ++layer;
-    return layer;
+  /// Does anything opaque, a visible lamp's body included, stand between the two points?
+  bool blocked(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const {
+    return rays.occluded(from, to) || (!lamp_bodies.empty() && lamp_bodies.stand_between(from, to));
   }
+
+  int layer_at(double z) const { return layer_of_height(faces, z); }
 
   /// The medium of a layer where no Refractive surface says otherwise.
   int medium_of_layer(int layer) const {

@@ -81,7 +81,7 @@ struct RayScene::State {
   std::vector<Ball> balls;
   std::array<std::vector<int>, 3> balls_by_passage;  // Embree's primitive number -> ball
   RTCScene all = nullptr, opaque = nullptr, refractive = nullptr, films = nullptr;
-  bool has_films = false;
+  bool has_films = false, has_refractive = false;
   HeightRange all_heights, opaque_heights;
   Eigen::AlignedBox3d bounds;
   std::vector<RecordedRay>* recorded = nullptr;
@@ -105,6 +105,7 @@ struct RayScene::State {
     const RTCScene own = passage == Passage::kNone ? opaque : passage == Passage::kFilm ? films : refractive;
     rtcAttachGeometryByID(own, geometry, id);
     has_films = has_films || passage == Passage::kFilm;
+    has_refractive = has_refractive || passage == Passage::kRefracted;
     rtcReleaseGeometry(geometry);
   }
 
@@ -328,6 +329,19 @@ std::uint64_t RayScene::trace_bare(std::span<const RecordedRay> rays) const {
 
 bool RayScene::nothing_beyond(double z, bool up) const {
   return state_->all_heights.misses(z, std::copysign(1e30, up ? 1.0 : -1.0));
+}
+
+bool RayScene::has_refractive() const {
+  return state_->has_refractive;
+}
+
+bool RayScene::meets_refractive(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const {
+  if (!finite(from, to)) return false;
+  RTCRay ray = embree_ray(from, to - from, 1.0);
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  rtcOccluded1(state_->refractive, &context, &ray);
+  return ray.tfar < 0.0f;
 }
 
 double RayScene::refractive_along_z(const Eigen::Vector3d& origin, bool up, double most) const {

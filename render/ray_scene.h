@@ -61,6 +61,10 @@ class RayScene {
   /// none.
   double refractive_along_z(const Eigen::Vector3d& origin, bool up, double most) const;
 
+  /// Are there Refractive surfaces, and does one cross the way between two points?
+  bool has_refractive() const;
+  bool meets_refractive(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const;
+
   /// Is all of the scene's geometry below (`up`) or above (not `up`) the height z?
   bool nothing_beyond(double z, bool up) const;
 

@@ -6,7 +6,6 @@
 #include <string>
 
 #include "core/error.h"
-#include "core/units.h"
 #include "render/layer_connection.h"
 
 namespace touchstone::render {
@@ -18,19 +17,6 @@ struct Overloaded : Ts... {
 };
 template <typename... Ts>
 Overloaded(Ts...) -> Overloaded<Ts...>;
-
-void check_spectrum(const Spectrum& values, Eigen::Index bands, double most, const std::string& what) {
-  if (values.size() != bands) {
-    fail("{} has {} bands; the scene's environment has {}", what, values.size(), bands);
-  }
-  for (Eigen::Index i = 0; i < bands; ++i) {
-    if (!(values[i] >= 0.0 && values[i] <= most)) {
-      if (std::isinf(most)) fail("{} is {} in band {}; it must be finite and 0 or more", what, values[i], i);
-      fail("{} is {} in band {}; it must be from 0 to {}", what, values[i], i, most);
-    }
-    if (!std::isfinite(values[i])) fail("{} is {} in band {}; it must be finite", what, values[i], i);
-  }
-}
 
 void check_medium_index(int medium, const Scene& scene, const std::string& what) {
   if (medium < 0 || medium >= static_cast<int>(scene.media.size())) {
@@ -190,19 +176,7 @@ void check_scene(const Scene& scene) {
     check_material(ball.material, scene, what);
   }
   for (std::size_t i = 0; i < scene.lamps.size(); ++i) {
-    const SpotLamp& lamp = scene.lamps[i];
-    const std::string what = fmt::format("lamp {}", i);
-    if (!lamp.position.allFinite()) fail("{}: its position isn't finite", what);
-    if (!lamp.direction.allFinite() || !(lamp.direction.norm() > 1e-9)) fail("{}: it has no direction", what);
-    if (!(lamp.lens_radius >= 0.0 && lamp.lens_radius < 1e5)) {
-      fail("{}: lens_radius is {} mm; it must be 0 or more", what, lamp.lens_radius);
-    }
-    if (!(lamp.half_angle >= 0.0 && lamp.soft_angle >= 0.0 && lamp.half_angle + lamp.soft_angle > 1e-4 &&
-          lamp.half_angle + lamp.soft_angle <= 0.5 * kPi)) {
-      fail("{}: half_angle {} and soft_angle {} rad; each must be 0 or more, together above 0 and at most pi/2", what,
-           lamp.half_angle, lamp.soft_angle);
-    }
-    check_spectrum(lamp.power_W, bands, INFINITY, what + ": power_W");
+    check_lamp(scene.lamps[i], bands, scene.faces, fmt::format("lamp {}", i));
   }
 }
 

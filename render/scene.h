@@ -9,6 +9,7 @@
 
 #include "core/triangle_mesh.h"
 #include "render/diffuse_transmitter.h"
+#include "render/lamp.h"
 #include "render/print.h"
 #include "render/rough_dielectric.h"
 #include "render/spectrum.h"
@@ -81,19 +82,6 @@ struct FlatFace {
   int medium_above = 0;
 };
 
-/// A small projection lens: a disc of `lens_radius` (0 is a point) at `position`, facing `direction`. Each point of the
-/// lens sends the same intensity (W/sr) into every direction within `half_angle` of `direction`, falling smoothly to
-/// zero over a further `soft_angle` (radians; together below pi/2). `power_W` is all it emits, in each band.
-/// The lens isn't seen by the camera nor by bounced light; it only lights.
-struct SpotLamp {
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();
-  Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();
-  double lens_radius = 0.0;
-  double half_angle = 0.5;
-  double soft_angle = 0.05;
-  Spectrum power_W;
-};
-
 /// A scene. The number of bands is the length of `environment`.
 ///
 /// Faces are given from low z to high z; the medium above one is the medium below the next; coincident faces (a layer
@@ -106,7 +94,7 @@ struct Scene {
   std::vector<FlatFace> faces;
   std::vector<Surface> surfaces;
   std::vector<Ball> balls;
-  std::vector<SpotLamp> lamps;
+  std::vector<Lamp> lamps;
   Spectrum environment;         ///< radiance of the surroundings, in air, W/m^2/sr in each band
   bool interreflection = true;  ///< false: only lamp light on what the camera sees, and the surroundings seen directly
 };

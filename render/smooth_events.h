@@ -136,7 +136,7 @@ class SmoothEvents {
   bool leaves(const Leg& leg) const {
     const bool up = leg.direction.z() > 0.0;
     if (up ? leg.layer < static_cast<int>(scene_.faces.size()) : leg.layer > 0) return false;
-    if (scene_.media[leg.medium].scatters) return false;
+    if (scene_.media[leg.medium].scatters || !scene_.lamp_bodies.empty()) return false;
     return scene_.rays.nothing_beyond(leg.origin.z(), up);
   }
 

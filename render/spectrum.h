@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <string>
 
 namespace touchstone::render {
 
@@ -19,5 +20,9 @@ using Bands = Eigen::Array<double, N, 1>;
 inline Spectrum flat_spectrum(int bands, double value) {
   return Spectrum::Constant(bands, value);
 }
+
+/// @throws Error, naming `what`, unless there are `bands` values, all finite and from 0 to `most` (which may be
+/// infinite). "the scene's environment" is said to have `bands`.
+void check_spectrum(const Spectrum& values, Eigen::Index bands, double most, const std::string& what);
 
 }  // namespace touchstone::render

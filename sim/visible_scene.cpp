@@ -127,9 +127,10 @@ render::Scene scene_without_surface(const SceneSpec& scene, const Plan& plan, co
     }
   }
   for (const LampSpec& lamp : device.lamps) {
-    out.lamps.push_back({lamp.position_mm, (lamp.target_mm - lamp.position_mm).normalized(), lamp.lens_radius_mm,
-                         lamp.half_angle_deg * kRadiansPerDegree, lamp.soft_angle_deg * kRadiansPerDegree,
-                         scene.lamp_level * bands(lamp.power_W)});
+    out.lamps.push_back(render::SpotLamp{lamp.position_mm, (lamp.target_mm - lamp.position_mm).normalized(),
+                                         lamp.lens_radius_mm, lamp.half_angle_deg * kRadiansPerDegree,
+                                         lamp.soft_angle_deg * kRadiansPerDegree,
+                                         scene.lamp_level * bands(lamp.power_W)});
   }
   out.environment = render::flat_spectrum(3, device.room_radiance);
   out.interreflection = plan.interreflection;

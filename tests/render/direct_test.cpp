@@ -121,15 +121,15 @@ TEST(LightField, RefusesWhatItCannotHold) {
   EXPECT_THROW(make_light_field(scene, Eigen::AlignedBox3d{}), Error);
   EXPECT_THROW(make_light_field(scene, {Eigen::Vector3d(-1, -1, -6), Eigen::Vector3d(1, 1, 0)}), Error);  // a face
   Scene inside = scene;
-  inside.lamps[0].position = {0, 0, -1};
+  std::get<SpotLamp>(inside.lamps[0]).position = {0, 0, -1};
   EXPECT_THROW(make_light_field(inside, reach), Error);
   for (double bad : {0.0, -1.0, 2.0, std::numeric_limits<double>::quiet_NaN()}) {
     EXPECT_THROW(make_light_field(scene, reach, accuracy(bad)), Error);
   }
   Scene sharp = scene;  // a lobe whose sharp rim crosses the membrane
-  sharp.lamps[0].half_angle = 0.1;
-  sharp.lamps[0].soft_angle = 0.0;
-  sharp.lamps[0].lens_radius = 0.0;
+  std::get<SpotLamp>(sharp.lamps[0]).half_angle = 0.1;
+  std::get<SpotLamp>(sharp.lamps[0]).soft_angle = 0.0;
+  std::get<SpotLamp>(sharp.lamps[0]).lens_radius = 0.0;
   LightFieldSettings small = accuracy(1e-4);
   small.most_nodes = 5000;
   EXPECT_THROW(make_light_field(sharp, reach, small), Error);
@@ -262,7 +262,8 @@ TEST(DirectRenderer, BandsAreIndependent) {
   Scene many = scene;
   many.environment = flat_spectrum(kBands, 0.0);
   many.surfaces[0].material = Lambertian{flat_spectrum(kBands, 0.7)};
-  for (SpotLamp& lamp : many.lamps) {
+  for (Lamp& each : many.lamps) {
+    auto& lamp = std::get<SpotLamp>(each);
     lamp.power_W = flat_spectrum(kBands, 0.5);
     lamp.power_W[5] = 1.0;
   }
@@ -320,7 +321,7 @@ TEST(DirectRenderer, RefusesOtherScenes) {
     EXPECT_THROW(renderer.render(other), Error);
   };
   refuses([](Scene& s) { s.interreflection = true; });
-  refuses([](Scene& s) { s.lamps[0].power_W = grey(0.6); });
+  refuses([](Scene& s) { std::get<SpotLamp>(s.lamps[0]).power_W = grey(0.6); });
   refuses([](Scene& s) { s.media[2].index = 1.5; });
   refuses([](Scene& s) { s.surfaces[0].material = Refractive{2, 0}; });
   refuses([](Scene& s) { s.surfaces[0].mesh.vertices[0].z() = -6.0; });  // in the glass

@@ -155,7 +155,7 @@ TEST(ManyLamps, AddUp) {
     Scene scene = empty_scene(0.0);
     scene.interreflection = false;
     scene.balls.push_back({{0, 0, 0}, 2.0, Lambertian{grey(0.7)}});
-    std::vector<SpotLamp> lamps;
+    std::vector<Lamp> lamps;
     for (int i = 0; i < count; ++i) {
       const double angle = 2.0 * kPi * i / count;
       const Eigen::Vector3d position(12 * std::cos(angle), 12 * std::sin(angle), -10.0);
@@ -164,7 +164,7 @@ TEST(ManyLamps, AddUp) {
     const Eigen::Vector3d eye(0, 0, -30);
     for (const Eigen::Vector3d& target : {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(1.6, 0.3, 0)}) {
       double sum = 0.0;
-      for (const SpotLamp& lamp : lamps) {
+      for (const Lamp& lamp : lamps) {
         scene.lamps = {lamp};
         sum += Tracer(scene).radiance(eye, target - eye, samples(1))[0];
       }

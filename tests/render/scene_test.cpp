@@ -61,9 +61,9 @@ TEST(SceneCheck, FaultsAreRefusedByName) {
   expect_refused([](Scene& s) { s.media[2].anisotropy = kNan; }, "medium 2: anisotropy");
   expect_refused([](Scene& s) { s.faces[1].z = -8.0; }, "face 1");
   expect_refused([](Scene& s) { s.faces[1].medium_below = 0; }, "face 1");
-  expect_refused([](Scene& s) { s.lamps[0].direction.setZero(); }, "lamp 0");
-  expect_refused([](Scene& s) { s.lamps[0].power_W = grey(kNan); }, "lamp 0: power_W");
-  expect_refused([](Scene& s) { s.lamps[0].half_angle = 2.0; }, "half_angle 2");
+  expect_refused([](Scene& s) { std::get<SpotLamp>(s.lamps[0]).direction.setZero(); }, "lamp 0");
+  expect_refused([](Scene& s) { std::get<SpotLamp>(s.lamps[0]).power_W = grey(kNan); }, "lamp 0: power_W");
+  expect_refused([](Scene& s) { std::get<SpotLamp>(s.lamps[0]).half_angle = 2.0; }, "half_angle 2");
   expect_refused([](Scene& s) { s.environment = grey(INFINITY); }, "environment");
   expect_refused([](Scene& s) { s.environment = Spectrum(); }, "no band");
   expect_refused([](Scene& s) { s.media.clear(); }, "no medium");
