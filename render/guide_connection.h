@@ -8,161 +8,186 @@
 // receiver is
 //   F = - int L(w') T_up(w) R_low(w)^i R_high(w)^j w dw  over the directions w whose line back meets the strip's width,
 // L the exit face's radiance, w' = w or its mirror image, T what the faces on the way from plate to receiver pass.
-// A direction of the lobe stands for a point of the lamp: it is drawn with the lobe's own density, which leaves an
-// integrand without peaks however narrow the lobe is, and the way from the receiver back to the exit face is then known
-// without an equation to solve.
+// A direction stands for a point of the lamp: its azimuth is drawn within what the exit face's width leaves, azimuth
+// and elevation about those of the lobe with normal densities that are nowhere far below it (cos^m x <= exp(-m x^2 /
+// 2)). That leaves an integrand without peaks, however narrow the lobe and however far the receiver is, and the way
+// from the receiver back to the exit face is known without an equation to solve.
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
 #include <cmath>
 
 #include "render/fresnel.h"
 #include "render/lamp_connection.h"
 #include "render/prepared_scene.h"
+#include "render/truncated_normal.h"
 
 namespace touchstone::render {
 
-/// One sample of the light of the guide `lamp` at the receiver, as connect_to_lamp; the mean over (u, v) uniform in the
-/// unit square is the light. Mirroring at faces other than the plate's two is left out, and so are shadows inside the
-/// plate. `connections` counts shadow tests.
+/// The layers from a plate's face to a receiver beyond it, in the order in which light crosses them.
+struct LayersBeyondPlate {
+  Layer layers[kMaxLayers];
+  int media[kMaxLayers];
+  int count = 0;
+  bool bends_at_surface = false;  ///< the last is beyond a Refractive surface, taken as flat (see connect_to_lamp)
+};
+
+/// @pre the receiver isn't in the plate's layer
+template <int N>
+LayersBeyondPlate layers_beyond_plate(const PreparedScene<N>& scene, int plate, const Receiver& receiver) {
+  LayersBeyondPlate out;
+  const bool up = receiver.layer > plate;
+  double z = scene.faces[up ? plate : plate - 1].z;
+  const auto add = [&](double until, int medium) {
+    out.layers[out.count] = {std::abs(until - z), scene.media[medium].index};
+    out.media[out.count++] = medium;
+    z = until;
+  };
+  for (int layer = plate + (up ? 1 : -1); layer != receiver.layer; layer += up ? 1 : -1) {
+    add(scene.faces[up ? layer : layer - 1].z, scene.medium_of_layer(layer));
+  }
+  const double end = receiver.position.z();
+  const int usual = scene.medium_of_layer(receiver.layer);
+  if (receiver.medium != usual) {
+    const double off = scene.rays.refractive_along_z(receiver.position, !up, std::abs(end - z));
+    out.bends_at_surface = off >= 0.0;
+    if (off >= 0.0) add(up ? std::max(z, end - off) : std::min(z, end + off), usual);
+  }
+  add(end, receiver.medium);
+  return out;
+}
+
+/// One sample of the light of the guide `lamp` at the receiver, as connect_to_lamp; the mean over `numbers` uniform in
+/// the unit square is the light. Mirroring at faces other than the plate's two is left out, and so are shadows inside
+/// the plate. `connections` counts shadow tests.
 template <int N>
 bool connect_to_guide(const PreparedScene<N>& scene, const PreparedLamp<N>& lamp, const std::array<double, 2>& numbers,
                       const Receiver& receiver, std::uint64_t& connections, Arrival<N>& arrival) {
   const int plate = lamp.layer;
-  const bool is_particle = receiver.normal.isZero(0.0);
-  const Eigen::Vector3d& p = receiver.position;
-
-  // A direction of the lobe. In the plate light comes from both sides: the mirrored lobe is as good as the lobe.
-  auto [u, v] = numbers;
-  bool turned = false;
-  if (receiver.layer == plate) {
-    turned = v < 0.5;
-    v = turned ? 2.0 * v : 2.0 * v - 1.0;
-  }
-  const Eigen::Vector2d disc = square_to_disc(u, v);
-  const double inside = disc.squaredNorm();
-  const double lobe_cosine = std::pow(std::max(0.0, 1.0 - inside), 1.0 / (lamp.exponent + 1.0));
-  const double spread = inside > 0.0 ? std::sqrt(std::max(0.0, 1.0 - lobe_cosine * lobe_cosine) / inside) : 0.0;
-  Eigen::Vector3d way = lamp.frame.to_world({spread * disc.x(), spread * disc.y(), lobe_cosine});
-  const double forward = way.dot(lamp.exit_normal);
-  if (!(forward > 1e-9) || std::abs(way.z()) < 1e-9) return false;
-  if (receiver.layer == plate) {
-    if (turned) way.z() = -way.z();
-  } else {
-    way.z() = std::copysign(way.z(), receiver.layer > plate ? 1.0 : -1.0);
-  }
-  const auto mirrored = [](const Eigen::Vector3d& w) { return Eigen::Vector3d(w.x(), w.y(), -w.z()); };
-  const auto lobe = [&](const Eigen::Vector3d& w) {
-    return std::pow(std::max(0.0, w.dot(lamp.frame.z)), lamp.exponent);
-  };
-  // Relative to (m + 1) / (2 pi).
-  const double density = (lobe(way) + lobe(mirrored(way))) * (receiver.layer == plate ? 0.5 : 1.0);
-
-  // Back from the receiver to the plate.
-  const bool up = way.z() > 0.0;
-  const double flat = way.head<2>().norm();
-  const Eigen::Vector2d toward = way.head<2>() / flat;
-  const int plate_medium = scene.medium_of_layer(plate);
-  const double plate_index = scene.media[plate_medium].index;
-  Bands<N> light = lamp.intensity_on_axis;
-  Eigen::Vector3d corner = p;
-  Eigen::Vector3d end = p + RayScene::leave_distance(p) * receiver.normal;
-  double through_s = 1.0;
-  double through_p = 1.0;
-  double stretch = 1.0;  // of solid angle and of cross section, on the way into the receiver's medium
-  double cosine = std::abs(way.z());
-  const auto leg_back_to = [&](const Eigen::Vector3d& start, int medium) {
-    if (scene.blocked(start, end)) return false;
-    if (scene.has_films) light *= passed_by_films(scene, start, end, medium);
-    if (scene.media[medium].weakens) light *= (-scene.media[medium].extinction * (start - corner).norm()).exp();
-    corner = end = start;
-    return true;
-  };
-  const auto sine_in = [&](double index) { return plate_index * flat / index; };
-  // From a layer back through the face where light came into it.
-  const auto back_to_height = [&](double z, int medium, int before) {
-    const double index = scene.media[medium].index;
-    const double sine = sine_in(index);
-    if (!(sine < 1.0)) return false;
-    cosine = std::sqrt(1.0 - sine * sine);
-    const double sine_before = sine_in(scene.media[before].index);
-    if (!(sine_before < 1.0)) return false;
-    const FresnelFace face = fresnel(scene.media[before].index, index, std::sqrt(1.0 - sine_before * sine_before));
-    through_s *= 1.0 - face.reflectance_s;
-    through_p *= 1.0 - face.reflectance_p;
-    const double step = std::abs(corner.z() - z) * sine / cosine;
-    const Eigen::Vector3d start(corner.x() - step * toward.x(), corner.y() - step * toward.y(), z);
-    return leg_back_to(start, medium);
-  };
-  const double sense = up ? 1.0 : -1.0;
-  Eigen::Vector3d arriving = way;
-  if (receiver.layer != plate || receiver.medium != plate_medium) {
-    const double sine = sine_in(scene.media[receiver.medium].index);
-    if (!(sine < 1.0)) return false;
-    const double rise = std::sqrt(1.0 - sine * sine);
-    arriving = {sine * toward.x(), sine * toward.y(), sense * rise};
-    // Basic radiance stays but for losses, and n^2 cos d omega is the same on both sides of a face.
-    stretch = cosine / rise;
-  }
-  arrival.direction = -arriving;
-  arrival.bends_at_surface = false;
-  arrival.angle_per_lamp_area = 0.0;
-  if (!is_particle && arrival.direction.dot(receiver.normal) <= 0.0) return false;
-  ++connections;
-
-  const int usual = scene.medium_of_layer(receiver.layer);
   const double plate_low = scene.faces[plate - 1].z;
   const double plate_high = scene.faces[plate].z;
-  if (receiver.medium != usual) {
-    const double far = up ? p.z() - plate_low : plate_high - p.z();
-    const double off = scene.rays.refractive_along_z(p, !up, far);
-    if (off >= 0.0) {
-      const double limit = up ? p.z() - off : p.z() + off;
-      arrival.bends_at_surface = true;
-      if (!back_to_height(limit, receiver.medium, usual)) return false;
+  const int plate_medium = scene.medium_of_layer(plate);
+  const double plate_index = scene.media[plate_medium].index;
+  const Eigen::Vector3d& p = receiver.position;
+  const bool is_inside = receiver.layer == plate;
+  if (is_inside && receiver.medium != plate_medium) return false;
+  LayersBeyondPlate beyond;
+  if (!is_inside) beyond = layers_beyond_plate(scene, plate, receiver);
+
+  // The exit face's width, seen from the receiver in the level plane, where nothing bends: a range of azimuths.
+  const Eigen::Vector3d& ahead = lamp.exit_normal;
+  const Eigen::Vector3d aside(-ahead.y(), ahead.x(), 0.0);
+  const double forward = (p - lamp.position).dot(ahead);
+  if (!(forward > 0.0)) return false;
+  const double beside = (p - lamp.position).dot(aside);
+  // At an elevation e and an azimuth a from `ahead` the lobe's cosine is reach(a) cos(e - crest(a)).
+  const double axis_rise = lamp.frame.z.z();
+  const double axis_level = lamp.frame.z.dot(ahead);
+  constexpr double kSineBound = 4.0 / (kPi * kPi);  // sin^2 x is at least this times x^2
+  const TruncatedNormal azimuths(0.0, 1.0 / (std::sqrt(lamp.exponent * kSineBound) * axis_level),
+                                 std::atan((beside - lamp.half_width) / forward),
+                                 std::atan((beside + lamp.half_width) / forward));
+  const double azimuth = azimuths.value(numbers[0]);
+  const double distance = forward / std::cos(azimuth);  // from the exit face to the receiver, in the level plane
+  const double crest = std::atan2(axis_rise, axis_level * std::cos(azimuth));
+  const double reach = std::hypot(axis_rise, axis_level * std::cos(azimuth));
+
+  // Light flatter than that from the edge of the exit face isn't in the plate any more when it has to leave it.
+  double flattest = 0.0;
+  if (!is_inside) {
+    if (const auto edge = solve_layer_path({beyond.layers, static_cast<std::size_t>(beyond.count)}, distance)) {
+      const double cosine = beyond.layers[0].index * edge->tangent[0] * edge->cosine[0] / plate_index;
+      flattest = (1.0 - 1e-6) * std::acos(std::min(1.0, cosine));
     }
   }
-  for (int layer = receiver.layer; layer != plate; layer += up ? -1 : 1) {
-    const bool last_medium = layer == receiver.layer && !arrival.bends_at_surface;
-    const int medium = last_medium ? receiver.medium : scene.medium_of_layer(layer);
-    const double z = scene.faces[up ? layer - 1 : layer].z;
-    const int before = scene.medium_of_layer(up ? layer - 1 : layer + 1);
-    if (!back_to_height(z, medium, before)) return false;
+  // How steep the light is in the plate: about the lobe's crest, or about its mirror image. To a receiver in the plate
+  // it comes from above or from below.
+  const double deviation = 1.0 / std::sqrt(lamp.exponent);
+  const TruncatedNormal upright(crest, deviation, flattest, 0.5 * kPi);
+  const TruncatedNormal turned(-crest, deviation, flattest, 0.5 * kPi);
+  double number = 2.0 * numbers[1];
+  const bool from_upright = number < 1.0;
+  number -= from_upright ? 0.0 : 1.0;
+  bool up = receiver.layer > plate;
+  if (is_inside) {
+    up = number < 0.5;
+    number = up ? 2.0 * number : 2.0 * number - 1.0;
+  }
+  const double steepness = from_upright ? upright.value(number) : turned.value(number);
+  const double density = azimuths.density(azimuth) * 0.5 * (upright.density(steepness) + turned.density(steepness)) *
+                         (is_inside ? 0.5 : 1.0);
+  const double sense = up ? 1.0 : -1.0;
+  const double flat = std::cos(steepness);
+  const double rise = std::sin(steepness);
+  if (!(rise > 1e-9 && flat > 1e-9 && density > 0.0)) return false;
+  const Eigen::Vector3d toward = std::cos(azimuth) * ahead + std::sin(azimuth) * aside;
+
+  // Back from the receiver to the plate. Basic radiance stays but for losses, and n^2 cos d omega is the same on both
+  // sides of a face.
+  const double end_sine = plate_index * flat / scene.media[receiver.medium].index;
+  if (!(end_sine < 1.0)) return false;
+  const double end_rise = std::sqrt(1.0 - end_sine * end_sine);
+  const double stretch = rise / end_rise;
+  arrival.direction = -end_sine * toward;
+  arrival.direction.z() = -sense * end_rise;
+  arrival.bends_at_surface = beyond.bends_at_surface;
+  arrival.angle_per_lamp_area = 0.0;
+  if (!receiver.normal.isZero(0.0) && arrival.direction.dot(receiver.normal) <= 0.0) return false;
+
+  Bands<N> light = lamp.intensity_on_axis;
+  double through_s = 1.0;
+  double through_p = 1.0;
+  double left = distance;  // to the exit face
+  Eigen::Vector3d corner = p;
+  Eigen::Vector3d end = p + RayScene::leave_distance(p) * receiver.normal;
+  ++connections;
+  for (int k = beyond.count - 1; k >= 0; --k) {
+    const Layer& layer = beyond.layers[k];
+    const double sine = plate_index * flat / layer.index;
+    const double sine_before = k > 0 ? plate_index * flat / beyond.layers[k - 1].index : flat;
+    if (!(sine < 1.0 && sine_before < 1.0)) return false;
+    const double cosine = std::sqrt(1.0 - sine * sine);
+    const FresnelFace face = fresnel(k > 0 ? beyond.layers[k - 1].index : plate_index, layer.index,
+                                     std::sqrt(1.0 - sine_before * sine_before));
+    through_s *= 1.0 - face.reflectance_s;
+    through_p *= 1.0 - face.reflectance_p;
+    const double step = layer.thickness * sine / cosine;
+    left -= step;
+    if (!(left > 0.0)) return false;
+    Eigen::Vector3d start = corner - step * toward;
+    start.z() = corner.z() - sense * layer.thickness;
+    if (scene.blocked(end, start)) return false;
+    const int medium = beyond.media[k];
+    if (scene.has_films) light *= passed_by_films(scene, end, start, medium);
+    if (scene.media[medium].weakens) light *= (-scene.media[medium].extinction * (layer.thickness / cosine)).exp();
+    corner = end = start;
   }
 
-  // In the plate, unfolded: D along the level, V up and down.
-  const Eigen::Vector3d level(toward.x(), toward.y(), 0.0);
-  const double run = (corner - lamp.position).dot(lamp.exit_normal) / level.dot(lamp.exit_normal);
-  if (!(run > 0.0)) return false;
-  const Eigen::Vector3d foot = corner - run * level - lamp.position;
-  if (std::abs(foot.x() * lamp.exit_normal.y() - foot.y() * lamp.exit_normal.x()) > lamp.half_width) return false;
-  const double rise = run * std::abs(way.z()) / flat;
-  const double thickness = plate_high - plate_low;
-  const double to_first = up ? corner.z() - plate_low : plate_high - corner.z();
-  const double crossings = rise <= to_first ? 0.0 : 1.0 + std::floor((rise - to_first) / thickness);
-  const double at_first = std::ceil(0.5 * crossings);
-  const double at_other = crossings - at_first;
-  const bool is_odd = at_first != at_other;
-  const auto mirror_at = [&](const FlatFace& face, bool upper, double times) {
+  // In the plate, unfolded.
+  const double climb = left * rise / flat;
+  const double to_first = is_inside ? (up ? p.z() - plate_low : plate_high - p.z()) : plate_high - plate_low;
+  const double mirrorings = climb <= to_first ? 0.0 : 1.0 + std::floor((climb - to_first) / (plate_high - plate_low));
+  const double at_first = std::ceil(0.5 * mirrorings);
+  const auto mirror = [&](bool upper, double times) {
     if (times == 0.0) return;
-    const double beyond = scene.media[upper ? face.medium_above : face.medium_below].index;
-    const FresnelFace one = fresnel(plate_index, beyond, std::abs(way.z()));
-    through_s *= std::pow(one.reflectance_s, times);
-    through_p *= std::pow(one.reflectance_p, times);
+    const int outside = upper ? scene.faces[plate].medium_above : scene.faces[plate - 1].medium_below;
+    const FresnelFace face = fresnel(plate_index, scene.media[outside].index, rise);
+    through_s *= std::pow(face.reflectance_s, times);
+    through_p *= std::pow(face.reflectance_p, times);
   };
-  mirror_at(scene.faces[up ? plate - 1 : plate], !up, at_first);
-  mirror_at(scene.faces[up ? plate : plate - 1], up, at_other);
-  if (!(through_s + through_p > 0.0)) return false;
-  if (scene.media[plate_medium].weakens) {
-    light *= (-scene.media[plate_medium].extinction * std::hypot(run, rise)).exp();
-  }
+  mirror(!up, at_first);
+  mirror(up, mirrorings - at_first);
+  const bool is_odd = at_first > mirrorings - at_first;
+  const double sent_elevation = is_odd ? -sense * steepness : sense * steepness;
+  const double sent = std::pow(reach * std::max(0.0, std::cos(sent_elevation - crest)), lamp.exponent);
+  if (!(sent * (through_s + through_p) > 0.0)) return false;
+  if (scene.media[plate_medium].weakens) light *= (-scene.media[plate_medium].extinction * (left / flat)).exp();
 
-  const double sent = lobe(is_odd ? mirrored(way) : way);
-  if (!(sent > 0.0)) return false;
   constexpr double kSquareMillimetresPerSquareMetre = 1e6;
-  const double inverse_density = 2.0 * kPi / (lamp.exponent + 1.0) / density;
-  arrival.irradiance = light * (sent / forward * inverse_density * stretch * 0.5 * (through_s + through_p) / lamp.area *
-                                kSquareMillimetresPerSquareMetre);
+  // Radiance is intensity / (area cos(e) cos(a)), and d omega is cos(e) de da.
+  arrival.irradiance = light * (sent / (std::cos(azimuth) * density) * stretch * 0.5 * (through_s + through_p) /
+                                lamp.area * kSquareMillimetresPerSquareMetre);
   return true;
 }
 

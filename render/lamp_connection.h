@@ -16,6 +16,7 @@ struct Receiver {
   Eigen::Vector3d normal;  ///< unit, on the side that is lit; zero for a particle, which is lit from all sides
   int layer = 0;
   int medium = 0;
+  bool shadowed = true;  ///< false: as if nothing stood in the way
 };
 
 /// Light arriving: the unit direction it comes from (in the receiver's medium) and the irradiance in W/m^2 on an area
@@ -112,22 +113,22 @@ bool connect_to_lamp(const PreparedScene<N>& scene, const PreparedLamp<N>& lamp,
     const Eigen::Vector2d flat = (p - source).head<2>();
     const double lateral = flat.norm();
     const Eigen::Vector2d toward = lateral > 0.0 ? Eigen::Vector2d(flat / lateral) : Eigen::Vector2d::UnitX();
-    const auto path = solve_layer_path({layers, static_cast<std::size_t>(count)}, lateral);
-    if (!path) return false;
+    LayerPath path;
+    if (!solve_layer_path({layers, static_cast<std::size_t>(count)}, lateral, path)) return false;
     const double sense = up ? 1.0 : -1.0;
     const auto direction_in = [&](int k) {
-      const double sine = path->tangent[k] * path->cosine[k];
-      return Eigen::Vector3d(sine * toward.x(), sine * toward.y(), sense * path->cosine[k]);
+      const double sine = path.tangent[k] * path.cosine[k];
+      return Eigen::Vector3d(sine * toward.x(), sine * toward.y(), sense * path.cosine[k]);
     };
     arrival.direction = -direction_in(count - 1);
     if (!is_particle && arrival.direction.dot(receiver.normal) <= 0.0) return false;
     from_lamp = direction_in(0);
     arrival.angle_per_lamp_area =
-        path->jacobian * std::pow(layers[0].index / layers[count - 1].index, 2);  // by reciprocity
-    per_area = path->jacobian * path->transmittance;
+        path.jacobian * std::pow(layers[0].index / layers[count - 1].index, 2);  // by reciprocity
+    per_area = path.jacobian * path.transmittance;
     for (int k = 0; k < count; ++k) {
       if (!scene.media[media[k]].weakens) continue;
-      light *= (-scene.media[media[k]].extinction * (layers[k].thickness / path->cosine[k])).exp();
+      light *= (-scene.media[media[k]].extinction * (layers[k].thickness / path.cosine[k])).exp();
     }
     if (emission_profile(lamp, from_lamp) <= 0.0) return false;
 
@@ -139,11 +140,11 @@ bool connect_to_lamp(const PreparedScene<N>& scene, const PreparedLamp<N>& lamp,
     for (int k = count - 1; k >= 0; --k) {
       Eigen::Vector3d next = source;
       if (k > 0) {
-        const double step = layers[k].thickness * path->tangent[k];
+        const double step = layers[k].thickness * path.tangent[k];
         next = {corner.x() - step * toward.x(), corner.y() - step * toward.y(),
                 corner.z() - sense * layers[k].thickness};
       }
-      if (scene.blocked(end, next)) return false;
+      if (receiver.shadowed && scene.blocked(end, next)) return false;
       if (scene.has_films) light *= passed_by_films(scene, end, next, media[k]);
       corner = next;
       end = next;
@@ -155,13 +156,32 @@ bool connect_to_lamp(const PreparedScene<N>& scene, const PreparedLamp<N>& lamp,
   if (!bends) {
     ++connections;
     const Eigen::Vector3d end = p + RayScene::leave_distance(p) * receiver.normal;
-    if (scene.blocked(end, source)) return false;
+    if (receiver.shadowed && scene.blocked(end, source)) return false;
     if (scene.has_films) light *= passed_by_films(scene, end, source, receiver.medium);
   }
   constexpr double kSquareMillimetresPerSquareMetre = 1e6;
   arrival.angle_per_lamp_area *= from_lamp.dot(lamp.frame.z);
   arrival.irradiance = light * (profile * per_area * kSquareMillimetresPerSquareMetre);
   return true;
+}
+
+/// Lets the choice of lamps know what light arrives where (LampChooser::lay_grid), all over the scene's things.
+template <int N>
+void weigh_lamps(PreparedScene<N>& scene) {
+  for (const PreparedLamp<N>& lamp : scene.lamps) {
+    if (lamp.kind == LampKind::kGuide) return;  // its light takes other ways
+  }
+  scene.lamp_chooser.lay_grid(scene.rays.bounds(), [&](int lamp, const Eigen::Vector3d& place) {
+    const int layer = scene.layer_at(place.z());
+    const Receiver receiver{place, Eigen::Vector3d::Zero(), layer, scene.medium_of_layer(layer), false};
+    Arrival<N> arrival;
+    std::uint64_t uncounted = 0;
+    const PreparedLamp<N>& one = scene.lamps[lamp];
+    if (!connect_to_lamp(scene, one, one.position, receiver, uncounted, arrival)) {
+      return Eigen::Vector3d(Eigen::Vector3d::Zero());
+    }
+    return Eigen::Vector3d(arrival.irradiance.sum() * arrival.direction);
+  });
 }
 
 }  // namespace touchstone::render

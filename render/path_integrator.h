@@ -7,25 +7,21 @@
 #include <cstdint>
 #include <limits>
 
-#include "render/fresnel.h"
 #include "render/ggx.h"
 #include "render/guide_connection.h"
 #include "render/lamp_sharing.h"
+#include "render/path_leg.h"
 #include "render/path_tracer.h"
 #include "render/prepared_scene.h"
 #include "render/rough_dielectric.h"
 #include "render/sample_sequence.h"
 #include "render/scattering.h"
-#include "render/thin_film.h"
+#include "render/smooth_events.h"
 #include "render/warps.h"
 
 namespace touchstone::render {
 
 /// Follows paths through a PreparedScene. Radiances here are basic radiances, L / n^2.
-///
-/// Before the first diffuse or metallic hit a ray that meets a smooth boundary goes both ways, weighted by Fresnel's
-/// reflectance, so that mirror images in the glass add no noise; a branch weaker than kFaintest is followed now and
-/// then with that weight (Russian roulette). After that hit a random number chooses one way.
 template <int N>
 class PathIntegrator {
  public:
@@ -33,7 +29,7 @@ class PathIntegrator {
       : scene_(scene),
         max_depth_(max_depth),
         interreflection_(interreflection),
-        dark_((scene.environment == 0.0).all()),
+        smooth_(scene),
         lamps_are_seen_(!scene.lamp_bodies.empty()) {}
 
   /// Basic radiance that arrives at `origin` against `direction` (unit).
@@ -54,23 +50,12 @@ class PathIntegrator {
   }
 
  private:
-  static constexpr double kFaintest = 0.01;
-  static constexpr int kMostBranches = 12;
   static constexpr int kMostSmoothEvents = 64;
   static constexpr int kRouletteFrom = 3;
   static constexpr int kGuidePreview = 6;
 
-  struct Leg {  // without default values: a path makes room for a dozen and mostly uses three
-    Eigen::Vector3d origin, direction;
-    Bands<N> throughput;
-    double s_share;  // of the light, polarised square to the plane of incidence at the flat faces
-    int layer, medium;
-    int depth;   // diffuse and metallic reflections so far
-    int smooth;  // mirror reflections and crossings of faces, Refractive surfaces and films since the last scattering
-    std::int64_t scatterings;  // in media so far
-
-    bool is_first_sight() const { return depth == 0 && scatterings == 0; }
-  };
+  using Leg = PathLeg<N>;
+  using Branches = PathBranches<N>;
 
   /// Which lamp lights a hit, and which point of its lens.
   struct LampNumbers {
@@ -82,72 +67,17 @@ class PathIntegrator {
     return {lamp, numbers.next_pair()};
   }
 
-  struct LampChoice {
-    int lamp;
-    double probability;
-  };
-
-  static constexpr int kMostWeighed = 32;
-  using LampWeights = std::array<double, kMostWeighed>;
-
-  /// Weighs the lamps, at most kMostWeighed, in proportion to what they would send without shadow, Fresnel's loss or
-  /// lobe: by power, distance and, for a matt surface, the cosine after refraction as if all of the way were in the
-  /// lamp's medium. No lamp that shines gets the weight zero. The sum of the weights.
-  double weigh_lamps(const Receiver& receiver, bool is_matt, LampWeights& weights) const {
-    constexpr double kLeastCosine = 0.05;
-    double total = 0.0;
-    const auto lamp_count = static_cast<int>(scene_.lamps.size());
-    for (int i = 0; i < lamp_count; ++i) {
-      const PreparedLamp<N>& lamp = scene_.lamps[i];
-      const Eigen::Vector3d way = lamp.position - receiver.position;
-      const double distance2 = std::max(1e-12, way.squaredNorm());
-      double cosine = 1.0;
-      if (is_matt) {
-        const double bend =
-            scene_.media[scene_.medium_of_layer(lamp.layer)].index / scene_.media[receiver.medium].index;
-        const double lateral2 = std::min(1.0, bend * bend * way.head<2>().squaredNorm() / distance2);
-        const double shrink = bend / std::sqrt(distance2);
-        const double height = std::copysign(std::sqrt(1.0 - lateral2), way.z());
-        cosine = std::max(kLeastCosine, receiver.normal.x() * way.x() * shrink +
-                                            receiver.normal.y() * way.y() * shrink + receiver.normal.z() * height);
-      }
-      weights[i] = lamp.total_power * cosine / distance2;
-      total += weights[i];
-    }
-    return total;
-  }
-
-  /// A lamp by those weights; of many lamps any one.
+  /// One lamp of the scene for a receiver, see LampChooser.
   LampChoice choose_lamp(const Receiver& receiver, bool is_matt, double number) const {
-    const auto lamp_count = static_cast<int>(scene_.lamps.size());
-    if (lamp_count == 1) return {0, 1.0};
-    if (lamp_count > kMostWeighed) {
-      return {std::min(lamp_count - 1, static_cast<int>(number * lamp_count)), 1.0 / lamp_count};
-    }
-    LampWeights weights{};
-    const double total = weigh_lamps(receiver, is_matt, weights);
-    if (!(total > 0.0)) return {0, 1.0};
-    double rest = number * total;
-    int i = 0;
-    while (i + 1 < lamp_count && rest >= weights[i]) rest -= weights[i++];
-    while (weights[i] == 0.0) --i;  // rounding may have run past the last lamp that shines
-    return {i, weights[i] / total};
+    return scene_.lamp_chooser.choose(receiver.position, is_matt ? &receiver.normal : nullptr,
+                                      scene_.media[receiver.medium].index, number);
   }
 
-  /// The probability with which choose_lamp takes a lamp that shines.
+  /// The probability with which choose_lamp takes a lamp.
   double chance_of_lamp(const Receiver& receiver, bool is_matt, int lamp) const {
-    const auto lamp_count = static_cast<int>(scene_.lamps.size());
-    if (lamp_count == 1) return 1.0;
-    if (lamp_count > kMostWeighed) return 1.0 / lamp_count;
-    LampWeights weights{};
-    const double total = weigh_lamps(receiver, is_matt, weights);
-    return total > 0.0 ? weights[lamp] / total : 1.0;
+    return scene_.lamp_chooser.chance_of(lamp, receiver.position, is_matt ? &receiver.normal : nullptr,
+                                         scene_.media[receiver.medium].index);
   }
-
-  struct Branches {
-    std::array<Leg, kMostBranches> legs;  // uninitialised on purpose, see Leg
-    int count = 0;
-  };
 
   void absorb(Leg& leg, double distance) const {
     const auto& medium = scene_.media[leg.medium];
@@ -163,148 +93,6 @@ class PathIntegrator {
     }
   }
 
-  /// Has the leg nothing before it but the surroundings?
-  bool leaves(const Leg& leg) const {
-    const bool up = leg.direction.z() > 0.0;
-    if (up ? leg.layer < static_cast<int>(scene_.faces.size()) : leg.layer > 0) return false;
-    if (scene_.media[leg.medium].scatters || !scene_.lamp_bodies.empty()) return false;
-    return scene_.rays.nothing_beyond(leg.origin.z(), up);
-  }
-
-  /// Goes on at a smooth boundary with one of two ways, and before the first diffuse hit with the other one as well.
-  void part(Leg& leg, Leg& mirrored, Leg& refracted, double reflectance_s, double reflectance_p, Branches& branches,
-            SampleSequence& numbers, Bands<N>& sum) const {
-    const double s = leg.s_share;
-    const double reflectance = s * reflectance_s + (1.0 - s) * reflectance_p;
-    const double transmittance = 1.0 - reflectance;
-    const auto share = [](double piece, double whole) { return whole > 0.0 ? piece / whole : 0.5; };
-    mirrored.s_share = share(s * reflectance_s, reflectance);
-    refracted.s_share = share(s * (1.0 - reflectance_s), transmittance);
-    if (!leg.is_first_sight() || branches.count == kMostBranches || reflectance >= 1.0) {
-      leg = reflectance >= 1.0 || numbers.next() < reflectance ? mirrored : refracted;
-      return;
-    }
-    const bool mirror_is_weaker = reflectance < 0.5;
-    const double weak = std::min(reflectance, transmittance);
-    leg = mirror_is_weaker ? refracted : mirrored;
-    leg.throughput *= 1.0 - weak;
-    Leg& weaker = mirror_is_weaker ? mirrored : refracted;
-    if (dark_ && leaves(weaker)) return;
-    const double chance = std::min(1.0, weak * weaker.throughput.maxCoeff() / kFaintest);
-    if (chance < 1.0 && !(numbers.next() < chance)) return;
-    weaker.throughput *= weak / chance;
-    if (leaves(weaker)) {
-      sum += weaker.throughput * scene_.environment;
-    } else {
-      branches.legs[branches.count++] = weaker;
-    }
-  }
-
-  /// The leg ends on the flat face above (`up`) or below its layer.
-  void meet_face(Leg& leg, bool up, Branches& branches, SampleSequence& numbers, Bands<N>& sum) const {
-    const int index = up ? leg.layer : leg.layer - 1;
-    const FlatFace& face = scene_.faces[index];
-    leg.origin.z() = face.z;
-    const int to = up ? face.medium_above : face.medium_below;
-    const double n_from = scene_.media[leg.medium].index;
-    const double n_to = scene_.media[to].index;
-    if (n_from != n_to) {
-      ++leg.smooth;
-      const double cosine = std::abs(leg.direction.z());
-      const FresnelFace fresnel_face = fresnel(n_from, n_to, cosine);
-      Leg mirrored = leg;
-      mirrored.direction.z() = -leg.direction.z();
-      const double eta = n_from / n_to;
-      Leg refracted = leg;
-      refracted.direction = {eta * leg.direction.x(), eta * leg.direction.y(),
-                             up ? fresnel_face.cos_refracted : -fresnel_face.cos_refracted};
-      refracted.direction.normalize();
-      refracted.medium = to;
-      refracted.layer += up ? 1 : -1;
-      part(leg, mirrored, refracted, fresnel_face.reflectance_s, fresnel_face.reflectance_p, branches, numbers, sum);
-      return;
-    }
-    leg.medium = to;
-    leg.layer += up ? 1 : -1;
-  }
-
-  /// The leg ends on a Refractive surface.
-  void meet_boundary(Leg& leg, const RayHit& hit, const PreparedMaterial<N>& material, Branches& branches,
-                     SampleSequence& numbers, Bands<N>& sum) const {
-    const bool entering = leg.direction.dot(hit.normal) < 0.0;
-    const int to = entering ? material.inside : material.outside;
-    const double leave = RayScene::leave_distance(hit.position);
-    const Eigen::Vector3d facing = entering ? hit.normal : Eigen::Vector3d(-hit.normal);
-    const double n_from = scene_.media[leg.medium].index;
-    const double n_to = scene_.media[to].index;
-    ++leg.smooth;
-    if (n_from != n_to) {
-      Eigen::Vector3d normal = entering ? hit.shading_normal : Eigen::Vector3d(-hit.shading_normal);
-      if (-leg.direction.dot(normal) <= 1e-6) normal = facing;
-      double cosine = -leg.direction.dot(normal);
-      Eigen::Vector3d reflected = leg.direction + 2.0 * cosine * normal;
-      if (reflected.dot(facing) <= 0.0) {  // the interpolated normal would mirror light through the surface
-        normal = facing;
-        cosine = -leg.direction.dot(normal);
-        reflected = leg.direction + 2.0 * cosine * normal;
-      }
-      const FresnelFace face = fresnel(n_from, n_to, cosine);
-      const double eta = n_from / n_to;
-      Eigen::Vector3d bent = eta * leg.direction + (eta * cosine - face.cos_refracted) * normal;
-      if (bent.dot(facing) >= 0.0) bent -= (bent.dot(facing) + 1e-6) * facing;
-      // A curved surface has another plane of incidence than the flat faces: unpolarised from here.
-      leg.s_share = 0.5;
-      Leg mirrored = leg;
-      mirrored.origin = hit.position + leave * facing;
-      mirrored.direction = reflected.normalized();
-      const double mean = face.mean_reflectance();
-      Leg refracted = leg;
-      refracted.origin = hit.position - leave * facing;
-      refracted.direction = bent.normalized();
-      refracted.medium = to;
-      part(leg, mirrored, refracted, mean, mean, branches, numbers, sum);
-      return;
-    }
-    leg.origin = hit.position - leave * facing;
-    leg.medium = to;
-  }
-
-  /// The leg ends on a film: it goes on straight, and where the film mirrors one of two ways as in part().
-  [[gnu::noinline]] void meet_film(Leg& leg, const RayHit& hit, const PreparedMaterial<N>& material, Branches& branches,
-                                   SampleSequence& numbers) const {
-    ++leg.smooth;
-    const double along = leg.direction.dot(hit.normal);
-    const Eigen::Vector3d facing = along < 0.0 ? hit.normal : Eigen::Vector3d(-hit.normal);
-    const FilmLight<N> light = film_light<N>(material.colour, material.film_index, material.film_mirrors,
-                                             scene_.media[leg.medium].index, std::abs(along));
-    const double leave = RayScene::leave_distance(hit.position);
-    Leg mirrored = leg;
-    leg.origin = hit.position - leave * facing;
-    leg.throughput *= light.passed;
-    if (!material.film_mirrors) return;
-
-    leg.s_share = mirrored.s_share = 0.5;
-    mirrored.origin = hit.position + leave * facing;
-    mirrored.direction = (leg.direction + 2.0 * std::abs(along) * facing).normalized();
-    mirrored.throughput *= light.reflected;
-    const double on = leg.throughput.sum();
-    const double back = mirrored.throughput.sum();
-    if (!(on + back > 0.0)) return;
-    if (!leg.is_first_sight() || branches.count == kMostBranches) {
-      const double chance = back / (on + back);
-      const bool turns = numbers.next() < chance;
-      if (turns) leg = mirrored;
-      leg.throughput /= turns ? chance : 1.0 - chance;
-      return;
-    }
-    Leg weaker = on < back ? leg : mirrored;
-    if (on < back) leg = mirrored;
-    const double chance = std::min(1.0, weaker.throughput.maxCoeff() / kFaintest);
-    if (!(numbers.next() < chance)) return;
-    weaker.throughput /= chance;
-    branches.legs[branches.count++] = weaker;
-  }
-
   /// The leg ends on a RoughRefractive surface: lamp light from both sides, then one way on. False where the path ends.
   [[gnu::noinline]] bool meet_rough_boundary(Leg& leg, const RayHit& hit, const PreparedMaterial<N>& material,
                                              const LampNumbers& at_first_hit, Branches& branches,
@@ -314,7 +102,7 @@ class PathIntegrator {
     const double n_out = scene_.media[leg.medium].index;
     const double n_in = scene_.media[to].index;
     if (n_out == n_in) {
-      meet_boundary(leg, hit, material, branches, numbers, sum);
+      smooth_.meet_boundary(leg, hit, material, branches, numbers, sum);
       return true;
     }
     const Eigen::Vector3d normal = entering ? hit.normal : Eigen::Vector3d(-hit.normal);
@@ -620,7 +408,7 @@ class PathIntegrator {
           return;
         }
         if (material.kind == SurfaceKind::kRefractive) {
-          meet_boundary(leg, hit, material, branches, numbers, sum);
+          smooth_.meet_boundary(leg, hit, material, branches, numbers, sum);
           if (lamps_are_seen_) note_smooth_event(departure, before.direction, leg.direction, hit.normal, true);
         } else if (material.kind == SurfaceKind::kRoughRefractive) {
           if (!meet_rough_boundary(leg, hit, material, at_first_hit, branches, numbers, counts, sum)) return;
@@ -628,7 +416,7 @@ class PathIntegrator {
           departure.sharing = leg.depth == before.depth || !lamps_are_seen_ ? Departure::Sharing::kAllToPath
                                                                             : Departure::Sharing::kAllToConnection;
         } else if (material.kind == SurfaceKind::kFilm) {
-          meet_film(leg, hit, material, branches, numbers);
+          smooth_.meet_film(leg, hit, material, branches, numbers);
           if (!(leg.throughput.maxCoeff() > 0.0)) return;
           if (lamps_are_seen_) note_smooth_event(departure, before.direction, leg.direction, hit.normal, false);
         } else {
@@ -665,7 +453,7 @@ class PathIntegrator {
       } else if (std::isfinite(to_face)) {
         pass(leg, flight, to_face);
         leg.origin += to_face * leg.direction;
-        meet_face(leg, up, branches, numbers, sum);
+        smooth_.meet_face(leg, up, branches, numbers, sum);
         if (lamps_are_seen_) {
           note_smooth_event(departure, before.direction, leg.direction, Eigen::Vector3d::UnitZ(), false);
         }
@@ -685,7 +473,7 @@ class PathIntegrator {
   const PreparedScene<N>& scene_;
   int max_depth_;
   bool interreflection_;
-  bool dark_;            // no light from the surroundings
+  SmoothEvents<N> smooth_;
   bool lamps_are_seen_;  // some lamp is visible
 };
 

@@ -211,6 +211,13 @@ cv::Mat preview_image(const PreparedScene<N>& scene, const AnyCamera& camera, in
 }
 
 template <int N>
+std::unique_ptr<PreparedScene<N>> prepare_scene(const Scene& scene) {
+  auto prepared = std::make_unique<PreparedScene<N>>(scene);
+  weigh_lamps(*prepared);
+  return prepared;
+}
+
+template <int N>
 Spectrum mean_radiance(const PreparedScene<N>& scene, const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
                        const RenderSettings& settings) {
   const PathIntegrator<N> integrator(scene, settings.max_depth, scene.interreflection);
@@ -245,16 +252,16 @@ Tracer::Tracer(const Scene& scene) : prepared_(std::make_unique<Prepared>()) {
   prepared_->bands = scene.environment.size();
   switch (prepared_->bands) {
     case 1:
-      prepared_->scene = std::make_unique<PreparedScene<1>>(scene);
+      prepared_->scene = prepare_scene<1>(scene);
       break;
     case 3:
-      prepared_->scene = std::make_unique<PreparedScene<3>>(scene);
+      prepared_->scene = prepare_scene<3>(scene);
       break;
     case 8:
-      prepared_->scene = std::make_unique<PreparedScene<8>>(scene);
+      prepared_->scene = prepare_scene<8>(scene);
       break;
     case 16:
-      prepared_->scene = std::make_unique<PreparedScene<16>>(scene);
+      prepared_->scene = prepare_scene<16>(scene);
       break;
     default:
       fail("scene: {} bands; the tracer carries 1, 3, 8 or 16", prepared_->bands);

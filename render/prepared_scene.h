@@ -9,6 +9,7 @@
 
 #include "render/ggx.h"
 #include "render/lamp_bodies.h"
+#include "render/lamp_choice.h"
 #include "render/prepared_lamp.h"
 #include "render/ray_scene.h"
 #include "render/scene.h"
@@ -76,6 +77,7 @@ struct PreparedScene {
   std::vector<PreparedMaterial<N>> materials;  ///< by RayHit::object
   std::vector<PreparedPrint<N>> prints;
   std::vector<PreparedLamp<N>> lamps;
+  LampChooser lamp_chooser;
   Bands<N> environment;
   bool interreflection;
   RayScene rays;
@@ -108,6 +110,9 @@ struct PreparedScene {
       if (!one.visible) continue;
       lamp_bodies.add(
           {one.frame, one.position, one.radius, one.half_width, one.half_height, static_cast<int>(lamps.size()) - 1});
+    }
+    for (const auto& lamp : lamps) {
+      lamp_chooser.add(lamp.position, lamp.total_power, media[medium_of_layer(lamp.layer)].index);
     }
   }
 

@@ -83,6 +83,7 @@ struct RayScene::State {
   RTCScene all = nullptr, opaque = nullptr, refractive = nullptr, films = nullptr;
   bool has_films = false, has_refractive = false;
   HeightRange all_heights, opaque_heights;
+  Eigen::AlignedBox3d bounds;
   std::vector<RecordedRay>* recorded = nullptr;
 
   void keep(const RTCRay& ray, bool shadow) const {
@@ -125,6 +126,7 @@ struct RayScene::State {
         *corners++ = static_cast<unsigned>(corner);
         const double z = mesh.vertices[corner].z();
         all_heights.add(z, z);
+        bounds.extend(mesh.vertices[corner]);
         if (passage == Passage::kNone) opaque_heights.add(z, z);
       }
     }
@@ -143,6 +145,8 @@ struct RayScene::State {
       for (int a = 0; a < 3; ++a) *points++ = static_cast<float>(ball.centre[a]);
       *points++ = static_cast<float>(ball.radius);
       all_heights.add(ball.centre.z() - ball.radius, ball.centre.z() + ball.radius);
+      bounds.extend((ball.centre.array() - ball.radius).matrix());
+      bounds.extend((ball.centre.array() + ball.radius).matrix());
       if (passage == Passage::kNone) opaque_heights.add(ball.centre.z() - ball.radius, ball.centre.z() + ball.radius);
     }
     attach(geometry, id, passage);
@@ -258,6 +262,10 @@ bool RayScene::intersect(const Eigen::Vector3d& origin, const Eigen::Vector3d& d
   if (!(most > 0.0) || state.all_heights.misses(origin.z(), end) || !finite(origin, direction)) return false;
 
   return state.nearest(state.all, origin, direction, most, hit);
+}
+
+const Eigen::AlignedBox3d& RayScene::bounds() const {
+  return state_->bounds;
 }
 
 bool RayScene::has_films() const {

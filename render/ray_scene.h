@@ -6,6 +6,7 @@
 // tens of float steps: more than Embree's rounding, less than a tenth of a micrometre in a scene of a few cm.
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -46,6 +47,9 @@ class RayScene {
 
   /// Does anything opaque (neither Refractive nor ThinFilm) stand between the two points?
   bool occluded(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const;
+
+  /// A box round all surfaces and balls; empty if there are none.
+  const Eigen::AlignedBox3d& bounds() const;
 
   /// Are there ThinFilms?
   bool has_films() const;

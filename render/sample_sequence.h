@@ -48,7 +48,7 @@ inline std::uint32_t sobol_second_reversed(std::uint32_t index) {
 class SampleSequence {
  public:
   SampleSequence(std::uint64_t seed, std::uint64_t pixel, std::uint32_t sample)
-      : key_(mix_bits(seed + 0x9e3779b97f4a7c15ull * (pixel + 1))), sample_(sample) {}
+      : key_(mix_bits(seed + 0x9e3779b97f4a7c15ull * (pixel + 1))), reversed_sample_(reverse_bits(sample)) {}
 
   /// A sequence whose numbers are all one half: the deterministic ray of a preview.
   static SampleSequence centre() {
@@ -60,20 +60,30 @@ class SampleSequence {
 
   std::array<double, 2> next_pair() {
     if (fixed_) return {0.5, 0.5};
-    key_ += 0x9e3779b97f4a7c15ull;
-    const std::uint64_t a = mix_bits(key_);
-    const std::uint64_t b = mix_bits(a ^ 0xd1b54a32d192ed03ull);
-    const std::uint32_t index = reverse_bits(hash_upwards(reverse_bits(sample_), static_cast<std::uint32_t>(a)));
-    const std::uint32_t x = reverse_bits(hash_upwards(index, static_cast<std::uint32_t>(a >> 32)));
-    const std::uint32_t y = reverse_bits(hash_upwards(sobol_second_reversed(index), static_cast<std::uint32_t>(b)));
-    return {x * 0x1.0p-32, y * 0x1.0p-32};
+    const Point point = advance();
+    const std::uint64_t b = mix_bits(point.key ^ 0xd1b54a32d192ed03ull);
+    const std::uint32_t y = hash_upwards(sobol_second_reversed(point.index), static_cast<std::uint32_t>(b));
+    return {to_unit(point.x), to_unit(y)};
   }
 
-  double next() { return next_pair()[0]; }
+  /// The first number of next_pair().
+  double next() { return fixed_ ? 0.5 : to_unit(advance().x); }
 
  private:
+  struct Point {  // bit-reversed
+    std::uint64_t key;
+    std::uint32_t index, x;
+  };
+  Point advance() {
+    key_ += 0x9e3779b97f4a7c15ull;
+    const std::uint64_t key = mix_bits(key_);
+    const std::uint32_t index = reverse_bits(hash_upwards(reversed_sample_, static_cast<std::uint32_t>(key)));
+    return {key, index, hash_upwards(index, static_cast<std::uint32_t>(key >> 32))};
+  }
+  static double to_unit(std::uint32_t reversed) { return reverse_bits(reversed) * 0x1.0p-32; }
+
   std::uint64_t key_;
-  std::uint32_t sample_;
+  std::uint32_t reversed_sample_;
   bool fixed_ = false;
 };
 

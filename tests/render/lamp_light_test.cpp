@@ -164,7 +164,7 @@ TEST(EveryLamp, SendsItsPowerAllInAll) {
   for (Lamp lamp : {Lamp(spot), Lamp(led), Lamp(area), Lamp(thrown), Lamp(level), Lamp(rising)}) {
     std::visit([](auto& one) { one.power_W = grey(0.7); }, lamp);
     plate.lamps = {lamp};
-    EXPECT_NEAR(power_on_all_sides(plate, 20000) / 0.7, 1.0, 0.01) << "kind " << lamp.index();
+    EXPECT_NEAR(power_on_all_sides(plate, 10000) / 0.7, 1.0, 0.01) << "kind " << lamp.index();
   }
 }
 

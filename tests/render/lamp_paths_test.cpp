@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <string>
+#include <utility>
 
 #include "lab/light_closed_forms.h"
 #include "lamp_scenes.h"
@@ -103,8 +105,9 @@ TEST(SharedLight, IsThatOfConnectionsAlone) {
     scene.media = {Medium{1.0, {}}, Medium{1.4, {}}};
     scene.surfaces.push_back({square_sheet(50.0, 0.0), thing.material});
     const auto seen = [&](bool visible) {
-      scene.lamps = {square_above(thing.height, visible), square_above(thing.height + 20.0, visible)};
-      std::get<AreaLamp>(scene.lamps[1]).centre.x() = 20.0;
+      AreaLamp beside = square_above(thing.height + 1.0, visible);  // not behind the other
+      beside.centre.y() = 12.0;
+      scene.lamps = {square_above(thing.height, visible), beside};
       // Across the lamp's own light, so that it isn't seen itself.
       return view(scene, {-4, 0, 0.2}, {4.5, 0, -0.2}, 4000);
     };
@@ -112,14 +115,17 @@ TEST(SharedLight, IsThatOfConnectionsAlone) {
   }
 }
 
-TEST(SharedLight, InAScatteringMediumIsThatOfConnectionsAlone) {
-  Scene scene = empty_scene(0.0);
-  scene.media = {Medium{1.0, grey(0.05), grey(0.4), 0.5}};
-  const auto seen = [&](bool visible) {
-    scene.lamps = {square_above(1.0, visible)};
-    return view(scene, {-6, 0, 0.3}, {1, 0, 0}, 4000);
-  };
-  expect_equal(seen(false), seen(true), "milk");
+/// An Emitter of radiance 1 where a level AreaLamp shines up or down, with a black back.
+void add_luminous_twin(Scene& scene, const AreaLamp& area) {
+  TriangleMesh mesh;
+  const Eigen::Vector3d& c = area.centre;
+  for (const auto& [x, y] : {std::pair{-0.5, -0.5}, {0.5, -0.5}, {0.5, 0.5}, {-0.5, 0.5}}) {
+    mesh.vertices.emplace_back(c.x() + x * area.width, c.y() + y * area.height, c.z());
+  }
+  mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
+  scene.surfaces.push_back({mesh, Emitter{grey(1.0)}});
+  for (Eigen::Vector3d& vertex : mesh.vertices) vertex.z() -= 1e-3 * area.direction.z();
+  scene.surfaces.push_back({mesh, Black{}});
 }
 
 // The strongest law: an Emitter of the same radiance, which only paths find, lights all just the same, through glass
@@ -137,24 +143,24 @@ TEST(SharedLight, IsThatOfALuminousSurface) {
     area.visible = true;
     const double index = in_gel ? 1.41 : 1.0;
     area.power_W = grey(24e-6 * kPi * index * index);
-    // The back of the lamp is black.
     Scene luminous = scene;
-    TriangleMesh mesh;
-    const Eigen::Vector3d& c = area.centre;
-    for (const auto& [x, y] : {std::pair{-2.0, -3.0}, {2.0, -3.0}, {2.0, 3.0}, {-2.0, 3.0}}) {
-      mesh.vertices.emplace_back(c.x() + x, c.y() + y, c.z());
-    }
-    mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
-    luminous.surfaces.push_back({mesh, Emitter{grey(1.0)}});
-    for (Eigen::Vector3d& vertex : mesh.vertices) vertex.z() -= 1e-3;
-    luminous.surfaces.push_back({mesh, Black{}});
+    add_luminous_twin(luminous, area);
     scene.lamps = {area};
     const std::string where = in_gel ? "in the gel: " : "in air: ";
-    expect_equal(view(scene, {-3, 0, -1}, {0.5, 0, 1}, 3000), view(luminous, {-3, 0, -1}, {0.5, 0, 1}, 6000),
+    expect_equal(view(scene, {-3, 0, -1}, {0.5, 0, 1}, 3000), view(luminous, {-3, 0, -1}, {0.5, 0, 1}, 12000),
                  where + "membrane");
     expect_equal(view(scene, {-3, 0, -1}, {3, 0, -1}, 3000), view(luminous, {-3, 0, -1}, {3, 0, -1}, 6000),
                  where + "metal, lit by mirrored light");
   }
+}
+
+TEST(SharedLight, InAScatteringMediumIsThatOfALuminousSurface) {
+  Scene scene = empty_scene(0.0);
+  scene.media = {Medium{1.0, grey(0.05), grey(0.4), 0.5}};
+  Scene luminous = scene;
+  add_luminous_twin(luminous, square_above(1.0, true));
+  scene.lamps = {square_above(1.0, true)};
+  expect_equal(view(scene, {-6, 0, 0.3}, {1, 0, 0}, 5000), view(luminous, {-6, 0, 0.3}, {1, 0, 0}, 12000), "milk");
 }
 
 TEST(SharedLight, IsLessNoisyThanConnectionsCloseToTheLamp) {

@@ -16,10 +16,10 @@ inline double irradiance_at(Scene scene, double x, double y, double normal_z, in
   return kPi * Tracer(scene).radiance(eye, {0, 0, -normal_z}, samples(count))[0];
 }
 
-/// All that a scene's lamps send to the inside of a wide ball, by `count` places on it. Nothing else may be in the
+/// All that a scene's lamps send to the inside of a ball, by `count` places on it. Nothing else may be in the
 /// scene.
 inline double power_on_all_sides(Scene scene, int count) {
-  constexpr double kRadius = 1000.0;
+  constexpr double kRadius = 6.0;
   scene.interreflection = false;
   scene.balls.push_back({{0, 0, 0}, kRadius, Lambertian{grey(1.0)}});
   const Tracer tracer(scene);
@@ -30,7 +30,9 @@ inline double power_on_all_sides(Scene scene, int count) {
     const double azimuth = i * kPi * (3.0 - std::sqrt(5.0));
     const double r = std::sqrt(1.0 - z * z);
     const Eigen::Vector3d out(r * std::cos(azimuth), r * std::sin(azimuth), z);
-    sum += kPi * tracer.radiance(0.999 * kRadius * out, out, samples(4))[0];
+    RenderSettings settings = samples(16);
+    settings.seed = static_cast<std::uint64_t>(i);
+    sum += kPi * tracer.radiance(0.999 * kRadius * out, out, settings)[0];
   }
   return sum / count * 4.0 * kPi * kRadius * kRadius * 1e-6;
 }
