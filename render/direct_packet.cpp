@@ -25,11 +25,14 @@ DirectFixture::DirectFixture(const LightField& of) : field(of) {
     absorption[band] = static_cast<float>(medium.absorption[band]);
     absorbs = absorbs || medium.absorption[band] > 0.0;
   }
-  for (const Lamp& one : field.fixture.lamps) {
-    const auto& lamp = std::get<SpotLamp>(one);  // a light field has no others
-    lens_frames.emplace_back(lamp.direction.normalized());
+  for (const Lamp& lamp : field.fixture.lamps) {
+    // Shadows are softened by round lenses and chips; those of other lamps fall as from the middle of their light.
+    const Eigen::Vector3d direction = std::visit([](const auto& one) { return one.direction; }, lamp);
+    lens_frames.emplace_back(direction.normalized());
+    const bool is_round = std::holds_alternative<SpotLamp>(lamp) || std::holds_alternative<LedLamp>(lamp);
+    lens_radii.push_back(is_round ? lamp_extent(lamp) : 0.0);
     int layer = 0;
-    while (layer < static_cast<int>(faces.size()) && faces[layer].z < lamp.position.z()) ++layer;
+    while (layer < static_cast<int>(faces.size()) && faces[layer].z < lamp_position(lamp).z()) ++layer;
     lamp_index.push_back(medium_of(layer).index);
     lamp_in_layer.push_back(layer == field.layer);
   }
@@ -98,7 +101,7 @@ void DirectPacket::light_lane(int lane) {
 void DirectPacket::choose_lens_points(int lane, double u, double v) {
   if (material_[lane] == nullptr || !is_lit(material_[lane]->kind)) return;
   for (int lamp = 0; lamp < lamps_; ++lamp) {
-    const double radius = std::get<SpotLamp>(field_.fixture.lamps[lamp]).lens_radius;
+    const double radius = frame_.fixture.lens_radii[lamp];
     LampLight& one = light_[lamp];
     if (one.amount[lane] == 0.0f || radius == 0.0) continue;
     const Eigen::Vector2d lens = radius * square_to_disc(u, v);

@@ -29,6 +29,7 @@ struct DirectMaterial {
 struct DirectFixture {
   LightField field;
   std::vector<NormalFrame> lens_frames;
+  std::vector<double> lens_radii;  ///< mm, 0 for lamps that aren't round
   std::vector<double> lamp_index;  ///< refractive index of the medium that a lamp stands in
   std::vector<bool> lamp_in_layer;
   double low, high;  ///< of the field's layer

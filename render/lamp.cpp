@@ -250,6 +250,13 @@ const Spectrum& lamp_power(const Lamp& lamp) {
   return std::visit([](const auto& one) -> const Spectrum& { return one.power_W; }, lamp);
 }
 
+double lamp_extent(const Lamp& lamp) {
+  if (const auto* spot = std::get_if<SpotLamp>(&lamp)) return spot->lens_radius;
+  if (const auto* led = std::get_if<LedLamp>(&lamp)) return led->radius;
+  if (const auto* area = std::get_if<AreaLamp>(&lamp)) return 0.5 * std::hypot(area->width, area->height);
+  return 0.0;
+}
+
 bool is_visible(const Lamp& lamp) {
   if (const auto* led = std::get_if<LedLamp>(&lamp)) return led->visible;
   if (const auto* area = std::get_if<AreaLamp>(&lamp)) return area->visible;

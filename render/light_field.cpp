@@ -41,12 +41,10 @@ Eigen::Vector4d flow_at(const PreparedScene<1>& scene, int number, int layer, co
   std::uint64_t uncounted = 0;
   for (int i = 0; i < side; ++i) {
     for (int j = 0; j < side; ++j) {
-      const Eigen::Vector3d source = point_on_lamp(lamp, {(i + 0.5) / side, (j + 0.5) / side});
-      // Light that is bent at level faces keeps its azimuth and its sense along z, so a receiver that faces the source
-      // isn't lit from behind.
-      const Receiver receiver{place, (source - place).normalized(), layer, scene.medium_of_layer(layer)};
+      const Receiver particle{place, Eigen::Vector3d::Zero(), layer, scene.medium_of_layer(layer)};
       Arrival<1> arrival;
-      if (!connect_to_lamp(scene, lamp, source, receiver, uncounted, arrival)) continue;
+      const Eigen::Vector3d source = point_on_lamp(lamp, {(i + 0.5) / side, (j + 0.5) / side});
+      if (!connect_to_lamp(scene, lamp, source, particle, uncounted, arrival)) continue;
       sum -= arrival.irradiance[0] * arrival.direction;
     }
   }
@@ -147,13 +145,14 @@ void check_reach(const Scene& fixture, const Eigen::AlignedBox3d& reach) {
     }
   }
   for (std::size_t i = 0; i < fixture.lamps.size(); ++i) {
-    if (!std::holds_alternative<SpotLamp>(fixture.lamps[i])) {
-      fail("light field: lamp {} isn't a SpotLamp; other kinds are for the path tracer", i);
+    if (std::holds_alternative<GuideLamp>(fixture.lamps[i])) {
+      fail("light field: lamp {} is a light guide, whose light has edges that no coarse grid holds", i);
     }
-    const SpotLamp& lamp = std::get<SpotLamp>(fixture.lamps[i]);
-    if (reach.exteriorDistance(lamp.position) <= lamp.lens_radius) {
-      fail("light field: lamp {} at ({}, {}, {}) reaches into the box; the field is endless there", i,
-           lamp.position.x(), lamp.position.y(), lamp.position.z());
+    if (is_visible(fixture.lamps[i])) fail("light field: lamp {} is visible; such lamps are for the path tracer", i);
+    const Eigen::Vector3d& middle = lamp_position(fixture.lamps[i]);
+    if (reach.exteriorDistance(middle) <= lamp_extent(fixture.lamps[i])) {
+      fail("light field: lamp {} at ({}, {}, {}) reaches into the box; the field is endless there", i, middle.x(),
+           middle.y(), middle.z());
     }
   }
 }

@@ -174,8 +174,8 @@ class PathIntegrator {
     sum += leg.throughput * arrival.irradiance * (phase / (choice.probability * medium.index * medium.index));
   }
 
-  /// Density per sr of the directions in which a path goes on from a surface: those that scatter() draws for this leg,
-  /// or 0 where connections keep the light for themselves. `normal` is the surface's, on either side.
+  /// Density per sr of the directions that scatter() draws for a leg at its end. `normal` is the surface's, on either
+  /// side.
   double scattering_density(const Leg& leg, const Eigen::Vector3d& normal, const PreparedMaterial<N>& material,
                             const Eigen::Vector3d& in) const {
     const double side = leg.direction.dot(normal) < 0.0 ? 1.0 : -1.0;
@@ -429,6 +429,7 @@ class PathIntegrator {
             add_lamp_light(leg, hit, side == 0 ? normal : Eigen::Vector3d(-normal), material,
                            side == 0 ? colour : material.passed, chosen, numbers.is_centre(), counts, sum);
           }
+          if (lamps_are_seen_) before = leg;  // with what it carries here
           if (!scatter(leg, hit, normal, material, colour, numbers)) return;
           if (lamps_are_seen_) [[unlikely]] {
             const Eigen::Vector3d lit = leg.direction.dot(normal) > 0.0 ? normal : Eigen::Vector3d(-normal);

@@ -249,6 +249,33 @@ TEST(DirectRenderer, AgreesWithThePathTracer) {
   expect_equal_light(beads, "beads");
 }
 
+TEST(DirectRenderer, AgreesWithThePathTracerUnderLedAndAreaLamps) {
+  Scene scene = dented_scene(0.0, Lambertian{grey(0.7)});
+  LedLamp led;
+  led.position = {-10, 12, -18};
+  led.direction = Eigen::Vector3d(0, 0, -1) - led.position;
+  led.radius = 0.9;
+  led.half_power_angle = 0.5;
+  led.power_W = grey(1.0);
+  AreaLamp area;
+  area.centre = {14, 0, -16};
+  area.direction = -area.centre;
+  area.along = {0, 1, 0};
+  area.width = 3.0;
+  area.power_W = grey(1.0);
+  scene.lamps = {led, area};
+  expect_equal_light(scene, "LED and area");
+
+  led.visible = true;
+  scene.lamps = {led};
+  EXPECT_THROW(make_light_field(scene, reach_of_membrane(), accuracy(5e-3)), Error);
+  GuideLamp guide;
+  guide.centre = {-14, 0, -6};
+  guide.power_W = grey(1.0);
+  scene.lamps = {guide};
+  EXPECT_THROW(make_light_field(scene, reach_of_membrane(), accuracy(5e-3)), Error);
+}
+
 TEST(DirectRenderer, BandsAreIndependent) {
   Scene scene = dented_scene(0.0, Lambertian{grey(0.7)});
   scene.media[2].absorption = grey(0.1);

@@ -7,7 +7,6 @@
 #include "core/random.h"
 #include "lamp_scenes.h"
 #include "render/fresnel.h"
-#include "render/lamp_arrays.h"
 #include "render/warps.h"
 
 namespace touchstone::render {
@@ -160,7 +159,6 @@ TEST(Guide, HasTheLightOfALuminousEndThatPathsRunInto) {
   }
 }
 
-// Along a level plate between media that let nothing out at these angles light goes on as in the plane: as 1/distance.
 TEST(Guide, SendsNothingIntoAGelThatMirrorsItAll) {
   const Scene scene = plate_and_gel(1.49, 1.41);
   // The critical angle leaves 18.9 degrees; the lobe at twelve half-power angles is 1e-30 or so.

@@ -121,7 +121,7 @@ TEST(Projector, ThrowsAnEvenPatternEvenly) {
   EXPECT_EQ(irradiance_at(scene, 0, 5.1, 1, 1), 0.0);
 }
 
-// Seen from the projector, which looks down with +y up, the right is -x... of a viewer below; of one behind it, +x.
+// The first row is towards `up`, the last column to the right of who looks along with the projector.
 TEST(Projector, KeepsThePatternsSides) {
   cv::Mat pattern = cv::Mat::zeros(2, 4, CV_32FC1);
   pattern.at<float>(0, 3) = 1.0f;  // top right
