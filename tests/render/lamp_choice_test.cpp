@@ -124,7 +124,7 @@ TEST(LampChoice, LightOfSeveralLampsIsTheSumOfEachAlone) {
   for (double x : {-6.0, -2.0, 0.5, 4.0, 7.0}) {
     double sum = 0.0;
     Scene alone = scene;
-    for (const SpotLamp& lamp : scene.lamps) {
+    for (const auto& lamp : scene.lamps) {
       alone.lamps = {lamp};
       sum += seen(alone, x);
     }
