@@ -2,10 +2,12 @@
 // One path: from the camera through faces and surfaces to the lamps and the surroundings.
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <vector>
 
 #include "render/fresnel.h"
 #include "render/ggx.h"
@@ -86,14 +88,20 @@ class PathIntegrator {
 
   /// A lamp with a probability in proportion to what it would send without shadow, Fresnel's loss or lobe: by its
   /// power, distance and, for a matt surface, the cosine after refraction as if all of the way were in the lamp's
-  /// medium. No lamp that shines is left without a chance.
+  /// medium; where there are many, by its power alone. No lamp that shines is left without a chance.
   LampChoice choose_lamp(const Receiver& receiver, bool is_matt, double number) const {
     const auto lamp_count = static_cast<int>(scene_.lamps.size());
     if (lamp_count == 1) return {0, 1.0};
     constexpr double kLeastCosine = 0.05;
     constexpr int kMostWeighed = 32;
     if (lamp_count > kMostWeighed) {
-      return {std::min(lamp_count - 1, static_cast<int>(number * lamp_count)), 1.0 / lamp_count};
+      const std::vector<double>& sums = scene_.lamp_power_sums;
+      if (!(sums.back() > 0.0)) return {0, 1.0};
+      const auto above = std::upper_bound(sums.begin(), sums.end(), number * sums.back());
+      // Rounding may have run past the last lamp that shines.
+      const auto shines = above == sums.end() ? std::lower_bound(sums.begin(), sums.end(), sums.back()) : above;
+      const auto lamp = static_cast<int>(shines - sums.begin());
+      return {lamp, scene_.lamps[lamp].total_power / sums.back()};
     }
     std::array<double, kMostWeighed> weights{};
     double total = 0.0;
@@ -267,7 +275,7 @@ class PathIntegrator {
     mirrored.throughput *= light.reflected;
     const double on = leg.throughput.sum();
     const double back = mirrored.throughput.sum();
-    if (!(on + back > 0.0)) return;
+    if (!(back > 0.0)) return;  // a film of the medium's own index draws no number
     if (!leg.is_first_sight() || branches.count == kMostBranches) {
       const double chance = back / (on + back);
       const bool turns = numbers.next() < chance;
@@ -501,6 +509,7 @@ class PathIntegrator {
       const Flight<N>* flight = nullptr;
       double most = to_face;
       if (scene_.media[leg.medium].scatters && !numbers.is_centre()) [[unlikely]] {
+        if (!(leg.throughput.maxCoeff() > 0.0)) return;  // an absorber took all: no share of it can be chosen
         drawn = fly(leg, numbers);
         flight = &drawn;
         most = std::min(most, drawn.distance);

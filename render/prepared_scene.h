@@ -86,6 +86,7 @@ struct PreparedScene {
   std::vector<PreparedMaterial<N>> materials;  ///< by RayHit::object
   std::vector<PreparedPrint<N>> prints;
   std::vector<PreparedLamp<N>> lamps;
+  std::vector<double> lamp_power_sums;  ///< W over the bands, of the lamps up to and with each
   Bands<N> environment;
   bool interreflection;
   RayScene rays;
@@ -116,6 +117,8 @@ struct PreparedScene {
       lamps.push_back({lamp, NormalFrame(lamp.direction.normalized()), std::cos(lamp.half_angle), intensity,
                        lamp.power_W.sum(), layer_at(lamp.position.z())});
     }
+    double power = 0.0;
+    for (const PreparedLamp<N>& lamp : lamps) lamp_power_sums.push_back(power += lamp.total_power);
   }
 
   int layer_at(double z) const {

@@ -32,6 +32,16 @@ void check_spectrum(const Spectrum& values, Eigen::Index bands, double most, con
   }
 }
 
+/// Beyond this single precision, in which Embree traces, steps by more than 8 um.
+constexpr double kFarthest = 1e5;  // mm
+/// W/m^2/sr and W: the sun shows 2e7. What can come of it must fit into the single precision of a picture.
+constexpr double kBrightest = 1e12;
+
+void check_position(const Eigen::Vector3d& position, const std::string& what) {
+  if (!position.allFinite()) fail("{} isn't finite", what);
+  if (position.cwiseAbs().maxCoeff() > kFarthest) fail("{} is over 100 m from the origin", what);
+}
+
 void check_medium_index(int medium, const Scene& scene, const std::string& what) {
   if (medium < 0 || medium >= static_cast<int>(scene.media.size())) {
     fail("{} is medium {}; the scene has media 0 to {}", what, medium, scene.media.size() - 1);
@@ -56,10 +66,7 @@ void check_material(const Material& material, const Scene& scene, const std::str
                           check_roughness(m.roughness, what);
                         },
                         [](const Black&) {},
-                        [&](const Emitter& m) {
-                          check_spectrum(m.radiance, bands, std::numeric_limits<double>::infinity(),
-                                         what + ": radiance");
-                        },
+                        [&](const Emitter& m) { check_spectrum(m.radiance, bands, kBrightest, what + ": radiance"); },
                         [&](const Refractive& m) {
                           check_medium_index(m.medium_inside, scene, what + ": medium_inside");
                           check_medium_index(m.medium_outside, scene, what + ": medium_outside");
@@ -117,8 +124,7 @@ void check_print(const Print& print, const Surface& surface, Eigen::Index bands,
 
 void check_mesh(const TriangleMesh& mesh, const std::string& what) {
   for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
-    if (!mesh.vertices[i].allFinite()) fail("{}: vertex {} isn't finite", what, i);
-    if (mesh.vertices[i].cwiseAbs().maxCoeff() > 1e5) fail("{}: vertex {} is over 100 m from the origin", what, i);
+    check_position(mesh.vertices[i], fmt::format("{}: vertex {}", what, i));
   }
   for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
     const auto& triangle = mesh.triangles[i];
@@ -140,7 +146,7 @@ void check_mesh(const TriangleMesh& mesh, const std::string& what) {
 void check_scene(const Scene& scene) {
   const Eigen::Index bands = scene.environment.size();
   if (bands < 1) fail("scene: the environment has no band; give a radiance (0 for darkness) for each band");
-  check_spectrum(scene.environment, bands, INFINITY, "environment");
+  check_spectrum(scene.environment, bands, kBrightest, "environment");
 
   if (scene.media.empty()) fail("scene: no medium; media[0] fills the space");
   for (std::size_t i = 0; i < scene.media.size(); ++i) {
@@ -164,7 +170,7 @@ void check_scene(const Scene& scene) {
   for (std::size_t i = 0; i < scene.faces.size(); ++i) {
     const FlatFace& face = scene.faces[i];
     const std::string what = fmt::format("face {}", i);
-    if (!std::isfinite(face.z)) fail("{}: z is {}; it must be finite", what, face.z);
+    if (!(std::abs(face.z) <= kFarthest)) fail("{}: z is {} mm; it must be within 100 m of the origin", what, face.z);
     check_medium_index(face.medium_below, scene, what + ": medium_below");
     check_medium_index(face.medium_above, scene, what + ": medium_above");
     if (i == 0) continue;
@@ -185,14 +191,14 @@ void check_scene(const Scene& scene) {
   for (std::size_t i = 0; i < scene.balls.size(); ++i) {
     const Ball& ball = scene.balls[i];
     const std::string what = fmt::format("ball {}", i);
-    if (!ball.centre.allFinite()) fail("{}: its centre isn't finite", what);
+    check_position(ball.centre, what + ": its centre");
     if (!(ball.radius > 0.0 && ball.radius < 1e5)) fail("{}: radius is {} mm; it must be above 0", what, ball.radius);
     check_material(ball.material, scene, what);
   }
   for (std::size_t i = 0; i < scene.lamps.size(); ++i) {
     const SpotLamp& lamp = scene.lamps[i];
     const std::string what = fmt::format("lamp {}", i);
-    if (!lamp.position.allFinite()) fail("{}: its position isn't finite", what);
+    check_position(lamp.position, what + ": its position");
     if (!lamp.direction.allFinite() || !(lamp.direction.norm() > 1e-9)) fail("{}: it has no direction", what);
     if (!(lamp.lens_radius >= 0.0 && lamp.lens_radius < 1e5)) {
       fail("{}: lens_radius is {} mm; it must be 0 or more", what, lamp.lens_radius);
@@ -202,7 +208,7 @@ void check_scene(const Scene& scene) {
       fail("{}: half_angle {} and soft_angle {} rad; each must be 0 or more, together above 0 and at most pi/2", what,
            lamp.half_angle, lamp.soft_angle);
     }
-    check_spectrum(lamp.power_W, bands, INFINITY, what + ": power_W");
+    check_spectrum(lamp.power_W, bands, kBrightest, what + ": power_W");
   }
 }
 

@@ -24,6 +24,12 @@ Scene slab(const Medium& medium, double environment) {
   return scene;
 }
 
+/// What glass and gel mirror at normal incidence.
+double mirrored_by_the_faces() {
+  const auto face = [](double a, double b) { return std::pow((a - b) / (a + b), 2); };
+  return face(1.0, 1.52) + std::pow(1.0 - face(1.0, 1.52), 2) * face(1.52, 1.41);
+}
+
 /// A matt sheet under glass and gel, lit by nothing yet.
 Scene sheet(double albedo = 0.7) {
   Scene scene = sensor_stack(0.0);
@@ -40,12 +46,12 @@ SpotLamp lamp_at(const Eigen::Vector3d& position, const Eigen::Vector3d& directi
 }
 
 TEST(HardMedia, WhiteMilkOf5000MeanFreePathsReturnsTheSky) {
-  // A walk takes some hundred steps here and may take millions; the roulette on long ones must leave the mean alone.
+  // A walk takes a thousand steps here and may take millions; what ends the long ones must leave the mean alone.
   const Tracer tracer(slab(milk(1000.0, 0.0), 1.0));
   constexpr int kRuns = 40;
   Eigen::ArrayXd seen(kRuns);
   for (int run = 0; run < kRuns; ++run) {
-    RenderSettings settings = samples(1024, 10000);
+    RenderSettings settings = samples(256, 10000);
     settings.seed = static_cast<std::uint64_t>(run);
     seen[run] = tracer.radiance({0, 0, -9}, {0.3, 0, 1}, settings)[0];
   }
@@ -63,7 +69,7 @@ TEST(HardMedia, GreyMilkOf5000MeanFreePathsReturnsLess) {
     EXPECT_LT(seen.most(), before) << albedo;
     before = seen.most();
   }
-  EXPECT_NEAR(before, 0.08, 0.03) << "black but for the faces' mirror images";
+  EXPECT_NEAR(before, mirrored_by_the_faces(), 0.01) << "nothing comes back out of the black one";
 }
 
 TEST(HardMedia, MilkLitByALampGivesBackNoMoreThanItGets) {
@@ -87,28 +93,30 @@ TEST(HardMedia, MilkLitByALampGivesBackNoMoreThanItGets) {
 }
 
 TEST(HardMedia, GelSoDarkThatNothingReturnsShowsTheFacesOnly) {
-  const auto face = [](double a, double b) { return std::pow((a - b) / (a + b), 2); };
   for (const double absorption : {1e2, 1e4, 1e300}) {
     Scene scene = slab(Medium{1.41, grey(absorption)}, 1.0);
     scene.surfaces.push_back({square_sheet(12.0, -1.0, false), Lambertian{grey(1.0)}});
     scene.lamps.push_back(lamp_at({8, 0, -20}, {-8, 0, 20}, 1.0, 1.0));
-    const double expected = face(1.0, 1.52) + std::pow(1.0 - face(1.0, 1.52), 2) * face(1.52, 1.41);
     const Seen seen = look(scene, few_pixels(), 64);
-    EXPECT_NEAR(seen.least(), expected, 0.01) << absorption;
+    EXPECT_NEAR(seen.least(), mirrored_by_the_faces(), 0.01) << absorption;
     EXPECT_LT(seen.most(), 0.12) << absorption;
   }
 }
 
 TEST(HardMedia, MilkBehindAPlateThatLetsNothingThroughIsDark) {
   // What arrives there carries exactly nothing, and must not turn into NaN where a share of it is asked for.
-  for (const double absorption : {1e3, 1e4}) {
-    Scene scene = slab(milk(10.0, 0.1), 1.0);
-    scene.media[1].absorption = grey(absorption);
-    scene.lamps.push_back(lamp_at({8, 0, -20}, {-8, 0, 20}, 1.0, 1.0));
-    EXPECT_LT(look(scene, few_pixels(), 64).most(), 0.08);
-    Scene film = slab(milk(10.0, 0.1), 1.0);
-    film.surfaces.push_back({square_sheet(30.0, -6.0), ThinFilm{grey(0.0)}});
-    EXPECT_LT(look(film, few_pixels(), 64).most(), 0.08);
+  for (const double scattering : {0.1, 10.0}) {
+    for (const double absorption : {1e3, 1e4}) {
+      Scene scene = slab(milk(scattering, 0.0), 1.0);
+      scene.media[1].absorption = grey(absorption);
+      scene.lamps.push_back(lamp_at({8, 0, -20}, {-8, 0, 20}, 1.0, 1.0));
+      EXPECT_LT(look(scene, few_pixels(), 64).most(), 0.08);
+    }
+    // A black film in the milk ends what passes it; what comes from before it is left.
+    Scene film = slab(milk(scattering, 0.0), 0.0);
+    film.surfaces.push_back({square_sheet(100.0, -2.5), ThinFilm{grey(0.0)}});
+    film.balls.push_back({{0, 0, -1}, 0.5, Emitter{grey(1.0)}});
+    EXPECT_LT(look(film, few_pixels(), 256).most(), 1e-3);
   }
 }
 
@@ -116,7 +124,7 @@ TEST(HardMedia, BandsThatDieAtDifferentDepthsStayFinite) {
   Scene scene;
   scene.environment = flat_spectrum(3, 1.0);
   const Spectrum dies = Bands<3>(0.0, 30.0, 1e6);
-  scene.media = {Medium{1.0}, Medium{1.5, dies}, Medium{1.41, dies, Bands<3>(100.0, 1e-6, 0.0), 0.9}};
+  scene.media = {Medium{1.0}, Medium{1.5, dies}, Medium{1.41, dies, Bands<3>(5.0, 1e-6, 0.0), 0.9}};
   scene.faces = {{-7.0, 0, 1}, {-5.0, 1, 2}, {0.0, 2, 0}};
   const Seen seen = look(scene, few_pixels(), 64);
   EXPECT_LT(seen.most(), 1.2);
@@ -153,9 +161,9 @@ TEST(HardLamps, OneWithLightAmongThousandsWithoutIsFound) {
 TEST(HardLamps, ExactlyAtAFaceIsJustBelowIt) {
   for (const double z : {-7.0, -5.0}) {
     Scene at = sheet();
-    at.lamps.push_back(lamp_at({6, 0, z}, {-1, 0, 1}, 0.0, 1.0));
     Scene below = at;
-    below.lamps[0].position.z() -= 1e-7;
+    at.lamps.push_back(lamp_at({6, 0, z}, {-1, 0, 1}, 0.0, 1.0));
+    below.lamps.push_back(lamp_at({6, 0, z - 1e-7}, {-1, 0, 1}, 0.0, 1.0));
     const Seen a = look(at, few_pixels());
     const Seen b = look(below, few_pixels());
     EXPECT_GT(a.most(), 0.0);
@@ -166,12 +174,12 @@ TEST(HardLamps, ExactlyAtAFaceIsJustBelowIt) {
 TEST(HardLamps, OnTheMembraneItLightsItsOwnSideOnly) {
   // The lens lies in the membrane's plane. What it sends along that plane lights nothing; what it sends down comes
   // back from the glass alone.
-  Scene scene = sheet();
-  scene.lamps.push_back(lamp_at({1, 0, 0}, {0, 0, -1}, 0.5, 1.0));
-  scene.interreflection = false;
-  EXPECT_EQ(look(scene, few_pixels()).most(), 0.0);
-  scene.lamps[0].direction = {0, 0, 1};
-  EXPECT_EQ(look(scene, few_pixels()).most(), 0.0);
+  for (const double sense : {-1.0, 1.0}) {
+    Scene scene = sheet();
+    scene.lamps.push_back(lamp_at({1, 0, 0}, {0, 0, sense}, 0.5, 1.0));
+    scene.interreflection = false;
+    EXPECT_EQ(look(scene, few_pixels()).most(), 0.0) << sense;
+  }
 }
 
 TEST(HardLamps, CloseToTheMembraneItsLightIsAllThere) {
@@ -222,7 +230,7 @@ TEST(HardLamps, LightBeyondSinglePrecisionIsRefusedByName) {
 }
 
 TEST(HardLamps, TheBrightestThatIsTakenStaysFiniteAndTheFaintestCounts) {
-  for (const double power : {1e-30, 1e15}) {
+  for (const double power : {1e-30, 1e12}) {
     Scene scene = sheet();
     scene.lamps.push_back(lamp_at({8, 0, -20}, {-8, 0, 20}, 0.5, power));
     Scene plain = sheet();
