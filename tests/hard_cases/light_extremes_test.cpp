@@ -84,7 +84,7 @@ TEST(HardMedia, MilkLitByALampGivesBackNoMoreThanItGets) {
   constexpr double kStep = 0.5;
   for (double r = 0.5 * kStep; r < 30.0; r += kStep) {
     const Eigen::Vector3d from(r, 0, 10);
-    flux += 2.0 * kPi * r * kStep * kPi * 1e-6 * tracer.radiance(from, {0, 0, -1}, samples(256, 64))[0];
+    flux += 2.0 * kPi * r * kStep * kPi * 1e-6 * tracer.radiance(from, {0, 0, -1}, samples(64, 64))[0];
   }
   // Of the half space's 2 pi W this ring's plane catches 2 pi (1 - 4/hypot(4, 30)); not Lambert's law, but near it.
   const double caught = 2.0 * kPi * (1.0 - 4.0 / std::hypot(4.0, 30.0));
@@ -116,7 +116,7 @@ TEST(HardMedia, MilkBehindAPlateThatLetsNothingThroughIsDark) {
     Scene film = slab(milk(scattering, 0.0), 0.0);
     film.surfaces.push_back({square_sheet(100.0, -2.5), ThinFilm{grey(0.0)}});
     film.balls.push_back({{0, 0, -1}, 0.5, Emitter{grey(1.0)}});
-    EXPECT_LT(look(film, few_pixels(), 256).most(), 1e-3);
+    EXPECT_LT(look(film, few_pixels(), 32).most(), 1e-3);
   }
 }
 
@@ -182,17 +182,19 @@ TEST(HardLamps, OnTheMembraneItLightsItsOwnSideOnly) {
   }
 }
 
-TEST(HardLamps, CloseToTheMembraneItsLightIsAllThere) {
-  // A lens of 1 mm at a tenth of its radius: all of its power falls on the sheet, and a white one gives it back.
-  Scene scene = empty_scene(0.0);
-  scene.surfaces.push_back({square_sheet(200.0, 0.0, false), Lambertian{grey(1.0)}});
-  scene.lamps.push_back(lamp_at({0, 0, -0.05}, {0, 0, 1}, 0.5, 1.0));
-  const Seen seen = look(scene, few_pixels(), 4096);
-  // Irradiance times pixel area on the sheet, summed, is the power inside the picture: all but a few percent.
-  const double pixel_mm2 = std::pow(27.0 / 3.0 * 2.0 / 6.0, 2);
-  const double power = seen.mean.sum() * kPi * pixel_mm2 * 1e-6;
-  EXPECT_LT(power, 1.02);
-  EXPECT_GT(power, 0.9);
+TEST(HardLamps, CloseToTheMembraneItLightsAsItsIntegralSays) {
+  // A lens of radius R at height h over a white sheet, an even intensity of I from all of it: under its middle
+  // E = int I / (pi R^2) h / (h^2 + r^2)^(3/2) dA = 2 I / R^2 (1 - h / hypot(h, R)).
+  constexpr double kRadius = 0.5;
+  for (const double height : {0.5, 0.05, 0.005}) {
+    Scene scene = empty_scene(0.0);
+    scene.surfaces.push_back({square_sheet(200.0, 0.0, false), Lambertian{grey(1.0)}});
+    scene.lamps.push_back(lamp_at({0, 0, -height}, {0, 0, 1}, kRadius, 2.0 * kPi));
+    const double irradiance = 2e6 / (kRadius * kRadius) * (1.0 - height / std::hypot(height, kRadius));
+    const Tracer tracer(scene);
+    EXPECT_NEAR(tracer.radiance({0, 0, -5}, {0, 0, 1}, samples(1 << 18))[0] * kPi / irradiance, 1.0, 0.02) << height;
+    if (height >= 0.05) look(scene, few_pixels(), 1024);
+  }
 }
 
 TEST(HardLamps, InsideABodyOrBehindTheMembraneLightsNothing) {

@@ -297,6 +297,7 @@ TEST(HardLight, TinyBodiesAreHarmless) {
   // Looked at from as near.
   PinholeCamera camera = few_pixels();
   camera.hole_diameter_um = 1e-4;
+  camera.foil_thickness_um = 0.0;
   camera.gel_from_camera = look_at({0, 0, -1.0 - 1e-5}, {0, 0, -1}, {0, 1, 0});
   EXPECT_TRUE(look(scene, camera, 64, 10000).is(1.41 * 1.41));
 }
