@@ -1,0 +1,215 @@
+#include "tests/golden/image_statistics.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "core/error.h"
+#include "sim/image_file.h"
+
+namespace touchstone::golden {
+namespace {
+
+constexpr int kBlock = 8;      // pixels a side
+constexpr int kMeanBits = 11;  // of a stored mean
+constexpr int kVarianceBits = 4;
+
+/// Rounded to so many significant bits.
+float rounded(float value, int bits) {
+  int exponent = 0;
+  const double fraction = std::frexp(static_cast<double>(value), &exponent);
+  const double scale = std::ldexp(1.0, bits);
+  return static_cast<float>(std::ldexp(std::round(fraction * scale) / scale, exponent));
+}
+
+cv::Mat rounded(const cv::Mat& image, int bits) {
+  cv::Mat result = image.clone();
+  auto* value = result.ptr<float>();
+  for (std::size_t i = 0; i < result.total() * result.channels(); ++i) value[i] = rounded(value[i], bits);
+  return result;
+}
+
+/// A mean over some values of a picture, and how well it's known.
+struct Part {
+  double difference = 0.0;         // test less reference, summed
+  double variance = 0.0;           // of both
+  double test_variance = 0.0;      // of the test
+  double squared_variances = 0.0;  // sum of the squares of the test's variances
+
+  void add(double test, double test_var, double reference, double reference_var, double floor) {
+    difference += test - reference;
+    const double rounding = std::abs(reference) * std::ldexp(1.0, -kMeanBits) / std::sqrt(3.0);
+    variance += test_var + reference_var + rounding * rounding + floor * floor;
+    test_variance += test_var;
+    squared_variances += test_var * test_var;
+  }
+
+  /// The normal statistic of the same tail as Student's t (Wallace 1959, eq. 1.1 with his correction), whose degrees of
+  /// freedom are Welch and Satterthwaite's with the reference taken as well known.
+  double z(int batches) const {
+    if (!(variance > 0.0)) return 0.0;
+    const double t = difference / std::sqrt(variance);
+    if (!(squared_variances > 0.0)) return t;
+    const double freedom = (batches - 1) * variance * variance / squared_variances;
+    const double z = std::sqrt(freedom * std::log1p(t * t / freedom)) * (8.0 * freedom + 1.0) / (8.0 * freedom + 3.0);
+    return std::copysign(z, t);
+  }
+};
+
+double p_value(double z) {
+  return std::erfc(std::abs(z) / std::sqrt(2.0));
+}
+
+void judge(LevelResult& level, std::size_t count, double significance) {
+  level.p_value = p_value(level.largest_z);
+  level.needed = -std::expm1(std::log1p(-significance) / static_cast<double>(count));  // Sidak
+}
+
+}  // namespace
+
+ImageStatistics render_batches(const render::Scene& scene, const render::Camera& camera, int batches, int samples,
+                               std::uint64_t first_seed) {
+  TS_ASSERT(batches >= 2);
+  const render::Tracer tracer(scene);
+  render::RenderSettings settings;
+  settings.min_samples = settings.max_samples = samples;
+  cv::Mat mean, squares;  // Welford's recurrence
+  int bands = 0;
+  for (int i = 0; i < batches; ++i) {
+    settings.seed = first_seed + static_cast<std::uint64_t>(i);
+    cv::Mat image;
+    // As one wide band: OpenCV's arithmetic with numbers knows at most four.
+    cv::Mat irradiance = tracer.render(camera, settings).irradiance;
+    bands = irradiance.channels();
+    irradiance.reshape(1).convertTo(image, CV_64F);
+    if (i == 0) {
+      mean = cv::Mat::zeros(image.size(), image.type());
+      squares = mean.clone();
+    }
+    const cv::Mat off = image - mean;
+    mean += off / (i + 1.0);
+    squares += off.mul(image - mean);
+  }
+  ImageStatistics result;
+  result.batches = batches;
+  mean.convertTo(result.mean, CV_32F);
+  squares.convertTo(result.variance, CV_32F, 1.0 / (batches * (batches - 1.0)));
+  result.mean = result.mean.reshape(bands);
+  result.variance = result.variance.reshape(bands);
+  return result;
+}
+
+bool Comparison::passes() const {
+  return std::all_of(levels.begin(), levels.end(), [](const LevelResult& level) { return level.passes(); });
+}
+
+std::string Comparison::text() const {
+  std::string line;
+  for (const LevelResult& level : levels) {
+    line += fmt::format("{}: z {:+.2f}, p {:.2g} (needs {:.1g}){}; ", level.name, level.largest_z, level.p_value,
+                        level.needed, level.passes() ? "" : " FAILS");
+  }
+  return line + fmt::format("mean {:+.3f} %", 100.0 * relative_change);
+}
+
+Comparison compare(const ImageStatistics& reference, const ImageStatistics& test, double significance) {
+  if (reference.mean.size() != test.mean.size() || reference.mean.type() != test.mean.type()) {
+    fail("golden image: {} x {} pixels of {} bands; the stored one has {} x {} of {}", test.mean.cols, test.mean.rows,
+         test.mean.channels(), reference.mean.cols, reference.mean.rows, reference.mean.channels());
+  }
+  const int bands = test.mean.channels();
+  const int across = (test.mean.cols + kBlock - 1) / kBlock;
+  const int down = (test.mean.rows + kBlock - 1) / kBlock;
+  std::vector<Part> blocks(static_cast<std::size_t>(across) * down * bands);
+  std::vector<Part> picture(static_cast<std::size_t>(bands));
+  Comparison result;
+  result.levels[0].name = "pixels";
+  result.levels[1].name = "blocks";
+  result.levels[2].name = "picture";
+  result.p_values.create(test.mean.size(), test.mean.type());
+  double light = 0.0;
+  double change = 0.0;
+  for (const float* value = reference.mean.ptr<float>(); value < reinterpret_cast<const float*>(reference.mean.dataend);
+       ++value) {
+    light += *value;
+  }
+  // Less than that is single precision's rounding.
+  const double floor = 1e-6 * light / static_cast<double>(reference.mean.total() * bands);
+  const auto take = [&](LevelResult& level, const Part& part) {
+    const double z = part.z(test.batches);
+    if (std::abs(z) > std::abs(level.largest_z)) level.largest_z = z;
+    return z;
+  };
+  for (int row = 0; row < test.mean.rows; ++row) {
+    for (int i = 0; i < test.mean.cols * bands; ++i) {
+      const double is = test.mean.ptr<float>(row)[i];
+      const double was = reference.mean.ptr<float>(row)[i];
+      const double is_variance = test.variance.ptr<float>(row)[i];
+      const double was_variance = reference.variance.ptr<float>(row)[i];
+      const std::size_t band = static_cast<std::size_t>(i % bands);
+      const std::size_t block = static_cast<std::size_t>((row / kBlock) * across + i / bands / kBlock);
+      Part pixel;
+      for (Part* part : {&pixel, &blocks[block * static_cast<std::size_t>(bands) + band], &picture[band]}) {
+        part->add(is, is_variance, was, was_variance, floor);
+      }
+      change += is - was;
+      result.p_values.ptr<float>(row)[i] = static_cast<float>(p_value(take(result.levels[0], pixel)));
+    }
+  }
+  for (const Part& part : blocks) take(result.levels[1], part);
+  for (const Part& part : picture) take(result.levels[2], part);
+  judge(result.levels[0], test.mean.total() * static_cast<std::size_t>(bands), significance);
+  judge(result.levels[1], blocks.size(), significance);
+  judge(result.levels[2], picture.size(), significance);
+  result.relative_change = light > 0.0 ? change / light : change;
+  return result;
+}
+
+void write_statistics(const std::filesystem::path& file, const ImageStatistics& statistics) {
+  std::vector<cv::Mat> planes, variances;
+  cv::split(rounded(statistics.mean, kMeanBits), planes);
+  cv::split(rounded(statistics.variance, kVarianceBits), variances);
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < planes.size(); ++i) names.push_back(fmt::format("mean.{:02}", i));
+  for (std::size_t i = 0; i < variances.size(); ++i) names.push_back(fmt::format("variance.{:02}", i));
+  planes.insert(planes.end(), variances.begin(), variances.end());
+  cv::Mat image;
+  cv::merge(planes, image);
+  sim::write_exr(file, image, names, {{"batches", std::to_string(statistics.batches)}});
+}
+
+ImageStatistics read_statistics(const std::filesystem::path& file) {
+  const sim::LinearImage stored = sim::read_exr(file);
+  std::vector<cv::Mat> planes, means, variances;
+  cv::split(stored.image, planes);
+  for (std::size_t i = 0; i < planes.size(); ++i) {  // in the order of their names, which is that of the bands
+    (stored.channel_names[i].starts_with("mean.") ? means : variances).push_back(planes[i]);
+  }
+  if (means.empty() || means.size() != variances.size()) fail("{}: it isn't a golden image", file.string());
+  ImageStatistics result;
+  cv::merge(means, result.mean);
+  cv::merge(variances, result.variance);
+  result.batches = std::stoi(sim::image_metadata(file, "batches"));
+  return result;
+}
+
+cv::Mat picture_of(const cv::Mat& mean) {
+  std::vector<cv::Mat> bands;
+  cv::split(mean, bands);
+  const std::size_t last = bands.size() - 1;
+  // Bands run from red to blue in our devices and from blue to red over even bands of wavelength.
+  std::vector<cv::Mat> shown = {bands[last], bands[last / 2], bands[0]};
+  if (bands.size() > 3) std::swap(shown[0], shown[2]);
+  cv::Mat picture;
+  cv::merge(shown, picture);
+  std::vector<float> sorted(picture.ptr<float>(), picture.ptr<float>() + picture.total() * picture.channels());
+  const auto white = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() * 99 / 100);
+  std::nth_element(sorted.begin(), white, sorted.end());
+  cv::Mat bright;
+  cv::pow(picture / std::max(1e-30F, *white), 1.0 / 2.2, bright);
+  bright.convertTo(picture, CV_8U, 255.0);
+  return picture;
+}
+
+}  // namespace touchstone::golden
