@@ -112,19 +112,21 @@ GoldenScene metallic_membrane() {
   return {"metallic-membrane", scene, sensor_camera()};
 }
 
-/// Half-transparent white silicone, black things on it: a ball that touches and a plate that lies on it.
-GoldenScene milky_slab() {
+/// A half-transparent white layer on clear gel, as dvs has, with dark things on it: a plate that it wets and a ball
+/// that dents it by less than its thickness.
+GoldenScene milky_layer() {
   Scene scene = plate_and_gel(3);
-  scene.media[2] = {1.41, Bands<3>(0.004, 0.006, 0.01), Bands<3>(0.45, 0.5, 0.55), 0.6};
-  scene.faces.push_back({0.0, 2, 0});
-  scene.environment = flat_spectrum(3, 0.05);
-  scene.balls.push_back({{-4, 0, 1.4}, 1.5, Lambertian{flat_spectrum(3, 0.03)}});
+  scene.media.push_back({1.41, Bands<3>(0.004, 0.006, 0.01), Bands<3>(1.1, 1.2, 1.3), 0.6});
+  scene.faces.push_back({-1.5, 2, 3});
+  scene.faces.push_back({0.0, 3, 0});
+  scene.environment = flat_spectrum(3, 5.0);
+  scene.balls.push_back({{-4, 0, 1.6}, 2.2, Lambertian{flat_spectrum(3, 0.03)}});
   TriangleMesh plate;
   plate.vertices = {{2, -3, -0.02}, {7, -3, -0.02}, {7, 3, -0.02}, {2, 3, -0.02}};
   plate.triangles = {{0, 2, 1}, {0, 3, 2}};
-  scene.surfaces.push_back({plate, Lambertian{Bands<3>(0.08, 0.03, 0.03)}});
+  scene.surfaces.push_back({plate, Lambertian{Bands<3>(0.2, 0.05, 0.05)}});
   light_from_below(scene, flat_spectrum(3, 0.02));
-  return {"milky-slab", scene, sensor_camera()};
+  return {"milky-layer", scene, sensor_camera()};
 }
 
 /// A yellow film on the plate before magenta print, white LEDs, 16 bands.
@@ -207,7 +209,7 @@ const std::map<std::string, std::function<GoldenScene()>>& makers() {
       {"film-over-print", film_over_print},
       {"frosted-ball", frosted_ball},
       {"metallic-membrane", metallic_membrane},
-      {"milky-slab", milky_slab},
+      {"milky-layer", milky_layer},
       {"printed-membrane", [] { return printed_membrane(0.7, 0.0); }},
       {"through-a-lens", through_a_lens},
       {"vhs-pressed", [] { return vhs(true); }},

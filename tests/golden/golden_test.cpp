@@ -88,8 +88,8 @@ TEST(GoldenTest, AStoredPictureIsReadAsItWasWritten) {
   const ImageStatistics back = read_statistics(folder.path() / "one.exr");
   EXPECT_EQ(back.batches, 17);
   ASSERT_EQ(back.mean.type(), statistics.mean.type());
-  EXPECT_LT(cv::norm(back.mean, statistics.mean, cv::NORM_INF), 2.0 / 2048.0);
-  EXPECT_LT(cv::norm(back.variance, statistics.variance, cv::NORM_INF), 2e-4 / 16.0);
+  EXPECT_LT(cv::norm(back.mean, statistics.mean, cv::NORM_INF), 2.0 / 1024.0);
+  EXPECT_LT(cv::norm(back.variance, statistics.variance, cv::NORM_INF), 2e-4 / 8.0);
 }
 
 TEST(GoldenTest, PicturesOfAnotherSizeAreRefused) {

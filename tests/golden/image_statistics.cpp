@@ -12,8 +12,8 @@ namespace touchstone::golden {
 namespace {
 
 constexpr int kBlock = 8;      // pixels a side
-constexpr int kMeanBits = 11;  // of a stored mean
-constexpr int kVarianceBits = 4;
+constexpr int kMeanBits = 10;  // of a stored mean
+constexpr int kVarianceBits = 3;
 
 /// Rounded to so many significant bits.
 float rounded(float value, int bits) {
@@ -197,10 +197,10 @@ ImageStatistics read_statistics(const std::filesystem::path& file) {
 cv::Mat picture_of(const cv::Mat& mean) {
   std::vector<cv::Mat> bands;
   cv::split(mean, bands);
-  const std::size_t last = bands.size() - 1;
-  // Bands run from red to blue in our devices and from blue to red over even bands of wavelength.
-  std::vector<cv::Mat> shown = {bands[last], bands[last / 2], bands[0]};
-  if (bands.size() > 3) std::swap(shown[0], shown[2]);
+  // Three bands run from red to blue, as in our devices; even bands of the visible range from blue to red.
+  const std::size_t count = bands.size();
+  const std::vector<cv::Mat> shown = count > 3 ? std::vector{bands[count / 5], bands[count / 2], bands[count * 7 / 10]}
+                                               : std::vector{bands[count - 1], bands[count / 2], bands[0]};
   cv::Mat picture;
   cv::merge(shown, picture);
   std::vector<float> sorted(picture.ptr<float>(), picture.ptr<float>() + picture.total() * picture.channels());

@@ -47,13 +47,13 @@ struct Comparison {
 /// @throws Error if the two differ in size or bands
 Comparison compare(const ImageStatistics& reference, const ImageStatistics& test, double significance = 1e-3);
 
-/// Writes both as an EXR (channels mean.0, mean.1 ..., variance.0 ...), which git can hold: means are rounded to 11
-/// bits, variances to 4; what the rounding adds to the variance is counted by `compare`.
+/// Writes both as an EXR (channels mean.0, mean.1 ..., variance.0 ...), which git can hold: means are rounded to 10
+/// bits, variances to 3; what the rounding adds to the variance is counted by `compare`.
 void write_statistics(const std::filesystem::path& file, const ImageStatistics& statistics);
 /// @throws Error naming the file
 ImageStatistics read_statistics(const std::filesystem::path& file);
 
-/// To look at: the first three bands (or one) as blue, green, red are shown, the 99th percentile white, gamma 2.2.
+/// To look at: three of the bands as red, green and blue, the 99th percentile white, gamma 2.2.
 cv::Mat picture_of(const cv::Mat& mean);
 
 }  // namespace touchstone::golden
