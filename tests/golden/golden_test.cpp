@@ -56,11 +56,11 @@ TEST(GoldenTest, ALampMovedByAFifthOfAMillimetreFails) {
   EXPECT_FALSE(comparison.levels[1].passes()) << comparison.text();
 }
 
-// Under the null hypothesis p-values are uniform; each of the three levels fails once in 1/significance.
-TEST(GoldenTest, OtherSeedsOfTheSameScenePassAsOftenAsTheSignificanceSays) {
+// A level that fails too often cries wolf; one that never does is no test.
+TEST(GoldenTest, OtherSeedsOfTheSameSceneFailNoMoreThanTheSignificanceSays) {
   const ImageStatistics stored = read_statistics(file_of("printed-membrane"));
   const GoldenScene golden = golden_scene("printed-membrane");
-  constexpr int kTimes = 12;
+  constexpr int kTimes = 8;
   constexpr double kSignificance = 0.1;
   int failed = 0;
   double low = 0.0;
@@ -73,8 +73,9 @@ TEST(GoldenTest, OtherSeedsOfTheSameScenePassAsOftenAsTheSignificanceSays) {
     low += cv::countNonZero(values < 0.05);
     count += static_cast<double>(values.total());
   }
-  EXPECT_LE(failed, 11) << "of 36 at 10 %: more than that comes once in a thousand times";
-  EXPECT_NEAR(low / count, 0.05, 0.01);
+  EXPECT_LE(failed, 8) << "of 24 at 10 %: more comes once in 700 times";
+  EXPECT_LT(low / count, 0.055);
+  EXPECT_GT(low / count, 0.02);
 }
 
 TEST(GoldenTest, AStoredPictureIsReadAsItWasWritten) {
@@ -84,9 +85,11 @@ TEST(GoldenTest, AStoredPictureIsReadAsItWasWritten) {
   cv::randu(statistics.mean, 0.1, 2.0);
   statistics.mean.convertTo(statistics.variance, CV_32F, 1e-4);
   statistics.batches = 17;
+  statistics.paths = 170;
   write_statistics(folder.path() / "one.exr", statistics);
   const ImageStatistics back = read_statistics(folder.path() / "one.exr");
   EXPECT_EQ(back.batches, 17);
+  EXPECT_EQ(back.paths, 170);
   ASSERT_EQ(back.mean.type(), statistics.mean.type());
   EXPECT_LT(cv::norm(back.mean, statistics.mean, cv::NORM_INF), 2.0 / 1024.0);
   EXPECT_LT(cv::norm(back.variance, statistics.variance, cv::NORM_INF), 2e-4 / 8.0);

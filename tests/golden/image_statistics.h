@@ -2,11 +2,13 @@
 // A picture as mean and variance, and whether two of them can be of the same scene.
 //
 // The test is that of Mitsuba 3's render tests (W. Jakob et al. 2022): a z-test in each pixel and band, and Sidak's
-// correction for how many there are. Here the variance of the reference counts, too; that of the test picture is known
-// from few batches only, so its statistic is Student's t; and besides pixels the means of 8 x 8 blocks and of the whole
-// picture are tested, which see a bias that drowns in the noise of one pixel.
+// correction for how many there are. Here the variance of the reference counts, too; that of the test picture, known
+// from few batches only, is its own or what the reference's paths make expected, whichever is more, and its statistic
+// is Student's t; and besides pixels the means of 8 x 8 blocks and of the whole picture are tested, which see a bias
+// that drowns in the noise of one pixel.
 
 #include <array>
+#include <cstdint>
 #include <filesystem>
 #include <opencv2/core/mat.hpp>
 #include <string>
@@ -20,6 +22,7 @@ struct ImageStatistics {
   cv::Mat mean;
   cv::Mat variance;
   int batches = 0;
+  std::int64_t paths = 0;  ///< a pixel, in all batches
 };
 
 /// Renders with the seeds first_seed, first_seed + 1 ... and `samples` paths a pixel each. @pre batches >= 2
