@@ -480,8 +480,9 @@ class PathIntegrator {
         leg.throughput /= survival;
       }
       if (roulette_is_due(leg.scatterings)) {
-        if (numbers.next() < 0.5) return false;
-        leg.throughput *= 2.0;
+        const double kept = share_of_walks_kept(leg.scatterings);
+        if (!(numbers.next() < kept)) return false;
+        leg.throughput /= kept;
       }
     }
     const auto [u, v] = numbers.next_pair();

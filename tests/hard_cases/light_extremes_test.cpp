@@ -5,6 +5,7 @@
 
 #include "core/units.h"
 #include "light_laws.h"
+#include "render/scattering.h"
 #include "render/warps.h"
 
 namespace touchstone::render {
@@ -46,7 +47,8 @@ SpotLamp lamp_at(const Eigen::Vector3d& position, const Eigen::Vector3d& directi
 }
 
 TEST(HardMedia, WhiteMilkOf5000MeanFreePathsReturnsTheSky) {
-  // A walk takes a thousand steps here and may take millions; what ends the long ones must leave the mean alone.
+  // A walk takes a thousand steps here and may take millions; what ends the long ones must leave the mean alone and
+  // make no fireflies.
   const Tracer tracer(slab(milk(1000.0, 0.0), 1.0));
   constexpr int kRuns = 40;
   Eigen::ArrayXd seen(kRuns);
@@ -60,6 +62,28 @@ TEST(HardMedia, WhiteMilkOf5000MeanFreePathsReturnsTheSky) {
   EXPECT_LT(farthest(seen, 1e-6), 6.0);
   const double error = std::sqrt((seen - seen.mean()).square().sum() / (kRuns * (kRuns - 1.0)));
   EXPECT_NEAR(seen.mean(), 1.0, 4.0 * error + 1e-9);
+}
+
+TEST(HardMedia, WeightsOfLongWalksGrowAsWalksBecomeRareAndTheirMeanLengthIsFinite) {
+  // A walk is still inside a half space of white milk after n scatterings with a chance of n^(-1/2), and inside a slab
+  // of tau mean free paths for some tau^2 scatterings.
+  constexpr double kThickest = 5000.0;
+  double weight = 1.0;
+  double before = HUGE_VAL;
+  for (std::int64_t n = 2; n < (std::int64_t{1} << 60); n *= 2) {
+    if (roulette_is_due(n)) weight /= share_of_walks_kept(n);
+    const auto length = static_cast<double>(n);
+    const double rare = std::pow(length, -0.5);
+    if (length < kThickest * kThickest) {
+      // Of the walks of this length 1 / weight are left, each of that weight, so to the variance they add their chance
+      // times it: no more than the first ones that the roulette meets.
+      EXPECT_LE(rare * weight, 1.5 / std::sqrt(static_cast<double>(kFreeScatterings)) + rare) << n;
+    } else if (length > 4096.0 * static_cast<double>(kFreeScatterings)) {
+      const double steps = length * rare / weight;  // what they add to the mean length
+      EXPECT_LT(steps, 0.8 * before) << n;
+      before = steps;
+    }
+  }
 }
 
 TEST(HardMedia, GreyMilkOf5000MeanFreePathsReturnsLess) {
