@@ -2,12 +2,10 @@
 // One path: from the camera through faces and surfaces to the lamps and the surroundings.
 
 #include <Eigen/Core>
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <vector>
 
 #include "render/fresnel.h"
 #include "render/ggx.h"
@@ -95,13 +93,8 @@ class PathIntegrator {
     constexpr double kLeastCosine = 0.05;
     constexpr int kMostWeighed = 32;
     if (lamp_count > kMostWeighed) {
-      const std::vector<double>& sums = scene_.lamp_power_sums;
-      if (!(sums.back() > 0.0)) return {0, 1.0};
-      const auto above = std::upper_bound(sums.begin(), sums.end(), number * sums.back());
-      // Rounding may have run past the last lamp that shines.
-      const auto shines = above == sums.end() ? std::lower_bound(sums.begin(), sums.end(), sums.back()) : above;
-      const auto lamp = static_cast<int>(shines - sums.begin());
-      return {lamp, scene_.lamps[lamp].total_power / sums.back()};
+      const auto [lamp, probability] = scene_.choice_by_power.choose(number);
+      return {lamp, probability};
     }
     std::array<double, kMostWeighed> weights{};
     double total = 0.0;

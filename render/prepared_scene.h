@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "render/choice_by_power.h"
 #include "render/ggx.h"
 #include "render/ray_scene.h"
 #include "render/scene.h"
@@ -86,7 +87,7 @@ struct PreparedScene {
   std::vector<PreparedMaterial<N>> materials;  ///< by RayHit::object
   std::vector<PreparedPrint<N>> prints;
   std::vector<PreparedLamp<N>> lamps;
-  std::vector<double> lamp_power_sums;  ///< W over the bands, of the lamps up to and with each
+  ChoiceByPower choice_by_power;  ///< of the lamps
   Bands<N> environment;
   bool interreflection;
   RayScene rays;
@@ -117,8 +118,7 @@ struct PreparedScene {
       lamps.push_back({lamp, NormalFrame(lamp.direction.normalized()), std::cos(lamp.half_angle), intensity,
                        lamp.power_W.sum(), layer_at(lamp.position.z())});
     }
-    double power = 0.0;
-    for (const PreparedLamp<N>& lamp : lamps) lamp_power_sums.push_back(power += lamp.total_power);
+    for (const PreparedLamp<N>& lamp : lamps) choice_by_power.add(lamp.total_power);
   }
 
   int layer_at(double z) const {

@@ -82,7 +82,7 @@ Bands<N> weight_of_scattering(const Bands<N>& extinction, const Bands<N>& scatte
 /// A walk in a medium that takes nothing away may last for ever: the chance to be still inside a half space after n
 /// scatterings falls as n^(-1/2). So from kFreeScatterings on, each time their count has doubled, some walks end and
 /// the others go on with more weight: no bias. Up to 2^10 times that count a share of 2^(-1/2) is kept, so that the
-/// squares of the weights grow no faster than the walks become rare and none is a firefly; that is as long as walks
+/// weights grow no faster than the walks become rare and none is a firefly; that is as long as walks
 /// last in a layer of some 8,000 mean free paths. Beyond a half is kept, and the mean length is finite.
 inline constexpr std::int64_t kFreeScatterings = 65536;
 inline bool roulette_is_due(std::int64_t scatterings) {

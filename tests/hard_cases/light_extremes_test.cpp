@@ -5,6 +5,7 @@
 
 #include "core/units.h"
 #include "light_laws.h"
+#include "render/choice_by_power.h"
 #include "render/scattering.h"
 #include "render/warps.h"
 
@@ -180,6 +181,25 @@ TEST(HardLamps, OneWithLightAmongThousandsWithoutIsFound) {
   const Seen a = look(one, few_pixels(), 64);
   const Seen b = look(many, few_pixels(), 64);
   EXPECT_TRUE(((a.mean - b.mean).abs() < 5.0 * (a.error.square() + b.error.square()).sqrt() + 1e-4 * a.most()).all());
+}
+
+TEST(HardLamps, TheChoiceAmongThousandsIsInProportionToPower) {
+  ChoiceByPower choice;
+  const std::vector<double> powers = {0.0, 1e-9, 0.0, 3.0, 0.0, 0.0, 1.0, 4.0, 0.0};
+  for (const double power : powers) choice.add(power);
+  std::vector<double> share(powers.size(), 0.0);
+  constexpr int kNumbers = 80000;
+  for (int i = 0; i < kNumbers; ++i) {
+    const auto [lamp, probability] = choice.choose((i + 0.5) / kNumbers);
+    ASSERT_GT(powers[lamp], 0.0);
+    EXPECT_EQ(probability, choice.probability(lamp));
+    share[lamp] += 1.0 / kNumbers;
+  }
+  for (std::size_t i = 0; i < powers.size(); ++i) {
+    EXPECT_NEAR(share[i], powers[i] / 8.0, 2.0 / kNumbers) << i;
+  }
+  EXPECT_EQ(choice.choose(0.0).first, 1);
+  EXPECT_EQ(choice.choose(std::nextafter(1.0, 0.0)).first, 7);
 }
 
 TEST(HardLamps, ExactlyAtAFaceIsJustBelowIt) {
