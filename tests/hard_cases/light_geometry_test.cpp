@@ -124,7 +124,6 @@ TEST(HardLight, MatchedBodiesAndFilmsChangeNothing) {
     with.balls.push_back({{1, 1, -2.5}, 1.5, matched});
     with.surfaces.push_back(
         {square_sheet(20.0, -4.0, true), rough ? Material(RoughRefractive{2, 2, 0.4}) : Material(Refractive{2, 2})});
-    // A lamp's light doesn't come through a rough boundary by connections, matched or not.
     EXPECT_LT(difference(plain, with), kRounding) << rough;
   }
   Scene with = plain;
