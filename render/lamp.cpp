@@ -9,13 +9,12 @@
 #include "core/error.h"
 #include "core/units.h"
 #include "render/scene.h"
+#include "render/scene_limits.h"
 #include "render/spot_light.h"
 
 namespace touchstone::render {
 namespace {
 
-constexpr double kMostLength = 1e5;      // mm
-constexpr double kMostCoordinate = 1e9;  // mm: a lamp may stand for the sun
 constexpr double kLeastHalfPower = 1e-3;
 constexpr double kMostHalfPower = 1.5;
 
@@ -94,8 +93,9 @@ double integral(const GuideLamp& lamp) {
 }
 
 void check_point(const Eigen::Vector3d& point, const char* name, const std::string& what) {
-  if (!point.allFinite() || point.cwiseAbs().maxCoeff() > kMostCoordinate) {
-    fail("{}: its {} is ({}, {}, {}); it must be within 1000 km", what, name, point.x(), point.y(), point.z());
+  if (!point.allFinite() || point.cwiseAbs().maxCoeff() > kFarthest) {
+    fail("{}: its {} is ({}, {}, {}); it must be within 100 m of the origin", what, name, point.x(), point.y(),
+         point.z());
   }
 }
 
@@ -124,13 +124,13 @@ void check_lobe(double half_power_angle, bool visible, const std::string& what) 
 }
 
 void check_length(double length, const char* name, const std::string& what) {
-  if (!(length > 0.0 && length < kMostLength)) fail("{}: {} is {} mm; it must be above 0", what, name, length);
+  if (!(length > 0.0 && length < kFarthest)) fail("{}: {} is {} mm; it must be above 0", what, name, length);
 }
 
 void check(const SpotLamp& lamp, const std::vector<FlatFace>&, const std::string& what) {
   check_point(lamp.position, "position", what);
   check_direction(lamp.direction, what);
-  if (!(lamp.lens_radius >= 0.0 && lamp.lens_radius < kMostLength)) {
+  if (!(lamp.lens_radius >= 0.0 && lamp.lens_radius < kFarthest)) {
     fail("{}: lens_radius is {} mm; it must be 0 or more", what, lamp.lens_radius);
   }
   if (!(lamp.half_angle >= 0.0 && lamp.soft_angle >= 0.0 && lamp.half_angle + lamp.soft_angle > 1e-4 &&
@@ -154,7 +154,7 @@ void check_in_one_layer(double z, double reach, const std::vector<FlatFace>& fac
 void check(const LedLamp& lamp, const std::vector<FlatFace>& faces, const std::string& what) {
   check_point(lamp.position, "position", what);
   check_direction(lamp.direction, what);
-  if (!(lamp.radius >= 0.0 && lamp.radius < kMostLength)) {
+  if (!(lamp.radius >= 0.0 && lamp.radius < kFarthest)) {
     fail("{}: radius is {} mm; it must be 0 or more", what, lamp.radius);
   }
   if (lamp.visible && lamp.radius == 0.0) fail("{}: radius is 0; a visible lamp needs one", what);
@@ -270,7 +270,7 @@ bool same_lamp(const Lamp& a, const Lamp& b) {
 
 void check_lamp(const Lamp& lamp, Eigen::Index bands, const std::vector<FlatFace>& faces, const std::string& what) {
   std::visit([&](const auto& one) { check(one, faces, what); }, lamp);
-  check_spectrum(lamp_power(lamp), bands, std::numeric_limits<double>::infinity(), what + ": power_W");
+  check_spectrum(lamp_power(lamp), bands, kBrightest, what + ": power_W");
 }
 
 }  // namespace touchstone::render

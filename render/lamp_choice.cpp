@@ -18,6 +18,7 @@ void LampChooser::add(const Eigen::Vector3d& position, double power, double inde
   group.z[lane] = static_cast<float>(position.z());
   group.power[lane] = static_cast<float>(power);
   group.index[lane] = static_cast<float>(index);
+  by_power_.add(power);
 }
 
 void LampChooser::lay_grid(const Eigen::AlignedBox3d& box, const LightAt& light_at) {
@@ -138,7 +139,8 @@ LampChoice LampChooser::choose(const Eigen::Vector3d& position, const Eigen::Vec
   if (count_ == 1) return {0, 1.0};
   Sums sums;
   if (!weigh(position, normal, index, sums)) {
-    return {std::min(count_ - 1, static_cast<int>(number * count_)), 1.0 / count_};
+    const auto [lamp, probability] = by_power_.choose(number);
+    return {lamp, probability};
   }
   const float at = std::min(static_cast<float>(number), 1.0f - 0x1p-24f) * sums.total;
   int lamp = 0;
@@ -152,7 +154,7 @@ double LampChooser::chance_of(int lamp, const Eigen::Vector3d& position, const E
   TS_ASSERT(lamp >= 0 && lamp < count_);
   if (count_ == 1) return 1.0;
   Sums sums;
-  return weigh(position, normal, index, sums) ? sums.chance(lamp) : 1.0 / count_;
+  return weigh(position, normal, index, sums) ? sums.chance(lamp) : by_power_.probability(lamp);
 }
 
 }  // namespace touchstone::render

@@ -8,6 +8,8 @@
 #include <optional>
 #include <vector>
 
+#include "render/choice_by_power.h"
+
 namespace touchstone::render {
 
 struct LampChoice {
@@ -40,7 +42,7 @@ class LampChooser {
   /// The probability with which choose() takes lamp number `lamp`.
   double chance_of(int lamp, const Eigen::Vector3d& position, const Eigen::Vector3d* normal, double index) const;
 
-  static constexpr int kMostWeighed = 32;  ///< of more lamps each has the same chance
+  static constexpr int kMostWeighed = 32;  ///< of more lamps each has a chance by its power alone
 
  private:
   static constexpr int kLanes = 8;
@@ -80,6 +82,7 @@ class LampChooser {
   Lanes rule_of_thumb(const Group& group, const Eigen::Array3f& p, const Eigen::Vector3d* normal, float index) const;
 
   std::vector<Group> groups_;
+  ChoiceByPower by_power_;
   int count_ = 0;
   std::optional<Grid> grid_;
 };

@@ -6,6 +6,7 @@
 
 #include "core/error.h"
 #include "core/units.h"
+#include "render/camera_pose.h"
 #include "render/warps.h"
 
 namespace touchstone::render {
@@ -85,11 +86,13 @@ DistortionReach checked_reach(const LensCamera& camera) {
   for (double value : {d.k1, d.k2, d.p1, d.p2, d.k3, d.k4, d.k5, d.k6}) {
     if (!std::isfinite(value)) fail("camera: a distortion coefficient is {}; it must be finite", value);
   }
-  const Eigen::Matrix3d& rotation = camera.gel_from_camera.rotation;
-  if (!rotation.allFinite() || !camera.gel_from_camera.translation.allFinite() ||
-      !(rotation * rotation.transpose()).isIdentity(1e-6) || rotation.determinant() < 0.0) {
-    fail("camera: gel_from_camera isn't a finite rotation and translation");
+  // Places on the lens are drawn evenly; of a wider one nearly all would see the sensor edge on.
+  constexpr double kWidestAperture = 10.0;
+  if (!(camera.aperture_mm <= kWidestAperture * sensor_distance_mm(camera))) {
+    fail("camera: aperture_mm is {}; it must be at most {} times the distance to the sensor, {} mm", camera.aperture_mm,
+         kWidestAperture, sensor_distance_mm(camera));
   }
+  check_camera_pose(camera.gel_from_camera);
   const DistortionReach reach = radial_reach(camera.distortion);
   check_invertible(camera, reach);
   return reach;

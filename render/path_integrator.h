@@ -352,8 +352,9 @@ class PathIntegrator {
         leg.throughput /= survival;
       }
       if (roulette_is_due(leg.scatterings)) {
-        if (numbers.next() < 0.5) return false;
-        leg.throughput *= 2.0;
+        const double kept = share_of_walks_kept(leg.scatterings);
+        if (!(numbers.next() < kept)) return false;
+        leg.throughput /= kept;
       }
     }
     const auto [u, v] = numbers.next_pair();
@@ -385,6 +386,7 @@ class PathIntegrator {
       const Flight<N>* flight = nullptr;
       double most = to_face;
       if (scene_.media[leg.medium].scatters && !numbers.is_centre()) [[unlikely]] {
+        if (!(leg.throughput.maxCoeff() > 0.0)) return;  // an absorber took all: no share of it can be chosen
         drawn = fly(leg, numbers);
         flight = &drawn;
         most = std::min(most, drawn.distance);

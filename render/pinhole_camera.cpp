@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "render/camera_pose.h"
 #include "render/warps.h"
 
 namespace touchstone::render {
@@ -136,11 +137,13 @@ void check_camera(const PinholeCamera& camera) {
     fail("camera: foil_thickness_um is {}; it must be 0 or more and less than the distance to the sensor, {} mm",
          camera.foil_thickness_um, camera.distance_mm);
   }
-  const Eigen::Matrix3d& rotation = camera.gel_from_camera.rotation;
-  if (!rotation.allFinite() || !camera.gel_from_camera.translation.allFinite() ||
-      !(rotation * rotation.transpose()).isIdentity(1e-6) || rotation.determinant() < 0.0) {
-    fail("camera: gel_from_camera isn't a finite rotation and translation");
+  // Places in the hole are drawn evenly; of a wider one nearly all would see the sensor edge on.
+  constexpr double kWidestHole = 10.0;
+  if (!(1e-3 * camera.hole_diameter_um <= kWidestHole * camera.distance_mm)) {
+    fail("camera: hole_diameter_um is {}; it must be at most {} times the distance to the sensor, {} mm",
+         camera.hole_diameter_um, kWidestHole, camera.distance_mm);
   }
+  check_camera_pose(camera.gel_from_camera);
 }
 
 std::optional<CameraRay> pinhole_ray(const PinholeCamera& camera, double x, double y, double u, double v) {

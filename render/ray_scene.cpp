@@ -65,8 +65,12 @@ RTCRay embree_ray(const Eigen::Vector3d& origin, const Eigen::Vector3d& directio
 /// How light gets on through a thing.
 enum class Passage { kNone, kRefracted, kFilm };
 
-Passage passage_of(const Material& material) {
+Passage passage_of(const Material& material, const std::vector<Medium>& media) {
   if (std::holds_alternative<Refractive>(material)) return Passage::kRefracted;
+  if (const auto* rough = std::get_if<RoughRefractive>(&material)) {
+    // Between equal indices there is no face, rough or smooth.
+    if (media[rough->medium_inside].index == media[rough->medium_outside].index) return Passage::kRefracted;
+  }
   return std::holds_alternative<ThinFilm>(material) ? Passage::kFilm : Passage::kNone;
 }
 
@@ -163,7 +167,7 @@ RayScene::RayScene(const Scene& scene) : state_(std::make_unique<State>()) {
   }
   for (const Surface& surface : scene.surfaces) {
     State::Mesh mesh{surface.mesh, {}};
-    if (passage_of(surface.material) == Passage::kRefracted) {
+    if (passage_of(surface.material, scene.media) == Passage::kRefracted) {
       mesh.vertex_normals.assign(mesh.mesh.vertices.size(), Eigen::Vector3d::Zero());
       for (const auto& t : mesh.mesh.triangles) {
         const auto& p = mesh.mesh.vertices;
@@ -177,10 +181,10 @@ RayScene::RayScene(const Scene& scene) : state_(std::make_unique<State>()) {
   }
   state.balls = scene.balls;
   for (int i = 0; i < static_cast<int>(scene.balls.size()); ++i) {
-    state.balls_by_passage[static_cast<std::size_t>(passage_of(scene.balls[i].material))].push_back(i);
+    state.balls_by_passage[static_cast<std::size_t>(passage_of(scene.balls[i].material, scene.media))].push_back(i);
   }
   for (unsigned i = 0; i < state.meshes.size(); ++i) {
-    state.add_mesh(i, passage_of(scene.surfaces[i].material));
+    state.add_mesh(i, passage_of(scene.surfaces[i].material, scene.media));
   }
   const auto first_ball = static_cast<unsigned>(state.meshes.size());
   for (Passage passage : {Passage::kNone, Passage::kRefracted, Passage::kFilm}) {

@@ -20,6 +20,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <numbers>
 
 #include "core/units.h"
 #include "render/spectrum.h"
@@ -78,12 +79,18 @@ Bands<N> weight_of_scattering(const Bands<N>& extinction, const Bands<N>& scatte
   return scattering * left / (flight.chance * extinction * left).sum();
 }
 
-/// A walk in a medium that takes nothing away may last for ever. After kFreeScatterings, and each time the count has
-/// doubled since, one walk in two ends and the other goes on with twice its weight: no bias, and a finite mean length
-/// even in a half space of albedo one, where the chance to be still inside after n scatterings falls as n^(-1/2).
+/// A walk in a medium that takes nothing away may last for ever: the chance to be still inside a half space after n
+/// scatterings falls as n^(-1/2). So from kFreeScatterings on, each time their count has doubled, some walks end and
+/// the others go on with more weight: no bias. Up to 2^10 times that count a share of 2^(-1/2) is kept, so that the
+/// weights grow no faster than the walks become rare and none is a firefly; that is as long as walks
+/// last in a layer of some 8,000 mean free paths. Beyond a half is kept, and the mean length is finite.
 inline constexpr std::int64_t kFreeScatterings = 65536;
 inline bool roulette_is_due(std::int64_t scatterings) {
   return scatterings >= kFreeScatterings && (scatterings & (scatterings - 1)) == 0;
+}
+/// @pre roulette_is_due(scatterings)
+inline double share_of_walks_kept(std::int64_t scatterings) {
+  return scatterings <= (kFreeScatterings << 10) ? std::numbers::sqrt2 / 2.0 : 0.5;
 }
 
 }  // namespace touchstone::render

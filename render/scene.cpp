@@ -7,6 +7,7 @@
 
 #include "core/error.h"
 #include "render/layer_connection.h"
+#include "render/scene_limits.h"
 
 namespace touchstone::render {
 namespace {
@@ -17,6 +18,11 @@ struct Overloaded : Ts... {
 };
 template <typename... Ts>
 Overloaded(Ts...) -> Overloaded<Ts...>;
+
+void check_position(const Eigen::Vector3d& position, const std::string& what) {
+  if (!position.allFinite()) fail("{} isn't finite", what);
+  if (position.cwiseAbs().maxCoeff() > kFarthest) fail("{} is over 100 m from the origin", what);
+}
 
 void check_medium_index(int medium, const Scene& scene, const std::string& what) {
   if (medium < 0 || medium >= static_cast<int>(scene.media.size())) {
@@ -42,10 +48,7 @@ void check_material(const Material& material, const Scene& scene, const std::str
                           check_roughness(m.roughness, what);
                         },
                         [](const Black&) {},
-                        [&](const Emitter& m) {
-                          check_spectrum(m.radiance, bands, std::numeric_limits<double>::infinity(),
-                                         what + ": radiance");
-                        },
+                        [&](const Emitter& m) { check_spectrum(m.radiance, bands, kBrightest, what + ": radiance"); },
                         [&](const Refractive& m) {
                           check_medium_index(m.medium_inside, scene, what + ": medium_inside");
                           check_medium_index(m.medium_outside, scene, what + ": medium_outside");
@@ -103,8 +106,10 @@ void check_print(const Print& print, const Surface& surface, Eigen::Index bands,
 
 void check_mesh(const TriangleMesh& mesh, const std::string& what) {
   for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
-    if (!mesh.vertices[i].allFinite()) fail("{}: vertex {} isn't finite", what, i);
-    if (mesh.vertices[i].cwiseAbs().maxCoeff() > 1e5) fail("{}: vertex {} is over 100 m from the origin", what, i);
+    const Eigen::Vector3d& vertex = mesh.vertices[i];
+    if (!(vertex.cwiseAbs().maxCoeff() <= kFarthest && vertex.allFinite())) {
+      check_position(vertex, fmt::format("{}: vertex {}", what, i));
+    }
   }
   for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
     const auto& triangle = mesh.triangles[i];
@@ -126,7 +131,7 @@ void check_mesh(const TriangleMesh& mesh, const std::string& what) {
 void check_scene(const Scene& scene) {
   const Eigen::Index bands = scene.environment.size();
   if (bands < 1) fail("scene: the environment has no band; give a radiance (0 for darkness) for each band");
-  check_spectrum(scene.environment, bands, INFINITY, "environment");
+  check_spectrum(scene.environment, bands, kBrightest, "environment");
 
   if (scene.media.empty()) fail("scene: no medium; media[0] fills the space");
   for (std::size_t i = 0; i < scene.media.size(); ++i) {
@@ -150,7 +155,7 @@ void check_scene(const Scene& scene) {
   for (std::size_t i = 0; i < scene.faces.size(); ++i) {
     const FlatFace& face = scene.faces[i];
     const std::string what = fmt::format("face {}", i);
-    if (!std::isfinite(face.z)) fail("{}: z is {}; it must be finite", what, face.z);
+    if (!(std::abs(face.z) <= kFarthest)) fail("{}: z is {} mm; it must be within 100 m of the origin", what, face.z);
     check_medium_index(face.medium_below, scene, what + ": medium_below");
     check_medium_index(face.medium_above, scene, what + ": medium_above");
     if (i == 0) continue;
@@ -171,7 +176,7 @@ void check_scene(const Scene& scene) {
   for (std::size_t i = 0; i < scene.balls.size(); ++i) {
     const Ball& ball = scene.balls[i];
     const std::string what = fmt::format("ball {}", i);
-    if (!ball.centre.allFinite()) fail("{}: its centre isn't finite", what);
+    check_position(ball.centre, what + ": its centre");
     if (!(ball.radius > 0.0 && ball.radius < 1e5)) fail("{}: radius is {} mm; it must be above 0", what, ball.radius);
     check_material(ball.material, scene, what);
   }

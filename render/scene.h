@@ -99,7 +99,8 @@ struct Scene {
   bool interreflection = true;  ///< false: only lamp light on what the camera sees, and the surroundings seen directly
 };
 
-/// Throws Error if anything in the scene can't be rendered: it names the part, the value and what is allowed.
+/// Throws Error if anything in the scene can't be rendered: it names the part, the value and what is allowed. Nothing
+/// may be over 100 m from the origin, no radiance or power above 1e12.
 void check_scene(const Scene& scene);
 
 }  // namespace touchstone::render

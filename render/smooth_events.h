@@ -115,7 +115,7 @@ class SmoothEvents {
     mirrored.throughput *= light.reflected;
     const double on = leg.throughput.sum();
     const double back = mirrored.throughput.sum();
-    if (!(on + back > 0.0)) return;
+    if (!(back > 0.0)) return;  // a film of the medium's own index draws no number
     if (!leg.is_first_sight() || branches.is_full()) {
       const double chance = back / (on + back);
       const bool turns = numbers.next() < chance;

@@ -36,7 +36,9 @@ TEST(CameraPreset, GivesTheImagersOwnFigures) {
     device.band_wavelengths_nm = {610, 540, 450};
     device.camera = camera_with(fmt::format("preset: {}\nexposure_us: 300\nwhite_balance: [1, 1, 1]\n", name));
     const render::ImagerPreset preset = render::imager_preset(name, 3e-4);
-    const render::Imager made = imager(device, true);
+    SceneBands bands;
+    bands.centres_nm = Eigen::Array3d(610, 540, 450);
+    const render::Imager made = imager(device, bands, true);
     EXPECT_EQ(device.camera->width, preset.width) << name;
     EXPECT_EQ(device.camera->height, preset.height) << name;
     EXPECT_EQ(device.camera->pixel_pitch_um, preset.pixel_pitch_um) << name;
