@@ -289,15 +289,15 @@ class PathIntegrator {
                                              SampleSequence& numbers, RayCounts& counts, Bands<N>& sum) const {
     const bool entering = leg.direction.dot(hit.normal) < 0.0;
     const int to = entering ? material.inside : material.outside;
-    const double n_out = scene_.media[leg.medium].index;
-    const double n_in = scene_.media[to].index;
-    if (n_out == n_in) {
+    const double n_out = scene_.media[entering ? material.outside : material.inside].index;
+    if (n_out == scene_.media[to].index) {
       meet_boundary(leg, hit, material, branches, numbers, sum);
       return true;
     }
     const Eigen::Vector3d normal = entering ? hit.normal : Eigen::Vector3d(-hit.normal);
     const NormalFrame frame(normal);
     const Eigen::Vector3d out = frame.to_local(-leg.direction);
+    const RoughBoundary& boundary = scene_.boundaries[material.boundary];
     const LampNumbers chosen = leg.is_first_sight() ? at_first_hit : lamp_numbers(numbers);
     for (int side = 0; side < 2 && !scene_.lamps.empty(); ++side) {
       const Receiver receiver{hit.position, side == 0 ? normal : Eigen::Vector3d(-normal), leg.layer,
@@ -314,18 +314,15 @@ class PathIntegrator {
         }
         const Eigen::Vector3d in = frame.to_local(arrival.direction);
         sum += leg.throughput * arrival.irradiance *
-               (rough_dielectric(out, in, material.roughness, n_out, n_in) * std::abs(in.z()) /
-                (choice.probability * n_out * n_out));
+               (boundary(out, in, !entering) * std::abs(in.z()) / (choice.probability * n_out * n_out));
       }
     }
 
     if (!interreflection_ || leg.depth >= max_depth_) return false;
-    const auto [u, v] = numbers.next_pair();
-    const RoughSample sample = sample_rough_dielectric(out, material.roughness, n_out, n_in, u, v, numbers.next());
-    leg.throughput *= sample.weight;
-    if (!(sample.weight > 0.0) || std::abs(sample.in.z()) <= 1e-9 || !survives(leg, numbers)) return false;
-    const bool passes = sample.in.z() < 0.0;
-    leg.direction = frame.to_world(sample.in).normalized();
+    const auto in = boundary.sample(out, !entering, numbers);
+    if (!in || std::abs(in->z()) <= 1e-9 || !survives(leg, numbers)) return false;
+    const bool passes = in->z() < 0.0;
+    leg.direction = frame.to_world(*in).normalized();
     const double leave = RayScene::leave_distance(hit.position);
     leg.origin = hit.position + (passes ? -leave : leave) * normal;
     if (passes) leg.medium = to;

@@ -47,6 +47,7 @@ struct PreparedMaterial {
   double film_index = 1.0;
   bool film_mirrors = false;
   int print = -1;           ///< index into PreparedScene::prints
+  int boundary = -1;        ///< of a RoughRefractive: index into PreparedScene::boundaries
   GgxAlbedo single_albedo;  ///< of a conductor
   int inside = 0, outside = 0;
 };
@@ -85,6 +86,7 @@ struct PreparedScene {
   std::vector<FlatFace> faces;
   std::vector<PreparedMaterial<N>> materials;  ///< by RayHit::object
   std::vector<PreparedPrint<N>> prints;
+  std::vector<RoughBoundary> boundaries;
   std::vector<PreparedLamp<N>> lamps;
   Bands<N> environment;
   bool interreflection;
@@ -139,7 +141,7 @@ struct PreparedScene {
     prints.push_back(std::move(made));
   }
 
-  PreparedMaterial<N> prepare(const Material& material) const {
+  PreparedMaterial<N> prepare(const Material& material) {
     PreparedMaterial<N> made;
     if (const auto* lambertian = std::get_if<Lambertian>(&material)) {
       made.kind = SurfaceKind::kLambertian;
@@ -163,6 +165,11 @@ struct PreparedScene {
       made.inside = rough->medium_inside;
       made.outside = rough->medium_outside;
       made.roughness = rough->roughness;
+      const bool as_before = !materials.empty() && materials.back().kind == SurfaceKind::kRoughRefractive &&
+                             materials.back().roughness == made.roughness && materials.back().inside == made.inside &&
+                             materials.back().outside == made.outside;
+      if (!as_before) boundaries.emplace_back(made.roughness, media[made.outside].index, media[made.inside].index);
+      made.boundary = static_cast<int>(boundaries.size()) - 1;
     } else if (const auto* transmitter = std::get_if<DiffuseTransmitter>(&material)) {
       made.kind = SurfaceKind::kTransmitter;
       made.colour = transmitter->reflectance;
