@@ -1,33 +1,37 @@
 #include "render/rough_dielectric.h"
 
-#include <cstdint>
-
 #include "core/units.h"
 #include "render/warps.h"
 
 namespace touchstone::render {
 namespace {
 
-/// The share of the light seen along a direction at `cosine` that one facet explains.
-double explained_by_one_facet(double cosine, double alpha, double n_out, double n_in, std::uint64_t stream) {
-  constexpr std::uint32_t kFacets = 512;
+/// The share of the light seen along a direction at `cosine` that one facet explains: by the midpoint rule over the
+/// numbers that sample_visible_normal takes, half of the turn (the other half is its mirror image) and a height with the
+/// square roots at its ends stretched away.
+double explained_by_one_facet(double cosine, double alpha, double n_out, double n_in) {
+  constexpr int kTurns = 16;
+  constexpr int kHeights = 32;
   const Eigen::Vector3d out(std::sqrt(1.0 - cosine * cosine), 0.0, cosine);
+  const double eta = n_out / n_in;
+  const double masking = ggx_masking(cosine, alpha);
   double sum = 0.0;
-  for (std::uint32_t i = 0; i < kFacets; ++i) {
-    SampleSequence numbers(0, stream, i);
-    const auto [u, v] = numbers.next_pair();
-    const Eigen::Vector3d facet = sample_visible_normal(out, alpha, u, v);
-    const double on_facet = std::clamp(out.dot(facet), 0.0, 1.0);
-    const FresnelFace face = fresnel(n_out, n_in, on_facet);
-    const double reflectance = face.mean_reflectance();
-    const double mirrored = 2.0 * on_facet * facet.z() - out.z();
-    if (mirrored > 0.0)
-      sum += reflectance * ggx_masking_shadowing(mirrored, cosine, alpha) / ggx_masking(cosine, alpha);
-    const double eta = n_out / n_in;
-    const double refracted = eta * out.z() - (eta * on_facet - face.cos_refracted) * facet.z();
-    if (refracted > 0.0) sum += (1.0 - reflectance) * ggx_masking(refracted, alpha);
+  for (int j = 0; j < kHeights; ++j) {
+    const double t = (j + 0.5) / kHeights;
+    const double height = 0.5 * (1.0 - std::cos(kPi * t));
+    const double weight = 0.5 * kPi * std::sin(kPi * t) / (kHeights * kTurns);
+    for (int i = 0; i < kTurns; ++i) {
+      const Eigen::Vector3d facet = sample_visible_normal(out, alpha, 0.5 * (i + 0.5) / kTurns, height);
+      const double on_facet = std::clamp(out.dot(facet), 0.0, 1.0);
+      const FresnelFace face = fresnel(n_out, n_in, on_facet);
+      const double reflectance = face.mean_reflectance();
+      const double mirrored = 2.0 * on_facet * facet.z() - cosine;
+      const double refracted = eta * cosine - (eta * on_facet - face.cos_refracted) * facet.z();
+      sum += weight * (reflectance * ggx_masking_shadowing(mirrored, cosine, alpha) / masking +
+                       (1.0 - reflectance) * ggx_masking(refracted, alpha));
+    }
   }
-  return std::min(1.0, sum / kFacets);
+  return std::min(1.0, sum);
 }
 
 /// The integral of s^3 (a + (b - a) (s - low) / (high - low)) from `low` to `s`.
@@ -46,8 +50,7 @@ RoughBoundary::RoughBoundary(double alpha, double n_outside, double n_inside)
   for (int side = 0; side < 2; ++side) {
     for (int k = 0; k <= kCells; ++k) {
       const double root = std::max(k, 1) / static_cast<double>(kCells);  // at grazing take the next node's value
-      const auto stream = static_cast<std::uint64_t>(side * (kCells + 1) + k);
-      missing_[side][k] = 1.0 - explained_by_one_facet(root * root, alpha, index_[side], index_[1 - side], stream);
+      missing_[side][k] = 1.0 - explained_by_one_facet(root * root, alpha, index_[side], index_[1 - side]);
     }
     // With s the root of the cosine, |cos| d omega is 2 pi s^2 d(s^2) = 4 pi s^3 ds.
     for (int k = 0; k < kCells; ++k) {

@@ -92,7 +92,7 @@ inline RoughSample sample_rough_dielectric(const Eigen::Vector3d& out, double al
 /// once: light that has met many facets is taken to have forgotten where it came from. Energy and reciprocity hold
 /// exactly; what is lost is the true shape of that light, which is less wide, and its share of either side.
 ///
-/// E is tabulated (512 facets a node). Sampling doesn't need it: a direction drawn for one facet is kept with its
+/// E is tabulated, to some 3e-3. Sampling doesn't need it: a direction drawn for one facet is kept with its
 /// weight's probability, which is E on average, and the rest is drawn from the lobe. So each sample weighs one.
 class RoughBoundary {
  public:
