@@ -473,6 +473,10 @@ class PathIntegrator {
         leg.throughput *= 2.0;
       }
     }
+    if (leg.scatterings % kJumpEvery == 0 && std::isfinite(scene_.media[leg.medium].deep.margin) &&
+        jump(leg, numbers)) {
+      return leg.throughput.maxCoeff() > 0.0;
+    }
     const auto [u, v] = numbers.next_pair();
     const double cosine = sample_henyey_greenstein(scene_.media[leg.medium].anisotropy, u);
     const double sine = std::sqrt(std::max(0.0, 1.0 - cosine * cosine));
@@ -480,6 +484,31 @@ class PathIntegrator {
     const NormalFrame frame(leg.direction);
     leg.direction =
         frame.to_world(Eigen::Vector3d(sine * std::cos(angle), sine * std::sin(angle), cosine)).normalized();
+    return true;
+  }
+
+  /// Sets a leg that has just met a particle far from everything onto a sphere round it (deep_walk.h). False where
+  /// there is no room.
+  [[gnu::noinline]] bool jump(Leg& leg, SampleSequence& numbers) const {
+    const DeepWalk<N>& walk = scene_.media[leg.medium].deep;
+    // Light that isn't even after a scattering stands for a place further on; for the bands' mean one.
+    const Eigen::Vector3d centre =
+        leg.origin + (leg.throughput * walk.drift).sum() / leg.throughput.sum() * leg.direction;
+    double room = 1e6;
+    const int face_count = static_cast<int>(scene_.faces.size());
+    if (leg.layer < face_count) room = std::min(room, scene_.faces[leg.layer].z - centre.z());
+    if (leg.layer > 0) room = std::min(room, centre.z() - scene_.faces[leg.layer - 1].z);
+    for (const PreparedLamp<N>& lamp : scene_.lamps) {
+      room = std::min(room, (lamp.lamp.position - centre).norm() - lamp.lamp.lens_radius);
+    }
+    if (room < 2.0 * walk.margin) return false;
+    const double radius = scene_.rays.clearance(centre, room) - walk.margin;
+    if (radius < walk.margin) return false;
+    const auto [a, b] = numbers.next_pair();
+    leg.origin = centre + radius * square_to_sphere(a, b);
+    leg.throughput *= share_left(walk, radius);
+    const auto [c, d] = numbers.next_pair();
+    leg.direction = square_to_sphere(c, d);
     return true;
   }
 

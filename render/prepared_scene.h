@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "render/deep_walk.h"
 #include "render/ggx.h"
 #include "render/ray_scene.h"
 #include "render/scene.h"
@@ -25,6 +26,7 @@ struct PreparedMedium {
   Bands<N> scattering;
   Bands<N> extinction;  ///< absorption + scattering
   double anisotropy;
+  DeepWalk<N> deep;
 };
 
 enum class SurfaceKind {
@@ -106,7 +108,7 @@ struct PreparedScene {
       if (medium.scattering.size() > 0) scattering = medium.scattering;
       const Bands<N> extinction = absorption + scattering;
       media.push_back({medium.index, (extinction > 0.0).any(), absorption, (scattering > 0.0).any(), scattering,
-                       extinction, medium.anisotropy});
+                       extinction, medium.anisotropy, deep_walk<N>(absorption, scattering, medium.anisotropy)});
     }
     for (const Surface& surface : scene.surfaces) {
       materials.push_back(prepare(surface.material));

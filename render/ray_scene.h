@@ -57,6 +57,9 @@ class RayScene {
   /// none.
   double refractive_along_z(const Eigen::Vector3d& origin, bool up, double most) const;
 
+  /// How far the nearest surface or ball is from a point, if that is less than `most` (mm, finite); else `most`.
+  double clearance(const Eigen::Vector3d& point, double most) const;
+
   /// Is all of the scene's geometry below (`up`) or above (not `up`) the height z?
   bool nothing_beyond(double z, bool up) const;
 
