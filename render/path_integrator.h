@@ -28,8 +28,10 @@ namespace touchstone::render {
 template <int N>
 class PathIntegrator {
  public:
-  PathIntegrator(const PreparedScene<N>& scene, int max_depth, bool interreflection)
+  /// `lens_scale`: lamps' lenses are taken that many times as wide as they are, for finding the rims of shadows.
+  PathIntegrator(const PreparedScene<N>& scene, int max_depth, bool interreflection, double lens_scale = 1.0)
       : scene_(scene),
+        lens_scale_(lens_scale),
         max_depth_(max_depth),
         interreflection_(interreflection),
         dark_((scene.environment == 0.0).all()) {}
@@ -74,9 +76,11 @@ class PathIntegrator {
     double lamp;
     std::array<double, 2> lens;
   };
-  static LampNumbers lamp_numbers(SampleSequence& numbers) {
+  LampNumbers lamp_numbers(SampleSequence& numbers) const {
     const double lamp = numbers.next();
-    return {lamp, numbers.next_pair()};
+    const auto [u, v] = numbers.next_pair();
+    // Numbers beyond [0, 1) lie beside the lens: square_to_disc goes on as it is.
+    return {lamp, {0.5 + lens_scale_ * (u - 0.5), 0.5 + lens_scale_ * (v - 0.5)}};
   }
 
   struct LampChoice {
@@ -309,9 +313,7 @@ class PathIntegrator {
       for (int i = choice.lamp; i < last; ++i) {
         const PreparedLamp<N>& lamp = scene_.lamps[i];
         Arrival<N> arrival;
-        if (!connect_to_lamp(scene_, lamp, point_of_lens(lamp, chosen), receiver, counts.connections, arrival)) {
-          continue;
-        }
+        if (!reach_lamp(leg, lamp, chosen, receiver, counts, arrival)) continue;
         const Eigen::Vector3d in = frame.to_local(arrival.direction);
         sum += leg.throughput * arrival.irradiance *
                (boundary(out, in, !entering) * std::abs(in.z()) / (choice.probability * n_out * n_out));
@@ -354,7 +356,7 @@ class PathIntegrator {
     const LampChoice choice = choose_lamp(receiver, false, chosen.lamp);
     const PreparedLamp<N>& lamp = scene_.lamps[choice.lamp];
     Arrival<N> arrival;
-    if (!connect_to_lamp(scene_, lamp, point_of_lens(lamp, chosen), receiver, counts.connections, arrival)) return;
+    if (!reach_lamp(leg, lamp, chosen, receiver, counts, arrival)) return;
     const double phase = henyey_greenstein(arrival.direction.dot(leg.direction), medium.anisotropy);
     sum += leg.throughput * arrival.irradiance * (phase / (choice.probability * medium.index * medium.index));
   }
@@ -367,6 +369,18 @@ class PathIntegrator {
       source += disc.x() * lamp.frame.x + disc.y() * lamp.frame.y;
     }
     return source;
+  }
+
+  /// Light of one lamp at what the leg has met.
+  bool reach_lamp(const Leg& leg, const PreparedLamp<N>& lamp, const LampNumbers& chosen, const Receiver& receiver,
+                  RayCounts& counts, Arrival<N>& arrival) const {
+    const std::uint64_t before = counts.connections;
+    const bool lit = connect_to_lamp(scene_, lamp, point_of_lens(lamp, chosen), receiver, counts.connections, arrival);
+    if (leg.is_first_sight()) {
+      counts.direct += counts.connections - before;
+      counts.direct_lit += lit ? 1 : 0;
+    }
+    return lit;
   }
 
   /// Lamp light that the surface sends along the leg, out of its side `normal`: the side that faces the leg, or the
@@ -386,9 +400,8 @@ class PathIntegrator {
     const double weight = 1.0 / (choice.probability * index * index);
     for (int i = first; i < last; ++i) {
       const PreparedLamp<N>& lamp = scene_.lamps[i];
-      const Eigen::Vector3d source = point_of_lens(lamp, chosen);
       Arrival<N> arrival;
-      if (!connect_to_lamp(scene_, lamp, source, receiver, counts.connections, arrival)) continue;
+      if (!reach_lamp(leg, lamp, chosen, receiver, counts, arrival)) continue;
       const double cosine = arrival.direction.dot(normal);
       if (is_matt) {
         sum += leg.throughput * surface_colour * arrival.irradiance * (weight * cosine / kPi);
@@ -583,6 +596,7 @@ class PathIntegrator {
   }
 
   const PreparedScene<N>& scene_;
+  double lens_scale_;
   int max_depth_;
   bool interreflection_;
   bool dark_;  // no light from the surroundings
