@@ -19,6 +19,9 @@ constexpr int kTile = 16;  // pixels a side
 // Where none of n samples sees the light that is at stake, the share that does is taken for evenly spread from 0 to
 // 1/n; this is its standard deviation times n, 1 / sqrt(12).
 constexpr double kShareMissed = 0.28867513459481287;
+// Shadow is rarer than light, and missing some of it matters less beside the light's own noise.
+constexpr std::uint32_t kProbesInTheDark = 8;
+constexpr std::uint32_t kProbesInTheLight = 4;
 
 void check_settings(const RenderSettings& settings, Eigen::Index bands) {
   if (settings.min_samples < 1 || settings.max_samples < settings.min_samples || settings.max_samples > (1 << 24)) {
@@ -94,17 +97,22 @@ class ErrorEstimate {
   int blocks_ = 0;
 };
 
-/// A pixel whose samples lamp light has reached all or not at all may have missed a shadow's rim. Probes look over
-/// three pixels by three and at lenses twice as wide, at direct light only. Where one of them finds the other thing
-/// than the samples did, this is the light (irradiance in each band) of the brightest of them; else it is zero.
+/// What probes find round a pixel, at direct light only: they look over three pixels by three and at lenses twice as
+/// wide.
+template <int N>
+struct ProbedRim {
+  bool light = false;                     ///< did lamp light reach one of them?
+  bool shadow = false;                    ///< did something stand in the way of it?
+  Bands<N> brightest = Bands<N>::Zero();  ///< irradiance of the brightest that lamp light reached
+};
+
 template <int N, typename AnyCamera>
-Bands<N> light_at_stake(const PathIntegrator<N>& prober, const AnyCamera& camera, std::uint64_t seed,
-                        std::uint64_t number, double camera_index, int column, int row, bool dark, RayCounts& counts) {
-  constexpr int kProbes = 8;
+ProbedRim<N> probe_rim(const PathIntegrator<N>& prober, const AnyCamera& camera, std::uint64_t seed,
+                       std::uint64_t number, double camera_index, int column, int row, std::uint32_t probes,
+                       RayCounts& counts) {
   constexpr std::uint64_t kOtherNumbers = 0x5851f42d4c957f2dull;
-  Bands<N> brightest = Bands<N>::Zero();
-  bool at_stake = false;
-  for (std::uint32_t probe = 0; probe < kProbes; ++probe) {
+  ProbedRim<N> rim;
+  for (std::uint32_t probe = 0; probe < probes; ++probe) {
     SampleSequence numbers(seed ^ kOtherNumbers, number, probe);
     const auto [px, py] = numbers.next_pair();
     const auto [hu, hv] = numbers.next_pair();
@@ -116,11 +124,12 @@ Bands<N> light_at_stake(const PathIntegrator<N>& prober, const AnyCamera& camera
     const Bands<N> basic =
         prober.trace(camera.gel_from_camera * ray->origin, camera.gel_from_camera.turn(ray->direction), numbers, own);
     const Bands<N> value = basic * (ray->weight * camera_index * camera_index);
-    if (own.direct_lit > 0 && value.sum() > brightest.sum()) brightest = value;
-    at_stake = at_stake || (dark ? own.direct_lit > 0 : own.direct_lit < own.direct);
+    rim.light = rim.light || own.direct_lit > 0;
+    rim.shadow = rim.shadow || own.direct_lit < own.direct;
+    if (own.direct_lit > 0 && value.sum() > rim.brightest.sum()) rim.brightest = value;
     counts += own;
   }
-  return at_stake ? brightest : Bands<N>::Zero();
+  return rim;
 }
 
 template <int N>
@@ -139,7 +148,7 @@ int next_turn(int samples, int min_samples, int max_samples) {
 }
 
 template <int N, typename AnyCamera>
-PixelResult<N> sample_pixel(const PathIntegrator<N>& integrator, const PathIntegrator<N>& prober,
+PixelResult<N> sample_pixel(const PathIntegrator<N>& integrator, const PathIntegrator<N>* prober,
                             const AnyCamera& camera, const RenderSettings& settings, double camera_index, int column,
                             int row, RayCounts& counts) {
   PixelResult<N> pixel;
@@ -155,7 +164,9 @@ PixelResult<N> sample_pixel(const PathIntegrator<N>& integrator, const PathInteg
   std::uint64_t direct = 0;
   std::uint64_t lit = 0;
   Bands<N> brightest = Bands<N>::Zero();
-  Bands<N> at_stake = Bands<N>::Zero();
+  bool probed = false;
+  ProbedRim<N> rim;
+  Bands<N> at_stake = Bands<N>::Zero();  // what samples may or may not have seen, at the rim of a shadow
   for (;;) {
     const RayCounts before = counts;
     for (; pixel.samples < target; ++pixel.samples) {
@@ -177,17 +188,26 @@ PixelResult<N> sample_pixel(const PathIntegrator<N>& integrator, const PathInteg
     if (!settings.noise || pixel.samples >= settings.max_samples) break;
     direct += counts.direct - before.direct;
     lit += counts.direct_lit - before.direct_lit;
-    const bool undecided = lit == 0 || lit == direct;
-    if (undecided && pixel.samples == settings.min_samples) {
-      at_stake = light_at_stake(prober, camera, settings.seed, number, camera_index, column, row, lit == 0, counts);
-    } else if (!undecided) {
-      at_stake = brightest;
-    }
-    const double missed = kShareMissed / pixel.samples * (at_stake * electrons_per_irradiance).sum();
     const NoiseTarget& noise = *settings.noise;
     const double imager_noise = std::sqrt(std::max(0.0, electrons.mean()) + noise.read_noise_e * noise.read_noise_e +
                                           noise.quantisation_e * noise.quantisation_e);
-    if (std::max(missed, electrons.standard_error()) <= noise.fraction * imager_noise) break;
+    const double allowed = noise.fraction * imager_noise;
+    if (electrons.standard_error() <= allowed) {
+      const auto matters = [&](const Bands<N>& light) {
+        return kShareMissed / pixel.samples * (light * electrons_per_irradiance).sum() > allowed;
+      };
+      const bool dark = lit == 0;
+      const bool bright = lit == direct;
+      if (prober != nullptr && !probed && (dark || (bright && matters(brightest)))) {
+        probed = true;
+        rim = probe_rim(*prober, camera, settings.seed, number, camera_index, column, row,
+                        dark ? kProbesInTheDark : kProbesInTheLight, counts);
+      }
+      at_stake.setZero();
+      if (dark && rim.light) at_stake = rim.brightest;
+      if (!dark && (!bright || rim.shadow)) at_stake = brightest;
+      if (!matters(at_stake)) break;
+    }
     target = next_turn(pixel.samples, settings.min_samples, settings.max_samples);
   }
   pixel.irradiance = sum / static_cast<double>(pixel.samples);
@@ -221,8 +241,8 @@ RenderedImage render_image(const PreparedScene<N>& scene, const AnyCamera& camer
       const auto* wanted = mask.empty() ? nullptr : mask.ptr<unsigned char>(row);
       for (int column = left; column < std::min(left + kTile, camera.width); ++column) {
         if (wanted != nullptr && wanted[column] == 0) continue;
-        const PixelResult<N> pixel =
-            sample_pixel(integrator, prober, camera, settings, camera_index, column, row, counts);
+        const PixelResult<N> pixel = sample_pixel(integrator, scene.lamps.empty() ? nullptr : &prober, camera, settings,
+                                                  camera_index, column, row, counts);
         for (int band = 0; band < N; ++band) irradiance[N * column + band] = static_cast<float>(pixel.irradiance[band]);
         error[column] = static_cast<float>(pixel.standard_error);
         samples[column] = pixel.samples;
