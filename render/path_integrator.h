@@ -504,7 +504,8 @@ class PathIntegrator {
   /// there is no room.
   [[gnu::noinline]] bool jump(Leg& leg, SampleSequence& numbers) const {
     const DeepWalk<N>& walk = scene_.media[leg.medium].deep;
-    // Light that isn't even after a scattering stands for a place further on; for the bands' mean one.
+    // Light that isn't even after a scattering stands for a place further on. Bands take their mean one: ways along
+    // which walks come are even this deep, so what is left is of second order.
     const Eigen::Vector3d centre =
         leg.origin + (leg.throughput * walk.drift).sum() / leg.throughput.sum() * leg.direction;
     double room = 1e6;

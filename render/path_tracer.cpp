@@ -147,6 +147,7 @@ int next_turn(int samples, int min_samples, int max_samples) {
   return std::min(max_samples, std::max(next, samples + 1));
 }
 
+/// `prober` is null where there are no lamps.
 template <int N, typename AnyCamera>
 PixelResult<N> sample_pixel(const PathIntegrator<N>& integrator, const PathIntegrator<N>* prober,
                             const AnyCamera& camera, const RenderSettings& settings, double camera_index, int column,
