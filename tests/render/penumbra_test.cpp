@@ -76,7 +76,7 @@ TEST(Penumbra, IsAsBrightAsTheVisibleShareOfTheLamp) {
   double squares = 0.0;
   double largest = 0.0;
   int pixels = 0;
-  constexpr int kSeeds = 10;
+  constexpr int kSeeds = 6;
   for (int seed = 0; seed < kSeeds; ++seed) {
     const RenderedImage image = tracer.render(camera, adaptive(kElectrons / middle, kReadNoise, 100 + seed));
     for (int column = 0; column < camera.width; ++column) {
@@ -96,7 +96,7 @@ TEST(Penumbra, IsAsBrightAsTheVisibleShareOfTheLamp) {
   EXPECT_LT(largest, 8.0);
   double all = 0.0;
   for (int column = 0; column < camera.width; ++column) {
-    // A mean of 120 pixels, each good to 0.014 at most.
+    // A mean of 72 pixels, each good to 0.014 at most.
     EXPECT_NEAR(sums[column], 0.0, 0.015) << "at " << place_of(camera, column);
     all += sums[column] / camera.width;
   }
