@@ -10,6 +10,7 @@
 #include "core/random.h"
 #include "core/units.h"
 #include "light_scenes.h"
+#include "render/deep_walk.h"
 #include "render/ggx.h"
 #include "render/rough_dielectric.h"
 #include "render/scattering.h"
@@ -126,6 +127,16 @@ TEST(DirectionDensities, CosineHemisphere) {
         return square_to_cosine_hemisphere(u, stream.uniform());
       },
       [](const Eigen::Vector3d& d) { return d.z() / kPi; }, 0.0);
+}
+
+TEST(DirectionDensities, Sphere) {
+  RandomStream stream(3, 0, Purpose::kTest);
+  expect_directions(
+      [&]() -> std::optional<Eigen::Vector3d> {
+        const double u = stream.uniform();
+        return square_to_sphere(u, stream.uniform());
+      },
+      [](const Eigen::Vector3d&) { return 0.25 / kPi; }, -1.0);
 }
 
 // Bins in slopes, so that narrow distributions fill many of them: x = s / (1 + s), s = tan / alpha.

@@ -25,95 +25,112 @@ double turn_of(double x, double y) {
 }
 
 /// One path along a ray, of its own random numbers.
-double one_path(const Tracer& tracer, const Eigen::Vector3d& from, const Eigen::Vector3d& direction,
-                std::uint64_t seed) {
+Spectrum one_path(const Tracer& tracer, const Eigen::Vector3d& from, const Eigen::Vector3d& direction,
+                  std::uint64_t seed) {
   RenderSettings settings = samples(1);
   settings.seed = seed;
-  return tracer.radiance(from, direction, settings)[0];
+  return tracer.radiance(from, direction, settings);
 }
 
-// A path that lamp i lights shows what i alone would send over the chance that i was chosen. So the values tell both
-// which lamp it was and what the tracer takes its chance for; the counts tell whether that is true.
+// Sixteen bands; each lamp shines in two of them, no two lamps in the same two.
+constexpr int kBands = 16;
+
+Spectrum all_bands(double value) {
+  return Spectrum::Constant(kBands, value);
+}
+
+/// A lamp above z = 0 that looks at the origin with a lobe that falls off, and its number in the bands.
+SpotLamp numbered_lamp(int number, const Eigen::Vector3d& position, double power) {
+  SpotLamp lamp;
+  lamp.position = position;
+  lamp.direction = -position;
+  lamp.half_angle = 0.02 * (number % 7);
+  lamp.soft_angle = 0.8;
+  lamp.power_W = all_bands(0.0);
+  int first = 0;
+  int second = 1;
+  for (int i = 0; i < number; ++i) {
+    if (++second == kBands) second = ++first + 1;
+  }
+  lamp.power_W[first] = lamp.power_W[second] = power;
+  return lamp;
+}
+
+std::pair<int, int> lit_bands(const Spectrum& light) {
+  int first = -1;
+  int second = -1;
+  for (int band = 0; band < kBands; ++band) {
+    if (light[band] > 0.0) (first < 0 ? first : second) = band;
+  }
+  return {first, second};
+}
+
+// A path that lamp i lights shows what i alone would send over the chance that i was chosen. So its bands tell which
+// lamp it was, its brightness what the tracer takes the chance for; the counts tell whether that is true.
 void expect_lamp_choice(Scene scene, std::uint64_t first_seed) {
-  const Eigen::Vector3d from(0.5, 0.2, 3.0);
-  const Eigen::Vector3d direction(-0.1, 0.05, -1.0);
+  const Eigen::Vector3d from(0.5, 0.2, 1.5);
+  const Eigen::Vector3d direction(-0.3, 0.1, -1.0);
+  scene.environment = all_bands(0.0);
   scene.interreflection = false;
-  const Tracer tracer(scene);
-  std::vector<double> alone;
-  for (const SpotLamp& lamp : scene.lamps) {
+  std::map<std::pair<int, int>, double> alone;
+  for (const auto& lamp : scene.lamps) {
     Scene one = scene;
     one.lamps = {lamp};
-    alone.push_back(one_path(Tracer(one), from, direction, 0));
+    const Spectrum light = one_path(Tracer(one), from, direction, 0);
+    ASSERT_GT(light.sum(), 0.0);
+    alone[lit_bands(light)] = light.sum();
   }
+  ASSERT_EQ(alone.size(), scene.lamps.size());
+  const Tracer tracer(scene);
   constexpr int kPaths = 50000;
-  std::map<double, double> counted;
-  for (std::uint64_t i = 0; i < kPaths; ++i) counted[one_path(tracer, from, direction, first_seed + i)] += 1.0;
-  ASSERT_EQ(counted.size(), alone.size());
-  // Which value is whose: chances of all lamps add up to one, and counts follow them; the nearest share settles it.
+  std::map<std::pair<int, int>, double> counted;
+  std::map<std::pair<int, int>, double> chance;
+  for (std::uint64_t i = 0; i < kPaths; ++i) {
+    const Spectrum light = one_path(tracer, from, direction, first_seed + i);
+    const auto bands = lit_bands(light);
+    counted[bands] += 1.0;
+    chance[bands] = alone[bands] / light.sum();
+  }
+  ASSERT_EQ(counted.size(), alone.size()) << "a lamp that was never chosen";
   std::vector<double> counts;
   std::vector<double> expected;
   double all = 0.0;
-  for (const double light : alone) {
-    double best = 1e9;
-    double count = 0.0;
-    double chance = 0.0;
-    for (const auto& [value, times] : counted) {
-      const double off = std::abs(light / value - times / kPaths);
-      if (off < best) {
-        best = off;
-        count = times;
-        chance = light / value;
-      }
-    }
+  for (const auto& [bands, count] : counted) {
     counts.push_back(count);
-    expected.push_back(chance * kPaths);
-    all += chance;
+    expected.push_back(chance[bands] * kPaths);
+    all += chance[bands];
   }
-  EXPECT_NEAR(all, 1.0, 1e-9);
+  EXPECT_NEAR(all, 1.0, 1e-6);
   expect_counts(counts, expected);
 }
 
 TEST(LampDensities, ChoiceOverAMattSurface) {
-  Scene scene = empty_scene(0.0);
-  scene.surfaces.push_back({square_sheet(10.0, 0.0), Lambertian{grey(0.5)}});
+  Scene scene;
+  scene.surfaces.push_back({square_sheet(10.0, 0.0), Lambertian{all_bands(0.5)}});
   for (int i = 0; i < 7; ++i) {
-    const Eigen::Vector3d position(4.0 * std::cos(i), 4.0 * std::sin(i), 1.0 + 1.3 * i);
-    SpotLamp lamp = half_space_lamp(position, -position, 1.0 + 0.4 * (i % 3));
-    lamp.half_angle = 0.05 * i;  // what falls off in the lobe the choice doesn't know
-    lamp.soft_angle = 0.8;
-    scene.lamps.push_back(lamp);
+    scene.lamps.push_back(numbered_lamp(i, {4.0 * std::cos(i), 4.0 * std::sin(i), 1.0 + 1.3 * i}, 1.0 + 0.4 * (i % 3)));
   }
   expect_lamp_choice(scene, 1);
 }
 
-TEST(LampDensities, ChoiceOverMetal) {
-  Scene scene = empty_scene(0.0);
-  scene.surfaces.push_back({square_sheet(10.0, 0.0), RoughConductor{grey(0.5), 0.8}});
+TEST(LampDensities, ChoiceOverMetalUnderAFlatFace) {
+  Scene scene;
+  scene.media = {Medium{1.0}, Medium{1.5}};
+  scene.faces = {{2.0, 1, 0}};
+  scene.surfaces.push_back({square_sheet(10.0, 0.0), RoughConductor{all_bands(0.5), 0.8}});
   for (int i = 0; i < 5; ++i) {
-    const Eigen::Vector3d position(3.0 * std::cos(i), 3.0 * std::sin(i), 2.0 + i);
-    scene.lamps.push_back(half_space_lamp(position, -position, 1.0 + i));
+    scene.lamps.push_back(numbered_lamp(i, {3.0 * std::cos(i), 3.0 * std::sin(i), 2.5 + i}, 1.0 + i));
   }
   expect_lamp_choice(scene, 100001);
 }
 
-// More lamps than are weighed: all are as likely.
-TEST(LampDensities, ChoiceAmongMany) {
-  Scene scene = empty_scene(0.0);
-  scene.surfaces.push_back({square_sheet(10.0, 0.0), Lambertian{grey(0.5)}});
-  constexpr int kLamps = 40;
-  for (int i = 0; i < kLamps; ++i) {
-    const Eigen::Vector3d position(3.0 * std::cos(i), 3.0 * std::sin(i), 3.0);
-    scene.lamps.push_back(half_space_lamp(position, Eigen::Vector3d(0, 0, -1), 1.0 + i));
+TEST(LampDensities, ChoiceAmongForty) {
+  Scene scene;
+  scene.surfaces.push_back({square_sheet(10.0, 0.0), Lambertian{all_bands(0.5)}});
+  for (int i = 0; i < 40; ++i) {
+    scene.lamps.push_back(numbered_lamp(i, {3.0 * std::cos(i), 3.0 * std::sin(i), 3.0}, 1.0 + 0.05 * i));
   }
-  scene.interreflection = false;
-  const Tracer tracer(scene);
-  std::map<double, double> counted;
-  constexpr int kPaths = 40000;
-  for (std::uint64_t i = 0; i < kPaths; ++i) counted[one_path(tracer, {0, 0, 2}, {0, 0, -1}, 200001 + i)] += 1.0;
-  ASSERT_EQ(counted.size(), kLamps);
-  std::vector<double> counts;
-  for (const auto& [value, times] : counted) counts.push_back(times);
-  expect_counts(counts, std::vector<double>(kLamps, double(kPaths) / kLamps));
+  expect_lamp_choice(scene, 200001);
 }
 
 // Before a wide lens stand films of 32 shades, a grid of squares; through which one the light came tells the lens
@@ -128,7 +145,7 @@ TEST(LampDensities, PointsOfALensAreEven) {
   lamp.lens_radius = 1.0;
   const double plain = [&] {
     scene.lamps = {lamp};
-    return one_path(Tracer(scene), {0, 0, 1}, {0, 0, -1}, 1);
+    return one_path(Tracer(scene), {0, 0, 1}, {0, 0, -1}, 1)[0];
   }();
   for (int i = 0; i < kSide * kSide; ++i) {
     const double x = 2.0 * (i % kSide) / kSide - 1.0;
@@ -144,7 +161,7 @@ TEST(LampDensities, PointsOfALensAreEven) {
   std::uint64_t seed = 0;
   expect_samples(
       [&]() -> std::optional<Point> {
-        const double shade = one_path(tracer, {0, 0, 1}, {0, 0, -1}, ++seed) / plain * kSide * kSide;
+        const double shade = one_path(tracer, {0, 0, 1}, {0, 0, -1}, ++seed)[0] / plain * kSide * kSide;
         EXPECT_NEAR(shade, std::round(shade), 1e-3);
         const auto i = static_cast<int>(std::round(shade)) - 1;
         return Point((i % kSide + 0.5) / kSide, (i / kSide + 0.5) / kSide);

@@ -12,9 +12,9 @@
 namespace touchstone::render {
 namespace {
 
-// A disc lamp of radius 1 stands 20 above a matt plane, an edge along y 10 below it; so the penumbra is a band of x
-// from -1 to 1, and at x the edge hides the disc's part beyond -x.
-Scene edge_under_a_lamp() {
+// A disc lamp, of radius 1 if not said otherwise, stands 20 above a matt plane, an edge along y 10 below it; so the
+// penumbra is a band of x from -1 to 1, and at x the edge hides the disc's part beyond -x.
+Scene edge_under_a_lamp(double lens_radius = 1.0) {
   Scene scene = empty_scene(0.0);
   scene.surfaces.push_back({square_sheet(30.0, 0.0), Lambertian{grey(0.5)}});
   TriangleMesh screen;
@@ -22,7 +22,7 @@ Scene edge_under_a_lamp() {
   screen.triangles = {{0, 1, 2}, {0, 2, 3}};
   scene.surfaces.push_back({screen, Black{}});
   SpotLamp lamp = half_space_lamp({0, 0, 20}, {0, 0, -1}, 1.0);
-  lamp.lens_radius = 1.0;
+  lamp.lens_radius = lens_radius;
   scene.lamps.push_back(lamp);
   return scene;
 }
@@ -106,8 +106,7 @@ TEST(Penumbra, IsAsBrightAsTheVisibleShareOfTheLamp) {
 // Where no rim is near, neither light nor shadow takes more than the first samples. The lens is narrower here.
 TEST(Penumbra, FarFromItPixelsStopAtOnce) {
   const PinholeCamera camera = low_camera();
-  Scene scene = edge_under_a_lamp();
-  scene.lamps[0].lens_radius = 0.2;
+  const Scene scene = edge_under_a_lamp(0.2);
   const RenderedImage image = Tracer(scene).render(camera, adaptive(1e9, 3.0, 1));
   for (int column = 0; column < camera.width; ++column) {
     if (std::abs(place_of(camera, column)) < 0.5) continue;
