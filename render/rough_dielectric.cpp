@@ -7,8 +7,8 @@ namespace touchstone::render {
 namespace {
 
 /// The share of the light seen along a direction at `cosine` that one facet explains: by the midpoint rule over the
-/// numbers that sample_visible_normal takes, half of the turn (the other half is its mirror image) and a height with the
-/// square roots at its ends stretched away.
+/// numbers that sample_visible_normal takes, half of the turn (the other half is its mirror image) and a height with
+/// the square roots at its ends stretched away.
 double explained_by_one_facet(double cosine, double alpha, double n_out, double n_in) {
   constexpr int kTurns = 16;
   constexpr int kHeights = 32;
