@@ -75,6 +75,15 @@ double sphere_share(double radius, double distance) {
   return radius * radius / (distance * distance);
 }
 
+double coaxial_discs_share(double radius_1, double radius_2, double distance) {
+  const double r1 = radius_1 / distance;
+  const double r2 = radius_2 / distance;
+  const double s = 1.0 + (1.0 + r2 * r2) / (r1 * r1);
+  // The usual form loses digits where the second disc is small; this is the same times its conjugate over itself.
+  const double ratio2 = (radius_2 / radius_1) * (radius_2 / radius_1);
+  return 2.0 * ratio2 / (s + std::sqrt(s * s - 4.0 * ratio2));
+}
+
 double sphere_cavity_radiance(double albedo, double intensity, double radius) {
   return albedo * intensity / (kPi * radius * radius * (1.0 - albedo)) * kSquareMillimetresPerSquareMetre;
 }

@@ -25,6 +25,10 @@ double disc_share(double radius, double height);
 /// The same for a sphere on the patch's normal, centre at `distance`: (R / d)^2.
 double sphere_share(double radius, double distance);
 
+/// Share of what the first of two coaxial parallel discs sends out that meets the second (form factor):
+/// F12 = (S - sqrt(S^2 - 4 (r2/r1)^2)) / 2, S = 1 + (1 + R2^2) / R1^2, R = r / h.
+double coaxial_discs_share(double radius_1, double radius_2, double distance);
+
 /// Radiance inside a closed Lambertian sphere with an isotropic point source at its centre, all reflections counted:
 /// L = albedo I / (pi R^2 (1 - albedo)).
 double sphere_cavity_radiance(double albedo, double intensity, double radius);

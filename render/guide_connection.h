@@ -192,12 +192,16 @@ bool connect_to_guide(const PreparedScene<N>& scene, const PreparedLamp<N>& lamp
 }
 
 /// One sample of a lamp's light at the receiver, by whatever way its kind has: the mean over `numbers` uniform in the
-/// unit square is the light.
+/// unit square is the light. Numbers beyond it stand for a wider lamp; of a guide, whose numbers are directions, they
+/// are taken back to its rim.
 template <int N>
 bool connect(const PreparedScene<N>& scene, const PreparedLamp<N>& lamp, const std::array<double, 2>& numbers,
              const Receiver& receiver, std::uint64_t& connections, Arrival<N>& arrival) {
+  constexpr double kBelowOne = 1.0 - 0x1p-53;
   if (lamp.kind == LampKind::kGuide) [[unlikely]] {
-    return connect_to_guide(scene, lamp, numbers, receiver, connections, arrival);
+    const std::array<double, 2> direction = {std::clamp(numbers[0], 0.0, kBelowOne),
+                                             std::clamp(numbers[1], 0.0, kBelowOne)};
+    return connect_to_guide(scene, lamp, direction, receiver, connections, arrival);
   }
   return connect_to_lamp(scene, lamp, point_on_lamp(lamp, numbers), receiver, connections, arrival);
 }

@@ -25,8 +25,10 @@ namespace touchstone::render {
 template <int N>
 class PathIntegrator {
  public:
-  PathIntegrator(const PreparedScene<N>& scene, int max_depth, bool interreflection)
+  /// `lens_scale`: lamps' lenses are taken that many times as wide as they are, for finding the rims of shadows.
+  PathIntegrator(const PreparedScene<N>& scene, int max_depth, bool interreflection, double lens_scale = 1.0)
       : scene_(scene),
+        lens_scale_(lens_scale),
         max_depth_(max_depth),
         interreflection_(interreflection),
         smooth_(scene),
@@ -62,9 +64,11 @@ class PathIntegrator {
     double lamp;
     std::array<double, 2> lens;
   };
-  static LampNumbers lamp_numbers(SampleSequence& numbers) {
+  LampNumbers lamp_numbers(SampleSequence& numbers) const {
     const double lamp = numbers.next();
-    return {lamp, numbers.next_pair()};
+    const auto [u, v] = numbers.next_pair();
+    // Numbers beyond [0, 1) lie beside the lamp: point_on_lamp goes on as it is. A guide's are of directions.
+    return {lamp, {0.5 + lens_scale_ * (u - 0.5), 0.5 + lens_scale_ * (v - 0.5)}};
   }
 
   /// One lamp of the scene for a receiver, see LampChooser.
@@ -99,15 +103,15 @@ class PathIntegrator {
                                              SampleSequence& numbers, RayCounts& counts, Bands<N>& sum) const {
     const bool entering = leg.direction.dot(hit.normal) < 0.0;
     const int to = entering ? material.inside : material.outside;
-    const double n_out = scene_.media[leg.medium].index;
-    const double n_in = scene_.media[to].index;
-    if (n_out == n_in) {
+    const double n_out = scene_.media[entering ? material.outside : material.inside].index;
+    if (n_out == scene_.media[to].index) {
       smooth_.meet_boundary(leg, hit, material, branches, numbers, sum);
       return true;
     }
     const Eigen::Vector3d normal = entering ? hit.normal : Eigen::Vector3d(-hit.normal);
     const NormalFrame frame(normal);
     const Eigen::Vector3d out = frame.to_local(-leg.direction);
+    const RoughBoundary& boundary = scene_.boundaries[material.boundary];
     const LampNumbers chosen = leg.is_first_sight() ? at_first_hit : lamp_numbers(numbers);
     for (int side = 0; side < 2 && !scene_.lamps.empty(); ++side) {
       const Receiver receiver{hit.position, side == 0 ? normal : Eigen::Vector3d(-normal), leg.layer,
@@ -119,21 +123,18 @@ class PathIntegrator {
       for (int i = choice.lamp; i < last; ++i) {
         const PreparedLamp<N>& lamp = scene_.lamps[i];
         Arrival<N> arrival;
-        if (!connect(scene_, lamp, chosen.lens, receiver, counts.connections, arrival)) continue;
+        if (!reach_lamp(leg, lamp, chosen.lens, receiver, counts, arrival)) continue;
         const Eigen::Vector3d in = frame.to_local(arrival.direction);
         sum += leg.throughput * arrival.irradiance *
-               (rough_dielectric(out, in, material.roughness, n_out, n_in) * std::abs(in.z()) /
-                (choice.probability * n_out * n_out));
+               (boundary(out, in, !entering) * std::abs(in.z()) / (choice.probability * n_out * n_out));
       }
     }
 
     if (!interreflection_ || leg.depth >= max_depth_) return false;
-    const auto [u, v] = numbers.next_pair();
-    const RoughSample sample = sample_rough_dielectric(out, material.roughness, n_out, n_in, u, v, numbers.next());
-    leg.throughput *= sample.weight;
-    if (!(sample.weight > 0.0) || std::abs(sample.in.z()) <= 1e-9 || !survives(leg, numbers)) return false;
-    const bool passes = sample.in.z() < 0.0;
-    leg.direction = frame.to_world(sample.in).normalized();
+    const auto in = boundary.sample(out, !entering, numbers);
+    if (!in || std::abs(in->z()) <= 1e-9 || !survives(leg, numbers)) return false;
+    const bool passes = in->z() < 0.0;
+    leg.direction = frame.to_world(*in).normalized();
     const double leave = RayScene::leave_distance(hit.position);
     leg.origin = hit.position + (passes ? -leave : leave) * normal;
     if (passes) leg.medium = to;
@@ -165,7 +166,7 @@ class PathIntegrator {
     const LampChoice choice = choose_lamp(receiver, false, chosen.lamp);
     const PreparedLamp<N>& lamp = scene_.lamps[choice.lamp];
     Arrival<N> arrival;
-    if (!connect(scene_, lamp, chosen.lens, receiver, counts.connections, arrival)) return;
+    if (!reach_lamp(leg, lamp, chosen.lens, receiver, counts, arrival)) return;
     if (lamp.visible && interreflection_) {
       share_with_paths(lamp, choice, receiver,
                        henyey_greenstein(arrival.direction.dot(leg.direction), medium.anisotropy), arrival);
@@ -241,6 +242,18 @@ class PathIntegrator {
     sum += leg.throughput * lamp_radiance(lamp, Eigen::Vector3d(-leg.direction)) * (weight / (index * index));
   }
 
+  /// Light of one lamp at what the leg has met.
+  bool reach_lamp(const Leg& leg, const PreparedLamp<N>& lamp, const std::array<double, 2>& place,
+                  const Receiver& receiver, RayCounts& counts, Arrival<N>& arrival) const {
+    const std::uint64_t before = counts.connections;
+    const bool lit = connect(scene_, lamp, place, receiver, counts.connections, arrival);
+    if (leg.is_first_sight()) {
+      counts.direct += counts.connections - before;
+      counts.direct_lit += lit ? 1 : 0;
+    }
+    return lit;
+  }
+
   /// Lamp light that the surface sends along the leg, out of its side `normal`: the side that faces the leg, or the
   /// other one of a diffuse transmitter.
   void add_lamp_light(const Leg& leg, const RayHit& hit, const Eigen::Vector3d& normal,
@@ -266,7 +279,7 @@ class PathIntegrator {
         if (parts > 1)
           place = {(part % kGuidePreview + 0.5) / kGuidePreview, (part / kGuidePreview + 0.5) / kGuidePreview};
         Arrival<N> arrival;
-        if (!connect(scene_, lamp, place, receiver, counts.connections, arrival)) continue;
+        if (!reach_lamp(leg, lamp, place, receiver, counts, arrival)) continue;
         if (lamp.visible && interreflection_ && leg.depth < max_depth_) {
           share_with_paths(lamp, choice, receiver, scattering_density(leg, hit.normal, material, arrival.direction),
                            arrival);
@@ -357,6 +370,10 @@ class PathIntegrator {
         leg.throughput /= kept;
       }
     }
+    if (leg.scatterings % kJumpEvery == 0 && std::isfinite(scene_.media[leg.medium].deep.margin) &&
+        jump(leg, numbers)) {
+      return leg.throughput.maxCoeff() > 0.0;
+    }
     const auto [u, v] = numbers.next_pair();
     const double cosine = sample_henyey_greenstein(scene_.media[leg.medium].anisotropy, u);
     const double sine = std::sqrt(std::max(0.0, 1.0 - cosine * cosine));
@@ -364,6 +381,33 @@ class PathIntegrator {
     const NormalFrame frame(leg.direction);
     leg.direction =
         frame.to_world(Eigen::Vector3d(sine * std::cos(angle), sine * std::sin(angle), cosine)).normalized();
+    return true;
+  }
+
+  /// Sets a leg that has just met a particle far from everything onto a sphere round it (deep_walk.h). False where
+  /// there is no room.
+  [[gnu::noinline]] bool jump(Leg& leg, SampleSequence& numbers) const {
+    const DeepWalk<N>& walk = scene_.media[leg.medium].deep;
+    // Light that isn't even after a scattering stands for a place further on. Bands take their mean one: ways along
+    // which walks come are even this deep, so what is left is of second order.
+    const Eigen::Vector3d centre =
+        leg.origin + (leg.throughput * walk.drift).sum() / leg.throughput.sum() * leg.direction;
+    double room = 1e6;
+    const int face_count = static_cast<int>(scene_.faces.size());
+    if (leg.layer < face_count) room = std::min(room, scene_.faces[leg.layer].z - centre.z());
+    if (leg.layer > 0) room = std::min(room, centre.z() - scene_.faces[leg.layer - 1].z);
+    for (const PreparedLamp<N>& lamp : scene_.lamps) {
+      const double extent = std::max(lamp.radius, std::hypot(lamp.half_width, lamp.half_height));
+      room = std::min(room, (lamp.position - centre).norm() - extent);
+    }
+    if (room < 2.0 * walk.margin) return false;
+    const double radius = scene_.rays.clearance(centre, room) - walk.margin;
+    if (radius < walk.margin) return false;
+    const auto [a, b] = numbers.next_pair();
+    leg.origin = centre + radius * square_to_sphere(a, b);
+    leg.throughput *= share_left(walk, radius);
+    const auto [c, d] = numbers.next_pair();
+    leg.direction = square_to_sphere(c, d);
     return true;
   }
 
@@ -474,6 +518,7 @@ class PathIntegrator {
   }
 
   const PreparedScene<N>& scene_;
+  double lens_scale_;
   int max_depth_;
   bool interreflection_;
   SmoothEvents<N> smooth_;

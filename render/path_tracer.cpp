@@ -16,6 +16,12 @@ namespace touchstone::render {
 namespace {
 
 constexpr int kTile = 16;  // pixels a side
+// Where none of n samples sees the light that is at stake, the share that does is taken for evenly spread from 0 to
+// 1/n; this is its standard deviation times n, 1 / sqrt(12).
+constexpr double kShareMissed = 0.28867513459481287;
+// Shadow is rarer than light, and missing some of it matters less beside the light's own noise.
+constexpr std::uint32_t kProbesInTheDark = 8;
+constexpr std::uint32_t kProbesInTheLight = 4;
 
 void check_settings(const RenderSettings& settings, Eigen::Index bands) {
   if (settings.min_samples < 1 || settings.max_samples < settings.min_samples || settings.max_samples > (1 << 24)) {
@@ -91,6 +97,41 @@ class ErrorEstimate {
   int blocks_ = 0;
 };
 
+/// What probes find round a pixel, at direct light only: they look over three pixels by three and at lenses twice as
+/// wide.
+template <int N>
+struct ProbedRim {
+  bool light = false;                     ///< did lamp light reach one of them?
+  bool shadow = false;                    ///< did something stand in the way of it?
+  Bands<N> brightest = Bands<N>::Zero();  ///< irradiance of the brightest that lamp light reached
+};
+
+template <int N, typename AnyCamera>
+ProbedRim<N> probe_rim(const PathIntegrator<N>& prober, const AnyCamera& camera, std::uint64_t seed,
+                       std::uint64_t number, double camera_index, int column, int row, std::uint32_t probes,
+                       RayCounts& counts) {
+  constexpr std::uint64_t kOtherNumbers = 0x5851f42d4c957f2dull;
+  ProbedRim<N> rim;
+  for (std::uint32_t probe = 0; probe < probes; ++probe) {
+    SampleSequence numbers(seed ^ kOtherNumbers, number, probe);
+    const auto [px, py] = numbers.next_pair();
+    const auto [hu, hv] = numbers.next_pair();
+    const double x = std::clamp(column - 1.0 + 3.0 * px, 0.0, static_cast<double>(camera.width));
+    const double y = std::clamp(row - 1.0 + 3.0 * py, 0.0, static_cast<double>(camera.height));
+    const auto ray = camera_ray(camera, x, y, hu, hv);
+    if (!ray) continue;
+    RayCounts own;
+    const Bands<N> basic =
+        prober.trace(camera.gel_from_camera * ray->origin, camera.gel_from_camera.turn(ray->direction), numbers, own);
+    const Bands<N> value = basic * (ray->weight * camera_index * camera_index);
+    rim.light = rim.light || own.direct_lit > 0;
+    rim.shadow = rim.shadow || own.direct_lit < own.direct;
+    if (own.direct_lit > 0 && value.sum() > rim.brightest.sum()) rim.brightest = value;
+    counts += own;
+  }
+  return rim;
+}
+
 template <int N>
 struct PixelResult {
   Bands<N> irradiance = Bands<N>::Zero();
@@ -106,10 +147,11 @@ int next_turn(int samples, int min_samples, int max_samples) {
   return std::min(max_samples, std::max(next, samples + 1));
 }
 
+/// `prober` is null where there are no lamps.
 template <int N, typename AnyCamera>
-PixelResult<N> sample_pixel(const PathIntegrator<N>& integrator, const AnyCamera& camera,
-                            const RenderSettings& settings, double camera_index, int column, int row,
-                            RayCounts& counts) {
+PixelResult<N> sample_pixel(const PathIntegrator<N>& integrator, const PathIntegrator<N>* prober,
+                            const AnyCamera& camera, const RenderSettings& settings, double camera_index, int column,
+                            int row, RayCounts& counts) {
   PixelResult<N> pixel;
   ErrorEstimate total;
   ErrorEstimate electrons;
@@ -120,7 +162,14 @@ PixelResult<N> sample_pixel(const PathIntegrator<N>& integrator, const AnyCamera
       static_cast<std::uint64_t>(row) * static_cast<std::uint64_t>(camera.width) + static_cast<std::uint64_t>(column);
   const RigidTransform& gel_from_camera = camera.gel_from_camera;
   int target = settings.min_samples;
+  std::uint64_t direct = 0;
+  std::uint64_t lit = 0;
+  Bands<N> brightest = Bands<N>::Zero();
+  bool probed = false;
+  ProbedRim<N> rim;
+  Bands<N> at_stake = Bands<N>::Zero();  // what samples may or may not have seen, at the rim of a shadow
   for (;;) {
+    const RayCounts before = counts;
     for (; pixel.samples < target; ++pixel.samples) {
       SampleSequence numbers(settings.seed, number, static_cast<std::uint32_t>(pixel.samples));
       const auto [px, py] = numbers.next_pair();
@@ -133,18 +182,37 @@ PixelResult<N> sample_pixel(const PathIntegrator<N>& integrator, const AnyCamera
         value = basic * (ray->weight * camera_index * camera_index);
       }
       sum += value;
+      if (value.sum() > brightest.sum()) brightest = value;
       total.add(value.sum());
       if (settings.noise) electrons.add((value * electrons_per_irradiance).sum());
     }
     if (!settings.noise || pixel.samples >= settings.max_samples) break;
+    direct += counts.direct - before.direct;
+    lit += counts.direct_lit - before.direct_lit;
     const NoiseTarget& noise = *settings.noise;
     const double imager_noise = std::sqrt(std::max(0.0, electrons.mean()) + noise.read_noise_e * noise.read_noise_e +
                                           noise.quantisation_e * noise.quantisation_e);
-    if (electrons.standard_error() <= noise.fraction * imager_noise) break;
+    const double allowed = noise.fraction * imager_noise;
+    if (electrons.standard_error() <= allowed) {
+      const auto matters = [&](const Bands<N>& light) {
+        return kShareMissed / pixel.samples * (light * electrons_per_irradiance).sum() > allowed;
+      };
+      const bool dark = lit == 0;
+      const bool bright = lit == direct;
+      if (prober != nullptr && !probed && (dark || (bright && matters(brightest)))) {
+        probed = true;
+        rim = probe_rim(*prober, camera, settings.seed, number, camera_index, column, row,
+                        dark ? kProbesInTheDark : kProbesInTheLight, counts);
+      }
+      at_stake.setZero();
+      if (dark && rim.light) at_stake = rim.brightest;
+      if (!dark && (!bright || rim.shadow)) at_stake = brightest;
+      if (!matters(at_stake)) break;
+    }
     target = next_turn(pixel.samples, settings.min_samples, settings.max_samples);
   }
   pixel.irradiance = sum / static_cast<double>(pixel.samples);
-  pixel.standard_error = total.standard_error();
+  pixel.standard_error = std::max(total.standard_error(), kShareMissed / pixel.samples * at_stake.sum());
   return pixel;
 }
 
@@ -156,6 +224,7 @@ RenderedImage render_image(const PreparedScene<N>& scene, const AnyCamera& camer
   image.standard_error = cv::Mat::zeros(camera.height, camera.width, CV_32FC1);
   image.samples = cv::Mat::zeros(camera.height, camera.width, CV_32SC1);
   const PathIntegrator<N> integrator(scene, settings.max_depth, scene.interreflection);
+  const PathIntegrator<N> prober(scene, 0, false, 2.0);
   const Eigen::Vector3d eye = camera.gel_from_camera.translation;
   const double camera_index = scene.media[scene.medium_of_layer(scene.layer_at(eye.z()))].index;
   const int tiles_across = (camera.width + kTile - 1) / kTile;
@@ -173,7 +242,8 @@ RenderedImage render_image(const PreparedScene<N>& scene, const AnyCamera& camer
       const auto* wanted = mask.empty() ? nullptr : mask.ptr<unsigned char>(row);
       for (int column = left; column < std::min(left + kTile, camera.width); ++column) {
         if (wanted != nullptr && wanted[column] == 0) continue;
-        const PixelResult<N> pixel = sample_pixel(integrator, camera, settings, camera_index, column, row, counts);
+        const PixelResult<N> pixel = sample_pixel(integrator, scene.lamps.empty() ? nullptr : &prober, camera, settings,
+                                                  camera_index, column, row, counts);
         for (int band = 0; band < N; ++band) irradiance[N * column + band] = static_cast<float>(pixel.irradiance[band]);
         error[column] = static_cast<float>(pixel.standard_error);
         samples[column] = pixel.samples;
@@ -237,6 +307,8 @@ RayCounts& RayCounts::operator+=(const RayCounts& other) {
   primary += other.primary;
   connections += other.connections;
   bounces += other.bounces;
+  direct += other.direct;
+  direct_lit += other.direct_lit;
   return *this;
 }
 

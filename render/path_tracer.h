@@ -12,8 +12,11 @@
 namespace touchstone::render {
 
 /// A pixel is sampled until its standard error, in electrons, is below `fraction` times the imager's own noise there,
-/// sqrt(signal + read_noise_e^2 + quantisation_e^2). The error is judged from the samples themselves: something that
-/// fills less than about 1 / min_samples of what a pixel sees through hole or lens may be missed.
+/// sqrt(signal + read_noise_e^2 + quantisation_e^2). The error is judged from the samples themselves. Where no lamp
+/// light reached any of the first ones, or all of it all of them, a few probes that look wider tell whether the rim of
+/// a shadow is near; there the pixel goes on until a share of 1 / samples of it that it may have missed can't matter.
+/// Something else that fills less than about 1 / min_samples of what a pixel sees through hole or lens may still be
+/// missed.
 struct NoiseTarget {
   Spectrum electrons_per_irradiance;  ///< electrons in a pixel per W/m^2 in each band (exposure, area, efficiency)
   double read_noise_e = 0.0;
@@ -35,12 +38,14 @@ struct RayCounts {
   std::uint64_t primary = 0;      ///< legs before the first diffuse or metallic hit
   std::uint64_t connections = 0;  ///< connections to lamps that were tested for occlusion
   std::uint64_t bounces = 0;      ///< legs after that hit or a scattering in a medium
+  std::uint64_t direct = 0;       ///< those of the connections that came from what a path met first
+  std::uint64_t direct_lit = 0;   ///< those of them that nothing stood in the way of
   RayCounts& operator+=(const RayCounts& other);
 };
 
 /// `irradiance`: CV_32FC(N), W/m^2 on the sensor in each band, mean over the pixel's area. `standard_error`: CV_32FC1,
-/// of the irradiance summed over the bands (infinite below 8 samples). `samples`: CV_32S, paths spent. Pixels outside
-/// the mask are zero.
+/// of the irradiance summed over the bands (infinite below 8 samples), with what may be missed near a shadow's rim.
+/// `samples`: CV_32S, paths spent. Pixels outside the mask are zero.
 struct RenderedImage {
   cv::Mat irradiance;
   cv::Mat standard_error;

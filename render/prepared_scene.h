@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "render/deep_walk.h"
 #include "render/ggx.h"
 #include "render/lamp_bodies.h"
 #include "render/lamp_choice.h"
@@ -26,6 +27,7 @@ struct PreparedMedium {
   Bands<N> scattering;
   Bands<N> extinction;  ///< absorption + scattering
   double anisotropy;
+  DeepWalk<N> deep;
 };
 
 enum class SurfaceKind {
@@ -48,6 +50,7 @@ struct PreparedMaterial {
   double film_index = 1.0;
   bool film_mirrors = false;
   int print = -1;           ///< index into PreparedScene::prints
+  int boundary = -1;        ///< of a RoughRefractive: index into PreparedScene::boundaries
   GgxAlbedo single_albedo;  ///< of a conductor
   int inside = 0, outside = 0;
 };
@@ -76,6 +79,7 @@ struct PreparedScene {
   std::vector<FlatFace> faces;
   std::vector<PreparedMaterial<N>> materials;  ///< by RayHit::object
   std::vector<PreparedPrint<N>> prints;
+  std::vector<RoughBoundary> boundaries;
   std::vector<PreparedLamp<N>> lamps;
   LampChooser lamp_chooser;
   Bands<N> environment;
@@ -97,7 +101,7 @@ struct PreparedScene {
       if (medium.scattering.size() > 0) scattering = medium.scattering;
       const Bands<N> extinction = absorption + scattering;
       media.push_back({medium.index, (extinction > 0.0).any(), absorption, (scattering > 0.0).any(), scattering,
-                       extinction, medium.anisotropy});
+                       extinction, medium.anisotropy, deep_walk<N>(absorption, scattering, medium.anisotropy)});
     }
     for (const Surface& surface : scene.surfaces) {
       materials.push_back(prepare(surface.material));
@@ -138,7 +142,7 @@ struct PreparedScene {
     prints.push_back(std::move(made));
   }
 
-  PreparedMaterial<N> prepare(const Material& material) const {
+  PreparedMaterial<N> prepare(const Material& material) {
     PreparedMaterial<N> made;
     if (const auto* lambertian = std::get_if<Lambertian>(&material)) {
       made.kind = SurfaceKind::kLambertian;
@@ -162,6 +166,11 @@ struct PreparedScene {
       made.inside = rough->medium_inside;
       made.outside = rough->medium_outside;
       made.roughness = rough->roughness;
+      const bool as_before = !materials.empty() && materials.back().kind == SurfaceKind::kRoughRefractive &&
+                             materials.back().roughness == made.roughness && materials.back().inside == made.inside &&
+                             materials.back().outside == made.outside;
+      if (!as_before) boundaries.emplace_back(made.roughness, media[made.outside].index, media[made.inside].index);
+      made.boundary = static_cast<int>(boundaries.size()) - 1;
     } else if (const auto* transmitter = std::get_if<DiffuseTransmitter>(&material)) {
       made.kind = SurfaceKind::kTransmitter;
       made.colour = transmitter->reflectance;

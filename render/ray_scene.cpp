@@ -331,6 +331,68 @@ std::uint64_t RayScene::trace_bare(std::span<const RecordedRay> rays) const {
   return met;
 }
 
+namespace {
+
+/// Squared distance of a point from a triangle: from its plane where the foot lies inside, else from the nearest edge.
+double squared_distance(const Eigen::Vector3d& point, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+                        const Eigen::Vector3d& c) {
+  const auto from_edge = [&](const Eigen::Vector3d& p, const Eigen::Vector3d& q) {
+    const Eigen::Vector3d way = q - p;
+    const double along = std::clamp((point - p).dot(way) / way.squaredNorm(), 0.0, 1.0);
+    return (point - p - along * way).squaredNorm();
+  };
+  const Eigen::Vector3d normal = (b - a).cross(c - a);
+  const auto inside = [&](const Eigen::Vector3d& p, const Eigen::Vector3d& q) {
+    return normal.dot((q - p).cross(point - p)) >= 0.0;
+  };
+  if (inside(a, b) && inside(b, c) && inside(c, a)) {
+    const double height = (point - a).dot(normal);
+    return height * height / normal.squaredNorm();
+  }
+  return std::min({from_edge(a, b), from_edge(b, c), from_edge(c, a)});
+}
+
+}  // namespace
+
+double RayScene::clearance(const Eigen::Vector3d& point, double most) const {
+  const State& state = *state_;
+  double nearest = most;
+  for (const Ball& ball : state.balls) {
+    nearest = std::min(nearest, std::abs((point - ball.centre).norm() - ball.radius));
+  }
+  if (state.all_heights.misses(point.z() - nearest, point.z() + nearest) || !point.allFinite()) return nearest;
+
+  struct Search {
+    const State& state;
+    Eigen::Vector3d point;
+    double nearest;
+  } search{state, point, nearest};
+  RTCPointQuery query;
+  query.x = static_cast<float>(point.x());
+  query.y = static_cast<float>(point.y());
+  query.z = static_cast<float>(point.z());
+  query.time = 0.0f;
+  query.radius = static_cast<float>(nearest);
+  RTCPointQueryContext context;
+  rtcInitPointQueryContext(&context);
+  rtcPointQuery(
+      state.all, &query, &context,
+      [](RTCPointQueryFunctionArguments* arguments) {
+        Search& found = *static_cast<Search*>(arguments->userPtr);
+        if (arguments->geomID >= found.state.meshes.size()) return false;  // a ball
+        const TriangleMesh& mesh = found.state.meshes[arguments->geomID].mesh;
+        const auto& t = mesh.triangles[arguments->primID];
+        const double distance =
+            std::sqrt(squared_distance(found.point, mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]));
+        if (!(distance < found.nearest)) return false;
+        found.nearest = distance;
+        arguments->query->radius = static_cast<float>(distance);
+        return true;
+      },
+      &search);
+  return search.nearest;
+}
+
 bool RayScene::nothing_beyond(double z, bool up) const {
   return state_->all_heights.misses(z, std::copysign(1e30, up ? 1.0 : -1.0));
 }

@@ -10,6 +10,8 @@
 // back. Any number of scatterings is followed; RenderSettings::max_depth doesn't count them. Without interreflection
 // only light is seen that was scattered once, straight from a lamp; a preview takes a medium as if it only absorbed.
 //
+// Where a medium absorbs next to nothing and is wide, walks cross it in jumps (deep_walk.h).
+//
 // One path carries all bands although each has its own mean free path. The distance is drawn for one band, chosen in
 // proportion to what the path carries in it, and the result is weighted by the density over all choices (the balance
 // heuristic of Veach 1997 over bands; Chiang, Kutz and Burley 2016). So the sum of a path's bands never grows at an

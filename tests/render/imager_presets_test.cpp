@@ -12,57 +12,9 @@
 namespace touchstone::render {
 namespace {
 
-double number_at(const cv::Mat& raw, int row, int column) {
-  return raw.type() == CV_8UC1 ? raw.at<std::uint8_t>(row, column) : raw.at<std::uint16_t>(row, column);
-}
-
 /// Irradiance in the green band that frees `electrons` in the channel seen by the pixel.
 double green_for(const ImagerResponse& response, int channel, double electrons) {
   return electrons / response.electrons_per_irradiance(channel, 1);
-}
-
-// Rounding adds exactly 1/12 to the mean square deviation from the expected number, however coarse the steps are, if
-// the expected number runs evenly over whole steps: so the photon transfer line can be tested on 6 bits, whose step is
-// wider than the noise.
-TEST(ImagerPresets, LieOnThePhotonTransferLine) {
-  for (const auto& name : imager_preset_names()) {
-    ImagerPreset preset = imager_preset(name, 1e-3);
-    Imager& imager = preset.imager;
-    const ImagerResponse response = response_of(imager);
-    const double gain = imager.gain_DN_per_e;
-    const cv::Size size(1000, 500);
-    const FixedPattern pattern = {cv::Mat(size, CV_32FC1, cv::Scalar(1.0)), cv::Mat(size, CV_32FC1, cv::Scalar(0.0))};
-    for (double share : {0.1, 0.4, 0.8}) {
-      const double centre = share * imager.full_well_e;
-      cv::Mat light(size, CV_32FC3, cv::Scalar::all(0.0));
-      cv::Mat expected_e(size, CV_64FC1);
-      for (int row = 0; row < size.height; ++row) {
-        for (int column = 0; column < size.width; ++column) {
-          // 1000 columns over one step.
-          const double electrons = centre + ((column + 0.5) / size.width - 0.5) / gain;
-          const int channel = imager.bayer == BayerPattern::none ? 0 : channel_of(imager.bayer, column, row);
-          light.at<cv::Vec3f>(row, column)[1] = static_cast<float>(green_for(response, channel, electrons));
-          expected_e.at<double>(row, column) = electrons;
-        }
-      }
-      const cv::Mat raw = expose(light, imager, pattern, 5, 1);
-      double squares = 0.0;
-      double offset = 0.0;
-      for (int row = 0; row < size.height; ++row) {
-        for (int column = 0; column < size.width; ++column) {
-          const double expected = imager.black_level_DN + gain * (expected_e.at<double>(row, column) + response.dark_e);
-          const double off = number_at(raw, row, column) - expected;
-          offset += off;
-          squares += off * off;
-        }
-      }
-      const double n = size.area();
-      const double line = gain * gain * (imager.read_noise_e * imager.read_noise_e + response.dark_e) +
-                          gain * gain * centre + 1.0 / 12.0;
-      EXPECT_NEAR(squares / n / line, 1.0, 0.015) << name << " at " << share;
-      EXPECT_NEAR(offset / n, 0.0, 5.0 * std::sqrt(line / n)) << name << " at " << share;
-    }
-  }
 }
 
 TEST(ImagerPresets, SayWhereTheirFiguresComeFrom) {

@@ -18,10 +18,12 @@ Eigen::Vector3d tilted(double cosine, double azimuth = 0.0) {
   return {sine * std::cos(azimuth), sine * std::sin(azimuth), cosine};
 }
 
-// A path may go either way: f(out, in) n_in^2 = f(in, out) n_out^2 across, and the same without the squares above.
+// A path may go either way: f(out, in) n_in^2 = f(in, out) n_out^2 across, and the same without the squares above. With
+// one facet and with all of them.
 TEST(RoughDielectric, IsReciprocal) {
   RandomStream stream(1, 0, Purpose::kTest);
   const Eigen::Vector3d mirror(1, 1, -1);  // the other side's frame has +z on its own side
+  const RoughBoundary boundary(0.4, 1.0, 1.5);
   int passed = 0;
   for (int i = 0; i < 2000; ++i) {
     const double azimuth = 2.0 * kPi * stream.uniform();
@@ -34,8 +36,41 @@ TEST(RoughDielectric, IsReciprocal) {
     const double across = rough_dielectric(out, down, 0.4, 1.0, 1.5) * 1.5 * 1.5;
     EXPECT_NEAR(across, rough_dielectric(up, mirror.cwiseProduct(out), 0.4, 1.5, 1.0), 1e-9 * (1.0 + across));
     passed += across > 0.0;
+    for (bool inside : {false, true}) {
+      const double all_above = boundary(out, up, inside);
+      EXPECT_GT(all_above, 0.0);
+      EXPECT_NEAR(all_above, boundary(up, out, inside), 1e-9 * (1.0 + all_above));
+      const double gain = inside ? 1.0 / (1.5 * 1.5) : 1.5 * 1.5;
+      const double all_across = boundary(out, down, inside) * gain;
+      EXPECT_NEAR(all_across, boundary(up, mirror.cwiseProduct(out), !inside), 1e-9 * (1.0 + all_across));
+    }
   }
   EXPECT_GT(passed, 200);
+}
+
+// The table of what one facet doesn't explain against the mean of the sampler's weights.
+TEST(RoughDielectric, TableOfWhatIsMissingIsRight) {
+  constexpr std::uint32_t kCount = 1 << 14;
+  for (double index : {1.3, 1.6}) {
+    for (double alpha : {0.05, 0.3, 0.6}) {
+      const RoughBoundary boundary(alpha, 1.0, index);
+      for (bool inside : {false, true}) {
+        for (double cosine : {0.1, 0.3, 0.6, 0.75, 1.0}) {
+          double missing = 0.0;
+          for (std::uint32_t i = 0; i < kCount; ++i) {
+            SampleSequence numbers(3, 7, i);
+            const auto [u, v] = numbers.next_pair();
+            const double n_out = inside ? index : 1.0;
+            const double n_in = inside ? 1.0 : index;
+            const RoughSample sample =
+                sample_rough_dielectric(tilted(cosine), alpha, n_out, n_in, u, v, numbers.next());
+            missing += (1.0 - sample.weight) / kCount;
+          }
+          EXPECT_NEAR(boundary.missing(cosine, inside), missing, 7e-3) << index << " " << alpha << " " << cosine;
+        }
+      }
+    }
+  }
 }
 
 // Sampled weights give the function's integrals: total and first moments of each side, by quadrature over the sphere.
@@ -83,15 +118,22 @@ TEST(RoughDielectric, SamplerFollowsTheFunction) {
   }
 }
 
-TEST(RoughDielectric, MakesNoEnergyAndLosesLittleWhereAlmostSmooth) {
-  for (double alpha : {0.01, 0.1, 0.5, 1.0}) {
+// Bodies of all roughnesses and indices under an even sky look like the sky, seen from outside and from within, and so
+// does a bubble: each path, not only the mean.
+TEST(RoughDielectric, IsAWhiteFurnace) {
+  const auto seen = [](double alpha, double index_of_ball, double index_around, const Eigen::Vector3d& from) {
     Scene scene = empty_scene(1.0);
-    scene.media = {Medium{}, Medium{1.5}};
+    scene.media = {Medium{index_around}, Medium{index_of_ball}};
     scene.balls.push_back({{0, 0, 0}, 2.0, RoughRefractive{1, 0, alpha}});
-    const Estimate seen = view(scene, {0.5, 0, 10}, {0, 0, -1}, 400);
-    EXPECT_LE(seen.mean, 1.0 + 4.0 * seen.error) << alpha;
-    if (alpha < 0.2) {
-      EXPECT_GT(seen.mean, 0.98 - 4.0 * seen.error) << alpha;
+    return view(scene, from, {0.01, 0.02, -1}, 20).mean;
+  };
+  for (double alpha : {0.01, 0.05, 0.1, 0.3, 0.6, 1.0}) {
+    for (double index : {1.3, 1.41, 1.6}) {
+      SCOPED_TRACE(testing::Message() << "alpha " << alpha << " index " << index);
+      EXPECT_NEAR(seen(alpha, index, 1.0, {0.5, 0, 10}), 1.0, 1e-9) << "a ball";
+      EXPECT_NEAR(seen(alpha, index, 1.0, {1.8, 0, 10}), 1.0, 1e-9) << "its rim";
+      EXPECT_NEAR(seen(alpha, 1.0, index, {0.5, 0, 10}), 1.0, 1e-9) << "a bubble";
+      EXPECT_NEAR(seen(alpha, 1.0, index, {0.5, 0.2, 0.1}), 1.0, 1e-9) << "from within";
     }
   }
 }

@@ -9,6 +9,7 @@
 #include "core/random.h"
 #include "core/units.h"
 #include "light_scenes.h"
+#include "render/ray_scene.h"
 #include "render/scattering.h"
 
 namespace touchstone::render {
@@ -141,36 +142,6 @@ TEST(HenyeyGreenstein, IsOneOverTheSphereAndHasItsMean) {
     }
     EXPECT_NEAR(total, 1.0, 1e-6);
     EXPECT_NEAR(mean, g, 1e-6);
-  }
-}
-
-TEST(HenyeyGreenstein, SamplerHasItsDensityAndMean) {
-  constexpr int kBins = 40;
-  constexpr int kCount = 200000;
-  for (double g : {-0.7, 0.0, 0.3, 0.9}) {
-    RandomStream stream(3, 0, Purpose::kTest);
-    std::vector<double> counts(kBins, 0.0);
-    double sum = 0.0;
-    double squares = 0.0;
-    for (int i = 0; i < kCount; ++i) {
-      const double cosine = sample_henyey_greenstein(g, stream.uniform());
-      ASSERT_LE(std::abs(cosine), 1.0);
-      sum += cosine;
-      squares += cosine * cosine;
-      counts[std::min(kBins - 1, static_cast<int>(0.5 * (cosine + 1.0) * kBins))] += 1.0;
-    }
-    const double mean = sum / kCount;
-    EXPECT_NEAR(mean, g, 4.0 * std::sqrt((squares / kCount - mean * mean) / kCount)) << g;
-    double statistic = 0.0;
-    for (int bin = 0; bin < kBins; ++bin) {
-      double expected = 0.0;
-      for (int k = 0; k < 1000; ++k) {
-        const double cosine = 2.0 * (bin + (k + 0.5) / 1000.0) / kBins - 1.0;
-        expected += henyey_greenstein(cosine, g) * 4.0 * kPi / kBins / 1000.0 * kCount;
-      }
-      statistic += std::pow(counts[bin] - expected, 2) / expected;
-    }
-    EXPECT_LT(statistic, 100.0) << g;  // 39 degrees of freedom: passed once in 3e-7
   }
 }
 
@@ -314,16 +285,108 @@ TEST(ScatteringMedium, UnequalBandsGiveNoFireflies) {
   }
 }
 
-// 5000 mean free paths thick, indices that mirror, a lamp close by: finite, and the energy is the sky's.
-TEST(ScatteringMedium, VeryThickIsFiniteAndMakesNoEnergy) {
-  Scene scene = slab(Medium{1.41, {}, grey(1000.0), 0.0}, 5.0, 1.0);
-  const Estimate sky = view(scene, {0, 0, 1}, {0.2, 0, -1}, 20);
-  EXPECT_NEAR(sky.mean, 1.0, 4.0 * sky.error + 1e-9);
-  scene.environment = grey(0.0);
-  scene.lamps.push_back(half_space_lamp({0, 0, 2}, {0, 0, -1}, 1.0));
-  const Estimate lamp = view(scene, {0, 0, 1}, {0.2, 0, -1}, 20);
-  EXPECT_TRUE(std::isfinite(lamp.mean));
-  EXPECT_GT(lamp.mean, 0.0);
+// 5000 mean free paths thick, indices that mirror, a lamp close by: the energy is the sky's, and no path or pixel
+// stands out. One path's light of a lamp falls off like an exponential, so pixels of 16 paths are looked at.
+TEST(ScatteringMedium, VeryThickMakesNoEnergyAndNoFireflies) {
+  for (double thickness : {5.0, 0.0}) {
+    Scene scene = slab(Medium{1.41, {}, grey(1000.0), 0.0}, thickness, 1.0);
+    const Tracer under_sky(scene);
+    double sum = 0.0;
+    constexpr int kPaths = 2000;
+    for (int i = 0; i < kPaths; ++i) {
+      RenderSettings settings = samples(1);
+      settings.seed = static_cast<std::uint64_t>(i);
+      const double seen = under_sky.radiance({0, 0, 1}, {0.2, 0, -1}, settings)[0];
+      EXPECT_LE(seen, 1.03) << "the sky once, over the chance of the roulette at the face";
+      sum += seen;
+    }
+    EXPECT_NEAR(sum / kPaths, 1.0, 4.0 * 0.2 / std::sqrt(kPaths));
+
+    scene.environment = grey(0.0);
+    scene.lamps.push_back(half_space_lamp({0, 0, 2}, {0, 0, -1}, 1.0));
+    const Tracer lit(scene);
+    std::vector<double> pixels;
+    constexpr int kPixels = 300;
+    for (int i = 0; i < kPixels; ++i) {
+      RenderSettings settings = samples(16);
+      settings.seed = static_cast<std::uint64_t>(i);
+      pixels.push_back(lit.radiance({0, 0, 1}, {0.2, 0, -1}, settings)[0]);
+    }
+    const auto seen = Eigen::Map<const Eigen::ArrayXd>(pixels.data(), kPixels);
+    const double spread = std::sqrt((seen - seen.mean()).square().mean());
+    EXPECT_GT(seen.minCoeff(), 0.0);
+    EXPECT_LT((seen.maxCoeff() - seen.mean()) / spread, 6.0);
+  }
+}
+
+// Between a luminous wall and a black one, many mean free paths apart, diffuse light falls as sinh(kappa (x + l0)), x
+// from the black wall and l0 = 0.7104 transport mean free paths (Milne's problem); linearly without absorption.
+TEST(DeepWalk, LightBetweenWallsFollowsTheDiffusionEquation) {
+  constexpr double kWide = 200.0;  // between the walls, in transport mean free paths, which are 1 mm
+  constexpr double kMilne = 0.7104;
+  for (double g : {0.0, 0.7}) {
+    for (double absorption : {0.0, 1e-4}) {
+      Scene scene = empty_scene(0.0);
+      scene.media = {Medium{1.0, grey(absorption), grey((1.0 - absorption) / (1.0 - g)), g}};
+      scene.surfaces.push_back({square_sheet(1e5, kWide, false), Emitter{grey(1.0)}});
+      scene.surfaces.push_back({square_sheet(1e5, 0.0), Black{}});
+      for (double height : {40.0, 150.0}) {
+        const double kappa = std::sqrt(3.0 * absorption);
+        const double expected = absorption > 0.0
+                                    ? std::sinh(kappa * (height + kMilne)) / std::sinh(kappa * (kWide + 2.0 * kMilne))
+                                    : (height + kMilne) / (kWide + 2.0 * kMilne);
+        const Estimate seen = view(scene, {0, 0, height}, {1, 0, 0}, 60);
+        EXPECT_NEAR(seen.mean, expected, 4.0 * seen.error) << g << " " << absorption << " " << height;
+        EXPECT_LT(seen.error, 0.02);
+      }
+    }
+  }
+}
+
+// Half spaces of nearly no absorption: the same law as above for albedos at which walks jump.
+TEST(DeepWalk, HalfSpaceUnderASkyFollowsChandrasekhar) {
+  for (double albedo : {0.9992, 0.9999}) {
+    const ChandrasekharH h(albedo);
+    const Estimate seen = view(slab(particles(albedo, 0.0), 0.0, 1.0), {0, 0, 1}, at_cosine(0.5, false), 1500);
+    EXPECT_NEAR(seen.mean, 1.0 - h(0.5) * std::sqrt(1.0 - albedo), 4.0 * seen.error) << albedo;
+    EXPECT_LT(seen.error, 0.002);
+  }
+}
+
+TEST(DeepWalk, ClearanceIsTheDistanceOfTheNearestThing) {
+  RandomStream stream(12, 0, Purpose::kTest);
+  const auto point = [&] {
+    return Eigen::Vector3d(8.0 * stream.uniform() - 4.0, 8.0 * stream.uniform() - 4.0, 8.0 * stream.uniform() - 4.0);
+  };
+  Scene scene = empty_scene(0.0);
+  TriangleMesh mesh;
+  for (int i = 0; i < 40; ++i) {
+    const Eigen::Vector3d corner = point();
+    mesh.vertices.insert(mesh.vertices.end(), {corner, corner + 0.3 * point(), corner + 0.3 * point()});
+    mesh.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
+  }
+  scene.surfaces.push_back({mesh, Black{}});
+  scene.balls.push_back({{1, 2, 3}, 0.5, Black{}});
+  const RayScene rays(scene);
+  for (int i = 0; i < 200; ++i) {
+    const Eigen::Vector3d from = point();
+    double nearest = std::abs((from - Eigen::Vector3d(1, 2, 3)).norm() - 0.5);
+    for (const auto& t : mesh.triangles) {  // by search over the triangle's points, coarse to fine
+      const Eigen::Vector3d a = mesh.vertices[t[0]];
+      const Eigen::Vector3d ab = mesh.vertices[t[1]] - a;
+      const Eigen::Vector3d ac = mesh.vertices[t[2]] - a;
+      constexpr int kSteps = 60;
+      for (int u = 0; u <= kSteps; ++u) {
+        for (int v = 0; u + v <= kSteps; ++v) {
+          nearest = std::min(nearest, (from - a - ab * u / kSteps - ac * v / kSteps).norm());
+        }
+      }
+    }
+    const double found = rays.clearance(from, 100.0);
+    EXPECT_LE(found, nearest + 1e-5);
+    EXPECT_GT(found, nearest - 0.05);
+    EXPECT_EQ(rays.clearance(from, 0.5 * found), 0.5 * found);
+  }
 }
 
 TEST(ScatteringMedium, PreviewHasNoNoise) {
