@@ -3,14 +3,16 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <optional>
 #include <vector>
 
 #include "core/error.h"
+#include "render/camera_footprint.h"
 #include "render/camera_rays.h"
-#include "render/direct_packet.h"
+#include "render/direct_batch.h"
 #include "render/ggx.h"
 #include "render/packet_scene.h"
 #include "render/sample_sequence.h"
@@ -19,7 +21,8 @@
 namespace touchstone::render {
 namespace {
 
-constexpr int kTilesATask = 32;
+constexpr int kTilesATask = 2 * DirectBatch::kMostPackets;
+constexpr int kBlocksAcross = 20;  // of the footprint
 
 bool same(const Spectrum& a, const Spectrum& b) {
   return a.size() == b.size() && (a == b).all();
@@ -78,6 +81,9 @@ void check_settings(const DirectSettings& settings) {
   if (settings.samples < 1 || settings.samples > 64) {
     fail("direct renderer: samples is {}; it must be from 1 to 64", settings.samples);
   }
+  if (!(settings.rays_across_blur >= 1.0 && settings.rays_across_blur <= 64.0)) {
+    fail("direct renderer: rays_across_blur is {}; it must be from 1 to 64", settings.rays_across_blur);
+  }
 }
 
 }  // namespace
@@ -87,10 +93,15 @@ std::string unfit_for_direct(const LightField& field, const Scene& scene) {
   if (!same_fixture(field.fixture, scene)) {
     return "the scene's media, faces, lamps or surroundings aren't those that the light field was made for";
   }
+  for (std::size_t i = 0; i < scene.media.size(); ++i) {
+    const Spectrum& scattering = scene.media[i].scattering;
+    if (scattering.size() > 0 && (scattering > 0.0).any()) return fmt::format("medium {} scatters", i);
+  }
   for (std::size_t i = 0; i < scene.surfaces.size(); ++i) {
     const std::string what = fmt::format("surface {}", i);
     const Surface& surface = scene.surfaces[i];
     if (!renders(surface.material)) return what + " is neither Lambertian, RoughConductor, Black nor Emitter";
+    if (surface.print) return what + " is printed on";
     Eigen::AlignedBox3d box;
     for (const auto& vertex : surface.mesh.vertices) box.extend(vertex);
     if (const std::string fault = out_of_place(field, box, surface.material, what); !fault.empty()) return fault;
@@ -107,20 +118,44 @@ std::string unfit_for_direct(const LightField& field, const Scene& scene) {
 
 struct DirectRenderer::Parts {
   DirectFixture fixture;
-  PinholeCamera camera;
+  ReadyCamera camera;
   DirectSettings settings;
-  CameraRays rays;
   PacketScene tree;
-  bool connected;                          // the first surface
+  bool connected;  // the first surface
+  bool spreads;    // central rays, then the footprint
+  CameraFootprint footprint;
+  CameraRays rays;
+  // By pixel and band, where central rays are spread; see CameraRays.
+  std::vector<float> through, veil;
+  std::vector<float> radiance;             // [band][grid point], room for a frame
   std::map<double, GgxAlbedo> conductors;  // by roughness
 
-  Parts(const LightField& field, const PinholeCamera& camera_of, const Scene& rest, const DirectSettings& settings_of)
-      : fixture(field),
-        camera(camera_of),
+  Parts(const LightField& field, const Camera& camera_of, const Scene& rest, const DirectSettings& settings_of)
+      : fixture(field, settings_of.samples > 1),
+        camera(make_ready(camera_of)),
         settings(settings_of),
-        rays(trace_to_layer(field.fixture, camera, field.layer, settings.samples, settings.seed)),
         tree(rest),
-        connected(!rest.surfaces.empty() && is_connected(rest.surfaces[0].mesh)) {}
+        connected(!rest.surfaces.empty() && is_connected(rest.surfaces[0].mesh)),
+        spreads(settings.samples == 1 && settings.blur) {
+    ImageGrid grid = pixel_grid(camera);
+    if (spreads) {
+      find_footprint(rest);
+      grid = footprint.grid;
+    }
+    rays = trace_to_layer(field.fixture, camera, grid, field.layer, settings.samples, settings.seed);
+    if (!spreads) return;
+    radiance.resize(static_cast<std::size_t>(grid.columns) * grid.rows * rays.bands);
+    CameraRays pixels = trace_to_layer(field.fixture, camera, pixel_grid(camera), field.layer, 1, 0);
+    keep_by_pixel(pixels, pixels.through, through);
+    if (!pixels.veil.empty()) keep_by_pixel(pixels, pixels.veil, veil);
+    rays.through.clear();
+    rays.through.shrink_to_fit();
+    rays.veil.clear();
+    rays.veil.shrink_to_fit();
+  }
+
+  int width() const { return size_of_grid(pixel_grid(camera)).x(); }
+  int height() const { return size_of_grid(pixel_grid(camera)).y(); }
 
   DirectMaterial prepare(const Material& material) {
     DirectMaterial made;
@@ -141,11 +176,151 @@ struct DirectRenderer::Parts {
     }
     return made;
   }
+
+  /// Casts the rays and shades what they meet: into `radiance`, or into the picture where nothing is spread.
+  void cast(const DirectFrame& frame, DirectImage& image);
+  /// From `radiance` to the picture.
+  void spread(DirectImage& image) const;
+
+ private:
+  static Eigen::Vector2i size_of_grid(const ImageGrid& grid) { return {grid.columns, grid.rows}; }
+
+  /// The footprint on what the scene shows at rest, by block; in the middle of the field's box where it shows nothing.
+  void find_footprint(const Scene& rest) {
+    const LightField& field = fixture.field;
+    const int block = std::max(8, 8 * ((width() + 4 * kBlocksAcross) / (8 * kBlocksAcross)));
+    const std::vector<Eigen::Vector2d> middles = footprint_blocks(camera, block);
+    std::vector<double> surface_z;
+    for (const Eigen::Vector2d& middle : middles) {
+      surface_z.push_back(field.reach.center().z());
+      const auto ray = ray_in_layer(field.fixture, camera, field.layer, middle.x(), middle.y(), 0.5, 0.5);
+      if (!ray) continue;
+      RayPacket packet{};
+      for (int lane = 0; lane < kPacket; ++lane) packet.direction[2][lane] = 1.0f;
+      for (int a = 0; a < 3; ++a) {
+        packet.origin[a][0] = static_cast<float>(ray->origin[a]);
+        packet.direction[a][0] = static_cast<float>(ray->direction[a]);
+      }
+      packet.far[0] = static_cast<float>(ray->far);
+      packet.valid[0] = -1;
+      PacketHits hits;
+      tree.intersect(packet, hits);
+      if (hits.object[0] < 0 || hits.object[0] >= static_cast<int>(rest.surfaces.size())) continue;
+      surface_z.back() = ray->origin.z() + double(hits.distance[0]) * ray->direction.z();
+    }
+    footprint = make_footprint(field.fixture, camera, field.layer, surface_z, block, settings.rays_across_blur);
+  }
+
+  void keep_by_pixel(const CameraRays& pixels, const std::vector<float>& from, std::vector<float>& to) const {
+    const std::size_t bands = pixels.bands;
+    to.resize(static_cast<std::size_t>(width()) * height() * bands);
+    for (int row = 0; row < height(); ++row) {
+      for (int column = 0; column < width(); ++column) {
+        const std::size_t tile =
+            static_cast<std::size_t>(row / CameraRays::kSide) * pixels.tiles_across + column / CameraRays::kSide;
+        const std::size_t lane = row % CameraRays::kSide * CameraRays::kSide + column % CameraRays::kSide;
+        const float gain = footprint.gain[footprint.block_at(row, column)];
+        for (std::size_t band = 0; band < bands; ++band) {
+          to[(static_cast<std::size_t>(row) * width() + column) * bands + band] =
+              gain * from[(tile * kPacket + lane) * bands + band];
+        }
+      }
+    }
+  }
 };
 
-DirectRenderer::DirectRenderer(const LightField& field, const PinholeCamera& camera, const Scene& rest,
+void DirectRenderer::Parts::cast(const DirectFrame& frame, DirectImage& image) {
+  const int bands = rays.bands;
+  const int samples = settings.samples;
+  const int columns = rays.grid.columns;
+  const int tasks = (rays.tiles + kTilesATask - 1) / kTilesATask;
+  const std::size_t points = static_cast<std::size_t>(columns) * rays.grid.rows;
+  const std::array<float, kMaxBands> whole = [] {
+    std::array<float, kMaxBands> ones;
+    ones.fill(1.0f);
+    return ones;
+  }();
+  std::vector<DirectCounts> task_counts(tasks);
+  tbb::parallel_for(0, tasks, [&](int task) {
+    DirectBatch batch(frame);
+    DirectCounts& counts = task_counts[task];
+    const int task_end = std::min(rays.tiles, (task + 1) * kTilesATask);
+    for (int first = task * kTilesATask; first < task_end; first += DirectBatch::kMostPackets) {
+      const int packets = std::min(DirectBatch::kMostPackets, task_end - first);
+      for (int sample = 0; sample < samples; ++sample) {
+        const std::size_t number = static_cast<std::size_t>(sample) * rays.tiles + first;
+        batch.look({rays.packets.data() + number, static_cast<std::size_t>(packets)}, counts);
+        const auto for_lanes = [&](auto&& work) {  // work(lane, row, column) of those on the grid
+          for (int lane = 0; lane < packets * kPacket; ++lane) {
+            const int tile = first + lane / kPacket;
+            const int row = tile / rays.tiles_across * CameraRays::kSide + lane % kPacket / CameraRays::kSide;
+            const int column = tile % rays.tiles_across * CameraRays::kSide + lane % CameraRays::kSide;
+            if (column < columns && row < rays.grid.rows) work(lane, row, column);
+          }
+        };
+        if (settings.shadows && samples > 1) {
+          for_lanes([&](int lane, int row, int column) {
+            SampleSequence numbers(settings.seed,
+                                   static_cast<std::uint64_t>(row) * std::uint64_t(columns) + std::uint64_t(column),
+                                   static_cast<std::uint32_t>(sample));
+            for (int drawn = 0; drawn < 3; ++drawn) numbers.next_pair();  // as a path's: pixel, hole, lamp
+            const auto [u, v] = numbers.next_pair();
+            batch.choose_lens_points(lane, u, v);
+          });
+        }
+        if (settings.shadows) batch.cast_shadows(counts);
+        for_lanes([&](int lane, int row, int column) {
+          if (spreads) {
+            float out[kMaxBands] = {};
+            batch.add(lane, whole.data(), nullptr, out);
+            const std::size_t point = static_cast<std::size_t>(row) * columns + column;
+            for (int band = 0; band < bands; ++band) radiance[band * points + point] = out[band];
+            return;
+          }
+          float* out = image.irradiance.ptr<float>(row) + bands * column;
+          const std::size_t slot = (number * kPacket + lane) * bands;
+          if (!rays.veil.empty()) {
+            for (int band = 0; band < bands; ++band) out[band] += rays.veil[slot + band];
+          }
+          batch.add(lane, rays.through.data() + slot, nullptr, out);
+        });
+      }
+    }
+  });
+  for (const DirectCounts& counts : task_counts) {
+    image.primary += counts.primary;
+    image.shadow_rays += counts.shadow_rays;
+    image.shadow_spared += counts.spared;
+  }
+}
+
+void DirectRenderer::Parts::spread(DirectImage& image) const {
+  const int bands = rays.bands;
+  const int side = footprint.spacing;
+  const std::size_t points = static_cast<std::size_t>(rays.grid.columns) * rays.grid.rows;
+  const int columns = width();
+  tbb::parallel_for(0, height(), [&](int row) {
+    std::vector<float> line(footprint.block);
+    float* out = image.irradiance.ptr<float>(row);
+    const std::size_t first = static_cast<std::size_t>(row) * columns;
+    for (int left = 0; left < columns; left += footprint.block) {
+      const int right = std::min(columns, left + footprint.block);
+      for (int phase = left; phase < std::min(left + side, right); ++phase) {
+        const int count = (right - phase + side - 1) / side;
+        for (int band = 0; band < bands; ++band) {
+          footprint.spread(radiance.data() + band * points, row, phase, count, line.data());
+          for (int k = 0; k < count; ++k) {
+            const std::size_t slot = (first + phase + static_cast<std::size_t>(k) * side) * bands + band;
+            out[slot - first * bands] = through[slot] * line[k] + (veil.empty() ? 0.0f : veil[slot]);
+          }
+        }
+      }
+    }
+  });
+}
+
+DirectRenderer::DirectRenderer(const LightField& field, const Camera& camera, const Scene& rest,
                                const DirectSettings& settings) {
-  check_camera(camera);
   check_settings(settings);
   check_scene(rest);
   if (field.lamp_count() > kMostDirectLamps) {
@@ -171,56 +346,13 @@ DirectImage DirectRenderer::render(const Scene& scene) {
   for (const Surface& surface : scene.surfaces) materials.push_back(parts.prepare(surface.material));
   for (const Ball& ball : scene.balls) materials.push_back(parts.prepare(ball.material));
   const ShadowReach shadow_reach(
-      scene, other ? !scene.surfaces.empty() && is_connected(scene.surfaces[0].mesh) : parts.connected);
+      parts.fixture.bearings, scene,
+      other ? !scene.surfaces.empty() && is_connected(scene.surfaces[0].mesh) : parts.connected);
 
-  const DirectFrame frame{parts.fixture, tree, shadow_reach, materials};
-  const int bands = parts.rays.bands;
-  const int samples = parts.settings.samples;
   DirectImage image;
-  image.irradiance = cv::Mat::zeros(parts.camera.height, parts.camera.width, CV_32FC(bands));
-  const int tiles = parts.rays.tiles;
-  const int tasks = (tiles + kTilesATask - 1) / kTilesATask;
-  std::vector<DirectCounts> task_counts(tasks);
-  tbb::parallel_for(0, tasks, [&](int task) {
-    DirectPacket packet(frame);
-    DirectCounts& counts = task_counts[task];
-    for (int tile = task * kTilesATask; tile < std::min(tiles, (task + 1) * kTilesATask); ++tile) {
-      const int left = tile % parts.rays.tiles_across * CameraRays::kSide;
-      const int top = tile / parts.rays.tiles_across * CameraRays::kSide;
-      for (int sample = 0; sample < samples; ++sample) {
-        const std::size_t number = static_cast<std::size_t>(sample) * tiles + tile;
-        packet.look(parts.rays.packets[number], counts);
-        for (int lane = 0; lane < kPacket && samples > 1 && parts.settings.shadows; ++lane) {
-          const int row = top + lane / CameraRays::kSide;
-          const int column = left + lane % CameraRays::kSide;
-          SampleSequence numbers(
-              parts.settings.seed,
-              static_cast<std::uint64_t>(row) * std::uint64_t(parts.camera.width) + std::uint64_t(column),
-              static_cast<std::uint32_t>(sample));
-          for (int drawn = 0; drawn < 3; ++drawn) numbers.next_pair();  // as a path's: pixel, hole, lamp
-          const auto [u, v] = numbers.next_pair();
-          packet.choose_lens_points(lane, u, v);
-        }
-        if (parts.settings.shadows) packet.cast_shadows(counts);
-        for (int lane = 0; lane < kPacket; ++lane) {
-          const int row = top + lane / CameraRays::kSide;
-          const int column = left + lane % CameraRays::kSide;
-          if (column >= parts.camera.width || row >= parts.camera.height) continue;
-          float* out = image.irradiance.ptr<float>(row) + bands * column;
-          const std::size_t slot = (number * kPacket + lane) * bands;
-          if (!parts.rays.veil.empty()) {
-            for (int band = 0; band < bands; ++band) out[band] += parts.rays.veil[slot + band];
-          }
-          packet.add(lane, parts.rays.through.data() + slot, out);
-        }
-      }
-    }
-  });
-  for (const DirectCounts& counts : task_counts) {
-    image.primary += counts.primary;
-    image.shadow_rays += counts.shadow_rays;
-    image.shadow_spared += counts.spared;
-  }
+  image.irradiance = cv::Mat::zeros(parts.height(), parts.width(), CV_32FC(parts.rays.bands));
+  parts.cast({parts.fixture, tree, shadow_reach, materials}, image);
+  if (parts.spreads) parts.spread(image);
   return image;
 }
 
