@@ -128,14 +128,13 @@ void DirectBatch::light_lane(int lane, DirectCounts& counts) {
     Eigen::Map<Four>(flow + group * 12 + 8) = z;
     Eigen::Map<Four>(amount + group * 4) = (-(one.normal[0] * x + one.normal[1] * y + one.normal[2] * z)).max(0.0f);
   }
-  one.doubt = frame_.shadow_reach.doubtful(one.place[0], one.place[1], one.object);
-  for (int lamp = 0; lamp < lamps_; ++lamp) {
-    if (amount[lamp] > 0.0f) {
-      counts.spared += ~(one.doubt >> lamp) & 1u;
-    } else {
-      one.doubt &= ~(std::uint64_t{1} << lamp);
-    }
+  if (frame_.shadow_reach != nullptr) {
+    one.doubt = frame_.shadow_reach->doubtful(one.place[0], one.place[1], one.object);
   }
+  std::uint64_t lit = 0;
+  for (int lamp = 0; lamp < lamps_; ++lamp) lit |= std::uint64_t{amount[lamp] > 0.0f} << lamp;
+  one.doubt &= lit;
+  counts.spared += std::popcount(lit ^ one.doubt);
   if (pass_.empty()) return;
   const std::size_t pass_width = static_cast<std::size_t>(lamps_) * bands_;
   float* pass = pass_.data() + lane * pass_width;
@@ -224,7 +223,7 @@ bool DirectBatch::shadow_ray(int lane, int lamp, int slot) {
     // To the layer's end, or to where the ray is clear of everything.
     const bool up = towards.z() > 0.0f;
     const auto end = static_cast<float>(up ? fixture_.high : fixture_.low);
-    const float limit = up ? std::min(end, frame_.shadow_reach.high()) : std::max(end, frame_.shadow_reach.low());
+    const float limit = up ? std::min(end, frame_.shadow_reach->high()) : std::max(end, frame_.shadow_reach->low());
     far = std::min(far, std::max(0.0f, (limit - origin.z()) / towards.z()));
   }
   if (fixture_.lamp_in_layer[lamp]) {

@@ -345,13 +345,15 @@ DirectImage DirectRenderer::render(const Scene& scene) {
   std::vector<DirectMaterial> materials;
   for (const Surface& surface : scene.surfaces) materials.push_back(parts.prepare(surface.material));
   for (const Ball& ball : scene.balls) materials.push_back(parts.prepare(ball.material));
-  const ShadowReach shadow_reach(
-      parts.fixture.bearings, scene,
-      other ? !scene.surfaces.empty() && is_connected(scene.surfaces[0].mesh) : parts.connected);
+  std::optional<ShadowReach> shadow_reach;
+  if (parts.settings.shadows) {
+    shadow_reach.emplace(parts.fixture.bearings, scene,
+                         other ? !scene.surfaces.empty() && is_connected(scene.surfaces[0].mesh) : parts.connected);
+  }
 
   DirectImage image;
   image.irradiance = cv::Mat::zeros(parts.height(), parts.width(), CV_32FC(parts.rays.bands));
-  parts.cast({parts.fixture, tree, shadow_reach, materials}, image);
+  parts.cast({parts.fixture, tree, shadow_reach ? &*shadow_reach : nullptr, materials}, image);
   if (parts.spreads) parts.spread(image);
   return image;
 }

@@ -15,7 +15,7 @@ namespace {
 
 constexpr float kPad = 1e-3f;  // mm: more than single precision moves anything
 constexpr float kEndless = std::numeric_limits<float>::infinity();
-constexpr int kMostCells = 64;                     // along the longer side
+constexpr int kMostCells = 40;                     // along the longer side
 constexpr std::array<int, 3> kWidths = {1, 2, 4};  // cells by which the map of slopes is widened
 
 /// What the sheet does over each cell.
