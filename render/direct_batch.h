@@ -47,7 +47,7 @@ struct DirectFixture {
 struct DirectFrame {
   const DirectFixture& fixture;
   const PacketScene& tree;
-  const ShadowReach* shadow_reach;  ///< null: nothing casts a shadow
+  const ShadowReach* shadow_reach;               ///< null: nothing casts a shadow
   const std::vector<DirectMaterial>& materials;  ///< by object
 };
 

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <opencv2/core.hpp>
 #include <optional>
 #include <vector>
 
@@ -88,8 +89,10 @@ void check_settings(const DirectSettings& settings) {
 
 }  // namespace
 
-std::string unfit_for_direct(const LightField& field, const Scene& scene) {
-  if (scene.interreflection) return "the scene asks for interreflection";
+namespace {
+
+/// All but interreflection.
+std::string misfit(const LightField& field, const Scene& scene) {
   if (!same_fixture(field.fixture, scene)) {
     return "the scene's media, faces, lamps or surroundings aren't those that the light field was made for";
   }
@@ -116,6 +119,12 @@ std::string unfit_for_direct(const LightField& field, const Scene& scene) {
   return {};
 }
 
+}  // namespace
+
+std::string unfit_for_direct(const LightField& field, const Scene& scene) {
+  return scene.interreflection ? "the scene asks for interreflection" : misfit(field, scene);
+}
+
 struct DirectRenderer::Parts {
   DirectFixture fixture;
   ReadyCamera camera;
@@ -128,6 +137,7 @@ struct DirectRenderer::Parts {
   // By pixel and band, where central rays are spread; see CameraRays.
   std::vector<float> through, veil;
   std::vector<float> radiance;             // [band][grid point], room for a frame
+  std::vector<float> bounced;              // [grid point][band], irradiance; empty for none
   std::map<double, GgxAlbedo> conductors;  // by roughness
 
   Parts(const LightField& field, const Camera& camera_of, const Scene& rest, const DirectSettings& settings_of)
@@ -270,10 +280,11 @@ void DirectRenderer::Parts::cast(const DirectFrame& frame, DirectImage& image) {
         }
         if (settings.shadows) batch.cast_shadows(counts);
         for_lanes([&](int lane, int row, int column) {
+          const std::size_t point = static_cast<std::size_t>(row) * columns + column;
+          const float* ambient = bounced.empty() ? nullptr : bounced.data() + point * bands;
           if (spreads) {
             float out[kMaxBands] = {};
-            batch.add(lane, whole.data(), nullptr, out);
-            const std::size_t point = static_cast<std::size_t>(row) * columns + column;
+            batch.add(lane, whole.data(), ambient, out);
             for (int band = 0; band < bands; ++band) radiance[band * points + point] = out[band];
             return;
           }
@@ -282,7 +293,7 @@ void DirectRenderer::Parts::cast(const DirectFrame& frame, DirectImage& image) {
           if (!rays.veil.empty()) {
             for (int band = 0; band < bands; ++band) out[band] += rays.veil[slot + band];
           }
-          batch.add(lane, rays.through.data() + slot, nullptr, out);
+          batch.add(lane, rays.through.data() + slot, ambient, out);
         });
       }
     }
@@ -333,11 +344,33 @@ DirectRenderer::DirectRenderer(const LightField& field, const Camera& camera, co
 DirectRenderer::~DirectRenderer() = default;
 DirectRenderer::DirectRenderer(DirectRenderer&&) noexcept = default;
 
+void DirectRenderer::set_bounced_light(const cv::Mat& irradiance) {
+  Parts& parts = *parts_;
+  const int bands = parts.rays.bands;
+  parts.bounced.clear();
+  if (irradiance.empty()) return;
+  if (irradiance.type() != CV_32FC(bands) || irradiance.cols != parts.width() || irradiance.rows != parts.height()) {
+    fail("direct renderer: bounced light has {} x {} pixels of {} channels; {} x {} of {} are needed (32-bit floats)",
+         irradiance.cols, irradiance.rows, irradiance.channels(), parts.width(), parts.height(), bands);
+  }
+  if (!cv::checkRange(irradiance)) fail("direct renderer: bounced light isn't finite everywhere");
+  const ImageGrid& grid = parts.rays.grid;
+  for (int row = 0; row < grid.rows; ++row) {
+    const int y = std::clamp(static_cast<int>(std::floor(grid.top + grid.spacing * row)), 0, parts.height() - 1);
+    for (int column = 0; column < grid.columns; ++column) {
+      const int x = std::clamp(static_cast<int>(std::floor(grid.left + grid.spacing * column)), 0, parts.width() - 1);
+      const float* from = irradiance.ptr<float>(y) + bands * x;
+      parts.bounced.insert(parts.bounced.end(), from, from + bands);
+    }
+  }
+}
+
 DirectImage DirectRenderer::render(const Scene& scene) {
   Parts& parts = *parts_;
   const LightField& field = parts.fixture.field;
   check_scene(scene);
-  if (const std::string fault = unfit_for_direct(field, scene); !fault.empty()) fail("direct renderer: {}", fault);
+  const std::string fault = parts.bounced.empty() ? unfit_for_direct(field, scene) : misfit(field, scene);
+  if (!fault.empty()) fail("direct renderer: {}", fault);
   std::optional<PacketScene> other;
   if (!parts.tree.move_to(scene)) other.emplace(scene);
   const PacketScene& tree = other ? *other : parts.tree;
