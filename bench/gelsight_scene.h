@@ -11,9 +11,9 @@ namespace touchstone::bench {
 
 enum class Pressed { kNothing, kBall, kCoin };
 
-/// Three lamps a side stand inside the plate and shine 8 to 30 degrees upwards. The ball has 2 mm radius and goes 0.6 mm
-/// deep; the coin is a relief of rim, rings and studs of 0.15 mm, 0.25 mm deep. About `triangles` triangles.
-/// `shift` moves what presses (mm).
+/// Three lamps a side stand inside the plate and shine 8 to 30 degrees upwards. The ball has 2 mm radius and goes 0.6
+/// mm deep; the coin is a relief of rim, rings and studs of 0.15 mm, 0.25 mm deep. About `triangles` triangles. `shift`
+/// moves what presses (mm).
 render::Scene gelsight_scene(Pressed pressed, int triangles, const render::Material& membrane, bool interreflection,
                              double shift = 0.0);
 

@@ -12,6 +12,8 @@ namespace {
 
 using Four = Eigen::Array4f;
 
+constexpr auto kPerPi = static_cast<float>(1.0 / kPi);
+
 Eigen::Map<const Four> four(const float* from) {
   return Eigen::Map<const Four>(from);
 }
@@ -56,9 +58,13 @@ DirectFixture::DirectFixture(const LightField& of, bool soft)
   }
   const auto bands = static_cast<std::size_t>(field.fixture.environment.size());
   intensity.assign(bands * groups * 4, 0.0f);
+  if (!field.pass.empty()) pass.assign(nodes * bands * groups * 4, 0.0f);
   for (std::size_t band = 0; band < bands; ++band) {
     for (std::size_t lamp = 0; lamp < lamps; ++lamp) {
       intensity[band * groups * 4 + lamp] = static_cast<float>(field.intensity[lamp][static_cast<Eigen::Index>(band)]);
+      for (std::size_t node = 0; !pass.empty() && node < nodes; ++node) {
+        pass[(node * bands + band) * groups * 4 + lamp] = field.pass[(node * lamps + lamp) * bands + band];
+      }
     }
   }
 }
@@ -73,7 +79,7 @@ DirectBatch::DirectBatch(const DirectFrame& frame)
       lanes_(kMostPackets * kPacket),
       amounts_(lanes_.size() * stride_),
       flows_(lanes_.size() * stride_ * 3),
-      pass_(field_.pass.empty() ? 0 : lanes_.size() * lamps_ * bands_) {}
+      pass_(field_.pass.empty() ? 0 : lanes_.size() * stride_ * bands_) {}
 
 void DirectBatch::look(std::span<const RayPacket> rays, DirectCounts& counts) {
   TS_ASSERT(rays.size() <= kMostPackets);
@@ -136,13 +142,18 @@ void DirectBatch::light_lane(int lane, DirectCounts& counts) {
   one.doubt &= lit;
   counts.spared += std::popcount(lit ^ one.doubt);
   if (pass_.empty()) return;
-  const std::size_t pass_width = static_cast<std::size_t>(lamps_) * bands_;
+  const std::size_t pass_width = stride_ * bands_;
   float* pass = pass_.data() + lane * pass_width;
   std::fill_n(pass, pass_width, 0.0f);
   for (int corner = 0; corner < 8; ++corner) {
-    const float* from = field_.pass.data() + cell.node[corner] * pass_width;
+    const float* from = fixture_.pass.data() + cell.node[corner] * pass_width;
     for (std::size_t k = 0; k < pass_width; ++k) pass[k] += cell.weight[corner] * from[k];
   }
+}
+
+Eigen::Array4f DirectBatch::passing(int lane, int group, int band) const {
+  if (pass_.empty()) return Four::Ones();
+  return four(pass_.data() + (static_cast<std::size_t>(lane) * bands_ + band) * stride_ + group * 4);
 }
 
 Eigen::Vector3f DirectBatch::flow_of(int lane, int lamp) const {
@@ -274,58 +285,77 @@ void DirectBatch::add(int lane, const float* through, const float* ambient, floa
     for (int band = 0; band < bands_; ++band) out[band] += dimmed[band] * one.material->colour[band];
     return;
   }
-  add_reflected(lane, dimmed, ambient, out);
-}
-
-void DirectBatch::add_reflected(int lane, const float* dimmed, const float* ambient, float* out) const {
-  const Lane& one = lanes_[lane];
-  const DirectMaterial& material = *one.material;
-  const float* amount = amounts(lane);
-  constexpr auto kPerPi = static_cast<float>(1.0 / kPi);
   float sum[kMaxBands] = {};
-  if (material.kind == DirectKind::kMatt && pass_.empty()) {
-    for (int band = 0; band < bands_; ++band) {
-      const float* intensity = fixture_.intensity.data() + band * stride_;
-      Four lit = Four::Zero();
-      for (int group = 0; group < fixture_.groups; ++group) {
-        lit += four(amount + group * 4) * four(intensity + group * 4);
-      }
-      sum[band] = material.colour[band] * kPerPi * lit.sum();
-    }
+  if (one.material->kind == DirectKind::kMatt) {
+    reflect_from_matt(lane, sum);
   } else {
-    const Eigen::Vector3d normal(one.normal[0], one.normal[1], one.normal[2]);
-    const NormalFrame frame(normal.normalized());
-    const RayPacket& packet = packet_of(lane);
-    const int k = lane % kPacket;
-    const Eigen::Vector3d leaving =
-        frame.to_local(-Eigen::Vector3d(packet.direction[0][k], packet.direction[1][k], packet.direction[2][k]));
-    for (int lamp = 0; lamp < lamps_; ++lamp) {
-      if (amount[lamp] == 0.0f) continue;
-      float share[kMaxBands];
-      if (material.kind == DirectKind::kMatt) {
-        for (int band = 0; band < bands_; ++band) share[band] = material.colour[band] * kPerPi;
-      } else {
-        const Eigen::Vector3d coming = frame.to_local((-flow_of(lane, lamp)).cast<double>().normalized());
-        const double schlick = schlick_weight((leaving + coming).normalized().dot(leaving));
-        const double lobe = ggx_reflection(leaving, coming, material.roughness);
-        const double missing = material.albedo->missing_ratio(leaving.z());
-        for (int band = 0; band < bands_; ++band) {
-          const double r = material.colour[band];
-          share[band] = static_cast<float>((r + (1.0 - r) * schlick) * (1.0 + r * missing) * lobe);
-        }
-      }
-      const float* pass = pass_.empty() ? nullptr : &pass_[(static_cast<std::size_t>(lane) * lamps_ + lamp) * bands_];
-      for (int band = 0; band < bands_; ++band) {
-        const float passed = pass == nullptr ? 1.0f : pass[band];
-        sum[band] += amount[lamp] * share[band] * passed * static_cast<float>(field_.intensity[lamp][band]);
-      }
-    }
-  }
-  if (ambient != nullptr) {
-    for (int band = 0; band < bands_; ++band) sum[band] += material.colour[band] * kPerPi * ambient[band];
+    reflect_from_metal(lane, sum);
   }
   const auto per_index2 = static_cast<float>(1.0 / (field_.index * field_.index));
-  for (int band = 0; band < bands_; ++band) out[band] += dimmed[band] * sum[band] * per_index2;
+  for (int band = 0; band < bands_; ++band) {
+    if (ambient != nullptr) sum[band] += one.material->colour[band] * kPerPi * ambient[band];
+    out[band] += dimmed[band] * sum[band] * per_index2;
+  }
+}
+
+void DirectBatch::reflect_from_matt(int lane, float* sum) const {
+  const float* amount = amounts(lane);
+  for (int band = 0; band < bands_; ++band) {
+    const float* intensity = fixture_.intensity.data() + band * stride_;
+    Four lit = Four::Zero();
+    for (int group = 0; group < fixture_.groups; ++group) {
+      lit += four(amount + group * 4) * four(intensity + group * 4) * passing(lane, group, band);
+    }
+    sum[band] = lanes_[lane].material->colour[band] * kPerPi * lit.sum();
+  }
+}
+
+/// ggx.h's formulas, four lamps at a time; each lamp is one direction.
+void DirectBatch::reflect_from_metal(int lane, float* sum) const {
+  const Lane& one = lanes_[lane];
+  const DirectMaterial& material = *one.material;
+  const RayPacket& packet = packet_of(lane);
+  const Eigen::Array3f back(-packet.direction[0][lane % kPacket], -packet.direction[1][lane % kPacket],
+                            -packet.direction[2][lane % kPacket]);
+  const Eigen::Array3f normal(one.normal[0], one.normal[1], one.normal[2]);
+  const float out = (normal * back).sum();
+  if (!(out > 0.0f)) return;
+  const auto missing = static_cast<float>(material.albedo->missing_ratio(double(out)));
+  const auto a2 = static_cast<float>(material.roughness * material.roughness);
+  const float slope_out = std::sqrt(a2 + (1.0f - a2) * out * out);
+  const float* flow = flows_.data() + static_cast<std::size_t>(lane) * stride_ * 3;
+  for (int group = 0; group < fixture_.groups; ++group) {
+    const Four amount = four(amounts(lane) + group * 4);
+    if ((amount == 0.0f).all()) continue;
+    const Four x = four(flow + group * 12);
+    const Four y = four(flow + group * 12 + 4);
+    const Four z = four(flow + group * 12 + 8);
+    const Four per_length = -(x * x + y * y + z * z).max(1e-30f).rsqrt();
+    const Four in = ((x * normal[0] + y * normal[1] + z * normal[2]) * per_length).max(0.0f);
+    // The facet's normal that mirrors one into the other; its sine by the cross product, since for a smooth metal
+    // 1 - cos^2 would have no digits left.
+    Four hx = x * per_length + back[0];
+    Four hy = y * per_length + back[1];
+    Four hz = z * per_length + back[2];
+    const Four per_half = (hx * hx + hy * hy + hz * hz).max(1e-30f).rsqrt();
+    hx *= per_half;
+    hy *= per_half;
+    hz *= per_half;
+    const Four sine2 = (normal[1] * hz - normal[2] * hy).square() + (normal[2] * hx - normal[0] * hz).square() +
+                       (normal[0] * hy - normal[1] * hx).square();
+    const Four spread = a2 + (1.0f - a2) * sine2;
+    const Four masking = out * (a2 + (1.0f - a2) * in * in).sqrt() + in * slope_out;
+    const Four lobe = a2 * kPerPi / (spread * spread) * 0.5f / masking.max(1e-30f);
+    const Four graze = (1.0f - (hx * back[0] + hy * back[1] + hz * back[2])).max(0.0f).min(1.0f);
+    const Four schlick = graze.square().square() * graze;
+    const Four arriving = amount * lobe;
+    for (int band = 0; band < bands_; ++band) {
+      const float r = material.colour[band];
+      const Four intensity = four(fixture_.intensity.data() + band * stride_ + group * 4);
+      const Four share = (r + (1.0f - r) * schlick) * (1.0f + r * missing);
+      sum[band] += (arriving * share * intensity * passing(lane, group, band)).sum();
+    }
+  }
 }
 
 }  // namespace touchstone::render

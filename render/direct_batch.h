@@ -32,6 +32,7 @@ struct DirectFixture {
   int groups;
   std::vector<float> flow;       ///< [node][group][axis][4]: F of LightField
   std::vector<float> intensity;  ///< [band][group][4]
+  std::vector<float> pass;       ///< [node][band][group][4], empty where nothing absorbs
   std::vector<NormalFrame> lens_frames;
   std::vector<double> lamp_index;  ///< refractive index of the medium that a lamp stands in
   std::vector<bool> lamp_in_layer;
@@ -89,12 +90,14 @@ class DirectBatch {
   const RayPacket& packet_of(int lane) const { return rays_[lane / kPacket]; }
   float* amounts(int lane) { return amounts_.data() + static_cast<std::size_t>(lane) * stride_; }
   const float* amounts(int lane) const { return amounts_.data() + static_cast<std::size_t>(lane) * stride_; }
+  Eigen::Array4f passing(int lane, int group, int band) const;
   Eigen::Vector3f flow_of(int lane, int lamp) const;
   void set_flow(int lane, int lamp, const Eigen::Vector3f& flow);
   void light_lane(int lane, DirectCounts& counts);
   bool shadow_ray(int lane, int lamp, int slot);
   void trace_shadows(int lamp, const int* lanes, int count, DirectCounts& counts);
-  void add_reflected(int lane, const float* dimmed, const float* ambient, float* out) const;
+  void reflect_from_matt(int lane, float* sum) const;
+  void reflect_from_metal(int lane, float* sum) const;
 
   const DirectFrame& frame_;
   const DirectFixture& fixture_;
@@ -105,7 +108,7 @@ class DirectBatch {
   std::vector<Lane> lanes_;
   std::vector<float> amounts_;  // [lane][lamp]: cosine times irradiance of unit intensity
   std::vector<float> flows_;    // [lane][group][axis][4]
-  std::vector<float> pass_;     // [lane][lamp][band], empty where nothing absorbs
+  std::vector<float> pass_;     // [lane][band][lamp], empty where nothing absorbs
   RayPacket shadow_;
 };
 

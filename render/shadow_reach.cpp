@@ -15,7 +15,8 @@ namespace {
 
 constexpr float kPad = 1e-3f;  // mm: more than single precision moves anything
 constexpr float kEndless = std::numeric_limits<float>::infinity();
-constexpr int kMostCells = 40;                     // along the longer side
+constexpr int kMostCells = 40;  // along the longer side
+constexpr int kMostSlabs = 8;
 constexpr std::array<int, 3> kWidths = {1, 2, 4};  // cells by which the map of slopes is widened
 
 /// What the sheet does over each cell.
@@ -85,14 +86,14 @@ Ground ground_of(const LampBearings& map, const TriangleMesh& mesh) {
       });
 }
 
-/// The most within `width` cells along both axes; endless beyond the map's edge, of which nothing is known.
+/// The most within `width` cells along both axes. Cells at the map's edge hold what lies beside it (over_cells).
 std::vector<float> widened(const LampBearings& map, const std::vector<float>& from, int width) {
   const auto along = [&](const std::vector<float>& source, int count, int stride, int lines, int line_stride) {
     std::vector<float> to(source.size());
     for (int line = 0; line < lines; ++line) {
       const float* in = source.data() + static_cast<std::size_t>(line) * line_stride;
       for (int k = 0; k < count; ++k) {
-        float most = k < width || k + width >= count ? kEndless : 0.0f;
+        float most = 0.0f;
         for (int n = std::max(0, k - width); n <= std::min(count - 1, k + width); ++n) {
           most = std::max(most, in[static_cast<std::size_t>(n) * stride]);
         }
@@ -134,29 +135,33 @@ LampBearings::LampBearings(const LightField& field, bool soft)
   bottom = static_cast<float>(field.reach.min().y());
   columns = 1 + static_cast<int>(size.x() / double(cell));
   rows = 1 + static_cast<int>(size.y() / double(cell));
-  bearings.resize(static_cast<std::size_t>(columns) * rows * lamps);
+  floor = static_cast<float>(field.reach.min().z());
+  slabs = std::clamp(static_cast<int>(std::ceil(size.z() / (0.5 * double(cell)))), 1, kMostSlabs);
+  slab = static_cast<float>(size.z() / slabs);
+  bearings.resize(static_cast<std::size_t>(slabs) * columns * rows * lamps);
   // A ray to another point of a lens takes the field's direction at a place that is set off by up to the lens's radius
   // and what it takes along a slanting ray (DirectBatch::choose_lens_points).
   std::vector<float> set_off(lamps, 0.0f);
   for (int lamp = 0; soft && lamp < lamps; ++lamp) {
     set_off[lamp] = static_cast<float>(field.fixture.lamps[lamp].lens_radius);
   }
-  const float middle_z = static_cast<float>(field.reach.center().z());
-  const float half_height = static_cast<float>(0.5 * size.z());
-  tbb::parallel_for(0, rows, [&](int row) {
+  tbb::parallel_for(0, slabs * rows, [&](int line) {
+    const int row = line % rows;
+    const float middle_z = floor + (static_cast<float>(line / rows) + 0.5f) * slab;
+    const float y = bottom + (static_cast<float>(row) + 0.5f) * cell;
+    // What the lamps send to 27 places of the cell, and beside it as far as lenses ask.
     std::vector<float> flow(4 * static_cast<std::size_t>(lamps));
     for (int column = 0; column < columns; ++column) {
       const float x = left + (static_cast<float>(column) + 0.5f) * cell;
-      const float y = bottom + (static_cast<float>(row) + 0.5f) * cell;
       const auto way = [&](float px, float py, float pz, int lamp, Eigen::Vector3f& to) {
         look_up_flow(field, find_cell(field, px, py, pz), flow.data());
         to = -Eigen::Vector3f(flow[4 * lamp], flow[4 * lamp + 1], flow[4 * lamp + 2]);
-        return to.squaredNorm() > 0.0f;
+        return to.squaredNorm() > 0.0f && to.z() != 0.0f;
       };
       for (int lamp = 0; lamp < lamps; ++lamp) {
-        Bearing& made = bearings[(static_cast<std::size_t>(row) * columns + column) * lamps + lamp];
+        Bearing& made = bearings[(static_cast<std::size_t>(line) * columns + column) * lamps + lamp];
         Eigen::Vector3f to;
-        if (!way(x, y, middle_z, lamp, to) || to.z() == 0.0f) continue;
+        if (!way(x, y, middle_z, lamp, to)) continue;
         made.side = to.z() > 0.0f ? 1.0f : -1.0f;
         const Eigen::Vector2f middle = to.head<2>() / std::abs(to.z());
         made.x = middle.x();
@@ -167,17 +172,16 @@ LampBearings::LampBearings(const LightField& field, bool soft)
         const double sent_along = std::max(1e-6, std::abs(double(middle_z) - real.position.z()));
         const float off =
             0.5f * cell + set_off[lamp] * (1.0f + static_cast<float>(std::min(31.0, 2.0 * sent_across / sent_along)));
+        const auto step = [](int n) { return static_cast<float>(n - 1); };
         float spread = 0.0f;
         for (int k = 0; k < 27 && std::isfinite(spread); ++k) {
-          const auto step = [](int n) { return static_cast<float>(n - 1); };
-          if (!way(x + off * step(k % 3), y + off * step(k / 3 % 3), middle_z + half_height * step(k / 9), lamp, to) ||
-              !(to.z() * made.side > 0.0f)) {
-            spread = kEndless;
-            break;
-          }
-          spread = std::max(spread, (to.head<2>() / std::abs(to.z()) - middle).norm());
+          const bool lit =
+              way(x + off * step(k % 3), y + off * step(k / 3 % 3), middle_z + 0.5f * slab * step(k / 9), lamp, to);
+          spread = lit && to.z() * made.side > 0.0f
+                       ? std::max(spread, (to.head<2>() / std::abs(to.z()) - middle).norm())
+                       : kEndless;
         }
-        made.spread = 1.5f * spread + 1e-3f;  // a half more for what lies between the 27 places
+        made.spread = 1.5f * spread + 1e-3f;  // a half more for what lies between those places
       }
     }
   });
@@ -190,6 +194,10 @@ int LampBearings::cell_at(float x, float y) const {
   const int i = static_cast<int>(std::floor((x - left) / cell));
   const int j = static_cast<int>(std::floor((y - bottom) / cell));
   return i < 0 || j < 0 || i >= columns || j >= rows ? -1 : j * columns + i;
+}
+
+int LampBearings::slab_at(float z) const {
+  return static_cast<int>(std::clamp((z - floor) / slab, 0.0f, static_cast<float>(slabs - 1)));
 }
 
 ShadowReach::ShadowReach(const LampBearings& bearings, const Scene& scene, bool connected)
@@ -242,9 +250,11 @@ ShadowReach::ShadowReach(const LampBearings& bearings, const Scene& scene, bool 
     float clear = 0.0f;
     for (int k = 0; k < steps; ++k) {
       const float risen = (static_cast<float>(k) + 0.5f) * step / map.cell;
-      const int i = static_cast<int>(std::floor(static_cast<float>(column) + 0.5f + risen * to.x));
-      const int j = static_cast<int>(std::floor(static_cast<float>(row) + 0.5f + risen * to.y));
-      if (i < 0 || j < 0 || i >= map.columns || j >= map.rows) return true;
+      const auto cell = [](float at, int count) {
+        return static_cast<int>(std::clamp(at, 0.0f, static_cast<float>(count - 1)));
+      };
+      const int i = cell(static_cast<float>(column) + 0.5f + risen * to.x, map.columns);
+      const int j = cell(static_cast<float>(row) + 0.5f + risen * to.y, map.rows);
       clear += step * (1.0f - slopes[width][static_cast<std::size_t>(j) * map.columns + i] * most);
       if (!(clear >= 0.0f)) return true;
     }
@@ -278,15 +288,21 @@ ShadowReach::ShadowReach(const LampBearings& bearings, const Scene& scene, bool 
     const float y = map.bottom + (static_cast<float>(row) + 0.5f) * map.cell;
     for (int lamp = 0; lamp < map.lamps; ++lamp) {
       const std::uint64_t bit = std::uint64_t{1} << lamp;
-      const auto bearing = [&](int column) -> const LampBearings::Bearing& {
-        return map.bearings[(static_cast<std::size_t>(row) * map.columns + column) * map.lamps + lamp];
+      // Of all slabs in which the sheet lies over a cell.
+      const auto any_bearing = [&](int column, auto&& meets) {
+        const std::size_t here = static_cast<std::size_t>(row) * map.columns + column;
+        if (!(ground.low[here] <= ground.high[here])) return false;  // no sheet there, no place to ask for
+        const int last = map.slab_at(ground.high[here]);
+        for (int slab = map.slab_at(ground.low[here]); slab <= last; ++slab) {
+          const LampBearings::Bearing& to = map.bearing(slab, row, column, lamp);
+          if (to.side == 0.0f || !std::isfinite(to.spread) || meets(to)) return true;
+        }
+        return false;
       };
       std::uint64_t* doubt = doubt_.data() + static_cast<std::size_t>(row) * map.columns;
       for (int column = 0; column < map.columns; ++column) {
-        const std::size_t here = static_cast<std::size_t>(row) * map.columns + column;
-        if (!(ground.low[here] <= ground.high[here])) continue;  // no sheet there, no place to ask for
-        const LampBearings::Bearing& to = bearing(column);
-        if (to.side == 0.0f || !std::isfinite(to.spread) || meets_ground(column, row, to)) doubt[column] |= bit;
+        const auto meets = [&](const LampBearings::Bearing& to) { return meets_ground(column, row, to); };
+        if (any_bearing(column, meets)) doubt[column] |= bit;
       }
       for (const Ball& ball : scene.balls) {
         const auto r = static_cast<float>(ball.radius);
@@ -300,9 +316,8 @@ ShadowReach::ShadowReach(const LampBearings& bearings, const Scene& scene, bool 
         const int last = static_cast<int>(std::clamp(std::ceil(middle + reach / map.cell), 0.0f, most));
         for (int column = first; column <= last; ++column) {
           if ((doubt[column] & bit) != 0) continue;
-          const std::size_t here = static_cast<std::size_t>(row) * map.columns + column;
-          if (!(ground.low[here] <= ground.high[here])) continue;
-          if (meets_ball(column, row, bearing(column), ball)) doubt[column] |= bit;
+          const auto meets = [&](const LampBearings::Bearing& to) { return meets_ball(column, row, to, ball); };
+          if (any_bearing(column, meets)) doubt[column] |= bit;
         }
       }
     }

@@ -24,7 +24,9 @@ struct LampBearings {
 
   float left = 0.0f, bottom = 0.0f, cell = 1.0f;  ///< mm
   int columns = 0, rows = 0, lamps = 0;
-  std::vector<Bearing> bearings;  ///< [row][column][lamp]
+  float floor = 0.0f, slab = 1.0f;  ///< mm: the box's height is cut into slabs
+  int slabs = 1;
+  std::vector<Bearing> bearings;  ///< [slab][row][column][lamp]
   std::vector<float> longest;     ///< by lamp: the most of length + spread, infinite if that isn't known everywhere
 
   /// `soft`: shadow rays will go to all points of each lens, not to its middle only.
@@ -32,6 +34,11 @@ struct LampBearings {
 
   /// Index of the cell that holds a place, -1 beside the map.
   int cell_at(float x, float y) const;
+  /// Number of the slab that holds a height, the nearest one for heights beside them.
+  int slab_at(float z) const;
+  const Bearing& bearing(int at_slab, int row, int column, int lamp) const {
+    return bearings[((static_cast<std::size_t>(at_slab) * rows + row) * columns + column) * lamps + lamp];
+  }
 };
 
 /// Where the first surface is a connected sheet whose triangles all face the same way along z (a height field), a ray
