@@ -196,6 +196,27 @@ void DirectBatch::choose_lens_points(int lane, double u, double v) {
   }
 }
 
+void DirectBatch::take_as_known(int lane, const Visibility& known) {
+  Lane& one = lanes_[lane];
+  if (one.material == nullptr || !is_lit(one.material->kind)) return;
+  for (std::uint64_t rest = one.doubt & known.hidden; rest != 0; rest &= rest - 1) {
+    amounts(lane)[std::countr_zero(rest)] = 0.0f;
+  }
+  one.doubt &= ~(known.open | known.hidden);
+}
+
+DirectBatch::Visibility DirectBatch::visibility(int lane) const {
+  const Lane& one = lanes_[lane];
+  Visibility found;
+  if (packet_of(lane).valid[lane % kPacket] == 0 || one.material == nullptr || !is_lit(one.material->kind))
+    return found;
+  for (int lamp = 0; lamp < lamps_; ++lamp) {
+    found.open |= std::uint64_t{amounts(lane)[lamp] > 0.0f} << lamp;
+  }
+  found.hidden = one.doubt & ~found.open;
+  return found;
+}
+
 void DirectBatch::cast_shadows(DirectCounts& counts) {
   const int lane_count = static_cast<int>(rays_.size()) * kPacket;
   std::uint64_t asked = 0;

@@ -70,8 +70,18 @@ class DirectBatch {
   /// Lets a lane's shadows come from the point of each lens that (u, v) in [0, 1)^2 stands for, not from its middle.
   void choose_lens_points(int lane, double u, double v);
 
+  /// Which lamps' light is known to reach a place, and which is known to be hidden: a bit a lamp.
+  struct Visibility {
+    std::uint64_t open = 0, hidden = 0;
+  };
+  /// Takes that for a lane, so that no shadow ray asks.
+  void take_as_known(int lane, const Visibility& known);
+
   /// Takes away what doesn't get through.
   void cast_shadows(DirectCounts& counts);
+
+  /// What the lane has found; lamps that its surface turns away from are in neither.
+  Visibility visibility(int lane) const;
 
   /// Adds a lane's light to `out`, a number a band: `through` (that of CameraRays) times basic radiance. `ambient`, if
   /// any, is an irradiance from everywhere, W/m^2 a band, that comes on top.

@@ -82,6 +82,12 @@ void check_settings(const DirectSettings& settings) {
   if (settings.samples < 1 || settings.samples > 64) {
     fail("direct renderer: samples is {}; it must be from 1 to 64", settings.samples);
   }
+  if (settings.edge_side != 1 && settings.edge_side != 2 && settings.edge_side != 4) {
+    fail("direct renderer: edge_side is {}; it must be 1, 2 or 4", settings.edge_side);
+  }
+  if (!(settings.edge_contrast >= 0.0) || !std::isfinite(settings.edge_contrast)) {
+    fail("direct renderer: edge_contrast is {}; it must be 0 or more", settings.edge_contrast);
+  }
   if (!(settings.rays_across_blur >= 1.0 && settings.rays_across_blur <= 64.0)) {
     fail("direct renderer: rays_across_blur is {}; it must be from 1 to 64", settings.rays_across_blur);
   }
@@ -130,15 +136,17 @@ struct DirectRenderer::Parts {
   ReadyCamera camera;
   DirectSettings settings;
   PacketScene tree;
-  bool connected;  // the first surface
-  bool spreads;    // central rays, then the footprint
+  bool connected;        // the first surface
+  bool spreads;          // central rays, then the footprint
+  bool refines = false;  // more rays at edges
   CameraFootprint footprint;
   CameraRays rays;
   // By pixel and band, where central rays are spread; see CameraRays.
   std::vector<float> through, veil;
-  std::vector<float> radiance;             // [band][grid point], room for a frame
-  std::vector<float> bounced;              // [grid point][band], irradiance; empty for none
-  std::map<double, GgxAlbedo> conductors;  // by roughness
+  std::vector<float> radiance;                // [band][grid point], room for a frame
+  std::vector<DirectBatch::Visibility> seen;  // by grid point, where edges get more rays
+  std::vector<float> bounced;                 // [grid point][band], irradiance; empty for none
+  std::map<double, GgxAlbedo> conductors;     // by roughness
 
   Parts(const LightField& field, const Camera& camera_of, const Scene& rest, const DirectSettings& settings_of)
       : fixture(field, settings_of.samples > 1),
@@ -155,6 +163,8 @@ struct DirectRenderer::Parts {
     rays = trace_to_layer(field.fixture, camera, grid, field.layer, settings.samples, settings.seed);
     if (!spreads) return;
     radiance.resize(static_cast<std::size_t>(grid.columns) * grid.rows * rays.bands);
+    refines = footprint.spacing == 1 && settings.edge_side > 1;
+    if (refines && settings.shadows) seen.resize(static_cast<std::size_t>(grid.columns) * grid.rows);
     CameraRays pixels = trace_to_layer(field.fixture, camera, pixel_grid(camera), field.layer, 1, 0);
     keep_by_pixel(pixels, pixels.through, through);
     if (!pixels.veil.empty()) keep_by_pixel(pixels, pixels.veil, veil);
@@ -189,10 +199,29 @@ struct DirectRenderer::Parts {
 
   /// Casts the rays and shades what they meet: into `radiance`, or into the picture where nothing is spread.
   void cast(const DirectFrame& frame, DirectImage& image);
+  /// Casts more rays where `radiance` has edges.
+  void refine(const DirectFrame& frame, DirectImage& image);
   /// From `radiance` to the picture.
   void spread(DirectImage& image) const;
 
  private:
+  struct GridRay {
+    bool valid;
+    Eigen::Vector3f origin, direction;
+    float far;
+  };
+  GridRay grid_ray(int row, int column) const {
+    const RayPacket& packet = rays.packets[row / CameraRays::kSide * rays.tiles_across + column / CameraRays::kSide];
+    const int lane = row % CameraRays::kSide * CameraRays::kSide + column % CameraRays::kSide;
+    return {packet.valid[lane] != 0,
+            {packet.origin[0][lane], packet.origin[1][lane], packet.origin[2][lane]},
+            {packet.direction[0][lane], packet.direction[1][lane], packet.direction[2][lane]},
+            packet.far[lane]};
+  }
+  std::vector<int> edge_points() const;
+  DirectBatch::Visibility known_round(int point) const;
+  void put_edge_rays(int point, RayPacket& packet, int first_lane) const;
+
   static Eigen::Vector2i size_of_grid(const ImageGrid& grid) { return {grid.columns, grid.rows}; }
 
   /// The footprint on what the scene shows at rest, by block; in the middle of the field's box where it shows nothing.
@@ -238,6 +267,18 @@ struct DirectRenderer::Parts {
     }
   }
 };
+
+namespace {
+
+void count_up(const std::vector<DirectCounts>& task_counts, DirectImage& image) {
+  for (const DirectCounts& counts : task_counts) {
+    image.primary += counts.primary;
+    image.shadow_rays += counts.shadow_rays;
+    image.shadow_spared += counts.spared;
+  }
+}
+
+}  // namespace
 
 void DirectRenderer::Parts::cast(const DirectFrame& frame, DirectImage& image) {
   const int bands = rays.bands;
@@ -286,6 +327,7 @@ void DirectRenderer::Parts::cast(const DirectFrame& frame, DirectImage& image) {
             float out[kMaxBands] = {};
             batch.add(lane, whole.data(), ambient, out);
             for (int band = 0; band < bands; ++band) radiance[band * points + point] = out[band];
+            if (!seen.empty()) seen[point] = batch.visibility(lane);
             return;
           }
           float* out = image.irradiance.ptr<float>(row) + bands * column;
@@ -298,11 +340,143 @@ void DirectRenderer::Parts::cast(const DirectFrame& frame, DirectImage& image) {
       }
     }
   });
-  for (const DirectCounts& counts : task_counts) {
-    image.primary += counts.primary;
-    image.shadow_rays += counts.shadow_rays;
-    image.shadow_spared += counts.spared;
+  count_up(task_counts, image);
+}
+
+/// Grid points that differ from the next one, in order.
+std::vector<int> DirectRenderer::Parts::edge_points() const {
+  const int columns = rays.grid.columns;
+  const int rows = rays.grid.rows;
+  const std::size_t points = static_cast<std::size_t>(columns) * rows;
+  std::vector<double> squares(rows);
+  tbb::parallel_for(0, rows, [&](int row) {
+    for (int band = 0; band < rays.bands; ++band) {
+      const float* at = radiance.data() + band * points + static_cast<std::size_t>(row) * columns;
+      for (int k = 0; k < columns; ++k) squares[row] += double(at[k]) * double(at[k]);
+    }
+  });
+  double square = 0.0;
+  for (double one : squares) square += one;
+  const auto limit = static_cast<float>(settings.edge_contrast * settings.edge_contrast * square / double(points));
+  const auto differ = [&](std::size_t one, std::size_t other) {
+    float sum = 0.0f;
+    for (int band = 0; band < rays.bands; ++band) {
+      const float difference = radiance[band * points + one] - radiance[band * points + other];
+      sum += difference * difference;
+    }
+    return sum > limit;
+  };
+  std::vector<std::vector<int>> by_row(rows);
+  tbb::parallel_for(0, rows, [&](int row) {
+    for (int column = 0; column < columns; ++column) {
+      const std::size_t point = static_cast<std::size_t>(row) * columns + column;
+      if ((column > 0 && differ(point, point - 1)) || (column + 1 < columns && differ(point, point + 1)) ||
+          (row > 0 && differ(point, point - columns)) || (row + 1 < rows && differ(point, point + columns))) {
+        by_row[row].push_back(static_cast<int>(point));
+      }
+    }
+  });
+  std::vector<int> all;
+  for (const auto& one : by_row) all.insert(all.end(), one.begin(), one.end());
+  return all;
+}
+
+/// A lamp that is seen, or hidden, from a point and all eight next ones is taken to be so from all between them.
+DirectBatch::Visibility DirectRenderer::Parts::known_round(int point) const {
+  const int columns = rays.grid.columns;
+  const int row = point / columns;
+  const int column = point % columns;
+  DirectBatch::Visibility known{~std::uint64_t{0}, ~std::uint64_t{0}};
+  for (int j = std::max(row - 1, 0); j <= std::min(row + 1, rays.grid.rows - 1); ++j) {
+    for (int i = std::max(column - 1, 0); i <= std::min(column + 1, columns - 1); ++i) {
+      const DirectBatch::Visibility& one = seen[static_cast<std::size_t>(j) * columns + i];
+      known.open &= one.open;
+      known.hidden &= one.hidden;
+    }
   }
+  return known;
+}
+
+/// Rays through a grid point's square: what a central ray is in the layer changes so smoothly over the picture that
+/// the next grid points' rays tell it.
+void DirectRenderer::Parts::put_edge_rays(int point, RayPacket& packet, int first_lane) const {
+  const int column = point % rays.grid.columns;
+  const int row = point / rays.grid.columns;
+  const GridRay here = grid_ray(row, column);
+  const auto slope = [&](int rows_on, int columns_on) {
+    Eigen::Matrix<float, 3, 2> change = Eigen::Matrix<float, 3, 2>::Zero();
+    const int row_to = std::min(row + rows_on, rays.grid.rows - 1);
+    const int column_to = std::min(column + columns_on, rays.grid.columns - 1);
+    const int row_from = std::max(row - rows_on, 0);
+    const int column_from = std::max(column - columns_on, 0);
+    const GridRay to = grid_ray(row_to, column_to);
+    const GridRay from = grid_ray(row_from, column_from);
+    const int steps = row_to - row_from + column_to - column_from;
+    if (to.valid && from.valid && steps > 0) {
+      change << (to.origin - from.origin) / static_cast<float>(steps),
+          (to.direction - from.direction) / static_cast<float>(steps);
+    }
+    return change;
+  };
+  const Eigen::Matrix<float, 3, 2> across = slope(0, 1);
+  const Eigen::Matrix<float, 3, 2> down = slope(1, 0);
+  const int side = settings.edge_side;
+  for (int k = 0; k < side * side; ++k) {
+    const float x = (static_cast<float>(k % side) + 0.5f) / static_cast<float>(side) - 0.5f;
+    const float y = (static_cast<float>(k / side) + 0.5f) / static_cast<float>(side) - 0.5f;
+    const Eigen::Vector3f origin = here.origin + x * across.col(0) + y * down.col(0);
+    const Eigen::Vector3f direction = (here.direction + x * across.col(1) + y * down.col(1)).normalized();
+    const int lane = first_lane + k;
+    for (int a = 0; a < 3; ++a) {
+      packet.origin[a][lane] = origin[a];
+      packet.direction[a][lane] = direction[a];
+    }
+    packet.far[lane] = here.far;
+    packet.valid[lane] = here.valid ? -1 : 0;
+  }
+}
+
+void DirectRenderer::Parts::refine(const DirectFrame& frame, DirectImage& image) {
+  const std::vector<int> edges = edge_points();
+  image.edge_pixels = edges.size();
+  const int bands = rays.bands;
+  const std::size_t points = static_cast<std::size_t>(rays.grid.columns) * rays.grid.rows;
+  const int rays_a_point = settings.edge_side * settings.edge_side;
+  const int points_a_packet = kPacket / rays_a_point;
+  const int points_a_task = DirectBatch::kMostPackets * points_a_packet;
+  const auto tasks = static_cast<int>((edges.size() + points_a_task - 1) / points_a_task);
+  std::array<float, kMaxBands> share;
+  share.fill(1.0f / static_cast<float>(rays_a_point));
+  std::vector<DirectCounts> task_counts(tasks);
+  tbb::parallel_for(0, tasks, [&](int task) {
+    const int first = task * points_a_task;
+    const int count = std::min(points_a_task, static_cast<int>(edges.size()) - first);
+    std::vector<RayPacket> packets((count + points_a_packet - 1) / points_a_packet);
+    for (RayPacket& packet : packets) {
+      packet = RayPacket{};
+      std::fill_n(packet.direction[2], kPacket, 1.0f);
+    }
+    for (int k = 0; k < count; ++k) {
+      put_edge_rays(edges[first + k], packets[k / points_a_packet], k % points_a_packet * rays_a_point);
+    }
+    DirectBatch batch(frame);
+    batch.look(packets, task_counts[task]);
+    if (settings.shadows) {
+      for (int k = 0; k < count; ++k) {
+        const DirectBatch::Visibility known = known_round(edges[first + k]);
+        for (int ray = 0; ray < rays_a_point; ++ray) batch.take_as_known(k * rays_a_point + ray, known);
+      }
+      batch.cast_shadows(task_counts[task]);
+    }
+    for (int k = 0; k < count; ++k) {
+      const std::size_t point = edges[first + k];
+      const float* ambient = bounced.empty() ? nullptr : bounced.data() + point * bands;
+      float out[kMaxBands] = {};
+      for (int ray = 0; ray < rays_a_point; ++ray) batch.add(k * rays_a_point + ray, share.data(), ambient, out);
+      for (int band = 0; band < bands; ++band) radiance[band * points + point] = out[band];
+    }
+  });
+  count_up(task_counts, image);
 }
 
 void DirectRenderer::Parts::spread(DirectImage& image) const {
@@ -386,8 +560,12 @@ DirectImage DirectRenderer::render(const Scene& scene) {
 
   DirectImage image;
   image.irradiance = cv::Mat::zeros(parts.height(), parts.width(), CV_32FC(parts.rays.bands));
-  parts.cast({parts.fixture, tree, shadow_reach ? &*shadow_reach : nullptr, materials}, image);
-  if (parts.spreads) parts.spread(image);
+  const DirectFrame frame{parts.fixture, tree, shadow_reach ? &*shadow_reach : nullptr, materials};
+  parts.cast(frame, image);
+  if (parts.spreads) {
+    if (parts.refines) parts.refine(frame, image);
+    parts.spread(image);
+  }
   return image;
 }
 

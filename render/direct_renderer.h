@@ -23,6 +23,10 @@ struct DirectSettings {
       true;  ///< of hole or lens and of the pixel's area, with one sample; false: each ray as it is, one a pixel
   /// Where the blur is wide, rays are cast for squares of pixels, at least so many along the blur's diameter; 1 to 64.
   double rays_across_blur = 3.0;
+  /// Where there's one ray a pixel, `edge_side` x `edge_side` (1, 2 or 4) are cast instead in pixels that differ from
+  /// one beside them by more than `edge_contrast` of the picture's root mean square: rims, beads, borders of shadows.
+  int edge_side = 4;
+  double edge_contrast = 0.1;
 };
 
 /// `irradiance`: CV_32FC(bands), W/m^2 on the sensor, as RenderedImage::irradiance.
@@ -31,6 +35,7 @@ struct DirectImage {
   std::uint64_t primary = 0;        ///< camera rays traced
   std::uint64_t shadow_rays = 0;    ///< traced
   std::uint64_t shadow_spared = 0;  ///< lamp connections that nothing could stand in the way of
+  std::uint64_t edge_pixels = 0;    ///< that got more rays than one
 };
 
 /// Tier 1 of the renderers: what Scene::interreflection = false means, from a light field. For a static fixture (faces,

@@ -274,6 +274,35 @@ TEST(DirectRenderer, SpreadingCentralRaysIsTheHolesOwnBlur) {
   EXPECT_NEAR(cv::mean(spread)[0] / cv::mean(whole)[0], 1.0, 2e-3);
 }
 
+TEST(DirectRenderer, MoreRaysAtEdgesGiveThePixelsArea) {
+  Scene scene = dented_scene(0.0, Lambertian{grey(0.7)});
+  for (SpotLamp& lamp : scene.lamps) lamp.lens_radius = 0.0;  // else shadows have rims that one direction can't tell
+  scene.balls.push_back({{1.5, 0.5, -1.1}, 0.25, Lambertian{grey(0.1)}});
+  scene.balls.push_back({{-2.0, 1.0, -0.8}, 0.4, Black{}});
+  const LightField field = make_light_field(scene, reach_of_membrane(), accuracy(1e-3));
+  PinholeCamera camera = small_camera(96, 72);
+  camera.pixel_pitch_um *= 0.7;
+  camera.hole_diameter_um = 1e-3;
+  camera.foil_thickness_um = 0.0;
+  const auto picture = [&](int samples, int side) {
+    DirectSettings settings;
+    settings.samples = samples;
+    settings.edge_side = side;
+    return DirectRenderer(field, camera, scene, settings).render(scene);
+  };
+  const cv::Mat whole = picture(64, 1).irradiance;
+  const auto error = [&](const DirectImage& image) {
+    return cv::norm(image.irradiance, whole, cv::NORM_L2) / cv::norm(whole);
+  };
+  const DirectImage one = picture(1, 1);
+  const DirectImage many = picture(1, 4);
+  EXPECT_EQ(one.edge_pixels, 0u);
+  EXPECT_GT(many.edge_pixels, 100u);
+  EXPECT_LT(many.edge_pixels, 96u * 72u / 4u);
+  EXPECT_LT(error(many), 0.25 * error(one));
+  EXPECT_LT(error(picture(1, 2)), 0.6 * error(one));
+}
+
 TEST(DirectRenderer, BandsAreIndependent) {
   Scene scene = dented_scene(0.0, Lambertian{grey(0.7)});
   scene.media[2].absorption = grey(0.1);
@@ -362,6 +391,12 @@ TEST(DirectRenderer, RefusesOtherScenes) {
   bad.samples = 0;
   EXPECT_THROW(DirectRenderer(field, camera, scene, bad), Error);
   bad.samples = 1;
+  bad.edge_side = 3;
+  EXPECT_THROW(DirectRenderer(field, camera, scene, bad), Error);
+  bad.edge_side = 2;
+  bad.edge_contrast = -1.0;
+  EXPECT_THROW(DirectRenderer(field, camera, scene, bad), Error);
+  bad.edge_contrast = 0.1;
   for (double rays : {0.0, 65.0, std::numeric_limits<double>::quiet_NaN()}) {
     bad.rays_across_blur = rays;
     EXPECT_THROW(DirectRenderer(field, camera, scene, bad), Error);
