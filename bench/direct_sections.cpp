@@ -119,7 +119,8 @@ ResultTable hole_blur_table(const LightOptions& options) {
   render::DirectErrorSettings judge;
   judge.samples = options.quick ? 64 : 512;
   judge.pixels = options.quick ? 300 : 1200;
-  for (const auto& [width, height] : {std::pair{320, 240}, std::pair{640, 480}}) {
+  for (const int width : {320, 640}) {
+    const int height = width / 4 * 3;
     const Scene scene = bench_scene(50000, 8, 3, false);
     const Scene moved = bench_scene(50000, 8, 3, false, 0.05);
     const render::PinholeCamera camera = bench_camera(width, height);
