@@ -167,6 +167,7 @@ CameraFootprint make_footprint(const Scene& fixture, const ReadyCamera& camera, 
   for (const Spread& spread : spreads) narrowest = std::min(narrowest, 4.0 * std::sqrt(spread.variance.minCoeff()));
   CameraFootprint made;
   made.block = block;
+  made.narrowest = narrowest;
   while (made.spacing < 8 && block % (2 * made.spacing) == 0 && narrowest >= rays_across * 2 * made.spacing) {
     made.spacing *= 2;
   }
@@ -198,12 +199,21 @@ void CameraFootprint::spread(const float* picture, int row, int left, int count,
   const int phases = spacing * spacing;
   const Kernel& kernel =
       kernels[static_cast<std::size_t>(block_at(row, left)) * phases + row % spacing * spacing + left % spacing];
-  std::fill_n(out, count, 0.0f);
   const float* from =
       picture + static_cast<std::ptrdiff_t>(margin + row / spacing) * grid.columns + margin + left / spacing;
-  for (const Tap& tap : kernel.taps) {
-    const float* at = from + static_cast<std::ptrdiff_t>(tap.row) * grid.columns + tap.column;
-    for (int k = 0; k < count; ++k) out[k] += tap.weight * at[k];
+  const auto place = [&](const Tap& tap) {
+    return from + static_cast<std::ptrdiff_t>(tap.row) * grid.columns + tap.column;
+  };
+  using Eight = Eigen::Array<float, 8, 1>;  // sums that stay in registers
+  int k = 0;
+  for (; k + 8 <= count; k += 8) {
+    Eight sum = Eight::Zero();
+    for (const Tap& tap : kernel.taps) sum += tap.weight * Eigen::Map<const Eight>(place(tap) + k);
+    Eigen::Map<Eight>(out + k) = sum;
+  }
+  for (; k < count; ++k) {
+    out[k] = 0.0f;
+    for (const Tap& tap : kernel.taps) out[k] += tap.weight * place(tap)[k];
   }
 }
 

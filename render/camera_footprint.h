@@ -28,9 +28,10 @@ struct CameraFootprint {
   };
 
   ImageGrid grid;
-  int spacing = 1;  ///< pixels
-  int margin = 0;   ///< grid points beside the picture on each side
-  int block = 0;    ///< pixels, a multiple of spacing
+  int spacing = 1;         ///< pixels
+  double narrowest = 0.0;  ///< the hole's blur where it is least, a disc's diameter in pixels
+  int margin = 0;          ///< grid points beside the picture on each side
+  int block = 0;           ///< pixels, a multiple of spacing
   int blocks_across = 0;
   std::vector<Kernel> kernels;  ///< [block][phase row][phase column]
   std::vector<float> gain;      ///< [block]: mean irradiance per radiance over the hole, over that at its centre

@@ -24,6 +24,7 @@ namespace {
 
 constexpr int kTilesATask = 2 * DirectBatch::kMostPackets;
 constexpr int kBlocksAcross = 20;  // of the footprint
+constexpr double kSharp = 4.0;     // pixels: a wider blur takes the mean of a dozen rays anyway
 
 bool same(const Spectrum& a, const Spectrum& b) {
   return a.size() == b.size() && (a == b).all();
@@ -163,7 +164,7 @@ struct DirectRenderer::Parts {
     rays = trace_to_layer(field.fixture, camera, grid, field.layer, settings.samples, settings.seed);
     if (!spreads) return;
     radiance.resize(static_cast<std::size_t>(grid.columns) * grid.rows * rays.bands);
-    refines = footprint.spacing == 1 && settings.edge_side > 1;
+    refines = footprint.narrowest < kSharp && settings.edge_side > 1;
     if (refines && settings.shadows) seen.resize(static_cast<std::size_t>(grid.columns) * grid.rows);
     CameraRays pixels = trace_to_layer(field.fixture, camera, pixel_grid(camera), field.layer, 1, 0);
     keep_by_pixel(pixels, pixels.through, through);

@@ -19,12 +19,13 @@ struct DirectSettings {
   int samples = 1;
   std::uint64_t seed = 0;
   bool shadows = true;
-  bool blur =
-      true;  ///< of hole or lens and of the pixel's area, with one sample; false: each ray as it is, one a pixel
+  /// Of hole or lens and of the pixel's area, with one sample; false: each ray as it is, one a pixel.
+  bool blur = true;
   /// Where the blur is wide, rays are cast for squares of pixels, at least so many along the blur's diameter; 1 to 64.
   double rays_across_blur = 3.0;
-  /// Where there's one ray a pixel, `edge_side` x `edge_side` (1, 2 or 4) are cast instead in pixels that differ from
-  /// one beside them by more than `edge_contrast` of the picture's root mean square: rims, beads, borders of shadows.
+  /// Where the blur is narrower than 4 pixels, `edge_side` x `edge_side` (1, 2 or 4) rays are cast instead of one in
+  /// pixels that differ from one beside them by more than `edge_contrast` of the picture's root mean square: rims,
+  /// beads, borders of shadows.
   int edge_side = 4;
   double edge_contrast = 0.1;
 };
