@@ -4,6 +4,7 @@
 #include <functional>
 
 #include "apps/blas_kind.h"
+#include "bench/direct_sections.h"
 #include "bench/light_sections.h"
 #include "bench/machine.h"
 #include "core/error.h"
@@ -29,8 +30,8 @@ void measure(const std::filesystem::path& folder, bool quick, const std::string&
   for (const std::string& line : where) page += fmt::format("- {}\n", line);
   const bench::LightOptions options{quick, sim::default_cache_folder()};
   const std::vector<std::function<bench::ResultTable(const bench::LightOptions&)>> tables = {
-      bench::bare_rays_table, bench::light_error_table, bench::direct_frames_table, bench::light_growth_table,
-      bench::device_frames_table};
+      bench::bare_rays_table,       bench::light_error_table,  bench::direct_frames_table, bench::hole_blur_table,
+      bench::gelsight_frames_table, bench::light_growth_table, bench::device_frames_table};
   for (const auto& make : tables) {
     const bench::ResultTable table = make(options);
     write_files(table, where, folder);

@@ -257,14 +257,14 @@ ResultTable light_error_table(const LightOptions& options) {
           "{} x {} pixels, 50k triangles, 8 lamps, against {} samples of another seed of the same kind of light; "
           "the reference's own noise is in the figures. \"Mean\" is the whole picture's.",
           camera.width, camera.height, reference_samples),
-      "The direct renderer with one sample leaves out the hole's blur, which is part of its error here."};
+      "The direct renderer with one sample casts rays through the hole's middle and spreads the picture."};
   return table;
 }
 
 ResultTable direct_frames_table(const LightOptions& options) {
   ResultTable table;
   table.name = "light-frames";
-  table.title = "Pictures a second of direct light, one sample a pixel";
+  table.title = "Pictures a second of direct light";
   table.columns = {"pixels",       "lamps",       "shadows", "ms",           "frames/s",
                    "processor ms", "shadow rays", "spared",  "RMS error, %", "with a sharp hole, %"};
   double field_seconds = 0.0;

@@ -114,21 +114,67 @@ Followed follow(const Scene& scene, Eigen::Vector3d origin, Eigen::Vector3d dire
   return result;
 }
 
+const RigidTransform& place_of(const ReadyCamera& camera) {
+  return std::visit([](const auto& one) -> const RigidTransform& { return one.gel_from_camera; }, camera);
+}
+
+Eigen::Vector2i size_of(const ReadyCamera& camera) {
+  return std::visit([](const auto& one) { return Eigen::Vector2i(one.width, one.height); }, camera);
+}
+
+std::optional<CameraRay> ray_of(const ReadyCamera& camera, double x, double y, double u, double v) {
+  return std::visit([&](const auto& one) { return camera_ray(one, x, y, u, v); }, camera);
+}
+
+/// Of the picture's inside or, a little beside it, as far as light and the lens's distortion go.
+std::optional<CameraRay> ray_near(const ReadyCamera& camera, double x, double y, double u, double v) {
+  const Eigen::Vector2i size = size_of(camera);
+  const double inside_x = std::clamp(x, 0.0, double(size.x()));
+  const double inside_y = std::clamp(y, 0.0, double(size.y()));
+  const auto* lens = std::get_if<PreparedLens>(&camera);
+  const bool beside = x != inside_x || y != inside_y;
+  if (beside && lens != nullptr && !sees(*lens, x, y)) return ray_of(camera, inside_x, inside_y, u, v);
+  const std::optional<CameraRay> ray = ray_of(camera, x, y, u, v);
+  return ray || !beside ? ray : ray_of(camera, inside_x, inside_y, u, v);
+}
+
+double index_at(const Scene& fixture, const RigidTransform& place) {
+  return medium_of(fixture, layer_at(fixture, place.translation.z())).index;
+}
+
 }  // namespace
 
-CameraRays trace_to_layer(const Scene& fixture, const PinholeCamera& camera, int layer, int samples,
-                          std::uint64_t seed) {
+ImageGrid pixel_grid(const ReadyCamera& camera) {
+  const Eigen::Vector2i size = size_of(camera);
+  return {0.5, 0.5, 1.0, size.x(), size.y()};
+}
+
+std::optional<LayerRay> ray_in_layer(const Scene& fixture, const ReadyCamera& camera, int layer, double x, double y,
+                                     double u, double v) {
+  const std::optional<CameraRay> ray = ray_near(camera, x, y, u, v);
+  if (!ray) return std::nullopt;
+  const RigidTransform& place = place_of(camera);
+  const Followed end = follow(fixture, place * ray->origin, place.turn(ray->direction), layer);
+  if (!end.arrives) return std::nullopt;
+  const double index = index_at(fixture, place);
+  return LayerRay{end.origin, end.direction, end.far, ray->weight * index * index * end.transmittance.mean()};
+}
+
+CameraRays trace_to_layer(const Scene& fixture, const ReadyCamera& camera, const ImageGrid& grid, int layer,
+                          int samples, std::uint64_t seed) {
   CameraRays rays;
+  rays.grid = grid;
   rays.bands = static_cast<int>(fixture.environment.size());
-  rays.tiles_across = (camera.width + CameraRays::kSide - 1) / CameraRays::kSide;
-  rays.tiles = rays.tiles_across * ((camera.height + CameraRays::kSide - 1) / CameraRays::kSide);
+  rays.tiles_across = (grid.columns + CameraRays::kSide - 1) / CameraRays::kSide;
+  rays.tiles = rays.tiles_across * ((grid.rows + CameraRays::kSide - 1) / CameraRays::kSide);
   const auto packet_count = static_cast<std::size_t>(rays.tiles) * samples;
   const std::size_t bands = rays.bands;
   rays.packets.resize(packet_count);
   rays.through.assign(packet_count * kPacket * bands, 0.0f);
   const bool dark = (fixture.environment == 0.0).all();
   if (!dark) rays.veil.assign(packet_count * kPacket * bands, 0.0f);
-  const double camera_index = medium_of(fixture, layer_at(fixture, camera.gel_from_camera.translation.z())).index;
+  const RigidTransform& camera_place = place_of(camera);
+  const double camera_index = index_at(fixture, camera_place);
 
   tbb::parallel_for(0, rays.tiles, [&](int tile) {
     const int left = tile % rays.tiles_across * CameraRays::kSide;
@@ -145,16 +191,16 @@ CameraRays trace_to_layer(const Scene& fixture, const PinholeCamera& camera, int
         }
         const int column = left + lane % CameraRays::kSide;
         const int row = top + lane / CameraRays::kSide;
-        if (column >= camera.width || row >= camera.height) continue;
+        if (column >= grid.columns || row >= grid.rows) continue;
         const std::uint64_t pixel =
-            static_cast<std::uint64_t>(row) * static_cast<std::uint64_t>(camera.width) + std::uint64_t(column);
+            static_cast<std::uint64_t>(row) * static_cast<std::uint64_t>(grid.columns) + std::uint64_t(column);
         SampleSequence numbers = samples == 1 ? SampleSequence::centre() : SampleSequence(seed, pixel, sample);
         const auto [px, py] = numbers.next_pair();
         const auto [hu, hv] = numbers.next_pair();
-        const auto ray = pinhole_ray(camera, column + px, row + py, hu, hv);
+        const auto ray = ray_near(camera, grid.left + grid.spacing * column + (px - 0.5),
+                                  grid.top + grid.spacing * row + (py - 0.5), hu, hv);
         if (!ray) continue;
-        const Followed end =
-            follow(fixture, camera.gel_from_camera * ray->origin, camera.gel_from_camera.turn(ray->direction), layer);
+        const Followed end = follow(fixture, camera_place * ray->origin, camera_place.turn(ray->direction), layer);
         const double weight = ray->weight * camera_index * camera_index / samples;
         const std::size_t slot = (number * kPacket + lane) * bands;
         for (std::size_t band = 0; band < bands; ++band) {

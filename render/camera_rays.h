@@ -4,16 +4,26 @@
 #include <cstdint>
 #include <vector>
 
+#include "render/camera.h"
 #include "render/packet_scene.h"
-#include "render/pinhole_camera.h"
 
 namespace touchstone::render {
 
-/// Packets of 4 x 4 pixels, row by row of such tiles, one set after another for each sample. `far` is the way to the
-/// next face or a large number. What a lane's ray brings to its pixel per basic radiance at its end, and what it brings
-/// of the surroundings by mirroring, is kept by [packet][lane][band]; `veil` is empty where it would be zero.
+/// Image points (left + spacing i, top + spacing j), 0 <= i < columns, 0 <= j < rows, in pixels.
+struct ImageGrid {
+  double left = 0.5, top = 0.5, spacing = 1.0;
+  int columns = 0, rows = 0;
+};
+
+/// The middles of a camera's pixels.
+ImageGrid pixel_grid(const ReadyCamera& camera);
+
+/// Packets of 4 x 4 grid points, row by row of such tiles, one set after another for each sample. `far` is the way to
+/// the next face or a large number. What a lane's ray brings to the sensor per basic radiance at its end, and what it
+/// brings of the surroundings by mirroring, is kept by [packet][lane][band]; `veil` is empty where it would be zero.
 struct CameraRays {
   static constexpr int kSide = 4;
+  ImageGrid grid;
   int tiles_across = 0;
   int tiles = 0;
   int bands = 0;
@@ -22,10 +32,21 @@ struct CameraRays {
   std::vector<float> veil;         ///< W/m^2 on the sensor
 };
 
-/// `samples` 1 is the middle of each pixel and of the hole; more are SampleSequence's. Of the light that runs to and
-/// fro between the faces all that gets through is counted, as if it hit the same place.
-/// @pre check_scene(fixture), check_camera(camera)
-CameraRays trace_to_layer(const Scene& fixture, const PinholeCamera& camera, int layer, int samples,
-                          std::uint64_t seed);
+/// `samples` 1 is each grid point itself and the middle of hole or lens; more are SampleSequence's over the pixel whose
+/// middle the grid point is, and through and veil are then parts of the mean. Of the light that runs to and fro between
+/// the faces all that gets through is counted, as if it hit the same place. Grid points beside the picture from which
+/// no light comes take the nearest ray of the picture's edge.
+/// @pre check_scene(fixture)
+CameraRays trace_to_layer(const Scene& fixture, const ReadyCamera& camera, const ImageGrid& grid, int layer,
+                          int samples, std::uint64_t seed);
+
+/// Where a camera ray is in the layer: nullopt where it doesn't get there.
+struct LayerRay {
+  Eigen::Vector3d origin, direction;  ///< gel frame
+  double far = 0.0;                   ///< to the next face, mm, or a large number
+  double weight = 0.0;                ///< irradiance on the sensor per basic radiance, mean over the bands
+};
+std::optional<LayerRay> ray_in_layer(const Scene& fixture, const ReadyCamera& camera, int layer, double x, double y,
+                                     double u, double v);
 
 }  // namespace touchstone::render

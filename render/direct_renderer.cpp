@@ -3,14 +3,17 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
+#include <opencv2/core.hpp>
 #include <optional>
 #include <vector>
 
 #include "core/error.h"
+#include "render/camera_footprint.h"
 #include "render/camera_rays.h"
-#include "render/direct_packet.h"
+#include "render/direct_batch.h"
 #include "render/ggx.h"
 #include "render/packet_scene.h"
 #include "render/sample_sequence.h"
@@ -19,7 +22,9 @@
 namespace touchstone::render {
 namespace {
 
-constexpr int kTilesATask = 32;
+constexpr int kTilesATask = 2 * DirectBatch::kMostPackets;
+constexpr int kBlocksAcross = 20;  // of the footprint
+constexpr double kSharp = 4.0;     // pixels: a wider blur takes the mean of a dozen rays anyway
 
 bool same(const Spectrum& a, const Spectrum& b) {
   return a.size() == b.size() && (a == b).all();
@@ -74,19 +79,35 @@ void check_settings(const DirectSettings& settings) {
   if (settings.samples < 1 || settings.samples > 64) {
     fail("direct renderer: samples is {}; it must be from 1 to 64", settings.samples);
   }
+  if (settings.edge_side != 1 && settings.edge_side != 2 && settings.edge_side != 4) {
+    fail("direct renderer: edge_side is {}; it must be 1, 2 or 4", settings.edge_side);
+  }
+  if (!(settings.edge_contrast >= 0.0) || !std::isfinite(settings.edge_contrast)) {
+    fail("direct renderer: edge_contrast is {}; it must be 0 or more", settings.edge_contrast);
+  }
+  if (!(settings.rays_across_blur >= 1.0 && settings.rays_across_blur <= 64.0)) {
+    fail("direct renderer: rays_across_blur is {}; it must be from 1 to 64", settings.rays_across_blur);
+  }
 }
 
 }  // namespace
 
-std::string unfit_for_direct(const LightField& field, const Scene& scene) {
-  if (scene.interreflection) return "the scene asks for interreflection";
+namespace {
+
+/// All but interreflection.
+std::string misfit(const LightField& field, const Scene& scene) {
   if (!same_fixture(field.fixture, scene)) {
     return "the scene's media, faces, lamps or surroundings aren't those that the light field was made for";
+  }
+  for (std::size_t i = 0; i < scene.media.size(); ++i) {
+    const Spectrum& scattering = scene.media[i].scattering;
+    if (scattering.size() > 0 && (scattering > 0.0).any()) return fmt::format("medium {} scatters", i);
   }
   for (std::size_t i = 0; i < scene.surfaces.size(); ++i) {
     const std::string what = fmt::format("surface {}", i);
     const Surface& surface = scene.surfaces[i];
     if (!renders(surface.material)) return what + " is neither Lambertian, RoughConductor, Black nor Emitter";
+    if (surface.print) return what + " is printed on";
     Eigen::AlignedBox3d box;
     for (const auto& vertex : surface.mesh.vertices) box.extend(vertex);
     if (const std::string fault = out_of_place(field, box, surface.material, what); !fault.empty()) return fault;
@@ -101,22 +122,57 @@ std::string unfit_for_direct(const LightField& field, const Scene& scene) {
   return {};
 }
 
+}  // namespace
+
+std::string unfit_for_direct(const LightField& field, const Scene& scene) {
+  return scene.interreflection ? "the scene asks for interreflection" : misfit(field, scene);
+}
+
 struct DirectRenderer::Parts {
   DirectFixture fixture;
-  PinholeCamera camera;
+  ReadyCamera camera;
   DirectSettings settings;
-  CameraRays rays;
   PacketScene tree;
-  bool connected;                          // the first surface
-  std::map<double, GgxAlbedo> conductors;  // by roughness
+  bool connected;        // the first surface
+  bool spreads;          // central rays, then the footprint
+  bool refines = false;  // more rays at edges
+  CameraFootprint footprint;
+  CameraRays rays;
+  // By pixel and band, where central rays are spread; see CameraRays.
+  std::vector<float> through, veil;
+  std::vector<float> radiance;                // [band][grid point], room for a frame
+  std::vector<DirectBatch::Visibility> seen;  // by grid point, where edges get more rays
+  std::vector<float> bounced;                 // [grid point][band], irradiance; empty for none
+  std::map<double, GgxAlbedo> conductors;     // by roughness
 
-  Parts(const LightField& field, const PinholeCamera& camera_of, const Scene& rest, const DirectSettings& settings_of)
-      : fixture(field),
-        camera(camera_of),
+  Parts(const LightField& field, const Camera& camera_of, const Scene& rest, const DirectSettings& settings_of)
+      : fixture(field, settings_of.samples > 1),
+        camera(make_ready(camera_of)),
         settings(settings_of),
-        rays(trace_to_layer(field.fixture, camera, field.layer, settings.samples, settings.seed)),
         tree(rest),
-        connected(!rest.surfaces.empty() && is_connected(rest.surfaces[0].mesh)) {}
+        connected(!rest.surfaces.empty() && is_connected(rest.surfaces[0].mesh)),
+        spreads(settings.samples == 1 && settings.blur) {
+    ImageGrid grid = pixel_grid(camera);
+    if (spreads) {
+      find_footprint(rest);
+      grid = footprint.grid;
+    }
+    rays = trace_to_layer(field.fixture, camera, grid, field.layer, settings.samples, settings.seed);
+    if (!spreads) return;
+    radiance.resize(static_cast<std::size_t>(grid.columns) * grid.rows * rays.bands);
+    refines = footprint.narrowest < kSharp && settings.edge_side > 1;
+    if (refines && settings.shadows) seen.resize(static_cast<std::size_t>(grid.columns) * grid.rows);
+    CameraRays pixels = trace_to_layer(field.fixture, camera, pixel_grid(camera), field.layer, 1, 0);
+    keep_by_pixel(pixels, pixels.through, through);
+    if (!pixels.veil.empty()) keep_by_pixel(pixels, pixels.veil, veil);
+    rays.through.clear();
+    rays.through.shrink_to_fit();
+    rays.veil.clear();
+    rays.veil.shrink_to_fit();
+  }
+
+  int width() const { return size_of_grid(pixel_grid(camera)).x(); }
+  int height() const { return size_of_grid(pixel_grid(camera)).y(); }
 
   DirectMaterial prepare(const Material& material) {
     DirectMaterial made;
@@ -137,11 +193,316 @@ struct DirectRenderer::Parts {
     }
     return made;
   }
+
+  /// Casts the rays and shades what they meet: into `radiance`, or into the picture where nothing is spread.
+  void cast(const DirectFrame& frame, DirectImage& image);
+  /// Casts more rays where `radiance` has edges.
+  void refine(const DirectFrame& frame, DirectImage& image);
+  /// From `radiance` to the picture.
+  void spread(DirectImage& image) const;
+
+ private:
+  struct GridRay {
+    bool valid;
+    Eigen::Vector3f origin, direction;
+    float far;
+  };
+  GridRay grid_ray(int row, int column) const {
+    const RayPacket& packet = rays.packets[row / CameraRays::kSide * rays.tiles_across + column / CameraRays::kSide];
+    const int lane = row % CameraRays::kSide * CameraRays::kSide + column % CameraRays::kSide;
+    return {packet.valid[lane] != 0,
+            {packet.origin[0][lane], packet.origin[1][lane], packet.origin[2][lane]},
+            {packet.direction[0][lane], packet.direction[1][lane], packet.direction[2][lane]},
+            packet.far[lane]};
+  }
+  std::vector<int> edge_points() const;
+  DirectBatch::Visibility known_round(int point) const;
+  void put_edge_rays(int point, RayPacket& packet, int first_lane) const;
+
+  static Eigen::Vector2i size_of_grid(const ImageGrid& grid) { return {grid.columns, grid.rows}; }
+
+  /// The footprint on what the scene shows at rest, by block; in the middle of the field's box where it shows nothing.
+  void find_footprint(const Scene& rest) {
+    const LightField& field = fixture.field;
+    const int block = std::max(8, 8 * ((width() + 4 * kBlocksAcross) / (8 * kBlocksAcross)));
+    const std::vector<Eigen::Vector2d> middles = footprint_blocks(camera, block);
+    std::vector<double> surface_z;
+    for (const Eigen::Vector2d& middle : middles) {
+      surface_z.push_back(field.reach.center().z());
+      const auto ray = ray_in_layer(field.fixture, camera, field.layer, middle.x(), middle.y(), 0.5, 0.5);
+      if (!ray) continue;
+      RayPacket packet{};
+      for (int lane = 0; lane < kPacket; ++lane) packet.direction[2][lane] = 1.0f;
+      for (int a = 0; a < 3; ++a) {
+        packet.origin[a][0] = static_cast<float>(ray->origin[a]);
+        packet.direction[a][0] = static_cast<float>(ray->direction[a]);
+      }
+      packet.far[0] = static_cast<float>(ray->far);
+      packet.valid[0] = -1;
+      PacketHits hits;
+      tree.intersect(packet, hits);
+      if (hits.object[0] < 0 || hits.object[0] >= static_cast<int>(rest.surfaces.size())) continue;
+      surface_z.back() = ray->origin.z() + double(hits.distance[0]) * ray->direction.z();
+    }
+    footprint = make_footprint(field.fixture, camera, field.layer, surface_z, block, settings.rays_across_blur);
+  }
+
+  void keep_by_pixel(const CameraRays& pixels, const std::vector<float>& from, std::vector<float>& to) const {
+    const std::size_t bands = pixels.bands;
+    to.resize(static_cast<std::size_t>(width()) * height() * bands);
+    for (int row = 0; row < height(); ++row) {
+      for (int column = 0; column < width(); ++column) {
+        const std::size_t tile =
+            static_cast<std::size_t>(row / CameraRays::kSide) * pixels.tiles_across + column / CameraRays::kSide;
+        const std::size_t lane = row % CameraRays::kSide * CameraRays::kSide + column % CameraRays::kSide;
+        const float gain = footprint.gain[footprint.block_at(row, column)];
+        for (std::size_t band = 0; band < bands; ++band) {
+          to[(static_cast<std::size_t>(row) * width() + column) * bands + band] =
+              gain * from[(tile * kPacket + lane) * bands + band];
+        }
+      }
+    }
+  }
 };
 
-DirectRenderer::DirectRenderer(const LightField& field, const PinholeCamera& camera, const Scene& rest,
+namespace {
+
+void count_up(const std::vector<DirectCounts>& task_counts, DirectImage& image) {
+  for (const DirectCounts& counts : task_counts) {
+    image.primary += counts.primary;
+    image.shadow_rays += counts.shadow_rays;
+    image.shadow_spared += counts.spared;
+  }
+}
+
+}  // namespace
+
+void DirectRenderer::Parts::cast(const DirectFrame& frame, DirectImage& image) {
+  const int bands = rays.bands;
+  const int samples = settings.samples;
+  const int columns = rays.grid.columns;
+  const int tasks = (rays.tiles + kTilesATask - 1) / kTilesATask;
+  const std::size_t points = static_cast<std::size_t>(columns) * rays.grid.rows;
+  const std::array<float, kMaxBands> whole = [] {
+    std::array<float, kMaxBands> ones;
+    ones.fill(1.0f);
+    return ones;
+  }();
+  std::vector<DirectCounts> task_counts(tasks);
+  tbb::parallel_for(0, tasks, [&](int task) {
+    DirectBatch batch(frame);
+    DirectCounts& counts = task_counts[task];
+    const int task_end = std::min(rays.tiles, (task + 1) * kTilesATask);
+    for (int first = task * kTilesATask; first < task_end; first += DirectBatch::kMostPackets) {
+      const int packets = std::min(DirectBatch::kMostPackets, task_end - first);
+      for (int sample = 0; sample < samples; ++sample) {
+        const std::size_t number = static_cast<std::size_t>(sample) * rays.tiles + first;
+        batch.look({rays.packets.data() + number, static_cast<std::size_t>(packets)}, counts);
+        const auto for_lanes = [&](auto&& work) {  // work(lane, row, column) of those on the grid
+          for (int lane = 0; lane < packets * kPacket; ++lane) {
+            const int tile = first + lane / kPacket;
+            const int row = tile / rays.tiles_across * CameraRays::kSide + lane % kPacket / CameraRays::kSide;
+            const int column = tile % rays.tiles_across * CameraRays::kSide + lane % CameraRays::kSide;
+            if (column < columns && row < rays.grid.rows) work(lane, row, column);
+          }
+        };
+        if (settings.shadows && samples > 1) {
+          for_lanes([&](int lane, int row, int column) {
+            SampleSequence numbers(settings.seed,
+                                   static_cast<std::uint64_t>(row) * std::uint64_t(columns) + std::uint64_t(column),
+                                   static_cast<std::uint32_t>(sample));
+            for (int drawn = 0; drawn < 3; ++drawn) numbers.next_pair();  // as a path's: pixel, hole, lamp
+            const auto [u, v] = numbers.next_pair();
+            batch.choose_lens_points(lane, u, v);
+          });
+        }
+        if (settings.shadows) batch.cast_shadows(counts);
+        for_lanes([&](int lane, int row, int column) {
+          const std::size_t point = static_cast<std::size_t>(row) * columns + column;
+          const float* ambient = bounced.empty() ? nullptr : bounced.data() + point * bands;
+          if (spreads) {
+            float out[kMaxBands] = {};
+            batch.add(lane, whole.data(), ambient, out);
+            for (int band = 0; band < bands; ++band) radiance[band * points + point] = out[band];
+            if (!seen.empty()) seen[point] = batch.visibility(lane);
+            return;
+          }
+          float* out = image.irradiance.ptr<float>(row) + bands * column;
+          const std::size_t slot = (number * kPacket + lane) * bands;
+          if (!rays.veil.empty()) {
+            for (int band = 0; band < bands; ++band) out[band] += rays.veil[slot + band];
+          }
+          batch.add(lane, rays.through.data() + slot, ambient, out);
+        });
+      }
+    }
+  });
+  count_up(task_counts, image);
+}
+
+/// Grid points that differ from the next one, in order.
+std::vector<int> DirectRenderer::Parts::edge_points() const {
+  const int columns = rays.grid.columns;
+  const int rows = rays.grid.rows;
+  const std::size_t points = static_cast<std::size_t>(columns) * rows;
+  std::vector<double> squares(rows);
+  tbb::parallel_for(0, rows, [&](int row) {
+    for (int band = 0; band < rays.bands; ++band) {
+      const float* at = radiance.data() + band * points + static_cast<std::size_t>(row) * columns;
+      for (int k = 0; k < columns; ++k) squares[row] += double(at[k]) * double(at[k]);
+    }
+  });
+  double square = 0.0;
+  for (double one : squares) square += one;
+  const auto limit = static_cast<float>(settings.edge_contrast * settings.edge_contrast * square / double(points));
+  const auto differ = [&](std::size_t one, std::size_t other) {
+    float sum = 0.0f;
+    for (int band = 0; band < rays.bands; ++band) {
+      const float difference = radiance[band * points + one] - radiance[band * points + other];
+      sum += difference * difference;
+    }
+    return sum > limit;
+  };
+  std::vector<std::vector<int>> by_row(rows);
+  tbb::parallel_for(0, rows, [&](int row) {
+    for (int column = 0; column < columns; ++column) {
+      const std::size_t point = static_cast<std::size_t>(row) * columns + column;
+      if ((column > 0 && differ(point, point - 1)) || (column + 1 < columns && differ(point, point + 1)) ||
+          (row > 0 && differ(point, point - columns)) || (row + 1 < rows && differ(point, point + columns))) {
+        by_row[row].push_back(static_cast<int>(point));
+      }
+    }
+  });
+  std::vector<int> all;
+  for (const auto& one : by_row) all.insert(all.end(), one.begin(), one.end());
+  return all;
+}
+
+/// A lamp that is seen, or hidden, from a point and all eight next ones is taken to be so from all between them.
+DirectBatch::Visibility DirectRenderer::Parts::known_round(int point) const {
+  const int columns = rays.grid.columns;
+  const int row = point / columns;
+  const int column = point % columns;
+  DirectBatch::Visibility known{~std::uint64_t{0}, ~std::uint64_t{0}};
+  for (int j = std::max(row - 1, 0); j <= std::min(row + 1, rays.grid.rows - 1); ++j) {
+    for (int i = std::max(column - 1, 0); i <= std::min(column + 1, columns - 1); ++i) {
+      const DirectBatch::Visibility& one = seen[static_cast<std::size_t>(j) * columns + i];
+      known.open &= one.open;
+      known.hidden &= one.hidden;
+    }
+  }
+  return known;
+}
+
+/// Rays through a grid point's square: what a central ray is in the layer changes so smoothly over the picture that
+/// the next grid points' rays tell it.
+void DirectRenderer::Parts::put_edge_rays(int point, RayPacket& packet, int first_lane) const {
+  const int column = point % rays.grid.columns;
+  const int row = point / rays.grid.columns;
+  const GridRay here = grid_ray(row, column);
+  const auto slope = [&](int rows_on, int columns_on) {
+    Eigen::Matrix<float, 3, 2> change = Eigen::Matrix<float, 3, 2>::Zero();
+    const int row_to = std::min(row + rows_on, rays.grid.rows - 1);
+    const int column_to = std::min(column + columns_on, rays.grid.columns - 1);
+    const int row_from = std::max(row - rows_on, 0);
+    const int column_from = std::max(column - columns_on, 0);
+    const GridRay to = grid_ray(row_to, column_to);
+    const GridRay from = grid_ray(row_from, column_from);
+    const int steps = row_to - row_from + column_to - column_from;
+    if (to.valid && from.valid && steps > 0) {
+      change << (to.origin - from.origin) / static_cast<float>(steps),
+          (to.direction - from.direction) / static_cast<float>(steps);
+    }
+    return change;
+  };
+  const Eigen::Matrix<float, 3, 2> across = slope(0, 1);
+  const Eigen::Matrix<float, 3, 2> down = slope(1, 0);
+  const int side = settings.edge_side;
+  for (int k = 0; k < side * side; ++k) {
+    const float x = (static_cast<float>(k % side) + 0.5f) / static_cast<float>(side) - 0.5f;
+    const float y = (static_cast<float>(k / side) + 0.5f) / static_cast<float>(side) - 0.5f;
+    const Eigen::Vector3f origin = here.origin + x * across.col(0) + y * down.col(0);
+    const Eigen::Vector3f direction = (here.direction + x * across.col(1) + y * down.col(1)).normalized();
+    const int lane = first_lane + k;
+    for (int a = 0; a < 3; ++a) {
+      packet.origin[a][lane] = origin[a];
+      packet.direction[a][lane] = direction[a];
+    }
+    packet.far[lane] = here.far;
+    packet.valid[lane] = here.valid ? -1 : 0;
+  }
+}
+
+void DirectRenderer::Parts::refine(const DirectFrame& frame, DirectImage& image) {
+  const std::vector<int> edges = edge_points();
+  image.edge_pixels = edges.size();
+  const int bands = rays.bands;
+  const std::size_t points = static_cast<std::size_t>(rays.grid.columns) * rays.grid.rows;
+  const int rays_a_point = settings.edge_side * settings.edge_side;
+  const int points_a_packet = kPacket / rays_a_point;
+  const int points_a_task = DirectBatch::kMostPackets * points_a_packet;
+  const auto tasks = static_cast<int>((edges.size() + points_a_task - 1) / points_a_task);
+  std::array<float, kMaxBands> share;
+  share.fill(1.0f / static_cast<float>(rays_a_point));
+  std::vector<DirectCounts> task_counts(tasks);
+  tbb::parallel_for(0, tasks, [&](int task) {
+    const int first = task * points_a_task;
+    const int count = std::min(points_a_task, static_cast<int>(edges.size()) - first);
+    std::vector<RayPacket> packets((count + points_a_packet - 1) / points_a_packet);
+    for (RayPacket& packet : packets) {
+      packet = RayPacket{};
+      std::fill_n(packet.direction[2], kPacket, 1.0f);
+    }
+    for (int k = 0; k < count; ++k) {
+      put_edge_rays(edges[first + k], packets[k / points_a_packet], k % points_a_packet * rays_a_point);
+    }
+    DirectBatch batch(frame);
+    batch.look(packets, task_counts[task]);
+    if (settings.shadows) {
+      for (int k = 0; k < count; ++k) {
+        const DirectBatch::Visibility known = known_round(edges[first + k]);
+        for (int ray = 0; ray < rays_a_point; ++ray) batch.take_as_known(k * rays_a_point + ray, known);
+      }
+      batch.cast_shadows(task_counts[task]);
+    }
+    for (int k = 0; k < count; ++k) {
+      const std::size_t point = edges[first + k];
+      const float* ambient = bounced.empty() ? nullptr : bounced.data() + point * bands;
+      float out[kMaxBands] = {};
+      for (int ray = 0; ray < rays_a_point; ++ray) batch.add(k * rays_a_point + ray, share.data(), ambient, out);
+      for (int band = 0; band < bands; ++band) radiance[band * points + point] = out[band];
+    }
+  });
+  count_up(task_counts, image);
+}
+
+void DirectRenderer::Parts::spread(DirectImage& image) const {
+  const int bands = rays.bands;
+  const int side = footprint.spacing;
+  const std::size_t points = static_cast<std::size_t>(rays.grid.columns) * rays.grid.rows;
+  const int columns = width();
+  tbb::parallel_for(0, height(), [&](int row) {
+    std::vector<float> line(footprint.block);
+    float* out = image.irradiance.ptr<float>(row);
+    const std::size_t first = static_cast<std::size_t>(row) * columns;
+    for (int left = 0; left < columns; left += footprint.block) {
+      const int right = std::min(columns, left + footprint.block);
+      for (int phase = left; phase < std::min(left + side, right); ++phase) {
+        const int count = (right - phase + side - 1) / side;
+        for (int band = 0; band < bands; ++band) {
+          footprint.spread(radiance.data() + band * points, row, phase, count, line.data());
+          for (int k = 0; k < count; ++k) {
+            const std::size_t slot = (first + phase + static_cast<std::size_t>(k) * side) * bands + band;
+            out[slot - first * bands] = through[slot] * line[k] + (veil.empty() ? 0.0f : veil[slot]);
+          }
+        }
+      }
+    }
+  });
+}
+
+DirectRenderer::DirectRenderer(const LightField& field, const Camera& camera, const Scene& rest,
                                const DirectSettings& settings) {
-  check_camera(camera);
   check_settings(settings);
   check_scene(rest);
   if (field.lamp_count() > kMostDirectLamps) {
@@ -154,11 +515,33 @@ DirectRenderer::DirectRenderer(const LightField& field, const PinholeCamera& cam
 DirectRenderer::~DirectRenderer() = default;
 DirectRenderer::DirectRenderer(DirectRenderer&&) noexcept = default;
 
+void DirectRenderer::set_bounced_light(const cv::Mat& irradiance) {
+  Parts& parts = *parts_;
+  const int bands = parts.rays.bands;
+  parts.bounced.clear();
+  if (irradiance.empty()) return;
+  if (irradiance.type() != CV_32FC(bands) || irradiance.cols != parts.width() || irradiance.rows != parts.height()) {
+    fail("direct renderer: bounced light has {} x {} pixels of {} channels; {} x {} of {} are needed (32-bit floats)",
+         irradiance.cols, irradiance.rows, irradiance.channels(), parts.width(), parts.height(), bands);
+  }
+  if (!cv::checkRange(irradiance)) fail("direct renderer: bounced light isn't finite everywhere");
+  const ImageGrid& grid = parts.rays.grid;
+  for (int row = 0; row < grid.rows; ++row) {
+    const int y = std::clamp(static_cast<int>(std::floor(grid.top + grid.spacing * row)), 0, parts.height() - 1);
+    for (int column = 0; column < grid.columns; ++column) {
+      const int x = std::clamp(static_cast<int>(std::floor(grid.left + grid.spacing * column)), 0, parts.width() - 1);
+      const float* from = irradiance.ptr<float>(y) + bands * x;
+      parts.bounced.insert(parts.bounced.end(), from, from + bands);
+    }
+  }
+}
+
 DirectImage DirectRenderer::render(const Scene& scene) {
   Parts& parts = *parts_;
   const LightField& field = parts.fixture.field;
   check_scene(scene);
-  if (const std::string fault = unfit_for_direct(field, scene); !fault.empty()) fail("direct renderer: {}", fault);
+  const std::string fault = parts.bounced.empty() ? unfit_for_direct(field, scene) : misfit(field, scene);
+  if (!fault.empty()) fail("direct renderer: {}", fault);
   std::optional<PacketScene> other;
   if (!parts.tree.move_to(scene)) other.emplace(scene);
   const PacketScene& tree = other ? *other : parts.tree;
@@ -166,56 +549,19 @@ DirectImage DirectRenderer::render(const Scene& scene) {
   std::vector<DirectMaterial> materials;
   for (const Surface& surface : scene.surfaces) materials.push_back(parts.prepare(surface.material));
   for (const Ball& ball : scene.balls) materials.push_back(parts.prepare(ball.material));
-  const ShadowReach shadow_reach(
-      scene, other ? !scene.surfaces.empty() && is_connected(scene.surfaces[0].mesh) : parts.connected);
+  std::optional<ShadowReach> shadow_reach;
+  if (parts.settings.shadows) {
+    shadow_reach.emplace(parts.fixture.bearings, scene,
+                         other ? !scene.surfaces.empty() && is_connected(scene.surfaces[0].mesh) : parts.connected);
+  }
 
-  const DirectFrame frame{parts.fixture, tree, shadow_reach, materials};
-  const int bands = parts.rays.bands;
-  const int samples = parts.settings.samples;
   DirectImage image;
-  image.irradiance = cv::Mat::zeros(parts.camera.height, parts.camera.width, CV_32FC(bands));
-  const int tiles = parts.rays.tiles;
-  const int tasks = (tiles + kTilesATask - 1) / kTilesATask;
-  std::vector<DirectCounts> task_counts(tasks);
-  tbb::parallel_for(0, tasks, [&](int task) {
-    DirectPacket packet(frame);
-    DirectCounts& counts = task_counts[task];
-    for (int tile = task * kTilesATask; tile < std::min(tiles, (task + 1) * kTilesATask); ++tile) {
-      const int left = tile % parts.rays.tiles_across * CameraRays::kSide;
-      const int top = tile / parts.rays.tiles_across * CameraRays::kSide;
-      for (int sample = 0; sample < samples; ++sample) {
-        const std::size_t number = static_cast<std::size_t>(sample) * tiles + tile;
-        packet.look(parts.rays.packets[number], counts);
-        for (int lane = 0; lane < kPacket && samples > 1 && parts.settings.shadows; ++lane) {
-          const int row = top + lane / CameraRays::kSide;
-          const int column = left + lane % CameraRays::kSide;
-          SampleSequence numbers(
-              parts.settings.seed,
-              static_cast<std::uint64_t>(row) * std::uint64_t(parts.camera.width) + std::uint64_t(column),
-              static_cast<std::uint32_t>(sample));
-          for (int drawn = 0; drawn < 3; ++drawn) numbers.next_pair();  // as a path's: pixel, hole, lamp
-          const auto [u, v] = numbers.next_pair();
-          packet.choose_lens_points(lane, u, v);
-        }
-        if (parts.settings.shadows) packet.cast_shadows(counts);
-        for (int lane = 0; lane < kPacket; ++lane) {
-          const int row = top + lane / CameraRays::kSide;
-          const int column = left + lane % CameraRays::kSide;
-          if (column >= parts.camera.width || row >= parts.camera.height) continue;
-          float* out = image.irradiance.ptr<float>(row) + bands * column;
-          const std::size_t slot = (number * kPacket + lane) * bands;
-          if (!parts.rays.veil.empty()) {
-            for (int band = 0; band < bands; ++band) out[band] += parts.rays.veil[slot + band];
-          }
-          packet.add(lane, parts.rays.through.data() + slot, out);
-        }
-      }
-    }
-  });
-  for (const DirectCounts& counts : task_counts) {
-    image.primary += counts.primary;
-    image.shadow_rays += counts.shadow_rays;
-    image.shadow_spared += counts.spared;
+  image.irradiance = cv::Mat::zeros(parts.height(), parts.width(), CV_32FC(parts.rays.bands));
+  const DirectFrame frame{parts.fixture, tree, shadow_reach ? &*shadow_reach : nullptr, materials};
+  parts.cast(frame, image);
+  if (parts.spreads) {
+    if (parts.refines) parts.refine(frame, image);
+    parts.spread(image);
   }
   return image;
 }

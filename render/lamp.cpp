@@ -238,6 +238,16 @@ double emission_integral(const Lamp& lamp) {
   return std::visit([](const auto& one) { return integral(one); }, lamp);
 }
 
+const Eigen::Vector3d& lamp_direction(const Lamp& lamp) {
+  return std::visit([](const auto& one) -> const Eigen::Vector3d& { return one.direction; }, lamp);
+}
+
+double disc_radius(const Lamp& lamp) {
+  if (const auto* spot = std::get_if<SpotLamp>(&lamp)) return spot->lens_radius;
+  if (const auto* led = std::get_if<LedLamp>(&lamp)) return led->radius;
+  return 0.0;
+}
+
 const Eigen::Vector3d& lamp_position(const Lamp& lamp) {
   if (const auto* area = std::get_if<AreaLamp>(&lamp)) return area->centre;
   if (const auto* guide = std::get_if<GuideLamp>(&lamp)) return guide->centre;

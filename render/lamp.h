@@ -139,6 +139,10 @@ const Spectrum& lamp_power(const Lamp& lamp);
 /// How far it reaches from its middle; 0 for a point, and for a guide, whose end stands inside its plate.
 double lamp_extent(const Lamp& lamp);
 
+/// Where it faces (not always a unit vector), and the radius of the disc that a round lamp is; 0 of other kinds.
+const Eigen::Vector3d& lamp_direction(const Lamp& lamp);
+double disc_radius(const Lamp& lamp);
+
 /// Has it a body that rays can meet?
 bool is_visible(const Lamp& lamp);
 

@@ -163,6 +163,10 @@ CameraRay lens_ray(const PreparedLens& camera, double x, double y, double u, dou
   return ray;
 }
 
+bool sees(const PreparedLens& camera, double x, double y) {
+  return undistort(camera.distortion, camera.reach, tangents_of(camera.matrix, x, y)).has_value();
+}
+
 Eigen::Vector2d project(const LensCamera& camera, const Eigen::Vector3d& point_in_camera) {
   TS_ASSERT(point_in_camera.z() > 0.0);
   return pixel_of(camera.matrix, distort(camera.distortion, point_in_camera.head<2>() / point_in_camera.z()));

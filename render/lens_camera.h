@@ -72,6 +72,10 @@ PreparedLens prepare(const LensCamera& camera);
 /// @throws Error if the distortion can't be inverted there
 CameraRay lens_ray(const PreparedLens& camera, double x, double y, double u, double v);
 
+/// Can the distortion be inverted at this image point? Everywhere in a checked camera's picture, and beside it to some
+/// way.
+bool sees(const PreparedLens& camera, double x, double y);
+
 /// Where a point of the camera frame in front of the lens appears (pixels of core/transform.h), seen through the lens's
 /// centre in air: cv::projectPoints plus half a pixel.
 Eigen::Vector2d project(const LensCamera& camera, const Eigen::Vector3d& point_in_camera);

@@ -150,7 +150,9 @@ TEST(DirectRenderer, PointSourceOverAMattPlane) {
   const LightField field =
       make_light_field(scene, {Eigen::Vector3d(-9, -9, -0.2), Eigen::Vector3d(9, 9, 0.2)}, accuracy(5e-4));
   const PinholeCamera camera = small_camera(30, 22);
-  DirectRenderer renderer(field, camera, scene);
+  DirectSettings sharp;
+  sharp.blur = false;
+  DirectRenderer renderer(field, camera, scene, sharp);
   const DirectImage image = renderer.render(scene);
   for (int row = 0; row < camera.height; ++row) {
     for (int column = 0; column < camera.width; ++column) {
@@ -176,7 +178,9 @@ TEST(DirectRenderer, ABallsShadowHasItsOutline) {
   const LightField field =
       make_light_field(scene, {Eigen::Vector3d(-9, -9, -0.2), Eigen::Vector3d(9, 9, 0.2)}, accuracy(2e-3));
   const PinholeCamera camera = small_camera(160, 120);
-  DirectRenderer renderer(field, camera, scene);
+  DirectSettings sharp;
+  sharp.blur = false;
+  DirectRenderer renderer(field, camera, scene, sharp);
   const DirectImage image = renderer.render(scene);
   int dark = 0;
   const Ball& ball = scene.balls.front();
@@ -276,6 +280,57 @@ TEST(DirectRenderer, AgreesWithThePathTracerUnderLedAndAreaLamps) {
   EXPECT_THROW(make_light_field(scene, reach_of_membrane(), accuracy(5e-3)), Error);
 }
 
+TEST(DirectRenderer, SpreadingCentralRaysIsTheHolesOwnBlur) {
+  Scene scene = dented_scene(1.0, Lambertian{grey(0.7)});
+  scene.balls.push_back({{1.5, 0.5, -1.1}, 0.25, Lambertian{grey(0.3)}});
+  const LightField field = make_light_field(scene, reach_of_membrane(), accuracy(1e-3));
+  PinholeCamera camera = small_camera(96, 72);
+  camera.pixel_pitch_um *= 0.7;  // the picture's edge sees the membrane, too
+  const auto picture = [&](int samples, bool blur) {
+    DirectSettings settings;
+    settings.samples = samples;
+    settings.blur = blur;
+    settings.rays_across_blur = 4.0;
+    return DirectRenderer(field, camera, scene, settings).render(scene).irradiance;
+  };
+  const cv::Mat whole = picture(64, true);
+  const auto error = [&](const cv::Mat& image) { return cv::norm(image, whole, cv::NORM_L2) / cv::norm(whole); };
+  const cv::Mat spread = picture(1, true);
+  EXPECT_LT(error(spread), 0.008);  // most of it the 64 samples' own noise
+  EXPECT_GT(error(picture(1, false)), 5.0 * error(spread));
+  EXPECT_NEAR(cv::mean(spread)[0] / cv::mean(whole)[0], 1.0, 2e-3);
+}
+
+TEST(DirectRenderer, MoreRaysAtEdgesGiveThePixelsArea) {
+  Scene scene = dented_scene(0.0, Lambertian{grey(0.7)});
+  for (Lamp& lamp : scene.lamps)
+    std::get<SpotLamp>(lamp).lens_radius = 0.0;  // else shadows have rims that one direction can't tell
+  scene.balls.push_back({{1.5, 0.5, -1.1}, 0.25, Lambertian{grey(0.1)}});
+  scene.balls.push_back({{-2.0, 1.0, -0.8}, 0.4, Black{}});
+  const LightField field = make_light_field(scene, reach_of_membrane(), accuracy(1e-3));
+  PinholeCamera camera = small_camera(96, 72);
+  camera.pixel_pitch_um *= 0.7;
+  camera.hole_diameter_um = 1e-3;
+  camera.foil_thickness_um = 0.0;
+  const auto picture = [&](int samples, int side) {
+    DirectSettings settings;
+    settings.samples = samples;
+    settings.edge_side = side;
+    return DirectRenderer(field, camera, scene, settings).render(scene);
+  };
+  const cv::Mat whole = picture(64, 1).irradiance;
+  const auto error = [&](const DirectImage& image) {
+    return cv::norm(image.irradiance, whole, cv::NORM_L2) / cv::norm(whole);
+  };
+  const DirectImage one = picture(1, 1);
+  const DirectImage many = picture(1, 4);
+  EXPECT_EQ(one.edge_pixels, 0u);
+  EXPECT_GT(many.edge_pixels, 100u);
+  EXPECT_LT(many.edge_pixels, 96u * 72u / 4u);
+  EXPECT_LT(error(many), 0.25 * error(one));
+  EXPECT_LT(error(picture(1, 2)), 0.6 * error(one));
+}
+
 TEST(DirectRenderer, BandsAreIndependent) {
   Scene scene = dented_scene(0.0, Lambertian{grey(0.7)});
   scene.media[2].absorption = grey(0.1);
@@ -351,6 +406,12 @@ TEST(DirectRenderer, RefusesOtherScenes) {
   refuses([](Scene& s) { std::get<SpotLamp>(s.lamps[0]).power_W = grey(0.6); });
   refuses([](Scene& s) { s.media[2].index = 1.5; });
   refuses([](Scene& s) { s.surfaces[0].material = Refractive{2, 0}; });
+  refuses([](Scene& s) { s.media[2].scattering = grey(0.1); });
+  refuses([](Scene& s) {
+    Print print;
+    for (const auto& vertex : s.surfaces[0].mesh.vertices) print.material_mm.push_back(vertex.head<2>());
+    s.surfaces[0].print = print;
+  });
   refuses([](Scene& s) { s.surfaces[0].mesh.vertices[0].z() = -6.0; });  // in the glass
   refuses([](Scene& s) { s.surfaces[0].mesh.vertices[0].x() = -8.0; });  // beside the box
   refuses([](Scene& s) { s.surfaces[0].mesh.vertices[0].x() = std::nan(""); });
@@ -358,60 +419,104 @@ TEST(DirectRenderer, RefusesOtherScenes) {
   DirectSettings bad;
   bad.samples = 0;
   EXPECT_THROW(DirectRenderer(field, camera, scene, bad), Error);
+  bad.samples = 1;
+  bad.edge_side = 3;
+  EXPECT_THROW(DirectRenderer(field, camera, scene, bad), Error);
+  bad.edge_side = 2;
+  bad.edge_contrast = -1.0;
+  EXPECT_THROW(DirectRenderer(field, camera, scene, bad), Error);
+  bad.edge_contrast = 0.1;
+  for (double rays : {0.0, 65.0, std::numeric_limits<double>::quiet_NaN()}) {
+    bad.rays_across_blur = rays;
+    EXPECT_THROW(DirectRenderer(field, camera, scene, bad), Error);
+  }
   PinholeCamera blind = camera;
   blind.distance_mm = 0.0;
   EXPECT_THROW(DirectRenderer(field, blind, scene), Error);
 }
 
-TEST(ShadowReach, NeverCutsARayThatMeetsSomething) {
-  Scene scene = empty_scene(0.0);
-  scene.surfaces.push_back({sheet(7.0, 60, dent), Lambertian{grey(0.5)}});
-  scene.surfaces.push_back({square_sheet(0.5, -1.2), Black{}});
-  scene.balls.push_back({{-3, 2, -0.9}, 0.4, Black{}});
-  const ShadowReach reach(scene, is_connected(scene.surfaces[0].mesh));
+/// Rays from places on a sheet to the lamps, against what the map says of them.
+struct ReachTally {
+  int hidden = 0;  // rays that meet something
+  int missed = 0;  // of them, those that the map would have spared
+  int spared = 0;
+};
+
+ReachTally tally(const Scene& scene, bool soft) {
+  const LightField field = make_light_field(scene, reach_of_membrane(), accuracy(2e-3));
+  const LampBearings bearings(field, soft);
+  const ShadowReach reach(bearings, scene, is_connected(scene.surfaces[0].mesh));
   const RayScene rays(scene);
   std::mt19937 random(5);
   std::uniform_real_distribution<double> unit(-1.0, 1.0);
-  int met = 0;
-  int spared = 0;
-  int by_look = 0;
-  for (int k = 0; k < 40000; ++k) {
+  ReachTally result;
+  for (int k = 0; k < 20000; ++k) {
     // From a place on the sheet, to its lower side.
     RayHit start;
-    if (!rays.intersect({6.9 * unit(random), 6.9 * unit(random), 3.0}, {0, 0, -1}, 10.0, start)) continue;
+    if (!rays.intersect({6.99 * unit(random), 6.99 * unit(random), 3.0}, {0, 0, -1}, 10.0, start)) continue;
     if (start.object != 0) continue;
-    const Eigen::Vector3d direction =
-        Eigen::Vector3d(unit(random), unit(random), -0.8 * std::abs(unit(random)) - 0.02).normalized();
-    if (direction.dot(start.normal) >= 0.0) continue;
     const Eigen::Vector3d from = start.position - RayScene::leave_distance(start.position) * start.normal;
-    const float length = reach.length(float(from.x()), float(from.y()), float(from.z()), float(direction.x()),
-                                      float(direction.y()), float(direction.z()), 50.0f, 0);
-    const bool steep = std::abs(direction.z()) >=
-                       double(reach.safe_steepness(float(from.x()), float(from.y()), 0)) * direction.head<2>().norm();
-    by_look += steep ? 1 : 0;
-    RayHit hit;
-    if (rays.intersect(from, direction, 50.0, hit)) {
-      ++met;
-      EXPECT_FALSE(steep);
-      EXPECT_GE(length, hit.distance * (1.0 - 1e-5));
-    } else {
-      spared += length == 0.0f ? 1 : 0;
+    const std::uint64_t doubt = reach.doubtful(float(start.position.x()), float(start.position.y()), start.object);
+    for (int lamp = 0; lamp < field.lamp_count(); ++lamp) {
+      // The direction as DirectBatch takes it, for a soft shadow at a place set off by up to the lens's radius.
+      const double off = soft ? disc_radius(field.fixture.lamps[lamp]) : 0.0;
+      float flow[4 * 8];
+      look_up_flow(
+          field,
+          find_cell(field, float(from.x() + off * unit(random)), float(from.y() + off * unit(random)), float(from.z())),
+          flow);
+      const Eigen::Vector3d towards =
+          -Eigen::Vector3f(flow[4 * lamp], flow[4 * lamp + 1], flow[4 * lamp + 2]).cast<double>().normalized();
+      if (towards.dot(start.normal) >= 0.0) continue;
+      const bool doubtful = (doubt >> lamp & 1u) != 0;
+      RayHit hit;
+      if (rays.intersect(from, towards, 50.0, hit)) {
+        ++result.hidden;
+        result.missed += doubtful ? 0 : 1;
+      } else {
+        result.spared += doubtful ? 0 : 1;
+      }
     }
   }
-  EXPECT_GT(met, 300);
-  EXPECT_GT(spared, 5000);
-  EXPECT_GT(by_look, 1000);
+  return result;
+}
+
+TEST(ShadowReach, NeverSparesALampThatSomethingHides) {
+  Scene scene = dented_scene(0.0, Lambertian{grey(0.5)});
+  scene.surfaces.push_back({square_sheet(0.5, -1.2), Black{}});
+  for (auto& vertex : scene.surfaces[1].mesh.vertices) vertex.x() += 4.0;
+  scene.balls.push_back({{-3, 2, -0.9}, 0.4, Black{}});
+  scene.balls.push_back({{-4, -4, -3.0}, 0.8, Black{}});
+  scene.lamps.push_back(lamp_from({25, -20, -9}, 1.0));
+  for (const bool soft : {false, true}) {
+    const ReachTally found = tally(scene, soft);
+    EXPECT_EQ(found.missed, 0);
+    EXPECT_GT(found.hidden, 500);
+    EXPECT_GT(found.spared, soft ? 5000 : 30000);
+  }
 }
 
 TEST(ShadowReach, SparesNothingOverAFold) {
-  Scene scene = empty_scene(0.0);
+  Scene scene = lit_stack(0.0);
   TriangleMesh two = square_sheet(5.0, 0.0);
   const TriangleMesh lower = square_sheet(2.0, -1.0);
   for (const auto& vertex : lower.vertices) two.vertices.push_back(vertex);
   for (const auto& t : lower.triangles) two.triangles.push_back({t[0] + 4, t[1] + 4, t[2] + 4});
   scene.surfaces.push_back({two, Lambertian{grey(0.5)}});
-  const ShadowReach reach(scene, is_connected(scene.surfaces[0].mesh));
-  EXPECT_GE(reach.length(0.0f, 0.0f, -1e-4f, 0.0f, 0.0f, -1.0f, 50.0f, 0), 1.0f);
+  const LightField field = make_light_field(scene, reach_of_membrane(), accuracy(1e-2));
+  const LampBearings bearings(field, false);
+  const ShadowReach reach(bearings, scene, is_connected(scene.surfaces[0].mesh));
+  EXPECT_EQ(reach.doubtful(0.0f, 0.0f, 0), 7u);
+}
+
+TEST(ShadowReach, SparesNothingOnBallsAndBesideTheMap) {
+  Scene scene = dented_scene(0.0, Lambertian{grey(0.5)});
+  const LightField field = make_light_field(scene, reach_of_membrane(), accuracy(1e-2));
+  const LampBearings bearings(field, false);
+  const ShadowReach reach(bearings, scene, true);
+  EXPECT_EQ(reach.doubtful(0.0f, 0.0f, 1), 7u);
+  EXPECT_EQ(reach.doubtful(9.0f, 0.0f, 0), 7u);
+  EXPECT_EQ(reach.doubtful(-5.0f, 3.0f, 0), 0u);  // flat there
 }
 
 }  // namespace

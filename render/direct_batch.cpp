@@ -1,0 +1,384 @@
+#include "render/direct_batch.h"
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "core/error.h"
+
+namespace touchstone::render {
+namespace {
+
+using Four = Eigen::Array4f;
+
+constexpr auto kPerPi = static_cast<float>(1.0 / kPi);
+
+Eigen::Map<const Four> four(const float* from) {
+  return Eigen::Map<const Four>(from);
+}
+
+bool is_lit(DirectKind kind) {
+  return kind == DirectKind::kMatt || kind == DirectKind::kMetal;
+}
+
+}  // namespace
+
+DirectFixture::DirectFixture(const LightField& of, bool soft)
+    : field(of), bearings(of, soft), groups((of.lamp_count() + 3) / 4) {
+  const std::vector<FlatFace>& faces = field.fixture.faces;
+  low = field.layer > 0 ? faces[field.layer - 1].z : -INFINITY;
+  high = field.layer < static_cast<int>(faces.size()) ? faces[field.layer].z : INFINITY;
+  const auto medium_of = [&](int layer) -> const Medium& {
+    if (faces.empty()) return field.fixture.media[0];
+    return field.fixture.media[layer == 0 ? faces.front().medium_below : faces[layer - 1].medium_above];
+  };
+  const Medium& medium = medium_of(field.layer);
+  for (Eigen::Index band = 0; band < medium.absorption.size(); ++band) {
+    absorption[band] = static_cast<float>(medium.absorption[band]);
+    absorbs = absorbs || medium.absorption[band] > 0.0;
+  }
+  for (const Lamp& lamp : field.fixture.lamps) {
+    lens_frames.emplace_back(lamp_direction(lamp).normalized());
+    int layer = 0;
+    while (layer < static_cast<int>(faces.size()) && faces[layer].z < lamp_position(lamp).z()) ++layer;
+    lens_radii.push_back(disc_radius(lamp));
+    lamp_index.push_back(medium_of(layer).index);
+    lamp_in_layer.push_back(layer == field.layer);
+  }
+  const std::size_t lamps = field.intensity.size();
+  const std::size_t nodes = lamps == 0 ? 0 : field.flow.size() / (4 * lamps);
+  const std::size_t width = static_cast<std::size_t>(groups) * 12;
+  flow.assign(nodes * width, 0.0f);
+  for (std::size_t node = 0; node < nodes; ++node) {
+    for (std::size_t lamp = 0; lamp < lamps; ++lamp) {
+      for (std::size_t a = 0; a < 3; ++a) {
+        flow[node * width + lamp / 4 * 12 + a * 4 + lamp % 4] = field.flow[(node * lamps + lamp) * 4 + a];
+      }
+    }
+  }
+  const auto bands = static_cast<std::size_t>(field.fixture.environment.size());
+  intensity.assign(bands * groups * 4, 0.0f);
+  if (!field.pass.empty()) pass.assign(nodes * bands * groups * 4, 0.0f);
+  for (std::size_t band = 0; band < bands; ++band) {
+    for (std::size_t lamp = 0; lamp < lamps; ++lamp) {
+      intensity[band * groups * 4 + lamp] = static_cast<float>(field.intensity[lamp][static_cast<Eigen::Index>(band)]);
+      for (std::size_t node = 0; !pass.empty() && node < nodes; ++node) {
+        pass[(node * bands + band) * groups * 4 + lamp] = field.pass[(node * lamps + lamp) * bands + band];
+      }
+    }
+  }
+}
+
+DirectBatch::DirectBatch(const DirectFrame& frame)
+    : frame_(frame),
+      fixture_(frame.fixture),
+      field_(fixture_.field),
+      lamps_(field_.lamp_count()),
+      bands_(static_cast<int>(field_.fixture.environment.size())),
+      stride_(static_cast<std::size_t>(fixture_.groups) * 4),
+      lanes_(kMostPackets * kPacket),
+      amounts_(lanes_.size() * stride_),
+      flows_(lanes_.size() * stride_ * 3),
+      pass_(field_.pass.empty() ? 0 : lanes_.size() * stride_ * bands_) {}
+
+void DirectBatch::look(std::span<const RayPacket> rays, DirectCounts& counts) {
+  TS_ASSERT(rays.size() <= kMostPackets);
+  rays_ = rays;
+  PacketHits hits;
+  for (std::size_t number = 0; number < rays.size(); ++number) {
+    const RayPacket& packet = rays[number];
+    frame_.tree.intersect(packet, hits);
+    for (int k = 0; k < kPacket; ++k) {
+      const int lane = static_cast<int>(number) * kPacket + k;
+      Lane& one = lanes_[lane];
+      one.material = nullptr;
+      one.doubt = 0;
+      if (packet.valid[k] == 0) continue;
+      ++counts.primary;
+      one.object = hits.object[k];
+      if (one.object < 0) continue;
+      one.material = &frame_.materials[one.object];
+      one.distance = hits.distance[k];
+      float along = 0.0f;
+      float length2 = 0.0f;
+      for (int a = 0; a < 3; ++a) {
+        one.place[a] = packet.origin[a][k] + one.distance * packet.direction[a][k];
+        along += hits.normal[a][k] * packet.direction[a][k];
+        length2 += hits.normal[a][k] * hits.normal[a][k];
+      }
+      const float scale = (along < 0.0f ? 1.0f : -1.0f) / std::sqrt(std::max(length2, 1e-30f));
+      for (int a = 0; a < 3; ++a) one.normal[a] = scale * hits.normal[a][k];
+      if (is_lit(one.material->kind)) light_lane(lane, counts);
+    }
+  }
+}
+
+void DirectBatch::light_lane(int lane, DirectCounts& counts) {
+  Lane& one = lanes_[lane];
+  const FieldCell cell = find_cell(field_, one.place[0], one.place[1], one.place[2]);
+  float* amount = amounts(lane);
+  float* flow = flows_.data() + static_cast<std::size_t>(lane) * stride_ * 3;
+  const std::size_t width = stride_ * 3;
+  for (int group = 0; group < fixture_.groups; ++group) {
+    Four x = Four::Zero();
+    Four y = Four::Zero();
+    Four z = Four::Zero();
+    for (int corner = 0; corner < 8; ++corner) {
+      const float* from = fixture_.flow.data() + static_cast<std::size_t>(cell.node[corner]) * width + group * 12;
+      x += cell.weight[corner] * four(from);
+      y += cell.weight[corner] * four(from + 4);
+      z += cell.weight[corner] * four(from + 8);
+    }
+    Eigen::Map<Four>(flow + group * 12) = x;
+    Eigen::Map<Four>(flow + group * 12 + 4) = y;
+    Eigen::Map<Four>(flow + group * 12 + 8) = z;
+    Eigen::Map<Four>(amount + group * 4) = (-(one.normal[0] * x + one.normal[1] * y + one.normal[2] * z)).max(0.0f);
+  }
+  if (frame_.shadow_reach != nullptr) {
+    one.doubt = frame_.shadow_reach->doubtful(one.place[0], one.place[1], one.object);
+  }
+  std::uint64_t lit = 0;
+  for (int lamp = 0; lamp < lamps_; ++lamp) lit |= std::uint64_t{amount[lamp] > 0.0f} << lamp;
+  one.doubt &= lit;
+  counts.spared += std::popcount(lit ^ one.doubt);
+  if (pass_.empty()) return;
+  const std::size_t pass_width = stride_ * bands_;
+  float* pass = pass_.data() + lane * pass_width;
+  std::fill_n(pass, pass_width, 0.0f);
+  for (int corner = 0; corner < 8; ++corner) {
+    const float* from = fixture_.pass.data() + cell.node[corner] * pass_width;
+    for (std::size_t k = 0; k < pass_width; ++k) pass[k] += cell.weight[corner] * from[k];
+  }
+}
+
+Eigen::Array4f DirectBatch::passing(int lane, int group, int band) const {
+  if (pass_.empty()) return Four::Ones();
+  return four(pass_.data() + (static_cast<std::size_t>(lane) * bands_ + band) * stride_ + group * 4);
+}
+
+Eigen::Vector3f DirectBatch::flow_of(int lane, int lamp) const {
+  const float* from = flows_.data() + static_cast<std::size_t>(lane) * stride_ * 3 + lamp / 4 * 12 + lamp % 4;
+  return {from[0], from[4], from[8]};
+}
+
+void DirectBatch::set_flow(int lane, int lamp, const Eigen::Vector3f& flow) {
+  float* to = flows_.data() + static_cast<std::size_t>(lane) * stride_ * 3 + lamp / 4 * 12 + lamp % 4;
+  for (int a = 0; a < 3; ++a) to[4 * a] = flow[a];
+}
+
+// The field of a lens point is that of the lens's middle seen from a place set off the other way, since flat layers
+// look alike from everywhere; a source that is higher is one that is set off along its own ray.
+void DirectBatch::choose_lens_points(int lane, double u, double v) {
+  const Lane& one = lanes_[lane];
+  if (one.material == nullptr || !is_lit(one.material->kind)) return;
+  const bool metal = one.material->kind == DirectKind::kMetal;
+  for (int lamp = 0; lamp < lamps_; ++lamp) {
+    // Shadows are softened by round lenses and chips; those of other lamps fall as from the middle of their light.
+    const double radius = fixture_.lens_radii[lamp];
+    if (amounts(lane)[lamp] == 0.0f || radius == 0.0) continue;
+    if (!metal && (one.doubt >> lamp & 1u) == 0) continue;  // nobody asks where it comes from
+    const Eigen::Vector2d lens = radius * square_to_disc(u, v);
+    const NormalFrame& frame = fixture_.lens_frames[lamp];
+    const Eigen::Vector3d offset = lens.x() * frame.x + lens.y() * frame.y;
+    const Eigen::Vector3d flows = flow_of(lane, lamp).cast<double>();
+    const Eigen::Vector2d across =
+        flows.head<2>() * (field_.index / fixture_.lamp_index[lamp] / flows.norm());  // as the lamp sends it
+    const double along2 = 1.0 - across.squaredNorm();
+    if (!(along2 > 1e-3)) continue;
+    const Eigen::Vector2d shift =
+        offset.head<2>() - across * (offset.z() / std::copysign(std::sqrt(along2), flows.z()));
+    float flow[4 * kMostDirectLamps];
+    look_up_flow(field_,
+                 find_cell(field_, one.place[0] - static_cast<float>(shift.x()),
+                           one.place[1] - static_cast<float>(shift.y()), one.place[2]),
+                 flow);
+    const float* turned = flow + 4 * lamp;
+    if (turned[3] > 0.0f) set_flow(lane, lamp, {turned[0], turned[1], turned[2]});
+  }
+}
+
+void DirectBatch::take_as_known(int lane, const Visibility& known) {
+  Lane& one = lanes_[lane];
+  if (one.material == nullptr || !is_lit(one.material->kind)) return;
+  for (std::uint64_t rest = one.doubt & known.hidden; rest != 0; rest &= rest - 1) {
+    amounts(lane)[std::countr_zero(rest)] = 0.0f;
+  }
+  one.doubt &= ~(known.open | known.hidden);
+}
+
+DirectBatch::Visibility DirectBatch::visibility(int lane) const {
+  const Lane& one = lanes_[lane];
+  Visibility found;
+  if (packet_of(lane).valid[lane % kPacket] == 0 || one.material == nullptr || !is_lit(one.material->kind))
+    return found;
+  for (int lamp = 0; lamp < lamps_; ++lamp) {
+    found.open |= std::uint64_t{amounts(lane)[lamp] > 0.0f} << lamp;
+  }
+  found.hidden = one.doubt & ~found.open;
+  return found;
+}
+
+void DirectBatch::cast_shadows(DirectCounts& counts) {
+  const int lane_count = static_cast<int>(rays_.size()) * kPacket;
+  std::uint64_t asked = 0;
+  for (int lane = 0; lane < lane_count; ++lane) asked |= lanes_[lane].doubt;
+  // Packets are filled with one lamp's rays from places beside each other.
+  for (; asked != 0; asked &= asked - 1) {
+    const int lamp = std::countr_zero(asked);
+    int lanes[kPacket];
+    int count = 0;
+    for (int lane = 0; lane < lane_count; ++lane) {
+      if ((lanes_[lane].doubt >> lamp & 1u) == 0) continue;
+      if (!shadow_ray(lane, lamp, count)) {
+        ++counts.spared;
+        continue;
+      }
+      lanes[count++] = lane;
+      if (count == kPacket) {
+        trace_shadows(lamp, lanes, count, counts);
+        count = 0;
+      }
+    }
+    if (count > 0) trace_shadows(lamp, lanes, count, counts);
+  }
+}
+
+bool DirectBatch::shadow_ray(int lane, int lamp, int slot) {
+  const Lane& one = lanes_[lane];
+  const Eigen::Vector3f place(one.place[0], one.place[1], one.place[2]);
+  const Eigen::Vector3f normal(one.normal[0], one.normal[1], one.normal[2]);
+  const Eigen::Vector3f towards = (-flow_of(lane, lamp)).normalized();
+  // More than single precision loses where the ray meets the surface and where it leaves it.
+  const Eigen::Vector3f origin = place + 8e-6f * (1.0f + place.cwiseAbs().maxCoeff()) * normal;
+  if (!origin.allFinite() || !towards.allFinite()) return false;
+  float far = 1e6f;
+  if (towards.z() != 0.0f) {
+    // To the layer's end, or to where the ray is clear of everything.
+    const bool up = towards.z() > 0.0f;
+    const auto end = static_cast<float>(up ? fixture_.high : fixture_.low);
+    const float limit = up ? std::min(end, frame_.shadow_reach->high()) : std::max(end, frame_.shadow_reach->low());
+    far = std::min(far, std::max(0.0f, (limit - origin.z()) / towards.z()));
+  }
+  if (fixture_.lamp_in_layer[lamp]) {
+    far = std::min(far, static_cast<float>((lamp_position(field_.fixture.lamps[lamp]) - place.cast<double>()).norm()));
+  }
+  for (int a = 0; a < 3; ++a) {
+    shadow_.origin[a][slot] = origin[a];
+    shadow_.direction[a][slot] = towards[a];
+  }
+  shadow_.far[slot] = far;
+  return far > 0.0f;
+}
+
+void DirectBatch::trace_shadows(int lamp, const int* lanes, int count, DirectCounts& counts) {
+  for (int slot = 0; slot < kPacket; ++slot) {
+    shadow_.valid[slot] = slot < count ? -1 : 0;
+    if (slot < count) continue;
+    shadow_.far[slot] = 0.0f;
+    for (int a = 0; a < 3; ++a) {  // Embree aborts at numbers that aren't finite, also in lanes left out
+      shadow_.origin[a][slot] = 0.0f;
+      shadow_.direction[a][slot] = a == 2 ? 1.0f : 0.0f;
+    }
+  }
+  alignas(64) int free[kPacket];
+  frame_.tree.occluded(shadow_, free);
+  for (int slot = 0; slot < count; ++slot) {
+    if (free[slot] == 0) amounts(lanes[slot])[lamp] = 0.0f;
+  }
+  counts.shadow_rays += count;
+}
+
+void DirectBatch::add(int lane, const float* through, const float* ambient, float* out) const {
+  if (packet_of(lane).valid[lane % kPacket] == 0) return;
+  const Lane& one = lanes_[lane];
+  if (one.material == nullptr) {
+    for (int band = 0; band < bands_; ++band) {
+      out[band] += through[band] * static_cast<float>(field_.fixture.environment[band]);
+    }
+    return;
+  }
+  if (one.material->kind == DirectKind::kBlack) return;
+  float dimmed[kMaxBands];
+  for (int band = 0; band < bands_; ++band) {
+    dimmed[band] = through[band];
+    if (fixture_.absorbs) dimmed[band] *= std::exp(-fixture_.absorption[band] * one.distance);
+  }
+  if (one.material->kind == DirectKind::kLuminous) {
+    for (int band = 0; band < bands_; ++band) out[band] += dimmed[band] * one.material->colour[band];
+    return;
+  }
+  float sum[kMaxBands] = {};
+  if (one.material->kind == DirectKind::kMatt) {
+    reflect_from_matt(lane, sum);
+  } else {
+    reflect_from_metal(lane, sum);
+  }
+  const auto per_index2 = static_cast<float>(1.0 / (field_.index * field_.index));
+  for (int band = 0; band < bands_; ++band) {
+    if (ambient != nullptr) sum[band] += one.material->colour[band] * kPerPi * ambient[band];
+    out[band] += dimmed[band] * sum[band] * per_index2;
+  }
+}
+
+void DirectBatch::reflect_from_matt(int lane, float* sum) const {
+  const float* amount = amounts(lane);
+  for (int band = 0; band < bands_; ++band) {
+    const float* intensity = fixture_.intensity.data() + band * stride_;
+    Four lit = Four::Zero();
+    for (int group = 0; group < fixture_.groups; ++group) {
+      lit += four(amount + group * 4) * four(intensity + group * 4) * passing(lane, group, band);
+    }
+    sum[band] = lanes_[lane].material->colour[band] * kPerPi * lit.sum();
+  }
+}
+
+/// ggx.h's formulas, four lamps at a time; each lamp is one direction.
+void DirectBatch::reflect_from_metal(int lane, float* sum) const {
+  const Lane& one = lanes_[lane];
+  const DirectMaterial& material = *one.material;
+  const RayPacket& packet = packet_of(lane);
+  const Eigen::Array3f back(-packet.direction[0][lane % kPacket], -packet.direction[1][lane % kPacket],
+                            -packet.direction[2][lane % kPacket]);
+  const Eigen::Array3f normal(one.normal[0], one.normal[1], one.normal[2]);
+  const float out = (normal * back).sum();
+  if (!(out > 0.0f)) return;
+  const auto missing = static_cast<float>(material.albedo->missing_ratio(double(out)));
+  const auto a2 = static_cast<float>(material.roughness * material.roughness);
+  const float slope_out = std::sqrt(a2 + (1.0f - a2) * out * out);
+  const float* flow = flows_.data() + static_cast<std::size_t>(lane) * stride_ * 3;
+  for (int group = 0; group < fixture_.groups; ++group) {
+    const Four amount = four(amounts(lane) + group * 4);
+    if ((amount == 0.0f).all()) continue;
+    const Four x = four(flow + group * 12);
+    const Four y = four(flow + group * 12 + 4);
+    const Four z = four(flow + group * 12 + 8);
+    const Four per_length = -(x * x + y * y + z * z).max(1e-30f).rsqrt();
+    const Four in = ((x * normal[0] + y * normal[1] + z * normal[2]) * per_length).max(0.0f);
+    // The facet's normal that mirrors one into the other; its sine by the cross product, since for a smooth metal
+    // 1 - cos^2 would have no digits left.
+    Four hx = x * per_length + back[0];
+    Four hy = y * per_length + back[1];
+    Four hz = z * per_length + back[2];
+    const Four per_half = (hx * hx + hy * hy + hz * hz).max(1e-30f).rsqrt();
+    hx *= per_half;
+    hy *= per_half;
+    hz *= per_half;
+    const Four sine2 = (normal[1] * hz - normal[2] * hy).square() + (normal[2] * hx - normal[0] * hz).square() +
+                       (normal[0] * hy - normal[1] * hx).square();
+    const Four spread = a2 + (1.0f - a2) * sine2;
+    const Four masking = out * (a2 + (1.0f - a2) * in * in).sqrt() + in * slope_out;
+    const Four lobe = a2 * kPerPi / (spread * spread) * 0.5f / masking.max(1e-30f);
+    const Four graze = (1.0f - (hx * back[0] + hy * back[1] + hz * back[2])).max(0.0f).min(1.0f);
+    const Four schlick = graze.square().square() * graze;
+    const Four arriving = amount * lobe;
+    for (int band = 0; band < bands_; ++band) {
+      const float r = material.colour[band];
+      const Four intensity = four(fixture_.intensity.data() + band * stride_ + group * 4);
+      const Four share = (r + (1.0f - r) * schlick) * (1.0f + r * missing);
+      sum[band] += (arriving * share * intensity * passing(lane, group, band)).sum();
+    }
+  }
+}
+
+}  // namespace touchstone::render
