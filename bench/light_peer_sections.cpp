@@ -1,0 +1,245 @@
+#include "bench/light_peer_sections.h"
+
+#include <fmt/format.h>
+#include <tbb/global_control.h>
+
+#include <array>
+#include <cmath>
+#include <opencv2/core.hpp>
+
+#include "bench/cycles_peer.h"
+#include "bench/picture_comparison.h"
+#include "bench/stopwatch.h"
+#include "core/error.h"
+#include "core/units.h"
+#include "render/path_tracer.h"
+
+namespace touchstone::bench {
+namespace {
+
+/// What is drawn: see peer_scene.
+struct PeerCase {
+  std::string name;
+  bool slab = true;
+  bool interreflection = true;
+  int lamps = 1;
+  double lens_radius = 2.5;      // mm
+  bool shadow_caustics = false;  // in Cycles
+};
+
+/// A dented matt membrane of 20 x 20 mm and 20,000 triangles, seen from below through 2 mm of glass and 5 mm of gel (or
+/// bare), lit by disc lamps 20 mm below and 25 mm beside it. No mirror image of a lamp is in the camera's view: our
+/// lamps can't be seen.
+render::Scene peer_scene(const PeerCase& one) {
+  render::Scene scene;
+  if (one.slab) {
+    scene.media = {render::Medium{1.0}, render::Medium{1.5}, render::Medium{1.41}};
+    scene.faces = {{-7.0, 0, 1}, {-5.0, 1, 2}};
+  }
+  scene.environment = render::flat_spectrum(3, 0.0);
+  scene.interreflection = one.interreflection;
+  constexpr int kCells = 100;
+  TriangleMesh mesh;
+  for (int j = 0; j <= kCells; ++j) {
+    for (int i = 0; i <= kCells; ++i) {
+      const double x = 10.0 * (2.0 * i / kCells - 1.0);
+      const double y = 10.0 * (2.0 * j / kCells - 1.0);
+      mesh.vertices.emplace_back(x, y, -1.0 * std::exp(-((x - 1.0) * (x - 1.0) + y * y) / 4.0));
+    }
+  }
+  for (int j = 0; j < kCells; ++j) {
+    for (int i = 0; i < kCells; ++i) {
+      const int a = j * (kCells + 1) + i;
+      mesh.triangles.push_back({a, a + 1, a + kCells + 2});
+      mesh.triangles.push_back({a, a + kCells + 2, a + kCells + 1});
+    }
+  }
+  scene.surfaces.push_back({std::move(mesh), render::Lambertian{render::flat_spectrum(3, 0.6)}});
+  for (int k = 0; k < one.lamps; ++k) {
+    const double angle = 0.5 + 2.0 * kPi * k / one.lamps;
+    render::SpotLamp lamp;
+    lamp.position = {25.0 * std::cos(angle), 25.0 * std::sin(angle), -20.0};
+    lamp.direction = Eigen::Vector3d(0, 0, -3) - lamp.position;
+    lamp.lens_radius = one.lens_radius;
+    lamp.half_angle = 35.0 * kRadiansPerDegree;
+    lamp.soft_angle = 0.0;
+    lamp.power_W = render::flat_spectrum(3, 0.5);
+    scene.lamps.push_back(lamp);
+  }
+  return scene;
+}
+
+/// 64 x 48 pixels behind a point.
+render::PinholeCamera peer_camera() {
+  render::PinholeCamera camera;
+  camera.width = 64;
+  camera.height = 48;
+  camera.pixel_pitch_um = 69.0;
+  camera.hole_diameter_um = 1.0;
+  camera.foil_thickness_um = 0.0;
+  camera.distance_mm = 5.0;
+  camera.gel_from_camera = look_at({0, 0, -22.4}, {0, 0, 0}, {0, 1, 0});
+  return camera;
+}
+
+/// The irradiance that a radiance of one gives in each pixel: Cycles' pixels are mean radiances.
+cv::Mat irradiance_per_radiance(const render::PinholeCamera& camera) {
+  cv::Mat factor(camera.height, camera.width, CV_32FC1);
+  constexpr int kGrid = 4;
+  for (int row = 0; row < camera.height; ++row) {
+    for (int column = 0; column < camera.width; ++column) {
+      double sum = 0.0;
+      for (int k = 0; k < kGrid * kGrid; ++k) {
+        const double x = column + (k % kGrid + 0.5) / kGrid;
+        const double y = row + (k / kGrid + 0.5) / kGrid;
+        const auto ray = render::pinhole_ray(camera, x, y, 0.5, 0.5);
+        TS_ASSERT(ray.has_value());
+        sum += ray->weight;
+      }
+      factor.at<float>(row, column) = static_cast<float>(sum / (kGrid * kGrid));
+    }
+  }
+  return factor;
+}
+
+int threads() {
+  return static_cast<int>(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
+}
+
+/// Some pictures of one scene, each with a seed of its own, and the mean cost of one.
+struct PictureSet {
+  std::vector<cv::Mat> radiance;  // first band
+  int samples = 0;
+  double seconds = 0.0;
+  double processor_seconds = 0.0;
+
+  /// Variance times processor seconds: the less, the better the program.
+  double cost() const { return relative_noise(radiance) * relative_noise(radiance) * processor_seconds; }
+};
+
+class Ours {
+ public:
+  explicit Ours(const PeerCase& one) : tracer_(peer_scene(one)) {}
+
+  PictureSet draw(int samples, int pictures) const {
+    PictureSet set;
+    set.samples = samples;
+    render::RenderSettings settings;
+    settings.min_samples = settings.max_samples = samples;
+    settings.max_depth = 64;  // Cycles' paths end by chance only, too
+    const Stopwatch clock;
+    const ProcessorStopwatch processor;
+    std::vector<cv::Mat> irradiance;
+    for (int k = 0; k < pictures; ++k) {
+      settings.seed = 1000 + static_cast<std::uint64_t>(k);
+      irradiance.push_back(tracer_.render(camera_, settings).irradiance);
+    }
+    set.seconds = clock.seconds() / pictures;
+    set.processor_seconds = processor.seconds() / pictures;
+    for (const cv::Mat& picture : irradiance) {
+      cv::Mat band;
+      cv::extractChannel(picture, band, 0);
+      set.radiance.push_back(band / factor_);
+    }
+    return set;
+  }
+
+ private:
+  render::PinholeCamera camera_ = peer_camera();
+  cv::Mat factor_ = irradiance_per_radiance(camera_);
+  render::Tracer tracer_;
+};
+
+/// What Cycles draws in one process: `pictures` of each number of samples.
+std::vector<PictureSet> draw_with_cycles(const PeerCase& one, const std::vector<int>& samples, int pictures,
+                                         const std::filesystem::path& scratch, double* overhead = nullptr) {
+  CyclesOptions options;
+  options.threads = threads();
+  options.most_bounces = one.interreflection ? 128 : 0;
+  options.shadow_caustics = one.shadow_caustics;
+  std::vector<CyclesJob> jobs;
+  for (const int count : samples) {
+    for (int k = 0; k < pictures; ++k) jobs.push_back({static_cast<std::uint32_t>(jobs.size()) + 1, count});
+  }
+  const CyclesRun run = run_cycles(peer_scene(one), peer_camera(), options, jobs, scratch);
+  if (overhead != nullptr) *overhead = run.overhead_seconds;
+  std::vector<PictureSet> sets;
+  for (std::size_t k = 0; k < jobs.size(); ++k) {
+    if (k % static_cast<std::size_t>(pictures) == 0) sets.push_back({{}, jobs[k].samples, 0.0, 0.0});
+    PictureSet& set = sets.back();
+    cv::Mat band;
+    cv::extractChannel(run.pictures[k].radiance, band, 0);
+    set.radiance.push_back(band);
+    set.seconds += run.pictures[k].seconds / pictures;
+    set.processor_seconds += run.pictures[k].processor_seconds / pictures;
+  }
+  return sets;
+}
+
+}  // namespace
+
+ResultTable equal_pictures_table(const LightPeerOptions& options) {
+  ResultTable table;
+  table.name = "light-peer-equal";
+  table.title = "The same pictures?";
+  table.columns = {"scene",        "our samples",         "Cycles' samples", "Cycles / ours", "standard error",
+                   "mean z^2", "of noise alone", "largest z",      "equal"};
+  struct Row {
+    PeerCase scene;
+    int our_samples, cycles_samples;
+  };
+  const int effort = options.quick ? 1 : 8;
+  std::vector<Row> rows = {
+      {{"bare membrane, direct light", false, false, 1, 5.0}, 16 * effort, 16 * effort},
+      {{"bare membrane", false, true, 1, 5.0}, 16 * effort, 32 * effort},
+      {{"slab, lamp of 10 mm", true, true, 1, 5.0}, 32 * effort, 512 * effort},
+      {{"slab, lamp of 10 mm, Cycles' shadow caustics", true, true, 1, 5.0, true}, 32 * effort, 64 * effort}};
+  if (!options.quick) {
+    rows.push_back({{"slab, four lamps of 5 mm", true, true, 4, 2.5}, 256, 4096});
+    rows.push_back({{"slab, lamp of 2 mm", true, true, 1, 1.0}, 256, 8192});
+  }
+  constexpr int kPictures = 16;
+  constexpr int kBlock = 8;
+  for (const Row& row : rows) {
+    const PictureSet ours = Ours(row.scene).draw(row.our_samples, kPictures);
+    const PictureSet theirs =
+        draw_with_cycles(row.scene, {row.cycles_samples}, kPictures, options.scratch).front();
+    const PictureComparison result = compare_pictures(ours.radiance, theirs.radiance, kBlock);
+    table.rows.push_back({row.scene.name, fmt::format("{}", kPictures * row.our_samples),
+                          fmt::format("{}", kPictures * row.cycles_samples), fmt::format("{:.5f}", result.mean_ratio),
+                          fmt::format("{:.5f}", result.ratio_error), fmt::format("{:.2f}", result.mean_square_z),
+                          fmt::format("{:.2f} +- {:.2f}", result.expected_mean_square_z, result.mean_square_z_error),
+                          fmt::format("{:.1f}", result.largest_z), result.equal() ? "yes" : "NO"});
+  }
+  table.remarks = {"x"};
+  return table;
+}
+
+ResultTable equal_noise_table(const LightPeerOptions& options) {
+  ResultTable table;
+  table.name = "light-peer-noise";
+  table.title = "Noise against seconds";
+  table.columns = {"scene", "program", "samples", "s", "processor s", "noise, %", "s to 1 %"};
+  const auto add = [&](const PeerCase& scene, const std::string& program, const PictureSet& set) {
+    const double noise = relative_noise(set.radiance);
+    table.rows.push_back({scene.name, program, fmt::format("{}", set.samples), fmt::format("{:.3f}", set.seconds),
+                          fmt::format("{:.3f}", set.processor_seconds), fmt::format("{:.3f}", 100.0 * noise),
+                          fmt::format("{:.3g}", set.seconds * noise * noise * 1e4)});
+  };
+  for (const PeerCase& scene :
+       {PeerCase{"bare membrane", false, true, 1, 5.0}, PeerCase{"slab, lamp of 10 mm", true, true, 1, 5.0},
+        PeerCase{"slab, lamp of 5 mm", true, true, 1, 2.5}, PeerCase{"slab, lamp of 2 mm", true, true, 1, 1.0}}) {
+    const Ours ours(scene);
+    for (int n : {4, 16, 64, 256}) add(scene, "ours", ours.draw(n, 4));
+    for (const auto& set : draw_with_cycles(scene, {64, 256, 1024}, 4, options.scratch)) add(scene, "Cycles", set);
+    PeerCase with_caustics = scene;
+    with_caustics.shadow_caustics = true;
+    for (const auto& set : draw_with_cycles(with_caustics, {64, 256}, 4, options.scratch)) {
+      add(scene, "Cycles, shadow caustics", set);
+    }
+  }
+  table.remarks = {"x"};
+  return table;
+}
+
+}  // namespace touchstone::bench
