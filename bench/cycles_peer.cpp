@@ -75,6 +75,7 @@ nlohmann::json description(const render::Scene& scene, const render::PinholeCame
   const Eigen::Matrix3d& turn = camera.gel_from_camera.rotation;
   return {{"threads", options.threads},
           {"most_bounces", options.most_bounces},
+          {"most_matt_bounces", options.most_matt_bounces},
           {"shadow_caustics", options.shadow_caustics},
           {"faces", faces_of(scene)},
           {"surfaces", surfaces_of(scene)},

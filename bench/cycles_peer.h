@@ -14,7 +14,8 @@ namespace touchstone::bench {
 
 struct CyclesOptions {
   int threads = 1;
-  int most_bounces = 128;        ///< of all kinds on a path; 0: light straight from the lamps only
+  int most_bounces = 128;        ///< of all kinds on a path; 0: light that comes straight from a lamp to what is seen
+  int most_matt_bounces = 128;   ///< 1: light that comes from a lamp through smooth faces only, or straight
   bool shadow_caustics = false;  ///< Cycles' own connections through smooth faces (manifold next event estimation)
 };
 

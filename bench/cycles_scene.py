@@ -116,13 +116,13 @@ def add_camera(camera, render):
     render.resolution_percentage = 100
 
 
-def set_up_cycles(threads, bounces):
+def set_up_cycles(description):
     scene = bpy.context.scene
     scene.render.engine = "CYCLES"
     scene.world = bpy.data.worlds.new("dark")
     scene.world.color = (0, 0, 0)
     render = scene.render
-    render.threads_mode, render.threads = "FIXED", threads
+    render.threads_mode, render.threads = "FIXED", description["threads"]
     render.image_settings.file_format = "OPEN_EXR"
     render.image_settings.color_mode = "RGB"
     render.image_settings.color_depth = "32"
@@ -138,7 +138,8 @@ def set_up_cycles(threads, bounces):
     cycles.blur_glossy = 0.0
     cycles.caustics_reflective = cycles.caustics_refractive = True
     cycles.use_auto_tile = False
-    cycles.max_bounces = cycles.diffuse_bounces = cycles.glossy_bounces = cycles.transmission_bounces = bounces
+    cycles.max_bounces = cycles.glossy_bounces = cycles.transmission_bounces = description["most_bounces"]
+    cycles.diffuse_bounces = description["most_matt_bounces"]
     return scene
 
 
@@ -158,7 +159,7 @@ def main():
     for thing in list(bpy.data.objects):  # the start-up scene's cube, lamp and camera
         bpy.data.objects.remove(thing)
     caustics = description["shadow_caustics"]
-    scene = set_up_cycles(description["threads"], description["most_bounces"])
+    scene = set_up_cycles(description)
     for face in description["faces"]:
         add_face(face, caustics)
     for surface in description["surfaces"]:

@@ -155,7 +155,7 @@ std::vector<PictureSet> draw_with_cycles(const PeerCase& one, const std::vector<
                                          const std::filesystem::path& scratch, double* overhead = nullptr) {
   CyclesOptions options;
   options.threads = threads();
-  options.most_bounces = one.interreflection ? 128 : 0;
+  if (!one.interreflection) (one.slab ? options.most_matt_bounces : options.most_bounces) = one.slab ? 1 : 0;
   options.shadow_caustics = one.shadow_caustics;
   std::vector<CyclesJob> jobs;
   for (const int count : samples) {
@@ -192,6 +192,7 @@ ResultTable equal_pictures_table(const LightPeerOptions& options) {
   std::vector<Row> rows = {
       {{"bare membrane, direct light", false, false, 1, 5.0}, 16 * effort, 16 * effort},
       {{"bare membrane", false, true, 1, 5.0}, 16 * effort, 32 * effort},
+      {{"slab, direct light, lamp of 10 mm", true, false, 1, 5.0}, 32 * effort, 512 * effort},
       {{"slab, lamp of 10 mm", true, true, 1, 5.0}, 32 * effort, 512 * effort},
       {{"slab, lamp of 10 mm, Cycles' shadow caustics", true, true, 1, 5.0, true}, 32 * effort, 64 * effort}};
   if (!options.quick) {

@@ -1,10 +1,10 @@
 #include "bench/peer_process.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <cstdio>
 #include <cstdlib>
 
 namespace touchstone::bench {
@@ -17,7 +17,9 @@ int run_to_end(const std::vector<std::string>& command, const std::filesystem::p
   const pid_t child = fork();
   if (child < 0) return -1;
   if (child == 0) {
-    if (std::freopen(log.c_str(), "w", stdout) == nullptr || dup2(STDOUT_FILENO, STDERR_FILENO) < 0) _exit(127);
+    // Not by stdio: what waits in its buffer is the parent's to print.
+    const int file = open(log.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0644);
+    if (file < 0 || dup2(file, STDOUT_FILENO) < 0 || dup2(file, STDERR_FILENO) < 0) _exit(127);
     setenv("OPENBLAS_NUM_THREADS", "1", 1);
     execv(arguments[0], arguments.data());
     _exit(127);
