@@ -17,8 +17,12 @@ namespace {
 constexpr const char* kBlender = "/usr/bin/blender";  // Debian's
 constexpr double kSquareMillimetresPerSquareMetre = 1e6;
 
-nlohmann::json triple(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
-nlohmann::json bands(const render::Spectrum& spectrum) { return {spectrum[0], spectrum[1], spectrum[2]}; }
+nlohmann::json triple(const Eigen::Vector3d& v) {
+  return {v.x(), v.y(), v.z()};
+}
+nlohmann::json bands(const render::Spectrum& spectrum) {
+  return {spectrum[0], spectrum[1], spectrum[2]};
+}
 
 nlohmann::json faces_of(const render::Scene& scene) {
   nlohmann::json faces = nlohmann::json::array();

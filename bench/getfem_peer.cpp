@@ -37,11 +37,12 @@ PeerResult run_peer(const std::filesystem::path& mesh_file, const PeerProblem& p
   std::filesystem::path log = mesh_file;
   log += ".peer.log";
   const auto number = [](double value) { return fmt::format("{:.17g}", value); };
-  const int code = run_to_end({kPython, std::string(TOUCHSTONE_SOURCE_DIR) + "/bench/getfem_peer.py", mesh_file.string(),
-                        "--out", out.string(), "--element", problem.element, "--load", problem.load, "--young",
-                        number(problem.material.youngs_modulus), "--poisson", number(problem.material.poisson_ratio),
-                        "--radius", number(problem.radius), "--depth", number(problem.depth)},
-                       log);
+  const int code =
+      run_to_end({kPython, std::string(TOUCHSTONE_SOURCE_DIR) + "/bench/getfem_peer.py", mesh_file.string(), "--out",
+                  out.string(), "--element", problem.element, "--load", problem.load, "--young",
+                  number(problem.material.youngs_modulus), "--poisson", number(problem.material.poisson_ratio),
+                  "--radius", number(problem.radius), "--depth", number(problem.depth)},
+                 log);
   if (code != 0) fail("the peer ended with {}: {}", code, read_whole_file(log));
   const nlohmann::json record = nlohmann::json::parse(read_whole_file(out));
   const nlohmann::json& seconds = record.at("seconds");

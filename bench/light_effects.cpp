@@ -2,6 +2,8 @@
 
 namespace touchstone::bench {
 
-ResultTable light_effects_table(const LightOptions&) { return {}; }
+ResultTable light_effects_table(const LightOptions&) {
+  return {};
+}
 
 }  // namespace touchstone::bench

@@ -29,7 +29,9 @@ int run_to_end(const std::vector<std::string>& command, const std::filesystem::p
   return WEXITSTATUS(status);
 }
 
-int probe(const std::vector<std::string>& command) { return run_to_end(command, "/dev/null"); }
+int probe(const std::vector<std::string>& command) {
+  return run_to_end(command, "/dev/null");
+}
 
 ScratchFolder::ScratchFolder()
     : path_(std::filesystem::temp_directory_path() / fmt::format("touchstone-bench-{}", getpid())) {

@@ -46,7 +46,9 @@ std::vector<cv::Mat> first_channels(const std::vector<cv::Mat>& pictures) {
   return channels;
 }
 
-double squared(double x) { return x * x; }
+double squared(double x) {
+  return x * x;
+}
 
 }  // namespace
 
@@ -75,9 +77,8 @@ PictureComparison compare_pictures(const std::vector<cv::Mat>& first, const std:
       const double both = in_a.variance_of_mean + in_b.variance_of_mean;
       if (!(both > 0.0)) continue;
       // Welch's degrees of freedom; z^2 is then F(1, freedom).
-      const double freedom =
-          squared(both) / (squared(in_a.variance_of_mean) / (static_cast<double>(a.size()) - 1.0) +
-                           squared(in_b.variance_of_mean) / (static_cast<double>(b.size()) - 1.0));
+      const double freedom = squared(both) / (squared(in_a.variance_of_mean) / (static_cast<double>(a.size()) - 1.0) +
+                                              squared(in_b.variance_of_mean) / (static_cast<double>(b.size()) - 1.0));
       const double z2 = squared(in_a.mean - in_b.mean) / both;
       ++result.blocks;
       result.mean_square_z += z2;
