@@ -23,6 +23,7 @@ Report::Report(std::string name, std::filesystem::path folder, bool quick, const
     fmt::print("{}\n", line);
     page_ += fmt::format("- {}\n", line);
   }
+  std::fflush(stdout);
 }
 
 void Report::take(const ResultTable& table) {
