@@ -9,7 +9,6 @@
 #include "bench/light_scenes.h"
 #include "bench/light_sections.h"
 #include "bench/stopwatch.h"
-#include "core/error.h"
 #include "render/event_pixels.h"
 #include "render/imager.h"
 #include "render/path_tracer.h"
@@ -83,9 +82,15 @@ Scene with_metal(Scene scene) {
   return scene;
 }
 
-Scene with_slab(bool interreflection, double scattering_per_mm = 0.0) {
-  Scene scene = bench_scene(50000, 8, 3, interreflection);
-  if (scattering_per_mm > 0.0) scene.media.back().scattering = render::flat_spectrum(3, scattering_per_mm);
+Scene with_slab(bool interreflection) {
+  return bench_scene(50000, 8, 3, interreflection);
+}
+
+/// The gel ends just behind the membrane: paths would wander about for long in an endless one.
+Scene with_milky_gel(double scattering_per_mm) {
+  Scene scene = with_slab(true);
+  scene.media.back().scattering = render::flat_spectrum(3, scattering_per_mm);
+  scene.faces.push_back({0.1, 2, 0});
   return scene;
 }
 
@@ -199,7 +204,7 @@ ResultTable light_effects_table(const LightOptions& options) {
       {"interreflection", traced(with_interreflection(scene))},
       {"refraction: plate and gel, direct light", traced(with_slab(false))},
       {"refraction and interreflection", traced(with_slab(true))},
-      {"the same, the gel scatters (0.05 per mm)", traced(with_slab(true, 0.05))},
+      {"the same, the gel scatters (0.05 per mm)", traced(with_milky_gel(0.05))},
       {"print: 361 dots", traced(with_print(scene))},
       {"thin film with faces", traced(with_film(scene))},
       {"metal membrane", traced(with_metal(scene))},
@@ -212,17 +217,13 @@ ResultTable light_effects_table(const LightOptions& options) {
       {"8 bands", traced(plain_scene(8))},
       {"16 bands", traced(plain_scene(16))}};
   for (const auto& [name, make] : effects) {
-    try {
-      const Cost cost = cost_of(make(), plain, turns);
-      const auto per_path = [&](std::uint64_t count) {
-        return fmt::format("{:.2f}", static_cast<double>(count) / static_cast<double>(cost.counts.paths));
-      };
-      table.rows.push_back({name, per_path(cost.counts.primary), per_path(cost.counts.connections),
-                            per_path(cost.counts.bounces), fmt::format("{:.3f}", cost.seconds),
-                            fmt::format("{:.2f}", cost.seconds / cost.plain_seconds)});
-    } catch (const Error&) {  // a number of bands that the path tracer doesn't carry
-      table.rows.push_back({name, "-", "-", "-", "-", "-"});
-    }
+    const Cost cost = cost_of(make(), plain, turns);
+    const auto per_path = [&](std::uint64_t count) {
+      return fmt::format("{:.2f}", static_cast<double>(count) / static_cast<double>(cost.counts.paths));
+    };
+    table.rows.push_back({name, per_path(cost.counts.primary), per_path(cost.counts.connections),
+                          per_path(cost.counts.bounces), fmt::format("{:.3f}", cost.seconds),
+                          fmt::format("{:.2f}", cost.seconds / cost.plain_seconds)});
   }
   table.remarks = {
       fmt::format(
@@ -231,8 +232,7 @@ ResultTable light_effects_table(const LightOptions& options) {
           "making the tracer isn't counted.",
           kWidth, kHeight, samples),
       "Processor seconds are summed over the threads, the least of several frames by turns with the plain one.",
-      "What an effect adds in noise isn't in here: hole and lens need more paths for the same error.",
-      "A dash: the path tracer doesn't carry that number of bands."};
+      "What an effect adds in noise isn't in here: hole and lens need more paths for the same error."};
   return table;
 }
 
