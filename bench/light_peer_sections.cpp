@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "bench/cycles_peer.h"
 #include "bench/picture_comparison.h"
@@ -102,6 +103,25 @@ cv::Mat irradiance_per_radiance(const render::PinholeCamera& camera) {
   return factor;
 }
 
+/// Per pixel, central differences.
+std::array<cv::Mat, 2> gradient(const cv::Mat& picture) {
+  std::array<cv::Mat, 2> slopes;
+  cv::Sobel(picture, slopes[0], CV_32F, 1, 0, 1, 0.5, 0.0, cv::BORDER_REPLICATE);
+  cv::Sobel(picture, slopes[1], CV_32F, 0, 1, 1, 0.5, 0.0, cv::BORDER_REPLICATE);
+  return slopes;
+}
+
+/// The mean radiance over each pixel: with the irradiance E = mean of w L, it is (E - covariance of w and L) / mean of
+/// w; for a pixel over which both run straight the covariance is a twelfth of the product of their slopes. It is below
+/// 1e-4 of E, which the bare membrane shows.
+cv::Mat mean_radiance(const cv::Mat& irradiance, const cv::Mat& factor) {
+  const cv::Mat radiance = irradiance / factor;
+  const auto of_radiance = gradient(radiance);
+  const auto of_factor = gradient(factor);
+  const cv::Mat covariance = (of_radiance[0].mul(of_factor[0]) + of_radiance[1].mul(of_factor[1])) / 12.0;
+  return radiance - covariance / factor;
+}
+
 int threads() {
   return static_cast<int>(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
 }
@@ -139,7 +159,7 @@ class Ours {
     for (const cv::Mat& picture : irradiance) {
       cv::Mat band;
       cv::extractChannel(picture, band, 0);
-      set.radiance.push_back(band / factor_);
+      set.radiance.push_back(mean_radiance(band, factor_));
     }
     return set;
   }
@@ -231,8 +251,7 @@ ResultTable equal_pictures_table(const LightPeerOptions& options) {
   if (!options.quick) {
     table.remarks.push_back(
         "Shadow caustics are Cycles' own connections through smooth faces (manifold next event estimation, off by "
-        "default): of another brightness than its own paths, as the last rows show; of direct light about 1/n^2 = 0.50 "
-        "of it arrives.");
+        "default): the last rows show that they give another picture than Cycles' own paths do.");
   }
   return table;
 }
