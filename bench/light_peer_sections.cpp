@@ -9,6 +9,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "bench/cycles_peer.h"
+#include "bench/light_scenes.h"
 #include "bench/picture_comparison.h"
 #include "bench/stopwatch.h"
 #include "core/error.h"
@@ -39,22 +40,8 @@ render::Scene peer_scene(const PeerCase& one) {
   }
   scene.environment = render::flat_spectrum(3, 0.0);
   scene.interreflection = one.interreflection;
-  constexpr int kCells = 100;
-  TriangleMesh mesh;
-  for (int j = 0; j <= kCells; ++j) {
-    for (int i = 0; i <= kCells; ++i) {
-      const double x = 10.0 * (2.0 * i / kCells - 1.0);
-      const double y = 10.0 * (2.0 * j / kCells - 1.0);
-      mesh.vertices.emplace_back(x, y, -1.0 * std::exp(-((x - 1.0) * (x - 1.0) + y * y) / 4.0));
-    }
-  }
-  for (int j = 0; j < kCells; ++j) {
-    for (int i = 0; i < kCells; ++i) {
-      const int a = j * (kCells + 1) + i;
-      mesh.triangles.push_back({a, a + 1, a + kCells + 2});
-      mesh.triangles.push_back({a, a + kCells + 2, a + kCells + 1});
-    }
-  }
+  TriangleMesh mesh =
+      height_field(100, [](double x, double y) { return -std::exp(-((x - 1.0) * (x - 1.0) + y * y) / 4.0); });
   scene.surfaces.push_back({std::move(mesh), render::Lambertian{render::flat_spectrum(3, 0.6)}});
   for (int k = 0; k < one.lamps; ++k) {
     const double angle = 0.5 + 2.0 * kPi * k / one.lamps;
