@@ -215,8 +215,8 @@ ResultTable equal_pictures_table(const LightPeerOptions& options) {
     const PictureSet theirs = draw_with_cycles(row.scene, {row.cycles_samples}, kPictures, options.scratch).front();
     const PictureComparison result = compare_pictures(ours.radiance, theirs.radiance, kBlock);
     table.rows.push_back({row.scene.name, fmt::format("{}", kPictures * row.our_samples),
-                          fmt::format("{}", kPictures * row.cycles_samples), fmt::format("{:.5f}", result.mean_ratio),
-                          fmt::format("{:.5f}", result.ratio_error), fmt::format("{:.2f}", result.mean_square_z),
+                          fmt::format("{}", kPictures * row.cycles_samples), fmt::format("{:.6f}", result.mean_ratio),
+                          fmt::format("{:.6f}", result.ratio_error), fmt::format("{:.2f}", result.mean_square_z),
                           fmt::format("{:.2f} +- {:.2f}", result.expected_mean_square_z, result.mean_square_z_error),
                           fmt::format("{:.1f}", result.largest_z), result.equal() ? "yes" : "NO"});
   }
