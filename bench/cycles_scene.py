@@ -18,6 +18,7 @@ from mathutils import Matrix, Vector
 
 FACE_HALF_WIDTH = 2000.0  # mm: our faces have no end
 
+
 def new_material(name, shader, **inputs):
     """A material of one shader node."""
     material = bpy.data.materials.new(name)

@@ -99,8 +99,8 @@ std::array<cv::Mat, 2> gradient(const cv::Mat& picture) {
 }
 
 /// The mean radiance over each pixel: with the irradiance E = mean of w L, it is (E - covariance of w and L) / mean of
-/// w; for a pixel over which both run straight the covariance is a twelfth of the product of their slopes. It is below
-/// 1e-4 of E, which the bare membrane shows.
+/// w; for a pixel over which both run straight the covariance is a twelfth of the product of their slopes. That is
+/// less than 1e-4 of E, but the bare membrane is compared as finely as 1e-5.
 cv::Mat mean_radiance(const cv::Mat& irradiance, const cv::Mat& factor) {
   const cv::Mat radiance = irradiance / factor;
   const auto of_radiance = gradient(radiance);
@@ -166,6 +166,7 @@ std::vector<PictureSet> draw_with_cycles(const PeerCase& one, const std::vector<
   options.shadow_caustics = one.shadow_caustics;
   std::vector<CyclesJob> jobs;
   for (const int count : samples) {
+    // Far apart: neighbouring seeds aren't known to be independent.
     for (int k = 0; k < pictures; ++k) jobs.push_back({static_cast<std::uint32_t>(jobs.size() + 1) * 104729, count});
   }
   const CyclesRun run = run_cycles(peer_scene(one), peer_camera(), options, jobs, scratch);
