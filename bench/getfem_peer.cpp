@@ -1,13 +1,9 @@
 #include "bench/getfem_peer.h"
 
-#include <sys/wait.h>
-#include <unistd.h>
-
 #include <array>
-#include <cstdlib>
 #include <nlohmann/json.hpp>
-#include <vector>
 
+#include "bench/peer_process.h"
 #include "core/error.h"
 #include "core/whole_file.h"
 
@@ -16,33 +12,10 @@ namespace {
 
 constexpr const char* kPython = "/usr/bin/python3";  // Debian's: another one may stand before it on PATH
 
-/// Runs a program to its end with stdout and stderr in `log`; its exit code, or -1.
-int run(const std::vector<std::string>& command, const std::filesystem::path& log) {
-  std::vector<char*> arguments;
-  arguments.reserve(command.size() + 1);
-  for (const std::string& word : command) arguments.push_back(const_cast<char*>(word.c_str()));
-  arguments.push_back(nullptr);
-  const pid_t child = fork();
-  if (child < 0) return -1;
-  if (child == 0) {
-    if (std::freopen(log.c_str(), "w", stdout) == nullptr || dup2(STDOUT_FILENO, STDERR_FILENO) < 0) _exit(127);
-    setenv("OPENBLAS_NUM_THREADS", "1", 1);
-    execv(arguments[0], arguments.data());
-    _exit(127);
-  }
-  int status = 0;
-  if (waitpid(child, &status, 0) != child || !WIFEXITED(status)) return -1;
-  return WEXITSTATUS(status);
-}
-
 }  // namespace
 
 std::string why_no_peer() {
-  const std::filesystem::path log = std::filesystem::temp_directory_path() / fmt::format("ts-peer-{}.log", getpid());
-  const int code = run({kPython, "-c", "import getfem, numpy"}, log);
-  std::error_code ignored;
-  std::filesystem::remove(log, ignored);
-  if (code == 0) return {};
+  if (probe({kPython, "-c", "import getfem, numpy"}) == 0) return {};
   return fmt::format("{} can't import getfem; script/bootstrap --bench installs Debian's python3-getfem", kPython);
 }
 
@@ -64,11 +37,12 @@ PeerResult run_peer(const std::filesystem::path& mesh_file, const PeerProblem& p
   std::filesystem::path log = mesh_file;
   log += ".peer.log";
   const auto number = [](double value) { return fmt::format("{:.17g}", value); };
-  const int code = run({kPython, std::string(TOUCHSTONE_SOURCE_DIR) + "/bench/getfem_peer.py", mesh_file.string(),
-                        "--out", out.string(), "--element", problem.element, "--load", problem.load, "--young",
-                        number(problem.material.youngs_modulus), "--poisson", number(problem.material.poisson_ratio),
-                        "--radius", number(problem.radius), "--depth", number(problem.depth)},
-                       log);
+  const int code =
+      run_to_end({kPython, std::string(TOUCHSTONE_SOURCE_DIR) + "/bench/getfem_peer.py", mesh_file.string(), "--out",
+                  out.string(), "--element", problem.element, "--load", problem.load, "--young",
+                  number(problem.material.youngs_modulus), "--poisson", number(problem.material.poisson_ratio),
+                  "--radius", number(problem.radius), "--depth", number(problem.depth)},
+                 log);
   if (code != 0) fail("the peer ended with {}: {}", code, read_whole_file(log));
   const nlohmann::json record = nlohmann::json::parse(read_whole_file(out));
   const nlohmann::json& seconds = record.at("seconds");

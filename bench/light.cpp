@@ -1,66 +1,29 @@
-// Light: the tracer against bare Embree, error against seconds, pictures a second, growth. A program of its own.
-//   build/dev/bench/bench_light -o build/bench-results [--quick] [--date TEXT]
-#include <CLI/CLI.hpp>
-#include <functional>
+// Light: the tracer against bare Embree, error against seconds, pictures a second, growth, what each effect costs. A
+// program of its own.
+//   script/bench light      or  build/dev/bench/bench_light -o build/bench-results [--quick] [--only effects]
+#include <algorithm>
 
-#include "apps/blas_kind.h"
 #include "bench/direct_sections.h"
 #include "bench/light_sections.h"
-#include "bench/machine.h"
-#include "core/error.h"
-#include "core/whole_file.h"
-#include "lab/run_identity.h"
+#include "bench/report.h"
 #include "sim/virtual_sensor.h"
 
-namespace {
-
-using namespace touchstone;
-
-void measure(const std::filesystem::path& folder, bool quick, const std::string& date) {
-  std::filesystem::create_directories(folder);
-  const bench::Machine machine = bench::this_machine();
-  std::vector<std::string> where = {"Touchstone " + lab::program_version() + (quick ? ", quick form" : ""),
-                                    describe(machine)};
-  if (!date.empty()) where.push_back(date);
-  if (machine.load_before > 0.25 * machine.cpus) {
-    where.push_back("Others were at work on this machine: ratios hold better than seconds");
-  }
-  for (const std::string& line : where) fmt::print("{}\n", line);
-  std::string page = "# bench/light\n\n";
-  for (const std::string& line : where) page += fmt::format("- {}\n", line);
-  const bench::LightOptions options{quick, sim::default_cache_folder()};
-  const std::vector<std::function<bench::ResultTable(const bench::LightOptions&)>> tables = {
-      bench::bare_rays_table,       bench::light_error_table,  bench::direct_frames_table, bench::hole_blur_table,
-      bench::gelsight_frames_table, bench::light_growth_table, bench::device_frames_table};
-  for (const auto& make : tables) {
-    const bench::ResultTable table = make(options);
-    write_files(table, where, folder);
-    const std::string text = to_markdown(table);
-    page += text;
-    fmt::print("{}", text);
-    std::fflush(stdout);
-  }
-  write_whole_file(folder / "light.md", page);
-  fmt::print("\nWritten to {}\n", folder.string());
-}
-
-}  // namespace
-
 int main(int argc, char** argv) {
-  apps::choose_blas_kind(argv);
+  using namespace touchstone;
+  using namespace touchstone::bench;
+  const std::vector<std::pair<std::string, ResultTable (*)(const LightOptions&)>> tables = {
+      {"rays", bare_rays_table},        {"error", light_error_table},        {"frames", direct_frames_table},
+      {"blur", hole_blur_table},        {"gelsight", gelsight_frames_table}, {"growth", light_growth_table},
+      {"effects", light_effects_table}, {"devices", device_frames_table}};
+  std::vector<std::string> names;
+  for (const auto& [name, make] : tables) names.push_back(name);
   CLI::App app("The renderers' speed and error");
-  std::filesystem::path folder = "build/bench-results";
-  bool quick = false;
-  std::string date;
-  app.add_option("-o", folder, "Where CSV, SVG and light.md go");
-  app.add_flag("--quick", quick, "Under half a minute");
-  app.add_option("--date", date, "What the results shall say for their date");
-  CLI11_PARSE(app, argc, argv);
-  try {
-    measure(folder, quick, date);
-  } catch (const std::exception& error) {
-    fmt::print(stderr, "bench_light: {}\n", error.what());
-    return 1;
-  }
-  return 0;
+  std::vector<std::string> only;
+  app.add_option("--only", only, "These tables")->check(CLI::IsMember(names));
+  return report_main("light", app, argc, argv, [&](Report& report) {
+    const LightOptions options{report.quick(), sim::default_cache_folder()};
+    for (const auto& [name, make] : tables) {
+      if (only.empty() || std::find(only.begin(), only.end(), name) != only.end()) report.take(make(options));
+    }
+  });
 }

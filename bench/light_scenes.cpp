@@ -8,30 +8,36 @@ namespace touchstone::bench {
 
 using render::flat_spectrum;
 
+TriangleMesh height_field(int cells, const std::function<double(double x, double y)>& height) {
+  TriangleMesh mesh;
+  for (int j = 0; j <= cells; ++j) {
+    for (int i = 0; i <= cells; ++i) {
+      const double x = kBenchHalf * (2.0 * i / cells - 1.0);
+      const double y = kBenchHalf * (2.0 * j / cells - 1.0);
+      mesh.vertices.emplace_back(x, y, height(x, y));
+    }
+  }
+  for (int j = 0; j < cells; ++j) {
+    for (int i = 0; i < cells; ++i) {
+      const int a = j * (cells + 1) + i;
+      mesh.triangles.push_back({a, a + 1, a + cells + 2});
+      mesh.triangles.push_back({a, a + cells + 2, a + cells + 1});
+    }
+  }
+  return mesh;
+}
+
 render::Scene bench_scene(int triangles, int lamps, int bands, bool interreflection, double shift) {
   render::Scene scene;
   scene.media = {render::Medium{1.0, {}}, render::Medium{1.517, {}}, render::Medium{1.41, {}}};
   scene.faces = {{-7.0, 0, 1}, {-5.0, 1, 2}};
   scene.environment = flat_spectrum(bands, 0.0);
   scene.interreflection = interreflection;
-  TriangleMesh mesh;
-  const int n = static_cast<int>(std::lround(std::sqrt(triangles / 2.0)));
-  for (int j = 0; j <= n; ++j) {
-    for (int i = 0; i <= n; ++i) {
-      const double x = kBenchHalf * (2.0 * i / n - 1.0);
-      const double y = kBenchHalf * (2.0 * j / n - 1.0);
-      const double r2 = (x - shift) * (x - shift) + y * y;
-      const double s2 = (x - shift - 3.0) * (x - shift - 3.0) + (y - 1.0) * (y - 1.0);
-      mesh.vertices.emplace_back(x, y, -0.8 * std::exp(-r2 / 0.5) - 0.3 * std::exp(-s2 / 0.05));
-    }
-  }
-  for (int j = 0; j < n; ++j) {
-    for (int i = 0; i < n; ++i) {
-      const int a = j * (n + 1) + i;
-      mesh.triangles.push_back({a, a + 1, a + n + 2});
-      mesh.triangles.push_back({a, a + n + 2, a + n + 1});
-    }
-  }
+  TriangleMesh mesh = height_field(static_cast<int>(std::lround(std::sqrt(triangles / 2.0))), [&](double x, double y) {
+    const double r2 = (x - shift) * (x - shift) + y * y;
+    const double s2 = (x - shift - 3.0) * (x - shift - 3.0) + (y - 1.0) * (y - 1.0);
+    return -0.8 * std::exp(-r2 / 0.5) - 0.3 * std::exp(-s2 / 0.05);
+  });
   scene.surfaces.push_back({std::move(mesh), render::Lambertian{flat_spectrum(bands, 0.6)}});
   for (int bead = 0; bead < 9; ++bead) {
     scene.balls.push_back({{2.0 * (bead % 3) - 4.0, 2.0 * (bead / 3) - 2.0, -1.2},  // clear of the imprint

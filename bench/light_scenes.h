@@ -1,7 +1,10 @@
 #pragma once
 // What bench_light draws: a dented membrane on gel and glass, lit from the camera's side.
 
+#include <functional>
+
 #include "core/transform.h"
+#include "core/triangle_mesh.h"
 #include "render/light_field.h"
 #include "render/pinhole_camera.h"
 #include "render/scene.h"
@@ -9,6 +12,9 @@
 namespace touchstone::bench {
 
 inline constexpr double kBenchHalf = 10.0;  // mm, of the membrane; the camera sees 8.8
+
+/// z = height(x, y) over the square of kBenchHalf to each side, `cells` x `cells` squares of two triangles.
+TriangleMesh height_field(int cells, const std::function<double(double x, double y)>& height);
 
 /// Glass of 2 mm under 5 mm of gel; `lamps` low on a ring of 30 mm, 12 mm below the membrane, of 0.5 W in each band.
 /// The membrane has about `triangles` triangles and an imprint of 0.8 mm with a smaller one beside it, moved by `shift`

@@ -20,6 +20,8 @@ ResultTable light_error_table(const LightOptions& options);
 ResultTable direct_frames_table(const LightOptions& options);
 /// Growth with triangles, pixels and bands.
 ResultTable light_growth_table(const LightOptions& options);
+/// What each effect costs when it's on: rays and seconds against a plain scene.
+ResultTable light_effects_table(const LightOptions& options);
 /// The vhs device at its default accuracy.
 ResultTable device_frames_table(const LightOptions& options);
 

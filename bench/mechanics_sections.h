@@ -1,12 +1,12 @@
 #pragma once
 // What bench_mechanics measures, a table each.
 
-#include <chrono>
 #include <filesystem>
 #include <memory>
 #include <vector>
 
 #include "bench/result_table.h"
+#include "bench/stopwatch.h"
 #include "fem/compliance.h"
 #include "fem/press.h"
 #include "fem/slab.h"
@@ -16,14 +16,6 @@ namespace touchstone::bench {
 struct BenchOptions {
   bool quick = false;             ///< under half a minute
   std::filesystem::path scratch;  ///< an empty folder for caches and meshes
-};
-
-class Stopwatch {
- public:
-  double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - begun_).count(); }
-
- private:
-  std::chrono::steady_clock::time_point begun_ = std::chrono::steady_clock::now();
 };
 
 /// Median seconds of one step of a press that goes to and fro between two targets, after two steps to warm up; at least
