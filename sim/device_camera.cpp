@@ -45,15 +45,20 @@ render::Camera camera_of(const CameraSpec& camera) {
   return lens;
 }
 
-double blur_radius_px(const render::Camera& camera, double nearest_mm) {
+double blur_disc_px(const render::Camera& camera, double distance_mm) {
   if (const auto* lens = std::get_if<render::LensCamera>(&camera)) {
-    // A disc's diameter grows with the distance from the plane of focus on either side.
-    const double infinite = std::numeric_limits<double>::infinity();
-    const double blur = std::max(render::blur_circle_mm(*lens, nearest_mm), render::blur_circle_mm(*lens, infinite));
-    return 0.5e3 * blur / lens->pixel_pitch_um;
+    return 1e3 * render::blur_circle_mm(*lens, distance_mm) / lens->pixel_pitch_um;
   }
   const auto& pinhole = std::get<render::PinholeCamera>(camera);
-  return pinhole.hole_diameter_um / 2 * (1.0 + pinhole.distance_mm / nearest_mm) / pinhole.pixel_pitch_um;
+  return pinhole.hole_diameter_um * (1.0 + pinhole.distance_mm / distance_mm) / pinhole.pixel_pitch_um;
+}
+
+double blur_radius_px(const render::Camera& camera, double nearest_mm) {
+  // A lens's disc grows with the distance from the plane of focus on either side.
+  const double far = std::holds_alternative<render::LensCamera>(camera)
+                         ? blur_disc_px(camera, std::numeric_limits<double>::infinity())
+                         : 0.0;
+  return 0.5 * std::max(blur_disc_px(camera, nearest_mm), far);
 }
 
 }  // namespace touchstone::sim

@@ -10,6 +10,9 @@ namespace touchstone::sim {
 /// distortion can't be inverted inside the picture
 render::Camera camera_of(const CameraSpec& camera);
 
+/// The diameter in pixels of the disc to which a point at `distance_mm` before the camera is blurred by hole or lens.
+double blur_disc_px(const render::Camera& camera, double distance_mm);
+
 /// The largest radius in pixels of the disc to which a point of the scene, from `nearest_mm` before the camera to
 /// any distance, is blurred by hole or lens.
 double blur_radius_px(const render::Camera& camera, double nearest_mm);

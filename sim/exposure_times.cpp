@@ -11,7 +11,7 @@
 namespace touchstone::sim {
 namespace {
 
-constexpr double kPixelsApart = 0.25;  // light is taken as linear in time between moments so far apart
+constexpr double kPixelsApart = 0.25;  // light is taken as linear in time between moments so far apart, if sharp
 constexpr int kMostIntervals = 64;
 
 }  // namespace
@@ -43,6 +43,9 @@ ExposureTimes::ExposureTimes(const SceneSpec& scene, const Plan& plan)
   if (window_s_ == 0.0) return;
   between_states_s_ = 1.0 / (frame_rate_Hz_ * plan.states_a_frame);
   scale_.emplace(scene.device);
+  const bool own_choice = !plan.rolling_shutter && scene.effects.motion_blur == Switch::automatic;
+  if (own_choice) tolerance_px_ *= scale_->point_width();
+  apart_px_ = kPixelsApart * (plan.rolling_shutter ? 1.0 : scale_->point_width());
   object_radius_mm_ = largest_object_radius(scene);
 }
 
@@ -77,7 +80,7 @@ std::vector<double> ExposureTimes::of(const Truth& truth) const {
   if (window_s_ == 0.0) return {0.0};
   const double moved = pixels(truth);
   if (moved <= tolerance_px_) return {0.0};
-  const int intervals = std::clamp(static_cast<int>(std::ceil(moved / kPixelsApart)), 1, kMostIntervals);
+  const int intervals = std::clamp(static_cast<int>(std::ceil(moved / apart_px_)), 1, kMostIntervals);
   std::vector<double> times;
   for (int i = 0; i <= intervals; ++i) times.push_back(window_s_ * i / intervals);
   return times;

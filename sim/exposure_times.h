@@ -31,8 +31,9 @@ class ExposureTimes {
   void keep(std::vector<Truth>& truths, double now_s, const fem::PressState& state) const;
 
   /// The moments, s after a frame's begin, at which its light is computed: evenly over the window, so densely that
-  /// nothing moves more than a quarter of a pixel from one to the next, at least two and at most 65. A single one, the
-  /// begin, where nothing moves by more than the scene's `light.motion_tolerance_px`.
+  /// nothing moves more than a quarter of a pixel (of what a point's image is wide, if that is more) from one to the
+  /// next, at least two and at most 65. A single one, the begin, where nothing moves by more than the scene's
+  /// `light.motion_tolerance_px` (times that width, for motion blur that the scene doesn't force).
   std::vector<double> of(const Truth& truth) const;
 
  private:
@@ -43,6 +44,7 @@ class ExposureTimes {
   double frame_rate_Hz_ = 0.0;
   double between_states_s_ = 0.0;
   double tolerance_px_ = 0.0;
+  double apart_px_ = 0.0;
   double object_radius_mm_ = 0.0;
   std::optional<ImageScale> scale_;  // where the window isn't 0
 };

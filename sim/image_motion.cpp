@@ -67,6 +67,9 @@ ImageScale::ImageScale(const DeviceSpec& device) {
   pixels_per_mm_ = focal_pixels(eye) / distance;
   const double half_diagonal = 0.5 * std::hypot(camera.width, camera.height);
   pixels_per_mm_along_ = half_diagonal / distance;
+  // A disc of diameter d has the variance d^2 / 16 along a line, a pixel 1 / 12.
+  const double disc = blur_disc_px(eye, distance);
+  point_width_ = std::sqrt(1.0 + 12.0 / 16.0 * disc * disc);
 }
 
 double ImageScale::pixels(const Eigen::Vector3d& motion_mm) const {

@@ -15,11 +15,15 @@ class ImageScale {
   double pixels(const Eigen::Vector3d& motion_mm) const;
   /// Of a motion across the view.
   double pixels_across(double mm) const { return pixels_per_mm_ * mm; }
+  /// How many times as wide as a pixel the image of a point of the outer surface is (standard deviations along a line):
+  /// 1 where all is sharp. What moves within an exposure shows against that width.
+  double point_width() const { return point_width_; }
 
  private:
   Eigen::Vector3d axis_;        // along the view, gel frame
   double pixels_per_mm_ = 0.0;  // across it
   double pixels_per_mm_along_ = 0.0;
+  double point_width_ = 1.0;
 };
 
 /// How far at most something of an object (within `object_radius_mm` of its origin) or of the gel's surface moves in

@@ -29,7 +29,7 @@ struct Plan {
   bool interreflection = false;
   bool scattering = false;
   bool sensor_noise = false;
-  SceneBands bands;             ///< of the light; none without a picture
+  SceneBands bands;  ///< of the light; none without a picture
   bool motion_blur = false;
   bool rolling_shutter = false;
   bool events = false;

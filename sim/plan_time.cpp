@@ -62,15 +62,16 @@ void plan_time(const SceneSpec& scene, Plan& plan, PlanTable& table) {
   const bool light = scene.outputs.light();
   const double blur = speed.pixels_per_s * camera.exposure_us / kMicrosecondsPerSecond;
   const double skew = speed.pixels_per_s * camera.row_time_us * (camera.height - 1) / kMicrosecondsPerSecond;
+  const double sharp = tolerance * ImageScale(scene.device).point_width();
   const char* about = speed.led_by_force ? "some " : "";
   const char* cost = "a picture of what moves for every quarter of a pixel";
 
   plan.motion_blur = table.add(
-      "motion blur", light ? scene.effects.motion_blur : Switch::automatic, light && blur > tolerance,
+      "motion blur", light ? scene.effects.motion_blur : Switch::automatic, light && blur > sharp,
       !light ? "no picture is asked for"
              : fmt::format("in an exposure of {} us the image moves by up to {}{:.2g} pixels; allowed to leave out is "
                            "{:.2g}",
-                           camera.exposure_us, about, blur, tolerance),
+                           camera.exposure_us, about, blur, sharp),
       cost);
   plan.rolling_shutter = table.add(
       "rolling shutter", light ? scene.effects.rolling_shutter : Switch::automatic, light && skew > tolerance,

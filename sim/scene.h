@@ -46,8 +46,9 @@ struct LightSpec {
   int min_samples = 8;
   int max_samples = 64;
   double interreflection_tolerance = 0.05;  ///< part of a surface's light that may be left out
-  double motion_tolerance_px = 0.1;  ///< image motion during an exposure that needn't show as blur or rolling shutter
-  double change_tolerance = 0.25;    ///< a pixel that changed by less than this part of the noise keeps its old light
+  double motion_tolerance_px =
+      0.3;  ///< image motion that needn't show as rolling shutter or, times the camera's own blur, as motion blur
+  double change_tolerance = 0.25;  ///< a pixel that changed by less than this part of the noise keeps its old light
 };
 
 /// Pixels of the fine contact and of the height map: square, the map centred on the gel's origin.
