@@ -29,12 +29,12 @@ inline Eigen::Vector2i size_of(const ReadyCamera& camera) {
   return std::visit([](const auto& one) { return Eigen::Vector2i(one.width, one.height); }, camera);
 }
 
-/// Where it is: the middle of hole or lens is the origin of the camera frame.
+/// Where it is: the centre of hole or lens is the origin of the camera frame.
 inline const RigidTransform& pose_of(const ReadyCamera& camera) {
   return std::visit([](const auto& one) -> const RigidTransform& { return one.gel_from_camera; }, camera);
 }
 
-/// The unit vector of the camera frame along which an image point looks through the middle of hole or lens; nullopt
+/// The unit vector of the camera frame along which an image point looks through the centre of hole or lens; nullopt
 /// where a lens's distortion has no inverse.
 inline std::optional<Eigen::Vector3d> view_direction(const ReadyCamera& camera, double x, double y) {
   return std::visit([&](const auto& one) -> std::optional<Eigen::Vector3d> { return view_direction(one, x, y); },

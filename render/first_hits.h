@@ -1,6 +1,6 @@
 #pragma once
-// What each pixel of a camera sees first: one ray a pixel, the one that passes the middle of hole or lens and meets the
-// pixel's, bent at the flat faces. And the way back: where a point of the scene appears.
+// What each pixel of a camera sees first: one ray a pixel, through its centre and that of hole or lens, distorted as
+// the lens does and bent at the flat faces. And the way back: where a point of the scene appears.
 
 #include <Eigen/Core>
 #include <optional>
@@ -25,7 +25,7 @@ struct FirstHit {
 /// threads. @throws Error as check_scene
 std::vector<FirstHit> first_hits(const Scene& scene, const ReadyCamera& camera);
 
-/// Where `point` (gel frame) appears in pixels, seen through the middle of hole or lens and the scene's flat faces,
+/// Where `point` (gel frame) appears in pixels, seen through the centre of hole or lens and the scene's flat faces,
 /// whatever stands in between: p = n sin(angle) is the same in all layers (Snell), and the layers' ways across must add
 /// up to the point's distance from the camera's plumb line. nullopt if it's behind the camera, or level with it and not
 /// in its layer, or so far aside that no image point looks there (image_point).

@@ -1,11 +1,10 @@
 #pragma once
-// What is true of each pixel, for other people's networks: layers of one EXR. All come from one ray a pixel, the one
-// that passes the middle of hole or lens and meets the pixel's, with the lens's distortion and bent at the flat faces
-// (render/first_hits.h), so an edge is a step and blur by hole or lens isn't in them. The gel's outer surface counts as
-// the first hit even where the gel is clear.
+// What is true of each pixel, for other people's networks: layers of one EXR. All come from one ray a pixel, through
+// its centre and that of hole or lens (render/first_hits.h), so an edge is a step and blur by hole or lens isn't in
+// them. The gel's outer surface counts as the first hit even where the gel is clear.
 //
 // | output  | channels                     | meaning                                                               |
-// | depth   | depth.Z                      | mm from the middle of hole or lens along the optical axis, true place |
+// | depth   | depth.Z                      | mm from the centre of hole or lens along the optical axis, true place |
 // | normals | normal.X normal.Y normal.Z   | unit, gel frame, outward of the surface (+z on an undeformed gel)     |
 // | ids     | id.ID                        | see PixelId                                                           |
 // | contact | contact.Y                    | 1 where the gel's outer surface lies on an object, else 0             |
@@ -13,7 +12,8 @@
 // |         |                              | less where it is; the frame's is 0, an object beside the gel has none |
 // | error   | error.irradiance             | W/m^2, standard error over all bands (render::RenderedImage)          |
 //
-// Where a pixel sees nothing depth, normal and flow are NaN, id and contact 0.
+// Where a pixel sees nothing depth, normal and flow are NaN, id and contact 0. Flow is NaN, too, where the material
+// point lay so far aside that no image point of the distorted lens looked there.
 
 #include "render/camera.h"
 #include "sim/image_file.h"
