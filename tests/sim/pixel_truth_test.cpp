@@ -171,8 +171,8 @@ TEST_P(PixelTruthOf, ProjectionIsTheWayBackFromEveryHitOfATiltedCamera) {
     if (hits[i].object < 0) continue;
     const auto back = render::project_through_faces(seen.inside, camera, hits[i].position);
     ASSERT_TRUE(back);
-    EXPECT_NEAR(back->x(), static_cast<double>(i % 160) + 0.5, 5e-3);
-    EXPECT_NEAR(back->y(), static_cast<double>(i / 160) + 0.5, 5e-3);
+    EXPECT_NEAR(back->x(), static_cast<double>(i % 160) + 0.5, 2e-4);
+    EXPECT_NEAR(back->y(), static_cast<double>(i / 160) + 0.5, 2e-4);
     ++checked;
   }
   EXPECT_GT(checked, 1000);
