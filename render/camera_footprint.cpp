@@ -136,11 +136,6 @@ CameraFootprint::Kernel kernel_of(const Spread& spread, const Eigen::Vector2d& s
   return kernel;
 }
 
-Eigen::Vector2i size_of(const ReadyCamera& camera) {
-  const ImageGrid grid = pixel_grid(camera);
-  return {grid.columns, grid.rows};
-}
-
 }  // namespace
 
 std::vector<Eigen::Vector2d> footprint_blocks(const ReadyCamera& camera, int block) {

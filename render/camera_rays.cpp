@@ -6,7 +6,7 @@
 #include <array>
 #include <cmath>
 
-#include "render/fresnel.h"
+#include "render/flat_faces.h"
 #include "render/layer_connection.h"
 #include "render/sample_sequence.h"
 
@@ -14,17 +14,6 @@ namespace touchstone::render {
 namespace {
 
 constexpr float kFarAway = 1e6f;  // mm
-
-int layer_at(const Scene& scene, double z) {
-  int layer = 0;
-  while (layer < static_cast<int>(scene.faces.size()) && scene.faces[layer].z < z) ++layer;
-  return layer;
-}
-
-const Medium& medium_of(const Scene& scene, int layer) {
-  if (scene.faces.empty()) return scene.media[0];
-  return scene.media[layer == 0 ? scene.faces.front().medium_below : scene.faces[layer - 1].medium_above];
-}
 
 /// A face on the way, and the layer before it.
 struct Passed {
@@ -68,32 +57,23 @@ void add_stack(const std::array<Passed, kMaxLayers>& passed, int count, int band
   }
 }
 
-Followed follow(const Scene& scene, Eigen::Vector3d origin, Eigen::Vector3d direction, int layer) {
+Followed follow(const Scene& scene, const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, int layer) {
   const auto bands = static_cast<int>(scene.environment.size());
   Followed result;
   result.transmittance = flat_spectrum(bands, 1.0);
   result.reflectance = flat_spectrum(bands, 0.0);
-  int at = layer_at(scene, origin.z());
-  const bool up = direction.z() > 0.0;
+  RayInLayer ray{origin, direction, layer_of_height(scene.faces, origin.z())};
   std::array<Passed, kMaxLayers> passed;
   int count = 0;
   bool total = false;
-  while (at != layer) {
-    if (direction.z() == 0.0 || up != (layer > at)) return result;  // leads away
-    const Medium& before = medium_of(scene, at);
-    const double way = std::max(0.0, (scene.faces[up ? at : at - 1].z - origin.z()) / direction.z());
-    origin += way * direction;
-    origin.z() = scene.faces[up ? at : at - 1].z;
-    at += up ? 1 : -1;
-    const double n_from = before.index;
-    const double n_to = medium_of(scene, at).index;
-    const FresnelFace face = fresnel(n_from, n_to, std::abs(direction.z()));
+  while (ray.layer != layer) {
+    if (ray.direction.z() == 0.0 || ray.up() != (layer > ray.layer)) return result;  // leads away
+    const Medium& before = medium_of_layer(scene, ray.layer);
+    const double way = way_to_face(scene, ray);
+    const FresnelFace face = cross_face(scene, way, ray);
     passed[count++] = {face.reflectance_s, face.reflectance_p, way, &before};
     total = face.cos_refracted <= 0.0;
     if (total) break;
-    const double eta = n_from / n_to;
-    direction = Eigen::Vector3d(eta * direction.x(), eta * direction.y(), up ? face.cos_refracted : -face.cos_refracted)
-                    .normalized();
   }
   for (int band = 0; band < bands; ++band) {
     double r[2];
@@ -104,22 +84,10 @@ Followed follow(const Scene& scene, Eigen::Vector3d origin, Eigen::Vector3d dire
   }
   if (total) return result;
   result.arrives = true;
-  result.origin = origin;
-  result.direction = direction;
-  const int face_count = static_cast<int>(scene.faces.size());
-  if (direction.z() != 0.0 && (up ? layer < face_count : layer > 0)) {
-    const double face_z = scene.faces[up ? layer : layer - 1].z;
-    result.far = std::clamp((face_z - origin.z()) / direction.z(), 0.0, double(kFarAway));
-  }
+  result.origin = ray.origin;
+  result.direction = ray.direction;
+  result.far = std::min(way_to_face(scene, ray), double(kFarAway));
   return result;
-}
-
-const RigidTransform& place_of(const ReadyCamera& camera) {
-  return std::visit([](const auto& one) -> const RigidTransform& { return one.gel_from_camera; }, camera);
-}
-
-Eigen::Vector2i size_of(const ReadyCamera& camera) {
-  return std::visit([](const auto& one) { return Eigen::Vector2i(one.width, one.height); }, camera);
 }
 
 std::optional<CameraRay> ray_of(const ReadyCamera& camera, double x, double y, double u, double v) {
@@ -133,13 +101,13 @@ std::optional<CameraRay> ray_near(const ReadyCamera& camera, double x, double y,
   const double inside_y = std::clamp(y, 0.0, double(size.y()));
   const auto* lens = std::get_if<PreparedLens>(&camera);
   const bool beside = x != inside_x || y != inside_y;
-  if (beside && lens != nullptr && !sees(*lens, x, y)) return ray_of(camera, inside_x, inside_y, u, v);
+  if (beside && lens != nullptr && !view_direction(*lens, x, y)) return ray_of(camera, inside_x, inside_y, u, v);
   const std::optional<CameraRay> ray = ray_of(camera, x, y, u, v);
   return ray || !beside ? ray : ray_of(camera, inside_x, inside_y, u, v);
 }
 
 double index_at(const Scene& fixture, const RigidTransform& place) {
-  return medium_of(fixture, layer_at(fixture, place.translation.z())).index;
+  return medium_of_layer(fixture, layer_of_height(fixture.faces, place.translation.z())).index;
 }
 
 }  // namespace
@@ -153,7 +121,7 @@ std::optional<LayerRay> ray_in_layer(const Scene& fixture, const ReadyCamera& ca
                                      double u, double v) {
   const std::optional<CameraRay> ray = ray_near(camera, x, y, u, v);
   if (!ray) return std::nullopt;
-  const RigidTransform& place = place_of(camera);
+  const RigidTransform& place = pose_of(camera);
   const Followed end = follow(fixture, place * ray->origin, place.turn(ray->direction), layer);
   if (!end.arrives) return std::nullopt;
   const double index = index_at(fixture, place);
@@ -173,7 +141,7 @@ CameraRays trace_to_layer(const Scene& fixture, const ReadyCamera& camera, const
   rays.through.assign(packet_count * kPacket * bands, 0.0f);
   const bool dark = (fixture.environment == 0.0).all();
   if (!dark) rays.veil.assign(packet_count * kPacket * bands, 0.0f);
-  const RigidTransform& camera_place = place_of(camera);
+  const RigidTransform& camera_place = pose_of(camera);
   const double camera_index = index_at(fixture, camera_place);
 
   tbb::parallel_for(0, rays.tiles, [&](int tile) {

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "render/flat_faces.h"
 
 namespace touchstone::render {
 namespace {
@@ -29,21 +30,16 @@ DirectFixture::DirectFixture(const LightField& of, bool soft)
   const std::vector<FlatFace>& faces = field.fixture.faces;
   low = field.layer > 0 ? faces[field.layer - 1].z : -INFINITY;
   high = field.layer < static_cast<int>(faces.size()) ? faces[field.layer].z : INFINITY;
-  const auto medium_of = [&](int layer) -> const Medium& {
-    if (faces.empty()) return field.fixture.media[0];
-    return field.fixture.media[layer == 0 ? faces.front().medium_below : faces[layer - 1].medium_above];
-  };
-  const Medium& medium = medium_of(field.layer);
+  const Medium& medium = medium_of_layer(field.fixture, field.layer);
   for (Eigen::Index band = 0; band < medium.absorption.size(); ++band) {
     absorption[band] = static_cast<float>(medium.absorption[band]);
     absorbs = absorbs || medium.absorption[band] > 0.0;
   }
   for (const Lamp& lamp : field.fixture.lamps) {
     lens_frames.emplace_back(lamp_direction(lamp).normalized());
-    int layer = 0;
-    while (layer < static_cast<int>(faces.size()) && faces[layer].z < lamp_position(lamp).z()) ++layer;
+    const int layer = layer_of_height(faces, lamp_position(lamp).z());
     lens_radii.push_back(disc_radius(lamp));
-    lamp_index.push_back(medium_of(layer).index);
+    lamp_index.push_back(medium_of_layer(field.fixture, layer).index);
     lamp_in_layer.push_back(layer == field.layer);
   }
   const std::size_t lamps = field.intensity.size();

@@ -1,12 +1,12 @@
 #pragma once
-// What each pixel of a pinhole camera sees first: one ray a pixel, from the hole's centre through the pixel's, bent at
-// the flat faces. And the way back: where a point of the scene appears.
+// What each pixel of a camera sees first: one ray a pixel, through its centre and that of hole or lens, distorted as
+// the lens does and bent at the flat faces. And the way back: where a point of the scene appears.
 
 #include <Eigen/Core>
 #include <optional>
 #include <vector>
 
-#include "render/pinhole_camera.h"
+#include "render/camera.h"
 #include "render/scene.h"
 
 namespace touchstone::render {
@@ -22,14 +22,14 @@ struct FirstHit {
 
 /// The first surface or ball of every pixel, row by row: Refractive ones count as what they are, a hit. A ray that is
 /// totally reflected at a flat face meets nothing. Lamps and materials play no part. Pure: the same for any number of
-/// threads. @throws Error as check_scene and check_camera
-std::vector<FirstHit> first_hits(const Scene& scene, const PinholeCamera& camera);
+/// threads. @throws Error as check_scene
+std::vector<FirstHit> first_hits(const Scene& scene, const ReadyCamera& camera);
 
-/// Where `point` (gel frame) appears in pixels, seen through the hole's centre and the scene's flat faces, whatever
-/// stands in between: p = n sin(angle) is the same in all layers (Snell), and the layers' ways across must add up to
-/// the point's distance from the camera's plumb line. nullopt if it's behind the camera, or level with it and not in
-/// its layer.
-std::optional<Eigen::Vector2d> project_through_faces(const Scene& scene, const PinholeCamera& camera,
+/// Where `point` (gel frame) appears in pixels, seen through the centre of hole or lens and the scene's flat faces,
+/// whatever stands in between: p = n sin(angle) is the same in all layers (Snell), and the layers' ways across must add
+/// up to the point's distance from the camera's plumb line. nullopt if it's behind the camera, or level with it and not
+/// in its layer, or so far aside that no image point looks there (image_point).
+std::optional<Eigen::Vector2d> project_through_faces(const Scene& scene, const ReadyCamera& camera,
                                                      const Eigen::Vector3d& point);
 
 }  // namespace touchstone::render

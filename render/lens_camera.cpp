@@ -163,8 +163,21 @@ CameraRay lens_ray(const PreparedLens& camera, double x, double y, double u, dou
   return ray;
 }
 
-bool sees(const PreparedLens& camera, double x, double y) {
-  return undistort(camera.distortion, camera.reach, tangents_of(camera.matrix, x, y)).has_value();
+std::optional<Eigen::Vector3d> view_direction(const PreparedLens& camera, double x, double y) {
+  const auto seen = undistort(camera.distortion, camera.reach, tangents_of(camera.matrix, x, y));
+  if (!seen) return std::nullopt;
+  return Eigen::Vector3d(seen->x(), seen->y(), 1.0).normalized();
+}
+
+std::optional<Eigen::Vector2d> image_point(const PreparedLens& camera, const Eigen::Vector3d& direction) {
+  if (!(direction.z() > 0.0)) return std::nullopt;
+  const Eigen::Vector2d tangents = direction.head<2>() / direction.z();
+  const Eigen::Vector2d distorted = distort(camera.distortion, tangents);
+  // Beyond a fold the formula gives points that look elsewhere; only undistort knows which of them do.
+  const auto seen = undistort(camera.distortion, camera.reach, distorted);
+  constexpr double kSame = 1e-6;
+  if (!seen || !((*seen - tangents).norm() <= kSame * (1.0 + tangents.norm()))) return std::nullopt;
+  return pixel_of(camera.matrix, distorted);
 }
 
 Eigen::Vector2d project(const LensCamera& camera, const Eigen::Vector3d& point_in_camera) {

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <limits>
+#include <optional>
 
 #include "core/transform.h"
 #include "render/camera_ray.h"
@@ -72,9 +73,13 @@ PreparedLens prepare(const LensCamera& camera);
 /// @throws Error if the distortion can't be inverted there
 CameraRay lens_ray(const PreparedLens& camera, double x, double y, double u, double v);
 
-/// Can the distortion be inverted at this image point? Everywhere in a checked camera's picture, and beside it to some
-/// way.
-bool sees(const PreparedLens& camera, double x, double y);
+/// The unit vector of the camera frame along which an image point looks through the lens's centre; nullopt where the
+/// distortion can't be inverted: nowhere in a checked camera's picture, and beside it from some way on.
+std::optional<Eigen::Vector3d> view_direction(const PreparedLens& camera, double x, double y);
+
+/// The image point that looks along a vector of the camera frame; nullopt where none does: it doesn't point forwards,
+/// or so far aside that the formula of the distortion has folded the picture back.
+std::optional<Eigen::Vector2d> image_point(const PreparedLens& camera, const Eigen::Vector3d& direction);
 
 /// Where a point of the camera frame in front of the lens appears (pixels of core/transform.h), seen through the lens's
 /// centre in air: cv::projectPoints plus half a pixel.

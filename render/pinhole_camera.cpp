@@ -188,6 +188,17 @@ std::optional<CameraRay> pinhole_ray(const PinholeCamera& camera, double x, doub
   return ray;
 }
 
+Eigen::Vector3d view_direction(const PinholeCamera& camera, double x, double y) {
+  const double pitch = camera.pixel_pitch_um * 1e-3;
+  return Eigen::Vector3d((x - 0.5 * camera.width) * pitch, (y - 0.5 * camera.height) * pitch, camera.distance_mm)
+      .normalized();
+}
+
+std::optional<Eigen::Vector2d> image_point(const PinholeCamera& camera, const Eigen::Vector3d& direction) {
+  if (!(direction.z() > 0.0)) return std::nullopt;
+  return project(camera, direction);
+}
+
 Eigen::Vector2d project(const PinholeCamera& camera, const Eigen::Vector3d& point_in_camera) {
   TS_ASSERT(point_in_camera.z() > 0.0);
   const double scale = camera.distance_mm / (point_in_camera.z() * camera.pixel_pitch_um * 1e-3);

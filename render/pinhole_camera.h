@@ -31,6 +31,12 @@ void check_camera(const PinholeCamera& camera);
 /// past both rims, so cos^4 fall-off and the foil's shadow come out of the geometry. nullopt where the foil hides all.
 std::optional<CameraRay> pinhole_ray(const PinholeCamera& camera, double x, double y, double u, double v);
 
+/// The unit vector of the camera frame along which an image point looks through the hole's centre.
+Eigen::Vector3d view_direction(const PinholeCamera& camera, double x, double y);
+
+/// The image point that looks along a vector of the camera frame; nullopt where it doesn't point forwards.
+std::optional<Eigen::Vector2d> image_point(const PinholeCamera& camera, const Eigen::Vector3d& direction);
+
 /// Where a point of the camera frame in front of the hole appears (pixels), seen through the hole's centre in air.
 Eigen::Vector2d project(const PinholeCamera& camera, const Eigen::Vector3d& point_in_camera);
 

@@ -9,6 +9,7 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
+#include "render/flat_faces.h"
 #include "render/lamp.h"
 #include "render/scene.h"
 #include "render/spectrum.h"
@@ -55,13 +56,6 @@ struct PreparedLamp {
 
   explicit PreparedLamp(const Eigen::Vector3d& axis) : frame(axis) {}
 };
-
-/// The number of faces below a height.
-inline int layer_of_height(const std::vector<FlatFace>& faces, double z) {
-  int layer = 0;
-  while (layer < static_cast<int>(faces.size()) && faces[layer].z < z) ++layer;
-  return layer;
-}
 
 /// @pre check_lamp holds
 template <int N>

@@ -127,11 +127,7 @@ struct PreparedScene {
 
   int layer_at(double z) const { return layer_of_height(faces, z); }
 
-  /// The medium of a layer where no Refractive surface says otherwise.
-  int medium_of_layer(int layer) const {
-    if (faces.empty()) return 0;
-    return layer == 0 ? faces.front().medium_below : faces[layer - 1].medium_above;
-  }
+  int medium_of_layer(int layer) const { return render::medium_of_layer(faces, layer); }
 
  private:
   void add_print(const Surface& surface) {

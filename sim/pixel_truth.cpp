@@ -51,12 +51,14 @@ SeenPoint beyond_point(const SeenGeometry& seen, const render::FirstHit& hit) {
 
 }  // namespace
 
-LinearImage pixel_truth(const SeenGeometry& seen, const render::PinholeCamera& camera, const OutputSpec& outputs) {
+LinearImage pixel_truth(const SeenGeometry& seen, const render::Camera& camera_of, const OutputSpec& outputs) {
+  const render::ReadyCamera camera = render::make_ready(camera_of);
+  const Eigen::Vector2i size = render::size_of(camera);
   const std::vector<render::FirstHit> inside = render::first_hits(seen.inside, camera);
   std::vector<render::FirstHit> beyond;
   const bool gaps = std::any_of(inside.begin(), inside.end(), [](const auto& hit) { return hit.object < 0; });
   if (gaps) beyond = render::first_hits(seen.beyond, camera);
-  const RigidTransform camera_from_gel = camera.gel_from_camera.inverse();
+  const RigidTransform camera_from_gel = render::pose_of(camera).inverse();
 
   LinearImage out;
   const auto channels = [&](bool wanted, std::initializer_list<const char*> names) {
@@ -69,13 +71,13 @@ LinearImage pixel_truth(const SeenGeometry& seen, const render::PinholeCamera& c
   channels(outputs.flow, {"flow.X", "flow.Y"});
   TS_ASSERT(!out.channel_names.empty());
   const auto count = static_cast<int>(out.channel_names.size());
-  out.image.create(camera.height, camera.width, CV_32FC(count));
+  out.image.create(size.y(), size.x(), CV_32FC(count));
 
-  tbb::parallel_for(0, camera.height, [&](int row) {
+  tbb::parallel_for(0, size.y(), [&](int row) {
     auto* value = out.image.ptr<float>(row);
-    for (int column = 0; column < camera.width; ++column) {
+    for (int column = 0; column < size.x(); ++column) {
       const auto i =
-          static_cast<std::size_t>(row) * static_cast<std::size_t>(camera.width) + static_cast<std::size_t>(column);
+          static_cast<std::size_t>(row) * static_cast<std::size_t>(size.x()) + static_cast<std::size_t>(column);
       SeenPoint point;
       if (inside[i].object >= 0) {
         point = inside_point(seen, inside[i]);

@@ -1,10 +1,10 @@
 #pragma once
 // What is true of each pixel, for other people's networks: layers of one EXR. All come from one ray a pixel, through
-// the hole's centre and the pixel's, bent at the flat faces (render/first_hits.h), so an edge is a step and blur by the
-// hole isn't in them. The gel's outer surface counts as the first hit even where the gel is clear.
+// its centre and that of hole or lens (render/first_hits.h), so an edge is a step and blur by hole or lens isn't in
+// them. The gel's outer surface counts as the first hit even where the gel is clear.
 //
 // | output  | channels                     | meaning                                                               |
-// | depth   | depth.Z                      | mm from the hole's centre along the optical axis, to the true place   |
+// | depth   | depth.Z                      | mm from the centre of hole or lens along the optical axis, true place |
 // | normals | normal.X normal.Y normal.Z   | unit, gel frame, outward of the surface (+z on an undeformed gel)     |
 // | ids     | id.ID                        | see PixelId                                                           |
 // | contact | contact.Y                    | 1 where the gel's outer surface lies on an object, else 0             |
@@ -12,9 +12,10 @@
 // |         |                              | less where it is; the frame's is 0, an object beside the gel has none |
 // | error   | error.irradiance             | W/m^2, standard error over all bands (render::RenderedImage)          |
 //
-// Where a pixel sees nothing depth, normal and flow are NaN, id and contact 0.
+// Where a pixel sees nothing depth, normal and flow are NaN, id and contact 0. Flow is NaN, too, where the material
+// point lay so far aside that no image point of the distorted lens looked there.
 
-#include "render/pinhole_camera.h"
+#include "render/camera.h"
 #include "sim/image_file.h"
 #include "sim/scene.h"
 #include "sim/seen_geometry.h"
@@ -33,7 +34,8 @@ struct PixelId {
 };
 
 /// The layers that `outputs` asks for, in the order of the table, but for `error`. Pure.
-LinearImage pixel_truth(const SeenGeometry& seen, const render::PinholeCamera& camera, const OutputSpec& outputs);
+/// @throws Error as render::make_ready
+LinearImage pixel_truth(const SeenGeometry& seen, const render::Camera& camera, const OutputSpec& outputs);
 
 /// Adds a CV_32FC1 picture of the same size as another channel.
 void add_channel(LinearImage& image, const cv::Mat& channel, const std::string& name);

@@ -260,10 +260,6 @@ void plan_light(const SceneSpec& scene, Plan& plan, PlanTable& table) {
             scene.device.where.file);
   }
   const bool hits = scene.outputs.first_hits();
-  if (hits && scene.device.camera->type == CameraType::lens) {
-    fail_at(scene.where, "outputs: depth, normals, ids, contact and flow can't be had with a lens (device '{}') yet",
-            scene.device.name);
-  }
   table.add(
       "truth of pixels", hits,
       hits ? "depth, normals, ids, contact or flow is asked for" : "none of depth, normals, ids, contact, flow is",

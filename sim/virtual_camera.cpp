@@ -108,7 +108,7 @@ struct VirtualCamera::Parts : SceneSight {
       const SeenGeometry seen = relief && relief->grid.size() > 0
                                     ? seen_geometry(scene, plan, objects, *membrane, truth.press, *relief)
                                     : seen_geometry(scene, plan, objects, gel, truth.press);
-      capture.pixel_truth = pixel_truth(seen, std::get<render::PinholeCamera>(camera), scene.outputs);
+      capture.pixel_truth = pixel_truth(seen, camera, scene.outputs);
     }
     return capture;
   }

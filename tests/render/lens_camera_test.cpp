@@ -336,6 +336,40 @@ TEST(LensCamera, BadFieldsAreNamed) {
   EXPECT_EQ(focus_of_sensor(4.0, 4.0), kInfinite);
 }
 
+TEST(LensImage, TheImagePointOfAViewIsTheOneThatLooksThere) {
+  const PreparedLens lens = prepare(calibrated_lens());
+  for (double x : {0.0, 0.5, 123.4, 331.7, 500.0, 640.0}) {
+    for (double y : {0.0, 77.7, 226.4, 400.0, 480.0}) {
+      const auto view = view_direction(lens, x, y);
+      ASSERT_TRUE(view);
+      EXPECT_NEAR(view->norm(), 1.0, 1e-15);
+      EXPECT_LT((*view - lens_ray(lens, x, y, 0.5, 0.5).direction).norm(), 1e-12)
+          << "as light through the centre comes";
+      const auto back = image_point(lens, 7.0 * *view);
+      ASSERT_TRUE(back);
+      EXPECT_LT((*back - Eigen::Vector2d(x, y)).norm(), 1e-9);
+    }
+  }
+  EXPECT_FALSE(image_point(lens, {0.1, 0.2, -1.0}));
+  EXPECT_FALSE(image_point(lens, {1.0, 0.0, 0.0}));
+}
+
+// By the formula alone, with k1 = -0.3, what is seen along a tangent of 1.8 would appear as near the middle as 0.05.
+TEST(LensImage, BeyondTheFoldNoImagePointLooks) {
+  LensCamera camera = wide_lens();
+  camera.width = 32;
+  camera.height = 24;
+  camera.matrix = matrix_of_lens(4.0, 50.0, 100.0, 32, 24);
+  camera.distortion.k1 = -0.3;
+  const PreparedLens lens = prepare(camera);
+  EXPECT_NEAR(lens.reach.undistorted, 1.0 / std::sqrt(0.9), 1e-9);
+  EXPECT_TRUE(image_point(lens, {1.05, 0.0, 1.0}));
+  for (double tangent : {1.06, 1.3, 1.8, 1e3, 1e200}) {
+    EXPECT_FALSE(image_point(lens, {tangent, 0.0, 1.0})) << tangent;
+  }
+  EXPECT_FALSE(view_direction(lens, 1e4, 20.0));
+}
+
 TEST(LensImage, IsUprightAndWhereProjectSays) {
   LensCamera camera = calibrated_lens();
   camera.width = 80;

@@ -206,28 +206,31 @@ TEST(LightDevice, CoatingHidesTheObjectAndPrintMovesWithTheGel) {
 }
 
 TEST(LightDevice, PrintedMarkersHaveIdsOfTheirOwn) {
-  std::string pinhole = R"(camera: {width: 64, height: 64, pixel_pitch_um: 60, hole_diameter_um: 100,
+  const std::string pinhole = R"(camera: {width: 64, height: 64, pixel_pitch_um: 60, hole_diameter_um: 100,
   hole_to_sensor_mm: 6, hole_position_mm: [0, 0, -16], look_at_mm: [0, 0, 0], exposure_us: 100, full_well_e: 10000}
-coating: {type: matt, albedo: 0.9, print: {grid: [3, 3], spacing_mm: [3, 3], diameter_mm: 2}}
 )";
-  SceneSpec scene = scene_of(device(pinhole));
-  scene.outputs = parse_yaml<OutputSpec>("{frames: false, ids: true, contact: true}", "outputs.yaml");
-  const Seen seen = see(scene);
-  const Capture capture = seen.camera->capture(seen.truths.back());
-  std::map<int, int> pixels;
-  bool middle_in_contact = false;
-  for (int row = 0; row < 64; ++row) {
-    for (int column = 0; column < 64; ++column) {
-      const auto at = capture.pixel_truth.image.ptr<cv::Vec2f>(row)[column];
-      ++pixels[static_cast<int>(at[0])];
-      if (row == 32 && column == 32) middle_in_contact = at[1] == 1.0f;
+  const std::string print =
+      "coating: {type: matt, albedo: 0.9, print: {grid: [3, 3], spacing_mm: [3, 3], diameter_mm: 2}}\n";
+  for (const std::string& camera : {pinhole, kCamera + "  distortion: [-0.3, 0, 0, 0]\n"}) {
+    SceneSpec scene = scene_of(device(camera + print));
+    scene.outputs = parse_yaml<OutputSpec>("{frames: false, ids: true, contact: true}", "outputs.yaml");
+    const Seen seen = see(scene);
+    const Capture capture = seen.camera->capture(seen.truths.back());
+    std::map<int, int> pixels;
+    bool middle_in_contact = false;
+    for (int row = 0; row < 64; ++row) {
+      for (int column = 0; column < 64; ++column) {
+        const auto at = capture.pixel_truth.image.ptr<cv::Vec2f>(row)[column];
+        ++pixels[static_cast<int>(at[0])];
+        if (row == 32 && column == 32) middle_in_contact = at[1] == 1.0f;
+      }
     }
+    EXPECT_TRUE(middle_in_contact);  // the marker's id stands even where the gel lies on the ball
+    for (int marker = 0; marker < 9; ++marker) {
+      EXPECT_GT(pixels[PixelId::kFirstMarker + marker], 50) << marker;  // pi r^2 is some 70 pixels, or 130
+    }
+    EXPECT_GT(pixels[PixelId::kGel], 500);
   }
-  EXPECT_TRUE(middle_in_contact);  // the marker's id stands even where the gel lies on the ball
-  for (int marker = 0; marker < 9; ++marker) {
-    EXPECT_GT(pixels[PixelId::kFirstMarker + marker], 50) << marker;  // pi r^2 is some 70 pixels
-  }
-  EXPECT_GT(pixels[PixelId::kGel], 500);
 }
 
 TEST(LightDevice, JitterMovesMarkersWithinItsRangeAndByTheSeedOnly) {

@@ -11,83 +11,27 @@
 
 #include "core/error.h"
 #include "render/first_hits.h"
-#include "sim/virtual_sensor.h"
-#include "tests/support/small_scene.h"
-#include "tests/support/temporary_folder.h"
+#include "sim/device_camera.h"
+#include "tests/sim/pixel_truth_scene.h"
 
 namespace touchstone::sim {
 namespace {
 
 using ::testing::HasSubstr;
 
-/// A pad of 12 x 12 x 4 mm with 2 x 2 beads, a camera of 160 x 120 pixels that looks straight up through the plate.
-SceneSpec small_scene(const std::string& keys) {
-  SceneSpec scene;
-  scene.device = test::small_device({.width = 160, .height = 120, .pixel_pitch_um = 18, .bead_spacing_mm = 5});
-  scene.object =
-      parse_yaml<ObjectSpec>("name: ball\nshape: {type: sphere, radius_mm: 4}\nfriction: 0.7\n", "ball.yaml");
-  scene.motion = parse_yaml<MotionSpec>("start_mm: [0, 0, 4.5]\nkeys:\n" + keys, "motion.yaml");
-  scene.outputs = parse_yaml<OutputSpec>(
-      "{frames: false, depth: true, normals: true, ids: true, contact: true, flow: true}", "outputs.yaml");
-  scene.light.max_samples = 16;
-  scene.light.min_samples = 8;
-  return scene;
-}
-
-const test::TemporaryFolder& cache() {
-  static const test::TemporaryFolder folder;
-  return folder;
-}
-
-struct Played {
-  SceneSpec scene;
-  Plan plan;
-  std::shared_ptr<const fem::Compliance> gel;
-  std::vector<Truth> truths;
-
-  explicit Played(SceneSpec scene_of) : scene(std::move(scene_of)), plan(make_plan(scene)) {
-    gel = set_up_gel(scene.device, cache().path());
-    truths = play_motion(scene, plan, *gel);
+/// What holds through a hole and through a lens.
+class PixelTruthOf : public ::testing::TestWithParam<CameraType> {
+ protected:
+  static SceneSpec seen_by(SceneSpec scene) {
+    if (GetParam() == CameraType::lens) make_lens(*scene.device.camera);
+    return scene;
   }
-  Capture last() const { return VirtualCamera(scene, plan, *gel, truths.front()).capture(truths.back()); }
 };
+INSTANTIATE_TEST_SUITE_P(Cameras, PixelTruthOf, ::testing::Values(CameraType::pinhole, CameraType::lens),
+                         [](const auto& of) { return of.param == CameraType::lens ? "Lens" : "Pinhole"; });
 
-const char* const kPress = "  - {frames: 1, z: {position_mm: 3.6}}\n  - {frames: 1, x: {position_mm: 0.15}}\n";
-
-const Played& pressed() {
-  static const Played played(small_scene(kPress));
-  return played;
-}
-
-cv::Mat channel(const LinearImage& image, const std::string& name) {
-  const auto found = std::find(image.channel_names.begin(), image.channel_names.end(), name);
-  EXPECT_NE(found, image.channel_names.end()) << name;
-  cv::Mat plane;
-  cv::extractChannel(image.image, plane, static_cast<int>(found - image.channel_names.begin()));
-  return plane;
-}
-
-/// Where a point appears: the angle in air by bisection, on the sum of the layers' ways by Snell's law.
-Eigen::Vector2d projected_by_bisection(const DeviceSpec& device, const Eigen::Vector3d& point) {
-  const CameraSpec& camera = *device.camera;
-  const double glass_low = -device.gel.thickness_mm - device.plate.thickness_mm;
-  const double air = glass_low - camera.hole_position_mm.z();
-  const double r = point.head<2>().norm();
-  double low = 0.0, high = 1.5;
-  for (int i = 0; i < 200; ++i) {
-    const double angle = 0.5 * (low + high);
-    const double in_glass = std::asin(std::sin(angle) / device.plate.refractive_index);
-    const double in_gel = std::asin(std::sin(angle) / device.gel.refractive_index);
-    const double way = air * std::tan(angle) + device.plate.thickness_mm * std::tan(in_glass) +
-                       (point.z() + device.gel.thickness_mm) * std::tan(in_gel);
-    (way < r ? low : high) = angle;
-  }
-  const double scale = std::tan(low) * camera.hole_to_sensor_mm / (camera.pixel_pitch_um * 1e-3) / std::max(r, 1e-12);
-  return {0.5 * camera.width + scale * point.x(), 0.5 * camera.height + scale * point.y()};
-}
-
-TEST(PixelTruth, AFlatGelIsAtItsTrueDepthAndDoesNotFlow) {
-  SceneSpec scene = small_scene("  - {frames: 1, z: {position_mm: 4.4}}\n");
+TEST_P(PixelTruthOf, AFlatGelIsAtItsTrueDepthAndDoesNotFlow) {
+  SceneSpec scene = seen_by(small_scene("  - {frames: 1, z: {position_mm: 4.4}}\n"));
   scene.device.beads.reset();
   const Capture capture = Played(scene).last();
   EXPECT_TRUE(capture.frame.empty());
@@ -108,8 +52,9 @@ TEST(PixelTruth, AFlatGelIsAtItsTrueDepthAndDoesNotFlow) {
   EXPECT_EQ(gel, 160 * 120);
 }
 
-TEST(PixelTruth, BeadsAreCountedAndFlowAsTheirDisplacementSays) {
-  const Played& p = pressed();
+TEST_P(PixelTruthOf, BeadsAreCountedAndFlowAsTheirDisplacementSays) {
+  Played p = pressed();
+  p.scene = seen_by(p.scene);
   const Capture capture = p.last();
   const cv::Mat ids = channel(capture.pixel_truth, "id.ID");
   const cv::Mat x = channel(capture.pixel_truth, "flow.X"), y = channel(capture.pixel_truth, "flow.Y");
@@ -213,21 +158,21 @@ TEST(PixelTruth, ADeviceWithoutACameraIsRefused) {
   }
 }
 
-TEST(FirstHits, ProjectionIsTheWayBackFromEveryHitOfATiltedCamera) {
+TEST_P(PixelTruthOf, ProjectionIsTheWayBackFromEveryHitOfATiltedCamera) {
   const Played& p = pressed();
-  SceneSpec scene = p.scene;
+  SceneSpec scene = seen_by(p.scene);
   scene.device.camera->hole_position_mm = {3.0, -2.0, -16.0};
   const std::vector<VisibleObject> objects = visible_objects(scene);
   const SeenGeometry seen = seen_geometry(scene, make_plan(scene), objects, VisibleGel(*p.gel), p.truths.back().press);
-  const render::PinholeCamera camera = pinhole_camera(*scene.device.camera);
+  const render::ReadyCamera camera = render::make_ready(camera_of(*scene.device.camera));
   const std::vector<render::FirstHit> hits = render::first_hits(seen.inside, camera);
   int checked = 0;
   for (std::size_t i = 0; i < hits.size(); i += 7) {
     if (hits[i].object < 0) continue;
     const auto back = render::project_through_faces(seen.inside, camera, hits[i].position);
     ASSERT_TRUE(back);
-    EXPECT_NEAR(back->x(), static_cast<double>(i % 160) + 0.5, 5e-3);
-    EXPECT_NEAR(back->y(), static_cast<double>(i / 160) + 0.5, 5e-3);
+    EXPECT_NEAR(back->x(), static_cast<double>(i % 160) + 0.5, 2e-4);
+    EXPECT_NEAR(back->y(), static_cast<double>(i / 160) + 0.5, 2e-4);
     ++checked;
   }
   EXPECT_GT(checked, 1000);
