@@ -257,7 +257,7 @@ class Run {
     tbb::parallel_for(std::size_t{0}, needed.size(), [&](std::size_t k) {
       const std::size_t i = needed[k];
       const PreparedScene& scene = job_.scenes[i];
-      cameras[i] = source_.set_up_camera(scene.spec, scene.plan, gel_, numbered(i, 0));
+      cameras[i] = source_.set_up_camera(scene.spec, scene.plan, gel_, truths_[i]);
       counter.step();
     });
     return cameras;

@@ -29,10 +29,11 @@ struct Plan {
   bool interreflection = false;
   bool scattering = false;
   bool sensor_noise = false;
-  SceneBands bands;             ///< of the light; none without a picture
+  SceneBands bands;  ///< of the light; none without a picture
   bool motion_blur = false;
   bool rolling_shutter = false;
   bool events = false;
+  bool direct_light = false;    ///< to be tried; VirtualCamera measures whether it holds (sim/direct_light.h)
   int states_a_frame = 1;       ///< pressed states that are kept from one frame to the next
   std::vector<Effect> effects;  ///< the same for people, with reasons
 };

@@ -48,6 +48,7 @@ struct LightSpec {
   double interreflection_tolerance = 0.05;  ///< part of a surface's light that may be left out
   double motion_tolerance_px = 0.1;  ///< image motion during an exposure that needn't show as blur or rolling shutter
   double change_tolerance = 0.25;    ///< a pixel that changed by less than this part of the noise keeps its old light
+  double direct_tolerance = 0.015;   ///< RMS difference from path tracing that direct light may have, relative
 };
 
 /// Pixels of the fine contact and of the height map: square, the map centred on the gel's origin.
@@ -77,6 +78,7 @@ struct EffectSwitches {
   Switch relaxation = Switch::automatic;
   Switch inertia = Switch::automatic;
   Switch interreflection = Switch::automatic;
+  Switch direct_light = Switch::automatic;
   Switch motion_blur = Switch::automatic;
   Switch rolling_shutter = Switch::automatic;
   Switch sensor_noise = Switch::automatic;

@@ -5,6 +5,7 @@
 #include "core/units.h"
 #include "render/rolling_shutter.h"
 #include "sim/device_camera.h"
+#include "sim/direct_light.h"
 #include "sim/exposure_times.h"
 #include "sim/pixel_truth.h"
 #include "sim/scene_sight.h"
@@ -68,6 +69,8 @@ struct VirtualCamera::Parts : SceneSight {
   render::ImagerResponse response;
   render::FixedPattern pattern;
   render::RenderSettings settings;
+  std::unique_ptr<const DirectLight> direct;  // where it holds; the first frame is then not needed
+  LightChoice choice{false, "paths: the plan has no direct light", {}};
   cv::Mat first_light;    // irradiance of the first frame
   cv::Mat first_error;    // its standard error
   cv::Mat first_preview;  // its preview without noise
@@ -135,7 +138,18 @@ struct VirtualCamera::Parts : SceneSight {
     if (!scene.outputs.light()) return geometry(truth, now);
     const std::vector<double> times = exposure.of(truth);
     if (times.size() > 1) return take_over_time(truth, now, times, whole);
-    const render::Tracer at_once = tracer(truth.press, now);
+    render::Scene scene_now = seen(truth.press, now);
+    if (direct) {
+      if (const auto image = direct->render(scene_now)) {
+        render::RayCounts counts;
+        counts.paths = counts.primary = image->primary;
+        Capture capture = develop(image->irradiance, {}, truth, now, counts, size.area());
+        capture.direct = true;
+        return capture;
+      }
+      whole = true;  // there is no first frame to lean on
+    }
+    const render::Tracer at_once(std::move(scene_now));
     const cv::Mat mask = whole ? all_pixels() : changed(at_once.preview(camera, kPreviewStride));
     const int pixels = cv::countNonZero(mask);
     if (pixels == 0) return develop(first_light, first_error, truth, now, {}, 0);
@@ -189,15 +203,25 @@ struct VirtualCamera::Parts : SceneSight {
   }
 };
 
-VirtualCamera::VirtualCamera(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel, const Truth& first) {
-  TS_ASSERT(plan.camera && scene.device.camera);
+VirtualCamera::VirtualCamera(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel,
+                             std::span<const Truth> truths) {
+  TS_ASSERT(plan.camera && scene.device.camera && !truths.empty());
   auto parts = std::make_unique<Parts>(scene, plan, gel);
   if (!scene.outputs.light() || plan.scattering) {
     parts_ = std::move(parts);
     return;
   }
+  if (plan.direct_light) {
+    auto direct = std::make_unique<const DirectLight>(*parts, parts->camera, truths);
+    parts->choice = direct->choice();
+    if (direct->choice().direct) {
+      parts->direct = std::move(direct);
+      parts_ = std::move(parts);
+      return;
+    }
+  }
   render::RenderSettings settings = parts->settings;
-  const render::Tracer tracer = parts->tracer(first.press);
+  const render::Tracer tracer = parts->tracer(truths.front().press);
   settings.noise->fraction *= kFirstFrameFraction;
   settings.max_samples *= kFirstFrameSamples;
   const render::RenderedImage image = tracer.render(parts->camera, settings);
@@ -208,6 +232,10 @@ VirtualCamera::VirtualCamera(const SceneSpec& scene, const Plan& plan, const fem
 }
 
 VirtualCamera::~VirtualCamera() = default;
+
+const LightChoice& VirtualCamera::light_choice() const {
+  return parts_->choice;
+}
 
 Capture VirtualCamera::capture(const Truth& truth) const {
   // A preview knows nothing of scattered light.
