@@ -98,7 +98,6 @@ void render(const RenderOptions& options, const GlobalOptions& global) {
   sim::Capture capture;
   std::string warning;
   std::string summary;
-  std::string light;
   {
     ProgressBar bar(global.quiet);
     const Progress progress = bar.listener();
@@ -107,11 +106,7 @@ void render(const RenderOptions& options, const GlobalOptions& global) {
     const auto elastic = sim::set_up_elastic_objects(scene, plan, global.cache);
     const std::vector<sim::Truth> truths = sim::play_motion(scene, plan, *gel, progress, vibration.get(), elastic);
     const sim::Truth& wanted = truths[static_cast<std::size_t>(frame)];
-    if (picture || truth) {
-      const sim::VirtualCamera camera(scene, plan, *gel, truths);
-      capture = camera.capture(wanted);
-      light = camera.light_choice().reason;
-    }
+    if (picture || truth) capture = sim::VirtualCamera(scene, plan, *gel, truths).capture(wanted);
     if (!options.gltf.empty()) {
       const sim::FrameGeometry geometry = sim::frame_geometry(scene, *gel, wanted.press);
       sim::write_glb(options.gltf, geometry.parts, geometry.cameras);
@@ -126,7 +121,7 @@ void render(const RenderOptions& options, const GlobalOptions& global) {
   }
   if (!warning.empty()) spdlog::warn("{}", warning);
   if (!summary.empty()) spdlog::info("{}", summary);
-  if (plan.direct_light) spdlog::info("light: {}", light);
+  if (!capture.light.empty()) spdlog::info("{}", capture.light);
   if (truth) sim::write_exr(options.truth, capture.pixel_truth.image, capture.pixel_truth.channel_names);
   if (picture) sim::write_png(options.out, options.ideal ? capture.ideal : capture.frame);
   if (options.exr) {

@@ -134,6 +134,15 @@ struct VirtualCamera::Parts : SceneSight {
   }
 
   Capture take(const Truth& truth, bool whole) const {
+    Capture capture = take_light(truth, whole);
+    if (plan.direct_light && scene.outputs.light()) {
+      const bool beyond = direct && !capture.direct;
+      capture.light = beyond ? "paths: the gel has gone beyond the light field" : choice.reason;
+    }
+    return capture;
+  }
+
+  Capture take_light(const Truth& truth, bool whole) const {
     const auto now = relief(truth.press);
     if (!scene.outputs.light()) return geometry(truth, now);
     const std::vector<double> times = exposure.of(truth);

@@ -55,6 +55,7 @@ struct Capture {
   std::int64_t paths_traced = 0;
   std::int64_t pixels_traced = 0;
   bool direct = false;  ///< the light is direct light from a light field
+  std::string light;    ///< where the plan has direct light: how this picture is lit and why, for people
 };
 
 /// Where set-up results are kept between runs: $TOUCHSTONE_CACHE, else $XDG_CACHE_HOME/touchstone, else
