@@ -13,7 +13,6 @@ std::string unfit_for_direct_light(const SceneSpec& scene, const Plan& plan) {
     if (lamp.type == LampType::guide) return "a lamp is a light guide, whose light has edges that no coarse grid holds";
     if (lamp.visible) return "a lamp has a body that is seen";
   }
-  if (plan.motion_blur || plan.rolling_shutter) return "an exposure is made of several moments";
   if (plan.events) return "event pixels' light is path-traced, and frames beside them are to match it";
   if (scene.outputs.error) return "the standard error of path tracing is asked for";
   return {};

@@ -146,25 +146,49 @@ struct VirtualCamera::Parts : SceneSight {
     const auto now = relief(truth.press);
     if (!scene.outputs.light()) return geometry(truth, now);
     const std::vector<double> times = exposure.of(truth);
-    if (times.size() > 1) return take_over_time(truth, now, times, whole);
-    render::Scene scene_now = seen(truth.press, now);
     if (direct) {
-      if (const auto image = direct->render(scene_now)) {
-        render::RayCounts counts;
-        counts.paths = counts.primary = image->primary;
-        Capture capture = develop(image->irradiance, {}, truth, now, counts, size.area());
-        capture.direct = true;
-        return capture;
-      }
+      if (auto capture = take_direct(truth, now, times)) return *std::move(capture);
       whole = true;  // there is no first frame to lean on
     }
-    const render::Tracer at_once(std::move(scene_now));
+    if (times.size() > 1) return take_over_time(truth, now, times, whole);
+    const render::Tracer at_once = tracer(truth.press, now);
     const cv::Mat mask = whole ? all_pixels() : changed(at_once.preview(camera, kPreviewStride));
     const int pixels = cv::countNonZero(mask);
     if (pixels == 0) return develop(first_light, first_error, truth, now, {}, 0);
     const render::RenderedImage image = at_once.render(camera, settings, mask);
     return develop(with_first(image.irradiance, first_light, mask), with_first(image.standard_error, first_error, mask),
                    truth, now, image.counts, pixels);
+  }
+
+  /// By direct light; nothing if at one of the moments the gel has gone where the light field doesn't reach.
+  std::optional<Capture> take_direct(const Truth& truth, const std::optional<fem::ReliefAnswer>& now,
+                                     const std::vector<double>& times) const {
+    std::optional<render::RollingExposure> sum;
+    if (times.size() > 1) sum.emplace(times, shutter_timing(), size, plan.bands.count());
+    render::RayCounts counts;
+    cv::Mat irradiance;
+    for (std::size_t i = 0; i < times.size(); ++i) {
+      const bool later = times[i] > 0.0;
+      const fem::PressState press = later ? state_after(truth, times[i]) : truth.press;
+      const auto image = direct->render(seen(press, later ? relief(press) : now));
+      if (!image) return std::nullopt;
+      counts.paths += image->primary;
+      counts.primary += image->primary;
+      irradiance = image->irradiance;
+      if (sum) sum->add(i, irradiance);
+    }
+    if (sum) irradiance = sum->irradiance();
+    Capture capture =
+        develop(irradiance, {}, truth, now, counts, static_cast<std::int64_t>(times.size()) * size.area());
+    capture.direct = true;
+    return capture;
+  }
+
+  render::ShutterTiming shutter_timing() const {
+    render::ShutterTiming timing;
+    if (plan.motion_blur) timing.exposure_s = scene.device.camera->exposure_us / kMicrosecondsPerSecond;
+    if (plan.rolling_shutter) timing.line_time_s = scene.device.camera->row_time_us / kMicrosecondsPerSecond;
+    return timing;
   }
 
   /// Light of the moments `times` (s) after the frame's begin, each row's mean over its own exposure. The moments have
@@ -183,9 +207,7 @@ struct VirtualCamera::Parts : SceneSight {
     }
     const int pixels = cv::countNonZero(mask);
     if (pixels == 0) return develop(first_light, first_error, truth, now, {}, 0);
-    render::ShutterTiming timing;
-    if (plan.motion_blur) timing.exposure_s = scene.device.camera->exposure_us / kMicrosecondsPerSecond;
-    if (plan.rolling_shutter) timing.line_time_s = scene.device.camera->row_time_us / kMicrosecondsPerSecond;
+    const render::ShutterTiming timing = shutter_timing();
     render::RenderSettings of_moment = settings;
     const double intervals_of_row = timing.exposure_s / times.back() * static_cast<double>(times.size() - 1);
     of_moment.noise = noise_target(response, scene.light.noise_fraction * std::sqrt(std::max(1.0, intervals_of_row)));
