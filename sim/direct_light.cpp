@@ -3,12 +3,14 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <iterator>
 
 namespace touchstone::sim {
 namespace {
 
-constexpr double kSpareReach = 0.25;    // of the widest displacement, for states that weren't looked at
-constexpr double kSpareReachMm = 0.05;  // and for what is laid onto a body
+constexpr double kSpareReach = 0.25;       // of the widest displacement, for states that weren't looked at
+constexpr double kSpareReachMm = 0.05;     // and for what is laid onto a body
+constexpr int kRaysTried[] = {1, 16, 64};  // a pixel; with one, shadows of wide lamps have no soft rims
 constexpr double kFarAway_mm = 1e4;
 
 /// The gel as nothing presses it.
@@ -97,10 +99,15 @@ DirectLight::DirectLight(const SceneSight& sight, const render::Camera& camera, 
   const render::Scene pressed = with_blacks(sight.seen(judged.press, sight.relief(judged.press)));
   render::DirectChoiceSettings settings;
   settings.tolerance = scene.light.direct_tolerance;
-  settings.whatever = forced;
   settings.direct.seed = settings.error.seed = settings.rest.seed = scene.seed;
-  render::DirectChoice chosen = render::choose_direct(
-      rest, pressed, camera, reach_of(rest, pressed, truths, -scene.device.gel.thickness_mm), settings);
+  const Eigen::AlignedBox3d reach = reach_of(rest, pressed, truths, -scene.device.gel.thickness_mm);
+  render::DirectChoice chosen;
+  for (const int rays : kRaysTried) {
+    settings.direct.samples = rays;
+    settings.whatever = forced && rays == *std::rbegin(kRaysTried);
+    chosen = render::choose_direct(rest, pressed, camera, reach, settings);
+    if (chosen.renderer || chosen.error.pixels == 0) break;
+  }
   if (chosen.error.pixels > 0) choice_.error = chosen.error;
   if (!chosen.renderer) {
     if (forced) fail_at(scene.where, "effects.direct_light: on, but {}", chosen.reason);
@@ -110,7 +117,9 @@ DirectLight::DirectLight(const SceneSight& sight, const render::Camera& camera, 
     return;
   }
   choice_.direct = true;
-  choice_.reason = with_figures("direct light", chosen.error);
+  const int rays = settings.direct.samples;
+  choice_.reason =
+      with_figures(rays == 1 ? "direct light" : fmt::format("direct light of {} rays a pixel", rays), chosen.error);
   settings_ = settings.direct;
   rest_ = rest;
   rest_.interreflection = false;
