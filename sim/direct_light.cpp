@@ -10,6 +10,7 @@ namespace {
 
 constexpr double kSpareReach = 0.25;       // of the widest displacement, for states that weren't looked at
 constexpr double kSpareReachMm = 0.05;     // and for what is laid onto a body
+constexpr int kPathsToMeasure = 256;       // a pixel, for a standard error of a tenth of a percent
 constexpr int kRaysTried[] = {1, 16, 64};  // a pixel; with one, shadows of wide lamps have no soft rims
 constexpr double kFarAway_mm = 1e4;
 
@@ -100,6 +101,7 @@ DirectLight::DirectLight(const SceneSight& sight, const render::Camera& camera, 
   render::DirectChoiceSettings settings;
   settings.tolerance = scene.light.direct_tolerance;
   settings.direct.seed = settings.error.seed = settings.rest.seed = scene.seed;
+  settings.error.samples = kPathsToMeasure;
   const Eigen::AlignedBox3d reach = reach_of(rest, pressed, truths, -scene.device.gel.thickness_mm);
   render::DirectChoice chosen;
   for (const int rays : kRaysTried) {
