@@ -106,7 +106,7 @@ void render(const RenderOptions& options, const GlobalOptions& global) {
     const auto elastic = sim::set_up_elastic_objects(scene, plan, global.cache);
     const std::vector<sim::Truth> truths = sim::play_motion(scene, plan, *gel, progress, vibration.get(), elastic);
     const sim::Truth& wanted = truths[static_cast<std::size_t>(frame)];
-    if (picture || truth) capture = sim::VirtualCamera(scene, plan, *gel, truths.front()).capture(wanted);
+    if (picture || truth) capture = sim::VirtualCamera(scene, plan, *gel, truths).capture(wanted);
     if (!options.gltf.empty()) {
       const sim::FrameGeometry geometry = sim::frame_geometry(scene, *gel, wanted.press);
       sim::write_glb(options.gltf, geometry.parts, geometry.cameras);
@@ -121,6 +121,7 @@ void render(const RenderOptions& options, const GlobalOptions& global) {
   }
   if (!warning.empty()) spdlog::warn("{}", warning);
   if (!summary.empty()) spdlog::info("{}", summary);
+  if (!capture.light.empty()) spdlog::info("{}", capture.light);
   if (truth) sim::write_exr(options.truth, capture.pixel_truth.image, capture.pixel_truth.channel_names);
   if (picture) sim::write_png(options.out, options.ideal ? capture.ideal : capture.frame);
   if (options.exr) {

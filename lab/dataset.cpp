@@ -167,6 +167,13 @@ class Run {
       work.pixels_traced += record->pixels_traced;
       work.paths_traced += record->paths_traced;
     }
+    work.light.resize(job_.scenes.size());
+    for (std::size_t i = 0; i < job_.scenes.size(); ++i) {
+      for (std::int64_t frame = 0; frame < job_.scenes[i].samples; ++frame) {
+        const auto& record = record_of({i, frame});
+        if (record && !record->light.empty()) ++work.light[i][record->light];
+      }
+    }
     files.push_back(written(out_, "truth.h5"));
     std::sort(files.begin(), files.end(), [](const WrittenFile& a, const WrittenFile& b) { return a.name < b.name; });
     RunTimings timings;
@@ -257,7 +264,7 @@ class Run {
     tbb::parallel_for(std::size_t{0}, needed.size(), [&](std::size_t k) {
       const std::size_t i = needed[k];
       const PreparedScene& scene = job_.scenes[i];
-      cameras[i] = source_.set_up_camera(scene.spec, scene.plan, gel_, numbered(i, 0));
+      cameras[i] = source_.set_up_camera(scene.spec, scene.plan, gel_, truths_[i]);
       counter.step();
     });
     return cameras;
@@ -278,6 +285,7 @@ class Run {
     record.sample = scene.first_sample + place.frame;
     record.pixels_traced = capture.pixels_traced;
     record.paths_traced = capture.paths_traced;
+    record.light = capture.light;
     const auto png = [&](const std::string& folder, const cv::Mat& picture) {
       const std::string name = picture_name(folder, scene.entry.name, place.frame, "png");
       sim::write_png(out_ / name, picture);

@@ -95,8 +95,10 @@ std::string manifest_text(const PreparedJob& job, const RunIdentity& identity, c
   manifest["gel_mesh"] = {{"tetrahedra", gel.tetrahedra},
                           {"unknowns", gel.unknowns},
                           {"smallest_dihedral_deg", std::round(100.0 * gel.smallest_dihedral_deg) / 100.0}};
-  for (const PreparedScene& scene : job.scenes) {
-    manifest["scenes"].push_back(scene_json(scene, job.file.parent_path()));
+  for (std::size_t i = 0; i < job.scenes.size(); ++i) {
+    ordered_json scene = scene_json(job.scenes[i], job.file.parent_path());
+    for (const auto& [how, samples] : work.light[i]) scene["light"].push_back({{"how", how}, {"samples", samples}});
+    manifest["scenes"].push_back(std::move(scene));
   }
   for (const ArrayShape& array : arrays) {
     manifest["arrays"].push_back(

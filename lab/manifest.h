@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <string>
 #include <utility>
 #include <vector>
@@ -19,6 +20,8 @@ struct CountedWork {
   std::int64_t pictures = 0;
   std::int64_t pixels_traced = 0;
   std::int64_t paths_traced = 0;
+  /// By scene: how its pictures are lit (sim::Capture::light), and how many so; where the plan has direct light.
+  std::vector<std::map<std::string, std::int64_t>> light;
 };
 
 /// Wall times and what they are for: different in every run.

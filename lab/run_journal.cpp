@@ -23,7 +23,8 @@ std::string line_of(const FrameRecord& record) {
   return json{{"sample", record.sample},
               {"files", std::move(files)},
               {"pixels", record.pixels_traced},
-              {"paths", record.paths_traced}}
+              {"paths", record.paths_traced},
+              {"light", record.light}}
              .dump() +
          "\n";
 }
@@ -35,6 +36,7 @@ std::optional<FrameRecord> record_of(const std::string& line) {
     record.sample = parsed.at("sample").get<std::int64_t>();
     record.pixels_traced = parsed.at("pixels").get<std::int64_t>();
     record.paths_traced = parsed.at("paths").get<std::int64_t>();
+    record.light = parsed.at("light").get<std::string>();
     for (const json& file : parsed.at("files")) {
       record.files.push_back(
           {file.at(0).get<std::string>(), file.at(1).get<std::string>(), file.at(2).get<std::int64_t>()});

@@ -22,6 +22,7 @@ struct FrameRecord {
   std::vector<WrittenFile> files;
   std::int64_t pixels_traced = 0;
   std::int64_t paths_traced = 0;
+  std::string light;  ///< sim::Capture::light
 };
 
 /// The records of a journal; none if there is no such file. Lines that are broken off or aren't records are passed

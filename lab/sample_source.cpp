@@ -17,7 +17,7 @@ SampleSource simulator(const std::filesystem::path& cache_folder) {
     return sim::play_motion(scene, plan, gel, progress, vibration.get(), elastic);
   };
   source.set_up_camera = [](const sim::SceneSpec& scene, const sim::Plan& plan,
-                            std::shared_ptr<const fem::Compliance> gel, const sim::Truth& first) {
+                            std::shared_ptr<const fem::Compliance> gel, std::span<const sim::Truth> truths) {
     if (!plan.camera) {
       TS_ASSERT(scene.outputs.height);
       auto membrane = std::make_shared<const sim::Membrane>(scene, plan, *gel);
@@ -27,7 +27,7 @@ SampleSource simulator(const std::filesystem::path& cache_folder) {
         return capture;
       });
     }
-    auto camera = std::make_shared<const sim::VirtualCamera>(scene, plan, *gel, first);
+    auto camera = std::make_shared<const sim::VirtualCamera>(scene, plan, *gel, truths);
     return SampleSource::Camera([camera](const sim::Truth& truth) { return camera->capture(truth); });
   };
   source.watch_events = [cache_folder](const sim::SceneSpec& scene, const sim::Plan& plan, const fem::Compliance& gel,

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "sim/event_stream.h"
@@ -20,8 +21,8 @@ struct SampleSource {
                                         const Progress&)>
       play_motion;
   std::function<Camera(const sim::SceneSpec&, const sim::Plan&, std::shared_ptr<const fem::Compliance>,
-                       const sim::Truth& first)>
-      set_up_camera;
+                       std::span<const sim::Truth> truths)>
+      set_up_camera;  ///< `truths` as sim::VirtualCamera takes them
   /// For scenes whose plan has event pixels. `noise_seed` as in sim::watch_events.
   std::function<sim::EventStreamReport(const sim::SceneSpec&, const sim::Plan&, const fem::Compliance&,
                                        std::uint64_t noise_seed, const sim::EventSink&, const Progress&)>

@@ -36,10 +36,15 @@ struct DirectChoice {
   std::unique_ptr<DirectRenderer> renderer;  ///< null where direct light won't do; `reason` then says why
   std::string reason;
   DirectError error;  ///< of `first`, if it was drawn
+  /// What the renderer was made of, for further ones that draw the same pictures: with the camera and `rest` without
+  /// interreflection, and set_bounced_light.
+  LightField field;
+  cv::Mat bounced;
 };
 
 struct DirectChoiceSettings {
   double tolerance = 0.015;  ///< of the root mean square difference, with twice its standard error
+  bool whatever = false;     ///< the error is measured, but any will do
   DirectSettings direct;
   DirectErrorSettings error;
   RestLightSettings rest;  ///< used where the scene asks for interreflection

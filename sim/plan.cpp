@@ -5,6 +5,7 @@
 
 #include "core/units.h"
 #include "fem/vibration.h"
+#include "sim/plan_direct.h"
 #include "sim/plan_table.h"
 #include "sim/plan_time.h"
 #include "sim/scene_bands.h"
@@ -321,7 +322,10 @@ Plan make_plan(const SceneSpec& scene) {
   plan_mechanics(scene, plan, table);
   plan_relief(scene, plan, table);
   plan_light(scene, plan, table);
-  if (plan.camera) plan_time(scene, plan, table);
+  if (plan.camera) {
+    plan_time(scene, plan, table);
+    plan_direct_light(scene, plan, table);
+  }
   return plan;
 }
 

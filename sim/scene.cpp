@@ -58,6 +58,7 @@ void fields(YamlReader& in, LightSpec& light) {
   in.optional("interreflection_tolerance", light.interreflection_tolerance, Allowed::within(0.0, 1.0));
   in.optional("motion_tolerance_px", light.motion_tolerance_px, Allowed::at_least(0.0));
   in.optional("change_tolerance", light.change_tolerance, Allowed::at_least(0.0));
+  in.optional("direct_tolerance", light.direct_tolerance, Allowed::above_up_to(0.0, 1.0));
 }
 
 void fields(YamlReader& in, EffectSwitches& effects) {
@@ -68,6 +69,7 @@ void fields(YamlReader& in, EffectSwitches& effects) {
   in.optional("relaxation", effects.relaxation);
   in.optional("inertia", effects.inertia);
   in.optional("interreflection", effects.interreflection);
+  in.optional("direct_light", effects.direct_light);
   in.optional("motion_blur", effects.motion_blur);
   in.optional("rolling_shutter", effects.rolling_shutter);
   in.optional("sensor_noise", effects.sensor_noise);

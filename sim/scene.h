@@ -48,7 +48,8 @@ struct LightSpec {
   double interreflection_tolerance = 0.05;  ///< part of a surface's light that may be left out
   double motion_tolerance_px =
       0.3;  ///< image motion that needn't show as rolling shutter or, times the camera's own blur, as motion blur
-  double change_tolerance = 0.25;  ///< a pixel that changed by less than this part of the noise keeps its old light
+  double change_tolerance = 0.25;   ///< a pixel that changed by less than this part of the noise keeps its old light
+  double direct_tolerance = 0.015;  ///< RMS difference from path tracing that direct light may have, relative
 };
 
 /// Pixels of the fine contact and of the height map: square, the map centred on the gel's origin.
@@ -78,6 +79,7 @@ struct EffectSwitches {
   Switch relaxation = Switch::automatic;
   Switch inertia = Switch::automatic;
   Switch interreflection = Switch::automatic;
+  Switch direct_light = Switch::automatic;
   Switch motion_blur = Switch::automatic;
   Switch rolling_shutter = Switch::automatic;
   Switch sensor_noise = Switch::automatic;

@@ -13,11 +13,9 @@ std::optional<fem::ReliefAnswer> SceneSight::relief(const fem::PressState& press
   return membrane ? membrane->relief(press) : std::nullopt;
 }
 
-render::Tracer SceneSight::tracer(const fem::PressState& press, const std::optional<fem::ReliefAnswer>& relief) const {
-  if (relief && relief->grid.size() > 0) {
-    return render::Tracer(visible_scene(scene, plan, objects, *membrane, press, *relief));
-  }
-  return render::Tracer(visible_scene(scene, plan, objects, gel, press));
+render::Scene SceneSight::seen(const fem::PressState& press, const std::optional<fem::ReliefAnswer>& relief) const {
+  if (relief && relief->grid.size() > 0) return visible_scene(scene, plan, objects, *membrane, press, *relief);
+  return visible_scene(scene, plan, objects, gel, press);
 }
 
 }  // namespace touchstone::sim

@@ -19,7 +19,11 @@ struct SceneSight {
 
   /// The fine contact, where it's called for.
   std::optional<fem::ReliefAnswer> relief(const fem::PressState& press) const;
-  render::Tracer tracer(const fem::PressState& press, const std::optional<fem::ReliefAnswer>& relief) const;
+  /// `relief` as relief() gave it.
+  render::Scene seen(const fem::PressState& press, const std::optional<fem::ReliefAnswer>& relief) const;
+  render::Tracer tracer(const fem::PressState& press, const std::optional<fem::ReliefAnswer>& relief) const {
+    return render::Tracer(seen(press, relief));
+  }
   render::Tracer tracer(const fem::PressState& press) const { return tracer(press, relief(press)); }
 
   SceneSpec scene;

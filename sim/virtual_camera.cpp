@@ -5,6 +5,7 @@
 #include "core/units.h"
 #include "render/rolling_shutter.h"
 #include "sim/device_camera.h"
+#include "sim/direct_light.h"
 #include "sim/exposure_times.h"
 #include "sim/pixel_truth.h"
 #include "sim/scene_sight.h"
@@ -18,11 +19,14 @@ constexpr int kPreviewStride = 2;
 constexpr double kFirstFrameFraction = 0.5;
 constexpr int kFirstFrameSamples = 4;
 
-/// The response of the channel that the eye and most trackers lean on: green of three, or the grey one.
+/// The electrons of all channels together, as many as the one that sees most: a lamp of one colour counts even if the
+/// first samples of a pixel never chose it.
 render::NoiseTarget noise_target(const render::ImagerResponse& response, double fraction) {
+  const render::QuantumEfficiency& channels = response.electrons_per_irradiance;
   render::NoiseTarget target;
-  const int channel = response.electrons_per_irradiance.rows() == 1 ? 0 : 1;
-  target.electrons_per_irradiance = response.electrons_per_irradiance.row(channel).transpose().array();
+  target.electrons_per_irradiance = channels.colwise().sum().transpose().array();
+  const double all = target.electrons_per_irradiance.sum();
+  if (all > 0.0) target.electrons_per_irradiance *= channels.rowwise().sum().maxCoeff() / all;
   target.read_noise_e = response.read_noise_e;
   target.quantisation_e = response.quantisation_e / std::sqrt(12.0);
   target.fraction = fraction;
@@ -68,6 +72,8 @@ struct VirtualCamera::Parts : SceneSight {
   render::ImagerResponse response;
   render::FixedPattern pattern;
   render::RenderSettings settings;
+  std::unique_ptr<const DirectLight> direct;  // where it holds; the first frame is then not needed
+  LightChoice choice{false, "paths: the plan has no direct light", {}};
   cv::Mat first_light;    // irradiance of the first frame
   cv::Mat first_error;    // its standard error
   cv::Mat first_preview;  // its preview without noise
@@ -131,9 +137,22 @@ struct VirtualCamera::Parts : SceneSight {
   }
 
   Capture take(const Truth& truth, bool whole) const {
+    Capture capture = take_light(truth, whole);
+    if (plan.direct_light && scene.outputs.light()) {
+      const bool beyond = direct && !capture.direct;
+      capture.light = beyond ? "paths: the gel has gone beyond the light field" : choice.reason;
+    }
+    return capture;
+  }
+
+  Capture take_light(const Truth& truth, bool whole) const {
     const auto now = relief(truth.press);
     if (!scene.outputs.light()) return geometry(truth, now);
     const std::vector<double> times = exposure.of(truth);
+    if (direct) {
+      if (auto capture = take_direct(truth, now, times)) return *std::move(capture);
+      whole = true;  // there is no first frame to lean on
+    }
     if (times.size() > 1) return take_over_time(truth, now, times, whole);
     const render::Tracer at_once = tracer(truth.press, now);
     const cv::Mat mask = whole ? all_pixels() : changed(at_once.preview(camera, kPreviewStride));
@@ -142,6 +161,37 @@ struct VirtualCamera::Parts : SceneSight {
     const render::RenderedImage image = at_once.render(camera, settings, mask);
     return develop(with_first(image.irradiance, first_light, mask), with_first(image.standard_error, first_error, mask),
                    truth, now, image.counts, pixels);
+  }
+
+  /// By direct light; nothing if at one of the moments the gel has gone where the light field doesn't reach.
+  std::optional<Capture> take_direct(const Truth& truth, const std::optional<fem::ReliefAnswer>& now,
+                                     const std::vector<double>& times) const {
+    std::optional<render::RollingExposure> sum;
+    if (times.size() > 1) sum.emplace(times, shutter_timing(), size, plan.bands.count());
+    render::RayCounts counts;
+    cv::Mat irradiance;
+    for (std::size_t i = 0; i < times.size(); ++i) {
+      const bool later = times[i] > 0.0;
+      const fem::PressState press = later ? state_after(truth, times[i]) : truth.press;
+      const auto image = direct->render(seen(press, later ? relief(press) : now));
+      if (!image) return std::nullopt;
+      counts.paths += image->primary;
+      counts.primary += image->primary;
+      irradiance = image->irradiance;
+      if (sum) sum->add(i, irradiance);
+    }
+    if (sum) irradiance = sum->irradiance();
+    Capture capture =
+        develop(irradiance, {}, truth, now, counts, static_cast<std::int64_t>(times.size()) * size.area());
+    capture.direct = true;
+    return capture;
+  }
+
+  render::ShutterTiming shutter_timing() const {
+    render::ShutterTiming timing;
+    if (plan.motion_blur) timing.exposure_s = scene.device.camera->exposure_us / kMicrosecondsPerSecond;
+    if (plan.rolling_shutter) timing.line_time_s = scene.device.camera->row_time_us / kMicrosecondsPerSecond;
+    return timing;
   }
 
   /// Light of the moments `times` (s) after the frame's begin, each row's mean over its own exposure. The moments have
@@ -160,9 +210,7 @@ struct VirtualCamera::Parts : SceneSight {
     }
     const int pixels = cv::countNonZero(mask);
     if (pixels == 0) return develop(first_light, first_error, truth, now, {}, 0);
-    render::ShutterTiming timing;
-    if (plan.motion_blur) timing.exposure_s = scene.device.camera->exposure_us / kMicrosecondsPerSecond;
-    if (plan.rolling_shutter) timing.line_time_s = scene.device.camera->row_time_us / kMicrosecondsPerSecond;
+    const render::ShutterTiming timing = shutter_timing();
     render::RenderSettings of_moment = settings;
     const double intervals_of_row = timing.exposure_s / times.back() * static_cast<double>(times.size() - 1);
     of_moment.noise = noise_target(response, scene.light.noise_fraction * std::sqrt(std::max(1.0, intervals_of_row)));
@@ -189,15 +237,25 @@ struct VirtualCamera::Parts : SceneSight {
   }
 };
 
-VirtualCamera::VirtualCamera(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel, const Truth& first) {
-  TS_ASSERT(plan.camera && scene.device.camera);
+VirtualCamera::VirtualCamera(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel,
+                             std::span<const Truth> truths) {
+  TS_ASSERT(plan.camera && scene.device.camera && !truths.empty());
   auto parts = std::make_unique<Parts>(scene, plan, gel);
   if (!scene.outputs.light() || plan.scattering) {
     parts_ = std::move(parts);
     return;
   }
+  if (plan.direct_light) {
+    auto direct = std::make_unique<const DirectLight>(*parts, parts->camera, truths);
+    parts->choice = direct->choice();
+    if (direct->choice().direct) {
+      parts->direct = std::move(direct);
+      parts_ = std::move(parts);
+      return;
+    }
+  }
   render::RenderSettings settings = parts->settings;
-  const render::Tracer tracer = parts->tracer(first.press);
+  const render::Tracer tracer = parts->tracer(truths.front().press);
   settings.noise->fraction *= kFirstFrameFraction;
   settings.max_samples *= kFirstFrameSamples;
   const render::RenderedImage image = tracer.render(parts->camera, settings);
@@ -208,6 +266,10 @@ VirtualCamera::VirtualCamera(const SceneSpec& scene, const Plan& plan, const fem
 }
 
 VirtualCamera::~VirtualCamera() = default;
+
+const LightChoice& VirtualCamera::light_choice() const {
+  return parts_->choice;
+}
 
 Capture VirtualCamera::capture(const Truth& truth) const {
   // A preview knows nothing of scattered light.

@@ -4,6 +4,9 @@
 #include <filesystem>
 #include <memory>
 #include <opencv2/core/mat.hpp>
+#include <optional>
+#include <span>
+#include <string>
 #include <vector>
 
 #include "core/progress.h"
@@ -11,6 +14,7 @@
 #include "fem/press.h"
 #include "fem/press_error.h"
 #include "fem/vibration.h"
+#include "render/direct_error.h"
 #include "sim/elastic_object.h"
 #include "sim/image_file.h"
 #include "sim/plan.h"
@@ -34,6 +38,13 @@ struct Truth {
                                   ///< in order, to the first at or after the exposure's end or the motion's end
 };
 
+/// How a camera's light is computed, and why.
+struct LightChoice {
+  bool direct = false;                       ///< from a light field (render/direct_renderer.h); else by path tracing
+  std::string reason;                        ///< for people
+  std::optional<render::DirectError> error;  ///< of direct light, where it was measured
+};
+
 /// What a camera makes of one Truth. Pictures that weren't asked for are empty.
 struct Capture {
   cv::Mat frame;            ///< 8 bit BGR or grey, with noise as planned
@@ -43,6 +54,8 @@ struct Capture {
   LinearImage pixel_truth;  ///< the layers of sim/pixel_truth.h that were asked for
   std::int64_t paths_traced = 0;
   std::int64_t pixels_traced = 0;
+  bool direct = false;  ///< the light is direct light from a light field
+  std::string light;    ///< where the plan has direct light: how this picture is lit and why, for people
 };
 
 /// Where set-up results are kept between runs: $TOUCHSTONE_CACHE, else $XDG_CACHE_HOME/touchstone, else
@@ -66,12 +79,21 @@ std::vector<Truth> play_motion(const SceneSpec& scene, const Plan& plan, const f
                                const Progress& progress = {}, const fem::GelVibration* vibration = nullptr,
                                const std::vector<std::shared_ptr<const fem::Compliance>>& elastic = {});
 
-/// The camera of a scene. Its constructor renders the first frame well; each capture traces again only the pixels that
-/// changed. `capture` is a pure function of its arguments and may be called from several threads.
+/// The camera of a scene. Where the plan has direct light, the constructor measures whether it holds the scene's
+/// tolerance; if so, pictures are made with it, but for those of a gel that went beyond where it was looked for. Else
+/// the constructor renders the first frame well, and each capture traces again only the pixels that changed. `capture`
+/// is a pure function of its argument and the constructor's and may be called from several threads.
 class VirtualCamera {
  public:
-  VirtualCamera(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel, const Truth& first);
+  /// `truths` are the scene's, or those of it that pictures are made of: the first one is where the light of later
+  /// frames is taken from, and the one that is pressed deepest is what direct light is judged by.
+  /// @throws Error with the scene's place if the scene switches direct light on and it can't be had
+  VirtualCamera(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel, std::span<const Truth> truths);
+  /// For a scene of a single state, or one whose further ones aren't known.
+  VirtualCamera(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel, const Truth& first)
+      : VirtualCamera(scene, plan, gel, std::span<const Truth>(&first, 1)) {}
   ~VirtualCamera();
+  const LightChoice& light_choice() const;
   Capture capture(const Truth& truth) const;
   /// The same without the short cut: every pixel is traced.
   Capture capture_whole(const Truth& truth) const;

@@ -48,7 +48,7 @@ inline lab::SampleSource fake_source(FakeCalls& calls) {
     return truths;
   };
   source.set_up_camera = [&calls](const sim::SceneSpec& scene, const sim::Plan&, std::shared_ptr<const fem::Compliance>,
-                                  const sim::Truth&) {
+                                  std::span<const sim::Truth>) {
     ++calls.cameras;
     const std::uint64_t seed = scene.seed;
     const auto offset = static_cast<std::size_t>(100.0 * (scene.motion.start_mm.x() + 1.0));

@@ -1,0 +1,44 @@
+#pragma once
+// Direct light for a scene's camera: found good enough by measurement, or not taken.
+
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "render/direct_error.h"
+#include "sim/scene_sight.h"
+#include "sim/virtual_sensor.h"
+
+namespace touchstone::sim {
+
+/// Tier 1 of the renderers for one scene. Made once; `render` is pure and may be called from several threads.
+class DirectLight {
+ public:
+  /// Measures on the state of `truths` that is pressed deepest; `choice` then says what became of it.
+  /// @pre the plan has direct light, `truths` isn't empty
+  /// @throws Error with the scene's place if the scene switches direct light on and it can't be had
+  DirectLight(const SceneSight& sight, const render::Camera& camera, std::span<const Truth> truths);
+
+  const LightChoice& choice() const { return choice_; }
+
+  /// The picture of a scene as SceneSight::seen gives it; nothing if the gel has gone where the light field doesn't
+  /// reach. @pre choice().direct
+  std::optional<render::DirectImage> render(render::Scene scene) const;
+
+ private:
+  std::unique_ptr<render::DirectRenderer> borrow() const;
+
+  LightChoice choice_;
+  render::Camera camera_;
+  render::Scene rest_;
+  render::LightField field_;
+  cv::Mat bounced_;
+  render::DirectSettings settings_;
+  mutable std::mutex mutex_;
+  mutable std::vector<std::unique_ptr<render::DirectRenderer>> idle_;  // a renderer serves one thread at a time
+};
+
+}  // namespace touchstone::sim
