@@ -144,6 +144,7 @@ TEST(DirectLight, SwitchedOffOrTooFarOffThePathTracersBytesStay) {
 TEST(DirectLight, AnExposureIsTheMeanOfItsMoments) {
   SceneSpec scene = scene_of(kMatt, "effects: {motion_blur: on}\n");
   scene.device.camera->exposure_us = 20000.0;
+  scene.light.motion_tolerance_px = 0.1;
   const Seen seen = see(scene);
   ASSERT_TRUE(seen.camera->light_choice().direct) << seen.camera->light_choice().reason;
   const std::size_t moving = 1;
