@@ -1,6 +1,7 @@
 #include <spdlog/spdlog.h>
 
 #include <memory>
+#include <opencv2/core.hpp>
 
 #include "apps/command.h"
 #include "apps/progress_bar.h"
@@ -29,6 +30,15 @@ struct RenderOptions {
   bool ideal = false;
   bool exr = false;
 };
+
+/// Share of a picture's pixels at the largest number in any channel.
+double saturated_share(const cv::Mat& picture) {
+  if (picture.empty()) return 0.0;
+  cv::Mat channels = picture.reshape(1, static_cast<int>(picture.total()));
+  cv::Mat brightest;
+  cv::reduce(channels, brightest, 1, cv::REDUCE_MAX);
+  return cv::countNonZero(brightest == 255) / static_cast<double>(picture.total());
+}
 
 void require_ending(const std::filesystem::path& file, const char* ending, const char* whose) {
   if (file.empty()) return;
@@ -123,6 +133,12 @@ void render(const RenderOptions& options, const GlobalOptions& global) {
   if (!summary.empty()) spdlog::info("{}", summary);
   if (!capture.light.empty()) spdlog::info("{}", capture.light);
   if (truth) sim::write_exr(options.truth, capture.pixel_truth.image, capture.pixel_truth.channel_names);
+  constexpr double kMuchSaturated = 0.25;
+  const double saturated = saturated_share(options.ideal ? capture.ideal : capture.frame);
+  if (saturated > kMuchSaturated) {
+    spdlog::warn("{:.0f} % of the picture's pixels are saturated: a shorter camera.exposure_us or a smaller lamp_level",
+                 100.0 * saturated);
+  }
   if (picture) sim::write_png(options.out, options.ideal ? capture.ideal : capture.frame);
   if (options.exr) {
     std::filesystem::path exr = options.out;
