@@ -197,16 +197,18 @@ PixelResult<N> sample_pixel(const PathIntegrator<N>& integrator, const PathInteg
       const auto matters = [&](const Bands<N>& light) {
         return kShareMissed / pixel.samples * (light * electrons_per_irradiance).sum() > allowed;
       };
+      // What shines by itself, without a lamp in sight, has no rim of a shadow.
+      const bool by_lamps = direct > 0 || !(electrons.mean() > 0.0);
       const bool dark = lit == 0;
       const bool bright = lit == direct;
-      if (prober != nullptr && !probed && (dark || (bright && matters(brightest)))) {
+      if (prober != nullptr && by_lamps && !probed && (dark || (bright && matters(brightest)))) {
         probed = true;
         rim = probe_rim(*prober, camera, settings.seed, number, camera_index, column, row,
                         dark ? kProbesInTheDark : kProbesInTheLight, counts);
       }
       at_stake.setZero();
-      if (dark && rim.light) at_stake = rim.brightest;
-      if (!dark && (!bright || rim.shadow)) at_stake = brightest;
+      if (by_lamps && dark && rim.light) at_stake = rim.brightest;
+      if (by_lamps && !dark && (!bright || rim.shadow)) at_stake = brightest;
       if (!matters(at_stake)) break;
     }
     target = next_turn(pixel.samples, settings.min_samples, settings.max_samples);
