@@ -132,6 +132,7 @@ render::Surface coated_surface(const DeviceSpec& device, const SceneBands& bands
     out.material = render::RoughConductor{in_bands(coating.albedo, bands, "coating.reflectance"), coating.roughness};
   }
   if (coating.print) out.print = print_of(*coating.print, bands, sheet.rest);
+  out.normals = vertex_normals(sheet.mesh);
   out.mesh = std::move(sheet.mesh);
   return out;
 }
