@@ -13,11 +13,12 @@ namespace touchstone::sensors {
 namespace {
 
 constexpr double kSmallestRadius_px = 4.0;
-constexpr double kFaintest_DN = 6.0;   // summed over the channels: less is no contact
-constexpr double kStrongPart = 0.5;    // of a contact's strong difference, which marks others
-constexpr double kSecondArea = 0.15;   // of the first contact, from which a second counts
-constexpr double kSurroundings = 1.7;  // radii: within, the gel still bends round the ball
-constexpr double kFitPart = 0.85;      // of the radius: where colours are compared with a ball's
+constexpr double kFaintest_DN = 6.0;    // summed over the channels: less is no contact
+constexpr double kStrongPart = 0.5;     // of a contact's strong difference, which marks others
+constexpr double kSecondArea = 0.15;    // of the first contact, from which a second counts
+constexpr double kSurroundings = 1.7;   // radii: within, the gel still bends round the ball
+constexpr double kFitPart = 0.85;       // of the contact's radius: where colours are compared with a ball's,
+constexpr double kFitPartOfBall = 0.5;  // and of the ball's: steeper parts may lie in a lamp's shadow
 
 /// |frame - background|, summed over the channels, smoothed against noise.
 cv::Mat contrast_of(const cv::Mat& difference) {
@@ -81,21 +82,23 @@ double shading_misfit(const cv::Mat& difference, const Eigen::Vector2d& centre, 
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
   Eigen::Matrix3d right = Eigen::Matrix3d::Zero();
   double squares = 0.0;
-  int count = 0;
+  double weights = 0.0;
   for_each_pixel(difference.size(), centre, radius_px, [&](int u, int v, const Eigen::Vector2d& offset) {
+    // Fades out towards the rim, so that the misfit doesn't jump when a pixel comes in.
+    const double weight = 1.0 - offset.squaredNorm() / (radius_px * radius_px);
     const double depth = std::sqrt(ball_px * ball_px - offset.squaredNorm());
     const Eigen::Vector3d tilt(offset.x() / ball_px, offset.y() / ball_px, depth / ball_px - 1.0);
     const cv::Vec3f& pixel = difference.at<cv::Vec3f>(v, u);
     const Eigen::Vector3d colour(pixel[0], pixel[1], pixel[2]);
-    normal += tilt * tilt.transpose();
-    right += tilt * colour.transpose();
-    squares += colour.squaredNorm();
-    ++count;
+    normal += weight * tilt * tilt.transpose();
+    right += weight * tilt * colour.transpose();
+    squares += weight * colour.squaredNorm();
+    weights += weight;
   });
-  if (count == 0) return INFINITY;
+  if (weights <= 0.0) return INFINITY;
   normal.diagonal().array() += 1e-9;
   const Eigen::Matrix3d solution = normal.ldlt().solve(right);
-  return (squares - (solution.transpose() * right).trace()) / count;
+  return (squares - (solution.transpose() * right).trace()) / weights;
 }
 
 /// Moves the centre to the least misfit by a pattern search down to a hundredth of a pixel.
@@ -260,7 +263,8 @@ ContactCircle find_contact_circle(const cv::Mat& frame, const Background& backgr
   circle.centre = {box.x + 0.5 * box.width, box.y + 0.5 * box.height};
   circle.radius = std::min(0.25 * (box.width + box.height), 0.95 * ball_px);
   for (int pass = 0; pass < 3; ++pass) {  // each makes the other better
-    circle.centre = best_centre(difference, circle.centre, kFitPart * circle.radius, ball_px);
+    circle.centre =
+        best_centre(difference, circle.centre, std::min(kFitPart * circle.radius, kFitPartOfBall * ball_px), ball_px);
     circle.radius = std::min(rim_radius(contrast, circle.centre, 0.98 * ball_px), 0.97 * ball_px);
     if (circle.radius < kSmallestRadius_px) {
       fail("{}: the contact's radius is {:.1f} px; at least {:.0f} are needed: press deeper", name, circle.radius,
