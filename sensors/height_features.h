@@ -1,0 +1,71 @@
+#pragma once
+// Keypoints with binary descriptors on height images: BRISK (Leutenegger et al. 2011), as the source text has it
+// (sec. 3.3.1), by OpenCV's features2d.
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <opencv2/core/mat.hpp>
+#include <vector>
+
+#include "sensors/relief_detail.h"
+
+namespace cv {
+class BRISK;
+}
+
+namespace touchstone::sensors {
+
+/// 512 bits.
+using BinaryDescriptor = std::array<std::uint64_t, 8>;
+
+struct HeightFeatures {
+  std::vector<Eigen::Vector2d> points;  ///< mm, in the detail's frame
+  std::vector<BinaryDescriptor> descriptors;
+};
+
+struct FeatureSettings {
+  int threshold = 20;              ///< least grey difference of a corner (AGAST)
+  int octaves = 1;                 ///< of the scale space; touches of one sensor have one scale
+  double pattern_scale = 1.0;      ///< BRISK's sampling pattern, relative to its authors'
+  double grey_range_rms = 3.0;     ///< the detail's rms that the greys from 128 to 255 stand for
+  double least_rms_mm = 0.001;     ///< detail weaker than this is noise: it isn't made stronger than that
+  std::size_t most_features = 4000;  ///< the strongest are kept
+};
+
+/// Detail as a grey picture, CV_8UC1: 128 + 127 d / (grey_range_rms * max(rms, least_rms_mm)), clamped.
+cv::Mat grey_of(const ReliefDetail& detail, const FeatureSettings& settings);
+
+/// Finds features. Made once: BRISK's tables take 50 MB and a tenth of a second.
+class HeightFeatureDetector {
+ public:
+  /// @throws Error for settings out of range
+  explicit HeightFeatureDetector(const FeatureSettings& settings = {});
+
+  /// Only keypoints where `detail.weight` is above 0 are kept.
+  HeightFeatures detect(const ReliefDetail& detail) const;
+
+ private:
+  FeatureSettings settings_;
+  std::shared_ptr<cv::BRISK> brisk_;
+};
+
+/// Number of bits in which two descriptors differ.
+int hamming_distance(const BinaryDescriptor& a, const BinaryDescriptor& b);
+
+/// Two features that look alike.
+struct FeatureMatch {
+  int from = 0, to = 0;  ///< indices of features
+  int distance = 0;      ///< bits
+};
+
+struct MatchSettings {
+  int most_bits = 100;    ///< of 512: the threshold on the Hamming distance
+  int most_partners = 3;  ///< of each feature, the nearest first: relief repeats itself
+};
+
+/// For each feature of `from` its nearest ones in `to` within the threshold, ordered by (from, distance, to).
+std::vector<FeatureMatch> match(const HeightFeatures& from, const HeightFeatures& to, const MatchSettings& settings);
+
+}  // namespace touchstone::sensors
