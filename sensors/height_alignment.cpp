@@ -9,8 +9,8 @@
 namespace touchstone::sensors {
 namespace {
 
-constexpr double kTukey = 4.685;               // of the residuals' sigma: 95 % efficient for normal residuals
-constexpr double kSigmaOfMedian = 1.4826;      // of normal residuals' median absolute value
+constexpr double kTukey = 4.685;           // of the residuals' sigma: 95 % efficient for normal residuals
+constexpr double kSigmaOfMedian = 1.4826;  // of normal residuals' median absolute value
 constexpr std::size_t kLeastOverlapPixels = 50;
 
 /// A pixel of `from` that is looked up in `to`.
@@ -24,7 +24,8 @@ std::vector<Sample> samples_of(const ReliefDetail& from, std::size_t most) {
   for (int v = 0; v < from.weight.rows; ++v) {
     for (int u = 0; u < from.weight.cols; ++u) touched += from.weight.at<float>(v, u) > 0.0F;
   }
-  const int stride = std::max(1, static_cast<int>(std::ceil(std::sqrt(static_cast<double>(touched) / static_cast<double>(most)))));
+  const int stride =
+      std::max(1, static_cast<int>(std::ceil(std::sqrt(static_cast<double>(touched) / static_cast<double>(most)))));
   std::vector<Sample> samples;
   for (int v = stride / 2; v < from.weight.rows; v += stride) {
     for (int u = stride / 2; u < from.weight.cols; u += stride) {
@@ -54,9 +55,10 @@ Lookup look_up(const ReliefDetail& to, const Sample& sample, const PlanarPose& p
   if (!(weights.minCoeff() > 0.0)) return {};
   const Eigen::Vector4d shares((1.0 - s) * (1.0 - t), s * (1.0 - t), (1.0 - s) * t, s * t);
   const Eigen::Vector4d d = corners(to.detail_mm);
-  return {d.dot(shares), sample.weight * weights.dot(shares),
-          Eigen::Vector2d((1.0 - t) * (d[1] - d[0]) + t * (d[3] - d[2]), (1.0 - s) * (d[2] - d[0]) + s * (d[3] - d[1])) /
-              to.frame.mm_per_px};
+  return {
+      d.dot(shares), sample.weight * weights.dot(shares),
+      Eigen::Vector2d((1.0 - t) * (d[1] - d[0]) + t * (d[3] - d[2]), (1.0 - s) * (d[2] - d[0]) + s * (d[3] - d[1])) /
+          to.frame.mm_per_px};
 }
 
 /// Weighted straight-line fit to = gain * from + offset, and how well it does.
@@ -131,7 +133,8 @@ std::optional<Eigen::Matrix<double, 5, 1>> step(const std::vector<Sample>& sampl
   }
   const Eigen::Matrix<double, 5, 1> scale = normal.diagonal().cwiseSqrt();
   if (!(scale.minCoeff() > 0.0)) return std::nullopt;
-  const Eigen::Matrix<double, 5, 5> even = scale.cwiseInverse().asDiagonal() * normal * scale.cwiseInverse().asDiagonal();
+  const Eigen::Matrix<double, 5, 5> even =
+      scale.cwiseInverse().asDiagonal() * normal * scale.cwiseInverse().asDiagonal();
   const Eigen::LDLT<Eigen::Matrix<double, 5, 5>> factor(even);
   constexpr double kSingular = 1e-9;
   if (!(factor.vectorD().minCoeff() > kSingular)) return std::nullopt;

@@ -79,9 +79,8 @@ Registration register_surfaces(const DescribedSurface& from, const DescribedSurf
   if (const auto second = ransac_isometry(pairs, settings.ransac, here)) {
     result.runner_up = static_cast<double>(second->inliers.size()) / static_cast<double>(best->inliers.size());
   }
-  const Alignment alignment = settings.refine
-                                  ? align(from.detail, to.detail, best->to_from_from, settings.alignment)
-                                  : compare(from.detail, to.detail, best->to_from_from, settings.alignment);
+  const Alignment alignment = settings.refine ? align(from.detail, to.detail, best->to_from_from, settings.alignment)
+                                              : compare(from.detail, to.detail, best->to_from_from, settings.alignment);
   result.to_from_from = alignment.to_from_from;
   result.refined = alignment.converged;
   result.correlation = alignment.correlation;

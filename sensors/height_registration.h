@@ -42,13 +42,13 @@ std::string name_of(Outcome outcome);
 
 struct Registration {
   Outcome outcome = Outcome::no_contact;
-  PlanarPose to_from_from;   ///< the refined pose where that was asked for and found, else the features' one. Means
-                             ///< something only where localised
-  PlanarPose feature_pose;   ///< least squares over the inliers, as in the text
-  bool refined = false;      ///< whether to_from_from is by direct alignment
-  double confidence = 0.0;   ///< eq. 2
-  int features = 0;          ///< of `from`
-  int matches = 0;           ///< pairs under the Hamming threshold
+  PlanarPose to_from_from;  ///< the refined pose where that was asked for and found, else the features' one. Means
+                            ///< something only where localised
+  PlanarPose feature_pose;  ///< least squares over the inliers, as in the text
+  bool refined = false;     ///< whether to_from_from is by direct alignment
+  double confidence = 0.0;  ///< eq. 2
+  int features = 0;         ///< of `from`
+  int matches = 0;          ///< pairs under the Hamming threshold
   int inliers = 0;
   double runner_up = 0.0;    ///< inliers of the best pose elsewhere, as a share of `inliers`
   double correlation = 0.0;  ///< of the details, under to_from_from

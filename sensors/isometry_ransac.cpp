@@ -77,7 +77,9 @@ std::optional<RansacResult> ransac_isometry(std::span<const PointPair> pairs, co
                                             const std::optional<PoseNeighbourhood>& except) {
   if (pairs.size() < 2) return std::nullopt;
   RandomStream random(settings.seed, pairs.size(), Purpose::kMatchSampling);
-  const auto draw = [&, count = static_cast<double>(pairs.size())] { return static_cast<std::size_t>(random.uniform() * count); };
+  const auto draw = [&, count = static_cast<double>(pairs.size())] {
+    return static_cast<std::size_t>(random.uniform() * count);
+  };
   InlierSearch search(pairs, settings.inlier_mm);
   RansacResult best;
   double needed = settings.samples;

@@ -25,7 +25,9 @@ PlanarPose PlanarPose::operator*(const PlanarPose& other) const {
   return {wrapped(angle + other.angle), rotation() * other.translation + translation};
 }
 
-PlanarPose PlanarPose::inverse() const { return {wrapped(-angle), -(rotation().transpose() * translation)}; }
+PlanarPose PlanarPose::inverse() const {
+  return {wrapped(-angle), -(rotation().transpose() * translation)};
+}
 
 double wrapped(double angle) {
   const double rest = std::remainder(angle, 2.0 * kPi);

@@ -98,7 +98,8 @@ std::string to_bytes(const TactileMapData& data) {
 TactileMapData tactile_map_from_bytes(std::string_view bytes, const std::string& name) {
   if (!bytes.starts_with(kFormatLine)) {
     const std::string line(bytes.substr(0, std::min<std::size_t>(bytes.find('\n'), kFormatLine.size())));
-    if (line.starts_with(kFormatName)) fail_at({name, 1}, "has version {}; version 1 is known", line.substr(kFormatName.size()));
+    if (line.starts_with(kFormatName))
+      fail_at({name, 1}, "has version {}; version 1 is known", line.substr(kFormatName.size()));
     fail_at({name, 1}, "isn't a tactile map of Touchstone");
   }
   bytes.remove_prefix(kFormatLine.size());
@@ -127,7 +128,9 @@ TactileMapData tactile_map_from_bytes(std::string_view bytes, const std::string&
   return data;
 }
 
-void save(const TactileMapData& data, const std::filesystem::path& path) { write_whole_file(path, to_bytes(data)); }
+void save(const TactileMapData& data, const std::filesystem::path& path) {
+  write_whole_file(path, to_bytes(data));
+}
 
 TactileMapData load_tactile_map(const std::filesystem::path& path) {
   return tactile_map_from_bytes(read_whole_file(path), path.string());

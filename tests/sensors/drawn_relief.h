@@ -32,13 +32,27 @@ inline Surface strewn_relief(std::uint64_t seed, double half_side_mm = 12.0, int
     list.push_back({a, a + length * Eigen::Vector2d(std::cos(angle), std::sin(angle)), ring, within(0.1, 0.2),
                     within(0.03, 0.09)});
   }
-  return [list](const Eigen::Vector2d& p) {
+  // Pieces by the cells of 1 mm that they reach into.
+  constexpr double kReach = 3.0;  // widths
+  const int side = 2 * static_cast<int>(std::ceil(half_side_mm)) + 6;
+  const auto cell = [side](double x) { return std::clamp(static_cast<int>(std::floor(x)) + side / 2, 0, side - 1); };
+  std::vector<std::vector<Piece>> cells(static_cast<std::size_t>(side * side));
+  for (const Piece& one : list) {
+    const double reach = one.radius + kReach * one.width;
+    const Eigen::Vector2d low = one.a.cwiseMin(one.b).array() - reach, high = one.a.cwiseMax(one.b).array() + reach;
+    for (int j = cell(low.y()); j <= cell(high.y()); ++j) {
+      for (int i = cell(low.x()); i <= cell(high.x()); ++i)
+        cells[static_cast<std::size_t>(j * side + i)].push_back(one);
+    }
+  }
+  return [cells, cell, side](const Eigen::Vector2d& p) {
     double highest = 0.0;
-    for (const Piece& one : list) {
+    for (const Piece& one : cells[static_cast<std::size_t>(cell(p.y()) * side + cell(p.x()))]) {
       const Eigen::Vector2d along = one.b - one.a;
-      const double t = along.squaredNorm() > 0.0 ? std::clamp((p - one.a).dot(along) / along.squaredNorm(), 0.0, 1.0) : 0.0;
+      const double length = along.squaredNorm();
+      const double t = length > 0.0 ? std::clamp((p - one.a).dot(along) / length, 0.0, 1.0) : 0.0;
       const double distance = std::abs((p - one.a - t * along).norm() - one.radius) / one.width;
-      if (distance < 3.0) highest = std::max(highest, one.height * std::exp(-0.5 * distance * distance));
+      if (distance < kReach) highest = std::max(highest, one.height * std::exp(-0.5 * distance * distance));
     }
     return 0.1 + highest;
   };
@@ -58,8 +72,8 @@ inline TouchImage touch_of(const Surface& surface, const PlanarPose& surface_fro
   cv::Mat height(camera.rows, camera.columns, CV_32FC1);
   for (int v = 0; v < camera.rows; ++v) {
     for (int u = 0; u < camera.columns; ++u) {
-      height.at<float>(v, u) = static_cast<float>(surface(surface_from_touch * frame.point_of({u, v})) +
-                                                  camera.noise_mm * random.normal());
+      height.at<float>(v, u) =
+          static_cast<float>(surface(surface_from_touch * frame.point_of({u, v})) + camera.noise_mm * random.normal());
     }
   }
   return touch_by_height(height, camera.mm_per_px, 0.02);
