@@ -16,6 +16,7 @@ enum class Purpose : std::uint32_t {
   kEventNoise = 7,
   kLampSpread = 8,
   kMatchSampling = 12,
+  kRelief = 13,
   kTest = 99,
 };
 
