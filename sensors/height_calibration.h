@@ -13,9 +13,9 @@ namespace touchstone::sensors {
 struct HeightCalibrationSettings {
   double mm_per_px = 0.0;
   LightCorrection correction = LightCorrection::fitted;
-  std::optional<int> lamp_order{};  ///< absent: 0 below 3 presses, 1 below 6, else 2, and less where the presses' places
-                                  ///< don't determine that
-  double lamp_steepest = 1.0;     ///< slopes up to which lamps are taken to be above the membrane's horizon
+  std::optional<int> lamp_order{};  ///< absent: 0 below 3 presses, 1 below 6, else 2, and less where the presses'
+                                    ///< places don't determine that
+  double lamp_steepest = 1.0;  ///< slopes up to which lamps are taken to be above the membrane's horizon
   PressSampling sampling{};
   SlopeTableSettings table{};
   bool cross_validate = false;  ///< fill HeightCalibration::left_out

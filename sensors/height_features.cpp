@@ -5,16 +5,23 @@
 #include <cmath>
 #include <cstring>
 #include <opencv2/features2d.hpp>
+#include <opencv2/imgproc.hpp>
 #include <tuple>
 
 #include "core/error.h"
 
 namespace touchstone::sensors {
+namespace {
+
+constexpr int kFrame_px = 32;  // more than BRISK's pattern reaches
+constexpr double kMiddleGrey = 128.0;
+
+}  // namespace
 
 cv::Mat grey_of(const ReliefDetail& detail, const FeatureSettings& settings) {
-  const double full = settings.grey_range_rms * std::max(detail.rms_mm, settings.least_rms_mm);
   cv::Mat grey;
-  detail.detail_mm.convertTo(grey, CV_8U, 127.0 / full, 128.0);
+  evened(detail, settings.rms_over_mm, settings.least_rms_mm)
+      .convertTo(grey, CV_8U, 127.0 / settings.grey_range_rms, kMiddleGrey);
   return grey;
 }
 
@@ -36,10 +43,21 @@ HeightFeatureDetector::HeightFeatureDetector(const FeatureSettings& settings) : 
 }
 
 HeightFeatures HeightFeatureDetector::detect(const ReliefDetail& detail) const {
-  const cv::Mat mask = detail.weight > 0.0;
+  // Grey beyond the border as well: BRISK leaves out what its pattern doesn't fit round.
+  const double scale = detail.frame.mm_per_px / settings_.pitch_mm;
+  const auto prepared = [&](const cv::Mat& image, int interpolation, double fill) {
+    cv::Mat resized, framed;
+    const cv::Size size(std::max(1, static_cast<int>(std::lround(image.cols * scale))),
+                        std::max(1, static_cast<int>(std::lround(image.rows * scale))));
+    cv::resize(image, resized, size, 0.0, 0.0, interpolation);
+    cv::copyMakeBorder(resized, framed, kFrame_px, kFrame_px, kFrame_px, kFrame_px, cv::BORDER_CONSTANT, fill);
+    return framed;
+  };
+  const cv::Mat grey = prepared(grey_of(detail, settings_), cv::INTER_AREA, kMiddleGrey);
+  const cv::Mat mask = prepared(detail.weight > 0.0, cv::INTER_NEAREST, 0.0);
   std::vector<cv::KeyPoint> found;
   cv::Mat bits;
-  brisk_->detectAndCompute(grey_of(detail, settings_), mask, found, bits);
+  brisk_->detectAndCompute(grey, mask, found, bits);
   TS_ASSERT(found.empty() || (bits.type() == CV_8UC1 && bits.cols == sizeof(BinaryDescriptor)));
 
   std::vector<int> order(found.size());
@@ -48,9 +66,12 @@ HeightFeatures HeightFeatureDetector::detect(const ReliefDetail& detail) const {
     std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return found[a].response > found[b].response; });
     order.resize(settings_.most_features);
   }
+  const Eigen::Vector2d shrink(static_cast<double>(detail.detail_mm.cols) / (grey.cols - 2 * kFrame_px),
+                               static_cast<double>(detail.detail_mm.rows) / (grey.rows - 2 * kFrame_px));
   HeightFeatures features;
   for (const int i : order) {
-    features.points.push_back(detail.frame.point_of({found[i].pt.x, found[i].pt.y}));
+    const Eigen::Vector2d pixel = Eigen::Vector2d(found[i].pt.x, found[i].pt.y).array() - kFrame_px + 0.5;
+    features.points.push_back(detail.frame.point_of((pixel.cwiseProduct(shrink).array() - 0.5).matrix()));
     std::memcpy(features.descriptors.emplace_back().data(), bits.ptr(i), sizeof(BinaryDescriptor));
   }
   return features;

@@ -1,5 +1,6 @@
 #include "sensors/height_registration.h"
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -23,6 +24,53 @@ double confidence_of(const std::vector<PointPair>& pairs, const std::vector<int>
     to.push_back(pairs[i].to);
   }
   return isometry_confidence(least_squares_linear_part(to, from));
+}
+
+/// A pose that RANSAC found, and how the heights agree under it.
+struct Candidate {
+  RansacResult features;
+  Alignment heights;
+};
+
+std::vector<Candidate> candidates_of(const DescribedSurface& from, const DescribedSurface& to,
+                                     const std::vector<PointPair>& pairs, const RegistrationSettings& settings) {
+  std::vector<Candidate> candidates;
+  std::vector<PoseNeighbourhood> known;
+  while (static_cast<int>(candidates.size()) < settings.most_candidates) {
+    const auto found = ransac_isometry(pairs, settings.ransac, known);
+    if (!found) break;
+    const auto inliers = static_cast<double>(found->inliers.size());
+    if (!candidates.empty() &&
+        inliers < settings.least_share * static_cast<double>(candidates.front().features.inliers.size())) {
+      break;
+    }
+    const PlanarPose& pose = found->to_from_from;
+    candidates.push_back({*found, align(from.detail, to.detail, pose, settings.alignment)});
+    known.push_back({pose, middle_of(pairs, found->inliers), settings.elsewhere_mm, settings.elsewhere_angle});
+  }
+  return candidates;
+}
+
+/// The best correlation elsewhere: of the other candidates that aren't the same pose after all, and of the pose moved a
+/// little any way, which an edge or a grating wouldn't show.
+double rival_of(const Candidate& best, const std::vector<Candidate>& candidates, const DescribedSurface& from,
+                const DescribedSurface& to, const std::vector<PointPair>& pairs, const RegistrationSettings& settings) {
+  const PlanarPose& pose = best.heights.to_from_from;
+  const PoseNeighbourhood here{pose, middle_of(pairs, best.features.inliers), settings.elsewhere_mm,
+                               settings.elsewhere_angle};
+  double rival = 0.0;
+  for (const Candidate& other : candidates) {
+    if (here.holds(other.heights.to_from_from) || other.heights.overlap < settings.least_overlap) continue;
+    rival = std::max(rival, other.heights.correlation);
+  }
+  constexpr int kDirections = 8;
+  for (int i = 0; i < kDirections; ++i) {
+    const double way = 2.0 * kPi * i / kDirections;
+    PlanarPose moved = pose;
+    moved.translation += settings.elsewhere_mm * Eigen::Vector2d(std::cos(way), std::sin(way));
+    rival = std::max(rival, compare(from.detail, to.detail, moved, settings.alignment).correlation);
+  }
+  return rival;
 }
 
 }  // namespace
@@ -68,28 +116,31 @@ Registration register_surfaces(const DescribedSurface& from, const DescribedSurf
     pairs.push_back({from.features.points[one.from], to.features.points[one.to], one.from, one.to});
   }
   result.matches = static_cast<int>(pairs.size());
-  const auto best = ransac_isometry(pairs, settings.ransac);
-  if (!best) return end(Outcome::no_match);
-  result.to_from_from = result.feature_pose = best->to_from_from;
-  result.inliers = static_cast<int>(best->inliers.size());
-  result.confidence = confidence_of(pairs, best->inliers);
+  std::vector<Candidate> candidates = candidates_of(from, to, pairs, settings);
+  if (candidates.empty()) return end(Outcome::no_match);
+  // Stable: of equals the one with more inliers stays first.
+  std::stable_sort(candidates.begin(), candidates.end(), [&](const Candidate& a, const Candidate& b) {
+    const auto rank = [&](const Candidate& one) {
+      return one.heights.overlap < settings.least_overlap ? -1.0 : one.heights.correlation;
+    };
+    return rank(a) > rank(b);
+  });
+  const Candidate& best = candidates.front();
+  result.feature_pose = best.features.to_from_from;
+  result.inliers = static_cast<int>(best.features.inliers.size());
+  result.confidence = confidence_of(pairs, best.features.inliers);
+  result.refined = settings.refine && best.heights.converged;
+  result.to_from_from = result.refined ? best.heights.to_from_from : result.feature_pose;
+  result.correlation = best.heights.correlation;
+  result.overlap = best.heights.overlap;
+  result.runner_up = rival_of(best, candidates, from, to, pairs, settings);
 
-  const PoseNeighbourhood here{best->to_from_from, middle_of(pairs, best->inliers), settings.elsewhere_mm,
-                               settings.elsewhere_angle};
-  if (const auto second = ransac_isometry(pairs, settings.ransac, here)) {
-    result.runner_up = static_cast<double>(second->inliers.size()) / static_cast<double>(best->inliers.size());
-  }
-  const Alignment alignment = settings.refine ? align(from.detail, to.detail, best->to_from_from, settings.alignment)
-                                              : compare(from.detail, to.detail, best->to_from_from, settings.alignment);
-  result.to_from_from = alignment.to_from_from;
-  result.refined = alignment.converged;
-  result.correlation = alignment.correlation;
-  result.overlap = alignment.overlap;
-
-  if (best->inliers.size() < least) return end(Outcome::no_match);
+  if (best.features.inliers.size() < least) return end(Outcome::no_match);
   if (!(result.confidence > settings.least_confidence)) return end(Outcome::low_confidence);
-  if (result.runner_up > settings.most_runner_up) return end(Outcome::ambiguous);
-  if (result.correlation < settings.least_correlation) return end(Outcome::disagrees);
+  if (result.correlation < settings.least_correlation || result.overlap < settings.least_overlap) {
+    return end(Outcome::disagrees);
+  }
+  if (1.0 - result.correlation > settings.most_rival_share * (1.0 - result.runner_up)) return end(Outcome::ambiguous);
   return end(Outcome::localised);
 }
 

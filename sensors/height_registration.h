@@ -19,13 +19,20 @@ struct RegistrationSettings {
   RansacSettings ransac;
   AlignmentSettings alignment;
   double least_confidence = 0.98;  ///< of eq. 2, as published
-  int least_inliers = 8;           ///< two pairs always agree; so few can by chance
-  /// Ours: a second pose, elsewhere, with more than this share of the best one's inliers makes the touch ambiguous.
-  double most_runner_up = 0.6;
+  int least_inliers = 6;           ///< two pairs always agree; so few can by chance
+  /// Ours: RANSAC is asked for more poses, each elsewhere than those before; all are tried on the heights, and the one
+  /// under which these agree best is taken. Relief with symmetries, as a plug's, has several poses of many inliers.
+  int most_candidates = 4;
   double elsewhere_mm = 0.5;
-  double elsewhere_angle = 0.1;    ///< radians
-  bool refine = true;              ///< ours: the pose by direct alignment, from the features' one
-  double least_correlation = 0.5;  ///< ours: of the details under the pose found
+  double elsewhere_angle = 0.1;  ///< radians
+  double least_share = 0.4;      ///< of the best candidate's inliers, for another to be one
+  /// Ours: what the best pose leaves unexplained (1 - correlation), as a share of what the next candidate leaves, or
+  /// the pose moved by `elsewhere_mm` any way; more is ambiguous. Turned by half a turn, a plug still correlates by
+  /// 0.9.
+  double most_rival_share = 0.75;
+  double least_overlap = 0.25;     ///< ours: share of the touch that must lie on the map
+  bool refine = true;              ///< ours: the pose by direct alignment of the heights; else the features' one
+  double least_correlation = 0.6;  ///< ours: of the details under the aligned pose
 };
 
 /// Why a touch was, or wasn't, localised.
@@ -35,8 +42,8 @@ enum class Outcome {
   no_texture,      ///< too few features: a plane, an edge
   no_match,        ///< too few of them agree with one isometry
   low_confidence,  ///< the best map of the inliers isn't an isometry (eq. 2)
-  ambiguous,       ///< another pose explains nearly as much: a repeating pattern
-  disagrees,       ///< the heights differ under the pose found
+  ambiguous,       ///< the heights agree nearly as well elsewhere: a repeating pattern
+  disagrees,       ///< the heights differ under the pose found, or hardly overlap
 };
 std::string name_of(Outcome outcome);
 
@@ -50,8 +57,8 @@ struct Registration {
   int features = 0;         ///< of `from`
   int matches = 0;          ///< pairs under the Hamming threshold
   int inliers = 0;
-  double runner_up = 0.0;    ///< inliers of the best pose elsewhere, as a share of `inliers`
-  double correlation = 0.0;  ///< of the details, under to_from_from
+  double runner_up = 0.0;    ///< the best correlation under any other pose that was tried
+  double correlation = 0.0;  ///< of the details, under the aligned pose, whether that is asked for or not
   double overlap = 0.0;      ///< share of `from` that lies on `to`
 
   bool localised() const { return outcome == Outcome::localised; }

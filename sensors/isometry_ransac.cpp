@@ -74,7 +74,10 @@ bool PoseNeighbourhood::holds(const PlanarPose& other) const {
 }
 
 std::optional<RansacResult> ransac_isometry(std::span<const PointPair> pairs, const RansacSettings& settings,
-                                            const std::optional<PoseNeighbourhood>& except) {
+                                            std::span<const PoseNeighbourhood> except) {
+  const auto excepted = [&](const PlanarPose& pose) {
+    return std::any_of(except.begin(), except.end(), [&](const auto& one) { return one.holds(pose); });
+  };
   if (pairs.size() < 2) return std::nullopt;
   RandomStream random(settings.seed, pairs.size(), Purpose::kMatchSampling);
   const auto draw = [&, count = static_cast<double>(pairs.size())] {
@@ -90,7 +93,7 @@ std::optional<RansacResult> ransac_isometry(std::span<const PointPair> pairs, co
     if (from_length < settings.baseline_mm || std::abs(from_length - to_length) > 2.0 * settings.inlier_mm) continue;
     const std::array<Eigen::Vector2d, 2> from = {a.from, b.from}, to = {a.to, b.to};
     const PlanarPose pose = least_squares_isometry(to, from);
-    if (except && except->holds(pose)) continue;
+    if (excepted(pose)) continue;
     const std::vector<int>& inliers = search.of(pose);
     if (inliers.size() <= best.inliers.size() || inliers.size() < 2) continue;
     best = {pose, inliers};
@@ -99,7 +102,7 @@ std::optional<RansacResult> ransac_isometry(std::span<const PointPair> pairs, co
   if (best.inliers.size() < 2) return std::nullopt;
   for (int refit = 0; refit < kMostRefits; ++refit) {
     const PlanarPose pose = fitted(pairs, best.inliers);
-    if (except && except->holds(pose)) break;
+    if (excepted(pose)) break;
     best.to_from_from = pose;
     const std::vector<int>& inliers = search.of(pose);
     if (inliers.size() < best.inliers.size() || inliers == best.inliers) break;

@@ -43,9 +43,10 @@ struct RansacResult {
   std::vector<int> inliers;  ///< indices of pairs, each point in one of them only
 };
 
-/// The isometry with the most inliers, refitted to them until they don't change. Poses in `except` aren't considered.
+/// The isometry with the most inliers, refitted to them until they don't change. Poses in any of `except` aren't
+/// considered.
 /// Empty if no isometry has two inliers. The same arguments give the same answer.
 std::optional<RansacResult> ransac_isometry(std::span<const PointPair> pairs, const RansacSettings& settings,
-                                            const std::optional<PoseNeighbourhood>& except = {});
+                                            std::span<const PoseNeighbourhood> except = {});
 
 }  // namespace touchstone::sensors

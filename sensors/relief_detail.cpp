@@ -21,14 +21,38 @@ cv::Mat blurred(const cv::Mat& image, double sigma_px) {
 
 }  // namespace
 
-cv::Mat contact_with_margin(const TouchImage& touch, double margin_mm) {
-  const int margin = static_cast<int>(std::lround(margin_mm / touch.mm_per_px));
-  cv::Mat support = touch.contact != 0;
-  if (margin > 0) {
-    const cv::Mat disc = cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * margin + 1, 2 * margin + 1});
-    cv::dilate(support, support, disc);
+cv::Mat support_of(const TouchImage& touch, const DetailSettings& settings) {
+  const cv::Mat contact = touch.contact != 0;
+  // Distances stand for dilating and eroding by discs, which would cost the square of their radius.
+  const auto grown = [](const cv::Mat& mask, double px) {
+    if (cv::countNonZero(mask) == 0) return mask;
+    cv::Mat distance;
+    cv::distanceTransform(~mask, distance, cv::DIST_L2, cv::DIST_MASK_PRECISE);
+    return cv::Mat(distance <= px);
+  };
+  const double gap_px = settings.gap_mm / touch.mm_per_px, margin_px = settings.margin_mm / touch.mm_per_px;
+  // Beyond the picture's border nothing is touched, else the border would close gaps too.
+  cv::Mat far;
+  cv::copyMakeBorder(~grown(contact, gap_px), far, 1, 1, 1, 1, cv::BORDER_CONSTANT, 255);
+  const cv::Mat closed = ~grown(far, gap_px)(cv::Rect(1, 1, contact.cols, contact.rows));
+  return grown(contact | closed, margin_px);
+}
+
+cv::Mat evened(const ReliefDetail& detail, double sigma_mm, double least_rms_mm) {
+  cv::Mat touched;
+  cv::Mat(detail.weight > 0.0).convertTo(touched, CV_32F, 1.0 / 255.0);
+  const double sigma_px = sigma_mm / detail.frame.mm_per_px;
+  const cv::Mat squares = blurred(detail.detail_mm.mul(detail.detail_mm).mul(touched), sigma_px);
+  const cv::Mat share = blurred(touched, sigma_px);
+  cv::Mat result(detail.detail_mm.size(), CV_32F, cv::Scalar(0));
+  for (int v = 0; v < result.rows; ++v) {
+    for (int u = 0; u < result.cols; ++u) {
+      if (touched.at<float>(v, u) == 0.0F) continue;
+      const double rms = std::sqrt(squares.at<float>(v, u) / std::max<double>(share.at<float>(v, u), kLeastShare));
+      result.at<float>(v, u) = static_cast<float>(detail.detail_mm.at<float>(v, u) / std::max(rms, least_rms_mm));
+    }
   }
-  return support;
+  return result;
 }
 
 ReliefDetail relief_detail(const cv::Mat& height_mm, const cv::Mat& support, const PixelFrame& frame,
@@ -67,7 +91,7 @@ ReliefDetail relief_detail(const cv::Mat& height_mm, const cv::Mat& support, con
 
 ReliefDetail relief_detail(const TouchImage& touch, const DetailSettings& settings) {
   check(touch);
-  return relief_detail(touch.height_mm, contact_with_margin(touch, settings.margin_mm),
+  return relief_detail(touch.height_mm, support_of(touch, settings),
                        touch_frame(touch.height_mm.size(), touch.mm_per_px), settings);
 }
 

@@ -127,7 +127,7 @@ Registration TactileMap::add(const TouchImage& touch) {
 
 void TactileMap::place(const TouchImage& touch, const PlanarPose& map_from_touch) {
   const PixelFrame frame = touch_frame(touch.height_mm.size(), touch.mm_per_px);
-  const cv::Mat support = contact_with_margin(touch, settings_.registration.detail.margin_mm);
+  const cv::Mat support = support_of(touch, settings_.registration.detail);
   const cv::Mat weights = blend_weights(support, settings_.blend_mm / touch.mm_per_px);
 
   Box box = covered(data_.frame, touch.height_mm.size(), frame, map_from_touch);

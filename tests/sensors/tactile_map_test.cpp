@@ -32,7 +32,7 @@ TEST(TactileMap, EveryTurnIsLocalisedByFeaturesAlone) {
     const Registration by_features = text.localise(touch);
     ASSERT_TRUE(by_features.localised()) << name_of(by_features.outcome) << " at " << 30 * i - 180;
     EXPECT_FALSE(by_features.refined);
-    EXPECT_LT(error_of(by_features.to_from_from, truth).mm, 0.025) << "half a pixel";
+    EXPECT_LT(error_of(by_features.to_from_from, truth).mm, 0.04) << "half a pixel of the features' picture";
     EXPECT_LT(error_of(by_features.to_from_from, truth).degrees, 0.3);
     const Registration refined = ours.localise(touch);
     ASSERT_TRUE(refined.localised());
@@ -126,7 +126,7 @@ TEST(TactileMap, PartOfAnObjectIsEnough) {
   half.height_mm.rowRange(0, 120).setTo(0);
   const Registration found = map.localise(half);
   ASSERT_TRUE(found.localised()) << name_of(found.outcome);
-  EXPECT_LT(error_of(found.to_from_from, truth).mm, 0.01);
+  EXPECT_LT(error_of(found.to_from_from, truth).mm, 0.02);
 }
 
 }  // namespace
