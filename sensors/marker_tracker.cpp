@@ -13,7 +13,6 @@ namespace {
 constexpr double kNeighbourReach = 1.6;  ///< of the spacing: the eight round a marker of a square grid
 constexpr double kAreaLearning = 0.05;   ///< how fast a marker's usual area follows the measured one, a frame
 constexpr double kAtRest = 0.1;          ///< of the spacing
-constexpr int kTogether = 3;             ///< so many that vanish at once, and as many that turn up, are a jump
 
 /// The nearest of `places` to `from`, -1 if there's none.
 template <typename Places, typename PlaceOf>
@@ -199,7 +198,6 @@ void MarkerTracker::follow(const std::vector<MarkerBlob>& blobs) {
   for (std::size_t b = 0; b < blobs.size(); ++b) nearest_marker_[b] = nearest(expected_, itself, blobs[b].centroid);
 
   const double longest = settings_.longest_step * spacing_px_;
-  int vanished = 0, turned_up = 0;
   for (std::size_t i = 0; i < markers; ++i) {
     const bool was_found = is_found(result_.status[i]);
     MarkerStatus& status = result_.status[i];
@@ -223,8 +221,6 @@ void MarkerTracker::follow(const std::vector<MarkerBlob>& blobs) {
         usual_area_[i] += kAreaLearning * (blob.area_px - usual_area_[i]);
       }
     }
-    if (was_found && status == MarkerStatus::kHidden) ++vanished;
-    if (was_found && status == MarkerStatus::kMerged) ++turned_up;
   }
 
   // Blobs as large as a marker that nobody claims: come into view, or gone too far from where they were.
@@ -236,14 +232,12 @@ void MarkerTracker::follow(const std::vector<MarkerBlob>& blobs) {
                           blobs[b].area_px * settings_.max_area_change >= usual_area_[marker];
     if (!is_whole) continue;
     ++result_.unclaimed;
-    ++turned_up;
     if (result_.status[marker] == MarkerStatus::kHidden &&
         (blobs[b].centroid - expected_[marker]).norm() <= spacing_px_) {
       result_.status[marker] = MarkerStatus::kTooFar;
       result_.jumped = true;
     }
   }
-  if (std::min(vanished, turned_up) >= kTogether) result_.jumped = true;
   for (std::size_t i = 0; i < markers; ++i) {
     if (!is_found(result_.status[i])) result_.positions[i] = carried_by_neighbours(i);
   }

@@ -7,11 +7,11 @@
 // spacing.
 //   So no two markers share a blob, and a step that could lead to the neighbour's place is no match: it's reported.
 // - A marker that isn't measured is held where its neighbours' mean displacement carries it, and looked for there.
-// - A region that jumps by about a whole spacing between two frames looks like none that moved, but for its edges:
-// behind
-//   it markers have no blob, before it blobs have no marker or two. Where a blob waits beyond the longest step, or
-//   three markers vanish in the frame in which three blobs turn up or merge, `jumped` is set, and stays until every
-//   rest position has its blob again: then the gel is at rest, and each marker is home.
+// - Where the gel's middle jumps by about a whole spacing between two frames, markers take their neighbours' names
+// there. But
+//   the gel's rim stays, so between the two there's a place that jumps by half a spacing, where a blob waits beyond the
+//   longest step (`kTooFar`). From such a frame on `jumped` is set, until every rest position has its blob again: then
+//   the gel is at rest, and each marker is home.
 
 #include <Eigen/Core>
 #include <cstdint>
