@@ -14,8 +14,6 @@ namespace touchstone::sensors {
 
 namespace {
 
-using Json = nlohmann::json;
-
 constexpr const char* kFormat = "touchstone.gel_force_model";
 constexpr int kVersion = 1;
 
@@ -109,7 +107,7 @@ std::string to_json(const GelForceModel& model) {
 }
 
 GelForceModel gel_force_model_from_json(const std::string& text, const std::string& name) {
-  const Json json = parse_model_json(text, name);
+  const Json json = parse_json(text, name);
   const JsonField root{json, "", name};
   root.expect_format(kFormat, kVersion);
   root.expect_map({"format", "version", "gel", "normal_of_height_sum_mm3", "shear_of_displacement_mm"});

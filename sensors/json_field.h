@@ -1,6 +1,5 @@
 #pragma once
-// Strict reading of the estimators' model files (JSON): each value is checked where it's read, and a message says file
-// and field. For .cpp files only: it brings the JSON library along.
+// Reading a model file's JSON strictly. For the .cpp files of models only: it brings in all of nlohmann-json.
 
 #include <fmt/ranges.h>
 
@@ -19,13 +18,24 @@
 
 namespace touchstone::sensors {
 
-/// Parses a file's text; `name` stands for the file in messages.
-/// @throws Error with the line if it isn't JSON, or has a number beyond the range of double
-nlohmann::json parse_model_json(const std::string& text, const std::string& name);
+using Json = nlohmann::json;
 
-/// A value of the file and the path of names that leads to it. What refuses throws an Error that names file and path.
+/// @throws Error naming the file and, where it's known, the line
+inline Json parse_json(const std::string& text, const std::string& name) {
+  try {
+    return Json::parse(text);
+  } catch (const Json::parse_error& error) {
+    const auto byte = std::min(error.byte, text.size());
+    const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(byte), '\n');
+    throw Error({name, static_cast<int>(line)}, "isn't valid JSON");
+  } catch (const Json::exception& error) {  // a number beyond the range of double
+    throw Error({name, 0}, fmt::format("isn't usable JSON: {}", error.what()));
+  }
+}
+
+/// A value of a model file and the path of names that leads to it. What doesn't fit is an Error with file and path.
 struct JsonField {
-  const nlohmann::json& value;
+  const Json& value;
   std::string path;
   const std::string& file;
 
@@ -42,7 +52,7 @@ struct JsonField {
   }
   JsonField at(std::size_t index) const { return {value[index], fmt::format("{}[{}]", path, index), file}; }
 
-  /// Refuses another "format" or "version" than these.
+  /// Refuses what isn't a map with this format's name and version.
   void expect_format(const char* format, int version) const {
     if (!value.is_object()) refuse("is a {}, a map is needed", value.type_name());
     if (at("format").text() != format) at("format").refuse("is '{}', '{}' is needed", at("format").text(), format);

@@ -2,7 +2,6 @@
 
 #include <array>
 #include <limits>
-#include <nlohmann/json.hpp>
 #include <vector>
 
 #include "core/error.h"
@@ -12,8 +11,6 @@
 namespace touchstone::sensors {
 
 namespace {
-
-using Json = nlohmann::json;
 
 constexpr const char* kFormat = "touchstone.stiffness_force_model";
 constexpr int kVersion = 1;
@@ -60,7 +57,7 @@ std::string to_json(const StiffnessForceModel& model) {
 }
 
 StiffnessForceModel stiffness_model_from_json(const std::string& text, const std::string& name) {
-  const Json json = parse_model_json(text, name);
+  const Json json = parse_json(text, name);
   const JsonField root{json, "", name};
   root.expect_format(kFormat, kVersion);
   root.expect_map({"format", "version", "grid", "form", "stiffness_N_per_px", "rest_px", "lowest_seen_px",

@@ -7,9 +7,12 @@
 #include <new>
 #include <opencv2/core.hpp>
 
+#include "sensors/height_calibration.h"
+#include "sensors/height_estimator.h"
 #include "sensors/incipient_slip.h"
 #include "sensors/motion_ratio.h"
 #include "tests/sensors/force_samples.h"
+#include "tests/sensors/painted_gel.h"
 #include "tests/sensors/painted_markers.h"
 #include "tests/sensors/rendered_beads.h"
 
@@ -134,6 +137,23 @@ TEST_F(Allocation, NoneForMarkersAndSlipAfterTheFirstFrame) {
   for (std::size_t i = 1; i < frames.size(); ++i) look(i);
   EXPECT_EQ(allocations, before);
   EXPECT_GT(sum, 0.0);
+}
+
+TEST_F(Allocation, NoneForAHeightMapAfterTheFirst) {
+  test::GelPainter painter(120, 90, 0.053, {});
+  HeightCalibrationSettings calibration;
+  calibration.mm_per_px = 0.053;
+  calibration.table.most_cells = 20000;
+  const HeightModel model = calibrate_height(painter.presses(2, 2, 1.0, 0.7), painter.background(), calibration).model;
+  const std::vector<cv::Mat> frames = {painter.rest(), painter.press({{3.0, 2.5}, 2.0, 1.0}).frame};
+  for (const HeightBorder border : {HeightBorder::zero, HeightBorder::free}) {
+    HeightEstimator estimator(model, {.border = border});
+    int contact = estimator.estimate(frames[0]).contact_pixels;
+    const long before = allocations;
+    for (const cv::Mat& frame : frames) contact += estimator.estimate(frame).contact_pixels;
+    EXPECT_EQ(allocations, before);
+    EXPECT_GT(contact, 0);
+  }
 }
 
 }  // namespace
