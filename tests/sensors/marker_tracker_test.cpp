@@ -8,6 +8,7 @@
 #include <set>
 
 #include "core/error.h"
+#include "sensors/marker_filling.h"
 #include "tests/sensors/painted_markers.h"
 
 namespace touchstone::sensors {
@@ -274,6 +275,21 @@ TEST(MarkerFinder, NoiseEndsAtTheMostBlobs) {
   for (auto& value : cv::Mat_<std::uint8_t>(noise)) value = random.uniform() < 0.1 ? 0 : 200;
   MarkerFinder finder({.diameter_px = 2.0, .spacing_px = 8.0, .least_area = 0.0});
   EXPECT_EQ(finder.find(noise).size(), MarkerFinder::kMostBlobs);
+}
+
+TEST(FillMarkers, AFilledPictureIsOneWithoutMarkers) {
+  const auto rest = marker_grid();
+  cv::Mat filled = paint_markers({}, rest);
+  const cv::Mat bare = paint_markers({}, {});
+  EXPECT_GT(cv::norm(filled, bare, cv::NORM_INF), 100.0);
+  fill_markers(filled, rest, 6.0);
+  EXPECT_LE(cv::norm(filled, bare, cv::NORM_INF), 2.0);
+  const std::vector<Eigen::Vector2d> outside = {{-50.0, 10.0}, {std::nan(""), 0.0}, {1e9, 1e9}, {0.0, 0.0}};
+  fill_markers(filled, outside, 6.0);
+  EXPECT_LE(cv::norm(filled, bare, cv::NORM_INF), 3.0);
+  cv::Mat grey(20, 20, CV_8UC1, cv::Scalar(0));
+  EXPECT_THROW(fill_markers(grey, rest, 6.0), Error);
+  EXPECT_THROW(fill_markers(filled, rest, 0.0), Error);
 }
 
 }  // namespace
