@@ -19,6 +19,7 @@ namespace {
 
 constexpr double kFillRadius = 0.8;  ///< of a marker's diameter: its rim and the blur
 constexpr int kBackgroundFrames = 4;
+constexpr int kBackgroundFrame = 1000000;  ///< number of the first: its noise is no frame's
 constexpr double kCalibrationBall_mm = 4.0;
 constexpr double kCalibrationDepth_mm = 0.6;
 constexpr double kCalibrationStep_mm = 4.0;  ///< between the nine presses
@@ -54,6 +55,12 @@ std::optional<sensors::TrackedMarkers> track_from_rest(const sim::TouchRig& rig,
   const sensors::TrackedMarkers* last = &tracker.track({background, t_us});
   for (const cv::Mat& frame : frames) last = &tracker.track({frame, ++t_us});
   return *last;
+}
+
+std::vector<cv::Mat> backgrounds(const sim::TouchRig& rig, std::uint64_t seed) {
+  std::vector<cv::Mat> frames;
+  for (int i = 0; i < kBackgroundFrames; ++i) frames.push_back(rig.background(seed, kBackgroundFrame + i));
+  return frames;
 }
 
 double diameter_px(const sim::TouchRig& rig) {
@@ -102,43 +109,39 @@ cv::Mat without_markers(const cv::Mat& frame, const sensors::TrackedMarkers* mar
 }
 
 sensors::HeightModel calibrate_on(const sim::TouchRig& rig, std::uint64_t seed) {
-  const double diameter = diameter_px(rig);
-  std::vector<cv::Mat> rest;
-  for (int i = 0; i < kBackgroundFrames; ++i) {
-    const cv::Mat frame = rig.background(seed, i);
-    const auto markers = track_from_rest(rig, frame, {});
-    rest.push_back(without_markers(frame, markers ? &*markers : nullptr, diameter));
-  }
-  const sensors::Background background = sensors::mean_background(rest);
-  const cv::Mat at_rest = rig.background(seed, 0);
-
+  if (rig.device().coating->print) fail("device {}: has markers; heights are calibrated without", rig.device().name);
+  const sensors::Background background = sensors::mean_background(backgrounds(rig, seed));
   const sim::ObjectSpec ball = gelsight_ball(kCalibrationBall_mm, 0.0);
   const sim::TouchObject object = rig.object(ball);
   constexpr int kPresses = 9;
   std::vector<sensors::BallPress> presses(kPresses);
   tbb::parallel_for(0, kPresses, [&](int i) {
-    sim::MotionSpec motion;
     const double radius = ball.shape.radius_mm;
-    motion.start_mm = {kCalibrationStep_mm * (i % 3 - 1), 0.75 * kCalibrationStep_mm * (i / 3 - 1), radius + kClear_mm};
+    sim::MotionSpec motion;
+    motion.start_mm = {kCalibrationStep_mm * (i % 3 - 1), kCalibrationStep_mm * 0.75 * (i / 3 - 1), radius + kClear_mm};
     sim::MotionKey key;
-    key.frames = 2;
     key.z = sim::AxisKey{radius - kCalibrationDepth_mm, std::nullopt};
     motion.keys = {key};
-    std::vector<cv::Mat> frames;
-    const std::vector<sim::Truth> truths = rig.play(object, motion);
-    for (std::size_t k = 1; k < truths.size(); ++k) {
-      frames.push_back(rig.look(object, truths[k].press, seed, 100 * (i + 1) + static_cast<int>(k), false).frame);
-    }
-    const auto markers = track_from_rest(rig, at_rest, frames);
     sensors::BallPress& press = presses[as_size(i)];
     press.name = fmt::format("press {}", i);
-    press.frame = without_markers(frames.back(), markers ? &*markers : nullptr, diameter);
+    press.frame = rig.look(object, rig.play(object, motion).back().press, seed, i, false).frame;
     press.ball_radius_mm = radius;
     press.circle = sensors::find_contact_circle(press.frame, background, radius, rig.mm_per_px(), press.name);
   });
   sensors::HeightCalibrationSettings settings;
   settings.mm_per_px = rig.mm_per_px();
   return sensors::calibrate_height(presses, background, settings).model;
+}
+
+sensors::HeightModel for_marked_gel(sensors::HeightModel model, const sim::TouchRig& marked, std::uint64_t seed) {
+  std::vector<cv::Mat> rest = backgrounds(marked, seed);
+  for (cv::Mat& frame : rest) {
+    const auto markers = track_from_rest(marked, frame, {});
+    frame = without_markers(frame, &*markers, diameter_px(marked));
+  }
+  model.background = sensors::mean_background(rest);
+  model.mm_per_px = marked.mm_per_px();
+  return model;
 }
 
 NormalSeries press_with_forces(const sim::TouchRig& rig, const sensors::HeightModel& model,
@@ -149,7 +152,7 @@ NormalSeries press_with_forces(const sim::TouchRig& rig, const sensors::HeightMo
   tbb::parallel_for(std::size_t{0}, truths.size(), [&](std::size_t i) {
     touches[i] = rig.look(touch_object, truths[i].press, seed, static_cast<int>(i));
   });
-  const cv::Mat at_rest = rig.background(seed, -1);
+  const cv::Mat at_rest = rig.background(seed, kBackgroundFrame);
   NormalSeries series;
   series.indenter = object.name;
   sensors::HeightEstimator estimator(model);
@@ -205,7 +208,7 @@ ShearTest shear_until_slip(const sim::TouchRig& rig, const sim::ObjectSpec& obje
     frames[i] = rig.look(touch_object, truths[i].press, seed, static_cast<int>(i), false).frame;
   });
 
-  const cv::Mat background = rig.background(seed, -1);
+  const cv::Mat background = rig.background(seed, kBackgroundFrame);
   sensors::MarkerTracker tracker(marker_settings(rig));
   tracker.track({background, -1});
   ShearTest test;

@@ -16,6 +16,7 @@ namespace touchstone::lab {
 namespace {
 
 constexpr int kStatesAFrame = 4;
+constexpr int kBackgroundFrame = 1000000;  ///< its noise is no other frame's
 constexpr int kPressFrames = 4;
 constexpr int kHoldFrames = 3;
 constexpr int kLoadFrames = 10;
@@ -133,7 +134,7 @@ SlipRun run_slip_case(const sim::TouchRig& rig, const SlipCase& what, const Slip
     truths.resize(std::min(truths.size(), onset + as_count(frames_after * kStatesAFrame) + 1));
   }
 
-  const cv::Mat background = rig.background(seed, -1);
+  const cv::Mat background = rig.background(seed, kBackgroundFrame);
   const double diameter = marker_settings(rig).look.diameter_px;
   sensors::MarkerTracker tracker(marker_settings(rig));
   sensors::IncipientSlipDetector incipient(estimators.incipient);
