@@ -8,7 +8,6 @@
 
 #include "core/error.h"
 #include "sensors/contact_patch.h"
-#include "sensors/height_calibration.h"
 #include "sensors/height_estimator.h"
 #include "sensors/marker_filling.h"
 #include "sensors/motion_ratio.h"
@@ -20,9 +19,6 @@ namespace {
 constexpr double kFillRadius = 0.8;  ///< of a marker's diameter: its rim and the blur
 constexpr int kBackgroundFrames = 4;
 constexpr int kBackgroundFrame = 1000000;  ///< number of the first: its noise is no frame's
-constexpr double kCalibrationBall_mm = 4.0;
-constexpr double kCalibrationDepth_mm = 0.6;
-constexpr double kCalibrationStep_mm = 4.0;  ///< between the nine presses
 constexpr double kRisesTo = 0.95;   ///< of the largest shear force: up to there the gel sticks (samples_before_slip)
 constexpr double kClear_mm = 0.02;  ///< above the gel, where motions start
 constexpr int kLeastPatch_px = 50;
@@ -106,31 +102,6 @@ cv::Mat without_markers(const cv::Mat& frame, const sensors::TrackedMarkers* mar
   cv::Mat filled = frame.clone();
   if (markers != nullptr) sensors::fill_markers(filled, markers->positions, std::max(kFillRadius * diameter, 1.0));
   return filled;
-}
-
-sensors::HeightModel calibrate_on(const sim::TouchRig& rig, std::uint64_t seed) {
-  if (rig.device().coating->print) fail("device {}: has markers; heights are calibrated without", rig.device().name);
-  const sensors::Background background = sensors::mean_background(backgrounds(rig, seed));
-  const sim::ObjectSpec ball = gelsight_ball(kCalibrationBall_mm, 0.0);
-  const sim::TouchObject object = rig.object(ball);
-  constexpr int kPresses = 9;
-  std::vector<sensors::BallPress> presses(kPresses);
-  tbb::parallel_for(0, kPresses, [&](int i) {
-    const double radius = ball.shape.radius_mm;
-    sim::MotionSpec motion;
-    motion.start_mm = {kCalibrationStep_mm * (i % 3 - 1), kCalibrationStep_mm * 0.75 * (i / 3 - 1), radius + kClear_mm};
-    sim::MotionKey key;
-    key.z = sim::AxisKey{radius - kCalibrationDepth_mm, std::nullopt};
-    motion.keys = {key};
-    sensors::BallPress& press = presses[as_size(i)];
-    press.name = fmt::format("press {}", i);
-    press.frame = rig.look(object, rig.play(object, motion).back().press, seed, i, false).frame;
-    press.ball_radius_mm = radius;
-    press.circle = sensors::find_contact_circle(press.frame, background, radius, rig.mm_per_px(), press.name);
-  });
-  sensors::HeightCalibrationSettings settings;
-  settings.mm_per_px = rig.mm_per_px();
-  return sensors::calibrate_height(presses, background, settings).model;
 }
 
 sensors::HeightModel for_marked_gel(sensors::HeightModel model, const sim::TouchRig& marked, std::uint64_t seed) {

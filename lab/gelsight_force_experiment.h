@@ -25,10 +25,6 @@ sensors::MarkerTrackerSettings marker_settings(const sim::TouchRig& rig);
 /// A frame without its markers, if the device has any: filled where the tracker finds them (`markers`, else nullptr).
 cv::Mat without_markers(const cv::Mat& frame, const sensors::TrackedMarkers* markers, double diameter_px);
 
-/// Height calibration as of sec. 2.2.2: a ball of 4 mm, pressed at nine places, its circles found in the frames.
-/// @throws Error for a gel with markers
-sensors::HeightModel calibrate_on(const sim::TouchRig& rig, std::uint64_t seed);
-
 /// The same calibration for a gel with markers under the same light: with the background of that gel, its markers
 /// filled. (The text doesn't say how it calibrates its second gel. Its table goes from colour to slope, and holds for
 /// both.)
