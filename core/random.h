@@ -15,6 +15,7 @@ enum class Purpose : std::uint32_t {
   kEventThreshold = 6,
   kEventNoise = 7,
   kLampSpread = 8,
+  kRelief = 20,
   kTest = 99,
 };
 
