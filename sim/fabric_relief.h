@@ -22,6 +22,9 @@ enum class Weave {
 EnumNames<Weave> enum_names(Weave);
 
 struct FabricRelief {
+  static constexpr const char* kType = "fabric";
+  static constexpr bool kSharp = false;
+
   Weave weave = Weave::plain;
   /// From yarn to yarn: of the warp's ends (which run along y), of the weft's picks (along x). Knit: from wale to wale,
   /// from course to course. Corduroy: from rib to rib, both alike.

@@ -16,6 +16,9 @@ enum class FoamKind {
 EnumNames<FoamKind> enum_names(FoamKind);
 
 struct FoamRelief {
+  static constexpr const char* kType = "foam";
+  static constexpr bool kSharp = false;
+
   FoamKind kind = FoamKind::open;
   double cell_mm = 0.8;  ///< mean diameter: of a circle with the mean area of a cell
   double spread = 0.15;  ///< relative standard deviation that is asked of the cells' diameters, beside that of chance

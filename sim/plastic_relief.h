@@ -10,6 +10,9 @@
 namespace touchstone::sim {
 
 struct PlasticRelief {
+  static constexpr const char* kType = "plastic";
+  static constexpr bool kSharp = false;
+
   double pebble_mm = 0.8;   ///< mean diameter of a pebble
   double spread = 0.2;      ///< relative standard deviation that is asked of their diameters
   double valley_mm = 0.2;   ///< width of the valleys

@@ -9,6 +9,9 @@
 namespace touchstone::sim {
 
 struct SandpaperRelief {
+  static constexpr const char* kType = "sandpaper";
+  static constexpr bool kSharp = false;
+
   int grit = 120;     ///< FEPA P-grade: one that grain_size_mm() knows
   double coat = 0.7;  ///< share of the area under grains; a closed coat has 0.7 and more, an open one about half
   double size_spread = 0.15;        ///< relative standard deviation of a grain's size

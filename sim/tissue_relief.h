@@ -16,6 +16,9 @@ enum class Embossing {
 EnumNames<Embossing> enum_names(Embossing);
 
 struct TissueRelief {
+  static constexpr const char* kType = "tissue";
+  static constexpr bool kSharp = false;
+
   Embossing embossing = Embossing::none;
   double emboss_mm = 2.0;         ///< from knob to knob, or from line to line
   double emboss_width_mm = 0.6;   ///< of a knob or line

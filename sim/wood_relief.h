@@ -9,6 +9,9 @@
 namespace touchstone::sim {
 
 struct WoodRelief {
+  static constexpr const char* kType = "wood";
+  static constexpr bool kSharp = false;
+
   double ring_mm = 2.0;           ///< a year's growth
   double ring_um = 15.0;          ///< how far late wood stands above early wood
   double vessels_per_mm2 = 1.0;   ///< mean; softwoods have none
