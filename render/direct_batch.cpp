@@ -97,14 +97,26 @@ void DirectBatch::look(std::span<const RayPacket> rays, DirectCounts& counts) {
       one.material = &frame_.materials[one.object];
       one.distance = hits.distance[k];
       float along = 0.0f;
-      float length2 = 0.0f;
+      float shading_along = 0.0f;
       for (int a = 0; a < 3; ++a) {
         one.place[a] = packet.origin[a][k] + one.distance * packet.direction[a][k];
         along += hits.normal[a][k] * packet.direction[a][k];
-        length2 += hits.normal[a][k] * hits.normal[a][k];
+        shading_along += hits.shading[a][k] * packet.direction[a][k];
       }
+      // A smooth normal that has turned away from the camera is left for the triangle's own.
+      const bool turned_away = (along < 0.0f) != (shading_along < 0.0f);
+      const auto& normal = turned_away ? hits.normal : hits.shading;
+      float length2 = 0.0f;
+      for (int a = 0; a < 3; ++a) length2 += normal[a][k] * normal[a][k];
       const float scale = (along < 0.0f ? 1.0f : -1.0f) / std::sqrt(std::max(length2, 1e-30f));
-      for (int a = 0; a < 3; ++a) one.normal[a] = scale * hits.normal[a][k];
+      float furthest = 0.0f;
+      for (int a = 0; a < 3; ++a) {
+        one.normal[a] = scale * normal[a][k];
+        furthest = std::max(furthest, std::abs(one.place[a]));
+      }
+      // More than single precision loses where the ray meets the surface and where it leaves it.
+      const float off = 8e-6f * (1.0f + furthest);
+      for (int a = 0; a < 3; ++a) one.leave[a] = one.place[a] + hits.lift[a][k] + off * one.normal[a];
       if (is_lit(one.material->kind)) light_lane(lane, counts);
     }
   }
@@ -243,10 +255,8 @@ void DirectBatch::cast_shadows(DirectCounts& counts) {
 bool DirectBatch::shadow_ray(int lane, int lamp, int slot) {
   const Lane& one = lanes_[lane];
   const Eigen::Vector3f place(one.place[0], one.place[1], one.place[2]);
-  const Eigen::Vector3f normal(one.normal[0], one.normal[1], one.normal[2]);
   const Eigen::Vector3f towards = (-flow_of(lane, lamp)).normalized();
-  // More than single precision loses where the ray meets the surface and where it leaves it.
-  const Eigen::Vector3f origin = place + 8e-6f * (1.0f + place.cwiseAbs().maxCoeff()) * normal;
+  const Eigen::Vector3f origin(one.leave[0], one.leave[1], one.leave[2]);
   if (!origin.allFinite() || !towards.allFinite()) return false;
   float far = 1e6f;
   if (towards.z() != 0.0f) {

@@ -91,7 +91,8 @@ class DirectBatch {
  private:
   struct Lane {
     float place[3];
-    float normal[3];  // unit, facing the camera's ray
+    float normal[3];  // the shading normal: unit, facing the camera's ray
+    float leave[3];   // where shadow rays start
     float distance;
     int object;
     const DirectMaterial* material;  // null where nothing was met
