@@ -206,6 +206,9 @@ void PacketScene::intersect(const RayPacket& rays, PacketHits& hits) const {
     const bool hit = rays.valid[lane] != 0 && geometry != RTC_INVALID_GEOMETRY_ID;
     const bool ball = geometry == state_->meshes.size();
     hits.object[lane] = hit ? static_cast<int>(geometry + (ball ? found.hit.primID[lane] : 0u)) : -1;
+    hits.triangle[lane] = hit && !ball ? static_cast<int>(found.hit.primID[lane]) : -1;
+    hits.u[lane] = found.hit.u[lane];
+    hits.v[lane] = found.hit.v[lane];
     hits.distance[lane] = found.ray.tfar[lane];
     hits.normal[0][lane] = found.hit.Ng_x[lane];
     hits.normal[1][lane] = found.hit.Ng_y[lane];
