@@ -1,18 +1,24 @@
 #include "lab/gelsight_texture_experiment.h"
 
 #include <fmt/format.h>
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <map>
+#include <memory>
 #include <numeric>
 #include <set>
 #include <variant>
 
 #include "core/error.h"
 #include "core/random.h"
+#include "core/transform.h"
+#include "core/units.h"
+#include "fem/press.h"
+#include "sensors/height_estimator.h"
 #include "sensors/height_gray.h"
 
 namespace touchstone::lab {
@@ -20,16 +26,16 @@ namespace {
 
 constexpr int kSquares = 4;  // of one image
 
-/// The pose at the start is just clear of the gel; the force of the only key presses.
-sim::MotionSpec press_of(const sim::ObjectSpec& object, const Eigen::Vector2d& place, double turn_deg, double force_N) {
-  constexpr double kClear_mm = 0.05;
-  sim::MotionSpec motion;
-  motion.start_mm = {place.x(), place.y(), sim::relief_map(*object.relief).highest() + kClear_mm};
-  motion.start_angles_deg = {0.0, 0.0, turn_deg};
-  sim::MotionKey key;
-  key.z = sim::AxisKey{std::nullopt, force_N};
-  motion.keys = {key};
-  return motion;
+/// The state under a force, pressed straight from above without friction: a face that covers the whole view has nothing
+/// to slide on.
+fem::PressState pressed(const sim::TouchRig& rig, const sim::TouchObject& object, const Eigen::Vector2d& place,
+                        double turn_deg, double force_N) {
+  fem::Press press(rig.gel(), object.felt(), 0.0);
+  fem::PressTarget target;
+  target.rotation = rotation_from_xyz({0.0, 0.0, turn_deg * kRadiansPerDegree});
+  target.axis = {fem::AxisControl::at(place.x()), fem::AxisControl::at(place.y()),
+                 fem::AxisControl::with_force(force_N)};
+  return press.step(target);
 }
 
 /// A random order of 0 to n - 1 (Fisher and Yates).
@@ -107,18 +113,41 @@ sim::ObjectSpec another_patch(const sim::ObjectSpec& object, std::uint64_t seed)
   return patch;
 }
 
+HeightsOf estimated_heights(const sim::TouchRig& rig, const sensors::HeightModel& model, std::uint64_t noise_seed) {
+  sensors::HeightSettings settings;
+  settings.border = sensors::HeightBorder::free;  // the object covers the whole picture
+  // An estimator serves one thread at a time; each thread gets a copy of this one.
+  auto estimators = std::make_shared<tbb::enumerable_thread_specific<sensors::HeightEstimator>>(
+      [model, settings] { return sensors::HeightEstimator(model, settings); });
+  estimators->local();  // a faulty model shows here
+  return [&rig, estimators, noise_seed](const sim::TouchObject& object, const fem::PressState& press, int number) {
+    const cv::Mat frame = rig.look(object, press, noise_seed, number, false).frame;
+    return estimators->local().estimate(frame).height_mm.clone();
+  };
+}
+
+HeightsOf true_heights(const sim::TouchRig& rig, double noise_mm, std::uint64_t noise_seed) {
+  return [&rig, noise_mm, noise_seed](const sim::TouchObject& object, const fem::PressState& press, int number) {
+    cv::Mat heights = rig.look(object, press, noise_seed, number, true).height;
+    RandomStream random(noise_seed, static_cast<std::uint64_t>(number), Purpose::kImagerNoise);
+    for (int j = 0; j < heights.rows; ++j) {
+      auto* row = heights.ptr<float>(j);
+      for (int i = 0; i < heights.cols; ++i) row[i] += static_cast<float>(noise_mm * random.normal());
+    }
+    return heights;
+  };
+}
+
 cv::Mat press_texture(const sim::TouchRig& rig, const sim::ObjectSpec& object, const TexturePresses& presses,
-                      int texture, int image, const HeightsOf& heights_of) {
+                      int texture, int image, const HeightsOf& look) {
   const auto number = (static_cast<std::uint64_t>(texture) << 16) + static_cast<std::uint64_t>(image);
   RandomStream random(presses.seed, number, Purpose::kPlacement);
   const std::uint64_t piece = (static_cast<std::uint64_t>(random()) << 32) + random();
   const double turn_deg = 360.0 * random.uniform();
   const Eigen::Vector2d place(presses.shift_mm * random.normal(), presses.shift_mm * random.normal());
   const double force = presses.force_N * std::max(0.2, 1.0 + presses.force_spread * random.normal());
-  const sim::ObjectSpec patch = another_patch(object, piece);
-  const sim::TouchObject touching = rig.object(patch);
-  const std::vector<sim::Truth> states = rig.play(touching, press_of(patch, place, turn_deg, force));
-  return heights_of(rig.look(touching, states.back().press, presses.seed, static_cast<int>(number)));
+  const sim::TouchObject touching = rig.object(another_patch(object, piece));
+  return look(touching, pressed(rig, touching, place, turn_deg, force), static_cast<int>(number));
 }
 
 std::vector<cv::Mat> middle_squares(const cv::Mat& image, int side) {
@@ -134,7 +163,7 @@ std::vector<cv::Mat> middle_squares(const cv::Mat& image, int side) {
 }
 
 std::vector<TextureSample> texture_samples(const sim::TouchRig& rig, const std::vector<sim::ObjectSpec>& objects,
-                                           const TexturePresses& presses, const HeightsOf& heights_of,
+                                           const TexturePresses& presses, const HeightsOf& look,
                                            const Progress& progress) {
   constexpr int kSide = 200;
   const int images = static_cast<int>(objects.size()) * presses.images;
@@ -142,7 +171,7 @@ std::vector<TextureSample> texture_samples(const sim::TouchRig& rig, const std::
   std::atomic<int> done = 0;
   tbb::parallel_for(0, images, [&](int k) {
     const int texture = k / presses.images;
-    const cv::Mat heights = press_texture(rig, objects[texture], presses, texture, k % presses.images, heights_of);
+    const cv::Mat heights = press_texture(rig, objects[texture], presses, texture, k % presses.images, look);
     squares[k] = middle_squares(heights, kSide);
     if (progress) progress("pressing textures", ++done, images);
   });

@@ -12,6 +12,8 @@
 #include <vector>
 
 #include "core/progress.h"
+#include "fem/press.h"
+#include "sensors/height_model.h"
 #include "sensors/texture_model.h"
 #include "sim/touch_rig.h"
 
@@ -31,13 +33,22 @@ struct TexturePresses {
   std::uint64_t seed = 1;
 };
 
-/// From what the camera saw to a height image (CV_32FC1, mm, the frame's size). Called from many threads.
-using HeightsOf = std::function<cv::Mat(const sim::Touch&)>;
+/// The height image (CV_32FC1, mm, the camera's size) of a pressed object; `number` is the press's own. Called from
+/// many threads, a pure function.
+using HeightsOf = std::function<cv::Mat(const sim::TouchObject&, const fem::PressState&, int number)>;
+
+/// Heights as the sensor gives them: from the camera's frame, by a model that was made of frames of the same device.
+/// @throws Error if the model can't be used
+HeightsOf estimated_heights(const sim::TouchRig& rig, const sensors::HeightModel& model, std::uint64_t noise_seed);
+
+/// The membrane as it truly is, with white noise of this standard deviation in each pixel: what a better camera and
+/// estimator would give.
+HeightsOf true_heights(const sim::TouchRig& rig, double noise_mm, std::uint64_t noise_seed);
 
 /// The height image of press number `image` on class number `texture`: a new piece of the surface, at a random angle,
 /// place and force, all chosen by (seed, texture, image).
 cv::Mat press_texture(const sim::TouchRig& rig, const sim::ObjectSpec& object, const TexturePresses& presses,
-                      int texture, int image, const HeightsOf& heights_of);
+                      int texture, int image, const HeightsOf& look);
 
 /// Four squares of `side` px about the image's middle, which don't overlap. @throws Error for a smaller image
 std::vector<cv::Mat> middle_squares(const cv::Mat& image, int side);
@@ -51,7 +62,7 @@ struct TextureSample {
 
 /// All samples of `objects`, by class, then image, then square; presses run in parallel.
 std::vector<TextureSample> texture_samples(const sim::TouchRig& rig, const std::vector<sim::ObjectSpec>& objects,
-                                           const TexturePresses& presses, const HeightsOf& heights_of,
+                                           const TexturePresses& presses, const HeightsOf& look,
                                            const Progress& progress = {});
 
 /// How samples are divided into those that train and those that test.
