@@ -196,7 +196,7 @@ void plan_relief(const SceneSpec& scene, Plan& plan, PlanTable& table) {
   }
   const double pixel = scene.membrane.pixel_um / kMicrometresPerMillimetre;
   // A picture may be smoother than its pixels; waves and hairs are as fine as they say.
-  const bool known = scene.object.relief && scene.object.relief->type != ReliefKind::image;
+  const bool known = scene.object.relief && is_sharp(*scene.object.relief);
   if (plan.fine_relief && known && *detail < 2.0 * pixel) {
     fail_at(scene.membrane.where,
             "membrane.pixel_um: {} is too wide for the object's relief of {:.3g} mm; at most {:.3g}",
