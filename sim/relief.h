@@ -10,11 +10,12 @@
 #include "core/yaml_reader.h"
 #include "fem/relief_map.h"
 #include "sim/image_relief.h"
+#include "sim/leaf_relief.h"
 #include "sim/wave_reliefs.h"
 
 namespace touchstone::sim {
 
-using ReliefKind = std::variant<WavesRelief, GridRelief, HairRelief, ImageRelief>;
+using ReliefKind = std::variant<WavesRelief, GridRelief, HairRelief, ImageRelief, LeafRelief>;
 
 /// Heights from 0 over the shape's lower side, mapped along the object's z axis; the plain shape is the floor. Only the
 /// fields that belong to `type` may stand in the file.
