@@ -3,15 +3,13 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
-#include <iterator>
 
 namespace touchstone::sim {
 namespace {
 
-constexpr double kSpareReach = 0.25;       // of the widest displacement, for states that weren't looked at
-constexpr double kSpareReachMm = 0.05;     // and for what is laid onto a body
-constexpr int kPathsToMeasure = 256;       // a pixel, for a standard error of a tenth of a percent
-constexpr int kRaysTried[] = {1, 16, 64};  // a pixel; with one, shadows of wide lamps have no soft rims
+constexpr double kSpareReach = 0.25;    // of the widest displacement, for states that weren't looked at
+constexpr double kSpareReachMm = 0.05;  // and for what is laid onto a body
+constexpr int kPathsToMeasure = 256;    // a pixel, for a standard error of a tenth of a percent
 constexpr double kFarAway_mm = 1e4;
 
 /// The gel as nothing presses it.
@@ -89,9 +87,10 @@ std::string with_figures(const std::string& verdict, const render::DirectError& 
 
 }  // namespace
 
-DirectLight::DirectLight(const SceneSight& sight, const render::Camera& camera, std::span<const Truth> truths)
+DirectLight::DirectLight(const SceneSight& sight, const render::Camera& camera, std::span<const Truth> truths,
+                         std::span<const int> rays_tried)
     : camera_(camera) {
-  TS_ASSERT(sight.plan.direct_light && !truths.empty());
+  TS_ASSERT(sight.plan.direct_light && !truths.empty() && !rays_tried.empty());
   const SceneSpec& scene = sight.scene;
   const bool forced = scene.effects.direct_light == Switch::on;
   const fem::PressState still = at_rest(truths.front().press);
@@ -104,9 +103,9 @@ DirectLight::DirectLight(const SceneSight& sight, const render::Camera& camera, 
   settings.error.samples = kPathsToMeasure;
   const Eigen::AlignedBox3d reach = reach_of(rest, pressed, truths, -scene.device.gel.thickness_mm);
   render::DirectChoice chosen;
-  for (const int rays : kRaysTried) {
+  for (const int rays : rays_tried) {
     settings.direct.samples = rays;
-    settings.whatever = forced && rays == *std::rbegin(kRaysTried);
+    settings.whatever = forced && rays == rays_tried.back();
     chosen = render::choose_direct(rest, pressed, camera, reach, settings);
     if (chosen.renderer || chosen.error.pixels == 0) break;
   }

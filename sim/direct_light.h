@@ -14,13 +14,18 @@
 
 namespace touchstone::sim {
 
+/// Rays a pixel that are tried in turn; with one, shadows of wide lamps have no soft rims.
+inline constexpr int kRaysTried[] = {1, 16, 64};
+
 /// Tier 1 of the renderers for one scene. Made once; `render` is pure and may be called from several threads.
 class DirectLight {
  public:
-  /// Measures on the state of `truths` that is pressed deepest; `choice` then says what became of it.
+  /// Measures on the state of `truths` that is pressed deepest, with ever more rays a pixel until the scene's tolerance
+  /// holds; `choice` then says what became of it. Where the scene switches direct light on, the last is taken.
   /// @pre the plan has direct light, `truths` isn't empty
   /// @throws Error with the scene's place if the scene switches direct light on and it can't be had
-  DirectLight(const SceneSight& sight, const render::Camera& camera, std::span<const Truth> truths);
+  DirectLight(const SceneSight& sight, const render::Camera& camera, std::span<const Truth> truths,
+              std::span<const int> rays_tried = kRaysTried);
 
   const LightChoice& choice() const { return choice_; }
 

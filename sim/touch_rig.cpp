@@ -1,0 +1,240 @@
+#include "sim/touch_rig.h"
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+#include "core/error.h"
+#include "render/first_hits.h"
+#include "sim/device_camera.h"
+#include "sim/direct_light.h"
+#include "sim/plan_direct.h"
+#include "sim/seen_geometry.h"
+
+namespace touchstone::sim {
+namespace {
+
+constexpr double kFarAway_mm = 1e4;
+constexpr int kRaysAPixel[] = {1};  // of direct light: some milliseconds a frame
+constexpr int kPathsAPixel = 256;   // where a device is unfit for direct light
+
+/// The gel as nothing presses it.
+fem::PressState rest_state(const fem::Compliance& gel, int beads) {
+  const auto vertices = static_cast<Eigen::Index>(gel.vertices.size());
+  fem::PressState rest;
+  rest.gel_from_object.translation = {0, 0, kFarAway_mm};
+  rest.bodies.resize(1);
+  rest.bodies[0].gel_from_object = rest.gel_from_object;
+  rest.traction = Eigen::MatrixX3d::Zero(vertices, 3);
+  rest.surface_displacement = Eigen::MatrixX3d::Zero(vertices, 3);
+  rest.bead_displacement = Eigen::MatrixX3d::Zero(beads, 3);
+  rest.node_state.assign(gel.vertices.size(), fem::NodeState::open);
+  rest.node_owner.assign(gel.vertices.size(), -1);
+  return rest;
+}
+
+/// States that go as far as the light has to reach: pushed flat to the side and in.
+std::vector<Truth> farthest_states(const fem::PressState& rest, const TouchRigSettings& settings) {
+  std::vector<Truth> states;
+  for (const double side : {-1.0, 1.0}) {
+    Truth truth;
+    truth.press = rest;
+    truth.press.surface_displacement.col(0).setConstant(side * settings.widest_mm);
+    truth.press.surface_displacement.col(1).setConstant(side * settings.widest_mm);
+    truth.press.surface_displacement.col(2).setConstant(side < 0 ? -settings.deepest_mm : 0.1 * settings.deepest_mm);
+    states.push_back(std::move(truth));
+  }
+  return states;
+}
+
+/// A ball that shadows and shades as objects do: what the light's error is measured on.
+ObjectSpec judged_ball() {
+  constexpr double kRadius_mm = 3.0;
+  ObjectSpec ball;
+  ball.name = "ball";
+  ball.shape.radius_mm = kRadius_mm;
+  return ball;
+}
+
+MotionSpec straight_press(double from_mm, double to_mm) {
+  MotionSpec motion;
+  motion.start_mm = {0, 0, from_mm};
+  MotionKey key;
+  key.z = AxisKey{to_mm, std::nullopt};
+  motion.keys = {key};
+  return motion;
+}
+
+}  // namespace
+
+struct TouchRig::Parts {
+  Parts(DeviceSpec device_of, const std::filesystem::path& cache_folder, const TouchRigSettings& settings_of)
+      : device(std::move(device_of)), settings(settings_of) {
+    if (!device.camera) fail("device {}: has no camera, so it can't be looked through", device.name);
+    if (!device.coating) fail("device {}: has no coating; what shows through its gel needs whole scenes", device.name);
+    gel = set_up_gel(device, cache_folder);
+    const SceneSpec scene = scene_with(judged_ball(), {});
+    judged = std::make_shared<const SceneSight>(scene, make_plan(scene), *gel);
+    rest = rest_state(*gel, 0);
+    camera = camera_of(*device.camera);
+    ready = render::make_ready(camera);
+    size = {render::size_of(camera).x(), render::size_of(camera).y()};
+    imager = sim::imager(device, judged->plan.bands, judged->plan.sensor_noise);
+    pattern = render::fixed_pattern(imager, size, settings.seed);
+    rest_seen = seen(*judged, rest, {});
+    rest_hits = render::first_hits(rest_seen.inside, ready);
+    if (judged->plan.direct_light) {
+      std::vector<Truth> states = farthest_states(rest, settings);
+      const double radius = judged_ball().shape.radius_mm;
+      const double half = 0.5 * settings.deepest_mm;
+      states.push_back(play(scene_with(judged_ball(), straight_press(radius + 0.1, radius - half))).back());
+      direct = std::make_unique<const DirectLight>(*judged, camera, states, kRaysAPixel);
+      choice = direct->choice();
+    }
+    background_light = light(*judged, rest, {});
+  }
+
+  SceneSpec scene_with(const ObjectSpec& object, const MotionSpec& motion) const {
+    SceneSpec scene;
+    scene.device = device;
+    scene.object = object;
+    scene.motion = motion;
+    scene.seed = settings.seed;
+    scene.membrane.pixel_um = settings.membrane_um;
+    scene.light.interreflection_tolerance = settings.interreflection_tolerance;
+    scene.effects.fine_relief = device.gel.shape == GelShape::slab ? Switch::on : Switch::off;
+    scene.effects.motion_blur = Switch::off;
+    scene.effects.rolling_shutter = Switch::off;
+    const bool fit = unfit_for_direct_light(scene, make_plan(scene)).empty();
+    scene.effects.direct_light = fit ? Switch::on : Switch::off;
+    return scene;
+  }
+
+  std::vector<Truth> play(const SceneSpec& scene) const { return play_motion(scene, make_plan(scene), *gel); }
+
+  SeenGeometry seen(const SceneSight& sight, const fem::PressState& press,
+                    const std::optional<fem::ReliefAnswer>& relief) const {
+    return relief && relief->grid.size() > 0
+               ? seen_geometry(sight.scene, sight.plan, sight.objects, *sight.membrane, press, *relief)
+               : seen_geometry(sight.scene, sight.plan, sight.objects, sight.gel, press);
+  }
+
+  /// Irradiance on the sensor.
+  cv::Mat light(const SceneSight& sight, const fem::PressState& press,
+                const std::optional<fem::ReliefAnswer>& relief) const {
+    if (choice.direct) {
+      if (auto image = direct->render(sight.seen(press, relief))) return image->irradiance;
+      fail("the gel has gone beyond the {} mm in and {} mm aside that the rig was set up for", settings.deepest_mm,
+           settings.widest_mm);
+    }
+    render::RenderSettings paths;
+    paths.seed = settings.seed;
+    paths.min_samples = paths.max_samples = kPathsAPixel;
+    return sight.tracer(press, relief).render(camera, paths).irradiance;
+  }
+
+  cv::Mat develop(const cv::Mat& irradiance, std::uint64_t noise_seed, int frame) const {
+    return render::develop(render::expose(irradiance, imager, pattern, noise_seed, static_cast<std::uint64_t>(frame)),
+                           imager);
+  }
+
+  DeviceSpec device;
+  TouchRigSettings settings;
+  std::shared_ptr<const fem::Compliance> gel;
+  std::shared_ptr<const SceneSight> judged;  // any object's: what the device alone looks like
+  fem::PressState rest;
+  render::Camera camera;
+  render::ReadyCamera ready;
+  cv::Size size;
+  render::Imager imager;
+  render::FixedPattern pattern;
+  SeenGeometry rest_seen;
+  std::vector<render::FirstHit> rest_hits;
+  std::unique_ptr<const DirectLight> direct;
+  LightChoice choice{false, "paths: the device is unfit for direct light", {}};
+  cv::Mat background_light;
+};
+
+TouchRig::TouchRig(DeviceSpec device, const std::filesystem::path& cache_folder, const TouchRigSettings& settings)
+    : parts_(std::make_unique<const Parts>(std::move(device), cache_folder, settings)) {}
+TouchRig::~TouchRig() = default;
+
+const DeviceSpec& TouchRig::device() const {
+  return parts_->device;
+}
+
+const fem::Compliance& TouchRig::gel() const {
+  return *parts_->gel;
+}
+
+const LightChoice& TouchRig::light() const {
+  return parts_->choice;
+}
+
+double TouchRig::mm_per_px() const {
+  constexpr double kStep_mm = 0.1;
+  const Eigen::Vector2d middle = pixel_from_gel({0, 0});
+  const Eigen::Vector2d right = pixel_from_gel({kStep_mm, 0});
+  return kStep_mm / (right - middle).norm();
+}
+
+Eigen::Vector2d TouchRig::pixel_from_gel(const Eigen::Vector2d& place) const {
+  const auto pixel =
+      render::project_through_faces(parts_->rest_seen.inside, parts_->ready, {place.x(), place.y(), 0.0});
+  if (!pixel) fail("place ({}, {}) mm on the gel isn't seen by the camera", place.x(), place.y());
+  return *pixel;
+}
+
+Eigen::Vector2d TouchRig::gel_from_pixel(const Eigen::Vector2d& pixel) const {
+  constexpr double kStep_mm = 0.01;
+  constexpr int kMostSteps = 20;
+  Eigen::Vector2d place(0, 0);
+  for (int step = 0; step < kMostSteps; ++step) {  // Newton's; the map is nearly affine
+    const Eigen::Vector2d here = pixel_from_gel(place);
+    Eigen::Matrix2d slope;
+    slope.col(0) = (pixel_from_gel(place + Eigen::Vector2d(kStep_mm, 0)) - here) / kStep_mm;
+    slope.col(1) = (pixel_from_gel(place + Eigen::Vector2d(0, kStep_mm)) - here) / kStep_mm;
+    const Eigen::Vector2d change = slope.inverse() * (pixel - here);
+    place += change;
+    if (change.norm() < 1e-9) break;
+  }
+  return place;
+}
+
+TouchObject TouchRig::object(const ObjectSpec& spec) const {
+  const SceneSpec scene = parts_->scene_with(spec, {});
+  TouchObject object;
+  object.sight_ = std::make_shared<const SceneSight>(scene, make_plan(scene), *parts_->gel);
+  return object;
+}
+
+std::vector<Truth> TouchRig::play(const TouchObject& object, const MotionSpec& motion) const {
+  return parts_->play(parts_->scene_with(object.spec(), motion));
+}
+
+Touch TouchRig::look(const TouchObject& object, const fem::PressState& press, std::uint64_t noise_seed, int frame,
+                     bool truth) const {
+  const SceneSight& sight = *object.sight_;
+  const auto relief = sight.relief(press);
+  Touch touch;
+  touch.frame = parts_->develop(parts_->light(sight, press, relief), noise_seed, frame);
+  if (!truth) return touch;
+  const SeenGeometry seen = parts_->seen(sight, press, relief);
+  const std::vector<render::FirstHit> hits = render::first_hits(seen.inside, parts_->ready);
+  touch.height = cv::Mat(parts_->size, CV_32F, cv::Scalar(std::numeric_limits<float>::quiet_NaN()));
+  touch.contact = cv::Mat(parts_->size, CV_8U, cv::Scalar(0));
+  for (std::size_t i = 0; i < hits.size(); ++i) {
+    const render::FirstHit& now = hits[i];
+    const render::FirstHit& before = parts_->rest_hits[i];
+    if (now.object != 0 || before.object != 0) continue;
+    touch.height.ptr<float>()[i] = static_cast<float>(before.position.z() - now.position.z());
+    if (seen.sheet.touched[static_cast<std::size_t>(now.triangle)] >= 0) touch.contact.ptr<std::uint8_t>()[i] = 255;
+  }
+  return touch;
+}
+
+cv::Mat TouchRig::background(std::uint64_t noise_seed, int frame) const {
+  return parts_->develop(parts_->background_light, noise_seed, frame);
+}
+
+}  // namespace touchstone::sim
