@@ -128,7 +128,7 @@ bool is_connected(const TriangleMesh& mesh) {
 }
 
 LampBearings::LampBearings(const LightField& field, bool soft)
-    : lamps(field.lamp_count()), longest(field.lamp_count(), 0.0f) {
+    : lamps(field.beam_count()), longest(field.beam_count(), 0.0f) {
   const Eigen::Vector3d size = field.reach.sizes();
   cell = static_cast<float>(std::max(size.x(), size.y()) / kMostCells);
   left = static_cast<float>(field.reach.min().x());
@@ -143,7 +143,7 @@ LampBearings::LampBearings(const LightField& field, bool soft)
   // and what it takes along a slanting ray (DirectBatch::choose_lens_points).
   std::vector<float> set_off(lamps, 0.0f);
   for (int lamp = 0; soft && lamp < lamps; ++lamp) {
-    set_off[lamp] = static_cast<float>(disc_radius(field.fixture.lamps[lamp]));
+    set_off[lamp] = static_cast<float>(disc_radius(field.lamp(lamp)));
   }
   tbb::parallel_for(0, slabs * rows, [&](int line) {
     const int row = line % rows;
@@ -167,7 +167,7 @@ LampBearings::LampBearings(const LightField& field, bool soft)
         made.x = middle.x();
         made.y = middle.y();
         made.length = middle.norm();
-        const Eigen::Vector3d& real = lamp_position(field.fixture.lamps[lamp]);
+        const Eigen::Vector3d& real = lamp_position(field.lamp(lamp));
         const double sent_across = (Eigen::Vector3d(x, y, middle_z) - real).head<2>().norm();
         const double sent_along = std::max(1e-6, std::abs(double(middle_z) - real.z()));
         const float off =

@@ -44,7 +44,7 @@ std::vector<double> sheet_lines(double first, double pitch, int pixels, double l
 }  // namespace
 
 Membrane::Membrane(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel)
-    : surface_(gel), pixel_(scene.membrane.pixel_um * 1e-3) {
+    : surface_(gel), pixel_(scene.membrane.pixel_um * 1e-3), relief_pixel_(plan.relief_pixel_mm) {
   if (plan.fine_relief) shape_ = contact_shape(scene.object);
   const Eigen::Vector2d size = scene.membrane.height_size_mm.value_or(2.0 * scene.device.mesh.fine_half_extent_mm);
   columns_ = std::max(1, static_cast<int>(std::lround(size.x() / pixel_)));
@@ -58,7 +58,7 @@ Membrane::Membrane(const SceneSpec& scene, const Plan& plan, const fem::Complian
 std::optional<fem::ReliefAnswer> Membrane::relief(const fem::PressState& press) const {
   if (!shape_) return std::nullopt;
   fem::ReliefSettings settings;
-  settings.pitch = pixel_;
+  settings.pitch = relief_pixel_;
   return fem::solve_fine_relief(surface_, press, *shape_, settings);
 }
 

@@ -39,7 +39,7 @@ class Membrane {
  private:
   fem::SmoothSurface surface_;
   std::optional<fem::ContactShape> shape_;  // with all its detail; only where fine relief is on
-  double pixel_;
+  double pixel_, relief_pixel_;
   int columns_, rows_;
 };
 

@@ -78,23 +78,6 @@ render::Surface film_sheet(const FilmSpec& films, const SceneBands& bands, doubl
           render::ThinFilm{in_bands(films.transmittance, bands, "films.transmittance"), films.refractive_index, false}};
 }
 
-render::BayerPattern bayer_pattern(BayerLayout layout) {
-  switch (layout) {
-    case BayerLayout::none:
-      return render::BayerPattern::none;
-    case BayerLayout::rggb:
-      return render::BayerPattern::rggb;
-    case BayerLayout::bggr:
-      return render::BayerPattern::bggr;
-    case BayerLayout::grbg:
-      return render::BayerPattern::grbg;
-    case BayerLayout::gbrg:
-      return render::BayerPattern::gbrg;
-  }
-  TS_ASSERT(false);
-  return {};
-}
-
 }  // namespace
 
 VisibleObject visible_object(const ObjectSpec& object, double edge_mm) {
@@ -149,6 +132,7 @@ render::Surface coated_surface(const DeviceSpec& device, const SceneBands& bands
     out.material = render::RoughConductor{in_bands(coating.albedo, bands, "coating.reflectance"), coating.roughness};
   }
   if (coating.print) out.print = print_of(*coating.print, bands, sheet.rest);
+  out.normals = vertex_normals(sheet.mesh);
   out.mesh = std::move(sheet.mesh);
   return out;
 }
@@ -282,7 +266,7 @@ render::Imager imager(const DeviceSpec& device, const SceneBands& bands, bool wi
   out.exposure_s = camera.exposure_us / kMicrosecondsPerSecond;
   out.wavelengths_nm = bands.centres_nm;
   const auto green = in_bands(camera.quantum_efficiency_green, bands, "camera.quantum_efficiency_green");
-  if (camera.bayer == BayerLayout::none) {
+  if (camera.bayer == render::BayerPattern::none) {
     out.quantum_efficiency = green.matrix().transpose();
   } else {
     out.quantum_efficiency.resize(3, bands.count());
@@ -295,7 +279,7 @@ render::Imager imager(const DeviceSpec& device, const SceneBands& bands, bool wi
   out.dark_current_e_per_s = camera.dark_current_e_per_s;
   out.prnu = camera.prnu;
   out.dsnu_e = camera.dsnu_e;
-  out.bayer = bayer_pattern(camera.bayer);
+  out.bayer = camera.bayer;
   out.black_level_DN = camera.black_level_DN;
   constexpr double kDecibelsPerDecade = 20.0;
   out.gain_DN_per_e = ((1 << camera.bits) - 1 - camera.black_level_DN) / camera.full_well_e *
@@ -303,7 +287,7 @@ render::Imager imager(const DeviceSpec& device, const SceneBands& bands, bool wi
   out.ideal = !with_noise;
   if (camera.white_balance) {
     out.white_balance = *camera.white_balance;
-  } else if (camera.bayer != BayerLayout::none) {
+  } else if (camera.bayer != render::BayerPattern::none) {
     render::Spectrum light = render::flat_spectrum(bands.count(), 0.0);
     for (const LampSpec& lamp : device.lamps) {
       for (const render::Lamp& one : lamps_of(lamp, bands, 1.0)) light += render::lamp_power(one);
