@@ -14,6 +14,7 @@
 #include "sim/fingerprint_relief.h"
 #include "sim/foam_relief.h"
 #include "sim/image_relief.h"
+#include "sim/leaf_relief.h"
 #include "sim/plastic_relief.h"
 #include "sim/plug_relief.h"
 #include "sim/print_relief.h"
@@ -24,9 +25,9 @@
 
 namespace touchstone::sim {
 
-using ReliefKind =
-    std::variant<WavesRelief, GridRelief, HairRelief, ImageRelief, PrintRelief, FingerprintRelief, CoinRelief,
-                 PlugRelief, FabricRelief, FoamRelief, TissueRelief, SandpaperRelief, PlasticRelief, WoodRelief>;
+using ReliefKind = std::variant<WavesRelief, GridRelief, HairRelief, ImageRelief, PrintRelief, FingerprintRelief,
+                                CoinRelief, PlugRelief, FabricRelief, FoamRelief, TissueRelief, SandpaperRelief,
+                                PlasticRelief, WoodRelief, LeafRelief>;
 
 /// Heights from 0 over the shape's lower side, mapped along the object's z axis; the plain shape is the floor. Only the
 /// fields that belong to `type` may stand in the file.
