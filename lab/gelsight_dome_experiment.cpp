@@ -99,12 +99,10 @@ DomeHeights measure_dome_heights(const sim::TouchRig& rig, const CalibrationPres
   constexpr double kBall_mm = 4.0;
   constexpr double kBallDepth_mm = 0.4;
   constexpr double kPlateDepth_mm = 0.3;
-  const double sphere = rig.device().gel.sphere_radius_mm;
   const sim::TouchObject ball = rig.object(ball_of(kBall_mm));
   std::uint64_t noise = seed + kTestNoise;
   for (const Eigen::Vector2d& place : {Eigen::Vector2d(0, 0), {2.7, -1.9}, {-4.3, 2.2}}) {
-    const double fall = sphere - std::sqrt(sphere * sphere - place.squaredNorm());
-    const sim::Touch touch = touch_once(rig, ball, {place, kBallDepth_mm + fall}, ++noise);
+    const sim::Touch touch = touch_once(rig, ball, {place, kBallDepth_mm}, ++noise);
     heights.balls.push_back(height_error(estimator.estimate(touch.frame), touch, rig.mm_per_px()));
   }
   const sim::TouchObject flat = rig.object(plate());
