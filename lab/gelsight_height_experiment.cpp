@@ -8,6 +8,7 @@
 #include "core/error.h"
 #include "core/units.h"
 #include "fem/relief_map.h"
+#include "sim/gel_setup.h"
 
 namespace touchstone::lab {
 
@@ -63,7 +64,7 @@ sim::ObjectSpec flat_cylinder_of(double diameter_mm) {
 
 sim::Touch touch_once(const sim::TouchRig& rig, const sim::TouchObject& object, const StraightPress& press,
                       std::uint64_t noise_seed, bool truth) {
-  const double reach = reach_below(object.spec());
+  const double reach = reach_below(object.spec()) + sim::rest_height(rig.device().gel, press.place_mm);
   sim::MotionSpec motion;
   motion.start_mm = {press.place_mm.x(), press.place_mm.y(), reach + kClearance_mm};
   sim::MotionKey key;
