@@ -26,6 +26,12 @@ double half_height(const sim::ShapeSpec& shape) {
       return 0.5 * shape.size_mm.z();
     case sim::ShapeKind::rounded_cylinder:
       return 0.0;  // its origin is in the middle of its flat end
+    case sim::ShapeKind::egg:
+      return shape.radius_mm;
+    case sim::ShapeKind::shell: {
+      const Eigen::Vector2d rise = 0.125 * shape.curvature_per_mm.cwiseProduct(shape.axes_mm.cwiseAbs2());
+      return std::max(0.0, -rise.minCoeff());
+    }
     case sim::ShapeKind::mesh:
       break;
   }
