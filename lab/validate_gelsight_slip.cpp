@@ -217,8 +217,8 @@ std::vector<ValidationRow> validate_gelsight_slip(const ValidateOptions& options
 
   const sim::TouchRig marked = rig_of("gelsight-markers.yaml");
   rows.begin();
-  const ShearTest shear = shear_until_slip(marked, with_friction(flat_cylinder_of(10.0), 0.5), 0.6, kShearDrag_mm,
-                                           options.quick ? 10 : 24, kSeed + 4);
+  const ShearTest shear =
+      shear_until_slip(marked, gelsight_flat_end(10.0, 0.5), 0.6, kShearDrag_mm, options.quick ? 10 : 24, kSeed + 4);
   rows.add("gelsight.shear.r2", "shear force against mean marker displacement until slip (\"highly linear\")", "1",
            Better::higher, kStronglyLinear_r2, false, shear.line.r2);
   rows.begin();
