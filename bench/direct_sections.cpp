@@ -3,13 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
-#include <ctime>
 #include <functional>
 
 #include "bench/gelsight_scene.h"
 #include "bench/light_scenes.h"
+#include "bench/stopwatch.h"
 #include "render/direct_error.h"
 #include "render/direct_renderer.h"
 #include "render/rest_light.h"
@@ -29,18 +28,12 @@ struct Time {
 /// Least of some frames that alternate between two shapes, checks, tree and all.
 Time frame_time(DirectRenderer& renderer, const Scene& one, const Scene& other, int frames) {
   Time least;
-  const auto processor = [] {
-    timespec now{};
-    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-    return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-  };
   for (int frame = 0; frame < frames; ++frame) {
-    const double before = processor();
-    const auto begun = std::chrono::steady_clock::now();
+    const Stopwatch clock;
+    const ProcessorStopwatch processors;
     renderer.render(frame % 2 == 0 ? other : one);
-    least.seconds =
-        std::min(least.seconds, std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count());
-    least.processor_seconds = std::min(least.processor_seconds, processor() - before);
+    least.seconds = std::min(least.seconds, clock.seconds());
+    least.processor_seconds = std::min(least.processor_seconds, processors.seconds());
   }
   return least;
 }

@@ -6,13 +6,12 @@
 #include <tbb/parallel_reduce.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
-#include <ctime>
 #include <functional>
 #include <opencv2/core.hpp>
 
 #include "bench/light_scenes.h"
+#include "bench/stopwatch.h"
 #include "core/error.h"
 #include "render/direct_renderer.h"
 #include "render/path_integrator.h"
@@ -30,9 +29,9 @@ using render::Tracer;
 double least_seconds(int runs, const std::function<void()>& work) {
   double least = INFINITY;
   for (int run = 0; run < runs; ++run) {
-    const auto begun = std::chrono::steady_clock::now();
+    const Stopwatch clock;
     work();
-    least = std::min(least, std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count());
+    least = std::min(least, clock.seconds());
   }
   return least;
 }
@@ -105,13 +104,6 @@ cv::Mat sparse_mask(const render::PinholeCamera& camera, int stride) {
   return mask;
 }
 
-/// Seconds of all processors that this process has used.
-double processor_seconds() {
-  timespec now{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
-
 struct FrameTime {
   double seconds = 0.0;
   double processor_seconds = INFINITY;
@@ -130,14 +122,14 @@ FrameTime direct_frame(int triangles, int lamps, int bands, int width, int heigh
   result.seconds = INFINITY;
   // Runs of ten frames: the least mean, so that no single lucky frame counts.
   for (int run = 0; run < std::max(1, frames / 10); ++run) {
-    const double before = processor_seconds();
+    const ProcessorStopwatch processors;
     const double mean = least_seconds(1,
                                       [&] {
                                         for (int k = 0; k < 10; ++k) renderer.render(k % 2 == 0 ? other : one);
                                       }) /
                         10;
     result.seconds = std::min(result.seconds, mean);
-    result.processor_seconds = std::min(result.processor_seconds, (processor_seconds() - before) / 10);
+    result.processor_seconds = std::min(result.processor_seconds, processors.seconds() / 10);
   }
   result.image = renderer.render(one);
   return result;

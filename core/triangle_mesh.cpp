@@ -113,6 +113,17 @@ double enclosed_volume(const TriangleMesh& mesh) {
   return six_volumes / 6.0;
 }
 
+std::vector<Eigen::Vector3d> vertex_normals(const TriangleMesh& mesh) {
+  std::vector<Eigen::Vector3d> normals(mesh.vertices.size(), Eigen::Vector3d::Zero());
+  const auto& p = mesh.vertices;
+  for (const auto& t : mesh.triangles) {
+    const Eigen::Vector3d doubled_area = (p[t[1]] - p[t[0]]).cross(p[t[2]] - p[t[0]]);
+    for (const int corner : t) normals[corner] += doubled_area;
+  }
+  for (Eigen::Vector3d& normal : normals) normal.normalize();  // leaves zero as it is
+  return normals;
+}
+
 TriangleMesh weld(const TriangleMesh& mesh, double distance, std::vector<int>* kept) {
   if (kept != nullptr) kept->clear();
   // Cells as wide as the distance: what is nearer lies in the same or a neighbouring cell. Cell numbers are doubles,

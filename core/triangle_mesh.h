@@ -24,6 +24,9 @@ std::string fault_of_closed_mesh(const TriangleMesh& mesh);
 /// Signed volume that a closed mesh encloses, in mm^3; positive if its normals point outwards.
 double enclosed_volume(const TriangleMesh& mesh);
 
+/// Unit normals at the vertices: means of the triangles round each, weighted by their areas; zero where there are none.
+std::vector<Eigen::Vector3d> vertex_normals(const TriangleMesh& mesh);
+
 /// Joins vertices that are nearer than `distance` (mm) and drops the triangles that collapse. glTF files split
 /// vertices at seams of normals or texture; the solid is the same. `kept`, if given, becomes the former number of each
 /// triangle that is left.

@@ -9,8 +9,8 @@
 #include "core/random.h"
 #include "core/units.h"
 #include "lab/light_closed_forms.h"
+#include "lab/light_setup.h"
 #include "render/imager_presets.h"
-#include "render/path_tracer.h"
 
 namespace touchstone::lab {
 namespace {
@@ -19,24 +19,6 @@ using render::Medium;
 using render::Scene;
 using render::Spectrum;
 
-Spectrum grey(double value) {
-  return Spectrum::Constant(1, value);
-}
-
-Scene with_surroundings(double radiance) {
-  Scene scene;
-  scene.environment = grey(radiance);
-  return scene;
-}
-
-render::RenderSettings samples(int count, std::uint64_t seed) {
-  render::RenderSettings settings;
-  settings.seed = seed;
-  settings.min_samples = settings.max_samples = count;
-  settings.max_depth = 10000;
-  return settings;
-}
-
 }  // namespace
 
 double rough_furnace(std::uint64_t seed, int effort) {
@@ -44,7 +26,7 @@ double rough_furnace(std::uint64_t seed, int effort) {
   for (const double alpha : {0.05, 0.3, 0.6}) {
     for (const double index : {1.3, 1.6}) {
       for (const bool within : {false, true}) {
-        Scene scene = with_surroundings(1.0);
+        Scene scene = empty_scene(1.0);
         scene.media = {Medium{within ? index : 1.0}, Medium{within ? 1.0 : index}};
         scene.balls.push_back({{0, 0, 0}, 2.0, render::RoughRefractive{1, 0, alpha}});
         const Eigen::Vector3d from = within ? Eigen::Vector3d(0.5, 0.2, 0.1) : Eigen::Vector3d(1.2, 0.3, 9.0);
@@ -67,7 +49,7 @@ double closed_box(std::uint64_t seed, int effort) {
     point[(wall / 2 + 2) % 3] = kHalf * y;
     return point;
   };
-  Scene scene = with_surroundings(0.0);
+  Scene scene = empty_scene(0.0);
   scene.media = {Medium{}, Medium{1.5}};
   for (int wall = 0; wall < 6; ++wall) {
     TriangleMesh mesh;
@@ -119,7 +101,7 @@ double coaxial_discs(std::uint64_t seed, int effort) {
     }
     return mesh;
   };
-  Scene scene = with_surroundings(0.0);
+  Scene scene = empty_scene(0.0);
   scene.surfaces.push_back({disc(kLarge, kApart), render::Emitter{grey(1.0)}});
   scene.surfaces.push_back({disc(1.001 * kSmall, 0.0), render::Lambertian{grey(0.8)}});
   const render::Tracer tracer(scene);

@@ -12,9 +12,9 @@
 #include "core/units.h"
 #include "lab/light_closed_forms.h"
 #include "lab/light_energy_cases.h"
+#include "lab/light_setup.h"
 #include "lab/validation.h"
 #include "render/imager.h"
-#include "render/path_tracer.h"
 
 namespace touchstone::lab {
 namespace {
@@ -27,16 +27,6 @@ using render::Tracer;
 
 constexpr int kSeeds = 5;
 constexpr double kStudent95OfFive = 2.776;  // t of 4 degrees of freedom
-
-Spectrum grey(double value) {
-  return Spectrum::Constant(1, value);
-}
-
-Scene empty_scene(double environment) {
-  Scene scene;
-  scene.environment = grey(environment);
-  return scene;
-}
 
 TriangleMesh sheet(double half, double z) {
   TriangleMesh mesh;
@@ -53,14 +43,6 @@ render::SpotLamp point_lamp(const Eigen::Vector3d& position, const Eigen::Vector
   lamp.soft_angle = 0.0;
   lamp.power_W = grey(intensity * 2.0 * kPi);
   return lamp;
-}
-
-render::RenderSettings samples(int count, std::uint64_t seed) {
-  render::RenderSettings settings;
-  settings.seed = seed;
-  settings.min_samples = settings.max_samples = count;
-  settings.max_depth = 10000;
-  return settings;
 }
 
 Eigen::Vector3d slanted(double angle) {

@@ -26,7 +26,7 @@ bool is_lit(DirectKind kind) {
 }  // namespace
 
 DirectFixture::DirectFixture(const LightField& of, bool soft)
-    : field(of), bearings(of, soft), groups((of.lamp_count() + 3) / 4) {
+    : field(of), bearings(of, soft), groups((of.beam_count() + 3) / 4) {
   const std::vector<FlatFace>& faces = field.fixture.faces;
   low = field.layer > 0 ? faces[field.layer - 1].z : -INFINITY;
   high = field.layer < static_cast<int>(faces.size()) ? faces[field.layer].z : INFINITY;
@@ -35,7 +35,8 @@ DirectFixture::DirectFixture(const LightField& of, bool soft)
     absorption[band] = static_cast<float>(medium.absorption[band]);
     absorbs = absorbs || medium.absorption[band] > 0.0;
   }
-  for (const Lamp& lamp : field.fixture.lamps) {
+  for (int beam = 0; beam < field.beam_count(); ++beam) {
+    const Lamp& lamp = field.lamp(beam);
     lens_frames.emplace_back(lamp_direction(lamp).normalized());
     const int layer = layer_of_height(faces, lamp_position(lamp).z());
     lens_radii.push_back(disc_radius(lamp));
@@ -66,11 +67,28 @@ DirectFixture::DirectFixture(const LightField& of, bool soft)
   }
 }
 
+DirectPrint::DirectPrint(const Surface& surface)
+    : material_mm(&surface.print->material_mm), triangles(&surface.mesh.triangles), index(surface.print->discs) {
+  for (const PrintedDisc& disc : surface.print->discs) {
+    const Spectrum& ink = surface.print->inks[disc.ink];
+    auto& colour = disc_colours.emplace_back();
+    for (Eigen::Index band = 0; band < ink.size(); ++band) colour[band] = static_cast<float>(ink[band]);
+  }
+}
+
+const float* DirectPrint::colour_at(int triangle, float u, float v, const float* plain) const {
+  const auto& t = (*triangles)[triangle];
+  const std::vector<Eigen::Vector2d>& at = *material_mm;
+  const int disc =
+      index.disc_at((1.0 - double(u) - double(v)) * at[t[0]] + double(u) * at[t[1]] + double(v) * at[t[2]]);
+  return disc < 0 ? plain : disc_colours[disc].data();
+}
+
 DirectBatch::DirectBatch(const DirectFrame& frame)
     : frame_(frame),
       fixture_(frame.fixture),
       field_(fixture_.field),
-      lamps_(field_.lamp_count()),
+      lamps_(field_.beam_count()),
       bands_(static_cast<int>(field_.fixture.environment.size())),
       stride_(static_cast<std::size_t>(fixture_.groups) * 4),
       lanes_(kMostPackets * kPacket),
@@ -95,16 +113,32 @@ void DirectBatch::look(std::span<const RayPacket> rays, DirectCounts& counts) {
       one.object = hits.object[k];
       if (one.object < 0) continue;
       one.material = &frame_.materials[one.object];
+      one.colour = one.material->colour.data();
+      if (one.material->print != nullptr) {
+        one.colour = one.material->print->colour_at(hits.triangle[k], hits.u[k], hits.v[k], one.colour);
+      }
       one.distance = hits.distance[k];
       float along = 0.0f;
-      float length2 = 0.0f;
+      float shading_along = 0.0f;
       for (int a = 0; a < 3; ++a) {
         one.place[a] = packet.origin[a][k] + one.distance * packet.direction[a][k];
         along += hits.normal[a][k] * packet.direction[a][k];
-        length2 += hits.normal[a][k] * hits.normal[a][k];
+        shading_along += hits.shading[a][k] * packet.direction[a][k];
       }
+      // A smooth normal that has turned away from the camera is left for the triangle's own.
+      const bool turned_away = (along < 0.0f) != (shading_along < 0.0f);
+      const auto& normal = turned_away ? hits.normal : hits.shading;
+      float length2 = 0.0f;
+      for (int a = 0; a < 3; ++a) length2 += normal[a][k] * normal[a][k];
       const float scale = (along < 0.0f ? 1.0f : -1.0f) / std::sqrt(std::max(length2, 1e-30f));
-      for (int a = 0; a < 3; ++a) one.normal[a] = scale * hits.normal[a][k];
+      float furthest = 0.0f;
+      for (int a = 0; a < 3; ++a) {
+        one.normal[a] = scale * normal[a][k];
+        furthest = std::max(furthest, std::abs(one.place[a]));
+      }
+      // More than single precision loses where the ray meets the surface and where it leaves it.
+      const float off = 8e-6f * (1.0f + furthest);
+      for (int a = 0; a < 3; ++a) one.leave[a] = one.place[a] + hits.lift[a][k] + off * one.normal[a];
       if (is_lit(one.material->kind)) light_lane(lane, counts);
     }
   }
@@ -243,10 +277,8 @@ void DirectBatch::cast_shadows(DirectCounts& counts) {
 bool DirectBatch::shadow_ray(int lane, int lamp, int slot) {
   const Lane& one = lanes_[lane];
   const Eigen::Vector3f place(one.place[0], one.place[1], one.place[2]);
-  const Eigen::Vector3f normal(one.normal[0], one.normal[1], one.normal[2]);
   const Eigen::Vector3f towards = (-flow_of(lane, lamp)).normalized();
-  // More than single precision loses where the ray meets the surface and where it leaves it.
-  const Eigen::Vector3f origin = place + 8e-6f * (1.0f + place.cwiseAbs().maxCoeff()) * normal;
+  const Eigen::Vector3f origin(one.leave[0], one.leave[1], one.leave[2]);
   if (!origin.allFinite() || !towards.allFinite()) return false;
   float far = 1e6f;
   if (towards.z() != 0.0f) {
@@ -257,7 +289,7 @@ bool DirectBatch::shadow_ray(int lane, int lamp, int slot) {
     far = std::min(far, std::max(0.0f, (limit - origin.z()) / towards.z()));
   }
   if (fixture_.lamp_in_layer[lamp]) {
-    far = std::min(far, static_cast<float>((lamp_position(field_.fixture.lamps[lamp]) - place.cast<double>()).norm()));
+    far = std::min(far, static_cast<float>((lamp_position(field_.lamp(lamp)) - place.cast<double>()).norm()));
   }
   for (int a = 0; a < 3; ++a) {
     shadow_.origin[a][slot] = origin[a];
@@ -312,7 +344,7 @@ void DirectBatch::add(int lane, const float* through, const float* ambient, floa
   }
   const auto per_index2 = static_cast<float>(1.0 / (field_.index * field_.index));
   for (int band = 0; band < bands_; ++band) {
-    if (ambient != nullptr) sum[band] += one.material->colour[band] * kPerPi * ambient[band];
+    if (ambient != nullptr) sum[band] += one.colour[band] * kPerPi * ambient[band];
     out[band] += dimmed[band] * sum[band] * per_index2;
   }
 }
@@ -325,7 +357,7 @@ void DirectBatch::reflect_from_matt(int lane, float* sum) const {
     for (int group = 0; group < fixture_.groups; ++group) {
       lit += four(amount + group * 4) * four(intensity + group * 4) * passing(lane, group, band);
     }
-    sum[band] = lanes_[lane].material->colour[band] * kPerPi * lit.sum();
+    sum[band] = lanes_[lane].colour[band] * kPerPi * lit.sum();
   }
 }
 
@@ -369,7 +401,7 @@ void DirectBatch::reflect_from_metal(int lane, float* sum) const {
     const Four schlick = graze.square().square() * graze;
     const Four arriving = amount * lobe;
     for (int band = 0; band < bands_; ++band) {
-      const float r = material.colour[band];
+      const float r = one.colour[band];
       const Four intensity = four(fixture_.intensity.data() + band * stride_ + group * 4);
       const Four share = (r + (1.0f - r) * schlick) * (1.0f + r * missing);
       sum[band] += (arriving * share * intensity * passing(lane, group, band)).sum();

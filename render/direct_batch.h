@@ -17,11 +17,25 @@ namespace touchstone::render {
 
 enum class DirectKind { kMatt, kMetal, kLuminous, kBlack };
 
+/// What is printed on a surface (print.h), as long as its scene lives.
+struct DirectPrint {
+  const std::vector<Eigen::Vector2d>* material_mm = nullptr;
+  const std::vector<std::array<int, 3>>* triangles = nullptr;
+  PrintIndex index;
+  std::vector<std::array<float, kMaxBands>> disc_colours;
+
+  explicit DirectPrint(const Surface& surface);
+
+  /// The ink at a place of a triangle, or `plain` beside the discs.
+  const float* colour_at(int triangle, float u, float v, const float* plain) const;
+};
+
 struct DirectMaterial {
   DirectKind kind = DirectKind::kBlack;
   std::array<float, kMaxBands> colour{};  ///< albedo, reflectance at normal incidence, or radiance
   double roughness = 0.0;
-  const GgxAlbedo* albedo = nullptr;  ///< of a metal
+  const GgxAlbedo* albedo = nullptr;   ///< of a metal
+  const DirectPrint* print = nullptr;  ///< of a matt surface or a metal
 };
 
 /// What stays the same from frame to frame, besides the camera's rays. Lamps are taken in groups of four, the last one
@@ -91,10 +105,12 @@ class DirectBatch {
  private:
   struct Lane {
     float place[3];
-    float normal[3];  // unit, facing the camera's ray
+    float normal[3];  // the shading normal: unit, facing the camera's ray
+    float leave[3];   // where shadow rays start
     float distance;
     int object;
     const DirectMaterial* material;  // null where nothing was met
+    const float* colour;             // the material's, or that of the ink
     std::uint64_t doubt;             // see ShadowReach
   };
 

@@ -107,7 +107,6 @@ std::string misfit(const LightField& field, const Scene& scene) {
     const std::string what = fmt::format("surface {}", i);
     const Surface& surface = scene.surfaces[i];
     if (!renders(surface.material)) return what + " is neither Lambertian, RoughConductor, Black nor Emitter";
-    if (surface.print) return what + " is printed on";
     Eigen::AlignedBox3d box;
     for (const auto& vertex : surface.mesh.vertices) box.extend(vertex);
     if (const std::string fault = out_of_place(field, box, surface.material, what); !fault.empty()) return fault;
@@ -505,8 +504,9 @@ DirectRenderer::DirectRenderer(const LightField& field, const Camera& camera, co
                                const DirectSettings& settings) {
   check_settings(settings);
   check_scene(rest);
-  if (field.lamp_count() > kMostDirectLamps) {
-    fail("direct renderer: {} lamps; at most {} are allowed", field.lamp_count(), kMostDirectLamps);
+  if (field.beam_count() > kMostDirectLamps) {
+    fail("direct renderer: {} beams of {} lamps; at most {} are allowed", field.beam_count(),
+         field.fixture.lamps.size(), kMostDirectLamps);
   }
   if (const std::string fault = unfit_for_direct(field, rest); !fault.empty()) fail("direct renderer: {}", fault);
   parts_ = std::make_unique<Parts>(field, camera, rest, settings);
@@ -547,7 +547,11 @@ DirectImage DirectRenderer::render(const Scene& scene) {
   const PacketScene& tree = other ? *other : parts.tree;
 
   std::vector<DirectMaterial> materials;
-  for (const Surface& surface : scene.surfaces) materials.push_back(parts.prepare(surface.material));
+  std::vector<std::unique_ptr<const DirectPrint>> prints;
+  for (const Surface& surface : scene.surfaces) {
+    materials.push_back(parts.prepare(surface.material));
+    if (surface.print) materials.back().print = prints.emplace_back(new DirectPrint(surface)).get();
+  }
   for (const Ball& ball : scene.balls) materials.push_back(parts.prepare(ball.material));
   std::optional<ShadowReach> shadow_reach;
   if (parts.settings.shadows) {

@@ -60,8 +60,8 @@ class DirectRenderer {
   /// A pure function of the constructor's arguments and `scene`, the same bytes for any number of threads. Not for
   /// several threads at once. A scene with other triangles than `rest` gets a tree of its own, which costs some ms.
   /// @throws Error if the scene is faulty; asks for interreflection without set_bounced_light; has other media, faces,
-  /// lamps or surroundings than the field; has materials other than Lambertian, RoughConductor, Black and Emitter,
-  /// prints or scattering media; or things outside of the field's layer, or lit ones outside of its box
+  /// lamps or surroundings than the field; has materials other than Lambertian, RoughConductor, Black and Emitter, or
+  /// scattering media; or things outside of the field's layer, or lit ones outside of its box
   DirectImage render(const Scene& scene);
 
   /// Irradiance that reaches what each pixel shows from everywhere, on top of the lamps' (rest_light.h): W/m^2,

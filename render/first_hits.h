@@ -17,7 +17,7 @@ struct FirstHit {
   int triangle = -1;        ///< of the surface; -1 on a ball
   double u = 0.0, v = 0.0;  ///< on a triangle a b c the position is (1 - u - v) a + u b + v c
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
-  Eigen::Vector3d normal = Eigen::Vector3d::Zero();  ///< outward; interpolated on Refractive surfaces (see Surface)
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero();  ///< outward; the shading normal, see Surface
 };
 
 /// The first surface or ball of every pixel, row by row: Refractive ones count as what they are, a hit. A ray that is

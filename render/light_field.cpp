@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "core/error.h"
+#include "render/flat_faces.h"
 #include "render/lamp_connection.h"
 
 namespace touchstone::render {
@@ -32,10 +33,9 @@ Scene single_band(const Scene& fixture, int band) {
   return scene;
 }
 
-/// F by connections, mean over the lens, and its length.
-Eigen::Vector4d flow_at(const PreparedScene<1>& scene, int number, int layer, const Eigen::Vector3d& place,
-                        int lens_points) {
-  const PreparedLamp<1>& lamp = scene.lamps[number];
+/// F by connections, mean over the lens.
+Eigen::Vector3d flow_of_lens(const PreparedScene<1>& scene, const PreparedLamp<1>& lamp, int layer,
+                             const Eigen::Vector3d& place, int lens_points) {
   const int side = lamp.area > 0.0 ? lens_points : 1;
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   std::uint64_t uncounted = 0;
@@ -48,36 +48,134 @@ Eigen::Vector4d flow_at(const PreparedScene<1>& scene, int number, int layer, co
       sum -= arrival.irradiance[0] * arrival.direction;
     }
   }
-  sum /= static_cast<double>(side) * side;
-  return {sum.x(), sum.y(), sum.z(), sum.norm()};
+  return sum / (static_cast<double>(side) * side);
 }
 
 struct Maker {
   const LightFieldSettings& settings;
   PreparedScene<1> clear;
   std::vector<std::unique_ptr<PreparedScene<1>>> absorbing;  // by band; none if nothing absorbs
+  std::vector<int> group_of;  // by number of all beams: that of the field's
 
-  Eigen::Vector3d place(const LightField& field, double i, double j, double k) const {
+  int beams_of(const PreparedLamp<1>& lamp) const {
+    return lamp.kind == LampKind::kGuide ? settings.guides.beams() : 1;
+  }
+
+  /// Of all beams, lamp by lamp.
+  int all_beams() const {
+    int count = 0;
+    for (const PreparedLamp<1>& lamp : clear.lamps) count += beams_of(lamp);
+    return count;
+  }
+  std::vector<Eigen::Vector3d> all_flows(const PreparedScene<1>& scene, int layer, const Eigen::Vector3d& place) const {
+    std::vector<Eigen::Vector3d> flows(all_beams());
+    Eigen::Vector3d* to = flows.data();
+    for (const PreparedLamp<1>& lamp : scene.lamps) {
+      if (lamp.kind == LampKind::kGuide) {
+        guide_beam_flows(scene, lamp, settings.guides, layer, place, settings.guide_points, to);
+      } else {
+        *to = flow_of_lens(scene, lamp, layer, place, settings.lens_points);
+      }
+      to += beams_of(lamp);
+    }
+    return flows;
+  }
+
+  static Eigen::Vector3d place(const LightField& field, double i, double j, double k) {
     return field.reach.min() + Eigen::Vector3d(i * field.step[0], j * field.step[1], k * field.step[2]);
   }
 
+  /// Which beams the field has: of a guide those that bring little are put together with the one beside them, and as
+  /// many as it takes.
+  void choose_beams(LightField& field) {
+    constexpr double kLittle = 0.03;  // of the guide's light, wherever in the box
+    const int all = all_beams();
+    std::vector<int> lamp_of;
+    std::vector<int> run_of;  // beams that may be put together
+    for (std::size_t lamp = 0; lamp < clear.lamps.size(); ++lamp) {
+      for (int k = 0; k < beams_of(clear.lamps[lamp]); ++k) {
+        lamp_of.push_back(static_cast<int>(lamp));
+        const bool joins = k % settings.guides.beams_a_sector() != 0;
+        run_of.push_back(run_of.empty() ? 0 : run_of.back() + (joins ? 0 : 1));
+      }
+    }
+    std::vector<double> share(all, 0.0);  // the most of the lamp's light at one of 27 places
+    for (int number = 0; number < 27; ++number) {
+      const Eigen::Array3d at(number % 3, number / 3 % 3, number / 9);
+      const Eigen::Vector3d where = field.reach.min() + (0.5 * at * field.reach.sizes().array()).matrix();
+      const std::vector<Eigen::Vector3d> flows = all_flows(clear, field.layer, where);
+      std::vector<double> whole(clear.lamps.size(), 0.0);
+      for (int k = 0; k < all; ++k) whole[lamp_of[k]] += flows[k].norm();
+      for (int k = 0; k < all; ++k) {
+        if (whole[lamp_of[k]] > 0.0) share[k] = std::max(share[k], flows[k].norm() / whole[lamp_of[k]]);
+      }
+    }
+    struct Group {
+      int first, end;  // numbers of beams
+      double share;
+    };
+    std::vector<Group> groups;
+    for (int k = 0; k < all; ++k) groups.push_back({k, k + 1, share[k]});
+    for (;;) {
+      std::size_t least = 0;
+      double least_share = INFINITY;
+      for (std::size_t g = 0; g + 1 < groups.size(); ++g) {
+        if (run_of[groups[g].first] != run_of[groups[g + 1].first]) continue;
+        const double weaker = std::min(groups[g].share, groups[g + 1].share);
+        if (weaker < least_share) {
+          least_share = weaker;
+          least = g;
+        }
+      }
+      const bool too_many = groups.size() > static_cast<std::size_t>(settings.most_beams);
+      if (!(least_share < (too_many ? INFINITY : kLittle / settings.guides.sectors))) break;
+      groups[least].end = groups[least + 1].end;
+      groups[least].share += groups[least + 1].share;
+      groups.erase(groups.begin() + static_cast<std::ptrdiff_t>(least) + 1);
+    }
+    group_of.assign(all, 0);
+    for (std::size_t g = 0; g < groups.size(); ++g) {
+      std::fill(group_of.begin() + groups[g].first, group_of.begin() + groups[g].end, static_cast<int>(g));
+      const int lamp = lamp_of[groups[g].first];
+      field.lamp_of.push_back(lamp);
+      const Lamp& one = field.fixture.lamps[lamp];
+      field.intensity.push_back(lamp_power(one) / emission_integral(one));
+    }
+  }
+
+  /// Of the field's beams.
+  std::vector<Eigen::Vector3d> flows(const PreparedScene<1>& scene, const LightField& field,
+                                     const Eigen::Vector3d& place) const {
+    std::vector<Eigen::Vector3d> sums(field.beam_count(), Eigen::Vector3d::Zero());
+    const std::vector<Eigen::Vector3d> all = all_flows(scene, field.layer, place);
+    for (std::size_t k = 0; k < all.size(); ++k) sums[group_of[k]] += all[k];
+    return sums;
+  }
+
   void fill(LightField& field) const {
-    const int lamps = field.lamp_count();
+    const int beams = field.beam_count();
     const int across = field.nodes[0] * field.nodes[1];
-    const int bands = static_cast<int>(absorbing.size());
-    const auto count = static_cast<std::size_t>(across) * field.nodes[2] * lamps;
+    const auto bands = static_cast<int>(absorbing.size());
+    const auto count = static_cast<std::size_t>(across) * field.nodes[2] * beams;
     field.flow.assign(4 * count, 0.0f);
     field.pass.assign(bands * count, 0.0f);
     tbb::parallel_for(0, across * field.nodes[2], [&](int node) {
       const int in_plane = node % across;
       const Eigen::Vector3d at = place(field, in_plane % field.nodes[0], in_plane / field.nodes[0], node / across);
-      for (int lamp = 0; lamp < lamps; ++lamp) {
-        const auto slot = static_cast<std::size_t>(node) * lamps + lamp;
-        const Eigen::Vector4d flow = flow_at(clear, lamp, field.layer, at, settings.lens_points);
-        for (int a = 0; a < 4; ++a) field.flow[4 * slot + a] = static_cast<float>(flow[a]);
-        for (int band = 0; band < bands; ++band) {
-          const Eigen::Vector4d dimmed = flow_at(*absorbing[band], lamp, field.layer, at, settings.lens_points);
-          field.pass[bands * slot + band] = static_cast<float>(flow[3] > 0.0 ? dimmed[3] / flow[3] : 0.0);
+      const std::vector<Eigen::Vector3d> whole = flows(clear, field, at);
+      const std::size_t first = static_cast<std::size_t>(node) * beams;
+      for (int beam = 0; beam < beams; ++beam) {
+        const Eigen::Vector3d& flow = whole[beam];
+        float* out = field.flow.data() + 4 * (first + beam);
+        for (int a = 0; a < 3; ++a) out[a] = static_cast<float>(flow[a]);
+        out[3] = static_cast<float>(flow.norm());
+      }
+      for (int band = 0; band < bands; ++band) {
+        const std::vector<Eigen::Vector3d> dimmed = flows(*absorbing[band], field, at);
+        for (int beam = 0; beam < beams; ++beam) {
+          const double length = whole[beam].norm();
+          field.pass[bands * (first + beam) + band] =
+              static_cast<float>(length > 0.0 ? dimmed[beam].norm() / length : 0.0);
         }
       }
     });
@@ -85,7 +183,7 @@ struct Maker {
 
   /// Relative error at points set off from nodes by `offset` steps.
   double error(const LightField& field, const Eigen::Array3d& offset) const {
-    const int lamps = field.lamp_count();
+    const int beams = field.beam_count();
     const Eigen::Array3i cells = field.nodes - (offset > 0.0).cast<int>();
     // Every cell of a small grid; of a large one some 4000 that are spread evenly.
     const int all = cells.prod();
@@ -96,16 +194,23 @@ struct Maker {
       const int cell = number * stride;
       const Eigen::Vector3d at = place(field, cell % cells[0] + offset[0], cell / cells[0] % cells[1] + offset[1],
                                        cell / (cells[0] * cells[1]) + offset[2]);
-      std::vector<float> held(4 * static_cast<std::size_t>(lamps));
+      std::vector<float> held(4 * static_cast<std::size_t>(beams));
       look_up_flow(field, find_cell(field, float(at.x()), float(at.y()), float(at.z())), held.data());
+      const std::vector<Eigen::Vector3d> exact = flows(clear, field, at);
       double wrong = 0.0;
       double whole = 0.0;
-      for (int lamp = 0; lamp < lamps; ++lamp) {
-        const double power = field.intensity[lamp].sum();
-        const Eigen::Vector4d exact = flow_at(clear, lamp, field.layer, at, settings.lens_points);
-        const float* f = held.data() + 4 * lamp;
-        wrong += power * (Eigen::Vector3d(f[0], f[1], f[2]) - exact.head<3>()).norm();
-        whole += power * exact[3];
+      for (int beam = 0; beam < beams;) {
+        const int lamp = field.lamp_of[beam];
+        const double power = field.intensity[beam].sum();
+        Eigen::Vector3d off = Eigen::Vector3d::Zero();
+        Eigen::Vector3d light = Eigen::Vector3d::Zero();
+        for (; beam < beams && field.lamp_of[beam] == lamp; ++beam) {
+          const float* f = held.data() + 4 * beam;
+          off += Eigen::Vector3d(f[0], f[1], f[2]) - exact[beam];
+          light += exact[beam];
+        }
+        wrong += power * off.norm();
+        whole += power * light.norm();
       }
       squares[number] = {wrong * wrong, whole * whole};
     });
@@ -126,9 +231,24 @@ void check_settings(const LightFieldSettings& settings) {
   if (settings.lens_points < 1 || settings.lens_points > 64) {
     fail("light field: lens_points is {}; it must be from 1 to 64", settings.lens_points);
   }
+  if (settings.guides.sectors < 1 || settings.guides.slices < 1 || settings.guides.beams() > 1000) {
+    fail("light field: guides are cut into {} sectors of {} slices; 1 or more, and 1000 beams at most, are allowed",
+         settings.guides.sectors, settings.guides.slices);
+  }
+  if (settings.most_beams < 1) fail("light field: most_beams is {}; it must be 1 or more", settings.most_beams);
+  if (settings.guide_points < 1 || settings.guide_points > 16) {
+    fail("light field: guide_points is {}; it must be from 1 to 16", settings.guide_points);
+  }
   if (settings.most_nodes < 8 || settings.most_nodes > 10000000) {
     fail("light field: most_nodes is {}; it must be from 8 to 10000000", settings.most_nodes);
   }
+}
+
+/// In the plate a guide's light has edges where its mirror images meet.
+void check_guide(const GuideLamp& guide, const Scene& fixture, const Eigen::AlignedBox3d& reach, std::size_t number) {
+  if (layer_of_height(fixture.faces, guide.centre.z()) != layer_of_height(fixture.faces, reach.center().z())) return;
+  fail("light field: lamp {} is a light guide in the box's own layer; its light has edges there that no grid holds",
+       number);
 }
 
 void check_reach(const Scene& fixture, const Eigen::AlignedBox3d& reach) {
@@ -145,8 +265,9 @@ void check_reach(const Scene& fixture, const Eigen::AlignedBox3d& reach) {
     }
   }
   for (std::size_t i = 0; i < fixture.lamps.size(); ++i) {
-    if (std::holds_alternative<GuideLamp>(fixture.lamps[i])) {
-      fail("light field: lamp {} is a light guide, whose light has edges that no coarse grid holds", i);
+    if (const auto* guide = std::get_if<GuideLamp>(&fixture.lamps[i])) {
+      check_guide(*guide, fixture, reach, i);
+      continue;
     }
     if (is_visible(fixture.lamps[i])) fail("light field: lamp {} is visible; such lamps are for the path tracer", i);
     const Eigen::Vector3d& middle = lamp_position(fixture.lamps[i]);
@@ -173,9 +294,8 @@ LightField make_light_field(const Scene& fixture, const Eigen::AlignedBox3d& rea
   // By the box's middle, since it may end just on a face.
   const double middle = reach.center().z();
   for (const FlatFace& face : fixture.faces) field.layer += face.z < middle ? 1 : 0;
-  for (const Lamp& lamp : fixture.lamps) field.intensity.push_back(lamp_power(lamp) / emission_integral(lamp));
 
-  Maker maker{settings, PreparedScene<1>(single_band(fixture, -1)), {}};
+  Maker maker{settings, PreparedScene<1>(single_band(fixture, -1)), {}, {}};
   field.index = maker.clear.media[maker.clear.medium_of_layer(field.layer)].index;
   const bool absorbs = std::any_of(fixture.media.begin(), fixture.media.end(), [](const Medium& medium) {
     return medium.absorption.size() > 0 && (medium.absorption > 0.0).any();
@@ -185,6 +305,8 @@ LightField make_light_field(const Scene& fixture, const Eigen::AlignedBox3d& rea
       maker.absorbing.push_back(std::make_unique<PreparedScene<1>>(single_band(fixture, band)));
     }
   }
+
+  maker.choose_beams(field);
 
   // Cells about as long as wide to begin with, some eight along the longest side.
   const Eigen::Array3d size = reach.sizes().array();
@@ -217,10 +339,16 @@ LightField make_light_field(const Scene& fixture, const Eigen::AlignedBox3d& rea
   }
 }
 
-Eigen::Vector4d exact_flow(const LightField& field, int lamp, const Eigen::Vector3d& place, int lens_points) {
-  TS_ASSERT(lamp >= 0 && lamp < field.lamp_count() && lens_points > 0);
-  const PreparedScene<1> scene(single_band(field.fixture, -1));
-  return flow_at(scene, lamp, field.layer, place, lens_points);
+Eigen::Vector4d exact_flow(const LightField& field, int lamp, const Eigen::Vector3d& place,
+                           const LightFieldSettings& settings) {
+  TS_ASSERT(lamp >= 0 && lamp < static_cast<int>(field.fixture.lamps.size()));
+  const Maker maker{settings, PreparedScene<1>(single_band(field.fixture, -1)), {}, {}};
+  const std::vector<Eigen::Vector3d> flows = maker.all_flows(maker.clear, field.layer, place);
+  std::size_t first = 0;
+  for (int before = 0; before < lamp; ++before) first += maker.beams_of(maker.clear.lamps[before]);
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (int k = 0; k < maker.beams_of(maker.clear.lamps[lamp]); ++k) sum += flows[first + k];
+  return {sum.x(), sum.y(), sum.z(), sum.norm()};
 }
 
 }  // namespace touchstone::render

@@ -10,6 +10,7 @@
 #include <array>
 #include <vector>
 
+#include "render/guide_beams.h"
 #include "render/scene.h"
 
 namespace touchstone::render {
@@ -17,14 +18,19 @@ namespace touchstone::render {
 struct LightFieldSettings {
   double accuracy = 2e-3;  ///< relative RMS error of interpolation to reach, see LightField::error
   int lens_points = 4;     ///< a lamp's lens is averaged over lens_points^2 places; a point lamp takes one
+  GuideCut guides;         ///< into what beams light guides are cut
+  int guide_points = 3;    ///< guide_beam_flows, 1 to 16
+  int most_beams = 64;     ///< of all lamps together, see LightField; a direct renderer takes no more
   int most_nodes = 400000;
 };
 
 /// A regular grid over a box. Between nodes F is interpolated linearly along each axis.
 ///
-/// F is kept as that of unit intensity without absorption, (W/m^2)/(W/sr) in the direction that light flows; a band's
-/// is intensity[lamp][band] times `pass` times that. With absorbing media `pass` is the share of each band that
-/// arrives, taken along F's own direction: exact for a point lamp, off to second order in the angle that a lens fills.
+/// What the grid holds are beams: a lamp is one, a light guide several (guide_beams.h); those of them that bring
+/// little are put together. F is kept as that of unit intensity without absorption, (W/m^2)/(W/sr) in the direction
+/// that light flows; a band's is intensity[beam][band] times `pass` times that. With absorbing media `pass` is the
+/// share of each band that arrives, taken along F's own direction: exact for a point lamp, off to second order in the
+/// angle that a lens fills.
 struct LightField {
   Scene fixture;  ///< media, faces, lamps, environment; no surfaces and no balls
   Eigen::AlignedBox3d reach;
@@ -32,27 +38,31 @@ struct LightField {
   double index = 1.0;
   Eigen::Array3i nodes = Eigen::Array3i::Zero();
   Eigen::Array3d step = Eigen::Array3d::Zero();  ///< mm
-  std::vector<Spectrum> intensity;               ///< W/sr on the axis, by lamp
-  std::vector<float> flow;  ///< [node][lamp][4]: F and its length; node = x + nodes.x (y + nodes.y z)
-  std::vector<float> pass;  ///< [node][lamp][band], empty where nothing absorbs
+  std::vector<int> lamp_of;                      ///< index into fixture.lamps, by beam; beams of a lamp in a row
+  std::vector<Spectrum> intensity;               ///< W/sr on the lamp's axis, by beam
+  std::vector<float> flow;  ///< [node][beam][4]: F and its length; node = x + nodes.x (y + nodes.y z)
+  std::vector<float> pass;  ///< [node][beam][band], empty where nothing absorbs
   /// Estimate: root mean square over the middles of cells, where linear interpolation is worst, of |F - exact| summed
   /// over the lamps by power, over the same of |exact|.
   double error = 0.0;
 
-  int lamp_count() const { return static_cast<int>(intensity.size()); }
+  int beam_count() const { return static_cast<int>(intensity.size()); }
+  const Lamp& lamp(int beam) const { return fixture.lamps[lamp_of[beam]]; }
 };
 
 /// Computes the field of `fixture`'s lamps (surfaces and balls are ignored) over `reach`, which must lie between two
 /// flat faces. The grid starts coarse and is halved along its worst axis until the estimated error is below
 /// `accuracy`. The same bytes for any number of threads.
-/// @throws Error if the scene is faulty, the box is empty, holds a face or a lamp's lens, or the accuracy needs more
-/// than most_nodes nodes (as a lobe without a soft rim does whose edge crosses the box)
+/// @throws Error if the scene is faulty, the box is empty, holds a face or a lamp's lens, lies in a light guide's plate
+/// or beside its exit face's plane, or the accuracy needs more than most_nodes nodes (as a lobe without a soft rim does
+/// whose edge crosses the box)
 LightField make_light_field(const Scene& fixture, const Eigen::AlignedBox3d& reach,
                             const LightFieldSettings& settings = {});
 
-/// F of one lamp at `place` by connections to its lens, as the grid's nodes have it: F and its length.
-/// For tests and for error estimates.
-Eigen::Vector4d exact_flow(const LightField& field, int lamp, const Eigen::Vector3d& place, int lens_points);
+/// F of one lamp, all its beams together, at `place` by connections to its lens, as the grid's nodes have it: F and its
+/// length. For tests and for error estimates. @pre settings as of make_light_field
+Eigen::Vector4d exact_flow(const LightField& field, int lamp, const Eigen::Vector3d& place,
+                           const LightFieldSettings& settings = {});
 
 /// The grid cell round a place and its corners' weights, for looking up several values.
 struct FieldCell {
@@ -86,9 +96,9 @@ inline FieldCell find_cell(const LightField& field, float x, float y, float z) {
   return cell;
 }
 
-/// All lamps' F and length at once: `out` gets 4 floats a lamp.
+/// All beams' F and length at once: `out` gets 4 floats a beam.
 inline void look_up_flow(const LightField& field, const FieldCell& cell, float* out) {
-  const int width = 4 * field.lamp_count();
+  const int width = 4 * field.beam_count();
   for (int k = 0; k < width; ++k) out[k] = 0.0f;
   for (int corner = 0; corner < 8; ++corner) {
     const float* from = field.flow.data() + static_cast<std::size_t>(cell.node[corner]) * width;

@@ -19,6 +19,12 @@ struct PacketScene::State {
     std::size_t vertex_count = 0;
     RTCGeometry geometry = nullptr;  // none for a mesh without triangles
     float* vertices = nullptr;
+    std::vector<Eigen::Vector3f> normals;  // at the vertices; empty: triangles are flat
+
+    void take_normals(const std::vector<Eigen::Vector3d>& from) {
+      normals.resize(from.size());
+      for (std::size_t k = 0; k < from.size(); ++k) normals[k] = from[k].cast<float>();
+    }
   };
   std::vector<Mesh> meshes;
   std::size_t ball_count = 0;
@@ -39,6 +45,8 @@ struct PacketScene::State {
       for (int a = 0; a < 3; ++a) *out++ = static_cast<float>(vertex[a]);
     }
   }
+  static void smooth(const RayPacket& rays, int lane, const Mesh& mesh, unsigned triangle, float u, float v,
+                     PacketHits& hits);
   static void place(const std::vector<Ball>& balls, float* out) {
     for (const Ball& ball : balls) {
       for (int a = 0; a < 3; ++a) *out++ = static_cast<float>(ball.centre[a]);
@@ -59,6 +67,7 @@ PacketScene::PacketScene(const Scene& scene) : state_(std::make_unique<State>())
     State::Mesh& made = state.meshes.emplace_back();
     made.triangles = mesh.triangles;
     made.vertex_count = mesh.vertices.size();
+    made.take_normals(scene.surfaces[i].normals);
     if (mesh.triangles.empty()) continue;
     made.geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
     made.vertices = static_cast<float*>(rtcSetNewGeometryBuffer(
@@ -107,7 +116,8 @@ bool PacketScene::move_to(const Scene& scene) {
     }
   }
   for (std::size_t i = 0; i < state.meshes.size(); ++i) {
-    const State::Mesh& mesh = state.meshes[i];
+    State::Mesh& mesh = state.meshes[i];
+    mesh.take_normals(scene.surfaces[i].normals);
     if (mesh.geometry == nullptr) continue;
     State::place(scene.surfaces[i].mesh, mesh.vertices);
     rtcUpdateGeometryBuffer(mesh.geometry, RTC_BUFFER_TYPE_VERTEX, 0);
@@ -152,6 +162,36 @@ RTCIntersectContext coherent() {
 
 }  // namespace
 
+/// The shading normal of a lane's hit on a mesh with normals, and its lift: RayScene's formulas.
+void PacketScene::State::smooth(const RayPacket& rays, int lane, const Mesh& mesh, unsigned triangle, float u, float v,
+                                PacketHits& hits) {
+  const auto& corners = mesh.triangles[triangle];
+  const float weights[3] = {1.0f - u - v, u, v};
+  Eigen::Vector3f points[3];
+  Eigen::Vector3f place = Eigen::Vector3f::Zero();
+  Eigen::Vector3f shading = Eigen::Vector3f::Zero();
+  for (int k = 0; k < 3; ++k) {
+    points[k] = Eigen::Map<const Eigen::Vector3f>(mesh.vertices + 3 * corners[k]);
+    place += weights[k] * points[k];
+    shading += weights[k] * mesh.normals[corners[k]];
+  }
+  const Eigen::Vector3f normal(hits.normal[0][lane], hits.normal[1][lane], hits.normal[2][lane]);
+  const float length = shading.norm();
+  // A fold sharper than that isn't a smooth surface.
+  if (!(length > 0.1f && shading.dot(normal) > 0.5f * length * normal.norm())) return;
+  const Eigen::Vector3f ray(rays.direction[0][lane], rays.direction[1][lane], rays.direction[2][lane]);
+  const bool outside = ray.dot(normal) < 0.0f;
+  Eigen::Vector3f lift = Eigen::Vector3f::Zero();
+  for (int k = 0; k < 3; ++k) {
+    const float above = (points[k] - place).dot(mesh.normals[corners[k]]);
+    if ((above > 0.0f) == outside) lift += weights[k] * above * mesh.normals[corners[k]];
+  }
+  for (int a = 0; a < 3; ++a) {
+    hits.shading[a][lane] = shading[a];
+    hits.lift[a][lane] = lift[a];
+  }
+}
+
 void PacketScene::intersect(const RayPacket& rays, PacketHits& hits) const {
   RTCRayHit16 found;
   load(rays, found.ray);
@@ -166,10 +206,20 @@ void PacketScene::intersect(const RayPacket& rays, PacketHits& hits) const {
     const bool hit = rays.valid[lane] != 0 && geometry != RTC_INVALID_GEOMETRY_ID;
     const bool ball = geometry == state_->meshes.size();
     hits.object[lane] = hit ? static_cast<int>(geometry + (ball ? found.hit.primID[lane] : 0u)) : -1;
+    hits.triangle[lane] = hit && !ball ? static_cast<int>(found.hit.primID[lane]) : -1;
+    hits.u[lane] = found.hit.u[lane];
+    hits.v[lane] = found.hit.v[lane];
     hits.distance[lane] = found.ray.tfar[lane];
     hits.normal[0][lane] = found.hit.Ng_x[lane];
     hits.normal[1][lane] = found.hit.Ng_y[lane];
     hits.normal[2][lane] = found.hit.Ng_z[lane];
+    for (int a = 0; a < 3; ++a) {
+      hits.shading[a][lane] = hits.normal[a][lane];
+      hits.lift[a][lane] = 0.0f;
+    }
+    if (!hit || ball || state_->meshes[geometry].normals.empty()) continue;
+    State::smooth(rays, lane, state_->meshes[geometry], found.hit.primID[lane], found.hit.u[lane], found.hit.v[lane],
+                  hits);
   }
 }
 

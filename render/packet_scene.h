@@ -19,8 +19,12 @@ struct alignas(64) RayPacket {
 
 struct alignas(64) PacketHits {
   float distance[kPacket];
-  float normal[3][kPacket];  ///< not of unit length, in the surface's own sense
-  int object[kPacket];       ///< index of the surface, or surfaces.size() + index of the ball; -1 for nothing
+  float normal[3][kPacket];      ///< not of unit length, in the surface's own sense
+  float shading[3][kPacket];     ///< the shading normal, see Surface; as `normal` where there is no other
+  float lift[3][kPacket];        ///< as RayHit::lift
+  int object[kPacket];           ///< index of the surface, or surfaces.size() + index of the ball; -1 for nothing
+  int triangle[kPacket];         ///< of the surface; -1 on a ball
+  float u[kPacket], v[kPacket];  ///< on a triangle a b c the place is (1 - u - v) a + u b + v c
 };
 
 /// The tree is built once by one thread, and a scene of the same triangles at other places only fits its boxes anew:

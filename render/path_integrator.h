@@ -153,6 +153,13 @@ class PathIntegrator {
     return true;
   }
 
+  /// The shading normal on the side that the leg comes from; the triangle's own where a smooth one has turned away.
+  static Eigen::Vector3d facing_normal(const Leg& leg, const RayHit& hit) {
+    const double side = leg.direction.dot(hit.normal) < 0.0 ? 1.0 : -1.0;
+    const bool turned_away = side * leg.direction.dot(hit.shading_normal) >= 0.0;
+    return side * (turned_away ? hit.normal : hit.shading_normal);
+  }
+
   /// What the surface's own colour is at a hit.
   const Bands<N>& colour_at(const PreparedMaterial<N>& material, const RayHit& hit) const {
     return material.print < 0 ? material.colour : scene_.prints[material.print].colour(hit, material.colour);
@@ -254,16 +261,16 @@ class PathIntegrator {
     return lit;
   }
 
-  /// Lamp light that the surface sends along the leg, out of its side `normal`: the side that faces the leg, or the
-  /// other one of a diffuse transmitter.
-  void add_lamp_light(const Leg& leg, const RayHit& hit, const Eigen::Vector3d& normal,
+  /// Lamp light that the surface sends along the leg from `position`, out of its side `normal`: the side that faces the
+  /// leg, or the other one of a diffuse transmitter.
+  void add_lamp_light(const Leg& leg, const Eigen::Vector3d& position, const Eigen::Vector3d& normal,
                       const PreparedMaterial<N>& material, const Bands<N>& surface_colour, const LampNumbers& chosen,
                       bool all_lamps, RayCounts& counts, Bands<N>& sum) const {
     const auto lamp_count = static_cast<int>(scene_.lamps.size());
     if (lamp_count == 0) return;
     const double index = scene_.media[leg.medium].index;
     const bool is_matt = material.kind != SurfaceKind::kConductor;
-    const Receiver receiver{hit.position, normal, leg.layer, leg.medium};
+    const Receiver receiver{position, normal, leg.layer, leg.medium};
     // One lamp a hit. A preview has just one sample and takes them all, guides by several directions.
     const LampChoice choice = all_lamps ? LampChoice{0, 1.0} : choose_lamp(receiver, is_matt, chosen.lamp);
     const int first = choice.lamp;
@@ -281,7 +288,7 @@ class PathIntegrator {
         Arrival<N> arrival;
         if (!reach_lamp(leg, lamp, place, receiver, counts, arrival)) continue;
         if (lamp.visible && interreflection_ && leg.depth < max_depth_) {
-          share_with_paths(lamp, choice, receiver, scattering_density(leg, hit.normal, material, arrival.direction),
+          share_with_paths(lamp, choice, receiver, scattering_density(leg, normal, material, arrival.direction),
                            arrival);
         }
         const double cosine = arrival.direction.dot(normal);
@@ -307,6 +314,7 @@ class PathIntegrator {
                const Bands<N>& surface_colour, SampleSequence& numbers) const {
     if (!interreflection_ || leg.depth >= max_depth_) return false;
     Eigen::Vector3d normal = facing;
+    Eigen::Vector3d place = hit.position + hit.lift;
     Bands<N> colour = surface_colour;
     if (material.kind == SurfaceKind::kTransmitter) {
       const double back = (leg.throughput * surface_colour).sum();
@@ -318,6 +326,7 @@ class PathIntegrator {
       } else {
         colour = material.passed / (1.0 - chance);
         normal = -facing;
+        place = hit.position;
       }
     }
     const NormalFrame frame(normal);
@@ -339,7 +348,7 @@ class PathIntegrator {
     }
     if (in.z() <= 1e-9 || !survives(leg, numbers)) return false;
     leg.direction = frame.to_world(in).normalized();
-    leg.origin = hit.position + RayScene::leave_distance(hit.position) * normal;
+    leg.origin = place + RayScene::leave_distance(hit.position) * normal;
     leg.s_share = 0.5;
     return leg.throughput.maxCoeff() > 0.0;
   }
@@ -466,23 +475,24 @@ class PathIntegrator {
           if (!(leg.throughput.maxCoeff() > 0.0)) return;
           if (lamps_are_seen_) note_smooth_event(departure, before.direction, leg.direction, hit.normal, false);
         } else {
-          const Eigen::Vector3d normal =
-              leg.direction.dot(hit.normal) < 0.0 ? hit.normal : Eigen::Vector3d(-hit.normal);
+          const Eigen::Vector3d normal = facing_normal(leg, hit);
+          const Eigen::Vector3d lifted = hit.position + hit.lift;
           const Bands<N>& colour = colour_at(material, hit);
           const LampNumbers chosen = leg.is_first_sight() ? at_first_hit : lamp_numbers(numbers);
           const int sides = material.kind == SurfaceKind::kTransmitter ? 2 : 1;
           for (int side = 0; side < sides; ++side) {  // one call, so that the compiler inlines it
-            add_lamp_light(leg, hit, side == 0 ? normal : Eigen::Vector3d(-normal), material,
-                           side == 0 ? colour : material.passed, chosen, numbers.is_centre(), counts, sum);
+            add_lamp_light(leg, side == 0 ? lifted : hit.position, side == 0 ? normal : Eigen::Vector3d(-normal),
+                           material, side == 0 ? colour : material.passed, chosen, numbers.is_centre(), counts, sum);
           }
           if (lamps_are_seen_) before = leg;  // with what it carries here
           if (!scatter(leg, hit, normal, material, colour, numbers)) return;
           if (lamps_are_seen_) [[unlikely]] {
-            const Eigen::Vector3d lit = leg.direction.dot(normal) > 0.0 ? normal : Eigen::Vector3d(-normal);
+            const bool went_back = leg.direction.dot(normal) > 0.0;
+            const Eigen::Vector3d lit = went_back ? normal : Eigen::Vector3d(-normal);
             departure = {Departure::Sharing::kShared,
-                         {hit.position, lit, before.layer, before.medium},
+                         {went_back ? lifted : hit.position, lit, before.layer, before.medium},
                          material.kind != SurfaceKind::kConductor,
-                         scattering_density(before, hit.normal, material, leg.direction)};
+                         scattering_density(before, normal, material, leg.direction)};
           }
         }
       } else if (most < to_face) {

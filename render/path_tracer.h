@@ -77,7 +77,7 @@ struct RenderedImage {
 /// threads and with any mask.
 class Tracer {
  public:
-  /// Throws Error if the scene is faulty (check_scene) or has a number of bands other than 1 or 3.
+  /// Throws Error if the scene is faulty (check_scene) or has a number of bands that isn't one of kBandCounts.
   explicit Tracer(const Scene& scene);
   ~Tracer();
   Tracer(Tracer&&) noexcept;

@@ -79,8 +79,22 @@ Passage passage_of(const Material& material, const std::vector<Medium>& media) {
 struct RayScene::State {
   struct Mesh {
     TriangleMesh mesh;
-    std::vector<Eigen::Vector3d> vertex_normals;  // empty: shade with the triangle's normal
+    std::vector<Eigen::Vector3d> normals;  // at the vertices; empty: shade with the triangle's normal
+    bool lifts = false;                    // light leaves it where the curved surface is
   };
+  /// From a point of a triangle to the mean, weighted as the point is, of its feet on the corners' tangent planes. Of
+  /// those that lie on the side `outside`.
+  static Eigen::Vector3d lift_of(const Mesh& mesh, const std::array<int, 3>& triangle, const double* weights,
+                                 const Eigen::Vector3d& point, bool outside) {
+    Eigen::Vector3d lift = Eigen::Vector3d::Zero();
+    for (int k = 0; k < 3; ++k) {
+      const Eigen::Vector3d& normal = mesh.normals[triangle[k]];
+      const double above = (mesh.mesh.vertices[triangle[k]] - point).dot(normal);
+      if ((above > 0.0) == outside) lift += weights[k] * above * normal;
+    }
+    return lift;
+  }
+
   std::vector<Mesh> meshes;
   std::vector<Ball> balls;
   std::array<std::vector<int>, 3> balls_by_passage;  // Embree's primitive number -> ball
@@ -166,18 +180,10 @@ RayScene::RayScene(const Scene& scene) : state_(std::make_unique<State>()) {
     rtcSetSceneBuildQuality(*made, RTC_BUILD_QUALITY_MEDIUM);
   }
   for (const Surface& surface : scene.surfaces) {
-    State::Mesh mesh{surface.mesh, {}};
-    if (passage_of(surface.material, scene.media) == Passage::kRefracted) {
-      mesh.vertex_normals.assign(mesh.mesh.vertices.size(), Eigen::Vector3d::Zero());
-      for (const auto& t : mesh.mesh.triangles) {
-        const auto& p = mesh.mesh.vertices;
-        const Eigen::Vector3d doubled_area = (p[t[1]] - p[t[0]]).cross(p[t[2]] - p[t[0]]);
-        for (int corner : t) mesh.vertex_normals[corner] += doubled_area;
-      }
-      for (Eigen::Vector3d& normal : mesh.vertex_normals)
-        normal.normalize();  // leaves an unused vertex's zero as it is
-    }
-    state.meshes.push_back(std::move(mesh));
+    const bool refracts = passage_of(surface.material, scene.media) == Passage::kRefracted;
+    state.meshes.push_back({surface.mesh,
+                            refracts && surface.normals.empty() ? vertex_normals(surface.mesh) : surface.normals,
+                            !refracts && !surface.normals.empty()});
   }
   state.balls = scene.balls;
   for (int i = 0; i < static_cast<int>(scene.balls.size()); ++i) {
@@ -228,13 +234,17 @@ bool RayScene::State::nearest(RTCScene scene, const Eigen::Vector3d& origin, con
     hit.weight_1 = double(found.hit.u);
     hit.weight_2 = double(found.hit.v);
     hit.shading_normal = hit.normal;
-    if (!mesh.vertex_normals.empty()) {
-      const double w = 1.0 - double(found.hit.u) - double(found.hit.v);
-      const Eigen::Vector3d smooth = w * mesh.vertex_normals[t[0]] + double(found.hit.u) * mesh.vertex_normals[t[1]] +
-                                     double(found.hit.v) * mesh.vertex_normals[t[2]];
+    hit.lift.setZero();
+    if (!mesh.normals.empty()) {
+      const double weights[3] = {1.0 - hit.weight_1 - hit.weight_2, hit.weight_1, hit.weight_2};
+      const Eigen::Vector3d smooth =
+          weights[0] * mesh.normals[t[0]] + weights[1] * mesh.normals[t[1]] + weights[2] * mesh.normals[t[2]];
       const double length = smooth.norm();
       // A fold sharper than that isn't a smooth surface.
-      if (length > 0.1 && smooth.dot(hit.normal) > 0.5 * length) hit.shading_normal = smooth / length;
+      if (length > 0.1 && smooth.dot(hit.normal) > 0.5 * length) {
+        hit.shading_normal = smooth / length;
+        if (mesh.lifts) hit.lift = lift_of(mesh, t, weights, hit.position, direction.dot(hit.normal) < 0.0);
+      }
     }
     return true;
   }
@@ -251,6 +261,7 @@ bool RayScene::State::nearest(RTCScene scene, const Eigen::Vector3d& origin, con
   const Eigen::Vector3d radial = origin + t * direction - ball.centre;
   hit.normal = radial.normalized();
   hit.shading_normal = hit.normal;
+  hit.lift.setZero();
   hit.position = ball.centre + ball.radius * hit.normal;
   hit.distance = t;
   hit.object = static_cast<int>(meshes.size()) + index;

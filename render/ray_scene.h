@@ -21,10 +21,11 @@ namespace touchstone::render {
 struct RayHit {
   double distance = 0.0;
   Eigen::Vector3d position;
-  Eigen::Vector3d normal;                 ///< of the true geometry
-  Eigen::Vector3d shading_normal;         ///< interpolated from the vertices on Refractive surfaces, else `normal`
-  int object = -1;                        ///< index of the surface, or surfaces.size() + index of the ball
-  int triangle = -1;                      ///< of the surface's mesh; -1 on a ball
+  Eigen::Vector3d normal;          ///< of the true geometry
+  Eigen::Vector3d shading_normal;  ///< interpolated where the surface has normals or is Refractive, else `normal`
+  Eigen::Vector3d lift;  ///< from `position` to where light leaves a surface with normals on the ray's side; else zero
+  int object = -1;       ///< index of the surface, or surfaces.size() + index of the ball
+  int triangle = -1;     ///< of the surface's mesh; -1 on a ball
   double weight_1 = 0.0, weight_2 = 0.0;  ///< barycentric weights of the triangle's second and third vertex
 };
 

@@ -104,6 +104,20 @@ void check_print(const Print& print, const Surface& surface, Eigen::Index bands,
   }
 }
 
+void check_normals(const Surface& surface, const std::string& what) {
+  if (surface.normals.size() != surface.mesh.vertices.size()) {
+    fail("{}: {} normals; the mesh has {} vertices", what, surface.normals.size(), surface.mesh.vertices.size());
+  }
+  for (std::size_t i = 0; i < surface.mesh.triangles.size(); ++i) {
+    for (const int corner : surface.mesh.triangles[i]) {
+      const double length = surface.normals[corner].norm();
+      if (!(std::abs(length - 1.0) < 1e-6)) {
+        fail("{}: the normal of vertex {} is {} long; it must be a unit vector", what, corner, length);
+      }
+    }
+  }
+}
+
 void check_mesh(const TriangleMesh& mesh, const std::string& what) {
   for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
     const Eigen::Vector3d& vertex = mesh.vertices[i];
@@ -171,6 +185,7 @@ void check_scene(const Scene& scene) {
     const std::string what = fmt::format("surface {}", i);
     check_mesh(scene.surfaces[i].mesh, what);
     check_material(scene.surfaces[i].material, scene, what);
+    if (!scene.surfaces[i].normals.empty()) check_normals(scene.surfaces[i], what);
     if (scene.surfaces[i].print) check_print(*scene.surfaces[i].print, scene.surfaces[i], bands, what + ": print");
   }
   for (std::size_t i = 0; i < scene.balls.size(); ++i) {

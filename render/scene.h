@@ -60,13 +60,18 @@ struct Refractive {
 using Material =
     std::variant<Lambertian, RoughConductor, Black, Emitter, Refractive, DiffuseTransmitter, ThinFilm, RoughRefractive>;
 
-/// A triangle surface, open or closed. A Refractive surface is shaded with normals interpolated from its vertices, so
-/// that a deformed gel refracts as the curved surface it stands for; others with the normal of the triangle. A
-/// Lambertian or RoughConductor may be printed on.
+/// A triangle surface, open or closed. With `normals` (one a vertex, unit, on the side that the triangles' own are) it
+/// is shaded as the curved surface that it stands for: normals are interpolated over a triangle, and what leaves it
+/// starts where the tangent planes of its corners are, if that is over the triangle, so that facets that turn away from
+/// a lamp a little earlier or later than the surface cast no shadows on it (Hanika 2021). What passes under the
+/// triangles is stopped by them as ever. Without, each triangle is flat; but a Refractive surface always bends light by
+/// interpolated normals, those of vertex_normals() if none are given. Only Refractive, Lambertian, RoughConductor and
+/// DiffuseTransmitter surfaces look at them. A Lambertian or RoughConductor may be printed on.
 struct Surface {
   TriangleMesh mesh;
   Material material;
   std::optional<Print> print = std::nullopt;
+  std::vector<Eigen::Vector3d> normals = {};
 };
 
 struct Ball {

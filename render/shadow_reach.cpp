@@ -128,7 +128,7 @@ bool is_connected(const TriangleMesh& mesh) {
 }
 
 LampBearings::LampBearings(const LightField& field, bool soft)
-    : lamps(field.lamp_count()), longest(field.lamp_count(), 0.0f) {
+    : lamps(field.beam_count()), longest(field.beam_count(), 0.0f) {
   const Eigen::Vector3d size = field.reach.sizes();
   cell = static_cast<float>(std::max(size.x(), size.y()) / kMostCells);
   left = static_cast<float>(field.reach.min().x());
@@ -139,11 +139,22 @@ LampBearings::LampBearings(const LightField& field, bool soft)
   slabs = std::clamp(static_cast<int>(std::ceil(size.z() / (0.5 * double(cell)))), 1, kMostSlabs);
   slab = static_cast<float>(size.z() / slabs);
   bearings.resize(static_cast<std::size_t>(slabs) * columns * rows * lamps);
+  for (const Lamp& lamp : field.fixture.lamps) {
+    const auto* guide = std::get_if<GuideLamp>(&lamp);
+    if (guide == nullptr) {
+      guides.setEmpty();
+      break;
+    }
+    const Eigen::Vector2d ahead = guide->direction.head<2>().normalized();
+    const Eigen::Vector2d aside(-ahead.y(), ahead.x());
+    guides.extend(Eigen::Vector2d(guide->centre.head<2>() + 0.5 * guide->width * aside));
+    guides.extend(Eigen::Vector2d(guide->centre.head<2>() - 0.5 * guide->width * aside));
+  }
   // A ray to another point of a lens takes the field's direction at a place that is set off by up to the lens's radius
   // and what it takes along a slanting ray (DirectBatch::choose_lens_points).
   std::vector<float> set_off(lamps, 0.0f);
   for (int lamp = 0; soft && lamp < lamps; ++lamp) {
-    set_off[lamp] = static_cast<float>(disc_radius(field.fixture.lamps[lamp]));
+    set_off[lamp] = static_cast<float>(disc_radius(field.lamp(lamp)));
   }
   tbb::parallel_for(0, slabs * rows, [&](int line) {
     const int row = line % rows;
@@ -167,7 +178,7 @@ LampBearings::LampBearings(const LightField& field, bool soft)
         made.x = middle.x();
         made.y = middle.y();
         made.length = middle.norm();
-        const Eigen::Vector3d& real = lamp_position(field.fixture.lamps[lamp]);
+        const Eigen::Vector3d& real = lamp_position(field.lamp(lamp));
         const double sent_across = (Eigen::Vector3d(x, y, middle_z) - real).head<2>().norm();
         const double sent_along = std::max(1e-6, std::abs(double(middle_z) - real.z()));
         const float off =
@@ -202,10 +213,30 @@ int LampBearings::slab_at(float z) const {
 
 ShadowReach::ShadowReach(const LampBearings& bearings, const Scene& scene, bool connected)
     : bearings_(bearings), all_(bearings.lamps == 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << bearings.lamps) - 1) {
+  Eigen::AlignedBox3d sheet;
+  if (!scene.surfaces.empty()) {
+    for (const auto& vertex : scene.surfaces[0].mesh.vertices) sheet.extend(vertex);
+  }
+  // The sheet seen along z, less a rim that pressing moves.
+  constexpr double kRim = 0.05;  // mm
+  const Eigen::AlignedBox2d inner(Eigen::Vector2d(sheet.min().head<2>().array() + kRim),
+                                  Eigen::Vector2d(sheet.max().head<2>().array() - kRim));
+  const Eigen::AlignedBox2d outer(Eigen::Vector2d(sheet.min().head<2>().array() - kRim),
+                                  Eigen::Vector2d(sheet.max().head<2>().array() + kRim));
+  const bool enclosed = !bearings.guides.isEmpty() && !inner.isEmpty() && outer.contains(bearings.guides);
+  const auto is_wall_round_it = [&](const Eigen::AlignedBox3d& part) {
+    return enclosed && ((part.max().head<2>().array() <= inner.min().array()).any() ||
+                        (part.min().head<2>().array() >= inner.max().array()).any());
+  };
   // Of the sheet and what stands on the map for columns, and of everything.
-  Eigen::AlignedBox3d solid;
-  for (const Surface& surface : scene.surfaces) {
-    for (const auto& vertex : surface.mesh.vertices) solid.extend(vertex);
+  Eigen::AlignedBox3d solid = sheet;
+  for (std::size_t i = 1; i < scene.surfaces.size(); ++i) {
+    const TriangleMesh& other = scene.surfaces[i].mesh;
+    for (const auto& t : other.triangles) {
+      Eigen::AlignedBox3d part;
+      for (int corner : t) part.extend(other.vertices[corner]);
+      if (!is_wall_round_it(part)) solid.extend(part);
+    }
   }
   Eigen::AlignedBox3d everything = solid;
   for (const Ball& ball : scene.balls) {
@@ -225,6 +256,7 @@ ShadowReach::ShadowReach(const LampBearings& bearings, const Scene& scene, bool 
     for (const auto& t : other.triangles) {
       Eigen::AlignedBox3d part;
       for (int corner : t) part.extend(other.vertices[corner]);
+      if (is_wall_round_it(part)) continue;
       over_cells(map, part.min().x(), part.max().x(), part.min().y(), part.max().y(),
                  [&](std::size_t cell) { ground.slope[cell] = kEndless; });
     }

@@ -12,12 +12,6 @@ namespace {
 constexpr double kSampleNm = 1.0;      // of the curves, for errors and weighted means
 constexpr int kSamplesAnEdgeStep = 2;  // edges are tried at every second sample
 
-/// A lamp has no light that was measured beyond its curve's points.
-double emitted_at(const SpectralCurve& emission, double at_nm) {
-  const bool beyond = at_nm < emission.wavelengths_nm.front() || at_nm > emission.wavelengths_nm.back();
-  return beyond ? 0.0 : emission.at(at_nm);
-}
-
 /// Wavelengths in the middles of equal steps of at most kSampleNm, a multiple of `parts` of them.
 std::vector<double> samples_of(double from_nm, double to_nm, int parts = 1) {
   const int steps = parts * std::max(1, static_cast<int>(std::ceil((to_nm - from_nm) / (kSampleNm * parts))));

@@ -82,6 +82,11 @@ double SpectralCurve::at(double wavelength_nm) const {
   return values[k - 1] + share * (values[k] - values[k - 1]);
 }
 
+double emitted_at(const SpectralCurve& emission, double wavelength_nm) {
+  const bool beyond = wavelength_nm < emission.wavelengths_nm.front() || wavelength_nm > emission.wavelengths_nm.back();
+  return beyond ? 0.0 : emission.at(wavelength_nm);
+}
+
 double SpectralCurve::integral(double from_nm, double to_nm) const {
   TS_ASSERT(from_nm <= to_nm);
   const std::vector<double> knots = knots_of(*this, from_nm, to_nm);

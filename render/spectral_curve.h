@@ -22,6 +22,9 @@ struct SpectralCurve {
   double mean(double from_nm, double to_nm) const;
 };
 
+/// What a lamp of this measured emission sends at a wavelength: nothing beyond the curve's points.
+double emitted_at(const SpectralCurve& emission, double wavelength_nm);
+
 /// What a curve's values may be.
 enum class CurveKind {
   share,     ///< of light: reflectance, transmittance, quantum efficiency; 0 to 1

@@ -1,15 +1,18 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <string>
 
 namespace touchstone::render {
 
 /// The most bands that a description may have.
 inline constexpr int kMaxBands = 16;
+/// The numbers of bands that the tracer is compiled for.
+inline constexpr std::array kBandCounts = {1, 3, 8, 16};
 
-/// One number per band, in a description: a scene has 1 band (grey) or 3 (blue to red, or whatever its author means by
-/// them); all spectra of a scene have the same length. Coefficient-wise arithmetic; no allocation.
+/// One number per band, in a description: a scene has one of kBandCounts, whatever its author means by them; all
+/// spectra of a scene have the same length. Coefficient-wise arithmetic; no allocation.
 using Spectrum = Eigen::Array<double, Eigen::Dynamic, 1, 0, kMaxBands, 1>;
 
 /// One number per band inside the tracer, where the count is known to the compiler.

@@ -13,24 +13,26 @@ namespace touchstone::sensors {
 namespace {
 
 constexpr double kSmallestRadius_px = 4.0;
-constexpr double kFaintest_DN = 6.0;   // summed over the channels: less is no contact
-constexpr double kStrongPart = 0.5;    // of a contact's strong difference, which marks others
-constexpr double kSecondArea = 0.15;   // of the first contact, from which a second counts
-constexpr double kSurroundings = 1.7;  // radii: within, the gel still bends round the ball
-constexpr double kFitPart = 0.85;      // of the radius: where colours are compared with a ball's
+constexpr double kFaintest_DN = 6.0;    // summed over the channels: less is no contact
+constexpr double kStrongPart = 0.5;     // of a contact's own brightness, which marks others
+constexpr double kSecondArea = 0.15;    // of the first contact, from which a second counts
+constexpr double kSurroundings = 1.7;   // radii: within, the gel still bends round the ball
+constexpr double kFitPart = 0.85;       // of the contact's radius: where colours are compared with a ball's,
+constexpr double kFitPartOfBall = 0.5;  // and of the ball's: steeper parts may lie in a lamp's shadow
 
-/// |frame - background|, summed over the channels, smoothed against noise.
-cv::Mat contrast_of(const cv::Mat& difference) {
-  cv::Mat contrast(difference.size(), CV_32FC1);
+/// By how much a pixel is brighter than the background, summed over the channels, smoothed against noise. Flanks are
+/// brighter in the colour of the lamp that they face; the shadows that a contact casts are only darker.
+cv::Mat brightening_of(const cv::Mat& difference) {
+  cv::Mat brightening(difference.size(), CV_32FC1);
   for (int v = 0; v < difference.rows; ++v) {
     const auto* in = difference.ptr<cv::Vec3f>(v);
-    auto* out = contrast.ptr<float>(v);
+    auto* out = brightening.ptr<float>(v);
     for (int u = 0; u < difference.cols; ++u) {
-      out[u] = std::abs(in[u][0]) + std::abs(in[u][1]) + std::abs(in[u][2]);
+      out[u] = std::max(in[u][0], 0.0F) + std::max(in[u][1], 0.0F) + std::max(in[u][2], 0.0F);
     }
   }
-  cv::GaussianBlur(contrast, contrast, {}, 1.5);
-  return contrast;
+  cv::GaussianBlur(brightening, brightening, {}, 1.5);
+  return brightening;
 }
 
 /// Calls `use(u, v, offset)` for each pixel of the picture whose centre is within `radius` of `centre`.
@@ -57,9 +59,9 @@ float quantile(std::vector<float> values, double share) {
 }
 
 /// @throws Error if there's a second contact outside of the circle
-void refuse_second_contact(const cv::Mat& contrast, const ContactCircle& circle, float strong,
+void refuse_second_contact(const cv::Mat& brightening, const ContactCircle& circle, float strong,
                            const std::string& name) {
-  cv::Mat marks = contrast > kStrongPart * static_cast<double>(strong);
+  cv::Mat marks = brightening > kStrongPart * static_cast<double>(strong);
   for_each_pixel(marks.size(), circle.centre, kSurroundings * circle.radius,
                  [&](int u, int v, const Eigen::Vector2d&) { marks.at<unsigned char>(v, u) = 0; });
   cv::Mat labels;
@@ -81,21 +83,23 @@ double shading_misfit(const cv::Mat& difference, const Eigen::Vector2d& centre, 
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
   Eigen::Matrix3d right = Eigen::Matrix3d::Zero();
   double squares = 0.0;
-  int count = 0;
+  double weights = 0.0;
   for_each_pixel(difference.size(), centre, radius_px, [&](int u, int v, const Eigen::Vector2d& offset) {
+    // Fades out towards the rim, so that the misfit doesn't jump when a pixel comes in.
+    const double weight = 1.0 - offset.squaredNorm() / (radius_px * radius_px);
     const double depth = std::sqrt(ball_px * ball_px - offset.squaredNorm());
     const Eigen::Vector3d tilt(offset.x() / ball_px, offset.y() / ball_px, depth / ball_px - 1.0);
     const cv::Vec3f& pixel = difference.at<cv::Vec3f>(v, u);
     const Eigen::Vector3d colour(pixel[0], pixel[1], pixel[2]);
-    normal += tilt * tilt.transpose();
-    right += tilt * colour.transpose();
-    squares += colour.squaredNorm();
-    ++count;
+    normal += weight * tilt * tilt.transpose();
+    right += weight * tilt * colour.transpose();
+    squares += weight * colour.squaredNorm();
+    weights += weight;
   });
-  if (count == 0) return INFINITY;
+  if (weights <= 0.0) return INFINITY;
   normal.diagonal().array() += 1e-9;
   const Eigen::Matrix3d solution = normal.ldlt().solve(right);
-  return (squares - (solution.transpose() * right).trace()) / count;
+  return (squares - (solution.transpose() * right).trace()) / weights;
 }
 
 /// Moves the centre to the least misfit by a pattern search down to a hundredth of a pixel.
@@ -117,14 +121,14 @@ Eigen::Vector2d best_centre(const cv::Mat& difference, Eigen::Vector2d centre, d
   return centre;
 }
 
-/// Where the mean contrast over circles round `centre` is highest: contact ends there and the slope falls off again.
-double rim_radius(const cv::Mat& contrast, const Eigen::Vector2d& centre, double largest) {
+/// Where circles round `centre` are brightest in the mean: contact ends there and the slope falls off again.
+double rim_radius(const cv::Mat& brightening, const Eigen::Vector2d& centre, double largest) {
   constexpr double kBin = 0.5;
   std::vector<double> sums(static_cast<std::size_t>(largest / kBin) + 1, 0.0);
   std::vector<double> counts(sums.size(), 0.0);
-  for_each_pixel(contrast.size(), centre, largest, [&](int u, int v, const Eigen::Vector2d& offset) {
+  for_each_pixel(brightening.size(), centre, largest, [&](int u, int v, const Eigen::Vector2d& offset) {
     const auto bin = std::min(static_cast<std::size_t>(offset.norm() / kBin), sums.size() - 1);
-    sums[bin] += contrast.at<float>(v, u);
+    sums[bin] += brightening.at<float>(v, u);
     counts[bin] += 1.0;
   });
   const auto ring = [&](std::size_t i) {  // over three bins, against the grid's own unevenness
@@ -182,15 +186,15 @@ std::vector<ColourSample> samples_of(const BallPress& press, const Background& b
   }
 
   const cv::Mat difference = difference_to(background, press.frame);
-  const cv::Mat contrast = contrast_of(difference);
+  const cv::Mat brightening = brightening_of(difference);
   std::vector<float> within;
-  for_each_pixel(contrast.size(), circle.centre, circle.radius,
-                 [&](int u, int v, const Eigen::Vector2d&) { within.push_back(contrast.at<float>(v, u)); });
+  for_each_pixel(brightening.size(), circle.centre, circle.radius,
+                 [&](int u, int v, const Eigen::Vector2d&) { within.push_back(brightening.at<float>(v, u)); });
   const float strong = quantile(within, 0.9);
   if (strong < kFaintest_DN)
     fail("{}: nothing is pressed at ({:.0f}, {:.0f}): the frame is as the background there", press.name,
          circle.centre.x(), circle.centre.y());
-  refuse_second_contact(contrast, circle, strong, press.name);
+  refuse_second_contact(brightening, circle, strong, press.name);
 
   std::vector<ColourSample> samples;
   int saturated = 0;
@@ -223,12 +227,12 @@ ContactCircle find_contact_circle(const cv::Mat& frame, const Background& backgr
   const std::string fault = frame_fault(frame, background.mean.size());
   if (!fault.empty()) fail("{}: the frame {}", name, fault);
   const cv::Mat difference = difference_to(background, frame);
-  const cv::Mat contrast = contrast_of(difference);
+  const cv::Mat brightening = brightening_of(difference);
   double highest = 0.0;
-  cv::minMaxLoc(contrast, nullptr, &highest);
+  cv::minMaxLoc(brightening, nullptr, &highest);
   if (highest < kFaintest_DN) fail("{}: no contact is seen: the frame is as the background", name);
 
-  cv::Mat marks = contrast > 0.35 * highest;
+  cv::Mat marks = brightening > 0.35 * highest;
   std::vector<std::vector<cv::Point>> outlines;
   // A ball's middle is as bright as the gel at rest: only outlines count, and gaps in the ring are closed.
   const double ball_px = ball_radius_mm / mm_per_px;
@@ -260,17 +264,18 @@ ContactCircle find_contact_circle(const cv::Mat& frame, const Background& backgr
   circle.centre = {box.x + 0.5 * box.width, box.y + 0.5 * box.height};
   circle.radius = std::min(0.25 * (box.width + box.height), 0.95 * ball_px);
   for (int pass = 0; pass < 3; ++pass) {  // each makes the other better
-    circle.centre = best_centre(difference, circle.centre, kFitPart * circle.radius, ball_px);
-    circle.radius = std::min(rim_radius(contrast, circle.centre, 0.98 * ball_px), 0.97 * ball_px);
+    circle.centre =
+        best_centre(difference, circle.centre, std::min(kFitPart * circle.radius, kFitPartOfBall * ball_px), ball_px);
+    circle.radius = std::min(rim_radius(brightening, circle.centre, 0.98 * ball_px), 0.97 * ball_px);
     if (circle.radius < kSmallestRadius_px) {
       fail("{}: the contact's radius is {:.1f} px; at least {:.0f} are needed: press deeper", name, circle.radius,
            kSmallestRadius_px);
     }
   }
   std::vector<float> within;
-  for_each_pixel(contrast.size(), circle.centre, circle.radius,
-                 [&](int u, int v, const Eigen::Vector2d&) { within.push_back(contrast.at<float>(v, u)); });
-  refuse_second_contact(contrast, circle, quantile(within, 0.9), name);
+  for_each_pixel(brightening.size(), circle.centre, circle.radius,
+                 [&](int u, int v, const Eigen::Vector2d&) { within.push_back(brightening.at<float>(v, u)); });
+  refuse_second_contact(brightening, circle, quantile(within, 0.9), name);
   return circle;
 }
 

@@ -10,7 +10,7 @@ namespace {
 
 constexpr int kPressesForOrder1 = 3;
 constexpr int kPressesForOrder2 = 6;
-constexpr std::size_t kCellsToCompare = 1U << 16U;  // coarser tables serve to compare corrections
+constexpr std::size_t kCellsToCompare = 1U << 17U;  // coarser tables serve to compare corrections
 
 using Samples = std::vector<ColourSample>;
 

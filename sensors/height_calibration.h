@@ -15,7 +15,7 @@ struct HeightCalibrationSettings {
   LightCorrection correction = LightCorrection::fitted;
   std::optional<int> lamp_order{};  ///< absent: 0 below 3 presses, 1 below 6, else 2, and less where the presses'
                                     ///< places don't determine that
-  double lamp_steepest = 1.0;  ///< slopes up to which lamps are taken to be above the membrane's horizon
+  double lamp_steepest = 0.6;       ///< slopes up to which every lamp is taken to stand above the membrane's horizon
   PressSampling sampling{};
   SlopeTableSettings table{};
   bool cross_validate = false;  ///< fill HeightCalibration::left_out

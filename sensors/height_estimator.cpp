@@ -208,7 +208,7 @@ FrameCoverage HeightEstimator::coverage(const cv::Mat& frame) const {
       const Eigen::Vector3f colour(pixel[0], pixel[1], pixel[2]);
       const Eigen::Matrix3f matrix = correction.at({u + 0.5, v + 0.5}).cast<float>();
       const std::size_t cell = model_.table.index_of(matrix * colour);
-      const bool hit = model_.table.hits[cell] > 0;
+      const bool hit = model_.table.measured_near(matrix * colour);
       measured += hit ? 1 : 0;
       if (colour.lpNorm<1>() > kClearly_DN) {
         ++clear;

@@ -35,7 +35,7 @@ struct HeightResult {
 
 /// How well the calibration's colours cover those of a frame.
 struct FrameCoverage {
-  double measured_share = 0.0;          ///< of the pixels: their colours fall into cells that calibration has hit
+  double measured_share = 0.0;  ///< of the pixels: calibration has hit the cell of their colour or one beside it
   double contact_measured_share = 0.0;  ///< of those that differ clearly from the background (1 if there are none)
   double steep_share = 0.0;             ///< of the pixels: steeper than 99 % of the calibration's, so extrapolated
 };

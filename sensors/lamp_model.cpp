@@ -117,7 +117,7 @@ Eigen::Vector2d slope_by_lamps(const Eigen::Matrix3d& a, const Eigen::Vector3d& 
     // A little damping: far out, normals hardly change with the slope.
     Eigen::Matrix2d normal = derivative.transpose() * derivative;
     normal.diagonal().array() += 1e-3 * (a.squaredNorm() + 1e-30);
-    slope += normal.ldlt().solve(derivative.transpose() * miss);
+    slope += normal.inverse() * (derivative.transpose() * miss);
     if (const double length = slope.norm(); length > limit) slope *= limit / length;
   }
   return slope;

@@ -9,6 +9,7 @@ namespace touchstone::sensors {
 namespace {
 
 constexpr float kMargin_DN = 8.0F;    // around the calibration's colours
+constexpr float kGrowth = 1.05F;      // of the step, until the table is small enough
 constexpr double kRestPixels = 50.0;  // as which the certainty counts that the colour of rest is flat
 
 /// Sums of deviations over the cells of one level; each level's cells are twice as wide as those of the one before.
@@ -78,6 +79,14 @@ std::size_t SlopeTable::index_of(const Eigen::Vector3f& colour) const {
   return index;
 }
 
+bool SlopeTable::measured_near(const Eigen::Vector3f& colour) const {
+  for (int i = 0; i < 27; ++i) {
+    const Eigen::Vector3f beside = step * Eigen::Vector3i(i / 9 - 1, i / 3 % 3 - 1, i % 3 - 1).cast<float>();
+    if (hits[index_of(colour + beside)] > 0) return true;
+  }
+  return false;
+}
+
 SlopeTable build_slope_table(std::span<const ColourSample> samples, const Eigen::Matrix3d& lamps,
                              const SlopeTableSettings& settings) {
   TS_ASSERT(!samples.empty());
@@ -90,7 +99,7 @@ SlopeTable build_slope_table(std::span<const ColourSample> samples, const Eigen:
   SlopeTable table;
   table.step = static_cast<float>(settings.finest_step_DN);
   std::size_t cells = 0;
-  for (;; table.step *= 2.0F) {
+  for (;; table.step *= kGrowth) {
     cells = 1;
     for (std::size_t c = 0; c < 3; ++c) {
       const auto axis = static_cast<Eigen::Index>(c);

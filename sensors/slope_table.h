@@ -21,11 +21,13 @@ struct SlopeTable {
   std::vector<std::uint16_t> hits;      ///< calibration pixels that fell into each cell, at most 65535
 
   std::size_t index_of(const Eigen::Vector3f& colour) const;
+  /// Whether calibration has hit the colour's cell or one of the 26 beside it.
+  bool measured_near(const Eigen::Vector3f& colour) const;
 };
 
 struct SlopeTableSettings {
-  double finest_step_DN = 2.0;  ///< doubled until the grid has at most `most_cells`
-  std::size_t most_cells = 1U << 19U;
+  double finest_step_DN = 2.0;  ///< made larger until the grid has at most `most_cells`
+  std::size_t most_cells = 1U << 20U;
   double prior_pixels = 4.0;  ///< as how many calibration pixels a cell's surroundings count
   double steepest = 4.0;      ///< no slope is longer: the limit of step 2 of the text
 };

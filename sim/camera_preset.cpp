@@ -7,22 +7,6 @@
 namespace touchstone::sim {
 namespace {
 
-BayerLayout layout_of(render::BayerPattern pattern) {
-  switch (pattern) {
-    case render::BayerPattern::none:
-      return BayerLayout::none;
-    case render::BayerPattern::rggb:
-      return BayerLayout::rggb;
-    case render::BayerPattern::bggr:
-      return BayerLayout::bggr;
-    case render::BayerPattern::grbg:
-      return BayerLayout::grbg;
-    case render::BayerPattern::gbrg:
-      return BayerLayout::gbrg;
-  }
-  return BayerLayout::none;
-}
-
 /// A row of a preset's efficiencies, which are told at a few wavelengths from blue to red: between them a line.
 Colour efficiency_of(const render::Imager& imager, Eigen::Index row) {
   const Eigen::VectorXd values = imager.quantum_efficiency.row(row).transpose();
@@ -54,7 +38,7 @@ bool read_preset(YamlReader& in, CameraSpec& camera) {
   camera.active_area_um2 = imager.active_area_um2;
   camera.row_time_us = preset.line_time_s * kMicrosecondsPerSecond;
   camera.bits = imager.bits;
-  camera.bayer = layout_of(imager.bayer);
+  camera.bayer = imager.bayer;
   const bool grey = imager.bayer == render::BayerPattern::none;
   camera.quantum_efficiency_green = efficiency_of(imager, grey ? 0 : 1);
   if (!grey) {

@@ -11,10 +11,20 @@
 #include "sim/gel_setup.h"
 #include "sim/gltf_mesh.h"
 
+namespace touchstone::render {
+
+EnumNames<BayerPattern> enum_names(BayerPattern) {
+  return {{"none", BayerPattern::none},
+          {"rggb", BayerPattern::rggb},
+          {"bggr", BayerPattern::bggr},
+          {"grbg", BayerPattern::grbg},
+          {"gbrg", BayerPattern::gbrg}};
+}
+
+}  // namespace touchstone::render
+
 namespace touchstone::sim {
 namespace {
-
-constexpr int kBandCounts[] = {1, 3, 8, 16};  // what the tracer is compiled for
 
 Allowed part_of_one() {
   return Allowed::within(0.0, 1.0);
@@ -104,14 +114,6 @@ void lens_fields(YamlReader& in, CameraSpec& camera) {
 
 EnumNames<CoatingType> enum_names(CoatingType) {
   return {{"matt", CoatingType::matt}, {"metal", CoatingType::metal}};
-}
-
-EnumNames<BayerLayout> enum_names(BayerLayout) {
-  return {{"none", BayerLayout::none},
-          {"rggb", BayerLayout::rggb},
-          {"bggr", BayerLayout::bggr},
-          {"grbg", BayerLayout::grbg},
-          {"gbrg", BayerLayout::gbrg}};
 }
 
 EnumNames<CameraType> enum_names(CameraType) {
@@ -247,7 +249,7 @@ void fields(YamlReader& in, BandsSpec& bands) {
   in.optional("to_nm", bands.to_nm, Allowed::within(bands.from_nm + 64.0, 3000.0));
   in.optional("tolerance", bands.tolerance, Allowed::within(1e-4, 1.0));
   in.optional("count", bands.count);
-  if (bands.count && std::ranges::find(kBandCounts, *bands.count) == std::end(kBandCounts)) {
+  if (bands.count && std::ranges::find(render::kBandCounts, *bands.count) == render::kBandCounts.end()) {
     fail_at(in.where("count"), "bands.count: {}; allowed are 1, 3, 8 and 16", *bands.count);
   }
 }
@@ -278,7 +280,7 @@ void fields(YamlReader& in, CameraSpec& camera) {
   in.optional("row_time_us", camera.row_time_us, Allowed::at_least(0.0));
   in.optional("bits", camera.bits, Allowed::within(1, 16));
   in.optional("bayer", camera.bayer);
-  if (camera.bayer == BayerLayout::none && !preset) camera.quantum_efficiency_green = 1.0;
+  if (camera.bayer == render::BayerPattern::none && !preset) camera.quantum_efficiency_green = 1.0;
   for (auto [key, efficiency] : {std::pair{"quantum_efficiency_red", &camera.quantum_efficiency_red},
                                  std::pair{"quantum_efficiency_green", &camera.quantum_efficiency_green},
                                  std::pair{"quantum_efficiency_blue", &camera.quantum_efficiency_blue}}) {
@@ -328,7 +330,8 @@ void fields(YamlReader& in, DeviceSpec& device) {
   if (device.bands && in.has("band_wavelengths_nm")) {
     fail_at(in.where("band_wavelengths_nm"), "band_wavelengths_nm: can't stand beside bands, which tell them");
   }
-  if (std::ranges::find(kBandCounts, static_cast<int>(device.band_wavelengths_nm.size())) == std::end(kBandCounts)) {
+  if (std::ranges::find(render::kBandCounts, static_cast<int>(device.band_wavelengths_nm.size())) ==
+      render::kBandCounts.end()) {
     fail_at(in.where("band_wavelengths_nm"), "band_wavelengths_nm: {} wavelengths; allowed are 1, 3, 8 or 16 of them",
             device.band_wavelengths_nm.size());
   }

@@ -10,9 +10,14 @@
 
 #include "core/yaml_reader.h"
 #include "fem/relaxation.h"
+#include "render/imager.h"
 #include "sim/colour.h"
 #include "sim/device_lamps.h"
 #include "sim/event_camera_spec.h"
+
+namespace touchstone::render {
+EnumNames<BayerPattern> enum_names(BayerPattern);  // of the field `camera.bayer`
+}  // namespace touchstone::render
 
 namespace touchstone::sim {
 
@@ -123,9 +128,6 @@ struct FilmSpec {
   Colour transmittance = 1.0;  ///< of one passage at normal incidence
 };
 
-enum class BayerLayout { none, rggb, bggr, grbg, gbrg };
-EnumNames<BayerLayout> enum_names(BayerLayout);
-
 enum class CameraType { pinhole, lens };
 EnumNames<CameraType> enum_names(CameraType);
 
@@ -154,7 +156,7 @@ struct CameraSpec {
   double exposure_us = 1000.0;
   double row_time_us = 0.0;  ///< from row to row of a rolling shutter, the top row first; 0: all rows at once
   int bits = 8;              ///< 1 to 16
-  BayerLayout bayer = BayerLayout::none;
+  render::BayerPattern bayer = render::BayerPattern::none;
   // Of the red, green and blue pixels; a grey camera has the green one only, by itself 1 in all bands. A colour
   // camera's own three are for the bands red, green and blue.
   Colour quantum_efficiency_red = {1, 0, 0};

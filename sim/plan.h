@@ -23,6 +23,7 @@ struct Plan {
   bool friction = false;
   bool elastic_object = false;
   bool fine_relief = false;
+  double relief_pixel_mm = 0.0;  ///< where fine relief is on: of its grid
   bool relaxation = false;
   bool inertia = false;
   bool refraction = false;

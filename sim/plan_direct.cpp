@@ -5,12 +5,10 @@ namespace touchstone::sim {
 std::string unfit_for_direct_light(const SceneSpec& scene, const Plan& plan) {
   const DeviceSpec& device = scene.device;
   if (!device.coating) return "the gel has no coating: its outer face refracts";
-  if (device.coating->print) return "the coating is printed on";
   if (device.films) return "the device has films, which pass light";
   if (plan.scattering) return "the gel scatters light";
   if (device.lamps.empty()) return "the device has no lamps";
   for (const LampSpec& lamp : device.lamps) {
-    if (lamp.type == LampType::guide) return "a lamp is a light guide, whose light has edges that no coarse grid holds";
     if (lamp.visible) return "a lamp has a body that is seen";
   }
   if (plan.events) return "event pixels' light is path-traced, and frames beside them are to match it";

@@ -33,7 +33,7 @@ std::vector<NamedColour> reflecting(const SceneSpec& scene) {
 
 std::vector<NamedColour> efficiencies(const CameraSpec& camera) {
   std::vector<NamedColour> all = {{camera.quantum_efficiency_green, "camera.quantum_efficiency_green"}};
-  if (camera.bayer != BayerLayout::none) {
+  if (camera.bayer != render::BayerPattern::none) {
     all.push_back({camera.quantum_efficiency_red, "camera.quantum_efficiency_red"});
     all.push_back({camera.quantum_efficiency_blue, "camera.quantum_efficiency_blue"});
   }
@@ -65,8 +65,7 @@ std::optional<render::SpectralCurve> light_of(const std::vector<render::Spectral
     const double at = bands.from_nm + (bands.to_nm - bands.from_nm) * k / steps;
     double light = 0.0;
     for (const render::SpectralCurve& lamp : lamps) {
-      const bool beyond = at < lamp.wavelengths_nm.front() || at > lamp.wavelengths_nm.back();
-      light += beyond ? 0.0 : lamp.at(at);
+      light += render::emitted_at(lamp, at);
     }
     sum.wavelengths_nm.push_back(at);
     sum.values.push_back(light);
@@ -132,13 +131,12 @@ SceneBands choose_bands(const SceneSpec& scene) {
     out.centres_nm = Eigen::Map<const Eigen::ArrayXd>(centres.data(), static_cast<Eigen::Index>(centres.size()));
     return out;
   }
-  constexpr std::array kCounts = {1, 3, 8, 16};  // what the tracer is compiled for
   const BandsSpec& wanted = *device.bands;
   const LightPaths light = light_paths(scene);
-  out.ranges =
-      wanted.count
-          ? render::adapted_bands(light.paths, light.light, wanted.from_nm, wanted.to_nm, *wanted.count)
-          : render::bands_within(light.paths, light.light, wanted.from_nm, wanted.to_nm, wanted.tolerance, kCounts);
+  out.ranges = wanted.count
+                   ? render::adapted_bands(light.paths, light.light, wanted.from_nm, wanted.to_nm, *wanted.count)
+                   : render::bands_within(light.paths, light.light, wanted.from_nm, wanted.to_nm, wanted.tolerance,
+                                          render::kBandCounts);
   out.centres_nm = out.ranges->centres_nm();
   return out;
 }

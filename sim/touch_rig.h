@@ -26,9 +26,9 @@ struct TouchRigSettings {
 
 /// One frame and what is true of it. Pictures have the camera's size.
 struct Touch {
-  cv::Mat frame;   ///< as the camera delivers it: 8 bit, BGR or grey, with noise
-  cv::Mat height;  ///< CV_32FC1, mm: how far the membrane that the pixel sees is pressed in, against what the pixel
-                   ///< sees at rest, along the gel frame's z; NaN where it sees no membrane
+  cv::Mat frame;    ///< as the camera delivers it: 8 bit, BGR or grey, with noise
+  cv::Mat height;   ///< CV_32FC1, mm: how far the membrane that the pixel sees is pressed in, against what the pixel
+                    ///< sees at rest, along the gel frame's z; NaN where it sees no membrane
   cv::Mat contact;  ///< CV_8UC1, 255 where the pixel sees membrane that lies on the object
 };
 

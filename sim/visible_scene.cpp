@@ -13,8 +13,35 @@ enum MediumIndex { kAir = 0, kPlate = 1, kGel = 2 };
 
 constexpr double kFilmInGelMm = 1e-3;  // so that film and face don't coincide
 
-/// The frame that holds the gel: walls round the pad's sides, from the plate to its outer surface.
-TriangleMesh pad_walls(const GelSpec& gel) {
+/// A wall on a circle about z from `low` to `high`; nothing where that's no height.
+TriangleMesh round_wall(double radius, double low, double high) {
+  constexpr int kSides = 180;
+  constexpr double kLowest = 1e-6;
+  TriangleMesh mesh;
+  if (high - low < kLowest) return mesh;
+  for (int side = 0; side < kSides; ++side) {
+    const double angle = 2.0 * kPi * side / kSides;
+    for (const double z : {low, high})
+      mesh.vertices.emplace_back(radius * std::cos(angle), radius * std::sin(angle), z);
+    const int a = 2 * side;
+    const int b = 2 * ((side + 1) % kSides);
+    mesh.triangles.push_back({a, b, a + 1});
+    mesh.triangles.push_back({b, b + 1, a + 1});
+  }
+  return mesh;
+}
+
+/// The frame that holds the gel: walls round its sides, from the plate to its outer surface.
+TriangleMesh gel_walls(const GelSpec& gel) {
+  if (gel.shape == GelShape::dome) {
+    const double rim =
+        std::sqrt(gel.sphere_radius_mm * gel.sphere_radius_mm - gel.base_radius_mm * gel.base_radius_mm) -
+        gel.sphere_radius_mm;
+    return round_wall(gel.base_radius_mm, -gel.thickness_mm, rim);
+  }
+  if (gel.shape == GelShape::fingertip) {
+    return round_wall(gel.radius_mm, -gel.thickness_mm, -gel.thickness_mm + gel.sleeve_mm);
+  }
   const double x = gel.size_x_mm / 2;
   const double y = gel.size_y_mm / 2;
   const Eigen::Vector2d corners[4] = {{-x, -y}, {x, -y}, {x, y}, {-x, y}};
@@ -78,23 +105,6 @@ render::Surface film_sheet(const FilmSpec& films, const SceneBands& bands, doubl
           render::ThinFilm{in_bands(films.transmittance, bands, "films.transmittance"), films.refractive_index, false}};
 }
 
-render::BayerPattern bayer_pattern(BayerLayout layout) {
-  switch (layout) {
-    case BayerLayout::none:
-      return render::BayerPattern::none;
-    case BayerLayout::rggb:
-      return render::BayerPattern::rggb;
-    case BayerLayout::bggr:
-      return render::BayerPattern::bggr;
-    case BayerLayout::grbg:
-      return render::BayerPattern::grbg;
-    case BayerLayout::gbrg:
-      return render::BayerPattern::gbrg;
-  }
-  TS_ASSERT(false);
-  return {};
-}
-
 }  // namespace
 
 VisibleObject visible_object(const ObjectSpec& object, double edge_mm) {
@@ -149,6 +159,7 @@ render::Surface coated_surface(const DeviceSpec& device, const SceneBands& bands
     out.material = render::RoughConductor{in_bands(coating.albedo, bands, "coating.reflectance"), coating.roughness};
   }
   if (coating.print) out.print = print_of(*coating.print, bands, sheet.rest);
+  out.normals = vertex_normals(sheet.mesh);
   out.mesh = std::move(sheet.mesh);
   return out;
 }
@@ -168,7 +179,7 @@ render::Scene scene_without_surface(const SceneSpec& scene, const Plan& plan, co
   }
   out.faces = flat_faces(device);
   out.surfaces.push_back(
-      {pad_walls(device.gel), render::Lambertian{in_bands(device.gel.frame_albedo, bands, "gel.frame_albedo")}});
+      {gel_walls(device.gel), render::Lambertian{in_bands(device.gel.frame_albedo, bands, "gel.frame_albedo")}});
   const std::vector<MovedObject> all = moved_objects(scene);
   for (std::size_t k = 0; k < objects.size(); ++k) {
     out.surfaces.push_back({placed(objects[k].body, poses[k]), material_of(all[k].object, bands)});
@@ -282,7 +293,7 @@ render::Imager imager(const DeviceSpec& device, const SceneBands& bands, bool wi
   out.exposure_s = camera.exposure_us / kMicrosecondsPerSecond;
   out.wavelengths_nm = bands.centres_nm;
   const auto green = in_bands(camera.quantum_efficiency_green, bands, "camera.quantum_efficiency_green");
-  if (camera.bayer == BayerLayout::none) {
+  if (camera.bayer == render::BayerPattern::none) {
     out.quantum_efficiency = green.matrix().transpose();
   } else {
     out.quantum_efficiency.resize(3, bands.count());
@@ -295,7 +306,7 @@ render::Imager imager(const DeviceSpec& device, const SceneBands& bands, bool wi
   out.dark_current_e_per_s = camera.dark_current_e_per_s;
   out.prnu = camera.prnu;
   out.dsnu_e = camera.dsnu_e;
-  out.bayer = bayer_pattern(camera.bayer);
+  out.bayer = camera.bayer;
   out.black_level_DN = camera.black_level_DN;
   constexpr double kDecibelsPerDecade = 20.0;
   out.gain_DN_per_e = ((1 << camera.bits) - 1 - camera.black_level_DN) / camera.full_well_e *
@@ -303,7 +314,7 @@ render::Imager imager(const DeviceSpec& device, const SceneBands& bands, bool wi
   out.ideal = !with_noise;
   if (camera.white_balance) {
     out.white_balance = *camera.white_balance;
-  } else if (camera.bayer != BayerLayout::none) {
+  } else if (camera.bayer != render::BayerPattern::none) {
     render::Spectrum light = render::flat_spectrum(bands.count(), 0.0);
     for (const LampSpec& lamp : device.lamps) {
       for (const render::Lamp& one : lamps_of(lamp, bands, 1.0)) light += render::lamp_power(one);

@@ -7,7 +7,10 @@
 #include <new>
 #include <opencv2/core.hpp>
 
+#include "sensors/height_calibration.h"
+#include "sensors/height_estimator.h"
 #include "tests/sensors/force_samples.h"
+#include "tests/sensors/painted_gel.h"
 #include "tests/sensors/rendered_beads.h"
 
 namespace {
@@ -102,6 +105,23 @@ TEST_F(Allocation, NoneAfterTheFirstFrame) {
       EXPECT_EQ(allocations, before) << "type " << type;
       EXPECT_TRUE(sum.allFinite());
     }
+  }
+}
+
+TEST_F(Allocation, NoneForAHeightMapAfterTheFirst) {
+  test::GelPainter painter(120, 90, 0.053, {});
+  HeightCalibrationSettings calibration;
+  calibration.mm_per_px = 0.053;
+  calibration.table.most_cells = 20000;
+  const HeightModel model = calibrate_height(painter.presses(2, 2, 1.0, 0.7), painter.background(), calibration).model;
+  const std::vector<cv::Mat> frames = {painter.rest(), painter.press({{3.0, 2.5}, 2.0, 1.0}).frame};
+  for (const HeightBorder border : {HeightBorder::zero, HeightBorder::free}) {
+    HeightEstimator estimator(model, {.border = border});
+    int contact = estimator.estimate(frames[0]).contact_pixels;
+    const long before = allocations;
+    for (const cv::Mat& frame : frames) contact += estimator.estimate(frame).contact_pixels;
+    EXPECT_EQ(allocations, before);
+    EXPECT_GT(contact, 0);
   }
 }
 

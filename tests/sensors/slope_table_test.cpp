@@ -82,7 +82,7 @@ TEST(LampModel, LampsThatTellNothingAreRefused) {
 
 TEST(SlopeTable, MattShadingComesBack) {
   const auto samples = shaded_samples(20000, 1.0, 0.5, even_lamps());
-  const SlopeTable table = build_slope_table(samples, some_lamps(), {});
+  const SlopeTable table = build_slope_table(samples, some_lamps(), {.most_cells = 1U << 18U});
   for (const ColourSample& test : shaded_samples(500, 0.9, 0.0, even_lamps())) {
     // Half a step of 2 DN on lamps of some 90 DN a unit of slope, and where it's steep a third of that.
     EXPECT_LT((table.slopes[table.index_of(test.colour)] - test.slope).norm(), 0.06F);
@@ -92,7 +92,7 @@ TEST(SlopeTable, MattShadingComesBack) {
 TEST(SlopeTable, DeviationsFromMattShadingAreLearnt) {
   auto samples = shaded_samples(20000, 1.0, 0.5, even_lamps());
   for (ColourSample& sample : samples) sample.slope *= 1.3F;  // as if the coating weren't matt
-  const SlopeTable table = build_slope_table(samples, some_lamps(), {});
+  const SlopeTable table = build_slope_table(samples, some_lamps(), {.most_cells = 1U << 18U});
   double sum = 0.0;
   double count = 0.0;
   for (const ColourSample& test : shaded_samples(2000, 0.9, 0.0, even_lamps())) {
@@ -108,7 +108,7 @@ TEST(SlopeTable, GapsAreBridged) {
   auto samples = shaded_samples(20000, 1.0, 0.0, even_lamps());
   std::erase_if(samples, [](const ColourSample& sample) { return std::abs(sample.slope.norm() - 0.5F) < 0.1F; });
   for (ColourSample& sample : samples) sample.slope.x() += 0.1F;
-  const SlopeTable table = build_slope_table(samples, some_lamps(), {});
+  const SlopeTable table = build_slope_table(samples, some_lamps(), {.most_cells = 1U << 18U});
   double sum = 0.0;
   double count = 0.0;
   for (const ColourSample& test : shaded_samples(2000, 0.55, 0.0, even_lamps())) {
@@ -121,7 +121,7 @@ TEST(SlopeTable, GapsAreBridged) {
 
 TEST(SlopeTable, RestIsFlatAndNothingIsSteeperThanTheLimit) {
   const auto samples = shaded_samples(5000, 2.0, 1.0, even_lamps());
-  const SlopeTable table = build_slope_table(samples, some_lamps(), {.steepest = 1.5});
+  const SlopeTable table = build_slope_table(samples, some_lamps(), {.most_cells = 1U << 17U, .steepest = 1.5});
   EXPECT_LT(table.slopes[table.index_of(Eigen::Vector3f::Zero())].norm(), 0.01F);
   for (const Eigen::Vector2f& slope : table.slopes) ASSERT_LE(slope.norm(), 1.5001F);
   // Colours far outside are taken to the nearest cell.

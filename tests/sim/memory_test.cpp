@@ -9,6 +9,7 @@
 #include <string>
 
 #include "sim/virtual_sensor.h"
+#include "tests/support/small_scene.h"
 #include "tests/support/temporary_folder.h"
 
 namespace touchstone::sim {
@@ -17,31 +18,8 @@ namespace {
 /// A pad of 12 x 12 x 4 mm with 2 x 2 beads and a flat probe of 3 mm.
 SceneSpec small_scene(int width, int height) {
   SceneSpec scene;
-  scene.device = parse_yaml<DeviceSpec>(R"(
-name: small
-gel: {size_x_mm: 12, size_y_mm: 12, thickness_mm: 4, youngs_modulus_MPa: 0.3, poisson_ratio: 0.49, refractive_index: 1.45}
-mesh: {fine_mm: 0.8, coarse_mm: 2, fine_half_extent_mm: [3, 3], fine_depth_mm: 1}
-beads: {grid: 2, spacing_mm: 2, diameter_mm: 0.6, depth_mm: 0.8}
-plate: {thickness_mm: 1, refractive_index: 1.5}
-lamps:
-  - {position_mm: [0, -10, -16], target_mm: [0, 0, -2], lens_radius_mm: 1, half_angle_deg: 25, power_W: [3, 3, 3]}
-camera:
-  width: 96
-  height: 72
-  pixel_pitch_um: 30
-  hole_diameter_um: 100
-  foil_thickness_um: 50
-  hole_to_sensor_mm: 5
-  hole_position_mm: [0, 0, -18]
-  look_at_mm: [0, 0, 0]
-  exposure_us: 500
-  full_well_e: 50000
-  read_noise_e: 5
-)",
-                                        "small.yaml");
-  scene.device.camera->width = width;
-  scene.device.camera->height = height;
-  scene.device.camera->pixel_pitch_um = 30.0 * 96.0 / width;
+  scene.device = test::small_device({.width = width, .height = height, .pixel_pitch_um = 30.0 * 96.0 / width});
+  scene.device.room_radiance = 0.0;
   scene.object = parse_yaml<ObjectSpec>(
       "name: probe\nshape: {type: rounded_cylinder, radius_mm: 1.5, edge_radius_mm: 0.3, height_mm: 4}\n"
       "friction: 0.7\n",

@@ -6,20 +6,13 @@
 #include <vector>
 
 #include "sim/virtual_sensor.h"
+#include "tests/support/small_job.h"
 #include "tests/support/temporary_folder.h"
 
 namespace touchstone::sim {
 
 /// A pad of 8 x 8 x 3 mm with four beads, a grey camera of 40 x 30 pixels with event pixels and no noise.
-inline const char* const kMovingDevice = R"(name: small
-gel: {size_x_mm: 8, size_y_mm: 8, thickness_mm: 3, youngs_modulus_MPa: 0.3, poisson_ratio: 0.49, refractive_index: 1.45}
-mesh: {fine_mm: 0.8, coarse_mm: 2, fine_half_extent_mm: [2, 2], fine_depth_mm: 1}
-beads: {grid: 2, spacing_mm: 2, diameter_mm: 0.6, depth_mm: 0.8}
-plate: {thickness_mm: 1, refractive_index: 1.5}
-lamps:
-  - {position_mm: [0, -10, -16], target_mm: [0, 0, -2], lens_radius_mm: 1, half_angle_deg: 25, power_W: [3, 3, 3]}
-room_radiance: 0.2
-camera:
+inline const std::string kMovingDevice = std::string(test::kSmallDevice) + R"(camera:
   width: 40
   height: 30
   pixel_pitch_um: 60

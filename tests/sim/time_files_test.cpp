@@ -69,7 +69,7 @@ TEST(CameraPreset, FieldsInTheFileOverrideIt) {
   EXPECT_EQ(camera.row_time_us, 0.0);
   EXPECT_EQ(camera.full_well_e, 7000.0);
   EXPECT_DOUBLE_EQ(camera.active_area_um2, 11.2 * 11.2);
-  EXPECT_EQ(camera.bayer, BayerLayout::rggb);
+  EXPECT_EQ(camera.bayer, render::BayerPattern::rggb);
 }
 
 TEST(CameraPreset, AnUnknownOneListsTheKnown) {
