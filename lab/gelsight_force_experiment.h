@@ -12,9 +12,6 @@
 
 namespace touchstone::lab {
 
-/// A ball, or a flat-ended cylinder with a rounded edge, for the gelsight experiments.
-sim::ObjectSpec gelsight_ball(double diameter_mm, double friction);
-sim::ObjectSpec gelsight_flat_end(double diameter_mm, double friction);
 /// Where an object's origin is when it just touches the middle of the flat gel, mm above it.
 double touching_height_mm(const sim::ObjectSpec& object);
 
