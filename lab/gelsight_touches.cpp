@@ -26,6 +26,7 @@ double origin_height(const sim::ObjectSpec& object) {
   double plain = 0.0;
   switch (object.shape.type) {
     case sim::ShapeKind::sphere:
+    case sim::ShapeKind::egg:
       plain = object.shape.radius_mm;
       break;
     case sim::ShapeKind::box:
@@ -34,7 +35,8 @@ double origin_height(const sim::ObjectSpec& object) {
     case sim::ShapeKind::rounded_cylinder:
       break;
     case sim::ShapeKind::mesh:
-      fail("{}: a mesh's lowest point isn't known here", object.name);
+    case sim::ShapeKind::shell:
+      fail("{}: the lowest point of a mesh or a shell isn't known here", object.name);
   }
   return plain + (object.relief ? relief_map(*object.relief).highest() : 0.0);
 }
