@@ -9,6 +9,7 @@
 #include <array>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 namespace touchstone::render {
 namespace {
@@ -17,7 +18,7 @@ constexpr float kPad = 1e-3f;  // mm: more than single precision moves anything
 constexpr float kEndless = std::numeric_limits<float>::infinity();
 constexpr int kMostCells = 40;  // along the longer side
 constexpr int kMostSlabs = 8;
-constexpr std::array<int, 3> kWidths = {1, 2, 4};  // cells by which the map of slopes is widened
+constexpr std::array<int, 5> kWidths = {1, 2, 4, 8, 16};  // cells by which the map of slopes is widened
 
 /// What the sheet does over each cell.
 struct Ground {
@@ -190,7 +191,20 @@ LampBearings::LampBearings(const LightField& field, bool soft)
                        ? std::max(spread, (to.head<2>() / std::abs(to.z()) - middle).norm())
                        : kEndless;
         }
-        made.spread = 1.5f * spread + 1e-3f;  // a half more for what lies between those places
+        // Rays go to all of a beam, half as far as the next one's middle.
+        float wide = 0.0f;
+        const BesideBeam& beside = field.beside[lamp];
+        for (const auto& [one, other] : {std::pair{beside.flatter, beside.steeper}, {beside.left, beside.right}}) {
+          float most = 0.0f;
+          for (const int next : {one, other}) {
+            if (next < 0) continue;
+            const bool lit = way(x, y, middle_z, next, to);
+            most = lit && to.z() * made.side > 0.0f ? std::max(most, (to.head<2>() / std::abs(to.z()) - middle).norm())
+                                                    : kEndless;
+          }
+          wide += 0.55f * most;
+        }
+        made.spread = 1.5f * spread + wide + 1e-3f;  // a half more for what lies between those places
       }
     }
   });
