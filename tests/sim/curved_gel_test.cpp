@@ -248,6 +248,43 @@ TEST(CurvedGel, APressBesideTheApexTouchesThere) {
   EXPECT_GT(touched, 50);
 }
 
+// What photometric stereo reads: a ball's slopes, to a part of a degree, though the mesh has edges of 0.7 mm.
+void expect_the_balls_own_slopes(const Pressed& pressed) {
+  ASSERT_TRUE(pressed.plan.fine_relief);
+  const auto relief = pressed.sight.relief(pressed.press());
+  ASSERT_TRUE(relief && relief->grid.size() > 0);
+  const render::Scene seen = pressed.sight.seen(pressed.press(), relief);
+  const render::Surface& sheet = seen.surfaces[0];
+  const Eigen::Vector3d centre =
+      pressed.press().gel_from_object.translation + Eigen::Vector3d(0, 0, relief->solved.shift);
+  double squares = 0.0;
+  int count = 0;
+  const GelSheet whole = whole_sheet(pressed.sight.membrane->sheet(pressed.press(), *relief));
+  std::vector<char> inside(sheet.normals.size(), 1);  // all triangles round it touch
+  std::vector<char> used(sheet.normals.size(), 0);
+  for (std::size_t k = 0; k < whole.mesh.triangles.size(); ++k) {
+    for (const int v : whole.mesh.triangles[k]) {
+      used[v] = 1;
+      if (whole.touched[k] < 0) inside[v] = 0;
+    }
+  }
+  for (std::size_t i = 0; i < sheet.normals.size(); ++i) {
+    if (inside[i] == 0 || used[i] == 0) continue;
+    const Eigen::Vector3d normal = (centre - sheet.mesh.vertices[i]).normalized();
+    const double angle = std::acos(std::min(1.0, normal.dot(sheet.normals[i]))) / kRadiansPerDegree;
+    squares += angle * angle;
+    ++count;
+  }
+  ASSERT_GT(count, 100);
+  EXPECT_LT(std::sqrt(squares / count), 0.25) << "degrees";
+}
+
+TEST(CurvedGel, ABallShowsItsOwnSlopes) {
+  expect_the_balls_own_slopes(Pressed(scene_of(dome_device(), kBall, 0, 0, 2.0 - 0.3)));
+  expect_the_balls_own_slopes(
+      Pressed(scene_of(device("size_x_mm: 12, size_y_mm: 12, thickness_mm: 4"), kBall, 0.2, 0.1, 2.0 - 0.3)));
+}
+
 TEST(CurvedGel, OffTheGelNothingTouches) {
   const Pressed beside(scene_of(dome_device(), kBall, 9.0, 0, 1.0));
   EXPECT_EQ(beside.press().contact_vertices, 0);
