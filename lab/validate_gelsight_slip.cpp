@@ -11,6 +11,7 @@
 #include <optional>
 
 #include "core/error.h"
+#include "core/whole_file.h"
 #include "lab/gelsight_force_experiment.h"
 #include "lab/gelsight_height_experiment.h"
 #include "lab/gelsight_slip_experiment.h"
@@ -232,6 +233,7 @@ std::vector<ValidationRow> validate_gelsight_slip(const ValidateOptions& options
   std::vector<SlipRun> runs(cases.size());
   tbb::parallel_for(std::size_t{0}, cases.size(),
                     [&](std::size_t i) { runs[i] = run_slip_case(marked, cases[i], estimators, kSeed + 100 + i); });
+  if (!options.scratch.empty()) write_whole_file(options.scratch / "gelsight-slip.csv", to_csv(runs));
   add_slip_rows(rows, runs);
   return rows.rows();
 }
