@@ -18,8 +18,8 @@
 
 namespace touchstone::sim {
 
-using ReliefKind = std::variant<WavesRelief, GridRelief, HairRelief, ImageRelief, PrintRelief, FingerprintRelief, CoinRelief,
-                                PlugRelief>;
+using ReliefKind = std::variant<WavesRelief, GridRelief, HairRelief, ImageRelief, PrintRelief, FingerprintRelief,
+                                CoinRelief, PlugRelief>;
 
 /// Heights from 0 over the shape's lower side, mapped along the object's z axis; the plain shape is the floor. Only the
 /// fields that belong to `type` may stand in the file.
