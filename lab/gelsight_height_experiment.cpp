@@ -8,6 +8,7 @@
 #include "core/error.h"
 #include "core/units.h"
 #include "fem/relief_map.h"
+#include "sim/gel_setup.h"
 
 namespace touchstone::lab {
 
@@ -26,6 +27,12 @@ double half_height(const sim::ShapeSpec& shape) {
       return 0.5 * shape.size_mm.z();
     case sim::ShapeKind::rounded_cylinder:
       return 0.0;  // its origin is in the middle of its flat end
+    case sim::ShapeKind::egg:
+      return shape.radius_mm;
+    case sim::ShapeKind::shell: {
+      const Eigen::Vector2d rise = 0.125 * shape.curvature_per_mm.cwiseProduct(shape.axes_mm.cwiseAbs2());
+      return std::max(0.0, -rise.minCoeff());
+    }
     case sim::ShapeKind::mesh:
       break;
   }
@@ -57,7 +64,7 @@ sim::ObjectSpec flat_cylinder_of(double diameter_mm) {
 
 sim::Touch touch_once(const sim::TouchRig& rig, const sim::TouchObject& object, const StraightPress& press,
                       std::uint64_t noise_seed, bool truth) {
-  const double reach = reach_below(object.spec());
+  const double reach = reach_below(object.spec()) + sim::rest_height(rig.device().gel, press.place_mm);
   sim::MotionSpec motion;
   motion.start_mm = {press.place_mm.x(), press.place_mm.y(), reach + kClearance_mm};
   sim::MotionKey key;

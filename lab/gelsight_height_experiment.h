@@ -14,7 +14,7 @@ namespace touchstone::lab {
 /// A straight press of a rigid object.
 struct StraightPress {
   Eigen::Vector2d place_mm = Eigen::Vector2d::Zero();  ///< of the object's origin, gel frame
-  double depth_mm = 0.0;                               ///< of its lowest point below the gel at rest
+  double depth_mm = 0.0;                               ///< of its lowest point below the gel at rest there
 };
 
 /// The object's lowest point below its origin, mm: of its shape and its relief.

@@ -14,8 +14,8 @@ namespace touchstone::render {
 /// by one, then the first mirror image, then all further ones together.
 /// So a facet whose horizon cuts the guide sees some beams and not others, and shadows get soft rims.
 struct GuideCut {
-  int sectors = 5;
-  int slices = 3;
+  int sectors = 4;
+  int slices = 2;
 
   int beams_a_sector() const { return slices + 2; }
   int beams() const { return sectors * beams_a_sector(); }

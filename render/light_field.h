@@ -107,4 +107,14 @@ inline void look_up_flow(const LightField& field, const FieldCell& cell, float* 
   }
 }
 
+/// One beam's F.
+inline Eigen::Vector3f look_up_flow(const LightField& field, const FieldCell& cell, int beam) {
+  Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+  for (int corner = 0; corner < 8; ++corner) {
+    const std::size_t at = static_cast<std::size_t>(cell.node[corner]) * field.beam_count() + beam;
+    sum += cell.weight[corner] * Eigen::Map<const Eigen::Vector3f>(field.flow.data() + 4 * at);
+  }
+  return sum;
+}
+
 }  // namespace touchstone::render

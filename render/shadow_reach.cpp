@@ -161,12 +161,10 @@ LampBearings::LampBearings(const LightField& field, bool soft)
     const float middle_z = floor + (static_cast<float>(line / rows) + 0.5f) * slab;
     const float y = bottom + (static_cast<float>(row) + 0.5f) * cell;
     // What the lamps send to 27 places of the cell, and beside it as far as lenses ask.
-    std::vector<float> flow(4 * static_cast<std::size_t>(lamps));
     for (int column = 0; column < columns; ++column) {
       const float x = left + (static_cast<float>(column) + 0.5f) * cell;
       const auto way = [&](float px, float py, float pz, int lamp, Eigen::Vector3f& to) {
-        look_up_flow(field, find_cell(field, px, py, pz), flow.data());
-        to = -Eigen::Vector3f(flow[4 * lamp], flow[4 * lamp + 1], flow[4 * lamp + 2]);
+        to = -look_up_flow(field, find_cell(field, px, py, pz), lamp);
         return to.squaredNorm() > 0.0f && to.z() != 0.0f;
       };
       for (int lamp = 0; lamp < lamps; ++lamp) {

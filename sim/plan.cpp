@@ -46,6 +46,8 @@ double bright_radius(const ObjectSpec& object) {
     case ShapeKind::box:
       return object.shape.size_mm.head<2>().norm() / 2;
     case ShapeKind::mesh:
+    case ShapeKind::egg:
+    case ShapeKind::shell:
       break;
   }
   double radius = 0.0;

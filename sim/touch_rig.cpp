@@ -88,7 +88,7 @@ struct TouchRig::Parts {
       const double radius = judged_ball().shape.radius_mm;
       const double half = 0.5 * settings.deepest_mm;
       states.push_back(play(scene_with(judged_ball(), straight_press(radius + 0.1, radius - half))).back());
-      direct = std::make_unique<const DirectLight>(*judged, camera, states, kRaysAPixel);
+      direct = std::make_unique<const DirectLight>(*judged, camera, states, kRaysAPixel, settings.edge_side);
       choice = direct->choice();
     }
     background_light = light(*judged, rest, {});
