@@ -8,6 +8,7 @@ std::vector<ValidationRow> validate_vibration(const ValidateOptions& options);
 std::vector<ValidationRow> validate_light(const ValidateOptions& options);
 std::vector<ValidationRow> validate_vhs(const ValidateOptions& options);
 std::vector<ValidationRow> validate_gelsight_dome(const ValidateOptions& options);
+std::vector<ValidationRow> validate_gelsight_map(const ValidateOptions& options);
 std::vector<ValidationRow> validate_gelsight_slip(const ValidateOptions& options);
 std::vector<ValidationRow> validate_gelsight_grasp(const ValidateOptions& options);
 std::vector<ValidationRow> validate_gelsight_texture(const ValidateOptions& options);
@@ -21,6 +22,7 @@ const std::vector<ValidationGroup>& validation_groups() {
       {"gelsight.dome", validate_gelsight_dome},
       {"gelsight.force", validate_gelsight_slip},
       {"gelsight.grasp", validate_gelsight_grasp},
+      {"gelsight.map", validate_gelsight_map},
       {"gelsight.texture", validate_gelsight_texture},
   };
   return groups;
