@@ -68,7 +68,7 @@ GraspTrial ball(double mass_g) {
 }
 
 GraspSenses stand_in() {
-  constexpr double kDiffers = 24.0;         // grey levels, over the three channels
+  constexpr double kDiffers = 8.0;          // grey levels
   constexpr double kHeightOfAPixel = 1e-3;  // mm
   constexpr double kMoved_px = 0.15;
   struct Memory {
@@ -77,10 +77,9 @@ GraspSenses stand_in() {
   };
   return [memory = std::make_shared<Memory>()](const cv::Mat& frame) {
     if (memory->first.empty()) memory->first = frame;
-    cv::Mat difference, sum, mask;
+    cv::Mat difference, mask;
     cv::absdiff(frame, memory->first, difference);
-    cv::transform(difference, sum, cv::Matx13f(1, 1, 1));
-    cv::threshold(sum, mask, kDiffers, 255, cv::THRESH_BINARY);
+    cv::threshold(difference, mask, kDiffers, 255, cv::THRESH_BINARY);
     const cv::Moments moments = cv::moments(mask, true);
     sensors::GraspSight sight;
     sight.height_max_mm = kHeightOfAPixel * moments.m00;
