@@ -139,6 +139,17 @@ LampBearings::LampBearings(const LightField& field, bool soft)
   slabs = std::clamp(static_cast<int>(std::ceil(size.z() / (0.5 * double(cell)))), 1, kMostSlabs);
   slab = static_cast<float>(size.z() / slabs);
   bearings.resize(static_cast<std::size_t>(slabs) * columns * rows * lamps);
+  for (const Lamp& lamp : field.fixture.lamps) {
+    const auto* guide = std::get_if<GuideLamp>(&lamp);
+    if (guide == nullptr) {
+      guides.setEmpty();
+      break;
+    }
+    const Eigen::Vector2d ahead = guide->direction.head<2>().normalized();
+    const Eigen::Vector2d aside(-ahead.y(), ahead.x());
+    guides.extend(Eigen::Vector2d(guide->centre.head<2>() + 0.5 * guide->width * aside));
+    guides.extend(Eigen::Vector2d(guide->centre.head<2>() - 0.5 * guide->width * aside));
+  }
   // A ray to another point of a lens takes the field's direction at a place that is set off by up to the lens's radius
   // and what it takes along a slanting ray (DirectBatch::choose_lens_points).
   std::vector<float> set_off(lamps, 0.0f);
@@ -150,12 +161,10 @@ LampBearings::LampBearings(const LightField& field, bool soft)
     const float middle_z = floor + (static_cast<float>(line / rows) + 0.5f) * slab;
     const float y = bottom + (static_cast<float>(row) + 0.5f) * cell;
     // What the lamps send to 27 places of the cell, and beside it as far as lenses ask.
-    std::vector<float> flow(4 * static_cast<std::size_t>(lamps));
     for (int column = 0; column < columns; ++column) {
       const float x = left + (static_cast<float>(column) + 0.5f) * cell;
       const auto way = [&](float px, float py, float pz, int lamp, Eigen::Vector3f& to) {
-        look_up_flow(field, find_cell(field, px, py, pz), flow.data());
-        to = -Eigen::Vector3f(flow[4 * lamp], flow[4 * lamp + 1], flow[4 * lamp + 2]);
+        to = -look_up_flow(field, find_cell(field, px, py, pz), lamp);
         return to.squaredNorm() > 0.0f && to.z() != 0.0f;
       };
       for (int lamp = 0; lamp < lamps; ++lamp) {
@@ -202,10 +211,30 @@ int LampBearings::slab_at(float z) const {
 
 ShadowReach::ShadowReach(const LampBearings& bearings, const Scene& scene, bool connected)
     : bearings_(bearings), all_(bearings.lamps == 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << bearings.lamps) - 1) {
+  Eigen::AlignedBox3d sheet;
+  if (!scene.surfaces.empty()) {
+    for (const auto& vertex : scene.surfaces[0].mesh.vertices) sheet.extend(vertex);
+  }
+  // The sheet seen along z, less a rim that pressing moves.
+  constexpr double kRim = 0.05;  // mm
+  const Eigen::AlignedBox2d inner(Eigen::Vector2d(sheet.min().head<2>().array() + kRim),
+                                  Eigen::Vector2d(sheet.max().head<2>().array() - kRim));
+  const Eigen::AlignedBox2d outer(Eigen::Vector2d(sheet.min().head<2>().array() - kRim),
+                                  Eigen::Vector2d(sheet.max().head<2>().array() + kRim));
+  const bool enclosed = !bearings.guides.isEmpty() && !inner.isEmpty() && outer.contains(bearings.guides);
+  const auto is_wall_round_it = [&](const Eigen::AlignedBox3d& part) {
+    return enclosed && ((part.max().head<2>().array() <= inner.min().array()).any() ||
+                        (part.min().head<2>().array() >= inner.max().array()).any());
+  };
   // Of the sheet and what stands on the map for columns, and of everything.
-  Eigen::AlignedBox3d solid;
-  for (const Surface& surface : scene.surfaces) {
-    for (const auto& vertex : surface.mesh.vertices) solid.extend(vertex);
+  Eigen::AlignedBox3d solid = sheet;
+  for (std::size_t i = 1; i < scene.surfaces.size(); ++i) {
+    const TriangleMesh& other = scene.surfaces[i].mesh;
+    for (const auto& t : other.triangles) {
+      Eigen::AlignedBox3d part;
+      for (int corner : t) part.extend(other.vertices[corner]);
+      if (!is_wall_round_it(part)) solid.extend(part);
+    }
   }
   Eigen::AlignedBox3d everything = solid;
   for (const Ball& ball : scene.balls) {
@@ -225,6 +254,7 @@ ShadowReach::ShadowReach(const LampBearings& bearings, const Scene& scene, bool 
     for (const auto& t : other.triangles) {
       Eigen::AlignedBox3d part;
       for (int corner : t) part.extend(other.vertices[corner]);
+      if (is_wall_round_it(part)) continue;
       over_cells(map, part.min().x(), part.max().x(), part.min().y(), part.max().y(),
                  [&](std::size_t cell) { ground.slope[cell] = kEndless; });
     }

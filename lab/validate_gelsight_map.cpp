@@ -1,0 +1,1 @@
+int unused_validate_gelsight_map = 0;
