@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "core/error.h"
+#include "lab/gelsight_height_experiment.h"
 #include "sensors/contact_patch.h"
 #include "sensors/height_estimator.h"
 #include "sensors/marker_filling.h"
@@ -22,10 +23,6 @@ constexpr int kBackgroundFrame = 1000000;  ///< number of the first: its noise i
 constexpr double kRisesTo = 0.95;   ///< of the largest shear force: up to there the gel sticks (samples_before_slip)
 constexpr double kClear_mm = 0.02;  ///< above the gel, where motions start
 constexpr int kLeastPatch_px = 50;
-
-std::size_t as_size(int n) {
-  return static_cast<std::size_t>(n);
-}
 
 /// Truths of a press with a force that grows through all of `forces_N`.
 std::vector<sim::Truth> press_truths(const sim::TouchRig& rig, const sim::TouchObject& object,
@@ -66,21 +63,13 @@ double diameter_px(const sim::TouchRig& rig) {
 }  // namespace
 
 sim::ObjectSpec gelsight_ball(double diameter_mm, double friction) {
-  sim::ObjectSpec object;
-  object.name = fmt::format("ball {:g} mm", diameter_mm);
-  object.shape.type = sim::ShapeKind::sphere;
-  object.shape.radius_mm = 0.5 * diameter_mm;
+  sim::ObjectSpec object = ball_of(diameter_mm);
   object.friction = friction;
   return object;
 }
 
 sim::ObjectSpec gelsight_flat_end(double diameter_mm, double friction) {
-  sim::ObjectSpec object;
-  object.name = fmt::format("flat end {:g} mm", diameter_mm);
-  object.shape.type = sim::ShapeKind::rounded_cylinder;
-  object.shape.radius_mm = 0.5 * diameter_mm;
-  object.shape.edge_radius_mm = 0.3;
-  object.shape.height_mm = 5.0;
+  sim::ObjectSpec object = flat_cylinder_of(diameter_mm);
   object.friction = friction;
   return object;
 }

@@ -12,7 +12,7 @@
 
 namespace touchstone::lab {
 
-/// A ball, or a flat-ended cylinder with a rounded edge, for the gelsight experiments.
+/// ball_of and flat_cylinder_of (lab/gelsight_height_experiment.h) with a friction.
 sim::ObjectSpec gelsight_ball(double diameter_mm, double friction);
 sim::ObjectSpec gelsight_flat_end(double diameter_mm, double friction);
 /// Where an object's origin is when it just touches the middle of the flat gel, mm above it.

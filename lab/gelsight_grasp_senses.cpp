@@ -15,13 +15,18 @@ namespace touchstone::lab {
 namespace {
 
 constexpr double kForceBall_mm = 12.7;
-constexpr double kShearEnd_mm = 8.5;
-constexpr double kShearNormal_N = 0.5;
+constexpr double kShearEnd_mm = 10.0;
+constexpr double kShearNormal_N = 0.6;
 constexpr double kShearDrag_mm = 1.0;
 constexpr int kShearSteps = 10;
-constexpr double kCalibrationFriction = 1.0;
+constexpr double kCalibrationFriction = 0.5;
 constexpr int kLeastPatch_px = 50;
 constexpr int kFrameOfBackground = 2000000;  // its noise is no other frame's
+
+sim::ObjectSpec with_friction(sim::ObjectSpec object) {
+  object.friction = kCalibrationFriction;
+  return object;
+}
 
 /// The estimators of one trial, and what they remember.
 class Eyes {
@@ -72,15 +77,14 @@ class Eyes {
 
 GraspCalibration calibrate_for_grasps(const sim::TouchRig& flat, const sim::TouchRig& marked, std::uint64_t seed) {
   GraspCalibration calibration;
-  const sensors::HeightModel of_flat =
-      calibrate_rig(flat, {}, sensors::LightCorrection::fitted, seed).calibration.model;
+  const sensors::HeightModel of_flat = calibrate_rig(flat, {}, {}, seed).calibration.model;
   calibration.height = for_marked_gel(of_flat, marked, seed);
   calibration.markers = marker_settings(marked);
   calibration.background = marked.background(seed, kFrameOfBackground);
-  calibration.normal = press_with_forces(marked, calibration.height, gelsight_ball(kForceBall_mm, kCalibrationFriction),
-                                         {0.1, 0.2, 0.4, 0.6}, seed)
-                           .estimated;
-  calibration.shear = shear_until_slip(marked, gelsight_flat_end(kShearEnd_mm, kCalibrationFriction), kShearNormal_N,
+  calibration.normal =
+      press_with_forces(marked, calibration.height, with_friction(ball_of(kForceBall_mm)), {0.1, 0.2, 0.4, 0.6}, seed)
+          .estimated;
+  calibration.shear = shear_until_slip(marked, with_friction(flat_cylinder_of(kShearEnd_mm)), kShearNormal_N,
                                        kShearDrag_mm, kShearSteps, seed)
                           .line;
   return calibration;

@@ -17,7 +17,7 @@ namespace touchstone::lab {
 struct GraspCalibration {
   sensors::HeightModel height;  ///< of frames whose markers are filled
   sensors::LinearForce normal;  ///< of the height map's sum, mm^3, from a ball of 12.7 mm
-  sensors::LinearForce shear;   ///< of the mean marker displacement, mm, from a flat end of 8.5 mm
+  sensors::LinearForce shear;   ///< of the mean marker displacement, mm, from a flat end of 10 mm
   sensors::MarkerTrackerSettings markers;
   cv::Mat background;  ///< one frame of the untouched gel
 };

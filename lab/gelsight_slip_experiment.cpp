@@ -180,6 +180,22 @@ double SlipScore::false_alarms_percent() const {
   return quiet_frames > 0 ? 100.0 * false_frames / quiet_frames : 0.0;
 }
 
+std::string to_csv(const std::vector<SlipRun>& runs) {
+  std::string text =
+      "case,onset_s,t_s,load,sticking,force_ratio,motion_ratio,rule,lag,lag_error,slide_px,shear_px,state,markers\n";
+  const auto known = [](const std::optional<double>& value) { return value ? fmt::format("{:.4f}", *value) : ""; };
+  for (const SlipRun& run : runs) {
+    for (const SlipFrame& frame : run.frames) {
+      text += fmt::format("\"{}\",{},{:.4f},{:.4f},{:.4f},{},{},{},{},{:.4f},{:.3f},{:.3f},{},{}\n", run.what.name(),
+                          known(run.onset_s), frame.t_s, frame.load, frame.sticking, known(frame.force_ratio),
+                          known(frame.motion_ratio), frame.rule ? 1 : 0, known(frame.incipient.lag),
+                          frame.incipient.lag_error, frame.incipient.slide_px, frame.incipient.shear_px,
+                          sensors::name_of(frame.incipient.state), frame.markers_found);
+    }
+  }
+  return text;
+}
+
 SlipScore score(const std::vector<SlipRun>& runs, SlipDetector detector) {
   const auto reports = [&](const SlipFrame& frame) {
     return detector == SlipDetector::rule ? frame.rule

@@ -79,6 +79,10 @@ struct SlipScore {
   double false_alarms_percent() const;  ///< false over quiet frames
 };
 
+/// All frames of all runs as CSV, a line each: case, onset, time, true load and sticking share, both ratios, lag,
+/// verdicts.
+std::string to_csv(const std::vector<SlipRun>& runs);
+
 enum class SlipDetector { rule, incipient };
 /// A detector reports from its first frame on that says slip; frames before an object's shear load reaches a twentieth
 /// of its limit are quiet ones.

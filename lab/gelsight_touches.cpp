@@ -10,6 +10,8 @@
 #include "core/error.h"
 #include "core/random.h"
 #include "core/units.h"
+#include "lab/gelsight_height_experiment.h"
+#include "sensors/height_estimator.h"
 #include "sensors/height_map.h"
 
 namespace touchstone::lab {
@@ -20,24 +22,6 @@ constexpr int kMarkColumns = 15, kMarkRows = 11;
 constexpr double kMarkedShare = 0.96;  // of the picture that the marks cover
 constexpr double kLowestShare = 0.01;  // of the pixels: taken to be at rest
 constexpr sensors::ContactRule kContact{0.02, 0.3};
-
-/// Height of the object's origin above its lowest point.
-double origin_height(const sim::ObjectSpec& object) {
-  double plain = 0.0;
-  switch (object.shape.type) {
-    case sim::ShapeKind::sphere:
-      plain = object.shape.radius_mm;
-      break;
-    case sim::ShapeKind::box:
-      plain = 0.5 * object.shape.size_mm.z();
-      break;
-    case sim::ShapeKind::rounded_cylinder:
-      break;
-    case sim::ShapeKind::mesh:
-      fail("{}: a mesh's lowest point isn't known here", object.name);
-  }
-  return plain + (object.relief ? relief_map(*object.relief).highest() : 0.0);
-}
 
 sim::MotionSpec press_of(const Grip& grip, double origin_mm) {
   sim::MotionSpec motion;
@@ -86,7 +70,7 @@ TouchBench::TouchBench(const sim::TouchRig& rig, HeightReader heights)
 
 std::vector<HeldTouch> TouchBench::touches(const sim::TouchObject& object, std::span<const Grip> grips,
                                            std::uint64_t seed) const {
-  const double origin = origin_height(object.spec());
+  const double origin = reach_below(object.spec());
   std::vector<sim::Touch> seen(grips.size());
   std::vector<HeldTouch> touches(grips.size());
   tbb::parallel_for(std::size_t{0}, grips.size(), [&](std::size_t i) {
@@ -102,6 +86,14 @@ std::vector<HeldTouch> TouchBench::touches(const sim::TouchObject& object, std::
     touches[i].image = sensors::rectified(heights, contact, places_);
   }
   return touches;
+}
+
+HeightReader estimated_heights(const sim::TouchRig& rig, std::uint64_t seed) {
+  const CalibratedRig calibrated = calibrate_rig(rig, {}, seed);
+  sensors::HeightSettings settings;
+  settings.border = sensors::HeightBorder::free;
+  const auto estimator = std::make_shared<sensors::HeightEstimator>(calibrated.calibration.model, settings);
+  return [estimator](const sim::Touch& touch) { return estimator->estimate(touch.frame).height_mm.clone(); };
 }
 
 HeightReader true_heights(double noise_mm, std::uint64_t seed) {

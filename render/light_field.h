@@ -24,6 +24,11 @@ struct LightFieldSettings {
   int most_nodes = 400000;
 };
 
+/// Which beams of the same guide lie beside a beam; -1 where there is none.
+struct BesideBeam {
+  int flatter = -1, steeper = -1, left = -1, right = -1;
+};
+
 /// A regular grid over a box. Between nodes F is interpolated linearly along each axis.
 ///
 /// What the grid holds are beams: a lamp is one, a light guide several (guide_beams.h); those of them that bring
@@ -40,6 +45,7 @@ struct LightField {
   Eigen::Array3d step = Eigen::Array3d::Zero();  ///< mm
   std::vector<int> lamp_of;                      ///< index into fixture.lamps, by beam; beams of a lamp in a row
   std::vector<Spectrum> intensity;               ///< W/sr on the lamp's axis, by beam
+  std::vector<BesideBeam> beside;                ///< by beam
   std::vector<float> flow;  ///< [node][beam][4]: F and its length; node = x + nodes.x (y + nodes.y z)
   std::vector<float> pass;  ///< [node][beam][band], empty where nothing absorbs
   /// Estimate: root mean square over the middles of cells, where linear interpolation is worst, of |F - exact| summed
@@ -105,6 +111,16 @@ inline void look_up_flow(const LightField& field, const FieldCell& cell, float* 
     const float weight = cell.weight[corner];
     for (int k = 0; k < width; ++k) out[k] += weight * from[k];
   }
+}
+
+/// One beam's F.
+inline Eigen::Vector3f look_up_flow(const LightField& field, const FieldCell& cell, int beam) {
+  Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+  for (int corner = 0; corner < 8; ++corner) {
+    const std::size_t at = static_cast<std::size_t>(cell.node[corner]) * field.beam_count() + beam;
+    sum += cell.weight[corner] * Eigen::Map<const Eigen::Vector3f>(field.flow.data() + 4 * at);
+  }
+  return sum;
 }
 
 }  // namespace touchstone::render

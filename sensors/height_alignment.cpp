@@ -12,6 +12,7 @@ namespace {
 constexpr double kTukey = 4.685;           // of the residuals' sigma: 95 % efficient for normal residuals
 constexpr double kSigmaOfMedian = 1.4826;  // of normal residuals' median absolute value
 constexpr std::size_t kLeastOverlapPixels = 50;
+constexpr double kWorse = 0.02;  // correlation lost on the way: robust weights may cost a little of it
 
 /// A pixel of `from` that is looked up in `to`.
 struct Sample {
@@ -176,7 +177,7 @@ Alignment align(const ReliefDetail& from, const ReliefDetail& to, const PlanarPo
     lookups = look_up_all(to, samples, pose);
     line = fit_line(samples, lookups);
     if (change->segment<2>(1).norm() + std::abs((*change)[0]) * reach > settings.least_step_mm) continue;
-    if (line.correlation < unmoved.correlation) break;
+    if (line.correlation < unmoved.correlation - kWorse) break;
     Alignment result = judged(pose, line);
     result.steps = steps;
     result.converged = true;

@@ -20,6 +20,13 @@ bool is_on(const ContactPatch& patch, const Eigen::Vector2d& place) {
   return patch.reach_squared(place) <= 1.0;
 }
 
+/// The patch shrunk about its centre.
+ContactPatch inner_part(ContactPatch patch, double part) {
+  patch.edge /= part * part;
+  patch.area_px *= part * part;
+  return patch;
+}
+
 void check(const char* name, double value, double low, double high) {
   if (!(value >= low && value <= high))
     fail("incipient slip: {} is {}, it must be from {} to {}", name, value, low, high);
@@ -44,6 +51,7 @@ const char* name_of(SlipState state) {
 IncipientSlipDetector::IncipientSlipDetector(const IncipientSlipSettings& settings) : settings_(settings) {
   check("history_frames", settings.history_frames, 2, 1000);
   check("least_motion_px", settings.least_motion_px, 1e-3, 1e3);
+  check("patch_part", settings.patch_part, 0.2, 1.0);
   check("least_markers", settings.least_markers, 6, 1e6);
   check("lag_threshold", settings.lag_threshold, 0.0, 2.0);
   check("certainty", settings.certainty, 0.0, 10.0);
@@ -149,14 +157,15 @@ const IncipientSlip& IncipientSlipDetector::look(const TrackedMarkers& markers,
     return result_;
   }
   result_.state = SlipState::kSticking;
-  find_lag(markers, *patch);
-  find_slide(markers, *patch);
+  const ContactPatch held = inner_part(*patch, settings_.patch_part);
+  find_lag(markers, held);
+  find_slide(markers, held);
   if (result_.slide_px >= settings_.slide_px && result_.shear_px >= settings_.least_shear_px) {
     result_.state = SlipState::kSliding;
   } else if (result_.lag && *result_.lag - settings_.certainty * result_.lag_error >= settings_.lag_threshold) {
     result_.state = SlipState::kIncipient;
   }
-  remember(markers, *patch);
+  remember(markers, held);
   return result_;
 }
 

@@ -8,8 +8,9 @@
 // contact patch moved by u(x). That is taken apart by least squares into
 //   u = t + w J x + s x - l q(x),
 // a translation t (of the middle), a turn w, a swelling s (pressing spreads the gel), and a lag l that grows from the
-// middle to the edge with q = the squared distance over the edge's. While all sticks the field moves with the object
-// and l is small; where a rim slips, it stays behind: l.t/|t|^2 goes to 1 as the stick zone shrinks.
+// middle to the edge with q = the squared distance over the edge's (of the part of the patch that is looked at). While
+// all sticks the field moves with the object and l is small; where a rim slips, it stays behind: l.t/|t|^2 goes to 1 as
+// the stick zone shrinks.
 //
 // Once the whole contact slides, the markers stand still and there's no lag to be seen. Then the patch itself moves
 // over the markers (`sliding`): by `slide_px` within the frames kept, while the gel is sheared by `least_shear_px` or
@@ -28,11 +29,15 @@ namespace touchstone::sensors {
 struct IncipientSlipSettings {
   int history_frames = 15;       ///< how far back motion is sought (0.5 s at 30 frames/s); 2 to 1000
   double least_motion_px = 0.7;  ///< of the middle; below, noise of the centroids is too large a part of it. Above 0
-  int least_markers = 8;         ///< on the patch, measured now and then; at least 6
-  double lag_threshold = 0.5;    ///< 0 to 2
-  double certainty = 2.0;        ///< the lag less so many of its standard errors must pass the threshold; 0 to 10
-  double slide_px = 3.0;         ///< above 0
-  double least_shear_px = 2.0;   ///< mean displacement of the patch's markers since rest; at least 0
+  /// Markers within this part of the patch's size are taken to lie on the object. A mask of pixels that differ from the
+  /// background is larger than the contact, since the gel slopes down beside it: under balls 1.15 to 1.35 times. 0.2 to
+  /// 1
+  double patch_part = 0.75;
+  int least_markers = 6;        ///< on the patch, measured now and then; at least 6
+  double lag_threshold = 0.5;   ///< 0 to 2
+  double certainty = 2.0;       ///< the lag less so many of its standard errors must pass the threshold; 0 to 10
+  double slide_px = 3.0;        ///< above 0
+  double least_shear_px = 2.0;  ///< mean displacement of the patch's markers since rest; at least 0
 };
 
 enum class SlipState : std::uint8_t {

@@ -4,9 +4,9 @@
 namespace touchstone::sim {
 
 struct ArmLiftSettings {
-  double height_mm = 20.0;
-  double speed_mm_s = 20.0;
-  double acceleration_mm_s2 = 100.0;
+  double height_mm = 10.0;
+  double speed_mm_s = 5.0;
+  double acceleration_mm_s2 = 20.0;
 };
 
 /// @throws Error for a setting that isn't above zero and finite

@@ -16,6 +16,9 @@ namespace {
 const Eigen::Vector2d kCentre(160, 120);
 constexpr double kRadius = 60.0;  // of the contact, px
 
+/// The patches of these tests are the contact itself.
+const IncipientSlipSettings kWholePatch{.patch_part = 1.0, .least_markers = 8};
+
 cv::Mat disc(const Eigen::Vector2d& centre, double radius) {
   cv::Mat mask(240, 320, CV_8UC1, cv::Scalar(0));
   for (int y = 0; y < mask.rows; ++y) {
@@ -112,7 +115,7 @@ TEST(ContactPatch, MeanDisplacementIsOverItsMarkers) {
 
 TEST(IncipientSlip, StickingMotionHasNoLag) {
   // All rigid motions of the object, with the swelling of a press on top.
-  IncipientSlipDetector detector;
+  IncipientSlipDetector detector(kWholePatch);
   Field field;
   Eigen::Vector2d centre = kCentre;
   for (int frame = 0; frame < 40; ++frame) {
@@ -133,7 +136,7 @@ TEST(IncipientSlip, StickingMotionHasNoLag) {
 TEST(IncipientSlip, LagGrowsAsTheStickZoneShrinks) {
   double before = -1.0;
   for (const double stick : {1.0, 0.8, 0.6, 0.4, 0.2}) {
-    IncipientSlipDetector detector;
+    IncipientSlipDetector detector(kWholePatch);
     Field field;
     field.noise_px = 0.0;
     IncipientSlip slip;
@@ -160,7 +163,7 @@ TEST(IncipientSlip, IsFoundBeforeTheMiddleSlips) {
   // Mindlin: under a shear load Q the stick radius is (1 - Q/(mu P))^(1/3) of the contact's; the object moves on
   // evenly.
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
-    IncipientSlipDetector detector;
+    IncipientSlipDetector detector(kWholePatch);
     Field field;
     field.random = RandomStream(seed, 0, Purpose::kTest);
     Eigen::Vector2d centre = kCentre;
@@ -187,7 +190,7 @@ TEST(IncipientSlip, IsFoundBeforeTheMiddleSlips) {
 
 TEST(IncipientSlip, AFlatPunchThatSlidesAtOnceIsSeenSliding) {
   // No rim slips first: the markers go with the punch, then stop all together while it goes on.
-  IncipientSlipDetector detector;
+  IncipientSlipDetector detector(kWholePatch);
   Field field;
   Eigen::Vector2d centre = kCentre;
   int found = -1;
@@ -206,7 +209,7 @@ TEST(IncipientSlip, AFlatPunchThatSlidesAtOnceIsSeenSliding) {
 }
 
 TEST(IncipientSlip, PressingHoldingAndRollingInAreNoSlip) {
-  IncipientSlipDetector detector;
+  IncipientSlipDetector detector(kWholePatch);
   Field field;
   Eigen::Vector2d centre = kCentre - Eigen::Vector2d(30, 0);
   Eigen::Vector2d centre_before = centre;
@@ -231,7 +234,7 @@ TEST(IncipientSlip, PressingHoldingAndRollingInAreNoSlip) {
 }
 
 TEST(IncipientSlip, WithoutContactAllIsForgotten) {
-  IncipientSlipDetector detector;
+  IncipientSlipDetector detector(kWholePatch);
   Field field;
   const auto motion = [](const Eigen::Vector2d&) { return Eigen::Vector2d(1.0, 0.0); };
   EXPECT_EQ(detector.look(field.step(motion), std::nullopt).state, SlipState::kNoContact);
@@ -247,7 +250,7 @@ TEST(IncipientSlip, WithoutContactAllIsForgotten) {
 }
 
 TEST(IncipientSlip, TooFewMarkersGiveNoLag) {
-  IncipientSlipDetector detector;
+  IncipientSlipDetector detector(kWholePatch);
   Field field;
   for (int frame = 0; frame < 5; ++frame) {
     const auto& markers = field.step([](const Eigen::Vector2d&) { return Eigen::Vector2d(1.0, 0.0); });
@@ -264,7 +267,7 @@ TEST(IncipientSlip, IsFoundInPictures) {
   picture.noise = 2.0;
   const auto rest = test::marker_grid();
   MarkerTracker tracker({});
-  IncipientSlipDetector detector;
+  IncipientSlipDetector detector(kWholePatch);
   auto places = rest;
   std::vector<SlipState> states;
   for (int frame = 0; frame < 12; ++frame) {
@@ -290,6 +293,7 @@ TEST(IncipientSlip, BadSettingsAreRefused) {
   };
   refuses([](auto& s) { s.history_frames = 1; });
   refuses([](auto& s) { s.least_motion_px = 0.0; });
+  refuses([](auto& s) { s.patch_part = 0.1; });
   refuses([](auto& s) { s.least_markers = 5; });
   refuses([](auto& s) { s.lag_threshold = std::nan(""); });
   refuses([](auto& s) { s.certainty = -1.0; });
