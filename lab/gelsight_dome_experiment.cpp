@@ -85,15 +85,21 @@ double plate_radius_on_layer(const sim::GelSpec& gel, double force) {
   const auto at = [&](double depth) {
     return sphere_on_layer(gel.youngs_modulus_MPa, gel.poisson_ratio, gel.thickness_mm, gel.sphere_radius_mm, depth);
   };
-  double shallow = 0.0;
-  double deep = 0.25 * gel.thickness_mm;
-  if (at(deep).force < force) fail("a force of {} N presses the dome by more than a quarter of its thickness", force);
-  constexpr int kHalvings = 40;
-  for (int i = 0; i < kHalvings; ++i) {
-    const double middle = 0.5 * (shallow + deep);
-    (at(middle).force < force ? shallow : deep) = middle;
+  // From Hertz's depth on: force goes about as depth to 1.5, and each look at the layer takes its time.
+  const double hertz = plate_radius_by_hertz(gel, force);
+  double depth = hertz * hertz / gel.sphere_radius_mm;
+  LayerContact contact;
+  constexpr int kMostSteps = 12;
+  constexpr double kGood = 1e-4;
+  for (int step = 0; step < kMostSteps; ++step) {
+    if (depth > 0.25 * gel.thickness_mm) {
+      fail("a force of {} N presses the dome by more than a quarter of its thickness", force);
+    }
+    contact = at(depth);
+    if (std::abs(contact.force / force - 1.0) < kGood) break;
+    depth *= std::pow(force / contact.force, 2.0 / 3.0);
   }
-  return at(deep).contact_radius;
+  return contact.contact_radius;
 }
 
 double plate_radius_by_hertz(const sim::GelSpec& gel, double force) {
