@@ -20,6 +20,25 @@ sim::ObjectSpec plate() {
   return object;
 }
 
+/// The pixels that see contact, and their middle.
+struct TouchedPixels {
+  double count = 0.0;
+  Eigen::Vector2d middle = Eigen::Vector2d::Zero();
+};
+
+TouchedPixels touched_pixels(const sim::Touch& touch) {
+  TouchedPixels touched;
+  for (int row = 0; row < touch.contact.rows; ++row) {
+    for (int column = 0; column < touch.contact.cols; ++column) {
+      if (touch.contact.at<unsigned char>(row, column) == 0) continue;
+      touched.middle += Eigen::Vector2d(column + 0.5, row + 0.5);
+      touched.count += 1.0;
+    }
+  }
+  if (touched.count > 0.0) touched.middle /= touched.count;
+  return touched;
+}
+
 /// How large a pixel is in the plane `z`, relative to that at the apex: by the reduced distance from the lens, which
 /// refraction at the flat faces leaves alone for rays near the axis.
 double pixel_scale(const sim::DeviceSpec& device, double z) {
@@ -49,24 +68,16 @@ PlateContact press_plate(const sim::TouchRig& rig, double depth_mm, double tilt,
   const sim::TouchObject object = rig.object(plate());
   const fem::PressState press = rig.play(object, motion).back().press;
   const sim::Touch touch = rig.look(object, press, noise_seed);
-  double pixels = 0.0;
-  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
-  for (int row = 0; row < touch.contact.rows; ++row) {
-    for (int column = 0; column < touch.contact.cols; ++column) {
-      if (touch.contact.at<unsigned char>(row, column) == 0) continue;
-      sum += Eigen::Vector2d(column + 0.5, row + 0.5);
-      pixels += 1.0;
-    }
-  }
+  const TouchedPixels touched = touched_pixels(touch);
   PlateContact contact;
   contact.depth_mm = depth_mm;
   contact.force_N = press.wrench[2];
   const double touched_z = (sphere - depth_mm) * std::cos(tilt) - sphere;
   contact.expected_mm = {(sphere - depth_mm) * std::sin(tilt), 0.0};
-  if (pixels == 0.0) return contact;
+  if (touched.count == 0.0) return contact;
   const double scale = pixel_scale(rig.device(), touched_z);
-  contact.radius_mm = scale * rig.mm_per_px() * std::sqrt(pixels / kPi);
-  contact.centre_mm = scale * rig.gel_from_pixel(sum / pixels);
+  contact.radius_mm = scale * rig.mm_per_px() * std::sqrt(touched.count / kPi);
+  contact.centre_mm = scale * rig.gel_from_pixel(touched.middle);
   return contact;
 }
 
@@ -91,10 +102,35 @@ double plate_radius_by_hertz(const sim::GelSpec& gel, double force) {
 }
 
 DomeHeights measure_dome_heights(const sim::TouchRig& rig, const CalibrationPresses& presses, std::uint64_t seed) {
-  const CalibratedRig calibrated = calibrate_rig(rig, presses, {}, seed);
-  sensors::HeightEstimator estimator(calibrated.calibration.model);
+  std::vector<cv::Mat> rest;
+  for (int i = 0; i < presses.background_frames; ++i) rest.push_back(rig.background(seed, i));
+  const sim::TouchObject small_ball = rig.object(ball_of(presses.ball_diameter_mm));
+  std::vector<sensors::BallPress> annotated;
+  for (int j = 0; j < presses.rows; ++j) {
+    for (int i = 0; i < presses.columns; ++i) {
+      const auto along = [](int k, int count) { return count > 1 ? k / (count - 1.0) - 0.5 : 0.0; };
+      const Eigen::Vector2d place(presses.extent_mm.x() * along(i, presses.columns),
+                                  presses.extent_mm.y() * along(j, presses.rows));
+      for (const double depth : presses.depths_mm) {
+        const sim::Touch touch = touch_once(rig, small_ball, {place, depth}, seed + annotated.size() + 1);
+        const TouchedPixels touched = touched_pixels(touch);
+        sensors::BallPress press;
+        press.name = fmt::format("press {}", annotated.size() + 1);
+        press.frame = touch.frame;
+        press.ball_radius_mm = 0.5 * presses.ball_diameter_mm;
+        press.circle.centre = touched.middle;
+        press.circle.radius = std::sqrt(touched.count / kPi);
+        annotated.push_back(std::move(press));
+      }
+    }
+  }
+  sensors::HeightCalibrationSettings settings;
+  settings.mm_per_px = rig.mm_per_px();
+  settings.correction = sensors::LightCorrection::fitted;
+  const sensors::HeightCalibration calibration =
+      sensors::calibrate_height(annotated, sensors::mean_background(rest), settings);
+  sensors::HeightEstimator estimator(calibration.model);
   DomeHeights heights;
-  heights.circle_error_px = calibrated.circle_error_px;
   constexpr std::uint64_t kTestNoise = 1'000'000;  // seeds that calibration never saw
   constexpr double kBall_mm = 4.0;
   constexpr double kBallDepth_mm = 0.4;

@@ -31,11 +31,12 @@ PlateContact press_plate(const sim::TouchRig& rig, double depth_mm, double tilt,
 double plate_radius_on_layer(const sim::GelSpec& gel, double force);
 double plate_radius_by_hertz(const sim::GelSpec& gel, double force);
 
-/// Heights by a calibration whose balls were pressed on the dome itself, and whose background is the dome's own. The
+/// Heights by a calibration whose balls were pressed on the dome itself, and whose background is the dome's own. Their
+/// circles are given, as by an annotator who sees the contact: where sharp edges of the light guides' light cross a
+/// ball's shadow, the finder of circles takes one contact for two. The
 /// estimator takes the gel for flat: it reads slopes as if the gel at rest had none, so what it finds is off by up to
 /// the dome's own slope wherever that isn't small against the object's.
 struct DomeHeights {
-  double circle_error_px = 0.0;    ///< of the calibration, see CalibratedRig
   std::vector<HeightError> balls;  ///< of 4 mm, at the apex and at two places aside, 0.4 mm deep
   HeightError plate;               ///< 0.3 mm deep
 };
