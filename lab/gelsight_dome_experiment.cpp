@@ -91,10 +91,10 @@ double plate_radius_by_hertz(const sim::GelSpec& gel, double force) {
 }
 
 DomeHeights measure_dome_heights(const sim::TouchRig& rig, const CalibrationPresses& presses, std::uint64_t seed) {
-  const CalibratedRig calibrated = calibrate_rig(rig, presses, sensors::LightCorrection::fitted, seed);
+  const CalibratedRig calibrated = calibrate_rig(rig, presses, seed);
   sensors::HeightEstimator estimator(calibrated.calibration.model);
   DomeHeights heights;
-  heights.circle_error_px = calibrated.circle_error_px;
+  heights.circle_error_px = calibrated.found_circle_px;
   constexpr std::uint64_t kTestNoise = 1'000'000;  // seeds that calibration never saw
   constexpr double kBall_mm = 4.0;
   constexpr double kBallDepth_mm = 0.4;

@@ -212,7 +212,7 @@ std::vector<ValidationRow> validate_gelsight_slip(const ValidateOptions& options
   };
   const sim::TouchRig bare = rig_of("gelsight-flat.yaml");
   const sensors::HeightModel heights =
-      calibrate_rig(bare, {}, sensors::LightCorrection::fitted, kSeed).calibration.model;
+      calibrate_rig(bare, {}, kSeed).calibration.model;
   add_force_rows(rows, bare, heights, options.quick);
 
   const sim::TouchRig marked = rig_of("gelsight-markers.yaml");
