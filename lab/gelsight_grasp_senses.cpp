@@ -77,8 +77,7 @@ class Eyes {
 
 GraspCalibration calibrate_for_grasps(const sim::TouchRig& flat, const sim::TouchRig& marked, std::uint64_t seed) {
   GraspCalibration calibration;
-  const sensors::HeightModel of_flat =
-      calibrate_rig(flat, {}, sensors::LightCorrection::fitted, seed).calibration.model;
+  const sensors::HeightModel of_flat = calibrate_rig(flat, {}, seed).calibration.model;
   calibration.height = for_marked_gel(of_flat, marked, seed);
   calibration.markers = marker_settings(marked);
   calibration.background = marked.background(seed, kFrameOfBackground);

@@ -211,8 +211,7 @@ std::vector<ValidationRow> validate_gelsight_slip(const ValidateOptions& options
     return sim::TouchRig(sim::read_device(options.scenes / "devices" / device), options.cache);
   };
   const sim::TouchRig bare = rig_of("gelsight-flat.yaml");
-  const sensors::HeightModel heights =
-      calibrate_rig(bare, {}, sensors::LightCorrection::fitted, kSeed).calibration.model;
+  const sensors::HeightModel heights = calibrate_rig(bare, {}, kSeed).calibration.model;
   add_force_rows(rows, bare, heights, options.quick);
 
   const sim::TouchRig marked = rig_of("gelsight-markers.yaml");

@@ -83,7 +83,7 @@ std::vector<ValidationRow> validate_gelsight_texture(const ValidateOptions& opti
     balls.columns = 2;
     balls.rows = 2;
   }
-  const CalibratedRig calibrated = calibrate_rig(rig, balls, sensors::LightCorrection::fitted, kSeed);
+  const CalibratedRig calibrated = calibrate_rig(rig, balls, kSeed);
   const HeightsOf heights = estimated_heights(rig, calibrated.calibration.model, kSeed);
 
   std::vector<sim::ObjectSpec> objects = texture_objects(options.scenes);
