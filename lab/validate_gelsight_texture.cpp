@@ -7,6 +7,7 @@
 #include <fmt/ranges.h>
 
 #include <chrono>
+#include <utility>
 #include <vector>
 
 #include "lab/gelsight_texture_experiment.h"
@@ -78,7 +79,10 @@ std::vector<ValidationRow> validate_gelsight_texture(const ValidateOptions& opti
   how.deepest_mm = 1.0;
   how.membrane_um = 30.0;  // a pixel of the camera sees 27 um
   how.edge_side = 1;       // every pixel of a texture differs from the next
-  const sim::TouchRig rig(portable_device(options.scenes), options.cache, how);
+  sim::DeviceSpec device = portable_device(options.scenes);
+  // All samples are cut from the middle of the picture: the imager reads out no more than that.
+  device.camera->width = device.camera->height = kTextureView_px;
+  const sim::TouchRig rig(std::move(device), options.cache, how);
   const HeightsOf heights = estimated_heights(rig, calibrate_view(rig, kSeed), kSeed);
 
   std::vector<sim::ObjectSpec> objects = texture_objects(options.scenes);
