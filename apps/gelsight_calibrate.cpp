@@ -18,7 +18,7 @@ struct CalibrateOptions {
   fs::path annotations;
   std::vector<fs::path> background;
   double mm_per_px = 0.0;
-  std::string correction = "fitted";
+  std::string correction = "best";
   int order = -1;
   fs::path out;
 };
@@ -47,7 +47,7 @@ void calibrate(const CalibrateOptions& options) {
   const std::vector<sensors::BallPress> presses = lab::read_ball_presses(table, background, options.mm_per_px);
   sensors::HeightCalibrationSettings settings;
   settings.mm_per_px = options.mm_per_px;
-  settings.correction = correction_named(options.correction);
+  if (options.correction != "best") settings.correction = correction_named(options.correction);
   if (options.order >= 0) settings.lamp_order = options.order;
   settings.cross_validate = true;
   const sensors::HeightCalibration result = sensors::calibrate_height(presses, background, settings);
@@ -88,9 +88,11 @@ void add_gelsight_calibration(CLI::App& calibrations, const GlobalOptions&, Acti
       ->required()
       ->check(CLI::Range(1e-4, 10.0));
   command
-      ->add_option("--correction", options->correction,
-                   "Of colours for the place: 'none', by the 'background', or by lamps 'fitted' to the presses")
-      ->check(CLI::IsMember({"none", "background", "fitted"}))
+      ->add_option(
+          "--correction", options->correction,
+          "Of colours for the place: 'none', by the 'background', by lamps 'fitted' to the presses, or the 'best' "
+          "on presses that were left out")
+      ->check(CLI::IsMember({"best", "none", "background", "fitted"}))
       ->capture_default_str();
   command->add_option("--order", options->order, "Of the light's polynomial over the picture (default: by the presses)")
       ->check(CLI::Range(0, 2));

@@ -4,10 +4,13 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "core/error.h"
+#include "core/random.h"
 #include "core/units.h"
 #include "fem/relief_map.h"
+#include "sim/gel_setup.h"
 
 namespace touchstone::lab {
 
@@ -26,6 +29,12 @@ double half_height(const sim::ShapeSpec& shape) {
       return 0.5 * shape.size_mm.z();
     case sim::ShapeKind::rounded_cylinder:
       return 0.0;  // its origin is in the middle of its flat end
+    case sim::ShapeKind::egg:
+      return shape.radius_mm;
+    case sim::ShapeKind::shell: {
+      const Eigen::Vector2d rise = 0.125 * shape.curvature_per_mm.cwiseProduct(shape.axes_mm.cwiseAbs2());
+      return std::max(0.0, -rise.minCoeff());
+    }
     case sim::ShapeKind::mesh:
       break;
   }
@@ -57,7 +66,7 @@ sim::ObjectSpec flat_cylinder_of(double diameter_mm) {
 
 sim::Touch touch_once(const sim::TouchRig& rig, const sim::TouchObject& object, const StraightPress& press,
                       std::uint64_t noise_seed, bool truth) {
-  const double reach = reach_below(object.spec());
+  const double reach = reach_below(object.spec()) + sim::rest_height(rig.device().gel, press.place_mm);
   sim::MotionSpec motion;
   motion.start_mm = {press.place_mm.x(), press.place_mm.y(), reach + kClearance_mm};
   sim::MotionKey key;
@@ -67,37 +76,49 @@ sim::Touch touch_once(const sim::TouchRig& rig, const sim::TouchObject& object, 
 }
 
 CalibratedRig calibrate_rig(const sim::TouchRig& rig, const CalibrationPresses& how,
-                            sensors::LightCorrection correction, std::uint64_t noise_seed, bool compare) {
+                            std::optional<sensors::LightCorrection> correction, std::uint64_t noise_seed) {
   std::vector<cv::Mat> rest;
   for (int i = 0; i < how.background_frames; ++i) rest.push_back(rig.background(noise_seed, i));
   const sensors::Background background = sensors::mean_background(rest);
   const double mm_per_px = rig.mm_per_px();
   const sim::TouchObject ball = rig.object(ball_of(how.ball_diameter_mm));
+  RandomStream hand(noise_seed, 0, Purpose::kPlacement);
   std::vector<sensors::BallPress> presses;
+  CalibratedRig result;
   double squares = 0.0;
   for (int j = 0; j < how.rows; ++j) {
     for (int i = 0; i < how.columns; ++i) {
       const auto along = [](int k, int count) { return count > 1 ? k / (count - 1.0) - 0.5 : 0.0; };
       const Eigen::Vector2d place(how.extent_mm.x() * along(i, how.columns), how.extent_mm.y() * along(j, how.rows));
       for (const double depth : how.depths_mm) {
+        const sim::Touch touch = touch_once(rig, ball, {place, depth}, noise_seed + presses.size() + 1);
+        const cv::Moments contact = cv::moments(touch.contact, true);
+        if (contact.m00 < 1.0) fail("calibration: the ball at ({}, {}) mm isn't seen", place.x(), place.y());
+        const Eigen::Vector2d centre(contact.m10 / contact.m00 + 0.5, contact.m01 / contact.m00 + 0.5);
         sensors::BallPress press;
         press.name = fmt::format("press {}", presses.size() + 1);
-        press.frame = touch_once(rig, ball, {place, depth}, noise_seed + presses.size() + 1, false).frame;
+        press.frame = touch.frame;
         press.ball_radius_mm = 0.5 * how.ball_diameter_mm;
-        press.circle =
-            sensors::find_contact_circle(press.frame, background, press.ball_radius_mm, mm_per_px, press.name);
-        squares += (press.circle.centre - rig.pixel_from_gel(place)).squaredNorm();
-        presses.push_back(std::move(press));
+        press.circle.centre = centre + how.annotation_px * Eigen::Vector2d(hand.normal(), hand.normal());
+        press.circle.radius = std::sqrt(contact.m00 / kPi) + how.annotation_px * hand.normal();
+        presses.push_back(press);
+        try {
+          const sensors::ContactCircle found =
+              sensors::find_contact_circle(press.frame, background, press.ball_radius_mm, mm_per_px, press.name);
+          squares += (found.centre - centre).squaredNorm();
+          ++result.found_circles;
+        } catch (const Error&) {
+          // Counted as not found.
+        }
       }
     }
   }
   sensors::HeightCalibrationSettings settings;
   settings.mm_per_px = mm_per_px;
   settings.correction = correction;
-  settings.cross_validate = compare;
-  CalibratedRig result;
+  settings.sampling.most_saturated = how.most_saturated;
   result.calibration = sensors::calibrate_height(presses, background, settings);
-  result.circle_error_px = std::sqrt(squares / static_cast<double>(presses.size()));
+  result.circle_error_px = result.found_circles > 0 ? std::sqrt(squares / result.found_circles) : 0.0;
   return result;
 }
 

@@ -2,11 +2,16 @@
 
 namespace touchstone::lab {
 
-// Each in a file of its own: validate_mechanics.cpp, validate_vibration.cpp, validate_light.cpp, validate_vhs.cpp.
+// Each in a file of its own, named for it.
 std::vector<ValidationRow> validate_mechanics(const ValidateOptions& options);
 std::vector<ValidationRow> validate_vibration(const ValidateOptions& options);
 std::vector<ValidationRow> validate_light(const ValidateOptions& options);
 std::vector<ValidationRow> validate_vhs(const ValidateOptions& options);
+std::vector<ValidationRow> validate_gelsight_dome(const ValidateOptions& options);
+std::vector<ValidationRow> validate_gelsight_map(const ValidateOptions& options);
+std::vector<ValidationRow> validate_gelsight_slip(const ValidateOptions& options);
+std::vector<ValidationRow> validate_gelsight_grasp(const ValidateOptions& options);
+std::vector<ValidationRow> validate_gelsight_texture(const ValidateOptions& options);
 
 const std::vector<ValidationGroup>& validation_groups() {
   static const std::vector<ValidationGroup> groups = {
@@ -14,6 +19,11 @@ const std::vector<ValidationGroup>& validation_groups() {
       {"vibration", validate_vibration},
       {"light", validate_light},
       {"vhs", validate_vhs},
+      {"gelsight.dome", validate_gelsight_dome},
+      {"gelsight.force", validate_gelsight_slip},
+      {"gelsight.grasp", validate_gelsight_grasp},
+      {"gelsight.map", validate_gelsight_map},
+      {"gelsight.texture", validate_gelsight_texture},
   };
   return groups;
 }

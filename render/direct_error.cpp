@@ -122,7 +122,7 @@ DirectChoice choose_direct(const Scene& rest, const Scene& first, const Camera& 
   LightField field;
   try {
     LightFieldSettings light;
-    light.accuracy = std::clamp(0.2 * settings.tolerance, 1e-4, 1e-2);
+    light.accuracy = std::clamp(0.5 * settings.tolerance, 1e-4, 1e-2);
     field = make_light_field(direct, reach, light);
   } catch (const Error& error) {
     choice.reason = error.what();

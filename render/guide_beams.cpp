@@ -13,7 +13,7 @@ namespace {
 
 constexpr int kMostPoints = 16;
 constexpr int kMostImages = 200;
-constexpr double kNegligible = 1e-5;  // of the sector's light so far: further images are left out
+constexpr double kNegligible = 1e-4;  // of the sector's light so far: further images are left out
 
 /// Nodes and weights on [0, 1] of Gauss and Legendre's rule, by Newton's method.
 struct Rule {
@@ -70,37 +70,39 @@ void guide_beam_flows(const PreparedScene<1>& scene, const PreparedLamp<1>& lamp
   std::uint64_t uncounted = 0;
 
   for (int sector = 0; sector < cut.sectors; ++sector) {
-    Eigen::Vector3d* beams = out + sector * (2 * cut.slices + 1);
+    Eigen::Vector3d* beams = out + sector * cut.beams_a_sector();
     for (int i = 0; i < count; ++i) {
       const double azimuth = azimuths.value((sector + rule.node[i]) / cut.sectors);
       const double width = rule.weight[i] / (cut.sectors * azimuths.density(azimuth));
       const GuideBearing bearing = guide_bearing(lamp, before.forward, azimuth);
       const auto edge = [&](double height) { return steepness_from(scene, medium, beyond, height, bearing.distance); };
-      const auto light_between = [&](double low, double high) {
+      const auto light_between = [&](double low, double high, int upright_count) {
+        const Rule& upright = rule_of(upright_count);
         Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-        for (int j = 0; j < count; ++j) {
+        for (int j = 0; j < upright_count; ++j) {
           Arrival<1> arrival;
-          const double steepness = low + (high - low) * rule.node[j];
+          const double steepness = low + (high - low) * upright.node[j];
           if (guide_light_along(scene, lamp, beyond, bearing, steepness, up, receiver, uncounted, arrival)) {
-            sum -= rule.weight[j] * arrival.irradiance[0] * arrival.direction;
+            sum -= upright.weight[j] * arrival.irradiance[0] * arrival.direction;
           }
         }
         return Eigen::Vector3d((high - low) * width * sum);
       };
       Eigen::Vector3d all = Eigen::Vector3d::Zero();
+      Eigen::Vector3d last = Eigen::Vector3d::Zero();
       double low = edge(0.0);
-      for (int slice = 0; slice < 2 * cut.slices; ++slice) {
-        const double high = edge(thickness * (slice + 1) / cut.slices);
-        const Eigen::Vector3d light = light_between(low, high);
-        beams[slice] += light;
-        all += light;
+      for (int beam = 0; beam <= cut.slices; ++beam) {
+        const double height = beam < cut.slices ? (beam + 1.0) / cut.slices : 2.0;
+        const double high = edge(thickness * height);
+        last = light_between(low, high, count);
+        beams[beam] += last;
+        all += last;
         low = high;
       }
-      Eigen::Vector3d last = all;
       for (int image = 2; image < kMostImages; ++image) {
         const double high = edge(thickness * (image + 1));
-        const Eigen::Vector3d light = light_between(low, high);
-        beams[2 * cut.slices] += light;
+        const Eigen::Vector3d light = light_between(low, high, std::max(1, count / 2));
+        beams[cut.slices + 1] += light;
         all += light;
         low = high;
         // Two in a row: of a leaning lobe every second image may be dark.

@@ -202,42 +202,106 @@ bool guide_light_along(const PreparedScene<N>& scene, const PreparedLamp<N>& lam
   return true;
 }
 
+/// How steep a guide's light is in its plate: a choice about as the light is. Seen from beyond the plate the exit face
+/// and its mirror images stand above each other, and every second one shows the lobe upside down; so the first two are
+/// drawn from the lobe's normal density or that of its mirror image, and all further ones from both.
+class GuideSteepness {
+ public:
+  /// Of a receiver beyond the plate.
+  template <int N>
+  GuideSteepness(const PreparedScene<N>& scene, const PreparedLamp<N>& lamp, const LayersBeyondPlate& beyond,
+                 const GuideBearing& bearing, bool up) {
+    const int medium = scene.medium_of_layer(lamp.layer);
+    const double thickness = scene.faces[lamp.layer].z - scene.faces[lamp.layer - 1].z;
+    // Light flatter than that from the edge of the exit face isn't in the plate any more when it has to leave it.
+    const double flattest = (1.0 - 1e-6) * steepness_from(scene, medium, beyond, 0.0, bearing.distance);
+    const double first = steepness_from(scene, medium, beyond, thickness, bearing.distance);
+    const double second = steepness_from(scene, medium, beyond, 2.0 * thickness, bearing.distance);
+    const double outside = up ? 1.0 : -1.0;
+    const double deviation = 1.0 / std::sqrt(lamp.exponent);
+    const FresnelFace face = fresnel(scene.media[medium].index, beyond.layers[0].index, std::sin(second));
+    const double again = 0.5 * (face.reflectance_s + face.reflectance_p);
+    parts_ = {Part(outside * bearing.crest, deviation, flattest, first, 1.0),
+              Part(-outside * bearing.crest, deviation, first, second, 1.0),
+              Part(outside * bearing.crest, deviation, second, 0.5 * kPi, again),
+              Part(-outside * bearing.crest, deviation, second, 0.5 * kPi, again)};
+    double all = 0.0;
+    for (const Part& part : parts_) all += part.chance;
+    constexpr double kLeast = 0.01;  // what is dark by the lobe's normal density may still bring something
+    for (Part& part : parts_) {
+      part.chance = all > 0.0 ? (1.0 - 4.0 * kLeast) * part.chance / all + kLeast : 0.25;
+    }
+  }
+
+  /// From a number in [0, 1).
+  double value(double number) const {
+    for (std::size_t k = 0;; ++k) {
+      const Part& part = parts_[k];
+      if (number < part.chance || k + 1 == parts_.size()) {
+        return part.normal.value(std::min(number / part.chance, 1.0 - 0x1p-53));
+      }
+      number -= part.chance;
+    }
+  }
+
+  double density(double steepness) const {
+    double sum = 0.0;
+    for (const Part& part : parts_) {
+      if (steepness >= part.low && steepness <= part.high) sum += part.chance * part.normal.density(steepness);
+    }
+    return sum;
+  }
+
+ private:
+  struct Part {
+    double low = 0.0, high = 1.0;
+    TruncatedNormal normal{0.0, 1.0, 0.0, 1.0};
+    double chance = 0.0;
+
+    Part() = default;
+    Part(double middle, double deviation, double from, double to, double weight)
+        : low(from), high(std::max(to, from + 1e-9)), normal(middle, deviation, low, high) {
+      chance = weight * normal.mass();
+    }
+  };
+  std::array<Part, 4> parts_;
+};
+
 /// One sample of the light of the guide `lamp` at the receiver, as connect_to_lamp; the mean over `numbers` uniform in
 /// the unit square is the light.
 template <int N>
 bool connect_to_guide(const PreparedScene<N>& scene, const PreparedLamp<N>& lamp, const std::array<double, 2>& numbers,
                       const Receiver& receiver, std::uint64_t& connections, Arrival<N>& arrival) {
   const int plate = lamp.layer;
-  const int plate_medium = scene.medium_of_layer(plate);
   const bool is_inside = receiver.layer == plate;
-  if (is_inside && receiver.medium != plate_medium) return false;
-  LayersBeyondPlate beyond;
-  if (!is_inside) beyond = layers_beyond_plate(scene, plate, receiver);
-
+  if (is_inside && receiver.medium != scene.medium_of_layer(plate)) return false;
   const BeforeGuide place = before_guide(lamp, receiver.position);
   if (!(place.forward > 0.0)) return false;
   const TruncatedNormal azimuths = guide_azimuths(lamp, place);
   const GuideBearing bearing = guide_bearing(lamp, place.forward, azimuths.value(numbers[0]));
 
-  // Light flatter than that from the edge of the exit face isn't in the plate any more when it has to leave it.
-  const double flattest =
-      is_inside ? 0.0 : (1.0 - 1e-6) * steepness_from(scene, plate_medium, beyond, 0.0, bearing.distance);
-  // How steep the light is in the plate: about the lobe's crest, or about its mirror image. To a receiver in the plate
-  // it comes from above or from below.
-  const double deviation = 1.0 / std::sqrt(lamp.exponent);
-  const TruncatedNormal upright(bearing.crest, deviation, flattest, 0.5 * kPi);
-  const TruncatedNormal turned(-bearing.crest, deviation, flattest, 0.5 * kPi);
-  double number = 2.0 * numbers[1];
-  const bool from_upright = number < 1.0;
-  number -= from_upright ? 0.0 : 1.0;
+  LayersBeyondPlate beyond;
   bool up = receiver.layer > plate;
+  double steepness = 0.0;
+  double density = azimuths.density(bearing.azimuth);
   if (is_inside) {
+    // From above or from below, about the lobe's crest or about its mirror image.
+    const double deviation = 1.0 / std::sqrt(lamp.exponent);
+    const TruncatedNormal upright(bearing.crest, deviation, 0.0, 0.5 * kPi);
+    const TruncatedNormal turned(-bearing.crest, deviation, 0.0, 0.5 * kPi);
+    double number = 2.0 * numbers[1];
+    const bool from_upright = number < 1.0;
+    number -= from_upright ? 0.0 : 1.0;
     up = number < 0.5;
     number = up ? 2.0 * number : 2.0 * number - 1.0;
+    steepness = from_upright ? upright.value(number) : turned.value(number);
+    density *= 0.25 * (upright.density(steepness) + turned.density(steepness));
+  } else {
+    beyond = layers_beyond_plate(scene, plate, receiver);
+    const GuideSteepness steepnesses(scene, lamp, beyond, bearing, up);
+    steepness = steepnesses.value(numbers[1]);
+    density *= steepnesses.density(steepness);
   }
-  const double steepness = from_upright ? upright.value(number) : turned.value(number);
-  const double density = azimuths.density(bearing.azimuth) * 0.5 *
-                         (upright.density(steepness) + turned.density(steepness)) * (is_inside ? 0.5 : 1.0);
   if (!(density > 0.0)) return false;
   if (!guide_light_along(scene, lamp, beyond, bearing, steepness, up, receiver, connections, arrival)) return false;
   arrival.irradiance /= density;
@@ -257,6 +321,28 @@ bool connect(const PreparedScene<N>& scene, const PreparedLamp<N>& lamp, const s
     return connect_to_guide(scene, lamp, direction, receiver, connections, arrival);
   }
   return connect_to_lamp(scene, lamp, point_on_lamp(lamp, numbers), receiver, connections, arrival);
+}
+
+/// Lets the choice of lamps know what light arrives where (LampChooser::lay_grid), all over the scene's things.
+template <int N>
+void weigh_lamps(PreparedScene<N>& scene) {
+  scene.lamp_chooser.lay_grid(scene.rays.bounds(), [&](int number, const Eigen::Vector3d& place) {
+    const int layer = scene.layer_at(place.z());
+    const Receiver receiver{place, Eigen::Vector3d::Zero(), layer, scene.medium_of_layer(layer), false};
+    const PreparedLamp<N>& lamp = scene.lamps[number];
+    // The middle of a small lamp stands for it all; a guide's light comes from many directions.
+    const int parts = lamp.kind == LampKind::kGuide ? 3 : 1;
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    std::uint64_t uncounted = 0;
+    for (int part = 0; part < parts * parts; ++part) {
+      Arrival<N> arrival;
+      const std::array<double, 2> numbers = {(part % parts + 0.5) / parts, (part / parts + 0.5) / parts};
+      if (connect(scene, lamp, numbers, receiver, uncounted, arrival)) {
+        sum += arrival.irradiance.sum() * arrival.direction;
+      }
+    }
+    return Eigen::Vector3d(sum / (parts * parts));
+  });
 }
 
 }  // namespace touchstone::render

@@ -165,23 +165,4 @@ bool connect_to_lamp(const PreparedScene<N>& scene, const PreparedLamp<N>& lamp,
   return true;
 }
 
-/// Lets the choice of lamps know what light arrives where (LampChooser::lay_grid), all over the scene's things.
-template <int N>
-void weigh_lamps(PreparedScene<N>& scene) {
-  for (const PreparedLamp<N>& lamp : scene.lamps) {
-    if (lamp.kind == LampKind::kGuide) return;  // its light takes other ways
-  }
-  scene.lamp_chooser.lay_grid(scene.rays.bounds(), [&](int lamp, const Eigen::Vector3d& place) {
-    const int layer = scene.layer_at(place.z());
-    const Receiver receiver{place, Eigen::Vector3d::Zero(), layer, scene.medium_of_layer(layer), false};
-    Arrival<N> arrival;
-    std::uint64_t uncounted = 0;
-    const PreparedLamp<N>& one = scene.lamps[lamp];
-    if (!connect_to_lamp(scene, one, one.position, receiver, uncounted, arrival)) {
-      return Eigen::Vector3d(Eigen::Vector3d::Zero());
-    }
-    return Eigen::Vector3d(arrival.irradiance.sum() * arrival.direction);
-  });
-}
-
 }  // namespace touchstone::render

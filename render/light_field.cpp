@@ -55,7 +55,7 @@ struct Maker {
   const LightFieldSettings& settings;
   PreparedScene<1> clear;
   std::vector<std::unique_ptr<PreparedScene<1>>> absorbing;  // by band; none if nothing absorbs
-  std::vector<int> kept;                                     // which of all beams the field has, by number; rising
+  std::vector<int> group_of;                                 // by number of all beams: that of the field's
 
   int beams_of(const PreparedLamp<1>& lamp) const {
     return lamp.kind == LampKind::kGuide ? settings.guides.beams() : 1;
@@ -85,34 +85,86 @@ struct Maker {
     return field.reach.min() + Eigen::Vector3d(i * field.step[0], j * field.step[1], k * field.step[2]);
   }
 
-  /// Beams that bring less than a ten-thousandth of their lamp's light to each of 27 places of the box aren't kept.
+  /// Which beams the field has: of a guide those that bring little are put together with the one beside them, and as
+  /// many as it takes.
   void choose_beams(LightField& field) {
-    constexpr double kNothing = 1e-4;
-    std::vector<double> most(all_beams(), 0.0);
-    for (int number = 0; number < 27; ++number) {
-      const Eigen::Array3d share(number % 3, number / 3 % 3, number / 9);
-      const Eigen::Vector3d at = field.reach.min() + (0.5 * share * field.reach.sizes().array()).matrix();
-      const std::vector<Eigen::Vector3d> flows = all_flows(clear, field.layer, at);
-      std::size_t first = 0;
-      for (const PreparedLamp<1>& lamp : clear.lamps) {
-        const std::size_t end = first + beams_of(lamp);
-        double whole = 0.0;
-        for (std::size_t k = first; k < end; ++k) whole += flows[k].norm();
-        for (std::size_t k = first; whole > 0.0 && k < end; ++k) most[k] = std::max(most[k], flows[k].norm() / whole);
-        first = end;
-      }
-    }
-    int number = 0;
+    constexpr double kLittle = 0.03;  // of the guide's light, wherever in the box
+    const int all = all_beams();
+    std::vector<int> lamp_of;
+    std::vector<int> run_of;  // beams that may be put together
     for (std::size_t lamp = 0; lamp < clear.lamps.size(); ++lamp) {
-      const int count = beams_of(clear.lamps[lamp]);
-      for (int k = 0; k < count; ++k, ++number) {
-        if (count > 1 && most[number] < kNothing) continue;
-        kept.push_back(number);
-        field.lamp_of.push_back(static_cast<int>(lamp));
-        const Lamp& one = field.fixture.lamps[lamp];
-        field.intensity.push_back(lamp_power(one) / emission_integral(one));
+      for (int k = 0; k < beams_of(clear.lamps[lamp]); ++k) {
+        lamp_of.push_back(static_cast<int>(lamp));
+        const bool joins = k % settings.guides.beams_a_sector() != 0;
+        run_of.push_back(run_of.empty() ? 0 : run_of.back() + (joins ? 0 : 1));
       }
     }
+    std::vector<double> share(all, 0.0);  // the most of the lamp's light at one of 27 places
+    for (int number = 0; number < 27; ++number) {
+      const Eigen::Array3d at(number % 3, number / 3 % 3, number / 9);
+      const Eigen::Vector3d where = field.reach.min() + (0.5 * at * field.reach.sizes().array()).matrix();
+      const std::vector<Eigen::Vector3d> flows = all_flows(clear, field.layer, where);
+      std::vector<double> whole(clear.lamps.size(), 0.0);
+      for (int k = 0; k < all; ++k) whole[lamp_of[k]] += flows[k].norm();
+      for (int k = 0; k < all; ++k) {
+        if (whole[lamp_of[k]] > 0.0) share[k] = std::max(share[k], flows[k].norm() / whole[lamp_of[k]]);
+      }
+    }
+    struct Group {
+      int first, end;  // numbers of beams
+      double share;
+    };
+    std::vector<Group> groups;
+    for (int k = 0; k < all; ++k) groups.push_back({k, k + 1, share[k]});
+    for (;;) {
+      std::size_t least = 0;
+      double least_share = INFINITY;
+      for (std::size_t g = 0; g + 1 < groups.size(); ++g) {
+        if (run_of[groups[g].first] != run_of[groups[g + 1].first]) continue;
+        const double weaker = std::min(groups[g].share, groups[g + 1].share);
+        if (weaker < least_share) {
+          least_share = weaker;
+          least = g;
+        }
+      }
+      const bool too_many = groups.size() > static_cast<std::size_t>(settings.most_beams);
+      if (!(least_share < (too_many ? INFINITY : kLittle / settings.guides.sectors))) break;
+      groups[least].end = groups[least + 1].end;
+      groups[least].share += groups[least + 1].share;
+      groups.erase(groups.begin() + static_cast<std::ptrdiff_t>(least) + 1);
+    }
+    group_of.assign(all, 0);
+    for (std::size_t g = 0; g < groups.size(); ++g) {
+      std::fill(group_of.begin() + groups[g].first, group_of.begin() + groups[g].end, static_cast<int>(g));
+    }
+    for (std::size_t g = 0; g < groups.size(); ++g) {
+      const int lamp = lamp_of[groups[g].first];
+      field.lamp_of.push_back(lamp);
+      const Lamp& one = field.fixture.lamps[lamp];
+      field.intensity.push_back(lamp_power(one) / emission_integral(one));
+      if (!std::holds_alternative<GuideLamp>(one)) {
+        field.beside.emplace_back();
+        continue;
+      }
+      const int sector = settings.guides.beams_a_sector();
+      const int middle = (groups[g].first + groups[g].end - 1) / 2;
+      const auto group_at = [&](int number, bool same_run) {
+        const bool fits =
+            number >= 0 && number < all && lamp_of[number] == lamp && (run_of[number] == run_of[middle]) == same_run;
+        return fits ? group_of[number] : -1;
+      };
+      field.beside.push_back({group_at(groups[g].first - 1, true), group_at(groups[g].end, true),
+                              group_at(middle - sector, false), group_at(middle + sector, false)});
+    }
+  }
+
+  /// Of the field's beams.
+  std::vector<Eigen::Vector3d> flows(const PreparedScene<1>& scene, const LightField& field,
+                                     const Eigen::Vector3d& place) const {
+    std::vector<Eigen::Vector3d> sums(field.beam_count(), Eigen::Vector3d::Zero());
+    const std::vector<Eigen::Vector3d> all = all_flows(scene, field.layer, place);
+    for (std::size_t k = 0; k < all.size(); ++k) sums[group_of[k]] += all[k];
+    return sums;
   }
 
   void fill(LightField& field) const {
@@ -125,20 +177,20 @@ struct Maker {
     tbb::parallel_for(0, across * field.nodes[2], [&](int node) {
       const int in_plane = node % across;
       const Eigen::Vector3d at = place(field, in_plane % field.nodes[0], in_plane / field.nodes[0], node / across);
-      const std::vector<Eigen::Vector3d> flows = all_flows(clear, field.layer, at);
+      const std::vector<Eigen::Vector3d> whole = flows(clear, field, at);
       const std::size_t first = static_cast<std::size_t>(node) * beams;
       for (int beam = 0; beam < beams; ++beam) {
-        const Eigen::Vector3d& flow = flows[kept[beam]];
+        const Eigen::Vector3d& flow = whole[beam];
         float* out = field.flow.data() + 4 * (first + beam);
         for (int a = 0; a < 3; ++a) out[a] = static_cast<float>(flow[a]);
         out[3] = static_cast<float>(flow.norm());
       }
       for (int band = 0; band < bands; ++band) {
-        const std::vector<Eigen::Vector3d> dimmed = all_flows(*absorbing[band], field.layer, at);
+        const std::vector<Eigen::Vector3d> dimmed = flows(*absorbing[band], field, at);
         for (int beam = 0; beam < beams; ++beam) {
-          const double whole = flows[kept[beam]].norm();
+          const double length = whole[beam].norm();
           field.pass[bands * (first + beam) + band] =
-              static_cast<float>(whole > 0.0 ? dimmed[kept[beam]].norm() / whole : 0.0);
+              static_cast<float>(length > 0.0 ? dimmed[beam].norm() / length : 0.0);
         }
       }
     });
@@ -159,15 +211,21 @@ struct Maker {
                                        cell / (cells[0] * cells[1]) + offset[2]);
       std::vector<float> held(4 * static_cast<std::size_t>(beams));
       look_up_flow(field, find_cell(field, float(at.x()), float(at.y()), float(at.z())), held.data());
-      const std::vector<Eigen::Vector3d> flows = all_flows(clear, field.layer, at);
+      const std::vector<Eigen::Vector3d> exact = flows(clear, field, at);
       double wrong = 0.0;
       double whole = 0.0;
-      for (int beam = 0; beam < beams; ++beam) {
+      for (int beam = 0; beam < beams;) {
+        const int lamp = field.lamp_of[beam];
         const double power = field.intensity[beam].sum();
-        const Eigen::Vector3d& exact = flows[kept[beam]];
-        const float* f = held.data() + 4 * beam;
-        wrong += power * (Eigen::Vector3d(f[0], f[1], f[2]) - exact).norm();
-        whole += power * exact.norm();
+        Eigen::Vector3d off = Eigen::Vector3d::Zero();
+        Eigen::Vector3d light = Eigen::Vector3d::Zero();
+        for (; beam < beams && field.lamp_of[beam] == lamp; ++beam) {
+          const float* f = held.data() + 4 * beam;
+          off += Eigen::Vector3d(f[0], f[1], f[2]) - exact[beam];
+          light += exact[beam];
+        }
+        wrong += power * off.norm();
+        whole += power * light.norm();
       }
       squares[number] = {wrong * wrong, whole * whole};
     });
@@ -188,10 +246,11 @@ void check_settings(const LightFieldSettings& settings) {
   if (settings.lens_points < 1 || settings.lens_points > 64) {
     fail("light field: lens_points is {}; it must be from 1 to 64", settings.lens_points);
   }
-  if (settings.guides.sectors < 1 || settings.guides.slices < 1 || settings.guides.beams() > 64) {
-    fail("light field: guides are cut into {} sectors of {} slices; 1 or more, and 64 beams at most, are allowed",
+  if (settings.guides.sectors < 1 || settings.guides.slices < 1 || settings.guides.beams() > 1000) {
+    fail("light field: guides are cut into {} sectors of {} slices; 1 or more, and 1000 beams at most, are allowed",
          settings.guides.sectors, settings.guides.slices);
   }
+  if (settings.most_beams < 1) fail("light field: most_beams is {}; it must be 1 or more", settings.most_beams);
   if (settings.guide_points < 1 || settings.guide_points > 16) {
     fail("light field: guide_points is {}; it must be from 1 to 16", settings.guide_points);
   }

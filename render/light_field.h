@@ -19,17 +19,23 @@ struct LightFieldSettings {
   double accuracy = 2e-3;  ///< relative RMS error of interpolation to reach, see LightField::error
   int lens_points = 4;     ///< a lamp's lens is averaged over lens_points^2 places; a point lamp takes one
   GuideCut guides;         ///< into what beams light guides are cut
-  int guide_points = 4;    ///< guide_beam_flows, 1 to 16
+  int guide_points = 3;    ///< guide_beam_flows, 1 to 16
+  int most_beams = 64;     ///< of all lamps together, see LightField; a direct renderer takes no more
   int most_nodes = 400000;
+};
+
+/// Which beams of the same guide lie beside a beam; -1 where there is none.
+struct BesideBeam {
+  int flatter = -1, steeper = -1, left = -1, right = -1;
 };
 
 /// A regular grid over a box. Between nodes F is interpolated linearly along each axis.
 ///
-/// What the grid holds are beams: a lamp is one, a light guide several (guide_beams.h), of which those that bring
-/// nothing are left out. F is kept as that of unit intensity without absorption, (W/m^2)/(W/sr) in the direction that
-/// light flows; a band's is intensity[beam][band] times `pass` times that. With absorbing media `pass` is the share of
-/// each band that arrives, taken along F's own direction: exact for a point lamp, off to second order in the angle that
-/// a lens fills.
+/// What the grid holds are beams: a lamp is one, a light guide several (guide_beams.h); those of them that bring
+/// little are put together. F is kept as that of unit intensity without absorption, (W/m^2)/(W/sr) in the direction
+/// that light flows; a band's is intensity[beam][band] times `pass` times that. With absorbing media `pass` is the
+/// share of each band that arrives, taken along F's own direction: exact for a point lamp, off to second order in the
+/// angle that a lens fills.
 struct LightField {
   Scene fixture;  ///< media, faces, lamps, environment; no surfaces and no balls
   Eigen::AlignedBox3d reach;
@@ -39,10 +45,11 @@ struct LightField {
   Eigen::Array3d step = Eigen::Array3d::Zero();  ///< mm
   std::vector<int> lamp_of;                      ///< index into fixture.lamps, by beam; beams of a lamp in a row
   std::vector<Spectrum> intensity;               ///< W/sr on the lamp's axis, by beam
+  std::vector<BesideBeam> beside;                ///< by beam
   std::vector<float> flow;  ///< [node][beam][4]: F and its length; node = x + nodes.x (y + nodes.y z)
   std::vector<float> pass;  ///< [node][beam][band], empty where nothing absorbs
   /// Estimate: root mean square over the middles of cells, where linear interpolation is worst, of |F - exact| summed
-  /// over the beams by power, over the same of |exact|.
+  /// over the lamps by power, over the same of |exact|.
   double error = 0.0;
 
   int beam_count() const { return static_cast<int>(intensity.size()); }
@@ -104,6 +111,16 @@ inline void look_up_flow(const LightField& field, const FieldCell& cell, float* 
     const float weight = cell.weight[corner];
     for (int k = 0; k < width; ++k) out[k] += weight * from[k];
   }
+}
+
+/// One beam's F.
+inline Eigen::Vector3f look_up_flow(const LightField& field, const FieldCell& cell, int beam) {
+  Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+  for (int corner = 0; corner < 8; ++corner) {
+    const std::size_t at = static_cast<std::size_t>(cell.node[corner]) * field.beam_count() + beam;
+    sum += cell.weight[corner] * Eigen::Map<const Eigen::Vector3f>(field.flow.data() + 4 * at);
+  }
+  return sum;
 }
 
 }  // namespace touchstone::render

@@ -23,7 +23,7 @@ struct alignas(64) PacketHits {
   float shading[3][kPacket];     ///< the shading normal, see Surface; as `normal` where there is no other
   float lift[3][kPacket];        ///< as RayHit::lift
   int object[kPacket];           ///< index of the surface, or surfaces.size() + index of the ball; -1 for nothing
-  int triangle[kPacket];         ///< of the surface; of no meaning on a ball
+  int triangle[kPacket];         ///< of the surface; -1 on a ball
   float u[kPacket], v[kPacket];  ///< on a triangle a b c the place is (1 - u - v) a + u b + v c
 };
 

@@ -1,6 +1,7 @@
 #pragma once
 // Which lamps can be hidden from a place of the membrane at all.
 
+#include <Eigen/Geometry>
 #include <cstdint>
 #include <limits>
 #include <vector>
@@ -19,6 +20,7 @@ struct LampBearings {
     float x = 0.0f, y = 0.0f;
     float length = 0.0f;                                    ///< of (x, y)
     float spread = std::numeric_limits<float>::infinity();  ///< no way from the cell differs by more
+    float swing = std::numeric_limits<float>::infinity();   ///< nor its unit vector across by more
     float side = 0.0f;                                      ///< 1: the lamp is above, -1: below
   };
 
@@ -28,6 +30,9 @@ struct LampBearings {
   int slabs = 1;
   std::vector<Bearing> bearings;  ///< [slab][row][column][lamp]
   std::vector<float> longest;     ///< by lamp: the most of length + spread, infinite if that isn't known everywhere
+  /// Round all lamps' places, where they are light guides: their light runs straight in the level plane, out of a plate
+  /// and into the layer. Empty if some lamp isn't one.
+  Eigen::AlignedBox2d guides;
 
   /// `soft`: shadow rays will go to all points of each lens, not to its middle only.
   LampBearings(const LightField& field, bool soft);
@@ -44,7 +49,8 @@ struct LampBearings {
 /// Where the first surface is a connected sheet whose triangles all face the same way along z (a height field), a ray
 /// that leaves it and climbs faster than the sheet does anywhere under its way can't meet it, and a ball hides a lamp
 /// only from the places that lie in its shadow. Other surfaces are taken for columns along z over the cells they
-/// cover. All answers are safe: a lamp that something hides is never left out.
+/// cover, but for walls round a sheet and guides that stand within them: what runs straight from guide to sheet doesn't
+/// meet those. All answers are safe: a lamp that something hides is never left out.
 class ShadowReach {
  public:
   /// `connected`: what is_connected says of the first surface, kept by those who draw the same triangles again.

@@ -23,6 +23,8 @@ class TruncatedNormal {
     const double x = middle_ + deviation_ * normal_quantile(below_ + u * mass_);
     return std::fmin(std::fmax(x, low_), low_ + width_);
   }
+  /// What the bounds leave of the whole normal distribution.
+  double mass() const { return mass_; }
   double density(double x) const {
     if (even_) return 1.0 / width_;
     const double off = (x - middle_) / deviation_;

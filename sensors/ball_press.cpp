@@ -13,25 +13,35 @@ namespace touchstone::sensors {
 namespace {
 
 constexpr double kSmallestRadius_px = 4.0;
-constexpr double kFaintest_DN = 6.0;    // summed over the channels: less is no contact
-constexpr double kStrongPart = 0.5;     // of a contact's strong difference, which marks others
-constexpr double kSecondArea = 0.15;    // of the first contact, from which a second counts
-constexpr double kSurroundings = 1.7;   // radii: within, the gel still bends round the ball
-constexpr double kFitPart = 0.85;       // of the contact's radius: where colours are compared with a ball's,
-constexpr double kFitPartOfBall = 0.5;  // and of the ball's: steeper parts may lie in a lamp's shadow
+constexpr double kFaintest_percent = 15.0;  // less is no contact
+constexpr float kDarkest_DN = 10.0F;        // a darker background doesn't count for less
+constexpr double kStrongPart = 0.5;         // of a contact's own brightening, which marks others
+constexpr double kSecondArea = 0.15;        // of the first contact, from which a second counts
+constexpr double kSurroundings = 1.1;       // ball radii: nothing nearer is another ball
+constexpr double kWidest = 3.4;             // ball radii: what one ball can brighten
+constexpr double kFitPart = 0.85;           // of the contact's radius: where colours are compared with a ball's,
+constexpr double kFitPartOfBall = 0.5;      // and of the ball's: steeper parts may lie in a lamp's shadow
 
-/// |frame - background|, summed over the channels, smoothed against noise.
-cv::Mat contrast_of(const cv::Mat& difference) {
-  cv::Mat contrast(difference.size(), CV_32FC1);
+enum class Change { brighter, either };
+
+/// By how many percent of the background a pixel has changed, summed over the channels, smoothed against noise. Flanks
+/// are brighter in the colour of the lamp that they face; the shadows that a contact casts are only darker.
+cv::Mat change_of(const cv::Mat& difference, const Background& background, Change kind) {
+  cv::Mat change(difference.size(), CV_32FC1);
   for (int v = 0; v < difference.rows; ++v) {
     const auto* in = difference.ptr<cv::Vec3f>(v);
-    auto* out = contrast.ptr<float>(v);
+    const auto* rest = background.mean.ptr<cv::Vec3f>(v);
+    auto* out = change.ptr<float>(v);
     for (int u = 0; u < difference.cols; ++u) {
-      out[u] = std::abs(in[u][0]) + std::abs(in[u][1]) + std::abs(in[u][2]);
+      out[u] = 0.0F;
+      for (int c = 0; c < 3; ++c) {
+        const float part = kind == Change::either ? std::abs(in[u][c]) : std::max(in[u][c], 0.0F);
+        out[u] += 100.0F * part / std::max(rest[u][c], kDarkest_DN);
+      }
     }
   }
-  cv::GaussianBlur(contrast, contrast, {}, 1.5);
-  return contrast;
+  cv::GaussianBlur(change, change, {}, 1.5);
+  return change;
 }
 
 /// Calls `use(u, v, offset)` for each pixel of the picture whose centre is within `radius` of `centre`.
@@ -57,11 +67,11 @@ float quantile(std::vector<float> values, double share) {
   return *at;
 }
 
-/// @throws Error if there's a second contact outside of the circle
-void refuse_second_contact(const cv::Mat& contrast, const ContactCircle& circle, float strong,
+/// @throws Error if there's a second contact: two balls of one size touch the gel at least their diameter apart
+void refuse_second_contact(const cv::Mat& brightening, const ContactCircle& circle, double ball_px, float strong,
                            const std::string& name) {
-  cv::Mat marks = contrast > kStrongPart * static_cast<double>(strong);
-  for_each_pixel(marks.size(), circle.centre, kSurroundings * circle.radius,
+  cv::Mat marks = brightening > kStrongPart * static_cast<double>(strong);
+  for_each_pixel(marks.size(), circle.centre, kSurroundings * ball_px,
                  [&](int u, int v, const Eigen::Vector2d&) { marks.at<unsigned char>(v, u) = 0; });
   cv::Mat labels;
   cv::Mat statistics;
@@ -120,14 +130,14 @@ Eigen::Vector2d best_centre(const cv::Mat& difference, Eigen::Vector2d centre, d
   return centre;
 }
 
-/// Where the mean contrast over circles round `centre` is highest: contact ends there and the slope falls off again.
-double rim_radius(const cv::Mat& contrast, const Eigen::Vector2d& centre, double largest) {
+/// Where circles round `centre` have changed most in the mean: contact ends there and the slope falls off again.
+double rim_radius(const cv::Mat& change, const Eigen::Vector2d& centre, double largest) {
   constexpr double kBin = 0.5;
   std::vector<double> sums(static_cast<std::size_t>(largest / kBin) + 1, 0.0);
   std::vector<double> counts(sums.size(), 0.0);
-  for_each_pixel(contrast.size(), centre, largest, [&](int u, int v, const Eigen::Vector2d& offset) {
+  for_each_pixel(change.size(), centre, largest, [&](int u, int v, const Eigen::Vector2d& offset) {
     const auto bin = std::min(static_cast<std::size_t>(offset.norm() / kBin), sums.size() - 1);
-    sums[bin] += contrast.at<float>(v, u);
+    sums[bin] += change.at<float>(v, u);
     counts[bin] += 1.0;
   });
   const auto ring = [&](std::size_t i) {  // over three bins, against the grid's own unevenness
@@ -185,15 +195,15 @@ std::vector<ColourSample> samples_of(const BallPress& press, const Background& b
   }
 
   const cv::Mat difference = difference_to(background, press.frame);
-  const cv::Mat contrast = contrast_of(difference);
+  const cv::Mat brightening = change_of(difference, background, Change::brighter);
   std::vector<float> within;
-  for_each_pixel(contrast.size(), circle.centre, circle.radius,
-                 [&](int u, int v, const Eigen::Vector2d&) { within.push_back(contrast.at<float>(v, u)); });
+  for_each_pixel(brightening.size(), circle.centre, circle.radius,
+                 [&](int u, int v, const Eigen::Vector2d&) { within.push_back(brightening.at<float>(v, u)); });
   const float strong = quantile(within, 0.9);
-  if (strong < kFaintest_DN)
+  if (strong < kFaintest_percent)
     fail("{}: nothing is pressed at ({:.0f}, {:.0f}): the frame is as the background there", press.name,
          circle.centre.x(), circle.centre.y());
-  refuse_second_contact(contrast, circle, strong, press.name);
+  refuse_second_contact(brightening, circle, press.ball_radius_mm / mm_per_px, strong, press.name);
 
   std::vector<ColourSample> samples;
   int saturated = 0;
@@ -226,12 +236,13 @@ ContactCircle find_contact_circle(const cv::Mat& frame, const Background& backgr
   const std::string fault = frame_fault(frame, background.mean.size());
   if (!fault.empty()) fail("{}: the frame {}", name, fault);
   const cv::Mat difference = difference_to(background, frame);
-  const cv::Mat contrast = contrast_of(difference);
+  const cv::Mat brightening = change_of(difference, background, Change::brighter);
+  const cv::Mat change = change_of(difference, background, Change::either);
   double highest = 0.0;
-  cv::minMaxLoc(contrast, nullptr, &highest);
-  if (highest < kFaintest_DN) fail("{}: no contact is seen: the frame is as the background", name);
+  cv::minMaxLoc(brightening, nullptr, &highest);
+  if (highest < kFaintest_percent) fail("{}: no contact is seen: the frame is as the background", name);
 
-  cv::Mat marks = contrast > 0.35 * highest;
+  cv::Mat marks = brightening > 0.35 * highest;
   std::vector<std::vector<cv::Point>> outlines;
   // A ball's middle is as bright as the gel at rest: only outlines count, and gaps in the ring are closed.
   const double ball_px = ball_radius_mm / mm_per_px;
@@ -255,7 +266,7 @@ ContactCircle find_contact_circle(const cv::Mat& frame, const Background& backgr
   if (box.x == 0 || box.y == 0 || box.x + box.width == frame.cols || box.y + box.height == frame.rows) {
     fail("{}: the contact touches the edge of the picture; press where all of it is seen", name);
   }
-  if (std::max(box.width, box.height) > 2.0 * kSurroundings * ball_px) {
+  if (std::max(box.width, box.height) > kWidest * ball_px) {
     fail("{}: the contact is {} x {} px, more than a ball of {:.2f} mm radius can make: is there more than one?", name,
          box.width, box.height, ball_radius_mm);
   }
@@ -265,16 +276,16 @@ ContactCircle find_contact_circle(const cv::Mat& frame, const Background& backgr
   for (int pass = 0; pass < 3; ++pass) {  // each makes the other better
     circle.centre =
         best_centre(difference, circle.centre, std::min(kFitPart * circle.radius, kFitPartOfBall * ball_px), ball_px);
-    circle.radius = std::min(rim_radius(contrast, circle.centre, 0.98 * ball_px), 0.97 * ball_px);
+    circle.radius = std::min(rim_radius(change, circle.centre, 0.98 * ball_px), 0.97 * ball_px);
     if (circle.radius < kSmallestRadius_px) {
       fail("{}: the contact's radius is {:.1f} px; at least {:.0f} are needed: press deeper", name, circle.radius,
            kSmallestRadius_px);
     }
   }
   std::vector<float> within;
-  for_each_pixel(contrast.size(), circle.centre, circle.radius,
-                 [&](int u, int v, const Eigen::Vector2d&) { within.push_back(contrast.at<float>(v, u)); });
-  refuse_second_contact(contrast, circle, quantile(within, 0.9), name);
+  for_each_pixel(brightening.size(), circle.centre, circle.radius,
+                 [&](int u, int v, const Eigen::Vector2d&) { within.push_back(brightening.at<float>(v, u)); });
+  refuse_second_contact(brightening, circle, ball_px, quantile(within, 0.9), name);
   return circle;
 }
 

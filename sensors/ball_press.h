@@ -41,9 +41,9 @@ struct PressSampling {
 std::vector<ColourSample> samples_of(const BallPress& press, const Background& background, double mm_per_px,
                                      const PressSampling& how = {});
 
-/// Looks for the one ball that a frame shows: the region that differs from the background, its outline's circle; the
-/// centre is then moved to where matt shading of the ball explains the colours best, and the radius put where the
-/// colours differ most from the background, which is the rim of contact (it comes out up to 1.5 px small).
+/// Looks for the one ball that a frame shows: the region that is brighter than the background, its outline's circle;
+/// the centre is then moved to where matt shading of the ball explains the colours best, and the radius put where
+/// circles are brightest, which is the rim of contact (it comes out up to 1.5 px small).
 /// @throws Error naming `name` if there's nothing, more than one contact, or a contact that touches the picture's edge
 ContactCircle find_contact_circle(const cv::Mat& frame, const Background& background, double ball_radius_mm,
                                   double mm_per_px, const std::string& name);

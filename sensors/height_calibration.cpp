@@ -14,6 +14,14 @@ constexpr std::size_t kCellsToCompare = 1U << 17U;  // coarser tables serve to c
 
 using Samples = std::vector<ColourSample>;
 
+Samples corrected_samples(const Samples& samples, const ColourCorrection& correction) {
+  Samples corrected = samples;
+  for (ColourSample& sample : corrected) {
+    sample.colour = (correction.at(sample.place.cast<double>()) * sample.colour.cast<double>()).cast<float>();
+  }
+  return corrected;
+}
+
 struct FittedLight {
   LampModel lamps;
   ColourCorrection correction;
@@ -21,11 +29,13 @@ struct FittedLight {
 
 FittedLight fit_light(const Samples& samples, std::size_t presses, const Background& background,
                       const HeightCalibrationSettings& settings, LightCorrection kind) {
+  const ColourCorrection by_background = ColourCorrection::by_background(background.mean);
+  const Samples scaled = corrected_samples(samples, by_background);
   const auto fit = [&](int order) {
     FittedLight light;
-    light.lamps = fit_lamps(samples, background.mean.size(), order, settings.lamp_steepest);
-    if (kind == LightCorrection::background) light.correction = ColourCorrection::by_background(background.mean);
-    if (kind == LightCorrection::fitted) light.correction = ColourCorrection::by_lamps(light.lamps);
+    light.lamps = fit_lamps(scaled, background.mean.size(), order, settings.lamp_steepest);
+    if (kind == LightCorrection::background) light.correction = by_background;
+    if (kind == LightCorrection::fitted) light.correction = ColourCorrection::by_lamps(background.mean, light.lamps);
     return light;
   };
   if (settings.lamp_order) return fit(*settings.lamp_order);
@@ -46,14 +56,6 @@ struct Learnt {
   Samples corrected;
   SlopeTable table;
 };
-
-Samples corrected_samples(const Samples& samples, const ColourCorrection& correction) {
-  Samples corrected = samples;
-  for (ColourSample& sample : corrected) {
-    sample.colour = (correction.at(sample.place.cast<double>()) * sample.colour.cast<double>()).cast<float>();
-  }
-  return corrected;
-}
 
 Learnt learn(const Samples& samples, std::size_t presses, const Background& background,
              const HeightCalibrationSettings& settings, LightCorrection kind) {
@@ -106,22 +108,25 @@ HeightCalibration calibrate_height(std::span<const BallPress> presses, const Bac
     all.insert(all.end(), parts.back().begin(), parts.back().end());
   }
   if (all.empty()) fail("the ball presses have no pixel that can be used");
-  Learnt learnt = learn(all, presses.size(), background, settings, settings.correction);
-
   HeightCalibration result;
+  LightCorrection kind = settings.correction.value_or(LightCorrection::background);
+  if ((settings.cross_validate || !settings.correction) && presses.size() >= kPressesForOrder1) {
+    for (const LightCorrection tried : {LightCorrection::none, LightCorrection::background, LightCorrection::fitted}) {
+      result.left_out.push_back({tried, left_out_error(parts, background, settings, tried)});
+    }
+    const auto best = std::min_element(result.left_out.begin(), result.left_out.end(),
+                                       [](const SlopeError& a, const SlopeError& b) { return a.rms < b.rms; });
+    if (!settings.correction) kind = best->correction;
+  }
+  Learnt learnt = learn(all, presses.size(), background, settings, kind);
   result.pixels = all.size();
   result.rms_slope_error =
       std::sqrt(squared_error(learnt.table, learnt.corrected) / (2.0 * static_cast<double>(all.size())));
   result.coverage = coverage_of(learnt.table, learnt.corrected);
-  if (settings.cross_validate && presses.size() >= kPressesForOrder1) {
-    for (const LightCorrection kind : {LightCorrection::none, LightCorrection::background, LightCorrection::fitted}) {
-      result.left_out.push_back({kind, left_out_error(parts, background, settings, kind)});
-    }
-  }
   HeightModel& model = result.model;
   model.mm_per_px = settings.mm_per_px;
   model.background = background;
-  model.correction = settings.correction;
+  model.correction = kind;
   model.lamps = std::move(learnt.light.lamps);
   model.table = std::move(learnt.table);
   model.steepest_calibrated = result.coverage.steepest_slope;

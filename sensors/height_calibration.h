@@ -12,7 +12,8 @@ namespace touchstone::sensors {
 
 struct HeightCalibrationSettings {
   double mm_per_px = 0.0;
-  LightCorrection correction = LightCorrection::fitted;
+  std::optional<LightCorrection> correction{};  ///< absent: the one with the least left-out error; `background` below 3
+                                                ///< presses
   std::optional<int> lamp_order{};  ///< absent: 0 below 3 presses, 1 below 6, else 2, and less where the presses'
                                     ///< places don't determine that
   double lamp_steepest = 0.6;       ///< slopes up to which every lamp is taken to stand above the membrane's horizon

@@ -58,7 +58,7 @@ ColourCorrection correction_of(const HeightModel& model) {
     case LightCorrection::fitted:
       break;
   }
-  return ColourCorrection::by_lamps(model.lamps);
+  return ColourCorrection::by_lamps(model.background.mean, model.lamps);
 }
 
 }  // namespace touchstone::sensors

@@ -23,7 +23,7 @@ struct HeightModel {
 /// range.
 std::string fault_of(const HeightModel& model);
 
-/// The correction that belongs to the model. @throws Error if its lamps can't be inverted
+/// The correction that belongs to the model.
 ColourCorrection correction_of(const HeightModel& model);
 
 }  // namespace touchstone::sensors

@@ -21,7 +21,7 @@ struct ColourSample {
 enum class LightCorrection {
   none,        ///< one table for all places, as the source text has it
   background,  ///< each channel is scaled by its mean background / its background there: brightness that falls off
-  fitted       ///< colours are led back to the middle's by the lamps' vectors there, fitted to the presses
+  fitted       ///< so scaled, colours are led back to the middle's by the lamps' vectors there, fitted to the presses
 };
 const char* name_of(LightCorrection correction);
 
@@ -55,8 +55,8 @@ class ColourCorrection {
   ColourCorrection() = default;
   /// By the background's smoothed brightness. @pre `background_mean` is CV_32FC3
   static ColourCorrection by_background(const cv::Mat& background_mean);
-  /// By the lamps. @throws Error if their matrix can't be inverted everywhere
-  static ColourCorrection by_lamps(const LampModel& lamps);
+  /// By the background and then by the lamps of colours that were scaled by it: the likeliest colour in the middle.
+  static ColourCorrection by_lamps(const cv::Mat& background_mean, const LampModel& lamps);
 
   Eigen::Matrix3d at(const Eigen::Vector2d& place) const;
 

@@ -102,7 +102,7 @@ struct TouchRig::Parts {
     scene.seed = settings.seed;
     scene.membrane.pixel_um = settings.membrane_um;
     scene.light.interreflection_tolerance = settings.interreflection_tolerance;
-    scene.effects.fine_relief = device.gel.shape == GelShape::slab ? Switch::on : Switch::off;
+    scene.effects.fine_relief = is_gentle(device.gel) ? Switch::on : Switch::off;
     scene.effects.motion_blur = Switch::off;
     scene.effects.rolling_shutter = Switch::off;
     const bool fit = unfit_for_direct_light(scene, make_plan(scene)).empty();
