@@ -48,10 +48,6 @@ sensors::HeightModel calibrate_view(const sim::TouchRig& rig, std::uint64_t nois
 /// outlive it. @throws Error if the model can't be used
 HeightsOf estimated_heights(const sim::TouchRig& rig, const sensors::HeightModel& model, std::uint64_t noise_seed);
 
-/// The membrane as it truly is, with white noise of this standard deviation in each pixel: what a better camera and
-/// estimator would give. The rig must outlive it.
-HeightsOf true_heights(const sim::TouchRig& rig, double noise_mm, std::uint64_t noise_seed);
-
 /// The height image of press number `image` on class number `texture`: a new piece of the surface, at a random angle,
 /// place and force, all chosen by (seed, texture, image).
 cv::Mat press_texture(const sim::TouchRig& rig, const sim::ObjectSpec& object, const TexturePresses& presses,
