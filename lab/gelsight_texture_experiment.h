@@ -27,7 +27,7 @@ sim::ObjectSpec another_patch(const sim::ObjectSpec& object, std::uint64_t seed)
 
 struct TexturePresses {
   int images = 6;             ///< of each class
-  double force_N = 25.0;      ///< mean
+  double force_N = 8.0;       ///< mean: some 30 kPa under the disc, a firm touch by hand
   double force_spread = 0.1;  ///< relative standard deviation
   double shift_mm = 0.3;      ///< standard deviation of the place, along each axis
   std::uint64_t seed = 1;

@@ -88,7 +88,6 @@ std::vector<ValidationRow> validate_gelsight_texture(const ValidateOptions& opti
   std::vector<sim::ObjectSpec> objects = texture_objects(options.scenes);
   if (options.quick) objects = some_of(objects);
   TexturePresses presses;
-  presses.force_N = 8.0;
   presses.seed = kSeed;
   if (options.quick) presses.images = 3;
   const std::vector<TextureSample> samples = texture_samples(rig, objects, presses, heights, options.progress);
