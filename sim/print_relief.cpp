@@ -93,7 +93,7 @@ std::vector<Segment> segments_of(const PrintRelief& relief) {
     Eigen::Vector2d last = Eigen::Vector2d::Zero();
     for (std::size_t at = 0; at + 1 < glyph->strokes.size(); at += 3) {
       const Eigen::Vector2d point =
-          unit * (corner + Eigen::Vector2d(glyph->strokes[at] - '0', glyph->strokes[at + 1] - '0'));
+          unit * (corner + Eigen::Vector2d(glyph->strokes[at] - '0', kGlyphHeight - (glyph->strokes[at + 1] - '0')));
       if (pen_down) segments.push_back({last, point});
       last = point;
       pen_down = at + 2 < glyph->strokes.size() && glyph->strokes[at + 2] == ' ';
