@@ -107,7 +107,8 @@ double plate_radius_by_hertz(const sim::GelSpec& gel, double force) {
   return std::cbrt(0.75 * force * gel.sphere_radius_mm / modulus);
 }
 
-DomeHeights measure_dome_heights(const sim::TouchRig& rig, const CalibrationPresses& presses, std::uint64_t seed) {
+DomeHeights measure_dome_heights(const sim::TouchRig& rig, const CalibrationPresses& presses,
+                                 sensors::LightCorrection correction, std::uint64_t seed) {
   std::vector<cv::Mat> rest;
   for (int i = 0; i < presses.background_frames; ++i) rest.push_back(rig.background(seed, i));
   const sim::TouchObject small_ball = rig.object(ball_of(presses.ball_diameter_mm));
@@ -132,7 +133,7 @@ DomeHeights measure_dome_heights(const sim::TouchRig& rig, const CalibrationPres
   }
   sensors::HeightCalibrationSettings settings;
   settings.mm_per_px = rig.mm_per_px();
-  settings.correction = sensors::LightCorrection::fitted;
+  settings.correction = correction;
   const sensors::HeightCalibration calibration =
       sensors::calibrate_height(annotated, sensors::mean_background(rest), settings);
   sensors::HeightEstimator estimator(calibration.model);

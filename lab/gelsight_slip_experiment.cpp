@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <numeric>
 
 #include "core/error.h"
 #include "lab/gelsight_force_experiment.h"
@@ -171,9 +170,12 @@ SlipRun run_slip_case(const sim::TouchRig& rig, const SlipCase& what, const Slip
   return run;
 }
 
-double SlipScore::mean_delay_ms() const {
+double SlipScore::median_delay_ms() const {
   if (delays_ms.empty()) return std::numeric_limits<double>::quiet_NaN();
-  return std::accumulate(delays_ms.begin(), delays_ms.end(), 0.0) / static_cast<double>(delays_ms.size());
+  std::vector<double> sorted = delays_ms;
+  std::sort(sorted.begin(), sorted.end());
+  const std::size_t half = sorted.size() / 2;
+  return sorted.size() % 2 == 1 ? sorted[half] : 0.5 * (sorted[half - 1] + sorted[half]);
 }
 
 double SlipScore::false_alarms_percent() const {

@@ -75,7 +75,7 @@ struct SlipScore {
   int quiet_frames = 0;           ///< frames of quiet runs, and of the others' before any shear
   int false_frames = 0;
 
-  double mean_delay_ms() const;         ///< NaN if none was found
+  double median_delay_ms() const;       ///< NaN if none was found
   double false_alarms_percent() const;  ///< false over quiet frames
 };
 

@@ -166,18 +166,6 @@ HeightsOf estimated_heights(const sim::TouchRig& rig, const sensors::HeightModel
   };
 }
 
-HeightsOf true_heights(const sim::TouchRig& rig, double noise_mm, std::uint64_t noise_seed) {
-  return [&rig, noise_mm, noise_seed](const sim::TouchObject& object, const fem::PressState& press, int number) {
-    cv::Mat heights = rig.look(object, press, noise_seed, number, true).height;
-    RandomStream random(noise_seed, static_cast<std::uint64_t>(number), Purpose::kImagerNoise);
-    for (int j = 0; j < heights.rows; ++j) {
-      auto* row = heights.ptr<float>(j);
-      for (int i = 0; i < heights.cols; ++i) row[i] += static_cast<float>(noise_mm * random.normal());
-    }
-    return heights;
-  };
-}
-
 cv::Mat press_texture(const sim::TouchRig& rig, const sim::ObjectSpec& object, const TexturePresses& presses,
                       int texture, int image, const HeightsOf& look) {
   const auto number = (static_cast<std::uint64_t>(texture) << 16) + static_cast<std::uint64_t>(image);

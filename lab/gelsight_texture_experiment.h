@@ -27,7 +27,7 @@ sim::ObjectSpec another_patch(const sim::ObjectSpec& object, std::uint64_t seed)
 
 struct TexturePresses {
   int images = 6;             ///< of each class
-  double force_N = 25.0;      ///< mean
+  double force_N = 8.0;       ///< mean: some 30 kPa under the disc, a firm touch by hand
   double force_spread = 0.1;  ///< relative standard deviation
   double shift_mm = 0.3;      ///< standard deviation of the place, along each axis
   std::uint64_t seed = 1;
@@ -47,10 +47,6 @@ sensors::HeightModel calibrate_view(const sim::TouchRig& rig, std::uint64_t nois
 /// Heights of the view as the sensor gives them: from the camera's frame, by a model of calibrate_view. The rig must
 /// outlive it. @throws Error if the model can't be used
 HeightsOf estimated_heights(const sim::TouchRig& rig, const sensors::HeightModel& model, std::uint64_t noise_seed);
-
-/// The membrane as it truly is, with white noise of this standard deviation in each pixel: what a better camera and
-/// estimator would give. The rig must outlive it.
-HeightsOf true_heights(const sim::TouchRig& rig, double noise_mm, std::uint64_t noise_seed);
 
 /// The height image of press number `image` on class number `texture`: a new piece of the surface, at a random angle,
 /// place and force, all chosen by (seed, texture, image).

@@ -89,7 +89,7 @@ std::vector<HeldTouch> TouchBench::touches(const sim::TouchObject& object, std::
 }
 
 HeightReader estimated_heights(const sim::TouchRig& rig, std::uint64_t seed) {
-  const CalibratedRig calibrated = calibrate_rig(rig, {}, seed);
+  const CalibratedRig calibrated = calibrate_rig(rig, {}, {}, seed);
   sensors::HeightSettings settings;
   settings.border = sensors::HeightBorder::free;
   const auto estimator = std::make_shared<sensors::HeightEstimator>(calibrated.calibration.model, settings);

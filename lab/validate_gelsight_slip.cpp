@@ -187,8 +187,9 @@ void add_slip_rows(Rows& rows, const std::vector<SlipRun>& runs) {
   const SlipScore rim = score(runs, SlipDetector::incipient);
   const SlipScore rule = score(runs, SlipDetector::rule);
   const auto percent = [](int part, int whole) { return whole > 0 ? 100.0 * part / whole : 0.0; };
-  rows.add("gelsight.slip.delay_ms", "slip at the rim found against the onset of gross sliding, mean; below 0: before",
-           "ms", Better::lower, 0.0, false, rim.mean_delay_ms());
+  rows.add("gelsight.slip.delay_ms",
+           "slip at the rim found against the onset of gross sliding, median; below 0: before", "ms", Better::lower,
+           0.0, false, rim.median_delay_ms());
   rows.add("gelsight.slip.found_before_percent", "slides in which slip at the rim was found before gross sliding", "%",
            Better::higher, 90.0, false, percent(rim.found_before, rim.slides));
   rows.add("gelsight.slip.false_alarms_percent",
@@ -197,8 +198,8 @@ void add_slip_rows(Rows& rows, const std::vector<SlipRun>& runs) {
   rows.add("gelsight.slip.rule_found_percent", "slides that the text's rule rf > 1 and rm > 0.5 found", "%",
            Better::higher, 90.0, false, percent(rule.found, rule.slides));
   if (rule.found > 0) {
-    rows.add("gelsight.slip.rule_delay_ms", "the text's rule against the onset of gross sliding, mean", "ms",
-             Better::lower, 0.0, false, rule.mean_delay_ms());
+    rows.add("gelsight.slip.rule_delay_ms", "the text's rule against the onset of gross sliding, median", "ms",
+             Better::lower, 0.0, false, rule.median_delay_ms());
   }
   rows.add("gelsight.slip.rule_false_alarms_percent", "frames with slip reported by the text's rule, as above", "%",
            Better::lower, kMostFalseAlarms_percent, false, rule.false_alarms_percent());

@@ -7,6 +7,7 @@
 #include <fmt/ranges.h>
 
 #include <chrono>
+#include <utility>
 #include <vector>
 
 #include "lab/gelsight_texture_experiment.h"
@@ -17,7 +18,7 @@ namespace {
 
 constexpr sensors::TextureOperator kWide{{16, 2.0}, 4};
 constexpr sensors::TextureOperator kNarrow{{8, 1.0}, 4};
-constexpr double kGrayStep_mm = 0.002;  // half a frame's noise in a height map, and a hundredth of coarse cloth
+constexpr double kGrayStep_mm = 0.002;  // chosen before any sample was made: far below every surface's relief
 constexpr std::uint64_t kSeed = 1;
 constexpr int kSquares = 4;
 constexpr double kNormal95 = 1.96;
@@ -78,13 +79,15 @@ std::vector<ValidationRow> validate_gelsight_texture(const ValidateOptions& opti
   how.deepest_mm = 1.0;
   how.membrane_um = 30.0;  // a pixel of the camera sees 27 um
   how.edge_side = 1;       // every pixel of a texture differs from the next
-  const sim::TouchRig rig(portable_device(options.scenes), options.cache, how);
+  sim::DeviceSpec device = portable_device(options.scenes);
+  // All samples are cut from the middle of the picture: the imager reads out no more than that.
+  device.camera->width = device.camera->height = kTextureView_px;
+  const sim::TouchRig rig(std::move(device), options.cache, how);
   const HeightsOf heights = estimated_heights(rig, calibrate_view(rig, kSeed), kSeed);
 
   std::vector<sim::ObjectSpec> objects = texture_objects(options.scenes);
   if (options.quick) objects = some_of(objects);
   TexturePresses presses;
-  presses.force_N = 8.0;
   presses.seed = kSeed;
   if (options.quick) presses.images = 3;
   const std::vector<TextureSample> samples = texture_samples(rig, objects, presses, heights, options.progress);

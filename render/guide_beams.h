@@ -13,7 +13,7 @@ namespace touchstone::render {
 /// itself in slices by height, then the first mirror image, then all further ones together. So a facet whose horizon
 /// cuts the guide sees some beams and not others, and shadows get soft rims.
 struct GuideCut {
-  int sectors = 4;
+  int sectors = 5;
   int slices = 2;
 
   int beams_a_sector() const { return slices + 2; }

@@ -33,11 +33,11 @@ TEST(SlipScore, DelaysCountFromTheOnset) {
   EXPECT_EQ(rule.slides, 2);
   EXPECT_EQ(rule.found, 1);
   EXPECT_EQ(rule.found_before, 0);
-  EXPECT_NEAR(rule.mean_delay_ms(), 2.0 / 30.0 * 1e3, 1e-9);
+  EXPECT_NEAR(rule.median_delay_ms(), 2.0 / 30.0 * 1e3, 1e-9);
   const SlipScore incipient = score(runs, SlipDetector::incipient);
   EXPECT_EQ(incipient.found, 2);
   EXPECT_EQ(incipient.found_before, 1);
-  EXPECT_NEAR(incipient.mean_delay_ms(), 0.0, 1e-9);  // once a frame before, once a frame after
+  EXPECT_NEAR(incipient.median_delay_ms(), 0.0, 1e-9);  // once a frame before, once a frame after
 }
 
 TEST(SlipScore, ReportsWithoutSlipAreFalseAlarms) {
@@ -50,7 +50,7 @@ TEST(SlipScore, ReportsWithoutSlipAreFalseAlarms) {
   EXPECT_EQ(result.false_frames, 3);
   EXPECT_NEAR(result.false_alarms_percent(), 100.0 * 3 / 16, 1e-12);
   EXPECT_EQ(result.found, 0);
-  EXPECT_TRUE(std::isnan(result.mean_delay_ms()));
+  EXPECT_TRUE(std::isnan(result.median_delay_ms()));
   EXPECT_EQ(score({}, SlipDetector::rule).false_alarms_percent(), 0.0);
 }
 

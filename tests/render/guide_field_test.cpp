@@ -54,7 +54,8 @@ Eigen::Vector3d flow_by_connections(Scene scene, const Eigen::Vector3d& place, i
 TEST(GuideField, BeamsTogetherAreAllLight) {
   LightFieldSettings rough;
   rough.accuracy = 0.5;
-  rough.guide_points = 8;
+  LightFieldSettings fine;
+  fine.guide_points = 8;
   for (double tilt : {0.0, 0.45, -0.3}) {
     for (double lobe : {0.17, 0.6}) {
       const Scene scene = guide_scene(tilt, lobe);
@@ -63,7 +64,7 @@ TEST(GuideField, BeamsTogetherAreAllLight) {
       for (const Eigen::Vector3d& place :
            {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(-9, 6, -0.5), Eigen::Vector3d(11, -8, -1.5)}) {
         const Eigen::Vector3d expected = flow_by_connections(scene, place, 400);
-        const Eigen::Vector3d found = exact_flow(field, 0, place).head<3>();
+        const Eigen::Vector3d found = exact_flow(field, 0, place, fine).head<3>();
         EXPECT_LT((found - expected).norm(), 5e-3 * expected.norm())
             << "tilt " << tilt << ", lobe " << lobe << ", at " << place.transpose() << ": " << found.transpose()
             << " for " << expected.transpose();
@@ -183,7 +184,8 @@ TEST(DirectGuides, CastShadowsThatMatter) {
   bare.shadows = false;
   const cv::Mat with = DirectRenderer(field, camera, scene).render(scene).irradiance;
   const cv::Mat without = DirectRenderer(field, camera, scene, bare).render(scene).irradiance;
-  EXPECT_GT(cv::norm(without - with, cv::NORM_L2), 0.05 * cv::norm(with, cv::NORM_L2));
+  // More than the error that ShadeAndShadowADentAsPathsDo allows, which thus fails without them.
+  EXPECT_GT(cv::norm(without - with, cv::NORM_L2), 0.025 * cv::norm(with, cv::NORM_L2));
 }
 
 TEST(DirectPrints, EqualThePathTracersPicture) {
