@@ -1,9 +1,6 @@
 #include "apps/command.h"
 
-#include <array>
-
 #include "core/error.h"
-#include "core/nearest_name.h"
 
 namespace touchstone::apps {
 
@@ -13,11 +10,18 @@ void require_writable_place(const std::filesystem::path& file) {
   if (std::filesystem::is_directory(file)) fail("{}: is a folder; a file is wanted here", file.string());
 }
 
-void require_known_sensor(const std::string& sensor) {
-  static const std::array<std::string, 1> kKnown = {"vhs"};
-  if (std::find(kKnown.begin(), kKnown.end(), sensor) != kKnown.end()) return;
-  fail("'{}' is no sensor with an estimator{}; allowed is: {}", sensor, did_you_mean(sensor, kKnown),
-       fmt::join(kKnown, ", "));
+void add_calibrate_command(CLI::App& app, const GlobalOptions& global, Action& action) {
+  CLI::App* command = app.add_subcommand("calibrate", "Make a sensor's model from frames, simulated or recorded");
+  command->require_subcommand(1);
+  add_gelsight_calibration(*command, global, action);
+  add_vhs_calibration(*command, global, action);
+}
+
+void add_estimate_command(CLI::App& app, const GlobalOptions& global, Action& action) {
+  CLI::App* command = app.add_subcommand("estimate", "What a sensor's frames tell, by a model that `calibrate` made");
+  command->require_subcommand(1);
+  add_gelsight_estimation(*command, global, action);
+  add_vhs_estimation(*command, global, action);
 }
 
 }  // namespace touchstone::apps

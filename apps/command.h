@@ -28,7 +28,10 @@ void add_inspect_command(CLI::App& app, const GlobalOptions& global, Action& act
 /// @throws Error if a result can't be written at `file`: its folder isn't there, or it's a folder itself
 void require_writable_place(const std::filesystem::path& file);
 
-/// @throws Error that names the nearest one if `sensor` isn't one that has an estimator in this command
-void require_known_sensor(const std::string& sensor);
+// What calibrate and estimate do differs from sensor to sensor: each sensor's form is a command below them.
+void add_vhs_calibration(CLI::App& calibrations, const GlobalOptions& global, Action& action);
+void add_gelsight_calibration(CLI::App& calibrations, const GlobalOptions& global, Action& action);
+void add_vhs_estimation(CLI::App& estimations, const GlobalOptions& global, Action& action);
+void add_gelsight_estimation(CLI::App& estimations, const GlobalOptions& global, Action& action);
 
 }  // namespace touchstone::apps

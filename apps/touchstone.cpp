@@ -32,12 +32,18 @@ int complain(int code, const std::string& message) {
 
 /// CLI11 only says that an unknown command "was not expected".
 void refuse_unknown_command(const CLI::App& app, int argc, char** argv) {
-  if (argc < 2 || argv[1][0] == '-') return;
-  std::vector<std::string> known;
-  for (const CLI::App* command : app.get_subcommands({})) known.push_back(command->get_name());
-  const std::string name = argv[1];
-  if (std::find(known.begin(), known.end(), name) != known.end()) return;
-  fail("'{}' is not a command{}; there are: {}", name, did_you_mean(name, known), fmt::join(known, ", "));
+  const CLI::App* at = &app;
+  for (int i = 1; i < argc && argv[i][0] != '-'; ++i) {
+    std::vector<std::string> known;
+    for (const CLI::App* command : at->get_subcommands({})) known.push_back(command->get_name());
+    if (known.empty()) return;
+    const std::string name = argv[i];
+    if (std::find(known.begin(), known.end(), name) == known.end()) {
+      fail("'{}' is not a {}{}; there are: {}", name, at == &app ? "command" : "sensor of '" + at->get_name() + "'",
+           did_you_mean(name, known), fmt::join(known, ", "));
+    }
+    at = at->get_subcommand(name);
+  }
 }
 
 int run(int argc, char** argv) {

@@ -15,6 +15,8 @@ enum class Purpose : std::uint32_t {
   kEventThreshold = 6,
   kEventNoise = 7,
   kLampSpread = 8,
+  kMatchSampling = 9,
+  kRelief = 10,
   kTest = 99,
 };
 

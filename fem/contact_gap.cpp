@@ -206,10 +206,6 @@ class TriangleGap {
   double steep_ = 1.0;
 };
 
-bool is_convex(const ContactShape& shape) {
-  return !std::holds_alternative<MeshShape>(shape) && !std::holds_alternative<ReliefShape>(shape);
-}
-
 }  // namespace
 
 ContactSurface::ContactSurface(const Compliance& gel)

@@ -2,48 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "core/error.h"
+#include "fem/line_interval.h"
 
 namespace touchstone::fem {
 namespace {
 
 constexpr int kReliefIterations = 40;
-
-struct Interval {
-  double enter = -std::numeric_limits<double>::infinity();
-  double leave = std::numeric_limits<double>::infinity();
-  bool empty() const { return enter > leave; }
-};
-
-/// The part of a line where low <= coordinate <= high.
-Interval between(double low, double high, double start, double slope) {
-  if (slope == 0.0) return start < low || start > high ? Interval{1.0, 0.0} : Interval{};
-  double a = (low - start) / slope;
-  double b = (high - start) / slope;
-  if (a > b) std::swap(a, b);
-  return {a, b};
-}
-
-Interval common(const Interval& a, const Interval& b) {
-  return {std::max(a.enter, b.enter), std::min(a.leave, b.leave)};
-}
-
-/// The part of a line inside the endless cylinder of `radius` about z.
-Interval inside_cylinder(double radius, const Eigen::Vector3d& p, const Eigen::Vector3d& d) {
-  const double across2 = d.x() * d.x() + d.y() * d.y();
-  const double along = p.x() * d.x() + p.y() * d.y();
-  if (across2 < 1e-30) return p.x() * p.x() + p.y() * p.y() > radius * radius ? Interval{1.0, 0.0} : Interval{};
-  const double middle = -along / across2;
-  // The line's distance from the axis by a cross product, which doesn't cancel for far points.
-  const double cross = p.x() * d.y() - p.y() * d.x();
-  const double rest = radius * radius - cross * cross / across2;
-  if (rest < 0.0) return {1.0, 0.0};
-  const double half = std::sqrt(rest / across2);
-  return {middle - half, middle + half};
-}
 
 void check_positive(double value, const char* what) {
   if (!(value > 0.0) || !std::isfinite(value)) fail("{} is {} mm, it must be above 0 and finite", what, value);
@@ -67,6 +34,18 @@ void check_one(const BoxShape& box) {
 }
 
 void check_one(const MeshShape&) {}
+
+void check_one(const EggShape& egg) {
+  check_positive(egg.radius, "the egg's radius");
+  check_positive(egg.blunt, "the egg's blunt half");
+  check_positive(egg.sharp, "the egg's sharp half");
+}
+
+void check_one(const ShellShape& shell) {
+  for (int a = 0; a < 2; ++a) check_positive(shell.size[a], "the shell's axis");
+  check_positive(shell.thickness, "the shell's thickness");
+  if (!shell.curvature.allFinite()) fail("the shell's curvatures must be finite");
+}
 
 void check_one(const ReliefShape& shape) {
   TS_ASSERT(shape.relief != nullptr);
@@ -99,6 +78,29 @@ BoundingBall ball_of(const MeshShape& shape) {
   return {centre, std::sqrt(radius2)};
 }
 
+BoundingBall ball_of(const EggShape& egg) {
+  const double middle = 0.5 * (egg.sharp - egg.blunt);
+  double radius2 = 0.0;
+  // Along each half the squared distance from the middle is a quadratic in y: it is largest at an end or where it
+  // turns.
+  for (const auto& [length, centre] : {std::pair(egg.sharp, middle), std::pair(egg.blunt, -middle)}) {
+    const double bend = 1.0 - std::pow(egg.radius / length, 2);
+    const double turn = bend < 0.0 ? std::clamp(centre / bend, 0.0, length) : 0.0;
+    for (const double y : {0.0, turn, length}) {
+      const double rho2 = egg.radius * egg.radius * (1.0 - std::pow(y / length, 2));
+      radius2 = std::max(radius2, rho2 + (y - centre) * (y - centre));
+    }
+  }
+  return {{0.0, middle, 0.0}, std::sqrt(radius2)};
+}
+
+BoundingBall ball_of(const ShellShape& shell) {
+  const Eigen::Vector2d rise = 0.125 * shell.curvature.cwiseProduct(shell.size.cwiseProduct(shell.size));
+  const double low = std::min(0.0, rise.minCoeff());
+  const double high = std::max(0.0, rise.maxCoeff()) + shell.thickness;
+  return {{0.0, 0.0, 0.5 * (low + high)}, std::hypot(0.5 * shell.size.maxCoeff(), 0.5 * (high - low))};
+}
+
 BoundingBall ball_of(const ReliefShape& shape) {
   const BoundingBall plain = std::visit([](const auto& body) { return ball_of(body); }, shape.base);
   return {plain.centre, plain.radius + shape.relief->highest()};
@@ -110,6 +112,11 @@ void check_shape(const ContactShape& shape) {
   std::visit([](const auto& body) { check_one(body); }, shape);
 }
 
+bool is_convex(const ContactShape& shape) {
+  return std::holds_alternative<SphereShape>(shape) || std::holds_alternative<RoundedCylinder>(shape) ||
+         std::holds_alternative<BoxShape>(shape) || std::holds_alternative<EggShape>(shape);
+}
+
 std::optional<double> first_entry(const SphereShape& shape, const Eigen::Vector3d& p, const Eigen::Vector3d& d) {
   const double along = p.dot(d);
   const double rest = shape.radius * shape.radius - (p - along * d).squaredNorm();
@@ -118,7 +125,7 @@ std::optional<double> first_entry(const SphereShape& shape, const Eigen::Vector3
 }
 
 std::optional<double> first_entry(const BoxShape& shape, const Eigen::Vector3d& p, const Eigen::Vector3d& d) {
-  Interval inside;
+  LineInterval inside;
   for (int a = 0; a < 3; ++a) inside = common(inside, between(-0.5 * shape.size[a], 0.5 * shape.size[a], p[a], d[a]));
   if (inside.empty()) return std::nullopt;
   return inside.enter;
@@ -134,7 +141,7 @@ std::optional<double> first_entry(const RoundedCylinder& shape, const Eigen::Vec
     const double out = std::sqrt(rho2) - core;
     return r - std::sqrt(std::max(0.0, (r - out) * (r + out))) - p.z();
   }
-  const Interval inside = common(inside_cylinder(shape.radius, p, d), between(0.0, shape.height, p.z(), d.z()));
+  const LineInterval inside = common(inside_cylinder(shape.radius, p, d), between(0.0, shape.height, p.z(), d.z()));
   if (inside.empty()) return std::nullopt;
   // The rounded body is a ball of radius r swept over the core {rho <= core, z >= r}, so the distance to the core less
   // r is convex along the line: Newton's steps from the sharp body's entry approach the first root from one side.

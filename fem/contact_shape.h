@@ -6,8 +6,10 @@
 #include <optional>
 #include <variant>
 
+#include "fem/egg_shape.h"
 #include "fem/mesh_shape.h"
 #include "fem/relief_map.h"
+#include "fem/shell_shape.h"
 
 namespace touchstone::fem {
 
@@ -29,7 +31,7 @@ struct BoxShape {
   Eigen::Vector3d size = Eigen::Vector3d::Ones();
 };
 
-using PlainShape = std::variant<SphereShape, RoundedCylinder, BoxShape, MeshShape>;
+using PlainShape = std::variant<SphereShape, RoundedCylinder, BoxShape, MeshShape, EggShape, ShellShape>;
 
 /// A body whose lower side bears a relief: at each (x, y) of the object frame the surface that looks to -z lies lower
 /// than the plain body's by the map's height. Lines that run up (direction.z > 0) meet the relief; others the plain
@@ -40,7 +42,10 @@ struct ReliefShape {
   std::shared_ptr<const ReliefMap> relief;
 };
 
-using ContactShape = std::variant<SphereShape, RoundedCylinder, BoxShape, MeshShape, ReliefShape>;
+using ContactShape = std::variant<SphereShape, RoundedCylinder, BoxShape, MeshShape, EggShape, ShellShape, ReliefShape>;
+
+/// Whether the gap over a plane is convex wherever the body stands.
+bool is_convex(const ContactShape& shape);
 
 /// Refuses sizes that aren't finite and positive, and an edge radius above the cylinder's radius or height.
 /// @throws Error
@@ -62,8 +67,8 @@ std::optional<double> first_entry(const ContactShape& shape, const Eigen::Vector
                                   const Eigen::Vector3d& direction);
 
 /// How far inside the body's silhouette the line lies: the signed distance, across the direction, from the line to the
-/// silhouette's outline, positive where the line hits; outside a corner it may be less than the distance. Nothing where
-/// there is no closed form for this direction. Continuous in `point`.
+/// silhouette's outline, positive where the line hits; outside a corner, and where its shape says so, it may be less
+/// than the distance. Nothing where there is no closed form for this direction. Continuous in `point`.
 std::optional<double> silhouette_distance(const SphereShape& shape, const Eigen::Vector3d& point,
                                           const Eigen::Vector3d& direction);
 std::optional<double> silhouette_distance(const RoundedCylinder& shape, const Eigen::Vector3d& point,

@@ -83,9 +83,10 @@ void move_as_a_whole(const Compliance& gel, const PressState& press, SplineField
   }
 }
 
-/// Gap per pixel from the plane z = rest up to the object, looked up where the gel has moved to along the surface.
-std::vector<double> gaps(const PixelGrid& grid, const SmoothDisplacement& coarse, const ContactShape& shape,
-                         const RigidTransform& gel_from_object) {
+/// Gap per pixel from the undeformed surface plus `rest` up to the object, looked up where the gel has moved to along
+/// the surface. Endless beside a dome.
+std::vector<double> gaps(const SmoothSurface& surface, const PixelGrid& grid, const SmoothDisplacement& coarse,
+                         const ContactShape& shape, const RigidTransform& gel_from_object) {
   const RigidTransform object_from_gel = gel_from_object.inverse();
   const Eigen::Vector3d up = object_from_gel.turn(Eigen::Vector3d::UnitZ());
   const BoundingBall ball = bounding_ball(shape);
@@ -94,8 +95,9 @@ std::vector<double> gaps(const PixelGrid& grid, const SmoothDisplacement& coarse
   tbb::parallel_for(0, grid.ny, [&](int j) {
     for (int i = 0; i < grid.nx; ++i) {
       const Eigen::Vector2d at = grid.centre(i, j);
+      if (at.squaredNorm() > surface.rim_radius() * surface.rim_radius()) continue;
       const Eigen::Vector3d moved = coarse.along.at(at);
-      const Eigen::Vector3d point(at.x() + moved.x(), at.y() + moved.y(), 0.0);
+      const Eigen::Vector3d point(at.x() + moved.x(), at.y() + moved.y(), surface.rest_height(at));
       if ((point - centre).head<2>().squaredNorm() > ball.radius * ball.radius) continue;
       if (const auto entry = first_entry(shape, object_from_gel * point, up)) {
         gap[grid.at(i, j)] = *entry - coarse.rest.at(at).z();
@@ -181,7 +183,7 @@ ReliefAnswer solve_fine_relief(const SmoothSurface& surface, const PressState& p
     const PixelGrid grid = box.grid(settings.pitch);
     check(grid);
     const LayerResponse layer(gel.material, gel.thickness, grid, GridEdges::free);
-    const std::vector<double> gap = gaps(grid, coarse, shape, press.gel_from_object);
+    const std::vector<double> gap = gaps(surface, grid, coarse, shape, press.gel_from_object);
     PixelContact contact{gap, {}};
     if (settings.control == ReliefControl::force) contact.force = coarse.force;
     start = carried_over(answer.grid.size() > 0 ? &answer : previous, grid);
@@ -210,7 +212,7 @@ ReliefAnswer solve_fine_relief(const SmoothSurface& surface, const PressState& p
 }
 
 HeightField::HeightField(const SmoothSurface& surface, const PressState& press, const ReliefAnswer* fine)
-    : coarse_grid_(surface.reference_grid()) {
+    : surface_(surface), coarse_grid_(surface.reference_grid()) {
   along_ = fine != nullptr ? fine->along : surface.displacement(press).along;
   if (fine == nullptr || fine->grid.size() == 0) {
     coarse_ = surface.normal_displacement(press);
@@ -240,7 +242,7 @@ double HeightField::at(const Eigen::Vector2d& point) const {
     material = next;
     if (settled) break;
   }
-  return at_material(material);
+  return at_material(material) + surface_.rest_height(material) - surface_.rest_height(point);
 }
 
 }  // namespace touchstone::fem

@@ -35,8 +35,8 @@ struct ReliefSettings {
   PixelTolerance tolerance;
 };
 
-/// The surface under the fine contact. Pixels stand on the undeformed surface (gel frame, z = 0); the one at x has
-/// moved to x + tangential + (0, 0, height).
+/// The surface under the fine contact. Pixels stand on the undeformed surface (gel frame, z = 0, or on the dome); the
+/// one at x has moved to x + tangential + (0, 0, height).
 struct ReliefAnswer {
   PixelGrid grid;                ///< empty (0 x 0) out of contact
   std::vector<double> pressure;  ///< MPa, of the object on the gel
@@ -58,19 +58,20 @@ struct ReliefAnswer {
 ReliefAnswer solve_fine_relief(const SmoothSurface& surface, const PressState& press, const ContactShape& shape,
                                const ReliefSettings& settings = {}, const ReliefAnswer* previous = nullptr);
 
-/// The displaced surface's height (mm) over points of the gel frame's x, y plane, as a camera or a profilometer above
-/// it would find it: where the tangential displacement has carried the gel. Outside of the answer's grid: the coarse
-/// one.
+/// The displaced surface's height (mm) over the undeformed one, along z, at points of the gel frame's x, y plane, as a
+/// camera or a profilometer above it would find it: where the tangential displacement has carried the gel. Outside of
+/// the answer's grid: the coarse one.
 class HeightField {
  public:
-  /// `fine` may be null: coarse heights everywhere. Keeps what it needs by value.
+  /// `fine` may be null: coarse heights everywhere. The surface must outlive this.
   HeightField(const SmoothSurface& surface, const PressState& press, const ReliefAnswer* fine);
 
   double at(const Eigen::Vector2d& point) const;
-  /// The same for the material point that stood at `material` on the undeformed surface.
+  /// How far the material point that stood at `material` on the undeformed surface has moved along z.
   double at_material(const Eigen::Vector2d& material) const;
 
  private:
+  const SmoothSurface& surface_;
   SplineField along_;
   PixelGrid coarse_grid_, fine_grid_;
   std::vector<double> coarse_, fine_;

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "core/error.h"
+#include "core/units.h"
 
 namespace touchstone::fem {
 namespace {
@@ -104,16 +105,36 @@ std::vector<double> gathered(const PixelGrid& fine, std::span<const double> pres
 
 }  // namespace
 
-SmoothSurface::SmoothSurface(const Compliance& gel) : gel_(gel), edge_(shortest_edge(gel)) {
+SmoothSurface::SmoothSurface(const Compliance& gel, double sphere_radius)
+    : gel_(gel),
+      edge_(shortest_edge(gel)),
+      sphere_radius_(sphere_radius),
+      rim_radius_(std::numeric_limits<double>::infinity()) {
   const Box box = box_of(gel.vertices);
   const Eigen::Vector2d size = box.high - box.low;
-  for (const auto& v : gel.vertices) {
-    if (std::abs(v.z()) > kFlatness * size.maxCoeff()) {
+  const auto n = static_cast<Eigen::Index>(gel.vertices.size());
+  per_seen_area_ = Eigen::VectorXd::Ones(n);
+  double widest = 0.0;
+  for (const auto& v : gel.vertices) widest = std::max(widest, v.head<2>().norm());
+  if (std::isfinite(sphere_radius)) {
+    if (!(widest <= std::sin(kSteepestDome) * sphere_radius)) {
       fail(
-          "fine relief and smooth surfaces are for flat gels only: the outer surface of this one reaches to z = {:.4g} "
-          "mm",
+          "fine relief and smooth surfaces are for flat and gently domed gels only: a cap of {:.4g} mm radius on a "
+          "sphere of {:.4g} mm slopes by {:.3g} degrees at its rim, allowed are {:.3g}",
+          widest, sphere_radius, std::asin(std::min(1.0, widest / sphere_radius)) / kRadiansPerDegree,
+          kSteepestDome / kRadiansPerDegree);
+    }
+    rim_radius_ = widest;
+  }
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const Eigen::Vector3d& v = gel.vertices[static_cast<std::size_t>(i)];
+    if (std::abs(v.z() - rest_height(v.head<2>())) > kFlatness * size.maxCoeff()) {
+      fail(
+          "fine relief and smooth surfaces are for flat and gently domed gels only: the outer surface of this one "
+          "reaches to z = {:.4g} mm",
           v.z());
     }
+    if (std::isfinite(sphere_radius)) per_seen_area_[i] = sphere_radius / (sphere_radius + v.z());
   }
   const double pitch = std::max({edge_ / kPixelsAnEdge, size.maxCoeff() / kMostReferencePixels});
   PixelGrid grid;
@@ -137,8 +158,14 @@ SmoothSurface::SmoothSurface(const Compliance& gel) : gel_(gel), edge_(shortest_
 
 SmoothSurface::~SmoothSurface() = default;
 
+double SmoothSurface::rest_height(const Eigen::Vector2d& point) const {
+  if (std::isinf(sphere_radius_)) return 0.0;
+  const double r2 = std::min(point.squaredNorm(), rim_radius_ * rim_radius_);
+  return -r2 / (sphere_radius_ + std::sqrt(sphere_radius_ * sphere_radius_ - r2));
+}
+
 std::vector<double> SmoothSurface::coarse_pressure(const PressState& press) const {
-  const Eigen::VectorXd pressure = hats_ * (-press.traction.col(2));
+  const Eigen::VectorXd pressure = hats_ * (-press.traction.col(2).cwiseProduct(per_seen_area_));
   return {pressure.data(), pressure.data() + pressure.size()};
 }
 

@@ -1,8 +1,10 @@
 #pragma once
-// The displacement of a flat outer surface under a coarse press, at any point and free of the mesh's wiggles.
+// The displacement of a flat or gently domed outer surface under a coarse press, at any point and free of the mesh's
+// wiggles.
 
 #include <Eigen/Core>
 #include <Eigen/SparseCore>
+#include <limits>
 #include <memory>
 #include <span>
 #include <vector>
@@ -24,16 +26,24 @@ struct SmoothDisplacement {
   double force = 0.0;           ///< N, of the coarse pressure
 };
 
+inline constexpr double kSteepestDome = 0.5;  ///< radians of slope, at its rim
+
 /// Takes the mesh's wiggles out. The coarse mesh and the endless layer (fem/layer_response.h) are given the same P1
 /// pressure; the difference of what they answer, as means over the hats, has no detail of the size of an edge but for
 /// the mesh's own error, so smoothing splines are fitted to it (knots a quarter of the thickness or two and a half
 /// edges apart, the bending below a wavelength of four knots held back) and the wiggles stay behind. Made once a gel;
 /// safe to use from many threads.
+///
+/// A dome is treated as a height field over x and y: pressures are per area seen along z, "normal" is along z. The
+/// endless layer is then tilted by the surface's slope and as thick as the dome's middle, which touches only the
+/// difference of two pressures of equal force: what the finite elements know of the dome stays. So it is good to second
+/// order in the slope, and steeper domes than kSteepestDome are refused.
 class SmoothSurface {
  public:
-  /// The compliance must outlive this.
-  /// @throws Error unless the gel's outer surface lies in the plane z = 0
-  explicit SmoothSurface(const Compliance& gel);
+  /// The compliance must outlive this. The outer surface lies in the plane z = 0, or is the cap of the sphere about (0,
+  /// 0, -sphere_radius).
+  /// @throws Error unless it is, or if the cap is steeper than kSteepestDome somewhere
+  explicit SmoothSurface(const Compliance& gel, double sphere_radius = std::numeric_limits<double>::infinity());
   ~SmoothSurface();
 
   SmoothDisplacement displacement(const PressState& press) const;
@@ -45,6 +55,11 @@ class SmoothSurface {
                                           std::span<const double> pressure = {}) const;
   const PixelGrid& reference_grid() const { return layer_->grid(); }
 
+  /// Height of the undeformed surface, mm; beside a dome that of its rim.
+  double rest_height(const Eigen::Vector2d& point) const;
+  /// Of the dome's rim; infinite for a flat surface.
+  double rim_radius() const { return rim_radius_; }
+
   const Compliance& gel() const { return gel_; }
   double edge() const { return edge_; }  ///< mm, of the finest triangles
 
@@ -54,6 +69,8 @@ class SmoothSurface {
 
   const Compliance& gel_;
   double edge_ = 0.0;
+  double sphere_radius_, rim_radius_;
+  Eigen::VectorXd per_seen_area_;                      // per vertex: 1 / cosine of the surface's slope
   std::unique_ptr<LayerResponse> layer_;               // over the whole surface
   Eigen::SparseMatrix<double, Eigen::RowMajor> hats_;  // pixels x vertices: P1 values at pixel centres
   Eigen::VectorXd weight_;                             // per vertex, mm^2, by the mass matrix

@@ -1,12 +1,13 @@
 #include "lab/frame_sequence.h"
 
 #include <algorithm>
-#include <charconv>
+#include <cctype>
 #include <cmath>
 #include <sstream>
 
 #include "core/units.h"
 #include "core/whole_file.h"
+#include "lab/csv_cells.h"
 #include "lab/manifest.h"
 #include "lab/truth_file.h"
 
@@ -16,21 +17,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kForceColumns = "file,t_us,force_x_N,force_y_N,force_z_N";
-
-std::vector<std::string> cells_of(const std::string& line) {
-  std::vector<std::string> cells;
-  std::istringstream in(line);
-  for (std::string cell; std::getline(in, cell, ',');) cells.push_back(cell);
-  return cells;
-}
-
-template <typename T>
-std::optional<T> number_of(const std::string& text) {
-  T value{};
-  const auto result = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (result.ec != std::errc() || result.ptr != text.data() + text.size()) return std::nullopt;
-  return value;
-}
 
 }  // namespace
 
@@ -66,18 +52,25 @@ std::vector<FrameSequence> frames_of_data_set(const fs::path& folder, std::optio
   return sequences;
 }
 
-FrameSequence frames_of_folder(const fs::path& folder, double frame_rate_Hz) {
+std::vector<fs::path> picture_files(const fs::path& folder) {
   if (!fs::is_directory(folder)) fail("{}: isn't a folder", folder.string());
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    std::string ending = entry.path().extension().string();
+    std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char c) { return std::tolower(c); });
+    const bool picture = ending == ".png" || ending == ".jpg" || ending == ".jpeg";
+    if (picture && entry.is_regular_file()) files.push_back(entry.path());
+  }
+  if (files.empty()) fail("{}: has no .png, .jpg or .jpeg file", folder.string());
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+FrameSequence frames_of_folder(const fs::path& folder, double frame_rate_Hz) {
   if (!(frame_rate_Hz > 0.0) || !std::isfinite(frame_rate_Hz)) fail("frame rate {}: must be above 0", frame_rate_Hz);
   FrameSequence sequence;
   sequence.name = folder.filename().string();
-  for (const auto& entry : fs::directory_iterator(folder)) {
-    if (entry.is_regular_file() && entry.path().extension() == ".png")
-      sequence.frames.push_back({entry.path(), 0, 0, {}});
-  }
-  if (sequence.frames.empty()) fail("{}: has no .png file", folder.string());
-  std::sort(sequence.frames.begin(), sequence.frames.end(),
-            [](const LabelledFrame& a, const LabelledFrame& b) { return a.file < b.file; });
+  for (const fs::path& file : picture_files(folder)) sequence.frames.push_back({file, 0, 0, {}});
   for (std::size_t i = 0; i < sequence.frames.size(); ++i) {
     sequence.frames[i].frame = static_cast<int>(i);
     sequence.frames[i].t_us = std::llround(static_cast<double>(i) * kMicrosecondsPerSecond / frame_rate_Hz);

@@ -30,7 +30,10 @@ struct FrameSequence {
 /// @throws Error if the folder isn't a finished data set, has no frames, or has no scene of this split
 std::vector<FrameSequence> frames_of_data_set(const std::filesystem::path& folder, std::optional<Split> split);
 
-/// Recorded frames: the .png files of a folder, by name, at a constant rate. @throws Error if there is none
+/// The .png, .jpg and .jpeg files of a folder, by name. @throws Error if it's no folder, or there is none
+std::vector<std::filesystem::path> picture_files(const std::filesystem::path& folder);
+
+/// Recorded frames: the picture_files of a folder, at a constant rate. @throws Error if there is none
 FrameSequence frames_of_folder(const std::filesystem::path& folder, double frame_rate_Hz);
 
 /// Recorded frames with forces, as a CSV file with the columns `file,t_us,force_x_N,force_y_N,force_z_N` in this order

@@ -62,8 +62,6 @@ double microseconds_between(std::int64_t earlier, std::int64_t later) {
   return static_cast<double>(static_cast<std::uint64_t>(later) - static_cast<std::uint64_t>(earlier));
 }
 
-constexpr double kDarkFraction = 1.0 / 128.0;
-constexpr double kSaturatedFraction = 0.98;
 /// How fast a bead's usual area follows the measured one, a frame.
 constexpr double kAreaLearning = 0.05;
 
@@ -159,9 +157,7 @@ cv::Rect BeadTracker::State::roi_a(const cv::Mat& image) const {
 /// Step ii. Returns whether there is light to see beads by.
 bool BeadTracker::State::adjust_brightness(const cv::Mat& image) {
   result.mean_grey = mean_grey(image, roi_a(image));
-  result.light = FrameLight::kNormal;
-  if (result.mean_grey < kDarkFraction * full_scale(image)) result.light = FrameLight::kDark;
-  if (result.mean_grey > kSaturatedFraction * full_scale(image)) result.light = FrameLight::kSaturated;
+  result.light = light_of_mean(result.mean_grey / full_scale(image));
   if (result.light != FrameLight::kNormal) return false;
   scale.set(settings.mean_brightness / result.mean_grey);
   return true;
@@ -275,20 +271,6 @@ const char* name_of(BeadStatus status) {
       return "hidden";
     case BeadStatus::kReset:
       return "reset";
-  }
-  return "?";
-}
-
-const char* name_of(FrameLight light) {
-  switch (light) {
-    case FrameLight::kNormal:
-      return "normal";
-    case FrameLight::kDark:
-      return "dark";
-    case FrameLight::kSaturated:
-      return "saturated";
-    case FrameLight::kFlat:
-      return "flat";
   }
   return "?";
 }

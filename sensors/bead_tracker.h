@@ -25,6 +25,7 @@
 #include <vector>
 
 #include "core/frame.h"
+#include "sensors/frame_light.h"
 
 namespace touchstone::sensors {
 
@@ -90,13 +91,6 @@ inline bool is_found(BeadStatus status) {
   return status == BeadStatus::kFound || status == BeadStatus::kFoundAgain;
 }
 
-enum class FrameLight : std::uint8_t {
-  kNormal,
-  kDark,       ///< ROI-A's mean is below 1/128 of the full scale: too few grey levels to scale
-  kSaturated,  ///< ROI-A's mean is above 0.98 of the full scale
-  kFlat,       ///< all of ROI-A has one value
-};
-
 /// What was found in one frame. Beads are in row-major order of the grid: left to right, then top to bottom.
 /// Coordinates are px in the convention of core/transform.h (a pixel's centre is at + 0.5), always finite.
 struct TrackedBeads {
@@ -105,16 +99,14 @@ struct TrackedBeads {
   std::vector<Eigen::Vector2d> measured;   ///< centroids before the filter; equal to `positions` where not found
   std::vector<double> area_px;             ///< of each bead's region; 0 where not found
   std::vector<BeadStatus> status;
-  FrameLight light = FrameLight::kNormal;
-  double mean_grey = 0.0;  ///< of ROI-A, in the frame's own digital numbers
+  FrameLight light = FrameLight::kNormal;  ///< judged on ROI-A
+  double mean_grey = 0.0;                  ///< of ROI-A, in the frame's own digital numbers
 
   int found() const;  ///< number of beads measured in this frame
 };
 
 /// The text for a status: "found", "found again", "hidden", "reset".
 const char* name_of(BeadStatus status);
-/// "normal", "dark", "saturated", "flat"
-const char* name_of(FrameLight light);
 
 /// Follows the beads of one camera. After the first frame nothing is allocated. One object is for one thread.
 class BeadTracker {

@@ -22,10 +22,11 @@ class DirectLight {
  public:
   /// Measures on the state of `truths` that is pressed deepest, with ever more rays a pixel until the scene's tolerance
   /// holds; `choice` then says what became of it. Where the scene switches direct light on, the last is taken.
+  /// `edge_side` is DirectSettings::edge_side.
   /// @pre the plan has direct light, `truths` isn't empty
   /// @throws Error with the scene's place if the scene switches direct light on and it can't be had
   DirectLight(const SceneSight& sight, const render::Camera& camera, std::span<const Truth> truths,
-              std::span<const int> rays_tried = kRaysTried);
+              std::span<const int> rays_tried = kRaysTried, int edge_side = render::DirectSettings{}.edge_side);
 
   const LightChoice& choice() const { return choice_; }
 

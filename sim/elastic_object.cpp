@@ -133,6 +133,8 @@ TriangleMesh even_surface(const ShapeSpec& shape, double edge_mm) {
     }
     case ShapeKind::box:
     case ShapeKind::mesh:
+    case ShapeKind::egg:
+    case ShapeKind::shell:
       break;
   }
   return visible_mesh(shape);

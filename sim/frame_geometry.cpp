@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "sim/device_camera.h"
+#include "sim/gel_setup.h"
 #include "sim/visible_scene.h"
 
 namespace touchstone::sim {
@@ -42,7 +43,7 @@ FrameGeometry frame_geometry(const SceneSpec& scene, const fem::Compliance& gel,
   const std::vector<VisibleObject> objects = visible_objects(scene);
   const std::vector<MovedObject> all = moved_objects(scene);
   const std::vector<PlacedShape> felt = placed_shapes(objects, press);
-  add_gel(VisibleGel(gel).sheet(press, felt), out.parts);
+  add_gel(VisibleGel(gel, gel_body(scene.device)).sheet(press, felt), out.parts);
   if (scene.device.beads) add_beads(*scene.device.beads, press, out.parts);
   for (std::size_t k = 0; k < objects.size(); ++k) {
     const ObjectSpec& object = all[k].object;

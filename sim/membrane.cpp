@@ -43,8 +43,15 @@ std::vector<double> sheet_lines(double first, double pitch, int pixels, double l
 
 }  // namespace
 
+bool is_gentle(const GelSpec& gel) {
+  return gel.shape == GelShape::slab ||
+         (gel.shape == GelShape::dome && gel.base_radius_mm <= std::sin(fem::kSteepestDome) * gel.sphere_radius_mm);
+}
+
 Membrane::Membrane(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel)
-    : surface_(gel), pixel_(scene.membrane.pixel_um * 1e-3), relief_pixel_(plan.relief_pixel_mm) {
+    : surface_(gel, scene.device.gel.shape == GelShape::dome ? scene.device.gel.sphere_radius_mm : INFINITY),
+      pixel_(scene.membrane.pixel_um * 1e-3),
+      relief_pixel_(plan.relief_pixel_mm) {
   if (plan.fine_relief) shape_ = contact_shape(scene.object);
   const Eigen::Vector2d size = scene.membrane.height_size_mm.value_or(2.0 * scene.device.mesh.fine_half_extent_mm);
   columns_ = std::max(1, static_cast<int>(std::lround(size.x() / pixel_)));
@@ -83,23 +90,44 @@ Membrane::Sheet Membrane::sheet(const fem::PressState& press, const fem::ReliefA
   Sheet sheet;
   std::vector<Eigen::Vector3d> vertices(x.size() * y.size());
   std::vector<char> wet(vertices.size(), 0);
+  // The lattice goes on beside a dome; there its points are drawn in onto the rim.
+  const double rim = surface_.rim_radius();
+  std::vector<char> beside(vertices.size(), 0);
   for (int j = 0; j < rows; ++j) {
     for (int i = 0; i < columns; ++i) {
       const std::size_t k = static_cast<std::size_t>(j) * x.size() + i;
-      const Eigen::Vector2d material(x[static_cast<std::size_t>(i)], y[static_cast<std::size_t>(j)]);
+      Eigen::Vector2d material(x[static_cast<std::size_t>(i)], y[static_cast<std::size_t>(j)]);
+      beside[k] = material.norm() >= rim;
+      if (beside[k]) material *= rim / material.norm();
       const Eigen::Vector2d along = relief.tangential(material);
-      vertices[k] << material + along, field.at_material(material);
-      sheet.rest.emplace_back(material.x(), material.y(), surface_.gel().vertices.front().z());
+      const double rest_z = surface_.rest_height(material);
+      vertices[k] << material + along, rest_z + field.at_material(material);
+      sheet.rest.emplace_back(material.x(), material.y(), rest_z);
       const int gi = i - left;
       const int gj = j - bottom;
       if (gi >= 0 && gj >= 0 && gi < grid.nx && gj < grid.ny) wet[k] = relief.contact[grid.at(gi, gj)];
     }
   }
+  const auto beside_rim = [&](const std::array<int, 3>& t) {
+    if (!std::isfinite(rim)) return false;
+    if (beside[static_cast<std::size_t>(t[0])] && beside[static_cast<std::size_t>(t[1])] &&
+        beside[static_cast<std::size_t>(t[2])]) {
+      return true;
+    }
+    const auto rest = [&](int k) {
+      return sheet.rest[static_cast<std::size_t>(t[static_cast<std::size_t>(k)])].head<2>();
+    };
+    const Eigen::Vector2d ab = rest(1) - rest(0);
+    const Eigen::Vector2d ac = rest(2) - rest(0);
+    // Drawn together along one ray from the middle.
+    return ab.x() * ac.y() - ab.y() * ac.x() < 1e-6 * grid.pixel_area();
+  };
   for (int j = 0; j + 1 < rows; ++j) {
     for (int i = 0; i + 1 < columns; ++i) {
       const int a = j * columns + i;
       const int c = a + columns;
       for (const std::array<int, 3>& t : {std::array{a, a + 1, c + 1}, std::array{a, c + 1, c}}) {
+        if (beside_rim(t)) continue;
         const bool on_object = wet[static_cast<std::size_t>(t[0])] && wet[static_cast<std::size_t>(t[1])] &&
                                wet[static_cast<std::size_t>(t[2])];
         (on_object ? sheet.wet : sheet.dry).triangles.push_back(t);

@@ -12,18 +12,22 @@
 
 namespace touchstone::sim {
 
+/// Is the outer surface flat, or a dome so gentle that Membrane can have it?
+bool is_gentle(const GelSpec& gel);
+
 /// The membrane of one scene. Made once; its functions are pure and may be called from several threads.
 class Membrane {
  public:
-  /// @throws Error for a gel whose outer surface isn't flat, or a height map of more than kMostHeightPixels a side
+  /// @throws Error for a gel whose outer surface is neither flat nor a gentle dome (fem::SmoothSurface), or a height
+  /// map of more than kMostHeightPixels a side
   Membrane(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel);
 
   /// The fine contact at `press`; nothing where the plan has fine relief off. Never throws for want of contact.
   std::optional<fem::ReliefAnswer> relief(const fem::PressState& press) const;
 
-  /// Height over the undeformed surface, mm (CV_32FC1), as a profilometer above the gel finds it: column i, row j is
-  /// the place x = (i + 0.5) pixel - width / 2, y = (j + 0.5) pixel - height / 2 of the gel frame. `relief` as relief()
-  /// gave it.
+  /// Height over the undeformed surface along z (of a dome: not over the plane z = 0), mm (CV_32FC1), as a profilometer
+  /// above the gel finds it: column i, row j is the place x = (i + 0.5) pixel - width / 2, y = (j + 0.5) pixel - height
+  /// / 2 of the gel frame. `relief` as relief() gave it.
   cv::Mat height(const fem::PressState& press, const std::optional<fem::ReliefAnswer>& relief) const;
   double pixel_mm() const { return pixel_; }
 

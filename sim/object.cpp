@@ -78,6 +78,59 @@ TriangleMesh box_mesh(const Eigen::Vector3d& size) {
   return mesh;
 }
 
+TriangleMesh egg_mesh(const ShapeSpec& shape) {
+  constexpr int kRings = 48;
+  std::vector<Eigen::Vector2d> profile;
+  for (int i = 0; i <= kRings; ++i) {
+    const double angle = kPi * i / kRings;
+    const bool pole = i == 0 || i == kRings;
+    const double half = 2 * i < kRings ? shape.blunt_mm : shape.sharp_mm;
+    profile.emplace_back(pole ? 0.0 : shape.radius_mm * std::sin(angle), -half * std::cos(angle));
+  }
+  TriangleMesh mesh = turned_body(profile);
+  for (Eigen::Vector3d& v : mesh.vertices) v = Eigen::Vector3d(v.x(), v.z(), -v.y());  // its axis from z to y
+  return mesh;
+}
+
+fem::ShellShape shell_shape(const ShapeSpec& shape) {
+  return {shape.axes_mm, shape.thickness_mm, shape.curvature_per_mm};
+}
+
+/// Rings of an ellipse, the lower face first, then the upper one.
+TriangleMesh shell_mesh(const fem::ShellShape& shell) {
+  constexpr int kRings = 48;
+  constexpr int kPoints = 1 + kRings * kAround;  // of one face
+  TriangleMesh mesh;
+  for (const double above : {0.0, shell.thickness}) {
+    for (int ring = 0; ring <= kRings; ++ring) {
+      for (int i = 0; i < (ring == 0 ? 1 : kAround); ++i) {
+        const double angle = 2.0 * kPi * i / kAround;
+        const double part = 0.5 * ring / kRings;
+        const double x = part * shell.size.x() * std::cos(angle);
+        const double y = part * shell.size.y() * std::sin(angle);
+        mesh.vertices.emplace_back(x, y, shell.lower_face(x, y) + above);
+      }
+    }
+  }
+  const auto at = [](int ring, int i) { return ring == 0 ? 0 : 1 + (ring - 1) * kAround + i % kAround; };
+  const auto both_faces = [&](int a, int b, int c) {  // given as seen from above
+    mesh.triangles.push_back({a, c, b});
+    mesh.triangles.push_back({kPoints + a, kPoints + b, kPoints + c});
+  };
+  for (int i = 0; i < kAround; ++i) {
+    both_faces(0, at(1, i), at(1, i + 1));
+    for (int ring = 1; ring < kRings; ++ring) {
+      both_faces(at(ring, i), at(ring + 1, i), at(ring + 1, i + 1));
+      both_faces(at(ring, i), at(ring + 1, i + 1), at(ring, i + 1));
+    }
+    const int low = at(kRings, i);
+    const int next = at(kRings, i + 1);
+    mesh.triangles.push_back({low, next, kPoints + next});
+    mesh.triangles.push_back({low, kPoints + next, kPoints + low});
+  }
+  return mesh;
+}
+
 TriangleMesh read_mesh(const ShapeSpec& shape) {
   if (!std::filesystem::exists(shape.file)) {
     fail_at(shape.where, "shape.file: there is no file {}", shape.file.string());
@@ -92,10 +145,9 @@ TriangleMesh read_mesh(const ShapeSpec& shape) {
 }  // namespace
 
 EnumNames<ShapeKind> enum_names(ShapeKind) {
-  return {{"sphere", ShapeKind::sphere},
-          {"rounded_cylinder", ShapeKind::rounded_cylinder},
-          {"box", ShapeKind::box},
-          {"mesh", ShapeKind::mesh}};
+  return {{"sphere", ShapeKind::sphere}, {"rounded_cylinder", ShapeKind::rounded_cylinder},
+          {"box", ShapeKind::box},       {"mesh", ShapeKind::mesh},
+          {"egg", ShapeKind::egg},       {"shell", ShapeKind::shell}};
 }
 
 void fields(YamlReader& in, ShapeSpec& shape) {
@@ -122,6 +174,16 @@ void fields(YamlReader& in, ShapeSpec& shape) {
       in.optional("mm_per_unit", shape.mm_per_unit, Allowed::above(0.0));
       break;
     }
+    case ShapeKind::egg:
+      in.required("radius_mm", shape.radius_mm, Allowed::above_up_to(0.0, 1e4));
+      in.required("blunt_mm", shape.blunt_mm, Allowed::above_up_to(0.0, 1e4));
+      in.required("sharp_mm", shape.sharp_mm, Allowed::above_up_to(0.0, 1e4));
+      break;
+    case ShapeKind::shell:
+      in.required("axes_mm", shape.axes_mm, Allowed::above_up_to(0.0, 1e4));
+      in.required("thickness_mm", shape.thickness_mm, Allowed::above_up_to(0.0, 1e3));
+      in.optional("curvature_per_mm", shape.curvature_per_mm, Allowed::within(-10.0, 10.0));
+      break;
   }
 }
 
@@ -149,6 +211,8 @@ void fields(YamlReader& in, ObjectSpec& object) {
   in.optional("elastic", object.elastic);
   in.optional("friction", object.friction, Allowed::at_least(0.0));
   in.optional("screen", object.screen);
+  in.optional("mass_g", object.mass_g, Allowed::above_up_to(0.0, 1e5));
+  in.optional("crush_force_N", object.crush_force_N, Allowed::above_up_to(0.0, 1e6));
 }
 
 ObjectSpec read_object(const std::filesystem::path& file) {
@@ -165,6 +229,10 @@ fem::ContactShape contact_shape(const ShapeSpec& shape) {
       return fem::BoxShape{shape.size_mm};
     case ShapeKind::mesh:
       return fem::MeshShape(read_mesh(shape));
+    case ShapeKind::egg:
+      return fem::EggShape{shape.radius_mm, shape.blunt_mm, shape.sharp_mm};
+    case ShapeKind::shell:
+      return shell_shape(shape);
   }
   TS_ASSERT(false);
   return {};
@@ -205,6 +273,10 @@ TriangleMesh visible_mesh(const ShapeSpec& shape) {
       return box_mesh(shape.size_mm);
     case ShapeKind::mesh:
       return read_mesh(shape);
+    case ShapeKind::egg:
+      return egg_mesh(shape);
+    case ShapeKind::shell:
+      return shell_mesh(shell_shape(shape));
   }
   TS_ASSERT(false);
   return {};

@@ -14,18 +14,23 @@
 
 namespace touchstone::sim {
 
-enum class ShapeKind { sphere, rounded_cylinder, box, mesh };
+enum class ShapeKind { sphere, rounded_cylinder, box, mesh, egg, shell };
 EnumNames<ShapeKind> enum_names(ShapeKind);
 
 /// Only the fields that belong to `type` may stand in the file.
 struct ShapeSpec {
   ShapeKind type = ShapeKind::sphere;
-  double radius_mm = 0.0;                             ///< sphere, rounded_cylinder
-  double edge_radius_mm = 0.0;                        ///< rounded_cylinder
-  double height_mm = 0.0;                             ///< rounded_cylinder
-  Eigen::Vector3d size_mm = Eigen::Vector3d::Zero();  ///< box
-  std::filesystem::path file;                         ///< mesh: glTF, relative to the object file
-  double mm_per_unit = 1000.0;                        ///< mesh: glTF's unit is the metre
+  double radius_mm = 0.0;                                      ///< sphere, rounded_cylinder; egg: of its equator
+  double edge_radius_mm = 0.0;                                 ///< rounded_cylinder
+  double height_mm = 0.0;                                      ///< rounded_cylinder
+  Eigen::Vector3d size_mm = Eigen::Vector3d::Zero();           ///< box
+  std::filesystem::path file;                                  ///< mesh: glTF, relative to the object file
+  double mm_per_unit = 1000.0;                                 ///< mesh: glTF's unit is the metre
+  double blunt_mm = 0.0;                                       ///< egg: from the equator to its end at -y
+  double sharp_mm = 0.0;                                       ///< egg: to its end at +y
+  Eigen::Vector2d axes_mm = Eigen::Vector2d::Zero();           ///< shell: whole axes of its outline, an ellipse
+  double thickness_mm = 0.0;                                   ///< shell: along z
+  Eigen::Vector2d curvature_per_mm = Eigen::Vector2d::Zero();  ///< shell: along x and y, see fem::ShellShape
   SourceLocation where;
 };
 
@@ -58,6 +63,8 @@ struct ObjectSpec {
   std::optional<ElasticSpec> elastic;  ///< without it the object is rigid
   double friction = 0.0;               ///< Coulomb coefficient against the gel
   std::optional<ScreenSpec> screen;
+  std::optional<double> mass_g;         ///< what a gripper lifts
+  std::optional<double> crush_force_N;  ///< normal force that breaks it
 };
 
 void fields(YamlReader& in, ShapeSpec& shape);

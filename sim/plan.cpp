@@ -5,6 +5,7 @@
 
 #include "core/units.h"
 #include "fem/vibration.h"
+#include "sim/membrane.h"
 #include "sim/plan_direct.h"
 #include "sim/plan_table.h"
 #include "sim/plan_time.h"
@@ -45,6 +46,8 @@ double bright_radius(const ObjectSpec& object) {
     case ShapeKind::box:
       return object.shape.size_mm.head<2>().norm() / 2;
     case ShapeKind::mesh:
+    case ShapeKind::egg:
+    case ShapeKind::shell:
       break;
   }
   double radius = 0.0;
@@ -181,9 +184,8 @@ void plan_relief(const SceneSpec& scene, Plan& plan, PlanTable& table) {
   const bool fine = detail && *detail < kEdgesADetail * edge;
   // A coating shows each slope. On the gel's mesh a ball's contact ends on whole edges and what is free is averaged
   // over them: of edges of 0.5 mm under a ball of 4 mm the surface comes out 15 um and its slope 2 to 4 degrees off.
-  const bool shows_slopes = scene.device.coating && scene.outputs.camera() &&
-                            scene.device.gel.shape == GelShape::slab && scene.more_objects.empty() &&
-                            !plan.elastic_object && !plan.finite_strain;
+  const bool shows_slopes = scene.device.coating && scene.outputs.camera() && is_gentle(scene.device.gel) &&
+                            scene.more_objects.empty() && !plan.elastic_object && !plan.finite_strain;
   const std::string why =
       shows_slopes && !fine ? "a coating shows the surface's slope, which the gel's mesh has to some degrees only"
       : !detail             ? "the object's shape is smooth: the gel's mesh has all of it"
@@ -276,11 +278,13 @@ void plan_light(const SceneSpec& scene, Plan& plan, PlanTable& table) {
       hits ? "depth, normals, ids, contact or flow is asked for" : "none of depth, normals, ids, contact, flow is",
       "one ray a pixel: some 0.1 s a frame of 640x480");
   const GelSpec& gel = scene.device.gel;
-  if (gel.shape != GelShape::slab) {
+  const bool clear_and_curved = gel.shape != GelShape::slab && !scene.device.coating;
+  if (gel.shape == GelShape::mesh || clear_and_curved) {
     fail_at(scene.where,
-            "outputs: an image is asked for, but the gel of the device '{}' ({}) isn't a slab, and the renderer draws "
-            "slabs only; truth alone can be had with frames, ideal and radiance all false",
-            scene.device.name, scene.device.where.file);
+            "outputs: an image is asked for, but the gel of the device '{}' ({}) is {}; pictures can be had of slabs, "
+            "and of domes and fingertips with a coating; truth alone with frames, ideal and radiance all false",
+            scene.device.name, scene.device.where.file,
+            gel.shape == GelShape::mesh ? "a mesh" : "curved and has no coating");
   }
   const PlateSpec& plate = scene.device.plate;
   const bool refracts = gel.refractive_index != 1.0 || plate.refractive_index != 1.0;

@@ -9,12 +9,25 @@
 
 #include "core/yaml_reader.h"
 #include "fem/relief_map.h"
+#include "sim/coin_relief.h"
+#include "sim/fabric_relief.h"
+#include "sim/fingerprint_relief.h"
+#include "sim/foam_relief.h"
 #include "sim/image_relief.h"
+#include "sim/leaf_relief.h"
+#include "sim/plastic_relief.h"
+#include "sim/plug_relief.h"
+#include "sim/print_relief.h"
+#include "sim/sandpaper_relief.h"
+#include "sim/tissue_relief.h"
 #include "sim/wave_reliefs.h"
+#include "sim/wood_relief.h"
 
 namespace touchstone::sim {
 
-using ReliefKind = std::variant<WavesRelief, GridRelief, HairRelief, ImageRelief>;
+using ReliefKind = std::variant<WavesRelief, GridRelief, HairRelief, ImageRelief, PrintRelief, FingerprintRelief,
+                                CoinRelief, PlugRelief, FabricRelief, FoamRelief, TissueRelief, SandpaperRelief,
+                                PlasticRelief, WoodRelief, LeafRelief>;
 
 /// Heights from 0 over the shape's lower side, mapped along the object's z axis; the plain shape is the floor. Only the
 /// fields that belong to `type` may stand in the file.

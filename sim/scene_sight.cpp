@@ -1,11 +1,13 @@
 #include "sim/scene_sight.h"
 
+#include "sim/gel_setup.h"
+
 namespace touchstone::sim {
 
 SceneSight::SceneSight(const SceneSpec& scene_of, const Plan& plan_of, const fem::Compliance& gel_of)
     : scene(scene_of),
       plan(plan_of),
-      gel(gel_of),
+      gel(gel_of, gel_body(scene.device)),
       membrane(plan.fine_relief || scene.outputs.height ? std::make_unique<Membrane>(scene, plan, gel_of) : nullptr),
       objects(visible_objects(scene)) {}
 

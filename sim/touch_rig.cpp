@@ -88,7 +88,7 @@ struct TouchRig::Parts {
       const double radius = judged_ball().shape.radius_mm;
       const double half = 0.5 * settings.deepest_mm;
       states.push_back(play(scene_with(judged_ball(), straight_press(radius + 0.1, radius - half))).back());
-      direct = std::make_unique<const DirectLight>(*judged, camera, states, kRaysAPixel);
+      direct = std::make_unique<const DirectLight>(*judged, camera, states, kRaysAPixel, settings.edge_side);
       choice = direct->choice();
     }
     background_light = light(*judged, rest, {});
@@ -102,7 +102,7 @@ struct TouchRig::Parts {
     scene.seed = settings.seed;
     scene.membrane.pixel_um = settings.membrane_um;
     scene.light.interreflection_tolerance = settings.interreflection_tolerance;
-    scene.effects.fine_relief = device.gel.shape == GelShape::slab ? Switch::on : Switch::off;
+    scene.effects.fine_relief = is_gentle(device.gel) ? Switch::on : Switch::off;
     scene.effects.motion_blur = Switch::off;
     scene.effects.rolling_shutter = Switch::off;
     const bool fit = unfit_for_direct_light(scene, make_plan(scene)).empty();

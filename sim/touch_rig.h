@@ -22,13 +22,15 @@ struct TouchRigSettings {
   double widest_mm = 0.5;     ///< how far it will be sheared
   double membrane_um = 40.0;  ///< pixels of the fine contact (MembraneSpec::pixel_um)
   double interreflection_tolerance = 0.05;
+  int edge_side = 4;  ///< rays along a side of pixels that differ from those beside them (render::DirectSettings): on a
+                      ///< rough object these are all pixels
 };
 
 /// One frame and what is true of it. Pictures have the camera's size.
 struct Touch {
-  cv::Mat frame;   ///< as the camera delivers it: 8 bit, BGR or grey, with noise
-  cv::Mat height;  ///< CV_32FC1, mm: how far the membrane that the pixel sees is pressed in, against what the pixel
-                   ///< sees at rest, along the gel frame's z; NaN where it sees no membrane
+  cv::Mat frame;    ///< as the camera delivers it: 8 bit, BGR or grey, with noise
+  cv::Mat height;   ///< CV_32FC1, mm: how far the membrane that the pixel sees is pressed in, against what the pixel
+                    ///< sees at rest, along the gel frame's z; NaN where it sees no membrane
   cv::Mat contact;  ///< CV_8UC1, 255 where the pixel sees membrane that lies on the object
 };
 

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <map>
 #include <utility>
+#include <variant>
 
 #include "core/error.h"
 #include "core/units.h"
@@ -75,35 +77,87 @@ Weights subdivide(std::vector<std::array<int, 3>>& triangles, int vertices) {
   return matrix;
 }
 
-/// Where lines straight up through points of the gel meet the body.
+/// Where a point of the undeformed surface that subdivision gave truly lies, and the way along which it is laid onto
+/// bodies. On the border only the rim's own points are wanted.
+struct TrueSurface {
+  std::function<Eigen::Vector3d(const Eigen::Vector3d& point, bool on_border)> place;
+  std::function<Eigen::Vector3d(const Eigen::Vector3d& point)> up;
+};
+
+Eigen::Vector3d on_cylinder(const Eigen::Vector3d& point, double radius, double z) {
+  const Eigen::Vector2d across = radius * point.head<2>().normalized();
+  return {across.x(), across.y(), z};
+}
+
+TrueSurface true_surface(const fem::GelBody& body) {
+  const auto straight_up = [](const Eigen::Vector3d&) { return Eigen::Vector3d(Eigen::Vector3d::UnitZ()); };
+  if (const auto* dome = std::get_if<fem::DomeGel>(&body)) {
+    const double sphere = dome->sphere_radius;
+    const double base = dome->base_radius;
+    const double rim_z = std::sqrt(sphere * sphere - base * base) - sphere;
+    const Eigen::Vector3d centre(0, 0, -sphere);
+    return {[=](const Eigen::Vector3d& point, bool on_border) -> Eigen::Vector3d {
+              if (on_border) return on_cylinder(point, base, rim_z);
+              return centre + sphere * (point - centre).normalized();
+            },
+            straight_up};
+  }
+  if (const auto* tip = std::get_if<fem::FingertipGel>(&body)) {
+    const double radius = tip->radius;
+    const Eigen::Vector3d centre(0, 0, -radius);
+    return {[=](const Eigen::Vector3d& point, bool) -> Eigen::Vector3d {
+              if (point.z() < centre.z()) return on_cylinder(point, radius, point.z());
+              return centre + radius * (point - centre).normalized();
+            },
+            [=](const Eigen::Vector3d& point) -> Eigen::Vector3d {
+              if (point.z() < centre.z()) return on_cylinder(point, 1.0, 0.0);
+              return (point - centre).normalized();
+            }};
+  }
+  return {[](const Eigen::Vector3d& point, bool) { return point; }, straight_up};
+}
+
+/// Which vertices lie on the surface's edge.
+std::vector<char> border_of(const std::vector<std::array<int, 3>>& triangles, std::size_t vertices) {
+  std::map<std::pair<int, int>, int> uses;
+  for (const auto& t : triangles) {
+    for (int k = 0; k < 3; ++k) ++uses[std::minmax(t[k], t[(k + 1) % 3])];
+  }
+  std::vector<char> border(vertices, 0);
+  for (const auto& [ends, count] : uses) {
+    if (count == 1) border[ends.first] = border[ends.second] = 1;
+  }
+  return border;
+}
+
+/// Where lines out of the gel through its points meet the body.
 class Above {
  public:
   Above(const fem::ContactShape& shape, const RigidTransform& gel_from_object)
-      : shape_(shape),
-        object_from_gel_(gel_from_object.inverse()),
-        up_(object_from_gel_.turn(Eigen::Vector3d::UnitZ())) {
+      : shape_(shape), object_from_gel_(gel_from_object.inverse()) {
     const fem::BoundingBall ball = fem::bounding_ball(shape);
     centre_ = gel_from_object * ball.centre;
     radius_ = ball.radius;
   }
 
-  /// Height of the body's surface above the point, negative where the point lies inside; nothing beside the body.
-  std::optional<double> gap(const Eigen::Vector3d& point) const {
-    if ((point - centre_).head<2>().squaredNorm() > radius_ * radius_) return std::nullopt;
-    return fem::first_entry(shape_, object_from_gel_ * point, up_);
+  /// Height of the body's surface above the point along the unit vector `up`, negative where the point lies inside;
+  /// nothing beside the body.
+  std::optional<double> gap(const Eigen::Vector3d& point, const Eigen::Vector3d& up) const {
+    if ((point - centre_).cross(up).squaredNorm() > radius_ * radius_) return std::nullopt;
+    return fem::first_entry(shape_, object_from_gel_ * point, object_from_gel_.turn(up));
   }
 
  private:
   const fem::ContactShape& shape_;
   RigidTransform object_from_gel_;
-  Eigen::Vector3d up_;
   Eigen::Vector3d centre_;
   double radius_ = 0.0;
 };
 
 }  // namespace
 
-VisibleGel::VisibleGel(const fem::Compliance& gel) : coarse_(gel.triangles), fine_(gel.triangles) {
+VisibleGel::VisibleGel(const fem::Compliance& gel, const fem::GelBody& body)
+    : coarse_(gel.triangles), fine_(gel.triangles) {
   const auto n = static_cast<int>(gel.vertices.size());
   rest_.resize(n, 3);
   for (int i = 0; i < n; ++i) rest_.row(i) = gel.vertices[i].transpose();
@@ -116,6 +170,17 @@ VisibleGel::VisibleGel(const fem::Compliance& gel) : coarse_(gel.triangles), fin
     fine_from_coarse_ = Weights(step * fine_from_coarse_);
   }
   TS_ASSERT(fine_.size() == kParts * coarse_.size());
+  const TrueSurface surface = true_surface(body);
+  fine_rest_ = fine_from_coarse_ * rest_;
+  const std::vector<char> border = border_of(fine_, static_cast<std::size_t>(fine_rest_.rows()));
+  up_.resize(n, 3);
+  fine_up_.resize(fine_rest_.rows(), 3);
+  for (int i = 0; i < n; ++i) up_.row(i) = surface.up(gel.vertices[i]).transpose();
+  for (Eigen::Index i = 0; i < fine_rest_.rows(); ++i) {
+    const Eigen::Vector3d place = surface.place(fine_rest_.row(i).transpose(), border[i] != 0);
+    fine_rest_.row(i) = place.transpose();
+    fine_up_.row(i) = surface.up(place).transpose();
+  }
 }
 
 TriangleMesh VisibleGel::dry_surface(const fem::PressState& press, const fem::ContactShape& shape) const {
@@ -137,21 +202,22 @@ GelSheet VisibleGel::sheet(const fem::PressState& press, std::span<const PlacedS
   for (const PlacedShape& body : bodies) above.emplace_back(body.shape, body.gel_from_object);
   const auto owner = [&](int vertex) { return bodies.size() == 1 ? 0 : press.node_owner[vertex]; };
   // To the body that comes first on the way up, or reaches deepest.
-  const auto nearest_gap = [&](const Eigen::Vector3d& point) {
+  const auto nearest_gap = [&](const Eigen::Vector3d& point, const Eigen::Vector3d& up) {
     std::optional<std::pair<double, int>> nearest;
     for (std::size_t k = 0; k < above.size(); ++k) {
-      const std::optional<double> gap = above[k].gap(point);
+      const std::optional<double> gap = above[k].gap(point, up);
       if (gap && (!nearest || *gap < nearest->first)) nearest = {*gap, static_cast<int>(k)};
     }
     return nearest;
   };
   const auto touches = [&](int vertex) { return press.node_state[vertex] != fem::NodeState::open; };
-  Eigen::MatrixX3d coarse = rest_ + averaged_ * press.surface_displacement;
-  for (Eigen::Index i = 0; i < coarse.rows(); ++i) {
+  Eigen::MatrixX3d moved = averaged_ * press.surface_displacement;
+  for (Eigen::Index i = 0; i < moved.rows(); ++i) {
     if (!touches(static_cast<int>(i))) continue;
-    coarse(i, 2) += above[owner(static_cast<int>(i))].gap(coarse.row(i).transpose()).value_or(0.0);
+    const Eigen::Vector3d point = (rest_.row(i) + moved.row(i)).transpose();
+    moved.row(i) += above[owner(static_cast<int>(i))].gap(point, up_.row(i).transpose()).value_or(0.0) * up_.row(i);
   }
-  const Eigen::MatrixX3d fine = fine_from_coarse_ * coarse;
+  const Eigen::MatrixX3d fine = fine_rest_ + fine_from_coarse_ * moved;
 
   std::vector<char> in_contact(fine.rows(), 0);  // inside the contact as mechanics has it
   std::vector<char> contact_triangle(coarse_.size(), 0);
@@ -167,14 +233,14 @@ GelSheet VisibleGel::sheet(const fem::PressState& press, std::span<const PlacedS
   GelSheet sheet;
   TriangleMesh& mesh = sheet.mesh;
   mesh.vertices.resize(fine.rows());
-  const Eigen::MatrixX3d fine_rest = fine_from_coarse_ * rest_;
-  for (Eigen::Index i = 0; i < fine.rows(); ++i) sheet.rest.emplace_back(fine_rest.row(i).transpose());
+  for (Eigen::Index i = 0; i < fine.rows(); ++i) sheet.rest.emplace_back(fine_rest_.row(i).transpose());
   std::vector<int> touched(fine.rows(), -1);
   for (Eigen::Index i = 0; i < fine.rows(); ++i) {
     mesh.vertices[i] = fine.row(i).transpose();
-    const auto nearest = nearest_gap(mesh.vertices[i]);
+    const Eigen::Vector3d up = fine_up_.row(i).transpose();
+    const auto nearest = nearest_gap(mesh.vertices[i], up);
     if (nearest && (in_contact[i] || nearest->first < kWettedMm)) {
-      mesh.vertices[i].z() += nearest->first;
+      mesh.vertices[i] += nearest->first * up;
       touched[i] = nearest->second;
     }
   }

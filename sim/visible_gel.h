@@ -10,6 +10,7 @@
 #include "core/triangle_mesh.h"
 #include "fem/compliance.h"
 #include "fem/contact_shape.h"
+#include "fem/gel_body.h"
 #include "fem/press.h"
 
 namespace touchstone::sim {
@@ -32,10 +33,13 @@ struct GelSheet {
 /// taken). Seen through the gel both would
 /// show: as a many-cornered edge of contact with glints on it. So the surface is subdivided twice (Loop 1987; the pad's
 /// edge by straight halving) from vertices that lie on the body where they're in contact, and where the fine surface
-/// reaches into the body it's laid onto it. Made once a gel; safe to use from many threads.
+/// reaches into the body it's laid onto it: straight along z, of a fingertip along its undeformed surface's normal. The
+/// undeformed surface of domes and fingertips is subdivided on its true sphere and cylinder, to rounding. Made once a
+/// gel; safe to use from many threads.
 class VisibleGel {
  public:
-  explicit VisibleGel(const fem::Compliance& gel);
+  /// `body` is that of the compliance; a flat one's outer surface is as its mesh has it.
+  explicit VisibleGel(const fem::Compliance& gel, const fem::GelBody& body = fem::SlabGel{});
 
   /// The displaced surface. The bodies are those of the press, in their order.
   GelSheet sheet(const fem::PressState& press, std::span<const PlacedShape> bodies) const;
@@ -46,7 +50,9 @@ class VisibleGel {
   TriangleMesh dry_surface(const fem::PressState& press, const fem::ContactShape& shape) const;
 
  private:
-  Eigen::MatrixX3d rest_;                                  // of the mechanics' vertices
+  Eigen::MatrixX3d rest_;          // of the mechanics' vertices
+  Eigen::MatrixX3d fine_rest_;     // of the visible ones
+  Eigen::MatrixX3d up_, fine_up_;  // unit: ways out of the gel along which it is laid onto bodies
   Eigen::SparseMatrix<double, Eigen::RowMajor> averaged_;  // hat-weighted means from values at the vertices
   Eigen::SparseMatrix<double, Eigen::RowMajor> fine_from_coarse_;
   std::vector<std::array<int, 3>> coarse_, fine_;  // triangles; those of coarse triangle i begin at fine_[i * kParts]

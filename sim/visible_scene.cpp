@@ -13,8 +13,35 @@ enum MediumIndex { kAir = 0, kPlate = 1, kGel = 2 };
 
 constexpr double kFilmInGelMm = 1e-3;  // so that film and face don't coincide
 
-/// The frame that holds the gel: walls round the pad's sides, from the plate to its outer surface.
-TriangleMesh pad_walls(const GelSpec& gel) {
+/// A wall on a circle about z from `low` to `high`; nothing where that's no height.
+TriangleMesh round_wall(double radius, double low, double high) {
+  constexpr int kSides = 180;
+  constexpr double kLowest = 1e-6;
+  TriangleMesh mesh;
+  if (high - low < kLowest) return mesh;
+  for (int side = 0; side < kSides; ++side) {
+    const double angle = 2.0 * kPi * side / kSides;
+    for (const double z : {low, high})
+      mesh.vertices.emplace_back(radius * std::cos(angle), radius * std::sin(angle), z);
+    const int a = 2 * side;
+    const int b = 2 * ((side + 1) % kSides);
+    mesh.triangles.push_back({a, b, a + 1});
+    mesh.triangles.push_back({b, b + 1, a + 1});
+  }
+  return mesh;
+}
+
+/// The frame that holds the gel: walls round its sides, from the plate to its outer surface.
+TriangleMesh gel_walls(const GelSpec& gel) {
+  if (gel.shape == GelShape::dome) {
+    const double rim =
+        std::sqrt(gel.sphere_radius_mm * gel.sphere_radius_mm - gel.base_radius_mm * gel.base_radius_mm) -
+        gel.sphere_radius_mm;
+    return round_wall(gel.base_radius_mm, -gel.thickness_mm, rim);
+  }
+  if (gel.shape == GelShape::fingertip) {
+    return round_wall(gel.radius_mm, -gel.thickness_mm, -gel.thickness_mm + gel.sleeve_mm);
+  }
   const double x = gel.size_x_mm / 2;
   const double y = gel.size_y_mm / 2;
   const Eigen::Vector2d corners[4] = {{-x, -y}, {x, -y}, {x, y}, {-x, y}};
@@ -152,7 +179,7 @@ render::Scene scene_without_surface(const SceneSpec& scene, const Plan& plan, co
   }
   out.faces = flat_faces(device);
   out.surfaces.push_back(
-      {pad_walls(device.gel), render::Lambertian{in_bands(device.gel.frame_albedo, bands, "gel.frame_albedo")}});
+      {gel_walls(device.gel), render::Lambertian{in_bands(device.gel.frame_albedo, bands, "gel.frame_albedo")}});
   const std::vector<MovedObject> all = moved_objects(scene);
   for (std::size_t k = 0; k < objects.size(); ++k) {
     out.surfaces.push_back({placed(objects[k].body, poses[k]), material_of(all[k].object, bands)});

@@ -79,8 +79,13 @@ TEST(FirstEntry, OfASphereIsOnItsNearSide) {
 
 TEST(FirstEntry, DoesNotDependOnWhereTheLineStarts) {
   RandomStream random(2, 0, Purpose::kTest);
-  const ContactShape shapes[] = {SphereShape{1.0}, RoundedCylinder{1.0, 0.3, 2.0}, BoxShape{{1.0, 2.0, 3.0}},
-                                 MeshShape(box_mesh({1.0, 2.0, 3.0}))};
+  const ContactShape shapes[] = {SphereShape{1.0},
+                                 RoundedCylinder{1.0, 0.3, 2.0},
+                                 BoxShape{{1.0, 2.0, 3.0}},
+                                 MeshShape(box_mesh({1.0, 2.0, 3.0})),
+                                 EggShape{1.0, 1.2, 1.5},
+                                 EggShape{2.0, 0.4, 0.7},
+                                 ShellShape{{3.0, 2.0}, 0.2, {0.4, -0.3}}};
   for (const auto& shape : shapes) {
     for (int k = 0; k < 100; ++k) {
       const Eigen::Vector3d d = random_direction(random);
@@ -209,8 +214,13 @@ TEST(MeshShape, RefusesAnOpenMesh) {
 
 TEST(BoundingBall, HoldsEachEntryPoint) {
   RandomStream random(6, 0, Purpose::kTest);
-  const ContactShape shapes[] = {SphereShape{1.0}, RoundedCylinder{1.0, 0.3, 2.0}, BoxShape{{1.0, 2.0, 3.0}},
-                                 MeshShape(box_mesh({1.0, 2.0, 3.0}))};
+  const ContactShape shapes[] = {SphereShape{1.0},
+                                 RoundedCylinder{1.0, 0.3, 2.0},
+                                 BoxShape{{1.0, 2.0, 3.0}},
+                                 MeshShape(box_mesh({1.0, 2.0, 3.0})),
+                                 EggShape{1.0, 1.2, 1.5},
+                                 EggShape{2.0, 0.4, 0.7},
+                                 ShellShape{{3.0, 2.0}, 0.2, {0.4, -0.3}}};
   for (const auto& shape : shapes) {
     const BoundingBall ball = bounding_ball(shape);
     for (int k = 0; k < 200; ++k) {

@@ -255,6 +255,20 @@ TEST(DirectRenderer, AgreesWithThePathTracer) {
   expect_equal_light(beads, "beads");
 }
 
+// Facets of a millimetre that are shaded as the curved sheet that they stand for.
+TEST(DirectRenderer, AgreesWithThePathTracerOnSmoothSheets) {
+  for (const Material& material : {Material{Lambertian{grey(0.7)}}, Material{RoughConductor{grey(0.8), 0.5}}}) {
+    Scene scene = lit_stack(0.0);
+    const auto ripples = [](double x, double y) { return 0.25 * (std::sin(1.5 * x) * std::cos(1.3 * y) - 1.0); };
+    scene.surfaces = {{sheet(7.0, 14, ripples), material}};
+    const cv::Mat facets = Tracer(scene).render(small_camera(32, 24), samples(64)).irradiance;
+    scene.surfaces[0].normals = vertex_normals(scene.surfaces[0].mesh);
+    const cv::Mat smooth = Tracer(scene).render(small_camera(32, 24), samples(64)).irradiance;
+    EXPECT_GT(cv::norm(facets, smooth) / cv::norm(smooth), 0.02) << "then facets would pass, too";
+    expect_equal_light(scene, "smooth");
+  }
+}
+
 TEST(DirectRenderer, AgreesWithThePathTracerUnderLedAndAreaLamps) {
   Scene scene = dented_scene(0.0, Lambertian{grey(0.7)});
   LedLamp led;

@@ -7,7 +7,13 @@
 #include <new>
 #include <opencv2/core.hpp>
 
+#include "sensors/height_calibration.h"
+#include "sensors/height_estimator.h"
+#include "sensors/incipient_slip.h"
+#include "sensors/motion_ratio.h"
 #include "tests/sensors/force_samples.h"
+#include "tests/sensors/painted_gel.h"
+#include "tests/sensors/painted_markers.h"
 #include "tests/sensors/rendered_beads.h"
 
 namespace {
@@ -102,6 +108,51 @@ TEST_F(Allocation, NoneAfterTheFirstFrame) {
       EXPECT_EQ(allocations, before) << "type " << type;
       EXPECT_TRUE(sum.allFinite());
     }
+  }
+}
+
+TEST_F(Allocation, NoneForMarkersAndSlipAfterTheFirstFrame) {
+  const auto rest = test::marker_grid();
+  std::vector<Frame> frames;
+  for (int i = 0; i < 12; ++i) {
+    auto places = rest;
+    for (auto& place : places) place += 0.8 * i * Eigen::Vector2d(1.0, -0.5);
+    if (i == 5) places[20].setConstant(std::nan(""));
+    frames.push_back({test::paint_markers({.noise = 2.0}, places, static_cast<std::uint64_t>(1 + i)), i});
+    if (i == 8) frames.back().image.setTo(0);
+  }
+  MarkerTracker tracker({});
+  IncipientSlipDetector detector;
+  cv::Mat contact;
+  double sum = 0.0;
+  const auto look = [&](std::size_t i) {
+    const TrackedMarkers& markers = tracker.track(frames[i]);
+    sum += motion_ratio(frames[0].image, frames[i > 0 ? i - 1 : 0].image, frames[i].image, {}, &contact).motion_px;
+    erase_markers(contact, markers, 4.0);
+    contact(cv::Rect(100, 60, 120, 120)).setTo(255);
+    sum += detector.look(markers, contact_patch(contact, 50)).motion_px;
+  };
+  look(0);
+  const long before = allocations;
+  for (std::size_t i = 1; i < frames.size(); ++i) look(i);
+  EXPECT_EQ(allocations, before);
+  EXPECT_GT(sum, 0.0);
+}
+
+TEST_F(Allocation, NoneForAHeightMapAfterTheFirst) {
+  test::GelPainter painter(120, 90, 0.053, {});
+  HeightCalibrationSettings calibration;
+  calibration.mm_per_px = 0.053;
+  calibration.table.most_cells = 20000;
+  const HeightModel model = calibrate_height(painter.presses(2, 2, 1.0, 0.7), painter.background(), calibration).model;
+  const std::vector<cv::Mat> frames = {painter.rest(), painter.press({{3.0, 2.5}, 2.0, 1.0}).frame};
+  for (const HeightBorder border : {HeightBorder::zero, HeightBorder::free}) {
+    HeightEstimator estimator(model, {.border = border});
+    int contact = estimator.estimate(frames[0]).contact_pixels;
+    const long before = allocations;
+    for (const cv::Mat& frame : frames) contact += estimator.estimate(frame).contact_pixels;
+    EXPECT_EQ(allocations, before);
+    EXPECT_GT(contact, 0);
   }
 }
 

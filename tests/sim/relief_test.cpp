@@ -151,5 +151,61 @@ TEST(Plan, PixelsTooWideForTheReliefAreRefused) {
   }
 }
 
+TEST(Relief, PrintIsAsHighAsItsInkAndReadsAlongX) {
+  // A pen of 0.2 mm draws an L of 2 x 3 mm: its stem is on the left.
+  const std::string print = "{type: print, amplitude_um: 60, text: L, letter_mm: 3, stroke_mm: 0.2}";
+  EXPECT_NEAR(height(print, -1.0, 0.3), 0.06, 1e-7);
+  EXPECT_NEAR(height(print, 0.5, 1.5), 0.06, 1e-7);
+  EXPECT_EQ(height(print, 1.0, 0.3), 0.0);
+  EXPECT_NEAR(height(print, -1.0 + 0.1 * (1.0 - 1.0 / 6.0), 0.3), 0.03, 0.004);  // half of the soft edge
+  EXPECT_EQ(height(print, -0.88, 0.3), 0.0);
+}
+
+TEST(Relief, EveryLetterLeavesInkWithinItsCell) {
+  for (const char letter : std::string("ABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789.-$")) {
+    const PrintRelief print{50.0, std::string(1, letter), 2.0, 0.2, {}};
+    const fem::ReliefMap map = relief_map(print);
+    EXPECT_NEAR(map.highest(), 0.05, 1e-6) << letter;
+    for (double y = -1.5; y < 1.5; y += 0.05) {
+      EXPECT_EQ(map.at(0.9, y), 0.0) << letter;
+      EXPECT_EQ(map.at(-0.9, y), 0.0) << letter;
+    }
+  }
+}
+
+TEST(Relief, PrintRefusesLettersThatThereArent) {
+  EXPECT_THAT(error_of("{type: print, amplitude_um: 60, text: a}"), HasSubstr("there's no letter 'a'"));
+  EXPECT_THAT(error_of("{type: print, amplitude_um: 60, text: ''}"), HasSubstr("has 0 letters"));
+}
+
+TEST(Relief, FingerprintsRidgesAreAsFarApartAsSaid) {
+  // Without minutiae: along x from the core the phase grows by 2 pi a ridge.
+  const FingerprintRelief print{80.0, 0.45, {12, 15}, 0, 1};
+  const fem::ReliefMap map = relief_map(print);
+  EXPECT_LE(map.highest(), 0.08 + 1e-7);
+  for (int ridge = 2; ridge < 8; ++ridge) {
+    EXPECT_NEAR(map.at(0.45 * ridge, 0.0), 0.08, 0.002) << ridge;
+    EXPECT_NEAR(map.at(0.45 * (ridge + 0.5), 0.0), 0.0, 0.002) << ridge;
+  }
+  EXPECT_EQ(map.at(6.2, 0.0), 0.0) << "it fades out";
+  EXPECT_EQ(map.at(0.0, 7.6), 0.0);
+}
+
+TEST(Relief, MinutiaeChangeThePrintAndLieWhereTheSeedSays) {
+  const auto difference = [](const FingerprintRelief& one, const FingerprintRelief& other) {
+    const fem::ReliefMap a = relief_map(one);
+    const fem::ReliefMap b = relief_map(other);
+    double sum = 0.0;
+    for (double x = -4.0; x < 4.0; x += 0.1) sum += std::abs(a.at(x, 2.0) - b.at(x, 2.0));
+    return sum / 80.0;
+  };
+  const FingerprintRelief whole{80.0, 0.45, {12, 15}, 0, 1};
+  const FingerprintRelief broken{80.0, 0.45, {12, 15}, 1, 1};
+  const FingerprintRelief elsewhere{80.0, 0.45, {12, 15}, 1, 2};
+  EXPECT_GT(difference(whole, broken), 0.01);
+  EXPECT_GT(difference(broken, elsewhere), 0.01);
+  EXPECT_EQ(difference(broken, broken), 0.0);
+}
+
 }  // namespace
 }  // namespace touchstone::sim

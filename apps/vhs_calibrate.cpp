@@ -9,7 +9,6 @@ namespace touchstone::apps {
 namespace {
 
 struct CalibrateOptions {
-  std::string sensor;
   std::filesystem::path out;
   std::string stop = "text";
   std::string form = "asymmetric";
@@ -24,7 +23,6 @@ sensors::TrainingSettings training_settings(const CalibrateOptions& options) {
 }
 
 void calibrate(const CalibrateOptions& options, const FrameOptions& frames, const GlobalOptions& global) {
-  require_known_sensor(options.sensor);
   require_writable_place(options.out);
   const std::vector<lab::TrackedSequence> tracked = tracked_frames(frames, global);
   const sensors::ForceSamples samples = lab::training_samples(tracked, frames.tracker.grid);
@@ -42,11 +40,10 @@ void calibrate(const CalibrateOptions& options, const FrameOptions& frames, cons
 
 }  // namespace
 
-void add_calibrate_command(CLI::App& app, const GlobalOptions& global, Action& action) {
-  CLI::App* command = app.add_subcommand(
-      "calibrate", "Train a sensor's force model on frames with known forces, simulated or recorded");
+void add_vhs_calibration(CLI::App& calibrations, const GlobalOptions& global, Action& action) {
+  CLI::App* command =
+      calibrations.add_subcommand("vhs", "Train its force model on frames with known forces, simulated or recorded");
   auto options = std::make_shared<CalibrateOptions>();
-  command->add_option("SENSOR", options->sensor, "vhs")->required();
   const auto frames = add_frame_options(*command, "train");
   command->add_option("--grid", frames->tracker.grid, "Beads a side")->check(CLI::Range(2, 32))->capture_default_str();
   command->add_option("-o,--out", options->out, "The model: a .json file")->required();

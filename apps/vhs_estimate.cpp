@@ -12,7 +12,6 @@ namespace {
 constexpr const char* kAxes = "xyz";
 
 struct EstimateOptions {
-  std::string sensor;
   std::filesystem::path model;
   std::filesystem::path out;
   std::string rest = "model";
@@ -62,7 +61,6 @@ void print_verification(const lab::Verification& verification) {
 }
 
 void estimate(const EstimateOptions& options, const FrameOptions& frames, const GlobalOptions& global) {
-  require_known_sensor(options.sensor);
   if (!options.out.empty()) require_writable_place(options.out);
   const sensors::StiffnessForceModel model = sensors::load_stiffness_model(options.model);
   FrameOptions with_grid = frames;
@@ -86,11 +84,10 @@ void estimate(const EstimateOptions& options, const FrameOptions& frames, const 
 
 }  // namespace
 
-void add_estimate_command(CLI::App& app, const GlobalOptions& global, Action& action) {
+void add_vhs_estimation(CLI::App& estimations, const GlobalOptions& global, Action& action) {
   CLI::App* command =
-      app.add_subcommand("estimate", "Force from a sensor's frames; where the true forces are known, the errors too");
+      estimations.add_subcommand("vhs", "Force from its frames; where the true forces are known, the errors too");
   auto options = std::make_shared<EstimateOptions>();
-  command->add_option("SENSOR", options->sensor, "vhs")->required();
   command->add_option("--model", options->model, "The model that `touchstone calibrate` made")->required();
   const auto frames = add_frame_options(*command, "verify");
   command->add_option("-o,--out", options->out, "The forces: a .csv file, one line a frame");

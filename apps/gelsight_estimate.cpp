@@ -1,0 +1,62 @@
+#include <algorithm>
+#include <memory>
+
+#include "apps/command.h"
+#include "apps/progress_bar.h"
+#include "lab/frame_sequence.h"
+#include "lab/height_maps.h"
+#include "sensors/height_model_file.h"
+
+namespace touchstone::apps {
+namespace {
+
+struct EstimateOptions {
+  std::filesystem::path model;
+  std::filesystem::path frames;
+  std::filesystem::path out;
+  std::string border = "zero";
+  std::string format = "exr";
+};
+
+void estimate(const EstimateOptions& options, const GlobalOptions& global) {
+  const sensors::HeightModel model = sensors::load_height_model(options.model);
+  sensors::HeightSettings settings;
+  if (options.border == "free") settings.border = sensors::HeightBorder::free;
+  const lab::HeightFormat format = options.format == "exr" ? lab::HeightFormat::exr : lab::HeightFormat::png16;
+  ProgressBar bar(global.quiet);
+  const std::vector<lab::HeightRecord> records =
+      lab::write_height_maps(model, settings, lab::picture_files(options.frames), options.out, format, bar.listener());
+  const auto count = [&](auto fault) { return std::count_if(records.begin(), records.end(), fault); };
+  const auto untrusted = count([](const lab::HeightRecord& record) { return !record.trusted; });
+  const auto at_border = count([](const lab::HeightRecord& record) { return record.contact_at_border; });
+  fmt::print("{}: {} height maps and heights.csv\n", options.out.string(), records.size());
+  if (untrusted > 0) fmt::print("  {} of them of frames that are overexposed or dark: not to be trusted\n", untrusted);
+  if (at_border > 0) {
+    fmt::print("  {} with a contact that runs out of the picture{}\n", at_border,
+               settings.border == sensors::HeightBorder::zero ? ": --border free suits them" : "");
+  }
+}
+
+}  // namespace
+
+void add_gelsight_estimation(CLI::App& estimations, const GlobalOptions& global, Action& action) {
+  CLI::App* command = estimations.add_subcommand("gelsight", "Height maps from its frames");
+  auto options = std::make_shared<EstimateOptions>();
+  command->add_option("--model", options->model, "The model that `touchstone calibrate gelsight` made")->required();
+  command->add_option("--frames", options->frames, "A folder of frames (.png, .jpg)")->required();
+  command->add_option("-o,--out", options->out, "The folder of the height maps and their summary, heights.csv")
+      ->required();
+  command
+      ->add_option("--border", options->border,
+                   "Height at the picture's border: 'zero', or 'free' where contacts run out of the picture")
+      ->check(CLI::IsMember({"zero", "free"}))
+      ->capture_default_str();
+  command
+      ->add_option("--format", options->format,
+                   "'exr': floats in mm; 'png16': 16 bit, 0.1 um a level, level 10000 is 0 mm")
+      ->check(CLI::IsMember({"exr", "png16"}))
+      ->capture_default_str();
+  command->callback([&action, options, &global] { action = [options, &global] { estimate(*options, global); }; });
+}
+
+}  // namespace touchstone::apps

@@ -1,0 +1,232 @@
+#include "lab/gelsight_slip_experiment.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "core/error.h"
+#include "lab/gelsight_force_experiment.h"
+#include "sensors/contact_patch.h"
+#include "sensors/height_estimator.h"
+
+namespace touchstone::lab {
+
+namespace {
+
+constexpr int kStatesAFrame = 4;
+constexpr int kBackgroundFrame = 1000000;  ///< its noise is no other frame's
+constexpr int kPressFrames = 4;
+constexpr int kHoldFrames = 3;
+constexpr int kLoadFrames = 10;
+constexpr double kClear_mm = 0.02;
+constexpr int kLeastPatch_px = 50;
+constexpr double kUnsheared = 0.05;  ///< of the limit
+constexpr double kRoll_mm = 1.2;
+/// How far a sliding object goes at most before it slides, mm for each N that friction holds, and mm at least.
+constexpr double kWay_mm_per_N = 3.0;
+constexpr double kLeastWay_mm = 0.6;
+
+sim::MotionSpec motion_of(const SlipCase& what, double frame_rate_Hz) {
+  sim::MotionSpec motion;
+  motion.frame_rate_Hz = kStatesAFrame * frame_rate_Hz;
+  const double way = what.motion == SlipMotion::roll
+                         ? kRoll_mm
+                         : std::max(kWay_mm_per_N * what.object.friction * what.normal_N, kLeastWay_mm);
+  const double from = -0.5 * way;
+  motion.start_mm = {from, 0, touching_height_mm(what.object) + kClear_mm};
+  const auto states_for = [&](double length_mm) {
+    return std::max(static_cast<int>(std::lround(length_mm / what.speed_mm_per_s * motion.frame_rate_Hz)), 1);
+  };
+  sim::MotionKey press, hold;
+  press.frames = kPressFrames * kStatesAFrame;
+  press.z = sim::AxisKey{std::nullopt, what.normal_N};
+  hold.frames = kHoldFrames * kStatesAFrame;
+  motion.keys = {press, hold};
+  switch (what.motion) {
+    case SlipMotion::slide: {
+      sim::MotionKey slide;
+      slide.frames = states_for(way);
+      slide.x = sim::AxisKey{from + way, std::nullopt};
+      motion.keys.push_back(slide);
+      break;
+    }
+    case SlipMotion::hold:
+      motion.keys.push_back(hold);
+      motion.keys.push_back(hold);
+      break;
+    case SlipMotion::load: {
+      sim::MotionKey load;
+      load.frames = kLoadFrames * kStatesAFrame;
+      load.x = sim::AxisKey{std::nullopt, what.part_of_limit * what.object.friction * what.normal_N};
+      motion.keys.push_back(load);
+      motion.keys.push_back(hold);
+      break;
+    }
+    case SlipMotion::roll: {
+      sim::MotionKey roll;
+      roll.frames = states_for(way);
+      roll.x = sim::AxisKey{from + way, std::nullopt};
+      roll.angles_deg = Eigen::Vector3d(0, way / what.object.shape.radius_mm * 180.0 / std::numbers::pi, 0);
+      motion.keys.push_back(roll);
+      break;
+    }
+  }
+  return motion;
+}
+
+std::size_t as_count(int number) {
+  return static_cast<std::size_t>(number);
+}
+
+double share_sticking(const fem::PressState& state) {
+  const auto count = [&](fem::NodeState one) {
+    return static_cast<double>(std::count(state.node_state.begin(), state.node_state.end(), one));
+  };
+  const double sticking = count(fem::NodeState::stick);
+  const double touching = sticking + count(fem::NodeState::slip);
+  return touching > 0 ? sticking / touching : 1.0;
+}
+
+double load_of(const fem::PressState& state, double friction) {
+  const double limit = friction * state.wrench[2];
+  return limit > 0 ? state.wrench.head<2>().norm() / limit : 0.0;
+}
+
+const char* name_of(SlipMotion motion) {
+  switch (motion) {
+    case SlipMotion::slide:
+      return "slide";
+    case SlipMotion::hold:
+      return "hold";
+    case SlipMotion::load:
+      return "load";
+    case SlipMotion::roll:
+      return "roll";
+  }
+  return "?";
+}
+
+}  // namespace
+
+std::string SlipCase::name() const {
+  std::string text = fmt::format("{} {}, mu {:g}, {:g} N", name_of(motion), object.name, object.friction, normal_N);
+  if (motion == SlipMotion::slide || motion == SlipMotion::roll) text += fmt::format(", {:g} mm/s", speed_mm_per_s);
+  if (motion == SlipMotion::load) text += fmt::format(", {:g} of the limit", part_of_limit);
+  return text;
+}
+
+SlipRun run_slip_case(const sim::TouchRig& rig, const SlipCase& what, const SlipEstimators& estimators,
+                      std::uint64_t seed, int frames_after) {
+  SlipRun run;
+  run.what = what;
+  const sim::TouchObject object = rig.object(what.object);
+  const double frame_rate_Hz = rig.device().camera->frame_rate_Hz;
+  std::vector<sim::Truth> truths = rig.play(object, motion_of(what, frame_rate_Hz));
+  const std::size_t first_drag = as_count((kPressFrames + kHoldFrames) * kStatesAFrame);
+  if (what.motion == SlipMotion::slide) {
+    const auto sliding = std::find_if(truths.begin() + static_cast<std::ptrdiff_t>(first_drag), truths.end(),
+                                      [](const sim::Truth& truth) { return share_sticking(truth.press) == 0.0; });
+    if (sliding == truths.end()) fail("{}: doesn't slide on its way", what.name());
+    const auto onset = static_cast<std::size_t>(sliding - truths.begin());
+    run.onset_s = static_cast<double>(onset) / (kStatesAFrame * frame_rate_Hz);
+    truths.resize(std::min(truths.size(), onset + as_count(frames_after * kStatesAFrame) + 1));
+  }
+
+  const cv::Mat background = rig.background(seed, kBackgroundFrame);
+  const double diameter = marker_settings(rig).look.diameter_px;
+  sensors::MarkerTracker tracker(marker_settings(rig));
+  sensors::IncipientSlipDetector incipient(estimators.incipient);
+  sensors::HeightEstimator heights(estimators.heights);
+  const sensors::LinearForce& normal_line = sensors::normal_line(estimators.forces, what.object.name);
+  tracker.track({background, -1});
+  cv::Mat before = background;
+  cv::Mat contact;
+  for (std::size_t i = 0; i < truths.size(); i += kStatesAFrame) {
+    const fem::PressState& state = truths[i].press;
+    const cv::Mat image = rig.look(object, state, seed, static_cast<int>(i), false).frame;
+    const sensors::TrackedMarkers& markers = tracker.track({image, static_cast<std::int64_t>(i)});
+    const sensors::MotionRatio motion = sensors::motion_ratio(background, before, image, estimators.motion, &contact);
+    before = image;
+    sensors::erase_markers(contact, markers, diameter);
+    const auto patch = sensors::contact_patch(contact, kLeastPatch_px);
+    SlipFrame frame;
+    frame.t_s = static_cast<double>(i) / (kStatesAFrame * frame_rate_Hz);
+    frame.load = load_of(state, what.object.friction);
+    frame.sticking = share_sticking(state);
+    frame.motion_ratio = motion.ratio;
+    if (patch) {
+      const cv::Mat bare = without_markers(image, &markers, diameter);
+      const double sum = sensors::height_sum_mm3(heights.estimate(bare).height_mm, rig.mm_per_px());
+      const Eigen::Vector2d displacement_mm = sensors::mean_displacement(markers, *patch).px * rig.mm_per_px();
+      frame.force_ratio =
+          sensors::force_ratio(sensors::shear_force_N(estimators.forces, displacement_mm), normal_line.force_N(sum));
+    }
+    frame.rule = sensors::is_slip(frame.force_ratio, frame.motion_ratio, estimators.rule);
+    frame.incipient = incipient.look(markers, patch);
+    frame.markers_found = markers.found();
+    run.frames.push_back(frame);
+  }
+  return run;
+}
+
+double SlipScore::median_delay_ms() const {
+  if (delays_ms.empty()) return std::numeric_limits<double>::quiet_NaN();
+  std::vector<double> sorted = delays_ms;
+  std::sort(sorted.begin(), sorted.end());
+  const std::size_t half = sorted.size() / 2;
+  return sorted.size() % 2 == 1 ? sorted[half] : 0.5 * (sorted[half - 1] + sorted[half]);
+}
+
+double SlipScore::false_alarms_percent() const {
+  return quiet_frames > 0 ? 100.0 * false_frames / quiet_frames : 0.0;
+}
+
+std::string to_csv(const std::vector<SlipRun>& runs) {
+  std::string text =
+      "case,onset_s,t_s,load,sticking,force_ratio,motion_ratio,rule,lag,lag_error,slide_px,shear_px,state,markers\n";
+  const auto known = [](const std::optional<double>& value) { return value ? fmt::format("{:.4f}", *value) : ""; };
+  for (const SlipRun& run : runs) {
+    for (const SlipFrame& frame : run.frames) {
+      text += fmt::format("\"{}\",{},{:.4f},{:.4f},{:.4f},{},{},{},{},{:.4f},{:.3f},{:.3f},{},{}\n", run.what.name(),
+                          known(run.onset_s), frame.t_s, frame.load, frame.sticking, known(frame.force_ratio),
+                          known(frame.motion_ratio), frame.rule ? 1 : 0, known(frame.incipient.lag),
+                          frame.incipient.lag_error, frame.incipient.slide_px, frame.incipient.shear_px,
+                          sensors::name_of(frame.incipient.state), frame.markers_found);
+    }
+  }
+  return text;
+}
+
+SlipScore score(const std::vector<SlipRun>& runs, SlipDetector detector) {
+  const auto reports = [&](const SlipFrame& frame) {
+    return detector == SlipDetector::rule ? frame.rule
+                                          : frame.incipient.state == sensors::SlipState::kIncipient ||
+                                                frame.incipient.state == sensors::SlipState::kSliding;
+  };
+  SlipScore result;
+  for (const SlipRun& run : runs) {
+    const auto loaded = run.onset_s ? std::find_if(run.frames.begin(), run.frames.end(),
+                                                   [](const SlipFrame& frame) { return frame.load > kUnsheared; })
+                                    : run.frames.end();
+    for (auto frame = run.frames.begin(); frame != loaded; ++frame) {
+      ++result.quiet_frames;
+      if (reports(*frame)) ++result.false_frames;
+    }
+    if (!run.onset_s) {
+      ++result.quiet_runs;
+      if (std::any_of(run.frames.begin(), run.frames.end(), reports)) ++result.false_runs;
+      continue;
+    }
+    ++result.slides;
+    const auto found = std::find_if(loaded, run.frames.end(), reports);
+    if (found == run.frames.end()) continue;
+    ++result.found;
+    const double delay_s = found->t_s - *run.onset_s;
+    if (delay_s <= 0.0) ++result.found_before;
+    result.delays_ms.push_back(1e3 * delay_s);
+  }
+  return result;
+}
+
+}  // namespace touchstone::lab

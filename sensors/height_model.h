@@ -1,0 +1,29 @@
+#pragma once
+// What a height estimator knows of one sensor: everything that calibration has found.
+
+#include <string>
+
+#include "sensors/background.h"
+#include "sensors/lamp_model.h"
+#include "sensors/slope_table.h"
+
+namespace touchstone::sensors {
+
+struct HeightModel {
+  double mm_per_px = 0.0;
+  Background background;
+  LightCorrection correction = LightCorrection::none;
+  LampModel lamps;  ///< corrects places if `correction` is fitted; always there
+  SlopeTable table;
+  double steepest_calibrated = 0.0;  ///< slope that 99 % of the calibration's pixels are below
+  int presses = 0;                   ///< that it was made of
+};
+
+/// What is wrong with a model, or the empty string: sizes that don't fit, figures that aren't finite or are out of
+/// range.
+std::string fault_of(const HeightModel& model);
+
+/// The correction that belongs to the model.
+ColourCorrection correction_of(const HeightModel& model);
+
+}  // namespace touchstone::sensors

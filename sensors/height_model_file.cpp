@@ -1,0 +1,153 @@
+#include "sensors/height_model_file.h"
+
+#include <bit>
+#include <cstring>
+#include <limits>
+
+#include "core/error.h"
+#include "core/sha256.h"
+#include "core/whole_file.h"
+#include "sensors/json_field.h"
+
+namespace touchstone::sensors {
+namespace {
+
+constexpr const char* kFormat = "touchstone.height_model";
+constexpr int kVersion = 1;
+constexpr int kLargestSide = 8192;
+constexpr int kMostCells = 1024;
+
+static_assert(std::endian::native == std::endian::little, "the file is little-endian");
+
+template <typename T>
+void append(std::string& bytes, const T* values, std::size_t count) {
+  bytes.append(reinterpret_cast<const char*>(values), count * sizeof(T));
+}
+
+template <typename T>
+void take(std::string_view& bytes, T* values, std::size_t count) {
+  TS_ASSERT(bytes.size() >= count * sizeof(T));
+  std::memcpy(values, bytes.data(), count * sizeof(T));
+  bytes.remove_prefix(count * sizeof(T));
+}
+
+Json matrix_to_json(const Eigen::Matrix3d& matrix) {
+  Json rows = Json::array();
+  for (int i = 0; i < 3; ++i) rows.push_back({matrix(i, 0), matrix(i, 1), matrix(i, 2)});
+  return rows;
+}
+
+Eigen::Matrix3d matrix_of(const JsonField& field) {
+  const std::vector<Eigen::Vector3d> rows = field.vectors<3>(3);
+  Eigen::Matrix3d matrix;
+  matrix << rows[0].transpose(), rows[1].transpose(), rows[2].transpose();
+  return matrix;
+}
+
+}  // namespace
+
+std::string to_bytes(const HeightModel& model) {
+  const std::string fault = fault_of(model);
+  if (!fault.empty()) fail("height model: {}", fault);
+  const cv::Mat background =
+      model.background.mean.isContinuous() ? model.background.mean : model.background.mean.clone();
+  std::string payload;
+  append(payload, background.ptr<float>(), background.total() * 3);
+  for (const Eigen::Vector2f& slope : model.table.slopes) append(payload, slope.data(), 2);
+  append(payload, model.table.hits.data(), model.table.hits.size());
+
+  Json json;
+  json["format"] = kFormat;
+  json["version"] = kVersion;
+  json["width_px"] = background.cols;
+  json["height_px"] = background.rows;
+  json["mm_per_px"] = model.mm_per_px;
+  json["presses"] = model.presses;
+  json["steepest_calibrated"] = model.steepest_calibrated;
+  json["background_frames"] = model.background.frames;
+  json["background_noise_DN"] = nullptr;
+  if (const auto& noise = model.background.noise_DN)
+    json["background_noise_DN"] = {(*noise)[0], (*noise)[1], (*noise)[2]};
+  json["correction"] = name_of(model.correction);
+  json["lamps"] = Json::array();
+  for (const Eigen::Matrix3d& term : model.lamps.terms) json["lamps"].push_back(matrix_to_json(term));
+  json["lamp_order"] = model.lamps.order;
+  json["table_cells"] = model.table.cells;
+  json["table_lowest_DN"] = {static_cast<double>(model.table.lowest[0]), static_cast<double>(model.table.lowest[1]),
+                             static_cast<double>(model.table.lowest[2])};
+  json["table_step_DN"] = static_cast<double>(model.table.step);
+  json["sha256"] = sha256_of(payload);
+  return json.dump() + "\n" + payload;
+}
+
+HeightModel height_model_from_bytes(std::string_view bytes, const std::string& name) {
+  const std::size_t end = bytes.find('\n');
+  if (end == std::string_view::npos || bytes.empty() || bytes.front() != '{') {
+    throw Error({name, 0}, "isn't a height model: it doesn't begin with a line of JSON");
+  }
+  const Json json = parse_json(std::string(bytes.substr(0, end)), name);
+  std::string_view payload = bytes.substr(end + 1);
+  const JsonField root{json, "", name};
+  root.expect_format(kFormat, kVersion);
+  root.expect_map({"format", "version", "width_px", "height_px", "mm_per_px", "presses", "steepest_calibrated",
+                   "background_frames", "background_noise_DN", "correction", "lamps", "lamp_order", "table_cells",
+                   "table_lowest_DN", "table_step_DN", "sha256"});
+  constexpr int kMany = std::numeric_limits<int>::max();
+  HeightModel model;
+  const auto width = static_cast<int>(root.at("width_px").whole_number(2, kLargestSide));
+  const auto height = static_cast<int>(root.at("height_px").whole_number(2, kLargestSide));
+  model.mm_per_px = root.at("mm_per_px").number();
+  model.presses = static_cast<int>(root.at("presses").whole_number(1, kMany));
+  model.steepest_calibrated = root.at("steepest_calibrated").number();
+  model.background.frames = static_cast<int>(root.at("background_frames").whole_number(1, kMany));
+  if (const JsonField noise = root.at("background_noise_DN"); !noise.value.is_null()) {
+    const Eigen::Vector3d values = noise.vector<3>();
+    model.background.noise_DN = cv::Vec3d(values[0], values[1], values[2]);
+  }
+  model.correction =
+      root.at("correction")
+          .name_among(std::array{LightCorrection::none, LightCorrection::background, LightCorrection::fitted});
+  model.lamps.width = width;
+  model.lamps.height = height;
+  model.lamps.order = static_cast<int>(root.at("lamp_order").whole_number(0, 2));
+  const JsonField lamps = root.at("lamps");
+  const auto terms = static_cast<std::size_t>(term_count(model.lamps.order));
+  lamps.expect_list(terms);
+  for (std::size_t i = 0; i < terms; ++i) model.lamps.terms.push_back(matrix_of(lamps.at(i)));
+
+  const JsonField sides = root.at("table_cells");
+  sides.expect_list(3);
+  std::size_t cells = 1;
+  for (std::size_t c = 0; c < 3; ++c) {
+    model.table.cells[c] = static_cast<int>(sides.at(c).whole_number(1, kMostCells));
+    cells *= static_cast<std::size_t>(model.table.cells[c]);
+  }
+  model.table.lowest = root.at("table_lowest_DN").vector<3>().cast<float>();
+  model.table.step = static_cast<float>(root.at("table_step_DN").number());
+
+  const std::size_t pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+  const std::size_t length = pixels * 3 * sizeof(float) + cells * (2 * sizeof(float) + sizeof(std::uint16_t));
+  if (payload.size() != length) {
+    root.refuse("has {} bytes after its first line; {} are needed: it is cut short or damaged", payload.size(), length);
+  }
+  if (sha256_of(payload) != root.at("sha256").text()) root.refuse("is damaged: its checksum doesn't fit");
+  model.background.mean.create(height, width, CV_32FC3);
+  take(payload, model.background.mean.ptr<float>(), pixels * 3);
+  model.table.slopes.resize(cells);
+  take(payload, reinterpret_cast<float*>(model.table.slopes.data()), 2 * cells);
+  model.table.hits.resize(cells);
+  take(payload, model.table.hits.data(), cells);
+  const std::string fault = fault_of(model);
+  if (!fault.empty()) root.refuse("{}", fault);
+  return model;
+}
+
+void save(const HeightModel& model, const std::filesystem::path& path) {
+  write_whole_file(path, to_bytes(model));
+}
+
+HeightModel load_height_model(const std::filesystem::path& path) {
+  return height_model_from_bytes(read_whole_file(path), path.string());
+}
+
+}  // namespace touchstone::sensors

@@ -1,0 +1,45 @@
+#pragma once
+// Force as a linear function of one measure of the picture (seed 004, sec. 4.2 and 4.3): normal force of the sum of the
+// height map, for each shape of indenter; shear force of the mean marker displacement, for each gel. Good for the gel,
+// and the shape, that it was fitted to, and within the range that it saw.
+
+#include <opencv2/core/mat.hpp>
+#include <span>
+
+namespace touchstone::sensors {
+
+/// force = newton_per_unit * measure + offset_N
+struct LinearForce {
+  double newton_per_unit = 0.0;
+  double offset_N = 0.0;
+  double r2 = 0.0;  ///< 1 - (squares of residuals)/(squares about the mean force); below 0: worse than the mean
+  double rms_residual_N = 0.0;      ///< root mean square
+  double largest_residual_N = 0.0;  ///< absolute
+  double lowest_seen = 0.0;         ///< the range of the measure in the samples
+  double highest_seen = 0.0;
+  int samples = 0;
+
+  double force_N(double measure) const { return newton_per_unit * measure + offset_N; }
+  bool has_seen(double measure) const { return measure >= lowest_seen && measure <= highest_seen; }
+};
+
+enum class FitLine {
+  kFree,           ///< slope and offset
+  kThroughOrigin,  ///< slope only: no force where nothing is measured
+};
+
+/// Least squares in the force. @throws Error for lists of unequal lengths, fewer than three samples, a value that isn't
+/// finite, or measures (or forces) that are all equal
+LinearForce fit_linear_force(std::span<const double> measure, std::span<const double> force_N, FitLine line);
+
+/// The sum of a height map times a pixel's area: the volume of the dent, so that a fit doesn't depend on the
+/// resolution. Heights below 0 count too, so noise has no mean. @throws Error unless the map is CV_32FC1 (mm), not
+/// empty and finite, and the pitch is positive
+double height_sum_mm3(const cv::Mat& height_mm, double mm_per_px);
+
+/// How many of the first samples belong to the rise before slip: those before the first that reaches `part` of the
+/// largest force. With a force that is held back by friction from there on, this is the linear part of fig. 4-6.
+/// @pre 0 < part <= 1
+std::size_t samples_before_slip(std::span<const double> force_N, double part);
+
+}  // namespace touchstone::sensors

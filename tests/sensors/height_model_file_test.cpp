@@ -1,0 +1,79 @@
+#include "sensors/height_model_file.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <opencv2/core.hpp>
+
+#include "core/error.h"
+#include "sensors/height_calibration.h"
+#include "sensors/height_estimator.h"
+#include "tests/sensors/painted_gel.h"
+#include "tests/support/temporary_folder.h"
+
+namespace touchstone::sensors {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::ThrowsMessage;
+
+class HeightModelFile : public ::testing::Test {
+ protected:
+  HeightModelFile() {
+    HeightCalibrationSettings settings;
+    settings.mm_per_px = 0.053;
+    settings.table.most_cells = 20000;
+    model_ = calibrate_height(painter_.presses(2, 2, 1.0, 0.7), painter_.background(), settings).model;
+    bytes_ = to_bytes(model_);
+  }
+  auto reading(std::string bytes) {
+    return [bytes = std::move(bytes)] { height_model_from_bytes(bytes, "m.gel"); };
+  }
+  std::string replaced(const std::string& from, const std::string& to) {
+    std::string changed = bytes_;
+    const std::size_t at = changed.find(from);
+    EXPECT_LT(at, changed.find('\n')) << from;
+    return changed.replace(at, from.size(), to);
+  }
+  test::GelPainter painter_{120, 90, 0.053, {.fall_off = 0.1}};
+  HeightModel model_;
+  std::string bytes_;
+};
+
+TEST_F(HeightModelFile, ReadingGivesTheSameBits) {
+  const touchstone::test::TemporaryFolder folder;
+  save(model_, folder.path() / "m.gel");
+  const HeightModel read = load_height_model(folder.path() / "m.gel");
+  EXPECT_EQ(to_bytes(read), bytes_);
+  EXPECT_EQ(read.table.slopes, model_.table.slopes);
+  const cv::Mat frame = painter_.press({{3.0, 2.5}, 2.0, 1.0}).frame;
+  HeightEstimator first(model_);
+  HeightEstimator second(read);
+  EXPECT_EQ(cv::norm(first.estimate(frame).height_mm, second.estimate(frame).height_mm, cv::NORM_INF), 0.0);
+}
+
+TEST_F(HeightModelFile, DamageIsNoticed) {
+  EXPECT_THAT(reading(""), ThrowsMessage<Error>(HasSubstr("m.gel: isn't a height model")));
+  EXPECT_THAT(reading("PNG\n"), ThrowsMessage<Error>(HasSubstr("isn't a height model")));
+  EXPECT_THAT(reading("{\n"), ThrowsMessage<Error>(HasSubstr("isn't valid JSON")));
+  EXPECT_THAT(reading(bytes_.substr(0, bytes_.size() - 5)), ThrowsMessage<Error>(HasSubstr("cut short or damaged")));
+  EXPECT_THAT(reading(bytes_ + "x"), ThrowsMessage<Error>(HasSubstr("cut short or damaged")));
+  std::string flipped = bytes_;
+  flipped[bytes_.size() - 100] = static_cast<char>(flipped[bytes_.size() - 100] ^ 1);
+  EXPECT_THAT(reading(flipped), ThrowsMessage<Error>(HasSubstr("checksum")));
+}
+
+TEST_F(HeightModelFile, FieldsAreChecked) {
+  EXPECT_THAT(reading(replaced("\"mm_per_px\"", "\"mm_per_pixel\"")),
+              ThrowsMessage<Error>(HasSubstr("'mm_per_pixel' isn't known (did you mean 'mm_per_px'?)")));
+  EXPECT_THAT(reading(replaced("\"mm_per_px\":0.053", "\"mm_per_px\":-0.053")),
+              ThrowsMessage<Error>(HasSubstr("mm_per_px is -0.053")));
+  EXPECT_THAT(reading(replaced("\"version\":1", "\"version\":2")), ThrowsMessage<Error>(HasSubstr("version")));
+  EXPECT_THAT(reading(replaced("\"width_px\":120", "\"width_px\":121")),
+              ThrowsMessage<Error>(HasSubstr("bytes after its first line")));
+  EXPECT_THAT(reading(replaced("\"correction\":\"fitted\"", "\"correction\":\"fited\"")),
+              ThrowsMessage<Error>(HasSubstr("did you mean 'fitted'?")));
+}
+
+}  // namespace
+}  // namespace touchstone::sensors
