@@ -85,15 +85,21 @@ double plate_radius_on_layer(const sim::GelSpec& gel, double force) {
   const auto at = [&](double depth) {
     return sphere_on_layer(gel.youngs_modulus_MPa, gel.poisson_ratio, gel.thickness_mm, gel.sphere_radius_mm, depth);
   };
-  double shallow = 0.0;
-  double deep = 0.25 * gel.thickness_mm;
-  if (at(deep).force < force) fail("a force of {} N presses the dome by more than a quarter of its thickness", force);
-  constexpr int kHalvings = 40;
-  for (int i = 0; i < kHalvings; ++i) {
-    const double middle = 0.5 * (shallow + deep);
-    (at(middle).force < force ? shallow : deep) = middle;
+  // From Hertz's depth on: force goes about as depth to 1.5, and each look at the layer takes its time.
+  const double hertz = plate_radius_by_hertz(gel, force);
+  double depth = hertz * hertz / gel.sphere_radius_mm;
+  LayerContact contact;
+  constexpr int kMostSteps = 12;
+  constexpr double kGood = 1e-3;  // of the force; a third of that of the radius
+  for (int step = 0; step < kMostSteps; ++step) {
+    if (depth > 0.25 * gel.thickness_mm) {
+      fail("a force of {} N presses the dome by more than a quarter of its thickness", force);
+    }
+    contact = at(depth);
+    if (std::abs(contact.force / force - 1.0) < kGood) break;
+    depth *= std::pow(force / contact.force, 2.0 / 3.0);
   }
-  return at(deep).contact_radius;
+  return contact.contact_radius;
 }
 
 double plate_radius_by_hertz(const sim::GelSpec& gel, double force) {
@@ -101,7 +107,8 @@ double plate_radius_by_hertz(const sim::GelSpec& gel, double force) {
   return std::cbrt(0.75 * force * gel.sphere_radius_mm / modulus);
 }
 
-DomeHeights measure_dome_heights(const sim::TouchRig& rig, const CalibrationPresses& presses, std::uint64_t seed) {
+DomeHeights measure_dome_heights(const sim::TouchRig& rig, const CalibrationPresses& presses,
+                                 sensors::LightCorrection correction, std::uint64_t seed) {
   std::vector<cv::Mat> rest;
   for (int i = 0; i < presses.background_frames; ++i) rest.push_back(rig.background(seed, i));
   const sim::TouchObject small_ball = rig.object(ball_of(presses.ball_diameter_mm));
@@ -126,7 +133,7 @@ DomeHeights measure_dome_heights(const sim::TouchRig& rig, const CalibrationPres
   }
   sensors::HeightCalibrationSettings settings;
   settings.mm_per_px = rig.mm_per_px();
-  settings.correction = sensors::LightCorrection::fitted;
+  settings.correction = correction;
   const sensors::HeightCalibration calibration =
       sensors::calibrate_height(annotated, sensors::mean_background(rest), settings);
   sensors::HeightEstimator estimator(calibration.model);

@@ -40,6 +40,7 @@ struct DomeHeights {
   std::vector<HeightError> balls;  ///< of 4 mm, at the apex and at two places aside, 0.4 mm deep
   HeightError plate;               ///< 0.3 mm deep
 };
-DomeHeights measure_dome_heights(const sim::TouchRig& rig, const CalibrationPresses& presses, std::uint64_t seed);
+DomeHeights measure_dome_heights(const sim::TouchRig& rig, const CalibrationPresses& presses,
+                                 sensors::LightCorrection correction, std::uint64_t seed);
 
 }  // namespace touchstone::lab

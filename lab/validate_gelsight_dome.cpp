@@ -91,7 +91,7 @@ std::vector<ValidationRow> validate_gelsight_dome(const ValidateOptions& options
     presses.columns = 3;
     presses.rows = 2;
   }
-  const DomeHeights heights = measure_dome_heights(rig, presses, 100);
+  const DomeHeights heights = measure_dome_heights(rig, presses, sensors::LightCorrection::none, 100);
   double mean_um = 0.0;
   for (const HeightError& error : heights.balls) mean_um += error.mean_um / static_cast<double>(heights.balls.size());
   rows.push_back(row("gelsight.dome.height_error_um",
