@@ -59,6 +59,7 @@ class Eyes {
     sight.normal_force_N = normal_N;
     sight.slip = sensors::is_slip(force_ratio, motion.ratio, settings_.rule) ||
                  (settings_.rim && (rim == sensors::SlipState::kIncipient || rim == sensors::SlipState::kSliding));
+    if (sight.slip) incipient_.restart();  // what was told once isn't told again by the frames that it keeps
     return sight;
   }
 

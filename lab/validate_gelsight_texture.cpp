@@ -89,7 +89,7 @@ std::vector<ValidationRow> validate_gelsight_texture(const ValidateOptions& opti
   if (options.quick) objects = some_of(objects);
   TexturePresses presses;
   presses.seed = kSeed;
-  if (options.quick) presses.images = 3;
+  if (options.quick) presses.images = 2;
   const std::vector<TextureSample> samples = texture_samples(rig, objects, presses, heights, options.progress);
   const int of_a_class = kSquares * presses.images;
 

@@ -15,7 +15,7 @@ struct GraspRuleSettings {
   int touch_frames = 2;               ///< frames in a row that must say so: noise in one of them is no touch
   double approach_step_mm = 0.02;     ///< a frame, until touch
   double longest_approach_mm = 30.0;  ///< without touch after that the rule gives up
-  double slip_step_mm = 0.1;          ///< each time that slip is seen
+  double slip_step_mm = 0.05;         ///< each time that slip is seen
   /// After such a step slip isn't looked at for so many frames, and when lifting is done so many pass without slip
   /// before the object counts as held: what is seen is as old as the camera's lag (text 2.2.3: some 100 ms).
   int settle_frames = 3;

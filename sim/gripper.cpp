@@ -121,6 +121,7 @@ void Gripper::hang(double arm_acceleration, double seconds) {
     return;
   }
   step_to(state_.sunk_mm);
+  state_.sliding_speed_mm_s = 0.0;
   stiffness_ = 0.0;  // it depends on how hard the fingers press
   sliding_ = !balance(half_load(arm_acceleration));
 }

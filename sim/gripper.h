@@ -30,7 +30,7 @@ struct GripperSettings {
   RigidTransform gel_from_object;   ///< at the start; its z is set anew, see clearance_mm
   double clearance_mm = 0.1;        ///< between gel and object at the start, least over the gel's vertices
   bool table = true;                ///< false: nothing but the fingers carries the object
-  double step_s = 1.0 / 120;        ///< longest step while it sticks or stands on the table
+  double step_s = 1.0 / 60;         ///< longest step while it sticks or stands on the table
   double slide_step_s = 1.0 / 480;  ///< while it slides in the air
   double drop_mm = 6.0;             ///< it is lost when it has slid so far, or slid and isn't touched any more
 };

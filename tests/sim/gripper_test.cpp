@@ -114,6 +114,7 @@ TEST(Gripper, FrictionThatSufficesHoldsWithoutSliding) {
   EXPECT_FALSE(state.on_table);
   EXPECT_FALSE(state.dropped);
   EXPECT_EQ(state.slid_mm, 0.0);
+  EXPECT_EQ(state.sliding_speed_mm_s, 0.0);
   EXPECT_NEAR(2.0 * state.friction_N, mass_for(normal, 1.2) * 1e-6 * kGravity_mm_s2, 2e-3 * state.friction_N);
   EXPECT_NEAR(state.object_height_mm, 10.0, 0.5);  // less what the gel gives way
   EXPECT_GT(state.sunk_mm, 0.0);
@@ -135,6 +136,20 @@ TEST(Gripper, FrictionThatDoesNotSufficeLeavesItOnTheTable) {
   EXPECT_NEAR(state.table_force_N + 2.0 * state.friction_N, weight, 1e-12);
   EXPECT_NEAR(state.table_force_N, weight - 2.0 * kFriction * state.normal_force_N, 0.005 * weight);
   EXPECT_GT(state.table_force_N, 0.19 * weight);  // at the pad's rim the gel bears less
+}
+
+TEST(Gripper, ClosingFurtherLiftsWhatSlidesOnTheTable) {
+  Gripper gripper(gel(), ball(mass_for(force_at(0.4), 0.9)), settings());
+  close_to(gripper, 0.4);
+  lift(gripper, 0.2);
+  EXPECT_TRUE(gripper.state().slipping);
+  EXPECT_GT(gripper.state().sliding_speed_mm_s, 0.0);
+  gripper.advance(0.2, 0.0, kFrame_s);
+  gripper.advance(0.0, 0.0, kFrame_s);
+  EXPECT_FALSE(gripper.state().on_table);
+  EXPECT_FALSE(gripper.state().slipping);
+  EXPECT_EQ(gripper.state().sliding_speed_mm_s, 0.0);
+  EXPECT_GT(gripper.state().object_height_mm, 0.0);
 }
 
 TEST(Gripper, WithoutATableItFallsAsFrictionLetsIt) {
