@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <opencv2/imgproc.hpp>
 #include <utility>
 
 #include "core/error.h"
@@ -12,7 +13,6 @@
 #include "core/units.h"
 #include "lab/gelsight_height_experiment.h"
 #include "sensors/height_estimator.h"
-#include "sensors/height_map.h"
 
 namespace touchstone::lab {
 namespace {
@@ -20,8 +20,6 @@ namespace {
 constexpr double kApproach_mm = 0.15;  // above the gel at the start: a tilted face doesn't touch yet
 constexpr int kMarkColumns = 15, kMarkRows = 11;
 constexpr double kMarkedShare = 0.96;  // of the picture that the marks cover
-constexpr double kLowestShare = 0.01;  // of the pixels: taken to be at rest
-constexpr sensors::ContactRule kContact{0.02, 0.3};
 
 sim::MotionSpec press_of(const Grip& grip, double origin_mm) {
   sim::MotionSpec motion;
@@ -55,12 +53,12 @@ sensors::PlaceMap fitted_places(const sim::TouchRig& rig) {
   return sensors::fit_place_map(pixels, places, {width, height});
 }
 
-/// The lowest hundredth of the heights is taken for the gel at rest.
-cv::Mat from_rest(cv::Mat heights) {
-  std::vector<float> sorted(heights.begin<float>(), heights.end<float>());
-  const auto low = sorted.begin() + static_cast<std::ptrdiff_t>(kLowestShare * static_cast<double>(sorted.size()));
-  std::nth_element(sorted.begin(), low, sorted.end());
-  return heights - *low;
+/// Contact where the level of rest isn't known: the higher of two classes of heights (Otsu 1979).
+cv::Mat higher_part(const cv::Mat& heights) {
+  cv::Mat grey, mask;
+  cv::normalize(heights, grey, 0.0, 255.0, cv::NORM_MINMAX, CV_8U);
+  cv::threshold(grey, mask, 0.0, 255.0, cv::THRESH_BINARY | cv::THRESH_OTSU);
+  return mask;
 }
 
 }  // namespace
@@ -80,9 +78,8 @@ std::vector<HeldTouch> TouchBench::touches(const sim::TouchObject& object, std::
     touches[i].force_N = press.bodies.front().wrench[2];
   });
   for (std::size_t i = 0; i < grips.size(); ++i) {
-    const cv::Mat heights = from_rest(heights_(seen[i]));
-    cv::Mat contact;
-    sensors::mark_contact(heights, kContact, contact);
+    const cv::Mat heights = heights_(seen[i]);
+    const cv::Mat contact = higher_part(heights);
     touches[i].image = sensors::rectified(heights, contact, places_);
   }
   return touches;
