@@ -88,9 +88,10 @@ void add_gelsight_calibration(CLI::App& calibrations, const GlobalOptions&, Acti
       ->required()
       ->check(CLI::Range(1e-4, 10.0));
   command
-      ->add_option("--correction", options->correction,
-                   "Of colours for the place: 'none', by the 'background', by lamps 'fitted' to the presses, or the 'best' "
-                   "on presses that were left out")
+      ->add_option(
+          "--correction", options->correction,
+          "Of colours for the place: 'none', by the 'background', by lamps 'fitted' to the presses, or the 'best' "
+          "on presses that were left out")
       ->check(CLI::IsMember({"best", "none", "background", "fitted"}))
       ->capture_default_str();
   command->add_option("--order", options->order, "Of the light's polynomial over the picture (default: by the presses)")

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "core/error.h"
+#include "lab/gelsight_height_experiment.h"
 #include "sensors/contact_patch.h"
 #include "sensors/height_estimator.h"
 #include "sensors/marker_filling.h"
@@ -60,6 +61,18 @@ double diameter_px(const sim::TouchRig& rig) {
 }
 
 }  // namespace
+
+sim::ObjectSpec gelsight_ball(double diameter_mm, double friction) {
+  sim::ObjectSpec object = ball_of(diameter_mm);
+  object.friction = friction;
+  return object;
+}
+
+sim::ObjectSpec gelsight_flat_end(double diameter_mm, double friction) {
+  sim::ObjectSpec object = flat_cylinder_of(diameter_mm);
+  object.friction = friction;
+  return object;
+}
 
 double touching_height_mm(const sim::ObjectSpec& object) {
   return object.shape.type == sim::ShapeKind::sphere ? object.shape.radius_mm : 0.0;

@@ -12,6 +12,9 @@
 
 namespace touchstone::lab {
 
+/// ball_of and flat_cylinder_of (lab/gelsight_height_experiment.h) with a friction.
+sim::ObjectSpec gelsight_ball(double diameter_mm, double friction);
+sim::ObjectSpec gelsight_flat_end(double diameter_mm, double friction);
 /// Where an object's origin is when it just touches the middle of the flat gel, mm above it.
 double touching_height_mm(const sim::ObjectSpec& object);
 

@@ -18,7 +18,7 @@ constexpr double kForceBall_mm = 12.7;
 constexpr double kShearEnd_mm = 10.0;
 constexpr double kShearNormal_N = 0.6;
 constexpr double kShearDrag_mm = 1.0;
-constexpr int kShearSteps = 24;
+constexpr int kShearSteps = 10;
 constexpr double kCalibrationFriction = 0.5;
 constexpr int kLeastPatch_px = 50;
 constexpr int kFrameOfBackground = 2000000;  // its noise is no other frame's
@@ -83,7 +83,7 @@ class Eyes {
 
 GraspCalibration calibrate_for_grasps(const sim::TouchRig& flat, const sim::TouchRig& marked, std::uint64_t seed) {
   GraspCalibration calibration;
-  const sensors::HeightModel of_flat = calibrate_rig(flat, {}, seed).calibration.model;
+  const sensors::HeightModel of_flat = calibrate_rig(flat, {}, {}, seed).calibration.model;
   calibration.height = for_marked_gel(of_flat, marked, seed);
   calibration.markers = marker_settings(marked);
   calibration.background = marked.background(seed, kFrameOfBackground);

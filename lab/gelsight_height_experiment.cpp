@@ -10,6 +10,7 @@
 #include "core/random.h"
 #include "core/units.h"
 #include "fem/relief_map.h"
+#include "sim/gel_setup.h"
 
 namespace touchstone::lab {
 
@@ -65,7 +66,7 @@ sim::ObjectSpec flat_cylinder_of(double diameter_mm) {
 
 sim::Touch touch_once(const sim::TouchRig& rig, const sim::TouchObject& object, const StraightPress& press,
                       std::uint64_t noise_seed, bool truth) {
-  const double reach = reach_below(object.spec());
+  const double reach = reach_below(object.spec()) + sim::rest_height(rig.device().gel, press.place_mm);
   sim::MotionSpec motion;
   motion.start_mm = {press.place_mm.x(), press.place_mm.y(), reach + kClearance_mm};
   sim::MotionKey key;
@@ -74,7 +75,8 @@ sim::Touch touch_once(const sim::TouchRig& rig, const sim::TouchObject& object, 
   return rig.look(object, rig.play(object, motion).back().press, noise_seed, 0, truth);
 }
 
-CalibratedRig calibrate_rig(const sim::TouchRig& rig, const CalibrationPresses& how, std::uint64_t noise_seed) {
+CalibratedRig calibrate_rig(const sim::TouchRig& rig, const CalibrationPresses& how,
+                            std::optional<sensors::LightCorrection> correction, std::uint64_t noise_seed) {
   std::vector<cv::Mat> rest;
   for (int i = 0; i < how.background_frames; ++i) rest.push_back(rig.background(noise_seed, i));
   const sensors::Background background = sensors::mean_background(rest);
@@ -101,8 +103,8 @@ CalibratedRig calibrate_rig(const sim::TouchRig& rig, const CalibrationPresses& 
         press.circle.radius = std::sqrt(contact.m00 / kPi) + how.annotation_px * hand.normal();
         presses.push_back(press);
         try {
-          const sensors::ContactCircle found = sensors::find_contact_circle(press.frame, background,
-                                                                            press.ball_radius_mm, mm_per_px, press.name);
+          const sensors::ContactCircle found =
+              sensors::find_contact_circle(press.frame, background, press.ball_radius_mm, mm_per_px, press.name);
           squares += (found.centre - centre).squaredNorm();
           ++result.found_circles;
         } catch (const Error&) {
@@ -113,9 +115,10 @@ CalibratedRig calibrate_rig(const sim::TouchRig& rig, const CalibrationPresses& 
   }
   sensors::HeightCalibrationSettings settings;
   settings.mm_per_px = mm_per_px;
+  settings.correction = correction;
   settings.sampling.most_saturated = how.most_saturated;
   result.calibration = sensors::calibrate_height(presses, background, settings);
-  result.found_circle_px = result.found_circles > 0 ? std::sqrt(squares / result.found_circles) : 0.0;
+  result.circle_error_px = result.found_circles > 0 ? std::sqrt(squares / result.found_circles) : 0.0;
   return result;
 }
 

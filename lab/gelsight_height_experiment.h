@@ -14,7 +14,7 @@ namespace touchstone::lab {
 /// A straight press of a rigid object.
 struct StraightPress {
   Eigen::Vector2d place_mm = Eigen::Vector2d::Zero();  ///< of the object's origin, gel frame
-  double depth_mm = 0.0;                               ///< of its lowest point below the gel at rest
+  double depth_mm = 0.0;                               ///< of its lowest point below the gel at rest there
 };
 
 /// The object's lowest point below its origin, mm: of its shape and its relief.
@@ -37,16 +37,18 @@ struct CalibrationPresses {
   Eigen::Vector2d extent_mm = {11.0, 7.6};  ///< between the outermost places
   std::vector<double> depths_mm = {0.35, 0.6};
   int background_frames = 8;
-  double annotation_px = 0.3;  ///< standard deviation of each coordinate and of the radius
-  double most_saturated = 0.5; ///< of a press's pixels
+  double annotation_px = 0.3;   ///< standard deviation of each coordinate and of the radius
+  double most_saturated = 0.5;  ///< of a press's pixels
 };
 struct CalibratedRig {
   sensors::HeightCalibration calibration;
-  double found_circle_px = 0.0;  ///< RMS distance from the contact's centre to that found by find_contact_circle
+  double circle_error_px = 0.0;  ///< RMS distance from the contact's centre to that found by find_contact_circle
   int found_circles = 0;         ///< of the presses
 };
+/// `correction`: absent, the one that errs least on presses that are left out (HeightCalibrationSettings).
 /// @throws Error as sensors::calibrate_height
-CalibratedRig calibrate_rig(const sim::TouchRig& rig, const CalibrationPresses& presses, std::uint64_t noise_seed);
+CalibratedRig calibrate_rig(const sim::TouchRig& rig, const CalibrationPresses& presses,
+                            std::optional<sensors::LightCorrection> correction, std::uint64_t noise_seed);
 
 /// Estimated heights against the true membrane, over the pixels that see membrane.
 struct HeightError {

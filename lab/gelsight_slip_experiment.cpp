@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <numeric>
 
 #include "core/error.h"
 #include "lab/gelsight_force_experiment.h"
@@ -171,13 +170,32 @@ SlipRun run_slip_case(const sim::TouchRig& rig, const SlipCase& what, const Slip
   return run;
 }
 
-double SlipScore::mean_delay_ms() const {
+double SlipScore::median_delay_ms() const {
   if (delays_ms.empty()) return std::numeric_limits<double>::quiet_NaN();
-  return std::accumulate(delays_ms.begin(), delays_ms.end(), 0.0) / static_cast<double>(delays_ms.size());
+  std::vector<double> sorted = delays_ms;
+  std::sort(sorted.begin(), sorted.end());
+  const std::size_t half = sorted.size() / 2;
+  return sorted.size() % 2 == 1 ? sorted[half] : 0.5 * (sorted[half - 1] + sorted[half]);
 }
 
 double SlipScore::false_alarms_percent() const {
   return quiet_frames > 0 ? 100.0 * false_frames / quiet_frames : 0.0;
+}
+
+std::string to_csv(const std::vector<SlipRun>& runs) {
+  std::string text =
+      "case,onset_s,t_s,load,sticking,force_ratio,motion_ratio,rule,lag,lag_error,slide_px,shear_px,state,markers\n";
+  const auto known = [](const std::optional<double>& value) { return value ? fmt::format("{:.4f}", *value) : ""; };
+  for (const SlipRun& run : runs) {
+    for (const SlipFrame& frame : run.frames) {
+      text += fmt::format("\"{}\",{},{:.4f},{:.4f},{:.4f},{},{},{},{},{:.4f},{:.3f},{:.3f},{},{}\n", run.what.name(),
+                          known(run.onset_s), frame.t_s, frame.load, frame.sticking, known(frame.force_ratio),
+                          known(frame.motion_ratio), frame.rule ? 1 : 0, known(frame.incipient.lag),
+                          frame.incipient.lag_error, frame.incipient.slide_px, frame.incipient.shear_px,
+                          sensors::name_of(frame.incipient.state), frame.markers_found);
+    }
+  }
+  return text;
 }
 
 SlipScore score(const std::vector<SlipRun>& runs, SlipDetector detector) {

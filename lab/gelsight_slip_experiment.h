@@ -75,9 +75,13 @@ struct SlipScore {
   int quiet_frames = 0;           ///< frames of quiet runs, and of the others' before any shear
   int false_frames = 0;
 
-  double mean_delay_ms() const;         ///< NaN if none was found
+  double median_delay_ms() const;       ///< NaN if none was found
   double false_alarms_percent() const;  ///< false over quiet frames
 };
+
+/// All frames of all runs as CSV, a line each: case, onset, time, true load and sticking share, both ratios, lag,
+/// verdicts.
+std::string to_csv(const std::vector<SlipRun>& runs);
 
 enum class SlipDetector { rule, incipient };
 /// A detector reports from its first frame on that says slip; frames before an object's shear load reaches a twentieth

@@ -18,6 +18,8 @@
 #include "core/transform.h"
 #include "core/units.h"
 #include "fem/press.h"
+#include "lab/gelsight_height_experiment.h"
+#include "sensors/height_calibration.h"
 #include "sensors/height_estimator.h"
 #include "sensors/height_gray.h"
 
@@ -36,6 +38,17 @@ fem::PressState pressed(const sim::TouchRig& rig, const sim::TouchObject& object
   target.axis = {fem::AxisControl::at(place.x()), fem::AxisControl::at(place.y()),
                  fem::AxisControl::with_force(force_N)};
   return press.step(target);
+}
+
+/// The middle of a picture.
+cv::Mat view_of(const cv::Mat& picture) {
+  if (picture.cols < kTextureView_px || picture.rows < kTextureView_px) {
+    fail("a picture of {} x {} px is smaller than the view of {} px a side", picture.cols, picture.rows,
+         kTextureView_px);
+  }
+  return picture(cv::Rect((picture.cols - kTextureView_px) / 2, (picture.rows - kTextureView_px) / 2, kTextureView_px,
+                          kTextureView_px))
+      .clone();
 }
 
 /// A random order of 0 to n - 1 (Fisher and Yates).
@@ -113,6 +126,33 @@ sim::ObjectSpec another_patch(const sim::ObjectSpec& object, std::uint64_t seed)
   return patch;
 }
 
+sensors::HeightModel calibrate_view(const sim::TouchRig& rig, std::uint64_t noise_seed) {
+  constexpr int kBackgrounds = 8, kPlaces = 3;
+  constexpr double kBall_mm = 2.0;  // sec. 2.2.2
+  constexpr double kDepths_mm[] = {0.2, 0.3};
+  constexpr double kBetween_mm = 3.0;  // places, so that the circles stay within the view
+  std::vector<cv::Mat> rest;
+  for (int i = 0; i < kBackgrounds; ++i) rest.push_back(view_of(rig.background(noise_seed, i)));
+  const sensors::Background background = sensors::mean_background(rest);
+  const sim::TouchObject ball = rig.object(ball_of(kBall_mm));
+  std::vector<sensors::BallPress> balls;
+  for (int k = 0; k < kPlaces * kPlaces; ++k) {
+    const Eigen::Vector2d place = kBetween_mm * Eigen::Vector2d(k % kPlaces - 1, k / kPlaces - 1);
+    for (const double depth : kDepths_mm) {
+      sensors::BallPress press;
+      press.name = fmt::format("ball press {}", balls.size() + 1);
+      press.frame = view_of(touch_once(rig, ball, {place, depth}, noise_seed + balls.size() + 1, false).frame);
+      press.ball_radius_mm = 0.5 * kBall_mm;
+      press.circle =
+          sensors::find_contact_circle(press.frame, background, press.ball_radius_mm, rig.mm_per_px(), press.name);
+      balls.push_back(std::move(press));
+    }
+  }
+  sensors::HeightCalibrationSettings settings;
+  settings.mm_per_px = rig.mm_per_px();
+  return sensors::calibrate_height(balls, background, settings).model;
+}
+
 HeightsOf estimated_heights(const sim::TouchRig& rig, const sensors::HeightModel& model, std::uint64_t noise_seed) {
   sensors::HeightSettings settings;
   settings.border = sensors::HeightBorder::free;  // the object covers the whole picture
@@ -121,20 +161,8 @@ HeightsOf estimated_heights(const sim::TouchRig& rig, const sensors::HeightModel
       [model, settings] { return sensors::HeightEstimator(model, settings); });
   estimators->local();  // a faulty model shows here
   return [&rig, estimators, noise_seed](const sim::TouchObject& object, const fem::PressState& press, int number) {
-    const cv::Mat frame = rig.look(object, press, noise_seed, number, false).frame;
+    const cv::Mat frame = view_of(rig.look(object, press, noise_seed, number, false).frame);
     return estimators->local().estimate(frame).height_mm.clone();
-  };
-}
-
-HeightsOf true_heights(const sim::TouchRig& rig, double noise_mm, std::uint64_t noise_seed) {
-  return [&rig, noise_mm, noise_seed](const sim::TouchObject& object, const fem::PressState& press, int number) {
-    cv::Mat heights = rig.look(object, press, noise_seed, number, true).height;
-    RandomStream random(noise_seed, static_cast<std::uint64_t>(number), Purpose::kImagerNoise);
-    for (int j = 0; j < heights.rows; ++j) {
-      auto* row = heights.ptr<float>(j);
-      for (int i = 0; i < heights.cols; ++i) row[i] += static_cast<float>(noise_mm * random.normal());
-    }
-    return heights;
   };
 }
 

@@ -27,23 +27,26 @@ sim::ObjectSpec another_patch(const sim::ObjectSpec& object, std::uint64_t seed)
 
 struct TexturePresses {
   int images = 6;             ///< of each class
-  double force_N = 25.0;      ///< mean
+  double force_N = 8.0;       ///< mean: some 30 kPa under the disc, a firm touch by hand
   double force_spread = 0.1;  ///< relative standard deviation
   double shift_mm = 0.3;      ///< standard deviation of the place, along each axis
   std::uint64_t seed = 1;
 };
 
-/// The height image (CV_32FC1, mm, the camera's size) of a pressed object; `number` is the press's own. Called from
+/// The height image (CV_32FC1, mm) of a pressed object, at least the view; `number` is the press's own. Called from
 /// many threads, a pure function.
 using HeightsOf = std::function<cv::Mat(const sim::TouchObject&, const fem::PressState&, int number)>;
 
-/// Heights as the sensor gives them: from the camera's frame, by a model that was made of frames of the same device.
-/// @throws Error if the model can't be used
-HeightsOf estimated_heights(const sim::TouchRig& rig, const sensors::HeightModel& model, std::uint64_t noise_seed);
+/// Pixels a side of the middle of the picture that samples are cut from: four squares of 200 px.
+inline constexpr int kTextureView_px = 400;
 
-/// The membrane as it truly is, with white noise of this standard deviation in each pixel: what a better camera and
-/// estimator would give.
-HeightsOf true_heights(const sim::TouchRig& rig, double noise_mm, std::uint64_t noise_seed);
+/// A height model of the view's pixels alone, where light is good: from a ball of 2 mm pressed in at 3 x 3 places, its
+/// circle found in the frames, as a user would calibrate. @throws Error as sensors::calibrate_height
+sensors::HeightModel calibrate_view(const sim::TouchRig& rig, std::uint64_t noise_seed);
+
+/// Heights of the view as the sensor gives them: from the camera's frame, by a model of calibrate_view. The rig must
+/// outlive it. @throws Error if the model can't be used
+HeightsOf estimated_heights(const sim::TouchRig& rig, const sensors::HeightModel& model, std::uint64_t noise_seed);
 
 /// The height image of press number `image` on class number `texture`: a new piece of the surface, at a random angle,
 /// place and force, all chosen by (seed, texture, image).

@@ -5,12 +5,14 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <opencv2/imgproc.hpp>
 #include <utility>
 
 #include "core/error.h"
 #include "core/random.h"
 #include "core/units.h"
-#include "sensors/height_map.h"
+#include "lab/gelsight_height_experiment.h"
+#include "sensors/height_estimator.h"
 
 namespace touchstone::lab {
 namespace {
@@ -18,28 +20,6 @@ namespace {
 constexpr double kApproach_mm = 0.15;  // above the gel at the start: a tilted face doesn't touch yet
 constexpr int kMarkColumns = 15, kMarkRows = 11;
 constexpr double kMarkedShare = 0.96;  // of the picture that the marks cover
-constexpr double kLowestShare = 0.01;  // of the pixels: taken to be at rest
-constexpr sensors::ContactRule kContact{0.02, 0.3};
-
-/// Height of the object's origin above its lowest point.
-double origin_height(const sim::ObjectSpec& object) {
-  double plain = 0.0;
-  switch (object.shape.type) {
-    case sim::ShapeKind::sphere:
-    case sim::ShapeKind::egg:
-      plain = object.shape.radius_mm;
-      break;
-    case sim::ShapeKind::box:
-      plain = 0.5 * object.shape.size_mm.z();
-      break;
-    case sim::ShapeKind::rounded_cylinder:
-      break;
-    case sim::ShapeKind::mesh:
-    case sim::ShapeKind::shell:
-      fail("{}: the lowest point of a mesh or a shell isn't known here", object.name);
-  }
-  return plain + (object.relief ? relief_map(*object.relief).highest() : 0.0);
-}
 
 sim::MotionSpec press_of(const Grip& grip, double origin_mm) {
   sim::MotionSpec motion;
@@ -73,12 +53,12 @@ sensors::PlaceMap fitted_places(const sim::TouchRig& rig) {
   return sensors::fit_place_map(pixels, places, {width, height});
 }
 
-/// The lowest hundredth of the heights is taken for the gel at rest.
-cv::Mat from_rest(cv::Mat heights) {
-  std::vector<float> sorted(heights.begin<float>(), heights.end<float>());
-  const auto low = sorted.begin() + static_cast<std::ptrdiff_t>(kLowestShare * static_cast<double>(sorted.size()));
-  std::nth_element(sorted.begin(), low, sorted.end());
-  return heights - *low;
+/// Contact where the level of rest isn't known: the higher of two classes of heights (Otsu 1979).
+cv::Mat higher_part(const cv::Mat& heights) {
+  cv::Mat grey, mask;
+  cv::normalize(heights, grey, 0.0, 255.0, cv::NORM_MINMAX, CV_8U);
+  cv::threshold(grey, mask, 0.0, 255.0, cv::THRESH_BINARY | cv::THRESH_OTSU);
+  return mask;
 }
 
 }  // namespace
@@ -88,7 +68,7 @@ TouchBench::TouchBench(const sim::TouchRig& rig, HeightReader heights)
 
 std::vector<HeldTouch> TouchBench::touches(const sim::TouchObject& object, std::span<const Grip> grips,
                                            std::uint64_t seed) const {
-  const double origin = origin_height(object.spec());
+  const double origin = reach_below(object.spec());
   std::vector<sim::Touch> seen(grips.size());
   std::vector<HeldTouch> touches(grips.size());
   tbb::parallel_for(std::size_t{0}, grips.size(), [&](std::size_t i) {
@@ -98,12 +78,19 @@ std::vector<HeldTouch> TouchBench::touches(const sim::TouchObject& object, std::
     touches[i].force_N = press.bodies.front().wrench[2];
   });
   for (std::size_t i = 0; i < grips.size(); ++i) {
-    const cv::Mat heights = from_rest(heights_(seen[i]));
-    cv::Mat contact;
-    sensors::mark_contact(heights, kContact, contact);
+    const cv::Mat heights = heights_(seen[i]);
+    const cv::Mat contact = higher_part(heights);
     touches[i].image = sensors::rectified(heights, contact, places_);
   }
   return touches;
+}
+
+HeightReader estimated_heights(const sim::TouchRig& rig, std::uint64_t seed) {
+  const CalibratedRig calibrated = calibrate_rig(rig, {}, {}, seed);
+  sensors::HeightSettings settings;
+  settings.border = sensors::HeightBorder::free;
+  const auto estimator = std::make_shared<sensors::HeightEstimator>(calibrated.calibration.model, settings);
+  return [estimator](const sim::Touch& touch) { return estimator->estimate(touch.frame).height_mm.clone(); };
 }
 
 HeightReader true_heights(double noise_mm, std::uint64_t seed) {

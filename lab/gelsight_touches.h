@@ -52,6 +52,10 @@ class TouchBench {
   sensors::PlaceMap places_;
 };
 
+/// The estimator's heights: calibrated on the rig by ball presses as a user would (lab/gelsight_height_experiment.h),
+/// integrated with a free border since objects run out of the picture. @throws Error as calibrate_rig does
+HeightReader estimated_heights(const sim::TouchRig& rig, std::uint64_t seed);
+
 /// True heights with normal noise of `noise_mm` in each pixel: a reader that leaves the estimator out.
 HeightReader true_heights(double noise_mm, std::uint64_t seed);
 

@@ -39,7 +39,13 @@ std::string name_of(Better better) {
 std::vector<ValidationRow> validate(const std::vector<std::string>& names, const std::vector<ValidationGroup>& known,
                                     const ValidateOptions& options) {
   std::vector<std::string> allowed = {"all"};
-  for (const ValidationGroup& group : known) allowed.push_back(group.name);
+  for (const ValidationGroup& group : known) {
+    const std::string whole = group.name.substr(0, group.name.find('.'));
+    if (whole != group.name && allowed.back() != whole && !allowed.back().starts_with(whole + '.')) {
+      allowed.push_back(whole);
+    }
+    allowed.push_back(group.name);
+  }
   std::set<std::string> wanted;
   for (const std::string& name : names) {
     if (std::find(allowed.begin(), allowed.end(), name) == allowed.end()) {
@@ -51,7 +57,8 @@ std::vector<ValidationRow> validate(const std::vector<std::string>& names, const
   std::vector<ValidationRow> rows;
   std::set<std::string> ids;
   for (const ValidationGroup& group : known) {
-    if (!wanted.contains("all") && !wanted.contains(group.name)) continue;
+    const std::string whole = group.name.substr(0, group.name.find('.'));
+    if (!wanted.contains("all") && !wanted.contains(group.name) && !wanted.contains(whole)) continue;
     for (ValidationRow& row : group.run(options)) {
       TS_ASSERT(ids.insert(row.id).second);
       rows.push_back(std::move(row));

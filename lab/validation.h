@@ -50,14 +50,15 @@ struct ValidateOptions {
 
 /// Rows that are made together.
 struct ValidationGroup {
-  std::string name;  ///< "mechanics", "light", or a sensor's
+  std::string name;  ///< "mechanics", "light", a sensor's, or a part of a sensor's: "gelsight.height"
   std::function<std::vector<ValidationRow>(const ValidateOptions&)> run;
 };
 
 /// The groups that this build has, in the order in which `all` runs them (validation_groups.cpp).
 const std::vector<ValidationGroup>& validation_groups();
 
-/// Runs the groups with these names, each once, in the order of `known`; "all" stands for every one.
+/// Runs the groups with these names, each once, in the order of `known`; "all" stands for every one, a
+/// sensor's name for all its parts.
 /// @throws Error for a name that isn't known, before anything runs
 std::vector<ValidationRow> validate(const std::vector<std::string>& names, const std::vector<ValidationGroup>& known,
                                     const ValidateOptions& options);

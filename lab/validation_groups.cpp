@@ -2,11 +2,17 @@
 
 namespace touchstone::lab {
 
-// Each in a file of its own: validate_mechanics.cpp, validate_vibration.cpp, validate_light.cpp, validate_vhs.cpp.
+// Each in a file of its own, named for it.
 std::vector<ValidationRow> validate_mechanics(const ValidateOptions& options);
 std::vector<ValidationRow> validate_vibration(const ValidateOptions& options);
 std::vector<ValidationRow> validate_light(const ValidateOptions& options);
 std::vector<ValidationRow> validate_vhs(const ValidateOptions& options);
+std::vector<ValidationRow> validate_gelsight_height(const ValidateOptions& options);
+std::vector<ValidationRow> validate_gelsight_dome(const ValidateOptions& options);
+std::vector<ValidationRow> validate_gelsight_map(const ValidateOptions& options);
+std::vector<ValidationRow> validate_gelsight_slip(const ValidateOptions& options);
+std::vector<ValidationRow> validate_gelsight_grasp(const ValidateOptions& options);
+std::vector<ValidationRow> validate_gelsight_texture(const ValidateOptions& options);
 
 const std::vector<ValidationGroup>& validation_groups() {
   static const std::vector<ValidationGroup> groups = {
@@ -14,6 +20,12 @@ const std::vector<ValidationGroup>& validation_groups() {
       {"vibration", validate_vibration},
       {"light", validate_light},
       {"vhs", validate_vhs},
+      {"gelsight.height", validate_gelsight_height},
+      {"gelsight.dome", validate_gelsight_dome},
+      {"gelsight.map", validate_gelsight_map},
+      {"gelsight.force", validate_gelsight_slip},
+      {"gelsight.grasp", validate_gelsight_grasp},
+      {"gelsight.texture", validate_gelsight_texture},
   };
   return groups;
 }

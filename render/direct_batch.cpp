@@ -108,6 +108,14 @@ void DirectBatch::look(std::span<const RayPacket> rays, DirectCounts& counts) {
       Lane& one = lanes_[lane];
       one.material = nullptr;
       one.doubt = 0;
+      // A point set in which rows, columns and quarters of the square are shared out evenly over the packet (the first
+      // sixteen of van der Corput's, paired with their own number), laid so that lanes beside each other differ.
+      constexpr int kOrder[kPacket] = {0, 8, 2, 10, 12, 4, 14, 6, 3, 11, 1, 9, 15, 7, 13, 5};
+      const int number_in_set = kOrder[k];
+      const int reversed =
+          (number_in_set & 1) << 3 | (number_in_set & 2) << 1 | (number_in_set & 4) >> 1 | number_in_set >> 3;
+      one.spread[0] = (static_cast<float>(number_in_set) + 0.5f) / kPacket - 0.5f;
+      one.spread[1] = (static_cast<float>(reversed) + 0.5f) / kPacket - 0.5f;
       if (packet.valid[k] == 0) continue;
       ++counts.primary;
       one.object = hits.object[k];
@@ -200,7 +208,9 @@ void DirectBatch::set_flow(int lane, int lamp, const Eigen::Vector3f& flow) {
 // The field of a lens point is that of the lens's middle seen from a place set off the other way, since flat layers
 // look alike from everywhere; a source that is higher is one that is set off along its own ray.
 void DirectBatch::choose_lens_points(int lane, double u, double v) {
-  const Lane& one = lanes_[lane];
+  Lane& one = lanes_[lane];
+  one.spread[0] = static_cast<float>(u - 0.5);
+  one.spread[1] = static_cast<float>(v - 0.5);
   if (one.material == nullptr || !is_lit(one.material->kind)) return;
   const bool metal = one.material->kind == DirectKind::kMetal;
   for (int lamp = 0; lamp < lamps_; ++lamp) {
@@ -274,10 +284,33 @@ void DirectBatch::cast_shadows(DirectCounts& counts) {
   }
 }
 
+/// Where a shadow ray to the lamp goes. A beam is as wide as the ways to the beams beside it differ; one at the rim is
+/// taken to be as wide outwards as it is inwards.
+Eigen::Vector3f DirectBatch::towards(int lane, int lamp) const {
+  const Eigen::Vector3f middle = (-flow_of(lane, lamp)).normalized();
+  const BesideBeam& beside = field_.beside[lamp];
+  const auto part = [&](float share, int less, int more) -> Eigen::Vector3f {
+    const bool up = (share > 0.0f && more >= 0) || less < 0;
+    const int other = up ? more : less;
+    if (other < 0) return Eigen::Vector3f::Zero();
+    const Eigen::Vector3f way = (-flow_of(lane, other)).normalized() - middle;
+    return way.allFinite() ? Eigen::Vector3f((up ? share : -share) * way) : Eigen::Vector3f::Zero();
+  };
+  // Each beam begins elsewhere in the sequence, so that a place sees different parts of different beams.
+  const auto turned = [&](float share, float by) {
+    const float at = share + 0.5f + by * static_cast<float>(lamp);
+    return at - std::floor(at) - 0.5f;
+  };
+  const float* spread = lanes_[lane].spread;
+  return (middle + part(turned(spread[0], 0.4375f), beside.flatter, beside.steeper) +
+          part(turned(spread[1], 0.6875f), beside.left, beside.right))
+      .normalized();
+}
+
 bool DirectBatch::shadow_ray(int lane, int lamp, int slot) {
   const Lane& one = lanes_[lane];
   const Eigen::Vector3f place(one.place[0], one.place[1], one.place[2]);
-  const Eigen::Vector3f towards = (-flow_of(lane, lamp)).normalized();
+  const Eigen::Vector3f towards = this->towards(lane, lamp);
   const Eigen::Vector3f origin(one.leave[0], one.leave[1], one.leave[2]);
   if (!origin.allFinite() || !towards.allFinite()) return false;
   float far = 1e6f;

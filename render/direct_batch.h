@@ -82,7 +82,8 @@ class DirectBatch {
   /// What the rays meet and what each lamp would send there; at most kMostPackets.
   void look(std::span<const RayPacket> rays, DirectCounts& counts);
 
-  /// Lets a lane's shadows come from the point of each lens that (u, v) in [0, 1)^2 stands for, not from its middle.
+  /// Lets a lane's shadows come from the point of each lens that (u, v) in [0, 1)^2 stands for, not from its middle,
+  /// and from that part of a guide's beams. Without, the sixteen lanes of a packet take sixteen parts of a beam.
   void choose_lens_points(int lane, double u, double v);
 
   /// Which lamps' light is known to reach a place, and which is known to be hidden: a bit a lamp.
@@ -112,6 +113,7 @@ class DirectBatch {
     const DirectMaterial* material;  // null where nothing was met
     const float* colour;             // the material's, or that of the ink
     std::uint64_t doubt;             // see ShadowReach
+    float spread[2];                 // where in the beams of guides shadow rays go, each -1/2 to 1/2
   };
 
   const RayPacket& packet_of(int lane) const { return rays_[lane / kPacket]; }
@@ -119,6 +121,7 @@ class DirectBatch {
   const float* amounts(int lane) const { return amounts_.data() + static_cast<std::size_t>(lane) * stride_; }
   Eigen::Array4f passing(int lane, int group, int band) const;
   Eigen::Vector3f flow_of(int lane, int lamp) const;
+  Eigen::Vector3f towards(int lane, int lamp) const;
   void set_flow(int lane, int lamp, const Eigen::Vector3f& flow);
   void light_lane(int lane, DirectCounts& counts);
   bool shadow_ray(int lane, int lamp, int slot);

@@ -71,8 +71,6 @@ void guide_beam_flows(const PreparedScene<1>& scene, const PreparedLamp<1>& lamp
 
   for (int sector = 0; sector < cut.sectors; ++sector) {
     Eigen::Vector3d* beams = out + sector * cut.beams_a_sector();
-    // Of neighbouring sectors the cuts lie half a slice apart; the thin slices at the ends don't matter.
-    const double stagger = sector % 2 == 0 ? 0.25 : -0.25;
     for (int i = 0; i < count; ++i) {
       const double azimuth = azimuths.value((sector + rule.node[i]) / cut.sectors);
       const double width = rule.weight[i] / (cut.sectors * azimuths.density(azimuth));
@@ -94,7 +92,7 @@ void guide_beam_flows(const PreparedScene<1>& scene, const PreparedLamp<1>& lamp
       Eigen::Vector3d last = Eigen::Vector3d::Zero();
       double low = edge(0.0);
       for (int beam = 0; beam <= cut.slices; ++beam) {
-        const double height = beam + 1 < cut.slices ? (beam + 1 + stagger) / cut.slices : beam + 2 - cut.slices;
+        const double height = beam < cut.slices ? (beam + 1.0) / cut.slices : 2.0;
         const double high = edge(thickness * height);
         last = light_between(low, high, count);
         beams[beam] += last;

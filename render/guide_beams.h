@@ -10,11 +10,10 @@ namespace touchstone::render {
 
 /// How a guide's light is cut. A receiver sees the exit face as an endless upright strip of mirror images
 /// (guide_connection.h). Its azimuths are cut into `sectors` that carry about the same light. Each has the exit face
-/// itself in slices by height, which are staggered from sector to sector so that the edge of a shadow crosses them one
-/// by one, then the first mirror image, then all further ones together.
-/// So a facet whose horizon cuts the guide sees some beams and not others, and shadows get soft rims.
+/// itself in slices by height, then the first mirror image, then all further ones together. So a facet whose horizon
+/// cuts the guide sees some beams and not others, and shadows get soft rims.
 struct GuideCut {
-  int sectors = 4;
+  int sectors = 5;
   int slices = 2;
 
   int beams_a_sector() const { return slices + 2; }

@@ -8,8 +8,7 @@
 // a plate is a lamp in the glass; `power_W` is what it sends into that medium, in each band. Rows and rings of LEDs are
 // made by lamp_arrays.h.
 //
-// Which renderer takes which: the path tracer all of them; a light field (light_field.h) those that aren't visible and
-// are no guides.
+// Which renderer takes which: the path tracer all of them; a light field (light_field.h) those that aren't visible.
 //
 // How lamp light gets to a place:
 //  - through the flat faces between the two straight on, exactly, by one connection to a point of the lamp

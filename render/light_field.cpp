@@ -55,7 +55,7 @@ struct Maker {
   const LightFieldSettings& settings;
   PreparedScene<1> clear;
   std::vector<std::unique_ptr<PreparedScene<1>>> absorbing;  // by band; none if nothing absorbs
-  std::vector<int> group_of;  // by number of all beams: that of the field's
+  std::vector<int> group_of;                                 // by number of all beams: that of the field's
 
   int beams_of(const PreparedLamp<1>& lamp) const {
     return lamp.kind == LampKind::kGuide ? settings.guides.beams() : 1;
@@ -136,10 +136,25 @@ struct Maker {
     group_of.assign(all, 0);
     for (std::size_t g = 0; g < groups.size(); ++g) {
       std::fill(group_of.begin() + groups[g].first, group_of.begin() + groups[g].end, static_cast<int>(g));
+    }
+    for (std::size_t g = 0; g < groups.size(); ++g) {
       const int lamp = lamp_of[groups[g].first];
       field.lamp_of.push_back(lamp);
       const Lamp& one = field.fixture.lamps[lamp];
       field.intensity.push_back(lamp_power(one) / emission_integral(one));
+      if (!std::holds_alternative<GuideLamp>(one)) {
+        field.beside.emplace_back();
+        continue;
+      }
+      const int sector = settings.guides.beams_a_sector();
+      const int middle = (groups[g].first + groups[g].end - 1) / 2;
+      const auto group_at = [&](int number, bool same_run) {
+        const bool fits =
+            number >= 0 && number < all && lamp_of[number] == lamp && (run_of[number] == run_of[middle]) == same_run;
+        return fits ? group_of[number] : -1;
+      };
+      field.beside.push_back({group_at(groups[g].first - 1, true), group_at(groups[g].end, true),
+                              group_at(middle - sector, false), group_at(middle + sector, false)});
     }
   }
 

@@ -24,6 +24,11 @@ struct LightFieldSettings {
   int most_nodes = 400000;
 };
 
+/// Which beams of the same guide lie beside a beam; -1 where there is none.
+struct BesideBeam {
+  int flatter = -1, steeper = -1, left = -1, right = -1;
+};
+
 /// A regular grid over a box. Between nodes F is interpolated linearly along each axis.
 ///
 /// What the grid holds are beams: a lamp is one, a light guide several (guide_beams.h); those of them that bring
@@ -40,6 +45,7 @@ struct LightField {
   Eigen::Array3d step = Eigen::Array3d::Zero();  ///< mm
   std::vector<int> lamp_of;                      ///< index into fixture.lamps, by beam; beams of a lamp in a row
   std::vector<Spectrum> intensity;               ///< W/sr on the lamp's axis, by beam
+  std::vector<BesideBeam> beside;                ///< by beam
   std::vector<float> flow;  ///< [node][beam][4]: F and its length; node = x + nodes.x (y + nodes.y z)
   std::vector<float> pass;  ///< [node][beam][band], empty where nothing absorbs
   /// Estimate: root mean square over the middles of cells, where linear interpolation is worst, of |F - exact| summed

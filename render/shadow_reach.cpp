@@ -9,6 +9,7 @@
 #include <array>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 namespace touchstone::render {
 namespace {
@@ -17,7 +18,7 @@ constexpr float kPad = 1e-3f;  // mm: more than single precision moves anything
 constexpr float kEndless = std::numeric_limits<float>::infinity();
 constexpr int kMostCells = 40;  // along the longer side
 constexpr int kMostSlabs = 8;
-constexpr std::array<int, 3> kWidths = {1, 2, 4};  // cells by which the map of slopes is widened
+constexpr std::array<int, 5> kWidths = {1, 2, 4, 8, 16};  // cells by which the map of slopes is widened
 
 /// What the sheet does over each cell.
 struct Ground {
@@ -86,7 +87,8 @@ Ground ground_of(const LampBearings& map, const TriangleMesh& mesh) {
       });
 }
 
-/// The most within `width` cells along both axes. Cells at the map's edge hold what lies beside it (over_cells).
+/// The most within `width` cells along both axes, no less than zero. Cells at the map's edge hold what lies beside it
+/// (over_cells).
 std::vector<float> widened(const LampBearings& map, const std::vector<float>& from, int width) {
   const auto along = [&](const std::vector<float>& source, int count, int stride, int lines, int line_stride) {
     std::vector<float> to(source.size());
@@ -183,14 +185,39 @@ LampBearings::LampBearings(const LightField& field, bool soft)
             0.5f * cell + set_off[lamp] * (1.0f + static_cast<float>(std::min(31.0, 2.0 * sent_across / sent_along)));
         const auto step = [](int n) { return static_cast<float>(n - 1); };
         float spread = 0.0f;
+        float swing = 0.0f;
+        const auto swings = [&](const Eigen::Vector3f& other) {
+          const Eigen::Vector2f flat = other.head<2>();
+          const bool known = flat.squaredNorm() > 0.0f && middle.squaredNorm() > 0.0f;
+          return known ? (flat.normalized() - middle.normalized()).norm() : 2.0f;
+        };
         for (int k = 0; k < 27 && std::isfinite(spread); ++k) {
           const bool lit =
               way(x + off * step(k % 3), y + off * step(k / 3 % 3), middle_z + 0.5f * slab * step(k / 9), lamp, to);
           spread = lit && to.z() * made.side > 0.0f
                        ? std::max(spread, (to.head<2>() / std::abs(to.z()) - middle).norm())
                        : kEndless;
+          swing = std::max(swing, lit ? swings(to) : 2.0f);
         }
-        made.spread = 1.5f * spread + 1e-3f;  // a half more for what lies between those places
+        // Rays go to all of a beam, half as far as the next one's middle.
+        float wide = 0.0f;
+        float wide_swing = 0.0f;
+        const BesideBeam& beside = field.beside[lamp];
+        for (const auto& [one, other] : {std::pair{beside.flatter, beside.steeper}, {beside.left, beside.right}}) {
+          float most = 0.0f;
+          float most_swing = 0.0f;
+          for (const int next : {one, other}) {
+            if (next < 0) continue;
+            const bool lit = way(x, y, middle_z, next, to);
+            most = lit && to.z() * made.side > 0.0f ? std::max(most, (to.head<2>() / std::abs(to.z()) - middle).norm())
+                                                    : kEndless;
+            most_swing = std::max(most_swing, lit ? swings(to) : 2.0f);
+          }
+          wide += 0.55f * most;
+          wide_swing += 0.55f * most_swing;
+        }
+        made.swing = std::min(1.5f * swing + wide_swing + 1e-3f, 2.0f);
+        made.spread = 1.5f * spread + wide + 1e-3f;  // a half more for what lies between those places
       }
     }
   });
@@ -259,9 +286,21 @@ ShadowReach::ShadowReach(const LampBearings& bearings, const Scene& scene, bool 
                  [&](std::size_t cell) { ground.slope[cell] = kEndless; });
     }
   }
-  std::array<std::vector<float>, kWidths.size()> slopes;
-  tbb::parallel_for(std::size_t{0}, kWidths.size(),
-                    [&](std::size_t k) { slopes[k] = widened(map, ground.slope, kWidths[k]); });
+  // How far what stands in a cell reaches down, and up; no less than to z = 0 (see widened).
+  std::vector<float> down(ground.slope.size());
+  std::vector<float> up(ground.slope.size());
+  for (std::size_t k = 0; k < ground.slope.size(); ++k) {
+    const bool column = std::isinf(ground.slope[k]);
+    down[k] = column ? kEndless : -ground.low[k];
+    up[k] = column ? kEndless : ground.high[k];
+  }
+  std::array<std::vector<float>, kWidths.size()> slopes, downs, ups;
+  tbb::parallel_for(std::size_t{0}, 3 * kWidths.size(), [&](std::size_t k) {
+    const std::size_t width = k / 3;
+    if (k % 3 == 0) slopes[width] = widened(map, ground.slope, kWidths[width]);
+    if (k % 3 == 1) downs[width] = widened(map, down, kWidths[width]);
+    if (k % 3 == 2) ups[width] = widened(map, up, kWidths[width]);
+  });
   const float solid_low = static_cast<float>(solid.min().z()) - kPad;
   const float solid_high = static_cast<float>(solid.max().z()) + kPad;
 
@@ -269,23 +308,31 @@ ShadowReach::ShadowReach(const LampBearings& bearings, const Scene& scene, bool 
   const auto meets_ground = [&](int column, int row, const LampBearings::Bearing& to) {
     const std::size_t here = static_cast<std::size_t>(row) * map.columns + column;
     const float height = to.side < 0.0f ? ground.high[here] - solid_low : solid_high - ground.low[here];
-    const float drift = to.spread * height / map.cell;
-    std::size_t width = 0;
-    // From the cell's middle to where the ray is: half a cell, half a step of half a cell, and what ways differ by.
-    while (width < kWidths.size() && !(0.75f + drift <= static_cast<float>(kWidths[width]))) ++width;
-    if (width == kWidths.size()) return true;
-    const float most = to.length + to.spread;
-    const int steps = static_cast<int>(std::ceil(std::min(1e3f, height * to.length / (0.5f * map.cell)))) + 1;
-    const float step = height / static_cast<float>(steps);
+    const float most = to.length + to.spread;  // across a mm of height, of the flattest ray
+    // In steps of half a cell along the heading; a ray may stray from it by its swing, and by where it began.
+    const float step = 0.5f * map.cell;
+    const int steps = static_cast<int>(std::ceil(std::min(1e3f, height * most / step))) + 1;
+    const float dx = to.length > 0.0f ? 0.5f * to.x / to.length : 0.0f;
+    const float dy = to.length > 0.0f ? 0.5f * to.y / to.length : 0.0f;
     float clear = 0.0f;
     for (int k = 0; k < steps; ++k) {
-      const float risen = (static_cast<float>(k) + 0.5f) * step / map.cell;
+      const float along = static_cast<float>(k) + 0.5f;
+      const float drift = 1.0f + to.swing * 0.5f * (along + 0.5f);
+      std::size_t width = 0;
+      while (width < kWidths.size() && !(drift <= static_cast<float>(kWidths[width]))) ++width;
+      if (width == kWidths.size()) return true;
       const auto cell = [](float at, int count) {
         return static_cast<int>(std::clamp(at, 0.0f, static_cast<float>(count - 1)));
       };
-      const int i = cell(static_cast<float>(column) + 0.5f + risen * to.x, map.columns);
-      const int j = cell(static_cast<float>(row) + 0.5f + risen * to.y, map.rows);
-      clear += step * (1.0f - slopes[width][static_cast<std::size_t>(j) * map.columns + i] * most);
+      const int i = cell(static_cast<float>(column) + 0.5f + along * dx, map.columns);
+      const int j = cell(static_cast<float>(row) + 0.5f + along * dy, map.rows);
+      const std::size_t there = static_cast<std::size_t>(j) * map.columns + i;
+      // Nothing there may reach as far as the ray has risen at least, or it has risen more than the sheet has.
+      const float risen = static_cast<float>(k) * step / most;
+      const float apart = to.side < 0.0f ? risen - ground.high[here] - downs[width][there]
+                                         : risen + ground.low[here] - ups[width][there];
+      clear += step * (1.0f / most - slopes[width][there]);
+      if (apart > 0.0f) clear = std::max(clear, apart);
       if (!(clear >= 0.0f)) return true;
     }
     return false;

@@ -20,6 +20,7 @@ struct LampBearings {
     float x = 0.0f, y = 0.0f;
     float length = 0.0f;                                    ///< of (x, y)
     float spread = std::numeric_limits<float>::infinity();  ///< no way from the cell differs by more
+    float swing = std::numeric_limits<float>::infinity();   ///< nor its unit vector across by more
     float side = 0.0f;                                      ///< 1: the lamp is above, -1: below
   };
 

@@ -91,7 +91,8 @@ GraspCommand GraspRule::approach(const GraspSight& sight) {
     phase_ = GraspPhase::touched;
     return {phase_, 0.0, false};
   }
-  if (approached_ + settings_.approach_step_mm > settings_.longest_approach_mm + kLeastStep_mm) return end(GraspPhase::nothing_there);
+  if (approached_ + settings_.approach_step_mm > settings_.longest_approach_mm + kLeastStep_mm)
+    return end(GraspPhase::nothing_there);
   phase_ = GraspPhase::approaching;
   approached_ += settings_.approach_step_mm;
   return {phase_, settings_.approach_step_mm, false};

@@ -12,6 +12,8 @@ namespace {
 constexpr double kTukey = 4.685;           // of the residuals' sigma: 95 % efficient for normal residuals
 constexpr double kSigmaOfMedian = 1.4826;  // of normal residuals' median absolute value
 constexpr std::size_t kLeastOverlapPixels = 50;
+constexpr double kRounding_mm = 1e-6;  // detail below is what single precision leaves of a plane
+constexpr double kWorse = 0.02;        // correlation lost on the way: robust weights may cost a little of it
 
 /// A pixel of `from` that is looked up in `to`.
 struct Sample {
@@ -164,6 +166,7 @@ Alignment align(const ReliefDetail& from, const ReliefDetail& to, const PlanarPo
   std::vector<Lookup> lookups = look_up_all(to, samples, pose);
   LineFit line = fit_line(samples, lookups);
   const Alignment unmoved = judged(start, line);
+  if (std::min(from.rms_mm, to.rms_mm) < kRounding_mm) return unmoved;
   for (int steps = 1; steps <= settings.most_steps && line.pixels >= kLeastOverlapPixels; ++steps) {
     const auto change = step(samples, lookups, line, pose);
     if (!change) break;
@@ -176,7 +179,7 @@ Alignment align(const ReliefDetail& from, const ReliefDetail& to, const PlanarPo
     lookups = look_up_all(to, samples, pose);
     line = fit_line(samples, lookups);
     if (change->segment<2>(1).norm() + std::abs((*change)[0]) * reach > settings.least_step_mm) continue;
-    if (line.correlation < unmoved.correlation) break;
+    if (line.correlation < unmoved.correlation - kWorse) break;
     Alignment result = judged(pose, line);
     result.steps = steps;
     result.converged = true;

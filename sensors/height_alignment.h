@@ -9,8 +9,8 @@
 namespace touchstone::sensors {
 
 struct AlignmentSettings {
-  int most_steps = 30;
-  double least_step_mm = 1e-4;      ///< a smaller step is the last
+  int most_steps = 40;
+  double least_step_mm = 5e-4;      ///< a smaller step is the last
   double most_moved_mm = 0.5;       ///< from the start, at the middle of the overlap; beyond that it has gone astray
   std::size_t most_pixels = 20000;  ///< of `from`, evenly chosen
 };

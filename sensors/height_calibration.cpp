@@ -111,8 +111,7 @@ HeightCalibration calibrate_height(std::span<const BallPress> presses, const Bac
   HeightCalibration result;
   LightCorrection kind = settings.correction.value_or(LightCorrection::background);
   if ((settings.cross_validate || !settings.correction) && presses.size() >= kPressesForOrder1) {
-    for (const LightCorrection tried :
-         {LightCorrection::none, LightCorrection::background, LightCorrection::fitted}) {
+    for (const LightCorrection tried : {LightCorrection::none, LightCorrection::background, LightCorrection::fitted}) {
       result.left_out.push_back({tried, left_out_error(parts, background, settings, tried)});
     }
     const auto best = std::min_element(result.left_out.begin(), result.left_out.end(),

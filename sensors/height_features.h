@@ -28,7 +28,7 @@ struct HeightFeatures {
 struct FeatureSettings {
   /// Of the picture in which features are looked for. A pressed membrane is smooth over some tenths of a millimetre,
   /// and the detector looks at rings of 3 px radius: on finer pixels it sees no corners.
-  double pitch_mm = 0.08;
+  double pitch_mm = 0.06;
   int threshold = 10;  ///< least grey difference of a corner (AGAST)
   /// Of the scale space. 0: touches of one sensor have one scale, and in the octaves OpenCV 4.6 puts keypoints half a
   /// pixel aside, which doesn't turn with the touch (0.05 mm of 0.05 mm pixels, against 0.004 mm without octaves).

@@ -20,7 +20,7 @@ struct PointPair {
 };
 
 struct RansacSettings {
-  double inlier_mm = 0.2;     ///< a pair is an inlier when the moved point is nearer than that to its partner
+  double inlier_mm = 0.12;    ///< a pair is an inlier when the moved point is nearer than that to its partner
   double baseline_mm = 0.5;   ///< least distance between the two points of a sample
   int samples = 20000;        ///< most samples of two pairs
   double assurance = 0.9999;  ///< enough samples are drawn to meet one of two inliers with this probability

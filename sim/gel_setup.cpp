@@ -1,5 +1,7 @@
 #include "sim/gel_setup.h"
 
+#include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <mutex>
 #include <optional>
@@ -77,6 +79,15 @@ std::shared_ptr<const fem::FiniteGel> set_up_finite_gel(const DeviceSpec& device
   const fem::GelBody body = gel_body(device);
   return std::make_shared<const fem::FiniteGel>(fem::mesh_gel(body), gel_materials(device.gel), gel_beads(device),
                                                 fem::thickness_of(body));
+}
+
+double rest_height(const GelSpec& gel, const Eigen::Vector2d& place) {
+  TS_ASSERT(gel.shape != GelShape::mesh);
+  if (gel.shape == GelShape::slab) return 0.0;
+  const bool dome = gel.shape == GelShape::dome;
+  const double sphere = dome ? gel.sphere_radius_mm : gel.radius_mm;
+  const double across = std::min(place.norm(), dome ? gel.base_radius_mm : gel.radius_mm);
+  return std::sqrt(sphere * sphere - across * across) - sphere;
 }
 
 std::string gel_key(const DeviceSpec& device) {

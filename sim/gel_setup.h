@@ -19,6 +19,10 @@ std::vector<fem::ElasticMaterial> gel_materials(const GelSpec& gel);
 
 std::vector<fem::Bead> gel_beads(const DeviceSpec& device);
 
+/// Height (gel frame's z, mm) of the undeformed outer surface over a place; of a dome or fingertip beyond its rim that
+/// of the rim. @pre the gel isn't a mesh
+double rest_height(const GelSpec& gel, const Eigen::Vector2d& place);
+
 /// The gel for presses at finite strain: the mesh that its compliance was made with. The mesh must be given by fine_mm.
 std::shared_ptr<const fem::FiniteGel> set_up_finite_gel(const DeviceSpec& device);
 

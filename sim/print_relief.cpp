@@ -93,7 +93,7 @@ std::vector<Segment> segments_of(const PrintRelief& relief) {
     Eigen::Vector2d last = Eigen::Vector2d::Zero();
     for (std::size_t at = 0; at + 1 < glyph->strokes.size(); at += 3) {
       const Eigen::Vector2d point =
-          unit * (corner + Eigen::Vector2d(glyph->strokes[at] - '0', glyph->strokes[at + 1] - '0'));
+          unit * (corner + Eigen::Vector2d(glyph->strokes[at] - '0', kGlyphHeight - (glyph->strokes[at + 1] - '0')));
       if (pen_down) segments.push_back({last, point});
       last = point;
       pen_down = at + 2 < glyph->strokes.size() && glyph->strokes[at + 2] == ' ';
@@ -157,7 +157,6 @@ fem::ReliefMap relief_map(const PrintRelief& relief) {
       }
     }
   }
-  // The map is seen from above the object, the print from below: along x it is mirrored.
   std::vector<float> heights(nearest.size());
   for (int j = 0; j < ny; ++j) {
     const auto row = static_cast<std::ptrdiff_t>(j) * nx;
@@ -165,7 +164,6 @@ fem::ReliefMap relief_map(const PrintRelief& relief) {
       const double inside = std::clamp((pen - static_cast<double>(distance)) / (kSoftEdge * pen), 0.0, 1.0);
       return static_cast<float>(amplitude * inside * inside * (3.0 - 2.0 * inside));
     });
-    std::reverse(heights.begin() + row, heights.begin() + row + nx);
   }
   const Eigen::Vector2d first(-spacing * ((nx - 1) / 2), -spacing * ((ny - 1) / 2));
   return {nx, ny, first, {spacing, spacing}, {false, false}, std::move(heights)};

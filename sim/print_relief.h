@@ -9,7 +9,8 @@
 namespace touchstone::sim {
 
 /// A line of letters drawn with a round pen whose ink stands `amplitude_um` high and falls off over the outer third of
-/// the pen. It is centred on the z axis and reads along +x for who looks at the printed side, from below. Capitals,
+/// the pen. It is centred on the z axis and reads along +x with y down, for who looks at the printed
+/// side from below, as a device does. Capitals,
 /// digits, blanks, and . - $; each letter is 2/3 as wide as it is high.
 struct PrintRelief {
   static constexpr const char* kType = "print";

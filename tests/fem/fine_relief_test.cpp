@@ -316,7 +316,7 @@ TEST(FineRelief, RefusesWhatItCantDo) {
     const SmoothSurface surface(domed);
     FAIL() << "no error";
   } catch (const Error& error) {
-    EXPECT_THAT(error.what(), HasSubstr("flat gels only"));
+    EXPECT_THAT(error.what(), HasSubstr("flat and gently domed gels only"));
   }
 }
 

@@ -37,6 +37,23 @@ TEST(Validation, AllRunsEveryGroupOnce) {
   EXPECT_EQ(rows.size(), 2u);
 }
 
+TEST(Validation, ASensorsNameRunsAllItsParts) {
+  std::vector<std::string> ran;
+  const auto group = [&ran](const std::string& name) {
+    return ValidationGroup{name, [&ran, name](const ValidateOptions&) {
+                             ran.push_back(name);
+                             return std::vector<ValidationRow>{};
+                           }};
+  };
+  const std::vector<ValidationGroup> known = {group("light"), group("gel.height"), group("gel.map"), group("vhs")};
+  validate({"gel"}, known, {});
+  EXPECT_EQ(ran, (std::vector<std::string>{"gel.height", "gel.map"}));
+  ran.clear();
+  validate({"gel.map"}, known, {});
+  EXPECT_EQ(ran, (std::vector<std::string>{"gel.map"}));
+  EXPECT_THROW(validate({"gel."}, known, {}), Error);
+}
+
 TEST(Validation, UnknownGroupNamesTheNearestAndRunsNothing) {
   std::vector<std::string> ran;
   try {

@@ -73,7 +73,7 @@ TEST(Plan, AnImageOfAGelThatIsNoSlabIsRefusedAndItsTruthIsnt) {
       make_plan(scene);
       FAIL() << "no error";
     } catch (const Error& error) {
-      EXPECT_THAT(error.what(), HasSubstr("curved and has no coating"));
+      EXPECT_THAT(error.what(), HasSubstr(shape == GelShape::mesh ? "is a mesh" : "curved and has no coating"));
       EXPECT_GT(error.where().line, 0);
     }
     scene.outputs.frames = scene.outputs.ideal = scene.outputs.radiance = false;

@@ -151,14 +151,14 @@ TEST(Plan, PixelsTooWideForTheReliefAreRefused) {
   }
 }
 
-TEST(Relief, PrintIsAsHighAsItsInkAndReadsFromBelow) {
-  // A pen of 0.2 mm draws an L of 2 x 3 mm: its stem is on the left for who looks from below, where x runs to the left.
+TEST(Relief, PrintIsAsHighAsItsInkAndReadsAlongX) {
+  // A pen of 0.2 mm draws an L of 2 x 3 mm: its stem is on the left.
   const std::string print = "{type: print, amplitude_um: 60, text: L, letter_mm: 3, stroke_mm: 0.2}";
-  EXPECT_NEAR(height(print, 1.0, 0.3), 0.06, 1e-7);
-  EXPECT_NEAR(height(print, -0.5, -1.5), 0.06, 1e-7);
-  EXPECT_EQ(height(print, -1.0, 0.3), 0.0);
-  EXPECT_NEAR(height(print, 1.0 + 0.1 * (1.0 - 1.0 / 6.0), 0.3), 0.03, 0.004);  // half of the soft edge
-  EXPECT_EQ(height(print, 1.12, 0.3), 0.0);
+  EXPECT_NEAR(height(print, -1.0, 0.3), 0.06, 1e-7);
+  EXPECT_NEAR(height(print, 0.5, 1.5), 0.06, 1e-7);
+  EXPECT_EQ(height(print, 1.0, 0.3), 0.0);
+  EXPECT_NEAR(height(print, -1.0 + 0.1 * (1.0 - 1.0 / 6.0), 0.3), 0.03, 0.004);  // half of the soft edge
+  EXPECT_EQ(height(print, -0.88, 0.3), 0.0);
 }
 
 TEST(Relief, EveryLetterLeavesInkWithinItsCell) {

@@ -34,10 +34,6 @@ cv::Mat heights_of(const fem::ReliefMap& map, double side, double pixel = kPixel
   return heights;
 }
 
-double mean_of(const cv::Mat& heights) {
-  return cv::mean(heights)[0];
-}
-
 /// Sq, mm: root mean square about the mean plane's height.
 double sq_of(const cv::Mat& heights) {
   cv::Scalar mean, deviation;
@@ -139,8 +135,8 @@ TEST(TextureRelief, ASeedIsAPieceAndNothingElse) {
     SCOPED_TRACE(name);
     const cv::Mat one = heights_of(piece(1), 4.0), again = heights_of(piece(1), 4.0), other = heights_of(piece(2), 4.0);
     EXPECT_EQ(cv::norm(one, again, cv::NORM_INF), 0.0);
-    EXPECT_GT(cv::norm(one, other, cv::NORM_L1) / one.total(), 0.1 * sq_of(one));  // another piece
-    EXPECT_NEAR(sq_of(other) / sq_of(one), 1.0, 0.35);                             // of the same material
+    EXPECT_GT(cv::norm(one, other, cv::NORM_L1) / static_cast<double>(one.total()), 0.1 * sq_of(one));  // another piece
+    EXPECT_NEAR(sq_of(other) / sq_of(one), 1.0, 0.35);  // of the same material
   }
 }
 
@@ -158,8 +154,8 @@ TEST(TextureRelief, GoesOnWithoutASeam) {
     // recurs in the tile's interior.
     std::vector<double> sorted = steps;
     std::sort(sorted.begin(), sorted.end());
-    const double usual = sorted[sorted.size() * 95 / 100];
-    EXPECT_LT(sorted.back(), 3.0 * usual + 1e-6);
+    const double usual = sorted[sorted.size() * 98 / 100];  // borders are less than one column in a hundred
+    EXPECT_LT(sorted.back(), 3.0 * usual);
     EXPECT_GT(usual, 0.0);
   }
 }
@@ -173,9 +169,10 @@ TEST(FabricRelief, PeaksAtItsPitch) {
     cloth.irregularity = 0.05;
     cloth.size_mm = 9.0;
     const cv::Mat heights = heights_of(relief_map(cloth), 9.0);
-    // Of a plain weave all yarns are alike along their whole length but for the crossings, so the pitch itself shows.
-    EXPECT_NEAR(strongest_period(heights, true, 0.8 * cloth.pitch_mm.x(), 1.3 * cloth.pitch_mm.x()), cloth.pitch_mm.x(),
-                0.02 * cloth.pitch_mm.x());
+    SCOPED_TRACE(static_cast<int>(weave));
+    // Along x a wale of a knit shows its two legs.
+    const double across = weave == Weave::knit ? 0.5 * cloth.pitch_mm.x() : cloth.pitch_mm.x();
+    EXPECT_NEAR(strongest_period(heights, true, 0.8 * across, 1.3 * across), across, 0.02 * across);
     if (weave == Weave::corduroy) continue;
     EXPECT_NEAR(strongest_period(heights, false, 0.8 * cloth.pitch_mm.y(), 1.3 * cloth.pitch_mm.y()),
                 cloth.pitch_mm.y(), 0.02 * cloth.pitch_mm.y());
