@@ -59,7 +59,11 @@ class Eyes {
     sight.normal_force_N = normal_N;
     sight.slip = sensors::is_slip(force_ratio, motion.ratio, settings_.rule) ||
                  (settings_.rim && (rim == sensors::SlipState::kIncipient || rim == sensors::SlipState::kSliding));
-    if (sight.slip) incipient_.restart();  // what was told once isn't told again by the frames that it keeps
+    if (sight.slip) forgetting_ = settings_.forget_frames;
+    if (forgetting_ > 0) {
+      incipient_.restart();
+      --forgetting_;
+    }
     return sight;
   }
 
@@ -72,6 +76,7 @@ class Eyes {
   cv::Mat before_;
   cv::Mat contact_;
   std::int64_t frames_ = 0;
+  int forgetting_ = 0;  // frames
 };
 
 }  // namespace

@@ -29,6 +29,9 @@ GraspCalibration calibrate_for_grasps(const sim::TouchRig& flat, const sim::Touc
 struct GraspSenseSettings {
   sensors::SlipThresholds rule;  ///< of the text's two ratios
   bool rim = true;               ///< slip that begins at the contact's rim counts, too (sensors/incipient_slip.h)
+  /// After slip was told, the rim's detector forgets its frames for so many: the gripper's answer, seen a camera's lag
+  /// later, moves the contact too, and would be taken for slip and answered again.
+  int forget_frames = 4;
 };
 
 /// The estimators of one trial. The calibration is copied.
