@@ -9,6 +9,7 @@ namespace touchstone {
 inline constexpr double kPi = std::numbers::pi;
 inline constexpr double kRadiansPerDegree = kPi / 180.0;
 inline constexpr double kMicrosecondsPerSecond = 1e6;
+inline constexpr double kMicrometresPerMillimetre = 1000.0;
 inline constexpr double kTonnePerMm3 = 1e-12;  // of a density of 1 kg/m^3
 
 }  // namespace touchstone

@@ -13,7 +13,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kColumns = "file,u_px,v_px,radius_px,ball_diameter_mm";
-constexpr std::size_t kColumnCount = 5;
 
 double number_in(const std::string& cell, const char* field, const SourceLocation& where) {
   const auto value = number_of<double>(cell);
@@ -30,22 +29,8 @@ double above_zero(const std::string& cell, const char* field, const SourceLocati
 }  // namespace
 
 std::vector<AnnotatedPress> read_ball_press_table(const fs::path& folder, const fs::path& csv) {
-  std::istringstream lines(read_whole_file(csv));
   std::vector<AnnotatedPress> table;
-  int number = 0;
-  for (std::string line; std::getline(lines, line);) {
-    ++number;
-    const SourceLocation where{csv.string(), number};
-    if (!line.empty() && line.back() == '\r') line.pop_back();
-    if (number == 1) {
-      if (line != kColumns) fail_at(where, "the first line is '{}'; it must be '{}'", line, kColumns);
-      continue;
-    }
-    if (line.empty()) continue;
-    const std::vector<std::string> cells = cells_of(line);
-    if (cells.size() != kColumnCount) {
-      fail_at(where, "has {} cells; {} are needed: {}", cells.size(), kColumnCount, kColumns);
-    }
+  for_each_row(csv, kColumns, [&](const SourceLocation& where, const std::vector<std::string>& cells) {
     AnnotatedPress press;
     press.where = where;
     press.file = folder / cells[0];
@@ -61,7 +46,7 @@ std::vector<AnnotatedPress> read_ball_press_table(const fs::path& folder, const 
     }
     press.ball_diameter_mm = above_zero(cells[4], "ball_diameter_mm", where);
     table.push_back(std::move(press));
-  }
+  });
   if (table.empty()) fail("{}: has no press", csv.string());
   return table;
 }

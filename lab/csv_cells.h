@@ -2,9 +2,14 @@
 // The little of CSV that recorded frames' tables need: cells without quotes, numbers without blanks.
 
 #include <charconv>
+#include <filesystem>
 #include <optional>
+#include <sstream>
 #include <string>
 #include <vector>
+
+#include "core/error.h"
+#include "core/whole_file.h"
 
 namespace touchstone::lab {
 
@@ -27,6 +32,28 @@ std::optional<T> number_of(const std::string& text) {
   const auto result = std::from_chars(text.data(), text.data() + text.size(), value);
   if (result.ec != std::errc() || result.ptr != text.data() + text.size()) return std::nullopt;
   return value;
+}
+
+/// Calls `row(where, cells)` for each line of a table after its first one, which must be `columns`; empty lines are
+/// passed over. @throws Error naming file and line if the first line or a line's number of cells is another
+template <typename Row>
+void for_each_row(const std::filesystem::path& csv, const std::string& columns, const Row& row) {
+  std::istringstream lines(read_whole_file(csv));
+  const std::size_t count = cells_of(columns).size();
+  int number = 0;
+  for (std::string line; std::getline(lines, line);) {
+    ++number;
+    const SourceLocation where{csv.string(), number};
+    if (!line.empty() && line.back() == '\r') line.pop_back();
+    if (number == 1) {
+      if (line != columns) fail_at(where, "the first line is '{}'; it must be '{}'", line, columns);
+      continue;
+    }
+    if (line.empty()) continue;
+    const std::vector<std::string> cells = cells_of(line);
+    if (cells.size() != count) fail_at(where, "has {} cells; {} are needed: {}", cells.size(), count, columns);
+    row(where, cells);
+  }
 }
 
 }  // namespace touchstone::lab

@@ -79,21 +79,9 @@ FrameSequence frames_of_folder(const fs::path& folder, double frame_rate_Hz) {
 }
 
 FrameSequence frames_of_force_table(const fs::path& folder, const fs::path& csv) {
-  std::istringstream lines(read_whole_file(csv));
   FrameSequence sequence;
   sequence.name = folder.filename().string();
-  int number = 0;
-  for (std::string line; std::getline(lines, line);) {
-    ++number;
-    const SourceLocation where{csv.string(), number};
-    if (!line.empty() && line.back() == '\r') line.pop_back();
-    if (number == 1) {
-      if (line != kForceColumns) fail_at(where, "the first line is '{}'; it must be '{}'", line, kForceColumns);
-      continue;
-    }
-    if (line.empty()) continue;
-    const std::vector<std::string> cells = cells_of(line);
-    if (cells.size() != 5) fail_at(where, "has {} cells; 5 are needed: {}", cells.size(), kForceColumns);
+  for_each_row(csv, kForceColumns, [&](const SourceLocation& where, const std::vector<std::string>& cells) {
     LabelledFrame frame;
     frame.file = folder / cells[0];
     if (!fs::is_regular_file(frame.file)) fail_at(where, "there is no file {}", frame.file.string());
@@ -114,7 +102,7 @@ FrameSequence frames_of_force_table(const fs::path& folder, const fs::path& csv)
     }
     frame.force = force;
     sequence.frames.push_back(std::move(frame));
-  }
+  });
   if (sequence.frames.empty()) fail("{}: has no frame", csv.string());
   return sequence;
 }

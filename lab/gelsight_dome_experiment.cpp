@@ -109,34 +109,10 @@ double plate_radius_by_hertz(const sim::GelSpec& gel, double force) {
 
 DomeHeights measure_dome_heights(const sim::TouchRig& rig, const CalibrationPresses& presses,
                                  sensors::LightCorrection correction, std::uint64_t seed) {
-  std::vector<cv::Mat> rest;
-  for (int i = 0; i < presses.background_frames; ++i) rest.push_back(rig.background(seed, i));
-  const sim::TouchObject small_ball = rig.object(ball_of(presses.ball_diameter_mm));
-  std::vector<sensors::BallPress> annotated;
-  for (int j = 0; j < presses.rows; ++j) {
-    for (int i = 0; i < presses.columns; ++i) {
-      const auto along = [](int k, int count) { return count > 1 ? k / (count - 1.0) - 0.5 : 0.0; };
-      const Eigen::Vector2d place(presses.extent_mm.x() * along(i, presses.columns),
-                                  presses.extent_mm.y() * along(j, presses.rows));
-      for (const double depth : presses.depths_mm) {
-        const sim::Touch touch = touch_once(rig, small_ball, {place, depth}, seed + annotated.size() + 1);
-        const TouchedPixels touched = touched_pixels(touch);
-        sensors::BallPress press;
-        press.name = fmt::format("press {}", annotated.size() + 1);
-        press.frame = touch.frame;
-        press.ball_radius_mm = 0.5 * presses.ball_diameter_mm;
-        press.circle.centre = touched.middle;
-        press.circle.radius = std::sqrt(touched.count / kPi);
-        annotated.push_back(std::move(press));
-      }
-    }
-  }
-  sensors::HeightCalibrationSettings settings;
-  settings.mm_per_px = rig.mm_per_px();
-  settings.correction = correction;
-  const sensors::HeightCalibration calibration =
-      sensors::calibrate_height(annotated, sensors::mean_background(rest), settings);
-  sensors::HeightEstimator estimator(calibration.model);
+  CalibrationPresses exact = presses;  // the dome's circles are the truth's: the finder can't be held against it
+  exact.annotation_px = 0.0;
+  exact.most_saturated = sensors::PressSampling{}.most_saturated;
+  sensors::HeightEstimator estimator(calibrate_rig(rig, exact, correction, seed).calibration.model);
   DomeHeights heights;
   constexpr std::uint64_t kTestNoise = 1'000'000;  // seeds that calibration never saw
   constexpr double kBall_mm = 4.0;

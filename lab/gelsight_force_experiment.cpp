@@ -28,7 +28,7 @@ constexpr int kLeastPatch_px = 50;
 std::vector<sim::Truth> press_truths(const sim::TouchRig& rig, const sim::TouchObject& object,
                                      const std::vector<double>& forces_N) {
   sim::MotionSpec motion;
-  motion.start_mm = {0, 0, touching_height_mm(object.spec()) + kClear_mm};
+  motion.start_mm = {0, 0, reach_below(object.spec()) + kClear_mm};
   for (const double force : forces_N) {
     sim::MotionKey key;
     key.z = sim::AxisKey{std::nullopt, force};
@@ -37,17 +37,6 @@ std::vector<sim::Truth> press_truths(const sim::TouchRig& rig, const sim::TouchO
   std::vector<sim::Truth> truths = rig.play(object, motion);
   truths.erase(truths.begin());  // the start, in the air
   return truths;
-}
-
-/// The tracker's result for one frame, if the device has markers. The gel's rest is `background`.
-std::optional<sensors::TrackedMarkers> track_from_rest(const sim::TouchRig& rig, const cv::Mat& background,
-                                                       const std::vector<cv::Mat>& frames) {
-  if (!rig.device().coating->print) return std::nullopt;
-  sensors::MarkerTracker tracker(marker_settings(rig));
-  std::int64_t t_us = 0;
-  const sensors::TrackedMarkers* last = &tracker.track({background, t_us});
-  for (const cv::Mat& frame : frames) last = &tracker.track({frame, ++t_us});
-  return *last;
 }
 
 std::vector<cv::Mat> backgrounds(const sim::TouchRig& rig, std::uint64_t seed) {
@@ -61,22 +50,6 @@ double diameter_px(const sim::TouchRig& rig) {
 }
 
 }  // namespace
-
-sim::ObjectSpec gelsight_ball(double diameter_mm, double friction) {
-  sim::ObjectSpec object = ball_of(diameter_mm);
-  object.friction = friction;
-  return object;
-}
-
-sim::ObjectSpec gelsight_flat_end(double diameter_mm, double friction) {
-  sim::ObjectSpec object = flat_cylinder_of(diameter_mm);
-  object.friction = friction;
-  return object;
-}
-
-double touching_height_mm(const sim::ObjectSpec& object) {
-  return object.shape.type == sim::ShapeKind::sphere ? object.shape.radius_mm : 0.0;
-}
 
 sensors::MarkerTrackerSettings marker_settings(const sim::TouchRig& rig) {
   const auto& print = rig.device().coating->print;
@@ -96,8 +69,8 @@ cv::Mat without_markers(const cv::Mat& frame, const sensors::TrackedMarkers* mar
 sensors::HeightModel for_marked_gel(sensors::HeightModel model, const sim::TouchRig& marked, std::uint64_t seed) {
   std::vector<cv::Mat> rest = backgrounds(marked, seed);
   for (cv::Mat& frame : rest) {
-    const auto markers = track_from_rest(marked, frame, {});
-    frame = without_markers(frame, &*markers, diameter_px(marked));
+    sensors::MarkerTracker tracker(marker_settings(marked));
+    frame = without_markers(frame, &tracker.track({frame, 0}), diameter_px(marked));
   }
   model.background = sensors::mean_background(rest);
   model.mm_per_px = marked.mm_per_px();
@@ -116,12 +89,13 @@ NormalSeries press_with_forces(const sim::TouchRig& rig, const sensors::HeightMo
   NormalSeries series;
   series.indenter = object.name;
   sensors::HeightEstimator estimator(model);
-  std::vector<cv::Mat> frames;
+  std::optional<sensors::MarkerTracker> tracker;
+  if (rig.device().coating->print) tracker.emplace(marker_settings(rig)).track({at_rest, 0});
   std::vector<double> force, estimated, truth;
   for (std::size_t i = 0; i < truths.size(); ++i) {
-    frames.push_back(touches[i].frame);
-    const auto markers = track_from_rest(rig, at_rest, frames);
-    const cv::Mat bare = without_markers(touches[i].frame, markers ? &*markers : nullptr, diameter_px(rig));
+    const cv::Mat& frame = touches[i].frame;
+    const auto t_us = static_cast<std::int64_t>(i) + 1;
+    const cv::Mat bare = without_markers(frame, tracker ? &tracker->track({frame, t_us}) : nullptr, diameter_px(rig));
     cv::Mat true_height = touches[i].height.clone();
     cv::patchNaNs(true_height, 0.0);
     NormalSample sample;
@@ -155,7 +129,7 @@ ShearTest shear_until_slip(const sim::TouchRig& rig, const sim::ObjectSpec& obje
                            int steps, std::uint64_t seed) {
   const sim::TouchObject touch_object = rig.object(object);
   sim::MotionSpec motion;
-  motion.start_mm = {-0.5 * drag_mm, 0, touching_height_mm(object) + kClear_mm};
+  motion.start_mm = {-0.5 * drag_mm, 0, reach_below(object) + kClear_mm};
   sim::MotionKey press, drag;
   press.frames = 3;
   press.z = sim::AxisKey{std::nullopt, normal_N};

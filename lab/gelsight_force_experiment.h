@@ -12,12 +12,6 @@
 
 namespace touchstone::lab {
 
-/// ball_of and flat_cylinder_of (lab/gelsight_height_experiment.h) with a friction.
-sim::ObjectSpec gelsight_ball(double diameter_mm, double friction);
-sim::ObjectSpec gelsight_flat_end(double diameter_mm, double friction);
-/// Where an object's origin is when it just touches the middle of the flat gel, mm above it.
-double touching_height_mm(const sim::ObjectSpec& object);
-
 /// What the tracker is told of a rig's markers: their size and distance in its picture, from the device's print.
 /// @throws Error for a device without a print
 sensors::MarkerTrackerSettings marker_settings(const sim::TouchRig& rig);

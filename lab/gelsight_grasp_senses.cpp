@@ -23,11 +23,6 @@ constexpr double kCalibrationFriction = 0.5;
 constexpr int kLeastPatch_px = 50;
 constexpr int kFrameOfBackground = 2000000;  // its noise is no other frame's
 
-sim::ObjectSpec with_friction(sim::ObjectSpec object) {
-  object.friction = kCalibrationFriction;
-  return object;
-}
-
 /// The estimators of one trial, and what they remember.
 class Eyes {
  public:
@@ -88,10 +83,11 @@ GraspCalibration calibrate_for_grasps(const sim::TouchRig& flat, const sim::Touc
   calibration.markers = marker_settings(marked);
   calibration.background = marked.background(seed, kFrameOfBackground);
   calibration.normal =
-      press_with_forces(marked, calibration.height, with_friction(ball_of(kForceBall_mm)), {0.1, 0.2, 0.4, 0.6}, seed)
+      press_with_forces(marked, calibration.height, with_friction(ball_of(kForceBall_mm), kCalibrationFriction),
+                        {0.1, 0.2, 0.4, 0.6}, seed)
           .estimated;
-  calibration.shear = shear_until_slip(marked, with_friction(flat_cylinder_of(kShearEnd_mm)), kShearNormal_N,
-                                       kShearDrag_mm, kShearSteps, seed)
+  calibration.shear = shear_until_slip(marked, with_friction(flat_cylinder_of(kShearEnd_mm), kCalibrationFriction),
+                                       kShearNormal_N, kShearDrag_mm, kShearSteps, seed)
                           .line;
   return calibration;
 }

@@ -19,7 +19,6 @@ namespace {
 constexpr double kEdgeRadius_mm = 0.1;
 constexpr double kCylinderHeight_mm = 6.0;
 constexpr double kClearance_mm = 0.05;  // above the gel, where presses start
-constexpr double kMicrometresPerMillimetre = 1000.0;
 
 double half_height(const sim::ShapeSpec& shape) {
   switch (shape.type) {
@@ -61,6 +60,11 @@ sim::ObjectSpec flat_cylinder_of(double diameter_mm) {
   object.shape.radius_mm = 0.5 * diameter_mm;
   object.shape.edge_radius_mm = kEdgeRadius_mm;
   object.shape.height_mm = kCylinderHeight_mm;
+  return object;
+}
+
+sim::ObjectSpec with_friction(sim::ObjectSpec object, double friction) {
+  object.friction = friction;
   return object;
 }
 

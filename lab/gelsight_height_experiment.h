@@ -24,6 +24,8 @@ sim::ObjectSpec ball_of(double diameter_mm);
 /// A cylinder's flat end, its edge rounded by 0.1 mm.
 sim::ObjectSpec flat_cylinder_of(double diameter_mm);
 
+sim::ObjectSpec with_friction(sim::ObjectSpec object, double friction);
+
 /// The frame of a press and what is true of it.
 sim::Touch touch_once(const sim::TouchRig& rig, const sim::TouchObject& object, const StraightPress& press,
                       std::uint64_t noise_seed, bool truth = true);

@@ -7,6 +7,7 @@
 
 #include "core/error.h"
 #include "lab/gelsight_force_experiment.h"
+#include "lab/gelsight_height_experiment.h"
 #include "sensors/contact_patch.h"
 #include "sensors/height_estimator.h"
 
@@ -34,7 +35,7 @@ sim::MotionSpec motion_of(const SlipCase& what, double frame_rate_Hz) {
                          ? kRoll_mm
                          : std::max(kWay_mm_per_N * what.object.friction * what.normal_N, kLeastWay_mm);
   const double from = -0.5 * way;
-  motion.start_mm = {from, 0, touching_height_mm(what.object) + kClear_mm};
+  motion.start_mm = {from, 0, reach_below(what.object) + kClear_mm};
   const auto states_for = [&](double length_mm) {
     return std::max(static_cast<int>(std::lround(length_mm / what.speed_mm_per_s * motion.frame_rate_Hz)), 1);
   };

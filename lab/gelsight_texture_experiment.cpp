@@ -130,14 +130,15 @@ sensors::HeightModel calibrate_view(const sim::TouchRig& rig, std::uint64_t nois
   constexpr int kBackgrounds = 8, kPlaces = 3;
   constexpr double kBall_mm = 2.0;  // sec. 2.2.2
   constexpr double kDepths_mm[] = {0.2, 0.3};
-  constexpr double kBetween_mm = 3.0;  // places, so that the circles stay within the view
+  // Places, so that circles and their shadows stay within the view.
+  const double between_mm = 0.28 * kTextureView_px * rig.mm_per_px();
   std::vector<cv::Mat> rest;
   for (int i = 0; i < kBackgrounds; ++i) rest.push_back(view_of(rig.background(noise_seed, i)));
   const sensors::Background background = sensors::mean_background(rest);
   const sim::TouchObject ball = rig.object(ball_of(kBall_mm));
   std::vector<sensors::BallPress> balls;
   for (int k = 0; k < kPlaces * kPlaces; ++k) {
-    const Eigen::Vector2d place = kBetween_mm * Eigen::Vector2d(k % kPlaces - 1, k / kPlaces - 1);
+    const Eigen::Vector2d place = between_mm * Eigen::Vector2d(k % kPlaces - 1, k / kPlaces - 1);
     for (const double depth : kDepths_mm) {
       sensors::BallPress press;
       press.name = fmt::format("ball press {}", balls.size() + 1);

@@ -6,6 +6,7 @@
 
 #include "core/units.h"
 #include "lab/gelsight_dome_experiment.h"
+#include "lab/seconds_since.h"
 #include "lab/validation.h"
 
 namespace touchstone::lab {
@@ -15,10 +16,6 @@ constexpr double kAllowedRadius_percent = 3.0;  // a pixel and a half in the sma
 constexpr double kAllowedCentre_mm = 0.1;
 constexpr double kTilt_deg = 6.0;
 constexpr double kPublishedResolution_um = 40.0;  // text, sec. 2.2.2: 10 to 40 um
-
-double seconds_since(std::chrono::steady_clock::time_point begun) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
-}
 
 ValidationRow row(const char* id, std::string title, const char* unit, double ours, bool holds, bool quick,
                   std::chrono::steady_clock::time_point begun) {

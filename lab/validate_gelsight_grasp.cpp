@@ -16,6 +16,7 @@
 #include "core/error.h"
 #include "lab/gelsight_grasp_experiment.h"
 #include "lab/gelsight_grasp_senses.h"
+#include "lab/seconds_since.h"
 #include "lab/validation.h"
 
 namespace touchstone::lab {
@@ -132,7 +133,7 @@ std::vector<ValidationRow> validate_gelsight_grasp(const ValidateOptions& option
     row.title = title;
     row.unit = unit;
     row.quick = options.quick;
-    row.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+    row.seconds = seconds_since(begun);
     rows.push_back(row);
     return rows.back();
   };

@@ -8,7 +8,9 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "core/units.h"
 #include "lab/gelsight_height_experiment.h"
+#include "lab/seconds_since.h"
 #include "lab/validation.h"
 
 namespace touchstone::lab {
@@ -19,14 +21,9 @@ constexpr double kPublishedResolution_um = 40.0;  // sec. 2.2.3: 10 to 40 um, "d
 constexpr double kWantedSpeedUp = 100.0;
 constexpr double kSeen = 0.1;     // of a grating's contrast: what counts as resolved
 constexpr double kVisible = 3.0;  // standard deviations of the noise
-constexpr double kMicrometresPerMillimetre = 1000.0;
 constexpr std::uint64_t kCalibrationSeed = 1000;
 constexpr std::uint64_t kTestSeed = 9000;
 constexpr double kMembrane_um = 20.0;  // the finest grating has 6 of these a period
-
-double seconds_since(std::chrono::steady_clock::time_point begun) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
-}
 
 /// What all rows share.
 struct Bench {

@@ -8,6 +8,7 @@
 
 #include "lab/gelsight_insertion_experiment.h"
 #include "lab/gelsight_map_experiment.h"
+#include "lab/seconds_since.h"
 #include "lab/validation.h"
 #include "sim/device.h"
 #include "sim/object.h"
@@ -106,7 +107,7 @@ std::vector<ValidationRow> validate_gelsight_map(const ValidateOptions& options)
   rows.back().holds = std::abs(rows.back().ours - kPublishedInsertions) < 1.0;
   rows.back().better = Better::near;
 
-  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+  const double seconds = seconds_since(begun);
   for (ValidationRow& one : rows) {
     one.quick = options.quick;
     one.seconds = seconds;

@@ -15,6 +15,7 @@
 #include "lab/gelsight_force_experiment.h"
 #include "lab/gelsight_height_experiment.h"
 #include "lab/gelsight_slip_experiment.h"
+#include "lab/seconds_since.h"
 #include "lab/validation.h"
 
 namespace touchstone::lab {
@@ -25,10 +26,6 @@ constexpr double kPublishedTracking_Hz = 30.0;    // sec. 4.3: "about 25-30"
 constexpr double kMostFalseAlarms_percent = 5.0;  // of frames; ours to choose
 constexpr double kShearDrag_mm = 0.45;            // it slides at some 0.3
 constexpr std::uint64_t kSeed = 4001;
-
-double seconds_since(std::chrono::steady_clock::time_point begun) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
-}
 
 /// The objects of fig. 4-2 and the forces on them. The text's balls lie there with their own weight; here each gets
 /// several. The small ball stops where it is pressed in by a quarter of the gel.
@@ -48,11 +45,6 @@ std::vector<Indenter> balls(int loads) {
           {ball_of(12.7), even_forces(0.4, loads)},
           {ball_of(22.25), even_forces(0.66, loads)},
           {ball_of(25.45), even_forces(0.66, loads)}};
-}
-
-sim::ObjectSpec with_friction(sim::ObjectSpec object, double friction) {
-  object.friction = friction;
-  return object;
 }
 
 SlipCase slide(const sim::ObjectSpec& object, double friction, double normal_N, double speed_mm_per_s) {
@@ -218,8 +210,8 @@ std::vector<ValidationRow> validate_gelsight_slip(const ValidateOptions& options
 
   const sim::TouchRig marked = rig_of("gelsight-markers.yaml");
   rows.begin();
-  const ShearTest shear =
-      shear_until_slip(marked, gelsight_flat_end(10.0, 0.6), 0.7, kShearDrag_mm, options.quick ? 12 : 24, kSeed + 4);
+  const ShearTest shear = shear_until_slip(marked, with_friction(flat_cylinder_of(10.0), 0.6), 0.7, kShearDrag_mm,
+                                           options.quick ? 12 : 24, kSeed + 4);
   rows.add("gelsight.shear.r2", "shear force against mean marker displacement until slip (\"highly linear\")", "1",
            Better::higher, kStronglyLinear_r2, false, shear.line.r2);
   rows.begin();

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "lab/gelsight_texture_experiment.h"
+#include "lab/seconds_since.h"
 #include "lab/validation.h"
 
 namespace touchstone::lab {
@@ -22,22 +23,6 @@ constexpr double kGrayStep_mm = 0.002;  // chosen before any sample was made: fa
 constexpr std::uint64_t kSeed = 1;
 constexpr int kSquares = 4;
 constexpr double kNormal95 = 1.96;
-
-/// The portable device (text fig. 2.3b) if there is one, else the flat fingertip with a camera of 640 x 480.
-sim::DeviceSpec portable_device(const std::filesystem::path& scenes) {
-  const std::filesystem::path file = scenes / "devices" / "gelsight-portable.yaml";
-  if (std::filesystem::exists(file)) return read_yaml<sim::DeviceSpec>(file);
-  sim::DeviceSpec device = read_yaml<sim::DeviceSpec>(scenes / "devices" / "gelsight-flat.yaml");
-  sim::CameraSpec& camera = *device.camera;
-  const double finer = static_cast<double>(camera.width) / 640.0;
-  camera.width = 640;
-  camera.height = 480;
-  camera.pixel_pitch_um *= finer;
-  camera.active_area_um2 *= finer * finer;
-  camera.full_well_e *= finer * finer;  // fewer of the imager's own pixels make one of the picture
-  camera.exposure_us *= 0.6;            // so that the flanks of a ball in the bright middle don't saturate
-  return device;
-}
 
 /// In the quick form: some of each kind, with the ones that are hard to tell apart.
 std::vector<sim::ObjectSpec> some_of(const std::vector<sim::ObjectSpec>& objects) {
@@ -79,7 +64,7 @@ std::vector<ValidationRow> validate_gelsight_texture(const ValidateOptions& opti
   how.deepest_mm = 1.0;
   how.membrane_um = 30.0;  // a pixel of the camera sees 27 um
   how.edge_side = 1;       // every pixel of a texture differs from the next
-  sim::DeviceSpec device = portable_device(options.scenes);
+  sim::DeviceSpec device = sim::read_device(options.scenes / "devices" / "gelsight-portable.yaml");
   // All samples are cut from the middle of the picture: the imager reads out no more than that.
   device.camera->width = device.camera->height = kTextureView_px;
   const sim::TouchRig rig(std::move(device), options.cache, how);
@@ -117,7 +102,7 @@ std::vector<ValidationRow> validate_gelsight_texture(const ValidateOptions& opti
     result.better = Better::higher;
     result.holds = score.percent >= row.published;
     result.quick = options.quick;
-    result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+    result.seconds = seconds_since(begun);
     rows.push_back(result);
   }
   return rows;

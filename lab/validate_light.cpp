@@ -13,6 +13,7 @@
 #include "lab/light_closed_forms.h"
 #include "lab/light_energy_cases.h"
 #include "lab/light_setup.h"
+#include "lab/seconds_since.h"
 #include "lab/validation.h"
 #include "render/imager.h"
 
@@ -336,7 +337,7 @@ std::vector<ValidationRow> validate_light(const ValidateOptions& options) {
     row.better = Better::lower;
     row.holds = row.ours <= one.bound;
     row.quick = options.quick;
-    row.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+    row.seconds = seconds_since(begun);
     rows.push_back(row);
   }
   return rows;

@@ -4,6 +4,7 @@
 #include <chrono>
 
 #include "lab/mechanics_rows.h"
+#include "lab/seconds_since.h"
 
 namespace touchstone::lab {
 
@@ -31,7 +32,7 @@ std::vector<ValidationRow> validate_mechanics(const ValidateOptions& options) {
     row.better = one.better;
     row.holds = one.better == Better::lower ? finding.ours <= one.bound : finding.ours >= one.bound;
     row.quick = options.quick;
-    row.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+    row.seconds = seconds_since(begun);
     row.series = std::move(finding.series);
     rows.push_back(std::move(row));
   }

@@ -11,6 +11,7 @@
 #include "core/whole_file.h"
 #include "lab/dataset.h"
 #include "lab/sample_source.h"
+#include "lab/seconds_since.h"
 #include "lab/validation.h"
 #include "lab/vhs_experiment.h"
 #include "sim/image_file.h"
@@ -23,10 +24,6 @@ constexpr double kPublishedTracking_fps = 719.0;  // sec. 4.2.1, one core
 constexpr double kNeededForce_Hz = 500.0;         // sec. 2.3.1
 constexpr int kSeeds = 5;                         // sec. 4.4.1: five sets of experiments
 constexpr double kStudent95OfFive = 2.776;        // t of 4 degrees of freedom
-
-double seconds_since(std::chrono::steady_clock::time_point begun) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
-}
 
 /// The job with another seed, its scene files named from the root.
 std::filesystem::path job_with_seed(const std::filesystem::path& file, std::uint64_t seed,

@@ -12,7 +12,6 @@
 namespace touchstone::sim {
 namespace {
 
-constexpr double kMicrometresPerMillimetre = 1000.0;
 constexpr double kPitch_mm = 0.04;
 constexpr double kStroke_mm = 0.28;  // of glyphs, as letters on coins are
 constexpr double kFlank_mm = 0.12;   // over which a struck edge rises

@@ -10,17 +10,6 @@ namespace {
 constexpr double kSpareReach = 0.25;    // of the widest displacement, for states that weren't looked at
 constexpr double kSpareReachMm = 0.05;  // and for what is laid onto a body
 constexpr int kPathsToMeasure = 256;    // a pixel, for a standard error of a tenth of a percent
-constexpr double kFarAway_mm = 1e4;
-
-/// The gel as nothing presses it.
-fem::PressState at_rest(fem::PressState press) {
-  press.surface_displacement.setZero();
-  press.bead_displacement.setZero();
-  std::fill(press.node_state.begin(), press.node_state.end(), fem::NodeState::open);
-  press.gel_from_object.translation.z() += kFarAway_mm;
-  for (fem::BodyState& body : press.bodies) body.gel_from_object.translation.z() += kFarAway_mm;
-  return press;
-}
 
 /// What reflects nothing needs no light: it may stand outside of the light field.
 render::Scene with_blacks(render::Scene scene) {

@@ -15,7 +15,6 @@ namespace {
 constexpr int kPointsARidge = 12;
 constexpr double kElongation = 1.25;  // of the whorl along y
 constexpr double kFade_mm = 0.8;      // over which the print runs out
-constexpr double kMicrometresPerMillimetre = 1000.0;
 
 struct Minutia {
   Eigen::Vector2d place;

@@ -7,13 +7,12 @@
 #include <utility>
 #include <vector>
 
+#include "core/units.h"
 #include "sim/image_file.h"
 #include "sim/wave_reliefs.h"
 
 namespace touchstone::sim {
 namespace {
-
-constexpr double kMicrometresPerMillimetre = 1000.0;
 
 /// The picture as shares of white, 32 bit floats.
 cv::Mat read_shares(const ImageRelief& relief) {

@@ -13,7 +13,6 @@ namespace {
 constexpr double kPointsAVein = 8.0;   // across the narrowest
 constexpr double kNarrowest_mm = 0.2;  // with the largest leaf this keeps the map below 100 MB
 constexpr double kLargest_mm = 100.0;
-constexpr double kMicrometresPerMillimetre = 1000.0;
 
 /// The section of a vein of height 1 at this distance from its middle.
 double section(double distance, double width) {

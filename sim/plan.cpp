@@ -14,9 +14,8 @@
 namespace touchstone::sim {
 namespace {
 
-constexpr double kEdgesADetail = 4.0;   // a wave needs so many for its shape
-constexpr double kPixelsAnEdge = 10.0;  // for objects without detail: 0.3 um and a degree off under a ball of 4 mm
-constexpr double kMicrometresPerMillimetre = 1000.0;
+constexpr double kEdgesADetail = 4.0;     // a wave needs so many for its shape
+constexpr double kPixelsAnEdge = 10.0;    // for objects without detail: 0.3 um and a degree off under a ball of 4 mm
 constexpr double kAllowedInertia = 0.04;  // of a vibration's force: a fifth of the lowest eigenfrequency
 
 /// Fresnel reflectance of unpolarised light that meets a face from index n1 at sine `sine` towards index n2.

@@ -4,12 +4,12 @@
 #include <cmath>
 #include <vector>
 
+#include "core/units.h"
 #include "sim/wave_reliefs.h"
 
 namespace touchstone::sim {
 namespace {
 
-constexpr double kMicrometresPerMillimetre = 1000.0;
 constexpr double kPitch_mm = 0.025;
 constexpr double kCut_mm = 0.06;             // over which a punched edge falls
 constexpr double kCorner_mm = 0.2;           // radius of a window's corners

@@ -8,12 +8,12 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/units.h"
 #include "sim/wave_reliefs.h"
 
 namespace touchstone::sim {
 namespace {
 
-constexpr double kMicrometresPerMillimetre = 1000.0;
 constexpr int kPointsAStroke = 10;
 constexpr double kSoftEdge = 1.0 / 3.0;  // of the pen's radius
 constexpr int kGlyphWidth = 4;           // of the grid that glyphs are drawn on

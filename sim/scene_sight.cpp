@@ -20,4 +20,19 @@ render::Scene SceneSight::seen(const fem::PressState& press, const std::optional
   return visible_scene(scene, plan, objects, gel, press);
 }
 
+SeenGeometry SceneSight::geometry(const fem::PressState& press, const std::optional<fem::ReliefAnswer>& relief) const {
+  if (relief && relief->grid.size() > 0) return seen_geometry(scene, plan, objects, *membrane, press, *relief);
+  return seen_geometry(scene, plan, objects, gel, press);
+}
+
+fem::PressState at_rest(fem::PressState press) {
+  constexpr double kFarAway_mm = 1e4;
+  press.surface_displacement.setZero();
+  press.bead_displacement.setZero();
+  std::fill(press.node_state.begin(), press.node_state.end(), fem::NodeState::open);
+  press.gel_from_object.translation.z() += kFarAway_mm;
+  for (fem::BodyState& body : press.bodies) body.gel_from_object.translation.z() += kFarAway_mm;
+  return press;
+}
+
 }  // namespace touchstone::sim

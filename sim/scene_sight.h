@@ -8,6 +8,7 @@
 #include "sim/membrane.h"
 #include "sim/plan.h"
 #include "sim/scene.h"
+#include "sim/seen_geometry.h"
 #include "sim/visible_gel.h"
 #include "sim/visible_scene.h"
 
@@ -19,6 +20,8 @@ struct SceneSight {
 
   /// The fine contact, where it's called for.
   std::optional<fem::ReliefAnswer> relief(const fem::PressState& press) const;
+  /// What first hits and viewers are told of; `relief` as relief() gave it.
+  SeenGeometry geometry(const fem::PressState& press, const std::optional<fem::ReliefAnswer>& relief) const;
   /// `relief` as relief() gave it.
   render::Scene seen(const fem::PressState& press, const std::optional<fem::ReliefAnswer>& relief) const;
   render::Tracer tracer(const fem::PressState& press, const std::optional<fem::ReliefAnswer>& relief) const {
@@ -32,5 +35,8 @@ struct SceneSight {
   std::unique_ptr<const Membrane> membrane;  ///< for the fine contact and height maps; null where neither is wanted
   std::vector<VisibleObject> objects;
 };
+
+/// The gel of `press` as nothing presses it.
+fem::PressState at_rest(fem::PressState press);
 
 }  // namespace touchstone::sim

@@ -14,24 +14,9 @@
 namespace touchstone::sim {
 namespace {
 
-constexpr double kFarAway_mm = 1e4;
-constexpr int kRaysAPixel[] = {1};  // of direct light: some milliseconds a frame
-constexpr int kPathsAPixel = 256;   // where a device is unfit for direct light
-
-/// The gel as nothing presses it.
-fem::PressState rest_state(const fem::Compliance& gel, int beads) {
-  const auto vertices = static_cast<Eigen::Index>(gel.vertices.size());
-  fem::PressState rest;
-  rest.gel_from_object.translation = {0, 0, kFarAway_mm};
-  rest.bodies.resize(1);
-  rest.bodies[0].gel_from_object = rest.gel_from_object;
-  rest.traction = Eigen::MatrixX3d::Zero(vertices, 3);
-  rest.surface_displacement = Eigen::MatrixX3d::Zero(vertices, 3);
-  rest.bead_displacement = Eigen::MatrixX3d::Zero(beads, 3);
-  rest.node_state.assign(gel.vertices.size(), fem::NodeState::open);
-  rest.node_owner.assign(gel.vertices.size(), -1);
-  return rest;
-}
+constexpr double kClearance_mm = 0.1;  // of the judged ball before its press
+constexpr int kRaysAPixel[] = {1};     // of direct light: some milliseconds a frame
+constexpr int kPathsAPixel = 256;      // where a device is unfit for direct light
 
 /// States that go as far as the light has to reach: pushed flat to the side and in.
 std::vector<Truth> farthest_states(const fem::PressState& rest, const TouchRigSettings& settings) {
@@ -73,21 +58,24 @@ struct TouchRig::Parts {
     if (!device.camera) fail("device {}: has no camera, so it can't be looked through", device.name);
     if (!device.coating) fail("device {}: has no coating; what shows through its gel needs whole scenes", device.name);
     gel = set_up_gel(device, cache_folder);
+    const SceneSpec any = scene_with(judged_ball(), {});
+    fit_for_direct = unfit_for_direct_light(any, make_plan(any)).empty();
     const SceneSpec scene = scene_with(judged_ball(), {});
     judged = std::make_shared<const SceneSight>(scene, make_plan(scene), *gel);
-    rest = rest_state(*gel, 0);
+    const double radius = judged_ball().shape.radius_mm;
+    const std::vector<Truth> ball =
+        play(scene_with(judged_ball(), straight_press(radius + kClearance_mm, radius - 0.5 * settings.deepest_mm)));
+    rest = at_rest(ball.front().press);
     camera = camera_of(*device.camera);
     ready = render::make_ready(camera);
     size = {render::size_of(camera).x(), render::size_of(camera).y()};
     imager = sim::imager(device, judged->plan.bands, judged->plan.sensor_noise);
     pattern = render::fixed_pattern(imager, size, settings.seed);
-    rest_seen = seen(*judged, rest, {});
+    rest_seen = judged->geometry(rest, {});
     rest_hits = render::first_hits(rest_seen.inside, ready);
     if (judged->plan.direct_light) {
       std::vector<Truth> states = farthest_states(rest, settings);
-      const double radius = judged_ball().shape.radius_mm;
-      const double half = 0.5 * settings.deepest_mm;
-      states.push_back(play(scene_with(judged_ball(), straight_press(radius + 0.1, radius - half))).back());
+      states.push_back(ball.back());
       direct = std::make_unique<const DirectLight>(*judged, camera, states, kRaysAPixel, settings.edge_side);
       choice = direct->choice();
     }
@@ -105,19 +93,11 @@ struct TouchRig::Parts {
     scene.effects.fine_relief = is_gentle(device.gel) ? Switch::on : Switch::off;
     scene.effects.motion_blur = Switch::off;
     scene.effects.rolling_shutter = Switch::off;
-    const bool fit = unfit_for_direct_light(scene, make_plan(scene)).empty();
-    scene.effects.direct_light = fit ? Switch::on : Switch::off;
+    scene.effects.direct_light = fit_for_direct ? Switch::on : Switch::off;
     return scene;
   }
 
   std::vector<Truth> play(const SceneSpec& scene) const { return play_motion(scene, make_plan(scene), *gel); }
-
-  SeenGeometry seen(const SceneSight& sight, const fem::PressState& press,
-                    const std::optional<fem::ReliefAnswer>& relief) const {
-    return relief && relief->grid.size() > 0
-               ? seen_geometry(sight.scene, sight.plan, sight.objects, *sight.membrane, press, *relief)
-               : seen_geometry(sight.scene, sight.plan, sight.objects, sight.gel, press);
-  }
 
   /// Irradiance on the sensor.
   cv::Mat light(const SceneSight& sight, const fem::PressState& press,
@@ -140,6 +120,7 @@ struct TouchRig::Parts {
 
   DeviceSpec device;
   TouchRigSettings settings;
+  bool fit_for_direct = false;
   std::shared_ptr<const fem::Compliance> gel;
   std::shared_ptr<const SceneSight> judged;  // any object's: what the device alone looks like
   fem::PressState rest;
@@ -219,7 +200,7 @@ Touch TouchRig::look(const TouchObject& object, const fem::PressState& press, st
   Touch touch;
   touch.frame = parts_->develop(parts_->light(sight, press, relief), noise_seed, frame);
   if (!truth) return touch;
-  const SeenGeometry seen = parts_->seen(sight, press, relief);
+  const SeenGeometry seen = sight.geometry(press, relief);
   const std::vector<render::FirstHit> hits = render::first_hits(seen.inside, parts_->ready);
   touch.height = cv::Mat(parts_->size, CV_32F, cv::Scalar(std::numeric_limits<float>::quiet_NaN()));
   touch.contact = cv::Mat(parts_->size, CV_8U, cv::Scalar(0));

@@ -111,10 +111,7 @@ struct VirtualCamera::Parts : SceneSight {
     Capture capture;
     if (scene.outputs.height) capture.height = membrane->height(truth.press, relief);
     if (scene.outputs.first_hits()) {
-      const SeenGeometry seen = relief && relief->grid.size() > 0
-                                    ? seen_geometry(scene, plan, objects, *membrane, truth.press, *relief)
-                                    : seen_geometry(scene, plan, objects, gel, truth.press);
-      capture.pixel_truth = pixel_truth(seen, camera, scene.outputs);
+      capture.pixel_truth = pixel_truth(SceneSight::geometry(truth.press, relief), camera, scene.outputs);
     }
     return capture;
   }

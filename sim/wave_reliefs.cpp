@@ -12,7 +12,6 @@ namespace {
 
 constexpr int kPointsAWave = 64;
 constexpr int kPointsAHair = 64;
-constexpr double kMicrometresPerMillimetre = 1000.0;
 
 template <typename Waves>
 void read_waves(YamlReader& in, Waves& waves) {

@@ -15,27 +15,6 @@
 namespace touchstone::render {
 namespace {
 
-/// A sheet of n x n squares, |x|, |y| <= half, at height(x, y); normal up.
-template <typename Height>
-TriangleMesh sheet(double half, int n, Height height) {
-  TriangleMesh mesh;
-  for (int j = 0; j <= n; ++j) {
-    for (int i = 0; i <= n; ++i) {
-      const double x = half * (2.0 * i / n - 1.0);
-      const double y = half * (2.0 * j / n - 1.0);
-      mesh.vertices.emplace_back(x, y, height(x, y));
-    }
-  }
-  for (int j = 0; j < n; ++j) {
-    for (int i = 0; i < n; ++i) {
-      const int a = j * (n + 1) + i;
-      mesh.triangles.push_back({a, a + 1, a + n + 2});
-      mesh.triangles.push_back({a, a + n + 2, a + n + 1});
-    }
-  }
-  return mesh;
-}
-
 /// A dent of 1 mm, as a ball of some 4 mm would press, with walls of 40 degrees.
 double dent(double x, double y) {
   return -0.8 * std::exp(-(x * x + y * y) / 1.2) - 0.2 * std::exp(-((x - 3) * (x - 3) + y * y) / 0.3);
@@ -62,7 +41,7 @@ Scene lit_stack(double environment) {
 
 Scene dented_scene(double environment, const Material& material) {
   Scene scene = lit_stack(environment);
-  scene.surfaces.push_back({sheet(7.0, 70, dent), material});
+  scene.surfaces.push_back({square_relief(7.0, 70, dent), material});
   return scene;
 }
 
@@ -260,7 +239,7 @@ TEST(DirectRenderer, AgreesWithThePathTracerOnSmoothSheets) {
   for (const Material& material : {Material{Lambertian{grey(0.7)}}, Material{RoughConductor{grey(0.8), 0.5}}}) {
     Scene scene = lit_stack(0.0);
     const auto ripples = [](double x, double y) { return 0.25 * (std::sin(1.5 * x) * std::cos(1.3 * y) - 1.0); };
-    scene.surfaces = {{sheet(7.0, 14, ripples), material}};
+    scene.surfaces = {{square_relief(7.0, 14, ripples), material}};
     const cv::Mat facets = Tracer(scene).render(small_camera(32, 24), samples(64)).irradiance;
     scene.surfaces[0].normals = vertex_normals(scene.surfaces[0].mesh);
     const cv::Mat smooth = Tracer(scene).render(small_camera(32, 24), samples(64)).irradiance;
@@ -377,13 +356,13 @@ TEST(DirectRenderer, BandsAreIndependent) {
 TEST(DirectRenderer, SameBytesForAnyThreadsAndHistory) {
   const Scene rest = [] {
     Scene scene = lit_stack(1.0);
-    scene.surfaces.push_back({sheet(7.0, 70, [](double, double) { return 0.0; }), Lambertian{grey(0.7)}});
+    scene.surfaces.push_back({square_relief(7.0, 70, [](double, double) { return 0.0; }), Lambertian{grey(0.7)}});
     return scene;
   }();
   Scene dented = rest;
-  dented.surfaces[0].mesh = sheet(7.0, 70, dent);
+  dented.surfaces[0].mesh = square_relief(7.0, 70, dent);
   Scene finer = rest;
-  finer.surfaces[0].mesh = sheet(7.0, 50, dent);
+  finer.surfaces[0].mesh = square_relief(7.0, 50, dent);
   const PinholeCamera camera = small_camera(50, 38);
   const auto picture = [&](int threads, bool history) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <opencv2/core.hpp>
+#include <utility>
 
 #include "render/path_tracer.h"
 
@@ -23,6 +24,30 @@ inline TriangleMesh square_sheet(double half, double z, bool up = true) {
     mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
   } else {
     mesh.triangles = {{0, 2, 1}, {0, 3, 2}};
+  }
+  return mesh;
+}
+
+/// A sheet of n x n squares, |x|, |y| <= half, at height(x, y); normal up, or down.
+template <typename Height>
+TriangleMesh square_relief(double half, int n, const Height& height, bool up = true) {
+  TriangleMesh mesh;
+  for (int j = 0; j <= n; ++j) {
+    for (int i = 0; i <= n; ++i) {
+      const double x = half * (2.0 * i / n - 1.0);
+      const double y = half * (2.0 * j / n - 1.0);
+      mesh.vertices.emplace_back(x, y, height(x, y));
+    }
+  }
+  for (int j = 0; j < n; ++j) {
+    for (int i = 0; i < n; ++i) {
+      const int a = j * (n + 1) + i;
+      mesh.triangles.push_back({a, a + 1, a + n + 2});
+      mesh.triangles.push_back({a, a + n + 2, a + n + 1});
+    }
+  }
+  if (!up) {
+    for (auto& triangle : mesh.triangles) std::swap(triangle[1], triangle[2]);
   }
   return mesh;
 }

@@ -18,31 +18,10 @@ namespace {
 constexpr double kRadius = 4.0;
 const Eigen::Vector3d kCentre(0.0, 0.0, 3.0);
 
-/// n x n squares over |x|, |y| <= half at height(x, y), outward normal down (towards the camera).
-template <typename Height>
-TriangleMesh sheet_from_below(double half, int n, const Height& height) {
-  TriangleMesh mesh;
-  for (int j = 0; j <= n; ++j) {
-    for (int i = 0; i <= n; ++i) {
-      const double x = half * (2.0 * i / n - 1.0);
-      const double y = half * (2.0 * j / n - 1.0);
-      mesh.vertices.emplace_back(x, y, height(x, y));
-    }
-  }
-  for (int j = 0; j < n; ++j) {
-    for (int i = 0; i < n; ++i) {
-      const int a = j * (n + 1) + i;
-      mesh.triangles.push_back({a, a + n + 2, a + 1});
-      mesh.triangles.push_back({a, a + n + 1, a + n + 2});
-    }
-  }
-  return mesh;
-}
-
 /// The lower cap of the sphere as a sheet of n x n squares.
 TriangleMesh cap(int n) {
-  return sheet_from_below(
-      2.7, n, [](double x, double y) { return kCentre.z() - std::sqrt(kRadius * kRadius - x * x - y * y); });
+  return square_relief(
+      2.7, n, [](double x, double y) { return kCentre.z() - std::sqrt(kRadius * kRadius - x * x - y * y); }, false);
 }
 
 std::vector<Eigen::Vector3d> normals_of_cap(const TriangleMesh& mesh) {
@@ -68,7 +47,9 @@ TEST(SmoothShading, APlaneWithNormalsIsThePlane) {
     Scene flat = lit_by({6, 2, -9});
     flat.interreflection = true;
     flat.environment = grey(0.3);
-    flat.surfaces = {{sheet_from_below(5.0, 7, [](double, double) { return 0.0; }), material}};
+    flat.surfaces = {{square_relief(
+                          5.0, 7, [](double, double) { return 0.0; }, false),
+                      material}};
     Scene smooth = flat;
     smooth.surfaces[0].normals.assign(smooth.surfaces[0].mesh.vertices.size(), {0, 0, -1});
     const cv::Mat one = Tracer(flat).render(small_camera(16, 12), samples(16)).irradiance;
@@ -131,7 +112,9 @@ TEST(SmoothShading, TheTerminatorIsTheSpheresOwn) {
 TEST(SmoothShading, NoLightComesFromBelowTheTrueSurface) {
   // Normals that lean towards a lamp which stands behind the sheet.
   Scene scene = lit_by({8, 0, 1.5});
-  scene.surfaces = {{sheet_from_below(5.0, 10, [](double, double) { return 0.0; }), Lambertian{grey(0.6)}}};
+  scene.surfaces = {{square_relief(
+                         5.0, 10, [](double, double) { return 0.0; }, false),
+                     Lambertian{grey(0.6)}}};
   scene.surfaces[0].normals.assign(scene.surfaces[0].mesh.vertices.size(), Eigen::Vector3d(0.6, 0, -0.8));
   const Tracer tracer(scene);
   for (double x = -3.9; x < 4.0; x += 0.3) EXPECT_EQ(seen_from_below(tracer, x, 0.21), 0.0) << x;
@@ -141,7 +124,8 @@ TEST(SmoothShading, MakesNoEnergy) {
   const auto bumps = [](double x, double y) { return 0.25 * std::sin(2.1 * x) * std::cos(1.7 * y); };
   for (const Material& material : {Material{Lambertian{grey(1.0)}}, Material{RoughConductor{grey(1.0), 0.5}}}) {
     Scene scene = empty_scene(1.0);
-    const TriangleMesh mesh = sheet_from_below(5.0, 20, bumps);  // coarse: facets up to 20 degrees off their neighbours
+    const TriangleMesh mesh =
+        square_relief(5.0, 20, bumps, false);  // coarse: facets up to 20 degrees off their neighbours
     scene.surfaces = {{mesh, material, std::nullopt, vertex_normals(mesh)}};
     const Tracer tracer(scene);
     RandomStream random(9, 0, Purpose::kTest);

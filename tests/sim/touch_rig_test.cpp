@@ -16,39 +16,10 @@ namespace {
 
 using ::testing::HasSubstr;
 
-/// A pad of 12 x 12 x 3 mm with a grey coating, lit from four corners in the plate, seen by a lens.
-DeviceSpec coated_device() {
-  return parse_yaml<DeviceSpec>(R"(
-name: small-coated
-gel: {size_x_mm: 12, size_y_mm: 12, thickness_mm: 3, youngs_modulus_MPa: 0.15, poisson_ratio: 0.49, refractive_index: 1.41}
-mesh: {fine_mm: 0.6, coarse_mm: 2, fine_half_extent_mm: [3, 3], fine_depth_mm: 1}
-plate: {thickness_mm: 3, refractive_index: 1.49}
-coating: {type: matt, albedo: 0.4}
-lamps:
-  - {type: led, position_mm: [-8, -7, -5.8], target_mm: [0, 0, 0], viewing_angle_deg: 60, power_W: [0.02, 0, 0]}
-  - {type: led, position_mm: [8, -7, -5.8], target_mm: [0, 0, 0], viewing_angle_deg: 60, power_W: [0, 0.02, 0]}
-  - {type: led, position_mm: [0, 11, -5.8], target_mm: [0, 0, 0], viewing_angle_deg: 60, power_W: [0, 0, 0.02]}
-camera:
-  type: lens
-  width: 80
-  height: 60
-  pixel_pitch_um: 22
-  focal_length_mm: 3
-  f_number: 4
-  focus_distance_mm: 17
-  lens_position_mm: [0, 0, -19]
-  look_at_mm: [0, 0, 0]
-  exposure_us: 60
-  full_well_e: 12000
-  read_noise_e: 8
-)",
-                                "small-coated.yaml");
-}
-
 /// Made once: the gel's set-up takes longest.
 const TouchRig& rig() {
   static const test::TemporaryFolder cache;
-  static const TouchRig one(coated_device(), cache.path());
+  static const TouchRig one(test::small_coated_device(), cache.path());
   return one;
 }
 
