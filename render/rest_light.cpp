@@ -1,9 +1,11 @@
 #include "render/rest_light.h"
 
+#include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
 #include "core/error.h"
+#include "core/units.h"
 #include "render/path_tracer.h"
 
 namespace touchstone::render {
@@ -34,6 +36,7 @@ cv::Mat measure_rest_light(DirectRenderer& renderer, const Scene& rest, const Ca
   if (settings.samples < 1 || settings.samples > 1 << 20) {
     fail("rest light: samples is {}; it must be from 1 to 1048576", settings.samples);
   }
+  if (settings.paths < 1) fail("rest light: paths is {}; it must be at least 1", settings.paths);
   if (!(settings.smooth_mm >= 0.0 && settings.smooth_mm <= 1e3)) {
     fail("rest light: smooth_mm is {}; it must be from 0 to 1000", settings.smooth_mm);
   }
@@ -52,13 +55,15 @@ cv::Mat measure_rest_light(DirectRenderer& renderer, const Scene& rest, const Ca
   cv::Mat response = renderer.render(direct).irradiance - plain;
   renderer.set_bounced_light({});
 
+  const double sigma = settings.smooth_mm * pixels_per_mm(camera, rest);
+  const double window = std::max(1.0, 4.0 * kPi * sigma * sigma);  // as many pixels a Gaussian's mean is as good as
   RenderSettings paths;
   paths.seed = settings.seed;
-  paths.min_samples = paths.max_samples = settings.samples;
+  paths.min_samples = paths.max_samples =
+      std::min(settings.samples, static_cast<int>(std::ceil(settings.paths / window)));
   paths.max_depth = settings.max_depth;
   cv::Mat added = Tracer(whole).render(camera, paths).irradiance - plain;
 
-  const double sigma = settings.smooth_mm * pixels_per_mm(camera, rest);
   if (sigma > 0.1) {
     cv::GaussianBlur(added, added, cv::Size(), sigma, sigma, cv::BORDER_REFLECT);
     cv::GaussianBlur(response, response, cv::Size(), sigma, sigma, cv::BORDER_REFLECT);

@@ -9,7 +9,8 @@
 namespace touchstone::render {
 
 struct RestLightSettings {
-  int samples = 64;        ///< paths a pixel
+  int samples = 64;        ///< paths a pixel, at most
+  int paths = 20000;       ///< that each pixel's value is the mean of, smoothing counted: more than this aren't traced
   int max_depth = 16;      ///< RenderSettings::max_depth
   double smooth_mm = 0.5;  ///< standard deviation on the surface that the result is smoothed with, 0 to 1e3
   std::uint64_t seed = 0;

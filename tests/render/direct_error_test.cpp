@@ -161,6 +161,9 @@ TEST(RestLight, RefusesFaultySettingsAndPictures) {
   settings.samples = 0;
   EXPECT_THROW(measure_rest_light(renderer, rest, camera(), settings), Error);
   settings.samples = 1;
+  settings.paths = 0;
+  EXPECT_THROW(measure_rest_light(renderer, rest, camera(), settings), Error);
+  settings.paths = 1;
   for (double bad : {-1.0, 1e4, std::numeric_limits<double>::quiet_NaN()}) {
     settings.smooth_mm = bad;
     EXPECT_THROW(measure_rest_light(renderer, rest, camera(), settings), Error);
