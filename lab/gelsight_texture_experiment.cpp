@@ -162,13 +162,13 @@ HeightsOf estimated_heights(const sim::TouchRig& rig, const sensors::HeightModel
       [model, settings] { return sensors::HeightEstimator(model, settings); });
   estimators->local();  // a faulty model shows here
   return [&rig, estimators, noise_seed](const sim::TouchObject& object, const fem::PressState& press, int number) {
-    const cv::Mat frame = view_of(rig.look(object, press, noise_seed, number, false).frame);
-    return estimators->local().estimate(frame).height_mm.clone();
+    const sim::Touch touch = rig.look(object, press, noise_seed, number);
+    return PressedHeights{estimators->local().estimate(view_of(touch.frame)).height_mm.clone(), view_of(touch.height)};
   };
 }
 
-cv::Mat press_texture(const sim::TouchRig& rig, const sim::ObjectSpec& object, const TexturePresses& presses,
-                      int texture, int image, const HeightsOf& look) {
+PressedHeights press_texture(const sim::TouchRig& rig, const sim::ObjectSpec& object, const TexturePresses& presses,
+                             int texture, int image, const HeightsOf& look) {
   const auto number = (static_cast<std::uint64_t>(texture) << 16) + static_cast<std::uint64_t>(image);
   RandomStream random(presses.seed, number, Purpose::kPlacement);
   const std::uint64_t piece = (static_cast<std::uint64_t>(random()) << 32) + random();
@@ -191,24 +191,27 @@ std::vector<cv::Mat> middle_squares(const cv::Mat& image, int side) {
   return squares;
 }
 
-std::vector<TextureSample> texture_samples(const sim::TouchRig& rig, const std::vector<sim::ObjectSpec>& objects,
-                                           const TexturePresses& presses, const HeightsOf& look,
-                                           const Progress& progress) {
+TextureSamples texture_samples(const sim::TouchRig& rig, const std::vector<sim::ObjectSpec>& objects,
+                               const TexturePresses& presses, const HeightsOf& look, const Progress& progress) {
   constexpr int kSide = 200;
   const int images = static_cast<int>(objects.size()) * presses.images;
-  std::vector<std::vector<cv::Mat>> squares(images);
+  std::vector<std::vector<cv::Mat>> estimated(images), membrane(images);
   std::atomic<int> done = 0;
   tbb::parallel_for(0, images, [&](int k) {
     const int texture = k / presses.images;
-    const cv::Mat heights = press_texture(rig, objects[texture], presses, texture, k % presses.images, look);
-    squares[k] = middle_squares(heights, kSide);
+    const PressedHeights heights = press_texture(rig, objects[texture], presses, texture, k % presses.images, look);
+    estimated[k] = middle_squares(heights.estimated, kSide);
+    membrane[k] = middle_squares(heights.membrane, kSide);
     if (progress) progress("pressing textures", ++done, images);
   });
-  std::vector<TextureSample> samples;
-  for (int k = 0; k < images; ++k) {
-    for (const cv::Mat& square : squares[k]) samples.push_back({k / presses.images, k % presses.images, square});
-  }
-  return samples;
+  const auto listed = [&](const std::vector<std::vector<cv::Mat>>& squares) {
+    std::vector<TextureSample> samples;
+    for (int k = 0; k < images; ++k) {
+      for (const cv::Mat& square : squares[k]) samples.push_back({k / presses.images, k % presses.images, square});
+    }
+    return samples;
+  };
+  return {listed(estimated), listed(membrane)};
 }
 
 TextureScore score_textures(const std::vector<TextureSample>& samples, const sensors::TextureOperator& op,

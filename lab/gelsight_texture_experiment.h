@@ -33,9 +33,14 @@ struct TexturePresses {
   std::uint64_t seed = 1;
 };
 
-/// The height image (CV_32FC1, mm) of a pressed object, at least the view; `number` is the press's own. Called from
-/// many threads, a pure function.
-using HeightsOf = std::function<cv::Mat(const sim::TouchObject&, const fem::PressState&, int number)>;
+/// The height images (CV_32FC1, mm) of one press: what the sensor makes of it, and the membrane as it is.
+struct PressedHeights {
+  cv::Mat estimated, membrane;
+};
+
+/// The height images of a pressed object, at least the view; `number` is the press's own. Called from many threads, a
+/// pure function.
+using HeightsOf = std::function<PressedHeights(const sim::TouchObject&, const fem::PressState&, int number)>;
 
 /// Pixels a side of the middle of the picture that samples are cut from: four squares of 200 px.
 inline constexpr int kTextureView_px = 400;
@@ -48,10 +53,10 @@ sensors::HeightModel calibrate_view(const sim::TouchRig& rig, std::uint64_t nois
 /// outlive it. @throws Error if the model can't be used
 HeightsOf estimated_heights(const sim::TouchRig& rig, const sensors::HeightModel& model, std::uint64_t noise_seed);
 
-/// The height image of press number `image` on class number `texture`: a new piece of the surface, at a random angle,
+/// The height images of press number `image` on class number `texture`: a new piece of the surface, at a random angle,
 /// place and force, all chosen by (seed, texture, image).
-cv::Mat press_texture(const sim::TouchRig& rig, const sim::ObjectSpec& object, const TexturePresses& presses,
-                      int texture, int image, const HeightsOf& look);
+PressedHeights press_texture(const sim::TouchRig& rig, const sim::ObjectSpec& object, const TexturePresses& presses,
+                             int texture, int image, const HeightsOf& look);
 
 /// Four squares of `side` px about the image's middle, which don't overlap. @throws Error for a smaller image
 std::vector<cv::Mat> middle_squares(const cv::Mat& image, int side);
@@ -63,10 +68,14 @@ struct TextureSample {
   cv::Mat heights;  ///< CV_32FC1, mm
 };
 
+/// The same squares twice, so that what the estimator of heights loses can be told from what surfaces have in common.
+struct TextureSamples {
+  std::vector<TextureSample> estimated, membrane;
+};
+
 /// All samples of `objects`, by class, then image, then square; presses run in parallel.
-std::vector<TextureSample> texture_samples(const sim::TouchRig& rig, const std::vector<sim::ObjectSpec>& objects,
-                                           const TexturePresses& presses, const HeightsOf& look,
-                                           const Progress& progress = {});
+TextureSamples texture_samples(const sim::TouchRig& rig, const std::vector<sim::ObjectSpec>& objects,
+                               const TexturePresses& presses, const HeightsOf& look, const Progress& progress = {});
 
 /// How samples are divided into those that train and those that test.
 enum class TextureSplit {
