@@ -7,6 +7,7 @@ std::vector<ValidationRow> validate_mechanics(const ValidateOptions& options);
 std::vector<ValidationRow> validate_vibration(const ValidateOptions& options);
 std::vector<ValidationRow> validate_light(const ValidateOptions& options);
 std::vector<ValidationRow> validate_vhs(const ValidateOptions& options);
+std::vector<ValidationRow> validate_gelsight_light(const ValidateOptions& options);
 std::vector<ValidationRow> validate_gelsight_height(const ValidateOptions& options);
 std::vector<ValidationRow> validate_gelsight_dome(const ValidateOptions& options);
 std::vector<ValidationRow> validate_gelsight_map(const ValidateOptions& options);
@@ -20,6 +21,7 @@ const std::vector<ValidationGroup>& validation_groups() {
       {"vibration", validate_vibration},
       {"light", validate_light},
       {"vhs", validate_vhs},
+      {"gelsight.light", validate_gelsight_light},
       {"gelsight.height", validate_gelsight_height},
       {"gelsight.dome", validate_gelsight_dome},
       {"gelsight.map", validate_gelsight_map},
