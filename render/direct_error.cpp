@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "render/direct_fitness.h"
 #include "render/path_tracer.h"
 #include "render/sample_sequence.h"
 

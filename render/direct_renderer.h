@@ -74,8 +74,4 @@ class DirectRenderer {
   std::unique_ptr<Parts> parts_;
 };
 
-/// The reason why DirectRenderer would refuse this scene, empty if it wouldn't. For a plan that looks for the cheapest
-/// renderer; that interreflection may be left out is for the plan to show.
-std::string unfit_for_direct(const LightField& field, const Scene& scene);
-
 }  // namespace touchstone::render

@@ -7,6 +7,7 @@
 
 #include "core/error.h"
 #include "core/units.h"
+#include "render/direct_fitness.h"
 #include "render/direct_renderer.h"
 #include "render/ray_scene.h"
 #include "render/shadow_reach.h"
