@@ -58,6 +58,29 @@ struct Sums {
   }
 };
 
+/// The lamps at a place: a plane through those of the samples around it.
+Eigen::Matrix3d lamps_near(const Eigen::Vector2d& place, const std::vector<Sums>& bins, const Sums& all,
+                           const LampFit& how, int width) {
+  double nearest = INFINITY;
+  for (const Sums& bin : bins) nearest = std::min(nearest, (bin.place - place).squaredNorm());
+  const double reach_px = how.reach * width;
+  // Unknowns: the lamps here, and how they change along u and v in a reach.
+  Eigen::Matrix<double, 9, 9> normal = Eigen::Matrix<double, 9, 9>::Zero();
+  Eigen::Matrix<double, 9, 3> right = Eigen::Matrix<double, 9, 3>::Zero();
+  for (int i = 0; i < 3; ++i) normal.block<3, 3>(3 * i, 3 * i) = how.prior * all.normal;
+  right.topRows<3>() = how.prior * all.right;
+  for (const Sums& bin : bins) {
+    const Eigen::Vector2d offset = (bin.place - place) / reach_px;
+    const double weight = std::exp(-0.5 * (offset.squaredNorm() - nearest / (reach_px * reach_px)));
+    const Eigen::Vector3d along(1.0, offset.x(), offset.y());
+    for (int i = 0; i < 3; ++i) {
+      right.middleRows<3>(3 * i) += weight * along[i] * bin.right;
+      for (int j = 0; j < 3; ++j) normal.block<3, 3>(3 * i, 3 * j) += weight * along[i] * along[j] * bin.normal;
+    }
+  }
+  return normal.ldlt().solve(right).topRows<3>().transpose();
+}
+
 }  // namespace
 
 const char* name_of(LightCorrection correction) {
@@ -113,25 +136,23 @@ LampModel fit_lamps(std::span<const ColourSample> samples, const cv::Size& size,
   std::erase_if(bins, [](const Sums& bin) { return bin.count <= 0.0; });
   for (Sums& bin : bins) bin.place /= bin.count;
 
+  Eigen::Vector2d low = bins.front().place;
+  Eigen::Vector2d high = low;
+  for (const Sums& bin : bins) {
+    low = low.cwiseMin(bin.place);
+    high = high.cwiseMax(bin.place);
+  }
+  const Eigen::LDLT<Eigen::Matrix3d> factor(all.normal);
+  if (factor.info() != Eigen::Success || !(factor.vectorD().minCoeff() > 1e-9 * all.normal.trace())) {
+    fail("the presses' slopes don't determine the lamps: they have to point all ways");
+  }
+  const Eigen::Matrix3d mean = factor.solve(all.right).transpose();
   LampModel model{size.width, size.height, how.columns, how.rows, {}};
   for (int row = 0; row < how.rows; ++row) {
     for (int column = 0; column < how.columns; ++column) {
       const Eigen::Vector2d node((column + 0.5) * size.width / how.columns, (row + 0.5) * size.height / how.rows);
-      double nearest = INFINITY;
-      for (const Sums& bin : bins) nearest = std::min(nearest, (bin.place - node).squaredNorm());
-      const double reach_px = how.reach * size.width;
       const bool even = how.columns == 1 && how.rows == 1;
-      Sums here;
-      here.add(all, how.prior);
-      for (const Sums& bin : bins) {
-        const double beyond = (bin.place - node).squaredNorm() - nearest;
-        here.add(bin, even ? 1.0 : std::exp(-0.5 * beyond / (reach_px * reach_px)));
-      }
-      const Eigen::LDLT<Eigen::Matrix3d> factor(here.normal);
-      if (factor.info() != Eigen::Success || !(factor.vectorD().minCoeff() > 1e-9 * here.normal.trace())) {
-        fail("the presses' slopes don't determine the lamps: they have to point all ways");
-      }
-      model.nodes.push_back(factor.solve(here.right).transpose());
+      model.nodes.push_back(even ? mean : lamps_near(node.cwiseMax(low).cwiseMin(high), bins, all, how, size.width));
     }
   }
   return model;

@@ -137,24 +137,31 @@ TEST(HeightCalibration, OnePressMakesAModel) {
   settings.mm_per_px = kScale;
   settings.table.most_cells = kCells;
   const HeightCalibration calibration = calibrate_height(presses, painter.background(1), settings);
-  EXPECT_EQ(calibration.model.lamps.order, 0);
   HeightEstimator estimator(calibration.model);
   const MapError error = error_of(estimator.estimate(painter.paint(other_ball)).height_mm, painter.heights(other_ball));
   EXPECT_LT(error.mean_um, 10.0);
 }
 
-TEST(HeightCalibration, PressesInOnePlaceDontDetermineTheField) {
+TEST(HeightCalibration, PressesInOnePlaceGiveTheirLampsToTheWholePicture) {
   test::GelPainter painter(kWidth, kHeight, kScale, {});
   std::vector<BallPress> presses;
-  for (int i = 0; i < 7; ++i) presses.push_back(painter.press({{6.0, 5.0}, 1.0, 0.75}));
+  for (int i = 0; i < 4; ++i) presses.push_back(painter.press({{6.0, 5.0}, 1.0, 0.75}));
   HeightCalibrationSettings settings;
   settings.mm_per_px = kScale;
   settings.table.most_cells = kCells;
-  settings.lamp_order = 2;
-  EXPECT_THAT([&] { calibrate_height(presses, painter.background(), settings); },
-              ThrowsMessage<Error>(HasSubstr("press in more places")));
-  settings.lamp_order.reset();
-  EXPECT_LT(calibrate_height(presses, painter.background(), settings).model.lamps.order, 2);
+  const LampModel lamps = calibrate_height(presses, painter.background(), settings).model.lamps;
+  for (const Eigen::Matrix3d& node : lamps.nodes) {
+    EXPECT_LT((node - lamps.nodes.front()).norm(), 0.01 * node.norm());
+  }
+}
+
+TEST(HeightEstimator, LightThatHardlyReachesASideIsBoundedNotRefused) {
+  test::GelPainter painter(kWidth, kHeight, kScale, {.fall_off = 0.9, .bend_deg = 20.0, .level = 0.7});
+  for (const LightCorrection correction : {LightCorrection::background, LightCorrection::fitted}) {
+    HeightEstimator estimator(calibrated(painter, correction).model);
+    const HeightResult& result = estimator.estimate(painter.paint(other_ball));
+    EXPECT_TRUE(cv::checkRange(result.height_mm, true, nullptr, -1.0, 3.0));
+  }
 }
 
 TEST(HeightCalibration, BadFiguresAreRefused) {
