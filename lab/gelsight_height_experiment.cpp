@@ -113,6 +113,7 @@ CalibratedRig calibrate_rig(const sim::TouchRig& rig, const CalibrationPresses& 
   std::vector<sensors::BallPress> presses;
   CalibratedRig result;
   double squares = 0.0;
+  int small_ones = 0;
   for (const Eigen::Vector2d& place : places_of(how)) {
     for (const BallPressed& way : ways) {
       const sim::Touch touch = touch_once(rig, way.ball, {place, way.depth_mm}, noise_seed + presses.size() + 1);
@@ -129,8 +130,10 @@ CalibratedRig calibrate_rig(const sim::TouchRig& rig, const CalibrationPresses& 
       try {
         const sensors::ContactCircle found =
             sensors::find_contact_circle(press.frame, background, press.ball_radius_mm, mm_per_px, press.name);
-        squares += (found.centre - centre).squaredNorm();
         ++result.found_circles;
+        if (&way == &ways.back() && how.wide_ball_depth_mm > 0.0) continue;
+        squares += (found.centre - centre).squaredNorm();
+        ++small_ones;
       } catch (const Error&) {
         // Counted as not found.
       }
@@ -142,7 +145,7 @@ CalibratedRig calibrate_rig(const sim::TouchRig& rig, const CalibrationPresses& 
   settings.correction = correction;
   settings.sampling.most_saturated = how.most_saturated;
   result.calibration = sensors::calibrate_height(presses, background, settings);
-  result.circle_error_px = result.found_circles > 0 ? std::sqrt(squares / result.found_circles) : 0.0;
+  result.circle_error_px = small_ones > 0 ? std::sqrt(squares / small_ones) : 0.0;
   return result;
 }
 

@@ -47,9 +47,9 @@ struct CalibrationPresses {
 };
 struct CalibratedRig {
   sensors::HeightCalibration calibration;
-  double circle_error_px = 0.0;  ///< RMS distance from the contact's centre to that found by find_contact_circle
-  int found_circles = 0;         ///< of the presses
   int presses = 0;
+  int found_circles = 0;         ///< by find_contact_circle
+  double circle_error_px = 0.0;  ///< of the small ball's: RMS distance from the contact's centre
 };
 /// `correction`: absent, the one that errs least on presses that are left out (HeightCalibrationSettings).
 /// @throws Error as sensors::calibrate_height
