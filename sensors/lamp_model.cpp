@@ -110,7 +110,10 @@ Eigen::Matrix3d LampModel::at(const Eigen::Vector2d& place) const {
 }
 
 LampModel fit_lamps(std::span<const ColourSample> samples, const cv::Size& size, const LampFit& how) {
-  TS_ASSERT(how.columns > 0 && how.rows > 0 && how.reach > 0.0 && how.prior > 0.0);
+  if (how.columns < 1 || how.rows < 1 || !(how.reach > 0.0) || !(how.prior > 0.0)) {
+    fail("lamps at {} x {} nodes, reach {}, prior {}: all must be above 0", how.columns, how.rows, how.reach,
+         how.prior);
+  }
   const double bin_px = static_cast<double>(size.width) / kBins;
   const int bins_down = static_cast<int>(size.height / bin_px) + 1;
   std::vector<Sums> bins(static_cast<std::size_t>(kBins * bins_down));

@@ -38,6 +38,7 @@ struct LampModel {
   Eigen::Matrix3d at(const Eigen::Vector2d& place) const;
 };
 
+/// How fit_lamps does it.
 struct LampFit {
   int columns = 8;
   int rows = 6;
@@ -47,13 +48,14 @@ struct LampFit {
   double prior = 0.01;    ///< as which share of all samples, all over the picture, the mean lamps count at a node
   double steepest = 0.6;  ///< slopes up to which every lamp is taken to stand above the membrane's horizon
 };
-/// The same lamps everywhere.
+/// The same lamps everywhere: a single node, for which all samples count alike.
 inline constexpr LampFit kEvenLamps{1, 1};
 
-/// Least squares fit at each node to all samples with slopes up to `how.steepest`. The weight of a sample falls off
-/// with its distance from the node, less that of the nearest sample: no node is without samples, and beyond the
-/// outermost presses their own lamps hold, for nothing is extrapolated.
-/// @throws Error if there are too few samples or their slopes all have one direction
+/// Least squares fit at each node to the samples with slopes up to `how.steepest`: lamps that change linearly over the
+/// samples near the node. The weight of a sample falls off with its distance, less that of the nearest sample, so that
+/// no node is without samples; nodes outside of the rectangle that holds all samples take the lamps of its nearest
+/// point, so that nothing is extrapolated.
+/// @throws Error if there are too few samples, their slopes all have one direction, or `how` has a figure not above 0
 LampModel fit_lamps(std::span<const ColourSample> samples, const cv::Size& size, const LampFit& how);
 
 /// The slope, at most `limit` long, whose shading comes nearest to `colour` under the lamps `a`: photometric stereo

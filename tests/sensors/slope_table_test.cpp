@@ -114,6 +114,7 @@ TEST(LampModel, TooFewOrOneSidedSamplesAreRefused) {
   auto samples = shaded_samples(20, 0.5, 0.0, even_lamps());
   EXPECT_THROW(fit_lamps(samples, {320, 240}, {}), Error);
   samples = shaded_samples(4000, 0.5, 0.0, even_lamps());
+  EXPECT_THROW(fit_lamps(samples, {320, 240}, {.reach = 0.0}), Error);
   for (ColourSample& sample : samples) sample.slope.y() = 0.0F;
   EXPECT_THROW(fit_lamps(samples, {320, 240}, {}), Error);
 }
