@@ -19,7 +19,6 @@ struct CalibrateOptions {
   std::vector<fs::path> background;
   double mm_per_px = 0.0;
   std::string correction = "best";
-  int order = -1;
   fs::path out;
 };
 
@@ -48,7 +47,6 @@ void calibrate(const CalibrateOptions& options) {
   sensors::HeightCalibrationSettings settings;
   settings.mm_per_px = options.mm_per_px;
   if (options.correction != "best") settings.correction = correction_named(options.correction);
-  if (options.order >= 0) settings.lamp_order = options.order;
   settings.cross_validate = true;
   const sensors::HeightCalibration result = sensors::calibrate_height(presses, background, settings);
   sensors::save(result.model, options.out);
@@ -61,10 +59,12 @@ void calibrate(const CalibrateOptions& options) {
   }
   fmt::print("{}: {} presses, {} pixels; slopes of these are off by {:.4f} (RMS)\n", options.out.string(),
              presses.size(), result.pixels, result.rms_slope_error);
-  fmt::print(
-      "  light over the picture: polynomial of order {}; table: {} of {} cells hit, step {:.2f}, slopes to {:.2f}\n",
-      result.model.lamps.order, result.coverage.cells_hit, result.coverage.cells, result.model.table.step,
-      result.coverage.steepest_slope);
+  fmt::print("  table: {} of {} cells hit, step {:.2f}, slopes to {:.2f}\n", result.coverage.cells_hit,
+             result.coverage.cells, result.model.table.step, result.coverage.steepest_slope);
+  if (result.bounded_share > 0.0) {
+    fmt::print("  {:.1f} % of the picture is too dark or too one-sidedly lit to be corrected in full\n",
+               100.0 * result.bounded_share);
+  }
   for (const sensors::SlopeError& error : result.left_out) {
     fmt::print("  correction '{}': slopes of a press that was left out are off by {:.4f} (RMS)\n",
                sensors::name_of(error.correction), error.rms);
@@ -94,8 +94,6 @@ void add_gelsight_calibration(CLI::App& calibrations, const GlobalOptions&, Acti
           "on presses that were left out")
       ->check(CLI::IsMember({"best", "none", "background", "fitted"}))
       ->capture_default_str();
-  command->add_option("--order", options->order, "Of the light's polynomial over the picture (default: by the presses)")
-      ->check(CLI::Range(0, 2));
   command->add_option("-o,--out", options->out, "The model's file")->required();
   command->callback([&action, options] { action = [options] { calibrate(*options); }; });
 }

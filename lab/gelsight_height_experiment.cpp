@@ -40,6 +40,24 @@ double half_height(const sim::ShapeSpec& shape) {
   fail("the object's lowest point isn't known for a shape from a file");
 }
 
+/// One of the ways in which the gel is pressed at each place.
+struct BallPressed {
+  sim::TouchObject ball;
+  double radius_mm = 0.0;
+  double depth_mm = 0.0;
+};
+
+std::vector<Eigen::Vector2d> places_of(const CalibrationPresses& how) {
+  const auto along = [](int k, int count) { return count > 1 ? k / (count - 1.0) - 0.5 : 0.0; };
+  std::vector<Eigen::Vector2d> places;
+  for (int j = 0; j < how.rows; ++j) {
+    for (int i = 0; i < how.columns; ++i) {
+      places.emplace_back(how.extent_mm.x() * along(i, how.columns), how.extent_mm.y() * along(j, how.rows));
+    }
+  }
+  return places;
+}
+
 }  // namespace
 
 double reach_below(const sim::ObjectSpec& object) {
@@ -85,44 +103,49 @@ CalibratedRig calibrate_rig(const sim::TouchRig& rig, const CalibrationPresses& 
   for (int i = 0; i < how.background_frames; ++i) rest.push_back(rig.background(noise_seed, i));
   const sensors::Background background = sensors::mean_background(rest);
   const double mm_per_px = rig.mm_per_px();
-  const sim::TouchObject ball = rig.object(ball_of(how.ball_diameter_mm));
+  std::vector<BallPressed> ways;
+  const auto add_way = [&](double diameter_mm, double depth_mm) {
+    ways.push_back({rig.object(ball_of(diameter_mm)), 0.5 * diameter_mm, depth_mm});
+  };
+  for (const double depth : how.depths_mm) add_way(how.ball_diameter_mm, depth);
+  if (how.wide_ball_depth_mm > 0.0) add_way(how.wide_ball_diameter_mm, how.wide_ball_depth_mm);
   RandomStream hand(noise_seed, 0, Purpose::kPlacement);
   std::vector<sensors::BallPress> presses;
   CalibratedRig result;
   double squares = 0.0;
-  for (int j = 0; j < how.rows; ++j) {
-    for (int i = 0; i < how.columns; ++i) {
-      const auto along = [](int k, int count) { return count > 1 ? k / (count - 1.0) - 0.5 : 0.0; };
-      const Eigen::Vector2d place(how.extent_mm.x() * along(i, how.columns), how.extent_mm.y() * along(j, how.rows));
-      for (const double depth : how.depths_mm) {
-        const sim::Touch touch = touch_once(rig, ball, {place, depth}, noise_seed + presses.size() + 1);
-        const cv::Moments contact = cv::moments(touch.contact, true);
-        if (contact.m00 < 1.0) fail("calibration: the ball at ({}, {}) mm isn't seen", place.x(), place.y());
-        const Eigen::Vector2d centre(contact.m10 / contact.m00 + 0.5, contact.m01 / contact.m00 + 0.5);
-        sensors::BallPress press;
-        press.name = fmt::format("press {}", presses.size() + 1);
-        press.frame = touch.frame;
-        press.ball_radius_mm = 0.5 * how.ball_diameter_mm;
-        press.circle.centre = centre + how.annotation_px * Eigen::Vector2d(hand.normal(), hand.normal());
-        press.circle.radius = std::sqrt(contact.m00 / kPi) + how.annotation_px * hand.normal();
-        presses.push_back(press);
-        try {
-          const sensors::ContactCircle found =
-              sensors::find_contact_circle(press.frame, background, press.ball_radius_mm, mm_per_px, press.name);
-          squares += (found.centre - centre).squaredNorm();
-          ++result.found_circles;
-        } catch (const Error&) {
-          // Counted as not found.
-        }
+  int small_ones = 0;
+  for (const Eigen::Vector2d& place : places_of(how)) {
+    for (const BallPressed& way : ways) {
+      const sim::Touch touch = touch_once(rig, way.ball, {place, way.depth_mm}, noise_seed + presses.size() + 1);
+      const cv::Moments contact = cv::moments(touch.contact, true);
+      if (contact.m00 < 1.0) fail("calibration: the ball at ({}, {}) mm isn't seen", place.x(), place.y());
+      const Eigen::Vector2d centre(contact.m10 / contact.m00 + 0.5, contact.m01 / contact.m00 + 0.5);
+      sensors::BallPress press;
+      press.name = fmt::format("press {}", presses.size() + 1);
+      press.frame = touch.frame;
+      press.ball_radius_mm = way.radius_mm;
+      press.circle.centre = centre + how.annotation_px * Eigen::Vector2d(hand.normal(), hand.normal());
+      press.circle.radius = std::sqrt(contact.m00 / kPi) + how.annotation_px * hand.normal();
+      presses.push_back(press);
+      try {
+        const sensors::ContactCircle found =
+            sensors::find_contact_circle(press.frame, background, press.ball_radius_mm, mm_per_px, press.name);
+        ++result.found_circles;
+        if (&way == &ways.back() && how.wide_ball_depth_mm > 0.0) continue;
+        squares += (found.centre - centre).squaredNorm();
+        ++small_ones;
+      } catch (const Error&) {
+        // Counted as not found.
       }
     }
   }
+  result.presses = static_cast<int>(presses.size());
   sensors::HeightCalibrationSettings settings;
   settings.mm_per_px = mm_per_px;
   settings.correction = correction;
   settings.sampling.most_saturated = how.most_saturated;
   result.calibration = sensors::calibrate_height(presses, background, settings);
-  result.circle_error_px = result.found_circles > 0 ? std::sqrt(squares / result.found_circles) : 0.0;
+  result.circle_error_px = small_ones > 0 ? std::sqrt(squares / small_ones) : 0.0;
   return result;
 }
 

@@ -31,21 +31,25 @@ sim::Touch touch_once(const sim::TouchRig& rig, const sim::TouchObject& object, 
                       std::uint64_t noise_seed, bool truth = true);
 
 /// How a user calibrates: some frames of the untouched gel, and a ball pressed in at a grid of places, each to every
-/// depth. Circles are annotated by hand: the contact's outline as it is, with errors of `annotation_px`.
+/// depth, and a wider one, which shows gentle slopes on more pixels than the small one's middle has. Circles are
+/// annotated by hand: the contact's outline as it is, with errors of `annotation_px`.
 struct CalibrationPresses {
   double ball_diameter_mm = 2.0;  ///< source text 004, sec. 2.2.2
   int columns = 4;
   int rows = 3;
   Eigen::Vector2d extent_mm = {11.0, 7.6};  ///< between the outermost places
   std::vector<double> depths_mm = {0.35, 0.6};
+  double wide_ball_diameter_mm = 10.0;  ///< sec. 2.2.2: "for a larger semisphere" the table is to be adjusted
+  double wide_ball_depth_mm = 0.3;      ///< 0: without the wide ball
   int background_frames = 8;
   double annotation_px = 0.3;   ///< standard deviation of each coordinate and of the radius
   double most_saturated = 0.5;  ///< of a press's pixels
 };
 struct CalibratedRig {
   sensors::HeightCalibration calibration;
-  double circle_error_px = 0.0;  ///< RMS distance from the contact's centre to that found by find_contact_circle
-  int found_circles = 0;         ///< of the presses
+  int presses = 0;
+  int found_circles = 0;         ///< by find_contact_circle
+  double circle_error_px = 0.0;  ///< of the small ball's: RMS distance from the contact's centre
 };
 /// `correction`: absent, the one that errs least on presses that are left out (HeightCalibrationSettings).
 /// @throws Error as sensors::calibrate_height

@@ -43,7 +43,7 @@ std::vector<ColourSample> samples_of(const BallPress& press, const Background& b
 
 /// Looks for the one ball that a frame shows: the region that is brighter than the background, its outline's circle;
 /// the centre is then moved to where matt shading of the ball explains the colours best, and the radius put where
-/// circles are brightest, which is the rim of contact (it comes out up to 1.5 px small).
+/// circles are brightest, just inside of the rim of contact (it comes out 1 to 2 px small, which costs pixels only).
 /// @throws Error naming `name` if there's nothing, more than one contact, or a contact that touches the picture's edge
 ContactCircle find_contact_circle(const cv::Mat& frame, const Background& background, double ball_radius_mm,
                                   double mm_per_px, const std::string& name);

@@ -8,8 +8,7 @@
 namespace touchstone::sensors {
 namespace {
 
-constexpr int kPressesForOrder1 = 3;
-constexpr int kPressesForOrder2 = 6;
+constexpr int kPressesToCompare = 3;
 constexpr std::size_t kCellsToCompare = 1U << 17U;  // coarser tables serve to compare corrections
 
 using Samples = std::vector<ColourSample>;
@@ -27,27 +26,14 @@ struct FittedLight {
   ColourCorrection correction;
 };
 
-FittedLight fit_light(const Samples& samples, std::size_t presses, const Background& background,
-                      const HeightCalibrationSettings& settings, LightCorrection kind) {
+FittedLight fit_light(const Samples& samples, const Background& background, const HeightCalibrationSettings& settings,
+                      LightCorrection kind) {
   const ColourCorrection by_background = ColourCorrection::by_background(background.mean);
-  const Samples scaled = corrected_samples(samples, by_background);
-  const auto fit = [&](int order) {
-    FittedLight light;
-    light.lamps = fit_lamps(scaled, background.mean.size(), order, settings.lamp_steepest);
-    if (kind == LightCorrection::background) light.correction = by_background;
-    if (kind == LightCorrection::fitted) light.correction = ColourCorrection::by_lamps(background.mean, light.lamps);
-    return light;
-  };
-  if (settings.lamp_order) return fit(*settings.lamp_order);
-  int order = presses >= kPressesForOrder2 ? 2 : presses >= kPressesForOrder1 ? 1 : 0;
-  for (; order > 0; --order) {
-    try {
-      return fit(order);
-    } catch (const Error&) {
-      // The presses lie in too few places for this order.
-    }
-  }
-  return fit(0);
+  FittedLight light;
+  light.lamps = fit_lamps(corrected_samples(samples, by_background), background.mean.size(), settings.lamps);
+  if (kind == LightCorrection::background) light.correction = by_background;
+  if (kind == LightCorrection::fitted) light.correction = ColourCorrection::by_lamps(background.mean, light.lamps);
+  return light;
 }
 
 /// The samples as they would have been seen in the middle, and the table made of them.
@@ -57,14 +43,16 @@ struct Learnt {
   SlopeTable table;
 };
 
-Learnt learn(const Samples& samples, std::size_t presses, const Background& background,
-             const HeightCalibrationSettings& settings, LightCorrection kind) {
+Learnt learn(const Samples& samples, const Background& background, const HeightCalibrationSettings& settings,
+             LightCorrection kind) {
   Learnt learnt;
-  learnt.light = fit_light(samples, presses, background, settings, kind);
+  learnt.light = fit_light(samples, background, settings, kind);
   learnt.corrected = corrected_samples(samples, learnt.light.correction);
   // The table's own lamps: of the corrected colours, which are the same everywhere.
-  const LampModel middle = fit_lamps(learnt.corrected, background.mean.size(), 0, settings.lamp_steepest);
-  learnt.table = build_slope_table(learnt.corrected, middle.terms.front(), settings.table);
+  LampFit even = kEvenLamps;
+  even.steepest = settings.lamps.steepest;
+  const LampModel middle = fit_lamps(learnt.corrected, background.mean.size(), even);
+  learnt.table = build_slope_table(learnt.corrected, middle.nodes.front(), settings.table);
   return learnt;
 }
 
@@ -86,7 +74,7 @@ double left_out_error(const std::vector<Samples>& presses, const Background& bac
     for (std::size_t i = 0; i < presses.size(); ++i) {
       if (i != out) others.insert(others.end(), presses[i].begin(), presses[i].end());
     }
-    const Learnt learnt = learn(others, presses.size() - 1, background, settings, kind);
+    const Learnt learnt = learn(others, background, settings, kind);
     squares += squared_error(learnt.table, corrected_samples(presses[out], learnt.light.correction));
     pixels += presses[out].size();
   }
@@ -110,7 +98,7 @@ HeightCalibration calibrate_height(std::span<const BallPress> presses, const Bac
   if (all.empty()) fail("the ball presses have no pixel that can be used");
   HeightCalibration result;
   LightCorrection kind = settings.correction.value_or(LightCorrection::background);
-  if ((settings.cross_validate || !settings.correction) && presses.size() >= kPressesForOrder1) {
+  if ((settings.cross_validate || !settings.correction) && presses.size() >= kPressesToCompare) {
     for (const LightCorrection tried : {LightCorrection::none, LightCorrection::background, LightCorrection::fitted}) {
       result.left_out.push_back({tried, left_out_error(parts, background, settings, tried)});
     }
@@ -118,10 +106,11 @@ HeightCalibration calibrate_height(std::span<const BallPress> presses, const Bac
                                        [](const SlopeError& a, const SlopeError& b) { return a.rms < b.rms; });
     if (!settings.correction) kind = best->correction;
   }
-  Learnt learnt = learn(all, presses.size(), background, settings, kind);
+  Learnt learnt = learn(all, background, settings, kind);
   result.pixels = all.size();
   result.rms_slope_error =
       std::sqrt(squared_error(learnt.table, learnt.corrected) / (2.0 * static_cast<double>(all.size())));
+  result.bounded_share = learnt.light.correction.bounded_share();
   result.coverage = coverage_of(learnt.table, learnt.corrected);
   HeightModel& model = result.model;
   model.mm_per_px = settings.mm_per_px;

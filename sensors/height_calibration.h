@@ -14,9 +14,7 @@ struct HeightCalibrationSettings {
   double mm_per_px = 0.0;
   std::optional<LightCorrection> correction{};  ///< absent: the one with the least left-out error; `background` below 3
                                                 ///< presses
-  std::optional<int> lamp_order{};  ///< absent: 0 below 3 presses, 1 below 6, else 2, and less where the presses'
-                                    ///< places don't determine that
-  double lamp_steepest = 0.6;       ///< slopes up to which every lamp is taken to stand above the membrane's horizon
+  LampFit lamps{};                              ///< of `fitted`
   PressSampling sampling{};
   SlopeTableSettings table{};
   bool cross_validate = false;  ///< fill HeightCalibration::left_out
@@ -32,6 +30,7 @@ struct HeightCalibration {
   HeightModel model;
   std::size_t pixels = 0;        ///< that were learnt from
   double rms_slope_error = 0.0;  ///< on them
+  double bounded_share = 0.0;    ///< of the picture: too dark or too one-sidedly lit to be corrected in full
   TableCoverage coverage;
   /// Each press looked up in a table made of the others: what each correction would err by at a new place. From three
   /// presses on.

@@ -16,9 +16,10 @@ constexpr int kColourBits = 7;
 constexpr int kCellBits = 4;
 constexpr int kCoefficientBits = 16 - kColourBits + kCellBits;
 constexpr int kBandRows = 4;
-constexpr double kLargestCoefficient = 32767.0 / (1 << kCoefficientBits);
-constexpr double kLargestRowSum = 32767.0 / (1 << kCellBits) / 256.0;  // cells a digital number
-constexpr float kClearly_DN = 12.0F;                                   // summed over the channels
+// Cells a digital number: one coefficient, and what a row of them adds up to for colours of 255.
+static_assert(ColourCorrection::kLargestGain / static_cast<double>(kFinestStep_DN) <=
+              std::min(32767.0 / (1 << kCoefficientBits), 32767.0 / (1 << kCellBits) / 256.0));
+constexpr float kClearly_DN = 12.0F;  // summed over the channels
 
 inline std::int16_t upper_half(std::int16_t a, std::int16_t b) {
   return static_cast<std::int16_t>((static_cast<std::int32_t>(a) * b) >> 16);
@@ -130,11 +131,6 @@ HeightEstimator::HeightEstimator(const HeightModel& model, const HeightSettings&
     for (int u = 0; u < width; ++u) {
       const Eigen::Vector2d place(u + 0.5, std::min(band * kBandRows + 0.5 * kBandRows, height - 0.5));
       const Eigen::Matrix3d cells_a_number = correction.at(place) / static_cast<double>(model_.table.step);
-      if (cells_a_number.cwiseAbs().maxCoeff() > kLargestCoefficient ||
-          cells_a_number.cwiseAbs().rowwise().sum().maxCoeff() > kLargestRowSum) {
-        fail("height model: near pixel ({:.0f}, {:.0f}) colours would have to be corrected by a factor of {:.1f}",
-             place.x(), place.y(), correction.at(place).cwiseAbs().maxCoeff());
-      }
       for (int i = 0; i < 9; ++i) {
         matrix_[static_cast<std::size_t>((band * 9 + i) * width + u)] =
             static_cast<std::int16_t>(std::lround(cells_a_number(i / 3, i % 3) * (1 << kCoefficientBits)));

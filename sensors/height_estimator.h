@@ -44,7 +44,7 @@ struct FrameCoverage {
 /// Colours and slopes are looked up at places that are corrected in bands of four rows.
 class HeightEstimator {
  public:
-  /// @throws Error if the model is faulty, or its light differs too much over the picture to be corrected
+  /// @throws Error if the model is faulty
   explicit HeightEstimator(const HeightModel& model, const HeightSettings& settings = {});
 
   /// @throws Error if the frame isn't a colour picture of the model's size

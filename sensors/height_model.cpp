@@ -21,10 +21,13 @@ std::string fault_of(const HeightModel& model) {
 
   const LampModel& lamps = model.lamps;
   if (lamps.width != mean.cols || lamps.height != mean.rows) return "the lamps are of another picture size";
-  if (lamps.order < 0 || lamps.order > 2) return fmt::format("the lamps' order is {}; it must be 0 to 2", lamps.order);
-  if (static_cast<int>(lamps.terms.size()) != term_count(lamps.order)) return "the lamps' terms don't fit their order";
-  for (const Eigen::Matrix3d& term : lamps.terms) {
-    if (!term.allFinite()) return "the lamps aren't finite";
+  for (const int side : {lamps.columns, lamps.rows}) {
+    if (side < 1 || side > kMostNodes)
+      return fmt::format("the lamps have {} nodes a side; 1 to {} are allowed", side, kMostNodes);
+  }
+  if (static_cast<int>(lamps.nodes.size()) != lamps.columns * lamps.rows) return "the lamps don't fit their nodes";
+  for (const Eigen::Matrix3d& node : lamps.nodes) {
+    if (!node.allFinite()) return "the lamps aren't finite";
   }
 
   const SlopeTable& table = model.table;
@@ -35,8 +38,8 @@ std::string fault_of(const HeightModel& model) {
     cells *= static_cast<std::size_t>(side);
   }
   if (table.slopes.size() != cells || table.hits.size() != cells) return "the table's entries don't fit its cells";
-  if (!(table.step >= 1.0F && table.step <= 255.0F)) {
-    return fmt::format("the table's step is {}; it must be 1 to 255", table.step);
+  if (!(table.step >= kFinestStep_DN && table.step <= 255.0F)) {
+    return fmt::format("the table's step is {}; it must be {} to 255", table.step, kFinestStep_DN);
   }
   if (!(table.lowest.array().abs() < 2048.0F).all()) return "the table begins out of range";
   const bool finite = std::all_of(table.slopes.begin(), table.slopes.end(),

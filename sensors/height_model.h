@@ -9,6 +9,12 @@
 
 namespace touchstone::sensors {
 
+/// Finest step of a model's table, digital numbers: finer ones don't fit the estimator's 16 bits under the strongest
+/// correction (ColourCorrection::kLargestGain).
+inline constexpr float kFinestStep_DN = 1.6F;
+/// Of the lamps, along each side of the picture.
+inline constexpr int kMostNodes = 64;
+
 struct HeightModel {
   double mm_per_px = 0.0;
   Background background;

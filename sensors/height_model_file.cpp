@@ -13,7 +13,7 @@ namespace touchstone::sensors {
 namespace {
 
 constexpr const char* kFormat = "touchstone.height_model";
-constexpr int kVersion = 1;
+constexpr int kVersion = 2;  // 2: lamps at nodes; 1 had a polynomial
 constexpr int kLargestSide = 8192;
 constexpr int kMostCells = 1024;
 
@@ -70,8 +70,9 @@ std::string to_bytes(const HeightModel& model) {
     json["background_noise_DN"] = {(*noise)[0], (*noise)[1], (*noise)[2]};
   json["correction"] = name_of(model.correction);
   json["lamps"] = Json::array();
-  for (const Eigen::Matrix3d& term : model.lamps.terms) json["lamps"].push_back(matrix_to_json(term));
-  json["lamp_order"] = model.lamps.order;
+  for (const Eigen::Matrix3d& node : model.lamps.nodes) json["lamps"].push_back(matrix_to_json(node));
+  json["lamp_columns"] = model.lamps.columns;
+  json["lamp_rows"] = model.lamps.rows;
   json["table_cells"] = model.table.cells;
   json["table_lowest_DN"] = {static_cast<double>(model.table.lowest[0]), static_cast<double>(model.table.lowest[1]),
                              static_cast<double>(model.table.lowest[2])};
@@ -88,10 +89,14 @@ HeightModel height_model_from_bytes(std::string_view bytes, const std::string& n
   const Json json = parse_json(std::string(bytes.substr(0, end)), name);
   std::string_view payload = bytes.substr(end + 1);
   const JsonField root{json, "", name};
+  if (root.at("format").text() == kFormat && root.at("version").number() < kVersion) {
+    root.refuse("is of version {}, before {}: calibrate again from the same pictures", root.at("version").number(),
+                kVersion);
+  }
   root.expect_format(kFormat, kVersion);
   root.expect_map({"format", "version", "width_px", "height_px", "mm_per_px", "presses", "steepest_calibrated",
-                   "background_frames", "background_noise_DN", "correction", "lamps", "lamp_order", "table_cells",
-                   "table_lowest_DN", "table_step_DN", "sha256"});
+                   "background_frames", "background_noise_DN", "correction", "lamps", "lamp_columns", "lamp_rows",
+                   "table_cells", "table_lowest_DN", "table_step_DN", "sha256"});
   constexpr int kMany = std::numeric_limits<int>::max();
   HeightModel model;
   const auto width = static_cast<int>(root.at("width_px").whole_number(2, kLargestSide));
@@ -109,11 +114,12 @@ HeightModel height_model_from_bytes(std::string_view bytes, const std::string& n
           .name_among(std::array{LightCorrection::none, LightCorrection::background, LightCorrection::fitted});
   model.lamps.width = width;
   model.lamps.height = height;
-  model.lamps.order = static_cast<int>(root.at("lamp_order").whole_number(0, 2));
+  model.lamps.columns = static_cast<int>(root.at("lamp_columns").whole_number(1, kMostNodes));
+  model.lamps.rows = static_cast<int>(root.at("lamp_rows").whole_number(1, kMostNodes));
   const JsonField lamps = root.at("lamps");
-  const auto terms = static_cast<std::size_t>(term_count(model.lamps.order));
-  lamps.expect_list(terms);
-  for (std::size_t i = 0; i < terms; ++i) model.lamps.terms.push_back(matrix_of(lamps.at(i)));
+  const auto nodes = static_cast<std::size_t>(model.lamps.columns * model.lamps.rows);
+  lamps.expect_list(nodes);
+  for (std::size_t i = 0; i < nodes; ++i) model.lamps.nodes.push_back(matrix_of(lamps.at(i)));
 
   const JsonField sides = root.at("table_cells");
   sides.expect_list(3);

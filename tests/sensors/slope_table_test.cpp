@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <opencv2/core.hpp>
 
 #include "core/error.h"
@@ -39,23 +41,82 @@ std::vector<ColourSample> shaded_samples(int count, double steepest, double nois
 }
 
 LampModel even_lamps() {
-  return {320, 240, 0, {some_lamps()}};
+  return {320, 240, 1, 1, {some_lamps()}};
 }
 
+/// Stronger to the right and weaker downwards.
 LampModel uneven_lamps() {
-  LampModel lamps = even_lamps();
-  lamps.order = 1;
+  LampModel lamps{320, 240, 4, 3, {}};
   Eigen::Matrix3d tilt = 0.15 * some_lamps();
   tilt(0, 2) -= 8.0;
-  lamps.terms.push_back(tilt);
-  lamps.terms.push_back(-0.1 * some_lamps());
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 4; ++column) {
+      lamps.nodes.push_back(some_lamps() + (0.5 * column - 0.75) * tilt - 0.1 * (row - 1) * some_lamps());
+    }
+  }
   return lamps;
 }
 
-TEST(LampModel, FitFindsTheLamps) {
+/// Presses in some places: samples nowhere else.
+std::vector<ColourSample> near_places(std::vector<ColourSample> samples, const std::vector<Eigen::Vector2f>& places) {
+  std::erase_if(samples, [&](const ColourSample& sample) {
+    return std::none_of(places.begin(), places.end(),
+                        [&](const Eigen::Vector2f& place) { return (sample.place - place).norm() < 20.0F; });
+  });
+  return samples;
+}
+
+TEST(LampModel, LampsAreInterpolatedBetweenNodesAndHeldBeyond) {
+  const LampModel lamps = uneven_lamps();
+  EXPECT_LT((lamps.at({40, 40}) - lamps.nodes[0]).norm(), 1e-9);
+  EXPECT_LT((lamps.at({0, 0}) - lamps.nodes[0]).norm(), 1e-9);
+  EXPECT_LT((lamps.at({319, 239}) - lamps.nodes[11]).norm(), 1e-9);
+  EXPECT_LT((lamps.at({80, 80}) - 0.25 * (lamps.nodes[0] + lamps.nodes[1] + lamps.nodes[4] + lamps.nodes[5])).norm(),
+            1e-9);
+}
+
+TEST(LampModel, FitFindsEvenLampsAtAllNodes) {
+  const LampModel fitted = fit_lamps(shaded_samples(4000, 0.5, 0.0, even_lamps()), {320, 240}, {});
+  ASSERT_EQ(fitted.nodes.size(), 48U);
+  for (const Eigen::Matrix3d& node : fitted.nodes) EXPECT_LT((node - some_lamps()).norm(), 1e-3);
+}
+
+TEST(LampModel, FitFollowsUnevenLampsTheCloserTheShorterItsReach) {
   const LampModel truth = uneven_lamps();
-  const LampModel fitted = fit_lamps(shaded_samples(4000, 1.0, 0.0, truth), {320, 240}, 1, 1.0);
-  for (std::size_t k = 0; k < 3; ++k) EXPECT_LT((fitted.terms[k] - truth.terms[k]).norm(), 1e-3) << k;
+  const auto samples = shaded_samples(20000, 0.5, 0.0, truth);
+  const auto error = [&](double reach) {
+    const LampModel fitted = fit_lamps(samples, {320, 240}, {.reach = reach, .prior = 1e-4});
+    double worst = 0.0;
+    for (const Eigen::Vector2d& place : {Eigen::Vector2d(60, 60), {160, 120}, {260, 180}}) {
+      worst = std::max(worst, (fitted.at(place) - truth.at(place)).norm() / truth.at(place).norm());
+    }
+    return worst;
+  };
+  EXPECT_LT(error(0.05), 0.03);
+  EXPECT_LT(error(0.05), error(0.25));
+  EXPECT_LT(error(0.25), error(10.0));
+}
+
+TEST(LampModel, BeyondThePressesNothingIsExtrapolated) {
+  const LampModel truth = uneven_lamps();
+  const auto samples = near_places(shaded_samples(60000, 0.5, 0.0, truth), {{110, 120}, {160, 120}, {210, 120}});
+  const LampModel fitted = fit_lamps(samples, {320, 240}, {});
+  const double least = truth.at({90, 120}).norm();
+  const double most = truth.at({230, 120}).norm();
+  for (const Eigen::Matrix3d& node : fitted.nodes) {
+    EXPECT_GT(node.norm(), 0.95 * least);
+    EXPECT_LT(node.norm(), 1.05 * most);
+  }
+  EXPECT_GT(fitted.at({319, 120}).norm(), fitted.at({0, 120}).norm());
+}
+
+TEST(LampModel, TooFewOrOneSidedSamplesAreRefused) {
+  auto samples = shaded_samples(20, 0.5, 0.0, even_lamps());
+  EXPECT_THROW(fit_lamps(samples, {320, 240}, {}), Error);
+  samples = shaded_samples(4000, 0.5, 0.0, even_lamps());
+  EXPECT_THROW(fit_lamps(samples, {320, 240}, {.reach = 0.0}), Error);
+  for (ColourSample& sample : samples) sample.slope.y() = 0.0F;
+  EXPECT_THROW(fit_lamps(samples, {320, 240}, {}), Error);
 }
 
 TEST(LampModel, SlopeByLampsInvertsShading) {
@@ -79,10 +140,29 @@ TEST(LampModel, CorrectionLeadsBackToTheMiddle) {
 
 TEST(LampModel, CorrectionStaysBoundedWhereLampsTellLittle) {
   LampModel lamps = uneven_lamps();
-  lamps.terms[1].col(1) = -lamps.terms[0].col(1) + 1e-6 * Eigen::Vector3d::Ones();  // at the right side none along v
+  for (int row = 0; row < 3; ++row) lamps.nodes[static_cast<std::size_t>(4 * row + 3)].col(1).setConstant(1e-6);
   const cv::Mat even(240, 320, CV_32FC3, cv::Scalar(90, 100, 80));
   const ColourCorrection correction = ColourCorrection::by_lamps(even, lamps);
   for (double u = 0.0; u <= 320.0; u += 20.0) EXPECT_LT(correction.at({u, 120}).norm(), 10.0) << u;
+}
+
+TEST(ColourCorrection, DarkCornersAreMadeStrongerToABoundAndSaidSo) {
+  cv::Mat background(240, 320, CV_32FC3, cv::Scalar(90, 100, 80));
+  EXPECT_EQ(ColourCorrection::by_background(background).bounded_share(), 0.0);
+  background.colRange(0, 80) = cv::Scalar(0.5, 10, 10);
+  LampModel lamps = uneven_lamps();
+  for (Eigen::Matrix3d& node : lamps.nodes) node.row(0) *= 0.1;
+  lamps.nodes[5] = some_lamps();  // the middle, which all others are led to
+  for (const ColourCorrection& correction :
+       {ColourCorrection::by_background(background), ColourCorrection::by_lamps(background, lamps)}) {
+    for (double u = 0.5; u < 320.0; u += 9.0) {
+      const Eigen::Matrix3d matrix = correction.at({u, 120});
+      ASSERT_TRUE(matrix.allFinite());
+      EXPECT_LE(matrix.cwiseAbs().rowwise().sum().maxCoeff(), ColourCorrection::kLargestGain + 1e-9);
+    }
+    EXPECT_GT(correction.bounded_share(), 0.2);
+    EXPECT_LT(correction.bounded_share(), 1.0);
+  }
 }
 
 TEST(SlopeTable, MattShadingComesBack) {
