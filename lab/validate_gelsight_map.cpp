@@ -91,8 +91,9 @@ std::vector<ValidationRow> validate_gelsight_map(const ValidateOptions& options)
   add_error("gelsight.map.features_rotation_deg", "the same angle by features alone", "deg", kPublishedTurn_deg,
             maps.features_turn_deg);
   rows.push_back(row("gelsight.map.not_localised",
-                     fmt::format("touches refused, of {}", maps.along_mm.touches + maps.turn_deg.touches), "1", {},
-                     maps.along_mm.lost + maps.turn_deg.lost, Better::lower));
+                     fmt::format("touches refused, of {}{}{}", maps.along_mm.touches + maps.turn_deg.touches,
+                                 maps.lost.empty() ? "" : ": ", fmt::join(maps.lost, ", ")),
+                     "1", {}, maps.along_mm.lost + maps.turn_deg.lost, Better::lower));
   rows.back().reference = 0.0;
   rows.back().holds = rows.back().ours == 0.0;
 
