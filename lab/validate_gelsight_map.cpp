@@ -97,8 +97,10 @@ std::vector<ValidationRow> validate_gelsight_map(const ValidateOptions& options)
   rows.back().reference = 0.0;
   rows.back().holds = rows.back().ours == 0.0;
 
-  rows.push_back(row("gelsight.insertion.successes_of_36", "plug insertions within 1 mm, a robot without error", "1",
-                     kPublishedInsertions, inserted.successes(), Better::higher));
+  rows.push_back(
+      row("gelsight.insertion.successes_of_36",
+          fmt::format("plug insertions within 1 mm after {} grasps, a robot without error", inserted.grasps()), "1",
+          kPublishedInsertions, inserted.successes(), Better::higher));
   insertion.robot_error_mm = suspected_robot_error_mm();
   rows.push_back(row("gelsight.insertion.with_robot_error_of_36",
                      fmt::format("the same, the robot off by {:.2f} mm along each axis (mean of {} draws)",
