@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "core/error.h"
 #include "core/random.h"
@@ -48,6 +49,10 @@ RigidTransform target_gripper(const RigidTransform& base_from_object_wanted, con
 
 int InsertionExperiment::successes() const {
   return static_cast<int>(std::count_if(trials.begin(), trials.end(), [](const auto& one) { return one.inserted; }));
+}
+
+int InsertionExperiment::grasps() const {
+  return std::accumulate(trials.begin(), trials.end(), 0, [](int sum, const auto& one) { return sum + one.grasps; });
 }
 
 double mouth_error(const InsertionSettings& settings, const sensors::PlanarPose& touch_from_object_true,

@@ -55,6 +55,7 @@ struct InsertionTrial {
 struct InsertionExperiment {
   std::vector<InsertionTrial> trials;
   int successes() const;
+  int grasps() const;  ///< of all trials: one each, and one more for each grasp that wasn't localised
 };
 
 /// Where the plug's mouth ends up, judged in space. `robot_error` moves the gripper from its target, base frame.

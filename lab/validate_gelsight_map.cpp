@@ -91,13 +91,16 @@ std::vector<ValidationRow> validate_gelsight_map(const ValidateOptions& options)
   add_error("gelsight.map.features_rotation_deg", "the same angle by features alone", "deg", kPublishedTurn_deg,
             maps.features_turn_deg);
   rows.push_back(row("gelsight.map.not_localised",
-                     fmt::format("touches refused, of {}", maps.along_mm.touches + maps.turn_deg.touches), "1", {},
-                     maps.along_mm.lost + maps.turn_deg.lost, Better::lower));
+                     fmt::format("touches refused, of {}{}{}", maps.along_mm.touches + maps.turn_deg.touches,
+                                 maps.lost.empty() ? "" : ": ", fmt::join(maps.lost, ", ")),
+                     "1", {}, maps.along_mm.lost + maps.turn_deg.lost, Better::lower));
   rows.back().reference = 0.0;
   rows.back().holds = rows.back().ours == 0.0;
 
-  rows.push_back(row("gelsight.insertion.successes_of_36", "plug insertions within 1 mm, a robot without error", "1",
-                     kPublishedInsertions, inserted.successes(), Better::higher));
+  rows.push_back(
+      row("gelsight.insertion.successes_of_36",
+          fmt::format("plug insertions within 1 mm after {} grasps, a robot without error", inserted.grasps()), "1",
+          kPublishedInsertions, inserted.successes(), Better::higher));
   insertion.robot_error_mm = suspected_robot_error_mm();
   rows.push_back(row("gelsight.insertion.with_robot_error_of_36",
                      fmt::format("the same, the robot off by {:.2f} mm along each axis (mean of {} draws)",

@@ -28,7 +28,7 @@ struct RegistrationSettings {
   double least_share = 0.4;      ///< of the best candidate's inliers, for another to be one
   /// Ours: what the best pose leaves unexplained (1 - correlation), as a share of what the next candidate leaves, or
   /// the pose moved by `elsewhere_mm` any way; more is ambiguous. Turned by half a turn, a plug still correlates by
-  /// 0.9.
+  /// 0.7.
   double most_rival_share = 0.75;
   double least_overlap = 0.25;     ///< ours: share of the touch that must lie on the map
   bool refine = true;              ///< ours: the pose by direct alignment of the heights; else the features' one

@@ -10,16 +10,19 @@
 namespace touchstone::sim {
 namespace {
 
-constexpr double kGrowth = 1.3;  // of the spacing from line to line outside of the relief's grid
+constexpr double kGrowth = 1.3;     // of the spacing from line to line outside of the relief's grid
+constexpr double kSameLine = 1e-6;  // of a pixel: nearer lines are one but for rounding
 
-/// Lines across one axis: the grid's own pixels, and from its border on ever wider ones to the surface's edges.
+/// Lines across one axis: the grid's own pixels, and from its border on ever wider ones to the surface's edges. A grid
+/// that ends on an edge, or a part of a pixel beyond it, has no more lines there: else two would be one.
 std::vector<double> sheet_lines(double first, double pitch, int pixels, double low, double high, double widest) {
   std::vector<double> lines;
   const double last = first + pitch * (pixels - 1);
-  const auto outwards = [&](double from, double to) {
+  const auto outwards = [&](double from, double sign, double to) {
     std::vector<double> steps;
     double sum = 0.0;
-    const double way = std::abs(to - from);
+    const double way = sign * (to - from);
+    if (way < kSameLine * pitch) return steps;
     for (double step = kGrowth * pitch; sum < way; step = std::min(widest, kGrowth * step)) {
       steps.push_back(step);
       sum += step;
@@ -29,14 +32,14 @@ std::vector<double> sheet_lines(double first, double pitch, int pixels, double l
     double gone = 0.0;
     for (const double step : steps) {
       gone += step * way / sum;
-      at.push_back(from + (to > from ? gone : -gone));
+      at.push_back(from + sign * gone);
     }
     return at;
   };
-  const std::vector<double> below = outwards(first, low);
+  const std::vector<double> below = outwards(first, -1.0, low);
   lines.assign(below.rbegin(), below.rend());
   for (int i = 0; i < pixels; ++i) lines.push_back(first + pitch * i);
-  const std::vector<double> above = outwards(last, high);
+  const std::vector<double> above = outwards(last, 1.0, high);
   lines.insert(lines.end(), above.begin(), above.end());
   return lines;
 }

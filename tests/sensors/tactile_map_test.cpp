@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <opencv2/imgproc.hpp>
+
 #include "tests/sensors/drawn_relief.h"
 
 namespace touchstone::sensors {
@@ -113,6 +115,41 @@ TEST(TactileMap, ATouchOfAnotherSizeIsLocalised) {
   const Registration found = map.localise(touch_of(relief, truth, 2, small));
   ASSERT_TRUE(found.localised());
   EXPECT_LT(error_of(found.to_from_from, truth).mm, 0.01);
+}
+
+/// A plug's face: a plate with two windows and a bent seam.
+double plug_face(const Eigen::Vector2d& p) {
+  const auto inside = [](const Eigen::Vector2d& at, double half_x, double half_y, double blur) {
+    const double beyond = std::max(std::abs(at.x()) - half_x, std::abs(at.y()) - half_y);
+    return 1.0 / (1.0 + std::exp(beyond / blur));
+  };
+  const double bent = p.x() - (std::abs(p.y() - 3.5) < 1.0 ? 0.5 : 0.0);
+  const double seam = std::exp(-50.0 * bent * bent);
+  const double windows = inside({std::abs(p.x()) - 2.85, p.y() - 0.3}, 1.25, 1.12, 0.05);
+  return inside(p, 6.0, 6.0, 0.1) * (0.25 - 0.2 * windows - 0.03 * seam);
+}
+
+TEST(TactileMap, BulgesThatStayWithTheSensorDontHideThePlug) {
+  // What photometric stereo gets wrong of steep edges: heights beside them bulge over some half a millimetre, up on the
+  // sensor's one side and down on its other, however the plug is turned.
+  const auto bulging = [](const PlanarPose& pose, std::uint64_t seed) {
+    TouchImage touch = touch_of(plug_face, pose, seed);
+    cv::Mat wide, bulge;
+    cv::GaussianBlur(touch.height_mm, wide, {0, 0}, 0.5 / touch.mm_per_px);
+    cv::Sobel(wide, bulge, CV_32F, 1, 0, 3, 1.0 / (8.0 * touch.mm_per_px));
+    return touch_by_height(touch.height_mm + bulge, touch.mm_per_px, 0.12);
+  };
+  const PlanarPose root{0.0, {0.3, 0.2}};
+  TactileMap map;
+  map.add(bulging(root, 1));
+  for (const double angle : {1.0, -1.0}) ASSERT_TRUE(map.add(bulging({angle, {0.3, 0.2}}, 2)).localised());
+  for (int degrees = -90; degrees <= 90; degrees += 15) {
+    const PlanarPose pose{degrees * kRadiansPerDegree, {0.3, -0.4}};
+    const Registration found = map.localise(bulging(pose, static_cast<std::uint64_t>(200 + degrees)));
+    ASSERT_TRUE(found.localised()) << degrees << " degrees: " << name_of(found.outcome);
+    EXPECT_LT(error_of(found.to_from_from, root.inverse() * pose).mm, 0.05) << degrees << " degrees";
+    EXPECT_LT(error_of(found.to_from_from, root.inverse() * pose).degrees, 0.15) << degrees << " degrees";
+  }
 }
 
 TEST(TactileMap, PartOfAnObjectIsEnough) {

@@ -113,6 +113,33 @@ TEST(Membrane, TheSheetIsWholeAndItsWetPartLiesOnTheObject) {
   EXPECT_LT(worst, 1e-4);
 }
 
+TEST(Membrane, WherePixelsEndOnTheGelsEdgeTheSheetHasNoFolds) {
+  // A pixel's middle on the gel's edge but for rounding, a fifth of a pixel inside of it, and a fifth beyond it.
+  for (const double pixel_mm : {0.08, 10.0 / 125.4, 10.0 / 124.6}) {
+    SceneSpec scene = scene_with(kWaves);
+    scene.membrane.pixel_um = 1e3 * pixel_mm;
+    scene.motion.start_mm = {4, 0, 1};
+    const Plan plan = make_plan(scene);
+    const auto truths = play_motion(scene, plan, gel());
+    const Membrane membrane(scene, plan, gel());
+    const auto relief = membrane.relief(truths.back().press);
+    ASSERT_TRUE(relief);
+    ASSERT_GT(relief->grid.first.x() + relief->grid.pitch * (relief->grid.nx - 1), 4.9) << "the pixels reach the edge";
+    const Membrane::Sheet sheet = membrane.sheet(truths.back().press, *relief);
+    double least = 1.0, most = -1.0;  // signed areas: of one sense, and none of them 0
+    for (const auto* part : {&sheet.dry, &sheet.wet}) {
+      for (const auto& t : part->triangles) {
+        const auto at = [&](int k) -> Eigen::Vector2d { return sheet.dry.vertices[t[k]].head<2>(); };
+        const Eigen::Vector2d ab = at(1) - at(0), ac = at(2) - at(0);
+        const double area = 0.5 * (ab.x() * ac.y() - ab.y() * ac.x());
+        least = std::min(least, area), most = std::max(most, area);
+      }
+    }
+    EXPECT_GT(least * most, 0.0) << "pixels of " << pixel_mm << " mm: " << least << " to " << most << " mm^2";
+    EXPECT_GT(std::min(std::abs(least), std::abs(most)), 1e-6);
+  }
+}
+
 TEST(Membrane, RefusesAHeightMapWithoutEnd) {
   SceneSpec scene = scene_with(kWaves);
   scene.membrane.height_size_mm = Eigen::Vector2d(900, 1);
