@@ -8,8 +8,6 @@
 #include "core/error.h"
 #include "lab/gelsight_force_experiment.h"
 #include "lab/gelsight_height_experiment.h"
-#include "sensors/contact_patch.h"
-#include "sensors/height_estimator.h"
 
 namespace touchstone::lab {
 
@@ -21,7 +19,6 @@ constexpr int kPressFrames = 4;
 constexpr int kHoldFrames = 3;
 constexpr int kLoadFrames = 10;
 constexpr double kClear_mm = 0.02;
-constexpr int kLeastPatch_px = 50;
 constexpr double kUnsheared = 0.05;  ///< of the limit
 constexpr double kRoll_mm = 1.2;
 /// How far a sliding object goes at most before it slides, mm for each N that friction holds, and mm at least.
@@ -134,38 +131,25 @@ SlipRun run_slip_case(const sim::TouchRig& rig, const SlipCase& what, const Slip
     truths.resize(std::min(truths.size(), onset + as_count(frames_after * kStatesAFrame) + 1));
   }
 
-  const cv::Mat background = rig.background(seed, kBackgroundFrame);
-  const double diameter = marker_settings(rig).look.diameter_px;
-  sensors::MarkerTracker tracker(marker_settings(rig));
-  sensors::IncipientSlipDetector incipient(estimators.incipient);
-  sensors::HeightEstimator heights(estimators.heights);
-  const sensors::LinearForce& normal_line = sensors::normal_line(estimators.forces, what.object.name);
-  tracker.track({background, -1});
-  cv::Mat before = background;
-  cv::Mat contact;
+  sensors::TouchReader reader({.height = estimators.heights,
+                               .markers = marker_settings(rig),
+                               .background = rig.background(seed, kBackgroundFrame),
+                               .normal = sensors::normal_line(estimators.forces, what.object.name),
+                               .shear = sensors::shear_line(estimators.forces)},
+                              estimators.settings);
   for (std::size_t i = 0; i < truths.size(); i += kStatesAFrame) {
     const fem::PressState& state = truths[i].press;
     const cv::Mat image = rig.look(object, state, seed, static_cast<int>(i), false).frame;
-    const sensors::TrackedMarkers& markers = tracker.track({image, static_cast<std::int64_t>(i)});
-    const sensors::MotionRatio motion = sensors::motion_ratio(background, before, image, estimators.motion, &contact);
-    before = image;
-    sensors::erase_markers(contact, markers, diameter);
-    const auto patch = sensors::contact_patch(contact, kLeastPatch_px);
+    const sensors::TouchReading& touch = reader.read({image, static_cast<std::int64_t>(i)});
     SlipFrame frame;
     frame.t_s = static_cast<double>(i) / (kStatesAFrame * frame_rate_Hz);
     frame.load = load_of(state, what.object.friction);
     frame.sticking = share_sticking(state);
-    frame.motion_ratio = motion.ratio;
-    if (patch) {
-      const cv::Mat bare = without_markers(image, &markers, diameter);
-      const double sum = sensors::height_sum_mm3(heights.estimate(bare).height_mm, rig.mm_per_px());
-      const Eigen::Vector2d displacement_mm = sensors::mean_displacement(markers, *patch).px * rig.mm_per_px();
-      frame.force_ratio =
-          sensors::force_ratio(sensors::shear_force_N(estimators.forces, displacement_mm), normal_line.force_N(sum));
-    }
-    frame.rule = sensors::is_slip(frame.force_ratio, frame.motion_ratio, estimators.rule);
-    frame.incipient = incipient.look(markers, patch);
-    frame.markers_found = markers.found();
+    frame.force_ratio = touch.force_ratio;
+    frame.motion_ratio = touch.motion_ratio;
+    frame.rule = touch.rule_slip;
+    frame.rim = touch.rim;
+    frame.markers_found = touch.markers_found;
     run.frames.push_back(frame);
   }
   return run;
@@ -189,11 +173,11 @@ std::string to_csv(const std::vector<SlipRun>& runs) {
   const auto known = [](const std::optional<double>& value) { return value ? fmt::format("{:.4f}", *value) : ""; };
   for (const SlipRun& run : runs) {
     for (const SlipFrame& frame : run.frames) {
-      text += fmt::format("\"{}\",{},{:.4f},{:.4f},{:.4f},{},{},{},{},{:.4f},{:.3f},{:.3f},{},{}\n", run.what.name(),
-                          known(run.onset_s), frame.t_s, frame.load, frame.sticking, known(frame.force_ratio),
-                          known(frame.motion_ratio), frame.rule ? 1 : 0, known(frame.incipient.lag),
-                          frame.incipient.lag_error, frame.incipient.slide_px, frame.incipient.shear_px,
-                          sensors::name_of(frame.incipient.state), frame.markers_found);
+      text +=
+          fmt::format("\"{}\",{},{:.4f},{:.4f},{:.4f},{},{},{},{},{:.4f},{:.3f},{:.3f},{},{}\n", run.what.name(),
+                      known(run.onset_s), frame.t_s, frame.load, frame.sticking, known(frame.force_ratio),
+                      known(frame.motion_ratio), frame.rule ? 1 : 0, known(frame.rim.lag), frame.rim.lag_error,
+                      frame.rim.slide_px, frame.rim.shear_px, sensors::name_of(frame.rim.state), frame.markers_found);
     }
   }
   return text;
@@ -201,9 +185,9 @@ std::string to_csv(const std::vector<SlipRun>& runs) {
 
 SlipScore score(const std::vector<SlipRun>& runs, SlipDetector detector) {
   const auto reports = [&](const SlipFrame& frame) {
-    return detector == SlipDetector::rule ? frame.rule
-                                          : frame.incipient.state == sensors::SlipState::kIncipient ||
-                                                frame.incipient.state == sensors::SlipState::kSliding;
+    return detector == SlipDetector::rule
+               ? frame.rule
+               : frame.rim.state == sensors::SlipState::kIncipient || frame.rim.state == sensors::SlipState::kSliding;
   };
   SlipScore result;
   for (const SlipRun& run : runs) {

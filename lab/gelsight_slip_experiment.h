@@ -9,9 +9,7 @@
 
 #include "sensors/gel_force_model.h"
 #include "sensors/height_model.h"
-#include "sensors/incipient_slip.h"
-#include "sensors/motion_ratio.h"
-#include "sensors/slip_rule.h"
+#include "sensors/touch_reader.h"
 #include "sim/touch_rig.h"
 
 namespace touchstone::lab {
@@ -39,8 +37,8 @@ struct SlipFrame {
   double load = 0.0;      ///< true: shear force over friction times normal force
   double sticking = 0.0;  ///< true: share of the touching vertices
   std::optional<double> force_ratio, motion_ratio;
-  bool rule = false;  ///< the text's detector
-  sensors::IncipientSlip incipient;
+  bool rule = false;           ///< the text's detector
+  sensors::IncipientSlip rim;  ///< the second one
   int markers_found = 0;
 };
 
@@ -50,13 +48,11 @@ struct SlipRun {
   std::optional<double> onset_s;  ///< of gross sliding: the first state in which no touching vertex sticks
 };
 
-/// What the two detectors are made of. The text's thresholds; the second detector's own (incipient_slip.h).
+/// What the two detectors are made of.
 struct SlipEstimators {
   sensors::HeightModel heights;   ///< of this gel
-  sensors::GelForceModel forces;  ///< with a line for each object by its name
-  sensors::MotionRatioSettings motion = {};
-  sensors::SlipThresholds rule = {};
-  sensors::IncipientSlipSettings incipient = {};
+  sensors::GelForceModel forces;  ///< with a line for each object by its name, and one for shear
+  sensors::TouchReaderSettings settings = {};
 };
 
 /// Plays and judges one case at the device's frame rate; states come four times as often, so the onset is known to a

@@ -18,12 +18,12 @@ SlipRun run_with(std::optional<double> onset_s, const std::vector<int>& rule, co
     SlipFrame frame;
     frame.t_s = i / 30.0;
     frame.load = i < 4 ? 0.0 : std::min(0.2 * (i - 3), 1.0);
-    frame.incipient.state = sensors::SlipState::kSticking;
+    frame.rim.state = sensors::SlipState::kSticking;
     run.frames.push_back(frame);
   }
   for (const int i : rule) run.frames[static_cast<std::size_t>(i)].rule = true;
   for (const int i : incipient)
-    run.frames[static_cast<std::size_t>(i)].incipient.state = sensors::SlipState::kIncipient;
+    run.frames[static_cast<std::size_t>(i)].rim.state = sensors::SlipState::kIncipient;
   return run;
 }
 
