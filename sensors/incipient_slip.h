@@ -6,11 +6,12 @@
 //
 // Over the last few frames, in which the contact's middle moved by `least_motion_px` or more, the markers on the
 // contact patch moved by u(x). That is taken apart by least squares into
-//   u = t + w J x + s x - l q(x),
-// a translation t (of the middle), a turn w, a swelling s (pressing spreads the gel), and a lag l that grows from the
-// middle to the edge with q = the squared distance over the edge's (of the part of the patch that is looked at). While
-// all sticks the field moves with the object and l is small; where a rim slips, it stays behind: l.t/|t|^2 goes to 1 as
-// the stick zone shrinks.
+//   u = t + w J x + s x - (|z|^2 l - 2/7 z (z.l)),
+// a translation t (of the middle), a turn w, a swelling s (pressing spreads the gel), and a lag l that grows with the
+// squared distance from the middle; z is x in units of the edge (of the part of the patch that is looked at). While all
+// sticks the field moves with the object and l is small; where a rim slips, it stays behind: l.t/|t|^2 grows to some 1
+// as the stick zone shrinks. The second part of the lag is what an incompressible gel does under a round contact that
+// slips (K. L. Johnson, Contact Mechanics, eq. 7.22): its surface lags less along the motion than across it.
 //
 // Once the whole contact slides, the markers stand still and there's no lag to be seen. Then the patch itself moves
 // over the markers (`sliding`): by `slide_px` within the frames kept, while the gel is sheared by `least_shear_px` or
@@ -32,9 +33,9 @@ struct IncipientSlipSettings {
   /// Markers within this part of the patch's size are taken to lie on the object. A mask of pixels that differ from the
   /// background is larger than the contact, since the gel slopes down beside it: under balls 1.15 to 1.35 times. 0.2 to
   /// 1
-  double patch_part = 0.75;
+  double patch_part = 0.9;
   int least_markers = 6;        ///< on the patch, measured now and then; at least 6
-  double lag_threshold = 0.5;   ///< 0 to 2
+  double lag_threshold = 0.55;  ///< 0 to 2
   double certainty = 2.0;       ///< the lag less so many of its standard errors must pass the threshold; 0 to 10
   double slide_px = 3.0;        ///< above 0
   double least_shear_px = 2.0;  ///< mean displacement of the patch's markers since rest; at least 0
