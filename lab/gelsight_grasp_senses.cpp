@@ -11,8 +11,8 @@ namespace {
 constexpr double kForceBall_mm = 12.7;
 constexpr double kShearEnd_mm = 10.0;
 constexpr double kShearNormal_N = 0.6;
-constexpr double kShearDrag_mm = 1.0;
-constexpr int kShearSteps = 10;
+constexpr double kShearDrag_mm = 0.3;  // it slides at some 0.2
+constexpr int kShearSteps = 12;
 constexpr double kCalibrationFriction = 0.5;
 constexpr int kFrameOfBackground = 2000000;  // its noise is no other frame's
 

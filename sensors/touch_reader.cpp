@@ -16,6 +16,9 @@ TouchReader::TouchReader(const TouchCalibration& calibration, const TouchReaderS
       rim_(settings.rim) {
   if (settings.least_patch_px < 1)
     fail("touch reader: least_patch_px is {}, at least 1 is needed", settings.least_patch_px);
+  if (calibration.background.size() != calibration.height.background.mean.size())
+    fail("touch reader: the background is {} x {} px, the height model's {} x {}", calibration.background.cols,
+         calibration.background.rows, calibration.height.background.mean.cols, calibration.height.background.mean.rows);
   calibration_.background = calibration.background.clone();  // who gave it may paint on it
   calibration_.background.copyTo(before_);
   // Before any other frame, whatever clock they have. Markers are at rest in it.
