@@ -27,7 +27,7 @@ class Eyes {
     sensors::GraspSight sight;
     sight.height_max_mm = touch.height_max_mm;
     sight.normal_force_N = touch.normal_N;
-    sight.slip = touch.rule_slip || (settings_.rim && touch.rim_slip());
+    sight.slip = touch.rule_slip || (settings_.rim && touch.rim.slips());
     if (sight.slip) forgetting_ = settings_.forget_frames;
     if (forgetting_ > 0) {
       reader_.forget_slip();

@@ -194,9 +194,7 @@ std::string to_csv(const std::vector<SlipRun>& runs) {
 
 SlipScore score(const std::vector<SlipRun>& runs, SlipDetector detector, double foretold_s) {
   const auto reports = [&](const SlipFrame& frame) {
-    return detector == SlipDetector::rule
-               ? frame.rule
-               : frame.rim.state == sensors::SlipState::kIncipient || frame.rim.state == sensors::SlipState::kSliding;
+    return detector == SlipDetector::rule ? frame.rule : frame.rim.slips();
   };
   SlipScore result;
   for (const SlipRun& run : runs) {

@@ -45,9 +45,6 @@ struct TouchReading {
   bool rule_slip = false;                             ///< both of them above their thresholds
   IncipientSlip rim;                                  ///< slip that begins at the contact's rim
   int markers_found = 0;
-
-  /// Slip at the rim, or of the whole contact.
-  bool rim_slip() const { return rim.state == SlipState::kIncipient || rim.state == SlipState::kSliding; }
 };
 
 /// Reads the frames of one sensor, in their order. One object is for one thread.

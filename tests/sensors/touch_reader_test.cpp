@@ -96,7 +96,7 @@ TEST_F(TouchReaderTest, ABallsDepthForceAndShearAreThoseOfTheFormula) {
   EXPECT_LT((touch.shear_N - 2.0 * kScale * shift).norm(), 0.02 * touch.shear_N.norm());
   ASSERT_TRUE(touch.force_ratio);
   EXPECT_NEAR(*touch.force_ratio, touch.shear_N.norm() / touch.normal_N, 1e-12);
-  EXPECT_FALSE(touch.rim_slip());  // all moved as one
+  EXPECT_FALSE(touch.rim.slips());  // all moved as one
 }
 
 TEST_F(TouchReaderTest, ARimThatStaysBehindIsSlipUntilItIsForgotten) {
@@ -108,10 +108,10 @@ TEST_F(TouchReaderTest, ARimThatStaysBehindIsSlipUntilItIsForgotten) {
                  }));
   };
   reader.read({with_step(0), 0});
-  EXPECT_TRUE(reader.read({with_step(1), 1}).rim_slip());
+  EXPECT_TRUE(reader.read({with_step(1), 1}).rim.slips());
   reader.forget_slip();
-  EXPECT_FALSE(reader.read({with_step(2), 2}).rim_slip());  // nothing to compare with
-  EXPECT_TRUE(reader.read({with_step(3), 3}).rim_slip());
+  EXPECT_FALSE(reader.read({with_step(2), 2}).rim.slips());  // nothing to compare with
+  EXPECT_TRUE(reader.read({with_step(3), 3}).rim.slips());
 }
 
 TEST_F(TouchReaderTest, WhatCannotBeReadIsRefused) {
