@@ -10,6 +10,7 @@
 namespace touchstone::sim {
 namespace {
 
+constexpr double kNoWay = 1e-6;  // of the pitch: triangles as narrow have no area
 constexpr double kGrowth = 1.3;  // of the spacing from line to line outside of the relief's grid
 
 /// Lines across one axis: the grid's own pixels, and from its border on ever wider ones to the surface's edges.
@@ -20,6 +21,7 @@ std::vector<double> sheet_lines(double first, double pitch, int pixels, double l
     std::vector<double> steps;
     double sum = 0.0;
     const double way = std::abs(to - from);
+    if (way < kNoWay * pitch) return std::vector<double>();  // the grid ends on the edge but for rounding
     for (double step = kGrowth * pitch; sum < way; step = std::min(widest, kGrowth * step)) {
       steps.push_back(step);
       sum += step;
