@@ -17,7 +17,6 @@ namespace touchstone::lab {
 
 namespace {
 
-constexpr double kFillRadius = 0.8;  ///< of a marker's diameter: its rim and the blur
 constexpr int kBackgroundFrames = 4;
 constexpr int kBackgroundFrame = 1000000;  ///< number of the first: its noise is no frame's
 constexpr double kRisesTo = 0.95;   ///< of the largest shear force: up to there the gel sticks (samples_before_slip)
@@ -62,7 +61,7 @@ sensors::MarkerTrackerSettings marker_settings(const sim::TouchRig& rig) {
 
 cv::Mat without_markers(const cv::Mat& frame, const sensors::TrackedMarkers* markers, double diameter) {
   cv::Mat filled = frame.clone();
-  if (markers != nullptr) sensors::fill_markers(filled, markers->positions, std::max(kFillRadius * diameter, 1.0));
+  if (markers != nullptr) sensors::fill_markers(filled, markers->positions, sensors::fill_radius_px(diameter));
   return filled;
 }
 

@@ -8,8 +8,6 @@
 #include "core/error.h"
 #include "lab/gelsight_force_experiment.h"
 #include "lab/gelsight_height_experiment.h"
-#include "sensors/contact_patch.h"
-#include "sensors/height_estimator.h"
 
 namespace touchstone::lab {
 
@@ -21,8 +19,8 @@ constexpr int kPressFrames = 4;
 constexpr int kHoldFrames = 3;
 constexpr int kLoadFrames = 10;
 constexpr double kClear_mm = 0.02;
-constexpr int kLeastPatch_px = 50;
-constexpr double kUnsheared = 0.05;  ///< of the limit
+constexpr double kUnsheared = 0.05;     ///< of the limit
+constexpr double kStillSticking = 0.9;  ///< of what sticks before the drag: with less, partial slip has begun
 constexpr double kRoll_mm = 1.2;
 /// How far a sliding object goes at most before it slides, mm for each N that friction holds, and mm at least.
 constexpr double kWay_mm_per_N = 3.0;
@@ -130,42 +128,36 @@ SlipRun run_slip_case(const sim::TouchRig& rig, const SlipCase& what, const Slip
                                       [](const sim::Truth& truth) { return share_sticking(truth.press) == 0.0; });
     if (sliding == truths.end()) fail("{}: doesn't slide on its way", what.name());
     const auto onset = static_cast<std::size_t>(sliding - truths.begin());
-    run.onset_s = static_cast<double>(onset) / (kStatesAFrame * frame_rate_Hz);
+    const auto time_of = [&](std::size_t state) {
+      return static_cast<double>(state) / (kStatesAFrame * frame_rate_Hz);
+    };
+    run.onset_s = time_of(onset);
+    const double at_rest = share_sticking(truths[first_drag].press);
+    std::size_t partial = first_drag;
+    while (share_sticking(truths[partial].press) > kStillSticking * at_rest) ++partial;
+    run.partial_s = time_of(partial);
     truths.resize(std::min(truths.size(), onset + as_count(frames_after * kStatesAFrame) + 1));
   }
 
-  const cv::Mat background = rig.background(seed, kBackgroundFrame);
-  const double diameter = marker_settings(rig).look.diameter_px;
-  sensors::MarkerTracker tracker(marker_settings(rig));
-  sensors::IncipientSlipDetector incipient(estimators.incipient);
-  sensors::HeightEstimator heights(estimators.heights);
-  const sensors::LinearForce& normal_line = sensors::normal_line(estimators.forces, what.object.name);
-  tracker.track({background, -1});
-  cv::Mat before = background;
-  cv::Mat contact;
+  sensors::TouchReader reader({.height = estimators.heights,
+                               .markers = marker_settings(rig),
+                               .background = rig.background(seed, kBackgroundFrame),
+                               .normal = sensors::normal_line(estimators.forces, what.object.name),
+                               .shear = sensors::shear_line(estimators.forces)},
+                              estimators.settings);
   for (std::size_t i = 0; i < truths.size(); i += kStatesAFrame) {
     const fem::PressState& state = truths[i].press;
     const cv::Mat image = rig.look(object, state, seed, static_cast<int>(i), false).frame;
-    const sensors::TrackedMarkers& markers = tracker.track({image, static_cast<std::int64_t>(i)});
-    const sensors::MotionRatio motion = sensors::motion_ratio(background, before, image, estimators.motion, &contact);
-    before = image;
-    sensors::erase_markers(contact, markers, diameter);
-    const auto patch = sensors::contact_patch(contact, kLeastPatch_px);
+    const sensors::TouchReading& touch = reader.read({image, static_cast<std::int64_t>(i)});
     SlipFrame frame;
     frame.t_s = static_cast<double>(i) / (kStatesAFrame * frame_rate_Hz);
     frame.load = load_of(state, what.object.friction);
     frame.sticking = share_sticking(state);
-    frame.motion_ratio = motion.ratio;
-    if (patch) {
-      const cv::Mat bare = without_markers(image, &markers, diameter);
-      const double sum = sensors::height_sum_mm3(heights.estimate(bare).height_mm, rig.mm_per_px());
-      const Eigen::Vector2d displacement_mm = sensors::mean_displacement(markers, *patch).px * rig.mm_per_px();
-      frame.force_ratio =
-          sensors::force_ratio(sensors::shear_force_N(estimators.forces, displacement_mm), normal_line.force_N(sum));
-    }
-    frame.rule = sensors::is_slip(frame.force_ratio, frame.motion_ratio, estimators.rule);
-    frame.incipient = incipient.look(markers, patch);
-    frame.markers_found = markers.found();
+    frame.force_ratio = touch.force_ratio;
+    frame.motion_ratio = touch.motion_ratio;
+    frame.rule = touch.rule_slip;
+    frame.rim = touch.rim;
+    frame.markers_found = touch.markers_found;
     run.frames.push_back(frame);
   }
   return run;
@@ -185,25 +177,24 @@ double SlipScore::false_alarms_percent() const {
 
 std::string to_csv(const std::vector<SlipRun>& runs) {
   std::string text =
-      "case,onset_s,t_s,load,sticking,force_ratio,motion_ratio,rule,lag,lag_error,slide_px,shear_px,state,markers\n";
+      "case,partial_s,onset_s,t_s,load,sticking,force_ratio,motion_ratio,rule,lag,lag_error,slide_px,shear_px,state,"
+      "markers\n";
   const auto known = [](const std::optional<double>& value) { return value ? fmt::format("{:.4f}", *value) : ""; };
   for (const SlipRun& run : runs) {
     for (const SlipFrame& frame : run.frames) {
-      text += fmt::format("\"{}\",{},{:.4f},{:.4f},{:.4f},{},{},{},{},{:.4f},{:.3f},{:.3f},{},{}\n", run.what.name(),
-                          known(run.onset_s), frame.t_s, frame.load, frame.sticking, known(frame.force_ratio),
-                          known(frame.motion_ratio), frame.rule ? 1 : 0, known(frame.incipient.lag),
-                          frame.incipient.lag_error, frame.incipient.slide_px, frame.incipient.shear_px,
-                          sensors::name_of(frame.incipient.state), frame.markers_found);
+      text += fmt::format("\"{}\",{},{},{:.4f},{:.4f},{:.4f},{},{},{},{},{:.4f},{:.3f},{:.3f},{},{}\n", run.what.name(),
+                          known(run.partial_s), known(run.onset_s), frame.t_s, frame.load, frame.sticking,
+                          known(frame.force_ratio), known(frame.motion_ratio), frame.rule ? 1 : 0, known(frame.rim.lag),
+                          frame.rim.lag_error, frame.rim.slide_px, frame.rim.shear_px,
+                          sensors::name_of(frame.rim.state), frame.markers_found);
     }
   }
   return text;
 }
 
-SlipScore score(const std::vector<SlipRun>& runs, SlipDetector detector) {
+SlipScore score(const std::vector<SlipRun>& runs, SlipDetector detector, double foretold_s) {
   const auto reports = [&](const SlipFrame& frame) {
-    return detector == SlipDetector::rule ? frame.rule
-                                          : frame.incipient.state == sensors::SlipState::kIncipient ||
-                                                frame.incipient.state == sensors::SlipState::kSliding;
+    return detector == SlipDetector::rule ? frame.rule : frame.rim.slips();
   };
   SlipScore result;
   for (const SlipRun& run : runs) {
@@ -220,11 +211,17 @@ SlipScore score(const std::vector<SlipRun>& runs, SlipDetector detector) {
       continue;
     }
     ++result.slides;
+    constexpr double kRounding_s = 1e-9;
+    const bool foretold = run.partial_s && *run.onset_s - *run.partial_s >= foretold_s - kRounding_s;
+    if (foretold) ++result.foretold;
     const auto found = std::find_if(loaded, run.frames.end(), reports);
     if (found == run.frames.end()) continue;
     ++result.found;
     const double delay_s = found->t_s - *run.onset_s;
-    if (delay_s <= 0.0) ++result.found_before;
+    if (delay_s <= 0.0) {
+      ++result.found_before;
+      if (foretold) ++result.foretold_before;
+    }
     result.delays_ms.push_back(1e3 * delay_s);
   }
   return result;

@@ -9,9 +9,7 @@
 
 #include "sensors/gel_force_model.h"
 #include "sensors/height_model.h"
-#include "sensors/incipient_slip.h"
-#include "sensors/motion_ratio.h"
-#include "sensors/slip_rule.h"
+#include "sensors/touch_reader.h"
 #include "sim/touch_rig.h"
 
 namespace touchstone::lab {
@@ -39,24 +37,24 @@ struct SlipFrame {
   double load = 0.0;      ///< true: shear force over friction times normal force
   double sticking = 0.0;  ///< true: share of the touching vertices
   std::optional<double> force_ratio, motion_ratio;
-  bool rule = false;  ///< the text's detector
-  sensors::IncipientSlip incipient;
+  bool rule = false;           ///< the text's detector
+  sensors::IncipientSlip rim;  ///< the second one
   int markers_found = 0;
 };
 
 struct SlipRun {
   SlipCase what;
   std::vector<SlipFrame> frames;
-  std::optional<double> onset_s;  ///< of gross sliding: the first state in which no touching vertex sticks
+  std::optional<double> onset_s;    ///< of gross sliding: the first state in which no touching vertex sticks
+  std::optional<double> partial_s;  ///< of partial slip in a slide: the first state of the drag in which a tenth of the
+                                    ///< vertices that stuck before it no longer do
 };
 
-/// What the two detectors are made of. The text's thresholds; the second detector's own (incipient_slip.h).
+/// What the two detectors are made of.
 struct SlipEstimators {
   sensors::HeightModel heights;   ///< of this gel
-  sensors::GelForceModel forces;  ///< with a line for each object by its name
-  sensors::MotionRatioSettings motion = {};
-  sensors::SlipThresholds rule = {};
-  sensors::IncipientSlipSettings incipient = {};
+  sensors::GelForceModel forces;  ///< with a line for each object by its name, and one for shear
+  sensors::TouchReaderSettings settings = {};
 };
 
 /// Plays and judges one case at the device's frame rate; states come four times as often, so the onset is known to a
@@ -70,9 +68,11 @@ struct SlipScore {
   int found = 0;                  ///< in which slip was reported at all
   int found_before = 0;           ///< not later than the onset
   std::vector<double> delays_ms;  ///< report - onset of those found; negative: before
-  int quiet_runs = 0;             ///< without an onset
-  int false_runs = 0;             ///< of those, with a report
-  int quiet_frames = 0;           ///< frames of quiet runs, and of the others' before any shear
+  int foretold = 0;         ///< slides whose partial slip lasts as long as score() was told: there's time to see it
+  int foretold_before = 0;  ///< of those, found not later than the onset
+  int quiet_runs = 0;       ///< without an onset
+  int false_runs = 0;       ///< of those, with a report
+  int quiet_frames = 0;     ///< frames of quiet runs, and of the others' before any shear
   int false_frames = 0;
 
   double median_delay_ms() const;       ///< NaN if none was found
@@ -85,7 +85,7 @@ std::string to_csv(const std::vector<SlipRun>& runs);
 
 enum class SlipDetector { rule, incipient };
 /// A detector reports from its first frame on that says slip; frames before an object's shear load reaches a twentieth
-/// of its limit are quiet ones.
-SlipScore score(const std::vector<SlipRun>& runs, SlipDetector detector);
+/// of its limit are quiet ones. `foretold_s`: how long partial slip has to last for SlipScore::foretold.
+SlipScore score(const std::vector<SlipRun>& runs, SlipDetector detector, double foretold_s = 0.0);
 
 }  // namespace touchstone::lab

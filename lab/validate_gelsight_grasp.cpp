@@ -94,7 +94,7 @@ std::vector<GraspTrial> trials_of(const std::vector<sim::ObjectSpec>& objects, b
 
 /// Plays the trials. `known`, if given, are outcomes of the same trials with at least as much answered to slip: where
 /// nothing was answered then, the same frames lead to the same end, and it isn't played again.
-Trials run(const sim::TouchRig& rig, const GraspCalibration& calibration, const std::vector<GraspTrial>& trials,
+Trials run(const sim::TouchRig& rig, const sensors::TouchCalibration& calibration, const std::vector<GraspTrial>& trials,
            const GraspLoopSettings& loop, const GraspSenseSettings& senses, const Trials* known = nullptr) {
   Trials result{trials, known != nullptr ? known->outcomes : std::vector<GraspOutcome>(trials.size())};
   tbb::parallel_for(std::size_t{0}, trials.size(), [&](std::size_t i) {
@@ -116,7 +116,7 @@ std::vector<ValidationRow> validate_gelsight_grasp(const ValidateOptions& option
     return sim::TouchRig(sim::read_device(options.scenes / "devices" / device), options.cache, light);
   };
   const sim::TouchRig rig = rig_of("gelsight-markers.yaml");
-  const GraspCalibration calibration = calibrate_for_grasps(rig_of("gelsight-flat.yaml"), rig, kSeed);
+  const sensors::TouchCalibration calibration = calibrate_for_grasps(rig_of("gelsight-flat.yaml"), rig, kSeed);
   std::vector<sim::ObjectSpec> objects;
   for (const char* name : {"egg.yaml", "chip.yaml", "leaf.yaml"}) {
     objects.push_back(sim::read_object(options.scenes / "objects" / name));

@@ -24,6 +24,7 @@ namespace {
 constexpr double kStronglyLinear_r2 = 0.95;
 constexpr double kPublishedTracking_Hz = 30.0;    // sec. 4.3: "about 25-30"
 constexpr double kMostFalseAlarms_percent = 5.0;  // of frames; ours to choose
+constexpr double kFramesToSee = 2.0;              // partial slip that lasts less may fall between frames
 constexpr double kShearDrag_mm = 0.45;            // it slides at some 0.3
 constexpr std::uint64_t kSeed = 4001;
 
@@ -175,8 +176,8 @@ void add_force_rows(Rows& rows, const sim::TouchRig& rig, const sensors::HeightM
            kStronglyLinear_r2, false, cylinder.truth.r2);
 }
 
-void add_slip_rows(Rows& rows, const std::vector<SlipRun>& runs) {
-  const SlipScore rim = score(runs, SlipDetector::incipient);
+void add_slip_rows(Rows& rows, const std::vector<SlipRun>& runs, double frame_rate_Hz) {
+  const SlipScore rim = score(runs, SlipDetector::incipient, kFramesToSee / frame_rate_Hz);
   const SlipScore rule = score(runs, SlipDetector::rule);
   const auto percent = [](int part, int whole) { return whole > 0 ? 100.0 * part / whole : 0.0; };
   rows.add("gelsight.slip.delay_ms",
@@ -184,6 +185,10 @@ void add_slip_rows(Rows& rows, const std::vector<SlipRun>& runs) {
            0.0, false, rim.median_delay_ms());
   rows.add("gelsight.slip.found_before_percent", "slides in which slip at the rim was found before gross sliding", "%",
            Better::higher, 90.0, false, percent(rim.found_before, rim.slides));
+  rows.add("gelsight.slip.found_before_of_foretold_percent",
+           fmt::format("the same of the {} slides of {} whose rim slips for {:g} frames or more before all does",
+                       rim.foretold, rim.slides, kFramesToSee),
+           "%", Better::higher, 90.0, false, percent(rim.foretold_before, rim.foretold));
   rows.add("gelsight.slip.false_alarms_percent",
            "frames with slip at the rim reported while pressing, holding, loaded to a half, rolling", "%",
            Better::lower, kMostFalseAlarms_percent, false, rim.false_alarms_percent());
@@ -226,7 +231,7 @@ std::vector<ValidationRow> validate_gelsight_slip(const ValidateOptions& options
   tbb::parallel_for(std::size_t{0}, cases.size(),
                     [&](std::size_t i) { runs[i] = run_slip_case(marked, cases[i], estimators, kSeed + 100 + i); });
   if (!options.scratch.empty()) write_whole_file(options.scratch / "gelsight-slip.csv", to_csv(runs));
-  add_slip_rows(rows, runs);
+  add_slip_rows(rows, runs, marked.device().camera->frame_rate_Hz);
   return rows.rows();
 }
 

@@ -31,10 +31,38 @@ void check(const cv::Mat& mask) {
   if (mask.empty() || mask.type() != CV_8UC1) fail("contact mask: CV_8UC1 is needed, not empty");
 }
 
+/// Whether a set pixel has fewer than three set neighbours: noise stands alone, a rim two pixels wide doesn't.
+bool is_speck(const cv::Mat& mask, int x, int y) {
+  int set = -1;  // itself doesn't count
+  for (int v = std::max(y - 1, 0); v <= std::min(y + 1, mask.rows - 1); ++v) {
+    const std::uint8_t* row = mask.ptr<std::uint8_t>(v);
+    for (int u = std::max(x - 1, 0); u <= std::min(x + 1, mask.cols - 1); ++u) set += row[u] != 0 ? 1 : 0;
+  }
+  return set < 3;
+}
+
+/// Calls use(x, y) for the set pixels, by rows, that are no specks and aren't far out of a patch.
+template <typename Use>
+void for_touched(const cv::Mat& mask, const ContactPatch& patch, Use&& use) {
+  for (int y = 0; y < mask.rows; ++y) {
+    const std::uint8_t* row = mask.ptr<std::uint8_t>(y);
+    for (int x = 0; x < mask.cols; ++x) {
+      if (row[x] != 0 && patch.reach_squared({x + 0.5, y + 0.5}) <= kFarOut && !is_speck(mask, x, y)) use(x, y);
+    }
+  }
+}
+
 }  // namespace
 
 void erase_markers(cv::Mat& mask, const TrackedMarkers& markers, double radius_px) {
   check(mask);
+  const int strip = std::min({static_cast<int>(std::ceil(std::max(radius_px, 0.0))), mask.rows, mask.cols});
+  for (int y = 0; y < mask.rows; ++y) {
+    std::uint8_t* row = mask.ptr<std::uint8_t>(y);
+    const bool outer = y < strip || y >= mask.rows - strip;
+    std::fill_n(row, outer ? mask.cols : strip, std::uint8_t{0});
+    std::fill_n(row + mask.cols - strip, strip, std::uint8_t{0});
+  }
   for (std::size_t i = 0; i < markers.rest.size(); ++i) {
     erase_disc(mask, markers.rest[i], radius_px);
     erase_disc(mask, markers.positions[i], radius_px);
@@ -44,21 +72,17 @@ void erase_markers(cv::Mat& mask, const TrackedMarkers& markers, double radius_p
 std::optional<ContactPatch> contact_patch(const cv::Mat& mask, int least_px) {
   check(mask);
   ContactPatch patch;
+  patch.edge.setZero();  // nothing is far out yet
   for (int round = 0; round < kRounds; ++round) {
     double count = 0.0;
     Eigen::Vector2d sum = Eigen::Vector2d::Zero();
     Eigen::Matrix2d squares = Eigen::Matrix2d::Zero();
-    for (int y = 0; y < mask.rows; ++y) {
-      const std::uint8_t* row = mask.ptr<std::uint8_t>(y);
-      for (int x = 0; x < mask.cols; ++x) {
-        if (row[x] == 0) continue;
-        const Eigen::Vector2d place(x + 0.5, y + 0.5);
-        if (round > 0 && patch.reach_squared(place) > kFarOut) continue;
-        count += 1.0;
-        sum += place;
-        squares += place * place.transpose();
-      }
-    }
+    for_touched(mask, patch, [&](int x, int y) {
+      const Eigen::Vector2d place(x + 0.5, y + 0.5);
+      count += 1.0;
+      sum += place;
+      squares += place * place.transpose();
+    });
     if (count < std::max(least_px, 1)) return std::nullopt;
     patch.area_px = count;
     patch.centre = sum / count;

@@ -70,11 +70,9 @@ const LinearForce& normal_line(const GelForceModel& model, const std::string& in
        did_you_mean(indenter, known));
 }
 
-Eigen::Vector2d shear_force_N(const GelForceModel& model, const Eigen::Vector2d& displacement_mm) {
+const LinearForce& shear_line(const GelForceModel& model) {
   if (!model.shear) fail("force model of {}: no line for shear", model.gel);
-  const double length = displacement_mm.norm();
-  if (!(length > 0.0)) return Eigen::Vector2d::Zero();
-  return std::max(model.shear->force_N(length), 0.0) / length * displacement_mm;
+  return *model.shear;
 }
 
 std::string fault_of(const GelForceModel& model) {

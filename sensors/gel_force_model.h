@@ -25,9 +25,8 @@ struct GelForceModel {
 /// The line for an indenter. @throws Error naming those that the model has
 const LinearForce& normal_line(const GelForceModel& model, const std::string& indenter);
 
-/// Shear force (N, along the picture's u and v) for a mean marker displacement (mm). It has the displacement's
-/// direction: a gel is as stiff along u as along v. @throws Error if the model has no line for shear
-Eigen::Vector2d shear_force_N(const GelForceModel& model, const Eigen::Vector2d& displacement_mm);
+/// The line for shear (shear_force_N in linear_force.h). @throws Error if the model has none
+const LinearForce& shear_line(const GelForceModel& model);
 
 /// What makes the model unusable, or "": nothing in it, an indenter without a name or twice, a number that isn't
 /// finite, a slope that isn't positive, r2 above 1, a residual below 0, an empty range, fewer than three samples.

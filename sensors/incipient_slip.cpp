@@ -1,6 +1,7 @@
 #include "sensors/incipient_slip.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
@@ -12,6 +13,15 @@ namespace {
 
 /// Terms of the field: translation (2), turn, swelling, lag (2).
 constexpr int kTerms = 6;
+/// How much less a surface lags along the motion than across it (K. L. Johnson, Contact Mechanics, eq. 3.91, for a
+/// Poisson's ratio of 1/2: 2.5 x^2 + 3.5 y^2 along, -x y across).
+constexpr double kAlong = 2.0 / 7.0;
+/// A patch slides over the markers while they move by less than this part of its own motion against them. While they
+/// move more it carries them, and is ahead of their mean by what the rim lags.
+constexpr double kCarried = 0.5;
+/// A mask that covers less of its patch is the rim of a flat end. Now this part of a rim is seen and now that, and the
+/// patch's middle wanders with them: it tells no sliding.
+constexpr double kLeastCover = 0.15;
 /// Below this part of its largest one, a pivot says that the markers' places can't tell the terms apart.
 constexpr double kLeastPivot = 1e-6;
 
@@ -69,17 +79,21 @@ bool IncipientSlipDetector::fit_lag(const TrackedMarkers& markers, const Contact
   Eigen::Matrix<double, kTerms, kTerms> normal = Eigen::Matrix<double, kTerms, kTerms>::Zero();
   Eigen::Matrix<double, kTerms, 1> right = Eigen::Matrix<double, kTerms, 1>::Zero();
   const double scale = 1.0 / std::sqrt(std::max(patch.area_px, 1.0));
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes;
+  axes.computeDirect(patch.edge);
+  const Eigen::Matrix2d to_unit = axes.operatorSqrt();  // the patch becomes the unit circle
   double squares = 0.0;
   int count = 0;
   for (std::size_t i = 0; i < markers.rest.size(); ++i) {
     const Eigen::Vector2d& place = markers.positions[i];
     if (!is_found(markers.status[i]) || past.found[i] == 0 || !is_on(patch, place)) continue;
     const Eigen::Vector2d x = scale * (place - patch.centre);
-    const double q = patch.reach_squared(place);
+    const Eigen::Vector2d z = to_unit * (place - patch.centre);
+    const Eigen::Matrix2d lag = z.squaredNorm() * Eigen::Matrix2d::Identity() - kAlong * z * z.transpose();
     const Eigen::Vector2d u = markers.displacement(i) - past.displacement[i];
     Eigen::Matrix<double, 2, kTerms> terms;
-    terms << 1, 0, -x.y(), x.x(), -q, 0,  //
-        0, 1, x.x(), x.y(), 0, -q;
+    terms << 1, 0, -x.y(), x.x(), -lag(0, 0), -lag(0, 1),  //
+        0, 1, x.x(), x.y(), -lag(1, 0), -lag(1, 1);
     normal += terms.transpose() * terms;
     right += terms.transpose() * u;
     squares += u.squaredNorm();
@@ -115,6 +129,8 @@ void IncipientSlipDetector::find_lag(const TrackedMarkers& markers, const Contac
 void IncipientSlipDetector::find_slide(const TrackedMarkers& markers, const ContactPatch& patch) {
   const MeanDisplacement now = mean_displacement(markers, patch);
   result_.shear_px = now.px.norm();
+  if (!(result_.shear_px > 0.0) || patch.cover() < kLeastCover) return;
+  const Eigen::Vector2d ahead = now.px / result_.shear_px;
   for (int frames = 1; frames <= kept_; ++frames) {
     const Past& past = back(frames);
     Eigen::Vector2d motion = Eigen::Vector2d::Zero();
@@ -125,8 +141,9 @@ void IncipientSlipDetector::find_slide(const TrackedMarkers& markers, const Cont
       ++count;
     }
     if (count < settings_.least_markers) continue;
-    const double slide = (patch.centre - past.patch_centre - motion / count).norm();
-    result_.slide_px = std::max(result_.slide_px, slide);
+    motion /= count;
+    const double slide = (patch.centre - past.patch_centre - motion).dot(ahead);
+    if (motion.norm() <= kCarried * slide) result_.slide_px = std::max(result_.slide_px, slide);
   }
 }
 

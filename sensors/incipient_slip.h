@@ -6,15 +6,17 @@
 //
 // Over the last few frames, in which the contact's middle moved by `least_motion_px` or more, the markers on the
 // contact patch moved by u(x). That is taken apart by least squares into
-//   u = t + w J x + s x - l q(x),
-// a translation t (of the middle), a turn w, a swelling s (pressing spreads the gel), and a lag l that grows from the
-// middle to the edge with q = the squared distance over the edge's (of the part of the patch that is looked at). While
-// all sticks the field moves with the object and l is small; where a rim slips, it stays behind: l.t/|t|^2 goes to 1 as
-// the stick zone shrinks.
+//   u = t + w J x + s x - (|z|^2 l - 2/7 z (z.l)),
+// a translation t (of the middle), a turn w, a swelling s (pressing spreads the gel), and a lag l that grows with the
+// squared distance from the middle; z is x in units of the edge (of the part of the patch that is looked at). While all
+// sticks the field moves with the object and l is small; where a rim slips, it stays behind: l.t/|t|^2 grows to some 1
+// as the stick zone shrinks. The second part of the lag is what an incompressible gel does under a round contact that
+// slips (K. L. Johnson, Contact Mechanics, eq. 3.91): its surface lags less along the motion than across it.
 //
 // Once the whole contact slides, the markers stand still and there's no lag to be seen. Then the patch itself moves
-// over the markers (`sliding`): by `slide_px` within the frames kept, while the gel is sheared by `least_shear_px` or
-// more. Without that shear a ball that rolls in would look the same.
+// over the markers (`sliding`), the way they are sheared: by `slide_px` within the frames kept, while they go less than
+// half as far, and the gel is sheared by `least_shear_px` or more. Without that shear a ball that rolls in would look
+// the same.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -29,12 +31,12 @@ namespace touchstone::sensors {
 struct IncipientSlipSettings {
   int history_frames = 15;       ///< how far back motion is sought (0.5 s at 30 frames/s); 2 to 1000
   double least_motion_px = 0.7;  ///< of the middle; below, noise of the centroids is too large a part of it. Above 0
-  /// Markers within this part of the patch's size are taken to lie on the object. A mask of pixels that differ from the
-  /// background is larger than the contact, since the gel slopes down beside it: under balls 1.15 to 1.35 times. 0.2 to
-  /// 1
-  double patch_part = 0.75;
+  /// Markers within this part of the patch's size have a say. A mask of pixels that differ from the background is
+  /// larger than the contact, since the gel slopes down beside it: under balls 1.15 to 1.35 times. So the outermost of
+  /// these markers lie just beside the contact, where most of the lag is. 0.2 to 1
+  double patch_part = 0.9;
   int least_markers = 6;        ///< on the patch, measured now and then; at least 6
-  double lag_threshold = 0.5;   ///< 0 to 2
+  double lag_threshold = 0.55;  ///< 0 to 2
   double certainty = 2.0;       ///< the lag less so many of its standard errors must pass the threshold; 0 to 10
   double slide_px = 3.0;        ///< above 0
   double least_shear_px = 2.0;  ///< mean displacement of the patch's markers since rest; at least 0
@@ -58,6 +60,9 @@ struct IncipientSlip {
   int markers = 0;            ///< that the fit went through
   double slide_px = 0.0;      ///< how far the patch moved over the markers within the frames kept
   double shear_px = 0.0;      ///< mean displacement since rest
+
+  /// At the rim, or of the whole contact.
+  bool slips() const { return state == SlipState::kIncipient || state == SlipState::kSliding; }
 };
 
 /// Looks at frames of one tracker, in their order. After the first nothing is allocated. One object is for one thread.

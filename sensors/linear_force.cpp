@@ -51,6 +51,12 @@ LinearForce fit_linear_force(std::span<const double> measure, std::span<const do
   return fit;
 }
 
+Eigen::Vector2d shear_force_N(const LinearForce& line, const Eigen::Vector2d& displacement_mm) {
+  const double length = displacement_mm.norm();
+  if (!(length > 0.0)) return Eigen::Vector2d::Zero();
+  return std::max(line.force_N(length), 0.0) / length * displacement_mm;
+}
+
 double height_sum_mm3(const cv::Mat& height_mm, double mm_per_px) {
   if (height_mm.empty() || height_mm.type() != CV_32FC1) fail("height sum: a height map of type CV_32FC1 is needed");
   if (!(mm_per_px > 0.0) || !std::isfinite(mm_per_px))

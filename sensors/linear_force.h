@@ -3,6 +3,7 @@
 // height map, for each shape of indenter; shear force of the mean marker displacement, for each gel. Good for the gel,
 // and the shape, that it was fitted to, and within the range that it saw.
 
+#include <Eigen/Core>
 #include <opencv2/core/mat.hpp>
 #include <span>
 
@@ -31,6 +32,10 @@ enum class FitLine {
 /// Least squares in the force. @throws Error for lists of unequal lengths, fewer than three samples, a value that isn't
 /// finite, or measures (or forces) that are all equal
 LinearForce fit_linear_force(std::span<const double> measure, std::span<const double> force_N, FitLine line);
+
+/// Shear force (N, along the picture's u and v) of a mean marker displacement (mm) by a gel's line for shear. It has
+/// the displacement's direction: a gel is as stiff along u as along v.
+Eigen::Vector2d shear_force_N(const LinearForce& line, const Eigen::Vector2d& displacement_mm);
 
 /// The sum of a height map times a pixel's area: the volume of the dent, so that a fit doesn't depend on the
 /// resolution. Heights below 0 count too, so noise has no mean. @throws Error unless the map is CV_32FC1 (mm), not

@@ -11,8 +11,9 @@ namespace touchstone::sensors {
 
 namespace {
 
-constexpr double kRing = 2.0;      ///< its outer radius, in radii
-constexpr int kLeastRing_px = 12;  ///< for a plane
+constexpr double kFillRadius = 0.8;  ///< of a marker's diameter
+constexpr double kRing = 2.0;        ///< its outer radius, in radii
+constexpr int kLeastRing_px = 12;    ///< for a plane
 
 /// Calls use(x, y, distance) for the pixels of the picture whose centres are within `reach` of a place.
 template <typename Use>
@@ -66,6 +67,10 @@ void fill_markers(cv::Mat& picture, std::span<const Eigen::Vector2d> places, dou
   for (const Eigen::Vector2d& place : places) {
     if (place.allFinite()) fill_marker(picture, place, radius_px);
   }
+}
+
+double fill_radius_px(double diameter_px) {
+  return std::max(kFillRadius * diameter_px, 1.0);
 }
 
 }  // namespace touchstone::sensors

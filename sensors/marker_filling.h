@@ -14,4 +14,7 @@ namespace touchstone::sensors {
 /// @throws Error unless the picture is 8 bit and BGR, and the radius is at least 1
 void fill_markers(cv::Mat& picture, std::span<const Eigen::Vector2d> places, double radius_px);
 
+/// For markers of a diameter: their ink, rim and blur are within it. At least 1.
+double fill_radius_px(double diameter_px);
+
 }  // namespace touchstone::sensors

@@ -73,6 +73,9 @@ class MarkerTracker {
   ///   time that isn't later than the last frame's. The tracker is then as it was before the call
   const TrackedMarkers& track(const Frame& frame);
 
+  /// What the last call of track() returned; empty before the first.
+  const TrackedMarkers& tracked() const { return result_; }
+
   /// Forgets all frames: the next one is the gel at rest.
   void restart() { result_.rest.clear(); }
 

@@ -18,12 +18,11 @@ SlipRun run_with(std::optional<double> onset_s, const std::vector<int>& rule, co
     SlipFrame frame;
     frame.t_s = i / 30.0;
     frame.load = i < 4 ? 0.0 : std::min(0.2 * (i - 3), 1.0);
-    frame.incipient.state = sensors::SlipState::kSticking;
+    frame.rim.state = sensors::SlipState::kSticking;
     run.frames.push_back(frame);
   }
   for (const int i : rule) run.frames[static_cast<std::size_t>(i)].rule = true;
-  for (const int i : incipient)
-    run.frames[static_cast<std::size_t>(i)].incipient.state = sensors::SlipState::kIncipient;
+  for (const int i : incipient) run.frames[static_cast<std::size_t>(i)].rim.state = sensors::SlipState::kIncipient;
   return run;
 }
 
@@ -52,6 +51,18 @@ TEST(SlipScore, ReportsWithoutSlipAreFalseAlarms) {
   EXPECT_EQ(result.found, 0);
   EXPECT_TRUE(std::isnan(result.median_delay_ms()));
   EXPECT_EQ(score({}, SlipDetector::rule).false_alarms_percent(), 0.0);
+}
+
+TEST(SlipScore, OnlySlidesWithTimeEnoughAreForetold) {
+  std::vector<SlipRun> runs = {run_with(8.0 / 30.0, {}, {7}), run_with(8.0 / 30.0, {}, {9}),
+                               run_with(8.0 / 30.0, {}, {9})};
+  runs[0].partial_s = 6.0 / 30.0;  // two frames
+  runs[1].partial_s = 5.0 / 30.0;
+  runs[2].partial_s = 7.0 / 30.0;
+  const SlipScore result = score(runs, SlipDetector::incipient, 2.0 / 30.0);
+  EXPECT_EQ(result.slides, 3);
+  EXPECT_EQ(result.foretold, 2);
+  EXPECT_EQ(result.foretold_before, 1);
 }
 
 TEST(SlipScore, ACaseHasANameThatTellsItApart) {

@@ -111,12 +111,13 @@ TEST(GelForceModel, AFileGivesTheSameBitsBack) {
   EXPECT_FALSE(gel_force_model_from_json(to_json(without_shear), "x").shear);
 }
 
-TEST(GelForceModel, ShearForceHasTheDisplacementsDirection) {
+TEST(LinearForce, ShearForceHasTheDisplacementsDirection) {
   const GelForceModel model = model_of_two_balls();
-  const Eigen::Vector2d force = shear_force_N(model, {0.3, -0.4});
-  EXPECT_NEAR(force.norm(), model.shear->force_N(0.5), 1e-14);
+  const LinearForce& line = shear_line(model);
+  const Eigen::Vector2d force = shear_force_N(line, {0.3, -0.4});
+  EXPECT_NEAR(force.norm(), line.force_N(0.5), 1e-14);
   EXPECT_NEAR(force.x() / force.y(), -0.75, 1e-12);
-  EXPECT_EQ(shear_force_N(model, {0, 0}), Eigen::Vector2d(0, 0));
+  EXPECT_EQ(shear_force_N(line, {0, 0}), Eigen::Vector2d(0, 0));
 }
 
 TEST(GelForceModel, WhatIsntThereIsNamed) {
@@ -128,7 +129,7 @@ TEST(GelForceModel, WhatIsntThereIsNamed) {
     EXPECT_NE(std::string(error.what()).find("did you mean 'ball 12.7 mm'"), std::string::npos) << error.what();
   }
   model.shear.reset();
-  EXPECT_THROW(shear_force_N(model, {1, 0}), Error);
+  EXPECT_THROW(shear_line(model), Error);
 }
 
 TEST(GelForceModel, FaultyFilesAreRefused) {

@@ -90,6 +90,25 @@ TEST(ContactPatch, SpecksFarOutDontWidenIt) {
   EXPECT_NEAR(patch->reach_squared(kCentre + Eigen::Vector2d(kRadius, 0)), 1.0, 0.05);
 }
 
+TEST(ContactPatch, MarkersCutByTheBorderAreErasedWithTheOthers) {
+  Field field;
+  cv::Mat mask = disc(kCentre, kRadius);
+  cv::Mat with_specks = mask.clone();
+  for (int y = 10; y < 230; y += 22) with_specks(cv::Rect(0, y, 5, 5)).setTo(255);
+  erase_markers(mask, field.markers, 7.5);
+  erase_markers(with_specks, field.markers, 7.5);
+  EXPECT_EQ(cv::norm(mask, with_specks, cv::NORM_INF), 0.0);
+}
+
+TEST(ContactPatch, ARingCoversLittleOfItsPatch) {
+  const cv::Mat filled = disc(kCentre, kRadius);
+  const cv::Mat ring = filled - disc(kCentre, 0.93 * kRadius);
+  const auto patch = contact_patch(filled, 50), rim = contact_patch(ring, 50);
+  ASSERT_TRUE(patch && rim);
+  EXPECT_NEAR(patch->cover(), 1.0, 0.01);
+  EXPECT_LT(rim->cover(), 0.15);
+}
+
 TEST(ContactPatch, NothingAndTooLittleIsNoPatch) {
   cv::Mat mask(240, 320, CV_8UC1, cv::Scalar(0));
   EXPECT_FALSE(contact_patch(mask, 50));
