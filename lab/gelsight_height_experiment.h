@@ -39,9 +39,8 @@ struct CalibrationPresses {
   int rows = 3;
   Eigen::Vector2d extent_mm = {11.0, 7.6};  ///< between the outermost places
   std::vector<double> depths_mm = {0.35, 0.6};
-  double wide_ball_diameter_mm =
-      10.0;                         ///< sec. 2.2.2: a larger one has more pixels; slopes are those of its touched part
-  double wide_ball_depth_mm = 0.3;  ///< 0: without the wide ball
+  double wide_ball_diameter_mm = 10.0;  ///< sec. 2.2.2: a larger one has more pixels
+  double wide_ball_depth_mm = 0.3;      ///< 0: without the wide ball
   int background_frames = 8;
   double annotation_px = 0.3;   ///< standard deviation of each coordinate and of the radius
   double most_saturated = 0.5;  ///< of a press's pixels
