@@ -39,7 +39,7 @@ struct CalibrationPresses {
   int rows = 3;
   Eigen::Vector2d extent_mm = {11.0, 7.6};  ///< between the outermost places
   std::vector<double> depths_mm = {0.35, 0.6};
-  double wide_ball_diameter_mm = 10.0;  ///< sec. 2.2.2: "for a larger semisphere" the table is to be adjusted
+  double wide_ball_diameter_mm = 10.0;  ///< sec. 2.2.2: a larger one has more pixels
   double wide_ball_depth_mm = 0.3;      ///< 0: without the wide ball
   int background_frames = 8;
   double annotation_px = 0.3;   ///< standard deviation of each coordinate and of the radius
