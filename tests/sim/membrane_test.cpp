@@ -113,6 +113,23 @@ TEST(Membrane, TheSheetIsWholeAndItsWetPartLiesOnTheObject) {
   EXPECT_LT(worst, 1e-4);
 }
 
+TEST(Membrane, AGridThatEndsOnTheSurfacesEdgeLeavesNoSliver) {
+  const SceneSpec scene = scene_with(kWaves);
+  const Plan plan = make_plan(scene);
+  const auto truths = play_motion(scene, plan, gel());
+  const Membrane membrane(scene, plan, gel());
+  auto relief = membrane.relief(truths.back().press);
+  ASSERT_TRUE(relief);
+  relief->grid.first.x() = -5.0 + 4e-15;  // the gel's edge, but for rounding
+  const Membrane::Sheet sheet = membrane.sheet(truths.back().press, *relief);
+  for (const TriangleMesh* part : {&sheet.dry, &sheet.wet}) {
+    for (const auto& t : part->triangles) {
+      const auto corner = [&](std::size_t k) { return part->vertices[static_cast<std::size_t>(t[k])]; };
+      ASSERT_GT((corner(1) - corner(0)).cross(corner(2) - corner(0)).norm(), 1e-9);
+    }
+  }
+}
+
 TEST(Membrane, RefusesAHeightMapWithoutEnd) {
   SceneSpec scene = scene_with(kWaves);
   scene.membrane.height_size_mm = Eigen::Vector2d(900, 1);
