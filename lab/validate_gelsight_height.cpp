@@ -2,6 +2,8 @@
 // visible, rate. Calibrated on the simulated device with a 2 mm ball as a user would, tested on what calibration never
 // saw.
 
+#include <fmt/format.h>
+
 #include <chrono>
 #include <cmath>
 #include <ctime>
@@ -265,8 +267,13 @@ std::vector<ValidationRow> validate_gelsight_height(const ValidateOptions& optio
   const auto add_resolution = [&](const std::string& id, const std::string& pixels,
                                   const std::vector<Transfer>& curve) {
     const double pitch_um = kMicrometresPerMillimetre * resolved_pitch_mm(curve);
-    ValidationRow& row = add(id, "pitch of a pressed grating at which a tenth of its contrast is left, " + pixels, "um",
-                             pitch_um, Better::lower, pitch_um <= kPublishedResolution_um);
+    const double groove_um = 0.5 * pitch_um;
+    ValidationRow& row = add(
+        id,
+        fmt::format("width of a pressed grating's grooves (its pitch is {:.0f} um) at which a tenth of its contrast "
+                    "is left, {}",
+                    pitch_um, pixels),
+        "um", groove_um, Better::lower, groove_um <= kPublishedResolution_um);
     row.published = kPublishedResolution_um;
     ValidationSeries series{"pitch, mm", "contrast of the estimate / of the grating", {}};
     for (const Transfer& transfer : curve) series.points.emplace_back(transfer.pitch_mm, transfer.estimate);
