@@ -94,8 +94,9 @@ std::vector<GraspTrial> trials_of(const std::vector<sim::ObjectSpec>& objects, b
 
 /// Plays the trials. `known`, if given, are outcomes of the same trials with at least as much answered to slip: where
 /// nothing was answered then, the same frames lead to the same end, and it isn't played again.
-Trials run(const sim::TouchRig& rig, const sensors::TouchCalibration& calibration, const std::vector<GraspTrial>& trials,
-           const GraspLoopSettings& loop, const GraspSenseSettings& senses, const Trials* known = nullptr) {
+Trials run(const sim::TouchRig& rig, const sensors::TouchCalibration& calibration,
+           const std::vector<GraspTrial>& trials, const GraspLoopSettings& loop, const GraspSenseSettings& senses,
+           const Trials* known = nullptr) {
   Trials result{trials, known != nullptr ? known->outcomes : std::vector<GraspOutcome>(trials.size())};
   tbb::parallel_for(std::size_t{0}, trials.size(), [&](std::size_t i) {
     if (known != nullptr && known->outcomes[i].slip_answers == 0) return;

@@ -10,10 +10,11 @@ namespace touchstone::sensors {
 /// How the rule goes about. Lengths are of one finger's way: a gripper of two fingers closes by twice that.
 struct GraspRuleSettings {
   /// Touch is where the height map's maximum exceeds this. The text's threshold is 2 without a unit; in a map that is
-  /// integrated from slopes without a pixel pitch that is two pixels, 0.106 mm. Half of it is still nine times the most
-  /// that an untouched gel shows (0.0056 mm in 300 frames of gelsight-markers), and takes less force to see a touch
-  /// that is wide and flat.
-  double touch_height_mm = 0.05;
+  /// integrated from slopes without a pixel pitch that is two pixels, 0.106 mm. Less takes less force to see a touch
+  /// that is wide and flat; much less leaves patches on which slip can't be seen: an object with a radius of 20 mm has
+  /// one of 1.7 mm here, which six markers lie on. An untouched gel shows at most 0.006 mm (gelsight-markers, 300
+  /// frames).
+  double touch_height_mm = 0.075;
   int touch_frames = 2;               ///< frames in a row that must say so: noise in one of them is no touch
   double approach_step_mm = 0.02;     ///< a frame, until touch
   double longest_approach_mm = 30.0;  ///< without touch after that the rule gives up
@@ -23,7 +24,7 @@ struct GraspRuleSettings {
   int settle_frames = 3;
   double most_slip_travel_mm = 1.0;           ///< closing by slip ends here
   std::optional<double> most_normal_force_N;  ///< and at this estimated normal force, if one is given
-  double lost_height_mm = 0.03;               ///< the object is lost where the maximum stays below this...
+  double lost_height_mm = 0.02;               ///< the object is lost where the maximum stays below this...
   int lost_frames = 5;                        ///< ...for so many frames in a row after touch
   bool answer_slip = true;                    ///< false: the text's step 2 is left out, for comparison
 };
