@@ -9,12 +9,12 @@
 #include "core/error.h"
 #include "core/random.h"
 #include "core/units.h"
+#include "lab/validation.h"
 
 namespace touchstone::lab {
 namespace {
 
 constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
-constexpr double kNormal95 = 1.96;
 
 /// How a jig or gripper holds the object a little otherwise each time: half a millimetre, two degrees, tilted by a
 /// quarter of a degree, a fifth of the depth.

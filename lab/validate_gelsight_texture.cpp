@@ -22,7 +22,6 @@ constexpr sensors::TextureOperator kNarrow{{8, 1.0}, 4};
 constexpr double kGrayStep_mm = 0.002;  // chosen before any sample was made: far below every surface's relief
 constexpr std::uint64_t kSeed = 1;
 constexpr int kSquares = 4;
-constexpr double kNormal95 = 1.96;
 
 /// In the quick form: some of each kind, with the ones that are hard to tell apart.
 std::vector<sim::ObjectSpec> some_of(const std::vector<sim::ObjectSpec>& objects) {

@@ -17,6 +17,9 @@ namespace touchstone::lab {
 enum class Better { lower, higher, near };
 std::string name_of(Better better);
 
+/// Half of a 95 % interval, in standard errors of a normal distribution.
+inline constexpr double kNormal95 = 1.96;
+
 /// How a row's error goes with what it costs or how finely it was made, for a logarithmic plot.
 struct ValidationSeries {
   std::string x_label;
