@@ -1,18 +1,16 @@
 #pragma once
 // Coverages of pixels, of 255. For the .cpp files of ColourMarkerFinder only.
 
-#include <algorithm>
-
 namespace touchstone::sensors {
 
 inline constexpr int kHalfCovered = 128;
-inline constexpr double kNoCoverage = 0.15;  ///< noise, and what ink and filter take of each other's channel
-inline constexpr double kFullCoverage = 0.85;
+/// Less is noise of white.
+inline constexpr double kLeastCoverage = 0.06;
 
-/// What a pixel counts by: 0 up to kNoCoverage, 1 from kFullCoverage on. The ramp between is symmetric about a half, so
-/// a blurred rim counts as much as a sharp one.
+/// What a pixel counts by, 0 to 1: as much as is covered of it, so a rim counts right wherever it cuts a pixel.
 inline double weight_of(int coverage) {
-  return std::clamp((coverage / 255.0 - kNoCoverage) / (kFullCoverage - kNoCoverage), 0.0, 1.0);
+  const double part = coverage / 255.0;
+  return part < kLeastCoverage ? 0.0 : part;
 }
 
 }  // namespace touchstone::sensors

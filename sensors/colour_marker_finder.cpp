@@ -20,18 +20,22 @@ constexpr double kLatticePixels = 6e6;     ///< the grid is sought in no larger 
 constexpr int kDarkest = 24;               ///< of kWhite: darker pixels have no colour
 constexpr double kColouredRatio = 0.6;     ///< a channel below this part of the largest is taken out by ink or filter
 constexpr double kLeastColourShare = 0.1;  ///< of the coloured pixels, that each of ink and filter must have at rest
-constexpr double kLeastFilter = 0.4;       ///< of the usual area: a filter
+constexpr int kWhollyCovered = 230;        ///< of 255
+constexpr int kMostInkOfFilter = 77;       ///< of 255, that a filter alone looks like
+constexpr int kLeastBareFilter_px = 16;
+constexpr double kBareFilter = 0.25;  ///< so many filter pixels have no ink at all, if filter shows beside it
+constexpr double kLeastFilter = 0.4;  ///< of the usual area: a filter
 
 void check_range(const char* name, double value, double low, double high) {
   if (!(value >= low && value <= high))
     fail("coloured marker {} is {}, it must be from {} to {}", name, value, low, high);
 }
 
-/// The bin that the middle one of all that were counted is in.
-int median_of(const std::array<int, 256>& counts) {
-  const int half = std::accumulate(counts.begin(), counts.end(), 0) / 2;
+/// The bin below which a part of all that were counted are.
+int level_of(const std::array<int, 256>& counts, double part) {
+  const double enough = part * std::accumulate(counts.begin(), counts.end(), 0);
   int sum = 0, level = 0;
-  while (level < 255 && (sum += counts[static_cast<std::size_t>(level)]) <= half) ++level;
+  while (level < 255 && (sum += counts[static_cast<std::size_t>(level)]) <= enough) ++level;
   return level;
 }
 
@@ -57,8 +61,8 @@ struct ColourCounts {
       fail("coloured markers: the picture at rest shows {} in {} of {} coloured pixels, at least {:.0f} % are needed",
            what, count, coloured, 100.0 * kLeastColourShare);
     }
-    const double m = std::min(1.0, static_cast<double>(median_of(brightest)) / ColourLevelling::kWhite);
-    const double g = m * median_of(ratios) / 255.0;
+    const double m = std::min(1.0, static_cast<double>(level_of(brightest, 0.5)) / ColourLevelling::kWhite);
+    const double g = m * level_of(ratios, 0.5) / 255.0;
     std::array<std::uint8_t, 256> table{};
     for (int ratio = 0; ratio < 256; ++ratio) {
       const double q = ratio / 255.0;
@@ -186,14 +190,45 @@ void ColourMarkerFinder::classify() {
     const std::uint8_t* bgr = levelled_.ptr<std::uint8_t>(y);
     std::uint8_t* ink = ink_.ptr<std::uint8_t>(y);
     std::uint8_t* filter = filter_.ptr<std::uint8_t>(y);
-    std::uint8_t* core = core_.ptr<std::uint8_t>(y);
     for (int x = 0; x < levelled_.cols; ++x, bgr += 3) {
       const int highest = std::max({bgr[0], bgr[1], bgr[2]});
       const int per = highest < kDarkest ? 0 : kReciprocal[static_cast<std::size_t>(highest)];
       const bool has_colour = per != 0;
       ink[x] = has_colour ? ink_of_ratio_[static_cast<std::size_t>((bgr[1] * per) >> 16)] : std::uint8_t{0};
       filter[x] = has_colour ? filter_of_ratio_[static_cast<std::size_t>((bgr[0] * per) >> 16)] : std::uint8_t{0};
-      core[x] = ink[x] >= kHalfCovered;
+    }
+  }
+  take_filter_from_ink();
+  for (int y = 0; y < levelled_.rows; ++y) {
+    const std::uint8_t* ink = ink_.ptr<std::uint8_t>(y);
+    std::uint8_t* core = core_.ptr<std::uint8_t>(y);
+    for (int x = 0; x < levelled_.cols; ++x) core[x] = ink[x] >= kHalfCovered;
+  }
+}
+
+void ColourMarkerFinder::take_filter_from_ink() {
+  std::array<int, 256> counts{};
+  for (int y = 0; y < levelled_.rows; ++y) {
+    const std::uint8_t* ink = ink_.ptr<std::uint8_t>(y);
+    const std::uint8_t* filter = filter_.ptr<std::uint8_t>(y);
+    for (int x = 0; x < levelled_.cols; ++x) {
+      if (filter[x] >= kWhollyCovered && ink[x] < kMostInkOfFilter) ++counts[ink[x]];
+    }
+  }
+  // Where hardly any filter is without ink, none of its rims matters.
+  if (std::accumulate(counts.begin(), counts.end(), 0) < kLeastBareFilter_px) return;
+  const double of_filter = level_of(counts, kBareFilter) / 255.0;
+  std::array<float, 256> share{}, rest{};
+  for (std::size_t f = 0; f < 256; ++f) {
+    share[f] = static_cast<float>(of_filter * static_cast<double>(f));
+    rest[f] = static_cast<float>(1.0 / (1.0 - of_filter * static_cast<double>(f) / 255.0));
+  }
+  for (int y = 0; y < levelled_.rows; ++y) {
+    std::uint8_t* ink = ink_.ptr<std::uint8_t>(y);
+    const std::uint8_t* filter = filter_.ptr<std::uint8_t>(y);
+    for (int x = 0; x < levelled_.cols; ++x) {
+      const float less = (static_cast<float>(ink[x]) - share[filter[x]]) * rest[filter[x]];
+      ink[x] = static_cast<std::uint8_t>(std::max(less, 0.0F) + 0.5F);
     }
   }
 }

@@ -10,8 +10,8 @@
 // - Filters are rigid: where they are is known from the picture at rest. A patch of ink belongs to the filter that most
 //   of it is under (ink_ownership.h), what is filter without ink to that filter's cell. So regions that touch are told
 //   apart, and ink may reach a little under a neighbour's filter.
-// - Centroids and areas weigh a rim pixel by what is covered of it (coverages below 0.15 count as none and those above
-//   0.85 as whole), so a marker of 4 x 4 px has them to parts of a pixel.
+// - Centroids and areas weigh a rim pixel by what is covered of it, so a marker of 4 x 4 px has them to parts of a
+// pixel.
 // - The mean hue is the circular mean, as hue wraps at red, over pixels of more than half saturation, as the text has
 // it.
 
@@ -77,6 +77,7 @@ class ColourMarkerFinder {
   void learn_colours();
   void place_filters(const std::vector<Eigen::Vector2d>& places);
   void classify();
+  void take_filter_from_ink();  ///< what a filter alone takes of green isn't ink
   void find_ink();
   int patch_near(int x, int y) const;
   void add_up();

@@ -73,7 +73,7 @@ int ColourMarkerFinder::patch_near(int x, int y) const {
 
 void ColourMarkerFinder::add_up() {
   sums_.assign(filter_place_.size(), {});
-  const int least_ink = static_cast<int>(std::ceil(255.0 * kNoCoverage));
+  const int least_ink = static_cast<int>(std::ceil(255.0 * kLeastCoverage));
   for (int y = 0; y < levelled_.rows; ++y) {
     const std::uint8_t* bgr = levelled_.ptr<std::uint8_t>(y);
     const std::uint8_t* raw = part_.ptr<std::uint8_t>(y);
