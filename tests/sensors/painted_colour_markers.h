@@ -135,6 +135,30 @@ inline cv::Mat paint_colour_markers(const ColourPicture& picture) {
   return expose(paint_colour_light(picture), 1.0, picture.noise, picture.seed);
 }
 
+/// The gel that a painted grid's markers sit on, 3 mm apart.
+struct PaintedGel {
+  double thickness_mm = 5.0;
+  double viewing_distance_mm = 380.0;
+};
+
+/// Moves the markers by displacements (mm, gel frame: a press is -z): a pressed marker stretches by half the gel's
+/// compression (seed 002, eq. 3, for a Poisson's ratio of 0.5), and is seen larger and farther from the picture's
+/// middle as it is nearer (eq. 1).
+inline void displace(ColourPicture& picture, const std::vector<Eigen::Vector3d>& displacements,
+                     const PaintedGel& gel = {}) {
+  const double px_per_mm = picture.spacing_px / 3.0;
+  picture.shift_px.clear();
+  picture.stretch.clear();
+  for (std::size_t i = 0; i < picture.count(); ++i) {
+    const Eigen::Vector3d& d = displacements[i];
+    const double nearer = gel.viewing_distance_mm / (gel.viewing_distance_mm + d.z());
+    const Eigen::Vector2d from_middle = picture.rest(i) - picture.middle_px;
+    const Eigen::Vector2d moved = from_middle + picture.turn() * (px_per_mm * d.head<2>());
+    picture.shift_px.push_back(nearer * moved - from_middle);
+    picture.stretch.push_back(nearer * (1.0 - 0.5 * d.z() / gel.thickness_mm));
+  }
+}
+
 /// A compact picture of small markers, as of a low-resolution camera: fast to paint.
 inline ColourPicture small_colour_picture(double marker_px = 8.0) {
   ColourPicture picture;
