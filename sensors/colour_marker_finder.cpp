@@ -129,6 +129,7 @@ void ColourMarkerFinder::take_rest(const cv::Mat& image) {
   stray_at_rest_ = owners_.stray;
   add_up();
   read(nullptr, rest_);
+  for (const Sums& sums : sums_) filter_at_rest_.push_back(sums.filter);
 }
 
 const ColourMarkerReading& ColourMarkerFinder::find(const cv::Mat& image) {
@@ -202,7 +203,7 @@ void ColourMarkerFinder::classify() {
   for (int y = 0; y < levelled_.rows; ++y) {
     const std::uint8_t* ink = ink_.ptr<std::uint8_t>(y);
     std::uint8_t* core = core_.ptr<std::uint8_t>(y);
-    for (int x = 0; x < levelled_.cols; ++x) core[x] = ink[x] >= kHalfCovered;
+    for (int x = 0; x < levelled_.cols; ++x) core[x] = ink[x] >= kInkCore;
   }
 }
 

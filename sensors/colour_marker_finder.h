@@ -70,7 +70,7 @@ class ColourMarkerFinder {
     int clipped = 0;                                ///< coloured pixels with a channel at full scale
     double filter_value = 0.0;                      ///< sum of the largest channel over the filter's place
     int filter_pixels = 0;
-    int filter_seen = 0;  ///< of those, that show filter
+    double filter = 0.0;  ///< sum of coverages (of 255) over it
   };
   void take_rest(const cv::Mat& image);
   void take_picture(const cv::Mat& image);
@@ -97,6 +97,7 @@ class ColourMarkerFinder {
   cv::Mat cell_, filter_at_;  ///< CV_16S, marker or -1: whose cell a pixel is in, and under whose filter
   std::vector<Eigen::Vector2d> filter_place_;
   std::vector<double> filter_area_;
+  std::vector<double> filter_at_rest_;  ///< Sums::filter
   double usual_area_ = 0.0;
   std::vector<std::uint8_t> cut_off_;  ///< filters that the picture's edge cuts
   std::vector<InkPatch> patches_;

@@ -16,7 +16,7 @@ constexpr double kLeastPatch = 0.1;        ///< of the usual area: smaller patch
 constexpr double kLeastFilter = 0.4;       ///< of the usual area: at rest, a filter
 constexpr double kLeastInk = 0.4;          ///< of the usual area: at rest, a marker
 constexpr double kLeastSaturated = 0.25;   ///< of the usual area: pixels with a hue
-constexpr double kLeastFilterSeen = 0.75;  ///< of the filter's place at rest
+constexpr double kLeastFilterSeen = 0.75;  ///< of its coverage at rest, over its place at rest
 constexpr int kFullScale = 254;
 constexpr double kMostClipped = 0.05;  ///< of a marker's pixels
 constexpr double kBrightestWhite = 252.0;
@@ -87,7 +87,7 @@ void ColourMarkerFinder::add_up() {
         Sums& sums = sums_[static_cast<std::size_t>(filter_at[x])];
         sums.filter_value += std::max({bgr[0], bgr[1], bgr[2]});
         ++sums.filter_pixels;
-        if (filter[x] >= kHalfCovered) ++sums.filter_seen;
+        sums.filter += filter[x];
       }
       const int coverage = std::max(ink[x], filter[x]);
       if (coverage < least_ink) continue;
@@ -146,12 +146,13 @@ MarkerFlaw ColourMarkerFinder::flaw_of(const Sums& sums, std::size_t marker) con
   if (white < look_.least_white) return MarkerFlaw::kUnderexposed;
   if (filter_area_[marker] < kLeastFilter * usual_area_) return MarkerFlaw::kMissing;
   if (cut_off_[marker]) return MarkerFlaw::kCutOff;
+  if (owners_.flaws[marker] == MarkerFlaw::kTwoFilters) return MarkerFlaw::kTwoFilters;
   if (sums.saturated < kLeastSaturated * usual_area_) {
     const bool is_white = sums.filter_value > kNotWhite * ColourLevelling::kWhite * sums.filter_pixels;
     return is_white ? MarkerFlaw::kMissing : MarkerFlaw::kColourless;
   }
   // The filter isn't where it was: another picture, or a camera that was knocked.
-  if (sums.filter_seen < kLeastFilterSeen * sums.filter_pixels) return MarkerFlaw::kMissing;
+  if (!filter_at_rest_.empty() && sums.filter < kLeastFilterSeen * filter_at_rest_[marker]) return MarkerFlaw::kMissing;
   if (owners_.flaws[marker] != MarkerFlaw::kNone) return owners_.flaws[marker];
   return sums.ink < kLeastPatch * usual_area_ ? MarkerFlaw::kMissing : MarkerFlaw::kNone;
 }

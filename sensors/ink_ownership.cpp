@@ -9,7 +9,7 @@ namespace touchstone::sensors {
 
 namespace {
 
-constexpr double kWholePatch = 0.5;     ///< of the usual area: what is smaller is a piece of a marker
+constexpr double kWholePatch = 0.35;    ///< of the usual area: what is smaller is a piece of a marker
 constexpr double kMergedPatches = 1.8;  ///< of the usual area: two markers' ink has run together; one is stretched
                                         ///< to it by a third along both sides
 constexpr double kBarelyUnder = 0.2;    ///< of a patch's area

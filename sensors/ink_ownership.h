@@ -27,7 +27,7 @@ struct InkRules {
 struct InkOwners {
   std::vector<int> owner;         ///< of each patch: a marker, or -1
   std::vector<MarkerFlaw> flaws;  ///< of each marker: none, missing (no ink is its own), two filters, cut off
-  int stray = 0;  ///< patches of at least half the usual area that have less than a fifth under any filter
+  int stray = 0;  ///< patches of at least 0.35 of the usual area that have less than a fifth under any filter
 };
 
 /// A patch belongs to the filter that most of it is under. Two filters: more than the rules' part of the patch is under
