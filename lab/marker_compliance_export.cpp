@@ -305,7 +305,7 @@ sensors::MarkerCompliance export_marker_compliance(const sim::DeviceSpec& device
   sensors::MarkerCompliance result;
   if (device.coating && device.coating->print) {
     const SurfaceMarkers markers = printed_markers(device);
-    const double side = patch_side_mm.value_or(2.0 / 3.0 * device.coating->print->spacing_mm.mean());
+    const double side = patch_side_mm.value_or(0.5 * device.coating->print->spacing_mm.mean());
     result = marker_compliance(gel, markers, patches_over(gel, markers, side));
   } else if (device.beads) {
     const std::vector<Eigen::Vector3d> rest = sim::bead_centres(*device.beads);
@@ -314,7 +314,7 @@ sensors::MarkerCompliance export_marker_compliance(const sim::DeviceSpec& device
     for (const Eigen::Vector3d& bead : rest) {
       markers.markers.push_back({bead.head<2>(), 0.5 * device.beads->diameter_mm, false});
     }
-    const double side = patch_side_mm.value_or(2.0 / 3.0 * device.beads->spacing_mm);
+    const double side = patch_side_mm.value_or(0.5 * device.beads->spacing_mm);
     result = bead_compliance(gel, rest, patches_over(gel, markers, side));
   } else {
     fail_at(device.where, "the device has neither printed markers nor beads");
