@@ -62,7 +62,7 @@ Scene with_print(Scene scene) {
   for (const Eigen::Vector3d& x : membrane.mesh.vertices) print.material_mm.push_back(x.head<2>());
   print.inks = {render::flat_spectrum(3, 0.05)};
   for (int j = -9; j <= 9; ++j) {
-    for (int i = -9; i <= 9; ++i) print.discs.push_back({{i, j}, 0.3, 0});
+    for (int i = -9; i <= 9; ++i) print.marks.push_back({{i, j}, 0.3, 0});
   }
   membrane.print = print;
   return scene;

@@ -45,7 +45,7 @@ std::vector<cv::Mat> backgrounds(const sim::TouchRig& rig, std::uint64_t seed) {
 }
 
 double diameter_px(const sim::TouchRig& rig) {
-  return rig.device().coating->print ? rig.device().coating->print->diameter_mm / rig.mm_per_px() : 0.0;
+  return rig.device().coating->print ? rig.device().coating->print->width_mm / rig.mm_per_px() : 0.0;
 }
 
 }  // namespace
@@ -54,7 +54,7 @@ sensors::MarkerTrackerSettings marker_settings(const sim::TouchRig& rig) {
   const auto& print = rig.device().coating->print;
   if (!print) fail("device {}: has no markers", rig.device().name);
   sensors::MarkerTrackerSettings settings;
-  settings.look.diameter_px = print->diameter_mm / rig.mm_per_px();
+  settings.look.diameter_px = print->width_mm / rig.mm_per_px();
   settings.look.spacing_px = print->spacing_mm.minCoeff() / rig.mm_per_px();
   return settings;
 }

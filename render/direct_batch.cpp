@@ -68,10 +68,10 @@ DirectFixture::DirectFixture(const LightField& of, bool soft)
 }
 
 DirectPrint::DirectPrint(const Surface& surface)
-    : material_mm(&surface.print->material_mm), triangles(&surface.mesh.triangles), index(surface.print->discs) {
-  for (const PrintedDisc& disc : surface.print->discs) {
-    const Spectrum& ink = surface.print->inks[disc.ink];
-    auto& colour = disc_colours.emplace_back();
+    : material_mm(&surface.print->material_mm), triangles(&surface.mesh.triangles), index(surface.print->marks) {
+  for (const PrintedMark& mark : surface.print->marks) {
+    const Spectrum& ink = surface.print->inks[mark.ink];
+    auto& colour = mark_colours.emplace_back();
     for (Eigen::Index band = 0; band < ink.size(); ++band) colour[band] = static_cast<float>(ink[band]);
   }
 }
@@ -79,9 +79,9 @@ DirectPrint::DirectPrint(const Surface& surface)
 const float* DirectPrint::colour_at(int triangle, float u, float v, const float* plain) const {
   const auto& t = (*triangles)[triangle];
   const std::vector<Eigen::Vector2d>& at = *material_mm;
-  const int disc =
-      index.disc_at((1.0 - double(u) - double(v)) * at[t[0]] + double(u) * at[t[1]] + double(v) * at[t[2]]);
-  return disc < 0 ? plain : disc_colours[disc].data();
+  const int mark =
+      index.mark_at((1.0 - double(u) - double(v)) * at[t[0]] + double(u) * at[t[1]] + double(v) * at[t[2]]);
+  return mark < 0 ? plain : mark_colours[mark].data();
 }
 
 DirectBatch::DirectBatch(const DirectFrame& frame)

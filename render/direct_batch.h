@@ -22,11 +22,11 @@ struct DirectPrint {
   const std::vector<Eigen::Vector2d>* material_mm = nullptr;
   const std::vector<std::array<int, 3>>* triangles = nullptr;
   PrintIndex index;
-  std::vector<std::array<float, kMaxBands>> disc_colours;
+  std::vector<std::array<float, kMaxBands>> mark_colours;
 
   explicit DirectPrint(const Surface& surface);
 
-  /// The ink at a place of a triangle, or `plain` beside the discs.
+  /// The ink at a place of a triangle, or `plain` beside the marks.
   const float* colour_at(int triangle, float u, float v, const float* plain) const;
 };
 

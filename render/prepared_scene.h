@@ -59,16 +59,16 @@ template <int N>
 struct PreparedPrint {
   std::vector<Eigen::Vector2d> points;
   std::vector<std::array<int, 3>> triangles;
-  std::vector<Bands<N>> disc_colours;
+  std::vector<Bands<N>> mark_colours;
   PrintIndex index;
 
-  /// The ink at a hit, or `plain` beside the discs.
+  /// The ink at a hit, or `plain` beside the marks.
   const Bands<N>& colour(const RayHit& hit, const Bands<N>& plain) const {
     const auto& t = triangles[hit.triangle];
     const Eigen::Vector2d at =
         (1.0 - hit.weight_1 - hit.weight_2) * points[t[0]] + hit.weight_1 * points[t[1]] + hit.weight_2 * points[t[2]];
-    const int disc = index.disc_at(at);
-    return disc < 0 ? plain : disc_colours[disc];
+    const int mark = index.mark_at(at);
+    return mark < 0 ? plain : mark_colours[mark];
   }
 };
 
@@ -132,8 +132,8 @@ struct PreparedScene {
  private:
   void add_print(const Surface& surface) {
     const Print& print = *surface.print;
-    PreparedPrint<N> made{print.material_mm, surface.mesh.triangles, {}, PrintIndex(print.discs)};
-    for (const PrintedDisc& disc : print.discs) made.disc_colours.push_back(print.inks[disc.ink]);
+    PreparedPrint<N> made{print.material_mm, surface.mesh.triangles, {}, PrintIndex(print.marks)};
+    for (const PrintedMark& mark : print.marks) made.mark_colours.push_back(print.inks[mark.ink]);
     materials.back().print = static_cast<int>(prints.size());
     prints.push_back(std::move(made));
   }

@@ -91,15 +91,15 @@ void check_print(const Print& print, const Surface& surface, Eigen::Index bands,
   for (std::size_t i = 0; i < print.inks.size(); ++i) {
     check_spectrum(print.inks[i], bands, 1.0, fmt::format("{}: ink {}", what, i));
   }
-  for (std::size_t i = 0; i < print.discs.size(); ++i) {
-    const PrintedDisc& disc = print.discs[i];
-    if (!disc.centre.allFinite() || disc.centre.cwiseAbs().maxCoeff() > 1e5)
-      fail("{}: the centre of disc {} isn't within 100 m", what, i);
-    if (!(disc.radius > 0.0 && disc.radius < 1e5)) {
-      fail("{}: the radius of disc {} is {} mm; it must be above 0", what, i, disc.radius);
+  for (std::size_t i = 0; i < print.marks.size(); ++i) {
+    const PrintedMark& mark = print.marks[i];
+    if (!mark.centre.allFinite() || mark.centre.cwiseAbs().maxCoeff() > 1e5)
+      fail("{}: the centre of mark {} isn't within 100 m", what, i);
+    if (!(mark.half_width > 0.0 && mark.half_width < 1e5)) {
+      fail("{}: the half width of mark {} is {} mm; it must be above 0", what, i, mark.half_width);
     }
-    if (disc.ink < 0 || disc.ink >= static_cast<int>(print.inks.size())) {
-      fail("{}: disc {} has ink {}; there are {}", what, i, disc.ink, print.inks.size());
+    if (mark.ink < 0 || mark.ink >= static_cast<int>(print.inks.size())) {
+      fail("{}: mark {} has ink {}; there are {}", what, i, mark.ink, print.inks.size());
     }
   }
 }

@@ -21,6 +21,10 @@ EnumNames<BayerPattern> enum_names(BayerPattern) {
           {"gbrg", BayerPattern::gbrg}};
 }
 
+EnumNames<MarkShape> enum_names(MarkShape) {
+  return {{"round", MarkShape::round}, {"square", MarkShape::square}};
+}
+
 }  // namespace touchstone::render
 
 namespace touchstone::sim {
@@ -222,7 +226,8 @@ void fields(YamlReader& in, PlateSpec& plate) {
 void fields(YamlReader& in, PrintSpec& print) {
   in.required("grid", print.grid, Allowed::within(1, 1000));
   in.required("spacing_mm", print.spacing_mm, Allowed::above(0.0));
-  in.required("diameter_mm", print.diameter_mm, Allowed::above(0.0));
+  in.optional("shape", print.shape);
+  in.required(print.shape == render::MarkShape::round ? "diameter_mm" : "side_mm", print.width_mm, Allowed::above(0.0));
   in.optional("jitter_mm", print.jitter_mm, Allowed::at_least(0.0));
   in.optional("seed", print.seed);
   in.optional("colour", print.colour, part_of_one());

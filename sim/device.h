@@ -11,12 +11,14 @@
 #include "core/yaml_reader.h"
 #include "fem/relaxation.h"
 #include "render/imager.h"
+#include "render/print.h"
 #include "sim/colour.h"
 #include "sim/device_lamps.h"
 #include "sim/event_camera_spec.h"
 
 namespace touchstone::render {
 EnumNames<BayerPattern> enum_names(BayerPattern);  // of the field `camera.bayer`
+EnumNames<MarkShape> enum_names(MarkShape);        // of `coating.print.shape`
 }  // namespace touchstone::render
 
 namespace touchstone::sim {
@@ -97,11 +99,12 @@ struct PlateSpec {
   double refractive_index = 1.0;
 };
 
-/// Round markers on the inside of a coating: a grid, or with `jitter_mm` a semi-random field. They stretch with it.
+/// Markers on the inside of a coating: a grid, or with `jitter_mm` a semi-random field. They stretch with it.
 struct PrintSpec {
   Eigen::Vector2i grid = {1, 1};            ///< markers along x and y, centred on the gel's origin
   Eigen::Vector2d spacing_mm = {1.0, 1.0};  ///< between neighbours' centres
-  double diameter_mm = 0.0;
+  render::MarkShape shape = render::MarkShape::round;
+  double width_mm = 0.0;   ///< in the file `diameter_mm` of round ones, `side_mm` of square ones
   double jitter_mm = 0.0;  ///< each centre is moved along x and y by up to this, evenly distributed
   std::uint64_t seed = 0;  ///< of the jitter
   Colour colour = 0.05;

@@ -37,7 +37,7 @@ SeenPoint inside_point(const SeenGeometry& seen, const render::FirstHit& hit) {
     point.contact = touched >= 0;
     point.id = point.contact ? PixelId::kFirstObject + touched : PixelId::kGel;
     point.rest = (1.0 - hit.u - hit.v) * rest(0) + hit.u * rest(1) + hit.v * rest(2);
-    const int marker = seen.markers.disc_at(point.rest->head<2>());
+    const int marker = seen.markers.mark_at(point.rest->head<2>());
     if (marker >= 0) point.id = PixelId::kFirstMarker + marker;
   }
   return point;

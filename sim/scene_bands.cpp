@@ -27,7 +27,9 @@ std::vector<NamedColour> reflecting(const SceneSpec& scene) {
         {device.coating->albedo, device.coating->type == CoatingType::matt ? "coating.albedo" : "coating.reflectance"});
     if (device.coating->print) all.push_back({device.coating->print->colour, "coating.print.colour"});
   }
-  for (const MovedObject& moved : moved_objects(scene)) all.push_back({moved.object.albedo, "albedo"});
+  if (!device.coating) {  // a coating hides the objects
+    for (const MovedObject& moved : moved_objects(scene)) all.push_back({moved.object.albedo, "albedo"});
+  }
   return all;
 }
 

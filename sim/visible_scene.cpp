@@ -84,7 +84,7 @@ render::Print print_of(const PrintSpec& spec, const SceneBands& bands, const std
   render::Print print;
   for (const Eigen::Vector3d& point : rest) print.material_mm.emplace_back(point.head<2>());
   print.inks = {in_bands(spec.colour, bands, "coating.print.colour")};
-  print.discs = printed_discs(spec);
+  print.marks = printed_marks(spec);
   return print;
 }
 
@@ -253,16 +253,16 @@ GelSheet whole_sheet(Membrane::Sheet fine) {
   return sheet;
 }
 
-std::vector<render::PrintedDisc> printed_discs(const PrintSpec& print) {
-  std::vector<render::PrintedDisc> discs;
+std::vector<render::PrintedMark> printed_marks(const PrintSpec& print) {
+  std::vector<render::PrintedMark> marks;
   std::uint64_t index = 0;
   for (const Eigen::Vector2d& centre : grid_centres(print.grid, print.spacing_mm)) {
     RandomStream random(print.seed, index++, Purpose::kPlacement);
     const double dx = print.jitter_mm * (2.0 * random.uniform() - 1.0);
     const double dy = print.jitter_mm * (2.0 * random.uniform() - 1.0);
-    discs.push_back({centre + Eigen::Vector2d(dx, dy), print.diameter_mm / 2, 0});
+    marks.push_back({centre + Eigen::Vector2d(dx, dy), print.width_mm / 2, 0, print.shape});
   }
-  return discs;
+  return marks;
 }
 
 RigidTransform pose_of(const CameraSpec& camera) {

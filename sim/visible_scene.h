@@ -46,7 +46,7 @@ render::Surface gel_surface(TriangleMesh mesh);
 GelSheet whole_sheet(Membrane::Sheet fine);
 
 /// The markers in material coordinates, row by row, y growing from row to row.
-std::vector<render::PrintedDisc> printed_discs(const PrintSpec& print);
+std::vector<render::PrintedMark> printed_marks(const PrintSpec& print);
 
 /// A coated gel's outer surface. @pre the device has a coating
 render::Surface coated_surface(const DeviceSpec& device, const SceneBands& bands, GelSheet sheet);

@@ -74,7 +74,7 @@ Print dots_on(const TriangleMesh& mesh, const Spectrum& ink) {
   for (const Eigen::Vector3d& vertex : mesh.vertices) print.material_mm.push_back(vertex.head<2>());
   print.inks = {ink};
   for (int i = -5; i <= 5; ++i) {
-    for (int j = -4; j <= 4; ++j) print.discs.push_back({{2.0 * i, 2.0 * j}, 0.5, 0});
+    for (int j = -4; j <= 4; ++j) print.marks.push_back({{2.0 * i, 2.0 * j}, 0.5, 0});
   }
   return print;
 }

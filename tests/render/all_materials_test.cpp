@@ -21,7 +21,7 @@ Scene everything(int bands) {
   Print print;
   print.material_mm = {{-4, -4}, {4, -4}, {4, 4}, {-4, 4}};
   print.inks = {all(0.05)};
-  print.discs = {{{0, 0}, 1.0, 0}};
+  print.marks = {{{0, 0}, 1.0, 0}};
   scene.surfaces.push_back({square_sheet(4.0, 0.3, false), Lambertian{all(0.8)}, print});
   scene.surfaces.push_back({square_sheet(2.0, -3.0), ThinFilm{all(0.7), 1.5, true}});
   scene.surfaces.push_back({square_sheet(0.7, -2.0), DiffuseTransmitter{all(0.4), all(0.5)}});

@@ -151,7 +151,7 @@ TEST(WhiteFurnace, WhitePrintOnWhiteReturnsOne) {
     Print print;
     print.material_mm = {{-4, -4}, {4, -4}, {4, 4}, {-4, 4}};
     print.inks = {grey(1.0)};
-    for (int i = 0; i < 5; ++i) print.discs.push_back({{-2.0 + i, 0.3 * i}, 0.4, 0});
+    for (int i = 0; i < 5; ++i) print.marks.push_back({{-2.0 + i, 0.3 * i}, 0.4, 0});
     scene.surfaces.push_back({square_sheet(10.0, 0.1), Refractive{2, 0}});
     scene.surfaces.push_back({square_sheet(4.0, 0.0, false), ground, print});
     for (double x : {-2.0, -1.5, 0.0, 1.1}) {

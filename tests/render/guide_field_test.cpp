@@ -146,7 +146,7 @@ Print markers_of(const TriangleMesh& flat) {
   for (const auto& vertex : flat.vertices) print.material_mm.push_back(vertex.head<2>());
   print.inks = {grey(0.03)};
   for (int i = -4; i <= 4; ++i) {
-    for (int j = -4; j <= 4; ++j) print.discs.push_back({{1.2 * i, 1.2 * j}, 0.2, 0});
+    for (int j = -4; j <= 4; ++j) print.marks.push_back({{1.2 * i, 1.2 * j}, 0.2, 0});
   }
   return print;
 }
@@ -209,7 +209,7 @@ TEST(DirectPrints, InkTakesThePlaceOfTheSurfacesColour) {
   const cv::Mat printed = DirectRenderer(field, camera, scene).render(scene).irradiance;
   const cv::Mat plain = DirectRenderer(field, camera, inked).render(inked).irradiance;
   EXPECT_EQ(cv::norm(printed, plain, cv::NORM_INF), 0.0);
-  scene.surfaces[0].print->discs = {{{0, 0}, 100.0, 0}};  // ink everywhere, half as bright
+  scene.surfaces[0].print->marks = {{{0, 0}, 100.0, 0}};  // ink everywhere, half as bright
   scene.surfaces[0].print->inks = {grey(0.25)};
   const cv::Mat dark = DirectRenderer(field, camera, scene).render(scene).irradiance;
   EXPECT_LT(cv::norm(2.0 * dark, plain, cv::NORM_INF), 1e-6 * cv::norm(plain, cv::NORM_INF));

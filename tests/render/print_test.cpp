@@ -39,7 +39,7 @@ Surface printed_sheet(int cells, const Map& deformed, const Material& material, 
 Print one_disc(const Eigen::Vector2d& centre, double radius, double ink) {
   Print print;
   print.inks = {grey(ink)};
-  print.discs = {{centre, radius, 0}};
+  print.marks = {{centre, radius, 0}};
   return print;
 }
 
@@ -82,6 +82,14 @@ TEST(Print, DiscCoversItsAreaOnAnyMesh) {
   }
 }
 
+TEST(Print, SquareCoversItsSideSquared) {
+  Print print = one_disc({1.2, -0.7}, 1.5, 0.1);
+  print.marks[0].shape = MarkShape::square;
+  const Seen seen = look_down(printed_sheet(5, kFlat, Lambertian{grey(0.9)}, print), 5.0, 0.1);
+  EXPECT_NEAR(seen.share / (3.0 * 3.0 / 100.0), 1.0, 2e-3);
+  EXPECT_NEAR((seen.centroid - Eigen::Vector2d(1.2, -0.7)).norm(), 0.0, 5e-3);
+}
+
 TEST(Print, DiscMovesWithTheMaterial) {
   Eigen::Matrix2d stretch;
   stretch << 1.5, 0.2, -0.1, 0.8;
@@ -99,7 +107,7 @@ TEST(Print, DiscMovesWithTheMaterial) {
 TEST(Print, LastOfOverlappingDiscsShows) {
   Print print;
   print.inks = {grey(0.1), grey(0.2)};
-  print.discs = {{{0, 0}, 1.0, 0}, {{0.5, 0}, 1.0, 1}, {{3, 3}, 0.2, 0}};
+  print.marks = {{{0, 0}, 1.0, 0}, {{0.5, 0}, 1.0, 1}, {{3, 3}, 0.2, 0}};
   Scene scene = empty_scene(1.0);
   scene.surfaces.push_back(printed_sheet(1, kFlat, Lambertian{grey(0.9)}, print));
   const Tracer tracer(scene);
@@ -121,27 +129,30 @@ TEST(Print, InkOnMetalIsMetalOfThatColour) {
   EXPECT_GT(Tracer(printed).radiance({2.1, 0, 3}, {0, 0, -1}, samples(64))[0], 1.5 * expected);
 }
 
-TEST(PrintIndex, FindsWhatASearchOfAllDiscsFinds) {
+TEST(PrintIndex, FindsWhatASearchOfAllMarksFinds) {
   RandomStream stream(5, 0, Purpose::kTest);
   for (int count : {0, 1, 2, 50, 700}) {
-    std::vector<PrintedDisc> discs;
+    std::vector<PrintedMark> marks;
     for (int i = 0; i < count; ++i) {
       const double x = 20.0 * stream.uniform() - 10.0;
       const double y = 4.0 * stream.uniform();
-      discs.push_back({{x, y}, i % 50 == 7 ? 3.0 : 0.02 + 0.3 * stream.uniform(), 0});
+      const MarkShape shape = i % 3 == 1 ? MarkShape::square : MarkShape::round;
+      marks.push_back({{x, y}, i % 50 == 7 ? 3.0 : 0.02 + 0.3 * stream.uniform(), 0, shape});
     }
-    const PrintIndex index(discs);
+    const PrintIndex index(marks);
     for (int i = 0; i < 3000; ++i) {
       const double x = 30.0 * stream.uniform() - 15.0;
       const Eigen::Vector2d at(x, 8.0 * stream.uniform() - 2.0);
       int expected = -1;
       for (int k = 0; k < count; ++k) {
-        if ((at - discs[k].centre).squaredNorm() <= discs[k].radius * discs[k].radius) expected = k;
+        const Eigen::Vector2d off = at - marks[k].centre;
+        const bool round = marks[k].shape == MarkShape::round;
+        if ((round ? off.norm() : off.cwiseAbs().maxCoeff()) <= marks[k].half_width) expected = k;
       }
-      ASSERT_EQ(index.disc_at(at), expected) << count << " discs at " << at.transpose();
+      ASSERT_EQ(index.mark_at(at), expected) << count << " marks at " << at.transpose();
     }
-    EXPECT_EQ(index.disc_at({std::nan(""), 0.0}), -1);
-    EXPECT_EQ(index.disc_at({1e300, -1e300}), -1);
+    EXPECT_EQ(index.mark_at({std::nan(""), 0.0}), -1);
+    EXPECT_EQ(index.mark_at({1e300, -1e300}), -1);
   }
 }
 

@@ -89,7 +89,7 @@ TEST(SceneCheck, FaultyPrintsAreRefusedByName) {
       Print print;
       print.material_mm = {{-1, -1}, {1, -1}, {1, 1}, {-1, 1}};
       print.inks = {grey(0.1)};
-      print.discs = {{{0, 0}, 0.5, 0}};
+      print.marks = {{{0, 0}, 0.5, 0}};
       change(print);
       s.surfaces[0].print = print;
     };
@@ -100,10 +100,10 @@ TEST(SceneCheck, FaultyPrintsAreRefusedByName) {
   expect_refused(spoil([](Print& p) { p.material_mm.pop_back(); }), "surface 0: print: 3 material points");
   expect_refused(spoil([](Print& p) { p.material_mm[2].x() = kNan; }), "material point 2");
   expect_refused(spoil([](Print& p) { p.inks[0] = grey(1.1); }), "ink 0 is 1.1");
-  expect_refused(spoil([](Print& p) { p.discs[0].radius = 0.0; }), "radius of disc 0 is 0");
-  expect_refused(spoil([](Print& p) { p.discs[0].radius = kNan; }), "radius of disc 0");
-  expect_refused(spoil([](Print& p) { p.discs[0].centre.y() = kNan; }), "centre of disc 0");
-  expect_refused(spoil([](Print& p) { p.discs[0].ink = 1; }), "disc 0 has ink 1");
+  expect_refused(spoil([](Print& p) { p.marks[0].half_width = 0.0; }), "half width of mark 0 is 0");
+  expect_refused(spoil([](Print& p) { p.marks[0].half_width = kNan; }), "half width of mark 0");
+  expect_refused(spoil([](Print& p) { p.marks[0].centre.y() = kNan; }), "centre of mark 0");
+  expect_refused(spoil([](Print& p) { p.marks[0].ink = 1; }), "mark 0 has ink 1");
   expect_refused(
       [&](Scene& s) {
         spoil([](Print&) {})(s);

@@ -192,8 +192,8 @@ TEST(LightDevice, CoatingHidesTheObjectAndPrintMovesWithTheGel) {
           .sheet(pressed.truths.back().press, placed_shapes(visible_objects(scene), pressed.truths.back().press));
   const render::Surface coat = coated_surface(scene.device, pressed.plan.bands, sheet);
   ASSERT_TRUE(coat.print);
-  ASSERT_EQ(coat.print->discs.size(), 9u);
-  EXPECT_EQ(coat.print->discs[5].centre, Eigen::Vector2d(3, 0));
+  ASSERT_EQ(coat.print->marks.size(), 9u);
+  EXPECT_EQ(coat.print->marks[5].centre, Eigen::Vector2d(3, 0));
   double outwards = 0.0;
   int inside = 0;
   for (std::size_t i = 0; i < sheet.rest.size(); ++i) {
@@ -237,9 +237,9 @@ TEST(LightDevice, JitterMovesMarkersWithinItsRangeAndByTheSeedOnly) {
   PrintSpec print;
   print.grid = {20, 10};
   print.spacing_mm = {1, 2};
-  print.diameter_mm = 0.3;
+  print.width_mm = 0.3;
   print.jitter_mm = 0.2;
-  const auto discs = printed_discs(print);
+  const auto discs = printed_marks(print);
   ASSERT_EQ(discs.size(), 200u);
   double widest = 0.0;
   for (std::size_t i = 0; i < discs.size(); ++i) {
@@ -248,9 +248,9 @@ TEST(LightDevice, JitterMovesMarkersWithinItsRangeAndByTheSeedOnly) {
   }
   EXPECT_LE(widest, 0.2);
   EXPECT_GT(widest, 0.19);
-  EXPECT_EQ(printed_discs(print)[7].centre, discs[7].centre);
+  EXPECT_EQ(printed_marks(print)[7].centre, discs[7].centre);
   print.seed = 1;
-  EXPECT_NE(printed_discs(print)[7].centre, discs[7].centre);
+  EXPECT_NE(printed_marks(print)[7].centre, discs[7].centre);
 }
 
 // A milky gel hides what is behind it, and shows a dark thing only where it touches: there no light comes back.
