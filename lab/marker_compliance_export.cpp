@@ -290,7 +290,7 @@ SurfaceMarkers printed_markers(const sim::DeviceSpec& device) {
     for (int i = 0; i < print.grid.x(); ++i) {
       const Eigen::Vector2d place = print.spacing_mm.cwiseProduct(
           Eigen::Vector2d(i, j) - 0.5 * (print.grid.cast<double>().array() - 1.0).matrix());
-      result.markers.push_back({place, 0.5 * print.diameter_mm, false});
+      result.markers.push_back({place, 0.5 * print.width_mm, print.shape == render::MarkShape::square});
     }
   }
   return result;

@@ -274,7 +274,26 @@ TractionField TractionInversion::invert(const MarkerField& field) {
     if (best > 0 && tried.size() > best + kWorse) break;
   }
   describe(tried, best, result);
+  if (result.in_contact) carry(field, result);
   return result;
+}
+
+void TractionInversion::carry(const MarkerField& field, TractionField& result) const {
+  double pressure = 0.0;
+  for (int p = 0; p < compliance_.patches(); ++p) {
+    result.centre_of_pressure -= result.traction(2, p) * compliance_.patch_centre(p);
+    pressure -= result.traction(2, p);
+  }
+  if (pressure > 0.0) result.centre_of_pressure /= pressure;
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  double weight = 0.0;
+  for (std::size_t m = 0; m < field.displacement.size(); ++m) {
+    if (!field.measured[m]) continue;
+    const double of = -result.markers[m].traction.z();
+    mean += of * field.displacement[m];
+    weight += of;
+  }
+  if (weight > 0.0) result.wrench.tail<3>() += (mean / weight).cross(Eigen::Vector3d(result.wrench.head<3>()));
 }
 
 void TractionInversion::describe(const std::vector<Candidate>& tried, std::size_t best, TractionField& result) const {

@@ -52,8 +52,12 @@ struct TractionField {
   Eigen::Matrix3Xd traction;          ///< on the gel, MPa, a column for each patch
   std::vector<std::uint8_t> contact;  ///< of each patch: 0 or 1
   std::vector<MarkerTraction> markers;
-  Vector6d wrench = Vector6d::Zero();  ///< on the object: force (N), torque about the gel frame's origin (N mm)
-  Matrix6d noise = Matrix6d::Zero();   ///< covariance of the wrench from the stated noise alone, for this contact
+  /// On the object: force (N), torque about the gel frame's origin (N mm). The contact is where the gel has carried it:
+  /// patches lie aside from their places at rest by the mean displacement of the measured markers in contact.
+  Vector6d wrench = Vector6d::Zero();
+  /// Of the patches at rest, mm: it stays while the object sticks, wherever it carries the gel. Zero without contact.
+  Eigen::Vector2d centre_of_pressure = Eigen::Vector2d::Zero();
+  Matrix6d noise = Matrix6d::Zero();  ///< covariance of the wrench from the stated noise alone, for this contact
   /// Covariance of the wrench with all that is known to be unknown: the noise and what smoothness fills in (the bias to
   /// be expected from it), on the next larger contact that was tried, since the rim isn't known to better than that,
   /// times misfit^2 where the misfit is above 1; and the choice among contacts (their spread, by evidence). What the
@@ -95,6 +99,7 @@ class TractionInversion {
   std::vector<std::vector<int>> possible_contacts(const Eigen::VectorXd& load, int& factorisations) const;
   Candidate solve(const std::vector<int>& patches, const Eigen::VectorXd& load, double data_square) const;
   void describe(const std::vector<Candidate>& tried, std::size_t best, TractionField& result) const;
+  void carry(const MarkerField& field, TractionField& result) const;
 
   MarkerCompliance compliance_;
   TractionSettings settings_;
