@@ -17,6 +17,7 @@ constexpr double kEdgeRadius = 0.3;    // mm, of the flat cylinder's rim
 constexpr double kPunchHeight = 10.0;  // mm
 constexpr double kWhole = 0.9;         // share of a marker's square that touches, for its state to be scored
 constexpr double kMostly = 0.5;
+constexpr double kStillSticking = 0.05;  // of the touching vertices: a discrete contact sheds them one by one
 
 /// Height of the object frame's origin over what first touches.
 double standoff(const ForceProbe& probe) {
@@ -60,11 +61,13 @@ SurfaceMarkers squares_about(const SurfaceMarkers& markers) {
   return result;
 }
 
-bool any_sticks(const fem::PressState& press) {
+bool has_come_to_slide(const fem::PressState& press) {
+  int stick = 0, slip = 0;
   for (const fem::NodeState state : press.node_state) {
-    if (state == fem::NodeState::stick) return true;
+    stick += state == fem::NodeState::stick;
+    slip += state == fem::NodeState::slip;
   }
-  return false;
+  return stick + slip > 0 && stick <= kStillSticking * (stick + slip);
 }
 
 /// Means over the markers and over their squares.
@@ -168,7 +171,7 @@ void play_probe(const ForceBench& bench, const ForceProbe& probe, const DragSett
   for (int number = 0; drag.step_mm * number <= drag.longest_mm; ++number) {
     const double drag_mm = drag.step_mm * number;
     const fem::PressState& state = press.step(target_at(probe, drag_mm));
-    const bool slides = state.contact_vertices > 0 && !any_sticks(state);
+    const bool slides = has_come_to_slide(state);
     look({probe, state, number, drag_mm, slides, reader.of(state)});
     if ((slides || after > 0) && ++after > drag.frames_after) return;
   }

@@ -53,7 +53,7 @@ struct ForceFrame {
   const fem::PressState& press;
   int number = 0;        ///< 0 is the press; then the drag
   double drag_mm = 0.0;  ///< of the probe
-  bool slides = false;   ///< no vertex that touches sticks
+  bool slides = false;   ///< at most a twentieth of the vertices that touch sticks
   std::vector<MarkerTruth> markers;
 };
 

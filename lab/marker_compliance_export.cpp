@@ -296,18 +296,27 @@ SurfaceMarkers printed_markers(const sim::DeviceSpec& device) {
   return result;
 }
 
+void check_marker_compliance(const sim::DeviceSpec& device) {
+  if (device.gel.shape != sim::GelShape::slab) {
+    fail_at(device.where, "the gel isn't a slab: how markers move under tractions is exported of slabs only");
+  }
+  if (device.coating && device.coating->print) {
+    printed_markers(device);
+  } else if (!device.beads) {
+    fail_at(device.where, "the device has neither printed markers nor beads");
+  }
+}
+
 sensors::MarkerCompliance export_marker_compliance(const sim::DeviceSpec& device, const fem::Compliance& gel,
                                                    std::optional<double> patch_side_mm) {
-  if (device.gel.shape != sim::GelShape::slab) {
-    fail_at(device.where, "the gel is a {}: marker compliances are of slabs only",
-            sim::GelShape::dome == device.gel.shape ? "dome" : "curved body");
-  }
+  check_marker_compliance(device);
   sensors::MarkerCompliance result;
   if (device.coating && device.coating->print) {
     const SurfaceMarkers markers = printed_markers(device);
     const double side = patch_side_mm.value_or(0.5 * device.coating->print->spacing_mm.mean());
     result = marker_compliance(gel, markers, patches_over(gel, markers, side));
-  } else if (device.beads) {
+  } else {
+    TS_ASSERT(device.beads.has_value());
     const std::vector<Eigen::Vector3d> rest = sim::bead_centres(*device.beads);
     SurfaceMarkers markers;  // over the beads, to place the patches
     markers.grid = {device.beads->grid, device.beads->grid};
@@ -316,8 +325,6 @@ sensors::MarkerCompliance export_marker_compliance(const sim::DeviceSpec& device
     }
     const double side = patch_side_mm.value_or(0.5 * device.beads->spacing_mm);
     result = bead_compliance(gel, rest, patches_over(gel, markers, side));
-  } else {
-    fail_at(device.where, "the device has neither printed markers nor beads");
   }
   result.gel = device.name;
   return result;

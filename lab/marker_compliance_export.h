@@ -65,8 +65,12 @@ class MarkerMeans {
 /// The markers that a device's coating bears. @throws Error for a device without a print, or with a jittered one
 SurfaceMarkers printed_markers(const sim::DeviceSpec& device);
 
+/// Whether a device has such a map, without setting it up. @throws Error for a gel that isn't a slab, for a device with
+/// neither printed markers nor beads, or with jittered markers
+void check_marker_compliance(const sim::DeviceSpec& device);
+
 /// All of it for a device: its printed markers, or else its beads. `patch_side_mm`: half a spacing without it.
-/// @throws Error for a gel that isn't a slab, for a device without either, and as marker_compliance
+/// @throws Error as check_marker_compliance, patches_over and marker_compliance
 sensors::MarkerCompliance export_marker_compliance(const sim::DeviceSpec& device, const fem::Compliance& gel,
                                                    std::optional<double> patch_side_mm = {});
 

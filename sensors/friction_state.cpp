@@ -13,6 +13,8 @@ constexpr double kObjectPart = 1.0 / 3.0;
 constexpr int kLeastObjectMarkers = 2;
 /// The contact slides over markers that move by less than this part of its own motion.
 constexpr double kCarried = 0.5;
+/// While the ratio of shear to normal force grows by more than this over the frames looked at, some of it sticks.
+constexpr double kStillGrowing = 0.1;
 constexpr int kLeastSlideFrames = 4;
 /// Frames that slide have errors in common (the map's, the contact's): their mean isn't better than a frame's by more.
 constexpr double kCommonError = 0.02;  // relative
@@ -77,8 +79,7 @@ FrictionObserver::FrictionObserver(const FrictionSettings& settings) : settings_
 void FrictionObserver::restart() {
   past_.clear();
   result_ = {};
-  slid_weight_ = slid_sum_ = 0.0;
-  slid_frames_ = 0;
+  slid_.clear();
 }
 
 const FrictionState& FrictionObserver::look(const MarkerField& field, const TractionField& tractions) {
@@ -103,10 +104,11 @@ const FrictionState& FrictionObserver::look(const MarkerField& field, const Trac
 
   result_.markers.resize(count);
   read_ratios(tractions);
+  past_.back().ratio = result_.ratio;
   find_lags(tractions);
   find_slide(tractions);
   judge(tractions);
-  read_friction(tractions);
+  read_friction();
   return result_;
 }
 
@@ -181,13 +183,18 @@ void FrictionObserver::find_slide(const TractionField& tractions) {
   for (std::size_t back = kLeastSlideFrames; back < past_.size(); ++back) {
     // The contact's motion by a line through its places, as a single one is noisy.
     const double middle = 0.5 * static_cast<double>(back);
-    double sum = 0.0, squares = 0.0;
+    double sum = 0.0, ratios = 0.0, squares = 0.0, mean = 0.0;
     for (std::size_t k = 0; k <= back; ++k) {
       const double at = static_cast<double>(k) - middle;  // frames
-      sum += at * past_[past_.size() - 1 - back + k].centre.dot(direction);
+      const Past& past = past_[past_.size() - 1 - back + k];
+      sum += at * past.centre.dot(direction);
+      ratios += at * past.ratio;
+      mean += past.ratio / static_cast<double>(back + 1);
       squares += at * at;
     }
     const double moved = sum / squares * static_cast<double>(back);
+    const double grown = ratios / squares * static_cast<double>(back);
+    if (grown > kStillGrowing * mean) continue;
     const Past& then = past_[past_.size() - 1 - back];
     double carried = 0.0, weight = 0.0;
     for (std::size_t m = 0; m < result_.markers.size(); ++m) {
@@ -239,17 +246,20 @@ void FrictionObserver::judge(const TractionField& tractions) {
   }
 }
 
-void FrictionObserver::read_friction(const TractionField&) {
+void FrictionObserver::read_friction() {
   if (result_.state == ContactSlip::kSliding && result_.ratio_error > 0.0) {
-    const double weight = 1.0 / (result_.ratio_error * result_.ratio_error);
-    slid_weight_ += weight;
-    slid_sum_ += weight * result_.ratio;
-    ++slid_frames_;
-    const double value = slid_sum_ / slid_weight_;
-    result_.friction = FrictionEstimate{value, std::hypot(1.0 / std::sqrt(slid_weight_), kCommonError * value), true};
+    slid_.push_back({result_.ratio, result_.ratio_error});
+    if (slid_.size() > static_cast<std::size_t>(settings_.history_frames)) slid_.pop_front();
+    double weight = 0.0, sum = 0.0;
+    for (const Slid& slid : slid_) {
+      weight += 1.0 / (slid.error * slid.error);
+      sum += slid.ratio / (slid.error * slid.error);
+    }
+    const double value = sum / weight;
+    result_.friction = FrictionEstimate{value, std::hypot(1.0 / std::sqrt(weight), kCommonError * value), true};
     return;
   }
-  if (slid_frames_ > 0 || result_.state != ContactSlip::kPartial) return;  // what slid as a whole told more
+  if (!slid_.empty() || result_.state != ContactSlip::kPartial) return;  // what slid as a whole told more
   double weight = 0.0, sum = 0.0;
   for (const MarkerFriction& marker : result_.markers) {
     if (marker.state != MarkerSlip::kSlip || !marker.lag || marker.ratio_error <= 0.0) continue;

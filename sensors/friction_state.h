@@ -8,8 +8,8 @@
 //   behind. Slip begins at the rim, so the markers with most pressure about them, deepest in the contact, are taken for
 //   the object; each marker's lag is the part of their motion, along it, that it doesn't take part in.
 // - Of all: the markers stand still, and the contact itself moves over them. Its middle is the centre of pressure,
-//   (-My, Mx)/Fz, which an estimate of the wrench gives to a tenth of a marker spacing. Sliding goes against the shear
-//   on the gel's surface being carried on: along the traction on the gel.
+//   which the tractions give to a tenth of a marker spacing. It goes along the shear traction on the gel, and the ratio
+//   of shear to normal force doesn't grow any more.
 //
 // What can't: while nothing moves, stick and slip look the same, so each marker keeps its last state; a marker whose
 // square isn't wholly in contact, or whose motion is within the noise, stays unknown.
@@ -43,11 +43,11 @@ struct FrictionSettings {
   double lateral_noise_mm = 0.02;  ///< of a marker's displacement, as for the inversion; above 0
   int history_frames = 15;         ///< how far back motion is sought; 4 to 1000
   double least_motion_mm = 0.3;    ///< of the object over the frames compared; above 0
-  double whole_contact = 0.8;      ///< share of a marker's square that must touch for a verdict; 0.3 to 1
-  double lag = 0.2;                ///< of a marker that slips; above 0, below 1
+  double whole_contact = 0.7;      ///< share of a marker's square that must touch for a verdict; 0.3 to 1
+  double lag = 0.25;               ///< of a marker that slips; above 0, below 1
   double saturation = 0.85;        ///< traction ratio of a marker that slips, parts of the friction; above 0, below 1
   double certainty = 0.5;          ///< standard errors that a verdict takes; 0 to 10
-  double slide_mm = 0.5;           ///< that the contact must have moved over the markers to be sliding; above 0
+  double slide_mm = 0.4;           ///< that the contact must have moved over the markers to be sliding; above 0
 };
 
 /// One marker. Ratio and tractions are means over its square (MarkerTraction).
@@ -99,19 +99,21 @@ class FrictionObserver {
     std::vector<Eigen::Vector2d> displacement;
     std::vector<std::uint8_t> measured;
     Eigen::Vector2d centre;  ///< of pressure, in material coordinates, mm
+    double ratio = 0.0;      ///< of the whole contact
   };
   void read_ratios(const TractionField& tractions);
   void find_lags(const TractionField& tractions);
   void find_slide(const TractionField& tractions);
   void judge(const TractionField& tractions);
-  void read_friction(const TractionField& tractions);
+  void read_friction();
 
   FrictionSettings settings_;
   FrictionState result_;
-  std::deque<Past> past_;   ///< the newest last
-  double slid_weight_ = 0;  ///< of the frames that slid: sum of 1/error^2
-  double slid_sum_ = 0;     ///< of ratio/error^2
-  int slid_frames_ = 0;
+  struct Slid {
+    double ratio = 0.0, error = 0.0;
+  };
+  std::deque<Past> past_;  ///< the newest last
+  std::deque<Slid> slid_;  ///< the last frames that slid
 };
 
 }  // namespace touchstone::sensors

@@ -313,20 +313,24 @@ void TractionInversion::describe(const std::vector<Candidate>& tried, std::size_
   }
   result.uncertainty /= weights;
   const double values = 3.0 * result.measured;
-  result.misfit = std::sqrt(std::max(0.0, chosen.misfit_square) / values);
-  if (!result.in_contact) return;
-
-  const std::vector<int> rows = unknowns(chosen.patches);
-  const Eigen::MatrixXd normal = normal_(rows, rows);
-  const double used = chosen.factor.solve(normal).trace();
+  double used = 0.0;
+  std::vector<int> rows;
+  if (result.in_contact) {
+    rows = unknowns(chosen.patches);
+    const Eigen::MatrixXd normal = normal_(rows, rows);
+    used = chosen.factor.solve(normal).trace();
+    const Eigen::MatrixXd answer = chosen.factor.solve(wrench_of(compliance_, chosen.patches).transpose());
+    result.noise = answer.transpose() * normal * answer;
+  }
   result.misfit = std::sqrt(std::max(0.0, chosen.misfit_square) / std::max(1.0, values - used));
   const double widen = std::max(1.0, result.misfit * result.misfit);
-  const Eigen::MatrixXd answer = chosen.factor.solve(wrench_of(compliance_, chosen.patches).transpose());
-  result.noise = answer.transpose() * normal * answer;
   const Candidate& larger = tried[std::min(best + 1, tried.size() - 1)];
-  Eigen::MatrixXd spread = wrench_of(compliance_, larger.patches).transpose();
-  larger.factor.matrixL().solveInPlace(spread);
-  result.uncertainty += widen * spread.transpose() * spread;
+  if (!larger.patches.empty()) {
+    Eigen::MatrixXd spread = wrench_of(compliance_, larger.patches).transpose();
+    larger.factor.matrixL().solveInPlace(spread);
+    result.uncertainty += widen * spread.transpose() * spread;
+  }
+  if (!result.in_contact) return;
   for (std::size_t k = 0; k < chosen.patches.size(); ++k) {
     const Eigen::Vector3d x = chosen.x.segment<3>(3 * static_cast<Eigen::Index>(k));
     result.traction.col(chosen.patches[k]) = Eigen::Vector3d(x.x(), x.y(), -x.z());
