@@ -13,8 +13,8 @@ constexpr double kObjectPart = 1.0 / 3.0;
 constexpr int kLeastObjectMarkers = 2;
 /// The contact slides over markers that move by less than this part of its own motion.
 constexpr double kCarried = 0.5;
-/// While the ratio of shear to normal force grows by more than this over the frames looked at, some of it sticks.
-constexpr double kStillGrowing = 0.1;
+/// While the ratio of shear to normal force changes by more than this over the frames looked at, some of it sticks.
+constexpr double kStillChanging = 0.1;
 constexpr int kLeastSlideFrames = 4;
 /// Frames that slide have errors in common (the map's, the contact's): their mean isn't better than a frame's by more.
 constexpr double kCommonError = 0.02;  // relative
@@ -194,7 +194,7 @@ void FrictionObserver::find_slide(const TractionField& tractions) {
     }
     const double moved = sum / squares * static_cast<double>(back);
     const double grown = ratios / squares * static_cast<double>(back);
-    if (grown > kStillGrowing * mean) continue;
+    if (std::abs(grown) > kStillChanging * mean) continue;
     const Past& then = past_[past_.size() - 1 - back];
     double carried = 0.0, weight = 0.0;
     for (std::size_t m = 0; m < result_.markers.size(); ++m) {
@@ -218,6 +218,13 @@ void FrictionObserver::judge(const TractionField& tractions) {
   // While nothing moves the contact and its markers keep what they were.
   if (result_.motion_mm <= 0.0) {
     if (result_.state == ContactSlip::kNoContact) result_.state = ContactSlip::kUnknown;
+    const bool slid = result_.state == ContactSlip::kSliding && result_.friction;
+    if (slid && result_.ratio < settings_.saturation * result_.friction->value) {
+      result_.state = ContactSlip::kSticking;  // friction isn't used up any more: some of it sticks, whichever
+      for (MarkerFriction& marker : result_.markers) {
+        if (marker.state == MarkerSlip::kSlip) marker.state = MarkerSlip::kUnknown;
+      }
+    }
     return;
   }
   const double lag_error = std::sqrt(2.0) * settings_.lateral_noise_mm / result_.motion_mm;
@@ -247,7 +254,7 @@ void FrictionObserver::judge(const TractionField& tractions) {
 }
 
 void FrictionObserver::read_friction() {
-  if (result_.state == ContactSlip::kSliding && result_.ratio_error > 0.0) {
+  if (result_.slide_mm >= settings_.slide_mm && result_.ratio_error > 0.0) {
     slid_.push_back({result_.ratio, result_.ratio_error});
     if (slid_.size() > static_cast<std::size_t>(settings_.history_frames)) slid_.pop_front();
     double weight = 0.0, sum = 0.0;

@@ -196,6 +196,10 @@ std::vector<std::vector<int>> TractionInversion::possible_contacts(const Eigen::
     }
     if (contact != result.back()) result.push_back(std::move(contact));
   }
+  if (result.size() == 1) {  // all pulls: to know how little is known there has to be something to compare with
+    result.emplace_back();
+    for (int p = 0; p < patches; ++p) result.back().push_back(p);
+  }
   return result;
 }
 
