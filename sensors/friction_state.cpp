@@ -194,7 +194,7 @@ void FrictionObserver::find_slide(const TractionField& tractions) {
     }
     const double moved = sum / squares * static_cast<double>(back);
     const double grown = ratios / squares * static_cast<double>(back);
-    if (std::abs(grown) > kStillChanging * mean) continue;
+    if (std::max(std::abs(grown), std::abs(now.ratio - mean)) > kStillChanging * mean) continue;
     const Past& then = past_[past_.size() - 1 - back];
     double carried = 0.0, weight = 0.0;
     for (std::size_t m = 0; m < result_.markers.size(); ++m) {
