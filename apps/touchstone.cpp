@@ -39,8 +39,10 @@ void refuse_unknown_command(const CLI::App& app, int argc, char** argv) {
     if (known.empty()) return;
     const std::string name = argv[i];
     if (std::find(known.begin(), known.end(), name) == known.end()) {
-      fail("'{}' is not a {}{}; there are: {}", name, at == &app ? "command" : "sensor of '" + at->get_name() + "'",
-           did_you_mean(name, known), fmt::join(known, ", "));
+      const std::string what = at == &app                   ? "command"
+                               : at->get_name() == "export" ? "thing that 'export' writes"
+                                                            : "sensor of '" + at->get_name() + "'";
+      fail("'{}' is not a {}{}; there are: {}", name, what, did_you_mean(name, known), fmt::join(known, ", "));
     }
     at = at->get_subcommand(name);
   }
@@ -66,6 +68,7 @@ int run(int argc, char** argv) {
   add_estimate_command(app, global, action);
   add_validate_command(app, global, action);
   add_inspect_command(app, global, action);
+  add_export_command(app, global, action);
 
   refuse_unknown_command(app, argc, argv);
   try {
