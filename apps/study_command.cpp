@@ -29,8 +29,7 @@ void add_study_command(CLI::App& app, const GlobalOptions& global, Action& actio
   auto out = std::make_shared<std::filesystem::path>();
   command->add_option("STUDY", *file, "Study file")->required();
   command->add_option("-o,--out", *out, "Folder for its tables and plots; is made")->required();
-  command->callback(
-      [&action, &global, file, out] { action = [&global, file, out] { study(*file, *out, global); }; });
+  command->callback([&action, &global, file, out] { action = [&global, file, out] { study(*file, *out, global); }; });
 }
 
 }  // namespace touchstone::apps

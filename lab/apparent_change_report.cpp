@@ -30,8 +30,8 @@ std::string cell(double value) {
 }
 
 std::string to_csv(const ApparentChangeSpec& spec, const ApparentChangeResult& result) {
-  std::string csv = fmt::format("object,by,force_N,{},lens_mm,displacement_mm,stretch,largest_strain",
-                                lab::name_of(spec.vary.field));
+  std::string csv =
+      fmt::format("object,by,force_N,{},lens_mm,displacement_mm,stretch,largest_strain", lab::name_of(spec.vary.field));
   for (const ApparentMeasure measure : kStudiedMeasures) csv += fmt::format(",{}", name_of(measure));
   csv += "\n";
   for (const ApparentChangeRow& row : result.rows) {
@@ -113,9 +113,9 @@ StudyResult report(const std::string& name, const ApparentChangeSpec& spec, cons
   for (std::size_t k = 0; k < spec.objects.size(); ++k) {
     for (const double force : spec.force_N) {
       for (const int measure : kDrawn) {
-        files.files.push_back({fmt::format("{}-{}-{:.4g}N-{}.svg", name, spec.objects[k].name, force,
-                                           name_of(kStudiedMeasures[measure])),
-                               to_svg(plot_of(spec, result, spec.objects[k].name, force, measure))});
+        files.files.push_back(
+            {fmt::format("{}-{}-{:.4g}N-{}.svg", name, spec.objects[k].name, force, name_of(kStudiedMeasures[measure])),
+             to_svg(plot_of(spec, result, spec.objects[k].name, force, measure))});
       }
     }
   }

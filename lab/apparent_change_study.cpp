@@ -83,8 +83,8 @@ ApparentChangeRow seen_row(const ApparentChangeSpec& spec, const sim::DeviceSpec
   row.stretch = pressed.stretch;
   row.largest_strain = pressed.largest_strain;
   const double t = device.gel.thickness_mm;
-  const render::Scene faces = bare_faces(t, device.gel.refractive_index, device.plate.thickness_mm,
-                                         device.plate.refractive_index);
+  const render::Scene faces =
+      bare_faces(t, device.gel.refractive_index, device.plate.thickness_mm, device.plate.refractive_index);
   const double distance = distance_of(spec, lens);
   for (int k = 0; k < kStudiedMeasureCount; ++k) {
     const bool whole = kStudiedMeasures[k] == ApparentMeasure::relative_whole_fixed;
@@ -165,9 +165,7 @@ double& field_of(sim::DeviceSpec& device, StudyField field) {
 }
 
 EnumNames<ApparentSource> enum_names(ApparentSource) {
-  return {{"formula", ApparentSource::formula},
-          {"linear", ApparentSource::linear},
-          {"finite", ApparentSource::finite}};
+  return {{"formula", ApparentSource::formula}, {"linear", ApparentSource::linear}, {"finite", ApparentSource::finite}};
 }
 
 std::string name_of(ApparentSource source) {

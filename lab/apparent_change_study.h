@@ -83,11 +83,11 @@ ApparentChangeResult run_apparent_change(const ApparentChangeSpec& spec, const s
 
 /// Where one measure is largest over the varied figure.
 struct ApparentOptimum {
-  ApparentChangeRow of;    ///< what was pressed and seen: object, source, force, lens
+  ApparentChangeRow of;  ///< what was pressed and seen: object, source, force, lens
   ApparentMeasure measure = ApparentMeasure::relative_whole_fixed;
-  double value = 0.0;      ///< of the varied figure: the vertex of the parabola through the best and its neighbours
-  double change = 0.0;     ///< the largest of the values that were tried
-  bool interior = false;   ///< false: the largest is the first or the last that could be had
+  double value = 0.0;     ///< of the varied figure: the vertex of the parabola through the best and its neighbours
+  double change = 0.0;    ///< the largest of the values that were tried
+  bool interior = false;  ///< false: the largest is the first or the last that could be had
 };
 /// For each object, source, force, lens and measure of which at least one value could be had, in the rows' order.
 std::vector<ApparentOptimum> optima_of(const ApparentChangeResult& result);

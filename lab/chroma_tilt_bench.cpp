@@ -55,11 +55,10 @@ Eigen::Vector3d sheet_point(const TiltBench& bench, TiltMarker marker, const Til
   const Eigen::Vector3d rest(u, v, 0.0);
   const double depth = marker == TiltMarker::ball ? ball_depth(bench) : 0.0;
   const double pressed = std::max(0.0, -pose.moved_mm.z());
-  const double stretch =
-      marker == TiltMarker::flat ? column_stretch(pressed, bench.gel_mm, bench.poisson_ratio) : 1.0;
+  const double stretch = marker == TiltMarker::flat ? column_stretch(pressed, bench.gel_mm, bench.poisson_ratio) : 1.0;
   const Eigen::Vector3d arm(stretch * u, stretch * v, depth);  // from the centre that it turns about
-  const Eigen::Vector3d moved = Eigen::AngleAxisd(pose.tilt, Eigen::Vector3d::UnitY()) * arm -
-                                Eigen::Vector3d(0.0, 0.0, depth) + pose.moved_mm;
+  const Eigen::Vector3d moved =
+      Eigen::AngleAxisd(pose.tilt, Eigen::Vector3d::UnitY()) * arm - Eigen::Vector3d(0.0, 0.0, depth) + pose.moved_mm;
   const Eigen::Vector3d place(bench.place_mm.x(), bench.place_mm.y(), 0.0);
   return place + rest + share_of_motion(std::hypot(u, v)) * (moved - rest);
 }
@@ -188,12 +187,8 @@ render::Scene tilt_scene(const TiltBench& bench, const TiltSpectra& spectra, Til
   const double z = -bench.gel_mm - 0.5 * bench.plate_mm;
   for (const Eigen::Vector2d& side : {Eigen::Vector2d(-1.0, 0.0), {1.0, 0.0}, {0.0, 1.0}}) {
     const Eigen::Vector2d at = kGuideSide_mm * side;
-    scene.lamps.push_back(render::GuideLamp{{at.x(), at.y(), z},
-                                            {-side.x(), -side.y(), 0.0},
-                                            0.0,
-                                            kGuideWidth_mm,
-                                            40.0 * kRadiansPerDegree,
-                                            spectra.lamp});
+    scene.lamps.push_back(render::GuideLamp{
+        {at.x(), at.y(), z}, {-side.x(), -side.y(), 0.0}, 0.0, kGuideWidth_mm, 40.0 * kRadiansPerDegree, spectra.lamp});
   }
   return scene;
 }
@@ -206,8 +201,7 @@ render::Camera tilt_camera(const TiltBench& bench) {
   camera.pixel_pitch_um = bench.pixel_pitch_um;
   camera.aperture_mm = bench.lens_mm / bench.f_number;
   camera.focus_distance_mm = focus;
-  camera.matrix =
-      render::matrix_of_lens(bench.lens_mm, focus, bench.pixel_pitch_um, camera.width, camera.height);
+  camera.matrix = render::matrix_of_lens(bench.lens_mm, focus, bench.pixel_pitch_um, camera.width, camera.height);
   camera.matrix.cx += bench.phase_px.x() - bench.place_mm.x() * px_per_mm;
   camera.matrix.cy += bench.phase_px.y() - bench.place_mm.y() * px_per_mm;
   camera.gel_from_camera.translation = {0.0, 0.0, -bench.camera_mm};

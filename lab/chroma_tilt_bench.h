@@ -26,16 +26,16 @@ enum class TiltMarker {
 struct TiltBench {
   double gel_mm = 5.0;
   double plate_mm = 8.0;
-  double side_mm = 2.0;            ///< of marker and film; the ball's diameter
-  double poisson_ratio = 0.5;      ///< of eq. 3
-  double lens_mm = 24.0;           ///< focal length
-  double camera_mm = 382.0;        ///< from the lens to the sheet at rest
-  double pixel_pitch_um = 4.51;    ///< 66 um on the sheet
+  double side_mm = 2.0;          ///< of marker and film; the ball's diameter
+  double poisson_ratio = 0.5;    ///< of eq. 3
+  double lens_mm = 24.0;         ///< focal length
+  double camera_mm = 382.0;      ///< from the lens to the sheet at rest
+  double pixel_pitch_um = 4.51;  ///< 66 um on the sheet
   double f_number = 4.0;
   Eigen::Vector2d place_mm = Eigen::Vector2d::Zero();  ///< of marker and film, from the camera's axis
-  double half_view_mm = 2.6;       ///< of the part of the picture that is made, about the marker at rest
+  double half_view_mm = 2.6;  ///< of the part of the picture that is made, about the marker at rest
   Eigen::Vector2d phase_px = Eigen::Vector2d::Zero();  ///< by which the picture is shifted on the pixels
-  int samples = 256;               ///< paths a pixel
+  int samples = 256;                                   ///< paths a pixel
 };
 
 /// The text's camera, 66 um a pixel, and a small one 60 mm (in air) away on which the marker is 7 pixels wide.
@@ -59,7 +59,7 @@ struct TiltSpectra {
 };
 /// Colours as a tilt picture has them, of what is level and fully lit: red, green and blue over those of the lamps.
 struct TiltColours {
-  Eigen::Vector3d white, magenta;          ///< beside the film
+  Eigen::Vector3d white, magenta;            ///< beside the film
   Eigen::Vector3d film_white, film_magenta;  ///< lit and seen through it
 };
 TiltColours tilt_colours(const TiltSpectra& spectra);

@@ -15,8 +15,6 @@ namespace {
 constexpr float kSaturated = 0.5F;
 // Blue over red: 0.9 and more beside the film, 0.3 and less under it.
 constexpr double kUnderFilm = 0.6;
-constexpr double kLeastCover = 0.25;
-constexpr double kMostCover = 0.75;
 constexpr std::array kPressed_mm = {0.0, 0.25, 0.5, 0.75, 1.0};
 constexpr double kAside_mm = 0.3;
 constexpr int kPhases = 4;
@@ -50,7 +48,7 @@ double ink_cover(const cv::Vec3f& c, const TiltColours& colours) {
   parts << sheet[0], ink[0], sheet[1], ink[1];
   const Eigen::Vector2d share = parts.inverse() * Eigen::Vector2d(c[0], c[1]);
   if (!(share.sum() > 0.0)) return 0.0;
-  return std::clamp((share[1] / share.sum() - kLeastCover) / (kMostCover - kLeastCover), 0.0, 1.0);
+  return std::clamp(share[1] / share.sum(), 0.0, 1.0);
 }
 
 /// a - b on the circle.
@@ -93,10 +91,9 @@ TiltReading read_tilt_picture(const cv::Mat& picture, const TiltColours& colours
     for (int x = 0; x < picture.cols; ++x) {
       const auto& c = picture.at<cv::Vec3f>(y, x);
       const float most = std::max({c[0], c[1], c[2]});
-      if (most - std::min({c[0], c[1], c[2]}) > kSaturated * most) {
-        hue += hue_direction(c);
-        reading.coloured_area_px += 1.0;
-      }
+      if (!(most - std::min({c[0], c[1], c[2]}) > kSaturated * most)) continue;
+      hue += hue_direction(c);
+      reading.coloured_area_px += 1.0;
       const double cover = ink_cover(c, colours);
       reading.ink_area_px += cover;
       moment += cover * Eigen::Vector2d(x + 0.5, y + 0.5);

@@ -15,22 +15,22 @@ namespace touchstone::lab {
 
 /// What a picture of one marker tells. Own plain code on ideal pictures: no mosaic, no noise, no segmentation.
 struct TiltReading {
-  double hue = 0.0;            ///< radians, -pi to pi, 0 is red: circular mean over pixels of more than half saturation
+  double hue = 0.0;  ///< radians, -pi to pi, 0 is red: circular mean over pixels of more than half saturation
   Eigen::Vector2d ink_px = Eigen::Vector2d::Zero();  ///< centroid of the ink
-  double ink_area_px = 0.0;    ///< pixels counted by what ink covers of them
-  double coloured_area_px = 0.0;  ///< number of pixels of more than half saturation
+  double ink_area_px = 0.0;                          ///< pixels counted by what ink covers of them
+  double coloured_area_px = 0.0;                     ///< number of pixels of more than half saturation
 };
-/// `picture` as tilt_picture gives it. A pixel's red and green are split into bare sheet and ink, under the film or
-/// beside it as its blue tells; the share of ink counts from a quarter to three quarters, so that the shade that ink
-/// throws on the sheet isn't ink. @throws Error if nothing in it is coloured, or has ink
+/// `picture` as tilt_picture gives it. Ink is looked for in saturated pixels only, as the text does, since a ball
+/// throws a pink shade of saturation 0.3 on the sheet beside it. Their red and green are split into bare sheet and ink,
+/// under the film or beside it as their blue tells. @throws Error if nothing in it is coloured, or has ink
 TiltReading read_tilt_picture(const cv::Mat& picture, const TiltColours& colours);
 
 /// How a level marker's reading goes with its displacement.
 struct TiltCalibration {
-  double hue_slope = 0.0;       ///< radians a mm towards the film: of the straight line over 0 to 1 mm
-  double hue_fit_r2 = 0.0;      ///< of that line
-  double centroid_gain = 0.0;   ///< px a mm along x, level and not pressed
-  double area_slope = 0.0;      ///< relative change of the ink's area a mm towards the film
+  double hue_slope = 0.0;      ///< radians a mm towards the film: of the straight line over 0 to 1 mm
+  double hue_fit_r2 = 0.0;     ///< of that line
+  double centroid_gain = 0.0;  ///< px a mm along x, level and not pressed
+  double area_slope = 0.0;     ///< relative change of the ink's area a mm towards the film
 };
 
 /// What a tilt seems to be.

@@ -11,7 +11,7 @@
 namespace touchstone::lab {
 namespace {
 
-constexpr int kPointsASide = 32;         // of an outline: a straight side stays straight but for the press's own bend
+constexpr int kPointsASide = 32;          // of an outline: a straight side stays straight but for the press's own bend
 constexpr double kBesideTriangle = 1e-9;  // of its area: points on an edge belong to either
 
 double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {

@@ -35,7 +35,9 @@ StudySpec read_study(const std::filesystem::path& file) {
 
 StudyResult run_study(const StudySpec& study, const std::filesystem::path& cache, const Progress& progress) {
   return std::visit(
-      [&](const ApparentChangeSpec& spec) { return report(study.name, spec, run_apparent_change(spec, cache, progress)); },
+      [&](const ApparentChangeSpec& spec) {
+        return report(study.name, spec, run_apparent_change(spec, cache, progress));
+      },
       study.kind);
 }
 
