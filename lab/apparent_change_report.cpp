@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 
 #include "core/error.h"
 #include "lab/line_plot.h"
@@ -94,9 +93,11 @@ LinePlot plot_of(const ApparentChangeSpec& spec, const ApparentChangeResult& res
   plot.x_label = lab::name_of(spec.vary.field);
   plot.y_label = "apparent change";
   plot.log_x = false;
+  // Beside the formula the better one of the simulations: with both, lenses couldn't be told apart.
+  const ApparentSource best = *std::max_element(spec.by.begin(), spec.by.end());
   for (const ApparentChangeRow& row : result.rows) {
     const bool formula = row.source == ApparentSource::formula;
-    if (row.force_N != force || !(formula || row.object == object)) continue;
+    if (row.force_N != force || !(formula || (row.object == object && row.source == best))) continue;
     const std::string name = fmt::format("{:.4g} mm, {}", row.lens_mm, lab::name_of(row.source));
     if (plot.curves.empty() || plot.curves.back().name != name) plot.curves.push_back({name, {}, formula});
     plot.curves.back().points.emplace_back(row.value, row.measure[measure]);

@@ -39,7 +39,7 @@ struct TiltError {
   double hue_change = 0.0;  ///< radians, from level
   double normal_um = 0.0;   ///< by the hue: towards the film
   double size_um = 0.0;     ///< by the ink's area: towards the film
-  double lateral_um = 0.0;  ///< by the ink's centroid: along x, the way that the tilt's raised side lies
+  double lateral_um = 0.0;  ///< by the ink's centroid: along x, to the side that is tilted towards the film
   double across_um = 0.0;   ///< likewise along y
 };
 

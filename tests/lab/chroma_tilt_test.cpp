@@ -112,6 +112,7 @@ TEST(TiltedMarker, LooksNarrowerAndYellowerAndAPressedOneLarger) {
 TEST(MeasureTilt, FindsTheGainThatTheLensHas) {
   TiltBench bench = far_bench();
   bench.samples = 8;
+  bench.half_view_mm = 1.6;
   const TiltTable table = measure_tilt(bench, spectra(), TiltMarker::rigid, std::vector<double>{}, 5);
   EXPECT_TRUE(table.errors.empty());
   // 24 mm before what is 378 mm away, on pixels of 4.51 um.
