@@ -115,7 +115,7 @@ StudyResult report(const std::string& name, const ApparentChangeSpec& spec, cons
     for (const double force : spec.force_N) {
       for (const int measure : kDrawn) {
         files.files.push_back(
-            {fmt::format("{}-{}-{:.4g}N-{}.svg", name, spec.objects[k].name, force, name_of(kStudiedMeasures[measure])),
+            {fmt::format("{}-{}-{}N-{}.svg", name, spec.objects[k].name, force, name_of(kStudiedMeasures[measure])),
              to_svg(plot_of(spec, result, spec.objects[k].name, force, measure))});
       }
     }

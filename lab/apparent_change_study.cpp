@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <map>
 #include <tuple>
 
 #include "core/error.h"
+#include "lab/job.h"
 #include "lab/pressed_marker.h"
 #include "sim/gel_setup.h"
 #include "sim/virtual_sensor.h"
@@ -194,20 +194,40 @@ void fields(YamlReader& in, ApparentChangeSpec& spec) {
   in.optional("sensor_mm", spec.sensor_mm, Allowed::above(0.0));
   in.required("lenses_mm", spec.lenses_mm, Allowed::above(0.0));
   require_rising(spec.lenses_mm, in.where("lenses_mm"), "lenses_mm");
+  try {
+    for (const double lens : spec.lenses_mm) distance_of(spec, lens);
+  } catch (const Error& error) {
+    fail_at(in.where("lenses_mm"), "lenses_mm: {}", error.what());
+  }
   std::vector<std::string> objects;
   in.required("objects", objects);
   if (objects.empty()) fail_at(in.where("objects"), "objects: is empty; at least one object file is needed");
   for (const std::string& file : objects) {
-    spec.objects.push_back(sim::read_object(in.folder() / file));
-    if (spec.objects.back().elastic) {
+    const sim::ObjectSpec object = sim::read_object(in.folder() / file);
+    if (object.elastic) {
       fail_at(in.where("objects"), "objects: {} is elastic; a study of this kind presses rigid ones", file);
     }
+    if (!is_folder_name(object.name)) {
+      fail_at(in.where("objects"), "objects: the name '{}' in {} can't name files; allowed are letters, digits, - and _",
+              object.name, file);
+    }
+    for (const sim::ObjectSpec& other : spec.objects) {
+      if (other.name == object.name) {
+        fail_at(in.where("objects"), "objects: {} has the name '{}' a second time", file, object.name);
+      }
+    }
+    spec.objects.push_back(object);
   }
   in.required("force_N", spec.force_N, Allowed::above(0.0));
   require_rising(spec.force_N, in.where("force_N"), "force_N");
   in.optional("friction", spec.friction, Allowed::at_least(0.0));
   in.optional("by", spec.by);
   if (spec.by.empty()) fail_at(in.where("by"), "by: is empty; allowed are formula, linear and finite");
+  for (std::size_t k = 1; k < spec.by.size(); ++k) {
+    if (std::find(spec.by.begin(), spec.by.begin() + k, spec.by[k]) != spec.by.begin() + k) {
+      fail_at(in.where("by"), "by: {} stands there a second time", name_in(spec.by[k]));
+    }
+  }
   if (asks_for(spec, ApparentSource::finite) && spec.device.mesh.force_error) {
     fail_at(in.where("by"), "by: finite strain needs a mesh that is given by fine_mm: {} gives it by force_error",
             spec.device.name);

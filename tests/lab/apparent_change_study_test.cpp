@@ -8,7 +8,6 @@
 #include "core/error.h"
 #include "lab/pressed_marker.h"
 #include "lab/study.h"
-#include "sim/virtual_sensor.h"
 #include "tests/support/temporary_folder.h"
 
 namespace touchstone::lab {
@@ -143,6 +142,11 @@ TEST_F(ApparentChangeStudy, MistakesAreRefusedWithTheirPlace) {
   refused("friction: 0", "friction: -1", "friction");
   refused("friction: 0", "by: []", "by: is empty");
   refused("friction: 0", "colour: 3", "colour");
+  refused("friction: 0", "by: [linear, linear]", "by: linear stands there a second time");
+  refused("[punch.yaml]", "[punch.yaml, punch.yaml]", "has the name 'punch' a second time");
+  refused("[24, 50]", "[0.001, 50]\nmarkers_in_view: 1", "lenses_mm: 1 markers");
+  folder_.write("odd.yaml", replaced(kPunch, "name: punch", "name: a/b"));
+  refused("[punch.yaml]", "[odd.yaml]", "'a/b' in odd.yaml can't name files");
 }
 
 TEST(PressedMarker, IsPicturedByThalesWithoutRefraction) {
