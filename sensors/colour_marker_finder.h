@@ -5,15 +5,13 @@
 // What the text leaves open, and what is done here:
 // - Ink takes green out of white and hardly blue, the filter takes blue and hardly green. So green tells where ink is
 //   and blue where filter is, each against the pixel's own largest channel: a shadow darkens all channels and changes
-//   neither. The threshold is half way from white to the full colour, which the picture at rest shows: there a rim
-//   pixel is half covered, so a region's area doesn't depend on how blurred its rim is.
+//   neither. How far a pixel is on the way from white to the full colour, which the picture at rest shows, is how much
+//   of it is covered. Patches of ink are connected pixels of more than 0.7, so those with a blurred gap stay apart.
 // - Filters are rigid: where they are is known from the picture at rest. A patch of ink belongs to the filter that most
 //   of it is under (ink_ownership.h), what is filter without ink to that filter's cell. So regions that touch are told
 //   apart, and ink may reach a little under a neighbour's filter.
-// - Centroids and areas weigh a rim pixel by what is covered of it, so a marker of 4 x 4 px has them to parts of a
-// pixel.
-// - The mean hue is the circular mean, as hue wraps at red, over pixels of more than half saturation, as the text has
-// it.
+// - Centroids and areas weigh a rim pixel by what is covered of it: a marker of 4 x 4 px has them to parts of a pixel.
+// - The mean hue is circular, as hue wraps at red, over pixels of more than half saturation, as the text has it.
 
 #include <Eigen/Core>
 #include <array>

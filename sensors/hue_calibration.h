@@ -18,17 +18,19 @@ struct HueSample {
   int series = 0;  ///< samples of one series (one press or one shear) are alike: they are left out together
 };
 
-/// What kind of model to make.
+/// What kind of model to make. The default is what did best on painted markers of 7 and 28 px, calibrated on shear
+/// along one axis at several depths and tried on shear along a diagonal.
 struct HueModelForm {
-  HueForm form = HueForm::kPolynomial;
+  HueForm form = HueForm::kIsotropic;
   // Of eq. 4:
   bool of_ink = false;       ///< of the ink's centroid
   bool free_offset = false;  ///< h0 is fitted, not the hue at rest: a better line, but then rest isn't zero
-  // Of a polynomial:
-  HueFeatures features = {};
-  int degree = 3;         ///< 1 to 4
+  // Of the other two:
+  HueFeatures features = {.coloured_area = false};
+  int degree = 2;         ///< 1 to 4
   double ridge = 1e-5;    ///< on terms of unit mean square, per sample; above 0
-  bool symmetric = true;  ///< a square marker looks alike under its 8 turns and mirrorings: each sample counts as 8
+  bool symmetric = true;  ///< of kPolynomial: a square marker looks alike under its 8 turns and mirrorings: each sample
+                          ///< counts as 8
 };
 
 struct HueCalibrationSettings {
@@ -69,8 +71,8 @@ struct HueFormScore {
   HueErrors errors;  ///< cross-validated
 };
 
-/// Polynomials of degrees 1 to 4 and several ridges, of all features, of those without areas, and of hue and one
-/// centroid; and eq. 4.
+/// Eq. 4; isotropic and other polynomials of degrees 1 to 4 and several ridges, of all features, of those without
+/// areas, and of hue and one centroid.
 std::vector<HueModelForm> usual_hue_forms();
 
 /// Scores each form by cross-validation, the best (least rms of the displacement's length) first. Forms that the

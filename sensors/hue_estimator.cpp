@@ -16,9 +16,7 @@ HueEstimator::HueEstimator(const HueModel& model, const ColourMarkerReading& res
     }
     gains_[static_cast<std::size_t>(gain.marker)] = gain;
   }
-  if (model.form == HueForm::kPolynomial) {
-    terms_ = hue_terms(static_cast<int>(model.polynomial.features.indices().size()), model.polynomial.degree);
-  }
+  terms_ = terms_of(model);
 }
 
 HueEstimate HueEstimator::estimate(std::size_t marker, const ColourMarker& seen) const {

@@ -27,12 +27,25 @@ void add_terms(int feature, int left, Eigen::RowVectorXi& exponents, std::vector
   }
 }
 
+std::string fault_of_terms(int degree, const Eigen::VectorXd& scale, int features) {
+  if (features == 0) return "it is of no feature";
+  if (degree < 1 || degree > kMostDegree) {
+    return fmt::format("its degree is {}, it must be from 1 to {}", degree, kMostDegree);
+  }
+  if (scale.size() != features || !scale.allFinite() || scale.minCoeff() <= 0.0) {
+    return "its features' scales aren't all above zero";
+  }
+  return "";
+}
+
 }  // namespace
 
 const char* name_of(HueForm form) {
   switch (form) {
     case HueForm::kEquation4:
       return "equation_4";
+    case HueForm::kIsotropic:
+      return "isotropic";
     case HueForm::kPolynomial:
       return "polynomial";
   }
@@ -89,15 +102,23 @@ std::string fault_of(const HueModel& model) {
     if (!std::isfinite(line.hue_offset) || !std::isfinite(line.gain) || !std::isfinite(line.gain_slope)) {
       return "its line isn't finite";
     }
+  } else if (model.form == HueForm::kIsotropic) {
+    const HueIsotropic& isotropic = model.isotropic;
+    const int centroids = isotropic.features.centroid + isotropic.features.ink_centroid;
+    if (centroids == 0) return "it is of no centroid";
+    const int scalars = IsotropicFeatures::count(isotropic.features);
+    const std::string fault = fault_of_terms(isotropic.degree, isotropic.scale, scalars);
+    if (!fault.empty()) return fault;
+    const Eigen::Index lateral = centroids * (1 + count_lower_terms(scalars, isotropic.degree));
+    if (isotropic.press.size() != hue_terms(scalars, isotropic.degree).rows() || isotropic.lateral.size() != lateral) {
+      return fmt::format("it has {} and {} coefficients, {} and {} terms", isotropic.press.size(),
+                         isotropic.lateral.size(), hue_terms(scalars, isotropic.degree).rows(), lateral);
+    }
+    if (!isotropic.press.allFinite() || !isotropic.lateral.allFinite()) return "a coefficient isn't finite";
   } else {
     const auto features = static_cast<int>(polynomial.features.indices().size());
-    if (features == 0) return "its polynomial is of no feature";
-    if (polynomial.degree < 1 || polynomial.degree > kMostDegree) {
-      return fmt::format("its degree is {}, it must be from 1 to {}", polynomial.degree, kMostDegree);
-    }
-    if (polynomial.scale.size() != features || !polynomial.scale.allFinite() || polynomial.scale.minCoeff() <= 0.0) {
-      return "its features' scales aren't all above zero";
-    }
+    const std::string fault = fault_of_terms(polynomial.degree, polynomial.scale, features);
+    if (!fault.empty()) return fault;
     if (polynomial.coefficients.rows() != hue_terms(features, polynomial.degree).rows()) {
       return fmt::format("it has {} coefficients, {} terms", polynomial.coefficients.rows(),
                          hue_terms(features, polynomial.degree).rows());
@@ -112,6 +133,44 @@ std::string fault_of(const HueModel& model) {
   return "";
 }
 
+int IsotropicFeatures::count(const HueFeatures& features) {
+  return features.hue + features.centroid + features.ink_centroid + features.coloured_area + features.ink_area;
+}
+
+IsotropicFeatures::IsotropicFeatures(const HueFeatures& features, const Eigen::VectorXd& scale,
+                                     const MarkerChange& change)
+    : scalars(count(features)) {
+  TS_ASSERT(scale.size() == scalars.size());
+  Eigen::Index i = 0;
+  const auto add_scalar = [&](bool is_used, double value) {
+    if (!is_used) return;
+    scalars[i] = value / scale[i];
+    ++i;
+  };
+  const auto add_shift = [&](bool is_used, const Eigen::Vector2d& value) {
+    if (!is_used) return;
+    shifts.emplace_back(value / scale[i]);
+    scalars[i++] = shifts.back().squaredNorm();
+  };
+  add_scalar(features.hue, change.hue);
+  add_shift(features.centroid, change.centroid_mm);
+  add_shift(features.ink_centroid, change.ink_centroid_mm);
+  add_scalar(features.coloured_area, change.log_coloured_area);
+  add_scalar(features.ink_area, change.log_ink_area);
+}
+
+Eigen::Index count_lower_terms(int features, int degree) {
+  return degree > 1 ? hue_terms(features, degree - 1).rows() : 0;
+}
+
+Eigen::MatrixXi terms_of(const HueModel& model) {
+  if (model.form == HueForm::kEquation4) return {};
+  if (model.form == HueForm::kIsotropic) {
+    return hue_terms(IsotropicFeatures::count(model.isotropic.features), model.isotropic.degree);
+  }
+  return hue_terms(static_cast<int>(model.polynomial.features.indices().size()), model.polynomial.degree);
+}
+
 SeenDisplacement displacement_of(const HueModel& model, const Eigen::MatrixXi& terms, const MarkerChange& change) {
   SeenDisplacement out;
   if (model.form == HueForm::kEquation4) {
@@ -120,6 +179,20 @@ SeenDisplacement displacement_of(const HueModel& model, const Eigen::MatrixXi& t
     const double gain = line.gain_slope * out.press_mm + line.gain;
     out.determined = std::abs(gain) >= kLeastGain;
     if (out.determined) out.lateral_mm = (line.of_ink ? change.ink_centroid_mm : change.centroid_mm) / gain;
+    return out;
+  }
+  if (model.form == HueForm::kIsotropic) {
+    const HueIsotropic& isotropic = model.isotropic;
+    const IsotropicFeatures features(isotropic.features, isotropic.scale, change);
+    const Eigen::VectorXd values = hue_term_values(terms, features.scalars);
+    out.press_mm = values.dot(isotropic.press);
+    const auto centroids = static_cast<Eigen::Index>(features.shifts.size());
+    const Eigen::Index each = isotropic.lateral.size() / centroids;
+    for (Eigen::Index i = 0; i < centroids; ++i) {
+      const auto coefficients = isotropic.lateral.segment(i * each, each);
+      const double gain = coefficients[0] + coefficients.tail(each - 1).dot(values.head(each - 1));
+      out.lateral_mm += gain * features.shifts[static_cast<std::size_t>(i)];
+    }
     return out;
   }
   const HuePolynomial& polynomial = model.polynomial;

@@ -17,10 +17,11 @@
 namespace touchstone::sensors {
 
 enum class HueForm : std::uint8_t {
-  kEquation4,  ///< the text's own
-  kPolynomial,
+  kEquation4,   ///< the text's own
+  kIsotropic,   ///< a polynomial that knows no direction: it may learn from shear along one axis
+  kPolynomial,  ///< any polynomial: it has to see shear in all directions
 };
-/// "equation_4", "polynomial"
+/// "equation_4", "isotropic", "polynomial"
 const char* name_of(HueForm form);
 
 /// Which of a MarkerChange a polynomial is of.
@@ -43,6 +44,17 @@ struct HueLine {
   double gain_slope = 0.0;  ///< a, 1/mm
   double gain = 0.0;        ///< b
   bool of_ink = false;      ///< c is the ink's centroid, not that of all that is coloured
+};
+
+/// With s the scaled scalars (change of hue, squares of the centroids' shifts, areas' logarithms): the press is a
+/// polynomial of s without a constant, and the lateral displacement the sum of the centroids' scaled shifts, each times
+/// a polynomial of s of one degree less.
+struct HueIsotropic {
+  HueFeatures features;     ///< a centroid at least
+  int degree = 1;           ///< 1 to 4
+  Eigen::VectorXd scale;    ///< of the scalars; of a shift, not of its square
+  Eigen::VectorXd press;    ///< mm, terms in the order of hue_terms
+  Eigen::VectorXd lateral;  ///< mm, for each centroid: the constant, then terms in that order
 };
 
 /// All products of up to `degree` of the scaled features, but for the constant.
@@ -76,6 +88,7 @@ struct HueModel {
   double spacing_mm = 3.0;  ///< of the grid
   ViewParallax parallax;
   HueLine line;              ///< of kEquation4
+  HueIsotropic isotropic;    ///< of kIsotropic
   HuePolynomial polynomial;  ///< of kPolynomial
   std::vector<MarkerGain> gains;
   HueRange range;
@@ -93,6 +106,23 @@ Eigen::MatrixXi hue_terms(int features, int degree);
 /// The terms' values. @param scaled the features
 Eigen::VectorXd hue_term_values(const Eigen::MatrixXi& terms, const Eigen::VectorXd& scaled);
 
+/// What a HueIsotropic is made of, from a change.
+struct IsotropicFeatures {
+  Eigen::VectorXd scalars;
+  std::vector<Eigen::Vector2d> shifts;
+
+  /// @param scale as HueIsotropic::scale
+  IsotropicFeatures(const HueFeatures& features, const Eigen::VectorXd& scale, const MarkerChange& change);
+  /// Number of scalars. That of the centroids among them is `features.centroid + features.ink_centroid`.
+  static int count(const HueFeatures& features);
+};
+
+/// How many of the terms of a degree are of a lower one.
+Eigen::Index count_lower_terms(int features, int degree);
+
+/// The terms that a model is evaluated with; empty for eq. 4.
+Eigen::MatrixXi terms_of(const HueModel& model);
+
 /// A marker's displacement as it is seen.
 struct SeenDisplacement {
   Eigen::Vector2d lateral_mm = Eigen::Vector2d::Zero();
@@ -100,7 +130,7 @@ struct SeenDisplacement {
   bool determined = true;  ///< false: eq. 5's gain a w + b is too near to zero to divide by
 };
 
-/// Without gains. `terms` are hue_terms of the polynomial, and not looked at for eq. 4.
+/// Without gains. `terms` are terms_of(model).
 SeenDisplacement displacement_of(const HueModel& model, const Eigen::MatrixXi& terms, const MarkerChange& change);
 
 /// Whether a change is beyond what calibration saw, by more than a twentieth.

@@ -50,12 +50,24 @@ Json json_of(const HueLine& line) {
           {"centroid", line.of_ink ? "ink" : "all"}};
 }
 
-Json json_of(const HuePolynomial& polynomial) {
-  Json features = Json::array();
+Json json_of(const HueFeatures& features) {
+  Json names = Json::array();
   for (const auto& [name, member] : feature_names()) {
-    if (polynomial.features.*member) features.push_back(name);
+    if (features.*member) names.push_back(name);
   }
-  return {{"features", features},
+  return names;
+}
+
+Json json_of(const HueIsotropic& isotropic) {
+  return {{"features", json_of(isotropic.features)},
+          {"degree", isotropic.degree},
+          {"scale", list_of(isotropic.scale)},
+          {"press_mm", list_of(isotropic.press)},
+          {"lateral_mm", list_of(isotropic.lateral)}};
+}
+
+Json json_of(const HuePolynomial& polynomial) {
+  return {{"features", json_of(polynomial.features)},
           {"degree", polynomial.degree},
           {"scale", list_of(polynomial.scale)},
           {"coefficients_mm", rows_of(polynomial.coefficients)}};
@@ -78,30 +90,51 @@ HueLine line_of(const JsonField& json) {
   return line;
 }
 
-HuePolynomial polynomial_of(const JsonField& json) {
-  json.expect_map({"features", "degree", "scale", "coefficients_mm"});
-  HuePolynomial polynomial;
-  polynomial.features = {false, false, false, false, false};
-  const JsonField features = json.at("features");
-  if (!features.value.is_array()) features.refuse("is a {}, a list is needed", features.value.type_name());
-  for (std::size_t i = 0; i < features.value.size(); ++i) {
-    const std::string name = features.at(i).text();
+HueFeatures features_of(const JsonField& json) {
+  HueFeatures features{false, false, false, false, false};
+  if (!json.value.is_array()) json.refuse("is a {}, a list is needed", json.value.type_name());
+  for (std::size_t i = 0; i < json.value.size(); ++i) {
+    const std::string name = json.at(i).text();
     bool known = false;
     for (const auto& [feature, member] : feature_names()) {
       if (name != feature) continue;
-      if (polynomial.features.*member) features.at(i).refuse("'{}' is there twice", name);
-      polynomial.features.*member = known = true;
+      if (features.*member) json.at(i).refuse("'{}' is there twice", name);
+      features.*member = known = true;
     }
-    if (!known) features.at(i).refuse("'{}' isn't a feature", name);
+    if (!known) json.at(i).refuse("'{}' isn't a feature", name);
   }
-  const std::size_t count = polynomial.features.indices().size();
-  if (count == 0) features.refuse("has no feature");
+  if (json.value.empty()) json.refuse("has no feature");
+  return features;
+}
+
+Eigen::VectorXd numbers_of(const JsonField& json, Eigen::Index size) {
+  json.expect_list(static_cast<std::size_t>(size));
+  Eigen::VectorXd numbers(size);
+  for (Eigen::Index i = 0; i < size; ++i) numbers[i] = json.at(static_cast<std::size_t>(i)).number();
+  return numbers;
+}
+
+HueIsotropic isotropic_of(const JsonField& json) {
+  json.expect_map({"features", "degree", "scale", "press_mm", "lateral_mm"});
+  HueIsotropic isotropic;
+  isotropic.features = features_of(json.at("features"));
+  isotropic.degree = static_cast<int>(json.at("degree").whole_number(1, 4));
+  const int scalars = IsotropicFeatures::count(isotropic.features);
+  const int centroids = isotropic.features.centroid + isotropic.features.ink_centroid;
+  isotropic.scale = numbers_of(json.at("scale"), scalars);
+  isotropic.press = numbers_of(json.at("press_mm"), hue_terms(scalars, isotropic.degree).rows());
+  isotropic.lateral = numbers_of(json.at("lateral_mm"), centroids * (1 + count_lower_terms(scalars, isotropic.degree)));
+  return isotropic;
+}
+
+HuePolynomial polynomial_of(const JsonField& json) {
+  json.expect_map({"features", "degree", "scale", "coefficients_mm"});
+  HuePolynomial polynomial;
+  polynomial.features = features_of(json.at("features"));
+  const auto count = static_cast<int>(polynomial.features.indices().size());
   polynomial.degree = static_cast<int>(json.at("degree").whole_number(1, 4));
-  const JsonField scale = json.at("scale");
-  scale.expect_list(count);
-  polynomial.scale.resize(static_cast<Eigen::Index>(count));
-  for (std::size_t i = 0; i < count; ++i) polynomial.scale[static_cast<Eigen::Index>(i)] = scale.at(i).number();
-  const Eigen::Index terms = hue_terms(static_cast<int>(count), polynomial.degree).rows();
+  polynomial.scale = numbers_of(json.at("scale"), count);
+  const Eigen::Index terms = hue_terms(count, polynomial.degree).rows();
   const auto rows = json.at("coefficients_mm").vectors<3>(static_cast<std::size_t>(terms));
   polynomial.coefficients.resize(terms, 3);
   for (Eigen::Index i = 0; i < terms; ++i) {
@@ -142,6 +175,7 @@ std::string to_json(const HueModel& model) {
   json["viewing_distance_mm"] = model.parallax.viewing_distance_mm;
   json["view_axis_mm"] = list_of(model.parallax.axis_mm);
   if (model.form == HueForm::kEquation4) json["line"] = json_of(model.line);
+  if (model.form == HueForm::kIsotropic) json["isotropic"] = json_of(model.isotropic);
   if (model.form == HueForm::kPolynomial) json["polynomial"] = json_of(model.polynomial);
   json["gains"] = gains;
   json["range"] = {{"lowest_hue_rad", range.lowest_hue},         {"highest_hue_rad", range.highest_hue},
@@ -157,14 +191,15 @@ HueModel hue_model_from_json(const std::string& text, const std::string& name) {
   const JsonField root{json, "", name};
   root.expect_format(kFormat, kVersion);
   HueModel model;
-  model.form = root.at("form").name_among(std::array{HueForm::kEquation4, HueForm::kPolynomial});
-  const char* form = model.form == HueForm::kEquation4 ? "line" : "polynomial";
+  model.form = root.at("form").name_among(std::array{HueForm::kEquation4, HueForm::kIsotropic, HueForm::kPolynomial});
+  const char* form = model.form == HueForm::kEquation4 ? "line" : name_of(model.form);
   root.expect_map({"format", "version", "form", "spacing_mm", "viewing_distance_mm", "view_axis_mm", form, "gains",
                    "range", "samples", "rms_error_mm"});
   model.spacing_mm = root.at("spacing_mm").number();
   model.parallax.viewing_distance_mm = root.at("viewing_distance_mm").number();
   model.parallax.axis_mm = root.at("view_axis_mm").vector<2>();
   if (model.form == HueForm::kEquation4) model.line = line_of(root.at(form));
+  if (model.form == HueForm::kIsotropic) model.isotropic = isotropic_of(root.at(form));
   if (model.form == HueForm::kPolynomial) model.polynomial = polynomial_of(root.at(form));
   const JsonField gains = root.at("gains");
   if (!gains.value.is_array()) gains.refuse("is a {}, a list is needed", gains.value.type_name());

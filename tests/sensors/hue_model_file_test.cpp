@@ -26,6 +26,11 @@ HueModel known_model(HueForm form) {
   model.polynomial.coefficients.resize(terms, 3);
   for (Eigen::Index i = 0; i < 3 * terms; ++i)
     model.polynomial.coefficients.data()[i] = 1.0 / (3.0 + static_cast<double>(i));
+  model.isotropic.features = {.coloured_area = false};
+  model.isotropic.degree = 2;
+  model.isotropic.scale = Eigen::Vector4d(0.2, 0.4, 0.4, 0.1 / 3.0);
+  model.isotropic.press = Eigen::VectorXd::LinSpaced(hue_terms(4, 2).rows(), 0.1, 1.0);
+  model.isotropic.lateral = Eigen::VectorXd::LinSpaced(2 * (1 + count_lower_terms(4, 2)), -0.3, 1.0);
   model.gains = {{7, 1.1, 0.9}, {42, 1.0 / 3.0, 1.0}};
   model.range.lowest_hue = -0.5;
   model.range.highest_hue = 0.1;
@@ -40,7 +45,7 @@ HueModel known_model(HueForm form) {
 }
 
 TEST(HueModelFile, WhatIsReadIsWhatWasWrittenBitForBit) {
-  for (const HueForm form : {HueForm::kEquation4, HueForm::kPolynomial}) {
+  for (const HueForm form : {HueForm::kEquation4, HueForm::kIsotropic, HueForm::kPolynomial}) {
     const HueModel model = known_model(form);
     const auto path = std::filesystem::path(testing::TempDir()) / "hue_model.json";
     save(model, path);
@@ -53,6 +58,11 @@ TEST(HueModelFile, WhatIsReadIsWhatWasWrittenBitForBit) {
     if (form == HueForm::kEquation4) {
       EXPECT_EQ(read.line.hue_slope, model.line.hue_slope);
       EXPECT_EQ(read.line.of_ink, true);
+    } else if (form == HueForm::kIsotropic) {
+      EXPECT_EQ(read.isotropic.features, model.isotropic.features);
+      EXPECT_EQ(read.isotropic.scale, model.isotropic.scale);
+      EXPECT_EQ(read.isotropic.press, model.isotropic.press);
+      EXPECT_EQ(read.isotropic.lateral, model.isotropic.lateral);
     } else {
       EXPECT_EQ(read.polynomial.features, model.polynomial.features);
       EXPECT_EQ(read.polynomial.scale, model.polynomial.scale);
@@ -95,6 +105,8 @@ TEST(HueModelFile, WhatDoesNotFitIsNamed) {
   EXPECT_THAT(error_of(with("\"marker\": 7", "\"marker\": -7")), HasSubstr("gains[0].marker"));
   EXPECT_THAT(error_of(with("\"spacing_mm\": 3.0", "\"spacing_mm\": -3.0")), HasSubstr("spacing"));
   EXPECT_THAT(error_of(with("\"ink\"", "\"paint\"", HueForm::kEquation4)), HasSubstr("line.centroid"));
+  EXPECT_THAT(error_of(with("\"degree\": 2", "\"degree\": 1", HueForm::kIsotropic)), HasSubstr("press_mm"));
+  EXPECT_THAT(error_of(with("\"lateral_mm\"", "\"sideways_mm\"", HueForm::kIsotropic)), HasSubstr("sideways_mm"));
   HueModel faulty = known_model(HueForm::kEquation4);
   faulty.line.hue_slope = 0.0;
   EXPECT_THROW(to_json(faulty), Error);

@@ -123,7 +123,7 @@ TEST(HueModel, AFreeOffsetIsRecovered) {
 TEST(HueModel, WhatLooksAsAtRestIsAtRest) {
   const ColourMarkerReading rest = rest_reading();
   const HueLine truth{.hue_slope = 0.2, .gain_slope = 0.05, .gain = 0.5};
-  for (const HueForm form : {HueForm::kEquation4, HueForm::kPolynomial}) {
+  for (const HueForm form : {HueForm::kEquation4, HueForm::kIsotropic, HueForm::kPolynomial}) {
     const HueModel model = calibrate_hue(rest, shear_series(rest, truth, {5}), {.form = {.form = form}});
     const HueField field = HueEstimator(model, rest).estimate(rest);
     for (std::size_t i = 0; i < rest.markers.size(); ++i) {
@@ -168,7 +168,7 @@ TEST(HueModel, FlawedMarkersAreNotMeasured) {
 TEST(HueModel, LooksThatCalibrationDidNotSeeAreSaid) {
   const ColourMarkerReading rest = rest_reading();
   const HueLine truth{.hue_slope = 0.2, .gain_slope = 0.05, .gain = 0.5};
-  for (const HueForm form : {HueForm::kEquation4, HueForm::kPolynomial}) {
+  for (const HueForm form : {HueForm::kEquation4, HueForm::kIsotropic, HueForm::kPolynomial}) {
     const HueModel model = calibrate_hue(rest, shear_series(rest, truth, {5}), {.form = {.form = form}});
     const HueEstimator estimator(model, rest);
     const auto extrapolated = [&](const Eigen::Vector3d& displacement) {
@@ -205,6 +205,8 @@ TEST(HueModel, BadCalibrationsAreRefused) {
   EXPECT_THAT(message(flat), HasSubstr("no press"));
   EXPECT_THAT(message(samples, {.form = {.degree = 5}}), HasSubstr("degree"));
   EXPECT_THAT(message(samples, {.form = {.ridge = 0.0}}), HasSubstr("ridge"));
+  EXPECT_THAT(message(samples, {.form = {.features = {.centroid = false, .ink_centroid = false}}}),
+              HasSubstr("needs a centroid"));
   EXPECT_THAT(message(samples, {.spacing_mm = 0.0}), HasSubstr("spacing"));
   EXPECT_THAT(message(samples, {.parallax = {.viewing_distance_mm = -1.0}}), HasSubstr("viewing distance"));
   std::vector<HueSample> one_series = samples;
@@ -226,8 +228,9 @@ TEST(HueModel, RankingPutsTheFormThatMadeTheSamplesFirst) {
   const HueFeatures some{.ink_centroid = false, .coloured_area = false, .ink_area = false};
   const std::vector<HueFormScore> ranked = rank_hue_forms(
       rest, samples, {},
-      {{.features = some, .degree = 4, .ridge = 1e-9, .symmetric = false},
-       {.features = {.hue = true, .centroid = false, .ink_centroid = false, .coloured_area = false, .ink_area = false},
+      {{.form = HueForm::kPolynomial, .features = some, .degree = 4, .ridge = 1e-9, .symmetric = false},
+       {.form = HueForm::kPolynomial,
+        .features = {.hue = true, .centroid = false, .ink_centroid = false, .coloured_area = false, .ink_area = false},
         .degree = 2},
        {.form = HueForm::kEquation4}});
   ASSERT_EQ(ranked.size(), 3u);
@@ -288,7 +291,7 @@ TEST(HueModelOnPaint, ThePolynomialBeatsEquationFourOnPicturesItHasNotSeen) {
   const HueModel curve = calibrate_hue(training.rest, training.samples, {});
   const HueErrors of_line = hue_errors(line, test.rest, test.samples);
   const HueErrors of_curve = hue_errors(curve, test.rest, test.samples);
-  EXPECT_LT(of_curve.rms_mm(), 0.25 * of_line.rms_mm());
+  EXPECT_LT(of_curve.rms_mm(), 0.5 * of_line.rms_mm());
   EXPECT_LT(of_curve.rms_press_mm, 0.1);
   EXPECT_LT(of_curve.rms_lateral_mm, 0.02);
 }
@@ -299,10 +302,13 @@ TEST(HueModelOnPaint, WhatShearAlongOneAxisTaughtHoldsForTheOther) {
   std::erase_if(training.samples, [](const HueSample& sample) {
     return sample.displacement_mm.x() < 0.0 || std::abs(sample.displacement_mm.y()) > 0.4 * sample.displacement_mm.x();
   });
-  const HueModel symmetric = calibrate_hue(training.rest, training.samples, {.form = {.degree = 2, .symmetric = true}});
-  const HueModel not_so = calibrate_hue(training.rest, training.samples, {.form = {.degree = 2, .symmetric = false}});
-  EXPECT_LT(hue_errors(symmetric, test.rest, test.samples).rms_lateral_mm, 0.05);
-  EXPECT_GT(hue_errors(not_so, test.rest, test.samples).rms_lateral_mm, 0.1);
+  const auto lateral_error = [&](const HueModelForm& form) {
+    return hue_errors(calibrate_hue(training.rest, training.samples, {.form = form}), test.rest, test.samples)
+        .rms_lateral_mm;
+  };
+  EXPECT_LT(lateral_error({.form = HueForm::kIsotropic}), 0.05);
+  EXPECT_LT(lateral_error({.form = HueForm::kPolynomial}), 0.05);
+  EXPECT_GT(lateral_error({.form = HueForm::kPolynomial, .symmetric = false}), 0.1);
 }
 
 TEST(HueModelOnPaint, ATurnedCameraReadsInTheGridsOwnFrame) {
