@@ -54,6 +54,12 @@ DirectFixture::DirectFixture(const LightField& of, bool soft)
       }
     }
   }
+  for (int beam = 0; beam < field.beam_count(); ++beam) {
+    const auto same = std::find_if(colour_lamp.begin(), colour_lamp.end(),
+                                   [&](int other) { return (field.intensity[beam] == field.intensity[other]).all(); });
+    colour_of.push_back(static_cast<int>(same - colour_lamp.begin()));
+    if (same == colour_lamp.end()) colour_lamp.push_back(beam);
+  }
   const auto bands = static_cast<std::size_t>(field.fixture.environment.size());
   intensity.assign(bands * groups * 4, 0.0f);
   if (!field.pass.empty()) pass.assign(nodes * bands * groups * 4, 0.0f);
@@ -94,7 +100,7 @@ DirectBatch::DirectBatch(const DirectFrame& frame)
       lanes_(kMostPackets * kPacket),
       amounts_(lanes_.size() * stride_),
       flows_(lanes_.size() * stride_ * 3),
-      pass_(field_.pass.empty() && fixture_.films.empty() ? 0 : lanes_.size() * stride_ * bands_) {}
+      pass_(field_.pass.empty() ? 0 : lanes_.size() * stride_ * bands_) {}
 
 void DirectBatch::look(std::span<const RayPacket> rays, DirectCounts& counts) {
   TS_ASSERT(rays.size() <= kMostPackets);
@@ -185,28 +191,10 @@ void DirectBatch::light_lane(int lane, DirectCounts& counts) {
   if (pass_.empty()) return;
   const std::size_t pass_width = stride_ * bands_;
   float* pass = pass_.data() + lane * pass_width;
-  std::fill_n(pass, pass_width, fixture_.pass.empty() ? 1.0f : 0.0f);
-  for (int corner = 0; corner < 8 && !fixture_.pass.empty(); ++corner) {
+  std::fill_n(pass, pass_width, 0.0f);
+  for (int corner = 0; corner < 8; ++corner) {
     const float* from = fixture_.pass.data() + cell.node[corner] * pass_width;
     for (std::size_t k = 0; k < pass_width; ++k) pass[k] += cell.weight[corner] * from[k];
-  }
-  if (!fixture_.films.empty()) filter_lamps(lane);
-}
-
-/// Takes away what films keep of each lamp's light, where its way crosses their plane.
-void DirectBatch::filter_lamps(int lane) {
-  const Lane& one = lanes_[lane];
-  float* pass = pass_.data() + static_cast<std::size_t>(lane) * stride_ * bands_;
-  const float height = fixture_.films.z() - one.place[2];
-  for (int lamp = 0; lamp < lamps_; ++lamp) {
-    if (amounts(lane)[lamp] == 0.0f || fixture_.lamp_in_layer[lamp]) continue;
-    const Eigen::Vector3f towards = (-flow_of(lane, lamp)).normalized();
-    const float way = height / towards.z();
-    if (!(way > 0.0f)) continue;
-    float left[kMaxBands];
-    fixture_.films.pass(fixture_.films.lamp_cover(one.place[0] + way * towards.x(), one.place[1] + way * towards.y()),
-                        std::abs(towards.z()), left);
-    for (int band = 0; band < bands_; ++band) pass[static_cast<std::size_t>(band) * stride_ + lamp] *= left[band];
   }
 }
 
@@ -386,8 +374,10 @@ void DirectBatch::add(int lane, const float* through, const float* ambient, floa
     if (fixture_.absorbs) dimmed[band] *= std::exp(-fixture_.absorption[band] * one.distance);
   }
   if (one.film > 0.0f) {
+    FilmScreen::Light one_ray;
+    fixture_.films.add(1.0f, one.film, std::abs(packet_of(lane).direction[2][lane % kPacket]), one_ray);
     float left[kMaxBands];
-    fixture_.films.pass(one.film, std::abs(packet_of(lane).direction[2][lane % kPacket]), left);
+    fixture_.films.pass(one_ray, left);
     for (int band = 0; band < bands_; ++band) dimmed[band] *= left[band];
   }
   if (one.material->kind == DirectKind::kLuminous) {
@@ -395,7 +385,9 @@ void DirectBatch::add(int lane, const float* through, const float* ambient, floa
     return;
   }
   float sum[kMaxBands] = {};
-  if (one.material->kind == DirectKind::kMatt) {
+  if (!fixture_.films.empty()) {
+    reflect_through_films(lane, sum);
+  } else if (one.material->kind == DirectKind::kMatt) {
     reflect_from_matt(lane, sum);
   } else {
     reflect_from_metal(lane, sum);
@@ -416,6 +408,36 @@ void DirectBatch::reflect_from_matt(int lane, float* sum) const {
       lit += four(amount + group * 4) * four(intensity + group * 4) * passing(lane, group, band);
     }
     sum[band] = lanes_[lane].colour[band] * kPerPi * lit.sum();
+  }
+}
+
+/// As from a matt surface, less what films keep where each lamp's way crosses their plane. Lamps of one colour are
+/// added up first, those parts that meet film by their slope: the bands are many, and film takes of each another share.
+void DirectBatch::reflect_through_films(int lane, float* sum) const {
+  const Lane& one = lanes_[lane];
+  const FilmScreen& films = fixture_.films;
+  const float* amount = amounts(lane);
+  const float height = films.z() - one.place[2];
+  FilmScreen::Light light;
+  for (std::size_t colour = 0; colour < fixture_.colour_lamp.size(); ++colour) {
+    light = {};
+    for (int lamp = 0; lamp < lamps_; ++lamp) {
+      if (amount[lamp] == 0.0f || fixture_.colour_of[lamp] != static_cast<int>(colour)) continue;
+      const Eigen::Vector3f flow = flow_of(lane, lamp);
+      const float way = height / -flow.z();
+      if (fixture_.lamp_in_layer[lamp] || !(way > 0.0f)) {
+        light.plain += amount[lamp];
+        continue;
+      }
+      const float cover = films.lamp_cover(one.place[0] - way * flow.x(), one.place[1] - way * flow.y());
+      films.add(amount[lamp], cover, std::abs(flow.z()) / flow.norm(), light);
+    }
+    float left[kMaxBands];
+    films.pass(light, left);
+    const int lamp = fixture_.colour_lamp[colour];
+    for (int band = 0; band < bands_; ++band) {
+      sum[band] += one.colour[band] * kPerPi * left[band] * fixture_.intensity[band * stride_ + lamp];
+    }
   }
 }
 

@@ -55,7 +55,9 @@ struct DirectFixture {
   double low, high;  ///< of the field's layer
   std::array<float, kMaxBands> absorption{};
   bool absorbs = false;
-  FilmScreen films;  ///< empty where there are none
+  FilmScreen films;              ///< empty where there are none
+  std::vector<int> colour_of;    ///< of each lamp: lamps of one colour have equal intensities
+  std::vector<int> colour_lamp;  ///< a lamp of each colour
 
   /// `soft`: see LampBearings.
   DirectFixture(const LightField& of, bool soft);
@@ -127,7 +129,7 @@ class DirectBatch {
   Eigen::Vector3f towards(int lane, int lamp) const;
   void set_flow(int lane, int lamp, const Eigen::Vector3f& flow);
   void light_lane(int lane, DirectCounts& counts);
-  void filter_lamps(int lane);
+  void reflect_through_films(int lane, float* sum) const;
   bool shadow_ray(int lane, int lamp, int slot);
   void trace_shadows(int lamp, const int* lanes, int count, DirectCounts& counts);
   void reflect_from_matt(int lane, float* sum) const;
@@ -142,7 +144,7 @@ class DirectBatch {
   std::vector<Lane> lanes_;
   std::vector<float> amounts_;  // [lane][lamp]: cosine times irradiance of unit intensity
   std::vector<float> flows_;    // [lane][group][axis][4]
-  std::vector<float> pass_;     // [lane][band][lamp], empty where nothing absorbs or filters
+  std::vector<float> pass_;     // [lane][band][lamp], empty where nothing absorbs
   RayPacket shadow_;
 };
 

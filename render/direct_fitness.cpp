@@ -71,10 +71,14 @@ std::string unfit_for_direct(const LightField& field, const Scene& scene, bool b
     if (scattering.size() > 0 && (scattering > 0.0).any()) return fmt::format("medium {} scatters", i);
   }
   if (std::string fault = unfit_for_screen(scene); !fault.empty()) return fault;
+  const bool has_films = std::ranges::any_of(scene.surfaces, is_film);
+  if (has_films && !field.pass.empty()) return "a medium before films absorbs";
+  if (has_films && !scene.balls.empty()) return "balls stand behind films";
   for (std::size_t i = 0; i < scene.surfaces.size(); ++i) {
     const std::string what = fmt::format("surface {}", i);
     const Surface& surface = scene.surfaces[i];
     if (is_film(surface)) continue;
+    if (has_films && std::holds_alternative<RoughConductor>(surface.material)) return what + " is metal behind films";
     if (!renders(surface.material)) return what + " is neither Lambertian, RoughConductor, Black nor Emitter";
     Eigen::AlignedBox3d box;
     for (const auto& vertex : surface.mesh.vertices) box.extend(vertex);

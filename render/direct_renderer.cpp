@@ -362,9 +362,18 @@ void DirectRenderer::Parts::put_edge_rays(int point, RayPacket& packet, int firs
   const Eigen::Matrix<float, 3, 2> across = slope(0, 1);
   const Eigen::Matrix<float, 3, 2> down = slope(1, 0);
   const int side = settings.edge_side;
+  // Moved from pixel to pixel, so that along an edge that runs with the rows or columns the rays don't all lie on the
+  // same side of it: x by the row and y by the column, in steps of the golden section.
+  constexpr double kGolden = 0.6180339887498949;
+  const auto moved = [](int by) {
+    const double turns = kGolden * (by + 0.5);
+    return static_cast<float>(turns - std::floor(turns));
+  };
+  const float x_in_cell = moved(row);
+  const float y_in_cell = moved(column);
   for (int k = 0; k < side * side; ++k) {
-    const float x = (static_cast<float>(k % side) + 0.5f) / static_cast<float>(side) - 0.5f;
-    const float y = (static_cast<float>(k / side) + 0.5f) / static_cast<float>(side) - 0.5f;
+    const float x = (static_cast<float>(k % side) + x_in_cell) / static_cast<float>(side) - 0.5f;
+    const float y = (static_cast<float>(k / side) + y_in_cell) / static_cast<float>(side) - 0.5f;
     const Eigen::Vector3f origin = here.origin + x * across.col(0) + y * down.col(0);
     const Eigen::Vector3f direction = (here.direction + x * across.col(1) + y * down.col(1)).normalized();
     const int lane = first_lane + k;

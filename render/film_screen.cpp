@@ -145,13 +145,20 @@ float FilmScreen::cover(const Map& map, float x, float y) {
   return (1 - v) * ((1 - u) * above[0] + u * above[1]) + v * ((1 - u) * below[0] + u * below[1]);
 }
 
-void FilmScreen::pass(float cover, float cosine, float* out) const {
+void FilmScreen::add(float amount, float cover, float cosine, Light& light) const {
   const float at = std::clamp(cosine, 0.0f, 1.0f) * kCosines;
   const int k = std::min(static_cast<int>(at), kCosines - 1);
   const float share = at - static_cast<float>(k);
-  for (int band = 0; band < bands_; ++band) {
-    const float left = (1.0f - share) * left_by_cosine_[k][band] + share * left_by_cosine_[k + 1][band];
-    out[band] = 1.0f - cover * (1.0f - left);
+  light.plain += amount * (1.0f - cover);
+  light.filtered[k] += amount * cover * (1.0f - share);
+  light.filtered[k + 1] += amount * cover * share;
+}
+
+void FilmScreen::pass(const Light& light, float* out) const {
+  std::fill_n(out, bands_, light.plain);
+  for (int k = 0; k <= kCosines; ++k) {
+    if (light.filtered[k] == 0.0f) continue;
+    for (int band = 0; band < bands_; ++band) out[band] += light.filtered[k] * left_by_cosine_[k][band];
   }
 }
 

@@ -1,8 +1,8 @@
 #pragma once
 // The coloured films of a fixture as direct light sees them: a flat screen that camera rays and lamps' light pass.
 
-#include <array>
 #include <Eigen/Geometry>
+#include <array>
 #include <opencv2/core/mat.hpp>
 #include <string>
 #include <vector>
@@ -37,9 +37,17 @@ class FilmScreen {
   float z() const { return z_; }
   float camera_cover(float x, float y) const { return cover(camera_, x, y); }
   float lamp_cover(float x, float y) const { return cover(lamps_, x, y); }
-  /// What is left of one in each band: 1 - cover + cover * t^(1 / cos inside the film), for a ray that crosses at
-  /// `cosine` (of the medium) to the normal. Writes as many numbers as the scene has bands.
-  void pass(float cover, float cosine, float* out) const;
+  /// Light on its way through the plane: what meets no film, and what does, shared out to the table's cosines.
+  static constexpr int kCosines = 16;
+  struct Light {
+    float plain = 0.0f;
+    float filtered[kCosines + 1] = {};
+  };
+  /// Adds `amount` that crosses at `cosine` (of the medium) to the normal, of which the share `cover` meets film.
+  void add(float amount, float cover, float cosine, Light& light) const;
+  /// What is left of it in each band: film leaves t^(1 / cos inside the film). Writes as many numbers as the scene has
+  /// bands.
+  void pass(const Light& light, float* out) const;
 
  private:
   struct Map {
@@ -48,7 +56,6 @@ class FilmScreen {
   };
   static float cover(const Map& map, float x, float y);
 
-  static constexpr int kCosines = 128;  ///< steps of the table
   int bands_ = 0;
   float z_ = 0.0f;
   Map camera_, lamps_;
