@@ -85,7 +85,7 @@ TEST(TiltScene, RefusesWhatTheBenchCantHave) {
   refused(TiltMarker::flat, {std::nan(""), Eigen::Vector3d::Zero()});
   refused(TiltMarker::flat, {0.0, {0, 0, 0.1}});
   refused(TiltMarker::flat, {0.0, {0, 0, -5.0}});
-  refused(TiltMarker::ball, {0.0, {0, 0, -2.95}});
+  refused(TiltMarker::ball, {0.0, {0, 0, -2.96}});
   EXPECT_THROW(read_tilt_spectra("/nowhere"), Error);
 }
 
