@@ -85,9 +85,10 @@ TEST_F(ApparentChangeStudy, OfAPunchIsLinearInItsForce) {
 
 TEST_F(ApparentChangeStudy, StretchesAMarkerMostOnAGelNeitherThinNorThick) {
   // A thin incompressible gel can't get out of the way, a thick one hardly stretches where it is pressed.
-  folder_.write("d.yaml", replaced(kDevice, "fine_mm: 0.6", "fine_mm: 0.4"));
+  folder_.write("d.yaml", replaced(replaced(kDevice, "fine_mm: 0.6", "fine_mm: 0.4"), "[2, 2]", "[1.2, 1.2]"));
+  folder_.write("punch.yaml", replaced(kPunch, "radius_mm: 1.8", "radius_mm: 1"));
   const ApparentChangeSpec wanted = std::get<ApparentChangeSpec>(
-      read(replaced(replaced(kStudy, "[1.5, 2, 3]", "[0.4, 0.9, 3]"), "[24, 50]", "[24]") + "by: [linear]\n").kind);
+      read(replaced(replaced(kStudy, "[1.5, 2, 3]", "[0.4, 0.8, 3]"), "[24, 50]", "[24]") + "by: [linear]\n").kind);
   const ApparentChangeResult result = run_apparent_change(wanted, folder_.path());
   ASSERT_EQ(result.rows.size(), 6u);
   EXPECT_GT(result.rows[1].stretch - 1.0, 1.1 * (result.rows[0].stretch - 1.0));
