@@ -11,6 +11,7 @@ namespace {
 
 void study(const std::filesystem::path& file, const std::filesystem::path& out, const GlobalOptions& global) {
   const lab::StudySpec spec = lab::read_study(file);
+  lab::make_study_folder(out);  // before minutes of work that couldn't be kept
   lab::StudyResult result;
   {
     ProgressBar bar(global.quiet);

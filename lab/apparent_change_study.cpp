@@ -6,6 +6,7 @@
 #include <tuple>
 
 #include "core/error.h"
+#include "fem/gel_body.h"
 #include "lab/job.h"
 #include "lab/pressed_marker.h"
 #include "sim/gel_setup.h"
@@ -189,6 +190,15 @@ void fields(YamlReader& in, ApparentChangeSpec& spec) {
             spec.device.name);
   }
   in.required("vary", spec.vary);
+  for (const double value : spec.vary.values) {
+    sim::DeviceSpec device_then = spec.device;
+    field_of(device_then, spec.vary.field) = value;
+    try {
+      fem::check(sim::gel_body(device_then));
+    } catch (const Error& error) {
+      fail_at(in.where("vary"), "vary: with {} = {}: {}", name_in(spec.vary.field), value, error.what());
+    }
+  }
   in.optional("marker_mm", spec.marker_mm, Allowed::above(0.0));
   in.optional("markers_in_view", spec.markers_in_view, Allowed::at_least(1.0));
   in.optional("sensor_mm", spec.sensor_mm, Allowed::above(0.0));
@@ -208,8 +218,8 @@ void fields(YamlReader& in, ApparentChangeSpec& spec) {
       fail_at(in.where("objects"), "objects: {} is elastic; a study of this kind presses rigid ones", file);
     }
     if (!is_folder_name(object.name)) {
-      fail_at(in.where("objects"), "objects: the name '{}' in {} can't name files; allowed are letters, digits, - and _",
-              object.name, file);
+      fail_at(in.where("objects"),
+              "objects: the name '{}' in {} can't name files; allowed are letters, digits, - and _", object.name, file);
     }
     for (const sim::ObjectSpec& other : spec.objects) {
       if (other.name == object.name) {

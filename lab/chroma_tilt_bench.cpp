@@ -167,7 +167,8 @@ render::Scene tilt_scene(const TiltBench& bench, const TiltSpectra& spectra, Til
   if (!(pose.tilt >= 0.0 && pose.tilt <= 0.25 * kPi + 1e-12)) {
     fail("a tilt of {:.4g} rad must be from 0 to pi / 4", pose.tilt);
   }
-  const double reach = marker == TiltMarker::ball ? 2.0 * ball_depth(bench) : kFadedRadius_mm * std::sin(pose.tilt);
+  const double reach = std::max(marker == TiltMarker::ball ? ball_depth(bench) + 0.5 * bench.side_mm : 0.0,
+                                kFadedRadius_mm * std::sin(pose.tilt));
   if (!(pose.moved_mm.z() <= 0.0 && reach - pose.moved_mm.z() < bench.gel_mm)) {
     fail("a marker moved by {:.4g} mm must be moved towards the film, and stay clear of it", pose.moved_mm.z());
   }

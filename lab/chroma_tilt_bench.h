@@ -57,15 +57,15 @@ struct TiltSpectra {
   render::Spectrum white, magenta, film;
   render::QuantumEfficiency efficiency;  ///< 3 x bands
 };
+/// `spectra` is the folder. @throws Error if a file can't be read
+TiltSpectra read_tilt_spectra(const std::filesystem::path& spectra);
+
 /// Colours as a tilt picture has them, of what is level and fully lit: red, green and blue over those of the lamps.
 struct TiltColours {
   Eigen::Vector3d white, magenta;            ///< beside the film
   Eigen::Vector3d film_white, film_magenta;  ///< lit and seen through it
 };
 TiltColours tilt_colours(const TiltSpectra& spectra);
-
-/// `spectra` is the folder. @throws Error if a file can't be read
-TiltSpectra read_tilt_spectra(const std::filesystem::path& spectra);
 
 /// The bench as the tracer takes it. @throws Error for a tilt beyond pi / 4, or a marker that is moved to the film
 render::Scene tilt_scene(const TiltBench& bench, const TiltSpectra& spectra, TiltMarker marker, const TiltPose& pose);

@@ -1,5 +1,6 @@
 #include "lab/chroma_tilt_experiment.h"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <array>
@@ -87,6 +88,7 @@ TiltReading read_tilt_picture(const cv::Mat& picture, const TiltColours& colours
   TiltReading reading;
   std::complex<double> hue = 0.0;
   Eigen::Vector2d moment = Eigen::Vector2d::Zero();
+  Eigen::Matrix2d second = Eigen::Matrix2d::Zero();
   for (int y = 0; y < picture.rows; ++y) {
     for (int x = 0; x < picture.cols; ++x) {
       const auto& c = picture.at<cv::Vec3f>(y, x);
@@ -96,13 +98,18 @@ TiltReading read_tilt_picture(const cv::Mat& picture, const TiltColours& colours
       reading.coloured_area_px += 1.0;
       const double cover = ink_cover(c, colours);
       reading.ink_area_px += cover;
-      moment += cover * Eigen::Vector2d(x + 0.5, y + 0.5);
+      const Eigen::Vector2d place(x + 0.5, y + 0.5);
+      moment += cover * place;
+      second += cover * place * place.transpose();
     }
   }
   if (!(std::abs(hue) > 0.0)) fail("the picture has no coloured pixel");
   if (!(reading.ink_area_px > 0.0)) fail("the picture shows no ink");
   reading.hue = std::arg(hue);
   reading.ink_px = moment / reading.ink_area_px;
+  const Eigen::Matrix2d variance = second / reading.ink_area_px - reading.ink_px * reading.ink_px.transpose();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(variance, Eigen::EigenvaluesOnly);
+  reading.ink_width_px = std::sqrt(12.0 * std::max(0.0, axes.eigenvalues()[1]));
   return reading;
 }
 
@@ -127,6 +134,7 @@ TiltTable measure_tilt(const TiltBench& bench, const TiltSpectra& spectra, TiltM
       hue += std::polar(1.0, one.hue);
       mean.ink_px += (one.ink_px - phase) / kPhases;
       mean.ink_area_px += one.ink_area_px / kPhases;
+      mean.ink_width_px += one.ink_width_px / kPhases;
       mean.coloured_area_px += one.coloured_area_px / kPhases;
     }
     mean.hue = std::arg(hue);
@@ -138,16 +146,19 @@ TiltTable measure_tilt(const TiltBench& bench, const TiltSpectra& spectra, TiltM
   const TiltReading level = look({}, seed);
   std::vector<double> hues;
   std::vector<double> areas;
+  std::vector<double> widths;
   for (const double pressed : kPressed_mm) {
     const TiltReading reading = pressed == 0.0 ? level : look({0.0, {0.0, 0.0, -pressed}}, seed);
     hues.push_back(turn(reading.hue, level.hue));
     areas.push_back(reading.ink_area_px / level.ink_area_px - 1.0);
+    widths.push_back(reading.ink_width_px / level.ink_width_px - 1.0);
   }
   const Line hue = line_through(kPressed_mm, hues);
   TiltCalibration& calibration = table.calibration;
   calibration.hue_slope = hue.slope;
   calibration.hue_fit_r2 = hue.r2;
   calibration.area_slope = line_through(kPressed_mm, areas).slope;
+  calibration.width_slope = line_through(kPressed_mm, widths).slope;
   const TiltReading right = look({0.0, {kAside_mm, 0.0, 0.0}}, seed);
   const TiltReading left = look({0.0, {-kAside_mm, 0.0, 0.0}}, seed);
   calibration.centroid_gain = (right.ink_px.x() - left.ink_px.x()) / (2.0 * kAside_mm);
@@ -162,6 +173,8 @@ TiltTable measure_tilt(const TiltBench& bench, const TiltSpectra& spectra, TiltM
     error.normal_um = um_a_radian * error.hue_change;
     error.size_um =
         kMicrometresPerMillimetre * (reading.ink_area_px / level.ink_area_px - 1.0) / calibration.area_slope;
+    error.width_um =
+        kMicrometresPerMillimetre * (reading.ink_width_px / level.ink_width_px - 1.0) / calibration.width_slope;
     error.lateral_um = um_a_pixel * (reading.ink_px.x() - level.ink_px.x());
     error.across_um = um_a_pixel * (reading.ink_px.y() - level.ink_px.y());
     table.errors.push_back(error);

@@ -18,7 +18,8 @@ struct TiltReading {
   double hue = 0.0;  ///< radians, -pi to pi, 0 is red: circular mean over pixels of more than half saturation
   Eigen::Vector2d ink_px = Eigen::Vector2d::Zero();  ///< centroid of the ink
   double ink_area_px = 0.0;                          ///< pixels counted by what ink covers of them
-  double coloured_area_px = 0.0;                     ///< number of pixels of more than half saturation
+  double ink_width_px = 0.0;      ///< the wider way across the ink: of a square its side, root of 12 times the variance
+  double coloured_area_px = 0.0;  ///< number of pixels of more than half saturation
 };
 /// `picture` as tilt_picture gives it. Ink is looked for in saturated pixels only, as the text does, since a ball
 /// throws a pink shade of saturation 0.3 on the sheet beside it. Their red and green are split into bare sheet and ink,
@@ -31,6 +32,7 @@ struct TiltCalibration {
   double hue_fit_r2 = 0.0;     ///< of that line
   double centroid_gain = 0.0;  ///< px a mm along x, level and not pressed
   double area_slope = 0.0;     ///< relative change of the ink's area a mm towards the film
+  double width_slope = 0.0;    ///< likewise of its width
 };
 
 /// What a tilt seems to be.
@@ -39,6 +41,7 @@ struct TiltError {
   double hue_change = 0.0;  ///< radians, from level
   double normal_um = 0.0;   ///< by the hue: towards the film
   double size_um = 0.0;     ///< by the ink's area: towards the film
+  double width_um = 0.0;    ///< by the ink's wider way, which a tilt leaves as it is: towards the film
   double lateral_um = 0.0;  ///< by the ink's centroid: along x, to the side that is tilted towards the film
   double across_um = 0.0;   ///< likewise along y
 };

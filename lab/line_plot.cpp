@@ -74,7 +74,7 @@ class Axis {
       if (factor * decade >= rough) step = factor * decade;
     }
     std::vector<double> ticks;
-    for (double k = std::ceil(low_ / step); k * step <= high_; k += 1.0) ticks.push_back(k * step);
+    for (double k = std::ceil(low_ / step); k * step <= high_; k += 1.0) ticks.push_back(k * step + 0.0);  // not -0
     return ticks;
   }
 

@@ -41,12 +41,15 @@ StudyResult run_study(const StudySpec& study, const std::filesystem::path& cache
       study.kind);
 }
 
-void write_study(const StudyResult& result, const std::filesystem::path& folder) {
+void make_study_folder(const std::filesystem::path& folder) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (error || !std::filesystem::is_directory(folder)) {
     fail("{}: the folder can't be made: {}", folder.string(), error ? error.message() : "a file is in its place");
   }
+}
+
+void write_study(const StudyResult& result, const std::filesystem::path& folder) {
   for (const StudyFile& file : result.files) write_whole_file(folder / file.name, file.text);
 }
 

@@ -41,8 +41,10 @@ StudyResult run_study(const StudySpec& study, const std::filesystem::path& cache
 /// Files of one kind of study.
 StudyResult report(const std::string& name, const ApparentChangeSpec& spec, const ApparentChangeResult& result);
 
-/// Puts the files into a folder, which is made if it isn't there; files of these names are replaced, each whole.
-/// @throws Error if they can't be written
+/// Makes the folder for a study's files, if it isn't there. @throws Error if it can't be made
+void make_study_folder(const std::filesystem::path& folder);
+
+/// Puts the files into a folder; files of these names are replaced, each whole. @throws Error if they can't be written
 void write_study(const StudyResult& result, const std::filesystem::path& folder);
 
 }  // namespace touchstone::lab

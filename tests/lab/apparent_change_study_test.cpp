@@ -83,6 +83,19 @@ TEST_F(ApparentChangeStudy, OfAPunchIsLinearInItsForce) {
   }
 }
 
+TEST_F(ApparentChangeStudy, StretchesAMarkerMostOnAGelNeitherThinNorThick) {
+  // A thin incompressible gel can't get out of the way, a thick one hardly stretches where it is pressed.
+  folder_.write("d.yaml", replaced(replaced(kDevice, "fine_mm: 0.6", "fine_mm: 0.4"), "[2, 2]", "[1.2, 1.2]"));
+  folder_.write("punch.yaml", replaced(kPunch, "radius_mm: 1.8", "radius_mm: 1"));
+  const ApparentChangeSpec wanted = std::get<ApparentChangeSpec>(
+      read(replaced(replaced(kStudy, "[1.5, 2, 3]", "[0.4, 0.8, 3]"), "[24, 50]", "[24]") + "by: [linear]\n").kind);
+  const ApparentChangeResult result = run_apparent_change(wanted, folder_.path());
+  ASSERT_EQ(result.rows.size(), 6u);
+  EXPECT_GT(result.rows[1].stretch - 1.0, 1.1 * (result.rows[0].stretch - 1.0));
+  EXPECT_GT(result.rows[1].stretch - 1.0, 1.5 * (result.rows[2].stretch - 1.0));
+  for (const ApparentOptimum& optimum : optima_of(result)) EXPECT_TRUE(optimum.interior);
+}
+
 TEST_F(ApparentChangeStudy, WritesTheSameBytesTwice) {
   const StudySpec study = read(kStudy);
   const StudyResult first = run_study(study, folder_.path());
@@ -136,6 +149,7 @@ TEST_F(ApparentChangeStudy, MistakesAreRefusedWithTheirPlace) {
   refused("[1.5, 2, 3]", "[]", "vary.values: is empty");
   refused("[1.5, 2, 3]", "[1.5, 1.5]", "must rise");
   refused("[1.5, 2, 3]", "[-1, 2]", "vary.values[0]: -1 is not allowed");
+  refused("[1.5, 2, 3]", "[0.1, 2]", "s.yaml:4: vary: with gel.thickness_mm = 0.1: the slab's fine edge length");
   refused("[24, 50]", "[0, 50]", "lenses_mm");
   refused("[punch.yaml]", "[]", "objects: is empty");
   refused("[0.05, 0.1]", "[0.1, 0.05]", "force_N: 0.05 stands after 0.1");

@@ -40,6 +40,7 @@ TEST(TiltPicture, TellsInkFromFilm) {
   const TiltReading centred = read_tilt_picture(painted(12), tilt_colours(spectra()));
   EXPECT_NEAR(centred.ink_area_px, 256.0, 0.1);
   EXPECT_NEAR(centred.ink_px.x(), 20.0, 1e-3);
+  EXPECT_NEAR(centred.ink_width_px, 16.0, 0.05);
   EXPECT_NEAR(centred.coloured_area_px, 400.0, 1e-9);
   // Ink beside the film is magenta, not red.
   const TiltReading aside = read_tilt_picture(painted(18), tilt_colours(spectra()));
@@ -84,7 +85,7 @@ TEST(TiltScene, RefusesWhatTheBenchCantHave) {
   refused(TiltMarker::flat, {std::nan(""), Eigen::Vector3d::Zero()});
   refused(TiltMarker::flat, {0.0, {0, 0, 0.1}});
   refused(TiltMarker::flat, {0.0, {0, 0, -5.0}});
-  refused(TiltMarker::ball, {0.0, {0, 0, -2.95}});
+  refused(TiltMarker::ball, {0.0, {0, 0, -2.96}});
   EXPECT_THROW(read_tilt_spectra("/nowhere"), Error);
 }
 
@@ -98,6 +99,7 @@ TEST(TiltedMarker, LooksNarrowerAndYellowerAndAPressedOneLarger) {
   const TiltReading level = look(TiltMarker::flat, {});
   const TiltReading tilted = look(TiltMarker::flat, {0.5, Eigen::Vector3d::Zero()});
   EXPECT_NEAR(tilted.ink_area_px / level.ink_area_px, std::cos(0.5), 0.02);
+  EXPECT_NEAR(tilted.ink_width_px, level.ink_width_px, 0.01 * level.ink_width_px);
   EXPECT_GT(tilted.hue, level.hue + 2.0 * kRadiansPerDegree);
   EXPECT_NEAR(tilted.ink_px.x(), level.ink_px.x(), 0.1);
   const TiltReading pressed = look(TiltMarker::flat, {0.0, {0, 0, -1}});
