@@ -13,7 +13,7 @@ namespace touchstone::lab {
 
 namespace {
 
-constexpr double kSmallest_px = 4.0;
+constexpr double kLeastSize_px = 2.0;
 
 cv::Mat as_float(const cv::Mat& picture) {
   cv::Mat values;
@@ -23,8 +23,13 @@ cv::Mat as_float(const cv::Mat& picture) {
 
 void check(const std::vector<RobustnessRung>& rungs, const RobustnessSettings& settings) {
   if (rungs.size() < 4) fail("chroma robustness: {} displacements, 4 are needed", rungs.size());
-  if (!(settings.filter_px >= kSmallest_px))
-    fail("chroma robustness: the filter is {} px wide, 4 are needed", settings.filter_px);
+  if (!(settings.smallest_px >= kLeastSize_px)) {
+    fail("chroma robustness: the smallest size is {} px, it must be at least 2", settings.smallest_px);
+  }
+  if (!(settings.filter_px >= settings.smallest_px)) {
+    fail("chroma robustness: the filter is {} px wide, at least the smallest size of {} is needed", settings.filter_px,
+         settings.smallest_px);
+  }
   for (const RobustnessRung& rung : rungs) {
     const auto is_of = [](const cv::Mat& picture, int channels) {
       return !picture.empty() && picture.channels() == channels &&
@@ -40,16 +45,16 @@ void check(const std::vector<RobustnessRung>& rungs, const RobustnessSettings& s
   }
 }
 
-/// Sizes down to 4 px: the largest that the pictures have, of 4, 8, 16, ...
-std::vector<double> marker_sizes(double filter_px) {
+/// Sizes down to the smallest: the largest that the pictures have, of the smallest times 1, 2, 4, ...
+std::vector<double> marker_sizes(const RobustnessSettings& settings) {
   std::vector<double> sizes;
-  for (double size = kSmallest_px; size <= filter_px; size *= 2.0) sizes.insert(sizes.begin(), size);
+  for (double size = settings.smallest_px; size <= settings.filter_px; size *= 2.0) sizes.insert(sizes.begin(), size);
   return sizes;
 }
 
 cv::Mat reduced(const cv::Mat& picture, const RobustnessSettings& settings, double marker_px) {
   cv::Mat out = as_float(picture);
-  const double first = marker_sizes(settings.filter_px).front() / settings.filter_px;
+  const double first = marker_sizes(settings).front() / settings.filter_px;
   if (first < 1.0) cv::resize(out, out, {}, first, first, cv::INTER_AREA);
   for (double size = first * settings.filter_px; size > 1.5 * marker_px; size *= 0.5) {
     cv::pyrDown(out, out);
@@ -155,7 +160,7 @@ std::vector<PixelRobustness> pixel_robustness(const std::vector<RobustnessRung>&
                                               const RobustnessSettings& settings) {
   check(rungs, settings);
   std::vector<PixelRobustness> rows;
-  for (const double size : marker_sizes(settings.filter_px)) {
+  for (const double size : marker_sizes(settings)) {
     const std::vector<Measured> measured = measure(rungs, settings, size, false, hue_of_first(rungs, settings, size));
     rows.push_back({size, r2_of_fit(rungs, measured, &Measured::hue), r2_of_fit(rungs, measured, &Measured::size),
                     r2_of_fit(rungs, measured, &Measured::darkness)});
@@ -166,7 +171,7 @@ std::vector<PixelRobustness> pixel_robustness(const std::vector<RobustnessRung>&
 GradientRobustness gradient_robustness(const std::vector<RobustnessRung>& rungs, const RobustnessSettings& settings,
                                        double marker_px) {
   check(rungs, settings);
-  const std::vector<double> sizes = marker_sizes(settings.filter_px);
+  const std::vector<double> sizes = marker_sizes(settings);
   const double size = *std::min_element(sizes.begin(), sizes.end(), [&](double a, double b) {
     return std::abs(std::log(a / marker_px)) < std::abs(std::log(b / marker_px));
   });

@@ -3,7 +3,9 @@
 // size, tell a displacement when the marker is only a few pixels wide, and when the light isn't even.
 //
 // What the text leaves open, and what is done here:
-// - A marker's apparent size is the side of its filter in px. "4 x 4 pixels": the filter is 4 px wide.
+// - A marker's apparent size is the side of its filter in px. "4 x 4 pixels" is taken for a filter of 4 px; if the
+// whole
+//   picture was meant, which is twice as wide in the drawing here, the row of 2 px is the text's.
 // - Pictures are made smaller by the Gaussian pyramid and then blurred by a Gaussian whose standard deviation is an
 //   eighth of the picture's size, as the text has it; then rounded to 8 bit, as a camera gives them.
 // - Fits are of the displacement by a polynomial of second order of the measurement: that is how it would be used.
@@ -30,6 +32,7 @@ enum class LightGradient {
 };
 
 struct RobustnessSettings {
+  double smallest_px = 4.0;       ///< apparent size down to which pictures are reduced; at least 2
   double filter_px = 256.0;       ///< side of the filter in the rungs' pictures
   double least_saturation = 0.5;  ///< of a pixel that counts for the hue (HSV)
   double size_threshold = 0.5;    ///< of the full scale
@@ -46,9 +49,10 @@ struct PixelRobustness {
   double darkness_r2 = 0.0;  ///< by the darkness
 };
 
-/// One row for each size: the rungs' own brought to the next lower power of two times 4 px, halved down to 4 px.
-/// @throws Error for fewer than 4 rungs, pictures of differing sizes or of another kind, a filter below 4 px, or a
-///   displacement whose coloured picture has no saturated pixel
+/// One row for each size: the rungs' own brought to the next lower power of two times the smallest, halved down to
+/// that.
+/// @throws Error for fewer than 4 rungs, pictures of differing sizes or of another kind, a filter below the smallest
+///   size, or a displacement whose coloured picture has no saturated pixel
 std::vector<PixelRobustness> pixel_robustness(const std::vector<RobustnessRung>& rungs,
                                               const RobustnessSettings& settings);
 

@@ -106,6 +106,9 @@ TEST(ChromaRobustness, BadPicturesAreRefused) {
   other = {};
   other.settings.filter_px = 3.0;
   refused(other.rungs, other.settings);
+  other = {};
+  other.settings.smallest_px = 0.0;
+  refused(other.rungs, other.settings);
 }
 
 }  // namespace
