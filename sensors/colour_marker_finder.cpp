@@ -219,18 +219,20 @@ void ColourMarkerFinder::take_filter_from_ink() {
   // Where hardly any filter is without ink, none of its rims matters.
   if (std::accumulate(counts.begin(), counts.end(), 0) < kLeastBareFilter_px) return;
   const double of_filter = level_of(counts, kBareFilter) / 255.0;
-  std::array<float, 256> share{}, rest{};
-  for (std::size_t f = 0; f < 256; ++f) {
-    share[f] = static_cast<float>(of_filter * static_cast<double>(f));
-    rest[f] = static_cast<float>(1.0 / (1.0 - of_filter * static_cast<double>(f) / 255.0));
+  // What is left of each coverage under each: a table is made faster than as many pixels are worked out.
+  ink_under_filter_.resize(256 * 256);
+  for (int f = 0; f < 256; ++f) {
+    const auto share = static_cast<float>(of_filter * f);
+    const float rest = 1.0F / (1.0F - share / 255.0F);
+    std::uint8_t* row = ink_under_filter_.data() + 256 * f;
+    for (int i = 0; i < 256; ++i) {
+      row[i] = static_cast<std::uint8_t>(std::max((static_cast<float>(i) - share) * rest, 0.0F) + 0.5F);
+    }
   }
   for (int y = 0; y < levelled_.rows; ++y) {
     std::uint8_t* ink = ink_.ptr<std::uint8_t>(y);
     const std::uint8_t* filter = filter_.ptr<std::uint8_t>(y);
-    for (int x = 0; x < levelled_.cols; ++x) {
-      const float less = (static_cast<float>(ink[x]) - share[filter[x]]) * rest[filter[x]];
-      ink[x] = static_cast<std::uint8_t>(std::max(less, 0.0F) + 0.5F);
-    }
+    for (int x = 0; x < levelled_.cols; ++x) ink[x] = ink_under_filter_[256U * filter[x] + ink[x]];
   }
 }
 

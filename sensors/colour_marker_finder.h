@@ -91,6 +91,7 @@ class ColourMarkerFinder {
   std::vector<ColourLevelling> levelling_;  ///< one, once the spacing is known
   cv::Mat part_, levelled_;
   std::array<std::uint8_t, 256> ink_of_ratio_{}, filter_of_ratio_{};  ///< coverage of 255 by green, blue / largest
+  std::vector<std::uint8_t> ink_under_filter_;
   cv::Mat ink_, filter_, core_, labels_, stats_, centroids_;
   cv::Mat cell_, filter_at_;  ///< CV_16S, marker or -1: whose cell a pixel is in, and under whose filter
   std::vector<Eigen::Vector2d> filter_place_;

@@ -72,6 +72,11 @@ int ColourMarkerFinder::patch_near(int x, int y) const {
 }
 
 void ColourMarkerFinder::add_up() {
+  static const std::array<double, 256> kWeights = [] {
+    std::array<double, 256> weights{};
+    for (int i = 0; i < 256; ++i) weights[static_cast<std::size_t>(i)] = weight_of(i);
+    return weights;
+  }();
   sums_.assign(filter_place_.size(), {});
   const int least_ink = static_cast<int>(std::ceil(255.0 * kLeastCoverage));
   for (int y = 0; y < levelled_.rows; ++y) {
@@ -89,7 +94,7 @@ void ColourMarkerFinder::add_up() {
         ++sums.filter_pixels;
         sums.filter += filter[x];
       }
-      const int coverage = std::max(ink[x], filter[x]);
+      const std::uint8_t coverage = std::max(ink[x], filter[x]);
       if (coverage < least_ink) continue;
       int patch = -1;
       if (label[x] != 0) {
@@ -101,7 +106,7 @@ void ColourMarkerFinder::add_up() {
       const Eigen::Vector2d place(x + 0.5, y + 0.5);
       if (ink_owner >= 0) {
         Sums& sums = sums_[static_cast<std::size_t>(ink_owner)];
-        const double weight = weight_of(ink[x]);
+        const double weight = kWeights[ink[x]];
         sums.ink += weight;
         sums.ink_moment += weight * place;
       }
@@ -109,7 +114,7 @@ void ColourMarkerFinder::add_up() {
       const int owner = mostly_ink ? ink_owner : cell[x];
       if (owner < 0) continue;
       Sums& sums = sums_[static_cast<std::size_t>(owner)];
-      const double weight = weight_of(coverage);
+      const double weight = kWeights[coverage];
       sums.coloured += weight;
       sums.coloured_moment += weight * place;
       if (std::max({raw[0], raw[1], raw[2]}) >= kFullScale) ++sums.clipped;
