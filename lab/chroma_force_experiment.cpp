@@ -167,8 +167,9 @@ void play_probe(const ForceBench& bench, const ForceProbe& probe, const DragSett
   TS_ASSERT(bench.truth_gel != nullptr && drag.step_mm > 0.0);
   const TruthReader reader(*bench.truth_gel, bench.markers);
   fem::Press press(*bench.truth_gel, contact_shape(probe), probe.friction);
+  const auto steps = static_cast<int>(std::floor(drag.longest_mm / drag.step_mm + 1e-9));
   int after = 0;
-  for (int number = 0; drag.step_mm * number <= drag.longest_mm; ++number) {
+  for (int number = 0; number <= steps; ++number) {
     const double drag_mm = drag.step_mm * number;
     const fem::PressState& state = press.step(target_at(probe, drag_mm));
     const bool slides = has_come_to_slide(state);
