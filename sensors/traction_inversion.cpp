@@ -172,6 +172,7 @@ void TractionInversion::prepare(const std::vector<std::uint8_t>& measured) {
   first_normal_ += stiff;
   first_normal_ -= first_lateral_ * coupling;
   first_normal_ = (0.5 * (first_normal_ + first_normal_.transpose())).eval();
+  first_factor_.compute(first_normal_);
   measured_ = measured;
 }
 
@@ -184,8 +185,8 @@ std::vector<std::vector<int>> TractionInversion::possible_contacts(const Eigen::
     vertical[p] = load[3 * p + 2];
   }
   vertical -= first_lateral_ * lateral;
-  const NonnegativeMinimum first =
-      nonnegative_minimum(first_normal_, vertical, std::vector<std::uint8_t>(static_cast<std::size_t>(patches), 1));
+  const NonnegativeMinimum first = nonnegative_minimum(first_normal_, first_factor_, vertical,
+                                                       std::vector<std::uint8_t>(static_cast<std::size_t>(patches), 1));
   factorisations += first.factorisations;
   std::vector<std::vector<int>> result = {{}};  // nothing touches
   const double largest = first.x.maxCoeff();
@@ -225,10 +226,10 @@ TractionInversion::Candidate TractionInversion::solve(const std::vector<int>& pa
   std::vector<std::uint8_t> sign(rows.size(), 0);
   for (std::size_t k = 2; k < sign.size(); k += 3) sign[k] = 1;
   const Eigen::VectorXd b = load(rows);
-  NonnegativeMinimum minimum = nonnegative_minimum(information, b, sign);
+  result.factor.compute(information);
+  const NonnegativeMinimum minimum = nonnegative_minimum(information, result.factor, b, sign);
   result.x = minimum.x;
-  result.factorisations = minimum.factorisations;
-  result.factor = std::move(minimum.factor);
+  result.factorisations = 1 + minimum.factorisations;
 
   const Eigen::VectorXd seen = normal * result.x;
   result.misfit_square = data_square - 2.0 * b.dot(result.x) + result.x.dot(seen);

@@ -21,6 +21,7 @@
 // Signs: tractions are those on the gel, wrenches those on the object that touches it (a press has Fz > 0), both in the
 // gel frame, as fem::PressState tells them.
 
+#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <cstdint>
 #include <vector>
@@ -108,9 +109,10 @@ class TractionInversion {
   Eigen::MatrixXd share_;  ///< markers x patches: of a patch in the square about a marker, over that square's area
   // Of the markers measured last. Unknown 3 p + a is the traction on patch p, along z the pressure.
   std::vector<std::uint8_t> measured_;
-  Eigen::MatrixXd weighted_;       ///< rows of A over the noise, those not measured zero
-  Eigen::MatrixXd normal_;         ///< weighted^T weighted
-  Eigen::MatrixXd first_normal_;   ///< first problem, lateral tractions eliminated: patches x patches
+  Eigen::MatrixXd weighted_;      ///< rows of A over the noise, those not measured zero
+  Eigen::MatrixXd normal_;        ///< weighted^T weighted
+  Eigen::MatrixXd first_normal_;  ///< first problem, lateral tractions eliminated: patches x patches
+  Eigen::LLT<Eigen::MatrixXd> first_factor_;
   Eigen::MatrixXd first_lateral_;  ///< takes the lateral load off: patches x 2 patches
 };
 
