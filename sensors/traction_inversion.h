@@ -16,7 +16,7 @@
 //   with the tractions integrated out, D. J. C. MacKay, Neural Computation 4, 1992, for the noise as stated) is taken.
 //   Outside of it all tractions are zero, inside the normal ones are at least zero.
 // The discrepancy principle, by which the smallest contact that explains the markers would be taken, makes contacts too
-// small or too large by more (docs/sensors/chroma.md has the figures).
+// small or too large by more (docs/sensors/chroma-force.md has the figures).
 //
 // Signs: tractions are those on the gel, wrenches those on the object that touches it (a press has Fz > 0), both in the
 // gel frame, as fem::PressState tells them.
