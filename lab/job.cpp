@@ -7,15 +7,11 @@
 #include "core/nearest_name.h"
 
 namespace touchstone::lab {
-namespace {
-
 bool is_folder_name(const std::string& name) {
   return !name.empty() && name.size() <= 100 && std::all_of(name.begin(), name.end(), [](unsigned char letter) {
     return (std::isalnum(letter) != 0 && letter < 128) || letter == '-' || letter == '_';
   });
 }
-
-}  // namespace
 
 EnumNames<Split> enum_names(Split) {
   return {{"train", Split::train}, {"verify", Split::verify}, {"test", Split::test}};

@@ -45,6 +45,9 @@ void fields(YamlReader& in, Job& job);
 Job read_job(const std::filesystem::path& file);
 
 /// True if the file is a job and not a scene: it has the key `scenes`. @throws Error if it isn't YAML
+/// May it name a folder or a file? Up to 100 letters, digits, - and _.
+bool is_folder_name(const std::string& name);
+
 bool is_job_file(const std::filesystem::path& file);
 
 }  // namespace touchstone::lab

@@ -94,7 +94,7 @@ DirectBatch::DirectBatch(const DirectFrame& frame)
       lanes_(kMostPackets * kPacket),
       amounts_(lanes_.size() * stride_),
       flows_(lanes_.size() * stride_ * 3),
-      pass_(field_.pass.empty() ? 0 : lanes_.size() * stride_ * bands_) {}
+      pass_(field_.pass.empty() && fixture_.films.empty() ? 0 : lanes_.size() * stride_ * bands_) {}
 
 void DirectBatch::look(std::span<const RayPacket> rays, DirectCounts& counts) {
   TS_ASSERT(rays.size() <= kMostPackets);
@@ -118,6 +118,8 @@ void DirectBatch::look(std::span<const RayPacket> rays, DirectCounts& counts) {
       one.spread[1] = (static_cast<float>(reversed) + 0.5f) / kPacket - 0.5f;
       if (packet.valid[k] == 0) continue;
       ++counts.primary;
+      // Films lie at the layer's near face, where the camera's rays enter it.
+      one.film = fixture_.films.empty() ? 0.0f : fixture_.films.camera_cover(packet.origin[0][k], packet.origin[1][k]);
       one.object = hits.object[k];
       if (one.object < 0) continue;
       one.material = &frame_.materials[one.object];
@@ -183,10 +185,28 @@ void DirectBatch::light_lane(int lane, DirectCounts& counts) {
   if (pass_.empty()) return;
   const std::size_t pass_width = stride_ * bands_;
   float* pass = pass_.data() + lane * pass_width;
-  std::fill_n(pass, pass_width, 0.0f);
-  for (int corner = 0; corner < 8; ++corner) {
+  std::fill_n(pass, pass_width, fixture_.pass.empty() ? 1.0f : 0.0f);
+  for (int corner = 0; corner < 8 && !fixture_.pass.empty(); ++corner) {
     const float* from = fixture_.pass.data() + cell.node[corner] * pass_width;
     for (std::size_t k = 0; k < pass_width; ++k) pass[k] += cell.weight[corner] * from[k];
+  }
+  if (!fixture_.films.empty()) filter_lamps(lane);
+}
+
+/// Takes away what films keep of each lamp's light, where its way crosses their plane.
+void DirectBatch::filter_lamps(int lane) {
+  const Lane& one = lanes_[lane];
+  float* pass = pass_.data() + static_cast<std::size_t>(lane) * stride_ * bands_;
+  const float height = fixture_.films.z() - one.place[2];
+  for (int lamp = 0; lamp < lamps_; ++lamp) {
+    if (amounts(lane)[lamp] == 0.0f || fixture_.lamp_in_layer[lamp]) continue;
+    const Eigen::Vector3f towards = (-flow_of(lane, lamp)).normalized();
+    const float way = height / towards.z();
+    if (!(way > 0.0f)) continue;
+    float left[kMaxBands];
+    fixture_.films.pass(fixture_.films.lamp_cover(one.place[0] + way * towards.x(), one.place[1] + way * towards.y()),
+                        std::abs(towards.z()), left);
+    for (int band = 0; band < bands_; ++band) pass[static_cast<std::size_t>(band) * stride_ + lamp] *= left[band];
   }
 }
 
@@ -364,6 +384,11 @@ void DirectBatch::add(int lane, const float* through, const float* ambient, floa
   for (int band = 0; band < bands_; ++band) {
     dimmed[band] = through[band];
     if (fixture_.absorbs) dimmed[band] *= std::exp(-fixture_.absorption[band] * one.distance);
+  }
+  if (one.film > 0.0f) {
+    float left[kMaxBands];
+    fixture_.films.pass(one.film, std::abs(packet_of(lane).direction[2][lane % kPacket]), left);
+    for (int band = 0; band < bands_; ++band) dimmed[band] *= left[band];
   }
   if (one.material->kind == DirectKind::kLuminous) {
     for (int band = 0; band < bands_; ++band) out[band] += dimmed[band] * one.material->colour[band];

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "render/camera_rays.h"
+#include "render/film_screen.h"
 #include "render/ggx.h"
 #include "render/light_field.h"
 #include "render/packet_scene.h"
@@ -54,6 +55,7 @@ struct DirectFixture {
   double low, high;  ///< of the field's layer
   std::array<float, kMaxBands> absorption{};
   bool absorbs = false;
+  FilmScreen films;  ///< empty where there are none
 
   /// `soft`: see LampBearings.
   DirectFixture(const LightField& of, bool soft);
@@ -114,6 +116,7 @@ class DirectBatch {
     const float* colour;             // the material's, or that of the ink
     std::uint64_t doubt;             // see ShadowReach
     float spread[2];                 // where in the beams of guides shadow rays go, each -1/2 to 1/2
+    float film;                      // the part of the camera's way to it that goes through film
   };
 
   const RayPacket& packet_of(int lane) const { return rays_[lane / kPacket]; }
@@ -124,6 +127,7 @@ class DirectBatch {
   Eigen::Vector3f towards(int lane, int lamp) const;
   void set_flow(int lane, int lamp, const Eigen::Vector3f& flow);
   void light_lane(int lane, DirectCounts& counts);
+  void filter_lamps(int lane);
   bool shadow_ray(int lane, int lamp, int slot);
   void trace_shadows(int lamp, const int* lanes, int count, DirectCounts& counts);
   void reflect_from_matt(int lane, float* sum) const;
@@ -138,7 +142,7 @@ class DirectBatch {
   std::vector<Lane> lanes_;
   std::vector<float> amounts_;  // [lane][lamp]: cosine times irradiance of unit intensity
   std::vector<float> flows_;    // [lane][group][axis][4]
-  std::vector<float> pass_;     // [lane][band][lamp], empty where nothing absorbs
+  std::vector<float> pass_;     // [lane][band][lamp], empty where nothing absorbs or filters
   RayPacket shadow_;
 };
 

@@ -5,6 +5,7 @@
 #include <variant>
 
 #include "core/error.h"
+#include "render/film_screen.h"
 
 namespace touchstone::render {
 namespace {
@@ -69,9 +70,11 @@ std::string unfit_for_direct(const LightField& field, const Scene& scene, bool b
     const Spectrum& scattering = scene.media[i].scattering;
     if (scattering.size() > 0 && (scattering > 0.0).any()) return fmt::format("medium {} scatters", i);
   }
+  if (std::string fault = unfit_for_screen(scene); !fault.empty()) return fault;
   for (std::size_t i = 0; i < scene.surfaces.size(); ++i) {
     const std::string what = fmt::format("surface {}", i);
     const Surface& surface = scene.surfaces[i];
+    if (is_film(surface)) continue;
     if (!renders(surface.material)) return what + " is neither Lambertian, RoughConductor, Black nor Emitter";
     Eigen::AlignedBox3d box;
     for (const auto& vertex : surface.mesh.vertices) box.extend(vertex);

@@ -15,6 +15,7 @@
 #include "render/camera_rays.h"
 #include "render/direct_batch.h"
 #include "render/direct_fitness.h"
+#include "render/film_screen.h"
 #include "render/ggx.h"
 #include "render/packet_scene.h"
 #include "render/sample_sequence.h"
@@ -24,8 +25,9 @@ namespace touchstone::render {
 namespace {
 
 constexpr int kTilesATask = 2 * DirectBatch::kMostPackets;
-constexpr int kBlocksAcross = 20;  // of the footprint
-constexpr double kSharp = 4.0;     // pixels: a wider blur takes the mean of a dozen rays anyway
+constexpr int kBlocksAcross = 20;    // of the footprint
+constexpr double kLampSpread = 0.5;  // of the films' distance: standard deviation of where lamps' light crosses them
+constexpr double kSharp = 4.0;       // pixels: a wider blur takes the mean of a dozen rays anyway
 
 void check_settings(const DirectSettings& settings) {
   if (settings.samples < 1 || settings.samples > 64) {
@@ -49,6 +51,7 @@ struct DirectRenderer::Parts {
   ReadyCamera camera;
   DirectSettings settings;
   PacketScene tree;
+  std::vector<TriangleMesh> films;
   bool connected;        // the first surface
   bool spreads;          // central rays, then the footprint
   bool refines = false;  // more rays at edges
@@ -73,6 +76,7 @@ struct DirectRenderer::Parts {
       find_footprint(rest);
       grid = footprint.grid;
     }
+    set_up_films(rest);
     rays = trace_to_layer(field.fixture, camera, grid, field.layer, settings.samples, settings.seed);
     if (!spreads) return;
     radiance.resize(static_cast<std::size_t>(grid.columns) * grid.rows * rays.bands);
@@ -136,6 +140,30 @@ struct DirectRenderer::Parts {
   void put_edge_rays(int point, RayPacket& packet, int first_lane) const;
 
   static Eigen::Vector2i size_of_grid(const ImageGrid& grid) { return {grid.columns, grid.rows}; }
+
+  /// What the hole or lens sees of a point at rest it sees through a disc of the films' plane; lamps' light rises to
+  /// the membrane so flat that it comes from about as far aside as films are below.
+  void set_up_films(const Scene& rest) {
+    for (const Surface& surface : rest.surfaces) {
+      if (is_film(surface)) films.push_back(surface.mesh);
+    }
+    if (films.empty()) return;
+    const LightField& field = fixture.field;
+    double radius = 0.0;
+    if (spreads) {
+      const auto at = [&](double u, double v) {
+        return ray_in_layer(field.fixture, camera, field.layer, 0.5 * width(), 0.5 * height(), u, v);
+      };
+      const auto middle = at(0.5, 0.5);
+      constexpr double kRim = 1.0 - 1e-6;
+      for (const auto& [u, v] : {std::pair{0.0, 0.5}, {kRim, 0.5}, {0.5, 0.0}, {0.5, kRim}}) {
+        const auto rim = at(u, v);
+        if (middle && rim) radius = std::max(radius, (rim->origin - middle->origin).head<2>().norm());
+      }
+    }
+    const double height = field.reach.center().z() - films.front().vertices.front().z();
+    fixture.films = FilmScreen(rest, field.index, radius, kLampSpread * std::abs(height));
+  }
 
   /// The footprint on what the scene shows at rest, by block; in the middle of the field's box where it shows nothing.
   void find_footprint(const Scene& rest) {
@@ -459,6 +487,13 @@ DirectImage DirectRenderer::render(const Scene& scene) {
   check_scene(scene);
   const std::string fault = unfit_for_direct(field, scene, !parts.bounced.empty());
   if (!fault.empty()) fail("direct renderer: {}", fault);
+  std::size_t film = 0;
+  for (const Surface& surface : scene.surfaces) {
+    if (!is_film(surface)) continue;
+    if (film == parts.films.size() || surface.mesh.vertices != parts.films[film++].vertices) {
+      fail("direct renderer: the scene's films aren't those that it was made for");
+    }
+  }
   std::optional<PacketScene> other;
   if (!parts.tree.move_to(scene)) other.emplace(scene);
   const PacketScene& tree = other ? *other : parts.tree;

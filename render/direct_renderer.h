@@ -61,7 +61,8 @@ class DirectRenderer {
   /// several threads at once. A scene with other triangles than `rest` gets a tree of its own, which costs some ms.
   /// @throws Error if the scene is faulty; asks for interreflection without set_bounced_light; has other media, faces,
   /// lamps or surroundings than the field; has materials other than Lambertian, RoughConductor, Black and Emitter, or
-  /// scattering media; or things outside of the field's layer, or lit ones outside of its box
+  /// scattering media; films other than `rest`'s or than film_screen.h takes; or things outside of the field's layer,
+  /// or lit ones outside of its box
   DirectImage render(const Scene& scene);
 
   /// Irradiance that reaches what each pixel shows from everywhere, on top of the lamps' (rest_light.h): W/m^2,

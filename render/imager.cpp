@@ -9,8 +9,9 @@
 #include <cfloat>
 #include <cmath>
 #include <limits>
-#include <opencv2/imgproc.hpp>
+#include <opencv2/core.hpp>
 #include <string_view>
+#include <vector>
 
 #include "core/error.h"
 #include "core/random.h"
@@ -28,6 +29,7 @@ constexpr std::array<std::string_view, 3> kChannelNames = {"red", "green", "blue
 std::array<int, 4> channels_of(BayerPattern bayer) {
   switch (bayer) {
     case BayerPattern::none:
+    case BayerPattern::binned:  // no mosaic to be seen
       return {0, 0, 0, 0};
     case BayerPattern::rggb:
       return {0, 1, 1, 2};
@@ -41,25 +43,6 @@ std::array<int, 4> channels_of(BayerPattern bayer) {
   return {0, 0, 0, 0};
 }
 
-int opencv_code(BayerPattern bayer, Demosaic method) {
-  // OpenCV's older names (BayerBG2BGR for what everyone calls RGGB) tell the second row's second and third pixel.
-  const bool aware = method == Demosaic::edge_aware;
-  switch (bayer) {
-    case BayerPattern::rggb:
-      return aware ? cv::COLOR_BayerRGGB2BGR_EA : cv::COLOR_BayerRGGB2BGR;
-    case BayerPattern::bggr:
-      return aware ? cv::COLOR_BayerBGGR2BGR_EA : cv::COLOR_BayerBGGR2BGR;
-    case BayerPattern::grbg:
-      return aware ? cv::COLOR_BayerGRBG2BGR_EA : cv::COLOR_BayerGRBG2BGR;
-    case BayerPattern::gbrg:
-      return aware ? cv::COLOR_BayerGBRG2BGR_EA : cv::COLOR_BayerGBRG2BGR;
-    case BayerPattern::none:
-      break;
-  }
-  TS_ASSERT(false && "a grey sensor has no colour to fill in");
-  return 0;
-}
-
 void require_finite(const char* name, double value, double low, bool low_itself = true) {
   const bool holds = std::isfinite(value) && (low_itself ? value >= low : value > low);
   if (!holds) {
@@ -71,22 +54,35 @@ double largest_number(const Imager& imager) {
   return static_cast<double>((1 << imager.bits) - 1);
 }
 
-int raw_type(const Imager& imager) {
-  return imager.bits <= 8 ? CV_8UC1 : CV_16UC1;
+int samples_per_pixel(const Imager& imager) {
+  return CV_MAT_CN(raw_type(imager));
 }
 
-// Everything a pixel of the inner loop needs.
-struct PixelModel {
-  int bands;
+// How one number comes of a pixel's light: that of a channel.
+struct Sample {
+  std::array<double, 16> electrons_per_irradiance{};
   double dark_e, full_well_e, read_noise_e, gain, black, largest;
   bool ideal;
 
+  Sample(const Imager& grey, const QuantumEfficiency& weights)
+      : dark_e(grey.dark_current_e_per_s * grey.exposure_s),
+        full_well_e(grey.full_well_e),
+        read_noise_e(grey.read_noise_e),
+        gain(grey.gain_DN_per_e),
+        black(grey.black_level_DN),
+        largest(largest_number(grey)),
+        ideal(grey.ideal) {
+    for (Eigen::Index band = 0; band < weights.cols(); ++band) electrons_per_irradiance[band] = weights(0, band);
+  }
+
+  // Always two draws, whatever the light, so that it doesn't change what the next sample of the pixel draws.
   int number(double mean_e, float pattern_gain, float pattern_offset, RandomStream& stream) const {
     double electrons = mean_e;
     if (!ideal) {
       const double mean = mean_e * pattern_gain + dark_e;
+      const double share = stream.uniform();
       // Far above the well every draw saturates; the test also keeps the mean in a range where counts are exact.
-      electrons = mean > 4.0 * full_well_e + 1e4 ? full_well_e : poisson_quantile(mean, stream.uniform());
+      electrons = mean > 4.0 * full_well_e + 1e4 ? full_well_e : poisson_quantile(mean, share);
     }
     electrons = std::min(electrons, full_well_e);
     if (!ideal) electrons += pattern_offset + read_noise_e * normal_quantile(stream.uniform());
@@ -94,6 +90,14 @@ struct PixelModel {
     return static_cast<int>(std::clamp(black + gain * electrons, 0.0, largest) + 0.5);
   }
 };
+
+std::vector<Imager> by_channel(const Imager& imager) {
+  std::vector<Imager> channels;
+  for (int channel = 0; channel < imager.quantum_efficiency.rows(); ++channel) {
+    channels.push_back(channel_imager(imager, channel));
+  }
+  return channels;
+}
 
 [[noreturn]] void refuse_irradiance(const cv::Mat& irradiance, int row) {
   const int bands = irradiance.channels();
@@ -111,38 +115,25 @@ struct PixelModel {
 template <typename Number>
 cv::Mat expose_as(const cv::Mat& irradiance, const Imager& imager, const FixedPattern& pattern, std::uint64_t seed,
                   std::uint64_t frame_index) {
-  const ImagerResponse response = response_of(imager);
-  const PixelModel model = {.bands = irradiance.channels(),
-                            .dark_e = response.dark_e,
-                            .full_well_e = imager.full_well_e,
-                            .read_noise_e = imager.read_noise_e,
-                            .gain = imager.gain_DN_per_e,
-                            .black = imager.black_level_DN,
-                            .largest = largest_number(imager),
-                            .ideal = imager.ideal};
-  const std::array<int, 4> channels = channels_of(imager.bayer);
+  std::vector<Sample> samples;
+  const QuantumEfficiency weights = response_of(imager).electrons_per_irradiance;
+  for (const Imager& channel : by_channel(imager)) {
+    samples.emplace_back(channel, weights.row(static_cast<Eigen::Index>(samples.size())));
+  }
+  const int bands = irradiance.channels();
+  const int count = samples_per_pixel(imager);
+  const std::array<int, 4> mosaic = channels_of(imager.bayer);
   cv::Mat raw(irradiance.size(), raw_type(imager));
   std::atomic<int> first_bad_row = std::numeric_limits<int>::max();
 
   const auto expose_row = [&](int row) {
-    std::array<std::array<double, 16>, 2> weights{};  // of even and odd columns
-    for (int column = 0; column < 2; ++column) {
-      for (int band = 0; band < model.bands; ++band) {
-        weights[column][band] = response.electrons_per_irradiance(channels[2 * (row & 1) + column], band);
-      }
-    }
     const float* light = irradiance.ptr<float>(row);
     const float* gain = imager.ideal ? nullptr : pattern.gain.ptr<float>(row);
     const float* offset = imager.ideal ? nullptr : pattern.offset_e.ptr<float>(row);
     Number* out = raw.ptr<Number>(row);
-    for (int column = 0; column < irradiance.cols; ++column) {
-      double mean_e = 0.0;
-      bool good = true;
-      for (int band = 0; band < model.bands; ++band) {
-        const float value = *light++;
-        good = good && value >= 0.0F && value <= FLT_MAX;
-        mean_e += weights[column & 1][band] * static_cast<double>(value);
-      }
+    for (int column = 0; column < irradiance.cols; ++column, light += bands) {
+      const bool good =
+          std::all_of(light, light + bands, [](float value) { return value >= 0.0F && value <= FLT_MAX; });
       if (!good) {
         int known = first_bad_row.load();
         while (row < known && !first_bad_row.compare_exchange_weak(known, row)) {
@@ -151,9 +142,16 @@ cv::Mat expose_as(const cv::Mat& irradiance, const Imager& imager, const FixedPa
       }
       const std::uint64_t pixel = (static_cast<std::uint64_t>(row) << 16) | static_cast<std::uint64_t>(column);
       RandomStream stream(seed, (frame_index << 32) | pixel, Purpose::kImagerNoise);
-      const float pixel_gain = gain != nullptr ? gain[column] : 1.0F;
-      const float pixel_offset = offset != nullptr ? offset[column] : 0.0F;
-      out[column] = static_cast<Number>(model.number(mean_e, pixel_gain, pixel_offset, stream));
+      for (int i = 0; i < count; ++i) {
+        const Sample& sample = samples[count > 1 ? i : mosaic[2 * (row & 1) + (column & 1)]];
+        double mean_e = 0.0;
+        for (int band = 0; band < bands; ++band) {
+          mean_e += sample.electrons_per_irradiance[band] * static_cast<double>(light[band]);
+        }
+        const float pixel_gain = gain != nullptr ? *gain++ : 1.0F;
+        const float pixel_offset = offset != nullptr ? *offset++ : 0.0F;
+        *out++ = static_cast<Number>(sample.number(mean_e, pixel_gain, pixel_offset, stream));
+      }
     }
   };
   tbb::parallel_for(tbb::blocked_range<int>(0, irradiance.rows, 16), [&](const tbb::blocked_range<int>& rows) {
@@ -189,7 +187,7 @@ void check(const Imager& imager) {
   }
   const bool grey = imager.bayer == BayerPattern::none;
   if (channels != (grey ? 1 : 3)) {
-    fail("imager: quantum_efficiency has {} channels; a {} sensor has {}", channels, grey ? "grey" : "Bayer",
+    fail("imager: quantum_efficiency has {} channels; a {} sensor has {}", channels, grey ? "grey" : "colour",
          grey ? 1 : 3);
   }
   for (Eigen::Index band = 0; band < bands; ++band) {
@@ -208,11 +206,35 @@ void check(const Imager& imager) {
   }
 }
 
+int raw_type(const Imager& imager) {
+  return CV_MAKETYPE(imager.bits <= 8 ? CV_8U : CV_16U, imager.bayer == BayerPattern::binned ? 3 : 1);
+}
+
+Imager channel_imager(const Imager& imager, int channel) {
+  TS_ASSERT(channel >= 0 && channel < imager.quantum_efficiency.rows());
+  Imager grey = imager;
+  grey.bayer = BayerPattern::none;
+  grey.white_balance = Eigen::Vector3d::Ones();
+  grey.quantum_efficiency = QuantumEfficiency(imager.quantum_efficiency.row(channel));
+  if (imager.bayer != BayerPattern::binned) return grey;
+  const double parts = channel == 1 ? 2.0 : 1.0;  // of the size that the imager's figures are of; four make the pixel
+  grey.active_area_um2 *= parts / 4.0;
+  grey.full_well_e *= parts;
+  grey.dark_current_e_per_s *= parts;
+  grey.read_noise_e *= std::sqrt(parts);
+  grey.dsnu_e *= std::sqrt(parts);
+  grey.prnu /= std::sqrt(parts);
+  grey.gain_DN_per_e /= parts;
+  return grey;
+}
+
 FixedPattern fixed_pattern(const Imager& imager, cv::Size size, std::uint64_t unit_seed) {
   check(imager);
-  FixedPattern pattern = {.gain = cv::Mat(size, CV_32FC1, cv::Scalar(1.0)),
-                          .offset_e = cv::Mat(size, CV_32FC1, cv::Scalar(0.0))};
+  const int count = samples_per_pixel(imager);
+  FixedPattern pattern = {.gain = cv::Mat(size, CV_32FC(count), cv::Scalar::all(1.0)),
+                          .offset_e = cv::Mat(size, CV_32FC(count), cv::Scalar::all(0.0))};
   if (imager.prnu == 0.0 && imager.dsnu_e == 0.0) return pattern;
+  const std::vector<Imager> channels = by_channel(imager);
   tbb::parallel_for(tbb::blocked_range<int>(0, size.height, 16), [&](const tbb::blocked_range<int>& rows) {
     for (int row = rows.begin(); row != rows.end(); ++row) {
       float* gain = pattern.gain.ptr<float>(row);
@@ -220,8 +242,11 @@ FixedPattern fixed_pattern(const Imager& imager, cv::Size size, std::uint64_t un
       for (int column = 0; column < size.width; ++column) {
         const std::uint64_t pixel = (static_cast<std::uint64_t>(row) << 32) | static_cast<std::uint64_t>(column);
         RandomStream stream(unit_seed, pixel, Purpose::kImagerPattern);
-        gain[column] = static_cast<float>(std::max(0.0, 1.0 + imager.prnu * normal_quantile(stream.uniform())));
-        offset[column] = static_cast<float>(imager.dsnu_e * normal_quantile(stream.uniform()));
+        for (int i = 0; i < count; ++i) {
+          const double relative = channels[i].prnu * normal_quantile(stream.uniform());
+          *gain++ = static_cast<float>(std::max(0.0, 1.0 + relative));
+          *offset++ = static_cast<float>(channels[i].dsnu_e * normal_quantile(stream.uniform()));
+        }
       }
     }
   });
@@ -242,9 +267,13 @@ cv::Mat expose(const cv::Mat& irradiance, const Imager& imager, const FixedPatte
     fail("irradiance has {} bands, the imager has {}", irradiance.channels(), imager.wavelengths_nm.size());
   }
   if (!imager.ideal) {
+    const int type = CV_32FC(samples_per_pixel(imager));
     const bool fits = pattern.gain.size() == irradiance.size() && pattern.offset_e.size() == irradiance.size() &&
-                      pattern.gain.type() == CV_32FC1 && pattern.offset_e.type() == CV_32FC1;
-    if (!fits) fail("the fixed pattern isn't of the irradiance's size, {}x{}", irradiance.cols, irradiance.rows);
+                      pattern.gain.type() == type && pattern.offset_e.type() == type;
+    if (!fits) {
+      fail("the fixed pattern isn't of the irradiance's size, {}x{}, and the imager's {} channels", irradiance.cols,
+           irradiance.rows, samples_per_pixel(imager));
+    }
   }
   return imager.bits <= 8 ? expose_as<std::uint8_t>(irradiance, imager, pattern, seed, frame_index)
                           : expose_as<std::uint16_t>(irradiance, imager, pattern, seed, frame_index);
@@ -255,66 +284,20 @@ cv::Mat expose(const cv::Mat& irradiance, const Imager& imager, std::uint64_t se
   return expose(irradiance, imager, pattern, seed, frame_index);
 }
 
-cv::Mat develop(const cv::Mat& raw, const Imager& imager, Demosaic method) {
-  check(imager);
-  if (raw.empty() || raw.type() != raw_type(imager)) {
-    fail("a raw image of {} bits must have one channel of {} bit numbers and not be empty", imager.bits,
-         imager.bits <= 8 ? 8 : 16);
-  }
-  const bool grey = imager.bayer == BayerPattern::none;
-  if (!grey && (raw.cols < 2 || raw.rows < 2)) {
-    fail("a Bayer image of {}x{} pixels can't be developed; allowed is 2x2 and more", raw.cols, raw.rows);
-  }
-  // White balance comes before colour is filled in (edges are then judged on balanced numbers), in 16 bits, so that
-  // rounding happens once at the end.
-  constexpr double kFullScale = 255.0 * 257.0;
-  const std::array<int, 4> channels = channels_of(imager.bayer);
-  const double scale = kFullScale / (largest_number(imager) - imager.black_level_DN);
-  cv::Mat linear(raw.size(), CV_16UC1);
-  for (int row = 0; row < raw.rows; ++row) {
-    std::array<double, 2> gain{};
-    for (int column = 0; column < 2; ++column) {
-      gain[column] = scale * imager.white_balance[channels[2 * (row & 1) + column]];
-    }
-    const auto balance = [&](const auto* numbers) {
-      std::uint16_t* out = linear.ptr<std::uint16_t>(row);
-      for (int column = 0; column < raw.cols; ++column) {
-        const double value = gain[column & 1] * (numbers[column] - imager.black_level_DN);
-        out[column] = static_cast<std::uint16_t>(std::clamp(value + 0.5, 0.0, kFullScale));
-      }
-    };
-    if (imager.bits <= 8) {
-      balance(raw.ptr<std::uint8_t>(row));
-    } else {
-      balance(raw.ptr<std::uint16_t>(row));
-    }
-  }
-  cv::Mat developed;
-  if (grey) {
-    linear.convertTo(developed, CV_8U, 1.0 / 257.0);
-    return developed;
-  }
-  // OpenCV copies the last inner row and column to the border; a mirrored margin (which keeps the pattern's phase)
-  // lets it fill in the border like the rest.
-  cv::Mat wide;
-  cv::Mat colour;
-  cv::copyMakeBorder(linear, wide, 2, 2, 2, 2, cv::BORDER_REFLECT_101);
-  cv::demosaicing(wide, colour, opencv_code(imager.bayer, method));
-  colour(cv::Rect(2, 2, raw.cols, raw.rows)).convertTo(developed, CV_8U, 1.0 / 257.0);
-  return developed;
-}
-
 ImagerResponse response_of(const Imager& imager) {
   check(imager);
+  const Imager noisiest = imager.bayer == BayerPattern::binned ? channel_imager(imager, 1) : imager;
   ImagerResponse response = {.electrons_per_irradiance = imager.quantum_efficiency,
-                             .dark_e = imager.dark_current_e_per_s * imager.exposure_s,
-                             .read_noise_e = imager.read_noise_e,
-                             .quantisation_e = 1.0 / imager.gain_DN_per_e,
-                             .full_well_e = imager.full_well_e};
+                             .dark_e = noisiest.dark_current_e_per_s * imager.exposure_s,
+                             .read_noise_e = noisiest.read_noise_e,
+                             .quantisation_e = 1.0 / noisiest.gain_DN_per_e,
+                             .full_well_e = noisiest.full_well_e};
   for (Eigen::Index band = 0; band < imager.wavelengths_nm.size(); ++band) {
     const double photon_J = kPlanck_Js * kLightSpeed_m_per_s / (imager.wavelengths_nm[band] * 1e-9);
-    const double photons_per_irradiance = imager.active_area_um2 * 1e-12 * imager.exposure_s / photon_J;
-    response.electrons_per_irradiance.col(band) *= photons_per_irradiance;
+    for (Eigen::Index channel = 0; channel < imager.quantum_efficiency.rows(); ++channel) {
+      const double area_um2 = channel_imager(imager, static_cast<int>(channel)).active_area_um2;
+      response.electrons_per_irradiance(channel, band) *= area_um2 * 1e-12 * imager.exposure_s / photon_J;
+    }
   }
   return response;
 }

@@ -3,11 +3,15 @@
 //
 //   mean photons    mu_p = sum over bands of E_b A t lambda_b / (h c)          irradiance, active area, exposure
 //   mean electrons  mu_e = sum over bands of eta_b mu_p,b                      quantum efficiency of the pixel's
-//   channel electrons       n    = min(Poisson(mu_e (1 + PRNU) + dark current t), full well) digital number  y    =
-//   clamp(floor(black + K (n + DSNU + read noise) + 1/2), 0, 2^bits - 1)
+//                                                                              channel
+//   electrons       n    = min(Poisson(mu_e (1 + PRNU) + dark current t), full well)
+//   digital number  y    = clamp(floor(black + K (n + DSNU + read noise) + 1/2), 0, 2^bits - 1)
 //
 // so that mean and temporal variance of a pixel below saturation lie on the photon transfer line
 // var_y = K^2 var_d + 1/12 + K (mu_y - mu_dark).
+//
+// A pixel of a binned picture has three such numbers, each with electrons, noise and rounding of its own
+// (BayerPattern).
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -18,15 +22,23 @@
 namespace touchstone::render {
 
 /// The colours of the filters on the 2x2 pixels at the image's top left corner, by rows. `none`: a grey sensor.
-enum class BayerPattern : std::uint8_t { none, rggb, bggr, grbg, gbrg };
+///
+/// `binned`: the mosaic is finer than the picture. Each pixel is the mean of a block of 2x2, 4x4, ... of the mosaic's
+/// pixels, a quarter of them red, half green, a quarter blue, so it has all three colours and there is nothing to fill
+/// in. Of the block's light, A in all, the red and the blue sample get A / 4 each and the green one A / 2. The imager's
+/// electrons (full well, read noise, dark current, DSNU), PRNU and K are those of the red sample and of the blue one.
+/// The green sample is two of that size: twice the full well and dark current, sqrt(2) times the read noise and DSNU,
+/// 1 / sqrt(2) of the PRNU and half of K, so that light that is grey to the filters gives three equal numbers. For a
+/// block of n of each of red and blue, whose pixels have a full well w and a read noise r, they're n w and sqrt(n) r.
+enum class BayerPattern : std::uint8_t { none, rggb, bggr, grbg, gbrg, binned };
 
-/// Quantum efficiency, rows = channels (R, G, B with a Bayer pattern, else one row), columns = bands; 0 to 1.
+/// Quantum efficiency, rows = channels (R, G, B of a colour sensor, else one row), columns = bands; 0 to 1.
 using QuantumEfficiency = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3, 16>;
 
 /// A sensor and its read-out.
 struct Imager {
   int bits = 8;                          ///< 1 to 8 give CV_8U (6 bits: 0 to 63), 9 to 16 give CV_16U
-  double active_area_um2 = 0.0;          ///< light-collecting area of one pixel
+  double active_area_um2 = 0.0;          ///< light-collecting area of one pixel; binned: of all its colours together
   double exposure_s = 0.0;               ///< 0 is legal: a dark frame
   QuantumEfficiency quantum_efficiency;  ///< channels x bands
   Spectrum wavelengths_nm;               ///< of the bands
@@ -49,18 +61,26 @@ struct Imager {
 /// Refuses an imager whose numbers make no sense. @throws Error that names field, value and what is allowed
 void check(const Imager& imager);
 
-/// What differs from pixel to pixel of one unit, for good.
+/// One channel (a row of `quantum_efficiency`: 0 R, 1 G, 2 B) by itself: the grey sensor that its pixels or samples
+/// are, with their own area, electrons and K. The photon transfer line holds for it. @pre the imager has that channel
+Imager channel_imager(const Imager& imager, int channel);
+
+/// OpenCV's type of a raw picture: CV_8U (up to 8 bits) or CV_16U with one channel, of a binned picture with three.
+int raw_type(const Imager& imager);
+
+/// What differs from pixel to pixel of one unit, for good; a channel for each of the raw picture's.
 struct FixedPattern {
-  cv::Mat gain;      ///< CV_32FC1, 1 + PRNU, not below 0
-  cv::Mat offset_e;  ///< CV_32FC1, DSNU
+  cv::Mat gain;      ///< CV_32FC1 or CV_32FC3, 1 + PRNU, not below 0
+  cv::Mat offset_e;  ///< CV_32FC1 or CV_32FC3, DSNU
 };
 
 /// The fixed pattern of the unit `unit_seed`: a pure function of the seed and the pixel's row and column.
 FixedPattern fixed_pattern(const Imager& imager, cv::Size size, std::uint64_t unit_seed);
 
-/// Raw digital numbers (CV_8UC1 or CV_16UC1) of `irradiance`, W/m^2 on the sensor, CV_32FC(bands). Noise is a pure
-/// function of (seed, frame_index, row, column) and of that pixel's light, monotonic in the light: the same seed on two
-/// nearly equal pictures gives nearly equal noise, and threads don't matter. @pre frame_index < 2^32
+/// Raw digital numbers (CV_8UC1 or CV_16UC1, of a binned picture CV_8UC3 or CV_16UC3 in RGB order) of `irradiance`,
+/// W/m^2 on the sensor, CV_32FC(bands). Noise is a pure function of (seed, frame_index, row, column, channel) and of
+/// that pixel's light, monotonic in the light: the same seed on two nearly equal pictures gives nearly equal noise, and
+/// threads don't matter. @pre frame_index < 2^32
 /// @throws Error for a negative or non-finite irradiance (naming the first such pixel) or a wrong type or size
 cv::Mat expose(const cv::Mat& irradiance, const Imager& imager, const FixedPattern& pattern, std::uint64_t seed,
                std::uint64_t frame_index);
@@ -68,17 +88,19 @@ cv::Mat expose(const cv::Mat& irradiance, const Imager& imager, const FixedPatte
 /// The same with the fixed pattern of the unit `seed`, which it works out anew: for single pictures.
 cv::Mat expose(const cv::Mat& irradiance, const Imager& imager, std::uint64_t seed, std::uint64_t frame_index);
 
-/// How colour is filled in between a Bayer sensor's pixels.
+/// How colour is filled in between a mosaic's pixels; nothing is to be filled in of a binned picture.
 enum class Demosaic : std::uint8_t { bilinear, edge_aware };
 
 /// A picture to look at or to track in: black level off, white balance on, full scale to 255, colour filled in; CV_8UC3
 /// in BGR order, or CV_8UC1 of a grey sensor. With 8 bits, no black level and no white balance it changes no number.
-/// @throws Error for a raw image of a foreign type, or of a Bayer sensor under 2x2 pixels
+/// @throws Error for a raw image of a foreign type, or of a mosaic under 2x2 pixels
 cv::Mat develop(const cv::Mat& raw, const Imager& imager, Demosaic method = Demosaic::bilinear);
 
-/// What the renderer needs to know of the sensor to sample no finer than it can see.
+/// What the renderer needs to know of the sensor to sample no finer than it can see. The scalars of a binned sensor are
+/// of its green samples, which have the most electrons and the most noise of all; those of another channel are in
+/// response_of(channel_imager(imager, channel)).
 struct ImagerResponse {
-  QuantumEfficiency electrons_per_irradiance;  ///< channels x bands: mean electrons per W/m^2
+  QuantumEfficiency electrons_per_irradiance;  ///< channels x bands: mean electrons per W/m^2, of each channel's area
   double dark_e = 0.0;                         ///< mean dark electrons of an exposure
   double read_noise_e = 0.0;                   ///< standard deviation
   double quantisation_e = 0.0;                 ///< electrons per digital number, 1/K
@@ -92,6 +114,7 @@ ImagerResponse response_of(const Imager& imager);
 double noise_e(const ImagerResponse& response, double electrons);
 
 /// The row of `quantum_efficiency` (0 R, 1 G, 2 B; 0 for a grey sensor) of the pixel in the given column and row.
+/// @pre `bayer` isn't `binned`, whose pixels have all three
 int channel_of(BayerPattern bayer, int column, int row);
 
 /// White balance that makes light of the spectrum `white` (irradiance per band) grey; the smallest gain is 1, so that

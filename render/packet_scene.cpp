@@ -10,6 +10,7 @@
 
 #include "core/error.h"
 #include "render/embree_device.h"
+#include "render/film_screen.h"
 
 namespace touchstone::render {
 
@@ -68,7 +69,7 @@ PacketScene::PacketScene(const Scene& scene) : state_(std::make_unique<State>())
     made.triangles = mesh.triangles;
     made.vertex_count = mesh.vertices.size();
     made.take_normals(scene.surfaces[i].normals);
-    if (mesh.triangles.empty()) continue;
+    if (mesh.triangles.empty() || is_film(scene.surfaces[i])) continue;
     made.geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
     made.vertices = static_cast<float*>(rtcSetNewGeometryBuffer(
         made.geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), mesh.vertices.size()));

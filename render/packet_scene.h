@@ -31,7 +31,7 @@ struct alignas(64) PacketHits {
 /// the same hits for any number of threads, whatever was drawn between.
 class PacketScene {
  public:
-  /// @pre check_scene(scene) holds; no Refractive materials
+  /// Films stop no ray: they aren't in the tree. @pre check_scene(scene) holds; no Refractive materials
   explicit PacketScene(const Scene& scene);
   ~PacketScene();
   PacketScene(PacketScene&&) noexcept;

@@ -1,4 +1,5 @@
 #include "render/shadow_reach.h"
+#include "render/film_screen.h"
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
@@ -256,6 +257,7 @@ ShadowReach::ShadowReach(const LampBearings& bearings, const Scene& scene, bool 
   // Of the sheet and what stands on the map for columns, and of everything.
   Eigen::AlignedBox3d solid = sheet;
   for (std::size_t i = 1; i < scene.surfaces.size(); ++i) {
+    if (is_film(scene.surfaces[i])) continue;
     const TriangleMesh& other = scene.surfaces[i].mesh;
     for (const auto& t : other.triangles) {
       Eigen::AlignedBox3d part;
@@ -277,6 +279,7 @@ ShadowReach::ShadowReach(const LampBearings& bearings, const Scene& scene, bool 
   Ground ground = ground_of(map, scene.surfaces[0].mesh);
   if (ground.upright || ground.up == ground.down) return;  // not a height field
   for (std::size_t i = 1; i < scene.surfaces.size(); ++i) {
+    if (is_film(scene.surfaces[i])) continue;
     const TriangleMesh& other = scene.surfaces[i].mesh;
     for (const auto& t : other.triangles) {
       Eigen::AlignedBox3d part;

@@ -15,7 +15,7 @@ namespace touchstone::sensors {
 /// Why a marker's figures can't be used.
 enum class MarkerFlaw : std::uint8_t {
   kNone,
-  kMissing,       ///< no coloured region where the grid has one
+  kMissing,       ///< no coloured region where the grid has one, or one without ink, or without its filter
   kTwoFilters,    ///< its ink shows under a neighbour's filter, or runs into a neighbour's region
   kOverexposed,   ///< too much of it has a channel at full scale: hue can't be told
   kUnderexposed,  ///< too dark for a hue

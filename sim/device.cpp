@@ -14,11 +14,8 @@
 namespace touchstone::render {
 
 EnumNames<BayerPattern> enum_names(BayerPattern) {
-  return {{"none", BayerPattern::none},
-          {"rggb", BayerPattern::rggb},
-          {"bggr", BayerPattern::bggr},
-          {"grbg", BayerPattern::grbg},
-          {"gbrg", BayerPattern::gbrg}};
+  return {{"none", BayerPattern::none}, {"rggb", BayerPattern::rggb}, {"bggr", BayerPattern::bggr},
+          {"grbg", BayerPattern::grbg}, {"gbrg", BayerPattern::gbrg}, {"binned", BayerPattern::binned}};
 }
 
 EnumNames<MarkShape> enum_names(MarkShape) {
@@ -301,6 +298,10 @@ void fields(YamlReader& in, CameraSpec& camera) {
   in.optional("dsnu_e", camera.dsnu_e, Allowed::at_least(0.0));
   in.optional("black_level_DN", camera.black_level_DN, Allowed::at_least(0.0));
   in.optional("events", camera.events);
+  if (camera.events && camera.bayer == render::BayerPattern::binned) {
+    fail_at(in.where("events"),
+            "camera.events: event pixels are single ones; `bayer: binned` tells of means over several");
+  }
   const double frame_us = kMicrosecondsPerSecond / camera.frame_rate_Hz;
   if (camera.exposure_us > frame_us) {
     fail_at(in.where("exposure_us"), "exposure_us: {} is longer than a frame of {} us at {} Hz", camera.exposure_us,

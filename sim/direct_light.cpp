@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "render/film_screen.h"
+
 namespace touchstone::sim {
 namespace {
 
@@ -23,7 +25,7 @@ render::Scene with_blacks(render::Scene scene) {
 Eigen::AlignedBox3d lit_box(const render::Scene& scene) {
   Eigen::AlignedBox3d box;
   for (const render::Surface& surface : scene.surfaces) {
-    if (std::holds_alternative<render::Black>(surface.material)) continue;
+    if (std::holds_alternative<render::Black>(surface.material) || render::is_film(surface)) continue;
     for (const auto& vertex : surface.mesh.vertices) box.extend(vertex);
   }
   for (const render::Ball& ball : scene.balls) {

@@ -5,7 +5,6 @@ namespace touchstone::sim {
 std::string unfit_for_direct_light(const SceneSpec& scene, const Plan& plan) {
   const DeviceSpec& device = scene.device;
   if (!device.coating) return "the gel has no coating: its outer face refracts";
-  if (device.films) return "the device has films, which pass light";
   if (plan.scattering) return "the gel scatters light";
   if (device.lamps.empty()) return "the device has no lamps";
   for (const LampSpec& lamp : device.lamps) {

@@ -182,7 +182,9 @@ render::Scene scene_without_surface(const SceneSpec& scene, const Plan& plan, co
       {gel_walls(device.gel), render::Lambertian{in_bands(device.gel.frame_albedo, bands, "gel.frame_albedo")}});
   const std::vector<MovedObject> all = moved_objects(scene);
   for (std::size_t k = 0; k < objects.size(); ++k) {
-    out.surfaces.push_back({placed(objects[k].body, poses[k]), material_of(all[k].object, bands)});
+    // Under a coating an object has a shape and no colour (seen_geometry).
+    out.surfaces.push_back({placed(objects[k].body, poses[k]),
+                            device.coating ? render::Material(render::Black{}) : material_of(all[k].object, bands)});
     if (!objects[k].screen) continue;
     out.surfaces.push_back({placed(*objects[k].screen, {Eigen::Matrix3d::Identity(), all[k].motion.start_mm}),
                             render::Emitter{in_bands(all[k].object.screen->radiance, bands, "screen.radiance")}});

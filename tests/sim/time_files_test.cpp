@@ -105,6 +105,15 @@ TEST(EventCamera, ReadsItsFigures) {
   EXPECT_FALSE(camera_with(kDavis).events.has_value());
 }
 
+TEST(BinnedCamera, IsReadAndHasNoEventPixels) {
+  const std::string binned = "preset: c310\nbayer: binned\nexposure_us: 300\n";
+  EXPECT_EQ(camera_with(binned).bayer, render::BayerPattern::binned);
+  EXPECT_THAT(error_of(binned + "events: {dark_e_per_s: 10}\n"),
+              AllOf(HasSubstr("camera.yaml:8"), HasSubstr("events"), HasSubstr("binned")));
+  EXPECT_THAT(error_of("preset: c310\nbayer: bined\nexposure_us: 300\n"),
+              AllOf(HasSubstr("camera.yaml:6"), HasSubstr("gbrg"), HasSubstr("binned")));
+}
+
 TEST(EventCamera, BadFiguresAreRefusedWithTheirLine) {
   const auto error = [](const std::string& block) { return error_of(kDavis + "events:\n" + block); };
   EXPECT_THAT(error("  dark_e_per_s: 10\n  off_threshold: -0.2\n"),

@@ -1,0 +1,193 @@
+#include "lab/chroma_tilt_experiment.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <complex>
+
+#include "core/error.h"
+#include "core/units.h"
+
+namespace touchstone::lab {
+namespace {
+
+constexpr float kSaturated = 0.5F;
+// Blue over red: 0.9 and more beside the film, 0.3 and less under it.
+constexpr double kUnderFilm = 0.6;
+constexpr std::array kPressed_mm = {0.0, 0.25, 0.5, 0.75, 1.0};
+constexpr double kAside_mm = 0.3;
+constexpr int kPhases = 4;
+const Eigen::Vector2d kPhases_px[kPhases] = {{0.0, 0.0}, {0.5, 0.0}, {0.0, 0.5}, {0.5, 0.5}};
+constexpr int kReportedTilts = 10;
+constexpr double kTiltStep_deg = 5.0;
+
+/// Hue of HSV as a direction; of a colour without any the vector is zero.
+std::complex<double> hue_direction(const cv::Vec3f& c) {
+  // The hexagon of HSV, not the circle of the plane through its corners.
+  const float most = std::max({c[0], c[1], c[2]});
+  const float span = most - std::min({c[0], c[1], c[2]});
+  if (!(span > 0.0F)) return 0.0;
+  double sixths = 0.0;
+  if (most == c[0]) {
+    sixths = static_cast<double>((c[1] - c[2]) / span);
+  } else if (most == c[1]) {
+    sixths = 2.0 + static_cast<double>((c[2] - c[0]) / span);
+  } else {
+    sixths = 4.0 + static_cast<double>((c[0] - c[1]) / span);
+  }
+  return std::polar(1.0, sixths * kPi / 3.0);
+}
+
+/// The share of a pixel that ink covers, if bare sheet and ink are lit alike.
+double ink_cover(const cv::Vec3f& c, const TiltColours& colours) {
+  const bool under_film = static_cast<double>(c[2]) < kUnderFilm * static_cast<double>(c[0]);
+  const Eigen::Vector3d& sheet = under_film ? colours.film_white : colours.white;
+  const Eigen::Vector3d& ink = under_film ? colours.film_magenta : colours.magenta;
+  Eigen::Matrix2d parts;
+  parts << sheet[0], ink[0], sheet[1], ink[1];
+  const Eigen::Vector2d share = parts.inverse() * Eigen::Vector2d(c[0], c[1]);
+  if (!(share.sum() > 0.0)) return 0.0;
+  return std::clamp(share[1] / share.sum(), 0.0, 1.0);
+}
+
+/// a - b on the circle.
+double turn(double a, double b) {
+  return std::remainder(a - b, 2.0 * kPi);
+}
+
+/// y = intercept + slope x by least squares.
+struct Line {
+  double slope = 0.0;
+  double r2 = 0.0;
+};
+Line line_through(std::span<const double> x, std::span<const double> y) {
+  const auto n = static_cast<double>(x.size());
+  double mx = 0.0;
+  double my = 0.0;
+  for (std::size_t k = 0; k < x.size(); ++k) {
+    mx += x[k] / n;
+    my += y[k] / n;
+  }
+  double xx = 0.0;
+  double xy = 0.0;
+  double yy = 0.0;
+  for (std::size_t k = 0; k < x.size(); ++k) {
+    xx += (x[k] - mx) * (x[k] - mx);
+    xy += (x[k] - mx) * (y[k] - my);
+    yy += (y[k] - my) * (y[k] - my);
+  }
+  return {xy / xx, yy > 0.0 ? xy * xy / (xx * yy) : 1.0};
+}
+
+}  // namespace
+
+TiltReading read_tilt_picture(const cv::Mat& picture, const TiltColours& colours) {
+  TS_ASSERT(picture.type() == CV_32FC3);
+  TiltReading reading;
+  std::complex<double> hue = 0.0;
+  Eigen::Vector2d moment = Eigen::Vector2d::Zero();
+  for (int y = 0; y < picture.rows; ++y) {
+    for (int x = 0; x < picture.cols; ++x) {
+      const auto& c = picture.at<cv::Vec3f>(y, x);
+      const float most = std::max({c[0], c[1], c[2]});
+      if (!(most - std::min({c[0], c[1], c[2]}) > kSaturated * most)) continue;
+      hue += hue_direction(c);
+      reading.coloured_area_px += 1.0;
+      const double cover = ink_cover(c, colours);
+      reading.ink_area_px += cover;
+      moment += cover * Eigen::Vector2d(x + 0.5, y + 0.5);
+    }
+  }
+  if (!(std::abs(hue) > 0.0)) fail("the picture has no coloured pixel");
+  if (!(reading.ink_area_px > 0.0)) fail("the picture shows no ink");
+  reading.hue = std::arg(hue);
+  reading.ink_px = moment / reading.ink_area_px;
+  return reading;
+}
+
+std::vector<double> reported_tilts() {
+  std::vector<double> tilts;
+  for (int k = 0; k < kReportedTilts; ++k) tilts.push_back(k * kTiltStep_deg * kRadiansPerDegree);
+  return tilts;
+}
+
+TiltTable measure_tilt(const TiltBench& bench, const TiltSpectra& spectra, TiltMarker marker,
+                       std::span<const double> tilts, std::uint64_t seed, const Progress& progress) {
+  const auto total = static_cast<std::int64_t>(kPressed_mm.size() + 3 + tilts.size());
+  std::int64_t done = 0;
+  const TiltColours colours = tilt_colours(spectra);
+  const auto look = [&](const TiltPose& pose, std::uint64_t with_seed) {
+    TiltReading mean;
+    std::complex<double> hue = 0.0;
+    for (const Eigen::Vector2d& phase : kPhases_px) {
+      TiltBench shifted = bench;
+      shifted.phase_px += phase;
+      const TiltReading one = read_tilt_picture(tilt_picture(shifted, spectra, marker, pose, with_seed++), colours);
+      hue += std::polar(1.0, one.hue);
+      mean.ink_px += (one.ink_px - phase) / kPhases;
+      mean.ink_area_px += one.ink_area_px / kPhases;
+      mean.coloured_area_px += one.coloured_area_px / kPhases;
+    }
+    mean.hue = std::arg(hue);
+    if (progress) progress("tilted markers", ++done, total);
+    return mean;
+  };
+  TiltTable table;
+  table.marker = marker;
+  const TiltReading level = look({}, seed);
+  std::vector<double> hues;
+  std::vector<double> areas;
+  for (const double pressed : kPressed_mm) {
+    const TiltReading reading = pressed == 0.0 ? level : look({0.0, {0.0, 0.0, -pressed}}, seed);
+    hues.push_back(turn(reading.hue, level.hue));
+    areas.push_back(reading.ink_area_px / level.ink_area_px - 1.0);
+  }
+  const Line hue = line_through(kPressed_mm, hues);
+  TiltCalibration& calibration = table.calibration;
+  calibration.hue_slope = hue.slope;
+  calibration.hue_fit_r2 = hue.r2;
+  calibration.area_slope = line_through(kPressed_mm, areas).slope;
+  const TiltReading right = look({0.0, {kAside_mm, 0.0, 0.0}}, seed);
+  const TiltReading left = look({0.0, {-kAside_mm, 0.0, 0.0}}, seed);
+  calibration.centroid_gain = (right.ink_px.x() - left.ink_px.x()) / (2.0 * kAside_mm);
+
+  const double um_a_radian = kMicrometresPerMillimetre / calibration.hue_slope;
+  const double um_a_pixel = kMicrometresPerMillimetre / calibration.centroid_gain;
+  for (const double tilt : tilts) {
+    const TiltReading reading = tilt == 0.0 ? level : look({tilt, Eigen::Vector3d::Zero()}, seed);
+    TiltError error;
+    error.tilt = tilt;
+    error.hue_change = turn(reading.hue, level.hue);
+    error.normal_um = um_a_radian * error.hue_change;
+    error.size_um =
+        kMicrometresPerMillimetre * (reading.ink_area_px / level.ink_area_px - 1.0) / calibration.area_slope;
+    error.lateral_um = um_a_pixel * (reading.ink_px.x() - level.ink_px.x());
+    error.across_um = um_a_pixel * (reading.ink_px.y() - level.ink_px.y());
+    table.errors.push_back(error);
+  }
+  const TiltReading again = look({}, seed + kPhases);
+  table.noise_normal_um = std::abs(um_a_radian * turn(again.hue, level.hue)) / std::sqrt(2.0);
+  table.noise_lateral_um = std::abs(um_a_pixel) * (again.ink_px - level.ink_px).norm() / 2.0;
+  return table;
+}
+
+TiltExperiment run_tilt_experiment(const std::filesystem::path& spectra, int samples, std::uint64_t seed,
+                                   const Progress& progress) {
+  const TiltSpectra light = read_tilt_spectra(spectra);
+  const std::vector<double> tilts = reported_tilts();
+  TiltExperiment experiment;
+  for (const TiltMarker marker : {TiltMarker::flat, TiltMarker::rigid, TiltMarker::ball}) {
+    // Tilted, the rigid square looks as the flat one does.
+    const std::span<const double> angles = marker == TiltMarker::rigid ? std::span<const double>() : tilts;
+    TiltBench bench = far_bench();
+    bench.samples = samples;
+    experiment.far.push_back(measure_tilt(bench, light, marker, angles, seed, progress));
+    bench = compact_bench();
+    bench.samples = 4 * samples;  // its pixels are a sixteenth as many
+    experiment.compact.push_back(measure_tilt(bench, light, marker, angles, seed, progress));
+  }
+  return experiment;
+}
+
+}  // namespace touchstone::lab

@@ -1,0 +1,53 @@
+#include "lab/study.h"
+
+#include "core/error.h"
+#include "core/whole_file.h"
+#include "lab/job.h"
+
+namespace touchstone::lab {
+namespace {
+
+enum class KindName { apparent_change };
+
+EnumNames<KindName> enum_names(KindName) {
+  return {{"apparent_change", KindName::apparent_change}};
+}
+
+}  // namespace
+
+void fields(YamlReader& in, StudySpec& study) {
+  in.required("name", study.name);
+  if (!is_folder_name(study.name)) {
+    fail_at(in.where("name"), "name: '{}' can't name files; allowed are up to 100 letters, digits, - and _",
+            study.name);
+  }
+  KindName kind = KindName::apparent_change;
+  in.required("kind", kind);
+  switch (kind) {
+    case KindName::apparent_change:
+      fields(in, study.kind.emplace<ApparentChangeSpec>());
+  }
+}
+
+StudySpec read_study(const std::filesystem::path& file) {
+  return read_yaml<StudySpec>(file);
+}
+
+StudyResult run_study(const StudySpec& study, const std::filesystem::path& cache, const Progress& progress) {
+  return std::visit(
+      [&](const ApparentChangeSpec& spec) {
+        return report(study.name, spec, run_apparent_change(spec, cache, progress));
+      },
+      study.kind);
+}
+
+void write_study(const StudyResult& result, const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error || !std::filesystem::is_directory(folder)) {
+    fail("{}: the folder can't be made: {}", folder.string(), error ? error.message() : "a file is in its place");
+  }
+  for (const StudyFile& file : result.files) write_whole_file(folder / file.name, file.text);
+}
+
+}  // namespace touchstone::lab

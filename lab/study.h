@@ -1,0 +1,48 @@
+#pragma once
+// A study: a device's figures are varied and what comes of it is tabled. One file describes it (docs/file-formats.md);
+// `kind` says what is looked at, and each kind is a plain struct of its own with a function that runs it.
+
+#include <filesystem>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "core/progress.h"
+#include "core/yaml_reader.h"
+#include "lab/apparent_change_study.h"
+
+namespace touchstone::lab {
+
+/// One alternative a kind; the names in files are in study.cpp.
+using StudyKind = std::variant<ApparentChangeSpec>;
+
+struct StudySpec {
+  std::string name;  ///< also of its files; letters, digits, - and _
+  StudyKind kind;
+};
+void fields(YamlReader& in, StudySpec& study);
+
+/// Reads and checks a study and all files that it names. @throws Error with file and line
+StudySpec read_study(const std::filesystem::path& file);
+
+/// What a study leaves behind: files by name, their text, and what is to be told beside.
+struct StudyFile {
+  std::string name;
+  std::string text;
+};
+struct StudyResult {
+  std::vector<StudyFile> files;    ///< a table as CSV and one in Markdown, plots as SVG
+  std::vector<std::string> notes;  ///< presses that couldn't be had, and why
+};
+
+/// The same study gives the same bytes. @throws Error if a gel can't be had
+StudyResult run_study(const StudySpec& study, const std::filesystem::path& cache, const Progress& progress = {});
+
+/// Files of one kind of study.
+StudyResult report(const std::string& name, const ApparentChangeSpec& spec, const ApparentChangeResult& result);
+
+/// Puts the files into a folder, which is made if it isn't there; files of these names are replaced, each whole.
+/// @throws Error if they can't be written
+void write_study(const StudyResult& result, const std::filesystem::path& folder);
+
+}  // namespace touchstone::lab
