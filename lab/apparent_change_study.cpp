@@ -208,8 +208,8 @@ void fields(YamlReader& in, ApparentChangeSpec& spec) {
       fail_at(in.where("objects"), "objects: {} is elastic; a study of this kind presses rigid ones", file);
     }
     if (!is_folder_name(object.name)) {
-      fail_at(in.where("objects"), "objects: the name '{}' in {} can't name files; allowed are letters, digits, - and _",
-              object.name, file);
+      fail_at(in.where("objects"),
+              "objects: the name '{}' in {} can't name files; allowed are letters, digits, - and _", object.name, file);
     }
     for (const sim::ObjectSpec& other : spec.objects) {
       if (other.name == object.name) {

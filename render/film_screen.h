@@ -1,8 +1,8 @@
 #pragma once
 // The coloured films of a fixture as direct light sees them: a flat screen that camera rays and lamps' light pass.
 
-#include <array>
 #include <Eigen/Geometry>
+#include <array>
 #include <opencv2/core/mat.hpp>
 #include <string>
 #include <vector>

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
+
 #include "core/error.h"
 #include "fem/slab.h"
 
@@ -101,6 +103,55 @@ TEST(ChromaForce, RunsRepeat) {
     EXPECT_EQ(first.samples[k].estimate, second.samples[k].estimate);
     EXPECT_NE(first.samples[k].estimate, other.samples[k].estimate);
   }
+}
+
+/// Where strains are small, linear and finite elasticity are one; deeper, the linear map must fall behind.
+TEST(ChromaForce, LargeStrainsAreToldApartFromSmallOnes) {
+  fem::SlabMesh slab;
+  slab.size_x = slab.size_y = 15.0;
+  slab.thickness = 4.0;
+  slab.fine = 1.3;
+  slab.coarse = 2.5;
+  slab.fine_half_x = slab.fine_half_y = 3.0;
+  slab.fine_depth = 1.0;
+  const std::array materials = {fem::ElasticMaterial{0.4, 0.49}};
+  ForceBench small;
+  small.truth_gel =
+      std::make_shared<const fem::Compliance>(fem::compute_compliance(fem::mesh_slab(slab), materials, {}, 4.0));
+  const fem::FiniteGel finite(fem::mesh_slab(slab), materials, {}, 4.0);
+  small.markers.grid = {5, 5};
+  for (int j = 0; j < 5; ++j) {
+    for (int i = 0; i < 5; ++i) small.markers.markers.push_back({{2.0 * (i - 2), 2.0 * (j - 2)}, 0.7, true});
+  }
+  small.compliance =
+      marker_compliance(*small.truth_gel, small.markers, patches_over(*small.truth_gel, small.markers, 1.0));
+  small.inversion.lateral_noise_mm = small.inversion.normal_noise_mm = 0.002;
+  ForceProbe ball = punch();
+  ball.shape = ProbeShape::hemisphere;
+  ball.width_mm = 16.0;
+  const std::vector<LargeStrainRow> rows =
+      large_strain_ladder(small, finite, ball, {0.1, 0.8}, noisy_truth({5, 5}, 0.0, 0.0, 1));
+  ASSERT_EQ(rows.size(), 2u);
+  EXPECT_NEAR(rows[0].linear_N, rows[0].truth_N, 0.03 * rows[0].truth_N);
+  EXPECT_LT(rows[1].linear_N, 0.97 * rows[1].truth_N);
+  EXPECT_LT(rows[1].estimate_N, rows[1].truth_N);
+  EXPECT_NEAR(rows[1].estimate_N, rows[1].linear_N, 0.15 * rows[1].linear_N) << "the estimator is linear";
+  EXPECT_GT(rows[1].largest_strain, rows[0].largest_strain);
+  EXPECT_THAT(
+      [&] {
+        large_strain_ladder(bench(), finite, ball, {0.1}, noisy_truth({7, 7}, 0, 0, 1));
+      },
+      ::testing::ThrowsMessage<Error>(::testing::HasSubstr("they need the same mesh")));
+}
+
+TEST(ChromaForce, ABenchNeedsMarkers) {
+  sim::DeviceSpec bare;
+  bare.gel.shape = sim::GelShape::slab;
+  EXPECT_THAT([&] { set_up_force_bench(bare, {}); },
+              ::testing::ThrowsMessage<Error>(::testing::HasSubstr("neither printed markers nor beads")));
+  bare.beads = sim::BeadSpec{};
+  EXPECT_THAT([&] { set_up_force_bench(bare, {}); },
+              ::testing::ThrowsMessage<Error>(::testing::HasSubstr("no printed markers")));
 }
 
 TEST(ChromaForce, ScoresAddUp) {
