@@ -9,13 +9,16 @@
 
 #include "core/error.h"
 #include "core/random.h"
+#include "sim/virtual_sensor.h"
 
 namespace touchstone::lab {
 namespace {
 
-constexpr double kEdgeRadius = 0.3;    // mm, of the flat cylinder's rim
-constexpr double kPunchHeight = 10.0;  // mm
-constexpr double kWhole = 0.9;         // share of a marker's square that touches, for its state to be scored
+constexpr double kEdgeRadius = 0.3;                                           // mm, of the flat cylinder's rim
+constexpr double kPunchHeight = 10.0;                                         // mm
+constexpr double kTruthEdge = 0.85, kEstimatorEdge = 1.0, kCoarseEdge = 2.5;  // mm, of meshes
+constexpr double kSideStrip = 2.0, kFineDepth = 1.0;                          // mm
+constexpr double kWhole = 0.9;  // share of a marker's square that touches, for its state to be scored
 constexpr double kMostly = 0.5;
 constexpr double kStillSticking = 0.05;  // of the touching vertices: a discrete contact sheds them one by one
 
@@ -162,13 +165,31 @@ std::vector<ForceProbe> draw_force_probes(int count, std::uint64_t seed) {
   return probes;
 }
 
+ForceBench set_up_force_bench(sim::DeviceSpec device, const std::filesystem::path& cache_folder,
+                              const Progress& progress) {
+  check_marker_compliance(device);
+  ForceBench bench;
+  bench.markers = printed_markers(device);
+  device.mesh = {};
+  device.mesh.coarse_mm = kCoarseEdge;
+  device.mesh.fine_half_extent_mm =
+      (0.5 * Eigen::Vector2d(device.gel.size_x_mm, device.gel.size_y_mm).array() - kSideStrip).max(kTruthEdge);
+  device.mesh.fine_depth_mm = kFineDepth;
+  device.mesh.fine_mm = kTruthEdge;
+  bench.truth_gel = sim::set_up_gel(device, cache_folder, progress);
+  device.mesh.fine_mm = kEstimatorEdge;
+  bench.compliance = export_marker_compliance(device, *sim::set_up_gel(device, cache_folder, progress));
+  return bench;
+}
+
 void play_probe(const ForceBench& bench, const ForceProbe& probe, const DragSettings& drag,
                 const std::function<void(const ForceFrame&)>& look) {
   TS_ASSERT(bench.truth_gel != nullptr && drag.step_mm > 0.0);
   const TruthReader reader(*bench.truth_gel, bench.markers);
   fem::Press press(*bench.truth_gel, contact_shape(probe), probe.friction);
+  const auto steps = static_cast<int>(std::floor(drag.longest_mm / drag.step_mm + 1e-9));
   int after = 0;
-  for (int number = 0; drag.step_mm * number <= drag.longest_mm; ++number) {
+  for (int number = 0; number <= steps; ++number) {
     const double drag_mm = drag.step_mm * number;
     const fem::PressState& state = press.step(target_at(probe, drag_mm));
     const bool slides = has_come_to_slide(state);

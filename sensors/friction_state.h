@@ -5,8 +5,8 @@
 // What can be seen. Coulomb's coefficient shows only where something slips: |q| = mu p there, |q| < mu p elsewhere. Two
 // things tell slip, both in material coordinates (where the gel was at rest), in which a sticking contact can't move:
 // - Of a part: as the object is dragged, markers that stick under it all move as one rigid body; those that slip lag
-//   behind. Slip begins at the rim, so the markers with most pressure about them, deepest in the contact, are taken for
-//   the object; each marker's lag is the part of their motion, along it, that it doesn't take part in.
+//   behind. Those that went furthest, a third of them, are taken for the object; a marker's lag is the part of their
+//   motion, along it, that it doesn't take part in.
 // - Of all: the markers stand still, and the contact itself moves over them. Its middle is the centre of pressure,
 //   which the tractions give to a tenth of a marker spacing. It goes along the shear traction on the gel, and the ratio
 //   of shear to normal force doesn't grow any more.

@@ -39,8 +39,8 @@ Eigen::VectorXd with_few_free(const Eigen::MatrixXd& H, const Eigen::VectorXd& b
 
 }  // namespace
 
-NonnegativeMinimum nonnegative_minimum(const Eigen::MatrixXd& H, const Eigen::VectorXd& b,
-                                       const std::vector<std::uint8_t>& sign) {
+NonnegativeMinimum nonnegative_minimum(const Eigen::MatrixXd& H, const Eigen::LLT<Eigen::MatrixXd>& factor,
+                                       const Eigen::VectorXd& b, const std::vector<std::uint8_t>& sign) {
   const Eigen::Index n = b.size();
   TS_ASSERT(H.rows() == n && H.cols() == n && sign.size() == static_cast<std::size_t>(n));
   NonnegativeMinimum result;
@@ -49,20 +49,19 @@ NonnegativeMinimum nonnegative_minimum(const Eigen::MatrixXd& H, const Eigen::Ve
     result.converged = true;
     return result;
   }
+  TS_ASSERT(factor.rows() == n);
   std::vector<std::uint8_t> held(static_cast<std::size_t>(n), 0);
   const double slack = kSlack * b.cwiseAbs().maxCoeff();
   std::size_t fewest = static_cast<std::size_t>(n) + 1;
   int tries = kBlockTries;
-  result.factor.compute(H);
-  const Eigen::VectorXd unheld = result.factor.solve(b);
-  result.factorisations = 1;
+  const Eigen::VectorXd unheld = factor.solve(b);
   std::vector<Eigen::Index> free, held_rows, wrong;
   for (int step = 0; step < kMostSteps; ++step) {
     free.clear();
     held_rows.clear();
     for (Eigen::Index i = 0; i < n; ++i) (held[static_cast<std::size_t>(i)] ? held_rows : free).push_back(i);
     if (kFewHeld * static_cast<Eigen::Index>(held_rows.size()) <= n) {
-      result.x = with_few_held(result.factor, unheld, held_rows);
+      result.x = with_few_held(factor, unheld, held_rows);
     } else {
       result.x = with_few_free(H, b, free);
       ++result.factorisations;

@@ -134,58 +134,59 @@ TractionInversion::TractionInversion(MarkerCompliance compliance, const Traction
   }
   inverse_correlation_ = factor.solve(Eigen::MatrixXd::Identity(patches, patches));
   share_ = shares_of_patches(compliance_);
+
+  all_weighted_ = compliance_.displacement;
+  for (Eigen::Index row = 0; row < all_weighted_.rows(); ++row) {
+    all_weighted_.row(row) /= row % 3 == 2 ? settings_.normal_noise_mm : settings_.lateral_noise_mm;
+  }
+  for (int p = 0; p < patches; ++p) all_weighted_.col(3 * p + 2) *= -1.0;  // pressure
+  all_normal_.setZero(3 * patches, 3 * patches);
+  all_normal_.selfadjointView<Eigen::Lower>().rankUpdate(all_weighted_.transpose());
+  all_normal_.triangularView<Eigen::StrictlyUpper>() = all_normal_.transpose();
+  const double scale = settings_.first_scale * compliance_.youngs_modulus;
+  all_lateral_.setZero(all_weighted_.rows(), all_weighted_.rows());
+  for (int a = 0; a < 2; ++a) {
+    const Eigen::MatrixXd along = all_weighted_(Eigen::all, Eigen::seqN(a, patches, 3));
+    all_lateral_ += scale * scale * along * correlation_ * along.transpose();
+  }
 }
 
 void TractionInversion::prepare(const std::vector<std::uint8_t>& measured) {
-  const Eigen::Vector3d weight(1.0 / settings_.lateral_noise_mm, 1.0 / settings_.lateral_noise_mm,
-                               1.0 / settings_.normal_noise_mm);
-  weighted_ = compliance_.displacement;
-  for (std::size_t m = 0; m < measured.size(); ++m) {
-    for (Eigen::Index a = 0; a < 3; ++a) {
-      weighted_.row(3 * static_cast<Eigen::Index>(m) + a) *= measured[m] ? weight[a] : 0.0;
-    }
-  }
   const int patches = compliance_.patches();
-  for (int p = 0; p < patches; ++p) weighted_.col(3 * p + 2) *= -1.0;  // pressure
-  normal_.setZero(3 * patches, 3 * patches);
-  normal_.selfadjointView<Eigen::Lower>().rankUpdate(weighted_.transpose());
-  normal_.triangularView<Eigen::StrictlyUpper>() = normal_.transpose();
-
-  std::vector<int> lateral, vertical;
-  for (int p = 0; p < patches; ++p) {
-    lateral.push_back(3 * p);
-    lateral.push_back(3 * p + 1);
-    vertical.push_back(3 * p + 2);
-  }
-  const double scale = settings_.first_scale * compliance_.youngs_modulus;
-  const Eigen::MatrixXd stiff = inverse_correlation_ / (scale * scale);
-  Eigen::MatrixXd of_lateral = normal_(lateral, lateral);
-  for (int i = 0; i < patches; ++i) {
-    for (int j = 0; j < patches; ++j) {
-      of_lateral(2 * i, 2 * j) += stiff(i, j);
-      of_lateral(2 * i + 1, 2 * j + 1) += stiff(i, j);
+  weighted_ = all_weighted_;
+  normal_ = all_normal_;
+  Eigen::MatrixXd spread = all_lateral_;  // what lateral tractions and noise do to the data, over the noise
+  std::vector<Eigen::Index> missing;
+  for (std::size_t m = 0; m < measured.size(); ++m) {
+    for (Eigen::Index row = 3 * static_cast<Eigen::Index>(m);
+         !measured[m] && row < 3 * static_cast<Eigen::Index>(m) + 3; ++row) {
+      missing.push_back(row);
+      weighted_.row(row).setZero();
+      spread.row(row).setZero();
+      spread.col(row).setZero();
     }
   }
-  const Eigen::MatrixXd coupling = normal_(lateral, vertical);
-  first_lateral_ = Eigen::LLT<Eigen::MatrixXd>(of_lateral).solve(coupling).transpose();
-  first_normal_ = normal_(vertical, vertical);
-  first_normal_ += stiff;
-  first_normal_ -= first_lateral_ * coupling;
-  first_normal_ = (0.5 * (first_normal_ + first_normal_.transpose())).eval();
+  if (!missing.empty()) {
+    const Eigen::MatrixXd taken_off = all_weighted_(missing, Eigen::all);
+    normal_.selfadjointView<Eigen::Lower>().rankUpdate(taken_off.transpose(), -1.0);
+    normal_.triangularView<Eigen::StrictlyUpper>() = normal_.transpose();
+  }
+  spread.diagonal().array() += 1.0;
+  const Eigen::MatrixXd of_pressure = weighted_(Eigen::all, Eigen::seqN(2, patches, 3));
+  first_load_ = Eigen::LLT<Eigen::MatrixXd>(spread).solve(of_pressure).transpose();
+  const double scale = settings_.first_scale * compliance_.youngs_modulus;
+  first_normal_ = first_load_ * of_pressure;
+  first_normal_ = (0.5 * (first_normal_ + first_normal_.transpose()) + inverse_correlation_ / (scale * scale)).eval();
+  first_factor_.compute(first_normal_);
   measured_ = measured;
 }
 
-std::vector<std::vector<int>> TractionInversion::possible_contacts(const Eigen::VectorXd& load,
+std::vector<std::vector<int>> TractionInversion::possible_contacts(const Eigen::VectorXd& data,
                                                                    int& factorisations) const {
   const int patches = compliance_.patches();
-  Eigen::VectorXd lateral(2 * patches), vertical(patches);
-  for (int p = 0; p < patches; ++p) {
-    lateral.segment<2>(2 * p) = load.segment<2>(3 * p);
-    vertical[p] = load[3 * p + 2];
-  }
-  vertical -= first_lateral_ * lateral;
-  const NonnegativeMinimum first =
-      nonnegative_minimum(first_normal_, vertical, std::vector<std::uint8_t>(static_cast<std::size_t>(patches), 1));
+  const Eigen::VectorXd vertical = first_load_ * data;
+  const NonnegativeMinimum first = nonnegative_minimum(first_normal_, first_factor_, vertical,
+                                                       std::vector<std::uint8_t>(static_cast<std::size_t>(patches), 1));
   factorisations += first.factorisations;
   std::vector<std::vector<int>> result = {{}};  // nothing touches
   const double largest = first.x.maxCoeff();
@@ -225,10 +226,10 @@ TractionInversion::Candidate TractionInversion::solve(const std::vector<int>& pa
   std::vector<std::uint8_t> sign(rows.size(), 0);
   for (std::size_t k = 2; k < sign.size(); k += 3) sign[k] = 1;
   const Eigen::VectorXd b = load(rows);
-  NonnegativeMinimum minimum = nonnegative_minimum(information, b, sign);
+  result.factor.compute(information);
+  const NonnegativeMinimum minimum = nonnegative_minimum(information, result.factor, b, sign);
   result.x = minimum.x;
-  result.factorisations = minimum.factorisations;
-  result.factor = std::move(minimum.factor);
+  result.factorisations = 1 + minimum.factorisations;
 
   const Eigen::VectorXd seen = normal * result.x;
   result.misfit_square = data_square - 2.0 * b.dot(result.x) + result.x.dot(seen);
@@ -271,7 +272,7 @@ TractionField TractionInversion::invert(const MarkerField& field) {
   const double data_square = data.squaredNorm();
   std::vector<Candidate> tried;
   std::size_t best = 0;
-  for (const std::vector<int>& contact : possible_contacts(load, result.factorisations)) {
+  for (const std::vector<int>& contact : possible_contacts(data, result.factorisations)) {
     tried.push_back(solve(contact, load, data_square));
     result.factorisations += tried.back().factorisations;
     if (tried.back().score < tried[best].score) best = tried.size() - 1;

@@ -16,11 +16,12 @@
 //   with the tractions integrated out, D. J. C. MacKay, Neural Computation 4, 1992, for the noise as stated) is taken.
 //   Outside of it all tractions are zero, inside the normal ones are at least zero.
 // The discrepancy principle, by which the smallest contact that explains the markers would be taken, makes contacts too
-// small or too large by more (docs/sensors/chroma.md has the figures).
+// small or too large by more (docs/sensors/chroma-force.md has the figures).
 //
 // Signs: tractions are those on the gel, wrenches those on the object that touches it (a press has Fz > 0), both in the
 // gel frame, as fem::PressState tells them.
 
+#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <cstdint>
 #include <vector>
@@ -74,7 +75,8 @@ struct TractionField {
 };
 
 /// Turns frames into tractions. Works on what is common to all frames once (and again when other markers are measured
-/// than in the frame before: some tens of ms). The same input gives the same bits. One object is for one thread.
+/// than in the frame before: some ten times a frame's work). The same input gives the same bits. One object is for one
+/// thread.
 class TractionInversion {
  public:
   /// Fewer measured markers than this are refused.
@@ -96,7 +98,7 @@ class TractionInversion {
  private:
   struct Candidate;
   void prepare(const std::vector<std::uint8_t>& measured);
-  std::vector<std::vector<int>> possible_contacts(const Eigen::VectorXd& load, int& factorisations) const;
+  std::vector<std::vector<int>> possible_contacts(const Eigen::VectorXd& data, int& factorisations) const;
   Candidate solve(const std::vector<int>& patches, const Eigen::VectorXd& load, double data_square) const;
   void describe(const std::vector<Candidate>& tried, std::size_t best, TractionField& result) const;
   void carry(const MarkerField& field, TractionField& result) const;
@@ -106,12 +108,16 @@ class TractionInversion {
   Eigen::MatrixXd correlation_;          ///< patches x patches
   Eigen::MatrixXd inverse_correlation_;  ///< its inverse
   Eigen::MatrixXd share_;  ///< markers x patches: of a patch in the square about a marker, over that square's area
-  // Of the markers measured last. Unknown 3 p + a is the traction on patch p, along z the pressure.
+  // Rows of A over the noise; their products; and what lateral tractions of the first scale do to the data
+  // (covariance). Unknown 3 p + a is the traction on patch p, along z the pressure.
+  Eigen::MatrixXd all_weighted_, all_normal_, all_lateral_;
+  // The same of the markers measured last: rows of those not measured are zero.
   std::vector<std::uint8_t> measured_;
-  Eigen::MatrixXd weighted_;       ///< rows of A over the noise, those not measured zero
-  Eigen::MatrixXd normal_;         ///< weighted^T weighted
-  Eigen::MatrixXd first_normal_;   ///< first problem, lateral tractions eliminated: patches x patches
-  Eigen::MatrixXd first_lateral_;  ///< takes the lateral load off: patches x 2 patches
+  Eigen::MatrixXd weighted_, normal_;
+  // The first problem, in pressures only: lateral tractions are integrated out.
+  Eigen::MatrixXd first_load_;    ///< of data over the noise: patches x 3 markers
+  Eigen::MatrixXd first_normal_;  ///< patches x patches
+  Eigen::LLT<Eigen::MatrixXd> first_factor_;
 };
 
 }  // namespace touchstone::sensors

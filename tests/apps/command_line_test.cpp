@@ -221,6 +221,35 @@ TEST_F(BadInput, ResultsThatCantBeWrittenAreRefusedBeforeTheWork) {
   expect_refused(run_program({"generate", job_.string(), "-o", folder_.path().string()}), "isn't empty");
 }
 
+TEST_F(BadInput, ExportsOfWhatTheDeviceHasntAreRefusedBeforeTheWork) {
+  const std::string device = (folder_.path() / "device.yaml").string();
+  const std::string out = (folder_.path() / "map.bin").string();
+  expect_refused(run_program({"export"}), "subcommand");
+  expect_refused(run_program({"export", "complianc"}), "did you mean 'compliance'?");
+  expect_refused(run_program({"export", "compliance", "--device", device}), "--out");
+  expect_refused(run_program({"export", "compliance", "--device", device, "-o", "/nonexistent/a.bin"}),
+                 "there is no folder");
+  expect_refused(run_program({"export", "compliance", "--device", "/nonexistent.yaml", "-o", out}),
+                 "/nonexistent.yaml");
+  const auto refuse_patch = [&](const std::string& side, const std::string& part) {
+    expect_refused(run_program({"--quiet", "--cache", folder_.path().string(), "export", "compliance", "--device",
+                                device, "-o", out, "--patch-mm", side}),
+                   part);
+  };
+  refuse_patch("wide", "--patch-mm");
+  refuse_patch("0", "side is 0 mm");
+  refuse_patch("100", "100 mm");
+  EXPECT_FALSE(fs::exists(out));
+  const ProgramRun run = run_program(
+      {"--quiet", "--cache", folder_.path().string(), "export", "compliance", "--device", device, "-o", out});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("markers under tractions on"));
+  EXPECT_TRUE(fs::exists(out));
+  change("device.yaml", "beads:", "# beads:");
+  expect_refused(run_program({"export", "compliance", "--device", device, "-o", out}),
+                 "neither printed markers nor beads");
+}
+
 TEST_F(BadInput, PlanShowsReasons) {
   const ProgramRun run = run_program({"plan", job_.string()});
   EXPECT_EQ(run.exit_code, 0) << run.err;
