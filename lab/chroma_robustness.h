@@ -3,9 +3,8 @@
 // size, tell a displacement when the marker is only a few pixels wide, and when the light isn't even.
 //
 // What the text leaves open, and what is done here:
-// - A marker's apparent size is the side of its filter in px. "4 x 4 pixels" is taken for a filter of 4 px; if the
-// whole
-//   picture was meant, which is twice as wide in the drawing here, the row of 2 px is the text's.
+// - A marker's apparent size is the side of its filter in px. "4 x 4 pixels" is taken for a filter of 4 px; if the text
+//   means the whole picture, which is twice as wide in the drawing here, its row is that of 2 px.
 // - Pictures are made smaller by the Gaussian pyramid and then blurred by a Gaussian whose standard deviation is an
 //   eighth of the picture's size, as the text has it; then rounded to 8 bit, as a camera gives them.
 // - Fits are of the displacement by a polynomial of second order of the measurement: that is how it would be used.

@@ -16,4 +16,7 @@ inline double weight_of(int coverage) {
   return part < kLeastCoverage ? 0.0 : part;
 }
 
+/// Of the usual area: what is smaller at rest is no filter.
+inline constexpr double kLeastFilter = 0.4;
+
 }  // namespace touchstone::sensors

@@ -24,11 +24,11 @@ constexpr int kWhollyCovered = 230;        ///< of 255
 constexpr int kMostInkOfFilter = 77;       ///< of 255, that a filter alone looks like
 constexpr int kLeastBareFilter_px = 16;
 constexpr double kBareFilter = 0.25;  ///< so many filter pixels have no ink at all, if filter shows beside it
-constexpr double kLeastFilter = 0.4;  ///< of the usual area: a filter
 
 void check_range(const char* name, double value, double low, double high) {
-  if (!(value >= low && value <= high))
+  if (!(value >= low && value <= high)) {
     fail("coloured marker {} is {}, it must be from {} to {}", name, value, low, high);
+  }
 }
 
 /// The bin below which a part of all that were counted are.

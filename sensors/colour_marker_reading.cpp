@@ -13,7 +13,6 @@ namespace touchstone::sensors {
 namespace {
 
 constexpr double kLeastPatch = 0.1;        ///< of the usual area: smaller patches of ink are noise
-constexpr double kLeastFilter = 0.4;       ///< of the usual area: at rest, a filter
 constexpr double kLeastInk = 0.4;          ///< of the usual area: at rest, a marker
 constexpr double kLeastSaturated = 0.25;   ///< of the usual area: pixels with a hue
 constexpr double kLeastFilterSeen = 0.75;  ///< of its coverage at rest, over its place at rest

@@ -133,7 +133,8 @@ struct SeenDisplacement {
 /// Without gains. `terms` are terms_of(model).
 SeenDisplacement displacement_of(const HueModel& model, const Eigen::MatrixXi& terms, const MarkerChange& change);
 
-/// Whether a change is beyond what calibration saw, by more than a twentieth.
+/// Whether a change is beyond what calibration saw, by more than a twentieth. It doesn't look at a shift's direction: a
+/// kPolynomial of degree 3 that saw shear along the axes alone is 1 mm off along a diagonal, and this doesn't say so.
 bool is_beyond(const HueRange& range, const MarkerChange& change);
 
 }  // namespace touchstone::sensors
