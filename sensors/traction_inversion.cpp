@@ -317,6 +317,12 @@ void TractionInversion::describe(const std::vector<Candidate>& tried, std::size_
     result.uncertainty += weight * apart * apart.transpose();
   }
   result.uncertainty /= weights;
+  if (!result.in_contact && tried.size() > 1) {
+    // A touch too light to be sure of: whatever the likeliest contact would have been may be missed.
+    const auto likeliest = std::min_element(tried.begin() + 1, tried.end(),
+                                            [](const Candidate& a, const Candidate& b) { return a.score < b.score; });
+    result.uncertainty += likeliest->wrench * likeliest->wrench.transpose();
+  }
   const double values = 3.0 * result.measured;
   double used = 0.0;
   std::vector<int> rows;
