@@ -18,7 +18,9 @@ namespace {
 /// Parts of the first pressure's maximum above which a patch may be in contact. Falling: each contact is part of the
 /// next.
 constexpr std::array kLevels = {0.5, 0.4, 0.3, 0.25, 0.2, 0.15, 0.1, 0.05, 0.0};
-constexpr int kWorse = 2;  // contacts in a row of less evidence than the best: the larger ones have less still
+// So many contacts in a row of less evidence than the best: the larger ones have less still.
+constexpr std::size_t kWorse = 2;
+constexpr std::size_t kWorseThanNone = 4;
 
 void check(double value, double low, double high, const char* name) {
   if (!(value >= low && value <= high)) fail("{} is {}, it must be from {} to {}", name, value, low, high);
@@ -276,7 +278,7 @@ TractionField TractionInversion::invert(const MarkerField& field) {
     tried.push_back(solve(contact, load, data_square));
     result.factorisations += tried.back().factorisations;
     if (tried.back().score < tried[best].score) best = tried.size() - 1;
-    if (best > 0 && tried.size() > best + kWorse) break;
+    if (tried.size() > best + (best > 0 ? kWorse : kWorseThanNone)) break;
   }
   describe(tried, best, result);
   if (result.in_contact) carry(field, result);
@@ -317,6 +319,12 @@ void TractionInversion::describe(const std::vector<Candidate>& tried, std::size_
     result.uncertainty += weight * apart * apart.transpose();
   }
   result.uncertainty /= weights;
+  if (!result.in_contact && tried.size() > 1) {
+    // A touch too light to be sure of: whatever the likeliest contact would have been may be missed.
+    const auto likeliest = std::min_element(tried.begin() + 1, tried.end(),
+                                            [](const Candidate& a, const Candidate& b) { return a.score < b.score; });
+    result.uncertainty += likeliest->wrench * likeliest->wrench.transpose();
+  }
   const double values = 3.0 * result.measured;
   double used = 0.0;
   std::vector<int> rows;

@@ -61,8 +61,9 @@ struct TractionField {
   Matrix6d noise = Matrix6d::Zero();  ///< covariance of the wrench from the stated noise alone, for this contact
   /// Covariance of the wrench with all that is known to be unknown: the noise and what smoothness fills in (the bias to
   /// be expected from it), on the next larger contact that was tried, since the rim isn't known to better than that,
-  /// times misfit^2 where the misfit is above 1; and the choice among contacts (their spread, by evidence). What the
-  /// gel does beyond the linear map isn't in it.
+  /// times misfit^2 where the misfit is above 1; and the choice among contacts (their spread, by evidence). Without
+  /// contact also the wrench of the likeliest one: a touch too light to be sure of. What the gel does beyond the linear
+  /// map isn't in it.
   Matrix6d uncertainty = Matrix6d::Zero();
   bool in_contact = false;  ///< something touches: else all tractions and the wrench are zero
   double misfit = 0.0;      ///< RMS of what isn't explained, over the stated noise and with the degrees of freedom used
