@@ -278,6 +278,7 @@ void fields(YamlReader& in, CameraSpec& camera) {
     in.required("hole_position_mm", camera.hole_position_mm);
   }
   in.required("look_at_mm", camera.look_at_mm);
+  in.optional("roll_deg", camera.roll_deg, Allowed::within(-180.0, 180.0));
   in.required("exposure_us", camera.exposure_us, Allowed::at_least(0.0));
   in.optional("row_time_us", camera.row_time_us, Allowed::at_least(0.0));
   in.optional("bits", camera.bits, Allowed::within(1, 16));

@@ -272,7 +272,8 @@ RigidTransform pose_of(const CameraSpec& camera) {
   // nothing is mirrored. A camera that looks straight along y has +z down instead.
   const Eigen::Vector3d view = (camera.look_at_mm - camera.hole_position_mm).normalized();
   const Eigen::Vector3d down = std::abs(view.y()) > 0.999 ? Eigen::Vector3d(0, 0, 1) : Eigen::Vector3d(0, 1, 0);
-  return look_at(camera.hole_position_mm, camera.look_at_mm, down);
+  const double roll = camera.roll_deg * kRadiansPerDegree;
+  return look_at(camera.hole_position_mm, camera.look_at_mm, Eigen::AngleAxisd(roll, view) * down);
 }
 
 render::PinholeCamera pinhole_camera(const CameraSpec& camera) {
