@@ -31,7 +31,8 @@ sim::TouchRigSettings chroma_rig_settings(std::uint64_t seed) {
   settings.deepest_mm = 3.3;    // the text presses by 3 mm
   settings.widest_mm = 1.3;     // and shears by 1 mm
   settings.membrane_um = 80.0;  // balls of 4 mm and larger are smooth on it
-  settings.edge_side = 2;       // a marker's rim is some hundred pixels: their mean is what counts
+  settings.always_friction = true;
+  settings.edge_side = 2;  // a marker's rim is some hundred pixels: their mean is what counts
   return settings;
 }
 

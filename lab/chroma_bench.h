@@ -44,6 +44,8 @@ class ChromaBench {
 
   const sim::TouchRig& rig() const { return rig_; }
   const sensors::ColourMarkerReading& rest() const { return rest_; }
+  /// As it is after the picture at rest; to be copied.
+  const sensors::ColourMarkerFinder& finder() const { return finder_; }
   const SurfaceMarkers& markers() const { return markers_; }
   double spacing_mm() const { return spacing_mm_; }
   /// The marker next to a place of the gel.

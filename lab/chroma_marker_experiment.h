@@ -34,7 +34,7 @@ struct MarkerSeries {
 /// Steps over one marker: the ball of the text, 4 mm.
 struct MarkerTest {
   Eigen::Vector2d place_mm = {1.5, 1.5};  ///< of the marker's middle
-  double friction = 0.5;
+  double friction = 1.0;                  ///< not given; soft silicone holds plastic well: usual figures are about 1
 };
 
 /// Fig. 8: from touch to `deepest_mm`.

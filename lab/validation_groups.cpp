@@ -7,6 +7,8 @@ std::vector<ValidationRow> validate_mechanics(const ValidateOptions& options);
 std::vector<ValidationRow> validate_vibration(const ValidateOptions& options);
 std::vector<ValidationRow> validate_light(const ValidateOptions& options);
 std::vector<ValidationRow> validate_vhs(const ValidateOptions& options);
+std::vector<ValidationRow> validate_chroma_marker(const ValidateOptions& options);
+std::vector<ValidationRow> validate_chroma_field(const ValidateOptions& options);
 std::vector<ValidationRow> validate_gelsight_light(const ValidateOptions& options);
 std::vector<ValidationRow> validate_gelsight_height(const ValidateOptions& options);
 std::vector<ValidationRow> validate_gelsight_dome(const ValidateOptions& options);
@@ -21,6 +23,8 @@ const std::vector<ValidationGroup>& validation_groups() {
       {"vibration", validate_vibration},
       {"light", validate_light},
       {"vhs", validate_vhs},
+      {"chroma.marker", validate_chroma_marker},
+      {"chroma.field", validate_chroma_field},
       {"gelsight.light", validate_gelsight_light},
       {"gelsight.height", validate_gelsight_height},
       {"gelsight.dome", validate_gelsight_dome},

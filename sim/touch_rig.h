@@ -22,6 +22,8 @@ struct TouchRigSettings {
   double widest_mm = 0.5;     ///< how far it will be sheared
   double membrane_um = 40.0;  ///< pixels of the fine contact (MembraneSpec::pixel_um)
   double interreflection_tolerance = 0.05;
+  bool always_friction = false;  ///< also in straight presses, where the plan leaves it out: it holds the surface
+                                 ///< together under an object, which else stretches
   int edge_side = 4;  ///< rays along a side of pixels that differ from those beside them (render::DirectSettings): on a
                       ///< rough object these are all pixels
 };
