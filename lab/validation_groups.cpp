@@ -16,6 +16,7 @@ std::vector<ValidationRow> validate_gelsight_map(const ValidateOptions& options)
 std::vector<ValidationRow> validate_gelsight_slip(const ValidateOptions& options);
 std::vector<ValidationRow> validate_gelsight_grasp(const ValidateOptions& options);
 std::vector<ValidationRow> validate_gelsight_texture(const ValidateOptions& options);
+std::vector<ValidationRow> validate_chroma_light(const ValidateOptions& options);
 
 const std::vector<ValidationGroup>& validation_groups() {
   static const std::vector<ValidationGroup> groups = {
@@ -32,6 +33,7 @@ const std::vector<ValidationGroup>& validation_groups() {
       {"gelsight.force", validate_gelsight_slip},
       {"gelsight.grasp", validate_gelsight_grasp},
       {"gelsight.texture", validate_gelsight_texture},
+      {"chroma.light", validate_chroma_light},
   };
   return groups;
 }

@@ -13,6 +13,7 @@ namespace {
 
 using Four = Eigen::Array4f;
 
+constexpr float kOnFace = 1e-3f;  // mm: films may lie on the face where camera rays enter the layer
 constexpr auto kPerPi = static_cast<float>(1.0 / kPi);
 
 Eigen::Map<const Four> four(const float* from) {
@@ -124,9 +125,8 @@ void DirectBatch::look(std::span<const RayPacket> rays, DirectCounts& counts) {
       one.spread[1] = (static_cast<float>(reversed) + 0.5f) / kPacket - 0.5f;
       if (packet.valid[k] == 0) continue;
       ++counts.primary;
-      // Films lie at the layer's near face, where the camera's rays enter it.
-      one.film = fixture_.films.empty() ? 0.0f : fixture_.films.camera_cover(packet.origin[0][k], packet.origin[1][k]);
       one.object = hits.object[k];
+      one.film = film_before(packet, k, one.object < 0 ? packet.far[k] : hits.distance[k]);
       if (one.object < 0) continue;
       one.material = &frame_.materials[one.object];
       one.colour = one.material->colour.data();
@@ -158,6 +158,16 @@ void DirectBatch::look(std::span<const RayPacket> rays, DirectCounts& counts) {
       if (is_lit(one.material->kind)) light_lane(lane, counts);
     }
   }
+}
+
+/// The share of a camera ray that meets film on the way of the given length.
+float DirectBatch::film_before(const RayPacket& packet, int slot, float distance) const {
+  const FilmScreen& films = fixture_.films;
+  if (films.empty()) return 0.0f;
+  const float way = (films.z() - packet.origin[2][slot]) / packet.direction[2][slot];
+  if (!(way >= -kOnFace && way < distance)) return 0.0f;
+  return films.camera_cover(packet.origin[0][slot] + way * packet.direction[0][slot],
+                            packet.origin[1][slot] + way * packet.direction[1][slot]);
 }
 
 void DirectBatch::light_lane(int lane, DirectCounts& counts) {
@@ -361,24 +371,24 @@ void DirectBatch::trace_shadows(int lamp, const int* lanes, int count, DirectCou
 void DirectBatch::add(int lane, const float* through, const float* ambient, float* out) const {
   if (packet_of(lane).valid[lane % kPacket] == 0) return;
   const Lane& one = lanes_[lane];
-  if (one.material == nullptr) {
-    for (int band = 0; band < bands_; ++band) {
-      out[band] += through[band] * static_cast<float>(field_.fixture.environment[band]);
-    }
-    return;
-  }
-  if (one.material->kind == DirectKind::kBlack) return;
+  if (one.material != nullptr && one.material->kind == DirectKind::kBlack) return;
   float dimmed[kMaxBands];
-  for (int band = 0; band < bands_; ++band) {
-    dimmed[band] = through[band];
-    if (fixture_.absorbs) dimmed[band] *= std::exp(-fixture_.absorption[band] * one.distance);
-  }
+  std::copy_n(through, bands_, dimmed);
   if (one.film > 0.0f) {
     FilmScreen::Light one_ray;
     fixture_.films.add(1.0f, one.film, std::abs(packet_of(lane).direction[2][lane % kPacket]), one_ray);
     float left[kMaxBands];
     fixture_.films.pass(one_ray, left);
     for (int band = 0; band < bands_; ++band) dimmed[band] *= left[band];
+  }
+  if (one.material == nullptr) {
+    for (int band = 0; band < bands_; ++band) {
+      out[band] += dimmed[band] * static_cast<float>(field_.fixture.environment[band]);
+    }
+    return;
+  }
+  if (fixture_.absorbs) {
+    for (int band = 0; band < bands_; ++band) dimmed[band] *= std::exp(-fixture_.absorption[band] * one.distance);
   }
   if (one.material->kind == DirectKind::kLuminous) {
     for (int band = 0; band < bands_; ++band) out[band] += dimmed[band] * one.material->colour[band];
@@ -425,7 +435,9 @@ void DirectBatch::reflect_through_films(int lane, float* sum) const {
       if (amount[lamp] == 0.0f || fixture_.colour_of[lamp] != static_cast<int>(colour)) continue;
       const Eigen::Vector3f flow = flow_of(lane, lamp);
       const float way = height / -flow.z();
-      if (fixture_.lamp_in_layer[lamp] || !(way > 0.0f)) {
+      const bool before_films = fixture_.lamp_in_layer[lamp] &&
+                                (lamp_position(field_.lamp(lamp)).z() - double(films.z())) * double(-height) > 0.0;
+      if (before_films || !(way > 0.0f)) {
         light.plain += amount[lamp];
         continue;
       }

@@ -128,6 +128,7 @@ class DirectBatch {
   Eigen::Vector3f flow_of(int lane, int lamp) const;
   Eigen::Vector3f towards(int lane, int lamp) const;
   void set_flow(int lane, int lamp, const Eigen::Vector3f& flow);
+  float film_before(const RayPacket& packet, int slot, float distance) const;
   void light_lane(int lane, DirectCounts& counts);
   void reflect_through_films(int lane, float* sum) const;
   bool shadow_ray(int lane, int lamp, int slot);

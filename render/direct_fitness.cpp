@@ -38,6 +38,12 @@ bool is_lit(const Material& material) {
 /// Single precision, and a vertex that was laid onto a face.
 constexpr double kSlack = 1e-4;  // mm
 
+bool in_layer(const LightField& field, double z) {
+  const std::vector<FlatFace>& faces = field.fixture.faces;
+  return (field.layer == 0 || z >= faces[field.layer - 1].z) &&
+         (field.layer == static_cast<int>(faces.size()) || z <= faces[field.layer].z);
+}
+
 std::string out_of_place(const LightField& field, const Eigen::AlignedBox3d& box, const Material& material,
                          const std::string& what) {
   if (box.isEmpty()) return {};
@@ -72,6 +78,11 @@ std::string unfit_for_direct(const LightField& field, const Scene& scene, bool b
   }
   if (std::string fault = unfit_for_screen(scene); !fault.empty()) return fault;
   const bool has_films = std::ranges::any_of(scene.surfaces, is_film);
+  if (has_films) {
+    const Surface& film = *std::ranges::find_if(scene.surfaces, is_film);
+    if (!in_layer(field, film.mesh.vertices.front().z())) return "films lie outside of the light field's layer";
+    if (std::get<ThinFilm>(film.material).index < field.index) return "films mirror, as their index is the lower one";
+  }
   if (has_films && !field.pass.empty()) return "a medium before films absorbs";
   if (has_films && !scene.balls.empty()) return "balls stand behind films";
   for (std::size_t i = 0; i < scene.surfaces.size(); ++i) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <opencv2/core.hpp>
 #include <optional>
@@ -51,7 +52,7 @@ struct DirectRenderer::Parts {
   ReadyCamera camera;
   DirectSettings settings;
   PacketScene tree;
-  std::vector<TriangleMesh> films;
+  std::vector<Surface> films;
   bool connected;        // the first surface
   bool spreads;          // central rays, then the footprint
   bool refines = false;  // more rays at edges
@@ -145,23 +146,26 @@ struct DirectRenderer::Parts {
   /// the membrane so flat that it comes from about as far aside as films are below.
   void set_up_films(const Scene& rest) {
     for (const Surface& surface : rest.surfaces) {
-      if (is_film(surface)) films.push_back(surface.mesh);
+      if (is_film(surface)) films.push_back(surface);
     }
     if (films.empty()) return;
     const LightField& field = fixture.field;
+    const double z = films.front().mesh.vertices.front().z();
     double radius = 0.0;
     if (spreads) {
-      const auto at = [&](double u, double v) {
-        return ray_in_layer(field.fixture, camera, field.layer, 0.5 * width(), 0.5 * height(), u, v);
+      const auto at = [&](double u, double v) -> std::optional<Eigen::Vector2d> {
+        const auto ray = ray_in_layer(field.fixture, camera, field.layer, 0.5 * width(), 0.5 * height(), u, v);
+        if (!ray) return std::nullopt;
+        return (ray->origin + (z - ray->origin.z()) / ray->direction.z() * ray->direction).head<2>();
       };
       const auto middle = at(0.5, 0.5);
       constexpr double kRim = 1.0 - 1e-6;
       for (const auto& [u, v] : {std::pair{0.0, 0.5}, {kRim, 0.5}, {0.5, 0.0}, {0.5, kRim}}) {
         const auto rim = at(u, v);
-        if (middle && rim) radius = std::max(radius, (rim->origin - middle->origin).head<2>().norm());
+        if (middle && rim) radius = std::max(radius, (*rim - *middle).norm());
       }
     }
-    const double height = field.reach.center().z() - films.front().vertices.front().z();
+    const double height = field.reach.center().z() - z;
     fixture.films = FilmScreen(rest, field.index, radius, kLampSpread * std::abs(height));
   }
 
@@ -362,18 +366,23 @@ void DirectRenderer::Parts::put_edge_rays(int point, RayPacket& packet, int firs
   const Eigen::Matrix<float, 3, 2> across = slope(0, 1);
   const Eigen::Matrix<float, 3, 2> down = slope(1, 0);
   const int side = settings.edge_side;
-  // Moved from pixel to pixel, so that along an edge that runs with the rows or columns the rays don't all lie on the
-  // same side of it: x by the row and y by the column, in steps of the golden section.
+  // A grid whose rows are set off against each other, and its columns, so that no two points share an x or a y (Chiu,
+  // Shirley and Wang 1994, "Multi-jittered sampling", without the jitter): an edge that runs with the pixels has as
+  // many places between them to be found at as there are points. Moved from pixel to pixel by less than that, in steps
+  // of the golden section, so that along such an edge the mean is right too.
   constexpr double kGolden = 0.6180339887498949;
   const auto moved = [](int by) {
     const double turns = kGolden * (by + 0.5);
     return static_cast<float>(turns - std::floor(turns));
   };
-  const float x_in_cell = moved(row);
-  const float y_in_cell = moved(column);
+  const float x_moved = moved(row);
+  const float y_moved = moved(column);
+  const auto sides = static_cast<float>(side);
   for (int k = 0; k < side * side; ++k) {
-    const float x = (static_cast<float>(k % side) + x_in_cell) / static_cast<float>(side) - 0.5f;
-    const float y = (static_cast<float>(k / side) + y_in_cell) / static_cast<float>(side) - 0.5f;
+    const auto i = static_cast<float>(k % side);
+    const auto j = static_cast<float>(k / side);
+    const float x = (i + (j + x_moved) / sides) / sides - 0.5f;
+    const float y = (j + (i + y_moved) / sides) / sides - 0.5f;
     const Eigen::Vector3f origin = here.origin + x * across.col(0) + y * down.col(0);
     const Eigen::Vector3f direction = (here.direction + x * across.col(1) + y * down.col(1)).normalized();
     const int lane = first_lane + k;
@@ -496,12 +505,10 @@ DirectImage DirectRenderer::render(const Scene& scene) {
   check_scene(scene);
   const std::string fault = unfit_for_direct(field, scene, !parts.bounced.empty());
   if (!fault.empty()) fail("direct renderer: {}", fault);
-  std::size_t film = 0;
-  for (const Surface& surface : scene.surfaces) {
-    if (!is_film(surface)) continue;
-    if (film == parts.films.size() || surface.mesh.vertices != parts.films[film++].vertices) {
-      fail("direct renderer: the scene's films aren't those that it was made for");
-    }
+  std::vector<Surface> films;
+  std::ranges::copy_if(scene.surfaces, std::back_inserter(films), is_film);
+  if (!std::ranges::equal(films, parts.films, same_film)) {
+    fail("direct renderer: the scene's films aren't those that it was made for");
   }
   std::optional<PacketScene> other;
   if (!parts.tree.move_to(scene)) other.emplace(scene);

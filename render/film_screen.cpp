@@ -12,9 +12,9 @@ namespace {
 
 constexpr double kLevel_mm = 1e-4;    // out of one plane
 constexpr double kFine_mm = 0.02;     // cells of the map that the camera asks
-constexpr int kDrawn = 4;             // times finer in each direction are the cells that the films are drawn in
 constexpr double kSigmasPerCell = 8;  // of the map that the lamps ask
-constexpr int kMostCells = 4000;      // a side, drawn ones
+constexpr int kMostCells = 3000;      // a side
+constexpr int kLines = 16;            // a cell: along each of them what films cover is exact
 
 const Surface* first_film(const Scene& scene) {
   const auto found = std::find_if(scene.surfaces.begin(), scene.surfaces.end(), is_film);
@@ -28,6 +28,30 @@ Eigen::AlignedBox2d outline_of(const Scene& scene) {
     for (const Eigen::Vector3d& vertex : surface.mesh.vertices) box.extend(vertex.head<2>());
   }
   return box;
+}
+
+/// Adds to each cell the part of it that a triangle covers; corners in cells.
+void add_triangle(const std::array<Eigen::Vector2d, 3>& corners, cv::Mat& share) {
+  const auto [low, high] = std::minmax({corners[0].y(), corners[1].y(), corners[2].y()});
+  const int first = static_cast<int>(std::ceil(low * kLines - 0.5));
+  const int last = static_cast<int>(std::ceil(high * kLines - 0.5)) - 1;
+  for (int line = std::max(first, 0); line <= std::min(last, share.rows * kLines - 1); ++line) {
+    const double y = (line + 0.5) / kLines;
+    double from = share.cols;
+    double to = 0.0;
+    for (int k = 0; k < 3; ++k) {
+      const Eigen::Vector2d& a = corners[k];
+      const Eigen::Vector2d& b = corners[(k + 1) % 3];
+      if ((a.y() <= y) == (b.y() <= y)) continue;
+      const double x = a.x() + (y - a.y()) / (b.y() - a.y()) * (b.x() - a.x());
+      from = std::min(from, x);
+      to = std::max(to, x);
+    }
+    auto* cells = share.ptr<float>(line / kLines);
+    for (int i = std::max(0, static_cast<int>(from)); i < std::min(to, double(share.cols)); ++i) {
+      cells[i] += static_cast<float>((std::min(to, i + 1.0) - std::max(from, double(i))) / kLines);
+    }
+  }
 }
 
 cv::Mat disc(double radius_cells) {
@@ -44,6 +68,14 @@ cv::Mat disc(double radius_cells) {
 }
 
 }  // namespace
+
+bool same_film(const Surface& one, const Surface& other) {
+  if (!is_film(one) || !is_film(other)) return false;
+  const auto& a = std::get<ThinFilm>(one.material);
+  const auto& b = std::get<ThinFilm>(other.material);
+  return a.index == b.index && a.fresnel == b.fresnel && (a.transmittance == b.transmittance).all() &&
+         one.mesh.vertices == other.mesh.vertices && one.mesh.triangles == other.mesh.triangles;
+}
 
 std::string unfit_for_screen(const Scene& scene) {
   const Surface* first = first_film(scene);
@@ -72,51 +104,16 @@ FilmScreen::FilmScreen(const Scene& scene, double medium_index, double camera_ra
   bands_ = static_cast<int>(film.transmittance.size());
   z_ = static_cast<float>(first->mesh.vertices.front().z());
 
-  // Drawn finely, then averaged: a cell's number is the part of it that is film.
-  const double margin = camera_radius_mm + 3.0 * lamp_sigma_mm + 2 * kFine_mm;
-  Eigen::AlignedBox2d box = outline_of(scene);
-  box.min().array() -= margin;
-  box.max().array() += margin;
-  const double cell = std::max(kFine_mm, box.sizes().maxCoeff() * kDrawn / kMostCells);
-  const cv::Size size(static_cast<int>(box.sizes().x() / cell) + 1, static_cast<int>(box.sizes().y() / cell) + 1);
-  cv::Mat drawn = cv::Mat::zeros(size * kDrawn, CV_8U);
-  constexpr int kShift = 8;  // fixed-point digits of OpenCV's corners, which count from the middle of a cell
-  for (const Surface& surface : scene.surfaces) {
-    if (!is_film(surface)) continue;
-    for (const auto& triangle : surface.mesh.triangles) {
-      std::array<cv::Point, 3> corners;
-      for (int k = 0; k < 3; ++k) {
-        const Eigen::Vector2d at =
-            (surface.mesh.vertices[triangle[k]].head<2>() - box.min()) * (kDrawn / cell) - Eigen::Vector2d(0.5, 0.5);
-        corners[k] = {static_cast<int>(std::lround(at.x() * (1 << kShift))),
-                      static_cast<int>(std::lround(at.y() * (1 << kShift)))};
-      }
-      cv::fillConvexPoly(drawn, corners.data(), 3, cv::Scalar(255), cv::LINE_8, kShift);
-    }
-  }
-  cv::Mat share;
-  cv::resize(drawn, share, size, 0, 0, cv::INTER_AREA);
-  share.convertTo(share, CV_32F, 1.0 / 255.0);
-
-  camera_.left = lamps_.left = static_cast<float>(box.min().x());
-  camera_.low = lamps_.low = static_cast<float>(box.min().y());
-  camera_.per_mm = static_cast<float>(1.0 / cell);
-  const double radius_cells = camera_radius_mm / cell;
+  camera_ = draw(scene, kFine_mm, camera_radius_mm);
+  const double radius_cells = camera_radius_mm * camera_.per_mm;
   if (radius_cells > 0.5) {
-    cv::filter2D(share, camera_.share, -1, disc(radius_cells), {-1, -1}, 0, cv::BORDER_CONSTANT);
-  } else {
-    camera_.share = share;
+    cv::filter2D(camera_.share, camera_.share, -1, disc(radius_cells), {-1, -1}, 0, cv::BORDER_CONSTANT);
   }
-  const int coarser = std::max(1, static_cast<int>(lamp_sigma_mm / kSigmasPerCell / cell));
-  cv::Mat coarse;
-  const cv::Size fewer(std::max(1, size.width / coarser), std::max(1, size.height / coarser));
-  cv::resize(
-      share(cv::Rect(0, 0, std::min(size.width, fewer.width * coarser), std::min(size.height, fewer.height * coarser))),
-      coarse, fewer, 0, 0, cv::INTER_AREA);
-  const double sigma = lamp_sigma_mm / (cell * coarser);
-  if (sigma > 0.1) cv::GaussianBlur(coarse, coarse, {}, sigma, sigma, cv::BORDER_CONSTANT);
-  lamps_.share = coarse;
-  lamps_.per_mm = static_cast<float>(1.0 / (cell * coarser));
+  lamps_ = draw(scene, std::max(kFine_mm, lamp_sigma_mm / kSigmasPerCell), 3.0 * lamp_sigma_mm);
+  const double sigma_cells = lamp_sigma_mm * lamps_.per_mm;
+  if (sigma_cells > 0.1) {
+    cv::GaussianBlur(lamps_.share, lamps_.share, {}, sigma_cells, sigma_cells, cv::BORDER_CONSTANT);
+  }
 
   left_by_cosine_.resize(kCosines + 1);
   const double eta = medium_index / film.index;
@@ -128,6 +125,31 @@ FilmScreen::FilmScreen(const Scene& scene, double medium_index, double camera_ra
           inside2 > 0.0 ? static_cast<float>(std::pow(film.transmittance[band], 1.0 / std::sqrt(inside2))) : 0.0f;
     }
   }
+}
+
+FilmScreen::Map FilmScreen::draw(const Scene& scene, double cell_mm, double margin_mm) {
+  Eigen::AlignedBox2d box = outline_of(scene);
+  const double cell = std::max(cell_mm, (box.sizes().maxCoeff() + 2.0 * margin_mm) / kMostCells);
+  box.min().array() -= margin_mm + 2.0 * cell;
+  box.max().array() += margin_mm + 2.0 * cell;
+  Map map;
+  map.left = static_cast<float>(box.min().x());
+  map.low = static_cast<float>(box.min().y());
+  map.per_mm = static_cast<float>(1.0 / cell);
+  map.share = cv::Mat::zeros(static_cast<int>(std::ceil(box.sizes().y() / cell)),
+                             static_cast<int>(std::ceil(box.sizes().x() / cell)), CV_32F);
+  for (const Surface& surface : scene.surfaces) {
+    if (!is_film(surface)) continue;
+    for (const auto& triangle : surface.mesh.triangles) {
+      std::array<Eigen::Vector2d, 3> corners;
+      for (int k = 0; k < 3; ++k) {
+        corners[k] = (surface.mesh.vertices[triangle[k]].head<2>() - box.min()) / cell;
+      }
+      add_triangle(corners, map.share);
+    }
+  }
+  map.share = cv::min(map.share, 1.0f);
+  return map;
 }
 
 float FilmScreen::cover(const Map& map, float x, float y) {

@@ -16,8 +16,11 @@ inline bool is_film(const Surface& surface) {
   return std::holds_alternative<ThinFilm>(surface.material);
 }
 
+/// Are two surfaces films of one shape, place and kind?
+bool same_film(const Surface& one, const Surface& other);
+
 /// Why a scene's films can't be taken for a screen; empty if they can, or if there are none: all of them must lie in
-/// one level plane, have one dye and index, and no faces that mirror.
+/// one level plane, have one dye and index, and no faces that mirror. They are taken not to overlap.
 std::string unfit_for_screen(const Scene& scene);
 
 /// Which part of what passes a place of the films' plane meets film, and what film leaves of it.
@@ -54,6 +57,7 @@ class FilmScreen {
     cv::Mat share;  ///< CV_32FC1, 0 to 1; 0 beyond
     float left = 0.0f, low = 0.0f, per_mm = 0.0f;
   };
+  static Map draw(const Scene& scene, double cell_mm, double margin_mm);
   static float cover(const Map& map, float x, float y);
 
   int bands_ = 0;

@@ -112,7 +112,9 @@ bool PacketScene::move_to(const Scene& scene) {
   if (scene.surfaces.size() != state.meshes.size() || scene.balls.size() != state.ball_count) return false;
   for (std::size_t i = 0; i < state.meshes.size(); ++i) {
     const TriangleMesh& mesh = scene.surfaces[i].mesh;
-    if (mesh.vertices.size() != state.meshes[i].vertex_count || mesh.triangles != state.meshes[i].triangles) {
+    const bool left_out = mesh.triangles.empty() || is_film(scene.surfaces[i]);
+    if (mesh.vertices.size() != state.meshes[i].vertex_count || mesh.triangles != state.meshes[i].triangles ||
+        left_out != (state.meshes[i].geometry == nullptr)) {
       return false;
     }
   }

@@ -322,6 +322,42 @@ TEST(DirectRenderer, MoreRaysAtEdgesGiveThePixelsArea) {
   EXPECT_LT(error(picture(1, 2)), 0.6 * error(one));
 }
 
+// A sheet's edge that runs with the rows, or the columns, at ten places between two pixels: what is covered is found
+// over all of it, and in each row to one ray.
+TEST(DirectRenderer, AnEdgeThatRunsWithThePixelsIsWhereItIs) {
+  const Scene whole = plane_scene({2, 1, -15});
+  const LightField field =
+      make_light_field(whole, {Eigen::Vector3d(-9, -9, -0.2), Eigen::Vector3d(9, 9, 0.2)}, accuracy(5e-3));
+  PinholeCamera camera = small_camera(64, 64);
+  camera.pixel_pitch_um *= 0.5;
+  camera.hole_diameter_um = 1e-3;
+  camera.foil_thickness_um = 0.0;
+  const double mm_per_px = camera.pixel_pitch_um * 1e-3 * 27.0 / camera.distance_mm;
+  for (const int side : {2, 4}) {
+    DirectSettings settings;
+    settings.edge_side = side;
+    const cv::Mat full = DirectRenderer(field, camera, whole, settings).render(whole).irradiance;
+    for (int step = 0; step < 10; ++step) {
+      const double edge_px = 20.0 + step / 10.0 + 0.03;  // from the picture's middle
+      for (const int axis : {0, 1}) {
+        Scene scene = whole;
+        for (Eigen::Vector3d& vertex : scene.surfaces[0].mesh.vertices) {
+          vertex[axis] = std::clamp(vertex[axis], -edge_px * mm_per_px, edge_px * mm_per_px);
+        }
+        cv::Mat covered = DirectRenderer(field, camera, scene, settings).render(scene).irradiance / full;
+        if (axis == 1) covered = covered.t();
+        double sum = 0.0;
+        for (int row = 8; row < 56; ++row) {
+          const double found = cv::sum(covered.row(row).colRange(8, 56))[0];
+          EXPECT_NEAR(found, 2.0 * edge_px, 2.0 / (side * side) + 2e-3) << side << " " << step << " " << row;
+          sum += found / 48.0;
+        }
+        EXPECT_NEAR(sum, 2.0 * edge_px, 0.012) << side << " " << step;
+      }
+    }
+  }
+}
+
 TEST(DirectRenderer, BandsAreIndependent) {
   Scene scene = dented_scene(0.0, Lambertian{grey(0.7)});
   scene.media[2].absorption = grey(0.1);
