@@ -70,7 +70,7 @@ class ForceTable {
     csv += fmt::format("{},{},{}", file, measured, extrapolated);
     if (measured < sensors::TractionInversion::kLeastMarkers) {
       observer_.restart();
-      csv += fmt::format("{},too few markers,,,,\n", std::string(14, ','));
+      csv += fmt::format("{},too few markers,,,,\n", std::string(13, ','));
       return false;
     }
     const sensors::TractionField tractions = inversion_.invert(field.field);

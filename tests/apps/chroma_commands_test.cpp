@@ -32,7 +32,6 @@ constexpr int kSide = 5;  // markers
 ColourPicture resting() {
   ColourPicture picture = sensors::test::small_colour_picture(16.0);
   picture.columns = picture.rows = kSide;
-  picture.samples = 4;
   return picture;
 }
 
@@ -58,6 +57,33 @@ std::vector<std::vector<std::string>> table_of(const fs::path& csv) {
   return table;
 }
 
+/// The frames of calibration: the same press and shear of all markers, of which three are in the table.
+struct Calibration {
+  struct Frame {
+    std::string name;
+    cv::Mat picture;
+  };
+  std::vector<Frame> frames;
+  std::string lines;
+};
+const Calibration& calibration() {
+  static const Calibration painted = [] {
+    Calibration made;
+    int number = 0;
+    for (const double press : {0.4, 0.8, 1.2, 1.6}) {
+      for (const double x : {0.0, 0.3, 0.6}) {
+        made.frames.push_back({fmt::format("{}.png", number), paint(all_by({x, 0.0, -press}))});
+        for (const int marker : {1, 2, 3}) {
+          made.lines += fmt::format("{}.png,{},2,{},0,{},{}\n", number, marker, x, -press, number / 3);
+        }
+        ++number;
+      }
+    }
+    return made;
+  }();
+  return painted;
+}
+
 class ChromaCommands : public ::testing::Test {
  protected:
   ChromaCommands() {
@@ -67,16 +93,8 @@ class ChromaCommands : public ::testing::Test {
     sim::write_png(folder_.path() / "cal/grey.png", cv::Mat(168, 192, CV_8UC1, cv::Scalar(90)));
     sim::write_png(folder_.path() / "cal/small.png", cv::Mat(100, 120, CV_8UC3, cv::Scalar(90, 90, 200)));
     sim::write_png(folder_.path() / "cal/white.png", cv::Mat(168, 192, CV_8UC3, cv::Scalar::all(255)));
-    int number = 0;
-    for (const double press : {0.4, 0.8, 1.2, 1.6}) {
-      for (const double x : {0.0, 0.3, 0.6}) {
-        const std::string name = fmt::format("{}.png", number);
-        sim::write_png(folder_.path() / "cal" / name, paint(all_by({x, 0.0, -press})));
-        for (const int marker : {1, 2, 3}) {
-          lines_ += fmt::format("{},{},2,{},0,{},{}\n", name, marker, x, -press, number / 3);
-        }
-        ++number;
-      }
+    for (const Calibration::Frame& frame : calibration().frames) {
+      sim::write_png(folder_.path() / "cal" / frame.name, frame.picture);
     }
   }
 
@@ -104,7 +122,7 @@ class ChromaCommands : public ::testing::Test {
   }
 
   test::TemporaryFolder folder_;
-  std::string lines_;
+  const std::string& lines_ = calibration().lines;
 };
 
 TEST_F(ChromaCommands, RecordedFramesGiveDisplacements) {
