@@ -31,8 +31,10 @@ void add_study_command(CLI::App& app, const GlobalOptions& global, Action& actio
 void require_writable_place(const std::filesystem::path& file);
 
 // What calibrate and estimate do differs from sensor to sensor: each sensor's form is a command below them.
+void add_chroma_calibration(CLI::App& calibrations, const GlobalOptions& global, Action& action);
 void add_vhs_calibration(CLI::App& calibrations, const GlobalOptions& global, Action& action);
 void add_gelsight_calibration(CLI::App& calibrations, const GlobalOptions& global, Action& action);
+void add_chroma_estimation(CLI::App& estimations, const GlobalOptions& global, Action& action);
 void add_vhs_estimation(CLI::App& estimations, const GlobalOptions& global, Action& action);
 void add_gelsight_estimation(CLI::App& estimations, const GlobalOptions& global, Action& action);
 

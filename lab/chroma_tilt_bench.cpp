@@ -91,7 +91,7 @@ Sheet make_sheet(const TiltBench& bench, TiltMarker marker, const TiltPose& pose
 }
 
 TriangleMesh square_film(const TiltBench& bench) {
-  const double h = 0.5 * bench.side_mm;
+  const double h = 0.5 * bench.film_mm;
   const double z = -bench.gel_mm + kFilmInGel_mm;
   TriangleMesh mesh;
   for (const Eigen::Vector2d& corner : {Eigen::Vector2d(-h, -h), {h, -h}, {h, h}, {-h, h}}) {

@@ -17,6 +17,7 @@ std::vector<ValidationRow> validate_gelsight_slip(const ValidateOptions& options
 std::vector<ValidationRow> validate_gelsight_grasp(const ValidateOptions& options);
 std::vector<ValidationRow> validate_gelsight_texture(const ValidateOptions& options);
 std::vector<ValidationRow> validate_chroma_light(const ValidateOptions& options);
+std::vector<ValidationRow> validate_chroma_robustness(const ValidateOptions& options);
 
 const std::vector<ValidationGroup>& validation_groups() {
   static const std::vector<ValidationGroup> groups = {
@@ -34,6 +35,7 @@ const std::vector<ValidationGroup>& validation_groups() {
       {"gelsight.grasp", validate_gelsight_grasp},
       {"gelsight.texture", validate_gelsight_texture},
       {"chroma.light", validate_chroma_light},
+      {"chroma.robustness", validate_chroma_robustness},
   };
   return groups;
 }

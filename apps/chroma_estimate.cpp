@@ -1,0 +1,70 @@
+#include <fmt/format.h>
+
+#include <memory>
+#include <optional>
+
+#include "apps/chroma_grid.h"
+#include "apps/command.h"
+#include "apps/progress_bar.h"
+#include "lab/chroma_fields.h"
+#include "lab/frame_sequence.h"
+#include "sensors/hue_model_file.h"
+#include "sensors/marker_compliance_file.h"
+
+namespace touchstone::apps {
+namespace {
+
+struct EstimateOptions {
+  std::filesystem::path model;
+  std::filesystem::path rest;
+  std::filesystem::path frames;
+  std::filesystem::path compliance;
+  std::filesystem::path out;
+  std::string grid = "10x10";
+  sensors::TractionSettings inversion;
+};
+
+void estimate(const EstimateOptions& options, const GlobalOptions& global) {
+  const sensors::HueModel model = sensors::load_hue_model(options.model);
+  const Eigen::Vector2i grid = grid_of(options.grid);
+  std::optional<lab::FieldForces> forces;
+  if (!options.compliance.empty()) {
+    forces = lab::FieldForces{sensors::load_marker_compliance(options.compliance), options.inversion};
+  }
+  ProgressBar bar(global.quiet);
+  const lab::FieldSummary summary = lab::write_chroma_fields(
+      model, grid, options.rest, lab::picture_files(options.frames), forces, options.out, bar.listener());
+  fmt::print("{}: displacements.csv{} of {} frames\n", options.out.string(), forces ? " and forces.csv" : "",
+             summary.frames);
+  fmt::print("  {} of {} markers measured, {} of them beyond what calibration saw\n", summary.measured, summary.markers,
+             summary.extrapolated);
+  if (summary.without_force > 0) {
+    fmt::print("  {} frames with too few measured markers for a force\n", summary.without_force);
+  }
+}
+
+}  // namespace
+
+void add_chroma_estimation(CLI::App& estimations, const GlobalOptions& global, Action& action) {
+  CLI::App* command = estimations.add_subcommand("chroma", "Displacements of its markers, and forces, from its frames");
+  auto options = std::make_shared<EstimateOptions>();
+  command->add_option("--model", options->model, "The model that `touchstone calibrate chroma` made")->required();
+  command->add_option("--rest", options->rest, "The picture of the unloaded sensor as it is mounted now")->required();
+  command->add_option("--frames", options->frames, "A folder of frames (.png, .jpg), in the order of their names")
+      ->required();
+  add_grid_option(*command, options->grid);
+  command->add_option("--compliance", options->compliance,
+                      "The gel's, by `touchstone export compliance`: forces and friction, too");
+  command
+      ->add_option("--lateral-noise-mm", options->inversion.lateral_noise_mm,
+                   "Error of a marker's displacement along x and y, for the forces")
+      ->check(CLI::Range(1e-5, 1.0))
+      ->capture_default_str();
+  command->add_option("--normal-noise-mm", options->inversion.normal_noise_mm, "Likewise along z")
+      ->check(CLI::Range(1e-5, 1.0))
+      ->capture_default_str();
+  command->add_option("-o,--out", options->out, "The folder of displacements.csv and forces.csv")->required();
+  command->callback([&action, options, &global] { action = [options, &global] { estimate(*options, global); }; });
+}
+
+}  // namespace touchstone::apps

@@ -1,0 +1,148 @@
+#include "lab/chroma_fields.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+
+#include "core/error.h"
+#include "core/whole_file.h"
+#include "sensors/friction_state.h"
+#include "sim/image_file.h"
+
+namespace touchstone::lab {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kSpacingTolerance = 0.02;
+
+/// Runs `act` on a picture; what is wrong then names the picture.
+template <typename Act>
+void on_picture(const fs::path& file, const Act& act) {
+  try {
+    act(sim::read_image(file));
+  } catch (const Error& error) {
+    const std::string message = error.what();
+    if (message.find(file.string()) != std::string::npos) throw;
+    fail("{}: {}", file.string(), message);
+  }
+}
+
+void check(const sensors::MarkerCompliance& compliance, const sensors::HueModel& model, const Eigen::Vector2i& grid) {
+  if (compliance.marker_grid != grid) {
+    fail("the compliance is of a grid of {} x {} markers, the pictures are of {} x {}", compliance.marker_grid.x(),
+         compliance.marker_grid.y(), grid.x(), grid.y());
+  }
+  const double spacing = (compliance.marker_rest[1] - compliance.marker_rest[0]).norm();
+  if (std::abs(spacing - model.spacing_mm) > kSpacingTolerance * model.spacing_mm) {
+    fail("the compliance's markers are {:.3f} mm apart, the model's {:.3f} mm", spacing, model.spacing_mm);
+  }
+}
+
+/// A line for each marker; cells of what isn't measured are empty.
+void add_displacements(const std::string& file, const sensors::ColourMarkerReading& reading,
+                       const sensors::HueField& field, std::string& csv) {
+  for (std::size_t i = 0; i < reading.markers.size(); ++i) {
+    if (field.field.measured[i]) {
+      const Eigen::Vector3d& d = field.field.displacement[i];
+      csv += fmt::format("{},{},{:.5f},{:.5f},{:.5f},1,{},none\n", file, i, d.x(), d.y(), d.z(), field.extrapolated[i]);
+    } else {
+      const sensors::MarkerFlaw flaw = reading.markers[i].flaw;
+      csv += fmt::format("{},{},,,,0,0,{}\n", file, i,
+                         flaw == sensors::MarkerFlaw::kNone ? "undetermined" : sensors::name_of(flaw));
+    }
+  }
+}
+
+/// Fields in the order of time to lines of forces.csv.
+class ForceTable {
+ public:
+  explicit ForceTable(const FieldForces& forces)
+      : inversion_(forces.compliance, forces.settings),
+        observer_({.lateral_noise_mm = forces.settings.lateral_noise_mm}) {}
+
+  /// False if too few markers are measured for a force: its cells are empty then.
+  bool add(const std::string& file, const sensors::HueField& field, std::string& csv) {
+    const auto measured = std::count(field.field.measured.begin(), field.field.measured.end(), 1);
+    const auto extrapolated = std::count(field.extrapolated.begin(), field.extrapolated.end(), 1);
+    csv += fmt::format("{},{},{}", file, measured, extrapolated);
+    if (measured < sensors::TractionInversion::kLeastMarkers) {
+      observer_.restart();
+      csv += fmt::format("{},too few markers,,,,\n", std::string(13, ','));
+      return false;
+    }
+    const sensors::TractionField tractions = inversion_.invert(field.field);
+    const sensors::FrictionState& friction = observer_.look(field.field, tractions);
+    for (int i = 0; i < 6; ++i) csv += fmt::format(",{:.5f}", tractions.wrench[i]);
+    for (int i = 0; i < 6; ++i) csv += fmt::format(",{:.5f}", tractions.sigma(i));
+    csv += fmt::format(",{:.3f},{}", tractions.misfit, sensors::name_of(friction.state));
+    if (tractions.in_contact) {
+      csv += fmt::format(",{:.4f},{:.4f}", friction.ratio, friction.ratio_error);
+    } else {
+      csv += ",,";
+    }
+    if (friction.friction) {
+      csv += fmt::format(",{:.4f},{:.4f}\n", friction.friction->value, friction.friction->error);
+    } else {
+      csv += ",,\n";
+    }
+    return true;
+  }
+
+  static std::string header() {
+    std::string columns = "file,measured,extrapolated";
+    for (const char* prefix : {"", "sigma_"}) {
+      for (const char axis : {'x', 'y', 'z'}) columns += fmt::format(",{}force_{}_N", prefix, axis);
+      for (const char axis : {'x', 'y', 'z'}) columns += fmt::format(",{}torque_{}_Nmm", prefix, axis);
+    }
+    return columns + ",misfit,slip,shear_ratio,sigma_shear_ratio,friction,sigma_friction\n";
+  }
+
+ private:
+  sensors::TractionInversion inversion_;
+  sensors::FrictionObserver observer_;
+};
+
+}  // namespace
+
+void find_rest_of(sensors::ColourMarkerFinder& finder, const fs::path& picture) {
+  on_picture(picture, [&](const cv::Mat& image) { finder.find_rest(image); });
+}
+
+FieldSummary write_chroma_fields(const sensors::HueModel& model, const Eigen::Vector2i& grid, const fs::path& rest,
+                                 const std::vector<fs::path>& frames, const std::optional<FieldForces>& forces,
+                                 const fs::path& folder, const Progress& progress) {
+  sensors::ColourMarkerFinder finder({.grid = grid});
+  find_rest_of(finder, rest);
+  const sensors::HueEstimator estimator(model, finder.rest());
+  std::optional<ForceTable> table;
+  if (forces) {
+    check(forces->compliance, model, grid);
+    table.emplace(*forces);
+  }
+  fs::create_directories(folder);
+  std::string displacements = "file,marker,x_mm,y_mm,z_mm,measured,extrapolated,flaw\n";
+  std::string wrenches = ForceTable::header();
+  FieldSummary summary;
+  for (const fs::path& frame : frames) {
+    const std::string name = frame.filename().string();
+    on_picture(frame, [&](const cv::Mat& image) {
+      const sensors::ColourMarkerReading& reading = finder.find(image);
+      const sensors::HueField field = estimator.estimate(reading);
+      add_displacements(name, reading, field, displacements);
+      if (table && !table->add(name, field, wrenches)) ++summary.without_force;
+      summary.markers += static_cast<int>(reading.markers.size());
+      summary.measured += static_cast<int>(std::count(field.field.measured.begin(), field.field.measured.end(), 1));
+      summary.extrapolated += static_cast<int>(std::count(field.extrapolated.begin(), field.extrapolated.end(), 1));
+    });
+    ++summary.frames;
+    if (progress) progress("fields", summary.frames, std::ssize(frames));
+  }
+  write_whole_file(folder / "displacements.csv", displacements);
+  if (table) write_whole_file(folder / "forces.csv", wrenches);
+  return summary;
+}
+
+}  // namespace touchstone::lab

@@ -1,0 +1,94 @@
+#include "lab/hue_sample_table.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <map>
+
+#include "lab/csv_cells.h"
+#include "sim/image_file.h"
+
+namespace touchstone::lab {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kColumns = "file,marker_column,marker_row,x_mm,y_mm,z_mm,series";
+
+int whole_number(const std::string& cell, const char* field, const SourceLocation& where) {
+  const auto value = number_of<int>(cell);
+  if (!value) fail_at(where, "{}: '{}' isn't a whole number", field, cell);
+  return *value;
+}
+
+int place_in_grid(const std::string& cell, const char* field, int count, const SourceLocation& where) {
+  const int value = whole_number(cell, field, where);
+  if (value < 0 || value >= count) {
+    fail_at(where, "{}: {} isn't in the grid, which has {}: 0 to {}", field, value, count, count - 1);
+  }
+  return value;
+}
+
+double number_in(const std::string& cell, const char* field, const SourceLocation& where) {
+  const auto value = number_of<double>(cell);
+  if (!value || !std::isfinite(*value)) fail_at(where, "{}: '{}' isn't a finite number", field, cell);
+  return *value;
+}
+
+}  // namespace
+
+std::vector<AnnotatedMarker> read_hue_sample_table(const fs::path& folder, const fs::path& csv,
+                                                   const Eigen::Vector2i& grid) {
+  std::vector<AnnotatedMarker> table;
+  for_each_row(csv, kColumns, [&](const SourceLocation& where, const std::vector<std::string>& cells) {
+    AnnotatedMarker line;
+    line.where = where;
+    line.file = folder / cells[0];
+    if (cells[0].empty() || !fs::is_regular_file(line.file)) {
+      fail_at(where, "file: there is no file {}", line.file.string());
+    }
+    const int column = place_in_grid(cells[1], "marker_column", grid.x(), where);
+    const int row = place_in_grid(cells[2], "marker_row", grid.y(), where);
+    line.marker = static_cast<std::size_t>(row * grid.x() + column);
+    line.displacement_mm = {number_in(cells[3], "x_mm", where), number_in(cells[4], "y_mm", where),
+                            number_in(cells[5], "z_mm", where)};
+    line.series = whole_number(cells[6], "series", where);
+    table.push_back(std::move(line));
+  });
+  if (table.empty()) fail("{}: has no marker", csv.string());
+  return table;
+}
+
+TableSamples read_hue_samples(const std::vector<AnnotatedMarker>& table, sensors::ColourMarkerFinder& finder) {
+  const int columns = finder.rest().grid.x();
+  std::map<fs::path, sensors::ColourMarkerReading> readings;
+  TableSamples result;
+  for (const AnnotatedMarker& line : table) {
+    const int marker = static_cast<int>(line.marker);
+    const std::string name = fmt::format("marker ({}, {})", marker % columns, marker / columns);
+    const sensors::MarkerFlaw at_rest = finder.rest().markers[line.marker].flaw;
+    if (at_rest != sensors::MarkerFlaw::kNone) {
+      fail_at(line.where, "{} isn't sound in the picture at rest: {}", name, sensors::name_of(at_rest));
+    }
+    auto known = readings.find(line.file);
+    if (known == readings.end()) {
+      try {
+        known = readings.emplace(line.file, finder.find(sim::read_image(line.file))).first;
+      } catch (const Error& error) {
+        const std::string message = error.what();
+        if (message.find(line.file.string()) != std::string::npos) fail_at(line.where, "{}", message);
+        fail_at(line.where, "{}: {}", line.file.string(), message);
+      }
+    }
+    const sensors::ColourMarker& seen = known->second.markers[line.marker];
+    if (seen.flaw != sensors::MarkerFlaw::kNone) {
+      result.left_out.push_back(
+          fmt::format("{}: {}: {}", line.file.filename().string(), name, sensors::name_of(seen.flaw)));
+      continue;
+    }
+    result.samples.push_back({line.marker, seen, line.displacement_mm, line.series});
+  }
+  return result;
+}
+
+}  // namespace touchstone::lab
