@@ -91,7 +91,7 @@ Sheet make_sheet(const TiltBench& bench, TiltMarker marker, const TiltPose& pose
 }
 
 TriangleMesh square_film(const TiltBench& bench) {
-  const double h = 0.5 * bench.side_mm;
+  const double h = 0.5 * bench.film_mm;
   const double z = -bench.gel_mm + kFilmInGel_mm;
   TriangleMesh mesh;
   for (const Eigen::Vector2d& corner : {Eigen::Vector2d(-h, -h), {h, -h}, {h, h}, {-h, h}}) {
@@ -122,6 +122,18 @@ TiltBench compact_bench() {
   bench.lens_mm = 4.0;
   bench.camera_mm = 64.0;
   bench.pixel_pitch_um = 20.0;
+  return bench;
+}
+
+TiltBench near_bench() {
+  TiltBench bench;
+  bench.gel_mm = 8.0;
+  bench.film_mm = 1.72;
+  bench.camera_mm = 65.06;
+  bench.pixel_pitch_um = 36.08;
+  bench.f_number = 11.0;
+  bench.half_view_mm = 2.2;
+  bench.samples = 64;
   return bench;
 }
 

@@ -14,6 +14,7 @@ std::vector<ValidationRow> validate_gelsight_map(const ValidateOptions& options)
 std::vector<ValidationRow> validate_gelsight_slip(const ValidateOptions& options);
 std::vector<ValidationRow> validate_gelsight_grasp(const ValidateOptions& options);
 std::vector<ValidationRow> validate_gelsight_texture(const ValidateOptions& options);
+std::vector<ValidationRow> validate_chroma_design(const ValidateOptions& options);
 
 const std::vector<ValidationGroup>& validation_groups() {
   static const std::vector<ValidationGroup> groups = {
@@ -28,6 +29,7 @@ const std::vector<ValidationGroup>& validation_groups() {
       {"gelsight.force", validate_gelsight_slip},
       {"gelsight.grasp", validate_gelsight_grasp},
       {"gelsight.texture", validate_gelsight_texture},
+      {"chroma.design", validate_chroma_design},
   };
   return groups;
 }
