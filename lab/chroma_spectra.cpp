@@ -22,6 +22,7 @@ constexpr double kHalfPatch_mm = 0.2;    // of the square that is looked at: cle
 constexpr double kLeastMarker_mm = 1.0;  // narrower ones leave no room for it
 constexpr double kStep_nm = 1.0;         // of the products
 constexpr const char* kNames[] = {"white", "magenta", "yellow", "red"};
+constexpr std::size_t kPalette[] = {0, 3, 4, 1};  // blue for white
 
 using Curve = std::function<double(double nm)>;
 
@@ -116,7 +117,11 @@ Patches patches_of(const sim::DeviceSpec& device) {
   // From left to right: the film's rim at -film, the marker's at 0, the film's at film, the marker's at 2 half.
   patches.places = {Eigen::Vector2d(0.0, 0.5 * print.spacing_mm.y()), Eigen::Vector2d(0.5 * (film + 2.0 * half), 0.0),
                     Eigen::Vector2d(-0.5 * film, 0.0), Eigen::Vector2d(0.5 * film, 0.0)};
-  if (!(0.5 * film > kHalfPatch_mm && 2.0 * half - film > 2.0 * kHalfPatch_mm)) {
+  const bool fits = 0.5 * film > kHalfPatch_mm && 2.0 * half - film > 2.0 * kHalfPatch_mm;
+  // Nor may the neighbour's film reach the patches of what is beside one.
+  const double right = patches.places[1].x() + kHalfPatch_mm;
+  const bool free = film + right < print.spacing_mm.x() && film + kHalfPatch_mm < 0.5 * print.spacing_mm.y();
+  if (!fits || !free) {
     fail("device {}: films that look {:.3g} mm wide don't leave half of a marker of {} mm free", device.name,
          2.0 * film, print.width_mm);
   }
@@ -214,7 +219,7 @@ ChromaSpectra measure_chroma_spectra(const sim::DeviceSpec& device, const std::f
 
 LinePlot plot_of(const ChromaSpectra& spectra) {
   LinePlot plot;
-  plot.title = "Light that reaches the camera";
+  plot.title = "Light that reaches the camera (dashed: products of the curves)";
   plot.x_label = "wavelength, nm";
   plot.y_label = "part of the light, % a nm";
   plot.log_x = plot.log_y = false;
@@ -224,7 +229,7 @@ LinePlot plot_of(const ChromaSpectra& spectra) {
       const ChromaSpectrum& one = spectra.colours[k];
       PlotCurve curve;
       if (rendered) curve.name = one.name;
-      curve.colour = k;
+      curve.colour = kPalette[k];
       curve.dashed = !rendered;
       for (int b = 0; b < spectra.bands.count(); ++b) {
         const double width = spectra.bands.edges_nm[b + 1] - spectra.bands.edges_nm[b];

@@ -50,9 +50,10 @@ struct ChromaSpectra {
 };
 
 /// Renders the places round the four markers nearest to the middle, `samples` paths a pixel.
-/// @throws Error unless the device has bands, a camera, lamps of one spectrum, a matt coating with square markers, and
-/// films, all by curves, and shows each of the four where it's looked for: markers 1 mm wide and more, narrower than
-/// their spacing, films about as wide
+/// The device's lamps must share one spectrum.
+/// @throws Error unless the device has bands, a camera, lamps with a spectrum, a matt coating with square markers, and
+/// films, all by curves, and shows each of the four where it's looked for: markers 1 mm wide and more, white between
+/// them, and films that leave half of a marker free
 ChromaSpectra measure_chroma_spectra(const sim::DeviceSpec& device, const std::filesystem::path& cache, int samples,
                                      std::uint64_t seed);
 

@@ -27,7 +27,7 @@ struct TiltBench {
   double gel_mm = 5.0;
   double plate_mm = 8.0;
   double side_mm = 2.0;          ///< of the marker; the ball's diameter
-  double film_mm = 2.0;          ///< side of the film
+  double film_mm = 2.0;          ///< side of the film's square
   double poisson_ratio = 0.5;    ///< of eq. 3
   double lens_mm = 24.0;         ///< focal length
   double camera_mm = 382.0;      ///< from the lens to the sheet at rest

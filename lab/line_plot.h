@@ -14,7 +14,7 @@ struct PlotCurve {
   std::string name;  ///< in the legend; empty: none
   std::vector<std::pair<double, double>> points;
   bool dashed = false;                     ///< for theory: no marks
-  std::optional<std::size_t> colour = {};  ///< number of the curve whose colour it shares; none: its own
+  std::optional<std::size_t> colour = {};  ///< number in the palette of six; none: as the curves' order
 };
 
 struct LinePlot {
