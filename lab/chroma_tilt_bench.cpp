@@ -125,6 +125,18 @@ TiltBench compact_bench() {
   return bench;
 }
 
+TiltBench near_bench() {
+  TiltBench bench;
+  bench.gel_mm = 8.0;
+  bench.film_mm = 1.72;
+  bench.camera_mm = 65.06;
+  bench.pixel_pitch_um = 36.08;
+  bench.f_number = 11.0;
+  bench.half_view_mm = 2.2;
+  bench.samples = 64;
+  return bench;
+}
+
 TiltSpectra read_tilt_spectra(const std::filesystem::path& spectra) {
   using render::CurveKind;
   const auto share = [&](const char* name) { return render::read_spectral_curve(spectra / name, CurveKind::share); };

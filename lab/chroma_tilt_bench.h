@@ -39,9 +39,11 @@ struct TiltBench {
   int samples = 256;                                   ///< paths a pixel
 };
 
-/// The text's camera, 66 um a pixel, and a small one 60 mm (in air) away on which the marker is 7 pixels wide.
+/// The text's camera, 66 um a pixel, a small one 60 mm (in air) away on which the marker is 7 pixels wide, and that of
+/// scenes/devices/chroma.yaml: as near, with the text's lens, 55 um a pixel and 8 mm of gel.
 TiltBench far_bench();
 TiltBench compact_bench();
+TiltBench near_bench();
 
 /// How the sheet stands at the marker: it is turned and moved as a whole within 1.6 mm, and fades from there to rest at
 /// 4.2 mm. The turn is about the marker's own centre, so the centre moves by `moved_mm` only.

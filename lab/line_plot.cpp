@@ -151,7 +151,7 @@ std::string to_svg(const LinePlot& plot) {
                  fmt::format(" transform=\"translate(16 {:.1f}) rotate(-90)\"", 0.5 * (kTop + kBottom)));
   double legend = kTop + 18.0;
   for (std::size_t k = 0; k < plot.curves.size(); ++k) {
-    const char* colour = kColours[k % kColours.size()];
+    const char* colour = kColours[plot.curves[k].colour.value_or(k) % kColours.size()];
     svg += draw_curve(plot.curves[k], colour, x, y);
     if (plot.curves[k].name.empty()) continue;
     svg += text_at(kRight - 8.0, legend, "end", plot.curves[k].name, fmt::format(" fill=\"{}\"", colour));

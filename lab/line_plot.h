@@ -1,6 +1,7 @@
 #pragma once
 // A small plot of curves as SVG: for the validation page and for benchmarks.
 
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -12,7 +13,8 @@ namespace touchstone::lab {
 struct PlotCurve {
   std::string name;  ///< in the legend; empty: none
   std::vector<std::pair<double, double>> points;
-  bool dashed = false;  ///< for theory: no marks
+  bool dashed = false;                     ///< for theory: no marks
+  std::optional<std::size_t> colour = {};  ///< number in the palette of six; none: as the curves' order
 };
 
 struct LinePlot {

@@ -18,6 +18,7 @@ std::vector<ValidationRow> validate_gelsight_grasp(const ValidateOptions& option
 std::vector<ValidationRow> validate_gelsight_texture(const ValidateOptions& options);
 std::vector<ValidationRow> validate_chroma_light(const ValidateOptions& options);
 std::vector<ValidationRow> validate_chroma_robustness(const ValidateOptions& options);
+std::vector<ValidationRow> validate_chroma_design(const ValidateOptions& options);
 
 const std::vector<ValidationGroup>& validation_groups() {
   static const std::vector<ValidationGroup> groups = {
@@ -36,6 +37,7 @@ const std::vector<ValidationGroup>& validation_groups() {
       {"gelsight.texture", validate_gelsight_texture},
       {"chroma.light", validate_chroma_light},
       {"chroma.robustness", validate_chroma_robustness},
+      {"chroma.design", validate_chroma_design},
   };
   return groups;
 }
