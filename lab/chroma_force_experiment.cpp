@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <utility>
 
 #include "core/error.h"
 #include "core/random.h"
@@ -165,17 +166,22 @@ std::vector<ForceProbe> draw_force_probes(int count, std::uint64_t seed) {
   return probes;
 }
 
+sim::DeviceSpec with_probe_mesh(sim::DeviceSpec device) {
+  device.mesh = {};
+  device.mesh.fine_mm = kTruthEdge;
+  device.mesh.coarse_mm = kCoarseEdge;
+  device.mesh.fine_half_extent_mm =
+      (0.5 * Eigen::Vector2d(device.gel.size_x_mm, device.gel.size_y_mm).array() - kSideStrip).max(kTruthEdge);
+  device.mesh.fine_depth_mm = kFineDepth;
+  return device;
+}
+
 ForceBench set_up_force_bench(sim::DeviceSpec device, const std::filesystem::path& cache_folder,
                               const Progress& progress) {
   check_marker_compliance(device);
   ForceBench bench;
   bench.markers = printed_markers(device);
-  device.mesh = {};
-  device.mesh.coarse_mm = kCoarseEdge;
-  device.mesh.fine_half_extent_mm =
-      (0.5 * Eigen::Vector2d(device.gel.size_x_mm, device.gel.size_y_mm).array() - kSideStrip).max(kTruthEdge);
-  device.mesh.fine_depth_mm = kFineDepth;
-  device.mesh.fine_mm = kTruthEdge;
+  device = with_probe_mesh(std::move(device));
   bench.truth_gel = sim::set_up_gel(device, cache_folder, progress);
   device.mesh.fine_mm = kEstimatorEdge;
   bench.compliance = export_marker_compliance(device, *sim::set_up_gel(device, cache_folder, progress));

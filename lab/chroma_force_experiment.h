@@ -75,8 +75,11 @@ struct ForceBench {
   sensors::FrictionSettings friction = {};
 };
 
-/// The bench of a device with printed markers, on meshes of its own that are fine wherever probes go: edges of 0.85 mm
-/// for the truth, of 1 mm for the estimator, within 2 mm of the gel's sides. @throws Error as check_marker_compliance
+/// A device with a mesh that is fine wherever probes go: edges of 0.85 mm within 2 mm of the gel's sides.
+sim::DeviceSpec with_probe_mesh(sim::DeviceSpec device);
+
+/// The bench of a device with printed markers: the truth's gel has with_probe_mesh, the estimator's a mesh that goes as
+/// far with edges of 1 mm. @throws Error as check_marker_compliance
 ForceBench set_up_force_bench(sim::DeviceSpec device, const std::filesystem::path& cache_folder,
                               const Progress& progress = {});
 

@@ -7,6 +7,7 @@ std::vector<ValidationRow> validate_mechanics(const ValidateOptions& options);
 std::vector<ValidationRow> validate_vibration(const ValidateOptions& options);
 std::vector<ValidationRow> validate_light(const ValidateOptions& options);
 std::vector<ValidationRow> validate_vhs(const ValidateOptions& options);
+std::vector<ValidationRow> validate_chroma_force(const ValidateOptions& options);
 std::vector<ValidationRow> validate_gelsight_light(const ValidateOptions& options);
 std::vector<ValidationRow> validate_gelsight_height(const ValidateOptions& options);
 std::vector<ValidationRow> validate_gelsight_dome(const ValidateOptions& options);
@@ -21,6 +22,7 @@ const std::vector<ValidationGroup>& validation_groups() {
       {"vibration", validate_vibration},
       {"light", validate_light},
       {"vhs", validate_vhs},
+      {"chroma.force", validate_chroma_force},
       {"gelsight.light", validate_gelsight_light},
       {"gelsight.height", validate_gelsight_height},
       {"gelsight.dome", validate_gelsight_dome},
