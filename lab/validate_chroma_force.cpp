@@ -49,7 +49,8 @@ class Rows {
 
 /// How far off a model's displacements are on probes that are neither those of the calibration nor those of the rows.
 sensors::HueErrors verify(const ForceBench& bench, const ChromaBench& camera, const sensors::HueModel& model,
-                          const DragSettings& drag, int count) {
+                          int count) {
+  const DragSettings drag{.step_mm = 0.4, .frames_after = 3};
   std::vector<sensors::HueSample> samples;
   int series = 0;
   for (const ForceProbe& probe : draw_force_probes(count, kVerification)) {
@@ -60,7 +61,7 @@ sensors::HueErrors verify(const ForceBench& bench, const ChromaBench& camera, co
   return sensors::hue_errors(model, camera.rest(), samples);
 }
 
-void add_rows(Rows& rows, const ForceScore& pictures, const ForceScore& ideal, const sensors::HueErrors& noise) {
+void add_force_rows(Rows& rows, const ForceScore& pictures, const ForceScore& ideal, const sensors::HueErrors& noise) {
   const double mean_normal_N = pictures.mean_truth_N.z();
   const double bar_N = kForceShare * mean_normal_N;
   rows.add("chroma.force.error_N",
@@ -80,21 +81,23 @@ void add_rows(Rows& rows, const ForceScore& pictures, const ForceScore& ideal, c
                        "lateral and {:.0f} um normal",
                        1000.0 * noise.rms_lateral_mm, 1000.0 * noise.rms_press_mm),
            "N", Better::lower, bar_N, ideal.mean_absolute_N.z());
-  if (pictures.friction_known > 0) {
-    rows.add("chroma.friction.error",
-             fmt::format("friction coefficient from pictures, mean absolute error over {} of {} probes that slid",
-                         pictures.friction_known, pictures.slid),
-             "1", Better::lower, kFrictionError, pictures.friction_error);
+}
+
+void add_friction_rows(Rows& rows, const ForceScore& score, bool from_pictures) {
+  const std::string id = from_pictures ? "chroma.friction." : "chroma.friction.ideal_";
+  const std::string from = from_pictures ? "from pictures" : "from true displacements with that noise";
+  if (score.friction_known > 0) {
+    rows.add(id + "error",
+             fmt::format("friction coefficient {}, mean absolute error over {} of {} probes that slid", from,
+                         score.friction_known, score.slid),
+             "1", Better::lower, kFrictionError, score.friction_error);
   }
-  rows.add("chroma.friction.known_percent", "probes that slid of which a coefficient was told", "%", Better::higher,
-           90.0, 100.0 * pictures.friction_known / std::max(1, pictures.slid));
-  const double agreement = pictures.markers.agreement();
-  const SlipCounts& counts = pictures.markers;
+  const double agreement = score.markers.agreement();
   if (std::isfinite(agreement)) {
-    rows.add("chroma.friction.state_percent",
-             fmt::format("stick or slip of markers under the probe that agrees with the finite elements ({} more were "
+    rows.add(id + "state_percent",
+             fmt::format("stick or slip of markers under the probe, {}, that agrees with the finite elements ({} more "
                          "left unknown)",
-                         counts.stick_as_unknown + counts.slip_as_unknown),
+                         from, score.markers.stick_as_unknown + score.markers.slip_as_unknown),
              "%", Better::higher, kStateAgreement_percent, 100.0 * agreement);
   }
 }
@@ -110,24 +113,28 @@ std::vector<ValidationRow> validate_chroma_force(const ValidateOptions& options)
   const sim::TouchRig rig(with_probe_mesh(device), options.cache, light);
   const ChromaBench camera(rig, kUnit);
 
-  DragSettings drag;
-  drag.step_mm = options.quick ? 0.4 : 0.2;
-  drag.frames_after = options.quick ? 3 : 6;
   const sensors::HueModel model = calibrate_on_probes(bench, camera, options.quick, kCalibration);
-  const sensors::HueErrors noise = verify(bench, camera, model, drag, options.quick ? 1 : 3);
+  const sensors::HueErrors noise = verify(bench, camera, model, options.quick ? 1 : 3);
   bench.inversion.lateral_noise_mm = bench.friction.lateral_noise_mm = noise.rms_lateral_mm;
   bench.inversion.normal_noise_mm = noise.rms_press_mm;
 
+  DragSettings drag;
+  if (options.quick) {
+    drag.step_mm = 0.2;
+    drag.frames_after = 8;
+  }
   std::vector<ForceRun> pictures, ideal;
   std::uint64_t seed = kProbes;
-  for (const ForceProbe& probe : draw_force_probes(options.quick ? 3 : 15, kProbes)) {
+  for (const ForceProbe& probe : draw_force_probes(options.quick ? 2 : 12, kProbes)) {
     const auto looks = photograph_probe(bench, camera, probe, drag, ++seed);
     pictures.push_back(run_force_probe(bench, probe, told_fields(fields_of(looks, camera, model)), drag));
     const Eigen::Vector2i grid = bench.compliance.marker_grid;
     ideal.push_back(
         run_force_probe(bench, probe, noisy_truth(grid, noise.rms_lateral_mm, noise.rms_press_mm, seed), drag));
   }
-  add_rows(rows, score(pictures), score(ideal), noise);
+  add_force_rows(rows, score(pictures), score(ideal), noise);
+  add_friction_rows(rows, score(pictures), true);
+  add_friction_rows(rows, score(ideal), false);
   return rows.rows();
 }
 
