@@ -1,0 +1,242 @@
+#include "lab/chroma_marker_experiment.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/error.h"
+
+namespace touchstone::lab {
+namespace {
+
+constexpr double kBall_mm = 2.0;  // radius of the text's
+constexpr double kLeastMoved_mm = 0.02;
+
+sim::ObjectSpec ball_of(double radius_mm, double friction) {
+  sim::ObjectSpec ball;
+  ball.name = "ball";
+  ball.shape.radius_mm = radius_mm;
+  ball.friction = friction;
+  return ball;
+}
+
+sim::ObjectSpec cylinder_of(double radius_mm, double friction) {
+  sim::ObjectSpec cylinder;
+  cylinder.name = "cylinder";
+  cylinder.shape.type = sim::ShapeKind::rounded_cylinder;
+  cylinder.shape.radius_mm = radius_mm;
+  cylinder.shape.edge_radius_mm = 0.2;
+  cylinder.shape.height_mm = 6.0;
+  cylinder.friction = friction;
+  return cylinder;
+}
+
+sim::AxisKey at(double position_mm) {
+  return {position_mm, std::nullopt};
+}
+
+/// From touch straight in, in `frames`, and then aside in `steps`.
+sim::MotionSpec press_and_drag(const Eigen::Vector2d& place, double height_mm, double depth_mm, int frames,
+                               const Eigen::Vector2d& drag_mm, int steps) {
+  sim::MotionSpec motion;
+  motion.start_mm = {place.x(), place.y(), height_mm};
+  sim::MotionKey press;
+  press.frames = frames;
+  press.z = at(height_mm - depth_mm);
+  motion.keys = {press};
+  if (steps > 0) {
+    sim::MotionKey drag;
+    drag.frames = steps;
+    drag.x = at(place.x() + drag_mm.x());
+    drag.y = at(place.y() + drag_mm.y());
+    motion.keys.push_back(drag);
+  }
+  return motion;
+}
+
+MarkerSeries read_series(const ChromaBench& bench, const MarkerTest& test, const std::vector<ChromaLook>& looks,
+                         std::size_t first) {
+  const std::size_t marker = bench.marker_at(test.place_mm);
+  const Eigen::Vector3d touch(test.place_mm.x(), test.place_mm.y(), kBall_mm);
+  MarkerSeries series;
+  for (std::size_t i = first; i < looks.size(); ++i) {
+    const sensors::ColourMarker& seen = looks[i].reading.markers[marker];
+    if (seen.flaw != sensors::MarkerFlaw::kNone) {
+      ++series.flawed;
+      continue;
+    }
+    series.ball_mm.push_back(looks[i].state.press.gel_from_object.translation - touch);
+    series.seen.push_back(seen);
+  }
+  series.depth_mm = kBall_mm - looks.back().state.press.gel_from_object.translation.z();
+  return series;
+}
+
+}  // namespace
+
+ChromaLine fit_chroma_line(std::span<const double> x, std::span<const double> y) {
+  TS_ASSERT(x.size() == y.size() && x.size() >= 2);
+  const auto n = static_cast<double>(x.size());
+  double mean_x = 0.0;
+  double mean_y = 0.0;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    mean_x += x[i] / n;
+    mean_y += y[i] / n;
+  }
+  double xx = 0.0;
+  double xy = 0.0;
+  double yy = 0.0;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    xx += (x[i] - mean_x) * (x[i] - mean_x);
+    xy += (x[i] - mean_x) * (y[i] - mean_y);
+    yy += (y[i] - mean_y) * (y[i] - mean_y);
+  }
+  ChromaLine line;
+  line.slope = xy / xx;
+  line.offset = mean_y - line.slope * mean_x;
+  line.r2 = yy > 0.0 ? xy * xy / (xx * yy) : 0.0;
+  return line;
+}
+
+std::vector<double> MarkerSeries::column_mm(int axis) const {
+  std::vector<double> column;
+  for (const Eigen::Vector3d& one : ball_mm) column.push_back(one[axis]);
+  return column;
+}
+
+MarkerSeries press_series(const ChromaBench& bench, const MarkerTest& test, double deepest_mm, double step_mm,
+                          std::uint64_t seed) {
+  const int steps = static_cast<int>(std::lround(deepest_mm / step_mm));
+  const auto motion = press_and_drag(test.place_mm, kBall_mm, deepest_mm, steps, {0, 0}, 0);
+  return read_series(bench, test, bench.play(ball_of(kBall_mm, test.friction), motion, seed), 0);
+}
+
+MarkerSeries shear_series(const ChromaBench& bench, const MarkerTest& test, double depth_mm,
+                          const Eigen::Vector2d& end_mm, int steps, std::uint64_t seed) {
+  const auto motion = press_and_drag(test.place_mm, kBall_mm, depth_mm, 1, end_mm, steps);
+  return read_series(bench, test, bench.play(ball_of(kBall_mm, test.friction), motion, seed), 1);
+}
+
+std::vector<sensors::HueSample> samples_of(const MarkerSeries& series, std::size_t marker, int number) {
+  std::vector<sensors::HueSample> samples;
+  for (std::size_t i = 0; i < series.seen.size(); ++i) {
+    samples.push_back({marker, series.seen[i], series.ball_mm[i], number});
+  }
+  return samples;
+}
+
+InverseScore score_inverse(const ChromaBench& bench, const sensors::HueModel& model, std::size_t marker,
+                           const std::vector<MarkerSeries>& series) {
+  const sensors::HueEstimator estimator(model, bench.rest());
+  InverseScore score;
+  double squares = 0.0;
+  for (const MarkerSeries& one : series) {
+    std::vector<double> truth[2];
+    std::vector<double> estimate[2];
+    for (std::size_t i = 0; i < one.seen.size(); ++i) {
+      const sensors::HueEstimate found = estimator.estimate(marker, one.seen[i]);
+      if (!found.measured) continue;
+      const Eigen::Vector3d error_um = 1000.0 * (found.displacement_mm - one.ball_mm[i]);
+      score.largest_lateral_um = std::max(score.largest_lateral_um, error_um.head<2>().cwiseAbs().maxCoeff());
+      score.largest_press_um = std::max(score.largest_press_um, std::abs(error_um.z()));
+      squares += error_um.squaredNorm() / 3.0;
+      ++score.samples;
+      for (int axis = 0; axis < 2; ++axis) {
+        truth[axis].push_back(one.ball_mm[i][axis]);
+        estimate[axis].push_back(found.displacement_mm[axis]);
+      }
+    }
+    for (int axis = 0; axis < 2; ++axis) {
+      const auto [low, high] = std::ranges::minmax(truth[axis]);
+      if (high - low > 0.1) score.worst_r2 = std::min(score.worst_r2, fit_chroma_line(truth[axis], estimate[axis]).r2);
+    }
+  }
+  score.largest_um = std::max(score.largest_lateral_um, score.largest_press_um);
+  score.rms_um = score.samples > 0 ? std::sqrt(squares / score.samples) : std::numeric_limits<double>::quiet_NaN();
+  return score;
+}
+
+sensors::HueModel calibrate_field(const ChromaBench& bench, bool quick, std::uint64_t seed) {
+  struct Touch {
+    sim::ObjectSpec object;
+    double height_mm, depth_mm;
+    Eigen::Vector2d place, drag;
+  };
+  std::vector<Touch> touches = {
+      {ball_of(kBall_mm, 0.8), kBall_mm, 2.5, {1.5, 1.5}, {0.8, 0.3}},
+      {ball_of(6.35, 0.8), 6.35, 1.8, {-1.0, 2.0}, {-0.5, 0.7}},
+      {cylinder_of(4.25, 0.8), 0.0, 1.2, {0.7, -0.9}, {0.4, -0.8}},
+  };
+  if (!quick) {
+    touches.push_back({ball_of(kBall_mm, 0.3), kBall_mm, 1.8, {-4.5, 1.5}, {-0.6, -0.7}});
+    touches.push_back({ball_of(4.0, 0.3), 4.0, 2.2, {3.6, -2.8}, {0.2, 0.9}});
+    touches.push_back({ball_of(11.0, 1.0), 11.0, 1.5, {1.8, 0.4}, {0.9, 0.0}});
+    touches.push_back({cylinder_of(3.0, 0.4), 0.0, 1.5, {-2.2, -3.1}, {-0.7, 0.3}});
+    touches.push_back({cylinder_of(6.0, 1.0), 0.0, 0.8, {0.3, 0.6}, {0.5, 0.5}});
+  }
+  std::vector<sensors::HueSample> samples;
+  int number = 0;
+  for (const Touch& touch : touches) {
+    const auto motion = press_and_drag(touch.place, touch.height_mm, touch.depth_mm, 6, touch.drag, 4);
+    const auto looks = bench.play(touch.object, motion, seed + static_cast<std::uint64_t>(number));
+    const auto found = samples_of_moved(looks, kLeastMoved_mm, number);
+    samples.insert(samples.end(), found.begin(), found.end());
+    ++number;
+  }
+  sensors::HueCalibrationSettings settings;
+  settings.spacing_mm = bench.spacing_mm();
+  settings.parallax = parallax_of(bench.rig().device());
+  settings.form = sensors::rank_hue_forms(bench.rest(), samples, settings, sensors::usual_hue_forms()).front().form;
+  return sensors::calibrate_hue(bench.rest(), samples, settings);
+}
+
+FieldScore field_under(const ChromaBench& bench, const sensors::HueModel& model, const sim::ObjectSpec& punch,
+                       double height_mm, double depth_mm, const Eigen::Vector2d& place_mm, std::uint64_t seed) {
+  const auto looks = bench.play(punch, press_and_drag(place_mm, height_mm, depth_mm, 3, {0, 0}, 0), seed);
+  const ChromaLook& look = looks.back();
+  const sensors::HueField found = sensors::HueEstimator(model, bench.rest()).estimate(look.reading);
+  FieldScore score;
+  score.punch = punch.name;
+  score.truth = look.truth;
+  double press = 0.0;
+  double lateral = 0.0;
+  for (std::size_t i = 0; i < look.truth.size(); ++i) {
+    score.largest_true_um = std::max(score.largest_true_um, 1000.0 * look.truth[i].norm());
+    if (found.field.measured[i] == 0) {
+      ++score.flawed;
+      score.estimate.push_back(Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN()));
+      continue;
+    }
+    score.estimate.push_back(found.field.displacement[i]);
+    const Eigen::Vector3d error_um = 1000.0 * (found.field.displacement[i] - look.truth[i]);
+    ++score.measured;
+    if (found.extrapolated[i] != 0) ++score.extrapolated;
+    score.mean_um += error_um.norm();
+    score.worst_um = std::max(score.worst_um, error_um.norm());
+    press += error_um.z() * error_um.z();
+    lateral += 0.5 * error_um.head<2>().squaredNorm();
+  }
+  const double n = std::max(1, score.measured);
+  score.mean_um /= n;
+  score.rms_um = std::sqrt((press + 2.0 * lateral) / n);
+  score.press_rms_um = std::sqrt(press / n);
+  score.lateral_rms_um = std::sqrt(lateral / n);
+  return score;
+}
+
+std::vector<PunchTest> fig10_punches() {
+  constexpr double kFriction = 0.6;
+  PunchTest square;
+  square.object.name = "square";
+  square.object.shape.type = sim::ShapeKind::box;
+  square.object.shape.size_mm = {10, 10, 6};
+  square.object.friction = kFriction;
+  square.height_mm = 3.0;
+  square.depth_mm = 1.0;
+  PunchTest cylinder{cylinder_of(5.0, kFriction), 0.0, 1.0};
+  PunchTest hemisphere{ball_of(8.0, kFriction), 8.0, 2.0};
+  hemisphere.object.name = "hemisphere";
+  return {square, cylinder, hemisphere};
+}
+
+}  // namespace touchstone::lab
