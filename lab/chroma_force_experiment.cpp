@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <limits>
@@ -244,6 +245,10 @@ ForceRun run_force_probe(const ForceBench& bench, const ForceProbe& probe, const
   sensors::FrictionObserver observer(bench.friction);
   play_probe(bench, probe, drag, [&](const ForceFrame& frame) {
     const sensors::MarkerField field = reader(frame);
+    if (std::count(field.measured.begin(), field.measured.end(), 1) < sensors::TractionInversion::kLeastMarkers) {
+      ++run.unread;
+      return;
+    }
     const auto start = std::chrono::steady_clock::now();
     const sensors::TractionField tractions = inversion.invert(field);
     const sensors::FrictionState& friction = observer.look(field, tractions);
@@ -289,6 +294,7 @@ ForceScore score(const std::vector<ForceRun>& runs) {
       if (seen) (sample.slides ? result.sliding_seen : result.sliding_false) += 1;
       slid = slid || sample.slides;
     }
+    result.unread += run.unread;
     result.markers += run.markers;
     if (!slid) continue;
     ++result.slid;

@@ -118,7 +118,8 @@ struct SlipCounts {
 
 struct ForceRun {
   ForceProbe probe;
-  std::vector<ForceSample> samples;
+  std::vector<ForceSample> samples;  ///< of the frames that were read
+  int unread = 0;                    ///< frames with too few measured markers to invert
   SlipCounts markers;
 };
 ForceRun run_force_probe(const ForceBench& bench, const ForceProbe& probe, const MarkerReader& reader,
@@ -126,7 +127,8 @@ ForceRun run_force_probe(const ForceBench& bench, const ForceProbe& probe, const
 
 /// All runs together. Means are over frames; a run's friction is the last estimate.
 struct ForceScore {
-  int frames = 0;
+  int frames = 0;  ///< that were read; all means are over these
+  int unread = 0;
   Eigen::Vector3d mean_absolute_N = Eigen::Vector3d::Zero();
   Eigen::Vector3d mean_truth_N = Eigen::Vector3d::Zero();     ///< of the absolute
   double relative = 0.0;                                      ///< mean of |error vector| / |force|
