@@ -2,10 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <utility>
 
 #include "core/error.h"
 #include "core/random.h"
@@ -165,17 +167,22 @@ std::vector<ForceProbe> draw_force_probes(int count, std::uint64_t seed) {
   return probes;
 }
 
+sim::DeviceSpec with_probe_mesh(sim::DeviceSpec device) {
+  device.mesh = {};
+  device.mesh.fine_mm = kTruthEdge;
+  device.mesh.coarse_mm = kCoarseEdge;
+  device.mesh.fine_half_extent_mm =
+      (0.5 * Eigen::Vector2d(device.gel.size_x_mm, device.gel.size_y_mm).array() - kSideStrip).max(kTruthEdge);
+  device.mesh.fine_depth_mm = kFineDepth;
+  return device;
+}
+
 ForceBench set_up_force_bench(sim::DeviceSpec device, const std::filesystem::path& cache_folder,
                               const Progress& progress) {
   check_marker_compliance(device);
   ForceBench bench;
   bench.markers = printed_markers(device);
-  device.mesh = {};
-  device.mesh.coarse_mm = kCoarseEdge;
-  device.mesh.fine_half_extent_mm =
-      (0.5 * Eigen::Vector2d(device.gel.size_x_mm, device.gel.size_y_mm).array() - kSideStrip).max(kTruthEdge);
-  device.mesh.fine_depth_mm = kFineDepth;
-  device.mesh.fine_mm = kTruthEdge;
+  device = with_probe_mesh(std::move(device));
   bench.truth_gel = sim::set_up_gel(device, cache_folder, progress);
   device.mesh.fine_mm = kEstimatorEdge;
   bench.compliance = export_marker_compliance(device, *sim::set_up_gel(device, cache_folder, progress));
@@ -238,6 +245,10 @@ ForceRun run_force_probe(const ForceBench& bench, const ForceProbe& probe, const
   sensors::FrictionObserver observer(bench.friction);
   play_probe(bench, probe, drag, [&](const ForceFrame& frame) {
     const sensors::MarkerField field = reader(frame);
+    if (std::count(field.measured.begin(), field.measured.end(), 1) < sensors::TractionInversion::kLeastMarkers) {
+      ++run.unread;
+      return;
+    }
     const auto start = std::chrono::steady_clock::now();
     const sensors::TractionField tractions = inversion.invert(field);
     const sensors::FrictionState& friction = observer.look(field, tractions);
@@ -283,6 +294,7 @@ ForceScore score(const std::vector<ForceRun>& runs) {
       if (seen) (sample.slides ? result.sliding_seen : result.sliding_false) += 1;
       slid = slid || sample.slides;
     }
+    result.unread += run.unread;
     result.markers += run.markers;
     if (!slid) continue;
     ++result.slid;

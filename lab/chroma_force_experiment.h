@@ -75,8 +75,11 @@ struct ForceBench {
   sensors::FrictionSettings friction = {};
 };
 
-/// The bench of a device with printed markers, on meshes of its own that are fine wherever probes go: edges of 0.85 mm
-/// for the truth, of 1 mm for the estimator, within 2 mm of the gel's sides. @throws Error as check_marker_compliance
+/// A device with a mesh that is fine wherever probes go: edges of 0.85 mm within 2 mm of the gel's sides.
+sim::DeviceSpec with_probe_mesh(sim::DeviceSpec device);
+
+/// The bench of a device with printed markers: the truth's gel has with_probe_mesh, the estimator's a mesh that goes as
+/// far with edges of 1 mm. @throws Error as check_marker_compliance
 ForceBench set_up_force_bench(sim::DeviceSpec device, const std::filesystem::path& cache_folder,
                               const Progress& progress = {});
 
@@ -115,7 +118,8 @@ struct SlipCounts {
 
 struct ForceRun {
   ForceProbe probe;
-  std::vector<ForceSample> samples;
+  std::vector<ForceSample> samples;  ///< of the frames that were read
+  int unread = 0;                    ///< frames with too few measured markers to invert
   SlipCounts markers;
 };
 ForceRun run_force_probe(const ForceBench& bench, const ForceProbe& probe, const MarkerReader& reader,
@@ -123,7 +127,8 @@ ForceRun run_force_probe(const ForceBench& bench, const ForceProbe& probe, const
 
 /// All runs together. Means are over frames; a run's friction is the last estimate.
 struct ForceScore {
-  int frames = 0;
+  int frames = 0;  ///< that were read; all means are over these
+  int unread = 0;
   Eigen::Vector3d mean_absolute_N = Eigen::Vector3d::Zero();
   Eigen::Vector3d mean_truth_N = Eigen::Vector3d::Zero();     ///< of the absolute
   double relative = 0.0;                                      ///< mean of |error vector| / |force|

@@ -7,8 +7,12 @@ std::vector<ValidationRow> validate_mechanics(const ValidateOptions& options);
 std::vector<ValidationRow> validate_vibration(const ValidateOptions& options);
 std::vector<ValidationRow> validate_light(const ValidateOptions& options);
 std::vector<ValidationRow> validate_vhs(const ValidateOptions& options);
+std::vector<ValidationRow> validate_chroma_light(const ValidateOptions& options);
 std::vector<ValidationRow> validate_chroma_marker(const ValidateOptions& options);
 std::vector<ValidationRow> validate_chroma_field(const ValidateOptions& options);
+std::vector<ValidationRow> validate_chroma_force(const ValidateOptions& options);
+std::vector<ValidationRow> validate_chroma_robustness(const ValidateOptions& options);
+std::vector<ValidationRow> validate_chroma_design(const ValidateOptions& options);
 std::vector<ValidationRow> validate_gelsight_light(const ValidateOptions& options);
 std::vector<ValidationRow> validate_gelsight_height(const ValidateOptions& options);
 std::vector<ValidationRow> validate_gelsight_dome(const ValidateOptions& options);
@@ -16,9 +20,6 @@ std::vector<ValidationRow> validate_gelsight_map(const ValidateOptions& options)
 std::vector<ValidationRow> validate_gelsight_slip(const ValidateOptions& options);
 std::vector<ValidationRow> validate_gelsight_grasp(const ValidateOptions& options);
 std::vector<ValidationRow> validate_gelsight_texture(const ValidateOptions& options);
-std::vector<ValidationRow> validate_chroma_light(const ValidateOptions& options);
-std::vector<ValidationRow> validate_chroma_robustness(const ValidateOptions& options);
-std::vector<ValidationRow> validate_chroma_design(const ValidateOptions& options);
 
 const std::vector<ValidationGroup>& validation_groups() {
   static const std::vector<ValidationGroup> groups = {
@@ -26,8 +27,12 @@ const std::vector<ValidationGroup>& validation_groups() {
       {"vibration", validate_vibration},
       {"light", validate_light},
       {"vhs", validate_vhs},
+      {"chroma.light", validate_chroma_light},
       {"chroma.marker", validate_chroma_marker},
       {"chroma.field", validate_chroma_field},
+      {"chroma.force", validate_chroma_force},
+      {"chroma.robustness", validate_chroma_robustness},
+      {"chroma.design", validate_chroma_design},
       {"gelsight.light", validate_gelsight_light},
       {"gelsight.height", validate_gelsight_height},
       {"gelsight.dome", validate_gelsight_dome},
@@ -35,9 +40,6 @@ const std::vector<ValidationGroup>& validation_groups() {
       {"gelsight.force", validate_gelsight_slip},
       {"gelsight.grasp", validate_gelsight_grasp},
       {"gelsight.texture", validate_gelsight_texture},
-      {"chroma.light", validate_chroma_light},
-      {"chroma.robustness", validate_chroma_robustness},
-      {"chroma.design", validate_chroma_design},
   };
   return groups;
 }
