@@ -9,6 +9,8 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <optional>
+#include <string>
 
 #include "core/units.h"
 #include "lab/chroma_design.h"
