@@ -9,6 +9,8 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <optional>
+#include <string>
 
 #include "core/units.h"
 #include "lab/chroma_design.h"
@@ -39,7 +41,7 @@ void add_thickness_rows(const ValidateOptions& options, std::vector<ValidationRo
       std::get<ApparentChangeSpec>(read_study(options.scenes / "studies" / "chroma-thickness.yaml").kind);
   spec.force_N = {kForce_N};
   spec.by = {options.quick ? ApparentSource::linear : ApparentSource::finite};
-  spec.vary.values = options.quick ? std::vector<double>{0.5, 0.75, 1.2}
+  spec.vary.values = options.quick ? std::vector<double>{0.5, 0.7, 1.0}
                                    : std::vector<double>{0.5, 0.6, 0.7, 0.85, 1.0, 1.5, 2.5, 5.0, 8.0};
   const ApparentChangeResult result = run_apparent_change(spec, options.cache, options.progress);
   const double seconds = seconds_since(begun);
@@ -97,7 +99,7 @@ OverSeeds over_seeds(const Values& values, const Figure& figure) {
 void add_tilt_rows(const ValidateOptions& options, std::vector<ValidationRow>& rows) {
   const TiltSpectra spectra = read_tilt_spectra(options.scenes / "spectra");
   TiltBench bench = near_bench();
-  bench.samples = options.quick ? 4 : 64;
+  bench.samples = options.quick ? 16 : 64;
   const int seeds = options.quick ? 1 : 4;
   const std::array<double, 1> tilts = {kTilt_deg * kRadiansPerDegree};
   const auto measure = [&](TiltMarker marker) {
@@ -176,7 +178,7 @@ void add_spectra_rows(const ValidateOptions& options, std::vector<ValidationRow>
     row.better = allowed > 0.0 ? Better::near : Better::lower;
     row.holds = allowed > 0.0 ? std::abs(row.ours - reference) <= allowed : row.ours <= reference;
     row.quick = options.quick;
-    row.seconds = seconds / 4.0;
+    row.seconds = seconds / 5.0;
     rows.push_back(std::move(row));
   };
   add("chroma.spectra.error_percent",
@@ -188,6 +190,11 @@ void add_spectra_rows(const ValidateOptions& options, std::vector<ValidationRow>
         }
         return worst;
       });
+  add("chroma.spectra.white_error_percent",
+      "white: light on the sensor against the product of lamp and white layer; the rest is colour that light brings "
+      "along",
+      "%", kSpectraAllowed_percent, 0.0,
+      [](const ChromaSpectra& one) { return 100.0 * one.of(ChromaColour::white).error; });
   for (const ChromaColour colour : {ChromaColour::magenta, ChromaColour::yellow, ChromaColour::red}) {
     const ChromaSpectrum& first = seen.front().of(colour);
     add(fmt::format("chroma.spectra.{}_hue_deg", first.name),

@@ -8,6 +8,7 @@
 #include "core/error.h"
 #include "core/units.h"
 #include "lab/scenes_folder.h"
+#include "sim/device.h"
 
 namespace touchstone::lab {
 namespace {
@@ -109,6 +110,19 @@ TEST(TiltedMarker, LooksNarrowerAndYellowerAndAPressedOneLarger) {
   const TiltReading ball = look(TiltMarker::ball, {});
   const TiltReading turned = look(TiltMarker::ball, {0.5, Eigen::Vector3d::Zero()});
   EXPECT_LT(std::abs(turned.hue - ball.hue), 0.2 * (tilted.hue - level.hue));
+}
+
+TEST(NearBench, IsTheDevicesOwn) {
+  const sim::DeviceSpec device = sim::read_device(scenes_folder() / "devices" / "chroma.yaml");
+  const TiltBench bench = near_bench();
+  EXPECT_EQ(bench.gel_mm, device.gel.thickness_mm);
+  EXPECT_EQ(bench.plate_mm, device.plate.thickness_mm);
+  EXPECT_EQ(bench.side_mm, device.coating->print->width_mm);
+  EXPECT_EQ(bench.film_mm, device.films->side_mm);
+  EXPECT_EQ(bench.lens_mm, device.camera->focal_length_mm);
+  EXPECT_EQ(bench.camera_mm, -device.camera->hole_position_mm.z());
+  EXPECT_EQ(bench.pixel_pitch_um, device.camera->pixel_pitch_um);
+  EXPECT_EQ(bench.f_number, device.camera->f_number);
 }
 
 TEST(MeasureTilt, FindsTheGainThatTheLensHas) {

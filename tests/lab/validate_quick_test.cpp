@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 #include "lab/validation.h"
@@ -32,6 +33,22 @@ TEST_P(QuickValidation, EveryRowHoldsAndIsNamedAfterItsGroup) {
     EXPECT_TRUE(ids.insert(row.id).second) << row.id << " stands twice";
     EXPECT_EQ(row.id.rfind(GetParam() + ".", 0), 0u) << row.id;
     EXPECT_TRUE(row.published || row.reference) << row.id << " is held against nothing";
+  }
+}
+
+// Of the chroma text's design rules and remedies some are refuted, so not every row of its group holds.
+TEST(QuickChromaDesign, HasAFigureInEveryRow) {
+  const std::vector<ValidationRow> rows = quick("chroma.design");
+  EXPECT_EQ(rows.size(), 15u);
+  for (const ValidationRow& row : rows) {
+    EXPECT_EQ(row.id.rfind("chroma.", 0), 0u) << row.id;
+    EXPECT_TRUE(std::isfinite(row.ours)) << row.id;
+    EXPECT_TRUE(row.quick) << row.id;
+    if (row.id.rfind("chroma.design.thickness", 0) == 0) {
+      EXPECT_TRUE(row.series) << row.id;
+      EXPECT_LT(row.ours, 1.0) << row.id;               // some 0.38 of the marker's width
+      EXPECT_GT(row.reference.value(), 6.0) << row.id;  // eqs. 1 to 3
+    }
   }
 }
 
