@@ -22,11 +22,10 @@ struct FieldForces {
 /// What came of all frames.
 struct FieldSummary {
   int frames = 0;
-  int markers = 0;       ///< of all frames together
-  int measured = 0;      ///< of these
-  int extrapolated = 0;  ///< of the measured
-  int without_force =
-      0;  ///< frames with too few markers that are measured and not extrapolated; 0 where none is asked for
+  int markers = 0;        ///< of all frames together
+  int measured = 0;       ///< of these
+  int extrapolated = 0;   ///< of the measured
+  int without_force = 0;  ///< frames with too few markers, measured and not extrapolated; 0 without forces
 };
 
 /// Estimates each frame, in their order, and writes <folder>/displacements.csv and, if `forces` are given,

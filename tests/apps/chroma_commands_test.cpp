@@ -195,6 +195,30 @@ TEST_F(ChromaCommands, WithAComplianceThereAreForces) {
   EXPECT_EQ(std::stod(table[3][4]), 0.0);
 }
 
+TEST_F(ChromaCommands, MarkersBeyondCalibrationTakeNoPartInForces) {
+  sensors::save(sensors::test::half_space_markers(kSide, 5, 3.0), folder_.path() / "gel.compliance");
+  std::vector<Eigen::Vector3d> displacements = all_by(Eigen::Vector3d::Zero());
+  displacements[12] = {0.0, -0.8, -0.4};  // sheared by 0.6 at the most in calibration
+  sim::write_png(folder_.path() / "new/a.png", paint(displacements));
+  ASSERT_EQ(calibrate(kHeader + lines_).exit_code, 0);
+  const ProgramRun run = estimate({"--compliance", in("gel.compliance")});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("25 of 25 markers measured, 1 of them beyond what calibration saw"));
+  EXPECT_EQ(table_of(in("out/displacements.csv"))[13][6], "1");
+  const auto forces = table_of(in("out/forces.csv"));
+  EXPECT_EQ(forces[1][1], "24");
+  EXPECT_EQ(forces[1][15], "no contact");
+}
+
+TEST_F(ChromaCommands, AMarkerMissingAtRestIsNamed) {
+  ColourPicture picture = resting();
+  picture.stretch.assign(picture.count(), 1.0);
+  picture.stretch[11] = 0.0;
+  sim::write_png(folder_.path() / "without.png", sensors::test::paint_colour_markers(picture));
+  expect_refused(calibrate(kHeader + lines_, {}, "without.png"),
+                 "table.csv:2: marker (1, 2) isn't sound in the picture at rest: missing");
+}
+
 TEST_F(ChromaCommands, TablesAreRefusedWithLineAndField) {
   const auto refused = [&](const std::string& table, const std::string& part) {
     expect_refused(calibrate(table), part);
