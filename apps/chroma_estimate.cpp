@@ -39,7 +39,8 @@ void estimate(const EstimateOptions& options, const GlobalOptions& global) {
   fmt::print("  {} of {} markers measured, {} of them beyond what calibration saw\n", summary.measured, summary.markers,
              summary.extrapolated);
   if (summary.without_force > 0) {
-    fmt::print("  {} frames with too few measured markers for a force\n", summary.without_force);
+    fmt::print("  {} frames with too few markers, measured and not beyond calibration, for a force\n",
+               summary.without_force);
   }
 }
 

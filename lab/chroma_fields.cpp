@@ -56,6 +56,16 @@ void add_displacements(const std::string& file, const sensors::ColourMarkerReadi
   }
 }
 
+/// Without the markers that look as nothing did in calibration: a polynomial may be far off there, and one such marker
+/// spoils the whole frame's forces.
+sensors::MarkerField trusted(const sensors::HueField& field) {
+  sensors::MarkerField markers = field.field;
+  for (std::size_t i = 0; i < markers.measured.size(); ++i) {
+    if (field.extrapolated[i]) markers.measured[i] = 0;
+  }
+  return markers;
+}
+
 /// Fields in the order of time to lines of forces.csv.
 class ForceTable {
  public:
@@ -65,16 +75,16 @@ class ForceTable {
 
   /// False if too few markers are measured for a force: its cells are empty then.
   bool add(const std::string& file, const sensors::HueField& field, std::string& csv) {
-    const auto measured = std::count(field.field.measured.begin(), field.field.measured.end(), 1);
-    const auto extrapolated = std::count(field.extrapolated.begin(), field.extrapolated.end(), 1);
-    csv += fmt::format("{},{},{}", file, measured, extrapolated);
-    if (measured < sensors::TractionInversion::kLeastMarkers) {
+    const sensors::MarkerField markers = trusted(field);
+    const auto used = std::count(markers.measured.begin(), markers.measured.end(), 1);
+    csv += fmt::format("{},{}", file, used);
+    if (used < sensors::TractionInversion::kLeastMarkers) {
       observer_.restart();
       csv += fmt::format("{},too few markers,,,,\n", std::string(13, ','));
       return false;
     }
-    const sensors::TractionField tractions = inversion_.invert(field.field);
-    const sensors::FrictionState& friction = observer_.look(field.field, tractions);
+    const sensors::TractionField tractions = inversion_.invert(markers);
+    const sensors::FrictionState& friction = observer_.look(markers, tractions);
     for (int i = 0; i < 6; ++i) csv += fmt::format(",{:.5f}", tractions.wrench[i]);
     for (int i = 0; i < 6; ++i) csv += fmt::format(",{:.5f}", tractions.sigma(i));
     csv += fmt::format(",{:.3f},{}", tractions.misfit, sensors::name_of(friction.state));
@@ -92,7 +102,7 @@ class ForceTable {
   }
 
   static std::string header() {
-    std::string columns = "file,measured,extrapolated";
+    std::string columns = "file,markers";
     for (const char* prefix : {"", "sigma_"}) {
       for (const char axis : {'x', 'y', 'z'}) columns += fmt::format(",{}force_{}_N", prefix, axis);
       for (const char axis : {'x', 'y', 'z'}) columns += fmt::format(",{}torque_{}_Nmm", prefix, axis);

@@ -25,7 +25,7 @@ struct FieldSummary {
   int markers = 0;        ///< of all frames together
   int measured = 0;       ///< of these
   int extrapolated = 0;   ///< of the measured
-  int without_force = 0;  ///< frames with too few measured markers for one; 0 where none is asked for
+  int without_force = 0;  ///< frames with too few markers, measured and not extrapolated; 0 without forces
 };
 
 /// Estimates each frame, in their order, and writes <folder>/displacements.csv and, if `forces` are given,

@@ -12,7 +12,7 @@ namespace {
 constexpr double kGel_mm = 8.0;  // as scenes/devices/chroma.yaml
 constexpr double kGelIndex = 1.41;
 constexpr double kWhite = 0.9;
-constexpr double kBlack = 0.04;  // of carbon black in silicone
+constexpr double kBlack = 0.04;  // a matt black print; a size by a threshold hardly depends on it
 constexpr double kLargest = 1.6;
 constexpr int kRimParts = 16;  // the picture's rim that white is measured on is this part of its width
 
@@ -31,7 +31,7 @@ TiltBench bench_of(const RenderedRungs& rungs) {
   return bench;
 }
 
-/// Black markers and nothing before them.
+/// Black markers behind a film that takes no light; its faces in the gel reflect a thousandth.
 TiltSpectra black_and_white(TiltSpectra spectra) {
   spectra.magenta.setConstant(kBlack);
   spectra.film.setOnes();

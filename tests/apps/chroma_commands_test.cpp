@@ -177,22 +177,46 @@ TEST_F(ChromaCommands, WithAComplianceThereAreForces) {
   ASSERT_EQ(calibrate(kHeader + lines_).exit_code, 0);
   const ProgramRun run = estimate({"--compliance", in("gel.compliance"), "--normal-noise-mm", "0.05"});
   ASSERT_EQ(run.exit_code, 0) << run.err;
-  EXPECT_THAT(run.out, HasSubstr("1 frames with too few measured markers for a force"));
+  EXPECT_THAT(run.out, HasSubstr("1 frames with too few markers"));
   const auto table = table_of(in("out/forces.csv"));
   ASSERT_EQ(table.size(), 4u);
-  for (const auto& line : table) ASSERT_EQ(line.size(), 21u);
-  EXPECT_EQ(table[0][5], "force_z_N");
-  EXPECT_EQ(table[0][11], "sigma_force_z_N");
-  EXPECT_EQ(table[0][16], "slip");
-  const double error = std::stod(table[1][5]) - force;
+  for (const auto& line : table) ASSERT_EQ(line.size(), 20u);
+  EXPECT_EQ(table[0][4], "force_z_N");
+  EXPECT_EQ(table[0][10], "sigma_force_z_N");
+  EXPECT_EQ(table[0][15], "slip");
+  const double error = std::stod(table[1][4]) - force;
   EXPECT_LT(std::abs(error), 0.15 * force);
-  EXPECT_LT(std::abs(error), 4.0 * std::stod(table[1][11]));
-  EXPECT_NE(table[1][16], "no contact");
+  EXPECT_LT(std::abs(error), 4.0 * std::stod(table[1][10]));
+  EXPECT_NE(table[1][15], "no contact");
   EXPECT_EQ(table[2][1], "0");
-  EXPECT_EQ(table[2][5], "");
-  EXPECT_EQ(table[2][16], "too few markers");
-  EXPECT_EQ(table[3][16], "no contact");
-  EXPECT_EQ(std::stod(table[3][5]), 0.0);
+  EXPECT_EQ(table[2][4], "");
+  EXPECT_EQ(table[2][15], "too few markers");
+  EXPECT_EQ(table[3][15], "no contact");
+  EXPECT_EQ(std::stod(table[3][4]), 0.0);
+}
+
+TEST_F(ChromaCommands, MarkersBeyondCalibrationTakeNoPartInForces) {
+  sensors::save(sensors::test::half_space_markers(kSide, 5, 3.0), folder_.path() / "gel.compliance");
+  std::vector<Eigen::Vector3d> displacements = all_by(Eigen::Vector3d::Zero());
+  displacements[12] = {0.0, -0.8, -0.4};  // sheared by 0.6 at the most in calibration
+  sim::write_png(folder_.path() / "new/a.png", paint(displacements));
+  ASSERT_EQ(calibrate(kHeader + lines_).exit_code, 0);
+  const ProgramRun run = estimate({"--compliance", in("gel.compliance")});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("25 of 25 markers measured, 1 of them beyond what calibration saw"));
+  EXPECT_EQ(table_of(in("out/displacements.csv"))[13][6], "1");
+  const auto forces = table_of(in("out/forces.csv"));
+  EXPECT_EQ(forces[1][1], "24");
+  EXPECT_EQ(forces[1][15], "no contact");
+}
+
+TEST_F(ChromaCommands, AMarkerMissingAtRestIsNamed) {
+  ColourPicture picture = resting();
+  picture.stretch.assign(picture.count(), 1.0);
+  picture.stretch[11] = 0.0;
+  sim::write_png(folder_.path() / "without.png", sensors::test::paint_colour_markers(picture));
+  expect_refused(calibrate(kHeader + lines_, {}, "without.png"),
+                 "table.csv:2: marker (1, 2) isn't sound in the picture at rest: missing");
 }
 
 TEST_F(ChromaCommands, TablesAreRefusedWithLineAndField) {
