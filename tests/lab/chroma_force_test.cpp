@@ -105,6 +105,21 @@ TEST(ChromaForce, RunsRepeat) {
   }
 }
 
+TEST(ChromaForce, FramesWithTooFewMarkersAreCountedNotInverted) {
+  const MarkerReader whole = noisy_truth({7, 7}, 0.02, 0.06, 11);
+  const MarkerReader lost = [&](const ForceFrame& frame) {
+    sensors::MarkerField field = whole(frame);
+    const auto left = static_cast<std::size_t>(sensors::TractionInversion::kLeastMarkers - (frame.number > 1 ? 1 : 0));
+    for (std::size_t m = left; m < field.measured.size(); ++m) field.measured[m] = 0;
+    return field;
+  };
+  const ForceRun run = run_force_probe(bench(), punch(), lost, {0.1, 0.4, 2});
+  EXPECT_EQ(run.samples.size(), 2u);
+  EXPECT_EQ(run.unread, 3);
+  EXPECT_EQ(score({run, run}).unread, 6);
+  EXPECT_EQ(score({run, run}).frames, 4);
+}
+
 /// Where strains are small, linear and finite elasticity are one; deeper, the linear map must fall behind.
 TEST(ChromaForce, LargeStrainsAreToldApartFromSmallOnes) {
   fem::SlabMesh slab;
