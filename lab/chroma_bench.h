@@ -1,6 +1,6 @@
 #pragma once
-// A chroma device on a bench: objects press its markers, its camera's pictures are read, and the truth of each marker is
-// kept beside the reading.
+// A chroma device on a bench: objects press its markers, its camera's pictures are read, and the truth of each marker
+// is kept beside the reading.
 
 #include <cstdint>
 #include <span>
@@ -23,7 +23,8 @@ struct ChromaLook {
 /// How far a chroma experiment presses and shears, for a rig's light.
 sim::TouchRigSettings chroma_rig_settings(std::uint64_t seed);
 
-/// Apparent distance from the camera to the markers at rest and where its axis meets them, as the device's drawing says.
+/// Apparent distance from the camera to the markers at rest and where its axis meets them, as the device's drawing
+/// says.
 /// @throws Error for a device without a camera
 sensors::ViewParallax parallax_of(const sim::DeviceSpec& device);
 
