@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
 #include <map>
 #include <memory>
 
@@ -20,7 +21,6 @@ constexpr std::size_t kPressFrames = 3;
 
 /// A device on its bench, and a ball of 12.7 mm that has been pressed in by 1.8 mm and then pulled along x by 0.6 mm.
 struct Pressed {
-  test::TemporaryFolder folder;
   sim::DeviceSpec device;
   sim::TouchRig rig;
   ChromaBench bench;
@@ -31,7 +31,7 @@ struct Pressed {
 
   explicit Pressed(const std::string& name)
       : device(sim::read_device(std::string(TOUCHSTONE_SOURCE_DIR) + "/scenes/devices/" + name + ".yaml")),
-        rig(device, folder.path(), chroma_rig_settings(5)),
+        rig(device, cache(), chroma_rig_settings(5)),
         bench(rig, 5),
         map(sensors::map_of_rest(bench.rest(), bench.spacing_mm())) {
     const sim::ObjectSpec ball =
@@ -48,6 +48,11 @@ struct Pressed {
     looks = bench.play(ball, motion, 11);
   }
 
+  /// The devices have the same gel.
+  static const std::filesystem::path& cache() {
+    static const test::TemporaryFolder folder;
+    return folder.path();
+  }
   /// Of a marker that is sound in frame `frame`.
   sensors::MarkerChange change(std::size_t frame, std::size_t marker) const {
     return sensors::change_of(looks[frame].reading.markers[marker], bench.rest().markers[marker], map);
@@ -80,7 +85,7 @@ TEST_P(ChromaDevices, AllMarkersAreReadAtRestWhereTheyArePrinted) {
   EXPECT_EQ(rest.light, sensors::FrameLight::kNormal);
   for (std::size_t i = 0; i < rest.markers.size(); ++i) {
     ASSERT_EQ(rest.markers[i].flaw, sensors::MarkerFlaw::kNone) << i;
-    const Eigen::Vector2d at = p.map(rest.markers[i].ink_centroid_px);
+    const Eigen::Vector2d at = p.rig.gel_from_pixel(rest.markers[i].ink_centroid_px);
     EXPECT_LT((at - p.bench.markers().markers[i].centre).norm(), 0.1) << i;
     // Red: between the film's yellow and the ink's magenta.
     EXPECT_LT(std::abs(std::remainder(rest.markers[i].hue, 2.0 * kPi)), 0.35) << i;
@@ -147,8 +152,9 @@ TEST_P(ChromaDevices, ParallaxTakenOffLeavesASmallerLateralError) {
   EXPECT_LT(with, 0.3 * without);  // squares
 }
 
-INSTANTIATE_TEST_SUITE_P(Devices, ChromaDevices, testing::Values("chroma", "chroma-compact"),
-                         [](const auto& info) { return std::string(info.param) == "chroma" ? "Bench" : "Compact"; });
+INSTANTIATE_TEST_SUITE_P(Devices, ChromaDevices, testing::Values("chroma", "chroma-compact"), [](const auto& device) {
+  return std::string(device.param) == "chroma" ? "Bench" : "Compact";
+});
 
 TEST(ChromaBench, DistanceToTheMarkersIsThatOfTheDrawing) {
   sim::DeviceSpec device = sim::read_device(std::string(TOUCHSTONE_SOURCE_DIR) + "/scenes/devices/chroma-compact.yaml");

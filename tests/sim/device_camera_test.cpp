@@ -8,6 +8,7 @@
 #include <string>
 
 #include "core/error.h"
+#include "core/units.h"
 
 namespace touchstone::sim {
 namespace {
@@ -108,6 +109,27 @@ TEST(DeviceCamera, BlurIsTheLargestAtTheNearOrTheFarEnd) {
   const double infinite = std::numeric_limits<double>::infinity();
   EXPECT_NEAR(blur_radius_px(lens, 5.0), 0.5 * render::blur_circle_mm(camera, 5.0) / px, 1e-9);
   EXPECT_NEAR(blur_radius_px(lens, 20.0), 0.5 * render::blur_circle_mm(camera, infinite) / px, 1e-9);
+}
+
+// The camera turns clockwise, as seen from behind it, so its picture turns the other way.
+TEST(DeviceCamera, ARolledCamerasPictureIsTurnedTheOtherWay) {
+  const render::LensCamera upright = lens_of(kLens);
+  EXPECT_EQ(error_of(kLens + "roll_deg: -180\n"), "");
+  for (const double roll_deg : {-90.0, 3.0, 40.0, 180.0}) {
+    const render::LensCamera rolled = lens_of(kLens + "roll_deg: " + std::to_string(roll_deg) + "\n");
+    EXPECT_EQ(rolled.gel_from_camera.translation, upright.gel_from_camera.translation);
+    const double roll = roll_deg * kRadiansPerDegree;
+    for (const Eigen::Vector3d& place :
+         {Eigen::Vector3d(1, 2, 0), Eigen::Vector3d(4, 1, -2), Eigen::Vector3d(-3, 5, 1)}) {
+      const Eigen::Vector2d middle(320, 240);
+      const Eigen::Vector2d before = render::project(upright, upright.gel_from_camera.inverse() * place) - middle;
+      const Eigen::Vector2d after = render::project(rolled, rolled.gel_from_camera.inverse() * place) - middle;
+      // x to the right and y down: turned by +angle is clockwise.
+      EXPECT_LT((after - Eigen::Rotation2Dd(-roll) * before).norm(), 1e-9) << roll_deg;
+    }
+  }
+  EXPECT_THAT(error_of(kLens + "roll_deg: 181\n"), HasSubstr("roll_deg"));
+  EXPECT_THAT(error_of(kLens + "roll_deg: .nan\n"), HasSubstr("roll_deg"));
 }
 
 }  // namespace

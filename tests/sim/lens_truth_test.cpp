@@ -169,5 +169,35 @@ TEST(LensTruth, PixelsThatLookNowhereSeeNothing) {
   EXPECT_GT(nothing, 100);
 }
 
+// Turned by a quarter about its axis, the camera sees the same in a turned picture: layer by layer, and its frames.
+TEST(LensTruth, ARolledCamerasLayersAreTurnedAsItsPictureIs) {
+  const Played& p = pressed();
+  const SeenGeometry seen = seen_of(p, p.truths.back().press);
+  DeviceSpec device = p.scene.device;
+  make_lens(*device.camera);
+  device.camera->distortion.clear();
+  device.camera->width = device.camera->height = 120;
+  const double focal = 5.0 / 0.018;
+  device.camera->camera_matrix = Eigen::Vector4d(focal, focal, 59.5, 59.5);
+  const LinearImage upright = pixel_truth(seen, camera_of(*device.camera), all_layers());
+  device.camera->roll_deg = 90.0;
+  const LinearImage rolled = pixel_truth(seen, camera_of(*device.camera), all_layers());
+  for (const char* layer : {"depth.Z", "contact.Y"}) {
+    cv::Mat turned;
+    cv::rotate(channel(upright, layer), turned, cv::ROTATE_90_COUNTERCLOCKWISE);
+    const cv::Mat differs = cv::abs(channel(rolled, layer) - turned) > 1e-4;
+    EXPECT_LT(cv::countNonZero(differs), 0.002 * 120 * 120) << layer;  // rays that meet edges
+  }
+  // Flow is of the picture: what went to the right goes up in one that is turned.
+  EXPECT_GT(cv::norm(channel(upright, "flow.X"), cv::NORM_INF), 0.1);
+  cv::Mat x, y;
+  cv::rotate(channel(upright, "flow.X"), x, cv::ROTATE_90_COUNTERCLOCKWISE);
+  cv::rotate(channel(upright, "flow.Y"), y, cv::ROTATE_90_COUNTERCLOCKWISE);
+  const cv::Mat wrong_x = cv::abs(channel(rolled, "flow.X") - y) > 1e-3;
+  const cv::Mat wrong_y = cv::abs(channel(rolled, "flow.Y") + x) > 1e-3;
+  EXPECT_LT(cv::countNonZero(wrong_x), 0.002 * 120 * 120);
+  EXPECT_LT(cv::countNonZero(wrong_y), 0.002 * 120 * 120);
+}
+
 }  // namespace
 }  // namespace touchstone::sim

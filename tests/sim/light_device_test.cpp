@@ -6,6 +6,7 @@
 
 #include <opencv2/core.hpp>
 
+#include "core/error.h"
 #include "render/spectral_bands.h"
 #include "sim/pixel_truth.h"
 #include "sim/scene_bands.h"
@@ -145,6 +146,21 @@ lamps:
   // As the file wants them.
   EXPECT_EQ(make_plan(scene_of(device(kCamera + "bands: {count: 8}\n"))).bands.count(), 8);
   EXPECT_EQ(make_plan(scene_of(device(kCamera + "band_wavelengths_nm: [550]\n"))).bands.count(), 1);
+}
+
+// Objects are described once for all devices: what a coating hides needs no colour in a device's own bands.
+TEST(LightDevice, AnObjectOfThreeColoursUnderACoatingFitsAnyBands) {
+  SceneSpec coated = scene_of(device(kCamera + kSpectra + kPrinted));
+  coated.object =
+      parse_yaml<ObjectSpec>("{name: ball, shape: {type: sphere, radius_mm: 3}, albedo: [0.6, 0.5, 0.4]}", "ball.yaml");
+  EXPECT_EQ(make_plan(coated).bands.count(), 16);
+  coated.outputs.radiance = true;
+  const Seen seen = see(coated);
+  EXPECT_EQ(seen.camera->capture(seen.truths.back()).radiance.channels(), 16);
+  // Bare, its colour is seen.
+  SceneSpec bare = scene_of(device(kCamera + kSpectra));
+  bare.object = coated.object;
+  EXPECT_THROW(make_plan(bare), Error);
 }
 
 // Light that passes a film of dye transmittance t twice, straight on: what is white behind it keeps t^2 of its light in
