@@ -128,7 +128,7 @@ TiltBench compact_bench() {
 TiltBench near_bench() {
   TiltBench bench;
   bench.gel_mm = 8.0;
-  bench.film_mm = 1.72;
+  bench.film_mm = 1.54;
   bench.camera_mm = 65.06;
   bench.pixel_pitch_um = 36.08;
   bench.f_number = 11.0;
