@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <ctime>
 #include <opencv2/core/utility.hpp>
 #include <opencv2/imgproc.hpp>
 
@@ -45,13 +44,6 @@ Ladder rendered_ladder(const ValidateOptions& options) {
                 drawn_robustness_settings()};
   ladder.settings.filter_px = how.filter_px;
   return ladder;
-}
-
-/// Seconds that this thread has worked: what others on the machine take doesn't count.
-double thread_seconds() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
 /// Pictures of the device at rest and under a ball that is pressed in and sheared, and a model for them.

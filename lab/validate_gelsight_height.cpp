@@ -6,7 +6,6 @@
 
 #include <chrono>
 #include <cmath>
-#include <ctime>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
@@ -188,13 +187,6 @@ double detail_over_noise(const Bench& bench, const sim::ObjectSpec& spec, double
   cv::Scalar deviation;
   cv::meanStdDev(part - smooth, mean, deviation);
   return kMicrometresPerMillimetre * deviation[0] / noise;
-}
-
-/// Seconds that this thread has worked: what others on the machine take doesn't count.
-double thread_seconds() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
 /// Frames a second of one core: the best of some rounds.
