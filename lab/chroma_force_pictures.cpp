@@ -4,6 +4,7 @@
 
 #include "core/error.h"
 #include "sensors/hue_estimator.h"
+#include "sensors/seen_markers.h"
 
 namespace touchstone::lab {
 namespace {
@@ -100,10 +101,13 @@ sensors::HueModel calibrate_on_probes(const ForceBench& bench, const ChromaBench
 }
 
 std::vector<sensors::MarkerField> fields_of(const std::vector<ChromaLook>& looks, const ChromaBench& camera,
-                                            const sensors::HueModel& model) {
+                                            const sensors::HueModel& model,
+                                            const sensors::MarkerCompliance& compliance) {
   const sensors::HueEstimator estimator(model, camera.rest());
   std::vector<sensors::MarkerField> fields;
-  for (const ChromaLook& look : looks) fields.push_back(estimator.estimate(look.reading).field);
+  for (const ChromaLook& look : looks) {
+    fields.push_back(sensors::as_seen(estimator.estimate(look.reading).field, compliance, model.parallax));
+  }
   return fields;
 }
 

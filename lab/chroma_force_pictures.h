@@ -28,9 +28,10 @@ std::vector<ForceProbe> calibration_probes(bool quick);
 sensors::HueModel calibrate_on_probes(const ForceBench& bench, const ChromaBench& camera, bool quick,
                                       std::uint64_t noise_seed);
 
-/// What a model says of all looks, in their order.
+/// What a model says of all looks, in their order, with lateral displacements as seen (sensors/seen_markers.h).
 std::vector<sensors::MarkerField> fields_of(const std::vector<ChromaLook>& looks, const ChromaBench& camera,
-                                            const sensors::HueModel& model);
+                                            const sensors::HueModel& model,
+                                            const sensors::MarkerCompliance& compliance);
 
 /// Tells the field of a frame by the frame's number. @pre there is one for each frame that is asked for
 MarkerReader told_fields(std::vector<sensors::MarkerField> fields);

@@ -6,11 +6,13 @@
 
 #include <chrono>
 #include <cmath>
+#include <utility>
 
 #include "core/error.h"
 #include "lab/chroma_force_pictures.h"
 #include "lab/seconds_since.h"
 #include "lab/validation.h"
+#include "sensors/seen_markers.h"
 
 namespace touchstone::lab {
 namespace {
@@ -48,21 +50,38 @@ class Rows {
   std::vector<ValidationRow> rows_;
 };
 
-/// How far off a model's displacements are on probes that are neither those of the calibration nor those of the rows.
-sensors::HueErrors verify(const ForceBench& bench, const ChromaBench& camera, const sensors::HueModel& model,
-                          int count) {
+/// How far off a model's displacements are, root mean square over all measured markers, on probes that are neither
+/// those of the calibration nor those of the rows; lateral ones as seen.
+struct FieldNoise {
+  double lateral_mm = 0.0, normal_mm = 0.0;
+};
+
+FieldNoise verify(const ForceBench& bench, const ChromaBench& camera, const sensors::HueModel& model, int count) {
   const DragSettings drag{.step_mm = 0.4, .frames_after = 3};
-  std::vector<sensors::HueSample> samples;
-  int series = 0;
+  FieldNoise noise;
+  int markers = 0;
+  std::uint64_t seed = kVerification;
   for (const ForceProbe& probe : draw_force_probes(count, kVerification)) {
-    const auto looks = photograph_probe(bench, camera, probe, drag, kVerification + static_cast<std::uint64_t>(series));
-    const auto all = samples_of_moved(looks, 0.0, series++);
-    samples.insert(samples.end(), all.begin(), all.end());
+    const std::vector<ChromaLook> looks = photograph_probe(bench, camera, probe, drag, ++seed);
+    const std::vector<sensors::MarkerField> fields = fields_of(looks, camera, model, bench.compliance);
+    for (std::size_t k = 0; k < looks.size(); ++k) {
+      sensors::MarkerField truth = fields[k];
+      truth.displacement = looks[k].truth;
+      truth = sensors::as_seen(std::move(truth), bench.compliance, model.parallax);
+      for (std::size_t m = 0; m < truth.displacement.size(); ++m) {
+        if (!truth.measured[m]) continue;
+        const Eigen::Vector3d error = fields[k].displacement[m] - truth.displacement[m];
+        noise.lateral_mm += 0.5 * error.head<2>().squaredNorm();
+        noise.normal_mm += error.z() * error.z();
+        ++markers;
+      }
+    }
   }
-  return sensors::hue_errors(model, camera.rest(), samples);
+  if (markers == 0) fail("no marker was measured on the verification's probes");
+  return {std::sqrt(noise.lateral_mm / markers), std::sqrt(noise.normal_mm / markers)};
 }
 
-void add_force_rows(Rows& rows, const ForceScore& pictures, const ForceScore& ideal, const sensors::HueErrors& noise) {
+void add_force_rows(Rows& rows, const ForceScore& pictures, const ForceScore& ideal, const FieldNoise& noise) {
   const double mean_normal_N = pictures.mean_truth_N.z();
   const double bar_N = kForceShare * mean_normal_N;
   rows.add("chroma.force.error_N",
@@ -83,7 +102,7 @@ void add_force_rows(Rows& rows, const ForceScore& pictures, const ForceScore& id
   rows.add("chroma.force.ideal_error_N",
            fmt::format("normal force from true displacements with independent noise of what pictures err by, {:.0f} um "
                        "lateral and {:.0f} um normal",
-                       1000.0 * noise.rms_lateral_mm, 1000.0 * noise.rms_press_mm),
+                       1000.0 * noise.lateral_mm, 1000.0 * noise.normal_mm),
            "N", Better::lower, bar_N, ideal.mean_absolute_N.z());
 }
 
@@ -118,9 +137,13 @@ std::vector<ValidationRow> validate_chroma_force(const ValidateOptions& options)
   const ChromaBench camera(rig, kUnit);
 
   const sensors::HueModel model = calibrate_on_probes(bench, camera, options.quick, kCalibration);
-  const sensors::HueErrors noise = verify(bench, camera, model, options.quick ? 1 : 3);
-  bench.inversion.lateral_noise_mm = bench.friction.lateral_noise_mm = noise.rms_lateral_mm;
-  bench.inversion.normal_noise_mm = noise.rms_press_mm;
+  const FieldNoise noise = verify(bench, camera, model, options.quick ? 2 : 3);
+  bench.inversion.lateral_noise_mm = bench.friction.lateral_noise_mm = noise.lateral_mm;
+  bench.inversion.normal_noise_mm = noise.normal_mm;
+
+  // What the camera sees has parallax in it; the ideal is of displacements without.
+  const ForceBench straight = bench;
+  bench.compliance = sensors::as_seen(bench.compliance, model.parallax);
 
   DragSettings drag;
   drag.step_mm = options.quick ? 0.3 : 0.2;
@@ -129,16 +152,15 @@ std::vector<ValidationRow> validate_chroma_force(const ValidateOptions& options)
   std::uint64_t seed = kProbes;
   for (const ForceProbe& probe : draw_force_probes(options.quick ? 2 : 9, kProbes)) {
     const std::vector<sensors::MarkerField> fields =
-        fields_of(photograph_probe(bench, camera, probe, drag, ++seed), camera, model);
+        fields_of(photograph_probe(bench, camera, probe, drag, ++seed), camera, model, straight.compliance);
     pictures.push_back(run_force_probe(bench, probe, told_fields(fields), drag));
-    const MarkerReader noisy =
-        noisy_truth(bench.compliance.marker_grid, noise.rms_lateral_mm, noise.rms_press_mm, seed);
+    const MarkerReader noisy = noisy_truth(bench.compliance.marker_grid, noise.lateral_mm, noise.normal_mm, seed);
     const MarkerReader ideal_reader = [&](const ForceFrame& frame) {
       sensors::MarkerField field = noisy(frame);
       field.measured = fields[static_cast<std::size_t>(frame.number)].measured;
       return field;
     };
-    ideal.push_back(run_force_probe(bench, probe, ideal_reader, drag));
+    ideal.push_back(run_force_probe(straight, probe, ideal_reader, drag));
   }
   add_force_rows(rows, score(pictures), score(ideal), noise);
   add_friction_rows(rows, score(pictures), true);
