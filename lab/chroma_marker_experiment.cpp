@@ -5,6 +5,9 @@
 #include <limits>
 
 #include "core/error.h"
+#include "lab/chroma_force_experiment.h"
+#include "sensors/seen_markers.h"
+#include "sim/virtual_sensor.h"
 
 namespace touchstone::lab {
 namespace {
@@ -190,17 +193,36 @@ sensors::HueModel calibrate_field(const ChromaBench& bench, bool quick, std::uin
   return sensors::calibrate_hue(bench.rest(), samples, settings);
 }
 
-FieldScore field_under(const ChromaBench& bench, const sensors::HueModel& model, const sim::ObjectSpec& punch,
-                       double height_mm, double depth_mm, const Eigen::Vector2d& place_mm, std::uint64_t seed) {
+sensors::TractionInversion elastic_inversion(const ChromaBench& bench, const std::filesystem::path& cache,
+                                             const sensors::ViewParallax& parallax) {
+  const sim::DeviceSpec device = with_probe_mesh(bench.rig().device());
+  const auto gel = sim::set_up_gel(device, cache);
+  // About what the pictures' displacements scatter by (docs/sensors/chroma-force.md): lateral ones are far better.
+  constexpr sensors::TractionSettings kNoise{.lateral_noise_mm = 0.008, .normal_noise_mm = 0.13};
+  return sensors::TractionInversion(sensors::as_seen(export_marker_compliance(device, *gel), parallax), kNoise);
+}
+
+FieldScore field_under(const ChromaBench& bench, const sensors::HueModel& model, sensors::TractionInversion& inversion,
+                       const sim::ObjectSpec& punch, double height_mm, double depth_mm, const Eigen::Vector2d& place_mm,
+                       std::uint64_t seed) {
   const auto looks = bench.play(punch, press_and_drag(place_mm, height_mm, depth_mm, 3, {0, 0}, 0), seed);
   const ChromaLook& look = looks.back();
   const sensors::HueField found = sensors::HueEstimator(model, bench.rest()).estimate(look.reading);
   FieldScore score;
+  const sensors::MarkerField seen = sensors::as_seen(found.field, inversion.compliance(), model.parallax);
+  const sensors::MarkerField elastic =
+      sensors::displacements_under(inversion.compliance(), inversion.invert(seen).traction);
   score.punch = punch.name;
   score.truth = look.truth;
   double press = 0.0;
   double lateral = 0.0;
   for (std::size_t i = 0; i < look.truth.size(); ++i) {
+    // The inversion's displacements are as seen, too.
+    Eigen::Vector3d moved = elastic.displacement[i];
+    moved.head<2>() = model.parallax.true_one(moved.head<2>(), -moved.z(), bench.markers().markers[i].centre);
+    const double off_um = 1000.0 * (moved - look.truth[i]).norm();
+    score.elastic_mean_um += off_um / static_cast<double>(look.truth.size());
+    score.elastic_worst_um = std::max(score.elastic_worst_um, off_um);
     score.largest_true_um = std::max(score.largest_true_um, 1000.0 * look.truth[i].norm());
     if (found.field.measured[i] == 0) {
       ++score.flawed;

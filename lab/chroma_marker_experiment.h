@@ -6,12 +6,14 @@
 // held against the finite elements' mean displacement of each marker.
 
 #include <cstdint>
+#include <filesystem>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "lab/chroma_bench.h"
 #include "sensors/hue_estimator.h"
+#include "sensors/traction_inversion.h"
 
 namespace touchstone::lab {
 
@@ -73,10 +75,18 @@ struct FieldScore {
   double largest_true_um = 0.0;                     ///< displacement of the marker that moves most
   int measured = 0, flawed = 0, extrapolated = 0;
   std::vector<Eigen::Vector3d> truth, estimate;  ///< mm, by marker; the estimate NaN where not measured
+  /// The same of the displacements under those tractions that explain the estimate best: what mechanics adds to it.
+  double elastic_mean_um = 0.0, elastic_worst_um = 0.0;
 };
+/// Inverts fields told with `parallax`, taking their lateral displacements as seen: the compliance is of another mesh
+/// than the rig's.
+sensors::TractionInversion elastic_inversion(const ChromaBench& bench, const std::filesystem::path& cache,
+                                             const sensors::ViewParallax& parallax);
+
 /// Presses a punch straight down. @pre the punch's lowest point is its origin's z less `height_mm`
-FieldScore field_under(const ChromaBench& bench, const sensors::HueModel& model, const sim::ObjectSpec& punch,
-                       double height_mm, double depth_mm, const Eigen::Vector2d& place_mm, std::uint64_t seed);
+FieldScore field_under(const ChromaBench& bench, const sensors::HueModel& model, sensors::TractionInversion& inversion,
+                       const sim::ObjectSpec& punch, double height_mm, double depth_mm, const Eigen::Vector2d& place_mm,
+                       std::uint64_t seed);
 
 /// Fig. 10's three: a square punch of 10 mm, a flat cylinder of 10 mm, a hemisphere of 16 mm, with friction.
 struct PunchTest {

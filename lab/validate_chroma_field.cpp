@@ -25,6 +25,7 @@ std::vector<ValidationRow> validate_chroma_field(const ValidateOptions& options)
                           chroma_rig_settings(kUnit));
   const ChromaBench bench(rig, kRest);
   const sensors::HueModel model = calibrate_field(bench, options.quick, kCalibration);
+  sensors::TractionInversion inversion = elastic_inversion(bench, options.cache, model.parallax);
   std::vector<ValidationRow> rows;
   const auto add = [&](const std::string& id, const std::string& title, double ours_um) {
     ValidationRow row;
@@ -41,15 +42,20 @@ std::vector<ValidationRow> validate_chroma_field(const ValidateOptions& options)
   };
   int number = 0;
   for (const PunchTest& punch : fig10_punches()) {
-    const FieldScore field =
-        field_under(bench, model, punch.object, punch.height_mm, punch.depth_mm, {0.4, -0.3}, kTest + number++);
+    const FieldScore field = field_under(bench, model, inversion, punch.object, punch.height_mm, punch.depth_mm,
+                                         {0.4, -0.3}, kTest + number++);
     const std::string under =
         fmt::format("a {} {:.1f} mm deep, {} of 100 markers measured", field.punch, punch.depth_mm, field.measured);
     add(field.punch + "_um", fmt::format("mean length of the displacements' error under {}", under), field.mean_um);
     add(field.punch + "_worst_um",
         fmt::format("the same, the worst marker (the largest displacement is {:.0f} um)", field.largest_true_um),
         field.worst_um);
-    add(field.punch + "_lateral_um", "the same, root mean square of a lateral component", field.lateral_rms_um);
+    add(field.punch + "_elastic_um",
+        "mean length of the error of the displacements under the tractions that explain the field best",
+        field.elastic_mean_um);
+    add(field.punch + "_elastic_worst_um", "the same, the worst marker", field.elastic_worst_um);
+    add(field.punch + "_lateral_um",
+        "of the field as told by markers alone: root mean square error of a lateral component", field.lateral_rms_um);
     add(field.punch + "_press_um", "the same, root mean square of the normal component", field.press_rms_um);
   }
   return rows;

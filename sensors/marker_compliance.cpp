@@ -1,5 +1,7 @@
 #include "sensors/marker_compliance.h"
 
+#include "core/error.h"
+
 #include <fmt/format.h>
 
 #include <cmath>
@@ -49,6 +51,19 @@ std::string fault_of(const MarkerCompliance& compliance) {
     return fmt::format("poisson_ratio is {}, it must be above -1 and at most 0.5", c.poisson_ratio);
   }
   return "";
+}
+
+MarkerField displacements_under(const MarkerCompliance& compliance, const Eigen::Matrix3Xd& traction) {
+  TS_ASSERT(traction.cols() == compliance.patches());
+  const Eigen::VectorXd moved =
+      compliance.displacement * Eigen::Map<const Eigen::VectorXd>(traction.data(), traction.size());
+  MarkerField field;
+  field.grid = compliance.marker_grid;
+  field.measured.assign(static_cast<std::size_t>(compliance.markers()), 1);
+  for (int marker = 0; marker < compliance.markers(); ++marker) {
+    field.displacement.emplace_back(moved.segment<3>(3 * marker));
+  }
+  return field;
 }
 
 }  // namespace touchstone::sensors

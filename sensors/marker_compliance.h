@@ -10,6 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "sensors/marker_field.h"
+
 namespace touchstone::sensors {
 
 struct MarkerCompliance {
@@ -39,5 +41,9 @@ inline constexpr int kMostPatches = 4096;
 /// What makes the map unusable, or "": an empty or too large grid, sizes that don't fit each other, a number that isn't
 /// finite, a length or modulus that isn't positive, a Poisson's ratio outside of (-1, 0.5], a matrix of zeros.
 std::string fault_of(const MarkerCompliance& compliance);
+
+/// How the markers move under tractions (on the gel, MPa, a column for each patch): all are measured.
+/// @pre the compliance is sound and has as many patches
+MarkerField displacements_under(const MarkerCompliance& compliance, const Eigen::Matrix3Xd& traction);
 
 }  // namespace touchstone::sensors

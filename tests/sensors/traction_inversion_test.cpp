@@ -35,12 +35,7 @@ class Inversion : public ::testing::Test {
     return tractions;
   }
   MarkerField field_of(const Eigen::VectorXd& tractions) const {
-    const Eigen::VectorXd displacement = map_.displacement * tractions;
-    MarkerField field;
-    field.grid = map_.marker_grid;
-    for (int m = 0; m < map_.markers(); ++m) field.displacement.emplace_back(displacement.segment<3>(3 * m));
-    field.measured.assign(field.displacement.size(), 1);
-    return field;
+    return displacements_under(map_, Eigen::Map<const Eigen::Matrix3Xd>(tractions.data(), 3, map_.patches()));
   }
   static MarkerField with_noise(MarkerField field, std::uint64_t seed) {
     RandomStream random(seed, 0, Purpose::kTest);
