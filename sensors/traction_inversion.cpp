@@ -93,8 +93,9 @@ Eigen::MatrixXd wrench_of(const MarkerCompliance& c, const std::vector<int>& pat
 /// The tractions if just these patches touch.
 struct TractionInversion::Candidate {
   std::vector<int> patches;
-  Eigen::VectorXd x;                   ///< 3 patches
-  Eigen::LLT<Eigen::MatrixXd> factor;  ///< of the information on all of them
+  Eigen::VectorXd x;  ///< 3 patches
+  /// Of the information on all of them. Made of something, since a fresh LLT has indeterminate members to copy.
+  Eigen::LLT<Eigen::MatrixXd> factor{Eigen::MatrixXd::Identity(1, 1)};
   Vector6d wrench = Vector6d::Zero();
   double misfit_square = 0.0;  ///< sum over the measured displacements, over the noise
   double score = 0.0;          ///< -2 log evidence, but for a constant

@@ -118,7 +118,8 @@ class TractionInversion {
   // The first problem, in pressures only: lateral tractions are integrated out.
   Eigen::MatrixXd first_load_;    ///< of data over the noise: patches x 3 markers
   Eigen::MatrixXd first_normal_;  ///< patches x patches
-  Eigen::LLT<Eigen::MatrixXd> first_factor_;
+  /// Made of something, since a fresh LLT has indeterminate members to copy.
+  Eigen::LLT<Eigen::MatrixXd> first_factor_{Eigen::MatrixXd::Identity(1, 1)};
 };
 
 }  // namespace touchstone::sensors
