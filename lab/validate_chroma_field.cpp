@@ -1,11 +1,8 @@
 // Displacement fields of the chroma device under three punches (shared/seeds/002, sec. IV.E, fig. 10) against the
 // finite elements'.
 
-#include <chrono>
-
 #include "lab/chroma_marker_experiment.h"
-#include "lab/seconds_since.h"
-#include "lab/validation.h"
+#include "lab/row_list.h"
 #include "sim/device.h"
 
 namespace touchstone::lab {
@@ -20,25 +17,14 @@ constexpr double kPublishedError_um = 350.0;  // of one marker, sec. IV.D: the t
 }  // namespace
 
 std::vector<ValidationRow> validate_chroma_field(const ValidateOptions& options) {
-  auto begun = std::chrono::steady_clock::now();
+  RowList rows("chroma.field.", options, RowList::Since::last_row);
   const sim::TouchRig rig(sim::read_device(options.scenes / "devices" / "chroma.yaml"), options.cache,
                           chroma_rig_settings(kUnit));
   const ChromaBench bench(rig, kRest);
   const sensors::HueModel model = calibrate_field(bench, options.quick, kCalibration);
   sensors::TractionInversion inversion = elastic_inversion(bench, options.cache, model.parallax);
-  std::vector<ValidationRow> rows;
   const auto add = [&](const std::string& id, const std::string& title, double ours_um) {
-    ValidationRow row;
-    row.id = "chroma.field." + id;
-    row.title = title;
-    row.unit = "um";
-    row.reference = kPublishedError_um;
-    row.ours = ours_um;
-    row.holds = ours_um <= kPublishedError_um;
-    row.quick = options.quick;
-    row.seconds = seconds_since(begun);
-    begun = std::chrono::steady_clock::now();
-    rows.push_back(std::move(row));
+    rows.add_bounded(id, title, "um", Better::lower, kPublishedError_um, false, ours_um);
   };
   int number = 0;
   for (const PunchTest& punch : fig10_punches()) {
@@ -58,7 +44,7 @@ std::vector<ValidationRow> validate_chroma_field(const ValidateOptions& options)
         "of the field as told by markers alone: root mean square error of a lateral component", field.lateral_rms_um);
     add(field.punch + "_press_um", "the same, root mean square of the normal component", field.press_rms_um);
   }
-  return rows;
+  return rows.rows();
 }
 
 }  // namespace touchstone::lab

@@ -4,14 +4,12 @@
 // normal force, as the vhs text asks for 0.1 N of some newtons; friction to 0.1, which tells rubber from steel and the
 // dry from the oiled.
 
-#include <chrono>
 #include <cmath>
 #include <utility>
 
 #include "core/error.h"
 #include "lab/chroma_force_pictures.h"
-#include "lab/seconds_since.h"
-#include "lab/validation.h"
+#include "lab/row_list.h"
 #include "sensors/seen_markers.h"
 
 namespace touchstone::lab {
@@ -23,32 +21,6 @@ constexpr double kStateAgreement_percent = 80;  // of true displacements with 10
 constexpr double kMostUnread_percent = 5;       // ours to choose
 constexpr double kWidest_mm = 3.0;              // friction of 1.2 shears the gel so far
 constexpr std::uint64_t kUnit = 6001, kCalibration = 6100, kVerification = 6200, kProbes = 6300;
-
-class Rows {
- public:
-  explicit Rows(bool quick) : quick_(quick) {}
-
-  void add(const std::string& id, const std::string& title, const std::string& unit, Better better, double bound,
-           double ours) {
-    ValidationRow row;
-    row.id = id;
-    row.title = title;
-    row.unit = unit;
-    row.reference = bound;
-    row.ours = ours;
-    row.better = better;
-    row.holds = better == Better::higher ? ours >= bound : ours <= bound;
-    row.quick = quick_;
-    row.seconds = seconds_since(begun_);
-    rows_.push_back(row);
-  }
-  std::vector<ValidationRow> rows() const { return rows_; }
-
- private:
-  bool quick_;
-  std::chrono::steady_clock::time_point begun_ = std::chrono::steady_clock::now();
-  std::vector<ValidationRow> rows_;
-};
 
 /// How far off a model's displacements are, root mean square over all measured markers, on probes that are neither
 /// those of the calibration nor those of the rows; lateral ones as seen.
@@ -81,54 +53,57 @@ FieldNoise verify(const ForceBench& bench, const ChromaBench& camera, const sens
   return {std::sqrt(noise.lateral_mm / markers), std::sqrt(noise.normal_mm / markers)};
 }
 
-void add_force_rows(Rows& rows, const ForceScore& pictures, const ForceScore& ideal, const FieldNoise& noise) {
+void add_force_rows(RowList& rows, const ForceScore& pictures, const ForceScore& ideal, const FieldNoise& noise) {
   const double mean_normal_N = pictures.mean_truth_N.z();
   const double bar_N = kForceShare * mean_normal_N;
-  rows.add("chroma.force.error_N",
-           fmt::format("normal force from pictures, mean absolute error over {} frames of {:.1f} N on average",
-                       pictures.frames, mean_normal_N),
-           "N", Better::lower, bar_N, pictures.mean_absolute_N.z());
+  rows.add_bounded("chroma.force.error_N",
+                   fmt::format("normal force from pictures, mean absolute error over {} frames of {:.1f} N on average",
+                               pictures.frames, mean_normal_N),
+                   "N", Better::lower, bar_N, false, pictures.mean_absolute_N.z());
   for (const int axis : {0, 1}) {
     const char name = axis == 0 ? 'x' : 'y';
-    rows.add(fmt::format("chroma.force.error_{}_N", name),
-             fmt::format("shear force along {}, of {:.1f} N on average", name, pictures.mean_truth_N[axis]), "N",
-             Better::lower, bar_N, pictures.mean_absolute_N[axis]);
+    rows.add_bounded(fmt::format("chroma.force.error_{}_N", name),
+                     fmt::format("shear force along {}, of {:.1f} N on average", name, pictures.mean_truth_N[axis]),
+                     "N", Better::lower, bar_N, false, pictures.mean_absolute_N[axis]);
   }
-  rows.add("chroma.force.relative_percent", "error of the force's vector, part of its length, mean over frames", "%",
-           Better::lower, 100.0 * kForceShare, 100.0 * pictures.relative);
-  rows.add("chroma.force.unread_percent",
-           "frames that couldn't be read: sheared so far that the markers are under two filters each", "%",
-           Better::lower, kMostUnread_percent, 100.0 * pictures.unread / (pictures.frames + pictures.unread));
-  rows.add("chroma.force.ideal_error_N",
-           fmt::format("normal force from true displacements with independent noise of what pictures err by, {:.0f} um "
-                       "lateral and {:.0f} um normal",
-                       1000.0 * noise.lateral_mm, 1000.0 * noise.normal_mm),
-           "N", Better::lower, bar_N, ideal.mean_absolute_N.z());
+  rows.add_bounded("chroma.force.relative_percent", "error of the force's vector, part of its length, mean over frames",
+                   "%", Better::lower, 100.0 * kForceShare, false, 100.0 * pictures.relative);
+  rows.add_bounded("chroma.force.unread_percent",
+                   "frames that couldn't be read: sheared so far that the markers are under two filters each", "%",
+                   Better::lower, kMostUnread_percent, false,
+                   100.0 * pictures.unread / (pictures.frames + pictures.unread));
+  rows.add_bounded(
+      "chroma.force.ideal_error_N",
+      fmt::format("normal force from true displacements with independent noise of what pictures err by, {:.0f} um "
+                  "lateral and {:.0f} um normal",
+                  1000.0 * noise.lateral_mm, 1000.0 * noise.normal_mm),
+      "N", Better::lower, bar_N, false, ideal.mean_absolute_N.z());
 }
 
-void add_friction_rows(Rows& rows, const ForceScore& score, bool from_pictures) {
+void add_friction_rows(RowList& rows, const ForceScore& score, bool from_pictures) {
   const std::string id = from_pictures ? "chroma.friction." : "chroma.friction.ideal_";
   const std::string from = from_pictures ? "from pictures" : "from true displacements with that noise";
   if (score.friction_known > 0) {
-    rows.add(id + "error",
-             fmt::format("friction coefficient {}, mean absolute error over {} of {} probes that slid", from,
-                         score.friction_known, score.slid),
-             "1", Better::lower, kFrictionError, score.friction_error);
+    rows.add_bounded(id + "error",
+                     fmt::format("friction coefficient {}, mean absolute error over {} of {} probes that slid", from,
+                                 score.friction_known, score.slid),
+                     "1", Better::lower, kFrictionError, false, score.friction_error);
   }
   const double agreement = score.markers.agreement();
   if (std::isfinite(agreement)) {
-    rows.add(id + "state_percent",
-             fmt::format("stick or slip of markers under the probe, {}, that agrees with the finite elements ({} more "
-                         "left unknown)",
-                         from, score.markers.stick_as_unknown + score.markers.slip_as_unknown),
-             "%", Better::higher, kStateAgreement_percent, 100.0 * agreement);
+    rows.add_bounded(
+        id + "state_percent",
+        fmt::format("stick or slip of markers under the probe, {}, that agrees with the finite elements ({} more "
+                    "left unknown)",
+                    from, score.markers.stick_as_unknown + score.markers.slip_as_unknown),
+        "%", Better::higher, kStateAgreement_percent, false, 100.0 * agreement);
   }
 }
 
 }  // namespace
 
 std::vector<ValidationRow> validate_chroma_force(const ValidateOptions& options) {
-  Rows rows(options.quick);
+  RowList rows("", options, RowList::Since::begin);
   const sim::DeviceSpec device = sim::read_device(options.scenes / "devices" / "chroma.yaml");
   ForceBench bench = set_up_force_bench(device, options.cache, options.progress);
   sim::TouchRigSettings light = chroma_rig_settings(kUnit);
@@ -162,9 +137,11 @@ std::vector<ValidationRow> validate_chroma_force(const ValidateOptions& options)
     };
     ideal.push_back(run_force_probe(straight, probe, ideal_reader, drag));
   }
-  add_force_rows(rows, score(pictures), score(ideal), noise);
-  add_friction_rows(rows, score(pictures), true);
-  add_friction_rows(rows, score(ideal), false);
+  const ForceScore of_pictures = score(pictures);
+  const ForceScore of_ideal = score(ideal);
+  add_force_rows(rows, of_pictures, of_ideal, noise);
+  add_friction_rows(rows, of_pictures, true);
+  add_friction_rows(rows, of_ideal, false);
   return rows.rows();
 }
 

@@ -2,15 +2,13 @@
 // (shared/seeds/002, sec. IV.C and D, figs. 8 and 9).
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
 #include <fmt/format.h>
 
 #include "core/units.h"
 #include "lab/chroma_marker_experiment.h"
-#include "lab/seconds_since.h"
-#include "lab/validation.h"
+#include "lab/row_list.h"
 #include "sensors/hue.h"
 #include "sim/device.h"
 
@@ -74,28 +72,12 @@ std::vector<ValidationRow> validate_chroma_marker(const ValidateOptions& options
   const MarkerTest test;
   const std::size_t marker = bench.marker_at(test.place_mm);
   const sensors::ColourMarker& rest = bench.rest().markers[marker];
-  std::vector<ValidationRow> rows;
-  auto begun = std::chrono::steady_clock::now();
-  const auto add = [&](const std::string& id, const std::string& title, const std::string& unit, double ours,
-                       Better better, bool holds) -> ValidationRow& {
-    ValidationRow row;
-    row.id = "chroma." + id;
-    row.title = title;
-    row.unit = unit;
-    row.ours = ours;
-    row.better = better;
-    row.holds = holds;
-    row.quick = options.quick;
-    row.seconds = seconds_since(begun);
-    begun = std::chrono::steady_clock::now();
-    rows.push_back(std::move(row));
-    return rows.back();
-  };
+  RowList rows("chroma.", options, RowList::Since::last_row);
 
   const int pictures = options.quick ? 10 : 50;
   const double repeat = repeat_deg(bench, pictures);
-  add("hue.repeat_deg", fmt::format("standard deviation of a marker's hue in {} pictures of one state", pictures),
-      "deg", repeat, Better::lower, repeat <= kPublishedRepeat_deg)
+  rows.add("hue.repeat_deg", fmt::format("standard deviation of a marker's hue in {} pictures of one state", pictures),
+           "deg", repeat, Better::lower, repeat <= kPublishedRepeat_deg)
       .published = kPublishedRepeat_deg;
 
   const MarkerSeries press = press_series(bench, test, 3.0, options.quick ? 0.25 : 0.05, kPress);
@@ -104,10 +86,10 @@ std::vector<ValidationRow> validate_chroma_marker(const ValidateOptions& options
   for (const Eigen::Vector3d& ball : press.ball_mm) depths.push_back(-ball.z());
   const ChromaLine hue_line = fit_chroma_line(depths, hues);
   {
-    ValidationRow& row =
-        add("hue.linearity_r2",
-            fmt::format("hue against depth under a ball of 4 mm to 3 mm: {:.2f} degrees/mm (fig. 8)", hue_line.slope),
-            "1", hue_line.r2, Better::higher, hue_line.r2 >= kPublishedHue_r2);
+    ValidationRow& row = rows.add(
+        "hue.linearity_r2",
+        fmt::format("hue against depth under a ball of 4 mm to 3 mm: {:.2f} degrees/mm (fig. 8)", hue_line.slope), "1",
+        hue_line.r2, Better::higher, hue_line.r2 >= kPublishedHue_r2);
     row.published = kPublishedHue_r2;
     ValidationSeries series{"depth, mm", "change of hue, degrees", {}};
     for (std::size_t i = 0; i < depths.size(); ++i) series.points.emplace_back(depths[i], hues[i]);
@@ -132,18 +114,19 @@ std::vector<ValidationRow> validate_chroma_marker(const ValidateOptions& options
     at.push_back(depth);
     gains.push_back(line.slope);
   }
-  add("lateral.linearity_r2",
-      fmt::format("centroid against lateral displacement, the worst of {} series at depths 1.5 to 3 mm (fig. 9a)",
-                  shears.size()),
-      "1", worst_r2, Better::higher, worst_r2 >= kLinear_r2)
+  rows.add("lateral.linearity_r2",
+           fmt::format("centroid against lateral displacement, the worst of {} series at depths 1.5 to 3 mm (fig. 9a)",
+                       shears.size()),
+           "1", worst_r2, Better::higher, worst_r2 >= kLinear_r2)
       .reference = kLinear_r2;
   const ChromaLine gain_line = fit_chroma_line(at, gains);
   {
-    ValidationRow& row = add("gain.linearity_r2",
-                             fmt::format("gain of the centroid against depth: {:.3f} + {:.3f}/mm of the displacement "
-                                         "(fig. 9c)",
-                                         gain_line.offset, gain_line.slope),
-                             "1", gain_line.r2, Better::higher, gain_line.r2 >= kPublishedGain_r2);
+    ValidationRow& row =
+        rows.add("gain.linearity_r2",
+                 fmt::format("gain of the centroid against depth: {:.3f} + {:.3f}/mm of the displacement "
+                             "(fig. 9c)",
+                             gain_line.offset, gain_line.slope),
+                 "1", gain_line.r2, Better::higher, gain_line.r2 >= kPublishedGain_r2);
     row.published = kPublishedGain_r2;
     ValidationSeries series{"depth, mm", "gain", {}};
     for (std::size_t i = 0; i < at.size(); ++i) series.points.emplace_back(at[i], gains[i]);
@@ -170,14 +153,14 @@ std::vector<ValidationRow> validate_chroma_marker(const ValidateOptions& options
   eq4.line.hue_slope = hue_line.slope * kRadiansPerDegree;
   eq4.line.hue_offset = hue_line.offset * kRadiansPerDegree;
   const InverseScore linear = score_inverse(bench, eq4, marker, tests);
-  add("inverse.r2", "lateral displacement by eq. 5 against the ball's at depths 2, 2.5 and 3 mm, the worst", "1",
-      linear.worst_r2, Better::higher, linear.worst_r2 >= kPublishedInverse_r2)
+  rows.add("inverse.r2", "lateral displacement by eq. 5 against the ball's at depths 2, 2.5 and 3 mm, the worst", "1",
+           linear.worst_r2, Better::higher, linear.worst_r2 >= kPublishedInverse_r2)
       .published = kPublishedInverse_r2;
-  add("inverse.error_um", "the same: largest error of a lateral component", "um", linear.largest_lateral_um,
-      Better::lower, linear.largest_lateral_um <= kPublishedError_um)
+  rows.add("inverse.error_um", "the same: largest error of a lateral component", "um", linear.largest_lateral_um,
+           Better::lower, linear.largest_lateral_um <= kPublishedError_um)
       .published = kPublishedError_um;
-  add("inverse.press_error_um", "the same: largest error of the normal component", "um", linear.largest_press_um,
-      Better::lower, linear.largest_press_um <= kPublishedError_um)
+  rows.add("inverse.press_error_um", "the same: largest error of the normal component", "um", linear.largest_press_um,
+           Better::lower, linear.largest_press_um <= kPublishedError_um)
       .published = kPublishedError_um;
 
   // A non-linear model has to see shear in more than one direction: three series beside those of the text.
@@ -192,16 +175,16 @@ std::vector<ValidationRow> validate_chroma_marker(const ValidateOptions& options
   const InverseScore best =
       score_inverse(bench, sensors::calibrate_hue(bench.rest(), samples, settings), marker, tests);
   const std::string form = fmt::format("a {} of degree {}", sensors::name_of(settings.form.form), settings.form.degree);
-  add("inverse.nonlinear_error_um", fmt::format("largest error of a lateral component by {}", form), "um",
-      best.largest_lateral_um, Better::lower, best.largest_lateral_um <= kPublishedError_um)
+  rows.add("inverse.nonlinear_error_um", fmt::format("largest error of a lateral component by {}", form), "um",
+           best.largest_lateral_um, Better::lower, best.largest_lateral_um <= kPublishedError_um)
       .published = kPublishedError_um;
-  add("inverse.nonlinear_press_error_um", fmt::format("largest error of the normal component by {}", form), "um",
-      best.largest_press_um, Better::lower, best.largest_press_um <= kPublishedError_um)
+  rows.add("inverse.nonlinear_press_error_um", fmt::format("largest error of the normal component by {}", form), "um",
+           best.largest_press_um, Better::lower, best.largest_press_um <= kPublishedError_um)
       .published = kPublishedError_um;
-  add("inverse.nonlinear_rms_um", fmt::format("root mean square error of a component by {}", form), "um", best.rms_um,
-      Better::lower, best.rms_um <= linear.rms_um)
+  rows.add("inverse.nonlinear_rms_um", fmt::format("root mean square error of a component by {}", form), "um",
+           best.rms_um, Better::lower, best.rms_um <= linear.rms_um)
       .reference = linear.rms_um;
-  return rows;
+  return rows.rows();
 }
 
 }  // namespace touchstone::lab

@@ -4,15 +4,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <opencv2/core/utility.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "lab/chroma_bench.h"
 #include "lab/gelsight_height_experiment.h"
 #include "lab/rendered_robustness.h"
+#include "lab/row_list.h"
 #include "lab/seconds_since.h"
-#include "lab/validation.h"
 #include "sensors/hue_estimator.h"
 #include "sim/device.h"
 
@@ -119,22 +118,7 @@ double rate_Hz(const Clip& clip, const cv::Size& size) {
 }  // namespace
 
 std::vector<ValidationRow> validate_chroma_robustness(const ValidateOptions& options) {
-  auto begun = std::chrono::steady_clock::now();
-  std::vector<ValidationRow> rows;
-  const auto add = [&](const std::string& id, const std::string& title, const std::string& unit, double ours,
-                       Better better, bool holds) -> ValidationRow& {
-    ValidationRow row;
-    row.id = "chroma." + id;
-    row.title = title;
-    row.unit = unit;
-    row.ours = ours;
-    row.better = better;
-    row.holds = holds;
-    row.quick = options.quick;
-    row.seconds = seconds_since(begun);
-    begun = std::chrono::steady_clock::now();
-    return rows.emplace_back(std::move(row));
-  };
+  RowList rows("chroma.", options, RowList::Since::last_row);
   const auto report = [&](std::int64_t done) {
     if (options.progress) options.progress("chroma: robustness", done, 3);
   };
@@ -148,13 +132,13 @@ std::vector<ValidationRow> validate_chroma_robustness(const ValidateOptions& opt
       for (const PixelRobustness& size : sizes) made.points.emplace_back(size.marker_px, size.*member);
       return made;
     };
-    ValidationRow& hue =
-        add(fmt::format("pixels.{}hue_r2_4px", prefix),
-            fmt::format("R2 of displacement by hue, fit of second order, {:.0f} px a marker; {}", few.marker_px, what),
-            "1", few.hue_r2, Better::higher, few.hue_r2 > kPublishedHueR2);
+    ValidationRow& hue = rows.add(
+        fmt::format("pixels.{}hue_r2_4px", prefix),
+        fmt::format("R2 of displacement by hue, fit of second order, {:.0f} px a marker; {}", few.marker_px, what), "1",
+        few.hue_r2, Better::higher, few.hue_r2 > kPublishedHueR2);
     hue.published = kPublishedHueR2;
     hue.series = series(&PixelRobustness::hue_r2, "R2 by hue");
-    ValidationRow& size = add(
+    ValidationRow& size = rows.add(
         fmt::format("pixels.{}size_r2_4px", prefix),
         fmt::format("the rival that hue is to beat, and holds where it does: R2 by a black marker's pixels; {}", what),
         "1", few.size_r2, Better::near, few.hue_r2 > few.size_r2);
@@ -164,14 +148,15 @@ std::vector<ValidationRow> validate_chroma_robustness(const ValidateOptions& opt
   const auto add_gradient = [&](const Ladder& ladder, double marker_px, const std::string& suffix,
                                 const std::string& what) {
     const GradientShift worst = gradient_robustness(ladder.rungs, ladder.settings, marker_px).worst;
-    add("gradient." + suffix + "hue_percent",
-        fmt::format("hue's change by a gradient of light of 25 %, of its range, worst; {}", what), "%",
-        worst.hue_percent, Better::lower, worst.hue_percent < kPublishedHue_percent)
+    rows.add("gradient." + suffix + "hue_percent",
+             fmt::format("hue's change by a gradient of light of 25 %, of its range, worst; {}", what), "%",
+             worst.hue_percent, Better::lower, worst.hue_percent < kPublishedHue_percent)
         .published = kPublishedHue_percent;
-    add("gradient." + suffix + "size_percent",
-        fmt::format("the rival that hue is to beat, and holds where it does: a black marker's luminosity, worst; {}",
-                    what),
-        "%", worst.darkness_percent, Better::near, worst.hue_percent < worst.darkness_percent)
+    rows.add(
+            "gradient." + suffix + "size_percent",
+            fmt::format(
+                "the rival that hue is to beat, and holds where it does: a black marker's luminosity, worst; {}", what),
+            "%", worst.darkness_percent, Better::near, worst.hue_percent < worst.darkness_percent)
         .published = kPublishedSize_percent;
   };
 
@@ -198,14 +183,14 @@ std::vector<ValidationRow> validate_chroma_robustness(const ValidateOptions& opt
   const Clip clip = make_clip(options);
   const auto add_rate = [&](const std::string& id, const cv::Size& size) {
     const double rate = rate_Hz(clip, size);
-    add(id, fmt::format("frames of {} x {}, the device's scaled, to fields on one core", size.width, size.height), "Hz",
-        rate, Better::higher, rate >= kCamera_Hz)
+    rows.add(id, fmt::format("frames of {} x {}, the device's scaled, to fields on one core", size.width, size.height),
+             "Hz", rate, Better::higher, rate >= kCamera_Hz)
         .reference = kCamera_Hz;
   };
   add_rate("rate_Hz", {640, 480});
   add_rate("rate_text_Hz", {7952, 5304});
   report(3);
-  return rows;
+  return rows.rows();
 }
 
 }  // namespace touchstone::lab

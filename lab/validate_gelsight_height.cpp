@@ -4,15 +4,14 @@
 
 #include <fmt/format.h>
 
-#include <chrono>
 #include <cmath>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "core/units.h"
 #include "lab/gelsight_height_experiment.h"
+#include "lab/row_list.h"
 #include "lab/seconds_since.h"
-#include "lab/validation.h"
 
 namespace touchstone::lab {
 namespace {
@@ -205,7 +204,7 @@ double rate_Hz(sensors::HeightEstimator& estimator, const cv::Mat& frame) {
 }  // namespace
 
 std::vector<ValidationRow> validate_gelsight_height(const ValidateOptions& options) {
-  auto begun = std::chrono::steady_clock::now();
+  RowList rows("gelsight.height.", options, RowList::Since::last_row);
   const auto report = [&](std::int64_t done) {
     if (options.progress) options.progress("gelsight: height", done, 6);
   };
@@ -224,35 +223,19 @@ std::vector<ValidationRow> validate_gelsight_height(const ValidateOptions& optio
   const Bench bench{rig, estimator, options.quick};
   report(1);
 
-  std::vector<ValidationRow> rows;
-  const auto add = [&](const std::string& id, const std::string& title, const std::string& unit, double ours,
-                       Better better, bool holds) -> ValidationRow& {
-    ValidationRow row;
-    row.id = "gelsight.height." + id;
-    row.title = title;
-    row.unit = unit;
-    row.ours = ours;
-    row.better = better;
-    row.holds = holds;
-    row.quick = options.quick;
-    row.seconds = seconds_since(begun);
-    begun = std::chrono::steady_clock::now();
-    return rows.emplace_back(std::move(row));
-  };
-
   const Errors errors = errors_of_shapes(bench);
-  add("error_um",
-      "height against the true membrane, mean over the picture; balls and a flat cylinder, 0.2 and 0.5 mm deep", "um",
-      errors.mean_um, Better::lower, errors.mean_um <= kPublishedResolution_um)
+  rows.add("error_um",
+           "height against the true membrane, mean over the picture; balls and a flat cylinder, 0.2 and 0.5 mm deep",
+           "um", errors.mean_um, Better::lower, errors.mean_um <= kPublishedResolution_um)
       .reference = kPublishedResolution_um;
-  add("worst_um", "the same, the worst pixel of all pictures", "um", errors.worst_um, Better::lower,
-      errors.worst_um <= 10.0 * kPublishedResolution_um)
+  rows.add("worst_um", "the same, the worst pixel of all pictures", "um", errors.worst_um, Better::lower,
+           errors.worst_um <= 10.0 * kPublishedResolution_um)
       .reference = 10.0 * kPublishedResolution_um;
-  add("ball_error_um", "the balls alone, mean", "um", errors.ball_mean_um, Better::lower,
-      errors.ball_mean_um <= kPublishedResolution_um)
+  rows.add("ball_error_um", "the balls alone, mean", "um", errors.ball_mean_um, Better::lower,
+           errors.ball_mean_um <= kPublishedResolution_um)
       .reference = kPublishedResolution_um;
-  add("ball_worst_um", "the balls alone, the worst pixel", "um", errors.ball_worst_um, Better::lower,
-      errors.ball_worst_um <= 10.0 * kPublishedResolution_um)
+  rows.add("ball_worst_um", "the balls alone, the worst pixel", "um", errors.ball_worst_um, Better::lower,
+           errors.ball_worst_um <= 10.0 * kPublishedResolution_um)
       .reference = 10.0 * kPublishedResolution_um;
   report(2);
 
@@ -260,7 +243,7 @@ std::vector<ValidationRow> validate_gelsight_height(const ValidateOptions& optio
                                   const std::vector<Transfer>& curve) {
     const double pitch_um = kMicrometresPerMillimetre * resolved_pitch_mm(curve);
     const double groove_um = 0.5 * pitch_um;
-    ValidationRow& row = add(
+    ValidationRow& row = rows.add(
         id,
         fmt::format("width of a pressed grating's grooves (its pitch is {:.0f} um) at which a tenth of its contrast "
                     "is left, {}",
@@ -279,24 +262,24 @@ std::vector<ValidationRow> validate_gelsight_height(const ValidateOptions& optio
 
   const sim::TouchObject plain = rig.object(flat_cylinder_of(4.0));
   const double noise = noise_um(bench, plain, {{0, 0}, 0.12});
-  add("smallest_um", "height that stands three standard deviations over one pixel's noise in one frame", "um",
-      kVisible * noise, Better::lower, kVisible * noise <= kPublishedResolution_um)
+  rows.add("smallest_um", "height that stands three standard deviations over one pixel's noise in one frame", "um",
+           kVisible * noise, Better::lower, kVisible * noise <= kPublishedResolution_um)
       .reference = kPublishedResolution_um;
   for (const auto& [name, depth] : {std::pair{"hair-100um", 0.15}, {"print-60um", 0.15}, {"fingerprint", 0.2}}) {
     const sim::ObjectSpec object = sim::read_object(options.scenes / "objects" / (std::string(name) + ".yaml"));
     const double ratio = detail_over_noise(bench, object, depth, noise);
-    add(std::string(name) + "_over_noise", "detail of it in the height map, in standard deviations of the noise", "1",
-        ratio, Better::higher, ratio >= kVisible)
+    rows.add(std::string(name) + "_over_noise", "detail of it in the height map, in standard deviations of the noise",
+             "1", ratio, Better::higher, ratio >= kVisible)
         .reference = kVisible;
   }
   report(5);
 
   const double rate = rate_Hz(estimator, rig.background(kTestSeed));
-  add("rate_Hz", "frames of 320 x 240 to heights on one core; 100 times the published rate is asked for", "Hz", rate,
-      Better::higher, rate >= kWantedSpeedUp * kPublishedRate_Hz)
+  rows.add("rate_Hz", "frames of 320 x 240 to heights on one core; 100 times the published rate is asked for", "Hz",
+           rate, Better::higher, rate >= kWantedSpeedUp * kPublishedRate_Hz)
       .published = kPublishedRate_Hz;
   report(6);
-  return rows;
+  return rows.rows();
 }
 
 }  // namespace touchstone::lab

@@ -15,8 +15,8 @@
 #include "lab/gelsight_force_experiment.h"
 #include "lab/gelsight_height_experiment.h"
 #include "lab/gelsight_slip_experiment.h"
+#include "lab/row_list.h"
 #include "lab/seconds_since.h"
-#include "lab/validation.h"
 
 namespace touchstone::lab {
 namespace {
@@ -119,36 +119,7 @@ double tracking_rate_Hz(const sim::TouchRig& rig) {
   return kRounds * static_cast<double>(frames.size()) / seconds;
 }
 
-class Rows {
- public:
-  explicit Rows(bool quick) : quick_(quick) {}
-
-  /// A row that holds if `ours` is on the good side of `bound`. The bound is the text's, or one of ours.
-  void add(const std::string& id, const std::string& title, const std::string& unit, Better better, double bound,
-           bool published, double ours) {
-    ValidationRow row;
-    row.id = id;
-    row.title = title;
-    row.unit = unit;
-    (published ? row.published : row.reference) = bound;
-    row.ours = ours;
-    row.better = better;
-    row.holds = better == Better::higher ? ours >= bound : ours <= bound;
-    row.quick = quick_;
-    row.seconds = seconds_since(begun_);
-    rows_.push_back(row);
-  }
-  /// What follows is another part: its time starts here.
-  void begin() { begun_ = std::chrono::steady_clock::now(); }
-  std::vector<ValidationRow> rows() const { return rows_; }
-
- private:
-  bool quick_;
-  std::chrono::steady_clock::time_point begun_ = std::chrono::steady_clock::now();
-  std::vector<ValidationRow> rows_;
-};
-
-void add_force_rows(Rows& rows, const sim::TouchRig& rig, const sensors::HeightModel& heights, bool quick) {
+void add_force_rows(RowList& rows, const sim::TouchRig& rig, const sensors::HeightModel& heights, bool quick) {
   rows.begin();
   std::vector<NormalSeries> series;
   for (const Indenter& one : balls(quick ? 3 : 6)) {
@@ -161,51 +132,54 @@ void add_force_rows(Rows& rows, const sim::TouchRig& rig, const sensors::HeightM
     for (const NormalSeries& one : series) least = std::min(least, line(one).r2);
     return least;
   };
-  rows.add("gelsight.force.sphere_r2", "sum of the height map against force, worst of four balls (\"strongly linear\")",
-           "1", Better::higher, kStronglyLinear_r2, false, worst([](const auto& one) { return one.estimated; }));
-  rows.add("gelsight.force.sphere_true_r2", "the same with the true membrane's heights", "1", Better::higher,
-           kStronglyLinear_r2, false, worst([](const auto& one) { return one.truth; }));
+  rows.add_bounded("gelsight.force.sphere_r2",
+                   "sum of the height map against force, worst of four balls (\"strongly linear\")", "1",
+                   Better::higher, kStronglyLinear_r2, false, worst([](const auto& one) { return one.estimated; }));
+  rows.add_bounded("gelsight.force.sphere_true_r2", "the same with the true membrane's heights", "1", Better::higher,
+                   kStronglyLinear_r2, false, worst([](const auto& one) { return one.truth; }));
   const PooledLines pooled = pool(series);
-  rows.add("gelsight.force.sphere_pooled_r2", "one line through all balls, as in fig. 4-2a", "1", Better::higher,
-           kStronglyLinear_r2, false, pooled.estimated.r2);
-  rows.add("gelsight.force.sphere_pooled_true_r2", "the same with the true membrane's heights", "1", Better::higher,
-           kStronglyLinear_r2, false, pooled.truth.r2);
-  rows.add("gelsight.force.cylinder_r2", "sum of the height map against force, 8.5 mm flat cylinder to 1.2 N", "1",
-           Better::higher, kStronglyLinear_r2, false, cylinder.estimated.r2);
-  rows.add("gelsight.force.cylinder_true_r2", "the same with the true membrane's heights", "1", Better::higher,
-           kStronglyLinear_r2, false, cylinder.truth.r2);
+  rows.add_bounded("gelsight.force.sphere_pooled_r2", "one line through all balls, as in fig. 4-2a", "1",
+                   Better::higher, kStronglyLinear_r2, false, pooled.estimated.r2);
+  rows.add_bounded("gelsight.force.sphere_pooled_true_r2", "the same with the true membrane's heights", "1",
+                   Better::higher, kStronglyLinear_r2, false, pooled.truth.r2);
+  rows.add_bounded("gelsight.force.cylinder_r2", "sum of the height map against force, 8.5 mm flat cylinder to 1.2 N",
+                   "1", Better::higher, kStronglyLinear_r2, false, cylinder.estimated.r2);
+  rows.add_bounded("gelsight.force.cylinder_true_r2", "the same with the true membrane's heights", "1", Better::higher,
+                   kStronglyLinear_r2, false, cylinder.truth.r2);
 }
 
-void add_slip_rows(Rows& rows, const std::vector<SlipRun>& runs, double frame_rate_Hz) {
+void add_slip_rows(RowList& rows, const std::vector<SlipRun>& runs, double frame_rate_Hz) {
   const SlipScore rim = score(runs, SlipDetector::incipient, kFramesToSee / frame_rate_Hz);
   const SlipScore rule = score(runs, SlipDetector::rule);
   const auto percent = [](int part, int whole) { return whole > 0 ? 100.0 * part / whole : 0.0; };
-  rows.add("gelsight.slip.delay_ms",
-           "slip at the rim found against the onset of gross sliding, median; below 0: before", "ms", Better::lower,
-           0.0, false, rim.median_delay_ms());
-  rows.add("gelsight.slip.found_before_percent", "slides in which slip at the rim was found before gross sliding", "%",
-           Better::higher, 90.0, false, percent(rim.found_before, rim.slides));
-  rows.add("gelsight.slip.found_before_of_foretold_percent",
-           fmt::format("the same of the {} slides of {} whose rim slips for {:g} frames or more before all does",
-                       rim.foretold, rim.slides, kFramesToSee),
-           "%", Better::higher, 90.0, false, percent(rim.foretold_before, rim.foretold));
-  rows.add("gelsight.slip.false_alarms_percent",
-           "frames with slip at the rim reported while pressing, holding, loaded to a half, rolling", "%",
-           Better::lower, kMostFalseAlarms_percent, false, rim.false_alarms_percent());
-  rows.add("gelsight.slip.rule_found_percent", "slides that the text's rule rf > 1 and rm > 0.5 found", "%",
-           Better::higher, 90.0, false, percent(rule.found, rule.slides));
+  rows.add_bounded("gelsight.slip.delay_ms",
+                   "slip at the rim found against the onset of gross sliding, median; below 0: before", "ms",
+                   Better::lower, 0.0, false, rim.median_delay_ms());
+  rows.add_bounded("gelsight.slip.found_before_percent",
+                   "slides in which slip at the rim was found before gross sliding", "%", Better::higher, 90.0, false,
+                   percent(rim.found_before, rim.slides));
+  rows.add_bounded(
+      "gelsight.slip.found_before_of_foretold_percent",
+      fmt::format("the same of the {} slides of {} whose rim slips for {:g} frames or more before all does",
+                  rim.foretold, rim.slides, kFramesToSee),
+      "%", Better::higher, 90.0, false, percent(rim.foretold_before, rim.foretold));
+  rows.add_bounded("gelsight.slip.false_alarms_percent",
+                   "frames with slip at the rim reported while pressing, holding, loaded to a half, rolling", "%",
+                   Better::lower, kMostFalseAlarms_percent, false, rim.false_alarms_percent());
+  rows.add_bounded("gelsight.slip.rule_found_percent", "slides that the text's rule rf > 1 and rm > 0.5 found", "%",
+                   Better::higher, 90.0, false, percent(rule.found, rule.slides));
   if (rule.found > 0) {
-    rows.add("gelsight.slip.rule_delay_ms", "the text's rule against the onset of gross sliding, median", "ms",
-             Better::lower, 0.0, false, rule.median_delay_ms());
+    rows.add_bounded("gelsight.slip.rule_delay_ms", "the text's rule against the onset of gross sliding, median", "ms",
+                     Better::lower, 0.0, false, rule.median_delay_ms());
   }
-  rows.add("gelsight.slip.rule_false_alarms_percent", "frames with slip reported by the text's rule, as above", "%",
-           Better::lower, kMostFalseAlarms_percent, false, rule.false_alarms_percent());
+  rows.add_bounded("gelsight.slip.rule_false_alarms_percent", "frames with slip reported by the text's rule, as above",
+                   "%", Better::lower, kMostFalseAlarms_percent, false, rule.false_alarms_percent());
 }
 
 }  // namespace
 
 std::vector<ValidationRow> validate_gelsight_slip(const ValidateOptions& options) {
-  Rows rows(options.quick);
+  RowList rows("", options, RowList::Since::begin);
   const auto rig_of = [&](const char* device) {
     return sim::TouchRig(sim::read_device(options.scenes / "devices" / device), options.cache);
   };
@@ -217,11 +191,11 @@ std::vector<ValidationRow> validate_gelsight_slip(const ValidateOptions& options
   rows.begin();
   const ShearTest shear = shear_until_slip(marked, with_friction(flat_cylinder_of(10.0), 0.6), 0.7, kShearDrag_mm,
                                            options.quick ? 12 : 24, kSeed + 4);
-  rows.add("gelsight.shear.r2", "shear force against mean marker displacement until slip (\"highly linear\")", "1",
-           Better::higher, kStronglyLinear_r2, false, shear.line.r2);
+  rows.add_bounded("gelsight.shear.r2", "shear force against mean marker displacement until slip (\"highly linear\")",
+                   "1", Better::higher, kStronglyLinear_r2, false, shear.line.r2);
   rows.begin();
-  rows.add("gelsight.markers.rate_Hz", "marker tracking at 320x240 on one core", "Hz", Better::higher,
-           kPublishedTracking_Hz, true, tracking_rate_Hz(marked));
+  rows.add_bounded("gelsight.markers.rate_Hz", "marker tracking at 320x240 on one core", "Hz", Better::higher,
+                   kPublishedTracking_Hz, true, tracking_rate_Hz(marked));
 
   rows.begin();
   const std::vector<SlipCase> cases = slip_cases(options.quick);
