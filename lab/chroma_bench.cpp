@@ -112,4 +112,18 @@ std::vector<sensors::HueSample> samples_of_moved(const std::vector<ChromaLook>& 
   return samples;
 }
 
+sensors::HueCalibrationSettings hue_settings_of(const ChromaBench& bench) {
+  sensors::HueCalibrationSettings settings;
+  settings.spacing_mm = bench.spacing_mm();
+  settings.parallax = parallax_of(bench.rig().device());
+  return settings;
+}
+
+sensors::HueModel best_hue_model(const ChromaBench& bench, const std::vector<sensors::HueSample>& samples,
+                                 const std::vector<sensors::HueModelForm>& forms) {
+  sensors::HueCalibrationSettings settings = hue_settings_of(bench);
+  settings.form = sensors::rank_hue_forms(bench.rest(), samples, settings, forms).front().form;
+  return sensors::calibrate_hue(bench.rest(), samples, settings);
+}
+
 }  // namespace touchstone::lab

@@ -66,4 +66,11 @@ std::vector<sensors::HueSample> samples_of(const std::vector<ChromaLook>& looks,
 /// Samples of all markers that have moved by at least `least_mm`.
 std::vector<sensors::HueSample> samples_of_moved(const std::vector<ChromaLook>& looks, double least_mm, int series);
 
+/// What calibrate_hue is told of the bench; the form is its default.
+sensors::HueCalibrationSettings hue_settings_of(const ChromaBench& bench);
+
+/// The model of that form among `forms` that errs least on series left out (sensors::rank_hue_forms).
+sensors::HueModel best_hue_model(const ChromaBench& bench, const std::vector<sensors::HueSample>& samples,
+                                 const std::vector<sensors::HueModelForm>& forms);
+
 }  // namespace touchstone::lab

@@ -93,11 +93,7 @@ sensors::HueModel calibrate_on_probes(const ForceBench& bench, const ChromaBench
     const auto moved = samples_of_moved(looks, kLeastMoved_mm, series++);
     samples.insert(samples.end(), moved.begin(), moved.end());
   }
-  sensors::HueCalibrationSettings settings;
-  settings.spacing_mm = camera.spacing_mm();
-  settings.parallax = parallax_of(camera.rig().device());
-  settings.form = sensors::rank_hue_forms(camera.rest(), samples, settings, forms_to_try()).front().form;
-  return sensors::calibrate_hue(camera.rest(), samples, settings);
+  return best_hue_model(camera, samples, forms_to_try());
 }
 
 std::vector<sensors::MarkerField> fields_of(const std::vector<ChromaLook>& looks, const ChromaBench& camera,

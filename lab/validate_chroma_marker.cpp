@@ -63,6 +63,22 @@ double repeat_deg(const ChromaBench& bench, int pictures) {
   return mean;
 }
 
+std::string name_of_form(const sensors::HueModel& model) {
+  if (model.form == sensors::HueForm::kEquation4) return "eq. 4";
+  const bool isotropic = model.form == sensors::HueForm::kIsotropic;
+  return fmt::format("an {} polynomial of degree {} of {}", isotropic ? "isotropic" : "unrestricted",
+                     isotropic ? model.isotropic.degree : model.polynomial.degree,
+                     features_of(model).of_surroundings() ? "the marker and its neighbours" : "the marker alone");
+}
+
+std::vector<sensors::HueModelForm> forms_of_one_marker() {
+  std::vector<sensors::HueModelForm> forms;
+  for (const sensors::HueModelForm& form : sensors::usual_hue_forms()) {
+    if (!form.features.of_surroundings()) forms.push_back(form);
+  }
+  return forms;
+}
+
 }  // namespace
 
 std::vector<ValidationRow> validate_chroma_marker(const ValidateOptions& options) {
@@ -144,9 +160,7 @@ std::vector<ValidationRow> validate_chroma_marker(const ValidateOptions& options
     const auto more = samples_of(shears[k], marker, static_cast<int>(k) + 1);
     samples.insert(samples.end(), more.begin(), more.end());
   }
-  sensors::HueCalibrationSettings settings;
-  settings.spacing_mm = bench.spacing_mm();
-  settings.parallax = parallax_of(rig.device());
+  sensors::HueCalibrationSettings settings = hue_settings_of(bench);
   settings.form = {.form = sensors::HueForm::kEquation4};
   sensors::HueModel eq4 = sensors::calibrate_hue(bench.rest(), samples, settings);
   // As the text has it, the line of hue is that of the presses without shear.
@@ -171,10 +185,9 @@ std::vector<ValidationRow> validate_chroma_marker(const ValidateOptions& options
     samples.insert(samples.end(), more.begin(), more.end());
     ++series;
   }
-  settings.form = sensors::rank_hue_forms(bench.rest(), samples, settings, sensors::usual_hue_forms()).front().form;
-  const InverseScore best =
-      score_inverse(bench, sensors::calibrate_hue(bench.rest(), samples, settings), marker, tests);
-  const std::string form = fmt::format("a {} of degree {}", sensors::name_of(settings.form.form), settings.form.degree);
+  const sensors::HueModel best_model = best_hue_model(bench, samples, sensors::usual_hue_forms());
+  const InverseScore best = score_inverse(bench, best_model, marker, tests);
+  const std::string form = name_of_form(best_model);
   rows.add("inverse.nonlinear_error_um", fmt::format("largest error of a lateral component by {}", form), "um",
            best.largest_lateral_um, Better::lower, best.largest_lateral_um <= kPublishedError_um)
       .published = kPublishedError_um;
@@ -184,6 +197,12 @@ std::vector<ValidationRow> validate_chroma_marker(const ValidateOptions& options
   rows.add("inverse.nonlinear_rms_um", fmt::format("root mean square error of a component by {}", form), "um",
            best.rms_um, Better::lower, best.rms_um <= linear.rms_um)
       .reference = linear.rms_um;
+  const sensors::HueModel alone_model = best_hue_model(bench, samples, forms_of_one_marker());
+  const InverseScore alone = score_inverse(bench, alone_model, marker, tests);
+  rows.add("inverse.alone_press_error_um",
+           fmt::format("largest error of the normal component by {}", name_of_form(alone_model)), "um",
+           alone.largest_press_um, Better::lower, alone.largest_press_um <= kPublishedError_um)
+      .reference = kPublishedError_um;
   return rows.rows();
 }
 

@@ -26,6 +26,14 @@ enum class MarkerFlaw : std::uint8_t {
 /// "none", "missing", "two_filters", ...
 const char* name_of(MarkerFlaw flaw);
 
+/// What the direct neighbours of a marker in the grid have done since the picture at rest: those that are sound in
+/// both.
+struct MarkerSurroundings {
+  bool known = false;          ///< there's such a neighbour along the grid's rows and one along its columns
+  double log_cell_area = 0.0;  ///< logarithm of the growth of a cell of the grid, as their ink's centroids span it
+  double log_ink_area = 0.0;   ///< mean logarithm of the growth of their ink's areas
+};
+
 /// One marker with its filter. Positions in px, pixel centres at + 0.5 (core/transform.h); areas in px^2, the rims'
 /// pixels counted by what is covered of them.
 struct ColourMarker {
@@ -36,6 +44,7 @@ struct ColourMarker {
   Eigen::Vector2d ink_centroid_px = Eigen::Vector2d::Zero();  ///< of what has the soft marker's ink
   double coloured_area_px = 0.0;
   double ink_area_px = 0.0;
+  MarkerSurroundings surroundings;
 };
 
 /// A whole picture. Where `light` isn't normal every marker is flawed.

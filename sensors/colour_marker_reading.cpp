@@ -7,6 +7,7 @@
 #include "sensors/colour_coverage.h"
 #include "sensors/colour_marker_finder.h"
 #include "sensors/hue.h"
+#include "sensors/marker_surroundings.h"
 
 namespace touchstone::sensors {
 
@@ -198,6 +199,7 @@ void ColourMarkerFinder::read(const ColourMarkerReading* rest, ColourMarkerReadi
     }
   }
   for (std::size_t i = 0; i < count; ++i) reading.markers[i].flaw = flaws[i];
+  tell_surroundings(rest ? *rest : reading, reading);
 }
 
 }  // namespace touchstone::sensors

@@ -20,6 +20,7 @@ std::vector<HueRow> rows_of(const ColourMarkerReading& rest, const std::vector<H
   }
   const PictureMap map = map_of_rest(rest, settings.spacing_mm);
   const std::vector<Eigen::Vector2d> places = grid_places(rest.grid, settings.spacing_mm);
+  const bool of_surroundings = settings.form.form != HueForm::kEquation4 && settings.form.features.of_surroundings();
   std::vector<HueRow> rows;
   rows.reserve(samples.size());
   for (const HueSample& sample : samples) {
@@ -31,9 +32,13 @@ std::vector<HueRow> rows_of(const ColourMarkerReading& rest, const std::vector<H
     }
     if (!sample.displacement_mm.allFinite())
       fail("hue calibration: a displacement of marker {} isn't finite", sample.marker);
+    if (of_surroundings && !sample.seen.surroundings.known) continue;
     rows.push_back({sample.marker, change_of(sample.seen, rest.markers[sample.marker], map),
                     settings.parallax.seen(sample.displacement_mm, places[sample.marker]),
                     -sample.displacement_mm.z()});
+  }
+  if (rows.size() < kLeastHueSamples) {
+    fail("hue calibration: {} samples have sound neighbours, at least {} are needed", rows.size(), kLeastHueSamples);
   }
   return rows;
 }
@@ -179,7 +184,9 @@ std::vector<HueModelForm> usual_hue_forms() {
   std::vector<HueModelForm> forms{{.form = HueForm::kEquation4},
                                   {.form = HueForm::kEquation4, .of_ink = true},
                                   {.form = HueForm::kEquation4, .free_offset = true}};
-  const std::array<HueFeatures, 5> sets{{{},
+  const std::array<HueFeatures, 7> sets{{{},
+                                         {.coloured_area = false, .cell_area = true},
+                                         {.coloured_area = false, .cell_area = true, .neighbour_area = true},
                                          {.coloured_area = false, .ink_area = false},
                                          {.coloured_area = false},
                                          {.ink_centroid = false, .coloured_area = false, .ink_area = false},

@@ -44,6 +44,7 @@ inline constexpr int kLeastHueSamples = 8;
 
 /// Least squares of the form on all samples.
 /// @param rest the picture at rest that goes with the samples
+/// Samples whose neighbours aren't sound are left out of a form that needs them.
 /// @throws Error for fewer than kLeastHueSamples, a flawed sample, a marker that isn't sound at rest, settings out of
 ///   range, or samples that don't determine the form (no press, or no lateral displacement, among them)
 HueModel calibrate_hue(const ColourMarkerReading& rest, const std::vector<HueSample>& samples,
@@ -71,8 +72,8 @@ struct HueFormScore {
   HueErrors errors;  ///< cross-validated
 };
 
-/// Eq. 4; isotropic and other polynomials of degrees 1 to 4 and several ridges, of all features, of those without
-/// areas, and of hue and one centroid.
+/// Eq. 4; isotropic and other polynomials of degrees 1 to 4 and several ridges, of all that one marker shows, of that
+/// without areas, of hue and one centroid, and of a marker with its neighbours.
 std::vector<HueModelForm> usual_hue_forms();
 
 /// Scores each form by cross-validation, the best (least rms of the displacement's length) first. Forms that the

@@ -29,6 +29,8 @@ Eigen::VectorXd shift_flags(const HueFeatures& features) {
   if (features.ink_centroid) flags.push_back(1.0);
   if (features.coloured_area) flags.push_back(0.0);
   if (features.ink_area) flags.push_back(0.0);
+  if (features.cell_area) flags.push_back(0.0);
+  if (features.neighbour_area) flags.push_back(0.0);
   return Eigen::Map<const Eigen::VectorXd>(flags.data(), static_cast<Eigen::Index>(flags.size()));
 }
 
@@ -157,7 +159,7 @@ HueRange fit_range(const std::vector<HueRow>& rows) {
   }
   // A direction that calibration hardly saw isn't forbidden outright: noise of a hundredth is let through.
   Eigen::Matrix<double, MarkerChange::kSize, 1> floor;
-  floor << 0.01, 0.01, 0.01, 0.01, 0.01, 0.01, 0.01;
+  floor.setConstant(0.01);
   square.diagonal() += floor.cwiseAbs2();
   range.precision = square.ldlt().solve(decltype(square)::Identity().eval());
   for (const HueRow& row : rows) {

@@ -59,6 +59,8 @@ std::vector<int> HueFeatures::indices() const {
   if (ink_centroid) places.insert(places.end(), {3, 4});
   if (coloured_area) places.push_back(5);
   if (ink_area) places.push_back(6);
+  if (cell_area) places.push_back(7);
+  if (neighbour_area) places.push_back(8);
   return places;
 }
 
@@ -134,7 +136,8 @@ std::string fault_of(const HueModel& model) {
 }
 
 int IsotropicFeatures::count(const HueFeatures& features) {
-  return features.hue + features.centroid + features.ink_centroid + features.coloured_area + features.ink_area;
+  return features.hue + features.centroid + features.ink_centroid + features.coloured_area + features.ink_area +
+         features.cell_area + features.neighbour_area;
 }
 
 IsotropicFeatures::IsotropicFeatures(const HueFeatures& features, const Eigen::VectorXd& scale,
@@ -157,10 +160,24 @@ IsotropicFeatures::IsotropicFeatures(const HueFeatures& features, const Eigen::V
   add_shift(features.ink_centroid, change.ink_centroid_mm);
   add_scalar(features.coloured_area, change.log_coloured_area);
   add_scalar(features.ink_area, change.log_ink_area);
+  add_scalar(features.cell_area, change.log_cell_area);
+  add_scalar(features.neighbour_area, change.log_neighbour_area);
 }
 
 Eigen::Index count_lower_terms(int features, int degree) {
   return degree > 1 ? hue_terms(features, degree - 1).rows() : 0;
+}
+
+HueFeatures features_of(const HueModel& model) {
+  switch (model.form) {
+    case HueForm::kIsotropic:
+      return model.isotropic.features;
+    case HueForm::kPolynomial:
+      return model.polynomial.features;
+    case HueForm::kEquation4:
+      break;
+  }
+  return {false, false, false, false, false, false, false};
 }
 
 Eigen::MatrixXi terms_of(const HueModel& model) {
@@ -173,6 +190,10 @@ Eigen::MatrixXi terms_of(const HueModel& model) {
 
 SeenDisplacement displacement_of(const HueModel& model, const Eigen::MatrixXi& terms, const MarkerChange& change) {
   SeenDisplacement out;
+  if (features_of(model).of_surroundings() && !change.surroundings_known) {
+    out.determined = false;
+    return out;
+  }
   if (model.form == HueForm::kEquation4) {
     const HueLine& line = model.line;
     out.press_mm = (change.hue - line.hue_offset) / line.hue_slope;

@@ -4,7 +4,8 @@
 // The text's model, eq. 4: h = Gz w + h0 and c = (a w + b) d, of the press w (positive inwards, the text's delta_z),
 // the hue h, the centroid's shift c and the lateral displacement d; inverted, eq. 5. The text says itself that its
 // errors "can be improved by using a non-linear approximation": here a polynomial of the change in hue, the two
-// centroids' shifts and the two areas' logarithms, without a constant term, so what looks as at rest is at rest.
+// centroids' shifts, the two areas' logarithms and what its neighbours tell
+// (marker_surroundings.h), without a constant term, so what looks as at rest is at rest.
 // Lateral displacements are those that are seen (ViewParallax); the true ones follow from them.
 
 #include <Eigen/Core>
@@ -31,10 +32,13 @@ struct HueFeatures {
   bool ink_centroid = true;
   bool coloured_area = true;
   bool ink_area = true;
+  bool cell_area = false;  ///< of its neighbours, as the next one: a marker without sound ones isn't measured then
+  bool neighbour_area = false;
 
   bool operator==(const HueFeatures&) const = default;
   /// Places in MarkerChange::vector().
   std::vector<int> indices() const;
+  bool of_surroundings() const { return cell_area || neighbour_area; }
 };
 
 /// eq. 4.
@@ -120,6 +124,9 @@ struct IsotropicFeatures {
 /// How many of the terms of a degree are of a lower one.
 Eigen::Index count_lower_terms(int features, int degree);
 
+/// What it is of; all false for eq. 4.
+HueFeatures features_of(const HueModel& model);
+
 /// The terms that a model is evaluated with; empty for eq. 4.
 Eigen::MatrixXi terms_of(const HueModel& model);
 
@@ -127,7 +134,8 @@ Eigen::MatrixXi terms_of(const HueModel& model);
 struct SeenDisplacement {
   Eigen::Vector2d lateral_mm = Eigen::Vector2d::Zero();
   double press_mm = 0.0;   ///< positive inwards
-  bool determined = true;  ///< false: eq. 5's gain a w + b is too near to zero to divide by
+  bool determined = true;  ///< false: eq. 5's gain a w + b is too near to zero to divide by, or the model needs
+                           ///< neighbours that aren't sound
 };
 
 /// Without gains. `terms` are terms_of(model).

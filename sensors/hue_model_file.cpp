@@ -14,17 +14,19 @@ namespace touchstone::sensors {
 namespace {
 
 constexpr const char* kFormat = "touchstone.hue_model";
-constexpr int kVersion = 1;
+constexpr int kVersion = 2;
 constexpr std::int64_t kMany = std::numeric_limits<std::int64_t>::max();
 constexpr int kSize = MarkerChange::kSize;
 
-const std::array<std::pair<const char*, bool HueFeatures::*>, 5>& feature_names() {
-  static const std::array<std::pair<const char*, bool HueFeatures::*>, 5> kNames{
+const std::array<std::pair<const char*, bool HueFeatures::*>, 7>& feature_names() {
+  static const std::array<std::pair<const char*, bool HueFeatures::*>, 7> kNames{
       {{"hue", &HueFeatures::hue},
        {"centroid", &HueFeatures::centroid},
        {"ink_centroid", &HueFeatures::ink_centroid},
        {"coloured_area", &HueFeatures::coloured_area},
-       {"ink_area", &HueFeatures::ink_area}}};
+       {"ink_area", &HueFeatures::ink_area},
+       {"cell_area", &HueFeatures::cell_area},
+       {"neighbour_area", &HueFeatures::neighbour_area}}};
   return kNames;
 }
 
@@ -91,7 +93,7 @@ HueLine line_of(const JsonField& json) {
 }
 
 HueFeatures features_of(const JsonField& json) {
-  HueFeatures features{false, false, false, false, false};
+  HueFeatures features{false, false, false, false, false, false, false};
   if (!json.value.is_array()) json.refuse("is a {}, a list is needed", json.value.type_name());
   for (std::size_t i = 0; i < json.value.size(); ++i) {
     const std::string name = json.at(i).text();

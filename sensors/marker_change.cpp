@@ -9,7 +9,7 @@ namespace touchstone::sensors {
 
 Eigen::Matrix<double, MarkerChange::kSize, 1> MarkerChange::vector() const {
   Eigen::Matrix<double, kSize, 1> all;
-  all << hue, centroid_mm, ink_centroid_mm, log_coloured_area, log_ink_area;
+  all << hue, centroid_mm, ink_centroid_mm, log_coloured_area, log_ink_area, log_cell_area, log_neighbour_area;
   return all;
 }
 
@@ -21,6 +21,11 @@ MarkerChange change_of(const ColourMarker& seen, const ColourMarker& rest, const
   change.ink_centroid_mm = map(seen.ink_centroid_px) - map(rest.ink_centroid_px);
   change.log_coloured_area = std::log(seen.coloured_area_px / rest.coloured_area_px);
   change.log_ink_area = std::log(seen.ink_area_px / rest.ink_area_px);
+  change.surroundings_known = seen.surroundings.known;
+  if (change.surroundings_known) {
+    change.log_cell_area = seen.surroundings.log_cell_area;
+    change.log_neighbour_area = seen.surroundings.log_ink_area;
+  }
   return change;
 }
 

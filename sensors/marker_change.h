@@ -9,13 +9,16 @@ namespace touchstone::sensors {
 
 /// How a coloured marker looks different from what it was at rest.
 struct MarkerChange {
-  static constexpr int kSize = 7;
+  static constexpr int kSize = 9;
 
   double hue = 0.0;                                           ///< radians, the short way round
   Eigen::Vector2d centroid_mm = Eigen::Vector2d::Zero();      ///< of all that is coloured, in the plane at rest
   Eigen::Vector2d ink_centroid_mm = Eigen::Vector2d::Zero();  ///< of its ink
   double log_coloured_area = 0.0;                             ///< logarithm of the ratio to that at rest
   double log_ink_area = 0.0;
+  bool surroundings_known = false;  ///< if not, what follows is 0
+  double log_cell_area = 0.0;       ///< MarkerSurroundings, of its neighbours
+  double log_neighbour_area = 0.0;
 
   Eigen::Matrix<double, kSize, 1> vector() const;
 };

@@ -4,12 +4,20 @@
 
 namespace touchstone::sensors {
 
-MarkerField as_seen(MarkerField field, const MarkerCompliance& compliance, const ViewParallax& parallax) {
+namespace {
+
+void check_grid(const MarkerField& field, const MarkerCompliance& compliance) {
   if (field.grid != compliance.marker_grid || field.displacement.size() != compliance.marker_rest.size() ||
       field.measured.size() != compliance.marker_rest.size()) {
     fail("markers as seen: the field has a grid of {} x {}, the compliance {} x {}", field.grid.x(), field.grid.y(),
          compliance.marker_grid.x(), compliance.marker_grid.y());
   }
+}
+
+}  // namespace
+
+MarkerField as_seen(MarkerField field, const MarkerCompliance& compliance, const ViewParallax& parallax) {
+  check_grid(field, compliance);
   for (std::size_t m = 0; m < field.displacement.size(); ++m) {
     Eigen::Vector3d& displacement = field.displacement[m];
     if (field.measured[m]) {
@@ -17,6 +25,16 @@ MarkerField as_seen(MarkerField field, const MarkerCompliance& compliance, const
     }
   }
   return field;
+}
+
+MarkerField as_they_are(MarkerField seen, const MarkerCompliance& compliance, const ViewParallax& parallax) {
+  check_grid(seen, compliance);
+  for (std::size_t m = 0; m < seen.displacement.size(); ++m) {
+    Eigen::Vector3d& displacement = seen.displacement[m];
+    displacement.head<2>() =
+        parallax.true_one(displacement.head<2>(), -displacement.z(), compliance.marker_rest[m].head<2>()).eval();
+  }
+  return seen;
 }
 
 MarkerCompliance as_seen(MarkerCompliance compliance, const ViewParallax& parallax) {

@@ -13,6 +13,9 @@ namespace touchstone::sensors {
 /// @throws Error if field and compliance aren't of the same markers
 MarkerField as_seen(MarkerField field, const MarkerCompliance& compliance, const ViewParallax& parallax);
 
+/// The inverse: displacements as they are, of such as are seen. @throws Error as as_seen
+MarkerField as_they_are(MarkerField seen, const MarkerCompliance& compliance, const ViewParallax& parallax);
+
 /// The map from tractions to displacements as seen, to first order in them. @throws Error if it is faulty (fault_of)
 MarkerCompliance as_seen(MarkerCompliance compliance, const ViewParallax& parallax);
 

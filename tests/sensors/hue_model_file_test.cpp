@@ -93,7 +93,7 @@ TEST(HueModelFile, WhatDoesNotFitIsNamed) {
   EXPECT_THAT(error_of("{"), HasSubstr("m.json"));
   EXPECT_THAT(error_of("[]"), HasSubstr("map"));
   EXPECT_THAT(error_of(with("touchstone.hue_model", "touchstone.other")), HasSubstr("format"));
-  EXPECT_THAT(error_of(with("\"version\": 1", "\"version\": 2")), HasSubstr("version"));
+  EXPECT_THAT(error_of(with("\"version\": 2", "\"version\": 1")), HasSubstr("version"));
   EXPECT_THAT(error_of(with("\"polynomial\",", "\"spline\",")), HasSubstr("form"));
   EXPECT_THAT(error_of(with("\"samples\"", "\"sample\"")), HasSubstr("sample"));
   EXPECT_THAT(error_of(with("\"degree\": 2", "\"degree\": 3")), HasSubstr("coefficients_mm"));

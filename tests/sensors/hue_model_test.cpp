@@ -120,6 +120,37 @@ TEST(HueModel, AFreeOffsetIsRecovered) {
   EXPECT_NEAR(model.line.hue_slope, 0.2, 1e-9);
 }
 
+// A marker that is pressed by w looks larger by 2 w / 60, and by the logarithm of its stretch besides; the grid about
+// it shows the stretch. So 30 times what the area grew by, less the cell's growth, is the press, and without the cells
+// the stretch of up to 0.1 is taken for up to 3 mm.
+TEST(HueModel, NeighboursTellAStretchFromAPress) {
+  const ColourMarkerReading rest = rest_reading();
+  const auto look = [&](double press, double stretch, double x) {
+    HueSample sample{5, rest.markers[5], {x, 0.0, -press}, 0};
+    sample.seen.ink_area_px *= std::exp(press / 30 + stretch);
+    sample.seen.ink_centroid_px.x() += kPxPerMm * x;
+    sample.seen.surroundings = {true, stretch, 0.0};
+    return sample;
+  };
+  std::vector<HueSample> samples;
+  for (int i = 0; i < 60; ++i) samples.push_back(look(0.1 * (i % 20), 0.025 * ((7 * i) % 5), 0.1 * (i % 7)));
+  HueCalibrationSettings settings;
+  settings.form = {.features = {.hue = false, .centroid = false, .coloured_area = false}, .degree = 1, .ridge = 1e-9};
+  EXPECT_GT(calibrate_hue(rest, samples, settings).rms_error_mm, 0.3);
+  settings.form.features.cell_area = true;
+  const HueModel model = calibrate_hue(rest, samples, settings);
+  EXPECT_LT(model.rms_error_mm, 1e-4);
+  const HueEstimator estimator(model, rest);
+  ColourMarker seen = look(1.23, 0.07, 0.4).seen;
+  EXPECT_NEAR(estimator.estimate(5, seen).displacement_mm.z(), -1.23, 1e-4);
+  // Without neighbours nothing is said; without enough samples that have them nothing is learned.
+  seen.surroundings = {};
+  EXPECT_FALSE(estimator.estimate(5, seen).measured);
+  for (std::size_t i = 7; i < samples.size(); ++i) samples[i].seen.surroundings = {};
+  EXPECT_THAT(message_of([&] { calibrate_hue(rest, samples, settings); }),
+              HasSubstr("7 samples have sound neighbours"));
+}
+
 TEST(HueModel, WhatLooksAsAtRestIsAtRest) {
   const ColourMarkerReading rest = rest_reading();
   const HueLine truth{.hue_slope = 0.2, .gain_slope = 0.05, .gain = 0.5};
