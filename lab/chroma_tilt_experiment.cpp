@@ -8,6 +8,7 @@
 
 #include "core/error.h"
 #include "core/units.h"
+#include "lab/straight_line.h"
 #include "sensors/hue.h"
 
 namespace touchstone::lab {
@@ -38,30 +39,6 @@ double ink_cover(const cv::Vec3f& c, const TiltColours& colours) {
 /// Of a sum of hues' directions.
 double signed_hue_of(const Eigen::Vector2d& direction) {
   return sensors::hue_difference(sensors::hue_of(direction), 0.0);
-}
-
-/// y = intercept + slope x by least squares.
-struct Line {
-  double slope = 0.0;
-  double r2 = 0.0;
-};
-Line line_through(std::span<const double> x, std::span<const double> y) {
-  const auto n = static_cast<double>(x.size());
-  double mx = 0.0;
-  double my = 0.0;
-  for (std::size_t k = 0; k < x.size(); ++k) {
-    mx += x[k] / n;
-    my += y[k] / n;
-  }
-  double xx = 0.0;
-  double xy = 0.0;
-  double yy = 0.0;
-  for (std::size_t k = 0; k < x.size(); ++k) {
-    xx += (x[k] - mx) * (x[k] - mx);
-    xy += (x[k] - mx) * (y[k] - my);
-    yy += (y[k] - my) * (y[k] - my);
-  }
-  return {xy / xx, yy > 0.0 ? xy * xy / (xx * yy) : 1.0};
 }
 
 }  // namespace
@@ -136,7 +113,7 @@ TiltTable measure_tilt(const TiltBench& bench, const TiltSpectra& spectra, TiltM
     areas.push_back(reading.ink_area_px / level.ink_area_px - 1.0);
     widths.push_back(reading.ink_width_px / level.ink_width_px - 1.0);
   }
-  const Line hue = line_through(kPressed_mm, hues);
+  const StraightLine hue = line_through(kPressed_mm, hues);
   TiltCalibration& calibration = table.calibration;
   calibration.hue_slope = hue.slope;
   calibration.hue_fit_r2 = hue.r2;
