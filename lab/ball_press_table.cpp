@@ -1,9 +1,5 @@
 #include "lab/ball_press_table.h"
 
-#include <cmath>
-#include <sstream>
-
-#include "core/whole_file.h"
 #include "lab/csv_cells.h"
 #include "sim/image_file.h"
 
@@ -13,12 +9,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kColumns = "file,u_px,v_px,radius_px,ball_diameter_mm";
-
-double number_in(const std::string& cell, const char* field, const SourceLocation& where) {
-  const auto value = number_of<double>(cell);
-  if (!value || !std::isfinite(*value)) fail_at(where, "{}: '{}' isn't a finite number", field, cell);
-  return *value;
-}
 
 double above_zero(const std::string& cell, const char* field, const SourceLocation& where) {
   const double value = number_in(cell, field, where);
@@ -33,10 +23,7 @@ std::vector<AnnotatedPress> read_ball_press_table(const fs::path& folder, const 
   for_each_row(csv, kColumns, [&](const SourceLocation& where, const std::vector<std::string>& cells) {
     AnnotatedPress press;
     press.where = where;
-    press.file = folder / cells[0];
-    if (cells[0].empty() || !fs::is_regular_file(press.file)) {
-      fail_at(where, "file: there is no file {}", press.file.string());
-    }
+    press.file = file_in(folder, cells[0], where);
     if (!(cells[1].empty() && cells[2].empty() && cells[3].empty())) {
       sensors::ContactCircle circle;
       circle.centre.x() = number_in(cells[1], "u_px", where);

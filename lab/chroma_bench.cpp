@@ -60,16 +60,25 @@ std::vector<ChromaLook> ChromaBench::play(const sim::ObjectSpec& object, const s
                                           std::uint64_t noise_seed) const {
   const sim::TouchObject touched = rig_.object(object);
   const std::vector<sim::Truth> states = rig_.play(touched, motion);
-  return look(object, states, noise_seed);
+  return read(pictures(touched, states, noise_seed), states);
 }
 
 std::vector<ChromaLook> ChromaBench::look(const sim::ObjectSpec& object, std::span<const sim::Truth> states,
                                           std::uint64_t noise_seed) const {
-  const sim::TouchObject touched = rig_.object(object);
-  std::vector<cv::Mat> frames(states.size());
+  return read(pictures(rig_.object(object), states, noise_seed), states);
+}
+
+std::vector<cv::Mat> ChromaBench::pictures(const sim::TouchObject& object, std::span<const sim::Truth> states,
+                                           std::uint64_t noise_seed) const {
+  std::vector<cv::Mat> made(states.size());
   tbb::parallel_for(std::size_t{0}, states.size(), [&](std::size_t i) {
-    frames[i] = rig_.look(touched, states[i].press, noise_seed, static_cast<int>(i), false).frame;
+    made[i] = rig_.look(object, states[i].press, noise_seed, static_cast<int>(i), false).frame;
   });
+  return made;
+}
+
+std::vector<ChromaLook> ChromaBench::read(std::span<const cv::Mat> frames, std::span<const sim::Truth> states) const {
+  TS_ASSERT(frames.size() == states.size());
   sensors::ColourMarkerFinder finder = finder_;
   std::vector<ChromaLook> looks(states.size());
   for (std::size_t i = 0; i < states.size(); ++i) {

@@ -3,6 +3,7 @@
 // is kept beside the reading.
 
 #include <cstdint>
+#include <opencv2/core/mat.hpp>
 #include <span>
 #include <vector>
 
@@ -41,6 +42,10 @@ class ChromaBench {
   /// The same for states that are there already.
   std::vector<ChromaLook> look(const sim::ObjectSpec& object, std::span<const sim::Truth> states,
                                std::uint64_t noise_seed) const;
+  /// The two halves of that, for who wants the pictures too. @pre as many pictures as states
+  std::vector<cv::Mat> pictures(const sim::TouchObject& object, std::span<const sim::Truth> states,
+                                std::uint64_t noise_seed) const;
+  std::vector<ChromaLook> read(std::span<const cv::Mat> frames, std::span<const sim::Truth> states) const;
 
   const sim::TouchRig& rig() const { return rig_; }
   const sensors::ColourMarkerReading& rest() const { return rest_; }

@@ -8,8 +8,8 @@
 
 #include "core/error.h"
 #include "core/whole_file.h"
+#include "lab/on_picture.h"
 #include "sensors/friction_state.h"
-#include "sim/image_file.h"
 
 namespace touchstone::lab {
 namespace {
@@ -17,18 +17,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kSpacingTolerance = 0.02;
-
-/// Runs `act` on a picture; what is wrong then names the picture.
-template <typename Act>
-void on_picture(const fs::path& file, const Act& act) {
-  try {
-    act(sim::read_image(file));
-  } catch (const Error& error) {
-    const std::string message = error.what();
-    if (message.find(file.string()) != std::string::npos) throw;
-    fail("{}: {}", file.string(), message);
-  }
-}
 
 void check(const sensors::MarkerCompliance& compliance, const sensors::HueModel& model, const Eigen::Vector2i& grid) {
   if (compliance.marker_grid != grid) {

@@ -11,6 +11,7 @@
 #include "lab/chroma_bench.h"
 #include "render/first_hits.h"
 #include "render/path_tracer.h"
+#include "sensors/hue.h"
 #include "sim/device_camera.h"
 #include "sim/scene_sight.h"
 #include "sim/virtual_sensor.h"
@@ -92,13 +93,8 @@ SeenHue hue_of(const render::Spectrum& light, const render::Imager& imager) {
   SeenHue seen;
   seen.saturation = span / most;
   if (!(span > 0.0)) return seen;
-  double sixths = 4.0 + (rgb[0] - rgb[1]) / span;
-  if (most == rgb[0]) {
-    sixths = (rgb[1] - rgb[2]) / span;
-  } else if (most == rgb[1]) {
-    sixths = 2.0 + (rgb[2] - rgb[0]) / span;
-  }
-  seen.hue_deg = std::remainder(60.0 * sixths, 360.0);
+  const double hue = sensors::hue_of(sensors::hue_direction(rgb[2], rgb[1], rgb[0]));
+  seen.hue_deg = sensors::hue_difference(hue, 0.0) / kRadiansPerDegree;
   return seen;
 }
 

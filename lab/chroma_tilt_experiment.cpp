@@ -5,10 +5,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <complex>
 
 #include "core/error.h"
 #include "core/units.h"
+#include "lab/straight_line.h"
+#include "sensors/hue.h"
 
 namespace touchstone::lab {
 namespace {
@@ -23,23 +24,6 @@ const Eigen::Vector2d kPhases_px[kPhases] = {{0.0, 0.0}, {0.5, 0.0}, {0.0, 0.5},
 constexpr int kReportedTilts = 10;
 constexpr double kTiltStep_deg = 5.0;
 
-/// Hue of HSV as a direction; of a colour without any the vector is zero.
-std::complex<double> hue_direction(const cv::Vec3f& c) {
-  // The hexagon of HSV, not the circle of the plane through its corners.
-  const float most = std::max({c[0], c[1], c[2]});
-  const float span = most - std::min({c[0], c[1], c[2]});
-  if (!(span > 0.0F)) return 0.0;
-  double sixths = 0.0;
-  if (most == c[0]) {
-    sixths = static_cast<double>((c[1] - c[2]) / span);
-  } else if (most == c[1]) {
-    sixths = 2.0 + static_cast<double>((c[2] - c[0]) / span);
-  } else {
-    sixths = 4.0 + static_cast<double>((c[0] - c[1]) / span);
-  }
-  return std::polar(1.0, sixths * kPi / 3.0);
-}
-
 /// The share of a pixel that ink covers, if bare sheet and ink are lit alike.
 double ink_cover(const cv::Vec3f& c, const TiltColours& colours) {
   const bool under_film = static_cast<double>(c[2]) < kUnderFilm * static_cast<double>(c[0]);
@@ -52,33 +36,9 @@ double ink_cover(const cv::Vec3f& c, const TiltColours& colours) {
   return std::clamp(share[1] / share.sum(), 0.0, 1.0);
 }
 
-/// a - b on the circle.
-double turn(double a, double b) {
-  return std::remainder(a - b, 2.0 * kPi);
-}
-
-/// y = intercept + slope x by least squares.
-struct Line {
-  double slope = 0.0;
-  double r2 = 0.0;
-};
-Line line_through(std::span<const double> x, std::span<const double> y) {
-  const auto n = static_cast<double>(x.size());
-  double mx = 0.0;
-  double my = 0.0;
-  for (std::size_t k = 0; k < x.size(); ++k) {
-    mx += x[k] / n;
-    my += y[k] / n;
-  }
-  double xx = 0.0;
-  double xy = 0.0;
-  double yy = 0.0;
-  for (std::size_t k = 0; k < x.size(); ++k) {
-    xx += (x[k] - mx) * (x[k] - mx);
-    xy += (x[k] - mx) * (y[k] - my);
-    yy += (y[k] - my) * (y[k] - my);
-  }
-  return {xy / xx, yy > 0.0 ? xy * xy / (xx * yy) : 1.0};
+/// Of a sum of hues' directions.
+double signed_hue_of(const Eigen::Vector2d& direction) {
+  return sensors::hue_difference(sensors::hue_of(direction), 0.0);
 }
 
 }  // namespace
@@ -86,7 +46,7 @@ Line line_through(std::span<const double> x, std::span<const double> y) {
 TiltReading read_tilt_picture(const cv::Mat& picture, const TiltColours& colours) {
   TS_ASSERT(picture.type() == CV_32FC3);
   TiltReading reading;
-  std::complex<double> hue = 0.0;
+  Eigen::Vector2d hue = Eigen::Vector2d::Zero();
   Eigen::Vector2d moment = Eigen::Vector2d::Zero();
   Eigen::Matrix2d second = Eigen::Matrix2d::Zero();
   for (int y = 0; y < picture.rows; ++y) {
@@ -94,7 +54,7 @@ TiltReading read_tilt_picture(const cv::Mat& picture, const TiltColours& colours
       const auto& c = picture.at<cv::Vec3f>(y, x);
       const float most = std::max({c[0], c[1], c[2]});
       if (!(most - std::min({c[0], c[1], c[2]}) > kSaturated * most)) continue;
-      hue += hue_direction(c);
+      hue += sensors::hue_direction(static_cast<double>(c[2]), static_cast<double>(c[1]), static_cast<double>(c[0]));
       reading.coloured_area_px += 1.0;
       const double cover = ink_cover(c, colours);
       reading.ink_area_px += cover;
@@ -103,9 +63,9 @@ TiltReading read_tilt_picture(const cv::Mat& picture, const TiltColours& colours
       second += cover * place * place.transpose();
     }
   }
-  if (!(std::abs(hue) > 0.0)) fail("the picture has no coloured pixel");
+  if (!(hue.norm() > 0.0)) fail("the picture has no coloured pixel");
   if (!(reading.ink_area_px > 0.0)) fail("the picture shows no ink");
-  reading.hue = std::arg(hue);
+  reading.hue = signed_hue_of(hue);
   reading.ink_px = moment / reading.ink_area_px;
   const Eigen::Matrix2d variance = second / reading.ink_area_px - reading.ink_px * reading.ink_px.transpose();
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(variance, Eigen::EigenvaluesOnly);
@@ -126,18 +86,18 @@ TiltTable measure_tilt(const TiltBench& bench, const TiltSpectra& spectra, TiltM
   const TiltColours colours = tilt_colours(spectra);
   const auto look = [&](const TiltPose& pose, std::uint64_t with_seed) {
     TiltReading mean;
-    std::complex<double> hue = 0.0;
+    Eigen::Vector2d hue = Eigen::Vector2d::Zero();
     for (const Eigen::Vector2d& phase : kPhases_px) {
       TiltBench shifted = bench;
       shifted.phase_px += phase;
       const TiltReading one = read_tilt_picture(tilt_picture(shifted, spectra, marker, pose, with_seed++), colours);
-      hue += std::polar(1.0, one.hue);
+      hue += Eigen::Vector2d(std::cos(one.hue), std::sin(one.hue));
       mean.ink_px += (one.ink_px - phase) / kPhases;
       mean.ink_area_px += one.ink_area_px / kPhases;
       mean.ink_width_px += one.ink_width_px / kPhases;
       mean.coloured_area_px += one.coloured_area_px / kPhases;
     }
-    mean.hue = std::arg(hue);
+    mean.hue = signed_hue_of(hue);
     if (progress) progress("tilted markers", ++done, total);
     return mean;
   };
@@ -149,11 +109,11 @@ TiltTable measure_tilt(const TiltBench& bench, const TiltSpectra& spectra, TiltM
   std::vector<double> widths;
   for (const double pressed : kPressed_mm) {
     const TiltReading reading = pressed == 0.0 ? level : look({0.0, {0.0, 0.0, -pressed}}, seed);
-    hues.push_back(turn(reading.hue, level.hue));
+    hues.push_back(sensors::hue_difference(reading.hue, level.hue));
     areas.push_back(reading.ink_area_px / level.ink_area_px - 1.0);
     widths.push_back(reading.ink_width_px / level.ink_width_px - 1.0);
   }
-  const Line hue = line_through(kPressed_mm, hues);
+  const StraightLine hue = line_through(kPressed_mm, hues);
   TiltCalibration& calibration = table.calibration;
   calibration.hue_slope = hue.slope;
   calibration.hue_fit_r2 = hue.r2;
@@ -169,7 +129,7 @@ TiltTable measure_tilt(const TiltBench& bench, const TiltSpectra& spectra, TiltM
     const TiltReading reading = tilt == 0.0 ? level : look({tilt, Eigen::Vector3d::Zero()}, seed);
     TiltError error;
     error.tilt = tilt;
-    error.hue_change = turn(reading.hue, level.hue);
+    error.hue_change = sensors::hue_difference(reading.hue, level.hue);
     error.normal_um = um_a_radian * error.hue_change;
     error.size_um =
         kMicrometresPerMillimetre * (reading.ink_area_px / level.ink_area_px - 1.0) / calibration.area_slope;
@@ -180,7 +140,7 @@ TiltTable measure_tilt(const TiltBench& bench, const TiltSpectra& spectra, TiltM
     table.errors.push_back(error);
   }
   const TiltReading again = look({}, seed + kPhases);
-  table.noise_normal_um = std::abs(um_a_radian * turn(again.hue, level.hue)) / std::sqrt(2.0);
+  table.noise_normal_um = std::abs(um_a_radian * sensors::hue_difference(again.hue, level.hue)) / std::sqrt(2.0);
   table.noise_lateral_um = std::abs(um_a_pixel) * (again.ink_px - level.ink_px).norm() / 2.0;
   return table;
 }

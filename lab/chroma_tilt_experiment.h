@@ -13,7 +13,7 @@
 
 namespace touchstone::lab {
 
-/// What a picture of one marker tells. Own plain code on ideal pictures: no mosaic, no noise, no segmentation.
+/// What a picture of one marker tells, by plain code on ideal pictures: no mosaic, no noise, no segmentation.
 struct TiltReading {
   double hue = 0.0;  ///< radians, -pi to pi, 0 is red: circular mean over pixels of more than half saturation
   Eigen::Vector2d ink_px = Eigen::Vector2d::Zero();  ///< centroid of the ink

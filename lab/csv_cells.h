@@ -2,6 +2,7 @@
 // The little of CSV that recorded frames' tables need: cells without quotes, numbers without blanks.
 
 #include <charconv>
+#include <cmath>
 #include <filesystem>
 #include <optional>
 #include <sstream>
@@ -32,6 +33,31 @@ std::optional<T> number_of(const std::string& text) {
   const auto result = std::from_chars(text.data(), text.data() + text.size(), value);
   if (result.ec != std::errc() || result.ptr != text.data() + text.size()) return std::nullopt;
   return value;
+}
+
+/// @throws Error naming the cell's field at `where` unless the cell holds a whole number of that type
+template <typename T>
+T whole_number_in(const std::string& cell, const char* field, const SourceLocation& where) {
+  const auto value = number_of<T>(cell);
+  if (!value) fail_at(where, "{}: '{}' isn't a whole number", field, cell);
+  return *value;
+}
+
+/// @throws Error naming the cell's field at `where` unless the cell holds a finite number
+inline double number_in(const std::string& cell, const char* field, const SourceLocation& where) {
+  const auto value = number_of<double>(cell);
+  if (!value || !std::isfinite(*value)) fail_at(where, "{}: '{}' isn't a finite number", field, cell);
+  return *value;
+}
+
+/// The file of `folder` that a cell of the field `file` names. @throws Error at `where` if there is none
+inline std::filesystem::path file_in(const std::filesystem::path& folder, const std::string& cell,
+                                     const SourceLocation& where) {
+  std::filesystem::path file = folder / cell;
+  if (cell.empty() || !std::filesystem::is_regular_file(file)) {
+    fail_at(where, "file: there is no file {}", file.string());
+  }
+  return file;
 }
 
 /// Calls `row(where, cells)` for each line of a table after its first one, which must be `columns`; empty lines are

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
-#include <sstream>
 
 #include "core/units.h"
 #include "core/whole_file.h"
@@ -85,22 +84,13 @@ FrameSequence frames_of_force_table(const fs::path& folder, const fs::path& csv)
     LabelledFrame frame;
     frame.file = folder / cells[0];
     if (!fs::is_regular_file(frame.file)) fail_at(where, "there is no file {}", frame.file.string());
-    const auto t_us = number_of<std::int64_t>(cells[1]);
-    if (!t_us) fail_at(where, "t_us: '{}' isn't a whole number", cells[1]);
-    if (!sequence.frames.empty() && *t_us <= sequence.frames.back().t_us) {
-      fail_at(where, "t_us: {} isn't later than the line before", *t_us);
+    frame.t_us = whole_number_in<std::int64_t>(cells[1], "t_us", where);
+    if (!sequence.frames.empty() && frame.t_us <= sequence.frames.back().t_us) {
+      fail_at(where, "t_us: {} isn't later than the line before", frame.t_us);
     }
-    frame.t_us = *t_us;
     frame.frame = static_cast<int>(sequence.frames.size());
-    Eigen::Vector3d force;
-    for (int axis = 0; axis < 3; ++axis) {
-      const auto value = number_of<double>(cells[static_cast<std::size_t>(2 + axis)]);
-      if (!value || !std::isfinite(*value)) {
-        fail_at(where, "'{}' isn't a finite number", cells[static_cast<std::size_t>(2 + axis)]);
-      }
-      force[axis] = *value;
-    }
-    frame.force = force;
+    frame.force = Eigen::Vector3d{number_in(cells[2], "force_x_N", where), number_in(cells[3], "force_y_N", where),
+                                  number_in(cells[4], "force_z_N", where)};
     sequence.frames.push_back(std::move(frame));
   });
   if (sequence.frames.empty()) fail("{}: has no frame", csv.string());

@@ -6,6 +6,7 @@
 
 #include "core/error.h"
 #include "core/whole_file.h"
+#include "lab/on_picture.h"
 #include "sim/image_file.h"
 
 namespace touchstone::lab {
@@ -55,8 +56,8 @@ std::vector<HeightRecord> write_height_maps(const sensors::HeightModel& model, c
   const double pixel_mm2 = model.mm_per_px * model.mm_per_px;
   std::vector<HeightRecord> records;
   for (const fs::path& frame : frames) {
-    try {
-      const sensors::HeightResult& result = estimator.estimate(sim::read_image(frame));
+    on_picture(frame, [&](const cv::Mat& image) {
+      const sensors::HeightResult& result = estimator.estimate(image);
       HeightRecord record;
       record.file = frame.filename().string();
       cv::minMaxLoc(result.height_mm, nullptr, &record.highest_mm);
@@ -67,11 +68,7 @@ std::vector<HeightRecord> write_height_maps(const sensors::HeightModel& model, c
       record.contact_at_border = result.contact_at_border;
       write_map(result.height_mm, folder / frame.filename(), format);
       records.push_back(record);
-    } catch (const Error& error) {
-      const std::string message = error.what();
-      if (message.find(frame.string()) != std::string::npos) throw;
-      fail("{}: {}", frame.string(), message);
-    }
+    });
     if (progress) progress("heights", std::ssize(records), std::ssize(frames));
   }
   write_whole_file(folder / "heights.csv", csv_of(records));

@@ -2,11 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
 #include <map>
 
 #include "lab/csv_cells.h"
-#include "sim/image_file.h"
+#include "lab/on_picture.h"
 
 namespace touchstone::lab {
 namespace {
@@ -15,24 +14,12 @@ namespace fs = std::filesystem;
 
 constexpr const char* kColumns = "file,marker_column,marker_row,x_mm,y_mm,z_mm,series";
 
-int whole_number(const std::string& cell, const char* field, const SourceLocation& where) {
-  const auto value = number_of<int>(cell);
-  if (!value) fail_at(where, "{}: '{}' isn't a whole number", field, cell);
-  return *value;
-}
-
 int place_in_grid(const std::string& cell, const char* field, int count, const SourceLocation& where) {
-  const int value = whole_number(cell, field, where);
+  const int value = whole_number_in<int>(cell, field, where);
   if (value < 0 || value >= count) {
     fail_at(where, "{}: {} isn't in the grid, which has {}: 0 to {}", field, value, count, count - 1);
   }
   return value;
-}
-
-double number_in(const std::string& cell, const char* field, const SourceLocation& where) {
-  const auto value = number_of<double>(cell);
-  if (!value || !std::isfinite(*value)) fail_at(where, "{}: '{}' isn't a finite number", field, cell);
-  return *value;
 }
 
 }  // namespace
@@ -43,16 +30,13 @@ std::vector<AnnotatedMarker> read_hue_sample_table(const fs::path& folder, const
   for_each_row(csv, kColumns, [&](const SourceLocation& where, const std::vector<std::string>& cells) {
     AnnotatedMarker line;
     line.where = where;
-    line.file = folder / cells[0];
-    if (cells[0].empty() || !fs::is_regular_file(line.file)) {
-      fail_at(where, "file: there is no file {}", line.file.string());
-    }
+    line.file = file_in(folder, cells[0], where);
     const int column = place_in_grid(cells[1], "marker_column", grid.x(), where);
     const int row = place_in_grid(cells[2], "marker_row", grid.y(), where);
     line.marker = static_cast<std::size_t>(row * grid.x() + column);
     line.displacement_mm = {number_in(cells[3], "x_mm", where), number_in(cells[4], "y_mm", where),
                             number_in(cells[5], "z_mm", where)};
-    line.series = whole_number(cells[6], "series", where);
+    line.series = whole_number_in<int>(cells[6], "series", where);
     table.push_back(std::move(line));
   });
   if (table.empty()) fail("{}: has no marker", csv.string());
@@ -73,11 +57,10 @@ TableSamples read_hue_samples(const std::vector<AnnotatedMarker>& table, sensors
     auto known = readings.find(line.file);
     if (known == readings.end()) {
       try {
-        known = readings.emplace(line.file, finder.find(sim::read_image(line.file))).first;
+        on_picture(line.file,
+                   [&](const cv::Mat& image) { known = readings.emplace(line.file, finder.find(image)).first; });
       } catch (const Error& error) {
-        const std::string message = error.what();
-        if (message.find(line.file.string()) != std::string::npos) fail_at(line.where, "{}", message);
-        fail_at(line.where, "{}: {}", line.file.string(), message);
+        fail_at(line.where, "{}", error.what());
       }
     }
     const sensors::ColourMarker& seen = known->second.markers[line.marker];

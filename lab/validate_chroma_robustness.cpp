@@ -69,16 +69,14 @@ Clip make_clip(const ValidateOptions& options) {
   const sim::TouchObject touched = rig.object(ball);
   std::vector<sim::Truth> states = rig.play(touched, motion);
   states.erase(states.begin());  // the ball only just touches
-  const std::vector<ChromaLook> looks = bench.look(ball, states, kSeed);
+  Clip clip;
+  clip.rest = rig.background(kSeed);
+  clip.frames = bench.pictures(touched, states, kSeed);
   sensors::HueCalibrationSettings settings;
   settings.spacing_mm = bench.spacing_mm();
   settings.parallax = parallax_of(rig.device());
-  Clip clip;
-  clip.model = sensors::calibrate_hue(bench.rest(), samples_of_moved(looks, 0.02, 0), settings);
-  clip.rest = rig.background(kSeed);
-  for (std::size_t i = 0; i < states.size(); ++i) {
-    clip.frames.push_back(rig.look(touched, states[i].press, kSeed, static_cast<int>(i), false).frame);
-  }
+  const std::vector<sensors::HueSample> samples = samples_of_moved(bench.read(clip.frames, states), 0.02, 0);
+  clip.model = sensors::calibrate_hue(bench.rest(), samples, settings);
   return clip;
 }
 

@@ -12,6 +12,7 @@
 #include "lab/contact_closed_forms.h"
 #include "lab/mechanics_press.h"
 #include "lab/mechanics_rows.h"
+#include "lab/straight_line.h"
 
 namespace touchstone::lab {
 namespace {
@@ -103,7 +104,7 @@ MechanicsFinding order_of_force(const MechanicsGels& gels, const std::vector<dou
   const double wanted = sphere_on_layer(kValidationModulus, 0.49, 5.0, 8.0, kDepth).force;
   MechanicsFinding finding;
   finding.series = ValidationSeries{"edge of the mesh, mm", "relative error of the force", {}};
-  double sx = 0.0, sy = 0.0, sxx = 0.0, sxy = 0.0;
+  std::vector<double> log_edges, log_errors;
   for (const double edge : edges) {
     const fem::Compliance gel = gels.slab({60.0, 60.0, 5.0, edge, 4.0, 3.0, 3.0, 1.0}, 0.49);
     double squares = 0.0;
@@ -118,13 +119,10 @@ MechanicsFinding order_of_force(const MechanicsGels& gels, const std::vector<dou
     }
     const double error = std::sqrt(squares) / kPlaces;
     finding.series->points.emplace_back(edge, error);
-    sx += std::log(edge);
-    sy += std::log(error);
-    sxx += std::log(edge) * std::log(edge);
-    sxy += std::log(edge) * std::log(error);
+    log_edges.push_back(std::log(edge));
+    log_errors.push_back(std::log(error));
   }
-  const auto n = static_cast<double>(edges.size());
-  finding.ours = (n * sxy - sx * sy) / (n * sxx - sx * sx);
+  finding.ours = line_through(log_edges, log_errors).slope;
   return finding;
 }
 

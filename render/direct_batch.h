@@ -1,67 +1,17 @@
 #pragma once
 // Some hundred rays' worth of direct light: what the rays met, which lamps reach it, what comes back.
 
-#include <array>
+#include <Eigen/Core>
 #include <cstdint>
 #include <span>
 #include <vector>
 
 #include "render/camera_rays.h"
-#include "render/film_screen.h"
-#include "render/ggx.h"
-#include "render/light_field.h"
+#include "render/direct_fixture.h"
+#include "render/direct_material.h"
 #include "render/packet_scene.h"
-#include "render/shadow_reach.h"
-#include "render/warps.h"
 
 namespace touchstone::render {
-
-enum class DirectKind { kMatt, kMetal, kLuminous, kBlack };
-
-/// What is printed on a surface (print.h), as long as its scene lives.
-struct DirectPrint {
-  const std::vector<Eigen::Vector2d>* material_mm = nullptr;
-  const std::vector<std::array<int, 3>>* triangles = nullptr;
-  PrintIndex index;
-  std::vector<std::array<float, kMaxBands>> mark_colours;
-
-  explicit DirectPrint(const Surface& surface);
-
-  /// The ink at a place of a triangle, or `plain` beside the marks.
-  const float* colour_at(int triangle, float u, float v, const float* plain) const;
-};
-
-struct DirectMaterial {
-  DirectKind kind = DirectKind::kBlack;
-  std::array<float, kMaxBands> colour{};  ///< albedo, reflectance at normal incidence, or radiance
-  double roughness = 0.0;
-  const GgxAlbedo* albedo = nullptr;   ///< of a metal
-  const DirectPrint* print = nullptr;  ///< of a matt surface or a metal
-};
-
-/// What stays the same from frame to frame, besides the camera's rays. Lamps are taken in groups of four, the last one
-/// filled up with dark ones.
-struct DirectFixture {
-  LightField field;
-  LampBearings bearings;
-  int groups;
-  std::vector<float> flow;       ///< [node][group][axis][4]: F of LightField
-  std::vector<float> intensity;  ///< [band][group][4]
-  std::vector<float> pass;       ///< [node][band][group][4], empty where nothing absorbs
-  std::vector<NormalFrame> lens_frames;
-  std::vector<double> lens_radii;  // 0 of lamps that are not round
-  std::vector<double> lamp_index;  ///< refractive index of the medium that a lamp stands in
-  std::vector<bool> lamp_in_layer;
-  double low, high;  ///< of the field's layer
-  std::array<float, kMaxBands> absorption{};
-  bool absorbs = false;
-  FilmScreen films;              ///< empty where there are none
-  std::vector<int> colour_of;    ///< of each lamp: lamps of one colour have equal intensities
-  std::vector<int> colour_lamp;  ///< a lamp of each colour
-
-  /// `soft`: see LampBearings.
-  DirectFixture(const LightField& of, bool soft);
-};
 
 /// What a frame consists of.
 struct DirectFrame {

@@ -16,6 +16,7 @@
 #include "render/camera_rays.h"
 #include "render/direct_batch.h"
 #include "render/direct_fitness.h"
+#include "render/edge_rays.h"
 #include "render/film_screen.h"
 #include "render/ggx.h"
 #include "render/packet_scene.h"
@@ -95,26 +96,6 @@ struct DirectRenderer::Parts {
   int width() const { return size_of_grid(pixel_grid(camera)).x(); }
   int height() const { return size_of_grid(pixel_grid(camera)).y(); }
 
-  DirectMaterial prepare(const Material& material) {
-    DirectMaterial made;
-    const auto take = [&](const Spectrum& from) {
-      for (Eigen::Index band = 0; band < from.size(); ++band) made.colour[band] = static_cast<float>(from[band]);
-    };
-    if (const auto* lambertian = std::get_if<Lambertian>(&material)) {
-      made.kind = DirectKind::kMatt;
-      take(lambertian->albedo);
-    } else if (const auto* conductor = std::get_if<RoughConductor>(&material)) {
-      made.kind = DirectKind::kMetal;
-      take(conductor->reflectance);
-      made.roughness = conductor->roughness;
-      made.albedo = &conductors.try_emplace(made.roughness, made.roughness).first->second;
-    } else if (const auto* emitter = std::get_if<Emitter>(&material)) {
-      made.kind = DirectKind::kLuminous;
-      take(emitter->radiance);
-    }
-    return made;
-  }
-
   /// Casts the rays and shades what they meet: into `radiance`, or into the picture where nothing is spread.
   void cast(const DirectFrame& frame, DirectImage& image);
   /// Casts more rays where `radiance` has edges.
@@ -123,22 +104,7 @@ struct DirectRenderer::Parts {
   void spread(DirectImage& image) const;
 
  private:
-  struct GridRay {
-    bool valid;
-    Eigen::Vector3f origin, direction;
-    float far;
-  };
-  GridRay grid_ray(int row, int column) const {
-    const RayPacket& packet = rays.packets[row / CameraRays::kSide * rays.tiles_across + column / CameraRays::kSide];
-    const int lane = row % CameraRays::kSide * CameraRays::kSide + column % CameraRays::kSide;
-    return {packet.valid[lane] != 0,
-            {packet.origin[0][lane], packet.origin[1][lane], packet.origin[2][lane]},
-            {packet.direction[0][lane], packet.direction[1][lane], packet.direction[2][lane]},
-            packet.far[lane]};
-  }
-  std::vector<int> edge_points() const;
   DirectBatch::Visibility known_round(int point) const;
-  void put_edge_rays(int point, RayPacket& packet, int first_lane) const;
 
   static Eigen::Vector2i size_of_grid(const ImageGrid& grid) { return {grid.columns, grid.rows}; }
 
@@ -288,44 +254,6 @@ void DirectRenderer::Parts::cast(const DirectFrame& frame, DirectImage& image) {
   count_up(task_counts, image);
 }
 
-/// Grid points that differ from the next one, in order.
-std::vector<int> DirectRenderer::Parts::edge_points() const {
-  const int columns = rays.grid.columns;
-  const int rows = rays.grid.rows;
-  const std::size_t points = static_cast<std::size_t>(columns) * rows;
-  std::vector<double> squares(rows);
-  tbb::parallel_for(0, rows, [&](int row) {
-    for (int band = 0; band < rays.bands; ++band) {
-      const float* at = radiance.data() + band * points + static_cast<std::size_t>(row) * columns;
-      for (int k = 0; k < columns; ++k) squares[row] += double(at[k]) * double(at[k]);
-    }
-  });
-  double square = 0.0;
-  for (double one : squares) square += one;
-  const auto limit = static_cast<float>(settings.edge_contrast * settings.edge_contrast * square / double(points));
-  const auto differ = [&](std::size_t one, std::size_t other) {
-    float sum = 0.0f;
-    for (int band = 0; band < rays.bands; ++band) {
-      const float difference = radiance[band * points + one] - radiance[band * points + other];
-      sum += difference * difference;
-    }
-    return sum > limit;
-  };
-  std::vector<std::vector<int>> by_row(rows);
-  tbb::parallel_for(0, rows, [&](int row) {
-    for (int column = 0; column < columns; ++column) {
-      const std::size_t point = static_cast<std::size_t>(row) * columns + column;
-      if ((column > 0 && differ(point, point - 1)) || (column + 1 < columns && differ(point, point + 1)) ||
-          (row > 0 && differ(point, point - columns)) || (row + 1 < rows && differ(point, point + columns))) {
-        by_row[row].push_back(static_cast<int>(point));
-      }
-    }
-  });
-  std::vector<int> all;
-  for (const auto& one : by_row) all.insert(all.end(), one.begin(), one.end());
-  return all;
-}
-
 /// A lamp that is seen, or hidden, from a point and all eight next ones is taken to be so from all between them.
 DirectBatch::Visibility DirectRenderer::Parts::known_round(int point) const {
   const int columns = rays.grid.columns;
@@ -342,61 +270,8 @@ DirectBatch::Visibility DirectRenderer::Parts::known_round(int point) const {
   return known;
 }
 
-/// Rays through a grid point's square: what a central ray is in the layer changes so smoothly over the picture that
-/// the next grid points' rays tell it.
-void DirectRenderer::Parts::put_edge_rays(int point, RayPacket& packet, int first_lane) const {
-  const int column = point % rays.grid.columns;
-  const int row = point / rays.grid.columns;
-  const GridRay here = grid_ray(row, column);
-  const auto slope = [&](int rows_on, int columns_on) {
-    Eigen::Matrix<float, 3, 2> change = Eigen::Matrix<float, 3, 2>::Zero();
-    const int row_to = std::min(row + rows_on, rays.grid.rows - 1);
-    const int column_to = std::min(column + columns_on, rays.grid.columns - 1);
-    const int row_from = std::max(row - rows_on, 0);
-    const int column_from = std::max(column - columns_on, 0);
-    const GridRay to = grid_ray(row_to, column_to);
-    const GridRay from = grid_ray(row_from, column_from);
-    const int steps = row_to - row_from + column_to - column_from;
-    if (to.valid && from.valid && steps > 0) {
-      change << (to.origin - from.origin) / static_cast<float>(steps),
-          (to.direction - from.direction) / static_cast<float>(steps);
-    }
-    return change;
-  };
-  const Eigen::Matrix<float, 3, 2> across = slope(0, 1);
-  const Eigen::Matrix<float, 3, 2> down = slope(1, 0);
-  const int side = settings.edge_side;
-  // A grid whose rows are set off against each other, and its columns, so that no two points share an x or a y (Chiu,
-  // Shirley and Wang 1994, "Multi-jittered sampling", without the jitter): an edge that runs with the pixels has as
-  // many places between them to be found at as there are points. Moved from pixel to pixel by less than that, in steps
-  // of the golden section, so that along such an edge the mean is right too.
-  constexpr double kGolden = 0.6180339887498949;
-  const auto moved = [](int by) {
-    const double turns = kGolden * (by + 0.5);
-    return static_cast<float>(turns - std::floor(turns));
-  };
-  const float x_moved = moved(row);
-  const float y_moved = moved(column);
-  const auto sides = static_cast<float>(side);
-  for (int k = 0; k < side * side; ++k) {
-    const auto i = static_cast<float>(k % side);
-    const auto j = static_cast<float>(k / side);
-    const float x = (i + (j + x_moved) / sides) / sides - 0.5f;
-    const float y = (j + (i + y_moved) / sides) / sides - 0.5f;
-    const Eigen::Vector3f origin = here.origin + x * across.col(0) + y * down.col(0);
-    const Eigen::Vector3f direction = (here.direction + x * across.col(1) + y * down.col(1)).normalized();
-    const int lane = first_lane + k;
-    for (int a = 0; a < 3; ++a) {
-      packet.origin[a][lane] = origin[a];
-      packet.direction[a][lane] = direction[a];
-    }
-    packet.far[lane] = here.far;
-    packet.valid[lane] = here.valid ? -1 : 0;
-  }
-}
-
 void DirectRenderer::Parts::refine(const DirectFrame& frame, DirectImage& image) {
-  const std::vector<int> edges = edge_points();
+  const std::vector<int> edges = edge_points(radiance, rays.grid, rays.bands, settings.edge_contrast);
   image.edge_pixels = edges.size();
   const int bands = rays.bands;
   const std::size_t points = static_cast<std::size_t>(rays.grid.columns) * rays.grid.rows;
@@ -416,7 +291,8 @@ void DirectRenderer::Parts::refine(const DirectFrame& frame, DirectImage& image)
       std::fill_n(packet.direction[2], kPacket, 1.0f);
     }
     for (int k = 0; k < count; ++k) {
-      put_edge_rays(edges[first + k], packets[k / points_a_packet], k % points_a_packet * rays_a_point);
+      put_edge_rays(rays, edges[first + k], settings.edge_side, packets[k / points_a_packet],
+                    k % points_a_packet * rays_a_point);
     }
     DirectBatch batch(frame);
     batch.look(packets, task_counts[task]);
@@ -517,10 +393,10 @@ DirectImage DirectRenderer::render(const Scene& scene) {
   std::vector<DirectMaterial> materials;
   std::vector<std::unique_ptr<const DirectPrint>> prints;
   for (const Surface& surface : scene.surfaces) {
-    materials.push_back(parts.prepare(surface.material));
+    materials.push_back(direct_material(surface.material, parts.conductors));
     if (surface.print) materials.back().print = prints.emplace_back(new DirectPrint(surface)).get();
   }
-  for (const Ball& ball : scene.balls) materials.push_back(parts.prepare(ball.material));
+  for (const Ball& ball : scene.balls) materials.push_back(direct_material(ball.material, parts.conductors));
   std::optional<ShadowReach> shadow_reach;
   if (parts.settings.shadows) {
     shadow_reach.emplace(parts.fixture.bearings, scene,

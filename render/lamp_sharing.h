@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <cmath>
 
+#include "render/lamp_choice.h"
 #include "render/lamp_connection.h"
 #include "render/layer_connection.h"
 #include "render/prepared_scene.h"
@@ -85,6 +86,35 @@ bool passes_refractive(const PreparedScene<N>& scene, const PreparedLamp<N>& lam
   }
   const double left = (lamp.position - at).dot(lamp.frame.z) / direction.dot(lamp.frame.z);
   return left > 0.0 && std::isfinite(left) && scene.rays.meets_refractive(at, at + left * direction);
+}
+
+/// Leaves to paths that run into the lamp their share of what a connection has found; `density` is that of such a
+/// path's direction.
+template <int N>
+inline void share_with_paths(const PreparedScene<N>& scene, const PreparedLamp<N>& lamp, const LampChoice& choice,
+                             const Receiver& receiver, double density, Arrival<N>& arrival) {
+  if (!(arrival.angle_per_lamp_area > 0.0)) return;
+  if (arrival.bends_at_surface || passes_refractive(scene, lamp, receiver, arrival.direction)) return;
+  const double of_connection = choice.probability / (lamp.area * arrival.angle_per_lamp_area);
+  arrival.irradiance *= of_connection / (of_connection + density);
+}
+
+/// How the light of a lamp that the path runs into is shared with the connections of where the path last scattered.
+struct Departure {
+  enum class Sharing { kAllToPath, kShared, kAllToConnection } sharing = Sharing::kAllToPath;
+  Receiver from;
+  bool is_matt = false;
+  double density = 0.0;
+};
+
+/// After a smooth event at a face or surface of this normal: mirrored light is found by paths only.
+inline void note_smooth_event(Departure& departure, const Eigen::Vector3d& before, const Eigen::Vector3d& after,
+                              const Eigen::Vector3d& normal, bool is_refractive_surface) {
+  if ((before.dot(normal) > 0.0) != (after.dot(normal) > 0.0)) {
+    departure.sharing = Departure::Sharing::kAllToPath;
+  } else if (is_refractive_surface && departure.sharing == Departure::Sharing::kShared) {
+    departure.sharing = Departure::Sharing::kAllToConnection;
+  }
 }
 
 }  // namespace touchstone::render

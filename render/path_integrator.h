@@ -10,6 +10,7 @@
 #include "render/ggx.h"
 #include "render/guide_connection.h"
 #include "render/lamp_sharing.h"
+#include "render/medium_walk.h"
 #include "render/path_leg.h"
 #include "render/path_tracer.h"
 #include "render/prepared_scene.h"
@@ -32,6 +33,7 @@ class PathIntegrator {
         max_depth_(max_depth),
         interreflection_(interreflection),
         smooth_(scene),
+        walk_(scene),
         lamps_are_seen_(!scene.lamp_bodies.empty()) {}
 
   /// Basic radiance that arrives at `origin` against `direction` (unit).
@@ -53,7 +55,6 @@ class PathIntegrator {
 
  private:
   static constexpr int kMostSmoothEvents = 64;
-  static constexpr int kRouletteFrom = 3;
   static constexpr int kGuidePreview = 6;
 
   using Leg = PathLeg<N>;
@@ -175,7 +176,7 @@ class PathIntegrator {
     Arrival<N> arrival;
     if (!reach_lamp(leg, lamp, chosen.lens, receiver, counts, arrival)) return;
     if (lamp.visible && interreflection_) {
-      share_with_paths(lamp, choice, receiver,
+      share_with_paths(scene_, lamp, choice, receiver,
                        henyey_greenstein(arrival.direction.dot(leg.direction), medium.anisotropy), arrival);
     }
     const double phase = henyey_greenstein(arrival.direction.dot(leg.direction), medium.anisotropy);
@@ -199,34 +200,6 @@ class PathIntegrator {
       return std::abs(cosine) / kPi * (cosine > 0.0 ? back : through) / (back + through);
     }
     return std::max(0.0, cosine) / kPi;
-  }
-
-  /// Leaves to paths that run into the lamp their share of what a connection has found; `density` is that of such a
-  /// path's direction.
-  void share_with_paths(const PreparedLamp<N>& lamp, const LampChoice& choice, const Receiver& receiver, double density,
-                        Arrival<N>& arrival) const {
-    if (!(arrival.angle_per_lamp_area > 0.0)) return;
-    if (arrival.bends_at_surface || passes_refractive(scene_, lamp, receiver, arrival.direction)) return;
-    const double of_connection = choice.probability / (lamp.area * arrival.angle_per_lamp_area);
-    arrival.irradiance *= of_connection / (of_connection + density);
-  }
-
-  /// How the light of a lamp that the path runs into is shared with the connections of where the path last scattered.
-  struct Departure {
-    enum class Sharing { kAllToPath, kShared, kAllToConnection } sharing = Sharing::kAllToPath;
-    Receiver from;
-    bool is_matt = false;
-    double density = 0.0;
-  };
-
-  /// After a smooth event at a face or surface of this normal: mirrored light is found by paths only.
-  static void note_smooth_event(Departure& departure, const Eigen::Vector3d& before, const Eigen::Vector3d& after,
-                                const Eigen::Vector3d& normal, bool is_refractive_surface) {
-    if ((before.dot(normal) > 0.0) != (after.dot(normal) > 0.0)) {
-      departure.sharing = Departure::Sharing::kAllToPath;
-    } else if (is_refractive_surface && departure.sharing == Departure::Sharing::kShared) {
-      departure.sharing = Departure::Sharing::kAllToConnection;
-    }
   }
 
   /// The leg runs into a lamp.
@@ -288,7 +261,7 @@ class PathIntegrator {
         Arrival<N> arrival;
         if (!reach_lamp(leg, lamp, place, receiver, counts, arrival)) continue;
         if (lamp.visible && interreflection_ && leg.depth < max_depth_) {
-          share_with_paths(lamp, choice, receiver, scattering_density(leg, normal, material, arrival.direction),
+          share_with_paths(scene_, lamp, choice, receiver, scattering_density(leg, normal, material, arrival.direction),
                            arrival);
         }
         const double cosine = arrival.direction.dot(normal);
@@ -353,71 +326,13 @@ class PathIntegrator {
     return leg.throughput.maxCoeff() > 0.0;
   }
 
-  [[gnu::noinline]] Flight<N> fly(const Leg& leg, SampleSequence& numbers) const {
-    const auto [u, v] = numbers.next_pair();
-    return sample_flight<N>(scene_.media[leg.medium].extinction, leg.throughput, u, v);
-  }
-
   /// The leg ends at a particle of its medium, at its origin. Goes on in a new direction; false where the path ends.
   [[gnu::noinline]] bool scatter_in_medium(Leg& leg, const LampNumbers& chosen, SampleSequence& numbers,
                                            RayCounts& counts, Bands<N>& sum) const {
     if (!(leg.throughput.maxCoeff() > 0.0)) return false;
     add_lamp_light_of_particle(leg, chosen, counts, sum);
     if (!interreflection_) return false;
-    ++leg.scatterings;
-    leg.smooth = 0;
-    leg.s_share = 0.5;
-    if (leg.scatterings >= kRouletteFrom) {
-      const double survival = std::min(1.0, leg.throughput.maxCoeff());
-      if (survival < 1.0) {
-        if (!(numbers.next() < survival)) return false;
-        leg.throughput /= survival;
-      }
-      if (roulette_is_due(leg.scatterings)) {
-        const double kept = share_of_walks_kept(leg.scatterings);
-        if (!(numbers.next() < kept)) return false;
-        leg.throughput /= kept;
-      }
-    }
-    if (leg.scatterings % kJumpEvery == 0 && std::isfinite(scene_.media[leg.medium].deep.margin) &&
-        jump(leg, numbers)) {
-      return leg.throughput.maxCoeff() > 0.0;
-    }
-    const auto [u, v] = numbers.next_pair();
-    const double cosine = sample_henyey_greenstein(scene_.media[leg.medium].anisotropy, u);
-    const double sine = std::sqrt(std::max(0.0, 1.0 - cosine * cosine));
-    const double angle = 2.0 * kPi * v;
-    const NormalFrame frame(leg.direction);
-    leg.direction =
-        frame.to_world(Eigen::Vector3d(sine * std::cos(angle), sine * std::sin(angle), cosine)).normalized();
-    return true;
-  }
-
-  /// Sets a leg that has just met a particle far from everything onto a sphere round it (deep_walk.h). False where
-  /// there is no room.
-  [[gnu::noinline]] bool jump(Leg& leg, SampleSequence& numbers) const {
-    const DeepWalk<N>& walk = scene_.media[leg.medium].deep;
-    // Light that isn't even after a scattering stands for a place further on. Bands take their mean one: ways along
-    // which walks come are even this deep, so what is left is of second order.
-    const Eigen::Vector3d centre =
-        leg.origin + (leg.throughput * walk.drift).sum() / leg.throughput.sum() * leg.direction;
-    double room = 1e6;
-    const int face_count = static_cast<int>(scene_.faces.size());
-    if (leg.layer < face_count) room = std::min(room, scene_.faces[leg.layer].z - centre.z());
-    if (leg.layer > 0) room = std::min(room, centre.z() - scene_.faces[leg.layer - 1].z);
-    for (const PreparedLamp<N>& lamp : scene_.lamps) {
-      const double extent = std::max(lamp.radius, std::hypot(lamp.half_width, lamp.half_height));
-      room = std::min(room, (lamp.position - centre).norm() - extent);
-    }
-    if (room < 2.0 * walk.margin) return false;
-    const double radius = scene_.rays.clearance(centre, room) - walk.margin;
-    if (radius < walk.margin) return false;
-    const auto [a, b] = numbers.next_pair();
-    leg.origin = centre + radius * square_to_sphere(a, b);
-    leg.throughput *= share_left(walk, radius);
-    const auto [c, d] = numbers.next_pair();
-    leg.direction = square_to_sphere(c, d);
-    return true;
+    return walk_.go_on(leg, numbers);
   }
 
   void follow(Leg& leg, Branches& branches, const LampNumbers& at_first_hit, SampleSequence& numbers, RayCounts& counts,
@@ -440,7 +355,7 @@ class PathIntegrator {
       double most = to_face;
       if (scene_.media[leg.medium].scatters && !numbers.is_centre()) [[unlikely]] {
         if (!(leg.throughput.maxCoeff() > 0.0)) return;  // an absorber took all: no share of it can be chosen
-        drawn = fly(leg, numbers);
+        drawn = walk_.fly(leg, numbers);
         flight = &drawn;
         most = std::min(most, drawn.distance);
       }
@@ -532,6 +447,7 @@ class PathIntegrator {
   int max_depth_;
   bool interreflection_;
   SmoothEvents<N> smooth_;
+  MediumWalk<N> walk_;
   bool lamps_are_seen_;  // some lamp is visible
 };
 

@@ -1,5 +1,4 @@
 #include "render/shadow_reach.h"
-#include "render/film_screen.h"
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
@@ -9,8 +8,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <utility>
+
+#include "render/film_screen.h"
 
 namespace touchstone::render {
 namespace {

@@ -1,13 +1,11 @@
 #include "sensors/height_model_file.h"
 
-#include <bit>
-#include <cstring>
 #include <limits>
+#include <utility>
 
 #include "core/error.h"
-#include "core/sha256.h"
 #include "core/whole_file.h"
-#include "sensors/json_field.h"
+#include "sensors/json_payload.h"
 
 namespace touchstone::sensors {
 namespace {
@@ -16,20 +14,6 @@ constexpr const char* kFormat = "touchstone.height_model";
 constexpr int kVersion = 2;  // 2: lamps at nodes; 1 had a polynomial
 constexpr int kLargestSide = 8192;
 constexpr int kMostCells = 1024;
-
-static_assert(std::endian::native == std::endian::little, "the file is little-endian");
-
-template <typename T>
-void append(std::string& bytes, const T* values, std::size_t count) {
-  bytes.append(reinterpret_cast<const char*>(values), count * sizeof(T));
-}
-
-template <typename T>
-void take(std::string_view& bytes, T* values, std::size_t count) {
-  TS_ASSERT(bytes.size() >= count * sizeof(T));
-  std::memcpy(values, bytes.data(), count * sizeof(T));
-  bytes.remove_prefix(count * sizeof(T));
-}
 
 Json matrix_to_json(const Eigen::Matrix3d& matrix) {
   Json rows = Json::array();
@@ -77,17 +61,11 @@ std::string to_bytes(const HeightModel& model) {
   json["table_lowest_DN"] = {static_cast<double>(model.table.lowest[0]), static_cast<double>(model.table.lowest[1]),
                              static_cast<double>(model.table.lowest[2])};
   json["table_step_DN"] = static_cast<double>(model.table.step);
-  json["sha256"] = sha256_of(payload);
-  return json.dump() + "\n" + payload;
+  return with_payload(std::move(json), payload);
 }
 
 HeightModel height_model_from_bytes(std::string_view bytes, const std::string& name) {
-  const std::size_t end = bytes.find('\n');
-  if (end == std::string_view::npos || bytes.empty() || bytes.front() != '{') {
-    throw Error({name, 0}, "isn't a height model: it doesn't begin with a line of JSON");
-  }
-  const Json json = parse_json(std::string(bytes.substr(0, end)), name);
-  std::string_view payload = bytes.substr(end + 1);
+  auto [json, payload] = split_payload(bytes, "a height model", name);
   const JsonField root{json, "", name};
   if (root.at("format").text() == kFormat && root.at("version").number() < kVersion) {
     root.refuse("is of version {}, before {}: calibrate again from the same pictures", root.at("version").number(),
@@ -133,10 +111,7 @@ HeightModel height_model_from_bytes(std::string_view bytes, const std::string& n
 
   const std::size_t pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   const std::size_t length = pixels * 3 * sizeof(float) + cells * (2 * sizeof(float) + sizeof(std::uint16_t));
-  if (payload.size() != length) {
-    root.refuse("has {} bytes after its first line; {} are needed: it is cut short or damaged", payload.size(), length);
-  }
-  if (sha256_of(payload) != root.at("sha256").text()) root.refuse("is damaged: its checksum doesn't fit");
+  expect_payload(root, payload, length);
   model.background.mean.create(height, width, CV_32FC3);
   take(payload, model.background.mean.ptr<float>(), pixels * 3);
   model.table.slopes.resize(cells);

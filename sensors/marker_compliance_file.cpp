@@ -1,12 +1,10 @@
 #include "sensors/marker_compliance_file.h"
 
-#include <bit>
-#include <cstring>
+#include <utility>
 
 #include "core/error.h"
-#include "core/sha256.h"
 #include "core/whole_file.h"
-#include "sensors/json_field.h"
+#include "sensors/json_payload.h"
 
 namespace touchstone::sensors {
 namespace {
@@ -14,17 +12,8 @@ namespace {
 constexpr const char* kFormat = "touchstone.marker_compliance";
 constexpr int kVersion = 1;
 
-static_assert(std::endian::native == std::endian::little, "the file is little-endian");
-
-void append(std::string& bytes, const double* values, Eigen::Index count) {
-  bytes.append(reinterpret_cast<const char*>(values), static_cast<std::size_t>(count) * sizeof(double));
-}
-
-void take(std::string_view& bytes, double* values, Eigen::Index count) {
-  const std::size_t size = static_cast<std::size_t>(count) * sizeof(double);
-  TS_ASSERT(bytes.size() >= size);
-  std::memcpy(values, bytes.data(), size);
-  bytes.remove_prefix(size);
+std::size_t count_of(const Eigen::MatrixXd& matrix) {
+  return static_cast<std::size_t>(matrix.size());
 }
 
 Eigen::Vector2i grid_of(const JsonField& field, int most) {
@@ -40,7 +29,7 @@ std::string to_bytes(const MarkerCompliance& compliance) {
   if (!fault.empty()) fail("marker compliance: {}", fault);
   std::string payload;
   for (const Eigen::Vector3d& rest : compliance.marker_rest) append(payload, rest.data(), 3);
-  append(payload, compliance.displacement.data(), compliance.displacement.size());
+  append(payload, compliance.displacement.data(), count_of(compliance.displacement));
 
   Json json;
   json["format"] = kFormat;
@@ -53,17 +42,11 @@ std::string to_bytes(const MarkerCompliance& compliance) {
   json["thickness_mm"] = compliance.thickness;
   json["youngs_modulus_MPa"] = compliance.youngs_modulus;
   json["poisson_ratio"] = compliance.poisson_ratio;
-  json["sha256"] = sha256_of(payload);
-  return json.dump() + "\n" + payload;
+  return with_payload(std::move(json), payload);
 }
 
 MarkerCompliance marker_compliance_from_bytes(std::string_view bytes, const std::string& name) {
-  const std::size_t end = bytes.find('\n');
-  if (end == std::string_view::npos || bytes.front() != '{') {
-    throw Error({name, 0}, "isn't a marker compliance: it doesn't begin with a line of JSON");
-  }
-  const Json json = parse_json(std::string(bytes.substr(0, end)), name);
-  std::string_view payload = bytes.substr(end + 1);
+  auto [json, payload] = split_payload(bytes, "a marker compliance", name);
   const JsonField root{json, "", name};
   root.expect_format(kFormat, kVersion);
   root.expect_map({"format", "version", "gel", "marker_grid", "patch_grid", "patch_side_mm", "first_patch_mm",
@@ -85,14 +68,11 @@ MarkerCompliance marker_compliance_from_bytes(std::string_view bytes, const std:
                 kMostPatches);
   }
   const auto length = static_cast<std::size_t>(3 * markers + 9 * markers * patches) * sizeof(double);
-  if (payload.size() != length) {
-    root.refuse("has {} bytes after its first line; {} are needed: it is cut short or damaged", payload.size(), length);
-  }
-  if (sha256_of(payload) != root.at("sha256").text()) root.refuse("is damaged: its checksum doesn't fit");
+  expect_payload(root, payload, length);
   compliance.marker_rest.resize(static_cast<std::size_t>(markers));
   for (Eigen::Vector3d& rest : compliance.marker_rest) take(payload, rest.data(), 3);
   compliance.displacement.resize(3 * markers, 3 * patches);
-  take(payload, compliance.displacement.data(), compliance.displacement.size());
+  take(payload, compliance.displacement.data(), count_of(compliance.displacement));
   const std::string fault = fault_of(compliance);
   if (!fault.empty()) root.refuse("{}", fault);
   return compliance;

@@ -9,18 +9,11 @@ namespace touchstone {
 namespace {
 
 namespace fs = std::filesystem;
+using test::expect_refused;
 using test::ProgramRun;
 using test::run_program;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
-
-/// A mistake is one line on stderr, exit code 2, and nothing on stdout.
-void expect_refused(const ProgramRun& run, const std::string& part) {
-  EXPECT_EQ(run.exit_code, 2) << run.err;
-  EXPECT_THAT(run.err, AllOf(::testing::StartsWith("touchstone: "), HasSubstr(part)));
-  EXPECT_EQ(std::count(run.err.begin(), run.err.end(), '\n'), 1) << run.err;
-  EXPECT_EQ(run.out, "");
-}
 
 class BadInput : public ::testing::Test {
  protected:

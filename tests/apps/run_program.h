@@ -1,5 +1,9 @@
 #pragma once
 
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
 #include <chrono>
 #include <string>
 #include <vector>
@@ -23,6 +27,14 @@ inline ProgramRun run_program_on_full_disk(const std::vector<std::string>& argum
                                     TOUCHSTONE_PROGRAM};
   words.insert(words.end(), arguments.begin(), arguments.end());
   return run_words(std::move(words));
+}
+
+/// A mistake is one line on stderr that has `part` in it, exit code 2, and nothing on stdout.
+inline void expect_refused(const ProgramRun& run, const std::string& part) {
+  EXPECT_EQ(run.exit_code, 2) << run.err;
+  EXPECT_THAT(run.err, ::testing::AllOf(::testing::StartsWith("touchstone: "), ::testing::HasSubstr(part)));
+  EXPECT_EQ(std::count(run.err.begin(), run.err.end(), '\n'), 1) << run.err;
+  EXPECT_EQ(run.out, "");
 }
 
 }  // namespace touchstone::test

@@ -57,9 +57,7 @@ TEST_F(StudyCommand, WritesTablesAndPlotsAndDoesSoAgain) {
 
 TEST_F(StudyCommand, RefusesMistakesWithOneLineAndWritesNothing) {
   const auto refused = [&](const ProgramRun& run, const std::string& part) {
-    EXPECT_EQ(run.exit_code, 2) << run.err;
-    EXPECT_THAT(run.err, HasSubstr(part));
-    EXPECT_EQ(std::count(run.err.begin(), run.err.end(), '\n'), 1) << run.err;
+    test::expect_refused(run, part);
     EXPECT_FALSE(fs::exists(in("out")));
   };
   refused(study("name: thin\n"), "kind");

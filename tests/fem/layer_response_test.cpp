@@ -8,14 +8,15 @@
 #include <numbers>
 #include <vector>
 
-#include "core/error.h"
 #include "fem/layer_kernel.h"
 #include "tests/fem/layer_kernel.h"
+#include "tests/support/message_of.h"
 
 namespace touchstone::fem {
 namespace {
 
 using ::testing::HasSubstr;
+using touchstone::test::message_of;
 
 constexpr double kPi = std::numbers::pi;
 
@@ -27,16 +28,6 @@ std::vector<double> answer(const LayerResponse& layer, const std::vector<double>
   std::vector<double> displacement(pressure.size());
   layer.apply(pressure, displacement, *layer.make_scratch());
   return displacement;
-}
-
-template <typename Call>
-std::string error_of(const Call& call) {
-  try {
-    call();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
 }
 
 TEST(LayerKernel, EqualsItsFormulaWhereThatIsStable) {
@@ -213,7 +204,7 @@ TEST(LayerResponse, TheNumberOfThreadsChangesNoBit) {
 TEST(LayerResponse, RefusesWhatItCantDo) {
   const ElasticMaterial m{0.33, 0.49};
   const auto make = [&](double thickness, const PixelGrid& grid) {
-    return error_of([&] { LayerResponse(m, thickness, grid, GridEdges::free); });
+    return message_of([&] { LayerResponse(m, thickness, grid, GridEdges::free); });
   };
   EXPECT_THAT(make(1.0, {0, 4, 0.1, {0, 0}}), HasSubstr("0 x 4 pixels"));
   EXPECT_THAT(make(1.0, {kMostPixelsASide + 1, 4, 0.1, {0, 0}}), HasSubstr("1 to 2048"));

@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
-#include <functional>
 #include <nlohmann/json.hpp>
 
 #include "core/error.h"
@@ -16,6 +15,7 @@
 #include "lab/run_folder.h"
 #include "lab/truth_file.h"
 #include "tests/lab/fake_source.h"
+#include "tests/support/message_of.h"
 #include "tests/support/small_job.h"
 
 namespace touchstone::lab {
@@ -23,17 +23,9 @@ namespace {
 
 namespace fs = std::filesystem;
 using test::contents_of;
+using test::message_of;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
-
-std::string message_of(const std::function<void()>& act) {
-  try {
-    act();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "nothing was thrown";
-}
 
 class DataSet : public ::testing::Test {
  protected:

@@ -3,26 +3,16 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <functional>
-
-#include "core/error.h"
 #include "lab/prepared_job.h"
+#include "tests/support/message_of.h"
 #include "tests/support/small_job.h"
 
 namespace touchstone::lab {
 namespace {
 
+using test::message_of;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
-
-std::string message_of(const std::function<void()>& act) {
-  try {
-    act();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "nothing was thrown";
-}
 
 std::string message_of_job(const std::string& text) {
   const test::TemporaryFolder folder;

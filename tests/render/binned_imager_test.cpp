@@ -2,7 +2,6 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <tbb/global_control.h>
 
 #include <algorithm>
 #include <array>
@@ -12,6 +11,7 @@
 
 #include "core/error.h"
 #include "render/imager.h"
+#include "tests/render/imager_laws.h"
 
 namespace touchstone::render {
 namespace {
@@ -96,10 +96,6 @@ MeanAndSpread spread_of(const cv::Mat& numbers) {
 /// Half the variance of the difference: what changes from frame to frame, without the fixed pattern.
 double temporal_variance(const cv::Mat& a, const cv::Mat& b) {
   return spread_of(a - b).variance / 2.0;
-}
-
-bool same_bytes(const cv::Mat& a, const cv::Mat& b) {
-  return a.type() == b.type() && a.size() == b.size() && cv::norm(a, b, cv::NORM_INF) == 0.0;
 }
 
 /// Means over the pixels of a colour in each block of a raw mosaic.
@@ -296,22 +292,7 @@ TEST(BinnedImager, NoiseAndFixedPatternOfTheChannelsAreIndependent) {
 }
 
 TEST(BinnedImager, SameBytesWithAnyNumberOfThreads) {
-  const Imager imager = binned();
-  cv::Mat light(97, 61, CV_32FC3);
-  for (int row = 0; row < light.rows; ++row) {
-    for (int column = 0; column < light.cols; ++column) {
-      light.at<cv::Vec3f>(row, column) = {1e-3F * static_cast<float>(row), 0.03F, 1e-3F * static_cast<float>(column)};
-    }
-  }
-  cv::Mat one;
-  {
-    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, 1);
-    one = expose(light, imager, 3, 9);
-  }
-  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, 4);
-  EXPECT_TRUE(same_bytes(one, expose(light, imager, 3, 9)));
-  EXPECT_FALSE(same_bytes(one, expose(light, imager, 3, 10)));
-  EXPECT_FALSE(same_bytes(one, expose(light, imager, 4, 9)));
+  expect_same_bytes_on_any_threads(binned(), 1e-3F, 0.03F);
 }
 
 TEST(BinnedImager, AChannelsNoiseDoesNotHangOnTheOthersLight) {

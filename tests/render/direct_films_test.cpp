@@ -86,13 +86,18 @@ Scene without_films(Scene scene) {
   return scene;
 }
 
-// A lamp between film and surface: its light meets film only on its way to the camera.
-TEST(DirectFilms, TheCameraSeesThroughThemAsPathsDo) {
+/// A lamp between film and surface: its light meets film only on its way to the camera.
+Scene lamp_above_films() {
   Scene scene = white_surface();
   SpotLamp lamp = half_space_lamp({7.5, 4.0, -3.0}, {0, 0, 1}, 1.0);
   lamp.power_W = flat_spectrum(3, 1.0);
   scene.lamps.push_back(lamp);
   scene.surfaces.push_back(films(1, 1.0, 1.5));
+  return scene;
+}
+
+TEST(DirectFilms, TheCameraSeesThroughThemAsPathsDo) {
+  Scene scene = lamp_above_films();
   const LensCamera camera = lens(40);
   const cv::Mat found = direct(scene, camera);
   const cv::Mat bare = direct(without_films(scene), camera);
@@ -131,11 +136,7 @@ TEST(DirectFilms, TheCameraSeesThroughThemAsPathsDo) {
 
 // One ray with the disc's mean is as good as many rays that each meet film or not.
 TEST(DirectFilms, TheDiscsMeanIsThatOfManyRays) {
-  Scene scene = white_surface();
-  SpotLamp lamp = half_space_lamp({7.5, 4.0, -3.0}, {0, 0, 1}, 1.0);
-  lamp.power_W = flat_spectrum(3, 1.0);
-  scene.lamps.push_back(lamp);
-  scene.surfaces.push_back(films(1, 1.0, 1.5));
+  Scene scene = lamp_above_films();
   DirectSettings many;
   many.samples = 64;
   const cv::Mat sampled = direct(scene, lens(40), many);

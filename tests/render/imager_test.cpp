@@ -2,7 +2,6 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <tbb/global_control.h>
 
 #include <algorithm>
 #include <cmath>
@@ -13,6 +12,7 @@
 
 #include "core/error.h"
 #include "render/noise_quantile.h"
+#include "tests/render/imager_laws.h"
 
 namespace touchstone::render {
 namespace {
@@ -71,10 +71,6 @@ double temporal_variance(const cv::Mat& a, const cv::Mat& b) {
   cv::Scalar deviation;
   cv::meanStdDev(x - y, mean, deviation);
   return deviation[0] * deviation[0] / 2.0;
-}
-
-bool same_bytes(const cv::Mat& a, const cv::Mat& b) {
-  return a.type() == b.type() && a.size() == b.size() && cv::norm(a, b, cv::NORM_INF) == 0.0;
 }
 
 TEST(NoiseQuantile, NormalQuantileInvertsTheErrorFunction) {
@@ -241,22 +237,7 @@ TEST(Imager, OnePixelSensorWorks) {
 }
 
 TEST(Imager, SameBytesWithAnyNumberOfThreads) {
-  Imager imager = imx273_skipping(8, 1e-3);
-  cv::Mat light(97, 61, CV_32FC3);
-  for (int row = 0; row < light.rows; ++row) {
-    for (int column = 0; column < light.cols; ++column) {
-      light.at<cv::Vec3f>(row, column) = {0.01F * static_cast<float>(row), 0.3F, 0.01F * static_cast<float>(column)};
-    }
-  }
-  cv::Mat one;
-  {
-    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, 1);
-    one = expose(light, imager, 3, 9);
-  }
-  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, 4);
-  EXPECT_TRUE(same_bytes(one, expose(light, imager, 3, 9)));
-  EXPECT_FALSE(same_bytes(one, expose(light, imager, 3, 10)));
-  EXPECT_FALSE(same_bytes(one, expose(light, imager, 4, 9)));
+  expect_same_bytes_on_any_threads(imx273_skipping(8, 1e-3), 0.01F, 0.3F);
 }
 
 TEST(Imager, APixelsNoiseDependsOnItsOwnLightOnlyAndGrowsWithIt) {

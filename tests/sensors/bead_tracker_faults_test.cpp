@@ -7,10 +7,10 @@
 #include <limits>
 #include <opencv2/imgproc.hpp>
 
-#include "core/error.h"
 #include "core/random.h"
 #include "sensors/bead_tracker.h"
 #include "tests/sensors/rendered_beads.h"
+#include "tests/support/message_of.h"
 
 namespace touchstone::sensors {
 namespace {
@@ -19,6 +19,7 @@ using test::BeadPainter;
 using test::grid_positions;
 using testing::Each;
 using testing::HasSubstr;
+using touchstone::test::message_of;
 
 constexpr std::int64_t kIntervalUs = 1663;
 const Eigen::Vector2d kGone(std::nan(""), 0.0);
@@ -186,16 +187,6 @@ TEST_F(BeadTrackerFaults, BeadsAtTheImagesBorderAreNoTrouble) {
   expect_finite(beside.track({plain.paint(rest), 0}));
 }
 
-template <typename Call>
-std::string error_of(Call call) {
-  try {
-    call();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "(no error)";
-}
-
 TEST_F(BeadTrackerFaults, WrongFramesAreRefusedAndLeaveNoTrace) {
   next(rest);
   BeadTracker untouched({});
@@ -207,7 +198,7 @@ TEST_F(BeadTrackerFaults, WrongFramesAreRefusedAndLeaveNoTrace) {
   disturbed.track({good, 100});
 
   const auto refused = [&](const cv::Mat& image, std::int64_t at) {
-    return error_of([&] { disturbed.track({image, at}); });
+    return message_of([&] { disturbed.track({image, at}); });
   };
   EXPECT_THAT(refused(cv::Mat(), 200), HasSubstr("empty"));
   EXPECT_THAT(refused(cv::Mat(240, 320, CV_8U, cv::Scalar(100)), 200), HasSubstr("320 x 240"));
@@ -228,7 +219,7 @@ TEST_F(BeadTrackerFaults, WrongFramesAreRefusedAndLeaveNoTrace) {
 
 TEST_F(BeadTrackerFaults, TooSmallAFirstFrameIsRefused) {
   BeadTracker fresh({});
-  EXPECT_THAT(error_of([&] { fresh.track({cv::Mat(20, 640, CV_8U, cv::Scalar(100)), 0}); }), HasSubstr("640 x 20"));
+  EXPECT_THAT(message_of([&] { fresh.track({cv::Mat(20, 640, CV_8U, cv::Scalar(100)), 0}); }), HasSubstr("640 x 20"));
   EXPECT_EQ(fresh.track({painter.paint(rest), 0}).found(), 9);
 }
 
@@ -236,7 +227,7 @@ TEST_F(BeadTrackerFaults, SettingsOutOfRangeAreRefusedByName) {
   const auto refused = [](auto change) {
     BeadTrackerSettings settings;
     change(settings);
-    return error_of([&] { BeadTracker refusing(settings); });
+    return message_of([&] { BeadTracker refusing(settings); });
   };
   const double nan = std::nan("");
   EXPECT_THAT(refused([](auto& s) { s.grid = 1; }), HasSubstr("grid is 1"));

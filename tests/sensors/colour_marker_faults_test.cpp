@@ -1,13 +1,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <functional>
 #include <opencv2/imgproc.hpp>
 #include <string>
 
 #include "core/error.h"
 #include "sensors/colour_marker_finder.h"
 #include "tests/sensors/painted_colour_markers.h"
+#include "tests/support/message_of.h"
 
 namespace touchstone::sensors {
 namespace {
@@ -17,15 +17,7 @@ using test::expose;
 using test::paint_colour_light;
 using test::paint_colour_markers;
 using test::small_colour_picture;
-
-std::string message_of(const std::function<void()>& act) {
-  try {
-    act();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "no error";
-}
+using touchstone::test::message_of;
 
 /// A finder that has seen `picture` as the one at rest.
 ColourMarkerFinder at_rest(const ColourPicture& picture) {

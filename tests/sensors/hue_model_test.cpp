@@ -6,7 +6,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <functional>
 #include <string>
 #include <vector>
 
@@ -16,6 +15,7 @@
 #include "sensors/hue_calibration.h"
 #include "sensors/hue_estimator.h"
 #include "tests/sensors/painted_colour_markers.h"
+#include "tests/support/message_of.h"
 
 namespace touchstone::sensors {
 namespace {
@@ -23,18 +23,10 @@ namespace {
 using test::ColourPicture;
 using test::PaintedGel;
 using testing::HasSubstr;
+using touchstone::test::message_of;
 
 constexpr double kPxPerMm = 10.0;
 constexpr double kSpacing = 3.0;
-
-std::string message_of(const std::function<void()>& act) {
-  try {
-    act();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "no error";
-}
 
 /// A reading of a grid of 4 x 3 at rest, each marker with a hue of its own near red.
 ColourMarkerReading rest_reading() {

@@ -4,9 +4,9 @@
 
 #include <limits>
 
-#include "core/error.h"
 #include "sensors/tactile_map.h"
 #include "tests/sensors/drawn_relief.h"
+#include "tests/support/message_of.h"
 
 namespace touchstone::sensors {
 namespace {
@@ -14,15 +14,7 @@ namespace {
 using test::Surface;
 using test::touch_of;
 using ::testing::HasSubstr;
-
-std::string error_of(const std::function<void()>& action) {
-  try {
-    action();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
-}
+using touchstone::test::message_of;
 
 TactileMap map_of(const Surface& surface) {
   TactileMap map;
@@ -102,25 +94,25 @@ TEST(TactileMapFaults, BadTouchesAreNamed) {
   TactileMap map = map_of(test::strewn_relief(1));
   TouchImage touch = touch_of(test::strewn_relief(1), {}, 1);
   touch.height_mm.at<float>(7, 11) = std::numeric_limits<float>::quiet_NaN();
-  EXPECT_THAT(error_of([&] { map.localise(touch); }), HasSubstr("pixel (11, 7) is nan"));
-  EXPECT_THAT(error_of([&] { map.add(touch); }), HasSubstr("pixel (11, 7) is nan"));
+  EXPECT_THAT(message_of([&] { map.localise(touch); }), HasSubstr("pixel (11, 7) is nan"));
+  EXPECT_THAT(message_of([&] { map.add(touch); }), HasSubstr("pixel (11, 7) is nan"));
 
   touch = touch_of(test::strewn_relief(1), {}, 1);
   touch.contact = touch.contact.rowRange(0, 100);
-  EXPECT_THAT(error_of([&] { map.localise(touch); }), HasSubstr("320 x 100"));
+  EXPECT_THAT(message_of([&] { map.localise(touch); }), HasSubstr("320 x 100"));
   touch = touch_of(test::strewn_relief(1), {}, 1);
   touch.height_mm.convertTo(touch.height_mm, CV_64F);
-  EXPECT_THAT(error_of([&] { map.localise(touch); }), HasSubstr("CV_32FC1"));
-  EXPECT_THAT(error_of([&] { map.localise({}); }), HasSubstr("no heights"));
+  EXPECT_THAT(message_of([&] { map.localise(touch); }), HasSubstr("CV_32FC1"));
+  EXPECT_THAT(message_of([&] { map.localise({}); }), HasSubstr("no heights"));
   touch = touch_of(test::strewn_relief(1), {}, 1);
   touch.mm_per_px = 0.0;
-  EXPECT_THAT(error_of([&] { map.localise(touch); }), HasSubstr("0 mm wide"));
+  EXPECT_THAT(message_of([&] { map.localise(touch); }), HasSubstr("0 mm wide"));
   touch.mm_per_px = 0.06;
-  EXPECT_THAT(error_of([&] { map.localise(touch); }), HasSubstr("0.06 mm a pixel, the map 0.05"));
+  EXPECT_THAT(message_of([&] { map.localise(touch); }), HasSubstr("0.06 mm a pixel, the map 0.05"));
 }
 
 TEST(TactileMapFaults, AnEmptyMapLocalisesNothing) {
-  EXPECT_THAT(error_of([&] { TactileMap().localise(touch_of(test::strewn_relief(1), {}, 1)); }), HasSubstr("empty"));
+  EXPECT_THAT(message_of([&] { TactileMap().localise(touch_of(test::strewn_relief(1), {}, 1)); }), HasSubstr("empty"));
 }
 
 }  // namespace

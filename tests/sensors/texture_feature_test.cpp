@@ -8,15 +8,16 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "core/error.h"
 #include "core/random.h"
 #include "sensors/gaussian_pyramid.h"
 #include "sensors/height_gray.h"
+#include "tests/support/message_of.h"
 
 namespace touchstone::sensors {
 namespace {
 
 using testing::HasSubstr;
+using touchstone::test::message_of;
 
 cv::Mat random_image(int columns, int rows, std::uint64_t seed) {
   RandomStream random(seed, 0, Purpose::kTest);
@@ -25,16 +26,6 @@ cv::Mat random_image(int columns, int rows, std::uint64_t seed) {
     for (int i = 0; i < columns; ++i) image.at<std::uint8_t>(j, i) = static_cast<std::uint8_t>(random() >> 24);
   }
   return image;
-}
-
-template <typename Call>
-std::string message_of(Call call) {
-  try {
-    call();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
 }
 
 TEST(GaussianPyramid, TheKernelIsBurtAndAdelsonsWithThreeEighths) {

@@ -9,26 +9,17 @@
 #include <limits>
 #include <opencv2/core.hpp>
 
-#include "core/error.h"
 #include "core/random.h"
 #include "core/whole_file.h"
 #include "sensors/texture_model_file.h"
+#include "tests/support/message_of.h"
 
 namespace touchstone::sensors {
 namespace {
 
 using testing::HasSubstr;
 using testing::StartsWith;
-
-template <typename Call>
-std::string message_of(Call call) {
-  try {
-    call();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
-}
+using touchstone::test::message_of;
 
 /// Waves of a given length along x, mm, with a little noise.
 cv::Mat waves(double length_mm, std::uint64_t seed) {
@@ -181,7 +172,7 @@ TEST(TextureModelFile, RefusesFaultyFiles) {
     EXPECT_NE(at, std::string::npos) << from;
     return bytes.replace(at, from.size(), to);
   };
-  EXPECT_EQ(message(good), "");
+  EXPECT_EQ(message(good), "no error");
   EXPECT_THAT(message(""), StartsWith("some.model: isn't a texture model"));
   EXPECT_THAT(message("{\"format\": 1}\n"), HasSubstr("isn't a texture model"));
   EXPECT_THAT(message(changed("model 1", "model 2")), HasSubstr("version '2'"));
