@@ -6,6 +6,7 @@
 
 #include "core/error.h"
 #include "lab/chroma_force_experiment.h"
+#include "lab/straight_line.h"
 #include "sensors/seen_markers.h"
 #include "sim/virtual_sensor.h"
 
@@ -77,30 +78,6 @@ MarkerSeries read_series(const ChromaBench& bench, const MarkerTest& test, const
 
 }  // namespace
 
-ChromaLine fit_chroma_line(std::span<const double> x, std::span<const double> y) {
-  TS_ASSERT(x.size() == y.size() && x.size() >= 2);
-  const auto n = static_cast<double>(x.size());
-  double mean_x = 0.0;
-  double mean_y = 0.0;
-  for (std::size_t i = 0; i < x.size(); ++i) {
-    mean_x += x[i] / n;
-    mean_y += y[i] / n;
-  }
-  double xx = 0.0;
-  double xy = 0.0;
-  double yy = 0.0;
-  for (std::size_t i = 0; i < x.size(); ++i) {
-    xx += (x[i] - mean_x) * (x[i] - mean_x);
-    xy += (x[i] - mean_x) * (y[i] - mean_y);
-    yy += (y[i] - mean_y) * (y[i] - mean_y);
-  }
-  ChromaLine line;
-  line.slope = xy / xx;
-  line.offset = mean_y - line.slope * mean_x;
-  line.r2 = yy > 0.0 ? xy * xy / (xx * yy) : 0.0;
-  return line;
-}
-
 std::vector<double> MarkerSeries::column_mm(int axis) const {
   std::vector<double> column;
   for (const Eigen::Vector3d& one : ball_mm) column.push_back(one[axis]);
@@ -151,7 +128,7 @@ InverseScore score_inverse(const ChromaBench& bench, const sensors::HueModel& mo
     }
     for (int axis = 0; axis < 2; ++axis) {
       const auto [low, high] = std::ranges::minmax(truth[axis]);
-      if (high - low > 0.1) score.worst_r2 = std::min(score.worst_r2, fit_chroma_line(truth[axis], estimate[axis]).r2);
+      if (high - low > 0.1) score.worst_r2 = std::min(score.worst_r2, line_through(truth[axis], estimate[axis]).r2);
     }
   }
   score.largest_um = std::max(score.largest_lateral_um, score.largest_press_um);

@@ -7,7 +7,6 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -16,13 +15,6 @@
 #include "sensors/traction_inversion.h"
 
 namespace touchstone::lab {
-
-/// A straight line through pairs, with the share of the variance that it explains.
-struct ChromaLine {
-  double slope = 0.0, offset = 0.0, r2 = 0.0;
-};
-/// @pre as many x as y, at least two different x
-ChromaLine fit_chroma_line(std::span<const double> x, std::span<const double> y);
 
 /// A ball is pressed on a marker and dragged at its depth; what the picture tells of that marker.
 struct MarkerSeries {

@@ -9,6 +9,7 @@
 #include "core/units.h"
 #include "lab/chroma_marker_experiment.h"
 #include "lab/row_list.h"
+#include "lab/straight_line.h"
 #include "sensors/hue.h"
 #include "sim/device.h"
 
@@ -100,7 +101,7 @@ std::vector<ValidationRow> validate_chroma_marker(const ValidateOptions& options
   const std::vector<double> hues = hue_changes(press, rest);
   std::vector<double> depths;
   for (const Eigen::Vector3d& ball : press.ball_mm) depths.push_back(-ball.z());
-  const ChromaLine hue_line = fit_chroma_line(depths, hues);
+  const StraightLine hue_line = line_through(depths, hues);
   {
     ValidationRow& row = rows.add(
         "hue.linearity_r2",
@@ -125,7 +126,7 @@ std::vector<ValidationRow> validate_chroma_marker(const ValidateOptions& options
     for (const sensors::ColourMarker& seen : shears.back().seen) {
       shift.push_back((seen.centroid_px - rest.centroid_px).norm() * rig.mm_per_px());
     }
-    const ChromaLine line = fit_chroma_line(shears.back().column_mm(0), shift);
+    const StraightLine line = line_through(shears.back().column_mm(0), shift);
     worst_r2 = std::min(worst_r2, line.r2);
     at.push_back(depth);
     gains.push_back(line.slope);
@@ -135,7 +136,7 @@ std::vector<ValidationRow> validate_chroma_marker(const ValidateOptions& options
                        shears.size()),
            "1", worst_r2, Better::higher, worst_r2 >= kLinear_r2)
       .reference = kLinear_r2;
-  const ChromaLine gain_line = fit_chroma_line(at, gains);
+  const StraightLine gain_line = line_through(at, gains);
   {
     ValidationRow& row =
         rows.add("gain.linearity_r2",
