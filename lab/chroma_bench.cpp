@@ -2,6 +2,8 @@
 
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
+
 #include "core/error.h"
 
 namespace touchstone::lab {
@@ -129,9 +131,13 @@ sensors::HueCalibrationSettings hue_settings_of(const ChromaBench& bench) {
 }
 
 sensors::HueModel best_hue_model(const ChromaBench& bench, const std::vector<sensors::HueSample>& samples,
-                                 const std::vector<sensors::HueModelForm>& forms) {
+                                 const std::vector<sensors::HueModelForm>& forms, HueAim aim) {
   sensors::HueCalibrationSettings settings = hue_settings_of(bench);
-  settings.form = sensors::rank_hue_forms(bench.rest(), samples, settings, forms).front().form;
+  const auto scores = sensors::rank_hue_forms(bench.rest(), samples, settings, forms);
+  const auto error = [&](const sensors::HueFormScore& score) {
+    return aim == HueAim::lateral ? score.errors.rms_lateral_mm : score.errors.rms_mm();
+  };
+  settings.form = std::ranges::min_element(scores, {}, error)->form;
   return sensors::calibrate_hue(bench.rest(), samples, settings);
 }
 

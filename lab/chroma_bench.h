@@ -74,8 +74,11 @@ std::vector<sensors::HueSample> samples_of_moved(const std::vector<ChromaLook>& 
 /// What calibrate_hue is told of the bench; the form is its default.
 sensors::HueCalibrationSettings hue_settings_of(const ChromaBench& bench);
 
+/// What a model is to be good at: displacements, or the lateral ones, which mechanics then makes fields of.
+enum class HueAim { displacement, lateral };
+
 /// The model of that form among `forms` that errs least on series left out (sensors::rank_hue_forms).
 sensors::HueModel best_hue_model(const ChromaBench& bench, const std::vector<sensors::HueSample>& samples,
-                                 const std::vector<sensors::HueModelForm>& forms);
+                                 const std::vector<sensors::HueModelForm>& forms, HueAim aim);
 
 }  // namespace touchstone::lab

@@ -10,6 +10,7 @@
 #include "core/whole_file.h"
 #include "lab/on_picture.h"
 #include "sensors/friction_state.h"
+#include "sensors/seen_markers.h"
 
 namespace touchstone::lab {
 namespace {
@@ -29,18 +30,28 @@ void check(const sensors::MarkerCompliance& compliance, const sensors::HueModel&
   }
 }
 
-/// A line for each marker; cells of what isn't measured are empty.
+constexpr const char* kDisplacementColumns = "file,marker,x_mm,y_mm,z_mm,measured,extrapolated,flaw";
+constexpr const char* kElasticColumns = ",elastic_x_mm,elastic_y_mm,elastic_z_mm";
+
+/// A line for each marker; cells of what isn't measured are empty. @param elastic null without forces; otherwise the
+/// displacements under the tractions, none where there were too few markers for them
 void add_displacements(const std::string& file, const sensors::ColourMarkerReading& reading,
-                       const sensors::HueField& field, std::string& csv) {
+                       const sensors::HueField& field, const sensors::MarkerField* elastic, std::string& csv) {
   for (std::size_t i = 0; i < reading.markers.size(); ++i) {
     if (field.field.measured[i]) {
       const Eigen::Vector3d& d = field.field.displacement[i];
-      csv += fmt::format("{},{},{:.5f},{:.5f},{:.5f},1,{},none\n", file, i, d.x(), d.y(), d.z(), field.extrapolated[i]);
+      csv += fmt::format("{},{},{:.5f},{:.5f},{:.5f},1,{},none", file, i, d.x(), d.y(), d.z(), field.extrapolated[i]);
     } else {
       const sensors::MarkerFlaw flaw = reading.markers[i].flaw;
-      csv += fmt::format("{},{},,,,0,0,{}\n", file, i,
+      csv += fmt::format("{},{},,,,0,0,{}", file, i,
                          flaw == sensors::MarkerFlaw::kNone ? "undetermined" : sensors::name_of(flaw));
     }
+    if (elastic && elastic->displacement.empty()) csv += ",,,";
+    if (elastic && !elastic->displacement.empty()) {
+      const Eigen::Vector3d& d = elastic->displacement[i];
+      csv += fmt::format(",{:.5f},{:.5f},{:.5f}", d.x(), d.y(), d.z());
+    }
+    csv += '\n';
   }
 }
 
@@ -54,22 +65,25 @@ sensors::MarkerField trusted(const sensors::HueField& field) {
   return markers;
 }
 
-/// Fields in the order of time to lines of forces.csv.
+/// Fields in the order of time to lines of forces.csv. Lateral displacements are inverted as seen, for hue hardly tells
+/// the press that undoing their parallax would take (sensors/seen_markers.h).
 class ForceTable {
  public:
-  explicit ForceTable(const FieldForces& forces)
-      : inversion_(forces.compliance, forces.settings),
+  ForceTable(const FieldForces& forces, const sensors::ViewParallax& parallax)
+      : parallax_(parallax),
+        inversion_(sensors::as_seen(forces.compliance, parallax), forces.settings),
         observer_({.lateral_noise_mm = forces.settings.lateral_noise_mm}) {}
 
-  /// False if too few markers are measured for a force: its cells are empty then.
-  bool add(const std::string& file, const sensors::HueField& field, std::string& csv) {
-    const sensors::MarkerField markers = trusted(field);
+  /// Adds a line. Its cells are empty if too few markers are measured for a force.
+  /// @return how the markers moved under the tractions; of none where there are no tractions
+  sensors::MarkerField add(const std::string& file, const sensors::HueField& field, std::string& csv) {
+    const sensors::MarkerField markers = sensors::as_seen(trusted(field), inversion_.compliance(), parallax_);
     const auto used = std::count(markers.measured.begin(), markers.measured.end(), 1);
     csv += fmt::format("{},{}", file, used);
     if (used < sensors::TractionInversion::kLeastMarkers) {
       observer_.restart();
       csv += fmt::format("{},too few markers,,,,\n", std::string(13, ','));
-      return false;
+      return {};
     }
     const sensors::TractionField tractions = inversion_.invert(markers);
     const sensors::FrictionState& friction = observer_.look(markers, tractions);
@@ -86,7 +100,8 @@ class ForceTable {
     } else {
       csv += ",,\n";
     }
-    return true;
+    return sensors::as_they_are(sensors::displacements_under(inversion_.compliance(), tractions.traction),
+                                inversion_.compliance(), parallax_);
   }
 
   static std::string header() {
@@ -99,6 +114,7 @@ class ForceTable {
   }
 
  private:
+  sensors::ViewParallax parallax_;
   sensors::TractionInversion inversion_;
   sensors::FrictionObserver observer_;
 };
@@ -118,10 +134,10 @@ FieldSummary write_chroma_fields(const sensors::HueModel& model, const Eigen::Ve
   std::optional<ForceTable> table;
   if (forces) {
     check(forces->compliance, model, grid);
-    table.emplace(*forces);
+    table.emplace(*forces, model.parallax);
   }
   fs::create_directories(folder);
-  std::string displacements = "file,marker,x_mm,y_mm,z_mm,measured,extrapolated,flaw\n";
+  std::string displacements = fmt::format("{}{}\n", kDisplacementColumns, table ? kElasticColumns : "");
   std::string wrenches = ForceTable::header();
   FieldSummary summary;
   for (const fs::path& frame : frames) {
@@ -129,8 +145,10 @@ FieldSummary write_chroma_fields(const sensors::HueModel& model, const Eigen::Ve
     on_picture(frame, [&](const cv::Mat& image) {
       const sensors::ColourMarkerReading& reading = finder.find(image);
       const sensors::HueField field = estimator.estimate(reading);
-      add_displacements(name, reading, field, displacements);
-      if (table && !table->add(name, field, wrenches)) ++summary.without_force;
+      sensors::MarkerField elastic;
+      if (table) elastic = table->add(name, field, wrenches);
+      add_displacements(name, reading, field, table ? &elastic : nullptr, displacements);
+      if (table && elastic.displacement.empty()) ++summary.without_force;
       summary.markers += static_cast<int>(reading.markers.size());
       summary.measured += static_cast<int>(std::count(field.field.measured.begin(), field.field.measured.end(), 1));
       summary.extrapolated += static_cast<int>(std::count(field.extrapolated.begin(), field.extrapolated.end(), 1));

@@ -93,7 +93,7 @@ sensors::HueModel calibrate_on_probes(const ForceBench& bench, const ChromaBench
     const auto moved = samples_of_moved(looks, kLeastMoved_mm, series++);
     samples.insert(samples.end(), moved.begin(), moved.end());
   }
-  return best_hue_model(camera, samples, forms_to_try());
+  return best_hue_model(camera, samples, forms_to_try(), HueAim::displacement);
 }
 
 std::vector<sensors::MarkerField> fields_of(const std::vector<ChromaLook>& looks, const ChromaBench& camera,

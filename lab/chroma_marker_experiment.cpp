@@ -163,7 +163,7 @@ sensors::HueModel calibrate_field(const ChromaBench& bench, bool quick, std::uin
     samples.insert(samples.end(), found.begin(), found.end());
     ++number;
   }
-  return best_hue_model(bench, samples, sensors::usual_hue_forms());
+  return best_hue_model(bench, samples, sensors::usual_hue_forms(), HueAim::lateral);
 }
 
 sensors::TractionInversion elastic_inversion(const ChromaBench& bench, const std::filesystem::path& cache,

@@ -53,8 +53,8 @@ InverseScore score_inverse(const ChromaBench& bench, const sensors::HueModel& mo
                            const std::vector<MarkerSeries>& series);
 
 /// A model for whole fields: balls and a flat cylinder pressed and dragged at places about the gel's middle, all
-/// markers that they move taken as samples with the finite elements' truth, the form chosen by cross-validation over
-/// presses.
+/// markers that they move taken as samples with the finite elements' truth, the form of least lateral
+/// error chosen by cross-validation over presses.
 sensors::HueModel calibrate_field(const ChromaBench& bench, bool quick, std::uint64_t seed);
 
 /// A field under a punch.

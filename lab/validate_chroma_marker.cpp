@@ -186,7 +186,7 @@ std::vector<ValidationRow> validate_chroma_marker(const ValidateOptions& options
     samples.insert(samples.end(), more.begin(), more.end());
     ++series;
   }
-  const sensors::HueModel best_model = best_hue_model(bench, samples, sensors::usual_hue_forms());
+  const sensors::HueModel best_model = best_hue_model(bench, samples, sensors::usual_hue_forms(), HueAim::displacement);
   const InverseScore best = score_inverse(bench, best_model, marker, tests);
   const std::string form = name_of_form(best_model);
   rows.add("inverse.nonlinear_error_um", fmt::format("largest error of a lateral component by {}", form), "um",
@@ -198,7 +198,7 @@ std::vector<ValidationRow> validate_chroma_marker(const ValidateOptions& options
   rows.add("inverse.nonlinear_rms_um", fmt::format("root mean square error of a component by {}", form), "um",
            best.rms_um, Better::lower, best.rms_um <= linear.rms_um)
       .reference = linear.rms_um;
-  const sensors::HueModel alone_model = best_hue_model(bench, samples, forms_of_one_marker());
+  const sensors::HueModel alone_model = best_hue_model(bench, samples, forms_of_one_marker(), HueAim::displacement);
   const InverseScore alone = score_inverse(bench, alone_model, marker, tests);
   rows.add("inverse.alone_press_error_um",
            fmt::format("largest error of the normal component by {}", name_of_form(alone_model)), "um",

@@ -33,8 +33,9 @@ std::vector<HueRow> rows_of(const ColourMarkerReading& rest, const std::vector<H
     if (!sample.displacement_mm.allFinite())
       fail("hue calibration: a displacement of marker {} isn't finite", sample.marker);
     if (of_surroundings && !sample.seen.surroundings.known) continue;
-    rows.push_back({sample.marker, change_of(sample.seen, rest.markers[sample.marker], map),
-                    settings.parallax.seen(sample.displacement_mm, places[sample.marker]),
+    MarkerChange change = change_of(sample.seen, rest.markers[sample.marker], map);
+    if (!of_surroundings) change.forget_surroundings();
+    rows.push_back({sample.marker, change, settings.parallax.seen(sample.displacement_mm, places[sample.marker]),
                     -sample.displacement_mm.z()});
   }
   if (rows.size() < kLeastHueSamples) {

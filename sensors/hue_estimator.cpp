@@ -23,7 +23,8 @@ HueEstimate HueEstimator::estimate(std::size_t marker, const ColourMarker& seen)
   TS_ASSERT(marker < places_.size());
   HueEstimate out;
   if (seen.flaw != MarkerFlaw::kNone || rest_.markers[marker].flaw != MarkerFlaw::kNone) return out;
-  const MarkerChange change = change_of(seen, rest_.markers[marker], map_);
+  MarkerChange change = change_of(seen, rest_.markers[marker], map_);
+  if (!features_of(model_).of_surroundings()) change.forget_surroundings();
   const SeenDisplacement displacement = displacement_of(model_, terms_, change);
   if (!displacement.determined) return out;
   const double press = gains_[marker].press * displacement.press_mm;

@@ -13,6 +13,12 @@ Eigen::Matrix<double, MarkerChange::kSize, 1> MarkerChange::vector() const {
   return all;
 }
 
+void MarkerChange::forget_surroundings() {
+  surroundings_known = false;
+  log_cell_area = 0.0;
+  log_neighbour_area = 0.0;
+}
+
 MarkerChange change_of(const ColourMarker& seen, const ColourMarker& rest, const PictureMap& map) {
   TS_ASSERT(seen.flaw == MarkerFlaw::kNone && rest.flaw == MarkerFlaw::kNone);
   MarkerChange change;

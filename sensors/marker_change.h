@@ -21,6 +21,8 @@ struct MarkerChange {
   double log_neighbour_area = 0.0;
 
   Eigen::Matrix<double, kSize, 1> vector() const;
+  /// For models that are of one marker alone: what its neighbours do is then no sign that it looks strange.
+  void forget_surroundings();
 };
 
 /// @pre neither is flawed

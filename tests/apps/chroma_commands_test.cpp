@@ -190,6 +190,16 @@ TEST_F(ChromaCommands, WithAComplianceThereAreForces) {
   EXPECT_EQ(table[2][15], "too few markers");
   EXPECT_EQ(table[3][15], "no contact");
   EXPECT_EQ(std::stod(table[3][4]), 0.0);
+  // Displacements under these tractions: of all markers, as they moved; of none where there were no tractions.
+  const auto moves = table_of(in("out/displacements.csv"));
+  ASSERT_EQ(moves.size(), 1u + 3u * displacements.size());
+  EXPECT_EQ(moves[0][8], "elastic_x_mm");
+  for (std::size_t m = 0; m < displacements.size(); ++m) {
+    ASSERT_EQ(moves[1 + m].size(), 11u);
+    for (int axis = 0; axis < 3; ++axis) EXPECT_NEAR(std::stod(moves[1 + m][8 + axis]), displacements[m][axis], 0.1);
+    EXPECT_EQ(moves[1 + displacements.size() + m][8], "");
+    EXPECT_EQ(std::stod(moves[1 + 2 * displacements.size() + m][10]), 0.0);
+  }
 }
 
 TEST_F(ChromaCommands, MarkersBeyondCalibrationTakeNoPartInForces) {
