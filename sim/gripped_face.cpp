@@ -18,8 +18,9 @@
 namespace touchstone::sim {
 namespace {
 
-constexpr double kInset = 0.2;  // of a fine edge: vertices nearer to the flat's rim than that bear what the rim does
-constexpr int kAlong = 8;       // degrees of the smooth field along and across the flat
+constexpr double kInset = 1.0;  // in fine edges: vertices nearer to the flat's rim have hats that reach beyond it
+constexpr double kRim = 0.6;    // likewise: vertices that far beyond the rim may still bear
+constexpr int kAlong = 10;      // degrees of the smooth field along and across the flat
 constexpr int kAcross = 2;
 constexpr int kTerms = (kAlong + 1) * (kAcross + 1);
 constexpr int kSubcells = 8;            // a side, to tell how much of a cell lies under the flat
@@ -301,11 +302,14 @@ GrippedFace::GrippedFace(const DeviceSpec& device, const fem::Compliance& gel, c
   // The vertices that the flat bears on.
   const RigidTransform piece_from_gel = touching.inverse();
   const Eigen::Vector2d inset = 0.5 * flat - Eigen::Vector2d::Constant(kInset * device.mesh.fine_mm);
+  std::vector<int> loaded;  // and those at its rim
   std::vector<int> vertices;
-  std::vector<Eigen::Vector2d> places;  // of them on the flat, -1 to 1 along and across it
+  std::vector<Eigen::Vector2d> places;  // of the former on the flat, -1 to 1 along and across it
   for (std::size_t v = 0; v < gel.vertices.size(); ++v) {
     const Eigen::Vector3d at = piece_from_gel * gel.vertices[v];
-    if (std::abs(at.x()) > inset.x() || std::abs(at.y()) > inset.y()) continue;
+    const Eigen::Vector2d out = at.head<2>().cwiseAbs() - inset;
+    if (out.maxCoeff() < (kInset + kRim) * device.mesh.fine_mm) loaded.push_back(static_cast<int>(v));
+    if (out.maxCoeff() > 0.0) continue;
     vertices.push_back(static_cast<int>(v));
     places.emplace_back(2.0 * at.head<2>().cwiseQuotient(flat));
   }
@@ -323,12 +327,13 @@ GrippedFace::GrippedFace(const DeviceSpec& device, const fem::Compliance& gel, c
   per_gap_ = gel.material.youngs_modulus / gel.thickness;
   const Eigen::VectorXd weight = gel.mass * Eigen::VectorXd::Ones(gel.mass.cols());
   std::optional<PieceAnswer> answer;
-  if (elastic) answer.emplace(*elastic, gel, vertices, touching);
+  if (elastic) answer.emplace(*elastic, gel, loaded, touching);
   std::vector<Eigen::Vector2d> at_cells;
   for (const int cell : bearing_) {
     const Eigen::Vector2d centre = grid_.centre(cell % grid_.nx, cell / grid_.nx);
-    at_cells.emplace_back(
-        2.0 * (piece_from_gel * Eigen::Vector3d(centre.x(), centre.y(), 0.0)).head<2>().cwiseQuotient(flat));
+    const Eigen::Vector2d at = (piece_from_gel * Eigen::Vector3d(centre.x(), centre.y(), 0.0)).head<2>();
+    // Polynomials aren't carried on beyond the vertices that they were fitted to.
+    at_cells.emplace_back(2.0 * at.cwiseMax(-inset).cwiseMin(inset).cwiseQuotient(flat));
   }
   const double nu = membrane.poisson_ratio;
   const CellContact fine({contact_modulus_ * (1.0 - nu * nu), nu}, gel, grid_, bearing_, vertices, places, at_cells);
@@ -365,15 +370,15 @@ GrippedFace::GrippedFace(const DeviceSpec& device, const fem::Compliance& gel, c
     Eigen::VectorXd apart = -(gel.mass * state.surface_displacement.col(2)).cwiseQuotient(weight);
     if (answer) {
       std::vector<Eigen::Vector3d> forces, shears;
-      for (const int v : vertices) {
+      for (const int v : loaded) {
         forces.emplace_back(0, 0, weight[v] * pressure[v]);
         shears.emplace_back(0, -weight[v] * pressure[v], 0);
       }
       const std::vector<Eigen::Vector3d> moved = answer->displacements(forces);
-      for (std::size_t k = 0; k < vertices.size(); ++k) apart[vertices[k]] += moved[k].z();
+      for (std::size_t k = 0; k < loaded.size(); ++k) apart[loaded[k]] += moved[k].z();
       if (step == 0) {
         const std::vector<Eigen::Vector3d> leant = answer->displacements(shears);
-        for (std::size_t k = 0; k < vertices.size(); ++k) {
+        for (std::size_t k = 0; k < loaded.size(); ++k) {
           piece_shear += shears[k].y() * leant[k].y() / (point.normal_N * point.normal_N);
         }
       }
