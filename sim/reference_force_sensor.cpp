@@ -79,6 +79,11 @@ std::vector<double> median_of(const std::vector<ForceReading>& readings, int wid
 HysteresisLoop::HysteresisLoop(double width, double scale) {
   if (!(width >= 0.0) || !(width < 0.5)) fail("a hysteresis of {} is asked for, it must be from 0 to below 0.5", width);
   if (!(scale > 0.0) || !std::isfinite(scale)) fail("a hysteresis' scale is {}, it must be above 0 and finite", scale);
+  if (width == 0.0) {
+    threshold_ = play_ = {0.0};
+    weight_ = {1.0};
+    return;
+  }
   const double alpha = 1.0 - std::log2(1.0 - width);
   // The first loading, linear between the thresholds; each play adds its change of slope.
   const auto loading = [&](double force) { return scale * std::pow(force / scale, alpha); };
