@@ -176,9 +176,9 @@ double flat_width_mm(const ShapeSpec& hexagon) {
 }
 
 EnumNames<ShapeKind> enum_names(ShapeKind) {
-  return {{"sphere", ShapeKind::sphere}, {"rounded_cylinder", ShapeKind::rounded_cylinder},
-          {"box", ShapeKind::box},       {"mesh", ShapeKind::mesh},
-          {"egg", ShapeKind::egg},       {"shell", ShapeKind::shell},
+  return {{"sphere", ShapeKind::sphere},  {"rounded_cylinder", ShapeKind::rounded_cylinder},
+          {"box", ShapeKind::box},        {"mesh", ShapeKind::mesh},
+          {"egg", ShapeKind::egg},        {"shell", ShapeKind::shell},
           {"hexagon", ShapeKind::hexagon}};
 }
 

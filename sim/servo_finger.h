@@ -37,9 +37,9 @@ struct FingerMotion {
   double target_force_N = 2.0;  ///< of the finger, when it holds: met as nearly as the servo's steps allow
   double closing_mm_s = 14.0;
   double opening_mm_s = 40.0;
-  double hold_s = 0.7;     ///< from the last closing step (text V.A)
-  double rest_s = 0.05;    ///< before the first step
-  double apart_s = 0.154;  ///< after the first opening step: 22 windows of 7 ms (text V.B, fig. 8)
+  double hold_s = 0.7;    ///< from the last closing step (text V.A)
+  double rest_s = 0.05;   ///< before the first step
+  double apart_s = 0.36;  ///< after the first opening step: the text has 144 windows of 7 ms from the touch on (fig. 8)
   std::uint64_t shake_seed = 1;
 };
 
