@@ -3,6 +3,7 @@
 #include <Eigen/QR>
 #include <Eigen/SparseCore>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -20,9 +21,10 @@ namespace {
 
 constexpr double kInset = 1.0;  // in fine edges: vertices nearer to the flat's rim have hats that reach beyond it
 constexpr double kRim = 0.6;    // likewise: vertices that far beyond the rim may still bear
-constexpr int kAlong = 10;      // degrees of the smooth field along and across the flat
+constexpr int kAlong = 6;       // degrees of the smooth field along and across the flat
 constexpr int kAcross = 2;
-constexpr int kTerms = (kAlong + 1) * (kAcross + 1);
+constexpr std::array kDecays = {0.5, 1.5};  // thicknesses over which the piece's ends are felt
+constexpr int kTerms = (kAlong + 1 + 2 * static_cast<int>(kDecays.size())) * (kAcross + 1);
 constexpr int kSubcells = 8;            // a side, to tell how much of a cell lies under the flat
 constexpr double kLeastStep_mm = 1e-7;  // by which the travel grows from state to state at least
 
@@ -127,11 +129,12 @@ class PieceAnswer {
 class CellContact {
  public:
   /// `cells`: places in `grid` that the flat is over; `at_cells`, `at_vertices`: where they and the gel's `vertices`
-  /// are on the flat, -1 to 1 along and across it.
+  /// are on the flat, -1 to 1 along and across it; `half_length`: its, mm.
   CellContact(const fem::ElasticMaterial& both, const fem::Compliance& gel, const fem::PixelGrid& grid,
               const std::vector<int>& cells, const std::vector<int>& vertices,
-              const std::vector<Eigen::Vector2d>& at_vertices, const std::vector<Eigen::Vector2d>& at_cells)
-      : gel_(gel), vertices_(vertices), terms_at_cells_(terms(at_cells)) {
+              const std::vector<Eigen::Vector2d>& at_vertices, const std::vector<Eigen::Vector2d>& at_cells,
+              double half_length)
+      : gel_(gel), vertices_(vertices), terms_at_cells_(terms(at_cells, half_length / gel.thickness)) {
     // The part of the grid that holds the flat, with nothing round it.
     int left = grid.nx, right = 0, bottom = grid.ny, top = 0;
     for (const int cell : cells) {
@@ -143,7 +146,7 @@ class CellContact {
     part_ = {right - left + 1, top - bottom + 1, grid.pitch, grid.centre(left, bottom)};
     layer_ = std::make_unique<const fem::LayerResponse>(both, gel.thickness, part_, fem::GridEdges::free);
     for (const int cell : cells) cells_.push_back(part_.at(cell % grid.nx - left, cell / grid.nx - bottom));
-    terms_at_vertices_ = terms(at_vertices);
+    terms_at_vertices_ = terms(at_vertices, half_length / gel.thickness);
     fit_.compute(terms_at_vertices_);
     // P1 values at the part's pixels.
     const fem::TriangleTree tree(gel.vertices, gel.triangles);
@@ -216,16 +219,21 @@ class CellContact {
     const auto at = static_cast<int>(pixel);
     return part_.centre(at % part_.nx, at / part_.nx);
   }
-  /// Products of Legendre's polynomials along and across.
-  static Eigen::MatrixXd terms(const std::vector<Eigen::Vector2d>& places) {
+  /// Legendre's polynomials across times those along and times what decays from either end. `half_length`: of the flat,
+  /// in thicknesses.
+  static Eigen::MatrixXd terms(const std::vector<Eigen::Vector2d>& places, double half_length) {
     Eigen::MatrixXd result(static_cast<Eigen::Index>(places.size()), kTerms);
     for (Eigen::Index row = 0; row < result.rows(); ++row) {
-      const Eigen::Vector2d& at = places[static_cast<std::size_t>(row)];
-      for (int n = 0; n <= kAlong; ++n) {
-        for (int m = 0; m <= kAcross; ++m) {
-          result(row, n * (kAcross + 1) + m) = std::legendre(static_cast<unsigned>(n), std::clamp(at.x(), -1.0, 1.0)) *
-                                               std::legendre(static_cast<unsigned>(m), std::clamp(at.y(), -1.0, 1.0));
-        }
+      const double x = std::clamp(places[static_cast<std::size_t>(row)].x(), -1.0, 1.0);
+      const double y = std::clamp(places[static_cast<std::size_t>(row)].y(), -1.0, 1.0);
+      for (int n = 0; n < kTerms; ++n) {
+        const int along = n / (kAcross + 1);
+        const int end = along - kAlong - 1;  // from 0 on: an end's
+        const double value =
+            end < 0
+                ? std::legendre(static_cast<unsigned>(along), x)
+                : std::exp(-(1.0 - (end % 2 == 0 ? x : -x)) * half_length / kDecays[static_cast<std::size_t>(end) / 2]);
+        result(row, n) = value * std::legendre(static_cast<unsigned>(n % (kAcross + 1)), y);
       }
     }
     return result;
@@ -332,11 +340,11 @@ GrippedFace::GrippedFace(const DeviceSpec& device, const fem::Compliance& gel, c
   for (const int cell : bearing_) {
     const Eigen::Vector2d centre = grid_.centre(cell % grid_.nx, cell / grid_.nx);
     const Eigen::Vector2d at = (piece_from_gel * Eigen::Vector3d(centre.x(), centre.y(), 0.0)).head<2>();
-    // Polynomials aren't carried on beyond the vertices that they were fitted to.
-    at_cells.emplace_back(2.0 * at.cwiseMax(-inset).cwiseMin(inset).cwiseQuotient(flat));
+    at_cells.emplace_back(2.0 * at.cwiseQuotient(flat));
   }
   const double nu = membrane.poisson_ratio;
-  const CellContact fine({contact_modulus_ * (1.0 - nu * nu), nu}, gel, grid_, bearing_, vertices, places, at_cells);
+  const CellContact fine({contact_modulus_ * (1.0 - nu * nu), nu}, gel, grid_, bearing_, vertices, places, at_cells,
+                         0.5 * flat.x());
 
   // No load: the flat's own distance.
   const FlatPlane rest(touching, half_height);
