@@ -65,7 +65,10 @@ DvsGraspBench::DvsGraspBench(const std::filesystem::path& scenes, const std::fil
     : device_(sim::read_device(scenes / "devices/dvs-grasp.yaml")), gel_(sim::set_up_gel(device_, cache_folder)) {
   for (const DvsMaterial& material : dvs_materials()) {
     pieces_.push_back(sim::read_object(scenes / material.object_file));
-    elastic_.push_back(pieces_.back().elastic ? sim::set_up_elastic_object(pieces_.back(), cache_folder) : nullptr);
+    // Compliance goes with 1/E, so pieces of equal shape and Poisson's ratio share one of 1 MPa.
+    sim::ObjectSpec unit = pieces_.back();
+    if (unit.elastic) unit.elastic->youngs_modulus_MPa = 1.0;
+    elastic_.push_back(unit.elastic ? sim::set_up_elastic_object(unit, cache_folder) : nullptr);
   }
 }
 

@@ -79,7 +79,7 @@ class DvsGraspBench {
   sim::DeviceSpec device_;
   std::shared_ptr<const fem::Compliance> gel_;
   std::vector<sim::ObjectSpec> pieces_;
-  std::vector<std::shared_ptr<const fem::Compliance>> elastic_;  // null for the rigid one
+  std::vector<std::shared_ptr<const fem::Compliance>> elastic_;  // of 1 MPa; null for the rigid one
 };
 
 }  // namespace touchstone::lab
