@@ -17,6 +17,9 @@ enum class Purpose : std::uint32_t {
   kLampSpread = 8,
   kMatchSampling = 9,
   kRelief = 10,
+  kGrasp = 11,
+  kGraspShake = 12,
+  kForceSensor = 13,
   kTest = 99,
 };
 

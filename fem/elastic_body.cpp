@@ -19,10 +19,9 @@ ElasticBody::ElasticBody(const Compliance& body)
       outer_(body.vertices, body.triangles),
       weight_(body.mass * Eigen::VectorXd::Ones(body.mass.rows())) {}
 
-void ElasticBody::add_to(Eigen::MatrixXd& compliance, double scale, const ContactSurface& surface,
-                         const std::vector<int>& vertices, const std::vector<char>& mine,
-                         const std::vector<Eigen::Matrix3d>& axes, const RigidTransform& gel_from_object,
-                         const PatchMotion& lookup) const {
+Eigen::SparseMatrix<double> ElasticBody::coupling(const ContactSurface& surface, const std::vector<int>& vertices,
+                                                  const std::vector<char>& mine, const RigidTransform& gel_from_object,
+                                                  const PatchMotion& lookup, std::vector<int>& met) const {
   TS_ASSERT(mine.size() == vertices.size());
   static const std::vector<SimplexPoint<3>> rule = triangle_rule(kRuleDegree);
   const RigidTransform object_from_gel = gel_from_object.inverse();
@@ -30,9 +29,8 @@ void ElasticBody::add_to(Eigen::MatrixXd& compliance, double scale, const Contac
   for (std::size_t k = 0; k < vertices.size(); ++k) {
     if (mine[k]) place[vertices[k]] = static_cast<int>(k);
   }
-  // B, its columns over the body's vertices that are met.
   std::map<int, int> column_of;
-  std::vector<int> met;
+  met.clear();
   std::vector<Eigen::Triplet<double>> entries;
   for (std::size_t t = 0; t < surface.triangles.size(); ++t) {
     const auto& index = surface.triangles[t];
@@ -65,10 +63,38 @@ void ElasticBody::add_to(Eigen::MatrixXd& compliance, double scale, const Contac
   }
   const auto m = static_cast<Eigen::Index>(vertices.size());
   const auto count = static_cast<Eigen::Index>(met.size());
-  Eigen::SparseMatrix<double> coupling(m, count);
-  coupling.setFromTriplets(entries.begin(), entries.end());
+  Eigen::SparseMatrix<double> result(m, count);
+  result.setFromTriplets(entries.begin(), entries.end());
+  return result;
+}
 
-  // One pair of components at a time: coupling * H_ab * coupling^T, turned from the object's axes into the vertices'.
+void ElasticBody::add_normal_to(Eigen::MatrixXd& compliance, double scale, const ContactSurface& surface,
+                                const std::vector<int>& vertices, const std::vector<char>& mine,
+                                const Eigen::Vector3d& normal, const RigidTransform& gel_from_object,
+                                const PatchMotion& lookup) const {
+  std::vector<int> met;
+  const Eigen::SparseMatrix<double> onto = coupling(surface, vertices, mine, gel_from_object, lookup, met);
+  const Eigen::Vector3d along = gel_from_object.rotation.transpose() * normal;
+  const auto h = body_.surface.view();
+  const auto count = static_cast<Eigen::Index>(met.size());
+  Eigen::MatrixXd own(count, count);
+  for (Eigen::Index j = 0; j < count; ++j) {
+    for (Eigen::Index i = 0; i < count; ++i) own(i, j) = along.dot(h.block<3, 3>(3 * met[i], 3 * met[j]) * along);
+  }
+  const Eigen::MatrixXd left = onto * own;
+  compliance.noalias() += scale * (onto * left.transpose()).transpose();
+}
+
+void ElasticBody::add_to(Eigen::MatrixXd& compliance, double scale, const ContactSurface& surface,
+                         const std::vector<int>& vertices, const std::vector<char>& mine,
+                         const std::vector<Eigen::Matrix3d>& axes, const RigidTransform& gel_from_object,
+                         const PatchMotion& lookup) const {
+  std::vector<int> met;
+  const Eigen::SparseMatrix<double> onto = coupling(surface, vertices, mine, gel_from_object, lookup, met);
+  const auto m = static_cast<Eigen::Index>(vertices.size());
+  const auto count = static_cast<Eigen::Index>(met.size());
+
+  // One pair of components at a time: onto * H_ab * onto^T, turned from the object's axes into the vertices'.
   const auto h = body_.surface.view();
   std::array<std::array<Eigen::MatrixXd, 3>, 3> seen;
   for (int a = 0; a < 3; ++a) {
@@ -77,8 +103,8 @@ void ElasticBody::add_to(Eigen::MatrixXd& compliance, double scale, const Contac
       for (Eigen::Index j = 0; j < count; ++j) {
         for (Eigen::Index i = 0; i < count; ++i) own(i, j) = h(3 * met[i] + a, 3 * met[j] + b);
       }
-      const Eigen::MatrixXd left = coupling * own;
-      seen[a][b] = (coupling * left.transpose()).transpose();
+      const Eigen::MatrixXd left = onto * own;
+      seen[a][b] = (onto * left.transpose()).transpose();
     }
   }
   for (Eigen::Index j = 0; j < m; ++j) {

@@ -156,17 +156,28 @@ ContactProblem PartSolver::problem(const PressSnapshot& from, const std::vector<
   result.components = c;
   if (elastic_) {
     combined_ = block_.compliance();
+    const auto normals = Eigen::seqN(Eigen::fix<0>, m, Eigen::fix<3>);
+    const bool normal_only = !friction_ && surface_.flat;  // what a body does along the surface then matters to nobody
+    if (normal_only) combined_normal_ = combined_(normals, normals);
     std::vector<Eigen::Matrix3d> axes;
     for (const int v : vertices) axes.push_back(block_.axes(v));
     for (std::size_t b = 0; b < bodies_.size(); ++b) {
       if (!soft_[b]) continue;
       std::vector<char> mine;
       for (const int v : vertices) mine.push_back(now.owner[v] == static_cast<int>(b));
-      soft_[b]->add_to(combined_, relaxation_.stiffness(), surface_, vertices, mine, axes, now.bodies[b].pose,
-                       now.bodies[b].lookup);
+      const Body& body = now.bodies[b];
+      if (normal_only) {
+        soft_[b]->add_normal_to(combined_normal_, relaxation_.stiffness(), surface_, vertices, mine,
+                                surface_.normals.front(), body.pose, body.lookup);
+      } else {
+        soft_[b]->add_to(combined_, relaxation_.stiffness(), surface_, vertices, mine, axes, body.pose, body.lookup);
+      }
     }
-    const auto normals = Eigen::seqN(Eigen::fix<0>, m, Eigen::fix<3>);
-    combined_normal_ = combined_(normals, normals);
+    if (normal_only) {
+      combined_(normals, normals) = combined_normal_;
+    } else {
+      combined_normal_ = combined_(normals, normals);
+    }
     memory_.forget();
   }
   for (const PartTarget& target : targets) {

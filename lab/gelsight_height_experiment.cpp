@@ -34,6 +34,8 @@ double half_height(const sim::ShapeSpec& shape) {
       const Eigen::Vector2d rise = 0.125 * shape.curvature_per_mm.cwiseProduct(shape.axes_mm.cwiseAbs2());
       return std::max(0.0, -rise.minCoeff());
     }
+    case sim::ShapeKind::hexagon:
+      return 0.5 * shape.across_flats_mm;
     case sim::ShapeKind::mesh:
       break;
   }

@@ -135,6 +135,7 @@ TriangleMesh even_surface(const ShapeSpec& shape, double edge_mm) {
     case ShapeKind::mesh:
     case ShapeKind::egg:
     case ShapeKind::shell:
+    case ShapeKind::hexagon:
       break;
   }
   return visible_mesh(shape);

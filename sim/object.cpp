@@ -1,6 +1,7 @@
 #include "sim/object.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "core/units.h"
@@ -96,6 +97,31 @@ fem::ShellShape shell_shape(const ShapeSpec& shape) {
   return {shape.axes_mm, shape.thickness_mm, shape.curvature_per_mm};
 }
 
+/// A regular hexagon's prism along x about the origin; one flat looks to -z.
+TriangleMesh hexagon_mesh(const ShapeSpec& shape) {
+  const double corner = shape.across_flats_mm / std::sqrt(3.0);  // from the axis
+  const double flat = 0.5 * shape.across_flats_mm;
+  const std::array<Eigen::Vector2d, 6> outline = {{{-0.5 * corner, -flat},
+                                                   {0.5 * corner, -flat},
+                                                   {corner, 0.0},
+                                                   {0.5 * corner, flat},
+                                                   {-0.5 * corner, flat},
+                                                   {-corner, 0.0}}};
+  TriangleMesh mesh;
+  for (const double x : {-0.5 * shape.length_mm, 0.5 * shape.length_mm}) {
+    for (const Eigen::Vector2d& p : outline) mesh.vertices.emplace_back(x, p.x(), p.y());
+  }
+  for (int k = 0; k < 6; ++k) {
+    const int next = (k + 1) % 6;
+    mesh.triangles.push_back({k, next, 6 + next});
+    mesh.triangles.push_back({k, 6 + next, 6 + k});
+    if (k == 0 || k == 5) continue;
+    mesh.triangles.push_back({0, k + 1, k});
+    mesh.triangles.push_back({6, 6 + k, 6 + k + 1});
+  }
+  return mesh;
+}
+
 /// Rings of an ellipse, the lower face first, then the upper one.
 TriangleMesh shell_mesh(const fem::ShellShape& shell) {
   constexpr int kRings = 48;
@@ -144,10 +170,16 @@ TriangleMesh read_mesh(const ShapeSpec& shape) {
 
 }  // namespace
 
+double flat_width_mm(const ShapeSpec& hexagon) {
+  TS_ASSERT(hexagon.type == ShapeKind::hexagon);
+  return hexagon.across_flats_mm / std::sqrt(3.0);
+}
+
 EnumNames<ShapeKind> enum_names(ShapeKind) {
-  return {{"sphere", ShapeKind::sphere}, {"rounded_cylinder", ShapeKind::rounded_cylinder},
-          {"box", ShapeKind::box},       {"mesh", ShapeKind::mesh},
-          {"egg", ShapeKind::egg},       {"shell", ShapeKind::shell}};
+  return {{"sphere", ShapeKind::sphere},  {"rounded_cylinder", ShapeKind::rounded_cylinder},
+          {"box", ShapeKind::box},        {"mesh", ShapeKind::mesh},
+          {"egg", ShapeKind::egg},        {"shell", ShapeKind::shell},
+          {"hexagon", ShapeKind::hexagon}};
 }
 
 void fields(YamlReader& in, ShapeSpec& shape) {
@@ -183,6 +215,10 @@ void fields(YamlReader& in, ShapeSpec& shape) {
       in.required("axes_mm", shape.axes_mm, Allowed::above_up_to(0.0, 1e4));
       in.required("thickness_mm", shape.thickness_mm, Allowed::above_up_to(0.0, 1e3));
       in.optional("curvature_per_mm", shape.curvature_per_mm, Allowed::within(-10.0, 10.0));
+      break;
+    case ShapeKind::hexagon:
+      in.required("across_flats_mm", shape.across_flats_mm, Allowed::above_up_to(0.0, 1e4));
+      in.required("length_mm", shape.length_mm, Allowed::above_up_to(0.0, 1e4));
       break;
   }
 }
@@ -233,6 +269,8 @@ fem::ContactShape contact_shape(const ShapeSpec& shape) {
       return fem::EggShape{shape.radius_mm, shape.blunt_mm, shape.sharp_mm};
     case ShapeKind::shell:
       return shell_shape(shape);
+    case ShapeKind::hexagon:
+      return fem::MeshShape(hexagon_mesh(shape));
   }
   TS_ASSERT(false);
   return {};
@@ -277,6 +315,8 @@ TriangleMesh visible_mesh(const ShapeSpec& shape) {
       return egg_mesh(shape);
     case ShapeKind::shell:
       return shell_mesh(shell_shape(shape));
+    case ShapeKind::hexagon:
+      return hexagon_mesh(shape);
   }
   TS_ASSERT(false);
   return {};

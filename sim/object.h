@@ -14,7 +14,7 @@
 
 namespace touchstone::sim {
 
-enum class ShapeKind { sphere, rounded_cylinder, box, mesh, egg, shell };
+enum class ShapeKind { sphere, rounded_cylinder, box, mesh, egg, shell, hexagon };
 EnumNames<ShapeKind> enum_names(ShapeKind);
 
 /// Only the fields that belong to `type` may stand in the file.
@@ -31,8 +31,13 @@ struct ShapeSpec {
   Eigen::Vector2d axes_mm = Eigen::Vector2d::Zero();           ///< shell: whole axes of its outline, an ellipse
   double thickness_mm = 0.0;                                   ///< shell: along z
   Eigen::Vector2d curvature_per_mm = Eigen::Vector2d::Zero();  ///< shell: along x and y, see fem::ShellShape
+  double across_flats_mm = 0.0;                                ///< hexagon: a regular prism along x, a flat below
+  double length_mm = 0.0;                                      ///< hexagon: along x
   SourceLocation where;
 };
+
+/// Width of one of the hexagon's flats, mm. @pre the shape is one
+double flat_width_mm(const ShapeSpec& hexagon);
 
 /// A luminous disc round or behind the object that the camera sees and that is never touched: a light panel. It stays
 /// where the motion starts, level.

@@ -47,6 +47,7 @@ double bright_radius(const ObjectSpec& object) {
     case ShapeKind::mesh:
     case ShapeKind::egg:
     case ShapeKind::shell:
+    case ShapeKind::hexagon:
       break;
   }
   double radius = 0.0;

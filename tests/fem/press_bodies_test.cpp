@@ -4,10 +4,12 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
+#include <numeric>
 
 #include "core/error.h"
 #include "core/triangle_mesh.h"
 #include "core/units.h"
+#include "fem/elastic_body.h"
 #include "fem/press.h"
 #include "fem/slab.h"
 #include "tests/support/half_space_gel.h"
@@ -159,6 +161,32 @@ TEST(ElasticBody, AMirrorImageOfTheGelYieldsAsMuchAsTheGel) {
   target.rotation = kUpsideDown;
   const PressState& state = pair.step(target);
   EXPECT_NEAR(state.wrench[2], expected, 0.01 * expected);
+}
+
+TEST(ElasticBody, ItsNormalPartIsThatOfTheWhole) {
+  // Contact without friction asks for the normal components only; a tilted body mixes its own into them.
+  const PressBody box = elastic_box(2.0, 0.0);
+  const ElasticBody body(*box.elastic);
+  const ContactSurface surface(slab_gel());
+  std::vector<int> vertices(surface.vertices.size());
+  std::iota(vertices.begin(), vertices.end(), 0);
+  std::vector<char> mine(vertices.size(), 1);
+  mine[3] = mine[10] = 0;
+  const std::vector<Eigen::Matrix3d> axes(
+      vertices.size(), (Eigen::Matrix3d() << 0, 1, 0, 0, 0, 1, 1, 0, 0).finished());  // normal, then along the surface
+  RigidTransform pose;
+  pose.rotation = Eigen::AngleAxisd(0.05, Eigen::Vector3d(1, 2, 0.5).normalized()).toRotationMatrix() * kUpsideDown;
+  pose.translation = {0.1, -0.2, 0.9};
+  const auto m = static_cast<Eigen::Index>(vertices.size());
+  Eigen::MatrixXd whole = Eigen::MatrixXd::Zero(3 * m, 3 * m);
+  body.add_to(whole, 1.5, surface, vertices, mine, axes, pose, {});
+  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(m, m);
+  body.add_normal_to(normal, 1.5, surface, vertices, mine, Eigen::Vector3d::UnitZ(), pose, {});
+  const auto normals = Eigen::seqN(Eigen::fix<0>, m, Eigen::fix<3>);
+  const Eigen::MatrixXd expected = whole(normals, normals);
+  EXPECT_GT(expected.norm(), 0.0);
+  EXPECT_LT((normal - expected).norm(), 1e-12 * expected.norm());
+  EXPECT_EQ(normal.row(3).norm(), 0.0);
 }
 
 TEST(ElasticBody, VeryStiffIsRigid) {

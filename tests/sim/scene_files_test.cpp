@@ -295,6 +295,19 @@ TEST(SceneFiles, AMissingMeshIsNamedWithTheLineThatAsksForIt) {
   }
 }
 
+TEST(SceneFiles, AHexagonHasItsOwnFields) {
+  const auto shape =
+      parse_yaml<ObjectSpec>("name: a\nshape: {type: hexagon, across_flats_mm: 6.5, length_mm: 35.5}\n", "object.yaml")
+          .shape;
+  EXPECT_EQ(shape.across_flats_mm, 6.5);
+  EXPECT_EQ(shape.length_mm, 35.5);
+  for (const char* wrong :
+       {"{type: hexagon, across_flats_mm: 6.5}", "{type: hexagon, across_flats_mm: 0, length_mm: 1}",
+        "{type: hexagon, across_flats_mm: 1, length_mm: 1, radius_mm: 1}"}) {
+    EXPECT_THROW(parse_yaml<ObjectSpec>("name: a\nshape: " + std::string(wrong) + "\n", "object.yaml"), Error) << wrong;
+  }
+}
+
 TEST(SceneFiles, AnAxisHasEitherAPositionOrAForce) {
   const std::string start = "start_mm: [0, 0, 1]\nkeys:\n  - {frames: 2, z: ";
   EXPECT_EQ(parse_yaml<MotionSpec>(start + "{force_N: 1}}\n", "m").frame_count(), 3);
