@@ -17,6 +17,9 @@ enum class Purpose : std::uint32_t {
   kLampSpread = 8,
   kMatchSampling = 9,
   kRelief = 10,
+  kNetworkWeights = 20,
+  kFolds = 21,
+  kSearch = 22,
   kTest = 99,
 };
 

@@ -1,0 +1,26 @@
+#pragma once
+// Products of large dense matrices for training: as wide as the processor's registers, and the same bits whatever they
+// are.
+//
+// The build is for any x86-64, where Eigen's product runs at a quarter of what a processor with AVX-512 can do: 8.9
+// against 32 GF/s for a Cholesky factor of 4000 rows (Xeon model 143, one core, in double precision). Here every entry
+// is a sum over the inner index in the same blocks and the same order in each of the forms, without fused
+// multiplications, so that it has the same bits on every processor, which no BLAS has. An OpenBLAS that takes the
+// processor for what it is has the same speed on this one.
+
+#include <Eigen/Core>
+#include <cstdint>
+
+namespace touchstone::sensors {
+
+enum class ProductPart : std::uint8_t {
+  kAll,
+  kLower,  ///< on and below the diagonal; above it c is left as it was, or written in parts
+};
+
+/// c -= a b^T. Allocates two blocks (together under 1 MB). @pre sizes fit; c overlaps neither a nor b; for kLower c is
+/// square
+void subtract_product(Eigen::Ref<Eigen::MatrixXd> c, const Eigen::Ref<const Eigen::MatrixXd>& a,
+                      const Eigen::Ref<const Eigen::MatrixXd>& b, ProductPart part = ProductPart::kAll);
+
+}  // namespace touchstone::sensors
