@@ -55,7 +55,7 @@ inline Eigen::VectorXd vector_of(const JsonField& field) {
 inline Eigen::MatrixXd matrix_of(const JsonField& field) {
   if (!field.value.is_array()) field.refuse("is a {}, a list of rows is needed", field.value.type_name());
   if (field.value.empty()) field.refuse("is empty");
-  const Eigen::VectorXd first = vector_of(field.at(0));
+  const Eigen::VectorXd first = vector_of(field.at(std::size_t{0}));
   Eigen::MatrixXd matrix(static_cast<Eigen::Index>(field.value.size()), first.size());
   for (std::size_t i = 0; i < field.value.size(); ++i) {
     field.at(i).expect_list(static_cast<std::size_t>(first.size()));
