@@ -62,7 +62,7 @@ GaussianProcess surrogate(const Eigen::MatrixXd& places, const Eigen::VectorXd& 
   bool has_one = false;
   for (const double length : {0.15, 0.3, 0.6, 1.2, 2.4}) {
     GaussianProcess process =
-        with_best_signal(condition({Eigen::VectorXd::Constant(places.cols(), length), 1.0, 0.03}, places, values));
+        with_best_signal(condition({Eigen::VectorXd::Constant(places.cols(), length), 1.0, 0.003}, places, values));
     if (has_one && process.log_evidence <= best.log_evidence) continue;
     best = std::move(process);
     has_one = true;
@@ -77,7 +77,8 @@ double expected_improvement(double mean, double deviation, double least) {
   return deviation * (z * 0.5 * std::erfc(-z / std::numbers::sqrt2) + density);
 }
 
-/// Where the improvement to be expected is largest: the best of random places, half of them about the best one so far.
+/// Where the improvement to be expected is largest: the best of random places, half of them about the best one so far,
+/// near and very near.
 Eigen::RowVectorXd most_promising(const GaussianProcess& process, Eigen::Index best, int candidates,
                                   RandomStream& random) {
   const Eigen::Index coordinates = process.inputs.cols();
@@ -85,7 +86,7 @@ Eigen::RowVectorXd most_promising(const GaussianProcess& process, Eigen::Index b
   for (Eigen::Index k = 0; k < candidates; ++k) {
     for (Eigen::Index i = 0; i < coordinates; ++i) {
       const double anywhere = random.uniform();
-      const double near = process.inputs(best, i) + 0.1 * random.normal();
+      const double near = process.inputs(best, i) + (k % 4 == 1 ? 0.1 : 0.02) * random.normal();
       places(k, i) = k % 2 == 0 ? anywhere : std::clamp(near, 0.0, 1.0);
     }
   }
