@@ -10,7 +10,7 @@
 namespace touchstone::sensors {
 namespace {
 
-constexpr Eigen::Index kBlock = 96;
+constexpr Eigen::Index kBlock = 128;
 
 }  // namespace
 
