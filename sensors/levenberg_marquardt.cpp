@@ -190,6 +190,7 @@ NetworkTrainingReport train_by_levenberg_marquardt(FeedForwardNetwork& network, 
     }
     const Eigen::VectorXd from = parameters_of(network);
     double sum = 0.0;
+    bool failed = false;
     for (;;) {
       ++report.factorisations;
       if (const auto step = system.step(damping)) {
@@ -201,6 +202,7 @@ NetworkTrainingReport train_by_levenberg_marquardt(FeedForwardNetwork& network, 
         stuck = true;
         break;
       }
+      failed = true;
       damping = std::min(settings.most_damping, damping * settings.damping_up);
     }
     if (stuck) {
@@ -208,7 +210,8 @@ NetworkTrainingReport train_by_levenberg_marquardt(FeedForwardNetwork& network, 
       report.end = NetworkTrainingEnd::kStuck;
       break;
     }
-    damping = std::max(settings.least_damping, damping * settings.damping_down);
+    // Less damping has just failed where there was a second try: it isn't tried again at once.
+    if (!failed) damping = std::max(settings.least_damping, damping * settings.damping_down);
     ++report.steps;
     if (should_stop(report.steps, sum)) {
       report.end = NetworkTrainingEnd::kValidation;

@@ -1,7 +1,7 @@
 #pragma once
 // Levenberg-Marquardt for networks: seed 001, eqs. 2 and 3. Each step solves (J^T J + lambda I) p = -J^T F, F the
 // errors of all samples and J their derivatives by all parameters; lambda goes down after a step that lowers the sum of
-// squares, and up, with the step tried again, after one that doesn't.
+// squares at once, and up, with the step tried again, after one that doesn't.
 //
 // The text's network of k = 4, n = 40 has more parameters (5241 with two counts in three windows) than samples (some
 // 2000). Then the same step is p = -J^T (J J^T + lambda I)^-1 F, whose matrix is only as large as the samples are many.
@@ -66,7 +66,7 @@ Eigen::MatrixXd jacobian(const FeedForwardNetwork& network, const Eigen::MatrixX
 struct LevenbergMarquardtSettings {
   double first_damping = 0.01;  ///< lambda of eq. 3; the text's
   double damping_up = 10.0;     ///< factor after a step that failed; above 1
-  double damping_down = 0.1;    ///< factor after one that didn't; above 0, below 1
+  double damping_down = 0.1;    ///< factor after one that succeeded at once; above 0, below 1
   double most_damping = 1e10;
   double least_damping = 1e-12;
   double least_gradient = 1e-7;  ///< of J^T F, its largest entry: below, training ends

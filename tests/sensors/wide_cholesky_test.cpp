@@ -79,6 +79,17 @@ TEST(WideCholesky, FactorSolutionInverseAndDeterminant) {
   }
 }
 
+TEST(WideCholesky, TinyEntriesAreZerosAndTheThreadIsLeftAsItWas) {
+  Eigen::MatrixXd matrix = Eigen::MatrixXd::Identity(300, 300);
+  matrix.row(200).head(200).setConstant(1e-160);  // products of two of them are below the least normal number
+  matrix.row(299).head(200).setConstant(1e-160);
+  ASSERT_TRUE(factorise_in_place(matrix));
+  EXPECT_EQ(matrix(299, 200), 0.0);
+  EXPECT_EQ(matrix(299, 0), 1e-160);
+  volatile double small = 1e-160;
+  EXPECT_GT(small * small, 0.0);
+}
+
 TEST(WideCholesky, SaysWhereThereIsNoFactor) {
   for (const Eigen::Index bad : {0, 95, 96, 150}) {
     Eigen::MatrixXd matrix = positive_matrix(200);
