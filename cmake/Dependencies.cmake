@@ -37,6 +37,10 @@ macro(touchstone_need_opencv)
   touchstone_require_package(OpenCV libopencv-dev COMPONENTS ${ARGN})
 endmacro()
 
+macro(touchstone_need_threads)
+  find_package(Threads REQUIRED)
+endmacro()
+
 macro(touchstone_need_tbb)
   touchstone_require_package(TBB libtbb-dev)
 endmacro()
