@@ -72,7 +72,9 @@ cv::Mat least_gap(const cv::Mat& gap, int factor) {
 /// A way over the grid.
 struct Step {
   int columns, rows;
-  float per_mm;  // 1 / distance
+  // 1 / distance of where a body that is met here ends and begins: half way, by ratio, to the next step and to the
+  // last.
+  float per_mm_end, per_mm_begin;
 };
 struct Way {
   float cosine, sine;
@@ -91,10 +93,15 @@ BodyShadow shadow_of_body(const FaceGrid& grid, const FaceState& state, double i
     const double azimuth = 2.0 * kPi * (k + 0.5) / kAzimuths;
     ways[k].cosine = static_cast<float>(std::cos(azimuth));
     ways[k].sine = static_cast<float>(std::sin(azimuth));
-    for (double distance = spacing; distance < reach; distance = std::max(distance + spacing, distance * kStepGrowth)) {
+    double last = 0.25 * spacing;
+    for (double distance = spacing; distance < reach;) {
+      const double next = std::max(distance + spacing, distance * kStepGrowth);
       const int columns = static_cast<int>(std::lround(distance * std::cos(azimuth) / spacing));
       const int rows = static_cast<int>(std::lround(distance * std::sin(azimuth) / spacing));
-      ways[k].steps.push_back({columns, rows, static_cast<float>(1.0 / (spacing * std::hypot(columns, rows)))});
+      ways[k].steps.push_back({columns, rows, static_cast<float>(1.0 / std::sqrt(distance * next)),
+                               static_cast<float>(1.0 / std::sqrt(distance * last))});
+      last = distance;
+      distance = next;
     }
   }
   const auto top = static_cast<float>(std::min(state.height_mm, 1e6));
@@ -127,8 +134,8 @@ BodyShadow shadow_of_body(const FaceGrid& grid, const FaceState& state, double i
           if (x < 0 || y < 0 || x >= gap.cols || y >= gap.rows) break;
           const float height = gap.at<float>(y, x);
           if (!(height < top)) continue;
-          lowest = std::min(lowest, height * step.per_mm);
-          highest = std::max(highest, top * step.per_mm);
+          lowest = std::min(lowest, height * step.per_mm_end);
+          highest = std::max(highest, top * step.per_mm_begin);
         }
         const float low = std::min(lowest, own / static_cast<float>(0.5 * spacing));
         for (int sector = 0; sector < kFaceSectors; ++sector) {

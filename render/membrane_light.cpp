@@ -39,12 +39,12 @@ Sectors even_reflectance(const MembraneKernels& kernels) {
   return out;
 }
 
-/// The face without an end, in one state all over, and how a walk's light depends on it.
+/// The light that walks bring from a face without an end that is in one state all over.
 struct EvenFace {
   Sectors g, h;
 };
 
-/// h = keeps h-part * g + from a mean of g + given.
+/// `contact` is 0 or 1 (or a share), before surroundings of `behind`.
 EvenFace solve_even(const MembraneKernels& kernels, double behind, double contact, double albedo) {
   Eigen::Matrix<double, kSectors, kSectors> crossing;
   Eigen::Matrix<double, kSectors, 1> out;
@@ -299,10 +299,10 @@ struct MembraneLight::Parts {
       PixelRay& ray = rays[pixel];
       ray.weight = through;
       ray.veil = veil;
-      ray.free = 1.0F;
       const Eigen::Vector2d place = origin.head<2>() + optics.thickness_mm / direction.z() * direction.head<2>();
       const double column = (place.x() - grid.left_mm) / settings.view_cell_mm;
       const double row = (place.y() - grid.top_mm) / settings.view_cell_mm;
+      ray.free = static_cast<float>(settings.behind);  // beside the membrane
       ray.sees_membrane = column >= 0.0 && row >= 0.0 && column <= view.columns() && row <= view.rows();
       if (!ray.sees_membrane) return;
       const double squared_sine = direction.head<2>().squaredNorm();

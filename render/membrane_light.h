@@ -38,7 +38,7 @@ struct MembraneLightSettings {
 
 class MembraneLight {
  public:
-  /// @param grid the outer face's; the membrane ends where it ends, and beside it the room is seen through the plate
+  /// @param grid the outer face's; the membrane ends where it ends, and beside it what is behind is seen
   /// @throws Error if the camera, the grid or the settings can't be used, or the camera sees the face at larger angles
   /// than the kernels were made for
   MembraneLight(const MembraneKernels& kernels, const Camera& camera, const FaceGrid& grid,
