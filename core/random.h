@@ -17,7 +17,7 @@ enum class Purpose : std::uint32_t {
   kLampSpread = 8,
   kMatchSampling = 9,
   kRelief = 10,
-  kMembraneWalk = 11,
+  kMembraneWalk = 14,
   kTest = 99,
 };
 

@@ -13,7 +13,7 @@ namespace touchstone::sim {
 
 struct MembraneCameraSettings {
   double cell_mm = 0.2;  ///< of the face's grid, at most; the membrane's sides are cut in an even number of cells
-  int walks = 1 << 21;   ///< render::MembraneWalkSettings::walks
+  int walks = 1 << 20;   ///< render::MembraneWalkSettings::walks
   std::uint64_t seed = 1;
 };
 
