@@ -119,38 +119,59 @@ BodyShadow shadow_of_body(const FaceGrid& grid, const FaceState& state, double i
     sum[1] += share * way.cosine;
     sum[2] += share * way.sine;
   };
+  // What isn't there is infinitely high, and begins nowhere.
+  cv::Mat low(gap.size(), CV_32FC1);
+  cv::Mat high(gap.size(), CV_32FC1);
   for (int row = 0; row < gap.rows; ++row) {
     for (int column = 0; column < gap.cols; ++column) {
-      const float own = gap.at<float>(row, column) < top ? gap.at<float>(row, column) : kNone;
-      Sums under = {};
-      Sums beside = {};
-      for (const Way& way : ways) {
-        // Rays that rise between these slopes meet the body; under it all that are steeper, too.
-        float lowest = kNone;
-        float highest = 0.0F;
-        for (const Step& step : way.steps) {
-          const int x = column + step.columns;
-          const int y = row + step.rows;
-          if (x < 0 || y < 0 || x >= gap.cols || y >= gap.rows) break;
-          const float height = gap.at<float>(y, x);
-          if (!(height < top)) continue;
-          lowest = std::min(lowest, height * step.per_mm_end);
-          highest = std::max(highest, top * step.per_mm_begin);
+      const bool is_there = gap.at<float>(row, column) < top;
+      low.at<float>(row, column) = is_there ? gap.at<float>(row, column) : kNone;
+      high.at<float>(row, column) = is_there ? top : 0.0F;
+    }
+  }
+  const auto cells = static_cast<std::size_t>(gap.cols);
+  std::vector<float> lowest(cells);
+  std::vector<float> highest(cells);
+  std::vector<Sums> under(cells);
+  std::vector<Sums> beside(cells);
+  for (int row = 0; row < gap.rows; ++row) {
+    std::fill(under.begin(), under.end(), Sums{});
+    std::fill(beside.begin(), beside.end(), Sums{});
+    const auto* own = low.ptr<float>(row);
+    for (const Way& way : ways) {
+      // Rays that rise between these slopes meet the body; under it all that are steeper, too.
+      std::fill(lowest.begin(), lowest.end(), kNone);
+      std::fill(highest.begin(), highest.end(), 0.0F);
+      for (const Step& step : way.steps) {
+        const int y = row + step.rows;
+        if (y < 0 || y >= gap.rows) break;
+        const auto* below = low.ptr<float>(y);
+        const auto* above = high.ptr<float>(y);
+        const int end = std::min(gap.cols, gap.cols - step.columns);
+        for (int column = std::max(0, -step.columns); column < end; ++column) {
+          lowest[column] = std::min(lowest[column], below[column + step.columns] * step.per_mm_end);
+          highest[column] = std::max(highest[column], above[column + step.columns] * step.per_mm_begin);
         }
-        const float low = std::min(lowest, own / static_cast<float>(0.5 * spacing));
+      }
+      for (int column = 0; column < gap.cols; ++column) {
+        const float from = std::min(lowest[column], own[column] / static_cast<float>(0.5 * spacing));
+        if (!(from < kNone)) continue;
         for (int sector = 0; sector < kFaceSectors; ++sector) {
           if (!light.enters(sector)) continue;
-          if (low < kNone) add(under[sector], way, light.within(sector, low));
-          if (highest > lowest) {
-            add(beside[sector], way, light.within(sector, lowest) - light.within(sector, highest));
+          add(under[column][sector], way, light.within(sector, from));
+          if (highest[column] > lowest[column]) {
+            add(beside[column][sector], way,
+                light.within(sector, lowest[column]) - light.within(sector, highest[column]));
           }
         }
       }
-      for (int sector = 0; sector < kFaceSectors; ++sector) {
-        if (!light.enters(sector)) continue;
-        for (int k = 0; k < 3; ++k) {
-          shadow.under[sector][k].at<float>(row, column) = under[sector][k] / kAzimuths;
-          shadow.beside[sector][k].at<float>(row, column) = beside[sector][k] / kAzimuths;
+    }
+    for (int sector = 0; sector < kFaceSectors; ++sector) {
+      if (!light.enters(sector)) continue;
+      for (int k = 0; k < 3; ++k) {
+        for (int column = 0; column < gap.cols; ++column) {
+          shadow.under[sector][k].at<float>(row, column) = under[column][sector][k] / kAzimuths;
+          shadow.beside[sector][k].at<float>(row, column) = beside[column][sector][k] / kAzimuths;
         }
       }
     }
