@@ -20,6 +20,7 @@ enum class Purpose : std::uint32_t {
   kGrasp = 11,
   kGraspShake = 12,
   kForceSensor = 13,
+  kMembraneWalk = 14,
   kNetworkWeights = 20,
   kFolds = 21,
   kSearch = 22,

@@ -343,6 +343,7 @@ void fields(YamlReader& in, DeviceSpec& device) {
             device.band_wavelengths_nm.size());
   }
   in.optional("room_radiance", device.room_radiance, Allowed::at_least(0.0));
+  in.optional("room_radiance_behind", device.room_radiance_behind, Allowed::at_least(0.0));
   in.optional("camera", device.camera);
   check_gel(device, in.where("gel"));
   if (device.beads) check_beads_fit(device, in.where("beads"));

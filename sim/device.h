@@ -198,6 +198,7 @@ struct DeviceSpec {
   std::optional<BandsSpec> bands;                             ///< for spectra; else:
   std::vector<double> band_wavelengths_nm = {610, 540, 455};  ///< centres of the bands, which are just numbers
   Colour room_radiance = 0.0;                                 ///< W/m^2/sr in each band
+  std::optional<Colour> room_radiance_behind;                 ///< of what is behind a clear gel; absent: the same
   std::optional<CameraSpec> camera;
   SourceLocation where;
 };

@@ -159,6 +159,7 @@ void check_light(const SceneSpec& scene, const SceneBands& bands) {
   in_bands(device.gel.absorption_per_mm, bands, "gel.absorption_per_mm");
   in_bands(device.gel.scattering_per_mm, bands, "gel.scattering_per_mm");
   in_bands(device.room_radiance, bands, "room_radiance");
+  if (device.room_radiance_behind) in_bands(*device.room_radiance_behind, bands, "room_radiance_behind");
   if (device.films) in_bands(device.films->transmittance, bands, "films.transmittance");
   for (const LampSpec& lamp : device.lamps) {
     for (const render::Lamp& one : lamps_of(lamp, bands, 1.0)) {

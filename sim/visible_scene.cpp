@@ -105,6 +105,19 @@ render::Surface film_sheet(const FilmSpec& films, const SceneBands& bands, doubl
           render::ThinFilm{in_bands(films.transmittance, bands, "films.transmittance"), films.refractive_index, false}};
 }
 
+/// A level panel behind all that touches the gel, so wide that the gel sees nothing beside it.
+TriangleMesh panel_behind() {
+  constexpr double kHeightMm = 1000.0;
+  constexpr double kHalfMm = 40.0 * kHeightMm;
+  TriangleMesh mesh;
+  mesh.vertices = {{-kHalfMm, -kHalfMm, kHeightMm},
+                   {kHalfMm, -kHalfMm, kHeightMm},
+                   {kHalfMm, kHalfMm, kHeightMm},
+                   {-kHalfMm, kHalfMm, kHeightMm}};
+  mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
+  return mesh;
+}
+
 }  // namespace
 
 VisibleObject visible_object(const ObjectSpec& object, double edge_mm) {
@@ -203,6 +216,10 @@ render::Scene scene_without_surface(const SceneSpec& scene, const Plan& plan, co
     for (render::Lamp& one : lamps_of(lamp, bands, scene.lamp_level)) out.lamps.push_back(std::move(one));
   }
   out.environment = in_bands(device.room_radiance, bands, "room_radiance");
+  if (device.room_radiance_behind) {
+    out.surfaces.push_back(
+        {panel_behind(), render::Emitter{in_bands(*device.room_radiance_behind, bands, "room_radiance_behind")}});
+  }
   out.interreflection = plan.interreflection;
   return out;
 }
