@@ -48,12 +48,15 @@ void calibrate(const CalibrateOptions& options) {
   sensors::HueCalibrationSettings settings;
   settings.spacing_mm = options.spacing_mm;
   settings.parallax.viewing_distance_mm = options.viewing_distance_mm;
-  settings.form = form_named(options.form);
+  settings.form =
+      options.form == "best"
+          ? sensors::rank_hue_forms(finder.rest(), read.samples, settings, sensors::usual_hue_forms()).front().form
+          : form_named(options.form);
   const sensors::HueModel model = sensors::calibrate_hue(finder.rest(), read.samples, settings);
   sensors::save(model, options.out);
 
   for (const std::string& line : read.left_out) fmt::print("left out: {}\n", line);
-  fmt::print("{}: form '{}', {} samples\n", options.out.string(), sensors::name_of(model.form), read.samples.size());
+  fmt::print("{}: {}, {} samples\n", options.out.string(), sensors::summary_of(model), read.samples.size());
   print_errors("on these", sensors::hue_errors(model, finder.rest(), read.samples));
   std::set<int> series;
   for (const sensors::HueSample& sample : read.samples) series.insert(sample.series);
@@ -90,8 +93,11 @@ void add_chroma_calibration(CLI::App& calibrations, const GlobalOptions&, Action
                    "Apparent distance from the camera to the markers, for parallax; 0: far away")
       ->check(CLI::Range(0.0, 1e6))
       ->capture_default_str();
-  command->add_option("--form", options->form, "Of the model: the text's own, or polynomials")
-      ->check(CLI::IsMember({"equation4", "isotropic", "polynomial"}))
+  command
+      ->add_option("--form", options->form,
+                   "Of the model: the text's own; polynomials of one marker; or, of many forms, some of which look at "
+                   "a marker's neighbours, too, the best on series left out")
+      ->check(CLI::IsMember({"equation4", "isotropic", "polynomial", "best"}))
       ->capture_default_str();
   command->add_option("-o,--out", options->out, "The model: a .json file")->required();
   command->callback([&action, options] { action = [options] { calibrate(*options); }; });

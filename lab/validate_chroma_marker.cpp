@@ -64,14 +64,6 @@ double repeat_deg(const ChromaBench& bench, int pictures) {
   return mean;
 }
 
-std::string name_of_form(const sensors::HueModel& model) {
-  if (model.form == sensors::HueForm::kEquation4) return "eq. 4";
-  const bool isotropic = model.form == sensors::HueForm::kIsotropic;
-  return fmt::format("an {} polynomial of degree {} of {}", isotropic ? "isotropic" : "unrestricted",
-                     isotropic ? model.isotropic.degree : model.polynomial.degree,
-                     features_of(model).of_surroundings() ? "the marker and its neighbours" : "the marker alone");
-}
-
 std::vector<sensors::HueModelForm> forms_of_one_marker() {
   std::vector<sensors::HueModelForm> forms;
   for (const sensors::HueModelForm& form : sensors::usual_hue_forms()) {
@@ -188,7 +180,7 @@ std::vector<ValidationRow> validate_chroma_marker(const ValidateOptions& options
   }
   const sensors::HueModel best_model = best_hue_model(bench, samples, sensors::usual_hue_forms(), HueAim::displacement);
   const InverseScore best = score_inverse(bench, best_model, marker, tests);
-  const std::string form = name_of_form(best_model);
+  const std::string form = summary_of(best_model);
   rows.add("inverse.nonlinear_error_um", fmt::format("largest error of a lateral component by {}", form), "um",
            best.largest_lateral_um, Better::lower, best.largest_lateral_um <= kPublishedError_um)
       .published = kPublishedError_um;
@@ -201,7 +193,7 @@ std::vector<ValidationRow> validate_chroma_marker(const ValidateOptions& options
   const sensors::HueModel alone_model = best_hue_model(bench, samples, forms_of_one_marker(), HueAim::displacement);
   const InverseScore alone = score_inverse(bench, alone_model, marker, tests);
   rows.add("inverse.alone_press_error_um",
-           fmt::format("largest error of the normal component by {}", name_of_form(alone_model)), "um",
+           fmt::format("largest error of the normal component by {}", summary_of(alone_model)), "um",
            alone.largest_press_um, Better::lower, alone.largest_press_um <= kPublishedError_um)
       .reference = kPublishedError_um;
   return rows.rows();

@@ -180,6 +180,14 @@ HueFeatures features_of(const HueModel& model) {
   return {false, false, false, false, false, false, false};
 }
 
+std::string summary_of(const HueModel& model) {
+  if (model.form == HueForm::kEquation4) return "eq. 4";
+  const bool isotropic = model.form == HueForm::kIsotropic;
+  return fmt::format("an {} polynomial of degree {} of {}", isotropic ? "isotropic" : "unrestricted",
+                     isotropic ? model.isotropic.degree : model.polynomial.degree,
+                     features_of(model).of_surroundings() ? "the marker and its neighbours" : "the marker alone");
+}
+
 Eigen::MatrixXi terms_of(const HueModel& model) {
   if (model.form == HueForm::kEquation4) return {};
   if (model.form == HueForm::kIsotropic) {

@@ -124,6 +124,9 @@ struct IsotropicFeatures {
 /// How many of the terms of a degree are of a lower one.
 Eigen::Index count_lower_terms(int features, int degree);
 
+/// For people: "eq. 4", "an isotropic polynomial of degree 2 of the marker and its neighbours", ...
+std::string summary_of(const HueModel& model);
+
 /// What it is of; all false for eq. 4.
 HueFeatures features_of(const HueModel& model);
 

@@ -129,6 +129,10 @@ TEST_F(ChromaCommands, RecordedFramesGiveDisplacements) {
     EXPECT_THAT(made.out, AllOf(HasSubstr("left out: white.png: marker (2, 2): "), HasSubstr("36 samples"),
                                 HasSubstr("on series left out in turn")));
   }
+  const ProgramRun best = calibrate(kHeader + lines_, {"--form", "best"});
+  ASSERT_EQ(best.exit_code, 0) << best.err;
+  EXPECT_THAT(best.out, HasSubstr("polynomial of degree"));
+  expect_refused(calibrate(kHeader + std::string("0.png,1,2,0,0,-1,0\n"), {"--form", "best"}), "no form fits");
   ASSERT_EQ(calibrate(kHeader + lines_).exit_code, 0);
   const Eigen::Vector3d truth(0.25, -0.35, -1.0);
   sim::write_png(folder_.path() / "new/a.png", paint(all_by(truth)));
