@@ -6,8 +6,8 @@
 
 #include "core/error.h"
 #include "render/direct_fitness.h"
-#include "render/path_tracer.h"
 #include "render/sample_sequence.h"
+#include "render/trace_twice.h"
 
 namespace touchstone::render {
 namespace {
@@ -56,15 +56,7 @@ DirectError measure_direct_error(const cv::Mat& picture, const Scene& scene, con
          picture.cols, picture.rows, picture.channels(), size.x(), size.y(), bands);
   }
   const cv::Mat mask = spread_pixels(size, settings.pixels, settings.seed);
-  const Tracer tracer(scene);
-  RenderSettings paths;
-  paths.min_samples = paths.max_samples = settings.samples;
-  paths.max_depth = settings.max_depth;
-  cv::Mat traced[2];
-  for (int k = 0; k < 2; ++k) {
-    paths.seed = mix_bits(2 * settings.seed + static_cast<std::uint64_t>(k));
-    traced[k] = tracer.render(camera, paths, mask).irradiance;
-  }
+  const auto traced = trace_twice(scene, camera, mask, settings.samples, settings.max_depth, settings.seed);
   std::vector<double> products;
   std::vector<double> differences;
   std::vector<double> powers;

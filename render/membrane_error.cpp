@@ -6,8 +6,8 @@
 
 #include "core/error.h"
 #include "render/membrane_light.h"
-#include "render/path_tracer.h"
 #include "render/sample_sequence.h"
+#include "render/trace_twice.h"
 
 namespace touchstone::render {
 namespace {
@@ -153,15 +153,7 @@ MembraneError measure_membrane_error(const cv::Mat& picture, const cv::Mat& free
     }
   }
 
-  const Tracer tracer(scene);
-  RenderSettings paths;
-  paths.min_samples = paths.max_samples = settings.samples;
-  paths.max_depth = settings.max_depth;
-  cv::Mat traced[2];
-  for (int k = 0; k < 2; ++k) {
-    paths.seed = mix_bits(2 * settings.seed + static_cast<std::uint64_t>(k));
-    traced[k] = tracer.render(camera, paths, mask).irradiance;
-  }
+  const auto traced = trace_twice(scene, camera, mask, settings.samples, settings.max_depth, settings.seed);
   std::vector<Sum> fields(static_cast<std::size_t>(across) * down);
   double products = 0.0;
   double square_products = 0.0;

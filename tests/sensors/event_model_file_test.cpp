@@ -7,14 +7,15 @@
 #include <nlohmann/json.hpp>
 
 #include "core/sha256.h"
-#include "error_message.h"
 #include "sensors/gaussian_process_file.h"
 #include "sensors/material_classifier_file.h"
 #include "sensors/time_delay_network_file.h"
+#include "tests/support/message_of.h"
 
 namespace touchstone::sensors {
 namespace {
 
+using test::message_of;
 using testing::HasSubstr;
 using Json = nlohmann::json;
 
@@ -86,7 +87,7 @@ std::string network_error(const std::string& text) {
 
 TEST(EventModelFiles, FaultyNetworksAreNamed) {
   const std::string good = to_json(some_network());
-  EXPECT_EQ(network_error(good), "");
+  EXPECT_EQ(network_error(good), "no error");
   EXPECT_THAT(network_error("{"), HasSubstr("m.json:1: isn't valid JSON"));
   EXPECT_THAT(network_error("[]"), HasSubstr("map"));
   EXPECT_THAT(network_error(to_json(some_classifier())), HasSubstr("format: is 'touchstone.material_classifier'"));
@@ -129,7 +130,7 @@ TEST(EventModelFiles, FaultyClassifiersAreNamed) {
   const auto error = [&](auto change) {
     return message_of([&] { material_classifier_from_json(changed(good, change), "m.json"); });
   };
-  EXPECT_EQ(error([](Json&) {}), "");
+  EXPECT_EQ(error([](Json&) {}), "no error");
   EXPECT_THAT(error([](Json& j) { j["materials"] = "foam"; }), HasSubstr("materials: is a string, a list"));
   EXPECT_THAT(error([](Json& j) { j["materials"][0] = 1; }), HasSubstr("materials[0]: is a number, text"));
   EXPECT_THAT(error([](Json& j) { j["materials"].push_back("third"); }), HasSubstr("2 outputs, there are 3 materials"));
@@ -144,7 +145,7 @@ TEST(EventModelFiles, FaultyProcessesAreNamed) {
   const auto error = [&](auto change) {
     return message_of([&] { gaussian_process_from_json(changed(good, change), "m.json"); });
   };
-  EXPECT_EQ(error([](Json&) {}), "");
+  EXPECT_EQ(error([](Json&) {}), "no error");
   EXPECT_THAT(error([](Json& j) { j["noise"] = 0.0; }), HasSubstr("m.json: Gaussian process: noise is 0"));
   EXPECT_THAT(error([](Json& j) { j["lengths"].erase(0); }), HasSubstr("1 lengths for 2 inputs"));
   EXPECT_THAT(error([](Json& j) { j["targets"].erase(0); }), HasSubstr("3 samples have 2 targets"));

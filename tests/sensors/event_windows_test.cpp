@@ -6,11 +6,12 @@
 #include <limits>
 
 #include "core/random.h"
-#include "error_message.h"
+#include "tests/support/message_of.h"
 
 namespace touchstone::sensors {
 namespace {
 
+using test::message_of;
 using testing::ElementsAre;
 using testing::HasSubstr;
 

@@ -5,13 +5,14 @@
 
 #include <cmath>
 
-#include "error_message.h"
 #include "sensors/early_stopping.h"
 #include "sensors/range_scaling.h"
+#include "tests/support/message_of.h"
 
 namespace touchstone::sensors {
 namespace {
 
+using test::message_of;
 using testing::HasSubstr;
 
 FeedForwardNetwork network_of(const NetworkShape& shape, std::uint64_t seed = 1) {
@@ -117,7 +118,7 @@ TEST(FeedForwardNetwork, FaultsAreNamed) {
     spoil(network);
     return fault_of(network);
   };
-  EXPECT_EQ(fault([](auto&) {}), "");
+  EXPECT_EQ(fault([](auto&) {}), "no error");
   EXPECT_THAT(fault([](auto& n) { n = {}; }), HasSubstr("no layer"));
   EXPECT_THAT(fault([](auto& n) { n.biases.pop_back(); }), HasSubstr("weights of 3 layers and biases of 2"));
   EXPECT_THAT(fault([](auto& n) { n.weights[1].resize(0, 0); }), HasSubstr("layer 1 has no weights"));

@@ -5,13 +5,14 @@
 
 #include <cmath>
 
-#include "error_message.h"
 #include "sensors/confusion_matrix.h"
 #include "sensors/force_series.h"
+#include "tests/support/message_of.h"
 
 namespace touchstone::sensors {
 namespace {
 
+using test::message_of;
 using testing::HasSubstr;
 
 TEST(ForceScore, MeanSquaredError) {
@@ -72,7 +73,7 @@ TEST(ForceSeries, FaultsAreNamed) {
     spoil(series[1]);
     return message_of([&] { stack(series, std::vector<int>{0, 1}); });
   };
-  EXPECT_EQ(message([](auto&) {}), "");
+  EXPECT_EQ(message([](auto&) {}), "no error");
   EXPECT_THAT(message([](auto& s) { s.force_N.resize(2); }), HasSubstr("series 1: 3 windows of features and 2"));
   EXPECT_THAT(message([](auto& s) { s = {}; }), HasSubstr("no windows"));
   EXPECT_THAT(message([](auto& s) { s.judged = {}; }), HasSubstr("no window of it is judged"));

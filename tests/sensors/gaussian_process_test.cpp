@@ -7,11 +7,12 @@
 #include <numbers>
 
 #include "core/random.h"
-#include "error_message.h"
+#include "tests/support/message_of.h"
 
 namespace touchstone::sensors {
 namespace {
 
+using test::message_of;
 using testing::HasSubstr;
 
 TEST(GaussianProcess, OfTwoSamplesIsTheClosedForm) {
@@ -136,7 +137,7 @@ TEST(GaussianProcess, FaultyInputIsNamed) {
     spoil(parameters, samples);
     return message_of([&] { condition(parameters, samples.inputs, samples.targets); });
   };
-  EXPECT_EQ(message([](auto&, auto&) {}), "");
+  EXPECT_EQ(message([](auto&, auto&) {}), "no error");
   EXPECT_THAT(message([](auto&, auto& s) { s.inputs.resize(0, 3); }), HasSubstr("0 samples"));
   EXPECT_THAT(message([](auto&, auto& s) { s.inputs.setZero(20'001, 3); }), HasSubstr("at most 20000"));
   EXPECT_THAT(message([](auto&, auto& s) { s.targets.setZero(39); }), HasSubstr("40 samples have 39 targets"));

@@ -6,13 +6,14 @@
 #include <cmath>
 
 #include "core/random.h"
-#include "error_message.h"
 #include "sensors/grasp_sequence.h"
-#include "synthetic_grasps.h"
+#include "tests/sensors/synthetic_grasps.h"
+#include "tests/support/message_of.h"
 
 namespace touchstone::sensors {
 namespace {
 
+using test::message_of;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
@@ -74,7 +75,7 @@ TEST(GraspPhases, WhatIsMissingIsSaid) {
   };
   const SyntheticGrasp grasp = synthetic_grasp(0, 0);
   const std::span<const EventCounts> all(grasp.windows);
-  EXPECT_EQ(message(all), "");
+  EXPECT_EQ(message(all), "no error");
   EXPECT_THAT(message(all.first(20)), HasSubstr("20 windows; more than the 20"));
   EXPECT_THAT(message(all.first(30)), HasSubstr("no touch"));
   EXPECT_THAT(message(all.first(60)), HasSubstr("after the touch in window 30 the recording has 30 windows"));
@@ -94,7 +95,7 @@ TEST(GraspPhases, FaultySettingsAreNamed) {
     spoil(settings);
     return message_of([&] { find_first_touch(windows, settings); });
   };
-  EXPECT_EQ(message([](auto&) {}), "");
+  EXPECT_EQ(message([](auto&) {}), "no error");
   EXPECT_THAT(message([](auto& s) { s.background_windows = 1; }), HasSubstr("background_windows is 1"));
   EXPECT_THAT(message([](auto& s) { s.false_alarm = 0.0; }), HasSubstr("false_alarm is 0"));
   EXPECT_THAT(message([](auto& s) { s.false_alarm = std::nan(""); }), HasSubstr("false_alarm is nan"));
@@ -132,7 +133,7 @@ TEST(GraspSequence, RefusesPhasesThatDoNotFit) {
     spoil(phases);
     return message_of([&] { grasp_sequence(windows, phases); });
   };
-  EXPECT_EQ(message([](auto&) {}), "");
+  EXPECT_EQ(message([](auto&) {}), "no error");
   EXPECT_THAT(message([](auto& p) { p.first_touch = -1; }), HasSubstr("-1, 3, 5 and 7"));
   EXPECT_THAT(message([](auto& p) { p.release_begin = 2; }), HasSubstr("must come after"));
   EXPECT_THAT(message([](auto& p) { p.release_end = 9; }), HasSubstr("ends at window 9, there are 8"));

@@ -1,4 +1,5 @@
 #include "sensors/leave_one_out.h"
+#include "tests/support/message_of.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,11 +11,10 @@
 #include <set>
 #include <stdexcept>
 
-#include "error_message.h"
-
 namespace touchstone::sensors {
 namespace {
 
+using test::message_of;
 using testing::HasSubstr;
 
 void expect_partition(const Fold& fold, int count) {

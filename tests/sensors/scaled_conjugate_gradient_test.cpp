@@ -1,15 +1,15 @@
 #include "sensors/scaled_conjugate_gradient.h"
+#include "tests/support/message_of.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "error_message.h"
-
 namespace touchstone::sensors {
 namespace {
 
+using test::message_of;
 using testing::HasSubstr;
 
 TEST(ScaledConjugateGradient, AQuadraticBowlOfNDimensionsTakesNSteps) {

@@ -6,14 +6,15 @@
 #include <cmath>
 #include <numeric>
 
-#include "error_message.h"
 #include "sensors/force_score.h"
 #include "sensors/leave_one_out.h"
-#include "synthetic_grasps.h"
+#include "tests/sensors/synthetic_grasps.h"
+#include "tests/support/message_of.h"
 
 namespace touchstone::sensors {
 namespace {
 
+using test::message_of;
 using testing::HasSubstr;
 
 std::vector<int> range(int begin, int end) {
@@ -61,7 +62,7 @@ TEST(TimeDelayNetwork, LearnsForceFromCounts) {
   for (int i = 0; i < 16; ++i) series.push_back(synthetic_series(synthetic_grasp(i, 1), false));
   const TrainedTimeDelayNetwork trained =
       train_time_delay_network(series, range(0, 12), range(12, 15), small_settings());
-  EXPECT_EQ(fault_of(trained.model), "");
+  EXPECT_EQ(fault_of(trained.model), "no error");
   const StackedSeries all = stack(series, range(0, 15));
   const double variance = (all.force_N.array() - all.force_N.mean()).square().mean();
   const Eigen::VectorXd estimate = estimate_force(trained.model, series[15].features);
@@ -123,7 +124,7 @@ TEST(TimeDelayNetwork, FaultyInputIsNamed) {
     spoil(settings, some, fold);
     return message_of([&] { train_time_delay_network(some, training, validation, settings, fold); });
   };
-  EXPECT_EQ(message([](auto&...) {}), "");
+  EXPECT_EQ(message([](auto&...) {}), "no error");
   EXPECT_THAT(message([](auto& s, auto&, auto&) { s.delays = 0; }), HasSubstr("delays is 0"));
   EXPECT_THAT(message([](auto& s, auto&, auto&) { s.units = 0; }), HasSubstr("units is 0"));
   EXPECT_THAT(message([](auto&, auto&, auto& fold) { fold = -1; }), HasSubstr("fold is -1"));
