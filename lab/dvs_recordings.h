@@ -21,7 +21,7 @@ namespace touchstone::lab {
 /// What one kind of event pixels told of a grasp.
 struct DvsEvents {
   std::vector<sensors::EventCounts> counts;  ///< per millisecond, from the recording's start
-  std::int64_t events = 0;
+  std::int64_t events = 0;                   ///< all, also those of a last millisecond that isn't whole
 };
 
 struct DvsRecording {
@@ -38,8 +38,8 @@ struct DvsRecording {
 struct DvsRecordSettings {
   std::vector<render::EventPixelSettings> pixels;  ///< kinds, at least one; the device's own first
   std::uint64_t unit_seed = 1;                     ///< thresholds: one sensor for all grasps
-  /// How far the light between two pictures may be from a picture made there, and for how little of a change a pixel
-  /// isn't told; in parts of the smallest threshold of all kinds.
+  /// How far the light of any pixel between two pictures may be from a picture made there, and how little of a change
+  /// is left for later; in parts of the smallest mean threshold of all kinds, at most 0.5.
   double tolerance = 0.05;
   sim::ReferenceForceSensorSettings force_sensor;
 };
