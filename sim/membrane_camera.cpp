@@ -51,6 +51,10 @@ render::MembraneOptics membrane_optics(const DeviceSpec& device) {
   return optics;
 }
 
+double in_one_band(const DeviceSpec& device, const Colour& colour, const char* what) {
+  return in_bands(colour, one_band(device), what)[0];
+}
+
 MembraneCamera::MembraneCamera(const DeviceSpec& device, const MembraneCameraSettings& settings)
     : optics_(membrane_optics(device)) {
   const SceneBands bands = one_band(device);

@@ -48,6 +48,9 @@ class MembraneCamera {
 /// The optics of a device's plate and slab, for its one band. @throws Error as MembraneCamera
 render::MembraneOptics membrane_optics(const DeviceSpec& device);
 
+/// A colour of something before such a device, in its one band. @throws Error as MembraneCamera and in_bands
+double in_one_band(const DeviceSpec& device, const Colour& colour, const char* what);
+
 /// A face state from maps of a contact on another grid: coverage is averaged over cells, gaps are those of the nearest
 /// cell; from `no_body_mm` on there is no body. CV_32FC1, `from.ny` x `from.nx`; beyond them nothing stands.
 /// @throws Error if maps don't fit their grid
