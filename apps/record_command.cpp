@@ -49,12 +49,13 @@ void record_dvs(const DvsOptions& options, const GlobalOptions& global) {
     fail("--out {}: it is there already; a recording wants a folder of its own", options.out.string());
   }
   require_writable_place(options.out);
-  ProgressBar bar(global.quiet);
+  int most = 0;
+  for (const lab::DvsMaterial& material : lab::dvs_materials()) most += material.grasps;
+  if (options.grasps < 0 || options.grasps > most) {
+    fail("--grasps is {}; allowed is 1 to {}, or 0 for all", options.grasps, most);
+  }
   const lab::DvsGraspBench bench(lab::scenes_folder(), global.cache);
   std::vector<lab::DvsGraspParameters> grasps = bench.draw(options.seed);
-  if (options.grasps < 0 || options.grasps > static_cast<int>(grasps.size())) {
-    fail("--grasps is {}; allowed is 1 to {}, or 0 for all", options.grasps, grasps.size());
-  }
   if (options.grasps > 0) {  // spread over the materials
     std::vector<lab::DvsGraspParameters> some;
     for (int k = 0; k < options.grasps; ++k) {
@@ -66,7 +67,8 @@ void record_dvs(const DvsOptions& options, const GlobalOptions& global) {
   const cv::Size size(bench.device().camera->width, bench.device().camera->height);
   std::filesystem::create_directories(options.out);
   std::string table = "grasp,material,youngs_modulus_MPa,target_N,light_level,touch_s,release_s,apart_s,events\n";
-  const Progress progress = bar.listener();
+  auto bar = std::make_unique<ProgressBar>(global.quiet);
+  const Progress progress = bar->listener();
   for (std::size_t k = 0; k < grasps.size(); ++k) {
     const std::string name = fmt::format("grasp-{:02}", k);
     write_whole_file(options.out / (name + ".h5"), [&](const std::filesystem::path& temporary) {
@@ -81,6 +83,7 @@ void record_dvs(const DvsOptions& options, const GlobalOptions& global) {
     if (progress) progress("grasps", static_cast<std::int64_t>(k) + 1, static_cast<std::int64_t>(grasps.size()));
   }
   write_whole_file(options.out / "grasps.csv", table);
+  bar.reset();
   fmt::print("{}: {} grasps\n", options.out.string(), grasps.size());
 }
 
@@ -90,8 +93,8 @@ void add_record_command(CLI::App& app, const GlobalOptions& global, Action& acti
   CLI::App* records = app.add_subcommand("record", "Record a sensor's experiment");
   records->require_subcommand(1);
   records->fallthrough();
-  CLI::App* command = records->add_subcommand(
-      "dvs", "Grasps of the event-driven fingertip: events, and counts and forces every 7 ms");
+  CLI::App* command =
+      records->add_subcommand("dvs", "Grasps of the event-driven fingertip: events, and counts and forces every 7 ms");
   auto options = std::make_shared<DvsOptions>();
   command->add_option("-o,--out", options->out, "The folder to make")->required();
   command->add_option("--grasps", options->grasps, "How many of the 48, spread over the materials (default: all)");
