@@ -69,6 +69,7 @@ int run(int argc, char** argv) {
   add_validate_command(app, global, action);
   add_inspect_command(app, global, action);
   add_export_command(app, global, action);
+  add_record_command(app, global, action);
   add_study_command(app, global, action);
 
   refuse_unknown_command(app, argc, argv);

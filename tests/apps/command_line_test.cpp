@@ -243,6 +243,18 @@ TEST_F(BadInput, ExportsOfWhatTheDeviceHasntAreRefusedBeforeTheWork) {
                  "neither printed markers nor beads");
 }
 
+TEST_F(BadInput, RecordingsOfWrongGraspsAreRefusedBeforeTheWork) {
+  const std::string out = (folder_.path() / "recording").string();
+  expect_refused(run_program({"record"}), "subcommand");
+  expect_refused(run_program({"record", "dsv"}), "did you mean 'dvs'?");
+  expect_refused(run_program({"record", "dvs"}), "--out");
+  expect_refused(run_program({"record", "dvs", "-o", folder_.path().string()}), "is there already");
+  expect_refused(run_program({"record", "dvs", "-o", "/nonexistent/a"}), "there is no folder");
+  expect_refused(run_program({"record", "dvs", "-o", out, "--grasps", "49"}), "allowed is 1 to 48");
+  expect_refused(run_program({"record", "dvs", "-o", out, "--grasps", "-1"}), "--grasps is -1");
+  EXPECT_FALSE(fs::exists(out));
+}
+
 TEST_F(BadInput, PlanShowsReasons) {
   const ProgramRun run = run_program({"plan", job_.string()});
   EXPECT_EQ(run.exit_code, 0) << run.err;
