@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "core/error.h"
 
@@ -25,6 +26,42 @@ double force_at(std::span<const sim::ForceReading> readings, double sim::ForceRe
   const double behind = (middle(*after) - seconds) / kReading_s;
   if (after == readings.begin()) return behind >= 1.0 ? 0.0 : (1.0 - behind) * ((*after).*force);
   return behind * ((*(after - 1)).*force) + (1.0 - behind) * ((*after).*force);
+}
+
+/// Its counts in windows. @throws Error for a kind of pixels that wasn't recorded
+std::vector<sensors::EventCounts> windows_seen(const DvsRecording& recording, const DvsSequenceSettings& settings) {
+  if (settings.pixels < 0 || static_cast<std::size_t>(settings.pixels) >= recording.by_pixels.size()) {
+    fail("dvs sequences: event pixels {} are asked for, {} kinds were recorded", settings.pixels,
+         recording.by_pixels.size());
+  }
+  dvs_phase_settings(settings.window_ms);  // refuses the length
+  return windows_of(recording.by_pixels[static_cast<std::size_t>(settings.pixels)], 0, settings.window_ms);
+}
+
+DvsSequence sequence_of(const DvsRecording& recording, std::span<const sensors::EventCounts> windows,
+                        const sensors::GraspPhases& phases, const DvsSequenceSettings& settings) {
+  DvsSequence sequence;
+  sequence.material = recording.parameters.material;
+  sequence.phases = phases;
+  sequence.windows = sensors::grasp_sequence(windows, phases, 1000LL * settings.window_ms, settings.accumulation);
+  // Rows are windows from the touch on; without the hold they are fewer than the windows.
+  const Eigen::Index all = phases.release_end - phases.first_touch;
+  const double first_s = 1e-3 * settings.window_ms * phases.first_touch;
+  const auto forces = [&](double sim::ForceReading::*force) -> Eigen::VectorXd {
+    const Eigen::VectorXd whole = window_forces(recording.readings, force, first_s, settings.window_ms, all);
+    const Eigen::Index rows = sequence.windows.counts.rows();
+    if (rows == all) return whole;
+    Eigen::VectorXd judged(rows);
+    judged << whole.head(sequence.windows.grasp_windows), whole.tail(rows - sequence.windows.grasp_windows);
+    return judged;
+  };
+  sequence.measured_N = forces(&sim::ForceReading::measured_N);
+  sequence.true_N = forces(&sim::ForceReading::true_N);
+  const auto end_ms = [&](int window) { return static_cast<double>(settings.window_ms * (window + 1)); };
+  sequence.touch_delay_ms = end_ms(phases.first_touch) - 1e3 * recording.touch_s;
+  sequence.release_delay_ms = end_ms(phases.release_begin) - 1e3 * recording.release_s;
+  sequence.apart_ms = 1e3 * recording.apart_s - end_ms(phases.release_begin);
+  return sequence;
 }
 
 }  // namespace
@@ -63,46 +100,32 @@ Eigen::VectorXd window_forces(std::span<const sim::ForceReading> readings, doubl
 }
 
 DvsSequence dvs_sequence(const DvsRecording& recording, const DvsSequenceSettings& settings) {
-  if (settings.pixels < 0 || static_cast<std::size_t>(settings.pixels) >= recording.by_pixels.size()) {
-    fail("dvs sequences: event pixels {} are asked for, {} kinds were recorded", settings.pixels,
-         recording.by_pixels.size());
-  }
-  const sensors::GraspPhaseSettings phases = dvs_phase_settings(settings.window_ms);
-  const std::vector<sensors::EventCounts> windows =
-      windows_of(recording.by_pixels[static_cast<std::size_t>(settings.pixels)], 0, settings.window_ms);
-  DvsSequence sequence;
-  sequence.material = recording.parameters.material;
+  const std::vector<sensors::EventCounts> windows = windows_seen(recording, settings);
   try {
-    sequence.phases = sensors::find_grasp_phases(windows, phases);
-    sequence.windows =
-        sensors::grasp_sequence(windows, sequence.phases, 1000LL * settings.window_ms, settings.accumulation);
-    // Rows are windows from the touch on; without the hold they are fewer than the windows.
-    const Eigen::Index all = sequence.phases.release_end - sequence.phases.first_touch;
-    const double first_s = 1e-3 * settings.window_ms * sequence.phases.first_touch;
-    const auto forces = [&](double sim::ForceReading::*force) {
-      const Eigen::VectorXd whole = window_forces(recording.readings, force, first_s, settings.window_ms, all);
-      const Eigen::Index rows = sequence.windows.counts.rows();
-      if (rows == all) return whole;
-      Eigen::VectorXd judged(rows);
-      judged << whole.head(sequence.windows.grasp_windows), whole.tail(rows - sequence.windows.grasp_windows);
-      return judged;
-    };
-    sequence.measured_N = forces(&sim::ForceReading::measured_N);
-    sequence.true_N = forces(&sim::ForceReading::true_N);
+    return sequence_of(recording, windows, sensors::find_grasp_phases(windows, dvs_phase_settings(settings.window_ms)),
+                       settings);
   } catch (const Error& error) {
     fail("grasp with noise seed {}: {}", recording.parameters.noise_seed, error.what());
   }
-  const auto end_ms = [&](int window) { return static_cast<double>(settings.window_ms * (window + 1)); };
-  sequence.touch_delay_ms = end_ms(sequence.phases.first_touch) - 1e3 * recording.touch_s;
-  sequence.release_delay_ms = end_ms(sequence.phases.release_begin) - 1e3 * recording.release_s;
-  sequence.apart_ms = 1e3 * recording.apart_s - end_ms(sequence.phases.release_begin);
-  return sequence;
 }
 
-std::vector<DvsSequence> dvs_sequences(std::span<const DvsRecording> recordings, const DvsSequenceSettings& settings) {
-  std::vector<DvsSequence> sequences;
-  for (const DvsRecording& recording : recordings) sequences.push_back(dvs_sequence(recording, settings));
-  return sequences;
+DvsSequences dvs_sequences(std::span<const DvsRecording> recordings, const DvsSequenceSettings& settings) {
+  const sensors::GraspPhaseSettings phases = dvs_phase_settings(settings.window_ms);
+  DvsSequences all;
+  for (const DvsRecording& recording : recordings) {
+    const std::vector<sensors::EventCounts> windows = windows_seen(recording, settings);
+    std::optional<sensors::GraspPhases> found;
+    try {
+      found = sensors::find_grasp_phases(windows, phases);
+    } catch (const Error& error) {
+      all.unseen.push_back(fmt::format("grasp with noise seed {}: {}", recording.parameters.noise_seed, error.what()));
+      for (const sim::ForceReading& reading : recording.readings) {
+        all.unseen_peak_N = std::max(all.unseen_peak_N, reading.true_N);
+      }
+    }
+    if (found) all.seen.push_back(sequence_of(recording, windows, *found, settings));
+  }
+  return all;
 }
 
 std::vector<sensors::ForceSeries> force_series_of(std::span<const DvsSequence> sequences, DvsForce force,

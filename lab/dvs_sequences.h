@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "lab/dvs_recordings.h"
@@ -47,8 +48,15 @@ Eigen::VectorXd window_forces(std::span<const sim::ForceReading> readings, doubl
 /// @throws Error for a kind of pixels that wasn't recorded, or where the grasp has no touch, no release or no end
 /// (sensors::find_grasp_phases), naming the grasp by its noise seed
 DvsSequence dvs_sequence(const DvsRecording& recording, const DvsSequenceSettings& settings = {});
-std::vector<DvsSequence> dvs_sequences(std::span<const DvsRecording> recordings,
-                                       const DvsSequenceSettings& settings = {});
+
+/// Many grasps. A press so light that its events are lost in the noise has no touch to begin with.
+struct DvsSequences {
+  std::vector<DvsSequence> seen;
+  std::vector<std::string> unseen;  ///< of each grasp that isn't, why
+  double unseen_peak_N = 0.0;       ///< the hardest press (true force) among those
+};
+/// @throws Error as dvs_sequence, but for grasps without touch, release or end
+DvsSequences dvs_sequences(std::span<const DvsRecording> recordings, const DvsSequenceSettings& settings = {});
 
 /// Which force is learned.
 enum class DvsForce { measured, truth };

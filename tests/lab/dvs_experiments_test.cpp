@@ -110,6 +110,14 @@ TEST(DvsSequences, SayWhatIsWrong) {
   for (sensors::EventCounts& count : untouched.by_pixels[0].counts) count.off = 0;
   EXPECT_THAT(error_of([&] { dvs_sequence(untouched); }),
               HasSubstr("grasp with noise seed 77: grasp phases: there is no touch"));
+  const DvsSequences two = dvs_sequences(std::vector<DvsRecording>{untouched, made(3, 1.0, 78)});
+  ASSERT_EQ(two.seen.size(), 1u);
+  EXPECT_EQ(two.seen[0].material, 3);
+  ASSERT_EQ(two.unseen.size(), 1u);
+  EXPECT_THAT(two.unseen[0], HasSubstr("grasp with noise seed 77: grasp phases: there is no touch"));
+  EXPECT_NEAR(two.unseen_peak_N, 2.0, 1e-9);
+  EXPECT_THAT(error_of([&] { dvs_sequences(std::vector<DvsRecording>{untouched}, {.pixels = 1}); }),
+              HasSubstr("pixels 1"));
   EXPECT_THAT(error_of([] { dvs_sequence(made(0, 2.0, 1), {.pixels = 1}); }), HasSubstr("pixels 1"));
   EXPECT_THAT(error_of([] { dvs_sequence(made(0, 2.0, 1), {.window_ms = 0}); }), HasSubstr("1 to 70"));
   EXPECT_THAT(error_of([] { dvs_phase_settings(71); }), HasSubstr("1 to 70"));
@@ -128,7 +136,7 @@ TEST(DvsForceExperiment, LearnsALawThatOnlyTheMaterialsBlur) {
   settings.learned = DvsForce::truth;
   settings.validation = 3;
   sensors::TuningSettings tuning;
-  const DvsForceScore one = test_force_processes(dvs_sequences(alike), tuning, settings);
+  const DvsForceScore one = test_force_processes(dvs_sequences(alike).seen, tuning, settings);
   ASSERT_EQ(one.folds.size(), 12u);
   EXPECT_LT(one.mean(&DvsForceFold::test_mse), 0.01) << "OFF less ON over 4000 is the force";
   EXPECT_EQ(one.mean(&DvsForceFold::test_mse), one.mean(&DvsForceFold::true_mse));
@@ -136,13 +144,13 @@ TEST(DvsForceExperiment, LearnsALawThatOnlyTheMaterialsBlur) {
   network.hidden_layers = 1;
   network.units = 5;
   network.training.most_steps = 60;
-  const DvsForceScore net = test_force_networks(dvs_sequences(alike), network, settings);
+  const DvsForceScore net = test_force_networks(dvs_sequences(alike).seen, network, settings);
   EXPECT_LT(net.mean(&DvsForceFold::test_mse), 0.01);
   EXPECT_GT(net.folds.front().steps, 0);
   EXPECT_GT(net.sensitivity_N(), 0.0);
   // The reference sensor's errors: 10 % of the force, squared, and nothing else.
   settings.learned = DvsForce::measured;
-  const DvsForceScore measured = test_force_processes(dvs_sequences(alike), tuning, settings);
+  const DvsForceScore measured = test_force_processes(dvs_sequences(alike).seen, tuning, settings);
   EXPECT_GT(measured.mean(&DvsForceFold::true_mse), measured.mean(&DvsForceFold::test_mse));
   for (const DvsForceFold& fold : measured.folds) {
     const DvsSequence sequence = dvs_sequence(alike[static_cast<std::size_t>(fold.grasp)]);
@@ -151,7 +159,7 @@ TEST(DvsForceExperiment, LearnsALawThatOnlyTheMaterialsBlur) {
 }
 
 TEST(DvsForceExperiment, FoldsAreTheSameForAnyNumberOfThreadsAndMayBeSparse) {
-  const std::vector<DvsSequence> sequences = dvs_sequences(some(8));
+  const std::vector<DvsSequence> sequences = dvs_sequences(some(8)).seen;
   sensors::TimeDelayNetworkSettings network;
   network.hidden_layers = 2;
   network.units = 4;
@@ -194,7 +202,7 @@ const std::vector<std::string> kMaterials = {"foam", "rubber", "silicone", "stee
 TEST(DvsMaterialExperiment, TellsMaterialsByEventsAndNotByForce) {
   std::vector<DvsRecording> recordings;
   for (int i = 0; i < 24; ++i) recordings.push_back(made(i % 4, 1.8 + 0.05 * (i / 4), static_cast<std::uint64_t>(i)));
-  const std::vector<DvsSequence> sequences = dvs_sequences(recordings);
+  const std::vector<DvsSequence> sequences = dvs_sequences(recordings).seen;
   DvsMaterialSettings settings;
   settings.classifier.hidden_layers = 1;
   settings.classifier.units = 10;
@@ -211,7 +219,7 @@ TEST(DvsMaterialExperiment, TellsMaterialsByEventsAndNotByForce) {
 }
 
 TEST(DvsMaterialExperiment, RefusesAMissingMaterial) {
-  std::vector<sensors::MaterialSample> samples = event_samples(dvs_sequences(some(12)));
+  std::vector<sensors::MaterialSample> samples = event_samples(dvs_sequences(some(12)).seen);
   EXPECT_THAT(error_of([&] {
                 test_material_classifiers(samples, {"foam", "rubber", "silicone"}, {});
               }),
