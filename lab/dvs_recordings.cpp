@@ -11,110 +11,12 @@
 
 #include "core/error.h"
 #include "core/units.h"
+#include "lab/dvs_light.h"
 
 namespace touchstone::lab {
 namespace {
 
-constexpr double kLeastCut_mm = 1e-6;    // travels nearer to each other aren't cut again
-constexpr int kFirstCuts = 4;            // of the travel before the touch
 constexpr std::int64_t kCountUs = 1000;  // for which events are counted together
-
-/// What a grasp's light is at any travel of the finger: logarithms of (electrons a second + dark), CV_32FC1.
-class TravelLight {
- public:
-  TravelLight(const DvsGrasp& grasp, const DvsGraspBench& bench, const sim::MembraneCamera& camera,
-              const render::EventPixelSettings& pixels, double allowed)
-      : grasp_(grasp),
-        camera_(camera),
-        piece_(bench.piece(grasp.parameters.material)),
-        albedo_(sim::in_one_band(bench.device(), piece_.albedo, "albedo")),
-        pixels_(pixels),
-        allowed_(allowed) {
-    const auto [least, most] = std::minmax_element(
-        grasp.run.moments.begin(), grasp.run.moments.end(),
-        [](const sim::FingerMoment& a, const sim::FingerMoment& b) { return a.travel_mm < b.travel_mm; });
-    std::map<double, cv::Mat> made;
-    const double low = least->travel_mm;
-    const double high = std::max(most->travel_mm, low + kLeastCut_mm);
-    for (const double travel : {low, high}) made[travel] = picture(travel);
-    // The face's course has corners at its states. Before the touch, the nearer the piece the steeper.
-    for (const sim::GripPoint& state : grasp.face->states()) {
-      if (state.travel_mm > low && state.travel_mm < high) made[state.travel_mm] = picture(state.travel_mm);
-    }
-    for (int k = 1; k < kFirstCuts && low < 0.0; ++k) {
-      const double travel = low * std::exp2(-k);
-      if (travel < high) made[travel] = picture(travel);
-    }
-    const std::map<double, cv::Mat> first = made;
-    for (auto before = first.begin(), after = std::next(before); after != first.end(); ++before, ++after) {
-      refine(*before, *after, made);
-    }
-    for (const auto& [travel, log] : made) {
-      path_.push_back(logs_.empty() ? 0.0 : path_.back() + cv::norm(logs_.back(), log, cv::NORM_INF));
-      travels_.push_back(travel);
-      logs_.push_back(log);
-    }
-  }
-
-  std::int64_t pictures() const { return static_cast<std::int64_t>(logs_.size()); }
-  /// The travels of the pictures, rising.
-  const std::vector<double>& travels() const { return travels_; }
-
-  /// Grows with the travel, at least by as much as any pixel's logarithm changes.
-  double path_at(double travel) const {
-    const auto [k, part] = place_of(travel);
-    return path_[k] + part * (path_[k + 1] - path_[k]);
-  }
-
-  /// Electrons a second.
-  cv::Mat photocurrent_at(double travel) const {
-    const auto [k, part] = place_of(travel);
-    cv::Mat light;
-    cv::addWeighted(logs_[k], 1.0 - part, logs_[k + 1], part, 0.0, light);
-    cv::exp(light, light);
-    light -= pixels_.dark_intensity;
-    return cv::max(light, 0.0);
-  }
-
- private:
-  std::pair<std::size_t, double> place_of(double travel) const {
-    const auto above = std::upper_bound(travels_.begin() + 1, travels_.end() - 1, travel);
-    const auto k = static_cast<std::size_t>(above - travels_.begin()) - 1;
-    const double part = (travel - travels_[k]) / (travels_[k + 1] - travels_[k]);
-    return {k, std::clamp(part, 0.0, 1.0)};
-  }
-
-  cv::Mat picture(double travel) const {
-    const sim::GripPoint point = grasp_.face->at_travel(travel);
-    const sim::FaceMap map = grasp_.face->map(point);
-    const render::FaceState state =
-        sim::face_state(camera_.grid(), grasp_.face->grid(), map.coverage, map.gap_mm, sim::kNoPiece_mm, albedo_,
-                        piece_.shape.across_flats_mm - point.approach_mm);
-    return render::log_intensity(camera_.photocurrent(state) * grasp_.parameters.light_level, pixels_);
-  }
-
-  void refine(const std::pair<const double, cv::Mat>& before, const std::pair<const double, cv::Mat>& after,
-              std::map<double, cv::Mat>& made) const {
-    if (after.first - before.first < 2.0 * kLeastCut_mm) return;
-    const double middle = 0.5 * (before.first + after.first);
-    const auto& made_here = *made.emplace(middle, picture(middle)).first;
-    cv::Mat straight;
-    cv::addWeighted(before.second, 0.5, after.second, 0.5, 0.0, straight);
-    if (cv::norm(straight, made_here.second, cv::NORM_INF) <= allowed_) return;
-    refine(before, made_here, made);
-    refine(made_here, after, made);
-  }
-
-  const DvsGrasp& grasp_;
-  const sim::MembraneCamera& camera_;
-  const sim::ObjectSpec& piece_;
-  double albedo_;
-  const render::EventPixelSettings& pixels_;
-  double allowed_;
-  std::vector<double> travels_;
-  std::vector<cv::Mat> logs_;
-  std::vector<double> path_;
-};
 
 /// All kinds of event pixels, seeing the same light.
 class Watch {
@@ -166,9 +68,9 @@ std::int64_t microseconds(double seconds) {
 }
 
 /// Shows the light from one moment to the next: at the pictures' travels in between, and at the end.
-void show_between(const sim::FingerMoment& before, const sim::FingerMoment& after, const TravelLight& light,
+void show_between(const sim::FingerMoment& before, const sim::FingerMoment& after, const DvsTravelLight& light,
                   Watch& watch) {
-  const auto& travels = light.travels();
+  const auto& travels = light.travels_mm();
   const auto begin = static_cast<double>(microseconds(before.seconds));
   const auto end = static_cast<double>(microseconds(after.seconds));
   std::vector<double> passed;
@@ -216,7 +118,7 @@ DvsRecording record_dvs_grasp(const DvsGraspBench& bench, const sim::MembraneCam
   }
   const DvsGrasp grasp = bench.play(parameters, settings.force_sensor);
   const double allowed = settings.tolerance * smallest_threshold(settings.pixels);
-  const TravelLight light(grasp, bench, camera, settings.pixels.front(), allowed);
+  const DvsTravelLight light(bench, camera, grasp, settings.pixels.front(), allowed);
 
   const std::vector<sim::FingerMoment>& moments = grasp.run.moments;
   const cv::Mat first = light.photocurrent_at(moments.front().travel_mm);
@@ -243,7 +145,7 @@ DvsRecording record_dvs_grasp(const DvsGraspBench& bench, const sim::MembraneCam
   recording.touch_s = grasp.run.first_touch_s;
   recording.release_s = grasp.run.release_s;
   recording.apart_s = grasp.run.apart_s;
-  recording.pictures = light.pictures();
+  recording.pictures = static_cast<std::int64_t>(light.travels_mm().size());
   recording.steps = watch.steps();
   return recording;
 }

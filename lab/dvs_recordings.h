@@ -1,9 +1,5 @@
 #pragma once
 // The grasps of lab/dvs_grasps.h as the event camera sees them: events counted, with forces and truth on one clock.
-//
-// What the membrane shows hangs on the finger's travel alone (sim/gripped_face.h), and to and fro it passes the same
-// travels. So a grasp's light is pictures at some travels, the logarithm running straight between two: as many as bring
-// that within a small part of a threshold of pictures made in between. The event pixels then see the travel's course.
 
 #include <cstdint>
 #include <span>
@@ -38,8 +34,8 @@ struct DvsRecording {
 struct DvsRecordSettings {
   std::vector<render::EventPixelSettings> pixels;  ///< kinds, at least one; the device's own first
   std::uint64_t unit_seed = 1;                     ///< thresholds: one sensor for all grasps
-  /// How far the light of any pixel between two pictures may be from a picture made there, and how little of a change
-  /// is left for later; in parts of the smallest mean threshold of all kinds, at most 0.5.
+  /// How far the light of any pixel between two pictures may be off (DvsTravelLight), and how small a change of it may
+  /// wait; in parts of the smallest mean threshold of all kinds, at most 0.5.
   double tolerance = 0.05;
   sim::ReferenceForceSensorSettings force_sensor;
 };

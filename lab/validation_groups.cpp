@@ -7,6 +7,7 @@ std::vector<ValidationRow> validate_mechanics(const ValidateOptions& options);
 std::vector<ValidationRow> validate_vibration(const ValidateOptions& options);
 std::vector<ValidationRow> validate_light(const ValidateOptions& options);
 std::vector<ValidationRow> validate_vhs(const ValidateOptions& options);
+std::vector<ValidationRow> validate_dvs_light(const ValidateOptions& options);
 std::vector<ValidationRow> validate_chroma_light(const ValidateOptions& options);
 std::vector<ValidationRow> validate_chroma_marker(const ValidateOptions& options);
 std::vector<ValidationRow> validate_chroma_field(const ValidateOptions& options);
@@ -27,6 +28,7 @@ const std::vector<ValidationGroup>& validation_groups() {
       {"vibration", validate_vibration},
       {"light", validate_light},
       {"vhs", validate_vhs},
+      {"dvs.light", validate_dvs_light},
       {"chroma.light", validate_chroma_light},
       {"chroma.marker", validate_chroma_marker},
       {"chroma.field", validate_chroma_field},
