@@ -8,6 +8,8 @@ std::vector<ValidationRow> validate_vibration(const ValidateOptions& options);
 std::vector<ValidationRow> validate_light(const ValidateOptions& options);
 std::vector<ValidationRow> validate_vhs(const ValidateOptions& options);
 std::vector<ValidationRow> validate_dvs_light(const ValidateOptions& options);
+std::vector<ValidationRow> validate_dvs_force(const ValidateOptions& options);
+std::vector<ValidationRow> validate_dvs_material(const ValidateOptions& options);
 std::vector<ValidationRow> validate_chroma_light(const ValidateOptions& options);
 std::vector<ValidationRow> validate_chroma_marker(const ValidateOptions& options);
 std::vector<ValidationRow> validate_chroma_field(const ValidateOptions& options);
@@ -29,6 +31,8 @@ const std::vector<ValidationGroup>& validation_groups() {
       {"light", validate_light},
       {"vhs", validate_vhs},
       {"dvs.light", validate_dvs_light},
+      {"dvs.force", validate_dvs_force},
+      {"dvs.material", validate_dvs_material},
       {"chroma.light", validate_chroma_light},
       {"chroma.marker", validate_chroma_marker},
       {"chroma.field", validate_chroma_field},
