@@ -162,7 +162,9 @@ void add_render_command(CLI::App& app, const GlobalOptions& global, Action& acti
   command->add_flag("--exr", options->exr, "Beside it the linear irradiance on the sensor, as .exr (W/m^2 a band)");
   command->add_option("--truth", options->truth,
                       "Depth, normals, ids, contact and flow of each pixel, as layers of one .exr file");
-  command->add_option("--events", options->events, "All events from the first frame to the last: an .h5 (DSEC), .raw (EVT 3.0), .aedat4, .txt or .csv file");
+  command->add_option(
+      "--events", options->events,
+      "All events from the first frame to the last: an .h5 (DSEC), .raw (EVT 3.0), .aedat4, .txt or .csv file");
   command->add_option("--events-picture", options->events_picture,
                       "The events of the 20 ms before the frame, ON red and OFF blue: a .png file");
   command->add_option("--gltf", options->gltf, "The frame's geometry for 3D viewers: a .glb file (glTF 2.0)");

@@ -211,10 +211,10 @@ void Hdf5Writer::write_number(const Hdf5Description& description, std::int64_t v
   const Handle creation(check(H5Pcreate(H5P_DATASET_CREATE), "dataset creation"), H5Pclose);
   check_done(H5Pset_obj_track_times(creation, 0), "times");
   make_group_of(description.path);
-  const Handle dataset(check(H5Dcreate2(file_, description.path.c_str(), H5T_STD_I64LE, space, H5P_DEFAULT, creation,
-                                        H5P_DEFAULT),
-                             description.path.c_str()),
-                       H5Dclose);
+  const Handle dataset(
+      check(H5Dcreate2(file_, description.path.c_str(), H5T_STD_I64LE, space, H5P_DEFAULT, creation, H5P_DEFAULT),
+            description.path.c_str()),
+      H5Dclose);
   check_done(H5Dwrite(dataset, H5T_NATIVE_INT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, &value), description.path.c_str());
   describe(dataset, description);
 }
@@ -337,9 +337,11 @@ void Hdf5Reader::expect_whole_numbers(const std::string& path) const {
                                                called.size(), called.data(), &config);
     if (filter >= 0 && H5Zfilter_avail(filter) > 0) continue;
     called.back() = '\0';
-    fail("{}: '{}' is packed by HDF5's filter {} ('{}'), which isn't on this machine. Plugins bring it: Blosc (32001) is "
-         "Debian's hdf5-filter-plugin-blosc-serial; HDF5_PLUGIN_PATH names the folder that they are in",
-         name_, path, static_cast<int>(filter), called.data());
+    fail(
+        "{}: '{}' is packed by HDF5's filter {} ('{}'), which isn't on this machine. Plugins bring it: Blosc (32001) "
+        "is "
+        "Debian's hdf5-filter-plugin-blosc-serial; HDF5_PLUGIN_PATH names the folder that they are in",
+        name_, path, static_cast<int>(filter), called.data());
   }
 }
 
