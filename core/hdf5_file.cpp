@@ -363,6 +363,14 @@ std::int64_t Hdf5Reader::count_of_whole_numbers(const std::string& path) const {
   return shape[0];
 }
 
+void Hdf5Reader::walk_list(const std::string& path) const {
+  if (count_of_whole_numbers(path) == 0) return;
+  const Handle dataset(H5Dopen2(file_, path.c_str(), H5P_DEFAULT), H5Dclose);
+  H5Dget_storage_size(dataset);  // visits every entry of the index of chunks
+  std::int64_t first = 0;
+  read_list_part(path, H5T_NATIVE_INT64, 0, 1, &first);  // and every filter
+}
+
 void Hdf5Reader::read_list_part(const std::string& path, Hdf5Id type, std::int64_t first, std::int64_t count,
                                 void* values) const {
   if (count == 0) return;

@@ -126,6 +126,9 @@ class Hdf5Reader {
   /// How many numbers a list of whole numbers of any size holds. @throws Error also if it was packed by a filter that
   /// this machine doesn't have
   std::int64_t count_of_whole_numbers(const std::string& path) const;
+  /// Goes through all that HDF5 itself keeps of a list of whole numbers (not through the numbers): where damage would
+  /// end the process, it does so here. For use within isolated_call.
+  void walk_list(const std::string& path) const;
   /// Reads into `values` as many numbers of a list as it has room for, from number `first` on. What T can't hold
   /// becomes the nearest value that it can. @pre they are there
   template <typename T>

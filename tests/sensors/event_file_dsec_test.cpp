@@ -4,7 +4,12 @@
 #include <gtest/gtest.h>
 #include <hdf5.h>
 
+#include <array>
+#include <limits>
+#include <optional>
+
 #include "core/error.h"
+#include "core/whole_file.h"
 #include "sensors/event_file.h"
 #include "tests/sensors/event_vectors.h"
 #include "tests/support/message_of.h"
@@ -149,6 +154,41 @@ TEST_F(DsecEvents, MoreThan32BitsOfMicrosecondsAreRefused) {
   writer.append(std::vector<Event>{{0, 1, 1, true}, {4'294'967'296, 1, 1, true}});
   EXPECT_THAT(message_of([&] { writer.close(); }),
               AllOf(HasSubstr("event 1"), HasSubstr("4294967295"), HasSubstr(".raw")));
+}
+
+TEST_F(DsecEvents, DamageInTheOlderLayoutEndsNoProcess) {
+  // As h5py writes by default: no checksums, and HDF5 1.10 itself crashes on some of these.
+  const hid_t made = H5Fcreate(file_.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
+  const hid_t group = H5Gcreate2(made, "/events", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+  const hid_t creation = H5Pcreate(H5P_DATASET_CREATE);
+  const hsize_t chunk = 2;
+  H5Pset_chunk(creation, 1, &chunk);
+  H5Pset_deflate(creation, 4);
+  const hsize_t count = 3;
+  const hid_t space = H5Screate_simple(1, &count, nullptr);
+  const std::array<std::int32_t, 3> values{0, 1, 1};
+  for (const char* path : {"/events/t", "/events/x", "/events/y", "/events/p"}) {
+    const hid_t dataset = H5Dcreate2(made, path, H5T_STD_U16LE, space, H5P_DEFAULT, creation, H5P_DEFAULT);
+    H5Dwrite(dataset, H5T_NATIVE_INT32, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data());
+    H5Dclose(dataset);
+  }
+  H5Sclose(space);
+  H5Pclose(creation);
+  H5Gclose(group);
+  H5Fclose(made);
+  EXPECT_EQ(read_events(file_).events.size(), 3u);
+  const std::string bytes = read_whole_file(file_);
+  int refused = 0;
+  for (std::size_t i = 0; i < bytes.size(); i += 61) {
+    std::string flipped = bytes;
+    flipped[i] = static_cast<char>(flipped[i] ^ (1 << (i % 8)));
+    const auto file = folder_.write("flipped.h5", flipped);
+    const std::string message = message_of([&] { read_events(file); });
+    if (message == "no error") continue;
+    EXPECT_THAT(message, HasSubstr("flipped.h5"));
+    ++refused;
+  }
+  EXPECT_GT(refused, 5);
 }
 
 TEST_F(DsecEvents, AFilterThatIsntThereIsNamed) {
