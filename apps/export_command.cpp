@@ -1,10 +1,14 @@
+#include <algorithm>
 #include <memory>
 #include <optional>
 
 #include "apps/command.h"
 #include "apps/progress_bar.h"
 #include "core/error.h"
+#include "core/whole_file.h"
 #include "lab/marker_compliance_export.h"
+#include "lab/run_identity.h"
+#include "sensors/event_file.h"
 #include "sensors/marker_compliance_file.h"
 #include "sim/device.h"
 #include "sim/virtual_sensor.h"
@@ -34,10 +38,70 @@ void export_compliance(const ComplianceOptions& options, const GlobalOptions& gl
              compliance.patch_grid.y(), compliance.patch_side);
 }
 
+struct EventOptions {
+  std::filesystem::path in;
+  std::filesystem::path out;
+  int width = 0;
+  int height = 0;
+  std::optional<int> stream;
+};
+
+/// The camera's size is the file's own or the one given, else that which the events themselves reach.
+cv::Size size_of(const EventOptions& options, const sensors::EventReadOptions& how) {
+  sensors::EventReader reader(options.in, how);
+  if (reader.source().size) return *reader.source().size;
+  cv::Size size(1, 1);
+  for (auto portion = reader.next(); !portion.empty(); portion = reader.next()) {
+    for (const Event& event : portion) {
+      size.width = std::max(size.width, event.x + 1);
+      size.height = std::max(size.height, event.y + 1);
+    }
+    if (reader.source().size) return *reader.source().size;
+  }
+  return size;
+}
+
+void export_events(const EventOptions& options) {
+  sensors::event_format_of_name(options.out);
+  require_writable_place(options.out);
+  if (std::error_code none; std::filesystem::equivalent(options.in, options.out, none)) {
+    fail("{}: would be written over while it is read", options.out.string());
+  }
+  sensors::EventReadOptions how;
+  how.stream = options.stream;
+  if ((options.width > 0) != (options.height > 0)) fail("--width and --height: give both or none");
+  if (options.width > 0) how.size = cv::Size(options.width, options.height);
+  const cv::Size size = size_of(options, how);
+  sensors::EventReader reader(options.in, how);
+  write_whole_file(options.out, [&](const std::filesystem::path& temporary) {
+    sensors::EventWriter writer(temporary, size, "touchstone " + lab::program_version());
+    for (auto portion = reader.next(); !portion.empty(); portion = reader.next()) writer.append(portion);
+    writer.close();
+  });
+  const sensors::EventSource& source = reader.source();
+  fmt::print("{}: {} events of {} x {} pixels; left out: {} triggers, {} before the first time and row, {} others\n",
+             options.out.string(), source.events, size.width, size.height, source.triggers, source.unplaced,
+             source.others);
+}
+
+void add_events_command(CLI::App& exports, Action& action) {
+  CLI::App* command = exports.add_subcommand(
+      "events", "Events of a file in another format: .h5 (DSEC), .raw (EVT 3.0), .aedat4, .txt or .csv");
+  auto options = std::make_shared<EventOptions>();
+  command->add_option("IN", options->in, "File of events, a real camera's or a simulated one's")->required();
+  command->add_option("-o,--out", options->out, "The file to write")->required();
+  command->add_option("--width", options->width, "Columns of the camera, where the file doesn't say it")
+      ->check(CLI::PositiveNumber);
+  command->add_option("--height", options->height, "Rows of the camera")->check(CLI::PositiveNumber);
+  command->add_option("--stream", options->stream, "Number of the stream, for .aedat4 files that have several");
+  command->callback([&action, options] { action = [options] { export_events(*options); }; });
+}
+
 }  // namespace
 
 void add_export_command(CLI::App& app, const GlobalOptions& global, Action& action) {
-  CLI::App* exports = app.add_subcommand("export", "Write what estimators need to know of a device");
+  CLI::App* exports =
+      app.add_subcommand("export", "Write what estimators need to know of a device, or events in another format");
   exports->require_subcommand(1);
   exports->fallthrough();
   CLI::App* command = exports->add_subcommand(
@@ -49,6 +113,7 @@ void add_export_command(CLI::App& app, const GlobalOptions& global, Action& acti
                       "Side of the patches on which tractions are sought (default: half of the markers' spacing)");
   command->callback(
       [&action, &global, options] { action = [&global, options] { export_compliance(*options, global); }; });
+  add_events_command(*exports, action);
 }
 
 }  // namespace touchstone::apps

@@ -7,9 +7,9 @@
 #include "apps/progress_bar.h"
 #include "core/error.h"
 #include "core/whole_file.h"
-#include "lab/event_file.h"
 #include "lab/run_identity.h"
 #include "lab/sample_source.h"
+#include "sensors/event_file.h"
 #include "sim/event_picture.h"
 #include "sim/frame_geometry.h"
 #include "sim/gltf_writer.h"
@@ -53,7 +53,7 @@ sim::EventStreamReport write_events(const RenderOptions& options, const sim::Sce
   constexpr std::int64_t kShown_us = 20'000;
   const cv::Size size(scene.device.camera->width, scene.device.camera->height);
   std::vector<Event> shown;
-  std::unique_ptr<lab::EventFileWriter> writer;
+  std::unique_ptr<sensors::EventWriter> writer;
   const auto sink = [&](std::span<const Event> events) {
     if (writer) writer->append(events);
     for (const Event& event : events) {
@@ -68,7 +68,7 @@ sim::EventStreamReport write_events(const RenderOptions& options, const sim::Sce
     report = watch();
   } else {
     write_whole_file(options.events, [&](const std::filesystem::path& temporary) {
-      writer = std::make_unique<lab::EventFileWriter>(temporary, size, lab::program_version());
+      writer = std::make_unique<sensors::EventWriter>(temporary, size, "touchstone " + lab::program_version());
       report = watch();
       writer->close();
     });
@@ -83,7 +83,10 @@ void render(const RenderOptions& options, const GlobalOptions& global) {
   require_ending(options.out, ".png", "the picture's");
   require_ending(options.gltf, ".glb", "the geometry's");
   require_ending(options.truth, ".exr", "the truth's");
-  require_ending(options.events, ".h5", "the events'");
+  if (!options.events.empty()) {
+    sensors::event_format_of_name(options.events);
+    require_writable_place(options.events);
+  }
   require_ending(options.events_picture, ".png", "the events' picture's");
   const bool events = !options.events.empty() || !options.events_picture.empty();
   if (!picture && !truth && !events && options.gltf.empty()) {
@@ -159,7 +162,9 @@ void add_render_command(CLI::App& app, const GlobalOptions& global, Action& acti
   command->add_flag("--exr", options->exr, "Beside it the linear irradiance on the sensor, as .exr (W/m^2 a band)");
   command->add_option("--truth", options->truth,
                       "Depth, normals, ids, contact and flow of each pixel, as layers of one .exr file");
-  command->add_option("--events", options->events, "All events from the first frame to the last: an .h5 file");
+  command->add_option(
+      "--events", options->events,
+      "All events from the first frame to the last: an .h5 (DSEC), .raw (EVT 3.0), .aedat4, .txt or .csv file");
   command->add_option("--events-picture", options->events_picture,
                       "The events of the 20 ms before the frame, ON red and OFF blue: a .png file");
   command->add_option("--gltf", options->gltf, "The frame's geometry for 3D viewers: a .glb file (glTF 2.0)");

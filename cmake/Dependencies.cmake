@@ -127,3 +127,19 @@ endmacro()
 macro(touchstone_need_xxhash)
   touchstone_plain_library(XXHash::XXHash libxxhash-dev xxhash.h xxhash)
 endmacro()
+
+macro(touchstone_need_flatbuffers)
+  touchstone_plain_library(FlatBuffers::Headers libflatbuffers-dev flatbuffers/flatbuffers.h)
+endmacro()
+
+macro(touchstone_need_lz4)
+  touchstone_plain_library(LZ4::LZ4 liblz4-dev lz4frame.h lz4)
+endmacro()
+
+macro(touchstone_need_zstd)
+  touchstone_plain_library(Zstd::Zstd libzstd-dev zstd.h zstd)
+endmacro()
+
+macro(touchstone_need_pugixml)
+  touchstone_plain_library(PugiXML::PugiXML libpugixml-dev pugixml.hpp pugixml)
+endmacro()

@@ -13,11 +13,11 @@
 #include "core/random.h"
 #include "core/sha256.h"
 #include "core/whole_file.h"
-#include "lab/event_file.h"
 #include "lab/manifest.h"
 #include "lab/prepared_job.h"
 #include "lab/run_folder.h"
 #include "lab/truth_file.h"
+#include "sensors/event_file.h"
 #include "sim/image_file.h"
 
 namespace touchstone::lab {
@@ -208,7 +208,7 @@ class Run {
       FrameRecord record;
       record.sample = job_.samples + static_cast<std::int64_t>(i);
       write_whole_file(out_ / name, [&](const fs::path& temporary) {
-        EventFileWriter writer(temporary, {camera.width, camera.height}, program_version());
+        sensors::EventWriter writer(temporary, {camera.width, camera.height}, "touchstone " + program_version());
         const sim::EventStreamReport report = source_.watch_events(
             scene.spec, scene.plan, *gel_, noise_seed, [&](std::span<const Event> events) { writer.append(events); },
             progress_);

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "core/error.h"
-#include "lab/hdf5_file.h"
+#include "core/hdf5_file.h"
 
 namespace touchstone::lab {
 namespace {

@@ -77,7 +77,7 @@ TEST_F(BadInput, EventsOfACameraWithoutEventPixels) {
   const std::string scene = (folder_.path() / "scene.yaml").string();
   expect_refused(run_program({"render", scene, "--events", (folder_.path() / "e.h5").string()}),
                  "no block camera.events");
-  expect_refused(run_program({"render", scene, "--events", (folder_.path() / "e.txt").string()}), ".h5");
+  expect_refused(run_program({"render", scene, "--events", (folder_.path() / "e.bin").string()}), ".aedat4");
   EXPECT_FALSE(fs::exists(folder_.path() / "e.h5"));
 }
 

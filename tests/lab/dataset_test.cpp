@@ -7,13 +7,13 @@
 #include <nlohmann/json.hpp>
 
 #include "core/error.h"
+#include "core/hdf5_file.h"
 #include "core/whole_file.h"
-#include "lab/event_file.h"
 #include "lab/folder_lock.h"
-#include "lab/hdf5_file.h"
 #include "lab/manifest.h"
 #include "lab/run_folder.h"
 #include "lab/truth_file.h"
+#include "sensors/event_file.h"
 #include "tests/lab/fake_source.h"
 #include "tests/support/message_of.h"
 #include "tests/support/small_job.h"
@@ -211,9 +211,9 @@ TEST_F(DataSet, StreamsOfEventsAreWrittenCheckedAndKept) {
                 std::string(test::kSmallScene).replace(std::string(test::kSmallScene).find("radiance"), 8, "events"));
   const auto whole = whole_set();
   EXPECT_EQ(calls_.streams, 2);
-  const EventFile middle = read_event_file(folder_.path() / "whole/events/middle.h5");
-  const EventFile beside = read_event_file(folder_.path() / "whole/events/beside.h5");
-  EXPECT_EQ(middle.size, cv::Size(48, 36));
+  const sensors::EventRecording middle = sensors::read_events(folder_.path() / "whole/events/middle.h5");
+  const sensors::EventRecording beside = sensors::read_events(folder_.path() / "whole/events/beside.h5");
+  EXPECT_EQ(middle.source.size, cv::Size(48, 36));
   ASSERT_EQ(middle.events.size(), 500u);
   EXPECT_EQ(middle.events[203].t_us, 2003);
   EXPECT_EQ(middle.events[203].y, 2);

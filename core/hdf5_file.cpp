@@ -1,8 +1,9 @@
-#include "lab/hdf5_file.h"
+#include "core/hdf5_file.h"
 
 #include <hdf5.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
@@ -10,7 +11,7 @@
 
 #include "core/error.h"
 
-namespace touchstone::lab {
+namespace touchstone {
 namespace {
 
 constexpr std::int64_t kChunkBytes = 256 * 1024;  // well under HDF5's cache of 1 MB a dataset: each is packed once
@@ -61,6 +62,14 @@ Hdf5Id hdf5_type<std::uint8_t>() {
 template <>
 Hdf5Id hdf5_type<std::uint16_t>() {
   return H5T_NATIVE_UINT16;
+}
+template <>
+Hdf5Id hdf5_type<std::uint32_t>() {
+  return H5T_NATIVE_UINT32;
+}
+template <>
+Hdf5Id hdf5_type<std::uint64_t>() {
+  return H5T_NATIVE_UINT64;
 }
 template <>
 Hdf5Id hdf5_type<std::int32_t>() {
@@ -197,6 +206,19 @@ void Hdf5Writer::write_rows(const std::string& path, Hdf5Id type, std::int64_t f
   check_done(H5Dwrite(dataset.id, type, memory, place, H5P_DEFAULT, values), path.c_str());
 }
 
+void Hdf5Writer::write_number(const Hdf5Description& description, std::int64_t value) {
+  const Handle space(check(H5Screate(H5S_SCALAR), "shape"), H5Sclose);
+  const Handle creation(check(H5Pcreate(H5P_DATASET_CREATE), "dataset creation"), H5Pclose);
+  check_done(H5Pset_obj_track_times(creation, 0), "times");
+  make_group_of(description.path);
+  const Handle dataset(
+      check(H5Dcreate2(file_, description.path.c_str(), H5T_STD_I64LE, space, H5P_DEFAULT, creation, H5P_DEFAULT),
+            description.path.c_str()),
+      H5Dclose);
+  check_done(H5Dwrite(dataset, H5T_NATIVE_INT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, &value), description.path.c_str());
+  describe(dataset, description);
+}
+
 void Hdf5Writer::write_texts(const Hdf5Description& description, const std::vector<std::string>& texts) {
   std::size_t longest = 1;
   for (const std::string& text : texts) longest = std::max(longest, text.size());
@@ -275,6 +297,10 @@ bool Hdf5Reader::has(const std::string& path) const {
   return H5Lexists(file_, path.c_str(), H5P_DEFAULT) > 0;
 }
 
+bool Hdf5Reader::has_attribute(const std::string& path, const std::string& name) const {
+  return H5Aexists_by_name(file_, path.c_str(), name.c_str(), H5P_DEFAULT) > 0;
+}
+
 std::vector<std::int64_t> Hdf5Reader::shape_of(const std::string& path, std::size_t& size) const {
   const Handle dataset(H5Dopen2(file_, path.c_str(), H5P_DEFAULT), H5Dclose);
   if (dataset < 0) fail("{}: has no dataset '{}'", name_, path);
@@ -292,6 +318,70 @@ void Hdf5Reader::read_into(const std::string& path, Hdf5Id type, void* values) c
   const Handle dataset(H5Dopen2(file_, path.c_str(), H5P_DEFAULT), H5Dclose);
   if (H5Dread(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) < 0) {
     fail("{}: '{}' can't be read; it isn't of the kind that is needed, or the file is damaged", name_, path);
+  }
+}
+
+void Hdf5Reader::expect_whole_numbers(const std::string& path) const {
+  const Handle dataset(H5Dopen2(file_, path.c_str(), H5P_DEFAULT), H5Dclose);
+  if (dataset < 0) fail("{}: has no dataset '{}'", name_, path);
+  const Handle type(H5Dget_type(dataset), H5Tclose);
+  if (H5Tget_class(type) != H5T_INTEGER) fail("{}: '{}' doesn't hold whole numbers", name_, path);
+  const Handle creation(H5Dget_create_plist(dataset), H5Pclose);
+  const int filters = H5Pget_nfilters(creation);
+  for (int i = 0; i < filters; ++i) {
+    unsigned flags = 0;
+    std::size_t values = 0;
+    std::array<char, 64> called{};
+    unsigned config = 0;
+    const H5Z_filter_t filter = H5Pget_filter2(creation, static_cast<unsigned>(i), &flags, &values, nullptr,
+                                               called.size(), called.data(), &config);
+    if (filter >= 0 && H5Zfilter_avail(filter) > 0) continue;
+    called.back() = '\0';
+    fail(
+        "{}: '{}' is packed by HDF5's filter {} ('{}'), which isn't on this machine. Plugins bring it: Blosc (32001) "
+        "is "
+        "Debian's hdf5-filter-plugin-blosc-serial; HDF5_PLUGIN_PATH names the folder that they are in",
+        name_, path, static_cast<int>(filter), called.data());
+  }
+}
+
+std::int64_t Hdf5Reader::read_number(const std::string& path) const {
+  expect_whole_numbers(path);
+  std::size_t count = 0;
+  shape_of(path, count);
+  if (count != 1) fail("{}: '{}' holds {} numbers; allowed is one", name_, path, count);
+  std::int64_t value = 0;
+  read_into(path, H5T_NATIVE_INT64, &value);
+  return value;
+}
+
+std::int64_t Hdf5Reader::count_of_whole_numbers(const std::string& path) const {
+  expect_whole_numbers(path);
+  std::size_t count = 0;
+  const std::vector<std::int64_t> shape = shape_of(path, count);
+  if (shape.size() != 1) fail("{}: '{}' has {} axes; allowed is one", name_, path, shape.size());
+  return shape[0];
+}
+
+void Hdf5Reader::walk_list(const std::string& path) const {
+  if (count_of_whole_numbers(path) == 0) return;
+  const Handle dataset(H5Dopen2(file_, path.c_str(), H5P_DEFAULT), H5Dclose);
+  H5Dget_storage_size(dataset);  // visits every entry of the index of chunks
+  std::int64_t first = 0;
+  read_list_part(path, H5T_NATIVE_INT64, 0, 1, &first);  // and every filter
+}
+
+void Hdf5Reader::read_list_part(const std::string& path, Hdf5Id type, std::int64_t first, std::int64_t count,
+                                void* values) const {
+  if (count == 0) return;
+  const Handle dataset(H5Dopen2(file_, path.c_str(), H5P_DEFAULT), H5Dclose);
+  const Handle place(H5Dget_space(dataset), H5Sclose);
+  const auto start = static_cast<hsize_t>(first);
+  const auto extent = static_cast<hsize_t>(count);
+  const Handle memory(H5Screate_simple(1, &extent, nullptr), H5Sclose);
+  if (H5Sselect_hyperslab(place, H5S_SELECT_SET, &start, nullptr, &extent, nullptr) < 0 ||
+      H5Dread(dataset, type, memory, place, H5P_DEFAULT, values) < 0) {
+    fail("{}: numbers {} to {} of '{}' can't be read; the file is damaged", name_, first, first + count - 1, path);
   }
 }
 
@@ -337,4 +427,4 @@ std::int64_t Hdf5Reader::integer_attribute(const std::string& path, const std::s
   return value;
 }
 
-}  // namespace touchstone::lab
+}  // namespace touchstone

@@ -1,4 +1,4 @@
-#include "lab/hdf5_file.h"
+#include "core/hdf5_file.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include "core/whole_file.h"
 #include "tests/support/temporary_folder.h"
 
-namespace touchstone::lab {
+namespace touchstone {
 namespace {
 
 constexpr std::int64_t kRows = 700;  // several chunks
@@ -120,4 +120,4 @@ TEST(Hdf5File, AFolderThatIsntThereIsAnError) {
 }
 
 }  // namespace
-}  // namespace touchstone::lab
+}  // namespace touchstone

@@ -9,12 +9,12 @@
 #include <string>
 #include <vector>
 
-namespace touchstone::lab {
+namespace touchstone {
 
 /// HDF5's own handle (hid_t), without its header.
 using Hdf5Id = std::int64_t;
 
-/// The HDF5 type that holds a C++ one: std::uint8_t, std::uint16_t, std::int32_t, std::int64_t, float, double.
+/// The HDF5 type that holds a C++ one: std::uint8_t, 16, 32, 64, std::int32_t, 64, float, double.
 template <typename T>
 Hdf5Id hdf5_type();
 
@@ -63,6 +63,8 @@ class Hdf5Writer {
   void append(const std::string& path, std::span<const T> values) {
     append_numbers(path, hdf5_type<T>(), values.data(), static_cast<std::int64_t>(values.size()));
   }
+  /// One whole number, as a dataset without axes.
+  void write_number(const Hdf5Description& description, std::int64_t value);
   /// A list of texts, as one dataset of texts of equal length, padded with zeros.
   void write_texts(const Hdf5Description& description, const std::vector<std::string>& texts);
   /// An attribute of the file itself.
@@ -119,18 +121,35 @@ class Hdf5Reader {
     read_into(path, hdf5_type<T>(), array.values.data());
     return array;
   }
+  /// The one whole number of a dataset.
+  std::int64_t read_number(const std::string& path) const;
+  /// How many numbers a list of whole numbers of any size holds. @throws Error also if it was packed by a filter that
+  /// this machine doesn't have
+  std::int64_t count_of_whole_numbers(const std::string& path) const;
+  /// Goes through all that HDF5 itself keeps of a list of whole numbers (not through the numbers): where damage would
+  /// end the process, it does so here. For use within isolated_call.
+  void walk_list(const std::string& path) const;
+  /// Reads into `values` as many numbers of a list as it has room for, from number `first` on. What T can't hold
+  /// becomes the nearest value that it can. @pre they are there
+  template <typename T>
+  void read_part(const std::string& path, std::int64_t first, std::span<T> values) const {
+    read_list_part(path, hdf5_type<T>(), first, static_cast<std::int64_t>(values.size()), values.data());
+  }
   std::vector<std::string> read_texts(const std::string& path) const;
   /// A text attribute of a dataset, or of the file if `path` is "/".
   std::string text_attribute(const std::string& path, const std::string& name) const;
   std::int64_t integer_attribute(const std::string& path, const std::string& name) const;
   bool has(const std::string& path) const;
+  bool has_attribute(const std::string& path, const std::string& name) const;
 
  private:
   std::vector<std::int64_t> shape_of(const std::string& path, std::size_t& size) const;
   void read_into(const std::string& path, Hdf5Id type, void* values) const;
+  void read_list_part(const std::string& path, Hdf5Id type, std::int64_t first, std::int64_t count, void* values) const;
+  void expect_whole_numbers(const std::string& path) const;
 
   std::string name_;
   Hdf5Id file_ = -1;
 };
 
-}  // namespace touchstone::lab
+}  // namespace touchstone
