@@ -6,7 +6,7 @@
 #include <algorithm>
 
 #include "core/whole_file.h"
-#include "lab/event_file.h"
+#include "sensors/event_file.h"
 #include "tests/apps/run_program.h"
 #include "tests/support/temporary_folder.h"
 
@@ -29,8 +29,8 @@ TEST(RecordCommand, WritesEventsAndForcesOfEachGrasp) {
   EXPECT_THAT(table, HasSubstr("grasp-00,foam,"));
   EXPECT_THAT(table, HasSubstr("grasp-01,silicone,"));
   for (const char* name : {"grasp-00", "grasp-01"}) {
-    const lab::EventFile events = lab::read_event_file(out / (std::string(name) + ".h5"));
-    EXPECT_EQ(events.size, cv::Size(240, 180));
+    const sensors::EventRecording events = sensors::read_events(out / (std::string(name) + ".h5"));
+    EXPECT_EQ(events.source.size, cv::Size(240, 180));
     EXPECT_GT(events.events.size(), 3000u);
     EXPECT_TRUE(std::is_sorted(events.events.begin(), events.events.end(),
                                [](const Event& a, const Event& b) { return a.t_us < b.t_us; }));
