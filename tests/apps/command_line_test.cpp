@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/whole_file.h"
 #include "tests/apps/run_program.h"
 #include "tests/support/small_job.h"
 
@@ -102,6 +103,24 @@ TEST_F(BadInput, RenderWritesTheEventsOfAScene) {
   EXPECT_THAT(run.err, HasSubstr("events from"));
   EXPECT_TRUE(fs::exists(file));
   EXPECT_TRUE(fs::exists(picture));
+}
+
+TEST_F(BadInput, ExportTurnsEventsIntoAnotherFormat) {
+  const std::string in = folder_.write("in.txt", "0.5 3 4 1\n0.75 639 479 0\n").string();
+  const auto at = [&](const char* name) { return (folder_.path() / name).string(); };
+  EXPECT_EQ(run_program({"export", "events", in, "-o", at("e.raw")}).exit_code, 0);
+  EXPECT_EQ(run_program({"export", "events", at("e.raw"), "-o", at("e.aedat4")}).exit_code, 0);
+  EXPECT_EQ(run_program({"export", "events", at("e.aedat4"), "-o", at("e.h5")}).exit_code, 0);
+  const ProgramRun run = run_program({"export", "events", at("e.h5"), "-o", at("e.csv")});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("2 events of 640 x 480 pixels"));
+  EXPECT_THAT(read_whole_file(at("e.csv")), HasSubstr("\nt_us,x,y,p\n500000,3,4,1\n750000,639,479,0\n"));
+  expect_refused(run_program({"export", "events", in, "-o", at("e.mp4")}), ".aedat4");
+  expect_refused(run_program({"export", "events", in, "-o", in}), "written over");
+  expect_refused(run_program({"export", "events", in, "-o", at("x.raw"), "--width", "640"}), "give both or none");
+  expect_refused(run_program({"export", "events", in, "-o", at("x.raw"), "--width", "64", "--height", "48"}),
+                 "columns 0 to 63");
+  EXPECT_FALSE(fs::exists(at("x.raw")));
 }
 
 TEST_F(BadInput, MissingSceneFiles) {

@@ -108,6 +108,30 @@ TEST(Hdf5File, SaysWhatItCantRead) {
   EXPECT_THROW(reader.text_attribute("/field", "none"), Error);
 }
 
+TEST(Hdf5File, ListsOfWholeNumbersAreReadInParts) {
+  const test::TemporaryFolder folder;
+  {
+    Hdf5Writer writer(folder.path() / "a.h5");
+    writer.write<std::uint32_t>({"/list", "us", "events", "", "Numbers."}, 3, {},
+                                std::vector<std::uint32_t>{1, 4'000'000'000, 3});
+    writer.write_number({"/offset", "us", "", "", "One number."}, -5);
+    writer.write<double>({"/real", "us", "events", "", "Not whole."}, 1, {}, std::vector<double>{0.5});
+    writer.close();
+  }
+  const Hdf5Reader reader(folder.path() / "a.h5");
+  EXPECT_EQ(reader.count_of_whole_numbers("/list"), 3);
+  std::vector<std::int64_t> part(2);
+  reader.read_part<std::int64_t>("/list", 1, part);
+  EXPECT_EQ(part, (std::vector<std::int64_t>{4'000'000'000, 3}));
+  EXPECT_EQ(reader.read_number("/offset"), -5);
+  EXPECT_NO_THROW(reader.walk_list("/list"));
+  EXPECT_THROW(reader.read_number("/list"), Error) << "three";
+  EXPECT_THROW(reader.read_number("/real"), Error);
+  EXPECT_THROW(reader.count_of_whole_numbers("/none"), Error);
+  EXPECT_THROW(reader.count_of_whole_numbers("/offset"), Error) << "no list";
+  EXPECT_THROW(reader.read_part<std::int64_t>("/list", 2, part), Error) << "beyond the end";
+}
+
 TEST(Hdf5File, ABrokenOffFileIsRefused) {
   const test::TemporaryFolder folder;
   write_file(folder.path() / "a.h5");
