@@ -39,10 +39,10 @@ std::optional<double> least_change_of(const Eigen::VectorXd& estimate, const Eig
   return releasing ? std::min(*grasping, *releasing) : *grasping;
 }
 
-DvsForceScore test_forces(std::span<const DvsSequence> sequences, const DvsForceSettings& settings, bool with_time,
+DvsForceScore test_forces(std::span<const DvsSequence> sequences, const DvsForceSettings& settings, DvsInputs inputs,
                           const Trainer& train, const Progress& progress) {
   if (settings.every < 1) fail("dvs force: every {} folds; it must be at least 1", settings.every);
-  const std::vector<sensors::ForceSeries> series = force_series_of(sequences, settings.learned, with_time);
+  const std::vector<sensors::ForceSeries> series = force_series_of(sequences, settings.learned, inputs);
   std::vector<double> peaks;
   for (const DvsSequence& sequence : sequences) peaks.push_back(sequence.measured_N.maxCoeff());
   const std::vector<sensors::Fold> folds = sensors::folds_by_level(peaks, settings.validation, settings.seed);
@@ -119,11 +119,11 @@ DvsForceScore test_force_networks(std::span<const DvsSequence> sequences,
             },
             steps};
   };
-  return test_forces(sequences, settings, false, train, progress);
+  return test_forces(sequences, settings, DvsInputs::counts, train, progress);
 }
 
 DvsForceScore test_force_processes(std::span<const DvsSequence> sequences, const sensors::TuningSettings& tuning,
-                                   const DvsForceSettings& settings, const Progress& progress) {
+                                   const DvsForceSettings& settings, const Progress& progress, DvsInputs inputs) {
   const Trainer train = [&](std::span<const sensors::ForceSeries> series, const sensors::Fold& fold) -> Trained {
     const sensors::StackedSeries training = sensors::stack(series, fold.training);
     const sensors::StackedSeries validation = sensors::stack(series, fold.validation);
@@ -135,7 +135,7 @@ DvsForceScore test_force_processes(std::span<const DvsSequence> sequences, const
             },
             steps};
   };
-  return test_forces(sequences, settings, true, train, progress);
+  return test_forces(sequences, settings, inputs, train, progress);
 }
 
 }  // namespace touchstone::lab

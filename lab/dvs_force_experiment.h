@@ -51,8 +51,9 @@ DvsForceScore test_force_networks(std::span<const DvsSequence> sequences,
                                   const sensors::TimeDelayNetworkSettings& network, const DvsForceSettings& settings,
                                   const Progress& progress = {});
 
-/// Gaussian processes on ON, OFF and time, tuned in each fold. @throws Error likewise
+/// Gaussian processes on ON, OFF and time, or what else is asked for, tuned in each fold. @throws Error likewise
 DvsForceScore test_force_processes(std::span<const DvsSequence> sequences, const sensors::TuningSettings& tuning,
-                                   const DvsForceSettings& settings, const Progress& progress = {});
+                                   const DvsForceSettings& settings, const Progress& progress = {},
+                                   DvsInputs inputs = DvsInputs::counts_and_time);
 
 }  // namespace touchstone::lab

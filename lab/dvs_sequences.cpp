@@ -129,12 +129,16 @@ DvsSequences dvs_sequences(std::span<const DvsRecording> recordings, const DvsSe
 }
 
 std::vector<sensors::ForceSeries> force_series_of(std::span<const DvsSequence> sequences, DvsForce force,
-                                                  bool with_time) {
+                                                  DvsInputs inputs) {
   std::vector<sensors::ForceSeries> all;
   for (const DvsSequence& sequence : sequences) {
     sensors::ForceSeries& series = all.emplace_back();
-    series.features = sequence.windows.counts;
-    if (with_time) {
+    if (inputs == DvsInputs::time) {
+      series.features = sequence.windows.time_s;
+    } else {
+      series.features = sequence.windows.counts;
+    }
+    if (inputs == DvsInputs::counts_and_time) {
       series.features.conservativeResize(Eigen::NoChange, 3);
       series.features.col(2) = sequence.windows.time_s;
     }

@@ -61,9 +61,15 @@ DvsSequences dvs_sequences(std::span<const DvsRecording> recordings, const DvsSe
 /// Which force is learned.
 enum class DvsForce { measured, truth };
 
-/// For networks: ON and OFF; for Gaussian processes (text III.D) time beside them.
+/// What estimators are given of a window.
+enum class DvsInputs {
+  counts,           ///< accumulated ON and OFF: networks
+  counts_and_time,  ///< Gaussian processes (text III.D)
+  time,             ///< a control: what can be told without having seen anything but the touch
+};
+
 std::vector<sensors::ForceSeries> force_series_of(std::span<const DvsSequence> sequences, DvsForce force,
-                                                  bool with_time);
+                                                  DvsInputs inputs);
 
 /// For the classifier: accumulated ON and OFF of the judged windows, or in their place the measured force of those.
 std::vector<sensors::MaterialSample> event_samples(std::span<const DvsSequence> sequences);

@@ -140,6 +140,9 @@ TEST(DvsForceExperiment, LearnsALawThatOnlyTheMaterialsBlur) {
   ASSERT_EQ(one.folds.size(), 12u);
   EXPECT_LT(one.mean(&DvsForceFold::test_mse), 0.01) << "OFF less ON over 4000 is the force";
   EXPECT_EQ(one.mean(&DvsForceFold::test_mse), one.mean(&DvsForceFold::true_mse));
+  // Time alone can't tell how hard each one is pressed: a variance of some (0.25 N)^2 (36 - 1) / 12 in the hold.
+  const DvsForceScore clock = test_force_processes(dvs_sequences(alike).seen, tuning, settings, {}, DvsInputs::time);
+  EXPECT_GT(clock.mean(&DvsForceFold::test_mse), 5.0 * one.mean(&DvsForceFold::test_mse));
   sensors::TimeDelayNetworkSettings network;
   network.hidden_layers = 1;
   network.units = 5;
