@@ -62,7 +62,7 @@ TEST(TimeDelayNetwork, LearnsForceFromCounts) {
   for (int i = 0; i < 16; ++i) series.push_back(synthetic_series(synthetic_grasp(i, 1), false));
   const TrainedTimeDelayNetwork trained =
       train_time_delay_network(series, range(0, 12), range(12, 15), small_settings());
-  EXPECT_EQ(fault_of(trained.model), "no error");
+  EXPECT_EQ(fault_of(trained.model), "");
   const StackedSeries all = stack(series, range(0, 15));
   const double variance = (all.force_N.array() - all.force_N.mean()).square().mean();
   const Eigen::VectorXd estimate = estimate_force(trained.model, series[15].features);
