@@ -29,33 +29,39 @@ std::span<const DvsMaterial> dvs_materials() {
   return all;
 }
 
-DvsGraspParameters draw_dvs_grasp(int material, const sim::ObjectSpec& piece, std::uint64_t seed, std::uint64_t index) {
+DvsGraspParameters draw_dvs_grasp(int material, const sim::ObjectSpec& piece, std::uint64_t seed, std::uint64_t index,
+                                  const DvsSpread& spread) {
   if (material < 0 || material >= static_cast<int>(dvs_materials().size())) {
     fail("material {} is asked for, there are {}", material, dvs_materials().size());
   }
+  for (const double part : {spread.force, spread.bench, spread.pose}) {
+    if (!(part >= 0.0 && part <= 1.0)) fail("a part of {} of the grasps' spread is asked for, 0 to 1 can be", part);
+  }
   const DvsMaterial& of = dvs_materials()[static_cast<std::size_t>(material)];
   RandomStream numbers(seed, index, Purpose::kGrasp);
-  const auto even = [&](double low, double high) { return low + (high - low) * numbers.uniform(); };
+  const auto even = [&](double low, double high, double part = 1.0) {
+    return low + (high - low) * (0.5 + part * (numbers.uniform() - 0.5));
+  };
   const auto normal = [&](double deviation) { return deviation * std::clamp(numbers.normal(), -kCut, kCut); };
   DvsGraspParameters p;
   p.material = material;
-  p.pose.place_mm.x() = even(-1.0, 1.0);
-  p.pose.place_mm.y() = even(-2.0, 2.0);
-  p.pose.yaw_deg = normal(1.5);
-  p.pose.pitch_deg = normal(0.06);
-  p.pose.roll_deg = normal(0.1);
+  p.pose.place_mm.x() = even(-1.0, 1.0, spread.pose);
+  p.pose.place_mm.y() = even(-2.0, 2.0, spread.pose);
+  p.pose.yaw_deg = spread.pose * normal(1.5);
+  p.pose.pitch_deg = spread.pose * normal(0.06);
+  p.pose.roll_deg = spread.pose * normal(0.1);
   const double modulus_factor = std::exp(normal(of.modulus_spread));
   p.youngs_modulus_MPa = piece.elastic ? piece.elastic->youngs_modulus_MPa * modulus_factor : 0.0;
   p.friction = even(0.5, 1.2);
   p.rms_slope = std::hypot(kMembraneSlope, of.rms_slope) * even(0.9, 1.1);
-  p.motion.clearance_mm = even(0.6, 1.4);
-  p.motion.target_force_N = even(0.3, 3.5);
-  p.motion.closing_mm_s = even(13.0, 20.0);
-  p.motion.opening_mm_s = even(30.0, 60.0);
-  p.finger.ring_Hz = even(20.0, 32.0);
-  p.finger.damping = even(0.07, 0.15);
-  p.finger.shake_um = even(1.0, 5.0);
-  p.light_level = even(0.8, 1.25);
+  p.motion.clearance_mm = even(0.6, 1.4, spread.pose);
+  p.motion.target_force_N = even(0.3, 3.5, spread.force);
+  p.motion.closing_mm_s = even(13.0, 20.0, spread.bench);
+  p.motion.opening_mm_s = even(30.0, 60.0, spread.bench);
+  p.finger.ring_Hz = even(20.0, 32.0, spread.bench);
+  p.finger.damping = even(0.07, 0.15, spread.bench);
+  p.finger.shake_um = even(1.0, 5.0, spread.bench);
+  p.light_level = even(0.8, 1.25, spread.bench);
   p.noise_seed = seed * kSeedsApart + index;
   p.motion.shake_seed = p.noise_seed;
   return p;
@@ -72,11 +78,11 @@ DvsGraspBench::DvsGraspBench(const std::filesystem::path& scenes, const std::fil
   }
 }
 
-std::vector<DvsGraspParameters> DvsGraspBench::draw(std::uint64_t seed) const {
+std::vector<DvsGraspParameters> DvsGraspBench::draw(std::uint64_t seed, const DvsSpread& spread) const {
   std::vector<DvsGraspParameters> all;
   for (int material = 0; material < static_cast<int>(pieces_.size()); ++material) {
     for (int k = 0; k < dvs_materials()[static_cast<std::size_t>(material)].grasps; ++k) {
-      all.push_back(draw_dvs_grasp(material, piece(material), seed, all.size()));
+      all.push_back(draw_dvs_grasp(material, piece(material), seed, all.size(), spread));
     }
   }
   return all;

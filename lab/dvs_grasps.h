@@ -45,13 +45,24 @@ struct DvsGraspParameters {
   std::uint64_t noise_seed = 0;  ///< for all that is random in it: sensor, camera
 };
 
-/// What the text leaves open is drawn evenly or, with (s), normally with that deviation, cut at 2.5 of them:
-/// place x +-1, y +-2 mm; yaw (1.5), pitch (0.06), roll (0.1 degrees: what the fingers' alignment leaves once the
-/// silicone on both has given way); ln E (the material's); friction 0.5 to 1.2; roughness 0.9 to 1.1 times; clearance
-/// 0.6 to 1.4 mm; force wanted 0.3 to 3.5 N (the servo's steps make 0.15 to 3.7 N of it); closing 13 to 20 mm/s,
-/// opening 30 to 60 mm/s; ring 20 to 32 Hz, damping 0.07 to 0.15, bench motion 1 to 5 um; light 0.8 to 1.25 times. A
-/// pure function of seed, index and what is given.
-DvsGraspParameters draw_dvs_grasp(int material, const sim::ObjectSpec& piece, std::uint64_t seed, std::uint64_t index);
+/// How much of what draw_dvs_grasp can draw is drawn, about the middle of it: 1 all, 0 nothing.
+struct DvsSpread {
+  double force = 1.0;  ///< wanted
+  double pose = 1.0;   ///< place, yaw, pitch, roll and clearance: a piece is put in by hand
+  /// Speeds, ring and damping, the bench's motion, light. The text's grasps are one gripper's, in one room, under one
+  /// program; 1 is as many benches as grasps.
+  double bench = 0.1;
+};
+
+/// What the text leaves open is drawn evenly or, with (s), normally with that deviation, cut at 2.5 of them. Force
+/// wanted 0.3 to 3.5 N (the servo's steps make 0.15 to 3.7 N of it). Pose: place x +-1, y +-2 mm; yaw (1.5), pitch
+/// (0.06), roll (0.1 degrees: what the fingers' alignment leaves once the silicone on both has given way), clearance
+/// 0.6 to 1.4 mm. Piece and face, always in full: ln E (the material's); friction 0.5 to 1.2; roughness 0.9 to 1.1
+/// times. Bench: closing 13 to 20 mm/s, opening 30 to 60 mm/s; ring 20 to 32 Hz, damping 0.07 to 0.15, motion 1 to 5
+/// um; light 0.8 to 1.25 times. A pure function of seed, index and what is given.
+/// @throws Error for a material that isn't there, or a spread that isn't 0 to 1
+DvsGraspParameters draw_dvs_grasp(int material, const sim::ObjectSpec& piece, std::uint64_t seed, std::uint64_t index,
+                                  const DvsSpread& spread = {});
 
 struct DvsGrasp {
   DvsGraspParameters parameters;
@@ -70,7 +81,8 @@ class DvsGraspBench {
   const sim::ObjectSpec& piece(int material) const { return pieces_[static_cast<std::size_t>(material)]; }
 
   /// All 48, material by material.
-  std::vector<DvsGraspParameters> draw(std::uint64_t seed) const;
+  /// @throws Error as draw_dvs_grasp
+  std::vector<DvsGraspParameters> draw(std::uint64_t seed, const DvsSpread& spread = {}) const;
   /// @throws Error as its parts do
   DvsGrasp play(const DvsGraspParameters& parameters, const sim::ReferenceForceSensorSettings& sensor = {},
                 const sim::GrippedFaceSettings& face = {}) const;

@@ -13,13 +13,11 @@ namespace {
 constexpr std::uint64_t kSeed = 4801;  // choices were made on the grasps of 4701
 constexpr double kWatched_s = 0.2;
 constexpr int kQuickGrasps = 4;
-constexpr double kLeastForce_N = 0.3, kMostForce_N = 3.5;  // of draw_dvs_grasp
-constexpr double kOneForce_N = 2.0, kOneForceWidth_N = 0.4;
 
-std::vector<DvsGraspParameters> grasps_of(const DvsGraspBench& bench, bool quick) {
+std::vector<DvsGraspParameters> grasps_of(const DvsGraspBench& bench, bool quick, const DvsSpread& spread = {}) {
   std::vector<DvsGraspParameters> chosen;
   std::array<int, 4> of_each{};
-  for (DvsGraspParameters grasp : bench.draw(kSeed)) {
+  for (DvsGraspParameters grasp : bench.draw(kSeed, spread)) {
     if (quick && ++of_each.at(static_cast<std::size_t>(grasp.material)) > kQuickGrasps) continue;
     grasp.motion.rest_s = kWatched_s;
     chosen.push_back(grasp);
@@ -58,16 +56,12 @@ DvsRecordings dvs_row_recordings(const ValidateOptions& options) {
   });
 }
 
-DvsRecordings dvs_one_force_recordings(const ValidateOptions& options) {
-  return kept("one force " + options.scenes.string(), [&] {
+DvsRecordings dvs_alike_recordings(const ValidateOptions& options, const std::string& name, const DvsSpread& spread) {
+  return kept(name + " " + options.scenes.string(), [&] {
     const DvsGraspBench bench(options.scenes, options.cache);
     const sim::MembraneCamera camera(bench.device());
-    std::vector<DvsGraspParameters> grasps = grasps_of(bench, false);
-    for (DvsGraspParameters& grasp : grasps) {
-      const double part = (grasp.motion.target_force_N - kLeastForce_N) / (kMostForce_N - kLeastForce_N);
-      grasp.motion.target_force_N = kOneForce_N + kOneForceWidth_N * (part - 0.5);
-    }
-    return record_dvs_grasps(bench, camera, grasps, own_pixels(bench.device()), options.progress);
+    return record_dvs_grasps(bench, camera, grasps_of(bench, false, spread), own_pixels(bench.device()),
+                             options.progress);
   });
 }
 

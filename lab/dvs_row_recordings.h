@@ -3,6 +3,7 @@
 
 #include <array>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "lab/dvs_recordings.h"
@@ -30,7 +31,7 @@ using DvsRecordings = std::shared_ptr<const std::vector<DvsRecording>>;
 /// watches for 0.2 s before the servo moves. Made once, kept as long as the program runs. @throws Error as its parts
 DvsRecordings dvs_row_recordings(const ValidateOptions& options);
 
-/// The same 48, but all pressed alike (1.8 to 2.2 N wanted), seen by the first kind.
-DvsRecordings dvs_one_force_recordings(const ValidateOptions& options);
+/// The same 48, but more alike, seen by the first kind. `name` tells one spread from another.
+DvsRecordings dvs_alike_recordings(const ValidateOptions& options, const std::string& name, const DvsSpread& spread);
 
 }  // namespace touchstone::lab
