@@ -74,7 +74,7 @@ void export_events(const EventOptions& options) {
   const cv::Size size = size_of(options, how);
   sensors::EventReader reader(options.in, how);
   write_whole_file(options.out, [&](const std::filesystem::path& temporary) {
-    sensors::EventWriter writer(temporary, size, "touchstone " + lab::program_version());
+    sensors::EventWriter writer(temporary, size, lab::program_name());
     for (auto portion = reader.next(); !portion.empty(); portion = reader.next()) writer.append(portion);
     writer.close();
   });

@@ -41,7 +41,9 @@ Progress ProgressBar::listener() {
 void ProgressBar::show(const std::string& stage, std::int64_t done, std::int64_t total) {
   const std::lock_guard<std::mutex> lock(mutex_);
   const Clock::time_point now = Clock::now();
-  if (stage != stage_) {
+  // A stage may come again, as folds do: threads report out of order, but not by half of all.
+  const bool again = total != total_ || (done_ >= total_ && 2 * done < total_);
+  if (stage != stage_ || again) {
     end_stage();
     stage_ = stage;
     done_ = 0;

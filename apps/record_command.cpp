@@ -72,7 +72,7 @@ void record_dvs(const DvsOptions& options, const GlobalOptions& global) {
   for (std::size_t k = 0; k < grasps.size(); ++k) {
     const std::string name = fmt::format("grasp-{:02}", k);
     write_whole_file(options.out / (name + ".h5"), [&](const std::filesystem::path& temporary) {
-      sensors::EventWriter writer(temporary, size, "touchstone " + lab::program_version());
+      sensors::EventWriter writer(temporary, size, lab::program_name());
       const lab::DvsRecording recording =
           lab::record_dvs_grasp(bench, camera, grasps[k], lab::own_pixels(bench.device()),
                                 [&](std::span<const Event> events) { writer.append(events); });

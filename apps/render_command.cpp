@@ -68,7 +68,7 @@ sim::EventStreamReport write_events(const RenderOptions& options, const sim::Sce
     report = watch();
   } else {
     write_whole_file(options.events, [&](const std::filesystem::path& temporary) {
-      writer = std::make_unique<sensors::EventWriter>(temporary, size, "touchstone " + lab::program_version());
+      writer = std::make_unique<sensors::EventWriter>(temporary, size, lab::program_name());
       report = watch();
       writer->close();
     });

@@ -50,7 +50,7 @@ void refuse_unknown_command(const CLI::App& app, int argc, char** argv) {
 
 int run(int argc, char** argv) {
   CLI::App app("Simulates vision-based tactile sensors and tests their estimators against known forces.", "touchstone");
-  app.set_version_flag("--version", "touchstone " + lab::program_version());
+  app.set_version_flag("--version", lab::program_name());
   app.require_subcommand(1);
   app.fallthrough();
   GlobalOptions global;

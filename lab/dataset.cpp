@@ -208,7 +208,7 @@ class Run {
       FrameRecord record;
       record.sample = job_.samples + static_cast<std::int64_t>(i);
       write_whole_file(out_ / name, [&](const fs::path& temporary) {
-        sensors::EventWriter writer(temporary, {camera.width, camera.height}, "touchstone " + program_version());
+        sensors::EventWriter writer(temporary, {camera.width, camera.height}, program_name());
         const sim::EventStreamReport report = source_.watch_events(
             scene.spec, scene.plan, *gel_, noise_seed, [&](std::span<const Event> events) { writer.append(events); },
             progress_);

@@ -23,6 +23,10 @@ std::string program_version() {
   return TOUCHSTONE_VERSION;
 }
 
+std::string program_name() {
+  return "touchstone " + program_version();
+}
+
 RunIdentity identity_of(const PreparedJob& job) {
   RunIdentity identity;
   identity.job_sha256 = sha256_of(job.text);

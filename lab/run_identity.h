@@ -17,6 +17,8 @@ struct RunIdentity {
 
 /// This program's version, as in CMakeLists.txt.
 std::string program_version();
+/// "touchstone 0.1.0": what files and the command call it.
+std::string program_name();
 
 RunIdentity identity_of(const PreparedJob& job);
 

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <ctime>
 #include <limits>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
@@ -33,11 +32,6 @@ constexpr double kSpeedOverV2e = 5.0;                  // issue 7 of this projec
 constexpr double kAllowedCore_s = 20 * 60 * 4 / 48.0;  // 48 grasps in 20 minutes of four cores
 constexpr double kWettedHalf = 0.5;                    // of a cell
 constexpr double kSure = 3.0;                          // standard errors
-
-/// Seconds of all cores that this process has worked.
-double core_seconds() {
-  return static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
-}
 
 render::EventPixelSettings without_noise(render::EventPixelSettings pixels) {
   pixels.threshold_spread = pixels.leak_rate_hz = pixels.shot_rate_hz = pixels.bandwidth_hz = 0.0;
