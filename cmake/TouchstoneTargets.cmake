@@ -23,6 +23,11 @@ if(TOUCHSTONE_SANITIZE)
   target_link_options(touchstone_options INTERFACE $<BUILD_INTERFACE:-fsanitize=${TOUCHSTONE_SANITIZE}>)
 endif()
 
+# Two precompiled headers, one for libraries and one for tests: positions and macros differ. Outside headers only, so that a
+# change in the house recompiles what it did before. A file must still name what it needs: builds with ccache have none.
+set(TOUCHSTONE_PCH_HEADERS <algorithm> <array> <cmath> <cstdint> <filesystem> <functional> <limits> <memory> <optional>
+  <span> <string> <utility> <vector> <Eigen/Core> <Eigen/Geometry> <Eigen/LU> <fmt/format.h> <opencv2/core.hpp>)
+
 function(touchstone_library name)
   add_library(touchstone_${name} STATIC ${ARGN})
   add_library(Touchstone::${name} ALIAS touchstone_${name})
@@ -33,6 +38,13 @@ function(touchstone_library name)
   target_link_libraries(touchstone_${name} PRIVATE $<BUILD_INTERFACE:touchstone_options>)
   target_compile_features(touchstone_${name} PUBLIC cxx_std_20)
   set_property(GLOBAL APPEND PROPERTY TOUCHSTONE_LIBRARIES touchstone_${name})
+  if(TOUCHSTONE_PCH)
+    if(name STREQUAL core OR name STREQUAL render)  # render has flags of its own
+      target_precompile_headers(touchstone_${name} PRIVATE ${TOUCHSTONE_PCH_HEADERS})
+    else()
+      target_precompile_headers(touchstone_${name} REUSE_FROM touchstone_core)
+    endif()
+  endif()
 endfunction()
 
 function(touchstone_test name)
@@ -43,6 +55,16 @@ function(touchstone_test name)
   target_include_directories(${name} PRIVATE "${PROJECT_SOURCE_DIR}")
   target_compile_definitions(${name} PRIVATE
     TOUCHSTONE_SOURCE_DIR="${PROJECT_SOURCE_DIR}" TOUCHSTONE_BINARY_DIR="${PROJECT_BINARY_DIR}")
+  if(TOUCHSTONE_PCH)
+    if(NOT TARGET touchstone_test_pch)
+      add_library(touchstone_test_pch OBJECT "${PROJECT_SOURCE_DIR}/cmake/pch.cpp")
+      target_link_libraries(touchstone_test_pch PRIVATE touchstone_core GTest::gtest GTest::gmock touchstone_options)
+      set_target_properties(touchstone_test_pch PROPERTIES POSITION_INDEPENDENT_CODE OFF)
+      target_compile_options(touchstone_test_pch PRIVATE -fPIE)
+      target_precompile_headers(touchstone_test_pch PRIVATE ${TOUCHSTONE_PCH_HEADERS} <gmock/gmock.h> <gtest/gtest.h>)
+    endif()
+    target_precompile_headers(${name} REUSE_FROM touchstone_test_pch)
+  endif()
   # One process a program: what its tests share is set up once.
   add_test(NAME ${name} COMMAND ${name})
   set_tests_properties(${name} PROPERTIES LABELS "${arg_LABELS}" TIMEOUT 1500)
