@@ -56,6 +56,7 @@ struct FinitePress::Parts {
 
   double overlap(const RigidTransform& pose) const { return solver.overlap(pose); }
   void refuse_too_deep(const RigidTransform& pose) const;
+  void refuse_way_through(const RigidTransform& pose) const;
   std::optional<FiniteSnapshot> advance(const FiniteSnapshot& start, const PartTarget& target,
                                         const FiniteSnapshot& from, double begin, double end, int halvings,
                                         Effort& effort);
@@ -70,6 +71,19 @@ struct FinitePress::Parts {
 void FinitePress::Parts::refuse_too_deep(const RigidTransform& pose) const {
   const double depth = overlap(pose);
   if (depth > gel.thickness) fail("the object reaches {:.4g} mm into a gel of {:.4g} mm", depth, gel.thickness);
+}
+
+/// A body that has gone through a curved gel is beside it again: that isn't a way out.
+void FinitePress::Parts::refuse_way_through(const RigidTransform& pose) const {
+  if (!placed || !(pose.translation.z() < now.pose.translation.z())) return;
+  const double way = (pose.translation - now.pose.translation).norm();
+  const int parts = static_cast<int>(std::min(1000.0, std::ceil(4.0 * way / gel.thickness)));
+  for (int k = 1; k < parts; ++k) {
+    const double depth = overlap(between(now.pose, pose, static_cast<double>(k) / parts));
+    if (depth > 0.45 * gel.thickness) {
+      fail("the object goes through the gel: it reaches {:.4g} mm into {:.4g} mm on its way", depth, gel.thickness);
+    }
+  }
 }
 
 /// From the share `begin` of the way from `start` to the target to the share `end`, halved where it doesn't converge.
@@ -138,6 +152,7 @@ FiniteSnapshot FinitePress::Parts::follow(const PressTarget& target, Effort& eff
   for (int a = 0; a < 2 && friction == 0.0; ++a) to.forced[a] = false;
 
   if (!to.forced[2] && !(overlap(to.pose) > 0.0)) {
+    refuse_way_through(to.pose);
     if (shear > 0.0) {
       fail("gross slip: a shear force of {:.6g} N is wanted, but the object doesn't touch the gel", shear);
     }
