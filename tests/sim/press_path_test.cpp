@@ -244,17 +244,20 @@ TEST(ForceLaw, ComesOfAStraightPressOnly) {
     played.states.emplace_back();
     played.states.back().wrench[2] = -point.shift_mm.z();
   }
-  EXPECT_NE(message_of([&] { force_law(path, played, 0.01); }).find("sideways"), std::string::npos);
+  EXPECT_NE(message_of([&] { force_law(path, played, 0.01, 0.02); }).find("sideways"), std::string::npos);
   played.at.pop_back();
   played.states.pop_back();
-  const ForceLaw law = force_law(path, played, 0.01);
+  const ForceLaw law = force_law(path, played, 0.01, 0.02);
   EXPECT_EQ(law.depth_mm, (std::vector<double>{0.0, 0.4, 0.8}));
   EXPECT_EQ(law.force_N, (std::vector<double>{0.0, 0.4, 0.8}));
-  EXPECT_EQ(law.relative_error, 0.01);
-  EXPECT_NE(message_of([&] { force_law(path, played, -0.1); }).find("relative error"), std::string::npos);
+  EXPECT_EQ(law.error(0.0), 0.0);
+  EXPECT_EQ(law.error(0.4), 0.02);
+  EXPECT_EQ(force_law(path, played, 0.1, 0.02).error(0.8), 0.1 * 0.8);
+  EXPECT_NE(message_of([&] { force_law(path, played, -0.1, 0.0); }).find("an error of the force law"),
+            std::string::npos);
   path.points[2].shift_mm.z() = -0.1;
-  EXPECT_NE(message_of([&] { force_law(path, played, 0.0); }).find("goes down"), std::string::npos);
-  EXPECT_NE(message_of([&] { force_law(path, PlayedPath{}, 0.0); }).find("there are none"), std::string::npos);
+  EXPECT_NE(message_of([&] { force_law(path, played, 0.0, 0.0); }).find("goes down"), std::string::npos);
+  EXPECT_NE(message_of([&] { force_law(path, PlayedPath{}, 0.0, 0.0); }).find("there are none"), std::string::npos);
 }
 
 TEST(RelaxingForce, WithoutASeriesItIsTheLaw) {
@@ -286,7 +289,7 @@ TEST(RelaxingForce, IsTheForceOfAPressThatRelaxes) {
   const fem::PronySeries series = {{0.3, 0.5}};
   PressPath path = ball_path();
   path.points = {{0.2, {0, 0, -0.2}}, {0.4, {0, 0, -0.4}}, {0.6, {0, 0, -0.6}}};
-  RelaxingForce cheap(force_law(path, play_path(*gel, path), 0.0), series);
+  RelaxingForce cheap(force_law(path, play_path(*gel, path), 0.0, 0.0), series);
   fem::FinitePress press(*gel, shape_of(path), path.friction, {}, series);
   const RigidTransform touch = *press.touching({path.rotation, {0.1, -0.2, 0.0}});
   for (const auto& [depth, seconds] : {std::pair{0.2, 0.1}, {0.4, 0.1}, {0.6, 0.1}, {0.6, 1.0}}) {
