@@ -3,9 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
+#include <cstring>
 #include <fstream>
 
 #include "core/error.h"
+#include "core/sha256.h"
 #include "core/whole_file.h"
 #include "fem/finite_press.h"
 #include "sim/force_law.h"
@@ -164,11 +167,20 @@ TEST(PressPath, ADamagedCacheIsntUsed) {
   flipped[whole.size() / 2] = static_cast<char>(flipped[whole.size() / 2] ^ 1);
   std::string nameless = whole;
   nameless[0] = 'X';
+  // Sealed anew, but the first matrix has other sizes: its rows and columns follow the mark and the key.
+  const auto resized = [&](std::int64_t rows, std::int64_t columns) {
+    std::string changed = whole.substr(0, whole.size() - 64);
+    std::memcpy(changed.data() + 8 + 64, &rows, sizeof(rows));
+    std::memcpy(changed.data() + 8 + 64 + sizeof(rows), &columns, sizeof(columns));
+    return changed + sha256_of(changed);
+  };
   for (const auto& [content, why] : {std::pair{whole.substr(0, 40), std::string("it ends early")},
                                      {nameless, "it isn't a path's presses"},
                                      {flipped, "its checksum is wrong"},
                                      {whole.substr(0, whole.size() - 8), "its checksum is wrong"},
-                                     {stranger, "it belongs to another gel or path"}}) {
+                                     {stranger, "it belongs to another gel or path"},
+                                     {resized(17, 2), "its matrices don't fit each other"},
+                                     {resized(1'000'000'000, 1), "it ends early"}}) {
     write_whole_file(player.file_of(path), content);
     const PlayedPath anew = player.play(path);
     EXPECT_NE(anew.note.find(why), std::string::npos) << anew.note;
