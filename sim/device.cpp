@@ -10,6 +10,7 @@
 #include "sim/device_camera.h"
 #include "sim/gel_setup.h"
 #include "sim/gltf_mesh.h"
+#include "sim/scattered_print.h"
 
 namespace touchstone::render {
 
@@ -117,6 +118,10 @@ EnumNames<CoatingType> enum_names(CoatingType) {
   return {{"matt", CoatingType::matt}, {"metal", CoatingType::metal}};
 }
 
+EnumNames<PrintPattern> enum_names(PrintPattern) {
+  return {{"grid", PrintPattern::grid}, {"scattered", PrintPattern::scattered}};
+}
+
 EnumNames<CameraType> enum_names(CameraType) {
   return {{"pinhole", CameraType::pinhole}, {"lens", CameraType::lens}};
 }
@@ -221,13 +226,23 @@ void fields(YamlReader& in, PlateSpec& plate) {
 }
 
 void fields(YamlReader& in, PrintSpec& print) {
+  in.optional("pattern", print.pattern);
+  in.optional("seed", print.seed);
+  in.optional("colour", print.colour, part_of_one());
+  if (print.pattern == PrintPattern::scattered) {
+    double spacing = 0.0;
+    in.required("spacing_mm", spacing, Allowed::above(0.0));
+    in.required("radius_mm", print.radius_mm, Allowed::above_up_to(0.0, kMostScatterRadii * spacing));
+    print.spacing_mm = {spacing, spacing};
+    in.required("diameter_mm", print.width_mm, Allowed::above_up_to(0.0, kScatterDistance * spacing));
+    in.optional("diameter_spread", print.diameter_spread, Allowed::within(0.0, 0.5));
+    return;
+  }
   in.required("grid", print.grid, Allowed::within(1, 1000));
   in.required("spacing_mm", print.spacing_mm, Allowed::above(0.0));
   in.optional("shape", print.shape);
   in.required(print.shape == render::MarkShape::round ? "diameter_mm" : "side_mm", print.width_mm, Allowed::above(0.0));
   in.optional("jitter_mm", print.jitter_mm, Allowed::at_least(0.0));
-  in.optional("seed", print.seed);
-  in.optional("colour", print.colour, part_of_one());
 }
 
 void fields(YamlReader& in, CoatingSpec& coating) {

@@ -99,14 +99,21 @@ struct PlateSpec {
   double refractive_index = 1.0;
 };
 
-/// Markers on the inside of a coating: a grid, or with `jitter_mm` a semi-random field. They stretch with it.
+enum class PrintPattern { grid, scattered };
+EnumNames<PrintPattern> enum_names(PrintPattern);  // of `coating.print.pattern`
+
+/// Markers on the inside of a coating: a grid, or with `jitter_mm` a semi-random field, laid out over the gel's x and
+/// y; or scattered dots, laid out along its surface (sim/scattered_print.h). They stretch with it.
 struct PrintSpec {
+  PrintPattern pattern = PrintPattern::grid;
   Eigen::Vector2i grid = {1, 1};            ///< markers along x and y, centred on the gel's origin
-  Eigen::Vector2d spacing_mm = {1.0, 1.0};  ///< between neighbours' centres
+  Eigen::Vector2d spacing_mm = {1.0, 1.0};  ///< between neighbours' centres; scattered: one number, in both
   render::MarkShape shape = render::MarkShape::round;
-  double width_mm = 0.0;   ///< in the file `diameter_mm` of round ones, `side_mm` of square ones
-  double jitter_mm = 0.0;  ///< each centre is moved along x and y by up to this, evenly distributed
-  std::uint64_t seed = 0;  ///< of the jitter
+  double width_mm = 0.0;         ///< in the file `diameter_mm` of round ones, `side_mm` of square ones
+  double jitter_mm = 0.0;        ///< grid: each centre is moved along x and y by up to this, evenly distributed
+  double radius_mm = 0.0;        ///< scattered: of the disc that they fill
+  double diameter_spread = 0.0;  ///< scattered: each diameter is changed by up to this part, evenly distributed
+  std::uint64_t seed = 0;        ///< of the jitter or the places and sizes
   Colour colour = 0.05;
 };
 

@@ -45,8 +45,13 @@ render::Surface gel_surface(TriangleMesh mesh);
 /// The sheet of a fine relief in one piece.
 GelSheet whole_sheet(Membrane::Sheet fine);
 
-/// The markers in material coordinates, row by row, y growing from row to row.
+/// The markers in material coordinates: of a grid those are the gel's x and y, row by row, y growing from row to row;
+/// of scattered ones see sim/scattered_print.h.
 std::vector<render::PrintedMark> printed_marks(const PrintSpec& print);
+
+/// Where points of the undeformed outer surface lie in the print's material coordinates.
+std::vector<Eigen::Vector2d> print_coordinates(const PrintSpec& print, const GelSpec& gel,
+                                               const std::vector<Eigen::Vector3d>& rest);
 
 /// A coated gel's outer surface. @pre the device has a coating
 render::Surface coated_surface(const DeviceSpec& device, const SceneBands& bands, GelSheet sheet);
