@@ -4,6 +4,7 @@
 #include <cmath>
 #include <iterator>
 
+#include "core/pixel_grab.h"
 #include "core/units.h"
 #include "fem/gel_body.h"
 #include "sim/camera_preset.h"
@@ -271,6 +272,13 @@ void fields(YamlReader& in, BandsSpec& bands) {
   }
 }
 
+void fields(YamlReader& in, MotionChipSpec& chip) {
+  chip.where = in.where();
+  in.optional("automatic_shutter", chip.automatic_shutter);
+  in.optional("darkest_maximum", chip.darkest_maximum);
+  in.optional("brightest_maximum", chip.brightest_maximum);
+}
+
 void fields(YamlReader& in, CameraSpec& camera) {
   const bool preset = read_preset(in, camera);
   const auto needed = [&](const char* key, auto& value, Allowed allowed) {
@@ -313,6 +321,11 @@ void fields(YamlReader& in, CameraSpec& camera) {
   in.optional("prnu", camera.prnu, Allowed::within(0.0, 0.5));
   in.optional("dsnu_e", camera.dsnu_e, Allowed::at_least(0.0));
   in.optional("black_level_DN", camera.black_level_DN, Allowed::at_least(0.0));
+  in.optional("motion_chip", camera.motion_chip);
+  if (camera.motion_chip && (camera.width != kChipSide || camera.height != kChipSide)) {
+    fail_at(in.where("motion_chip"), "camera.motion_chip: a picture of {}x{} pixels; the chip has {}x{}", camera.width,
+            camera.height, kChipSide, kChipSide);
+  }
   in.optional("events", camera.events);
   if (camera.events && camera.bayer == render::BayerPattern::binned) {
     fail_at(in.where("events"),

@@ -141,6 +141,15 @@ struct FilmSpec {
 enum class CameraType { pinhole, lens };
 EnumNames<CameraType> enum_names(CameraType);
 
+/// What an optical mouse's chip does by itself beside exposing its pixels (render/motion_chip.h). Its longest exposure
+/// is the camera's.
+struct MotionChipSpec {
+  bool automatic_shutter = true;
+  int darkest_maximum = 45;
+  int brightest_maximum = 60;
+  SourceLocation where;
+};
+
 /// A camera and its imager (EMVA 1288 terms). Only the fields that belong to `type` may stand in the file: of a lens
 /// either focal_length_mm or camera_matrix, and at most one of focus_distance_mm and sensor_distance_mm (neither: sharp
 /// at infinity; with a camera matrix, which tells the sensor's distance, focus_distance_mm only). A `preset` in the
@@ -181,6 +190,7 @@ struct CameraSpec {
   double prnu = 0.0;  ///< relative
   double dsnu_e = 0.0;
   double black_level_DN = 0.0;
+  std::optional<MotionChipSpec> motion_chip;
   std::optional<EventCameraSpec> events;  ///< its pixels also, or only, tell changes of their light
 };
 
@@ -220,6 +230,7 @@ void fields(YamlReader& in, PrintSpec& print);
 void fields(YamlReader& in, CoatingSpec& coating);
 void fields(YamlReader& in, FilmSpec& films);
 void fields(YamlReader& in, BandsSpec& bands);
+void fields(YamlReader& in, MotionChipSpec& chip);
 void fields(YamlReader& in, CameraSpec& camera);
 void fields(YamlReader& in, DeviceSpec& device);
 

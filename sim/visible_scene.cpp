@@ -358,4 +358,21 @@ render::Imager imager(const DeviceSpec& device, const SceneBands& bands, bool wi
   return out;
 }
 
+render::MotionChipSettings motion_chip(const DeviceSpec& device, const SceneBands& bands, bool with_noise) {
+  if (!device.camera || !device.camera->motion_chip) {
+    fail_at(device.where, "device {}: its camera has no motion_chip", device.name);
+  }
+  const MotionChipSpec& spec = *device.camera->motion_chip;
+  render::MotionChipSettings chip;
+  chip.imager = imager(device, bands, with_noise);
+  chip.frame_rate_Hz = device.camera->frame_rate_Hz;
+  chip.shutter = {spec.automatic_shutter, spec.darkest_maximum, spec.brightest_maximum};
+  try {
+    check(chip);
+  } catch (const Error& error) {
+    fail_at(spec.where, "camera.motion_chip: {}", error.what());
+  }
+  return chip;
+}
+
 }  // namespace touchstone::sim

@@ -6,6 +6,7 @@
 #include "fem/contact_shape.h"
 #include "fem/press.h"
 #include "render/imager.h"
+#include "render/motion_chip.h"
 #include "render/pinhole_camera.h"
 #include "render/scene.h"
 #include "sim/membrane.h"
@@ -80,5 +81,8 @@ RigidTransform pose_of(const CameraSpec& camera);
 
 /// The imager of a device for light in these bands.
 render::Imager imager(const DeviceSpec& device, const SceneBands& bands, bool with_noise);
+
+/// The motion chip of a device's camera. @throws Error with file and line if there is none or it makes no sense
+render::MotionChipSettings motion_chip(const DeviceSpec& device, const SceneBands& bands, bool with_noise);
 
 }  // namespace touchstone::sim
