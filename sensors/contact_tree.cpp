@@ -254,8 +254,7 @@ double best_price(std::span<const ContactSample* const> samples, const ContactTr
   for (int fold = 0; fold < settings.folds; ++fold) {
     add_fold_cost(samples, fold_of, fold, settings, prices, costs);
   }
-  const std::size_t best =
-      static_cast<std::size_t>(std::min_element(costs.begin(), costs.end()) - costs.begin());
+  const std::size_t best = static_cast<std::size_t>(std::min_element(costs.begin(), costs.end()) - costs.begin());
   double allowed = costs[best];
   if (settings.one_standard_error) {
     const auto n = static_cast<double>(samples.size());
@@ -315,8 +314,8 @@ std::string fault_of(const ContactTree& tree) {
 }
 
 int leaves_of(const ContactTree& tree) {
-  return static_cast<int>(std::count_if(tree.nodes.begin(), tree.nodes.end(),
-                                        [](const ContactTreeNode& node) { return node.above == 0; }));
+  return static_cast<int>(
+      std::count_if(tree.nodes.begin(), tree.nodes.end(), [](const ContactTreeNode& node) { return node.above == 0; }));
 }
 
 std::string rule_of(const ContactTree& tree) {

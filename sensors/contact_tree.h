@@ -1,5 +1,6 @@
 #pragma once
-// Does anything press? A decision tree on the statistics of a motion-sensing chip's frame (seed 003, sec. III.D, eq. 2).
+// Does anything press? A decision tree on the statistics of a motion-sensing chip's frame (seed 003, sec. III.D, eq.
+// 2).
 
 #include <array>
 #include <span>
@@ -71,11 +72,11 @@ struct ContactSample {
 };
 
 struct ContactTreeSettings {
-  int folds = 10;                     ///< of the cross-validation that prunes; 1: no pruning
-  bool one_standard_error = true;     ///< the smallest tree within one standard error of the best (Breiman et al. 1984)
+  int folds = 10;                  ///< of the cross-validation that prunes; 1: no pruning
+  bool one_standard_error = true;  ///< the smallest tree within one standard error of the best (Breiman et al. 1984)
   int most_depth = 8;
-  int least_samples = 10;             ///< a node with fewer isn't split
-  double missed_weight = 1.0;         ///< how much a missed force weighs, beside a force where there is none
+  int least_samples = 10;      ///< a node with fewer isn't split
+  double missed_weight = 1.0;  ///< how much a missed force weighs, beside a force where there is none
 };
 
 /// A tree grown by OpenCV's CART and pruned by cost and complexity (Breiman et al. 1984), which OpenCV 4 doesn't do: a
@@ -86,7 +87,7 @@ ContactTree train_contact_tree(std::span<const ContactSample> samples, const Con
 /// How often a tree is wrong, as the text counts it.
 struct ContactScore {
   int samples = 0;
-  int missed = 0;       ///< a force is present, the tree says none
+  int missed = 0;  ///< a force is present, the tree says none
   int false_alarms = 0;
   double error_percent() const { return samples > 0 ? 100.0 * (missed + false_alarms) / samples : 0.0; }
 };

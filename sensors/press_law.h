@@ -9,8 +9,8 @@
 namespace touchstone::sensors {
 
 /// press = sum_i mm[i] (1 - 1/dilation)^(i+1). The first coefficient is the text's Z, the distance of the skin at rest
-/// (with z counted towards the camera: what comes nearer grows, so dilation = Z/(Z - press)); with `terms` 1 it's eq. 8.
-/// Two or three terms also take in that a dome flattens while it comes nearer.
+/// (with z counted towards the camera: what comes nearer grows, so dilation = Z/(Z - press)); with `terms` 1 it's
+/// eq. 8. Two or three terms also take in that a dome flattens while it comes nearer.
 struct DilationPress {
   int terms = 1;  ///< 1 to 3
   std::array<double, 3> mm{};
@@ -37,9 +37,7 @@ struct ExponentialForce {
   double rate_per_mm = 0.0;
   double rms_residual_N = 0.0;
 
-  double force_N(double press_mm) const {
-    return press_mm > 0.0 ? scale_N * std::expm1(rate_per_mm * press_mm) : 0.0;
-  }
+  double force_N(double press_mm) const { return press_mm > 0.0 ? scale_N * std::expm1(rate_per_mm * press_mm) : 0.0; }
 };
 
 struct PressSample {

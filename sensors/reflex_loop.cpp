@@ -63,8 +63,7 @@ ReflexDecision ReflexLoop::next(const ChipStatistics& statistics) {
   const Eigen::Vector2d counts = counts_.next(statistics, last_.force_present);
   last_.shear_N.setZero();
   if (model_.shear && last_.force_present) last_.shear_N = model_.shear->force_N(counts, last_.force_N);
-  const bool over =
-      last_.force_present && (settings_.stop_above_N == 0.0 || last_.force_N > settings_.stop_above_N);
+  const bool over = last_.force_present && (settings_.stop_above_N == 0.0 || last_.force_N > settings_.stop_above_N);
   above_ = over ? std::min(above_ + 1, settings_.stop_frames) : 0;
   if (above_ >= settings_.stop_frames) last_.stop = true;
   return last_;

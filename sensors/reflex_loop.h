@@ -26,9 +26,9 @@ std::string name_of(ChipFault fault);
 ChipFault fault_of(const ChipStatistics& statistics, int flat_range = 3);
 
 struct ReflexSettings {
-  double stop_above_N = 0.0;  ///< with 0 any force that the tree sees stops
-  int stop_frames = 1;        ///< frames in a row that must say so
-  int release_frames = 15;    ///< MotionCounts; 10 ms
+  double stop_above_N = 0.0;    ///< with 0 any force that the tree sees stops
+  int stop_frames = 1;          ///< frames in a row that must say so
+  int release_frames = 15;      ///< MotionCounts; 10 ms
   bool stop_when_blind = true;  ///< stop also if nothing can be believed for `blind_frames` in a row
   int blind_frames = 3;
 };
@@ -39,9 +39,9 @@ void check(const ReflexSettings& settings);
 struct ReflexDecision {
   ChipFault fault = ChipFault::none;  ///< if there is one, the forces are those of the last frame without
   bool force_present = false;
-  double force_N = 0.0;                                 ///< 0 without force
+  double force_N = 0.0;                               ///< 0 without force
   Eigen::Vector2d shear_N = Eigen::Vector2d::Zero();  ///< 0 without force, or without a law for it
-  bool stop = false;                                   ///< to the actuator; stays until reset()
+  bool stop = false;                                  ///< to the actuator; stays until reset()
 };
 
 /// Give it each frame's statistics. It allocates nothing and knows nothing of clocks.
@@ -75,8 +75,8 @@ struct ReflexBudget {
   double actuator_us = 0.0;  ///< from the decision to where the actuator begins to brake
 
   double after_frame_us() const { return registers * register_us + decision_us + actuator_us; }
-  double least_us() const { return after_frame_us(); }                   ///< touch at a frame's very end
-  double mean_us() const { return 0.5 * frame_us + after_frame_us(); }   ///< touch at any time
+  double least_us() const { return after_frame_us(); }                  ///< touch at a frame's very end
+  double mean_us() const { return 0.5 * frame_us + after_frame_us(); }  ///< touch at any time
   /// Touch just after a frame was exposed, and a host that is still reading the frame before when this one is ready.
   double most_us() const { return frame_us + registers * register_us + after_frame_us(); }
 };

@@ -31,8 +31,9 @@ ShearLaw fit_shear_law(std::span<const ShearSample> samples) {
   Eigen::ColPivHouseholderQR<Eigen::MatrixXd> factors{Eigen::MatrixXd(terms)};
   factors.setThreshold(kLeastPivot);
   if (factors.rank() < 4) {
-    fail("shear law: the samples lie along one line or have one normal force; both directions and several normal "
-         "forces are needed");
+    fail(
+        "shear law: the samples lie along one line or have one normal force; both directions and several normal "
+        "forces are needed");
   }
   const Eigen::MatrixXd figures = size.cwiseInverse().transpose().asDiagonal() * factors.solve(Eigen::MatrixXd(forces));
   ShearLaw law;

@@ -15,9 +15,9 @@ inline constexpr std::size_t kStatisticsTerms = 15;
 std::array<double, kStatisticsTerms> statistics_terms(const ChipStatistics& statistics);
 
 struct StatisticsForce {
-  int degree = 1;                                      ///< 1 or 2; with 1 the products' coefficients are 0
+  int degree = 1;                                       ///< 1 or 2; with 1 the products' coefficients are 0
   std::array<double, kStatisticsTerms> coefficients{};  ///< N per term
-  double rms_residual_N = 0.0;                         ///< on what it was fitted to, negatives being 0
+  double rms_residual_N = 0.0;                          ///< on what it was fitted to, negatives being 0
 
   /// N, never below 0: no plate pulls. No allocation.
   double force_N(const ChipStatistics& statistics) const;
