@@ -75,6 +75,7 @@ ExploreSettings text_explore_settings() {
   settings.step_correlation = -1.0;
   settings.key_correlation = 2.0;
   settings.search_reach_px = 0.0;
+  settings.blur_px = 0.0;
   return settings;
 }
 

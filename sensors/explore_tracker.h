@@ -41,9 +41,9 @@ struct ExploreSettings {
   /// so on back: errors add up over key pictures and not over all. Above 1: against the last picture, as in the text.
   double key_correlation = 0.9;
   double search_reach_px = 4.0;  ///< when held, rest is sought with shifts up to this; 0: not sought
-  double blur_px = 0.0;          ///< laid over all pictures: less noise, less bias between pixels, coarser dots
-  double white = 63.0;           ///< the largest number of a pixel
-  PixelTimes times;              ///< when each pixel was taken; empty: all at once, or not known, as in the text
+  double blur_px = 0.6;  ///< laid over all pictures: less noise, and less pull towards whole pixels; the text has none
+  double white = 63.0;   ///< the largest number of a pixel
+  PixelTimes times;      ///< when each pixel was taken; empty: all at once, or not known, as in the text
 };
 
 /// The text's algorithm as it stands.
