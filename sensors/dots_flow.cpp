@@ -18,19 +18,28 @@ std::optional<Unknowns> solve(const DotsPicture& before, const DotsPicture& now,
   Eigen::Matrix<double, 5, 5> normal = Eigen::Matrix<double, 5, 5>::Zero();
   Unknowns right = Unknowns::Zero();
   const double half = 0.5 * before.columns();
-  for (int row = 1; row + 1 < before.rows(); ++row) {
-    for (int column = 1; column + 1 < before.columns(); ++column) {
-      const Eigen::Vector2d place = before.place_of(row, column);
-      const auto warped = [&](double x, double y) { return now.at(motion(place + Eigen::Vector2d(x, y))); };
-      const double weight = std::min({now.inside(motion(place)), now.inside(motion(place + Eigen::Vector2d(1.0, 1.0))),
-                                      now.inside(motion(place - Eigen::Vector2d(1.0, 1.0)))});
+  // Differences are taken over cubes of 2x2 pixels and both pictures, all of one middle (Horn and Schunck 1981):
+  // central differences beside the middle pixel's change would make steps of such coarse dots up to twice too long.
+  for (int row = 0; row + 1 < before.rows(); ++row) {
+    for (int column = 0; column + 1 < before.columns(); ++column) {
+      const Eigen::Vector2d corner = before.place_of(row, column);
+      double weight = 1.0;
+      double then[4], after[4];
+      for (int i = 0; i < 4; ++i) {
+        const Eigen::Vector2d at = motion(corner + Eigen::Vector2d(i % 2, i / 2));
+        weight = std::min(weight, now.inside(at));
+        then[i] = before.at(row + i / 2, column + i % 2);
+        after[i] = now.at(at);
+      }
       if (weight <= 0.0) continue;
-      // Gradients are the mean of both pictures': right to second order in the step.
-      const double gx = 0.25 * (before.at(row, column + 1) - before.at(row, column - 1) + warped(1, 0) - warped(-1, 0));
-      const double gy = 0.25 * (before.at(row + 1, column) - before.at(row - 1, column) + warped(0, 1) - warped(0, -1));
+      const auto both = [&](int i) { return then[i] + after[i]; };
+      const double gx = 0.25 * (both(1) - both(0) + both(3) - both(2));
+      const double gy = 0.25 * (both(2) - both(0) + both(3) - both(1));
+      const Eigen::Vector2d place = corner + Eigen::Vector2d(0.5, 0.5);
+      const double mean = 0.25 * (then[0] + then[1] + then[2] + then[3]);
       Unknowns equation;
-      equation << (gx * place.x() + gy * place.y()) / half, gx, gy, before.at(row, column), 1.0;
-      const double change = before.at(row, column) - warped(0, 0);
+      equation << (gx * place.x() + gy * place.y()) / half, gx, gy, mean, 1.0;
+      const double change = mean - 0.25 * (after[0] + after[1] + after[2] + after[3]);
       normal += weight * equation * equation.transpose();
       right += weight * change * equation;
     }

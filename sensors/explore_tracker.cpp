@@ -71,11 +71,11 @@ std::string name_of(PictureFault fault) {
 
 ExploreSettings text_explore_settings() {
   ExploreSettings settings;
-  settings.flow = {.rounds = 1, .free_light = false, .most_step_px = 1e9};
+  settings.flow.most_step_px = 1e9;
+  settings.step_by_match = false;
   settings.step_correlation = -1.0;
   settings.key_correlation = 2.0;
   settings.search_reach_px = 0.0;
-  settings.blur_px = 0.0;
   return settings;
 }
 
@@ -141,24 +141,26 @@ bool ExploreTracker::take_absolute(const DotsPicture& picture) {
 }
 
 bool ExploreTracker::take_step(const DotsPicture& picture) {
-  const auto step_from = [&](const Key& key) {
-    DotsMotion start;  // the text's flow is of pictures that follow each other, so from no motion
-    if (settings_.flow.rounds > 1) {
-      start = between(key.motion, last_.motion);
-      if (has_before_last_) start = then(start, between(before_last_, last_.motion));
-    }
-    std::optional<DotsMotion> step = dots_flow(key.picture, picture, settings_.flow, start);
-    if (!step) step = dots_flow(key.picture, picture, settings_.flow, between(key.motion, last_.motion));
-    return step;
-  };
   const auto take = [&](const Key& key, double least) {
-    const std::optional<DotsMotion> step = step_from(key);
-    if (!step || !(step->dilation > 0.0)) return false;
-    const double correlation = correlate(picture, key.picture, *step).correlation;
-    if (correlation < least) return false;
+    const DotsMotion so_far = between(key.motion, last_.motion);
+    const std::optional<DotsMotion> flow =
+        dots_flow(key.picture, picture, settings_.flow, settings_.step_by_match ? so_far : DotsMotion{});
+    DotsMatch step;
+    if (settings_.step_by_match) {
+      std::vector<DotsMotion> starts = {so_far};
+      if (flow) starts.push_back(*flow);
+      if (has_before_last_) starts.push_back(then(so_far, between(before_last_, last_.motion)));
+      step = match_dots(picture, key.picture, starts, settings_.match);
+    } else if (flow && flow->dilation > 0.0) {
+      const DotsCorrelation found = correlate(picture, key.picture, *flow);
+      step = {*flow, found.correlation, found.overlap};
+    } else {
+      return false;
+    }
+    if (step.correlation < least) return false;
     reading_.mode = ExploreMode::relative;
-    reading_.motion = then(key.motion, *step);
-    reading_.step_correlation = correlation;
+    reading_.motion = then(key.motion, step.motion);
+    reading_.step_correlation = step.correlation;
     return true;
   };
   if (settings_.key_correlation <= 1.0 && take(key_, settings_.key_correlation)) return true;

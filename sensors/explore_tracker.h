@@ -33,7 +33,10 @@ std::string name_of(PictureFault fault);
 struct ExploreSettings {
   double absolute_from = 0.95;  ///< correlation with the picture at rest, the text's
   DotsMatchSettings match;
-  DotsFlowSettings flow{.rounds = 20, .free_light = true};
+  DotsFlowSettings flow;
+  /// Look for a step's best correlation, from where the flow says and from where the motion was going. false: the
+  /// flow's answer is taken, as in the text; with dots of 1.5 px it is short by a third.
+  bool step_by_match = true;
   /// A step is believed if the picture, warped back by it, correlates so well with the one it was measured against.
   /// -1: always, as in the text.
   double step_correlation = 0.8;
@@ -41,9 +44,10 @@ struct ExploreSettings {
   /// so on back: errors add up over key pictures and not over all. Above 1: against the last picture, as in the text.
   double key_correlation = 0.9;
   double search_reach_px = 4.0;  ///< when held, rest is sought with shifts up to this; 0: not sought
-  double blur_px = 0.6;  ///< laid over all pictures: less noise, and less pull towards whole pixels; the text has none
-  double white = 63.0;   ///< the largest number of a pixel
-  PixelTimes times;      ///< when each pixel was taken; empty: all at once, or not known, as in the text
+  /// A Gaussian laid over all pictures, for such as have more noise than a chip's; it costs dots at the picture's edge.
+  double blur_px = 0.0;
+  double white = 63.0;  ///< the largest number of a pixel
+  PixelTimes times;     ///< when each pixel was taken; empty: all at once, or not known, as in the text
 };
 
 /// The text's algorithm as it stands.

@@ -192,7 +192,7 @@ TEST(ContactTree, WhatIsWrongIsNamed) {
 
 TEST(ContactTree, ImpossibleStatisticsAreKnown) {
   EXPECT_TRUE(is_possible(statistics(40, 80)));
-  EXPECT_TRUE(is_possible(statistics(63, 255, 63, 62.6)));  // Pixel_Sum is rounded down
+  EXPECT_TRUE(is_possible(statistics(63, 255, 63, 62.8)));  // Pixel_Sum is rounded down
   EXPECT_FALSE(is_possible(statistics(64, 80)));
   EXPECT_FALSE(is_possible(statistics(40, -1)));
   EXPECT_FALSE(is_possible(statistics(4, 80, 5)));

@@ -121,7 +121,7 @@ TEST(ExploreTracker, KeyPicturesDriftLessThanStepsFromPictureToPicture) {
 TEST(ExploreTracker, BadPicturesAreSaidAndHeldAndForgotten) {
   const FingertipPainter painter{.noise = 0.6};
   FingertipPainter bare = painter;
-  bare.dot = bare.ground;
+  bare.ground = bare.dot;
   const cv::Mat rest = painter.paint(DotsMotion{}, kRest);
   cv::Mat mostly_white(18, 18, CV_8UC1, cv::Scalar(63));
   mostly_white.row(0).setTo(10);

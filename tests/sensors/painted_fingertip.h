@@ -50,6 +50,8 @@ struct FingertipPainter {
         const Eigen::Vector2d on_skin = (at - motion.shift_px) / motion.dilation;
         double covered = 0.0;
         for (const Eigen::Vector2d& place : places) {
+          const double reach = radius_px + 0.5 * edge_px;
+          if ((on_skin - place).squaredNorm() > reach * reach) continue;
           const double inside = (radius_px - (on_skin - place).norm()) / edge_px + 0.5;
           covered = std::max(covered, std::clamp(inside, 0.0, 1.0));
         }

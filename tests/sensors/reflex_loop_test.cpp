@@ -177,7 +177,7 @@ TEST(ReflexLoop, ShearIsSummedWhileThereIsForce) {
 
 TEST(ReflexLoop, WhatCannotBeBelievedIsSaidAndStopsAfterAWhile) {
   const ChipStatistics dark{};
-  ChipStatistics saturated{.maximum = 63, .minimum = 63, .squal = 0, .average = 62.6};
+  ChipStatistics saturated{.maximum = 63, .minimum = 63, .squal = 0, .average = 62.8};
   ChipStatistics flat{.maximum = 31, .minimum = 30, .squal = 0, .average = 30.0};
   ChipStatistics blurred{.maximum = 40, .minimum = 10, .squal = 0, .average = 20.0};
   ChipStatistics disturbed = pressed(1.0);
