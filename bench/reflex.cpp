@@ -69,7 +69,7 @@ cv::Mat picture(const DotsMotion& motion, std::uint64_t index) {
 void explore_picture(benchmark::State& state) {
   ExploreSettings settings;
   if (state.range(0) == 1) settings = text_explore_settings();
-  if (state.range(0) == 2) settings.times = pixel_times(18, 1.0 / 1500.0, true);
+  if (state.range(0) == 2) settings.times = chip_pixel_times();
   if (state.range(0) == 3) settings.absolute_from = 1.0;  // steps are measured as well
   std::vector<Frame> frames;
   for (int i = 0; i < 50; ++i) {

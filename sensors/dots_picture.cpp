@@ -5,20 +5,18 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/error.h"
+#include "core/pixel_grab.h"
 
 namespace touchstone::sensors {
 
-PixelTimes pixel_times(int side, double interval_s, bool by_columns) {
-  if (side < 2) fail("pixel times: a picture of {0}x{0} pixels; at least 2x2 are needed", side);
+PixelTimes chip_pixel_times(double interval_s) {
   if (!(interval_s > 0.0) || !std::isfinite(interval_s)) {
     fail("pixel times: an interval of {} s, it must be above 0 and finite", interval_s);
   }
-  PixelTimes times(side, side, CV_32FC1);
-  for (int row = 0; row < side; ++row) {
-    for (int column = 0; column < side; ++column) {
-      const int index = by_columns ? column * side + row : row * side + column;
-      times.at<float>(row, column) = static_cast<float>(index * interval_s);
-    }
+  PixelTimes times(kChipSide, kChipSide, CV_32FC1);
+  for (int frame = 0; frame < kChipPixels; ++frame) {
+    const ChipPlace place = grabbed_place(frame);
+    times.at<float>(place.row, place.column) = static_cast<float>(frame * interval_s);
   }
   return times;
 }

@@ -11,9 +11,8 @@ namespace touchstone::sensors {
 /// picture. Empty: all at once.
 using PixelTimes = cv::Mat;
 
-/// Times of pixels that are taken one a frame, row by row or column by column.
-/// @throws Error for a size below 2 or an interval that isn't above 0 and finite
-PixelTimes pixel_times(int side, double interval_s, bool by_columns);
+/// Those of a motion chip's picture (core/pixel_grab.h). @throws Error for an interval that isn't above 0 and finite
+PixelTimes chip_pixel_times(double interval_s = 1.0 / 1500.0);
 
 /// Pixels as numbers, places from the picture's middle.
 class DotsPicture {

@@ -122,7 +122,7 @@ TEST(DotsMatch, DotsThatCameOffCostLittle) {
 }
 
 TEST(DotsMatch, TheSkewOfAPixelByPixelPictureIsTakenOut) {
-  const PixelTimes times = pixel_times(18, 1.0 / 1500.0, true);
+  const PixelTimes times = chip_pixel_times();
   const double middle_s = 0.5 * 323.0 / 1500.0;
   const DotsMotion middle{1.08, {0.5, -0.3}};
   const DotsVelocity velocity{0.25, {3.0, 2.0}};  // a good half pixel within the picture
@@ -158,10 +158,9 @@ TEST(DotsMatch, WhatMakesNoSenseIsNamed) {
   EXPECT_THAT(with({.most_steps = 0}), ThrowsMessage<Error>(HasSubstr("most_steps is 0")));
   EXPECT_THAT(with({.least_dilation = 1.1}), ThrowsMessage<Error>(HasSubstr("from 1.1")));
   EXPECT_THAT([&] { search_dots(rest, rest, -1.0); }, ThrowsMessage<Error>(HasSubstr("reach_px is -1")));
-  EXPECT_THAT([&] { match_skewed_dots(rest, rest, starts, {}, pixel_times(12, 1.0, true), {}); },
+  EXPECT_THAT([&] { match_skewed_dots(rest, rest, starts, {}, PixelTimes(12, 12, CV_32FC1), {}); },
               ThrowsMessage<Error>(HasSubstr("pixel times of 12x12")));
-  EXPECT_THAT([] { pixel_times(1, 1.0, true); }, ThrowsMessage<Error>(HasSubstr("1x1")));
-  EXPECT_THAT([] { pixel_times(18, 0.0, true); }, ThrowsMessage<Error>(HasSubstr("interval of 0")));
+  EXPECT_THAT([] { chip_pixel_times(0.0); }, ThrowsMessage<Error>(HasSubstr("interval of 0")));
   EXPECT_THAT([] { DotsPicture(cv::Mat(18, 18, CV_8UC3)); }, ThrowsMessage<Error>(HasSubstr("type")));
   EXPECT_THAT([] { DotsPicture(cv::Mat(7, 18, CV_8UC1)); }, ThrowsMessage<Error>(HasSubstr("18x7")));
   EXPECT_THAT([] { DotsPicture(cv::Mat(18, 18, CV_32FC1, std::nanf(""))); }, ThrowsMessage<Error>(HasSubstr("finite")));

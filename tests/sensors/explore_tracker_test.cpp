@@ -176,7 +176,7 @@ TEST(ExploreTracker, AJumpTooLargeForBothIsSaidAndFoundAgain) {
 
 TEST(ExploreTracker, PixelTimesTakeOutTheSkewOfAMovingSkin) {
   // 5 mm there and back at 4 mm/s, sideways a fifth of it, grabbed pixel by pixel.
-  const PixelTimes times = pixel_times(18, 1.0 / 1500.0, true);
+  const PixelTimes times = chip_pixel_times();
   const double interval_s = 324.0 / 1500.0, middle_s = 0.5 * 323.0 / 1500.0;
   const FingertipPainter painter{.noise = 0.3};
   const auto motion_at = [](double t) {
@@ -220,7 +220,7 @@ TEST(ExploreTracker, WhatMakesNoSenseIsNamed) {
   EXPECT_THAT(with([](S& s) { s.white = 0.0; }), ThrowsMessage<Error>(HasSubstr("white is 0")));
   EXPECT_THAT(with([](S& s) { s.match.most_steps = 0; }), ThrowsMessage<Error>(HasSubstr("most_steps is 0")));
   EXPECT_THAT(with([](S& s) { s.flow.rounds = 0; }), ThrowsMessage<Error>(HasSubstr("rounds is 0")));
-  EXPECT_THAT(with([](S& s) { s.times = pixel_times(17, 1.0, true); }), ThrowsMessage<Error>(HasSubstr("17x17")));
+  EXPECT_THAT(with([](S& s) { s.times = PixelTimes(17, 17, CV_32FC1); }), ThrowsMessage<Error>(HasSubstr("17x17")));
   EXPECT_THAT([] { ExploreTracker(cv::Mat::zeros(18, 18, CV_8UC1), {}); }, ThrowsMessage<Error>(HasSubstr("dark")));
   EXPECT_EQ(name_of(PictureFault::none), "none");
   EXPECT_EQ(name_of(PictureFault::jump), "neither rest nor the last picture is recognised");
