@@ -42,6 +42,8 @@ Collision play_collision(const CollisionSettings& settings, const PlateForce& fo
   Collision result;
   result.touch_s = settings.gap_mm / settings.speed_mm_s;
   double press_mm = -settings.gap_mm, speed_mm_s = settings.speed_mm_s;
+  double integral_mm = 0.0;
+  bool was_braking = false;
   std::int64_t frames = 0;
   const double step_s = settings.step_s;
   for (std::int64_t step = 0;; ++step) {
@@ -68,9 +70,14 @@ Collision play_collision(const CollisionSettings& settings, const PlateForce& fo
       result.standstill_s = t_s;
       return result;
     }
-    const double wanted_mm_s = braking ? 0.0 : settings.speed_mm_s;
-    const double motor_mm_s2 = std::clamp(actuator.velocity_gain_per_s * (wanted_mm_s - speed_mm_s),
-                                          -actuator.most_acceleration_mm_s2, actuator.most_acceleration_mm_s2);
+    if (braking && !was_braking) integral_mm = 0.0;
+    was_braking = braking;
+    const double off_mm_s = (braking ? 0.0 : settings.speed_mm_s) - speed_mm_s;
+    const double gain_per_s = actuator.velocity_gain_per_s;
+    const double most_mm_s2 = actuator.most_acceleration_mm_s2;
+    const double asked_mm_s2 = gain_per_s * off_mm_s + 0.25 * gain_per_s * gain_per_s * integral_mm;
+    const double motor_mm_s2 = std::clamp(asked_mm_s2, -most_mm_s2, most_mm_s2);
+    if (motor_mm_s2 == asked_mm_s2) integral_mm += step_s * off_mm_s;  // no winding up at the motor's end
     const double plate_mm_s2 = kMmPerM * plate_N / actuator.mass_kg;
     // Midpoint in the way, explicit in the velocity: the force hardly changes in a step of 10 us.
     const double next_mm_s = speed_mm_s + step_s * (motor_mm_s2 - plate_mm_s2);

@@ -13,7 +13,9 @@ struct ActuatorSettings {
   double mass_kg = 0.5;
   /// What its motor can do, in mm/s^2 of this mass: brakes and drives are both held to it.
   double most_acceleration_mm_s2 = 5000.0;
-  double velocity_gain_per_s = 500.0;  ///< acceleration for a velocity that's off, up to the most: a lag of 2 ms
+  /// Proportional gain of the velocity's control, so a lag of 2 ms; its integral's is a quarter of the square, which
+  /// damps it critically. The integral starts anew with a brake.
+  double velocity_gain_per_s = 500.0;
   /// From a stop command's sending to where the drive brakes: a frame on a serial bus and the drive's own clock.
   double bus_s = 1e-3;
 };

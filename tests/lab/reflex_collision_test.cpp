@@ -25,6 +25,7 @@ TEST(ReflexCollision, WithoutForceTheBrakingDistanceIsThatOfTheBrake) {
   CollisionSettings settings;
   settings.speed_mm_s = 100.0;
   settings.gap_mm = 5.0;
+  settings.first_frame_s = 2e-4;
   settings.actuator.velocity_gain_per_s = 1e4;  // braking is at its most until the very end
   const StopWatch at_once = [&](double t_s, double press_mm) {
     return press_mm > 0.0 ? std::optional(t_s) : std::nullopt;
@@ -79,7 +80,9 @@ TEST(ReflexCollision, WhoIsNotStoppedEndsWhereTheMotorAndThePlateComeToTerms) {
   const Collision run = play_collision(settings, text_law, kNobody);
   EXPECT_FALSE(run.stop_sent_s);
   EXPECT_FALSE(run.beyond_law);
-  EXPECT_NEAR(run.peak_force_N, 1.0, 0.05);
+  // 1 N, and what the mass's speed adds where the plate's stiffness is 0.4677 (1.1293 + 1) N/mm: v sqrt(k m).
+  const double stiffness_N_m = 1e3 * 0.4677 * (1.1293 + 1.0);
+  EXPECT_NEAR(run.peak_force_N, 1.0 + 0.005 * std::sqrt(stiffness_N_m * 0.5), 0.01);
   settings.actuator.most_acceleration_mm_s2 = 1e5;  // 50 N
   const Collision strong = play_collision(settings, text_law, kNobody);
   EXPECT_TRUE(strong.beyond_law);
@@ -95,7 +98,7 @@ TEST(ReflexCollision, HalfAStepIsTheSame) {
   const Collision coarse = play_collision(settings, text_law, watch);
   settings.step_s *= 0.5;
   const Collision fine = play_collision(settings, text_law, watch);
-  EXPECT_NEAR(coarse.peak_force_N, fine.peak_force_N, 1e-4 * fine.peak_force_N);
+  EXPECT_NEAR(coarse.peak_force_N, fine.peak_force_N, 1e-3 * fine.peak_force_N);  // the brake begins with a step
   EXPECT_NEAR(*coarse.reaction_ms(), *fine.reaction_ms(), 1e-6);
 }
 
