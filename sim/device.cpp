@@ -4,12 +4,14 @@
 #include <cmath>
 #include <iterator>
 
+#include "core/pixel_grab.h"
 #include "core/units.h"
 #include "fem/gel_body.h"
 #include "sim/camera_preset.h"
 #include "sim/device_camera.h"
 #include "sim/gel_setup.h"
 #include "sim/gltf_mesh.h"
+#include "sim/scattered_print.h"
 
 namespace touchstone::render {
 
@@ -117,6 +119,10 @@ EnumNames<CoatingType> enum_names(CoatingType) {
   return {{"matt", CoatingType::matt}, {"metal", CoatingType::metal}};
 }
 
+EnumNames<PrintPattern> enum_names(PrintPattern) {
+  return {{"grid", PrintPattern::grid}, {"scattered", PrintPattern::scattered}};
+}
+
 EnumNames<CameraType> enum_names(CameraType) {
   return {{"pinhole", CameraType::pinhole}, {"lens", CameraType::lens}};
 }
@@ -221,13 +227,23 @@ void fields(YamlReader& in, PlateSpec& plate) {
 }
 
 void fields(YamlReader& in, PrintSpec& print) {
+  in.optional("pattern", print.pattern);
+  in.optional("seed", print.seed);
+  in.optional("colour", print.colour, part_of_one());
+  if (print.pattern == PrintPattern::scattered) {
+    double spacing = 0.0;
+    in.required("spacing_mm", spacing, Allowed::above(0.0));
+    in.required("radius_mm", print.radius_mm, Allowed::above_up_to(0.0, kMostScatterRadii * spacing));
+    print.spacing_mm = {spacing, spacing};
+    in.required("diameter_mm", print.width_mm, Allowed::above_up_to(0.0, kScatterDistance * spacing));
+    in.optional("diameter_spread", print.diameter_spread, Allowed::within(0.0, 0.5));
+    return;
+  }
   in.required("grid", print.grid, Allowed::within(1, 1000));
   in.required("spacing_mm", print.spacing_mm, Allowed::above(0.0));
   in.optional("shape", print.shape);
   in.required(print.shape == render::MarkShape::round ? "diameter_mm" : "side_mm", print.width_mm, Allowed::above(0.0));
   in.optional("jitter_mm", print.jitter_mm, Allowed::at_least(0.0));
-  in.optional("seed", print.seed);
-  in.optional("colour", print.colour, part_of_one());
 }
 
 void fields(YamlReader& in, CoatingSpec& coating) {
@@ -254,6 +270,13 @@ void fields(YamlReader& in, BandsSpec& bands) {
   if (bands.count && std::ranges::find(render::kBandCounts, *bands.count) == render::kBandCounts.end()) {
     fail_at(in.where("count"), "bands.count: {}; allowed are 1, 3, 8 and 16", *bands.count);
   }
+}
+
+void fields(YamlReader& in, MotionChipSpec& chip) {
+  chip.where = in.where();
+  in.optional("automatic_shutter", chip.automatic_shutter);
+  in.optional("darkest_maximum", chip.darkest_maximum);
+  in.optional("brightest_maximum", chip.brightest_maximum);
 }
 
 void fields(YamlReader& in, CameraSpec& camera) {
@@ -298,6 +321,11 @@ void fields(YamlReader& in, CameraSpec& camera) {
   in.optional("prnu", camera.prnu, Allowed::within(0.0, 0.5));
   in.optional("dsnu_e", camera.dsnu_e, Allowed::at_least(0.0));
   in.optional("black_level_DN", camera.black_level_DN, Allowed::at_least(0.0));
+  in.optional("motion_chip", camera.motion_chip);
+  if (camera.motion_chip && (camera.width != kChipSide || camera.height != kChipSide)) {
+    fail_at(in.where("motion_chip"), "camera.motion_chip: a picture of {}x{} pixels; the chip has {}x{}", camera.width,
+            camera.height, kChipSide, kChipSide);
+  }
   in.optional("events", camera.events);
   if (camera.events && camera.bayer == render::BayerPattern::binned) {
     fail_at(in.where("events"),

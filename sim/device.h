@@ -99,14 +99,21 @@ struct PlateSpec {
   double refractive_index = 1.0;
 };
 
-/// Markers on the inside of a coating: a grid, or with `jitter_mm` a semi-random field. They stretch with it.
+enum class PrintPattern { grid, scattered };
+EnumNames<PrintPattern> enum_names(PrintPattern);  // of `coating.print.pattern`
+
+/// Markers on the inside of a coating: a grid, or with `jitter_mm` a semi-random field, laid out over the gel's x and
+/// y; or scattered dots, laid out along its surface (sim/scattered_print.h). They stretch with it.
 struct PrintSpec {
+  PrintPattern pattern = PrintPattern::grid;
   Eigen::Vector2i grid = {1, 1};            ///< markers along x and y, centred on the gel's origin
-  Eigen::Vector2d spacing_mm = {1.0, 1.0};  ///< between neighbours' centres
+  Eigen::Vector2d spacing_mm = {1.0, 1.0};  ///< between neighbours' centres; scattered: one number, in both
   render::MarkShape shape = render::MarkShape::round;
-  double width_mm = 0.0;   ///< in the file `diameter_mm` of round ones, `side_mm` of square ones
-  double jitter_mm = 0.0;  ///< each centre is moved along x and y by up to this, evenly distributed
-  std::uint64_t seed = 0;  ///< of the jitter
+  double width_mm = 0.0;         ///< in the file `diameter_mm` of round ones, `side_mm` of square ones
+  double jitter_mm = 0.0;        ///< grid: each centre is moved along x and y by up to this, evenly distributed
+  double radius_mm = 0.0;        ///< scattered: of the disc that they fill
+  double diameter_spread = 0.0;  ///< scattered: each diameter is changed by up to this part, evenly distributed
+  std::uint64_t seed = 0;        ///< of the jitter or the places and sizes
   Colour colour = 0.05;
 };
 
@@ -133,6 +140,15 @@ struct FilmSpec {
 
 enum class CameraType { pinhole, lens };
 EnumNames<CameraType> enum_names(CameraType);
+
+/// What an optical mouse's chip does by itself beside exposing its pixels (render/motion_chip.h). Its longest exposure
+/// is the camera's.
+struct MotionChipSpec {
+  bool automatic_shutter = true;
+  int darkest_maximum = 45;
+  int brightest_maximum = 60;
+  SourceLocation where;
+};
 
 /// A camera and its imager (EMVA 1288 terms). Only the fields that belong to `type` may stand in the file: of a lens
 /// either focal_length_mm or camera_matrix, and at most one of focus_distance_mm and sensor_distance_mm (neither: sharp
@@ -174,6 +190,7 @@ struct CameraSpec {
   double prnu = 0.0;  ///< relative
   double dsnu_e = 0.0;
   double black_level_DN = 0.0;
+  std::optional<MotionChipSpec> motion_chip;
   std::optional<EventCameraSpec> events;  ///< its pixels also, or only, tell changes of their light
 };
 
@@ -213,6 +230,7 @@ void fields(YamlReader& in, PrintSpec& print);
 void fields(YamlReader& in, CoatingSpec& coating);
 void fields(YamlReader& in, FilmSpec& films);
 void fields(YamlReader& in, BandsSpec& bands);
+void fields(YamlReader& in, MotionChipSpec& chip);
 void fields(YamlReader& in, CameraSpec& camera);
 void fields(YamlReader& in, DeviceSpec& device);
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <limits>
 #include <opencv2/core.hpp>
+#include <type_traits>
 
 #include "core/error.h"
 #include "render/first_hits.h"
@@ -33,11 +34,15 @@ SeenPoint inside_point(const SeenGeometry& seen, const render::FirstHit& hit) {
   } else if (hit.object == 0) {
     const int touched = seen.sheet.touched[static_cast<std::size_t>(hit.triangle)];
     const auto& t = seen.sheet.mesh.triangles[static_cast<std::size_t>(hit.triangle)];
-    const auto rest = [&](int corner) { return seen.sheet.rest[static_cast<std::size_t>(t[corner])]; };
+    const auto at_hit = [&](const auto& values) {
+      const auto at = [&](int corner) { return values[static_cast<std::size_t>(t[corner])]; };
+      using Value = std::decay_t<decltype(values[0])>;
+      return Value((1.0 - hit.u - hit.v) * at(0) + hit.u * at(1) + hit.v * at(2));
+    };
     point.contact = touched >= 0;
     point.id = point.contact ? PixelId::kFirstObject + touched : PixelId::kGel;
-    point.rest = (1.0 - hit.u - hit.v) * rest(0) + hit.u * rest(1) + hit.v * rest(2);
-    const int marker = seen.markers.mark_at(point.rest->head<2>());
+    point.rest = at_hit(seen.sheet.rest);
+    const int marker = seen.print.empty() ? -1 : seen.markers.mark_at(at_hit(seen.print));
     if (marker >= 0) point.id = PixelId::kFirstMarker + marker;
   }
   return point;

@@ -23,7 +23,10 @@ SeenGeometry seen_as(const SceneSpec& scene, const Plan& plan, const std::vector
   TS_ASSERT(all.size() >= 1 + seen.bodies.size() && objects.size() == moved_objects(scene).size());
   for (std::size_t i = 0; i < seen.bodies.size(); ++i) seen.beyond.surfaces.push_back(std::move(all[1 + i]));
   const auto& coating = scene.device.coating;
-  if (coating && coating->print) seen.markers = render::PrintIndex(printed_marks(*coating->print));
+  if (coating && coating->print) {
+    seen.markers = render::PrintIndex(printed_marks(*coating->print));
+    seen.print = print_coordinates(*coating->print, scene.device.gel, sheet.rest);
+  }
   seen.sheet = std::move(sheet);
   seen.bead_displacement = press.bead_displacement;
   return seen;

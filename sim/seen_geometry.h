@@ -28,6 +28,7 @@ struct SeenGeometry {
   GelSheet sheet;                      ///< surfaces[0] of `inside` with its meaning
   Eigen::MatrixX3d bead_displacement;  ///< m x 3, mm
   render::PrintIndex markers;          ///< printed on the outer surface; none without a coating
+  std::vector<Eigen::Vector2d> print;  ///< material coordinates of the sheet's vertices, where there's a print
 };
 
 /// As the elements' surface has it. @pre the gel is a slab

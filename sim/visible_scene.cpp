@@ -4,6 +4,7 @@
 
 #include "core/random.h"
 #include "core/units.h"
+#include "sim/scattered_print.h"
 #include "sim/scene_bands.h"
 
 namespace touchstone::sim {
@@ -80,9 +81,10 @@ std::vector<Eigen::Vector2d> grid_centres(const Eigen::Vector2i& grid, const Eig
   return centres;
 }
 
-render::Print print_of(const PrintSpec& spec, const SceneBands& bands, const std::vector<Eigen::Vector3d>& rest) {
+render::Print print_of(const PrintSpec& spec, const GelSpec& gel, const SceneBands& bands,
+                       const std::vector<Eigen::Vector3d>& rest) {
   render::Print print;
-  for (const Eigen::Vector3d& point : rest) print.material_mm.emplace_back(point.head<2>());
+  print.material_mm = print_coordinates(spec, gel, rest);
   print.inks = {in_bands(spec.colour, bands, "coating.print.colour")};
   print.marks = printed_marks(spec);
   return print;
@@ -171,7 +173,7 @@ render::Surface coated_surface(const DeviceSpec& device, const SceneBands& bands
   } else {
     out.material = render::RoughConductor{in_bands(coating.albedo, bands, "coating.reflectance"), coating.roughness};
   }
-  if (coating.print) out.print = print_of(*coating.print, bands, sheet.rest);
+  if (coating.print) out.print = print_of(*coating.print, device.gel, bands, sheet.rest);
   out.normals = vertex_normals(sheet.mesh);
   out.mesh = std::move(sheet.mesh);
   return out;
@@ -273,6 +275,7 @@ GelSheet whole_sheet(Membrane::Sheet fine) {
 }
 
 std::vector<render::PrintedMark> printed_marks(const PrintSpec& print) {
+  if (print.pattern == PrintPattern::scattered) return scattered_marks(print);
   std::vector<render::PrintedMark> marks;
   std::uint64_t index = 0;
   for (const Eigen::Vector2d& centre : grid_centres(print.grid, print.spacing_mm)) {
@@ -282,6 +285,17 @@ std::vector<render::PrintedMark> printed_marks(const PrintSpec& print) {
     marks.push_back({centre + Eigen::Vector2d(dx, dy), print.width_mm / 2, 0, print.shape});
   }
   return marks;
+}
+
+std::vector<Eigen::Vector2d> print_coordinates(const PrintSpec& print, const GelSpec& gel,
+                                               const std::vector<Eigen::Vector3d>& rest) {
+  std::vector<Eigen::Vector2d> places;
+  places.reserve(rest.size());
+  const bool along = print.pattern == PrintPattern::scattered;
+  for (const Eigen::Vector3d& point : rest) {
+    places.push_back(along ? along_surface(gel, point) : Eigen::Vector2d(point.head<2>()));
+  }
+  return places;
 }
 
 RigidTransform pose_of(const CameraSpec& camera) {
@@ -342,6 +356,23 @@ render::Imager imager(const DeviceSpec& device, const SceneBands& bands, bool wi
     if (light.sum() > 0.0) out.white_balance = render::grey_gains(out, light);
   }
   return out;
+}
+
+render::MotionChipSettings motion_chip(const DeviceSpec& device, const SceneBands& bands, bool with_noise) {
+  if (!device.camera || !device.camera->motion_chip) {
+    fail_at(device.where, "device {}: its camera has no motion_chip", device.name);
+  }
+  const MotionChipSpec& spec = *device.camera->motion_chip;
+  render::MotionChipSettings chip;
+  chip.imager = imager(device, bands, with_noise);
+  chip.frame_rate_Hz = device.camera->frame_rate_Hz;
+  chip.shutter = {spec.automatic_shutter, spec.darkest_maximum, spec.brightest_maximum};
+  try {
+    check(chip);
+  } catch (const Error& error) {
+    fail_at(spec.where, "camera.motion_chip: {}", error.what());
+  }
+  return chip;
 }
 
 }  // namespace touchstone::sim

@@ -6,6 +6,7 @@
 #include "fem/contact_shape.h"
 #include "fem/press.h"
 #include "render/imager.h"
+#include "render/motion_chip.h"
 #include "render/pinhole_camera.h"
 #include "render/scene.h"
 #include "sim/membrane.h"
@@ -45,8 +46,13 @@ render::Surface gel_surface(TriangleMesh mesh);
 /// The sheet of a fine relief in one piece.
 GelSheet whole_sheet(Membrane::Sheet fine);
 
-/// The markers in material coordinates, row by row, y growing from row to row.
+/// The markers in material coordinates: of a grid those are the gel's x and y, row by row, y growing from row to row;
+/// of scattered ones see sim/scattered_print.h.
 std::vector<render::PrintedMark> printed_marks(const PrintSpec& print);
+
+/// Where points of the undeformed outer surface lie in the print's material coordinates.
+std::vector<Eigen::Vector2d> print_coordinates(const PrintSpec& print, const GelSpec& gel,
+                                               const std::vector<Eigen::Vector3d>& rest);
 
 /// A coated gel's outer surface. @pre the device has a coating
 render::Surface coated_surface(const DeviceSpec& device, const SceneBands& bands, GelSheet sheet);
@@ -75,5 +81,8 @@ RigidTransform pose_of(const CameraSpec& camera);
 
 /// The imager of a device for light in these bands.
 render::Imager imager(const DeviceSpec& device, const SceneBands& bands, bool with_noise);
+
+/// The motion chip of a device's camera. @throws Error with file and line if there is none or it makes no sense
+render::MotionChipSettings motion_chip(const DeviceSpec& device, const SceneBands& bands, bool with_noise);
 
 }  // namespace touchstone::sim

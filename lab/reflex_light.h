@@ -1,0 +1,66 @@
+#pragma once
+// The light that the reflex fingertip's skin sends to the chip behind it.
+//
+// Nothing in the fingertip casts shadows and its walls are black, so the light is direct light with the little that
+// bounces off the skin at rest (render/direct_renderer.h), of many rays a pixel, through all of the lens. Whose skin it
+// is doesn't matter: any sheet whose vertices have the rest's triangles, from finite presses or linear ones.
+
+#include <memory>
+#include <opencv2/core/mat.hpp>
+#include <span>
+#include <string>
+
+#include "fem/finite_gel.h"
+#include "fem/press.h"
+#include "render/direct_error.h"
+#include "render/path_tracer.h"
+#include "sim/device.h"
+#include "sim/scene_bands.h"
+#include "sim/visible_gel.h"
+
+namespace touchstone::lab {
+
+struct ReflexLightSettings {
+  double lamp_level = 1.0;  ///< of the lamps' power; 0: they're off
+  int side = 4;             ///< a pixel is cut into side x side, 1 to 16
+  int rays = 64;            ///< through each of them, 1 to 64
+  std::uint64_t seed = 1;   ///< of the rays
+};
+
+/// A finite gel's skin for cameras.
+sim::VisibleGel visible_skin(const fem::FiniteGel& gel, const fem::GelBody& body);
+
+/// The skin of a press, laid onto what presses it.
+sim::GelSheet skin_sheet(const sim::VisibleGel& skin, const fem::PressState& press, const fem::ContactShape& object);
+
+/// A device's pictures of its skin. Pure functions of the constructor's arguments and theirs; safe to use from many
+/// threads.
+class ReflexLight {
+ public:
+  /// `rest` is the skin that nothing presses; `reached` are skins that go as far as any that will be looked at, the
+  /// first of which the light's error is measured on.
+  /// @throws Error for a device without coating or camera, or that direct light can't draw
+  ReflexLight(const sim::DeviceSpec& device, const sim::GelSheet& rest, std::span<const sim::GelSheet> reached,
+              const ReflexLightSettings& settings = {});
+  ~ReflexLight();
+  ReflexLight(ReflexLight&&) noexcept;
+
+  const sim::DeviceSpec& device() const;
+  const sim::SceneBands& bands() const;
+  /// Against path tracing, in the parts of pixels that are drawn.
+  const render::DirectError& error() const;
+
+  /// Irradiance on the sensor, W/m^2, CV_32FC(bands) of the camera's size.
+  /// @throws Error for a skin beyond those that were reached
+  cv::Mat irradiance(const sim::GelSheet& skin) const;
+  /// The same by path tracing, of so many paths a pixel.
+  cv::Mat traced(const sim::GelSheet& skin, int paths, std::uint64_t seed) const;
+  /// Traced with so many times as many pixels each way, for people to look at.
+  cv::Mat portrait(const sim::GelSheet& skin, int times, int paths) const;
+
+ private:
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+}  // namespace touchstone::lab
