@@ -21,6 +21,7 @@ constexpr int kMostBacktracks = 5;
 constexpr double kLeastShrink = 0.2;  // of the least J in one Newton step
 constexpr double kLeastRatio = 0.1;   // J: below, elements have found a way out that the gel hasn't
 constexpr double kBalanced = 1e-8;    // residual over the elements' forces
+constexpr double kAtRest = 1e-4;      // of the elements' forces at a part's start: below, a gel is as good as at rest
 constexpr double kHold = 1000.0;      // stiffness that holds what touches, over the surface's own
 constexpr double kReach = 0.5;        // of a vertex's own size: open gaps below this are candidates
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -88,6 +89,9 @@ struct FinitePartSolver::Iterate {
   Eigen::Vector3d bulges = Eigen::Vector3d::Zero();  ///< sum of bulge_forces, N
   Eigen::VectorXd tangential_scale;                  ///< mm^3 per MPa, per vertex, of the last compliance
   double balance = 0.0;                              ///< residual over the elements' forces
+  double size = 0.0;                                 ///< those forces
+  double least_size = 0.0;                           ///< what `balance` takes for them at least: a gel that is let go
+                                                     ///< comes to rest, where there are none
   double least = 0.0;                                ///< J
 };
 
@@ -355,6 +359,7 @@ std::optional<FiniteSnapshot> FinitePartSolver::solve(const FiniteSnapshot& from
   iterate.at.pose = target.pose;
   iterate.least = gel_.problem.smallest_volume_ratio(from.elastic);
   evaluate(nullptr, iterate, effort);
+  iterate.least_size = kAtRest * iterate.size;
   Eigen::VectorXd last_change;
   double factor = 1.0;
   double error = kInfinity;

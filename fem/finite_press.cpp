@@ -23,15 +23,17 @@ constexpr int kResolvedVertices = 13;  // as in press_report.cpp
 struct Effort {
   PartEffort part;
   int parts = 0;
+  double clear = 0.0;  // share of the step before the touch
 };
 
 }  // namespace
 
 struct FinitePress::Parts {
-  Parts(const FiniteGel& on, ContactShape shape, double mu, PressTolerance wanted)
+  Parts(const FiniteGel& on, ContactShape shape, double mu, PressTolerance wanted, PronySeries relaxing)
       : gel(on),
         friction(mu),
         tolerance(wanted),
+        series(std::move(relaxing)),
         solver(on, std::move(shape), mu, wanted),
         n(static_cast<int>(gel.rest.vertices.size())) {
     mass.compute(gel.mass);
@@ -43,15 +45,18 @@ struct FinitePress::Parts {
   const FiniteGel& gel;
   double friction;
   PressTolerance tolerance;
+  PronySeries series;
   FinitePartSolver solver;
   int n;
   SurfaceMassFactor mass;
   FiniteSnapshot now;
+  RelaxationHistory history;  ///< of the tractions' rows and the wrench; empty if the gel doesn't relax
   bool placed = false;
   PressState state;
 
   double overlap(const RigidTransform& pose) const { return solver.overlap(pose); }
   void refuse_too_deep(const RigidTransform& pose) const;
+  void refuse_way_through(const RigidTransform& pose) const;
   std::optional<FiniteSnapshot> advance(const FiniteSnapshot& start, const PartTarget& target,
                                         const FiniteSnapshot& from, double begin, double end, int halvings,
                                         Effort& effort);
@@ -59,11 +64,26 @@ struct FinitePress::Parts {
   std::optional<RigidTransform> straight_above(RigidTransform pose) const;
   FiniteSnapshot follow(const PressTarget& target, Effort& effort);
   PressState report(const FiniteSnapshot& at) const;
+  Eigen::Vector3d elastic_force(const PressTarget& target, const PartTarget& to) const;
+  void relax(double seconds, double clear, PressState& elastic);
 };
 
 void FinitePress::Parts::refuse_too_deep(const RigidTransform& pose) const {
   const double depth = overlap(pose);
   if (depth > gel.thickness) fail("the object reaches {:.4g} mm into a gel of {:.4g} mm", depth, gel.thickness);
+}
+
+/// A body that has gone through a curved gel is beside it again: that isn't a way out.
+void FinitePress::Parts::refuse_way_through(const RigidTransform& pose) const {
+  if (!placed || !(pose.translation.z() < now.pose.translation.z())) return;
+  const double way = (pose.translation - now.pose.translation).norm();
+  const int parts = static_cast<int>(std::min(1000.0, std::ceil(4.0 * way / gel.thickness)));
+  for (int k = 1; k < parts; ++k) {
+    const double depth = overlap(between(now.pose, pose, static_cast<double>(k) / parts));
+    if (depth > 0.45 * gel.thickness) {
+      fail("the object goes through the gel: it reaches {:.4g} mm into {:.4g} mm on its way", depth, gel.thickness);
+    }
+  }
 }
 
 /// From the share `begin` of the way from `start` to the target to the share `end`, halved where it doesn't converge.
@@ -113,6 +133,7 @@ FiniteSnapshot FinitePress::Parts::follow(const PressTarget& target, Effort& eff
     to.forced[a] = target.axis[a].kind == AxisControl::Kind::force;
     (to.forced[a] ? to.force[a] : to.pose.translation[a]) = target.axis[a].value;
   }
+  if (!series.empty()) to.force = elastic_force(target, to);
   double shear = 0.0;
   for (int a = 0; a < 2; ++a) {
     if (to.forced[a]) shear = std::hypot(shear, to.force[a]);
@@ -130,6 +151,13 @@ FiniteSnapshot FinitePress::Parts::follow(const PressTarget& target, Effort& eff
   // A forced axis that nothing can push on stays where it is: without friction, along the surface.
   for (int a = 0; a < 2 && friction == 0.0; ++a) to.forced[a] = false;
 
+  if (!to.forced[2] && !(overlap(to.pose) > 0.0)) {
+    refuse_way_through(to.pose);
+    if (shear > 0.0) {
+      fail("gross slip: a shear force of {:.6g} N is wanted, but the object doesn't touch the gel", shear);
+    }
+    return untouched(gel, to.pose);
+  }
   FiniteSnapshot start = now;
   const bool no_force = to.forced[2] && to.force[2] == 0.0;
   if (!now.touching || no_force) {
@@ -140,12 +168,6 @@ FiniteSnapshot FinitePress::Parts::follow(const PressTarget& target, Effort& eff
       to.pose = *touch;
     } else {
       refuse_too_deep(to.pose);
-      if (!(overlap(to.pose) > 0.0)) {
-        if (shear > 0.0) {
-          fail("gross slip: a shear force of {:.6g} N is wanted, but the object doesn't touch the gel", shear);
-        }
-        return untouched(gel, to.pose);
-      }
       if (placed && !(overlap(now.pose) > 0.0)) {
         double clear = 0.0;
         double overlapping = 1.0;
@@ -154,6 +176,7 @@ FiniteSnapshot FinitePress::Parts::follow(const PressTarget& target, Effort& eff
           (overlap(between(now.pose, to.pose, middle)) > 0.0 ? overlapping : clear) = middle;
         }
         touch = between(now.pose, to.pose, clear);
+        effort.clear = clear;
       }
     }
     start = untouched(gel, touch ? *touch : to.pose);
@@ -244,10 +267,50 @@ PressState FinitePress::Parts::report(const FiniteSnapshot& at) const {
   return s;
 }
 
-FinitePress::FinitePress(const FiniteGel& gel, ContactShape shape, double friction, PressTolerance tolerance) {
+/// The forces on the elastic gel that the wanted ones take, with what the gel remembers.
+Eigen::Vector3d FinitePress::Parts::elastic_force(const PressTarget& target, const PartTarget& to) const {
+  const RelaxationStep step = relaxation_step(series, target.seconds);
+  const Eigen::VectorXd rest = carried_over(step, history, 3 * n + 6);
+  Eigen::Vector3d force = to.force;
+  for (int a = 0; a < 3; ++a) {
+    // None is none: a gel that isn't pushed comes back with nothing on it.
+    if (to.forced[a] && to.force[a] != 0.0) force[a] = (to.force[a] - rest[3 * n + a]) / step.stiffness;
+  }
+  return force;
+}
+
+/// From the elastic gel's tractions and wrench to those of the gel that relaxes.
+void FinitePress::Parts::relax(double seconds, double clear, PressState& elastic) {
+  Eigen::VectorXd now_elastic(3 * n + 6);
+  for (int v = 0; v < n; ++v) now_elastic.segment<3>(3 * v) = elastic.traction.row(v).transpose();
+  now_elastic.tail<6>() = elastic.wrench;
+  if (clear > 0.0) {  // nothing touches yet: what was there recovers
+    const RelaxationStep before = relaxation_step(series, clear * seconds);
+    history = after_step(before, history, carried_over(before, history, now_elastic.size()));
+  }
+  const RelaxationStep step = relaxation_step(series, (1.0 - clear) * seconds);
+  const Eigen::VectorXd relaxed = step.stiffness * now_elastic + carried_over(step, history, now_elastic.size());
+  history = after_step(step, history, relaxed);
+  elastic.largest_tension = 0.0;
+  const bool pulls = !(relaxed[3 * n + 2] > 0.0);
+  elastic.traction.setZero();
+  for (int v = 0; v < n && !pulls; ++v) {
+    if (elastic.node_state[v] == NodeState::open) continue;
+    elastic.traction.row(v) = relaxed.segment<3>(3 * v).transpose();
+    const double pressure = elastic.traction.row(v).dot(now.gap.direction.row(v).normalized());
+    elastic.largest_tension = std::max(elastic.largest_tension, -pressure);
+  }
+  elastic.wrench.setZero();
+  if (!pulls) elastic.wrench = relaxed.tail<6>();
+  elastic.bodies.front().wrench = elastic.wrench;
+}
+
+FinitePress::FinitePress(const FiniteGel& gel, ContactShape shape, double friction, PressTolerance tolerance,
+                         PronySeries relaxation) {
   check_shape(shape);
+  check(relaxation);
   if (!(friction >= 0.0)) fail("the friction coefficient is {}, it must be at least 0", friction);
-  parts_ = std::make_unique<Parts>(gel, std::move(shape), friction, tolerance);
+  parts_ = std::make_unique<Parts>(gel, std::move(shape), friction, tolerance, std::move(relaxation));
 }
 
 FinitePress::FinitePress(FinitePress&&) noexcept = default;
@@ -262,9 +325,11 @@ const PressState& FinitePress::step(const PressTarget& target) {
   p.now = std::move(next);
   p.placed = true;
   p.state = p.report(p.now);
+  if (!p.series.empty()) p.relax(target.seconds, effort.clear, p.state);
   for (int a = 0; a < 3; ++a) {
     if (target.axis[a].kind == AxisControl::Kind::force) {
-      p.state.force_residual = std::max(p.state.force_residual, std::abs(p.now.force[a] - target.axis[a].value));
+      const double force = p.series.empty() ? p.now.force[a] : p.state.wrench[a];
+      p.state.force_residual = std::max(p.state.force_residual, std::abs(force - target.axis[a].value));
     }
   }
   p.state.candidates = effort.part.candidates;
@@ -278,6 +343,10 @@ const PressState& FinitePress::step(const PressTarget& target) {
 
 const PressState& FinitePress::state() const {
   return parts_->state;
+}
+
+std::optional<RigidTransform> FinitePress::touching(const RigidTransform& pose) const {
+  return parts_->straight_above(pose);
 }
 
 const ElasticSolution& FinitePress::solution() const {

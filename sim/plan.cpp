@@ -150,9 +150,8 @@ void plan_mechanics(const SceneSpec& scene, Plan& plan, PlanTable& table) {
                                      "the vibration's force; allowed is {:.2g} %",
                                      frequency, frequency / std::sqrt(missing), 100 * missing, 100 * kAllowedInertia),
       "the gel's modes once (half a minute, kept in the cache), then milliseconds a frame");
-  if (plan.finite_strain && (plan.relaxation || plan.inertia)) {
-    fail_at(scene.where, "effects.elasticity: neo_hookean goes without {}; switch one of them off",
-            plan.relaxation ? "relaxation" : "inertia");
+  if (plan.finite_strain && plan.inertia) {
+    fail_at(scene.where, "effects.elasticity: neo_hookean goes without inertia; switch one of them off");
   }
   if (plan.finite_strain && scene.device.mesh.force_error) {
     fail_at(scene.where, "effects.elasticity: neo_hookean needs a mesh that is given by fine_mm");

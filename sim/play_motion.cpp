@@ -25,7 +25,7 @@ class PlannedPress {
       TS_ASSERT(bodies.size() == 1);
       finite_gel_ = set_up_finite_gel(scene.device);
       TS_ASSERT(finite_gel_->rest.vertices == gel.vertices);
-      finite_.emplace(*finite_gel_, bodies.front().shape, bodies.front().friction);
+      finite_.emplace(*finite_gel_, bodies.front().shape, bodies.front().friction, fem::PressTolerance{}, relaxation);
     } else {
       linear_.emplace(gel, std::move(bodies), fem::PressTolerance{}, relaxation);
     }

@@ -62,6 +62,18 @@ TEST(FinitePress, AMissGivesExactlyZero) {
   }
 }
 
+/// A gel at rest has no forces that a residual could be measured by.
+TEST(FinitePress, LetGoTheGelComesToRest) {
+  const FiniteGel gel(pad(6), kSoft, {}, kThickness);
+  FinitePress press(gel, SphereShape{kRadius}, 0.0);
+  for (const double depth : {-0.5, 0.0, 1e-3}) {
+    EXPECT_GT(press.step(sphere_at(0.5)).wrench[2], 0.1);
+    const PressState& state = press.step(sphere_at(depth));
+    EXPECT_LT(state.wrench[2], 1e-3) << depth;
+    EXPECT_LT(state.factorisations, 30) << depth;
+  }
+}
+
 /// The weighted gap of the gel at rest is the linear press's own.
 TEST(FinitePress, TheGapAtRestIsTheLinearOne) {
   const FiniteGel& gel = soft_gel();

@@ -39,7 +39,10 @@ TEST(Plan, FiniteStrainIsOnWhereTheSceneAsksForIt) {
   const Plan plan = make_plan(scene);
   EXPECT_TRUE(plan.finite_strain);
   EXPECT_THAT(effect(plan, "finite strain").why, HasSubstr("the scene asks for"));
-  scene.effects.relaxation = Switch::on;
+  EXPECT_FALSE(plan.relaxation);
+  scene.device.gel.relaxation = {{0.2, 1.0}};
+  EXPECT_TRUE(make_plan(scene).relaxation);
+  scene.effects.inertia = Switch::on;
   EXPECT_THROW(make_plan(scene), Error);
 }
 
