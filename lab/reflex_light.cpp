@@ -57,7 +57,7 @@ void make_black(render::Surface& surface) {
 sim::VisibleGel visible_skin(const fem::FiniteGel& gel, const fem::GelBody& body) {
   fem::Compliance outer;  // of which only the surface is asked for
   outer.thickness = gel.thickness;
-  outer.vertices = gel.outer.vertices;
+  for (const int vertex : gel.outer.mesh_vertex) outer.vertices.push_back(gel.mesh.vertices[vertex]);
   outer.triangles = gel.outer.triangles;
   outer.mass = gel.mass;
   return sim::VisibleGel(outer, body);

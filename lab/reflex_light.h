@@ -2,8 +2,9 @@
 // The light that the reflex fingertip's skin sends to the chip behind it.
 //
 // Nothing in the fingertip casts shadows and its walls are black, so the light is direct light with the little that
-// bounces off the skin at rest (render/direct_renderer.h), of many rays a pixel, through all of the lens. Whose skin it
-// is doesn't matter: any sheet whose vertices have the rest's triangles, from finite presses or linear ones.
+// bounces off the skin at rest (render/direct_renderer.h), on a grid finer than the chip's pixels. It is smooth in the
+// skin's motion: what lies between two near states is a line to a fraction of a number. Whose skin it is doesn't
+// matter: any sheet whose vertices have the rest's triangles, from finite presses or linear ones.
 
 #include <memory>
 #include <opencv2/core/mat.hpp>
@@ -22,9 +23,14 @@ namespace touchstone::lab {
 
 struct ReflexLightSettings {
   double lamp_level = 1.0;  ///< of the lamps' power; 0: they're off
-  int side = 4;             ///< a pixel is cut into side x side, 1 to 16
-  int rays = 64;            ///< through each of them, 1 to 64
-  std::uint64_t seed = 1;   ///< of the rays
+  /// A pixel is cut into side x side, 1 to 16. With 8 the lens's blur is just below 4 of them, up to where rims of dots
+  /// get 16 rays a part (DirectSettings::edge_side): 0.5 to 1.2 % off path tracing (root mean square). Of 4 and of 16,
+  /// it's 2 %, and less smooth.
+  int side = 8;
+  /// Through each of them, 1 to 64. With 1 the lens's blur is that of the skin at rest. More sample pixel and lens, at
+  /// many times the cost: 64 through 4x4 parts come as near to path tracing as 1 through 8x8.
+  int rays = 1;
+  std::uint64_t seed = 1;  ///< of the rays
 };
 
 /// A finite gel's skin for cameras.

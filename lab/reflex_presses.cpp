@@ -14,6 +14,8 @@ constexpr double kMostTilt_deg = 30.0;
 constexpr double kPublishedScale_N = 1.1293;
 constexpr double kPublishedRate_per_mm = 0.4677;
 constexpr double kPublishedDeepest_mm = 5.0;
+constexpr double kMeshError = 0.01;
+constexpr double kLeastMeshError_N = 0.02;
 
 void check_above_zero(const char* name, double value) {
   if (!(value > 0.0 && std::isfinite(value))) {
@@ -103,6 +105,10 @@ sim::PressPath press_and_shear(const ReflexPress& press, const ReflexShear& shea
 
 double published_reflex_force(double z_mm) {
   return z_mm > 0.0 ? kPublishedScale_N * std::expm1(kPublishedRate_per_mm * z_mm) : 0.0;
+}
+
+sim::ForceLaw reflex_law(const ReflexPress& press, const sim::PlayedPath& played) {
+  return sim::force_law(press_down(press), played, kMeshError, kLeastMeshError_N);
 }
 
 double reflex_law_rms(const sim::ForceLaw& law, int count) {

@@ -26,7 +26,7 @@ namespace touchstone::render {
 struct ChipShutter {
   bool automatic = true;       ///< false: always the longest
   int darkest_maximum = 45;    ///< below it the exposure grows by 1/16, up to the longest
-  int brightest_maximum = 60;  ///< above it the exposure falls by 1/16
+  int brightest_maximum = 62;  ///< above it the exposure falls by 1/16
 };
 
 struct MotionChipSettings {

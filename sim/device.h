@@ -146,7 +146,7 @@ EnumNames<CameraType> enum_names(CameraType);
 struct MotionChipSpec {
   bool automatic_shutter = true;
   int darkest_maximum = 45;
-  int brightest_maximum = 60;
+  int brightest_maximum = 62;
   SourceLocation where;
 };
 

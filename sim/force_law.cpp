@@ -34,6 +34,10 @@ double ForceLaw::force(double depth) const {
   return force_N[k - 1] + share_of(depth_mm, k, depth) * (force_N[k] - force_N[k - 1]);
 }
 
+double ForceLaw::error(double depth) const {
+  return depth <= 0.0 ? 0.0 : std::max(least_error_N, relative_error * force(depth));
+}
+
 double ForceLaw::stiffness(double depth) const {
   if (depth <= 0.0) return 0.0;
   const std::size_t k = piece_of(depth_mm, depth, "depths", "mm");
@@ -60,12 +64,14 @@ double ForceLaw::depth(double force) const {
   return depth_mm[k - 1] + share_of(force_N, k, force) * (depth_mm[k] - depth_mm[k - 1]);
 }
 
-ForceLaw force_law(const PressPath& path, const PlayedPath& played, double relative_error) {
+ForceLaw force_law(const PressPath& path, const PlayedPath& played, double relative_error, double least_error_N) {
   TS_ASSERT(played.states.size() <= path.points.size());
-  if (!(relative_error >= 0.0 && std::isfinite(relative_error))) {
-    fail("the force law's relative error is {}, it must be finite and at least 0", relative_error);
+  for (const double error : {relative_error, least_error_N}) {
+    if (!(error >= 0.0 && std::isfinite(error))) {
+      fail("an error of the force law is {}, it must be finite and at least 0", error);
+    }
   }
-  ForceLaw law{{0.0}, {0.0}, relative_error};
+  ForceLaw law{{0.0}, {0.0}, relative_error, least_error_N};
   for (std::size_t k = 0; k < played.states.size(); ++k) {
     const Eigen::Vector3d& shift = path.points[k].shift_mm;
     if (shift.head<2>().norm() > kStraight) {

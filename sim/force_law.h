@@ -13,7 +13,12 @@ namespace touchstone::sim {
 struct ForceLaw {
   std::vector<double> depth_mm;  ///< from 0, rising
   std::vector<double> force_N;   ///< beginning with 0
-  double relative_error = 0.0;   ///< one standard error of the forces, of the mesh they were computed on
+  // One standard error of the forces, of the mesh that they were computed on:
+  double relative_error = 0.0;
+  double least_error_N = 0.0;
+
+  /// N, the larger of the two. @throws Error as force
+  double error(double depth) const;
 
   /// N. @throws Error beyond the last depth, or for NaN
   double force(double depth) const;
@@ -26,9 +31,9 @@ struct ForceLaw {
 };
 
 /// The normal forces of a straight press whose points' shifts go down from the touch; points above it are left out.
-/// @throws Error if there is no state below the touch, one moves sideways or goes up again, or the error isn't finite
-/// or is negative
-ForceLaw force_law(const PressPath& path, const PlayedPath& played, double relative_error);
+/// @throws Error if there is no state below the touch, one moves sideways or goes up again, or an error isn't
+/// finite or is negative
+ForceLaw force_law(const PressPath& path, const PlayedPath& played, double relative_error, double least_error_N);
 
 /// The force of a law along any history of depths on a gel that relaxes: the hereditary integral of the law's forces,
 /// as in fem::FinitePress. So the gel comes back with the object, and never pulls: where the integral is below zero,

@@ -33,10 +33,11 @@ TEST(ReflexPresses, ThePlatesForceIsTheTextsLaw) {
   ReflexPress press;
   press.step_mm = 0.5;
   press.friction = 0.0;  // it adds 0.02 N at most and makes it three times as dear
-  const sim::PressPath path = press_down(press);
-  const sim::PlayedPath played = sim::play_path(*gel, path);
+  const sim::PlayedPath played = sim::play_path(*gel, press_down(press));
   ASSERT_EQ(played.stopped, "");
-  const sim::ForceLaw law = sim::force_law(path, played, kReflexMeshError);
+  const sim::ForceLaw law = reflex_law(press, played);
+  EXPECT_NEAR(law.error(5.0), 0.01 * law.force(5.0), 1e-12);
+  EXPECT_EQ(law.error(0.5), 0.02);
   const double rms = reflex_law_rms(law, 11);
   RecordProperty("rms_N", std::to_string(rms));
   EXPECT_LT(rms, kReflexLawRms_N);

@@ -3,9 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
+#include <cstring>
 #include <fstream>
 
 #include "core/error.h"
+#include "core/sha256.h"
 #include "core/whole_file.h"
 #include "fem/finite_press.h"
 #include "sim/force_law.h"
@@ -164,11 +167,20 @@ TEST(PressPath, ADamagedCacheIsntUsed) {
   flipped[whole.size() / 2] = static_cast<char>(flipped[whole.size() / 2] ^ 1);
   std::string nameless = whole;
   nameless[0] = 'X';
+  // Sealed anew, but the first matrix has other sizes: its rows and columns follow the mark and the key.
+  const auto resized = [&](std::int64_t rows, std::int64_t columns) {
+    std::string changed = whole.substr(0, whole.size() - 64);
+    std::memcpy(changed.data() + 8 + 64, &rows, sizeof(rows));
+    std::memcpy(changed.data() + 8 + 64 + sizeof(rows), &columns, sizeof(columns));
+    return changed + sha256_of(changed);
+  };
   for (const auto& [content, why] : {std::pair{whole.substr(0, 40), std::string("it ends early")},
                                      {nameless, "it isn't a path's presses"},
                                      {flipped, "its checksum is wrong"},
                                      {whole.substr(0, whole.size() - 8), "its checksum is wrong"},
-                                     {stranger, "it belongs to another gel or path"}}) {
+                                     {stranger, "it belongs to another gel or path"},
+                                     {resized(17, 2), "its matrices don't fit each other"},
+                                     {resized(1'000'000'000, 1), "it ends early"}}) {
     write_whole_file(player.file_of(path), content);
     const PlayedPath anew = player.play(path);
     EXPECT_NE(anew.note.find(why), std::string::npos) << anew.note;
@@ -244,17 +256,20 @@ TEST(ForceLaw, ComesOfAStraightPressOnly) {
     played.states.emplace_back();
     played.states.back().wrench[2] = -point.shift_mm.z();
   }
-  EXPECT_NE(message_of([&] { force_law(path, played, 0.01); }).find("sideways"), std::string::npos);
+  EXPECT_NE(message_of([&] { force_law(path, played, 0.01, 0.02); }).find("sideways"), std::string::npos);
   played.at.pop_back();
   played.states.pop_back();
-  const ForceLaw law = force_law(path, played, 0.01);
+  const ForceLaw law = force_law(path, played, 0.01, 0.02);
   EXPECT_EQ(law.depth_mm, (std::vector<double>{0.0, 0.4, 0.8}));
   EXPECT_EQ(law.force_N, (std::vector<double>{0.0, 0.4, 0.8}));
-  EXPECT_EQ(law.relative_error, 0.01);
-  EXPECT_NE(message_of([&] { force_law(path, played, -0.1); }).find("relative error"), std::string::npos);
+  EXPECT_EQ(law.error(0.0), 0.0);
+  EXPECT_EQ(law.error(0.4), 0.02);
+  EXPECT_EQ(force_law(path, played, 0.1, 0.02).error(0.8), 0.1 * 0.8);
+  EXPECT_NE(message_of([&] { force_law(path, played, -0.1, 0.0); }).find("an error of the force law"),
+            std::string::npos);
   path.points[2].shift_mm.z() = -0.1;
-  EXPECT_NE(message_of([&] { force_law(path, played, 0.0); }).find("goes down"), std::string::npos);
-  EXPECT_NE(message_of([&] { force_law(path, PlayedPath{}, 0.0); }).find("there are none"), std::string::npos);
+  EXPECT_NE(message_of([&] { force_law(path, played, 0.0, 0.0); }).find("goes down"), std::string::npos);
+  EXPECT_NE(message_of([&] { force_law(path, PlayedPath{}, 0.0, 0.0); }).find("there are none"), std::string::npos);
 }
 
 TEST(RelaxingForce, WithoutASeriesItIsTheLaw) {
@@ -286,7 +301,7 @@ TEST(RelaxingForce, IsTheForceOfAPressThatRelaxes) {
   const fem::PronySeries series = {{0.3, 0.5}};
   PressPath path = ball_path();
   path.points = {{0.2, {0, 0, -0.2}}, {0.4, {0, 0, -0.4}}, {0.6, {0, 0, -0.6}}};
-  RelaxingForce cheap(force_law(path, play_path(*gel, path), 0.0), series);
+  RelaxingForce cheap(force_law(path, play_path(*gel, path), 0.0, 0.0), series);
   fem::FinitePress press(*gel, shape_of(path), path.friction, {}, series);
   const RigidTransform touch = *press.touching({path.rotation, {0.1, -0.2, 0.0}});
   for (const auto& [depth, seconds] : {std::pair{0.2, 0.1}, {0.4, 0.1}, {0.6, 0.1}, {0.6, 1.0}}) {

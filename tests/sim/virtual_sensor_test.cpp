@@ -76,6 +76,29 @@ TEST(PlayMotion, FiniteStrainChangesALargePressAndHardlyASmallOne) {
   EXPECT_EQ(finite[2].press.bead_displacement.rows(), linear.truths[2].press.bead_displacement.rows());
 }
 
+TEST(PlayMotion, AGelAtFiniteStrainRelaxesWhereItStands) {
+  const std::string keys = "  - {frames: 1, z: {position_mm: 4.4}}\n  - {frames: 3, z: {position_mm: 4.4}}\n";
+  SceneSpec scene = small_scene(keys);
+  scene.effects.elasticity = Elasticity::neo_hookean;
+  scene.object.shape.type = ShapeKind::sphere;
+  scene.object.shape.radius_mm = 5.0;
+  scene.motion.start_mm.z() = 5.5;
+  scene.device.mesh.fine_mm = 1.6;
+  scene.device.mesh.coarse_mm = 3.0;
+  const auto gel = set_up_gel(scene.device, cache().path());
+  const std::vector<Truth> elastic = play_motion(scene, make_plan(scene), *gel);
+  scene.device.gel.relaxation = {{0.4, 0.05}};
+  const std::vector<Truth> relaxing = play_motion(scene, make_plan(scene), *gel);
+  ASSERT_EQ(relaxing.size(), 5u);
+  EXPECT_NEAR(elastic[4].press.wrench[2], elastic[1].press.wrench[2], 1e-6);
+  EXPECT_LT(relaxing[1].press.wrench[2], elastic[1].press.wrench[2]) << "some of it fades during the press";
+  for (int k = 2; k < 5; ++k) {
+    EXPECT_LT(relaxing[k].press.wrench[2], relaxing[k - 1].press.wrench[2]);
+    EXPECT_GT(relaxing[k].press.wrench[2], 0.6 * elastic[k].press.wrench[2]);
+    EXPECT_EQ(relaxing[k].press.surface_displacement, elastic[k].press.surface_displacement);
+  }
+}
+
 TEST(PlayMotion, TimesAreThoseOfTheFrameRate) {
   const Played p = play("  - {frames: 3, z: {position_mm: 0.4}}\n");
   EXPECT_EQ(p.truths[0].t_us, 0);
