@@ -12,7 +12,7 @@ namespace touchstone::lab {
 struct ActuatorSettings {
   double mass_kg = 0.5;
   /// What its motor can do, in mm/s^2 of this mass: brakes and drives are both held to it.
-  double most_acceleration_mm_s2 = 5000.0;
+  double most_acceleration_mm_s2 = 20000.0;
   /// Proportional gain of the velocity's control, so a lag of 2 ms; its integral's is a quarter of the square, which
   /// damps it critically. The integral starts anew with a brake.
   double velocity_gain_per_s = 500.0;

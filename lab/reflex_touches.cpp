@@ -90,7 +90,7 @@ const ReflexTouch& ReflexBench::touch(const std::string& name) const {
 
 ReflexBench set_up_reflex_bench(const sim::DeviceSpec& device, const std::filesystem::path& cache_folder,
                                 std::span<const ReflexTouchSpec> specs, const ReflexLightSettings& light,
-                                const Progress& progress) {
+                                const ReflexWaySettings& way, const Progress& progress) {
   ReflexBench bench;
   bench.device = device;
   sim::PathPlayer player(device, cache_folder);
@@ -110,25 +110,26 @@ ReflexBench set_up_reflex_bench(const sim::DeviceSpec& device, const std::filesy
 
   const auto gel = sim::set_up_finite_gel(device);
   const sim::VisibleGel skin = visible_skin(*gel, sim::gel_body(device));
-  std::vector<std::vector<sim::GelSheet>> sheets(specs.size());
-  std::vector<sim::GelSheet> reached;
   for (std::size_t i = 0; i < specs.size(); ++i) {
+    if (progress) progress("light of touches", static_cast<std::int64_t>(i), static_cast<std::int64_t>(specs.size()));
     const fem::ContactShape shape = shape_of(specs[i].path);
-    for (const fem::PressState& state : played[i].states) sheets[i].push_back(skin_sheet(skin, state, shape));
-    if (i == 0) reached.push_back(sheets[i].back());
-    for (const sim::GelSheet& sheet : sheets[i]) reached.push_back(sheet);
-  }
-  const ReflexLight optics(device, sheets.front().front(), reached, light);
-  bench.light_error = optics.error();
-  bench.chip = sim::motion_chip(device, optics.bands(), true);
-
-  for (std::size_t i = 0; i < specs.size(); ++i) {
-    const fem::ContactShape shape = shape_of(specs[i].path);
+    // The deepest first: the light's error is measured on it.
+    std::vector<sim::GelSheet> reached;
+    for (auto state = played[i].states.rbegin(); state != played[i].states.rend(); ++state) {
+      reached.push_back(skin_sheet(skin, *state, shape));
+    }
+    const sim::GelSheet rest = reached.back();
+    // A light field for each touch: that of all of them would be a much larger one.
+    const ReflexLight optics(device, rest, reached, light);
+    if (i == 0) {
+      bench.light_error = optics.error();
+      bench.chip = sim::motion_chip(device, optics.bands(), true);
+    }
     const ReflexWay::Picture picture = [&](double place) {
       return optics.irradiance(skin_sheet(skin, played[i].state(place), shape));
     };
-    if (progress) progress("light of touches", static_cast<std::int64_t>(i), static_cast<std::int64_t>(specs.size()));
-    ReflexTouch touch{specs[i].name, played[i].at, {}, ReflexWay(picture, played[i].at, bench.chip), played[i].stopped};
+    ReflexTouch touch{
+        specs[i].name, played[i].at, {}, ReflexWay(picture, played[i].at, bench.chip, way), played[i].stopped};
     for (std::size_t k = 0; k < played[i].states.size(); ++k) {
       touch.states.push_back(truth_of(specs[i].path.points[k], played[i].states[k]));
     }

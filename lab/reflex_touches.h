@@ -45,9 +45,9 @@ struct ReflexTouchSpec {
   sim::PressPath path;
 };
 
-/// The touches of the rows. In full: a plate straight down to 5 mm ("plate"), held-out loads to 4 mm ("tilt", 10 degrees;
-/// "ball"; "cylinder"), and shear of 1.5 mm to and fro ("shear-x-2", "shear-x-4", "shear-y-2", "shear-y-4" and, to be
-/// tested on, "shear-45-3": direction and depth in mm). In the quick form the plate alone, in larger steps.
+/// The touches of the rows. In full: a plate straight down to 5 mm ("plate"), held-out loads to 4 mm ("tilt", 10
+/// degrees; "ball"; "cylinder"), and shear of 1.5 mm to and fro ("shear-x-2", "shear-x-4", "shear-y-2", "shear-y-4"
+/// and, to be tested on, "shear-45-3": direction and depth in mm). In the quick form the plate alone, in larger steps.
 std::vector<ReflexTouchSpec> reflex_row_touches(bool quick);
 
 /// The device, its chip and its touches. Immutable.
@@ -63,10 +63,10 @@ struct ReflexBench {
   render::MotionChip start_chip(std::uint64_t noise_seed) const { return {chip, 1, noise_seed}; }
 };
 
-/// Plays all paths (or takes them from the cache) and makes their light. `lamps`: the lamps' level, 0 for none.
+/// Plays all paths (or takes them from the cache) and makes their light.
 /// @throws Error as its parts, for a path that doesn't begin with a touch at 0, and if none has two states
 ReflexBench set_up_reflex_bench(const sim::DeviceSpec& device, const std::filesystem::path& cache_folder,
                                 std::span<const ReflexTouchSpec> specs, const ReflexLightSettings& light = {},
-                                const Progress& progress = {});
+                                const ReflexWaySettings& way = {}, const Progress& progress = {});
 
 }  // namespace touchstone::lab

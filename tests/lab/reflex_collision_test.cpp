@@ -32,7 +32,7 @@ TEST(ReflexCollision, WithoutForceTheBrakingDistanceIsThatOfTheBrake) {
   };
   const Collision run = play_collision(settings, kNoForce, at_once);
   const double travelled_until_brake_mm = 100.0 * (*run.brake_s - run.touch_s);
-  const double braking_mm = 100.0 * 100.0 / (2.0 * 5000.0);
+  const double braking_mm = 100.0 * 100.0 / (2.0 * 20000.0);
   EXPECT_NEAR(run.peak_press_mm, travelled_until_brake_mm + braking_mm, 0.01);
   EXPECT_NEAR(run.touch_s, 0.05, 1e-12);
   // Touch within a frame, sent at its end, a millisecond of bus.
