@@ -91,6 +91,7 @@ const ReflexTouch& ReflexBench::touch(const std::string& name) const {
 ReflexBench set_up_reflex_bench(const sim::DeviceSpec& device, const std::filesystem::path& cache_folder,
                                 std::span<const ReflexTouchSpec> specs, const ReflexLightSettings& light,
                                 const ReflexWaySettings& way, const Progress& progress) {
+  if (specs.empty()) fail("a bench needs a touch");
   ReflexBench bench;
   bench.device = device;
   sim::PathPlayer player(device, cache_folder);
@@ -106,7 +107,6 @@ ReflexBench set_up_reflex_bench(const sim::DeviceSpec& device, const std::filesy
            played.back().stopped);
     }
   }
-  if (specs.empty()) fail("a bench needs a touch");
 
   const auto gel = sim::set_up_finite_gel(device);
   const sim::VisibleGel skin = visible_skin(*gel, sim::gel_body(device));
