@@ -143,8 +143,8 @@ void FinitePartSolver::evaluate(const GapLines* held, Iterate& iterate, PartEffo
   const FiniteStrain::Residual residual = gel_.problem.residual(at.elastic);
   const Eigen::VectorXd outside = over_unknowns(gel_, nodal);
   iterate.inside = residual.values - over_unknowns(gel_, bulges);
-  const double size = std::max(residual.scale, outside.norm());
-  iterate.balance = size > 0.0 ? (iterate.inside - outside).norm() / size : 0.0;
+  iterate.size = std::max({residual.scale, outside.norm(), iterate.least_size});
+  iterate.balance = iterate.size > 0.0 ? (iterate.inside - outside).norm() / iterate.size : 0.0;
 }
 
 /// Vertices in contact and around it, and those that nearly touch.

@@ -18,7 +18,7 @@
 namespace touchstone::sim {
 
 /// Raised with each change of the file's layout, or of what fem::FinitePress answers.
-inline constexpr int kPressPathFormat = 1;
+inline constexpr int kPressPathFormat = 2;
 
 /// A state that is wanted on the way.
 struct PathPoint {
