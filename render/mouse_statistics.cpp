@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/core.hpp>
+#include <vector>
 
 #include "core/error.h"
 
@@ -11,24 +12,35 @@ namespace touchstone::render {
 int trackable_features(const cv::Mat& raw) {
   if (raw.type() != CV_8UC1)
     fail("features are counted in a grey picture of 8 bit numbers; this has type {}", raw.type());
-  constexpr double kLeastEigenvalue = 1.0;  // DN^2 per pixel^2
+  constexpr double kLeastEigenvalue = 1.0;    // DN^2 per pixel^2
+  constexpr double kTensorPart = 1.0 / 36.0;  // of products of differences over two pixels, summed over nine
+  const int rows = raw.rows - 2;              // where central differences can be had
+  const int columns = raw.cols - 2;
+  if (rows < 3 || columns < 3) return 0;
+  struct Products {
+    int xx, xy, yy;
+  };
+  std::vector<Products> products(static_cast<std::size_t>(rows) * columns);
+  for (int row = 0; row < rows; ++row) {
+    for (int column = 0; column < columns; ++column) {
+      const unsigned char* here = raw.ptr<unsigned char>(row + 1) + column;
+      const int dx = here[2] - here[0];
+      const int dy = raw.at<unsigned char>(row + 2, column + 1) - raw.at<unsigned char>(row, column + 1);
+      products[static_cast<std::size_t>(row) * columns + column] = {dx * dx, dx * dy, dy * dy};
+    }
+  }
   int features = 0;
-  for (int row = 2; row < raw.rows - 2; ++row) {
-    for (int column = 2; column < raw.cols - 2; ++column) {
-      double xx = 0.0;
-      double xy = 0.0;
-      double yy = 0.0;
+  for (int row = 1; row + 1 < rows; ++row) {
+    for (int column = 1; column + 1 < columns; ++column) {
+      Products sum{0, 0, 0};
       for (int y = row - 1; y <= row + 1; ++y) {
-        for (int x = column - 1; x <= column + 1; ++x) {
-          const double dx = 0.5 * (raw.at<unsigned char>(y, x + 1) - raw.at<unsigned char>(y, x - 1));
-          const double dy = 0.5 * (raw.at<unsigned char>(y + 1, x) - raw.at<unsigned char>(y - 1, x));
-          xx += dx * dx / 9.0;
-          xy += dx * dy / 9.0;
-          yy += dy * dy / 9.0;
+        const Products* of_row = products.data() + static_cast<std::size_t>(y) * columns + column;
+        for (int x = -1; x <= 1; ++x) {
+          sum = {sum.xx + of_row[x].xx, sum.xy + of_row[x].xy, sum.yy + of_row[x].yy};
         }
       }
-      const double smaller = 0.5 * (xx + yy) - std::hypot(0.5 * (xx - yy), xy);
-      if (smaller >= kLeastEigenvalue) ++features;
+      const double bend = std::hypot(0.5 * (sum.xx - sum.yy), sum.xy);
+      if (kTensorPart * (0.5 * (sum.xx + sum.yy) - bend) >= kLeastEigenvalue) ++features;
     }
   }
   return features;

@@ -179,6 +179,9 @@ TEST(ReflexLight, BadInputIsRefused) {
   bad = device();
   bad.lamps.clear();
   EXPECT_NE(message_of([&] { ReflexLight(bad, rest, reached); }).find("no lamps"), std::string::npos);
+  bad = device();
+  bad.lamps.front().count = 65;  // more beams than a direct renderer takes
+  EXPECT_NE(message_of([&] { ReflexLight(bad, rest, reached); }).find("direct light can't draw it"), std::string::npos);
   ReflexLightSettings settings;
   settings.rays = 65;
   EXPECT_NE(message_of([&] { ReflexLight(device(), rest, reached, settings); }).find("65"), std::string::npos);

@@ -352,7 +352,7 @@ TEST(CurvedGel, AFingertipIsAHemisphereOnACylinder) {
 
 TEST(CurvedGel, PrintMovesWithTheDome) {
   SceneSpec scene = scene_of(dome_device(), kPlate, 0, 0, 1.0 - 0.25);
-  scene.device.coating->print = PrintSpec{{3, 3}, {2.0, 2.0}, render::MarkShape::round, 0.5, 0.0, 0, 0.05};
+  scene.device.coating->print = PrintSpec{.grid = {3, 3}, .spacing_mm = {2.0, 2.0}, .width_mm = 0.5, .colour = 0.05};
   const Pressed dome(scene);
   const auto relief = dome.sight.relief(dome.press());
   const render::Scene seen = dome.sight.seen(dome.press(), relief);
