@@ -33,6 +33,7 @@ enum Seed : std::uint64_t {
   kTraining = 1,
   kTest,
   kLoads,
+  kMixed,
   kPictures,
   kStill,
   kRest,
@@ -121,13 +122,16 @@ sensors::ReflexModel add_reflex_rows(const ReflexBench& bench, const Scale& scal
                    Better::lower, kPublishedError_percent, false, other.error_percent);
   rows.add_bounded("again.rms_N", fmt::format("its force; with products {:.2f}", score_reflex(curved, again).rms_N),
                    "N", Better::lower, kPublishedRms_N, false, other.rms_N);
+  // Once along a touch's way, 1000 points.
+  const auto along = [&](const ReflexTouch& touch, std::uint64_t seed) {
+    constexpr int kPoints = 1000;
+    const double frames = (touch.end() + kGap_mm) / kSpeed_mm_s * bench.chip.frame_rate_Hz;
+    return record_points(bench, touch, one_way(-kGap_mm, touch.end(), kSpeed_mm_s), kPoints,
+                         std::max(static_cast<int>(frames / kPoints), 1), seed);
+  };
   for (const ReflexTouch& touch : bench.touches) {
     if (&touch == &plate) continue;
-    const bool shears = touch.name.rfind("shear", 0) == 0;
-    const ReflexMotion how =
-        shears ? one_way(-kGap_mm, touch.end(), kSpeed_mm_s) : reciprocation(-kGap_mm, touch.end(), kSpeed_mm_s);
-    const int every = shears ? 9 : scale.every;
-    const ReflexScore held = score_reflex(model, record_points(bench, touch, how, 1000, every, kLoads));
+    const ReflexScore held = score_reflex(model, along(touch, kLoads));
     rows.add_bounded(
         touch.name + ".missed_below_N",
         fmt::format("a load that nothing was learned from; {:.2f} mm, {}", held.missed_below_mm, says(held)), "N",
@@ -138,15 +142,12 @@ sensors::ReflexModel add_reflex_rows(const ReflexBench& bench, const Scale& scal
   // The remedy: learn from several loads.
   std::vector<ReflexPoint> mixed = training;
   for (const char* name : {"ball", "cylinder", "shear-x-4"}) {
-    const ReflexTouch& touch = bench.touch(name);
-    const auto more = record(touch, one_way(-kGap_mm, touch.end(), kSpeed_mm_s), kMixed);
+    const auto more = along(bench.touch(name), kMixed);
     mixed.insert(mixed.end(), more.begin(), more.end());
   }
   const sensors::ReflexModel broad = train_reflex(mixed, 2);
   for (const char* name : {"tilt", "shear-45-3"}) {
-    const ReflexTouch& touch = bench.touch(name);
-    const auto points = record_points(bench, touch, one_way(-kGap_mm, touch.end(), kSpeed_mm_s), 500, 9, kLoads);
-    const ReflexScore held = score_reflex(broad, points);
+    const ReflexScore held = score_reflex(broad, along(bench.touch(name), kLoads));
     rows.add_bounded(
         fmt::format("mixed.{}.rms_N", name),
         fmt::format("learned from plate, ball, cylinder and shear along x at 4 mm, with products, '{}': {}",
