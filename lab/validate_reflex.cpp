@@ -122,12 +122,11 @@ sensors::ReflexModel add_reflex_rows(const ReflexBench& bench, const Scale& scal
                    Better::lower, kPublishedError_percent, false, other.error_percent);
   rows.add_bounded("again.rms_N", fmt::format("its force; with products {:.2f}", score_reflex(curved, again).rms_N),
                    "N", Better::lower, kPublishedRms_N, false, other.rms_N);
-  // Once along a touch's way, 1000 points.
+  // Once along all of a touch's way, some 1000 points.
   const auto along = [&](const ReflexTouch& touch, std::uint64_t seed) {
-    constexpr int kPoints = 1000;
-    const double frames = (touch.end() + kGap_mm) / kSpeed_mm_s * bench.chip.frame_rate_Hz;
-    return record_points(bench, touch, one_way(-kGap_mm, touch.end(), kSpeed_mm_s), kPoints,
-                         std::max(static_cast<int>(frames / kPoints), 1), seed);
+    const int frames = static_cast<int>((touch.end() + kGap_mm) / kSpeed_mm_s * bench.chip.frame_rate_Hz);
+    const int every = std::max(frames / 1000, 1);
+    return record_points(bench, touch, one_way(-kGap_mm, touch.end(), kSpeed_mm_s), frames / every, every, seed);
   };
   for (const ReflexTouch& touch : bench.touches) {
     if (&touch == &plate) continue;
