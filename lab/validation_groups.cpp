@@ -16,6 +16,7 @@ std::vector<ValidationRow> validate_chroma_field(const ValidateOptions& options)
 std::vector<ValidationRow> validate_chroma_force(const ValidateOptions& options);
 std::vector<ValidationRow> validate_chroma_robustness(const ValidateOptions& options);
 std::vector<ValidationRow> validate_chroma_design(const ValidateOptions& options);
+std::vector<ValidationRow> validate_reflex(const ValidateOptions& options);
 std::vector<ValidationRow> validate_gelsight_light(const ValidateOptions& options);
 std::vector<ValidationRow> validate_gelsight_height(const ValidateOptions& options);
 std::vector<ValidationRow> validate_gelsight_dome(const ValidateOptions& options);
@@ -39,6 +40,7 @@ const std::vector<ValidationGroup>& validation_groups() {
       {"chroma.force", validate_chroma_force},
       {"chroma.robustness", validate_chroma_robustness},
       {"chroma.design", validate_chroma_design},
+      {"reflex", validate_reflex},
       {"gelsight.light", validate_gelsight_light},
       {"gelsight.height", validate_gelsight_height},
       {"gelsight.dome", validate_gelsight_dome},

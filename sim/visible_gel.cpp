@@ -201,12 +201,29 @@ GelSheet VisibleGel::sheet(const fem::PressState& press, std::span<const PlacedS
   std::vector<Above> above;
   for (const PlacedShape& body : bodies) above.emplace_back(body.shape, body.gel_from_object);
   const auto owner = [&](int vertex) { return bodies.size() == 1 ? 0 : press.node_owner[vertex]; };
+  // Where a body leans against a fingertip's side, the way along the side's normal runs beside its face, to tens of
+  // millimetres away: there the way is straight along z, if that's the shorter one.
+  const auto way_to = [&](std::size_t body, const Eigen::Vector3d& point, const Eigen::Vector3d& up) {
+    constexpr double kFar_mm = 1.0;
+    std::optional<std::pair<double, Eigen::Vector3d>> way;
+    if (const auto gap = above[body].gap(point, up)) way.emplace(*gap, up);
+    if (!way || std::abs(way->first) <= kFar_mm) return way;
+    const Eigen::Vector3d z = Eigen::Vector3d::UnitZ();
+    const auto straight = above[body].gap(point, z);
+    if (straight && std::abs(*straight) < std::abs(way->first)) way.emplace(*straight, z);
+    return way;
+  };
+  struct Nearest {
+    double gap;
+    Eigen::Vector3d way;
+    int body;
+  };
   // To the body that comes first on the way up, or reaches deepest.
   const auto nearest_gap = [&](const Eigen::Vector3d& point, const Eigen::Vector3d& up) {
-    std::optional<std::pair<double, int>> nearest;
+    std::optional<Nearest> nearest;
     for (std::size_t k = 0; k < above.size(); ++k) {
-      const std::optional<double> gap = above[k].gap(point, up);
-      if (gap && (!nearest || *gap < nearest->first)) nearest = {*gap, static_cast<int>(k)};
+      const auto way = way_to(k, point, up);
+      if (way && (!nearest || way->first < nearest->gap)) nearest = {way->first, way->second, static_cast<int>(k)};
     }
     return nearest;
   };
@@ -215,7 +232,8 @@ GelSheet VisibleGel::sheet(const fem::PressState& press, std::span<const PlacedS
   for (Eigen::Index i = 0; i < moved.rows(); ++i) {
     if (!touches(static_cast<int>(i))) continue;
     const Eigen::Vector3d point = (rest_.row(i) + moved.row(i)).transpose();
-    moved.row(i) += above[owner(static_cast<int>(i))].gap(point, up_.row(i).transpose()).value_or(0.0) * up_.row(i);
+    const auto way = way_to(static_cast<std::size_t>(owner(static_cast<int>(i))), point, up_.row(i).transpose());
+    if (way) moved.row(i) += (way->first * way->second).transpose();
   }
   const Eigen::MatrixX3d fine = fine_rest_ + fine_from_coarse_ * moved;
 
@@ -239,9 +257,9 @@ GelSheet VisibleGel::sheet(const fem::PressState& press, std::span<const PlacedS
     mesh.vertices[i] = fine.row(i).transpose();
     const Eigen::Vector3d up = fine_up_.row(i).transpose();
     const auto nearest = nearest_gap(mesh.vertices[i], up);
-    if (nearest && (in_contact[i] || nearest->first < kWettedMm)) {
-      mesh.vertices[i] += nearest->first * up;
-      touched[i] = nearest->second;
+    if (nearest && (in_contact[i] || nearest->gap < kWettedMm)) {
+      mesh.vertices[i] += nearest->gap * nearest->way;
+      touched[i] = nearest->body;
     }
   }
   mesh.triangles = fine_;

@@ -11,6 +11,7 @@
 #include "sensors/height_estimator.h"
 #include "sensors/incipient_slip.h"
 #include "sensors/motion_ratio.h"
+#include "sensors/reflex_loop.h"
 #include "tests/sensors/force_samples.h"
 #include "tests/sensors/painted_gel.h"
 #include "tests/sensors/painted_markers.h"
@@ -154,6 +155,25 @@ TEST_F(Allocation, NoneForAHeightMapAfterTheFirst) {
     EXPECT_EQ(allocations, before);
     EXPECT_GT(contact, 0);
   }
+}
+
+TEST_F(Allocation, NoneForAReflex) {
+  ReflexModel model;
+  model.tree.nodes.resize(3);
+  model.tree.nodes[0] = {ChipFeature::maximum, 38.0, 1, 2, false};
+  model.tree.nodes[1].force_present = true;
+  model.force.coefficients[1] = 0.1;
+  model.shear = ShearLaw{Eigen::Matrix2d::Identity(), Eigen::Matrix2d::Identity(), 0.0};
+  ReflexLoop loop(model, {.stop_above_N = 1.0});
+  const long before = allocations;
+  double sum = 0.0;
+  for (int i = 0; i < 100; ++i) {
+    const ReflexDecision decision = loop.next(
+        {.t_us = 667 * i, .dx = 1, .maximum = i % 64, .minimum = 0, .squal = i % 50, .average = 0.5 * (i % 64)});
+    sum += decision.force_N + decision.shear_N.x();
+  }
+  EXPECT_EQ(allocations, before);
+  EXPECT_GT(sum, 0.0);
 }
 
 }  // namespace
