@@ -21,7 +21,7 @@ Json matrix_to_json(const Eigen::Matrix3d& matrix) {
   return rows;
 }
 
-Eigen::Matrix3d matrix_of(const JsonField& field) {
+Eigen::Matrix3d square_of(const JsonField& field) {
   const std::vector<Eigen::Vector3d> rows = field.vectors<3>(3);
   Eigen::Matrix3d matrix;
   matrix << rows[0].transpose(), rows[1].transpose(), rows[2].transpose();
@@ -97,7 +97,7 @@ HeightModel height_model_from_bytes(std::string_view bytes, const std::string& n
   const JsonField lamps = root.at("lamps");
   const auto nodes = static_cast<std::size_t>(model.lamps.columns * model.lamps.rows);
   lamps.expect_list(nodes);
-  for (std::size_t i = 0; i < nodes; ++i) model.lamps.nodes.push_back(matrix_of(lamps.at(i)));
+  for (std::size_t i = 0; i < nodes; ++i) model.lamps.nodes.push_back(square_of(lamps.at(i)));
 
   const JsonField sides = root.at("table_cells");
   sides.expect_list(3);

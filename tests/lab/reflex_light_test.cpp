@@ -1,5 +1,6 @@
 #include "lab/reflex_light.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <tbb/task_arena.h>
 
@@ -172,21 +173,22 @@ TEST(ReflexLight, BadInputIsRefused) {
   const std::vector<sim::GelSheet> reached = {rest};
   sim::DeviceSpec bad = device();
   bad.camera.reset();
-  EXPECT_NE(message_of([&] { ReflexLight(bad, rest, reached); }).find("camera"), std::string::npos);
+  EXPECT_THAT(message_of([&] { ReflexLight(bad, rest, reached); }), testing::HasSubstr("camera"));
   bad = device();
   bad.coating.reset();
-  EXPECT_NE(message_of([&] { ReflexLight(bad, rest, reached); }).find("coating"), std::string::npos);
+  EXPECT_THAT(message_of([&] { ReflexLight(bad, rest, reached); }), testing::HasSubstr("coating"));
   bad = device();
   bad.lamps.clear();
-  EXPECT_NE(message_of([&] { ReflexLight(bad, rest, reached); }).find("no lamps"), std::string::npos);
+  EXPECT_THAT(message_of([&] { ReflexLight(bad, rest, reached); }), testing::HasSubstr("no lamps"));
   bad = device();
   bad.lamps.front().count = 65;  // more beams than a direct renderer takes
-  EXPECT_NE(message_of([&] { ReflexLight(bad, rest, reached); }).find("direct light can't draw it"), std::string::npos);
+  EXPECT_THAT(message_of([&] { ReflexLight(bad, rest, reached); }),
+              testing::HasSubstr("65 beams of 65 lamps; at most 64"));
   ReflexLightSettings settings;
   settings.rays = 65;
-  EXPECT_NE(message_of([&] { ReflexLight(device(), rest, reached, settings); }).find("65"), std::string::npos);
-  EXPECT_NE(message_of([&] { ReflexLight(device(), rest, {}); }).find("reach"), std::string::npos);
-  EXPECT_NE(message_of([&] { light().irradiance(skin().pressed(0, 4.0)); }).find("beyond"), std::string::npos);
+  EXPECT_THAT(message_of([&] { ReflexLight(device(), rest, reached, settings); }), testing::HasSubstr("65"));
+  EXPECT_THAT(message_of([&] { ReflexLight(device(), rest, {}); }), testing::HasSubstr("reach"));
+  EXPECT_THAT(message_of([&] { light().irradiance(skin().pressed(0, 4.0)); }), testing::HasSubstr("beyond"));
 }
 
 }  // namespace

@@ -1,0 +1,70 @@
+# Which sources may be compiled as one: prints "GROUP FILE" for each .cpp file given. Files of a group declare no name twice in
+# their anonymous namespaces, where each thinks itself alone. A file stays alone where a header that is given defines a
+# constant or an inline function of a name that it uses for its own. -v most=N: files of a group at most.
+#
+# What counts as declared: at a line's begin within "namespace {" ... "}  // namespace", the name of a type, an alias, a
+# function or its operator's, variables, and the members of an enum that isn't a class.
+function declare(name) {
+  if (name != "" && !((FILENAME, name) in declared)) {
+    declared[FILENAME, name] = 1
+    names[FILENAME] = names[FILENAME] " " name
+  }
+}
+function declare_all(text,    word) {
+  while (match(text, /[A-Za-z_][A-Za-z_0-9]*/)) {
+    word = substr(text, RSTART, RLENGTH)
+    declare(word)
+    text = substr(text, RSTART + RLENGTH)
+  }
+}
+FILENAME ~ /\.h$/ {
+  if (match($0, /^inline constexpr [^=({]*[ >]k[A-Z][A-Za-z_0-9]*/)) {
+    name = substr($0, RSTART, RLENGTH); sub(/.*[^A-Za-z_0-9]/, "", name); public[name] = 1
+  } else if (/^inline [^(={]*\(/) {
+    name = $0; sub(/\(.*/, "", name); sub(/.*[^A-Za-z_0-9]/, "", name); public[name] = 1
+  }
+  next
+}
+FNR == 1 { inside = 0; in_enum = 0; files[++count] = FILENAME }
+/^namespace \{/ { inside = 1; next }
+/^\}  \/\/ namespace$/ { inside = 0; next }
+!inside { next }
+in_enum { line = $0; sub(/\/\/.*/, "", line); if (line ~ /\}/) in_enum = 0; declare_all(line); next }
+/^[A-Za-z_]/ {
+  line = $0
+  sub(/\/\/.*/, "", line)
+  sub(/^template *<[^>]*> */, "", line)
+  if (line ~ /^(struct|class|union|enum class) /) {
+    sub(/^(struct|class|union|enum class) /, "", line)
+    match(line, /^[A-Za-z_0-9]+/); declare(substr(line, RSTART, RLENGTH)); next
+  }
+  if (line ~ /^enum /) { in_enum = line !~ /\}/; sub(/^enum /, "", line); sub(/:[^{]*/, "", line); declare_all(line); next }
+  if (line ~ /^using [A-Za-z_0-9]+ *=/ || line ~ /^namespace /) { split(line, word, /[ =]+/); declare(word[2]); next }
+  if (line ~ /^using /) { sub(/;.*/, "", line); sub(/.*[: ]/, "", line); declare("using:" line); next }
+  head = line
+  sub(/[({=;].*/, "", head)          # up to what begins arguments or a value
+  if (line ~ /^[^=;{]*\(/) { sub(/ +$/, "", head); sub(/.*[^A-Za-z_0-9]/, "", head); declare(head); next }
+  sub(/\[.*/, "", head); sub(/ +$/, "", head); sub(/.*[^A-Za-z_0-9]/, "", head); declare(head)
+  rest = line                         # constexpr double kA = 1.0, kB = 2.0;
+  while (match(rest, /, *[A-Za-z_][A-Za-z_0-9]* *[={]/)) {
+    word1 = substr(rest, RSTART, RLENGTH); rest = substr(rest, RSTART + RLENGTH)
+    gsub(/[^A-Za-z_0-9]/, "", word1); declare(word1)
+  }
+}
+END {
+  for (f = 1; f <= count; ++f) {
+    n = split(names[files[f]], own, " ")
+    alone = 0
+    for (i = 1; i <= n; ++i) if (own[i] in public) alone = 1
+    if (alone) { print "alone" f, files[f]; continue }
+    for (g = 1; ; ++g) {
+      if (size[g] >= most) continue
+      free = 1
+      for (i = 1; i <= n && free; ++i) if ((g, own[i]) in taken) free = 0
+      if (free) break
+    }
+    ++size[g]
+    for (i = 1; i <= n; ++i) taken[g, own[i]] = 1
+    print g, files[f]
+  }
+}
