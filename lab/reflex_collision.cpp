@@ -4,23 +4,22 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "core/number_checks.h"
 
 namespace touchstone::lab {
 namespace {
 
-void check_above_zero(double value, const char* name) {
-  if (!(value > 0.0) || !std::isfinite(value)) fail("collision: {} is {}, it must be above 0 and finite", name, value);
-}
+constexpr const char* kWhose = "collision: ";  // begins what a refusal says
 
 void check(const CollisionSettings& s) {
-  check_above_zero(s.actuator.mass_kg, "mass_kg");
-  check_above_zero(s.actuator.most_acceleration_mm_s2, "most_acceleration_mm_s2");
-  check_above_zero(s.actuator.velocity_gain_per_s, "velocity_gain_per_s");
-  check_above_zero(s.speed_mm_s, "speed_mm_s");
-  check_above_zero(s.frame_s, "frame_s");
-  check_above_zero(s.most_press_mm, "most_press_mm");
-  check_above_zero(s.longest_s, "longest_s");
-  check_above_zero(s.step_s, "step_s");
+  check_above_zero(kWhose, s.actuator.mass_kg, "mass_kg");
+  check_above_zero(kWhose, s.actuator.most_acceleration_mm_s2, "most_acceleration_mm_s2");
+  check_above_zero(kWhose, s.actuator.velocity_gain_per_s, "velocity_gain_per_s");
+  check_above_zero(kWhose, s.speed_mm_s, "speed_mm_s");
+  check_above_zero(kWhose, s.frame_s, "frame_s");
+  check_above_zero(kWhose, s.most_press_mm, "most_press_mm");
+  check_above_zero(kWhose, s.longest_s, "longest_s");
+  check_above_zero(kWhose, s.step_s, "step_s");
   for (const auto& [value, name] : {std::pair{s.actuator.bus_s, "bus_s"}, std::pair{s.gap_mm, "gap_mm"},
                                     std::pair{s.first_frame_s, "first_frame_s"}}) {
     if (!(value >= 0.0) || !std::isfinite(value)) fail("collision: {} is {}, it must be at least 0", name, value);

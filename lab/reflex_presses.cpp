@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "core/number_checks.h"
 #include "core/units.h"
 
 namespace touchstone::lab {
@@ -17,11 +18,7 @@ constexpr double kPublishedDeepest_mm = 5.0;
 constexpr double kMeshError = 0.01;
 constexpr double kLeastMeshError_N = 0.02;
 
-void check_above_zero(const char* name, double value) {
-  if (!(value > 0.0 && std::isfinite(value))) {
-    fail("the reflex press's {} is {}, it must be finite and above 0", name, value);
-  }
-}
+constexpr const char* kWhose = "the reflex press's ";  // begins what a refusal says
 
 double radians(double degrees) {
   return degrees * kRadiansPerDegree;
@@ -57,8 +54,8 @@ const char* name_of(ReflexObject object) {
 }
 
 sim::PressPath press_down(const ReflexPress& press) {
-  check_above_zero("depth", press.deepest_mm);
-  check_above_zero("step", press.step_mm);
+  check_above_zero(kWhose, press.deepest_mm, "depth");
+  check_above_zero(kWhose, press.step_mm, "step");
   if (!(press.tilt_deg >= 0.0 && press.tilt_deg <= kMostTilt_deg) || !std::isfinite(press.tilt_towards_deg)) {
     fail("the reflex press's tilt is {} degrees towards {}; allowed are 0 to {} towards any finite angle",
          press.tilt_deg, press.tilt_towards_deg, kMostTilt_deg);
@@ -92,8 +89,8 @@ sim::PressPath press_down(const ReflexPress& press) {
 }
 
 sim::PressPath press_and_shear(const ReflexPress& press, const ReflexShear& shear) {
-  check_above_zero("shear", shear.reach_mm);
-  check_above_zero("step of shear", shear.shear_step_mm);
+  check_above_zero(kWhose, shear.reach_mm, "shear");
+  check_above_zero(kWhose, shear.shear_step_mm, "step of shear");
   if (!std::isfinite(shear.towards_deg)) fail("the reflex press's shear goes towards {} degrees", shear.towards_deg);
   sim::PressPath path = press_down(press);
   const double towards = radians(shear.towards_deg);
@@ -111,14 +108,18 @@ sim::ForceLaw reflex_law(const ReflexPress& press, const sim::PlayedPath& played
   return sim::force_law(press_down(press), played, kMeshError, kLeastMeshError_N);
 }
 
-double reflex_law_rms(const sim::ForceLaw& law, int count) {
+double reflex_law_rms(const std::function<double(double)>& force_N, int count) {
   TS_ASSERT(count >= 2);
   double sum = 0.0;
   for (int k = 0; k < count; ++k) {
     const double z = kPublishedDeepest_mm * k / (count - 1);
-    sum += std::pow(law.force(z) - published_reflex_force(z), 2);
+    sum += std::pow(force_N(z) - published_reflex_force(z), 2);
   }
   return std::sqrt(sum / count);
+}
+
+double reflex_law_rms(const sim::ForceLaw& law, int count) {
+  return reflex_law_rms([&](double z_mm) { return law.force(z_mm); }, count);
 }
 
 }  // namespace touchstone::lab

@@ -3,6 +3,7 @@
 // it leaves open), as ways for sim::PathPlayer. docs/sensors/reflex.md says what they cost.
 
 #include <cstdint>
+#include <functional>
 
 #include "sim/force_law.h"
 #include "sim/press_path.h"
@@ -48,8 +49,10 @@ sim::PressPath press_and_shear(const ReflexPress& press, const ReflexShear& shea
 double published_reflex_force(double z_mm);
 /// The text's root mean square error of it to its own data, N: what a law that meets it may differ by.
 inline constexpr double kReflexLawRms_N = 0.14;
-/// Root mean square difference of a law from eq. 1 over `count` depths evenly from 0 to 5 mm, both ends included.
-/// @throws Error if the law doesn't reach 5 mm
+/// Root mean square difference of a force at depths (mm) from eq. 1, over `count` of them evenly from 0 to 5 mm, both
+/// ends included.
+double reflex_law_rms(const std::function<double(double)>& force_N, int count = 51);
+/// Of a law. @throws Error if it doesn't reach 5 mm
 double reflex_law_rms(const sim::ForceLaw& law, int count = 51);
 
 /// The law of a press_down on scenes/devices/reflex.yaml, with its error bar: under the plate, edges 0.7 times as long

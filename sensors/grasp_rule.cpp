@@ -4,15 +4,12 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "core/number_checks.h"
 
 namespace touchstone::sensors {
 namespace {
 
 constexpr double kLeastStep_mm = 1e-9;  // what sums of steps leave of a limit by rounding
-
-void check_above_zero(double value, const char* name) {
-  if (!(value > 0.0) || !std::isfinite(value)) fail("{} is {}, it must be above 0 and finite", name, value);
-}
 
 void check_at_least(int value, int least, const char* name) {
   if (value < least) fail("{} is {}, it must be at least {}", name, value, least);
@@ -21,16 +18,16 @@ void check_at_least(int value, int least, const char* name) {
 }  // namespace
 
 void check(const GraspRuleSettings& s) {
-  check_above_zero(s.touch_height_mm, "touch_height_mm");
+  check_above_zero("", s.touch_height_mm, "touch_height_mm");
   check_at_least(s.touch_frames, 1, "touch_frames");
-  check_above_zero(s.approach_step_mm, "approach_step_mm");
-  check_above_zero(s.longest_approach_mm, "longest_approach_mm");
-  check_above_zero(s.slip_step_mm, "slip_step_mm");
+  check_above_zero("", s.approach_step_mm, "approach_step_mm");
+  check_above_zero("", s.longest_approach_mm, "longest_approach_mm");
+  check_above_zero("", s.slip_step_mm, "slip_step_mm");
   check_at_least(s.settle_frames, 0, "settle_frames");
   if (!(s.most_slip_travel_mm >= 0.0) || !std::isfinite(s.most_slip_travel_mm)) {
     fail("most_slip_travel_mm is {}, it must be at least 0 and finite", s.most_slip_travel_mm);
   }
-  if (s.most_normal_force_N) check_above_zero(*s.most_normal_force_N, "most_normal_force_N");
+  if (s.most_normal_force_N) check_above_zero("", *s.most_normal_force_N, "most_normal_force_N");
   if (!(s.lost_height_mm >= 0.0) || !(s.lost_height_mm < s.touch_height_mm)) {
     fail("lost_height_mm is {}, it must be from 0 to below touch_height_mm, {}", s.lost_height_mm, s.touch_height_mm);
   }

@@ -4,20 +4,15 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "core/number_checks.h"
 
 namespace touchstone::sim {
-namespace {
-
-void check_above_zero(double value, const char* name) {
-  if (!(value > 0.0) || !std::isfinite(value)) fail("{} is {}, it must be above 0 and finite", name, value);
-}
-
-}  // namespace
+namespace {}  // namespace
 
 void check(const ArmLiftSettings& settings) {
-  check_above_zero(settings.height_mm, "the lift's height_mm");
-  check_above_zero(settings.speed_mm_s, "the lift's speed_mm_s");
-  check_above_zero(settings.acceleration_mm_s2, "the lift's acceleration_mm_s2");
+  check_above_zero("", settings.height_mm, "the lift's height_mm");
+  check_above_zero("", settings.speed_mm_s, "the lift's speed_mm_s");
+  check_above_zero("", settings.acceleration_mm_s2, "the lift's acceleration_mm_s2");
 }
 
 ArmLift::ArmLift(const ArmLiftSettings& settings) : settings_(settings) {

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "core/error.h"
+#include "core/number_checks.h"
 #include "core/units.h"
 #include "fem/press.h"
 #include "fem/rough_contact.h"
@@ -21,16 +22,12 @@ constexpr double kRim = 0.6;    // likewise: vertices that far beyond the rim ma
 constexpr int kSubcells = 8;    // a side, to tell how much of a cell lies under the flat
 constexpr double kLeastStep_mm = 1e-7;  // by which the travel grows from state to state at least
 
-void check_above_zero(double value, const char* name) {
-  if (!(value > 0.0) || !std::isfinite(value)) {
-    fail("the gripped face's {} is {}, it must be above 0 and finite", name, value);
-  }
-}
+constexpr const char* kWhose = "the gripped face's ";  // begins what a refusal says
 
 void check_settings(const GrippedFaceSettings& s, const GrippedPose& pose) {
-  check_above_zero(s.least_force_N, "least_force_N");
-  check_above_zero(s.largest_force_N, "largest_force_N");
-  check_above_zero(s.cell_mm, "cell_mm");
+  check_above_zero(kWhose, s.least_force_N, "least_force_N");
+  check_above_zero(kWhose, s.largest_force_N, "largest_force_N");
+  check_above_zero(kWhose, s.cell_mm, "cell_mm");
   if (!(s.largest_force_N > s.least_force_N)) {
     fail("the gripped face's largest_force_N is {}, it must be above least_force_N, {}", s.largest_force_N,
          s.least_force_N);

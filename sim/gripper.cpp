@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "core/number_checks.h"
 
 namespace touchstone::sim {
 namespace {
@@ -28,10 +29,7 @@ void check_body(const GraspedBody& body) {
   }
 }
 
-void check_above_zero(double value, const char* name) {
-  if (!(value > 0.0) || !std::isfinite(value))
-    fail("the gripper's {} is {}, it must be above 0 and finite", name, value);
-}
+constexpr const char* kWhose = "the gripper's ";  // begins what a refusal says
 
 bool anything_sticks(const fem::PressState& press) {
   return std::any_of(press.node_state.begin(), press.node_state.end(),
@@ -43,10 +41,10 @@ bool anything_sticks(const fem::PressState& press) {
 Gripper::Gripper(const fem::Compliance& gel, const GraspedBody& body, const GripperSettings& settings)
     : body_(body), settings_(settings), press_(gel, body.shape, body.friction), mass_(body.mass_g * kTonnesPerGram) {
   check_body(body);
-  check_above_zero(settings.clearance_mm, "clearance_mm");
-  check_above_zero(settings.step_s, "step_s");
-  check_above_zero(settings.slide_step_s, "slide_step_s");
-  check_above_zero(settings.drop_mm, "drop_mm");
+  check_above_zero(kWhose, settings.clearance_mm, "clearance_mm");
+  check_above_zero(kWhose, settings.step_s, "step_s");
+  check_above_zero(kWhose, settings.slide_step_s, "slide_step_s");
+  check_above_zero(kWhose, settings.drop_mm, "drop_mm");
   place_object(gel);
   step_to(0.0);
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "core/number_checks.h"
 #include "core/random.h"
 #include "core/units.h"
 
@@ -14,36 +15,27 @@ constexpr double kMillimetresPerMetre = 1e3;
 constexpr double kShakeStep_s = 1e-3;  // for which a shaking force stays
 constexpr double kWhole = 1e-6;        // of a time step: how nearly a whole multiple is one
 
-void check_above_zero(double value, const char* name) {
-  if (!(value > 0.0) || !std::isfinite(value))
-    fail("the finger's {} is {}, it must be above 0 and finite", name, value);
-}
-
-void check_at_least_zero(double value, const char* name) {
-  if (!(value >= 0.0) || !std::isfinite(value)) {
-    fail("the finger's {} is {}, it must be at least 0 and finite", name, value);
-  }
-}
+constexpr const char* kWhose = "the finger's ";  // begins what a refusal says
 
 void check_all(const ServoFingerSettings& s, const FingerMotion& m, double interval_s) {
-  check_above_zero(s.step_deg, "step_deg");
-  check_above_zero(s.stall_torque_Nm, "stall_torque_Nm");
-  check_above_zero(s.slope_steps, "slope_steps");
-  check_above_zero(s.lever_mm, "lever_mm");
-  check_above_zero(s.lag_s, "lag_s");
-  check_above_zero(s.ring_Hz, "ring_Hz");
-  check_at_least_zero(s.damping, "damping");
-  check_at_least_zero(s.loss_s, "loss_s");
-  check_at_least_zero(s.shake_um, "shake_um");
-  check_above_zero(s.largest_closing_mm, "largest_closing_mm");
-  check_above_zero(s.time_step_s, "time_step_s");
-  check_at_least_zero(m.clearance_mm, "clearance_mm");
-  check_above_zero(m.target_force_N, "target_force_N");
-  check_above_zero(m.closing_mm_s, "closing_mm_s");
-  check_above_zero(m.opening_mm_s, "opening_mm_s");
-  check_at_least_zero(m.hold_s, "hold_s");
-  check_at_least_zero(m.rest_s, "rest_s");
-  check_at_least_zero(m.apart_s, "apart_s");
+  check_above_zero(kWhose, s.step_deg, "step_deg");
+  check_above_zero(kWhose, s.stall_torque_Nm, "stall_torque_Nm");
+  check_above_zero(kWhose, s.slope_steps, "slope_steps");
+  check_above_zero(kWhose, s.lever_mm, "lever_mm");
+  check_above_zero(kWhose, s.lag_s, "lag_s");
+  check_above_zero(kWhose, s.ring_Hz, "ring_Hz");
+  check_at_least_zero(kWhose, s.damping, "damping");
+  check_at_least_zero(kWhose, s.loss_s, "loss_s");
+  check_at_least_zero(kWhose, s.shake_um, "shake_um");
+  check_above_zero(kWhose, s.largest_closing_mm, "largest_closing_mm");
+  check_above_zero(kWhose, s.time_step_s, "time_step_s");
+  check_at_least_zero(kWhose, m.clearance_mm, "clearance_mm");
+  check_above_zero(kWhose, m.target_force_N, "target_force_N");
+  check_above_zero(kWhose, m.closing_mm_s, "closing_mm_s");
+  check_above_zero(kWhose, m.opening_mm_s, "opening_mm_s");
+  check_at_least_zero(kWhose, m.hold_s, "hold_s");
+  check_at_least_zero(kWhose, m.rest_s, "rest_s");
+  check_at_least_zero(kWhose, m.apart_s, "apart_s");
   const double steps = interval_s / s.time_step_s;
   if (!(steps >= 1.0 - kWhole) || std::abs(steps - std::round(steps)) > kWhole * steps) {
     fail("moments of a grasp every {} s: that must be a whole multiple of time_step_s, {}", interval_s, s.time_step_s);

@@ -9,8 +9,8 @@
 
 #include "core/error.h"
 #include "lab/reflex_presses.h"
-#include "render/imager_presets.h"
 #include "sim/gel_setup.h"
+#include "tests/lab/one_band_chip.h"
 #include "tests/sensors/painted_fingertip.h"
 
 namespace touchstone::lab {
@@ -19,13 +19,8 @@ namespace {
 using testing::HasSubstr;
 using testing::ThrowsMessage;
 
-constexpr double kFullLight_DN = 63.0;
-
 render::MotionChipSettings chip_settings() {
-  render::MotionChipSettings made;
-  made.imager = render::adns2620_preset(620e-6).imager;
-  made.imager.wavelengths_nm = render::Spectrum::Constant(1, 640.0);
-  made.imager.quantum_efficiency = render::QuantumEfficiency::Constant(1, 1, 0.45);
+  render::MotionChipSettings made = test::one_band_chip();
   made.shutter.automatic = false;
   return made;
 }
@@ -35,8 +30,7 @@ render::MotionChipSettings chip_settings() {
 ReflexTouch painted_touch(const std::string& name, double deepest_mm, double sideways_mm = 0.0,
                           double towards_rad = 0.0) {
   const render::MotionChipSettings chip = chip_settings();
-  const double electrons = (kFullLight_DN - chip.imager.black_level_DN) / chip.imager.gain_DN_per_e;
-  const double full = electrons / response_of(chip.imager).electrons_per_irradiance(0, 0);
+  const double full = test::full_light(chip);
   const Eigen::Vector2d towards(std::cos(towards_rad), std::sin(towards_rad));
   const auto lateral_mm = [=](double place) { return std::max(place - deepest_mm, 0.0) * towards; };
   const auto press_mm = [=](double place) { return std::clamp(place, 0.0, deepest_mm); };
@@ -50,7 +44,7 @@ ReflexTouch painted_touch(const std::string& name, double deepest_mm, double sid
     for (int row = 0; row < 18; ++row) {
       for (int column = 0; column < 18; ++column) {
         light.at<float>(row, column) =
-            static_cast<float>(full / kFullLight_DN * painter.light(dots, motion, row, column));
+            static_cast<float>(full / test::kFullLight_DN * painter.light(dots, motion, row, column));
       }
     }
     return light;

@@ -8,24 +8,19 @@
 
 #include "core/error.h"
 #include "render/imager_presets.h"
+#include "tests/lab/one_band_chip.h"
 
 namespace touchstone::lab {
 namespace {
 
 render::MotionChipSettings chip_settings() {
-  render::MotionChipSettings made;
-  made.imager = render::adns2620_preset(620e-6).imager;
-  made.imager.wavelengths_nm = render::Spectrum::Constant(1, 640.0);
-  made.imager.quantum_efficiency = render::QuantumEfficiency::Constant(1, 1, 0.45);
+  render::MotionChipSettings made = test::one_band_chip();
   made.imager.ideal = true;
   return made;
 }
 
-/// W/m^2 that make the number 63.
 double full_light() {
-  const render::MotionChipSettings chip = chip_settings();
-  const double electrons = (63 - chip.imager.black_level_DN) / chip.imager.gain_DN_per_e;
-  return electrons / response_of(chip.imager).electrons_per_irradiance(0, 0);
+  return test::full_light(chip_settings());
 }
 
 /// A pixel's part of the full light is `share(parameter)`, but for the upper left one, which is dark.

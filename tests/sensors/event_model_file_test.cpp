@@ -6,16 +6,17 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "core/sha256.h"
 #include "sensors/gaussian_process_file.h"
 #include "sensors/material_classifier_file.h"
 #include "sensors/time_delay_network_file.h"
+#include "tests/sensors/resealed_json.h"
 #include "tests/support/message_of.h"
 
 namespace touchstone::sensors {
 namespace {
 
 using test::message_of;
+using test::resealed;
 using testing::HasSubstr;
 using Json = nlohmann::json;
 
@@ -41,16 +42,6 @@ MaterialClassifier some_classifier() {
 GaussianProcess some_process() {
   const Eigen::MatrixXd inputs = (Eigen::MatrixXd(3, 2) << 0.0, 0.1, 1.0 / 3.0, 0.5, 0.3, 2.0).finished();
   return condition({Eigen::Vector2d(0.7, 1.3), 1.5, 0.2}, inputs, Eigen::Vector3d(1.0, 2.0 / 3.0, 0.5));
-}
-
-/// The file with its map changed and its checksum made anew.
-template <typename Change>
-std::string changed(const std::string& text, Change change) {
-  Json json = Json::parse(text);
-  change(json);
-  json.erase("sha256");
-  json["sha256"] = sha256_of(json.dump());
-  return json.dump();
 }
 
 TEST(EventModelFiles, WhatIsReadIsWhatWasWrittenBitForBit) {
@@ -91,7 +82,7 @@ TEST(EventModelFiles, FaultyNetworksAreNamed) {
   EXPECT_THAT(network_error("{"), HasSubstr("m.json:1: isn't valid JSON"));
   EXPECT_THAT(network_error("[]"), HasSubstr("map"));
   EXPECT_THAT(network_error(to_json(some_classifier())), HasSubstr("format: is 'touchstone.material_classifier'"));
-  EXPECT_THAT(network_error(changed(good, [](Json& j) { j["version"] = 2; })), HasSubstr("version"));
+  EXPECT_THAT(network_error(resealed(good, [](Json& j) { j["version"] = 2; })), HasSubstr("version"));
   // A digit changed, without the checksum.
   std::string damaged = good;
   const auto at = damaged.find("1234");
@@ -101,7 +92,7 @@ TEST(EventModelFiles, FaultyNetworksAreNamed) {
   Json bare = Json::parse(good);
   bare.erase("sha256");
   EXPECT_THAT(network_error(bare.dump()), HasSubstr("'sha256' is missing"));
-  const auto error = [&](auto change) { return network_error(changed(good, change)); };
+  const auto error = [&](auto change) { return network_error(resealed(good, change)); };
   EXPECT_THAT(error([](Json& j) { j.erase("delays"); }), HasSubstr("'delays' is missing"));
   EXPECT_THAT(error([](Json& j) { j["delay"] = 3; }), HasSubstr("'delay' isn't known"));
   EXPECT_THAT(error([](Json& j) { j["delays"] = 0; }), HasSubstr("delays: is 0"));
@@ -128,7 +119,7 @@ TEST(EventModelFiles, FaultyNetworksAreNamed) {
 TEST(EventModelFiles, FaultyClassifiersAreNamed) {
   const std::string good = to_json(some_classifier());
   const auto error = [&](auto change) {
-    return message_of([&] { material_classifier_from_json(changed(good, change), "m.json"); });
+    return message_of([&] { material_classifier_from_json(resealed(good, change), "m.json"); });
   };
   EXPECT_EQ(error([](Json&) {}), "no error");
   EXPECT_THAT(error([](Json& j) { j["materials"] = "foam"; }), HasSubstr("materials: is a string, a list"));
@@ -143,7 +134,7 @@ TEST(EventModelFiles, FaultyClassifiersAreNamed) {
 TEST(EventModelFiles, FaultyProcessesAreNamed) {
   const std::string good = to_json(some_process());
   const auto error = [&](auto change) {
-    return message_of([&] { gaussian_process_from_json(changed(good, change), "m.json"); });
+    return message_of([&] { gaussian_process_from_json(resealed(good, change), "m.json"); });
   };
   EXPECT_EQ(error([](Json&) {}), "no error");
   EXPECT_THAT(error([](Json& j) { j["noise"] = 0.0; }), HasSubstr("m.json: Gaussian process: noise is 0"));

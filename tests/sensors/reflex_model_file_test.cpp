@@ -11,15 +11,16 @@
 #include <utility>
 #include <vector>
 
-#include "core/sha256.h"
 #include "sensors/explore_model.h"
 #include "sensors/reflex_model.h"
+#include "tests/sensors/resealed_json.h"
 #include "tests/support/message_of.h"
 
 namespace touchstone::sensors {
 namespace {
 
 using test::message_of;
+using test::resealed;
 using testing::HasSubstr;
 using Json = nlohmann::json;
 
@@ -41,15 +42,6 @@ ExploreModel some_explore() {
   model.lateral_mm_per_px << 0.65, 0.01, -0.01, 1.9 / 3.0;
   model.shear = ShearLaw{Eigen::Matrix2d::Identity() * 0.8, Eigen::Matrix2d::Constant(1.0 / 7.0), 0.1};
   return model;
-}
-
-/// The file with its map changed and its checksum made anew.
-std::string changed(const std::string& text, const std::function<void(Json&)>& change) {
-  Json json = Json::parse(text);
-  change(json);
-  json.erase("sha256");
-  json["sha256"] = sha256_of(json.dump());
-  return json.dump();
 }
 
 TEST(ReflexModelFile, WhatIsReadIsWhatWasWrittenBitForBit) {
@@ -105,7 +97,7 @@ TEST(ReflexModelFile, WhatDoesNotFitIsNamed) {
        "shear.N_per_count"},
   };
   for (const auto& [change, what] : changes) {
-    EXPECT_THAT(message_of([&] { reflex_model_from_json(changed(text, change), "m.json"); }),
+    EXPECT_THAT(message_of([&] { reflex_model_from_json(resealed(text, change), "m.json"); }),
                 testing::AllOf(HasSubstr("m.json"), HasSubstr(what)));
   }
 }
@@ -126,7 +118,7 @@ TEST(ExploreModelFile, WhatDoesNotFitIsNamed) {
       {[](Json& j) { j["shear"]["per_mm"][0][0] = nullptr; }, "shear.per_mm[0]"},
   };
   for (const auto& [change, what] : changes) {
-    EXPECT_THAT(message_of([&] { explore_model_from_json(changed(text, change), "m.json"); }),
+    EXPECT_THAT(message_of([&] { explore_model_from_json(resealed(text, change), "m.json"); }),
                 testing::AllOf(HasSubstr("m.json"), HasSubstr(what)));
   }
 }
