@@ -1,23 +1,17 @@
 #include "fem/vibration_cache.h"
 
-#include <bit>
-#include <cstdint>
-#include <cstring>
 #include <string_view>
 #include <system_error>
 
 #include "core/error.h"
+#include "core/matrix_file.h"
 #include "core/sha256.h"
 #include "core/whole_file.h"
 
 namespace touchstone::fem {
 namespace {
 
-// A file is: kMagic, the key (64 hexadecimal digits), the matrices, and the SHA-256 of all before it (64 hexadecimal
-// digits). A matrix is its rows and columns (int64) and its numbers by columns, little-endian.
-static_assert(std::endian::native == std::endian::little);
-constexpr std::string_view kMagic = "TSVIBRAT";
-constexpr std::size_t kDigestSize = 64;
+constexpr std::string_view kMagic = "TSVIBRAT";  // of a matrix file (core/matrix_file.h)
 
 std::string key_of(const std::string& gel_key, double density, int count) {
   Sha256 sum;
@@ -27,59 +21,25 @@ std::string key_of(const std::string& gel_key, double density, int count) {
   return sum.digest();
 }
 
-void put(std::string& bytes, const Eigen::MatrixXd& matrix) {
-  const std::int64_t size[2] = {matrix.rows(), matrix.cols()};
-  bytes.append(reinterpret_cast<const char*>(size), sizeof(size));
-  bytes.append(reinterpret_cast<const char*>(matrix.data()), sizeof(double) * static_cast<std::size_t>(matrix.size()));
-}
-
-Eigen::MatrixXd take(std::string_view& bytes) {
-  std::int64_t size[2];
-  if (bytes.size() < sizeof(size)) fail("it ends early");
-  std::memcpy(size, bytes.data(), sizeof(size));
-  bytes.remove_prefix(sizeof(size));
-  const std::size_t numbers = bytes.size() / sizeof(double);
-  if (size[0] < 0 || size[1] < 0 ||
-      (size[1] > 0 && static_cast<std::size_t>(size[0]) > numbers / static_cast<std::size_t>(size[1]))) {
-    fail("it ends early");
-  }
-  Eigen::MatrixXd matrix(size[0], size[1]);
-  const std::size_t length = sizeof(double) * static_cast<std::size_t>(matrix.size());
-  if (length > 0) std::memcpy(matrix.data(), bytes.data(), length);
-  bytes.remove_prefix(length);
-  return matrix;
-}
-
 std::string file_of(const std::string& key, const GelVibration& vibration) {
-  std::string bytes(kMagic);
-  bytes += key;
-  for (const Eigen::MatrixXd& matrix :
-       {Eigen::MatrixXd(vibration.angular_frequency), vibration.surface, vibration.beads, vibration.effective_mass}) {
-    put(bytes, matrix);
-  }
-  put(bytes, Eigen::MatrixXd::Constant(1, 1, vibration.mass));
-  return bytes + sha256_of(bytes);
+  return matrix_file(kMagic, key,
+                     {vibration.angular_frequency, vibration.surface, vibration.beads, vibration.effective_mass,
+                      Eigen::MatrixXd::Constant(1, 1, vibration.mass)});
 }
 
 /// @throws Error that says, as the second half of a sentence, why the file can't be used
 GelVibration read_file(const std::filesystem::path& path, const std::string& key, int count) {
   const std::string content = read_whole_file(path);
-  std::string_view bytes = content;
-  if (bytes.size() < kMagic.size() + 2 * kDigestSize) fail("it ends early");
-  if (!bytes.starts_with(kMagic)) fail("it isn't a gel's modes");
-  const std::string_view sealed = bytes.substr(0, bytes.size() - kDigestSize);
-  if (sha256_of(sealed) != bytes.substr(sealed.size())) fail("its checksum is wrong");
-  bytes = sealed.substr(kMagic.size());
-  if (!bytes.starts_with(key)) fail("it belongs to another gel");
-  bytes.remove_prefix(kDigestSize);
+  MatrixFile matrices(content, kMagic, "a gel's modes", key, "gel");
   GelVibration vibration;
-  const Eigen::MatrixXd frequency = take(bytes);
-  vibration.surface = take(bytes);
-  vibration.beads = take(bytes);
-  vibration.effective_mass = take(bytes);
-  const Eigen::MatrixXd mass = take(bytes);
-  if (!bytes.empty() || frequency.cols() != 1 || frequency.rows() != count || vibration.surface.cols() != count ||
-      vibration.beads.cols() != count || vibration.effective_mass.cols() != count || mass.size() != 1) {
+  const Eigen::MatrixXd frequency = matrices.take();
+  vibration.surface = matrices.take();
+  vibration.beads = matrices.take();
+  vibration.effective_mass = matrices.take();
+  const Eigen::MatrixXd mass = matrices.take();
+  if (!matrices.rest().empty() || frequency.cols() != 1 || frequency.rows() != count ||
+      vibration.surface.cols() != count || vibration.beads.cols() != count ||
+      vibration.effective_mass.cols() != count || mass.size() != 1) {
     fail("its matrices don't fit each other");
   }
   vibration.angular_frequency = frequency;

@@ -1,47 +1,18 @@
 #include "sim/press_path_file.h"
 
-#include <bit>
-#include <cstdint>
-#include <cstring>
 #include <string_view>
 
 #include "core/error.h"
+#include "core/matrix_file.h"
 #include "core/sha256.h"
 #include "core/whole_file.h"
 
 namespace touchstone::sim {
 namespace {
 
-// A file is: kMagic, the key (64 hexadecimal digits), the matrices, why the path stopped, and the SHA-256 of all before
-// it (64 hexadecimal digits). A matrix is its rows and columns (int64) and its numbers by columns, little-endian; one
-// column a state.
-static_assert(std::endian::native == std::endian::little);
+// A matrix file (core/matrix_file.h) of one column a state; after the matrices why the path stopped.
 constexpr std::string_view kMagic = "TSPRPATH";
-constexpr std::size_t kDigestSize = 64;
 constexpr int kScalars = 34;
-
-void put(std::string& bytes, const Eigen::MatrixXd& matrix) {
-  const std::int64_t size[2] = {matrix.rows(), matrix.cols()};
-  bytes.append(reinterpret_cast<const char*>(size), sizeof(size));
-  bytes.append(reinterpret_cast<const char*>(matrix.data()), sizeof(double) * static_cast<std::size_t>(matrix.size()));
-}
-
-Eigen::MatrixXd take(std::string_view& bytes) {
-  std::int64_t size[2];
-  if (bytes.size() < sizeof(size)) fail("it ends early");
-  std::memcpy(size, bytes.data(), sizeof(size));
-  bytes.remove_prefix(sizeof(size));
-  const std::size_t numbers = bytes.size() / sizeof(double);
-  if (size[0] < 0 || size[1] < 0 ||
-      (size[1] > 0 && static_cast<std::size_t>(size[0]) > numbers / static_cast<std::size_t>(size[1]))) {
-    fail("it ends early");
-  }
-  Eigen::MatrixXd matrix(size[0], size[1]);
-  const std::size_t length = sizeof(double) * static_cast<std::size_t>(matrix.size());
-  if (length > 0) std::memcpy(matrix.data(), bytes.data(), length);
-  bytes.remove_prefix(length);
-  return matrix;
-}
 
 /// Takes each number of the state to or from a column, in one order. `visit` gets a reference.
 template <typename State, typename Visit>
@@ -106,7 +77,7 @@ std::string press_path_key(const std::string& gel_key, const PressPath& path) {
 }
 
 void write_press_path(const std::filesystem::path& file, const std::string& key, const PlayedPath& played) {
-  TS_ASSERT(key.size() == kDigestSize && played.at.size() == played.states.size());
+  TS_ASSERT(played.at.size() == played.states.size());
   const auto count = static_cast<Eigen::Index>(played.states.size());
   const auto first = [&](auto&& size) { return count > 0 ? static_cast<Eigen::Index>(size(played.states[0])) : 0; };
   Eigen::MatrixXd scalars(kScalars, count);
@@ -127,29 +98,17 @@ void write_press_path(const std::filesystem::path& file, const std::string& key,
       contact(v, k) = static_cast<double>(state.node_state[static_cast<std::size_t>(v)]);
     }
   }
-  std::string bytes(kMagic);
-  bytes += key;
-  for (const Eigen::MatrixXd& matrix : {scalars, traction, surface, beads, contact}) put(bytes, matrix);
-  bytes += played.stopped;
-  bytes += sha256_of(bytes);
-  write_whole_file(file, bytes);
+  write_whole_file(file, matrix_file(kMagic, key, {scalars, traction, surface, beads, contact}, played.stopped));
 }
 
 PlayedPath read_press_path(const std::filesystem::path& file, const std::string& key) {
   const std::string content = read_whole_file(file);
-  std::string_view bytes = content;
-  if (bytes.size() < kMagic.size() + 2 * kDigestSize) fail("it ends early");
-  if (!bytes.starts_with(kMagic)) fail("it isn't a path's presses");
-  const std::string_view sealed = bytes.substr(0, bytes.size() - kDigestSize);
-  if (sha256_of(sealed) != bytes.substr(sealed.size())) fail("its checksum is wrong");
-  bytes = sealed.substr(kMagic.size());
-  if (!bytes.starts_with(key)) fail("it belongs to another gel or path");
-  bytes.remove_prefix(kDigestSize);
-  const Eigen::MatrixXd scalars = take(bytes);
-  const Eigen::MatrixXd traction = take(bytes);
-  const Eigen::MatrixXd surface = take(bytes);
-  const Eigen::MatrixXd beads = take(bytes);
-  const Eigen::MatrixXd contact = take(bytes);
+  MatrixFile matrices(content, kMagic, "a path's presses", key, "gel or path");
+  const Eigen::MatrixXd scalars = matrices.take();
+  const Eigen::MatrixXd traction = matrices.take();
+  const Eigen::MatrixXd surface = matrices.take();
+  const Eigen::MatrixXd beads = matrices.take();
+  const Eigen::MatrixXd contact = matrices.take();
   const Eigen::Index count = scalars.cols();
   if (scalars.rows() != kScalars || traction.cols() != count || surface.cols() != count || beads.cols() != count ||
       contact.cols() != count || traction.rows() != surface.rows() || traction.rows() != 3 * contact.rows() ||
@@ -157,7 +116,7 @@ PlayedPath read_press_path(const std::filesystem::path& file, const std::string&
     fail("its matrices don't fit each other");
   }
   PlayedPath played;
-  played.stopped = std::string(bytes);
+  played.stopped = std::string(matrices.rest());
   for (Eigen::Index k = 0; k < count; ++k) {
     fem::PressState state;
     int row = 0;
