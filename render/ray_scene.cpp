@@ -26,19 +26,19 @@ RTCDevice embree_device() {
 
 namespace {
 
+/// Between which heights there is something to meet. What only touches such a height from outside meets nothing: a wall
+/// that stands on a flat face is no matter of the layer below.
 struct HeightRange {
   double low = std::numeric_limits<double>::infinity();
   double high = -std::numeric_limits<double>::infinity();
 
-  void add(double a, double b) {
-    low = std::min(low, a);
-    high = std::max(high, b);
+  void add(double from, double to) {
+    constexpr double kFlat = 1e-3;  // what lies flat is met from both sides, wherever single precision puts it
+    const double pad = to - from < kFlat ? kFlat : 0.0;
+    low = std::min(low, from - pad);
+    high = std::max(high, to + pad);
   }
-  /// Padded by what single precision may add to a box.
-  bool misses(double z0, double z1) const {
-    constexpr double kPad = 1e-3;
-    return std::max(z0, z1) < low - kPad || std::min(z0, z1) > high + kPad;
-  }
+  bool misses(double z0, double z1) const { return std::max(z0, z1) <= low || std::min(z0, z1) >= high; }
 };
 
 bool finite(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
@@ -140,13 +140,16 @@ struct RayScene::State {
       for (int a = 0; a < 3; ++a) *vertices++ = static_cast<float>(vertex[a]);
     }
     for (const auto& triangle : mesh.triangles) {
+      HeightRange own;
       for (int corner : triangle) {
         *corners++ = static_cast<unsigned>(corner);
         const double z = mesh.vertices[corner].z();
-        all_heights.add(z, z);
+        own.low = std::min(own.low, z);
+        own.high = std::max(own.high, z);
         bounds.extend(mesh.vertices[corner]);
-        if (passage == Passage::kNone) opaque_heights.add(z, z);
       }
+      all_heights.add(own.low, own.high);
+      if (passage == Passage::kNone) opaque_heights.add(own.low, own.high);
     }
     attach(geometry, id, passage);
   }

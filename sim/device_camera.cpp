@@ -61,4 +61,12 @@ double blur_radius_px(const render::Camera& camera, double nearest_mm) {
   return 0.5 * std::max(blur_disc_px(camera, nearest_mm), far);
 }
 
+double least_blur_radius_px(const render::Camera& camera) {
+  const auto* pinhole = std::get_if<render::PinholeCamera>(&camera);
+  if (pinhole == nullptr) return 0.0;
+  const double corner = 0.5 * std::hypot(pinhole->width, pinhole->height) * pinhole->pixel_pitch_um;
+  const double hidden_um = pinhole->foil_thickness_um * corner / (1e3 * pinhole->distance_mm);
+  return 0.5 * std::max(0.0, pinhole->hole_diameter_um - hidden_um) / pinhole->pixel_pitch_um;
+}
+
 }  // namespace touchstone::sim

@@ -17,4 +17,8 @@ double blur_disc_px(const render::Camera& camera, double distance_mm);
 /// any distance, is blurred by hole or lens.
 double blur_radius_px(const render::Camera& camera, double nearest_mm);
 
+/// Radius that a sharp point's image has at least, pixels: 0 with a lens; behind a hole that of a point far away in the
+/// picture's corner, where the foil's thickness hides a part of the hole.
+double least_blur_radius_px(const render::Camera& camera);
+
 }  // namespace touchstone::sim

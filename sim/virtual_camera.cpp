@@ -1,4 +1,8 @@
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <opencv2/imgproc.hpp>
 
 #include "core/random.h"
@@ -7,6 +11,7 @@
 #include "sim/device_camera.h"
 #include "sim/direct_light.h"
 #include "sim/exposure_times.h"
+#include "sim/key_frames.h"
 #include "sim/pixel_truth.h"
 #include "sim/scene_sight.h"
 #include "sim/virtual_sensor.h"
@@ -14,10 +19,12 @@
 namespace touchstone::sim {
 namespace {
 
-constexpr int kPreviewStride = 2;
-// The first frame's light stays in every later frame where nothing changes, so it is rendered better than they are.
-constexpr double kFirstFrameFraction = 0.5;
-constexpr int kFirstFrameSamples = 4;
+// The light of key frames stays in other frames where nothing changes, so it is rendered better than theirs.
+constexpr double kKeyFrameFraction = 0.5;
+constexpr int kKeyFrameSamples = 4;
+// After the first frame, which stands for the gel at rest, one frame in so many is a key: 3 to 5 % more work, which
+// pays where frames are so dense that those next to each other are alike.
+constexpr std::size_t kFramesPerKey = 50;
 
 /// The electrons of all channels together, as many as the one that sees most: a lamp of one colour counts even if the
 /// first samples of a pixel never chose it.
@@ -33,19 +40,6 @@ render::NoiseTarget noise_target(const render::ImagerResponse& response, double 
   return target;
 }
 
-/// Sets what lies within `radius` pixels of a set pixel.
-void widen(cv::Mat& mask, int radius) {
-  constexpr int kLargeRadius = 16;  // a lens out of focus; dilation's time grows with the square of the radius
-  if (radius <= kLargeRadius) {
-    cv::dilate(mask, mask, cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * radius + 1, 2 * radius + 1}));
-    return;
-  }
-  if (cv::countNonZero(mask) == 0) return;
-  cv::Mat distance;
-  cv::distanceTransform(mask == 0, distance, cv::DIST_L2, cv::DIST_MASK_PRECISE);
-  mask = (distance <= radius);
-}
-
 }  // namespace
 
 struct VirtualCamera::Parts : SceneSight {
@@ -53,6 +47,7 @@ struct VirtualCamera::Parts : SceneSight {
       : SceneSight(scene_of, plan_of, gel_of),
         exposure(scene_of, plan_of),
         camera(camera_of(*scene.device.camera)),
+        ready(render::make_ready(camera)),
         size(render::size_of(camera).x(), render::size_of(camera).y()),
         imager(sim::imager(scene.device, plan.bands, plan.sensor_noise)),
         ideal_imager(sim::imager(scene.device, plan.bands, false)),
@@ -66,44 +61,59 @@ struct VirtualCamera::Parts : SceneSight {
 
   ExposureTimes exposure;
   render::Camera camera;
+  render::ReadyCamera ready;
   cv::Size size;
   render::Imager imager;
   render::Imager ideal_imager;
   render::ImagerResponse response;
   render::FixedPattern pattern;
   render::RenderSettings settings;
-  std::unique_ptr<const DirectLight> direct;  // where it holds; the first frame is then not needed
+  std::unique_ptr<const DirectLight> direct;  // where it holds; keys are then not needed
   LightChoice choice{false, "paths: the plan has no direct light", {}};
-  cv::Mat first_light;    // irradiance of the first frame
-  cv::Mat first_error;    // its standard error
-  cv::Mat first_preview;  // its preview without noise
+  std::vector<KeyFrame> keys;  // the first frame's, then in the order of time
 
-  /// Which pixels changed against the first frame by more than the tolerance, widened by the blur of hole or lens.
-  cv::Mat changed(const cv::Mat& preview) const {
-    cv::Mat mask(preview.size(), CV_8U, cv::Scalar(0));
-    const auto& per_irradiance = settings.noise->electrons_per_irradiance;
-    const int bands = plan.bands.count();
-    for (int row = 0; row < preview.rows; ++row) {
-      const auto* now = preview.ptr<float>(row);
-      const auto* before = first_preview.ptr<float>(row);
-      auto* out = mask.ptr<unsigned char>(row);
-      for (int column = 0; column < preview.cols; ++column) {
-        double electrons = 0.0;
-        double change = 0.0;
-        for (int band = 0; band < bands; ++band) {
-          const int at = bands * column + band;
-          electrons += per_irradiance[band] * before[at];
-          change += std::abs(per_irradiance[band] * (now[at] - before[at]));
-        }
-        if (change > scene.light.change_tolerance * render::noise_e(response, electrons)) out[column] = 255;
-      }
-    }
+  /// The first frame's and those before and after a time: the gel at rest, and what the frame is most like.
+  std::vector<const KeyFrame*> keys_about(std::int64_t t_us) const {
+    std::vector<const KeyFrame*> about;
+    if (keys.empty()) return about;
+    about.push_back(&keys.front());
+    const auto after =
+        std::upper_bound(keys.begin() + 1, keys.end(), t_us, [](auto t, const KeyFrame& key) { return t < key.t_us; });
+    if (after != keys.begin() + 1) about.push_back(&*(after - 1));
+    if (after != keys.end()) about.push_back(&*after);
+    return about;
+  }
+
+  ChangeFinder change_finder() const {
     const double nearest = std::max(1e-3, -scene.device.gel.thickness_mm - scene.device.camera->hole_position_mm.z());
-    const int radius = 1 + static_cast<int>(std::ceil(blur_radius_px(camera, nearest) / kPreviewStride));
-    widen(mask, radius);
-    cv::Mat whole;
-    cv::resize(mask, whole, {mask.cols * kPreviewStride, mask.rows * kPreviewStride}, 0, 0, cv::INTER_NEAREST);
-    return whole(cv::Rect({0, 0}, size)).clone();
+    const PointBlur blur{least_blur_radius_px(camera), blur_radius_px(camera, nearest)};
+    return {response, *settings.noise, scene.light.change_tolerance, blur, size};
+  }
+
+  /// What the keys about a time know of a frame, seen at one or more moments.
+  KnownLight known(std::int64_t t_us, std::span<const FrameLook> looks) const {
+    return known_light(keys_about(t_us), looks, change_finder(), size, plan.bands.count());
+  }
+  KnownLight nothing_known() const { return known_light({}, {}, change_finder(), size, plan.bands.count()); }
+
+  /// A state's light, well done.
+  KeyFrame key_frame(const Truth& truth) const {
+    const render::Scene seen_now = seen(truth.press, relief(truth.press));
+    const render::Tracer at_once(seen_now);
+    KeyFrame key;
+    key.t_us = truth.t_us;
+    key.look = look_of(seen_now, at_once, ready, camera);
+    KnownLight light = keys.empty() ? nothing_known() : known(truth.t_us, {&key.look, 1});
+    key.where = keys.empty() ? cv::Rect({0, 0}, size) : cv::boundingRect(light.missing);
+    if (key.where.empty()) return key;
+    render::RenderSettings well = settings;
+    well.noise = noise_target(response, kKeyFrameFraction * scene.light.noise_fraction);
+    well.max_samples *= kKeyFrameSamples;
+    const render::RenderedImage image = at_once.render(camera, well, light.missing);
+    add_traced(image.irradiance, image.standard_error, light);
+    key.irradiance = light.irradiance(key.where).clone();
+    key.standard_error = light.standard_error(key.where).clone();
+    return key;
   }
 
   /// What needs no light.
@@ -148,16 +158,21 @@ struct VirtualCamera::Parts : SceneSight {
     const std::vector<double> times = exposure.of(truth);
     if (direct) {
       if (auto capture = take_direct(truth, now, times)) return *std::move(capture);
-      whole = true;  // there is no first frame to lean on
+      whole = true;  // there is no key to lean on
     }
     if (times.size() > 1) return take_over_time(truth, now, times, whole);
-    const render::Tracer at_once = tracer(truth.press, now);
-    const cv::Mat mask = whole ? all_pixels() : changed(at_once.preview(camera, kPreviewStride));
-    const int pixels = cv::countNonZero(mask);
-    if (pixels == 0) return develop(first_light, first_error, truth, now, {}, 0);
-    const render::RenderedImage image = at_once.render(camera, settings, mask);
-    return develop(with_first(image.irradiance, first_light, mask), with_first(image.standard_error, first_error, mask),
-                   truth, now, image.counts, pixels);
+    const render::Scene seen_now = seen(truth.press, now);
+    const render::Tracer at_once(seen_now);
+    KnownLight light = nothing_known();
+    if (!whole) {
+      const FrameLook look = look_of(seen_now, at_once, ready, camera);
+      light = known(truth.t_us, {&look, 1});
+    }
+    const int pixels = cv::countNonZero(light.missing);
+    if (pixels == 0) return develop(light.irradiance, light.standard_error, truth, now, {}, 0);
+    const render::RenderedImage image = at_once.render(camera, settings, light.missing);
+    add_traced(image.irradiance, image.standard_error, light);
+    return develop(light.irradiance, light.standard_error, truth, now, image.counts, pixels);
   }
 
   /// By direct light; nothing if at one of the moments the gel has gone where the light field doesn't reach.
@@ -195,18 +210,16 @@ struct VirtualCamera::Parts : SceneSight {
   /// samples of their own, so that their noise is averaged, too.
   Capture take_over_time(const Truth& truth, const std::optional<fem::ReliefAnswer>& now,
                          const std::vector<double>& times, bool whole) const {
-    std::vector<fem::PressState> states;
-    std::vector<std::optional<fem::ReliefAnswer>> reliefs;  // which cost more than a tracer
+    std::vector<render::Scene> scenes;
+    std::vector<FrameLook> looks;
     for (const double time : times) {
-      states.push_back(state_after(truth, time));
-      reliefs.push_back(relief(states.back()));
+      const fem::PressState press = state_after(truth, time);
+      scenes.push_back(seen(press, relief(press)));
+      if (!whole) looks.push_back(look_of(scenes.back(), render::Tracer(scenes.back()), ready, camera));
     }
-    cv::Mat mask = whole ? all_pixels() : cv::Mat(size, CV_8U, cv::Scalar(0));
-    for (std::size_t i = 0; i < times.size() && !whole; ++i) {
-      mask |= changed(tracer(states[i], reliefs[i]).preview(camera, kPreviewStride));
-    }
-    const int pixels = cv::countNonZero(mask);
-    if (pixels == 0) return develop(first_light, first_error, truth, now, {}, 0);
+    KnownLight light = whole ? nothing_known() : known(truth.t_us, looks);
+    const int pixels = cv::countNonZero(light.missing);
+    if (pixels == 0) return develop(light.irradiance, light.standard_error, truth, now, {}, 0);
     const render::ShutterTiming timing = shutter_timing();
     render::RenderSettings of_moment = settings;
     const double intervals_of_row = timing.exposure_s / times.back() * static_cast<double>(times.size() - 1);
@@ -216,21 +229,13 @@ struct VirtualCamera::Parts : SceneSight {
     for (std::size_t i = 0; i < times.size(); ++i) {
       RandomStream seeds(scene.seed, i, Purpose::kMotion);
       of_moment.seed = (std::uint64_t{seeds()} << 32) | seeds();
-      const render::RenderedImage image = tracer(states[i], reliefs[i]).render(camera, of_moment, mask);
+      const render::RenderedImage image = render::Tracer(scenes[i]).render(camera, of_moment, light.missing);
       sum.add(i, image.irradiance, image.standard_error);
       counts += image.counts;
     }
-    return develop(with_first(sum.irradiance(), first_light, mask), with_first(sum.standard_error(), first_error, mask),
-                   truth, now, counts, static_cast<std::int64_t>(times.size()) * pixels);
-  }
-
-  cv::Mat all_pixels() const { return {size, CV_8U, cv::Scalar(255)}; }
-
-  /// The picture where the mask is set, the first frame's elsewhere.
-  static cv::Mat with_first(const cv::Mat& picture, const cv::Mat& first, const cv::Mat& mask) {
-    cv::Mat out = first.clone();
-    picture.copyTo(out, mask);
-    return out;
+    add_traced(sum.irradiance(), sum.standard_error(), light);
+    return develop(light.irradiance, light.standard_error, truth, now, counts,
+                   static_cast<std::int64_t>(times.size()) * pixels);
   }
 };
 
@@ -251,14 +256,12 @@ VirtualCamera::VirtualCamera(const SceneSpec& scene, const Plan& plan, const fem
       return;
     }
   }
-  render::RenderSettings settings = parts->settings;
-  const render::Tracer tracer = parts->tracer(truths.front().press);
-  settings.noise->fraction *= kFirstFrameFraction;
-  settings.max_samples *= kFirstFrameSamples;
-  const render::RenderedImage image = tracer.render(parts->camera, settings);
-  parts->first_light = image.irradiance;
-  parts->first_error = image.standard_error;
-  parts->first_preview = tracer.preview(parts->camera, kPreviewStride);
+  parts->keys.push_back(parts->key_frame(truths.front()));
+  // They lean on the first one alone, so that they can be made at the same time.
+  std::vector<KeyFrame> later((truths.size() - 1) / kFramesPerKey);
+  tbb::parallel_for(std::size_t{0}, later.size(),
+                    [&](std::size_t i) { later[i] = parts->key_frame(truths[(i + 1) * kFramesPerKey]); });
+  std::move(later.begin(), later.end(), std::back_inserter(parts->keys));
   parts_ = std::move(parts);
 }
 

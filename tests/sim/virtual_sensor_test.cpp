@@ -148,13 +148,14 @@ TEST(PlayMotion, AForceThatCannotBeMetNamesTheKeysLine) {
 }
 
 // Light of the pixels that were not traced again must be what tracing the whole frame would give, within the noise.
-void expect_partial_frame_agrees(Played p) {
+// `all`: the camera is told of all frames, not of the first alone. Gives how many pixels were traced.
+std::int64_t expect_partial_frame_agrees(Played p, std::size_t frame, bool all = false) {
   p.scene.outputs = {.frames = false, .ideal = false, .radiance = true};
   p.scene.light.max_samples = 64;
   p.plan = make_plan(p.scene);
-  const VirtualCamera camera(p.scene, p.plan, *p.gel, p.truths.front());
-  const Capture part = camera.capture(p.truths.back());
-  const Capture whole = camera.capture_whole(p.truths.back());
+  const VirtualCamera camera(p.scene, p.plan, *p.gel, std::span(p.truths).first(all ? p.truths.size() : 1));
+  const Capture part = camera.capture(p.truths[frame]);
+  const Capture whole = camera.capture_whole(p.truths[frame]);
   EXPECT_LT(part.pixels_traced, whole.pixels_traced) << "nothing was saved";
   EXPECT_GT(part.pixels_traced, 0);
 
@@ -181,10 +182,37 @@ void expect_partial_frame_agrees(Played p) {
     // change.
     EXPECT_LT(rms, 1.5) << "in units of the imager's noise, channel " << channel;
   }
+  return part.pixels_traced;
 }
 
 TEST(VirtualCamera, ThePartialFrameAgreesWithTheWholeOne) {
-  expect_partial_frame_agrees(play("  - {frames: 2, z: {force_N: 1}}\n"));
+  expect_partial_frame_agrees(play("  - {frames: 2, z: {force_N: 1}}\n"), 2);
+}
+
+// Of a dense motion's frames some are keys: a frame between two of them needs fewer pixels than one that only the frame
+// at rest is known of, and is as good.
+TEST(VirtualCamera, AFrameOfADenseMotionLeansOnItsNeighbours) {
+  const Played dense = play("  - {frames: 60, z: {force_N: 1}}\n  - {frames: 45, x: {force_N: 0.3}}\n");
+  ASSERT_EQ(dense.truths.size(), 106u) << "keys at 50 and 100";
+  const std::int64_t with_first = expect_partial_frame_agrees(dense, 90);
+  const std::int64_t with_keys = expect_partial_frame_agrees(dense, 90, true);
+  EXPECT_LT(with_keys, with_first);
+}
+
+// Beads that move by a small part of a pixel are traced again, though no ray of the preview meets another thing.
+TEST(VirtualCamera, BeadsThatHardlyMoveAreTracedAgain) {
+  Played p = play("  - {frames: 1, z: {force_N: 0.01}}\n");
+  p.scene.outputs = {.frames = false, .ideal = false, .radiance = true};
+  p.plan = make_plan(p.scene);
+  const VirtualCamera camera(p.scene, p.plan, *p.gel, p.truths.front());
+  Truth moved = p.truths.front();
+  EXPECT_EQ(camera.capture(moved).pixels_traced, 0);
+  moved.press.bead_displacement.col(0).array() += 0.002;
+  const std::int64_t beads = camera.capture(moved).pixels_traced;
+  EXPECT_GT(beads, 0);
+  moved.press.bead_displacement.col(0).array() += 0.05;
+  EXPECT_NEAR(static_cast<double>(camera.capture(moved).pixels_traced), static_cast<double>(beads),
+              0.3 * static_cast<double>(beads));
 }
 
 TEST(VirtualCamera, ThePartialFrameAgreesWithTheWholeOneThroughALens) {
@@ -196,7 +224,7 @@ TEST(VirtualCamera, ThePartialFrameAgreesWithTheWholeOneThroughALens) {
   camera.focus_distance_mm = 16.0;
   camera.distortion = {-0.1, 0.0, 0.001, 0.0};
   camera.exposure_us = 20.0;
-  expect_partial_frame_agrees(p);
+  expect_partial_frame_agrees(p, 2);
 }
 
 TEST(VirtualCamera, ThePartialFrameAgreesWithTheWholeOneInEachColourOfABinnedPixel) {
@@ -206,7 +234,7 @@ TEST(VirtualCamera, ThePartialFrameAgreesWithTheWholeOneInEachColourOfABinnedPix
   camera.quantum_efficiency_red = {0.45, 0.06, 0.03};
   camera.quantum_efficiency_green = {0.08, 0.50, 0.10};
   camera.quantum_efficiency_blue = {0.02, 0.10, 0.45};
-  expect_partial_frame_agrees(p);
+  expect_partial_frame_agrees(p, 2);
 }
 
 TEST(VirtualCamera, AnObjectThatDoesNotMoveCostsNothing) {
