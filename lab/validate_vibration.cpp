@@ -13,6 +13,7 @@
 #include "fem/eigenmodes.h"
 #include "fem/vibration.h"
 #include "lab/block_mesh.h"
+#include "lab/spectral_line.h"
 #include "lab/validation.h"
 #include "sim/gel_setup.h"
 #include "sim/virtual_sensor.h"
@@ -163,26 +164,6 @@ struct VhsFigures {
   double peak_Hz = 0.0;         // of the true z force's spectrum in the replay
 };
 
-double spectrum_peak(const std::vector<sim::Truth>& truths, std::size_t first, double rate) {
-  const std::size_t n = truths.size() - first;
-  double mean = 0.0;
-  for (std::size_t i = first; i < truths.size(); ++i) mean += truths[i].press.wrench[2] / static_cast<double>(n);
-  double best = 0.0;
-  std::size_t line = 0;
-  for (std::size_t k = 1; k <= n / 2; ++k) {
-    Complex sum = 0.0;
-    for (std::size_t i = 0; i < n; ++i) {
-      sum += (truths[first + i].press.wrench[2] - mean) *
-             std::polar(1.0, -2.0 * kPi * static_cast<double>(k * i) / static_cast<double>(n));
-    }
-    if (std::abs(sum) > best) {
-      best = std::abs(sum);
-      line = k;
-    }
-  }
-  return static_cast<double>(line) * rate / static_cast<double>(n);
-}
-
 VhsFigures vhs(const ValidateOptions& options) {
   sim::SceneSpec scene = sim::read_scene(options.scenes / "vhs" / "vibration.yaml");
   scene.outputs = {.frames = false, .ideal = false, .radiance = false};
@@ -191,7 +172,10 @@ VhsFigures vhs(const ValidateOptions& options) {
   VhsFigures figures;
   const std::vector<sim::Truth> truths = sim::play_motion(scene, sim::make_plan(scene), *gel);
   const std::size_t still = static_cast<std::size_t>(scene.motion.keys.front().frames);
-  figures.peak_Hz = spectrum_peak(truths, still + 1, scene.motion.frame_rate_Hz);
+  std::vector<double> force;
+  for (std::size_t i = still + 1; i < truths.size(); ++i) force.push_back(truths[i].press.wrench[2]);
+  figures.peak_Hz = static_cast<double>(strongest_line(spectral_lines(force))) * scene.motion.frame_rate_Hz /
+                    static_cast<double>(force.size());
 
   scene.effects.inertia = sim::Switch::on;
   const auto vibration = sim::set_up_vibration(scene, sim::make_plan(scene), options.cache);

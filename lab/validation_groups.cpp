@@ -6,7 +6,9 @@ namespace touchstone::lab {
 std::vector<ValidationRow> validate_mechanics(const ValidateOptions& options);
 std::vector<ValidationRow> validate_vibration(const ValidateOptions& options);
 std::vector<ValidationRow> validate_light(const ValidateOptions& options);
-std::vector<ValidationRow> validate_vhs(const ValidateOptions& options);
+std::vector<ValidationRow> validate_vhs_force(const ValidateOptions& options);
+std::vector<ValidationRow> validate_vhs_vibration(const ValidateOptions& options);
+std::vector<ValidationRow> validate_vhs_cycle(const ValidateOptions& options);
 std::vector<ValidationRow> validate_dvs_light(const ValidateOptions& options);
 std::vector<ValidationRow> validate_dvs_force(const ValidateOptions& options);
 std::vector<ValidationRow> validate_dvs_material(const ValidateOptions& options);
@@ -30,7 +32,9 @@ const std::vector<ValidationGroup>& validation_groups() {
       {"mechanics", validate_mechanics},
       {"vibration", validate_vibration},
       {"light", validate_light},
-      {"vhs", validate_vhs},
+      {"vhs.force", validate_vhs_force},
+      {"vhs.vibration", validate_vhs_vibration},
+      {"vhs.cycle", validate_vhs_cycle},
       {"dvs.light", validate_dvs_light},
       {"dvs.force", validate_dvs_force},
       {"dvs.material", validate_dvs_material},

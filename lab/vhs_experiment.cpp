@@ -2,6 +2,7 @@
 
 #include <tbb/parallel_for.h>
 
+#include <Eigen/QR>
 #include <algorithm>
 #include <atomic>
 #include <cmath>
@@ -89,6 +90,37 @@ sensors::ForceSamples training_samples(const std::vector<TrackedSequence>& seque
     }
   }
   return samples;
+}
+
+ForceRelations force_relations(const sensors::ForceSamples& samples) {
+  const auto count = static_cast<Eigen::Index>(samples.positions.size());
+  const int last = samples.grid - 1;
+  Eigen::MatrixX4d summed = Eigen::MatrixX4d::Zero(count, 4);  // U_s, and 1
+  Eigen::MatrixX3d forces(count, 3);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const auto& positions = samples.positions[static_cast<std::size_t>(i)];
+    for (int row = 0; row < samples.grid; ++row) {
+      for (int column = 0; column < samples.grid; ++column) {
+        const int squares = (row == 0 || row == last ? 1 : 2) * (column == 0 || column == last ? 1 : 2);
+        summed.row(i).head<3>() += squares * (sensors::bead_coordinates(positions, samples.grid, row, column) -
+                                              sensors::bead_coordinates(samples.rest, samples.grid, row, column))
+                                                 .transpose();
+      }
+    }
+    summed(i, 3) = 1.0;
+    forces.row(i) = samples.forces[static_cast<std::size_t>(i)].transpose();
+  }
+  ForceRelations relations;
+  const auto length = static_cast<std::size_t>(count);
+  for (int axis = 0; axis < 3; ++axis) {
+    relations.axes[static_cast<std::size_t>(axis)] =
+        line_through({summed.col(axis).data(), length}, {forces.col(axis).data(), length});
+  }
+  const Eigen::VectorXd z = forces.col(2);
+  const Eigen::VectorXd left = z - summed * summed.colPivHouseholderQr().solve(z);
+  const double spread = (z.array() - z.mean()).square().sum();
+  if (spread > 0.0) relations.z_of_all_r2 = 1.0 - left.squaredNorm() / spread;
+  return relations;
 }
 
 std::vector<ForceRecord> estimate_forces(const std::vector<TrackedSequence>& sequences,

@@ -10,6 +10,7 @@
 
 #include "core/progress.h"
 #include "lab/frame_sequence.h"
+#include "lab/straight_line.h"
 #include "sensors/bead_tracker.h"
 #include "sensors/stiffness_force_model.h"
 #include "sensors/stiffness_training.h"
@@ -36,6 +37,13 @@ std::vector<TrackedSequence> track(const std::vector<FrameSequence>& sequences,
 /// which a bead wasn't measured are left out.
 /// @throws Error if a frame has no force, or the first frame of a sequence doesn't show every bead
 sensors::ForceSamples training_samples(const std::vector<TrackedSequence>& sequences, int grid);
+
+/// Fig. 6a: one axis of the force against U_s, the displacements summed over all squares between beads (px).
+struct ForceRelations {
+  std::array<StraightLine, 3> axes;  ///< F_x of U_s,x, F_y of U_s,y, F_z of U_s,z; N and N/px
+  double z_of_all_r2 = 0.0;          ///< of F_z of all three, the coupling that gives eq. 3 its last row
+};
+ForceRelations force_relations(const sensors::ForceSamples& samples);
 
 /// Against which positions displacements are measured.
 enum class RestChoice {

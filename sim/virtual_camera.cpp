@@ -21,9 +21,10 @@ namespace {
 
 // The light of key frames stays in other frames where nothing changes, so it is rendered better than theirs.
 constexpr double kKeyFrameFraction = 0.5;
-constexpr int kKeyFrameSamples = 4;
-// After the first frame, which stands for the gel at rest, one frame in so many is a key: 3 to 5 % more work, which
-// pays where frames are so dense that those next to each other are alike.
+constexpr int kFirstFrameSamples = 4;
+// After the first frame, which stands for the gel at rest, one frame in so many is a key: 2 or 3 % more work, which
+// pays where frames are so dense that those next to each other are alike. Where a key needs the most samples there are
+// edges, which other frames don't have in the same place: it gets no more of them than they do.
 constexpr std::size_t kFramesPerKey = 50;
 
 /// The electrons of all channels together, as many as the one that sees most: a lamp of one colour counts even if the
@@ -108,7 +109,7 @@ struct VirtualCamera::Parts : SceneSight {
     if (key.where.empty()) return key;
     render::RenderSettings well = settings;
     well.noise = noise_target(response, kKeyFrameFraction * scene.light.noise_fraction);
-    well.max_samples *= kKeyFrameSamples;
+    if (keys.empty()) well.max_samples *= kFirstFrameSamples;
     const render::RenderedImage image = at_once.render(camera, well, light.missing);
     add_traced(image.irradiance, image.standard_error, light);
     key.irradiance = light.irradiance(key.where).clone();
