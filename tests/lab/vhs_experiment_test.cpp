@@ -90,6 +90,34 @@ std::string write_recording(const test::TemporaryFolder& folder, int frames) {
   return table;
 }
 
+// Four squares of four beads: beads that all move by d have 16 d of U_s,x. Beads 70 px apart that go apart by a part s
+// each have p_z larger by 70 s px: 16 of them again.
+TEST(ForceRelations, AreThoseThatTheForcesWereMadeOf) {
+  sensors::ForceSamples samples;
+  const auto beads = [](double shift, double part) {
+    std::vector<Eigen::Vector2d> all;
+    for (int row = -1; row <= 1; ++row) {
+      for (int column = -1; column <= 1; ++column) {
+        all.emplace_back(320.0 + shift + 70.0 * (1.0 + part) * column, 240.0 - shift + 70.0 * (1.0 + part) * row);
+      }
+    }
+    return all;
+  };
+  samples.rest = beads(0.0, 0.0);
+  for (const double shift : {-2.0, 0.5, 3.0}) {
+    for (const double part : {0.0, 0.01, 0.03}) {
+      samples.positions.push_back(beads(shift, part));
+      samples.forces.emplace_back(0.05 * 16.0 * shift, shift * shift, 0.1 * 16.0 * 70.0 * part + 0.02 * 16.0 * shift);
+    }
+  }
+  const ForceRelations relations = force_relations(samples);
+  EXPECT_NEAR(relations.axes[0].slope, 0.05, 1e-12);
+  EXPECT_NEAR(relations.axes[0].r2, 1.0, 1e-12);
+  EXPECT_NEAR(relations.axes[2].slope, 0.1, 1e-12);
+  EXPECT_LT(relations.axes[2].r2, 0.95) << "the shift is in F_z, too";
+  EXPECT_NEAR(relations.z_of_all_r2, 1.0, 1e-12);
+}
+
 TEST(VhsExperiment, ForcesOfARecordingAreRecovered) {
   const test::TemporaryFolder folder;
   const auto csv = folder.write("forces.csv", write_recording(folder, 40));
