@@ -21,6 +21,7 @@ enum class Purpose : std::uint32_t {
   kGraspShake = 12,
   kForceSensor = 13,
   kMembraneWalk = 14,
+  kCentroidNoise = 15,
   kNetworkWeights = 20,
   kFolds = 21,
   kSearch = 22,

@@ -8,6 +8,7 @@ std::vector<ValidationRow> validate_vibration(const ValidateOptions& options);
 std::vector<ValidationRow> validate_light(const ValidateOptions& options);
 std::vector<ValidationRow> validate_vhs_force(const ValidateOptions& options);
 std::vector<ValidationRow> validate_vhs_vibration(const ValidateOptions& options);
+std::vector<ValidationRow> validate_vhs_design(const ValidateOptions& options);
 std::vector<ValidationRow> validate_vhs_cycle(const ValidateOptions& options);
 std::vector<ValidationRow> validate_dvs_light(const ValidateOptions& options);
 std::vector<ValidationRow> validate_dvs_force(const ValidateOptions& options);
@@ -34,6 +35,7 @@ const std::vector<ValidationGroup>& validation_groups() {
       {"light", validate_light},
       {"vhs.force", validate_vhs_force},
       {"vhs.vibration", validate_vhs_vibration},
+      {"vhs.design", validate_vhs_design},
       {"vhs.cycle", validate_vhs_cycle},
       {"dvs.light", validate_dvs_light},
       {"dvs.force", validate_dvs_force},
