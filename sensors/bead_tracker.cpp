@@ -10,6 +10,7 @@
 #include "sensors/bead_filter.h"
 #include "sensors/bead_window.h"
 #include "sensors/bit_window.h"
+#include "sensors/grey_pixels.h"
 
 namespace touchstone::sensors {
 
