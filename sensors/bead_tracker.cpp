@@ -86,6 +86,9 @@ struct BeadTracker::State {
     result.measured.resize(count);
     result.area_px.resize(count);
     result.status.resize(count);
+    before.resize(count);
+    was_found.resize(count);
+    jumped.resize(count);
     cell_side = static_cast<double>(settings.roi_a_px) / settings.grid;
   }
 
@@ -95,6 +98,9 @@ struct BeadTracker::State {
   int rows = 0, cols = 0, type = 0;  ///< of the first frame
   Eigen::Vector2d roi_a_centre = Eigen::Vector2d::Zero();
   std::vector<Bead> beads;
+  std::vector<Eigen::Vector2d> before;  ///< positions in the frame before; in the first one the cells' centres
+  std::vector<std::uint8_t> was_found;  ///< in the frame before; in the first one all
+  std::vector<BeadMeasurement> jumped;  ///< what follow_jump works on
   BrightnessScale scale;
   GreyWindow window;
   TrackedBeads result;
@@ -110,6 +116,8 @@ struct BeadTracker::State {
   void follow(const cv::Mat& image, std::size_t bead, bool visible, double dt);
   void accept(std::size_t bead, const BeadMeasurement& measurement, BeadStatus status, double dt);
   void hold_or_reset(std::size_t bead);
+  bool follow_jump(const cv::Mat& image, const Eigen::Vector2d& step);
+  void mend_jump(const cv::Mat& image);
   void reset_to_cell(std::size_t bead);
 };
 
@@ -258,6 +266,50 @@ void BeadTracker::State::follow(const cv::Mat& image, std::size_t bead, bool vis
   hold_or_reset(bead);
 }
 
+/// Takes all beads for moved by `step` since the frame before. Changes nothing and returns false if one isn't there.
+bool BeadTracker::State::follow_jump(const cv::Mat& image, const Eigen::Vector2d& step) {
+  for (std::size_t bead = 0; bead < beads.size(); ++bead) {
+    const Eigen::Vector2d where = before[bead] + step;
+    const std::optional<BeadMeasurement> found = measure_near(image, bead, where);
+    if (!found || (found->centroid - where).norm() > 0.25 * cell_side) return false;
+    jumped[bead] = *found;
+  }
+  for (std::size_t bead = 0; bead < beads.size(); ++bead) accept(bead, jumped[bead], BeadStatus::kFoundAgain, 0.0);
+  return true;
+}
+
+/// All beads may have moved by more than half a cell since the frame before: then cells hold a neighbour's bead, and
+/// those at one side hold none. What the middlemost of the cells that were searched holds is one of its nine nearest
+/// beads.
+void BeadTracker::State::mend_jump(const cv::Mat& image) {
+  const int n = settings.grid;
+  int lost = 0;
+  std::optional<std::size_t> middle;
+  for (std::size_t bead = 0; bead < beads.size(); ++bead) {
+    if (was_found[bead] && !is_found(result.status[bead])) ++lost;
+    if (!is_found(result.status[bead])) continue;
+    const auto from_middle = [&](std::size_t i) { return (cell_centre(i) - roi_a_centre).squaredNorm(); };
+    if (!middle || from_middle(bead) < from_middle(*middle)) middle = bead;
+  }
+  if (lost < n) return;
+  if (!middle) {  // half a cell along both axes: parts of four beads in each
+    for (const double x : {-0.5, 0.5}) {
+      for (const double y : {-0.5, 0.5}) {
+        if (follow_jump(image, cell_side * Eigen::Vector2d(x, y))) return;
+      }
+    }
+    return;
+  }
+  const Eigen::Vector2d there = result.measured[*middle];
+  const int row = static_cast<int>(*middle) / n;
+  const int column = static_cast<int>(*middle) % n;
+  for (int r = std::max(row - 1, 0); r <= std::min(row + 1, n - 1); ++r) {
+    for (int c = std::max(column - 1, 0); c <= std::min(column + 1, n - 1); ++c) {
+      if (follow_jump(image, there - before[static_cast<std::size_t>(r * n + c)])) return;
+    }
+  }
+}
+
 int TrackedBeads::found() const {
   return static_cast<int>(std::count_if(status.begin(), status.end(), is_found));
 }
@@ -301,12 +353,17 @@ const TrackedBeads& BeadTracker::track(const Frame& frame) {
     s.type = image.type();
     for (std::size_t bead = 0; bead < s.beads.size(); ++bead) s.reset_to_cell(bead);
     s.first = false;
+    std::fill(s.was_found.begin(), s.was_found.end(), std::uint8_t{1});
   } else {
+    for (std::size_t bead = 0; bead < s.beads.size(); ++bead)
+      s.was_found[bead] = is_found(s.result.status[bead]) ? 1 : 0;
     dt = microseconds_between(s.result.t_us, frame.t_us) / kMicrosecondsPerSecond;
   }
   s.result.t_us = frame.t_us;
+  std::copy(s.result.positions.begin(), s.result.positions.end(), s.before.begin());
   const bool visible = s.adjust_brightness(image);
   for (std::size_t bead = 0; bead < s.beads.size(); ++bead) s.follow(image, bead, visible, dt);
+  if (visible) s.mend_jump(image);
   if (visible && s.result.found() == 0) {
     double low = 0.0, high = 0.0;
     cv::minMaxIdx(image(s.roi_a(image)).reshape(1), &low, &high);

@@ -121,6 +121,66 @@ TEST_F(BeadTrackerFaults, DroppedFramesOnlyMakeTheStepLonger) {
   }
 }
 
+TEST_F(BeadTrackerFaults, TimeThatJumpsIsAsAnyOther) {
+  // Beads sway at 20 Hz; 1, 2 and 100 intervals pass unseen, 30 px apart at most.
+  for (const int intervals : {2, 100}) {
+    BeadTracker fresh({});
+    double seconds = 0.0;
+    const auto beads = [&] {
+      auto moved = rest;
+      for (Eigen::Vector2d& bead : moved) bead.x() += 15.0 * std::sin(2.0 * 3.14159265358979 * 20.0 * seconds);
+      return moved;
+    };
+    for (int frame = 0; frame < 60; ++frame) {
+      seconds += 1e-6 * static_cast<double>(kIntervalUs) * (frame == 40 ? intervals : 1);
+      const TrackedBeads& tracked = fresh.track({painter.paint(beads()), std::llround(1e6 * seconds)});
+      ASSERT_EQ(tracked.found(), 9) << "frame " << frame;
+      const auto truth = beads();
+      for (std::size_t i = 0; i < 9; ++i) EXPECT_LT((tracked.positions[i] - truth[i]).norm(), 0.6) << "frame " << frame;
+    }
+  }
+}
+
+TEST_F(BeadTrackerFaults, LightThatJumpsOrDriftsCostsNoBead) {
+  // Beads 60 levels darker than what is behind them, 18 at the least light; noise of half a level.
+  BeadPainter dim({.background = 80.0, .bead = 20.0, .noise = 0.5});
+  std::vector<double> gains = {1.0, 0.3, 1.0, 3.0, 0.3, 3.0, 1.0};
+  for (int i = 0; i <= 60; ++i) gains.push_back(0.3 * std::pow(10.0, i / 60.0));  // a ramp of 4 % a frame
+  for (const double gain : gains) {
+    const TrackedBeads& tracked = next(dim.paint(rest, gain));
+    EXPECT_THAT(tracked.status, Each(tracked.t_us == kIntervalUs ? tracked.status[0] : BeadStatus::kFound)) << gain;
+    for (std::size_t i = 0; i < 9; ++i) EXPECT_LT((tracked.measured[i] - rest[i]).norm(), 0.3) << "gain " << gain;
+  }
+}
+
+TEST_F(BeadTrackerFaults, TooMuchLightHidesBeadsUntilItIsGone) {
+  ASSERT_EQ(next(rest).found(), 9);
+  const TrackedBeads& white = next(painter.paint(rest, 20.0));  // beads are at 40 of 255
+  EXPECT_EQ(white.light, FrameLight::kSaturated);
+  EXPECT_THAT(white.status, Each(BeadStatus::kHidden));
+  EXPECT_THAT(next(rest).status, Each(BeadStatus::kFound));
+}
+
+TEST_F(BeadTrackerFaults, JumpOfAllBeadsIsFollowedUpToACell) {
+  // 71 px apart, in cells of 73 px: beyond half of it each cell sees a neighbour's bead.
+  for (const double length : {20.0, 30.0, 34.0, 36.0, 37.0, 45.0, 60.0, 71.0}) {
+    for (int direction = 0; direction < 8; ++direction) {
+      BeadTracker fresh({});
+      const double angle = direction * 3.14159265358979 / 4.0;
+      Eigen::Vector2d step(std::cos(angle), std::sin(angle));
+      step *= length / step.cwiseAbs().maxCoeff();
+      auto moved = rest;
+      for (Eigen::Vector2d& bead : moved) bead += step;
+      ASSERT_EQ(fresh.track({painter.paint(rest), 0}).found(), 9);
+      for (int frame = 1; frame <= 3; ++frame) {
+        const TrackedBeads& tracked = fresh.track({painter.paint(moved), frame * kIntervalUs});
+        ASSERT_EQ(tracked.found(), 9) << length << " px, direction " << direction;
+        for (std::size_t i = 0; i < 9; ++i) EXPECT_LT((tracked.positions[i] - moved[i]).norm(), 0.5) << length;
+      }
+    }
+  }
+}
+
 TEST_F(BeadTrackerFaults, BlackWhiteAndFlatFramesAreSaidSoAndSurvived) {
   for (int i = 0; i < 3; ++i) ASSERT_EQ(next(rest).found(), 9);
   const struct {
