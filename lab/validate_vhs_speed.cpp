@@ -60,7 +60,8 @@ Clip rendered_clip(const ValidateOptions& options) {
   generate(job, data, how, options.progress);
   Clip clip;
   clip.bead_radius_px = 9.0;
-  for (const LabelledFrame& frame : frames_of_data_set(data, Split::verify).front().frames) {
+  const std::vector<FrameSequence> sequences = frames_of_data_set(data, Split::verify);
+  for (const LabelledFrame& frame : sequences.front().frames) {
     cv::Mat image = sim::read_image(frame.file);
     if (image.channels() == 1) cv::cvtColor(image, image, cv::COLOR_GRAY2BGR);
     clip.frames.push_back(image);
