@@ -7,6 +7,7 @@ std::vector<ValidationRow> validate_mechanics(const ValidateOptions& options);
 std::vector<ValidationRow> validate_vibration(const ValidateOptions& options);
 std::vector<ValidationRow> validate_light(const ValidateOptions& options);
 std::vector<ValidationRow> validate_vhs(const ValidateOptions& options);
+std::vector<ValidationRow> validate_vhs_distribution(const ValidateOptions& options);
 std::vector<ValidationRow> validate_vhs_speed(const ValidateOptions& options);
 std::vector<ValidationRow> validate_dvs_light(const ValidateOptions& options);
 std::vector<ValidationRow> validate_dvs_force(const ValidateOptions& options);
@@ -32,6 +33,7 @@ const std::vector<ValidationGroup>& validation_groups() {
       {"vibration", validate_vibration},
       {"light", validate_light},
       {"vhs", validate_vhs},
+      {"vhs.distribution", validate_vhs_distribution},
       {"vhs.speed", validate_vhs_speed},
       {"dvs.light", validate_dvs_light},
       {"dvs.force", validate_dvs_force},
