@@ -4,6 +4,8 @@
 #include "apps/tracker_options.h"
 #include "core/error.h"
 #include "core/whole_file.h"
+#include "lab/bead_tractions.h"
+#include "sensors/marker_compliance_file.h"
 #include "sensors/stiffness_model_file.h"
 
 namespace touchstone::apps {
@@ -15,6 +17,10 @@ struct EstimateOptions {
   std::filesystem::path model;
   std::filesystem::path out;
   std::string rest = "model";
+  std::filesystem::path compliance;
+  std::filesystem::path distribution;
+  sensors::ViewParallax parallax;
+  sensors::TractionSettings inversion = lab::bead_inversion();
 };
 
 std::string csv_of(const std::vector<lab::ForceRecord>& records) {
@@ -60,12 +66,29 @@ void print_verification(const lab::Verification& verification) {
   }
 }
 
+void write_distribution(const EstimateOptions& options, const std::vector<lab::TrackedSequence>& tracked,
+                        const sensors::StiffnessForceModel& model) {
+  const std::vector<Eigen::Vector2d> rest = options.rest == "first" ? std::vector<Eigen::Vector2d>() : model.rest;
+  const lab::TractionSummary summary =
+      lab::write_bead_tractions(tracked, rest, sensors::load_marker_compliance(options.compliance), options.parallax,
+                                options.inversion, options.distribution);
+  fmt::print("{}: tractions.csv and forces.csv of {} frames, {} of them in contact\n", options.distribution.string(),
+             summary.frames, summary.in_contact);
+  if (summary.without_force > 0) {
+    fmt::print("  {} frames with too few beads for a distribution\n", summary.without_force);
+  }
+}
+
 void estimate(const EstimateOptions& options, const FrameOptions& frames, const GlobalOptions& global) {
+  if (options.compliance.empty() != options.distribution.empty()) {
+    fail("--compliance and --distribution belong together: the gel's compliance, and the folder for what it tells");
+  }
   if (!options.out.empty()) require_writable_place(options.out);
   const sensors::StiffnessForceModel model = sensors::load_stiffness_model(options.model);
   FrameOptions with_grid = frames;
   with_grid.tracker.grid = model.grid;
   const std::vector<lab::TrackedSequence> tracked = tracked_frames(with_grid, global);
+  if (!options.compliance.empty()) write_distribution(options, tracked, model);
   const lab::RestChoice rest = options.rest == "first" ? lab::RestChoice::first_frame : lab::RestChoice::model;
   const std::vector<lab::ForceRecord> records = lab::estimate_forces(tracked, model, rest);
   if (!options.out.empty()) {
@@ -74,7 +97,7 @@ void estimate(const EstimateOptions& options, const FrameOptions& frames, const 
   const bool truth_is_known = std::any_of(records.begin(), records.end(),
                                           [](const lab::ForceRecord& record) { return record.truth.has_value(); });
   if (!truth_is_known) {
-    if (options.out.empty()) fmt::print("{}", csv_of(records));
+    if (options.out.empty() && options.distribution.empty()) fmt::print("{}", csv_of(records));
     return;
   }
   fmt::print("Force by load, {}:\n", frames.data.empty() ? "recorded frames" : "split '" + frames.split + "'");
@@ -95,6 +118,22 @@ void add_vhs_estimation(CLI::App& estimations, const GlobalOptions& global, Acti
       ->add_option("--rest", options->rest,
                    "Displacements are measured from the 'model's rest positions, or from the 'first' frame's")
       ->check(CLI::IsMember({"model", "first"}))
+      ->capture_default_str();
+  command->add_option("--compliance", options->compliance,
+                      "The gel's, by `touchstone export compliance`: tractions, so forces at several points, too");
+  command->add_option("--distribution", options->distribution,
+                      "The folder of tractions.csv and forces.csv that the compliance gives");
+  command
+      ->add_option(
+          "--viewing-distance-mm", options->parallax.viewing_distance_mm,
+          "Apparent distance of the camera from the beads, for their parallax: n_gel (air + plate / n_plate) + "
+          "gel; 29.3 for scenes/devices/vhs.yaml; 0: far away")
+      ->check(CLI::Range(0.0, 1e6))
+      ->capture_default_str();
+  command
+      ->add_option("--lateral-noise-mm", options->inversion.lateral_noise_mm,
+                   "Error of a bead's displacement along x and y, for the tractions")
+      ->check(CLI::Range(1e-5, 1.0))
       ->capture_default_str();
   command->callback([&action, &global, options, frames] {
     action = [options, frames, &global] { estimate(*options, *frames, global); };

@@ -5,7 +5,6 @@
 #include <chrono>
 #include <cmath>
 #include <numeric>
-#include <opencv2/core.hpp>
 
 #include "core/error.h"
 #include "core/whole_file.h"
@@ -14,16 +13,13 @@
 #include "lab/seconds_since.h"
 #include "lab/validation.h"
 #include "lab/vhs_experiment.h"
-#include "sim/image_file.h"
 
 namespace touchstone::lab {
 namespace {
 
-constexpr double kPublished5N_percent = 2.0;      // table 1
-constexpr double kPublishedTracking_fps = 719.0;  // sec. 4.2.1, one core
-constexpr double kNeededForce_Hz = 500.0;         // sec. 2.3.1
-constexpr int kSeeds = 5;                         // sec. 4.4.1: five sets of experiments
-constexpr double kStudent95OfFive = 2.776;        // t of 4 degrees of freedom
+constexpr double kPublished5N_percent = 2.0;  // table 1
+constexpr int kSeeds = 5;                     // sec. 4.4.1: five sets of experiments
+constexpr double kStudent95OfFive = 2.776;    // t of 4 degrees of freedom
 
 /// The job with another seed, its scene files named from the root.
 std::filesystem::path job_with_seed(const std::filesystem::path& file, std::uint64_t seed,
@@ -91,41 +87,6 @@ double mean_of(const std::vector<Trial>& trials, const auto& figure) {
   double sum = 0.0;
   for (const Trial& trial : trials) sum += figure(trial);
   return sum / static_cast<double>(trials.size());
-}
-
-/// Frames a second of tracker and force model on one core, from pictures in memory.
-struct Speed {
-  double tracking = 0.0, with_force = 0.0;
-};
-
-Speed speed_of(const std::filesystem::path& data) {
-  const std::vector<FrameSequence> sequences = frames_of_data_set(data, Split::verify);
-  std::vector<cv::Mat> frames;
-  for (const LabelledFrame& frame : sequences.front().frames) frames.push_back(sim::read_image(frame.file));
-  sensors::StiffnessForceModel model;
-  model.rest.assign(9, Eigen::Vector2d::Zero());
-  model.lowest_seen.assign(9, Eigen::Vector3d::Constant(-1e9));
-  model.highest_seen.assign(9, Eigen::Vector3d::Constant(1e9));
-  model.stiffness.assign(4, Eigen::Matrix3d::Identity());
-  constexpr int kRounds = 100;
-  constexpr std::int64_t kInterval_us = 1663;
-  const auto frames_a_second = [&](bool with_force) {
-    sensors::BeadTracker tracker({});
-    double sum = 0.0;
-    std::int64_t t_us = 0;
-    const auto begun = std::chrono::steady_clock::now();
-    for (int round = 0; round < kRounds; ++round) {
-      tracker.restart();
-      for (const cv::Mat& frame : frames) {
-        const sensors::TrackedBeads& beads = tracker.track({frame, t_us += kInterval_us});
-        if (with_force) sum += sensors::estimate(model, beads).force.z();
-      }
-    }
-    const double seconds = seconds_since(begun);
-    TS_ASSERT(std::isfinite(sum));
-    return kRounds * static_cast<double>(frames.size()) / seconds;
-  };
-  return {frames_a_second(false), frames_a_second(true)};
 }
 
 }  // namespace
@@ -208,27 +169,6 @@ std::vector<ValidationRow> validate_vhs_force(const ValidateOptions& options) {
   add("vhs.track.lost_beads", "beads not found, summed over all frames of all cycles", "1", 0.0, false,
       [](const Trial& trial) { return trial.lost; });
 
-  const auto speed_begun = std::chrono::steady_clock::now();
-  const Speed speed = speed_of(data);
-  const double speed_seconds = seconds_since(speed_begun);
-  const auto add_speed = [&](const std::string& id, const std::string& title, const std::string& unit, double published,
-                             double ours) {
-    ValidationRow row;
-    row.id = id;
-    row.title = title;
-    row.unit = unit;
-    row.published = published;
-    row.ours = ours;
-    row.better = Better::higher;
-    row.holds = ours >= published;
-    row.quick = options.quick;
-    row.seconds = speed_seconds;
-    rows.push_back(row);
-  };
-  add_speed("vhs.speed.tracking_fps", "frames a second of the tracker on one core", "1/s", kPublishedTracking_fps,
-            speed.tracking);
-  add_speed("vhs.speed.force_Hz", "forces a second from frames on one core; palpation needs 500", "Hz", kNeededForce_Hz,
-            speed.with_force);
   return rows;
 }
 

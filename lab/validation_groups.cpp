@@ -10,6 +10,8 @@ std::vector<ValidationRow> validate_vhs_force(const ValidateOptions& options);
 std::vector<ValidationRow> validate_vhs_vibration(const ValidateOptions& options);
 std::vector<ValidationRow> validate_vhs_design(const ValidateOptions& options);
 std::vector<ValidationRow> validate_vhs_cycle(const ValidateOptions& options);
+std::vector<ValidationRow> validate_vhs_distribution(const ValidateOptions& options);
+std::vector<ValidationRow> validate_vhs_speed(const ValidateOptions& options);
 std::vector<ValidationRow> validate_dvs_light(const ValidateOptions& options);
 std::vector<ValidationRow> validate_dvs_force(const ValidateOptions& options);
 std::vector<ValidationRow> validate_dvs_material(const ValidateOptions& options);
@@ -37,6 +39,8 @@ const std::vector<ValidationGroup>& validation_groups() {
       {"vhs.vibration", validate_vhs_vibration},
       {"vhs.design", validate_vhs_design},
       {"vhs.cycle", validate_vhs_cycle},
+      {"vhs.distribution", validate_vhs_distribution},
+      {"vhs.speed", validate_vhs_speed},
       {"dvs.light", validate_dvs_light},
       {"dvs.force", validate_dvs_force},
       {"dvs.material", validate_dvs_material},

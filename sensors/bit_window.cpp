@@ -4,6 +4,8 @@
 #include <bit>
 #include <cmath>
 
+#include "sensors/wide_clones.h"
+
 namespace touchstone::sensors {
 
 namespace {
@@ -14,33 +16,37 @@ std::size_t index(int y) {
   return static_cast<std::size_t>(y);
 }
 
-/// Combines each row with the `radius` rows above and below it.
-template <typename Combine>
-void combine_rows(BitWindow& window, int radius, Combine combine) {
-  for (int step = 0; step < radius; ++step) {
-    Row above = window.rows[0];
-    for (int y = 0; y < window.height; ++y) {
-      const Row here = window.rows[index(y)];
-      const Row below = y + 1 < window.height ? window.rows[index(y + 1)] : here;
-      window.rows[index(y)] = combine(here, combine(above, below));
-      above = here;
-    }
-  }
+/// Each row, shifted and joined with its neighbours above and below. A border of one row on either side lets all rows
+/// be worked on alike, several at a time.
+using BorderedRows = std::array<Row, BitWindow::kMaxSide + 2>;
+
+TS_WIDE_CLONES void erode_once(Row* rows, int height, Row first, Row last) {
+  BorderedRows across;
+  across[0] = across[static_cast<std::size_t>(height) + 1] = ~Row{0};
+  Row* middle = across.data() + 1;
+  for (int y = 0; y < height; ++y) middle[y] = rows[y] & ((rows[y] << 1) | first) & ((rows[y] >> 1) | last);
+  for (int y = 0; y < height; ++y) rows[y] = middle[y - 1] & middle[y] & middle[y + 1];
 }
 
-/// All bits of `mask` that are joined to bits of `seed` by runs of the mask (Kogge-Stone fill, both ways).
+TS_WIDE_CLONES void dilate_once(Row* rows, int height, Row full) {
+  BorderedRows across;
+  across[0] = across[static_cast<std::size_t>(height) + 1] = 0;
+  Row* middle = across.data() + 1;
+  for (int y = 0; y < height; ++y) middle[y] = (rows[y] | (rows[y] << 1) | (rows[y] >> 1)) & full;
+  for (int y = 0; y < height; ++y) rows[y] = middle[y - 1] | middle[y] | middle[y + 1];
+}
+
+/// All bits of `mask` that are joined to bits of `seed` by runs of the mask: run by run, as there are few.
 Row fill_runs(Row seed, Row mask) {
-  Row left = seed & mask;
-  Row right = left;
-  Row left_mask = mask;
-  Row right_mask = mask;
-  for (int shift = 1; shift < 64; shift *= 2) {
-    left |= left_mask & (left << shift);
-    left_mask &= left_mask << shift;
-    right |= right_mask & (right >> shift);
-    right_mask &= right_mask >> shift;
+  Row filled = 0;
+  for (seed &= mask; seed != 0; seed &= ~filled) {
+    const Row lowest = seed & (~seed + 1);
+    const Row up = (mask ^ (mask + lowest)) & mask;  // the carry clears the run from here on
+    const Row gaps_below = ~mask & (lowest - 1);
+    const Row down = (lowest - 1) & (gaps_below == 0 ? ~Row{0} : ~Row{0} << (64 - std::countl_zero(gaps_below)));
+    filled |= up | down;
   }
-  return left | right;
+  return filled;
 }
 
 Row with_neighbours(Row row) {
@@ -51,22 +57,11 @@ Row with_neighbours(Row row) {
 
 void erode(BitWindow& window, int radius) {
   const Row full = window.full_row();
-  const Row first = Row{1};
-  const Row last = full & ~(full >> 1);
-  for (int y = 0; y < window.height; ++y) {
-    Row& row = window.rows[index(y)];
-    for (int step = 0; step < radius; ++step) row &= ((row << 1) | first) & ((row >> 1) | last);
-  }
-  combine_rows(window, radius, [](Row a, Row b) { return a & b; });
+  for (int step = 0; step < radius; ++step) erode_once(window.rows.data(), window.height, Row{1}, full & ~(full >> 1));
 }
 
 void dilate(BitWindow& window, int radius) {
-  const Row full = window.full_row();
-  for (int y = 0; y < window.height; ++y) {
-    Row& row = window.rows[index(y)];
-    for (int step = 0; step < radius; ++step) row = with_neighbours(row) & full;
-  }
-  combine_rows(window, radius, [](Row a, Row b) { return a | b; });
+  for (int step = 0; step < radius; ++step) dilate_once(window.rows.data(), window.height, window.full_row());
 }
 
 void open_regions(BitWindow& window, int radius) {
@@ -90,30 +85,39 @@ bool take_region(BitWindow& window, BitWindow& region) {
   const Row seed = window.rows[index(first)];
   region.rows[index(first)] = fill_runs(seed & (~seed + 1), seed);
 
-  // Sweep down and up until nothing is added; a convex region needs one sweep of each.
+  // Sweep down and up until a sweep adds nothing; a convex region needs one of each.
   int low = first;
   int high = first;  // rows low..high hold something
-  for (bool grew = true; grew;) {
-    grew = false;
-    const auto grow = [&](int y, int from) {
-      const Row mask = window.rows[index(y)];
-      const Row before = region.rows[index(y)];
-      const Row reached = (with_neighbours(region.rows[index(from)]) & mask) | before;
-      if (reached == before) return false;
-      region.rows[index(y)] = fill_runs(reached, mask);
-      grew = true;
-      return true;
-    };
+  const auto grow = [&](int y, int from) {
+    const Row mask = window.rows[index(y)];
+    const Row before = region.rows[index(y)];
+    const Row reached = (with_neighbours(region.rows[index(from)]) & mask) | before;
+    if (reached == before) return false;
+    region.rows[index(y)] = fill_runs(reached, mask);
+    return true;
+  };
+  const auto sweep_down = [&] {
+    bool grew = false;
     for (int y = low + 1; y < window.height; ++y) {
       const bool added = grow(y, y - 1);
+      grew = grew || added;
       if (y > high && !added) break;
       high = std::max(high, y);
     }
+    return grew;
+  };
+  const auto sweep_up = [&] {
+    bool grew = false;
     for (int y = high - 1; y >= 0; --y) {
       const bool added = grow(y, y + 1);
+      grew = grew || added;
       if (y < low && !added) break;
       low = std::min(low, y);
     }
+    return grew;
+  };
+  sweep_down();
+  while (sweep_up() && sweep_down()) {
   }
   for (int y = low; y <= high; ++y) window.rows[index(y)] &= ~region.rows[index(y)];
   return true;

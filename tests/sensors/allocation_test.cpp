@@ -81,34 +81,50 @@ TEST_F(Allocation, IsCounted) {
   EXPECT_GT(allocations, before + 1);
 }
 
+/// Frames with beads that are lost, found again and jump, in the dark and without any contrast.
+std::vector<Frame> hard_frames(const BeadTrackerSettings& settings, double spacing, double radius_px, int type) {
+  test::BeadPainter painter({.radius_px = radius_px, .noise = 2.0});
+  const auto rest = test::grid_positions(settings.grid, spacing, {320.0, 240.0});
+  std::vector<Frame> frames;
+  for (int i = 0; i < 12; ++i) {
+    auto beads = rest;
+    for (auto& bead : beads) bead += 0.5 * i * Eigen::Vector2d(1.0, -0.7);
+    if (i >= 5) beads[2] = {std::nan(""), 0.0};                     // hidden, searched for
+    if (i == 7) beads[3] += 0.3 * spacing * Eigen::Vector2d(1, 1);  // jumps
+    cv::Mat image = painter.paint(beads);
+    if (i == 9) image.setTo(0);
+    if (i == 10) image.setTo(100);
+    if (CV_MAT_CN(type) == 3) cv::merge(std::vector<cv::Mat>{image, image, image}, image);
+    image.convertTo(image, CV_MAT_DEPTH(type), CV_MAT_DEPTH(type) == CV_16U ? 16.0 : 1.0);
+    frames.push_back({image, i * 1663});
+  }
+  return frames;
+}
+
+void expect_none_after_the_first(const BeadTrackerSettings& settings, const std::vector<Frame>& frames) {
+  const StiffnessForceModel model = test::known_model(settings.grid, MatrixForm::kAsymmetric, 1);
+  BeadTracker tracker(settings);
+  Eigen::Vector3d sum = estimate(model, tracker.track(frames[0])).force;
+  int lost = 0;
+  const long before = allocations;
+  for (std::size_t i = 1; i < frames.size(); ++i) {
+    const TrackedBeads& beads = tracker.track(frames[i]);
+    sum += estimate(model, beads).force;
+    lost += settings.grid * settings.grid - beads.found();
+  }
+  EXPECT_EQ(allocations, before) << "type " << frames[0].image.type() << ", grid of " << settings.grid;
+  EXPECT_GT(lost, 0);
+  EXPECT_TRUE(sum.allFinite());
+}
+
 TEST_F(Allocation, NoneAfterTheFirstFrame) {
   for (const int type : {CV_8UC1, CV_8UC3, CV_16UC1, CV_16UC3}) {
     for (const CentroidKind centroid : {CentroidKind::kBinary, CentroidKind::kWeighted}) {
-      test::BeadPainter painter({.noise = 2.0});
-      const auto rest = test::grid_positions(3, 70.0, {320.0, 240.0});
-      std::vector<cv::Mat> images;
-      for (int i = 0; i < 12; ++i) {
-        auto beads = rest;
-        for (auto& bead : beads) bead += 0.5 * i * Eigen::Vector2d(1.0, -0.7);
-        if (i >= 5) beads[2] = {std::nan(""), 0.0};           // hidden, searched for
-        if (i == 7) beads[3] += Eigen::Vector2d(22.0, 20.0);  // jumps
-        cv::Mat image = painter.paint(beads);
-        if (i == 9) image.setTo(0);
-        if (i == 10) image.setTo(100);
-        if (CV_MAT_CN(type) == 3) cv::merge(std::vector<cv::Mat>{image, image, image}, image);
-        image.convertTo(image, CV_MAT_DEPTH(type), CV_MAT_DEPTH(type) == CV_16U ? 16.0 : 1.0);
-        images.push_back(image);
-      }
-      const StiffnessForceModel model = test::known_model(3, MatrixForm::kAsymmetric, 1);
-      BeadTracker tracker({.centroid = centroid});
-      Eigen::Vector3d sum = estimate(model, tracker.track({images[0], 0})).force;
-      std::vector<Frame> frames;
-      for (int i = 1; i < 12; ++i) frames.push_back({images[static_cast<std::size_t>(i)], i * 1663});
-      const long before = allocations;
-      for (const Frame& frame : frames) sum += estimate(model, tracker.track(frame)).force;
-      EXPECT_EQ(allocations, before) << "type " << type;
-      EXPECT_TRUE(sum.allFinite());
+      const BeadTrackerSettings three = {.centroid = centroid};
+      expect_none_after_the_first(three, hard_frames(three, 70.0, 9.0, type));
     }
+    const BeadTrackerSettings ten = {.grid = 10, .roi_a_px = 430, .roi_b_px = 20};
+    expect_none_after_the_first(ten, hard_frames(ten, 43.0, 5.0, type));
   }
 }
 
