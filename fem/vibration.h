@@ -40,8 +40,7 @@ struct GelVibration {
 GelVibration compute_vibration(const TetMesh& mesh, std::span<const ElasticMaterial> materials,
                                std::span<const Bead> beads, double density, int count, std::span<const int> held = {});
 GelVibration compute_vibration(const TetMesh& mesh, const ElasticMaterial& material, std::span<const Bead> beads,
-                               double density, int count,
-                               std::span<const int> held = {});  ///< the same in all regions
+                               double density, int count, std::span<const int> held = {});  ///< the same in all regions
 
 /// Lowest frequency (Hz) of a wide layer of this thickness (mm), bonded below: a quarter of a shear wave,
 /// sqrt(G / rho) / (4 h). A slab with free sides is softer: on 4 thicknesses square its lowest is some percent lower.

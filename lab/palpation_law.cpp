@@ -17,12 +17,13 @@
 namespace touchstone::lab {
 namespace {
 
-constexpr double kHardRatio = 100.0;     // see ratio_place
-constexpr double kSpreads = 3.05;        // how far from the middle pieces are covered, in their standard deviations
-constexpr double kFine_mm = 0.01;        // step of the laws
-constexpr int kTerms = 4;                // of the smooth laws
+constexpr double kHardRatio = 100.0;  // see ratio_place
+constexpr double kSpreads = 3.05;     // how far from the middle pieces are covered, in their standard deviations
+constexpr double kFine_mm = 0.01;     // step of the laws
+constexpr int kTerms = 4;             // of the smooth laws
 constexpr double kPlateRadius_mm = 10.0, kPlateEdge_mm = 1.0, kPlateHeight_mm = 5.0;
-constexpr double kShareStep = 0.05;      // of ln E, for derivatives
+constexpr double kCloser = 1.3;      // depths lie closer at first, as forces rise
+constexpr double kShareStep = 0.05;  // of ln E, for derivatives
 
 /// d^1.5 (1, d, d^2, ...): how a ball's force on elastic layers begins (Hertz), and goes on.
 Eigen::RowVectorXd terms_at(double depth) {
@@ -33,30 +34,38 @@ Eigen::RowVectorXd terms_at(double depth) {
 }
 
 /// By least squares, each depth weighted by `weight`: what the terms make of each column.
-Eigen::MatrixXd fitted(const std::vector<double>& depths, const Eigen::MatrixXd& values, const Eigen::VectorXd& weight) {
+Eigen::MatrixXd fitted(const std::vector<double>& depths, const Eigen::MatrixXd& values,
+                       const Eigen::VectorXd& weight) {
   Eigen::MatrixXd terms(values.rows(), kTerms);
   for (Eigen::Index i = 0; i < values.rows(); ++i) terms.row(i) = terms_at(depths[static_cast<std::size_t>(i)]);
   return (weight.asDiagonal() * terms).householderQr().solve(weight.asDiagonal() * values);
 }
 
-double ratio_at(double place) { return std::exp(place) / (1.0 - std::exp(place) / kHardRatio); }
+double ratio_at(double place) {
+  return std::exp(place) / (1.0 - std::exp(place) / kHardRatio);
+}
 
 /// Weights of three neighbours of evenly spaced places, the first of which it gives.
 std::array<double, 3> parabola(const std::vector<double>& places, double at, std::size_t& first) {
   const double step = places[1] - places[0];
   const double in_steps = (at - places[0]) / step;
-  first = static_cast<std::size_t>(
-      std::clamp(std::lround(in_steps) - 1, 0L, static_cast<long>(places.size()) - 3));
+  first = static_cast<std::size_t>(std::clamp(std::lround(in_steps) - 1, 0L, static_cast<long>(places.size()) - 3));
   const double u = in_steps - static_cast<double>(first) - 1.0;  // from the middle one
   return {0.5 * u * (u - 1.0), 1.0 - u * u, 0.5 * u * (u + 1.0)};
 }
 
 }  // namespace
 
-double ratio_place(double core_over_skin) { return std::log(core_over_skin / (1.0 + core_over_skin / kHardRatio)); }
+double ratio_place(double core_over_skin) {
+  return std::log(core_over_skin / (1.0 + core_over_skin / kHardRatio));
+}
 
-double PalpationLaw::force(double depth) const { return at(force_N, depth); }
-double PalpationLaw::radius(double depth) const { return at(radius_mm, depth); }
+double PalpationLaw::force(double depth) const {
+  return at(force_N, depth);
+}
+double PalpationLaw::radius(double depth) const {
+  return at(radius_mm, depth);
+}
 
 double PalpationLaw::at(const std::vector<double>& values, double depth) const {
   TS_ASSERT(depth >= 0.0 && depth <= deepest_mm());
@@ -98,7 +107,8 @@ Eigen::VectorXd bead_pixels(const sim::DeviceSpec& device, const Eigen::MatrixX3
     const Eigen::Vector2d across = (bead - hole).head<2>();
     const auto path = render::solve_layer_path(layers, across.norm());
     const double slope = path ? path->tangent[2] : 0.0;
-    const Eigen::Vector2d towards = across.norm() > 0.0 ? Eigen::Vector2d(across.normalized()) : Eigen::Vector2d::Zero();
+    const Eigen::Vector2d towards =
+        across.norm() > 0.0 ? Eigen::Vector2d(across.normalized()) : Eigen::Vector2d::Zero();
     const Eigen::Vector3d along(slope * towards.x(), slope * towards.y(), 1.0);
     const auto pixel = render::image_point(camera, camera_from_gel.turn(along));
     if (!path || !pixel) fail_at(device.where, "camera: bead {} isn't seen", b);
@@ -142,8 +152,9 @@ PalpationTable::PalpationTable(const PalpationSpec& spec, PalpationFace face, co
   });
 
   const auto fine = static_cast<Eigen::Index>(std::lround(settings.deepest_mm / step_));
-  const Eigen::VectorXd at_rest =
-      face == PalpationFace::gel ? bead_pixels(device, Eigen::MatrixX3d::Zero(gel.beads.rows() / 3, 3)) : Eigen::VectorXd();
+  const Eigen::VectorXd at_rest = face == PalpationFace::gel
+                                      ? bead_pixels(device, Eigen::MatrixX3d::Zero(gel.beads.rows() / 3, 3))
+                                      : Eigen::VectorXd();
   nodes_.resize(ratios_.size() * log_skins_.size());
   std::vector<double> misfits(nodes_.size(), 0.0), strains(nodes_.size(), 0.0);
   tbb::parallel_for(std::size_t{0}, nodes_.size(), [&](std::size_t at) {
@@ -163,7 +174,7 @@ PalpationTable::PalpationTable(const PalpationSpec& spec, PalpationFace face, co
     Eigen::MatrixXd areas(settings.depths, 1);
     Eigen::MatrixXd beads(settings.depths, at_rest.size());
     for (int i = 0; i < settings.depths; ++i) {
-      depths.push_back(settings.deepest_mm * (i + 1) / settings.depths);
+      depths.push_back(settings.deepest_mm * std::pow((i + 1.0) / settings.depths, kCloser));
       fem::PressTarget target;
       target.axis = {fem::AxisControl::at(0.0), fem::AxisControl::at(0.0), fem::AxisControl::at(top - depths.back())};
       const fem::PressState& state = press->step(target);
@@ -194,8 +205,9 @@ PalpationTable::PalpationTable(const PalpationSpec& spec, PalpationFace face, co
       if (at_rest.size() > 0) node.beads.row(i) = terms * moved;
     }
     for (int i = 0; i < settings.depths; ++i) {
-      misfits[at] = std::max(misfits[at], std::abs(terms_at(depths[static_cast<std::size_t>(i)]).dot(law) - forces(i, 0)) /
-                                              forces(settings.depths - 1, 0));
+      misfits[at] =
+          std::max(misfits[at], std::abs(terms_at(depths[static_cast<std::size_t>(i)]).dot(law) - forces(i, 0)) /
+                                    forces(settings.depths - 1, 0));
     }
     tell();
   });

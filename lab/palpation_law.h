@@ -25,11 +25,11 @@ enum class PalpationFace {
 /// A press of one piece: all at `depth_step_mm` from 0 on, smooth between by a parabola or finer steps.
 struct PalpationLaw {
   double depth_step_mm = 0.0;
-  std::vector<double> force_N;                 ///< elastic, of the moduli as they are at once
-  std::vector<double> radius_mm;               ///< of a circle as large as the contact
-  std::vector<Eigen::VectorXd> bead_px;        ///< of the gel: x and y of each bead's image less that at rest
-  double skin_share = 0.0;                     ///< d ln F / d ln E_skin at half the depth: how much of a small
-  double core_share = 0.0;                     ///< relaxation of the part shows in the force
+  std::vector<double> force_N;           ///< elastic, of the moduli as they are at once
+  std::vector<double> radius_mm;         ///< of a circle as large as the contact
+  std::vector<Eigen::VectorXd> bead_px;  ///< of the gel: x and y of each bead's image less that at rest
+  double skin_share = 0.0;               ///< d ln F / d ln E_skin at half the depth: how much of a small
+  double core_share = 0.0;               ///< relaxation of the part shows in the force
   double deepest_mm() const { return depth_step_mm * static_cast<double>(force_N.size() - 1); }
   /// @pre 0 <= depth <= deepest_mm()
   double force(double depth) const;
@@ -43,11 +43,11 @@ struct PalpationLaw {
 
 struct PalpationTableSettings {
   double deepest_mm = 2.2;
-  int depths = 11;              ///< at which is pressed
-  double ratio_step = 0.7;      ///< between ratios of moduli, in the logarithm (see ratio_place)
-  double skin_step = 0.16;      ///< of ln E_skin, between the two skins either side of the middle one's
+  int depths = 11;          ///< at which is pressed
+  double ratio_step = 0.7;  ///< between ratios of moduli, in the logarithm (see ratio_place)
+  double skin_step = 0.16;  ///< of ln E_skin, between the two skins either side of the middle one's
   double friction = 0.5;
-  double lump_mesh_mm = 0.0;    ///< 0: the lump's own
+  double lump_mesh_mm = 0.0;  ///< 0: the lump's own
 };
 
 /// The laws of all pieces of a spec on one face.
@@ -55,8 +55,9 @@ class PalpationTable {
  public:
   /// Presses what is needed. `device` and its compliance `gel` matter for PalpationFace::gel alone.
   /// @throws Error as the presses do
-  PalpationTable(const PalpationSpec& spec, PalpationFace face, const sim::DeviceSpec& device, const fem::Compliance& gel,
-                 const PalpationTableSettings& settings, const std::filesystem::path& cache, const Progress& progress = {});
+  PalpationTable(const PalpationSpec& spec, PalpationFace face, const sim::DeviceSpec& device,
+                 const fem::Compliance& gel, const PalpationTableSettings& settings, const std::filesystem::path& cache,
+                 const Progress& progress = {});
 
   /// @throws Error for moduli beyond those of the spec's pieces and six times their spread
   PalpationLaw law(double skin_MPa, double core_MPa) const;
@@ -84,8 +85,8 @@ class PalpationTable {
   int presses_ = 0;
 };
 
-/// ln r for cores that matter, and no more than ln 100 however hard the core is: evenly spaced, places tell pieces apart
-/// evenly.
+/// ln r for cores that matter, and no more than ln 100 however hard the core is: evenly spaced, places tell pieces
+/// apart evenly.
 double ratio_place(double core_over_skin);
 
 /// Where the camera sees the gel's beads, px: each centre's refracted ray through the hole's middle, x and y in turn.

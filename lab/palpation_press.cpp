@@ -18,9 +18,9 @@ namespace {
 constexpr double kStep_s = 5e-5;
 constexpr double kMillimetresPerMetre = 1e3;
 constexpr double kMicrometresPerMm = 1e3;
-constexpr double kLeastTop = 0.1;       // of the largest w / omega: modes below don't move the top
+constexpr double kLeastTop = 0.1;  // of the largest w / omega: modes below don't move the top
 constexpr double kMostSpreads = 3.0;
-constexpr double kMostModal = 0.7;      // of the law's give, that may be the modes': what is left is the contact's own
+constexpr double kMostModal = 0.7;  // of the law's give, that may be the modes': what is left is the contact's own
 constexpr int kNewtonSteps = 6;
 constexpr double kFullStepsAPeriod = 4.0;
 
@@ -31,16 +31,15 @@ double normal_within(RandomStream& random, double most) {
   }
 }
 
-/// A mode, by symplectic Euler: with the force of the same moment, so that force and mode as two springs neither lose nor
-/// gain energy. An exact step in which the force stands still would lag behind by half a step, and feed them.
+/// A mode, by symplectic Euler: with the force of the same moment, so that force and mode as two springs neither lose
+/// nor gain energy. An exact step in which the force stands still would lag behind by half a step, and feed them.
 struct Oscillator {
   const LumpMode& mode;
   double stiffness;  // omega^2
   double w = 0.0;
   double q = 0.0, v = 0.0;
 
-  Oscillator(const LumpMode& of, double radius_mm)
-      : mode(of), stiffness(of.angular_frequency * of.angular_frequency) {
+  Oscillator(const LumpMode& of, double radius_mm) : mode(of), stiffness(of.angular_frequency * of.angular_frequency) {
     constexpr std::size_t kLast = kTopRadii_mm.size() - 1;
     const double at = std::clamp((radius_mm - kTopRadii_mm[0]) / (kTopRadii_mm[1] - kTopRadii_mm[0]), 0.0,
                                  static_cast<double>(kLast));
@@ -114,8 +113,7 @@ std::vector<std::vector<LumpMode>> lump_modes(const PalpationSpec& spec, double 
       for (Eigen::Index k = 0; k < settings.count; ++k) {
         if (moved[k] < kLeastTop * moved.maxCoeff()) continue;
         // A skin of 1 MPa was computed.
-        all[m].push_back(
-            {std::sqrt(spec.skin.youngs_modulus_MPa) * vibration.angular_frequency[k], top.col(k), 0.0});
+        all[m].push_back({std::sqrt(spec.skin.youngs_modulus_MPa) * vibration.angular_frequency[k], top.col(k), 0.0});
       }
     }
     const std::int64_t now = ++done;

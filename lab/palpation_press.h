@@ -8,7 +8,8 @@
 // skin and core, each times its share of the stiffness: to first order in the relaxing parts. The lump's own inertia
 // moves its top by its modes, as in fem/vibration.h, where the law holds their static part already:
 //   d = s - sum w_k (q_k - w_k F / omega_k^2),   q_k'' + 2 zeta_k omega_k q_k' + omega_k^2 q_k = w_k F.
-// w_k is the mode's mean over a round contact as large as that where the press ends. Left out: the gel's inertia (14 % of the force at 400 Hz, docs/sensors/vhs.md), adhesion, the lump's tilt.
+// w_k is the mode's mean over a round contact as large as that where the press ends. Left out: the gel's inertia (14 %
+// of the force at 400 Hz, docs/sensors/vhs.md), adhesion, the lump's tilt.
 
 #include <Eigen/Core>
 #include <array>
@@ -27,7 +28,7 @@ struct LumpMode {
   double angular_frequency = 0.0;  ///< rad/s
   /// w: mean displacement along the press of the top within each of kTopRadii_mm, tonne^-1/2.
   Eigen::Vector<double, 5> top = Eigen::Vector<double, 5>::Zero();
-  double damping = 0.0;            ///< zeta
+  double damping = 0.0;  ///< zeta
 };
 
 inline constexpr std::array<double, 5> kTopRadii_mm = {1.5, 3.0, 4.5, 6.0, 7.5};
@@ -55,8 +56,8 @@ PalpationPiece draw_piece(const PalpationSpec& spec, int material, std::uint64_t
 /// What a press needs of its piece.
 struct PressedPiece {
   PalpationLaw law;
-  fem::PronySeries relaxation;   ///< of the force
-  std::vector<LumpMode> modes;   ///< of the piece's own moduli
+  fem::PronySeries relaxation;  ///< of the force
+  std::vector<LumpMode> modes;  ///< of the piece's own moduli
 };
 PressedPiece pressed_piece(const PalpationSpec& spec, const PalpationTable& table, const PalpationPiece& piece,
                            const std::vector<std::vector<LumpMode>>& modes);
@@ -66,7 +67,7 @@ struct PalpationRun {
   std::vector<double> force_N;   ///< true, evenly in time from the start on
   std::vector<double> depth_mm;  ///< elastic depth that belongs to the force: what the gel shows
   double touch_s = 0.0;
-  double stop_s = 0.0;           ///< when the actuator began to brake
+  double stop_s = 0.0;  ///< when the actuator began to brake
 };
 
 /// Plays a press for `seconds` from the touch on. A pure function of its arguments. @throws Error if it goes beyond

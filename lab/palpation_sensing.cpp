@@ -16,8 +16,8 @@ namespace touchstone::lab {
 namespace {
 
 constexpr double kFriction = 0.5;
-constexpr double kSkinAlbedo = 0.5;        // skin in white light: 0.3 to 0.6
-constexpr int kRestFrames = 12;            // of a waveform, that its rest is the mean of
+constexpr double kSkinAlbedo = 0.5;  // skin in white light: 0.3 to 0.6
+constexpr int kRestFrames = 12;      // of a waveform, that its rest is the mean of
 constexpr std::int64_t kInterval_us = 1663;
 
 std::vector<Eigen::Vector2d> in_pairs(const Eigen::VectorXd& pixels) {
@@ -48,8 +48,8 @@ sim::ObjectSpec lump_object(const PalpationSpec& spec, const sim::ObjectSpec& pr
 
 }  // namespace
 
-sensors::StiffnessForceModel train_on_true_beads(const std::filesystem::path& scenes, const std::filesystem::path& cache,
-                                                 const Progress& progress) {
+sensors::StiffnessForceModel train_on_true_beads(const std::filesystem::path& scenes,
+                                                 const std::filesystem::path& cache, const Progress& progress) {
   const Job job = read_job(scenes / "jobs" / "vhs-demo.yaml");
   sensors::ForceSamples samples;
   samples.grid = 3;
@@ -96,9 +96,8 @@ BeadNoise measure_bead_noise(const PalpationSpec& spec, const std::filesystem::p
   const double ratio = material.youngs_modulus_MPa / spec.skin.youngs_modulus_MPa;
   const auto piece = sim::set_up_lump(spec.lump, ratio, cache);
   const sim::Plan plan = sim::make_plan(scene);
-  const std::vector<sim::Truth> truths =
-      sim::play_motion(scene, plan, *gel, progress, nullptr,
-                       {sim::as_pressing_body(spec.lump, *piece, spec.skin.youngs_modulus_MPa)});
+  const std::vector<sim::Truth> truths = sim::play_motion(
+      scene, plan, *gel, progress, nullptr, {sim::as_pressing_body(spec.lump, *piece, spec.skin.youngs_modulus_MPa)});
   const sim::VirtualCamera camera(scene, plan, *gel, truths);
 
   sensors::BeadTracker tracker({});
@@ -123,7 +122,8 @@ BeadNoise measure_bead_noise(const PalpationSpec& spec, const std::filesystem::p
       }
       seen.push_back(measured);
     }
-    if (progress) progress("palpation, pictures", static_cast<std::int64_t>(k) + 1, static_cast<std::int64_t>(truths.size()));
+    if (progress)
+      progress("palpation, pictures", static_cast<std::int64_t>(k) + 1, static_cast<std::int64_t>(truths.size()));
     Eigen::VectorXd mean = Eigen::VectorXd::Zero(seen.front().size());
     for (const Eigen::VectorXd& one : seen) mean += one / settings.repeats;
     for (const Eigen::VectorXd& one : seen) squares += (one - mean).squaredNorm();
@@ -184,8 +184,7 @@ std::vector<double> vhs_waveform(const VhsChain& chain, const PalpationLaw& law,
     moved /= static_cast<double>(last - first);
     for (std::size_t b = 0; b < beads; ++b) {
       const Eigen::Vector2d error(chain.noise_px * random.normal(), chain.noise_px * random.normal());
-      const Eigen::Vector2d measured =
-          chain.model.rest[b] + moved.segment<2>(static_cast<Eigen::Index>(2 * b)) + error;
+      const Eigen::Vector2d measured = chain.model.rest[b] + moved.segment<2>(static_cast<Eigen::Index>(2 * b)) + error;
       if (!chain.filtered) {
         seen[b] = measured;
       } else if (frame == 0) {

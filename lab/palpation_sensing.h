@@ -20,27 +20,27 @@ namespace touchstone::lab {
 
 /// The force model of the text, trained as sec. 4.3 says on the vhs-demo's four training cycles, by the beads' true
 /// images. @throws Error as reading and playing them do
-sensors::StiffnessForceModel train_on_true_beads(const std::filesystem::path& scenes, const std::filesystem::path& cache,
-                                                 const Progress& progress = {});
+sensors::StiffnessForceModel train_on_true_beads(const std::filesystem::path& scenes,
+                                                 const std::filesystem::path& cache, const Progress& progress = {});
 
 /// Tracked against true images of the beads, on rendered frames of a lump that presses.
 struct BeadNoise {
-  double noise_px = 0.0;  ///< standard deviation of a measured coordinate from frame to frame of one state
-  double bias_px = 0.0;   ///< root mean square of a coordinate's mean error, less what it is at rest
+  double noise_px = 0.0;           ///< standard deviation of a measured coordinate from frame to frame of one state
+  double bias_px = 0.0;            ///< root mean square of a coordinate's mean error, less what it is at rest
   std::vector<double> force_N;     ///< true, of the states
   std::vector<double> model_N;     ///< what the model says by the true beads
   std::vector<double> measured_N;  ///< and by the mean measured ones
   Eigen::VectorXd rest_px;         ///< the beads at rest, as measured
   int frames = 0;
-  int lost = 0;           ///< beads that weren't found, summed over the frames
+  int lost = 0;  ///< beads that weren't found, summed over the frames
 };
 
 struct BeadNoiseSettings {
-  int material = 9;             ///< of the spec
+  int material = 9;  ///< of the spec
   /// A lump of opal lit from behind in a light panel, as the calibration's probe; else matt skin in a dim room.
   bool lit = true;
   std::vector<double> depths_mm = {0.5, 1.0, 1.5};
-  int repeats = 8;              ///< frames of each state, and of the gel at rest
+  int repeats = 8;  ///< frames of each state, and of the gel at rest
   std::uint64_t seed = 1;
 };
 BeadNoise measure_bead_noise(const PalpationSpec& spec, const std::filesystem::path& scenes,
@@ -55,7 +55,7 @@ std::vector<double> reference_waveform(const PalpationReference& reference, cons
 struct VhsChain {
   sensors::StiffnessForceModel model;
   sensors::BeadFilterSettings filter;
-  bool filtered = true;            ///< as the text's sec. 3.2.2
+  bool filtered = true;  ///< as the text's sec. 3.2.2
   double noise_px = 0.0;
   double frame_rate_Hz = 601.25;
   double exposure_s = 1600e-6;

@@ -18,7 +18,9 @@ struct Skin {
   PalpationMaterial material;
 };
 
-void fields(YamlReader& in, Skin& skin) { read_elasticity(in, skin.material); }
+void fields(YamlReader& in, Skin& skin) {
+  read_elasticity(in, skin.material);
+}
 
 }  // namespace
 
@@ -104,7 +106,9 @@ void fields(YamlReader& in, PalpationSpec& spec) {
   in.required("reference", spec.reference);
 }
 
-PalpationSpec read_palpation(const std::filesystem::path& file) { return read_yaml<PalpationSpec>(file); }
+PalpationSpec read_palpation(const std::filesystem::path& file) {
+  return read_yaml<PalpationSpec>(file);
+}
 
 fem::PronySeries palpation_series(double relaxing) {
   fem::PronySeries series;

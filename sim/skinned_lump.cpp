@@ -16,8 +16,8 @@ namespace touchstone::sim {
 namespace {
 
 constexpr double kCoarsePerFine = 2.5;
-constexpr double kFineDepth = 2.0;      // edges
-constexpr double kFineRadius = 0.6;     // of the base: contacts are smaller
+constexpr double kFineDepth = 2.0;   // edges
+constexpr double kFineRadius = 0.6;  // of the base: contacts are smaller
 
 std::vector<fem::ElasticMaterial> materials_of(const SkinnedLump& lump, double core_over_skin) {
   check_above_zero("a lump's ", core_over_skin, "core_over_skin");
