@@ -20,25 +20,45 @@ namespace {
 constexpr double kHardRatio = 100.0;  // see ratio_place
 constexpr double kSpreads = 3.05;     // how far from the middle pieces are covered, in their standard deviations
 constexpr double kFine_mm = 0.01;     // step of the laws
-constexpr int kTerms = 4;             // of the smooth laws
-constexpr double kPlateRadius_mm = 10.0, kPlateEdge_mm = 1.0, kPlateHeight_mm = 5.0;
-constexpr double kCloser = 1.3;      // depths lie closer at first, as forces rise
-constexpr double kShareStep = 0.05;  // of ln E, for derivatives
+constexpr int kMostTerms = 4;         // of the smooth laws
+constexpr double kCloser = 1.3;       // depths lie closer at first, as forces rise
+constexpr double kShareStep = 0.05;   // of ln E, for derivatives
 
 /// d^1.5 (1, d, d^2, ...): how a ball's force on elastic layers begins (Hertz), and goes on.
-Eigen::RowVectorXd terms_at(double depth) {
-  Eigen::RowVectorXd terms(kTerms);
+Eigen::RowVectorXd terms_at(double depth, int count) {
+  Eigen::RowVectorXd terms(count);
   double power = std::pow(depth, 1.5);
-  for (int k = 0; k < kTerms; ++k, power *= depth) terms[k] = power;
+  for (int k = 0; k < count; ++k, power *= depth) terms[k] = power;
   return terms;
 }
 
 /// By least squares, each depth weighted by `weight`: what the terms make of each column.
-Eigen::MatrixXd fitted(const std::vector<double>& depths, const Eigen::MatrixXd& values,
-                       const Eigen::VectorXd& weight) {
-  Eigen::MatrixXd terms(values.rows(), kTerms);
-  for (Eigen::Index i = 0; i < values.rows(); ++i) terms.row(i) = terms_at(depths[static_cast<std::size_t>(i)]);
+Eigen::MatrixXd fitted(const std::vector<double>& depths, const Eigen::MatrixXd& values, const Eigen::VectorXd& weight,
+                       int count) {
+  Eigen::MatrixXd terms(values.rows(), count);
+  for (Eigen::Index i = 0; i < values.rows(); ++i) {
+    terms.row(i) = terms_at(depths[static_cast<std::size_t>(i)], count);
+  }
   return (weight.asDiagonal() * terms).householderQr().solve(weight.asDiagonal() * values);
+}
+
+/// The force over depth with as many terms as let it rise from the first touch on: of few and rough points more may
+/// not.
+Eigen::VectorXd rising_law(const std::vector<double>& depths, const Eigen::VectorXd& forces) {
+  // Forces count with errors that are as large as their roots, so that small ones aren't passed over.
+  const Eigen::VectorXd weight = forces.cwiseMax(1e-6 * forces.maxCoeff()).cwiseSqrt().cwiseInverse();
+  for (int count = kMostTerms; count > 1; --count) {
+    const Eigen::VectorXd law = fitted(depths, forces, weight, count);
+    double before = 0.0;
+    bool rises = true;
+    for (double depth = kFine_mm; rises && depth <= depths.back(); depth += kFine_mm) {
+      const double here = terms_at(depth, count).dot(law);
+      rises = here > before;
+      before = here;
+    }
+    if (rises) return law;
+  }
+  return fitted(depths, forces, weight, 1);
 }
 
 double ratio_at(double place) {
@@ -111,7 +131,7 @@ Eigen::VectorXd bead_pixels(const sim::DeviceSpec& device, const Eigen::MatrixX3
         across.norm() > 0.0 ? Eigen::Vector2d(across.normalized()) : Eigen::Vector2d::Zero();
     const Eigen::Vector3d along(slope * towards.x(), slope * towards.y(), 1.0);
     const auto pixel = render::image_point(camera, camera_from_gel.turn(along));
-    if (!path || !pixel) fail_at(device.where, "camera: bead {} isn't seen", b);
+    TS_ASSERT(path && pixel);  // the camera is below the plate, and looks up
     pixels.segment<2>(2 * b) = *pixel;
   }
   return pixels;
@@ -120,8 +140,8 @@ Eigen::VectorXd bead_pixels(const sim::DeviceSpec& device, const Eigen::MatrixX3
 PalpationTable::PalpationTable(const PalpationSpec& spec, PalpationFace face, const sim::DeviceSpec& device,
                                const fem::Compliance& gel, const PalpationTableSettings& settings,
                                const std::filesystem::path& cache, const Progress& progress)
-    : face_(face), step_(kFine_mm) {
-  TS_ASSERT(settings.depths > kTerms && settings.deepest_mm > 0.0);
+    : step_(kFine_mm) {
+  TS_ASSERT(settings.depths > kMostTerms && settings.deepest_mm > 0.0);
   double least = std::numeric_limits<double>::infinity();
   double most = 0.0;
   for (const PalpationMaterial& material : spec.materials) {
@@ -151,6 +171,7 @@ PalpationTable::PalpationTable(const PalpationSpec& spec, PalpationFace face, co
     tell();
   });
 
+  const auto plate = face == PalpationFace::rigid ? sim::set_up_plate(lump, cache) : nullptr;
   const auto fine = static_cast<Eigen::Index>(std::lround(settings.deepest_mm / step_));
   const Eigen::VectorXd at_rest = face == PalpationFace::gel
                                       ? bead_pixels(device, Eigen::MatrixX3d::Zero(gel.beads.rows() / 3, 3))
@@ -160,15 +181,10 @@ PalpationTable::PalpationTable(const PalpationSpec& spec, PalpationFace face, co
   tbb::parallel_for(std::size_t{0}, nodes_.size(), [&](std::size_t at) {
     const fem::Compliance& piece = *pieces[at % ratios_.size()];
     const double skin = std::exp(log_skins_[at / ratios_.size()]);
-    std::optional<fem::Press> press;
-    double top = 0.0;  // of the moved body's origin over the touch
-    if (face == PalpationFace::rigid) {
-      press.emplace(piece, fem::RoundedCylinder{kPlateRadius_mm, kPlateEdge_mm, kPlateHeight_mm}, settings.friction);
-    } else {
-      top = lump.sphere_radius_mm;
-      press.emplace(gel, std::vector<fem::PressBody>{{fem::SphereShape{lump.sphere_radius_mm}, settings.friction,
-                                                      sim::as_pressing_body(lump, piece, skin)}});
-    }
+    const bool is_plate = face == PalpationFace::rigid;
+    fem::Press press(is_plate ? *plate : gel,
+                     std::vector<fem::PressBody>{{fem::SphereShape{lump.sphere_radius_mm}, settings.friction,
+                                                  sim::as_pressing_body(lump, piece, is_plate ? 1.0 : skin)}});
     std::vector<double> depths;
     Eigen::MatrixXd forces(settings.depths, 1);
     Eigen::MatrixXd areas(settings.depths, 1);
@@ -176,8 +192,9 @@ PalpationTable::PalpationTable(const PalpationSpec& spec, PalpationFace face, co
     for (int i = 0; i < settings.depths; ++i) {
       depths.push_back(settings.deepest_mm * std::pow((i + 1.0) / settings.depths, kCloser));
       fem::PressTarget target;
-      target.axis = {fem::AxisControl::at(0.0), fem::AxisControl::at(0.0), fem::AxisControl::at(top - depths.back())};
-      const fem::PressState& state = press->step(target);
+      target.axis = {fem::AxisControl::at(0.0), fem::AxisControl::at(0.0),
+                     fem::AxisControl::at(lump.sphere_radius_mm - depths.back())};
+      const fem::PressState& state = press.step(target);
       forces(i, 0) = state.wrench[2];
       areas(i, 0) = state.contact_area * std::sqrt(depths.back());  // as the terms begin: areas with the depth
       if (at_rest.size() > 0) beads.row(i) = (bead_pixels(device, state.bead_displacement) - at_rest).transpose();
@@ -186,28 +203,27 @@ PalpationTable::PalpationTable(const PalpationSpec& spec, PalpationFace face, co
         strains[at] = std::max(strains[at], state.largest_strain);
       }
     }
-    // Forces count with errors that are as large as the root of the force, so that small ones aren't passed over.
-    const Eigen::VectorXd weight = forces.col(0).cwiseMax(1e-6 * forces.maxCoeff()).cwiseSqrt().cwiseInverse();
-    const Eigen::VectorXd law = fitted(depths, forces, weight);
-    const Eigen::MatrixXd moved = fitted(depths, beads, Eigen::VectorXd::Ones(settings.depths));
-    const Eigen::VectorXd area = fitted(depths, areas, Eigen::VectorXd::Ones(settings.depths));
+    const Eigen::VectorXd even = Eigen::VectorXd::Ones(settings.depths);
+    const Eigen::VectorXd law = rising_law(depths, forces);
+    const Eigen::MatrixXd moved = fitted(depths, beads, even, kMostTerms);
+    const Eigen::VectorXd area = fitted(depths, areas, even, kMostTerms);
+    const auto force_at = [&](double depth) { return terms_at(depth, static_cast<int>(law.size())).dot(law); };
     Node& node = nodes_[at];
     node.log_force.resize(fine);
     node.area.resize(fine);
     node.beads.resize(fine, at_rest.size());
     for (Eigen::Index i = 0; i < fine; ++i) {
       const double depth = step_ * static_cast<double>(i + 1);
-      const Eigen::RowVectorXd terms = terms_at(depth);
-      const double force = terms.dot(law);
-      if (!(force > 0.0)) fail("palpation: the presses' forces can't be made a smooth law at {:.3g} mm", depth);
+      const Eigen::RowVectorXd terms = terms_at(depth, kMostTerms);
+      const double force = force_at(depth);
+      TS_ASSERT(force > 0.0);
       node.log_force[i] = std::log(force / std::pow(depth, 1.5));
       node.area[i] = std::max(0.0, terms.dot(area) / std::sqrt(depth));
       if (at_rest.size() > 0) node.beads.row(i) = terms * moved;
     }
     for (int i = 0; i < settings.depths; ++i) {
-      misfits[at] =
-          std::max(misfits[at], std::abs(terms_at(depths[static_cast<std::size_t>(i)]).dot(law) - forces(i, 0)) /
-                                    forces(settings.depths - 1, 0));
+      const double off = force_at(depths[static_cast<std::size_t>(i)]) - forces(i, 0);
+      misfits[at] = std::max(misfits[at], std::abs(off) / forces(settings.depths - 1, 0));
     }
     tell();
   });

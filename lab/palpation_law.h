@@ -18,7 +18,7 @@
 namespace touchstone::lab {
 
 enum class PalpationFace {
-  rigid,  ///< a plate
+  rigid,  ///< a plate, as stiff as sim::set_up_plate's
   gel     ///< the vhs sensor's
 };
 
@@ -76,7 +76,6 @@ class PalpationTable {
   };
   const Node& node(std::size_t ratio, std::size_t skin) const { return nodes_[skin * ratios_.size() + ratio]; }
 
-  PalpationFace face_;
   double step_ = 0.0;
   std::vector<double> ratios_;     ///< places, see ratio_place
   std::vector<double> log_skins_;  ///< one for a rigid face
@@ -90,7 +89,7 @@ class PalpationTable {
 double ratio_place(double core_over_skin);
 
 /// Where the camera sees the gel's beads, px: each centre's refracted ray through the hole's middle, x and y in turn.
-/// @throws Error for a camera that isn't a pinhole, or a bead it can't see
+/// @throws Error for a camera that isn't a pinhole
 Eigen::VectorXd bead_pixels(const sim::DeviceSpec& device, const Eigen::MatrixX3d& displacement);
 
 }  // namespace touchstone::lab

@@ -1,6 +1,6 @@
 #pragma once
-// What is palpated, and how: shared/seeds/000, sec. 2.3. Read from scenes/vhs/palpation.yaml, which says where its
-// figures come from.
+// What is palpated, and how: shared/seeds/000, sec. 2.3. Read from scenes/palpation/five-levels.yaml, which says where
+// its figures come from.
 
 #include <array>
 #include <filesystem>

@@ -67,7 +67,7 @@ struct Told {
 
 std::vector<ValidationRow> validate_vhs_palpation(const ValidateOptions& options) {
   RowList rows("vhs.palpation.", options, RowList::Since::begin);
-  const PalpationSpec spec = read_palpation(options.scenes / "vhs" / "palpation.yaml");
+  const PalpationSpec spec = read_palpation(options.scenes / "palpation" / "five-levels.yaml");
   const sim::DeviceSpec device = sim::read_device(options.scenes / "devices" / "vhs.yaml");
   const auto gel = sim::set_up_gel(device, options.cache, options.progress);
   PalpationTableSettings table;

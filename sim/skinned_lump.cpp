@@ -19,6 +19,10 @@ constexpr double kCoarsePerFine = 2.5;
 constexpr double kFineDepth = 2.0;   // edges
 constexpr double kFineRadius = 0.6;  // of the base: contacts are smaller
 
+constexpr double kPlateModulus = 1e3;    // MPa, over a skin of 1
+constexpr double kPlateEdge = 1.2;       // of the lump's
+constexpr double kPlateThickness = 0.4;  // of the base's radius
+
 std::vector<fem::ElasticMaterial> materials_of(const SkinnedLump& lump, double core_over_skin) {
   check_above_zero("a lump's ", core_over_skin, "core_over_skin");
   std::vector<fem::ElasticMaterial> materials = {{core_over_skin, lump.poisson_ratio}};
@@ -64,6 +68,23 @@ std::shared_ptr<const fem::Compliance> as_pressing_body(const SkinnedLump& lump,
   // The piece's first material is its core, whose modulus is that of the ratio.
   const auto stiff = with_modulus(piece, skin_MPa * piece.material.youngs_modulus);
   return std::make_shared<const fem::Compliance>(turned_back(*stiff, -lump.sphere_radius_mm));
+}
+
+std::shared_ptr<const fem::Compliance> set_up_plate(const SkinnedLump& lump,
+                                                    const std::filesystem::path& cache_folder) {
+  fem::SlabMesh pad;
+  pad.size_x = pad.size_y = 2.0 * lump.base_radius_mm;
+  pad.thickness = kPlateThickness * lump.base_radius_mm;
+  pad.fine = kPlateEdge * lump.mesh_mm;
+  pad.coarse = kCoarsePerFine * pad.fine;
+  pad.fine_half_x = pad.fine_half_y = kFineRadius * lump.base_radius_mm;
+  pad.fine_depth = pad.fine;
+  const fem::ElasticMaterial hard{kPlateModulus, 0.3};
+  Sha256 sum;
+  sum.add("plate " + fem::compliance_key(pad, hard, {}));
+  return std::make_shared<const fem::Compliance>(fem::cached_compliance(sum.digest(), cache_folder, [&] {
+    return fem::compute_compliance(fem::mesh_slab(pad), hard, {}, pad.thickness);
+  }));
 }
 
 fem::GelVibration set_up_lump_vibration(const SkinnedLump& lump, double core_over_skin, double density_kg_m3, int count,
