@@ -94,6 +94,14 @@ double PalpationLaw::at(const std::vector<double>& values, double depth) const {
   return values[k] + part * (values[k + 1] - values[k]);
 }
 
+double PalpationLaw::depth(double force) const {
+  const auto above = std::upper_bound(force_N.begin(), force_N.end(), force);
+  if (above == force_N.end()) return deepest_mm();
+  if (above == force_N.begin()) return 0.0;
+  const auto k = static_cast<std::size_t>(above - force_N.begin()) - 1;
+  return depth_step_mm * (static_cast<double>(k) + (force - force_N[k]) / (force_N[k + 1] - force_N[k]));
+}
+
 double PalpationLaw::stiffness(double depth) const {
   TS_ASSERT(depth >= 0.0 && depth <= deepest_mm());
   const auto k = std::min(static_cast<std::size_t>(depth / depth_step_mm), force_N.size() - 2);

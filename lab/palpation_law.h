@@ -22,7 +22,7 @@ enum class PalpationFace {
   gel     ///< the vhs sensor's
 };
 
-/// A press of one piece: all at `depth_step_mm` from 0 on, smooth between by a parabola or finer steps.
+/// A press of one piece: all at `depth_step_mm` from 0 on, straight between: the steps are fine.
 struct PalpationLaw {
   double depth_step_mm = 0.0;
   std::vector<double> force_N;           ///< elastic, of the moduli as they are at once
@@ -34,7 +34,9 @@ struct PalpationLaw {
   /// @pre 0 <= depth <= deepest_mm()
   double force(double depth) const;
   double stiffness(double depth) const;  ///< N/mm
-  double radius(double depth) const;     ///< mm
+  /// mm, at which the force is this one; the deepest for more. @pre the forces rise
+  double depth(double force) const;
+  double radius(double depth) const;  ///< mm
   Eigen::VectorXd beads(double depth) const;
 
  private:
@@ -64,7 +66,8 @@ class PalpationTable {
 
   /// What the smooth laws leave of the presses' forces: the largest part of the force at the deepest place.
   double largest_misfit() const { return misfit_; }
-  /// Largest strain measure (fem::PressState::largest_strain) of any press up to the stop force.
+  /// Largest strain measure of the gel (fem::PressState::largest_strain) in any press up to the stop force; of a plate
+  /// its own, next to nothing. The lumps' isn't known.
   double largest_strain() const { return strain_; }
   int presses() const { return presses_; }
 

@@ -231,7 +231,7 @@ PalpationRun play_press(const PalpationSpec& spec, const PressedPiece& piece, do
     heredity.go(depth > 0.0 ? piece.law.force(std::min(depth, deepest)) : 0.0);
     for (Oscillator& mode : modes) mode.go(force, kStep_s);
     run.force_N.push_back(force);
-    run.depth_mm.push_back(depth);
+    run.depth_mm.push_back(piece.law.depth(force));
     if (std::isinf(run.stop_s)) {
       const double way = 0.5 * speed * speed / axis.acceleration_mm_s2;  // that braking takes
       if (force >= motion.stop_force_N || commanded >= motion.deepest_mm - way) run.stop_s = t;

@@ -65,7 +65,7 @@ PressedPiece pressed_piece(const PalpationSpec& spec, const PalpationTable& tabl
 struct PalpationRun {
   double step_s = 0.0;
   std::vector<double> force_N;   ///< true, evenly in time from the start on
-  std::vector<double> depth_mm;  ///< elastic depth that belongs to the force: what the gel shows
+  std::vector<double> depth_mm;  ///< at which the elastic law has this force: what a gel that doesn't relax shows
   double touch_s = 0.0;
   double stop_s = 0.0;  ///< when the actuator began to brake
 };

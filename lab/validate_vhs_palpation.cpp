@@ -18,6 +18,7 @@ constexpr double kStudent95OfFive = 2.776;  // t of 4 degrees of freedom
 constexpr double kHighest_Hz = 500.0;       // half the text's sampling rate
 constexpr double kSlowestAlone_Hz = 125.0;  // half of 250: what that rate can't see
 constexpr double kAllowedDrop = 4.0;        // per cent, either side of the text's
+constexpr int kMorePieces = 4;              // times as many to train on
 constexpr double kChance = 100.0 / kSoftnessLevels;
 constexpr double kAllowedRatio = 0.1;  // of a force
 
@@ -97,7 +98,7 @@ std::vector<ValidationRow> validate_vhs_palpation(const ValidateOptions& options
   const PalpationTable rigid(spec, PalpationFace::rigid, device, *gel, table, options.cache, options.progress);
   const PalpationTable soft(spec, PalpationFace::gel, device, *gel, table, options.cache, options.progress);
 
-  Told at_1000, at_500, at_250, camera, without_noise, behind_gel, fast_part, unseen;
+  Told at_1000, at_500, at_250, camera, without_noise, behind_gel, fast_part, unseen, alike_skins, more_pieces;
   Figures drop;
   const int seeds = options.quick ? 1 : kSeeds;
   for (int k = 0; k < seeds; ++k) {
@@ -114,6 +115,12 @@ std::vector<ValidationRow> validate_vhs_palpation(const ValidateOptions& options
       quiet.noise_px = 0.0;
       without_noise.add(tell_softness(spec, record_vhs(spec, soft, modes, quiet, trial), how));
       behind_gel.add(tell_softness(spec, record_reference(spec, soft, modes, trial), how));
+      PalpationSpec alike = spec;
+      alike.skin.spread = 0.0;
+      alike_skins.add(tell_softness(spec, record_reference(alike, rigid, modes, trial), how));
+      PalpationTrialSettings more = trial;
+      more.training_pieces *= kMorePieces;
+      more_pieces.add(tell_softness(spec, record_reference(spec, rigid, modes, more), how));
       SoftnessSettings fast = how;
       fast.lowest_Hz = kSlowestAlone_Hz;
       fast_part.add(tell_softness(spec, reference, fast));
@@ -165,6 +172,10 @@ std::vector<ValidationRow> validate_vhs_palpation(const ValidateOptions& options
       at_1000_percent, false);
   add("above_125Hz_percent", "from the text's force sensor by what is above 125 Hz alone; by chance", fast_part,
       kChance, false);
+  add("alike_skins_percent", "lumps whose skins are all alike, by the text's force sensor at 1000 Hz", alike_skins,
+      at_1000_percent, false);
+  add("more_pieces_percent", "four times as many pieces to train on, by the text's force sensor at 1000 Hz",
+      more_pieces, at_1000_percent, false);
   add("unseen_material_percent", "materials that weren't in training, by the text's force sensor at 1000 Hz; by chance",
       unseen, kChance, false);
   BeadNoiseSettings matt = frames;

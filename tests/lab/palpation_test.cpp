@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <cmath>
@@ -120,6 +121,21 @@ TEST(PalpationTable, RisesWithTheCoreAndLiesOnPressesBetweenItsNodes) {
   const double pressed = 0.15 * press.step(target).wrench[2];
   EXPECT_NEAR(table.law(0.15, 0.3).force(2.0), pressed, 0.03 * pressed);
   EXPECT_THAT(message_of([&] { table.law(0.15, 1e-4); }), HasSubstr("the table has ratios from"));
+
+  // A trial is the same on one thread and on all.
+  const std::vector<std::vector<LumpMode>> none(spec.materials.size());
+  PalpationTrialSettings trial;
+  trial.training_pieces = trial.validation_pieces = trial.test_pieces = 1;
+  trial.presses = 2;
+  trial.seconds = 0.3;
+  const PalpationRecording all = record_reference(spec, table, none, trial);
+  tbb::task_arena alone(1);
+  const PalpationRecording one = alone.execute([&] { return record_reference(spec, table, none, trial); });
+  ASSERT_EQ(all.waveforms.size(), 13u * 3 * 2);
+  for (std::size_t i = 0; i < all.waveforms.size(); ++i) EXPECT_EQ(all.waveforms[i].force_N, one.waveforms[i].force_N);
+  EXPECT_NE(all.waveforms[0].force_N, all.waveforms[1].force_N) << "two presses of one piece";
+  EXPECT_EQ(all.waveforms[1].set, PalpationSet::training);
+  EXPECT_EQ(all.waveforms[5].set, PalpationSet::test);
 }
 
 TEST(PalpationPress, ComesToTheLawsForceAndStaysThere) {
