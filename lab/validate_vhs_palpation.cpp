@@ -98,7 +98,8 @@ std::vector<ValidationRow> validate_vhs_palpation(const ValidateOptions& options
   const PalpationTable rigid(spec, PalpationFace::rigid, device, *gel, table, options.cache, options.progress);
   const PalpationTable soft(spec, PalpationFace::gel, device, *gel, table, options.cache, options.progress);
 
-  Told at_1000, at_500, at_250, camera, without_noise, behind_gel, fast_part, unseen, alike_skins, more_pieces;
+  Told at_1000, at_500, at_250, camera, without_noise, behind_gel, fast_part, unseen, alike_skins, same_speed,
+      more_pieces;
   Figures drop;
   const int seeds = options.quick ? 1 : kSeeds;
   for (int k = 0; k < seeds; ++k) {
@@ -118,6 +119,9 @@ std::vector<ValidationRow> validate_vhs_palpation(const ValidateOptions& options
       PalpationSpec alike = spec;
       alike.skin.spread = 0.0;
       alike_skins.add(tell_softness(spec, record_reference(alike, rigid, modes, trial), how));
+      PalpationSpec steady = alike;
+      steady.motion.speed_spread = 0.0;
+      same_speed.add(tell_softness(spec, record_reference(steady, rigid, modes, trial), how));
       PalpationTrialSettings more = trial;
       more.training_pieces *= kMorePieces;
       more_pieces.add(tell_softness(spec, record_reference(spec, rigid, modes, more), how));
@@ -174,6 +178,7 @@ std::vector<ValidationRow> validate_vhs_palpation(const ValidateOptions& options
       kChance, false);
   add("alike_skins_percent", "lumps whose skins are all alike, by the text's force sensor at 1000 Hz", alike_skins,
       at_1000_percent, false);
+  add("alike_skins_one_speed_percent", "and all presses at one speed", same_speed, at_1000_percent, false);
   add("more_pieces_percent", "four times as many pieces to train on, by the text's force sensor at 1000 Hz",
       more_pieces, at_1000_percent, false);
   add("unseen_material_percent", "materials that weren't in training, by the text's force sensor at 1000 Hz; by chance",
