@@ -1,9 +1,9 @@
 #pragma once
 // What two sensors make of a press: the vhs sensor, by its beads, and the text's own force sensor.
 //
-// The vhs sensor's frames aren't rendered press by press: a second of it takes two minutes. Its chain is played from
-// the beads' true images on: their mean over the exposure, the noise that the tracker's centroids have on rendered
-// frames of the same sensor (measure_bead_noise), the tracker's own filter, and the published force model.
+// The vhs sensor's frames aren't rendered press by press: a second of them takes 40 minutes of CPU time. Its chain is
+// played from the beads' true images on: their mean over the exposure, the noise that the tracker's centroids have on
+// rendered frames of the same sensor (measure_bead_noise), the tracker's own filter, and the published force model.
 
 #include <Eigen/Core>
 #include <cstdint>
