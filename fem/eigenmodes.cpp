@@ -157,11 +157,17 @@ Eigen::SparseMatrix<double> volume_mass(const TaylorHoodSpace& space) {
 
 Eigenmodes lowest_eigenmodes(const TaylorHoodSpace& space, const ElasticMaterial& material, double density, int count,
                              std::span<const int> held) {
-  check(material);
+  const std::vector<ElasticMaterial> materials(static_cast<std::size_t>(region_count(*space.mesh)), material);
+  return lowest_eigenmodes(space, materials, density, count, held);
+}
+
+Eigenmodes lowest_eigenmodes(const TaylorHoodSpace& space, std::span<const ElasticMaterial> materials, double density,
+                             int count, std::span<const int> held) {
+  for (const ElasticMaterial& material : materials) check(material);
   if (!std::isfinite(density) || density <= 0.0) {
     fail("the gel's density is {} tonne/mm^3; it must be finite and above zero", density);
   }
-  const Scales scales = make_scales(*space.mesh, material);
+  const Scales scales = make_scales(*space.mesh, materials);
   const Problem problem = make_problem(space, scales, held);
   const auto size = static_cast<Eigen::Index>(problem.unknowns.size());
   if (count < 1 || 5 * static_cast<Eigen::Index>(count) > size) {

@@ -29,10 +29,13 @@ struct Eigenmodes {
 /// The `count` lowest modes of the gel, clamped where it's bonded. `density` in tonne/mm^3 (1e-12 per kg/m^3). `held`:
 /// vertices of the outer surface (as outer_surface numbers them) whose hat-weighted displacement int phi u dA is held
 /// at zero besides, as by a rigid body that sticks to them. That no mode below the last one is missing is checked by
-/// the inertia of K - sigma M (Sylvester's law), at the price of a second factorisation.
+/// the inertia of K - sigma M (Sylvester's law), at the price of a second factorisation. `materials` has one entry for
+/// each region of the mesh, for which the space was made; the density is the same in all of them.
 /// @throws Error for a bad mesh, material, density or count (from 1 to a fifth of the displacement's unknowns), or if
 /// the iteration doesn't converge
+Eigenmodes lowest_eigenmodes(const TaylorHoodSpace& space, std::span<const ElasticMaterial> materials, double density,
+                             int count, std::span<const int> held = {});
 Eigenmodes lowest_eigenmodes(const TaylorHoodSpace& space, const ElasticMaterial& material, double density, int count,
-                             std::span<const int> held = {});
+                             std::span<const int> held = {});  ///< the same in all regions
 
 }  // namespace touchstone::fem

@@ -45,8 +45,14 @@ Eigen::VectorXcd times(const Eigen::MatrixXd& a, const Eigen::VectorXcd& x) {
 
 GelVibration compute_vibration(const TetMesh& mesh, const ElasticMaterial& material, std::span<const Bead> beads,
                                double density, int count, std::span<const int> held) {
-  const TaylorHoodSpace space = make_space(mesh);
-  const Eigenmodes modes = lowest_eigenmodes(space, material, density, count, held);
+  const std::vector<ElasticMaterial> materials(static_cast<std::size_t>(region_count(mesh)), material);
+  return compute_vibration(mesh, materials, beads, density, count, held);
+}
+
+GelVibration compute_vibration(const TetMesh& mesh, std::span<const ElasticMaterial> materials,
+                               std::span<const Bead> beads, double density, int count, std::span<const int> held) {
+  const TaylorHoodSpace space = make_space(mesh, materials);
+  const Eigenmodes modes = lowest_eigenmodes(space, materials, density, count, held);
   GelVibration vibration;
   vibration.angular_frequency = modes.angular_frequency;
   vibration.surface = seen_by(surface_coupling(space, outer_surface(mesh)), modes.displacement);

@@ -37,8 +37,10 @@ struct GelVibration {
 /// With `held`, vertices of the surface that a body at rest sticks to (see lowest_eigenmodes), they are the modes under
 /// that body; StuckPatch wants those of the free gel.
 /// @throws Error as lowest_eigenmodes and compute_compliance do
+GelVibration compute_vibration(const TetMesh& mesh, std::span<const ElasticMaterial> materials,
+                               std::span<const Bead> beads, double density, int count, std::span<const int> held = {});
 GelVibration compute_vibration(const TetMesh& mesh, const ElasticMaterial& material, std::span<const Bead> beads,
-                               double density, int count, std::span<const int> held = {});
+                               double density, int count, std::span<const int> held = {});  ///< the same in all regions
 
 /// Lowest frequency (Hz) of a wide layer of this thickness (mm), bonded below: a quarter of a shear wave,
 /// sqrt(G / rho) / (4 h). A slab with free sides is softer: on 4 thicknesses square its lowest is some percent lower.

@@ -55,8 +55,8 @@ std::filesystem::path vibration_file(const std::filesystem::path& cache_dir, con
 }
 
 GelVibration cached_vibration(const std::string& gel_key, const std::function<TetMesh()>& mesh,
-                              const ElasticMaterial& material, std::span<const Bead> beads, double density, int count,
-                              const std::filesystem::path& cache_dir) {
+                              std::span<const ElasticMaterial> materials, std::span<const Bead> beads, double density,
+                              int count, const std::filesystem::path& cache_dir) {
   const std::string key = key_of(gel_key, density, count);
   const std::filesystem::path path = vibration_file(cache_dir, gel_key, density, count);
   const bool keep = !cache_dir.empty();
@@ -69,7 +69,7 @@ GelVibration cached_vibration(const std::string& gel_key, const std::function<Te
       note = fmt::format("the cached modes {} were made anew: {}", path.string(), error.what());
     }
   }
-  GelVibration vibration = compute_vibration(mesh(), material, beads, density, count);
+  GelVibration vibration = compute_vibration(mesh(), materials, beads, density, count);
   if (keep) {
     try {
       std::filesystem::create_directories(cache_dir, ignored);

@@ -23,7 +23,7 @@ std::filesystem::path vibration_file(const std::filesystem::path& cache_dir, con
 /// the modes are made anew, and GelVibration::note says why. An empty `cache_dir` keeps nothing.
 /// @throws Error as mesh() and compute_vibration() do
 GelVibration cached_vibration(const std::string& gel_key, const std::function<TetMesh()>& mesh,
-                              const ElasticMaterial& material, std::span<const Bead> beads, double density, int count,
-                              const std::filesystem::path& cache_dir);
+                              std::span<const ElasticMaterial> materials, std::span<const Bead> beads, double density,
+                              int count, const std::filesystem::path& cache_dir);
 
 }  // namespace touchstone::fem

@@ -23,6 +23,8 @@ class RowList {
   /// A row that holds if `ours` is on the good side of `bound`, a text's figure or one of ours. @pre better isn't near
   void add_bounded(const std::string& id, const std::string& title, const std::string& unit, Better better,
                    double bound, bool published, double ours);
+  /// The row that was added last. @pre there is one
+  ValidationRow& last() { return rows_.back(); }
   /// What follows is another part: its time starts here.
   void begin() { begun_ = std::chrono::steady_clock::now(); }
 

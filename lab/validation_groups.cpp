@@ -12,6 +12,7 @@ std::vector<ValidationRow> validate_vhs_design(const ValidateOptions& options);
 std::vector<ValidationRow> validate_vhs_cycle(const ValidateOptions& options);
 std::vector<ValidationRow> validate_vhs_distribution(const ValidateOptions& options);
 std::vector<ValidationRow> validate_vhs_speed(const ValidateOptions& options);
+std::vector<ValidationRow> validate_vhs_palpation(const ValidateOptions& options);
 std::vector<ValidationRow> validate_dvs_light(const ValidateOptions& options);
 std::vector<ValidationRow> validate_dvs_force(const ValidateOptions& options);
 std::vector<ValidationRow> validate_dvs_material(const ValidateOptions& options);
@@ -41,6 +42,7 @@ const std::vector<ValidationGroup>& validation_groups() {
       {"vhs.cycle", validate_vhs_cycle},
       {"vhs.distribution", validate_vhs_distribution},
       {"vhs.speed", validate_vhs_speed},
+      {"vhs.palpation", validate_vhs_palpation},
       {"dvs.light", validate_dvs_light},
       {"dvs.force", validate_dvs_force},
       {"dvs.material", validate_dvs_material},

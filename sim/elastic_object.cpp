@@ -99,19 +99,6 @@ double held_from(const ObjectSpec& object, const Eigen::AlignedBox3d& box) {
   return box.max().z() - kTopPart * box.sizes().z();
 }
 
-/// A compliance of the solid on its back, turned onto its feet again.
-fem::Compliance turned_back(fem::Compliance solid, double lowest) {
-  for (Eigen::Vector3d& vertex : solid.vertices) {
-    vertex = kHalfTurn.cwiseProduct(vertex) + Eigen::Vector3d(0.0, 0.0, lowest);
-  }
-  Eigen::MatrixXd surface = solid.surface.view();
-  for (Eigen::Index j = 0; j < surface.cols(); ++j) {
-    for (Eigen::Index i = 0; i < surface.rows(); ++i) surface(i, j) *= kHalfTurn[i % 3] * kHalfTurn[j % 3];
-  }
-  solid.surface = fem::SharedMatrix(std::move(surface));
-  return solid;
-}
-
 }  // namespace
 
 TriangleMesh even_surface(const ShapeSpec& shape, double edge_mm) {
@@ -168,6 +155,18 @@ fem::SolidGel solid_of(const ObjectSpec& object) {
   solid.coarse = kCoarsePerFine * elastic.mesh_mm;
   solid.fine_half_x = solid.fine_half_y = elastic.fine_radius_mm.value_or(reach);
   solid.fine_depth = kFineLayers * elastic.mesh_mm;
+  return solid;
+}
+
+fem::Compliance turned_back(fem::Compliance solid, double lowest) {
+  for (Eigen::Vector3d& vertex : solid.vertices) {
+    vertex = kHalfTurn.cwiseProduct(vertex) + Eigen::Vector3d(0.0, 0.0, lowest);
+  }
+  Eigen::MatrixXd surface = solid.surface.view();
+  for (Eigen::Index j = 0; j < surface.cols(); ++j) {
+    for (Eigen::Index i = 0; i < surface.rows(); ++i) surface(i, j) *= kHalfTurn[i % 3] * kHalfTurn[j % 3];
+  }
+  solid.surface = fem::SharedMatrix(std::move(surface));
   return solid;
 }
 

@@ -23,6 +23,9 @@ TriangleMesh even_surface(const ShapeSpec& shape, double edge_mm);
 /// @throws Error if it isn't held anywhere, or nowhere free
 fem::SolidGel solid_of(const ObjectSpec& object);
 
+/// A compliance of a solid on its back, turned onto its feet again, its lowest point at the height `lowest` (mm).
+fem::Compliance turned_back(fem::Compliance solid, double lowest);
+
 /// The object's own compliance in its own frame, kept in the cache. @pre the object is elastic
 /// @throws Error with the place in the object's file, if it can't be meshed
 std::shared_ptr<const fem::Compliance> set_up_elastic_object(const ObjectSpec& object,

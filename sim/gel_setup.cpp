@@ -126,7 +126,7 @@ std::shared_ptr<const fem::GelVibration> set_up_vibration(const SceneSpec& scene
   static std::mutex one_at_a_time;
   const std::lock_guard lock(one_at_a_time);
   return std::make_shared<const fem::GelVibration>(fem::cached_vibration(
-      fem::compliance_key(body, materials, beads), [&] { return fem::mesh_gel(body); }, materials.front(), beads,
+      fem::compliance_key(body, materials, beads), [&] { return fem::mesh_gel(body); }, materials, beads,
       device.gel.density_kg_m3 * kTonnePerMm3, kModes, cache_folder));
 }
 

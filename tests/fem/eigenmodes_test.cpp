@@ -201,6 +201,41 @@ TEST(Eigenmodes, FrequenciesScaleWithModulusDensityAndLength) {
   EXPECT_NEAR(other, one * 2.0 / 1000.0, 1e-9 * other);
 }
 
+TEST(Eigenmodes, AColumnOfTwoMaterialsSwingsAsTheWaveEquationSays) {
+  // Along its axis at nu = 0: clamped below with modulus E1 to h1, E2 above with its end free, so
+  // tan(k1 h1) tan(k2 h2) = sqrt(E1 / E2) with k = omega sqrt(rho / E).
+  constexpr double kLower = 0.2, kUpper = 1.4, kLowerHeight = 2.0, kUpperHeight = 1.0;
+  TetMesh mesh = test::box_mesh({2.0, 2.0, kLowerHeight + kUpperHeight}, 2, 2, 6);
+  for (const auto& tetrahedron : mesh.tetrahedra) {
+    double middle = 0.0;
+    for (const int v : tetrahedron) middle += mesh.vertices[v].z() / 4.0;
+    mesh.region.push_back(middle > -kUpperHeight ? 1 : 0);
+  }
+  const std::vector<ElasticMaterial> materials = {{kLower, 0.0}, {kUpper, 0.0}};
+  const auto excess = [&](double omega) {
+    return std::tan(omega * std::sqrt(kDensity / kLower) * kLowerHeight) *
+               std::tan(omega * std::sqrt(kDensity / kUpper) * kUpperHeight) -
+           std::sqrt(kLower / kUpper);
+  };
+  double low = 0.0;
+  double high = 0.5 * kPi / kLowerHeight * std::sqrt(kLower / kDensity) * (1.0 - 1e-9);  // the first pole
+  for (int i = 0; i < 100; ++i) {
+    const double middle = 0.5 * (low + high);
+    (excess(middle) < 0.0 ? low : high) = middle;
+  }
+  const TaylorHoodSpace space = make_space(mesh, materials);
+  const Eigenmodes modes = lowest_eigenmodes(space, materials, kDensity, 12);
+  const double found =
+      frequency_with_most(space, modes, [](const Eigen::Vector3d&) { return Eigen::Vector3d::UnitZ(); });
+  EXPECT_NEAR(2.0 * kPi * found, low, 1e-3 * low);
+  // The same from the outside: what contact sees, from one material where both are alike.
+  const std::vector<ElasticMaterial> alike(2, ElasticMaterial{kLower, 0.0});
+  const Eigen::VectorXd two = lowest_eigenmodes(make_space(mesh, alike), alike, kDensity, 4).angular_frequency;
+  mesh.region.clear();
+  const Eigen::VectorXd one = lowest_eigenmodes(make_space(mesh), alike[0], kDensity, 4).angular_frequency;
+  EXPECT_LT((two - one).norm(), 1e-9 * one.norm());
+}
+
 TEST(Eigenmodes, WhatIsHeldDoesntMoveAndStiffens) {
   const TetMesh mesh = test::box_mesh({4, 4, 2}, 4, 4, 2);
   const TaylorHoodSpace space = make_space(mesh);

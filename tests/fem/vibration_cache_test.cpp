@@ -28,7 +28,7 @@ Made made(const touchstone::test::TemporaryFolder& folder, const std::string& ke
     ++result.meshes;
     return test::box_mesh({2, 2, 1}, 2, 2, 1);
   };
-  result.vibration = cached_vibration(key, mesh, kMaterial, {&kBead, 1}, kDensity, kCount, folder.path());
+  result.vibration = cached_vibration(key, mesh, {&kMaterial, 1}, {&kBead, 1}, kDensity, kCount, folder.path());
   return result;
 }
 
@@ -78,7 +78,7 @@ TEST(VibrationCache, WithoutAFolderNothingIsKept) {
                                                   [] {
                                                     return test::box_mesh({2, 2, 1}, 2, 2, 1);
                                                   },
-                                                  kMaterial, {}, kDensity, kCount, {});
+                                                  {&kMaterial, 1}, {}, kDensity, kCount, {});
   EXPECT_EQ(vibration.note, "");
   EXPECT_EQ(vibration.beads.rows(), 0);
 }
