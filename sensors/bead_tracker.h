@@ -75,11 +75,11 @@ struct BeadFilterSettings {
 struct BeadConsistency {
   bool on = true;
   /// How far a bead's motion since the frame before may differ from the median of its (up to eight) neighbours'
-  /// motions, in sides of a cell. In rendered load cycles at 30 frames/s it was 0.06 at most.
+  /// motions, in sides of a cell. In rendered load cycles at 30 frames/s it was 0.08 at most.
   double lone_motion = 0.125;
   /// Likewise of motions since the first frame, if something that looks like a bead lies within `lone_motion` of where
-  /// the neighbours have it: the bead, while something else is followed. In rendered load cycles it was 0.16 at most.
-  double lone_displacement = 0.2;
+  /// the neighbours have it: the bead, while something else is followed. In rendered load cycles it was 0.21 at most.
+  double lone_displacement = 0.25;
   /// How far a bead may lie from where a regular grid has it in the first frame, in sides of a cell, if something that
   /// looks like a bead lies within `lone_motion` of there.
   double first_offset = 0.2;
