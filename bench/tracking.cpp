@@ -1,5 +1,6 @@
-// Frames a second of the bead tracker on one core, alone and with the force, beside OpenCV's SimpleBlobDetector on the
-// same frames (the peer that the text of the visio-haptic sensor names). 719 frames/s is the text's own figure.
+// Frames a second of the bead tracker on one core, alone, with the force and drawn for a window, and on all cores,
+// beside OpenCV's SimpleBlobDetector on the same frames (the peer that the text of the visio-haptic sensor names). 719
+// frames/s is the text's own figure.
 
 #include <benchmark/benchmark.h>
 
@@ -14,6 +15,7 @@
 #include <vector>
 
 #include "core/random.h"
+#include "sensors/bead_overlay.h"
 #include "sensors/bead_tracker.h"
 #include "sensors/stiffness_force_model.h"
 
@@ -77,7 +79,7 @@ StiffnessForceModel make_model(int grid, const TrackedBeads& rest) {
   return model;
 }
 
-enum class Work { kTrack, kTrackAndForce };
+enum class Work { kTrack, kTrackAndForce, kTrackForceAndDisplay };
 
 void track(benchmark::State& state, Work work, CentroidKind centroid) {
   const int grid = static_cast<int>(state.range(0));
@@ -87,6 +89,7 @@ void track(benchmark::State& state, Work work, CentroidKind centroid) {
   const StiffnessForceModel model = make_model(grid, tracker.track({clip.images[0], 0}));
   std::int64_t frame = 0;
   int lost = 0;
+  cv::Mat picture;
   std::vector<double> microseconds;
   microseconds.reserve(1 << 20);
   for (auto _ : state) {
@@ -95,9 +98,10 @@ void track(benchmark::State& state, Work work, CentroidKind centroid) {
     const auto begin = std::chrono::steady_clock::now();
     const TrackedBeads& beads = tracker.track(next);
     lost += grid * grid - beads.found();
-    if (work == Work::kTrackAndForce) {
+    if (work != Work::kTrack) {
       ForceEstimate force = estimate(model, beads);
       benchmark::DoNotOptimize(force);
+      if (work == Work::kTrackForceAndDisplay) draw_overlay(next.image, beads, force, picture);
     }
     const std::chrono::duration<double, std::micro> taken = std::chrono::steady_clock::now() - begin;
     if (microseconds.size() < microseconds.capacity()) microseconds.push_back(taken.count());
@@ -142,6 +146,7 @@ void sizes(benchmark::internal::Benchmark* benchmark) {
 
 BENCHMARK_CAPTURE(track, alone, Work::kTrack, CentroidKind::kBinary)->Apply(sizes);
 BENCHMARK_CAPTURE(track, with_force, Work::kTrackAndForce, CentroidKind::kBinary)->Apply(sizes);
+BENCHMARK_CAPTURE(track, with_display, Work::kTrackForceAndDisplay, CentroidKind::kBinary)->Apply(sizes);
 BENCHMARK_CAPTURE(track, weighted_centroid, Work::kTrack, CentroidKind::kWeighted)->Apply(sizes);
 BENCHMARK(simple_blob_detector)->Apply(sizes);
 

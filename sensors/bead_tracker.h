@@ -15,12 +15,13 @@
 //   so that neither looks like a bead alone, the window's darkest pixels are taken (a fifth of the bead's usual area).
 // - A region that touches the window's border is cut by it: the window is moved onto it, and it is measured again.
 // - A window in which nothing looks like a bead gives no measurement, where Otsu's method alone would invent one. Then
-//   the whole cell is searched, coarsely; if there's no bead either, the bead is `hidden`: its position is held for
+//   the whole cell is searched, coarsely; if there's no bead either, the bead is `hidden` for
 //   `max_hidden_frames`, then it is reset to its cell's centre. It is searched in each frame until it's found again.
-// - A measurement that doesn't go along with the neighbouring beads is looked for again where they say that it should
-// be
+// - A measurement that doesn't go along with the neighbouring beads is looked for again where they have the bead
 //   (BeadConsistency). What isn't there either is hidden; a hidden bead's position goes along with its neighbours.
 //   After `max_hidden_frames` anything in its cell that looks like a bead is taken again.
+// - All beads may jump by more than half a cell between two frames, so that each cell holds a neighbour's bead and one
+//   side none: then they are looked for where the jump would have brought all of them.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -74,11 +75,11 @@ struct BeadFilterSettings {
 struct BeadConsistency {
   bool on = true;
   /// How far a bead's motion since the frame before may differ from the median of its (up to eight) neighbours'
-  /// motions, in sides of a cell. In rendered load cycles at 30 frames/s it was 0.06 at most.
+  /// motions, in sides of a cell. In rendered load cycles at 30 frames/s it was 0.08 at most.
   double lone_motion = 0.125;
   /// Likewise of motions since the first frame, if something that looks like a bead lies within `lone_motion` of where
-  /// the neighbours have it: the bead, while something else is followed. In rendered load cycles it was 0.16 at most.
-  double lone_displacement = 0.2;
+  /// the neighbours have it: the bead, while something else is followed. In rendered load cycles it was 0.21 at most.
+  double lone_displacement = 0.25;
   /// How far a bead may lie from where a regular grid has it in the first frame, in sides of a cell, if something that
   /// looks like a bead lies within `lone_motion` of there.
   double first_offset = 0.2;

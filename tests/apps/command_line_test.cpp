@@ -217,6 +217,8 @@ TEST(CommandLine, MistakesOnTheLineItself) {
   expect_refused(run_program({"calibrate", "vhx", "--data", ".", "-o", "m.json"}), "did you mean 'vhs'?");
   expect_refused(run_program({"calibrate", "vhs", "-o", "m.json"}), "--data");
   expect_refused(run_program({"estimate", "vhs", "--model", "/none.json", "--data", "."}), "/none.json");
+  expect_refused(run_program({"estimate", "vhs", "--model", "m.json", "--data", ".", "--compliance", "c"}),
+                 "--distribution");
   expect_refused(run_program({"inspect", "/nonexistent", "-o", "sheet.png"}), "isn't a data set");
 }
 
