@@ -7,6 +7,7 @@ std::vector<ValidationRow> validate_mechanics(const ValidateOptions& options);
 std::vector<ValidationRow> validate_vibration(const ValidateOptions& options);
 std::vector<ValidationRow> validate_light(const ValidateOptions& options);
 std::vector<ValidationRow> validate_vhs(const ValidateOptions& options);
+std::vector<ValidationRow> validate_vhs_visual(const ValidateOptions& options);
 std::vector<ValidationRow> validate_dvs_light(const ValidateOptions& options);
 std::vector<ValidationRow> validate_dvs_force(const ValidateOptions& options);
 std::vector<ValidationRow> validate_dvs_material(const ValidateOptions& options);
@@ -31,6 +32,7 @@ const std::vector<ValidationGroup>& validation_groups() {
       {"vibration", validate_vibration},
       {"light", validate_light},
       {"vhs", validate_vhs},
+      {"vhs.visual", validate_vhs_visual},
       {"dvs.light", validate_dvs_light},
       {"dvs.force", validate_dvs_force},
       {"dvs.material", validate_dvs_material},
