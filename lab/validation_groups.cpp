@@ -13,6 +13,7 @@ std::vector<ValidationRow> validate_vhs_cycle(const ValidateOptions& options);
 std::vector<ValidationRow> validate_vhs_distribution(const ValidateOptions& options);
 std::vector<ValidationRow> validate_vhs_speed(const ValidateOptions& options);
 std::vector<ValidationRow> validate_vhs_palpation(const ValidateOptions& options);
+std::vector<ValidationRow> validate_vhs_visual(const ValidateOptions& options);
 std::vector<ValidationRow> validate_dvs_light(const ValidateOptions& options);
 std::vector<ValidationRow> validate_dvs_force(const ValidateOptions& options);
 std::vector<ValidationRow> validate_dvs_material(const ValidateOptions& options);
@@ -43,6 +44,7 @@ const std::vector<ValidationGroup>& validation_groups() {
       {"vhs.distribution", validate_vhs_distribution},
       {"vhs.speed", validate_vhs_speed},
       {"vhs.palpation", validate_vhs_palpation},
+      {"vhs.visual", validate_vhs_visual},
       {"dvs.light", validate_dvs_light},
       {"dvs.force", validate_dvs_force},
       {"dvs.material", validate_dvs_material},

@@ -25,7 +25,10 @@ DirectMaterial direct_material(const Material& material, std::map<double, GgxAlb
 }
 
 DirectPrint::DirectPrint(const Surface& surface)
-    : material_mm(&surface.print->material_mm), triangles(&surface.mesh.triangles), index(surface.print->marks) {
+    : material_mm(&surface.print->material_mm),
+      triangles(&surface.mesh.triangles),
+      index(surface.print->marks),
+      picture(surface.print->picture.get()) {
   for (const PrintedMark& mark : surface.print->marks) {
     const Spectrum& ink = surface.print->inks[mark.ink];
     auto& colour = mark_colours.emplace_back();
@@ -36,9 +39,11 @@ DirectPrint::DirectPrint(const Surface& surface)
 const float* DirectPrint::colour_at(int triangle, float u, float v, const float* plain) const {
   const auto& t = (*triangles)[triangle];
   const std::vector<Eigen::Vector2d>& at = *material_mm;
-  const int mark =
-      index.mark_at((1.0 - double(u) - double(v)) * at[t[0]] + double(u) * at[t[1]] + double(v) * at[t[2]]);
-  return mark < 0 ? plain : mark_colours[mark].data();
+  const Eigen::Vector2d point = (1.0 - double(u) - double(v)) * at[t[0]] + double(u) * at[t[1]] + double(v) * at[t[2]];
+  const int mark = index.mark_at(point);
+  if (mark >= 0) return mark_colours[mark].data();
+  const float* pixel = picture != nullptr ? picture->at(point) : nullptr;
+  return pixel != nullptr ? pixel : plain;
 }
 
 }  // namespace touchstone::render

@@ -21,10 +21,11 @@ struct DirectPrint {
   const std::vector<std::array<int, 3>>* triangles = nullptr;
   PrintIndex index;
   std::vector<std::array<float, kMaxBands>> mark_colours;
+  const PrintedPicture* picture = nullptr;
 
   explicit DirectPrint(const Surface& surface);
 
-  /// The ink at a place of a triangle, or `plain` beside the marks.
+  /// The ink at a place of a triangle, or `plain` where there is none.
   const float* colour_at(int triangle, float u, float v, const float* plain) const;
 };
 

@@ -162,7 +162,7 @@ class PathIntegrator {
   }
 
   /// What the surface's own colour is at a hit.
-  const Bands<N>& colour_at(const PreparedMaterial<N>& material, const RayHit& hit) const {
+  Bands<N> colour_at(const PreparedMaterial<N>& material, const RayHit& hit) const {
     return material.print < 0 ? material.colour : scene_.prints[material.print].colour(hit, material.colour);
   }
 
@@ -392,7 +392,7 @@ class PathIntegrator {
         } else {
           const Eigen::Vector3d normal = facing_normal(leg, hit);
           const Eigen::Vector3d lifted = hit.position + hit.lift;
-          const Bands<N>& colour = colour_at(material, hit);
+          const Bands<N> colour = colour_at(material, hit);
           const LampNumbers chosen = leg.is_first_sight() ? at_first_hit : lamp_numbers(numbers);
           const int sides = material.kind == SurfaceKind::kTransmitter ? 2 : 1;
           for (int side = 0; side < sides; ++side) {  // one call, so that the compiler inlines it

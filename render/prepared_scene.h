@@ -61,14 +61,18 @@ struct PreparedPrint {
   std::vector<std::array<int, 3>> triangles;
   std::vector<Bands<N>> mark_colours;
   PrintIndex index;
+  std::shared_ptr<const PrintedPicture> picture;
 
-  /// The ink at a hit, or `plain` beside the marks.
-  const Bands<N>& colour(const RayHit& hit, const Bands<N>& plain) const {
+  /// The ink at a hit, or `plain` where there is none.
+  Bands<N> colour(const RayHit& hit, const Bands<N>& plain) const {
     const auto& t = triangles[hit.triangle];
     const Eigen::Vector2d at =
         (1.0 - hit.weight_1 - hit.weight_2) * points[t[0]] + hit.weight_1 * points[t[1]] + hit.weight_2 * points[t[2]];
     const int mark = index.mark_at(at);
-    return mark < 0 ? plain : mark_colours[mark];
+    if (mark >= 0) return mark_colours[mark];
+    const float* pixel = picture ? picture->at(at) : nullptr;
+    if (pixel == nullptr) return plain;
+    return Eigen::Map<const Eigen::Array<float, N, 1>>(pixel).template cast<typename Bands<N>::Scalar>();
   }
 };
 
@@ -132,7 +136,7 @@ struct PreparedScene {
  private:
   void add_print(const Surface& surface) {
     const Print& print = *surface.print;
-    PreparedPrint<N> made{print.material_mm, surface.mesh.triangles, {}, PrintIndex(print.marks)};
+    PreparedPrint<N> made{print.material_mm, surface.mesh.triangles, {}, PrintIndex(print.marks), print.picture};
     for (const PrintedMark& mark : print.marks) made.mark_colours.push_back(print.inks[mark.ink]);
     materials.back().print = static_cast<int>(prints.size());
     prints.push_back(std::move(made));

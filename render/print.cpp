@@ -13,8 +13,8 @@ PrintIndex::PrintIndex(const std::vector<PrintedMark>& marks) : marks_(marks) {
   low_.setConstant(kInfinity);
   Eigen::Vector2d high = Eigen::Vector2d::Constant(-kInfinity);
   for (const PrintedMark& mark : marks_) {
-    low_ = low_.cwiseMin((mark.centre.array() - mark.half_width).matrix());
-    high = high.cwiseMax((mark.centre.array() + mark.half_width).matrix());
+    low_ = low_.cwiseMin(mark.centre - half_size(mark));
+    high = high.cwiseMax(mark.centre + half_size(mark));
   }
   // About one cell a mark, square, and not more than a thousand either way.
   const Eigen::Vector2d size = high - low_;
@@ -28,10 +28,12 @@ PrintIndex::PrintIndex(const std::vector<PrintedMark>& marks) : marks_(marks) {
     const auto place = [&](double at, int axis, int count) {
       return std::clamp(static_cast<int>((at - low_[axis]) * cells_per_mm_), 0, count - 1);
     };
-    const int right = place(mark.centre.x() + mark.half_width, 0, columns_);
-    const int top = place(mark.centre.y() + mark.half_width, 1, rows_);
-    for (int row = place(mark.centre.y() - mark.half_width, 1, rows_); row <= top; ++row) {
-      for (int column = place(mark.centre.x() - mark.half_width, 0, columns_); column <= right; ++column) {
+    const Eigen::Vector2d from = mark.centre - half_size(mark);
+    const Eigen::Vector2d to = mark.centre + half_size(mark);
+    const int right = place(to.x(), 0, columns_);
+    const int top = place(to.y(), 1, rows_);
+    for (int row = place(from.y(), 1, rows_); row <= top; ++row) {
+      for (int column = place(from.x(), 0, columns_); column <= right; ++column) {
         visit(static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) + static_cast<std::size_t>(column));
       }
     }
@@ -54,7 +56,7 @@ int PrintIndex::mark_at(const Eigen::Vector2d& point) const {
     const PrintedMark& mark = marks_[members_[k]];
     const Eigen::Vector2d off = point - mark.centre;
     const bool covers = mark.shape == MarkShape::round ? off.squaredNorm() <= mark.half_width * mark.half_width
-                                                       : off.cwiseAbs().maxCoeff() <= mark.half_width;
+                                                       : (off.cwiseAbs().array() <= half_size(mark).array()).all();
     if (covers) return members_[k];
   }
   return -1;

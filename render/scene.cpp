@@ -76,6 +76,25 @@ void check_material(const Material& material, const Scene& scene, const std::str
              material);
 }
 
+void check_picture(const PrintedPicture& picture, Eigen::Index bands, const std::string& what) {
+  if (picture.columns < 1 || picture.rows < 1) {
+    fail("{}: {} x {} pixels; there must be at least one", what, picture.columns, picture.rows);
+  }
+  if (picture.bands != bands) fail("{}: has {} bands, the scene has {}", what, picture.bands, bands);
+  if (!picture.low.allFinite() || picture.low.cwiseAbs().maxCoeff() > 1e5) {
+    fail("{}: its corner isn't within 100 m", what);
+  }
+  if (!((picture.pixel_mm.array() > 0.0).all() && (picture.pixel_mm.array() < 1e5).all())) {
+    fail("{}: pixels of {} x {} mm; they must be above 0", what, picture.pixel_mm.x(), picture.pixel_mm.y());
+  }
+  const std::size_t count = static_cast<std::size_t>(picture.columns) * static_cast<std::size_t>(picture.rows) *
+                            static_cast<std::size_t>(picture.bands);
+  if (picture.values.size() != count) fail("{}: {} values; {} are needed", what, picture.values.size(), count);
+  for (const float value : picture.values) {
+    if (!(value >= 0.0f && value <= 1.0f)) fail("{}: a value is {}; allowed is from 0 to 1", what, value);
+  }
+}
+
 void check_print(const Print& print, const Surface& surface, Eigen::Index bands, const std::string& what) {
   if (!std::holds_alternative<Lambertian>(surface.material) &&
       !std::holds_alternative<RoughConductor>(surface.material)) {
@@ -98,10 +117,14 @@ void check_print(const Print& print, const Surface& surface, Eigen::Index bands,
     if (!(mark.half_width > 0.0 && mark.half_width < 1e5)) {
       fail("{}: the half width of mark {} is {} mm; it must be above 0", what, i, mark.half_width);
     }
+    if (mark.shape == MarkShape::rectangle && !(mark.half_height > 0.0 && mark.half_height < 1e5)) {
+      fail("{}: the half height of mark {} is {} mm; it must be above 0", what, i, mark.half_height);
+    }
     if (mark.ink < 0 || mark.ink >= static_cast<int>(print.inks.size())) {
       fail("{}: mark {} has ink {}; there are {}", what, i, mark.ink, print.inks.size());
     }
   }
+  if (print.picture) check_picture(*print.picture, bands, what + ": picture");
 }
 
 void check_normals(const Surface& surface, const std::string& what) {

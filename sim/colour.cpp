@@ -1,8 +1,30 @@
 #include "sim/colour.h"
 
 #include <algorithm>
+#include <cctype>
+
+#include "sim/srgb_reflectance.h"
 
 namespace touchstone::sim {
+
+namespace {
+
+/// "#rrggbb" as three numbers, 0 to 1.
+Eigen::Vector3d srgb_of(const YamlReader& in, const std::string& text, Allowed allowed) {
+  constexpr std::size_t kLength = 7;
+  const bool sound = text.size() == kLength &&
+                     std::all_of(text.begin() + 1, text.end(), [](unsigned char c) { return std::isxdigit(c) != 0; });
+  if (!sound) fail_at(in.where(), "{}is '{}'; an sRGB colour is # and six hexadecimal digits", in.context(), text);
+  if (allowed.high != 1.0) {
+    fail_at(in.where(), "{}is '{}'; only what reflects can have an sRGB colour", in.context(), text);
+  }
+  Eigen::Vector3d srgb;
+  for (int k = 0; k < 3; ++k)
+    srgb[k] = std::stoi(text.substr(1 + 2 * static_cast<std::size_t>(k), 2), nullptr, 16) / 255.0;
+  return srgb;
+}
+
+}  // namespace
 
 double Colour::largest() const {
   const std::vector<double>& values = curve ? curve->values : numbers;
@@ -21,6 +43,11 @@ void read_value(YamlReader& in, Colour& colour, Allowed allowed) {
     return;
   }
   const std::string text = in.text();
+  if (text.starts_with('#')) {
+    colour.curve = srgb_reflectance(srgb_of(in, text, allowed));
+    colour.smooth = true;
+    return;
+  }
   if (!text.ends_with(".csv")) {
     colour.numbers = {in.number(allowed)};
     return;

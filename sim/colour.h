@@ -4,6 +4,7 @@
 //   albedo: 0.8                          # the same in all bands
 //   albedo: [0.8, 0.6, 0.5]              # one number a band
 //   albedo: ../spectra/silicone-white.csv   # a spectrum (render/spectral_curve.h), for a device that has `bands`
+//   albedo: '#d6a58c'                    # a print of an sRGB colour (sim/srgb_reflectance.h), for any device
 
 #include <Eigen/Core>
 #include <optional>
@@ -29,7 +30,7 @@ struct Colour {
   double largest() const;
 };
 
-/// Reads any of the three forms. A spectrum is one of shares where `allowed` ends at 1, else of coefficients per mm.
+/// Reads any of the four forms. A spectrum is one of shares where `allowed` ends at 1, else of coefficients per mm.
 void read_value(YamlReader& in, Colour& colour, Allowed allowed);
 
 /// The bands of a scene: narrow ranges that curves are averaged over, or just wavelengths that numbers are given for.

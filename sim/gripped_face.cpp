@@ -76,6 +76,10 @@ GrippedFace::GrippedFace(const DeviceSpec& device, const fem::Compliance& gel, c
   if (piece.shape.type != ShapeKind::hexagon) {
     fail("object {}: a gripped piece must be of the shape hexagon", piece.name);
   }
+  if (!piece.print.empty()) {
+    fail("object {}: has a print, which the pictures of a gripped piece don't show; it may have one albedo",
+         piece.name);
+  }
   if (piece.friction < sine_ / cosine_) {
     fail("object {}: friction {} doesn't hold it under a force that leans by {} degrees, it must be at least {:.3g}",
          piece.name, piece.friction, settings.tilt_deg, sine_ / cosine_);

@@ -243,7 +243,11 @@ void fields(YamlReader& in, ObjectSpec& object) {
   in.required("shape", object.shape);
   in.optional("relief", object.relief);
   in.optional("radiance", object.radiance, Allowed::at_least(0.0));
-  if (!object.radiance) in.optional("albedo", object.albedo, Allowed::within(0.0, 1.0));
+  if (!object.radiance) {
+    in.optional("albedo", object.albedo, Allowed::within(0.0, 1.0));
+    in.optional("print", object.print);
+    check_layers(object.print);
+  }
   in.optional("elastic", object.elastic);
   in.optional("friction", object.friction, Allowed::at_least(0.0));
   in.optional("screen", object.screen);

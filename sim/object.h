@@ -5,11 +5,13 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "core/triangle_mesh.h"
 #include "core/yaml_reader.h"
 #include "fem/contact_shape.h"
 #include "sim/colour.h"
+#include "sim/object_print.h"
 #include "sim/relief.h"
 
 namespace touchstone::sim {
@@ -64,6 +66,7 @@ struct ObjectSpec {
   ShapeSpec shape;
   std::optional<ReliefSpec> relief;  ///< on the shape's lower side
   Colour albedo = 0.5;
+  std::vector<PrintLayer> print;       ///< on the shape's lower side; none with a radiance
   std::optional<Colour> radiance;      ///< W/m^2/sr in air: a diffuser lit from behind, which has no albedo
   std::optional<ElasticSpec> elastic;  ///< without it the object is rigid
   double friction = 0.0;               ///< Coulomb coefficient against the gel

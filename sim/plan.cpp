@@ -234,7 +234,9 @@ void plan_interreflection(const SceneSpec& scene, Plan& plan, PlanTable& table) 
     judge(device.coating->albedo.largest(), 0.5 * std::hypot(gel.size_x_mm, gel.size_y_mm));
   } else {
     for (const MovedObject& moved : moved_objects(scene)) {
-      judge(moved.object.radiance ? 0.0 : moved.object.albedo.largest(), bright_radius(moved.object));
+      double brightest = moved.object.albedo.largest();
+      for (const Colour& ink : inks_of(moved.object.print)) brightest = std::max(brightest, ink.largest());
+      judge(moved.object.radiance ? 0.0 : brightest, bright_radius(moved.object));
     }
   }
   const std::string why = fmt::format(
@@ -243,6 +245,33 @@ void plan_interreflection(const SceneSpec& scene, Plan& plan, PlanTable& table) 
   plan.interreflection = table.add(
       "interreflection", scene.effects.interreflection, plan.scattering || gain > scene.light.interreflection_tolerance,
       plan.scattering ? "light is scattered many times in a milky gel" : why, "3 to 5 times the rays");
+}
+
+void plan_print(const SceneSpec& scene, Plan& plan, PlanTable& table) {
+  bool printed = false;
+  bool skin = false;
+  for (const MovedObject& moved : moved_objects(scene)) {
+    printed = printed || !moved.object.print.empty();
+    skin = skin || depends_on_pressure(moved.object.print);
+  }
+  const bool coated = scene.device.coating.has_value();
+  const bool seen = printed && !coated && (scene.outputs.light() || scene.outputs.events);
+  const char* hidden = coated ? "the gel's coating hides the objects" : "no picture is asked for";
+  plan.object_print = table.add("print on objects", seen,
+                                !printed ? "nothing is printed on an object"
+                                : seen   ? "an object is printed on and the gel is clear"
+                                         : hidden,
+                                "a look-up a hit; pictures are turned into bands once a frame");
+  plan.skin_blanching = table.add("skin under pressure", seen && skin,
+                                  !skin  ? "no object has a skin's marks"
+                                  : seen ? "blood is pressed out of a skin's vessels, which its colour shows"
+                                         : hidden,
+                                  "some milliseconds a frame");
+  if (plan.skin_blanching && plan.fine_relief) {
+    fail_at(scene.where,
+            "a skin's marks can't be had with fine relief, which has no map of pressure for them; "
+            "effects.fine_relief: off leaves that out");
+  }
 }
 
 void plan_bands(const SceneSpec& scene, Plan& plan, PlanTable& table) {
@@ -293,6 +322,7 @@ void plan_light(const SceneSpec& scene, Plan& plan, PlanTable& table) {
                                        : "no index differs from 1",
                               "closed form at the flat faces: under a tenth of the rays' time");
 
+  plan_print(scene, plan, table);
   plan_interreflection(scene, plan, table);
   plan_bands(scene, plan, table);
   const bool noise = scene.outputs.frames;

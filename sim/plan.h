@@ -29,6 +29,8 @@ struct Plan {
   bool refraction = false;
   bool interreflection = false;
   bool scattering = false;
+  bool object_print = false;    ///< what is printed on objects is seen
+  bool skin_blanching = false;  ///< and depends on how they are pressed
   bool sensor_noise = false;
   SceneBands bands;  ///< of the light; none without a picture
   bool motion_blur = false;

@@ -13,7 +13,7 @@ constexpr double kStepNm = 1.0;  // of the lamps' common light
 
 /// A colour of a scene with its name, for messages.
 struct NamedColour {
-  const Colour& colour;
+  Colour colour;
   const char* name;
 };
 
@@ -28,7 +28,10 @@ std::vector<NamedColour> reflecting(const SceneSpec& scene) {
     if (device.coating->print) all.push_back({device.coating->print->colour, "coating.print.colour"});
   }
   if (!device.coating) {  // a coating hides the objects
-    for (const MovedObject& moved : moved_objects(scene)) all.push_back({moved.object.albedo, "albedo"});
+    for (const MovedObject& moved : moved_objects(scene)) {
+      all.push_back({moved.object.albedo, "albedo"});
+      for (Colour& ink : inks_of(moved.object.print)) all.push_back({std::move(ink), "print"});
+    }
   }
   return all;
 }

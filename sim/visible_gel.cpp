@@ -197,6 +197,21 @@ TriangleMesh VisibleGel::dry_surface(const fem::PressState& press, std::span<con
   return dry;
 }
 
+ContactPressure VisibleGel::pressure_on(const fem::PressState& press, int body) const {
+  constexpr double kPaPerMPa = 1000.0;
+  const RigidTransform object_from_gel = press.bodies[static_cast<std::size_t>(body)].gel_from_object.inverse();
+  ContactPressure out;
+  out.triangles = coarse_;
+  for (Eigen::Index i = 0; i < rest_.rows(); ++i) {
+    const Eigen::Vector3d now = (rest_.row(i) + press.surface_displacement.row(i)).transpose();
+    out.places.emplace_back((object_from_gel * now).head<2>());
+    const auto vertex = static_cast<std::size_t>(i);
+    const bool touched = press.node_state[vertex] != fem::NodeState::open && press.node_owner[vertex] == body;
+    out.kPa.push_back(touched ? std::max(0.0, -kPaPerMPa * press.traction(i, 2)) : 0.0);
+  }
+  return out;
+}
+
 GelSheet VisibleGel::sheet(const fem::PressState& press, std::span<const PlacedShape> bodies) const {
   std::vector<Above> above;
   for (const PlacedShape& body : bodies) above.emplace_back(body.shape, body.gel_from_object);

@@ -12,6 +12,7 @@
 #include "fem/contact_shape.h"
 #include "fem/gel_body.h"
 #include "fem/press.h"
+#include "sim/contact_pressure.h"
 
 namespace touchstone::sim {
 
@@ -49,6 +50,9 @@ class VisibleGel {
   TriangleMesh dry_surface(const fem::PressState& press, std::span<const PlacedShape> bodies) const;
   /// The same for a press with one body.
   TriangleMesh dry_surface(const fem::PressState& press, const fem::ContactShape& shape) const;
+  /// Normal pressure that the gel of a press exerts on its `body`-th body, on the mechanics' own vertices.
+  /// @pre the gel is a slab
+  ContactPressure pressure_on(const fem::PressState& press, int body) const;
 
  private:
   Eigen::MatrixX3d rest_;          // of the mechanics' vertices

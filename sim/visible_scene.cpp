@@ -70,6 +70,32 @@ render::Material material_of(const ObjectSpec& object, const SceneBands& bands) 
   return render::Lambertian{in_bands(object.albedo, bands, "albedo")};
 }
 
+/// Material coordinates of an object's print for its mesh: x and y on the lower side, far from any print elsewhere. The
+/// mesh gets vertices of their own for the triangles that look up or sideways.
+std::vector<Eigen::Vector2d> lay_out_print(TriangleMesh& body) {
+  constexpr double kNowhere_mm = 1e5;
+  std::vector<Eigen::Vector2d> places;
+  for (const Eigen::Vector3d& vertex : body.vertices) places.emplace_back(vertex.head<2>());
+  for (std::array<int, 3>& t : body.triangles) {
+    const Eigen::Vector3d a = body.vertices[t[0]];
+    if ((body.vertices[t[1]] - a).cross(body.vertices[t[2]] - a).z() < 0.0) continue;
+    for (int& corner : t) {
+      body.vertices.push_back(Eigen::Vector3d(body.vertices[corner]));
+      places.push_back(Eigen::Vector2d::Constant(kNowhere_mm));
+      corner = static_cast<int>(body.vertices.size()) - 1;
+    }
+  }
+  return places;
+}
+
+/// The print of an object's own body.
+render::Print print_on(const VisibleObject& visible, const ObjectSpec& object, const SceneBands& bands,
+                       const ContactPressure* pressure) {
+  render::Print print = object_print(visible.print, bands, object.albedo, pressure);
+  print.material_mm = visible.printed_mm;
+  return print;
+}
+
 /// Centres of a grid about the origin, row by row.
 std::vector<Eigen::Vector2d> grid_centres(const Eigen::Vector2i& grid, const Eigen::Vector2d& spacing) {
   std::vector<Eigen::Vector2d> centres;
@@ -123,8 +149,12 @@ TriangleMesh panel_behind() {
 }  // namespace
 
 VisibleObject visible_object(const ObjectSpec& object, double edge_mm) {
-  VisibleObject visible{coarse_contact_shape(object, edge_mm), visible_mesh(object.shape), {}};
+  VisibleObject visible{coarse_contact_shape(object, edge_mm), visible_mesh(object.shape), {}, {}, {}};
   if (object.screen) visible.screen = visible_mesh(*object.screen);
+  if (!object.print.empty()) {
+    visible.print = ready_print(object.print);
+    visible.printed_mm = lay_out_print(visible.body);
+  }
   return visible;
 }
 
@@ -244,6 +274,18 @@ render::Scene visible_scene(const SceneSpec& scene, const Plan& plan, const std:
     return out;
   }
   render::Scene out = scene_without_surface(scene, plan, objects, poses_of(press), press);
+  if (plan.object_print) {
+    const std::vector<MovedObject> all = moved_objects(scene);
+    std::size_t surface = 1;  // after the frame
+    for (std::size_t k = 0; k < objects.size(); ++k) {
+      if (!objects[k].print.layers.empty()) {
+        std::optional<ContactPressure> pressure;
+        if (plan.skin_blanching) pressure = gel.pressure_on(press, static_cast<int>(k));
+        out.surfaces[surface].print = print_on(objects[k], all[k].object, plan.bands, pressure ? &*pressure : nullptr);
+      }
+      surface += objects[k].screen ? 2 : 1;
+    }
+  }
   out.surfaces.insert(out.surfaces.begin(), gel_surface(gel.dry_surface(press, felt)));
   return out;
 }
@@ -259,8 +301,19 @@ render::Scene visible_scene(const SceneSpec& scene, const Plan& plan, const std:
   }
   render::Scene out = scene_without_surface(scene, plan, objects, poses_of(press, relief), press);
   Membrane::Sheet sheet = membrane.sheet(press, relief);
+  render::Surface wet{std::move(sheet.wet), material_of(scene.object, plan.bands)};
+  if (plan.object_print && !objects.front().print.layers.empty()) {
+    render::Print print = print_on(objects.front(), scene.object, plan.bands, nullptr);
+    wet.print = print;
+    wet.print->material_mm.clear();
+    const RigidTransform object_from_gel = poses_of(press, relief).front().inverse();
+    for (const Eigen::Vector3d& vertex : wet.mesh.vertices) {
+      wet.print->material_mm.emplace_back((object_from_gel * vertex).head<2>());
+    }
+    out.surfaces[1].print = std::move(print);
+  }
   out.surfaces.insert(out.surfaces.begin(), gel_surface(std::move(sheet.dry)));
-  out.surfaces.push_back({std::move(sheet.wet), material_of(scene.object, plan.bands)});
+  out.surfaces.push_back(std::move(wet));
   return out;
 }
 

@@ -21,6 +21,8 @@ struct VisibleObject {
   fem::ContactShape felt;
   TriangleMesh body;
   std::optional<TriangleMesh> screen;
+  ReadyPrint print;                         ///< no layers: none
+  std::vector<Eigen::Vector2d> printed_mm;  ///< the body's vertices in the print's coordinates; none without a print
 };
 
 /// `edge_mm` of the gel's mesh: what the gel's coarse surface can be laid onto has no finer detail.

@@ -241,6 +241,12 @@ TEST(DirectRenderer, RefusesOtherScenes) {
     Print print;
     s.surfaces[0].print = print;  // without material coordinates
   });
+  refuses([](Scene& s) {
+    Print print;
+    for (const Eigen::Vector3d& v : s.surfaces[0].mesh.vertices) print.material_mm.emplace_back(v.head<2>());
+    print.picture = std::make_shared<const PrintedPicture>();  // of no pixels
+    s.surfaces[0].print = print;
+  });
   refuses([](Scene& s) { s.surfaces[0].mesh.vertices[0].z() = -6.0; });  // in the glass
   refuses([](Scene& s) { s.surfaces[0].mesh.vertices[0].x() = -8.0; });  // beside the box
   refuses([](Scene& s) { s.surfaces[0].mesh.vertices[0].x() = std::nan(""); });
@@ -262,6 +268,21 @@ TEST(DirectRenderer, RefusesOtherScenes) {
   PinholeCamera blind = camera;
   blind.distance_mm = 0.0;
   EXPECT_THROW(DirectRenderer(field, blind, scene), Error);
+}
+
+TEST(DirectRenderer, APrintedPictureIsItsColours) {
+  const Scene plain = dented_scene(0.0, Lambertian{grey(0.7)});
+  const Scene darker = dented_scene(0.0, Lambertian{grey(0.35)});
+  Scene printed = plain;
+  Print print;
+  for (const Eigen::Vector3d& v : printed.surfaces[0].mesh.vertices) print.material_mm.emplace_back(v.head<2>());
+  print.picture = std::make_shared<const PrintedPicture>(PrintedPicture{1, 1, {-50, -50}, {100, 100}, 1, {0.35f}});
+  printed.surfaces[0].print = print;
+  const LightField field = make_light_field(plain, reach_of_membrane(), accuracy(1e-2));
+  DirectRenderer renderer(field, small_camera(8, 6), plain);
+  const cv::Mat expected = renderer.render(darker).irradiance;
+  EXPECT_GT(cv::norm(expected), 0.0);
+  EXPECT_LE(cv::norm(renderer.render(printed).irradiance, expected, cv::NORM_INF), 1e-6 * cv::norm(expected));
 }
 
 }  // namespace

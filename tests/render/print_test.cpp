@@ -90,6 +90,29 @@ TEST(Print, SquareCoversItsSideSquared) {
   EXPECT_NEAR((seen.centroid - Eigen::Vector2d(1.2, -0.7)).norm(), 0.0, 5e-3);
 }
 
+TEST(Print, RectangleCoversItsSides) {
+  Print print = one_disc({1.2, -0.7}, 0.4, 0.1);
+  print.marks[0].shape = MarkShape::rectangle;
+  print.marks[0].half_height = 2.5;
+  const Seen seen = look_down(printed_sheet(5, kFlat, Lambertian{grey(0.9)}, print), 5.0, 0.1);
+  EXPECT_NEAR(seen.share / (0.8 * 5.0 / 100.0), 1.0, 5e-3);
+  EXPECT_NEAR((seen.centroid - Eigen::Vector2d(1.2, -0.7)).norm(), 0.0, 5e-3);
+}
+
+TEST(Print, PictureLiesUnderTheMarksAndOverThePlainColour) {
+  Print print = one_disc({0, 0}, 0.5, 0.1);
+  print.picture = std::make_shared<const PrintedPicture>(PrintedPicture{2, 1, {-2, -1}, {2, 2}, 1, {0.25f, 0.5f}});
+  Scene scene = empty_scene(1.0);
+  scene.surfaces.push_back(printed_sheet(3, kFlat, Lambertian{grey(0.9)}, print));
+  const Tracer tracer(scene);
+  const auto albedo = [&](double x, double y) { return tracer.radiance({x, y, 3}, {0, 0, -1}, samples(1))[0]; };
+  EXPECT_NEAR(albedo(0.3, 0.1), 0.1, 1e-12);
+  EXPECT_NEAR(albedo(-0.7, 0.9), 0.25, 1e-12);
+  EXPECT_NEAR(albedo(1.9, -0.9), 0.5, 1e-12);
+  EXPECT_NEAR(albedo(0.0, 1.1), 0.9, 1e-12);
+  EXPECT_NEAR(albedo(-2.1, 0.0), 0.9, 1e-12);
+}
+
 TEST(Print, DiscMovesWithTheMaterial) {
   Eigen::Matrix2d stretch;
   stretch << 1.5, 0.2, -0.1, 0.8;
@@ -136,8 +159,9 @@ TEST(PrintIndex, FindsWhatASearchOfAllMarksFinds) {
     for (int i = 0; i < count; ++i) {
       const double x = 20.0 * stream.uniform() - 10.0;
       const double y = 4.0 * stream.uniform();
-      const MarkShape shape = i % 3 == 1 ? MarkShape::square : MarkShape::round;
-      marks.push_back({{x, y}, i % 50 == 7 ? 3.0 : 0.02 + 0.3 * stream.uniform(), 0, shape});
+      const MarkShape shape = i % 3 == 1 ? MarkShape::square : i % 3 == 2 ? MarkShape::rectangle : MarkShape::round;
+      marks.push_back(
+          {{x, y}, i % 50 == 7 ? 3.0 : 0.02 + 0.3 * stream.uniform(), 0, shape, 0.01 + 0.9 * stream.uniform()});
     }
     const PrintIndex index(marks);
     for (int i = 0; i < 3000; ++i) {
@@ -147,7 +171,9 @@ TEST(PrintIndex, FindsWhatASearchOfAllMarksFinds) {
       for (int k = 0; k < count; ++k) {
         const Eigen::Vector2d off = at - marks[k].centre;
         const bool round = marks[k].shape == MarkShape::round;
-        if ((round ? off.norm() : off.cwiseAbs().maxCoeff()) <= marks[k].half_width) expected = k;
+        const double height = marks[k].shape == MarkShape::rectangle ? marks[k].half_height : marks[k].half_width;
+        const bool within = std::abs(off.x()) <= marks[k].half_width && std::abs(off.y()) <= height;
+        if (round ? off.norm() <= marks[k].half_width : within) expected = k;
       }
       ASSERT_EQ(index.mark_at(at), expected) << count << " marks at " << at.transpose();
     }

@@ -104,6 +104,22 @@ TEST(SceneCheck, FaultyPrintsAreRefusedByName) {
   expect_refused(spoil([](Print& p) { p.marks[0].half_width = kNan; }), "half width of mark 0");
   expect_refused(spoil([](Print& p) { p.marks[0].centre.y() = kNan; }), "centre of mark 0");
   expect_refused(spoil([](Print& p) { p.marks[0].ink = 1; }), "mark 0 has ink 1");
+  expect_refused(spoil([](Print& p) { p.marks[0].shape = MarkShape::rectangle; }), "half height of mark 0 is 0");
+  const auto pictured = [&](const std::function<void(PrintedPicture&)>& change) {
+    return spoil([change](Print& p) {
+      PrintedPicture picture{2, 1, {-1, -1}, {1, 2}, 1, {0.2f, 0.4f}};
+      change(picture);
+      p.picture = std::make_shared<const PrintedPicture>(picture);
+    });
+  };
+  pictured([](PrintedPicture&) {})(scene);
+  EXPECT_NO_THROW(Tracer{scene});
+  expect_refused(pictured([](PrintedPicture& p) { p.rows = 0; }), "picture: 2 x 0 pixels");
+  expect_refused(pictured([](PrintedPicture& p) { p.bands = 3; }), "picture: has 3 bands");
+  expect_refused(pictured([](PrintedPicture& p) { p.low.x() = kNan; }), "picture: its corner");
+  expect_refused(pictured([](PrintedPicture& p) { p.pixel_mm.y() = 0.0; }), "picture: pixels of 1 x 0 mm");
+  expect_refused(pictured([](PrintedPicture& p) { p.values.pop_back(); }), "picture: 1 values");
+  expect_refused(pictured([](PrintedPicture& p) { p.values[1] = 1.5f; }), "picture: a value is 1.5");
   expect_refused(
       [&](Scene& s) {
         spoil([](Print&) {})(s);

@@ -282,6 +282,7 @@ TEST(GrippedFace, WhatMakesNoSenseIsRefused) {
   expect_refused([&] { with([](P, S s, O) { s.rms_slope = -1; }); }, "rms_slope is -1");
   expect_refused([&] { with([](P, S, O o) { o.friction = 0.2; }); }, "must be at least 0.268");
   expect_refused([&] { with([](P, S, O o) { o.shape.type = ShapeKind::box; }); }, "must be of the shape hexagon");
+  expect_refused([&] { with([](P, S, O o) { o.print.emplace_back(); }); }, "has a print");
   DeviceSpec dome = device();
   dome.gel.shape = GelShape::dome;
   expect_refused([&] { GrippedFace(dome, gel(), piece(), nullptr, {}); }, "a slab");

@@ -6,7 +6,11 @@
 #include <cmath>
 
 #include "core/whole_file.h"
+#include "sim/gel_setup.h"
+#include "sim/scene_sight.h"
 #include "sim/virtual_sensor.h"
+#include "sim/visible_scene.h"
+#include "tests/support/small_scene.h"
 #include "tests/support/temporary_folder.h"
 
 namespace touchstone::sim {
@@ -136,6 +140,87 @@ TEST_F(SeveralObjects, HaveNoFineReliefAndNoInertia) {
   const SceneSpec spec = scene(0.0, one_more(2.0, "press.yaml"));
   EXPECT_THAT(plan_error(spec, &EffectSwitches::fine_relief), HasSubstr("fine relief isn't simulated with several"));
   EXPECT_THAT(plan_error(spec, &EffectSwitches::inertia), HasSubstr("inertia isn't simulated with several"));
+}
+
+// Each skin's colour follows its own pressure, whose sum over the face is the force.
+TEST(SkinsOfSeveralObjects, FadeWhereTheyArePressed) {
+  const std::string skin =
+      "shape: {type: sphere, radius_mm: 4}\nalbedo: 0.8\nprint:\n  - {type: skin, patches: [{kind: erythema, "
+      "centre_mm: "
+      "[0, 0], diameter_mm: 1, colour: 0.4}, {kind: purpura, centre_mm: [0.9, 0], diameter_mm: 0.5, rim_mm: 0, colour: "
+      "0.3}]}\n";
+  SceneSpec spec;
+  spec.device = test::small_device();
+  spec.object = parse_yaml<ObjectSpec>("name: pressed\n" + skin, "pressed.yaml");
+  spec.motion =
+      parse_yaml<MotionSpec>("start_mm: [-1, 0, 4.05]\nkeys:\n  - {frames: 3, z: {position_mm: 3.7}}\n", "m.yaml");
+  spec.more_objects.push_back({parse_yaml<ObjectSpec>("name: idle\n" + skin, "idle.yaml"),
+                               parse_yaml<MotionSpec>("start_mm: [4, 0, 6]\nkeys:\n  - {frames: 3}\n", "n.yaml"),
+                               {}});
+  const Plan plan = make_plan(spec);
+  ASSERT_TRUE(plan.skin_blanching);
+  const test::TemporaryFolder cache;
+  const auto gel = set_up_gel(spec.device, cache.path());
+  const std::vector<Truth> truths = play_motion(spec, plan, *gel);
+  const VisibleGel visible(*gel, gel_body(spec.device));
+  const std::vector<VisibleObject> objects = visible_objects(spec);
+
+  const fem::PressState& pressed = truths.back().press;
+  const ContactPressure pressure = visible.pressure_on(pressed, 0);
+  double force = 0.0;
+  for (const auto& t : pressure.triangles) {
+    const Eigen::Vector2d ab = pressure.places[t[1]] - pressure.places[t[0]];
+    const Eigen::Vector2d ac = pressure.places[t[2]] - pressure.places[t[0]];
+    const double area = 0.5 * std::abs(ab.x() * ac.y() - ab.y() * ac.x());
+    force += 1e-3 * area * (pressure.kPa[t[0]] + pressure.kPa[t[1]] + pressure.kPa[t[2]]) / 3.0;
+  }
+  // The surface's stretch is left out by tractions, which are those of the undeformed gel.
+  EXPECT_NEAR(force / pressed.wrench[2], 1.0, 0.05);
+  for (const double kPa : visible.pressure_on(pressed, 1).kPa) EXPECT_EQ(kPa, 0.0);
+
+  // Surfaces: the gel, its frame, the two objects.
+  const auto at = [&](const Truth& truth, std::size_t object, double x) {
+    const render::Scene scene = visible_scene(spec, plan, objects, visible, truth.press);
+    return *scene.surfaces.at(2 + object).print->picture->at({x, 0.01});
+  };
+  EXPECT_NEAR(at(truths.front(), 0, 0.0), 0.4, 1e-6);
+  EXPECT_NEAR(at(truths.back(), 0, 0.0), 0.8, 1e-6);
+  EXPECT_NEAR(at(truths.back(), 0, 0.95), 0.3, 1e-6);
+  EXPECT_NEAR(at(truths.back(), 1, 0.0), 0.4, 1e-6);
+  Plan without = plan;
+  without.object_print = without.skin_blanching = false;
+  EXPECT_FALSE(visible_scene(spec, without, objects, visible, truths.back().press).surfaces.at(2).print);
+}
+
+// With fine relief what the gel wets is a sheet of its own: it has the object's print in the object's coordinates.
+TEST(PrintOfAnObject, IsOnTheWettedSheetOfAFineRelief) {
+  SceneSpec spec;
+  spec.device = test::small_device();
+  spec.object = parse_yaml<ObjectSpec>(
+      "name: ribbed\nshape: {type: sphere, radius_mm: 4}\nalbedo: 0.8\nrelief: {type: waves, amplitude_um: 20, "
+      "pitch_mm: "
+      "0.5}\nprint:\n  - {type: specks, count: 5, diameters_mm: [0.3], size_mm: [1, 1]}\n",
+      "ribbed.yaml");
+  spec.motion = parse_yaml<MotionSpec>("start_mm: [0.5, -0.3, 3.8]\nkeys: []\n", "m.yaml");
+  spec.membrane.pixel_um = 100;
+  const Plan plan = make_plan(spec);
+  ASSERT_TRUE(plan.fine_relief && plan.object_print);
+  const test::TemporaryFolder cache;
+  const auto gel = set_up_gel(spec.device, cache.path());
+  const fem::PressState press = play_motion(spec, plan, *gel).back().press;
+  const SceneSight sight(spec, plan, *gel);
+  const auto relief = sight.relief(press);
+  ASSERT_TRUE(relief);
+  const render::Scene scene = sight.seen(press, relief);
+  const render::Surface& wet = scene.surfaces.back();
+  ASSERT_FALSE(wet.mesh.triangles.empty());
+  ASSERT_TRUE(wet.print && scene.surfaces.at(2).print);
+  EXPECT_EQ(wet.print->marks.size(), 5u);
+  ASSERT_EQ(wet.print->material_mm.size(), wet.mesh.vertices.size());
+  for (std::size_t i = 0; i < wet.mesh.vertices.size(); ++i) {
+    const Eigen::Vector2d expected = wet.mesh.vertices[i].head<2>() - Eigen::Vector2d(0.5, -0.3);
+    EXPECT_NEAR((wet.print->material_mm[i] - expected).norm(), 0.0, 1e-9);
+  }
 }
 
 }  // namespace
