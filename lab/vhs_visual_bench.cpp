@@ -20,6 +20,7 @@ std::vector<VhsPicture> vhs_pictures(sim::SceneSpec scene, const std::vector<int
   constexpr int kFirstFrame = 4;
   scene.light.max_samples = std::max(1, paths / kFirstFrame);
   scene.light.min_samples = scene.light.max_samples;
+  scene.effects.shared_paths = sim::Switch::off;  // colours and divisions are read by means over pixels of their own
   scene.outputs = {};
   scene.outputs.radiance = true;
   const sim::Plan plan = sim::make_plan(scene);

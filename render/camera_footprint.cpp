@@ -12,7 +12,10 @@
 namespace touchstone::render {
 namespace {
 
-constexpr int kHoleSide = 16;  // places in the hole along each side of (u, v)
+// Places in the hole along each side of (u, v). Over a wide footprint so few would lie several pixels from each other.
+constexpr int kHoleSide = 16;
+constexpr int kWideHoleSide = 24;
+constexpr double kWide = 8.0;  // pixels
 
 /// Places in the picture whose central rays meet the surface where the rays through all of the hole do, relative to
 /// the pixel, and what each weighs (in all 1).
@@ -30,7 +33,8 @@ std::optional<Eigen::Vector2d> place_at(const std::optional<LayerRay>& ray, doub
   return Eigen::Vector2d(at.x(), at.y());
 }
 
-Spread spread_at(const Scene& fixture, const ReadyCamera& camera, int layer, const Eigen::Vector2d& pixel, double z) {
+Spread spread_at(const Scene& fixture, const ReadyCamera& camera, int layer, const Eigen::Vector2d& pixel, double z,
+                 int hole_side) {
   Spread spread;
   spread.offsets = {Eigen::Vector2d::Zero()};
   spread.weights = {1.0};
@@ -50,9 +54,9 @@ Spread spread_at(const Scene& fixture, const ReadyCamera& camera, int layer, con
   const Eigen::Matrix2d pixel_per_place = place_per_pixel.inverse();
   Spread made;
   double whole = 0.0;
-  for (int i = 0; i < kHoleSide; ++i) {
-    for (int j = 0; j < kHoleSide; ++j) {
-      const auto one = ray(0, 0, (i + 0.5) / kHoleSide, (j + 0.5) / kHoleSide);
+  for (int i = 0; i < hole_side; ++i) {
+    for (int j = 0; j < hole_side; ++j) {
+      const auto one = ray(0, 0, (i + 0.5) / hole_side, (j + 0.5) / hole_side);
       const auto at = place_at(one, z);
       if (!at) continue;
       made.offsets.emplace_back(pixel_per_place * (*at - *middle));
@@ -61,7 +65,7 @@ Spread spread_at(const Scene& fixture, const ReadyCamera& camera, int layer, con
     }
   }
   if (!(whole > 0.0)) return spread;
-  made.gain = whole / (kHoleSide * kHoleSide) / central->weight;
+  made.gain = whole / (hole_side * hole_side) / central->weight;
   for (std::size_t k = 0; k < made.offsets.size(); ++k) {
     made.weights[k] /= whole;
     made.mean += made.weights[k] * made.offsets[k];
@@ -151,19 +155,29 @@ std::vector<Eigen::Vector2d> footprint_blocks(const ReadyCamera& camera, int blo
 }
 
 CameraFootprint make_footprint(const Scene& fixture, const ReadyCamera& camera, int layer,
-                               const std::vector<double>& surface_z, int block, double rays_across) {
+                               const std::vector<double>& surface_z, int block, double rays_across, int most_spacing) {
   const std::vector<Eigen::Vector2d> middles = footprint_blocks(camera, block);
   TS_ASSERT(surface_z.size() == middles.size());
   std::vector<Spread> spreads(middles.size());
-  tbb::parallel_for(std::size_t{0}, middles.size(),
-                    [&](std::size_t k) { spreads[k] = spread_at(fixture, camera, layer, middles[k], surface_z[k]); });
+  const auto spread_all = [&](int hole_side) {
+    tbb::parallel_for(std::size_t{0}, middles.size(), [&](std::size_t k) {
+      spreads[k] = spread_at(fixture, camera, layer, middles[k], surface_z[k], hole_side);
+    });
+  };
   // A disc of diameter D has the variance D^2 / 16 along each axis.
-  double narrowest = INFINITY;
-  for (const Spread& spread : spreads) narrowest = std::min(narrowest, 4.0 * std::sqrt(spread.variance.minCoeff()));
+  const auto least_width = [&] {
+    double least = INFINITY;
+    for (const Spread& spread : spreads) least = std::min(least, 4.0 * std::sqrt(spread.variance.minCoeff()));
+    return least;
+  };
+  spread_all(kHoleSide);
+  if (least_width() > kWide) spread_all(kWideHoleSide);
+  const double narrowest = least_width();
   CameraFootprint made;
   made.block = block;
   made.narrowest = narrowest;
-  while (made.spacing < 8 && block % (2 * made.spacing) == 0 && narrowest >= rays_across * 2 * made.spacing) {
+  while (made.spacing < most_spacing && block % (2 * made.spacing) == 0 &&
+         narrowest >= rays_across * 2 * made.spacing) {
     made.spacing *= 2;
   }
   const Eigen::Vector2i size = size_of(camera);
@@ -193,6 +207,16 @@ CameraFootprint make_footprint(const Scene& fixture, const ReadyCamera& camera, 
 const CameraFootprint::Kernel& CameraFootprint::kernel_at(int row, int column) const {
   const int phases = spacing * spacing;
   return kernels[static_cast<std::size_t>(block_at(row, column)) * phases + row % spacing * spacing + column % spacing];
+}
+
+void CameraFootprint::widen(int points) {
+  TS_ASSERT(points >= margin);
+  const int more = points - margin;
+  margin = points;
+  grid.left -= more * grid.spacing;
+  grid.top -= more * grid.spacing;
+  grid.columns += 2 * more;
+  grid.rows += 2 * more;
 }
 
 float CameraFootprint::sum_of_squares(int row, int column) const {

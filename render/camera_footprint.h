@@ -40,6 +40,9 @@ struct CameraFootprint {
   /// lie in one block's columns, for one phase: out[k] belongs to pixel left + k * spacing.
   void spread(const float* picture, int row, int left, int count, float* out) const;
 
+  /// Makes the grid wider on each side, to `points` beside the picture. @pre points >= margin
+  void widen(int points);
+
   /// The sum of a pixel's squared weights: what is left of the variance of independent points.
   float sum_of_squares(int row, int column) const;
 
@@ -48,9 +51,11 @@ struct CameraFootprint {
 };
 
 /// The footprint of a camera on `surface_z`, the height of what it looks at, by block of the grid of `block` pixels;
-/// with `rays_across` central rays along the narrowest footprint at least, or one a pixel.
+/// with `rays_across` central rays along the narrowest footprint at least, or one a pixel, and `most_spacing` pixels
+/// from one to the next at most.
 CameraFootprint make_footprint(const Scene& fixture, const ReadyCamera& camera, int layer,
-                               const std::vector<double>& surface_z, int block, double rays_across);
+                               const std::vector<double>& surface_z, int block, double rays_across,
+                               int most_spacing = 8);
 
 /// The blocks that make_footprint works on, their middles (pixels).
 std::vector<Eigen::Vector2d> footprint_blocks(const ReadyCamera& camera, int block);

@@ -294,7 +294,8 @@ std::uint32_t z_order(int column, int row) {
 
 template <int N, typename AnyCamera>
 cv::Mat central_image(const PreparedScene<N>& scene, const AnyCamera& camera, const ImageGrid& grid,
-                      const RenderSettings& settings, RayCounts& all_counts) {
+                      const cv::Mat& paths, const RenderSettings& settings, RayCounts& all_counts) {
+  constexpr std::uint64_t kSeveralPaths = 0x9d2c5680f3a1b7e5ull;
   cv::Mat image = cv::Mat::zeros(grid.rows, grid.columns, CV_32FC(N));
   const PathIntegrator<N> integrator(scene, settings.max_depth, scene.interreflection);
   const Eigen::Vector3d eye = camera.gel_from_camera.translation;
@@ -309,18 +310,26 @@ cv::Mat central_image(const PreparedScene<N>& scene, const AnyCamera& camera, co
     for (int row = top; row < std::min(top + kTile, grid.rows); ++row) {
       auto* out = image.ptr<float>(row);
       for (int column = left; column < std::min(left + kTile, grid.columns); ++column) {
-        SampleSequence numbers(settings.seed, static_cast<std::uint64_t>(tile), z_order(column - left, row - top));
-        const auto [px, py] = numbers.next_pair();
-        numbers.next_pair();  // the place in the hole, which is its centre
-        const double x = grid.left + (column + px - 0.5) * grid.spacing;
-        const double y = grid.top + (row + py - 0.5) * grid.spacing;
-        const auto ray = camera_ray(camera, x, y, 0.5, 0.5);
-        if (!ray) continue;
-        ++counts.paths;
-        const Bands<N> basic = integrator.trace(camera.gel_from_camera * ray->origin,
-                                                camera.gel_from_camera.turn(ray->direction), numbers, counts);
+        const int count = paths.empty() ? 1 : std::max<int>(1, paths.at<unsigned char>(row, column));
+        const std::uint32_t place = z_order(column - left, row - top);
+        Bands<N> sum = Bands<N>::Zero();
+        for (int i = 0; i < count; ++i) {
+          SampleSequence numbers =
+              count == 1 ? SampleSequence(settings.seed, static_cast<std::uint64_t>(tile), place)
+                         : SampleSequence(settings.seed ^ kSeveralPaths, std::uint64_t{kTile * kTile} * tile + place,
+                                          static_cast<std::uint32_t>(i));
+          const auto [px, py] = numbers.next_pair();
+          numbers.next_pair();  // the place in the hole, which is its centre
+          const double x = grid.left + (column + px - 0.5) * grid.spacing;
+          const double y = grid.top + (row + py - 0.5) * grid.spacing;
+          const auto ray = camera_ray(camera, x, y, 0.5, 0.5);
+          if (!ray) continue;
+          ++counts.paths;
+          sum += integrator.trace(camera.gel_from_camera * ray->origin, camera.gel_from_camera.turn(ray->direction),
+                                  numbers, counts);
+        }
         for (int band = 0; band < N; ++band) {
-          out[N * column + band] = static_cast<float>(basic[band] * camera_index * camera_index);
+          out[N * column + band] = static_cast<float>(sum[band] * (camera_index * camera_index / count));
         }
       }
     }
@@ -412,12 +421,13 @@ cv::Mat Tracer::preview(const Camera& camera, int stride) const {
                     prepared_->scene, ready);
 }
 
-cv::Mat Tracer::central_paths(const Camera& camera, const ImageGrid& grid, const RenderSettings& settings,
-                              RayCounts& counts) const {
+cv::Mat Tracer::central_paths(const Camera& camera, const ImageGrid& grid, const cv::Mat& paths,
+                              const RenderSettings& settings, RayCounts& counts) const {
   const ReadyCamera ready = make_ready(camera);
   check_settings(settings, prepared_->bands);
+  TS_ASSERT(paths.empty() || (paths.type() == CV_8UC1 && paths.rows == grid.rows && paths.cols == grid.columns));
   return std::visit(
-      [&](const auto& scene, const auto& one) { return central_image(*scene, one, grid, settings, counts); },
+      [&](const auto& scene, const auto& one) { return central_image(*scene, one, grid, paths, settings, counts); },
       prepared_->scene, ready);
 }
 

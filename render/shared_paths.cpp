@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <opencv2/imgproc.hpp>
 #include <vector>
 
 #include "core/error.h"
@@ -14,48 +15,156 @@ namespace touchstone::render {
 namespace {
 
 constexpr int kBlock = 32;  // pixels in which the footprint is the same
+constexpr int kPreviewStride = 4;
+constexpr double kEdge = 2.0;  // of the imager's noise: what neighbouring points of the preview may differ by
+constexpr unsigned char kPathsAtEdges = 8;
 
-/// A block's own pixel of first hits, or the nearest height known.
-std::vector<double> heights_of_blocks(const std::vector<FirstHit>& hits, const std::vector<Eigen::Vector2d>& middles,
-                                      int width) {
-  std::vector<double> heights;
-  std::vector<std::size_t> unknown;
-  double sum = 0.0;
-  for (const Eigen::Vector2d& middle : middles) {
-    const FirstHit& hit = hits[static_cast<std::size_t>(middle.y()) * width + static_cast<std::size_t>(middle.x())];
-    if (hit.object < 0) unknown.push_back(heights.size());
-    heights.push_back(hit.object < 0 ? 0.0 : hit.position.z());
-    sum += heights.back();
+constexpr int kHitStride = 8;         // pixels from one to the next of the first hits that tell heights
+constexpr double kHeightStep = 0.01;  // of the distance: half of it is what the blur may be off by
+constexpr int kMostHeights = 16;
+constexpr int kMostSpacing = 8;  // pixels
+
+/// First hits of one pixel in kHitStride x kHitStride.
+struct CoarseHits {
+  int columns, rows;
+  std::vector<FirstHit> hits;
+
+  CoarseHits(const Scene& scene, const PinholeCamera& camera) {
+    PinholeCamera coarse = camera;
+    coarse.width = columns = std::max(1, camera.width / kHitStride);
+    coarse.height = rows = std::max(1, camera.height / kHitStride);
+    coarse.pixel_pitch_um *= kHitStride;
+    hits = first_hits(scene, coarse);
   }
-  const std::size_t known = heights.size() - unknown.size();
-  for (const std::size_t block : unknown) heights[block] = known > 0 ? sum / static_cast<double>(known) : 0.0;
-  return heights;
-}
+};
+
+struct HeightRange {
+  double low = INFINITY, high = -INFINITY;
+  void add(const FirstHit& hit) {
+    if (hit.object < 0) return;
+    low = std::min(low, hit.position.z());
+    high = std::max(high, hit.position.z());
+  }
+  bool known() const { return low <= high; }
+};
 
 }  // namespace
 
-SharedPaths::SharedPaths(const Scene& rest, const PinholeCamera& camera, int least_paths) : camera_(camera) {
-  TS_ASSERT(least_paths >= 1);
-  const std::vector<Eigen::Vector2d> middles = footprint_blocks(camera, kBlock);
-  const std::vector<double> heights = heights_of_blocks(first_hits(rest, camera), middles, camera.width);
-  const double middle_height = heights[heights.size() / 2];
+SharedPaths::SharedPaths(std::span<const Scene> examples, const PinholeCamera& camera, int least_paths)
+    : camera_(camera) {
+  TS_ASSERT(least_paths >= 1 && !examples.empty());
+  HeightRange range;
+  for (const Scene& scene : examples) {
+    for (const FirstHit& hit : CoarseHits(scene, camera).hits) range.add(hit);
+  }
+  if (!range.known()) range = {0.0, 0.0};
+  const double distance = std::abs(camera.gel_from_camera.translation.z() - 0.5 * (range.low + range.high));
+  const int steps =
+      std::clamp(static_cast<int>(std::ceil((range.high - range.low) / std::max(1e-6, kHeightStep * distance))), 0,
+                 kMostHeights - 1);
   int layer = 0;
-  for (const FlatFace& face : rest.faces) layer += face.z < middle_height ? 1 : 0;
-  footprint_ = make_footprint(rest, camera, layer, heights, kBlock, std::sqrt(4.0 / std::numbers::pi * least_paths));
+  for (const FlatFace& face : examples.front().faces) layer += face.z < range.low ? 1 : 0;
+  const std::size_t blocks = footprint_blocks(camera, kBlock).size();
+  // From the camera's far end on, where the footprint is narrowest.
+  int margin = 0;
+  for (int i = 0; i <= steps; ++i) {
+    const double height = range.high + (range.low - range.high) * i / std::max(1, steps);
+    heights_.push_back(height);
+    footprints_.push_back(make_footprint(examples.front(), camera, layer, std::vector<double>(blocks, height), kBlock,
+                                         std::sqrt(4.0 / std::numbers::pi * least_paths),
+                                         i == 0 ? kMostSpacing : footprints_.front().spacing));
+    margin = std::max(margin, footprints_.back().margin);
+  }
+  for (CameraFootprint& footprint : footprints_) footprint.widen(margin);
   weight_ = cv::Mat::zeros(camera.height, camera.width, CV_32FC1);
+  const CameraFootprint& footprint = footprints_[footprints_.size() / 2];
   for (int row = 0; row < camera.height; ++row) {
     for (int column = 0; column < camera.width; ++column) {
       if (const auto ray = pinhole_ray(camera, column + 0.5, row + 0.5, 0.5, 0.5)) {
         weight_.at<float>(row, column) =
-            static_cast<float>(ray->weight) * footprint_.gain[footprint_.block_at(row, column)];
+            static_cast<float>(ray->weight) * footprint.gain[footprint.block_at(row, column)];
       }
     }
   }
 }
 
-RenderedImage SharedPaths::render(const Tracer& tracer, const RenderSettings& settings, bool with_error) const {
+/// By block: the footprint of the height in the middle of what lies in it or as far beside it as points are spread.
+std::vector<std::size_t> SharedPaths::footprints_of_blocks(const Scene& scene) const {
+  const CameraFootprint& any = footprints_.front();
+  std::vector<std::size_t> chosen(any.gain.size(), footprints_.size() / 2);
+  if (footprints_.size() < 2) return chosen;
+  const CoarseHits seen(scene, camera_);
+  const int reach = any.margin * any.spacing;
+  const double step = (heights_.back() - heights_.front()) / static_cast<double>(heights_.size() - 1);
+  for (std::size_t block = 0; block < chosen.size(); ++block) {
+    const int left = static_cast<int>(block) % any.blocks_across * kBlock;
+    const int top = static_cast<int>(block) / any.blocks_across * kBlock;
+    HeightRange range;
+    const int last_row = std::min(seen.rows - 1, (top + kBlock + reach) / kHitStride);
+    const int last_column = std::min(seen.columns - 1, (left + kBlock + reach) / kHitStride);
+    for (int row = std::max(0, top - reach) / kHitStride; row <= last_row; ++row) {
+      for (int column = std::max(0, left - reach) / kHitStride; column <= last_column; ++column) {
+        range.add(seen.hits[static_cast<std::size_t>(row) * seen.columns + column]);
+      }
+    }
+    if (!range.known()) continue;
+    const double place = std::round((0.5 * (range.low + range.high) - heights_.front()) / step);
+    chosen[block] = static_cast<std::size_t>(std::clamp(place, 0.0, static_cast<double>(heights_.size() - 1)));
+  }
+  return chosen;
+}
+
+/// More paths where a preview has edges: what changes from point to point makes more noise than what doesn't, and
+/// shared noise isn't averaged away between neighbours. The preview has no noise of its own, so that choosing by it
+/// favours no light.
+cv::Mat SharedPaths::paths_of_points(const Tracer& tracer, const RenderSettings& settings) const {
+  const ImageGrid& grid = footprints_.front().grid;
+  cv::Mat paths(grid.rows, grid.columns, CV_8UC1, cv::Scalar(1));
+  if (!settings.noise) return paths;
+  const NoiseTarget& noise = *settings.noise;
+  const cv::Mat preview = tracer.preview(camera_, kPreviewStride);
+  cv::Mat electrons(preview.size(), CV_32FC1);
+  const int bands = preview.channels();
+  for (int row = 0; row < preview.rows; ++row) {
+    for (int column = 0; column < preview.cols; ++column) {
+      double sum = 0.0;
+      for (int band = 0; band < bands; ++band) {
+        sum += noise.electrons_per_irradiance[band] * preview.ptr<float>(row)[bands * column + band];
+      }
+      electrons.at<float>(row, column) = static_cast<float>(sum);
+    }
+  }
+  cv::Mat least, most;
+  cv::erode(electrons, least, cv::Mat());
+  cv::dilate(electrons, most, cv::Mat());
+  cv::Mat edges(preview.size(), CV_8UC1, cv::Scalar(0));
+  for (int row = 0; row < preview.rows; ++row) {
+    for (int column = 0; column < preview.cols; ++column) {
+      const double imager_noise =
+          std::sqrt(std::max(0.0f, electrons.at<float>(row, column)) + noise.read_noise_e * noise.read_noise_e +
+                    noise.quantisation_e * noise.quantisation_e);
+      if (most.at<float>(row, column) - least.at<float>(row, column) > kEdge * imager_noise) {
+        edges.at<unsigned char>(row, column) = 1;
+      }
+    }
+  }
+  for (int row = 0; row < grid.rows; ++row) {
+    const int from_row =
+        std::clamp(static_cast<int>((grid.top + row * grid.spacing) / kPreviewStride), 0, edges.rows - 1);
+    for (int column = 0; column < grid.columns; ++column) {
+      const int from =
+          std::clamp(static_cast<int>((grid.left + column * grid.spacing) / kPreviewStride), 0, edges.cols - 1);
+      if (edges.at<unsigned char>(from_row, from) != 0) paths.at<unsigned char>(row, column) = kPathsAtEdges;
+    }
+  }
+  return paths;
+}
+
+RenderedImage SharedPaths::render(const Scene& scene, const Tracer& tracer, const RenderSettings& settings,
+                                  bool with_error) const {
   RenderedImage image;
-  const cv::Mat points = tracer.central_paths(camera_, footprint_.grid, settings, image.counts);
+  const cv::Mat paths = paths_of_points(tracer, settings);
+  const cv::Mat points = tracer.central_paths(camera_, footprints_.front().grid, paths, settings, image.counts);
   const int bands = points.channels();
   const int planes = bands + (with_error ? 2 : 0);  // and the sum over the bands and its square
   const auto count = static_cast<std::size_t>(points.total());
@@ -77,24 +186,26 @@ RenderedImage SharedPaths::render(const Tracer& tracer, const RenderSettings& se
   });
   image.irradiance.create(camera_.height, camera_.width, CV_32FC(bands));
   if (with_error) image.standard_error.create(camera_.height, camera_.width, CV_32FC1);
-  const int side = footprint_.spacing;
+  const std::vector<std::size_t> chosen = footprints_of_blocks(scene);
+  const int side = footprints_.front().spacing;
   tbb::parallel_for(0, camera_.height, [&](int row) {
-    std::vector<float> line(static_cast<std::size_t>(planes) * footprint_.block);
+    std::vector<float> line(static_cast<std::size_t>(planes) * kBlock);
     const auto* weight = weight_.ptr<float>(row);
     auto* out = image.irradiance.ptr<float>(row);
     auto* error = with_error ? image.standard_error.ptr<float>(row) : nullptr;
-    for (int left = 0; left < camera_.width; left += footprint_.block) {
-      const int right = std::min(camera_.width, left + footprint_.block);
+    for (int left = 0; left < camera_.width; left += kBlock) {
+      const CameraFootprint& footprint = footprints_[chosen[footprints_.front().block_at(row, left)]];
+      const int right = std::min(camera_.width, left + kBlock);
       for (int phase = left; phase < std::min(left + side, right); ++phase) {
         const int pixels = (right - phase + side - 1) / side;
         for (int plane = 0; plane < planes; ++plane) {
-          footprint_.spread(by_plane.data() + plane * count, row, phase, pixels,
-                            line.data() + static_cast<std::size_t>(plane) * footprint_.block);
+          footprint.spread(by_plane.data() + plane * count, row, phase, pixels,
+                           line.data() + static_cast<std::size_t>(plane) * kBlock);
         }
-        const float share = with_error ? footprint_.sum_of_squares(row, phase) : 0.0f;
+        const float share = with_error ? footprint.sum_of_squares(row, phase) : 0.0f;
         for (int k = 0; k < pixels; ++k) {
           const int column = phase + k * side;
-          const auto value = [&](int plane) { return line[static_cast<std::size_t>(plane) * footprint_.block + k]; };
+          const auto value = [&](int plane) { return line[static_cast<std::size_t>(plane) * kBlock + k]; };
           for (int band = 0; band < bands; ++band) out[bands * column + band] = weight[column] * value(band);
           if (!with_error) continue;
           const float variance = std::max(0.0f, value(bands + 1) - value(bands) * value(bands));

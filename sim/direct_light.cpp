@@ -48,15 +48,6 @@ Eigen::AlignedBox3d displacements(std::span<const Truth> truths) {
   return box;
 }
 
-const Truth& deepest(std::span<const Truth> truths) {
-  const auto depth = [](const Truth& truth) {
-    const auto& moved = truth.press.surface_displacement;
-    return moved.rows() == 0 ? 0.0 : moved.col(2).minCoeff();
-  };
-  return *std::min_element(truths.begin(), truths.end(),
-                           [&](const Truth& a, const Truth& b) { return depth(a) < depth(b); });
-}
-
 /// The box that lit things stay in.
 Eigen::AlignedBox3d reach_of(const render::Scene& rest, const render::Scene& pressed, std::span<const Truth> truths,
                              double back_z) {

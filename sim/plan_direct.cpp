@@ -57,17 +57,18 @@ void plan_shared_paths(const SceneSpec& scene, Plan& plan, PlanTable& table) {
   std::string unfit;
   if (plan.scattering) unfit = "the gel scatters light, which has no one depth";
   if (!wide) {
-    unfit = fmt::format("the camera's hole makes points {:.2g} pixels wide; below {:.2g} each pixel needs its own paths",
-                        width_px, kWidePoint_px);
+    unfit =
+        fmt::format("the camera's hole makes points {:.2g} pixels wide; below {:.2g} each pixel needs its own paths",
+                    width_px, kWidePoint_px);
   }
   if (scene.device.camera->type == CameraType::lens) unfit = "through a lens the blur depends on the depth";
   if (forced == Switch::on && !unfit.empty()) fail_at(scene.where, "effects.shared_paths: on, but {}", unfit);
   plan.shared_paths = table.add(
       name, forced, unfit.empty() && !plan.direct_light,
       plan.direct_light ? "direct light has no paths"
-      : !unfit.empty()  ? unfit
-                        : fmt::format("the hole makes points at least {:.2g} pixels wide: neighbours see the same places",
-                                      width_px),
+      : !unfit.empty()
+          ? unfit
+          : fmt::format("the hole makes points at least {:.2g} pixels wide: neighbours see the same places", width_px),
       "one path a pixel or fewer, in place of some for each pixel that changes");
 }
 

@@ -167,7 +167,7 @@ struct VirtualCamera::Parts : SceneSight {
     const render::Scene seen_now = seen(truth.press, now);
     const render::Tracer at_once(seen_now);
     if (shared && !whole) {
-      const render::RenderedImage image = shared->render(at_once, settings, scene.outputs.error);
+      const render::RenderedImage image = shared->render(seen_now, at_once, settings, scene.outputs.error);
       return develop(image.irradiance, image.standard_error, truth, now, image.counts, size.area());
     }
     KnownLight light = nothing_known();
@@ -238,8 +238,8 @@ struct VirtualCamera::Parts : SceneSight {
       RandomStream seeds(scene.seed, i, Purpose::kMotion);
       of_moment.seed = (std::uint64_t{seeds()} << 32) | seeds();
       const render::Tracer tracer(scenes[i]);
-      const render::RenderedImage image = shares ? shared->render(tracer, of_moment, true)
-                                                 : tracer.render(camera, of_moment, light.missing);
+      const render::RenderedImage image =
+          shares ? shared->render(scenes[i], tracer, of_moment, true) : tracer.render(camera, of_moment, light.missing);
       sum.add(i, image.irradiance, image.standard_error);
       counts += image.counts;
     }
@@ -248,6 +248,15 @@ struct VirtualCamera::Parts : SceneSight {
                    static_cast<std::int64_t>(times.size()) * pixels);
   }
 };
+
+const Truth& deepest(std::span<const Truth> truths) {
+  const auto depth = [](const Truth& truth) {
+    const auto& moved = truth.press.surface_displacement;
+    return moved.rows() == 0 ? 0.0 : moved.col(2).minCoeff();
+  };
+  return *std::min_element(truths.begin(), truths.end(),
+                           [&](const Truth& a, const Truth& b) { return depth(a) < depth(b); });
+}
 
 VirtualCamera::VirtualCamera(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel,
                              std::span<const Truth> truths) {
@@ -267,9 +276,11 @@ VirtualCamera::VirtualCamera(const SceneSpec& scene, const Plan& plan, const fem
     }
   }
   if (plan.shared_paths) {
-    const fem::PressState& first = truths.front().press;
-    parts->shared.emplace(parts->seen(first, parts->relief(first)), std::get<render::PinholeCamera>(parts->camera),
-                          parts->scene.light.max_samples);
+    std::vector<render::Scene> examples;
+    for (const Truth* truth : {&truths.front(), &deepest(truths)}) {
+      examples.push_back(parts->seen(truth->press, parts->relief(truth->press)));
+    }
+    parts->shared.emplace(examples, std::get<render::PinholeCamera>(parts->camera), parts->scene.light.max_samples);
     parts_ = std::move(parts);
     return;
   }

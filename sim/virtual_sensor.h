@@ -38,6 +38,9 @@ struct Truth {
                                   ///< in order, to the first at or after the exposure's end or the motion's end
 };
 
+/// The one whose gel is pressed deepest. @pre there is one
+const Truth& deepest(std::span<const Truth> truths);
+
 /// How a camera's light is computed, and why.
 struct LightChoice {
   bool direct = false;                       ///< from a light field (render/direct_renderer.h); else by path tracing

@@ -237,6 +237,84 @@ TEST(VirtualCamera, ThePartialFrameAgreesWithTheWholeOneInEachColourOfABinnedPix
   expect_partial_frame_agrees(p, 2);
 }
 
+/// The small device with pixels so small that a point is some 10 of them wide.
+Played play_behind_a_wide_hole(const std::string& keys) {
+  Played p = play(keys);
+  CameraSpec& camera = *p.scene.device.camera;
+  camera.width = 112;
+  camera.height = 84;
+  camera.pixel_pitch_um = 10.0;
+  camera.exposure_us = 2000.0;
+  p.scene.outputs = {.frames = false, .ideal = false, .radiance = true};
+  p.scene.light.max_samples = 64;
+  p.plan = make_plan(p.scene);
+  return p;
+}
+
+double rms_difference(const cv::Mat& a, const cv::Mat& b) {
+  return cv::norm(a, b, cv::NORM_L2) / std::sqrt(static_cast<double>(a.total()) * a.channels()) / cv::mean(b)[0];
+}
+
+// Behind a wide hole every frame is traced whole, with a path or so a pixel, and yet is nearer to many paths a pixel
+// than what keys and traced pixels give.
+TEST(VirtualCamera, BehindAWideHolePixelsShareTheirPaths) {
+  const Played p = play_behind_a_wide_hole("  - {frames: 2, z: {force_N: 1}}\n");
+  ASSERT_TRUE(p.plan.shared_paths);
+  const VirtualCamera camera(p.scene, p.plan, *p.gel, p.truths);
+  const Capture shared = camera.capture(p.truths.back());
+  SceneSpec by_keys = p.scene;
+  by_keys.effects.shared_paths = Switch::off;
+  const Plan plan = make_plan(by_keys);
+  ASSERT_FALSE(plan.shared_paths);
+  const VirtualCamera keys(by_keys, plan, *p.gel, p.truths.front());
+  const Capture traced = keys.capture(p.truths.back());
+  EXPECT_LT(shared.paths_traced, traced.paths_traced);
+  SceneSpec many = by_keys;
+  many.light.min_samples = many.light.max_samples = 128;
+  many.seed = 1;
+  const cv::Mat truth = VirtualCamera(many, plan, *p.gel, p.truths.front()).capture_whole(p.truths.back()).radiance;
+  const double off = rms_difference(shared.radiance, truth);
+  EXPECT_LT(off, 0.015) << "with the reference's own noise";
+  EXPECT_LT(off, rms_difference(traced.radiance, truth));
+}
+
+// Of a moving frame each moment shares its paths.
+TEST(VirtualCamera, MotionBlurBehindAWideHole) {
+  Played p =
+      play_behind_a_wide_hole("  - {frames: 2, z: {position_mm: -0.3}}\n  - {frames: 2, x: {position_mm: 0.3}}\n");
+  p.scene.effects.motion_blur = Switch::on;
+  p.plan = make_plan(p.scene);
+  const std::vector<Truth> truths = play_motion(p.scene, p.plan, *p.gel);
+  const Truth& moving = truths[3];
+  ASSERT_FALSE(moving.later.empty());
+  const VirtualCamera camera(p.scene, p.plan, *p.gel, truths);
+  const Capture shared = camera.capture(moving);
+  const Capture whole = camera.capture_whole(moving);
+  EXPECT_LT(shared.paths_traced, whole.paths_traced);
+  EXPECT_LT(rms_difference(shared.radiance, whole.radiance), 0.03) << "with the whole frame's noise";
+}
+
+TEST(VirtualCamera, SharedPathsAreRefusedWhereTheyDoNotHold) {
+  const auto message = [](SceneSpec scene) {
+    scene.effects.shared_paths = Switch::on;
+    try {
+      make_plan(scene);
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+    return std::string("no error");
+  };
+  const std::string keys = "  - {frames: 2, z: {force_N: 1}}\n";
+  EXPECT_THAT(message(small_scene(keys)), HasSubstr("effects.shared_paths: on, but the camera's hole makes points"));
+  SceneSpec lens = small_scene(keys);
+  lens.device.camera->type = CameraType::lens;
+  lens.device.camera->focal_length_mm = 4.0;
+  lens.device.camera->f_number = 8.0;
+  lens.device.camera->focus_distance_mm = 16.0;
+  EXPECT_THAT(message(lens), HasSubstr("through a lens"));
+  EXPECT_EQ(message(play_behind_a_wide_hole(keys).scene), "no error");
+}
+
 TEST(VirtualCamera, AnObjectThatDoesNotMoveCostsNothing) {
   const Played p = play("  - {frames: 1, z: {position_mm: 0.5}}\n");
   const VirtualCamera camera(p.scene, p.plan, *p.gel, p.truths.front());
