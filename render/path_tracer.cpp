@@ -295,7 +295,7 @@ std::uint32_t z_order(int column, int row) {
 template <int N, typename AnyCamera>
 cv::Mat central_image(const PreparedScene<N>& scene, const AnyCamera& camera, const ImageGrid& grid,
                       const cv::Mat& paths, const RenderSettings& settings, RayCounts& all_counts) {
-  constexpr std::uint64_t kSeveralPaths = 0x9d2c5680f3a1b7e5ull;
+  constexpr std::uint64_t kOtherCount = 0x9d2c5680f3a1b7e5ull;  // points with as many paths share a sequence
   cv::Mat image = cv::Mat::zeros(grid.rows, grid.columns, CV_32FC(N));
   const PathIntegrator<N> integrator(scene, settings.max_depth, scene.interreflection);
   const Eigen::Vector3d eye = camera.gel_from_camera.translation;
@@ -312,12 +312,10 @@ cv::Mat central_image(const PreparedScene<N>& scene, const AnyCamera& camera, co
       for (int column = left; column < std::min(left + kTile, grid.columns); ++column) {
         const int count = paths.empty() ? 1 : std::max<int>(1, paths.at<unsigned char>(row, column));
         const std::uint32_t place = z_order(column - left, row - top);
+        const std::uint64_t seed = settings.seed + kOtherCount * static_cast<std::uint64_t>(count - 1);
         Bands<N> sum = Bands<N>::Zero();
-        for (int i = 0; i < count; ++i) {
-          SampleSequence numbers =
-              count == 1 ? SampleSequence(settings.seed, static_cast<std::uint64_t>(tile), place)
-                         : SampleSequence(settings.seed ^ kSeveralPaths, std::uint64_t{kTile * kTile} * tile + place,
-                                          static_cast<std::uint32_t>(i));
+        for (std::uint32_t i = 0; i < static_cast<std::uint32_t>(count); ++i) {
+          SampleSequence numbers(seed, static_cast<std::uint64_t>(tile), place * static_cast<std::uint32_t>(count) + i);
           const auto [px, py] = numbers.next_pair();
           numbers.next_pair();  // the place in the hole, which is its centre
           const double x = grid.left + (column + px - 0.5) * grid.spacing;

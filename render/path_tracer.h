@@ -93,10 +93,9 @@ class Tracer {
 
   /// Paths for each point of `grid`, through the centre of hole or lens, drawn over the square of the grid's spacing
   /// round the point; `paths` (CV_8UC1 of grid.rows x grid.columns; 0 is taken for 1; empty: one each) says how many.
-  /// Their mean, CV_32FC(N) of that size: radiance in the camera's medium, W/m^2/sr; 0 where no light passes. Where a
-  /// point has one path, numbers are stratified over neighbouring points, 16 by 16, so that a mean over them has less
-  /// noise than one over as many paths each by itself. Of the settings only `seed` and `max_depth` count. Adds to
-  /// `counts`.
+  /// Their mean, CV_32FC(N) of that size: radiance in the camera's medium, W/m^2/sr; 0 where no light passes. Numbers
+  /// are stratified over neighbouring points that have as many paths, 16 by 16, so that a mean over them has less noise
+  /// than one over as many paths each by itself. Of the settings only `seed` and `max_depth` count. Adds to `counts`.
   cv::Mat central_paths(const Camera& camera, const ImageGrid& grid, const cv::Mat& paths,
                         const RenderSettings& settings, RayCounts& counts) const;
 

@@ -17,7 +17,6 @@ namespace {
 constexpr int kBlock = 32;  // pixels in which the footprint is the same
 constexpr int kPreviewStride = 4;
 constexpr double kEdge = 2.0;  // of the imager's noise: what neighbouring points of the preview may differ by
-constexpr unsigned char kPathsAtEdges = 8;
 
 constexpr int kHitStride = 8;         // pixels from one to the next of the first hits that tell heights
 constexpr double kHeightStep = 0.01;  // of the distance: half of it is what the blur may be off by
@@ -38,6 +37,20 @@ struct CoarseHits {
   }
 };
 
+double electrons_of(const NoiseTarget& target, const float* light) {
+  double electrons = 0.0;
+  for (Eigen::Index band = 0; band < target.electrons_per_irradiance.size(); ++band) {
+    electrons += target.electrons_per_irradiance[band] * light[band];
+  }
+  return electrons;
+}
+
+/// Of the imager, in electrons, at a pixel's light.
+double noise_of(const NoiseTarget& target, const float* light) {
+  return std::sqrt(std::max(0.0, electrons_of(target, light)) + target.read_noise_e * target.read_noise_e +
+                   target.quantisation_e * target.quantisation_e);
+}
+
 struct HeightRange {
   double low = INFINITY, high = -INFINITY;
   void add(const FirstHit& hit) {
@@ -50,9 +63,9 @@ struct HeightRange {
 
 }  // namespace
 
-SharedPaths::SharedPaths(std::span<const Scene> examples, const PinholeCamera& camera, int least_paths)
+SharedPaths::SharedPaths(std::span<const Scene> examples, const PinholeCamera& camera, const RenderSettings& settings)
     : camera_(camera) {
-  TS_ASSERT(least_paths >= 1 && !examples.empty());
+  TS_ASSERT(settings.max_samples >= 1 && !examples.empty());
   HeightRange range;
   for (const Scene& scene : examples) {
     for (const FirstHit& hit : CoarseHits(scene, camera).hits) range.add(hit);
@@ -71,7 +84,7 @@ SharedPaths::SharedPaths(std::span<const Scene> examples, const PinholeCamera& c
     const double height = range.high + (range.low - range.high) * i / std::max(1, steps);
     heights_.push_back(height);
     footprints_.push_back(make_footprint(examples.front(), camera, layer, std::vector<double>(blocks, height), kBlock,
-                                         std::sqrt(4.0 / std::numbers::pi * least_paths),
+                                         std::sqrt(4.0 / std::numbers::pi * settings.max_samples),
                                          i == 0 ? kMostSpacing : footprints_.front().spacing));
     margin = std::max(margin, footprints_.back().margin);
   }
@@ -86,6 +99,30 @@ SharedPaths::SharedPaths(std::span<const Scene> examples, const PinholeCamera& c
       }
     }
   }
+  if (settings.noise) paths_ = paths_called_for(examples.back(), settings);
+}
+
+/// Noise of neighbours that share it isn't averaged away over them.
+int SharedPaths::paths_called_for(const Scene& example, const RenderSettings& settings) const {
+  const NoiseTarget& noise = *settings.noise;
+  const RenderedImage image = render(example, Tracer(example), settings, true);
+  std::vector<double> squares;  // of the error, in units of what is allowed
+  squares.reserve(image.standard_error.total());
+  const double electrons_per_irradiance = noise.electrons_per_irradiance.mean();
+  const std::ptrdiff_t bands = image.irradiance.channels();
+  for (int row = 0; row < image.standard_error.rows; ++row) {
+    for (int column = 0; column < image.standard_error.cols; ++column) {
+      const double allowed =
+          kSharedPart * noise.fraction * noise_of(noise, image.irradiance.ptr<float>(row) + bands * column);
+      const double error = electrons_per_irradiance * image.standard_error.at<float>(row, column);
+      squares.push_back(error * error / (allowed * allowed));
+    }
+  }
+  const auto middle = squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2);
+  std::nth_element(squares.begin(), middle, squares.end());
+  int paths = 1;
+  while (paths < kMostPaths && paths < *middle) paths *= 2;
+  return paths;
 }
 
 /// By block: the footprint of the height in the middle of what lies in it or as far beside it as points are spread.
@@ -119,19 +156,16 @@ std::vector<std::size_t> SharedPaths::footprints_of_blocks(const Scene& scene) c
 /// favours no light.
 cv::Mat SharedPaths::paths_of_points(const Tracer& tracer, const RenderSettings& settings) const {
   const ImageGrid& grid = footprints_.front().grid;
-  cv::Mat paths(grid.rows, grid.columns, CV_8UC1, cv::Scalar(1));
+  cv::Mat paths(grid.rows, grid.columns, CV_8UC1, cv::Scalar(paths_));
   if (!settings.noise) return paths;
   const NoiseTarget& noise = *settings.noise;
   const cv::Mat preview = tracer.preview(camera_, kPreviewStride);
   cv::Mat electrons(preview.size(), CV_32FC1);
-  const int bands = preview.channels();
+  const std::ptrdiff_t bands = preview.channels();
   for (int row = 0; row < preview.rows; ++row) {
     for (int column = 0; column < preview.cols; ++column) {
-      double sum = 0.0;
-      for (int band = 0; band < bands; ++band) {
-        sum += noise.electrons_per_irradiance[band] * preview.ptr<float>(row)[bands * column + band];
-      }
-      electrons.at<float>(row, column) = static_cast<float>(sum);
+      electrons.at<float>(row, column) =
+          static_cast<float>(electrons_of(noise, preview.ptr<float>(row) + bands * column));
     }
   }
   cv::Mat least, most;
@@ -140,9 +174,7 @@ cv::Mat SharedPaths::paths_of_points(const Tracer& tracer, const RenderSettings&
   cv::Mat edges(preview.size(), CV_8UC1, cv::Scalar(0));
   for (int row = 0; row < preview.rows; ++row) {
     for (int column = 0; column < preview.cols; ++column) {
-      const double imager_noise =
-          std::sqrt(std::max(0.0f, electrons.at<float>(row, column)) + noise.read_noise_e * noise.read_noise_e +
-                    noise.quantisation_e * noise.quantisation_e);
+      const double imager_noise = noise_of(noise, preview.ptr<float>(row) + bands * column);
       if (most.at<float>(row, column) - least.at<float>(row, column) > kEdge * imager_noise) {
         edges.at<unsigned char>(row, column) = 1;
       }
@@ -154,7 +186,9 @@ cv::Mat SharedPaths::paths_of_points(const Tracer& tracer, const RenderSettings&
     for (int column = 0; column < grid.columns; ++column) {
       const int from =
           std::clamp(static_cast<int>((grid.left + column * grid.spacing) / kPreviewStride), 0, edges.cols - 1);
-      if (edges.at<unsigned char>(from_row, from) != 0) paths.at<unsigned char>(row, column) = kPathsAtEdges;
+      if (edges.at<unsigned char>(from_row, from) != 0) {
+        paths.at<unsigned char>(row, column) = static_cast<unsigned char>(kEdgePaths * paths_);
+      }
     }
   }
   return paths;

@@ -22,22 +22,31 @@ namespace touchstone::render {
 class SharedPaths {
  public:
   /// @param examples of what the camera sees: footprints are made for the heights of the first hits there
-  /// @param least_paths in the mean of a pixel: the grid is as coarse as they allow, but never finer than a point a
-  /// pixel
+  /// @param settings `max_samples` are in the mean of a pixel at least: the grid is as coarse as they allow, but never
+  ///   finer than a point a pixel. Where there's a noise target, points get as many paths (kMostPaths at most) as bring
+  ///   a pixel's error in the last example, in the median, to that part of the target that neighbours who share it call
+  ///   for (kSharedPart); and kEdgePaths times as many where a preview shows edges
   /// @pre there is an example
-  SharedPaths(std::span<const Scene> examples, const PinholeCamera& camera, int least_paths);
+  SharedPaths(std::span<const Scene> examples, const PinholeCamera& camera, const RenderSettings& settings);
+  static constexpr double kSharedPart = 0.25;
+  static constexpr int kMostPaths = 16;
+  static constexpr int kEdgePaths = 8;
 
-  /// The whole picture. Of the settings `seed` and `max_depth` count, and `noise` tells what an edge is, where more
-  /// paths are traced; `samples` is left empty. `standard_error` is empty unless `with_error`: from the scatter of the
-  /// paths in a pixel's footprint as if they were drawn at random, which is too much where an edge is seen, since they
-  /// are stratified.
+  /// Paths of each point, but for edges.
+  int paths_a_point() const { return paths_; }
+
+  /// The whole picture. Of the settings `seed`, `max_depth` and `noise` count; `samples` is left empty.
+  /// `standard_error` is empty unless `with_error`: from the scatter of the paths in a pixel's footprint as if they
+  /// were drawn at random, which is too much where an edge is seen, since they are stratified.
   RenderedImage render(const Scene& scene, const Tracer& tracer, const RenderSettings& settings, bool with_error) const;
 
  private:
+  int paths_called_for(const Scene& example, const RenderSettings& settings) const;
   cv::Mat paths_of_points(const Tracer& tracer, const RenderSettings& settings) const;
   std::vector<std::size_t> footprints_of_blocks(const Scene& scene) const;
 
   PinholeCamera camera_;
+  int paths_ = 1;
   std::vector<double> heights_;              // of the footprints, mm, falling
   std::vector<CameraFootprint> footprints_;  // on one grid
   cv::Mat weight_;                           // CV_32FC1, W/m^2 on the sensor per radiance through the hole's centre

@@ -280,7 +280,7 @@ VirtualCamera::VirtualCamera(const SceneSpec& scene, const Plan& plan, const fem
     for (const Truth* truth : {&truths.front(), &deepest(truths)}) {
       examples.push_back(parts->seen(truth->press, parts->relief(truth->press)));
     }
-    parts->shared.emplace(examples, std::get<render::PinholeCamera>(parts->camera), parts->scene.light.max_samples);
+    parts->shared.emplace(examples, std::get<render::PinholeCamera>(parts->camera), parts->settings);
     parts_ = std::move(parts);
     return;
   }

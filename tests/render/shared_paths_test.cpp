@@ -35,6 +35,7 @@ struct WideHole {
   RenderSettings settings(std::uint64_t seed) const {
     RenderSettings made;
     made.seed = seed;
+    made.max_samples = 64;
     made.noise = NoiseTarget{grey(kElectrons), 3.0, 1.0, 1.0};
     return made;
   }
@@ -56,8 +57,8 @@ TEST(SharedPaths, AnEvenRoomIsExact) {
   hole.scene.faces.clear();
   hole.scene.media = {Medium{}};
   const Tracer tracer(hole.scene);
-  const RenderedImage image =
-      SharedPaths(std::span(&hole.scene, 1), hole.camera, 64).render(hole.scene, tracer, hole.settings(1), false);
+  const RenderedImage image = SharedPaths(std::span(&hole.scene, 1), hole.camera, hole.settings(1))
+                                  .render(hole.scene, tracer, hole.settings(1), false);
   const RenderedImage whole = tracer.render(hole.camera, many_paths(64));
   for (const auto& [row, column] : {std::pair{0, 0}, {45, 60}, {89, 119}, {20, 100}}) {
     const double expected = whole.irradiance.at<float>(row, column);
@@ -70,7 +71,7 @@ TEST(SharedPaths, AnEvenRoomIsExact) {
 TEST(SharedPaths, TheMeanIsThatOfManyPaths) {
   const WideHole hole;
   const Tracer tracer(hole.scene);
-  const SharedPaths shared(std::span(&hole.scene, 1), hole.camera, 64);
+  const SharedPaths shared(std::span(&hole.scene, 1), hole.camera, hole.settings(1));
   constexpr int kSeeds = 16;
   cv::Mat mean = cv::Mat::zeros(hole.camera.height, hole.camera.width, CV_32FC1);
   for (int seed = 0; seed < kSeeds; ++seed) {
@@ -105,10 +106,11 @@ TEST(SharedPaths, TheMeanIsThatOfManyPaths) {
 TEST(SharedPaths, APathAPointAndMoreAtEdges) {
   WideHole hole;
   const Tracer tracer(hole.scene);
-  const SharedPaths shared(std::span(&hole.scene, 1), hole.camera, 64);
-  const RenderedImage edged = shared.render(hole.scene, tracer, hole.settings(1), false);
   RenderSettings plain = hole.settings(1);
   plain.noise.reset();
+  const SharedPaths shared(std::span(&hole.scene, 1), hole.camera, plain);
+  EXPECT_EQ(shared.paths_a_point(), 1);
+  const RenderedImage edged = shared.render(hole.scene, tracer, hole.settings(1), false);
   const RenderedImage even = shared.render(hole.scene, tracer, plain, false);
   EXPECT_GT(even.counts.paths, static_cast<std::uint64_t>((hole.camera.width * hole.camera.height)));
   EXPECT_LT(even.counts.paths, static_cast<std::uint64_t>(2 * (hole.camera.width * hole.camera.height)))
@@ -116,9 +118,16 @@ TEST(SharedPaths, APathAPointAndMoreAtEdges) {
   EXPECT_GT(edged.counts.paths, even.counts.paths);
   EXPECT_LT(edged.counts.paths, 4 * even.counts.paths);
   // Few paths allow a coarser grid.
+  RenderSettings few = plain;
+  few.min_samples = 1;
+  few.max_samples = 16;
   const RenderedImage coarse =
-      SharedPaths(std::span(&hole.scene, 1), hole.camera, 16).render(hole.scene, tracer, plain, false);
+      SharedPaths(std::span(&hole.scene, 1), hole.camera, few).render(hole.scene, tracer, plain, false);
   EXPECT_LT(coarse.counts.paths, even.counts.paths / 3);
+  // A hundredth of the noise calls for as many paths as there may be.
+  RenderSettings strict = hole.settings(1);
+  strict.noise->fraction = 0.01;
+  EXPECT_EQ(SharedPaths(std::span(&hole.scene, 1), hole.camera, strict).paths_a_point(), SharedPaths::kMostPaths);
 }
 
 // A ball's image is as wide at each height as paths through the whole hole make it, though footprints are of one
@@ -138,7 +147,7 @@ TEST(SharedPaths, FootprintsFollowTheHeight) {
     return least;
   };
   const auto mean_of = [&](std::span<const Scene> of) {
-    const SharedPaths shared(of, pressed.camera, 64);
+    const SharedPaths shared(of, pressed.camera, pressed.settings(1));
     cv::Mat mean = cv::Mat::zeros(pressed.camera.height, pressed.camera.width, CV_32FC1);
     for (int seed = 0; seed < 8; ++seed) {
       mean += shared.render(pressed.scene, tracer, pressed.settings(seed), false).irradiance / 8.0;
@@ -157,8 +166,8 @@ TEST(SharedPaths, TheSameBytesOnAnyNumberOfThreads) {
   cv::Mat first;
   for (int threads : {1, 4}) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-    const RenderedImage image =
-        SharedPaths(std::span(&hole.scene, 1), hole.camera, 64).render(hole.scene, tracer, hole.settings(5), true);
+    const RenderedImage image = SharedPaths(std::span(&hole.scene, 1), hole.camera, hole.settings(1))
+                                    .render(hole.scene, tracer, hole.settings(5), true);
     EXPECT_GT(cv::mean(image.standard_error)[0], 0.0);
     if (first.empty()) first = image.irradiance;
     EXPECT_EQ(cv::norm(first, image.irradiance, cv::NORM_INF), 0.0);
@@ -169,7 +178,7 @@ TEST(SharedPaths, TheSameBytesOnAnyNumberOfThreads) {
 TEST(SharedPaths, TheStatedErrorCoversTheScatter) {
   const WideHole hole;
   const Tracer tracer(hole.scene);
-  const SharedPaths shared(std::span(&hole.scene, 1), hole.camera, 64);
+  const SharedPaths shared(std::span(&hole.scene, 1), hole.camera, hole.settings(1));
   constexpr int kSeeds = 12;
   cv::Mat sum = cv::Mat::zeros(hole.camera.height, hole.camera.width, CV_64FC1);
   cv::Mat squares = sum.clone();
