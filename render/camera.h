@@ -21,6 +21,12 @@ inline ReadyCamera make_ready(const Camera& camera) {
   return std::get<PinholeCamera>(camera);
 }
 
+/// Image points (left + spacing i, top + spacing j), 0 <= i < columns, 0 <= j < rows, in pixels.
+struct ImageGrid {
+  double left = 0.5, top = 0.5, spacing = 1.0;
+  int columns = 0, rows = 0;
+};
+
 /// Width and height in pixels.
 inline Eigen::Vector2i size_of(const Camera& camera) {
   return std::visit([](const auto& one) { return Eigen::Vector2i(one.width, one.height); }, camera);

@@ -190,10 +190,19 @@ CameraFootprint make_footprint(const Scene& fixture, const ReadyCamera& camera, 
   return made;
 }
 
-void CameraFootprint::spread(const float* picture, int row, int left, int count, float* out) const {
+const CameraFootprint::Kernel& CameraFootprint::kernel_at(int row, int column) const {
   const int phases = spacing * spacing;
-  const Kernel& kernel =
-      kernels[static_cast<std::size_t>(block_at(row, left)) * phases + row % spacing * spacing + left % spacing];
+  return kernels[static_cast<std::size_t>(block_at(row, column)) * phases + row % spacing * spacing + column % spacing];
+}
+
+float CameraFootprint::sum_of_squares(int row, int column) const {
+  float sum = 0.0f;
+  for (const Tap& tap : kernel_at(row, column).taps) sum += tap.weight * tap.weight;
+  return sum;
+}
+
+void CameraFootprint::spread(const float* picture, int row, int left, int count, float* out) const {
+  const Kernel& kernel = kernel_at(row, left);
   const float* from =
       picture + static_cast<std::ptrdiff_t>(margin + row / spacing) * grid.columns + margin + left / spacing;
   const auto place = [&](const Tap& tap) {

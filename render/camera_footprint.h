@@ -40,6 +40,10 @@ struct CameraFootprint {
   /// lie in one block's columns, for one phase: out[k] belongs to pixel left + k * spacing.
   void spread(const float* picture, int row, int left, int count, float* out) const;
 
+  /// The sum of a pixel's squared weights: what is left of the variance of independent points.
+  float sum_of_squares(int row, int column) const;
+
+  const Kernel& kernel_at(int row, int column) const;
   int block_at(int row, int column) const { return row / block * blocks_across + column / block; }
 };
 

@@ -9,12 +9,6 @@
 
 namespace touchstone::render {
 
-/// Image points (left + spacing i, top + spacing j), 0 <= i < columns, 0 <= j < rows, in pixels.
-struct ImageGrid {
-  double left = 0.5, top = 0.5, spacing = 1.0;
-  int columns = 0, rows = 0;
-};
-
 /// The middles of a camera's pixels.
 ImageGrid pixel_grid(const ReadyCamera& camera);
 

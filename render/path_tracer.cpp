@@ -282,6 +282,54 @@ cv::Mat preview_image(const PreparedScene<N>& scene, const AnyCamera& camera, in
   return image;
 }
 
+/// The place of a point in its tile along the Z curve: an aligned block of 2^k x 2^k points has numbers in a row.
+std::uint32_t z_order(int column, int row) {
+  std::uint32_t number = 0;
+  for (int bit = 0; (1 << bit) < kTile; ++bit) {
+    number |= static_cast<std::uint32_t>((column >> bit) & 1) << (2 * bit);
+    number |= static_cast<std::uint32_t>((row >> bit) & 1) << (2 * bit + 1);
+  }
+  return number;
+}
+
+template <int N, typename AnyCamera>
+cv::Mat central_image(const PreparedScene<N>& scene, const AnyCamera& camera, const ImageGrid& grid,
+                      const RenderSettings& settings, RayCounts& all_counts) {
+  cv::Mat image = cv::Mat::zeros(grid.rows, grid.columns, CV_32FC(N));
+  const PathIntegrator<N> integrator(scene, settings.max_depth, scene.interreflection);
+  const Eigen::Vector3d eye = camera.gel_from_camera.translation;
+  const double camera_index = scene.media[scene.medium_of_layer(scene.layer_at(eye.z()))].index;
+  const int tiles_across = (grid.columns + kTile - 1) / kTile;
+  const int tiles = tiles_across * ((grid.rows + kTile - 1) / kTile);
+  std::vector<RayCounts> tile_counts(tiles);
+  tbb::parallel_for(0, tiles, [&](int tile) {
+    const int left = (tile % tiles_across) * kTile;
+    const int top = (tile / tiles_across) * kTile;
+    RayCounts counts;
+    for (int row = top; row < std::min(top + kTile, grid.rows); ++row) {
+      auto* out = image.ptr<float>(row);
+      for (int column = left; column < std::min(left + kTile, grid.columns); ++column) {
+        SampleSequence numbers(settings.seed, static_cast<std::uint64_t>(tile), z_order(column - left, row - top));
+        const auto [px, py] = numbers.next_pair();
+        numbers.next_pair();  // the place in the hole, which is its centre
+        const double x = grid.left + (column + px - 0.5) * grid.spacing;
+        const double y = grid.top + (row + py - 0.5) * grid.spacing;
+        const auto ray = camera_ray(camera, x, y, 0.5, 0.5);
+        if (!ray) continue;
+        ++counts.paths;
+        const Bands<N> basic = integrator.trace(camera.gel_from_camera * ray->origin,
+                                                camera.gel_from_camera.turn(ray->direction), numbers, counts);
+        for (int band = 0; band < N; ++band) {
+          out[N * column + band] = static_cast<float>(basic[band] * camera_index * camera_index);
+        }
+      }
+    }
+    tile_counts[tile] = counts;
+  });
+  for (const RayCounts& counts : tile_counts) all_counts += counts;
+  return image;
+}
+
 template <int N>
 std::unique_ptr<PreparedScene<N>> prepare_scene(const Scene& scene) {
   auto prepared = std::make_unique<PreparedScene<N>>(scene);
@@ -362,6 +410,15 @@ cv::Mat Tracer::preview(const Camera& camera, int stride) const {
   if (stride < 1) fail("preview: stride is {}; it must be 1 or more", stride);
   return std::visit([&](const auto& scene, const auto& one) { return preview_image(*scene, one, stride); },
                     prepared_->scene, ready);
+}
+
+cv::Mat Tracer::central_paths(const Camera& camera, const ImageGrid& grid, const RenderSettings& settings,
+                              RayCounts& counts) const {
+  const ReadyCamera ready = make_ready(camera);
+  check_settings(settings, prepared_->bands);
+  return std::visit(
+      [&](const auto& scene, const auto& one) { return central_image(*scene, one, grid, settings, counts); },
+      prepared_->scene, ready);
 }
 
 Spectrum Tracer::radiance(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,

@@ -91,6 +91,13 @@ class Tracer {
   /// CV_32FC(N) of ceil(height/stride) x ceil(width/stride).
   cv::Mat preview(const Camera& camera, int stride) const;
 
+  /// One path for each point of `grid`, through the centre of hole or lens, drawn over the square of the grid's spacing
+  /// round the point: CV_32FC(N) of grid.rows x grid.columns, radiance in the camera's medium, W/m^2/sr; 0 where no light
+  /// passes. Numbers are stratified over neighbouring points, 16 by 16, so that a mean over them has less noise than one
+  /// over as many paths of a pixel each by itself. Of the settings only `seed` and `max_depth` count. Adds to `counts`.
+  cv::Mat central_paths(const Camera& camera, const ImageGrid& grid, const RenderSettings& settings,
+                        RayCounts& counts) const;
+
   /// What the paths themselves do, for tests and tools: mean basic radiance seen along a ray of the gel frame.
   Spectrum radiance(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
                     const RenderSettings& settings) const;

@@ -368,6 +368,7 @@ Plan make_plan(const SceneSpec& scene) {
   if (plan.camera) {
     plan_time(scene, plan, table);
     plan_direct_light(scene, plan, table);
+    plan_shared_paths(scene, plan, table);
   }
   return plan;
 }

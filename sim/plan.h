@@ -37,6 +37,7 @@ struct Plan {
   bool rolling_shutter = false;
   bool events = false;
   bool direct_light = false;    ///< to be tried; VirtualCamera measures whether it holds (sim/direct_light.h)
+  bool shared_paths = false;    ///< behind a wide hole, where direct light isn't taken
   int states_a_frame = 1;       ///< pressed states that are kept from one frame to the next
   std::vector<Effect> effects;  ///< the same for people, with reasons
 };

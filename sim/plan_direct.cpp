@@ -1,6 +1,14 @@
 #include "sim/plan_direct.h"
 
+#include "sim/device_camera.h"
+
 namespace touchstone::sim {
+namespace {
+
+// Behind a narrower hole a pixel's mean would have less than some thirty paths.
+constexpr double kWidePoint_px = 6.0;
+
+}  // namespace
 
 std::string unfit_for_direct_light(const SceneSpec& scene, const Plan& plan) {
   const DeviceSpec& device = scene.device;
@@ -35,6 +43,32 @@ void plan_direct_light(const SceneSpec& scene, Plan& plan, PlanTable& table) {
   plan.direct_light = table.add(name, forced, unfit.empty(), why,
                                 "in place of path tracing: some milliseconds a frame; once a scene a light field, its "
                                 "bounced light and the measurement");
+}
+
+void plan_shared_paths(const SceneSpec& scene, Plan& plan, PlanTable& table) {
+  const std::string name = "shared paths";
+  const Switch forced = scene.effects.shared_paths;
+  if (!scene.outputs.light()) {
+    table.add(name, false, "no picture is asked for", "");
+    return;
+  }
+  const double width_px = 2.0 * least_blur_radius_px(camera_of(*scene.device.camera));
+  const bool wide = width_px >= kWidePoint_px;
+  std::string unfit;
+  if (plan.scattering) unfit = "the gel scatters light, which has no one depth";
+  if (!wide) {
+    unfit = fmt::format("the camera's hole makes points {:.2g} pixels wide; below {:.2g} each pixel needs its own paths",
+                        width_px, kWidePoint_px);
+  }
+  if (scene.device.camera->type == CameraType::lens) unfit = "through a lens the blur depends on the depth";
+  if (forced == Switch::on && !unfit.empty()) fail_at(scene.where, "effects.shared_paths: on, but {}", unfit);
+  plan.shared_paths = table.add(
+      name, forced, unfit.empty() && !plan.direct_light,
+      plan.direct_light ? "direct light has no paths"
+      : !unfit.empty()  ? unfit
+                        : fmt::format("the hole makes points at least {:.2g} pixels wide: neighbours see the same places",
+                                      width_px),
+      "one path a pixel or fewer, in place of some for each pixel that changes");
 }
 
 }  // namespace touchstone::sim

@@ -15,4 +15,9 @@ std::string unfit_for_direct_light(const SceneSpec& scene, const Plan& plan);
 /// @throws Error if the scene switches it on and is unfit
 void plan_direct_light(const SceneSpec& scene, Plan& plan, PlanTable& table);
 
+/// Do neighbouring pixels share their paths (render/shared_paths.h), as they may behind a hole much wider than they are?
+/// @pre the row of direct light is made
+/// @throws Error if the scene switches it on and is unfit
+void plan_shared_paths(const SceneSpec& scene, Plan& plan, PlanTable& table);
+
 }  // namespace touchstone::sim

@@ -70,6 +70,7 @@ void fields(YamlReader& in, EffectSwitches& effects) {
   in.optional("inertia", effects.inertia);
   in.optional("interreflection", effects.interreflection);
   in.optional("direct_light", effects.direct_light);
+  in.optional("shared_paths", effects.shared_paths);
   in.optional("motion_blur", effects.motion_blur);
   in.optional("rolling_shutter", effects.rolling_shutter);
   in.optional("sensor_noise", effects.sensor_noise);

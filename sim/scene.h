@@ -80,6 +80,7 @@ struct EffectSwitches {
   Switch inertia = Switch::automatic;
   Switch interreflection = Switch::automatic;
   Switch direct_light = Switch::automatic;
+  Switch shared_paths = Switch::automatic;
   Switch motion_blur = Switch::automatic;
   Switch rolling_shutter = Switch::automatic;
   Switch sensor_noise = Switch::automatic;

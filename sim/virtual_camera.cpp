@@ -8,6 +8,7 @@
 #include "core/random.h"
 #include "core/units.h"
 #include "render/rolling_shutter.h"
+#include "render/shared_paths.h"
 #include "sim/device_camera.h"
 #include "sim/direct_light.h"
 #include "sim/exposure_times.h"
@@ -71,7 +72,8 @@ struct VirtualCamera::Parts : SceneSight {
   render::RenderSettings settings;
   std::unique_ptr<const DirectLight> direct;  // where it holds; keys are then not needed
   LightChoice choice{false, "paths: the plan has no direct light", {}};
-  std::vector<KeyFrame> keys;  // the first frame's, then in the order of time
+  std::optional<render::SharedPaths> shared;  // behind a wide hole; keys are then not needed
+  std::vector<KeyFrame> keys;                 // the first frame's, then in the order of time
 
   /// The first frame's and those before and after a time: the gel at rest, and what the frame is most like.
   std::vector<const KeyFrame*> keys_about(std::int64_t t_us) const {
@@ -164,6 +166,10 @@ struct VirtualCamera::Parts : SceneSight {
     if (times.size() > 1) return take_over_time(truth, now, times, whole);
     const render::Scene seen_now = seen(truth.press, now);
     const render::Tracer at_once(seen_now);
+    if (shared && !whole) {
+      const render::RenderedImage image = shared->render(at_once, settings, scene.outputs.error);
+      return develop(image.irradiance, image.standard_error, truth, now, image.counts, size.area());
+    }
     KnownLight light = nothing_known();
     if (!whole) {
       const FrameLook look = look_of(seen_now, at_once, ready, camera);
@@ -211,14 +217,15 @@ struct VirtualCamera::Parts : SceneSight {
   /// samples of their own, so that their noise is averaged, too.
   Capture take_over_time(const Truth& truth, const std::optional<fem::ReliefAnswer>& now,
                          const std::vector<double>& times, bool whole) const {
+    const bool shares = shared && !whole;
     std::vector<render::Scene> scenes;
     std::vector<FrameLook> looks;
     for (const double time : times) {
       const fem::PressState press = state_after(truth, time);
       scenes.push_back(seen(press, relief(press)));
-      if (!whole) looks.push_back(look_of(scenes.back(), render::Tracer(scenes.back()), ready, camera));
+      if (!whole && !shares) looks.push_back(look_of(scenes.back(), render::Tracer(scenes.back()), ready, camera));
     }
-    KnownLight light = whole ? nothing_known() : known(truth.t_us, looks);
+    KnownLight light = whole || shares ? nothing_known() : known(truth.t_us, looks);
     const int pixels = cv::countNonZero(light.missing);
     if (pixels == 0) return develop(light.irradiance, light.standard_error, truth, now, {}, 0);
     const render::ShutterTiming timing = shutter_timing();
@@ -230,7 +237,9 @@ struct VirtualCamera::Parts : SceneSight {
     for (std::size_t i = 0; i < times.size(); ++i) {
       RandomStream seeds(scene.seed, i, Purpose::kMotion);
       of_moment.seed = (std::uint64_t{seeds()} << 32) | seeds();
-      const render::RenderedImage image = render::Tracer(scenes[i]).render(camera, of_moment, light.missing);
+      const render::Tracer tracer(scenes[i]);
+      const render::RenderedImage image = shares ? shared->render(tracer, of_moment, true)
+                                                 : tracer.render(camera, of_moment, light.missing);
       sum.add(i, image.irradiance, image.standard_error);
       counts += image.counts;
     }
@@ -256,6 +265,13 @@ VirtualCamera::VirtualCamera(const SceneSpec& scene, const Plan& plan, const fem
       parts_ = std::move(parts);
       return;
     }
+  }
+  if (plan.shared_paths) {
+    const fem::PressState& first = truths.front().press;
+    parts->shared.emplace(parts->seen(first, parts->relief(first)), std::get<render::PinholeCamera>(parts->camera),
+                          parts->scene.light.max_samples);
+    parts_ = std::move(parts);
+    return;
   }
   parts->keys.push_back(parts->key_frame(truths.front()));
   // They lean on the first one alone, so that they can be made at the same time.
