@@ -39,7 +39,7 @@ py::array column_of(const ColourMarkerReading& reading, const Number& number) {
   for (const ColourMarker& marker : reading.markers) {
     *to++ = marker.flaw == sensors::MarkerFlaw::kNone ? number(marker) : std::numeric_limits<double>::quiet_NaN();
   }
-  return std::move(out);
+  return out;
 }
 
 py::array places_of(const ColourMarkerReading& reading) {
@@ -103,7 +103,7 @@ py::array displacements_of(const HueField& field) {
 py::array bools_of(const std::vector<std::uint8_t>& values) {
   py::array_t<bool> out(static_cast<py::ssize_t>(values.size()));
   std::copy(values.begin(), values.end(), out.mutable_data());
-  return std::move(out);
+  return out;
 }
 
 }  // namespace

@@ -9,6 +9,13 @@ namespace {
 
 /// A contact session with what it stands on. One call at a time: a second thread is refused, not queued.
 class Session {
+  template <typename Work>
+  auto alone(const Work& work) {
+    const std::unique_lock<std::mutex> lock(mutex_, std::try_to_lock);
+    if (!lock) fail("this session is at work in another thread; each thread needs a session of its own");
+    return unlocked(work);
+  }
+
  public:
   Session(std::shared_ptr<Sensor> sensor, SharedObject object, const sim::TouchSessionSettings& settings)
       : sensor_(std::move(sensor)), object_(std::move(object)), session_(sensor_->session(object_, settings)) {}
@@ -31,13 +38,6 @@ class Session {
   }
 
  private:
-  template <typename Work>
-  auto alone(const Work& work) {
-    const std::unique_lock<std::mutex> lock(mutex_, std::try_to_lock);
-    if (!lock) fail("this session is at work in another thread; each thread needs a session of its own");
-    return unlocked(work);
-  }
-
   std::shared_ptr<Sensor> sensor_;
   SharedObject object_;
   std::mutex mutex_;

@@ -61,7 +61,7 @@ py::array points_in_rows(const std::vector<Point>& points) {
   for (const Point& point : points) {
     for (py::ssize_t j = 0; j < columns; ++j) *to++ = point[j];
   }
-  return std::move(out);
+  return out;
 }
 
 py::object array_on(const cv::Mat& picture, const py::dtype& type) {

@@ -63,7 +63,7 @@ py::array small_array(const Matrix& matrix) {
   for (py::ssize_t i = 0; i < rows; ++i) {
     for (py::ssize_t j = 0; j < columns; ++j) *to++ = matrix(i, j);
   }
-  return std::move(out);
+  return out;
 }
 /// 3 x 4: rotation, then translation in mm.
 py::array pose_array(const RigidTransform& pose);
