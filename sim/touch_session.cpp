@@ -76,11 +76,12 @@ struct TouchSession::Parts {
     if (!(target.seconds > 0.0) || !std::isfinite(target.seconds)) {
       fail("a step of a session takes {} s; allowed is a finite time above 0", target.seconds);
     }
-    if (reading.step == 0 || reading.contact == TouchContact::none || !target.rotation.allFinite()) return;
+    if (reading.step == 0 || reading.contact == TouchContact::none) return;
     RigidTransform to{target.rotation, reading.gel_from_object.translation};
     for (int a = 0; a < 3; ++a) {
       if (target.axis[a].kind == Kind::position) to.translation[a] = target.axis[a].value;
     }
+    if (!to.rotation.allFinite() || !to.translation.allFinite()) return;  // which a press refuses
     const double motion = farthest_motion(reading.gel_from_object, to, ball);
     if (motion <= settings.largest_step_mm || (to * ball.centre).z() - ball.radius > highest_mm) return;
     const Eigen::Vector3d& from = reading.gel_from_object.translation;

@@ -96,7 +96,8 @@ TEST(TouchSession, AContactSticksThenSlipsInPartThenSlidesAtItsFriction) {
   }
   EXPECT_TRUE(partly);
   ASSERT_EQ(dragged.contact, TouchContact::sliding);
-  EXPECT_NEAR(dragged.wrench.head<2>().norm() / dragged.wrench[2], kFriction, 1e-6);
+  EXPECT_NEAR(dragged.wrench.head<2>().norm() / dragged.wrench[2], kFriction, 0.01 * kFriction)
+      << "less than all of it, since not every vertex slides in quite the same direction";
 }
 
 TEST(TouchSession, AResultDependsOnTheWay) {
@@ -130,7 +131,7 @@ TEST(TouchSession, RefusesABadStepAndStaysAsItWas) {
   EXPECT_THAT(refusal(at(0, 0, 1.6), INFINITY), HasSubstr("takes inf s"));
   EXPECT_EQ(one.reading().step, 1);
   for (TouchSession* each : {&one, &undisturbed}) each->step(at(0.1, 0, 1.65), 0.01);
-  EXPECT_EQ(one.reading().wrench, undisturbed.reading().wrench);
+  EXPECT_LT((one.reading().wrench - undisturbed.reading().wrench).norm(), 1e-7) << "gaps may be looked up anew";
   EXPECT_EQ(one.step(at(0, 0, 60), 0.01).contact, TouchContact::none) << "lifting off may be fast";
   EXPECT_THAT(test::message_of([] { session({.largest_step_mm = -1}); }), HasSubstr("largest_step_mm"));
   EXPECT_THAT(test::message_of([] { session({.largest_part_mm = 0}); }), HasSubstr("largest_part_mm"));
@@ -144,7 +145,10 @@ TEST(TouchSession, AGelThatRelaxesForgetsItsForceAndKeepsItsSurface) {
   double later = 0.0;
   for (int k = 0; k < 100; ++k) later = one.step(at(0, 0, 1.6), 0.01).wrench[2];
   EXPECT_NEAR(later / at_once, 0.6, 0.001);
-  EXPECT_NEAR(one.press().surface_displacement.col(2).minCoeff(), -0.4, 0.02);
+  TouchSession elastic = session();
+  elastic.step(at(0, 0, 1.6), 0.01);
+  const Eigen::MatrixX3d relaxed = one.press().surface_displacement, wanted = elastic.press().surface_displacement;
+  EXPECT_LT((relaxed - wanted).norm(), 1e-3 * wanted.norm());
 }
 
 TEST(TouchHeight, IsThatOfClosedForms) {
