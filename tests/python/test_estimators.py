@@ -36,7 +36,7 @@ def test_beads_are_followed_and_a_force_is_learnt_and_read():
     estimate = model.estimate(moved, rest=rest.positions_px)
     assert estimate.beads_missing == 0 and estimate.t_us == 33000
     assert estimate.force_N == pytest.approx([0.6, -0.3, 0], abs=0.08)
-    with pytest.raises(ts.Error, match="later"):
+    with pytest.raises(ts.Error, match="times must increase"):
         tracker.track(beads_picture(REST), 33000)
     with pytest.raises(ts.Error, match="rest: 2 positions are given"):
         model.estimate(moved, rest=REST[:2])
