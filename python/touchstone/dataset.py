@@ -9,7 +9,7 @@ from ._core import read_image
 from ._errors import Error
 
 _SPLITS = ("train", "verify", "test")
-_PICTURES = ("frame", "ideal")  # what samples call them; their folders are plural
+_PICTURES = {"frame": "frames", "ideal": "ideal"}  # what samples call them, and the folders they are in
 
 
 class Files:
@@ -73,10 +73,10 @@ class Files:
         return self.truth[name]
 
     def picture_file(self, kind, scene, frame):
-        return self.folder / f"{kind}s" / self.scenes[scene]["name"] / f"{frame:06d}.png"
+        return self.folder / _PICTURES[kind] / self.scenes[scene]["name"] / f"{frame:06d}.png"
 
     def has_pictures(self, kind):
-        start = f"{kind}s/"
+        start = _PICTURES[kind] + "/"
         return any(one["file"].startswith(start) for one in self.manifest["files"])
 
 

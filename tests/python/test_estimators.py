@@ -128,7 +128,7 @@ def test_heights_are_checked_and_shared_between_threads(sensor, ball):
     assert np.array_equal(one.height_mm, kept), "a result isn't overwritten by later frames"
     assert np.array_equal(many[0].height_mm, many[2].height_mm)
     assert one.contact.any() and not many[0].contact.any()
-    with pytest.raises(ts.Error, match="160 x 120|120 x 160|size"):
+    with pytest.raises(ts.Error, match="80 x 60|60 x 80|size"):
         estimator.estimate(frame[:50])
     with pytest.raises(ts.Error, match="there are 2 for 1 frames"):
         ts.calibrate_height([frame], [3.0, 4.0], background, mm_per_px=0.1)
