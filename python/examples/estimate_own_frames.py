@@ -20,10 +20,16 @@ ball = ts.Object({"name": "ball", "shape": {"type": "sphere", "radius_mm": DIAME
 
 # What a user has: frames of the untouched gel, and of a ball pressed at some places.
 background = [sensor.background(frame=k) for k in range(8)]
-frames = [sensor.press(ball, depth_mm=DEPTH_MM, at_mm=(x, y), frame=100 + i, truth=False).frame
-          for i, (x, y) in enumerate((x, y) for x in (-1.2, 0.0, 1.2) for y in (-0.9, 0.0, 0.9))]
+frames, circles = [], []
+for x in (-1.2, 0.0, 1.2):
+    for y in (-0.9, 0.0, 0.9):
+        touch = sensor.press(ball, depth_mm=DEPTH_MM, at_mm=(x, y), frame=100 + len(frames))
+        frames.append(touch.frame)
+        # The outline of the touched part, as one would draw it by hand: u, v, radius in pixels.
+        circles.append((*sensor.pixel_from_gel((x, y)), np.sqrt(touch.contact.sum() / np.pi)))
 
-model, report = ts.calibrate_height(frames, [DIAMETER_MM] * len(frames), background, mm_per_px=sensor.mm_per_px)
+model, report = ts.calibrate_height(frames, [DIAMETER_MM] * len(frames), background, mm_per_px=sensor.mm_per_px,
+                                    circles=circles)
 print(f"calibrated on {model.presses} presses, {report['pixels']} pixels: slopes within "
       f"{report['rms_slope_error']:.3f}, correction '{report['correction']}'")
 

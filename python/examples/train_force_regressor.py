@@ -33,7 +33,7 @@ def features(data):
     change = frames - first
     n, height, width, channels = change.shape
     blocks = change.reshape(n, height // 4, 4, width // 4, 4, channels).mean(axis=(2, 4))
-    return np.concatenate([blocks.reshape(n, -1), abs(blocks).mean(axis=(1, 2))], axis=1)
+    return np.concatenate([abs(blocks).reshape(n, -1), abs(blocks).mean(axis=(1, 2))], axis=1)
 
 
 def main(folder):
@@ -41,7 +41,7 @@ def main(folder):
     print(f"{made['samples']} samples, {made['rendered']} of them made now")
     train = ts.Dataset(folder, "train")
     test = ts.Dataset(folder, "test")
-    model = make_pipeline(PCA(12, random_state=0), StandardScaler(), PolynomialFeatures(2),
+    model = make_pipeline(PCA(8, random_state=0), StandardScaler(), PolynomialFeatures(2),
                           RidgeCV(np.logspace(-3, 3, 13)))
     model.fit(features(train), train.array("wrench")[:, 2])
     truth = test.array("wrench")[:, 2]

@@ -42,7 +42,8 @@ def assert_close(estimate, truth, *, allowed, error_bar=0.0, sigmas=2.0, unit=""
     known = ~numpy.isnan(true)
     if not known.any():
         raise Error(f"{what}: no truth is known")
-    granted = numpy.broadcast_to(allowed + sigmas * bar, true.shape)
+    rounding = 1e-12 * numpy.abs(numpy.where(known, true, 0))
+    granted = numpy.broadcast_to(allowed + sigmas * bar, true.shape) + rounding
     off = numpy.abs(got - true)
     excess = numpy.where(known, numpy.where(numpy.isnan(off), numpy.inf, off - granted), -numpy.inf)
     if (excess <= 0).all():

@@ -112,9 +112,11 @@ def test_coloured_markers_are_read_and_their_motion_learnt(tmp_path):
 
 def test_heights_are_checked_and_shared_between_threads(sensor, ball):
     background = [sensor.background(frame=k) for k in range(2)]
-    frame = sensor.press(ball, depth_mm=0.4, truth=False).frame
-    model, report = ts.calibrate_height([frame], [3.0], background, mm_per_px=sensor.mm_per_px)
-    assert report["pixels"] > 100 and model.picture_shape == sensor.picture_shape
+    touch = sensor.press(ball, depth_mm=0.4)
+    frame = touch.frame
+    circle = (*sensor.pixel_from_gel((0, 0)), np.sqrt(touch.contact.sum() / np.pi))
+    model, report = ts.calibrate_height([frame], [3.0], background, mm_per_px=sensor.mm_per_px, circles=[circle])
+    assert report["pixels"] > 30 and model.picture_shape == sensor.picture_shape
     estimator = ts.HeightEstimator(model)
     one = estimator.estimate(frame)
     kept = one.height_mm.copy()

@@ -238,7 +238,7 @@ def test_a_session_is_for_one_thread_at_a_time(sensor, ball):
 
 def test_a_device_without_a_coating_tells_forces(tmp_path):
     device = {"name": "bare", "gel": {"size_x_mm": 8, "size_y_mm": 8, "thickness_mm": 3, "youngs_modulus_MPa": 0.3,
-                                      "refractive_index": 1.4},
+                                      "refractive_index": 1.4}, "plate": {"thickness_mm": 1, "refractive_index": 1.5},
               "mesh": {"fine_mm": 0.8, "coarse_mm": 2, "fine_half_extent_mm": [2, 2], "fine_depth_mm": 1}}
     bare = ts.Sensor(device, cache=str(tmp_path))
     assert bare.picture_shape is None
