@@ -5,7 +5,7 @@ get_property(libraries GLOBAL PROPERTY TOUCHSTONE_LIBRARIES)
 install(TARGETS ${libraries} EXPORT TouchstoneTargets
   ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
 foreach(part IN LISTS TOUCHSTONE_PARTS)
-  if(NOT part STREQUAL "apps")
+  if(NOT part MATCHES "^(apps|python)$")
     install(DIRECTORY ${part} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/touchstone FILES_MATCHING PATTERN "*.h")
   endif()
 endforeach()

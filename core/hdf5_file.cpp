@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
@@ -40,6 +41,14 @@ class Handle {
   herr_t (*close_)(hid_t);
 };
 
+std::atomic<Hdf5Guard> the_guard{nullptr};
+
+/// To be held for as long as HDF5 is at work.
+std::shared_ptr<void> hold() {
+  const Hdf5Guard guard = the_guard;
+  return guard != nullptr ? guard() : nullptr;
+}
+
 /// HDF5 prints its own stack of errors unless told not to; ours are exceptions.
 void keep_hdf5_quiet() {
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
@@ -55,36 +64,48 @@ Handle text_type(std::size_t length) {
 
 }  // namespace
 
+void set_hdf5_guard(Hdf5Guard guard) {
+  the_guard = guard;
+}
+
 template <>
 Hdf5Id hdf5_type<std::uint8_t>() {
+  const auto held = hold();
   return H5T_NATIVE_UINT8;
 }
 template <>
 Hdf5Id hdf5_type<std::uint16_t>() {
+  const auto held = hold();
   return H5T_NATIVE_UINT16;
 }
 template <>
 Hdf5Id hdf5_type<std::uint32_t>() {
+  const auto held = hold();
   return H5T_NATIVE_UINT32;
 }
 template <>
 Hdf5Id hdf5_type<std::uint64_t>() {
+  const auto held = hold();
   return H5T_NATIVE_UINT64;
 }
 template <>
 Hdf5Id hdf5_type<std::int32_t>() {
+  const auto held = hold();
   return H5T_NATIVE_INT32;
 }
 template <>
 Hdf5Id hdf5_type<std::int64_t>() {
+  const auto held = hold();
   return H5T_NATIVE_INT64;
 }
 template <>
 Hdf5Id hdf5_type<float>() {
+  const auto held = hold();
   return H5T_NATIVE_FLOAT;
 }
 template <>
 Hdf5Id hdf5_type<double>() {
+  const auto held = hold();
   return H5T_NATIVE_DOUBLE;
 }
 
@@ -98,6 +119,7 @@ void Hdf5Writer::check_done(int result, const char* what) const {
 }
 
 Hdf5Writer::Hdf5Writer(const std::filesystem::path& file) : name_(file.string()) {
+  const auto held = hold();
   keep_hdf5_quiet();
   const Handle access(check(H5Pcreate(H5P_FILE_ACCESS), "file access"), H5Pclose);
   // Later versions mark a file as open for writing until it's closed.
@@ -111,12 +133,14 @@ Hdf5Writer::Hdf5Writer(const std::filesystem::path& file) : name_(file.string())
 }
 
 Hdf5Writer::~Hdf5Writer() {
+  const auto held = hold();
   for (auto& [path, dataset] : datasets_) H5Dclose(dataset.id);
   if (file_ >= 0) H5Fclose(file_);
 }
 
 void Hdf5Writer::add_dataset(const Hdf5Description& description, Hdf5Id type, std::size_t item_bytes, std::int64_t rows,
                              const std::vector<std::int64_t>& row_shape) {
+  const auto held = hold();
   TS_ASSERT(!datasets_.contains(description.path) && rows >= 0);
   Dataset dataset;
   dataset.shape.push_back(rows);
@@ -144,6 +168,7 @@ void Hdf5Writer::add_dataset(const Hdf5Description& description, Hdf5Id type, st
 }
 
 void Hdf5Writer::add_growing_dataset(const Hdf5Description& description, Hdf5Id type, std::size_t item_bytes) {
+  const auto held = hold();
   TS_ASSERT(!datasets_.contains(description.path));
   const Handle creation(check(H5Pcreate(H5P_DATASET_CREATE), "dataset creation"), H5Pclose);
   check_done(H5Pset_obj_track_times(creation, 0), "times");
@@ -165,6 +190,7 @@ void Hdf5Writer::add_growing_dataset(const Hdf5Description& description, Hdf5Id 
 }
 
 void Hdf5Writer::append_numbers(const std::string& path, Hdf5Id type, const void* values, std::int64_t count) {
+  const auto held = hold();
   const auto found = datasets_.find(path);
   TS_ASSERT(found != datasets_.end() && found->second.shape.size() == 1);
   if (count == 0) return;
@@ -188,6 +214,7 @@ void Hdf5Writer::make_group_of(const std::string& path) {
 
 void Hdf5Writer::write_rows(const std::string& path, Hdf5Id type, std::int64_t first, std::int64_t count,
                             const void* values, std::size_t size) {
+  const auto held = hold();
   const auto found = datasets_.find(path);
   TS_ASSERT(found != datasets_.end());
   const Dataset& dataset = found->second;
@@ -207,6 +234,7 @@ void Hdf5Writer::write_rows(const std::string& path, Hdf5Id type, std::int64_t f
 }
 
 void Hdf5Writer::write_number(const Hdf5Description& description, std::int64_t value) {
+  const auto held = hold();
   const Handle space(check(H5Screate(H5S_SCALAR), "shape"), H5Sclose);
   const Handle creation(check(H5Pcreate(H5P_DATASET_CREATE), "dataset creation"), H5Pclose);
   check_done(H5Pset_obj_track_times(creation, 0), "times");
@@ -220,6 +248,7 @@ void Hdf5Writer::write_number(const Hdf5Description& description, std::int64_t v
 }
 
 void Hdf5Writer::write_texts(const Hdf5Description& description, const std::vector<std::string>& texts) {
+  const auto held = hold();
   std::size_t longest = 1;
   for (const std::string& text : texts) longest = std::max(longest, text.size());
   std::vector<char> padded(longest * texts.size(), '\0');
@@ -249,6 +278,7 @@ void Hdf5Writer::describe(Hdf5Id object, const Hdf5Description& description) {
 }
 
 void Hdf5Writer::text_attribute(Hdf5Id object, const std::string& name, const std::string& value) {
+  const auto held = hold();
   const Handle type = text_type(value.size());
   const Handle space(check(H5Screate(H5S_SCALAR), "attribute"), H5Sclose);
   const Handle attribute(check(H5Acreate2(object, name.c_str(), type, space, H5P_DEFAULT, H5P_DEFAULT), name.c_str()),
@@ -257,10 +287,12 @@ void Hdf5Writer::text_attribute(Hdf5Id object, const std::string& name, const st
 }
 
 void Hdf5Writer::set_attribute(const std::string& name, const std::string& value) {
+  const auto held = hold();
   text_attribute(file_, name, value);
 }
 
 void Hdf5Writer::set_attribute(const std::string& name, std::int64_t value) {
+  const auto held = hold();
   const Handle space(check(H5Screate(H5S_SCALAR), "attribute"), H5Sclose);
   const Handle attribute(
       check(H5Acreate2(file_, name.c_str(), H5T_STD_I64LE, space, H5P_DEFAULT, H5P_DEFAULT), name.c_str()), H5Aclose);
@@ -268,6 +300,7 @@ void Hdf5Writer::set_attribute(const std::string& name, std::int64_t value) {
 }
 
 void Hdf5Writer::close() {
+  const auto held = hold();
   for (auto& [path, dataset] : datasets_) H5Dclose(dataset.id);
   datasets_.clear();
   check_done(H5Fflush(file_, H5F_SCOPE_GLOBAL), "flush");
@@ -283,6 +316,7 @@ void Hdf5Writer::close() {
 }
 
 Hdf5Reader::Hdf5Reader(const std::filesystem::path& file) : name_(file.string()) {
+  const auto held = hold();
   keep_hdf5_quiet();
   if (!std::filesystem::is_regular_file(file)) fail("{}: there is no such file", name_);
   file_ = H5Fopen(name_.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
@@ -290,18 +324,22 @@ Hdf5Reader::Hdf5Reader(const std::filesystem::path& file) : name_(file.string())
 }
 
 Hdf5Reader::~Hdf5Reader() {
+  const auto held = hold();
   H5Fclose(file_);
 }
 
 bool Hdf5Reader::has(const std::string& path) const {
+  const auto held = hold();
   return H5Lexists(file_, path.c_str(), H5P_DEFAULT) > 0;
 }
 
 bool Hdf5Reader::has_attribute(const std::string& path, const std::string& name) const {
+  const auto held = hold();
   return H5Aexists_by_name(file_, path.c_str(), name.c_str(), H5P_DEFAULT) > 0;
 }
 
 std::vector<std::int64_t> Hdf5Reader::shape_of(const std::string& path, std::size_t& size) const {
+  const auto held = hold();
   const Handle dataset(H5Dopen2(file_, path.c_str(), H5P_DEFAULT), H5Dclose);
   if (dataset < 0) fail("{}: has no dataset '{}'", name_, path);
   const Handle space(H5Dget_space(dataset), H5Sclose);
@@ -315,6 +353,7 @@ std::vector<std::int64_t> Hdf5Reader::shape_of(const std::string& path, std::siz
 }
 
 void Hdf5Reader::read_into(const std::string& path, Hdf5Id type, void* values) const {
+  const auto held = hold();
   const Handle dataset(H5Dopen2(file_, path.c_str(), H5P_DEFAULT), H5Dclose);
   if (H5Dread(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) < 0) {
     fail("{}: '{}' can't be read; it isn't of the kind that is needed, or the file is damaged", name_, path);
@@ -346,6 +385,7 @@ void Hdf5Reader::expect_whole_numbers(const std::string& path) const {
 }
 
 std::int64_t Hdf5Reader::read_number(const std::string& path) const {
+  const auto held = hold();
   expect_whole_numbers(path);
   std::size_t count = 0;
   shape_of(path, count);
@@ -356,6 +396,7 @@ std::int64_t Hdf5Reader::read_number(const std::string& path) const {
 }
 
 std::int64_t Hdf5Reader::count_of_whole_numbers(const std::string& path) const {
+  const auto held = hold();
   expect_whole_numbers(path);
   std::size_t count = 0;
   const std::vector<std::int64_t> shape = shape_of(path, count);
@@ -364,6 +405,7 @@ std::int64_t Hdf5Reader::count_of_whole_numbers(const std::string& path) const {
 }
 
 void Hdf5Reader::walk_list(const std::string& path) const {
+  const auto held = hold();
   if (count_of_whole_numbers(path) == 0) return;
   const Handle dataset(H5Dopen2(file_, path.c_str(), H5P_DEFAULT), H5Dclose);
   H5Dget_storage_size(dataset);  // visits every entry of the index of chunks
@@ -373,6 +415,7 @@ void Hdf5Reader::walk_list(const std::string& path) const {
 
 void Hdf5Reader::read_list_part(const std::string& path, Hdf5Id type, std::int64_t first, std::int64_t count,
                                 void* values) const {
+  const auto held = hold();
   if (count == 0) return;
   const Handle dataset(H5Dopen2(file_, path.c_str(), H5P_DEFAULT), H5Dclose);
   const Handle place(H5Dget_space(dataset), H5Sclose);
@@ -386,6 +429,7 @@ void Hdf5Reader::read_list_part(const std::string& path, Hdf5Id type, std::int64
 }
 
 std::vector<std::string> Hdf5Reader::read_texts(const std::string& path) const {
+  const auto held = hold();
   std::size_t count = 0;
   shape_of(path, count);
   const Handle dataset(H5Dopen2(file_, path.c_str(), H5P_DEFAULT), H5Dclose);
@@ -407,6 +451,7 @@ std::vector<std::string> Hdf5Reader::read_texts(const std::string& path) const {
 }
 
 std::string Hdf5Reader::text_attribute(const std::string& path, const std::string& name) const {
+  const auto held = hold();
   const Handle attribute(H5Aopen_by_name(file_, path.c_str(), name.c_str(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
   if (attribute < 0) fail("{}: '{}' has no attribute '{}'", name_, path, name);
   const Handle type(H5Aget_type(attribute), H5Tclose);
@@ -419,6 +464,7 @@ std::string Hdf5Reader::text_attribute(const std::string& path, const std::strin
 }
 
 std::int64_t Hdf5Reader::integer_attribute(const std::string& path, const std::string& name) const {
+  const auto held = hold();
   const Handle attribute(H5Aopen_by_name(file_, path.c_str(), name.c_str(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
   std::int64_t value = 0;
   if (attribute < 0 || H5Aread(attribute, H5T_NATIVE_INT64, &value) < 0) {

@@ -5,11 +5,18 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
 
 namespace touchstone {
+
+/// Gives what is to be held while HDF5 is at work; recursive.
+using Hdf5Guard = std::shared_ptr<void> (*)();
+/// For a program in which others use HDF5's library beside us, as h5py does in Python: each use of ours is then
+/// guarded. Null: none, as it is by itself.
+void set_hdf5_guard(Hdf5Guard guard);
 
 /// HDF5's own handle (hid_t), without its header.
 using Hdf5Id = std::int64_t;

@@ -7,6 +7,7 @@
 #include <charconv>
 #include <cmath>
 
+#include "core/field_error.h"
 #include "core/nearest_name.h"
 #include "core/whole_file.h"
 
@@ -34,6 +35,16 @@ struct YamlReader::Node {
   mutable std::vector<std::string> asked;  // keys that some field asked for
 
   int empty_line = 0;  // line of the key, if nothing stands after it: YAML marks the next token
+
+  /// Throws what is wrong with this field; the message begins with its path.
+  template <typename... Args>
+  [[noreturn]] void refuse(fmt::format_string<Args...> format, Args&&... args) const {
+    refuse_at(line(), path, fmt::format(format, std::forward<Args>(args)...));
+  }
+  [[noreturn]] void refuse_at(int at_line, const std::string& field, const std::string& message) const {
+    throw FieldError({file, at_line}, field, (path.empty() ? "" : path + ": ") + message);
+  }
+  std::string path_of(const std::string& key) const { return path.empty() ? key : path + "." + key; }
 
   int line() const { return empty_line > 0 ? empty_line : yaml.Mark().is_null() ? 0 : yaml.Mark().line + 1; }
 };
@@ -103,7 +114,7 @@ std::string YamlReader::context() const {
 }
 
 void YamlReader::require_map() const {
-  if (!node_->yaml.IsMap()) fail_at(where(), "{}a map of fields is needed here", context());
+  if (!node_->yaml.IsMap()) node_->refuse("a map of fields is needed here");
 }
 
 std::optional<YamlReader> YamlReader::child(const std::string& key) {
@@ -114,7 +125,7 @@ std::optional<YamlReader> YamlReader::child(const std::string& key) {
   auto node = std::make_shared<Node>();
   node->yaml = value;
   node->file = node_->file;
-  node->path = node_->path.empty() ? key : node_->path + "." + key;
+  node->path = node_->path_of(key);
   if (value.IsNull()) {
     for (const auto& entry : map) {
       if (entry.first.IsScalar() && entry.first.Scalar() == key) node->empty_line = entry.first.Mark().line + 1;
@@ -124,7 +135,7 @@ std::optional<YamlReader> YamlReader::child(const std::string& key) {
 }
 
 std::vector<YamlReader> YamlReader::items() const {
-  if (!node_->yaml.IsSequence()) fail_at(where(), "{}a list is needed here", context());
+  if (!node_->yaml.IsSequence()) node_->refuse("a list is needed here");
   std::vector<YamlReader> result;
   for (std::size_t i = 0; i < node_->yaml.size(); ++i) {
     auto node = std::make_shared<Node>();
@@ -147,7 +158,7 @@ std::vector<double> YamlReader::numbers(Allowed allowed) const {
 }
 
 std::string YamlReader::scalar(const char* kind) const {
-  if (!node_->yaml.IsScalar()) fail_at(where(), "{}{} is needed here", context(), kind);
+  if (!node_->yaml.IsScalar()) node_->refuse("{} is needed here", kind);
   return node_->yaml.Scalar();
 }
 
@@ -155,18 +166,18 @@ double YamlReader::number(Allowed allowed) const {
   const std::string text = scalar("a number");
   const auto value = whole_number<double>(text);
   if (!value || !std::isfinite(*value)) {
-    fail_at(where(), "{}'{}' isn't a finite number; allowed is {}", context(), text, allowed.text());
+    node_->refuse("'{}' isn't a finite number; allowed is {}", text, allowed.text());
   }
-  if (!allowed.holds(*value)) fail_at(where(), "{}{} is not allowed; allowed is {}", context(), text, allowed.text());
+  if (!allowed.holds(*value)) node_->refuse("{} is not allowed; allowed is {}", text, allowed.text());
   return *value;
 }
 
 std::int64_t YamlReader::integer(Allowed allowed) const {
   const std::string text = scalar("a whole number");
   const auto value = whole_number<std::int64_t>(text);
-  if (!value) fail_at(where(), "{}'{}' isn't a whole number", context(), text);
+  if (!value) node_->refuse("'{}' isn't a whole number", text);
   if (!allowed.holds(static_cast<double>(*value))) {
-    fail_at(where(), "{}{} is not allowed; allowed is {}", context(), text, allowed.text());
+    node_->refuse("{} is not allowed; allowed is {}", text, allowed.text());
   }
   return *value;
 }
@@ -175,7 +186,7 @@ int YamlReader::small_integer(Allowed allowed) const {
   const std::int64_t value = integer(allowed);
   using Limits = std::numeric_limits<int>;
   if (value < Limits::min() || value > Limits::max()) {
-    fail_at(where(), "{}{} is not allowed; allowed is from {} to {}", context(), value, Limits::min(), Limits::max());
+    node_->refuse("{} is not allowed; allowed is from {} to {}", value, Limits::min(), Limits::max());
   }
   return static_cast<int>(value);
 }
@@ -183,16 +194,16 @@ int YamlReader::small_integer(Allowed allowed) const {
 std::uint64_t YamlReader::unsigned_integer(Allowed allowed) const {
   const std::string text = scalar("a whole number");
   const auto value = whole_number<std::uint64_t>(text);
-  if (!value) fail_at(where(), "{}'{}' isn't a whole number from 0 up", context(), text);
+  if (!value) node_->refuse("'{}' isn't a whole number from 0 up", text);
   if (!allowed.holds(static_cast<double>(*value))) {
-    fail_at(where(), "{}{} is not allowed; allowed is {}", context(), text, allowed.text());
+    node_->refuse("{} is not allowed; allowed is {}", text, allowed.text());
   }
   return *value;
 }
 
 void YamlReader::read(bool& value, Allowed) {
   const std::string text = scalar("true or false");
-  if (text != "true" && text != "false") fail_at(where(), "{}'{}' is neither true nor false", context(), text);
+  if (text != "true" && text != "false") node_->refuse("'{}' is neither true nor false", text);
   value = text == "true";
 }
 
@@ -200,15 +211,15 @@ void YamlReader::finish() const {
   std::vector<std::string> seen;
   for (const auto& entry : node_->yaml) {
     const int line = entry.first.Mark().is_null() ? 0 : entry.first.Mark().line + 1;
-    if (!entry.first.IsScalar()) throw Error({node_->file, line}, context() + "a key must be a plain word");
+    if (!entry.first.IsScalar()) node_->refuse_at(line, node_->path, "a key must be a plain word");
     const std::string key = entry.first.Scalar();
     if (std::find(seen.begin(), seen.end(), key) != seen.end()) {
-      throw Error({node_->file, line}, fmt::format("{}'{}' stands here a second time", context(), key));
+      node_->refuse_at(line, node_->path_of(key), fmt::format("'{}' stands here a second time", key));
     }
     seen.push_back(key);
     if (std::find(node_->asked.begin(), node_->asked.end(), key) == node_->asked.end()) {
-      throw Error({node_->file, line},
-                  fmt::format("{}unknown key '{}'{}", context(), key, did_you_mean(key, node_->asked)));
+      node_->refuse_at(line, node_->path_of(key),
+                       fmt::format("unknown key '{}'{}", key, did_you_mean(key, node_->asked)));
     }
   }
 }
@@ -222,16 +233,15 @@ void YamlReader::refuse_missing(const std::string& key) const {
     if (std::find(node_->asked.begin(), node_->asked.end(), there) == node_->asked.end() &&
         nearest_name(there, wanted)) {
       const int line = entry.first.Mark().is_null() ? 0 : entry.first.Mark().line + 1;
-      throw Error({node_->file, line},
-                  fmt::format("{}unknown key '{}'{}", context(), there, did_you_mean(there, wanted)));
+      node_->refuse_at(line, node_->path_of(there),
+                       fmt::format("unknown key '{}'{}", there, did_you_mean(there, wanted)));
     }
   }
-  fail_at(where(), "{}'{}' is missing", context(), key);
+  node_->refuse_at(node_->line(), node_->path_of(key), fmt::format("'{}' is missing", key));
 }
 
 void YamlReader::refuse_name(const std::string& name, const std::vector<std::string>& known) const {
-  fail_at(where(), "{}'{}' is not known{}; allowed is one of: {}", context(), name, did_you_mean(name, known),
-          fmt::join(known, ", "));
+  node_->refuse("'{}' is not known{}; allowed is one of: {}", name, did_you_mean(name, known), fmt::join(known, ", "));
 }
 
 }  // namespace touchstone

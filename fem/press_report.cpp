@@ -26,18 +26,25 @@ void add_fields(const Compliance& gel, const ContactSurface& surface, const Surf
       response.noalias() += compliance.middleCols<3>(3 * v) * snapshot.traction.segment<3>(3 * v);
     }
   }
-  Eigen::MatrixX3d weighted(n, 3);
-  for (int v = 0; v < n; ++v) weighted.row(v) = response.segment<3>(3 * v);
-  s.surface_displacement = mass.solve(weighted);
-  s.largest_gradient = largest_surface_gradient(gel.vertices, gel.triangles, s.surface_displacement);
-  double deepest = 0.0;
-  for (int v = 0; v < n; ++v) {
-    deepest = std::max(deepest, std::abs(surface.normals[v].dot(s.surface_displacement.row(v))));
-  }
-  s.largest_strain = std::max(s.largest_gradient, deepest / gel.thickness);
+  add_displacement(gel, surface, mass, response, s);
 }
 
 }  // namespace
+
+void add_displacement(const Compliance& gel, const ContactSurface& surface, const SurfaceMassFactor& mass,
+                      const Eigen::VectorXd& weighted, PressState& state) {
+  const auto n = static_cast<Eigen::Index>(gel.vertices.size());
+  Eigen::MatrixX3d rows(n, 3);
+  for (Eigen::Index v = 0; v < n; ++v) rows.row(v) = weighted.segment<3>(3 * v);
+  state.surface_displacement = mass.solve(rows);
+  state.largest_gradient = largest_surface_gradient(gel.vertices, gel.triangles, state.surface_displacement);
+  double deepest = 0.0;
+  for (Eigen::Index v = 0; v < n; ++v) {
+    const Eigen::Vector3d& normal = surface.normals[static_cast<std::size_t>(v)];
+    deepest = std::max(deepest, std::abs(normal.dot(state.surface_displacement.row(v))));
+  }
+  state.largest_strain = std::max(state.largest_gradient, deepest / gel.thickness);
+}
 
 PressState report(const Compliance& gel, const PartSolver& solver, const SurfaceMassFactor& mass, PressOutput output,
                   const PressSnapshot& snapshot) {

@@ -2,7 +2,6 @@
 
 #include <tbb/global_control.h>
 #include <tbb/info.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <atomic>
@@ -17,6 +16,7 @@
 #include "lab/prepared_job.h"
 #include "lab/run_folder.h"
 #include "lab/truth_file.h"
+#include "lab/whole_steps.h"
 #include "sensors/event_file.h"
 #include "sim/image_file.h"
 
@@ -92,7 +92,7 @@ class Run {
     truths_.resize(job_.scenes.size());
     Counter counter(progress_, "mechanics", job_.samples);
     const auto count = [&](const std::string&, std::int64_t, std::int64_t) { counter.step(); };
-    tbb::parallel_for(std::size_t{0}, job_.scenes.size(), [&](std::size_t i) {
+    for_each_whole(job_.scenes.size(), [&](std::size_t i) {
       const PreparedScene& scene = job_.scenes[i];
       truths_[i] = source_.play_motion(scene.spec, scene.plan, *gel_, count);
       TS_ASSERT(static_cast<std::int64_t>(truths_[i].size()) == scene.samples);
@@ -122,7 +122,7 @@ class Run {
       }
     }
     Counter counter(progress_, "frames", static_cast<std::int64_t>(missing.size()));
-    tbb::parallel_for(std::size_t{0}, missing.size(), [&](std::size_t i) {
+    for_each_whole(missing.size(), [&](std::size_t i) {
       const SamplePlace place = missing[i];
       record_of(place) = make_pictures(cameras[place.scene], place);
       journal.append(*record_of(place));
@@ -261,7 +261,7 @@ class Run {
     }
     std::vector<SampleSource::Camera> cameras(job_.scenes.size());
     Counter counter(progress_, "cameras", static_cast<std::int64_t>(needed.size()));
-    tbb::parallel_for(std::size_t{0}, needed.size(), [&](std::size_t k) {
+    for_each_whole(needed.size(), [&](std::size_t k) {
       const std::size_t i = needed[k];
       const PreparedScene& scene = job_.scenes[i];
       cameras[i] = source_.set_up_camera(scene.spec, scene.plan, gel_, truths_[i]);

@@ -1,5 +1,8 @@
 #include "lab/run_identity.h"
 
+#include <dlfcn.h>
+#include <link.h>
+
 #include <nlohmann/json.hpp>
 
 #include "core/error.h"
@@ -16,6 +19,18 @@ namespace {
 using nlohmann::ordered_json;
 
 constexpr const char* kFormat = "touchstone-run";
+
+/// The file that this code was loaded from: the running program, or the module within another one (Python's).
+std::string own_file() {
+  Dl_info info;
+  link_map* map = nullptr;
+  const auto* here = reinterpret_cast<const void*>(&program_version);
+  if (dladdr1(here, &info, reinterpret_cast<void**>(&map), RTLD_DL_LINKMAP) != 0 && map != nullptr &&
+      map->l_name != nullptr && *map->l_name != '\0') {
+    return map->l_name;
+  }
+  return "/proc/self/exe";
+}
 
 }  // namespace
 
@@ -34,7 +49,7 @@ RunIdentity identity_of(const PreparedJob& job) {
   for (const InputFile& file : job.inputs) inputs += file.sha256 + "  " + file.name + "\n";
   identity.inputs_sha256 = sha256_of(inputs);
   identity.version = program_version();
-  identity.program_sha256 = sha256_of_file("/proc/self/exe");
+  identity.program_sha256 = sha256_of_file(own_file());
   identity.processor = processor_kind();
   return identity;
 }

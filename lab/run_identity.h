@@ -11,7 +11,7 @@ struct RunIdentity {
   std::string job_sha256;
   std::string inputs_sha256;   ///< over names and checksums of all input files
   std::string version;         ///< of the program
-  std::string program_sha256;  ///< of the running executable: versions don't change while one is developing
+  std::string program_sha256;  ///< of the executable, or Python's module: versions don't change while one is developing
   std::string processor;       ///< its kind (processor.h)
 };
 

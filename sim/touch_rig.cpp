@@ -70,6 +70,7 @@ struct TouchRig::Parts {
     ready = render::make_ready(camera);
     size = {render::size_of(camera).x(), render::size_of(camera).y()};
     imager = sim::imager(device, judged->plan.bands, judged->plan.sensor_noise);
+    ideal_imager = sim::imager(device, judged->plan.bands, false);
     pattern = render::fixed_pattern(imager, size, settings.seed);
     rest_seen = judged->geometry(rest, {});
     rest_hits = render::first_hits(rest_seen.inside, ready);
@@ -119,6 +120,10 @@ struct TouchRig::Parts {
                            imager);
   }
 
+  cv::Mat develop_ideal(const cv::Mat& irradiance) const {
+    return render::develop(render::expose(irradiance, ideal_imager, pattern, 0, 0), ideal_imager);
+  }
+
   DeviceSpec device;
   TouchRigSettings settings;
   bool fit_for_direct = false;
@@ -128,7 +133,7 @@ struct TouchRig::Parts {
   render::Camera camera;
   render::ReadyCamera ready;
   cv::Size size;
-  render::Imager imager;
+  render::Imager imager, ideal_imager;
   render::FixedPattern pattern;
   SeenGeometry rest_seen;
   std::vector<render::FirstHit> rest_hits;
@@ -199,8 +204,10 @@ Touch TouchRig::look(const TouchObject& object, const fem::PressState& press, st
   const SceneSight& sight = *object.sight_;
   const auto relief = sight.relief(press);
   Touch touch;
-  touch.frame = parts_->develop(parts_->light(sight, press, relief), noise_seed, frame);
+  const cv::Mat irradiance = parts_->light(sight, press, relief);
+  touch.frame = parts_->develop(irradiance, noise_seed, frame);
   if (!truth) return touch;
+  touch.ideal = parts_->develop_ideal(irradiance);
   const SeenGeometry seen = sight.geometry(press, relief);
   const std::vector<render::FirstHit> hits = render::first_hits(seen.inside, parts_->ready);
   touch.height = cv::Mat(parts_->size, CV_32F, cv::Scalar(std::numeric_limits<float>::quiet_NaN()));

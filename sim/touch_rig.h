@@ -34,6 +34,7 @@ struct Touch {
   cv::Mat height;   ///< CV_32FC1, mm: how far the membrane that the pixel sees is pressed in, against what the pixel
                     ///< sees at rest, along the gel frame's z; NaN where it sees no membrane
   cv::Mat contact;  ///< CV_8UC1, 255 where the pixel sees membrane that lies on the object
+  cv::Mat ideal;    ///< the frame without noise and fixed pattern
 };
 
 /// An object that can touch a rig's device. Made by TouchRig::object; keeps what all its frames share.

@@ -11,6 +11,7 @@ declare -A allowed=(
   [sim]="core fem render sim"
   [lab]="core fem render sensors sim lab"
   [apps]="core fem render sensors sim lab apps"
+  [python]="core fem render sensors sim lab python"
 )
 folders=$(printf '%s|' "${!allowed[@]}")
 folders=${folders%|}
@@ -38,7 +39,7 @@ check_absent() {
   fi
 }
 check_absent '#include <(embree3|tetgen|dmumps|OpenImageIO|cholmod)' "sensors core" '^$'
-check_absent '#include <embree3' "fem render sim lab apps" '^render/\(ray_scene\|packet_scene\)\.'
+check_absent '#include <embree3' "fem render sim lab apps python" '^render/\(ray_scene\|packet_scene\)\.'
 
 [ "$seen" -gt 0 ] || { echo "no include was read: the test looks at the wrong folder"; exit 1; }
 [ "$wrong" -eq 0 ] || { echo "$wrong wrong arrows"; exit 1; }

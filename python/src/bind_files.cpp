@@ -1,0 +1,101 @@
+// Errors, pictures on disk, and data sets from jobs.
+
+#include <tbb/global_control.h>
+
+#include "core/error.h"
+#include "core/field_error.h"
+#include "core/hdf5_file.h"
+#include "lab/dataset.h"
+#include "lab/scenes_folder.h"
+#include "python/src/bindings.h"
+#include "sim/image_file.h"
+
+namespace touchstone::python {
+namespace {
+
+void set_error(const Error& error, const std::string& field) {
+  const py::object type = py::module_::import("touchstone._errors").attr("Error");
+  const SourceLocation& where = error.where();
+  const py::object instance = type(error.what(), where.file.empty() ? py::object(py::none()) : py::str(where.file),
+                                   where.line <= 0 ? py::object(py::none()) : py::int_(where.line),
+                                   field.empty() ? py::object(py::none()) : py::str(field));
+  PyErr_SetObject(type.ptr(), instance.ptr());
+}
+
+/// The GIL, and the lock that h5py holds while it uses the same library.
+class Hdf5Lock {
+ public:
+  Hdf5Lock() {
+    const py::object h5py = py::module_::import("sys").attr("modules").attr("get")("h5py._objects", py::none());
+    if (h5py.is_none() || !py::hasattr(h5py, "phil")) return;
+    lock_ = h5py.attr("phil");
+    lock_.attr("acquire")();
+  }
+  Hdf5Lock(const Hdf5Lock&) = delete;
+  Hdf5Lock& operator=(const Hdf5Lock&) = delete;
+  ~Hdf5Lock() {
+    if (!lock_) return;
+    const py::error_scope kept;
+    lock_.attr("release")();
+    lock_ = py::object();
+  }
+
+ private:
+  py::gil_scoped_acquire acquire_;  // first in, last out
+  py::object lock_;
+};
+
+py::dict generate(const std::string& job, const std::string& out, int threads, bool timings, const std::string& cache,
+                  const py::object& progress) {
+  if (threads < 0) fail("threads: {} is not allowed; allowed is at least 0 (0: as many as the machine has)", threads);
+  const Progress listener = progress_to(progress);
+  const lab::GenerateReport report = unlocked([&] {
+    lab::GenerateOptions how;
+    how.source = lab::simulator(cache.empty() ? sim::default_cache_folder() : std::filesystem::path(cache));
+    how.threads = threads;
+    how.timings = timings;
+    return lab::generate(job, out, how, listener);
+  });
+  py::dict result;
+  result["was_finished"] = report.was_finished;
+  result["samples"] = report.samples;
+  result["rendered"] = report.rendered;
+  result["kept"] = report.kept;
+  result["warning"] = report.warning;
+  return result;
+}
+
+}  // namespace
+
+void bind_errors(py::module_&) {
+  py::register_exception_translator([](std::exception_ptr thrown) {
+    try {
+      if (thrown) std::rethrow_exception(thrown);
+    } catch (const FieldError& error) {
+      set_error(error, error.field());
+    } catch (const Error& error) {
+      set_error(error, "");
+    }
+  });
+  set_hdf5_guard([]() -> std::shared_ptr<void> { return std::make_shared<Hdf5Lock>(); });
+}
+
+void bind_files(py::module_& module) {
+  module.def(
+      "scenes_folder", [] { return lab::scenes_folder().string(); },
+      "Where the shipped devices, objects and scenes lie.");
+  module.def(
+      "read_image", [](const std::string& path) { return array_of(unlocked([&] { return sim::read_image(path); })); },
+      py::arg("path"), "Reads a picture as it is stored: uint8 or uint16, grey or BGR.");
+  module.def(
+      "write_png",
+      [](const std::string& path, const py::object& image) {
+        const Picture picture = picture_from(image, "image");
+        unlocked([&] { sim::write_png(path, picture.mat); });
+      },
+      py::arg("path"), py::arg("image"), "Writes a PNG: uint8 or uint16, grey or BGR.");
+  module.def("generate", &generate, py::arg("job"), py::arg("out"), py::arg("threads") = 0, py::arg("timings") = true,
+             py::arg("cache") = "", py::arg("progress") = py::none());
+}
+
+}  // namespace touchstone::python

@@ -1,0 +1,155 @@
+// Heights from frames of a coated gel: sensors/height_estimator.h.
+
+#include "core/error.h"
+#include "python/src/bindings.h"
+#include "python/src/estimator.h"
+#include "sensors/height_calibration.h"
+#include "sensors/height_estimator.h"
+#include "sensors/height_model_file.h"
+
+namespace touchstone::python {
+namespace {
+
+using sensors::HeightModel;
+using Heights = Guarded<sensors::HeightEstimator>;
+
+std::optional<sensors::LightCorrection> correction_named(const std::string& name) {
+  if (name == "best") return std::nullopt;
+  if (name == "none") return sensors::LightCorrection::none;
+  if (name == "background") return sensors::LightCorrection::background;
+  if (name == "fitted") return sensors::LightCorrection::fitted;
+  fail("correction: '{}' is not known; allowed is one of: best, none, background, fitted", name);
+}
+
+/// Frames of pressed balls, each with the outline (u, v, radius in pixels) of its touched part, or None to look for it.
+py::tuple calibrate_height(const py::object& frames, const py::object& ball_diameters_mm, const py::object& background,
+                           double mm_per_px, const py::object& circles, const std::string& correction) {
+  const std::vector<Picture> pictures = pictures_from(frames, "frames");
+  const std::vector<Picture> rest = pictures_from(background, "background");
+  const auto diameters = ball_diameters_mm.cast<py::sequence>();
+  const bool circles_given = !circles.is_none();
+  if (diameters.size() != pictures.size()) {
+    fail("ball_diameters_mm: there are {} for {} frames", diameters.size(), pictures.size());
+  }
+  if (circles_given && py::len(circles) != pictures.size()) {
+    fail("circles: there are {} for {} frames", py::len(circles), pictures.size());
+  }
+  std::vector<std::optional<sensors::ContactCircle>> known(pictures.size());
+  std::vector<double> radii_mm;
+  for (std::size_t i = 0; i < pictures.size(); ++i) {
+    radii_mm.push_back(0.5 * py::object(diameters[i]).cast<double>());
+    if (!circles_given) continue;
+    const py::object circle = circles.cast<py::sequence>()[i];
+    if (circle.is_none()) continue;
+    const Eigen::Vector3d numbers = vector3_from(circle, "circles");
+    known[i] = sensors::ContactCircle{numbers.head<2>(), numbers.z()};
+  }
+  sensors::HeightCalibrationSettings settings;
+  settings.mm_per_px = mm_per_px;
+  settings.correction = correction_named(correction);
+  if (!(mm_per_px > 0.0)) fail("mm_per_px: {} is not allowed; allowed is above 0", mm_per_px);
+  const sensors::HeightCalibration made = unlocked([&] {
+    std::vector<cv::Mat> untouched;
+    for (const Picture& picture : rest) untouched.push_back(picture.mat);
+    const sensors::Background mean = sensors::mean_background(untouched);
+    std::vector<sensors::BallPress> presses;
+    for (std::size_t i = 0; i < pictures.size(); ++i) {
+      sensors::BallPress press;
+      press.name = fmt::format("frame {}", i);
+      press.frame = pictures[i].mat;
+      press.ball_radius_mm = radii_mm[i];
+      press.circle = known[i]
+                         ? *known[i]
+                         : sensors::find_contact_circle(press.frame, mean, press.ball_radius_mm, mm_per_px, press.name);
+      presses.push_back(std::move(press));
+    }
+    return sensors::calibrate_height(presses, mean, settings);
+  });
+  py::dict report;
+  report["pixels"] = made.pixels;
+  report["rms_slope_error"] = made.rms_slope_error;
+  report["correction"] = sensors::name_of(made.model.correction);
+  report["steepest_slope"] = made.coverage.steepest_slope;
+  return py::make_tuple(std::make_shared<HeightModel>(made.model), report);
+}
+
+/// A result of its own, apart from the estimator's.
+sensors::HeightResult copy_of(const sensors::HeightResult& result) {
+  sensors::HeightResult copy = result;
+  copy.height_mm = result.height_mm.clone();
+  copy.slope_u = result.slope_u.clone();
+  copy.slope_v = result.slope_v.clone();
+  copy.contact = result.contact.clone();
+  copy.contact.setTo(1, copy.contact != 0);
+  return copy;
+}
+
+std::shared_ptr<Heights> make_estimator(const HeightModel& model, const std::string& border) {
+  sensors::HeightSettings settings;
+  if (border == "free") {
+    settings.border = sensors::HeightBorder::free;
+  } else if (border != "zero") {
+    fail("border: '{}' is not known; allowed is one of: zero, free", border);
+  }
+  return unlocked([&] { return std::make_shared<Heights>(model, settings); });
+}
+
+}  // namespace
+
+void bind_gelsight(py::module_& module) {
+  using sensors::HeightResult;
+  py::class_<HeightModel, std::shared_ptr<HeightModel>>(module, "HeightModel",
+                                                        "What calibrate_height has found of one sensor.")
+      .def_static(
+          "load",
+          [](const std::string& path) { return std::make_shared<HeightModel>(sensors::load_height_model(path)); },
+          py::arg("path"), "Reads a model file.")
+      .def(
+          "save", [](const HeightModel& self, const std::string& path) { sensors::save(self, path); }, py::arg("path"),
+          "Writes it, whole or not at all.")
+      .def_readonly("mm_per_px", &HeightModel::mm_per_px, "Of the membrane.")
+      .def_readonly("presses", &HeightModel::presses, "That it was made of.")
+      .def_property_readonly(
+          "picture_shape",
+          [](const HeightModel& self) { return py::make_tuple(self.background.mean.rows, self.background.mean.cols); },
+          "(height, width).");
+  module.def(
+      "calibrate_height", &calibrate_height, py::arg("frames"), py::arg("ball_diameters_mm"), py::arg("background"),
+      py::kw_only(), py::arg("mm_per_px"), py::arg("circles") = py::none(), py::arg("correction") = "best",
+      "Learns from frames of pressed balls: returns (HeightModel, report).\n\n"
+      "frames: pictures, uint8, BGR. ball_diameters_mm: one each. background: frames of the untouched gel.\n"
+      "mm_per_px: of the membrane. circles: for each frame (u, v, radius) in pixels of the touched part, or None to "
+      "look for it.\ncorrection: of colours for the place: 'none', 'background', 'fitted' lamps or the 'best'.");
+
+  py::class_<HeightResult>(module, "HeightResult", "What one frame gives; arrays are its own memory.")
+      .def_property_readonly(
+          "height_mm", [](const HeightResult& self) { return array_of(self.height_mm); },
+          "float32: pressed in is positive.")
+      .def_property_readonly(
+          "slope_u", [](const HeightResult& self) { return array_of(self.slope_u); },
+          "float32: derivative of the height along u (right).")
+      .def_property_readonly(
+          "slope_v", [](const HeightResult& self) { return array_of(self.slope_v); }, "float32: along v (down).")
+      .def_property_readonly(
+          "contact", [](const HeightResult& self) { return bool_array_of(self.contact); },
+          "bool: higher than floor and share of the highest point.")
+      .def_readonly("contact_pixels", &HeightResult::contact_pixels, "In contact.")
+      .def_readonly("saturated_share", &HeightResult::saturated_share, "Of the pixels.")
+      .def_readonly("dark_share", &HeightResult::dark_share, "Of the pixels.")
+      .def_readonly("contact_at_border", &HeightResult::contact_at_border, "The contact runs out of the picture.")
+      .def_property_readonly("trusted", &HeightResult::trusted, "Neither overexposed nor dark.");
+  py::class_<Heights, std::shared_ptr<Heights>>(
+      module, "HeightEstimator",
+      "Frame in, height map out. HeightEstimator(model, *, border='zero'); border 'free' where contacts run out of the "
+      "picture. Calls from several threads wait for each other.")
+      .def(py::init(&make_estimator), py::arg("model"), py::kw_only(), py::arg("border") = "zero")
+      .def(
+          "estimate",
+          [](Heights& self, const py::object& frame) {
+            const Picture picture = picture_from(frame, "frame");
+            return self.with([&](auto& estimator) { return copy_of(estimator.estimate(picture.mat)); });
+          },
+          py::arg("frame"), "The HeightResult of a frame, uint8, BGR, of the model's size.");
+}
+
+}  // namespace touchstone::python

@@ -1,0 +1,20 @@
+#pragma once
+// What each part of the module adds to it.
+
+#include "python/src/convert.h"
+#include "python/src/sensor.h"
+
+namespace touchstone::python {
+
+/// An Object, or what makes one. @throws Error
+SharedObject object_from(const py::handle& value);
+
+void bind_errors(py::module_& module);
+void bind_files(py::module_& module);
+void bind_sensor(py::module_& module);
+void bind_session(py::module_& module);
+void bind_gelsight(py::module_& module);
+void bind_vhs(py::module_& module);
+void bind_chroma(py::module_& module);
+
+}  // namespace touchstone::python

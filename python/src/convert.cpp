@@ -1,0 +1,206 @@
+#include "python/src/convert.h"
+
+#include <cmath>
+#include <string>
+
+#include "core/error.h"
+
+namespace touchstone::python {
+namespace {
+
+std::string shape_text(const py::array& array) {
+  std::string text = "(";
+  for (py::ssize_t i = 0; i < array.ndim(); ++i) text += (i > 0 ? ", " : "") + std::to_string(array.shape(i));
+  return text + ")";
+}
+
+py::array_t<double, py::array::c_style | py::array::forcecast> doubles_from(const py::handle& value, const char* what) {
+  auto array = py::array_t<double, py::array::c_style | py::array::forcecast>::ensure(value);
+  if (!array) {
+    PyErr_Clear();
+    fail("{}: an array of numbers is needed, this is a {}", what, std::string(py::str(py::type::of(value))));
+  }
+  for (py::ssize_t i = 0; i < array.size(); ++i) {
+    if (!std::isfinite(array.data()[i])) fail("{}: number {} of it is {}; it must be finite", what, i, array.data()[i]);
+  }
+  return array;
+}
+
+/// Keeps what the listener is for as long as any thread may call it, and lets go of it under the GIL.
+std::shared_ptr<py::object> shared_under_gil(const py::object& object) {
+  return {new py::object(object), [](py::object* held) {
+            const py::gil_scoped_acquire acquire;
+            delete held;
+          }};
+}
+
+template <int N>
+std::vector<Eigen::Matrix<double, N, 1>> points_from(const py::handle& value, const char* what) {
+  const std::vector<double> numbers = numbers_from(value, N, what);
+  std::vector<Eigen::Matrix<double, N, 1>> points;
+  for (std::size_t i = 0; i < numbers.size(); i += N) {
+    points.emplace_back(Eigen::Map<const Eigen::Matrix<double, N, 1>>(&numbers[i]));
+  }
+  return points;
+}
+
+template <int N>
+Eigen::Matrix<double, N, 1> vector_from(const py::handle& value, const char* what) {
+  const auto array = doubles_from(value, what);
+  if (array.ndim() != 1 || array.shape(0) != N) {
+    fail("{}: {} numbers are needed, this has shape {}", what, N, shape_text(array));
+  }
+  return Eigen::Map<const Eigen::Matrix<double, N, 1>>(array.data());
+}
+
+template <typename Point>
+py::array points_in_rows(const std::vector<Point>& points) {
+  const py::ssize_t columns = Point::RowsAtCompileTime;
+  py::array_t<double> out({static_cast<py::ssize_t>(points.size()), columns});
+  double* to = out.mutable_data();
+  for (const Point& point : points) {
+    for (py::ssize_t j = 0; j < columns; ++j) *to++ = point[j];
+  }
+  return out;
+}
+
+py::object array_on(const cv::Mat& picture, const py::dtype& type) {
+  if (picture.empty()) return py::none();
+  auto* kept = new cv::Mat(picture);
+  const py::capsule owner(kept, [](void* mat) { delete static_cast<cv::Mat*>(mat); });
+  const auto item = static_cast<py::ssize_t>(picture.elemSize1());
+  std::vector<py::ssize_t> shape{picture.rows, picture.cols};
+  std::vector<py::ssize_t> strides{static_cast<py::ssize_t>(picture.step[0]),
+                                   static_cast<py::ssize_t>(picture.elemSize())};
+  if (picture.channels() > 1) {
+    shape.push_back(picture.channels());
+    strides.push_back(item);
+  }
+  return py::array(type, shape, strides, kept->data, owner);
+}
+
+}  // namespace
+
+Picture picture_from(const py::handle& value, const char* what) {
+  if (!py::isinstance<py::array>(value)) {
+    fail("{}: a NumPy array is needed, this is a {}", what, std::string(py::str(py::type::of(value))));
+  }
+  py::array array = py::reinterpret_borrow<py::array>(value);
+  const bool colour = array.ndim() == 3 && array.shape(2) == 3;
+  const char kind = array.dtype().kind();
+  const auto item = array.itemsize();
+  if ((array.ndim() != 2 && !colour) || kind != 'u' || (item != 1 && item != 2) || array.size() == 0) {
+    fail(
+        "{}: a picture is an array of uint8 or uint16 of shape (height, width) or (height, width, 3) in BGR order; "
+        "this "
+        "is {} of shape {}",
+        what, std::string(py::str(array.dtype())), shape_text(array));
+  }
+  const py::ssize_t channels = colour ? 3 : 1;
+  const bool packed = array.strides(1) == item * channels && (!colour || array.strides(2) == item) &&
+                      array.strides(0) >= array.shape(1) * item * channels;
+  if (!packed) array = py::array::ensure(array, py::array::c_style);
+  if (!array.dtype().equal(array.dtype().attr("newbyteorder")("="))) {
+    fail("{}: its numbers are in a foreign byte order", what);
+  }
+  const int type = CV_MAKETYPE(item == 1 ? CV_8U : CV_16U, static_cast<int>(channels));
+  // Estimators only read.
+  cv::Mat mat(static_cast<int>(array.shape(0)), static_cast<int>(array.shape(1)), type, const_cast<void*>(array.data()),
+              static_cast<std::size_t>(array.strides(0)));
+  return {std::move(array), std::move(mat)};
+}
+
+std::vector<Picture> pictures_from(const py::handle& value, const char* what) {
+  std::vector<Picture> pictures;
+  for (const py::handle one : py::reinterpret_borrow<py::object>(value)) pictures.push_back(picture_from(one, what));
+  if (pictures.empty()) fail("{}: no picture is given", what);
+  return pictures;
+}
+
+py::object array_of(const cv::Mat& picture) {
+  switch (picture.depth()) {
+    case CV_8U:
+      return array_on(picture, py::dtype::of<std::uint8_t>());
+    case CV_16U:
+      return array_on(picture, py::dtype::of<std::uint16_t>());
+    case CV_32F:
+      return array_on(picture, py::dtype::of<float>());
+    default:
+      TS_ASSERT(picture.depth() == CV_64F);
+      return array_on(picture, py::dtype::of<double>());
+  }
+}
+
+py::object bool_array_of(const cv::Mat& mask) {
+  TS_ASSERT(mask.empty() || mask.type() == CV_8UC1);
+  return array_on(mask, py::dtype::of<bool>());
+}
+
+py::array pose_array(const RigidTransform& pose) {
+  Eigen::Matrix<double, 3, 4> rows;
+  rows << pose.rotation, pose.translation;
+  return small_array(rows);
+}
+
+py::array points_array(const std::vector<Eigen::Vector2d>& points) {
+  return points_in_rows(points);
+}
+
+py::array points_array(const std::vector<Eigen::Vector3d>& points) {
+  return points_in_rows(points);
+}
+
+std::vector<double> numbers_from(const py::handle& value, py::ssize_t columns, const char* what) {
+  const auto array = doubles_from(value, what);
+  if (array.ndim() != 2 || array.shape(1) != columns) {
+    fail("{}: an array of shape (n, {}) is needed, this has {}", what, columns, shape_text(array));
+  }
+  return {array.data(), array.data() + array.size()};
+}
+
+Eigen::Vector2d vector2_from(const py::handle& value, const char* what) {
+  return vector_from<2>(value, what);
+}
+
+Eigen::Vector3d vector3_from(const py::handle& value, const char* what) {
+  return vector_from<3>(value, what);
+}
+
+std::vector<Eigen::Vector2d> points2_from(const py::handle& value, const char* what) {
+  return points_from<2>(value, what);
+}
+
+std::vector<Eigen::Vector3d> points3_from(const py::handle& value, const char* what) {
+  return points_from<3>(value, what);
+}
+
+RigidTransform pose_from(const py::handle& value, const char* what) {
+  const auto array = doubles_from(value, what);
+  const bool square = array.ndim() == 2 && array.shape(0) == 4 && array.shape(1) == 4;
+  if (!square && !(array.ndim() == 2 && array.shape(0) == 3 && array.shape(1) == 4)) {
+    fail("{}: a pose is an array of shape (3, 4) or (4, 4), rotation and then translation in mm; this has {}", what,
+         shape_text(array));
+  }
+  const double* row = array.data();
+  RigidTransform pose;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) pose.rotation(i, j) = row[4 * i + j];
+    pose.translation[i] = row[4 * i + 3];
+  }
+  if (square && (row[12] != 0.0 || row[13] != 0.0 || row[14] != 0.0 || row[15] != 1.0)) {
+    fail("{}: the last row of a pose of shape (4, 4) is 0 0 0 1; this has {} {} {} {}", what, row[12], row[13], row[14],
+         row[15]);
+  }
+  return pose;
+}
+
+Progress progress_to(const py::object& listener) {
+  const std::shared_ptr<py::object> held = listener.is_none() ? nullptr : shared_under_gil(listener);
+  return [held](const std::string& stage, std::int64_t done, std::int64_t total) {
+    const py::gil_scoped_acquire acquire;
+    if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+    if (held) (*held)(stage, done, total);
+  };
+}
+
+}  // namespace touchstone::python

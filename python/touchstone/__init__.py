@@ -1,0 +1,100 @@
+"""Touchstone: simulated vision-based tactile sensors, their true forces, and estimators, over NumPy arrays.
+
+    import touchstone as ts
+    sensor = ts.Sensor("gelsight-flat")
+    touch = sensor.press("ball-8mm", force_N=2.0)
+    touch.frame, touch.height_mm, touch.force_N, touch.force_error_N
+
+Lengths are in mm, forces in N, pressures in MPa, times in s, angles in degrees where a name says so. The gel frame has
+its origin in the middle of the gel's undeformed outer surface and z out of the gel; a wrench is the one on the object,
+so pressing gives a positive z. Pictures are BGR, as OpenCV's. See docs/python.md.
+"""
+
+import os as _os
+import warnings as _warnings
+
+from ._errors import Error
+
+
+def _find_installed_scenes():
+    """An installed package lies in PREFIX/lib/python3/dist-packages, the scenes in PREFIX/share/touchstone."""
+    if _os.environ.get("TOUCHSTONE_SCENES"):
+        return
+    prefix = _os.path.abspath(_os.path.join(_os.path.dirname(__file__), *[_os.pardir] * 4))
+    scenes = _os.path.join(prefix, "share", "touchstone", "scenes")
+    if _os.path.isdir(_os.path.join(scenes, "devices")):
+        _os.environ["TOUCHSTONE_SCENES"] = scenes
+
+
+_find_installed_scenes()
+
+from . import _core  # noqa: E402
+from ._core import (  # noqa: E402
+    BeadTracker,
+    ColourMarkerReader,
+    ColourMarkerReading,
+    ForceEstimate,
+    HeightEstimator,
+    HeightModel,
+    HeightResult,
+    HueEstimator,
+    HueField,
+    HueModel,
+    Object,
+    Reading,
+    Sensor,
+    Session,
+    StiffnessForceModel,
+    Touch,
+    TrackedBeads,
+    calibrate_height,
+    calibrate_hue,
+    read_image,
+    scenes_folder,
+    train_stiffness,
+    write_png,
+)
+from ._core import __version__  # noqa: E402
+from .dataset import Dataset  # noqa: E402
+
+# OpenBLAS's names of x86 processors without AVX2: what it says of one that it doesn't know (apps/blas_kind.cpp).
+_OLD_CORES = {"Generic", "Katmai", "Coppermine", "Northwood", "Prescott", "Banias", "Core2", "Penryn", "Dunnington",
+              "Atom", "Nehalem", "Athlon", "Opteron", "Nano", "Opteron_SSE3", "Barcelona", "Bobcat", "Unknown",
+              "Sandybridge"}
+
+
+def _warn_of_slow_blas():
+    instructions = _core.vector_instructions()
+    if instructions == "baseline" or _core.blas_core() not in _OLD_CORES:
+        return
+    wanted = "SkylakeX" if instructions == "avx512" else "Haswell"
+    _warnings.warn(f"OpenBLAS takes this processor for '{_core.blas_core()}' and will be slow; start Python with "
+                   f"OPENBLAS_CORETYPE={wanted}", RuntimeWarning, stacklevel=3)
+
+
+_warn_of_slow_blas()
+
+
+def generate(job, out, *, threads=0, timings=True, cache=None, progress=None):
+    """Makes the data set of a job file in folder `out`, or goes on with one that was broken off.
+
+    The same as `touchstone generate`: the same job gives the same bytes. Ctrl-C breaks it off; the same call goes on.
+
+    threads: at most so many; 0: as many as the machine has.
+    timings: put wall times in dataset.json; without them the whole folder is the same in every run.
+    cache: folder of set-up results; None: $TOUCHSTONE_CACHE or ~/.cache/touchstone.
+    progress: called as progress(stage, done, total), also from other threads; what it raises ends the run.
+
+    Returns a dict: was_finished, samples, rendered, kept, warning (of a damaged cache; empty).
+    Raises Error for a mistake in the job, a folder with anything else in it, a full disk.
+    """
+    return _core.generate(_os.fspath(job), _os.fspath(out), threads=threads, timings=timings,
+                          cache=_os.fspath(cache) if cache is not None else "", progress=progress)
+
+
+__all__ = [
+    "BeadTracker", "ColourMarkerReader", "ColourMarkerReading", "Dataset", "Error", "ForceEstimate", "HeightEstimator",
+    "HeightModel", "HeightResult", "HueEstimator", "HueField", "HueModel", "Object", "Reading", "Sensor", "Session",
+    "StiffnessForceModel", "Touch", "TrackedBeads", "calibrate_height", "calibrate_hue", "generate", "read_image",
+    "scenes_folder", "train_stiffness", "write_png",
+]

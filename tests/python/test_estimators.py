@@ -1,0 +1,140 @@
+"""Estimators over a user's own arrays; their own tests are in tests/sensors."""
+
+import threading
+
+import numpy as np
+import pytest
+
+import touchstone as ts
+
+
+def beads_picture(places, size=(240, 320), radius=8.0):
+    rows, columns = np.mgrid[:size[0], :size[1]] + 0.5
+    cover = np.zeros(size)
+    for x, y in places:
+        cover = np.maximum(cover, np.clip(radius + 0.5 - np.hypot(columns - x, rows - y), 0, 1))
+    return np.round(200 - 150 * cover).astype(np.uint8)
+
+
+REST = np.array([(160 + 60 * i, 120 + 60 * j) for j in (-1, 0, 1) for i in (-1, 0, 1)], float)
+
+
+def test_beads_are_followed_and_a_force_is_learnt_and_read():
+    tracker = ts.BeadTracker(grid=3, roi_a_px=200)
+    rest = tracker.track(beads_picture(REST), 0)
+    assert rest.found == 9 and set(rest.status) == {"found"}
+    assert abs(rest.positions_px - REST).max() < 0.1
+    rng = np.random.default_rng(4)
+    shifts = rng.uniform(-3, 3, (60, 2))
+    spread = rng.uniform(0, 0.05, 60)
+    positions = [rest.positions_px + shift + s * (REST - REST.mean(axis=0)) for shift, s in zip(shifts, spread)]
+    forces = np.column_stack([0.3 * shifts, 20 * spread])
+    trained = ts.train_stiffness(rest.positions_px, positions, forces)
+    model = trained["model"]
+    assert (trained["rms_error_N"] < 0.02).all() and (trained["r2"] > 0.99).all()
+    moved = tracker.track(beads_picture(REST + (2.0, -1.0)), 33000)
+    estimate = model.estimate(moved, rest=rest.positions_px)
+    assert estimate.beads_missing == 0 and estimate.t_us == 33000
+    assert estimate.force_N == pytest.approx([0.6, -0.3, 0], abs=0.08)
+    with pytest.raises(ts.Error, match="times must increase"):
+        tracker.track(beads_picture(REST), 33000)
+    with pytest.raises(ts.Error, match="rest: 2 positions are given"):
+        model.estimate(moved, rest=REST[:2])
+
+
+def test_a_model_is_kept_to_the_bit(tmp_path):
+    rest = REST
+    positions = [rest + (k, 0.5 * k) + 0.01 * k * (rest - rest.mean(axis=0)) for k in range(6)]
+    model = ts.train_stiffness(rest, positions, [(k, 0.5 * k, 2 * k) for k in range(6)])["model"]
+    path = str(tmp_path / "model.json")
+    model.save(path)
+    again = ts.StiffnessForceModel.load(path)
+    assert np.array_equal(again.rest_px, model.rest_px) and again.grid == 3
+    (tmp_path / "model.json").write_text("{}")
+    with pytest.raises(ts.Error, match="model.json"):
+        ts.StiffnessForceModel.load(path)
+
+
+def test_settings_out_of_range_name_themselves():
+    with pytest.raises(ts.Error, match="polarity: 'grey' is not known"):
+        ts.BeadTracker(polarity="grey")
+    with pytest.raises(ts.Error, match="form: 'x' is not known"):
+        ts.train_stiffness(REST, [REST], [(1, 0, 0)], form="x")
+    with pytest.raises(ts.Error, match="grid"):
+        ts.BeadTracker(grid=1)
+
+
+def markers_picture(shift=(0.0, 0.0), side=16.0, spacing=40.0, grid=4):
+    """Yellow films of 20 px, soft magenta squares seen through them and beside them; rims are antialiased."""
+    size = int(spacing * (grid + 1.5))
+    rows, columns = np.mgrid[:size, :size] + 0.5
+
+    def square(x, y, width):
+        along = [np.clip(width / 2 + 0.5 - abs(at - c), 0, 1) for at, c in ((columns, x), (rows, y))]
+        return along[0] * along[1]
+
+    white = np.full((size, size, 3), 220.0)  # BGR
+    for j in range(grid):
+        for i in range(grid):
+            x, y = spacing * (i + 1.25), spacing * (j + 1.25)
+            ink = square(x + shift[0] + 4, y + shift[1] + 4, side)
+            film = square(x, y, 20.0)
+            white[..., 1] *= 1 - 0.85 * ink
+            white[..., 0] *= 1 - 0.85 * film
+    return np.round(white).astype(np.uint8)
+
+
+def test_coloured_markers_are_read_and_their_motion_learnt(tmp_path):
+    reader = ts.ColourMarkerReader(markers_picture(), grid=(4, 4))
+    rest = reader.rest
+    assert rest.grid == (4, 4) and set(rest.flaws) == {"none"}
+    MM_PER_PX = 3.0 / 40.0
+    samples = []
+    for series, (x, y, growth) in enumerate((x, y, g) for x in (-3, 0, 3) for y in (-3, 0, 3) for g in (0, 1, 2)):
+        reading = reader.read(markers_picture((x, y), 16.0 + growth))
+        for marker in range(16):
+            if reading.flaws[marker] == "none":
+                samples.append((reading, marker, (x * MM_PER_PX, y * MM_PER_PX, -0.2 * growth), series))
+    model = ts.calibrate_hue(rest, samples, spacing_mm=3.0)
+    assert model.samples == len(samples) and model.rms_error_mm < 0.15
+    path = str(tmp_path / "hue.json")
+    model.save(path)
+    estimator = ts.HueEstimator(ts.HueModel.load(path), rest)
+    field = estimator.estimate(reader.read(markers_picture((2, -1), 17.0)))
+    assert field.measured.all() and not field.extrapolated.any()
+    wanted = (2 * MM_PER_PX, -1 * MM_PER_PX, -0.2)
+    assert abs(field.displacement_mm.mean(axis=0) - wanted).max() < 0.06
+    still = estimator.estimate(rest)
+    assert abs(still.displacement_mm).max() < 1e-12
+    with pytest.raises(ts.Error, match="marker 16"):
+        ts.calibrate_hue(rest, [(rest, 16, (0, 0, 0), 0)], spacing_mm=3.0)
+
+
+def test_heights_are_checked_and_shared_between_threads(sensor, ball):
+    background = [sensor.background(frame=k) for k in range(2)]
+    touch = sensor.press(ball, depth_mm=0.4)
+    frame = touch.frame
+    circle = (*sensor.pixel_from_gel((0, 0)), np.sqrt(touch.contact.sum() / np.pi))
+    model, report = ts.calibrate_height([frame], [3.0], background, mm_per_px=sensor.mm_per_px, circles=[circle])
+    assert report["pixels"] > 30 and model.picture_shape == sensor.picture_shape
+    estimator = ts.HeightEstimator(model)
+    one = estimator.estimate(frame)
+    kept = one.height_mm.copy()
+    many = [None] * 4
+    threads = [threading.Thread(target=lambda k=k: many.__setitem__(k, estimator.estimate(background[k % 2])))
+               for k in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert np.array_equal(one.height_mm, kept), "a result isn't overwritten by later frames"
+    assert np.array_equal(many[0].height_mm, many[2].height_mm)
+    assert one.contact.any() and not many[0].contact.any()
+    with pytest.raises(ts.Error, match="80 x 60|60 x 80|size"):
+        estimator.estimate(frame[:50])
+    with pytest.raises(ts.Error, match="there are 2 for 1 frames"):
+        ts.calibrate_height([frame], [3.0, 4.0], background, mm_per_px=0.1)
+    with pytest.raises(ts.Error, match="no picture is given"):
+        ts.calibrate_height([], [], background, mm_per_px=0.1)
+    with pytest.raises(ts.Error, match="border: 'open' is not known"):
+        ts.HeightEstimator(model, border="open")
