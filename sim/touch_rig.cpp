@@ -199,7 +199,8 @@ Touch TouchRig::look(const TouchObject& object, const fem::PressState& press, st
   const SceneSight& sight = *object.sight_;
   const auto relief = sight.relief(press);
   Touch touch;
-  touch.frame = parts_->develop(parts_->light(sight, press, relief), noise_seed, frame);
+  touch.light = parts_->light(sight, press, relief);
+  touch.frame = parts_->develop(touch.light, noise_seed, frame);
   if (!truth) return touch;
   const SeenGeometry seen = sight.geometry(press, relief);
   const std::vector<render::FirstHit> hits = render::first_hits(seen.inside, parts_->ready);
@@ -217,6 +218,14 @@ Touch TouchRig::look(const TouchObject& object, const fem::PressState& press, st
 
 cv::Mat TouchRig::background(std::uint64_t noise_seed, int frame) const {
   return parts_->develop(parts_->background_light, noise_seed, frame);
+}
+
+const cv::Mat& TouchRig::background_light() const {
+  return parts_->background_light;
+}
+
+cv::Mat TouchRig::develop(const cv::Mat& light, std::uint64_t noise_seed, int frame) const {
+  return parts_->develop(light, noise_seed, frame);
 }
 
 }  // namespace touchstone::sim

@@ -11,6 +11,7 @@ declare -A allowed=(
   [sim]="core fem render sim"
   [lab]="core fem render sensors sim lab"
   [apps]="core fem render sensors sim lab apps"
+  [testing]="core sim lab testing"
 )
 folders=$(printf '%s|' "${!allowed[@]}")
 folders=${folders%|}
