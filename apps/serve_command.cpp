@@ -76,9 +76,11 @@ void say_where(const ServeOptions& options, const FrameServer& server) {
              server.port());
 }
 
-void wait_until_stopped() {
-  std::fflush(stdout);
+/// Says `last`, the line at which who started the program knows that it serves, and waits.
+void wait_until_stopped(const std::string& last) {
   StopSignal stop;
+  fmt::print("{}; Ctrl-C stops\n", last);
+  std::fflush(stdout);
   stop.wait();
 }
 
@@ -117,8 +119,7 @@ void serve_scene(const ServeOptions& options, const GlobalOptions& global) {
   const FrameServer server(camera, settings);
   say_where(options, server);
   if (events) fmt::print("events: tcp://{}:{} (EVT 3.0)\n", options.address, events->port());
-  fmt::print("{} frames again and again at {:g} Hz; Ctrl-C stops\n", feed.states.size(), rate);
-  wait_until_stopped();
+  wait_until_stopped(fmt::format("{} frames again and again at {:g} Hz", feed.states.size(), rate));
 }
 
 /// Objects that may press a device: the shipped ones and those of the command line, by name.
@@ -194,8 +195,7 @@ void serve_device(const ServeOptions& options, const GlobalOptions& global) {
   say_where(options, server);
   fmt::print("press: curl -X POST 'http://{}:{}/press?object={}&x_mm=0&y_mm=0&force_N=1' (/release)\n", options.address,
              server.port(), usual);
-  fmt::print("{} untouched at {:g} Hz; Ctrl-C stops\n", spec.name, rate);
-  wait_until_stopped();
+  wait_until_stopped(fmt::format("{}, untouched, at {:g} Hz", spec.name, rate));
 }
 
 void serve(const ServeOptions& options, const GlobalOptions& global) {

@@ -58,8 +58,8 @@ constexpr const char* kViewerCode = R"(
   renderer.setClearColor(0xeeeeff);
   place.appendChild(renderer.domElement);
   const scene = new THREE.Scene();
-  scene.add(new THREE.HemisphereLight(0xffffff, 0x888888, 1.0));
-  const lamp = new THREE.DirectionalLight(0xffffff, 1.2);
+  scene.add(new THREE.HemisphereLight(0xffffff, 0x666666, 0.55));
+  const lamp = new THREE.DirectionalLight(0xffffff, 0.5);
   lamp.position.set(1, 2, 1.5);
   scene.add(lamp);
   const camera = new THREE.PerspectiveCamera(35, 1, 0.001, 10);

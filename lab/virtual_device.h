@@ -79,7 +79,7 @@ class VirtualObject {
 /// noise seed give the same bytes.
 class VirtualDevice {
  public:
-  /// @throws Error for a device without a camera, or with a milky or a curved clear gel, which scenes can't show either
+  /// @throws Error for a device without a camera, or that scenes can't show either (a curved gel without a coating)
   VirtualDevice(sim::DeviceSpec device, const std::filesystem::path& cache_folder,
                 const VirtualDeviceSettings& settings = {});
   ~VirtualDevice();
