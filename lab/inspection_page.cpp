@@ -278,26 +278,30 @@ std::string overlays(const InspectedSet& set, const std::optional<PreparedJob>& 
 }
 
 std::string plans(const InspectedSet& set) {
-  // Scenes of equal plans share a table.
-  std::vector<std::pair<std::string, std::string>> tables;  // rows, scenes
+  // Scenes with the same effects share a table, whose reasons are those of the first of them.
+  struct Table {
+    std::string effects, rows, scenes;
+  };
+  std::vector<Table> tables;
   for (const InspectedScene& scene : set.scenes) {
-    std::string rows;
+    Table table{{}, {}, scene.name};
     for (const sim::Effect& effect : scene.plan) {
-      rows += fmt::format("<tr{}>{}{}{}{}</tr>\n", effect.on ? "" : " class=\"off\"", cell(effect.name),
-                          cell(effect.on ? "on" : "off"), cell(effect.why), cell(effect.cost));
+      table.effects += effect.name + (effect.on ? " on\n" : " off\n");
+      table.rows += fmt::format("<tr{}>{}{}{}{}</tr>\n", effect.on ? "" : " class=\"off\"", cell(effect.name),
+                                cell(effect.on ? "on" : "off"), cell(effect.why), cell(effect.cost));
     }
     const auto known =
-        std::find_if(tables.begin(), tables.end(), [&](const auto& table) { return table.first == rows; });
+        std::find_if(tables.begin(), tables.end(), [&](const Table& other) { return other.effects == table.effects; });
     if (known == tables.end()) {
-      tables.emplace_back(rows, scene.name);
+      tables.push_back(std::move(table));
     } else {
-      known->second += ", " + scene.name;
+      known->scenes += ", " + scene.name;
     }
   }
-  std::string html;
-  for (const auto& [rows, scenes] : tables) {
+  std::string html = "<p class=\"note\">Figures in the reasons are those of the first scene named.</p>\n";
+  for (const Table& table : tables) {
     html += fmt::format("<h3>{}</h3>\n<table><tr><th>effect</th><th></th><th>why</th><th>cost</th></tr>\n{}</table>\n",
-                        escape_markup(scenes), rows);
+                        escape_markup(table.scenes), table.rows);
   }
   return html;
 }

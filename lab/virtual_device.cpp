@@ -110,9 +110,9 @@ double way_to_touch(const fem::ContactShape& felt, const fem::Compliance& gel, c
     for (bool better = true; better;) {
       better = false;
       const Eigen::Vector3d from = where;
-      for (const auto& [x, y] : std::array<std::array<double, 2>, 8>{
-               {{-1, -1}, {-1, 0}, {-1, 1}, {0, -1}, {0, 1}, {1, -1}, {1, 0}, {1, 1}}}) {
-        const Eigen::Vector3d to = from + step * Eigen::Vector3d(x, y, 0);
+      for (int k = 0; k < kWays; ++k) {
+        const double angle = 2.0 * kPi * k / kWays;
+        const Eigen::Vector3d to = from + step * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0);
         const bool inside = (to.head<2>().array() >= low.array()).all() && (to.head<2>().array() <= high.array()).all();
         if (inside && look(to)) better = true;
       }

@@ -24,8 +24,8 @@ namespace touchstone::lab {
 struct Hold {
   Eigen::Vector2d place_mm = Eigen::Vector2d::Zero();    ///< of the object's origin, gel frame
   Eigen::Vector3d angles_deg = Eigen::Vector3d::Zero();  ///< about the fixed axes x, then y, then z
-  std::optional<double> force_N;                         ///< normal, on the object; above 0
-  std::optional<double> depth_mm;                        ///< how far it is lowered beyond its first touch; above 0
+  std::optional<double> force_N = {};                    ///< normal, on the object; above 0
+  std::optional<double> depth_mm = {};                   ///< how far it is lowered beyond its first touch; above 0
   Eigen::Vector2d drag_mm = Eigen::Vector2d::Zero();     ///< then moved along the gel, its force or height being held
 };
 

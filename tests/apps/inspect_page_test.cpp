@@ -59,9 +59,9 @@ TEST_F(InspectPage, HoldsPicturesPlotsAndReasons) {
   for (const char* part :
        {"<h1>small-job</h1>", ">force z</text>", ">object&#39;s x</text>", "<h2>Error bars</h2>",
         "<td>friction</td><td>on</td>", "<h3>middle, beside</h3>", "<td>/wrench</td>", "scenes:\n  - {name: middle"}) {
-    EXPECT_THAT(*html_, HasSubstr(part));
+    EXPECT_NE(html_->find(part), std::string::npos) << part;  // without printing the page
   }
-  EXPECT_THAT(*html_, Not(HasSubstr("Less is drawn"))) << "the job is known";
+  EXPECT_EQ(count("Less is drawn"), 0) << "the job is known";
 }
 
 TEST_F(InspectPage, NeedsNothingElse) {
@@ -103,9 +103,9 @@ TEST_F(InspectPage, ShowsInABrowserWithoutErrors) {
   if (run_words({"/bin/sh", "-c", "command -v chromium"}).exit_code != 0) GTEST_SKIP() << "there is no chromium";
   const ProgramRun run = run_words(
       {"/bin/sh", "-c",
-       "HOME=\"$1\" timeout 120 chromium --headless --no-sandbox --disable-dev-shm-usage --use-angle=swiftshader "
+       "HOME=\"$1\" timeout 900 chromium --headless --no-sandbox --disable-dev-shm-usage --use-angle=swiftshader "
        "--enable-unsafe-swiftshader --enable-logging=stderr --user-data-dir=\"$1/profile\" "
-       "--window-size=1300,2400 --virtual-time-budget=20000 --screenshot=\"$1/page.png\" --dump-dom "
+       "--window-size=800,600 --virtual-time-budget=20000 --screenshot=\"$1/page.png\" --dump-dom "
        "\"file://$1/page.html\"",
        "sh", folder_->path().string()});
   ASSERT_EQ(run.exit_code, 0) << run.err;

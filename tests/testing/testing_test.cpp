@@ -197,7 +197,7 @@ TEST(Matchers, KeepTheFramesThatFailedWhereAsked) {
 }
 
 TEST(Matchers, PicturesArePrintedByTheirSize) {
-  EXPECT_EQ(::testing::PrintToString(held_ball().frame), "80 x 60 pixels of CV_8UC3");
+  EXPECT_EQ(::testing::PrintToString(held_ball().frame), "80 x 60 pixels of CV_8UC1");
 }
 
 TEST(ShippedThings, AreFoundByNameOrListed) {
