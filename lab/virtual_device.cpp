@@ -17,8 +17,9 @@
 namespace touchstone::lab {
 namespace {
 
-constexpr double kClearance_mm = 0.1;              // above the gel, where holds start
-constexpr double kFar_mm = 500.0;                  // where an object isn't seen
+constexpr double kClearance_mm = 0.1;  // above the gel, where holds start
+constexpr double kFar_mm = 500.0;      // where an object isn't seen
+constexpr int kWays = 64;              // from a place to a lower one: with 8 a tilted disc was found 4 um too high
 constexpr std::uint64_t kOtherNoise = 0x5bd1e995;  // of the background
 
 std::string in_words(const Hold& hold) {
