@@ -26,6 +26,7 @@ void add_validate_command(CLI::App& app, const GlobalOptions& global, Action& ac
 void add_inspect_command(CLI::App& app, const GlobalOptions& global, Action& action);
 void add_export_command(CLI::App& app, const GlobalOptions& global, Action& action);
 void add_record_command(CLI::App& app, const GlobalOptions& global, Action& action);
+void add_serve_command(CLI::App& app, const GlobalOptions& global, Action& action);
 void add_study_command(CLI::App& app, const GlobalOptions& global, Action& action);
 
 /// @throws Error if a result can't be written at `file`: its folder isn't there, or it's a folder itself

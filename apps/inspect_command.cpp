@@ -1,9 +1,12 @@
 #include <memory>
 
 #include "apps/command.h"
+#include "apps/viewer_scripts.h"
 #include "core/error.h"
+#include "core/whole_file.h"
 #include "lab/contact_sheet.h"
 #include "lab/frame_sequence.h"
+#include "lab/inspection_page.h"
 #include "sim/image_file.h"
 
 namespace touchstone::apps {
@@ -12,6 +15,7 @@ namespace {
 struct InspectOptions {
   std::filesystem::path data;
   std::filesystem::path out;
+  std::filesystem::path job;
   int columns = 6;
   int tiles_per_scene = 6;
   int tile_width = 240;
@@ -25,9 +29,21 @@ std::vector<std::size_t> spread(std::size_t size, std::size_t count) {
   return chosen;
 }
 
-void inspect(const InspectOptions& options) {
-  if (options.out.extension() != ".png") fail("{}: the picture's name must end in .png", options.out.string());
-  require_writable_place(options.out);
+void write_page(const InspectOptions& options) {
+  const lab::InspectedSet set = lab::read_inspected_set(options.data);
+  std::string note;
+  const std::optional<lab::PreparedJob> job = lab::job_of_set(set, options.job, note);
+  lab::InspectionOptions how;
+  how.columns = options.columns;
+  how.tiles_per_scene = options.tiles_per_scene;
+  how.tile_width = options.tile_width;
+  write_whole_file(options.out, lab::inspection_page(set, job, note, viewer_scripts(), how));
+  fmt::print("{}: {} samples in {} scenes{}\n", options.out.string(), set.samples.size(), set.scenes.size(),
+             note.empty() ? "" : "; " + note);
+}
+
+void write_sheet(const InspectOptions& options) {
+  if (!options.job.empty()) fail("--job: is for a page, and {} is a picture", options.out.string());
   std::vector<cv::Mat> pictures;
   std::vector<std::string> captions;
   for (const lab::FrameSequence& sequence : lab::frames_of_data_set(options.data, std::nullopt)) {
@@ -42,13 +58,26 @@ void inspect(const InspectOptions& options) {
   fmt::print("{}: {} frames with their forces x, y, z on the object\n", options.out.string(), pictures.size());
 }
 
+void inspect(const InspectOptions& options) {
+  const auto ending = options.out.extension();
+  if (ending != ".png" && ending != ".html") fail("{}: the name must end in .html or .png", options.out.string());
+  require_writable_place(options.out);
+  ending == ".html" ? write_page(options) : write_sheet(options);
+}
+
 }  // namespace
 
 void add_inspect_command(CLI::App& app, const GlobalOptions&, Action& action) {
-  CLI::App* command = app.add_subcommand("inspect", "Look at a data set: a sheet of its frames with their forces");
+  CLI::App* command = app.add_subcommand(
+      "inspect",
+      "Look at a data set: a page with frames, truth, histograms and a view in 3D, or a sheet of its frames");
   auto options = std::make_shared<InspectOptions>();
   command->add_option("DIR", options->data, "A data set that `touchstone generate` made")->required();
-  command->add_option("-o,--out", options->out, "The sheet: a .png file")->required();
+  command
+      ->add_option("-o,--out", options->out,
+                   "The page, an .html file that needs nothing else, or the sheet, a .png file")
+      ->required();
+  command->add_option("--job", options->job, "The job that the set was made of (default: the shipped one of its name)");
   command->add_option("--per-scene", options->tiles_per_scene, "Frames of each scene, spread evenly over it")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();

@@ -124,6 +124,17 @@ macro(touchstone_need_tinygltf)
   touchstone_plain_library(TinyGLTF::Headers libtinygltf-dev tiny_gltf.h tinygltf)
 endmacro()
 
+macro(touchstone_need_turbojpeg)
+  touchstone_plain_library(TurboJpeg::TurboJpeg libturbojpeg0-dev turbojpeg.h turbojpeg)
+endmacro()
+
+macro(touchstone_need_httplib)
+  touchstone_plain_library(HttpLib::HttpLib libcpp-httplib-dev httplib.h cpp-httplib)
+  # Debian's library was compiled with them, and a request's layout depends on the first.
+  set_target_properties(HttpLib::HttpLib PROPERTIES INTERFACE_COMPILE_DEFINITIONS
+    "CPPHTTPLIB_OPENSSL_SUPPORT;CPPHTTPLIB_ZLIB_SUPPORT;CPPHTTPLIB_BROTLI_SUPPORT")
+endmacro()
+
 macro(touchstone_need_xxhash)
   touchstone_plain_library(XXHash::XXHash libxxhash-dev xxhash.h xxhash)
 endmacro()

@@ -360,6 +360,33 @@ void Hdf5Reader::read_into(const std::string& path, Hdf5Id type, void* values) c
   }
 }
 
+std::vector<std::int64_t> Hdf5Reader::shape_of_rows(const std::string& path, std::int64_t first, std::int64_t count,
+                                                    std::size_t& size) const {
+  std::vector<std::int64_t> shape = shape_of(path, size);
+  if (shape.empty() || first < 0 || count < 0 || first > shape[0] || count > shape[0] - first) {
+    fail("{}: '{}' has {} rows; wanted are {} from {} on", name_, path, shape.empty() ? 0 : shape[0], count, first);
+  }
+  shape[0] = count;
+  size = 1;
+  for (const std::int64_t part : shape) size *= static_cast<std::size_t>(part);
+  return shape;
+}
+
+void Hdf5Reader::read_row_part(const std::string& path, Hdf5Id type, std::int64_t first,
+                               const std::vector<std::int64_t>& shape, void* values) const {
+  const std::vector<hsize_t> extent(shape.begin(), shape.end());
+  std::vector<hsize_t> start(shape.size(), 0);
+  start[0] = static_cast<hsize_t>(first);
+  const Handle dataset(H5Dopen2(file_, path.c_str(), H5P_DEFAULT), H5Dclose);
+  const Handle place(H5Dget_space(dataset), H5Sclose);
+  const Handle memory(H5Screate_simple(static_cast<int>(extent.size()), extent.data(), nullptr), H5Sclose);
+  if (H5Sselect_hyperslab(place, H5S_SELECT_SET, start.data(), nullptr, extent.data(), nullptr) < 0 ||
+      H5Dread(dataset, type, memory, place, H5P_DEFAULT, values) < 0) {
+    fail("{}: rows {} to {} of '{}' can't be read; it isn't of the kind that is needed, or the file is damaged", name_,
+         first, first + shape[0] - 1, path);
+  }
+}
+
 void Hdf5Reader::expect_whole_numbers(const std::string& path) const {
   const Handle dataset(H5Dopen2(file_, path.c_str(), H5P_DEFAULT), H5Dclose);
   if (dataset < 0) fail("{}: has no dataset '{}'", name_, path);

@@ -128,6 +128,21 @@ class Hdf5Reader {
     read_into(path, hdf5_type<T>(), array.values.data());
     return array;
   }
+  /// The rows `first` to `first + count - 1` of a dataset (its first axis). @throws Error also if they aren't there
+  template <typename T>
+  Hdf5Array<T> read_rows(const std::string& path, std::int64_t first, std::int64_t count) const {
+    Hdf5Array<T> array;
+    std::size_t size = 0;
+    array.shape = shape_of_rows(path, first, count, size);
+    array.values.resize(size);
+    read_row_part(path, hdf5_type<T>(), first, array.shape, array.values.data());
+    return array;
+  }
+  /// The extents of a dataset's axes.
+  std::vector<std::int64_t> extents(const std::string& path) const {
+    std::size_t ignored = 0;
+    return shape_of(path, ignored);
+  }
   /// The one whole number of a dataset.
   std::int64_t read_number(const std::string& path) const;
   /// How many numbers a list of whole numbers of any size holds. @throws Error also if it was packed by a filter that
@@ -152,6 +167,10 @@ class Hdf5Reader {
  private:
   std::vector<std::int64_t> shape_of(const std::string& path, std::size_t& size) const;
   void read_into(const std::string& path, Hdf5Id type, void* values) const;
+  std::vector<std::int64_t> shape_of_rows(const std::string& path, std::int64_t first, std::int64_t count,
+                                          std::size_t& size) const;
+  void read_row_part(const std::string& path, Hdf5Id type, std::int64_t first, const std::vector<std::int64_t>& shape,
+                     void* values) const;
   void read_list_part(const std::string& path, Hdf5Id type, std::int64_t first, std::int64_t count, void* values) const;
   void expect_whole_numbers(const std::string& path) const;
 

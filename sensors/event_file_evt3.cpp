@@ -5,6 +5,7 @@
 #include <charconv>
 #include <cstring>
 #include <string_view>
+#include <utility>
 
 #include "core/error.h"
 
@@ -214,15 +215,14 @@ void Evt3EventReader::read(std::vector<Event>& events) {
   source_.events += static_cast<std::int64_t>(events.size());
 }
 
-Evt3EventWriter::Evt3EventWriter(const std::filesystem::path& file, cv::Size size, const std::string& program)
-    : name_(file.string()), out_(file, std::ios::binary), size_(size), program_(program) {
+Evt3Encoder::Evt3Encoder(const std::string& name, cv::Size size, std::string program, Sink sink)
+    : size_(size), program_(std::move(program)), sink_(std::move(sink)) {
   if (size.width > kLargestSide || size.height > kLargestSide) {
-    fail("{}: the camera has {} x {} pixels; EVT 3.0 holds 1 to {}", name_, size.width, size.height, kLargestSide);
+    fail("{}: the camera has {} x {} pixels; EVT 3.0 holds 1 to {}", name, size.width, size.height, kLargestSide);
   }
-  if (!out_) fail("{}: can't be written", name_);
 }
 
-void Evt3EventWriter::start(std::int64_t first_us) {
+void Evt3Encoder::start(std::int64_t first_us) {
   started_ = true;
   offset_us_ = wraps_down(first_us);
   buffer_ =
@@ -232,13 +232,13 @@ void Evt3EventWriter::start(std::int64_t first_us) {
   buffer_ += "% end\n";
 }
 
-void Evt3EventWriter::put(unsigned type, unsigned payload) {
+void Evt3Encoder::put(unsigned type, unsigned payload) {
   const unsigned word = type << 12 | payload;
   buffer_ += static_cast<char>(word & 0xFF);
   buffer_ += static_cast<char>(word >> 8);
 }
 
-void Evt3EventWriter::write_time(std::int64_t t_us) {
+void Evt3Encoder::write_time(std::int64_t t_us) {
   if (t_us == t_us_) return;
   const std::int64_t high = t_us >> kTimeBits;
   // Over long silences so often that no wrap is missed.
@@ -254,7 +254,7 @@ void Evt3EventWriter::write_time(std::int64_t t_us) {
 }
 
 /// Events of one time, row and polarity, of growing columns no more than a vector apart.
-void Evt3EventWriter::write_run(std::span<const Event> run) {
+void Evt3Encoder::write_run(std::span<const Event> run) {
   const unsigned polarity = run.front().on ? kOnBit : 0;
   const unsigned first = run.front().x;
   const unsigned span = run.back().x - first + 1u;
@@ -274,7 +274,12 @@ void Evt3EventWriter::write_run(std::span<const Event> run) {
   }
 }
 
-void Evt3EventWriter::append(std::span<const Event> events) {
+void Evt3Encoder::pass_time(std::int64_t t_us) {
+  if (!started_) start(t_us);
+  write_time(t_us - offset_us_);
+}
+
+void Evt3Encoder::append(std::span<const Event> events) {
   for (std::size_t i = 0; i < events.size();) {
     const Event& first = events[i];
     if (!started_) start(first.t_us);
@@ -293,14 +298,23 @@ void Evt3EventWriter::append(std::span<const Event> events) {
   }
 }
 
-void Evt3EventWriter::flush() {
-  out_.write(buffer_.data(), static_cast<std::streamsize>(buffer_.size()));
+void Evt3Encoder::flush() {
+  if (!buffer_.empty()) sink_(buffer_);
   buffer_.clear();
 }
 
+Evt3EventWriter::Evt3EventWriter(const std::filesystem::path& file, cv::Size size, const std::string& program)
+    : name_(file.string()),
+      out_(file, std::ios::binary),
+      encoder_(name_, size, program, [this](std::string_view bytes) {
+        out_.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+      }) {
+  if (!out_) fail("{}: can't be written", name_);
+}
+
 void Evt3EventWriter::close() {
-  if (!started_) start(0);
-  flush();
+  if (!encoder_.started()) encoder_.start(0);
+  encoder_.flush();
   out_.close();
   if (!out_) fail("{}: can't be written", name_);
 }

@@ -4,8 +4,10 @@
 #include <cstddef>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/frame.h"
@@ -55,33 +57,57 @@ class Evt3EventReader {
   State state_;
 };
 
-/// Writes EVT 3.0 with vectors where they are shorter. Times that 24 bits don't hold are those of wraps, or, for what
-/// lies before the first event, in the header line "touchstone_t_offset_us".
-class Evt3EventWriter {
+/// Turns events into EVT 3.0, with vectors where they are shorter, for a file or a socket. Times that 24 bits don't
+/// hold are those of wraps, or, for what lies before the first event, in the header line "touchstone_t_offset_us".
+class Evt3Encoder {
  public:
-  /// @throws Error if the camera has more than 2048 columns or rows
-  Evt3EventWriter(const std::filesystem::path& file, cv::Size size, const std::string& program);
+  /// Takes the next bytes, a megabyte at most.
+  using Sink = std::function<void(std::string_view bytes)>;
+
+  /// @param name whose camera it is, for errors @throws Error if the camera has more than 2048 columns or rows
+  Evt3Encoder(const std::string& name, cv::Size size, std::string program, Sink sink);
+
+  /// The header, for a stream whose times are at or after `first_us`. append() calls it if nobody did.
+  void start(std::int64_t first_us);
+  bool started() const { return started_; }
+  /// Says what time it is where nothing happens: in a stream, at least every 8 seconds.
+  void pass_time(std::int64_t t_us);
   /// @pre within the picture, in the order of time
   void append(std::span<const Event> events);
-  void close();
+  /// Hands over what is held back.
+  void flush();
 
  private:
-  void start(std::int64_t first_us);
   void write_time(std::int64_t t_us);
   void write_run(std::span<const Event> run);
   void put(unsigned type, unsigned payload);
-  void flush();
 
-  std::string name_;
-  std::ofstream out_;
   cv::Size size_;
   std::string program_;
+  Sink sink_;
   std::string buffer_;
   bool started_ = false;
   std::int64_t offset_us_ = 0;
   std::int64_t high_ = -1;  // of the last word, not wrapped
   std::int64_t t_us_ = -1;
   int y_ = -1;
+};
+
+/// Writes a file of it.
+class Evt3EventWriter {
+ public:
+  /// @throws Error as Evt3Encoder
+  Evt3EventWriter(const std::filesystem::path& file, cv::Size size, const std::string& program);
+  Evt3EventWriter(const Evt3EventWriter&) = delete;
+  Evt3EventWriter& operator=(const Evt3EventWriter&) = delete;
+  /// @pre within the picture, in the order of time
+  void append(std::span<const Event> events) { encoder_.append(events); }
+  void close();
+
+ private:
+  std::string name_;
+  std::ofstream out_;
+  Evt3Encoder encoder_;
 };
 
 }  // namespace touchstone::sensors

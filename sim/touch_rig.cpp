@@ -204,10 +204,10 @@ Touch TouchRig::look(const TouchObject& object, const fem::PressState& press, st
   const SceneSight& sight = *object.sight_;
   const auto relief = sight.relief(press);
   Touch touch;
-  const cv::Mat irradiance = parts_->light(sight, press, relief);
-  touch.frame = parts_->develop(irradiance, noise_seed, frame);
+  touch.light = parts_->light(sight, press, relief);
+  touch.frame = parts_->develop(touch.light, noise_seed, frame);
   if (!truth) return touch;
-  touch.ideal = parts_->develop_ideal(irradiance);
+  touch.ideal = parts_->develop_ideal(touch.light);
   const SeenGeometry seen = sight.geometry(press, relief);
   const std::vector<render::FirstHit> hits = render::first_hits(seen.inside, parts_->ready);
   touch.height = cv::Mat(parts_->size, CV_32F, cv::Scalar(std::numeric_limits<float>::quiet_NaN()));
@@ -224,6 +224,14 @@ Touch TouchRig::look(const TouchObject& object, const fem::PressState& press, st
 
 cv::Mat TouchRig::background(std::uint64_t noise_seed, int frame) const {
   return parts_->develop(parts_->background_light, noise_seed, frame);
+}
+
+const cv::Mat& TouchRig::background_light() const {
+  return parts_->background_light;
+}
+
+cv::Mat TouchRig::develop(const cv::Mat& light, std::uint64_t noise_seed, int frame) const {
+  return parts_->develop(light, noise_seed, frame);
 }
 
 }  // namespace touchstone::sim

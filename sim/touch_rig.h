@@ -31,6 +31,7 @@ struct TouchRigSettings {
 /// One frame and what is true of it. Pictures have the camera's size.
 struct Touch {
   cv::Mat frame;    ///< as the camera delivers it: 8 bit, BGR or grey, with noise
+  cv::Mat light;    ///< CV_32FC(bands), W/m^2 on the sensor: what the frame was exposed to
   cv::Mat height;   ///< CV_32FC1, mm: how far the membrane that the pixel sees is pressed in, against what the pixel
                     ///< sees at rest, along the gel frame's z; NaN where it sees no membrane
   cv::Mat contact;  ///< CV_8UC1, 255 where the pixel sees membrane that lies on the object
@@ -79,6 +80,10 @@ class TouchRig {
              bool truth = true) const;
   /// The frame of the untouched device.
   cv::Mat background(std::uint64_t noise_seed, int frame = 0) const;
+  /// The light of the untouched device.
+  const cv::Mat& background_light() const;
+  /// A frame of the light of any of them, with other noise.
+  cv::Mat develop(const cv::Mat& light, std::uint64_t noise_seed, int frame = 0) const;
 
  private:
   struct Parts;

@@ -12,6 +12,7 @@ declare -A allowed=(
   [lab]="core fem render sensors sim lab"
   [apps]="core fem render sensors sim lab apps"
   [python]="core fem render sensors sim lab python"
+  [testing]="core sim lab testing"
 )
 folders=$(printf '%s|' "${!allowed[@]}")
 folders=${folders%|}

@@ -1,0 +1,54 @@
+#pragma once
+// A shown camera over HTTP, as network cameras are: MJPEG, single JPEGs, and what is true of them as JSON.
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+
+#include "apps/shown_camera.h"
+
+namespace touchstone::apps {
+
+/// The values that a request gave, by name.
+using Requested = std::map<std::string, std::string>;
+
+/// | request                | answer | | GET /                  | a page that shows the stream | | GET /stream.mjpg |
+/// multipart/x-mixed-replace, a JPEG a frame; frames that a client is too slow for are left out | | GET /frame.jpg |
+/// the frame that is due                                                                    | | GET /status.json | the
+/// frame that is due: its number and truth; rate, clients                               | | GET /truth.json?frame=N|
+/// the truth of frame number N (each picture has its own as the header X-Touchstone-Frame)  | | POST ... | what
+/// `commands` has                                                                      | A mistake in a request is
+/// answered by 400 and {"error": "..."}.
+class FrameServer {
+ public:
+  struct Settings {
+    std::string address = "127.0.0.1";
+    int port = 0;  ///< 0: any free one
+    std::string title;
+    /// POST requests by path ("/hold"). What they throw as Error is the client's mistake.
+    std::map<std::string, std::function<void(const Requested&)>> commands;
+  };
+
+  /// Listens; requests are answered from threads of its own. @throws Error if the port can't be had
+  FrameServer(ShownCamera& camera, Settings settings);
+  /// Stops the camera and waits until all clients are gone.
+  ~FrameServer();
+  FrameServer(const FrameServer&) = delete;
+  FrameServer& operator=(const FrameServer&) = delete;
+
+  int port() const;
+
+ private:
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+/// One of the values as a number. @throws Error naming it if it isn't one or, without `otherwise`, isn't there
+double number_of(const Requested& requested, const std::string& name, std::optional<double> otherwise = std::nullopt);
+/// The same, a whole one from 0.
+int count_of(const Requested& requested, const std::string& name);
+/// @throws Error naming a value that isn't among `allowed`
+void allow_only(const Requested& requested, const std::vector<std::string>& allowed);
+
+}  // namespace touchstone::apps

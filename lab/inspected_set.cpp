@@ -1,0 +1,165 @@
+#include "lab/inspected_set.h"
+
+#include <nlohmann/json.hpp>
+
+#include "core/error.h"
+#include "core/hdf5_file.h"
+#include "core/whole_file.h"
+#include "lab/manifest.h"
+#include "lab/truth_file.h"
+
+namespace touchstone::lab {
+namespace {
+
+using nlohmann::ordered_json;
+
+std::vector<Eigen::Vector3d> points(const std::vector<double>& values) {
+  std::vector<Eigen::Vector3d> all;
+  for (std::size_t i = 0; i + 2 < values.size(); i += 3) all.emplace_back(values[i], values[i + 1], values[i + 2]);
+  return all;
+}
+
+InspectedScene scene_of(const ordered_json& json) {
+  InspectedScene scene;
+  scene.name = json.at("name");
+  scene.split = split_named(json.at("split"));
+  scene.device = json.at("device");
+  scene.object = json.at("object");
+  scene.first_sample = json.at("first_sample");
+  scene.samples = json.at("samples");
+  for (const auto& [name, has] : json.at("outputs").items()) {
+    if (has.get<bool>()) scene.outputs.push_back(name);
+  }
+  for (const ordered_json& effect : json.at("plan")) {
+    scene.plan.push_back({effect.at("effect"), effect.at("on"), effect.at("why"), effect.at("cost")});
+  }
+  if (json.contains("light")) {
+    for (const ordered_json& light : json.at("light")) scene.light.emplace_back(light.at("how"), light.at("samples"));
+  }
+  return scene;
+}
+
+/// What dataset.json has beyond Manifest.
+void read_more(const std::filesystem::path& file, InspectedSet& set) {
+  try {
+    const ordered_json json = ordered_json::parse(read_whole_file(file));
+    set.job_file = json.at("job").at("file");
+    set.job_text = json.at("job").at("text");
+    set.processor = json.at("processor");
+    for (const ordered_json& scene : json.at("scenes")) set.scenes.push_back(scene_of(scene));
+    for (const ordered_json& array : json.at("arrays")) {
+      std::string axes = array.at("axes");
+      axes += ": " + array.at("shape").dump();
+      set.arrays.push_back({array.at("path"), axes, array.at("unit")});
+    }
+    if (json.contains("timings")) {
+      for (const auto& [stage, seconds] : json.at("timings").at("wall_s").items())
+        set.timings.emplace_back(stage, seconds);
+    }
+  } catch (const nlohmann::json::exception& error) {
+    fail("{}: isn't a whole manifest ({})", file.string(), error.what());
+  }
+}
+
+void read_columns(const std::filesystem::path& path, InspectedSet& set) {
+  const TruthTable table = read_truth_table(path);
+  const Hdf5Reader file(path);
+  const std::size_t count = table.t_us.size();
+  const auto column = [&](const char* name, std::size_t width) {
+    auto values = file.read<double>(name).values;
+    if (values.size() != width * count) fail("{}: '{}' isn't as long as the others", path.string(), name);
+    return values;
+  };
+  const auto pose = column("/pose", 12);
+  const auto force_error = column("/error/force_N", 3);
+  const auto displacement_error = column("/error/displacement_mm", 1);
+  const auto area = column("/contact_area_mm2", 1);
+  const auto strain = column("/largest_strain", 1);
+  const auto under_resolved = file.read<std::uint8_t>("/under_resolved").values;
+  if (under_resolved.size() != count) fail("{}: '/under_resolved' isn't as long as the others", path.string());
+  for (std::size_t i = 0; i < count; ++i) {
+    InspectedSample sample;
+    sample.scene = table.scene[i];
+    sample.frame = table.frame[i];
+    sample.t_us = table.t_us[i];
+    sample.wrench = table.wrench[i];
+    const Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>> placed(pose.data() + 12 * i);
+    sample.gel_from_object = {placed.leftCols<3>(), placed.col(3)};
+    sample.force_error = Eigen::Map<const Eigen::Vector3d>(force_error.data() + 3 * i);
+    sample.displacement_error = displacement_error[i];
+    sample.contact_area = area[i];
+    sample.largest_strain = strain[i];
+    sample.under_resolved = under_resolved[i] != 0;
+    set.samples.push_back(sample);
+  }
+}
+
+}  // namespace
+
+std::optional<std::filesystem::path> InspectedSet::picture(std::size_t sample, const std::string& of,
+                                                           const std::string& ending) const {
+  const InspectedSample& at = samples[sample];
+  const std::filesystem::path file =
+      folder / picture_name(of, scenes[static_cast<std::size_t>(at.scene)].name, at.frame, ending);
+  if (!std::filesystem::is_regular_file(file)) return std::nullopt;
+  return file;
+}
+
+std::string InspectedSet::name_of_sample(std::size_t sample) const {
+  return fmt::format("{} {}", scenes[static_cast<std::size_t>(samples[sample].scene)].name, samples[sample].frame);
+}
+
+InspectedSet read_inspected_set(const std::filesystem::path& folder) {
+  const Manifest manifest = read_manifest(folder);
+  InspectedSet set;
+  set.folder = folder;
+  set.job_name = manifest.job_name;
+  set.job_sha256 = manifest.job_sha256;
+  set.inputs_sha256 = manifest.inputs_sha256;
+  set.content_sha256 = manifest.content_sha256;
+  set.version = manifest.version;
+  set.files = static_cast<std::int64_t>(manifest.files.size());
+  for (const WrittenFile& file : manifest.files) set.bytes += static_cast<std::int64_t>(file.bytes);
+  read_more(folder / "dataset.json", set);
+  read_columns(folder / "truth.h5", set);
+  if (static_cast<std::int64_t>(set.samples.size()) != manifest.samples) {
+    fail("{}: truth.h5 has {} samples, dataset.json {}", folder.string(), set.samples.size(), manifest.samples);
+  }
+  for (const InspectedSample& sample : set.samples) {
+    if (sample.scene >= static_cast<int>(set.scenes.size())) {
+      fail("{}: truth.h5 has a scene {}, dataset.json {} scenes", folder.string(), sample.scene, set.scenes.size());
+    }
+  }
+  return set;
+}
+
+InspectedGel read_inspected_gel(const InspectedSet& set, std::size_t sample) {
+  const std::filesystem::path path = set.folder / "truth.h5";
+  const Hdf5Reader file(path);
+  const auto row = static_cast<std::int64_t>(sample);
+  InspectedGel gel;
+  gel.rest = points(file.read<double>("/gel_vertices_mm").values);
+  const auto corners = file.read<std::int32_t>("/gel_triangles").values;
+  const auto moved = points(file.read_rows<double>("/surface_displacement_mm", row, 1).values);
+  const auto touches = file.read_rows<std::uint8_t>("/contact", row, 1).values;
+  gel.beads = points(file.read<double>("/bead_rest_mm").values);
+  const auto beads_moved = points(file.read_rows<double>("/bead_displacement_mm", row, 1).values);
+  const std::size_t vertices = gel.rest.size();
+  if (moved.size() != vertices || touches.size() != vertices || beads_moved.size() != gel.beads.size()) {
+    fail("{}: the arrays of the gel's surface aren't of one length", path.string());
+  }
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    if (corners[i] < 0 || static_cast<std::size_t>(corners[i]) >= vertices) {
+      fail("{}: '/gel_triangles' names the vertex {}; there are {}", path.string(), corners[i], vertices);
+    }
+    if (i % 3 == 2) gel.triangles.push_back({corners[i - 2], corners[i - 1], corners[i]});
+  }
+  for (std::size_t i = 0; i < vertices; ++i) {
+    gel.displaced.emplace_back(gel.rest[i] + moved[i]);
+    gel.contact.push_back(touches[i] != 0);
+  }
+  for (std::size_t i = 0; i < gel.beads.size(); ++i) gel.beads[i] += beads_moved[i];
+  return gel;
+}
+
+}  // namespace touchstone::lab

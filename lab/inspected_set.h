@@ -1,0 +1,77 @@
+#pragma once
+// A finished data set as a person wants to look at it. All that inspection reads of a set's files is read here.
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/transform.h"
+#include "lab/job.h"
+#include "sim/plan.h"
+
+namespace touchstone::lab {
+
+struct InspectedScene {
+  std::string name;
+  Split split = Split::train;
+  std::string device, object;
+  std::int64_t first_sample = 0;
+  std::int64_t samples = 0;
+  std::vector<std::string> outputs;                         ///< those that it has
+  std::vector<sim::Effect> plan;                            ///< each effect, on or off, and why
+  std::vector<std::pair<std::string, std::int64_t>> light;  ///< how its pictures are lit, and how many
+};
+
+struct InspectedSample {
+  int scene = 0;
+  int frame = 0;
+  std::int64_t t_us = 0;
+  Eigen::Matrix<double, 6, 1> wrench = Eigen::Matrix<double, 6, 1>::Zero();  ///< on the object: N, N mm, gel frame
+  RigidTransform gel_from_object;
+  Eigen::Vector3d force_error = Eigen::Vector3d::Zero();  ///< N, one standard error
+  double displacement_error = 0.0;                        ///< mm
+  double contact_area = 0.0;                              ///< mm^2
+  double largest_strain = 0.0;
+  bool under_resolved = false;
+};
+
+struct InspectedSet {
+  std::filesystem::path folder;
+  std::string job_name, job_file, job_text;
+  std::string job_sha256, inputs_sha256, content_sha256;
+  std::string version, processor;
+  std::vector<InspectedScene> scenes;
+  std::vector<InspectedSample> samples;
+  std::vector<std::array<std::string, 3>> arrays;       ///< path, axes with extents, unit
+  std::vector<std::pair<std::string, double>> timings;  ///< stage, seconds; none where the set was made without
+  std::int64_t files = 0;
+  std::int64_t bytes = 0;
+
+  /// A picture of a sample: `folder` is "frames", "ideal"; none if the set has no such file.
+  std::optional<std::filesystem::path> picture(std::size_t sample, const std::string& folder,
+                                               const std::string& ending) const;
+  /// "square-left 12".
+  std::string name_of_sample(std::size_t sample) const;
+};
+
+/// @throws Error if the folder isn't a finished data set, or is damaged
+InspectedSet read_inspected_set(const std::filesystem::path& folder);
+
+/// The gel's outer surface and beads at one sample, gel frame, mm.
+struct InspectedGel {
+  std::vector<Eigen::Vector3d> rest;          ///< n vertices
+  std::vector<std::array<int, 3>> triangles;  ///< over them
+  std::vector<Eigen::Vector3d> displaced;     ///< where they are
+  std::vector<bool> contact;                  ///< whether they touch
+  std::vector<Eigen::Vector3d> beads;         ///< where the beads' centres are
+};
+
+/// @throws Error as read_inspected_set
+InspectedGel read_inspected_gel(const InspectedSet& set, std::size_t sample);
+
+}  // namespace touchstone::lab

@@ -1,0 +1,117 @@
+#include <cstdlib>
+#include <regex>
+
+#include "core/whole_file.h"
+#include "tests/apps/run_program.h"
+#include "tests/support/small_job.h"
+#include "tests/support/temporary_folder.h"
+
+namespace touchstone {
+namespace {
+
+using test::expect_refused;
+using test::ProgramRun;
+using test::run_program;
+using test::run_words;
+using test::TemporaryFolder;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+/// A small set and its page, made once.
+class InspectPage : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = new TemporaryFolder;
+    test::write_small_job(*folder_);
+    folder_->write("scene.yaml",
+                   "device: device.yaml\nobject: object.yaml\nmotion: motion.yaml\n"
+                   "light: {min_samples: 4, max_samples: 8}\noutputs: {frames: true, contact: true}\n");
+    const ProgramRun made =
+        run_program({"--quiet", "--cache", path("cache"), "generate", path("job.yaml"), "-o", path("set")});
+    ASSERT_EQ(made.exit_code, 0) << made.err;
+    const ProgramRun page = run_program({"inspect", path("set"), "-o", path("page.html"), "--job", path("job.yaml")});
+    ASSERT_EQ(page.exit_code, 0) << page.err;
+    html_ = new std::string(read_whole_file(path("page.html")));
+  }
+  static void TearDownTestSuite() {
+    // For who wants to see it.
+    if (const char* keep = std::getenv("TOUCHSTONE_KEEP_PAGE")) write_whole_file(keep, *html_);
+    delete html_;
+    delete folder_;
+  }
+  static std::string path(const std::string& name) { return (folder_->path() / name).string(); }
+  static int count(const std::string& text) {
+    int found = 0;
+    for (std::size_t at = 0; (at = html_->find(text, at)) != std::string::npos; at += text.size()) ++found;
+    return found;
+  }
+
+  static TemporaryFolder* folder_;
+  static std::string* html_;
+};
+TemporaryFolder* InspectPage::folder_ = nullptr;
+std::string* InspectPage::html_ = nullptr;
+
+TEST_F(InspectPage, HoldsPicturesPlotsAndReasons) {
+  EXPECT_EQ(count("<img "), 3) << "the sheet, and one picture with its truth a scene";
+  EXPECT_EQ(count("src=\"data:image/jpeg;base64,/9j/"), 3);
+  EXPECT_EQ(count("<svg "), 1 + 12 + 3) << "forces over time, histograms, error bars";
+  for (const char* part :
+       {"<h1>small-job</h1>", ">force z</text>", ">object&#39;s x</text>", "<h2>Error bars</h2>",
+        "<td>friction</td><td>on</td>", "<h3>middle, beside</h3>", "<td>/wrench</td>", "scenes:\n  - {name: middle"}) {
+    EXPECT_NE(html_->find(part), std::string::npos) << part;  // without printing the page
+  }
+  EXPECT_EQ(count("Less is drawn"), 0) << "the job is known";
+}
+
+TEST_F(InspectPage, NeedsNothingElse) {
+  const std::regex outside("(src|href)=\"(?!data:)");
+  EXPECT_FALSE(std::regex_search(html_->substr(0, html_->find("<script")), outside));
+  const std::size_t end = html_->rfind("</script>");
+  if (end != std::string::npos) EXPECT_FALSE(std::regex_search(html_->substr(end), outside));
+  EXPECT_EQ(count("<script src"), 0);
+}
+
+TEST_F(InspectPage, IsTheSameForTheSameSet) {
+  ASSERT_EQ(run_program({"inspect", path("set"), "-o", path("again.html"), "--job", path("job.yaml")}).exit_code, 0);
+  EXPECT_EQ(read_whole_file(path("again.html")), *html_);
+}
+
+TEST_F(InspectPage, DoesWithoutTheJobAndSaysSo) {
+  const ProgramRun run = run_program({"inspect", path("set"), "-o", path("no-job.html")});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("12 samples in 2 scenes; the job's file isn't known (--job names it)"));
+  EXPECT_THAT(read_whole_file(path("no-job.html")), HasSubstr("Less is drawn: the job&#39;s file"));
+}
+
+TEST_F(InspectPage, RefusesWhatIsNotTheSetsOwn) {
+  TemporaryFolder other;
+  test::write_small_job(other);
+  other.write("motion.yaml", "start_mm: [0, 0, 2.2]\nkeys:\n  - {frames: 5, z: {position_mm: 1.8}}\n");
+  expect_refused(
+      run_program({"inspect", path("set"), "-o", path("x.html"), "--job", (other.path() / "job.yaml").string()}),
+      "what the job names isn't that this set was made of");
+  expect_refused(run_program({"inspect", path("cache"), "-o", path("x.html")}), "isn't a data set");
+  expect_refused(run_program({"inspect", path("set"), "-o", path("x.pdf")}), "must end in .html or .png");
+  expect_refused(run_program({"inspect", path("set"), "-o", path("x.png"), "--job", path("job.yaml")}),
+                 "--job: is for a page");
+  expect_refused(run_program({"inspect", path("set"), "-o", path("nowhere/x.html")}), "nowhere");
+}
+
+TEST_F(InspectPage, ShowsInABrowserWithoutErrors) {
+  if (html_->find("id=\"model\"") == std::string::npos) GTEST_SKIP() << "built without three.js";
+  if (run_words({"/bin/sh", "-c", "command -v chromium"}).exit_code != 0) GTEST_SKIP() << "there is no chromium";
+  const ProgramRun run = run_words(
+      {"/bin/sh", "-c",
+       "HOME=\"$1\" timeout 900 chromium --headless --no-sandbox --disable-dev-shm-usage --use-angle=swiftshader "
+       "--enable-unsafe-swiftshader --enable-logging=stderr --user-data-dir=\"$1/profile\" "
+       "--window-size=800,600 --virtual-time-budget=20000 --screenshot=\"$1/page.png\" --dump-dom "
+       "\"file://$1/page.html\"",
+       "sh", folder_->path().string()});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("data-ready=\"yes\"")) << "the model was read and drawn";
+  EXPECT_THAT(run.err, Not(HasSubstr("CONSOLE"))) << "the page has said something";
+}
+
+}  // namespace
+}  // namespace touchstone
