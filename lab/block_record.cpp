@@ -9,10 +9,9 @@ namespace {
 
 constexpr int kBackgroundFrame = 1;  // of the unit's noise; samples have seeds of their own
 
-BlockRecord pressed(const PreparedDraw& prepared, const sim::TouchRig& rig, const DrawnTouch& touch,
-                    const sim::ObjectSpec& spec) {
-  const sim::TouchObject object = rig.object(spec);
-  const sim::Truth truth = rig.play(object, motion_of(touch, spec, rig.device())).back();
+BlockRecord pressed(const PreparedDraw& prepared, const sim::TouchRig& rig, const sim::TouchObject& object,
+                    const DrawnTouch& touch) {
+  const sim::Truth truth = rig.play(object, motion_of(touch, object.spec(), rig.device())).back();
   const fem::PressState& press = truth.press;
   BlockRecord record;
   record.touch = touch;
@@ -49,7 +48,12 @@ BenchSource rig_bench(const std::filesystem::path& cache_folder) {
     bench.light = rig->light().reason;
     bench.background = rig->background(unit.seed, kBackgroundFrame);
     bench.press = [&prepared, rig](const DrawnTouch& touch, const sim::ObjectSpec& object) {
-      return pressed(prepared, *rig, touch, object);
+      const sim::TouchObject on_rig = rig->object(object);  // what the rig can't take at all isn't drawn again
+      try {
+        return pressed(prepared, *rig, on_rig, touch);
+      } catch (const Error& error) {
+        throw Unpressable(error.what());
+      }
     };
     return bench;
   };

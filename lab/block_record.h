@@ -7,6 +7,7 @@
 #include <opencv2/core/mat.hpp>
 #include <string>
 
+#include "core/error.h"
 #include "lab/drawn_touch.h"
 
 namespace touchstone::lab {
@@ -26,8 +27,14 @@ struct BlockRecord {
   bool under_resolved = false;  ///< see fem::PressState
 };
 
+/// A touch that mechanics or light can't do: beside the gel, too deep, a shear that friction can't hold.
+class Unpressable : public Error {
+ public:
+  using Error::Error;
+};
+
 /// A unit on its bench. `press` is a pure function of the unit, the touch and the object, and may be called from many
-/// threads at once. @throws Error for a touch that can't be pressed; it is then drawn again
+/// threads at once. @throws Unpressable; the sample is then drawn again. Other errors end the run
 struct UnitBench {
   std::string light;   ///< how its pictures are lit, and how far that is off
   cv::Mat background;  ///< its frame untouched, as `frame`; with the imager's noise

@@ -96,12 +96,14 @@ bool is_begun(const Folder& folder) {
 }
 
 void begin(const Folder& folder) {
-  for (const fs::path& path : {folder.out / kUnfinished, folder.out / "blocks"}) {
+  const auto make = [](const fs::path& path) {
     std::error_code error;
     fs::create_directories(path, error);
     if (error) fail("{}: can't be made ({})", path.string(), error.message());
-  }
-  write_whole_file(folder.record(), to_json(folder.identity));
+  };
+  make(folder.out / kUnfinished);
+  write_whole_file(folder.record(), to_json(folder.identity));  // before all else: it says whose the folder is
+  make(folder.out / "blocks");
   is_begun(folder);  // another job's run may have begun here at the same time: the last record counts
 }
 
@@ -259,7 +261,7 @@ BlockRecord make_record(const PreparedDraw& prepared, const UnitBench& bench, st
     const sim::ObjectSpec object = drawn_object(prepared, touch.object, touch.piece);
     try {
       return bench.press(touch, object);
-    } catch (const Error& error) {
+    } catch (const Unpressable& error) {
       if (attempt + 1 < kMostAttempts) continue;
       fail("sample {}: {} draws in a row couldn't be pressed; the last one: {} of place ({:.3g}, {:.3g}) mm: {}",
            sample, kMostAttempts, object.name, touch.place_mm.x(), touch.place_mm.y(), error.what());

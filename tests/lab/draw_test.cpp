@@ -6,6 +6,7 @@
 #include <set>
 
 #include "core/edited_yaml.h"
+#include "core/transform.h"
 #include "lab/draw.h"
 #include "lab/drawn_touch.h"
 #include "tests/support/message_of.h"
@@ -102,7 +103,7 @@ TEST(EditedYaml, ChangesNumbersAndLeavesTheRestAsItIs) {
 }
 
 TEST(EditedYaml, PathsThatLeadNowhereAreTold) {
-  const std::string text = "gel: {thickness_mm: 3}\nlist: [1, 2]\nword: soft\nquoted: '3'\na: &x 5\nb: *x\n";
+  const std::string text = "gel: {thickness_mm: 3}\nlist: [1, 2]\nword: soft\nquoted: '3'\na: &x [5]\nb: *x\nc: &y 5\nd: *y\n";
   const auto told = [&](const std::string& path) {
     return message_of([&] { find_yaml_numbers(text, "device.yaml", path, {"job.yaml", 7}); });
   };
@@ -113,6 +114,8 @@ TEST(EditedYaml, PathsThatLeadNowhereAreTold) {
   EXPECT_THAT(told("word"), HasSubstr("isn't a number"));
   EXPECT_THAT(told("quoted"), HasSubstr("plain number"));
   EXPECT_THAT(told("b"), HasSubstr("shared by an alias"));
+  EXPECT_THAT(told("d"), HasSubstr("plain number"));
+  EXPECT_THAT(told("d"), HasSubstr("plain number"));
   EXPECT_THAT(told("gel"), HasSubstr("isn't a number"));
   EXPECT_THAT(told("list[x]"), HasSubstr("brackets"));
   EXPECT_THAT(told(""), HasSubstr("is empty"));

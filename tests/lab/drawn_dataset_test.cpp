@@ -38,7 +38,9 @@ BenchSource quick_bench(Calls& calls) {
     bench.background = cv::Mat(30, 40, CV_8UC3, cv::Scalar(unit.number, 20, 30));
     bench.press = [&calls, unit](const DrawnTouch& touch, const sim::ObjectSpec& object) {
       if (calls.presses++ == calls.stop_at) throw std::runtime_error("the process ends here");
-      if (calls.refuse_every > 0 && touch.seed % static_cast<std::uint64_t>(calls.refuse_every) == 0) fail("beside");
+      if (calls.refuse_every > 0 && touch.seed % static_cast<std::uint64_t>(calls.refuse_every) == 0) {
+        throw Unpressable("beside");
+      }
       BlockRecord record;
       record.touch = touch;
       record.frame = cv::Mat(30, 40, CV_8UC3);
@@ -220,6 +222,13 @@ TEST_F(DrawnDataset, WhatCannotBePressedIsDrawnAgain) {
   EXPECT_GT(generate("out").drawn_again, 0);
   calls_.refuse_every = 1;
   EXPECT_THAT(message_of([&] { generate("never", {}, 1); }), HasSubstr("20 draws in a row couldn't be pressed"));
+}
+
+TEST_F(DrawnDataset, ARunKilledBeforeItsFirstBlockGoesOn) {
+  generate("whole");
+  fs::create_directories(folder_.path() / "out/.unfinished");
+  EXPECT_EQ(generate("out").made, 10);
+  EXPECT_EQ(contents("out"), contents("whole"));
 }
 
 TEST(Shards, AreRead) {
