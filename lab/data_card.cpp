@@ -135,7 +135,7 @@ std::string data_card(const PreparedDraw& prepared, const DrawnFigures& figures)
       100.0 * figures.worst_force_error, kSmallForce_N, figures.under_resolved, share(figures.under_resolved));
   card +=
       fmt::format("- Contact is solved on cells of {} um; finer detail of an object isn't there.\n", job.membrane_um);
-  card += "- The coating shows no highlights and the gel no dust, bubbles or wear; lamps don't flicker.\n";
+  card += "- Gels have no dust, bubbles or wear, and lamps don't flicker.\n";
   card += fmt::format(
       "- {} samples don't touch. {} draws couldn't be pressed and were drawn again, so what can't be "
       "pressed is rarer here than the distributions above say.\n",

@@ -103,7 +103,8 @@ TEST(EditedYaml, ChangesNumbersAndLeavesTheRestAsItIs) {
 }
 
 TEST(EditedYaml, PathsThatLeadNowhereAreTold) {
-  const std::string text = "gel: {thickness_mm: 3}\nlist: [1, 2]\nword: soft\nquoted: '3'\na: &x [5]\nb: *x\nc: &y 5\nd: *y\n";
+  const std::string text =
+      "gel: {thickness_mm: 3}\nlist: [1, 2]\nword: soft\nquoted: '3'\na: &x [5]\nb: *x\nc: &y 5\nd: *y\n";
   const auto told = [&](const std::string& path) {
     return message_of([&] { find_yaml_numbers(text, "device.yaml", path, {"job.yaml", 7}); });
   };
