@@ -20,6 +20,7 @@ using Action = std::function<void()>;
 void add_plan_command(CLI::App& app, const GlobalOptions& global, Action& action);
 void add_render_command(CLI::App& app, const GlobalOptions& global, Action& action);
 void add_generate_command(CLI::App& app, const GlobalOptions& global, Action& action);
+void add_merge_command(CLI::App& app, const GlobalOptions& global, Action& action);
 void add_calibrate_command(CLI::App& app, const GlobalOptions& global, Action& action);
 void add_estimate_command(CLI::App& app, const GlobalOptions& global, Action& action);
 void add_validate_command(CLI::App& app, const GlobalOptions& global, Action& action);

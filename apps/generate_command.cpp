@@ -6,6 +6,8 @@
 #include "apps/progress_bar.h"
 #include "core/error.h"
 #include "lab/dataset.h"
+#include "lab/draw.h"
+#include "lab/drawn_dataset.h"
 
 namespace touchstone::apps {
 namespace {
@@ -13,10 +15,44 @@ namespace {
 struct Options {
   std::filesystem::path job;
   std::filesystem::path out;
+  std::string shard;
   bool no_timings = false;
 };
 
+/// A job that draws its samples.
+void generate_drawn(const Options& options, const GlobalOptions& global) {
+  lab::DrawnOptions how;
+  how.source = lab::rig_bench(global.cache);
+  how.threads = global.threads;
+  if (!options.shard.empty()) how.shard = lab::shard_of(options.shard);
+  lab::DrawnReport report;
+  {
+    ProgressBar bar(global.quiet);
+    report = lab::generate_drawn(options.job, options.out, how, bar.listener());
+  }
+  if (report.was_finished) {
+    fmt::print("{}: is finished already; all of its checksums hold ({} samples)\n", options.out.string(),
+               report.samples);
+    return;
+  }
+  fmt::print("{}: {} samples, {} of them made", options.out.string(), report.samples, report.made);
+  if (report.kept > 0) fmt::print(", {} kept from an earlier run", report.kept);
+  if (report.damaged_blocks > 0) fmt::print(", {} damaged files made again", report.damaged_blocks);
+  if (report.drawn_again > 0) fmt::print(", {} touches drawn again", report.drawn_again);
+  fmt::print("; {:.1f} s setting up units, {:.1f} s pressing and looking, {:.1f} s writing\n", report.set_up_s,
+             report.press_s, report.write_s);
+  if (how.shard.count > 1) {
+    fmt::print("when all {} shards are there: touchstone merge {} -o {}\n", how.shard.count, options.job.string(),
+               options.out.string());
+  }
+}
+
 void generate(const Options& options, const GlobalOptions& global) {
+  if (lab::is_draw_job_file(options.job)) {
+    generate_drawn(options, global);
+    return;
+  }
+  if (!options.shard.empty()) fail("--shard: {} isn't a job that draws; only those have shards", options.job.string());
   lab::GenerateOptions how;
   how.source = lab::simulator(global.cache);
   how.threads = global.threads;
@@ -45,6 +81,8 @@ void add_generate_command(CLI::App& app, const GlobalOptions& global, Action& ac
   auto options = std::make_shared<Options>();
   command->add_option("JOB", options->job, "Job file")->required();
   command->add_option("-o,--out", options->out, "Folder of the data set: new, empty, or this job's own")->required();
+  command->add_option("--shard", options->shard,
+                      "I/N: of a job that draws, only the I-th of N parts; `touchstone merge` puts them together");
   command->add_flag("--no-timings", options->no_timings,
                     "Leave wall times out of dataset.json: then the whole folder is the same bytes in every run");
   command->callback([&action, &global, options] { action = [options, &global] { generate(*options, global); }; });

@@ -64,6 +64,7 @@ int run(int argc, char** argv) {
   add_plan_command(app, global, action);
   add_render_command(app, global, action);
   add_generate_command(app, global, action);
+  add_merge_command(app, global, action);
   add_calibrate_command(app, global, action);
   add_estimate_command(app, global, action);
   add_validate_command(app, global, action);

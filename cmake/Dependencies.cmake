@@ -62,6 +62,10 @@ macro(touchstone_need_hdf5)
   touchstone_require_package(HDF5 libhdf5-dev COMPONENTS C HL)
 endmacro()
 
+macro(touchstone_need_zlib)
+  touchstone_require_package(ZLIB zlib1g-dev)
+endmacro()
+
 macro(touchstone_need_cli11)
   touchstone_require_package(CLI11 libcli11-dev)
 endmacro()

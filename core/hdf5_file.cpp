@@ -1,6 +1,7 @@
 #include "core/hdf5_file.h"
 
 #include <hdf5.h>
+#include <zlib.h>
 
 #include <algorithm>
 #include <array>
@@ -18,6 +19,7 @@ namespace {
 constexpr std::int64_t kChunkBytes = 256 * 1024;  // well under HDF5's cache of 1 MB a dataset: each is packed once
 constexpr std::size_t kMemoryStep = 4 << 20;
 constexpr unsigned kDeflateLevel = 4;  // of 9; higher ones cost time and win a percent
+constexpr int kPackedLevel = 1;        // of pictures with noise, which hardly pack
 
 static_assert(std::is_same_v<hid_t, Hdf5Id> || sizeof(hid_t) == sizeof(Hdf5Id));
 
@@ -118,7 +120,27 @@ void Hdf5Writer::check_done(int result, const char* what) const {
   if (result < 0) fail("{}: can't be written ({})", name_, what);
 }
 
-Hdf5Writer::Hdf5Writer(const std::filesystem::path& file) : name_(file.string()) {
+std::vector<std::uint8_t> pack_hdf5_row(const void* values, std::size_t bytes, std::size_t item_bytes) {
+  TS_ASSERT(item_bytes > 0 && bytes % item_bytes == 0);
+  const auto* from = static_cast<const std::uint8_t*>(values);
+  std::vector<std::uint8_t> shuffled(from, from + bytes);
+  const std::size_t items = bytes / item_bytes;
+  if (item_bytes > 1) {  // first bytes of all numbers, then second ones, ...
+    for (std::size_t b = 0; b < item_bytes; ++b) {
+      for (std::size_t i = 0; i < items; ++i) shuffled[b * items + i] = from[i * item_bytes + b];
+    }
+  }
+  uLongf size = compressBound(static_cast<uLong>(bytes));
+  std::vector<std::uint8_t> packed(size);
+  const int result = compress2(packed.data(), &size, shuffled.data(), static_cast<uLong>(bytes), kPackedLevel);
+  TS_ASSERT(result == Z_OK);
+  packed.resize(size);
+  return packed;
+}
+
+Hdf5Writer::Hdf5Writer(const std::filesystem::path& file) : Hdf5Writer(file, 0) {}
+
+Hdf5Writer::Hdf5Writer(const std::filesystem::path& file, std::size_t user_block) : name_(file.string()) {
   const auto held = hold();
   keep_hdf5_quiet();
   const Handle access(check(H5Pcreate(H5P_FILE_ACCESS), "file access"), H5Pclose);
@@ -129,6 +151,7 @@ Hdf5Writer::Hdf5Writer(const std::filesystem::path& file) : name_(file.string())
   check_done(H5Pset_fapl_core(access, kMemoryStep, 0), "memory");
   const Handle creation(check(H5Pcreate(H5P_FILE_CREATE), "file creation"), H5Pclose);
   check_done(H5Pset_obj_track_times(creation, 0), "times");
+  check_done(H5Pset_userblock(creation, user_block), "user block");
   file_ = check(H5Fcreate(name_.c_str(), H5F_ACC_TRUNC, creation, access), "creating the file");
 }
 
@@ -140,20 +163,27 @@ Hdf5Writer::~Hdf5Writer() {
 
 void Hdf5Writer::add_dataset(const Hdf5Description& description, Hdf5Id type, std::size_t item_bytes, std::int64_t rows,
                              const std::vector<std::int64_t>& row_shape) {
+  auto row_bytes = static_cast<std::int64_t>(item_bytes);
+  for (const std::int64_t extent : row_shape) row_bytes *= extent;
+  const std::int64_t fitting = row_bytes > 0 ? kChunkBytes / row_bytes : 1;
+  add_chunked_dataset(description, type, rows, row_shape,
+                      std::clamp<std::int64_t>(fitting, 1, std::max<std::int64_t>(1, rows)));
+}
+
+void Hdf5Writer::add_chunked_dataset(const Hdf5Description& description, Hdf5Id type, std::int64_t rows,
+                                     const std::vector<std::int64_t>& row_shape, std::int64_t rows_a_chunk) {
   const auto held = hold();
   TS_ASSERT(!datasets_.contains(description.path) && rows >= 0);
   Dataset dataset;
   dataset.shape.push_back(rows);
   dataset.shape.insert(dataset.shape.end(), row_shape.begin(), row_shape.end());
   const std::vector<hsize_t> shape = extents(dataset.shape);
-  std::vector<hsize_t> chunk = shape;
-  auto row_bytes = static_cast<std::int64_t>(item_bytes);
-  for (const std::int64_t extent : row_shape) row_bytes *= extent;
-  const bool empty = rows == 0 || row_bytes == 0;
+  const bool empty = std::find(shape.begin(), shape.end(), hsize_t{0}) != shape.end();
   const Handle creation(check(H5Pcreate(H5P_DATASET_CREATE), "dataset creation"), H5Pclose);
   check_done(H5Pset_obj_track_times(creation, 0), "times");
   if (!empty) {
-    chunk[0] = static_cast<hsize_t>(std::clamp<std::int64_t>(kChunkBytes / row_bytes, 1, rows));
+    std::vector<hsize_t> chunk = shape;
+    chunk[0] = static_cast<hsize_t>(rows_a_chunk);
     check_done(H5Pset_chunk(creation, static_cast<int>(chunk.size()), chunk.data()), "chunks");
     check_done(H5Pset_shuffle(creation), "shuffle");
     check_done(H5Pset_deflate(creation, kDeflateLevel), "compression");
@@ -233,6 +263,16 @@ void Hdf5Writer::write_rows(const std::string& path, Hdf5Id type, std::int64_t f
   check_done(H5Dwrite(dataset.id, type, memory, place, H5P_DEFAULT, values), path.c_str());
 }
 
+void Hdf5Writer::write_packed_row(const std::string& path, std::int64_t row, std::span<const std::uint8_t> packed) {
+  const auto held = hold();
+  const auto found = datasets_.find(path);
+  TS_ASSERT(found != datasets_.end() && row >= 0 && row < found->second.shape[0]);
+  std::vector<hsize_t> offset(found->second.shape.size(), 0);
+  offset[0] = static_cast<hsize_t>(row);
+  check_done(H5Dwrite_chunk(found->second.id, H5P_DEFAULT, 0, offset.data(), packed.size(), packed.data()),
+             path.c_str());
+}
+
 void Hdf5Writer::write_number(const Hdf5Description& description, std::int64_t value) {
   const auto held = hold();
   const Handle space(check(H5Screate(H5S_SCALAR), "shape"), H5Sclose);
@@ -300,15 +340,27 @@ void Hdf5Writer::set_attribute(const std::string& name, std::int64_t value) {
 }
 
 void Hdf5Writer::close() {
+  close({});
+}
+
+void Hdf5Writer::close(const std::function<std::string(std::string_view rest)>& head) {
   const auto held = hold();
   for (auto& [path, dataset] : datasets_) H5Dclose(dataset.id);
   datasets_.clear();
   check_done(H5Fflush(file_, H5F_SCOPE_GLOBAL), "flush");
-  const ssize_t size = H5Fget_file_image(file_, nullptr, 0);
+  const ssize_t size = H5Fget_file_image(file_, nullptr, 0);  // without the user block
   void* memory = nullptr;  // the image's own copy has a wrong checksum in its superblock (HDF5 1.10.8)
   if (size < 0 || H5Fget_vfd_handle(file_, H5P_DEFAULT, &memory) < 0) fail("{}: can't be written (its memory)", name_);
+  hsize_t user_block = 0;
+  const Handle creation(check(H5Fget_create_plist(file_), "user block"), H5Pclose);
+  check_done(H5Pget_userblock(creation, &user_block), "user block");
+  const std::string_view rest(*static_cast<const char* const*>(memory) + user_block, static_cast<std::size_t>(size));
+  std::string before = head ? head(rest) : std::string();
+  TS_ASSERT(before.size() <= user_block);
+  before.resize(user_block, '\0');
   std::ofstream out(name_, std::ios::binary);
-  out.write(*static_cast<const char* const*>(memory), size);
+  out.write(before.data(), static_cast<std::streamsize>(before.size()));
+  out.write(rest.data(), static_cast<std::streamsize>(rest.size()));
   out.close();
   const int why = errno;
   check_done(H5Fclose(std::exchange(file_, -1)), "closing the file");

@@ -4,10 +4,12 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace touchstone {
@@ -34,11 +36,16 @@ struct Hdf5Description {
   std::string meaning;  ///< one sentence
 };
 
+/// Rows of a dataset packed as its chunks are kept (shuffled and deflated): a pure function, for many threads.
+std::vector<std::uint8_t> pack_hdf5_row(const void* values, std::size_t bytes, std::size_t item_bytes);
+
 /// Makes a new file in memory and writes it when it's closed. Each function throws Error, naming the file, if it can't
 /// do what is asked.
 class Hdf5Writer {
  public:
   explicit Hdf5Writer(const std::filesystem::path& file);
+  /// `user_block` bytes before what HDF5 knows of (0, or a power of 2 from 512 up) are left to the caller, see close.
+  Hdf5Writer(const std::filesystem::path& file, std::size_t user_block);
   ~Hdf5Writer();
   Hdf5Writer(const Hdf5Writer&) = delete;
   Hdf5Writer& operator=(const Hdf5Writer&) = delete;
@@ -53,6 +60,14 @@ class Hdf5Writer {
   void write_row(const std::string& path, std::int64_t row, std::span<const T> values) {
     write_rows(path, hdf5_type<T>(), row, 1, values.data(), values.size());
   }
+  /// Makes a dataset as add_rows does, but with a row a chunk, for write_packed_row.
+  template <typename T>
+  void add_packed_rows(const Hdf5Description& description, std::int64_t rows,
+                       const std::vector<std::int64_t>& row_shape) {
+    add_chunked_dataset(description, hdf5_type<T>(), rows, row_shape, 1);
+  }
+  /// Puts a row as pack_hdf5_row made it into a dataset that add_packed_rows made.
+  void write_packed_row(const std::string& path, std::int64_t row, std::span<const std::uint8_t> packed);
   /// Makes and fills a whole dataset: `values` holds `rows` rows of `row_shape`.
   template <typename T>
   void write(const Hdf5Description& description, std::int64_t rows, const std::vector<std::int64_t>& row_shape,
@@ -80,6 +95,8 @@ class Hdf5Writer {
 
   /// Writes the file; without this call there is none.
   void close();
+  /// `head` is asked, with all of the file but the user block, what stands in that; the rest of it is zeros.
+  void close(const std::function<std::string(std::string_view rest)>& head);
 
  private:
   struct Dataset {
@@ -90,6 +107,8 @@ class Hdf5Writer {
   void make_group_of(const std::string& path);
   void add_dataset(const Hdf5Description& description, Hdf5Id type, std::size_t item_bytes, std::int64_t rows,
                    const std::vector<std::int64_t>& row_shape);
+  void add_chunked_dataset(const Hdf5Description& description, Hdf5Id type, std::int64_t rows,
+                           const std::vector<std::int64_t>& row_shape, std::int64_t rows_a_chunk);
   void add_growing_dataset(const Hdf5Description& description, Hdf5Id type, std::size_t item_bytes);
   void append_numbers(const std::string& path, Hdf5Id type, const void* values, std::int64_t count);
   void write_rows(const std::string& path, Hdf5Id type, std::int64_t first, std::int64_t count, const void* values,

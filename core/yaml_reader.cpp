@@ -151,6 +151,10 @@ bool YamlReader::is_list() const {
   return node_->yaml.IsSequence();
 }
 
+bool YamlReader::is_map() const {
+  return node_->yaml.IsMap();
+}
+
 std::vector<double> YamlReader::numbers(Allowed allowed) const {
   std::vector<double> all;
   for (const YamlReader& item : items()) all.push_back(item.number(allowed));

@@ -77,6 +77,7 @@ class YamlReader {
   // For types that may stand in several forms: they have, in the place of `fields`, a function
   // `read_value(YamlReader& in, T& value, Allowed allowed)` that looks what stands there.
   bool is_list() const;
+  bool is_map() const;
   std::string text() const { return scalar("a number, a list or a file's name"); }
   double number(Allowed allowed) const;
   std::vector<double> numbers(Allowed allowed) const;  ///< of a list

@@ -20,19 +20,6 @@ bool is_number(const std::string& text) {
          std::all_of(text.begin(), text.end(), [](char digit) { return digit >= '0' && digit <= '9'; });
 }
 
-/// The names that core/whole_file.h gives to files that aren't whole: .name.process.serial.part.ending
-bool is_temporary(const fs::path& file) {
-  const std::string name = file.filename().string();
-  const std::size_t part = name.rfind(".part");
-  if (!name.starts_with('.') || part == 0 || part == std::string::npos) return false;
-  if (part + 5 != name.size() && name[part + 5] != '.') return false;
-  const std::size_t serial = name.rfind('.', part - 1);
-  if (serial == 0 || serial == std::string::npos) return false;
-  const std::size_t process = name.rfind('.', serial - 1);
-  return process != 0 && process != std::string::npos && is_number(name.substr(process + 1, serial - process - 1)) &&
-         is_number(name.substr(serial + 1, part - serial - 1));
-}
-
 fs::path topmost_missing(const fs::path& folder) {
   fs::path missing;
   for (fs::path at = fs::absolute(folder); !at.empty() && !fs::exists(at); at = at.parent_path()) {
@@ -54,6 +41,18 @@ void refuse_unless_equal(const fs::path& out, const RunIdentity& identity) {
 }
 
 }  // namespace
+
+bool is_temporary_file(const fs::path& file) {
+  const std::string name = file.filename().string();
+  const std::size_t part = name.rfind(".part");
+  if (!name.starts_with('.') || part == 0 || part == std::string::npos) return false;
+  if (part + 5 != name.size() && name[part + 5] != '.') return false;
+  const std::size_t serial = name.rfind('.', part - 1);
+  if (serial == 0 || serial == std::string::npos) return false;
+  const std::size_t process = name.rfind('.', serial - 1);
+  return process != 0 && process != std::string::npos && is_number(name.substr(process + 1, serial - process - 1)) &&
+         is_number(name.substr(serial + 1, part - serial - 1));
+}
 
 FolderState state_of_folder(const fs::path& out, const RunIdentity& identity) {
   if (!fs::exists(out)) return FolderState::absent;
@@ -137,7 +136,7 @@ void RunFolder::keep() {
 void RunFolder::remove_temporary_files() const {
   std::vector<fs::path> temporary;
   for (const auto& entry : fs::recursive_directory_iterator(out_)) {
-    if (entry.is_regular_file() && is_temporary(entry.path())) temporary.push_back(entry.path());
+    if (entry.is_regular_file() && is_temporary_file(entry.path())) temporary.push_back(entry.path());
   }
   for (const fs::path& file : temporary) fs::remove(file);
 }

@@ -15,6 +15,9 @@ namespace touchstone::lab {
 /// Records of a run that isn't finished lie in this folder of the data set; it goes when the set is whole.
 inline constexpr const char* kUnfinished = ".unfinished";
 
+/// Has it a name that core/whole_file.h gives to files that aren't whole: .name.process.serial.part.ending?
+bool is_temporary_file(const std::filesystem::path& file);
+
 /// What is found at the place where a data set is wanted.
 enum class FolderState {
   absent,      ///< nothing, or an empty folder

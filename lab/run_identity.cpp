@@ -42,16 +42,20 @@ std::string program_name() {
   return "touchstone " + program_version();
 }
 
-RunIdentity identity_of(const PreparedJob& job) {
+RunIdentity identity_of(const std::string& job_text, const std::vector<InputFile>& inputs) {
   RunIdentity identity;
-  identity.job_sha256 = sha256_of(job.text);
-  std::string inputs;
-  for (const InputFile& file : job.inputs) inputs += file.sha256 + "  " + file.name + "\n";
-  identity.inputs_sha256 = sha256_of(inputs);
+  identity.job_sha256 = sha256_of(job_text);
+  std::string list;
+  for (const InputFile& file : inputs) list += file.sha256 + "  " + file.name + "\n";
+  identity.inputs_sha256 = sha256_of(list);
   identity.version = program_version();
   identity.program_sha256 = sha256_of_file(own_file());
   identity.processor = processor_kind();
   return identity;
+}
+
+RunIdentity identity_of(const PreparedJob& job) {
+  return identity_of(job.text, job.inputs);
 }
 
 std::string difference(const RunIdentity& before, const RunIdentity& now) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "lab/prepared_job.h"
 
@@ -20,6 +21,8 @@ std::string program_version();
 /// "touchstone 0.1.0": what files and the command call it.
 std::string program_name();
 
+/// Of a job file's text and all files that it names.
+RunIdentity identity_of(const std::string& job_text, const std::vector<InputFile>& inputs);
 RunIdentity identity_of(const PreparedJob& job);
 
 /// What differs between two identities ("the job file", "the program's version (0.1.0 before, 0.2.0 now)"), or the

@@ -52,9 +52,12 @@ bool is_gentle(const GelSpec& gel) {
 }
 
 Membrane::Membrane(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel)
-    : surface_(gel, scene.device.gel.shape == GelShape::dome ? scene.device.gel.sphere_radius_mm : INFINITY),
-      pixel_(scene.membrane.pixel_um * 1e-3),
-      relief_pixel_(plan.relief_pixel_mm) {
+    : Membrane(scene, plan,
+               std::make_shared<const fem::SmoothSurface>(
+                   gel, scene.device.gel.shape == GelShape::dome ? scene.device.gel.sphere_radius_mm : INFINITY)) {}
+
+Membrane::Membrane(const SceneSpec& scene, const Plan& plan, std::shared_ptr<const fem::SmoothSurface> surface)
+    : surface_(std::move(surface)), pixel_(scene.membrane.pixel_um * 1e-3), relief_pixel_(plan.relief_pixel_mm) {
   if (plan.fine_relief) shape_ = contact_shape(scene.object);
   const Eigen::Vector2d size = scene.membrane.height_size_mm.value_or(2.0 * scene.device.mesh.fine_half_extent_mm);
   columns_ = std::max(1, static_cast<int>(std::lround(size.x() / pixel_)));
@@ -69,32 +72,32 @@ std::optional<fem::ReliefAnswer> Membrane::relief(const fem::PressState& press) 
   if (!shape_) return std::nullopt;
   fem::ReliefSettings settings;
   settings.pitch = relief_pixel_;
-  return fem::solve_fine_relief(surface_, press, *shape_, settings);
+  return fem::solve_fine_relief(*surface_, press, *shape_, settings);
 }
 
 Membrane::Sheet Membrane::sheet(const fem::PressState& press, const fem::ReliefAnswer& relief) const {
   const fem::PixelGrid& grid = relief.grid;
   TS_ASSERT(grid.size() > 0);
-  Eigen::Vector2d low = surface_.gel().vertices.front().head<2>();
+  Eigen::Vector2d low = surface_->gel().vertices.front().head<2>();
   Eigen::Vector2d high = low;
-  for (const auto& v : surface_.gel().vertices) {
+  for (const auto& v : surface_->gel().vertices) {
     low = low.cwiseMin(v.head<2>());
     high = high.cwiseMax(v.head<2>());
   }
-  const double widest = 2.0 * surface_.edge();
+  const double widest = 2.0 * surface_->edge();
   const auto x = sheet_lines(grid.first.x(), grid.pitch, grid.nx, low.x(), high.x(), widest);
   const auto y = sheet_lines(grid.first.y(), grid.pitch, grid.ny, low.y(), high.y(), widest);
   const auto left = static_cast<int>(std::find(x.begin(), x.end(), grid.first.x()) - x.begin());
   const auto bottom = static_cast<int>(std::find(y.begin(), y.end(), grid.first.y()) - y.begin());
   const int columns = static_cast<int>(x.size());
   const int rows = static_cast<int>(y.size());
-  const fem::HeightField field(surface_, press, &relief);
+  const fem::HeightField field(*surface_, press, &relief);
 
   Sheet sheet;
   std::vector<Eigen::Vector3d> vertices(x.size() * y.size());
   std::vector<char> wet(vertices.size(), 0);
   // The lattice goes on beside a dome; there its points are drawn in onto the rim.
-  const double rim = surface_.rim_radius();
+  const double rim = surface_->rim_radius();
   std::vector<char> beside(vertices.size(), 0);
   for (int j = 0; j < rows; ++j) {
     for (int i = 0; i < columns; ++i) {
@@ -103,7 +106,7 @@ Membrane::Sheet Membrane::sheet(const fem::PressState& press, const fem::ReliefA
       beside[k] = material.norm() >= rim;
       if (beside[k]) material *= rim / material.norm();
       const Eigen::Vector2d along = relief.tangential(material);
-      const double rest_z = surface_.rest_height(material);
+      const double rest_z = surface_->rest_height(material);
       vertices[k] << material + along, rest_z + field.at_material(material);
       sheet.rest.emplace_back(material.x(), material.y(), rest_z);
       const int gi = i - left;
@@ -143,7 +146,7 @@ Membrane::Sheet Membrane::sheet(const fem::PressState& press, const fem::ReliefA
 }
 
 cv::Mat Membrane::height(const fem::PressState& press, const std::optional<fem::ReliefAnswer>& relief) const {
-  const fem::HeightField field(surface_, press, relief ? &*relief : nullptr);
+  const fem::HeightField field(*surface_, press, relief ? &*relief : nullptr);
   cv::Mat map(rows_, columns_, CV_32F);
   for (int j = 0; j < rows_; ++j) {
     auto* row = map.ptr<float>(j);

@@ -21,6 +21,8 @@ class Membrane {
   /// @throws Error for a gel whose outer surface is neither flat nor a gentle dome (fem::SmoothSurface), or a height
   /// map of more than kMostHeightPixels a side
   Membrane(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel);
+  /// The same with the surface of another scene's membrane on the same gel. @throws Error likewise
+  Membrane(const SceneSpec& scene, const Plan& plan, std::shared_ptr<const fem::SmoothSurface> surface);
 
   /// The fine contact at `press`; nothing where the plan has fine relief off. Never throws for want of contact.
   std::optional<fem::ReliefAnswer> relief(const fem::PressState& press) const;
@@ -30,6 +32,7 @@ class Membrane {
   /// / 2 of the gel frame. `relief` as relief() gave it.
   cv::Mat height(const fem::PressState& press, const std::optional<fem::ReliefAnswer>& relief) const;
   double pixel_mm() const { return pixel_; }
+  const std::shared_ptr<const fem::SmoothSurface>& surface() const { return surface_; }
 
   /// The displaced surface as a camera sees it, made as fine as the relief: what is free, and what lies on the object.
   /// Gel frame, mm; together they are one sheet without a crack. @pre the relief has contact
@@ -41,7 +44,7 @@ class Membrane {
   Sheet sheet(const fem::PressState& press, const fem::ReliefAnswer& relief) const;
 
  private:
-  fem::SmoothSurface surface_;
+  std::shared_ptr<const fem::SmoothSurface> surface_;
   std::optional<fem::ContactShape> shape_;  // with all its detail; only where fine relief is on
   double pixel_, relief_pixel_;
   int columns_, rows_;

@@ -11,6 +11,20 @@ SceneSight::SceneSight(const SceneSpec& scene_of, const Plan& plan_of, const fem
       membrane(plan.fine_relief || scene.outputs.height ? std::make_unique<Membrane>(scene, plan, gel_of) : nullptr),
       objects(visible_objects(scene)) {}
 
+SceneSight::SceneSight(const SceneSpec& scene_of, const Plan& plan_of, const fem::Compliance& gel_of,
+                       const SceneSight& other)
+    : scene(scene_of), plan(plan_of), gel(other.gel), objects(visible_objects(scene)) {
+  if (!plan.fine_relief && !scene.outputs.height) return;
+  membrane = other.membrane ? std::make_unique<Membrane>(scene, plan, other.membrane->surface())
+                            : std::make_unique<Membrane>(scene, plan, gel_of);
+}
+
+render::Scene SceneSight::seen_coating(const fem::PressState& press, const SeenGeometry& geometry) const {
+  render::Scene out = scene_without_surface(scene, plan, {}, {}, press);
+  out.surfaces.insert(out.surfaces.begin(), coated_surface(scene.device, plan.bands, geometry.sheet));
+  return out;
+}
+
 std::optional<fem::ReliefAnswer> SceneSight::relief(const fem::PressState& press) const {
   return membrane ? membrane->relief(press) : std::nullopt;
 }

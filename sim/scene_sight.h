@@ -17,11 +17,15 @@ namespace touchstone::sim {
 /// All of a scene that can be seen, ready to be traced at any of its states. Safe to use from many threads.
 struct SceneSight {
   SceneSight(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel);
+  /// Another scene with the same gel: takes from `other` what depends on the gel alone, most of the work.
+  SceneSight(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel, const SceneSight& other);
 
   /// The fine contact, where it's called for.
   std::optional<fem::ReliefAnswer> relief(const fem::PressState& press) const;
   /// What first hits and viewers are told of; `relief` as relief() gave it.
   SeenGeometry geometry(const fem::PressState& press, const std::optional<fem::ReliefAnswer>& relief) const;
+  /// What a coated gel's camera sees, from what geometry() gave: the same as seen(). @pre the device has a coating
+  render::Scene seen_coating(const fem::PressState& press, const SeenGeometry& geometry) const;
   /// `relief` as relief() gave it.
   render::Scene seen(const fem::PressState& press, const std::optional<fem::ReliefAnswer>& relief) const;
   render::Tracer tracer(const fem::PressState& press, const std::optional<fem::ReliefAnswer>& relief) const {

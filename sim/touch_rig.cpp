@@ -80,7 +80,7 @@ struct TouchRig::Parts {
       direct = std::make_unique<const DirectLight>(*judged, camera, states, kRaysAPixel, settings.edge_side);
       choice = direct->choice();
     }
-    background_light = light(*judged, rest, {});
+    background_light = light(*judged, rest, {}, rest_seen);
   }
 
   SceneSpec scene_with(const ObjectSpec& object, const MotionSpec& motion) const {
@@ -101,11 +101,11 @@ struct TouchRig::Parts {
 
   std::vector<Truth> play(const SceneSpec& scene) const { return play_motion(scene, make_plan(scene), *gel); }
 
-  /// Irradiance on the sensor.
-  cv::Mat light(const SceneSight& sight, const fem::PressState& press,
-                const std::optional<fem::ReliefAnswer>& relief) const {
+  /// Irradiance on the sensor. `seen` and `relief` as the sight's geometry() and relief() gave them.
+  cv::Mat light(const SceneSight& sight, const fem::PressState& press, const std::optional<fem::ReliefAnswer>& relief,
+                const SeenGeometry& seen) const {
     if (choice.direct) {
-      if (auto image = direct->render(sight.seen(press, relief))) return image->irradiance;
+      if (auto image = direct->render(sight.seen_coating(press, seen))) return image->irradiance;
       fail("the gel has gone beyond the {} mm in and {} mm aside that the rig was set up for", settings.deepest_mm,
            settings.widest_mm);
     }
@@ -191,7 +191,7 @@ Eigen::Vector2d TouchRig::gel_from_pixel(const Eigen::Vector2d& pixel) const {
 TouchObject TouchRig::object(const ObjectSpec& spec) const {
   const SceneSpec scene = parts_->scene_with(spec, {});
   TouchObject object;
-  object.sight_ = std::make_shared<const SceneSight>(scene, make_plan(scene), *parts_->gel);
+  object.sight_ = std::make_shared<const SceneSight>(scene, make_plan(scene), *parts_->gel, *parts_->judged);
   return object;
 }
 
@@ -203,12 +203,12 @@ Touch TouchRig::look(const TouchObject& object, const fem::PressState& press, st
                      bool truth) const {
   const SceneSight& sight = *object.sight_;
   const auto relief = sight.relief(press);
+  const SeenGeometry seen = sight.geometry(press, relief);
   Touch touch;
-  touch.light = parts_->light(sight, press, relief);
+  touch.light = parts_->light(sight, press, relief, seen);
   touch.frame = parts_->develop(touch.light, noise_seed, frame);
   if (!truth) return touch;
   touch.ideal = parts_->develop_ideal(touch.light);
-  const SeenGeometry seen = sight.geometry(press, relief);
   const std::vector<render::FirstHit> hits = render::first_hits(seen.inside, parts_->ready);
   touch.height = cv::Mat(parts_->size, CV_32F, cv::Scalar(std::numeric_limits<float>::quiet_NaN()));
   touch.contact = cv::Mat(parts_->size, CV_8U, cv::Scalar(0));

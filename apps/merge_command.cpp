@@ -1,0 +1,45 @@
+#include <memory>
+
+#include "apps/command.h"
+#include "apps/progress_bar.h"
+#include "core/error.h"
+#include "lab/draw.h"
+#include "lab/drawn_dataset.h"
+
+namespace touchstone::apps {
+namespace {
+
+struct Options {
+  std::filesystem::path job;
+  std::filesystem::path out;
+};
+
+void merge(const Options& options, const GlobalOptions& global) {
+  if (!lab::is_draw_job_file(options.job)) {
+    fail("{}: isn't a job that draws; only those have shards to merge", options.job.string());
+  }
+  lab::DrawnReport report;
+  {
+    ProgressBar bar(global.quiet);
+    report = lab::merge_drawn(options.job, options.out, bar.listener());
+  }
+  if (report.was_finished) {
+    fmt::print("{}: is finished already; all of its checksums hold ({} samples)\n", options.out.string(),
+               report.samples);
+    return;
+  }
+  fmt::print("{}: {} samples\n", options.out.string(), report.samples);
+}
+
+}  // namespace
+
+void add_merge_command(CLI::App& app, const GlobalOptions& global, Action& action) {
+  CLI::App* command =
+      app.add_subcommand("merge", "Check that all shards of a data set are there, and write its card and manifest");
+  auto options = std::make_shared<Options>();
+  command->add_option("JOB", options->job, "Job file, as given to generate")->required();
+  command->add_option("-o,--out", options->out, "Folder of the data set")->required();
+  command->callback([&action, &global, options] { action = [options, &global] { merge(*options, global); }; });
+}
+
+}  // namespace touchstone::apps
