@@ -31,9 +31,9 @@ std::string how(VaryHow how) {
   return how == VaryHow::set ? "set to" : how == VaryHow::times ? "times" : "plus";
 }
 
-std::string list_of(const std::vector<VarySpec>& all) {
+std::string list_of(const std::vector<NumberVariation>& all) {
   std::string text;
-  for (const VarySpec& vary : all)
+  for (const NumberVariation& vary : all)
     text += fmt::format("  - `{}` {} {}\n", vary.path, how(vary.how), vary.spread.text());
   return text;
 }

@@ -29,7 +29,7 @@ EnumNames<DrawnOutput> enum_names(DrawnOutput) {
   return {{"frame", DrawnOutput::frame}, {"height", DrawnOutput::height}, {"contact", DrawnOutput::contact}};
 }
 
-void fields(YamlReader& in, VarySpec& vary) {
+void fields(YamlReader& in, NumberVariation& vary) {
   vary.where = in.where();
   in.required("path", vary.path);
   int ways = 0;

@@ -18,7 +18,7 @@ enum class VaryHow : std::uint8_t { set, times, plus };
 
 /// Numbers of a file that are drawn. Each place that the path leads to gets a draw of its own (core/edited_yaml.h);
 /// numbers of one list get the same.
-struct VarySpec {
+struct NumberVariation {
   std::string path;
   VaryHow how = VaryHow::set;
   Spread spread;
@@ -28,14 +28,14 @@ struct VarySpec {
 /// How many sensors of one design there are, and how they differ.
 struct UnitsSpec {
   int count = 1;
-  std::vector<VarySpec> vary;
+  std::vector<NumberVariation> vary;
 };
 
 struct DrawnObjectSpec {
   std::filesystem::path file;
   double weight = 1.0;                 ///< how often it's taken, relative to the others
   std::optional<std::int64_t> pieces;  ///< how many there are of it; none: with `vary` a new one each sample, else one
-  std::vector<VarySpec> vary;
+  std::vector<NumberVariation> vary;
   SourceLocation where;
 };
 
@@ -82,7 +82,7 @@ struct DrawJob {
   SourceLocation where;
 };
 
-void fields(YamlReader& in, VarySpec& vary);
+void fields(YamlReader& in, NumberVariation& vary);
 void fields(YamlReader& in, UnitsSpec& units);
 void fields(YamlReader& in, DrawnObjectSpec& object);
 void fields(YamlReader& in, PlaceSpec& place);

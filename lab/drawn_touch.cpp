@@ -30,9 +30,9 @@ std::uint64_t drawn_seed(RandomStream& random) {
 }
 
 /// Applies what is to be varied, in order, each to what the ones before it left.
-std::string varied(std::string text, const std::string& name, const std::vector<VarySpec>& all, RandomStream& random,
-                   std::vector<DrawnNumber>* drawn) {
-  for (const VarySpec& vary : all) {
+std::string varied(std::string text, const std::string& name, const std::vector<NumberVariation>& all,
+                   RandomStream& random, std::vector<DrawnNumber>* drawn) {
+  for (const NumberVariation& vary : all) {
     std::vector<std::pair<YamlNumber, double>> changes;
     for (const std::vector<YamlNumber>& group : find_yaml_numbers(text, name, vary.path, vary.where)) {
       const double value = vary.spread.draw(random);

@@ -26,14 +26,15 @@ here = pathlib.Path(__file__).parent
 
 
 def features(data):
-    """Change of each frame against the first of its press, over blocks of 4 x 4 pixels."""
+    """How much of each frame has changed by how much against the first of its press, wherever in the picture."""
     frames = data.array("frame").astype(np.float32)
     scene = data.groups()
     first = np.array([frames[scene == number][0] for number in scene])
     change = frames - first
     n, height, width, channels = change.shape
-    blocks = change.reshape(n, height // 4, 4, width // 4, 4, channels).mean(axis=(2, 4))
-    return np.concatenate([abs(blocks).reshape(n, -1), abs(blocks).mean(axis=(1, 2))], axis=1)
+    blocks = abs(change.reshape(n, height // 4, 4, width // 4, 4, channels).mean(axis=(2, 4))).reshape(n, -1, channels)
+    shares = [np.sqrt((blocks > level).mean(axis=1)) for level in (1.5, 3, 6, 12, 24)]
+    return np.concatenate(shares + [blocks.mean(axis=1), np.sqrt((blocks**2).mean(axis=1))], axis=1)
 
 
 def main(folder):
@@ -41,7 +42,7 @@ def main(folder):
     print(f"{made['samples']} samples, {made['rendered']} of them made now")
     train = ts.Dataset(folder, "train")
     test = ts.Dataset(folder, "test")
-    model = make_pipeline(PCA(8, random_state=0), StandardScaler(), PolynomialFeatures(2),
+    model = make_pipeline(StandardScaler(), PCA(6, random_state=0), PolynomialFeatures(2),
                           RidgeCV(np.logspace(-3, 3, 13)))
     model.fit(features(train), train.array("wrench")[:, 2])
     truth = test.array("wrench")[:, 2]

@@ -18,7 +18,8 @@ TEST(WholeSteps, AreAllDone) {
   for_each_whole(0, [](std::size_t) { FAIL(); });
 }
 
-/// The first step to begin has a loop of its own under way when another one throws. TBB alone would cut that loop short.
+/// The first step to begin has a loop of its own under way when another one throws. TBB alone would cut that loop
+/// short.
 TEST(WholeSteps, AStepAtWorkIsDoneWholeThoughAnotherOneThrows) {
   constexpr int kInner = 2000;
   tbb::task_arena arena(4, 4);  // several at once on any machine

@@ -165,7 +165,9 @@ TEST(TouchHeight, IsThatOfClosedForms) {
   dome.sphere_radius_mm = 20;
   dome.base_radius_mm = 10;
   EXPECT_NEAR(touch_height(dome, fem::SphereShape{3}, {4, 3}, level), std::sqrt(23.0 * 23.0 - 25.0) - 20.0, 1e-6);
-  EXPECT_THAT(test::message_of([&] { touch_height(device().gel, fem::SphereShape{1}, {20, 0}, level); }),
+  EXPECT_THAT(test::message_of([&] {
+                touch_height(device().gel, fem::SphereShape{1}, {20, 0}, level);
+              }),
               HasSubstr("isn't over the gel"));
 }
 
