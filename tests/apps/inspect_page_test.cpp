@@ -68,7 +68,9 @@ TEST_F(InspectPage, NeedsNothingElse) {
   const std::regex outside("(src|href)=\"(?!data:)");
   EXPECT_FALSE(std::regex_search(html_->substr(0, html_->find("<script")), outside));
   const std::size_t end = html_->rfind("</script>");
-  if (end != std::string::npos) EXPECT_FALSE(std::regex_search(html_->substr(end), outside));
+  if (end != std::string::npos) {
+    EXPECT_FALSE(std::regex_search(html_->substr(end), outside));
+  }
   EXPECT_EQ(count("<script src"), 0);
 }
 
