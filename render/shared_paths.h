@@ -24,8 +24,8 @@ class SharedPaths {
   /// @param examples of what the camera sees: footprints are made for the heights of the first hits there
   /// @param settings `max_samples` are in the mean of a pixel at least: the grid is as coarse as they allow, but never
   ///   finer than a point a pixel. Where there's a noise target, points get as many paths (kMostPaths at most) as bring
-  ///   a pixel's error in the last example, in the median, to that part of the target that neighbours who share it call
-  ///   for (kSharedPart); and kEdgePaths times as many where a preview shows edges
+  ///   the lower quartile of the pixels' errors in the last example to that part of the target that neighbours who
+  ///   share it call for (kSharedPart); and kEdgePaths times as many where a preview shows edges
   /// @pre there is an example
   SharedPaths(std::span<const Scene> examples, const PinholeCamera& camera, const RenderSettings& settings);
   static constexpr double kSharedPart = 0.25;
