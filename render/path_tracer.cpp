@@ -218,6 +218,33 @@ PixelResult<N> sample_pixel(const PathIntegrator<N>& integrator, const PathInteg
   return pixel;
 }
 
+/// Of the medium that the camera stands in.
+template <int N, typename AnyCamera>
+double index_at(const PreparedScene<N>& scene, const AnyCamera& camera) {
+  return scene.media[scene.medium_of_layer(scene.layer_at(camera.gel_from_camera.translation.z()))].index;
+}
+
+/// Calls work(tile, row, left, right, counts) for each row of each tile of kTile x kTile places, tiles side by side in
+/// threads; counts are summed in the tiles' order.
+template <typename Work>
+RayCounts over_tiles(int columns, int rows, const Work& work) {
+  const int tiles_across = (columns + kTile - 1) / kTile;
+  const int tiles = tiles_across * ((rows + kTile - 1) / kTile);
+  std::vector<RayCounts> tile_counts(tiles);
+  tbb::parallel_for(0, tiles, [&](int tile) {
+    const int left = (tile % tiles_across) * kTile;
+    const int top = (tile / tiles_across) * kTile;
+    RayCounts counts;
+    for (int row = top; row < std::min(top + kTile, rows); ++row) {
+      work(tile, row, left, std::min(left + kTile, columns), counts);
+    }
+    tile_counts[tile] = counts;
+  });
+  RayCounts sum;
+  for (const RayCounts& counts : tile_counts) sum += counts;
+  return sum;
+}
+
 template <int N, typename AnyCamera>
 RenderedImage render_image(const PreparedScene<N>& scene, const AnyCamera& camera, const RenderSettings& settings,
                            const cv::Mat& mask) {
@@ -227,33 +254,21 @@ RenderedImage render_image(const PreparedScene<N>& scene, const AnyCamera& camer
   image.samples = cv::Mat::zeros(camera.height, camera.width, CV_32SC1);
   const PathIntegrator<N> integrator(scene, settings.max_depth, scene.interreflection);
   const PathIntegrator<N> prober(scene, 0, false, 2.0);
-  const Eigen::Vector3d eye = camera.gel_from_camera.translation;
-  const double camera_index = scene.media[scene.medium_of_layer(scene.layer_at(eye.z()))].index;
-  const int tiles_across = (camera.width + kTile - 1) / kTile;
-  const int tiles = tiles_across * ((camera.height + kTile - 1) / kTile);
-  std::vector<RayCounts> tile_counts(tiles);
-
-  tbb::parallel_for(0, tiles, [&](int tile) {
-    const int left = (tile % tiles_across) * kTile;
-    const int top = (tile / tiles_across) * kTile;
-    RayCounts counts;
-    for (int row = top; row < std::min(top + kTile, camera.height); ++row) {
-      auto* irradiance = image.irradiance.ptr<float>(row);
-      auto* error = image.standard_error.ptr<float>(row);
-      auto* samples = image.samples.ptr<int>(row);
-      const auto* wanted = mask.empty() ? nullptr : mask.ptr<unsigned char>(row);
-      for (int column = left; column < std::min(left + kTile, camera.width); ++column) {
-        if (wanted != nullptr && wanted[column] == 0) continue;
-        const PixelResult<N> pixel = sample_pixel(integrator, scene.lamps.empty() ? nullptr : &prober, camera, settings,
-                                                  camera_index, column, row, counts);
-        for (int band = 0; band < N; ++band) irradiance[N * column + band] = static_cast<float>(pixel.irradiance[band]);
-        error[column] = static_cast<float>(pixel.standard_error);
-        samples[column] = pixel.samples;
-      }
+  const double camera_index = index_at(scene, camera);
+  image.counts = over_tiles(camera.width, camera.height, [&](int, int row, int left, int right, RayCounts& counts) {
+    auto* irradiance = image.irradiance.ptr<float>(row);
+    auto* error = image.standard_error.ptr<float>(row);
+    auto* samples = image.samples.ptr<int>(row);
+    const auto* wanted = mask.empty() ? nullptr : mask.ptr<unsigned char>(row);
+    for (int column = left; column < right; ++column) {
+      if (wanted != nullptr && wanted[column] == 0) continue;
+      const PixelResult<N> pixel = sample_pixel(integrator, scene.lamps.empty() ? nullptr : &prober, camera, settings,
+                                                camera_index, column, row, counts);
+      for (int band = 0; band < N; ++band) irradiance[N * column + band] = static_cast<float>(pixel.irradiance[band]);
+      error[column] = static_cast<float>(pixel.standard_error);
+      samples[column] = pixel.samples;
     }
-    tile_counts[tile] = counts;
   });
-  for (const RayCounts& counts : tile_counts) image.counts += counts;
   return image;
 }
 
@@ -263,8 +278,7 @@ cv::Mat preview_image(const PreparedScene<N>& scene, const AnyCamera& camera, in
   const int columns = (camera.width + stride - 1) / stride;
   cv::Mat image = cv::Mat::zeros(rows, columns, CV_32FC(N));
   const PathIntegrator<N> integrator(scene, 0, false);
-  const Eigen::Vector3d eye = camera.gel_from_camera.translation;
-  const double camera_index = scene.media[scene.medium_of_layer(scene.layer_at(eye.z()))].index;
+  const double camera_index = index_at(scene, camera);
   tbb::parallel_for(0, rows, [&](int row) {
     auto* irradiance = image.ptr<float>(row);
     RayCounts counts;
@@ -298,42 +312,31 @@ cv::Mat central_image(const PreparedScene<N>& scene, const AnyCamera& camera, co
   constexpr std::uint64_t kOtherCount = 0x9d2c5680f3a1b7e5ull;  // points with as many paths share a sequence
   cv::Mat image = cv::Mat::zeros(grid.rows, grid.columns, CV_32FC(N));
   const PathIntegrator<N> integrator(scene, settings.max_depth, scene.interreflection);
-  const Eigen::Vector3d eye = camera.gel_from_camera.translation;
-  const double camera_index = scene.media[scene.medium_of_layer(scene.layer_at(eye.z()))].index;
-  const int tiles_across = (grid.columns + kTile - 1) / kTile;
-  const int tiles = tiles_across * ((grid.rows + kTile - 1) / kTile);
-  std::vector<RayCounts> tile_counts(tiles);
-  tbb::parallel_for(0, tiles, [&](int tile) {
-    const int left = (tile % tiles_across) * kTile;
-    const int top = (tile / tiles_across) * kTile;
-    RayCounts counts;
-    for (int row = top; row < std::min(top + kTile, grid.rows); ++row) {
-      auto* out = image.ptr<float>(row);
-      for (int column = left; column < std::min(left + kTile, grid.columns); ++column) {
-        const int count = paths.empty() ? 1 : std::max<int>(1, paths.at<unsigned char>(row, column));
-        const std::uint32_t place = z_order(column - left, row - top);
-        const std::uint64_t seed = settings.seed + kOtherCount * static_cast<std::uint64_t>(count - 1);
-        Bands<N> sum = Bands<N>::Zero();
-        for (std::uint32_t i = 0; i < static_cast<std::uint32_t>(count); ++i) {
-          SampleSequence numbers(seed, static_cast<std::uint64_t>(tile), place * static_cast<std::uint32_t>(count) + i);
-          const auto [px, py] = numbers.next_pair();
-          numbers.next_pair();  // the place in the hole, which is its centre
-          const double x = grid.left + (column + px - 0.5) * grid.spacing;
-          const double y = grid.top + (row + py - 0.5) * grid.spacing;
-          const auto ray = camera_ray(camera, x, y, 0.5, 0.5);
-          if (!ray) continue;
-          ++counts.paths;
-          sum += integrator.trace(camera.gel_from_camera * ray->origin, camera.gel_from_camera.turn(ray->direction),
-                                  numbers, counts);
-        }
-        for (int band = 0; band < N; ++band) {
-          out[N * column + band] = static_cast<float>(sum[band] * (camera_index * camera_index / count));
-        }
+  const double camera_index = index_at(scene, camera);
+  all_counts += over_tiles(grid.columns, grid.rows, [&](int tile, int row, int left, int right, RayCounts& counts) {
+    auto* out = image.ptr<float>(row);
+    for (int column = left; column < right; ++column) {
+      const int count = paths.empty() ? 1 : std::max<int>(1, paths.at<unsigned char>(row, column));
+      const std::uint32_t place = z_order(column - left, row % kTile);
+      const std::uint64_t seed = settings.seed + kOtherCount * static_cast<std::uint64_t>(count - 1);
+      Bands<N> sum = Bands<N>::Zero();
+      for (std::uint32_t i = 0; i < static_cast<std::uint32_t>(count); ++i) {
+        SampleSequence numbers(seed, static_cast<std::uint64_t>(tile), place * static_cast<std::uint32_t>(count) + i);
+        const auto [px, py] = numbers.next_pair();
+        numbers.next_pair();  // the place in the hole, which is its centre
+        const double x = grid.left + (column + px - 0.5) * grid.spacing;
+        const double y = grid.top + (row + py - 0.5) * grid.spacing;
+        const auto ray = camera_ray(camera, x, y, 0.5, 0.5);
+        if (!ray) continue;
+        ++counts.paths;
+        sum += integrator.trace(camera.gel_from_camera * ray->origin, camera.gel_from_camera.turn(ray->direction),
+                                numbers, counts);
+      }
+      for (int band = 0; band < N; ++band) {
+        out[N * column + band] = static_cast<float>(sum[band] * (camera_index * camera_index / count));
       }
     }
-    tile_counts[tile] = counts;
   });
-  for (const RayCounts& counts : tile_counts) all_counts += counts;
   return image;
 }
 

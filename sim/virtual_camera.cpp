@@ -238,8 +238,8 @@ struct VirtualCamera::Parts : SceneSight {
       RandomStream seeds(scene.seed, i, Purpose::kMotion);
       of_moment.seed = (std::uint64_t{seeds()} << 32) | seeds();
       const render::Tracer tracer(scenes[i]);
-      const render::RenderedImage image =
-          shares ? shared->render(scenes[i], tracer, of_moment, true) : tracer.render(camera, of_moment, light.missing);
+      const render::RenderedImage image = shares ? shared->render(scenes[i], tracer, of_moment, scene.outputs.error)
+                                                 : tracer.render(camera, of_moment, light.missing);
       sum.add(i, image.irradiance, image.standard_error);
       counts += image.counts;
     }
