@@ -1,6 +1,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 
@@ -32,6 +33,9 @@ void add_study_command(CLI::App& app, const GlobalOptions& global, Action& actio
 
 /// @throws Error if a result can't be written at `file`: its folder isn't there, or it's a folder itself
 void require_writable_place(const std::filesystem::path& file);
+
+/// That a data set was there already, as generate and merge find it.
+void print_finished(const std::filesystem::path& out, std::int64_t samples);
 
 // What calibrate and estimate do differs from sensor to sensor: each sensor's form is a command below them.
 void add_chroma_calibration(CLI::App& calibrations, const GlobalOptions& global, Action& action);

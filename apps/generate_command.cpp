@@ -31,8 +31,7 @@ void generate_drawn(const Options& options, const GlobalOptions& global) {
     report = lab::generate_drawn(options.job, options.out, how, bar.listener());
   }
   if (report.was_finished) {
-    fmt::print("{}: is finished already; all of its checksums hold ({} samples)\n", options.out.string(),
-               report.samples);
+    print_finished(options.out, report.samples);
     return;
   }
   fmt::print("{}: {} samples, {} of them made", options.out.string(), report.samples, report.made);
@@ -64,8 +63,7 @@ void generate(const Options& options, const GlobalOptions& global) {
   }
   if (!report.warning.empty()) spdlog::warn("{}", report.warning);
   if (report.was_finished) {
-    fmt::print("{}: is finished already; all of its checksums hold ({} samples)\n", options.out.string(),
-               report.samples);
+    print_finished(options.out, report.samples);
     return;
   }
   fmt::print("{}: {} samples, {} of them rendered", options.out.string(), report.samples, report.rendered);
@@ -74,6 +72,10 @@ void generate(const Options& options, const GlobalOptions& global) {
 }
 
 }  // namespace
+
+void print_finished(const std::filesystem::path& out, std::int64_t samples) {
+  fmt::print("{}: is finished already; all of its checksums hold ({} samples)\n", out.string(), samples);
+}
 
 void add_generate_command(CLI::App& app, const GlobalOptions& global, Action& action) {
   CLI::App* command =

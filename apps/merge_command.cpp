@@ -24,8 +24,7 @@ void merge(const Options& options, const GlobalOptions& global) {
     report = lab::merge_drawn(options.job, options.out, bar.listener());
   }
   if (report.was_finished) {
-    fmt::print("{}: is finished already; all of its checksums hold ({} samples)\n", options.out.string(),
-               report.samples);
+    print_finished(options.out, report.samples);
     return;
   }
   fmt::print("{}: {} samples\n", options.out.string(), report.samples);

@@ -426,6 +426,7 @@ std::vector<std::int64_t> Hdf5Reader::shape_of_rows(const std::string& path, std
 
 void Hdf5Reader::read_row_part(const std::string& path, Hdf5Id type, std::int64_t first,
                                const std::vector<std::int64_t>& shape, void* values) const {
+  const auto held = hold();
   const std::vector<hsize_t> extent(shape.begin(), shape.end());
   std::vector<hsize_t> start(shape.size(), 0);
   start[0] = static_cast<hsize_t>(first);

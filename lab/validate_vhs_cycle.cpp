@@ -1,5 +1,5 @@
 // The vhs sensor trained as its text trained it, on some 10,000 samples (shared/seeds/000, sec. 4.3): what so many
-// frames cost, and what they are good for. In full only: it takes half an hour on four cores.
+// frames cost, and what they are good for. In full only: it takes three quarters of a core's hour.
 
 #include <chrono>
 #include <ctime>
