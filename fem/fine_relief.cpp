@@ -45,6 +45,23 @@ PixelBox whole_surface(const Compliance& gel, double pitch) {
   return box_around(low + (0.5 + 1e-9) * half, high - (0.5 + 1e-9) * half, pitch);
 }
 
+/// The box widened to one of few sizes, each a sixth more than the one before, so that their responses are kept from
+/// press to press (SmoothSurface::response); not beyond `whole`.
+PixelBox of_kept_size(const PixelBox& box, const PixelBox& whole) {
+  const auto widen = [](int& low, int& high, int least, int most) {
+    int size = 24;
+    while (size < high - low + 1) size += (size + 5) / 6;
+    size = std::min(size, most - least + 1);
+    low = std::max(least, low - (size - (high - low + 1)) / 2);
+    high = std::min(most, low + size - 1);
+    low = high - size + 1;
+  };
+  PixelBox wide = box;
+  widen(wide.left, wide.right, whole.left, whole.right);
+  widen(wide.bottom, wide.top, whole.bottom, whole.top);
+  return wide;
+}
+
 /// The vertices with pressure and their neighbours' reach.
 PixelBox pressed_box(const Compliance& gel, const PressState& press, double margin, double pitch) {
   Eigen::Vector2d low = Eigen::Vector2d::Constant(kInfinity);
@@ -170,6 +187,7 @@ ReliefAnswer solve_fine_relief(const SmoothSurface& surface, const PressState& p
   ReliefAnswer answer;
   if (!settings.follow_surface) move_as_a_whole(gel, press, coarse.along);
   answer.along = coarse.along;
+  answer.rest = coarse.rest;
   answer.coarse_force = coarse.force;
   answer.misfit = coarse.largest_misfit;
   answer.solved.converged = true;
@@ -177,31 +195,32 @@ ReliefAnswer solve_fine_relief(const SmoothSurface& surface, const PressState& p
 
   const double margin = settings.margin >= 0.0 ? settings.margin : std::max(2.0 * surface.edge(), 0.25 * gel.thickness);
   const PixelBox whole = whole_surface(gel, settings.pitch);
-  PixelBox box = common(pressed_box(gel, press, margin, settings.pitch), whole);
+  PixelBox box = of_kept_size(common(pressed_box(gel, press, margin, settings.pitch), whole), whole);
   std::vector<double> start;
   for (int widening = 0;; ++widening) {
     const PixelGrid grid = box.grid(settings.pitch);
     check(grid);
-    const LayerResponse layer(gel.material, gel.thickness, grid, GridEdges::free);
+    const auto layer = surface.response(grid.nx, grid.ny, grid.pitch);
     const std::vector<double> gap = gaps(surface, grid, coarse, shape, press.gel_from_object);
     PixelContact contact{gap, {}};
     if (settings.control == ReliefControl::force) contact.force = coarse.force;
     start = carried_over(answer.grid.size() > 0 ? &answer : previous, grid);
-    answer.solved = solve_pixel_contact(layer, contact, settings.tolerance, start);
+    answer.solved = solve_pixel_contact(*layer, contact, settings.tolerance, start);
     answer.grid = grid;
     answer.pressure = std::move(answer.solved.pressure);
     const PixelBox wider = common(widened(box, grid, answer.pressure), whole);
     if (wider == box || widening == kMostWidenings) break;
-    box = wider;
+    box = of_kept_size(wider, whole);
   }
   const PixelBox inner{whole.left + 1, whole.bottom + 1, whole.right - 1, whole.top - 1};
   const PixelGrid& grid = answer.grid;
   answer.height = std::move(answer.solved.displacement);
   answer.contact.assign(grid.size(), 0);
+  const Eigen::MatrixX3d rest = coarse.rest.on_lattice(grid.columns_x(), grid.rows_y());
   for (int j = 0; j < grid.ny; ++j) {
     for (int i = 0; i < grid.nx; ++i) {
       const std::size_t k = grid.at(i, j);
-      answer.height[k] = coarse.rest.at(grid.centre(i, j)).z() - answer.height[k];
+      answer.height[k] = rest(static_cast<Eigen::Index>(k), 2) - answer.height[k];
       answer.contact[k] = answer.pressure[k] > 0.0;
       const bool inside = box.left + i >= inner.left && box.left + i <= inner.right && box.bottom + j >= inner.bottom &&
                           box.bottom + j <= inner.top;
@@ -218,7 +237,7 @@ HeightField::HeightField(const SmoothSurface& surface, const PressState& press, 
     coarse_ = surface.normal_displacement(press);
     return;
   }
-  coarse_ = surface.normal_displacement(press, fine->grid, fine->pressure);
+  coarse_ = surface.normal_displacement(fine->rest, fine->grid, fine->pressure);
   fine_grid_ = fine->grid;
   fine_ = fine->height;
 }

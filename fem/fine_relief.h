@@ -43,6 +43,7 @@ struct ReliefAnswer {
   std::vector<double> height;    ///< mm, normal displacement: below 0 under the object
   std::vector<char> contact;     ///< 1: in contact
   SplineField along;             ///< components x and y: the tangential displacement, mm
+  SplineField rest;              ///< as SmoothDisplacement::rest
   PixelContactAnswer solved;     ///< shift, residuals, work; its pressure and displacement are moved into the above
   double coarse_force = 0.0;     ///< N
   double misfit = 0.0;           ///< mm, see SmoothDisplacement::largest_misfit

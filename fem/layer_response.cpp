@@ -42,6 +42,18 @@ double corner(double x, double y) {
 
 }  // namespace
 
+std::vector<double> PixelGrid::columns_x() const {
+  std::vector<double> x;
+  for (int i = 0; i < nx; ++i) x.push_back(centre(i, 0).x());
+  return x;
+}
+
+std::vector<double> PixelGrid::rows_y() const {
+  std::vector<double> y;
+  for (int j = 0; j < ny; ++j) y.push_back(centre(0, j).y());
+  return y;
+}
+
 void check(const PixelGrid& grid) {
   if (grid.nx < 1 || grid.ny < 1 || grid.nx > kMostPixelsASide || grid.ny > kMostPixelsASide) {
     fail("a grid of {} x {} pixels is wanted; a side may have 1 to {}", grid.nx, grid.ny, kMostPixelsASide);
@@ -152,8 +164,19 @@ LayerResponse::LayerResponse(const LayerResponse& of, Inverse)
 
 LayerResponse::~LayerResponse() = default;
 
-std::unique_ptr<const LayerResponse> LayerResponse::rough_inverse() const {
-  return std::unique_ptr<const LayerResponse>(new LayerResponse(*this, Inverse{}));
+const LayerResponse& LayerResponse::rough_inverse() const {
+  std::call_once(inverse_made_, [&] { inverse_.reset(new LayerResponse(*this, Inverse{})); });
+  return *inverse_;
+}
+
+const LayerResponse& LayerResponse::on_wider_pixels() const {
+  TS_ASSERT(edges_ == GridEdges::free);
+  std::call_once(wider_made_, [&] {
+    const PixelGrid wider{(grid_.nx + 1) / 2, (grid_.ny + 1) / 2, 2.0 * grid_.pitch,
+                          grid_.first + Eigen::Vector2d::Constant(0.5 * grid_.pitch)};
+    wider_ = std::make_unique<const LayerResponse>(material_, thickness_, wider, GridEdges::free);
+  });
+  return *wider_;
 }
 
 void LayerResponse::fill_periodic() {

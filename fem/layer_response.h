@@ -3,7 +3,9 @@
 
 #include <Eigen/Core>
 #include <memory>
+#include <mutex>
 #include <span>
+#include <vector>
 
 #include "fem/elastic_material.h"
 
@@ -20,6 +22,8 @@ struct PixelGrid {
   std::size_t size() const { return static_cast<std::size_t>(nx) * static_cast<std::size_t>(ny); }
   std::size_t at(int i, int j) const { return static_cast<std::size_t>(j) * nx + static_cast<std::size_t>(i); }
   Eigen::Vector2d centre(int i, int j) const { return first + pitch * Eigen::Vector2d(i, j); }
+  std::vector<double> columns_x() const;  ///< of the pixels' centres, mm
+  std::vector<double> rows_y() const;
   double pixel_area() const { return pitch * pitch; }
   bool operator==(const PixelGrid&) const = default;
 };
@@ -64,7 +68,11 @@ class LayerResponse {
 
   /// An approximate inverse, from displacement to pressure, to speed up iterations: each wave of a slightly larger cell
   /// by itself. Symmetric positive definite.
-  std::unique_ptr<const LayerResponse> rough_inverse() const;
+  /// Made at the first call.
+  const LayerResponse& rough_inverse() const;
+  /// The same layer under pixels of twice the width, the first of them over the first four of these. Made at the first
+  /// call. @pre a free grid; pixels of a quarter of kWidestPixel or less are always fine enough
+  const LayerResponse& on_wider_pixels() const;
 
   std::unique_ptr<Scratch> make_scratch() const;
   /// @pre both spans have a value per pixel, and the scratch is of this response; they may be the same array
@@ -83,6 +91,8 @@ class LayerResponse {
   double thickness_;
   std::unique_ptr<const Transform> transform_;
   std::unique_ptr<double[]> symbol_;  // real: of the padded grid's half spectrum, over the number of its pixels
+  mutable std::once_flag inverse_made_, wider_made_;
+  mutable std::unique_ptr<const LayerResponse> inverse_, wider_;
 };
 
 class LayerResponse::Scratch {

@@ -43,7 +43,7 @@ class Solver {
         tolerance_(tolerance),
         inverse_(layer.rough_inverse()),
         scratch_(layer.make_scratch()),
-        inverse_scratch_(inverse_->make_scratch()),
+        inverse_scratch_(inverse_.make_scratch()),
         rows_(static_cast<std::size_t>(grid_.ny)) {}
 
   PixelContactAnswer solve(std::span<const double> start) {
@@ -167,7 +167,7 @@ class Solver {
   /// One step along the conjugate direction (Polak and Ribiere's, which begins anew by itself where the set changed).
   void step() {
     auto& p = answer_.pressure;
-    inverse_->apply(residual_, response_, *inverse_scratch_);
+    inverse_.apply(residual_, response_, *inverse_scratch_);
     project(response_);
     const Sums products = over_rows([&](std::size_t k, Sums& s) {
       s.a += response_[k] * residual_[k];
@@ -232,7 +232,7 @@ class Solver {
   bool forced_;
   double pressure_sum_;  // over the pixels, MPa
   PixelTolerance tolerance_;
-  std::unique_ptr<const LayerResponse> inverse_;
+  const LayerResponse& inverse_;
   std::unique_ptr<LayerResponse::Scratch> scratch_, inverse_scratch_;
   std::vector<Sums> rows_;
   std::vector<double> direction_, response_, residual_, last_residual_;
@@ -287,14 +287,12 @@ std::vector<double> doubled(const PixelGrid& coarse, const PixelGrid& fine, cons
 std::vector<double> nested_start(const LayerResponse& layer, const PixelContact& contact,
                                  const PixelTolerance& tolerance) {
   const PixelGrid& fine = layer.grid();
-  const double pitch = 2.0 * fine.pitch;
-  if (layer.edges() != GridEdges::free || pitch > kWidestPixel * layer.thickness() ||
+  if (layer.edges() != GridEdges::free || 2.0 * fine.pitch > kWidestPixel * layer.thickness() ||
       std::min(fine.nx, fine.ny) < kLeastNestedPixels) {
     return {};
   }
-  const PixelGrid coarse{(fine.nx + 1) / 2, (fine.ny + 1) / 2, pitch,
-                         fine.first + Eigen::Vector2d::Constant(0.5 * fine.pitch)};
-  const LayerResponse wide(layer.material(), layer.thickness(), coarse, GridEdges::free);
+  const LayerResponse& wide = layer.on_wider_pixels();
+  const PixelGrid& coarse = wide.grid();
   const std::vector<double> gap = halved(fine, coarse, contact.gap);
   PixelTolerance loose = tolerance;
   loose.gap_mm *= kNestedLooseness;

@@ -199,19 +199,48 @@ SmoothDisplacement SmoothSurface::displacement(const PressState& press) const {
   return result;
 }
 
-std::vector<double> SmoothSurface::normal_displacement(const PressState& press, const PixelGrid& fine,
-                                                       std::span<const double> pressure) const {
-  std::vector<double> displacement =
-      layer_answer(pressure.empty() ? coarse_pressure(press) : gathered(fine, pressure, reference_grid()));
-  const SmoothDisplacement smooth = this->displacement(press);
+std::vector<double> SmoothSurface::less_layer(const SplineField& rest, std::vector<double> answer) const {
   const PixelGrid& grid = reference_grid();
-  for (int j = 0; j < grid.ny; ++j) {
-    for (int i = 0; i < grid.nx; ++i) {
-      double& w = displacement[grid.at(i, j)];
-      w = smooth.rest.at(grid.centre(i, j)).z() - w;
+  const Eigen::MatrixX3d smooth = rest.on_lattice(grid.columns_x(), grid.rows_y());
+  for (std::size_t k = 0; k < answer.size(); ++k) answer[k] = smooth(static_cast<Eigen::Index>(k), 2) - answer[k];
+  return answer;
+}
+
+std::vector<double> SmoothSurface::normal_displacement(const PressState& press) const {
+  return less_layer(displacement(press).rest, layer_answer(coarse_pressure(press)));
+}
+
+std::vector<double> SmoothSurface::normal_displacement(const SplineField& rest, const PixelGrid& fine,
+                                                       std::span<const double> pressure) const {
+  return less_layer(rest, layer_answer(gathered(fine, pressure, reference_grid())));
+}
+
+std::shared_ptr<const LayerResponse> SmoothSurface::response(int nx, int ny, double pitch) const {
+  const auto fits = [&](const auto& one) {
+    const PixelGrid& grid = one->grid();
+    return grid.nx == nx && grid.ny == ny && grid.pitch == pitch;
+  };
+  {
+    const std::lock_guard lock(kept_mutex_);
+    const auto found = std::find_if(kept_.begin(), kept_.end(), fits);
+    if (found != kept_.end()) {
+      std::rotate(found, found + 1, kept_.end());
+      return kept_.back();
     }
   }
-  return displacement;
+  // Two threads may make the same one; they are equal.
+  auto made = std::make_shared<const LayerResponse>(gel_.material, gel_.thickness, PixelGrid{nx, ny, pitch, {0.0, 0.0}},
+                                                    GridEdges::free);
+  const std::lock_guard lock(kept_mutex_);
+  if (std::none_of(kept_.begin(), kept_.end(), fits)) kept_.push_back(made);
+  std::size_t pixels = 0;
+  for (auto one = kept_.rbegin(); one != kept_.rend(); ++one) {
+    pixels += (*one)->grid().size();
+    if (pixels <= kKeptPixels) continue;
+    kept_.erase(kept_.begin(), one.base());
+    break;
+  }
+  return made;
 }
 
 }  // namespace touchstone::fem

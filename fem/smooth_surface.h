@@ -6,6 +6,7 @@
 #include <Eigen/SparseCore>
 #include <limits>
 #include <memory>
+#include <mutex>
 #include <span>
 #include <vector>
 
@@ -25,6 +26,9 @@ struct SmoothDisplacement {
   double largest_misfit = 0.0;  ///< mm, of `rest.z` to the mesh's hat means where there's pressure: the mesh's wiggles
   double force = 0.0;           ///< N, of the coarse pressure
 };
+
+/// Of all responses that a SmoothSurface keeps; some 40 bytes each.
+inline constexpr std::size_t kKeptPixels = 2'000'000;
 
 inline constexpr double kSteepestDome = 0.5;  ///< radians of slope, at its rim
 
@@ -49,11 +53,16 @@ class SmoothSurface {
   SmoothDisplacement displacement(const PressState& press) const;
 
   /// Normal displacement (mm, negative under pressure) at the pixels of reference_grid(): the rest, and what the
-  /// endless layer does under the coarse pressure; or, if a finer pressure is given, under that one. As smooth as the
-  /// pressure.
-  std::vector<double> normal_displacement(const PressState& press, const PixelGrid& fine = {},
-                                          std::span<const double> pressure = {}) const;
+  /// endless layer does under the coarse pressure; or the `rest` of a SmoothDisplacement, and what it does under a
+  /// finer pressure. As smooth as the pressure.
+  std::vector<double> normal_displacement(const PressState& press) const;
+  std::vector<double> normal_displacement(const SplineField& rest, const PixelGrid& fine,
+                                          std::span<const double> pressure) const;
   const PixelGrid& reference_grid() const { return layer_->grid(); }
+
+  /// The endless layer under `nx` x `ny` free pixels of `pitch` mm, wherever they stand. Those that were asked for last
+  /// are kept, up to kKeptPixels: making one takes as long as using it ten times.
+  std::shared_ptr<const LayerResponse> response(int nx, int ny, double pitch) const;
 
   /// Height of the undeformed surface, mm; beside a dome that of its rim.
   double rest_height(const Eigen::Vector2d& point) const;
@@ -66,6 +75,7 @@ class SmoothSurface {
  private:
   std::vector<double> coarse_pressure(const PressState& press) const;
   std::vector<double> layer_answer(std::span<const double> pressure) const;
+  std::vector<double> less_layer(const SplineField& rest, std::vector<double> answer) const;
 
   const Compliance& gel_;
   double edge_ = 0.0;
@@ -76,6 +86,8 @@ class SmoothSurface {
   Eigen::VectorXd weight_;                             // per vertex, mm^2, by the mass matrix
   Eigen::VectorXd pixel_weight_;                       // the same in pixels
   std::unique_ptr<SplineFit> rest_fit_, along_fit_;
+  mutable std::mutex kept_mutex_;
+  mutable std::vector<std::shared_ptr<const LayerResponse>> kept_;  // the last one used stands last
 };
 
 }  // namespace touchstone::fem

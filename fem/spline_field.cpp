@@ -95,6 +95,29 @@ Eigen::Vector3d SplineField::at(const Eigen::Vector2d& point) const {
   return value;
 }
 
+Eigen::MatrixX3d SplineField::on_lattice(std::span<const double> x, std::span<const double> y) const {
+  Eigen::MatrixX3d values(static_cast<Eigen::Index>(x.size() * y.size()), 3);
+  std::vector<std::pair<int, std::array<double, 4>>> along_x;
+  for (const double at : x) {
+    const auto [i, u] = interval((at - first.x()) / spacing, nx);
+    along_x.emplace_back(i, splines(u));
+  }
+  const int width = nx + 3;
+  Eigen::MatrixX3d line(width, 3);  // the coefficients of a line of constant y
+  Eigen::Index row = 0;
+  for (const double at : y) {
+    const auto [j, v] = interval((at - first.y()) / spacing, ny);
+    const auto along_y = splines(v);
+    line.setZero();
+    for (int b = 0; b < 4; ++b) line += along_y[b] * coefficients.middleRows((j + b) * width, width);
+    for (const auto& [i, weights] : along_x) {
+      values.row(row++) = weights[0] * line.row(i) + weights[1] * line.row(i + 1) + weights[2] * line.row(i + 2) +
+                          weights[3] * line.row(i + 3);
+    }
+  }
+  return values;
+}
+
 Eigen::Vector2d SplineField::knot(Eigen::Index row) const {
   const auto i = static_cast<double>(row % (nx + 3));
   const auto j = static_cast<double>(row / (nx + 3));

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>
+#include <span>
 
 #include "fem/layer_response.h"
 
@@ -19,6 +20,8 @@ struct SplineField {
 
   /// Beyond the rectangle: the value at its nearest point.
   Eigen::Vector3d at(const Eigen::Vector2d& point) const;
+  /// The values at all points (x, y) of a lattice, x fastest; a fraction of the work of asking for each.
+  Eigen::MatrixX3d on_lattice(std::span<const double> x, std::span<const double> y) const;
   /// The knot that the spline of a row of `coefficients` stands about. A field whose coefficients are a linear
   /// function's values at these is that function.
   Eigen::Vector2d knot(Eigen::Index row) const;

@@ -42,6 +42,7 @@ BenchSource rig_bench(const std::filesystem::path& cache_folder) {
     settings.membrane_um = prepared.job.membrane_um;
     settings.interreflection_tolerance = prepared.job.interreflection_tolerance;
     settings.edge_side = prepared.job.edge_side;
+    settings.guides = prepared.job.guides;
     settings.always_friction = true;  // else a straight press would have none beside a tilted one that has
     const auto rig = std::make_shared<const sim::TouchRig>(unit.device, cache_folder, settings);
     UnitBench bench;

@@ -109,6 +109,8 @@ void fields(YamlReader& in, DrawJob& job) {
   in.optional("splits", job.splits);
   in.optional("membrane_um", job.membrane_um, Allowed::within(1.0, 1000.0));
   in.optional("interreflection_tolerance", job.interreflection_tolerance, Allowed::within(0.0, 1.0));
+  in.optional("guide_sectors", job.guides.sectors, Allowed::within(1, 8));
+  in.optional("guide_slices", job.guides.slices, Allowed::within(1, 4));
   in.optional("edge_side", job.edge_side);
   if (job.edge_side != 1 && job.edge_side != 2 && job.edge_side != 4) {
     fail_at(in.where("edge_side"), "edge_side: {} is not allowed; allowed is one of: 1, 2, 4", job.edge_side);

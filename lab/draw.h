@@ -10,6 +10,7 @@
 #include "core/yaml_reader.h"
 #include "lab/split.h"
 #include "lab/spread.h"
+#include "render/guide_beams.h"
 
 namespace touchstone::lab {
 
@@ -76,6 +77,7 @@ struct DrawJob {
   double membrane_um = 40.0;                ///< sim::TouchRigSettings::membrane_um
   double interreflection_tolerance = 0.05;  ///< sim::TouchRigSettings
   int edge_side = 4;                        ///< sim::TouchRigSettings
+  render::GuideCut guides;                  ///< sim::TouchRigSettings
   DrawSpec draw;
   DrawnOutputs outputs;
   SplitSpec splits;

@@ -35,6 +35,7 @@ DirectBatch::DirectBatch(const DirectFrame& frame)
       lanes_(kMostPackets * kPacket),
       amounts_(lanes_.size() * stride_),
       flows_(lanes_.size() * stride_ * 3),
+      ways_(frame.shadow_reach != nullptr ? flows_.size() : 0),
       pass_(field_.pass.empty() ? 0 : lanes_.size() * stride_ * bands_) {}
 
 void DirectBatch::look(std::span<const RayPacket> rays, DirectCounts& counts) {
@@ -132,6 +133,18 @@ void DirectBatch::light_lane(int lane, DirectCounts& counts) {
   for (int lamp = 0; lamp < lamps_; ++lamp) lit |= std::uint64_t{amount[lamp] > 0.0f} << lamp;
   one.doubt &= lit;
   counts.spared += std::popcount(lit ^ one.doubt);
+  if (one.doubt != 0) {
+    float* way = ways_.data() + static_cast<std::size_t>(lane) * stride_ * 3;
+    for (int group = 0; group < fixture_.groups; ++group) {
+      const Four x = four(flow + group * 12);
+      const Four y = four(flow + group * 12 + 4);
+      const Four z = four(flow + group * 12 + 8);
+      const Four scale = -(x * x + y * y + z * z).max(1e-30f).sqrt().inverse();
+      Eigen::Map<Four>(way + group * 12) = scale * x;
+      Eigen::Map<Four>(way + group * 12 + 4) = scale * y;
+      Eigen::Map<Four>(way + group * 12 + 8) = scale * z;
+    }
+  }
   if (pass_.empty()) return;
   const std::size_t pass_width = stride_ * bands_;
   float* pass = pass_.data() + lane * pass_width;
@@ -152,9 +165,18 @@ Eigen::Vector3f DirectBatch::flow_of(int lane, int lamp) const {
   return {from[0], from[4], from[8]};
 }
 
+Eigen::Vector3f DirectBatch::way_to(int lane, int lamp) const {
+  const float* from = ways_.data() + static_cast<std::size_t>(lane) * stride_ * 3 + lamp / 4 * 12 + lamp % 4;
+  return {from[0], from[4], from[8]};
+}
+
 void DirectBatch::set_flow(int lane, int lamp, const Eigen::Vector3f& flow) {
   float* to = flows_.data() + static_cast<std::size_t>(lane) * stride_ * 3 + lamp / 4 * 12 + lamp % 4;
   for (int a = 0; a < 3; ++a) to[4 * a] = flow[a];
+  if ((lanes_[lane].doubt >> lamp & 1u) == 0) return;
+  const Eigen::Vector3f way = -flow.normalized();
+  float* way_at = ways_.data() + (to - flows_.data());
+  for (int a = 0; a < 3; ++a) way_at[4 * a] = way[a];
 }
 
 // The field of a lens point is that of the lens's middle seen from a place set off the other way, since flat layers
@@ -218,10 +240,16 @@ void DirectBatch::cast_shadows(DirectCounts& counts) {
   // Packets are filled with one lamp's rays from places beside each other.
   for (; asked != 0; asked &= asked - 1) {
     const int lamp = std::countr_zero(asked);
+    // Over a sheet a ray is free if a flatter one of the same azimuth is.
+    const int flatter = frame_.shadow_reach->only_sheet() ? field_.beside[lamp].flatter : -1;
     int lanes[kPacket];
     int count = 0;
     for (int lane = 0; lane < lane_count; ++lane) {
       if ((lanes_[lane].doubt >> lamp & 1u) == 0) continue;
+      if (flatter >= 0 && amounts(lane)[flatter] > 0.0f) {
+        ++counts.spared;
+        continue;
+      }
       if (!shadow_ray(lane, lamp, count)) {
         ++counts.spared;
         continue;
@@ -239,24 +267,23 @@ void DirectBatch::cast_shadows(DirectCounts& counts) {
 /// Where a shadow ray to the lamp goes. A beam is as wide as the ways to the beams beside it differ; one at the rim is
 /// taken to be as wide outwards as it is inwards.
 Eigen::Vector3f DirectBatch::towards(int lane, int lamp) const {
-  const Eigen::Vector3f middle = (-flow_of(lane, lamp)).normalized();
+  const Eigen::Vector3f middle = way_to(lane, lamp);
   const BesideBeam& beside = field_.beside[lamp];
-  const auto part = [&](float share, int less, int more) -> Eigen::Vector3f {
+  Eigen::Vector3f sum = middle;
+  // Each beam begins elsewhere in the sequence, so that a place sees different parts of different beams.
+  const auto add_part = [&](float spread, float by, int number, int less, int more) {
+    const float at = spread + 0.5f + by * static_cast<float>(number);
+    const float share = at - std::floor(at) - 0.5f;
     const bool up = (share > 0.0f && more >= 0) || less < 0;
     const int other = up ? more : less;
-    if (other < 0) return Eigen::Vector3f::Zero();
-    const Eigen::Vector3f way = (-flow_of(lane, other)).normalized() - middle;
-    return way.allFinite() ? Eigen::Vector3f((up ? share : -share) * way) : Eigen::Vector3f::Zero();
-  };
-  // Each beam begins elsewhere in the sequence, so that a place sees different parts of different beams.
-  const auto turned = [&](float share, float by) {
-    const float at = share + 0.5f + by * static_cast<float>(lamp);
-    return at - std::floor(at) - 0.5f;
+    if (other < 0) return;
+    const Eigen::Vector3f way = way_to(lane, other);
+    if (way != Eigen::Vector3f::Zero()) sum += (up ? share : -share) * (way - middle);
   };
   const float* spread = lanes_[lane].spread;
-  return (middle + part(turned(spread[0], 0.4375f), beside.flatter, beside.steeper) +
-          part(turned(spread[1], 0.6875f), beside.left, beside.right))
-      .normalized();
+  add_part(spread[0], 0.4375f, lamp, beside.flatter, beside.steeper);
+  add_part(spread[1], 0.6875f, fixture_.flattest[lamp], beside.left, beside.right);
+  return sum.normalized();
 }
 
 bool DirectBatch::shadow_ray(int lane, int lamp, int slot) {
@@ -264,7 +291,7 @@ bool DirectBatch::shadow_ray(int lane, int lamp, int slot) {
   const Eigen::Vector3f place(one.place[0], one.place[1], one.place[2]);
   const Eigen::Vector3f towards = this->towards(lane, lamp);
   const Eigen::Vector3f origin(one.leave[0], one.leave[1], one.leave[2]);
-  if (!origin.allFinite() || !towards.allFinite()) return false;
+  if (!origin.allFinite() || !towards.allFinite() || towards.isZero(0.0f)) return false;
   float far = 1e6f;
   if (towards.z() != 0.0f) {
     // To the layer's end, or to where the ray is clear of everything.

@@ -76,6 +76,7 @@ class DirectBatch {
   const float* amounts(int lane) const { return amounts_.data() + static_cast<std::size_t>(lane) * stride_; }
   Eigen::Array4f passing(int lane, int group, int band) const;
   Eigen::Vector3f flow_of(int lane, int lamp) const;
+  Eigen::Vector3f way_to(int lane, int lamp) const;
   Eigen::Vector3f towards(int lane, int lamp) const;
   void set_flow(int lane, int lamp, const Eigen::Vector3f& flow);
   float film_before(const RayPacket& packet, int slot, float distance) const;
@@ -95,7 +96,9 @@ class DirectBatch {
   std::vector<Lane> lanes_;
   std::vector<float> amounts_;  // [lane][lamp]: cosine times irradiance of unit intensity
   std::vector<float> flows_;    // [lane][group][axis][4]
-  std::vector<float> pass_;     // [lane][band][lamp], empty where nothing absorbs
+  std::vector<float>
+      ways_;  // likewise, where shadows are in doubt: unit vectors against the flows, 0 where there's none
+  std::vector<float> pass_;  // [lane][band][lamp], empty where nothing absorbs
   RayPacket shadow_;
 };
 

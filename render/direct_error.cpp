@@ -116,6 +116,7 @@ DirectChoice choose_direct(const Scene& rest, const Scene& first, const Camera& 
   try {
     LightFieldSettings light;
     light.accuracy = std::clamp(0.5 * settings.tolerance, 1e-4, 1e-2);
+    light.guides = settings.guides;
     field = make_light_field(direct, reach, light);
   } catch (const Error& error) {
     choice.reason = error.what();

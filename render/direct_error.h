@@ -46,6 +46,7 @@ struct DirectChoiceSettings {
   double tolerance = 0.015;  ///< of the root mean square difference, with twice its standard error
   bool whatever = false;     ///< the error is measured, but any will do
   DirectSettings direct;
+  GuideCut guides;
   DirectErrorSettings error;
   RestLightSettings rest;  ///< used where the scene asks for interreflection
 };

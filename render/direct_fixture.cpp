@@ -26,6 +26,8 @@ DirectFixture::DirectFixture(const LightField& of, bool soft)
     lens_radii.push_back(disc_radius(lamp));
     lamp_index.push_back(medium_of_layer(field.fixture, layer).index);
     lamp_in_layer.push_back(layer == field.layer);
+    flattest.push_back(beam);
+    while (field.beside[flattest[beam]].flatter >= 0) flattest[beam] = field.beside[flattest[beam]].flatter;
   }
   const std::size_t lamps = field.intensity.size();
   const std::size_t nodes = lamps == 0 ? 0 : field.flow.size() / (4 * lamps);

@@ -24,7 +24,8 @@ struct DirectFixture {
   std::vector<double> lens_radii;  // 0 of lamps that are not round
   std::vector<double> lamp_index;  ///< refractive index of the medium that a lamp stands in
   std::vector<bool> lamp_in_layer;
-  double low, high;  ///< of the field's layer
+  std::vector<int> flattest;  ///< of each beam: the flattest one of its sector, whose azimuths are its own
+  double low, high;           ///< of the field's layer
   std::array<float, kMaxBands> absorption{};
   bool absorbs = false;
   FilmScreen films;              ///< empty where there are none

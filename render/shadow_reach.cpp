@@ -280,6 +280,7 @@ ShadowReach::ShadowReach(const LampBearings& bearings, const Scene& scene, bool 
   const LampBearings& map = bearings_;
   Ground ground = ground_of(map, scene.surfaces[0].mesh);
   if (ground.upright || ground.up == ground.down) return;  // not a height field
+  only_sheet_ = scene.balls.empty();
   for (std::size_t i = 1; i < scene.surfaces.size(); ++i) {
     if (is_film(scene.surfaces[i])) continue;
     const TriangleMesh& other = scene.surfaces[i].mesh;
@@ -287,6 +288,7 @@ ShadowReach::ShadowReach(const LampBearings& bearings, const Scene& scene, bool 
       Eigen::AlignedBox3d part;
       for (int corner : t) part.extend(other.vertices[corner]);
       if (is_wall_round_it(part)) continue;
+      only_sheet_ = false;
       over_cells(map, part.min().x(), part.max().x(), part.min().y(), part.max().y(),
                  [&](std::size_t cell) { ground.slope[cell] = kEndless; });
     }

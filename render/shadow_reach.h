@@ -60,13 +60,17 @@ class ShadowReach {
   /// Bit k is set where lamp k may be hidden from this place on object `from` (the number of a PacketHits::object).
   std::uint64_t doubtful(float x, float y, int from) const;
 
+  /// Is the sheet alone in what can hide a lamp? Then where a ray from it doesn't meet it no steeper ray of the same
+  /// azimuth does.
+  bool only_sheet() const { return only_sheet_; }
+
   /// The height that a ray has to reach to be clear of everything.
   float low() const { return low_; }
   float high() const { return high_; }
 
  private:
   const LampBearings& bearings_;
-  bool sheet_ = false;
+  bool sheet_ = false, only_sheet_ = false;
   float low_ = 0.0f, high_ = 0.0f;  // of everything, padded
   std::uint64_t all_ = 0;
   std::vector<std::uint64_t> doubt_;  // by cell

@@ -70,7 +70,7 @@ std::string with_figures(const std::string& verdict, const render::DirectError& 
 }  // namespace
 
 DirectLight::DirectLight(const SceneSight& sight, const render::Camera& camera, std::span<const Truth> truths,
-                         std::span<const int> rays_tried, int edge_side)
+                         std::span<const int> rays_tried, int edge_side, const render::GuideCut& guides)
     : camera_(camera) {
   TS_ASSERT(sight.plan.direct_light && !truths.empty() && !rays_tried.empty());
   const SceneSpec& scene = sight.scene;
@@ -82,6 +82,7 @@ DirectLight::DirectLight(const SceneSight& sight, const render::Camera& camera, 
   render::DirectChoiceSettings settings;
   settings.tolerance = scene.light.direct_tolerance;
   settings.direct.edge_side = edge_side;
+  settings.guides = guides;
   settings.direct.seed = settings.error.seed = settings.rest.seed = scene.seed;
   settings.error.samples = kPathsToMeasure;
   const Eigen::AlignedBox3d reach = reach_of(rest, pressed, truths, -scene.device.gel.thickness_mm);

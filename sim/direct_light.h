@@ -22,11 +22,12 @@ class DirectLight {
  public:
   /// Measures on the state of `truths` that is pressed deepest, with ever more rays a pixel until the scene's tolerance
   /// holds; `choice` then says what became of it. Where the scene switches direct light on, the last is taken.
-  /// `edge_side` is DirectSettings::edge_side.
+  /// `edge_side` is DirectSettings::edge_side, `guides` is LightFieldSettings::guides.
   /// @pre the plan has direct light, `truths` isn't empty
   /// @throws Error with the scene's place if the scene switches direct light on and it can't be had
   DirectLight(const SceneSight& sight, const render::Camera& camera, std::span<const Truth> truths,
-              std::span<const int> rays_tried = kRaysTried, int edge_side = render::DirectSettings{}.edge_side);
+              std::span<const int> rays_tried = kRaysTried, int edge_side = render::DirectSettings{}.edge_side,
+              const render::GuideCut& guides = {});
 
   const LightChoice& choice() const { return choice_; }
 

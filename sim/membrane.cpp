@@ -98,6 +98,7 @@ Membrane::Sheet Membrane::sheet(const fem::PressState& press, const fem::ReliefA
   std::vector<char> wet(vertices.size(), 0);
   // The lattice goes on beside a dome; there its points are drawn in onto the rim.
   const double rim = surface_->rim_radius();
+  const Eigen::MatrixX3d along_flat = std::isinf(rim) ? relief.along.on_lattice(x, y) : Eigen::MatrixX3d();
   std::vector<char> beside(vertices.size(), 0);
   for (int j = 0; j < rows; ++j) {
     for (int i = 0; i < columns; ++i) {
@@ -105,7 +106,9 @@ Membrane::Sheet Membrane::sheet(const fem::PressState& press, const fem::ReliefA
       Eigen::Vector2d material(x[static_cast<std::size_t>(i)], y[static_cast<std::size_t>(j)]);
       beside[k] = material.norm() >= rim;
       if (beside[k]) material *= rim / material.norm();
-      const Eigen::Vector2d along = relief.tangential(material);
+      const Eigen::Vector2d along = std::isinf(rim)
+                                        ? Eigen::Vector2d(along_flat.row(static_cast<Eigen::Index>(k)).head<2>())
+                                        : relief.tangential(material);
       const double rest_z = surface_->rest_height(material);
       vertices[k] << material + along, rest_z + field.at_material(material);
       sheet.rest.emplace_back(material.x(), material.y(), rest_z);

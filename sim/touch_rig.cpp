@@ -77,7 +77,8 @@ struct TouchRig::Parts {
     if (judged->plan.direct_light) {
       std::vector<Truth> states = farthest_states(rest, settings);
       states.push_back(ball.back());
-      direct = std::make_unique<const DirectLight>(*judged, camera, states, kRaysAPixel, settings.edge_side);
+      direct = std::make_unique<const DirectLight>(*judged, camera, states, kRaysAPixel, settings.edge_side,
+                                                   settings.guides);
       choice = direct->choice();
     }
     background_light = light(*judged, rest, {}, rest_seen);
@@ -118,10 +119,6 @@ struct TouchRig::Parts {
   cv::Mat develop(const cv::Mat& irradiance, std::uint64_t noise_seed, int frame) const {
     return render::develop(render::expose(irradiance, imager, pattern, noise_seed, static_cast<std::uint64_t>(frame)),
                            imager);
-  }
-
-  cv::Mat develop_ideal(const cv::Mat& irradiance) const {
-    return render::develop(render::expose(irradiance, ideal_imager, pattern, 0, 0), ideal_imager);
   }
 
   DeviceSpec device;
@@ -208,7 +205,6 @@ Touch TouchRig::look(const TouchObject& object, const fem::PressState& press, st
   touch.light = parts_->light(sight, press, relief, seen);
   touch.frame = parts_->develop(touch.light, noise_seed, frame);
   if (!truth) return touch;
-  touch.ideal = parts_->develop_ideal(touch.light);
   const std::vector<render::FirstHit> hits = render::first_hits(seen.inside, parts_->ready);
   touch.height = cv::Mat(parts_->size, CV_32F, cv::Scalar(std::numeric_limits<float>::quiet_NaN()));
   touch.contact = cv::Mat(parts_->size, CV_8U, cv::Scalar(0));
@@ -228,6 +224,10 @@ cv::Mat TouchRig::background(std::uint64_t noise_seed, int frame) const {
 
 const cv::Mat& TouchRig::background_light() const {
   return parts_->background_light;
+}
+
+cv::Mat TouchRig::ideal(const cv::Mat& light) const {
+  return render::develop(render::expose(light, parts_->ideal_imager, parts_->pattern, 0, 0), parts_->ideal_imager);
 }
 
 cv::Mat TouchRig::develop(const cv::Mat& light, std::uint64_t noise_seed, int frame) const {

@@ -26,6 +26,7 @@ struct TouchRigSettings {
                                  ///< together under an object, which else stretches
   int edge_side = 4;  ///< rays along a side of pixels that differ from those beside them (render::DirectSettings): on a
                       ///< rough object these are all pixels
+  render::GuideCut guides;  ///< light guides' light in the light field; fewer beams are quicker and a little less right
 };
 
 /// One frame and what is true of it. Pictures have the camera's size.
@@ -35,7 +36,6 @@ struct Touch {
   cv::Mat height;   ///< CV_32FC1, mm: how far the membrane that the pixel sees is pressed in, against what the pixel
                     ///< sees at rest, along the gel frame's z; NaN where it sees no membrane
   cv::Mat contact;  ///< CV_8UC1, 255 where the pixel sees membrane that lies on the object
-  cv::Mat ideal;    ///< the frame without noise and fixed pattern
 };
 
 /// An object that can touch a rig's device. Made by TouchRig::object; keeps what all its frames share.
@@ -82,6 +82,8 @@ class TouchRig {
   cv::Mat background(std::uint64_t noise_seed, int frame = 0) const;
   /// The light of the untouched device.
   const cv::Mat& background_light() const;
+  /// The frame of a light without noise and fixed pattern.
+  cv::Mat ideal(const cv::Mat& light) const;
   /// A frame of the light of any of them, with other noise.
   cv::Mat develop(const cv::Mat& light, std::uint64_t noise_seed, int frame = 0) const;
 

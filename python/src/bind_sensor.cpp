@@ -181,7 +181,9 @@ void bind_sensor(py::module_& module) {
       .def_property_readonly(
           "frame", of_touch(&sim::Touch::frame),
           "uint8: what the camera delivers, with noise; (height, width, 3) in BGR order, or (height, width) grey.")
-      .def_property_readonly("ideal", of_touch(&sim::Touch::ideal), "The frame without noise and fixed pattern.")
+      .def_property_readonly(
+          "ideal", [](const py::object& self) { return array_of(self.cast<Touch&>().ideal); },
+          "The frame without noise and fixed pattern.")
       .def_property_readonly(
           "height_mm", of_touch(&sim::Touch::height),
           "float32: how far the membrane that a pixel sees is pressed in, along z; NaN where it sees none.")

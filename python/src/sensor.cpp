@@ -56,6 +56,7 @@ Touch Sensor::touch(const SharedObject& object, const sim::TouchSession& session
   if (!look.picture) return touch;
   touch.pictures = rig().look(seen(object), touch.press, look.noise_seed, look.frame, look.truth);
   if (!touch.pictures.contact.empty()) touch.pictures.contact.setTo(1, touch.pictures.contact != 0);
+  if (look.truth) touch.ideal = rig().ideal(touch.pictures.light);
   touch.light_error = rig().light().error;
   return touch;
 }

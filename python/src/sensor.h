@@ -24,6 +24,7 @@ struct Touch {
   fem::PressState press;
   fem::PressError error;
   sim::Touch pictures;  ///< contact: 0 and 1; all empty without a picture
+  cv::Mat ideal;        ///< sim::TouchRig::ideal; empty without truth
   std::optional<render::DirectError> light_error;
 };
 
