@@ -45,4 +45,7 @@ void add_chroma_estimation(CLI::App& estimations, const GlobalOptions& global, A
 void add_vhs_estimation(CLI::App& estimations, const GlobalOptions& global, Action& action);
 void add_gelsight_estimation(CLI::App& estimations, const GlobalOptions& global, Action& action);
 
+// Below export.
+void add_webdataset_export(CLI::App& exports, const GlobalOptions& global, Action& action);
+
 }  // namespace touchstone::apps

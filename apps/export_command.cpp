@@ -100,8 +100,8 @@ void add_events_command(CLI::App& exports, Action& action) {
 }  // namespace
 
 void add_export_command(CLI::App& app, const GlobalOptions& global, Action& action) {
-  CLI::App* exports =
-      app.add_subcommand("export", "Write what estimators need to know of a device, or events in another format");
+  CLI::App* exports = app.add_subcommand(
+      "export", "Write what estimators need to know of a device, or events or a data set in another format");
   exports->require_subcommand(1);
   exports->fallthrough();
   CLI::App* command = exports->add_subcommand(
@@ -114,6 +114,7 @@ void add_export_command(CLI::App& app, const GlobalOptions& global, Action& acti
   command->callback(
       [&action, &global, options] { action = [&global, options] { export_compliance(*options, global); }; });
   add_events_command(*exports, action);
+  add_webdataset_export(*exports, global, action);
 }
 
 }  // namespace touchstone::apps

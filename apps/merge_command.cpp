@@ -1,4 +1,5 @@
 #include <memory>
+#include <optional>
 
 #include "apps/command.h"
 #include "apps/progress_bar.h"
@@ -12,11 +13,16 @@ namespace {
 struct Options {
   std::filesystem::path job;
   std::filesystem::path out;
+  std::optional<int> lacking;
 };
 
 void merge(const Options& options, const GlobalOptions& global) {
   if (!lab::is_draw_job_file(options.job)) {
     fail("{}: isn't a job that draws; only those have shards to merge", options.job.string());
+  }
+  if (options.lacking) {
+    fmt::print("{}\n", fmt::join(lab::lacking_shards(options.job, options.out, *options.lacking), ","));
+    return;
   }
   lab::DrawnReport report;
   {
@@ -38,6 +44,8 @@ void add_merge_command(CLI::App& app, const GlobalOptions& global, Action& actio
   auto options = std::make_shared<Options>();
   command->add_option("JOB", options->job, "Job file, as given to generate")->required();
   command->add_option("-o,--out", options->out, "Folder of the data set")->required();
+  command->add_option("--lacking", options->lacking,
+                      "N: merge nothing, but print which of N shards aren't there yet, as 2,5,7");
   command->callback([&action, &global, options] { action = [options, &global] { merge(*options, global); }; });
 }
 

@@ -57,6 +57,10 @@ macro(touchstone_need_openssl)
   touchstone_require_package(OpenSSL libssl-dev)
 endmacro()
 
+macro(touchstone_need_archive)
+  touchstone_plain_library(LibArchive::Archive libarchive-dev archive.h archive)
+endmacro()
+
 macro(touchstone_need_hdf5)
   set(HDF5_PREFER_PARALLEL FALSE)
   touchstone_require_package(HDF5 libhdf5-dev COMPONENTS C HL)

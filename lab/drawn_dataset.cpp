@@ -269,6 +269,13 @@ BlockRecord make_record(const PreparedDraw& prepared, const UnitBench& bench, st
   }
 }
 
+/// The first of a shard's blocks, and the one after its last.
+std::pair<std::size_t, std::size_t> blocks_of(const Shard& shard, std::size_t all) {
+  const auto count = static_cast<std::size_t>(shard.count);
+  const auto number = static_cast<std::size_t>(shard.number);
+  return {all * (number - 1) / count, all * number / count};
+}
+
 }  // namespace
 
 Shard shard_of(const std::string& text) {
@@ -294,9 +301,7 @@ DrawnReport generate_drawn(const fs::path& job_file, const fs::path& out, const 
   const PreparedDraw prepared = prepare_draw(job_file);
   const Folder folder = folder_of(prepared, out);
   const Shard& shard = options.shard;
-  const std::size_t all = prepared.blocks.size();
-  const std::size_t first = all * static_cast<std::size_t>(shard.number - 1) / static_cast<std::size_t>(shard.count);
-  const std::size_t end = all * static_cast<std::size_t>(shard.number) / static_cast<std::size_t>(shard.count);
+  const auto [first, end] = blocks_of(shard, prepared.blocks.size());
   DrawnReport report;
   for (std::size_t k = first; k < end; ++k) report.samples += prepared.blocks[k].samples;
   if (const auto manifest = finished_manifest(folder)) {
@@ -363,6 +368,32 @@ DrawnReport merge_drawn(const fs::path& job_file, const fs::path& out, const Pro
   }
   merge(prepared, folder, progress);
   return report;
+}
+
+std::vector<int> lacking_shards(const fs::path& job_file, const fs::path& out, int count) {
+  if (count < 1) fail("--lacking: {} is not allowed; allowed is at least 1", count);
+  const PreparedDraw prepared = prepare_draw(job_file);
+  const Folder folder = folder_of(prepared, out);
+  std::vector<int> lacking;
+  if (const auto manifest = finished_manifest(folder)) {
+    verify(folder, *manifest);
+    return lacking;
+  }
+  is_begun(folder);
+  std::vector<BlockState> states(prepared.blocks.size());
+  tbb::parallel_for(std::size_t{0}, states.size(), [&](std::size_t k) {
+    states[k] = state_of_block(folder.out, folder.checksum, prepared.blocks[k]);
+  });
+  for (int number = 1; number <= count; ++number) {
+    const auto [first, end] = blocks_of({number, count}, states.size());
+    bool whole = true;
+    for (std::size_t k = first; k < end; ++k) {
+      if (states[k] == BlockState::foreign) refuse_foreign(folder, prepared.blocks[k]);
+      whole = whole && states[k] == BlockState::whole;
+    }
+    if (!whole) lacking.push_back(number);
+  }
+  return lacking;
 }
 
 }  // namespace touchstone::lab

@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "core/progress.h"
 #include "lab/block_record.h"
@@ -51,5 +52,9 @@ DrawnReport generate_drawn(const std::filesystem::path& job_file, const std::fil
 /// @throws Error that names the first blocks that lack; as generate_drawn
 DrawnReport merge_drawn(const std::filesystem::path& job_file, const std::filesystem::path& out,
                         const Progress& progress = {});
+
+/// Of `count` shards the numbers of those that aren't all there yet, damaged files included; none of a finished set,
+/// all where nothing was begun. Writes nothing. @throws Error as merge_drawn, for a count below 1
+std::vector<int> lacking_shards(const std::filesystem::path& job_file, const std::filesystem::path& out, int count);
 
 }  // namespace touchstone::lab

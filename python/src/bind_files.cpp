@@ -6,6 +6,8 @@
 #include "core/field_error.h"
 #include "core/hdf5_file.h"
 #include "lab/dataset.h"
+#include "lab/draw.h"
+#include "lab/drawn_dataset.h"
 #include "lab/scenes_folder.h"
 #include "python/src/bindings.h"
 #include "sim/image_file.h"
@@ -45,13 +47,34 @@ class Hdf5Lock {
   py::object lock_;
 };
 
+py::dict dict_of(const lab::DrawnReport& report) {
+  py::dict result;
+  result["was_finished"] = report.was_finished;
+  result["samples"] = report.samples;
+  result["rendered"] = report.made;
+  result["kept"] = report.kept;
+  result["damaged_blocks"] = report.damaged_blocks;
+  result["drawn_again"] = report.drawn_again;
+  result["warning"] = "";  // there as in the other kind's report
+  return result;
+}
+
 py::dict generate(const std::string& job, const std::string& out, int threads, bool timings, const std::string& cache,
-                  const py::object& progress) {
+                  const std::string& shard, const py::object& progress) {
   if (threads < 0) fail("threads: {} is not allowed; allowed is at least 0 (0: as many as the machine has)", threads);
   const Progress listener = progress_to(progress);
+  const std::filesystem::path kept_in = cache.empty() ? sim::default_cache_folder() : std::filesystem::path(cache);
+  if (lab::is_draw_job_file(job)) {
+    lab::DrawnOptions how;
+    how.source = lab::rig_bench(kept_in);
+    how.threads = threads;
+    if (!shard.empty()) how.shard = lab::shard_of(shard);
+    return dict_of(unlocked([&] { return lab::generate_drawn(job, out, how, listener); }));
+  }
+  if (!shard.empty()) fail("shard: {} isn't a job that draws; only those have shards", job);
   const lab::GenerateReport report = unlocked([&] {
     lab::GenerateOptions how;
-    how.source = lab::simulator(cache.empty() ? sim::default_cache_folder() : std::filesystem::path(cache));
+    how.source = lab::simulator(kept_in);
     how.threads = threads;
     how.timings = timings;
     return lab::generate(job, out, how, listener);
@@ -63,6 +86,12 @@ py::dict generate(const std::string& job, const std::string& out, int threads, b
   result["kept"] = report.kept;
   result["warning"] = report.warning;
   return result;
+}
+
+py::dict merge(const std::string& job, const std::string& out, const py::object& progress) {
+  if (!lab::is_draw_job_file(job)) fail("{}: isn't a job that draws; only those have shards to merge", job);
+  const Progress listener = progress_to(progress);
+  return dict_of(unlocked([&] { return lab::merge_drawn(job, out, listener); }));
 }
 
 }  // namespace
@@ -95,7 +124,8 @@ void bind_files(py::module_& module) {
       },
       py::arg("path"), py::arg("image"), "Writes a PNG: uint8 or uint16, grey or BGR.");
   module.def("generate", &generate, py::arg("job"), py::arg("out"), py::arg("threads") = 0, py::arg("timings") = true,
-             py::arg("cache") = "", py::arg("progress") = py::none());
+             py::arg("cache") = "", py::arg("shard") = "", py::arg("progress") = py::none());
+  module.def("merge", &merge, py::arg("job"), py::arg("out"), py::arg("progress") = py::none());
 }
 
 }  // namespace touchstone::python

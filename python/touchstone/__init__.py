@@ -75,26 +75,39 @@ def _warn_of_slow_blas():
 _warn_of_slow_blas()
 
 
-def generate(job, out, *, threads=0, timings=True, cache=None, progress=None):
+def generate(job, out, *, threads=0, timings=True, cache=None, shard=None, progress=None):
     """Makes the data set of a job file in folder `out`, or goes on with one that was broken off.
 
     The same as `touchstone generate`: the same job gives the same bytes. Ctrl-C breaks it off; the same call goes on.
+    Jobs with `scenes` and jobs that draw (docs/datasets.md) are both taken; Dataset reads both.
 
     threads: at most so many; 0: as many as the machine has.
-    timings: put wall times in dataset.json; without them the whole folder is the same in every run.
+    timings: put wall times in dataset.json; without them the whole folder is the same in every run. Sets that are
+      drawn have no wall times in them.
     cache: folder of set-up results; None: $TOUCHSTONE_CACHE or ~/.cache/touchstone.
+    shard: of a job that draws, "I/N": only the I-th of N parts, I from 1 to N; merge() then puts them together.
     progress: called as progress(stage, done, total), also from other threads; what it raises ends the run.
 
-    Returns a dict: was_finished, samples, rendered, kept, warning (of a damaged cache; empty).
+    Returns a dict: was_finished, samples, rendered, kept, warning (of a damaged cache; empty); of a job that draws
+    also damaged_blocks (files made again) and drawn_again (touches that couldn't be pressed).
     Raises Error for a mistake in the job, a folder with anything else in it, a full disk.
     """
     return _core.generate(_os.fspath(job), _os.fspath(out), threads=threads, timings=timings,
-                          cache=_os.fspath(cache) if cache is not None else "", progress=progress)
+                          cache=_os.fspath(cache) if cache is not None else "", shard=shard or "", progress=progress)
+
+
+def merge(job, out, *, progress=None):
+    """Checks that all shards of a drawn data set are in folder `out`, and writes its card and manifest.
+
+    progress: as for generate. Returns a dict as generate does.
+    Raises Error that names the files that lack, or if the job isn't one that draws.
+    """
+    return _core.merge(_os.fspath(job), _os.fspath(out), progress=progress)
 
 
 __all__ = [
     "BeadTracker", "ColourMarkerReader", "ColourMarkerReading", "Dataset", "Error", "ForceEstimate", "HeightEstimator",
     "HeightModel", "HeightResult", "HueEstimator", "HueField", "HueModel", "Object", "Reading", "Sensor", "Session",
-    "StiffnessForceModel", "Touch", "TrackedBeads", "calibrate_height", "calibrate_hue", "generate", "read_image",
-    "scenes_folder", "train_stiffness", "write_png",
+    "StiffnessForceModel", "Touch", "TrackedBeads", "calibrate_height", "calibrate_hue", "generate", "merge",
+    "read_image", "scenes_folder", "train_stiffness", "write_png",
 ]

@@ -196,6 +196,21 @@ TEST_F(DrawnDataset, DamagedBlocksAreMadeAgainAndForeignOnesRefused) {
   EXPECT_EQ(contents("out"), whole);
 }
 
+TEST_F(DrawnDataset, ShardsThatLackAreNamed) {
+  const fs::path out = folder_.path() / "out";
+  EXPECT_EQ(lacking_shards(job_, out, 4), (std::vector<int>{1, 2, 3, 4}));
+  EXPECT_FALSE(fs::exists(out));
+  generate("out", {2, 4});
+  EXPECT_EQ(lacking_shards(job_, out, 4), (std::vector<int>{1, 3, 4}));
+  EXPECT_EQ(lacking_shards(job_, out, 2), (std::vector<int>{1, 2}));
+  for (const int number : {1, 3, 4}) generate("out", {number, 4});
+  EXPECT_TRUE(lacking_shards(job_, out, 4).empty());
+  write(block("out", 2), "short");
+  EXPECT_EQ(lacking_shards(job_, out, 4), (std::vector<int>{3}));
+  EXPECT_EQ(lacking_shards(job_, out, 2), (std::vector<int>{2}));
+  EXPECT_THAT(message_of([&] { lacking_shards(job_, out, 0); }), HasSubstr("--lacking: 0 is not allowed"));
+}
+
 TEST_F(DrawnDataset, AChangedJobAForeignFolderAndAChangedSetAreRefused) {
   generate("out", {1, 2});
   const auto before = contents("out");
