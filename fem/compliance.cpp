@@ -100,4 +100,14 @@ Compliance compute_compliance(const TetMesh& mesh, std::span<const ElasticMateri
   return gel;
 }
 
+Compliance with_modulus(const Compliance& body, double youngs_modulus) {
+  check(ElasticMaterial{youngs_modulus, body.material.poisson_ratio});
+  Compliance other = body;
+  const double softer = body.material.youngs_modulus / youngs_modulus;
+  other.material.youngs_modulus = youngs_modulus;
+  other.surface = SharedMatrix(Eigen::MatrixXd(softer * body.surface.view()));
+  other.beads = SharedMatrix(Eigen::MatrixXd(softer * body.beads.view()));
+  return other;
+}
+
 }  // namespace touchstone::fem

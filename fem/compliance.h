@@ -60,6 +60,10 @@ Compliance compute_compliance(const TetMesh& mesh, std::span<const ElasticMateri
 Compliance compute_compliance(const TetMesh& mesh, const ElasticMaterial& material, std::span<const Bead> beads,
                               double thickness, const Progress& progress = {});  ///< the same in all regions
 
+/// The same body with all its moduli times one number, so that its (first) material's is this: linear elasticity only
+/// divides by it. @throws Error unless the modulus is finite and above zero
+Compliance with_modulus(const Compliance& body, double youngs_modulus);
+
 /// Vertices n and beads m may have sqrt(n (n + m)) up to this: the compliance then takes 487 MB.
 inline constexpr int kMostSurfaceVertices = 2600;
 

@@ -25,7 +25,27 @@ void check_materials(const GelBody& body, std::span<const ElasticMaterial> mater
   }
 }
 
+/// The gel whose body has 1 MPa: read if the cache has it, else made. All gels come from it, so that their bytes don't
+/// depend on what the cache has.
+Compliance of_unit_modulus(const std::string& key, const std::filesystem::path& cache_dir,
+                           const std::function<Compliance()>& make) {
+  const std::filesystem::path path = compliance_file(cache_dir, key);
+  std::error_code ignored;
+  if (cache_dir.empty() || !std::filesystem::exists(path, ignored)) return make();
+  try {
+    return read_compliance(path, key);
+  } catch (const Error&) {
+    return make();  // who asks for that gel itself is told, and has the file replaced
+  }
+}
+
 }  // namespace
+
+std::vector<ElasticMaterial> per_body_modulus(std::span<const ElasticMaterial> materials) {
+  std::vector<ElasticMaterial> relative(materials.begin(), materials.end());
+  for (ElasticMaterial& material : relative) material.youngs_modulus /= materials.front().youngs_modulus;
+  return relative;
+}
 
 std::string compliance_key(const GelBody& body, std::span<const ElasticMaterial> materials,
                            std::span<const Bead> beads) {
@@ -98,11 +118,16 @@ Compliance cached_compliance(const GelBody& body, std::span<const ElasticMateria
                              const Progress& progress) {
   check(body);
   check_materials(body, materials);
-  return cached_compliance(compliance_key(body, materials, beads), cache_dir, [&] {
-    Compliance gel = compute_compliance(mesh_gel(body), materials, beads, thickness_of(body), progress);
+  const std::vector<ElasticMaterial> relative = per_body_modulus(materials);
+  const auto make = [&] {
+    Compliance gel = compute_compliance(mesh_gel(body), relative, beads, thickness_of(body), progress);
     gel.report.fine_edge = fine_edge(body);
-    gel.mesh_error = measure_mesh_error(gel, ladder_of(body, materials, beads), progress);
+    gel.mesh_error = measure_mesh_error(gel, ladder_of(body, relative, beads), progress);
     return gel;
+  };
+  return cached_compliance(compliance_key(body, materials, beads), cache_dir, [&] {
+    return with_modulus(of_unit_modulus(compliance_key(body, relative, beads), cache_dir, make),
+                        materials.front().youngs_modulus);
   });
 }
 
@@ -120,15 +145,20 @@ Compliance cached_compliance(const GelBody& body, const ErrorGoal& goal, std::sp
     fail("the contact radius is {} mm; it must be within the finely meshed part, {} mm from its middle",
          goal.contact_radius, fine_reach(body));
   }
-  return cached_compliance(compliance_key(body, goal, materials, beads), cache_dir, [&] {
+  const std::vector<ElasticMaterial> relative = per_body_modulus(materials);
+  const auto make = [&] {
     GelOfEdge gel;
     gel.coarsest = least_extent(body) / 2.0;
     gel.check = [&](double edge) { check(with_fine(body, edge)); };
     gel.make = [&](double edge) {
-      return compute_compliance(mesh_gel(with_fine(body, edge)), materials, beads, thickness_of(body), progress);
+      return compute_compliance(mesh_gel(with_fine(body, edge)), relative, beads, thickness_of(body), progress);
     };
-    gel.ladder = [&](double edge) { return ladder_of(with_fine(body, edge), materials, beads); };
+    gel.ladder = [&](double edge) { return ladder_of(with_fine(body, edge), relative, beads); };
     return gel_within(goal, gel, progress);
+  };
+  return cached_compliance(compliance_key(body, goal, materials, beads), cache_dir, [&] {
+    return with_modulus(of_unit_modulus(compliance_key(body, goal, relative, beads), cache_dir, make),
+                        materials.front().youngs_modulus);
   });
 }
 

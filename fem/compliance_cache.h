@@ -5,6 +5,7 @@
 #include <functional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "core/progress.h"
 #include "fem/compliance.h"
@@ -31,8 +32,13 @@ std::filesystem::path compliance_file(const std::filesystem::path& cache_dir, co
 Compliance cached_compliance(const std::string& key, const std::filesystem::path& cache_dir,
                              const std::function<Compliance()>& make);
 
+/// The materials with the first one's modulus as the unit: 1, and the others' over it.
+std::vector<ElasticMaterial> per_body_modulus(std::span<const ElasticMaterial> materials);
+
 /// The gel's compliance with its table of mesh errors in the same way. `materials`: the body's, then the layers' from
-/// the outer surface inwards (material_count). @throws Error as mesh_gel() and compute_compliance() do
+/// the outer surface inwards (material_count). Gels that differ in one factor of all moduli differ in a factor: if the
+/// one of per_body_modulus() is in the cache, this one is made from it in a moment, with the same bytes as without.
+/// @throws Error as mesh_gel() and compute_compliance() do
 Compliance cached_compliance(const GelBody& body, std::span<const ElasticMaterial> materials,
                              std::span<const Bead> beads, const std::filesystem::path& cache_dir,
                              const Progress& progress = {});

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "sim/gel_setup.h"
 #include "sim/touch_rig.h"
 
 namespace touchstone::lab {
@@ -44,6 +45,7 @@ BenchSource rig_bench(const std::filesystem::path& cache_folder) {
     settings.edge_side = prepared.job.edge_side;
     settings.guides = prepared.job.guides;
     settings.always_friction = true;  // else a straight press would have none beside a tilted one that has
+    sim::keep_gel_of_unit_modulus(unit.device, cache_folder);
     const auto rig = std::make_shared<const sim::TouchRig>(unit.device, cache_folder, settings);
     UnitBench bench;
     bench.light = rig->light().reason;

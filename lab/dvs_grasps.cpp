@@ -99,7 +99,10 @@ DvsGrasp DvsGraspBench::play(const DvsGraspParameters& parameters, const sim::Re
   sim::GrippedFaceSettings settings = face;
   settings.rms_slope = parameters.rms_slope;
   settings.largest_force_N = kOvershoot * parameters.motion.target_force_N + kOvershoot_N;
-  const auto elastic = elastic_[at] ? sim::with_modulus(*elastic_[at], parameters.youngs_modulus_MPa) : nullptr;
+  std::shared_ptr<const fem::Compliance> elastic;
+  if (elastic_[at]) {
+    elastic = std::make_shared<const fem::Compliance>(fem::with_modulus(*elastic_[at], parameters.youngs_modulus_MPa));
+  }
   DvsGrasp grasp;
   grasp.parameters = parameters;
   grasp.face = std::make_shared<const sim::GrippedFace>(device_, *gel_, piece, elastic, parameters.pose, settings);

@@ -98,6 +98,16 @@ std::string gel_key(const DeviceSpec& device) {
   return goal ? fem::compliance_key(body, *goal, materials, beads) : fem::compliance_key(body, materials, beads);
 }
 
+void keep_gel_of_unit_modulus(const DeviceSpec& device, const std::filesystem::path& cache_folder,
+                              const Progress& progress) {
+  std::error_code ignored;
+  if (cache_folder.empty() || !device.gel.layers.empty()) return;
+  if (std::filesystem::exists(fem::compliance_file(cache_folder, gel_key(device)), ignored)) return;
+  DeviceSpec relative = device;
+  relative.gel.youngs_modulus_MPa = 1.0;
+  set_up_gel(relative, cache_folder, progress);
+}
+
 std::shared_ptr<const fem::Compliance> set_up_gel(const DeviceSpec& device, const std::filesystem::path& cache_folder,
                                                   const Progress& progress) {
   const fem::GelBody body = gel_body(device);

@@ -354,16 +354,4 @@ FaceMap GrippedFace::map(const GripPoint& point) const {
   return face;
 }
 
-std::shared_ptr<const fem::Compliance> with_modulus(const fem::Compliance& body, double youngs_modulus_MPa) {
-  if (!(youngs_modulus_MPa > 0.0) || !std::isfinite(youngs_modulus_MPa)) {
-    fail("the piece's Young's modulus is {} MPa, it must be above 0 and finite", youngs_modulus_MPa);
-  }
-  auto other = std::make_shared<fem::Compliance>(body);
-  const double softer = body.material.youngs_modulus / youngs_modulus_MPa;
-  other->material.youngs_modulus = youngs_modulus_MPa;
-  other->surface = fem::SharedMatrix(Eigen::MatrixXd(softer * body.surface.view()));
-  other->beads = fem::SharedMatrix(Eigen::MatrixXd(softer * body.beads.view()));
-  return other;
-}
-
 }  // namespace touchstone::sim

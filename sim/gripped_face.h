@@ -74,8 +74,8 @@ inline constexpr double kNoPiece_mm = 10.0;
 /// One piece in one pose. Immutable; many threads may ask it.
 class GrippedFace {
  public:
-  /// `piece` is a hexagon; `elastic` its compliance (set_up_elastic_object, or with_modulus of that), null for a rigid
-  /// one. The gel is a slab; nothing that is given is kept.
+  /// `piece` is a hexagon; `elastic` its compliance (set_up_elastic_object, or fem::with_modulus of that), null for a
+  /// rigid one. The gel is a slab; nothing that is given is kept.
   /// @throws Error for settings that make no sense, a piece that isn't a hexagon, isn't over the membrane, or that
   /// friction can't hold at this tilt; and as fem::Press::step
   GrippedFace(const DeviceSpec& device, const fem::Compliance& gel, const ObjectSpec& piece,
@@ -122,8 +122,5 @@ class GrippedFace {
   double gel_shear_ = 0.0;
   double misfit_ = 0.0;
 };
-
-/// The same body of another Young's modulus. @throws Error unless it is finite and above zero
-std::shared_ptr<const fem::Compliance> with_modulus(const fem::Compliance& body, double youngs_modulus_MPa);
 
 }  // namespace touchstone::sim

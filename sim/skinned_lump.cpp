@@ -66,8 +66,8 @@ std::shared_ptr<const fem::Compliance> as_pressing_body(const SkinnedLump& lump,
                                                         double skin_MPa) {
   check_above_zero("a lump's ", skin_MPa, "skin_MPa");
   // The piece's first material is its core, whose modulus is that of the ratio.
-  const auto stiff = with_modulus(piece, skin_MPa * piece.material.youngs_modulus);
-  return std::make_shared<const fem::Compliance>(turned_back(*stiff, -lump.sphere_radius_mm));
+  fem::Compliance stiff = fem::with_modulus(piece, skin_MPa * piece.material.youngs_modulus);
+  return std::make_shared<const fem::Compliance>(turned_back(std::move(stiff), -lump.sphere_radius_mm));
 }
 
 std::shared_ptr<const fem::Compliance> set_up_plate(const SkinnedLump& lump,

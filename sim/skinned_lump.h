@@ -28,7 +28,7 @@ struct SkinnedLump {
 fem::GelBody lump_body(const SkinnedLump& lump);
 
 /// Its compliance for a skin of 1 MPa over a core of `core_over_skin` MPa (without a skin the piece is of that
-/// altogether), from the cache if it is there. With s times both moduli it is 1/s of that: see with_modulus.
+/// altogether), from the cache if it is there. With s times both moduli it is 1/s of that: see fem::with_modulus.
 /// @throws Error as fem::cached_compliance, and for a ratio that isn't finite and above zero
 std::shared_ptr<const fem::Compliance> set_up_lump(const SkinnedLump& lump, double core_over_skin,
                                                    const std::filesystem::path& cache_folder);

@@ -140,6 +140,35 @@ TEST_F(ComplianceCache, EachParameterHasItsOwnFile) {
   EXPECT_EQ(keys.size(), ++expected);
 }
 
+TEST_F(ComplianceCache, GelsThatDifferInModulusAreMadeFromOne) {
+  const Compliance alone = get();
+  const Compliance direct = compute_compliance(mesh_slab(slab), material, beads, slab.thickness);
+  EXPECT_EQ(computed, 1);
+  // Only rounding tells it from what elasticity gives at its own modulus.
+  EXPECT_LT((alone.surface.view() - direct.surface.view()).norm(), 1e-13 * direct.surface.view().norm());
+  EXPECT_LT((alone.beads.view() - direct.beads.view()).norm(), 1e-13 * direct.beads.view().norm());
+  EXPECT_EQ(alone.material.youngs_modulus, material.youngs_modulus);
+
+  std::filesystem::remove(file());
+  material.youngs_modulus = 1.0;
+  get();
+  material.youngs_modulus = alone.material.youngs_modulus;
+  const int once = computed;
+  expect_same(get(), alone);
+  material.youngs_modulus = 2.0;
+  const Compliance stiff = get();
+  EXPECT_EQ(computed, once);  // both from the one of 1 MPa
+  EXPECT_LT((stiff.surface.view() * (2.0 / 0.33) - alone.surface.view()).norm(), 1e-14 * alone.surface.view().norm());
+  expect_same(stiff.mesh_error.smooth, alone.mesh_error.smooth);
+
+  // A damaged one isn't believed.
+  material.youngs_modulus = 1.0;
+  write_whole_file(file(), "spoilt");
+  material.youngs_modulus = 3.0;
+  get();
+  EXPECT_EQ(computed, once + 1);
+}
+
 TEST_F(ComplianceCache, NegativeZeroIsZero) {
   beads[0].centre.x() = 0.0;
   const std::string key = compliance_key(slab, material, beads);

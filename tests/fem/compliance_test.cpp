@@ -260,6 +260,8 @@ TEST(Compliance, BadInputIsRefused) {
   TetMesh free_floating = small_mesh();
   free_floating.bonded.clear();
   EXPECT_THROW(compute_compliance(free_floating, kSoft, {}, 1.0), Error);
+  EXPECT_THROW(with_modulus(Compliance(), 0.0), Error);
+  EXPECT_THROW(with_modulus(Compliance(), nan), Error);
 }
 
 }  // namespace
