@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <utility>
 
 #include "core/error.h"
 #include "render/flat_faces.h"
@@ -167,18 +168,31 @@ struct Maker {
     return sums;
   }
 
-  void fill(LightField& field) const {
+  /// `halved`: the axis whose cells are half as long as those of the grid that `field` holds, whose nodes are kept:
+  /// they are every other one of the new grid, at the same places to the bit. -1 for none.
+  void fill(LightField& field, int halved) const {
     const int beams = field.beam_count();
     const int across = field.nodes[0] * field.nodes[1];
     const auto bands = static_cast<int>(absorbing.size());
     const auto count = static_cast<std::size_t>(across) * field.nodes[2] * beams;
-    field.flow.assign(4 * count, 0.0f);
-    field.pass.assign(bands * count, 0.0f);
+    const std::vector<float> known_flow = std::exchange(field.flow, std::vector<float>(4 * count));
+    const std::vector<float> known_pass = std::exchange(field.pass, std::vector<float>(bands * count));
     tbb::parallel_for(0, across * field.nodes[2], [&](int node) {
       const int in_plane = node % across;
-      const Eigen::Vector3d at = place(field, in_plane % field.nodes[0], in_plane / field.nodes[0], node / across);
-      const std::vector<Eigen::Vector3d> whole = flows(clear, field, at);
+      Eigen::Array3i index(in_plane % field.nodes[0], in_plane / field.nodes[0], node / across);
       const std::size_t first = static_cast<std::size_t>(node) * beams;
+      if (halved >= 0 && index[halved] % 2 == 0) {
+        Eigen::Array3i nodes = field.nodes;
+        nodes[halved] = field.nodes[halved] / 2 + 1;
+        index[halved] /= 2;
+        const int before = index[0] + nodes[0] * (index[1] + nodes[1] * index[2]);
+        const std::size_t from = static_cast<std::size_t>(before) * beams;
+        std::copy_n(known_flow.begin() + 4 * from, 4 * beams, field.flow.begin() + 4 * first);
+        std::copy_n(known_pass.begin() + bands * from, bands * beams, field.pass.begin() + bands * first);
+        return;
+      }
+      const Eigen::Vector3d at = place(field, index[0], index[1], index[2]);
+      const std::vector<Eigen::Vector3d> whole = flows(clear, field, at);
       for (int beam = 0; beam < beams; ++beam) {
         const Eigen::Vector3d& flow = whole[beam];
         float* out = field.flow.data() + 4 * (first + beam);
@@ -200,9 +214,10 @@ struct Maker {
   double error(const LightField& field, const Eigen::Array3d& offset) const {
     const int beams = field.beam_count();
     const Eigen::Array3i cells = field.nodes - (offset > 0.0).cast<int>();
-    // Every cell of a small grid; of a large one some 4000 that are spread evenly.
+    // Every cell of a small grid; of a large one some 1000 that are spread evenly: their root mean square is known to
+    // some percent, and looking at all would take longer than the nodes.
     const int all = cells.prod();
-    const int stride = std::max(1, all / 4000) | 1;
+    const int stride = std::max(1, all / 1000) | 1;
     const int looked_at = (all + stride - 1) / stride;
     std::vector<std::array<double, 2>> squares(looked_at);
     tbb::parallel_for(0, looked_at, [&](int number) {
@@ -326,7 +341,7 @@ LightField make_light_field(const Scene& fixture, const Eigen::AlignedBox3d& rea
   // Cells about as long as wide to begin with, some eight along the longest side.
   const Eigen::Array3d size = reach.sizes().array();
   Eigen::Array3i cells = (size / (size.maxCoeff() / 8.0)).ceil().cast<int>().max(1);
-  for (;;) {
+  for (int halved = -1;;) {
     field.nodes = cells + 1;
     field.step = size / cells.cast<double>();
     if (field.nodes.cast<double>().prod() > settings.most_nodes) {
@@ -336,10 +351,9 @@ LightField make_light_field(const Scene& fixture, const Eigen::AlignedBox3d& rea
           "rim that crosses the box needs a wider soft_angle)",
           settings.accuracy, field.nodes.prod(), settings.most_nodes, field.error);
     }
-    maker.fill(field);
+    maker.fill(field, halved);
     field.error = maker.error(field, Eigen::Array3d::Constant(0.5));
     if (field.error <= settings.accuracy) return field;
-    int worst = 0;
     double most = -1.0;
     for (int axis = 0; axis < 3; ++axis) {
       Eigen::Array3d offset = Eigen::Array3d::Zero();
@@ -347,10 +361,10 @@ LightField make_light_field(const Scene& fixture, const Eigen::AlignedBox3d& rea
       const double error = maker.error(field, offset);
       if (error > most) {
         most = error;
-        worst = axis;
+        halved = axis;
       }
     }
-    cells[worst] *= 2;
+    cells[halved] *= 2;
   }
 }
 
