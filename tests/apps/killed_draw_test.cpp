@@ -1,5 +1,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <thread>
 
@@ -69,6 +70,40 @@ TEST_F(KilledDraw, KillsShardsThreadsAndFullDisksLeaveNoTrace) {
   EXPECT_EQ(run_program(words("full")).exit_code, 0);
   EXPECT_EQ(contents("full"), whole);
   EXPECT_THAT(run_program(words("full")).out, ::testing::HasSubstr("is finished already"));
+}
+
+TEST_F(KilledDraw, ReadOnlyFolderIsOneLineAndNothingIsLost) {
+  ASSERT_EQ(run_program(shard("out", "1/2")).exit_code, 0);
+  const auto begun = contents("out");
+  const std::string out = (folder_.path() / "out").string();
+  test::ProgramRun run;
+  if (geteuid() == 0) {  // whom no permission stops: a mount of this process's own
+    std::vector<std::string> all = {"/usr/bin/unshare",
+                                    "--mount",
+                                    "/bin/bash",
+                                    "-c",
+                                    "mount --bind \"$1\" \"$1\" && mount -o remount,ro,bind \"$1\" || exit 77; "
+                                    "shift; exec \"$@\"",
+                                    "bash",
+                                    out,
+                                    TOUCHSTONE_PROGRAM};
+    const std::vector<std::string> rest = words("out");
+    all.insert(all.end(), rest.begin(), rest.end());
+    run = test::run_words(all);
+    if (run.exit_code == 77 || run.exit_code == 1) GTEST_SKIP() << "no mounts here: " << run.err;
+  } else {
+    const auto writable = fs::perms::owner_write;
+    for (const fs::path& one : {folder_.path() / "out", folder_.path() / "out/blocks"}) {
+      fs::permissions(one, writable, fs::perm_options::remove);
+    }
+    run = run_program(words("out"));
+    for (const fs::path& one : {folder_.path() / "out", folder_.path() / "out/blocks"}) {
+      fs::permissions(one, writable, fs::perm_options::add);
+    }
+  }
+  test::expect_refused(run, out);
+  EXPECT_EQ(contents("out"), begun);
+  EXPECT_EQ(run_program(words("out")).exit_code, 0);
 }
 
 TEST_F(KilledDraw, MistakesAreOneLine) {
