@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <memory>
 
 #include "apps/command.h"
@@ -6,6 +7,7 @@
 #include "core/whole_file.h"
 #include "lab/contact_sheet.h"
 #include "lab/frame_sequence.h"
+#include "lab/inspected_draw.h"
 #include "lab/inspection_page.h"
 #include "sim/image_file.h"
 
@@ -32,20 +34,25 @@ std::vector<std::size_t> spread(std::size_t size, std::size_t count) {
 void write_page(const InspectOptions& options) {
   const lab::InspectedSet set = lab::read_inspected_set(options.data);
   std::string note;
-  const std::optional<lab::PreparedJob> job = lab::job_of_set(set, options.job, note);
+  std::optional<lab::PreparedJob> job;
+  if (!set.drawn) {
+    job = lab::job_of_set(set, options.job, note);
+  } else if (!options.job.empty()) {
+    fail("--job: isn't for a set that was drawn; it has its devices in it");
+  } else if (std::ranges::any_of(set.scenes, [](const auto& unit) { return unit.device_spec == nullptr; })) {
+    note = "the units' device files name others that aren't here, so their cameras aren't known";
+  }
   lab::InspectionOptions how;
   how.columns = options.columns;
   how.tiles_per_scene = options.tiles_per_scene;
   how.tile_width = options.tile_width;
   write_whole_file(options.out, lab::inspection_page(set, job, note, viewer_scripts(), how));
-  fmt::print("{}: {} samples in {} scenes{}\n", options.out.string(), set.samples.size(), set.scenes.size(),
-             note.empty() ? "" : "; " + note);
+  fmt::print("{}: {} samples in {} {}{}\n", options.out.string(), set.samples.size(), set.scenes.size(),
+             set.drawn ? "units" : "scenes", note.empty() ? "" : "; " + note);
 }
 
-void write_sheet(const InspectOptions& options) {
-  if (!options.job.empty()) fail("--job: is for a page, and {} is a picture", options.out.string());
-  std::vector<cv::Mat> pictures;
-  std::vector<std::string> captions;
+void add_frames_of_scenes(const InspectOptions& options, std::vector<cv::Mat>& pictures,
+                          std::vector<std::string>& captions) {
   for (const lab::FrameSequence& sequence : lab::frames_of_data_set(options.data, std::nullopt)) {
     for (const std::size_t i : spread(sequence.frames.size(), static_cast<std::size_t>(options.tiles_per_scene))) {
       const lab::LabelledFrame& frame = sequence.frames[i];
@@ -54,6 +61,30 @@ void write_sheet(const InspectOptions& options) {
                                      frame.force->y(), frame.force->z()));
     }
   }
+}
+
+void add_frames_of_units(const InspectOptions& options, std::vector<cv::Mat>& pictures,
+                         std::vector<std::string>& captions) {
+  const lab::InspectedSet set = lab::read_inspected_set(options.data);
+  for (const lab::InspectedScene& unit : set.scenes) {
+    const auto each = static_cast<std::size_t>(options.tiles_per_scene);
+    for (const std::size_t i : spread(static_cast<std::size_t>(unit.samples), each)) {
+      const std::size_t sample = static_cast<std::size_t>(unit.first_sample) + i;
+      pictures.push_back(lab::inspected_frame(set, sample));
+      if (pictures.back().empty()) fail("{}: has no frames", options.data.string());
+      const auto& force = set.samples[sample].wrench;
+      captions.push_back(
+          fmt::format("{}\n{:.2f} {:.2f} {:.2f} N", set.name_of_sample(sample), force[0], force[1], force[2]));
+    }
+  }
+}
+
+void write_sheet(const InspectOptions& options) {
+  if (!options.job.empty()) fail("--job: is for a page, and {} is a picture", options.out.string());
+  std::vector<cv::Mat> pictures;
+  std::vector<std::string> captions;
+  lab::holds_drawn_set(options.data) ? add_frames_of_units(options, pictures, captions)
+                                     : add_frames_of_scenes(options, pictures, captions);
   sim::write_png(options.out, lab::contact_sheet(pictures, captions, options.columns, options.tile_width));
   fmt::print("{}: {} frames with their forces x, y, z on the object\n", options.out.string(), pictures.size());
 }

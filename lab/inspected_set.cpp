@@ -1,12 +1,18 @@
 #include "lab/inspected_set.h"
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
+#include <opencv2/core.hpp>
+#include <optional>
 
 #include "core/error.h"
 #include "core/hdf5_file.h"
 #include "core/whole_file.h"
+#include "lab/inspected_draw.h"
+#include "lab/job.h"
 #include "lab/manifest.h"
 #include "lab/truth_file.h"
+#include "sim/image_file.h"
 
 namespace touchstone::lab {
 namespace {
@@ -22,7 +28,7 @@ std::vector<Eigen::Vector3d> points(const std::vector<double>& values) {
 InspectedScene scene_of(const ordered_json& json) {
   InspectedScene scene;
   scene.name = json.at("name");
-  scene.split = split_named(json.at("split"));
+  scene.split = name_of(split_named(json.at("split")));
   scene.device = json.at("device");
   scene.object = json.at("object");
   scene.first_sample = json.at("first_sample");
@@ -94,22 +100,45 @@ void read_columns(const std::filesystem::path& path, InspectedSet& set) {
   }
 }
 
-}  // namespace
-
-std::optional<std::filesystem::path> InspectedSet::picture(std::size_t sample, const std::string& of,
-                                                           const std::string& ending) const {
-  const InspectedSample& at = samples[sample];
+/// A picture of a sample: `of` is "frames", "ideal", "pixels"; none if the set has no such file.
+std::optional<std::filesystem::path> picture_file(const InspectedSet& set, std::size_t sample, const std::string& of,
+                                                  const std::string& ending) {
+  const InspectedSample& at = set.samples[sample];
   const std::filesystem::path file =
-      folder / picture_name(of, scenes[static_cast<std::size_t>(at.scene)].name, at.frame, ending);
+      set.folder / picture_name(of, set.scenes[static_cast<std::size_t>(at.scene)].name, at.frame, ending);
   if (!std::filesystem::is_regular_file(file)) return std::nullopt;
   return file;
 }
 
+}  // namespace
+
+cv::Mat inspected_frame(const InspectedSet& set, std::size_t sample) {
+  if (set.drawn) return drawn_frame(set, sample);
+  for (const char* of : {"frames", "ideal"}) {
+    if (const auto file = picture_file(set, sample, of, "png")) return sim::read_image(*file);
+  }
+  return {};
+}
+
+cv::Mat inspected_contact(const InspectedSet& set, std::size_t sample) {
+  if (set.drawn) return drawn_contact(set, sample);
+  const auto file = picture_file(set, sample, "pixels", "exr");
+  if (!file) return {};
+  const sim::LinearImage truth = sim::read_exr(*file);
+  const auto at = std::find(truth.channel_names.begin(), truth.channel_names.end(), "contact.Y");
+  if (at == truth.channel_names.end()) return {};
+  cv::Mat channel;
+  cv::extractChannel(truth.image, channel, static_cast<int>(at - truth.channel_names.begin()));
+  return channel > 0.5;
+}
+
 std::string InspectedSet::name_of_sample(std::size_t sample) const {
-  return fmt::format("{} {}", scenes[static_cast<std::size_t>(samples[sample].scene)].name, samples[sample].frame);
+  return fmt::format("{}{} {}", scenes[static_cast<std::size_t>(samples[sample].scene)].name, drawn ? ", sample" : "",
+                     samples[sample].frame);
 }
 
 InspectedSet read_inspected_set(const std::filesystem::path& folder) {
+  if (holds_drawn_set(folder)) return read_inspected_draw(folder);
   const Manifest manifest = read_manifest(folder);
   InspectedSet set;
   set.folder = folder;
@@ -134,6 +163,7 @@ InspectedSet read_inspected_set(const std::filesystem::path& folder) {
 }
 
 InspectedGel read_inspected_gel(const InspectedSet& set, std::size_t sample) {
+  if (set.drawn) return drawn_gel(set, sample);
   const std::filesystem::path path = set.folder / "truth.h5";
   const Hdf5Reader file(path);
   const auto row = static_cast<std::int64_t>(sample);

@@ -5,26 +5,31 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
-#include <optional>
+#include <memory>
+#include <opencv2/core/mat.hpp>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "core/transform.h"
-#include "lab/job.h"
+#include "lab/drawn_manifest.h"
+#include "sim/device.h"
 #include "sim/plan.h"
 
 namespace touchstone::lab {
 
+/// A scene, or a sensor of a drawn set.
 struct InspectedScene {
   std::string name;
-  Split split = Split::train;
-  std::string device, object;
+  std::string split;           ///< "train"; of a drawn set how many of each
+  std::string device, object;  ///< of a drawn set all objects that were pressed on it
   std::int64_t first_sample = 0;
   std::int64_t samples = 0;
   std::vector<std::string> outputs;                         ///< those that it has
   std::vector<sim::Effect> plan;                            ///< each effect, on or off, and why
   std::vector<std::pair<std::string, std::int64_t>> light;  ///< how its pictures are lit, and how many
+  std::vector<std::pair<std::string, double>> drawn;        ///< of a drawn set: what tells this sensor from the others
+  std::shared_ptr<const sim::DeviceSpec> device_spec;       ///< of a drawn set, null if it can't be read back
 };
 
 struct InspectedSample {
@@ -42,6 +47,8 @@ struct InspectedSample {
 
 struct InspectedSet {
   std::filesystem::path folder;
+  bool drawn = false;                 ///< by a job that draws (lab/inspected_draw.h)
+  std::vector<ManifestBlock> blocks;  ///< of a drawn set
   std::string job_name, job_file, job_text;
   std::string job_sha256, inputs_sha256, content_sha256;
   std::string version, processor;
@@ -52,15 +59,18 @@ struct InspectedSet {
   std::int64_t files = 0;
   std::int64_t bytes = 0;
 
-  /// A picture of a sample: `folder` is "frames", "ideal"; none if the set has no such file.
-  std::optional<std::filesystem::path> picture(std::size_t sample, const std::string& folder,
-                                               const std::string& ending) const;
   /// "square-left 12".
   std::string name_of_sample(std::size_t sample) const;
 };
 
-/// @throws Error if the folder isn't a finished data set, or is damaged
+/// Of either kind of set. @throws Error if the folder isn't a finished data set, or is damaged
 InspectedSet read_inspected_set(const std::filesystem::path& folder);
+
+/// A sample's picture with the imager's noise, or where the set has only that the one without, grey or BGR; empty if it
+/// has neither. @throws Error if it can't be read
+cv::Mat inspected_frame(const InspectedSet& set, std::size_t sample);
+/// 255 where what a pixel sees is in contact; empty if the set doesn't say.
+cv::Mat inspected_contact(const InspectedSet& set, std::size_t sample);
 
 /// The gel's outer surface and beads at one sample, gel frame, mm.
 struct InspectedGel {

@@ -130,13 +130,6 @@ std::string force_words(const InspectedSample& sample) {
   return fmt::format("{:.2f} {:.2f} {:.2f} N", sample.wrench[0], sample.wrench[1], sample.wrench[2]);
 }
 
-cv::Mat picture_of(const InspectedSet& set, std::size_t sample) {
-  for (const char* folder : {"frames", "ideal"}) {
-    if (const auto file = set.picture(sample, folder, "png")) return sim::read_image(*file);
-  }
-  return {};
-}
-
 std::string sheet(const InspectedSet& set, const InspectionOptions& options) {
   const std::size_t scenes = std::max<std::size_t>(1, set.scenes.size());
   const std::size_t each = std::clamp<std::size_t>(static_cast<std::size_t>(options.most_tiles) / scenes, 1,
@@ -158,7 +151,7 @@ std::string sheet(const InspectedSet& set, const InspectionOptions& options) {
   std::vector<cv::Mat> pictures;
   std::vector<std::string> captions;
   for (const std::size_t i : shown) {
-    cv::Mat picture = picture_of(set, i);
+    cv::Mat picture = inspected_frame(set, i);
     if (picture.empty()) continue;
     pictures.push_back(std::move(picture));
     captions.push_back(set.name_of_sample(i) + "\n" + force_words(set.samples[i]));
@@ -226,7 +219,10 @@ std::string error_bars(const InspectedSet& set) {
       "mesh "
       "alone: not in it is what linear elasticity leaves out of large strains.</p>\n",
       touching, under_resolved);
-  for (const HistogramPlot* plot : {&absolute, &relative, &surface}) html += "<figure>" + to_svg(*plot) + "</figure>\n";
+  for (const HistogramPlot* plot : {&absolute, &relative, &surface}) {
+    if (set.drawn && plot == &surface) continue;  // it doesn't say
+    html += "<figure>" + to_svg(*plot) + "</figure>\n";
+  }
   return html;
 }
 
@@ -250,27 +246,25 @@ const PreparedScene* scene_of_sample(const std::optional<PreparedJob>& job, cons
   return &job->scenes[static_cast<std::size_t>(sample.scene)];
 }
 
-cv::Mat contact_mask(const InspectedSet& set, std::size_t sample) {
-  const auto file = set.picture(sample, "pixels", "exr");
-  if (!file) return {};
-  const sim::LinearImage truth = sim::read_exr(*file);
-  const auto at = std::find(truth.channel_names.begin(), truth.channel_names.end(), "contact.Y");
-  if (at == truth.channel_names.end()) return {};
-  cv::Mat channel;
-  cv::extractChannel(truth.image, channel, static_cast<int>(at - truth.channel_names.begin()));
-  return channel > 0.5;
+/// The device that a drawn set carries or that the job names; null if it isn't known.
+const sim::DeviceSpec* device_of_sample(const InspectedSet& set, const std::optional<PreparedJob>& job,
+                                        const InspectedSample& sample) {
+  if (set.drawn) return set.scenes[static_cast<std::size_t>(sample.scene)].device_spec.get();
+  const PreparedScene* scene = scene_of_sample(job, sample);
+  return scene == nullptr ? nullptr : &scene->spec.device;
 }
 
 std::string overlays(const InspectedSet& set, const std::optional<PreparedJob>& job, int most) {
   std::string html;
   for (const std::size_t i : hardest(set, most)) {
-    const cv::Mat picture = picture_of(set, i);
+    const cv::Mat picture = inspected_frame(set, i);
     if (picture.empty()) continue;
     const InspectedSample& sample = set.samples[i];
     std::optional<GelView> view;
-    const PreparedScene* scene = scene_of_sample(job, sample);
-    if (scene != nullptr && scene->spec.device.camera) view.emplace(scene->spec.device);
-    html += picture_element(draw_truth(picture, sample, read_inspected_gel(set, i), view, contact_mask(set, i)),
+    if (const sim::DeviceSpec* device = device_of_sample(set, job, sample); device != nullptr && device->camera) {
+      view.emplace(*device);
+    }
+    html += picture_element(draw_truth(picture, sample, read_inspected_gel(set, i), view, inspected_contact(set, i)),
                             fmt::format("{}: {} \xC2\xB1 {:.2g} N, {:.3g} mm\xC2\xB2 in contact", set.name_of_sample(i),
                                         force_words(sample), sample.force_error.norm(), sample.contact_area));
   }
@@ -308,15 +302,31 @@ std::string plans(const InspectedSet& set) {
 
 std::string scene_table(const InspectedSet& set) {
   std::string html =
-      "<table><tr><th>scene</th><th>split</th><th>samples</th><th>device</th><th>object</th><th>outputs</th>"
+      "<table><tr><th></th><th>split</th><th>samples</th><th>device</th><th>object</th><th>outputs</th>"
       "<th>light</th></tr>\n";
   for (const InspectedScene& scene : set.scenes) {
     std::string outputs, light;
     for (const std::string& output : scene.outputs) outputs += (outputs.empty() ? "" : ", ") + output;
     for (const auto& [how, samples] : scene.light)
       light += fmt::format("{}{}: {}", light.empty() ? "" : "; ", samples, how);
-    html += "<tr>" + cell(scene.name) + cell(name_of(scene.split)) + number_cell(static_cast<double>(scene.samples)) +
+    html += "<tr>" + cell(scene.name) + cell(scene.split) + number_cell(static_cast<double>(scene.samples)) +
             cell(scene.device) + cell(scene.object) + cell(outputs) + cell(light) + "</tr>\n";
+  }
+  return html + "</table>\n";
+}
+
+/// What tells a drawn set's sensors apart.
+std::string unit_table(const InspectedSet& set) {
+  if (set.scenes.empty() || set.scenes.front().drawn.empty()) {
+    return "<p class=\"note\">All sensors are the same.</p>\n";
+  }
+  std::string html = "<table><tr><th></th>";
+  for (const auto& [path, value] : set.scenes.front().drawn) html += cell(path, "th");
+  html += "</tr>\n";
+  for (const InspectedScene& scene : set.scenes) {
+    html += "<tr>" + cell(scene.name);
+    for (const auto& [path, value] : scene.drawn) html += number_cell(value);
+    html += "</tr>\n";
   }
   return html + "</table>\n";
 }
@@ -347,12 +357,16 @@ std::string view_3d(const InspectedSet& set, const std::optional<PreparedJob>& j
     if (set.samples[i].wrench.head<3>().norm() > set.samples[best].wrench.head<3>().norm()) best = i;
   }
   const InspectedSample& sample = set.samples[best];
-  const std::string model =
-      sim::glb_bytes(sample_parts(sample, read_inspected_gel(set, best), scene_of_sample(job, sample)), {});
+  const InspectedGel gel = read_inspected_gel(set, best);
+  if (gel.triangles.empty()) return "<p class=\"note\">The set doesn't tell the gel's surface.</p>\n";
+  const std::string model = sim::glb_bytes(sample_parts(sample, gel, scene_of_sample(job, sample)), {});
   std::string html = fmt::format(
-      "<p class=\"note\">{}, {}: what touches the gel is red, the arrow is the force on the object; drag turns it, the "
+      "<p class=\"note\">{}, {}: what touches the gel is red, the arrow is the force on the object{}; drag turns it, "
+      "the "
       "wheel zooms.</p>\n<div id=\"view\"></div>\n<script type=\"application/base64\" id=\"model\">{}</script>\n",
-      escape_markup(set.name_of_sample(best)), force_words(sample), base64(model));
+      escape_markup(set.name_of_sample(best)), force_words(sample),
+      set.drawn ? "; the surface is the part that the camera sees, from its height map, without the object" : "",
+      base64(model));
   html += "<!-- three.js (https://threejs.org), MIT licence, Copyright (c) 2010-2019 three.js authors -->\n";
   for (const std::string* script : {&viewer->three, &viewer->gltf_loader, &viewer->orbit_controls}) {
     html += "<script>\n" + *script + "\n</script>\n";
@@ -393,26 +407,31 @@ std::string inspection_page(const InspectedSet& set, const std::optional<Prepare
                      "</title>\n<style>" + kPageStyle +
                      "</style>\n<link rel=\"icon\" href=\"data:,\">\n</head>\n<body>\n<h1>" + title + "</h1>\n";
   html += fmt::format(
-      "<p class=\"note\">{} samples in {} scenes, {} files, {:.1f} MB. touchstone {} on {}. Content SHA-256 {}</p>\n",
-      set.samples.size(), set.scenes.size(), set.files, static_cast<double>(set.bytes) / 1e6,
-      escape_markup(set.version), escape_markup(set.processor), escape_markup(set.content_sha256));
+      "<p class=\"note\">{} samples in {} {}, {} files, {:.1f} MB. touchstone {} on {}. Content SHA-256 {}</p>\n",
+      set.samples.size(), set.scenes.size(), set.drawn ? "units" : "scenes", set.files,
+      static_cast<double>(set.bytes) / 1e6, escape_markup(set.version), escape_markup(set.processor),
+      escape_markup(set.content_sha256));
   const auto section = [&](const char* name, const std::string& content) {
     html += fmt::format("<h2>{}</h2>\n", name) + content;
   };
-  section("Scenes", scene_table(set));
+  section(set.drawn ? "Sensors" : "Scenes", scene_table(set));
+  if (set.drawn) section("What was drawn for each sensor", unit_table(set));
   section("Frames", sheet(set, options));
   std::string legend =
-      "<p class=\"note\">Of each scene the sample pressed hardest. Red: the object's origin and the force along the "
+      "<p class=\"note\">Of each scene or sensor, or of some of them, the sample pressed hardest. Red: the object's "
+      "origin and the force along the "
       "gel; "
       "green: the contact; blue: the beads' centres.";
   if (!note.empty()) legend += " Less is drawn: " + escape_markup(note) + ".";
   section("Truth over frames", legend + "</p>\n" + overlays(set, job, options.most_overlays));
-  section("Forces and poses", force_curves(set) + histograms(set));
+  section("Forces and poses", (set.drawn ? "" : force_curves(set)) + histograms(set));
   section("Error bars", error_bars(set));
   section("3D", view_3d(set, job, viewer));
-  section("Plan of effects", plans(set));
-  section("Timings", timing_table(set));
-  section("Arrays of truth.h5", array_table(set));
+  if (!set.drawn) {
+    section("Plan of effects", plans(set));
+    section("Timings", timing_table(set));
+  }
+  section(set.drawn ? "Arrays of each block" : "Arrays of truth.h5", array_table(set));
   section("Job", "<pre>" + escape_markup(set.job_text) + "</pre>\n");
   return html + "</body>\n</html>\n";
 }

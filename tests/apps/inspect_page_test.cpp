@@ -3,6 +3,7 @@
 
 #include "core/whole_file.h"
 #include "tests/apps/run_program.h"
+#include "tests/support/small_draw.h"
 #include "tests/support/small_job.h"
 #include "tests/support/temporary_folder.h"
 
@@ -84,6 +85,37 @@ TEST_F(InspectPage, DoesWithoutTheJobAndSaysSo) {
   ASSERT_EQ(run.exit_code, 0) << run.err;
   EXPECT_THAT(run.out, HasSubstr("12 samples in 2 scenes; the job's file isn't known (--job names it)"));
   EXPECT_THAT(read_whole_file(path("no-job.html")), HasSubstr("Less is drawn: the job&#39;s file"));
+}
+
+/// A drawn set has sensors instead of scenes, and carries their devices.
+TEST_F(InspectPage, ShowsDrawnSets) {
+  const TemporaryFolder folder;
+  const std::string job = test::write_small_draw(folder).string();
+  const auto at = [&](const std::string& name) { return (folder.path() / name).string(); };
+  const ProgramRun made = run_program({"--quiet", "--cache", at("cache"), "generate", job, "-o", at("set")});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  const ProgramRun run = run_program({"inspect", at("set"), "-o", at("page.html")});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_EQ(run.out, at("page.html") + ": 10 samples in 2 units\n");
+  const std::string page = read_whole_file(at("page.html"));
+  if (const char* keep = std::getenv("TOUCHSTONE_KEEP_DRAWN_PAGE")) write_whole_file(keep, page);
+  const auto times = [&](const std::string& text) {
+    int found = 0;
+    for (std::size_t k = 0; (k = page.find(text, k)) != std::string::npos; k += text.size()) ++found;
+    return found;
+  };
+  EXPECT_EQ(times("src=\"data:image/jpeg;base64,/9j/"), 3) << "the sheet, and one picture with its truth a sensor";
+  EXPECT_EQ(times("<svg "), 12 + 2) << "histograms, error bars";
+  for (const char* part : {"<h1>small-draw</h1>", "<td>unit 1</td>", "<th>gel.youngs_modulus_MPa</th>", "train 5",
+                           "test 5", "<td>/drawn/force_N</td>", "small-coated", "unit 0, sample "}) {
+    EXPECT_NE(page.find(part), std::string::npos) << part;
+  }
+  EXPECT_EQ(times("Less is drawn"), 0);
+  EXPECT_EQ(times("id=\"model\""), html_->find("id=\"model\"") == std::string::npos ? 0 : 1);
+  EXPECT_EQ(run_program({"inspect", at("set"), "-o", at("sheet.png")}).exit_code, 0);
+  expect_refused(run_program({"inspect", at("set"), "-o", at("page.html"), "--job", job}), "--job: isn't for a set");
+  std::filesystem::resize_file(folder.path() / "set/blocks/000001.h5", 3000);
+  expect_refused(run_program({"inspect", at("set"), "-o", at("page.html")}), "is missing or was changed");
 }
 
 TEST_F(InspectPage, RefusesWhatIsNotTheSetsOwn) {
