@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "lab/run_identity.h"
 #include "sim/gel_setup.h"
 #include "sim/touch_rig.h"
 
@@ -9,6 +10,17 @@ namespace touchstone::lab {
 namespace {
 
 constexpr int kBackgroundFrame = 1;  // of the unit's noise; samples have seeds of their own
+
+/// Of all but the job, which the rig's settings and the unit's text stand for.
+RunIdentity light_identity(const PreparedDraw& prepared) {
+  RunIdentity identity = identity_of(prepared.text, prepared.inputs);
+  identity.job_sha256.clear();
+  identity.inputs_sha256.clear();
+  for (const InputFile& input : prepared.inputs) {
+    if (!input.name.ends_with(".yaml")) identity.inputs_sha256 += input.sha256;  // spectra, that devices name
+  }
+  return identity;
+}
 
 BlockRecord pressed(const PreparedDraw& prepared, const sim::TouchRig& rig, const sim::TouchObject& object,
                     const DrawnTouch& touch) {
@@ -44,6 +56,7 @@ BenchSource rig_bench(const std::filesystem::path& cache_folder) {
     settings.interreflection_tolerance = prepared.job.interreflection_tolerance;
     settings.edge_side = prepared.job.edge_side;
     settings.guides = prepared.job.guides;
+    settings.light_key = to_json(light_identity(prepared)) + unit.text;
     settings.always_friction = true;  // else a straight press would have none beside a tilted one that has
     sim::keep_gel_of_unit_modulus(unit.device, cache_folder);
     const auto rig = std::make_shared<const sim::TouchRig>(unit.device, cache_folder, settings);

@@ -49,7 +49,8 @@ RunIdentity identity_of(const std::string& job_text, const std::vector<InputFile
   for (const InputFile& file : inputs) list += file.sha256 + "  " + file.name + "\n";
   identity.inputs_sha256 = sha256_of(list);
   identity.version = program_version();
-  identity.program_sha256 = sha256_of_file(own_file());
+  static const std::string program = sha256_of_file(own_file());
+  identity.program_sha256 = program;
   identity.processor = processor_kind();
   return identity;
 }

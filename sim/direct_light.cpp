@@ -113,6 +113,26 @@ DirectLight::DirectLight(const SceneSight& sight, const render::Camera& camera, 
   idle_.push_back(std::move(chosen.renderer));
 }
 
+DirectLight::DirectLight(const SceneSight& sight, const render::Camera& camera, const fem::PressState& still,
+                         FoundLight found, int edge_side)
+    : choice_(std::move(found.choice)), camera_(camera), field_(std::move(found.field)), bounced_(found.bounced) {
+  if (!choice_.direct) return;
+  settings_.samples = found.rays;
+  settings_.edge_side = edge_side;
+  settings_.seed = sight.scene.seed;
+  rest_ = with_blacks(sight.seen(still, {}));
+  field_.fixture = rest_;
+  field_.fixture.surfaces.clear();
+  field_.fixture.balls.clear();
+  rest_.interreflection = false;
+}
+
+FoundLight DirectLight::found() const {
+  FoundLight found{choice_, settings_.samples, field_, bounced_};
+  found.field.fixture = {};
+  return found;
+}
+
 std::unique_ptr<render::DirectRenderer> DirectLight::borrow() const {
   {
     const std::lock_guard lock(mutex_);

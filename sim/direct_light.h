@@ -17,6 +17,14 @@ namespace touchstone::sim {
 /// Rays a pixel that are tried in turn; with one, shadows of wide lamps have no soft rims.
 inline constexpr int kRaysTried[] = {1, 16, 64};
 
+/// What finding direct light comes to, but for what the scene says anyhow (field.fixture is empty).
+struct FoundLight {
+  LightChoice choice;
+  int rays = 1;  ///< a pixel; the rest is for a choice of direct light
+  render::LightField field;
+  cv::Mat bounced;
+};
+
 /// Tier 1 of the renderers for one scene. Made once; `render` is pure and may be called from several threads.
 class DirectLight {
  public:
@@ -29,7 +37,13 @@ class DirectLight {
               std::span<const int> rays_tried = kRaysTried, int edge_side = render::DirectSettings{}.edge_side,
               const render::GuideCut& guides = {});
 
+  /// As it was found before, of the same scene and camera and with the same edge_side. `still`: the gel untouched.
+  DirectLight(const SceneSight& sight, const render::Camera& camera, const fem::PressState& still, FoundLight found,
+              int edge_side);
+
   const LightChoice& choice() const { return choice_; }
+  /// For the constructor above.
+  FoundLight found() const;
 
   /// The picture of a scene as SceneSight::seen gives it; nothing if the gel has gone where the light field doesn't
   /// reach. @pre choice().direct

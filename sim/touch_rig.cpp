@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <limits>
+#include <optional>
 #include <utility>
 
 #include "core/error.h"
+#include "core/sha256.h"
 #include "render/first_hits.h"
 #include "sim/device_camera.h"
-#include "sim/direct_light.h"
+#include "sim/light_file.h"
 #include "sim/plan_direct.h"
 #include "sim/seen_geometry.h"
 
@@ -50,6 +52,25 @@ MotionSpec straight_press(double from_mm, double to_mm) {
   return motion;
 }
 
+/// Empty where the light isn't to be kept.
+std::string light_key(const TouchRigSettings& settings) {
+  if (settings.light_key.empty()) return {};
+  return sha256_of(fmt::format("touchstone light, format {}, {} {} {} {} {} {} {} {} {}\n{}", kLightFormat,
+                               settings.seed, settings.deepest_mm, settings.widest_mm, settings.membrane_um,
+                               settings.interreflection_tolerance, settings.always_friction, settings.edge_side,
+                               settings.guides.sectors, settings.guides.slices, settings.light_key));
+}
+
+/// A rig works as well where it can't be kept.
+void keep_light(const std::filesystem::path& folder, const std::string& key, const FoundLight& light) {
+  std::error_code ignored;
+  std::filesystem::create_directories(folder, ignored);
+  try {
+    write_light(folder, key, light);
+  } catch (const Error&) {
+  }
+}
+
 }  // namespace
 
 struct TouchRig::Parts {
@@ -63,9 +84,8 @@ struct TouchRig::Parts {
     const SceneSpec scene = scene_with(judged_ball(), {});
     judged = std::make_shared<const SceneSight>(scene, make_plan(scene), *gel);
     const double radius = judged_ball().shape.radius_mm;
-    const std::vector<Truth> ball =
-        play(scene_with(judged_ball(), straight_press(radius + kClearance_mm, radius - 0.5 * settings.deepest_mm)));
-    rest = at_rest(ball.front().press);
+    const double above = radius + kClearance_mm;
+    rest = at_rest(play(scene_with(judged_ball(), straight_press(above, above))).front().press);
     camera = camera_of(*device.camera);
     ready = render::make_ready(camera);
     size = {render::size_of(camera).x(), render::size_of(camera).y()};
@@ -75,10 +95,19 @@ struct TouchRig::Parts {
     rest_seen = judged->geometry(rest, {});
     rest_hits = render::first_hits(rest_seen.inside, ready);
     if (judged->plan.direct_light) {
-      std::vector<Truth> states = farthest_states(rest, settings);
-      states.push_back(ball.back());
-      direct = std::make_unique<const DirectLight>(*judged, camera, states, kRaysAPixel, settings.edge_side,
-                                                   settings.guides);
+      const std::string key = cache_folder.empty() ? "" : light_key(settings);
+      std::optional<FoundLight> found;
+      if (!key.empty()) found = read_light(cache_folder, key);
+      if (found) {
+        direct = std::make_unique<const DirectLight>(*judged, camera, rest, std::move(*found), settings.edge_side);
+      } else {
+        std::vector<Truth> states = farthest_states(rest, settings);
+        states.push_back(
+            play(scene_with(judged_ball(), straight_press(above, radius - 0.5 * settings.deepest_mm))).back());
+        direct = std::make_unique<const DirectLight>(*judged, camera, states, kRaysAPixel, settings.edge_side,
+                                                     settings.guides);
+        if (!key.empty()) keep_light(cache_folder, key, direct->found());
+      }
       choice = direct->choice();
     }
     background_light = light(*judged, rest, {}, rest_seen);

@@ -27,6 +27,9 @@ struct TouchRigSettings {
   int edge_side = 4;  ///< rays along a side of pixels that differ from those beside them (render::DirectSettings): on a
                       ///< rough object these are all pixels
   render::GuideCut guides;  ///< light guides' light in the light field; fewer beams are quicker and a little less right
+  /// All that the light hangs on besides these settings, such as the device's file and the program's checksum. Where it
+  /// is given, what was found about the light is kept with the gel and read back; empty: it's found anew each time.
+  std::string light_key;
 };
 
 /// One frame and what is true of it. Pictures have the camera's size.

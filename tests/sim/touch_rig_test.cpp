@@ -8,6 +8,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/error.h"
+#include "core/whole_file.h"
 #include "tests/support/small_scene.h"
 #include "tests/support/temporary_folder.h"
 
@@ -83,6 +84,43 @@ TEST(TouchRig, LooksAreTheSameFromAnyNumberOfThreads) {
     EXPECT_EQ(cv::norm(one.frame, alone.frame, cv::NORM_INF), 0.0);
     EXPECT_EQ(cv::norm(one.height, alone.height, cv::NORM_INF), 0.0);
   }
+}
+
+TEST(TouchRig, LightThatWasKeptMakesTheSameFrames) {
+  const test::TemporaryFolder cache;
+  TouchRigSettings settings;
+  settings.light_key = "this device, this program";
+  const auto frame_of = [&](const TouchRig& one) {
+    const TouchObject object = one.object(ball(2));
+    return one.look(object, one.play(object, press(0.3, 0, 2.05, 1.8)).back().press, 3).light;
+  };
+  const auto kept = [&] {
+    std::vector<std::filesystem::path> files;
+    for (const auto& entry : std::filesystem::directory_iterator(cache.path())) {
+      if (entry.path().filename().string().starts_with("light-")) files.push_back(entry.path());
+    }
+    return files;
+  };
+  const TouchRig first(test::small_coated_device(), cache.path(), settings);
+  ASSERT_EQ(kept().size(), 1U);
+  const cv::Mat light = frame_of(first);
+  EXPECT_EQ(cv::norm(light, frame_of(rig()), cv::NORM_INF), 0.0) << "one that keeps none";
+  std::string content = read_whole_file(kept().front());
+  const TouchRig second(test::small_coated_device(), cache.path(), settings);
+  EXPECT_EQ(second.light().reason, first.light().reason);
+  EXPECT_EQ(second.light().error->rms, first.light().error->rms);
+  EXPECT_EQ(cv::norm(light, frame_of(second), cv::NORM_INF), 0.0);
+  EXPECT_EQ(cv::norm(first.background_light(), second.background_light(), cv::NORM_INF), 0.0);
+
+  content[content.size() / 2] ^= 1;
+  write_whole_file(kept().front(), content);
+  const TouchRig third(test::small_coated_device(), cache.path(), settings);
+  EXPECT_EQ(cv::norm(light, frame_of(third), cv::NORM_INF), 0.0) << "a damaged file is made anew";
+  EXPECT_NE(read_whole_file(kept().front()), content);
+
+  settings.deepest_mm *= 0.9;
+  const TouchRig fourth(test::small_coated_device(), cache.path(), settings);
+  EXPECT_EQ(kept().size(), 2U);
 }
 
 TEST(TouchRig, RefusesWhatItCannotShow) {
