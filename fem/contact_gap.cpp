@@ -63,15 +63,20 @@ class TriangleGap {
   }
 
  private:
-  std::optional<double> at(const Eigen::Vector3d& b) const {
-    const Eigen::Vector3d point = points_ * b;
-    return entry(point, one_normal_ ? Eigen::Vector3d(normals_.col(0)) : (normals_ * b).normalized());
+  std::optional<double> at(const Eigen::Vector3d& b) const { return entry(points_ * b, direction(b)); }
+  Eigen::Vector3d direction(const Eigen::Vector3d& b) const {
+    return one_normal_ ? Eigen::Vector3d(normals_.col(0)) : (normals_ * b).normalized();
   }
   std::optional<double> entry(const Eigen::Vector3d& point, const Eigen::Vector3d& normal) const {
     const auto found = first_entry(shape_, point, normal);
     if (!found || *found >= -farthest_behind_) return found;
     const auto back = first_entry(shape_, point, -normal);  // where the line leaves the body, seen from outside
     return back && -*back < -farthest_behind_ ? std::nullopt : found;
+  }
+  /// Whether there is an entry.
+  bool hits(const Eigen::Vector3d& b) const {
+    if (std::isfinite(farthest_behind_)) return at(b).has_value();
+    return is_hit(shape_, points_ * b, direction(b));
   }
   /// Signed, positive inside.
   double silhouette(const Eigen::Vector3d& b) const {
@@ -143,7 +148,7 @@ class TriangleGap {
     if (!has_silhouette_) {
       for (int k = 0; k < kBisections; ++k) {
         const Eigen::Vector3d middle = 0.5 * (hit + miss);
-        (at(middle) ? hit : miss) = middle;
+        (hits(middle) ? hit : miss) = middle;
       }
       return hit;
     }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "core/error.h"
@@ -11,6 +12,8 @@ namespace touchstone::fem {
 namespace {
 
 constexpr int kReliefIterations = 40;
+constexpr int kRimSteps = 200;
+constexpr double kTouch = 1e-15;  // of the radius: rounding
 
 void check_positive(double value, const char* what) {
   if (!(value > 0.0) || !std::isfinite(value)) fail("{} is {} mm, it must be above 0 and finite", what, value);
@@ -131,6 +134,40 @@ std::optional<double> first_entry(const BoxShape& shape, const Eigen::Vector3d& 
   return inside.enter;
 }
 
+namespace {
+
+/// How far a point of a line is outside of the rounded rim of a cylinder: the rounded body is a ball of radius r swept
+/// over the core {rho <= core, z >= r}, so the distance to the core less r is convex along the line.
+struct RimDistance {
+  double t;
+  double value, slope;
+};
+
+/// Nothing where the point isn't outside: in the rim, or beside the corner, where the sharp body is the rounded one.
+/// @pre the point is in the sharp body
+std::optional<RimDistance> rim_distance(const RoundedCylinder& shape, const Eigen::Vector3d& p,
+                                        const Eigen::Vector3d& d, double t) {
+  const double r = shape.edge_radius;
+  const Eigen::Vector3d q = p + t * d;
+  const double rho = std::sqrt(q.x() * q.x() + q.y() * q.y());
+  const double out = rho - (shape.radius - r);
+  const double below = r - q.z();
+  if (out <= 0.0 || below <= 0.0) return std::nullopt;
+  const double distance = std::sqrt(out * out + below * below);
+  const double value = distance - r;
+  if (value <= kTouch * shape.radius) return std::nullopt;
+  return RimDistance{t, value, (out * (q.x() * d.x() + q.y() * d.y()) / rho - below * d.z()) / distance};
+}
+
+/// Where the tangents of two places meet: no value between them is lower. -infinity if they don't meet in between.
+RimDistance lowest_of_tangents(const RimDistance& a, const RimDistance& b) {
+  if (!(b.slope > a.slope)) return {0.5 * (a.t + b.t), -std::numeric_limits<double>::infinity(), 0.0};
+  const double t = (a.value - b.value + b.slope * b.t - a.slope * a.t) / (b.slope - a.slope);
+  return {t, a.value + a.slope * (t - a.t), 0.0};
+}
+
+}  // namespace
+
 std::optional<double> first_entry(const RoundedCylinder& shape, const Eigen::Vector3d& p, const Eigen::Vector3d& d) {
   const double r = shape.edge_radius;
   const double core = shape.radius - r;
@@ -143,21 +180,17 @@ std::optional<double> first_entry(const RoundedCylinder& shape, const Eigen::Vec
   }
   const LineInterval inside = common(inside_cylinder(shape.radius, p, d), between(0.0, shape.height, p.z(), d.z()));
   if (inside.empty()) return std::nullopt;
-  // The rounded body is a ball of radius r swept over the core {rho <= core, z >= r}, so the distance to the core less
-  // r is convex along the line: Newton's steps from the sharp body's entry approach the first root from one side.
+  // Newton's steps from the sharp body's entry approach the first root from one side.
   double t = inside.enter;
-  for (int iteration = 0; iteration < 200; ++iteration) {
-    const Eigen::Vector3d q = p + t * d;
-    const double rho = std::sqrt(q.x() * q.x() + q.y() * q.y());
-    const double out = rho - core;
-    const double below = r - q.z();
-    if (out <= 0.0 || below <= 0.0) return t;  // not in the corner: the sharp body is the rounded one there
-    const double distance = std::sqrt(out * out + below * below);
-    const double value = distance - r;
-    if (value <= 1e-15 * shape.radius) return t;
-    const double slope = (out * (q.x() * d.x() + q.y() * d.y()) / rho - below * d.z()) / distance;
-    if (slope >= 0.0) return std::nullopt;
-    const double next = t - value / slope;
+  std::optional<RimDistance> at_leave;
+  for (int iteration = 0; iteration < kRimSteps; ++iteration) {
+    const std::optional<RimDistance> here = rim_distance(shape, p, d, t);
+    if (!here) return t;
+    if (here->slope >= 0.0) return std::nullopt;
+    // A line that misses narrowly would take dozens of steps; the tangents from both ends tell at once.
+    if (iteration == 1) at_leave = rim_distance(shape, p, d, inside.leave);
+    if (at_leave && lowest_of_tangents(*here, *at_leave).value > kTouch * shape.radius) return std::nullopt;
+    const double next = t - here->value / here->slope;
     if (next > inside.leave) return std::nullopt;
     if (next <= t) return t;
     t = next;
@@ -194,6 +227,29 @@ std::optional<double> first_entry(const ReliefShape& shape, const Eigen::Vector3
 
 std::optional<double> first_entry(const ContactShape& shape, const Eigen::Vector3d& p, const Eigen::Vector3d& d) {
   return std::visit([&](const auto& body) { return first_entry(body, p, d); }, shape);
+}
+
+bool is_hit(const RoundedCylinder& shape, const Eigen::Vector3d& p, const Eigen::Vector3d& d) {
+  if (d.x() * d.x() + d.y() * d.y() < 1e-30) return first_entry(shape, p, d).has_value();
+  const LineInterval inside = common(inside_cylinder(shape.radius, p, d), between(0.0, shape.height, p.z(), d.z()));
+  if (inside.empty()) return false;
+  std::optional<RimDistance> first = rim_distance(shape, p, d, inside.enter);
+  std::optional<RimDistance> last = rim_distance(shape, p, d, inside.leave);
+  if (!first || !last) return true;
+  for (int iteration = 0; iteration < kRimSteps; ++iteration) {
+    if (first->slope >= 0.0 || last->slope <= 0.0) return false;
+    const RimDistance between_them = lowest_of_tangents(*first, *last);
+    if (between_them.value > kTouch * shape.radius) return false;
+    if (!(between_them.t > first->t && between_them.t < last->t)) return false;  // they touch, to rounding
+    const auto middle = rim_distance(shape, p, d, between_them.t);
+    if (!middle) return true;
+    (middle->slope < 0.0 ? first : last) = middle;
+  }
+  return false;
+}
+
+bool is_hit(const ReliefShape& shape, const Eigen::Vector3d& p, const Eigen::Vector3d& d) {
+  return std::visit([&](const auto& base) { return is_hit(base, p, d); }, shape.base);
 }
 
 std::optional<double> silhouette_distance(const SphereShape& shape, const Eigen::Vector3d& p,

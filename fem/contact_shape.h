@@ -66,6 +66,14 @@ std::optional<double> first_entry(const ReliefShape& shape, const Eigen::Vector3
 std::optional<double> first_entry(const ContactShape& shape, const Eigen::Vector3d& point,
                                   const Eigen::Vector3d& direction);
 
+/// Whether the line hits: whether first_entry() has an answer, for less where that takes a search.
+bool is_hit(const RoundedCylinder& shape, const Eigen::Vector3d& point, const Eigen::Vector3d& direction);
+bool is_hit(const ReliefShape& shape, const Eigen::Vector3d& point, const Eigen::Vector3d& direction);
+template <typename Shape>
+bool is_hit(const Shape& shape, const Eigen::Vector3d& point, const Eigen::Vector3d& direction) {
+  return first_entry(shape, point, direction).has_value();
+}
+
 /// How far inside the body's silhouette the line lies: the signed distance, across the direction, from the line to the
 /// silhouette's outline, positive where the line hits; outside a corner, and where its shape says so, it may be less
 /// than the distance. Nothing where there is no closed form for this direction. Continuous in `point`.

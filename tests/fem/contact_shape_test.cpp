@@ -196,6 +196,32 @@ TEST(FirstEntry, OnTheRoundedRimIsAtTheEdgeRadiusFromTheCore) {
   EXPECT_GT(rim, 200);
 }
 
+/// Also where a line all but touches the rim: a place is moved across the line until it changes from hit to miss, and
+/// at the last hits and misses both must agree, too.
+TEST(IsHit, IsWhetherThereIsAnEntry) {
+  RandomStream random(6, 0, Purpose::kTest);
+  int crossings = 0;
+  for (const double edge : {0.0, 0.02, 0.7, 2.0}) {
+    const RoundedCylinder cylinder{2.0, edge, 3.0};
+    for (int k = 0; k < 400; ++k) {
+      const Eigen::Vector3d d = random_direction(random);
+      Eigen::Vector3d hit(random.normal(), random.normal(), 1.5 + 0.5 * random.normal());
+      if (!first_entry(cylinder, hit, d)) continue;
+      EXPECT_TRUE(is_hit(cylinder, hit, d));
+      Eigen::Vector3d miss = hit + 10.0 * d.cross(random_direction(random)).normalized();
+      EXPECT_FALSE(is_hit(cylinder, miss, d));
+      for (int bisection = 0; bisection < 40; ++bisection) {
+        const Eigen::Vector3d middle = 0.5 * (hit + miss);
+        const bool is = first_entry(cylinder, middle, d).has_value();
+        ASSERT_EQ(is_hit(cylinder, middle, d), is) << bisection;
+        (is ? hit : miss) = middle;
+      }
+      ++crossings;
+    }
+  }
+  EXPECT_GT(crossings, 800);
+}
+
 TEST(CheckShape, RefusesImpossibleSizes) {
   EXPECT_THROW(check_shape(SphereShape{0.0}), Error);
   EXPECT_THROW(check_shape(SphereShape{std::numeric_limits<double>::quiet_NaN()}), Error);
