@@ -30,6 +30,7 @@ void add_export_command(CLI::App& app, const GlobalOptions& global, Action& acti
 void add_record_command(CLI::App& app, const GlobalOptions& global, Action& action);
 void add_serve_command(CLI::App& app, const GlobalOptions& global, Action& action);
 void add_study_command(CLI::App& app, const GlobalOptions& global, Action& action);
+void add_schema_command(CLI::App& app, Action& action);
 
 /// @throws Error if a result can't be written at `file`: its folder isn't there, or it's a folder itself
 void require_writable_place(const std::filesystem::path& file);

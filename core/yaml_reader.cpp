@@ -10,6 +10,7 @@
 #include "core/field_error.h"
 #include "core/nearest_name.h"
 #include "core/whole_file.h"
+#include "core/yaml_description.h"
 
 namespace touchstone {
 
@@ -33,6 +34,8 @@ struct YamlReader::Node {
   std::string file;
   std::string path;                        // keys from the root, with dots
   mutable std::vector<std::string> asked;  // keys that some field asked for
+
+  std::shared_ptr<YamlPlace> place;  // instead of all this, while describing
 
   int empty_line = 0;  // line of the key, if nothing stands after it: YAML marks the next token
 
@@ -86,7 +89,41 @@ YamlReader YamlReader::parse(const std::string& text, const std::string& name) {
   return reader;
 }
 
+bool YamlReader::describing() const {
+  return node_->place != nullptr;
+}
+
+YamlReader YamlReader::description() {
+  auto node = std::make_shared<Node>();
+  node->place = std::make_shared<YamlPlace>(std::make_shared<YamlPlace::Known>());
+  return YamlReader(node);
+}
+
+std::shared_ptr<const YamlMap> YamlReader::described_map() const {
+  const std::vector<YamlForm> forms = node_->place->asked();
+  TS_ASSERT(forms.size() == 1 && forms[0].map != nullptr);
+  return forms[0].map;
+}
+
+void YamlReader::describe_struct(std::type_index type, const std::function<void(YamlReader&)>& ask) const {
+  node_->place->map(type, [&ask](std::shared_ptr<YamlPlace> place) {
+    auto node = std::make_shared<Node>();
+    node->place = std::move(place);
+    YamlReader in(node);
+    ask(in);
+  });
+}
+
+void YamlReader::describe_forms(const std::function<void()>& ask) const {
+  node_->place->forms(ask);
+}
+
+void YamlReader::note_default(const std::string& key, std::optional<YamlScalar> value) const {
+  node_->place->note_default(key, std::move(value));
+}
+
 bool YamlReader::has(const std::string& key) const {
+  if (describing()) return node_->place->has(key);
   node_->asked.push_back(key);
   const YAML::Node& map = node_->yaml;
   return map.IsMap() && map[key].IsDefined();
@@ -117,7 +154,14 @@ void YamlReader::require_map() const {
   if (!node_->yaml.IsMap()) node_->refuse("a map of fields is needed here");
 }
 
-std::optional<YamlReader> YamlReader::child(const std::string& key) {
+std::optional<YamlReader> YamlReader::child(const std::string& key, bool needed) {
+  if (describing()) {
+    auto place = node_->place->child(key, needed);
+    if (place == nullptr) return std::nullopt;
+    auto inner = std::make_shared<Node>();
+    inner->place = std::move(place);
+    return YamlReader(inner);
+  }
   node_->asked.push_back(key);
   const YAML::Node& map = node_->yaml;
   const YAML::Node value = map[key];
@@ -134,7 +178,16 @@ std::optional<YamlReader> YamlReader::child(const std::string& key) {
   return YamlReader(node);
 }
 
-std::vector<YamlReader> YamlReader::items() const {
+std::vector<YamlReader> YamlReader::items(std::optional<int> length) const {
+  if (describing()) {
+    std::vector<YamlReader> described;
+    for (auto& place : node_->place->items(length)) {
+      auto node = std::make_shared<Node>();
+      node->place = std::move(place);
+      described.push_back(YamlReader(node));
+    }
+    return described;
+  }
   if (!node_->yaml.IsSequence()) node_->refuse("a list is needed here");
   std::vector<YamlReader> result;
   for (std::size_t i = 0; i < node_->yaml.size(); ++i) {
@@ -148,10 +201,12 @@ std::vector<YamlReader> YamlReader::items() const {
 }
 
 bool YamlReader::is_list() const {
+  if (describing()) return node_->place->shape() == YamlPlace::Shape::list;
   return node_->yaml.IsSequence();
 }
 
 bool YamlReader::is_map() const {
+  if (describing()) return node_->place->shape() == YamlPlace::Shape::map;
   return node_->yaml.IsMap();
 }
 
@@ -161,12 +216,25 @@ std::vector<double> YamlReader::numbers(Allowed allowed) const {
   return all;
 }
 
+std::optional<std::string> YamlReader::text_with(const std::string& begin, const std::string& end) const {
+  if (describing()) {
+    node_->place->text(begin, end);
+    return std::nullopt;
+  }
+  if (!node_->yaml.IsScalar()) return std::nullopt;
+  const std::string& text = node_->yaml.Scalar();
+  if (!text.starts_with(begin) || !text.ends_with(end)) return std::nullopt;
+  return text;
+}
+
 std::string YamlReader::scalar(const char* kind) const {
+  if (describing()) return node_->place->text();
   if (!node_->yaml.IsScalar()) node_->refuse("{} is needed here", kind);
   return node_->yaml.Scalar();
 }
 
 double YamlReader::number(Allowed allowed) const {
+  if (describing()) return node_->place->number(allowed);
   const std::string text = scalar("a number");
   const auto value = whole_number<double>(text);
   if (!value || !std::isfinite(*value)) {
@@ -177,6 +245,7 @@ double YamlReader::number(Allowed allowed) const {
 }
 
 std::int64_t YamlReader::integer(Allowed allowed) const {
+  if (describing()) return node_->place->integer(allowed);
   const std::string text = scalar("a whole number");
   const auto value = whole_number<std::int64_t>(text);
   if (!value) node_->refuse("'{}' isn't a whole number", text);
@@ -196,6 +265,10 @@ int YamlReader::small_integer(Allowed allowed) const {
 }
 
 std::uint64_t YamlReader::unsigned_integer(Allowed allowed) const {
+  if (describing()) {
+    if (allowed.low < 0.0) allowed.low = 0.0;
+    return static_cast<std::uint64_t>(std::max<std::int64_t>(0, node_->place->integer(allowed)));
+  }
   const std::string text = scalar("a whole number");
   const auto value = whole_number<std::uint64_t>(text);
   if (!value) node_->refuse("'{}' isn't a whole number from 0 up", text);
@@ -206,6 +279,10 @@ std::uint64_t YamlReader::unsigned_integer(Allowed allowed) const {
 }
 
 void YamlReader::read(bool& value, Allowed) {
+  if (describing()) {
+    value = node_->place->boolean();
+    return;
+  }
   const std::string text = scalar("true or false");
   if (text != "true" && text != "false") node_->refuse("'{}' is neither true nor false", text);
   value = text == "true";
@@ -228,8 +305,7 @@ void YamlReader::finish() const {
   }
 }
 
-void YamlReader::refuse_missing(const std::string& key) const {
-  // A key that is nearly the missing one is what was meant.
+void YamlReader::refuse_nearly(const std::string& key) const {
   for (const auto& entry : node_->yaml) {
     if (!entry.first.IsScalar()) continue;
     const std::string there = entry.first.Scalar();
@@ -241,11 +317,53 @@ void YamlReader::refuse_missing(const std::string& key) const {
                        fmt::format("unknown key '{}'{}", there, did_you_mean(there, wanted)));
     }
   }
+}
+
+void YamlReader::refuse_missing(const std::string& key) const {
+  refuse_nearly(key);
   node_->refuse_at(node_->line(), node_->path_of(key), fmt::format("'{}' is missing", key));
 }
 
-void YamlReader::refuse_name(const std::string& name, const std::vector<std::string>& known) const {
-  node_->refuse("'{}' is not known{}; allowed is one of: {}", name, did_you_mean(name, known), fmt::join(known, ", "));
+void YamlReader::exactly_one_of(const std::vector<std::string>& keys) {
+  if (describing()) return node_->place->rule({.kind = YamlRule::Kind::exactly_one, .keys = keys});
+  std::vector<std::string> there;
+  for (const std::string& key : keys) {
+    if (has(key)) there.push_back(key);
+  }
+  if (there.size() == 1) return;
+  if (there.empty()) {
+    for (const std::string& key : keys) refuse_nearly(key);
+    node_->refuse("none of {} stands here; exactly one is needed", fmt::join(keys, ", "));
+  }
+  node_->refuse("{} stand here together; exactly one of {} is needed", fmt::join(there, " and "),
+                fmt::join(keys, ", "));
+}
+
+void YamlReader::not_beside(const std::string& key, const std::vector<std::string>& others) {
+  for (const std::string& other : others) {
+    if (describing()) {
+      node_->place->rule({.kind = YamlRule::Kind::not_both, .keys = {key, other}});
+    } else if (has(key) && has(other)) {
+      node_->refuse_at(where(key).line, node_->path_of(key), fmt::format("{}: can't stand beside {}", key, other));
+    }
+  }
+}
+
+std::string YamlReader::required_name(const std::string& key, const std::vector<std::string>& known) {
+  auto node = child(key, true);
+  if (!node) refuse_missing(key);
+  return known[node->name_index(known)];
+}
+
+std::size_t YamlReader::name_index(const std::vector<std::string>& known) const {
+  if (describing()) return node_->place->name(known);
+  const std::string name = scalar("a name");
+  const auto found = std::find(known.begin(), known.end(), name);
+  if (found == known.end()) {
+    node_->refuse("'{}' is not known{}; allowed is one of: {}", name, did_you_mean(name, known),
+                  fmt::join(known, ", "));
+  }
+  return static_cast<std::size_t>(found - known.begin());
 }
 
 }  // namespace touchstone

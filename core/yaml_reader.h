@@ -11,13 +11,17 @@
 // so is a key that stands twice, a value of the wrong kind, outside the allowed range, NaN or infinite.
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <typeindex>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "core/error.h"
@@ -38,6 +42,7 @@ struct Allowed {
   /// low < value <= high
   static Allowed above_up_to(double low, double high) { return {.low = low, .high = high, .low_itself = false}; }
 
+  bool operator==(const Allowed&) const = default;
   bool holds(double value) const;
   std::string text() const;  ///< "above 0", "from 0 to 0.5"
 };
@@ -45,6 +50,11 @@ struct Allowed {
 /// A table of an enum's names, as `enum_names` returns it.
 template <typename E>
 using EnumNames = std::vector<std::pair<std::string, E>>;
+
+/// A plain value in a file. A name is text.
+using YamlScalar = std::variant<bool, std::int64_t, double, std::string>;
+
+struct YamlMap;
 
 class YamlReader {
  public:
@@ -56,7 +66,7 @@ class YamlReader {
   /// Reads the field `key`, which must be there.
   template <typename T>
   void required(const std::string& key, T& value, Allowed allowed = {}) {
-    auto node = child(key);
+    auto node = child(key, true);
     if (!node) refuse_missing(key);
     node->read(value, allowed);
   }
@@ -64,8 +74,18 @@ class YamlReader {
   /// Reads the field `key` if it's there, else leaves `value` as it is.
   template <typename T>
   void optional(const std::string& key, T& value, Allowed allowed = {}) {
-    if (auto node = child(key)) node->read(value, allowed);
+    auto node = child(key, false);
+    if (describing()) note_default(key, plain_value(value));
+    if (node) node->read(value, allowed);
   }
+
+  /// Reads the field `key`, which must be there and be one of `known`.
+  std::string required_name(const std::string& key, const std::vector<std::string>& known);
+
+  /// Refuses the map unless exactly one of these keys stands in it.
+  void exactly_one_of(const std::vector<std::string>& keys);
+  /// Refuses `key` if any of `others` stands in the map, too.
+  void not_beside(const std::string& key, const std::vector<std::string>& others);
 
   bool has(const std::string& key) const;
   /// Where the field `key` stands, or the map itself if it isn't there.
@@ -79,13 +99,26 @@ class YamlReader {
   bool is_list() const;
   bool is_map() const;
   std::string text() const { return scalar("a number, a list or a file's name"); }
+  /// The text, if it begins and ends so.
+  std::optional<std::string> text_with(const std::string& begin, const std::string& end) const;
   double number(Allowed allowed) const;
   std::vector<double> numbers(Allowed allowed) const;  ///< of a list
   std::string context() const;                         ///< the field, for messages: "gel.thickness_mm: " or ""
 
+  /// No file is read: `fields` is only asked what it would read (describe_yaml), and is given made-up values, again and
+  /// again. So it must open no files that fields name, and its checks of values stand after its last field: what they
+  /// throw ends the answer. Checks of which keys stand together are exactly_one_of and not_beside.
+  bool describing() const;
+
   /// Reads this whole map into a struct by its `fields`, and refuses keys that it didn't ask for.
   template <typename T>
   void read_struct(T& value) {
+    if (describing()) {
+      return describe_struct(typeid(T), [](YamlReader& in) {
+        T one{};
+        fields(in, one);
+      });
+    }
     require_map();
     fields(*this, value);
     finish();
@@ -95,12 +128,38 @@ class YamlReader {
   struct Node;
   explicit YamlReader(std::shared_ptr<Node> node) : node_(std::move(node)) {}
 
-  std::optional<YamlReader> child(const std::string& key);
-  std::vector<YamlReader> items() const;  ///< of a sequence
+  template <typename T>
+  friend std::shared_ptr<const YamlMap> describe_yaml();
+
+  std::optional<YamlReader> child(const std::string& key, bool needed);
+  std::vector<YamlReader> items(std::optional<int> length = {}) const;  ///< of a sequence; length: that it must have
   std::string scalar(const char* kind) const;
   void require_map() const;
   void finish() const;
   [[noreturn]] void refuse_missing(const std::string& key) const;
+  void refuse_nearly(const std::string& key) const;
+
+  static YamlReader description();
+  std::shared_ptr<const YamlMap> described_map() const;
+  void describe_struct(std::type_index type, const std::function<void(YamlReader&)>& ask) const;
+  void describe_forms(const std::function<void()>& ask) const;
+  void note_default(const std::string& key, std::optional<YamlScalar> value) const;
+  /// Which of the names stands here.
+  std::size_t name_index(const std::vector<std::string>& known) const;
+
+  template <typename T>
+  static std::optional<YamlScalar> plain_value(const T& value) {
+    if constexpr (std::is_same_v<T, bool> || std::is_same_v<T, double> || std::is_same_v<T, std::string>) {
+      return value;
+    } else if constexpr (std::is_integral_v<T>) {
+      if (std::in_range<std::int64_t>(value)) return static_cast<std::int64_t>(value);
+    } else if constexpr (std::is_enum_v<T>) {
+      for (const auto& [name, known_value] : enum_names(T{})) {
+        if (known_value == value) return name;
+      }
+    }
+    return std::nullopt;
+  }
 
   void read(double& value, Allowed allowed) { value = number(allowed); }
   void read(int& value, Allowed allowed) { value = small_integer(allowed); }
@@ -114,7 +173,7 @@ class YamlReader {
 
   template <typename Scalar, int N>
   void read(Eigen::Matrix<Scalar, N, 1>& value, Allowed allowed) {
-    auto parts = items();
+    auto parts = items(N);
     if (parts.size() != N) fail_at(where(), "{}has {} numbers, {} are needed", context(), parts.size(), N);
     for (int i = 0; i < N; ++i) parts[i].read(value[i], allowed);
   }
@@ -139,28 +198,21 @@ class YamlReader {
   template <typename T>
   requires std::is_enum_v<T>
   void read(T& value, Allowed) {
-    const std::string name = scalar("a name");
+    const EnumNames<T> names = enum_names(T{});
     std::vector<std::string> known;
-    for (const auto& [known_name, known_value] : enum_names(T{})) {
-      if (known_name == name) {
-        value = known_value;
-        return;
-      }
-      known.push_back(known_name);
-    }
-    refuse_name(name, known);
+    for (const auto& [name, known_value] : names) known.push_back(name);
+    value = names[name_index(known)].second;
   }
 
   template <typename T>
   requires(std::is_class_v<T>) void read(T& value, Allowed allowed) {
     if constexpr (requires { read_value(*this, value, allowed); }) {
+      if (describing()) return describe_forms([&] { read_value(*this, value, allowed); });
       read_value(*this, value, allowed);
     } else {
       read_struct(value);
     }
   }
-
-  [[noreturn]] void refuse_name(const std::string& name, const std::vector<std::string>& known) const;
 
   std::shared_ptr<Node> node_;
 };
@@ -179,6 +231,16 @@ T parse_yaml(const std::string& text, const std::string& name) {
   T value{};
   YamlReader::parse(text, name).read_struct(value);
   return value;
+}
+
+/// What may stand in a file that is read into a T (core/yaml_form.h), found by calling `fields` many times without a
+/// file.
+template <typename T>
+std::shared_ptr<const YamlMap> describe_yaml() {
+  YamlReader reader = YamlReader::description();
+  T value{};
+  reader.read_struct(value);
+  return reader.described_map();
 }
 
 }  // namespace touchstone

@@ -183,13 +183,23 @@ void fields(YamlReader& in, VarySpec& vary) {
 
 void fields(YamlReader& in, ApparentChangeSpec& spec) {
   std::string device;
+  std::vector<std::string> objects;
   in.required("device", device);
+  in.required("vary", spec.vary);
+  in.optional("marker_mm", spec.marker_mm, Allowed::above(0.0));
+  in.optional("markers_in_view", spec.markers_in_view, Allowed::at_least(1.0));
+  in.optional("sensor_mm", spec.sensor_mm, Allowed::above(0.0));
+  in.required("lenses_mm", spec.lenses_mm, Allowed::above(0.0));
+  in.required("objects", objects);
+  in.required("force_N", spec.force_N, Allowed::above(0.0));
+  in.optional("friction", spec.friction, Allowed::at_least(0.0));
+  in.optional("by", spec.by);
+  if (in.describing()) return;  // the files that it names aren't there
   spec.device = sim::read_device(in.folder() / device);
   if (spec.device.gel.shape != sim::GelShape::slab || !spec.device.gel.layers.empty()) {
     fail_at(in.where("device"), "device: {} isn't a slab of one material, which the formula knows alone",
             spec.device.name);
   }
-  in.required("vary", spec.vary);
   for (const double value : spec.vary.values) {
     sim::DeviceSpec device_then = spec.device;
     field_of(device_then, spec.vary.field) = value;
@@ -199,18 +209,12 @@ void fields(YamlReader& in, ApparentChangeSpec& spec) {
       fail_at(in.where("vary"), "vary: with {} = {}: {}", name_in(spec.vary.field), value, error.what());
     }
   }
-  in.optional("marker_mm", spec.marker_mm, Allowed::above(0.0));
-  in.optional("markers_in_view", spec.markers_in_view, Allowed::at_least(1.0));
-  in.optional("sensor_mm", spec.sensor_mm, Allowed::above(0.0));
-  in.required("lenses_mm", spec.lenses_mm, Allowed::above(0.0));
   require_rising(spec.lenses_mm, in.where("lenses_mm"), "lenses_mm");
   try {
     for (const double lens : spec.lenses_mm) distance_of(spec, lens);
   } catch (const Error& error) {
     fail_at(in.where("lenses_mm"), "lenses_mm: {}", error.what());
   }
-  std::vector<std::string> objects;
-  in.required("objects", objects);
   if (objects.empty()) fail_at(in.where("objects"), "objects: is empty; at least one object file is needed");
   for (const std::string& file : objects) {
     const sim::ObjectSpec object = sim::read_object(in.folder() / file);
@@ -228,10 +232,7 @@ void fields(YamlReader& in, ApparentChangeSpec& spec) {
     }
     spec.objects.push_back(object);
   }
-  in.required("force_N", spec.force_N, Allowed::above(0.0));
   require_rising(spec.force_N, in.where("force_N"), "force_N");
-  in.optional("friction", spec.friction, Allowed::at_least(0.0));
-  in.optional("by", spec.by);
   if (spec.by.empty()) fail_at(in.where("by"), "by: is empty; allowed are formula, linear and finite");
   for (std::size_t k = 1; k < spec.by.size(); ++k) {
     if (std::find(spec.by.begin(), spec.by.begin() + k, spec.by[k]) != spec.by.begin() + k) {

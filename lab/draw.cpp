@@ -17,7 +17,7 @@ std::filesystem::path existing_file(YamlReader& in, const std::string& key) {
   std::string name;
   in.required(key, name);
   std::filesystem::path file = in.folder() / name;
-  if (!std::filesystem::is_regular_file(file)) {
+  if (!in.describing() && !std::filesystem::is_regular_file(file)) {
     fail_at(in.where(key), "{}{}: there is no file {}", in.context(), key, file.string());
   }
   return file;
@@ -32,16 +32,13 @@ EnumNames<DrawnOutput> enum_names(DrawnOutput) {
 void fields(YamlReader& in, NumberVariation& vary) {
   vary.where = in.where();
   in.required("path", vary.path);
-  int ways = 0;
+  in.exactly_one_of({"set", "times", "plus"});
   for (const auto& [name, how] :
        {std::pair{"set", VaryHow::set}, std::pair{"times", VaryHow::times}, std::pair{"plus", VaryHow::plus}}) {
     if (!in.has(name)) continue;
-    ++ways;
     vary.how = how;
     in.required(name, vary.spread);
   }
-  if (ways > 1) fail_at(in.where(), "{}{} of set, times and plus; one is needed", in.context(), ways);
-  if (ways == 0) fail_at(in.where(), "{}one of set, times and plus is needed", in.context());
 }
 
 void fields(YamlReader& in, UnitsSpec& units) {
@@ -70,19 +67,17 @@ void fields(YamlReader& in, DrawSpec& draw) {
   draw.device = existing_file(in, "device");
   in.optional("units", draw.units);
   in.required("objects", draw.objects);
-  if (draw.objects.empty()) fail_at(in.where("objects"), "draw.objects: has no object; at least one is needed");
   in.required("place_mm", draw.place_mm);
   in.optional("turn_deg", draw.turn_deg);
   in.optional("tilt_deg", draw.tilt_deg, Allowed::within(0.0, kLargestTilt_deg));
   in.optional("tilt_axis_deg", draw.tilt_axis_deg);
   in.optional("force_N", draw.force_N, Allowed::above(0.0));
   in.optional("depth_mm", draw.depth_mm, Allowed::above(0.0));
-  if (draw.force_N.has_value() == draw.depth_mm.has_value()) {
-    fail_at(in.where(), "draw: {} of force_N and depth_mm; exactly one is needed", draw.force_N ? "both" : "neither");
-  }
+  in.exactly_one_of({"force_N", "depth_mm"});
   in.optional("drag_mm", draw.drag_mm, Allowed::at_least(0.0));
   in.optional("drag_toward_deg", draw.drag_toward_deg);
   in.optional("deepest_mm", draw.deepest_mm, Allowed::above(0.0));
+  if (draw.objects.empty()) fail_at(in.where("objects"), "draw.objects: has no object; at least one is needed");
 }
 
 void fields(YamlReader& in, DrawJob& job) {

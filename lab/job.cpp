@@ -44,11 +44,11 @@ void fields(YamlReader& in, JobScene& scene) {
   std::string file;
   in.required("scene", file);
   scene.scene = in.folder() / file;
+  in.required("split", scene.split);
+  in.optional("start_mm", scene.start_mm);
   if (!std::filesystem::is_regular_file(scene.scene)) {
     fail_at(in.where("scene"), "scene: there is no file {}", scene.scene.string());
   }
-  in.required("split", scene.split);
-  in.optional("start_mm", scene.start_mm);
 }
 
 void fields(YamlReader& in, Job& job) {

@@ -95,15 +95,15 @@ void fields(YamlReader& in, PalpationSpec& spec) {
   in.required("skin", skin);
   spec.skin = skin.material;
   in.required("materials", spec.materials);
+  in.required("axis", spec.axis);
+  in.required("motion", spec.motion);
+  in.required("reference", spec.reference);
   for (const auto& [name, level] : enum_names(Softness{})) {
     if (std::none_of(spec.materials.begin(), spec.materials.end(),
                      [&](const PalpationMaterial& material) { return material.level == level; })) {
       fail_at(in.where("materials"), "materials: none is {}; each level needs one", name);
     }
   }
-  in.required("axis", spec.axis);
-  in.required("motion", spec.motion);
-  in.required("reference", spec.reference);
 }
 
 PalpationSpec read_palpation(const std::filesystem::path& file) {

@@ -64,20 +64,17 @@ bool is_whole(double value) {
 }  // namespace
 
 void fields(YamlReader& in, Spread& spread) {
-  int kinds = 0;
+  in.exactly_one_of({"uniform", "log_uniform", "whole", "normal", "one_of"});
   Bounds bounds;
   if (in.has("uniform")) {
-    ++kinds;
     in.required("uniform", bounds);
     spread.kind = Spread::Kind::uniform;
   }
   if (in.has("log_uniform")) {
-    ++kinds;
     in.required("log_uniform", bounds, Allowed::above(0.0));
     spread.kind = Spread::Kind::log_uniform;
   }
   if (in.has("whole")) {
-    ++kinds;
     in.required("whole", bounds);
     if (!is_whole(bounds.low) || !is_whole(bounds.high)) {
       fail_at(in.where("whole"), "{}whole: from {} to {}; both must be whole numbers", in.context(), bounds.low,
@@ -86,7 +83,6 @@ void fields(YamlReader& in, Spread& spread) {
     spread.kind = Spread::Kind::whole;
   }
   if (in.has("normal")) {
-    ++kinds;
     Normal normal;
     in.required("normal", normal);
     bounds = normal.within;
@@ -95,7 +91,6 @@ void fields(YamlReader& in, Spread& spread) {
     spread.kind = Spread::Kind::normal;
   }
   if (in.has("one_of")) {
-    ++kinds;
     Choices choices;
     in.required("one_of", choices);
     const auto [low, high] = std::minmax_element(choices.values.begin(), choices.values.end());
@@ -105,10 +100,6 @@ void fields(YamlReader& in, Spread& spread) {
   }
   spread.low = bounds.low;
   spread.high = bounds.high;
-  if (kinds > 1) {
-    fail_at(in.where(), "{}{} kinds of spread; one of uniform, log_uniform, normal, one_of, whole is needed",
-            in.context(), kinds);
-  }
 }
 
 void read_value(YamlReader& in, Spread& spread, Allowed allowed) {
@@ -117,13 +108,7 @@ void read_value(YamlReader& in, Spread& spread, Allowed allowed) {
     spread = Spread::of(in.number(allowed));
     return;
   }
-  bool some = false;
-  for (const char* kind : {"uniform", "log_uniform", "normal", "one_of", "whole"}) some = some || in.has(kind);
   in.read_struct(spread);
-  if (!some) {
-    fail_at(in.where(), "{}a number or one of uniform, log_uniform, normal, one_of, whole is needed here",
-            in.context());
-  }
   if (!allowed.holds(spread.low) || !allowed.holds(spread.high)) {
     fail_at(in.where(), "{}draws go from {} to {}; allowed is {}", in.context(), spread.low, spread.high,
             allowed.text());

@@ -22,14 +22,9 @@ Colour efficiency_of(const render::Imager& imager, Eigen::Index row) {
 
 bool read_preset(YamlReader& in, CameraSpec& camera) {
   if (!in.has("preset")) return false;
-  std::string name;
-  in.required("preset", name);
-  render::ImagerPreset preset;
-  try {
-    preset = render::imager_preset(name, 0.0);
-  } catch (const Error& error) {
-    fail_at(in.where("preset"), "camera.preset: {}", error.what());
-  }
+  const auto known = render::imager_preset_names();
+  const std::string name = in.required_name("preset", {known.begin(), known.end()});
+  const render::ImagerPreset preset = render::imager_preset(name, 0.0);
   const render::Imager& imager = preset.imager;
   camera.width = preset.width;
   camera.height = preset.height;

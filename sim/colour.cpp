@@ -42,19 +42,19 @@ void read_value(YamlReader& in, Colour& colour, Allowed allowed) {
     }
     return;
   }
-  const std::string text = in.text();
-  if (text.starts_with('#')) {
-    colour.curve = srgb_reflectance(srgb_of(in, text, allowed));
+  if (const auto srgb = in.text_with("#", "")) {
+    colour.curve = srgb_reflectance(srgb_of(in, *srgb, allowed));
     colour.smooth = true;
     return;
   }
-  if (!text.ends_with(".csv")) {
+  const auto file = in.text_with("", ".csv");
+  if (!file) {
     colour.numbers = {in.number(allowed)};
     return;
   }
   const auto kind = allowed.high <= 1.0 ? render::CurveKind::share : render::CurveKind::per_mm;
   try {
-    colour.curve = render::read_spectral_curve(in.folder() / text, kind);
+    colour.curve = render::read_spectral_curve(in.folder() / *file, kind);
   } catch (const Error& error) {
     fail_at(in.where(), "{}{}", in.context(), error.what());
   }

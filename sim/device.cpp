@@ -91,26 +91,20 @@ void check_lamps_outside(const DeviceSpec& device, const SourceLocation& where) 
 /// The fields of a lens.
 void lens_fields(YamlReader& in, CameraSpec& camera) {
   const Allowed length = Allowed::above(0.0);
-  if (in.has("focal_length_mm") == in.has("camera_matrix")) {
-    fail_at(in.where(), "camera: a lens has either focal_length_mm or camera_matrix, {}",
-            in.has("focal_length_mm") ? "not both" : "and this has neither");
-  }
+  in.exactly_one_of({"focal_length_mm", "camera_matrix"});
   in.optional("focal_length_mm", camera.focal_length_mm, length);
   in.optional("camera_matrix", camera.camera_matrix);
   in.required("f_number", camera.f_number, Allowed::within(0.5, 1000.0));
   in.optional("focus_distance_mm", camera.focus_distance_mm, length);
-  if (in.has("sensor_distance_mm") && (camera.camera_matrix || camera.focus_distance_mm)) {
-    fail_at(in.where("sensor_distance_mm"), "sensor_distance_mm: can't stand beside {}, which tells it",
-            camera.camera_matrix ? "camera_matrix" : "focus_distance_mm");
-  }
+  in.not_beside("sensor_distance_mm", {"camera_matrix", "focus_distance_mm"});  // either of them tells it
   in.optional("sensor_distance_mm", camera.sensor_distance_mm, length);
   in.optional("distortion", camera.distortion);
+  in.required("lens_position_mm", camera.hole_position_mm);
   const std::size_t numbers = camera.distortion.size();
   if (in.has("distortion") && numbers != 4 && numbers != 5 && numbers != 8) {
     fail_at(in.where("distortion"), "distortion: {} numbers; allowed are 4, 5 or 8: k1 k2 p1 p2 [k3 [k4 k5 k6]]",
             numbers);
   }
-  in.required("lens_position_mm", camera.hole_position_mm);
 }
 
 }  // namespace
@@ -169,6 +163,7 @@ void fields(YamlReader& in, GelSpec& gel) {
       in.required("file", file);
       gel.file = in.folder() / file;
       in.optional("mm_per_unit", gel.mm_per_unit, Allowed::above(0.0));
+      if (in.describing()) break;
       try {
         gel.surface = std::make_shared<const GelSurface>(read_gltf_gel(gel.file, gel.mm_per_unit));
       } catch (const Error& error) {
@@ -182,17 +177,17 @@ void fields(YamlReader& in, GelSpec& gel) {
   in.optional("poisson_ratio", gel.poisson_ratio, Allowed::within(0.0, 0.5));
   in.optional("density_kg_m3", gel.density_kg_m3, Allowed::above_up_to(0.0, 1e5));
   in.optional("relaxation", gel.relaxation);
+  in.optional("refractive_index", gel.refractive_index, Allowed::within(1.0, 4.0));
+  in.optional("absorption_per_mm", gel.absorption_per_mm, Allowed::at_least(0.0));
+  in.optional("scattering_per_mm", gel.scattering_per_mm, Allowed::within(0.0, 1000.0));
+  in.optional("scattering_anisotropy", gel.scattering_anisotropy, Allowed::within(-0.999, 0.999));
+  in.optional("frame_albedo", gel.frame_albedo, part_of_one());
   double relaxing = 0.0;
   for (const RelaxationTermSpec& term : gel.relaxation) relaxing += term.share;
   if (relaxing >= 1.0) {
     fail_at(in.where("relaxation"), "relaxation: the shares sum to {}; something must last: allowed is below 1",
             relaxing);
   }
-  in.optional("refractive_index", gel.refractive_index, Allowed::within(1.0, 4.0));
-  in.optional("absorption_per_mm", gel.absorption_per_mm, Allowed::at_least(0.0));
-  in.optional("scattering_per_mm", gel.scattering_per_mm, Allowed::within(0.0, 1000.0));
-  in.optional("scattering_anisotropy", gel.scattering_anisotropy, Allowed::within(-0.999, 0.999));
-  in.optional("frame_albedo", gel.frame_albedo, part_of_one());
 }
 
 void fields(YamlReader& in, MeshSpec& mesh) {
@@ -203,9 +198,8 @@ void fields(YamlReader& in, MeshSpec& mesh) {
     in.optional("coarse_mm", mesh.coarse_mm, Allowed::at_least(mesh.fine_mm));
     return;
   }
-  for (const char* edge : {"fine_mm", "coarse_mm"}) {
-    if (in.has(edge)) fail_at(in.where(edge), "{}: can't stand beside force_error, from which it's found", edge);
-  }
+  in.not_beside("fine_mm", {"force_error"});  // from which they are found
+  in.not_beside("coarse_mm", {"force_error"});
   in.optional("force_error", mesh.force_error, Allowed::within(1e-4, 0.5));
   in.required("contact_radius_mm", mesh.contact_radius_mm,
               Allowed::above_up_to(0.0, mesh.fine_half_extent_mm.minCoeff()));
@@ -322,11 +316,11 @@ void fields(YamlReader& in, CameraSpec& camera) {
   in.optional("dsnu_e", camera.dsnu_e, Allowed::at_least(0.0));
   in.optional("black_level_DN", camera.black_level_DN, Allowed::at_least(0.0));
   in.optional("motion_chip", camera.motion_chip);
+  in.optional("events", camera.events);
   if (camera.motion_chip && (camera.width != kChipSide || camera.height != kChipSide)) {
     fail_at(in.where("motion_chip"), "camera.motion_chip: a picture of {}x{} pixels; the chip has {}x{}", camera.width,
             camera.height, kChipSide, kChipSide);
   }
-  in.optional("events", camera.events);
   if (camera.events && camera.bayer == render::BayerPattern::binned) {
     fail_at(in.where("events"),
             "camera.events: event pixels are single ones; `bayer: binned` tells of means over several");
@@ -362,17 +356,16 @@ void fields(YamlReader& in, DeviceSpec& device) {
   in.optional("films", device.films);
   in.optional("bands", device.bands);
   in.optional("band_wavelengths_nm", device.band_wavelengths_nm, Allowed::within(300.0, 1200.0));
-  if (device.bands && in.has("band_wavelengths_nm")) {
-    fail_at(in.where("band_wavelengths_nm"), "band_wavelengths_nm: can't stand beside bands, which tell them");
-  }
+  in.not_beside("band_wavelengths_nm", {"bands"});  // which tell them
+  in.optional("room_radiance", device.room_radiance, Allowed::at_least(0.0));
+  in.optional("room_radiance_behind", device.room_radiance_behind, Allowed::at_least(0.0));
+  in.optional("camera", device.camera);
+  if (in.describing()) return;  // there is nothing to check
   if (std::ranges::find(render::kBandCounts, static_cast<int>(device.band_wavelengths_nm.size())) ==
       render::kBandCounts.end()) {
     fail_at(in.where("band_wavelengths_nm"), "band_wavelengths_nm: {} wavelengths; allowed are 1, 3, 8 or 16 of them",
             device.band_wavelengths_nm.size());
   }
-  in.optional("room_radiance", device.room_radiance, Allowed::at_least(0.0));
-  in.optional("room_radiance_behind", device.room_radiance_behind, Allowed::at_least(0.0));
-  in.optional("camera", device.camera);
   check_gel(device, in.where("gel"));
   if (device.beads) check_beads_fit(device, in.where("beads"));
   if (device.camera) check_camera_outside(device, in.where("camera"));

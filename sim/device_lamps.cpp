@@ -35,6 +35,7 @@ void read_emission(YamlReader& in, LampSpec& lamp) {
   if (!in.has("spectrum")) return;
   std::string file;
   in.required("spectrum", file);
+  if (in.describing()) return;
   try {
     lamp.spectrum = render::read_spectral_curve(in.folder() / file, render::CurveKind::relative);
   } catch (const Error& error) {
@@ -48,6 +49,7 @@ void read_emission(YamlReader& in, LampSpec& lamp) {
 void read_pattern(YamlReader& in, LampSpec& lamp) {
   std::string file;
   in.required("pattern", file);
+  if (in.describing()) return;
   try {
     lamp.pattern = read_image(in.folder() / file);
   } catch (const Error& error) {

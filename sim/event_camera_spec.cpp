@@ -10,11 +10,7 @@ constexpr const char* kDavis240c = "davis240c";
 
 bool read_preset(YamlReader& in, render::EventPixelSettings& pixels) {
   if (!in.has("preset")) return false;
-  std::string name;
-  in.required("preset", name);
-  if (name != kDavis240c) {
-    fail_at(in.where("preset"), "events.preset: there is no preset \"{}\"; known is {}", name, kDavis240c);
-  }
+  in.required_name("preset", {kDavis240c});
   double white = 0.0;
   in.required("white_1klux_e_per_s", white, Allowed::within(1e-6, 1e18));
   pixels = render::davis240c(white);

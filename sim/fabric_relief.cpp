@@ -243,12 +243,6 @@ void fields(YamlReader& in, FabricRelief& relief) {
   if (relief.weave == Weave::satin) {
     in.optional("harness", relief.harness, Allowed::within(5, 16));
     in.optional("step", relief.step, Allowed::within(2, 14));
-    if (relief.step > relief.harness - 2 || std::gcd(relief.step, relief.harness) != 1) {
-      fail_at(in.where("step"),
-              "a satin of {} can't be shifted by {}: the step must be from 2 to {} and have no divisor "
-              "in common with it",
-              relief.harness, relief.step, relief.harness - 2);
-    }
   }
   in.optional("twist_mm", relief.twist_mm, Allowed::within(0.0, 10.0));
   in.optional("twist_um", relief.twist_um, Allowed::within(0.0, 500.0));
@@ -257,6 +251,12 @@ void fields(YamlReader& in, FabricRelief& relief) {
   in.optional("roughness_um", relief.roughness_um, Allowed::within(0.0, 200.0));
   in.optional("size_mm", relief.size_mm, Allowed::within(4.0, 60.0));
   in.optional("seed", relief.seed);
+  if (relief.weave == Weave::satin && (relief.step > relief.harness - 2 || std::gcd(relief.step, relief.harness) != 1)) {
+    fail_at(in.where("step"),
+            "a satin of {} can't be shifted by {}: the step must be from 2 to {} and have no divisor "
+            "in common with it",
+            relief.harness, relief.step, relief.harness - 2);
+  }
 }
 
 bool warp_is_over(const FabricRelief& relief, int end, int pick) {

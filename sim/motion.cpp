@@ -44,9 +44,7 @@ EnumNames<Axis> enum_names(Axis) {
 void fields(YamlReader& in, AxisKey& axis) {
   in.optional("position_mm", axis.position_mm);
   in.optional("force_N", axis.force_N);
-  if (axis.position_mm.has_value() == axis.force_N.has_value()) {
-    fail_at(in.where(), "an axis has either position_mm or force_N");
-  }
+  in.exactly_one_of({"position_mm", "force_N"});
 }
 
 void fields(YamlReader& in, VibrationSpec& vibration) {
@@ -69,9 +67,7 @@ void fields(YamlReader& in, MotionKey& key) {
   in.optional("turn_x", key.turn_x);
   in.optional("turn_y", key.turn_y);
   in.optional("turn_z", key.turn_z);
-  if (key.angles_deg && (key.turn_x || key.turn_y || key.turn_z)) {
-    fail_at(in.where("angles_deg"), "a key leads the object's rotation by angles_deg or by torques, not by both");
-  }
+  in.not_beside("angles_deg", {"turn_x", "turn_y", "turn_z"});  // one of them leads the rotation
   in.optional("vibration", key.vibration);
   if (key.vibration) {
     const std::optional<AxisKey>* const axes[] = {&key.x, &key.y, &key.z};

@@ -85,11 +85,6 @@ double grains_per_mm2(const SandpaperRelief& relief) {
 
 void fields(YamlReader& in, SandpaperRelief& relief) {
   in.required("grit", relief.grit, Allowed::any());
-  try {
-    grain_size_mm(relief.grit);
-  } catch (const Error& error) {
-    fail_at(in.where("grit"), "{}", error.what());
-  }
   in.optional("coat", relief.coat, Allowed::within(0.05, 1.0));
   in.optional("size_spread", relief.size_spread, Allowed::within(0.0, 0.4));
   in.optional("protrusion", relief.protrusion, Allowed::within(0.1, 0.9));
@@ -97,6 +92,11 @@ void fields(YamlReader& in, SandpaperRelief& relief) {
   in.optional("backing_um", relief.backing_um, Allowed::within(0.0, 100.0));
   in.optional("size_mm", relief.size_mm, Allowed::within(4.0, 60.0));
   in.optional("seed", relief.seed);
+  try {
+    grain_size_mm(relief.grit);
+  } catch (const Error& error) {
+    fail_at(in.where("grit"), "{}", error.what());
+  }
 }
 
 fem::ReliefMap relief_map(const SandpaperRelief& relief) {

@@ -1,0 +1,22 @@
+#pragma once
+// JSON Schemas (draft 07, which yaml-language-server reads) of the YAML files that people write, made from what the
+// functions that read these files ask for (core/yaml_form.h). What the reader takes, the schema takes, too, but for
+// numbers in quotes; the reader refuses some more: where one value is checked against another, or against a file.
+
+#include <string>
+#include <vector>
+
+#include "core/yaml_form.h"
+
+namespace touchstone::lab {
+
+/// The kinds of files: device, object, motion, scene, job, study, palpation.
+std::vector<std::string> file_kinds();
+
+/// The schema of one kind, as text. The same bytes each time. @throws Error for a kind that isn't known
+std::string file_schema(const std::string& kind);
+
+/// The schema of any struct that YAML is read into.
+std::string json_schema(const YamlMap& map);
+
+}  // namespace touchstone::lab
