@@ -57,19 +57,32 @@ std::vector<Step> steps_of(const std::string& path, const SourceLocation& where)
   return steps;
 }
 
-using Marks = std::map<int, int>;  // how many nodes stand at a place: two where an alias repeats one
+constexpr int kDeepest = 64;           // an alias may hold itself
+constexpr int kMostNodes = 1'000'000;  // a hundred aliases of aliases stand for more nodes than there are atoms
 
-void count_marks(const YAML::Node& node, Marks& marks, int depth = 0) {
-  constexpr int kDeepest = 64;  // an alias may hold itself
-  if (depth > kDeepest) return;
-  if (node.IsScalar()) {
-    ++marks[node.Mark().pos];
-  } else if (node.IsSequence()) {
-    for (const YAML::Node& item : node) count_marks(item, marks, depth + 1);
-  } else if (node.IsMap()) {
-    for (const auto& entry : node) count_marks(entry.second, marks, depth + 1);
+/// How many nodes stand at a place: two where an alias repeats one.
+struct Marks {
+  std::map<int, int> at;
+  int nodes = 0;
+
+  /// False if there are too many.
+  bool count(const YAML::Node& node, int depth = 0) {
+    if (depth > kDeepest) return true;
+    if (++nodes > kMostNodes) return false;
+    if (node.IsScalar()) {
+      ++at[node.Mark().pos];
+    } else if (node.IsSequence()) {
+      for (const YAML::Node& item : node) {
+        if (!count(item, depth + 1)) return false;
+      }
+    } else if (node.IsMap()) {
+      for (const auto& entry : node) {
+        if (!count(entry.second, depth + 1)) return false;
+      }
+    }
+    return true;
   }
-}
+};
 
 class Search {
  public:
@@ -81,7 +94,8 @@ class Search {
     } catch (const YAML::Exception& error) {
       throw Error({name, error.mark.is_null() ? 0 : error.mark.line + 1}, "isn't YAML: " + error.msg);
     }
-    count_marks(root, marks_);
+    if (!marks_.count(root))
+      throw Error({name, 0}, fmt::format("has more than {} values, aliases counted", kMostNodes));
     follow(root, 0, "");
   }
 
@@ -120,9 +134,13 @@ class Search {
     }
   }
 
-  void collect(const YAML::Node& node, const std::string& here, std::vector<YamlNumber>& group) const {
+  void collect(const YAML::Node& node, const std::string& here, std::vector<YamlNumber>& group, int depth = 0) const {
     if (node.IsSequence()) {
-      for (std::size_t i = 0; i < node.size(); ++i) collect(node[i], fmt::format("{}[{}]", here, i), group);
+      if (depth > kDeepest) {
+        fail_at(where_, "path '{}': '{}' of {} is a list that holds itself, or more than {} in each other", path_,
+                path_, name_, kDeepest);
+      }
+      for (std::size_t i = 0; i < node.size(); ++i) collect(node[i], fmt::format("{}[{}]", here, i), group, depth + 1);
       return;
     }
     const std::string word = node.IsScalar() ? node.Scalar() : "";
@@ -134,10 +152,11 @@ class Search {
     }
     const YAML::Mark mark = node.Mark();
     const auto begin = static_cast<std::size_t>(mark.is_null() ? 0 : mark.pos);
-    if (mark.is_null() || text_.compare(begin, word.size(), word) != 0) {
+    // In UTF-16 places aren't those of the bytes.
+    if (mark.is_null() || begin > text_.size() || text_.compare(begin, word.size(), word) != 0) {
       fail_at(where_, "path '{}': '{}' of {} must be written as a plain number", path_, here, name_);
     }
-    if (marks_.at(mark.pos) > 1) {
+    if (marks_.at.at(mark.pos) > 1) {
       fail_at(where_, "path '{}': '{}' of {} is shared by an alias; write it out where it's used", path_, here, name_);
     }
     group.push_back({here, value, begin, word.size()});

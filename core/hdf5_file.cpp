@@ -18,8 +18,9 @@ namespace {
 
 constexpr std::int64_t kChunkBytes = 256 * 1024;  // well under HDF5's cache of 1 MB a dataset: each is packed once
 constexpr std::size_t kMemoryStep = 4 << 20;
-constexpr unsigned kDeflateLevel = 4;  // of 9; higher ones cost time and win a percent
-constexpr int kPackedLevel = 1;        // of pictures with noise, which hardly pack
+constexpr std::size_t kMostTextBytes = 1 << 24;  // of an attribute
+constexpr unsigned kDeflateLevel = 4;            // of 9; higher ones cost time and win a percent
+constexpr int kPackedLevel = 1;                  // of pictures with noise, which hardly pack
 
 static_assert(std::is_same_v<hid_t, Hdf5Id> || sizeof(hid_t) == sizeof(Hdf5Id));
 
@@ -400,7 +401,9 @@ std::vector<std::int64_t> Hdf5Reader::shape_of(const std::string& path, std::siz
   std::vector<hsize_t> extent(static_cast<std::size_t>(rank));
   if (rank > 0) H5Sget_simple_extent_dims(space, extent.data(), nullptr);
   size = 1;
-  for (const hsize_t part : extent) size *= part;
+  for (const hsize_t part : extent) {
+    if (__builtin_mul_overflow(size, part, &size)) fail("{}: '{}' has more values than 64 bits count", name_, path);
+  }
   return {extent.begin(), extent.end()};
 }
 
@@ -481,6 +484,12 @@ std::int64_t Hdf5Reader::count_of_whole_numbers(const std::string& path) const {
   std::size_t count = 0;
   const std::vector<std::int64_t> shape = shape_of(path, count);
   if (shape.size() != 1) fail("{}: '{}' has {} axes; allowed is one", name_, path, shape.size());
+  // A list of any length fits in a small file if its numbers aren't there: HDF5 makes them up as they're read.
+  const Handle dataset(H5Dopen2(file_, path.c_str(), H5P_DEFAULT), H5Dclose);
+  H5D_space_status_t status = H5D_SPACE_STATUS_NOT_ALLOCATED;
+  if (count > 0 && (H5Dget_space_status(dataset, &status) < 0 || status != H5D_SPACE_STATUS_ALLOCATED)) {
+    fail("{}: '{}' says that it holds {} numbers, but not all of them are in the file", name_, path, shape[0]);
+  }
   return shape[0];
 }
 
@@ -530,6 +539,12 @@ std::vector<std::string> Hdf5Reader::read_texts(const std::string& path) const {
   return texts;
 }
 
+void Hdf5Reader::expect_one_value(Hdf5Id attribute, const std::string& path, const std::string& name) const {
+  const Handle space(H5Aget_space(attribute), H5Sclose);
+  const hssize_t values = H5Sget_simple_extent_npoints(space);
+  if (values != 1) fail("{}: the attribute '{}' of '{}' has {} values; allowed is one", name_, name, path, values);
+}
+
 std::string Hdf5Reader::text_attribute(const std::string& path, const std::string& name) const {
   const auto held = hold();
   const Handle attribute(H5Aopen_by_name(file_, path.c_str(), name.c_str(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
@@ -538,7 +553,13 @@ std::string Hdf5Reader::text_attribute(const std::string& path, const std::strin
   if (H5Tget_class(type) != H5T_STRING || H5Tis_variable_str(type) > 0) {
     fail("{}: the attribute '{}' of '{}' isn't a text of fixed length", name_, name, path);
   }
-  std::string value(H5Tget_size(type), '\0');
+  expect_one_value(attribute, path, name);
+  const std::size_t length = H5Tget_size(type);
+  if (length > kMostTextBytes) {
+    fail("{}: the attribute '{}' of '{}' is a text of {} bytes; allowed are {}", name_, name, path, length,
+         kMostTextBytes);
+  }
+  std::string value(length, '\0');
   if (H5Aread(attribute, type, value.data()) < 0) fail("{}: attribute '{}' can't be read", name_, name);
   return value.substr(0, value.find('\0'));
 }
@@ -546,6 +567,7 @@ std::string Hdf5Reader::text_attribute(const std::string& path, const std::strin
 std::int64_t Hdf5Reader::integer_attribute(const std::string& path, const std::string& name) const {
   const auto held = hold();
   const Handle attribute(H5Aopen_by_name(file_, path.c_str(), name.c_str(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
+  if (attribute >= 0) expect_one_value(attribute, path, name);
   std::int64_t value = 0;
   if (attribute < 0 || H5Aread(attribute, H5T_NATIVE_INT64, &value) < 0) {
     fail("{}: '{}' has no whole number '{}'", name_, path, name);

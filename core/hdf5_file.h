@@ -165,7 +165,7 @@ class Hdf5Reader {
   /// The one whole number of a dataset.
   std::int64_t read_number(const std::string& path) const;
   /// How many numbers a list of whole numbers of any size holds. @throws Error also if it was packed by a filter that
-  /// this machine doesn't have
+  /// this machine doesn't have, or if not all of the numbers are in the file
   std::int64_t count_of_whole_numbers(const std::string& path) const;
   /// Goes through all that HDF5 itself keeps of a list of whole numbers (not through the numbers): where damage would
   /// end the process, it does so here. For use within isolated_call.
@@ -192,6 +192,7 @@ class Hdf5Reader {
                      void* values) const;
   void read_list_part(const std::string& path, Hdf5Id type, std::int64_t first, std::int64_t count, void* values) const;
   void expect_whole_numbers(const std::string& path) const;
+  void expect_one_value(Hdf5Id attribute, const std::string& path, const std::string& name) const;
 
   std::string name_;
   Hdf5Id file_ = -1;

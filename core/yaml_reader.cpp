@@ -1,11 +1,13 @@
 #include "core/yaml_reader.h"
 
+#include <yaml-cpp/eventhandler.h>
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <sstream>
 
 #include "core/field_error.h"
 #include "core/nearest_name.h"
@@ -65,6 +67,54 @@ std::optional<T> whole_number(const std::string& text) {
   return value;
 }
 
+/// Stops at what a second document holds.
+class OneDocument : public YAML::EventHandler {
+ public:
+  struct Second {
+    YAML::Mark mark;
+  };
+
+  void OnDocumentStart(const YAML::Mark&) override { ++documents_; }
+  void OnDocumentEnd() override {}
+  void OnNull(const YAML::Mark& mark, YAML::anchor_t) override { stop_in_second(mark); }
+  void OnAlias(const YAML::Mark& mark, YAML::anchor_t) override { stop_in_second(mark); }
+  void OnScalar(const YAML::Mark& mark, const std::string&, YAML::anchor_t, const std::string&) override {
+    stop_in_second(mark);
+  }
+  void OnSequenceStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t, YAML::EmitterStyle::value) override {
+    stop_in_second(mark);
+  }
+  void OnSequenceEnd() override {}
+  void OnMapStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t, YAML::EmitterStyle::value) override {
+    stop_in_second(mark);
+  }
+  void OnMapEnd() override {}
+
+ private:
+  void stop_in_second(const YAML::Mark& mark) const {
+    if (documents_ > 1) throw Second{mark};
+  }
+
+  int documents_ = 0;
+};
+
+/// The text's one document. Not by YAML::LoadAll, which makes documents until memory is gone of what can't begin one
+/// (", a").
+YAML::Node only_document(const std::string& text, const std::string& name) {
+  try {
+    std::istringstream stream(text);
+    YAML::Parser parser(stream);
+    OneDocument one;
+    while (parser.HandleNextDocument(one)) {
+    }
+    return YAML::Load(text);
+  } catch (const OneDocument::Second& second) {
+    throw Error({name, second.mark.is_null() ? 0 : second.mark.line + 1}, "a second document begins here; one is read");
+  } catch (const YAML::Exception& error) {
+    throw Error({name, error.mark.is_null() ? 0 : error.mark.line + 1}, "isn't YAML: " + error.msg);
+  }
+}
+
 }  // namespace
 
 YamlReader YamlReader::open(const std::filesystem::path& file) {
@@ -74,16 +124,7 @@ YamlReader YamlReader::open(const std::filesystem::path& file) {
 YamlReader YamlReader::parse(const std::string& text, const std::string& name) {
   auto node = std::make_shared<Node>();
   node->file = name;
-  try {
-    const std::vector<YAML::Node> documents = YAML::LoadAll(text);
-    if (documents.size() > 1) {
-      const YAML::Mark mark = documents[1].Mark();
-      throw Error({name, mark.is_null() ? 0 : mark.line + 1}, "a second document begins here; one is read");
-    }
-    if (!documents.empty()) node->yaml = documents[0];
-  } catch (const YAML::Exception& error) {
-    throw Error({name, error.mark.is_null() ? 0 : error.mark.line + 1}, "isn't YAML: " + error.msg);
-  }
+  node->yaml = only_document(text, name);
   YamlReader reader(node);
   reader.require_map();
   return reader;

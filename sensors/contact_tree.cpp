@@ -85,7 +85,9 @@ std::vector<std::string> conditions_of(const Box& box) {
 
 void check(const ContactTreeSettings& settings) {
   if (settings.folds < 1) fail("contact tree: folds is {}, it must be at least 1", settings.folds);
-  if (settings.most_depth < 1) fail("contact tree: most_depth is {}, it must be at least 1", settings.most_depth);
+  if (settings.most_depth < 1 || settings.most_depth > kDeepestContactTree) {
+    fail("contact tree: most_depth is {}, it must be from 1 to {}", settings.most_depth, kDeepestContactTree);
+  }
   if (settings.least_samples < 1)
     fail("contact tree: least_samples is {}, it must be at least 1", settings.least_samples);
   if (!(settings.missed_weight > 0.0) || !std::isfinite(settings.missed_weight)) {
@@ -296,12 +298,20 @@ bool is_possible(const ChipStatistics& s) {
 std::string fault_of(const ContactTree& tree) {
   if (tree.nodes.empty()) return "the tree has no node";
   const auto count = static_cast<int>(tree.nodes.size());
+  // Ways that meet again would double with each node, and rule_of goes along all of them, by recursion.
+  std::vector<int> depth(tree.nodes.size(), 0);
   for (int i = 0; i < count; ++i) {
     const ContactTreeNode& node = tree.nodes[static_cast<std::size_t>(i)];
     if (node.above == 0 && node.below == 0) continue;
     for (const int next : {node.above, node.below}) {
       if (next <= i || next >= count) {
         return fmt::format("node {} leads to node {}; from {} to {} may follow it", i, next, i + 1, count - 1);
+      }
+      int& below = depth[static_cast<std::size_t>(next)];
+      if (below > 0) return fmt::format("two ways lead to node {}; one is allowed", next);
+      below = depth[static_cast<std::size_t>(i)] + 1;
+      if (below > kDeepestContactTree) {
+        return fmt::format("node {} is behind {} questions; at most {} are allowed", next, below, kDeepestContactTree);
       }
     }
     if (!std::isfinite(node.threshold)) return fmt::format("node {} has a threshold that isn't finite", i);

@@ -71,12 +71,15 @@ struct ContactSample {
   bool force_present = false;
 };
 
+/// Questions on the longest way that a tree may have: rule_of goes along every way.
+inline constexpr int kDeepestContactTree = 14;
+
 struct ContactTreeSettings {
   int folds = 10;                  ///< of the cross-validation that prunes; 1: no pruning
   bool one_standard_error = true;  ///< the smallest tree within one standard error of the best (Breiman et al. 1984)
-  int most_depth = 8;
-  int least_samples = 10;      ///< a node with fewer isn't split
-  double missed_weight = 1.0;  ///< how much a missed force weighs, beside a force where there is none
+  int most_depth = 8;              ///< 1 to kDeepestContactTree
+  int least_samples = 10;          ///< a node with fewer isn't split
+  double missed_weight = 1.0;      ///< how much a missed force weighs, beside a force where there is none
 };
 
 /// A tree grown by OpenCV's CART and pruned by cost and complexity (Breiman et al. 1984), which OpenCV 4 doesn't do: a

@@ -46,7 +46,9 @@ bool read_digits(const char*& at, const char* end, std::int64_t& value) {
   constexpr int kMostDigits = 18;
   const char* const from = at;
   std::int64_t sum = 0;
-  while (at < end && *at >= '0' && *at <= '9') sum = 10 * sum + (*at++ - '0');
+  for (; at < end && *at >= '0' && *at <= '9'; ++at) {
+    if (at - from < kMostDigits) sum = 10 * sum + (*at - '0');
+  }
   value = sum;
   return at > from && at - from <= kMostDigits;
 }

@@ -10,18 +10,28 @@
 #include <cstdint>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
 #include "core/error.h"
+#include "core/json_depth.h"
 #include "core/nearest_name.h"
 
 namespace touchstone::sensors {
 
 using Json = nlohmann::json;
 
+/// @throws Error naming the file if the text is nested deeper than kDeepestJson: for any such text, JSON or not
+inline void refuse_deep_json(std::string_view text, const SourceLocation& where) {
+  if (const int depth = deepest_json(text); depth > kDeepestJson) {
+    fail_at(where, "has lists and maps {} deep in each other; at most {} are read", depth, kDeepestJson);
+  }
+}
+
 /// @throws Error naming the file and, where it's known, the line
 inline Json parse_json(const std::string& text, const std::string& name) {
+  refuse_deep_json(text, {name, 0});
   try {
     return Json::parse(text);
   } catch (const Json::parse_error& error) {

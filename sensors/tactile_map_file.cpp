@@ -5,16 +5,14 @@
 #include <bit>
 #include <cstdint>
 #include <cstring>
-#include <nlohmann/json.hpp>
 
 #include "core/error.h"
 #include "core/sha256.h"
 #include "core/whole_file.h"
+#include "sensors/json_field.h"
 
 namespace touchstone::sensors {
 namespace {
-
-using Json = nlohmann::json;
 
 constexpr std::string_view kFormatLine = "touchstone.tactile_map 1\n";
 constexpr std::string_view kFormatName = "touchstone.tactile_map ";
@@ -36,6 +34,7 @@ cv::Mat image_from(std::string_view bytes, int columns, int rows) {
 class Header {
  public:
   Header(std::string_view line, const std::string& file) : file_(file) {
+    refuse_deep_json(line, {file_, 2});
     json_ = Json::parse(line, nullptr, false);
     if (!json_.is_object()) fail_at({file_, 2}, "isn't a JSON map");
     for (const auto& [key, unused] : json_.items()) {

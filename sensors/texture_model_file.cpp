@@ -3,16 +3,14 @@
 #include <bit>
 #include <cstdint>
 #include <cstring>
-#include <nlohmann/json.hpp>
 
 #include "core/error.h"
 #include "core/sha256.h"
 #include "core/whole_file.h"
+#include "sensors/json_field.h"
 
 namespace touchstone::sensors {
 namespace {
-
-using Json = nlohmann::json;
 
 static_assert(std::endian::native == std::endian::little, "the file's numbers are written as they stand in memory");
 
@@ -79,7 +77,9 @@ TextureModel texture_model_from_bytes(std::string_view bytes, const std::string&
   std::string sum;
   std::size_t samples = 0;
   try {
-    const Json header = Json::parse(take_line(bytes, where));
+    const std::string_view line = take_line(bytes, where);
+    refuse_deep_json(line, where);
+    const Json header = Json::parse(line);
     constexpr std::size_t kFields = 8;
     if (!header.is_object() || header.size() != kFields)
       fail_at(where, "its header hasn't the {} known fields", kFields);

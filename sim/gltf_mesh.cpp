@@ -13,6 +13,7 @@
 #include <tiny_gltf.h>
 
 #include "core/error.h"
+#include "core/json_depth.h"
 #include "core/nearest_name.h"
 #include "core/whole_file.h"
 
@@ -59,9 +60,21 @@ class GltfSolid {
     fail("{}: {}", name_, fmt::format(format, std::forward<Args>(args)...));
   }
 
+  /// A file's JSON: of a binary one, the first chunk behind 12 bytes of header and 8 of its own.
+  static std::string_view json_of(std::string_view content) {
+    constexpr std::size_t kLengthAt = 12, kJsonAt = 20;
+    if (!content.starts_with("glTF") || content.size() < kJsonAt) return content;
+    std::uint32_t length = 0;
+    std::memcpy(&length, content.data() + kLengthAt, sizeof length);
+    return content.substr(kJsonAt, length);
+  }
+
   void load(const std::filesystem::path& path) {
     const std::string content = read_whole_file(path);
     if (content.size() > std::numeric_limits<unsigned>::max()) refuse("is larger than 4 GB");
+    if (const int depth = deepest_json(json_of(content)); depth > kDeepestJson) {
+      refuse("has lists and maps {} deep in each other; at most {} are read", depth, kDeepestJson);
+    }
     const auto size = static_cast<unsigned>(content.size());
     tinygltf::TinyGLTF loader;
     loader.SetImageLoader([](tinygltf::Image*, const int, std::string*, std::string*, int, int, const unsigned char*,

@@ -1,0 +1,221 @@
+// Writes the seeds of the targets `models`, `events` and `event_hdf5` by the project's own writers: `fuzz_make_seeds
+// tests/fuzz/corpus`, after a format has changed. As small as they can be, since that is how they're mutated best.
+
+#include <cstdio>
+#include <filesystem>
+#include <vector>
+
+#include "core/random.h"
+#include "core/whole_file.h"
+#include "sensors/event_file.h"
+#include "sensors/explore_model.h"
+#include "sensors/gaussian_process_file.h"
+#include "sensors/gel_force_model.h"
+#include "sensors/height_model_file.h"
+#include "sensors/hue_model_file.h"
+#include "sensors/marker_compliance_file.h"
+#include "sensors/material_classifier_file.h"
+#include "sensors/reflex_model.h"
+#include "sensors/stiffness_model_file.h"
+#include "sensors/tactile_map_file.h"
+#include "sensors/texture_model_file.h"
+#include "sensors/time_delay_network_file.h"
+
+namespace touchstone::fuzz {
+namespace {
+
+using namespace touchstone::sensors;
+
+ExploreModel explore() {
+  ExploreModel model;
+  model.press = {2, {16.0, 0.5, 0.0}, 0.4};
+  model.force = {1.125, 0.5, 0.25};
+  model.lateral_mm_per_px << 0.5, 0.0, 0.0, 0.5;
+  model.shear = ShearLaw{Eigen::Matrix2d::Identity(), Eigen::Matrix2d::Constant(0.25), 0.1};
+  return model;
+}
+
+ReflexModel reflex() {
+  ReflexModel model;
+  model.tree.nodes.resize(3);
+  model.tree.nodes[0] = {ChipFeature::maximum, 37.0, 1, 2, false};
+  model.tree.nodes[1].force_present = true;
+  model.force.coefficients = {-10.0, 0.5, 0.25, 0.0, 0.125};
+  model.force.rms_residual_N = 0.5;
+  return model;
+}
+
+GaussianProcess process() {
+  const Eigen::MatrixXd inputs = (Eigen::MatrixXd(3, 2) << 0.0, 0.5, 0.25, 0.5, 0.75, 2.0).finished();
+  return condition({Eigen::Vector2d(0.5, 1.5), 1.5, 0.25}, inputs, Eigen::Vector3d(1.0, 0.75, 0.5));
+}
+
+GelForceModel gel_force() {
+  const LinearForce line{.newton_per_unit = 0.5,
+                         .offset_N = 0.0,
+                         .r2 = 0.875,
+                         .rms_residual_N = 0.125,
+                         .largest_residual_N = 0.25,
+                         .lowest_seen = 0.0,
+                         .highest_seen = 2.0,
+                         .samples = 3};
+  GelForceModel model;
+  model.gel = "gel";
+  model.normal = {{"ball", line}};
+  model.shear = line;
+  return model;
+}
+
+HueModel hue(HueForm form) {
+  HueModel model;
+  model.form = form;
+  model.spacing_mm = 3.0;
+  model.parallax = {.viewing_distance_mm = 380.0, .axis_mm = {0.0, 0.0}};
+  model.line = {.hue_slope = -0.25, .hue_offset = 0.0, .gain_slope = 0.125, .gain = 0.5, .of_ink = true};
+  model.polynomial.features = {false, false, false, true, false, false, false};
+  model.polynomial.degree = 1;
+  model.polynomial.scale = Eigen::VectorXd::Constant(1, 0.5);
+  model.polynomial.coefficients = Eigen::MatrixXd::Constant(hue_terms(1, 1).rows(), 3, 0.25);
+  model.isotropic.features = {false, true, false, false, true, false, false};
+  model.isotropic.degree = 1;
+  const int scalars = IsotropicFeatures::count(model.isotropic.features);
+  model.isotropic.scale = Eigen::VectorXd::Constant(scalars, 0.5);
+  model.isotropic.press = Eigen::VectorXd::Constant(hue_terms(scalars, 1).rows(), 0.5);
+  model.isotropic.lateral = Eigen::VectorXd::Constant(1 + count_lower_terms(scalars, 1), 0.5);
+  model.gains = {{7, 1.0, 0.5}};
+  model.range.lowest_hue = -0.5;
+  model.range.highest_hue = 0.5;
+  model.range.largest_shift_mm = 0.5;
+  model.range.largest_ink_shift_mm = 1.0;
+  model.range.precision.setIdentity();
+  model.range.largest_distance = 17.0;
+  model.samples = 315;
+  model.rms_error_mm = 0.25;
+  return model;
+}
+
+FeedForwardNetwork network(int inputs, int outputs) {
+  RandomStream random(1, 0, Purpose::kTest);
+  FeedForwardNetwork made = random_network(
+      {.inputs = inputs, .hidden_layers = 1, .units = 2, .outputs = outputs, .sigmoid = Sigmoid::kLogistic}, random);
+  for (auto& weights : made.weights) weights = (8.0 * weights).array().round() / 8.0;  // few digits
+  for (auto& biases : made.biases) biases = (8.0 * biases).array().round() / 8.0;
+  return made;
+}
+
+MaterialClassifier classifier() {
+  return {{"foam", "steel"}, {Eigen::Vector2d(0.0, 0.5), Eigen::Vector2d(100.0, 3.5)}, network(2, 2)};
+}
+
+TimeDelayNetwork delays() {
+  TimeDelayNetwork model;
+  model.delays = 2;
+  model.features = {Eigen::Vector2d(0.0, 0.5), Eigen::Vector2d(100.0, 3.5)};
+  model.force_N = {Eigen::VectorXd::Constant(1, 0.0), Eigen::VectorXd::Constant(1, 3.5)};
+  model.network = network(4, 1);
+  return model;
+}
+
+StiffnessForceModel stiffness() {
+  StiffnessForceModel model;
+  model.grid = 2;
+  model.form = MatrixForm::kDiagonal;
+  model.stiffness = {Eigen::Matrix3d::Identity()};
+  model.rest = {{0.0, 0.0}, {70.0, 0.0}, {0.0, 70.0}, {70.0, 70.0}};
+  model.lowest_seen.assign(4, Eigen::Vector3d::Constant(-10.0));
+  model.highest_seen.assign(4, Eigen::Vector3d::Constant(10.0));
+  return model;
+}
+
+HeightModel height() {
+  HeightModel model;
+  model.mm_per_px = 0.05;
+  model.background = {cv::Mat(2, 3, CV_32FC3, cv::Scalar(100.0, 110.0, 120.0)), 1, cv::Vec3d(1.0, 1.0, 1.0)};
+  model.lamps = {.width = 3, .height = 2, .columns = 1, .rows = 1, .nodes = {Eigen::Matrix3d::Identity()}};
+  model.table.cells = {1, 1, 2};
+  model.table.lowest.setConstant(-2.0F);
+  model.table.step = 2.0F;
+  model.table.slopes.assign(2, Eigen::Vector2f::Zero());
+  model.table.hits.assign(2, 1);
+  model.steepest_calibrated = 0.5;
+  model.presses = 1;
+  return model;
+}
+
+MarkerCompliance compliance() {
+  MarkerCompliance made;
+  made.marker_grid = {1, 1};
+  made.patch_grid = {1, 1};
+  made.patch_side = 2.0;
+  made.thickness = 5.0;
+  made.youngs_modulus = 0.5;
+  made.poisson_ratio = 0.5;
+  made.gel = "gel";
+  made.marker_rest = {Eigen::Vector3d::Zero()};
+  made.displacement = Eigen::Matrix3d::Identity();
+  return made;
+}
+
+TactileMapData map() {
+  TactileMapData data;
+  data.height_mm = cv::Mat(2, 2, CV_32FC1, cv::Scalar(0.5));
+  data.weight = cv::Mat(2, 2, CV_32FC1, cv::Scalar(1.0));
+  data.frame.mm_per_px = 0.05;
+  data.touches = 1;
+  return data;
+}
+
+TextureModel texture() {
+  TextureModel model;
+  model.op = {{4, 1.0}, 1};
+  model.classes = {"a", "b"};
+  model.features = TextureModel::Features::Zero(2, feature_size(model.op));
+  model.features.col(0).setOnes();
+  model.labels = {0, 1};
+  return model;
+}
+
+/// Enough to have runs of columns, both polarities and two times.
+std::vector<Event> events() {
+  std::vector<Event> made;
+  for (std::uint16_t x = 3; x < 17; ++x) made.push_back({1000, x, 5, true});
+  made.push_back({1001, 4, 6, false});
+  made.push_back({17'000'000, 30, 25, true});
+  return made;
+}
+
+void write_seeds(const std::filesystem::path& corpus) {
+  const std::filesystem::path models = corpus / "models";
+  save(explore(), models / "explore.json");
+  save(reflex(), models / "reflex.json");
+  save(process(), models / "gaussian_process.json");
+  save(gel_force(), models / "gel_force.json");
+  save(hue(HueForm::kEquation4), models / "hue_line.json");
+  save(hue(HueForm::kIsotropic), models / "hue_isotropic.json");
+  save(hue(HueForm::kPolynomial), models / "hue_polynomial.json");
+  save(classifier(), models / "material_classifier.json");
+  save(delays(), models / "time_delay_network.json");
+  save(stiffness(), models / "stiffness.json");
+  save(height(), models / "height.gel");
+  save(compliance(), models / "marker_compliance.bin");
+  save(map(), models / "tactile.map");
+  save(texture(), models / "texture.bin");
+  for (const char* name :
+       {"events/space.txt", "events/comma.csv", "events/evt3.raw", "events/lz4.aedat4", "event_hdf5/dsec.h5"}) {
+    EventWriter writer(corpus / name, {34, 26}, "touchstone 0");
+    writer.append(events());
+    writer.close();
+  }
+}
+
+}  // namespace
+}  // namespace touchstone::fuzz
+
+int main(int count, char** arguments) {
+  if (count != 2) {
+    std::fprintf(stderr, "usage: fuzz_make_seeds tests/fuzz/corpus\n");
+    return 2;
+  }
+  touchstone::fuzz::write_seeds(arguments[1]);
+  return 0;
+}

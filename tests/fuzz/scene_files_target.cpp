@@ -1,0 +1,33 @@
+// Devices, objects, motions, scenes, jobs and what palpation asks for: each text is taken for every kind of them.
+
+#include "core/yaml_reader.h"
+#include "lab/draw.h"
+#include "lab/job.h"
+#include "lab/palpation_spec.h"
+#include "sim/device.h"
+#include "sim/motion.h"
+#include "sim/object.h"
+#include "sim/scene.h"
+#include "tests/fuzz/fuzz_target.h"
+
+namespace touchstone::fuzz {
+namespace {
+
+/// Where the text is taken to stand: files that it names are found from there.
+constexpr const char* kPlace = TOUCHSTONE_SOURCE_DIR "/scenes/vhs/fuzz.yaml";
+
+template <typename Spec>
+bool parses(const std::string& text) {
+  return gives_result([&] { parse_yaml<Spec>(text, kPlace); });
+}
+
+}  // namespace
+
+bool reads(std::string_view bytes) {
+  const std::string text(bytes);
+  const bool of_a_scene = parses<sim::DeviceSpec>(text) | parses<sim::ObjectSpec>(text) |
+                          parses<sim::MotionSpec>(text) | parses<sim::SceneSpec>(text);
+  return of_a_scene | parses<lab::Job>(text) | parses<lab::DrawJob>(text) | parses<lab::PalpationSpec>(text);
+}
+
+}  // namespace touchstone::fuzz
