@@ -65,13 +65,38 @@ bool differ(const YamlCall& base, const YamlCall& other, const std::string& key,
     const auto now = asked.place->asked();
     if (bounds ? then != now : without_bounds(then) != without_bounds(now)) return true;
   }
-  if (other.stopped) return false;  // what it didn't come to says nothing
-  for (const YamlCall::Asked& asked : base.asked) {
-    if (asked.key == key || !asked.read) continue;
-    const YamlCall::Asked* after = other.find(asked.key);
+  // What a stopped call lacks behind its last field says nothing.
+  const YamlCall::Asked* last = other.asked.empty() ? nullptr : base.find(other.asked.back().key);
+  const YamlCall::Asked* end = base.asked.data() + base.asked.size();
+  const YamlCall::Asked* reached = !other.stopped ? end : last == nullptr ? base.asked.data() : last + 1;
+  for (const YamlCall::Asked* asked = base.asked.data(); asked != reached; ++asked) {
+    if (asked->key == key || !asked->read) continue;
+    const YamlCall::Asked* after = other.find(asked->key);
     if (after == nullptr || !after->read) return true;
   }
-  return base.rules != other.rules;
+  return reached == end && base.rules != other.rules;
+}
+
+/// Whether the maps differ in nothing but defaults.
+bool same_but_defaults(const YamlMap& left, const YamlMap& right) {
+  const auto same_field = [](const YamlField& a, const YamlField& b) {
+    return a.key == b.key && a.required == b.required && a.forms == b.forms;
+  };
+  const auto same_branch = [](const YamlBranch& a, const YamlBranch& b) {
+    return a.cases == b.cases && same_but_defaults(a.map, b.map);
+  };
+  return left.rules == right.rules && left.by.has_value() == right.by.has_value() &&
+         (!left.by || same_field(*left.by, *right.by)) && std::ranges::equal(left.fields, right.fields, same_field) &&
+         std::ranges::equal(left.branches, right.branches, same_branch);
+}
+
+/// Drops the defaults of `map` that are others in `seen`, which is the same else.
+void merge_defaults(YamlMap& map, const YamlMap& seen) {
+  if (map.by && map.by->standard != seen.by->standard) map.by->standard.reset();
+  for (std::size_t k = 0; k < map.fields.size(); ++k) {
+    if (map.fields[k].standard != seen.fields[k].standard) map.fields[k].standard.reset();
+  }
+  for (std::size_t k = 0; k < map.branches.size(); ++k) merge_defaults(map.branches[k].map, seen.branches[k].map);
 }
 
 YamlCase case_of(const YamlPick& pick, const std::vector<YamlForm>& forms, int values) {
@@ -286,9 +311,10 @@ YamlMap YamlPlace::explore(const YamlPicks& fixed, const Ask& ask, int depth) co
       const YamlMap map = explore(with(asked.key, pick), ask, depth + 1);
       const YamlCase one = case_of(pick, field.forms, values);
       const auto same = std::find_if(split.branches.begin(), split.branches.end(),
-                                     [&](const YamlBranch& branch) { return branch.map == map; });
+                                     [&](const YamlBranch& branch) { return same_but_defaults(branch.map, map); });
       if (same != split.branches.end()) {
         same->cases.push_back(one);
+        merge_defaults(same->map, map);
       } else {
         split.branches.push_back({{one}, map});
       }

@@ -1,0 +1,60 @@
+// Reads files as touchstone does, many in one process, for file_schemas_test.py: each line of the input is a kind and a
+// path, each line of the output "taken", or "refused" and why.
+#include <fmt/format.h>
+
+#include <functional>
+#include <iostream>
+#include <map>
+#include <string>
+
+#include "core/error.h"
+#include "lab/draw.h"
+#include "lab/job.h"
+#include "lab/palpation_spec.h"
+#include "lab/study.h"
+#include "sim/device.h"
+#include "sim/motion.h"
+#include "sim/object.h"
+#include "sim/scene.h"
+
+namespace touchstone {
+namespace {
+
+void read_job_of_either_sort(const std::string& file) {
+  if (lab::is_draw_job_file(file)) {
+    lab::read_draw_job(file);
+  } else {
+    lab::read_job(file);
+  }
+}
+
+int read_all() {
+  const std::map<std::string, std::function<void(const std::string&)>> readers = {
+      {"device", [](const std::string& file) { sim::read_device(file); }},
+      {"object", [](const std::string& file) { sim::read_object(file); }},
+      {"motion", [](const std::string& file) { read_yaml<sim::MotionSpec>(file); }},
+      {"scene", [](const std::string& file) { sim::read_scene(file); }},
+      {"job", read_job_of_either_sort},
+      {"study", [](const std::string& file) { lab::read_study(file); }},
+      {"palpation", [](const std::string& file) { lab::read_palpation(file); }},
+  };
+  std::string kind;
+  std::string file;
+  while (std::cin >> kind >> std::ws && std::getline(std::cin, file)) {
+    try {
+      readers.at(kind)(file);
+      fmt::print("taken\n");
+    } catch (const Error& error) {
+      fmt::print("refused {}\n", error.what());
+    }
+    std::fflush(stdout);
+  }
+  return 0;
+}
+
+}  // namespace
+}  // namespace touchstone
+
+int main() {
+  return touchstone::read_all();
+}
