@@ -24,6 +24,27 @@ except ImportError as error:
 
 # What readers find wrong and schemas don't: one value against another, or against a file. Each must be met at least once.
 ONLY_READERS = [
+    # files that aren't there
+    r"there is no file", r"can't be read",
+    # bounds that another field gives
+    *(rf"{field}: \S+ is not allowed; allowed is" for field in (
+        "active_area_um2", "coarse_mm", "to_nm", "vein_pitch_mm", "rim_mm", r"films\.side_mm", r"print\.diameter_mm",
+        r"print\.radius_mm", "edge_radius_mm", r"scales\[0\]\.width_mm", "soft_angle_deg", "threshold_spread", "valley_mm",
+        "emboss_width_mm", "window_apart_mm", "window_from_mouth_mm")),
+    # the device as a whole
+    r"gel: the (slab|dome|fingertip)", r"beads: a grid", r"beads.depth_mm: \S+ puts beads",
+    r"is not in front of the plate", r"is the lamp's own position", r"is longer than a frame",
+    r"camera.motion_chip: a picture of", r"event pixels are single ones", r"must be within \S+ m of the origin",
+    r"is sharp beyond that only", r"it must be at least the focal length",
+    # how many there are, or which
+    r"has \d+ numbers; allowed are 1 to", r"has \d+ numbers, 2 are needed", r"distortion: \d+ numbers",
+    r"\d+ wavelengths; allowed are", r"edge_side: \S+ is not allowed; allowed is one of", r"there is none; allowed is one",
+    r"has no (scene|object); at least one", r"stands here a second time", r"one stands here a second",
+    # texts
+    r"isn't a name", r"can't name a folder", r"relief.text: there's no letter", r"an sRGB colour is #",
+    # one value against another
+    r"leads that axis to a force", r"can't be shifted by", r"the first must not be the larger", r"draws go from",
+    r"leave nothing of cells", r"there's no grit", r"each level needs one", r"add up to", r"each unit needs one", r"that differ in nothing",
 ]
 
 KIND_OF_FOLDER = {"devices": "device", "objects": "object", "motions": "motion", "jobs": "job", "studies": "study",
@@ -193,12 +214,18 @@ def spoilt(data, schemas, path=()):
             yield path, "fraction", value + 0.25
             for other in (0, 1, -1, 10**9, -10**9):
                 yield path, f"{other}", other
-            for schema in schemas:
+            numbers = [schema for schema in schemas if schema.get("type") in ("number", "integer")]
+            for schema in numbers:
                 for bound, step in (("minimum", -1), ("maximum", 1), ("exclusiveMinimum", 0), ("exclusiveMaximum", 0)):
                     if bound in schema:
                         beyond = schema[bound] + step * max(1, abs(schema[bound]) * 1e-6)
-                        yield path, f"!beyond {bound}", int(beyond) if schema["type"] == "integer" else beyond
+                        beyond = int(beyond) if schema["type"] == "integer" else beyond
+                        # A place may belong to several cases with bounds of their own.
+                        sure = not any(jsonschema.Draft7Validator(other).is_valid(beyond) for other in numbers)
+                        yield path, f"{'!' if sure else ''}beyond {bound}", beyond
         else:
+            if value.startswith("#"):
+                yield path, "half a colour", value[:4]
             yield path, "number for text", 5
             yield path, "other text", "no such text"
 
