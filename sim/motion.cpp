@@ -3,6 +3,11 @@
 #include <algorithm>
 
 namespace touchstone::sim {
+namespace {
+
+constexpr std::int64_t kMostFrames = 1'000'000'000;  // an int counts them
+
+}  // namespace
 
 int MotionSpec::frame_count() const {
   int count = 1;
@@ -83,6 +88,11 @@ void fields(YamlReader& in, MotionSpec& motion) {
   in.optional("start_angles_deg", motion.start_angles_deg, Allowed::within(-180.0, 180.0));
   in.optional("frame_rate_Hz", motion.frame_rate_Hz, Allowed::above_up_to(0.0, 1e6));
   in.required("keys", motion.keys);
+  std::int64_t frames = 1;
+  for (const MotionKey& key : motion.keys) frames += key.frames;
+  if (frames > kMostFrames) {
+    fail_at(in.where("keys"), "keys: {} frames in all; allowed are {}", frames, kMostFrames);
+  }
 }
 
 }  // namespace touchstone::sim

@@ -163,6 +163,7 @@ TEST(YamlReader, WhatIsNotYamlIsRefusedWithTheLine) {
   expect_error("poisson_ratio: 0.4\nat: [1, 2\ncount: }\n", 3, {"isn't YAML"});
   expect_error("poisson_ratio: 0.4\n---\npoisson_ratio: 0.3\n", 3, {"second document"});
   expect_error(std::string(100000, '['), 1, {"isn't YAML"});
+  expect_error(", a\n", 1, {"second document"});  // one that YAML::LoadAll makes endlessly many of
 }
 
 TEST(YamlReader, RangesSayThemselves) {

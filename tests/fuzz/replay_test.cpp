@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <cstdlib>
 #include <filesystem>
 #include <random>
 #include <string>
@@ -19,8 +20,9 @@ namespace {
 
 const std::filesystem::path kFolder = TOUCHSTONE_SOURCE_DIR "/tests/fuzz";
 constexpr const char* kTarget = TOUCHSTONE_FUZZ_TARGET;
-constexpr const char* kMoreSeeds = TOUCHSTONE_FUZZ_MORE_SEEDS;  // a folder of files that are shipped; or empty
-constexpr int kDamaged = TOUCHSTONE_FUZZ_DAMAGED;               // inputs made of all seeds together
+constexpr const char* kMoreSeeds = TOUCHSTONE_FUZZ_MORE_SEEDS;   // a folder of files that are shipped; or empty
+constexpr int kDamaged = TOUCHSTONE_FUZZ_DAMAGED;                // inputs made of all seeds together
+constexpr const char* kMoreDamaged = "TOUCHSTONE_FUZZ_DAMAGED";  // in the environment: another number, other inputs
 
 std::vector<std::filesystem::path> files_below(const std::filesystem::path& folder, const std::string& ending = "") {
   std::vector<std::filesystem::path> files;
@@ -107,8 +109,10 @@ TEST(FuzzReplay, DamagedSeedsAreReadOrRefused) {
   std::vector<std::string> all;
   for (const auto& file : seeds()) all.push_back(read_whole_file(file));
   ASSERT_FALSE(all.empty());
-  std::mt19937 random(20261123);
-  for (int i = 0; i < kDamaged; ++i) {
+  const char* const wanted = std::getenv(kMoreDamaged);
+  const int count = wanted != nullptr ? std::atoi(wanted) : kDamaged;
+  std::mt19937 random(static_cast<unsigned>(count));
+  for (int i = 0; i < count; ++i) {
     std::string bytes = all[static_cast<std::size_t>(i) % all.size()];
     const int times = 1 + static_cast<int>(random() % 4);
     for (int k = 0; k < times; ++k) damage(bytes, all[random() % all.size()], random);

@@ -25,9 +25,9 @@ bool parses(const std::string& text) {
 
 bool reads(std::string_view bytes) {
   const std::string text(bytes);
-  const bool of_a_scene = parses<sim::DeviceSpec>(text) | parses<sim::ObjectSpec>(text) |
-                          parses<sim::MotionSpec>(text) | parses<sim::SceneSpec>(text);
-  return of_a_scene | parses<lab::Job>(text) | parses<lab::DrawJob>(text) | parses<lab::PalpationSpec>(text);
+  const bool of_a_scene = parses<sim::DeviceSpec>(text) | parses<sim::ObjectSpec>(text) | parses<sim::SceneSpec>(text);
+  const bool motion = gives_result([&] { TS_ASSERT(parse_yaml<sim::MotionSpec>(text, kPlace).frame_count() > 0); });
+  return of_a_scene | motion | parses<lab::Job>(text) | parses<lab::DrawJob>(text) | parses<lab::PalpationSpec>(text);
 }
 
 }  // namespace touchstone::fuzz

@@ -167,6 +167,7 @@ TEST(ContactTree, WhatIsWrongIsNamed) {
   };
   EXPECT_THAT(train({.folds = 0}), ThrowsMessage<Error>(HasSubstr("folds is 0")));
   EXPECT_THAT(train({.most_depth = 0}), ThrowsMessage<Error>(HasSubstr("most_depth is 0")));
+  EXPECT_THAT(train({.most_depth = 15}), ThrowsMessage<Error>(HasSubstr("it must be from 1 to 14")));
   EXPECT_THAT(train({.least_samples = 0}), ThrowsMessage<Error>(HasSubstr("least_samples is 0")));
   EXPECT_THAT(train({.missed_weight = 0.0}), ThrowsMessage<Error>(HasSubstr("missed_weight is 0")));
   samples[7].statistics.squal = 256;
@@ -183,6 +184,16 @@ TEST(ContactTree, WhatIsWrongIsNamed) {
   tree = text_tree();
   tree.nodes[3].below = 7;
   EXPECT_THAT(fault_of(tree), HasSubstr("node 3 leads to node 7"));
+  tree = {};
+  tree.nodes = {{ChipFeature::maximum, 37.0, 1, 1, false}, {}};  // of sixty such nodes, rule_of would never end
+  EXPECT_THAT(fault_of(tree), HasSubstr("two ways lead to node 1"));
+  tree.nodes.clear();
+  for (int i = 0; i <= kDeepestContactTree; ++i) {
+    tree.nodes.push_back({ChipFeature::maximum, 37.0, 2 * i + 2, 2 * i + 1, false});
+    tree.nodes.emplace_back();
+  }
+  tree.nodes.emplace_back();
+  EXPECT_THAT(fault_of(tree), HasSubstr("behind 15 questions; at most 14 are allowed"));
   tree = text_tree();
   tree.nodes[0].threshold = 40.5;
   EXPECT_THAT(fault_of(tree), HasSubstr("whole number"));

@@ -315,5 +315,12 @@ TEST(SceneFiles, AnAxisHasEitherAPositionOrAForce) {
   EXPECT_THROW(parse_yaml<MotionSpec>(start + "{}}\n", "m"), Error);
 }
 
+TEST(SceneFiles, AMotionHasAsManyFramesAsAnIntCounts) {
+  std::string text = "start_mm: [0, 0, 1]\nkeys:\n";
+  for (int key = 0; key < 99; ++key) text += "  - {frames: 10000000}\n";
+  EXPECT_EQ(parse_yaml<MotionSpec>(text, "m").frame_count(), 990'000'001);
+  EXPECT_THROW(parse_yaml<MotionSpec>(text + "  - {frames: 10000000}\n", "m"), Error);
+}
+
 }  // namespace
 }  // namespace touchstone::sim
