@@ -57,8 +57,8 @@ std::vector<Step> steps_of(const std::string& path, const SourceLocation& where)
   return steps;
 }
 
-constexpr int kDeepest = 64;           // an alias may hold itself
-constexpr int kMostNodes = 1'000'000;  // a hundred aliases of aliases stand for more nodes than there are atoms
+constexpr int kDeepest = 64;         // an alias may hold itself
+constexpr int kMostNodes = 100'000;  // a hundred aliases of aliases stand for more nodes than there are atoms
 
 /// How many nodes stand at a place: two where an alias repeats one.
 struct Marks {

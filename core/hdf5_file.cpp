@@ -467,6 +467,21 @@ void Hdf5Reader::expect_whole_numbers(const std::string& path) const {
   }
 }
 
+bool Hdf5Reader::is_all_there(const std::string& path, std::size_t count) const {
+  const Handle dataset(H5Dopen2(file_, path.c_str(), H5P_DEFAULT), H5Dclose);
+  const Handle creation(H5Dget_create_plist(dataset), H5Pclose);
+  if (H5Pget_layout(creation) != H5D_CHUNKED) {
+    const Handle type(H5Dget_type(dataset), H5Tclose);
+    return H5Dget_storage_size(dataset) / std::max<std::size_t>(1, H5Tget_size(type)) >= count;
+  }
+  // Not by H5Dget_space_status, which takes packed chunks for missing ones.
+  const Handle space(H5Dget_space(dataset), H5Sclose);
+  hsize_t numbers_a_chunk = 0;
+  hsize_t chunks = 0;
+  return H5Pget_chunk(creation, 1, &numbers_a_chunk) == 1 && numbers_a_chunk > 0 &&
+         H5Dget_num_chunks(dataset, space, &chunks) >= 0 && (count - 1) / numbers_a_chunk < chunks;
+}
+
 std::int64_t Hdf5Reader::read_number(const std::string& path) const {
   const auto held = hold();
   expect_whole_numbers(path);
@@ -485,9 +500,7 @@ std::int64_t Hdf5Reader::count_of_whole_numbers(const std::string& path) const {
   const std::vector<std::int64_t> shape = shape_of(path, count);
   if (shape.size() != 1) fail("{}: '{}' has {} axes; allowed is one", name_, path, shape.size());
   // A list of any length fits in a small file if its numbers aren't there: HDF5 makes them up as they're read.
-  const Handle dataset(H5Dopen2(file_, path.c_str(), H5P_DEFAULT), H5Dclose);
-  H5D_space_status_t status = H5D_SPACE_STATUS_NOT_ALLOCATED;
-  if (count > 0 && (H5Dget_space_status(dataset, &status) < 0 || status != H5D_SPACE_STATUS_ALLOCATED)) {
+  if (count > 0 && !is_all_there(path, count)) {
     fail("{}: '{}' says that it holds {} numbers, but not all of them are in the file", name_, path, shape[0]);
   }
   return shape[0];

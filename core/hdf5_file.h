@@ -192,6 +192,7 @@ class Hdf5Reader {
                      void* values) const;
   void read_list_part(const std::string& path, Hdf5Id type, std::int64_t first, std::int64_t count, void* values) const;
   void expect_whole_numbers(const std::string& path) const;
+  bool is_all_there(const std::string& path, std::size_t count) const;  ///< of a list: its numbers, in the file
   void expect_one_value(Hdf5Id attribute, const std::string& path, const std::string& name) const;
 
   std::string name_;
