@@ -119,7 +119,7 @@ TEST(LampChoice, LightOfSeveralLampsIsTheSumOfEachAlone) {
     scene.lamps.push_back(lamp);
   }
   const auto seen = [](const Scene& of, double x) {
-    return Tracer(of).radiance({x, 0.0, -3.0}, {0, 0, 1}, samples(1 << 14, 0))[0];
+    return Tracer(of).radiance({x, 0.0, -3.0}, {0, 0, 1}, samples(1 << 17, 0))[0];
   };
   for (double x : {-6.0, -2.0, 0.5, 4.0, 7.0}) {
     double sum = 0.0;
