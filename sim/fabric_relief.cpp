@@ -251,7 +251,8 @@ void fields(YamlReader& in, FabricRelief& relief) {
   in.optional("roughness_um", relief.roughness_um, Allowed::within(0.0, 200.0));
   in.optional("size_mm", relief.size_mm, Allowed::within(4.0, 60.0));
   in.optional("seed", relief.seed);
-  if (relief.weave == Weave::satin && (relief.step > relief.harness - 2 || std::gcd(relief.step, relief.harness) != 1)) {
+  if (relief.weave == Weave::satin &&
+      (relief.step > relief.harness - 2 || std::gcd(relief.step, relief.harness) != 1)) {
     fail_at(in.where("step"),
             "a satin of {} can't be shifted by {}: the step must be from 2 to {} and have no divisor "
             "in common with it",

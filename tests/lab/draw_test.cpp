@@ -225,8 +225,10 @@ TEST_F(Draw, MistakesAreToldBeforeAnythingIsWritten) {
   EXPECT_THAT(told("samples: 10", "samples: 1"), HasSubstr("each unit needs one at least"));
   EXPECT_THAT(told("gel.youngs_modulus_MPa", "gel.youngs_modulus"), HasSubstr("did you mean 'youngs_modulus_MPa'?"));
   EXPECT_THAT(told("times: {uniform: [0.8, 1.2]}", "times: {uniform: [-2, -1]}"), HasSubstr("unit 0, as drawn: "));
-  EXPECT_THAT(told("times: {uniform: [0.8, 1.2]}", "times: 1, plus: 2"), HasSubstr("times and plus stand here together"));
-  EXPECT_THAT(told("force_N: {log_uniform: [0.05, 0.3]}", "force_N: 1\n  depth_mm: 1"), HasSubstr("force_N and depth_mm stand here together"));
+  EXPECT_THAT(told("times: {uniform: [0.8, 1.2]}", "times: 1, plus: 2"),
+              HasSubstr("times and plus stand here together"));
+  EXPECT_THAT(told("force_N: {log_uniform: [0.05, 0.3]}", "force_N: 1\n  depth_mm: 1"),
+              HasSubstr("force_N and depth_mm stand here together"));
   EXPECT_THAT(told("  force_N: {log_uniform: [0.05, 0.3]}\n", ""), HasSubstr("none of force_N, depth_mm stands here"));
   EXPECT_THAT(told("force_N: {log_uniform: [0.05, 0.3]}", "depth_mm: 5"), HasSubstr("is 3 mm thick"));
   EXPECT_THAT(told("train: 0.5", "train: 0.6"), HasSubstr("add up to 1.1"));

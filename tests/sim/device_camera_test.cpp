@@ -84,7 +84,8 @@ TEST(DeviceCamera, ACalibrationsMatrixAndDistortionServeAsTheyAre) {
 TEST(DeviceCamera, WhatDoesntFitIsRefused) {
   EXPECT_EQ(error_of(kLens), "");
   EXPECT_THAT(error_of(with("type: lens", "type: fisheye")), HasSubstr("fisheye"));
-  EXPECT_THAT(error_of(with("focal_length_mm: 4\n", "")), HasSubstr("none of focal_length_mm, camera_matrix stands here"));
+  EXPECT_THAT(error_of(with("focal_length_mm: 4\n", "")),
+              HasSubstr("none of focal_length_mm, camera_matrix stands here"));
   EXPECT_THAT(error_of(with("f_number: 2.8", "f_number: 2.8\ncamera_matrix: [800, 800, 320, 240]")),
               HasSubstr("focal_length_mm and camera_matrix stand here together"));
   EXPECT_THAT(error_of(with("f_number: 2.8", "f_number: 2.8\nsensor_distance_mm: 5")),

@@ -164,7 +164,8 @@ TEST(SceneFiles, ARotationIsLedByAnglesOrByTorques) {
     return std::string();
   };
   EXPECT_THAT(error("angles_deg: [0, 0, 0], turn_x: {torque_Nmm: 0}"), HasSubstr("m:3: "));
-  EXPECT_THAT(error("angles_deg: [0, 0, 0], turn_x: {torque_Nmm: 0}"), HasSubstr("angles_deg: can't stand beside turn_x"));
+  EXPECT_THAT(error("angles_deg: [0, 0, 0], turn_x: {torque_Nmm: 0}"),
+              HasSubstr("angles_deg: can't stand beside turn_x"));
   EXPECT_THAT(error("turn_x: {force_N: 0}"), HasSubstr("torque_Nmm"));
   EXPECT_THAT(error("turn_x: {torque_Nmm: .nan}"), HasSubstr("torque_Nmm"));
 }
