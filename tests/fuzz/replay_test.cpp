@@ -9,6 +9,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <random>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -20,7 +21,7 @@ namespace {
 
 const std::filesystem::path kFolder = TOUCHSTONE_SOURCE_DIR "/tests/fuzz";
 constexpr const char* kTarget = TOUCHSTONE_FUZZ_TARGET;
-constexpr const char* kMoreSeeds = TOUCHSTONE_FUZZ_MORE_SEEDS;   // a folder of files that are shipped; or empty
+constexpr const char* kMoreSeeds = TOUCHSTONE_FUZZ_MORE_SEEDS;   // folders of shipped files, with : between them
 constexpr int kDamaged = TOUCHSTONE_FUZZ_DAMAGED;                // inputs made of all seeds together
 constexpr const char* kMoreDamaged = "TOUCHSTONE_FUZZ_DAMAGED";  // in the environment: another number, other inputs
 
@@ -36,8 +37,9 @@ std::vector<std::filesystem::path> files_below(const std::filesystem::path& fold
 
 std::vector<std::filesystem::path> seeds() {
   auto files = files_below(kFolder / "corpus" / kTarget);
-  if (*kMoreSeeds != '\0') {
-    const auto more = files_below(kMoreSeeds, ".yaml");
+  std::istringstream folders(kMoreSeeds);
+  for (std::string folder; std::getline(folders, folder, ':');) {
+    const auto more = files_below(folder, ".yaml");
     files.insert(files.end(), more.begin(), more.end());
   }
   return files;
