@@ -125,7 +125,8 @@ TEST(EventCamera, BadFiguresAreRefusedWithTheirLine) {
   EXPECT_THAT(error("  dark_e_per_s: 10\n  refractory_us: -1\n"), HasSubstr("camera.yaml:9"));
   EXPECT_THAT(error("  dark_e_per_s: .nan\n"), HasSubstr("camera.yaml:8"));
   EXPECT_THAT(error("  preset: davis240c\n"), HasSubstr("white_1klux_e_per_s"));
-  EXPECT_THAT(error("  preset: imx273\n"), AllOf(HasSubstr("camera.yaml:8"), HasSubstr("allowed is one of: davis240c")));
+  EXPECT_THAT(error("  preset: imx273\n"),
+              AllOf(HasSubstr("camera.yaml:8"), HasSubstr("allowed is one of: davis240c")));
   EXPECT_THAT(error("  dark_e_per_s: 10\n  onthreshold: 0.2\n"), HasSubstr("on_threshold"));
 }
 
