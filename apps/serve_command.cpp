@@ -193,7 +193,8 @@ void serve_device(const ServeOptions& options, const GlobalOptions& global) {
   };
   const FrameServer server(camera, settings);
   say_where(options, server);
-  fmt::print("press: curl -X POST 'http://{}:{}/press?object={}&x_mm=0&y_mm=0&force_N=1' (/release)\n", options.address,
+  // -X POST alone sends no Content-Length, and the server then waits for a body until it gives up.
+  fmt::print("press: curl -d '' 'http://{}:{}/press?object={}&x_mm=0&y_mm=0&force_N=1' (/release)\n", options.address,
              server.port(), usual);
   wait_until_stopped(fmt::format("{}, untouched, at {:g} Hz", spec.name, rate));
 }
