@@ -38,6 +38,11 @@ struct YamlReader::Node {
   mutable std::vector<std::string> asked;  // keys that some field asked for
 
   std::shared_ptr<YamlPlace> place;  // instead of all this, while describing
+  static std::shared_ptr<Node> at(std::shared_ptr<YamlPlace> place) {
+    auto node = std::make_shared<Node>();
+    node->place = std::move(place);
+    return node;
+  }
 
   int empty_line = 0;  // line of the key, if nothing stands after it: YAML marks the next token
 
@@ -135,9 +140,7 @@ bool YamlReader::describing() const {
 }
 
 YamlReader YamlReader::description() {
-  auto node = std::make_shared<Node>();
-  node->place = std::make_shared<YamlPlace>(std::make_shared<YamlPlace::Known>());
-  return YamlReader(node);
+  return YamlReader(Node::at(std::make_shared<YamlPlace>(std::make_shared<YamlPlace::Known>())));
 }
 
 std::shared_ptr<const YamlMap> YamlReader::described_map() const {
@@ -148,9 +151,7 @@ std::shared_ptr<const YamlMap> YamlReader::described_map() const {
 
 void YamlReader::describe_struct(std::type_index type, const std::function<void(YamlReader&)>& ask) const {
   node_->place->map(type, [&ask](std::shared_ptr<YamlPlace> place) {
-    auto node = std::make_shared<Node>();
-    node->place = std::move(place);
-    YamlReader in(node);
+    YamlReader in(Node::at(std::move(place)));
     ask(in);
   });
 }
@@ -199,9 +200,7 @@ std::optional<YamlReader> YamlReader::child(const std::string& key, bool needed)
   if (describing()) {
     auto place = node_->place->child(key, needed);
     if (place == nullptr) return std::nullopt;
-    auto inner = std::make_shared<Node>();
-    inner->place = std::move(place);
-    return YamlReader(inner);
+    return YamlReader(Node::at(std::move(place)));
   }
   node_->asked.push_back(key);
   const YAML::Node& map = node_->yaml;
@@ -222,11 +221,7 @@ std::optional<YamlReader> YamlReader::child(const std::string& key, bool needed)
 std::vector<YamlReader> YamlReader::items(std::optional<int> length) const {
   if (describing()) {
     std::vector<YamlReader> described;
-    for (auto& place : node_->place->items(length)) {
-      auto node = std::make_shared<Node>();
-      node->place = std::move(place);
-      described.push_back(YamlReader(node));
-    }
+    for (auto& place : node_->place->items(length)) described.push_back(YamlReader(Node::at(std::move(place))));
     return described;
   }
   if (!node_->yaml.IsSequence()) node_->refuse("a list is needed here");

@@ -25,18 +25,21 @@ void check_materials(const GelBody& body, std::span<const ElasticMaterial> mater
   }
 }
 
-/// The gel whose body has 1 MPa: read if the cache has it, else made. All gels come from it, so that their bytes don't
-/// depend on what the cache has.
-Compliance of_unit_modulus(const std::string& key, const std::filesystem::path& cache_dir,
-                           const std::function<Compliance()>& make) {
-  const std::filesystem::path path = compliance_file(cache_dir, key);
-  std::error_code ignored;
-  if (cache_dir.empty() || !std::filesystem::exists(path, ignored)) return make();
-  try {
-    return read_compliance(path, key);
-  } catch (const Error&) {
-    return make();  // who asks for that gel itself is told, and has the file replaced
-  }
+/// The gel of `key`, made from the one whose body has 1 MPa (`unit_key`), which is read if the cache has it, else made.
+/// All gels come from that one, so that their bytes don't depend on what the cache has.
+Compliance from_unit_modulus(const std::string& key, const std::string& unit_key, double youngs_modulus,
+                             const std::filesystem::path& cache_dir, const std::function<Compliance()>& make_unit) {
+  const auto unit = [&] {
+    const std::filesystem::path path = compliance_file(cache_dir, unit_key);
+    std::error_code ignored;
+    if (cache_dir.empty() || !std::filesystem::exists(path, ignored)) return make_unit();
+    try {
+      return read_compliance(path, unit_key);
+    } catch (const Error&) {
+      return make_unit();  // who asks for that gel itself is told, and has the file replaced
+    }
+  };
+  return cached_compliance(key, cache_dir, [&] { return with_modulus(unit(), youngs_modulus); });
 }
 
 }  // namespace
@@ -125,10 +128,8 @@ Compliance cached_compliance(const GelBody& body, std::span<const ElasticMateria
     gel.mesh_error = measure_mesh_error(gel, ladder_of(body, relative, beads), progress);
     return gel;
   };
-  return cached_compliance(compliance_key(body, materials, beads), cache_dir, [&] {
-    return with_modulus(of_unit_modulus(compliance_key(body, relative, beads), cache_dir, make),
-                        materials.front().youngs_modulus);
-  });
+  return from_unit_modulus(compliance_key(body, materials, beads), compliance_key(body, relative, beads),
+                           materials.front().youngs_modulus, cache_dir, make);
 }
 
 Compliance cached_compliance(const SlabMesh& slab, const ElasticMaterial& material, std::span<const Bead> beads,
@@ -156,10 +157,8 @@ Compliance cached_compliance(const GelBody& body, const ErrorGoal& goal, std::sp
     gel.ladder = [&](double edge) { return ladder_of(with_fine(body, edge), relative, beads); };
     return gel_within(goal, gel, progress);
   };
-  return cached_compliance(compliance_key(body, goal, materials, beads), cache_dir, [&] {
-    return with_modulus(of_unit_modulus(compliance_key(body, goal, relative, beads), cache_dir, make),
-                        materials.front().youngs_modulus);
-  });
+  return from_unit_modulus(compliance_key(body, goal, materials, beads), compliance_key(body, goal, relative, beads),
+                           materials.front().youngs_modulus, cache_dir, make);
 }
 
 }  // namespace touchstone::fem

@@ -18,6 +18,7 @@
 #include "core/whole_file.h"
 #include "lab/block_file.h"
 #include "lab/data_card.h"
+#include "lab/drawn_manifest.h"
 #include "lab/run_folder.h"
 #include "lab/run_identity.h"
 #include "lab/seconds_since.h"
@@ -28,7 +29,6 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
-constexpr const char* kFormat = "touchstone-drawn-dataset";
 constexpr int kFormatVersion = 1;
 constexpr int kMostAttempts = 20;  // draws of one sample
 
@@ -53,7 +53,7 @@ std::optional<ordered_json> finished_manifest(const Folder& folder) {
   if (!fs::exists(folder.manifest(), error)) return std::nullopt;
   try {
     ordered_json json = ordered_json::parse(read_whole_file(folder.manifest()));
-    if (json.at("format") != kFormat) {
+    if (json.at("format") != kDrawnSetFormat) {
       fail("{}: holds a data set of another kind; give another folder", folder.out.string());
     }
     if (json.at("content_sha256") != content_checksum(json)) {
@@ -134,7 +134,7 @@ ordered_json drawn_json(const std::vector<DrawnNumber>& drawn) {
 std::string manifest_text(const PreparedDraw& prepared, const Folder& folder, const DrawnFigures& figures,
                           const std::vector<BlockFile>& files) {
   const DrawJob& job = prepared.job;
-  ordered_json manifest = {{"format", kFormat},
+  ordered_json manifest = {{"format", kDrawnSetFormat},
                            {"format_version", kFormatVersion},
                            {"content_sha256", ""},
                            {"program", {{"name", "touchstone"}, {"version", folder.identity.version}}},

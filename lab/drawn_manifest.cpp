@@ -21,10 +21,9 @@ DrawnManifest read_drawn_manifest(const fs::path& folder) {
   DrawnManifest manifest;
   try {
     ordered_json json = ordered_json::parse(read_whole_file(file));
-    constexpr const char* kFormat = "touchstone-drawn-dataset";
-    if (json.at("format") != kFormat) {
+    if (json.at("format") != kDrawnSetFormat) {
       fail("{}: format: '{}' isn't a set of a job that draws; allowed is '{}'", file.string(),
-           json.at("format").get<std::string>(), kFormat);
+           json.at("format").get<std::string>(), kDrawnSetFormat);
     }
     manifest.content_sha256 = json.at("content_sha256");
     manifest.name = json.at("name");

@@ -8,6 +8,9 @@
 
 namespace touchstone::lab {
 
+/// What dataset.json's `format` is.
+inline constexpr const char* kDrawnSetFormat = "touchstone-drawn-dataset";
+
 /// One of a set's blocks: samples first_sample to first_sample + samples - 1, all of one unit.
 struct ManifestBlock {
   std::string name;  ///< blocks/000012.h5

@@ -55,22 +55,12 @@ void read_block(const ManifestBlock& block, InspectedSet& set, std::vector<std::
   const fs::path path = set.folder / block.name;
   const Hdf5Reader file(path);
   const auto count = static_cast<std::size_t>(block.samples);
-  const auto column = [&](const char* name, std::size_t width) {
-    auto values = file.read<double>(name).values;
-    if (values.size() != width * count) fail("{}: '{}' has another shape than it should", path.string(), name);
-    return values;
-  };
   const auto whole = [&](const char* name) {
     auto values = file.read<std::int32_t>(name).values;
     if (values.size() != count) fail("{}: '{}' has another shape than it should", path.string(), name);
     return values;
   };
-  const auto wrench = column("/wrench", 6);
-  const auto error = column("/wrench_error", 3);
-  const auto pose = column("/pose", 12);
-  const auto area = column("/contact_area_mm2", 1);
-  const auto strain = column("/largest_strain", 1);
-  const auto under_resolved = whole("/under_resolved");
+  std::vector<InspectedSample> samples = read_sample_columns(file, path, "/wrench_error", count);
   const auto split = whole("/split");
   const auto object = whole("/object");
   const std::vector<std::string> names = file.read_texts("/object_name");
@@ -82,18 +72,10 @@ void read_block(const ManifestBlock& block, InspectedSet& set, std::vector<std::
     }
     ++splits[unit][static_cast<std::size_t>(split[i])];
     objects[unit].insert(names[static_cast<std::size_t>(object[i])]);
-    InspectedSample sample;
-    sample.scene = block.unit;
-    sample.frame = static_cast<int>(block.first_sample) + static_cast<int>(i);
-    sample.wrench = Eigen::Map<const Eigen::Matrix<double, 6, 1>>(wrench.data() + 6 * i);
-    const Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>> placed(pose.data() + 12 * i);
-    sample.gel_from_object = {placed.leftCols<3>(), placed.col(3)};
-    sample.force_error = Eigen::Map<const Eigen::Vector3d>(error.data() + 3 * i);
-    sample.contact_area = area[i];
-    sample.largest_strain = strain[i];
-    sample.under_resolved = under_resolved[i] != 0;
-    set.samples.push_back(sample);
+    samples[i].scene = block.unit;
+    samples[i].frame = static_cast<int>(block.first_sample) + static_cast<int>(i);
   }
+  set.samples.insert(set.samples.end(), samples.begin(), samples.end());
 }
 
 /// The device that a block carries; null if it can't be read back, as where it names files that aren't here.
@@ -179,7 +161,7 @@ bool holds_drawn_set(const fs::path& folder) {
   const fs::path file = folder / "dataset.json";
   if (std::error_code error; !fs::is_regular_file(file, error)) return false;
   const ordered_json json = ordered_json::parse(read_whole_file(file), nullptr, false);
-  return json.is_object() && json.value("format", "") == "touchstone-drawn-dataset";
+  return json.is_object() && json.value("format", "") == kDrawnSetFormat;
 }
 
 InspectedSet read_inspected_draw(const fs::path& folder) {

@@ -67,36 +67,24 @@ void read_more(const std::filesystem::path& file, InspectedSet& set) {
   }
 }
 
+std::vector<double> column(const Hdf5Reader& file, const std::filesystem::path& path, const std::string& name,
+                           std::size_t width, std::size_t count) {
+  auto values = file.read<double>(name).values;
+  if (values.size() != width * count) fail("{}: '{}' isn't as long as the others", path.string(), name);
+  return values;
+}
+
 void read_columns(const std::filesystem::path& path, InspectedSet& set) {
   const TruthTable table = read_truth_table(path);
   const Hdf5Reader file(path);
   const std::size_t count = table.t_us.size();
-  const auto column = [&](const char* name, std::size_t width) {
-    auto values = file.read<double>(name).values;
-    if (values.size() != width * count) fail("{}: '{}' isn't as long as the others", path.string(), name);
-    return values;
-  };
-  const auto pose = column("/pose", 12);
-  const auto force_error = column("/error/force_N", 3);
-  const auto displacement_error = column("/error/displacement_mm", 1);
-  const auto area = column("/contact_area_mm2", 1);
-  const auto strain = column("/largest_strain", 1);
-  const auto under_resolved = file.read<std::uint8_t>("/under_resolved").values;
-  if (under_resolved.size() != count) fail("{}: '/under_resolved' isn't as long as the others", path.string());
+  const auto displacement_error = column(file, path, "/error/displacement_mm", 1, count);
+  set.samples = read_sample_columns(file, path, "/error/force_N", count);
   for (std::size_t i = 0; i < count; ++i) {
-    InspectedSample sample;
-    sample.scene = table.scene[i];
-    sample.frame = table.frame[i];
-    sample.t_us = table.t_us[i];
-    sample.wrench = table.wrench[i];
-    const Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>> placed(pose.data() + 12 * i);
-    sample.gel_from_object = {placed.leftCols<3>(), placed.col(3)};
-    sample.force_error = Eigen::Map<const Eigen::Vector3d>(force_error.data() + 3 * i);
-    sample.displacement_error = displacement_error[i];
-    sample.contact_area = area[i];
-    sample.largest_strain = strain[i];
-    sample.under_resolved = under_resolved[i] != 0;
-    set.samples.push_back(sample);
+    set.samples[i].scene = table.scene[i];
+    set.samples[i].frame = table.frame[i];
+    set.samples[i].t_us = table.t_us[i];
+    set.samples[i].displacement_error = displacement_error[i];
   }
 }
 
@@ -111,6 +99,29 @@ std::optional<std::filesystem::path> picture_file(const InspectedSet& set, std::
 }
 
 }  // namespace
+
+std::vector<InspectedSample> read_sample_columns(const Hdf5Reader& file, const std::filesystem::path& path,
+                                                 const std::string& force_error, std::size_t count) {
+  const auto wrench = column(file, path, "/wrench", 6, count);
+  const auto pose = column(file, path, "/pose", 12, count);
+  const auto error = column(file, path, force_error, 3, count);
+  const auto area = column(file, path, "/contact_area_mm2", 1, count);
+  const auto strain = column(file, path, "/largest_strain", 1, count);
+  const auto under_resolved = file.read<std::uint8_t>("/under_resolved").values;
+  if (under_resolved.size() != count) fail("{}: '/under_resolved' isn't as long as the others", path.string());
+  std::vector<InspectedSample> samples(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    InspectedSample& sample = samples[i];
+    sample.wrench = Eigen::Map<const Eigen::Matrix<double, 6, 1>>(wrench.data() + 6 * i);
+    const Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>> placed(pose.data() + 12 * i);
+    sample.gel_from_object = {placed.leftCols<3>(), placed.col(3)};
+    sample.force_error = Eigen::Map<const Eigen::Vector3d>(error.data() + 3 * i);
+    sample.contact_area = area[i];
+    sample.largest_strain = strain[i];
+    sample.under_resolved = under_resolved[i] != 0;
+  }
+  return samples;
+}
 
 cv::Mat inspected_frame(const InspectedSet& set, std::size_t sample) {
   if (set.drawn) return drawn_frame(set, sample);

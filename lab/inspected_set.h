@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/hdf5_file.h"
 #include "core/transform.h"
 #include "lab/drawn_manifest.h"
 #include "sim/device.h"
@@ -65,6 +66,11 @@ struct InspectedSet {
 
 /// Of either kind of set. @throws Error if the folder isn't a finished data set, or is damaged
 InspectedSet read_inspected_set(const std::filesystem::path& folder);
+
+/// The columns that files of both kinds of sets have, in samples of which all else is still to be filled in.
+/// @throws Error naming `path` if a column hasn't `count` rows
+std::vector<InspectedSample> read_sample_columns(const Hdf5Reader& file, const std::filesystem::path& path,
+                                                 const std::string& force_error, std::size_t count);
 
 /// A sample's picture with the imager's noise, or where the set has only that the one without, grey or BGR; empty if it
 /// has neither. @throws Error if it can't be read
