@@ -20,6 +20,7 @@ using Action = std::function<void()>;
 // Each adds one command to the line. When it is chosen, it sets `action`. `global` is read when the action runs.
 void add_plan_command(CLI::App& app, const GlobalOptions& global, Action& action);
 void add_render_command(CLI::App& app, const GlobalOptions& global, Action& action);
+void add_fit_command(CLI::App& app, const GlobalOptions& global, Action& action);
 void add_generate_command(CLI::App& app, const GlobalOptions& global, Action& action);
 void add_merge_command(CLI::App& app, const GlobalOptions& global, Action& action);
 void add_calibrate_command(CLI::App& app, const GlobalOptions& global, Action& action);

@@ -30,7 +30,9 @@ void estimate(const EstimateOptions& options, const GlobalOptions& global) {
   const auto untrusted = count([](const lab::HeightRecord& record) { return !record.trusted; });
   const auto at_border = count([](const lab::HeightRecord& record) { return record.contact_at_border; });
   fmt::print("{}: {} height maps and heights.csv\n", options.out.string(), records.size());
-  if (untrusted > 0) fmt::print("  {} of them of frames that are overexposed or dark: not to be trusted\n", untrusted);
+  if (untrusted > 0) {
+    fmt::print("  {} of them of frames that are overexposed, dark or of one colour: not to be trusted\n", untrusted);
+  }
   if (at_border > 0) {
     fmt::print("  {} with a contact that runs out of the picture{}\n", at_border,
                settings.border == sensors::HeightBorder::zero ? ": --border free suits them" : "");

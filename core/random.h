@@ -29,6 +29,7 @@ enum class Purpose : std::uint32_t {
   kNetworkWeights = 20,
   kFolds = 21,
   kSearch = 22,
+  kStudy = 23,
   kTest = 99,
 };
 

@@ -13,7 +13,9 @@ namespace {
 
 constexpr int kReliefIterations = 40;
 constexpr int kRimSteps = 200;
-constexpr double kTouch = 1e-15;  // of the radius: rounding
+constexpr int kEllipseSteps = 60;  // some 5 do
+constexpr double kAcross = 1e-6;   // cosine from which a disc is seen as an ellipse, not as a line
+constexpr double kTouch = 1e-15;   // of the radius: rounding
 
 void check_positive(double value, const char* what) {
   if (!(value > 0.0) || !std::isfinite(value)) fail("{} is {} mm, it must be above 0 and finite", what, value);
@@ -257,10 +259,53 @@ std::optional<double> silhouette_distance(const SphereShape& shape, const Eigen:
   return shape.radius - (p - p.dot(d) * d).norm();
 }
 
+namespace {
+
+/// From a point outside of an ellipse about the origin, its half axes `a` and `b`; 0 inside.
+/// The nearest point is (a2 x / (t + a2), b2 y / (t + b2)) with t the largest root of a convex falling function, to
+/// which Newton's steps from below come from one side. Eberly, Distance from a Point to an Ellipse, 2013, section 2.
+double distance_outside_ellipse(double a, double b, double x, double y) {
+  x = std::abs(x);
+  y = std::abs(y);
+  if (a == 0.0 || b == 0.0) return std::hypot(std::max(0.0, x - a), std::max(0.0, y - b));
+  const double a2 = a * a;
+  const double b2 = b * b;
+  double t = std::max({0.0, a * x - a2, b * y - b2});
+  for (int step = 0; step < kEllipseSteps; ++step) {
+    const double u = a * x / (t + a2);
+    const double v = b * y / (t + b2);
+    const double value = u * u + v * v - 1.0;
+    if (!(value > 0.0)) break;
+    const double next = t + 0.5 * value / (u * u / (t + a2) + v * v / (t + b2));
+    if (!(next > t)) break;
+    t = next;
+  }
+  return t * std::hypot(x / (t + a2), y / (t + b2));
+}
+
+}  // namespace
+
 std::optional<double> silhouette_distance(const RoundedCylinder& shape, const Eigen::Vector3d& p,
                                           const Eigen::Vector3d& d) {
-  if (d.x() * d.x() + d.y() * d.y() >= 1e-30) return std::nullopt;
-  return shape.radius - std::sqrt(p.x() * p.x() + p.y() * p.y());
+  const double sine2 = d.x() * d.x() + d.y() * d.y();
+  if (sine2 < 1e-30) return shape.radius - std::sqrt(p.x() * p.x() + p.y() * p.y());
+  // The body is the disc of the core, z = r, in which a ball of radius r is swept, below the sharp cylinder above r.
+  const double r = shape.edge_radius;
+  const double core = shape.radius - r;
+  const double cosine = std::abs(d.z());
+  if (shape.height < 2.0 * r || cosine < kAcross) return std::nullopt;
+  // Seen along d, with u along the axis as it is seen (towards +z) and v across it.
+  const double sine = std::sqrt(sine2);
+  const Eigen::Vector3d u_axis(-d.x() * d.z() / sine, -d.y() * d.z() / sine, sine);
+  const double u = u_axis.dot(p - Eigen::Vector3d(0.0, 0.0, r));
+  const double v = (d.x() * p.y() - d.y() * p.x()) / sine;
+  // A disc of radius R is seen as an ellipse, R cosine by R; R cosine (1 - norm) is at most the distance to it.
+  const double side = u - std::clamp(u, 0.0, (shape.height - r) * sine);
+  const double sharp = cosine * shape.radius - std::hypot(side, cosine * v);
+  if (r == 0.0) return sharp;
+  const double in_core = cosine * core - std::hypot(u, cosine * v);
+  const double rim = in_core >= 0.0 ? r + in_core : r - distance_outside_ellipse(cosine * core, core, u, v);
+  return std::max(sharp, rim);
 }
 
 std::optional<double> silhouette_distance(const BoxShape& shape, const Eigen::Vector3d& p, const Eigen::Vector3d& d) {
@@ -278,8 +323,9 @@ std::optional<double> silhouette_distance(const MeshShape&, const Eigen::Vector3
   return std::nullopt;
 }
 
-std::optional<double> silhouette_distance(const ReliefShape&, const Eigen::Vector3d&, const Eigen::Vector3d&) {
-  return std::nullopt;
+std::optional<double> silhouette_distance(const ReliefShape& shape, const Eigen::Vector3d& p,
+                                          const Eigen::Vector3d& d) {
+  return std::visit([&](const auto& base) { return silhouette_distance(base, p, d); }, shape.base);
 }
 
 BoundingBall bounding_ball(const ContactShape& shape) {

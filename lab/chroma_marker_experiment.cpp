@@ -5,8 +5,10 @@
 #include <limits>
 
 #include "core/error.h"
+#include "core/units.h"
 #include "lab/chroma_force_experiment.h"
 #include "lab/straight_line.h"
+#include "sensors/hue.h"
 #include "sensors/seen_markers.h"
 #include "sim/virtual_sensor.h"
 
@@ -65,6 +67,7 @@ MarkerSeries read_series(const ChromaBench& bench, const MarkerTest& test, const
   MarkerSeries series;
   for (std::size_t i = first; i < looks.size(); ++i) {
     const sensors::ColourMarker& seen = looks[i].reading.markers[marker];
+    series.largest_strain = std::max(series.largest_strain, looks[i].state.press.largest_strain);
     if (seen.flaw != sensors::MarkerFlaw::kNone) {
       ++series.flawed;
       continue;
@@ -95,6 +98,46 @@ MarkerSeries shear_series(const ChromaBench& bench, const MarkerTest& test, doub
                           const Eigen::Vector2d& end_mm, int steps, std::uint64_t seed) {
   const auto motion = press_and_drag(test.place_mm, kBall_mm, depth_mm, 1, end_mm, steps);
   return read_series(bench, test, bench.play(ball_of(kBall_mm, test.friction), motion, seed), 1);
+}
+
+std::vector<double> hue_repeats_deg(const ChromaBench& bench, std::uint64_t seed, int pictures) {
+  TS_ASSERT(pictures > 1);
+  sensors::ColourMarkerFinder finder = bench.finder();
+  const std::size_t markers = bench.rest().markers.size();
+  std::vector<double> sum(markers, 0.0);
+  std::vector<double> square(markers, 0.0);
+  for (int i = 0; i < pictures; ++i) {
+    const sensors::ColourMarkerReading& reading = finder.find(bench.rig().background(seed, i));
+    for (std::size_t m = 0; m < markers; ++m) {
+      const double change =
+          sensors::hue_difference(reading.markers[m].hue, bench.rest().markers[m].hue) / kRadiansPerDegree;
+      sum[m] += change;
+      square[m] += change * change;
+    }
+  }
+  std::vector<double> deviations;
+  for (std::size_t m = 0; m < markers; ++m) {
+    deviations.push_back(std::sqrt(std::max(0.0, square[m] - sum[m] * sum[m] / pictures) / (pictures - 1)));
+  }
+  return deviations;
+}
+
+HueAgainstDepth hue_against_depth(const ChromaBench& bench, const MarkerSeries& press, std::size_t marker) {
+  HueAgainstDepth found;
+  for (std::size_t i = 0; i < press.seen.size(); ++i) {
+    found.depth_mm.push_back(-press.ball_mm[i].z());
+    found.change_deg.push_back(sensors::hue_difference(press.seen[i].hue, bench.rest().markers[marker].hue) /
+                               kRadiansPerDegree);
+  }
+  return found;
+}
+
+std::vector<sensors::HueModelForm> forms_of_one_marker() {
+  std::vector<sensors::HueModelForm> forms;
+  for (const sensors::HueModelForm& form : sensors::usual_hue_forms()) {
+    if (!form.features.of_surroundings()) forms.push_back(form);
+  }
+  return forms;
 }
 
 std::vector<sensors::HueSample> samples_of(const MarkerSeries& series, std::size_t marker, int number) {

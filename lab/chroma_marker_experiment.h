@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "lab/chroma_bench.h"
+#include "lab/straight_line.h"
 #include "sensors/hue_estimator.h"
 #include "sensors/traction_inversion.h"
 
@@ -22,6 +23,7 @@ struct MarkerSeries {
   std::vector<Eigen::Vector3d> ball_mm;     ///< displacement of the ball since it touched: a press is -z
   std::vector<sensors::ColourMarker> seen;  ///< as long as `ball_mm`; flawed ones are left out of both
   int flawed = 0;                           ///< pictures in which the marker could not be read
+  double largest_strain = 0.0;              ///< of the gel's surface over the series, see fem::PressState
   std::vector<double> column_mm(int axis) const;
 };
 
@@ -37,6 +39,19 @@ MarkerSeries press_series(const ChromaBench& bench, const MarkerTest& test, doub
 /// Fig. 9 and sec. IV.D: pressed at once, then dragged to `end_mm` (x, y) in `steps` steps.
 MarkerSeries shear_series(const ChromaBench& bench, const MarkerTest& test, double depth_mm,
                           const Eigen::Vector2d& end_mm, int steps, std::uint64_t seed);
+
+/// Standard deviation (degrees) of each marker's hue in pictures of the untouched device. @pre at least 2 pictures
+std::vector<double> hue_repeats_deg(const ChromaBench& bench, std::uint64_t seed, int pictures);
+
+/// Fig. 8: changes of a marker's hue since rest, and the ball's depths that go with them.
+struct HueAgainstDepth {
+  std::vector<double> depth_mm, change_deg;
+  StraightLine line() const { return line_through(depth_mm, change_deg); }
+};
+HueAgainstDepth hue_against_depth(const ChromaBench& bench, const MarkerSeries& press, std::size_t marker);
+
+/// The usual forms of a model that needs nothing but the marker itself.
+std::vector<sensors::HueModelForm> forms_of_one_marker();
 
 /// Samples for calibration, with the ball's displacement as the marker's.
 std::vector<sensors::HueSample> samples_of(const MarkerSeries& series, std::size_t marker, int number);

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/error.h"
+#include "lab/input_files.h"
 #include "lab/job.h"
 
 namespace touchstone::lab {
@@ -12,16 +13,6 @@ constexpr int kMostUnits = 100'000;
 constexpr double kMostPieces = 1e9;
 constexpr int kMostSamplesAFile = 1000;  // all of a file's samples are in memory at once
 constexpr double kLargestTilt_deg = 60.0;
-
-std::filesystem::path existing_file(YamlReader& in, const std::string& key) {
-  std::string name;
-  in.required(key, name);
-  std::filesystem::path file = in.folder() / name;
-  if (!in.describing() && !std::filesystem::is_regular_file(file)) {
-    fail_at(in.where(key), "{}{}: there is no file {}", in.context(), key, file.string());
-  }
-  return file;
-}
 
 }  // namespace
 

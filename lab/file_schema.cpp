@@ -11,6 +11,7 @@
 #include "lab/job.h"
 #include "lab/palpation_spec.h"
 #include "lab/study.h"
+#include "lab/unit_fit_spec.h"
 #include "sim/device.h"
 #include "sim/motion.h"
 #include "sim/object.h"
@@ -253,6 +254,7 @@ const std::vector<Kind>& kinds() {
        }},
       {"study", schema_of<StudySpec>},
       {"palpation", schema_of<PalpationSpec>},
+      {"fit", schema_of<UnitFitSpec>},
   };
   return all;
 }

@@ -68,4 +68,14 @@ std::vector<InputFile> input_files(const fs::path& root) {
   return files;
 }
 
+std::filesystem::path existing_file(YamlReader& in, const std::string& key) {
+  std::string name;
+  in.required(key, name);
+  std::filesystem::path file = in.folder() / name;
+  if (!in.describing() && !std::filesystem::is_regular_file(file)) {
+    fail_at(in.where(key), "{}{}: there is no file {}", in.context(), key, file.string());
+  }
+  return file;
+}
+
 }  // namespace touchstone::lab

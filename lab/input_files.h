@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "core/yaml_reader.h"
+
 namespace touchstone::lab {
 
 /// A file that a job's result depends on.
@@ -17,5 +19,9 @@ struct InputFile {
 /// taken relative to that file's folder, is the path of an existing file: so no list of keys has to be kept here.
 /// @throws Error if a file can't be read or isn't YAML
 std::vector<InputFile> input_files(const std::filesystem::path& root);
+
+/// Reads the field `key` as a file's name, relative to the folder of the file it stands in.
+/// @throws Error with file and line if there is no such file
+std::filesystem::path existing_file(YamlReader& in, const std::string& key);
 
 }  // namespace touchstone::lab

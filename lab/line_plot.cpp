@@ -120,6 +120,7 @@ std::string draw_curve(const PlotCurve& curve, const char* colour, const Axis& x
         fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"3.5\" fill=\"{}\"/>\n", x.place(px), y.place(py), colour);
   }
   if (line.empty()) return {};
+  if (!curve.joined) return marks;
   return fmt::format("<polyline points=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.6\"{}/>\n", line, colour,
                      curve.dashed ? " stroke-dasharray=\"6 4\"" : "") +
          marks;

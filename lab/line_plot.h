@@ -9,11 +9,12 @@
 
 namespace touchstone::lab {
 
-/// A curve of one colour: points in the order in which they are joined, each marked.
+/// A curve of one colour: points in the order in which they are joined, if they are, each marked.
 struct PlotCurve {
   std::string name;  ///< in the legend; empty: none
   std::vector<std::pair<double, double>> points;
   bool dashed = false;                     ///< for theory: no marks
+  bool joined = true;                      ///< by lines
   std::optional<std::size_t> colour = {};  ///< number in the palette of six; none: as the curves' order
 };
 

@@ -7,10 +7,12 @@
 namespace touchstone::lab {
 namespace {
 
-enum class KindName { apparent_change };
+enum class KindName { apparent_change, bead_force, colour_marker };
 
 EnumNames<KindName> enum_names(KindName) {
-  return {{"apparent_change", KindName::apparent_change}};
+  return {{"apparent_change", KindName::apparent_change},
+          {"bead_force", KindName::bead_force},
+          {"colour_marker", KindName::colour_marker}};
 }
 
 }  // namespace
@@ -25,7 +27,11 @@ void fields(YamlReader& in, StudySpec& study) {
   in.required("kind", kind);
   switch (kind) {
     case KindName::apparent_change:
-      fields(in, study.kind.emplace<ApparentChangeSpec>());
+      return fields(in, study.kind.emplace<ApparentChangeSpec>());
+    case KindName::bead_force:
+      return fields(in, study.kind.emplace<BeadDesignSpec>());
+    case KindName::colour_marker:
+      return fields(in, study.kind.emplace<ColourDesignSpec>());
   }
 }
 
@@ -34,11 +40,14 @@ StudySpec read_study(const std::filesystem::path& file) {
 }
 
 StudyResult run_study(const StudySpec& study, const std::filesystem::path& cache, const Progress& progress) {
-  return std::visit(
-      [&](const ApparentChangeSpec& spec) {
-        return report(study.name, spec, run_apparent_change(spec, cache, progress));
-      },
-      study.kind);
+  if (const auto* spec = std::get_if<ApparentChangeSpec>(&study.kind)) {
+    return report(study.name, *spec, run_apparent_change(*spec, cache, progress));
+  }
+  if (const auto* spec = std::get_if<ColourDesignSpec>(&study.kind)) {
+    return report(study.name, *spec, run_colour_design(*spec, cache, progress));
+  }
+  const auto& spec = std::get<BeadDesignSpec>(study.kind);
+  return report(study.name, spec, run_bead_design(spec, progress));
 }
 
 void make_study_folder(const std::filesystem::path& folder) {

@@ -10,11 +10,14 @@
 #include "core/progress.h"
 #include "core/yaml_reader.h"
 #include "lab/apparent_change_study.h"
+#include "lab/bead_design_study.h"
+#include "lab/colour_design_study.h"
+#include "lab/study_files.h"
 
 namespace touchstone::lab {
 
 /// One alternative a kind; the names in files are in study.cpp.
-using StudyKind = std::variant<ApparentChangeSpec>;
+using StudyKind = std::variant<ApparentChangeSpec, BeadDesignSpec, ColourDesignSpec>;
 
 struct StudySpec {
   std::string name;  ///< also of its files; letters, digits, - and _
@@ -24,16 +27,6 @@ void fields(YamlReader& in, StudySpec& study);
 
 /// Reads and checks a study and all files that it names. @throws Error with file and line
 StudySpec read_study(const std::filesystem::path& file);
-
-/// What a study leaves behind: files by name, their text, and what is to be told beside.
-struct StudyFile {
-  std::string name;
-  std::string text;
-};
-struct StudyResult {
-  std::vector<StudyFile> files;    ///< a table as CSV and one in Markdown, plots as SVG
-  std::vector<std::string> notes;  ///< presses that couldn't be had, and why
-};
 
 /// The same study gives the same bytes. @throws Error if a gel can't be had
 StudyResult run_study(const StudySpec& study, const std::filesystem::path& cache, const Progress& progress = {});

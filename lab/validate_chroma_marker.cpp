@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include <fmt/format.h>
 
@@ -30,48 +31,6 @@ constexpr double kPublishedError_um = 350.0;
 constexpr double kPublishedRepeat_deg = 0.3;
 constexpr double kLinear_r2 = 0.99;
 
-double degrees(double radians) {
-  return radians / kRadiansPerDegree;
-}
-
-/// Change of hue since rest, degrees.
-std::vector<double> hue_changes(const MarkerSeries& series, const sensors::ColourMarker& rest) {
-  std::vector<double> changes;
-  for (const sensors::ColourMarker& seen : series.seen) {
-    changes.push_back(degrees(sensors::hue_difference(seen.hue, rest.hue)));
-  }
-  return changes;
-}
-
-/// Mean over markers of the standard deviation of their hue in pictures of the untouched device.
-double repeat_deg(const ChromaBench& bench, int pictures) {
-  sensors::ColourMarkerFinder finder = bench.finder();
-  const std::size_t markers = bench.rest().markers.size();
-  std::vector<double> sum(markers, 0.0);
-  std::vector<double> square(markers, 0.0);
-  for (int i = 0; i < pictures; ++i) {
-    const sensors::ColourMarkerReading& reading = finder.find(bench.rig().background(kRest, i));
-    for (std::size_t m = 0; m < markers; ++m) {
-      const double change = degrees(sensors::hue_difference(reading.markers[m].hue, bench.rest().markers[m].hue));
-      sum[m] += change;
-      square[m] += change * change;
-    }
-  }
-  double mean = 0.0;
-  for (std::size_t m = 0; m < markers; ++m) {
-    mean += std::sqrt(std::max(0.0, square[m] - sum[m] * sum[m] / pictures) / (pictures - 1)) / double(markers);
-  }
-  return mean;
-}
-
-std::vector<sensors::HueModelForm> forms_of_one_marker() {
-  std::vector<sensors::HueModelForm> forms;
-  for (const sensors::HueModelForm& form : sensors::usual_hue_forms()) {
-    if (!form.features.of_surroundings()) forms.push_back(form);
-  }
-  return forms;
-}
-
 }  // namespace
 
 std::vector<ValidationRow> validate_chroma_marker(const ValidateOptions& options) {
@@ -84,15 +43,14 @@ std::vector<ValidationRow> validate_chroma_marker(const ValidateOptions& options
   RowList rows("chroma.", options, RowList::Since::last_row);
 
   const int pictures = options.quick ? 10 : 50;
-  const double repeat = repeat_deg(bench, pictures);
+  const std::vector<double> repeats = hue_repeats_deg(bench, kRest, pictures);
+  const double repeat = std::accumulate(repeats.begin(), repeats.end(), 0.0) / static_cast<double>(repeats.size());
   rows.add("hue.repeat_deg", fmt::format("standard deviation of a marker's hue in {} pictures of one state", pictures),
            "deg", repeat, Better::lower, repeat <= kPublishedRepeat_deg)
       .published = kPublishedRepeat_deg;
 
   const MarkerSeries press = press_series(bench, test, 3.0, options.quick ? 0.25 : 0.05, kPress);
-  const std::vector<double> hues = hue_changes(press, rest);
-  std::vector<double> depths;
-  for (const Eigen::Vector3d& ball : press.ball_mm) depths.push_back(-ball.z());
+  const auto& [depths, hues] = hue_against_depth(bench, press, marker);
   const StraightLine hue_line = line_through(depths, hues);
   {
     ValidationRow& row = rows.add(

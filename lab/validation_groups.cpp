@@ -25,12 +25,14 @@ std::vector<ValidationRow> validate_chroma_robustness(const ValidateOptions& opt
 std::vector<ValidationRow> validate_chroma_design(const ValidateOptions& options);
 std::vector<ValidationRow> validate_reflex(const ValidateOptions& options);
 std::vector<ValidationRow> validate_gelsight_light(const ValidateOptions& options);
+std::vector<ValidationRow> validate_gelsight_design(const ValidateOptions& options);
 std::vector<ValidationRow> validate_gelsight_height(const ValidateOptions& options);
 std::vector<ValidationRow> validate_gelsight_dome(const ValidateOptions& options);
 std::vector<ValidationRow> validate_gelsight_map(const ValidateOptions& options);
 std::vector<ValidationRow> validate_gelsight_slip(const ValidateOptions& options);
 std::vector<ValidationRow> validate_gelsight_grasp(const ValidateOptions& options);
 std::vector<ValidationRow> validate_gelsight_texture(const ValidateOptions& options);
+std::vector<ValidationRow> validate_gelsight_unit(const ValidateOptions& options);
 
 const std::vector<ValidationGroup>& validation_groups() {
   static const std::vector<ValidationGroup> groups = {
@@ -57,11 +59,13 @@ const std::vector<ValidationGroup>& validation_groups() {
       {"reflex", validate_reflex},
       {"gelsight.light", validate_gelsight_light},
       {"gelsight.height", validate_gelsight_height},
+      {"gelsight.design", validate_gelsight_design},
       {"gelsight.dome", validate_gelsight_dome},
       {"gelsight.map", validate_gelsight_map},
       {"gelsight.force", validate_gelsight_slip},
       {"gelsight.grasp", validate_gelsight_grasp},
       {"gelsight.texture", validate_gelsight_texture},
+      {"gelsight.unit", validate_gelsight_unit},
   };
   return groups;
 }

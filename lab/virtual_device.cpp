@@ -153,6 +153,7 @@ struct VirtualObject::Parts {
     render::Imager imager;
     render::FixedPattern pattern;
     std::uint64_t seed = 0;
+    cv::Mat rest_light;  // of `start`
 
     cv::Mat expose(const cv::Mat& light, std::uint64_t noise_seed) const {
       return render::develop(render::expose(light, imager, pattern, seed, noise_seed), imager);
@@ -221,6 +222,7 @@ struct VirtualDevice::Parts {
       made->imager = sim::imager(device, plan.bands, plan.sensor_noise);
       made->pattern = render::fixed_pattern(made->imager, {device.camera->width, device.camera->height}, settings.seed);
       made->seed = settings.seed;
+      made->rest_light = made->camera->capture(made->start).radiance;
       kept = std::move(made);
     }
     return kept;
@@ -256,6 +258,7 @@ struct VirtualDevice::Parts {
 
   /// A coated device's frames.
   void show(const cv::Mat& light, std::uint64_t noise_seed, HeldFrame& held) const {
+    held.light = light;
     held.expose = [this, light](std::uint64_t seed) { return rig->develop(light, seed); };
     held.frame = held.expose(noise_seed);
     held.background = rig->background(noise_seed ^ kOtherNoise);
@@ -264,9 +267,10 @@ struct VirtualDevice::Parts {
   /// A clear one's.
   static void show(const std::shared_ptr<const VirtualObject::Parts::Sight>& seen, const cv::Mat& light,
                    std::uint64_t noise_seed, HeldFrame& held) {
+    held.light = light;
     held.expose = [seen, light](std::uint64_t seed) { return seen->expose(light, seed); };
     held.frame = held.expose(noise_seed);
-    held.background = seen->expose(seen->camera->capture(seen->start).radiance, noise_seed ^ kOtherNoise);
+    held.background = seen->expose(seen->rest_light, noise_seed ^ kOtherNoise);
   }
 
   sim::DeviceSpec device;
@@ -340,7 +344,7 @@ HeldFrame VirtualDevice::rest(std::uint64_t noise_seed) const {
     }
     const auto seen = parts_->sight(*nothing, {0, 0, kFar_mm});
     held.press = seen->start.press;
-    Parts::show(seen, seen->camera->capture(seen->start).radiance, noise_seed, held);
+    Parts::show(seen, seen->rest_light, noise_seed, held);
   }
   held.contact = cv::Mat::zeros(held.frame.size(), CV_8U);
   return held;

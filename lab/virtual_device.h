@@ -34,6 +34,7 @@ struct HeldFrame {
   std::string what;    ///< device, object and hold in words, for messages: "small, ball at (0, 0) mm with 2 N"
   cv::Mat frame;       ///< 8 bit, BGR or grey, with noise
   cv::Mat background;  ///< the untouched device with other noise
+  cv::Mat light;       ///< CV_32FC(bands), W/m^2 on the sensor: what the frame was exposed to
   cv::Mat height;      ///< CV_32FC1, mm, see sim::Touch; empty of a device without a coating
   cv::Mat contact;     ///< CV_8UC1, 255 where the pixel sees gel that lies on the object
   Eigen::Vector3d force_N = Eigen::Vector3d::Zero();

@@ -21,6 +21,16 @@ static_assert(ColourCorrection::kLargestGain / static_cast<double>(kFinestStep_D
               std::min(32767.0 / (1 << kCoefficientBits), 32767.0 / (1 << kCellBits) / 256.0));
 constexpr float kClearly_DN = 12.0F;  // summed over the channels
 
+/// Is every pixel the first one's like? A frame of a gel differs from it in its first few.
+bool is_flat(const cv::Mat& frame) {
+  const auto first = frame.at<cv::Vec3b>(0, 0);
+  for (int v = 0; v < frame.rows; ++v) {
+    const auto* const row = frame.ptr<cv::Vec3b>(v);
+    if (!std::all_of(row, row + frame.cols, [&](const cv::Vec3b& pixel) { return pixel == first; })) return false;
+  }
+  return true;
+}
+
 inline std::int16_t upper_half(std::int16_t a, std::int16_t b) {
   return static_cast<std::int16_t>((static_cast<std::int32_t>(a) * b) >> 16);
 }
@@ -187,6 +197,7 @@ const HeightResult& HeightEstimator::estimate(const cv::Mat& frame) {
   result_.contact_pixels = mark_contact(result_.height_mm, settings_.contact, result_.contact);
   result_.overexposed = result_.saturated_share > settings_.most_saturated;
   result_.dark = result_.dark_share > settings_.most_dark;
+  result_.flat = is_flat(frame);
   result_.contact_at_border = touches_border(result_.contact);
   return result_;
 }

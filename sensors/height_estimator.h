@@ -28,9 +28,10 @@ struct HeightResult {
   double dark_share = 0.0;         ///< all channels are 0
   bool overexposed = false;        ///< more saturated pixels than the settings allow: heights there are too flat
   bool dark = false;               ///< more black pixels than the settings allow: no light, or a covered camera
+  bool flat = false;               ///< all pixels are alike: no camera that sees a gel delivers that
   bool contact_at_border = false;  ///< the contact runs out of the picture: use HeightBorder::free, and mind the level
 
-  bool trusted() const { return !overexposed && !dark; }
+  bool trusted() const { return !overexposed && !dark && !flat; }
 };
 
 /// How well the calibration's colours cover those of a frame.

@@ -31,7 +31,9 @@ const TouchReading& TouchReader::read(const Frame& frame) {
   reading_ = {};
   const MotionRatio motion = motion_ratio(calibration_.background, before_, frame.image, settings_.motion, &contact_);
   const TrackedMarkers& markers = tracker_.track(frame);
-  frame.image.copyTo(before_);
+  reading_.light = markers.light;
+  const bool lit = markers.light == FrameLight::kNormal;
+  if (lit) frame.image.copyTo(before_);  // the next frame's motion is that since the gel was seen
   reading_.motion_ratio = motion.ratio;
   reading_.markers_found = markers.found();
 
@@ -48,7 +50,7 @@ const TouchReading& TouchReader::read(const Frame& frame) {
     reading_.shear_N = shear_force_N(calibration_.shear, moved_mm);
     reading_.force_ratio = force_ratio(reading_.shear_N, reading_.normal_N);
   }
-  reading_.rule_slip = is_slip(reading_.force_ratio, reading_.motion_ratio, settings_.rule);
+  reading_.rule_slip = lit && is_slip(reading_.force_ratio, reading_.motion_ratio, settings_.rule);
   reading_.rim = rim_.look(markers, reading_.patch);
   return reading_;
 }

@@ -45,6 +45,8 @@ struct TouchReading {
   bool rule_slip = false;                             ///< both of them above their thresholds
   IncipientSlip rim;                                  ///< slip that begins at the contact's rim
   int markers_found = 0;
+  /// Of the frame. Where it isn't normal nothing is measured: heights and forces mean nothing, markers are held.
+  FrameLight light = FrameLight::kNormal;
 };
 
 /// Reads the frames of one sensor, in their order. One object is for one thread.

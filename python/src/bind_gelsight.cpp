@@ -137,7 +137,7 @@ void bind_gelsight(py::module_& module) {
       .def_readonly("saturated_share", &HeightResult::saturated_share, "Of the pixels.")
       .def_readonly("dark_share", &HeightResult::dark_share, "Of the pixels.")
       .def_readonly("contact_at_border", &HeightResult::contact_at_border, "The contact runs out of the picture.")
-      .def_property_readonly("trusted", &HeightResult::trusted, "Neither overexposed nor dark.");
+      .def_property_readonly("trusted", &HeightResult::trusted, "Neither overexposed nor dark nor of one colour.");
   py::class_<Heights, std::shared_ptr<Heights>>(
       module, "HeightEstimator",
       "Frame in, height map out. HeightEstimator(model, *, border='zero'); border 'free' where contacts run out of the "

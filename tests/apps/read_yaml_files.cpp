@@ -12,6 +12,7 @@
 #include "lab/job.h"
 #include "lab/palpation_spec.h"
 #include "lab/study.h"
+#include "lab/unit_fit_spec.h"
 #include "sim/device.h"
 #include "sim/motion.h"
 #include "sim/object.h"
@@ -36,6 +37,7 @@ int read_all() {
       {"scene", [](const std::string& file) { sim::read_scene(file); }},
       {"job", read_job_of_either_sort},
       {"study", [](const std::string& file) { lab::read_study(file); }},
+      {"fit", [](const std::string& file) { read_yaml<lab::UnitFitSpec>(file); }},
       {"palpation", [](const std::string& file) { lab::read_palpation(file); }},
   };
   std::string kind;

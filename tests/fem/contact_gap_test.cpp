@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <memory>
+#include <vector>
 
 #include "core/units.h"
 #include "tests/support/half_space_gel.h"
@@ -175,16 +178,49 @@ TEST(WeightedGap, MovedAlongTheNormalIsThatOfTheMovedBody) {
   }
 }
 
-TEST(SilhouetteDistance, IsZeroWhereTheLineBeginsToHit) {
-  // The same outline by two ways: the sign of the distance, and whether the line enters.
-  const Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
-  for (const ContactShape& shape : {ContactShape(RoundedCylinder{1.1, 0.2, 1.0}), ContactShape(SphereShape{0.9}),
-                                    ContactShape(BoxShape{{1.0, 1.8, 0.5}})}) {
-    for (int k = 0; k < 400; ++k) {
-      const Eigen::Vector3d point(std::fmod(0.618 * k, 3.0) - 1.5, std::fmod(0.755 * k, 3.0) - 1.5, -2.0);
-      const auto distance = std::visit([&](const auto& body) { return silhouette_distance(body, point, up); }, shape);
-      ASSERT_TRUE(distance.has_value());
-      EXPECT_EQ(*distance >= 0.0, first_entry(shape, point, up).has_value());
+TEST(SilhouetteDistance, HasTheSignOfAHitAndNeverExceedsTheDistance) {
+  // The same outline by two ways: the sign of the distance, and whether the line enters; upright, tilted, from below
+  // and lying. Between two lines it may change by their distance at most.
+  const auto relief = std::make_shared<const ReliefMap>(2, 2, Eigen::Vector2d(-0.5, -0.5), Eigen::Vector2d(1, 1),
+                                                        std::array{true, true}, std::vector<float>(4, 0.01F));
+  const std::vector<ContactShape> shapes{
+      RoundedCylinder{1.1, 0.2, 1.0}, RoundedCylinder{1.1, 0.0, 1.0},
+      RoundedCylinder{0.8, 0.8, 1.6}, SphereShape{0.9},
+      BoxShape{{1.0, 1.8, 0.5}},      ReliefShape{RoundedCylinder{1.1, 0.2, 1.0}, relief}};
+  const std::vector<Eigen::Vector3d> ways{{0, 0, 1},      {1e-9, 0, 1},     {0.1, 0.05, 1},  {-0.3, 0.2, 1},
+                                          {0.9, -1.4, 1}, {0.2, 0.1, -1.0}, {1, 0.3, 0.002}, {0.5, 0, 0.5}};
+  for (const ContactShape& shape : shapes) {
+    for (const Eigen::Vector3d& way : ways) {
+      const Eigen::Vector3d d = way.normalized();
+      if (std::holds_alternative<BoxShape>(shape) && way.head<2>() != Eigen::Vector2d::Zero()) {
+        EXPECT_FALSE(silhouette_distance(std::get<BoxShape>(shape), Eigen::Vector3d::Zero(), d).has_value());
+        continue;
+      }
+      const Eigen::Vector3d a = d.unitOrthogonal();
+      const Eigen::Vector3d b = d.cross(a);
+      Eigen::Vector3d before = Eigen::Vector3d::Zero();
+      double value_before = 0.0;
+      int hits = 0;
+      for (int k = 0; k < 4000; ++k) {
+        const double x = std::fmod(0.618034 * k, 3.6) - 1.8;
+        const double y = std::fmod(0.754878 * k, 3.6) - 1.8;
+        const Eigen::Vector3d point = x * a + y * b - 2.0 * d;
+        const auto value = std::visit([&](const auto& body) { return silhouette_distance(body, point, d); }, shape);
+        ASSERT_TRUE(value.has_value());
+        const bool hit = first_entry(shape, point, d).has_value();
+        hits += hit;
+        if (std::abs(*value) > 1e-12) {
+          EXPECT_EQ(*value > 0.0, hit) << "shape " << &shape - shapes.data() << ": " << *value << " at " << x << ", "
+                                       << y << " along " << d.transpose();
+        }
+        if (k > 0) {
+          EXPECT_LE(std::abs(*value - value_before), (point - before).norm() * (1.0 + 1e-12));
+        }
+        before = point;
+        value_before = *value;
+      }
+      EXPECT_GT(hits, 200);
+      EXPECT_LT(hits, 3800);
     }
   }
 }

@@ -7,7 +7,6 @@
 #include <numeric>
 
 #include "core/error.h"
-#include "core/triangle_mesh.h"
 #include "core/units.h"
 #include "fem/elastic_body.h"
 #include "fem/press.h"
@@ -40,53 +39,6 @@ const Compliance& slab_gel() {
     return compute_compliance(mesh_slab(slab), {1.0, 0.45}, {}, slab.thickness);
   }();
   return gel;
-}
-
-void add_box(TriangleMesh& mesh, const Eigen::Vector3d& centre, const Eigen::Vector3d& size) {
-  const int first = static_cast<int>(mesh.vertices.size());
-  for (int corner = 0; corner < 8; ++corner) {
-    const Eigen::Vector3d sign((corner & 1) ? 0.5 : -0.5, (corner & 2) ? 0.5 : -0.5, (corner & 4) ? 0.5 : -0.5);
-    mesh.vertices.push_back(centre + sign.cwiseProduct(size));
-  }
-  for (const auto& t : std::vector<std::array<int, 3>>{{0, 2, 1},
-                                                       {1, 2, 3},
-                                                       {4, 5, 6},
-                                                       {5, 7, 6},
-                                                       {0, 1, 4},
-                                                       {1, 5, 4},
-                                                       {2, 6, 3},
-                                                       {3, 6, 7},
-                                                       {0, 4, 2},
-                                                       {2, 4, 6},
-                                                       {1, 3, 5},
-                                                       {3, 7, 5}}) {
-    mesh.triangles.push_back({first + t[0], first + t[1], first + t[2]});
-  }
-}
-
-TEST(HardCase19, TwoObjectsEqualTheJointProblem) {
-  // Two boxes moved as one, as two bodies and as one mesh: pressed, then sheared.
-  const Eigen::Vector3d size(1.1, 1.3, 1.0);
-  const Eigen::Vector3d left(-1.4, 0.1, 0.5);
-  const Eigen::Vector3d right(1.3, -0.2, 0.5);
-  TriangleMesh both;
-  add_box(both, left, size);
-  add_box(both, right, size);
-  Press joint(flat_gel(), MeshShape(both), 0.4);
-  Press apart(flat_gel(), std::vector<PressBody>{{BoxShape{size}, 0.4, nullptr}, {BoxShape{size}, 0.4, nullptr}});
-  for (const Eigen::Vector3d& offset : {Eigen::Vector3d(0, 0, -0.15), Eigen::Vector3d(0.03, 0.01, -0.15)}) {
-    const PressState& one = joint.step(at(offset.x(), offset.y(), offset.z()));
-    const std::array<PressTarget, 2> targets = {
-        at(left.x() + offset.x(), left.y() + offset.y(), left.z() + offset.z()),
-        at(right.x() + offset.x(), right.y() + offset.y(), right.z() + offset.z())};
-    const PressState& two = apart.step(targets);
-    ASSERT_EQ(two.bodies.size(), 2u);
-    EXPECT_GT(two.bodies[1].wrench[2], 0.01);
-    const Eigen::Matrix<double, 6, 1> sum = two.bodies[0].wrench + two.bodies[1].wrench;
-    // The gel is looked up where each body's own patch has gone in the one case, their mean in the other: some um.
-    EXPECT_LT((sum - one.wrench).norm(), 4e-3 * one.wrench.norm());
-    EXPECT_EQ(two.contact_vertices, one.contact_vertices);
-  }
 }
 
 TEST(SeveralBodies, ThatMissChangeNothing) {

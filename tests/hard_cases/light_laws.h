@@ -13,9 +13,14 @@
 #include <vector>
 
 #include "core/error.h"
+#include "tests/hard_cases/hard_case.h"
 #include "tests/render/light_scenes.h"
 
 namespace touchstone::render {
+
+using test::did;
+using test::refused;
+using test::Worst;
 
 /// What the pixels of a picture see: mean radiance over many renderings, and its standard error. Pixel after pixel, in
 /// each the bands.
@@ -23,6 +28,7 @@ struct Seen {
   Eigen::ArrayXd mean, error;
   double least() const { return mean.minCoeff(); }
   double most() const { return mean.maxCoeff(); }
+  std::string range() const { return fmt::format("{:.5g} to {:.5g}", least(), most()); }
   /// Is the whole picture of this radiance, within the noise?
   bool is(double radiance) const { return ((mean - radiance).abs() <= 5.0 * error + 1e-6 * std::abs(radiance)).all(); }
 };

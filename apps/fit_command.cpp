@@ -1,0 +1,47 @@
+#include <spdlog/spdlog.h>
+
+#include <memory>
+
+#include "apps/command.h"
+#include "apps/progress_bar.h"
+#include "lab/unit_fit.h"
+
+namespace touchstone::apps {
+namespace {
+
+void print(const lab::FittedUnknown& unknown) {
+  if (unknown.told) {
+    fmt::print("{}: {:.5g} -> {:.5g}, 95 % from {:.5g} to {:.5g}{}\n", unknown.name, unknown.start, unknown.value,
+               unknown.low95, unknown.high95, unknown.at_end ? "; at the end of its allowed range" : "");
+  } else {
+    fmt::print("{}: {:.5g} -> {:.5g}, but not told by the data\n", unknown.name, unknown.start, unknown.value);
+  }
+}
+
+void fit(const std::filesystem::path& file, const std::filesystem::path& out, const GlobalOptions& global) {
+  lab::UnitFit result;
+  {
+    ProgressBar bar(global.quiet);
+    result = lab::run_unit_fit(file, out, global.cache, bar.listener());
+  }
+  for (const lab::FittedUnknown& unknown : result.unknowns) print(unknown);
+  for (const lab::UntoldCombination& combination : result.untold) fmt::print("not told: {}\n", combination.words);
+  fmt::print("misfit {:.2f} -> {:.2f} of the noise\n", result.misfit_before, result.misfit_after);
+  if (!result.converged) spdlog::warn("the fit hasn't converged; take its intervals with care");
+  fmt::print("{}: the fitted device, the report and its pictures\n", out.string());
+}
+
+}  // namespace
+
+void add_fit_command(CLI::App& app, const GlobalOptions& global, Action& action) {
+  CLI::App* command = app.add_subcommand(
+      "fit", "Find the numbers of a device's file with which it shows and feels what a real sensor's presses did");
+  auto file = std::make_shared<std::filesystem::path>();
+  auto out = std::make_shared<std::filesystem::path>();
+  command->add_option("FIT", *file, "Fit file: device, unknowns and recorded presses (docs/calibration.md)")
+      ->required();
+  command->add_option("-o,--out", *out, "Folder for the fitted device and the report; is made")->required();
+  command->callback([&action, &global, file, out] { action = [&global, file, out] { fit(*file, *out, global); }; });
+}
+
+}  // namespace touchstone::apps

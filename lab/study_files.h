@@ -1,0 +1,18 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace touchstone::lab {
+
+/// What a study leaves behind: files by name, their text, and what is to be told beside.
+struct StudyFile {
+  std::string name;
+  std::string text;
+};
+struct StudyResult {
+  std::vector<StudyFile> files;    ///< a table as CSV and one in Markdown, plots as SVG
+  std::vector<std::string> notes;  ///< presses that couldn't be had, and why
+};
+
+}  // namespace touchstone::lab
