@@ -30,6 +30,7 @@ void add_inspect_command(CLI::App& app, const GlobalOptions& global, Action& act
 void add_export_command(CLI::App& app, const GlobalOptions& global, Action& action);
 void add_record_command(CLI::App& app, const GlobalOptions& global, Action& action);
 void add_serve_command(CLI::App& app, const GlobalOptions& global, Action& action);
+void add_bench_command(CLI::App& app, const GlobalOptions& global, Action& action);
 void add_study_command(CLI::App& app, const GlobalOptions& global, Action& action);
 void add_schema_command(CLI::App& app, Action& action);
 

@@ -73,6 +73,7 @@ int run(int argc, char** argv) {
   add_export_command(app, global, action);
   add_record_command(app, global, action);
   add_study_command(app, global, action);
+  add_bench_command(app, global, action);
   add_schema_command(app, action);
   add_serve_command(app, global, action);
 

@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "core/error.h"
-#include "fem/elimination_order.h"
+#include "fem/element.h"
 #include "fem/quasi_definite_schur.h"
 #include "fem/surface_coupling.h"
 #include "fem/taylor_hood.h"
@@ -14,15 +14,15 @@ namespace touchstone::fem {
 namespace {
 
 /// Adds three rows of the border, one a component, for each row over nodes.
-void add_border(const TaylorHoodSpace& space, const Eigen::SparseMatrix<double>& rows, double scale, int first,
-                SymmetricEntries& matrix) {
+void add_border(const Eigen::SparseMatrix<double>& rows, double scale, int first, ElementSystem& system) {
   for (int node = 0; node < rows.outerSize(); ++node) {
-    if (space.clamped[node]) {
+    if (system.displacement[node] < 0) {
       continue;  // it doesn't move
     }
     for (Eigen::SparseMatrix<double>::InnerIterator entry(rows, node); entry; ++entry) {
       for (int a = 0; a < 3; ++a) {
-        matrix.add(space.displacement[node] + a, first + 3 * static_cast<int>(entry.row()) + a, scale * entry.value());
+        system.matrix.add(system.displacement[node] + a, first + 3 * static_cast<int>(entry.row()) + a,
+                          scale * entry.value());
       }
     }
   }
@@ -38,6 +38,12 @@ Compliance compute_compliance(const TetMesh& mesh, const ElasticMaterial& materi
 
 Compliance compute_compliance(const TetMesh& mesh, std::span<const ElasticMaterial> materials,
                               std::span<const Bead> beads, double thickness, const Progress& progress) {
+  return compute_compliance(mesh, materials, beads, thickness, Element::taylor_hood, progress);
+}
+
+Compliance compute_compliance(const TetMesh& mesh, std::span<const ElasticMaterial> materials,
+                              std::span<const Bead> beads, double thickness, Element element,
+                              const Progress& progress) {
   const auto tell = [&](int step) {
     if (progress) {
       progress("elasticity", step, 3);
@@ -63,16 +69,18 @@ Compliance compute_compliance(const TetMesh& mesh, std::span<const ElasticMateri
   // of the order of one beside the elements' blocks.
   const double edge = 1.0 / std::sqrt(static_cast<double>(mesh.outer.size()));
   const double surface_scale = 1.0 / (scales.length * scales.length * edge);
-  SymmetricEntries matrix = assemble(space, scales);
-  add_border(space, surface_coupling(space, surface), surface_scale, space.unknowns, matrix);
-  add_border(space, bead_means(space, beads), 1.0, space.unknowns + 3 * n, matrix);
-  matrix.size = space.unknowns + 3 * (n + m);
+  ElementSystem system = make_system(space, scales, materials, element);
+  const int unknowns = system.matrix.size;
+  add_border(over_nodes_of(element, space, surface_coupling(space, surface)), surface_scale, unknowns, system);
+  add_border(over_nodes_of(element, space, bead_means(space, beads)), 1.0, unknowns + 3 * n, system);
+  system.matrix.size = unknowns + 3 * (n + m);
   tell(1);
 
   FactorReport factor;
-  const EliminationTree tree = elimination_tree(space);
-  std::optional<Eigen::MatrixXd> found = quasi_definite_schur(matrix, 3 * (n + m), tree, &factor);
-  if (!found) found = schur_complement(matrix, 3 * (n + m), tree.order, &factor);  // slower, but it can pivot
+  std::optional<Eigen::MatrixXd> found = quasi_definite_schur(system.matrix, 3 * (n + m), system.tree, &factor);
+  if (!found) {  // slower, but it can pivot
+    found = schur_complement(system.matrix, 3 * (n + m), system.tree.order, &factor);
+  }
   const Eigen::MatrixXd& schur = *found;
   tell(2);
 
@@ -91,7 +99,7 @@ Compliance compute_compliance(const TetMesh& mesh, std::span<const ElasticMateri
   gel.beads = Eigen::MatrixXd(schur.bottomLeftCorner(3 * m, 3 * n) * (-displacement_per_traction / surface_scale));
 
   gel.report.tetrahedra = static_cast<int>(mesh.tetrahedra.size());
-  gel.report.unknowns = space.unknowns;
+  gel.report.unknowns = unknowns;
   gel.report.smallest_dihedral_deg = smallest_dihedral_angle(mesh) * 180.0 / std::numbers::pi;
   gel.report.factor_entries = static_cast<double>(factor.factor_entries);
   gel.report.operations = factor.operations;

@@ -30,6 +30,8 @@ class EventWatch {
       : pixels_(scene.device.camera->events.value().pixels, {scene.device.camera->width, scene.device.camera->height},
                 scene.seed, noise_seed),
         smallest_threshold_(pixels_.smallest_threshold()),
+        // needed_subdivisions takes half of what it's told
+        step_(2.0 * scene.light.event_step * smallest_threshold_),
         light_(scene, plan, gel, smallest_threshold_),
         sink_(sink) {}
 
@@ -75,8 +77,8 @@ class EventWatch {
 
   /// Into how many parts the time between two pictures is to be cut.
   int parts_between(const Moment& before, const Moment& after) const {
-    const double wanted = 1.0 + render::needed_subdivisions(before.picture.log_photocurrent,
-                                                            after.picture.log_photocurrent, smallest_threshold_);
+    const double wanted =
+        1.0 + render::needed_subdivisions(before.picture.log_photocurrent, after.picture.log_photocurrent, step_);
     const double worth = std::floor(light_.motion(before.press, after.press) / kFinestMotion_px);
     const auto whole_us = static_cast<double>(after.t_us - before.t_us);
     return std::max(1, static_cast<int>(std::min({wanted, worth, whole_us, static_cast<double>(kMostParts)})));
@@ -100,6 +102,7 @@ class EventWatch {
 
   render::EventPixels pixels_;
   double smallest_threshold_;
+  double step_;
   LightSequence light_;
   const EventSink& sink_;
   std::vector<Event> events_;

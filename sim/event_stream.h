@@ -29,9 +29,9 @@ struct EventStreamReport {
 /// one's. Nothing is kept: memory doesn't grow with the sequence.
 ///
 /// Pictures (sim/light_sequence.h) are made at the states that are played (plan.states_a_frame) and, between two of
-/// them, as densely as no pixel changes by half the smallest threshold from one to the next; but no denser than a
-/// motion of 0.02 pixels, which the paths of a pixel can't tell, or a microsecond. Between pictures the logarithm runs
-/// straight.
+/// them, as densely as no pixel changes by light.event_step of the smallest threshold from one to the next; but no
+/// denser than a motion of 0.02 pixels, which the paths of a pixel can't tell, or a microsecond. Between pictures the
+/// logarithm runs straight.
 ///
 /// Thresholds belong to the unit, the scene's seed; `noise_seed` is of the noise in time. The same for any number of
 /// threads. `vibration` and `elastic` as in play_motion.

@@ -50,6 +50,7 @@ struct LightSpec {
       0.3;  ///< image motion that needn't show as rolling shutter or, times the camera's own blur, as motion blur
   double change_tolerance = 0.25;   ///< a pixel that changed by less than this part of the noise keeps its old light
   double direct_tolerance = 0.015;  ///< RMS difference from path tracing that direct light may have, relative
+  double event_step = 0.5;          ///< of the smallest threshold: what event pixels may change by between two pictures
 };
 
 /// Pixels of the fine contact and of the height map: square, the map centred on the gel's origin.

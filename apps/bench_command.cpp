@@ -1,0 +1,74 @@
+#include <spdlog/spdlog.h>
+
+#include <cmath>
+#include <memory>
+#include <optional>
+
+#include "apps/command.h"
+#include "apps/progress_bar.h"
+#include "core/whole_file.h"
+#include "lab/device_bench.h"
+#include "lab/study.h"
+
+namespace touchstone::apps {
+namespace {
+
+struct BenchOptions {
+  std::filesystem::path device, out, object;
+  double force_error_percent = 1.0;
+  std::optional<double> depth_mm;
+  bool no_finite_strain = false;
+  lab::BenchSettings settings;
+};
+
+void bench(const BenchOptions& options, const GlobalOptions& global) {
+  const sim::DeviceSpec device = sim::read_device(options.device);
+  lab::BenchSettings settings = options.settings;
+  settings.force_error = 0.01 * options.force_error_percent;
+  settings.depth_mm = options.depth_mm;
+  settings.finite_strain = !options.no_finite_strain;
+  if (!options.object.empty()) settings.object = sim::read_object(options.object);
+  lab::make_study_folder(options.out);  // before minutes of work that couldn't be kept
+  lab::DeviceBench measured;
+  {
+    ProgressBar bar(global.quiet);
+    measured = lab::bench_device(device, settings, bar.listener());
+  }
+  const lab::StudyResult result = lab::report(measured, read_whole_file(options.device));
+  for (const std::string& note : result.notes) spdlog::warn("{}", note);
+  lab::write_study(result, options.out);
+  const lab::BenchChoice& choice = measured.choice;
+  fmt::print("cheapest: edges of {:.3g} mm{}, {:.3g} s once and {:.3g} s a frame; as it is {:.3g} s and {:.3g} s\n",
+             choice.fine_mm, choice.light_words.empty() ? "" : ", " + choice.light_words, choice.once_s, choice.frame_s,
+             choice.as_is_once_s, choice.as_is_frame_s);
+  fmt::print("on other presses: force {:.2g} % off{}: {}\n", 100.0 * choice.verified_force,
+             std::isfinite(choice.verified_pixel) ? fmt::format(", pixels {:.2g} of the noise", choice.verified_pixel)
+                                                  : std::string(),
+             choice.holds ? "holds" : "doesn't hold");
+  for (const lab::StudyFile& written : result.files) fmt::print("{}\n", (options.out / written.name).string());
+}
+
+}  // namespace
+
+void add_bench_command(CLI::App& app, const GlobalOptions& global, Action& action) {
+  CLI::App* command = app.add_subcommand(
+      "bench",
+      "Measure what accuracy costs on a device: error against seconds, the cheapest setting, each effect's share");
+  auto options = std::make_shared<BenchOptions>();
+  command->add_option("DEVICE", options->device, "Device file")->required();
+  command->add_option("-o,--out", options->out, "Folder for the page, its table and plots; is made")->required();
+  command->add_option("--force-error", options->force_error_percent, "Wanted: percent of a force (default 1)");
+  command->add_option("--pixel-error", options->settings.pixel_error,
+                      "Wanted: part of the imager's noise, root mean square over pixels (default 0.5)");
+  command->add_option("--object", options->object, "Object file (default: a ball of the gel's thickness, in radius)");
+  command->add_option("--depth", options->depth_mm,
+                      "mm that it is pressed in (default: a tenth of the gel's thickness)");
+  command->add_option("--pixels", options->settings.most_pixels,
+                      "Compare pictures on so many pixels of their middle (default 76800)");
+  command->add_option("--seed", options->settings.seed, "Of the presses' places and of the light (default 1)");
+  command->add_flag("--no-finite-strain", options->no_finite_strain,
+                    "Leave out the press at finite strain, which takes up to minutes");
+  command->callback([&action, &global, options] { action = [&global, options] { bench(*options, global); }; });
+}
+
+}  // namespace touchstone::apps

@@ -1,0 +1,90 @@
+#pragma once
+// The presses that a device's settings are judged by, and a scene of one of them played, timed and held beside another.
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <filesystem>
+#include <opencv2/core/mat.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "fem/press.h"
+#include "lab/virtual_device.h"
+#include "render/imager.h"
+#include "sim/scene.h"
+#include "sim/virtual_sensor.h"
+
+namespace touchstone::lab {
+
+/// An object held against a device in several ways, each pressed down and then dragged.
+struct BenchPresses {
+  sim::ObjectSpec object;
+  double touch_mm = 0.0;  ///< see way_to_touch(), over the middle
+  std::vector<Hold> holds;
+};
+
+/// `count` holds near the gel's middle: places within an edge of the mesh, so that no place is luckier than another,
+/// depths within a fifth of `depth_mm`, dragged by a third of that into all directions. A pure function of its
+/// arguments.
+std::vector<Hold> bench_holds(int count, double edge_mm, double depth_mm, std::uint64_t seed);
+
+/// What the presses felt like: forces on the object, pressed and dragged, one after the other for each hold.
+struct FeltForces {
+  std::vector<Eigen::Vector3d> force_N;
+  Eigen::MatrixX3d beads_mm;  ///< all beads of all states, one after the other
+  double reach_mm = 0.0;      ///< from the gel's middle to the farthest vertex that was touched
+  double seconds = 0.0;       ///< a state
+  std::int64_t solves = 0;    ///< linear systems, in all
+};
+
+/// Presses without pictures, each from a fresh start. `edge_mm` is what a relief is blurred by
+/// (sim::coarse_contact_shape).
+/// @throws Error that says which hold can't be had
+FeltForces feel(const BenchPresses& presses, const fem::Compliance& gel, const sim::DeviceSpec& device, double edge_mm,
+                const fem::PressTolerance& tolerance = {});
+
+/// Root mean square over the states of the force's difference, relative to the other's force.
+double force_difference(const std::vector<Eigen::Vector3d>& forces, const std::vector<Eigen::Vector3d>& than);
+
+/// The scene of one hold: three frames, at rest, pressed and dragged.
+sim::SceneSpec bench_scene(const sim::DeviceSpec& device, const BenchPresses& presses, const Hold& hold,
+                           std::uint64_t seed);
+
+/// A camera of at most so many pixels out of the middle of this one, with all else as it was.
+sim::CameraSpec middle_of(sim::CameraSpec camera, int most_pixels);
+
+/// What a scene came to.
+struct SceneRun {
+  std::vector<Eigen::Vector3d> force_N;  ///< of each frame but the first
+  double largest_strain = 0.0;
+  std::vector<cv::Mat> electrons;  ///< of each frame but the first: CV_32FC(channels), without noise
+  std::vector<cv::Mat> numbers;    ///< the frames as delivered
+  double mechanics_seconds = 0.0;  ///< a frame
+  double camera_seconds = 0.0;     ///< once a scene
+  double picture_seconds = 0.0;    ///< a frame
+  std::int64_t paths = 0;          ///< traced for the pictures, not for what is made once
+  std::string light;               ///< how the last picture was lit
+};
+
+/// Plays and shows a scene whose outputs are frames and radiance, or neither.
+/// @param whole every pixel traced, nothing kept from picture to picture
+/// @throws Error as make_plan, sim::play_motion and sim::VirtualCamera
+SceneRun run_scene(const sim::SceneSpec& scene, const fem::Compliance& gel, bool whole = false);
+
+/// Root mean square over pixels and channels of how far pictures are from true ones, in units of the imager's temporal
+/// noise. Of both there are two that share no random numbers: the product of `one` - `true_one` and `other` -
+/// `true_other` is free of the paths' noise on the mean. Where `other` is `one`, that one's own noise counts as its
+/// error.
+double pixel_error(const std::vector<cv::Mat>& one, const std::vector<cv::Mat>& other,
+                   const std::vector<cv::Mat>& true_one, const std::vector<cv::Mat>& true_other,
+                   const render::Imager& imager);
+
+/// The largest difference of all pixels and channels but for 1 % of them, likewise.
+double worst_pixel(const std::vector<cv::Mat>& electrons, const std::vector<cv::Mat>& than,
+                   const render::Imager& imager);
+
+/// Root mean square difference of delivered numbers.
+double number_difference(const std::vector<cv::Mat>& numbers, const std::vector<cv::Mat>& than);
+
+}  // namespace touchstone::lab

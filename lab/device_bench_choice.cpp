@@ -1,0 +1,214 @@
+// The cheapest setting for the wanted errors: found among what was measured, refined, then held against presses that it
+// wasn't chosen by.
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <tuple>
+#include <utility>
+
+#include "core/error.h"
+#include "lab/device_bench_parts.h"
+
+namespace touchstone::lab {
+namespace {
+
+constexpr double kFrames = 100.0;   // of a scene, that a camera's set-up is shared by
+constexpr double kMeshShare = 0.5;  // of the squared pixel error that a mesh may take at most, where light has noise
+constexpr double kFiner = 0.8;      // edges, where a choice didn't hold
+constexpr double kMoreExact = 0.7;  // of the noise of paths, likewise
+constexpr int kMostVerifications = 3;
+constexpr int kVerifyingHolds = 6;
+
+double frame_seconds(const LightTry& one) {
+  return one.each_s + one.once_s / kFrames;
+}
+
+struct MeshPick {
+  double edges = 0.0;  ///< times the device's
+  BenchPoint point;
+};
+
+bool meets(const BenchPoint& point, double force_error, double pixel_error) {
+  return point.force_error <= force_error && (std::isnan(point.pixel_error) || point.pixel_error <= pixel_error);
+}
+
+/// The coarsest mesh from which on all finer ones that were tried hold, then halfway to the next coarser one.
+std::optional<MeshPick> pick_mesh(const BenchParts& parts, const BenchCurve& mesh) {
+  const double wanted_force = parts.settings.force_error;
+  const double wanted_pixel = parts.settings.pixel_error * std::sqrt(kMeshShare);
+  const double own = parts.device.mesh.fine_mm;
+  std::optional<MeshPick> best;
+  double coarser = 0.0;  // the next one that doesn't hold
+  std::vector<BenchPoint> by_edge = mesh.points;
+  std::sort(by_edge.begin(), by_edge.end(), [](const auto& a, const auto& b) { return a.value < b.value; });
+  for (const BenchPoint& point : by_edge) {
+    if (!meets(point, wanted_force, wanted_pixel)) {
+      coarser = std::isfinite(point.force_error) ? point.value / own : 0.0;
+      break;
+    }
+    best = MeshPick{point.value / own, point};
+  }
+  if (best && coarser > 0.0) {
+    const double between = std::sqrt(best->edges * coarser);
+    const BenchPoint point = mesh_point(parts, between);
+    if (meets(point, wanted_force, wanted_pixel)) best = MeshPick{between, point};
+  }
+  return best;
+}
+
+/// The cheapest way of light within an error; of paths also one between those that were tried.
+std::optional<LightTry> pick_light(const BenchParts& parts, const std::vector<LightTry>& tries, double wanted) {
+  std::optional<LightTry> best;
+  const LightTry* coarser = nullptr;  // paths with more noise than wanted, the least of them
+  const LightTry* holds = nullptr;
+  for (const LightTry& one : tries) {
+    if (!std::isfinite(one.pixel_error)) continue;
+    if (one.pixel_error <= wanted) {
+      if (!best || frame_seconds(one) < frame_seconds(*best)) best = one;
+      if (one.adaptive_paths && (holds == nullptr || one.pixel_error > holds->pixel_error)) holds = &one;
+    } else if (one.adaptive_paths && (coarser == nullptr || one.pixel_error < coarser->pixel_error)) {
+      coarser = &one;
+    }
+  }
+  if (best && best->adaptive_paths && holds != nullptr && coarser != nullptr) {
+    // Between two that were measured the error goes as a power of the noise that is asked for.
+    const double slope = std::log(coarser->pixel_error / holds->pixel_error) /
+                         std::log(coarser->light.noise_fraction / holds->light.noise_fraction);
+    LightTry between = *holds;
+    between.light.noise_fraction *= std::pow(0.97 * wanted / holds->pixel_error, 1.0 / std::max(slope, 0.1));
+    if (between.light.noise_fraction > 1.05 * holds->light.noise_fraction &&
+        between.light.noise_fraction < coarser->light.noise_fraction) {
+      between.words = paths_in_words(between.light.noise_fraction);
+      const Hold& hold = parts.presses.holds.front();
+      const TruePictures truth = true_pictures(parts, parts.device, parts.own_gel, hold, parts.settings.seed + 30);
+      BenchPoint point;
+      between = try_light(parts, truth, parts.device, parts.own_gel, between, parts.settings.seed + 4, point);
+      if (between.pixel_error <= wanted && frame_seconds(between) < frame_seconds(*best)) best = between;
+    }
+  }
+  return best;
+}
+
+struct Verified {
+  double force = kUnknown, pixel = kUnknown;
+  double as_is_force = kUnknown, as_is_pixel = kUnknown;
+};
+
+/// The choice and the device as it is on presses that nothing was chosen by.
+Verified verify(const BenchParts& parts, const BenchChoice& choice, const LightTry* light, std::uint64_t seed) {
+  BenchParts other = parts;
+  other.presses.holds = bench_holds(kVerifyingHolds, parts.whole_device.mesh.fine_mm, parts.depth_mm, seed);
+  other.finest_forces = feel(other.presses, parts.finest_gel, parts.device, parts.finest_device.mesh.fine_mm);
+  const sim::DeviceSpec device = with_edges(parts.device, choice.edges);
+  const fem::Compliance gel = make_gel(device).gel;
+  Verified verified;
+  const auto off = [&](const fem::Compliance& one, double edge_mm) {
+    return force_difference(feel(other.presses, one, parts.device, edge_mm).force_N, other.finest_forces.force_N);
+  };
+  verified.force = off(gel, device.mesh.fine_mm);
+  verified.as_is_force = off(parts.own_gel, parts.device.mesh.fine_mm);
+  if (!parts.truth) return verified;
+  const TruePictures truth =
+      true_pictures(other, parts.finest_device, parts.finest_gel, other.presses.holds.front(), seed);
+  BenchPoint ignored;
+  if (light != nullptr) verified.pixel = try_light(other, truth, device, gel, *light, seed + 7, ignored).pixel_error;
+  verified.as_is_pixel = try_light(other, truth, parts.device, parts.own_gel, {}, seed + 8, ignored).pixel_error;
+  return verified;
+}
+
+/// Seconds of whole pictures: once, and a frame.
+std::pair<double, double> whole_seconds(const BenchParts& parts, const sim::DeviceSpec& device, const LightTry& light) {
+  const MadeGel made = make_gel(device);
+  sim::SceneSpec scene = bench_scene(device, parts.presses, parts.presses.holds.front(), parts.settings.seed + 5);
+  if (!parts.truth) scene.outputs = {.frames = false};
+  scene.light = light.light;
+  scene.effects = light.effects;
+  const SceneRun run = run_scene(scene, made.gel);
+  return {made.seconds + run.camera_seconds, run.mechanics_seconds + run.picture_seconds};
+}
+
+}  // namespace
+
+BenchChoice cheapest_choice(const BenchParts& parts, const BenchCurve& mesh, const std::vector<LightTry>& tries,
+                            const Progress& progress) {
+  const auto tell = [&](int step) {
+    if (progress) progress("the cheapest setting", step, 4);
+  };
+  tell(0);
+  BenchChoice choice;
+  std::optional<MeshPick> picked = pick_mesh(parts, mesh);
+  if (!picked) {
+    const auto least = std::min_element(mesh.points.begin(), mesh.points.end(), [](const auto& a, const auto& b) {
+      return std::isnan(b.force_error) || a.force_error < b.force_error;
+    });
+    choice.remark = fmt::format(
+        "No mesh that was tried holds the wanted errors; the best has edges of {:.3g} mm, a force error of {:.2g} %{}.",
+        least->value, 100.0 * least->force_error,
+        std::isnan(least->pixel_error) ? ""
+                                       : fmt::format(" and {:.2g} of the noise in its pixels", least->pixel_error));
+    picked = MeshPick{least->value / parts.device.mesh.fine_mm, *least};
+  }
+  tell(1);
+  const auto left_for_light = [&] {
+    const double by_mesh = std::isnan(picked->point.pixel_error) ? 0.0 : picked->point.pixel_error;
+    return std::sqrt(std::max(0.0, std::pow(parts.settings.pixel_error, 2) - by_mesh * by_mesh));
+  };
+  std::optional<LightTry> light;
+  if (parts.truth) {
+    light = pick_light(parts, tries, left_for_light());
+    if (!light) {
+      for (const LightTry& one : tries) {
+        if (std::isfinite(one.pixel_error) && (!light || one.pixel_error < light->pixel_error)) light = one;
+      }
+      choice.remark += fmt::format("{}No way of light that was tried holds the wanted pixel error; the best is {}.",
+                                   choice.remark.empty() ? "" : " ", light ? light->words : "none");
+    }
+  }
+  for (int round = 0; round < kMostVerifications; ++round) {
+    tell(2);
+    choice.edges = picked->edges;
+    choice.force_error = picked->point.force_error;
+    choice.pixel_error =
+        light ? std::hypot(light->pixel_error, std::isnan(picked->point.pixel_error) ? 0.0 : picked->point.pixel_error)
+              : kUnknown;
+    const Verified verified = verify(parts, choice, light ? &*light : nullptr,
+                                     parts.settings.seed + 1000 + 10 * static_cast<unsigned>(round));
+    choice.verified_force = verified.force;
+    choice.verified_pixel = verified.pixel;
+    choice.as_is_force = verified.as_is_force;
+    choice.as_is_pixel = verified.as_is_pixel;
+    const bool force_holds = verified.force <= parts.settings.force_error;
+    const bool pixel_holds = !parts.truth || verified.pixel <= parts.settings.pixel_error;
+    choice.holds = force_holds && pixel_holds;
+    if (choice.holds || !choice.remark.empty() || round + 1 == kMostVerifications) break;
+    const std::string found =
+        fmt::format("edges of {:.3g} mm{}", picked->point.value, light ? " and " + light->words : std::string());
+    const bool by_mesh =
+        !force_holds || !light || !light->adaptive_paths || picked->point.pixel_error > light->pixel_error;
+    if (by_mesh) {
+      picked->edges *= kFiner;
+      picked->point = mesh_point(parts, picked->edges);
+    } else {
+      light->light.noise_fraction *= kMoreExact;
+      light->words = paths_in_words(light->light.noise_fraction);
+    }
+    choice.remark_rounds.push_back(
+        fmt::format("{} didn't hold on other presses ({:.2g} %{})", found, 100.0 * verified.force,
+                    parts.truth ? fmt::format(", {:.2g} of the noise", verified.pixel) : ""));
+  }
+  const sim::DeviceSpec chosen = with_edges(parts.whole_device, choice.edges);
+  choice.fine_mm = chosen.mesh.fine_mm;
+  choice.coarse_mm = chosen.mesh.coarse_mm;
+  if (light) {
+    choice.light = light->light;
+    choice.effects = light->effects;
+    choice.light_words = light->words;
+  }
+  tell(3);
+  std::tie(choice.once_s, choice.frame_s) = whole_seconds(parts, chosen, light.value_or(LightTry{}));
+  std::tie(choice.as_is_once_s, choice.as_is_frame_s) = whole_seconds(parts, parts.whole_device, {});
+  return choice;
+}
+
+}  // namespace touchstone::lab

@@ -1,0 +1,369 @@
+// What pictures and events cost.
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <map>
+#include <tuple>
+
+#include "core/error.h"
+#include "lab/device_bench_parts.h"
+#include "lab/seconds_since.h"
+#include "sim/event_stream.h"
+#include "sim/plan.h"
+#include "sim/plan_direct.h"
+#include "sim/visible_scene.h"
+
+namespace touchstone::lab {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr int kPlenty = 4096;  // paths a pixel: enough for the noise that is asked for to decide
+constexpr std::array kNoiseFractions = {4.0, 2.0, 1.0, 0.5, 0.25};
+constexpr std::array kSamples = {1, 4, 16, 64, 256};
+constexpr std::array kBandCounts = {1, 3, 8, 16};
+constexpr std::array kPixelsAnEdge = {2.5, 5.0, 10.0, 20.0};
+constexpr double kFinestPixelsAnEdge = 40.0;
+constexpr std::array kEventSteps = {4.0, 2.0, 1.0, 0.5, 0.25};
+constexpr double kFinestEventStep = 0.125;
+constexpr double kSameEvent_us = 1000.0;
+constexpr std::uint64_t kOtherSeed = 0x9e3779b97f4a7c15;
+
+std::int64_t pictures_of(const SceneRun& run) {
+  return static_cast<std::int64_t>(run.electrons.size());
+}
+
+void add_run(const SceneRun& run, BenchPoint& point) {
+  point.once_s = run.camera_seconds;
+  point.each_s = run.picture_seconds;
+  point.work = static_cast<double>(run.paths) / static_cast<double>(pictures_of(run) * run.electrons.front().total());
+}
+
+/// The ways of light that this device's scenes can be shown by.
+std::vector<LightTry> ways_of_light(const BenchParts& parts) {
+  const sim::SceneSpec scene = bench_scene(parts.device, parts.presses, parts.presses.holds.front(), 1);
+  std::vector<LightTry> tries;
+  const auto add = [&](const std::string& words, sim::Switch direct, sim::Switch shared, double noise_fraction,
+                       bool adaptive_paths = false) {
+    LightTry one;
+    one.words = words;
+    one.adaptive_paths = adaptive_paths;
+    one.effects.direct_light = direct;
+    one.effects.shared_paths = shared;
+    one.light.noise_fraction = noise_fraction;
+    one.light.max_samples = kPlenty;
+    sim::SceneSpec tried = scene;
+    tried.effects = one.effects;
+    tried.light = one.light;
+    try {
+      sim::make_plan(tried);
+    } catch (const Error&) {
+      return;  // this device has no such light
+    }
+    tries.push_back(one);
+  };
+  using sim::Switch;
+  tries.emplace_back().words = "as the plan decides";
+  add("direct light", Switch::on, Switch::off, 1.0);
+  add("shared paths", Switch::off, Switch::on, 1.0);
+  add("shared paths to half the noise", Switch::off, Switch::on, 0.5);
+  for (const double fraction : kNoiseFractions) {
+    add(paths_in_words(fraction), Switch::off, Switch::off, fraction, true);
+  }
+  return tries;
+}
+
+BenchCurve light_curve(const BenchParts& parts, const TruePictures& truth, std::vector<LightTry>& tries,
+                       const Progress& progress) {
+  BenchCurve curve;
+  curve.name = "light";
+  curve.what =
+      "Ways to make the pictures, on the device's own mesh, against paths traced twice. A picture's own noise of paths "
+      "counts as its error.";
+  curve.once = "a scene's camera, s";
+  curve.each = "a picture, s";
+  curve.work = "paths a pixel";
+  tries = ways_of_light(parts);
+  std::int64_t done = 0;
+  for (LightTry& one : tries) {
+    if (progress) progress("light", done++, static_cast<std::int64_t>(tries.size()));
+    BenchPoint point;
+    one = try_light(parts, truth, parts.device, parts.own_gel, std::move(one), parts.settings.seed + 2, point);
+    point.as_is = done == 1;
+    if (!point.as_is && std::isfinite(point.pixel_error)) point.note.clear();  // it says the same once more
+    curve.points.push_back(point);
+  }
+  return curve;
+}
+
+BenchCurve samples_curve(const BenchParts& parts, const TruePictures& truth, const Progress& progress) {
+  BenchCurve curve;
+  curve.name = "samples";
+  curve.what =
+      "Paths a pixel, the same number in every pixel: beside the curve of light it shows what it saves to stop where "
+      "the "
+      "imager's noise is reached.";
+  curve.each = "a picture, s";
+  curve.work = "paths a pixel";
+  for (const int samples : kSamples) {
+    if (progress) progress("samples", static_cast<std::int64_t>(curve.points.size()), kSamples.size());
+    BenchPoint point;
+    point.setting = fmt::format("{} paths a pixel", samples);
+    point.value = samples;
+    sim::SceneSpec scene = reference_scene(parts, parts.device, truth.hold, parts.settings.seed + 3);
+    scene.light.min_samples = scene.light.max_samples = samples;
+    const SceneRun run = run_scene(scene, parts.own_gel, true);
+    add_run(run, point);
+    point.once_s = kUnknown;  // key frames, which whole pictures don't use
+    point.pixel_error =
+        pixel_error(run.electrons, run.electrons, truth.runs[0].electrons, truth.runs[1].electrons, truth.imager);
+    point.pixel_worst = worst_pixel(run.electrons, truth.runs[0].electrons, truth.imager);
+    curve.points.push_back(point);
+  }
+  return curve;
+}
+
+/// A setting whose error is to be free of the paths' noise: it's shown twice.
+BenchPoint noise_free_point(const BenchParts& parts, const TruePictures& truth, const sim::SceneSpec& scene) {
+  BenchPoint point;
+  try {
+    std::array<SceneRun, 2> runs;
+    for (int k = 0; k < 2; ++k) {
+      sim::SceneSpec one = scene;
+      one.seed += static_cast<std::uint64_t>(k) * kOtherSeed;
+      runs[k] = run_scene(one, parts.own_gel, true);
+    }
+    add_run(runs[0], point);
+    point.once_s = kUnknown;
+    point.each_s = 0.5 * (runs[0].picture_seconds + runs[1].picture_seconds);
+    point.pixel_error = pixel_error(runs[0].electrons, runs[1].electrons, truth.runs[0].electrons,
+                                    truth.runs[1].electrons, truth.imager);
+  } catch (const Error& error) {
+    point.note = error.what();
+  }
+  return point;
+}
+
+BenchCurve bands_curve(const BenchParts& parts, const Progress& progress) {
+  BenchCurve curve;
+  curve.name = "bands";
+  curve.each = "a picture, s";
+  curve.work = "paths a pixel";
+  sim::DeviceSpec device = parts.device;
+  const sim::BandsSpec own = *device.bands;
+  curve.what =
+      fmt::format("Bands of wavelength between {:.4g} and {:.4g} nm, free of the paths' noise, against {} of them.",
+                  own.from_nm, own.to_nm, kBandCounts.back());
+  const Hold& hold = parts.presses.holds.front();
+  const int planned = sim::make_plan(bench_scene(device, parts.presses, hold, 1)).bands.count();
+  device.bands->count = kBandCounts.back();
+  const TruePictures truth = true_pictures(parts, device, parts.own_gel, hold, parts.settings.seed + 40);
+  for (const int count : kBandCounts) {
+    if (progress) progress("bands", static_cast<std::int64_t>(curve.points.size()), kBandCounts.size());
+    device.bands->count = count;
+    BenchPoint point;
+    if (count == kBandCounts.back()) {
+      add_run(truth.runs[0], point);
+      point.once_s = kUnknown;
+      point.pixel_error = 0.0;
+      point.note = "the reference";
+    } else {
+      point = noise_free_point(parts, truth, reference_scene(parts, device, hold, parts.settings.seed + 50));
+    }
+    point.setting = count == 1 ? "1 band" : fmt::format("{} bands", count);
+    point.value = count;
+    point.as_is = count == planned;
+    curve.points.push_back(point);
+  }
+  return curve;
+}
+
+BenchCurve membrane_curve(const BenchParts& parts, const sim::Plan& plan, const Progress& progress) {
+  BenchCurve curve;
+  curve.name = "contact pixels";
+  curve.what = fmt::format(
+      "Pixels of the fine contact, which gives the coating its shape, free of the paths' noise, against pixels of "
+      "{:.3g} um.",
+      1e3 * parts.device.mesh.fine_mm / kFinestPixelsAnEdge);
+  curve.each = "mechanics and a picture, s";
+  curve.work = "paths a pixel";
+  const Hold& hold = parts.presses.holds.front();
+  sim::SceneSpec scene = reference_scene(parts, parts.device, hold, parts.settings.seed + 60);
+  scene.effects.fine_relief = sim::Switch::on;
+  const auto pixel_um = [&](double an_edge) { return 1e3 * parts.device.mesh.fine_mm / an_edge; };
+  scene.membrane.pixel_um = pixel_um(kFinestPixelsAnEdge);
+  TruePictures truth{.hold = hold, .runs = {}, .imager = sim::imager(parts.device, plan.bands, true)};
+  for (int k = 0; k < 2; ++k) {
+    sim::SceneSpec one = scene;
+    one.seed += static_cast<std::uint64_t>(k + 2) * kOtherSeed;
+    truth.runs[k] = run_scene(one, parts.own_gel, true);
+  }
+  for (const double an_edge : kPixelsAnEdge) {
+    if (progress) progress("contact pixels", static_cast<std::int64_t>(curve.points.size()), kPixelsAnEdge.size());
+    scene.membrane.pixel_um = pixel_um(an_edge);
+    BenchPoint point = noise_free_point(parts, truth, scene);
+    point.setting = fmt::format("membrane.pixel_um {:.3g}", scene.membrane.pixel_um);
+    point.value = scene.membrane.pixel_um;
+    point.as_is = std::abs(1e3 * plan.relief_pixel_mm - point.value) < 1e-6 * point.value;
+    curve.points.push_back(point);
+  }
+  return curve;
+}
+
+/// Part of the true events that the others lack, have too many of, or have at another time: the k-th event of a pixel
+/// and a sign is the other's k-th.
+double event_difference(const std::vector<Event>& events, const std::vector<Event>& truth) {
+  using Key = std::tuple<int, int, bool>;
+  std::map<Key, std::array<std::vector<std::int64_t>, 2>> times;
+  for (const Event& event : events) times[{event.y, event.x, event.on}][0].push_back(event.t_us);
+  for (const Event& event : truth) times[{event.y, event.x, event.on}][1].push_back(event.t_us);
+  std::int64_t wrong = 0;
+  for (const auto& [key, both] : times) {
+    const std::size_t common = std::min(both[0].size(), both[1].size());
+    wrong += static_cast<std::int64_t>(std::max(both[0].size(), both[1].size()) - common);
+    for (std::size_t k = 0; k < common; ++k) {
+      if (std::abs(static_cast<double>(both[0][k] - both[1][k])) > kSameEvent_us) ++wrong;
+    }
+  }
+  return static_cast<double>(wrong) / static_cast<double>(std::max<std::size_t>(1, truth.size()));
+}
+
+BenchCurve events_curve(const BenchParts& parts, const Progress& progress) {
+  BenchCurve curve;
+  curve.name = "event step";
+  curve.what = fmt::format(
+      "What event pixels may change by from one picture to the next, as a part of the smallest threshold, against {}. "
+      "An "
+      "event counts as wrong if it's missing, too many or more than {:.0f} us off.",
+      kFinestEventStep, kSameEvent_us);
+  curve.each = "the whole press, s";
+  curve.work = "pictures";
+  sim::SceneSpec scene = bench_scene(parts.device, parts.presses, parts.presses.holds.front(), parts.settings.seed);
+  scene.outputs = {};
+  scene.outputs.frames = false;
+  scene.outputs.events = true;
+  const auto watch = [&](double step, BenchPoint& point) {
+    scene.light.event_step = step;
+    const sim::Plan plan = sim::make_plan(scene);
+    std::vector<Event> events;
+    const auto begun = Clock::now();
+    const sim::EventStreamReport report =
+        sim::watch_events(scene, plan, parts.own_gel, parts.settings.seed,
+                          [&](std::span<const Event> more) { events.insert(events.end(), more.begin(), more.end()); });
+    point.each_s = seconds_since(begun);
+    point.work = static_cast<double>(report.pictures);
+    return events;
+  };
+  try {
+    BenchPoint finest;
+    const std::vector<Event> truth = watch(kFinestEventStep, finest);
+    curve.what += fmt::format(" It has {} events and took {:.3g} s.", truth.size(), finest.each_s);
+    for (const double step : kEventSteps) {
+      if (progress) progress("event step", static_cast<std::int64_t>(curve.points.size()), kEventSteps.size());
+      BenchPoint point;
+      point.setting = fmt::format("light.event_step {}", step);
+      point.value = step;
+      point.event_error = event_difference(watch(step, point), truth);
+      point.as_is = step == sim::LightSpec{}.event_step;
+      curve.points.push_back(point);
+    }
+  } catch (const Error& error) {
+    curve.what += fmt::format(" Can't be had: {}", error.what());
+  }
+  return curve;
+}
+
+}  // namespace
+
+std::string paths_in_words(double noise_fraction) {
+  return fmt::format("paths to {:.3g} of the imager's noise", noise_fraction);
+}
+
+LightTry try_light(const BenchParts& parts, const TruePictures& truth, const sim::DeviceSpec& device,
+                   const fem::Compliance& gel, LightTry one, std::uint64_t seed, BenchPoint& point) {
+  point.setting = one.words;
+  point.value = one.adaptive_paths ? one.light.noise_fraction : kUnknown;
+  try {
+    sim::SceneSpec scene = bench_scene(device, parts.presses, truth.hold, seed);
+    scene.light = one.light;
+    scene.effects = one.effects;
+    const SceneRun run = run_scene(scene, gel);
+    add_run(run, point);
+    point.pixel_error =
+        pixel_error(run.electrons, run.electrons, truth.runs[0].electrons, truth.runs[1].electrons, truth.imager);
+    point.pixel_worst = worst_pixel(run.electrons, truth.runs[0].electrons, truth.imager);
+    point.note = run.light;
+    one.pixel_error = point.pixel_error;
+    one.once_s = point.once_s;
+    one.each_s = point.each_s;
+  } catch (const Error& error) {
+    point.note = error.what();
+  }
+  return one;
+}
+
+sim::SceneSpec reference_scene(const BenchParts& parts, const sim::DeviceSpec& device, const Hold& hold,
+                               std::uint64_t seed) {
+  sim::SceneSpec scene = bench_scene(device, parts.presses, hold, seed);
+  scene.effects.direct_light = sim::Switch::off;
+  scene.effects.shared_paths = sim::Switch::off;
+  scene.effects.interreflection = sim::Switch::on;
+  scene.light.max_samples = kPlenty;
+  return scene;
+}
+
+TruePictures true_pictures(const BenchParts& parts, const sim::DeviceSpec& device, const fem::Compliance& gel,
+                           const Hold& hold, std::uint64_t seed) {
+  TruePictures truth;
+  truth.hold = hold;
+  for (int k = 0; k < 2; ++k) {
+    const sim::SceneSpec scene =
+        reference_scene(parts, device, hold, seed + static_cast<std::uint64_t>(k + 2) * kOtherSeed);
+    truth.runs[k] = run_scene(scene, gel, true);
+    if (k == 0) truth.imager = sim::imager(device, sim::make_plan(scene).bands, true);
+  }
+  return truth;
+}
+
+std::string prepare_pictures(BenchParts& parts) {
+  if (!parts.device.camera) return "none: the device has no camera";
+  const Hold& hold = parts.presses.holds.front();
+  try {
+    sim::make_plan(bench_scene(parts.device, parts.presses, hold, 1));
+    parts.truth = true_pictures(parts, parts.finest_device, parts.finest_gel, hold, parts.settings.seed);
+  } catch (const Error& error) {
+    return fmt::format("none: {}", error.what());
+  }
+  const sim::CameraSpec& camera = *parts.device.camera;
+  const sim::CameraSpec& whole = *parts.whole_device.camera;
+  std::string words = fmt::format("{} x {} pixels", camera.width, camera.height);
+  if (camera.width != whole.width || camera.height != whole.height) {
+    words += fmt::format(" out of the middle of {} x {}", whole.width, whole.height);
+  }
+  return words + ", of a pressed and a dragged state";
+}
+
+double mesh_pixel_error(const BenchParts& parts, const TruePictures& truth, const sim::DeviceSpec& device,
+                        const fem::Compliance& gel) {
+  const TruePictures shown = true_pictures(parts, device, gel, truth.hold, parts.settings.seed + 20);
+  return pixel_error(shown.runs[0].electrons, shown.runs[1].electrons, truth.runs[0].electrons, truth.runs[1].electrons,
+                     truth.imager);
+}
+
+std::vector<BenchCurve> light_curves(const BenchParts& parts, std::vector<LightTry>& tries, const Progress& progress) {
+  std::vector<BenchCurve> curves;
+  if (parts.truth) {
+    const Hold& hold = parts.presses.holds.front();
+    const TruePictures own = true_pictures(parts, parts.device, parts.own_gel, hold, parts.settings.seed + 30);
+    curves.push_back(light_curve(parts, own, tries, progress));
+    curves.push_back(samples_curve(parts, own, progress));
+    if (parts.device.bands) curves.push_back(bands_curve(parts, progress));
+    const sim::Plan plan = sim::make_plan(bench_scene(parts.device, parts.presses, hold, 1));
+    if (plan.fine_relief) curves.push_back(membrane_curve(parts, plan, progress));
+  }
+  if (parts.device.camera && parts.device.camera->events) curves.push_back(events_curve(parts, progress));
+  return curves;
+}
+
+}  // namespace touchstone::lab

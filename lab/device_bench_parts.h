@@ -1,0 +1,92 @@
+#pragma once
+// What the parts of a device's bench share. For lab/device_bench*.cpp alone.
+
+#include <array>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/progress.h"
+#include "fem/compliance.h"
+#include "fem/element.h"
+#include "lab/bench_scene.h"
+#include "lab/device_bench.h"
+#include "render/imager.h"
+
+namespace touchstone::lab {
+
+/// Pictures of one hold by the reference's light, twice without common random numbers.
+struct TruePictures {
+  Hold hold;
+  std::array<SceneRun, 2> runs;
+  render::Imager imager;
+};
+
+struct BenchParts {
+  BenchSettings settings;
+  sim::DeviceSpec whole_device;  ///< as it is
+  sim::DeviceSpec device;        ///< with the middle of its pictures
+  BenchPresses presses;
+  double depth_mm = 0.0;
+  fem::Compliance own_gel;
+  double own_seconds = 0.0;
+  sim::DeviceSpec finest_device;
+  double finest_edges = 0.0;  ///< times the device's
+  fem::Compliance finest_gel;
+  double finest_seconds = 0.0;
+  FeltForces finest_forces;           ///< of `presses`
+  std::optional<TruePictures> truth;  ///< of the first hold on the finest gel; nothing where there are no pictures
+};
+
+sim::DeviceSpec with_edges(sim::DeviceSpec device, double factor);
+
+/// Set up anew, whatever a cache has.
+struct MadeGel {
+  fem::Compliance gel;
+  double seconds = 0.0;
+};
+MadeGel make_gel(const sim::DeviceSpec& device, fem::Element element = fem::Element::taylor_hood);
+
+/// The device with other edges, in forces and, where there is a truth, in pictures. What can't be had is in its note.
+BenchPoint mesh_point(const BenchParts& parts, double edges);
+
+/// Paths, each pixel traced by itself to the imager's noise.
+sim::SceneSpec reference_scene(const BenchParts& parts, const sim::DeviceSpec& device, const Hold& hold,
+                               std::uint64_t seed);
+TruePictures true_pictures(const BenchParts& parts, const sim::DeviceSpec& device, const fem::Compliance& gel,
+                           const Hold& hold, std::uint64_t seed);
+
+/// Makes parts.truth, or leaves it empty; in words, which or why.
+std::string prepare_pictures(BenchParts& parts);
+
+/// What a mesh gets wrong of pictures, free of the paths' noise.
+double mesh_pixel_error(const BenchParts& parts, const TruePictures& truth, const sim::DeviceSpec& device,
+                        const fem::Compliance& gel);
+
+/// A way to make a scene's pictures.
+struct LightTry {
+  std::string words;
+  sim::LightSpec light;
+  sim::EffectSwitches effects;
+  bool adaptive_paths = false;  ///< light.noise_fraction may be chosen between those tried
+  double pixel_error = kUnknown;
+  double once_s = kUnknown, each_s = kUnknown;
+};
+
+std::string paths_in_words(double noise_fraction);
+
+/// Shows a hold's scene that way, and fills in what it took and how far it is from the truth; `point` gets the same.
+/// What can't be had is in the point's note.
+LightTry try_light(const BenchParts& parts, const TruePictures& truth, const sim::DeviceSpec& device,
+                   const fem::Compliance& gel, LightTry one, std::uint64_t seed, BenchPoint& point);
+
+/// The curves of light, samples, bands, the fine contact's pixels and events, as far as the device has them. `tries`
+/// gets the ways of light that were tried.
+std::vector<BenchCurve> light_curves(const BenchParts& parts, std::vector<LightTry>& tries, const Progress& progress);
+
+BenchChoice cheapest_choice(const BenchParts& parts, const BenchCurve& mesh, const std::vector<LightTry>& tries,
+                            const Progress& progress);
+
+std::vector<EffectShare> effect_shares(const BenchParts& parts, const Progress& progress);
+
+}  // namespace touchstone::lab
