@@ -4,6 +4,8 @@
 #include <chrono>
 #include <cmath>
 #include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+#include <span>
 
 #include "core/error.h"
 #include "core/random.h"
@@ -33,37 +35,41 @@ std::vector<render::ImagerResponse> responses_of(const render::Imager& imager) {
   return responses;
 }
 
-/// Calls act(row, place in the row, what its channel is like) for each value of a picture of electrons.
-template <typename Act>
-void for_each_value(const cv::Mat& electrons, const std::vector<render::ImagerResponse>& responses, const Act& act) {
-  const int channels = electrons.channels();
-  TS_ASSERT(channels == static_cast<int>(responses.size()));
-  for (int row = 0; row < electrons.rows; ++row) {
-    for (int i = 0; i < electrons.cols * channels; ++i) act(row, i, responses[static_cast<std::size_t>(i % channels)]);
-  }
-}
-
-/// What is beyond the full well can't be seen.
-double seen(const cv::Mat& electrons, int row, int i, const render::ImagerResponse& response) {
-  return std::min<double>(electrons.ptr<float>(row)[i], response.full_well_e);
-}
-
 /// Mean electrons of each channel at each pixel, as if each pixel had all of them.
 cv::Mat electrons_of(const cv::Mat& irradiance, const render::Imager& imager) {
   std::vector<cv::Mat> bands;
   cv::split(irradiance, bands);
   std::vector<cv::Mat> channels;
   for (const render::ImagerResponse& response : responses_of(imager)) {
-    const render::QuantumEfficiency& per = response.electrons_per_irradiance;
     cv::Mat sum = cv::Mat::zeros(irradiance.size(), CV_32F);
     for (std::size_t b = 0; b < bands.size(); ++b) {
-      sum += bands[b] * per(0, static_cast<Eigen::Index>(b));
+      sum += bands[b] * response.electrons_per_irradiance(0, static_cast<Eigen::Index>(b));
     }
     channels.push_back(sum);
   }
   cv::Mat all;
   cv::merge(channels, all);
   return all;
+}
+
+constexpr int kBlur = 7;  // pixels
+
+/// Calls act(row, place in the row, the imager's noise there) for each value of pictures of electrons that the imager
+/// can tell. The noise is that of a blurred mean, since noise that knew of the paths' would weigh them by what they
+/// are; and nothing is cut off at the full well, since the mean of what is cut off isn't the mean cut off.
+template <typename Act>
+void for_each_value(const cv::Mat& one, const cv::Mat& other, const std::vector<render::ImagerResponse>& responses,
+                    const Act& act) {
+  TS_ASSERT(one.size() == other.size() && one.channels() == static_cast<int>(responses.size()));
+  cv::Mat mean = 0.5 * (one + other);
+  cv::blur(mean, mean, {kBlur, kBlur});
+  for (int row = 0; row < mean.rows; ++row) {
+    const float* level = mean.ptr<float>(row);
+    for (int i = 0; i < mean.cols * mean.channels(); ++i) {
+      const render::ImagerResponse& response = responses[static_cast<std::size_t>(i % mean.channels())];
+      if (level[i] < response.full_well_e) act(row, i, render::noise_e(response, level[i]));
+    }
+  }
 }
 
 }  // namespace
@@ -185,13 +191,13 @@ SceneRun run_scene(const sim::SceneSpec& scene, const fem::Compliance& gel, bool
   }
   if (!scene.outputs.light()) return run;
   begun = Clock::now();
-  const sim::VirtualCamera camera(scene, plan, gel, truths);
+  const sim::VirtualCamera camera(scene, plan, gel, whole ? std::span<const sim::Truth>() : truths);
   run.camera_seconds = seconds_since(begun);
   const render::Imager imager = sim::imager(scene.device, plan.bands, false);
   double seconds = 0.0;
   for (std::size_t k = 1; k < truths.size(); ++k) {
     begun = Clock::now();
-    const sim::Capture capture = whole ? camera.capture_whole(truths[k]) : camera.capture(truths[k]);
+    const sim::Capture capture = camera.capture(truths[k]);
     seconds += seconds_since(begun);
     run.paths += capture.paths_traced;
     run.electrons.push_back(electrons_of(capture.radiance, imager));
@@ -210,31 +216,28 @@ double pixel_error(const std::vector<cv::Mat>& one, const std::vector<cv::Mat>& 
   double sum = 0.0;
   std::size_t count = 0;
   for (std::size_t k = 0; k < one.size(); ++k) {
-    for_each_value(true_one[k], responses, [&](int row, int i, const render::ImagerResponse& response) {
-      const double a = seen(one[k], row, i, response);
-      const double b = seen(other[k], row, i, response);
-      const double true_a = seen(true_one[k], row, i, response);
-      const double true_b = seen(true_other[k], row, i, response);
-      const double noise = render::noise_e(response, 0.5 * (true_a + true_b));
-      sum += (a - true_a) * (b - true_b) / (noise * noise);
+    for_each_value(true_one[k], true_other[k], responses, [&](int row, int i, double noise) {
+      const double first = one[k].ptr<float>(row)[i] - true_one[k].ptr<float>(row)[i];
+      const double second = other[k].ptr<float>(row)[i] - true_other[k].ptr<float>(row)[i];
+      sum += first * second / (noise * noise);
       ++count;
     });
   }
-  return std::sqrt(std::max(0.0, sum) / static_cast<double>(count));
+  return count == 0 ? 0.0 : std::sqrt(std::max(0.0, sum) / static_cast<double>(count));
 }
 
-double worst_pixel(const std::vector<cv::Mat>& electrons, const std::vector<cv::Mat>& than,
-                   const render::Imager& imager) {
-  TS_ASSERT(electrons.size() == than.size() && !than.empty());
+double worst_pixel(const std::vector<cv::Mat>& electrons, const std::vector<cv::Mat>& true_one,
+                   const std::vector<cv::Mat>& true_other, const render::Imager& imager) {
+  TS_ASSERT(electrons.size() == true_one.size() && electrons.size() == true_other.size());
   const std::vector<render::ImagerResponse> responses = responses_of(imager);
   std::vector<double> differences;
-  for (std::size_t k = 0; k < than.size(); ++k) {
-    for_each_value(than[k], responses, [&](int row, int i, const render::ImagerResponse& response) {
-      const double wanted = seen(than[k], row, i, response);
-      differences.push_back(std::abs(seen(electrons[k], row, i, response) - wanted) /
-                            render::noise_e(response, wanted));
+  for (std::size_t k = 0; k < electrons.size(); ++k) {
+    for_each_value(true_one[k], true_other[k], responses, [&](int row, int i, double noise) {
+      const double wanted = 0.5 * (true_one[k].ptr<float>(row)[i] + true_other[k].ptr<float>(row)[i]);
+      differences.push_back(std::abs(electrons[k].ptr<float>(row)[i] - wanted) / noise);
     });
   }
+  if (differences.empty()) return 0.0;
   const auto rank = static_cast<std::ptrdiff_t>(0.99 * static_cast<double>(differences.size() - 1));
   std::nth_element(differences.begin(), differences.begin() + rank, differences.end());
   return differences[static_cast<std::size_t>(rank)];

@@ -68,7 +68,7 @@ struct SceneRun {
 };
 
 /// Plays and shows a scene whose outputs are frames and radiance, or neither.
-/// @param whole every pixel traced, nothing kept from picture to picture
+/// @param whole every pixel traced by paths, nothing kept from picture to picture
 /// @throws Error as make_plan, sim::play_motion and sim::VirtualCamera
 SceneRun run_scene(const sim::SceneSpec& scene, const fem::Compliance& gel, bool whole = false);
 
@@ -80,9 +80,10 @@ double pixel_error(const std::vector<cv::Mat>& one, const std::vector<cv::Mat>& 
                    const std::vector<cv::Mat>& true_one, const std::vector<cv::Mat>& true_other,
                    const render::Imager& imager);
 
-/// The largest difference of all pixels and channels but for 1 % of them, likewise.
-double worst_pixel(const std::vector<cv::Mat>& electrons, const std::vector<cv::Mat>& than,
-                   const render::Imager& imager);
+/// The largest difference from the true ones' mean, of all pixels and channels but 1 % of them. The true ones' noise is
+/// in it.
+double worst_pixel(const std::vector<cv::Mat>& electrons, const std::vector<cv::Mat>& true_one,
+                   const std::vector<cv::Mat>& true_other, const render::Imager& imager);
 
 /// Root mean square difference of delivered numbers.
 double number_difference(const std::vector<cv::Mat>& numbers, const std::vector<cv::Mat>& than);

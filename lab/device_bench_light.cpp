@@ -20,7 +20,12 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr int kPlenty = 4096;  // paths a pixel: enough for the noise that is asked for to decide
-constexpr std::array kNoiseFractions = {4.0, 2.0, 1.0, 0.5, 0.25};
+constexpr std::array kNoiseFractions = {8.0, 4.0, 2.0, 1.0, 0.5};  // of the wanted pixel error
+// A reference's noise is left in the mean over N values by its square over sqrt(N): it may be this part of the wanted
+// one.
+constexpr double kReferenceShare = 0.25;
+constexpr double kNoisiestReference = 4.0;  // of the imager's noise
+constexpr int kPilotPaths = 8;
 constexpr std::array kSamples = {1, 4, 16, 64, 256};
 constexpr std::array kBandCounts = {1, 3, 8, 16};
 constexpr std::array kPixelsAnEdge = {2.5, 5.0, 10.0, 20.0};
@@ -66,10 +71,12 @@ std::vector<LightTry> ways_of_light(const BenchParts& parts) {
   using sim::Switch;
   tries.emplace_back().words = "as the plan decides";
   add("direct light", Switch::on, Switch::off, 1.0);
-  add("shared paths", Switch::off, Switch::on, 1.0);
-  add("shared paths to half the noise", Switch::off, Switch::on, 0.5);
+  for (const double noise : {1.0, 0.5}) {
+    add(fmt::format("shared paths to {:.3g} of the imager's noise", noise), Switch::off, Switch::on, noise);
+  }
   for (const double fraction : kNoiseFractions) {
-    add(paths_in_words(fraction), Switch::off, Switch::off, fraction, true);
+    const double noise = fraction * parts.settings.pixel_error;
+    add(paths_in_words(noise), Switch::off, Switch::off, noise, true);
   }
   return tries;
 }
@@ -118,7 +125,7 @@ BenchCurve samples_curve(const BenchParts& parts, const TruePictures& truth, con
     point.once_s = kUnknown;  // key frames, which whole pictures don't use
     point.pixel_error =
         pixel_error(run.electrons, run.electrons, truth.runs[0].electrons, truth.runs[1].electrons, truth.imager);
-    point.pixel_worst = worst_pixel(run.electrons, truth.runs[0].electrons, truth.imager);
+    point.pixel_worst = worst_pixel(run.electrons, truth.runs[0].electrons, truth.runs[1].electrons, truth.imager);
     curve.points.push_back(point);
   }
   return curve;
@@ -292,7 +299,7 @@ LightTry try_light(const BenchParts& parts, const TruePictures& truth, const sim
     add_run(run, point);
     point.pixel_error =
         pixel_error(run.electrons, run.electrons, truth.runs[0].electrons, truth.runs[1].electrons, truth.imager);
-    point.pixel_worst = worst_pixel(run.electrons, truth.runs[0].electrons, truth.imager);
+    point.pixel_worst = worst_pixel(run.electrons, truth.runs[0].electrons, truth.runs[1].electrons, truth.imager);
     point.note = run.light;
     one.pixel_error = point.pixel_error;
     one.once_s = point.once_s;
@@ -309,7 +316,8 @@ sim::SceneSpec reference_scene(const BenchParts& parts, const sim::DeviceSpec& d
   scene.effects.direct_light = sim::Switch::off;
   scene.effects.shared_paths = sim::Switch::off;
   scene.effects.interreflection = sim::Switch::on;
-  scene.light.max_samples = kPlenty;
+  // The same number in all pixels: where sampling stops by what was sampled, it favours what happened to be dark.
+  scene.light.min_samples = scene.light.max_samples = parts.reference_paths;
   return scene;
 }
 
@@ -331,6 +339,18 @@ std::string prepare_pictures(BenchParts& parts) {
   const Hold& hold = parts.presses.holds.front();
   try {
     sim::make_plan(bench_scene(parts.device, parts.presses, hold, 1));
+    parts.reference_paths = kPilotPaths;
+    const TruePictures pilot = true_pictures(parts, parts.device, parts.own_gel, hold, parts.settings.seed + 10);
+    // Each against the other as if that were true: half of the squares are either one's.
+    const double noise = pixel_error(pilot.runs[0].electrons, pilot.runs[0].electrons, pilot.runs[1].electrons,
+                                     pilot.runs[1].electrons, pilot.imager) /
+                         std::sqrt(2.0);
+    const cv::Mat& picture = pilot.runs[0].electrons.front();
+    const double values = static_cast<double>(pilot.runs[0].electrons.size() * picture.total()) * picture.channels();
+    const double allowed =
+        std::min(kNoisiestReference, kReferenceShare * parts.settings.pixel_error * std::pow(values, 0.25));
+    parts.reference_paths =
+        std::clamp(static_cast<int>(std::ceil(kPilotPaths * std::pow(noise / allowed, 2))), kPilotPaths, kPlenty);
     parts.truth = true_pictures(parts, parts.finest_device, parts.finest_gel, hold, parts.settings.seed);
   } catch (const Error& error) {
     return fmt::format("none: {}", error.what());
@@ -341,7 +361,8 @@ std::string prepare_pictures(BenchParts& parts) {
   if (camera.width != whole.width || camera.height != whole.height) {
     words += fmt::format(" out of the middle of {} x {}", whole.width, whole.height);
   }
-  return words + ", of a pressed and a dragged state";
+  return words +
+         fmt::format(", of a pressed and a dragged state; {} paths a pixel for the reference", parts.reference_paths);
 }
 
 double mesh_pixel_error(const BenchParts& parts, const TruePictures& truth, const sim::DeviceSpec& device,

@@ -89,7 +89,7 @@ std::vector<Truth> play_motion(const SceneSpec& scene, const Plan& plan, const f
 class VirtualCamera {
  public:
   /// `truths` are the scene's, or those of it that pictures are made of: the first one is where the light of later
-  /// frames is taken from, and the one that is pressed deepest is what direct light is judged by.
+  /// frames is taken from, and the deepest one is what direct light is judged by. Of none, all pictures are whole.
   /// @throws Error with the scene's place if the scene switches direct light on and it can't be had
   VirtualCamera(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel, std::span<const Truth> truths);
   /// For a scene of a single state, or one whose further ones aren't known.

@@ -31,9 +31,9 @@ render::Imager grey_imager() {
   return imager;
 }
 
-/// 200 x 200 pixels of this many electrons, with a spread that differs from seed to seed.
+/// A million pixels of this many electrons, with a spread that differs from seed to seed.
 std::vector<cv::Mat> even(double electrons, double spread, std::uint64_t seed) {
-  cv::Mat picture(200, 200, CV_32FC1);
+  cv::Mat picture(1000, 1000, CV_32FC1);
   RandomStream random(seed, 0, Purpose::kTest);
   for (int row = 0; row < picture.rows; ++row) {
     for (int column = 0; column < picture.cols; ++column) {
@@ -52,13 +52,13 @@ TEST(PixelError, IsFreeOfTheReferencesNoise) {
   const auto other = even(1020.0, 50.0, 2);
   const auto true_one = even(1000.0, 40.0, 3);
   const auto true_other = even(1000.0, 40.0, 4);
-  EXPECT_NEAR(pixel_error(one, other, true_one, true_other, imager), 20.0 / noise, 0.03);
-  EXPECT_NEAR(pixel_error(one, one, true_one, true_other, imager), std::hypot(20.0, 50.0) / noise, 0.03);
+  EXPECT_NEAR(pixel_error(one, other, true_one, true_other, imager), 20.0 / noise, 0.01);
+  EXPECT_NEAR(pixel_error(one, one, true_one, true_other, imager), std::hypot(20.0, 50.0) / noise, 0.01);
   EXPECT_EQ(pixel_error(one, one, one, one, imager), 0.0);
 }
 
 TEST(PixelError, SeesNothingBeyondTheFullWell) {
-  EXPECT_EQ(pixel_error(even(12000.0, 0.0, 1), even(12000.0, 0.0, 1), even(50000.0, 0.0, 1), even(50000.0, 0.0, 1),
+  EXPECT_EQ(pixel_error(even(1000.0, 0.0, 1), even(1000.0, 0.0, 1), even(50000.0, 0.0, 1), even(50000.0, 0.0, 1),
                         grey_imager()),
             0.0);
 }
@@ -106,13 +106,23 @@ const BenchPoint& point(const BenchCurve& curve, const std::string& setting) {
   return *found;
 }
 
+/// Short of light, as cameras behind a hole are: their noise is some 4 % of what they see.
+sim::DeviceSpec dim_device() {
+  sim::DeviceSpec device = test::small_device();
+  device.camera->width = 64;
+  device.camera->height = 48;
+  device.camera->pixel_pitch_um = 45;
+  device.camera->exposure_us = 5;
+  device.camera->full_well_e = 1000;
+  return device;
+}
+
 const DeviceBench& clear_bench() {
   static const DeviceBench bench = [] {
     BenchSettings settings;
     settings.force_error = 0.03;
     settings.pixel_error = 1.0;
-    settings.most_pixels = 3000;
-    return bench_device(test::small_device(), settings);
+    return bench_device(dim_device(), settings);
   }();
   return bench;
 }
@@ -128,12 +138,11 @@ TEST(DeviceBench, FinerMeshesCostMoreAndErrLess) {
   EXPECT_EQ(std::count_if(mesh.points.begin(), mesh.points.end(), [](const auto& p) { return p.as_is; }), 1);
 }
 
-TEST(DeviceBench, ElementsWithoutPressureErrMoreOnTheSameMesh) {
+TEST(DeviceBench, LinearElementsErrFarMoreOnTheSameMesh) {
   const BenchCurve& element = curve(clear_bench(), "element");
   const double edge = 1.2;  // mm, 1.5 times the device's
-  const double taylor_hood = point(element, fmt::format("Taylor-Hood (P2/P1), fine_mm {}", edge)).force_error;
-  EXPECT_LT(taylor_hood, point(element, fmt::format("quadratic (P2), fine_mm {}", edge)).force_error);
-  EXPECT_GT(point(element, fmt::format("linear (P1), fine_mm {}", edge)).force_error, 5.0 * taylor_hood);
+  EXPECT_GT(point(element, fmt::format("linear (P1), fine_mm {}", edge)).force_error,
+            5.0 * point(element, fmt::format("Taylor-Hood (P2/P1), fine_mm {}", edge)).force_error);
 }
 
 TEST(DeviceBench, TighterContactErrsLess) {
@@ -153,9 +162,9 @@ TEST(DeviceBench, FourTimesThePathsHaveHalfTheNoise) {
 
 TEST(DeviceBench, PathsStopWhereTheyAreTold) {
   const BenchCurve& light = curve(clear_bench(), "light");
-  EXPECT_GT(point(light, "paths to 4 of").pixel_error, point(light, "paths to 0.25 of").pixel_error);
-  EXPECT_LT(point(light, "paths to 4 of").work, point(light, "paths to 0.25 of").work);
-  EXPECT_LT(point(light, "paths to 0.25 of").pixel_error, 0.5);
+  EXPECT_GT(point(light, "paths to 8 of").pixel_error, point(light, "paths to 0.5 of").pixel_error);
+  EXPECT_LT(point(light, "paths to 8 of").work, point(light, "paths to 0.5 of").work);
+  EXPECT_LT(point(light, "paths to 0.5 of").pixel_error, 1.0);
 }
 
 TEST(DeviceBench, ItsChoiceHoldsOnOtherPresses) {
@@ -223,11 +232,7 @@ TEST(DeviceBench, ACoatedDeviceHasDirectLightAndItsOwnContactPixels) {
 }
 
 TEST(DeviceBench, EventsComeNearerWithSmallerSteps) {
-  sim::DeviceSpec device = test::small_device();
-  device.camera->width = 24;
-  device.camera->height = 18;
-  device.camera->pixel_pitch_um = 120;
-  device.camera->active_area_um2 = 5000;
+  sim::DeviceSpec device = dim_device();
   device.camera->events.emplace().pixels.dark_intensity = 10.0;
   BenchSettings settings;
   settings.force_error = 0.1;
