@@ -59,12 +59,12 @@ void add_bench_command(CLI::App& app, const GlobalOptions& global, Action& actio
   command->add_option("-o,--out", options->out, "Folder for the page, its table and plots; is made")->required();
   command->add_option("--force-error", options->force_error_percent, "Wanted: percent of a force (default 1)");
   command->add_option("--pixel-error", options->settings.pixel_error,
-                      "Wanted: part of the imager's noise, root mean square over pixels (default 0.5)");
+                      "Wanted: part of the imager's noise, root mean square over pixels (default 1)");
   command->add_option("--object", options->object, "Object file (default: a ball of the gel's thickness, in radius)");
   command->add_option("--depth", options->depth_mm,
                       "mm that it is pressed in (default: a tenth of the gel's thickness)");
   command->add_option("--pixels", options->settings.most_pixels,
-                      "Compare pictures on so many pixels of their middle (default 76800)");
+                      "Compare pictures on so many pixels of their middle (default 19200)");
   command->add_option("--seed", options->settings.seed, "Of the presses' places and of the light (default 1)");
   command->add_flag("--no-finite-strain", options->no_finite_strain,
                     "Leave out the press at finite strain, which takes up to minutes");

@@ -21,11 +21,10 @@ using Clock = std::chrono::steady_clock;
 
 constexpr int kPlenty = 4096;  // paths a pixel: enough for the noise that is asked for to decide
 constexpr std::array kNoiseFractions = {8.0, 4.0, 2.0, 1.0, 0.5};  // of the wanted pixel error
-// A reference's noise is left in the mean over N values by its square over sqrt(N): it may be this part of the wanted
-// one.
-constexpr double kReferenceShare = 0.25;
 constexpr double kNoisiestReference = 4.0;  // of the imager's noise
 constexpr int kPilotPaths = 8;
+constexpr double kMostSeconds = 40.0;  // for one setting of a curve
+constexpr double kEnough = 0.7;        // of the wanted error: what is better costs a multiple, and nobody asked for it
 constexpr std::array kSamples = {1, 4, 16, 64, 256};
 constexpr std::array kBandCounts = {1, 3, 8, 16};
 constexpr std::array kPixelsAnEdge = {2.5, 5.0, 10.0, 20.0};
@@ -49,11 +48,16 @@ void add_run(const SceneRun& run, BenchPoint& point) {
 std::vector<LightTry> ways_of_light(const BenchParts& parts) {
   const sim::SceneSpec scene = bench_scene(parts.device, parts.presses, parts.presses.holds.front(), 1);
   std::vector<LightTry> tries;
-  const auto add = [&](const std::string& words, sim::Switch direct, sim::Switch shared, double noise_fraction,
+  using sim::Switch;
+  const auto add = [&](const std::string& words, Switch direct, Switch shared, double noise_fraction, bool exact,
                        bool adaptive_paths = false) {
     LightTry one;
     one.words = words;
     one.adaptive_paths = adaptive_paths;
+    if (exact) {
+      one.effects = parts.exact;
+      one.words += parts.exact_words;
+    }
     one.effects.direct_light = direct;
     one.effects.shared_paths = shared;
     one.light.noise_fraction = noise_fraction;
@@ -68,15 +72,17 @@ std::vector<LightTry> ways_of_light(const BenchParts& parts) {
     }
     tries.push_back(one);
   };
-  using sim::Switch;
   tries.emplace_back().words = "as the plan decides";
-  add("direct light", Switch::on, Switch::off, 1.0);
-  for (const double noise : {1.0, 0.5}) {
-    add(fmt::format("shared paths to {:.3g} of the imager's noise", noise), Switch::off, Switch::on, noise);
+  for (const bool exact : {false, true}) {
+    if (exact && parts.exact_words.empty()) continue;  // the same once more
+    add("direct light", Switch::on, Switch::off, 1.0, exact);
+    for (const double noise : {1.0, 0.5}) {
+      add(fmt::format("shared paths to {:.3g} of the imager's noise", noise), Switch::off, Switch::on, noise, exact);
+    }
   }
   for (const double fraction : kNoiseFractions) {
     const double noise = fraction * parts.settings.pixel_error;
-    add(paths_in_words(noise), Switch::off, Switch::off, noise, true);
+    add(paths_in_words(noise), Switch::off, Switch::off, noise, true, true);
   }
   return tries;
 }
@@ -93,13 +99,26 @@ BenchCurve light_curve(const BenchParts& parts, const TruePictures& truth, std::
   curve.work = "paths a pixel";
   tries = ways_of_light(parts);
   std::int64_t done = 0;
+  bool enough = false;
+  double last_s = 0.0;  // of paths; half of the noise takes four times as much
   for (LightTry& one : tries) {
+    if (enough && one.adaptive_paths) continue;
+    if (one.adaptive_paths && 4.0 * last_s > kMostSeconds) {
+      BenchPoint left_out;
+      left_out.setting = one.words;
+      left_out.note = fmt::format("left out: it would take some {:.0f} s", 4.0 * last_s);
+      curve.points.push_back(left_out);
+      break;
+    }
     if (progress) progress("light", done++, static_cast<std::int64_t>(tries.size()));
     BenchPoint point;
     one = try_light(parts, truth, parts.device, parts.own_gel, std::move(one), parts.settings.seed + 2, point);
     point.as_is = done == 1;
     if (!point.as_is && std::isfinite(point.pixel_error)) point.note.clear();  // it says the same once more
     curve.points.push_back(point);
+    if (one.adaptive_paths)
+      last_s = one.once_s + static_cast<double>(parts.truth->runs[0].electrons.size()) * one.each_s;
+    enough = enough || (one.adaptive_paths && one.pixel_error < kEnough * parts.settings.pixel_error);
   }
   return curve;
 }
@@ -127,6 +146,8 @@ BenchCurve samples_curve(const BenchParts& parts, const TruePictures& truth, con
         pixel_error(run.electrons, run.electrons, truth.runs[0].electrons, truth.runs[1].electrons, truth.imager);
     point.pixel_worst = worst_pixel(run.electrons, truth.runs[0].electrons, truth.runs[1].electrons, truth.imager);
     curve.points.push_back(point);
+    const double took_s = static_cast<double>(run.electrons.size()) * run.picture_seconds;
+    if (point.pixel_error < kEnough * parts.settings.pixel_error || 4.0 * took_s > kMostSeconds) break;
   }
   return curve;
 }
@@ -190,14 +211,13 @@ BenchCurve membrane_curve(const BenchParts& parts, const sim::Plan& plan, const 
   BenchCurve curve;
   curve.name = "contact pixels";
   curve.what = fmt::format(
-      "Pixels of the fine contact, which gives the coating its shape, free of the paths' noise, against pixels of "
+      "Pixels of the fine contact, which gives what is seen its shape, free of the paths' noise, against pixels of "
       "{:.3g} um.",
       1e3 * parts.device.mesh.fine_mm / kFinestPixelsAnEdge);
   curve.each = "mechanics and a picture, s";
   curve.work = "paths a pixel";
   const Hold& hold = parts.presses.holds.front();
   sim::SceneSpec scene = reference_scene(parts, parts.device, hold, parts.settings.seed + 60);
-  scene.effects.fine_relief = sim::Switch::on;
   const auto pixel_um = [&](double an_edge) { return 1e3 * parts.device.mesh.fine_mm / an_edge; };
   scene.membrane.pixel_um = pixel_um(kFinestPixelsAnEdge);
   TruePictures truth{.hold = hold, .runs = {}, .imager = sim::imager(parts.device, plan.bands, true)};
@@ -212,7 +232,7 @@ BenchCurve membrane_curve(const BenchParts& parts, const sim::Plan& plan, const 
     BenchPoint point = noise_free_point(parts, truth, scene);
     point.setting = fmt::format("membrane.pixel_um {:.3g}", scene.membrane.pixel_um);
     point.value = scene.membrane.pixel_um;
-    point.as_is = std::abs(1e3 * plan.relief_pixel_mm - point.value) < 1e-6 * point.value;
+    point.as_is = plan.fine_relief && std::abs(1e3 * plan.relief_pixel_mm - point.value) < 1e-6 * point.value;
     curve.points.push_back(point);
   }
   return curve;
@@ -313,9 +333,9 @@ LightTry try_light(const BenchParts& parts, const TruePictures& truth, const sim
 sim::SceneSpec reference_scene(const BenchParts& parts, const sim::DeviceSpec& device, const Hold& hold,
                                std::uint64_t seed) {
   sim::SceneSpec scene = bench_scene(device, parts.presses, hold, seed);
+  scene.effects = parts.exact;
   scene.effects.direct_light = sim::Switch::off;
   scene.effects.shared_paths = sim::Switch::off;
-  scene.effects.interreflection = sim::Switch::on;
   // The same number in all pixels: where sampling stops by what was sampled, it favours what happened to be dark.
   scene.light.min_samples = scene.light.max_samples = parts.reference_paths;
   return scene;
@@ -334,11 +354,32 @@ TruePictures true_pictures(const BenchParts& parts, const sim::DeviceSpec& devic
   return truth;
 }
 
+namespace {
+
+/// What the plan leaves out of pictures because it shows little: the reference has it.
+void find_exact_effects(BenchParts& parts) {
+  sim::SceneSpec scene = bench_scene(parts.device, parts.presses, parts.presses.holds.front(), 1);
+  const sim::Plan plan = sim::make_plan(scene);
+  scene.effects.interreflection = sim::Switch::on;
+  parts.exact = scene.effects;
+  if (!plan.interreflection) parts.exact_words = ", with interreflection";
+  try {
+    scene.effects.fine_relief = sim::Switch::on;
+    if (!sim::make_plan(scene).fine_relief) return;
+    parts.exact = scene.effects;
+    if (!plan.fine_relief) parts.exact_words += parts.exact_words.empty() ? ", with fine relief" : " and fine relief";
+  } catch (const Error&) {
+    return;  // this device has none
+  }
+}
+
+}  // namespace
+
 std::string prepare_pictures(BenchParts& parts) {
   if (!parts.device.camera) return "none: the device has no camera";
   const Hold& hold = parts.presses.holds.front();
   try {
-    sim::make_plan(bench_scene(parts.device, parts.presses, hold, 1));
+    find_exact_effects(parts);
     parts.reference_paths = kPilotPaths;
     const TruePictures pilot = true_pictures(parts, parts.device, parts.own_gel, hold, parts.settings.seed + 10);
     // Each against the other as if that were true: half of the squares are either one's.
@@ -362,7 +403,10 @@ std::string prepare_pictures(BenchParts& parts) {
     words += fmt::format(" out of the middle of {} x {}", whole.width, whole.height);
   }
   return words +
-         fmt::format(", of a pressed and a dragged state; {} paths a pixel for the reference", parts.reference_paths);
+         fmt::format(
+             ", of a pressed and a dragged state; {} paths a pixel for the reference{}, so that errors under {:.2g} "
+             "aren't told from none",
+             parts.reference_paths, parts.exact_words, kReferenceShare * parts.settings.pixel_error);
 }
 
 double mesh_pixel_error(const BenchParts& parts, const TruePictures& truth, const sim::DeviceSpec& device,
@@ -381,7 +425,7 @@ std::vector<BenchCurve> light_curves(const BenchParts& parts, std::vector<LightT
     curves.push_back(samples_curve(parts, own, progress));
     if (parts.device.bands) curves.push_back(bands_curve(parts, progress));
     const sim::Plan plan = sim::make_plan(bench_scene(parts.device, parts.presses, hold, 1));
-    if (plan.fine_relief) curves.push_back(membrane_curve(parts, plan, progress));
+    if (parts.exact.fine_relief == sim::Switch::on) curves.push_back(membrane_curve(parts, plan, progress));
   }
   if (parts.device.camera && parts.device.camera->events) curves.push_back(events_curve(parts, progress));
   return curves;

@@ -35,6 +35,8 @@ struct BenchParts {
   fem::Compliance finest_gel;
   double finest_seconds = 0.0;
   FeltForces finest_forces;           ///< of `presses`
+  sim::EffectSwitches exact;          ///< of the reference's pictures
+  std::string exact_words;            ///< ", with interreflection": what of it the plan leaves out; empty: nothing
   int reference_paths = 0;            ///< a pixel, of true pictures
   std::optional<TruePictures> truth;  ///< of the first hold on the finest gel; nothing where there are no pictures
 };

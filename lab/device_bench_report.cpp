@@ -43,7 +43,7 @@ std::vector<Column> columns_of(const BenchCurve& curve) {
           {"wrong events, %", &BenchPoint::event_error, 0.01}};
 }
 
-std::string table_of(const BenchCurve& curve) {
+std::string table_of(const BenchCurve& curve, double least_pixel_error) {
   std::vector<Column> columns;
   for (const Column& column : columns_of(curve)) {
     if (any(curve, column.of)) columns.push_back(column);
@@ -57,7 +57,11 @@ std::string table_of(const BenchCurve& curve) {
   text += " |\n" + line + "---|\n";
   for (const BenchPoint& point : curve.points) {
     text += point.as_is ? fmt::format("| **{}** |", point.setting) : fmt::format("| {} |", point.setting);
-    for (const Column& column : columns) text += fmt::format(" {} |", number(point.*column.of, column.unit));
+    for (const Column& column : columns) {
+      const bool too_small = column.of == &BenchPoint::pixel_error && point.*column.of < least_pixel_error;
+      text += too_small ? fmt::format(" < {:.2g} |", least_pixel_error)
+                        : fmt::format(" {} |", number(point.*column.of, column.unit));
+    }
     text += fmt::format(" {} |\n", point.note);
   }
   return text;
@@ -152,10 +156,16 @@ std::string choice_in_words(const DeviceBench& bench) {
     text += "\nIn scenes:\n\n```yaml\n";
     text += fmt::format("light: {{noise_fraction: {:.3g}, max_samples: {}}}\n", choice.light.noise_fraction,
                         choice.light.max_samples);
-    if (choice.effects.direct_light != sim::Switch::automatic) {
-      text += fmt::format("effects: {{direct_light: {}, shared_paths: {}}}\n", name_of(choice.effects.direct_light),
-                          name_of(choice.effects.shared_paths));
-    }
+    std::string switches;
+    const auto add = [&](const char* name, sim::Switch one) {
+      if (one != sim::Switch::automatic)
+        switches += fmt::format("{}{}: {}", switches.empty() ? "" : ", ", name, name_of(one));
+    };
+    add("interreflection", choice.effects.interreflection);
+    add("fine_relief", choice.effects.fine_relief);
+    add("direct_light", choice.effects.direct_light);
+    add("shared_paths", choice.effects.shared_paths);
+    if (!switches.empty()) text += fmt::format("effects: {{{}}}\n", switches);
     text += "```\n";
   }
   return text;
@@ -222,7 +232,7 @@ StudyResult report(const DeviceBench& bench, const std::string& text) {
       result.files.push_back({name, to_svg(*plot)});
       page += fmt::format("![Error against seconds]({})\n\n", name);
     }
-    page += table_of(curve) + "\n";
+    page += table_of(curve, kReferenceShare * bench.settings.pixel_error) + "\n";
   }
   page += "## Effects\n\n" + effects_table(bench);
   result.files.insert(result.files.begin(), {"bench.md", page});

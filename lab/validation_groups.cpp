@@ -15,6 +15,7 @@ std::vector<ValidationRow> validate_vhs_speed(const ValidateOptions& options);
 std::vector<ValidationRow> validate_vhs_palpation(const ValidateOptions& options);
 std::vector<ValidationRow> validate_vhs_visual(const ValidateOptions& options);
 std::vector<ValidationRow> validate_dvs_light(const ValidateOptions& options);
+std::vector<ValidationRow> validate_dvs_design(const ValidateOptions& options);
 std::vector<ValidationRow> validate_dvs_force(const ValidateOptions& options);
 std::vector<ValidationRow> validate_dvs_material(const ValidateOptions& options);
 std::vector<ValidationRow> validate_chroma_light(const ValidateOptions& options);
@@ -50,6 +51,7 @@ const std::vector<ValidationGroup>& validation_groups() {
       {"dvs.light", validate_dvs_light},
       {"dvs.force", validate_dvs_force},
       {"dvs.material", validate_dvs_material},
+      {"dvs.design", validate_dvs_design},
       {"chroma.light", validate_chroma_light},
       {"chroma.marker", validate_chroma_marker},
       {"chroma.field", validate_chroma_field},
