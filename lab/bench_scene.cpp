@@ -195,11 +195,13 @@ SceneRun run_scene(const sim::SceneSpec& scene, const fem::Compliance& gel, bool
   run.camera_seconds = seconds_since(begun);
   const render::Imager imager = sim::imager(scene.device, plan.bands, false);
   double seconds = 0.0;
+  run.direct = true;
   for (std::size_t k = 1; k < truths.size(); ++k) {
     begun = Clock::now();
     const sim::Capture capture = camera.capture(truths[k]);
     seconds += seconds_since(begun);
     run.paths += capture.paths_traced;
+    run.direct = run.direct && capture.direct;
     run.electrons.push_back(electrons_of(capture.radiance, imager));
     run.numbers.push_back(capture.frame);
     run.light = capture.direct ? "direct light" : capture.light.empty() ? "paths" : capture.light;

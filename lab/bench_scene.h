@@ -64,6 +64,7 @@ struct SceneRun {
   double camera_seconds = 0.0;     ///< once a scene
   double picture_seconds = 0.0;    ///< a frame
   std::int64_t paths = 0;          ///< traced for the pictures, not for what is made once
+  bool direct = false;             ///< all pictures by direct light
   std::string light;               ///< how the last picture was lit
 };
 

@@ -32,7 +32,7 @@ struct BenchSettings {
 
 /// A reference's noise is left in a mean over N values by its square over sqrt(N): pixel errors under this part of the
 /// wanted one aren't told from none.
-inline constexpr double kReferenceShare = 0.25;
+inline constexpr double kReferenceShare = 0.35;
 
 inline constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 

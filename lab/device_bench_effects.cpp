@@ -31,12 +31,16 @@ constexpr Switchable kSwitches[] = {
 
 using TwoRuns = std::array<SceneRun, 2>;
 
+/// With other random numbers the second time; direct light has none.
 TwoRuns run_twice(sim::SceneSpec scene, const fem::Compliance& gel) {
   TwoRuns runs;
-  for (SceneRun& run : runs) {
-    run = run_scene(scene, gel);
-    scene.seed += kOtherSeed;
+  runs[0] = run_scene(scene, gel);
+  if (runs[0].direct) {
+    runs[1] = runs[0];
+    return runs;
   }
+  scene.seed += kOtherSeed;
+  runs[1] = run_scene(scene, gel);
   return runs;
 }
 

@@ -21,14 +21,14 @@ using Clock = std::chrono::steady_clock;
 
 constexpr int kPlenty = 4096;  // paths a pixel: enough for the noise that is asked for to decide
 constexpr std::array kNoiseFractions = {8.0, 4.0, 2.0, 1.0, 0.5};  // of the wanted pixel error
-constexpr double kNoisiestReference = 4.0;  // of the imager's noise
+constexpr double kNoisiestReference = 4.0;                         // of the imager's noise
 constexpr int kPilotPaths = 8;
 constexpr double kMostSeconds = 40.0;  // for one setting of a curve
 constexpr double kEnough = 0.7;        // of the wanted error: what is better costs a multiple, and nobody asked for it
 constexpr std::array kSamples = {1, 4, 16, 64, 256};
 constexpr std::array kBandCounts = {1, 3, 8, 16};
-constexpr std::array kPixelsAnEdge = {2.5, 5.0, 10.0, 20.0};
-constexpr double kFinestPixelsAnEdge = 40.0;
+constexpr std::array kPixelsAnEdge = {2.5, 5.0, 10.0};
+constexpr double kFinestPixelsAnEdge = 20.0;
 constexpr std::array kEventSteps = {4.0, 2.0, 1.0, 0.5, 0.25};
 constexpr double kFinestEventStep = 0.125;
 constexpr double kSameEvent_us = 1000.0;

@@ -140,10 +140,19 @@ void add_force_rows(RowList& rows, const sim::TouchRig& rig, const sensors::Heig
   const PooledLines pooled = pool(series);
   rows.add_bounded("gelsight.force.sphere_pooled_r2", "one line through all balls, as in fig. 4-2a", "1",
                    Better::higher, kStronglyLinear_r2, false, pooled.estimated.r2);
+  const auto draw = [&](const std::vector<NormalSeries>& drawn) {
+    ValidationSeries figure{"sum of the height map, mm^3", "force, N", {}, false, false};
+    for (const NormalSeries& one : drawn) {
+      for (const NormalSample& sample : one.samples) figure.points.emplace_back(sample.estimated_mm3, sample.force_N);
+    }
+    rows.last().series = figure;
+  };
+  draw(series);
   rows.add_bounded("gelsight.force.sphere_pooled_true_r2", "the same with the true membrane's heights", "1",
                    Better::higher, kStronglyLinear_r2, false, pooled.truth.r2);
   rows.add_bounded("gelsight.force.cylinder_r2", "sum of the height map against force, 8.5 mm flat cylinder to 1.2 N",
                    "1", Better::higher, kStronglyLinear_r2, false, cylinder.estimated.r2);
+  draw({cylinder});
   rows.add_bounded("gelsight.force.cylinder_true_r2", "the same with the true membrane's heights", "1", Better::higher,
                    kStronglyLinear_r2, false, cylinder.truth.r2);
 }
@@ -193,6 +202,9 @@ std::vector<ValidationRow> validate_gelsight_slip(const ValidateOptions& options
                                            options.quick ? 12 : 24, kSeed + 4);
   rows.add_bounded("gelsight.shear.r2", "shear force against mean marker displacement until slip (\"highly linear\")",
                    "1", Better::higher, kStronglyLinear_r2, false, shear.line.r2);
+  ValidationSeries dragged{"mean marker displacement, mm", "shear force, N", {}, false};
+  for (const ShearSample& sample : shear.samples) dragged.points.emplace_back(sample.displacement_mm, sample.force_N);
+  rows.last().series = dragged;
   rows.begin();
   rows.add_bounded("gelsight.markers.rate_Hz", "marker tracking at 320x240 on one core", "Hz", Better::higher,
                    kPublishedTracking_Hz, true, tracking_rate_Hz(marked));

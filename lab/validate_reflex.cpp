@@ -360,6 +360,9 @@ std::vector<ValidationRow> validate_reflex(const ValidateOptions& options) {
   rows.add_bounded("law.rms_N", "force of a plate from 0 to 5 mm, of finite elements, against eq. 1", "N",
                    Better::lower, kReflexLawRms_N, true,
                    reflex_law_rms([&](double z_mm) { return plate.truth(z_mm).normal_N; }));
+  ValidationSeries law{"depth, mm", "force, N", {}, false};
+  for (int k = 0; k <= 50; ++k) law.points.emplace_back(0.1 * k, plate.truth(0.1 * k).normal_N);
+  rows.last().series = law;
   sensors::ReflexBudget budget;
   const sensors::ReflexModel reflex = add_reflex_rows(bench, scale, rows, budget);
   sensors::ExploreModel model = add_explore_rows(bench, scale, rows);

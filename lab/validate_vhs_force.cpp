@@ -2,6 +2,7 @@
 // the force model (shared/seeds/000, sec. 4.3), the verification of its sec. 4.4 and a cycle at a place that training
 // never saw test it. All of it goes the whole way: scene, gel, light, imager, PNG files, tracker, force model.
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <numeric>
@@ -18,6 +19,7 @@ namespace touchstone::lab {
 namespace {
 
 constexpr double kPublished5N_percent = 2.0;  // table 1
+constexpr std::size_t kDrawnPoints = 300;     // of fig. 6a
 constexpr int kSeeds = 5;                     // sec. 4.4.1: five sets of experiments
 constexpr double kStudent95OfFive = 2.776;    // t of 4 degrees of freedom
 
@@ -144,13 +146,23 @@ std::vector<ValidationRow> validate_vhs_force(const ValidateOptions& options) {
   // Fig. 6a: "linear" in x and y, "not as pronounced" in z, which x and y influence.
   const auto r2 = [](std::size_t axis) { return [axis](const Trial& trial) { return trial.relations.axes[axis].r2; }; };
   const double z_r2 = mean_of(trials, r2(2));
+  const auto draw = [&](std::size_t axis) {
+    const std::vector<std::pair<double, double>>& all = trials.front().relations.points[axis];
+    ValidationSeries series{
+        fmt::format("U_s,{}, px", axes[axis]), fmt::format("F_{}, N", axes[axis]), {}, false, false};
+    const std::size_t every = std::max<std::size_t>(1, all.size() / kDrawnPoints);
+    for (std::size_t i = 0; i < all.size(); i += every) series.points.push_back(all[i]);
+    rows.back().series = series;
+  };
   for (std::size_t axis = 0; axis < 2; ++axis) {
     add(fmt::format("vhs.linearity.{}_r2", axes[axis]),
         fmt::format("R2 of the line of F_{0} and U_s,{0} on the training set (fig. 6a); bound: that of z", axes[axis]),
         "1", z_r2, false, r2(axis), Better::higher);
+    draw(axis);
   }
   add("vhs.linearity.z_r2", "likewise of z, the text's least; bound: the lesser of x and y", "1",
       std::min(mean_of(trials, r2(0)), mean_of(trials, r2(1))), false, r2(2));
+  draw(2);
   add(
       "vhs.linearity.z_of_all_r2", "of F_z and all of U_s, as eq. 3 couples them; bound: U_s,z alone", "1", z_r2, false,
       [](const Trial& trial) { return trial.relations.z_of_all_r2; }, Better::higher);

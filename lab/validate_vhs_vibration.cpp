@@ -50,6 +50,12 @@ std::vector<ValidationRow> validate_vhs_vibration(const ValidateOptions& options
                        motion.frame_rate_Hz, std::abs(lines[line])),
            "Hz", peak_Hz, Better::near, std::abs(peak_Hz - kVibration_Hz) <= kPublishedWidth_Hz)
       .published = kVibration_Hz;
+  ValidationSeries spectrum{"frequency, Hz", "z force, N", {}, false};
+  for (std::size_t k = 1; k < lines.size(); ++k) {
+    const double frequency_Hz = static_cast<double>(k) * motion.frame_rate_Hz / static_cast<double>(told.size());
+    spectrum.points.emplace_back(frequency_Hz, std::abs(lines[k]));
+  }
+  rows.last().series = spectrum;
   const std::complex<double> answer = lines[line] / true_lines[line];
   rows.add_bounded("amplitude_error_percent", "of that peak, against the true force's", "%", Better::lower,
                    kAllowedAmplitude_percent, false, 100.0 * std::abs(std::abs(answer) - 1.0));

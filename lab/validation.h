@@ -20,11 +20,13 @@ std::string name_of(Better better);
 /// Half of a 95 % interval, in standard errors of a normal distribution.
 inline constexpr double kNormal95 = 1.96;
 
-/// How a row's error goes with what it costs or how finely it was made, for a logarithmic plot.
+/// What is drawn below a row: how its error goes with what it costs or how finely it was made, or a text's figure.
 struct ValidationSeries {
   std::string x_label;
   std::string y_label;
   std::vector<std::pair<double, double>> points;
+  bool logarithmic = true;  ///< both axes
+  bool joined = true;       ///< points by lines, in their order
 };
 
 /// One row. Either `published` (a figure of a text) or `reference` (a closed form) is given, as a rule.

@@ -110,7 +110,8 @@ std::string plot_of(const ValidationRow& row) {
   plot.title = row.id + ": " + row.title;
   plot.x_label = row.series->x_label;
   plot.y_label = row.series->y_label;
-  plot.curves.push_back({"", row.series->points, false});
+  plot.log_x = plot.log_y = row.series->logarithmic;
+  plot.curves.push_back({"", row.series->points, false, row.series->joined});
   return fmt::format("<figure>\n{}</figure>\n", to_svg(plot));
 }
 

@@ -115,6 +115,9 @@ ForceRelations force_relations(const sensors::ForceSamples& samples) {
   for (int axis = 0; axis < 3; ++axis) {
     relations.axes[static_cast<std::size_t>(axis)] =
         line_through({summed.col(axis).data(), length}, {forces.col(axis).data(), length});
+    for (Eigen::Index i = 0; i < count; ++i) {
+      relations.points[static_cast<std::size_t>(axis)].emplace_back(summed(i, axis), forces(i, axis));
+    }
   }
   const Eigen::VectorXd z = forces.col(2);
   const Eigen::VectorXd left = z - summed * summed.colPivHouseholderQr().solve(z);

@@ -6,6 +6,7 @@
 #include <array>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/progress.h"
@@ -41,7 +42,8 @@ sensors::ForceSamples training_samples(const std::vector<TrackedSequence>& seque
 /// Fig. 6a: one axis of the force against U_s, the displacements summed over all squares between beads (px).
 struct ForceRelations {
   std::array<StraightLine, 3> axes;  ///< F_x of U_s,x, F_y of U_s,y, F_z of U_s,z; N and N/px
-  double z_of_all_r2 = 0.0;          ///< of F_z of all three, the coupling that gives eq. 3 its last row
+  std::array<std::vector<std::pair<double, double>>, 3> points;  ///< (U_s px, F N) that the lines go through
+  double z_of_all_r2 = 0.0;  ///< of F_z of all three, the coupling that gives eq. 3 its last row
 };
 ForceRelations force_relations(const sensors::ForceSamples& samples);
 
