@@ -101,7 +101,7 @@ std::vector<ValidationRow> validate_dvs_design(const ValidateOptions& options) {
       membranes.push_back({fmt::format("modulus_{:g}MPa", modulus), 2.0, modulus});
     }
   }
-  std::vector<std::pair<double, double>> by_thickness, by_modulus;
+  std::vector<std::pair<double, double>> by_thickness, by_modulus, first_by_thickness;
   for (std::size_t i = 0; i < membranes.size(); ++i) {
     if (options.progress) {
       options.progress("membranes", static_cast<std::int64_t>(i), static_cast<std::int64_t>(membranes.size()));
@@ -123,12 +123,13 @@ std::vector<ValidationRow> validate_dvs_design(const ValidateOptions& options) {
     }
     if (membrane.youngs_modulus_MPa == membranes[0].youngs_modulus_MPa) {
       by_thickness.emplace_back(membrane.thickness_mm, range.high_N);
+      first_by_thickness.emplace_back(membrane.thickness_mm, range.low_N);
     }
     if (membrane.thickness_mm == membranes[0].thickness_mm) {
       by_modulus.emplace_back(membrane.youngs_modulus_MPa, range.high_N);
     }
   }
-  const auto spread = [&](const char* id, const char* what, const char* label,
+  const auto spread = [&](const char* id, const char* what, const char* label, const char* drawn,
                           std::vector<std::pair<double, double>>& points) {
     std::sort(points.begin(), points.end());
     const auto [least, most] = std::minmax_element(points.begin(), points.end(),
@@ -136,12 +137,14 @@ std::vector<ValidationRow> validate_dvs_design(const ValidateOptions& options) {
     const double ratio = most->second / least->second;
     ValidationRow& row = rows.add(id, fmt::format("{}; holds if it changes by a tenth or more", what), "1", ratio,
                                   Better::higher, ratio >= 1.1);
-    row.series = ValidationSeries{label, "range's end, N", points};
+    row.series = ValidationSeries{label, drawn, points};
   };
   spread("thickness_changes_range", "largest over smallest end of the range, by the membrane's thickness",
-         "membrane's thickness, mm", by_thickness);
+         "membrane's thickness, mm", "range's end, N", by_thickness);
+  spread("thickness_changes_first_force", "largest over smallest force that a touch is told from, by the thickness",
+         "membrane's thickness, mm", "range's beginning, N", first_by_thickness);
   spread("stiffness_changes_range", "largest over smallest end of the range, by the membrane's modulus",
-         "membrane's modulus, MPa", by_modulus);
+         "membrane's modulus, MPa", "range's end, N", by_modulus);
   return rows.rows();
 }
 
