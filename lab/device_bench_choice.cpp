@@ -18,6 +18,7 @@ constexpr double kFrames = 100.0;     // of a scene, that a camera's set-up is s
 constexpr double kMeshShare = 0.5;    // of the squared pixel error that a mesh may take at most, where light has noise
 constexpr double kFiner = 0.8;        // edges, where a choice didn't hold
 constexpr double kMoreExact = 0.7;    // of the noise of paths, likewise
+constexpr double kBelow = 0.97;       // of a wanted error: where to aim
 constexpr double kAboutAsGood = 1.1;  // times the best error
 constexpr int kMostVerifications = 3;
 constexpr int kVerifyingHolds = 6;
@@ -74,11 +75,13 @@ std::optional<LightTry> pick_light(const BenchParts& parts, const std::vector<Li
     }
   }
   if (best && best->adaptive_paths && holds != nullptr && coarser != nullptr) {
-    // Between two that were measured the error goes as a power of the noise that is asked for.
-    const double slope = std::log(coarser->pixel_error / holds->pixel_error) /
+    // Between two that were measured the error goes as a power of the noise that is asked for. What is too small to be
+    // told is taken for as large as it may be.
+    const double measured = std::max(holds->pixel_error, kReferenceShare * parts.settings.pixel_error);
+    const double slope = std::log(coarser->pixel_error / measured) /
                          std::log(coarser->light.noise_fraction / holds->light.noise_fraction);
     LightTry between = *holds;
-    between.light.noise_fraction *= std::pow(0.97 * wanted / holds->pixel_error, 1.0 / std::max(slope, 0.1));
+    between.light.noise_fraction *= std::pow(kBelow * wanted / measured, 1.0 / std::max(slope, 0.1));
     if (between.light.noise_fraction > 1.05 * holds->light.noise_fraction &&
         between.light.noise_fraction < coarser->light.noise_fraction) {
       between.words = paths_in_words(between.light.noise_fraction) + parts.exact_words;

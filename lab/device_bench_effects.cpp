@@ -10,8 +10,6 @@
 namespace touchstone::lab {
 namespace {
 
-constexpr std::uint64_t kOtherSeed = 0x9e3779b97f4a7c15;
-
 struct Switchable {
   const char* name;
   sim::Switch sim::EffectSwitches::*of;

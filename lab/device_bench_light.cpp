@@ -32,7 +32,6 @@ constexpr double kFinestPixelsAnEdge = 20.0;
 constexpr std::array kEventSteps = {4.0, 2.0, 1.0, 0.5, 0.25};
 constexpr double kFinestEventStep = 0.125;
 constexpr double kSameEvent_us = 1000.0;
-constexpr std::uint64_t kOtherSeed = 0x9e3779b97f4a7c15;
 
 std::int64_t pictures_of(const SceneRun& run) {
   return static_cast<std::int64_t>(run.electrons.size());
@@ -301,6 +300,23 @@ BenchCurve events_curve(const BenchParts& parts, const Progress& progress) {
   return curve;
 }
 
+/// What the plan leaves out of pictures because it shows little: the reference has it.
+void find_exact_effects(BenchParts& parts) {
+  sim::SceneSpec scene = bench_scene(parts.device, parts.presses, parts.presses.holds.front(), 1);
+  const sim::Plan plan = sim::make_plan(scene);
+  scene.effects.interreflection = sim::Switch::on;
+  parts.exact = scene.effects;
+  if (!plan.interreflection) parts.exact_words = ", with interreflection";
+  try {
+    scene.effects.fine_relief = sim::Switch::on;
+    if (!sim::make_plan(scene).fine_relief) return;
+    parts.exact = scene.effects;
+    if (!plan.fine_relief) parts.exact_words += parts.exact_words.empty() ? ", with fine relief" : " and fine relief";
+  } catch (const Error&) {
+    return;  // this device has none
+  }
+}
+
 }  // namespace
 
 std::string paths_in_words(double noise_fraction) {
@@ -353,27 +369,6 @@ TruePictures true_pictures(const BenchParts& parts, const sim::DeviceSpec& devic
   }
   return truth;
 }
-
-namespace {
-
-/// What the plan leaves out of pictures because it shows little: the reference has it.
-void find_exact_effects(BenchParts& parts) {
-  sim::SceneSpec scene = bench_scene(parts.device, parts.presses, parts.presses.holds.front(), 1);
-  const sim::Plan plan = sim::make_plan(scene);
-  scene.effects.interreflection = sim::Switch::on;
-  parts.exact = scene.effects;
-  if (!plan.interreflection) parts.exact_words = ", with interreflection";
-  try {
-    scene.effects.fine_relief = sim::Switch::on;
-    if (!sim::make_plan(scene).fine_relief) return;
-    parts.exact = scene.effects;
-    if (!plan.fine_relief) parts.exact_words += parts.exact_words.empty() ? ", with fine relief" : " and fine relief";
-  } catch (const Error&) {
-    return;  // this device has none
-  }
-}
-
-}  // namespace
 
 std::string prepare_pictures(BenchParts& parts) {
   if (!parts.device.camera) return "none: the device has no camera";

@@ -2,6 +2,7 @@
 // What the parts of a device's bench share. For lab/device_bench*.cpp alone.
 
 #include <array>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -14,6 +15,9 @@
 #include "render/imager.h"
 
 namespace touchstone::lab {
+
+/// From one seed to one that shares no random numbers with it.
+inline constexpr std::uint64_t kOtherSeed = 0x9e3779b97f4a7c15;
 
 /// Pictures of one hold by the reference's light, twice without common random numbers.
 struct TruePictures {

@@ -164,13 +164,15 @@ TEST(DeviceBench, NoiseGoesAsTheRootOfThePaths) {
   EXPECT_LT(few.pixel_error / many.pixel_error, 1.7 * expected);
 }
 
-TEST(DeviceBench, PathsStopWhereTheyAreToldAndCurvesWhereTheyAreGoodEnough) {
-  const std::vector<BenchPoint>& light = curve(clear_bench(), "light").points;
-  const BenchPoint& coarsest = point(curve(clear_bench(), "light"), "paths to 8 of");
-  const BenchPoint& last = light.back();
-  EXPECT_GT(coarsest.pixel_error, last.pixel_error);
-  EXPECT_LT(coarsest.work, last.work);
-  EXPECT_LT(last.pixel_error, 0.7) << "of the wanted 1";
+TEST(DeviceBench, CurvesOfPathsEndWhereTheyAreGoodEnough) {
+  std::vector<double> errors;
+  for (const BenchPoint& one : curve(clear_bench(), "light").points) {
+    if (one.setting.starts_with("paths to")) errors.push_back(one.pixel_error);
+  }
+  ASSERT_FALSE(errors.empty());
+  EXPECT_LT(errors.back(), 0.7) << "of the wanted 1";
+  errors.pop_back();
+  for (const double error : errors) EXPECT_GE(error, 0.7);
 }
 
 TEST(DeviceBench, ItsChoiceHoldsOnOtherPresses) {
@@ -226,8 +228,8 @@ TEST(DeviceBench, ReportsAPageATableAndADeviceThatCanBeRead) {
 TEST(DeviceBench, ACoatedDeviceHasDirectLightAndItsOwnContactPixels) {
   BenchSettings settings;
   settings.force_error = 0.05;
-  settings.pixel_error = 2.0;
-  settings.most_pixels = 2000;
+  settings.pixel_error = 3.0;
+  settings.most_pixels = 1000;
   settings.finite_strain = false;
   const DeviceBench bench = bench_device(test::small_coated_device(), settings);
   EXPECT_TRUE(std::isfinite(point(curve(bench, "light"), "direct light").pixel_error));
@@ -243,6 +245,7 @@ TEST(DeviceBench, EventsComeNearerWithSmallerSteps) {
   BenchSettings settings;
   settings.force_error = 0.1;
   settings.pixel_error = 5.0;
+  settings.most_pixels = 1000;
   settings.finite_strain = false;
   const DeviceBench bench = bench_device(device, settings);
   const BenchCurve& steps = curve(bench, "event step");
