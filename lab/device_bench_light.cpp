@@ -109,7 +109,8 @@ BenchCurve light_curve(const BenchParts& parts, const TruePictures& truth, std::
       curve.points.push_back(left_out);
       break;
     }
-    if (progress) progress("light", done++, static_cast<std::int64_t>(tries.size()));
+    if (progress) progress("light", done, static_cast<std::int64_t>(tries.size()));
+    ++done;
     BenchPoint point;
     one = try_light(parts, truth, parts.device, parts.own_gel, std::move(one), parts.settings.seed + 2, point);
     point.as_is = done == 1;
