@@ -87,10 +87,21 @@ std::string csv_of(const DeviceBench& bench) {
   return csv;
 }
 
+/// A way of light's words, short enough for a legend; + for what the plan leaves out.
+std::string short_name(std::string words) {
+  const std::size_t exact = words.find(", with ");
+  if (exact != std::string::npos) words = words.substr(0, exact) + " +";
+  const std::string noise = " of the imager's noise";
+  const std::size_t found = words.find(noise);
+  if (found != std::string::npos) words.replace(found, noise.size(), " of noise");
+  return words;
+}
+
 /// Error against seconds. Elements get a curve each, as what was varied is in their names.
 std::optional<LinePlot> plot_of(const BenchCurve& curve) {
   LinePlot plot;
   plot.title = curve.name + ": error against seconds";
+  if (curve.name == "light") plot.title += " (+: with what the plan leaves out)";
   const bool by_setup = curve.name == "mesh" || curve.name == "element";
   double BenchPoint::*const seconds = by_setup ? &BenchPoint::once_s : &BenchPoint::each_s;
   plot.x_label = by_setup ? "set-up, seconds" : "seconds, " + curve.each;
@@ -102,7 +113,7 @@ std::optional<LinePlot> plot_of(const BenchCurve& curve) {
       if (!std::isfinite(point.*error) || !std::isfinite(point.*seconds)) continue;
       std::string name = what;
       if (curve.name == "element") name = point.setting.substr(0, point.setting.find(", fine"));
-      if (curve.name == "light" && !std::isfinite(point.value)) name = point.setting;
+      if (curve.name == "light" && !std::isfinite(point.value)) name = short_name(point.setting);
       if (parts.emplace(name, PlotCurve{name, {}}).second) order.push_back(name);
       parts[name].points.emplace_back(point.*seconds, point.*error);
     }
