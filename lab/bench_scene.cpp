@@ -210,6 +210,14 @@ SceneRun run_scene(const sim::SceneSpec& scene, const fem::Compliance& gel, bool
   return run;
 }
 
+TwoRuns run_twice(sim::SceneSpec scene, const fem::Compliance& gel, bool whole) {
+  TwoRuns runs;
+  runs[0] = run_scene(scene, gel, whole);
+  scene.seed += kOtherSeed;
+  runs[1] = runs[0].direct ? runs[0] : run_scene(scene, gel, whole);
+  return runs;
+}
+
 double pixel_error(const std::vector<cv::Mat>& one, const std::vector<cv::Mat>& other,
                    const std::vector<cv::Mat>& true_one, const std::vector<cv::Mat>& true_other,
                    const render::Imager& imager) {
@@ -226,6 +234,14 @@ double pixel_error(const std::vector<cv::Mat>& one, const std::vector<cv::Mat>& 
     });
   }
   return count == 0 ? 0.0 : std::sqrt(std::max(0.0, sum) / static_cast<double>(count));
+}
+
+double pixel_error(const TwoRuns& shown, const TwoRuns& truth, const render::Imager& imager) {
+  return pixel_error(shown[0].electrons, shown[1].electrons, truth[0].electrons, truth[1].electrons, imager);
+}
+
+double pixel_error(const SceneRun& shown, const TwoRuns& truth, const render::Imager& imager) {
+  return pixel_error(shown.electrons, shown.electrons, truth[0].electrons, truth[1].electrons, imager);
 }
 
 double worst_pixel(const std::vector<cv::Mat>& electrons, const std::vector<cv::Mat>& true_one,

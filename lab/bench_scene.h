@@ -2,8 +2,8 @@
 // The presses that a device's settings are judged by, and a scene of one of them played, timed and held beside another.
 
 #include <Eigen/Core>
+#include <array>
 #include <cstdint>
-#include <filesystem>
 #include <opencv2/core/mat.hpp>
 #include <optional>
 #include <string>
@@ -73,13 +73,23 @@ struct SceneRun {
 /// @throws Error as make_plan, sim::play_motion and sim::VirtualCamera
 SceneRun run_scene(const sim::SceneSpec& scene, const fem::Compliance& gel, bool whole = false);
 
+/// From one seed to one that shares no random numbers with it.
+inline constexpr std::uint64_t kOtherSeed = 0x9e3779b97f4a7c15;
+
+/// The same twice, with other random numbers the second time; direct light, which has none, is shown once.
+using TwoRuns = std::array<SceneRun, 2>;
+TwoRuns run_twice(sim::SceneSpec scene, const fem::Compliance& gel, bool whole = false);
+
 /// Root mean square over pixels and channels of how far pictures are from true ones, in units of the imager's temporal
 /// noise. Of both there are two that share no random numbers: the product of `one` - `true_one` and `other` -
 /// `true_other` is free of the paths' noise on the mean. Where `other` is `one`, that one's own noise counts as its
-/// error.
+/// error. Pixels beyond the full well aren't counted.
 double pixel_error(const std::vector<cv::Mat>& one, const std::vector<cv::Mat>& other,
                    const std::vector<cv::Mat>& true_one, const std::vector<cv::Mat>& true_other,
                    const render::Imager& imager);
+/// Of two runs, and of a single one, whose own noise counts.
+double pixel_error(const TwoRuns& shown, const TwoRuns& truth, const render::Imager& imager);
+double pixel_error(const SceneRun& shown, const TwoRuns& truth, const render::Imager& imager);
 
 /// The largest difference from the true ones' mean, of all pixels and channels but 1 % of them. The true ones' noise is
 /// in it.

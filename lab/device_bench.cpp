@@ -83,7 +83,26 @@ std::string edges_in_words(const sim::MeshSpec& mesh) {
   return fmt::format("fine_mm {:.3g}, coarse_mm {:.3g}", mesh.fine_mm, mesh.coarse_mm);
 }
 
-BenchCurve mesh_curve(BenchParts& parts, const Progress& progress) {
+/// A device on its mesh against the reference; what can't be had is in the point's note.
+BenchPoint measured_mesh(const BenchParts& parts, const sim::DeviceSpec& device, fem::Element element, bool pictures) {
+  BenchPoint point;
+  point.value = device.mesh.fine_mm;
+  try {
+    const MadeGel made = make_gel(device, element);
+    const FeltForces felt = feel(parts.presses, made.gel, device, device.mesh.fine_mm);
+    point.once_s = made.seconds;
+    point.each_s = felt.seconds;
+    point.work = 1e-9 * made.gel.report.operations;
+    point.force_error = force_difference(felt.force_N, parts.finest_forces.force_N);
+    point.beads_um = beads_difference_um(felt, parts.finest_forces);
+    if (pictures) point.pixel_error = mesh_pixel_error(parts, device, made.gel);
+  } catch (const Error& error) {
+    point.note = error.what();
+  }
+  return point;
+}
+
+BenchCurve mesh_curve(const BenchParts& parts, const Progress& progress) {
   BenchCurve curve;
   curve.name = "mesh";
   curve.what = fmt::format(
@@ -100,7 +119,7 @@ BenchCurve mesh_curve(BenchParts& parts, const Progress& progress) {
   return curve;
 }
 
-BenchCurve element_curve(BenchParts& parts, const Progress& progress) {
+BenchCurve element_curve(const BenchParts& parts, const Progress& progress) {
   using fem::Element;
   constexpr std::array kElements = {Element::taylor_hood, Element::quadratic_constant_pressure, Element::quadratic,
                                     Element::linear};
@@ -117,21 +136,10 @@ BenchCurve element_curve(BenchParts& parts, const Progress& progress) {
     for (const double edges : kElementEdges) {
       if (progress) progress("element", done++, kElements.size() * kElementEdges.size());
       const sim::DeviceSpec device = with_edges(parts.device, edges);
-      BenchPoint point;
-      point.value = device.mesh.fine_mm;
-      point.setting = fmt::format("{}, fine_mm {:.3g}", fem::name_of(element), device.mesh.fine_mm);
+      BenchPoint point = measured_mesh(parts, device, element, false);
+      point.series = fem::name_of(element);
+      point.setting = fmt::format("{}, fine_mm {:.3g}", point.series, device.mesh.fine_mm);
       point.as_is = element == Element::taylor_hood && edges == 1.0;
-      try {
-        const MadeGel made = make_gel(device, element);
-        const FeltForces felt = feel(parts.presses, made.gel, device, device.mesh.fine_mm);
-        point.once_s = made.seconds;
-        point.each_s = felt.seconds;
-        point.work = 1e-9 * made.gel.report.operations;
-        point.force_error = force_difference(felt.force_N, parts.finest_forces.force_N);
-        point.beads_um = beads_difference_um(felt, parts.finest_forces);
-      } catch (const Error& error) {
-        point.note = error.what();
-      }
       curve.points.push_back(point);
     }
   }
@@ -144,17 +152,17 @@ BenchCurve contact_curve(const BenchParts& parts) {
   curve.name = "contact";
   curve.what =
       "How exactly the laws of contact hold: the largest violation of a traction's, relative to the largest pressure; "
-      "then "
-      "the longest step that friction is followed by. On the device's own mesh, against the tightest of each.";
+      "then the longest step that friction is followed by. On the device's own mesh, against the tightest of each.";
   curve.each = "a press, ms";
   curve.work = "systems solved a press";
   const double states = 3.0 * static_cast<double>(parts.presses.holds.size());
   const auto run = [&](const fem::PressTolerance& tolerance) {
     return feel(parts.presses, parts.own_gel, parts.device, parts.device.mesh.fine_mm, tolerance);
   };
-  const auto add = [&](const FeltForces& felt, const FeltForces& than, double value, const std::string& setting,
-                       bool as_is) {
+  const auto add = [&](const char* series, const FeltForces& felt, const FeltForces& than, double value,
+                       const std::string& setting, bool as_is) {
     BenchPoint point;
+    point.series = series;
     point.setting = setting;
     point.value = value;
     point.each_s = felt.seconds;
@@ -171,22 +179,23 @@ BenchCurve contact_curve(const BenchParts& parts) {
   for (const double traction : {1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10}) {
     fem::PressTolerance tolerance;
     tolerance.traction = traction;
-    tolerance.lookup_mm = std::max(tolerance.lookup_mm, 1e-3 * traction / 1e-3);
+    tolerance.lookup_mm = std::max(tolerance.lookup_mm, traction);
     const bool own = traction == fem::PressTolerance{}.traction;
-    add(run(own ? fem::PressTolerance{} : tolerance), tightest, traction, fmt::format("traction to {:.0e}", traction),
-        own);
+    add("tolerance of the laws", run(own ? fem::PressTolerance{} : tolerance), tightest, traction,
+        fmt::format("traction to {:.0e}", traction), own);
   }
   const double drag = parts.presses.holds.front().drag_mm.norm();
   fem::PressTolerance short_steps;
   short_steps.largest_motion = drag / 64;
   const FeltForces shortest = run(short_steps);
+  const char* steps = "steps of friction";
+  add(steps, run({}), shortest, drag, "one step a frame", true);
   for (const double share : {2.0, 4.0, 8.0, 16.0, 32.0}) {
     fem::PressTolerance tolerance;
     tolerance.largest_motion = drag / share;
-    add(run(tolerance), shortest, tolerance.largest_motion,
+    add(steps, run(tolerance), shortest, tolerance.largest_motion,
         fmt::format("steps of {:.2g} mm at most", tolerance.largest_motion), false);
   }
-  add(run({}), shortest, drag, "one step a frame", true);
   return curve;
 }
 
@@ -230,22 +239,9 @@ MadeGel make_gel(const sim::DeviceSpec& device, fem::Element element) {
 
 BenchPoint mesh_point(const BenchParts& parts, double edges) {
   const sim::DeviceSpec device = with_edges(parts.device, edges);
-  BenchPoint point;
-  point.value = device.mesh.fine_mm;
+  BenchPoint point = measured_mesh(parts, device, fem::Element::taylor_hood, parts.truth.has_value());
   point.setting = edges_in_words(device.mesh);
   point.as_is = edges == 1.0;
-  try {
-    const MadeGel made = make_gel(device);
-    const FeltForces felt = feel(parts.presses, made.gel, device, device.mesh.fine_mm);
-    point.once_s = made.seconds;
-    point.each_s = felt.seconds;
-    point.work = 1e-9 * made.gel.report.operations;
-    point.force_error = force_difference(felt.force_N, parts.finest_forces.force_N);
-    point.beads_um = beads_difference_um(felt, parts.finest_forces);
-    if (parts.truth) point.pixel_error = mesh_pixel_error(parts, *parts.truth, device, made.gel);
-  } catch (const Error& error) {
-    point.note = error.what();
-  }
   return point;
 }
 
@@ -264,9 +260,7 @@ DeviceBench bench_device(const sim::DeviceSpec& device, const BenchSettings& set
   parts.device = device;
   if (device.camera) parts.device.camera = middle_of(*device.camera, settings.most_pixels);
   tell("the device's own gel");
-  MadeGel own = make_gel(device);
-  parts.own_gel = std::move(own.gel);
-  parts.own_seconds = own.seconds;
+  parts.own_gel = make_gel(device).gel;
   const double thickness = parts.own_gel.thickness;
   parts.presses.object = settings.object ? *settings.object : ball_of(thickness);
   parts.depth_mm = settings.depth_mm.value_or(kDepth * thickness);
@@ -276,8 +270,7 @@ DeviceBench bench_device(const sim::DeviceSpec& device, const BenchSettings& set
   const FeltForces felt = feel(parts.presses, parts.own_gel, device, device.mesh.fine_mm);
   bench.presses = fmt::format(
       "{}, pressed {:.3g} mm deep (a fifth more or less) at {} places within an edge of the middle and dragged by "
-      "{:.3g} mm; "
-      "{:.3g} N on the mean",
+      "{:.3g} mm; {:.3g} N on the mean",
       parts.presses.object.name, parts.depth_mm, kHolds, parts.presses.holds.front().drag_mm.norm(),
       mean_normal_force(felt));
 

@@ -7,7 +7,6 @@
 // (linear elasticity, ray optics) aren't in them; the table of effects has finite strain's.
 
 #include <cstdint>
-#include <filesystem>
 #include <limits>
 #include <optional>
 #include <string>
@@ -39,6 +38,7 @@ inline constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 /// One setting tried.
 struct BenchPoint {
   std::string setting;            ///< "fine_mm 0.5, coarse_mm 1.5"
+  std::string series;             ///< of several in a curve: those of one are joined in its plot
   double value = 0.0;             ///< what was varied, as a number
   double once_s = kUnknown;       ///< seconds once: setting up the gel, the camera of a scene
   double each_s = kUnknown;       ///< seconds a state, a picture or a scene's events

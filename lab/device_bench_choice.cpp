@@ -85,10 +85,9 @@ std::optional<LightTry> pick_light(const BenchParts& parts, const std::vector<Li
     if (between.light.noise_fraction > 1.05 * holds->light.noise_fraction &&
         between.light.noise_fraction < coarser->light.noise_fraction) {
       between.words = paths_in_words(between.light.noise_fraction) + parts.exact_words;
-      const Hold& hold = parts.presses.holds.front();
-      const TruePictures truth = true_pictures(parts, parts.device, parts.own_gel, hold, parts.settings.seed + 30);
       BenchPoint point;
-      between = try_light(parts, truth, parts.device, parts.own_gel, between, parts.settings.seed + 4, point);
+      between =
+          try_light(parts, *parts.own_truth, parts.device, parts.own_gel, between, parts.settings.seed + 4, point);
       if (between.pixel_error <= wanted && frame_seconds(between) < frame_seconds(*best)) best = between;
     }
   }

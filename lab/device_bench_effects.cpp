@@ -27,21 +27,6 @@ constexpr Switchable kSwitches[] = {
     {"sensor noise", &sim::EffectSwitches::sensor_noise, &sim::Plan::sensor_noise},
 };
 
-using TwoRuns = std::array<SceneRun, 2>;
-
-/// With other random numbers the second time; direct light has none.
-TwoRuns run_twice(sim::SceneSpec scene, const fem::Compliance& gel) {
-  TwoRuns runs;
-  runs[0] = run_scene(scene, gel);
-  if (runs[0].direct) {
-    runs[1] = runs[0];
-    return runs;
-  }
-  scene.seed += kOtherSeed;
-  runs[1] = run_scene(scene, gel);
-  return runs;
-}
-
 double frame_seconds(const TwoRuns& runs) {
   double sum = 0.0;
   for (const SceneRun& run : runs) sum += run.mechanics_seconds + run.picture_seconds;
@@ -72,8 +57,7 @@ std::vector<EffectShare> effect_shares(const BenchParts& parts, const Progress& 
       const TwoRuns without = run_twice(switched, parts.own_gel);
       share.force_change = force_difference(without[0].force_N, with[0].force_N);
       if (parts.truth) {
-        share.pixel_change =
-            pixel_error(without[0].electrons, without[1].electrons, with[0].electrons, with[1].electrons, imager);
+        share.pixel_change = pixel_error(without, with, imager);
         share.number_change = number_difference(without[0].numbers, with[0].numbers);
       }
       share.seconds =

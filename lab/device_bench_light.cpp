@@ -128,8 +128,7 @@ BenchCurve samples_curve(const BenchParts& parts, const TruePictures& truth, con
   curve.name = "samples";
   curve.what =
       "Paths a pixel, the same number in every pixel: beside the curve of light it shows what it saves to stop where "
-      "the "
-      "imager's noise is reached.";
+      "the imager's noise is reached.";
   curve.each = "a picture, s";
   curve.work = "paths a pixel";
   for (const int samples : kSamples) {
@@ -142,8 +141,7 @@ BenchCurve samples_curve(const BenchParts& parts, const TruePictures& truth, con
     const SceneRun run = run_scene(scene, parts.own_gel, true);
     add_run(run, point);
     point.once_s = kUnknown;  // key frames, which whole pictures don't use
-    point.pixel_error =
-        pixel_error(run.electrons, run.electrons, truth.runs[0].electrons, truth.runs[1].electrons, truth.imager);
+    point.pixel_error = pixel_error(run, truth.runs, truth.imager);
     point.pixel_worst = worst_pixel(run.electrons, truth.runs[0].electrons, truth.runs[1].electrons, truth.imager);
     curve.points.push_back(point);
     const double took_s = static_cast<double>(run.electrons.size()) * run.picture_seconds;
@@ -152,21 +150,21 @@ BenchCurve samples_curve(const BenchParts& parts, const TruePictures& truth, con
   return curve;
 }
 
+/// A reference's scene; what is held beside it may have the scene's own seed.
+TruePictures shown_truly(sim::SceneSpec scene, const fem::Compliance& gel, const Hold& hold) {
+  scene.seed += 2 * kOtherSeed;
+  return {hold, run_twice(scene, gel, true), sim::imager(scene.device, sim::make_plan(scene).bands, true)};
+}
+
 /// A setting whose error is to be free of the paths' noise: it's shown twice.
 BenchPoint noise_free_point(const BenchParts& parts, const TruePictures& truth, const sim::SceneSpec& scene) {
   BenchPoint point;
   try {
-    std::array<SceneRun, 2> runs;
-    for (int k = 0; k < 2; ++k) {
-      sim::SceneSpec one = scene;
-      one.seed += static_cast<std::uint64_t>(k) * kOtherSeed;
-      runs[k] = run_scene(one, parts.own_gel, true);
-    }
+    const TwoRuns runs = run_twice(scene, parts.own_gel, true);
     add_run(runs[0], point);
     point.once_s = kUnknown;
     point.each_s = 0.5 * (runs[0].picture_seconds + runs[1].picture_seconds);
-    point.pixel_error = pixel_error(runs[0].electrons, runs[1].electrons, truth.runs[0].electrons,
-                                    truth.runs[1].electrons, truth.imager);
+    point.pixel_error = pixel_error(runs, truth.runs, truth.imager);
   } catch (const Error& error) {
     point.note = error.what();
   }
@@ -220,12 +218,7 @@ BenchCurve membrane_curve(const BenchParts& parts, const sim::Plan& plan, const 
   sim::SceneSpec scene = reference_scene(parts, parts.device, hold, parts.settings.seed + 60);
   const auto pixel_um = [&](double an_edge) { return 1e3 * parts.device.mesh.fine_mm / an_edge; };
   scene.membrane.pixel_um = pixel_um(kFinestPixelsAnEdge);
-  TruePictures truth{.hold = hold, .runs = {}, .imager = sim::imager(parts.device, plan.bands, true)};
-  for (int k = 0; k < 2; ++k) {
-    sim::SceneSpec one = scene;
-    one.seed += static_cast<std::uint64_t>(k + 2) * kOtherSeed;
-    truth.runs[k] = run_scene(one, parts.own_gel, true);
-  }
+  const TruePictures truth = shown_truly(scene, parts.own_gel, hold);
   for (const double an_edge : kPixelsAnEdge) {
     if (progress) progress("contact pixels", static_cast<std::int64_t>(curve.points.size()), kPixelsAnEdge.size());
     scene.membrane.pixel_um = pixel_um(an_edge);
@@ -261,8 +254,7 @@ BenchCurve events_curve(const BenchParts& parts, const Progress& progress) {
   curve.name = "event step";
   curve.what = fmt::format(
       "What event pixels may change by from one picture to the next, as a part of the smallest threshold, against {}. "
-      "An "
-      "event counts as wrong if it's missing, too many or more than {:.0f} us off.",
+      "An event counts as wrong if it's missing, too many or more than {:.0f} us off.",
       kFinestEventStep, kSameEvent_us);
   curve.each = "the whole press, s";
   curve.work = "pictures";
@@ -327,6 +319,7 @@ std::string paths_in_words(double noise_fraction) {
 LightTry try_light(const BenchParts& parts, const TruePictures& truth, const sim::DeviceSpec& device,
                    const fem::Compliance& gel, LightTry one, std::uint64_t seed, BenchPoint& point) {
   point.setting = one.words;
+  point.series = one.adaptive_paths ? "paths" : one.words;
   point.value = one.adaptive_paths ? one.light.noise_fraction : kUnknown;
   try {
     sim::SceneSpec scene = bench_scene(device, parts.presses, truth.hold, seed);
@@ -334,8 +327,7 @@ LightTry try_light(const BenchParts& parts, const TruePictures& truth, const sim
     scene.effects = one.effects;
     const SceneRun run = run_scene(scene, gel);
     add_run(run, point);
-    point.pixel_error =
-        pixel_error(run.electrons, run.electrons, truth.runs[0].electrons, truth.runs[1].electrons, truth.imager);
+    point.pixel_error = pixel_error(run, truth.runs, truth.imager);
     point.pixel_worst = worst_pixel(run.electrons, truth.runs[0].electrons, truth.runs[1].electrons, truth.imager);
     point.note = run.light;
     one.pixel_error = point.pixel_error;
@@ -360,15 +352,7 @@ sim::SceneSpec reference_scene(const BenchParts& parts, const sim::DeviceSpec& d
 
 TruePictures true_pictures(const BenchParts& parts, const sim::DeviceSpec& device, const fem::Compliance& gel,
                            const Hold& hold, std::uint64_t seed) {
-  TruePictures truth;
-  truth.hold = hold;
-  for (int k = 0; k < 2; ++k) {
-    const sim::SceneSpec scene =
-        reference_scene(parts, device, hold, seed + static_cast<std::uint64_t>(k + 2) * kOtherSeed);
-    truth.runs[k] = run_scene(scene, gel, true);
-    if (k == 0) truth.imager = sim::imager(device, sim::make_plan(scene).bands, true);
-  }
-  return truth;
+  return shown_truly(reference_scene(parts, device, hold, seed), gel, hold);
 }
 
 std::string prepare_pictures(BenchParts& parts) {
@@ -379,9 +363,7 @@ std::string prepare_pictures(BenchParts& parts) {
     parts.reference_paths = kPilotPaths;
     const TruePictures pilot = true_pictures(parts, parts.device, parts.own_gel, hold, parts.settings.seed + 10);
     // Each against the other as if that were true: half of the squares are either one's.
-    const double noise = pixel_error(pilot.runs[0].electrons, pilot.runs[0].electrons, pilot.runs[1].electrons,
-                                     pilot.runs[1].electrons, pilot.imager) /
-                         std::sqrt(2.0);
+    const double noise = pixel_error(pilot.runs[0], {pilot.runs[1], pilot.runs[1]}, pilot.imager) / std::sqrt(2.0);
     const cv::Mat& picture = pilot.runs[0].electrons.front();
     const double values = static_cast<double>(pilot.runs[0].electrons.size() * picture.total()) * picture.channels();
     const double allowed =
@@ -389,6 +371,7 @@ std::string prepare_pictures(BenchParts& parts) {
     parts.reference_paths =
         std::clamp(static_cast<int>(std::ceil(kPilotPaths * std::pow(noise / allowed, 2))), kPilotPaths, kPlenty);
     parts.truth = true_pictures(parts, parts.finest_device, parts.finest_gel, hold, parts.settings.seed);
+    parts.own_truth = true_pictures(parts, parts.device, parts.own_gel, hold, parts.settings.seed + 30);
   } catch (const Error& error) {
     return fmt::format("none: {}", error.what());
   }
@@ -405,10 +388,9 @@ std::string prepare_pictures(BenchParts& parts) {
              parts.reference_paths, parts.exact_words, kReferenceShare * parts.settings.pixel_error);
 }
 
-double mesh_pixel_error(const BenchParts& parts, const TruePictures& truth, const sim::DeviceSpec& device,
-                        const fem::Compliance& gel) {
-  const TruePictures shown = true_pictures(parts, device, gel, truth.hold, parts.settings.seed + 20);
-  return pixel_error(shown.runs[0].electrons, shown.runs[1].electrons, truth.runs[0].electrons, truth.runs[1].electrons,
+double mesh_pixel_error(const BenchParts& parts, const sim::DeviceSpec& device, const fem::Compliance& gel) {
+  const TruePictures& truth = *parts.truth;
+  return pixel_error(true_pictures(parts, device, gel, truth.hold, parts.settings.seed + 20).runs, truth.runs,
                      truth.imager);
 }
 
@@ -416,9 +398,8 @@ std::vector<BenchCurve> light_curves(const BenchParts& parts, std::vector<LightT
   std::vector<BenchCurve> curves;
   if (parts.truth) {
     const Hold& hold = parts.presses.holds.front();
-    const TruePictures own = true_pictures(parts, parts.device, parts.own_gel, hold, parts.settings.seed + 30);
-    curves.push_back(light_curve(parts, own, tries, progress));
-    curves.push_back(samples_curve(parts, own, progress));
+    curves.push_back(light_curve(parts, *parts.own_truth, tries, progress));
+    curves.push_back(samples_curve(parts, *parts.own_truth, progress));
     if (parts.device.bands) curves.push_back(bands_curve(parts, progress));
     const sim::Plan plan = sim::make_plan(bench_scene(parts.device, parts.presses, hold, 1));
     if (parts.exact.fine_relief == sim::Switch::on) curves.push_back(membrane_curve(parts, plan, progress));

@@ -1,7 +1,6 @@
 #pragma once
 // What the parts of a device's bench share. For lab/device_bench*.cpp alone.
 
-#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -16,13 +15,10 @@
 
 namespace touchstone::lab {
 
-/// From one seed to one that shares no random numbers with it.
-inline constexpr std::uint64_t kOtherSeed = 0x9e3779b97f4a7c15;
-
 /// Pictures of one hold by the reference's light, twice without common random numbers.
 struct TruePictures {
   Hold hold;
-  std::array<SceneRun, 2> runs;
+  TwoRuns runs;
   render::Imager imager;
 };
 
@@ -33,16 +29,16 @@ struct BenchParts {
   BenchPresses presses;
   double depth_mm = 0.0;
   fem::Compliance own_gel;
-  double own_seconds = 0.0;
   sim::DeviceSpec finest_device;
   double finest_edges = 0.0;  ///< times the device's
   fem::Compliance finest_gel;
   double finest_seconds = 0.0;
-  FeltForces finest_forces;           ///< of `presses`
-  sim::EffectSwitches exact;          ///< of the reference's pictures
-  std::string exact_words;            ///< ", with interreflection": what of it the plan leaves out; empty: nothing
-  int reference_paths = 0;            ///< a pixel, of true pictures
-  std::optional<TruePictures> truth;  ///< of the first hold on the finest gel; nothing where there are no pictures
+  FeltForces finest_forces;               ///< of `presses`
+  sim::EffectSwitches exact;              ///< of the reference's pictures
+  std::string exact_words;                ///< ", with interreflection": what of it the plan leaves out; empty: nothing
+  int reference_paths = 0;                ///< a pixel, of true pictures
+  std::optional<TruePictures> truth;      ///< of the first hold on the finest gel; nothing where there are no pictures
+  std::optional<TruePictures> own_truth;  ///< likewise on the device's own gel
 };
 
 sim::DeviceSpec with_edges(sim::DeviceSpec device, double factor);
@@ -57,18 +53,18 @@ MadeGel make_gel(const sim::DeviceSpec& device, fem::Element element = fem::Elem
 /// The device with other edges, in forces and, where there is a truth, in pictures. What can't be had is in its note.
 BenchPoint mesh_point(const BenchParts& parts, double edges);
 
-/// Paths, each pixel traced by itself to the imager's noise.
+/// Paths, the same number in each pixel, with what the plan leaves out.
 sim::SceneSpec reference_scene(const BenchParts& parts, const sim::DeviceSpec& device, const Hold& hold,
                                std::uint64_t seed);
 TruePictures true_pictures(const BenchParts& parts, const sim::DeviceSpec& device, const fem::Compliance& gel,
                            const Hold& hold, std::uint64_t seed);
 
-/// Makes parts.truth, or leaves it empty; in words, which or why.
+/// Makes parts.truth and parts.own_truth, or leaves them empty; in words, which or why.
 std::string prepare_pictures(BenchParts& parts);
 
 /// What a mesh gets wrong of pictures, free of the paths' noise.
-double mesh_pixel_error(const BenchParts& parts, const TruePictures& truth, const sim::DeviceSpec& device,
-                        const fem::Compliance& gel);
+/// @pre parts.truth
+double mesh_pixel_error(const BenchParts& parts, const sim::DeviceSpec& device, const fem::Compliance& gel);
 
 /// A way to make a scene's pictures.
 struct LightTry {

@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
+#include <iterator>
+#include <optional>
 #include <thread>
 
 #include "core/edited_yaml.h"
@@ -97,33 +98,39 @@ std::string short_name(std::string words) {
   return words;
 }
 
-/// Error against seconds. Elements get a curve each, as what was varied is in their names.
-std::optional<LinePlot> plot_of(const BenchCurve& curve) {
+/// Error against seconds. Pixel errors too small to be told stand on a line of their own.
+std::optional<LinePlot> plot_of(const BenchCurve& curve, double least_pixel_error) {
   LinePlot plot;
   plot.title = curve.name + ": error against seconds";
   if (curve.name == "light") plot.title += " (+: with what the plan leaves out)";
   const bool by_setup = curve.name == "mesh" || curve.name == "element";
   double BenchPoint::*const seconds = by_setup ? &BenchPoint::once_s : &BenchPoint::each_s;
-  plot.x_label = by_setup ? "set-up, seconds" : "seconds, " + curve.each;
+  const std::string& head = by_setup ? curve.once : curve.each;  // "a press, ms"
+  plot.x_label = head.substr(0, head.rfind(',')) + ", seconds";
   plot.y_label = "error";
-  const auto add = [&](const char* what, double BenchPoint::*error) {
-    std::map<std::string, PlotCurve> parts;
-    std::vector<std::string> order;
+  const auto add = [&](const char* what, double BenchPoint::*error, double least) {
+    std::vector<PlotCurve> parts;
+    PlotCurve limit;
     for (const BenchPoint& point : curve.points) {
       if (!std::isfinite(point.*error) || !std::isfinite(point.*seconds)) continue;
-      std::string name = what;
-      if (curve.name == "element") name = point.setting.substr(0, point.setting.find(", fine"));
-      if (curve.name == "light" && !std::isfinite(point.value)) name = short_name(point.setting);
-      if (parts.emplace(name, PlotCurve{name, {}}).second) order.push_back(name);
-      parts[name].points.emplace_back(point.*seconds, point.*error);
+      const std::string name = point.series.empty() ? what : short_name(point.series);
+      auto part = std::find_if(parts.begin(), parts.end(), [&](const PlotCurve& one) { return one.name == name; });
+      if (part == parts.end()) part = parts.insert(part, {name, {}});
+      part->points.emplace_back(point.*seconds, std::max(point.*error, least));
+      if (least > 0.0) limit.points.emplace_back(point.*seconds, least);
     }
-    for (const std::string& name : order) plot.curves.push_back(parts[name]);
+    std::move(parts.begin(), parts.end(), std::back_inserter(plot.curves));
+    if (limit.points.size() < 2) return;
+    std::sort(limit.points.begin(), limit.points.end());
+    limit.name = "told from none";
+    limit.dashed = true;
+    plot.curves.push_back(limit);
   };
-  if (any(curve, &BenchPoint::force_error)) add("force error, relative", &BenchPoint::force_error);
+  if (any(curve, &BenchPoint::force_error)) add("force error, relative", &BenchPoint::force_error, 0.0);
   if (any(curve, &BenchPoint::pixel_error)) {
-    add(curve.name == "light" ? "paths: pixel error" : "pixel error, of the imager's noise", &BenchPoint::pixel_error);
+    add("pixel error, of the imager's noise", &BenchPoint::pixel_error, least_pixel_error);
   }
-  if (any(curve, &BenchPoint::event_error)) add("wrong events", &BenchPoint::event_error);
+  if (any(curve, &BenchPoint::event_error)) add("wrong events", &BenchPoint::event_error, 0.0);
   if (plot.curves.empty()) return std::nullopt;
   return plot;
 }
@@ -186,15 +193,12 @@ std::string effects_table(const DeviceBench& bench) {
   const EffectShare& all = bench.effects.front();
   std::string text = fmt::format(
       "Each is switched over by itself: what the plan simulates off, what it leaves out on. A force's change is "
-      "relative, a "
-      "picture's in the imager's noise and free of the paths' own, the numbers' as delivered, with their noise. As "
-      "planned a "
-      "frame takes {:.3g} s{}; seconds are what the effect adds to that.\n\n",
+      "relative, a picture's in the imager's noise and free of the paths' own, the numbers' as delivered, with their "
+      "noise. As planned a frame takes {:.3g} s{}; seconds are what the effect adds to that.\n\n",
       all.seconds, all.once_s > 0.0 ? fmt::format(" and a scene's camera {:.3g} s", all.once_s) : std::string());
   text +=
       "| effect | as planned | switched | force changes, % | picture | numbers | it takes, s a frame | of the frame, % "
-      "| s once "
-      "| |\n|---|---|---|---|---|---|---|---|---|---|\n";
+      "| s once | |\n|---|---|---|---|---|---|---|---|---|---|\n";
   for (const EffectShare& share : bench.effects) {
     if (&share == &all) continue;
     text += fmt::format("| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} |\n", share.name,
@@ -229,21 +233,20 @@ StudyResult report(const DeviceBench& bench, const std::string& text) {
   std::string page = fmt::format("# What accuracy costs: {}\n\n{}\n", bench.device, choice_in_words(bench));
   page += fmt::format(
       "## How it was measured\n\n- Presses: {}.\n- Pictures: {}.\n- Reference: {}; light by paths, each pixel by "
-      "itself, twice "
-      "with other random numbers: the product of the differences from both is free of the reference's own noise.\n- "
-      "Machine: "
-      "{} threads, {}. Seconds are of single runs; other work on the machine shows in them.\n- Bold: the device as it "
-      "is.\n\n",
+      "itself, twice with other random numbers: the product of the differences from both is free of the reference's "
+      "own noise.\n- Machine: {} threads, {}. Seconds are of single runs; other work on the machine shows in them.\n- "
+      "Bold: the device as it is.\n\n",
       bench.presses, bench.pictures, bench.reference, std::thread::hardware_concurrency(), processor_kind());
+  const double least_pixel_error = kReferenceShare * bench.settings.pixel_error;
   for (const BenchCurve& curve : bench.curves) {
     page += fmt::format("## {}{}\n\n{}\n\n", static_cast<char>(std::toupper(curve.name[0])), curve.name.substr(1),
                         curve.what);
-    if (const auto plot = plot_of(curve)) {
+    if (const auto plot = plot_of(curve, least_pixel_error)) {
       const std::string name = fmt::format("bench-{}.svg", file_name(curve.name));
       result.files.push_back({name, to_svg(*plot)});
       page += fmt::format("![Error against seconds]({})\n\n", name);
     }
-    page += table_of(curve, kReferenceShare * bench.settings.pixel_error) + "\n";
+    page += table_of(curve, least_pixel_error) + "\n";
   }
   page += "## Effects\n\n" + effects_table(bench);
   result.files.insert(result.files.begin(), {"bench.md", page});

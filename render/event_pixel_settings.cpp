@@ -77,14 +77,14 @@ cv::Mat log_intensity(const cv::Mat& intensity, const EventPixelSettings& settin
   return logs;
 }
 
-int needed_subdivisions(const cv::Mat& log_before, const cv::Mat& log_after, double smallest_threshold) {
+int needed_subdivisions(const cv::Mat& log_before, const cv::Mat& log_after, double largest_change) {
   if (log_before.type() != CV_32FC1 || log_after.type() != CV_32FC1 || log_before.size() != log_after.size()) {
     fail(
         "logarithms of {} x {} of OpenCV's type {} and of {} x {} of type {}; allowed are two of one size and CV_32FC1",
         log_before.cols, log_before.rows, log_before.type(), log_after.cols, log_after.rows, log_after.type());
   }
-  if (!(smallest_threshold > 0.0 && std::isfinite(smallest_threshold))) {
-    fail("smallest threshold is {}; allowed is a finite number above 0", smallest_threshold);
+  if (!(largest_change > 0.0 && std::isfinite(largest_change))) {
+    fail("largest change is {}; allowed is a finite number above 0", largest_change);
   }
   double largest = 0.0;
   for (int row = 0; row < log_before.rows; ++row) {
@@ -99,8 +99,8 @@ int needed_subdivisions(const cv::Mat& log_before, const cv::Mat& log_after, dou
       largest = std::max(largest, change);
     }
   }
-  // n pictures between make n + 1 steps: largest / (n + 1) < threshold / 2.
-  return static_cast<int>(std::min(std::floor(2.0 * largest / smallest_threshold), 0x1.0p30));
+  // n pictures between make n + 1 steps: largest / (n + 1) < largest_change.
+  return static_cast<int>(std::min(std::floor(largest / largest_change), 0x1.0p30));
 }
 
 }  // namespace touchstone::render

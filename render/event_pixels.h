@@ -67,10 +67,10 @@ EventPixelSettings davis240c(double intensity_at_1klux);
 cv::Mat log_intensity(const cv::Mat& intensity, const EventPixelSettings& settings);
 
 /// How many pictures are wanted between two of which the logarithms (log_intensity) are given, so that from one to the
-/// next no pixel changes by as much as half of `smallest_threshold`, if the change is spread evenly; 0 if they are
-/// close enough. At most 2^30. @throws Error for pictures of different size, of another type than CV_32FC1, not finite,
-/// or a threshold that isn't positive
-int needed_subdivisions(const cv::Mat& log_before, const cv::Mat& log_after, double smallest_threshold);
+/// next no pixel changes by as much as `largest_change`, if the change is spread evenly; 0 if they are close enough. At
+/// most 2^30. @throws Error for pictures of different size, of another type than CV_32FC1, not finite, or a largest
+/// change that isn't positive
+int needed_subdivisions(const cv::Mat& log_before, const cv::Mat& log_after, double largest_change);
 
 /// One unit of an event camera, watching a sequence. Thresholds are a pure function of (unit seed, row, column), noise
 /// of (noise seed, row, column, number of the noise event); events are the same for any number of threads. Noise comes

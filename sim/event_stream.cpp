@@ -30,8 +30,7 @@ class EventWatch {
       : pixels_(scene.device.camera->events.value().pixels, {scene.device.camera->width, scene.device.camera->height},
                 scene.seed, noise_seed),
         smallest_threshold_(pixels_.smallest_threshold()),
-        // needed_subdivisions takes half of what it's told
-        step_(2.0 * scene.light.event_step * smallest_threshold_),
+        step_(scene.light.event_step * smallest_threshold_),
         light_(scene, plan, gel, smallest_threshold_),
         sink_(sink) {}
 

@@ -21,6 +21,16 @@ using test::message_of;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 
+/// From above the pad to 1.1 mm.
+sim::MotionSpec straight_down() {
+  sim::MotionSpec press;
+  press.start_mm = {0, 0, 1.6};
+  sim::MotionKey down;
+  down.z = sim::AxisKey{1.1, std::nullopt};
+  press.keys = {down};
+  return press;
+}
+
 /// A coated pad lit from three sides through its plate, red, green and blue; nothing is white.
 constexpr const char* kDevice = R"(name: small-lit
 gel: {size_x_mm: 8, size_y_mm: 8, thickness_mm: 3, youngs_modulus_MPa: 0.15, poisson_ratio: 0.49, refractive_index: 1.41}
@@ -110,12 +120,7 @@ TEST(UnitSimulation, LampsOneByOneAddUpToAllOfThem) {
   EXPECT_LT(cv::norm(shown.background, whole, cv::NORM_L2) / cv::norm(whole, cv::NORM_L2), 0.02);
   EXPECT_NEAR(cv::mean(shown.background)[1], cv::mean(whole)[1], 0.01 * cv::mean(whole)[1]);
   const sim::TouchObject ball = rig.object(fit.objects[0]);
-  sim::MotionSpec press;
-  press.start_mm = {0, 0, 1.6};
-  sim::MotionKey down;
-  down.z = sim::AxisKey{1.1, std::nullopt};
-  press.keys = {down};
-  EXPECT_NEAR(shown.force_N[0], rig.play(ball, press).back().press.wrench[2], 1e-6 * shown.force_N[0]);
+  EXPECT_NEAR(shown.force_N[0], rig.play(ball, straight_down()).back().press.wrench[2], 1e-6 * shown.force_N[0]);
 }
 
 TEST(UnitPictures, MeanAndNoiseOfExposuresAreAsTheImagerHasThem) {
@@ -263,12 +268,8 @@ std::filesystem::path written_fit(const test::TemporaryFolder& out, const std::s
   static const sim::TouchRig rig(fit.device, cache(), settings);
   sim::write_png(out.path() / "rest.png", rig.background(1));
   const sim::TouchObject ball = rig.object(fit.objects[0]);
-  sim::MotionSpec press;
-  press.start_mm = {0, 0, 1.6};
-  sim::MotionKey down;
-  down.z = sim::AxisKey{1.1, std::nullopt};
-  press.keys = {down};
-  sim::write_png(out.path() / "press.png", rig.look(ball, rig.play(ball, press).back().press, 1, 1, false).frame);
+  sim::write_png(out.path() / "press.png",
+                 rig.look(ball, rig.play(ball, straight_down()).back().press, 1, 1, false).frame);
   return out.write("fit.yaml",
                    fmt::format("name: mine\ndevice: device.yaml\ncoarse_px: 2\nmembrane_um: 120\ndeepest_mm: 0.6\n"
                                "backgrounds: [rest.png]\nunknowns:\n{}\npresses:\n  - {{picture: press.png, "

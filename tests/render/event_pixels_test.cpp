@@ -269,22 +269,22 @@ TEST(EventPixels, BadSettingsAreRefusedNamingTheField) {
   EXPECT_THROW(davis240c(nan), Error);
 }
 
-TEST(NeededSubdivisions, KeepEveryStepUnderHalfAThreshold) {
+TEST(NeededSubdivisions, KeepEveryStepUnderTheLargestChange) {
   const EventPixelSettings settings = ideal();
   const cv::Mat before = log_intensity(flat(1.0, 5, 4), settings);
-  EXPECT_EQ(needed_subdivisions(before, before, 0.2), 0);
+  EXPECT_EQ(needed_subdivisions(before, before, 0.1), 0);
   for (const double change : {0.05, 0.099, 0.101, 0.35, -2.0, 7.77}) {
     cv::Mat light = flat(1.0, 5, 4);
     light.at<float>(2, 3) = static_cast<float>(std::exp(change));
-    const int between = needed_subdivisions(before, log_intensity(light, settings), 0.2);
+    const int between = needed_subdivisions(before, log_intensity(light, settings), 0.1);
     EXPECT_LT(std::abs(change) / (between + 1), 0.1 + 1e-6);
     if (between > 0) {
       EXPECT_GE(std::abs(change) / between, 0.1 - 1e-6);
     }
   }
-  EXPECT_THROW(needed_subdivisions(before, flat(0.0, 4, 4), 0.2), Error);
+  EXPECT_THROW(needed_subdivisions(before, flat(0.0, 4, 4), 0.1), Error);
   EXPECT_THROW(needed_subdivisions(before, before, 0.0), Error);
-  EXPECT_THROW(needed_subdivisions(before, flat(std::numeric_limits<double>::infinity(), 5, 4), 0.2), Error);
+  EXPECT_THROW(needed_subdivisions(before, flat(std::numeric_limits<double>::infinity(), 5, 4), 0.1), Error);
   EXPECT_THROW(log_intensity(flat(-1.0), settings), Error);
   EXPECT_THROW(log_intensity(cv::Mat(), settings), Error);
   // No light at all is the dark's current.
