@@ -23,10 +23,9 @@ constexpr double kFriction = 0.5;
 constexpr double kDepth = 0.1;  // of the gel's thickness
 constexpr std::array kEdges = {2.5, 2.0, 1.6, 1.25, 1.0, 0.8};
 constexpr std::array kElementEdges = {2.0, 1.5, 1.0};
-// Of the reference: tried from the finest on until it's small enough. 45,000 tetrahedra take some 2 GB and a minute.
+// Of the reference: tried from the finest on until it's small enough.
 constexpr std::array kReferenceEdges = {0.4, 0.45, 0.5, 0.57, 0.65, 0.75};
 constexpr double kReferenceCoarse = 0.7;  // its edges far from the presses, times the device's own
-constexpr double kMostReferenceTetrahedra = 45000;
 
 void check(const sim::DeviceSpec& device, const BenchSettings& settings) {
   const auto above_zero = [](const char* field, double value) {
@@ -36,6 +35,7 @@ void check(const sim::DeviceSpec& device, const BenchSettings& settings) {
   above_zero("pixel error", settings.pixel_error);
   if (settings.depth_mm) above_zero("depth", *settings.depth_mm);
   if (settings.most_pixels < 1000) fail("pixels are {}; allowed are at least 1000", settings.most_pixels);
+  if (settings.most_tetrahedra < 1) fail("tetrahedra are {}; allowed is at least 1", settings.most_tetrahedra);
   if (device.mesh.force_error) {
     fail_at(device.where, "mesh.force_error: a bench varies the mesh's edges, so it needs fine_mm and coarse_mm");
   }
@@ -55,7 +55,7 @@ sim::ObjectSpec ball_of(double radius_mm) {
 }
 
 /// The mesh that the others are measured against: fine only where the presses go.
-sim::DeviceSpec reference_device(const sim::DeviceSpec& device, double reach_mm, double& edges) {
+sim::DeviceSpec reference_device(const sim::DeviceSpec& device, double reach_mm, int most_tetrahedra, double& edges) {
   sim::DeviceSpec finest = device;
   for (const double factor : kReferenceEdges) {
     edges = factor;
@@ -63,7 +63,7 @@ sim::DeviceSpec reference_device(const sim::DeviceSpec& device, double reach_mm,
     finest.mesh.coarse_mm = std::max(finest.mesh.fine_mm, kReferenceCoarse * device.mesh.coarse_mm);
     const double half = reach_mm + 3.0 * device.mesh.fine_mm;
     finest.mesh.fine_half_extent_mm = device.mesh.fine_half_extent_mm.cwiseMin(half);
-    if (fem::estimated_tetrahedra(sim::gel_body(finest)) <= kMostReferenceTetrahedra) break;
+    if (fem::estimated_tetrahedra(sim::gel_body(finest)) <= most_tetrahedra) break;
   }
   return finest;
 }
@@ -275,7 +275,7 @@ DeviceBench bench_device(const sim::DeviceSpec& device, const BenchSettings& set
       mean_normal_force(felt));
 
   tell("the reference's gel");
-  parts.finest_device = reference_device(parts.device, felt.reach_mm, parts.finest_edges);
+  parts.finest_device = reference_device(parts.device, felt.reach_mm, settings.most_tetrahedra, parts.finest_edges);
   MadeGel finest = make_gel(parts.finest_device);
   parts.finest_gel = std::move(finest.gel);
   parts.finest_seconds = finest.seconds;

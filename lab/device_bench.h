@@ -25,6 +25,7 @@ struct BenchSettings {
   std::optional<sim::ObjectSpec> object;  ///< absent: a ball whose radius is the gel's thickness, with friction
   std::optional<double> depth_mm;         ///< of the presses; absent: a tenth of the gel's thickness
   int most_pixels = 160 * 120;            ///< pictures are compared on so many of their middle
+  int most_tetrahedra = 45000;            ///< of the reference's mesh; so many take some 2 GB and a minute
   bool finite_strain = true;              ///< one press at finite strain, which takes up to minutes
   std::uint64_t seed = 1;
 };

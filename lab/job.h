@@ -44,10 +44,10 @@ void fields(YamlReader& in, Job& job);
 /// Reads and checks a job file, but none of the scenes that it names. @throws Error with file and line
 Job read_job(const std::filesystem::path& file);
 
-/// True if the file is a job and not a scene: it has the key `scenes`. @throws Error if it isn't YAML
 /// May it name a folder or a file? Up to 100 letters, digits, - and _.
 bool is_folder_name(const std::string& name);
 
+/// True if the file is a job and not a scene: it has the key `scenes`. @throws Error if it isn't YAML
 bool is_job_file(const std::filesystem::path& file);
 
 }  // namespace touchstone::lab

@@ -106,6 +106,8 @@ const BenchPoint& point(const BenchCurve& curve, const std::string& setting) {
   return *found;
 }
 
+constexpr int kFewTetrahedra = 12000;  // a reference in a few seconds
+
 /// Short of light, as cameras behind a hole are: their noise is some 4 % of what they see.
 sim::DeviceSpec dim_device() {
   sim::DeviceSpec device = test::small_device();
@@ -122,6 +124,7 @@ const DeviceBench& clear_bench() {
     BenchSettings settings;
     settings.force_error = 0.03;
     settings.pixel_error = 1.0;
+    settings.most_tetrahedra = kFewTetrahedra;
     return bench_device(dim_device(), settings);
   }();
   return bench;
@@ -231,6 +234,7 @@ TEST(DeviceBench, ACoatedDeviceHasDirectLightAndItsOwnContactPixels) {
   settings.pixel_error = 3.0;
   settings.most_pixels = 1000;
   settings.finite_strain = false;
+  settings.most_tetrahedra = kFewTetrahedra;
   const DeviceBench bench = bench_device(test::small_coated_device(), settings);
   EXPECT_TRUE(std::isfinite(point(curve(bench, "light"), "direct light").pixel_error));
   const BenchCurve& pixels = curve(bench, "contact pixels");
@@ -247,6 +251,7 @@ TEST(DeviceBench, EventsComeNearerWithSmallerSteps) {
   settings.pixel_error = 5.0;
   settings.most_pixels = 1000;
   settings.finite_strain = false;
+  settings.most_tetrahedra = kFewTetrahedra;
   const DeviceBench bench = bench_device(device, settings);
   const BenchCurve& steps = curve(bench, "event step");
   ASSERT_EQ(steps.points.size(), 5u) << steps.what;
@@ -261,6 +266,7 @@ TEST(DeviceBench, WithoutACameraItIsAboutForces) {
   BenchSettings settings;
   settings.force_error = 0.05;
   settings.finite_strain = false;
+  settings.most_tetrahedra = kFewTetrahedra;
   const DeviceBench bench = bench_device(device, settings);
   EXPECT_THAT(bench.pictures, HasSubstr("no camera"));
   EXPECT_TRUE(std::isnan(bench.choice.verified_pixel));
@@ -279,6 +285,7 @@ TEST(DeviceBench, RefusesWhatMakesNoSense) {
               HasSubstr("force error is 0; allowed are numbers above 0"));
   EXPECT_THAT(message([](auto&, auto& s) { s.pixel_error = NAN; }), HasSubstr("pixel error is nan"));
   EXPECT_THAT(message([](auto&, auto& s) { s.most_pixels = 10; }), HasSubstr("at least 1000"));
+  EXPECT_THAT(message([](auto&, auto& s) { s.most_tetrahedra = 0; }), HasSubstr("at least 1"));
   EXPECT_THAT(message([](auto& d, auto&) { d.mesh.force_error = 0.01; }), HasSubstr("needs fine_mm"));
   EXPECT_THAT(message([](auto&, auto& s) { s.depth_mm = 5.0; }), HasSubstr("deep"));
 }
