@@ -3,7 +3,8 @@
 # constant or an inline function of a name that it uses for its own. -v most=N: files of a group at most.
 #
 # What counts as declared: at a line's begin within "namespace {" ... "}  // namespace", the name of a type, an alias, a
-# function or its operator's, variables, and the members of an enum that isn't a class.
+# function or its operator's, variables, and the members of an enum that isn't a class; of GoogleTest's TEST(A, B) the
+# class that it makes. Files may say "using a::b" of the same a::b.
 function declare(name) {
   if (name != "" && !((FILENAME, name) in declared)) {
     declared[FILENAME, name] = 1
@@ -16,6 +17,14 @@ function declare_all(text,    word) {
     declare(word)
     text = substr(text, RSTART + RLENGTH)
   }
+}
+function clash(group, name,    part) {
+  if (split(name, part, "|") == 3) return ((group, part[2]) in used) && used[group, part[2]] != part[3]
+  return (group, name) in taken
+}
+function take(group, name,    part) {
+  if (split(name, part, "|") == 3) used[group, part[2]] = part[3]
+  else taken[group, name] = 1
 }
 FILENAME ~ /\.h$/ {
   if (match($0, /^inline constexpr [^=({]*[ >]k[A-Z][A-Za-z_0-9]*/)) {
@@ -40,7 +49,14 @@ in_enum { line = $0; sub(/\/\/.*/, "", line); if (line ~ /\}/) in_enum = 0; decl
   }
   if (line ~ /^enum /) { in_enum = line !~ /\}/; sub(/^enum /, "", line); sub(/:[^{]*/, "", line); declare_all(line); next }
   if (line ~ /^using [A-Za-z_0-9]+ *=/ || line ~ /^namespace /) { split(line, word, /[ =]+/); declare(word[2]); next }
-  if (line ~ /^using /) { sub(/;.*/, "", line); sub(/.*[: ]/, "", line); declare("using:" line); next }
+  if (line ~ /^using /) {
+    sub(/;.*/, "", line); sub(/^using +(::)?(touchstone::)?/, "", line); gsub(/ /, "_", line)
+    name = line; sub(/.*:/, "", name); declare("using|" name "|" line); next
+  }
+  if (line ~ /^(TYPED_)?TEST(_F|_P)?\(/) {
+    sub(/^[A-Z_]*\( */, "", line); sub(/\).*/, "", line); sub(/, */, "_", line); declare(line "_Test"); next
+  }
+  if (line ~ /^[A-Z_]*TEST_SUITE[A-Z_]*\(/) { sub(/^[A-Z_]*\( */, "", line); sub(/[,)].*/, "", line); declare("suite:" line); next }
   head = line
   sub(/[({=;].*/, "", head)          # up to what begins arguments or a value
   if (line ~ /^[^=;{]*\(/) { sub(/ +$/, "", head); sub(/.*[^A-Za-z_0-9]/, "", head); declare(head); next }
@@ -60,11 +76,11 @@ END {
     for (g = 1; ; ++g) {
       if (size[g] >= most) continue
       free = 1
-      for (i = 1; i <= n && free; ++i) if ((g, own[i]) in taken) free = 0
+      for (i = 1; i <= n && free; ++i) if (clash(g, own[i])) free = 0
       if (free) break
     }
     ++size[g]
-    for (i = 1; i <= n; ++i) taken[g, own[i]] = 1
+    for (i = 1; i <= n; ++i) take(g, own[i])
     print g, files[f]
   }
 }

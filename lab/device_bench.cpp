@@ -283,6 +283,7 @@ DeviceBench bench_device(const sim::DeviceSpec& device, const BenchSettings& set
 
   tell("the reference's pictures");
   bench.pictures = prepare_pictures(parts);
+  bench.least_pixel_error = parts.least_pixel_error;
 
   bench.curves.push_back(mesh_curve(parts, progress));
   bench.reference = reference_in_words(parts, bench.curves.back());

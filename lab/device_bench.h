@@ -30,10 +30,6 @@ struct BenchSettings {
   std::uint64_t seed = 1;
 };
 
-/// A reference's noise is left in a mean over N values by its square over sqrt(N): pixel errors under this part of the
-/// wanted one aren't told from none.
-inline constexpr double kReferenceShare = 0.35;
-
 inline constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
 /// One setting tried.
@@ -95,9 +91,10 @@ struct EffectShare {
 
 struct DeviceBench {
   std::string device;
-  std::string presses;    ///< in words
-  std::string reference;  ///< in words, with what it's off itself
-  std::string pictures;   ///< in words: how large; or why there are none
+  std::string presses;             ///< in words
+  std::string reference;           ///< in words, with what it's off itself
+  std::string pictures;            ///< in words: how large; or why there are none
+  double least_pixel_error = 0.0;  ///< smaller ones aren't told from none, as the reference has noise itself
   std::vector<BenchCurve> curves;
   BenchChoice choice;
   std::vector<EffectShare> effects;

@@ -37,6 +37,7 @@ struct BenchParts {
   sim::EffectSwitches exact;              ///< of the reference's pictures
   std::string exact_words;                ///< ", with interreflection": what of it the plan leaves out; empty: nothing
   int reference_paths = 0;                ///< a pixel, of true pictures
+  double least_pixel_error = 0.0;         ///< see DeviceBench
   std::optional<TruePictures> truth;      ///< of the first hold on the finest gel; nothing where there are no pictures
   std::optional<TruePictures> own_truth;  ///< likewise on the device's own gel
 };

@@ -237,7 +237,7 @@ StudyResult report(const DeviceBench& bench, const std::string& text) {
       "own noise.\n- Machine: {} threads, {}. Seconds are of single runs; other work on the machine shows in them.\n- "
       "Bold: the device as it is.\n\n",
       bench.presses, bench.pictures, bench.reference, std::thread::hardware_concurrency(), processor_kind());
-  const double least_pixel_error = kReferenceShare * bench.settings.pixel_error;
+  const double least_pixel_error = bench.least_pixel_error;
   for (const BenchCurve& curve : bench.curves) {
     page += fmt::format("## {}{}\n\n{}\n\n", static_cast<char>(std::toupper(curve.name[0])), curve.name.substr(1),
                         curve.what);

@@ -12,7 +12,7 @@
 namespace touchstone::sensors {
 namespace {
 
-using test::message_of;
+using touchstone::test::message_of;
 using ::testing::HasSubstr;
 
 /// A picture under light that falls to the rim and is warm: `albedo` (R, G, B) everywhere but for a bead.

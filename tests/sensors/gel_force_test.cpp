@@ -100,7 +100,7 @@ GelForceModel model_of_two_balls() {
 }
 
 TEST(GelForceModel, AFileGivesTheSameBitsBack) {
-  const test::TemporaryFolder folder;
+  const touchstone::test::TemporaryFolder folder;
   const GelForceModel model = model_of_two_balls();
   save(model, folder.path() / "gel.json");
   const GelForceModel back = load_gel_force_model(folder.path() / "gel.json");

@@ -11,7 +11,7 @@
 namespace touchstone::sensors {
 namespace {
 
-using test::message_of;
+using touchstone::test::message_of;
 using ::testing::HasSubstr;
 
 constexpr int kWidth = 320;
