@@ -12,8 +12,8 @@
 namespace touchstone::sensors {
 namespace {
 
-using touchstone::test::message_of;
 using ::testing::HasSubstr;
+using touchstone::test::message_of;
 
 /// A picture under light that falls to the rim and is warm: `albedo` (R, G, B) everywhere but for a bead.
 cv::Mat seen(const Eigen::Vector3d& albedo) {

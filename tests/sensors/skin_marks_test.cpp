@@ -11,8 +11,8 @@
 namespace touchstone::sensors {
 namespace {
 
-using touchstone::test::message_of;
 using ::testing::HasSubstr;
+using touchstone::test::message_of;
 
 constexpr int kWidth = 320;
 constexpr int kHeight = 240;
