@@ -12,6 +12,7 @@ namespace {
 
 constexpr double kTerminalInterval_s = 0.1;
 constexpr double kPlainInterval_s = 5.0;
+constexpr double kSameAgain_s = 60.0;  // until a plain line says that nothing new was told
 constexpr int kBarWidth = 24;
 
 double seconds_between(std::chrono::steady_clock::time_point from, std::chrono::steady_clock::time_point to) {
@@ -27,10 +28,28 @@ std::string duration_text(double seconds) {
   return fmt::format("{} h {:02} min", whole / 3600, whole / 60 % 60);
 }
 
-ProgressBar::ProgressBar(bool quiet) : quiet_(quiet), terminal_(isatty(STDERR_FILENO) == 1) {}
+ProgressBar::ProgressBar(bool quiet) : quiet_(quiet), terminal_(isatty(STDERR_FILENO) == 1) {
+  if (!quiet_) clock_ = std::thread([this] { keep_drawing(); });
+}
 
 ProgressBar::~ProgressBar() {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    closed_ = true;
+  }
+  closing_.notify_one();
+  if (clock_.joinable()) clock_.join();
   end_stage();
+}
+
+void ProgressBar::keep_drawing() {
+  const std::chrono::duration<double> interval(terminal_ ? 10 * kTerminalInterval_s : kPlainInterval_s);
+  std::unique_lock<std::mutex> lock(mutex_);
+  while (!closing_.wait_for(lock, interval, [this] { return closed_; })) {
+    const Clock::time_point now = Clock::now();
+    const bool anew = terminal_ || drawn_ != done_ || seconds_between(last_drawn_, now) >= kSameAgain_s;
+    if (done_ < total_ && anew && seconds_between(last_drawn_, now) >= interval.count()) draw(now);
+  }
 }
 
 Progress ProgressBar::listener() {
@@ -61,9 +80,9 @@ void ProgressBar::draw(Clock::time_point now) {
   const double part = total_ > 0 ? static_cast<double>(done_) / static_cast<double>(total_) : 0.0;
   std::string text = fmt::format("{}/{}", done_, total_);
   if (rate > 0.0) text += fmt::format("  {:.3g}/s", rate);
-  if (done_ >= total_) {
+  if (done_ >= total_ || rate == 0.0) {
     text += "  in " + duration_text(elapsed);
-  } else if (rate > 0.0) {
+  } else {
     text += "  " + duration_text(static_cast<double>(total_ - done_) / rate) + " left";
   }
   if (terminal_) {

@@ -1,16 +1,18 @@
 #pragma once
 
 #include <chrono>
+#include <condition_variable>
 #include <cstdint>
 #include <mutex>
 #include <string>
+#include <thread>
 
 #include "core/progress.h"
 
 namespace touchstone::apps {
 
 /// Shows on stderr how far long work is, with its rate and the time that is left: a bar on a terminal, a plain line now
-/// and then elsewhere. Work that is done at once shows nothing.
+/// and then elsewhere, also while work that was begun tells nothing. Work that is done at once shows nothing.
 class ProgressBar {
  public:
   /// `quiet`: shows nothing at all
@@ -27,6 +29,7 @@ class ProgressBar {
   void show(const std::string& stage, std::int64_t done, std::int64_t total);
   void draw(Clock::time_point now);
   void end_stage();
+  void keep_drawing();
 
   bool quiet_;
   bool terminal_;
@@ -37,6 +40,9 @@ class ProgressBar {
   std::int64_t drawn_ = -1;
   Clock::time_point begun_;
   Clock::time_point last_drawn_;
+  bool closed_ = false;
+  std::condition_variable closing_;
+  std::thread clock_;
 };
 
 /// "12 s", "3 min 05 s", "2 h 10 min"

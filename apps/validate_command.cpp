@@ -9,6 +9,7 @@
 #include "lab/processor.h"
 #include "lab/run_identity.h"
 #include "lab/scenes_folder.h"
+#include "lab/study.h"
 #include "lab/validation.h"
 #include "lab/validation_page.h"
 
@@ -20,6 +21,7 @@ struct Options {
   bool quick = false;
   std::filesystem::path json;
   std::filesystem::path page;
+  std::filesystem::path out;
   std::string date;
 };
 
@@ -43,7 +45,12 @@ class Scratch {
   std::filesystem::path path_;
 };
 
-void validate(const Options& options, const GlobalOptions& global) {
+void validate(Options options, const GlobalOptions& global) {
+  if (!options.out.empty()) {
+    lab::make_study_folder(options.out);
+    if (options.json.empty()) options.json = options.out / "validation.json";
+    if (options.page.empty()) options.page = options.out / "validation.html";
+  }
   if (!options.json.empty()) require_writable_place(options.json);
   std::filesystem::path markdown = options.page;
   if (!options.page.empty()) {
@@ -54,7 +61,7 @@ void validate(const Options& options, const GlobalOptions& global) {
     require_writable_place(options.page);
     require_writable_place(markdown);
   } else if (!options.date.empty()) {
-    fail("--date '{}' is for the page: give --page too", options.date);
+    fail("--date '{}' is for the page: give -o or --page too", options.date);
   }
   const Scratch scratch;
   lab::ValidateOptions how;
@@ -90,6 +97,8 @@ void add_validate_command(CLI::App& app, const GlobalOptions& global, Action& ac
   options->groups = {"all"};
   command->add_option("GROUP", options->groups, "What: " + known);
   command->add_flag("--quick", options->quick, "Coarser or fewer cases: minutes");
+  command->add_option("-o,--out", options->out,
+                      "Folder for validation.html, validation.md and validation.json; is made");
   command->add_option("--json", options->json, "Write the rows to this file");
   command->add_option("--page", options->page, "Write a page for people, FILE.html, and FILE.md beside it");
   command->add_option("--date", options->date, "What the page shall say for its date");

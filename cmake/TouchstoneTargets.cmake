@@ -1,5 +1,7 @@
 # touchstone_library(NAME sources...) makes the library of one folder: target touchstone_NAME, alias Touchstone::NAME.
-# touchstone_test(NAME LABELS ... SOURCES ... LINKS ...) makes one GoogleTest program, its cases known to ctest.
+# touchstone_test(NAME LABELS ... SOURCES ... LINKS ... [ALONE]) tells ctest of a test: the GoogleTest cases of its sources. A
+# folder's tests are one program, FOLDER_tests, which ctest runs once for each with its sources' names; a test that's
+# ALONE is a program of its own name.
 
 add_library(touchstone_options INTERFACE)
 target_compile_features(touchstone_options INTERFACE cxx_std_20)
@@ -82,15 +84,14 @@ function(touchstone_library name)
   endif()
 endfunction()
 
-function(touchstone_test name)
-  cmake_parse_arguments(arg "" "" "LABELS;SOURCES;LINKS" ${ARGN})
+# A program of tests: its target, before or after it has all of its sources.
+function(touchstone_test_program name)
   touchstone_need_gtest()
-  add_executable(${name} ${arg_SOURCES})
-  target_link_libraries(${name} PRIVATE ${arg_LINKS} GTest::gtest GTest::gmock GTest::gtest_main touchstone_options)
+  add_executable(${name})
+  target_link_libraries(${name} PRIVATE GTest::gtest GTest::gmock touchstone_options)
   target_include_directories(${name} PRIVATE "${PROJECT_SOURCE_DIR}")
   target_compile_definitions(${name} PRIVATE
     TOUCHSTONE_SOURCE_DIR="${PROJECT_SOURCE_DIR}" TOUCHSTONE_BINARY_DIR="${PROJECT_BINARY_DIR}")
-  touchstone_compile_together(${name})
   if(TOUCHSTONE_PCH)
     if(NOT TARGET touchstone_test_pch)
       add_library(touchstone_test_pch OBJECT "${PROJECT_SOURCE_DIR}/cmake/pch.cpp")
@@ -101,13 +102,40 @@ function(touchstone_test name)
     endif()
     target_precompile_headers(${name} REUSE_FROM touchstone_test_pch)
   endif()
-  # One process a program: what its tests share is set up once.
-  add_test(NAME ${name} COMMAND ${name})
+  if(NOT TARGET touchstone_test_main)
+    add_library(touchstone_test_main OBJECT "${PROJECT_SOURCE_DIR}/tests/support/test_main.cpp")
+    target_link_libraries(touchstone_test_main PRIVATE GTest::gtest GTest::gmock touchstone_options)
+  endif()
+  target_link_libraries(${name} PRIVATE touchstone_test_main)
+  # At the folder's end: touchstone_compile_together looks at all sources at once.
+  cmake_language(EVAL CODE "cmake_language(DEFER CALL touchstone_compile_together [[${name}]])")
+endfunction()
+
+function(touchstone_test name)
+  cmake_parse_arguments(arg "ALONE" "" "LABELS;SOURCES;LINKS" ${ARGN})
+  if(arg_ALONE)
+    set(program ${name})
+  else()
+    get_filename_component(folder "${CMAKE_CURRENT_SOURCE_DIR}" NAME)
+    set(program ${folder}_tests)
+  endif()
+  if(NOT TARGET ${program})
+    touchstone_test_program(${program})
+  endif()
+  target_sources(${program} PRIVATE ${arg_SOURCES})
+  target_link_libraries(${program} PRIVATE ${arg_LINKS})
+  # One process a test: what its cases share is set up once.
+  if(arg_ALONE)
+    add_test(NAME ${name} COMMAND ${name})
+  else()
+    list(JOIN arg_SOURCES "," sources)
+    add_test(NAME ${name} COMMAND ${program} --sources=${sources})
+  endif()
   set_tests_properties(${name} PROPERTIES LABELS "${arg_LABELS}" TIMEOUT 1500)
   if("fast" IN_LIST arg_LABELS)
     if(NOT TARGET fast_tests)
       add_custom_target(fast_tests)  # what the sanitizers run
     endif()
-    add_dependencies(fast_tests ${name})
+    add_dependencies(fast_tests ${program})
   endif()
 endfunction()

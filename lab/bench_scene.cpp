@@ -218,6 +218,17 @@ TwoRuns run_twice(sim::SceneSpec scene, const fem::Compliance& gel, bool whole) 
   return runs;
 }
 
+double part_below_full_well(const TwoRuns& runs, const render::Imager& imager) {
+  const std::vector<render::ImagerResponse> responses = responses_of(imager);
+  std::size_t below = 0, all = 0;
+  for (std::size_t k = 0; k < runs[0].electrons.size(); ++k) {
+    const cv::Mat& one = runs[0].electrons[k];
+    for_each_value(one, runs[1].electrons[k], responses, [&](int, int, double) { ++below; });
+    all += one.total() * static_cast<std::size_t>(one.channels());
+  }
+  return static_cast<double>(below) / static_cast<double>(all);
+}
+
 double pixel_error(const std::vector<cv::Mat>& one, const std::vector<cv::Mat>& other,
                    const std::vector<cv::Mat>& true_one, const std::vector<cv::Mat>& true_other,
                    const render::Imager& imager) {

@@ -149,6 +149,8 @@ DesignTable try_designs(const DesignPlan& plan, const DesignBase& base, std::vec
   table.points = design_points(plan);
   table.values.assign(table.points.size(), std::vector<double>(table.figures.size(), kNone));
   table.faults.resize(table.points.size());
+  const auto count = static_cast<std::int64_t>(table.points.size());
+  if (progress) progress("designs", 0, count);
   table.base = judge(base.device);
   std::atomic<std::int64_t> done = 0;
   const auto try_one = [&](std::size_t d) {
@@ -157,7 +159,7 @@ DesignTable try_designs(const DesignPlan& plan, const DesignBase& base, std::vec
     } catch (const Error& error) {
       table.faults[d] = error.what();
     }
-    if (progress) progress("designs", ++done, static_cast<std::int64_t>(table.points.size()));
+    if (progress) progress("designs", ++done, count);
   };
   if (!at_once) {
     for (std::size_t d = 0; d < table.points.size(); ++d) try_one(d);

@@ -72,6 +72,7 @@ struct BenchChoice {
   // Of whole pictures: once for gel and camera, then a frame. The same of the device as it is.
   double once_s = kUnknown, frame_s = kUnknown;
   double as_is_once_s = kUnknown, as_is_frame_s = kUnknown;
+  bool by_middle = false;  ///< those seconds: the middle's were taken times the pixels, as whole pictures take long
   double as_is_force = kUnknown, as_is_pixel = kUnknown;  ///< on the same other presses
   std::string remark;                                     ///< what couldn't be had, and why
   std::vector<std::string> remark_rounds;                 ///< choices before this one that didn't hold on other presses

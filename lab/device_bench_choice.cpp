@@ -5,8 +5,6 @@
 #include <cmath>
 #include <limits>
 #include <optional>
-#include <tuple>
-#include <utility>
 
 #include "core/error.h"
 #include "lab/device_bench_parts.h"
@@ -22,6 +20,7 @@ constexpr double kBelow = 0.97;       // of a wanted error: where to aim
 constexpr double kAboutAsGood = 1.1;  // times the best error
 constexpr int kMostVerifications = 3;
 constexpr int kVerifyingHolds = 6;
+constexpr double kMostWholeSeconds = 40.0;
 
 double frame_seconds(const LightTry& one) {
   return one.each_s + one.once_s / kFrames;
@@ -134,15 +133,32 @@ Verified verify(const BenchParts& parts, const BenchChoice& choice, const LightT
   return verified;
 }
 
-/// Seconds of whole pictures: once, and a frame.
-std::pair<double, double> whole_seconds(const BenchParts& parts, const sim::DeviceSpec& device, const LightTry& light) {
+struct WholeSeconds {
+  double once = 0.0, frame = 0.0;
+  bool by_middle = false;
+};
+
+/// Of whole pictures; from the middle, whose seconds `light` has, where they would take too long.
+WholeSeconds whole_seconds(const BenchParts& parts, double edges, const LightTry& light) {
+  WholeSeconds seconds;
+  double times = 1.0;
+  if (parts.truth) {
+    const sim::CameraSpec& whole = *parts.whole_device.camera;
+    const sim::CameraSpec& middle = *parts.device.camera;
+    times = static_cast<double>(whole.width) * whole.height / (static_cast<double>(middle.width) * middle.height);
+    const auto pictures = static_cast<double>(parts.truth->runs[0].electrons.size());
+    seconds.by_middle = pictures * times * light.each_s > kMostWholeSeconds;
+  }
+  const sim::DeviceSpec device = with_edges(seconds.by_middle ? parts.device : parts.whole_device, edges);
   const MadeGel made = make_gel(device);
   sim::SceneSpec scene = bench_scene(device, parts.presses, parts.presses.holds.front(), parts.settings.seed + 5);
   if (!parts.truth) scene.outputs = {.frames = false};
   scene.light = light.light;
   scene.effects = light.effects;
   const SceneRun run = run_scene(scene, made.gel);
-  return {made.seconds + run.camera_seconds, run.mechanics_seconds + run.picture_seconds};
+  seconds.once = made.seconds + run.camera_seconds;
+  seconds.frame = run.mechanics_seconds + (seconds.by_middle ? times : 1.0) * run.picture_seconds;
+  return seconds;
 }
 
 }  // namespace
@@ -209,8 +225,14 @@ BenchChoice cheapest_choice(const BenchParts& parts, const BenchCurve& mesh, con
     const bool by_mesh =
         !force_holds || !light || !light->adaptive_paths || picked->point.pixel_error > light->pixel_error;
     if (by_mesh) {
-      picked->edges *= kFiner;
-      picked->point = mesh_point(parts, picked->edges);
+      const MeshPick finer{kFiner * picked->edges, mesh_point(parts, kFiner * picked->edges)};
+      if (!std::isfinite(finer.point.force_error)) {
+        choice.remark = fmt::format(
+            "The mesh that was chosen ({}) doesn't hold on other presses, and a finer one can't be had: {}.",
+            picked->point.setting, finer.point.note);
+        break;
+      }
+      picked = finer;
     } else {
       light->light.noise_fraction *= kMoreExact;
       light->words = paths_in_words(light->light.noise_fraction) + parts.exact_words;
@@ -228,8 +250,13 @@ BenchChoice cheapest_choice(const BenchParts& parts, const BenchCurve& mesh, con
     choice.light_words = light->words;
   }
   tell(3);
-  std::tie(choice.once_s, choice.frame_s) = whole_seconds(parts, chosen, light.value_or(LightTry{}));
-  std::tie(choice.as_is_once_s, choice.as_is_frame_s) = whole_seconds(parts, parts.whole_device, {});
+  const WholeSeconds cheapest = whole_seconds(parts, choice.edges, light.value_or(LightTry{}));
+  const WholeSeconds as_is = whole_seconds(parts, 1.0, tries.empty() ? LightTry{} : tries.front());
+  choice.once_s = cheapest.once;
+  choice.frame_s = cheapest.frame;
+  choice.as_is_once_s = as_is.once;
+  choice.as_is_frame_s = as_is.frame;
+  choice.by_middle = cheapest.by_middle || as_is.by_middle;
   return choice;
 }
 

@@ -25,14 +25,15 @@ constexpr double kReferenceShare = 0.35;      // of the wanted pixel error: what
 constexpr double kNoisiestReference = 4.0;    // of the imager's noise
 constexpr double kMostReferenceSeconds = 20;  // for the pictures of one scene; there are some twenty
 constexpr int kPilotPaths = 8;
+constexpr double kLeastTold = 0.5;     // of a picture's pixels: those below their full well
 constexpr double kMostSeconds = 40.0;  // for one setting of a curve
 constexpr double kEnough = 0.7;        // of the wanted error: what is better costs a multiple, and nobody asked for it
 constexpr std::array kSamples = {1, 4, 16, 64, 256};
 constexpr std::array kBandCounts = {1, 3, 8, 16};
 constexpr std::array kPixelsAnEdge = {2.5, 5.0, 10.0};
 constexpr double kFinestPixelsAnEdge = 20.0;
-constexpr std::array kEventSteps = {4.0, 2.0, 1.0, 0.5, 0.25};
-constexpr double kFinestEventStep = 0.125;
+constexpr std::array kEventSteps = {4.0, 2.0, 1.0, 0.5, 0.25, 0.125};
+constexpr int kFewestEventPixels = 16 * 16;
 constexpr double kSameEvent_us = 1000.0;
 
 std::int64_t pictures_of(const SceneRun& run) {
@@ -251,44 +252,76 @@ double event_difference(const std::vector<Event>& events, const std::vector<Even
   return static_cast<double>(wrong) / static_cast<double>(std::max<std::size_t>(1, truth.size()));
 }
 
+struct WatchedEvents {
+  std::vector<Event> events;
+  double seconds = 0.0;
+  std::int64_t pictures = 0;
+};
+
+WatchedEvents watch(sim::SceneSpec scene, const fem::Compliance& gel, double step) {
+  scene.light.event_step = step;
+  const sim::Plan plan = sim::make_plan(scene);
+  WatchedEvents watched;
+  const auto begun = Clock::now();
+  watched.pictures = sim::watch_events(scene, plan, gel, scene.seed, [&](std::span<const Event> more) {
+                       watched.events.insert(watched.events.end(), more.begin(), more.end());
+                     }).pictures;
+  watched.seconds = seconds_since(begun);
+  return watched;
+}
+
+/// A setting of each step, until one would take too long. The finest is what the others are held against.
+void watch_in_steps(const BenchParts& parts, sim::SceneSpec scene, const Progress& progress, BenchCurve& curve) {
+  // What the finest step takes with few pixels says how many may be had: for half of the limit, as it's a guess.
+  const sim::CameraSpec whole = *scene.device.camera;
+  scene.device.camera = middle_of(whole, kFewestEventPixels);
+  if (progress) progress("event step", 0, kEventSteps.size());
+  const double pilot_s = watch(scene, parts.own_gel, kEventSteps.back()).seconds;
+  const double pixels = kFewestEventPixels * std::max(1.0, 0.5 * kMostSeconds / pilot_s);
+  scene.device.camera = middle_of(whole, static_cast<int>(std::min(pixels, 1e9)));
+
+  std::vector<WatchedEvents> watched;
+  for (const double step : kEventSteps) {
+    BenchPoint point;
+    point.setting = fmt::format("light.event_step {}", step);
+    point.value = step;
+    point.as_is = step == sim::LightSpec{}.event_step;
+    if (watched.size() > 1 && 2.0 * watched.back().seconds > kMostSeconds) {
+      point.note = fmt::format("left out: it would take some {:.0f} s", 2.0 * watched.back().seconds);
+      curve.points.push_back(point);
+      break;
+    }
+    if (progress) progress("event step", static_cast<std::int64_t>(watched.size()), kEventSteps.size());
+    watched.push_back(watch(scene, parts.own_gel, step));
+    point.each_s = watched.back().seconds;
+    point.work = static_cast<double>(watched.back().pictures);
+    curve.points.push_back(point);
+  }
+  const std::vector<Event>& truth = watched.back().events;
+  for (std::size_t k = 0; k + 1 < watched.size(); ++k) {
+    curve.points[k].event_error = event_difference(watched[k].events, truth);
+  }
+  BenchPoint& finest = curve.points[watched.size() - 1];
+  finest.note = "the reference";
+  curve.what +=
+      fmt::format(" {} x {} pixels, {} events.", scene.device.camera->width, scene.device.camera->height, truth.size());
+}
+
 BenchCurve events_curve(const BenchParts& parts, const Progress& progress) {
   BenchCurve curve;
   curve.name = "event step";
   curve.what = fmt::format(
-      "What event pixels may change by from one picture to the next, as a part of the smallest threshold, against {}. "
-      "An event counts as wrong if it's missing, too many or more than {:.0f} us off.",
-      kFinestEventStep, kSameEvent_us);
+      "What event pixels may change by from one picture to the next, as a part of the smallest threshold, against the "
+      "finest here. An event counts as wrong if it's missing, too many or more than {:.0f} us off.",
+      kSameEvent_us);
   curve.each = "the whole press, s";
   curve.work = "pictures";
   sim::SceneSpec scene = bench_scene(parts.device, parts.presses, parts.presses.holds.front(), parts.settings.seed);
   scene.outputs = {};
   scene.outputs.frames = false;
   scene.outputs.events = true;
-  const auto watch = [&](double step, BenchPoint& point) {
-    scene.light.event_step = step;
-    const sim::Plan plan = sim::make_plan(scene);
-    std::vector<Event> events;
-    const auto begun = Clock::now();
-    const sim::EventStreamReport report =
-        sim::watch_events(scene, plan, parts.own_gel, parts.settings.seed,
-                          [&](std::span<const Event> more) { events.insert(events.end(), more.begin(), more.end()); });
-    point.each_s = seconds_since(begun);
-    point.work = static_cast<double>(report.pictures);
-    return events;
-  };
   try {
-    BenchPoint finest;
-    const std::vector<Event> truth = watch(kFinestEventStep, finest);
-    curve.what += fmt::format(" It has {} events and took {:.3g} s.", truth.size(), finest.each_s);
-    for (const double step : kEventSteps) {
-      if (progress) progress("event step", static_cast<std::int64_t>(curve.points.size()), kEventSteps.size());
-      BenchPoint point;
-      point.setting = fmt::format("light.event_step {}", step);
-      point.value = step;
-      point.event_error = event_difference(watch(step, point), truth);
-      point.as_is = step == sim::LightSpec{}.event_step;
-      curve.points.push_back(point);
-    }
+    watch_in_steps(parts, scene, progress, curve);
   } catch (const Error& error) {
     curve.what += fmt::format(" Can't be had: {}", error.what());
   }
@@ -360,14 +393,24 @@ TruePictures true_pictures(const BenchParts& parts, const sim::DeviceSpec& devic
 std::string prepare_pictures(BenchParts& parts) {
   if (!parts.device.camera) return "none: the device has no camera";
   const Hold& hold = parts.presses.holds.front();
+  std::string saturated;
   try {
     find_exact_effects(parts);
     parts.reference_paths = kPilotPaths;
     const TruePictures pilot = true_pictures(parts, parts.device, parts.own_gel, hold, parts.settings.seed + 10);
     // Each against the other as if that were true: half of the squares are either one's.
     const double noise = pixel_error(pilot.runs[0], {pilot.runs[1], pilot.runs[1]}, pilot.imager) / std::sqrt(2.0);
+    const double told_part = part_below_full_well(pilot.runs, pilot.imager);
+    if (told_part < kLeastTold) {
+      return fmt::format(
+          "none: {:.3g} % of the pixels are at their full well; a shorter camera.exposure_us tells them apart",
+          100.0 * (1.0 - told_part));
+    }
+    if (told_part < 1.0)
+      saturated = fmt::format("; {:.2g} % are at their full well and left out", 100.0 * (1.0 - told_part));
     const cv::Mat& picture = pilot.runs[0].electrons.front();
-    const double values = static_cast<double>(pilot.runs[0].electrons.size() * picture.total()) * picture.channels();
+    const double values =
+        told_part * static_cast<double>(pilot.runs[0].electrons.size() * picture.total()) * picture.channels();
     // A reference's noise is left in a mean over N values by its square over sqrt(N).
     const double left = std::pow(values, -0.25);
     const double told = kReferenceShare * parts.settings.pixel_error;
@@ -392,7 +435,8 @@ std::string prepare_pictures(BenchParts& parts) {
          fmt::format(
              ", of a pressed and a dragged state; {} paths a pixel for the reference{}, so that errors under {:.2g} "
              "aren't told from none",
-             parts.reference_paths, parts.exact_words, parts.least_pixel_error);
+             parts.reference_paths, parts.exact_words, parts.least_pixel_error) +
+         saturated;
 }
 
 double mesh_pixel_error(const BenchParts& parts, const sim::DeviceSpec& device, const fem::Compliance& gel) {

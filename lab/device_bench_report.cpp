@@ -163,8 +163,9 @@ std::string choice_in_words(const DeviceBench& bench) {
     text += fmt::format("| pixel error, of the imager's noise | {:.3g} | {:.3g} | {:.3g} |\n",
                         bench.settings.pixel_error, choice.verified_pixel, choice.as_is_pixel);
   }
-  text += fmt::format("| once, s | | {:.3g} | {:.3g} |\n| a frame, s | | {:.3g} | {:.3g} |\n\n", choice.once_s,
-                      choice.as_is_once_s, choice.frame_s, choice.as_is_frame_s);
+  text += fmt::format("| once, s | | {:.3g} | {:.3g} |\n| a frame, s{} | | {:.3g} | {:.3g} |\n\n", choice.once_s,
+                      choice.as_is_once_s, choice.by_middle ? " (from the middle, by the number of pixels)" : "",
+                      choice.frame_s, choice.as_is_frame_s);
   text += choice.holds ? "**It holds on them.**" : "**It doesn't hold on them.**";
   if (!choice.remark.empty()) text += " " + choice.remark;
   for (const std::string& round : choice.remark_rounds) text += fmt::format(" Before it, {}.", round);

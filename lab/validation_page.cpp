@@ -107,12 +107,12 @@ std::vector<std::string> header_lines(const PageHeader& header) {
 
 std::string plot_of(const ValidationRow& row) {
   LinePlot plot;
-  plot.title = row.id + ": " + row.title;
+  plot.title = row.id;
   plot.x_label = row.series->x_label;
   plot.y_label = row.series->y_label;
   plot.log_x = plot.log_y = row.series->logarithmic;
   plot.curves.push_back({"", row.series->points, false, row.series->joined});
-  return fmt::format("<figure>\n{}</figure>\n", to_svg(plot));
+  return fmt::format("<figure>\n{}<figcaption>{}</figcaption>\n</figure>\n", to_svg(plot), escape_markup(row.title));
 }
 
 /// One cell of a Markdown table: no line ends, pipes and markup escaped.

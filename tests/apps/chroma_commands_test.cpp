@@ -19,7 +19,7 @@ namespace touchstone {
 namespace {
 
 namespace fs = std::filesystem;
-using sensors::test::ColourPicture;
+using sensors::fixtures::ColourPicture;
 using test::ProgramRun;
 using test::run_program;
 using ::testing::AllOf;
@@ -29,15 +29,15 @@ constexpr const char* kHeader = "file,marker_column,marker_row,x_mm,y_mm,z_mm,se
 constexpr int kSide = 5;  // markers
 
 ColourPicture resting() {
-  ColourPicture picture = sensors::test::small_colour_picture(16.0);
+  ColourPicture picture = sensors::fixtures::small_colour_picture(16.0);
   picture.columns = picture.rows = kSide;
   return picture;
 }
 
 cv::Mat paint(const std::vector<Eigen::Vector3d>& displacements) {
   ColourPicture picture = resting();
-  sensors::test::displace(picture, displacements);
-  return sensors::test::paint_colour_markers(picture);
+  sensors::fixtures::displace(picture, displacements);
+  return sensors::fixtures::paint_colour_markers(picture);
 }
 
 std::vector<Eigen::Vector3d> all_by(const Eigen::Vector3d& displacement) {
@@ -87,7 +87,7 @@ class ChromaCommands : public ::testing::Test {
  protected:
   ChromaCommands() {
     for (const char* name : {"cal", "new"}) fs::create_directories(folder_.path() / name);
-    sim::write_png(folder_.path() / "rest.png", sensors::test::paint_colour_markers(resting()));
+    sim::write_png(folder_.path() / "rest.png", sensors::fixtures::paint_colour_markers(resting()));
     sim::write_png(folder_.path() / "grey.png", cv::Mat(168, 192, CV_8UC1, cv::Scalar(90)));
     sim::write_png(folder_.path() / "cal/grey.png", cv::Mat(168, 192, CV_8UC1, cv::Scalar(90)));
     sim::write_png(folder_.path() / "cal/small.png", cv::Mat(100, 120, CV_8UC3, cv::Scalar(90, 90, 200)));
@@ -160,7 +160,7 @@ TEST_F(ChromaCommands, RecordedFramesGiveDisplacements) {
 }
 
 TEST_F(ChromaCommands, WithAComplianceThereAreForces) {
-  const sensors::MarkerCompliance gel = sensors::test::half_space_markers(kSide, 9, 1.5);
+  const sensors::MarkerCompliance gel = sensors::fixtures::half_space_markers(kSide, 9, 1.5);
   sensors::save(gel, folder_.path() / "gel.compliance");
   Eigen::VectorXd tractions = Eigen::VectorXd::Zero(3 * gel.patches());
   double force = 0.0;
@@ -207,7 +207,7 @@ TEST_F(ChromaCommands, WithAComplianceThereAreForces) {
 }
 
 TEST_F(ChromaCommands, MarkersBeyondCalibrationTakeNoPartInForces) {
-  sensors::save(sensors::test::half_space_markers(kSide, 5, 3.0), folder_.path() / "gel.compliance");
+  sensors::save(sensors::fixtures::half_space_markers(kSide, 5, 3.0), folder_.path() / "gel.compliance");
   std::vector<Eigen::Vector3d> displacements = all_by(Eigen::Vector3d::Zero());
   displacements[12] = {0.0, -0.8, -0.4};  // sheared by 0.6 at the most in calibration
   sim::write_png(folder_.path() / "new/a.png", paint(displacements));
@@ -225,7 +225,7 @@ TEST_F(ChromaCommands, AMarkerMissingAtRestIsNamed) {
   ColourPicture picture = resting();
   picture.stretch.assign(picture.count(), 1.0);
   picture.stretch[11] = 0.0;
-  sim::write_png(folder_.path() / "without.png", sensors::test::paint_colour_markers(picture));
+  sim::write_png(folder_.path() / "without.png", sensors::fixtures::paint_colour_markers(picture));
   expect_refused(calibrate(kHeader + lines_, {}, "without.png"),
                  "table.csv:2: marker (1, 2) isn't sound in the picture at rest: missing");
 }
@@ -264,10 +264,10 @@ TEST_F(ChromaCommands, OtherMistakesAreRefused) {
   fs::copy(in("grey.png"), in("new/a.png"));
   expect_refused(estimate({}, "4x5"), "rest.png: coloured markers");
   expect_refused(estimate({"--compliance", in("rest.png")}), "rest.png");
-  sensors::save(sensors::test::half_space_markers(4, 4, 3.0), folder_.path() / "four.compliance");
+  sensors::save(sensors::fixtures::half_space_markers(4, 4, 3.0), folder_.path() / "four.compliance");
   expect_refused(estimate({"--compliance", in("four.compliance")}),
                  "a grid of 4 x 4 markers, the pictures are of 5 x 5");
-  sensors::MarkerCompliance wide = sensors::test::half_space_markers(kSide, 4, 3.0);
+  sensors::MarkerCompliance wide = sensors::fixtures::half_space_markers(kSide, 4, 3.0);
   for (Eigen::Vector3d& place : wide.marker_rest) place *= 1.5;
   sensors::save(wide, folder_.path() / "wide.compliance");
   expect_refused(estimate({"--compliance", in("wide.compliance")}), "4.500 mm apart, the model's 3.000 mm");

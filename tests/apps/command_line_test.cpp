@@ -231,6 +231,7 @@ TEST_F(BadInput, ResultsThatCantBeWrittenAreRefusedBeforeTheWork) {
   expect_refused(run_program({"generate", job_.string(), "-o", scene}), "isn't a folder");
   expect_refused(run_program({"validate", "light", "--page", "/nonexistent/a.html"}), "there is no folder");
   expect_refused(run_program({"validate", "light", "--page", "a.pdf"}), ".html");
+  expect_refused(run_program({"validate", "light", "-o", scene}), "scene.yaml");
   expect_refused(run_program({"validate", "light", "--date", "today"}), "--page");
   expect_refused(run_program({"generate", job_.string(), "-o", folder_.path().string()}), "isn't empty");
 }

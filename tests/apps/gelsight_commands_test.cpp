@@ -16,8 +16,8 @@ namespace touchstone {
 namespace {
 
 namespace fs = std::filesystem;
-using sensors::test::Ball;
-using sensors::test::GelPainter;
+using sensors::fixtures::Ball;
+using sensors::fixtures::GelPainter;
 using test::ProgramRun;
 using test::run_program;
 using ::testing::AllOf;

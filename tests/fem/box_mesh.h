@@ -6,7 +6,7 @@
 
 #include "fem/tet_mesh.h"
 
-namespace touchstone::fem::test {
+namespace touchstone::fem::fixtures {
 
 /// The box |x| <= size_x/2, |y| <= size_y/2, -size_z <= z <= 0 as nx * ny * nz boxes of six tetrahedra each. Inner
 /// vertices are pushed by up to `unevenness` times the spacing, each its own way, so that nothing is right by symmetry.
@@ -64,4 +64,4 @@ inline TetMesh box_mesh(const Eigen::Vector3d& size, int nx, int ny, int nz, dou
   return mesh;
 }
 
-}  // namespace touchstone::fem::test
+}  // namespace touchstone::fem::fixtures

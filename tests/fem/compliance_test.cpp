@@ -28,7 +28,7 @@ using Eigen::VectorXd;
 const ElasticMaterial kSoft{0.33, 0.49};
 
 TetMesh small_mesh() {
-  return test::box_mesh({3, 2, 1}, 4, 3, 2, 0.12);
+  return fixtures::box_mesh({3, 2, 1}, 4, 3, 2, 0.12);
 }
 std::vector<Bead> two_beads() {
   return {{{0.2, -0.1, -0.4}, 0.25}, {{-0.9, 0.5, -0.6}, 0.2}};
@@ -183,7 +183,7 @@ TEST(Compliance, UnitsDontMatter) {
 
 /// In the middle of a wide pad its sides are out of reach: a column under confined compression, and simple shear.
 TEST(Compliance, WidePadIsConfinedUnderPressureAndSheared) {
-  const TetMesh mesh = test::box_mesh({20, 20, 1}, 20, 20, 2);
+  const TetMesh mesh = fixtures::box_mesh({20, 20, 1}, 20, 20, 2);
   const std::vector<Bead> beads = {{{0.1, -0.05, -0.4}, 0.25}};
   const ElasticMaterial material{0.33, 0.3};
   const Compliance gel = compute_compliance(mesh, material, beads, 1.0);
@@ -222,8 +222,8 @@ TEST(Compliance, AgreesWithTheLayerKernel) {
   for (const double nu : {0.0, 0.3, 0.49}) {
     const ElasticMaterial material{0.33, nu};
     const Compliance gel = compute_compliance(mesh, material, {}, slab.thickness);
-    const double exact = test::gaussian_pressure_work(material, slab.thickness, 1.2);
-    EXPECT_NEAR(test::gaussian_work(gel, 1.2) / exact, 1.0, 0.01) << nu;
+    const double exact = fixtures::gaussian_pressure_work(material, slab.thickness, 1.2);
+    EXPECT_NEAR(fixtures::gaussian_work(gel, 1.2) / exact, 1.0, 0.01) << nu;
   }
 }
 

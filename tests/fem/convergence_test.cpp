@@ -58,7 +58,7 @@ struct Errors {
 };
 
 Errors errors_on(int cells, const ElasticMaterial& material) {
-  const TetMesh mesh = test::box_mesh({2, 2, 2}, cells, cells, cells, 0.1);
+  const TetMesh mesh = fixtures::box_mesh({2, 2, 2}, cells, cells, cells, 0.1);
   const TaylorHoodSpace space = make_space(mesh);
   const Exact exact{shear_modulus(material)};
   ElasticLoads loads;

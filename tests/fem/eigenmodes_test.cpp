@@ -22,7 +22,7 @@ constexpr double kModulus = 0.33;     // MPa
 
 /// A round column: the box mesh's square made a disc of `radius`.
 TetMesh column_mesh(double radius, double height, int across, int up) {
-  TetMesh mesh = test::box_mesh({2.0, 2.0, height}, across, across, up);
+  TetMesh mesh = fixtures::box_mesh({2.0, 2.0, height}, across, across, up);
   for (Eigen::Vector3d& x : mesh.vertices) {
     const double square_x = x.x() * x.x();
     const double square_y = x.y() * x.y();
@@ -89,7 +89,7 @@ Eigen::MatrixXd dense_mass(const TaylorHoodSpace& space) {
 }
 
 TEST(Eigenmodes, TheMassMatrixIntegratesQuadraticsExactly) {
-  const TetMesh mesh = test::box_mesh({2, 3, 1}, 2, 3, 2, 0.1);
+  const TetMesh mesh = fixtures::box_mesh({2, 3, 1}, 2, 3, 2, 0.1);
   const TaylorHoodSpace space = make_space(mesh);
   const Eigen::SparseMatrix<double> mass = volume_mass(space);
   Eigen::VectorXd square(space.nodes);
@@ -102,7 +102,7 @@ TEST(Eigenmodes, TheMassMatrixIntegratesQuadraticsExactly) {
 
 // All of it by dense algebra, on a mesh whose symmetry makes pairs of equal frequencies.
 TEST(Eigenmodes, AreThoseOfDenseAlgebraAndNoneIsMissing) {
-  const TetMesh mesh = test::box_mesh({3, 3, 1}, 3, 3, 2);
+  const TetMesh mesh = fixtures::box_mesh({3, 3, 1}, 3, 3, 2);
   const TaylorHoodSpace space = make_space(mesh);
   for (const double nu : {0.0, 0.3, 0.499}) {
     const ElasticMaterial material{kModulus, nu};
@@ -117,7 +117,7 @@ TEST(Eigenmodes, AreThoseOfDenseAlgebraAndNoneIsMissing) {
 }
 
 TEST(Eigenmodes, ModesAreOrthogonalInMassAndStiffness) {
-  const TetMesh mesh = test::box_mesh({3, 2, 1}, 3, 2, 2, 0.15);
+  const TetMesh mesh = fixtures::box_mesh({3, 2, 1}, 3, 2, 2, 0.15);
   const TaylorHoodSpace space = make_space(mesh);
   const ElasticMaterial material{kModulus, 0.45};
   const Eigenmodes modes = lowest_eigenmodes(space, material, kDensity, 12);
@@ -140,7 +140,7 @@ TEST(Eigenmodes, ModesAreOrthogonalInMassAndStiffness) {
 
 // At nu = 0 a block's motion along z alone is exact whatever its width: f = (2 k - 1) sqrt(E / rho) / (4 h).
 TEST(Eigenmodes, ABlockWithoutPoissonsRatioHasTheThicknessModeOfALayer) {
-  const TetMesh mesh = test::box_mesh({4, 4, 5}, 3, 3, 5, 0.1);
+  const TetMesh mesh = fixtures::box_mesh({4, 4, 5}, 3, 3, 5, 0.1);
   const TaylorHoodSpace space = make_space(mesh);
   const Eigenmodes modes = lowest_eigenmodes(space, {kModulus, 0.0}, kDensity, 12);
   const double wanted = std::sqrt(kModulus / kDensity) / 20.0;
@@ -168,7 +168,7 @@ TEST(Eigenmodes, FrequenciesConvergeWithTheFourthOrder) {
   std::vector<double> errors;
   const double wanted = 3.0 * std::sqrt(kModulus / kDensity) / 20.0;  // the second thickness mode at nu = 0
   for (const int cells : {2, 4}) {
-    const TetMesh mesh = test::box_mesh({1, 1, 5}, 1, 1, cells);
+    const TetMesh mesh = fixtures::box_mesh({1, 1, 5}, 1, 1, cells);
     const TaylorHoodSpace space = make_space(mesh);
     const Eigenmodes modes = lowest_eigenmodes(space, {kModulus, 0.0}, kDensity, 15);
     double nearest = std::numeric_limits<double>::infinity();
@@ -182,7 +182,7 @@ TEST(Eigenmodes, FrequenciesConvergeWithTheFourthOrder) {
 }
 
 TEST(Eigenmodes, AnIncompressibleGelHasTheFrequenciesOfANearlyIncompressibleOne) {
-  const TetMesh mesh = test::box_mesh({4, 4, 2}, 4, 4, 2, 0.1);
+  const TetMesh mesh = fixtures::box_mesh({4, 4, 2}, 4, 4, 2, 0.1);
   const TaylorHoodSpace space = make_space(mesh);
   const Eigenmodes limit = lowest_eigenmodes(space, {kModulus, 0.5}, kDensity, 10);
   const Eigenmodes near = lowest_eigenmodes(space, {kModulus, 0.4999}, kDensity, 10);
@@ -192,7 +192,7 @@ TEST(Eigenmodes, AnIncompressibleGelHasTheFrequenciesOfANearlyIncompressibleOne)
 }
 
 TEST(Eigenmodes, FrequenciesScaleWithModulusDensityAndLength) {
-  const TetMesh mesh = test::box_mesh({3, 2, 1}, 3, 2, 1);
+  const TetMesh mesh = fixtures::box_mesh({3, 2, 1}, 3, 2, 1);
   TetMesh large = mesh;
   for (Eigen::Vector3d& x : large.vertices) x *= 1000.0;
   const double one = lowest_eigenmodes(make_space(mesh), {kModulus, 0.4}, kDensity, 1).angular_frequency[0];
@@ -205,7 +205,7 @@ TEST(Eigenmodes, AColumnOfTwoMaterialsSwingsAsTheWaveEquationSays) {
   // Along its axis at nu = 0: clamped below with modulus E1 to h1, E2 above with its end free, so
   // tan(k1 h1) tan(k2 h2) = sqrt(E1 / E2) with k = omega sqrt(rho / E).
   constexpr double kLower = 0.2, kUpper = 1.4, kLowerHeight = 2.0, kUpperHeight = 1.0;
-  TetMesh mesh = test::box_mesh({2.0, 2.0, kLowerHeight + kUpperHeight}, 2, 2, 6);
+  TetMesh mesh = fixtures::box_mesh({2.0, 2.0, kLowerHeight + kUpperHeight}, 2, 2, 6);
   for (const auto& tetrahedron : mesh.tetrahedra) {
     double middle = 0.0;
     for (const int v : tetrahedron) middle += mesh.vertices[v].z() / 4.0;
@@ -237,7 +237,7 @@ TEST(Eigenmodes, AColumnOfTwoMaterialsSwingsAsTheWaveEquationSays) {
 }
 
 TEST(Eigenmodes, WhatIsHeldDoesntMoveAndStiffens) {
-  const TetMesh mesh = test::box_mesh({4, 4, 2}, 4, 4, 2);
+  const TetMesh mesh = fixtures::box_mesh({4, 4, 2}, 4, 4, 2);
   const TaylorHoodSpace space = make_space(mesh);
   const ElasticMaterial material{kModulus, 0.5};
   const OuterSurface surface = outer_surface(mesh);
@@ -260,14 +260,14 @@ TEST(Eigenmodes, WhatIsHeldDoesntMoveAndStiffens) {
 }
 
 TEST(Eigenmodes, TheSameInputGivesTheSameBytes) {
-  const TetMesh mesh = test::box_mesh({3, 3, 1}, 3, 3, 1);
+  const TetMesh mesh = fixtures::box_mesh({3, 3, 1}, 3, 3, 1);
   const TaylorHoodSpace space = make_space(mesh);
   EXPECT_EQ(lowest_eigenmodes(space, {kModulus, 0.49}, kDensity, 5).displacement,
             lowest_eigenmodes(space, {kModulus, 0.49}, kDensity, 5).displacement);
 }
 
 TEST(Eigenmodes, BadInputIsRefused) {
-  const TetMesh mesh = test::box_mesh({1, 1, 1}, 1, 1, 1);
+  const TetMesh mesh = fixtures::box_mesh({1, 1, 1}, 1, 1, 1);
   const TaylorHoodSpace space = make_space(mesh);
   const double nan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_THROW(lowest_eigenmodes(space, {kModulus, 0.51}, kDensity, 1), Error);

@@ -17,7 +17,7 @@ TEST(ElasticMaterial, ModuliFollowFromYoungAndPoisson) {
 }
 
 TEST(ElasticMaterial, IncompressibleIsLegalAndFinite) {
-  EXPECT_NO_THROW(check({1.0, 0.5}));
+  EXPECT_NO_THROW(check(ElasticMaterial{1.0, 0.5}));
   EXPECT_EQ(lame_ratio({1.0, 0.5}), lame_ratio({1.0, kLargestPoissonRatio}));
   EXPECT_LT(lame_ratio({1.0, 0.5}), 1e8);
 }

@@ -19,7 +19,7 @@ constexpr double kThickness = 1.0;
 Compliance body(Element element, double poisson_ratio, int cells = 3) {
   const std::vector<ElasticMaterial> materials = {{0.33, poisson_ratio}};
   const std::vector<Bead> beads = {{{0.2, -0.1, -0.4}, 0.25}};
-  return compute_compliance(test::box_mesh({3, 2, kThickness}, 3 * cells / 2, cells, cells, 0.12), materials, beads,
+  return compute_compliance(fixtures::box_mesh({3, 2, kThickness}, 3 * cells / 2, cells, cells, 0.12), materials, beads,
                             kThickness, element);
 }
 

@@ -11,7 +11,7 @@ namespace touchstone::fem {
 namespace {
 
 TEST(EliminationOrder, HoldsEachUnknownOnce) {
-  const TetMesh mesh = test::box_mesh({3, 2, 1}, 5, 4, 3, 0.1);
+  const TetMesh mesh = fixtures::box_mesh({3, 2, 1}, 5, 4, 3, 0.1);
   const TaylorHoodSpace space = make_space(mesh);
   std::vector<int> order = elimination_order(space);
   std::sort(order.begin(), order.end());
@@ -21,7 +21,7 @@ TEST(EliminationOrder, HoldsEachUnknownOnce) {
 }
 
 TEST(EliminationOrder, BranchesOfTheTreeDontMeet) {
-  const TetMesh mesh = test::box_mesh({3, 2, 1}, 6, 5, 3, 0.1);
+  const TetMesh mesh = fixtures::box_mesh({3, 2, 1}, 6, 5, 3, 0.1);
   const TaylorHoodSpace space = make_space(mesh);
   const EliminationTree tree = elimination_tree(space);
   ASSERT_EQ(tree.end.size(), tree.parent.size());
@@ -41,7 +41,7 @@ TEST(EliminationOrder, BranchesOfTheTreeDontMeet) {
 }
 
 TEST(EliminationOrder, FillsLessThanTheMeshsOwnOrder) {
-  const TetMesh mesh = test::box_mesh({3, 3, 1}, 8, 8, 3);
+  const TetMesh mesh = fixtures::box_mesh({3, 3, 1}, 8, 8, 3);
   const TaylorHoodSpace space = make_space(mesh);
   const SymmetricEntries matrix = assemble(space, make_scales(mesh, {1.0, 0.49}));
   std::vector<int> own(space.unknowns);
@@ -54,7 +54,7 @@ TEST(EliminationOrder, FillsLessThanTheMeshsOwnOrder) {
 }
 
 TEST(EliminationOrder, SurvivesAMeshOnALine) {
-  const TetMesh mesh = test::box_mesh({30, 1, 1}, 60, 1, 1);
+  const TetMesh mesh = fixtures::box_mesh({30, 1, 1}, 60, 1, 1);
   const TaylorHoodSpace space = make_space(mesh);
   EXPECT_EQ(static_cast<int>(elimination_order(space).size()), space.unknowns);
 }

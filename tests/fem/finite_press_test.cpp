@@ -25,7 +25,7 @@ const std::vector<ElasticMaterial> kSoft = {{0.33, 0.49}};
 const std::vector<ElasticMaterial> kIncompressible = {{0.33, 0.5}};
 
 TetMesh pad(int cells = 8) {
-  return test::box_mesh({8, 8, kThickness}, cells, cells, cells / 2);
+  return fixtures::box_mesh({8, 8, kThickness}, cells, cells, cells / 2);
 }
 
 const FiniteGel& soft_gel() {

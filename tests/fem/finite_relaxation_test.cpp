@@ -17,7 +17,8 @@ constexpr double kRadius = 5.0;
 const PronySeries kSeries = {{0.2, 0.1}, {0.3, 2.0}};
 
 const FiniteGel& gel() {
-  static const FiniteGel made(test::box_mesh({8, 8, 3}, 6, 6, 3), std::vector<ElasticMaterial>{{0.33, 0.49}}, {}, 3.0);
+  static const FiniteGel made(fixtures::box_mesh({8, 8, 3}, 6, 6, 3), std::vector<ElasticMaterial>{{0.33, 0.49}}, {},
+                              3.0);
   return made;
 }
 

@@ -51,7 +51,7 @@ double largest_error(const TaylorHoodSpace& space, const ElasticSolution& soluti
 }
 
 TEST(FiniteStrain, PatchTestAtLargeDeformation) {
-  TetMesh mesh = test::box_mesh({3, 2, 1.5}, 3, 2, 2, 0.15);
+  TetMesh mesh = fixtures::box_mesh({3, 2, 1.5}, 3, 2, 2, 0.15);
   // Held all round but for the top: with its sides free too, a block under dead loads buckles on the way.
   mesh.bonded.clear();
   for (const auto& face : boundary_faces(mesh)) {
@@ -94,7 +94,7 @@ TEST(FiniteStrain, PatchTestAtLargeDeformation) {
 }
 
 TEST(FiniteStrain, RigidMotionCausesNoForce) {
-  const TetMesh mesh = test::box_mesh({3, 2, 1.5}, 2, 2, 2, 0.15);
+  const TetMesh mesh = fixtures::box_mesh({3, 2, 1.5}, 2, 2, 2, 0.15);
   const TaylorHoodSpace space = make_space(mesh);
   const FiniteStrain problem(space, {kYoung, 0.5});
   const Matrix3d turn = Eigen::AngleAxisd(2.0, Vector3d(1, -2, 0.5).normalized()).toRotationMatrix();
@@ -122,7 +122,7 @@ ElasticSolution some_state(const FiniteStrain& problem) {
 }
 
 TEST(FiniteStrain, ResidualIsTheEnergysDerivativeAndTangentTheResiduals) {
-  const TetMesh mesh = test::box_mesh({3, 2, 1.5}, 2, 2, 1, 0.15);
+  const TetMesh mesh = fixtures::box_mesh({3, 2, 1.5}, 2, 2, 1, 0.15);
   const TaylorHoodSpace space = make_space(mesh);
   for (const double nu : {0.2, 0.5}) {
     const FiniteStrain problem(space, {kYoung, nu});
@@ -166,7 +166,7 @@ TEST(FiniteStrain, ResidualIsTheEnergysDerivativeAndTangentTheResiduals) {
 
 /// The tangent at rest is the linear system: the same entries, but for the rules' rounding.
 TEST(FiniteStrain, TangentAtRestIsTheLinearSystem) {
-  const TetMesh mesh = test::box_mesh({3, 2, 1.5}, 2, 2, 2, 0.15);
+  const TetMesh mesh = fixtures::box_mesh({3, 2, 1.5}, 2, 2, 2, 0.15);
   const TaylorHoodSpace space = make_space(mesh);
   for (const double nu : {0.0, 0.3, 0.5}) {
     const FiniteStrain problem(space, {kYoung, nu});
@@ -193,7 +193,7 @@ ElasticLoads patch_of_traction(double size) {
 }
 
 TEST(FiniteStrain, EqualsLinearElasticityForSmallLoads) {
-  const TetMesh mesh = test::box_mesh({3, 3, 1}, 6, 6, 2, 0.1);
+  const TetMesh mesh = fixtures::box_mesh({3, 3, 1}, 6, 6, 2, 0.1);
   const TaylorHoodSpace space = make_space(mesh);
   double before = 0.0;
   for (const double load : {1e-2, 1e-3, 1e-4}) {
@@ -209,7 +209,7 @@ TEST(FiniteStrain, EqualsLinearElasticityForSmallLoads) {
 }
 
 TEST(FiniteStrain, NewtonConvergesQuadratically) {
-  const TetMesh mesh = test::box_mesh({3, 3, 1}, 6, 6, 2, 0.1);
+  const TetMesh mesh = fixtures::box_mesh({3, 3, 1}, 6, 6, 2, 0.1);
   const TaylorHoodSpace space = make_space(mesh);
   FiniteStrainEffort effort;
   solve_finite_strain(space, {kYoung, 0.5}, patch_of_traction(0.15), &effort);
@@ -230,7 +230,7 @@ TEST(FiniteStrain, NewtonConvergesQuadratically) {
 
 /// The work of a slowly growing dead load is the energy stored (trapezoidal rule, second order in the step).
 TEST(FiniteStrain, WorkOfTheLoadIsTheStoredEnergy) {
-  const TetMesh mesh = test::box_mesh({3, 3, 1}, 4, 4, 2, 0.1);
+  const TetMesh mesh = fixtures::box_mesh({3, 3, 1}, 4, 4, 2, 0.1);
   const TaylorHoodSpace space = make_space(mesh);
   const ElasticMaterial material{kYoung, 0.49};
   const FiniteStrain problem(space, material);
@@ -259,7 +259,7 @@ TEST(FiniteStrain, WorkOfTheLoadIsTheStoredEnergy) {
 
 /// A block between lubricated plates, incompressible: force per undeformed area G (l - 1/l^2).
 TEST(FiniteStrain, ALubricatedBlockHasItsClosedForm) {
-  const TetMesh mesh = test::box_mesh({2, 2, 1.5}, 2, 2, 2, 0.15);
+  const TetMesh mesh = fixtures::box_mesh({2, 2, 1.5}, 2, 2, 2, 0.15);
   const TaylorHoodSpace space = make_space(mesh);
   const ElasticMaterial material{kYoung, 0.5};
   for (const double stretch : {0.6, 0.8, 1.4}) {
@@ -281,7 +281,7 @@ TEST(FiniteStrain, ALubricatedBlockHasItsClosedForm) {
 /// A bent and stretched block with the body force that it needs, as the mesh becomes finer: third order in u's L2 norm,
 /// second in p's.
 double manufactured_error(int cells, double& pressure_error) {
-  const TetMesh mesh = test::box_mesh({1, 1, 1}, cells, cells, cells, 0.1);
+  const TetMesh mesh = fixtures::box_mesh({1, 1, 1}, cells, cells, cells, 0.1);
   const TaylorHoodSpace space = make_space(mesh);
   const ElasticMaterial material{kYoung, 0.4};
   const double shear = shear_modulus(material);
@@ -344,7 +344,7 @@ TEST(FiniteStrain, ManufacturedSolutionConvergesAtTheElementsOrder) {
 }
 
 TEST(FiniteStrain, AnImpossibleLoadEndsInAClearError) {
-  const TetMesh mesh = test::box_mesh({2, 2, 1}, 2, 2, 1, 0.1);
+  const TetMesh mesh = fixtures::box_mesh({2, 2, 1}, 2, 2, 1, 0.1);
   const TaylorHoodSpace space = make_space(mesh);
   ElasticLoads loads;
   loads.bonded_displacement = [](const Vector3d& x) -> Vector3d { return {-1.5 * x.x(), 0.0, 0.0}; };  // mirrored

@@ -7,7 +7,7 @@
 #include "fem/compliance.h"
 #include "fem/quadrature.h"
 
-namespace touchstone::fem::test {
+namespace touchstone::fem::fixtures {
 
 /// Work of the pressure exp(-r^2 / (2 s^2)), projected onto the surface's hats, over the displacement it causes.
 inline double gaussian_work(const Compliance& gel, double s) {
@@ -34,4 +34,4 @@ inline double gaussian_work(const Compliance& gel, double s) {
   return traction.dot(gel.surface.view() * traction);
 }
 
-}  // namespace touchstone::fem::test
+}  // namespace touchstone::fem::fixtures

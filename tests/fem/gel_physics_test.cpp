@@ -74,7 +74,7 @@ class CoatedSlab : public testing::TestWithParam<Coating> {
 
 TEST_P(CoatedSlab, MeetsTheKernelOfALayeredHalfSpaceUnderAGaussianPressure) {
   const double wanted = gaussian_work_on(reference(), 1.0);
-  EXPECT_NEAR(test::gaussian_work(gel(), 1.0), wanted, 0.003 * wanted);
+  EXPECT_NEAR(fixtures::gaussian_work(gel(), 1.0), wanted, 0.003 * wanted);
 }
 
 INSTANTIATE_TEST_SUITE_P(Coatings, CoatedSlab,

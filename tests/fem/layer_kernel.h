@@ -5,7 +5,7 @@
 
 #include "fem/elastic_material.h"
 
-namespace touchstone::fem::test {
+namespace touchstone::fem::fixtures {
 
 /// Normal displacement over normal pressure on the face of an infinite bonded layer, frictionless, at wave number q
 /// over the thickness; relative to the half space (DESIGN.md, layer kernel).
@@ -33,4 +33,4 @@ inline double gaussian_pressure_work(const ElasticMaterial& material, double thi
   return 4.0 * std::numbers::pi * (1.0 - nu * nu) / material.youngs_modulus * std::pow(s, 4) * integral;
 }
 
-}  // namespace touchstone::fem::test
+}  // namespace touchstone::fem::fixtures

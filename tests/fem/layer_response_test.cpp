@@ -33,7 +33,7 @@ std::vector<double> answer(const LayerResponse& layer, const std::vector<double>
 TEST(LayerKernel, EqualsItsFormulaWhereThatIsStable) {
   for (const double nu : {0.0, 0.2, 0.3, 0.45, 0.49}) {
     for (const double q : {0.3, 0.9, 1.0, 1.1, 2.0, 5.0, 15.0}) {
-      const double expected = test::layer_kernel(q, nu);
+      const double expected = fixtures::layer_kernel(q, nu);
       EXPECT_NEAR(layer_over_half_space(nu, q), expected, 1e-12) << nu << " " << q;
       EXPECT_NEAR(layer_less_half_space(nu, q), expected - 1.0, 1e-12) << nu << " " << q;
     }

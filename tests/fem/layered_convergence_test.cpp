@@ -67,7 +67,7 @@ struct Errors {
 };
 
 Errors errors_on(int cells, const std::vector<ElasticMaterial>& materials) {
-  TetMesh mesh = test::box_mesh({2, 2, 2}, cells, cells, cells, 0.1);
+  TetMesh mesh = fixtures::box_mesh({2, 2, 2}, cells, cells, cells, 0.1);
   const int plane = (cells + 1) * (cells + 1);
   for (int v = cells / 2 * plane; v < (cells / 2 + 1) * plane; ++v) mesh.vertices[v].z() = -1.0;
   for (const auto& tetrahedron : mesh.tetrahedra) {

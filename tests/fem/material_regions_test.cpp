@@ -23,7 +23,7 @@ using ::testing::HasSubstr;
 
 /// An uneven box whose upper `layers` rows of cells are region 1, parted from the rest by a plane.
 TetMesh two_layers(const Vector3d& size, int nx, int ny, int nz, int layers) {
-  TetMesh mesh = test::box_mesh(size, nx, ny, nz, 0.12);
+  TetMesh mesh = fixtures::box_mesh(size, nx, ny, nz, 0.12);
   const int first = (nz - layers) * (nx + 1) * (ny + 1);
   const double plane = -size.z() * layers / nz;
   for (int v = first; v < first + (nx + 1) * (ny + 1); ++v) mesh.vertices[v].z() = plane;

@@ -56,7 +56,7 @@ struct Gel {
   int last = 0;
 
   explicit Gel(double poisson_ratio, int cells = 6)
-      : mesh(test::box_mesh({3, 3, 1}, cells, cells, 3, 0.05)), space(make_space(mesh)) {
+      : mesh(fixtures::box_mesh({3, 3, 1}, cells, cells, 3, 0.05)), space(make_space(mesh)) {
     matrix = assemble(space, make_scales(mesh, {1.0, poisson_ratio}));
     for (int vertex = 0; vertex < space.vertices; ++vertex) {
       if (space.clamped[vertex] || std::abs(mesh.vertices[vertex].z()) > 1e-9) continue;

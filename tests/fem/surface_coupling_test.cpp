@@ -15,7 +15,7 @@ namespace {
 using Eigen::Vector3d;
 
 TEST(SurfaceCoupling, IntegratesQuadraticFieldsExactly) {
-  const TetMesh mesh = test::box_mesh({3, 2, 1}, 3, 2, 1, 0.15);
+  const TetMesh mesh = fixtures::box_mesh({3, 2, 1}, 3, 2, 1, 0.15);
   const TaylorHoodSpace space = make_space(mesh);
   const OuterSurface surface = outer_surface(mesh);
   Eigen::VectorXd field(space.nodes);
@@ -34,7 +34,7 @@ TEST(SurfaceCoupling, IntegratesQuadraticFieldsExactly) {
 }
 
 TEST(SurfaceCoupling, AgreesWithTheMassOnLinearFields) {
-  const TetMesh mesh = test::box_mesh({3, 2, 1}, 3, 2, 1, 0.15);
+  const TetMesh mesh = fixtures::box_mesh({3, 2, 1}, 3, 2, 1, 0.15);
   const TaylorHoodSpace space = make_space(mesh);
   const OuterSurface surface = outer_surface(mesh);
   Eigen::VectorXd field(space.nodes);
@@ -52,7 +52,7 @@ TEST(SurfaceCoupling, AgreesWithTheMassOnLinearFields) {
 }
 
 TEST(BeadMeans, OfAQuadraticFieldIsItsCentreAndASixthOfItsLaplacian) {
-  const TetMesh mesh = test::box_mesh({3, 2, 1}, 4, 3, 2, 0.15);
+  const TetMesh mesh = fixtures::box_mesh({3, 2, 1}, 4, 3, 2, 0.15);
   const TaylorHoodSpace space = make_space(mesh);
   Eigen::VectorXd field(space.nodes);
   for (int node = 0; node < space.nodes; ++node) {
@@ -69,7 +69,7 @@ TEST(BeadMeans, OfAQuadraticFieldIsItsCentreAndASixthOfItsLaplacian) {
 }
 
 TEST(BeadMeans, BeadMustBeWhollyInside) {
-  const TetMesh mesh = test::box_mesh({3, 2, 1}, 4, 3, 2);
+  const TetMesh mesh = fixtures::box_mesh({3, 2, 1}, 4, 3, 2);
   const TaylorHoodSpace space = make_space(mesh);
   const double nan = std::numeric_limits<double>::quiet_NaN();
   for (const Bead& bad : {Bead{{0, 0, -0.2}, 0.25},    // through the outer face

@@ -38,7 +38,7 @@ Matrix3d some_gradient(double nu) {
 }
 
 TEST(TaylorHood, PatchTest) {
-  const TetMesh mesh = test::box_mesh({3, 2, 1.5}, 3, 3, 2, 0.15);
+  const TetMesh mesh = fixtures::box_mesh({3, 2, 1.5}, 3, 3, 2, 0.15);
   const TaylorHoodSpace space = make_space(mesh);
   for (const double nu : {0.0, 0.05, 0.3, 0.49, 0.4999, 0.5}) {
     const ElasticMaterial material{0.33, nu};
@@ -64,7 +64,7 @@ TEST(TaylorHood, PatchTest) {
 }
 
 TEST(TaylorHood, PatchTestHoldsOnSlivers) {
-  TetMesh mesh = test::box_mesh({3, 2, 1.5}, 3, 3, 3);
+  TetMesh mesh = fixtures::box_mesh({3, 2, 1.5}, 3, 3, 3);
   // An inner vertex moved to nearly the plane of its neighbours flattens the elements below it.
   const int inner = (1 * 4 + 1) * 4 + 1;
   mesh.vertices[inner].z() = mesh.vertices[inner].z() + 0.499;
@@ -83,7 +83,7 @@ TEST(TaylorHood, PatchTestHoldsOnSlivers) {
 }
 
 TEST(TaylorHood, RigidMotionCausesNoStress) {
-  const TetMesh mesh = test::box_mesh({3, 2, 1.5}, 3, 2, 2, 0.15);
+  const TetMesh mesh = fixtures::box_mesh({3, 2, 1.5}, 3, 2, 2, 0.15);
   const TaylorHoodSpace space = make_space(mesh);
   for (const double nu : {0.0, 0.3, 0.5}) {
     const ElasticMaterial material{0.33, nu};
@@ -102,7 +102,7 @@ TEST(TaylorHood, RigidMotionCausesNoStress) {
 
 /// u = (z^2, 0, 0), p = 2 G x is in equilibrium without body force at nu = 0.5, and in the element's space.
 TEST(TaylorHood, QuadraticFieldWithLinearPressureIsReproduced) {
-  const TetMesh mesh = test::box_mesh({3, 2, 1.5}, 3, 2, 2, 0.15);
+  const TetMesh mesh = fixtures::box_mesh({3, 2, 1.5}, 3, 2, 2, 0.15);
   const TaylorHoodSpace space = make_space(mesh);
   const ElasticMaterial material{0.33, 0.5};
   const double shear = shear_modulus(material);
@@ -131,7 +131,7 @@ ElasticSolution pressed_patch(const TaylorHoodSpace& space, double nu) {
 }
 
 TEST(TaylorHood, IncompressibleEqualsItsNeighbours) {
-  const TetMesh mesh = test::box_mesh({3, 3, 1}, 6, 6, 2, 0.1);
+  const TetMesh mesh = fixtures::box_mesh({3, 3, 1}, 6, 6, 2, 0.1);
   const TaylorHoodSpace space = make_space(mesh);
   const ElasticSolution limit = pressed_patch(space, 0.5);
   const double size = limit.displacement.cwiseAbs().maxCoeff();
@@ -140,7 +140,7 @@ TEST(TaylorHood, IncompressibleEqualsItsNeighbours) {
 }
 
 TEST(TaylorHood, SweepOfPoissonsRatioIsSmoothAndDoesntLock) {
-  const TetMesh mesh = test::box_mesh({3, 3, 1}, 6, 6, 2, 0.1);
+  const TetMesh mesh = fixtures::box_mesh({3, 3, 1}, 6, 6, 2, 0.1);
   const TaylorHoodSpace space = make_space(mesh);
   const auto work = [&](double nu) {  // stands for the compliance under the patch
     const ElasticSolution solution = pressed_patch(space, nu);
@@ -163,7 +163,7 @@ TEST(TaylorHood, SweepOfPoissonsRatioIsSmoothAndDoesntLock) {
 }
 
 TEST(TaylorHood, SameMatrixHoweverManyThreads) {
-  const TetMesh mesh = test::box_mesh({3, 2, 1}, 4, 3, 2, 0.1);
+  const TetMesh mesh = fixtures::box_mesh({3, 2, 1}, 4, 3, 2, 0.1);
   const TaylorHoodSpace space = make_space(mesh);
   const Scales scales = make_scales(mesh, {1.0, 0.4});
   const SymmetricEntries first = assemble(space, scales);
@@ -176,7 +176,7 @@ TEST(TaylorHood, SameMatrixHoweverManyThreads) {
 }
 
 TEST(TaylorHood, UnfitMeshIsRefusedByName) {
-  TetMesh mesh = test::box_mesh({1, 1, 1}, 1, 1, 1);
+  TetMesh mesh = fixtures::box_mesh({1, 1, 1}, 1, 1, 1);
   mesh.vertices[0].x() = std::numeric_limits<double>::quiet_NaN();
   try {
     make_space(mesh);

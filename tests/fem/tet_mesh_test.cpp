@@ -30,7 +30,7 @@ TetMesh regular_tetrahedron() {
 }
 
 TEST(TetMesh, BoxHasItsVolumeAndItsSurface) {
-  const TetMesh mesh = test::box_mesh({2, 3, 4}, 3, 2, 4, 0.1);
+  const TetMesh mesh = fixtures::box_mesh({2, 3, 4}, 3, 2, 4, 0.1);
   double total = 0.0;
   for (const auto& tetrahedron : mesh.tetrahedra) {
     total += volume(mesh, tetrahedron);
@@ -59,7 +59,7 @@ TEST(TetMesh, SliverIsReportedByItsSmallestAngle) {
 }
 
 TEST(TetMesh, EachFaultIsNamed) {
-  const TetMesh good = test::box_mesh({1, 1, 1}, 1, 1, 1);
+  const TetMesh good = fixtures::box_mesh({1, 1, 1}, 1, 1, 1);
   ASSERT_EQ(fault_of(good), "");
   TetMesh bad = good;
   bad.vertices[3].y() = std::numeric_limits<double>::quiet_NaN();
@@ -99,7 +99,7 @@ TEST(TetMesh, EachFaultIsNamed) {
 }
 
 TEST(TetMesh, PieceThatIsntBondedIsRefused) {
-  TetMesh mesh = test::box_mesh({1, 1, 1}, 1, 1, 1);
+  TetMesh mesh = fixtures::box_mesh({1, 1, 1}, 1, 1, 1);
   const TetMesh other = mesh;
   const int offset = static_cast<int>(mesh.vertices.size());
   for (const auto& vertex : other.vertices) {

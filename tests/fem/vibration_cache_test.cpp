@@ -26,7 +26,7 @@ Made made(const touchstone::test::TemporaryFolder& folder, const std::string& ke
   Made result;
   const auto mesh = [&] {
     ++result.meshes;
-    return test::box_mesh({2, 2, 1}, 2, 2, 1);
+    return fixtures::box_mesh({2, 2, 1}, 2, 2, 1);
   };
   result.vibration = cached_vibration(key, mesh, {&kMaterial, 1}, {&kBead, 1}, kDensity, kCount, folder.path());
   return result;
@@ -76,7 +76,7 @@ TEST(VibrationCache, AFileThatIsTruncatedOrChangedIsNeverUsed) {
 TEST(VibrationCache, WithoutAFolderNothingIsKept) {
   const GelVibration vibration = cached_vibration("key",
                                                   [] {
-                                                    return test::box_mesh({2, 2, 1}, 2, 2, 1);
+                                                    return fixtures::box_mesh({2, 2, 1}, 2, 2, 1);
                                                   },
                                                   {&kMaterial, 1}, {}, kDensity, kCount, {});
   EXPECT_EQ(vibration.note, "");

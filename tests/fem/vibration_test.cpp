@@ -46,13 +46,13 @@ struct Gel {
 };
 
 const Gel& small_gel() {
-  static const Gel gel(test::box_mesh({3, 3, 2}, 3, 3, 2, 0.1), 0.45, {0.2, 0.1, -0.6}, 0.3);
+  static const Gel gel(fixtures::box_mesh({3, 3, 2}, 3, 3, 2, 0.1), 0.45, {0.2, 0.1, -0.6}, 0.3);
   return gel;
 }
 
 /// A column that Poisson's ratio doesn't narrow: everything is a function of z alone.
 const Gel& column() {
-  static const Gel gel(test::box_mesh({2, 2, 5}, 2, 2, 6, 0.1), 0.0, {0.0, 0.0, -2.0}, 0.5);
+  static const Gel gel(fixtures::box_mesh({2, 2, 5}, 2, 2, 6, 0.1), 0.0, {0.0, 0.0, -2.0}, 0.5);
   return gel;
 }
 
@@ -255,7 +255,7 @@ TEST(Vibration, ModesAddUpToTheStaticCompliance) {
 
 TEST(Vibration, AWideLayerShearsAtAQuarterWave) {
   EXPECT_NEAR(layer_shear_frequency({0.33, 0.49}, 1.05e-9, 5.0), 513.5, 0.5);
-  const TetMesh mesh = test::box_mesh({12, 12, 1}, 8, 8, 1);
+  const TetMesh mesh = fixtures::box_mesh({12, 12, 1}, 8, 8, 1);
   const double wanted = 2.0 * kPi * layer_shear_frequency({kModulus, 0.45}, kDensity, 1.0);
   const GelVibration vibration = compute_vibration(mesh, {kModulus, 0.45}, {}, kDensity, 2);
   EXPECT_LT(vibration.angular_frequency[0], wanted);

@@ -48,8 +48,8 @@ cv::Mat even(const cv::Size& size, int type, int value) {
 }
 
 TEST(HardCase30, TheBeadTrackerSaysSoAndHoldsItsBeads) {
-  test::BeadPainter painter({.noise = 2.0});
-  const std::vector<Eigen::Vector2d> rest = test::grid_positions(3, 71.0, {320.0, 240.0});
+  fixtures::BeadPainter painter({.noise = 2.0});
+  const std::vector<Eigen::Vector2d> rest = fixtures::grid_positions(3, 71.0, {320.0, 240.0});
   BeadTracker tracker({});
   std::int64_t t_us = 0;
   ASSERT_EQ(tracker.track({painter.paint(rest), ++t_us}).found(), 9);
@@ -75,7 +75,7 @@ constexpr int kWidth = 240;
 constexpr int kHeight = 180;
 constexpr double kScale_mm = 0.053;
 
-HeightModel height_model(test::GelPainter& painter) {
+HeightModel height_model(fixtures::GelPainter& painter) {
   HeightCalibrationSettings settings;
   settings.mm_per_px = kScale_mm;
   settings.table.most_cells = 1U << 15U;  // a smaller table than the default's, to be quick
@@ -85,7 +85,7 @@ HeightModel height_model(test::GelPainter& painter) {
 }
 
 TEST(HardCase30, TheHeightEstimatorSaysSo) {
-  test::GelPainter painter(kWidth, kHeight, kScale_mm, {});
+  fixtures::GelPainter painter(kWidth, kHeight, kScale_mm, {});
   HeightEstimator estimator(height_model(painter));
   for (const auto& [name, value, light] : kBadLights) {
     const HeightResult& result = estimator.estimate(even({kWidth, kHeight}, CV_8UC3, value));
@@ -107,8 +107,8 @@ TEST(HardCase30, TheHeightEstimatorSaysSo) {
 }
 
 TEST(HardCase30, TheMarkerTrackerSaysSoAndHoldsItsMarkers) {
-  const std::vector<Eigen::Vector2d> rest = test::marker_grid();
-  const cv::Mat good = test::paint_markers({}, rest);
+  const std::vector<Eigen::Vector2d> rest = fixtures::marker_grid();
+  const cv::Mat good = fixtures::paint_markers({}, rest);
   MarkerTracker tracker({});
   std::int64_t t_us = 0;
   const TrackedMarkers before = tracker.track({good, ++t_us});
@@ -129,22 +129,22 @@ TEST(HardCase30, TheMarkerTrackerSaysSoAndHoldsItsMarkers) {
 }
 
 TEST(HardCase30, TheTouchReaderSaysSoAndTakesNoSlipFromIt) {
-  test::GelPainter painter(kWidth, kHeight, kScale_mm, {});
+  fixtures::GelPainter painter(kWidth, kHeight, kScale_mm, {});
   TouchCalibration calibration;
   calibration.height = height_model(painter);
   calibration.normal.newton_per_unit = 0.1;
   calibration.shear.newton_per_unit = 2.0;
-  const std::vector<Eigen::Vector2d> markers = test::marker_grid(22.6, kWidth, kHeight);
+  const std::vector<Eigen::Vector2d> markers = fixtures::marker_grid(22.6, kWidth, kHeight);
   const cv::Mat ink =
-      test::paint_markers({.width = kWidth, .height = kHeight, .brightness = 255, .shading = 0}, markers);
-  const auto frame = [&](const test::Field& field) {
+      fixtures::paint_markers({.width = kWidth, .height = kHeight, .brightness = 255, .shading = 0}, markers);
+  const auto frame = [&](const fixtures::Field& field) {
     cv::Mat picture = painter.paint(field);
     cv::multiply(picture, ink, picture, 1.0 / 255);
     return picture;
   };
-  const test::Ball ball{kScale_mm * Eigen::Vector2d(120, 90), 6.0, 2.2};
+  const fixtures::Ball ball{kScale_mm * Eigen::Vector2d(120, 90), 6.0, 2.2};
   const auto pressed = [&](const Eigen::Vector2d& place) { return ball.at(place); };
-  calibration.background = frame([](const Eigen::Vector2d&) { return test::Relief{}; });
+  calibration.background = frame([](const Eigen::Vector2d&) { return fixtures::Relief{}; });
   TouchReader reader(calibration);
   std::int64_t t_us = 0;
   const double force_N = reader.read({frame(pressed), ++t_us}).normal_N;
@@ -169,8 +169,8 @@ TEST(HardCase30, TheTouchReaderSaysSoAndTakesNoSlipFromIt) {
 }
 
 TEST(HardCase30, TheColourMarkerFinderSaysSo) {
-  const test::ColourPicture picture = test::small_colour_picture(16.0);
-  const cv::Mat good = test::paint_colour_markers(picture);
+  const fixtures::ColourPicture picture = fixtures::small_colour_picture(16.0);
+  const cv::Mat good = fixtures::paint_colour_markers(picture);
   const auto whole = [](const ColourMarkerReading& reading) {
     return std::count_if(reading.markers.begin(), reading.markers.end(),
                          [](const ColourMarker& marker) { return marker.flaw == MarkerFlaw::kNone; });
@@ -191,7 +191,7 @@ TEST(HardCase30, TheColourMarkerFinderSaysSo) {
 }
 
 TEST(HardCase30, TheExploreTrackerSaysSoAndHoldsItsMotion) {
-  const test::FingertipPainter painter{.noise = 0.6};
+  const fixtures::FingertipPainter painter{.noise = 0.6};
   ExploreTracker tracker(painter.paint(DotsMotion{}, 10000), {});
   const DotsMotion pressed{1.05, {0.2, 0.1}};
   std::int64_t t_us = 0;

@@ -254,9 +254,22 @@ TEST(DeviceBench, EventsComeNearerWithSmallerSteps) {
   settings.most_tetrahedra = kFewTetrahedra;
   const DeviceBench bench = bench_device(device, settings);
   const BenchCurve& steps = curve(bench, "event step");
-  ASSERT_EQ(steps.points.size(), 5u) << steps.what;
-  EXPECT_GE(steps.points.front().event_error, steps.points.back().event_error);
+  ASSERT_EQ(steps.points.size(), 6u) << steps.what;
+  EXPECT_GT(steps.points.front().event_error, steps.points[4].event_error);
   EXPECT_LT(steps.points.front().work, steps.points.back().work);
+}
+
+TEST(DeviceBench, SaysThatPicturesFillTheWells) {
+  sim::DeviceSpec device = dim_device();
+  device.camera->exposure_us *= 1e3;
+  BenchSettings settings;
+  settings.force_error = 0.05;
+  settings.finite_strain = false;
+  settings.most_tetrahedra = kFewTetrahedra;
+  const DeviceBench bench = bench_device(device, settings);
+  EXPECT_THAT(bench.pictures, HasSubstr("full well"));
+  EXPECT_TRUE(std::isnan(bench.choice.verified_pixel));
+  for (const BenchCurve& one : bench.curves) EXPECT_NE(one.name, "light");
 }
 
 TEST(DeviceBench, WithoutACameraItIsAboutForces) {

@@ -35,9 +35,9 @@ ReflexTouch painted_touch(const std::string& name, double deepest_mm, double sid
   const auto lateral_mm = [=](double place) { return std::max(place - deepest_mm, 0.0) * towards; };
   const auto press_mm = [=](double place) { return std::clamp(place, 0.0, deepest_mm); };
   const ReflexWay::Picture picture = [=](double place) {
-    sensors::test::FingertipPainter painter{.spacing_px = 4.3, .radius_px = 1.06, .ground = 3.0, .dot = 36.0};
+    sensors::fixtures::FingertipPainter painter{.spacing_px = 4.3, .radius_px = 1.06, .ground = 3.0, .dot = 36.0};
     painter.gain = 1.0 + 0.05 * press_mm(place);
-    const double dilation = sensors::test::dilation_of(press_mm(place));
+    const double dilation = sensors::fixtures::dilation_of(press_mm(place));
     const sensors::DotsMotion motion{dilation, dilation / 0.47 * lateral_mm(place)};
     const std::vector<Eigen::Vector2d> dots = painter.dots();
     cv::Mat light(18, 18, CV_32FC1);

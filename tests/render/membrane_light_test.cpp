@@ -46,7 +46,7 @@ const MembraneKernels& milky_kernels() {
 }
 
 /// 60 x 45 pixels that see 48 x 36 mm.
-Camera small_camera() {
+Camera tiny_camera() {
   LensCamera camera;
   camera.width = 60;
   camera.height = 45;
@@ -151,7 +151,7 @@ TEST(MembraneLight, WhiteBodyInAnEvenRoomIsNotSeen) {
   const FaceGrid grid = wide_grid();
   MembraneLightSettings settings = coarse(1.0);
   settings.tolerance = 1e-6;
-  const MembraneLight light(milky_kernels(), small_camera(), grid, settings);
+  const MembraneLight light(milky_kernels(), tiny_camera(), grid, settings);
   FaceState state = block(grid, 9.0, 3.0, 0.5, 1.0);
   RandomStream random(3, 0, Purpose::kTest);
   for (int row = 0; row < grid.rows; ++row) {
@@ -167,7 +167,7 @@ TEST(MembraneLight, WhiteBodyInAnEvenRoomIsNotSeen) {
 
 TEST(MembraneLight, WideTouchIsATouchAllOver) {
   const FaceGrid grid = wide_grid();
-  const MembraneLight light(milky_kernels(), small_camera(), grid, coarse(0.3));
+  const MembraneLight light(milky_kernels(), tiny_camera(), grid, coarse(0.3));
   const cv::Mat touched = light.irradiance(block(grid, 100.0, 100.0, 0.0));
   const cv::Mat free = light.irradiance(free_face(grid));
   const double weight =
@@ -181,7 +181,7 @@ TEST(MembraneLight, WideTouchIsATouchAllOver) {
 // The more of a cell is wetted the darker it is, without a step.
 TEST(MembraneLight, CoverageDarkensEvenly) {
   const FaceGrid grid = wide_grid();
-  const MembraneLight light(milky_kernels(), small_camera(), grid, coarse(0.3));
+  const MembraneLight light(milky_kernels(), tiny_camera(), grid, coarse(0.3));
   float before = light.irradiance(free_face(grid)).at<float>(22, 30);
   const float first = before;
   FaceState state = block(grid, 8.0, 2.0, 0.0);
@@ -206,7 +206,7 @@ struct TracedCase {
 // what is seen (measured 1.4 and 2.1 %).
 TEST(MembraneLight, AgreesWithPathTracing) {
   const FaceGrid grid = wide_grid();
-  const Camera camera = small_camera();
+  const Camera camera = tiny_camera();
   for (const TracedCase& one :
        {TracedCase{"touch", 5.0, 5.0, 0.0, 0.3}, TracedCase{"touch in light", 9.0, 2.0, 0.0, 1.0},
         TracedCase{"near", 9.0, 2.0, 0.4, 1.0}}) {
@@ -229,7 +229,7 @@ TEST(MembraneLight, IsTheSameForAnyNumberOfThreads) {
   for (int k = 0; k < 2; ++k) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, k == 0 ? 1 : 4);
     const MembraneKernels kernels = walk_membrane(milky(), {.walks = 1 << 14});
-    pictures[k] = MembraneLight(kernels, small_camera(), grid, coarse(0.3)).irradiance(block(grid, 5.0, 2.0, 0.0));
+    pictures[k] = MembraneLight(kernels, tiny_camera(), grid, coarse(0.3)).irradiance(block(grid, 5.0, 2.0, 0.0));
   }
   EXPECT_EQ(cv::norm(pictures[0], pictures[1], cv::NORM_INF), 0.0);
 }
@@ -293,7 +293,7 @@ TEST(MembraneInput, IsRefusedByName) {
   EXPECT_THAT(message_of([&] { walk_membrane(optics); }), HasSubstr("thickness_mm is nan"));
   EXPECT_THAT(message_of([&] { walk_membrane(milky(), {.walks = 3}); }), HasSubstr("walks is 3"));
 
-  const Camera camera = small_camera();
+  const Camera camera = tiny_camera();
   const FaceGrid grid = wide_grid();
   const auto light = [&](const FaceGrid& of, const MembraneLightSettings& settings) {
     return message_of([&] { MembraneLight(milky_kernels(), camera, of, settings); });

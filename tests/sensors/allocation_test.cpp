@@ -83,8 +83,8 @@ TEST_F(Allocation, IsCounted) {
 
 /// Frames with beads that are lost, found again and jump, in the dark and without any contrast.
 std::vector<Frame> hard_frames(const BeadTrackerSettings& settings, double spacing, double radius_px, int type) {
-  test::BeadPainter painter({.radius_px = radius_px, .noise = 2.0});
-  const auto rest = test::grid_positions(settings.grid, spacing, {320.0, 240.0});
+  fixtures::BeadPainter painter({.radius_px = radius_px, .noise = 2.0});
+  const auto rest = fixtures::grid_positions(settings.grid, spacing, {320.0, 240.0});
   std::vector<Frame> frames;
   for (int i = 0; i < 12; ++i) {
     auto beads = rest;
@@ -102,7 +102,7 @@ std::vector<Frame> hard_frames(const BeadTrackerSettings& settings, double spaci
 }
 
 void expect_none_after_the_first(const BeadTrackerSettings& settings, const std::vector<Frame>& frames) {
-  const StiffnessForceModel model = test::known_model(settings.grid, MatrixForm::kAsymmetric, 1);
+  const StiffnessForceModel model = fixtures::known_model(settings.grid, MatrixForm::kAsymmetric, 1);
   BeadTracker tracker(settings);
   Eigen::Vector3d sum = estimate(model, tracker.track(frames[0])).force;
   int lost = 0;
@@ -129,13 +129,13 @@ TEST_F(Allocation, NoneAfterTheFirstFrame) {
 }
 
 TEST_F(Allocation, NoneForMarkersAndSlipAfterTheFirstFrame) {
-  const auto rest = test::marker_grid();
+  const auto rest = fixtures::marker_grid();
   std::vector<Frame> frames;
   for (int i = 0; i < 12; ++i) {
     auto places = rest;
     for (auto& place : places) place += 0.8 * i * Eigen::Vector2d(1.0, -0.5);
     if (i == 5) places[20].setConstant(std::nan(""));
-    frames.push_back({test::paint_markers({.noise = 2.0}, places, static_cast<std::uint64_t>(1 + i)), i});
+    frames.push_back({fixtures::paint_markers({.noise = 2.0}, places, static_cast<std::uint64_t>(1 + i)), i});
     if (i == 8) frames.back().image.setTo(0);
   }
   MarkerTracker tracker({});
@@ -157,7 +157,7 @@ TEST_F(Allocation, NoneForMarkersAndSlipAfterTheFirstFrame) {
 }
 
 TEST_F(Allocation, NoneForAHeightMapAfterTheFirst) {
-  test::GelPainter painter(120, 90, 0.053, {});
+  fixtures::GelPainter painter(120, 90, 0.053, {});
   HeightCalibrationSettings calibration;
   calibration.mm_per_px = 0.053;
   calibration.table.most_cells = 20000;

@@ -13,7 +13,7 @@ using ::testing::HasSubstr;
 using ::testing::ThrowsMessage;
 
 TEST(Background, NoiseIsThatOfOneFrame) {
-  test::GelPainter painter(80, 60, 0.05, {.noise_DN = 2.0});
+  fixtures::GelPainter painter(80, 60, 0.05, {.noise_DN = 2.0});
   const Background background = painter.background(20);
   ASSERT_TRUE(background.noise_DN);
   // Rounding to whole numbers adds 1/12 to the variance.

@@ -19,9 +19,9 @@ constexpr double kRadius = 1.0;  // the text's ball of 2 mm
 
 class BallPressTest : public ::testing::Test {
  protected:
-  test::GelPainter painter_{200, 160, kScale, {}};
+  fixtures::GelPainter painter_{200, 160, kScale, {}};
   Background background_ = painter_.background();
-  test::Ball ball_{{5.2, 4.1}, kRadius, 0.7};
+  fixtures::Ball ball_{{5.2, 4.1}, kRadius, 0.7};
   BallPress press_ = painter_.press(ball_);
 
   auto taking_samples(const BallPress& press) {
@@ -48,7 +48,7 @@ TEST_F(BallPressTest, SamplesAreTheTouchedPartOnly) {
   const double radius_px = 0.7 / kScale - 1.0;
   EXPECT_NEAR(static_cast<double>(samples.size()), kPi * radius_px * radius_px, 25.0);
   for (const ColourSample& sample : samples) {
-    const test::Relief truth = ball_.at(kScale * sample.place.cast<double>());
+    const fixtures::Relief truth = ball_.at(kScale * sample.place.cast<double>());
     EXPECT_LT((truth.slope - sample.slope.cast<double>()).norm(), 1e-4);
   }
 }
@@ -74,10 +74,10 @@ TEST_F(BallPressTest, PressOverTheEdgeIsRefused) {
 
 TEST_F(BallPressTest, TwoBallsAreRefused) {
   for (const double distance : {1.9, 2.5, 4.0}) {
-    const test::Ball other{{5.2 + distance, 4.1}, kRadius, 0.7};
+    const fixtures::Ball other{{5.2 + distance, 4.1}, kRadius, 0.7};
     press_.frame = painter_.paint([&](const Eigen::Vector2d& place) {
-      const test::Relief a = ball_.at(place);
-      const test::Relief b = other.at(place);
+      const fixtures::Relief a = ball_.at(place);
+      const fixtures::Relief b = other.at(place);
       return a.height > b.height ? a : b;
     });
     EXPECT_THROW(find_contact_circle(press_.frame, background_, kRadius, kScale, "frame"), Error) << distance;

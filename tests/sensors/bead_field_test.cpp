@@ -17,7 +17,7 @@ using touchstone::test::message_of;
 
 class BeadsInView : public testing::Test {
  protected:
-  BeadsInView() : map_(test::half_space_markers(3, 4, 2.0)) {}
+  BeadsInView() : map_(fixtures::half_space_markers(3, 4, 2.0)) {}
 
   /// Markers are 3 mm apart; 25 px are a mm.
   std::vector<Eigen::Vector2d> pictured(double turn_rad) const {
@@ -69,7 +69,7 @@ TEST_F(BeadsInView, MotionsAreToldInTheGelsAxes) {
 TEST_F(BeadsInView, OtherBeadsAndPicturesAreRefused) {
   auto rest = pictured(0.0);
   EXPECT_THAT(refused({rest.begin(), rest.begin() + 4}), HasSubstr("there are 4 rest positions"));
-  const MarkerCompliance lone = test::half_space_markers(1, 4, 2.0);
+  const MarkerCompliance lone = fixtures::half_space_markers(1, 4, 2.0);
   EXPECT_THAT(message_of([&] { view_of(std::vector<Eigen::Vector2d>(1, {3, 4}), lone); }), HasSubstr("one bead"));
   EXPECT_THAT(refused(std::vector<Eigen::Vector2d>(9, Eigen::Vector2d(7, 7))), HasSubstr("coincide"));
   EXPECT_THAT(refused(pictured(1.57)), HasSubstr("turned by 90 degrees"));

@@ -21,8 +21,8 @@ struct Drawn {
 };
 
 Drawn one_lost_bead() {
-  test::BeadPainter painter({.width = 320, .height = 320});
-  auto beads = test::grid_positions(3, 70.0, {160.0, 150.0});
+  fixtures::BeadPainter painter({.width = 320, .height = 320});
+  auto beads = fixtures::grid_positions(3, 70.0, {160.0, 150.0});
   BeadTracker tracker({});
   tracker.track({painter.paint(beads), 0});
   beads[4] = {std::nan(""), 0.0};

@@ -15,8 +15,8 @@
 namespace touchstone::sensors {
 namespace {
 
-using test::BeadPainter;
-using test::grid_positions;
+using fixtures::BeadPainter;
+using fixtures::grid_positions;
 using testing::Each;
 using testing::HasSubstr;
 using touchstone::test::message_of;

@@ -11,9 +11,9 @@
 namespace touchstone::sensors {
 namespace {
 
-using test::BeadPainter;
-using test::BeadPicture;
-using test::grid_positions;
+using fixtures::BeadPainter;
+using fixtures::BeadPicture;
+using fixtures::grid_positions;
 
 constexpr std::int64_t kIntervalUs = 1663;  // 601.25 frames/s
 

@@ -13,8 +13,8 @@
 namespace touchstone::sensors {
 namespace {
 
-using test::BeadPainter;
-using test::BeadPicture;
+using fixtures::BeadPainter;
+using fixtures::BeadPicture;
 
 GreyWindow window_of(const cv::Mat& grey) {
   GreyWindow window;

@@ -11,10 +11,10 @@
 namespace touchstone::sensors {
 namespace {
 
-using test::ColourPicture;
-using test::expose;
-using test::paint_colour_light;
-using test::small_colour_picture;
+using fixtures::ColourPicture;
+using fixtures::expose;
+using fixtures::paint_colour_light;
+using fixtures::small_colour_picture;
 
 /// Largest difference between two levelled pictures, in grey levels, away from the picture's edge.
 double largest_difference(const cv::Mat& a, const cv::Mat& b, int margin) {

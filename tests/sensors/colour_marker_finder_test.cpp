@@ -12,11 +12,11 @@
 namespace touchstone::sensors {
 namespace {
 
-using test::ColourPicture;
-using test::expose;
-using test::paint_colour_light;
-using test::paint_colour_markers;
-using test::small_colour_picture;
+using fixtures::ColourPicture;
+using fixtures::expose;
+using fixtures::paint_colour_light;
+using fixtures::paint_colour_markers;
+using fixtures::small_colour_picture;
 
 constexpr double kDegree = 3.14159265358979323846 / 180.0;
 

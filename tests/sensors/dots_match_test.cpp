@@ -55,7 +55,7 @@ TEST(DotsPicture, IsLookedUpBetweenPixels) {
 }
 
 TEST(DotsMatch, APictureIsItsOwn) {
-  const DotsPicture rest(test::FingertipPainter{}.paint(DotsMotion{}));
+  const DotsPicture rest(fixtures::FingertipPainter{}.paint(DotsMotion{}));
   const DotsMatch match = match_dots(rest, rest, std::vector<DotsMotion>{{1.05, {0.4, -0.4}}});
   EXPECT_NEAR(match.correlation, 1.0, 1e-4);
   EXPECT_LT(error_px(match.motion, {}), 0.02);
@@ -68,7 +68,7 @@ TEST(DotsMatch, RecoversMotionsFromNoisyCoarsePictures) {
     double squares = 0.0;
     constexpr int kTrials = 60;
     for (std::uint64_t i = 0; i < kTrials; ++i) {
-      test::FingertipPainter painter{.noise = 0.6, .seed = 1 + i % 10};
+      fixtures::FingertipPainter painter{.noise = 0.6, .seed = 1 + i % 10};
       const DotsPicture rest(painter.paint(DotsMotion{}, 1000));
       painter.gain = gain;
       const DotsMotion motion = some_motion(i, 0.7);
@@ -83,11 +83,11 @@ TEST(DotsMatch, RecoversMotionsFromNoisyCoarsePictures) {
 
 TEST(DotsMatch, WhatLeavesTheViewDoesNotPullTheEstimate) {
   // A press of 5 mm leaves less than half of the dots in view.
-  test::FingertipPainter painter{.noise = 0.6};
+  fixtures::FingertipPainter painter{.noise = 0.6};
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {
     painter.seed = seed;
     const DotsPicture rest(painter.paint(DotsMotion{}, 1000));
-    const DotsMotion motion{test::dilation_of(5.0), {0.8, -0.6}};
+    const DotsMotion motion{fixtures::dilation_of(5.0), {0.8, -0.6}};
     const std::vector<DotsMotion> starts = {{1.40, {0.5, -0.4}}};
     const DotsMatch match = match_dots(DotsPicture(painter.paint(motion)), rest, starts);
     EXPECT_LT(match.overlap, 0.5);
@@ -98,7 +98,7 @@ TEST(DotsMatch, WhatLeavesTheViewDoesNotPullTheEstimate) {
 }
 
 TEST(DotsMatch, ThePeakIsFoundAgainFromNowhere) {
-  test::FingertipPainter painter{.noise = 0.6};
+  fixtures::FingertipPainter painter{.noise = 0.6};
   for (std::uint64_t i = 0; i < 6; ++i) {
     painter.seed = 1 + i;
     const DotsPicture rest(painter.paint(DotsMotion{}, 1000));
@@ -112,7 +112,7 @@ TEST(DotsMatch, ThePeakIsFoundAgainFromNowhere) {
 }
 
 TEST(DotsMatch, DotsThatCameOffCostLittle) {
-  test::FingertipPainter painter{.noise = 0.6};
+  fixtures::FingertipPainter painter{.noise = 0.6};
   const DotsPicture rest(painter.paint(DotsMotion{}, 1000));
   painter.missing = {1, 6, 13};
   const DotsMotion motion{1.06, {0.3, 0.4}};
@@ -126,7 +126,7 @@ TEST(DotsMatch, TheSkewOfAPixelByPixelPictureIsTakenOut) {
   const double middle_s = 0.5 * 323.0 / 1500.0;
   const DotsMotion middle{1.08, {0.5, -0.3}};
   const DotsVelocity velocity{0.25, {3.0, 2.0}};  // a good half pixel within the picture
-  test::FingertipPainter painter{.noise = 0.3};
+  fixtures::FingertipPainter painter{.noise = 0.3};
   const DotsPicture rest(painter.paint(DotsMotion{}, 1000));
   const auto motion_at = [&](double after_s) {
     return DotsMotion{middle.dilation + velocity.dilation_per_s * (after_s - middle_s),
@@ -146,7 +146,7 @@ TEST(DotsMatch, TheSkewOfAPixelByPixelPictureIsTakenOut) {
 }
 
 TEST(DotsMatch, WhatMakesNoSenseIsNamed) {
-  const cv::Mat painted = test::FingertipPainter{}.paint(DotsMotion{});
+  const cv::Mat painted = fixtures::FingertipPainter{}.paint(DotsMotion{});
   const DotsPicture rest(painted), small(painted(cv::Rect(0, 0, 12, 12)));
   const std::vector<DotsMotion> starts(1);
   const auto with = [&](const DotsMatchSettings& settings) {
@@ -167,20 +167,20 @@ TEST(DotsMatch, WhatMakesNoSenseIsNamed) {
 }
 
 TEST(DotsCorrelation, IsNothingWhereNothingVaries) {
-  const DotsPicture flat(cv::Mat(18, 18, CV_8UC1, 20)), rest(test::FingertipPainter{}.paint(DotsMotion{}));
+  const DotsPicture flat(cv::Mat(18, 18, CV_8UC1, 20)), rest(fixtures::FingertipPainter{}.paint(DotsMotion{}));
   EXPECT_EQ(correlate(flat, rest, {}).correlation, 0.0);
   EXPECT_EQ(correlate(rest, rest, {1.0, {100.0, 0.0}}).overlap, 0.0);
 }
 
 /// Dots that are smooth on the scale of a pixel.
-test::FingertipPainter smooth_painter() {
+fixtures::FingertipPainter smooth_painter() {
   return {.spacing_px = 6.0, .jitter_px = 1.5, .radius_px = 1.6, .edge_px = 3.0};
 }
 
 TEST(DotsFlow, ASmallStepIsFoundByOneSolution) {
   const DotsMotion step{1.01, {0.10, -0.05}};
-  test::FingertipPainter painter = smooth_painter();
-  test::FingertipPainter coarse;
+  fixtures::FingertipPainter painter = smooth_painter();
+  fixtures::FingertipPainter coarse;
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {
     painter.seed = coarse.seed = seed;
     const auto found = dots_flow(DotsPicture(painter.paint(DotsMotion{}), 1.0), DotsPicture(painter.paint(step), 1.0));
@@ -196,7 +196,7 @@ TEST(DotsFlow, ASmallStepIsFoundByOneSolution) {
 }
 
 TEST(DotsFlow, RoundsTakeInALargeStepAndLightThatChanges) {
-  test::FingertipPainter painter = smooth_painter();
+  fixtures::FingertipPainter painter = smooth_painter();
   painter.noise = 0.6;
   double once = 0.0, often = 0.0;
   constexpr int kTrials = 20;
@@ -227,7 +227,7 @@ TEST(DotsFlow, WithoutGradientsThereIsNone) {
 }
 
 TEST(DotsFlow, WhatIsTooLargeIsNotBelieved) {
-  const test::FingertipPainter painter;
+  const fixtures::FingertipPainter painter;
   const DotsPicture before(painter.paint(DotsMotion{})), now(painter.paint(DotsMotion{1.0, {0.5, 0.0}}));
   EXPECT_FALSE(dots_flow(before, now, {.most_step_px = 0.1}));
   const DotsPicture small(painter.paint(DotsMotion{})(cv::Rect(0, 0, 12, 12)));
@@ -239,10 +239,10 @@ TEST(DotsFlow, WhatIsTooLargeIsNotBelieved) {
 
 TEST(PressLaw, ThePinholesDistanceIsFound) {
   std::vector<DilationSample> samples;
-  for (int i = 0; i <= 50; ++i) samples.push_back({test::dilation_of(0.1 * i, 16.03), 0.1 * i});
+  for (int i = 0; i <= 50; ++i) samples.push_back({fixtures::dilation_of(0.1 * i, 16.03), 0.1 * i});
   const DilationPress law = fit_dilation_press(samples);
   EXPECT_NEAR(law.mm[0], 16.03, 1e-9);
-  EXPECT_NEAR(law.press_mm(test::dilation_of(5.0, 16.03)), 5.0, 1e-9);
+  EXPECT_NEAR(law.press_mm(fixtures::dilation_of(5.0, 16.03)), 5.0, 1e-9);
   EXPECT_NEAR(law.rms_residual_mm, 0.0, 1e-10);
   // A skin that flattens as it comes: one term isn't enough.
   for (DilationSample& one : samples) {
@@ -303,7 +303,7 @@ TEST(ExploreModel, GoesFromMotionToPressForceAndShear) {
   model.lateral_mm_per_px = fit_lateral(lateral);
   EXPECT_TRUE(model.lateral_mm_per_px.isApprox(0.65 * Eigen::Matrix2d::Identity(), 1e-12));
   model.shear = ShearLaw{0.5 * Eigen::Matrix2d::Identity(), 0.1 * Eigen::Matrix2d::Identity(), 0.0};
-  const ExploreForce force = estimate(model, {test::dilation_of(2.0), {2.0, 0.0}});
+  const ExploreForce force = estimate(model, {fixtures::dilation_of(2.0), {2.0, 0.0}});
   EXPECT_NEAR(force.press_mm, 2.0, 1e-12);
   EXPECT_NEAR(force.force_N, 1.1293 * std::expm1(0.4677 * 2.0), 1e-12);
   EXPECT_NEAR(force.lateral_mm.x(), 0.65 * 2.0 * 14.0 / 16.0, 1e-12);

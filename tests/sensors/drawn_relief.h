@@ -11,7 +11,7 @@
 #include "sensors/planar_pose.h"
 #include "sensors/touch_image.h"
 
-namespace touchstone::sensors::test {
+namespace touchstone::sensors::fixtures {
 
 /// Height (mm) over points of a surface.
 using Surface = std::function<double(const Eigen::Vector2d&)>;
@@ -79,4 +79,4 @@ inline TouchImage touch_of(const Surface& surface, const PlanarPose& surface_fro
   return touch_by_height(height, camera.mm_per_px, 0.02);
 }
 
-}  // namespace touchstone::sensors::test
+}  // namespace touchstone::sensors::fixtures

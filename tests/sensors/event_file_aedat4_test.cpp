@@ -16,8 +16,8 @@
 namespace touchstone::sensors {
 namespace {
 
+using fixtures::number;
 using test::message_of;
-using test::number;
 using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -206,7 +206,7 @@ TEST(PacketCompression, NothingUnpacksToMoreThanIsAllowed) {
 TEST_F(Aedat4Events, WrittenFilesHaveATableOfTheirPackets) {
   const auto file = folder_.path() / "w.aedat4";
   EventWriter writer(file, {346, 260}, "<a & b>");
-  writer.append(test::bursts_of_events(20'000));
+  writer.append(fixtures::bursts_of_events(20'000));
   writer.close();
   const std::string bytes = read_whole_file(file);
   // dataTablePosition: by the header's own vtable.

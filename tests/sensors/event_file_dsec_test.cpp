@@ -115,7 +115,7 @@ TEST_F(DsecEvents, OtherFilesOfOursAreTold) {
 }
 
 TEST_F(DsecEvents, WrittenFilesKeepToTheLayout) {
-  const std::vector<Event> events = test::bursts_of_events(5000, 3, 2500);
+  const std::vector<Event> events = fixtures::bursts_of_events(5000, 3, 2500);
   EventWriter writer(file_, {346, 260}, "touchstone test");
   writer.append(events);
   writer.close();

@@ -14,8 +14,8 @@
 namespace touchstone::sensors {
 namespace {
 
+using fixtures::words;
 using test::message_of;
-using test::words;
 using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;

@@ -22,9 +22,9 @@ namespace touchstone::sensors {
 namespace {
 
 namespace fs = std::filesystem;
-using test::bursts_of_events;
-using test::kHeight;
-using test::kWidth;
+using fixtures::bursts_of_events;
+using fixtures::kHeight;
+using fixtures::kWidth;
 using test::message_of;
 using ::testing::AllOf;
 using ::testing::HasSubstr;

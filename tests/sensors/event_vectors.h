@@ -18,7 +18,7 @@ inline std::ostream& operator<<(std::ostream& out, const Event& e) {
   return out << "(" << e.t_us << " us, " << e.x << ", " << e.y << ", " << (e.on ? "ON" : "OFF") << ")";
 }
 
-namespace test {
+namespace sensors::fixtures {
 
 constexpr int kWidth = 346;
 constexpr int kHeight = 260;
@@ -62,5 +62,5 @@ inline std::string number(std::int64_t value, int bytes) {
   return text;
 }
 
-}  // namespace test
+}  // namespace sensors::fixtures
 }  // namespace touchstone

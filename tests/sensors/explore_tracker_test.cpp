@@ -12,8 +12,8 @@
 namespace touchstone::sensors {
 namespace {
 
-using test::dilation_of;
-using test::FingertipPainter;
+using fixtures::dilation_of;
+using fixtures::FingertipPainter;
 using testing::HasSubstr;
 using testing::ThrowsMessage;
 

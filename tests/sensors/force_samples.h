@@ -9,7 +9,7 @@
 #include "sensors/stiffness_force_model.h"
 #include "sensors/stiffness_training.h"
 
-namespace touchstone::sensors::test {
+namespace touchstone::sensors::fixtures {
 
 inline std::vector<Eigen::Vector2d> rest_grid(int grid, double spacing) {
   std::vector<Eigen::Vector2d> rest;
@@ -101,4 +101,4 @@ inline ForceSamples load_cycle_samples(int count, double noise_px) {
   return samples;
 }
 
-}  // namespace touchstone::sensors::test
+}  // namespace touchstone::sensors::fixtures

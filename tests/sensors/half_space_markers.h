@@ -6,7 +6,7 @@
 
 #include "sensors/marker_compliance.h"
 
-namespace touchstone::sensors::test {
+namespace touchstone::sensors::fixtures {
 
 /// Displacement of an incompressible half space's face, r away from a force along each axis (K. L. Johnson, Contact
 /// Mechanics, eqs. 3.19 and 3.75 with a Poisson's ratio of 1/2), times pi E.
@@ -53,4 +53,4 @@ inline MarkerCompliance half_space_markers(int markers, int patches, double side
   return c;
 }
 
-}  // namespace touchstone::sensors::test
+}  // namespace touchstone::sensors::fixtures

@@ -19,13 +19,13 @@ double apart(const PlanarPose& a, const PlanarPose& b) {
 
 class Alignment_ : public ::testing::Test {
  protected:
-  const test::Surface relief = test::strewn_relief(4);
-  const ReliefDetail to = relief_detail(test::touch_of(relief, {}, 1), {});
+  const fixtures::Surface relief = fixtures::strewn_relief(4);
+  const ReliefDetail to = relief_detail(fixtures::touch_of(relief, {}, 1), {});
   const PlanarPose truth{0.6, {1.0, -0.7}};
 };
 
 TEST_F(Alignment_, FindsThePoseFromNearby) {
-  const ReliefDetail from = relief_detail(test::touch_of(relief, truth, 2), {});
+  const ReliefDetail from = relief_detail(fixtures::touch_of(relief, truth, 2), {});
   for (int i = 0; i < 8; ++i) {
     const PlanarPose start =
         truth * PlanarPose{i % 2 ? 0.01 : -0.01, {0.1 * std::cos(i * 0.8), 0.1 * std::sin(i * 0.8)}};
@@ -37,8 +37,8 @@ TEST_F(Alignment_, FindsThePoseFromNearby) {
 }
 
 TEST_F(Alignment_, ADeeperAndTiltedPressChangesLittle) {
-  const test::Surface deeper = [&](const Eigen::Vector2d& p) { return 0.3 + 0.005 * p.x() + 1.4 * relief(p); };
-  const ReliefDetail from = relief_detail(test::touch_of(deeper, truth, 2), {});
+  const fixtures::Surface deeper = [&](const Eigen::Vector2d& p) { return 0.3 + 0.005 * p.x() + 1.4 * relief(p); };
+  const ReliefDetail from = relief_detail(fixtures::touch_of(deeper, truth, 2), {});
   const Alignment found = align(from, to, truth * PlanarPose{0.005, {0.06, -0.05}}, {});
   EXPECT_TRUE(found.converged);
   EXPECT_LT(apart(found.to_from_from, truth), 0.005);
@@ -47,20 +47,20 @@ TEST_F(Alignment_, ADeeperAndTiltedPressChangesLittle) {
 TEST_F(Alignment_, WhatStandsInOneOfThemOnlyIsLeftOut) {
   // A crumb on the gel, in the touch but not on the object.
   const PlanarPose touch_from_object = truth.inverse();
-  const test::Surface dirty = [&](const Eigen::Vector2d& p) {
+  const fixtures::Surface dirty = [&](const Eigen::Vector2d& p) {
     return relief(p) + 0.2 * std::exp(-(touch_from_object * p - Eigen::Vector2d(2, 1)).squaredNorm() / 0.5);
   };
-  const ReliefDetail from = relief_detail(test::touch_of(dirty, truth, 2), {});
+  const ReliefDetail from = relief_detail(fixtures::touch_of(dirty, truth, 2), {});
   const Alignment found = align(from, to, truth * PlanarPose{0.005, {0.06, -0.05}}, {});
   EXPECT_TRUE(found.converged);
   EXPECT_LT(apart(found.to_from_from, truth), 0.01);
 }
 
 TEST_F(Alignment_, APlaneGivesTheStartBack) {
-  const test::Surface plane = [](const Eigen::Vector2d&) { return 0.3; };
-  test::Camera still;
+  const fixtures::Surface plane = [](const Eigen::Vector2d&) { return 0.3; };
+  fixtures::Camera still;
   still.noise_mm = 0.0;
-  const ReliefDetail flat = relief_detail(test::touch_of(plane, {}, 1, still), {});
+  const ReliefDetail flat = relief_detail(fixtures::touch_of(plane, {}, 1, still), {});
   const PlanarPose start{0.3, {0.2, 0.1}};
   const Alignment found = align(flat, flat, start, {});
   EXPECT_FALSE(found.converged);
@@ -68,7 +68,7 @@ TEST_F(Alignment_, APlaneGivesTheStartBack) {
 }
 
 TEST_F(Alignment_, ItDoesNotGoAstray) {
-  const ReliefDetail from = relief_detail(test::touch_of(relief, truth, 2), {});
+  const ReliefDetail from = relief_detail(fixtures::touch_of(relief, truth, 2), {});
   const PlanarPose start = truth * PlanarPose{1.0, {3, 3}};
   const Alignment found = align(from, to, start, {});
   EXPECT_LE(apart(found.to_from_from, start), 20.0 * 0.5) << "moved at most 0.5 mm at the middle, turned as it may";
@@ -76,7 +76,7 @@ TEST_F(Alignment_, ItDoesNotGoAstray) {
 }
 
 TEST_F(Alignment_, OverlapIsTheShareThatLiesOnTheOther) {
-  const ReliefDetail from = relief_detail(test::touch_of(relief, {}, 2), {});
+  const ReliefDetail from = relief_detail(fixtures::touch_of(relief, {}, 2), {});
   EXPECT_NEAR(compare(from, to, {0.0, {8.0, 0.0}}, {}).overlap, 0.5, 0.03);
   EXPECT_EQ(compare(from, to, {0.0, {100.0, 0.0}}, {}).overlap, 0.0);
   EXPECT_EQ(compare(from, to, {0.0, {100.0, 0.0}}, {}).correlation, 0.0);

@@ -20,7 +20,7 @@ constexpr int kHeight = 180;
 constexpr double kScale = 0.053;
 constexpr std::size_t kCells = 1U << 17U;  // a smaller table than the default's, to be quick
 
-HeightCalibration calibrated(test::GelPainter& painter, LightCorrection correction, bool compare = false,
+HeightCalibration calibrated(fixtures::GelPainter& painter, LightCorrection correction, bool compare = false,
                              std::size_t cells = kCells) {
   const std::vector<BallPress> presses = painter.presses(3, 3, 1.0, 0.75);
   HeightCalibrationSettings settings;
@@ -45,13 +45,13 @@ MapError error_of(const cv::Mat& heights, const cv::Mat& truth) {
 }
 
 /// A ball of another size than the calibration's, off the middle.
-const test::Ball kOther{{5.0, 5.5}, 4.0, 2.0};
-test::Relief other_ball(const Eigen::Vector2d& place) {
+const fixtures::Ball kOther{{5.0, 5.5}, 4.0, 2.0};
+fixtures::Relief other_ball(const Eigen::Vector2d& place) {
   return kOther.at(place);
 }
 
 TEST(HeightEstimator, HeightOfAnotherBallIsRight) {
-  test::GelPainter painter(kWidth, kHeight, kScale, {});
+  fixtures::GelPainter painter(kWidth, kHeight, kScale, {});
   const std::size_t cells = SlopeTableSettings{}.most_cells;
   const HeightCalibration calibration = calibrated(painter, LightCorrection::none, false, cells);
   HeightEstimator estimator(calibration.model);
@@ -66,7 +66,7 @@ TEST(HeightEstimator, HeightOfAnotherBallIsRight) {
 }
 
 TEST(HeightEstimator, SignIsIndentation) {
-  test::GelPainter painter(kWidth, kHeight, kScale, {});
+  fixtures::GelPainter painter(kWidth, kHeight, kScale, {});
   HeightEstimator estimator(calibrated(painter, LightCorrection::none).model);
   const HeightResult& result = estimator.estimate(painter.paint(other_ball));
   const int v = static_cast<int>(5.5 / kScale);
@@ -81,7 +81,7 @@ TEST(HeightEstimator, SignIsIndentation) {
 }
 
 TEST(HeightEstimator, RestIsFlat) {
-  test::GelPainter painter(kWidth, kHeight, kScale, {});
+  fixtures::GelPainter painter(kWidth, kHeight, kScale, {});
   HeightEstimator estimator(calibrated(painter, LightCorrection::fitted).model);
   const HeightResult& result = estimator.estimate(painter.rest());
   const MapError error = error_of(result.height_mm, cv::Mat::zeros(kHeight, kWidth, CV_32FC1));
@@ -90,10 +90,10 @@ TEST(HeightEstimator, RestIsFlat) {
 }
 
 TEST(HeightEstimator, UnevenLightIsCorrectedByTheLampsBest) {
-  test::GelPainter painter(kWidth, kHeight, kScale, {.fall_off = 0.4, .bend_deg = 8.0});
+  fixtures::GelPainter painter(kWidth, kHeight, kScale, {.fall_off = 0.4, .bend_deg = 8.0});
   // Its rim is five lengths of decay from the border; half of it lies beyond the outermost presses, whose lamps hold
   // there.
-  const test::Ball corner{{3.0, 2.9}, 4.0, 1.2};
+  const fixtures::Ball corner{{3.0, 2.9}, 4.0, 1.2};
   const auto field = [&](const Eigen::Vector2d& place) { return corner.at(place); };
   const cv::Mat frame = painter.paint(field);
   const cv::Mat truth = painter.heights(field);
@@ -112,7 +112,7 @@ TEST(HeightEstimator, UnevenLightIsCorrectedByTheLampsBest) {
 }
 
 TEST(HeightCalibration, LeftOutPressesTellWhichCorrectionIsBest) {
-  test::GelPainter painter(kWidth, kHeight, kScale, {.fall_off = 0.25, .bend_deg = 6.0});
+  fixtures::GelPainter painter(kWidth, kHeight, kScale, {.fall_off = 0.25, .bend_deg = 6.0});
   const HeightCalibration calibration = calibrated(painter, LightCorrection::fitted, true);
   ASSERT_EQ(calibration.left_out.size(), 3U);
   EXPECT_EQ(calibration.left_out[0].correction, LightCorrection::none);
@@ -126,7 +126,7 @@ TEST(HeightCalibration, LeftOutPressesTellWhichCorrectionIsBest) {
 
 TEST(HeightCalibration, ErrorFallsWithTheNoise) {
   const auto error = [](double noise) {
-    test::GelPainter painter(kWidth, kHeight, kScale, {.noise_DN = noise});
+    fixtures::GelPainter painter(kWidth, kHeight, kScale, {.noise_DN = noise});
     return calibrated(painter, LightCorrection::none).rms_slope_error;
   };
   const double quiet = error(0.5);
@@ -135,7 +135,7 @@ TEST(HeightCalibration, ErrorFallsWithTheNoise) {
 }
 
 TEST(HeightCalibration, OnePressMakesAModel) {
-  test::GelPainter painter(kWidth, kHeight, kScale, {});
+  fixtures::GelPainter painter(kWidth, kHeight, kScale, {});
   const std::vector<BallPress> presses = {painter.press({{6.0, 5.0}, 1.0, 0.75})};
   HeightCalibrationSettings settings;
   settings.mm_per_px = kScale;
@@ -147,7 +147,7 @@ TEST(HeightCalibration, OnePressMakesAModel) {
 }
 
 TEST(HeightCalibration, PressesInOnePlaceGiveTheirLampsToTheWholePicture) {
-  test::GelPainter painter(kWidth, kHeight, kScale, {});
+  fixtures::GelPainter painter(kWidth, kHeight, kScale, {});
   std::vector<BallPress> presses;
   for (int i = 0; i < 4; ++i) presses.push_back(painter.press({{6.0, 5.0}, 1.0, 0.75}));
   HeightCalibrationSettings settings;
@@ -160,7 +160,7 @@ TEST(HeightCalibration, PressesInOnePlaceGiveTheirLampsToTheWholePicture) {
 }
 
 TEST(HeightEstimator, LightThatHardlyReachesASideIsBoundedNotRefused) {
-  test::GelPainter painter(kWidth, kHeight, kScale, {.fall_off = 0.9, .bend_deg = 20.0, .level = 0.7});
+  fixtures::GelPainter painter(kWidth, kHeight, kScale, {.fall_off = 0.9, .bend_deg = 20.0, .level = 0.7});
   for (const LightCorrection correction : {LightCorrection::background, LightCorrection::fitted}) {
     HeightEstimator estimator(calibrated(painter, correction).model);
     const HeightResult& result = estimator.estimate(painter.paint(other_ball));
@@ -169,7 +169,7 @@ TEST(HeightEstimator, LightThatHardlyReachesASideIsBoundedNotRefused) {
 }
 
 TEST(HeightCalibration, BadFiguresAreRefused) {
-  test::GelPainter painter(kWidth, kHeight, kScale, {});
+  fixtures::GelPainter painter(kWidth, kHeight, kScale, {});
   const Background background = painter.background(1);
   EXPECT_THAT([&] { calibrate_height({}, background, {.mm_per_px = kScale}); },
               ThrowsMessage<Error>(HasSubstr("no ball press")));
@@ -181,7 +181,7 @@ TEST(HeightCalibration, BadFiguresAreRefused) {
 
 class Faults : public ::testing::Test {
  protected:
-  test::GelPainter painter_{kWidth, kHeight, kScale, {}};
+  fixtures::GelPainter painter_{kWidth, kHeight, kScale, {}};
   HeightModel model_ = calibrated(painter_, LightCorrection::none).model;
   HeightEstimator estimator_{model_};
 };
@@ -208,14 +208,14 @@ TEST_F(Faults, BlackAndSaturatedFramesAreFlagged) {
 }
 
 TEST_F(Faults, ContactThatLeavesThePictureIsFlagged) {
-  const test::Ball ball{{0.5, 5.0}, 4.0, 2.0};
+  const fixtures::Ball ball{{0.5, 5.0}, 4.0, 2.0};
   const cv::Mat frame = painter_.paint([&](const Eigen::Vector2d& place) { return ball.at(place); });
   HeightEstimator open(model_, {.border = HeightBorder::free});
   EXPECT_TRUE(open.estimate(frame).contact_at_border);
 }
 
 TEST_F(Faults, FreeBorderKeepsAContactsShapeThatLeavesThePicture) {
-  const test::Ball ball{{0.5, 5.0}, 4.0, 2.0};
+  const fixtures::Ball ball{{0.5, 5.0}, 4.0, 2.0};
   const auto field = [&](const Eigen::Vector2d& place) { return ball.at(place); };
   const cv::Mat frame = painter_.paint(field);
   cv::Mat truth = painter_.heights(field);

@@ -10,14 +10,14 @@ namespace touchstone::sensors {
 namespace {
 
 TEST(ReliefDetail, DoesNotSeeDepthTiltOrSag) {
-  const test::Surface relief = test::strewn_relief(1);
-  const test::Surface sagged = [&](const Eigen::Vector2d& p) {
+  const fixtures::Surface relief = fixtures::strewn_relief(1);
+  const fixtures::Surface sagged = [&](const Eigen::Vector2d& p) {
     return relief(p) + 0.2 + 0.004 * p.x() - 0.003 * p.y() - 0.001 * p.squaredNorm();
   };
-  test::Camera still;
+  fixtures::Camera still;
   still.noise_mm = 0.0;
-  const ReliefDetail a = relief_detail(test::touch_of(relief, {}, 1, still), {});
-  const ReliefDetail b = relief_detail(test::touch_of(sagged, {}, 1, still), {});
+  const ReliefDetail a = relief_detail(fixtures::touch_of(relief, {}, 1, still), {});
+  const ReliefDetail b = relief_detail(fixtures::touch_of(sagged, {}, 1, still), {});
   // Away from the image's border, where a sloping surface's mean is one-sided.
   const cv::Rect inner(60, 60, 200, 120);
   EXPECT_LT(cv::norm(a.detail_mm(inner), b.detail_mm(inner), cv::NORM_INF), 0.003);
@@ -41,7 +41,7 @@ TEST(ReliefDetail, UntouchedSurroundingsDoNotLeakIn) {
 }
 
 TEST(HeightFeatures, StandOnlyWhereTheObjectTouches) {
-  TouchImage touch = test::touch_of(test::strewn_relief(2), {}, 1);
+  TouchImage touch = fixtures::touch_of(fixtures::strewn_relief(2), {}, 1);
   touch.contact.colRange(0, 160).setTo(0);
   DetailSettings settings;
   const HeightFeatures features = HeightFeatureDetector().detect(relief_detail(touch, settings));
@@ -50,18 +50,18 @@ TEST(HeightFeatures, StandOnlyWhereTheObjectTouches) {
 }
 
 TEST(HeightFeatures, NoiseMakesNextToNone) {
-  const test::Surface plane = [](const Eigen::Vector2d& p) { return 0.3 + 0.01 * p.x(); };
+  const fixtures::Surface plane = [](const Eigen::Vector2d& p) { return 0.3 + 0.01 * p.x(); };
   const HeightFeatureDetector detector;
-  const auto features = [&](const test::Surface& surface) {
-    return static_cast<double>(detector.detect(relief_detail(test::touch_of(surface, {}, 1), {})).points.size());
+  const auto features = [&](const fixtures::Surface& surface) {
+    return static_cast<double>(detector.detect(relief_detail(fixtures::touch_of(surface, {}, 1), {})).points.size());
   };
-  EXPECT_LT(features(plane), 0.05 * features(test::strewn_relief(2)));
+  EXPECT_LT(features(plane), 0.05 * features(fixtures::strewn_relief(2)));
 }
 
 TEST(HeightFeatures, TheStrongestAreKept) {
   FeatureSettings few;
   few.most_features = 20;
-  const ReliefDetail detail = relief_detail(test::touch_of(test::strewn_relief(2), {}, 1), {});
+  const ReliefDetail detail = relief_detail(fixtures::touch_of(fixtures::strewn_relief(2), {}, 1), {});
   EXPECT_EQ(HeightFeatureDetector(few).detect(detail).points.size(), 20u);
 }
 

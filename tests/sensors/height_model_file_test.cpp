@@ -31,9 +31,9 @@ class HeightModelFile : public ::testing::Test {
     return [bytes = std::move(bytes)] { height_model_from_bytes(bytes, "m.gel"); };
   }
   std::string replaced(const std::string& from, const std::string& to) {
-    return test::with_line_changed(bytes_, from, to);
+    return fixtures::with_line_changed(bytes_, from, to);
   }
-  test::GelPainter painter_{120, 90, 0.053, {.fall_off = 0.1}};
+  fixtures::GelPainter painter_{120, 90, 0.053, {.fall_off = 0.1}};
   HeightModel model_;
   std::string bytes_;
 };
@@ -53,7 +53,7 @@ TEST_F(HeightModelFile, ReadingGivesTheSameBits) {
 TEST_F(HeightModelFile, DamageIsNoticed) {
   EXPECT_THAT(reading(""), ThrowsMessage<Error>(HasSubstr("m.gel: isn't a height model")));
   EXPECT_THAT(reading("PNG\n"), ThrowsMessage<Error>(HasSubstr("isn't a height model")));
-  test::expect_damage_is_noticed([](const std::string& bytes) { height_model_from_bytes(bytes, "m.gel"); }, bytes_);
+  fixtures::expect_damage_is_noticed([](const std::string& bytes) { height_model_from_bytes(bytes, "m.gel"); }, bytes_);
 }
 
 TEST_F(HeightModelFile, FieldsAreChecked) {

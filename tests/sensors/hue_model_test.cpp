@@ -20,8 +20,8 @@
 namespace touchstone::sensors {
 namespace {
 
-using test::ColourPicture;
-using test::PaintedGel;
+using fixtures::ColourPicture;
+using fixtures::PaintedGel;
 using testing::HasSubstr;
 using touchstone::test::message_of;
 
@@ -264,7 +264,7 @@ TEST(HueModel, RankingPutsTheFormThatMadeTheSamplesFirst) {
 // From here on pictures are painted, found and read.
 
 ColourPicture painted_sensor(double noise = 1.0) {
-  ColourPicture picture = test::small_colour_picture(20.0);
+  ColourPicture picture = fixtures::small_colour_picture(20.0);
   picture.film_px = 21.0;
   picture.noise = noise;
   picture.samples = 6;
@@ -292,12 +292,12 @@ struct PaintedSamples {
 PaintedSamples paint_samples(ColourPicture picture, int pictures, std::uint64_t seed, const PaintedGel& gel = {}) {
   ColourMarkerFinder finder({.grid = {picture.columns, picture.rows}});
   PaintedSamples out;
-  out.rest = finder.find_rest(test::paint_colour_markers(picture));
+  out.rest = finder.find_rest(fixtures::paint_colour_markers(picture));
   for (int i = 0; i < pictures; ++i) {
     picture.seed = seed + static_cast<std::uint64_t>(i);
     const auto displacements = random_displacements(picture.count(), picture.seed);
-    test::displace(picture, displacements, gel);
-    const ColourMarkerReading& reading = finder.find(test::paint_colour_markers(picture));
+    fixtures::displace(picture, displacements, gel);
+    const ColourMarkerReading& reading = finder.find(fixtures::paint_colour_markers(picture));
     for (std::size_t marker = 0; marker < picture.count(); ++marker) {
       if (reading.markers[marker].flaw != MarkerFlaw::kNone) continue;
       out.samples.push_back({marker, reading.markers[marker], displacements[marker], i});

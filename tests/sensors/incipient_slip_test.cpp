@@ -50,7 +50,7 @@ struct Field {
   double noise_px = 0.04;
 
   explicit Field(double spacing = 22.6) {
-    markers.rest = test::marker_grid(spacing);
+    markers.rest = fixtures::marker_grid(spacing);
     markers.positions = markers.rest;
     markers.status.assign(markers.rest.size(), MarkerStatus::kFound);
     true_displacement.assign(markers.rest.size(), Eigen::Vector2d::Zero());
@@ -282,16 +282,16 @@ TEST(IncipientSlip, TooFewMarkersGiveNoLag) {
 
 TEST(IncipientSlip, IsFoundInPictures) {
   // The whole way: pictures, tracker, patch, detector, with noise.
-  test::MarkerPicture picture;
+  fixtures::MarkerPicture picture;
   picture.noise = 2.0;
-  const auto rest = test::marker_grid();
+  const auto rest = fixtures::marker_grid();
   MarkerTracker tracker({});
   IncipientSlipDetector detector(kWholePatch);
   auto places = rest;
   std::vector<SlipState> states;
   for (int frame = 0; frame < 12; ++frame) {
     const TrackedMarkers& markers =
-        tracker.track({test::paint_markers(picture, places, static_cast<std::uint64_t>(1 + frame)), frame});
+        tracker.track({fixtures::paint_markers(picture, places, static_cast<std::uint64_t>(1 + frame)), frame});
     cv::Mat mask = disc(kCentre + Eigen::Vector2d(0.8 * frame, 0.0), kRadius);
     erase_markers(mask, markers, 5.0);
     states.push_back(detector.look(markers, contact_patch(mask, 100)).state);

@@ -22,9 +22,9 @@ class MarkerComplianceFile : public ::testing::Test {
     return [bytes = std::move(bytes)] { marker_compliance_from_bytes(bytes, "m.bin"); };
   }
   std::string replaced(const std::string& from, const std::string& to) {
-    return test::with_line_changed(bytes_, from, to);
+    return fixtures::with_line_changed(bytes_, from, to);
   }
-  const MarkerCompliance map_ = test::half_space_markers(3, 4, 2.0);
+  const MarkerCompliance map_ = fixtures::half_space_markers(3, 4, 2.0);
   const std::string bytes_ = to_bytes(map_);
 };
 
@@ -42,8 +42,8 @@ TEST_F(MarkerComplianceFile, ReadingGivesTheSameBits) {
 TEST_F(MarkerComplianceFile, DamageIsNoticed) {
   EXPECT_THAT(reading(""), ThrowsMessage<Error>(HasSubstr("m.bin: isn't a marker compliance")));
   EXPECT_THAT(reading("\n"), ThrowsMessage<Error>(HasSubstr("isn't a marker compliance")));
-  test::expect_damage_is_noticed([](const std::string& bytes) { marker_compliance_from_bytes(bytes, "m.bin"); },
-                                 bytes_);
+  fixtures::expect_damage_is_noticed([](const std::string& bytes) { marker_compliance_from_bytes(bytes, "m.bin"); },
+                                     bytes_);
 }
 
 TEST_F(MarkerComplianceFile, FieldsAreChecked) {

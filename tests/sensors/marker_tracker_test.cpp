@@ -14,9 +14,9 @@
 namespace touchstone::sensors {
 namespace {
 
-using test::marker_grid;
-using test::MarkerPicture;
-using test::paint_markers;
+using fixtures::marker_grid;
+using fixtures::MarkerPicture;
+using fixtures::paint_markers;
 
 /// Index of the marker that was at `home` in the first frame.
 std::size_t marker_at(const TrackedMarkers& markers, const Eigen::Vector2d& home) {

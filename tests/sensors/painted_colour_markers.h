@@ -13,7 +13,7 @@
 
 #include "core/random.h"
 
-namespace touchstone::sensors::test {
+namespace touchstone::sensors::fixtures {
 
 struct ColourPicture {
   int width = 600;
@@ -172,4 +172,4 @@ inline ColourPicture small_colour_picture(double marker_px = 8.0) {
   return picture;
 }
 
-}  // namespace touchstone::sensors::test
+}  // namespace touchstone::sensors::fixtures

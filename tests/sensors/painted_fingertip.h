@@ -12,7 +12,7 @@
 #include "sensors/dots_motion.h"
 #include "sensors/dots_picture.h"
 
-namespace touchstone::sensors::test {
+namespace touchstone::sensors::fixtures {
 
 /// Lengths in pixels at rest: with 0.65 mm a pixel, dots 1 mm wide and about 2 mm apart.
 struct FingertipPainter {
@@ -87,4 +87,4 @@ inline double dilation_of(double press_mm, double distance_mm = 16.0) {
   return distance_mm / (distance_mm - press_mm);
 }
 
-}  // namespace touchstone::sensors::test
+}  // namespace touchstone::sensors::fixtures

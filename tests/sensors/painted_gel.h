@@ -12,7 +12,7 @@
 #include "core/units.h"
 #include "sensors/ball_press.h"
 
-namespace touchstone::sensors::test {
+namespace touchstone::sensors::fixtures {
 
 /// Height and slope at a place, mm and mm/mm.
 struct Relief {
@@ -130,4 +130,4 @@ class GelPainter {
   std::uint64_t frames_ = 0;
 };
 
-}  // namespace touchstone::sensors::test
+}  // namespace touchstone::sensors::fixtures

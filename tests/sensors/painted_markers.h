@@ -11,7 +11,7 @@
 
 #include "core/random.h"
 
-namespace touchstone::sensors::test {
+namespace touchstone::sensors::fixtures {
 
 struct MarkerPicture {
   int width = 320;
@@ -73,4 +73,4 @@ inline cv::Mat paint_markers(const MarkerPicture& picture, const std::vector<Eig
   return image;
 }
 
-}  // namespace touchstone::sensors::test
+}  // namespace touchstone::sensors::fixtures

@@ -8,7 +8,7 @@
 
 #include "core/error.h"
 
-namespace touchstone::sensors::test {
+namespace touchstone::sensors::fixtures {
 
 /// `bytes` with a piece of its first line replaced.
 inline std::string with_line_changed(std::string bytes, const std::string& from, const std::string& to) {
@@ -32,4 +32,4 @@ void expect_damage_is_noticed(const Read& read, const std::string& bytes) {
   EXPECT_THAT([&] { read(flipped); }, ThrowsMessage<Error>(HasSubstr("checksum")));
 }
 
-}  // namespace touchstone::sensors::test
+}  // namespace touchstone::sensors::fixtures

@@ -38,7 +38,7 @@ TEST(PlaceMap, TakesTheLensOut) {
   const PlaceMap map = fit_place_map(all.pixels, all.places, kSize);
   EXPECT_LT(map.rms_px, 1e-9) << "a cubic is a cubic";
   EXPECT_NEAR(map.mm_per_px, 0.05, 1e-4);
-  const test::Surface relief = test::strewn_relief(8);
+  const fixtures::Surface relief = fixtures::strewn_relief(8);
   // What the bent camera sees of the relief, and what a straight one would.
   cv::Mat height(kSize, CV_32FC1, cv::Scalar(0));
   const PixelFrame frame = touch_frame(kSize, 0.05);

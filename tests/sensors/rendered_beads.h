@@ -11,7 +11,7 @@
 #include "core/frame.h"
 #include "core/random.h"
 
-namespace touchstone::sensors::test {
+namespace touchstone::sensors::fixtures {
 
 struct BeadPicture {
   int width = 640;
@@ -105,4 +105,4 @@ class BeadPainter {
   std::vector<float> shade_at_;
 };
 
-}  // namespace touchstone::sensors::test
+}  // namespace touchstone::sensors::fixtures

@@ -11,9 +11,9 @@
 namespace touchstone::sensors {
 namespace {
 
-using test::known_model;
-using test::moved;
-using test::rest_grid;
+using fixtures::known_model;
+using fixtures::moved;
+using fixtures::rest_grid;
 
 TEST(BeadCoordinates, DepthIsTheMeanDistanceToTheFourNeighbours) {
   std::vector<Eigen::Vector2d> positions = rest_grid(3, 10.0);

@@ -12,7 +12,7 @@
 namespace touchstone::sensors {
 namespace {
 
-using test::known_model;
+using fixtures::known_model;
 using testing::HasSubstr;
 using testing::StartsWith;
 

@@ -12,9 +12,9 @@
 namespace touchstone::sensors {
 namespace {
 
-using test::known_model;
-using test::load_cycle_samples;
-using test::samples_of;
+using fixtures::known_model;
+using fixtures::load_cycle_samples;
+using fixtures::samples_of;
 
 double largest_difference(const StiffnessForceModel& a, const StiffnessForceModel& b) {
   double largest = 0.0;

@@ -11,8 +11,8 @@
 namespace touchstone::sensors {
 namespace {
 
-using test::Surface;
-using test::touch_of;
+using fixtures::Surface;
+using fixtures::touch_of;
 using ::testing::HasSubstr;
 using touchstone::test::message_of;
 
@@ -24,7 +24,7 @@ TactileMap map_of(const Surface& surface) {
 
 TEST(TactileMapFaults, NoContactIsNotLocalisedAndMakesNoRoot) {
   const Surface nothing = [](const Eigen::Vector2d&) { return 0.0; };
-  EXPECT_EQ(map_of(test::strewn_relief(1)).localise(touch_of(nothing, {}, 2)).outcome, Outcome::no_contact);
+  EXPECT_EQ(map_of(fixtures::strewn_relief(1)).localise(touch_of(nothing, {}, 2)).outcome, Outcome::no_contact);
   TactileMap map;
   EXPECT_EQ(map.add(touch_of(nothing, {}, 2)).outcome, Outcome::no_contact);
   EXPECT_TRUE(map.empty());
@@ -32,10 +32,10 @@ TEST(TactileMapFaults, NoContactIsNotLocalisedAndMakesNoRoot) {
 
 TEST(TactileMapFaults, APlaneIsNotLocalised) {
   const Surface plane = [](const Eigen::Vector2d& p) { return 0.3 + 0.01 * p.x(); };
-  EXPECT_FALSE(map_of(test::strewn_relief(1)).localise(touch_of(plane, {}, 2)).localised());
+  EXPECT_FALSE(map_of(fixtures::strewn_relief(1)).localise(touch_of(plane, {}, 2)).localised());
   EXPECT_FALSE(map_of(plane).localise(touch_of(plane, {}, 2)).localised());
   const Surface still = [](const Eigen::Vector2d&) { return 0.3; };
-  test::Camera noiseless;
+  fixtures::Camera noiseless;
   noiseless.noise_mm = 0.0;
   EXPECT_EQ(map_of(plane).localise(touch_of(still, {}, 2, noiseless)).outcome, Outcome::no_texture);
 }
@@ -70,41 +70,41 @@ TEST(TactileMapFaults, AGridIsNotLocalised) {
 }
 
 TEST(TactileMapFaults, AnotherObjectIsNotLocalised) {
-  const TactileMap map = map_of(test::strewn_relief(1));
+  const TactileMap map = map_of(fixtures::strewn_relief(1));
   for (std::uint64_t seed = 2; seed < 8; ++seed) {
-    EXPECT_FALSE(map.localise(touch_of(test::strewn_relief(seed), {}, seed)).localised());
+    EXPECT_FALSE(map.localise(touch_of(fixtures::strewn_relief(seed), {}, seed)).localised());
   }
 }
 
 TEST(TactileMapFaults, AMirroredObjectIsNotLocalised) {
-  const Surface relief = test::strewn_relief(1);
+  const Surface relief = fixtures::strewn_relief(1);
   const Surface mirrored = [&](const Eigen::Vector2d& p) { return relief({-p.x(), p.y()}); };
   EXPECT_FALSE(map_of(relief).localise(touch_of(mirrored, {}, 2)).localised());
 }
 
 TEST(TactileMapFaults, ARefusedTouchLeavesTheMapAsItWas) {
-  TactileMap map = map_of(test::strewn_relief(1));
+  TactileMap map = map_of(fixtures::strewn_relief(1));
   const cv::Mat before = map.data().height_mm.clone();
-  EXPECT_FALSE(map.add(touch_of(test::strewn_relief(2), {}, 2)).localised());
+  EXPECT_FALSE(map.add(touch_of(fixtures::strewn_relief(2), {}, 2)).localised());
   EXPECT_EQ(map.data().touches, 1);
   EXPECT_EQ(cv::norm(before, map.data().height_mm, cv::NORM_INF), 0.0);
 }
 
 TEST(TactileMapFaults, BadTouchesAreNamed) {
-  TactileMap map = map_of(test::strewn_relief(1));
-  TouchImage touch = touch_of(test::strewn_relief(1), {}, 1);
+  TactileMap map = map_of(fixtures::strewn_relief(1));
+  TouchImage touch = touch_of(fixtures::strewn_relief(1), {}, 1);
   touch.height_mm.at<float>(7, 11) = std::numeric_limits<float>::quiet_NaN();
   EXPECT_THAT(message_of([&] { map.localise(touch); }), HasSubstr("pixel (11, 7) is nan"));
   EXPECT_THAT(message_of([&] { map.add(touch); }), HasSubstr("pixel (11, 7) is nan"));
 
-  touch = touch_of(test::strewn_relief(1), {}, 1);
+  touch = touch_of(fixtures::strewn_relief(1), {}, 1);
   touch.contact = touch.contact.rowRange(0, 100);
   EXPECT_THAT(message_of([&] { map.localise(touch); }), HasSubstr("320 x 100"));
-  touch = touch_of(test::strewn_relief(1), {}, 1);
+  touch = touch_of(fixtures::strewn_relief(1), {}, 1);
   touch.height_mm.convertTo(touch.height_mm, CV_64F);
   EXPECT_THAT(message_of([&] { map.localise(touch); }), HasSubstr("CV_32FC1"));
   EXPECT_THAT(message_of([&] { map.localise({}); }), HasSubstr("no heights"));
-  touch = touch_of(test::strewn_relief(1), {}, 1);
+  touch = touch_of(fixtures::strewn_relief(1), {}, 1);
   touch.mm_per_px = 0.0;
   EXPECT_THAT(message_of([&] { map.localise(touch); }), HasSubstr("0 mm wide"));
   touch.mm_per_px = 0.06;
@@ -112,7 +112,8 @@ TEST(TactileMapFaults, BadTouchesAreNamed) {
 }
 
 TEST(TactileMapFaults, AnEmptyMapLocalisesNothing) {
-  EXPECT_THAT(message_of([&] { TactileMap().localise(touch_of(test::strewn_relief(1), {}, 1)); }), HasSubstr("empty"));
+  EXPECT_THAT(message_of([&] { TactileMap().localise(touch_of(fixtures::strewn_relief(1), {}, 1)); }),
+              HasSubstr("empty"));
 }
 
 }  // namespace

@@ -15,10 +15,10 @@ namespace {
 using ::testing::HasSubstr;
 
 TactileMap small_map() {
-  test::Camera small;
+  fixtures::Camera small;
   small.columns = 120, small.rows = 100;
   TactileMap map;
-  map.add(test::touch_of(test::strewn_relief(1), {}, 1, small));
+  map.add(fixtures::touch_of(fixtures::strewn_relief(1), {}, 1, small));
   return map;
 }
 
@@ -52,10 +52,10 @@ TEST(TactileMapFile, AMapComesBackAsItWas) {
 
 TEST(TactileMapFile, ALoadedMapLocalisesAsTheOldOne) {
   const Eigen::Vector2d place(0.4, -0.3);
-  const TouchImage touch = test::touch_of(test::strewn_relief(1), {0.5, place}, 2);
-  test::Camera camera;
+  const TouchImage touch = fixtures::touch_of(fixtures::strewn_relief(1), {0.5, place}, 2);
+  fixtures::Camera camera;
   TactileMap map;
-  map.add(test::touch_of(test::strewn_relief(1), {}, 1, camera));
+  map.add(fixtures::touch_of(fixtures::strewn_relief(1), {}, 1, camera));
   const TactileMap back(tactile_map_from_bytes(to_bytes(map.data()), "a.map"));
   const Registration a = map.localise(touch), b = back.localise(touch);
   ASSERT_TRUE(b.localised());

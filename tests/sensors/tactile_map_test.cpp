@@ -9,8 +9,8 @@
 namespace touchstone::sensors {
 namespace {
 
-using test::Surface;
-using test::touch_of;
+using fixtures::Surface;
+using fixtures::touch_of;
 
 struct PoseError {
   double mm, degrees;
@@ -22,7 +22,7 @@ PoseError error_of(const PlanarPose& found, const PlanarPose& truth) {
 }
 
 TEST(TactileMap, EveryTurnIsLocalisedByFeaturesAlone) {
-  const Surface relief = test::strewn_relief(3);
+  const Surface relief = fixtures::strewn_relief(3);
   TactileMapSettings plain;
   plain.registration.refine = false;
   TactileMap text(plain), ours;
@@ -61,7 +61,7 @@ double rms_error(const TactileMap& map, const Surface& relief, const PlanarPose&
 }
 
 TEST(TactileMap, GrowsTouchByTouchAndKeepsTheRelief) {
-  const Surface relief = test::strewn_relief(5);
+  const Surface relief = fixtures::strewn_relief(5);
   const PlanarPose root{0.3, {-2.0, 1.0}};
   TactileMap map;
   ASSERT_TRUE(map.empty());
@@ -81,7 +81,7 @@ TEST(TactileMap, GrowsTouchByTouchAndKeepsTheRelief) {
 }
 
 TEST(TactileMap, OverlapsAreAveraged) {
-  const Surface relief = test::strewn_relief(5);
+  const Surface relief = fixtures::strewn_relief(5);
   TactileMap once, often;
   once.add(touch_of(relief, {}, 1));
   for (std::uint64_t i = 1; i <= 9; ++i) ASSERT_TRUE(often.add(touch_of(relief, {}, i)).localised());
@@ -89,7 +89,7 @@ TEST(TactileMap, OverlapsAreAveraged) {
 }
 
 TEST(TactileMap, WithoutLevellingHeightsAreThoseOfTheTouches) {
-  const Surface relief = test::strewn_relief(5);
+  const Surface relief = fixtures::strewn_relief(5);
   const Surface deeper = [&](const Eigen::Vector2d& p) { return relief(p) + 0.02; };
   TactileMapSettings text;
   text.level = false;
@@ -106,10 +106,10 @@ TEST(TactileMap, WithoutLevellingHeightsAreThoseOfTheTouches) {
 }
 
 TEST(TactileMap, ATouchOfAnotherSizeIsLocalised) {
-  const Surface relief = test::strewn_relief(6);
+  const Surface relief = fixtures::strewn_relief(6);
   TactileMap map;
   map.add(touch_of(relief, {}, 1));
-  test::Camera small;
+  fixtures::Camera small;
   small.columns = 200, small.rows = 160;
   const PlanarPose truth{-1.0, {1.0, 0.5}};
   const Registration found = map.localise(touch_of(relief, truth, 2, small));
@@ -154,7 +154,7 @@ TEST(TactileMap, BulgesThatStayWithTheSensorDontHideThePlug) {
 
 TEST(TactileMap, PartOfAnObjectIsEnough) {
   // Contact in one half of the image only, as on a tilted object.
-  const Surface relief = test::strewn_relief(6);
+  const Surface relief = fixtures::strewn_relief(6);
   TactileMap map;
   map.add(touch_of(relief, {}, 1));
   const PlanarPose truth{2.0, {1.0, 0.5}};

@@ -148,7 +148,7 @@ TEST(TextureModelFile, WhatIsReadIsWhatWasWrittenBitForBit) {
 }
 
 TEST(TextureModelFile, AnEmptyModelCanBeKept) {
-  const TextureModel read = texture_model_from_bytes(to_bytes({}), "empty");
+  const TextureModel read = texture_model_from_bytes(to_bytes(TextureModel{}), "empty");
   EXPECT_TRUE(read.classes.empty());
   EXPECT_EQ(read.op, TextureOperator{});
 }

@@ -19,7 +19,7 @@ constexpr int kWidth = 240;
 constexpr int kHeight = 180;
 constexpr double kScale = 0.053;
 const Eigen::Vector2d kCentre_px(120, 90);
-const test::Ball kBall{kScale * kCentre_px, 6.0, 2.2};
+const fixtures::Ball kBall{kScale * kCentre_px, 6.0, 2.2};
 
 LinearForce line(double newton_per_unit) {
   LinearForce force;
@@ -31,7 +31,7 @@ class TouchReaderTest : public ::testing::Test {
  protected:
   TouchReaderTest() {
     static const HeightModel model = [] {
-      test::GelPainter painter(kWidth, kHeight, kScale, {});
+      fixtures::GelPainter painter(kWidth, kHeight, kScale, {});
       HeightCalibrationSettings settings;
       settings.mm_per_px = kScale;
       settings.table.most_cells = 1U << 15U;
@@ -46,10 +46,10 @@ class TouchReaderTest : public ::testing::Test {
   }
 
   /// The gel with its markers at these places.
-  cv::Mat frame(const test::Field& field, const std::vector<Eigen::Vector2d>& places) {
+  cv::Mat frame(const fixtures::Field& field, const std::vector<Eigen::Vector2d>& places) {
     cv::Mat picture = painter_.paint(field);
     const cv::Mat ink =
-        test::paint_markers({.width = kWidth, .height = kHeight, .brightness = 255, .shading = 0}, places);
+        fixtures::paint_markers({.width = kWidth, .height = kHeight, .brightness = 255, .shading = 0}, places);
     cv::multiply(picture, ink, picture, 1.0 / 255);
     return picture;
   }
@@ -61,11 +61,11 @@ class TouchReaderTest : public ::testing::Test {
     return places;
   }
 
-  static test::Relief nothing(const Eigen::Vector2d&) { return {}; }
-  static test::Relief ball(const Eigen::Vector2d& place) { return kBall.at(place); }
+  static fixtures::Relief nothing(const Eigen::Vector2d&) { return {}; }
+  static fixtures::Relief ball(const Eigen::Vector2d& place) { return kBall.at(place); }
 
-  test::GelPainter painter_{kWidth, kHeight, kScale, {}};
-  std::vector<Eigen::Vector2d> rest_ = test::marker_grid(22.6, kWidth, kHeight);
+  fixtures::GelPainter painter_{kWidth, kHeight, kScale, {}};
+  std::vector<Eigen::Vector2d> rest_ = fixtures::marker_grid(22.6, kWidth, kHeight);
   TouchCalibration calibration_;
 };
 

@@ -20,7 +20,7 @@ constexpr double kLateral = 0.02, kNormal = 0.06;  // mm, as the settings have i
 
 class Inversion : public ::testing::Test {
  protected:
-  Inversion() : map_(test::half_space_markers(7, 12, 1.5)) {}
+  Inversion() : map_(fixtures::half_space_markers(7, 12, 1.5)) {}
 
   /// Tractions on the gel of a round contact of radius 4.5 mm about (x, y): a pressure that falls to the rim, and the
   /// same times `shear` along the gel.

@@ -19,7 +19,7 @@ OutputSpec all_layers() {
                                 "outputs.yaml");
 }
 
-SeenGeometry seen_of(const Played& p, const fem::PressState& press) {
+SeenGeometry seen_of(const PlayedTruth& p, const fem::PressState& press) {
   const std::vector<VisibleObject> objects = visible_objects(p.scene);
   return seen_geometry(p.scene, p.plan, objects, VisibleGel(*p.gel), press);
 }
@@ -29,18 +29,18 @@ render::LensCamera lens_of(const DeviceSpec& device) {
 }
 
 /// A bare gel that nothing has touched yet, before the lens.
-const Played& bare() {
-  static const Played played = [] {
-    SceneSpec scene = small_scene("  - {frames: 1, z: {position_mm: 4.4}}\n");
+const PlayedTruth& bare() {
+  static const PlayedTruth played = [] {
+    SceneSpec scene = truth_scene("  - {frames: 1, z: {position_mm: 4.4}}\n");
     make_lens(*scene.device.camera);
     scene.device.beads.reset();
-    return Played(scene);
+    return PlayedTruth(scene);
   }();
   return played;
 }
 
 TEST(LensTruth, AnUndistortedLensInThePinholesPlaceHasItsLayers) {
-  const Played& p = pressed();
+  const PlayedTruth& p = pressed_truth();
   const SeenGeometry seen = seen_of(p, p.truths.back().press);
   DeviceSpec device = p.scene.device;
   const render::Camera hole = camera_of(*device.camera);
@@ -65,7 +65,7 @@ TEST(LensTruth, AnUndistortedLensInThePinholesPlaceHasItsLayers) {
 
 // By hand: the distortion inverted by bisection, the ray bent by n sin = const, followed to the plane z = 0.
 TEST(LensTruth, DepthOfAFlatGelBeforeATiltedLensIsThatOfTheBentRay) {
-  const Played& p = bare();
+  const PlayedTruth& p = bare();
   DeviceSpec device = p.scene.device;
   device.camera->hole_position_mm = {3.0, -2.0, -16.0};
   const render::LensCamera lens = lens_of(device);
@@ -107,7 +107,7 @@ TEST(LensTruth, DepthOfAFlatGelBeforeATiltedLensIsThatOfTheBentRay) {
 }
 
 TEST(LensTruth, ASidewaysMotionFlowsAsClosedFormHasIt) {
-  const Played& p = bare();
+  const PlayedTruth& p = bare();
   const Eigen::Vector3d motion(0.4, -0.25, 0.0);
   SeenGeometry seen = seen_of(p, p.truths.front().press);
   for (Eigen::Vector3d& rest : seen.sheet.rest) rest -= motion;
@@ -132,7 +132,7 @@ TEST(LensTruth, ASidewaysMotionFlowsAsClosedFormHasIt) {
 
 // k1 = -0.3 turns the picture back at a tangent of 1.05: beyond that the bare formula gives points of the picture.
 TEST(LensTruth, WhatLiesBeyondTheDistortionsFoldHasNoFlow) {
-  const Played& p = bare();
+  const PlayedTruth& p = bare();
   SeenGeometry seen = seen_of(p, p.truths.front().press);
   for (Eigen::Vector3d& rest : seen.sheet.rest) rest.x() -= 40.0;
   DeviceSpec device = p.scene.device;
@@ -144,7 +144,7 @@ TEST(LensTruth, WhatLiesBeyondTheDistortionsFoldHasNoFlow) {
 }
 
 TEST(LensTruth, PixelsThatLookNowhereSeeNothing) {
-  const Played& p = bare();
+  const PlayedTruth& p = bare();
   const SeenGeometry seen = seen_of(p, p.truths.front().press);
   // Made ready for a small picture, then asked for a larger one, whose rim the distortion doesn't reach.
   render::LensCamera lens = lens_of(p.scene.device);
@@ -171,7 +171,7 @@ TEST(LensTruth, PixelsThatLookNowhereSeeNothing) {
 
 // Turned by a quarter about its axis, the camera sees the same in a turned picture: layer by layer, and its frames.
 TEST(LensTruth, ARolledCamerasLayersAreTurnedAsItsPictureIs) {
-  const Played& p = pressed();
+  const PlayedTruth& p = pressed_truth();
   const SeenGeometry seen = seen_of(p, p.truths.back().press);
   DeviceSpec device = p.scene.device;
   make_lens(*device.camera);

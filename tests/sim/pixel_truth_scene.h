@@ -17,7 +17,7 @@
 namespace touchstone::sim {
 
 /// A pad of 12 x 12 x 4 mm with 2 x 2 beads, a camera of 160 x 120 pixels that looks straight up through the plate.
-inline SceneSpec small_scene(const std::string& keys) {
+inline SceneSpec truth_scene(const std::string& keys) {
   SceneSpec scene;
   scene.device = test::small_device({.width = 160, .height = 120, .pixel_pitch_um = 18, .bead_spacing_mm = 5});
   scene.object =
@@ -30,28 +30,29 @@ inline SceneSpec small_scene(const std::string& keys) {
   return scene;
 }
 
-inline const test::TemporaryFolder& cache() {
+inline const test::TemporaryFolder& truth_cache() {
   static const test::TemporaryFolder folder;
   return folder;
 }
 
-struct Played {
+struct PlayedTruth {
   SceneSpec scene;
   Plan plan;
   std::shared_ptr<const fem::Compliance> gel;
   std::vector<Truth> truths;
 
-  explicit Played(SceneSpec scene_of) : scene(std::move(scene_of)), plan(make_plan(scene)) {
-    gel = set_up_gel(scene.device, cache().path());
+  explicit PlayedTruth(SceneSpec scene_of) : scene(std::move(scene_of)), plan(make_plan(scene)) {
+    gel = set_up_gel(scene.device, truth_cache().path());
     truths = play_motion(scene, plan, *gel);
   }
   Capture last() const { return VirtualCamera(scene, plan, *gel, truths.front()).capture(truths.back()); }
 };
 
-inline const char* const kPress = "  - {frames: 1, z: {position_mm: 3.6}}\n  - {frames: 1, x: {position_mm: 0.15}}\n";
+inline const char* const kTruthPress =
+    "  - {frames: 1, z: {position_mm: 3.6}}\n  - {frames: 1, x: {position_mm: 0.15}}\n";
 
-inline const Played& pressed() {
-  static const Played played(small_scene(kPress));
+inline const PlayedTruth& pressed_truth() {
+  static const PlayedTruth played(truth_scene(kTruthPress));
   return played;
 }
 

@@ -31,9 +31,9 @@ INSTANTIATE_TEST_SUITE_P(Cameras, PixelTruthOf, ::testing::Values(CameraType::pi
                          [](const auto& of) { return of.param == CameraType::lens ? "Lens" : "Pinhole"; });
 
 TEST_P(PixelTruthOf, AFlatGelIsAtItsTrueDepthAndDoesNotFlow) {
-  SceneSpec scene = seen_by(small_scene("  - {frames: 1, z: {position_mm: 4.4}}\n"));
+  SceneSpec scene = seen_by(truth_scene("  - {frames: 1, z: {position_mm: 4.4}}\n"));
   scene.device.beads.reset();
-  const Capture capture = Played(scene).last();
+  const Capture capture = PlayedTruth(scene).last();
   EXPECT_TRUE(capture.frame.empty());
   EXPECT_EQ(capture.paths_traced, 0) << "no light is asked for";
   const cv::Mat depth = channel(capture.pixel_truth, "depth.Z"), ids = channel(capture.pixel_truth, "id.ID");
@@ -53,7 +53,7 @@ TEST_P(PixelTruthOf, AFlatGelIsAtItsTrueDepthAndDoesNotFlow) {
 }
 
 TEST_P(PixelTruthOf, BeadsAreCountedAndFlowAsTheirDisplacementSays) {
-  Played p = pressed();
+  PlayedTruth p = pressed_truth();
   p.scene = seen_by(p.scene);
   const Capture capture = p.last();
   const cv::Mat ids = channel(capture.pixel_truth, "id.ID");
@@ -84,7 +84,7 @@ TEST_P(PixelTruthOf, BeadsAreCountedAndFlowAsTheirDisplacementSays) {
 }
 
 TEST(PixelTruth, TheContactIsWhereTheObjectIsAndAsLargeAsTruthHasIt) {
-  const Played& p = pressed();
+  const PlayedTruth& p = pressed_truth();
   const LinearImage truth = p.last().pixel_truth;
   const cv::Mat contact = channel(truth, "contact.Y"), ids = channel(truth, "id.ID");
   const cv::Mat nx = channel(truth, "normal.X"), ny = channel(truth, "normal.Y"), nz = channel(truth, "normal.Z");
@@ -119,7 +119,7 @@ TEST(PixelTruth, TheContactIsWhereTheObjectIsAndAsLargeAsTruthHasIt) {
 }
 
 TEST(PixelTruth, ItIsTheSameBytesOnAnyNumberOfThreadsAndRoundTripsAsExr) {
-  const Played& p = pressed();
+  const PlayedTruth& p = pressed_truth();
   const LinearImage many = p.last().pixel_truth;
   const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
   const LinearImage alone = p.last().pixel_truth;
@@ -135,9 +135,9 @@ TEST(PixelTruth, ItIsTheSameBytesOnAnyNumberOfThreadsAndRoundTripsAsExr) {
 }
 
 TEST(PixelTruth, OnlyWhatIsAskedForIsMade) {
-  SceneSpec scene = small_scene("  - {frames: 1, z: {position_mm: 3.8}}\n");
+  SceneSpec scene = truth_scene("  - {frames: 1, z: {position_mm: 3.8}}\n");
   scene.outputs = parse_yaml<OutputSpec>("{frames: false, error: true, flow: true}", "outputs.yaml");
-  const Capture capture = Played(scene).last();
+  const Capture capture = PlayedTruth(scene).last();
   EXPECT_EQ(capture.pixel_truth.channel_names, (std::vector<std::string>{"flow.X", "flow.Y", "error.irradiance"}));
   const cv::Mat error = channel(capture.pixel_truth, "error.irradiance");
   EXPECT_GT(cv::countNonZero(error > 0.0f), 160 * 120 / 2);
@@ -147,7 +147,7 @@ TEST(PixelTruth, OnlyWhatIsAskedForIsMade) {
 }
 
 TEST(PixelTruth, ADeviceWithoutACameraIsRefused) {
-  SceneSpec scene = small_scene("  - {frames: 1, z: {position_mm: 4.4}}\n");
+  SceneSpec scene = truth_scene("  - {frames: 1, z: {position_mm: 4.4}}\n");
   scene.device.camera.reset();
   scene.outputs = parse_yaml<OutputSpec>("{frames: false, depth: true}", "outputs.yaml");
   try {
@@ -159,7 +159,7 @@ TEST(PixelTruth, ADeviceWithoutACameraIsRefused) {
 }
 
 TEST_P(PixelTruthOf, ProjectionIsTheWayBackFromEveryHitOfATiltedCamera) {
-  const Played& p = pressed();
+  const PlayedTruth& p = pressed_truth();
   SceneSpec scene = seen_by(p.scene);
   scene.device.camera->hole_position_mm = {3.0, -2.0, -16.0};
   const std::vector<VisibleObject> objects = visible_objects(scene);
@@ -179,7 +179,7 @@ TEST_P(PixelTruthOf, ProjectionIsTheWayBackFromEveryHitOfATiltedCamera) {
 }
 
 TEST(FirstHits, APointBehindTheCameraIsNotSeen) {
-  const render::PinholeCamera camera = pinhole_camera(*pressed().scene.device.camera);
+  const render::PinholeCamera camera = pinhole_camera(*pressed_truth().scene.device.camera);
   render::Scene scene;
   scene.environment = render::flat_spectrum(3, 0.0);
   EXPECT_FALSE(render::project_through_faces(scene, camera, {0, 0, -19}));
