@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/core.hpp>
+#include <stdexcept>
 
 #include "core/error.h"
 #include "core/random.h"
@@ -18,6 +19,7 @@ namespace touchstone::lab {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 render::Imager grey_imager() {
   render::Imager imager;
@@ -95,14 +97,14 @@ TEST(MiddleOf, KeepsTheAxisAndTheMosaic) {
 const BenchCurve& curve(const DeviceBench& bench, const std::string& name) {
   const auto found =
       std::find_if(bench.curves.begin(), bench.curves.end(), [&](const auto& c) { return c.name == name; });
-  EXPECT_NE(found, bench.curves.end()) << name;
+  if (found == bench.curves.end()) throw std::runtime_error("no curve '" + name + "'; pictures: " + bench.pictures);
   return *found;
 }
 
 const BenchPoint& point(const BenchCurve& curve, const std::string& setting) {
   const auto found = std::find_if(curve.points.begin(), curve.points.end(),
                                   [&](const auto& p) { return p.setting.find(setting) != std::string::npos; });
-  EXPECT_NE(found, curve.points.end()) << setting;
+  if (found == curve.points.end()) throw std::runtime_error("no point '" + setting + "' of " + curve.name);
   return *found;
 }
 
@@ -114,7 +116,7 @@ sim::DeviceSpec dim_device() {
   device.camera->width = 64;
   device.camera->height = 48;
   device.camera->pixel_pitch_um = 45;
-  device.camera->exposure_us = 5;
+  device.camera->exposure_us = 2;
   device.camera->full_well_e = 1000;
   return device;
 }
@@ -154,17 +156,18 @@ TEST(DeviceBench, TighterContactErrsLess) {
   EXPECT_LT(point(contact, "traction to 1e-10").force_error, 1e-6);
 }
 
-/// Noise goes as the root of the paths' number, as far as some three thousand pixels with bright rare paths can tell.
-TEST(DeviceBench, NoiseGoesAsTheRootOfThePaths) {
+/// Four times the paths halve the noise, as they do if they are drawn by chance. They are stratified, so that it falls
+/// somewhat faster, but not as one over their number: edges and bright rare paths are left to chance.
+TEST(DeviceBench, NoiseFallsAtLeastAsTheRootOfThePaths) {
   const std::vector<BenchPoint>& samples = curve(clear_bench(), "samples").points;
   ASSERT_GE(samples.size(), 3u);
-  const BenchPoint& few = samples.front();
-  const BenchPoint& many = samples.back();
-  EXPECT_EQ(few.work, few.value);
-  const double expected = std::sqrt(many.work / few.work);
-  EXPECT_GE(expected, 4.0);
-  EXPECT_GT(few.pixel_error / many.pixel_error, 0.6 * expected);
-  EXPECT_LT(few.pixel_error / many.pixel_error, 1.7 * expected);
+  EXPECT_EQ(samples.front().work, samples.front().value);
+  for (std::size_t k = 1; k < 3; ++k) {
+    EXPECT_EQ(samples[k].work, 4.0 * samples[k - 1].work);
+    const double falls = samples[k - 1].pixel_error / samples[k].pixel_error;
+    EXPECT_GT(falls, 1.9) << samples[k].setting;
+    EXPECT_LT(falls, 3.9) << samples[k].setting;
+  }
 }
 
 TEST(DeviceBench, CurvesOfPathsEndWhereTheyAreGoodEnough) {
@@ -193,7 +196,7 @@ TEST(DeviceBench, TellsWhatEachEffectBuys) {
   const std::vector<EffectShare>& effects = clear_bench().effects;
   const auto share = [&](const std::string& name) {
     const auto found = std::find_if(effects.begin(), effects.end(), [&](const auto& e) { return e.name == name; });
-    EXPECT_NE(found, effects.end()) << name;
+    if (found == effects.end()) throw std::runtime_error("no effect '" + name + "'");
     return *found;
   };
   EXPECT_TRUE(share("friction").planned);
@@ -214,7 +217,7 @@ TEST(DeviceBench, ReportsAPageATableAndADeviceThatCanBeRead) {
   const auto file = [&](const std::string& name) {
     const auto found =
         std::find_if(result.files.begin(), result.files.end(), [&](const auto& f) { return f.name == name; });
-    EXPECT_NE(found, result.files.end()) << name;
+    if (found == result.files.end()) throw std::runtime_error("no file '" + name + "'");
     return found->text;
   };
   EXPECT_THAT(file("bench.md"), HasSubstr("# What accuracy costs: small"));
@@ -236,6 +239,7 @@ TEST(DeviceBench, ACoatedDeviceHasDirectLightAndItsOwnContactPixels) {
   settings.finite_strain = false;
   settings.most_tetrahedra = kFewTetrahedra;
   const DeviceBench bench = bench_device(test::small_coated_device(), settings);
+  EXPECT_THAT(bench.pictures, Not(HasSubstr("full well")));
   EXPECT_TRUE(std::isfinite(point(curve(bench, "light"), "direct light").pixel_error));
   const BenchCurve& pixels = curve(bench, "contact pixels");
   EXPECT_GT(pixels.points.front().pixel_error, pixels.points.back().pixel_error);

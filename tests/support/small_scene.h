@@ -64,7 +64,7 @@ camera:
   focus_distance_mm: 17
   lens_position_mm: [0, 0, -19]
   look_at_mm: [0, 0, 0]
-  exposure_us: 60
+  exposure_us: 10
   full_well_e: 12000
   read_noise_e: 8
 )",
