@@ -35,24 +35,16 @@ bool meets(const BenchPoint& point, double force_error, double pixel_error) {
   return point.force_error <= force_error && (std::isnan(point.pixel_error) || point.pixel_error <= pixel_error);
 }
 
-/// The coarsest mesh from which on all finer ones that were tried hold, then halfway to the next coarser one.
+/// The coarsest mesh that holds, then halfway to the next coarser one.
 std::optional<MeshPick> pick_mesh(const BenchParts& parts, const BenchCurve& mesh) {
   const double wanted_force = parts.settings.force_error;
   const double wanted_pixel = parts.settings.pixel_error * std::sqrt(kMeshShare);
   const double own = parts.device.mesh.fine_mm;
-  std::optional<MeshPick> best;
-  double coarser = 0.0;  // the next one that doesn't hold
-  std::vector<BenchPoint> by_edge = mesh.points;
-  std::sort(by_edge.begin(), by_edge.end(), [](const auto& a, const auto& b) { return a.value < b.value; });
-  for (const BenchPoint& point : by_edge) {
-    if (!meets(point, wanted_force, wanted_pixel)) {
-      coarser = std::isfinite(point.force_error) ? point.value / own : 0.0;
-      break;
-    }
-    best = MeshPick{point.value / own, point};
-  }
-  if (best && coarser > 0.0) {
-    const double between = std::sqrt(best->edges * coarser);
+  const HoldingMesh found = coarsest_holding(mesh, wanted_force, wanted_pixel);
+  if (found.holds == nullptr) return std::nullopt;
+  MeshPick best{found.holds->value / own, *found.holds};
+  if (found.coarser != nullptr) {
+    const double between = std::sqrt(best.edges * found.coarser->value / own);
     const BenchPoint point = mesh_point(parts, between);
     if (meets(point, wanted_force, wanted_pixel)) best = MeshPick{between, point};
   }
@@ -163,6 +155,23 @@ WholeSeconds whole_seconds(const BenchParts& parts, double edges, const LightTry
 
 }  // namespace
 
+HoldingMesh coarsest_holding(const BenchCurve& mesh, double force_error, double pixel_error) {
+  std::vector<const BenchPoint*> by_edge;
+  for (const BenchPoint& point : mesh.points) {
+    if (std::isfinite(point.force_error)) by_edge.push_back(&point);
+  }
+  std::sort(by_edge.begin(), by_edge.end(), [](const auto* a, const auto* b) { return a->value < b->value; });
+  HoldingMesh found;
+  for (const BenchPoint* point : by_edge) {
+    if (!meets(*point, force_error, pixel_error)) {
+      found.coarser = point;
+      break;
+    }
+    found.holds = point;
+  }
+  return found;
+}
+
 BenchChoice cheapest_choice(const BenchParts& parts, const BenchCurve& mesh, const std::vector<LightTry>& tries,
                             const Progress& progress) {
   const auto tell = [&](int step) {
@@ -173,7 +182,7 @@ BenchChoice cheapest_choice(const BenchParts& parts, const BenchCurve& mesh, con
   std::optional<MeshPick> picked = pick_mesh(parts, mesh);
   if (!picked) {
     const auto least = std::min_element(mesh.points.begin(), mesh.points.end(), [](const auto& a, const auto& b) {
-      return std::isnan(b.force_error) || a.force_error < b.force_error;
+      return std::isfinite(a.force_error) && !(a.force_error >= b.force_error);
     });
     choice.remark = fmt::format(
         "No mesh that was tried holds the wanted errors; the best has edges of {:.3g} mm, a force error of {:.2g} %{}.",

@@ -88,6 +88,14 @@ LightTry try_light(const BenchParts& parts, const TruePictures& truth, const sim
 /// gets the ways of light that were tried.
 std::vector<BenchCurve> light_curves(const BenchParts& parts, std::vector<LightTry>& tries, const Progress& progress);
 
+/// The coarsest mesh from which on all finer ones that could be had hold both errors, and the next coarser one, which
+/// doesn't. Either may be null.
+struct HoldingMesh {
+  const BenchPoint* holds = nullptr;
+  const BenchPoint* coarser = nullptr;
+};
+HoldingMesh coarsest_holding(const BenchCurve& mesh, double force_error, double pixel_error);
+
 BenchChoice cheapest_choice(const BenchParts& parts, const BenchCurve& mesh, const std::vector<LightTry>& tries,
                             const Progress& progress);
 

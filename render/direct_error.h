@@ -13,7 +13,7 @@ namespace touchstone::render {
 
 struct DirectErrorSettings {
   int pixels = 400;    ///< looked at, one in each of as many fields of the picture
-  int samples = 64;    ///< paths a pixel, twice
+  int samples = 64;    ///< paths a pixel, twice; choose_direct takes four times as many where these can't tell
   int max_depth = 16;  ///< RenderSettings::max_depth
   std::uint64_t seed = 0;
 };
@@ -24,6 +24,11 @@ struct DirectError {
   double mean = 0.0, mean_error = 0.0;  ///< direct minus traced
   int pixels = 0;
 };
+
+/// What the root mean square difference isn't above, and not below, with two standard errors of its square, which is
+/// what is measured: a difference that isn't told from none has a root whose own error says little.
+double largest_rms(const DirectError& error);
+double smallest_rms(const DirectError& error);
 
 /// A picture against path tracing of `scene`, all bands. The paths' own noise is not in the result: what is averaged is
 /// the product of the differences from two renderings with independent numbers, whose noise has the mean zero.
@@ -43,7 +48,7 @@ struct DirectChoice {
 };
 
 struct DirectChoiceSettings {
-  double tolerance = 0.015;  ///< of the root mean square difference, with twice its standard error
+  double tolerance = 0.015;  ///< of the root mean square difference: what largest_rms may be
   bool whatever = false;     ///< the error is measured, but any will do
   DirectSettings direct;
   GuideCut guides;

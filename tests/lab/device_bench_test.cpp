@@ -12,6 +12,7 @@
 #include "core/random.h"
 #include "core/yaml_reader.h"
 #include "lab/bench_scene.h"
+#include "lab/device_bench_parts.h"
 #include "tests/support/message_of.h"
 #include "tests/support/small_scene.h"
 
@@ -229,6 +230,30 @@ TEST(DeviceBench, ReportsAPageATableAndADeviceThatCanBeRead) {
   std::size_t points = 0;
   for (const BenchCurve& one : clear_bench().curves) points += one.points.size();
   EXPECT_EQ(static_cast<std::size_t>(std::count(csv.begin(), csv.end(), '\n')), points + 1);
+}
+
+/// Edges of 0.4 mm couldn't be had; from 0.8 mm on forces hold, from 0.6 mm on pictures, too.
+TEST(CoarsestHolding, LeavesOutWhatCouldNotBeHad) {
+  BenchCurve mesh;
+  const auto add = [&](double edge, double force, double pixel) {
+    BenchPoint point;
+    point.value = edge;
+    point.force_error = force;
+    point.pixel_error = pixel;
+    mesh.points.push_back(point);
+  };
+  add(1.0, 0.02, 0.9);
+  add(0.8, 0.009, 0.8);
+  add(0.6, 0.003, 0.6);
+  add(0.5, 0.001, 0.5);
+  add(0.4, kUnknown, kUnknown);
+  const HoldingMesh forces = coarsest_holding(mesh, 0.01, 1.0);
+  ASSERT_NE(forces.holds, nullptr);
+  EXPECT_EQ(forces.holds->value, 0.8);
+  EXPECT_EQ(forces.coarser->value, 1.0);
+  EXPECT_EQ(coarsest_holding(mesh, 0.01, 0.7).holds->value, 0.6);
+  EXPECT_EQ(coarsest_holding(mesh, 1e-4, 1.0).holds, nullptr);
+  EXPECT_EQ(coarsest_holding(mesh, 1.0, 1.0).coarser, nullptr);
 }
 
 TEST(DeviceBench, ACoatedDeviceHasDirectLightAndItsOwnContactPixels) {

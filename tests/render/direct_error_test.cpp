@@ -96,6 +96,18 @@ TEST(DirectError, LeavesTheReferencesNoiseOut) {
   EXPECT_LT(std::abs(error.mean), 4.0 * error.mean_error + 2e-3);
 }
 
+/// The square's bound is its value and two standard errors: of one that isn't told from 0, twice (0.6 %)^2.
+TEST(DirectError, ItsRootIsBoundedByItsSquare) {
+  EXPECT_DOUBLE_EQ(largest_rms({.rms = 0.0, .rms_error = 0.006}), std::sqrt(2.0) * 0.006);
+  EXPECT_EQ(smallest_rms({.rms = 0.0, .rms_error = 0.006}), 0.0);
+  const DirectError told{.rms = 0.1, .rms_error = 0.001};
+  EXPECT_NEAR(largest_rms(told), 0.102, 3e-5);
+  EXPECT_NEAR(smallest_rms(told), 0.098, 3e-5);
+  const DirectError endless{.rms = std::numeric_limits<double>::infinity()};
+  EXPECT_TRUE(std::isinf(largest_rms(endless)));
+  EXPECT_TRUE(std::isinf(smallest_rms(endless)));
+}
+
 TEST(DirectError, OfADarkSceneIsNoneOrEndless) {
   Scene scene = membrane(0.0, false);
   scene.surfaces[0].material = Black{};
@@ -186,6 +198,28 @@ TEST(DirectChoice, TakesDirectLightWhereItIsGoodEnough) {
   EXPECT_EQ(choice.reason, "");
   EXPECT_LT(choice.error.rms, 0.05);
   EXPECT_GT(cv::sum(choice.renderer->render(first).irradiance)[0], 0.0);
+}
+
+TEST(DirectChoice, TakesMorePathsWhereItCannotTell) {
+  const Scene rest = membrane(0.0, true);
+  const Scene scene = membrane(0.6, true);
+  DirectChoiceSettings settings;
+  settings.error = some(100, 1);
+  // The field's accuracy goes by the tolerance up to 2 %, so that all of these draw the same picture.
+  settings.tolerance = 1.0;
+  const DirectChoice sure = choose_direct(rest, scene, camera(), reach(), settings);
+  ASSERT_NE(sure.renderer, nullptr);
+  const double smallest = std::max(0.02, smallest_rms(sure.error));
+  const double largest = largest_rms(sure.error);
+  ASSERT_LT(smallest, 0.9 * largest);
+  settings.tolerance = 0.5 * (smallest + largest);
+  const DirectChoice unsure = choose_direct(rest, scene, camera(), reach(), settings);
+  settings.error = some(100, 4);
+  settings.tolerance = 1.0;
+  const DirectChoice finer = choose_direct(rest, scene, camera(), reach(), settings);
+  EXPECT_EQ(unsure.error.rms, finer.error.rms);
+  EXPECT_EQ(unsure.error.rms_error, finer.error.rms_error);
+  EXPECT_NE(sure.error.rms_error, finer.error.rms_error);
 }
 
 TEST(DirectChoice, SaysWhyNot) {
