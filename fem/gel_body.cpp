@@ -57,7 +57,7 @@ void check_slab(const SlabGel& gel) {
   if (const double tetrahedra = estimated(gel); !(tetrahedra <= kMostTetrahedra)) {
     fail(
         "the slab with its layers would take some {:.3g} tetrahedra; at most {} are allowed: make its fine edge length "
-        "({} mm) larger or its fine box smaller",
+        "({:.4g} mm) larger or its fine box smaller",
         tetrahedra, kMostTetrahedra, gel.mesh.fine);
   }
 }

@@ -16,6 +16,7 @@ constexpr double kFrames = 100.0;     // of a scene, that a camera's set-up is s
 constexpr double kMeshShare = 0.5;    // of the squared pixel error that a mesh may take at most, where light has noise
 constexpr double kFiner = 0.8;        // edges, where a choice didn't hold
 constexpr double kMoreExact = 0.7;    // of the noise of paths, likewise
+constexpr double kOverReference = 1.25;  // of the finest mesh that is tried, times the reference's edges
 constexpr double kBelow = 0.97;       // of a wanted error: where to aim
 constexpr double kAboutAsGood = 1.1;  // times the best error
 constexpr int kMostVerifications = 3;
@@ -35,12 +36,22 @@ bool meets(const BenchPoint& point, double force_error, double pixel_error) {
   return point.force_error <= force_error && (std::isnan(point.pixel_error) || point.pixel_error <= pixel_error);
 }
 
-/// The coarsest mesh that holds, then halfway to the next coarser one.
-std::optional<MeshPick> pick_mesh(const BenchParts& parts, const BenchCurve& mesh) {
+/// The coarsest mesh that holds, then halfway to the next coarser one. Where none does, `mesh` gets finer ones, as near
+/// to the reference as it can still judge.
+std::optional<MeshPick> pick_mesh(const BenchParts& parts, BenchCurve& mesh) {
   const double wanted_force = parts.settings.force_error;
   const double wanted_pixel = parts.settings.pixel_error * std::sqrt(kMeshShare);
   const double own = parts.device.mesh.fine_mm;
-  const HoldingMesh found = coarsest_holding(mesh, wanted_force, wanted_pixel);
+  HoldingMesh found = coarsest_holding(mesh, wanted_force, wanted_pixel);
+  while (found.holds == nullptr) {
+    const BenchPoint* finest = found.coarser;  // of those that could be had
+    if (finest == nullptr || kFiner * finest->value < kOverReference * parts.finest_device.mesh.fine_mm) break;
+    BenchPoint finer = mesh_point(parts, kFiner * finest->value / own);
+    const bool had = std::isfinite(finer.force_error);
+    mesh.points.push_back(std::move(finer));
+    if (!had) break;
+    found = coarsest_holding(mesh, wanted_force, wanted_pixel);
+  }
   if (found.holds == nullptr) return std::nullopt;
   MeshPick best{found.holds->value / own, *found.holds};
   if (found.coarser != nullptr) {
@@ -172,7 +183,7 @@ HoldingMesh coarsest_holding(const BenchCurve& mesh, double force_error, double 
   return found;
 }
 
-BenchChoice cheapest_choice(const BenchParts& parts, const BenchCurve& mesh, const std::vector<LightTry>& tries,
+BenchChoice cheapest_choice(const BenchParts& parts, BenchCurve& mesh, const std::vector<LightTry>& tries,
                             const Progress& progress) {
   const auto tell = [&](int step) {
     if (progress) progress("the cheapest setting", step, 4);

@@ -96,7 +96,8 @@ struct HoldingMesh {
 };
 HoldingMesh coarsest_holding(const BenchCurve& mesh, double force_error, double pixel_error);
 
-BenchChoice cheapest_choice(const BenchParts& parts, const BenchCurve& mesh, const std::vector<LightTry>& tries,
+/// `mesh` gets finer meshes where none of its own holds the wanted errors.
+BenchChoice cheapest_choice(const BenchParts& parts, BenchCurve& mesh, const std::vector<LightTry>& tries,
                             const Progress& progress);
 
 std::vector<EffectShare> effect_shares(const BenchParts& parts, const Progress& progress);

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/units.h"
+#include "fem/smooth_surface.h"
 #include "fem/vibration.h"
 #include "sim/membrane.h"
 #include "sim/plan_direct.h"
@@ -200,6 +201,11 @@ void plan_relief(const SceneSpec& scene, Plan& plan, PlanTable& table) {
   }
   if (plan.fine_relief && plan.elastic_object) {
     fail_at(scene.where, "fine relief isn't simulated with an elastic object; switch one of them off in effects");
+  }
+  if ((plan.fine_relief || scene.outputs.height) && !is_gentle(scene.device.gel)) {
+    fail_at(scene.where, "{} is for flat and gently domed gels (domes of up to {:.3g} degrees at the rim) only{}",
+            plan.fine_relief ? "fine relief" : "outputs.height", fem::kSteepestDome / kRadiansPerDegree,
+            plan.fine_relief ? "; effects.fine_relief: off leaves it out" : "");
   }
   const double pixel = scene.membrane.pixel_um / kMicrometresPerMillimetre;
   const bool asked = fine || scene.effects.fine_relief == Switch::on;

@@ -3,9 +3,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "tests/support/message_of.h"
+
 namespace touchstone::sim {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 
 SceneSpec shipped(const std::string& name) {
@@ -82,6 +85,21 @@ TEST(Plan, AnImageOfAGelThatIsNoSlabIsRefusedAndItsTruthIsnt) {
     scene.outputs.frames = scene.outputs.ideal = scene.outputs.radiance = false;
     EXPECT_FALSE(make_plan(scene).camera);
   }
+}
+
+TEST(Plan, FineReliefAndHeightsOfAGelThatIsNeitherFlatNorAGentleDomeAreRefused) {
+  SceneSpec scene = shipped("cycle.yaml");
+  scene.outputs = {};
+  scene.outputs.frames = false;
+  scene.device.gel.shape = GelShape::fingertip;
+  scene.effects.fine_relief = Switch::on;
+  EXPECT_THAT(test::message_of([&] { make_plan(scene); }),
+              AllOf(HasSubstr("cycle.yaml:"), HasSubstr("fine relief is for flat and gently domed gels"),
+                    HasSubstr("effects.fine_relief: off leaves it out")));
+  scene.effects.fine_relief = Switch::off;
+  EXPECT_EQ(test::message_of([&] { make_plan(scene); }), "no error");
+  scene.outputs.height = true;
+  EXPECT_THAT(test::message_of([&] { make_plan(scene); }), HasSubstr("outputs.height is for flat"));
 }
 
 TEST(Plan, ASwitchOverrulesAndSaysSo) {
