@@ -151,7 +151,8 @@ void check(const Outline& o) {
   const double tetrahedra = estimated_tetrahedra(o);
   if (!(tetrahedra <= kMostTetrahedra)) {
     fail(
-        "{} would take some {:.3g} tetrahedra; at most {} are allowed: make its fine edge length ({:.4g} mm) larger or its "
+        "{} would take some {:.3g} tetrahedra; at most {} are allowed: make its fine edge length ({:.4g} mm) larger or "
+        "its "
         "fine part smaller",
         o.name, tetrahedra, kMostTetrahedra, o.fine);
   }

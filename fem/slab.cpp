@@ -138,7 +138,8 @@ void check(const SlabMesh& slab) {
   const double tetrahedra = estimated_tetrahedra(slab);
   if (!(tetrahedra <= kMostTetrahedra)) {
     fail(
-        "the slab would take some {:.3g} tetrahedra; at most {} are allowed: make its fine edge length ({:.4g} mm) larger "
+        "the slab would take some {:.3g} tetrahedra; at most {} are allowed: make its fine edge length ({:.4g} mm) "
+        "larger "
         "or "
         "its fine box smaller",
         tetrahedra, kMostTetrahedra, slab.fine);

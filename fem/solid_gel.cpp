@@ -135,7 +135,8 @@ void check(const SolidGel& solid) {
   const double tetrahedra = estimated_tetrahedra(solid);
   if (!(tetrahedra <= kMostTetrahedra)) {
     fail(
-        "the gel would take some {:.3g} tetrahedra; at most {} are allowed: make its fine edge length ({:.4g} mm) larger "
+        "the gel would take some {:.3g} tetrahedra; at most {} are allowed: make its fine edge length ({:.4g} mm) "
+        "larger "
         "or "
         "its fine box smaller",
         tetrahedra, kMostTetrahedra, solid.fine);

@@ -12,13 +12,13 @@
 namespace touchstone::lab {
 namespace {
 
-constexpr double kFrames = 100.0;     // of a scene, that a camera's set-up is shared by
-constexpr double kMeshShare = 0.5;    // of the squared pixel error that a mesh may take at most, where light has noise
-constexpr double kFiner = 0.8;        // edges, where a choice didn't hold
-constexpr double kMoreExact = 0.7;    // of the noise of paths, likewise
+constexpr double kFrames = 100.0;   // of a scene, that a camera's set-up is shared by
+constexpr double kMeshShare = 0.5;  // of the squared pixel error that a mesh may take at most, where light has noise
+constexpr double kFiner = 0.8;      // edges, where a choice didn't hold
+constexpr double kMoreExact = 0.7;  // of the noise of paths, likewise
 constexpr double kOverReference = 1.25;  // of the finest mesh that is tried, times the reference's edges
-constexpr double kBelow = 0.97;       // of a wanted error: where to aim
-constexpr double kAboutAsGood = 1.1;  // times the best error
+constexpr double kBelow = 0.97;          // of a wanted error: where to aim
+constexpr double kAboutAsGood = 1.1;     // times the best error
 constexpr int kMostVerifications = 3;
 constexpr int kVerifyingHolds = 6;
 constexpr double kMostWholeSeconds = 40.0;

@@ -43,7 +43,10 @@ struct OutputSpec {
 /// How exact the light has to be.
 struct LightSpec {
   double noise_fraction = 1.0;  ///< a pixel is sampled until its standard error is this part of the imager's noise
-  int min_samples = 8;
+  /// Before the first look at a pixel's error; 8 are judged by two blocks of 4, which are alike by luck where a pixel
+  /// has a print's edge: there pictures of the reflex device were 2.7 of the imager's noise off instead of 1 (of 32:
+  /// 0.7).
+  int min_samples = 32;
   int max_samples = 64;
   double interreflection_tolerance = 0.05;  ///< part of a surface's light that may be left out
   double motion_tolerance_px =
