@@ -173,6 +173,12 @@ std::optional<double> finest_detail(const ObjectSpec& object) {
   return *middle;
 }
 
+/// @pre the gel isn't gentle
+std::string shape_in_words(const GelSpec& gel) {
+  if (gel.shape != GelShape::dome) return "this gel is neither";
+  return fmt::format("this one has {:.3g}", std::asin(gel.base_radius_mm / gel.sphere_radius_mm) / kRadiansPerDegree);
+}
+
 void plan_relief(const SceneSpec& scene, Plan& plan, PlanTable& table) {
   const bool seen = scene.outputs.camera() || scene.outputs.height;
   const double edge = scene.device.mesh.fine_mm;
@@ -203,9 +209,9 @@ void plan_relief(const SceneSpec& scene, Plan& plan, PlanTable& table) {
     fail_at(scene.where, "fine relief isn't simulated with an elastic object; switch one of them off in effects");
   }
   if ((plan.fine_relief || scene.outputs.height) && !is_gentle(scene.device.gel)) {
-    fail_at(scene.where, "{} is for flat and gently domed gels (domes of up to {:.3g} degrees at the rim) only{}",
+    fail_at(scene.where, "{} is for flat and gently domed gels (domes of up to {:.3g} degrees at the rim) only; {}{}",
             plan.fine_relief ? "fine relief" : "outputs.height", fem::kSteepestDome / kRadiansPerDegree,
-            plan.fine_relief ? "; effects.fine_relief: off leaves it out" : "");
+            shape_in_words(scene.device.gel), plan.fine_relief ? "; effects.fine_relief: off leaves it out" : "");
   }
   const double pixel = scene.membrane.pixel_um / kMicrometresPerMillimetre;
   const bool asked = fine || scene.effects.fine_relief == Switch::on;

@@ -13,11 +13,13 @@
 #include "sim/gel_setup.h"
 #include "sim/scene_sight.h"
 #include "sim/virtual_sensor.h"
+#include "tests/support/message_of.h"
 #include "tests/support/temporary_folder.h"
 
 namespace touchstone::sim {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 
 constexpr double kSphere = 15.0;
@@ -314,14 +316,8 @@ TEST(CurvedGel, FineReliefOnASteepDomeIsRefused) {
   SceneSpec scene = scene_of(device("shape: dome, sphere_radius_mm: 7, base_radius_mm: 6"), kPlate, 0, 0, 0.8);
   EXPECT_FALSE(make_plan(scene).fine_relief);
   scene.effects.fine_relief = Switch::on;
-  const auto gel = gel_of(scene.device);
-  try {
-    const SceneSight sight(scene, make_plan(scene), *gel);
-    FAIL() << "no error";
-  } catch (const Error& error) {
-    EXPECT_THAT(error.what(), HasSubstr("gently domed"));
-    EXPECT_THAT(error.what(), HasSubstr("59 degrees"));
-  }
+  EXPECT_THAT(test::message_of([&] { make_plan(scene); }),
+              AllOf(HasSubstr("gently domed"), HasSubstr("this one has 59;")));
 }
 
 TEST(CurvedGel, AFingertipIsAHemisphereOnACylinder) {
