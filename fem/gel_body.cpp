@@ -54,12 +54,7 @@ void check_slab(const SlabGel& gel) {
   SlabMesh core = core_of(gel);
   core.fine = std::min(core.fine, core.thickness);
   check(core);
-  if (const double tetrahedra = estimated(gel); !(tetrahedra <= kMostTetrahedra)) {
-    fail(
-        "the slab with its layers would take some {:.3g} tetrahedra; at most {} are allowed: make its fine edge length "
-        "({:.4g} mm) larger or its fine box smaller",
-        tetrahedra, kMostTetrahedra, gel.mesh.fine);
-  }
+  check_tetrahedra(estimated(gel), "the slab with its layers", gel.mesh.fine);
 }
 
 TetMesh mesh_layered_slab(const SlabGel& gel) {

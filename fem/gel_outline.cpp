@@ -148,14 +148,7 @@ void check(const Outline& o) {
       fail("{}'s layers are {} mm thick together; there is room for {:.3g} mm", o.name, layers, std::max(0.0, room));
     }
   }
-  const double tetrahedra = estimated_tetrahedra(o);
-  if (!(tetrahedra <= kMostTetrahedra)) {
-    fail(
-        "{} would take some {:.3g} tetrahedra; at most {} are allowed: make its fine edge length ({:.4g} mm) larger or "
-        "its "
-        "fine part smaller",
-        o.name, tetrahedra, kMostTetrahedra, o.fine);
-  }
+  check_tetrahedra(estimated_tetrahedra(o), o.name, o.fine, "fine part");
 }
 
 }  // namespace touchstone::fem

@@ -135,15 +135,7 @@ void check(const SlabMesh& slab) {
   if (slab.fine > narrowest) {
     fail("the slab's fine edge length is {} mm; it must not be above its shortest side, {} mm", slab.fine, narrowest);
   }
-  const double tetrahedra = estimated_tetrahedra(slab);
-  if (!(tetrahedra <= kMostTetrahedra)) {
-    fail(
-        "the slab would take some {:.3g} tetrahedra; at most {} are allowed: make its fine edge length ({:.4g} mm) "
-        "larger "
-        "or "
-        "its fine box smaller",
-        tetrahedra, kMostTetrahedra, slab.fine);
-  }
+  check_tetrahedra(estimated_tetrahedra(slab), "the slab", slab.fine);
 }
 
 double estimated_tetrahedra(const SlabMesh& slab) {

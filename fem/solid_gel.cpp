@@ -132,15 +132,7 @@ void check(const SolidGel& solid) {
          size.z());
   }
   refuse_nearly_coincident(solid);
-  const double tetrahedra = estimated_tetrahedra(solid);
-  if (!(tetrahedra <= kMostTetrahedra)) {
-    fail(
-        "the gel would take some {:.3g} tetrahedra; at most {} are allowed: make its fine edge length ({:.4g} mm) "
-        "larger "
-        "or "
-        "its fine box smaller",
-        tetrahedra, kMostTetrahedra, solid.fine);
-  }
+  check_tetrahedra(estimated_tetrahedra(solid), "the gel", solid.fine);
 }
 
 double thickness_of(const SolidGel& solid) {

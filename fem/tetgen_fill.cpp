@@ -199,6 +199,14 @@ std::optional<TetMesh> fill_once(const FillInput& from, const std::string& quali
 
 }  // namespace
 
+void check_tetrahedra(double estimate, std::string_view what, double fine, std::string_view fine_part) {
+  if (estimate <= kMostTetrahedra) return;
+  fail(
+      "{} would take some {:.3g} tetrahedra; at most {} are allowed: make its fine edge length ({:.4g} mm) larger or "
+      "its {} smaller",
+      what, estimate, kMostTetrahedra, fine, fine_part);
+}
+
 TetMesh fill_with_tetrahedra(const FillInput& input, const std::string& what) {
   for (const Eigen::Vector3d& point : input.points) TS_ASSERT(point.allFinite());
   TetMesh best;

@@ -7,6 +7,7 @@
 #include <array>
 #include <functional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "fem/tet_mesh.h"
@@ -43,6 +44,10 @@ inline constexpr double kTetrahedraPerCube = 8.0;
 
 /// More tetrahedra than this are refused before they are made: the elimination would take some 6 GB and a minute.
 inline constexpr double kMostTetrahedra = 60000.0;
+
+/// Refuses them by an estimate: `what` is the body in words, `fine_part` what its fine edges (`fine`, mm) fill.
+/// @throws Error if there would be more than kMostTetrahedra, or the estimate isn't a number
+void check_tetrahedra(double estimate, std::string_view what, double fine, std::string_view fine_part = "fine box");
 
 /// Five degrees, in radians: a mesh without smaller dihedral angles is good.
 inline constexpr double kGoodDihedral = 0.0872664625997165;

@@ -176,7 +176,8 @@ std::optional<double> finest_detail(const ObjectSpec& object) {
 /// @pre the gel isn't gentle
 std::string shape_in_words(const GelSpec& gel) {
   if (gel.shape != GelShape::dome) return "this gel is neither";
-  return fmt::format("this one has {:.3g}", std::asin(gel.base_radius_mm / gel.sphere_radius_mm) / kRadiansPerDegree);
+  return fmt::format("this dome slopes by {:.3g} degrees at its rim",
+                     std::asin(gel.base_radius_mm / gel.sphere_radius_mm) / kRadiansPerDegree);
 }
 
 void plan_relief(const SceneSpec& scene, Plan& plan, PlanTable& table) {
@@ -209,7 +210,7 @@ void plan_relief(const SceneSpec& scene, Plan& plan, PlanTable& table) {
     fail_at(scene.where, "fine relief isn't simulated with an elastic object; switch one of them off in effects");
   }
   if ((plan.fine_relief || scene.outputs.height) && !is_gentle(scene.device.gel)) {
-    fail_at(scene.where, "{} is for flat and gently domed gels (domes of up to {:.3g} degrees at the rim) only; {}{}",
+    fail_at(scene.where, "{} is for flat and gently domed gels only (up to {:.3g} degrees of slope); {}{}",
             plan.fine_relief ? "fine relief" : "outputs.height", fem::kSteepestDome / kRadiansPerDegree,
             shape_in_words(scene.device.gel), plan.fine_relief ? "; effects.fine_relief: off leaves it out" : "");
   }
