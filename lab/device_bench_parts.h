@@ -15,6 +15,8 @@
 
 namespace touchstone::lab {
 
+inline constexpr double kMostSeconds = 40.0;  ///< for one setting of a curve
+
 /// Pictures of one hold by the reference's light, twice without common random numbers.
 struct TruePictures {
   Hold hold;
@@ -87,6 +89,9 @@ LightTry try_light(const BenchParts& parts, const TruePictures& truth, const sim
 /// The curves of light, samples, bands, the fine contact's pixels and events, as far as the device has them. `tries`
 /// gets the ways of light that were tried.
 std::vector<BenchCurve> light_curves(const BenchParts& parts, std::vector<LightTry>& tries, const Progress& progress);
+
+/// The curve of light.event_step. @pre the device has event pixels
+BenchCurve events_curve(const BenchParts& parts, const Progress& progress);
 
 /// The coarsest mesh from which on all finer ones that could be had hold both errors, and the next coarser one, which
 /// doesn't. Either may be null.
