@@ -7,8 +7,8 @@
 #include "apps/command.h"
 #include "apps/progress_bar.h"
 #include "core/whole_file.h"
-#include "lab/device_bench.h"
-#include "lab/study.h"
+#include "lab/bench/device_bench.h"
+#include "lab/studies/study.h"
 
 namespace touchstone::apps {
 namespace {

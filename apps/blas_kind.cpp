@@ -8,7 +8,7 @@
 #include <cstdlib>
 #include <string>
 
-#include "lab/processor.h"
+#include "datasets/sets/processor.h"
 
 namespace touchstone::apps {
 namespace {
@@ -28,14 +28,14 @@ bool is_old(const std::string& core) {
 }  // namespace
 
 void choose_blas_kind(char** argv) {
-  lab::use_one_blas_thread();
+  datasets::use_one_blas_thread();
   if (std::getenv(kCoreType) != nullptr || std::getenv(kRestarted) != nullptr) return;
-  const std::string instructions = lab::vector_instructions();
-  if (instructions == "baseline" || !is_old(lab::blas_core())) return;
+  const std::string instructions = datasets::vector_instructions();
+  if (instructions == "baseline" || !is_old(datasets::blas_core())) return;
   setenv(kCoreType, instructions == "avx512" ? "SkylakeX" : "Haswell", 1);
   setenv(kRestarted, "1", 1);
   execv("/proc/self/exe", argv);
-  spdlog::warn("OpenBLAS takes this processor for '{}' and will be slow; set {}={}", lab::blas_core(), kCoreType,
+  spdlog::warn("OpenBLAS takes this processor for '{}' and will be slow; set {}={}", datasets::blas_core(), kCoreType,
                std::getenv(kCoreType));
 }
 

@@ -7,9 +7,9 @@
 #include "apps/command.h"
 #include "core/error.h"
 #include "core/units.h"
-#include "lab/chroma_fields.h"
-#include "lab/hue_sample_table.h"
-#include "sensors/hue_model_file.h"
+#include "lab/chroma/chroma_fields.h"
+#include "lab/chroma/hue_sample_table.h"
+#include "sensors/colour/hue_model_file.h"
 
 namespace touchstone::apps {
 namespace {

@@ -6,10 +6,10 @@
 #include "apps/chroma_grid.h"
 #include "apps/command.h"
 #include "apps/progress_bar.h"
-#include "lab/chroma_fields.h"
-#include "lab/frame_sequence.h"
-#include "sensors/hue_model_file.h"
-#include "sensors/marker_compliance_file.h"
+#include "datasets/sets/frame_sequence.h"
+#include "lab/chroma/chroma_fields.h"
+#include "sensors/colour/hue_model_file.h"
+#include "sensors/tractions/marker_compliance_file.h"
 
 namespace touchstone::apps {
 namespace {
@@ -33,7 +33,7 @@ void estimate(const EstimateOptions& options, const GlobalOptions& global) {
   }
   ProgressBar bar(global.quiet);
   const lab::FieldSummary summary = lab::write_chroma_fields(
-      model, grid, options.rest, lab::picture_files(options.frames), forces, options.out, bar.listener());
+      model, grid, options.rest, datasets::picture_files(options.frames), forces, options.out, bar.listener());
   fmt::print("{}: displacements.csv{} of {} frames\n", options.out.string(), forces ? " and forces.csv" : "",
              summary.frames);
   fmt::print("  {} of {} markers measured, {} of them beyond what calibration saw\n", summary.measured, summary.markers,

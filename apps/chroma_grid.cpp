@@ -1,7 +1,7 @@
 #include "apps/chroma_grid.h"
 
 #include "core/error.h"
-#include "lab/csv_cells.h"
+#include "datasets/sets/csv_cells.h"
 
 namespace touchstone::apps {
 namespace {
@@ -18,7 +18,7 @@ void add_grid_option(CLI::App& command, std::string& text) {
 Eigen::Vector2i grid_of(const std::string& text) {
   const std::size_t cross = text.find('x');
   const auto count = [&](const std::string& part) {
-    const auto value = lab::number_of<int>(part);
+    const auto value = datasets::number_of<int>(part);
     if (!value || *value < kFewest || *value > kMost) {
       fail("--grid: '{}' must be COLUMNSxROWS, each from {} to {}, as 10x10", text, kFewest, kMost);
     }

@@ -17,8 +17,8 @@
 #include <utility>
 
 #include "core/error.h"
-#include "lab/run_identity.h"
-#include "sensors/event_file_evt3.h"
+#include "datasets/sets/run_identity.h"
+#include "sensors/events/event_file_evt3.h"
 
 namespace touchstone::apps {
 namespace {
@@ -99,7 +99,7 @@ struct EventServer::Parts {
   Parts(EventLoop of, const std::string& address, int port)
       : loop(std::move(of)), start(Clock::now()), listening(listen_at(address, port)) {
     // What can't be told in EVT 3.0 is refused here and not to a client.
-    sensors::Evt3Encoder("--events", loop.size, lab::program_name(), [](std::string_view) {});
+    sensors::Evt3Encoder("--events", loop.size, datasets::program_name(), [](std::string_view) {});
     acceptor = std::thread([this] { accept_clients(); });
   }
 
@@ -155,7 +155,7 @@ struct EventServer::Parts {
         }
       }
     };
-    sensors::Evt3Encoder encoder("a client", loop.size, lab::program_name(), send_all);
+    sensors::Evt3Encoder encoder("a client", loop.size, datasets::program_name(), send_all);
     std::int64_t sent_until = now_us();
     Place place = place_after(loop, sent_until);
     encoder.start(sent_until);

@@ -6,12 +6,12 @@
 #include "apps/progress_bar.h"
 #include "core/error.h"
 #include "core/whole_file.h"
-#include "lab/marker_compliance_export.h"
-#include "lab/run_identity.h"
-#include "sensors/event_file.h"
-#include "sensors/marker_compliance_file.h"
-#include "sim/device.h"
-#include "sim/virtual_sensor.h"
+#include "datasets/sets/run_identity.h"
+#include "lab/press/marker_compliance_export.h"
+#include "sensors/events/event_file.h"
+#include "sensors/tractions/marker_compliance_file.h"
+#include "sim/press/gel_setup.h"
+#include "sim/scene/device.h"
 
 namespace touchstone::apps {
 namespace {
@@ -74,7 +74,7 @@ void export_events(const EventOptions& options) {
   const cv::Size size = size_of(options, how);
   sensors::EventReader reader(options.in, how);
   write_whole_file(options.out, [&](const std::filesystem::path& temporary) {
-    sensors::EventWriter writer(temporary, size, lab::program_name());
+    sensors::EventWriter writer(temporary, size, datasets::program_name());
     for (auto portion = reader.next(); !portion.empty(); portion = reader.next()) writer.append(portion);
     writer.close();
   });

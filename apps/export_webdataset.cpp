@@ -2,7 +2,7 @@
 
 #include "apps/command.h"
 #include "apps/progress_bar.h"
-#include "lab/webdataset.h"
+#include "datasets/exports/webdataset.h"
 
 namespace touchstone::apps {
 namespace {
@@ -10,16 +10,16 @@ namespace {
 struct Options {
   std::filesystem::path folder;
   std::filesystem::path out;
-  lab::WebDatasetOptions how;
+  datasets::WebDatasetOptions how;
 };
 
 void export_set(const Options& options, const GlobalOptions& global) {
-  lab::WebDatasetOptions how = options.how;
+  datasets::WebDatasetOptions how = options.how;
   how.threads = global.threads;
-  lab::WebDatasetReport report;
+  datasets::WebDatasetReport report;
   {
     ProgressBar bar(global.quiet);
-    report = lab::export_webdataset(options.folder, options.out, how, bar.listener());
+    report = datasets::export_webdataset(options.folder, options.out, how, bar.listener());
   }
   constexpr double kBytesPerMB = 1e6;
   fmt::print("{}: {} samples in {} tars, {:.1f} MB\n", options.out.string(), report.samples, report.tars,

@@ -4,7 +4,7 @@
 
 #include "apps/command.h"
 #include "apps/progress_bar.h"
-#include "lab/unit_fit.h"
+#include "lab/fit/unit_fit.h"
 
 namespace touchstone::apps {
 namespace {
@@ -25,7 +25,8 @@ void fit(const std::filesystem::path& file, const std::filesystem::path& out, co
     result = lab::run_unit_fit(file, out, global.cache, bar.listener());
   }
   for (const lab::FittedUnknown& unknown : result.unknowns) print(unknown);
-  for (const lab::UntoldCombination& combination : result.untold) fmt::print("not told: {}\n", combination.words);
+  for (const lab::UnidentifiableCombination& combination : result.untold)
+    fmt::print("not told: {}\n", combination.words);
   fmt::print("misfit {:.2f} -> {:.2f} of the noise\n", result.misfit_before, result.misfit_after);
   if (!result.converged) spdlog::warn("the fit hasn't converged; take its intervals with care");
   fmt::print("{}: the fitted device, the report and its pictures\n", out.string());

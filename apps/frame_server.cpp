@@ -14,7 +14,7 @@
 
 #include "core/error.h"
 #include "core/nearest_name.h"
-#include "lab/line_plot.h"
+#include "plots/line_plot.h"
 
 namespace touchstone::apps {
 namespace {
@@ -40,7 +40,7 @@ void answer_error(httplib::Response& response, int status, const std::string& me
 }
 
 std::string page(const std::string& title) {
-  const std::string name = lab::escape_markup(title);
+  const std::string name = plots::escape_markup(title);
   return "<!DOCTYPE html><html lang=\"en\"><meta charset=\"utf-8\"><title>" + name + "</title><h1>" + name +
          "</h1><p><img src=\"/stream.mjpg\" alt=\"what the camera shows\"></p><p><a href=\"/frame.jpg\">one frame</a>, "
          "<a href=\"/status.json\">its truth</a></p></html>\n";
@@ -49,7 +49,7 @@ std::string page(const std::string& title) {
 }  // namespace
 
 struct FrameServer::Parts {
-  Parts(ShownCamera& shown, Settings how) : camera(shown), settings(std::move(how)) {
+  Parts(ServedCamera& shown, Settings how) : camera(shown), settings(std::move(how)) {
     server.new_task_queue = [] { return new httplib::ThreadPool(kThreads); };
     server.set_socket_options(&set_socket);
     server.set_keep_alive_timeout(1);
@@ -100,9 +100,9 @@ struct FrameServer::Parts {
     const auto frame = camera.latest();
     if (!frame) return answer_error(response, 503, "the camera is being stopped");
     response.set_content(
-        lab::to_json(*frame->state,
-                     fmt::format("\"frame\":{},\"rate_Hz\":{},\"frames\":{},\"clients\":{},", frame->number,
-                                 camera.rate_Hz(), camera.state_count(), streams.load())) +
+        datasets::to_json(*frame->state,
+                          fmt::format("\"frame\":{},\"rate_Hz\":{},\"frames\":{},\"clients\":{},", frame->number,
+                                      camera.rate_Hz(), camera.state_count(), streams.load())) +
             "\n",
         "application/json");
   }
@@ -114,7 +114,7 @@ struct FrameServer::Parts {
       const int number = count_of(requested, "frame");
       const auto state = camera.state_of(number);
       if (!state) fail("frame {} isn't due yet, or was too long ago", number);
-      response.set_content(lab::to_json(*state, fmt::format("\"frame\":{},", number)) + "\n", "application/json");
+      response.set_content(datasets::to_json(*state, fmt::format("\"frame\":{},", number)) + "\n", "application/json");
     } catch (const Error& error) {
       answer_error(response, 400, error.what());
     }
@@ -147,7 +147,7 @@ struct FrameServer::Parts {
     return values;
   }
 
-  ShownCamera& camera;
+  ServedCamera& camera;
   Settings settings;
   httplib::Server server;
   std::atomic<int> streams{0};
@@ -156,7 +156,7 @@ struct FrameServer::Parts {
   std::thread listener;
 };
 
-FrameServer::FrameServer(ShownCamera& camera, Settings settings)
+FrameServer::FrameServer(ServedCamera& camera, Settings settings)
     : parts_(std::make_unique<Parts>(camera, std::move(settings))) {
   const Settings& how = parts_->settings;
   errno = 0;

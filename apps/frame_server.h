@@ -6,7 +6,7 @@
 #include <memory>
 #include <string>
 
-#include "apps/shown_camera.h"
+#include "apps/served_camera.h"
 
 namespace touchstone::apps {
 
@@ -31,7 +31,7 @@ class FrameServer {
   };
 
   /// Listens; requests are answered from threads of its own. @throws Error if the port can't be had
-  FrameServer(ShownCamera& camera, Settings settings);
+  FrameServer(ServedCamera& camera, Settings settings);
   /// Stops the camera and waits until all clients are gone.
   ~FrameServer();
   FrameServer(const FrameServer&) = delete;

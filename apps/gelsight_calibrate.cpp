@@ -4,9 +4,9 @@
 
 #include "apps/command.h"
 #include "core/error.h"
-#include "lab/ball_press_table.h"
-#include "sensors/height_calibration.h"
-#include "sensors/height_model_file.h"
+#include "lab/gelsight/ball_press_table.h"
+#include "sensors/heights/height_calibration.h"
+#include "sensors/heights/height_model_file.h"
 
 namespace touchstone::apps {
 namespace {

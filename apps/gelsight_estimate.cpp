@@ -3,9 +3,9 @@
 
 #include "apps/command.h"
 #include "apps/progress_bar.h"
-#include "lab/frame_sequence.h"
-#include "lab/height_maps.h"
-#include "sensors/height_model_file.h"
+#include "datasets/sets/frame_sequence.h"
+#include "lab/gelsight/height_maps.h"
+#include "sensors/heights/height_model_file.h"
 
 namespace touchstone::apps {
 namespace {
@@ -24,8 +24,8 @@ void estimate(const EstimateOptions& options, const GlobalOptions& global) {
   if (options.border == "free") settings.border = sensors::HeightBorder::free;
   const lab::HeightFormat format = options.format == "exr" ? lab::HeightFormat::exr : lab::HeightFormat::png16;
   ProgressBar bar(global.quiet);
-  const std::vector<lab::HeightRecord> records =
-      lab::write_height_maps(model, settings, lab::picture_files(options.frames), options.out, format, bar.listener());
+  const std::vector<lab::HeightRecord> records = lab::write_height_maps(
+      model, settings, datasets::picture_files(options.frames), options.out, format, bar.listener());
   const auto count = [&](auto fault) { return std::count_if(records.begin(), records.end(), fault); };
   const auto untrusted = count([](const lab::HeightRecord& record) { return !record.trusted; });
   const auto at_border = count([](const lab::HeightRecord& record) { return record.contact_at_border; });

@@ -5,9 +5,9 @@
 #include "apps/command.h"
 #include "apps/progress_bar.h"
 #include "core/error.h"
-#include "lab/dataset.h"
-#include "lab/draw.h"
-#include "lab/drawn_dataset.h"
+#include "datasets/jobs/draw.h"
+#include "datasets/sets/dataset.h"
+#include "datasets/sets/drawn_dataset.h"
 
 namespace touchstone::apps {
 namespace {
@@ -21,14 +21,14 @@ struct Options {
 
 /// A job that draws its samples.
 void generate_drawn(const Options& options, const GlobalOptions& global) {
-  lab::DrawnOptions how;
-  how.source = lab::rig_bench(global.cache);
+  datasets::DrawnOptions how;
+  how.source = datasets::rig_bench(global.cache);
   how.threads = global.threads;
-  if (!options.shard.empty()) how.shard = lab::shard_of(options.shard);
-  lab::DrawnReport report;
+  if (!options.shard.empty()) how.shard = datasets::shard_of(options.shard);
+  datasets::DrawnReport report;
   {
     ProgressBar bar(global.quiet);
-    report = lab::generate_drawn(options.job, options.out, how, bar.listener());
+    report = datasets::generate_drawn(options.job, options.out, how, bar.listener());
   }
   if (report.was_finished) {
     print_finished(options.out, report.samples);
@@ -47,19 +47,19 @@ void generate_drawn(const Options& options, const GlobalOptions& global) {
 }
 
 void generate(const Options& options, const GlobalOptions& global) {
-  if (lab::is_draw_job_file(options.job)) {
+  if (datasets::is_draw_job_file(options.job)) {
     generate_drawn(options, global);
     return;
   }
   if (!options.shard.empty()) fail("--shard: {} isn't a job that draws; only those have shards", options.job.string());
-  lab::GenerateOptions how;
-  how.source = lab::simulator(global.cache);
+  datasets::GenerateOptions how;
+  how.source = datasets::simulator(global.cache);
   how.threads = global.threads;
   how.timings = !options.no_timings;
-  lab::GenerateReport report;
+  datasets::GenerateReport report;
   {
     ProgressBar bar(global.quiet);
-    report = lab::generate(options.job, options.out, how, bar.listener());
+    report = datasets::generate(options.job, options.out, how, bar.listener());
   }
   if (!report.warning.empty()) spdlog::warn("{}", report.warning);
   if (report.was_finished) {

@@ -5,11 +5,11 @@
 #include "apps/viewer_scripts.h"
 #include "core/error.h"
 #include "core/whole_file.h"
-#include "lab/contact_sheet.h"
-#include "lab/frame_sequence.h"
-#include "lab/inspected_draw.h"
-#include "lab/inspection_page.h"
-#include "sim/image_file.h"
+#include "datasets/inspection/contact_sheet.h"
+#include "datasets/inspection/inspected_draw.h"
+#include "datasets/inspection/inspection_page.h"
+#include "datasets/sets/frame_sequence.h"
+#include "sim/files/image_file.h"
 
 namespace touchstone::apps {
 namespace {
@@ -32,30 +32,30 @@ std::vector<std::size_t> spread(std::size_t size, std::size_t count) {
 }
 
 void write_page(const InspectOptions& options) {
-  const lab::InspectedSet set = lab::read_inspected_set(options.data);
+  const datasets::InspectedSet set = datasets::read_inspected_set(options.data);
   std::string note;
-  std::optional<lab::PreparedJob> job;
+  std::optional<datasets::PreparedJob> job;
   if (!set.drawn) {
-    job = lab::job_of_set(set, options.job, note);
+    job = datasets::job_of_set(set, options.job, note);
   } else if (!options.job.empty()) {
     fail("--job: isn't for a set that was drawn; it has its devices in it");
   } else if (std::ranges::any_of(set.scenes, [](const auto& unit) { return unit.device_spec == nullptr; })) {
     note = "the units' device files name others that aren't here, so their cameras aren't known";
   }
-  lab::InspectionOptions how;
+  datasets::InspectionOptions how;
   how.columns = options.columns;
   how.tiles_per_scene = options.tiles_per_scene;
   how.tile_width = options.tile_width;
-  write_whole_file(options.out, lab::inspection_page(set, job, note, viewer_scripts(), how));
+  write_whole_file(options.out, datasets::inspection_page(set, job, note, viewer_scripts(), how));
   fmt::print("{}: {} samples in {} {}{}\n", options.out.string(), set.samples.size(), set.scenes.size(),
              set.drawn ? "units" : "scenes", note.empty() ? "" : "; " + note);
 }
 
 void add_frames_of_scenes(const InspectOptions& options, std::vector<cv::Mat>& pictures,
                           std::vector<std::string>& captions) {
-  for (const lab::FrameSequence& sequence : lab::frames_of_data_set(options.data, std::nullopt)) {
+  for (const datasets::FrameSequence& sequence : datasets::frames_of_data_set(options.data, std::nullopt)) {
     for (const std::size_t i : spread(sequence.frames.size(), static_cast<std::size_t>(options.tiles_per_scene))) {
-      const lab::LabelledFrame& frame = sequence.frames[i];
+      const datasets::LabelledFrame& frame = sequence.frames[i];
       pictures.push_back(sim::read_image(frame.file));
       captions.push_back(fmt::format("{} {}\n{:.2f} {:.2f} {:.2f} N", sequence.name, frame.frame, frame.force->x(),
                                      frame.force->y(), frame.force->z()));
@@ -65,12 +65,12 @@ void add_frames_of_scenes(const InspectOptions& options, std::vector<cv::Mat>& p
 
 void add_frames_of_units(const InspectOptions& options, std::vector<cv::Mat>& pictures,
                          std::vector<std::string>& captions) {
-  const lab::InspectedSet set = lab::read_inspected_set(options.data);
-  for (const lab::InspectedScene& unit : set.scenes) {
+  const datasets::InspectedSet set = datasets::read_inspected_set(options.data);
+  for (const datasets::InspectedScene& unit : set.scenes) {
     const auto each = static_cast<std::size_t>(options.tiles_per_scene);
     for (const std::size_t i : spread(static_cast<std::size_t>(unit.samples), each)) {
       const std::size_t sample = static_cast<std::size_t>(unit.first_sample) + i;
-      pictures.push_back(lab::inspected_frame(set, sample));
+      pictures.push_back(datasets::inspected_frame(set, sample));
       if (pictures.back().empty()) fail("{}: has no frames", options.data.string());
       const auto& force = set.samples[sample].wrench;
       captions.push_back(
@@ -83,9 +83,9 @@ void write_sheet(const InspectOptions& options) {
   if (!options.job.empty()) fail("--job: is for a page, and {} is a picture", options.out.string());
   std::vector<cv::Mat> pictures;
   std::vector<std::string> captions;
-  lab::holds_drawn_set(options.data) ? add_frames_of_units(options, pictures, captions)
-                                     : add_frames_of_scenes(options, pictures, captions);
-  sim::write_png(options.out, lab::contact_sheet(pictures, captions, options.columns, options.tile_width));
+  datasets::holds_drawn_set(options.data) ? add_frames_of_units(options, pictures, captions)
+                                          : add_frames_of_scenes(options, pictures, captions);
+  sim::write_png(options.out, datasets::contact_sheet(pictures, captions, options.columns, options.tile_width));
   fmt::print("{}: {} frames with their forces x, y, z on the object\n", options.out.string(), pictures.size());
 }
 

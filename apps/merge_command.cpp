@@ -4,8 +4,8 @@
 #include "apps/command.h"
 #include "apps/progress_bar.h"
 #include "core/error.h"
-#include "lab/draw.h"
-#include "lab/drawn_dataset.h"
+#include "datasets/jobs/draw.h"
+#include "datasets/sets/drawn_dataset.h"
 
 namespace touchstone::apps {
 namespace {
@@ -17,17 +17,17 @@ struct Options {
 };
 
 void merge(const Options& options, const GlobalOptions& global) {
-  if (!lab::is_draw_job_file(options.job)) {
+  if (!datasets::is_draw_job_file(options.job)) {
     fail("{}: isn't a job that draws; only those have shards to merge", options.job.string());
   }
   if (options.lacking) {
-    fmt::print("{}\n", fmt::join(lab::lacking_shards(options.job, options.out, *options.lacking), ","));
+    fmt::print("{}\n", fmt::join(datasets::lacking_shards(options.job, options.out, *options.lacking), ","));
     return;
   }
-  lab::DrawnReport report;
+  datasets::DrawnReport report;
   {
     ProgressBar bar(global.quiet);
-    report = lab::merge_drawn(options.job, options.out, bar.listener());
+    report = datasets::merge_drawn(options.job, options.out, bar.listener());
   }
   if (report.was_finished) {
     print_finished(options.out, report.samples);

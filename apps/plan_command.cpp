@@ -4,9 +4,9 @@
 #include "apps/command.h"
 #include "apps/progress_bar.h"
 #include "core/error.h"
-#include "lab/prepared_job.h"
-#include "sim/gel_plan.h"
-#include "sim/linear_range.h"
+#include "datasets/jobs/prepared_job.h"
+#include "sim/press/gel_plan.h"
+#include "sim/press/linear_range.h"
 
 namespace touchstone::apps {
 namespace {
@@ -50,17 +50,17 @@ void print_linear_range(const sim::SceneSpec& scene, const GlobalOptions& global
 
 void plan(const std::filesystem::path& file, bool linear_range, const GlobalOptions& global) {
   const std::filesystem::path& cache = global.cache;
-  if (!lab::is_job_file(file)) {
+  if (!datasets::is_job_file(file)) {
     const sim::SceneSpec scene = sim::read_scene(file);
     print_plan(sim::make_plan(scene));
     fmt::print("\n{}", describe(sim::plan_gel(scene.device, cache)));
     if (linear_range) print_linear_range(scene, global);
     return;
   }
-  const lab::PreparedJob job = lab::prepare_job(file);
+  const datasets::PreparedJob job = datasets::prepare_job(file);
   fmt::print("job {}: {} scenes, {} samples\n", job.job.name, job.scenes.size(), job.samples);
-  const lab::PreparedScene* before = nullptr;
-  for (const lab::PreparedScene& scene : job.scenes) {
+  const datasets::PreparedScene* before = nullptr;
+  for (const datasets::PreparedScene& scene : job.scenes) {
     const bool as_before = before != nullptr && equal(before->plan, scene.plan);
     if (!as_before) fmt::print("\n");
     fmt::print("{} ({}, {} samples){}\n", scene.entry.name, lab::name_of(scene.entry.split), scene.samples,

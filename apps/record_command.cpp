@@ -4,11 +4,11 @@
 #include "apps/progress_bar.h"
 #include "core/error.h"
 #include "core/whole_file.h"
-#include "lab/dvs_recordings.h"
-#include "lab/run_identity.h"
-#include "lab/scenes_folder.h"
-#include "sensors/event_file.h"
-#include "sim/membrane_camera.h"
+#include "datasets/jobs/scenes_folder.h"
+#include "datasets/sets/run_identity.h"
+#include "lab/dvs/dvs_recordings.h"
+#include "sensors/events/event_file.h"
+#include "sim/sensor/membrane_camera.h"
 
 namespace touchstone::apps {
 namespace {
@@ -54,7 +54,7 @@ void record_dvs(const DvsOptions& options, const GlobalOptions& global) {
   if (options.grasps < 0 || options.grasps > most) {
     fail("--grasps is {}; allowed is 1 to {}, or 0 for all", options.grasps, most);
   }
-  const lab::DvsGraspBench bench(lab::scenes_folder(), global.cache);
+  const lab::DvsGraspBench bench(datasets::scenes_folder(), global.cache);
   std::vector<lab::DvsGraspParameters> grasps = bench.draw(options.seed);
   if (options.grasps > 0) {  // spread over the materials
     std::vector<lab::DvsGraspParameters> some;
@@ -72,7 +72,7 @@ void record_dvs(const DvsOptions& options, const GlobalOptions& global) {
   for (std::size_t k = 0; k < grasps.size(); ++k) {
     const std::string name = fmt::format("grasp-{:02}", k);
     write_whole_file(options.out / (name + ".h5"), [&](const std::filesystem::path& temporary) {
-      sensors::EventWriter writer(temporary, size, lab::program_name());
+      sensors::EventWriter writer(temporary, size, datasets::program_name());
       const lab::DvsRecording recording =
           lab::record_dvs_grasp(bench, camera, grasps[k], lab::own_pixels(bench.device()),
                                 [&](std::span<const Event> events) { writer.append(events); });

@@ -7,14 +7,20 @@
 #include "apps/progress_bar.h"
 #include "core/error.h"
 #include "core/whole_file.h"
-#include "lab/run_identity.h"
-#include "lab/sample_source.h"
-#include "sensors/event_file.h"
-#include "sim/event_picture.h"
-#include "sim/frame_geometry.h"
-#include "sim/gltf_writer.h"
-#include "sim/image_file.h"
-#include "sim/virtual_sensor.h"
+#include "datasets/sets/run_identity.h"
+#include "datasets/sets/sample_source.h"
+#include "sensors/events/event_file.h"
+#include "sim/files/gltf_writer.h"
+#include "sim/files/image_file.h"
+#include "sim/plan/plan.h"
+#include "sim/press/elastic_object.h"
+#include "sim/press/gel_setup.h"
+#include "sim/press/play_motion.h"
+#include "sim/press/truth.h"
+#include "sim/scene/scene.h"
+#include "sim/sensor/event_picture.h"
+#include "sim/sensor/virtual_camera.h"
+#include "sim/view/frame_geometry.h"
 
 namespace touchstone::apps {
 namespace {
@@ -61,14 +67,14 @@ sim::EventStreamReport write_events(const RenderOptions& options, const sim::Sce
     }
   };
   const auto watch = [&] {
-    return lab::simulator(global.cache).watch_events(scene, plan, gel, scene.seed, sink, progress);
+    return datasets::simulator(global.cache).watch_events(scene, plan, gel, scene.seed, sink, progress);
   };
   sim::EventStreamReport report;
   if (options.events.empty()) {
     report = watch();
   } else {
     write_whole_file(options.events, [&](const std::filesystem::path& temporary) {
-      writer = std::make_unique<sensors::EventWriter>(temporary, size, lab::program_name());
+      writer = std::make_unique<sensors::EventWriter>(temporary, size, datasets::program_name());
       report = watch();
       writer->close();
     });

@@ -4,7 +4,7 @@
 #include "apps/command.h"
 #include "core/error.h"
 #include "core/whole_file.h"
-#include "lab/file_schema.h"
+#include "lab/schema/file_schema.h"
 
 namespace touchstone::apps {
 namespace {

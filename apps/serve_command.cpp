@@ -16,8 +16,8 @@
 #include "core/error.h"
 #include "core/nearest_name.h"
 #include "core/yaml_reader.h"
-#include "lab/camera_feed.h"
-#include "lab/scenes_folder.h"
+#include "datasets/jobs/scenes_folder.h"
+#include "lab/device/camera_feed.h"
 
 namespace touchstone::apps {
 namespace {
@@ -98,7 +98,7 @@ void serve_scene(const ServeOptions& options, const GlobalOptions& global) {
     feed = lab::feed_of_scene(scene, global.cache, first_last, kMostLight_bytes, bar.listener());
   }
   const double rate = options.rate_Hz > 0.0 ? options.rate_Hz : feed.frame_rate_Hz;
-  ShownCamera camera(feed.states, rate, options.quality);
+  ServedCamera camera(feed.states, rate, options.quality);
   FrameServer::Settings settings{options.address, options.port, feed.device, {}};
   if (!feed.has_events) {  // events can't stand still
     settings.commands["/hold"] = [&](const Requested& requested) {
@@ -125,8 +125,8 @@ void serve_scene(const ServeOptions& options, const GlobalOptions& global) {
 /// Objects that may press a device: the shipped ones and those of the command line, by name.
 class Objects {
  public:
-  Objects(const lab::VirtualDevice& device, const std::vector<fs::path>& files) : device_(device) {
-    const fs::path shipped = lab::scenes_folder() / "objects";
+  Objects(const sim::VirtualDevice& device, const std::vector<fs::path>& files) : device_(device) {
+    const fs::path shipped = datasets::scenes_folder() / "objects";
     for (const auto& entry : fs::directory_iterator(shipped)) {
       if (entry.path().extension() == ".yaml") files_[entry.path().stem().string()] = entry.path();
     }
@@ -136,7 +136,7 @@ class Objects {
     }
   }
 
-  const lab::VirtualObject& named(const std::string& name) {
+  const sim::VirtualObject& named(const std::string& name) {
     const auto file = files_.find(name);
     if (file == files_.end()) {
       std::vector<std::string> known;
@@ -149,13 +149,13 @@ class Objects {
   }
 
  private:
-  const lab::VirtualDevice& device_;
+  const sim::VirtualDevice& device_;
   std::map<std::string, fs::path> files_;
-  std::map<std::string, lab::VirtualObject> made_;
+  std::map<std::string, sim::VirtualObject> made_;
 };
 
-lab::Hold hold_of(const Requested& requested) {
-  lab::Hold hold;
+sim::Hold hold_of(const Requested& requested) {
+  sim::Hold hold;
   hold.place_mm = {number_of(requested, "x_mm", 0.0), number_of(requested, "y_mm", 0.0)};
   hold.angles_deg = {number_of(requested, "turn_x_deg", 0.0), number_of(requested, "turn_y_deg", 0.0),
                      number_of(requested, "turn_z_deg", 0.0)};
@@ -169,12 +169,12 @@ void serve_device(const ServeOptions& options, const GlobalOptions& global) {
   if (!options.frames.empty()) fail("--frames: {} is a device and has no frames", options.what.string());
   if (options.events_port) fail("--events-port: {} is a device; events want a scene", options.what.string());
   const sim::DeviceSpec spec = sim::read_device(options.what);
-  const lab::VirtualDevice device(spec, global.cache);
+  const sim::VirtualDevice device(spec, global.cache);
   Objects objects(device, options.objects);
   const std::string usual = options.objects.empty() ? "ball-8mm" : options.objects.front().stem().string();
-  const ShownCamera::States rest = {std::make_shared<const lab::ShownState>(lab::shown_state(device.rest()))};
+  const ServedCamera::States rest = {std::make_shared<const lab::ShownState>(lab::shown_state(device.rest()))};
   const double rate = options.rate_Hz > 0.0 ? options.rate_Hz : spec.camera->frame_rate_Hz;
-  ShownCamera camera(rest, rate, options.quality);
+  ServedCamera camera(rest, rate, options.quality);
   std::mutex pressing;  // one after the other
   FrameServer::Settings settings{options.address, options.port, spec.name, {}};
   settings.commands["/press"] = [&](const Requested& requested) {
@@ -182,7 +182,7 @@ void serve_device(const ServeOptions& options, const GlobalOptions& global) {
                            "drag_x_mm", "drag_y_mm"});
     const auto name = requested.find("object");
     const std::lock_guard<std::mutex> lock(pressing);
-    const lab::HeldFrame held =
+    const sim::HeldFrame held =
         device.press(objects.named(name == requested.end() ? usual : name->second), hold_of(requested));
     camera.show({std::make_shared<const lab::ShownState>(lab::shown_state(held))});
   };

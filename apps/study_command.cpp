@@ -4,7 +4,7 @@
 
 #include "apps/command.h"
 #include "apps/progress_bar.h"
-#include "lab/study.h"
+#include "lab/studies/study.h"
 
 namespace touchstone::apps {
 namespace {

@@ -13,8 +13,8 @@
 #include "apps/command.h"
 #include "core/error.h"
 #include "core/nearest_name.h"
-#include "lab/run_identity.h"
-#include "sim/virtual_sensor.h"
+#include "datasets/sets/run_identity.h"
+#include "sim/press/gel_setup.h"
 
 namespace touchstone::apps {
 namespace {
@@ -50,7 +50,7 @@ void refuse_unknown_command(const CLI::App& app, int argc, char** argv) {
 
 int run(int argc, char** argv) {
   CLI::App app("Simulates vision-based tactile sensors and tests their estimators against known forces.", "touchstone");
-  app.set_version_flag("--version", lab::program_name());
+  app.set_version_flag("--version", datasets::program_name());
   app.require_subcommand(1);
   app.fallthrough();
   GlobalOptions global;

@@ -8,16 +8,16 @@
 namespace touchstone::apps {
 namespace {
 
-std::vector<lab::FrameSequence> chosen_frames(const FrameOptions& options) {
+std::vector<datasets::FrameSequence> chosen_frames(const FrameOptions& options) {
   if (options.data.empty() == options.frames.empty()) fail("give either --data DIR or --frames DIR");
   if (!options.data.empty()) {
-    std::optional<lab::Split> split;
-    if (!options.split.empty() && options.split != "all") split = lab::split_named(options.split);
-    return lab::frames_of_data_set(options.data, split);
+    std::optional<datasets::Split> split;
+    if (!options.split.empty() && options.split != "all") split = datasets::split_named(options.split);
+    return datasets::frames_of_data_set(options.data, split);
   }
-  if (!options.forces.empty()) return {lab::frames_of_force_table(options.frames, options.forces)};
+  if (!options.forces.empty()) return {datasets::frames_of_force_table(options.frames, options.forces)};
   if (options.frame_rate_Hz <= 0.0) fail("--frames needs --forces CSV or --frame-rate HZ, for the frames' times");
-  return {lab::frames_of_folder(options.frames, options.frame_rate_Hz)};
+  return {datasets::frames_of_folder(options.frames, options.frame_rate_Hz)};
 }
 
 }  // namespace

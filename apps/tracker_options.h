@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "apps/command.h"
-#include "lab/vhs_experiment.h"
+#include "lab/vhs/vhs_experiment.h"
 
 namespace touchstone::apps {
 

@@ -6,12 +6,12 @@
 #include "apps/progress_bar.h"
 #include "core/error.h"
 #include "core/whole_file.h"
-#include "lab/processor.h"
-#include "lab/run_identity.h"
-#include "lab/scenes_folder.h"
-#include "lab/study.h"
-#include "lab/validation.h"
-#include "lab/validation_page.h"
+#include "datasets/jobs/scenes_folder.h"
+#include "datasets/sets/processor.h"
+#include "datasets/sets/run_identity.h"
+#include "lab/studies/study.h"
+#include "lab/validation/validation.h"
+#include "lab/validation/validation_page.h"
 
 namespace touchstone::apps {
 namespace {
@@ -67,7 +67,7 @@ void validate(Options options, const GlobalOptions& global) {
   lab::ValidateOptions how;
   how.quick = options.quick;
   how.cache = global.cache;
-  how.scenes = lab::scenes_folder();
+  how.scenes = datasets::scenes_folder();
   how.scratch = scratch.path();
   std::vector<lab::ValidationRow> rows;
   {
@@ -75,9 +75,9 @@ void validate(Options options, const GlobalOptions& global) {
     how.progress = bar.listener();
     rows = lab::validate(options.groups, lab::validation_groups(), how);
   }
-  if (!options.json.empty()) write_whole_file(options.json, lab::to_json(rows));
+  if (!options.json.empty()) write_whole_file(options.json, datasets::to_json(rows));
   if (!options.page.empty()) {
-    const lab::PageHeader header{lab::program_version(), lab::processor_kind(), options.date};
+    const lab::PageHeader header{datasets::program_version(), datasets::processor_kind(), options.date};
     write_whole_file(options.page, lab::to_html(rows, header));
     write_whole_file(markdown, lab::to_markdown(rows, header));
   }

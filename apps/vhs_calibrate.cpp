@@ -3,7 +3,7 @@
 #include "apps/command.h"
 #include "apps/tracker_options.h"
 #include "core/error.h"
-#include "sensors/stiffness_model_file.h"
+#include "sensors/beads/stiffness_model_file.h"
 
 namespace touchstone::apps {
 namespace {

@@ -4,9 +4,9 @@
 #include "apps/tracker_options.h"
 #include "core/error.h"
 #include "core/whole_file.h"
-#include "lab/bead_tractions.h"
-#include "sensors/marker_compliance_file.h"
-#include "sensors/stiffness_model_file.h"
+#include "lab/vhs/bead_tractions.h"
+#include "sensors/beads/stiffness_model_file.h"
+#include "sensors/tractions/marker_compliance_file.h"
 
 namespace touchstone::apps {
 namespace {

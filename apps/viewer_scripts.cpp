@@ -18,15 +18,15 @@ TOUCHSTONE_FILE(three, "three.min.js")
 TOUCHSTONE_FILE(gltf_loader, "examples/js/loaders/GLTFLoader.js")
 TOUCHSTONE_FILE(orbit_controls, "examples/js/controls/OrbitControls.js")
 
-std::optional<lab::ViewerScripts> viewer_scripts() {
-  return lab::ViewerScripts{{touchstone_three_begin, touchstone_three_end},
-                            {touchstone_gltf_loader_begin, touchstone_gltf_loader_end},
-                            {touchstone_orbit_controls_begin, touchstone_orbit_controls_end}};
+std::optional<datasets::ViewerScripts> viewer_scripts() {
+  return datasets::ViewerScripts{{touchstone_three_begin, touchstone_three_end},
+                                 {touchstone_gltf_loader_begin, touchstone_gltf_loader_end},
+                                 {touchstone_orbit_controls_begin, touchstone_orbit_controls_end}};
 }
 
 #else
 
-std::optional<lab::ViewerScripts> viewer_scripts() {
+std::optional<datasets::ViewerScripts> viewer_scripts() {
   return std::nullopt;
 }
 

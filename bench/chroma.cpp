@@ -8,9 +8,9 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
-#include "sensors/colour_marker_finder.h"
-#include "sensors/hue_estimator.h"
-#include "tests/sensors/painted_colour_markers.h"
+#include "sensors/colour/colour_marker_finder.h"
+#include "sensors/colour/hue_estimator.h"
+#include "tests/sensors/colour/painted_colour_markers.h"
 
 namespace touchstone::sensors {
 namespace {

@@ -8,8 +8,8 @@
 #include "bench/peer_process.h"
 #include "core/error.h"
 #include "core/whole_file.h"
-#include "render/spot_light.h"
-#include "sim/image_file.h"
+#include "render/scene/spot_light.h"
+#include "sim/files/image_file.h"
 
 namespace touchstone::bench {
 namespace {

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "render/pinhole_camera.h"
-#include "render/scene.h"
+#include "render/cameras/pinhole_camera.h"
+#include "render/scene/scene.h"
 
 namespace touchstone::bench {
 

@@ -9,9 +9,9 @@
 #include "bench/gelsight_scene.h"
 #include "bench/light_scenes.h"
 #include "bench/stopwatch.h"
-#include "render/direct_error.h"
-#include "render/direct_renderer.h"
-#include "render/rest_light.h"
+#include "render/direct/direct_error.h"
+#include "render/direct/direct_renderer.h"
+#include "render/direct/rest_light.h"
 
 namespace touchstone::bench {
 namespace {

@@ -7,9 +7,9 @@
 #include <opencv2/core.hpp>
 
 #include "core/error.h"
-#include "lab/contact_sheet.h"
-#include "lab/gelsight_texture_experiment.h"
-#include "sim/image_file.h"
+#include "datasets/inspection/contact_sheet.h"
+#include "lab/gelsight/gelsight_texture_experiment.h"
+#include "sim/files/image_file.h"
 
 namespace touchstone {
 namespace {
@@ -52,7 +52,7 @@ int main(int argc, char** argv) {
       captions.push_back(object.name);
     }
     constexpr int kColumns = 8, kTile_px = 100;
-    cv::Mat sheet = lab::contact_sheet(pictures, captions, kColumns, kTile_px);
+    cv::Mat sheet = datasets::contact_sheet(pictures, captions, kColumns, kTile_px);
     cv::extractChannel(sheet, sheet, 0);  // it's grey
     sim::write_png(argv[1], sheet);
   } catch (const Error& error) {

@@ -6,11 +6,11 @@
 #include <cmath>
 
 #include "core/random.h"
-#include "sensors/gaussian_process_tuning.h"
-#include "sensors/levenberg_marquardt.h"
-#include "sensors/material_classifier.h"
-#include "sensors/time_delay_network.h"
-#include "sensors/wide_cholesky.h"
+#include "sensors/events/material_classifier.h"
+#include "sensors/events/time_delay_network.h"
+#include "sensors/learning/gaussian_process_tuning.h"
+#include "sensors/learning/levenberg_marquardt.h"
+#include "sensors/numerics/wide_cholesky.h"
 
 namespace touchstone::sensors {
 namespace {

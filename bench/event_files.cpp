@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "sensors/event_file.h"
+#include "sensors/events/event_file.h"
 
 namespace touchstone::sensors {
 namespace {

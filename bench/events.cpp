@@ -1,5 +1,5 @@
-// Frames and events a second of the event pixels on the clip of lab/event_clip.h, of which a machine of the same kind
-// made 226 and 97 frames/s by v2e, without noise and with it.
+// Frames and events a second of the event pixels on the clip of lab/dvs/event_clip.h, of which a machine of the same
+// kind made 226 and 97 frames/s by v2e, without noise and with it.
 //   build/dev/bench/bench_events
 
 #include <benchmark/benchmark.h>
@@ -9,8 +9,8 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "lab/event_clip.h"
-#include "render/event_pixels.h"
+#include "lab/dvs/event_clip.h"
+#include "render/events/event_pixels.h"
 
 namespace touchstone::lab {
 namespace {

@@ -2,7 +2,12 @@
 //   build/dev/bench/bench_frame
 #include <benchmark/benchmark.h>
 
-#include "sim/virtual_sensor.h"
+#include "sim/plan/plan.h"
+#include "sim/press/gel_setup.h"
+#include "sim/press/play_motion.h"
+#include "sim/press/truth.h"
+#include "sim/scene/scene.h"
+#include "sim/sensor/virtual_camera.h"
 
 namespace {
 

@@ -10,9 +10,9 @@
 #include <opencv2/core.hpp>
 #include <string>
 
-#include "sensors/height_calibration.h"
-#include "sensors/height_estimator.h"
-#include "tests/sensors/painted_gel.h"
+#include "sensors/heights/height_calibration.h"
+#include "sensors/heights/height_estimator.h"
+#include "tests/sensors/heights/painted_gel.h"
 
 namespace touchstone::sensors {
 namespace {

@@ -3,9 +3,9 @@
 // 3 mm of acrylic, seen by a webcam from 16 mm below, lit from the plate's four sides by red, green, blue and white
 // lamps.
 
-#include "render/lens_camera.h"
-#include "render/light_field.h"
-#include "render/scene.h"
+#include "render/cameras/lens_camera.h"
+#include "render/direct/light_field.h"
+#include "render/scene/scene.h"
 
 namespace touchstone::bench {
 

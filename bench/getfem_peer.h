@@ -5,8 +5,8 @@
 #include <optional>
 #include <string>
 
-#include "fem/elastic_material.h"
-#include "fem/tet_mesh.h"
+#include "fem/elements/elastic_material.h"
+#include "fem/mesh/tet_mesh.h"
 
 namespace touchstone::bench {
 

@@ -6,7 +6,7 @@
 #include "bench/direct_sections.h"
 #include "bench/light_sections.h"
 #include "bench/report.h"
-#include "sim/virtual_sensor.h"
+#include "sim/press/gel_setup.h"
 
 int main(int argc, char** argv) {
   using namespace touchstone;

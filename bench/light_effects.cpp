@@ -9,10 +9,10 @@
 #include "bench/light_scenes.h"
 #include "bench/light_sections.h"
 #include "bench/stopwatch.h"
-#include "render/event_pixels.h"
-#include "render/imager.h"
-#include "render/path_tracer.h"
-#include "render/rolling_shutter.h"
+#include "render/cameras/rolling_shutter.h"
+#include "render/events/event_pixels.h"
+#include "render/imager/imager.h"
+#include "render/paths/path_tracer.h"
 
 namespace touchstone::bench {
 namespace {

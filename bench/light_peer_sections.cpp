@@ -14,7 +14,7 @@
 #include "bench/stopwatch.h"
 #include "core/error.h"
 #include "core/units.h"
-#include "render/path_tracer.h"
+#include "render/paths/path_tracer.h"
 
 namespace touchstone::bench {
 namespace {
@@ -255,7 +255,7 @@ ResultTable equal_noise_table(const LightPeerOptions& options) {
   double least_ratio_with_caustics = INFINITY;
   double overhead = 0.0;
   const auto add = [&](const PeerCase& scene, const std::string& program, const std::vector<PictureSet>& sets) {
-    lab::PlotCurve curve;
+    plots::PlotCurve curve;
     curve.name = program;
     for (const PictureSet& set : sets) {
       const double noise = relative_noise(set.radiance);

@@ -5,9 +5,9 @@
 
 #include "core/transform.h"
 #include "core/triangle_mesh.h"
-#include "render/light_field.h"
-#include "render/pinhole_camera.h"
-#include "render/scene.h"
+#include "render/cameras/pinhole_camera.h"
+#include "render/direct/light_field.h"
+#include "render/scene/scene.h"
 
 namespace touchstone::bench {
 

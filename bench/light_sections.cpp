@@ -13,10 +13,15 @@
 #include "bench/light_scenes.h"
 #include "bench/stopwatch.h"
 #include "core/error.h"
-#include "render/direct_renderer.h"
-#include "render/path_integrator.h"
-#include "render/path_tracer.h"
-#include "sim/virtual_sensor.h"
+#include "render/direct/direct_renderer.h"
+#include "render/paths/path_integrator.h"
+#include "render/paths/path_tracer.h"
+#include "sim/plan/plan.h"
+#include "sim/press/gel_setup.h"
+#include "sim/press/play_motion.h"
+#include "sim/press/truth.h"
+#include "sim/scene/scene.h"
+#include "sim/sensor/virtual_camera.h"
 
 namespace touchstone::bench {
 namespace {
@@ -200,7 +205,7 @@ ResultTable light_error_table(const LightOptions& options) {
   table.columns = {"renderer", "samples", "ms", "RMS error, %", "mean, %"};
   const render::PinholeCamera camera = options.quick ? bench_camera(48, 36) : bench_camera(96, 72);
   const int reference_samples = options.quick ? 1024 : 4096;
-  lab::LinePlot plot;
+  plots::LinePlot plot;
   plot.title = "RMS error against seconds";
   plot.x_label = "seconds a frame";
   plot.y_label = "relative RMS error";
@@ -219,7 +224,7 @@ ResultTable light_error_table(const LightOptions& options) {
     RenderSettings other = paths(reference_samples);
     other.seed = 77;
     const cv::Mat reference = tracer.render(camera, other).irradiance;
-    lab::PlotCurve curve;
+    plots::PlotCurve curve;
     curve.name = interreflection ? "path tracer, interreflection" : "path tracer, direct light";
     for (int count = 4; count <= 256; count *= 2) {
       cv::Mat image;
@@ -229,7 +234,7 @@ ResultTable light_error_table(const LightOptions& options) {
     }
     plot.curves.push_back(curve);
     if (interreflection) continue;
-    lab::PlotCurve direct;
+    plots::PlotCurve direct;
     direct.name = "direct renderer";
     const render::LightField field = render::make_light_field(scene, bench_reach());
     for (int count : {1, 4, 16, 64}) {

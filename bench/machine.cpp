@@ -9,7 +9,7 @@
 #include <fstream>
 #include <thread>
 
-#include "fem/schur_solver.h"
+#include "fem/elements/schur_solver.h"
 
 namespace touchstone::bench {
 

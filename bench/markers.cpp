@@ -8,9 +8,9 @@
 #include <opencv2/features2d.hpp>
 #include <vector>
 
-#include "sensors/incipient_slip.h"
-#include "sensors/motion_ratio.h"
-#include "tests/sensors/painted_markers.h"
+#include "sensors/markers/incipient_slip.h"
+#include "sensors/markers/motion_ratio.h"
+#include "tests/sensors/markers/painted_markers.h"
 
 namespace touchstone::sensors {
 namespace {

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "bench/mechanics_sections.h"
-#include "lab/contact_closed_forms.h"
+#include "closed_forms/contact_closed_forms.h"
 
 namespace touchstone::bench {
 namespace {
@@ -27,8 +27,8 @@ double punch_force(const fem::Compliance& gel, double x, double y) {
 }
 
 void measure_errors(LadderStep& step) {
-  const double sphere = lab::sphere_on_layer(1.0, 0.49, kThickness, kSphere, kSphereDepth).force;
-  const double punch = lab::flat_punch_on_layer(1.0, 0.49, kThickness, kPunch, kPunchDepth).force;
+  const double sphere = closed_forms::sphere_on_layer(1.0, 0.49, kThickness, kSphere, kSphereDepth).force;
+  const double punch = closed_forms::flat_punch_on_layer(1.0, 0.49, kThickness, kPunch, kPunchDepth).force;
   constexpr int kPlaces = 3;
   double squares = 0.0;
   double sum = 0.0;
@@ -95,10 +95,10 @@ ResultTable mesh_table(const std::vector<LadderStep>& ladder) {
   table.title = "Mesh: force error against seconds";
   table.columns = {"edge, mm",         "tetrahedra", "unknowns",          "surface unknowns", "meshing, s",
                    "set-up in all, s", "press, ms",  "sphere's error, %", "punch's error, %"};
-  lab::PlotCurve sphere_setup{"sphere, set-up", {}, false};
-  lab::PlotCurve punch_setup{"flat punch, set-up", {}, false};
-  lab::PlotCurve sphere_press{"sphere, a press", {}, false};
-  lab::PlotCurve punch_press{"flat punch, a press", {}, false};
+  plots::PlotCurve sphere_setup{"sphere, set-up", {}, false};
+  plots::PlotCurve punch_setup{"flat punch, set-up", {}, false};
+  plots::PlotCurve sphere_press{"sphere, a press", {}, false};
+  plots::PlotCurve punch_press{"flat punch, a press", {}, false};
   const LadderStep* knee = &ladder.front();
   for (const LadderStep& step : ladder) {
     table.rows.push_back({fmt::format("{}", step.edge), fmt::format("{}", step.gel.report.tetrahedra),
@@ -167,15 +167,15 @@ ResultTable tolerance_table(const LadderStep& pad) {
   tight.lookup_mm = 1e-10;
   const SlidePath best = slide(pad.gel, tight);
   const auto add = [&](const std::string& name, double value, const fem::PressTolerance& tolerance,
-                       lab::PlotCurve& curve) {
+                       plots::PlotCurve& curve) {
     const SlidePath path = slide(pad.gel, tolerance);
     const double change = (path.force - best.force).norm() / best.force.norm();
     table.rows.push_back(
         {name, fmt::format("{:.0e}", value), fmt::format("{:.2f}", 1e3 * path.seconds), fmt::format("{:.1e}", change)});
     curve.points.emplace_back(path.seconds, std::max(change, 1e-16));
   };
-  lab::PlotCurve traction{"contact laws (traction)", {}, false};
-  lab::PlotCurve lookup{"place of the gap (lookup_mm)", {}, false};
+  plots::PlotCurve traction{"contact laws (traction)", {}, false};
+  plots::PlotCurve lookup{"place of the gap (lookup_mm)", {}, false};
   for (const double value : {1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12}) {
     fem::PressTolerance tolerance = tight;
     tolerance.traction = value;

@@ -10,7 +10,7 @@
 
 #include "bench/getfem_peer.h"
 #include "bench/mechanics_sections.h"
-#include "lab/contact_closed_forms.h"
+#include "closed_forms/contact_closed_forms.h"
 
 namespace touchstone::bench {
 namespace {
@@ -52,8 +52,10 @@ OurAnswer ours(const LadderStep& step, const PeerProblem& problem) {
 }
 
 double reference(const PeerProblem& problem) {
-  if (problem.load == "sphere") return lab::sphere_on_layer(1.0, 0.49, 5.0, problem.radius, problem.depth).force;
-  if (problem.load == "punch") return lab::flat_punch_on_layer(1.0, 0.49, 5.0, problem.radius, problem.depth).force;
+  if (problem.load == "sphere")
+    return closed_forms::sphere_on_layer(1.0, 0.49, 5.0, problem.radius, problem.depth).force;
+  if (problem.load == "punch")
+    return closed_forms::flat_punch_on_layer(1.0, 0.49, 5.0, problem.radius, problem.depth).force;
   return std::nan("");
 }
 
@@ -112,11 +114,11 @@ ResultTable peer_table(const std::vector<LadderStep>& ladder, const BenchOptions
     problems.push_back({"taylor_hood", "pressure", kMaterial, 3.0, 0.0});
     problems.push_back({"taylor_hood", "plate", kMaterial, 8.0, 0.1});
   }
-  std::vector<lab::PlotCurve> curves = {{"Taylor-Hood (GetFEM)", {}, false},
-                                        {"P2 (GetFEM)", {}, false},
-                                        {"P1 (GetFEM)", {}, false},
-                                        {"ours, set-up", {}, false},
-                                        {"ours, a press", {}, false}};
+  std::vector<plots::PlotCurve> curves = {{"Taylor-Hood (GetFEM)", {}, false},
+                                          {"P2 (GetFEM)", {}, false},
+                                          {"P1 (GetFEM)", {}, false},
+                                          {"ours, set-up", {}, false},
+                                          {"ours, a press", {}, false}};
   std::map<std::string, std::optional<Before>> before;
   double least_ratio = std::numeric_limits<double>::infinity();
   double worst_sphere = 0.0;

@@ -7,9 +7,9 @@
 
 #include "bench/result_table.h"
 #include "bench/stopwatch.h"
-#include "fem/compliance.h"
-#include "fem/press.h"
-#include "fem/slab.h"
+#include "fem/contact/press.h"
+#include "fem/elements/compliance.h"
+#include "fem/mesh/slab.h"
 
 namespace touchstone::bench {
 

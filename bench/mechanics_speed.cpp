@@ -10,9 +10,9 @@
 #include "bench/machine.h"
 #include "bench/mechanics_sections.h"
 #include "core/error.h"
-#include "fem/compliance_cache.h"
-#include "fem/pixel_contact.h"
-#include "sim/virtual_sensor.h"
+#include "fem/error/compliance_cache.h"
+#include "fem/fine_relief/pixel_contact.h"
+#include "sim/press/gel_setup.h"
 
 namespace touchstone::bench {
 namespace {
@@ -119,9 +119,9 @@ ResultTable growth_table(const BenchOptions& options) {
                    "peak memory of it, MB", "cache file, MB", "from it, s", "a press, ms",     "in contact"};
   const std::vector<double> wanted = options.quick ? std::vector<double>{1000, 2000}
                                                    : std::vector<double>{1000, 2000, 4000, 8000, 16000, 32000, 100000};
-  lab::PlotCurve setup_curve{"set-up, s", {}, false};
-  lab::PlotCurve press_curve{"a press, s", {}, false};
-  lab::PlotCurve memory_curve{"peak memory, GB", {}, false};
+  plots::PlotCurve setup_curve{"set-up, s", {}, false};
+  plots::PlotCurve press_curve{"a press, s", {}, false};
+  plots::PlotCurve memory_curve{"peak memory, GB", {}, false};
   std::string stop;
   double last_seconds = 0.0;
   double last_unknowns = 1.0;
@@ -189,8 +189,8 @@ ResultTable pixel_growth_table(const BenchOptions& options) {
   constexpr double kForce = 1.0;       // N
   const std::vector<int> sides =
       options.quick ? std::vector<int>{64, 128} : std::vector<int>{64, 128, 256, 512, 1024, 2048};
-  lab::PlotCurve solve_curve{"solve, s", {}, false};
-  lab::PlotCurve memory_curve{"peak memory, GB", {}, false};
+  plots::PlotCurve solve_curve{"solve, s", {}, false};
+  plots::PlotCurve memory_curve{"peak memory, GB", {}, false};
   double before = 0.0;
   for (const int side : sides) {
     const double pitch = kSide / side;

@@ -3,8 +3,8 @@
 #include <benchmark/benchmark.h>
 #include <unistd.h>
 
-#include "fem/press.h"
-#include "sim/virtual_sensor.h"
+#include "fem/contact/press.h"
+#include "sim/press/gel_setup.h"
 
 namespace {
 

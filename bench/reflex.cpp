@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "core/random.h"
-#include "sensors/explore_tracker.h"
-#include "sensors/reflex_loop.h"
+#include "sensors/reflex/explore_tracker.h"
+#include "sensors/reflex/reflex_loop.h"
 
 namespace touchstone::sensors {
 namespace {

@@ -5,7 +5,7 @@
 #include "apps/blas_kind.h"
 #include "bench/machine.h"
 #include "core/whole_file.h"
-#include "lab/run_identity.h"
+#include "datasets/sets/run_identity.h"
 
 namespace touchstone::bench {
 
@@ -13,7 +13,7 @@ Report::Report(std::string name, std::filesystem::path folder, bool quick, const
     : name_(std::move(name)), folder_(std::move(folder)), quick_(quick) {
   std::filesystem::create_directories(folder_);
   const Machine machine = this_machine();
-  where_ = {"Touchstone " + lab::program_version() + (quick ? ", quick form" : ""), describe(machine)};
+  where_ = {"Touchstone " + datasets::program_version() + (quick ? ", quick form" : ""), describe(machine)};
   if (!date.empty()) where_.push_back(date);
   if (machine.load_before > 0.25 * machine.cpus) {
     where_.push_back("Others were at work on this machine: ratios hold better than seconds");

@@ -33,7 +33,7 @@ void write_files(const ResultTable& table, const std::vector<std::string>& where
   }
   write_whole_file(folder / (table.name + ".csv"), csv);
   for (std::size_t k = 0; k < table.plots.size(); ++k) {
-    write_whole_file(folder / plot_name(table, k), lab::to_svg(table.plots[k]));
+    write_whole_file(folder / plot_name(table, k), plots::to_svg(table.plots[k]));
   }
 }
 

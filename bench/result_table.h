@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "lab/line_plot.h"
+#include "plots/line_plot.h"
 
 namespace touchstone::bench {
 
@@ -15,8 +15,8 @@ struct ResultTable {
   std::string title;  ///< a sentence over it
   std::vector<std::string> columns;
   std::vector<std::vector<std::string>> rows;
-  std::vector<std::string> remarks;  ///< sentences under it
-  std::vector<lab::LinePlot> plots;  ///< beside it: <name>-1.svg, ...
+  std::vector<std::string> remarks;    ///< sentences under it
+  std::vector<plots::LinePlot> plots;  ///< beside it: <name>-1.svg, ...
 };
 
 /// Writes <folder>/<name>.csv, which begins with '#' lines that say where it was measured, and the plots.

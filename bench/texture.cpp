@@ -7,8 +7,8 @@
 #include <opencv2/core/utility.hpp>
 
 #include "core/random.h"
-#include "sensors/height_gray.h"
-#include "sensors/texture_model.h"
+#include "sensors/texture/height_gray.h"
+#include "sensors/texture/texture_model.h"
 
 namespace touchstone::sensors {
 namespace {

@@ -15,9 +15,9 @@
 #include <vector>
 
 #include "core/random.h"
-#include "sensors/bead_overlay.h"
-#include "sensors/bead_tracker.h"
-#include "sensors/stiffness_force_model.h"
+#include "sensors/beads/bead_overlay.h"
+#include "sensors/beads/bead_tracker.h"
+#include "sensors/beads/stiffness_force_model.h"
 
 namespace touchstone::sensors {
 namespace {

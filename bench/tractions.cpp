@@ -6,8 +6,8 @@
 #include <cmath>
 
 #include "core/random.h"
-#include "sensors/friction_state.h"
-#include "tests/sensors/half_space_markers.h"
+#include "sensors/tractions/friction_state.h"
+#include "tests/sensors/tractions/half_space_markers.h"
 
 namespace touchstone::sensors {
 namespace {

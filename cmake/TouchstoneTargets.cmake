@@ -1,4 +1,5 @@
 # touchstone_library(NAME sources...) makes the library of one folder: target touchstone_NAME, alias Touchstone::NAME.
+# touchstone_sources(NAME sources...) adds those of one of its subfolders.
 # touchstone_test(NAME LABELS ... SOURCES ... LINKS ... [ALONE]) tells ctest of a test: the GoogleTest cases of its sources. A
 # folder's tests are one program, FOLDER_tests, which ctest runs once for each with its sources' names; a test that's
 # ALONE is a program of its own name.
@@ -45,7 +46,11 @@ function(touchstone_compile_together target)
     endif()
   endforeach()
   find_program(TOUCHSTONE_AWK awk REQUIRED)
-  file(GLOB headers "${PROJECT_SOURCE_DIR}/*/*.h")
+  set(headers)
+  foreach(folder IN LISTS TOUCHSTONE_PARTS)
+    file(GLOB_RECURSE of_folder "${PROJECT_SOURCE_DIR}/${folder}/*.h")
+    list(APPEND headers ${of_folder})
+  endforeach()
   execute_process(COMMAND ${TOUCHSTONE_AWK} -v most=8 -f "${PROJECT_SOURCE_DIR}/cmake/unity_groups.awk" ${headers} ${sources}
     WORKING_DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}" OUTPUT_VARIABLE lines RESULT_VARIABLE failed)
   if(failed)
@@ -74,7 +79,8 @@ function(touchstone_library name)
   target_link_libraries(touchstone_${name} PRIVATE $<BUILD_INTERFACE:touchstone_options>)
   target_compile_features(touchstone_${name} PUBLIC cxx_std_20)
   set_property(GLOBAL APPEND PROPERTY TOUCHSTONE_LIBRARIES touchstone_${name})
-  touchstone_compile_together(touchstone_${name})
+  # At the folder's end, when its subfolders have added their sources.
+  cmake_language(EVAL CODE "cmake_language(DEFER CALL touchstone_compile_together [[touchstone_${name}]])")
   if(TOUCHSTONE_PCH)
     if(name STREQUAL core OR name STREQUAL render)  # render has flags of its own
       target_precompile_headers(touchstone_${name} PRIVATE ${TOUCHSTONE_PCH_HEADERS})
@@ -82,6 +88,11 @@ function(touchstone_library name)
       target_precompile_headers(touchstone_${name} REUSE_FROM touchstone_core)
     endif()
   endif()
+endfunction()
+
+function(touchstone_sources name)
+  list(TRANSFORM ARGN PREPEND "${CMAKE_CURRENT_SOURCE_DIR}/")
+  target_sources(touchstone_${name} PRIVATE ${ARGN})
 endfunction()
 
 # A program of tests: its target, before or after it has all of its sources.

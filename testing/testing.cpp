@@ -13,9 +13,9 @@
 
 #include "core/error.h"
 #include "core/nearest_name.h"
-#include "lab/scenes_folder.h"
-#include "sim/image_file.h"
-#include "sim/virtual_sensor.h"
+#include "datasets/jobs/scenes_folder.h"
+#include "sim/files/image_file.h"
+#include "sim/press/gel_setup.h"
 
 namespace touchstone::testing {
 namespace {
@@ -25,7 +25,7 @@ namespace fs = std::filesystem;
 /// A file, or the shipped one of that name below `folder`.
 fs::path file_of(const std::string& name, const char* what, const char* folder) {
   if (fs::is_regular_file(name)) return fs::absolute(name).lexically_normal();
-  const fs::path shipped = lab::scenes_folder() / folder;
+  const fs::path shipped = datasets::scenes_folder() / folder;
   if (fs::is_regular_file(shipped / (name + ".yaml"))) return shipped / (name + ".yaml");
   std::vector<std::string> known;
   for (const auto& entry : fs::directory_iterator(shipped)) {

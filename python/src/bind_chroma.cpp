@@ -1,12 +1,12 @@
-// Coloured markers and their displacements: sensors/colour_marker_finder.h, sensors/hue_estimator.h.
+// Coloured markers and their displacements: sensors/colour/colour_marker_finder.h, sensors/colour/hue_estimator.h.
 
 #include "core/error.h"
 #include "python/src/bindings.h"
 #include "python/src/estimator.h"
-#include "sensors/colour_marker_finder.h"
-#include "sensors/hue_calibration.h"
-#include "sensors/hue_estimator.h"
-#include "sensors/hue_model_file.h"
+#include "sensors/colour/colour_marker_finder.h"
+#include "sensors/colour/hue_calibration.h"
+#include "sensors/colour/hue_estimator.h"
+#include "sensors/colour/hue_model_file.h"
 
 namespace touchstone::python {
 namespace {

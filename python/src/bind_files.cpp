@@ -5,12 +5,12 @@
 #include "core/error.h"
 #include "core/field_error.h"
 #include "core/hdf5_file.h"
-#include "lab/dataset.h"
-#include "lab/draw.h"
-#include "lab/drawn_dataset.h"
-#include "lab/scenes_folder.h"
+#include "datasets/jobs/draw.h"
+#include "datasets/jobs/scenes_folder.h"
+#include "datasets/sets/dataset.h"
+#include "datasets/sets/drawn_dataset.h"
 #include "python/src/bindings.h"
-#include "sim/image_file.h"
+#include "sim/files/image_file.h"
 
 namespace touchstone::python {
 namespace {
@@ -47,7 +47,7 @@ class Hdf5Lock {
   py::object lock_;
 };
 
-py::dict dict_of(const lab::DrawnReport& report) {
+py::dict dict_of(const datasets::DrawnReport& report) {
   py::dict result;
   result["was_finished"] = report.was_finished;
   result["samples"] = report.samples;
@@ -64,20 +64,20 @@ py::dict generate(const std::string& job, const std::string& out, int threads, b
   if (threads < 0) fail("threads: {} is not allowed; allowed is at least 0 (0: as many as the machine has)", threads);
   const Progress listener = progress_to(progress);
   const std::filesystem::path kept_in = cache.empty() ? sim::default_cache_folder() : std::filesystem::path(cache);
-  if (lab::is_draw_job_file(job)) {
-    lab::DrawnOptions how;
-    how.source = lab::rig_bench(kept_in);
+  if (datasets::is_draw_job_file(job)) {
+    datasets::DrawnOptions how;
+    how.source = datasets::rig_bench(kept_in);
     how.threads = threads;
-    if (!shard.empty()) how.shard = lab::shard_of(shard);
-    return dict_of(unlocked([&] { return lab::generate_drawn(job, out, how, listener); }));
+    if (!shard.empty()) how.shard = datasets::shard_of(shard);
+    return dict_of(unlocked([&] { return datasets::generate_drawn(job, out, how, listener); }));
   }
   if (!shard.empty()) fail("shard: {} isn't a job that draws; only those have shards", job);
-  const lab::GenerateReport report = unlocked([&] {
-    lab::GenerateOptions how;
-    how.source = lab::simulator(kept_in);
+  const datasets::GenerateReport report = unlocked([&] {
+    datasets::GenerateOptions how;
+    how.source = datasets::simulator(kept_in);
     how.threads = threads;
     how.timings = timings;
-    return lab::generate(job, out, how, listener);
+    return datasets::generate(job, out, how, listener);
   });
   py::dict result;
   result["was_finished"] = report.was_finished;
@@ -89,9 +89,9 @@ py::dict generate(const std::string& job, const std::string& out, int threads, b
 }
 
 py::dict merge(const std::string& job, const std::string& out, const py::object& progress) {
-  if (!lab::is_draw_job_file(job)) fail("{}: isn't a job that draws; only those have shards to merge", job);
+  if (!datasets::is_draw_job_file(job)) fail("{}: isn't a job that draws; only those have shards to merge", job);
   const Progress listener = progress_to(progress);
-  return dict_of(unlocked([&] { return lab::merge_drawn(job, out, listener); }));
+  return dict_of(unlocked([&] { return datasets::merge_drawn(job, out, listener); }));
 }
 
 }  // namespace
@@ -111,7 +111,7 @@ void bind_errors(py::module_&) {
 
 void bind_files(py::module_& module) {
   module.def(
-      "scenes_folder", [] { return lab::scenes_folder().string(); },
+      "scenes_folder", [] { return datasets::scenes_folder().string(); },
       "Where the shipped devices, objects and scenes lie.");
   module.def(
       "read_image", [](const std::string& path) { return array_of(unlocked([&] { return sim::read_image(path); })); },

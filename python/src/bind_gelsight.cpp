@@ -1,11 +1,11 @@
-// Heights from frames of a coated gel: sensors/height_estimator.h.
+// Heights from frames of a coated gel: sensors/heights/height_estimator.h.
 
 #include "core/error.h"
 #include "python/src/bindings.h"
 #include "python/src/estimator.h"
-#include "sensors/height_calibration.h"
-#include "sensors/height_estimator.h"
-#include "sensors/height_model_file.h"
+#include "sensors/heights/height_calibration.h"
+#include "sensors/heights/height_estimator.h"
+#include "sensors/heights/height_model_file.h"
 
 namespace touchstone::python {
 namespace {

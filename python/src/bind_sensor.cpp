@@ -7,11 +7,11 @@
 #include "core/nearest_name.h"
 #include "core/transform.h"
 #include "core/units.h"
-#include "lab/scenes_folder.h"
+#include "datasets/jobs/scenes_folder.h"
 #include "python/src/bindings.h"
 #include "python/src/sensor.h"
-#include "sim/object.h"
-#include "sim/touch_height.h"
+#include "sim/press/touch_height.h"
+#include "sim/scene/object.h"
 
 namespace touchstone::python {
 namespace {
@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 fs::path named_file(const std::string& name, const char* folder) {
   const fs::path given(name);
   if (given.has_extension() || given.has_parent_path() || fs::exists(given)) return given;
-  const fs::path shipped = lab::scenes_folder() / folder;
+  const fs::path shipped = datasets::scenes_folder() / folder;
   const fs::path file = shipped / (name + ".yaml");
   if (fs::exists(file)) return file;
   std::vector<std::string> known;

@@ -1,11 +1,11 @@
-// Beads and forces: sensors/bead_tracker.h, sensors/stiffness_force_model.h.
+// Beads and forces: sensors/beads/bead_tracker.h, sensors/beads/stiffness_force_model.h.
 
 #include "core/error.h"
 #include "python/src/bindings.h"
 #include "python/src/estimator.h"
-#include "sensors/bead_tracker.h"
-#include "sensors/stiffness_model_file.h"
-#include "sensors/stiffness_training.h"
+#include "sensors/beads/bead_tracker.h"
+#include "sensors/beads/stiffness_model_file.h"
+#include "sensors/beads/stiffness_training.h"
 
 namespace touchstone::python {
 namespace {

@@ -1,17 +1,17 @@
 // The module touchstone._core. What users see is put together and described in python/touchstone/.
 
-#include "lab/processor.h"
-#include "lab/run_identity.h"
+#include "datasets/sets/processor.h"
+#include "datasets/sets/run_identity.h"
 #include "python/src/bindings.h"
 
 PYBIND11_MODULE(_core, module) {
   namespace lab = touchstone::lab;
   namespace python = touchstone::python;
   module.doc() = "Touchstone's C++ part; use the package `touchstone`.";
-  lab::use_one_blas_thread();
-  module.attr("__version__") = lab::program_version();
-  module.def("blas_core", &lab::blas_core, "The processor that OpenBLAS takes this one for.");
-  module.def("vector_instructions", &lab::vector_instructions, "'avx512', 'avx2' or 'baseline'.");
+  datasets::use_one_blas_thread();
+  module.attr("__version__") = datasets::program_version();
+  module.def("blas_core", &datasets::blas_core, "The processor that OpenBLAS takes this one for.");
+  module.def("vector_instructions", &datasets::vector_instructions, "'avx512', 'avx2' or 'baseline'.");
   python::bind_errors(module);
   python::bind_files(module);
   python::bind_sensor(module);

@@ -10,8 +10,8 @@
 #include <utility>
 
 #include "core/progress.h"
-#include "sim/touch_rig.h"
-#include "sim/touch_session.h"
+#include "sim/press/touch_session.h"
+#include "sim/sensor/touch_rig.h"
 
 namespace touchstone::python {
 

@@ -20,8 +20,8 @@
 #include <string>
 #include <utility>
 
-#include "lab/truth_comparison.h"
-#include "lab/virtual_device.h"
+#include "lab/device/truth_comparison.h"
+#include "sim/sensor/virtual_device.h"
 
 namespace cv {
 
@@ -34,12 +34,12 @@ inline void PrintTo(const Mat& image, std::ostream* out) {
 
 namespace touchstone::testing {
 
-using lab::HeldFrame;
-using lab::Hold;
 using lab::Tolerance;
-using lab::VirtualDevice;
-using lab::VirtualDeviceSettings;
-using lab::VirtualObject;
+using sim::HeldFrame;
+using sim::Hold;
+using sim::VirtualDevice;
+using sim::VirtualDeviceSettings;
+using sim::VirtualObject;
 
 /// A device by its shipped name ("vhs", "gelsight-flat") or by its file. Set up when it's first asked for, which may
 /// take half a minute, and kept while the program runs: all tests share it. The gel's part is kept on disk between runs

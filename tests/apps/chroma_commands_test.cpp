@@ -8,11 +8,11 @@
 #include <sstream>
 
 #include "core/whole_file.h"
-#include "sensors/marker_compliance_file.h"
-#include "sim/image_file.h"
+#include "sensors/tractions/marker_compliance_file.h"
+#include "sim/files/image_file.h"
 #include "tests/apps/run_program.h"
-#include "tests/sensors/half_space_markers.h"
-#include "tests/sensors/painted_colour_markers.h"
+#include "tests/sensors/colour/painted_colour_markers.h"
+#include "tests/sensors/tractions/half_space_markers.h"
 #include "tests/support/temporary_folder.h"
 
 namespace touchstone {

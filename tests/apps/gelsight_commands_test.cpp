@@ -7,9 +7,9 @@
 #include <opencv2/core.hpp>
 
 #include "core/whole_file.h"
-#include "sim/image_file.h"
+#include "sim/files/image_file.h"
 #include "tests/apps/run_program.h"
-#include "tests/sensors/painted_gel.h"
+#include "tests/sensors/heights/painted_gel.h"
 #include "tests/support/temporary_folder.h"
 
 namespace touchstone {

@@ -8,24 +8,24 @@
 #include <string>
 
 #include "core/error.h"
-#include "lab/draw.h"
-#include "lab/job.h"
-#include "lab/palpation_spec.h"
-#include "lab/study.h"
-#include "lab/unit_fit_spec.h"
-#include "sim/device.h"
-#include "sim/motion.h"
-#include "sim/object.h"
-#include "sim/scene.h"
+#include "datasets/jobs/draw.h"
+#include "datasets/jobs/job.h"
+#include "lab/fit/unit_fit_spec.h"
+#include "lab/studies/study.h"
+#include "lab/vhs/palpation_spec.h"
+#include "sim/scene/device.h"
+#include "sim/scene/motion.h"
+#include "sim/scene/object.h"
+#include "sim/scene/scene.h"
 
 namespace touchstone {
 namespace {
 
 void read_job_of_either_sort(const std::string& file) {
-  if (lab::is_draw_job_file(file)) {
-    lab::read_draw_job(file);
+  if (datasets::is_draw_job_file(file)) {
+    datasets::read_draw_job(file);
   } else {
-    lab::read_job(file);
+    datasets::read_job(file);
   }
 }
 

@@ -6,7 +6,7 @@
 #include <algorithm>
 
 #include "core/whole_file.h"
-#include "sensors/event_file.h"
+#include "sensors/events/event_file.h"
 #include "tests/apps/run_program.h"
 #include "tests/support/temporary_folder.h"
 

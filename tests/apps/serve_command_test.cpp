@@ -12,7 +12,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/videoio.hpp>
 
-#include "sensors/event_file.h"
+#include "sensors/events/event_file.h"
 #include "tests/apps/run_program.h"
 #include "tests/support/small_job.h"
 #include "tests/support/temporary_folder.h"

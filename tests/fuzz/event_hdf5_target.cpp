@@ -1,7 +1,7 @@
 // Files of events as HDF5. The library isn't ours: what ends it ends a process of its own (core/isolated_call.h), which
 // is an Error.
 
-#include "sensors/event_file.h"
+#include "sensors/events/event_file.h"
 #include "tests/fuzz/fuzz_target.h"
 #include "tests/fuzz/scratch_file.h"
 

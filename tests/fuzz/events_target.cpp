@@ -1,6 +1,6 @@
 // Files of events: text, EVT 3.0, AEDAT 4.0. Those of HDF5 are event_hdf5_target's, as each takes a process.
 
-#include "sensors/event_file.h"
+#include "sensors/events/event_file.h"
 #include "tests/fuzz/fuzz_target.h"
 #include "tests/fuzz/scratch_file.h"
 

@@ -1,6 +1,6 @@
 // Solids and gels as glTF 2.0, JSON or binary.
 
-#include "sim/gltf_mesh.h"
+#include "sim/files/gltf_mesh.h"
 #include "tests/fuzz/fuzz_target.h"
 #include "tests/fuzz/scratch_file.h"
 

@@ -1,13 +1,13 @@
 // Devices, objects, motions, scenes, jobs and what palpation asks for: each text is taken for every kind of them.
 
 #include "core/yaml_reader.h"
-#include "lab/draw.h"
-#include "lab/job.h"
-#include "lab/palpation_spec.h"
-#include "sim/device.h"
-#include "sim/motion.h"
-#include "sim/object.h"
-#include "sim/scene.h"
+#include "datasets/jobs/draw.h"
+#include "datasets/jobs/job.h"
+#include "lab/vhs/palpation_spec.h"
+#include "sim/scene/device.h"
+#include "sim/scene/motion.h"
+#include "sim/scene/object.h"
+#include "sim/scene/scene.h"
 #include "tests/fuzz/fuzz_target.h"
 
 namespace touchstone::fuzz {
@@ -27,7 +27,8 @@ bool reads(std::string_view bytes) {
   const std::string text(bytes);
   const bool of_a_scene = parses<sim::DeviceSpec>(text) | parses<sim::ObjectSpec>(text) | parses<sim::SceneSpec>(text);
   const bool motion = gives_result([&] { TS_ASSERT(parse_yaml<sim::MotionSpec>(text, kPlace).frame_count() > 0); });
-  return of_a_scene | motion | parses<lab::Job>(text) | parses<lab::DrawJob>(text) | parses<lab::PalpationSpec>(text);
+  return of_a_scene | motion | parses<datasets::Job>(text) | parses<datasets::DrawJob>(text) |
+         parses<lab::PalpationSpec>(text);
 }
 
 }  // namespace touchstone::fuzz

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "core/error.h"
-#include "sim/image_file.h"
+#include "sim/files/image_file.h"
 #include "tests/golden/golden_files.h"
 #include "tests/golden/golden_scenes.h"
 

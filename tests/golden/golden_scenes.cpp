@@ -7,10 +7,14 @@
 
 #include "core/error.h"
 #include "core/units.h"
-#include "render/spectral_curve.h"
-#include "sim/device_camera.h"
-#include "sim/virtual_sensor.h"
-#include "sim/visible_scene.h"
+#include "render/spectra/spectral_curve.h"
+#include "sim/plan/plan.h"
+#include "sim/press/gel_setup.h"
+#include "sim/press/play_motion.h"
+#include "sim/press/truth.h"
+#include "sim/scene/device_camera.h"
+#include "sim/scene/scene.h"
+#include "sim/view/visible_scene.h"
 #include "tests/support/temporary_folder.h"
 
 namespace touchstone::golden {

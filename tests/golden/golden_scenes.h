@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "render/camera.h"
-#include "render/scene.h"
+#include "render/cameras/camera.h"
+#include "render/scene/scene.h"
 
 namespace touchstone::golden {
 

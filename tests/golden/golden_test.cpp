@@ -5,7 +5,7 @@
 #include <opencv2/core.hpp>
 
 #include "core/error.h"
-#include "sim/image_file.h"
+#include "sim/files/image_file.h"
 #include "tests/golden/golden_files.h"
 #include "tests/support/temporary_folder.h"
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/error.h"
-#include "sim/image_file.h"
+#include "sim/files/image_file.h"
 
 namespace touchstone::golden {
 namespace {

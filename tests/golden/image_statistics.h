@@ -13,7 +13,7 @@
 #include <opencv2/core/mat.hpp>
 #include <string>
 
-#include "render/path_tracer.h"
+#include "render/paths/path_tracer.h"
 
 namespace touchstone::golden {
 

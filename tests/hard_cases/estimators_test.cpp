@@ -10,20 +10,20 @@
 #include <string>
 #include <vector>
 
-#include "sensors/bead_tracker.h"
-#include "sensors/colour_marker_finder.h"
-#include "sensors/explore_tracker.h"
-#include "sensors/height_calibration.h"
-#include "sensors/height_estimator.h"
-#include "sensors/marker_tracker.h"
-#include "sensors/reflex_loop.h"
-#include "sensors/touch_reader.h"
+#include "sensors/beads/bead_tracker.h"
+#include "sensors/colour/colour_marker_finder.h"
+#include "sensors/heights/height_calibration.h"
+#include "sensors/heights/height_estimator.h"
+#include "sensors/markers/marker_tracker.h"
+#include "sensors/markers/touch_reader.h"
+#include "sensors/reflex/explore_tracker.h"
+#include "sensors/reflex/reflex_loop.h"
 #include "tests/hard_cases/hard_case.h"
-#include "tests/sensors/painted_colour_markers.h"
-#include "tests/sensors/painted_fingertip.h"
-#include "tests/sensors/painted_gel.h"
-#include "tests/sensors/painted_markers.h"
-#include "tests/sensors/rendered_beads.h"
+#include "tests/sensors/beads/rendered_beads.h"
+#include "tests/sensors/colour/painted_colour_markers.h"
+#include "tests/sensors/heights/painted_gel.h"
+#include "tests/sensors/markers/painted_markers.h"
+#include "tests/sensors/reflex/painted_fingertip.h"
 #include "tests/support/message_of.h"
 
 namespace touchstone::sensors {

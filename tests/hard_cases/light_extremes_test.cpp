@@ -5,9 +5,9 @@
 
 #include "core/units.h"
 #include "light_laws.h"
-#include "render/choice_by_power.h"
-#include "render/scattering.h"
-#include "render/warps.h"
+#include "render/materials/scattering.h"
+#include "render/sampling/choice_by_power.h"
+#include "render/sampling/warps.h"
 
 namespace touchstone::render {
 namespace {

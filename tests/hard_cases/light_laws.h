@@ -14,7 +14,7 @@
 
 #include "core/error.h"
 #include "tests/hard_cases/hard_case.h"
-#include "tests/render/light_scenes.h"
+#include "tests/render/paths/light_scenes.h"
 
 namespace touchstone::render {
 

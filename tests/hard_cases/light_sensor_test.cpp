@@ -5,8 +5,8 @@
 
 #include "core/units.h"
 #include "light_laws.h"
-#include "render/event_pixels.h"
-#include "render/imager.h"
+#include "render/events/event_pixels.h"
+#include "render/imager/imager.h"
 
 namespace touchstone::render {
 namespace {
@@ -193,7 +193,7 @@ cv::Mat one_pixel(double intensity) {
   return cv::Mat(1, 1, CV_32FC1, cv::Scalar(intensity));
 }
 
-// Tested in depth in tests/render/event_pixels_test.cpp; here the four cases of the list.
+// Tested in depth in tests/render/events/event_pixels_test.cpp; here the four cases of the list.
 TEST(HardCase29, ZeroLightIsSilentAndAStepOfAMillionAndBackIsCounted) {
   for (const double threshold : {0.2, kLeastEventThreshold}) {
     EventPixels pixels(quiet(threshold), {1, 1}, 1, 1);

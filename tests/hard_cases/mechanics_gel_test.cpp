@@ -8,13 +8,13 @@
 #include <limits>
 #include <string>
 
+#include "closed_forms/contact_closed_forms.h"
 #include "core/error.h"
 #include "core/yaml_reader.h"
-#include "fem/compliance.h"
-#include "fem/gel_body.h"
-#include "fem/mesh_shape.h"
-#include "fem/press.h"
-#include "lab/contact_closed_forms.h"
+#include "fem/contact/press.h"
+#include "fem/elements/compliance.h"
+#include "fem/mesh/gel_body.h"
+#include "fem/shapes/mesh_shape.h"
 #include "tests/hard_cases/hard_case.h"
 #include "tests/support/message_of.h"
 
@@ -84,7 +84,7 @@ TEST(HardCase4, AVeryThinLayerMeetsTheKernel) {
     target.axis = {AxisControl::at(0.013), AxisControl::at(0.021), AxisControl::at(60.0 - 0.04)};
     const PressState& state = press.step(target);
     const auto slope = [](double r) { return r / std::sqrt(3600.0 - r * r); };
-    const lab::LayerContact wanted = lab::profile_on_layer(1.0, nu, slab.thickness, slope, 0.04, 4.0);
+    const closed_forms::LayerContact wanted = closed_forms::profile_on_layer(1.0, nu, slab.thickness, slope, 0.04, 4.0);
     ASSERT_LT(slab.thickness / wanted.contact_radius, 0.1);
     Worst away{0.02};
     EXPECT_LT(away(std::abs(state.wrench[2] / wanted.force - 1.0)), away.bar) << nu;

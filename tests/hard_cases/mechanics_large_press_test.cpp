@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "core/error.h"
-#include "fem/finite_press.h"
-#include "fem/slab.h"
+#include "fem/finite_strain/finite_press.h"
+#include "fem/mesh/slab.h"
 #include "tests/hard_cases/hard_case.h"
 
 namespace touchstone::fem {

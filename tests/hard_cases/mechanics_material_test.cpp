@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "fem/press.h"
-#include "fem/press_error.h"
-#include "fem/slab.h"
-#include "lab/contact_closed_forms.h"
+#include "closed_forms/contact_closed_forms.h"
+#include "fem/contact/press.h"
+#include "fem/error/press_error.h"
+#include "fem/mesh/slab.h"
 #include "tests/hard_cases/hard_case.h"
 
 namespace touchstone::fem {
@@ -48,7 +48,7 @@ double sphere_force(const Compliance& gel, double depth) {
 TEST(HardCase1, APoissonsRatioOfAHalfIsThatOfNearlyAHalf) {
   const double at_half = sphere_force(gel_of(layer(0.6), 1.0, 0.5), 0.3);
   EXPECT_GT(at_half, 0.1);
-  const auto layers_force = [](double nu) { return lab::sphere_on_layer(1.0, nu, 5.0, 8.0, 0.3).force; };
+  const auto layers_force = [](double nu) { return closed_forms::sphere_on_layer(1.0, nu, 5.0, 8.0, 0.3).force; };
   const double slope = (layers_force(0.5) / layers_force(0.49) - 1.0) / 0.01;
   for (const double less : {1e-8, 1e-7, 1e-6}) {
     const double below = sphere_force(gel_of(layer(0.6), 1.0, 0.5 - less), 0.3);
@@ -66,7 +66,7 @@ TEST(HardCase2, FromPoissonsRatio03To05NothingStiffensThatShouldNot) {
   std::string forces;
   for (const double nu : {0.3, 0.4, 0.45, 0.49, 0.499, 0.4999, 0.49999, 0.5}) {
     const double force = sphere_force(gel_of(layer(0.5), 1.0, nu), 0.4);
-    const double expected = lab::sphere_on_layer(1.0, nu, 5.0, 8.0, 0.4).force;
+    const double expected = closed_forms::sphere_on_layer(1.0, nu, 5.0, 8.0, 0.4).force;
     EXPECT_LT(away(std::abs(force / expected - 1.0)), away.bar) << nu;
     EXPECT_GT(force, before) << nu;  // confinement alone: it rises with nu
     before = force;
@@ -76,7 +76,7 @@ TEST(HardCase2, FromPoissonsRatio03To05NothingStiffensThatShouldNot) {
 }
 
 TEST(HardCase5, UnderASharpPunchTheForceConvergesAndThePeakPressureDoesNot) {
-  const double expected = lab::flat_punch_on_layer(1.0, 0.45, 5.0, 1.9, 0.1).force;
+  const double expected = closed_forms::flat_punch_on_layer(1.0, 0.45, 5.0, 1.9, 0.1).force;
   double before = 1.0;
   double peak_before = 0.0;
   for (const double fine : {0.8, 0.4, 0.27}) {

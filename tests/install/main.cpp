@@ -2,10 +2,10 @@
 
 #include <core/error.h>
 
-#include <sensors/bead_tracker.h>
-#include <sensors/stiffness_force_model.h>
-#include <sensors/stiffness_model_file.h>
-#include <sensors/stiffness_training.h>
+#include <sensors/beads/bead_tracker.h>
+#include <sensors/beads/stiffness_force_model.h>
+#include <sensors/beads/stiffness_model_file.h>
+#include <sensors/beads/stiffness_training.h>
 #include <cstdio>
 #include <opencv2/imgproc.hpp>
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "fem/compliance.h"
+#include "fem/elements/compliance.h"
 
 namespace touchstone::test {
 

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "sim/scene.h"
+#include "sim/scene/scene.h"
 
 namespace touchstone::test {
 

@@ -88,11 +88,11 @@ TEST(VirtualDevice, FramesAreAPureFunctionOfHoldAndNoise) {
 
 TEST(VirtualDevice, AnObjectTouchesWhereItsLowestPointIs) {
   const fem::Compliance& gel = coated().gel();
-  EXPECT_NEAR(lab::way_to_touch(fem::SphereShape{1.5}, gel, {0.21, 0.4}, {0, 0, 0}), -1.5, 1e-4);
+  EXPECT_NEAR(sim::way_to_touch(fem::SphereShape{1.5}, gel, {0.21, 0.4}, {0, 0, 0}), -1.5, 1e-4);
   const double tilt = 10 * kRadiansPerDegree;
-  EXPECT_NEAR(lab::way_to_touch(fem::RoundedCylinder{1.0, 0.0, 5.0}, gel, {0, 0}, {10, 0, 0}), -std::sin(tilt), 1e-3);
+  EXPECT_NEAR(sim::way_to_touch(fem::RoundedCylinder{1.0, 0.0, 5.0}, gel, {0, 0}, {10, 0, 0}), -std::sin(tilt), 1e-3);
   // Over the pad's edge (6 mm) the ball touches with its flank.
-  EXPECT_NEAR(lab::way_to_touch(fem::SphereShape{1.5}, gel, {6.9, 0}, {0, 0, 0}), -std::sqrt(1.5 * 1.5 - 0.81), 1e-3);
+  EXPECT_NEAR(sim::way_to_touch(fem::SphereShape{1.5}, gel, {6.9, 0}, {0, 0, 0}), -std::sqrt(1.5 * 1.5 - 0.81), 1e-3);
 }
 
 TEST(VirtualDevice, HoldsThatCannotBeAreRefusedByName) {

@@ -1,0 +1,22 @@
+#pragma once
+// A finished drawn data set (docs/datasets.md) as inspection sees it: its sensors stand in the place of scenes.
+
+#include "datasets/inspection/inspected_set.h"
+
+namespace touchstone::datasets {
+
+/// Is it a drawn set's folder? False also where there is no set at all.
+bool holds_drawn_set(const std::filesystem::path& folder);
+
+/// @throws Error if the folder isn't a finished drawn set, or is damaged
+InspectedSet read_inspected_draw(const std::filesystem::path& folder);
+
+/// A sample's picture, BGR or grey, and 255 where what a pixel sees is in contact; empty if the set has none.
+cv::Mat drawn_frame(const InspectedSet& set, std::size_t sample);
+cv::Mat drawn_contact(const InspectedSet& set, std::size_t sample);
+
+/// The part of the gel's surface that the camera sees, from the sample's height map: pressed in along z alone, which is
+/// all that the set says. Empty if it has no heights or its device isn't known.
+InspectedGel drawn_gel(const InspectedSet& set, std::size_t sample);
+
+}  // namespace touchstone::datasets

@@ -1,0 +1,100 @@
+#pragma once
+// A job that draws: each sample is one press, drawn at random. See docs/datasets.md.
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/yaml_reader.h"
+#include "datasets/jobs/split.h"
+#include "datasets/jobs/spread.h"
+#include "render/lamps/guide_beams.h"
+
+namespace touchstone::datasets {
+
+/// What becomes of the numbers at a path of a device's or an object's file.
+enum class VaryHow : std::uint8_t { set, times, plus };
+
+/// Numbers of a file that are drawn. Each place that the path leads to gets a draw of its own (core/edited_yaml.h);
+/// numbers of one list get the same.
+struct NumberVariation {
+  std::string path;
+  VaryHow how = VaryHow::set;
+  Spread spread;
+  SourceLocation where;
+};
+
+/// How many sensors of one design there are, and how they differ.
+struct UnitsSpec {
+  int count = 1;
+  std::vector<NumberVariation> vary;
+};
+
+struct DrawnObjectSpec {
+  std::filesystem::path file;
+  double weight = 1.0;                 ///< how often it's taken, relative to the others
+  std::optional<std::int64_t> pieces;  ///< how many there are of it; none: with `vary` a new one each sample, else one
+  std::vector<NumberVariation> vary;
+  SourceLocation where;
+};
+
+/// Of the object's origin, gel frame.
+struct PlaceSpec {
+  Spread x, y;
+};
+
+struct DrawSpec {
+  std::filesystem::path device;
+  UnitsSpec units;
+  std::vector<DrawnObjectSpec> objects;
+  PlaceSpec place_mm;
+  Spread turn_deg = Spread::uniform(-180.0, 180.0);      ///< about z, before the tilt
+  Spread tilt_deg;                                       ///< about a level axis
+  Spread tilt_axis_deg = Spread::uniform(0.0, 360.0);    ///< that axis' direction, from x to y
+  std::optional<Spread> force_N;                         ///< normal; either this
+  std::optional<Spread> depth_mm;                        ///< or how far its lowest point goes in
+  Spread drag_mm;                                        ///< along the surface, after the press
+  Spread drag_toward_deg = Spread::uniform(0.0, 360.0);  ///< from x to y
+  std::optional<double> deepest_mm;                      ///< that the gel may be pressed in; default: see deepest_of
+};
+
+/// Pictures that a sample may have; the frame's own size.
+struct DrawnOutputs {
+  bool frame = false, height = false, contact = false;
+  SourceLocation where;
+};
+enum class DrawnOutput : std::uint8_t { frame, height, contact };
+EnumNames<DrawnOutput> enum_names(DrawnOutput);
+
+struct DrawJob {
+  std::string name;
+  std::string licence;  ///< of the data set: an SPDX name or any text; empty: none stated
+  std::uint64_t seed = 0;
+  std::int64_t samples = 0;
+  int samples_per_file = 100;
+  double membrane_um = 40.0;                ///< sim::TouchRigSettings::membrane_um
+  double interreflection_tolerance = 0.05;  ///< sim::TouchRigSettings
+  int edge_side = 4;                        ///< sim::TouchRigSettings
+  render::GuideCut guides;                  ///< sim::TouchRigSettings
+  DrawSpec draw;
+  DrawnOutputs outputs;
+  SplitSpec splits;
+  SourceLocation where;
+};
+
+void fields(YamlReader& in, NumberVariation& vary);
+void fields(YamlReader& in, UnitsSpec& units);
+void fields(YamlReader& in, DrawnObjectSpec& object);
+void fields(YamlReader& in, PlaceSpec& place);
+void fields(YamlReader& in, DrawSpec& draw);
+void fields(YamlReader& in, DrawJob& job);
+
+/// Reads and checks the job file, but not the device and the objects that it names. @throws Error with file and line
+DrawJob read_draw_job(const std::filesystem::path& file);
+
+/// True if the file is a job that draws: it has the key `draw`. @throws Error if it isn't YAML
+bool is_draw_job_file(const std::filesystem::path& file);
+
+}  // namespace touchstone::datasets

@@ -1,0 +1,77 @@
+#include "datasets/jobs/job.h"
+
+#include <algorithm>
+#include <cctype>
+#include <set>
+
+#include "core/nearest_name.h"
+
+namespace touchstone::datasets {
+bool is_folder_name(const std::string& name) {
+  return !name.empty() && name.size() <= 100 && std::all_of(name.begin(), name.end(), [](unsigned char letter) {
+    return (std::isalnum(letter) != 0 && letter < 128) || letter == '-' || letter == '_';
+  });
+}
+
+EnumNames<Split> enum_names(Split) {
+  return {{"train", Split::train}, {"verify", Split::verify}, {"test", Split::test}};
+}
+
+std::string name_of(Split split) {
+  for (const auto& [name, value] : enum_names(Split{})) {
+    if (value == split) return name;
+  }
+  TS_ASSERT(false);
+  return {};
+}
+
+Split split_named(const std::string& name) {
+  std::vector<std::string> known;
+  for (const auto& [known_name, value] : enum_names(Split{})) {
+    if (known_name == name) return value;
+    known.push_back(known_name);
+  }
+  fail("split '{}' is not known{}; allowed is one of: {}", name, did_you_mean(name, known), fmt::join(known, ", "));
+}
+
+void fields(YamlReader& in, JobScene& scene) {
+  scene.where = in.where();
+  in.required("name", scene.name);
+  if (!is_folder_name(scene.name)) {
+    fail_at(in.where("name"), "name: '{}' can't name a folder; allowed are up to 100 letters, digits, - and _",
+            scene.name);
+  }
+  std::string file;
+  in.required("scene", file);
+  scene.scene = in.folder() / file;
+  in.required("split", scene.split);
+  in.optional("start_mm", scene.start_mm);
+  if (!std::filesystem::is_regular_file(scene.scene)) {
+    fail_at(in.where("scene"), "scene: there is no file {}", scene.scene.string());
+  }
+}
+
+void fields(YamlReader& in, Job& job) {
+  job.where = in.where();
+  in.required("name", job.name);
+  in.required("seed", job.seed);
+  in.required("scenes", job.scenes);
+  in.optional("outputs", job.outputs);
+  if (job.scenes.empty()) fail_at(in.where("scenes"), "scenes: has no scene; at least one is needed");
+  std::set<std::string> names;
+  for (const JobScene& scene : job.scenes) {
+    if (!names.insert(scene.name).second) {
+      fail_at(scene.where, "scenes: the name '{}' stands here a second time", scene.name);
+    }
+  }
+}
+
+Job read_job(const std::filesystem::path& file) {
+  return read_yaml<Job>(file);
+}
+
+bool is_job_file(const std::filesystem::path& file) {
+  return YamlReader::open(file).has("scenes");
+}
+
+}  // namespace touchstone::datasets

@@ -1,0 +1,90 @@
+#include "datasets/jobs/split.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "core/random.h"
+
+namespace touchstone::datasets {
+
+std::string name_of(DrawnSplit split) {
+  constexpr std::array<const char*, kDrawnSplits> kNames = {"train", "validate", "test"};
+  return kNames.at(static_cast<std::size_t>(split));
+}
+
+EnumNames<SplitBy> enum_names(SplitBy) {
+  return {{"sample", SplitBy::sample}, {"unit", SplitBy::unit}};
+}
+
+void fields(YamlReader& in, SplitSpec& spec) {
+  constexpr double kRounding = 1e-9;
+  spec.where = in.where();
+  spec.share = {};
+  for (int k = 0; k < kDrawnSplits; ++k) {
+    in.optional(name_of(static_cast<DrawnSplit>(k)), spec.share[static_cast<std::size_t>(k)],
+                Allowed::within(0.0, 1.0));
+  }
+  in.optional("by", spec.by);
+  const double sum = std::accumulate(spec.share.begin(), spec.share.end(), 0.0);
+  if (std::abs(sum - 1.0) > kRounding) {
+    fail_at(in.where(), "{}train, validate and test add up to {}; 1 is needed", in.context(), sum);
+  }
+}
+
+std::vector<DrawnSplit> splits_of_units(const SplitSpec& spec, std::uint64_t seed, int units) {
+  const auto wanted =
+      static_cast<int>(std::count_if(spec.share.begin(), spec.share.end(), [](double s) { return s > 0; }));
+  if (units < wanted) {
+    fail_at(spec.where, "splits: by unit, but there are {} splits for {} units; draw.units.count must be {} at least",
+            wanted, units, wanted);
+  }
+  std::vector<int> order(static_cast<std::size_t>(units));
+  std::iota(order.begin(), order.end(), 0);
+  RandomStream random(seed, 0, Purpose::kSplit);
+  for (std::size_t k = order.size(); k > 1; --k) {  // Fisher and Yates
+    std::swap(order[k - 1],
+              order[std::min(k - 1, static_cast<std::size_t>(random.uniform() * static_cast<double>(k)))]);
+  }
+  // How many units each gets: rounded down, at least one; what is left goes where most was cut off.
+  std::array<int, kDrawnSplits> count{};
+  for (std::size_t s = 0; s < kDrawnSplits; ++s) {
+    if (spec.share[s] > 0) count[s] = std::max(1, static_cast<int>(spec.share[s] * units + 1e-9));
+  }
+  for (int left = units - std::accumulate(count.begin(), count.end(), 0); left != 0; left += left > 0 ? -1 : 1) {
+    const double sign = left > 0 ? 1.0 : -1.0;
+    std::size_t best = 0;
+    double most = -INFINITY;
+    for (std::size_t s = 0; s < kDrawnSplits; ++s) {
+      if (!(spec.share[s] > 0) || (left < 0 && count[s] == 1)) continue;
+      const double lacks = sign * (spec.share[s] * units - count[s]);
+      if (lacks > most) {
+        most = lacks;
+        best = s;
+      }
+    }
+    count[best] += left > 0 ? 1 : -1;
+  }
+  std::vector<DrawnSplit> splits(static_cast<std::size_t>(units));
+  std::size_t next = 0;
+  for (std::size_t s = 0; s < kDrawnSplits; ++s) {
+    for (int k = 0; k < count[s]; ++k) splits[static_cast<std::size_t>(order[next++])] = static_cast<DrawnSplit>(s);
+  }
+  TS_ASSERT(next == order.size());
+  return splits;
+}
+
+DrawnSplit split_of_sample(const SplitSpec& spec, std::uint64_t seed, std::int64_t sample) {
+  const double drawn = RandomStream(seed, static_cast<std::uint64_t>(sample) + 1, Purpose::kSplit).uniform();
+  double below = 0.0;
+  std::size_t last = 0;
+  for (std::size_t s = 0; s < kDrawnSplits; ++s) {
+    if (!(spec.share[s] > 0)) continue;
+    last = s;
+    below += spec.share[s];
+    if (drawn < below) return static_cast<DrawnSplit>(s);
+  }
+  return static_cast<DrawnSplit>(last);
+}
+
+}  // namespace touchstone::datasets

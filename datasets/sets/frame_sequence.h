@@ -1,0 +1,43 @@
+#pragma once
+// Pictures in the order of time, with the force where it's known: simulated or recorded, an estimator sees no
+// difference.
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "datasets/jobs/job.h"
+
+namespace touchstone::datasets {
+
+struct LabelledFrame {
+  std::filesystem::path file;
+  std::int64_t t_us = 0;
+  int frame = 0;                         ///< number within its sequence
+  std::optional<Eigen::Vector3d> force;  ///< on the object, N, gel frame; none where it isn't known
+};
+
+/// Frames that one tracker can follow. The first one shows the sensor without load.
+struct FrameSequence {
+  std::string name;
+  std::vector<LabelledFrame> frames;
+};
+
+/// The scenes of a finished data set that belong to `split`, or all of them. Checks the manifest, not every picture.
+/// @throws Error if the folder isn't a finished data set, has no frames, or has no scene of this split
+std::vector<FrameSequence> frames_of_data_set(const std::filesystem::path& folder, std::optional<Split> split);
+
+/// The .png, .jpg and .jpeg files of a folder, by name. @throws Error if it's no folder, or there is none
+std::vector<std::filesystem::path> picture_files(const std::filesystem::path& folder);
+
+/// Recorded frames: the picture_files of a folder, at a constant rate. @throws Error if there is none
+FrameSequence frames_of_folder(const std::filesystem::path& folder, double frame_rate_Hz);
+
+/// Recorded frames with forces, as a CSV file with the columns `file,t_us,force_x_N,force_y_N,force_z_N` in this order
+/// and a header line; files are relative to `folder`. @throws Error with file and line
+FrameSequence frames_of_force_table(const std::filesystem::path& folder, const std::filesystem::path& csv);
+
+}  // namespace touchstone::datasets

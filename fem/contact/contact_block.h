@@ -1,0 +1,41 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "fem/contact/contact_gap.h"
+#include "fem/elements/compliance.h"
+
+namespace touchstone::fem {
+
+/// The few surface vertices that may be in contact, and the compliance among them in each vertex's own axes
+/// (-normal, first tangent, second tangent): pressure and tangential traction against closing and tangential
+/// displacement. The whole compliance is touched only when the block changes.
+class ContactBlock {
+ public:
+  ContactBlock(const Compliance& gel, const ContactSurface& surface);
+
+  /// Makes the block hold `needed` (vertex indices, rising, unique). An old block that holds them and isn't far too
+  /// large is kept as it is. True if the block changed.
+  bool hold(const std::vector<int>& needed);
+
+  const std::vector<int>& vertices() const { return vertices_; }
+  /// Place of a surface vertex in the block, -1 if it isn't in it.
+  int place(int vertex) const { return place_[vertex]; }
+  /// 3 m x 3 m
+  const Eigen::MatrixXd& compliance() const { return compliance_; }
+  /// m x m: its normal rows and columns
+  const Eigen::MatrixXd& normal_compliance() const { return normal_compliance_; }
+  /// Columns are the vertex's own axes in the gel frame.
+  const Eigen::Matrix3d& axes(int vertex) const { return axes_[vertex]; }
+
+ private:
+  const Compliance& gel_;
+  std::vector<Eigen::Matrix3d> axes_;
+  std::vector<int> vertices_;
+  std::vector<int> place_;
+  Eigen::MatrixXd compliance_;
+  Eigen::MatrixXd normal_compliance_;
+};
+
+}  // namespace touchstone::fem

@@ -1,0 +1,349 @@
+#include "fem/contact/contact_gap.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "core/error.h"
+#include "fem/contact/covered_triangle.h"
+
+namespace touchstone::fem {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr int kSilhouetteSplits = 2;  // levels of splitting on the silhouette
+constexpr int kBisections = 34;       // of a cell's edge: a quarter of a triangle's to 1e-11
+constexpr int kFalsePositions = 40;   // likewise, where the distance to the silhouette is known: some 5 do
+constexpr double kSteep = 2.0;        // rise within a triangle, in its size, from which the body's side is seen
+constexpr double kBodiesLarge = 4.0;  // bodies larger than this times a triangle can't hide between its corners
+
+/// Integrates over one surface triangle; coordinates inside it are barycentric.
+template <typename Shape>
+class TriangleGap {
+ public:
+  TriangleGap(const Shape& shape, const RigidTransform& object_from_gel, double body_radius, double farthest_behind)
+      : shape_(shape),
+        object_from_gel_(object_from_gel),
+        body_radius_(body_radius),
+        farthest_behind_(farthest_behind) {}
+
+  /// int phi_k gap dA, int phi_k dA over the part that hits, and the least gap.
+  Eigen::Vector3d gap;
+  Eigen::Vector3d covered;
+  double lowest = kInfinity;
+
+  /// Gap at one surface point.
+  double corner_gap(const Eigen::Vector3d& corner, const Eigen::Vector3d& normal) const {
+    return entry(object_from_gel_ * corner, object_from_gel_.turn(normal)).value_or(kInfinity);
+  }
+
+  /// Where the gap is more than `steep` above `level` the body's side is seen, which doesn't bear: it fades out, up to
+  /// twice that.
+  void integrate(const std::array<Eigen::Vector3d, 3>& corners, const std::array<Eigen::Vector3d, 3>& normals,
+                 bool one_normal, double area, double level, double steep) {
+    level_ = level;
+    steep_ = steep;
+    gap.setZero();
+    covered.setZero();
+    lowest = kInfinity;
+    for (int k = 0; k < 3; ++k) {
+      points_.col(k) = object_from_gel_ * corners[k];
+      normals_.col(k) = object_from_gel_.turn(normals[k]);
+    }
+    one_normal_ = one_normal;
+    area_ = area;
+    has_silhouette_ = one_normal_ && silhouette_distance(shape_, points_.col(0), normals_.col(0)).has_value();
+    // Bodies smaller than the triangle must not fall between its points.
+    const int splits = splits_for_body(area_, body_radius_);
+    if (has_silhouette_) {
+      cell(Eigen::Matrix3d::Identity(), 0, splits + kSilhouetteSplits);
+    } else {
+      cell(Eigen::Matrix3d::Identity(), splits, kSilhouetteSplits);
+    }
+  }
+
+ private:
+  std::optional<double> at(const Eigen::Vector3d& b) const { return entry(points_ * b, direction(b)); }
+  Eigen::Vector3d direction(const Eigen::Vector3d& b) const {
+    return one_normal_ ? Eigen::Vector3d(normals_.col(0)) : (normals_ * b).normalized();
+  }
+  std::optional<double> entry(const Eigen::Vector3d& point, const Eigen::Vector3d& normal) const {
+    const auto found = first_entry(shape_, point, normal);
+    if (!found || *found >= -farthest_behind_) return found;
+    const auto back = first_entry(shape_, point, -normal);  // where the line leaves the body, seen from outside
+    return back && -*back < -farthest_behind_ ? std::nullopt : found;
+  }
+  /// Whether there is an entry.
+  bool hits(const Eigen::Vector3d& b) const {
+    if (std::isfinite(farthest_behind_)) return at(b).has_value();
+    return is_hit(shape_, points_ * b, direction(b));
+  }
+  /// Signed, positive inside.
+  double silhouette(const Eigen::Vector3d& b) const {
+    return *silhouette_distance(shape_, points_ * b, normals_.col(0));
+  }
+
+  /// `cell` holds the barycentric corners as columns.
+  void cell(const Eigen::Matrix3d& corners, int forced_splits, int silhouette_splits) {
+    if (forced_splits > 0) {
+      split(corners, forced_splits - 1, silhouette_splits);
+      return;
+    }
+    std::array<bool, 3> corner_hit;
+    int corner_hits = 0;
+    if (has_silhouette_) {
+      const Eigen::Vector3d middle = corners.rowwise().mean();
+      double reach2 = 0.0;
+      for (int k = 0; k < 3; ++k) reach2 = std::max(reach2, (points_ * (corners.col(k) - middle)).squaredNorm());
+      const double inside = silhouette(middle);
+      if (inside * inside > reach2) {
+        if (inside > 0.0) whole(corners);
+        return;
+      }
+      for (int k = 0; k < 3; ++k) corner_hits += corner_hit[k] = silhouette(corners.col(k)) >= 0.0;
+    } else {
+      int hits = 0;
+      for (int k = 0; k < 3; ++k) corner_hits += corner_hit[k] = at(corners.col(k)).has_value();
+      std::array<std::optional<double>, 7> value;
+      for (int k = 0; k < 7; ++k) {
+        value[k] = at(corners * radon_rule().points[k]);
+        hits += value[k].has_value();
+      }
+      if (hits + corner_hits == 0) return;
+      if (hits + corner_hits == 10) {
+        const double area = area_ * std::abs(corners.determinant());
+        for (int k = 0; k < 7; ++k) {
+          add(corners * radon_rule().points[k], *value[k], radon_rule().weights[k] * area);
+        }
+        return;
+      }
+    }
+    if (silhouette_splits > 0) {
+      split(corners, 0, silhouette_splits - 1);
+    } else if (corner_hits == 3) {
+      whole(corners);
+    } else if (corner_hits > 0) {
+      clip(corners, corner_hit, corner_hits);
+    }
+  }
+
+  void split(const Eigen::Matrix3d& c, int forced_splits, int silhouette_splits) {
+    const Eigen::Vector3d m01 = 0.5 * (c.col(0) + c.col(1));
+    const Eigen::Vector3d m12 = 0.5 * (c.col(1) + c.col(2));
+    const Eigen::Vector3d m20 = 0.5 * (c.col(2) + c.col(0));
+    cell(triangle(c.col(0), m01, m20), forced_splits, silhouette_splits);
+    cell(triangle(m01, c.col(1), m12), forced_splits, silhouette_splits);
+    cell(triangle(m20, m12, c.col(2)), forced_splits, silhouette_splits);
+    cell(triangle(m01, m12, m20), forced_splits, silhouette_splits);
+  }
+
+  static Eigen::Matrix3d triangle(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
+    Eigen::Matrix3d m;
+    m << a, b, c;
+    return m;
+  }
+
+  /// The point on the edge from a hit to a miss where the silhouette crosses it.
+  Eigen::Vector3d crossing(Eigen::Vector3d hit, Eigen::Vector3d miss) const {
+    if (!has_silhouette_) {
+      for (int k = 0; k < kBisections; ++k) {
+        const Eigen::Vector3d middle = 0.5 * (hit + miss);
+        (hits(middle) ? hit : miss) = middle;
+      }
+      return hit;
+    }
+    // False position with the Illinois rule: the kept end's value is halved when it is kept twice.
+    double at_hit = silhouette(hit);
+    double at_miss = silhouette(miss);
+    int kept = 0;
+    for (int k = 0; k < kFalsePositions; ++k) {
+      const Eigen::Vector3d middle = hit + at_hit / (at_hit - at_miss) * (miss - hit);
+      const double value = silhouette(middle);
+      if (std::abs(value) <= 1e-14 * body_radius_ || middle == hit || middle == miss) return middle;
+      if (value > 0.0) {
+        hit = middle;
+        at_hit = value;
+        if (kept == 1) at_miss *= 0.5;
+        kept = 1;
+      } else {
+        miss = middle;
+        at_miss = value;
+        if (kept == -1) at_hit *= 0.5;
+        kept = -1;
+      }
+    }
+    return hit;
+  }
+
+  void clip(const Eigen::Matrix3d& c, const std::array<bool, 3>& hit, int hits) {
+    clip_to_hits(
+        c, hit, hits, [&](const auto& in, const auto& out) { return crossing(in, out); },
+        [&](const auto& a, const auto& b, const auto& d) { whole(triangle(a, b, d)); });
+  }
+
+  /// A cell that hits all over, but for slivers at a curved silhouette.
+  void whole(const Eigen::Matrix3d& corners) {
+    const double area = area_ * std::abs(corners.determinant());
+    const RadonRule& rule = radon_rule();
+    for (int k = 0; k < 7; ++k) {
+      const Eigen::Vector3d point = corners * rule.points[k];
+      if (const auto value = at(point)) add(point, *value, rule.weights[k] * area);
+    }
+  }
+
+  void add(const Eigen::Vector3d& b, double value, double weight) {
+    weight *= std::clamp(2.0 - (value - level_) / steep_, 0.0, 1.0);
+    gap += weight * value * b;
+    covered += weight * b;
+    lowest = std::min(lowest, value);
+  }
+
+  const Shape& shape_;
+  const RigidTransform object_from_gel_;
+  const double body_radius_;
+  const double farthest_behind_;
+  Eigen::Matrix3d points_;
+  Eigen::Matrix3d normals_;
+  bool one_normal_ = true;
+  bool has_silhouette_ = false;
+  double area_ = 0.0;
+  double level_ = 0.0;
+  double steep_ = 1.0;
+};
+
+}  // namespace
+
+ContactSurface::ContactSurface(const Compliance& gel)
+    : ContactSurface(gel.vertices, gel.triangles, gel.mass, gel.thickness) {
+  TS_ASSERT(static_cast<std::size_t>(gel.surface.rows()) == 3 * vertices.size());
+  TS_ASSERT(gel.surface.cols() == gel.surface.rows());
+}
+
+ContactSurface::ContactSurface(std::vector<Eigen::Vector3d> places, std::vector<std::array<int, 3>> faces,
+                               const Eigen::SparseMatrix<double>& mass, double thickness)
+    : vertices(std::move(places)), triangles(std::move(faces)) {
+  const std::size_t n = vertices.size();
+  TS_ASSERT(static_cast<std::size_t>(mass.rows()) == n);
+  normals.assign(n, Eigen::Vector3d::Zero());
+  around.resize(n);
+  for (const auto& t : triangles) {
+    const Eigen::Vector3d middle = (vertices[t[0]] + vertices[t[1]] + vertices[t[2]]) / 3.0;
+    double size = 0.0;
+    for (const int v : t) size = std::max(size, (vertices[v] - middle).norm());
+    triangle_size.push_back(size);
+    const Eigen::Vector3d twice_area = (vertices[t[1]] - vertices[t[0]]).cross(vertices[t[2]] - vertices[t[0]]);
+    triangle_area.push_back(0.5 * twice_area.norm());
+    for (int k = 0; k < 3; ++k) {
+      normals[t[k]] += twice_area;
+      around[t[k]].push_back(t[(k + 1) % 3]);
+      around[t[k]].push_back(t[(k + 2) % 3]);
+    }
+  }
+  for (std::size_t v = 0; v < n; ++v) {
+    normals[v].normalize();
+    // A flat pad's normals must be equal to the last bit: sums of parallel vectors differ by rounding.
+    for (int a = 0; a < 3; ++a) {
+      if (std::abs(normals[v][a]) < 1e-14) normals[v][a] = 0.0;
+      if (std::abs(std::abs(normals[v][a]) - 1.0) < 1e-14) normals[v][a] = std::copysign(1.0, normals[v][a]);
+    }
+    std::sort(around[v].begin(), around[v].end());
+    around[v].erase(std::unique(around[v].begin(), around[v].end()), around[v].end());
+  }
+  weight = mass * Eigen::VectorXd::Ones(static_cast<Eigen::Index>(n));
+  for (const Eigen::Vector3d& normal : normals) flat = flat && normal == normals.front();
+  if (!flat) farthest_behind = 0.5 * thickness;
+}
+
+void WeightedGap::move_along_normals(const Eigen::VectorXd& weight, double distance) {
+  deepest += distance;
+  reach += distance;
+  const double depth = std::max(0.0, -deepest);
+  for (Eigen::Index i = 0; i < weighted.size(); ++i) {
+    if (!std::isfinite(weighted[i])) continue;
+    plain[i] += weight[i] * distance;
+    lowest[i] += distance;
+    weighted[i] = plain[i] + edge[i] * depth;
+  }
+}
+
+WeightedGap weighted_gap(const ContactSurface& surface, const ContactShape& shape,
+                         const RigidTransform& gel_from_object, const PatchMotion& lookup, GapReach asked) {
+  const auto n = static_cast<Eigen::Index>(surface.vertices.size());
+  WeightedGap result;
+  result.plain = Eigen::VectorXd::Zero(n);
+  result.lowest = Eigen::VectorXd::Constant(n, kInfinity);
+  result.edge = Eigen::VectorXd::Zero(n);
+  Eigen::VectorXd covered = Eigen::VectorXd::Zero(n);
+  std::vector<char> skipped(surface.vertices.size(), 0);  // a triangle of its support is above `reach`
+  const BoundingBall ball = bounding_ball(shape);
+  const Eigen::Vector3d centre = gel_from_object * ball.centre;
+  const bool may_skip = std::isfinite(asked.margin) && is_convex(shape);
+  std::vector<Eigen::Vector3d> moved(surface.vertices);
+  for (std::size_t v = 0; v < moved.size(); ++v) {
+    const Eigen::Vector3d& normal = surface.normals[v];
+    const Eigen::Vector3d displacement = lookup.displacement(moved[v]);
+    moved[v] += displacement - normal.dot(displacement) * normal;
+  }
+  std::visit(
+      [&](const auto& body) {
+        TriangleGap triangle(body, gel_from_object.inverse(), ball.radius, surface.farthest_behind);
+        Eigen::VectorXd corner_gap(n);
+        for (std::size_t v = 0; v < moved.size(); ++v) {
+          corner_gap[static_cast<Eigen::Index>(v)] = triangle.corner_gap(moved[v], surface.normals[v]);
+        }
+        if (may_skip) {
+          const double least = corner_gap.minCoeff();
+          result.reach = std::max(0.0, least) + asked.margin + asked.of_depth * std::max(0.0, -least);
+        }
+        for (std::size_t t = 0; t < surface.triangles.size(); ++t) {
+          const auto& index = surface.triangles[t];
+          const std::array<Eigen::Vector3d, 3> corners{moved[index[0]], moved[index[1]], moved[index[2]]};
+          const std::array<Eigen::Vector3d, 3> normals{surface.normals[index[0]], surface.normals[index[1]],
+                                                       surface.normals[index[2]]};
+          const double size = surface.triangle_size[t];
+          const bool one_normal = normals[0] == normals[1] && normals[0] == normals[2];
+          if (one_normal) {
+            const Eigen::Vector3d away = centre - (corners[0] + corners[1] + corners[2]) / 3.0;
+            const double limit = size + ball.radius;
+            if (away.squaredNorm() - std::pow(away.dot(normals[0]), 2) > limit * limit) continue;
+          }
+          double least = std::min({corner_gap[index[0]], corner_gap[index[1]], corner_gap[index[2]]});
+          if (may_skip && ball.radius > kBodiesLarge * size) {
+            // A convex body's gap is convex along the surface; steeper than 45 degrees it is beside the contact.
+            const double most = std::max({corner_gap[index[0]], corner_gap[index[1]], corner_gap[index[2]]});
+            if (std::isfinite(most) && least > result.reach + size) {
+              for (const int v : index) skipped[v] = 1;
+              continue;
+            }
+          }
+          // Integrals over the undeformed surface: the moved triangle only says where to look.
+          for (int k = 0; k < 3 && !std::isfinite(least); ++k) {
+            for (const int u : surface.around[index[k]]) least = std::min(least, corner_gap[u]);
+          }
+          if (!std::isfinite(least)) least = std::numeric_limits<double>::max();  // a small body between the vertices
+          triangle.integrate(corners, normals, one_normal, surface.triangle_area[t], least, kSteep * size);
+          for (int k = 0; k < 3; ++k) {
+            result.plain[index[k]] += triangle.gap[k];
+            covered[index[k]] += triangle.covered[k];
+            result.lowest[index[k]] = std::min(result.lowest[index[k]], triangle.lowest);
+          }
+          result.deepest = std::min(result.deepest, triangle.lowest);
+        }
+      },
+      shape);
+  const double depth = std::max(0.0, -result.deepest);
+  result.weighted = result.plain;
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const double share = covered[i] / surface.weight[i];
+    if (share < kLeastShare || skipped[i]) {
+      result.weighted[i] = result.plain[i] = result.lowest[i] = kInfinity;
+      continue;
+    }
+    if (share < kBearingShare) result.edge[i] = surface.weight[i] * (kBearingShare - share) / kBearingFade;
+    result.plain[i] *= surface.weight[i] / covered[i];
+    result.weighted[i] = result.plain[i] + result.edge[i] * depth;
+  }
+  return result;
+}
+
+}  // namespace touchstone::fem

@@ -1,0 +1,400 @@
+#include "fem/contact/press.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "core/error.h"
+#include "fem/contact/press_part.h"
+#include "fem/contact/press_report.h"
+
+namespace touchstone::fem {
+namespace {
+
+constexpr double kAsGoodAsInfinite = 100.0;  // for an infinite friction whose sets cycle
+constexpr int kBondedHalvings = 1;
+
+using Kind = AxisControl::Kind;
+
+/// A straight way: positions and rotations from `start` to `to`, forces and torques from those at `start` to those of
+/// `to`.
+struct Path {
+  PressSnapshot start;
+  std::vector<PartTarget> to;
+  double seconds = 0.0;
+};
+
+struct Effort {
+  PartEffort part;
+  int parts = 0;
+};
+
+}  // namespace
+
+RigidTransform between(const RigidTransform& a, const RigidTransform& b, double fraction) {
+  if (fraction >= 1.0) return b;
+  RigidTransform result;
+  result.translation = a.translation + fraction * (b.translation - a.translation);
+  result.rotation = a.rotation;
+  if (a.rotation != b.rotation) {
+    result.rotation = Eigen::Quaterniond(a.rotation).slerp(fraction, Eigen::Quaterniond(b.rotation)).toRotationMatrix();
+  }
+  return result;
+}
+
+namespace {
+
+/// About the body's origin.
+Eigen::Vector3d torque_on(const BodySnapshot& body) {
+  return body.moment - body.pose.translation.cross(body.force);
+}
+
+}  // namespace
+
+void check_target(const PressTarget& target) {
+  if (!std::isfinite(target.seconds) || target.seconds < 0.0) {
+    fail("a step takes {} s; it must be finite and at least 0", target.seconds);
+  }
+  const char* const names[] = {"x", "y", "z"};
+  for (int a = 0; a < 3; ++a) {
+    if (!std::isfinite(target.axis[a].value)) {
+      fail("the {} {} of the press is {}, it must be finite", names[a],
+           target.axis[a].kind == Kind::force ? "force" : "position", target.axis[a].value);
+    }
+  }
+  if (!target.rotation.allFinite()) fail("the object's rotation holds NaN or infinity");
+  const double error = (target.rotation.transpose() * target.rotation - Eigen::Matrix3d::Identity()).norm();
+  if (error > 1e-6 || target.rotation.determinant() < 0.0) {
+    fail("the object's rotation isn't one: R^T R differs from 1 by {:.3g}, det R = {:.3g}", error,
+         target.rotation.determinant());
+  }
+  for (int a = 0; a < 3; ++a) {
+    if (target.torque[a] && !std::isfinite(*target.torque[a])) {
+      fail("the torque about {} of the press is {}, it must be finite", names[a], *target.torque[a]);
+    }
+  }
+  if (target.axis[2].kind == Kind::force && target.axis[2].value < 0.0) {
+    fail("a normal force of {} N is wanted: contact can't pull, it must be at least 0", target.axis[2].value);
+  }
+}
+
+struct Press::Parts {
+  Parts(const Compliance& compliance, std::vector<PressBody> bodies, PressTolerance wanted, PronySeries relaxation,
+        PressOutput what)
+      : gel(compliance),
+        tolerance(wanted),
+        output(what),
+        solver(gel, std::move(bodies), wanted.lookup_mm, wanted.traction, std::move(relaxation)),
+        n(static_cast<int>(gel.vertices.size())),
+        placed(solver.bodies().size(), 0) {
+    if (output == PressOutput::fields) {
+      mass.compute(gel.mass);
+      if (mass.info() != Eigen::Success) fail("the gel's surface mass matrix isn't positive definite");
+    }
+    now = untouched(std::vector<BodySnapshot>(solver.bodies().size()), n);
+    state = report(gel, solver, mass, output, now);
+  }
+
+  const Compliance& gel;
+  PressTolerance tolerance;
+  PressOutput output;
+  PartSolver solver;
+  int n;
+  SurfaceMassFactor mass;
+  PressSnapshot now;
+  std::vector<char> placed;  ///< per body
+  PressState state;
+
+  double friction(std::size_t body) const { return solver.bodies()[body].friction; }
+  double deepest_at(std::size_t body, const RigidTransform& pose) const {
+    return weighted_gap(solver.surface(), solver.bodies()[body].shape, pose).deepest;
+  }
+  std::optional<RigidTransform> straight_above(std::size_t body, RigidTransform pose) const;
+  std::optional<RigidTransform> before_touch(std::size_t body, const PressTarget& target, RigidTransform& to,
+                                             double& clear) const;
+  double add_way(std::size_t body, const PressTarget& target, Path& path) const;
+  std::optional<PressSnapshot> advance(const Path& path, const PressSnapshot& from, double begin, double end,
+                                       int halvings, Effort& effort);
+  std::optional<PressSnapshot> walk(const Path& path, int halvings, Effort& effort);
+  PressSnapshot follow(std::span<const PressTarget> targets, Effort& effort);
+  const PressState& step(std::span<const PressTarget> targets);
+};
+
+/// The pose straight above `pose` in which the body just touches the undeformed gel; nothing if it isn't over it.
+std::optional<RigidTransform> Press::Parts::straight_above(std::size_t body, RigidTransform pose) const {
+  for (int k = 0; k < 30; ++k) {
+    const double gap = deepest_at(body, pose);
+    if (!std::isfinite(gap)) return std::nullopt;
+    pose.translation.z() -= gap;
+    if (std::abs(gap) < 1e-13 * (std::abs(pose.translation.z()) + gel.thickness)) break;
+  }
+  return pose;
+}
+
+/// The part of the path from `begin` to `end` (shares of the whole), halved where it doesn't converge.
+std::optional<PressSnapshot> Press::Parts::advance(const Path& path, const PressSnapshot& from, double begin,
+                                                   double end, int halvings, Effort& effort) {
+  std::vector<PartTarget> targets(path.to);
+  for (std::size_t b = 0; b < targets.size(); ++b) {
+    PartTarget& target = targets[b];
+    const BodySnapshot& start = path.start.bodies[b];
+    target.pose = between(start.pose, path.to[b].pose, end);
+    for (int a = 0; a < 3; ++a) {
+      if (target.forced[a]) target.pose.translation[a] = from.bodies[b].pose.translation[a];
+    }
+    const bool turned = target.turned[0] || target.turned[1] || target.turned[2];
+    if (turned) {
+      // What torque has turned the body by since the path's start comes on top of the way.
+      const Eigen::Matrix3d so_far = between(start.pose, path.to[b].pose, begin).rotation;
+      target.pose.rotation = from.bodies[b].pose.rotation * so_far.transpose() * target.pose.rotation;
+    }
+    if (end < 1.0) {
+      target.force = start.force + end * (target.force - start.force);
+      target.torque = torque_on(start) + end * (target.torque - torque_on(start));
+    }
+  }
+  if (auto next = solver.solve(from, targets, (end - begin) * path.seconds, effort.part)) {
+    ++effort.parts;
+    return next;
+  }
+  if (halvings == 0) return std::nullopt;
+  const double middle = 0.5 * (begin + end);
+  const auto half = advance(path, from, begin, middle, halvings - 1, effort);
+  if (!half) return std::nullopt;
+  return advance(path, *half, middle, end, halvings - 1, effort);
+}
+
+/// Where the path of a body that starts out of contact begins: a pose that just touches. `to` is the step's end with
+/// its force-controlled axes as they are before it; z is set to the touch if it's force-controlled. `clear` is set to
+/// the share of the step that goes before. Nothing on a miss.
+std::optional<RigidTransform> Press::Parts::before_touch(std::size_t body, const PressTarget& target,
+                                                         RigidTransform& to, double& clear) const {
+  clear = 0.0;
+  if (target.axis[2].kind == Kind::force) {
+    const auto touch = straight_above(body, to);
+    if (!touch) {
+      fail("the object isn't over the gel: a force of {:.4g} N can't be reached", target.axis[2].value);
+    }
+    to = *touch;
+    if (target.axis[2].value == 0.0) return std::nullopt;
+    return to;
+  }
+  const double deepest = deepest_at(body, to);
+  if (-deepest > gel.thickness) {
+    fail("the object reaches {:.4g} mm into a gel of {:.4g} mm", -deepest, gel.thickness);
+  }
+  if (!(deepest < 0.0)) {
+    if (now.history.empty()) return std::nullopt;
+    return to;  // what still bulges beside an old dent may be touched
+  }
+  const RigidTransform& here = now.bodies[body].pose;
+  if (!placed[body] || !(deepest_at(body, here) >= 0.0)) return straight_above(body, to).value_or(to);
+  double overlapping = 1.0;
+  for (int k = 0; k < 50; ++k) {
+    const double middle = 0.5 * (clear + overlapping);
+    (deepest_at(body, between(here, to, middle)) < 0.0 ? overlapping : clear) = middle;
+  }
+  return between(here, to, clear);
+}
+
+/// Sets one body's start and end. The share of the step after which it may touch.
+double Press::Parts::add_way(std::size_t b, const PressTarget& target, Path& path) const {
+  double clear = 0.0;
+  const BodySnapshot& here = now.bodies[b];
+  BodySnapshot& start = path.start.bodies[b];
+  PartTarget to;
+  to.pose = {target.rotation, here.pose.translation};
+  double shear2 = 0.0;
+  for (int a = 0; a < 3; ++a) {
+    to.forced[a] = target.axis[a].kind == Kind::force;
+    if (to.forced[a]) {
+      to.force[a] = target.axis[a].value;
+      if (a < 2) shear2 += to.force[a] * to.force[a];
+    } else {
+      to.pose.translation[a] = target.axis[a].value;
+    }
+    to.turned[a] = target.torque[a].has_value();
+    to.torque[a] = target.torque[a].value_or(0.0);
+  }
+  // What torque has turned the body by is kept along the axes that are still under torque control.
+  Eigen::Vector3d turn = here.turn;
+  for (int a = 0; a < 3; ++a) {
+    if (!to.turned[a]) turn[a] = 0.0;
+  }
+  start.turn = turn;
+  if (turn.norm() > 0.0) {
+    to.pose.rotation = Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix() * to.pose.rotation;
+  }
+
+  const double shear = std::sqrt(shear2);
+  if (to.forced[2]) {
+    const double held = to.force[2] > 0.0 && friction(b) > 0.0 ? friction(b) * to.force[2] : 0.0;
+    if (shear > 0.0 && shear >= held * (1.0 - 1e-9)) {
+      fail(
+          "gross slip: a shear force of {:.6g} N is wanted, but a normal force of {:.6g} N with a friction of {:.4g} "
+          "holds less than {:.6g} N",
+          shear, to.force[2], friction(b), held);
+    }
+  } else if (shear > 0.0 && friction(b) == 0.0) {
+    fail("gross slip: a shear force of {:.6g} N is wanted without friction", shear);
+  }
+
+  const bool no_force = to.forced[2] && to.force[2] == 0.0;
+  bool meets = here.touching && !no_force;
+  if (!meets) {
+    const auto touch = before_touch(b, target, to.pose, clear);
+    meets = touch.has_value();
+    if (!meets && shear > 0.0) {
+      fail("gross slip: a shear force of {:.6g} N is wanted, but the object doesn't touch the gel", shear);
+    }
+    start.pose = touch.value_or(to.pose);
+    if (!touch) clear = 1.0;
+  }
+  if (!here.touching || no_force) path.start.forget(static_cast<int>(b));
+  if (!meets) to.forced = to.turned = {};  // nothing to push against: it goes where it is told and turns no further
+  // A forced axis that nothing can push on stays where it is: without friction, along the surface.
+  if (friction(b) == 0.0) {
+    const auto& normals = solver.surface().normals;
+    for (int a = 0; a < 3; ++a) {
+      const bool pushed = std::any_of(normals.begin(), normals.end(),
+                                      [&](const Eigen::Vector3d& normal) { return std::abs(normal[a]) > 1e-12; });
+      if (!pushed) to.forced[a] = false;
+      if (solver.surface().flat && std::abs(normals.front()[a]) > 1.0 - 1e-12) to.turned[a] = false;
+    }
+  }
+  path.to.push_back(to);
+  return clear;
+}
+
+PressSnapshot Press::Parts::follow(std::span<const PressTarget> targets, Effort& effort) {
+  Path path;
+  path.start = now;
+  path.seconds = targets.front().seconds;
+  double clear = 1.0;
+  for (std::size_t b = 0; b < targets.size(); ++b) clear = std::min(clear, add_way(b, targets[b], path));
+  if (solver.relaxes() && clear > 0.0 && clear < 1.0) {  // nothing touches yet: the gel recovers on the way
+    path.start = solver.apart(now, path.start.bodies, clear * path.seconds);
+    path.seconds *= 1.0 - clear;
+  }
+  std::vector<double> mu;
+  bool bonded = false;
+  bool any_friction = false;
+  for (std::size_t b = 0; b < targets.size(); ++b) {
+    mu.push_back(friction(b));
+    bonded = bonded || std::isinf(mu.back());
+    any_friction = any_friction || mu.back() > 0.0;
+  }
+  solver.set_friction(mu);
+  auto end = walk(path, !any_friction ? 0 : bonded ? kBondedHalvings : tolerance.most_halvings, effort);
+  if (!end && bonded) {
+    for (double& value : mu) value = std::min(value, kAsGoodAsInfinite);
+    solver.set_friction(mu);
+    end = walk(path, tolerance.most_halvings, effort);
+  }
+  if (!end) {
+    for (std::size_t b = 0; b < targets.size(); ++b) {
+      const PartTarget& to = path.to[b];
+      const double shear = std::hypot(to.forced[0] ? to.force[0] : 0.0, to.forced[1] ? to.force[1] : 0.0);
+      const double held = friction(b) * std::max(0.0, now.bodies[b].force.z());
+      if (shear > 0.0 && !to.forced[2] && shear >= 0.9 * held) {
+        fail("gross slip: a shear force of {:.6g} N is wanted, but the friction of {:.4g} holds about {:.6g} N", shear,
+             friction(b), held);
+      }
+    }
+    fail("the press doesn't converge: {}", solver.why_not());
+  }
+  return *end;
+}
+
+/// The path in equal parts no longer than the tolerance allows, each halved where it must be.
+std::optional<PressSnapshot> Press::Parts::walk(const Path& path, int halvings, Effort& effort) {
+  int parts = 1;
+  for (std::size_t b = 0; b < path.to.size(); ++b) {
+    if (friction(b) == 0.0) continue;
+    Eigen::Vector3d motion = path.to[b].pose.translation - path.start.bodies[b].pose.translation;
+    for (int a = 0; a < 3; ++a) {
+      if (path.to[b].forced[a]) motion[a] = 0.0;
+    }
+    parts = std::max(parts, static_cast<int>(std::ceil(motion.norm() / tolerance.largest_motion - 1e-9)));
+  }
+  PressSnapshot at = path.start;
+  for (int part = 0; part < parts; ++part) {
+    const double begin = static_cast<double>(part) / parts;
+    const double end = part + 1 == parts ? 1.0 : static_cast<double>(part + 1) / parts;
+    auto next = advance(path, at, begin, end, halvings, effort);
+    if (!next) return std::nullopt;
+    at = std::move(*next);
+  }
+  return at;
+}
+
+const PressState& Press::Parts::step(std::span<const PressTarget> targets) {
+  if (targets.size() != solver.bodies().size()) {
+    fail("{} targets are given for {} bodies", targets.size(), solver.bodies().size());
+  }
+  for (const PressTarget& target : targets) check_target(target);
+  Effort effort;
+  PressSnapshot next = follow(targets, effort);
+  double force_residual = 0.0;
+  double torque_residual = 0.0;
+  for (std::size_t b = 0; b < targets.size(); ++b) {
+    const BodySnapshot& body = next.bodies[b];
+    for (int a = 0; a < 3; ++a) {
+      if (targets[b].axis[a].kind == Kind::force) {
+        const double wanted = targets[b].axis[a].value;
+        const double missing = std::abs(body.force[a] - wanted);
+        force_residual = std::max(force_residual, missing);
+        if (missing > tolerance.force * std::max(1.0, std::abs(wanted))) {
+          fail("the press ends at {:.9g} N on axis {} where {:.9g} N are wanted", body.force[a], a, wanted);
+        }
+      }
+      if (targets[b].torque[a] && body.touching) {
+        torque_residual = std::max(torque_residual, std::abs(torque_on(body)[a] - *targets[b].torque[a]));
+      }
+    }
+  }
+  now = std::move(next);
+  placed.assign(placed.size(), 1);
+  state = report(gel, solver, mass, output, now);
+  state.force_residual = force_residual;
+  state.torque_residual = torque_residual;
+  state.candidates = effort.part.candidates;
+  state.geometry_updates = effort.part.geometry_updates;
+  state.solves = effort.part.solves;
+  state.factorisations = effort.part.factorisations;
+  state.sweeps = effort.part.sweeps;
+  state.parts = effort.parts;
+  return state;
+}
+
+Press::Press(const Compliance& gel, std::vector<PressBody> bodies, PressTolerance tolerance, PronySeries relaxation,
+             PressOutput output) {
+  TS_ASSERT(!bodies.empty());
+  check(relaxation);
+  for (const PressBody& body : bodies) {
+    check_shape(body.shape);
+    if (!(body.friction >= 0.0)) fail("the friction coefficient is {}, it must be at least 0", body.friction);
+  }
+  parts_ = std::make_unique<Parts>(gel, std::move(bodies), tolerance, std::move(relaxation), output);
+}
+
+Press::Press(const Compliance& gel, ContactShape shape, double friction, PressTolerance tolerance,
+             PronySeries relaxation, PressOutput output)
+    : Press(gel, std::vector<PressBody>{{std::move(shape), friction, nullptr}}, tolerance, std::move(relaxation),
+            output) {}
+
+Press::Press(Press&&) noexcept = default;
+Press& Press::operator=(Press&&) noexcept = default;
+Press::~Press() = default;
+
+const PressState& Press::step(std::span<const PressTarget> targets) {
+  return parts_->step(targets);
+}
+
+const PressState& Press::state() const {
+  return parts_->state;
+}
+
+}  // namespace touchstone::fem

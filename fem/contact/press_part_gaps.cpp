@@ -1,0 +1,164 @@
+// Where the bodies are over the gel, and which vertices may touch.
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/error.h"
+#include "fem/contact/press_part_iterate.h"
+
+namespace touchstone::fem {
+namespace {
+
+constexpr double kSurelyTouching = 0.3;  // of the deepest overlap: vertices that overlap by more start in the block
+constexpr std::size_t kFirstCandidates = 12;
+// The gel bulges beside a contact by less than this part of the depth; vertices further from a body than that, and a
+// little, aren't looked at. It is checked at the answer, and widened where it doesn't hold.
+constexpr double kBulge = 0.5;
+constexpr double kSharpestCurve = 0.3;  // of a triangle: radius down to which a gap counts as smooth
+constexpr double kSlopeStep = 3e-4;     // of a triangle
+
+}  // namespace
+
+Eigen::Vector3d PartSolver::weighted_at(const PressSnapshot& snapshot, int vertex) const {
+  if (snapshot.known[vertex]) return snapshot.weighted.segment<3>(3 * vertex);
+  const auto rows = gel_.surface.view().middleCols<3>(3 * vertex);  // symmetric
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (std::size_t v = 0; v < snapshot.state.size(); ++v) {
+    if (snapshot.state[v] == NodeState::open) continue;
+    const auto at = static_cast<Eigen::Index>(3 * v);
+    sum += rows.middleRows<3>(at).transpose() * snapshot.traction.segment<3>(at);
+  }
+  return sum;
+}
+
+/// Of the gel relative to the body that touches it; an open vertex has no history against a body.
+Eigen::Vector3d PartSolver::relative_at(const PressSnapshot& snapshot, int vertex) const {
+  return snapshot.known[vertex] ? Eigen::Vector3d(snapshot.relative.segment<3>(3 * vertex))
+                                : weighted_at(snapshot, vertex);
+}
+
+/// The gap of one body at its pose, looked up or carried over from a place nearby.
+WeightedGap PartSolver::gap_of(std::size_t b, const Iterate& now, PartEffort& effort) {
+  const Body& body = now.bodies[b];
+  Looked& looked = looked_[b];
+  const ContactShape& shape = bodies_[b].shape;
+  // Some more than what is asked for, so that it serves the next, deeper place, too.
+  const GapReach reach = surface_.flat ? GapReach{now.reach + kLeastReach * gel_.thickness, 1.5 * kBulge} : GapReach{};
+  const auto look = [&] {
+    looked.gap = weighted_gap(surface_, shape, body.pose, body.lookup, reach);
+    looked.pose = body.pose;
+    looked.lookup = body.lookup;
+    looked.valid = surface_.flat && surface_.normals.front() == Eigen::Vector3d::UnitZ();
+    looked.has_slopes = false;
+    ++effort.geometry_updates;
+    return looked.gap;
+  };
+  if (!looked.valid || looked.pose.rotation != body.pose.rotation) return look();
+  const Eigen::Vector3d motion = body.pose.translation - looked.pose.translation;
+  const auto n = static_cast<Eigen::Index>(gel_.vertices.size());
+  Eigen::MatrixX2d slid = Eigen::MatrixX2d::Zero(n, 2);  // of the gel under the body
+  for (Eigen::Index v = 0; v < n; ++v) {
+    if (!std::isfinite(looked.gap.weighted[v])) continue;
+    const Eigen::Vector3d& x = gel_.vertices[static_cast<std::size_t>(v)];
+    slid.row(v) = (body.lookup.displacement(x) - looked.lookup.displacement(x) - motion).head<2>().transpose();
+  }
+  const double farthest = std::sqrt(slid.rowwise().squaredNorm().maxCoeff());
+  if (farthest > std::sqrt(lookup_mm_ * kSharpestCurve * size_)) return look();
+  WeightedGap gap = looked.gap;
+  if (farthest > 0.0) {
+    if (!looked.has_slopes) {
+      looked.plain_slope = looked.edge_slope = Eigen::MatrixX2d::Zero(n, 2);
+      const double step = kSlopeStep * size_;
+      for (int axis = 0; axis < 2; ++axis) {
+        RigidTransform beside = looked.pose;
+        beside.translation[axis] -= step;
+        const WeightedGap there = weighted_gap(surface_, shape, beside, looked.lookup, reach);
+        ++effort.geometry_updates;
+        for (Eigen::Index v = 0; v < n; ++v) {
+          if (!std::isfinite(gap.weighted[v]) || !std::isfinite(there.weighted[v])) continue;
+          looked.plain_slope(v, axis) = (there.plain[v] - gap.plain[v]) / step;
+          looked.edge_slope(v, axis) = (there.edge[v] - gap.edge[v]) / step;
+        }
+      }
+      looked.has_slopes = true;
+    }
+    for (Eigen::Index v = 0; v < n; ++v) {
+      if (!std::isfinite(gap.weighted[v])) continue;
+      gap.plain[v] += looked.plain_slope.row(v).dot(slid.row(v));
+      gap.edge[v] = std::max(0.0, gap.edge[v] + looked.edge_slope.row(v).dot(slid.row(v)));
+    }
+  }
+  gap.move_along_normals(surface_.weight, motion.z());
+  const double depth = std::max(0.0, -gap.deepest);
+  if (gap.reach < std::max(0.0, gap.deepest) + now.reach + kBulge * depth) return look();
+  return gap;
+}
+
+/// The gaps of all bodies, and which body each vertex faces.
+void PartSolver::look_up(Iterate& now, const std::vector<PartTarget>& targets, PartEffort& effort) {
+  const int n = static_cast<int>(gel_.vertices.size());
+  now.owner.assign(n, -1);
+  now.deepest = std::numeric_limits<double>::infinity();
+  for (std::size_t b = 0; b < now.bodies.size(); ++b) {
+    Body& body = now.bodies[b];
+    body.gap = gap_of(b, now, effort);
+    if (!targets[b].forced[2]) {
+      refuse_too_deep(body.gap.deepest);
+    } else if (!std::isfinite(body.gap.deepest)) {
+      fail("the object isn't over the gel: a force of {:.4g} N can't be reached", targets[b].force[2]);
+    }
+    now.deepest = std::min(now.deepest, body.gap.deepest);
+    for (int v = 0; v < n; ++v) {
+      if (body.gap.weighted[v] < now.gap(v)) now.owner[v] = static_cast<int>(b);
+    }
+  }
+}
+
+/// Vertices that surely or probably touch, with a ring around them.
+std::vector<int> PartSolver::candidates(const Iterate& now, bool z_forced) const {
+  const int n = static_cast<int>(gel_.vertices.size());
+  std::vector<std::pair<double, int>> near;
+  std::size_t touching = 0;
+  for (int v = 0; v < n; ++v) {
+    touching += now.active[v] != 0;
+    if (now.owner[v] >= 0) near.emplace_back(now.gap(v) / surface_.weight[v], v);
+  }
+  std::sort(near.begin(), near.end());
+  std::size_t count = 0;
+  while (count < near.size()) {
+    const double depth = std::max(0.0, -now.bodies[now.owner[near[count].second]].gap.deepest);
+    if (near[count].first >= -kSurelyTouching * depth) break;
+    ++count;
+  }
+  // While the depth is itself being sought it may be far off; the block grows by a factor at a time.
+  if (z_forced) count = std::min(count, 4 * touching + kFirstCandidates);
+  count = std::max(count, std::min(near.size(), kFirstCandidates));
+  std::vector<char> chosen(now.active);
+  for (int v = 0; v < n; ++v) chosen[v] = chosen[v] || now.required[v];
+  // Each body has its own first ones: under a flat body there are enough to leave none to another that is led by force.
+  std::vector<std::size_t> seen(bodies_.size(), 0);
+  for (std::size_t k = 0; k < near.size(); ++k) {
+    const std::size_t place = seen[now.owner[near[k].second]]++;
+    if (k < count || place < kFirstCandidates) chosen[near[k].second] = 1;
+  }
+  std::vector<int> result;
+  for (int v = 0; v < n; ++v) {
+    if (now.owner[v] < 0) continue;
+    const bool beside = std::any_of(surface_.around[v].begin(), surface_.around[v].end(),
+                                    [&](int neighbour) { return chosen[neighbour] != 0; });
+    if (chosen[v] || beside) result.push_back(v);
+  }
+  return result;
+}
+
+/// Whether the gel, not yet recovered from an earlier press, would stand out into a body if nothing touched it.
+bool PartSolver::bulges_into(const Iterate& now) const {
+  if (!relaxation_.on()) return false;
+  for (int v = 0; v < static_cast<int>(gel_.vertices.size()); ++v) {
+    const double out = -surface_.normals[v].dot(relaxation_.carried(v)) / relaxation_.stiffness();
+    if (now.gap(v) < out) return true;
+  }
+  return false;
+}
+
+}  // namespace touchstone::fem

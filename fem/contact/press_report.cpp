@@ -1,0 +1,110 @@
+#include "fem/contact/press_report.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+#include "fem/elements/surface_strain.h"
+
+namespace touchstone::fem {
+namespace {
+
+constexpr int kResolvedVertices = 13;
+
+/// Displacements of the whole surface, and the strain measures.
+void add_fields(const Compliance& gel, const ContactSurface& surface, const SurfaceMassFactor& mass,
+                const PressSnapshot& snapshot, PressState& s) {
+  const int n = static_cast<int>(gel.vertices.size());
+  s.surface_displacement = Eigen::MatrixX3d::Zero(n, 3);
+  if (!snapshot.touching() && snapshot.history.empty()) return;
+  Eigen::VectorXd response = snapshot.weighted;
+  if (snapshot.history.empty()) {
+    const auto compliance = gel.surface.view();
+    response.setZero();
+    for (int v = 0; v < n; ++v) {
+      if (snapshot.state[v] == NodeState::open) continue;
+      response.noalias() += compliance.middleCols<3>(3 * v) * snapshot.traction.segment<3>(3 * v);
+    }
+  }
+  add_displacement(gel, surface, mass, response, s);
+}
+
+}  // namespace
+
+void add_displacement(const Compliance& gel, const ContactSurface& surface, const SurfaceMassFactor& mass,
+                      const Eigen::VectorXd& weighted, PressState& state) {
+  const auto n = static_cast<Eigen::Index>(gel.vertices.size());
+  Eigen::MatrixX3d rows(n, 3);
+  for (Eigen::Index v = 0; v < n; ++v) rows.row(v) = weighted.segment<3>(3 * v);
+  state.surface_displacement = mass.solve(rows);
+  state.largest_gradient = largest_surface_gradient(gel.vertices, gel.triangles, state.surface_displacement);
+  double deepest = 0.0;
+  for (Eigen::Index v = 0; v < n; ++v) {
+    const Eigen::Vector3d& normal = surface.normals[static_cast<std::size_t>(v)];
+    deepest = std::max(deepest, std::abs(normal.dot(state.surface_displacement.row(v))));
+  }
+  state.largest_strain = std::max(state.largest_gradient, deepest / gel.thickness);
+}
+
+PressState report(const Compliance& gel, const PartSolver& solver, const SurfaceMassFactor& mass, PressOutput output,
+                  const PressSnapshot& snapshot) {
+  const ContactSurface& surface = solver.surface();
+  const int n = static_cast<int>(gel.vertices.size());
+  PressState s;
+  for (const BodySnapshot& body : snapshot.bodies) {
+    BodyState state;
+    state.gel_from_object = body.pose;
+    state.wrench << body.force, body.moment;
+    s.bodies.push_back(state);
+  }
+  s.gel_from_object = s.bodies.front().gel_from_object;
+  s.wrench = s.bodies.front().wrench;
+  s.node_state = snapshot.state;
+  s.node_owner = snapshot.owner;
+  s.traction.resize(n, 3);
+  for (int v = 0; v < n; ++v) s.traction.row(v) = snapshot.traction.segment<3>(3 * v);
+  s.largest_penetration = snapshot.penetration;
+  s.lookup_error = snapshot.lookup_error;
+  s.contact_residual = snapshot.residual;
+
+  const auto bead_compliance = gel.beads.view();
+  Eigen::VectorXd beads = Eigen::VectorXd::Zero(gel.beads.rows());
+  // A gel that relaxes is displaced as by its pseudo-elastic traction, also where nothing touches it any more.
+  const Eigen::VectorXd& moving = snapshot.history.empty() ? snapshot.traction : snapshot.history.elastic;
+  for (int v = 0; v < n && beads.size() > 0; ++v) {
+    const Eigen::Vector3d t = moving.segment<3>(3 * v);
+    if (!t.isZero(0.0)) beads += bead_compliance.middleCols<3>(3 * v) * t;
+  }
+  double largest_pressure = 0.0;
+  for (int v = 0; v < n; ++v) {
+    if (snapshot.state[v] == NodeState::open) continue;
+    const Eigen::Vector3d t = snapshot.traction.segment<3>(3 * v);
+    const double pressure = -surface.normals[v].dot(t);
+    largest_pressure = std::max(largest_pressure, pressure);
+    s.largest_tension = std::max(s.largest_tension, -pressure);
+    s.contact_area += surface.weight[v];
+    ++s.contact_vertices;
+    s.bodies[snapshot.owner[v]].contact_area += surface.weight[v];
+    ++s.bodies[snapshot.owner[v]].contact_vertices;
+  }
+  for (int v = 0; v < n && largest_pressure > 0.0; ++v) {
+    if (snapshot.state[v] == NodeState::open) continue;
+    const double friction = solver.bodies()[snapshot.owner[v]].friction;
+    if (!(friction > 0.0) || std::isinf(friction)) continue;
+    const Eigen::Vector3d t = snapshot.traction.segment<3>(3 * v);
+    const double pressure = -surface.normals[v].dot(t);
+    const double excess = (t + pressure * surface.normals[v]).norm() - friction * std::max(0.0, pressure);
+    s.cone_violation = std::max(s.cone_violation, excess / (friction * largest_pressure));
+  }
+  s.bead_displacement.resize(gel.beads.rows() / 3, 3);
+  for (Eigen::Index b = 0; b < s.bead_displacement.rows(); ++b) s.bead_displacement.row(b) = beads.segment<3>(3 * b);
+  if (output == PressOutput::fields) add_fields(gel, surface, mass, snapshot, s);
+  for (std::size_t b = 0; b < snapshot.bodies.size(); ++b) {
+    const BodySnapshot& body = snapshot.bodies[b];
+    s.under_resolved =
+        s.under_resolved || ((body.touching || body.overlapping) && s.bodies[b].contact_vertices < kResolvedVertices);
+  }
+  return s;
+}
+
+}  // namespace touchstone::fem

@@ -1,0 +1,303 @@
+#include "fem/elements/compliance_file.h"
+
+#include <xxhash.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <fstream>
+#include <memory>
+#include <string_view>
+#include <type_traits>
+#include <vector>
+
+#include "core/error.h"
+#include "core/mapped_file.h"
+#include "core/whole_file.h"
+
+namespace touchstone::fem {
+namespace {
+
+static_assert(std::endian::native == std::endian::little);
+constexpr std::string_view kMagic = "TSCOMPLY";
+constexpr std::uint64_t kPage = 4096;
+
+struct MatrixPlace {
+  std::uint64_t offset = 0;
+  std::uint64_t rows = 0;
+  std::uint64_t columns = 0;
+};
+
+/// The first bytes of a file, as they lie there.
+struct Header {
+  std::array<char, 8> magic{};
+  std::uint32_t format = kComplianceFormat;
+  std::uint32_t zero = 0;
+  std::array<char, 64> key{};
+  std::uint64_t file_size = 0;
+  std::uint64_t body_offset = sizeof(Header);
+  std::uint64_t body_size = 0;
+  MatrixPlace surface;
+  MatrixPlace beads;
+  XXH128_canonical_t checksum{};
+};
+static_assert(std::is_trivially_copyable_v<Header> && offsetof(Header, checksum) == 152 && sizeof(Header) == 168);
+
+std::uint64_t next_page(std::uint64_t offset) {
+  return (offset + kPage - 1) / kPage * kPage;
+}
+
+/// XXH3 over pieces.
+class Checksum {
+ public:
+  Checksum() : state_(XXH3_createState(), XXH3_freeState) {
+    TS_ASSERT(state_ != nullptr && XXH3_128bits_reset(state_.get()) == XXH_OK);
+  }
+  void add(const void* bytes, std::size_t size) {
+    if (size > 0) TS_ASSERT(XXH3_128bits_update(state_.get(), bytes, size) == XXH_OK);
+  }
+  XXH128_canonical_t digest() const {
+    XXH128_canonical_t result;
+    XXH128_canonicalFromHash(&result, XXH3_128bits_digest(state_.get()));
+    return result;
+  }
+
+ private:
+  std::unique_ptr<XXH3_state_t, decltype(&XXH3_freeState)> state_;
+};
+
+struct Writer {
+  std::string bytes;
+
+  void raw(const void* data, std::size_t size) {
+    if (size > 0) {
+      bytes.append(static_cast<const char*>(data), size);
+    }
+  }
+  template <typename T>
+  void value(const T& item) {
+    static_assert(std::is_arithmetic_v<T>);
+    raw(&item, sizeof(T));
+  }
+  template <typename T>
+  void array(const T* data, std::size_t count) {
+    value(static_cast<std::uint64_t>(count));
+    raw(data, count * sizeof(T));
+  }
+};
+
+/// Reads what Writer wrote. Throws Error where the bytes end early.
+struct Reader {
+  std::string_view bytes;
+
+  void raw(void* data, std::size_t size) {
+    if (size > bytes.size()) {
+      fail("it ends early");
+    }
+    if (size > 0) {
+      std::memcpy(data, bytes.data(), size);
+    }
+    bytes.remove_prefix(size);
+  }
+  template <typename T>
+  T value() {
+    T item;
+    raw(&item, sizeof(T));
+    return item;
+  }
+  /// A count of items of `size` bytes that are still to come.
+  std::size_t count(std::size_t size) {
+    const auto items = value<std::uint64_t>();
+    if (items > bytes.size() / size) {
+      fail("it ends early");
+    }
+    return items;
+  }
+  template <typename T>
+  std::vector<T> array() {
+    std::vector<T> items(count(sizeof(T)));
+    raw(items.data(), items.size() * sizeof(T));
+    return items;
+  }
+};
+
+void write_errors(const BodyErrors& body, Writer& out) {
+  out.array(body.radius_per_edge.data(), body.radius_per_edge.size());
+  for (const RelativeErrors& errors : body.errors) out.raw(errors.values.data(), sizeof(errors.values));
+  out.raw(body.mesh_order.values.data(), sizeof(body.mesh_order.values));
+  out.raw(body.size_order.values.data(), sizeof(body.size_order.values));
+}
+
+BodyErrors read_errors(Reader& in) {
+  BodyErrors body;
+  body.radius_per_edge = in.array<double>();
+  body.errors.resize(body.radius_per_edge.size());
+  for (RelativeErrors& errors : body.errors) in.raw(errors.values.data(), sizeof(errors.values));
+  in.raw(body.mesh_order.values.data(), sizeof(body.mesh_order.values));
+  in.raw(body.size_order.values.data(), sizeof(body.size_order.values));
+  return body;
+}
+
+void write_body(const Compliance& gel, Writer& out) {
+  out.value(gel.thickness);
+  out.value(gel.material.youngs_modulus);
+  out.value(gel.material.poisson_ratio);
+  out.array(reinterpret_cast<const double*>(gel.vertices.data()), 3 * gel.vertices.size());
+  out.array(reinterpret_cast<const std::int32_t*>(gel.triangles.data()), 3 * gel.triangles.size());
+  TS_ASSERT(gel.mass.isCompressed());
+  out.array(gel.mass.outerIndexPtr(), static_cast<std::size_t>(gel.mass.outerSize() + 1));
+  out.array(gel.mass.innerIndexPtr(), static_cast<std::size_t>(gel.mass.nonZeros()));
+  out.array(gel.mass.valuePtr(), static_cast<std::size_t>(gel.mass.nonZeros()));
+  const ComplianceReport& report = gel.report;
+  out.value(report.tetrahedra);
+  out.value(report.unknowns);
+  out.value(report.smallest_dihedral_deg);
+  out.value(report.fine_edge);
+  out.value(report.factor_entries);
+  out.value(report.operations);
+  out.value(report.memory_mb);
+  write_errors(gel.mesh_error.smooth, out);
+  write_errors(gel.mesh_error.sharp, out);
+}
+
+Compliance read_body(Reader& in) {
+  Compliance gel;
+  gel.thickness = in.value<double>();
+  gel.material.youngs_modulus = in.value<double>();
+  gel.material.poisson_ratio = in.value<double>();
+  const auto coordinates = in.array<double>();
+  for (std::size_t i = 0; i + 2 < coordinates.size(); i += 3) {
+    gel.vertices.emplace_back(coordinates[i], coordinates[i + 1], coordinates[i + 2]);
+  }
+  const auto n = static_cast<std::int64_t>(gel.vertices.size());
+  const auto corners = in.array<std::int32_t>();
+  for (std::size_t i = 0; i + 2 < corners.size(); i += 3) {
+    gel.triangles.push_back({corners[i], corners[i + 1], corners[i + 2]});
+  }
+  const auto columns = in.array<std::int32_t>();
+  const auto rows = in.array<std::int32_t>();
+  const auto values = in.array<double>();
+  const auto within = [](const std::vector<std::int32_t>& numbers, std::int64_t most) {
+    return std::all_of(numbers.begin(), numbers.end(), [&](std::int64_t i) { return i >= 0 && i < most; });
+  };
+  if (static_cast<std::int64_t>(columns.size()) != n + 1 || rows.size() != values.size() || columns.front() != 0 ||
+      columns.back() != static_cast<std::int32_t>(rows.size()) || !std::is_sorted(columns.begin(), columns.end()) ||
+      !within(rows, n) || !within(corners, n)) {
+    fail("its matrices don't fit its vertices");
+  }
+  gel.mass = Eigen::Map<const Eigen::SparseMatrix<double>>(n, n, static_cast<Eigen::Index>(rows.size()), columns.data(),
+                                                           rows.data(), values.data());
+  gel.report.tetrahedra = in.value<int>();
+  gel.report.unknowns = in.value<int>();
+  gel.report.smallest_dihedral_deg = in.value<double>();
+  gel.report.fine_edge = in.value<double>();
+  gel.report.factor_entries = in.value<double>();
+  gel.report.operations = in.value<double>();
+  gel.report.memory_mb = in.value<double>();
+  gel.mesh_error.smooth = read_errors(in);
+  gel.mesh_error.sharp = read_errors(in);
+  if (!in.bytes.empty()) {
+    fail("it is longer than it should be");
+  }
+  return gel;
+}
+
+/// A matrix in the mapped file, checked to lie within it.
+SharedMatrix matrix_at(const MappedFile& file, const MatrixPlace& place, std::uint64_t rows, std::uint64_t columns) {
+  if (place.rows != rows || place.columns != columns) fail("its matrices don't fit its vertices");
+  if (rows > file.size || columns > file.size) fail("it ends early");  // no product below overflows
+  const std::uint64_t bytes = sizeof(double) * rows * columns;
+  if (place.offset % kPage != 0 || place.offset > file.size || bytes > file.size - place.offset) {
+    fail("it ends early");
+  }
+  const auto* numbers = reinterpret_cast<const double*>(file.bytes.get() + place.offset);
+  return {std::shared_ptr<const double>(file.bytes, numbers), static_cast<Eigen::Index>(rows),
+          static_cast<Eigen::Index>(columns)};
+}
+
+std::uint64_t bytes_of(const SharedMatrix& matrix) {
+  return sizeof(double) * static_cast<std::uint64_t>(matrix.size());
+}
+
+}  // namespace
+
+void write_compliance(const std::filesystem::path& path, const std::string& key, const Compliance& gel) {
+  Writer body;
+  write_body(gel, body);
+  Header header;
+  std::copy(kMagic.begin(), kMagic.end(), header.magic.begin());
+  TS_ASSERT(key.size() == header.key.size());
+  std::copy(key.begin(), key.end(), header.key.begin());
+  header.body_size = body.bytes.size();
+  const auto place = [](const SharedMatrix& matrix, std::uint64_t offset) {
+    return MatrixPlace{offset, static_cast<std::uint64_t>(matrix.rows()), static_cast<std::uint64_t>(matrix.cols())};
+  };
+  header.surface = place(gel.surface, next_page(header.body_offset + header.body_size));
+  header.beads = place(gel.beads, next_page(header.surface.offset + bytes_of(gel.surface)));
+  header.file_size = header.beads.offset + bytes_of(gel.beads);
+
+  const std::string zeros(kPage, '\0');
+  std::vector<std::string_view> pieces;
+  std::uint64_t end = header.body_offset;
+  const auto put = [&](std::uint64_t offset, const void* bytes, std::uint64_t size) {
+    pieces.emplace_back(zeros.data(), offset - end);
+    pieces.emplace_back(static_cast<const char*>(bytes), size);
+    end = offset + size;
+  };
+  put(header.body_offset, body.bytes.data(), body.bytes.size());
+  put(header.surface.offset, gel.surface.view().data(), bytes_of(gel.surface));
+  put(header.beads.offset, gel.beads.view().data(), bytes_of(gel.beads));
+
+  Checksum sum;
+  sum.add(&header, offsetof(Header, checksum));
+  for (const std::string_view piece : pieces) sum.add(piece.data(), piece.size());
+  header.checksum = sum.digest();
+  write_whole_file(path, [&](const std::filesystem::path& temporary) {
+    std::ofstream out(temporary, std::ios::binary);
+    out.write(reinterpret_cast<const char*>(&header), sizeof(header));
+    for (const std::string_view piece : pieces) out.write(piece.data(), static_cast<std::streamsize>(piece.size()));
+    out.close();
+    if (!out) fail("{}: can't be written", path.string());
+  });
+}
+
+Compliance read_compliance(const std::filesystem::path& path, const std::string& key) {
+  const MappedFile file = map_file(path);
+  const std::string_view bytes(file.bytes.get(), file.size);
+  if (!bytes.starts_with(kMagic)) fail("it isn't a compliance");
+  if (bytes.size() < sizeof(Header)) fail("it ends early");
+  Header header;
+  std::memcpy(&header, bytes.data(), sizeof(header));
+  if (header.format != kComplianceFormat) {
+    fail("it has format {}, this program writes {}", header.format, kComplianceFormat);
+  }
+  if (bytes.size() < header.file_size) fail("it ends early");
+  if (bytes.size() > header.file_size) fail("it is longer than it should be");
+  Checksum sum;
+  sum.add(bytes.data(), offsetof(Header, checksum));
+  sum.add(bytes.data() + sizeof(header), bytes.size() - sizeof(header));
+  if (const XXH128_canonical_t found = sum.digest(); std::memcmp(&found, &header.checksum, sizeof(found)) != 0) {
+    fail("its checksum is wrong");
+  }
+  if (std::string_view(header.key.data(), header.key.size()) != key) fail("it belongs to another gel");
+  if (header.body_offset > bytes.size() || header.body_size > bytes.size() - header.body_offset) {
+    fail("it ends early");
+  }
+  Reader body{bytes.substr(header.body_offset, header.body_size)};
+  Compliance gel = read_body(body);
+  const std::uint64_t unknowns = 3 * gel.vertices.size();
+  gel.surface = matrix_at(file, header.surface, unknowns, unknowns);
+  gel.beads = matrix_at(file, header.beads, header.beads.rows, unknowns);
+  return gel;
+}
+
+double compliance_file_bytes(int surface_vertices, int beads) {
+  const double n = surface_vertices;
+  // Some 7 entries of the mass matrix and 2 triangles a vertex.
+  return 72.0 * n * (n + beads) + 160.0 * n;
+}
+
+}  // namespace touchstone::fem

@@ -1,0 +1,123 @@
+#include "fem/elements/front.h"
+
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <cstddef>
+
+extern "C" {
+void dpotrf_(const char* half, const int* size, double* matrix, const int* stride, int* info, std::size_t);
+void dtrsm_(const char* side, const char* half, const char* transposed, const char* unit, const int* rows,
+            const int* columns, const double* scale, const double* triangle, const int* triangle_stride, double* right,
+            const int* stride, std::size_t, std::size_t, std::size_t, std::size_t);
+void dgemm_(const char* transposed_a, const char* transposed_b, const int* rows, const int* columns, const int* inner,
+            const double* scale, const double* a, const int* a_stride, const double* b, const int* b_stride,
+            const double* keep, double* c, const int* c_stride, std::size_t, std::size_t);
+void dsyrk_(const char* half, const char* transposed, const int* size, const int* inner, const double* scale,
+            const double* a, const int* a_stride, const double* keep, double* c, const int* c_stride, std::size_t,
+            std::size_t);
+}
+
+namespace touchstone::fem {
+namespace {
+
+/// Pivots that are eliminated at once.
+constexpr int kPanel = 192;
+/// Rows and columns of a tile.
+constexpr int kTile = 384;
+
+/// A front, and which of its pivots have been eliminated.
+class Front {
+ public:
+  Front(double* data, int size) : data_(data), size_(size) {}
+
+  /// Eliminates pivots from..to, all of one sign. Only columns below `columns` are brought up to date.
+  bool eliminate(int from, int to, double sign, int columns) {
+    const int width = to - from;
+    double* corner = at(from, from);
+    if (sign < 0.0) {
+      for (int j = 0; j < width; ++j) {
+        for (int i = j; i < width; ++i) corner[i + static_cast<std::ptrdiff_t>(j) * size_] *= -1.0;
+      }
+    }
+    int info = 0;
+    dpotrf_("L", &width, corner, &size_, &info, 1);
+    if (info != 0) return false;
+    each((size_ - to + kTile - 1) / kTile, [&](int tile) {
+      const int row = to + tile * kTile;
+      const int rows = std::min(kTile, size_ - row);
+      const double one = 1.0;
+      dtrsm_("R", "L", "T", "N", &rows, &width, &one, corner, &size_, at(row, from), &size_, 1, 1, 1, 1);
+    });
+    update(from, to, sign, to, columns);
+    return true;
+  }
+
+  /// Takes the pivots from..to, which are eliminated, out of the columns first..last and the rows below.
+  void update(int from, int to, double sign, int first, int last) {
+    if (from == to || first >= last) return;
+    const int inner = to - from;
+    const double scale = -sign;
+    const double keep = 1.0;
+    const int tile_columns = (last - first + kTile - 1) / kTile;
+    const int tile_rows = (size_ - first + kTile - 1) / kTile;
+    each(tile_columns * tile_rows, [&](int tile) {
+      const int row_tile = tile / tile_columns;
+      const int column_tile = tile % tile_columns;
+      if (row_tile < column_tile) return;
+      const int row = first + row_tile * kTile;
+      const int column = first + column_tile * kTile;
+      const int rows = std::min(kTile, size_ - row);
+      const int columns = std::min(kTile, last - column);
+      if (row_tile == column_tile) {
+        dsyrk_("L", "N", &columns, &inner, &scale, at(column, from), &size_, &keep, at(column, column), &size_, 1, 1);
+        const int below = rows - columns;  // where the columns end before the tile does
+        if (below > 0) multiply(column + columns, column, below, columns, from, inner, scale);
+        return;
+      }
+      multiply(row, column, rows, columns, from, inner, scale);
+    });
+  }
+
+ private:
+  double* at(int row, int column) { return data_ + row + static_cast<std::ptrdiff_t>(column) * size_; }
+
+  void multiply(int row, int column, int rows, int columns, int from, int inner, double scale) {
+    const double keep = 1.0;
+    dgemm_("N", "T", &rows, &columns, &inner, &scale, at(row, from), &size_, at(column, from), &size_, &keep,
+           at(row, column), &size_, 1, 1);
+  }
+
+  template <typename Work>
+  void each(int count, const Work& work) {
+    if (count <= 1) {
+      for (int k = 0; k < count; ++k) work(k);
+      return;
+    }
+    // Isolated: a thread that waits here must not begin another branch of the tree, whose memory comes on top.
+    tbb::this_task_arena::isolate([&] { tbb::parallel_for(0, count, work); });
+  }
+
+  double* data_;
+  int size_;
+};
+
+}  // namespace
+
+bool eliminate_front(double* data, int size, int positive, int negative) {
+  Front front(data, size);
+  const int pivots = positive + negative;
+  // Within the pivots' columns panel by panel; the rest takes them all at once.
+  for (int from = 0; from < pivots;) {
+    const bool first = from < positive;
+    const int to = std::min(from + kPanel, first ? positive : pivots);
+    if (!front.eliminate(from, to, first ? 1.0 : -1.0, pivots)) return false;
+    from = to;
+  }
+  front.update(0, positive, 1.0, pivots, size);
+  front.update(positive, pivots, -1.0, pivots, size);
+  return true;
+}
+
+}  // namespace touchstone::fem

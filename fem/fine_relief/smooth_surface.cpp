@@ -1,0 +1,246 @@
+#include "fem/fine_relief/smooth_surface.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "core/error.h"
+#include "core/units.h"
+
+namespace touchstone::fem {
+namespace {
+
+constexpr double kFlatness = 1e-9;  // of the surface's width
+constexpr double kPixelsAnEdge = 8.0;
+constexpr int kMostReferencePixels = 768;  // a side
+constexpr double kKnotsAThickness = 4.0;
+constexpr double kEdgesAKnot = 2.5;
+constexpr double kKnotsAWave = 4.0;       // the wavelength that the fit follows by half
+constexpr double kEdgesAKnotAlong = 1.5;  // the same for the tangential displacement, which follows friction's detail
+constexpr double kEdgesAWaveAlong = 3.0;
+
+struct Box {
+  Eigen::Vector2d low = Eigen::Vector2d::Constant(std::numeric_limits<double>::infinity());
+  Eigen::Vector2d high = -low;
+};
+
+Box box_of(const std::vector<Eigen::Vector3d>& vertices) {
+  Box box;
+  for (const auto& v : vertices) {
+    box.low = box.low.cwiseMin(v.head<2>());
+    box.high = box.high.cwiseMax(v.head<2>());
+  }
+  return box;
+}
+
+double shortest_edge(const Compliance& gel) {
+  // The median of the finer half: a single sliver says nothing of the mesh.
+  std::vector<double> lengths;
+  for (const auto& t : gel.triangles) {
+    for (int k = 0; k < 3; ++k) lengths.push_back((gel.vertices[t[k]] - gel.vertices[t[(k + 1) % 3]]).norm());
+  }
+  const auto quarter = lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 4);
+  std::nth_element(lengths.begin(), quarter, lengths.end());
+  return *quarter;
+}
+
+/// The P1 functions at the pixels' centres. A centre on an edge belongs to one triangle.
+Eigen::SparseMatrix<double, Eigen::RowMajor> sampled_hats(const Compliance& gel, const PixelGrid& grid) {
+  std::vector<char> taken(grid.size(), 0);
+  std::vector<Eigen::Triplet<double>> entries;
+  for (const auto& t : gel.triangles) {
+    std::array<Eigen::Vector2d, 3> c;
+    for (int k = 0; k < 3; ++k) c[k] = (gel.vertices[t[k]].head<2>() - grid.first) / grid.pitch;
+    const auto low = c[0].cwiseMin(c[1]).cwiseMin(c[2]);
+    const auto high = c[0].cwiseMax(c[1]).cwiseMax(c[2]);
+    const Eigen::Vector2d e1 = c[1] - c[0];
+    const Eigen::Vector2d e2 = c[2] - c[0];
+    const double twice_area = e1.x() * e2.y() - e1.y() * e2.x();
+    const int left = std::max(0, static_cast<int>(std::ceil(low.x() - 1e-9)));
+    const int bottom = std::max(0, static_cast<int>(std::ceil(low.y() - 1e-9)));
+    for (int j = bottom; j < grid.ny && j <= high.y() + 1e-9; ++j) {
+      for (int i = left; i < grid.nx && i <= high.x() + 1e-9; ++i) {
+        const Eigen::Vector2d d = Eigen::Vector2d(i, j) - c[0];
+        const double b = (d.x() * e2.y() - d.y() * e2.x()) / twice_area;
+        const double g = (e1.x() * d.y() - e1.y() * d.x()) / twice_area;
+        if (b < -1e-9 || g < -1e-9 || b + g > 1.0 + 1e-9 || taken[grid.at(i, j)]) continue;
+        taken[grid.at(i, j)] = 1;
+        const int pixel = static_cast<int>(grid.at(i, j));
+        entries.emplace_back(pixel, t[0], 1.0 - b - g);
+        entries.emplace_back(pixel, t[1], b);
+        entries.emplace_back(pixel, t[2], g);
+      }
+    }
+  }
+  Eigen::SparseMatrix<double, Eigen::RowMajor> hats(static_cast<Eigen::Index>(grid.size()),
+                                                    static_cast<Eigen::Index>(gel.vertices.size()));
+  hats.setFromTriplets(entries.begin(), entries.end());
+  return hats;
+}
+
+/// Pressure of fine pixels on wider ones, shared bilinearly: force and torque stay.
+std::vector<double> gathered(const PixelGrid& fine, std::span<const double> pressure, const PixelGrid& wide) {
+  std::vector<double> result(wide.size(), 0.0);
+  const double share = fine.pixel_area() / wide.pixel_area();
+  for (int j = 0; j < fine.ny; ++j) {
+    for (int i = 0; i < fine.nx; ++i) {
+      const double p = share * pressure[fine.at(i, j)];
+      if (p == 0.0) continue;
+      const Eigen::Vector2d place = (fine.centre(i, j) - wide.first) / wide.pitch;
+      const double x = std::clamp(place.x(), 0.0, wide.nx - 1.0);
+      const double y = std::clamp(place.y(), 0.0, wide.ny - 1.0);
+      const int a = std::min(static_cast<int>(x), std::max(0, wide.nx - 2));
+      const int b = std::min(static_cast<int>(y), std::max(0, wide.ny - 2));
+      const int a1 = std::min(a + 1, wide.nx - 1);
+      const int b1 = std::min(b + 1, wide.ny - 1);
+      result[wide.at(a, b)] += p * (1.0 - (x - a)) * (1.0 - (y - b));
+      result[wide.at(a1, b)] += p * (x - a) * (1.0 - (y - b));
+      result[wide.at(a, b1)] += p * (1.0 - (x - a)) * (y - b);
+      result[wide.at(a1, b1)] += p * (x - a) * (y - b);
+    }
+  }
+  return result;
+}
+
+}  // namespace
+
+SmoothSurface::SmoothSurface(const Compliance& gel, double sphere_radius)
+    : gel_(gel),
+      edge_(shortest_edge(gel)),
+      sphere_radius_(sphere_radius),
+      rim_radius_(std::numeric_limits<double>::infinity()) {
+  const Box box = box_of(gel.vertices);
+  const Eigen::Vector2d size = box.high - box.low;
+  const auto n = static_cast<Eigen::Index>(gel.vertices.size());
+  per_seen_area_ = Eigen::VectorXd::Ones(n);
+  double widest = 0.0;
+  for (const auto& v : gel.vertices) widest = std::max(widest, v.head<2>().norm());
+  if (std::isfinite(sphere_radius)) {
+    if (!(widest <= std::sin(kSteepestDome) * sphere_radius)) {
+      fail(
+          "fine relief and smooth surfaces are for flat and gently domed gels only: a cap of {:.4g} mm radius on a "
+          "sphere of {:.4g} mm slopes by {:.3g} degrees at its rim, allowed are {:.3g}",
+          widest, sphere_radius, std::asin(std::min(1.0, widest / sphere_radius)) / kRadiansPerDegree,
+          kSteepestDome / kRadiansPerDegree);
+    }
+    rim_radius_ = widest;
+  }
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const Eigen::Vector3d& v = gel.vertices[static_cast<std::size_t>(i)];
+    if (std::abs(v.z() - rest_height(v.head<2>())) > kFlatness * size.maxCoeff()) {
+      fail(
+          "fine relief and smooth surfaces are for flat and gently domed gels only: the outer surface of this one "
+          "reaches to z = {:.4g} mm",
+          v.z());
+    }
+    if (std::isfinite(sphere_radius)) per_seen_area_[i] = sphere_radius / (sphere_radius + v.z());
+  }
+  const double pitch = std::max({edge_ / kPixelsAnEdge, size.maxCoeff() / kMostReferencePixels});
+  PixelGrid grid;
+  grid.nx = static_cast<int>(std::ceil(size.x() / pitch - 1e-9));
+  grid.ny = static_cast<int>(std::ceil(size.y() / pitch - 1e-9));
+  grid.pitch = pitch;
+  grid.first = 0.5 * (box.low + box.high) - 0.5 * pitch * Eigen::Vector2d(grid.nx - 1, grid.ny - 1);
+  layer_ = std::make_unique<LayerResponse>(gel.material, gel.thickness, grid, GridEdges::free);
+  hats_ = sampled_hats(gel, grid);
+  weight_ = gel.mass * Eigen::VectorXd::Ones(gel.mass.cols());
+  pixel_weight_ = grid.pixel_area() * (hats_.transpose() * Eigen::VectorXd::Ones(hats_.rows()));
+  for (Eigen::Index v = 0; v < pixel_weight_.size(); ++v) {
+    if (!(pixel_weight_[v] > 0.0)) pixel_weight_[v] = grid.pixel_area();  // a sliver between the pixels' centres
+  }
+
+  const double knots = std::max(gel.thickness / kKnotsAThickness, kEdgesAKnot * edge_);
+  rest_fit_ = std::make_unique<SplineFit>(grid, hats_, weight_, box.low, box.high, knots, kKnotsAWave * knots);
+  along_fit_ = std::make_unique<SplineFit>(grid, hats_, weight_, box.low, box.high, kEdgesAKnotAlong * edge_,
+                                           kEdgesAWaveAlong * edge_);
+}
+
+SmoothSurface::~SmoothSurface() = default;
+
+double SmoothSurface::rest_height(const Eigen::Vector2d& point) const {
+  if (std::isinf(sphere_radius_)) return 0.0;
+  const double r2 = std::min(point.squaredNorm(), rim_radius_ * rim_radius_);
+  return -r2 / (sphere_radius_ + std::sqrt(sphere_radius_ * sphere_radius_ - r2));
+}
+
+std::vector<double> SmoothSurface::coarse_pressure(const PressState& press) const {
+  const Eigen::VectorXd pressure = hats_ * (-press.traction.col(2).cwiseProduct(per_seen_area_));
+  return {pressure.data(), pressure.data() + pressure.size()};
+}
+
+std::vector<double> SmoothSurface::layer_answer(std::span<const double> pressure) const {
+  std::vector<double> answer(reference_grid().size());
+  layer_->apply(pressure, answer, *layer_->make_scratch());
+  return answer;
+}
+
+SmoothDisplacement SmoothSurface::displacement(const PressState& press) const {
+  const std::vector<double> layer = layer_answer(coarse_pressure(press));
+  const Eigen::Map<const Eigen::VectorXd> into(layer.data(), static_cast<Eigen::Index>(layer.size()));
+  Eigen::MatrixX3d means = gel_.mass * press.surface_displacement;
+  means = weight_.cwiseInverse().asDiagonal() * means;
+  const Eigen::VectorXd layer_means =
+      reference_grid().pixel_area() * (hats_.transpose() * into).cwiseQuotient(pixel_weight_);
+  means.col(2) += layer_means;
+
+  SmoothDisplacement result;
+  Eigen::MatrixX3d part = means;
+  part.col(2).setZero();
+  result.along = along_fit_->fit(part);
+  part.setZero();
+  part.col(2) = means.col(2);
+  result.rest = rest_fit_->fit(part);
+  const Eigen::VectorXd misfit = rest_fit_->means_of(result.rest).col(2) - means.col(2);
+  for (Eigen::Index v = 0; v < misfit.size(); ++v) {
+    if (press.traction(v, 2) != 0.0) result.largest_misfit = std::max(result.largest_misfit, std::abs(misfit[v]));
+  }
+  result.force = -weight_.dot(press.traction.col(2));
+  return result;
+}
+
+std::vector<double> SmoothSurface::less_layer(const SplineField& rest, std::vector<double> answer) const {
+  const PixelGrid& grid = reference_grid();
+  const Eigen::MatrixX3d smooth = rest.on_lattice(grid.columns_x(), grid.rows_y());
+  for (std::size_t k = 0; k < answer.size(); ++k) answer[k] = smooth(static_cast<Eigen::Index>(k), 2) - answer[k];
+  return answer;
+}
+
+std::vector<double> SmoothSurface::normal_displacement(const PressState& press) const {
+  return less_layer(displacement(press).rest, layer_answer(coarse_pressure(press)));
+}
+
+std::vector<double> SmoothSurface::normal_displacement(const SplineField& rest, const PixelGrid& fine,
+                                                       std::span<const double> pressure) const {
+  return less_layer(rest, layer_answer(gathered(fine, pressure, reference_grid())));
+}
+
+std::shared_ptr<const LayerResponse> SmoothSurface::response(int nx, int ny, double pitch) const {
+  const auto fits = [&](const auto& one) {
+    const PixelGrid& grid = one->grid();
+    return grid.nx == nx && grid.ny == ny && grid.pitch == pitch;
+  };
+  {
+    const std::lock_guard lock(kept_mutex_);
+    const auto found = std::find_if(kept_.begin(), kept_.end(), fits);
+    if (found != kept_.end()) {
+      std::rotate(found, found + 1, kept_.end());
+      return kept_.back();
+    }
+  }
+  // Two threads may make the same one; they are equal.
+  auto made = std::make_shared<const LayerResponse>(gel_.material, gel_.thickness, PixelGrid{nx, ny, pitch, {0.0, 0.0}},
+                                                    GridEdges::free);
+  const std::lock_guard lock(kept_mutex_);
+  if (std::none_of(kept_.begin(), kept_.end(), fits)) kept_.push_back(made);
+  std::size_t pixels = 0;
+  for (auto one = kept_.rbegin(); one != kept_.rend(); ++one) {
+    pixels += (*one)->grid().size();
+    if (pixels <= kKeptPixels) continue;
+    kept_.erase(kept_.begin(), one.base());
+    break;
+  }
+  return made;
+}
+
+}  // namespace touchstone::fem

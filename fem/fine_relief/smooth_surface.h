@@ -1,0 +1,93 @@
+#pragma once
+// The displacement of a flat or gently domed outer surface under a coarse press, at any point and free of the mesh's
+// wiggles.
+
+#include <Eigen/Core>
+#include <Eigen/SparseCore>
+#include <limits>
+#include <memory>
+#include <mutex>
+#include <span>
+#include <vector>
+
+#include "fem/contact/press.h"
+#include "fem/elements/compliance.h"
+#include "fem/fine_relief/layer_response.h"
+#include "fem/fine_relief/spline_field.h"
+
+namespace touchstone::fem {
+
+/// What a coarse press does to the surface, in two parts: what an endless layer does under the coarse pressure, which
+/// is as rough as that pressure; and all the rest, which is smooth.
+struct SmoothDisplacement {
+  SplineField along;  ///< components x and y: the surface's tangential displacement, mm
+  SplineField rest;   ///< component z: the normal displacement less what the endless layer does under the coarse
+                      ///< pressure alone (sides of the pad, layers below, friction's pull), mm
+  double largest_misfit = 0.0;  ///< mm, of `rest.z` to the mesh's hat means where there's pressure: the mesh's wiggles
+  double force = 0.0;           ///< N, of the coarse pressure
+};
+
+/// Of all responses that a SmoothSurface keeps; some 40 bytes each.
+inline constexpr std::size_t kKeptPixels = 2'000'000;
+
+inline constexpr double kSteepestDome = 0.5;  ///< radians of slope, at its rim
+
+/// Takes the mesh's wiggles out. The coarse mesh and the endless layer (fem/fine_relief/layer_response.h) are given the
+/// same P1 pressure; the difference of what they answer, as means over the hats, has no detail of the size of an edge
+/// but for the mesh's own error, so smoothing splines are fitted to it (knots a quarter of the thickness or two and a
+/// half edges apart, the bending below a wavelength of four knots held back) and the wiggles stay behind. Made once a
+/// gel; safe to use from many threads.
+///
+/// A dome is treated as a height field over x and y: pressures are per area seen along z, "normal" is along z. The
+/// endless layer is then tilted by the surface's slope and as thick as the dome's middle, which touches only the
+/// difference of two pressures of equal force: what the finite elements know of the dome stays. So it is good to second
+/// order in the slope, and steeper domes than kSteepestDome are refused.
+class SmoothSurface {
+ public:
+  /// The compliance must outlive this. The outer surface lies in the plane z = 0, or is the cap of the sphere about (0,
+  /// 0, -sphere_radius).
+  /// @throws Error unless it is, or if the cap is steeper than kSteepestDome somewhere
+  explicit SmoothSurface(const Compliance& gel, double sphere_radius = std::numeric_limits<double>::infinity());
+  ~SmoothSurface();
+
+  SmoothDisplacement displacement(const PressState& press) const;
+
+  /// Normal displacement (mm, negative under pressure) at the pixels of reference_grid(): the rest, and what the
+  /// endless layer does under the coarse pressure; or the `rest` of a SmoothDisplacement, and what it does under a
+  /// finer pressure. As smooth as the pressure.
+  std::vector<double> normal_displacement(const PressState& press) const;
+  std::vector<double> normal_displacement(const SplineField& rest, const PixelGrid& fine,
+                                          std::span<const double> pressure) const;
+  const PixelGrid& reference_grid() const { return layer_->grid(); }
+
+  /// The endless layer under `nx` x `ny` free pixels of `pitch` mm, wherever they stand. Those that were asked for last
+  /// are kept, up to kKeptPixels: making one takes as long as using it ten times.
+  std::shared_ptr<const LayerResponse> response(int nx, int ny, double pitch) const;
+
+  /// Height of the undeformed surface, mm; beside a dome that of its rim.
+  double rest_height(const Eigen::Vector2d& point) const;
+  /// Of the dome's rim; infinite for a flat surface.
+  double rim_radius() const { return rim_radius_; }
+
+  const Compliance& gel() const { return gel_; }
+  double edge() const { return edge_; }  ///< mm, of the finest triangles
+
+ private:
+  std::vector<double> coarse_pressure(const PressState& press) const;
+  std::vector<double> layer_answer(std::span<const double> pressure) const;
+  std::vector<double> less_layer(const SplineField& rest, std::vector<double> answer) const;
+
+  const Compliance& gel_;
+  double edge_ = 0.0;
+  double sphere_radius_, rim_radius_;
+  Eigen::VectorXd per_seen_area_;                      // per vertex: 1 / cosine of the surface's slope
+  std::unique_ptr<LayerResponse> layer_;               // over the whole surface
+  Eigen::SparseMatrix<double, Eigen::RowMajor> hats_;  // pixels x vertices: P1 values at pixel centres
+  Eigen::VectorXd weight_;                             // per vertex, mm^2, by the mass matrix
+  Eigen::VectorXd pixel_weight_;                       // the same in pixels
+  std::unique_ptr<SplineFit> rest_fit_, along_fit_;
+  mutable std::mutex kept_mutex_;
+  mutable std::vector<std::shared_ptr<const LayerResponse>> kept_;  // the last one used stands last
+};
+
+}  // namespace touchstone::fem

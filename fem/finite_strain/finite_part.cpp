@@ -1,0 +1,410 @@
+#include "fem/finite_strain/finite_part.h"
+
+#include <fmt/core.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "core/error.h"
+#include "fem/finite_strain/finite_system.h"
+
+namespace touchstone::fem {
+namespace {
+
+constexpr int kMostNewton = 25;
+constexpr int kPlainSteps = 2;    // before Aitken's rule
+constexpr int kTurningSteps = 4;  // after these the lines of contact stay
+constexpr int kMostBacktracks = 5;
+constexpr double kLeastShrink = 0.2;  // of the least J in one Newton step
+constexpr double kLeastRatio = 0.1;   // J: below, elements have found a way out that the gel hasn't
+constexpr double kBalanced = 1e-8;    // residual over the elements' forces
+constexpr double kAtRest = 1e-4;      // of the elements' forces at a part's start: below, a gel is as good as at rest
+constexpr double kHold = 1000.0;      // stiffness that holds what touches, over the surface's own
+constexpr double kReach = 0.5;        // of a vertex's own size: open gaps below this are candidates
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+using RowSparse = Eigen::SparseMatrix<double, Eigen::RowMajor>;
+
+/// Columns: along the force of contact (into the gel) and two across it.
+Eigen::Matrix3d axes_along(const Eigen::Vector3d& direction) {
+  const Eigen::Vector3d first = direction.normalized();
+  const Eigen::Vector3d guide = std::abs(first.x()) < 0.9 ? Eigen::Vector3d::UnitX() : Eigen::Vector3d::UnitY();
+  const Eigen::Vector3d second = (guide - guide.dot(first) * first).normalized();
+  Eigen::Matrix3d axes;
+  axes << first, second, first.cross(second);
+  return axes;
+}
+
+std::vector<int> forced_axes(const PartTarget& target) {
+  std::vector<int> axes;
+  for (int a = 0; a < 3; ++a) {
+    if (target.forced[a]) axes.push_back(a);
+  }
+  return axes;
+}
+
+}  // namespace
+
+FiniteSnapshot untouched(const FiniteGel& gel, const RigidTransform& pose) {
+  const auto n = static_cast<Eigen::Index>(gel.rest.vertices.size());
+  FiniteSnapshot s;
+  s.pose = pose;
+  s.elastic = gel.problem.at_rest();
+  s.pressure = Eigen::VectorXd::Zero(n);
+  s.shear = Eigen::MatrixX3d::Zero(n, 3);
+  s.state.assign(gel.rest.vertices.size(), NodeState::open);
+  return s;
+}
+
+Eigen::MatrixX3d traction_forces(const FiniteGel& gel, const FiniteSnapshot& at) {
+  Eigen::MatrixX3d forces = gel.coupling.transpose() * at.shear;
+  for (Eigen::Index v = 0; v < at.pressure.size(); ++v) {
+    if (at.pressure[v] == 0.0) continue;
+    for (RowSparse::InnerIterator it(at.gap.gradient, v); it; ++it) {
+      forces(it.col() / 3, it.col() % 3) += at.pressure[v] * it.value();
+    }
+  }
+  return forces;
+}
+
+Eigen::MatrixX3d bulge_forces(const FiniteGel& gel, const FiniteSnapshot& at) {
+  Eigen::MatrixX3d forces = Eigen::MatrixX3d::Zero(gel.space.nodes, 3);
+  for (const EdgeBulge& bulge : at.gap.bulges) {
+    for (int i = 0; i < 3; ++i) {
+      forces.row(bulge.nodes[i]) -= (bulge.stiffness * bulge.value) * bulge.gradient[i].transpose();
+    }
+  }
+  return forces;
+}
+
+/// One Newton iterate, and what is known there.
+struct FinitePartSolver::Iterate {
+  FiniteSnapshot at;
+  GapLines lines;
+  std::vector<Eigen::Matrix3d> axes;                 ///< per vertex; only where it has a gap
+  Eigen::VectorXd inside;                            ///< residual without the tractions of contact
+  Eigen::Vector3d bulges = Eigen::Vector3d::Zero();  ///< sum of bulge_forces, N
+  Eigen::VectorXd tangential_scale;                  ///< mm^3 per MPa, per vertex, of the last compliance
+  double balance = 0.0;                              ///< residual over the elements' forces
+  double size = 0.0;                                 ///< those forces
+  double least_size = 0.0;                           ///< what `balance` takes for them at least: a gel that is let go
+                                                     ///< comes to rest, where there are none
+  double least = 0.0;                                ///< J
+};
+
+/// A step: unknowns and shifts without units, and the tractions at its end.
+struct FinitePartSolver::Step {
+  std::vector<int> block;
+  ContactAnswer answer;
+  Eigen::VectorXd change;
+};
+
+FinitePartSolver::FinitePartSolver(const FiniteGel& gel, ContactShape shape, double friction, PressTolerance tolerance)
+    : gel_(gel),
+      shape_(std::move(shape)),
+      friction_(friction),
+      tolerance_(tolerance),
+      n_(static_cast<int>(gel.rest.vertices.size())) {}
+
+double FinitePartSolver::overlap(const RigidTransform& pose) const {
+  return -weighted_gap(gel_.rest, shape_, pose).deepest;
+}
+
+/// Gap, forces and residual at the iterate's state; along the lines given, or new ones.
+void FinitePartSolver::evaluate(const GapLines* held, Iterate& iterate, PartEffort& effort) const {
+  FiniteSnapshot& at = iterate.at;
+  const double depth = std::max(0.0, overlap(at.pose));
+  if (held == nullptr) {
+    iterate.lines = gap_lines(gel_.space, gel_.outer, at.elastic.displacement, shape_, at.pose, depth);
+  }
+  at.gap = deformed_gap(gel_.space, gel_.outer, gel_.rest.weight, iterate.lines, at.elastic.displacement, shape_,
+                        at.pose, depth, at.pressure);
+  ++effort.geometry_updates;
+  iterate.axes.resize(n_);
+  for (int v = 0; v < n_; ++v) {
+    if (!std::isfinite(at.gap.weighted[v])) {
+      at.pressure[v] = 0.0;
+      at.shear.row(v).setZero();
+      at.state[v] = NodeState::open;
+      continue;
+    }
+    iterate.axes[v] = axes_along(at.gap.direction.row(v));
+    // The frame turns with the gel, and the traction with it.
+    const Eigen::Vector3d normal = iterate.axes[v].col(0);
+    at.shear.row(v) -= (at.shear.row(v) * normal) * normal.transpose();
+  }
+  const Eigen::MatrixX3d nodal = traction_forces(gel_, at);
+  const Eigen::MatrixX3d bulges = bulge_forces(gel_, at);
+  iterate.bulges = bulges.colwise().sum();
+  at.force = -(nodal + bulges).colwise().sum().transpose();
+  const FiniteStrain::Residual residual = gel_.problem.residual(at.elastic);
+  const Eigen::VectorXd outside = over_unknowns(gel_, nodal);
+  iterate.inside = residual.values - over_unknowns(gel_, bulges);
+  iterate.size = std::max({residual.scale, outside.norm(), iterate.least_size});
+  iterate.balance = iterate.size > 0.0 ? (iterate.inside - outside).norm() / iterate.size : 0.0;
+}
+
+/// Vertices in contact and around it, and those that nearly touch.
+std::vector<int> FinitePartSolver::candidates(const FiniteSnapshot& at) const {
+  std::vector<int> result;
+  for (int v = 0; v < n_; ++v) {
+    if (!std::isfinite(at.gap.weighted[v])) continue;
+    const double weight = gel_.rest.weight[v];
+    const auto& around = gel_.rest.around[v];
+    const bool beside =
+        std::any_of(around.begin(), around.end(), [&](int u) { return at.state[u] != NodeState::open; });
+    if (at.state[v] != NodeState::open || beside || at.gap.weighted[v] / weight < kReach * std::sqrt(weight)) {
+      result.push_back(v);
+    }
+  }
+  return result;
+}
+
+/// How far the vertex's hat has slid over the object since `from`, in the vertex's axes, mm^3.
+Eigen::Vector2d FinitePartSolver::slid(const FiniteSnapshot& from, const FiniteSnapshot& at, int vertex,
+                                       const Eigen::Matrix3d& axes) const {
+  const RigidTransform motion = at.pose * from.pose.inverse();
+  Eigen::Vector3d way = Eigen::Vector3d::Zero();
+  for (RowSparse::InnerIterator it(gel_.coupling, vertex); it; ++it) {
+    const int node = static_cast<int>(it.col());
+    const Eigen::Vector3d place = gel_.space.position(node);
+    const Eigen::Vector3d was = place + from.elastic.displacement.row(node).transpose();
+    const Eigen::Vector3d is = place + at.elastic.displacement.row(node).transpose();
+    way += it.value() * (is - motion * was);
+  }
+  return axes.rightCols<2>().transpose() * way;
+}
+
+/// The largest of the iterate's errors over what is allowed: at most 1 at a solution.
+double FinitePartSolver::error_of(const FiniteSnapshot& from, const PartTarget& target, const Iterate& iterate) const {
+  const FiniteSnapshot& at = iterate.at;
+  double error = iterate.balance / kBalanced;
+  const double largest = at.pressure.maxCoeff();
+  for (int v = 0; v < n_; ++v) {
+    if (!std::isfinite(at.gap.weighted[v])) continue;
+    const double gap = at.gap.weighted[v] / gel_.rest.weight[v];
+    if (at.state[v] == NodeState::open) {
+      if (at.pressure[v] > 1e-9 * largest) return kInfinity;  // a shortened step leaves some
+      error = std::max(error, -gap / tolerance_.lookup_mm);
+      continue;
+    }
+    error = std::max(error, std::abs(gap) / tolerance_.lookup_mm);
+    if (friction_ == 0.0) continue;
+    if (!(iterate.tangential_scale[v] > 0.0)) return kInfinity;
+    // The laws of friction as a projection, as in contact_solver.h.
+    const Eigen::Vector2d t = iterate.axes[v].rightCols<2>().transpose() * at.shear.row(v).transpose();
+    Eigen::Vector2d kept = t - slid(from, at, v, iterate.axes[v]) / iterate.tangential_scale[v];
+    const double limit = friction_ * std::max(0.0, at.pressure[v]);
+    if (kept.norm() > limit) kept *= limit / kept.norm();
+    error = std::max(error, (t - kept).norm() / (largest * std::max(1e-6, 100.0 * tolerance_.traction)));
+  }
+  for (int a = 0; a < 3; ++a) {
+    if (!target.forced[a]) continue;
+    const double allowed = tolerance_.force * std::max(1.0, std::abs(target.force[a]));
+    error = std::max(error, std::abs(at.force[a] - target.force[a]) / (0.5 * allowed));
+  }
+  return error;
+}
+
+/// One factorisation, and the contact problem on its Schur complement. False: why_not_ says why.
+bool FinitePartSolver::find_step(const FiniteSnapshot& from, const PartTarget& target, Iterate& iterate, Step& step,
+                                 PartEffort& effort) {
+  const FiniteSnapshot& at = iterate.at;
+  const Scales& scales = gel_.problem.scales();
+  const double unit = force_scale(gel_);
+  const std::vector<int> forced = forced_axes(target);
+  const int c = friction_ > 0.0 ? 3 : 1;
+  const auto m = static_cast<Eigen::Index>(step.block.size());
+  const LawRows laws = law_rows(gel_, at.gap, iterate.axes, step.block, c, forced);
+  Eigen::VectorXd opening(c * m);  // gaps and ways slid, at this iterate
+  for (Eigen::Index j = 0; j < m; ++j) {
+    const int v = step.block[static_cast<std::size_t>(j)];
+    opening[c * j] = at.gap.weighted[v];
+    if (c == 3) opening.segment<2>(c * j + 1) = slid(from, at, v, iterate.axes[v]);
+  }
+
+  SymmetricEntries matrix = gel_.problem.tangent(at.elastic);
+  Eigen::VectorXd right(laws.inner);
+  right.head(gel_.space.unknowns) = -iterate.inside;
+  for (std::size_t b = 0; b < forced.size(); ++b) {
+    right[gel_.space.unknowns + static_cast<int>(b)] = -(target.force[forced[b]] + iterate.bulges[forced[b]]) / unit;
+  }
+  // A gel under pressure is stable in the hold of its contact, not under the same pressure as dead load (from a
+  // pressure of some 2 G on). What is held is therefore made stiff, by terms that vanish where it holds (the augmented
+  // Lagrangian of Hestenes and Powell), so that the compliance stays positive definite.
+  for (Eigen::Index j = 0; j < m; ++j) {
+    const int v = step.block[static_cast<std::size_t>(j)];
+    if (at.state[v] == NodeState::open) continue;
+    const double stiffness = kHold * scales.stress / std::pow(gel_.rest.weight[v], 1.5) / unit;
+    for (int t = 0; t < (at.state[v] == NodeState::stick ? c : 1); ++t) {
+      const LawRow& row = laws.rows[static_cast<std::size_t>(c * j + t)];
+      for (const auto& [i, x] : row) right[i] -= stiffness * x * opening[c * j + t];
+      add_square(row, stiffness * scales.length, matrix);
+    }
+  }
+  add_contact_stiffness(gel_, at.gap, forced, matrix);
+  // The border is scaled to be of the order of one beside the elements' blocks, as in compute_compliance.
+  const double border = std::sqrt(static_cast<double>(gel_.mesh.outer.size())) / (scales.length * scales.length);
+  for (std::size_t r = 0; r < laws.rows.size(); ++r) {
+    for (const auto& [i, x] : laws.rows[r]) matrix.add(i, laws.inner + static_cast<int>(r), border * x);
+  }
+  matrix.size = laws.inner + static_cast<int>(c * m);
+  std::vector<int> order = gel_.order;
+  for (int i = gel_.space.unknowns; i < laws.inner; ++i) order.push_back(i);
+
+  try {
+    BorderedFactor factor(matrix, static_cast<int>(c * m), order);
+    ++effort.factorisations;
+    const Eigen::MatrixXd compliance = factor.complement() * (-scales.length / unit / (border * border));
+    // Where gel and object would go if contact let go at once.
+    const Eigen::VectorXd back = factor.solve(right);
+    Eigen::VectorXd ahead = opening;
+    for (std::size_t r = 0; r < laws.rows.size(); ++r) {
+      for (const auto& [i, x] : laws.rows[r]) ahead[static_cast<Eigen::Index>(r)] += scales.length * x * back[i];
+    }
+    ContactProblem contact;
+    contact.compliance = &compliance;
+    contact.components = c;
+    contact.friction = Eigen::VectorXd::Constant(m, friction_);
+    contact.gap.resize(m);
+    contact.border.resize(c * m, 0);
+    if (c == 3) contact.drag.resize(2 * m);
+    Eigen::VectorXd start(at.touching ? c * m : 0);
+    iterate.tangential_scale = Eigen::VectorXd::Zero(n_);
+    for (Eigen::Index j = 0; j < m; ++j) {
+      const int v = step.block[static_cast<std::size_t>(j)];
+      contact.gap[j] = ahead[c * j];
+      if (at.touching) start[c * j] = at.pressure[v];
+      if (c == 1) continue;
+      contact.drag.segment<2>(2 * j) = -ahead.segment<2>(c * j + 1);
+      iterate.tangential_scale[v] = std::max(compliance(c * j + 1, c * j + 1), compliance(c * j + 2, c * j + 2));
+      if (at.touching) {
+        start.segment<2>(c * j + 1) = iterate.axes[v].rightCols<2>().transpose() * at.shear.row(v).transpose();
+      }
+    }
+    ContactMemory memory;
+    step.answer = c == 1 ? solve_frictionless(contact, start, memory)
+                         : solve_frictional(contact, start, std::max(tolerance_.traction, 1e-10), memory);
+    effort.solves += step.answer.iterations;
+    effort.sweeps += step.answer.sweeps;
+    if (!step.answer.converged) {
+      why_not_ =
+          fmt::format("the contact laws have no answer to be found with {} candidates: the gel isn't stable there", m);
+      return false;
+    }
+    Eigen::VectorXd push = Eigen::VectorXd::Zero(laws.inner);
+    for (std::size_t r = 0; r < laws.rows.size(); ++r) {
+      for (const auto& [i, x] : laws.rows[r]) push[i] += x * step.answer.z[static_cast<Eigen::Index>(r)] / unit;
+    }
+    step.change = back + factor.solve(push);
+  } catch (const Error& singular) {
+    why_not_ = singular.what();
+    return false;
+  }
+  return true;
+}
+
+/// Goes by `factor` of the step, or less where a tetrahedron would turn inside out. False: why_not_ says why.
+bool FinitePartSolver::take_step(const PartTarget& target, const Step& step, double& factor, Iterate& iterate) {
+  FiniteSnapshot& at = iterate.at;
+  const std::vector<int> forced = forced_axes(target);
+  const int c = friction_ > 0.0 ? 3 : 1;
+  for (int tries = 0;; factor *= 0.5, ++tries) {
+    if (tries > kMostBacktracks) return false;
+    ElasticSolution next = gel_.problem.moved(at.elastic, step.change, factor);
+    const double ratio = gel_.problem.smallest_volume_ratio(next);
+    if (!(ratio > kLeastShrink * iterate.least)) {
+      why_not_ = fmt::format("a tetrahedron turns inside out (its volume falls to {:.2g} of what it was)", ratio);
+      continue;
+    }
+    RigidTransform pose = at.pose;
+    for (std::size_t b = 0; b < forced.size(); ++b) {
+      pose.translation[forced[b]] +=
+          factor * gel_.problem.scales().length * step.change[gel_.space.unknowns + static_cast<int>(b)];
+    }
+    if (!pose.translation.allFinite() || overlap(pose) > 0.98 * gel_.thickness) {
+      why_not_ = fmt::format("the wanted force needs the object deeper than the gel's {:.4g} mm", gel_.thickness);
+      continue;
+    }
+    iterate.least = ratio;
+    at.elastic = std::move(next);
+    at.pose = pose;
+    break;
+  }
+  at.pressure *= 1.0 - factor;
+  at.shear *= 1.0 - factor;
+  at.state.assign(n_, NodeState::open);
+  at.touching = false;
+  at.residual = step.answer.residual;
+  for (std::size_t k = 0; k < step.block.size(); ++k) {
+    const auto j = static_cast<Eigen::Index>(k);
+    const int v = step.block[k];
+    at.state[v] = step.answer.state[k];
+    at.touching = at.touching || at.state[v] != NodeState::open;
+    at.pressure[v] += factor * step.answer.z[c * j];
+    if (c == 3) {
+      at.shear.row(v) += factor * (iterate.axes[v].rightCols<2>() * step.answer.z.segment<2>(c * j + 1)).transpose();
+    }
+  }
+  return true;
+}
+
+std::optional<FiniteSnapshot> FinitePartSolver::solve(const FiniteSnapshot& from, const PartTarget& target,
+                                                      PartEffort& effort) {
+  Iterate iterate;
+  iterate.at = from;
+  iterate.at.pose = target.pose;
+  iterate.least = gel_.problem.smallest_volume_ratio(from.elastic);
+  evaluate(nullptr, iterate, effort);
+  iterate.least_size = kAtRest * iterate.size;
+  Eigen::VectorXd last_change;
+  double factor = 1.0;
+  double error = kInfinity;
+  for (int iteration = 1; iteration <= kMostNewton; ++iteration) {
+    Step step;
+    step.block = candidates(iterate.at);
+    if (step.block.empty()) {
+      if (!target.forced[2]) return untouched(gel_, iterate.at.pose);
+      why_not_ = "the object has lost the gel";
+      return std::nullopt;
+    }
+    effort.candidates = std::max(effort.candidates, static_cast<int>(step.block.size()));
+    if (!find_step(from, target, iterate, step, effort)) return std::nullopt;
+    // Aitken's rule (Irons and Tuck 1969) against steps that alternate.
+    double next_factor = 1.0;
+    if (iteration > kPlainSteps) {
+      const double ratio = step.change.dot(last_change) / last_change.squaredNorm();
+      if (ratio < 0.0) next_factor = std::clamp(factor / (1.0 - ratio), 0.1, 1.0);
+    }
+    factor = next_factor;
+    last_change = step.change;
+    if (!take_step(target, step, factor, iterate)) return std::nullopt;
+    // How the lines turn, and which of them hit, isn't in the tangent. It hardly matters but at an edge as narrow as
+    // the mesh, where Newton's steps may alternate; so the lines stay once they are nearly right.
+    evaluate(iteration < kTurningSteps ? nullptr : &iterate.lines, iterate, effort);
+    error = error_of(from, target, iterate);
+    if (error <= 1.0) {
+      if (iterate.least < kLeastRatio) {
+        why_not_ = fmt::format(
+            "a tetrahedron keeps but {:.2g} of its volume: the mesh is too coarse where it's strained", iterate.least);
+        return std::nullopt;
+      }
+      FiniteSnapshot& found = iterate.at;
+      if (!found.touching) return untouched(gel_, found.pose);
+      found.penetration = 0.0;
+      for (int v = 0; v < n_; ++v) {
+        if (!std::isfinite(found.gap.weighted[v])) continue;
+        found.penetration = std::max(found.penetration, -found.gap.weighted[v] / gel_.rest.weight[v]);
+      }
+      return std::move(found);
+    }
+    if (!std::isfinite(iterate.balance)) break;
+  }
+  why_not_ = fmt::format("Newton's method is {:.2g} times its tolerance off after {} steps", error, kMostNewton);
+  return std::nullopt;
+}
+
+}  // namespace touchstone::fem

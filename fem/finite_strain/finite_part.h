@@ -1,0 +1,73 @@
+#pragma once
+// One part of a finite-strain press's path, from a converged state to the next.
+
+#include <Eigen/Core>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/transform.h"
+#include "fem/contact/contact_solver.h"
+#include "fem/contact/press.h"
+#include "fem/contact/press_part.h"
+#include "fem/finite_strain/finite_contact.h"
+#include "fem/finite_strain/finite_gel.h"
+#include "fem/shapes/contact_shape.h"
+
+namespace touchstone::fem {
+
+/// A converged state of gel and object.
+struct FiniteSnapshot {
+  RigidTransform pose;  ///< gel from object
+  ElasticSolution elastic;
+  Eigen::VectorXd pressure;  ///< n, MPa: the gap's multiplier
+  Eigen::MatrixX3d shear;    ///< n x 3, MPa, on the gel
+  std::vector<NodeState> state;
+  Eigen::Vector3d force = Eigen::Vector3d::Zero();  ///< on the object, N
+  bool touching = false;
+  DeformedGap gap;           ///< of a touching state
+  double penetration = 0.0;  ///< mm, the largest weighted gap below zero over its weight
+  double residual = 0.0;     ///< of the contact laws
+};
+
+/// The gel at rest under an object at `pose`.
+FiniteSnapshot untouched(const FiniteGel& gel, const RigidTransform& pose);
+
+/// What contact does to the gel's nodes (nodes x 3, N): by its tractions, and by its edges against bulging.
+Eigen::MatrixX3d traction_forces(const FiniteGel& gel, const FiniteSnapshot& at);
+Eigen::MatrixX3d bulge_forces(const FiniteGel& gel, const FiniteSnapshot& at);
+
+/// Newton's method for parts. Keeps nothing between them.
+class FinitePartSolver {
+ public:
+  /// Of the tolerance, `force`, `lookup_mm` and `traction` count (see FinitePress).
+  FinitePartSolver(const FiniteGel& gel, ContactShape shape, double friction, PressTolerance tolerance);
+
+  /// How deep the object reaches under the undeformed surface, mm; minus infinity if it isn't over it.
+  double overlap(const RigidTransform& pose) const;
+
+  /// The state at the end of the part, or nothing if Newton's method doesn't get there; why_not() then says why.
+  std::optional<FiniteSnapshot> solve(const FiniteSnapshot& from, const PartTarget& target, PartEffort& effort);
+  const std::string& why_not() const { return why_not_; }
+
+ private:
+  struct Iterate;
+  struct Step;
+  void evaluate(const GapLines* held, Iterate& iterate, PartEffort& effort) const;
+  std::vector<int> candidates(const FiniteSnapshot& at) const;
+  Eigen::Vector2d slid(const FiniteSnapshot& from, const FiniteSnapshot& at, int vertex,
+                       const Eigen::Matrix3d& axes) const;
+  double error_of(const FiniteSnapshot& from, const PartTarget& target, const Iterate& iterate) const;
+  bool find_step(const FiniteSnapshot& from, const PartTarget& target, Iterate& iterate, Step& step,
+                 PartEffort& effort);
+  bool take_step(const PartTarget& target, const Step& step, double& factor, Iterate& iterate);
+
+  const FiniteGel& gel_;
+  ContactShape shape_;
+  double friction_;
+  PressTolerance tolerance_;
+  int n_;
+  std::string why_not_;
+};
+
+}  // namespace touchstone::fem

@@ -1,0 +1,67 @@
+#pragma once
+// A rigid body pressed on a neo-Hookean gel at finite strain, step by step along a motion: what fem/contact/press.h
+// does in linear elasticity, slower (a factorisation of the whole gel each Newton iteration) and without its limits.
+//
+// Each Newton iterate factorises the tangent bordered by the rows of the vertices that may touch. The Schur complement
+// is the surface compliance at that state, so contact with Coulomb friction is solved on it as in the linear case, and
+// the volume follows by two solutions with the same factorisation. Gaps and the direction of contact forces belong to
+// the deformed surface (fem/finite_strain/finite_contact.h). Tractions are nominal: force per undeformed area. Friction
+// acts in the plane across the vertex's mean contact direction, against the motion relative to the object since the
+// last step.
+//
+// A gel may relax (fem/contact/relaxation.h): all of its nominal stress, the pressure in it, is then the hereditary
+// integral of what the elastic gel has at the same displacements (quasi-linear, Fung 1972, with the same function for
+// all of it). Equilibrium is linear in nominal stress, so a gel that is led by poses moves as the elastic one, and its
+// tractions and forces are the integrals of the elastic ones: exactly while contact doesn't change and the gel doesn't
+// turn, since the integral adds up stresses of different directions. Where contact grows that's first order in what
+// relaxes within the growth. Two things it leaves out: a gel that is let go faster than it recovers stays back, where
+// this one follows the object (with no force, never a pull in all), and friction keeps to its law in the elastic
+// tractions.
+
+#include <memory>
+#include <optional>
+
+#include "fem/contact/press.h"
+#include "fem/contact/relaxation.h"
+#include "fem/finite_strain/finite_gel.h"
+#include "fem/shapes/contact_shape.h"
+
+namespace touchstone::fem {
+
+class FinitePress {
+ public:
+  /// `friction` as for Press. The gel must outlive this. Of the tolerance, `force`, `lookup_mm` (here: what the gaps
+  /// are closed to) and `traction` (of the laws of friction; a hundred times that) count.
+  /// `relaxation`: the gel's moduli relax by this series from those of the gel, which are the instantaneous ones; over
+  /// a step the elastic forces are taken to go linearly, from the touch on where it has z position-controlled.
+  /// @throws Error for a shape, a friction or a relaxation that isn't allowed
+  FinitePress(const FiniteGel& gel, ContactShape shape, double friction, PressTolerance tolerance = {},
+              PronySeries relaxation = {});
+  FinitePress(FinitePress&&) noexcept;
+  FinitePress& operator=(FinitePress&&) noexcept;
+  ~FinitePress();
+
+  /// Moves the object to the target, in parts of no more than a tenth of the gel's thickness, halved where Newton's
+  /// method doesn't converge. In the state, `solves` counts contact problems, `factorisations` those of the gel,
+  /// `parts` the parts; `lookup_error` is zero.
+  /// @throws Error, the state being as before the step, as Press::step; for a target with torques; and if a tetrahedron
+  /// would turn inside out or Newton's method stalls in the smallest part allowed
+  const PressState& step(const PressTarget& target);
+
+  const PressState& state() const;
+
+  /// The pose straight above or below `pose` in which the body just touches the undeformed gel; nothing if it isn't
+  /// over it.
+  std::optional<RigidTransform> touching(const RigidTransform& pose) const;
+
+  /// The gel's displacement and pressure at the last step; of a gel that relaxes what the elastic one's would be.
+  const ElasticSolution& solution() const;
+  /// N mm, elastic energy at the last step; likewise.
+  double stored_energy() const;
+
+ private:
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+}  // namespace touchstone::fem

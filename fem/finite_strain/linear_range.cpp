@@ -1,0 +1,85 @@
+#include "fem/finite_strain/linear_range.h"
+
+#include <chrono>
+#include <cmath>
+#include <limits>
+
+#include "core/error.h"
+#include "fem/finite_strain/finite_press.h"
+
+namespace touchstone::fem {
+namespace {
+
+/// The height at which the body, unturned and in the gel's middle, touches the undeformed surface.
+double touching_height(const FiniteGel& gel, const ContactShape& shape) {
+  RigidTransform pose;
+  for (int k = 0; k < 30; ++k) {
+    const double gap = weighted_gap(gel.rest, shape, pose).deepest;
+    if (!std::isfinite(gap)) fail("the body isn't over the gel's middle: no reference press can be made");
+    pose.translation.z() -= gap;
+    if (std::abs(gap) < 1e-12 * gel.thickness) break;
+  }
+  return pose.translation.z();
+}
+
+}  // namespace
+
+std::vector<LinearRangeRow> measure_linear_range(const Compliance& linear, const FiniteGel& gel,
+                                                 const ContactShape& shape, double friction,
+                                                 std::span<const double> depths, const Progress& progress) {
+  TS_ASSERT(linear.vertices.size() == gel.rest.vertices.size());
+  Press press(linear, shape, friction);
+  PressTolerance tolerance;
+  tolerance.most_factorisations = kRangeFactorisations;
+  FinitePress finite(gel, shape, friction, tolerance);
+  const double height = touching_height(gel, shape);
+  std::vector<LinearRangeRow> range;
+  double before = 0.0;
+  for (const double part : depths) {
+    if (!(part > before)) fail("the depths of reference presses must be above zero and rise; {} doesn't", part);
+    before = part;
+    LinearRangeRow row;
+    row.depth = part * gel.thickness;
+    PressTarget target;
+    target.axis[2] = AxisControl::at(height - row.depth);
+    try {
+      const auto begun = std::chrono::steady_clock::now();
+      const PressState& state = press.step(target);
+      const auto between = std::chrono::steady_clock::now();
+      row.linear_force = state.wrench[2];
+      row.largest_strain = state.largest_strain;
+      row.finite_force = finite.step(target).wrench[2];
+      const auto ended = std::chrono::steady_clock::now();
+      row.linear_seconds = std::chrono::duration<double>(between - begun).count();
+      row.finite_seconds = std::chrono::duration<double>(ended - between).count();
+    } catch (const Error&) {
+      break;  // the rows so far are what can be said
+    }
+    if (!(row.finite_force > 0.0)) continue;  // the body slips between the mesh's vertices
+    range.push_back(row);
+    if (progress) {
+      progress("range of linear elasticity", static_cast<std::int64_t>(range.size()),
+               static_cast<std::int64_t>(depths.size()));
+    }
+  }
+  return range;
+}
+
+double estimated_difference(std::span<const LinearRangeRow> range, double largest_strain) {
+  if (range.empty()) return std::numeric_limits<double>::quiet_NaN();
+  double strain = 0.0;
+  double difference = 0.0;
+  for (const LinearRangeRow& row : range) {
+    if (row.largest_strain > strain) {
+      if (largest_strain <= row.largest_strain) {
+        const double share = (largest_strain - strain) / (row.largest_strain - strain);
+        return difference + share * (row.difference() - difference);
+      }
+      strain = row.largest_strain;
+      difference = row.difference();
+    }
+  }
+  return strain > 0.0 ? difference * largest_strain / strain : difference;
+}
+
+}  // namespace touchstone::fem

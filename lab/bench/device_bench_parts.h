@@ -1,0 +1,111 @@
+#pragma once
+// What the parts of a device's bench share. For lab/bench/device_bench*.cpp alone.
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/progress.h"
+#include "fem/elements/compliance.h"
+#include "fem/elements/element.h"
+#include "lab/bench/bench_scene.h"
+#include "lab/bench/device_bench.h"
+#include "render/imager/imager.h"
+
+namespace touchstone::lab {
+
+inline constexpr double kMostSeconds = 40.0;  ///< for one setting of a curve
+
+/// Pictures of one hold by the reference's light, twice without common random numbers.
+struct TruePictures {
+  sim::Hold hold;
+  TwoRuns runs;
+  render::Imager imager;
+};
+
+struct BenchParts {
+  BenchSettings settings;
+  sim::DeviceSpec whole_device;  ///< as it is
+  sim::DeviceSpec device;        ///< with the middle of its pictures
+  BenchPresses presses;
+  double depth_mm = 0.0;
+  fem::Compliance own_gel;
+  sim::DeviceSpec finest_device;
+  double finest_edges = 0.0;  ///< times the device's
+  fem::Compliance finest_gel;
+  double finest_seconds = 0.0;
+  FeltForces finest_forces;               ///< of `presses`
+  sim::EffectSwitches exact;              ///< of the reference's pictures
+  std::string exact_words;                ///< ", with interreflection": what of it the plan leaves out; empty: nothing
+  int reference_paths = 0;                ///< a pixel, of true pictures
+  double least_pixel_error = 0.0;         ///< see DeviceBench
+  std::optional<TruePictures> truth;      ///< of the first hold on the finest gel; nothing where there are no pictures
+  std::optional<TruePictures> own_truth;  ///< likewise on the device's own gel
+};
+
+sim::DeviceSpec with_edges(sim::DeviceSpec device, double factor);
+
+/// Set up anew, whatever a cache has.
+struct MadeGel {
+  fem::Compliance gel;
+  double seconds = 0.0;
+};
+MadeGel make_gel(const sim::DeviceSpec& device, fem::Element element = fem::Element::taylor_hood);
+
+/// The device with other edges, in forces and, where there is a truth, in pictures. What can't be had is in its note.
+BenchPoint mesh_point(const BenchParts& parts, double edges);
+
+/// Paths, the same number in each pixel, with what the plan leaves out.
+sim::SceneSpec reference_scene(const BenchParts& parts, const sim::DeviceSpec& device, const sim::Hold& hold,
+                               std::uint64_t seed);
+TruePictures true_pictures(const BenchParts& parts, const sim::DeviceSpec& device, const fem::Compliance& gel,
+                           const sim::Hold& hold, std::uint64_t seed);
+
+/// Makes parts.truth and parts.own_truth, or leaves them empty; in words, which or why.
+std::string prepare_pictures(BenchParts& parts);
+
+/// What a mesh gets wrong of pictures, free of the paths' noise.
+/// @pre parts.truth
+double mesh_pixel_error(const BenchParts& parts, const sim::DeviceSpec& device, const fem::Compliance& gel);
+
+/// A way to make a scene's pictures.
+struct LightSetting {
+  std::string words;
+  sim::LightSpec light;
+  sim::EffectSwitches effects;
+  bool adaptive_paths = false;  ///< light.noise_fraction may be chosen between those tried
+  double pixel_error = kUnknown;
+  double once_s = kUnknown, each_s = kUnknown;
+};
+
+std::string paths_in_words(double noise_fraction);
+
+/// Shows a hold's scene that way, and fills in what it took and how far it is from the truth; `point` gets the same.
+/// What can't be had is in the point's note.
+LightSetting try_light(const BenchParts& parts, const TruePictures& truth, const sim::DeviceSpec& device,
+                       const fem::Compliance& gel, LightSetting one, std::uint64_t seed, BenchPoint& point);
+
+/// The curves of light, samples, bands, the fine contact's pixels and events, as far as the device has them. `tries`
+/// gets the ways of light that were tried.
+std::vector<BenchCurve> light_curves(const BenchParts& parts, std::vector<LightSetting>& tries,
+                                     const Progress& progress);
+
+/// The curve of light.event_step. @pre the device has event pixels
+BenchCurve events_curve(const BenchParts& parts, const Progress& progress);
+
+/// The coarsest mesh from which on all finer ones that could be had hold both errors, and the next coarser one, which
+/// doesn't. Either may be null.
+struct HoldingMesh {
+  const BenchPoint* holds = nullptr;
+  const BenchPoint* coarser = nullptr;
+};
+HoldingMesh coarsest_holding(const BenchCurve& mesh, double force_error, double pixel_error);
+
+/// `mesh` gets finer meshes where none of its own holds the wanted errors.
+BenchChoice cheapest_choice(const BenchParts& parts, BenchCurve& mesh, const std::vector<LightSetting>& tries,
+                            const Progress& progress);
+
+std::vector<EffectShare> effect_shares(const BenchParts& parts, const Progress& progress);
+
+}  // namespace touchstone::lab

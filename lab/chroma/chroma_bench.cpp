@@ -1,0 +1,144 @@
+#include "lab/chroma/chroma_bench.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+
+#include "core/error.h"
+
+namespace touchstone::lab {
+namespace {
+
+const sim::PrintSpec& print_of(const sim::TouchRig& rig) {
+  const auto& coating = rig.device().coating;
+  if (!coating || !coating->print) fail("device {}: has no printed markers", rig.device().name);
+  return *coating->print;
+}
+
+sensors::ColourMarkerLook look_of(const sim::TouchRig& rig) {
+  sensors::ColourMarkerLook look;
+  look.grid = print_of(rig).grid;
+  // The text counts pixels of more than half saturation in pictures of enhanced contrast. In a levelled one the
+  // filter's yellow has some 0.47, as blue pixels see light of 500 to 540 nm; ink and filtered ink have 0.65 and more,
+  // white 0.1.
+  look.least_saturation = 0.3;
+  return look;
+}
+
+}  // namespace
+
+sim::TouchRigSettings chroma_rig_settings(std::uint64_t seed) {
+  sim::TouchRigSettings settings;
+  settings.seed = seed;
+  settings.deepest_mm = 3.3;    // the text presses by 3 mm
+  settings.widest_mm = 1.3;     // and shears by 1 mm
+  settings.membrane_um = 80.0;  // balls of 4 mm and larger are smooth on it
+  settings.always_friction = true;
+  settings.edge_side = 2;  // a marker's rim is some hundred pixels: their mean is what counts
+  return settings;
+}
+
+sensors::ViewParallax parallax_of(const sim::DeviceSpec& device) {
+  if (!device.camera) fail("device {}: has no camera", device.name);
+  const sim::CameraSpec& camera = *device.camera;
+  const double air = -camera.hole_position_mm.z() - device.plate.thickness_mm - device.gel.thickness_mm;
+  sensors::ViewParallax parallax;
+  parallax.viewing_distance_mm =
+      device.gel.refractive_index * (air + device.plate.thickness_mm / device.plate.refractive_index +
+                                     device.gel.thickness_mm / device.gel.refractive_index);
+  parallax.axis_mm = camera.look_at_mm.head<2>();
+  return parallax;
+}
+
+ChromaBench::ChromaBench(const sim::TouchRig& rig, std::uint64_t seed)
+    : rig_(rig),
+      markers_(printed_markers(rig.device())),
+      means_(rig.gel(), markers_),
+      spacing_mm_(print_of(rig).spacing_mm.x()),
+      finder_(look_of(rig)),
+      rest_(finder_.find_rest(rig.background(seed))) {}
+
+std::vector<ChromaLook> ChromaBench::play(const sim::ObjectSpec& object, const sim::MotionSpec& motion,
+                                          std::uint64_t noise_seed) const {
+  const sim::TouchObject touched = rig_.object(object);
+  const std::vector<sim::Truth> states = rig_.play(touched, motion);
+  return read(pictures(touched, states, noise_seed), states);
+}
+
+std::vector<ChromaLook> ChromaBench::look(const sim::ObjectSpec& object, std::span<const sim::Truth> states,
+                                          std::uint64_t noise_seed) const {
+  return read(pictures(rig_.object(object), states, noise_seed), states);
+}
+
+std::vector<cv::Mat> ChromaBench::pictures(const sim::TouchObject& object, std::span<const sim::Truth> states,
+                                           std::uint64_t noise_seed) const {
+  std::vector<cv::Mat> made(states.size());
+  tbb::parallel_for(std::size_t{0}, states.size(), [&](std::size_t i) {
+    made[i] = rig_.look(object, states[i].press, noise_seed, static_cast<int>(i), false).frame;
+  });
+  return made;
+}
+
+std::vector<ChromaLook> ChromaBench::read(std::span<const cv::Mat> frames, std::span<const sim::Truth> states) const {
+  TS_ASSERT(frames.size() == states.size());
+  sensors::ColourMarkerFinder finder = finder_;
+  std::vector<ChromaLook> looks(states.size());
+  for (std::size_t i = 0; i < states.size(); ++i) {
+    looks[i].reading = finder.find(frames[i]);
+    looks[i].truth = means_.of(states[i].press.surface_displacement);
+    looks[i].state = states[i];
+  }
+  return looks;
+}
+
+std::size_t ChromaBench::marker_at(const Eigen::Vector2d& place_mm) const {
+  std::size_t nearest = 0;
+  for (std::size_t i = 1; i < markers_.markers.size(); ++i) {
+    if ((markers_.markers[i].centre - place_mm).norm() < (markers_.markers[nearest].centre - place_mm).norm()) {
+      nearest = i;
+    }
+  }
+  return nearest;
+}
+
+std::vector<sensors::HueSample> samples_of(const std::vector<ChromaLook>& looks, std::size_t marker, int series) {
+  std::vector<sensors::HueSample> samples;
+  for (const ChromaLook& look : looks) {
+    const sensors::ColourMarker& seen = look.reading.markers[marker];
+    if (seen.flaw == sensors::MarkerFlaw::kNone) samples.push_back({marker, seen, look.truth[marker], series});
+  }
+  return samples;
+}
+
+std::vector<sensors::HueSample> samples_of_moved(const std::vector<ChromaLook>& looks, double least_mm, int series) {
+  std::vector<sensors::HueSample> samples;
+  for (const ChromaLook& look : looks) {
+    for (std::size_t marker = 0; marker < look.truth.size(); ++marker) {
+      const sensors::ColourMarker& seen = look.reading.markers[marker];
+      if (seen.flaw == sensors::MarkerFlaw::kNone && look.truth[marker].norm() >= least_mm) {
+        samples.push_back({marker, seen, look.truth[marker], series});
+      }
+    }
+  }
+  return samples;
+}
+
+sensors::HueCalibrationSettings hue_settings_of(const ChromaBench& bench) {
+  sensors::HueCalibrationSettings settings;
+  settings.spacing_mm = bench.spacing_mm();
+  settings.parallax = parallax_of(bench.rig().device());
+  return settings;
+}
+
+sensors::HueModel best_hue_model(const ChromaBench& bench, const std::vector<sensors::HueSample>& samples,
+                                 const std::vector<sensors::HueModelForm>& forms, HueAim aim) {
+  sensors::HueCalibrationSettings settings = hue_settings_of(bench);
+  const auto scores = sensors::rank_hue_forms(bench.rest(), samples, settings, forms);
+  const auto error = [&](const sensors::HueFormScore& score) {
+    return aim == HueAim::lateral ? score.errors.rms_lateral_mm : score.errors.rms_mm();
+  };
+  settings.form = std::ranges::min_element(scores, {}, error)->form;
+  return sensors::calibrate_hue(bench.rest(), samples, settings);
+}
+
+}  // namespace touchstone::lab

@@ -1,0 +1,45 @@
+#pragma once
+// Fields and forces of a chroma sensor on disk, from frames on disk.
+
+#include <filesystem>
+#include <optional>
+#include <vector>
+
+#include "core/progress.h"
+#include "sensors/colour/colour_marker_finder.h"
+#include "sensors/colour/hue_estimator.h"
+#include "sensors/tractions/marker_compliance.h"
+#include "sensors/tractions/traction_inversion.h"
+
+namespace touchstone::lab {
+
+/// What turns fields into forces.
+struct FieldForces {
+  sensors::MarkerCompliance compliance;
+  sensors::TractionSettings settings = {};
+};
+
+/// What came of all frames.
+struct FieldSummary {
+  int frames = 0;
+  int markers = 0;        ///< of all frames together
+  int measured = 0;       ///< of these
+  int extrapolated = 0;   ///< of the measured
+  int without_force = 0;  ///< frames with too few markers, measured and not extrapolated; 0 without forces
+};
+
+/// Estimates each frame, in their order, and writes <folder>/displacements.csv and, if `forces` are given,
+/// <folder>/forces.csv when all are done (docs/file-formats.md, "Recorded frames"). The folder is made if it isn't
+/// there.
+/// @param rest the picture of the unloaded sensor
+/// @throws Error naming the picture that can't be read or is unfit (see ColourMarkerFinder); for a model that doesn't
+///   fit the grid, or a compliance of another grid or another spacing than the model's
+FieldSummary write_chroma_fields(const sensors::HueModel& model, const Eigen::Vector2i& grid,
+                                 const std::filesystem::path& rest, const std::vector<std::filesystem::path>& frames,
+                                 const std::optional<FieldForces>& forces, const std::filesystem::path& folder,
+                                 const Progress& progress = {});
+
+/// The picture at rest, read and found. @throws Error naming it
+void find_rest_of(sensors::ColourMarkerFinder& finder, const std::filesystem::path& picture);
+
+}  // namespace touchstone::lab

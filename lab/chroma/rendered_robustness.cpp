@@ -1,0 +1,84 @@
+#include "lab/chroma/rendered_robustness.h"
+
+#include <algorithm>
+#include <opencv2/imgproc.hpp>
+#include <variant>
+
+#include "core/error.h"
+
+namespace touchstone::lab {
+namespace {
+
+constexpr double kGel_mm = 8.0;  // as scenes/devices/chroma.yaml
+constexpr double kGelIndex = 1.41;
+constexpr double kWhite = 0.9;
+constexpr double kBlack = 0.04;  // a matt black print; a size by a threshold hardly depends on it
+constexpr double kLargest = 1.6;
+constexpr int kRimParts = 16;  // the picture's rim that white is measured on is this part of its width
+
+/// The text's camera, as far from a gel as thick as the device's as it is from the text's, with pixels so small that
+/// the film has as many as are asked for. As on the device, the film stands before a marker of the usual side.
+TiltBench bench_of(const RenderedRungs& rungs) {
+  TiltBench bench = far_bench();
+  bench.camera_mm += kGel_mm - bench.gel_mm;
+  bench.gel_mm = kGel_mm;
+  const auto camera = std::get<render::LensCamera>(tilt_camera(bench));
+  bench.film_mm = bench.side_mm * (1.0 - kGel_mm / kGelIndex / camera.focus_distance_mm);
+  const double marker_px = bench.side_mm * camera.matrix.fx / camera.focus_distance_mm;
+  bench.pixel_pitch_um *= marker_px / rungs.filter_px;
+  bench.half_view_mm = bench.side_mm * (1.0 - 1e-9);  // a whole number of pixels mustn't be rounded up by one
+  bench.samples = rungs.samples;
+  return bench;
+}
+
+/// Black markers behind a film that takes no light; its faces in the gel reflect a thousandth.
+TiltSpectra black_and_white(TiltSpectra spectra) {
+  spectra.magenta.setConstant(kBlack);
+  spectra.film.setOnes();
+  return spectra;
+}
+
+/// The mean brightness along the picture's rim, which is white.
+double white_of(const cv::Mat& picture) {
+  cv::Mat mask(picture.size(), CV_8U, cv::Scalar(255));
+  const int rim = std::max(1, picture.cols / kRimParts);
+  mask(cv::Rect(rim, rim, picture.cols - 2 * rim, picture.rows - 2 * rim)).setTo(0);
+  const cv::Scalar mean = cv::mean(picture, mask);
+  return (mean[0] + mean[1] + mean[2]) / 3.0;
+}
+
+}  // namespace
+
+std::vector<RobustnessRung> rendered_robustness_rungs(const TiltSpectra& spectra, const RenderedRungs& rungs,
+                                                      std::uint64_t seed) {
+  if (rungs.count < 2) fail("rendered markers: {} sizes, at least 2 are needed", rungs.count);
+  if (!(rungs.smallest > 0.0 && rungs.smallest < rungs.largest && rungs.largest <= kLargest)) {
+    fail("rendered markers: sizes from {} to {} of the film's, they must rise, above 0 and up to {}", rungs.smallest,
+         rungs.largest, kLargest);
+  }
+  if (!(rungs.filter_px >= 4.0)) fail("rendered markers: a film of {} px, at least 4 are needed", rungs.filter_px);
+  const TiltBench usual = bench_of(rungs);
+  const TiltSpectra black = black_and_white(spectra);
+  std::vector<RobustnessRung> made;
+  double colour_exposure = 0.0, black_exposure = 0.0;
+  for (int i = 0; i < rungs.count; ++i) {
+    RobustnessRung rung;
+    rung.displacement = rungs.smallest + (rungs.largest - rungs.smallest) * i / (rungs.count - 1);
+    TiltBench bench = usual;
+    bench.side_mm *= rung.displacement;
+    const auto look = [&](const TiltSpectra& colours, int part) {
+      return tilt_picture(bench, colours, TiltMarker::flat, {}, seed + static_cast<std::uint64_t>(2 * i + part));
+    };
+    const cv::Mat colour = look(spectra, 0), grey = look(black, 1);
+    if (i == 0) {
+      colour_exposure = kWhite / white_of(colour);
+      black_exposure = kWhite / white_of(grey);
+    }
+    cv::cvtColor(colour_exposure * colour, rung.colour, cv::COLOR_RGB2BGR);
+    cv::transform(grey, rung.black_white, cv::Matx13d::all(black_exposure / 3.0));
+    made.push_back(std::move(rung));
+  }
+  return made;
+}
+
+}  // namespace touchstone::lab

@@ -1,0 +1,99 @@
+#pragma once
+// Calibration to a real unit: the numbers of a device's file with which the simulation shows and feels what was
+// recorded with it, how well they are known, and what can't be told. docs/calibration.md tells the method.
+
+#include <filesystem>
+#include <opencv2/core/mat.hpp>
+#include <string>
+#include <vector>
+
+#include "core/progress.h"
+#include "lab/fit/unit_fit_spec.h"
+#include "lab/fit/unit_pictures.h"
+#include "lab/fit/unit_simulation.h"
+
+namespace touchstone::lab {
+
+/// What was recorded, as it is compared. Without a background of its own `background.mean` is empty.
+struct UnitRecording {
+  BlockPicture background;
+  std::vector<BlockPicture> presses;
+};
+
+/// Reads a fit's pictures. @throws Error with the place in the fit's file
+UnitRecording read_recording(const PreparedFit& fit);
+
+/// One unknown as it was found.
+struct FittedUnknown {
+  std::string name;
+  UnknownHow how = UnknownHow::times;
+  double start = 0.0, value = 0.0;   ///< of the first number that it stands for, as the device's file has it
+  bool told = true;                  ///< false: its interval is open
+  double low95 = 0.0, high95 = 0.0;  ///< of the same number; -inf or 0, and inf where it isn't told
+  double deviation = 0.0;            ///< standard error: of the logarithm (times) or of the number (plus)
+  double by_noise = 0.0, by_model = 0.0, by_light = 0.0, by_mesh = 0.0;  ///< what it's made of (fit_certainty.h)
+  bool at_end = false;                                                   ///< at an end of its allowed range
+};
+
+/// A combination of unknowns that the data can't tell: all of them may move so at once, and nothing that was recorded
+/// changes by what could be noticed.
+struct UnidentifiableCombination {
+  struct Part {
+    std::string name;
+    UnknownHow how = UnknownHow::times;
+    double move = 0.0;  ///< of the logarithm, or of the number
+  };
+  std::vector<Part> parts;
+  std::string words;
+};
+
+/// How far what is simulated is from what was recorded, before the fit and after it.
+struct FitMisfit {
+  std::string what;                                  ///< the picture's file, or a press' force
+  double before = 0.0, after = 0.0;                  ///< root mean square, in standard deviations of the noise
+  double before_numbers = 0.0, after_numbers = 0.0;  ///< the same of 255 numbers; of a force N
+};
+
+/// Of a press: where it stood in the end.
+struct FittedPress {
+  double x_mm = 0.0, y_mm = 0.0, depth_mm = 0.0;
+  double place_deviation_mm = 0.0, depth_deviation_mm = 0.0;  ///< 0 where they were given as known
+  double force_N = 0.0;                                       ///< that the simulation has there
+};
+
+struct UnitFit {
+  std::vector<FittedUnknown> unknowns;
+  std::vector<UnidentifiableCombination> untold;
+  std::vector<FittedPress> presses;
+  std::vector<FitMisfit> misfits;
+  double misfit_before = 0.0, misfit_after = 0.0;  ///< of all residuals, in standard deviations of their noise
+  std::int64_t residuals = 0;
+  int steps = 0;
+  bool converged = false;
+  int rigs = 0;                ///< lamps' light that was set up
+  std::string device_text;     ///< the device's file with the fitted numbers
+  std::vector<cv::Mat> shown;  ///< simulated in the end, CV_64F: background if there is one, then presses
+};
+
+/// The same fit gives the same numbers, whatever the threads. @throws Error if what is to be simulated can't be
+UnitFit fit_unit(const PreparedFit& fit, const UnitRecording& recording, const std::filesystem::path& cache_folder,
+                 const Progress& progress = {});
+
+/// The same with a simulation that may have been used before, for several fits of one design. `simulation` is of a fit
+/// that differs from this one in labels and pictures alone.
+UnitFit fit_unit(const PreparedFit& fit, const UnitRecording& recording, UnitSimulation& simulation);
+
+/// The report for people, Markdown.
+std::string to_markdown(const PreparedFit& fit, const UnitFit& result);
+/// The same for programs.
+std::string to_json(const PreparedFit& fit, const UnitFit& result);
+
+/// Recorded, simulated and their difference (grey is none, tenfold) of each picture, side by side: CV_8UC3.
+cv::Mat misfit_sheet(const UnitRecording& recording, const UnitFit& result);
+
+/// Fits and puts NAME.md, NAME.json, NAME.yaml (the device) and NAME.png (misfit_sheet) into a folder, which is made.
+/// @throws Error for anything wrong with the fit's file, or a folder that can't be made
+UnitFit run_unit_fit(const std::filesystem::path& file, const std::filesystem::path& folder,
+                     const std::filesystem::path& cache_folder, const Progress& progress = {});
+
+}  // namespace touchstone::lab

@@ -1,0 +1,190 @@
+// The files of a unit's fit.
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "core/error.h"
+#include "core/whole_file.h"
+#include "datasets/inspection/contact_sheet.h"
+#include "lab/fit/unit_fit.h"
+#include "lab/studies/study.h"
+#include "sim/files/image_file.h"
+
+namespace touchstone::lab {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr double kDifference = 10.0;  // how much differences are enlarged
+constexpr int kTileWidth_px = 320;
+
+const char* name_of(UnknownHow how) {
+  return how == UnknownHow::times ? "times" : "plus";
+}
+
+std::string interval_text(const FittedUnknown& unknown) {
+  if (!unknown.told) return "not told";
+  return fmt::format("{:.5g} to {:.5g}", unknown.low95, unknown.high95);
+}
+
+/// Standard errors as people read them: of a factor in percent.
+std::string error_text(const FittedUnknown& unknown, double deviation) {
+  if (!std::isfinite(deviation)) return "-";
+  return unknown.how == UnknownHow::times ? fmt::format("{:.2g} %", 100.0 * deviation)
+                                          : fmt::format("{:.2g}", deviation);
+}
+
+Json number(double value) {
+  return std::isfinite(value) ? Json(value) : Json(nullptr);
+}
+
+cv::Mat eight_bits(const cv::Mat& picture, double factor, double offset) {
+  cv::Mat out;
+  picture.convertTo(out, CV_8U, factor, offset);
+  return out;
+}
+
+}  // namespace
+
+std::string to_markdown(const PreparedFit& fit, const UnitFit& result) {
+  std::string text = fmt::format(
+      "# {}\n\nThe device {} fitted to {} presses{}: {} numbers of blocks of {} x {} pixels, {} steps, {}.\n\n"
+      "Misfit before {:.2f}, after {:.2f} (root mean square, in standard deviations of the imager's and the labels' "
+      "noise; 1 is a model without fault).\n\n",
+      fit.spec.name, fit.device.name, fit.spec.presses.size(),
+      fit.spec.backgrounds.empty() ? "" : fmt::format(" and {} pictures of rest", fit.spec.backgrounds.size()),
+      result.residuals, fit.spec.coarse_px, fit.spec.coarse_px, result.steps,
+      result.converged ? "converged" : "NOT CONVERGED: take the intervals with care", result.misfit_before,
+      result.misfit_after);
+  text +=
+      "| unknown | start | fitted | 95 % interval | standard error | by noise | by the model | by the light | by the "
+      "mesh |\n"
+      "|---|---|---|---|---|---|---|---|---|\n";
+  for (const FittedUnknown& unknown : result.unknowns) {
+    text += fmt::format("| `{}` | {:.5g} | {:.5g}{} | {} | {} | {} | {} | {} | {} |\n", unknown.name, unknown.start,
+                        unknown.value, unknown.at_end ? " (end of its range)" : "", interval_text(unknown),
+                        error_text(unknown, unknown.deviation), error_text(unknown, unknown.by_noise),
+                        error_text(unknown, unknown.by_model), error_text(unknown, unknown.by_light),
+                        error_text(unknown, unknown.by_mesh));
+  }
+  text +=
+      "\nOf numbers that go together the first stands for all. By noise: with the misfit's own size; by the model: by "
+      "leaving out one part of the picture after the other; the larger of the two counts. By the light: with other "
+      "random "
+      "numbers for the simulated light; by the mesh: what the gel's mesh makes of forces. The interval is of all "
+      "together.\n";
+  text += "\n## What the data can't tell\n\n";
+  if (result.untold.empty()) text += "Nothing: each unknown's interval is narrower than its allowed range.\n";
+  for (const UnidentifiableCombination& combination : result.untold) text += fmt::format("- {}\n", combination.words);
+  if (!result.untold.empty()) {
+    text +=
+        "\nOf these unknowns the fitted device has one choice of many that show the same. Give one of them a known "
+        "value, "
+        "or leave it out of `unknowns`.\n";
+  }
+  text +=
+      "\n## Misfit\n\n| what | before | after | before | after |\n|---|---|---|---|---|\n| | of the noise | of the "
+      "noise | "
+      "of 255, or N | of 255, or N |\n";
+  for (const FitMisfit& misfit : result.misfits) {
+    text += fmt::format("| {} | {:.2f} | {:.2f} | {:.3g} | {:.3g} |\n", misfit.what, misfit.before, misfit.after,
+                        misfit.before_numbers, misfit.after_numbers);
+  }
+  text += "\n## Presses\n\n| press | x mm | y mm | depth mm | force N (simulated) |\n|---|---|---|---|---|\n";
+  for (std::size_t i = 0; i < result.presses.size(); ++i) {
+    const FittedPress& press = result.presses[i];
+    const auto with = [](double value, double deviation) {
+      return deviation > 0.0 ? fmt::format("{:.4f} +- {:.4f}", value, deviation) : fmt::format("{:.4g}", value);
+    };
+    text += fmt::format("| {} | {} | {} | {} | {:.4g} |\n", i, with(press.x_mm, press.place_deviation_mm),
+                        with(press.y_mm, press.place_deviation_mm), with(press.depth_mm, press.depth_deviation_mm),
+                        press.force_N);
+  }
+  return text;
+}
+
+std::string to_json(const PreparedFit& fit, const UnitFit& result) {
+  Json all = {{"name", fit.spec.name},
+              {"device", fit.device.name},
+              {"residuals", result.residuals},
+              {"steps", result.steps},
+              {"converged", result.converged},
+              {"misfit_before", number(result.misfit_before)},
+              {"misfit_after", number(result.misfit_after)}};
+  all["unknowns"] = Json::array();
+  for (const FittedUnknown& unknown : result.unknowns) {
+    all["unknowns"].push_back({{"name", unknown.name},
+                               {"how", name_of(unknown.how)},
+                               {"start", number(unknown.start)},
+                               {"fitted", number(unknown.value)},
+                               {"told", unknown.told},
+                               {"low95", unknown.told ? number(unknown.low95) : Json(nullptr)},
+                               {"high95", unknown.told ? number(unknown.high95) : Json(nullptr)},
+                               {"standard_error", number(unknown.deviation)},
+                               {"by_noise", number(unknown.by_noise)},
+                               {"by_model", number(unknown.by_model)},
+                               {"by_light", number(unknown.by_light)},
+                               {"by_mesh", number(unknown.by_mesh)},
+                               {"at_end", unknown.at_end}});
+  }
+  all["untold"] = Json::array();
+  for (const UnidentifiableCombination& combination : result.untold) {
+    Json parts = Json::array();
+    for (const auto& part : combination.parts) {
+      parts.push_back({{"name", part.name}, {"how", name_of(part.how)}, {"move", number(part.move)}});
+    }
+    all["untold"].push_back({{"words", combination.words}, {"parts", parts}});
+  }
+  all["misfits"] = Json::array();
+  for (const FitMisfit& misfit : result.misfits) {
+    all["misfits"].push_back({{"what", misfit.what},
+                              {"before", number(misfit.before)},
+                              {"after", number(misfit.after)},
+                              {"before_numbers", number(misfit.before_numbers)},
+                              {"after_numbers", number(misfit.after_numbers)}});
+  }
+  all["presses"] = Json::array();
+  for (const FittedPress& press : result.presses) {
+    all["presses"].push_back({{"place_mm", {press.x_mm, press.y_mm}},
+                              {"place_standard_error_mm", number(press.place_deviation_mm)},
+                              {"depth_mm", number(press.depth_mm)},
+                              {"depth_standard_error_mm", number(press.depth_deviation_mm)},
+                              {"simulated_force_N", number(press.force_N)}});
+  }
+  return all.dump(1) + "\n";
+}
+
+cv::Mat misfit_sheet(const UnitRecording& recording, const UnitFit& result) {
+  std::vector<const BlockPicture*> recorded;
+  if (!recording.background.mean.empty()) recorded.push_back(&recording.background);
+  for (const BlockPicture& press : recording.presses) recorded.push_back(&press);
+  TS_ASSERT(recorded.size() == result.shown.size());
+  std::vector<cv::Mat> images;
+  std::vector<std::string> captions;
+  for (std::size_t i = 0; i < recorded.size(); ++i) {
+    images.push_back(eight_bits(recorded[i]->mean, 1.0, 0.0));
+    images.push_back(eight_bits(result.shown[i], 1.0, 0.0));
+    images.push_back(eight_bits(result.shown[i] - recorded[i]->mean, kDifference, 128.0));
+    captions.push_back(std::filesystem::path(recorded[i]->file).filename().string());
+    captions.push_back("simulated");
+    captions.push_back(fmt::format("simulated - recorded, x {:.0f}", kDifference));
+  }
+  return datasets::contact_sheet(images, captions, 3, kTileWidth_px);
+}
+
+UnitFit run_unit_fit(const std::filesystem::path& file, const std::filesystem::path& folder,
+                     const std::filesystem::path& cache_folder, const Progress& progress) {
+  const PreparedFit fit = prepare_fit(file);
+  const UnitRecording recording = read_recording(fit);
+  make_study_folder(folder);  // before minutes of work that couldn't be kept
+  UnitFit result = fit_unit(fit, recording, cache_folder, progress);
+  const auto path = [&](const char* ending) { return folder / (fit.spec.name + ending); };
+  write_whole_file(path(".md"), to_markdown(fit, result));
+  write_whole_file(path(".json"), to_json(fit, result));
+  write_whole_file(path(".yaml"), result.device_text);
+  sim::write_png(path(".png"), misfit_sheet(recording, result));
+  return result;
+}
+
+}  // namespace touchstone::lab

@@ -1,0 +1,16 @@
+#pragma once
+// What a fit can't tell, in words.
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "lab/fit/unit_fit.h"
+
+namespace touchstone::lab {
+
+/// Combinations that span what `untold` (columns: orthonormal, rows: unknowns, in units of half ranges, whose lengths
+/// are `scale`) does, each with as few unknowns as can be: by elimination, the largest part first.
+std::vector<UnidentifiableCombination> untold_combinations(const std::vector<FitUnknown>& unknowns,
+                                                           const Eigen::MatrixXd& untold, const Eigen::VectorXd& scale);
+
+}  // namespace touchstone::lab

@@ -1,0 +1,246 @@
+#include "lab/fit/unit_simulation.h"
+
+#include <algorithm>
+#include <map>
+#include <optional>
+#include <utility>
+
+#include "core/error.h"
+#include "lab/fit/unit_pictures.h"
+#include "sim/press/gel_setup.h"
+#include "sim/scene/device_imager.h"
+#include "sim/sensor/touch_rig.h"
+#include "sim/sensor/virtual_device.h"
+#include "sim/view/visible_scene.h"
+
+namespace touchstone::lab {
+namespace {
+
+constexpr std::size_t kRigsKept = 2;  // of each lamp: where the fit stands, and a step beside it
+constexpr double kWidest_mm = 0.5;
+constexpr std::uint64_t kOtherLight = 500'000;  // beyond any number of lamps
+constexpr std::size_t kMostKept = 256U << 20U;  // bytes of pictures of each lamp
+
+/// What a press' state hangs on: the scene's numbers, the press, its pose.
+using Key = std::vector<double>;
+
+Key with_pose(Key key, int press, const PressPose& pose) {
+  key.insert(key.end(), {static_cast<double>(press), pose.place_mm.x(), pose.place_mm.y(), pose.depth_mm});
+  return key;
+}
+
+struct PressedState {
+  fem::PressState press;
+  double force_N = 0.0, error_N = 0.0;
+};
+
+}  // namespace
+
+struct UnitSimulation::Parts {
+  Parts(const PreparedFit& of, std::filesystem::path cache_folder, Progress listener, std::uint64_t first_seed)
+      : fit(of), cache(std::move(cache_folder)), progress(std::move(listener)), seed(first_seed) {
+    const auto lamps = fit.device.lamps.size();
+    rigs.resize(lamps);
+    lights.resize(lamps);
+    sim::keep_gel_of_unit_modulus(fit.device, cache);
+  }
+
+  /// The numbers that act on the scene and, with a lamp, on that lamp: under these its light is kept.
+  Key key_of(const Eigen::VectorXd& x, int lamp) const {
+    Key key;
+    for (std::size_t k = 0; k < fit.unknowns.size(); ++k) {
+      for (const FittedNumber& number : fit.unknowns[k].numbers) {
+        const bool acts =
+            number.acts == NumberActs::on_scene || (number.acts == NumberActs::on_lamp && number.lamp == lamp);
+        if (acts) key.push_back(number_at(fit.unknowns[k], number.number, x[static_cast<Eigen::Index>(k)]));
+      }
+    }
+    return key;
+  }
+
+  /// The device with one lamp of 1 W in each band, the modulus that its file says, and blocks for pixels.
+  sim::DeviceSpec device_of_lamp(const sim::DeviceSpec& whole, int lamp) const {
+    sim::DeviceSpec device = with_block_camera(whole, fit.spec.coarse_px);
+    device.lamps = {whole.lamps[static_cast<std::size_t>(lamp)]};
+    device.lamps.front().power_W = 1.0;
+    device.gel.youngs_modulus_MPa = modulus_of(whole);
+    return device;
+  }
+
+  /// The modulus that is simulated: where forces are in proportion to it that of the file.
+  double modulus_of(const sim::DeviceSpec& whole) const {
+    for (const FitUnknown& unknown : fit.unknowns) {
+      for (const FittedNumber& number : unknown.numbers) {
+        if (number.acts == NumberActs::on_force) return fit.device.gel.youngs_modulus_MPa;
+      }
+    }
+    return whole.gel.youngs_modulus_MPa;
+  }
+
+  const sim::TouchRig& rig(const sim::DeviceSpec& whole, const Key& key, int lamp) {
+    auto& kept = rigs[static_cast<std::size_t>(lamp)];
+    for (std::size_t i = 0; i < kept.size(); ++i) {
+      if (kept[i].first != key) continue;
+      std::rotate(kept.begin() + static_cast<std::ptrdiff_t>(i), kept.begin() + static_cast<std::ptrdiff_t>(i) + 1,
+                  kept.end());  // the newest last
+      return *kept.back().second;
+    }
+    sim::TouchRigSettings settings;
+    settings.seed = seed + static_cast<std::uint64_t>(lamp);  // lamps' light errs apart from each other
+    settings.deepest_mm = fit.deepest_mm;
+    settings.widest_mm = kWidest_mm;
+    settings.membrane_um = fit.spec.membrane_um;
+    settings.always_friction = true;
+    if (kept.size() == kRigsKept) kept.erase(kept.begin());
+    if (progress) progress("lamps' light", made, made + 1);
+    kept.emplace_back(key, std::make_unique<const sim::TouchRig>(device_of_lamp(whole, lamp), cache, settings));
+    ++made;
+    if (progress) progress("lamps' light", made, made);
+    return *kept.back().second;
+  }
+
+  const PressedState& state(const sim::TouchRig& on, const Key& scene, int press, const PressPose& pose) {
+    const Key key = with_pose(scene, press, pose);
+    const auto known = states.find(key);
+    if (known != states.end()) return known->second;
+    const RecordedPress& recorded = fit.spec.presses[static_cast<std::size_t>(press)];
+    sim::Hold hold;
+    hold.place_mm = pose.place_mm;
+    hold.angles_deg = recorded.angles_deg;
+    hold.depth_mm = pose.depth_mm;
+    return states.emplace(key, played(on, press, hold)).first->second;
+  }
+
+  PressedState played(const sim::TouchRig& on, int press, const sim::Hold& hold) const {
+    const RecordedPress& recorded = fit.spec.presses[static_cast<std::size_t>(press)];
+    try {
+      const sim::TouchObject object = on.object(fit.objects[static_cast<std::size_t>(press)]);
+      const double touch = sim::way_to_touch(object.felt(), on.gel(), hold.place_mm, hold.angles_deg);
+      const sim::Truth truth = on.play(object, sim::press_motion(hold, touch)).back();
+      return {truth.press, truth.press.wrench[2], truth.error.force.z()};
+    } catch (const Error& error) {
+      fail_at(recorded.where, "this press can't be simulated: {}", error.what());
+    }
+  }
+
+  /// One lamp's light in a press' picture, W/m^2 for 1 W in each band; press -1: of the untouched gel.
+  const cv::Mat& light(const sim::DeviceSpec& whole, const Eigen::VectorXd& x, int lamp, int press,
+                       const PressPose& pose) {
+    const Key scene = key_of(x, -1), own = key_of(x, lamp);
+    auto& kept = lights[static_cast<std::size_t>(lamp)];
+    const Key key = with_pose(own, press, pose);
+    const auto known = kept.find(key);
+    if (known != kept.end()) return known->second;
+    if (kept.size() * bytes_of_picture(whole) > kMostKept) kept.clear();
+    const sim::TouchRig& on = rig(whole, own, lamp);
+    if (press < 0) return kept.emplace(key, on.background_light()).first->second;
+    const PressedState& pressed = state(on, scene, press, pose);
+    const sim::TouchObject object = on.object(fit.objects[static_cast<std::size_t>(press)]);
+    return kept.emplace(key, on.look(object, pressed.press, 1, 0, false).light).first->second;
+  }
+
+  /// All lamps' light, at their power.
+  cv::Mat whole_light(const sim::DeviceSpec& whole, const Eigen::VectorXd& x, int press, const PressPose& pose) {
+    cv::Mat sum;
+    for (std::size_t lamp = 0; lamp < whole.lamps.size(); ++lamp) {
+      cv::Mat one;
+      light(whole, x, static_cast<int>(lamp), press, pose).convertTo(one, CV_64F);
+      const int bands = one.channels();
+      const render::Spectrum power = sim::in_bands(whole.lamps[lamp].power_W, bands_of(whole), "power_W");
+      for (int v = 0; v < one.rows; ++v) {
+        double* at = one.ptr<double>(v);
+        for (int i = 0; i < bands * one.cols; ++i) at[i] *= power[i % bands];
+      }
+      sum = sum.empty() ? one : cv::Mat(sum + one);
+    }
+    return sum;
+  }
+
+  std::size_t bytes_of_picture(const sim::DeviceSpec& whole) const {
+    const auto pixels = static_cast<std::size_t>(whole.camera->width) * static_cast<std::size_t>(whole.camera->height);
+    const auto block = static_cast<std::size_t>(fit.spec.coarse_px);
+    return sizeof(float) * whole.band_wavelengths_nm.size() * pixels / (block * block);
+  }
+
+  static sim::SceneBands bands_of(const sim::DeviceSpec& device) {
+    const auto& list = device.band_wavelengths_nm;
+    return {Eigen::Map<const Eigen::ArrayXd>(list.data(), static_cast<Eigen::Index>(list.size())), std::nullopt};
+  }
+
+  const PreparedFit& fit;
+  std::filesystem::path cache;
+  Progress progress;
+  std::uint64_t seed;
+  int made = 0;
+  std::vector<std::vector<std::pair<Key, std::unique_ptr<const sim::TouchRig>>>> rigs;  // by lamp
+  std::vector<std::map<Key, cv::Mat>> lights;                                           // by lamp
+  std::map<Key, PressedState> states;
+};
+
+UnitSimulation::UnitSimulation(const PreparedFit& fit, const std::filesystem::path& cache_folder, Progress progress)
+    : parts_(std::make_unique<Parts>(fit, cache_folder, std::move(progress), fit.spec.seed)) {}
+UnitSimulation::UnitSimulation(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
+UnitSimulation::~UnitSimulation() = default;
+
+SimulatedUnit UnitSimulation::show_press(const Eigen::VectorXd& x, int press, const PressPose& pose) {
+  const sim::DeviceSpec whole = device_at(parts_->fit, x);
+  SimulatedUnit shown;
+  shown.presses = {mean_numbers(parts_->whole_light(whole, x, press, pose), imager(x))};
+  const Key scene = parts_->key_of(x, -1);
+  auto known = parts_->states.find(with_pose(scene, press, pose));
+  if (known == parts_->states.end()) {
+    parts_->state(parts_->rig(whole, parts_->key_of(x, 0), 0), scene, press, pose);
+    known = parts_->states.find(with_pose(scene, press, pose));
+  }
+  const double share = whole.gel.youngs_modulus_MPa / parts_->modulus_of(whole);
+  shown.force_N = Eigen::VectorXd::Constant(1, share * known->second.force_N);
+  shown.force_error_N = Eigen::VectorXd::Constant(1, share * known->second.error_N);
+  return shown;
+}
+
+SimulatedUnit UnitSimulation::show(const Eigen::VectorXd& x, const std::vector<PressPose>& poses) {
+  const sim::DeviceSpec whole = device_at(parts_->fit, x);
+  TS_ASSERT(poses.size() == parts_->fit.spec.presses.size());
+  SimulatedUnit shown;
+  shown.background = mean_numbers(parts_->whole_light(whole, x, -1, {}), imager(x));
+  shown.force_N.resize(static_cast<Eigen::Index>(poses.size()));
+  shown.force_error_N.resize(static_cast<Eigen::Index>(poses.size()));
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const SimulatedUnit one = show_press(x, static_cast<int>(i), poses[i]);
+    shown.presses.push_back(one.presses.front());
+    shown.force_N[static_cast<Eigen::Index>(i)] = one.force_N[0];
+    shown.force_error_N[static_cast<Eigen::Index>(i)] = one.force_error_N[0];
+  }
+  return shown;
+}
+
+SimulatedUnit UnitSimulation::show_other_light(const Eigen::VectorXd& x, const std::vector<PressPose>& poses) {
+  if (!other_) {
+    other_.reset(new UnitSimulation(
+        std::make_unique<Parts>(parts_->fit, parts_->cache, parts_->progress, parts_->seed + kOtherLight)));
+  }
+  return other_->show(x, poses);
+}
+
+double UnitSimulation::depth_of_force(const Eigen::VectorXd& x, int press, const PressPose& pose, double force_N) {
+  const sim::DeviceSpec whole = device_at(parts_->fit, x);
+  const sim::TouchRig& on = parts_->rig(whole, parts_->key_of(x, 0), 0);
+  sim::Hold hold;
+  hold.place_mm = pose.place_mm;
+  hold.angles_deg = parts_->fit.spec.presses[static_cast<std::size_t>(press)].angles_deg;
+  hold.force_N = force_N * parts_->modulus_of(whole) / whole.gel.youngs_modulus_MPa;
+  const sim::TouchObject object = on.object(parts_->fit.objects[static_cast<std::size_t>(press)]);
+  const double touch = sim::way_to_touch(object.felt(), on.gel(), hold.place_mm, hold.angles_deg);
+  return -touch - parts_->played(on, press, hold).press.gel_from_object.translation.z();
+}
+
+render::Imager UnitSimulation::imager(const Eigen::VectorXd& x) const {
+  const sim::DeviceSpec whole = device_at(parts_->fit, x);
+  return sim::imager(whole, Parts::bands_of(whole), true);
+}
+
+int UnitSimulation::rigs_made() const {
+  return parts_->made + (other_ ? other_->rigs_made() : 0);
+}
+
+}  // namespace touchstone::lab

@@ -1,0 +1,36 @@
+#pragma once
+// The frames of a ball-press calibration on disk: pictures and a table that says what is pressed where.
+
+#include <filesystem>
+#include <optional>
+#include <vector>
+
+#include "core/error.h"
+#include "sensors/heights/background.h"
+#include "sensors/heights/ball_press.h"
+
+namespace touchstone::lab {
+
+/// One line of the table.
+struct AnnotatedPress {
+  std::filesystem::path file;
+  std::optional<sensors::ContactCircle> circle;  ///< absent: to be found
+  double ball_diameter_mm = 0.0;
+  SourceLocation where;
+};
+
+/// Reads a CSV file with the header `file,u_px,v_px,radius_px,ball_diameter_mm`: the outline of the touched part of the
+/// ball in each picture (u right, v down, the first pixel's centre at 0.5), or three empty cells where it is to be
+/// found. Files are relative to `folder`. @throws Error with file, line and field
+std::vector<AnnotatedPress> read_ball_press_table(const std::filesystem::path& folder,
+                                                  const std::filesystem::path& csv);
+
+/// The mean of some pictures of the untouched gel. @throws Error naming the picture that's unfit
+sensors::Background read_background(const std::vector<std::filesystem::path>& files);
+
+/// Reads the pictures of the table; where no circle is given it is found.
+/// @throws Error with the table's line: a picture that can't be read or is unfit, or a circle that isn't found
+std::vector<sensors::BallPress> read_ball_presses(const std::vector<AnnotatedPress>& table,
+                                                  const sensors::Background& background, double mm_per_px);
+
+}  // namespace touchstone::lab

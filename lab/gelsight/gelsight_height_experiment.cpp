@@ -1,0 +1,222 @@
+#include "lab/gelsight/gelsight_height_experiment.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "core/error.h"
+#include "core/random.h"
+#include "core/units.h"
+#include "fem/shapes/relief_map.h"
+#include "sim/scene/device_gel.h"
+
+namespace touchstone::lab {
+
+namespace {
+
+constexpr double kEdgeRadius_mm = 0.1;
+constexpr double kCylinderHeight_mm = 6.0;
+constexpr double kClearance_mm = 0.05;  // above the gel, where presses start
+
+double half_height(const sim::ShapeSpec& shape) {
+  switch (shape.type) {
+    case sim::ShapeKind::sphere:
+      return shape.radius_mm;
+    case sim::ShapeKind::box:
+      return 0.5 * shape.size_mm.z();
+    case sim::ShapeKind::rounded_cylinder:
+      return 0.0;  // its origin is in the middle of its flat end
+    case sim::ShapeKind::egg:
+      return shape.radius_mm;
+    case sim::ShapeKind::shell: {
+      const Eigen::Vector2d rise = 0.125 * shape.curvature_per_mm.cwiseProduct(shape.axes_mm.cwiseAbs2());
+      return std::max(0.0, -rise.minCoeff());
+    }
+    case sim::ShapeKind::hexagon:
+      return 0.5 * shape.across_flats_mm;
+    case sim::ShapeKind::mesh:
+      break;
+  }
+  fail("the object's lowest point isn't known for a shape from a file");
+}
+
+/// One of the ways in which the gel is pressed at each place.
+struct BallPressed {
+  sim::TouchObject ball;
+  double radius_mm = 0.0;
+  double depth_mm = 0.0;
+};
+
+std::vector<Eigen::Vector2d> places_of(const CalibrationPresses& how) {
+  const auto along = [](int k, int count) { return count > 1 ? k / (count - 1.0) - 0.5 : 0.0; };
+  std::vector<Eigen::Vector2d> places;
+  for (int j = 0; j < how.rows; ++j) {
+    for (int i = 0; i < how.columns; ++i) {
+      places.emplace_back(how.extent_mm.x() * along(i, how.columns), how.extent_mm.y() * along(j, how.rows));
+    }
+  }
+  return places;
+}
+
+}  // namespace
+
+double reach_below(const sim::ObjectSpec& object) {
+  return half_height(object.shape) + (object.relief ? sim::relief_map(*object.relief).highest() : 0.0);
+}
+
+sim::ObjectSpec ball_of(double diameter_mm) {
+  sim::ObjectSpec object;
+  object.name = fmt::format("ball-{}mm", diameter_mm);
+  object.shape.radius_mm = 0.5 * diameter_mm;
+  return object;
+}
+
+sim::ObjectSpec flat_cylinder_of(double diameter_mm) {
+  sim::ObjectSpec object;
+  object.name = fmt::format("cylinder-{}mm", diameter_mm);
+  object.shape.type = sim::ShapeKind::rounded_cylinder;
+  object.shape.radius_mm = 0.5 * diameter_mm;
+  object.shape.edge_radius_mm = kEdgeRadius_mm;
+  object.shape.height_mm = kCylinderHeight_mm;
+  return object;
+}
+
+sim::ObjectSpec with_friction(sim::ObjectSpec object, double friction) {
+  object.friction = friction;
+  return object;
+}
+
+sim::Touch touch_once(const sim::TouchRig& rig, const sim::TouchObject& object, const StraightPress& press,
+                      std::uint64_t noise_seed, bool truth) {
+  const double reach = reach_below(object.spec()) + sim::rest_height(rig.device().gel, press.place_mm);
+  sim::MotionSpec motion;
+  motion.start_mm = {press.place_mm.x(), press.place_mm.y(), reach + kClearance_mm};
+  sim::MotionKey key;
+  key.z = sim::AxisKey{reach - press.depth_mm, std::nullopt};
+  motion.keys = {key};
+  return rig.look(object, rig.play(object, motion).back().press, noise_seed, 0, truth);
+}
+
+CalibratedRig calibrate_rig(const sim::TouchRig& rig, const CalibrationPresses& how,
+                            std::optional<sensors::LightCorrection> correction, std::uint64_t noise_seed) {
+  std::vector<cv::Mat> rest;
+  for (int i = 0; i < how.background_frames; ++i) rest.push_back(rig.background(noise_seed, i));
+  const sensors::Background background = sensors::mean_background(rest);
+  const double mm_per_px = rig.mm_per_px();
+  std::vector<BallPressed> ways;
+  const auto add_way = [&](double diameter_mm, double depth_mm) {
+    ways.push_back({rig.object(ball_of(diameter_mm)), 0.5 * diameter_mm, depth_mm});
+  };
+  for (const double depth : how.depths_mm) add_way(how.ball_diameter_mm, depth);
+  if (how.wide_ball_depth_mm > 0.0) add_way(how.wide_ball_diameter_mm, how.wide_ball_depth_mm);
+  RandomStream hand(noise_seed, 0, Purpose::kPlacement);
+  std::vector<sensors::BallPress> presses;
+  CalibratedRig result;
+  double squares = 0.0;
+  int small_ones = 0;
+  for (const Eigen::Vector2d& place : places_of(how)) {
+    for (const BallPressed& way : ways) {
+      const sim::Touch touch = touch_once(rig, way.ball, {place, way.depth_mm}, noise_seed + presses.size() + 1);
+      const cv::Moments contact = cv::moments(touch.contact, true);
+      if (contact.m00 < 1.0) fail("calibration: the ball at ({}, {}) mm isn't seen", place.x(), place.y());
+      const Eigen::Vector2d centre(contact.m10 / contact.m00 + 0.5, contact.m01 / contact.m00 + 0.5);
+      sensors::BallPress press;
+      press.name = fmt::format("press {}", presses.size() + 1);
+      press.frame = touch.frame;
+      press.ball_radius_mm = way.radius_mm;
+      press.circle.centre = centre + how.annotation_px * Eigen::Vector2d(hand.normal(), hand.normal());
+      press.circle.radius = std::sqrt(contact.m00 / kPi) + how.annotation_px * hand.normal();
+      presses.push_back(press);
+      try {
+        const sensors::ContactCircle found =
+            sensors::find_contact_circle(press.frame, background, press.ball_radius_mm, mm_per_px, press.name);
+        ++result.found_circles;
+        if (&way == &ways.back() && how.wide_ball_depth_mm > 0.0) continue;
+        squares += (found.centre - centre).squaredNorm();
+        ++small_ones;
+      } catch (const Error&) {
+        // Counted as not found.
+      }
+    }
+  }
+  result.presses = static_cast<int>(presses.size());
+  sensors::HeightCalibrationSettings settings;
+  settings.mm_per_px = mm_per_px;
+  settings.correction = correction;
+  settings.sampling.most_saturated = how.most_saturated;
+  result.calibration = sensors::calibrate_height(presses, background, settings);
+  result.circle_error_px = small_ones > 0 ? std::sqrt(squares / small_ones) : 0.0;
+  return result;
+}
+
+HeightError height_error(const sensors::HeightResult& estimate, const sim::Touch& touch, double mm_per_px) {
+  TS_ASSERT(estimate.height_mm.size() == touch.height.size() && touch.height.type() == CV_32FC1);
+  HeightError error;
+  double sum = 0.0;
+  double squares = 0.0;
+  int pixels = 0;
+  int common = 0;
+  int either = 0;
+  std::vector<float> slopes;
+  for (int v = 0; v < touch.height.rows; ++v) {
+    const auto* truth = touch.height.ptr<float>(v);
+    const auto* ours = estimate.height_mm.ptr<float>(v);
+    for (int u = 0; u < touch.height.cols; ++u) {
+      if (!std::isfinite(truth[u])) continue;
+      const double off_um = kMicrometresPerMillimetre * (static_cast<double>(ours[u]) - static_cast<double>(truth[u]));
+      sum += std::abs(off_um);
+      squares += off_um * off_um;
+      error.worst_um = std::max(error.worst_um, std::abs(off_um));
+      if (static_cast<double>(truth[u]) > error.deepest_mm) {
+        error.deepest_mm = static_cast<double>(truth[u]);
+        error.depth_error_um = off_um;
+      }
+      ++pixels;
+      const bool here = touch.contact.at<unsigned char>(v, u) != 0;
+      const bool found = estimate.contact.at<unsigned char>(v, u) != 0;
+      common += here && found ? 1 : 0;
+      either += here || found ? 1 : 0;
+      if (here && u > 0 && v > 0 && std::isfinite(truth[u - 1]) && std::isfinite(touch.height.at<float>(v - 1, u))) {
+        slopes.push_back(std::hypot(truth[u] - truth[u - 1], truth[u] - touch.height.at<float>(v - 1, u)));
+      }
+    }
+  }
+  if (pixels > 0) {
+    error.mean_um = sum / pixels;
+    error.rms_um = std::sqrt(squares / pixels);
+  }
+  error.contact_overlap = either > 0 ? static_cast<double>(common) / either : 1.0;
+  if (!slopes.empty()) {
+    const auto at = slopes.begin() + static_cast<std::ptrdiff_t>(0.99 * static_cast<double>(slopes.size() - 1));
+    std::nth_element(slopes.begin(), at, slopes.end());
+    error.flank_slope = static_cast<double>(*at) / mm_per_px;
+  }
+  return error;
+}
+
+double wave_amplitude(const cv::Mat& height_mm, const cv::Rect& part, double wavelength_px) {
+  TS_ASSERT(height_mm.type() == CV_32FC1 && wavelength_px > 0.0 && part.width > wavelength_px);
+  TS_ASSERT((part & cv::Rect(0, 0, height_mm.cols, height_mm.rows)) == part);
+  using Row = Eigen::Matrix<double, 8, 1>;
+  Eigen::Matrix<double, 8, 8> normal = Eigen::Matrix<double, 8, 8>::Zero();
+  Row right = Row::Zero();
+  for (int v = part.y; v < part.y + part.height; ++v) {
+    for (int u = part.x; u < part.x + part.width; ++u) {
+      const auto value = static_cast<double>(height_mm.at<float>(v, u));
+      if (!std::isfinite(value)) continue;
+      const double phase = 2.0 * kPi * (u - part.x) / wavelength_px;
+      const double x = 2.0 * (u - part.x) / part.width - 1.0;
+      const double y = 2.0 * (v - part.y) / part.height - 1.0;
+      Row row;
+      row << std::cos(phase), std::sin(phase), 1.0, x, y, x * x, x * y, y * y;
+      normal += row * row.transpose();
+      right += value * row;
+    }
+  }
+  const Row solution = normal.ldlt().solve(right);
+  return std::hypot(solution[0], solution[1]);
+}
+
+}  // namespace touchstone::lab

@@ -1,0 +1,108 @@
+#include "lab/gelsight/gelsight_touches.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <opencv2/imgproc.hpp>
+#include <utility>
+
+#include "core/error.h"
+#include "core/random.h"
+#include "core/units.h"
+#include "lab/gelsight/gelsight_height_experiment.h"
+#include "sensors/heights/height_estimator.h"
+
+namespace touchstone::lab {
+namespace {
+
+constexpr double kApproach_mm = 0.15;  // above the gel at the start: a tilted face doesn't touch yet
+constexpr int kMarkColumns = 15, kMarkRows = 11;
+constexpr double kMarkedShare = 0.96;  // of the picture that the marks cover
+
+sim::MotionSpec press_of(const Grip& grip, double origin_mm) {
+  sim::MotionSpec motion;
+  motion.start_mm = {grip.place_mm.x(), grip.place_mm.y(), origin_mm + kApproach_mm};
+  motion.start_angles_deg = Eigen::Vector3d(grip.tilt.x(), grip.tilt.y(), grip.angle) / kRadiansPerDegree;
+  sim::MotionKey key;
+  key.z = sim::AxisKey{origin_mm - grip.depth_mm, std::nullopt};
+  motion.keys = {key};
+  return motion;
+}
+
+/// The pose in the plane of the object's touched face, `origin_mm` under its origin.
+sensors::PlanarPose planar(const RigidTransform& gel_from_object, double origin_mm) {
+  const Eigen::Vector3d face = gel_from_object * Eigen::Vector3d(0, 0, -origin_mm);
+  const Eigen::Vector3d along = gel_from_object.turn(Eigen::Vector3d::UnitX());
+  return {std::atan2(along.y(), along.x()), face.head<2>()};
+}
+
+sensors::PlaceMap fitted_places(const sim::TouchRig& rig) {
+  const int width = rig.device().camera->width, height = rig.device().camera->height;
+  std::vector<Eigen::Vector2d> pixels, places;
+  for (int j = 0; j < kMarkRows; ++j) {
+    for (int i = 0; i < kMarkColumns; ++i) {
+      const Eigen::Vector2d share(2.0 * i / (kMarkColumns - 1) - 1.0, 2.0 * j / (kMarkRows - 1) - 1.0);
+      const Eigen::Vector2d pixel =
+          0.5 * Eigen::Vector2d(width, height).cwiseProduct(Eigen::Vector2d::Ones() + kMarkedShare * share);
+      places.push_back(rig.gel_from_pixel(pixel));
+      pixels.push_back(pixel - Eigen::Vector2d::Constant(0.5));  // continuous indices
+    }
+  }
+  return sensors::fit_place_map(pixels, places, {width, height});
+}
+
+/// Contact where the level of rest isn't known: the higher of two classes of heights (Otsu 1979).
+cv::Mat higher_part(const cv::Mat& heights) {
+  cv::Mat grey, mask;
+  cv::normalize(heights, grey, 0.0, 255.0, cv::NORM_MINMAX, CV_8U);
+  cv::threshold(grey, mask, 0.0, 255.0, cv::THRESH_BINARY | cv::THRESH_OTSU);
+  return mask;
+}
+
+}  // namespace
+
+TouchBench::TouchBench(const sim::TouchRig& rig, HeightReader heights)
+    : rig_(rig), heights_(std::move(heights)), places_(fitted_places(rig)) {}
+
+std::vector<HeldTouch> TouchBench::touches(const sim::TouchObject& object, std::span<const Grip> grips,
+                                           std::uint64_t seed) const {
+  const double origin = reach_below(object.spec());
+  std::vector<sim::Touch> seen(grips.size());
+  std::vector<HeldTouch> touches(grips.size());
+  tbb::parallel_for(std::size_t{0}, grips.size(), [&](std::size_t i) {
+    const fem::PressState press = rig_.play(object, press_of(grips[i], origin)).back().press;
+    seen[i] = rig_.look(object, press, seed + i);
+    touches[i].touch_from_object = planar(press.gel_from_object, origin);
+    touches[i].force_N = press.bodies.front().wrench[2];
+  });
+  for (std::size_t i = 0; i < grips.size(); ++i) {
+    const cv::Mat heights = heights_(seen[i]);
+    const cv::Mat contact = higher_part(heights);
+    touches[i].image = sensors::rectified(heights, contact, places_);
+  }
+  return touches;
+}
+
+HeightReader estimated_heights(const sim::TouchRig& rig, std::uint64_t seed) {
+  const CalibratedRig calibrated = calibrate_rig(rig, {}, {}, seed);
+  sensors::HeightSettings settings;
+  settings.border = sensors::HeightBorder::free;
+  const auto estimator = std::make_shared<sensors::HeightEstimator>(calibrated.calibration.model, settings);
+  return [estimator](const sim::Touch& touch) { return estimator->estimate(touch.frame).height_mm.clone(); };
+}
+
+HeightReader true_heights(double noise_mm, std::uint64_t seed) {
+  const auto random = std::make_shared<RandomStream>(seed, 0, Purpose::kPlacement);
+  return [noise_mm, random](const sim::Touch& touch) {
+    cv::Mat heights = touch.height.clone();
+    for (auto height = heights.begin<float>(); height != heights.end<float>(); ++height) {
+      const double rest = std::isfinite(*height) ? *height : 0.0;  // out of the membrane's sight
+      *height = static_cast<float>(rest + noise_mm * random->normal());
+    }
+    return heights;
+  };
+}
+
+}  // namespace touchstone::lab

@@ -1,0 +1,78 @@
+#include "lab/gelsight/height_maps.h"
+
+#include <iterator>
+#include <opencv2/core.hpp>
+#include <set>
+
+#include "core/error.h"
+#include "core/whole_file.h"
+#include "datasets/inspection/on_picture.h"
+#include "sim/files/image_file.h"
+
+namespace touchstone::lab {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kLevelsPerMm = 10000.0;
+constexpr double kZeroLevel = 10000.0;
+
+void write_map(const cv::Mat& height_mm, fs::path file, HeightFormat format) {
+  if (format == HeightFormat::exr) {
+    sim::write_exr(file.replace_extension(".exr"), height_mm, {"height_mm"});
+    return;
+  }
+  cv::Mat levels;
+  height_mm.convertTo(levels, CV_16U, kLevelsPerMm, kZeroLevel);
+  sim::write_png(
+      file.replace_extension(".png"), levels,
+      {{"mm_per_level", fmt::format("{}", 1.0 / kLevelsPerMm)}, {"zero_level", fmt::format("{}", kZeroLevel)}});
+}
+
+std::string csv_of(const std::vector<HeightRecord>& records) {
+  std::string csv = "file,highest_mm,volume_mm3,contact_mm2,saturated_percent,trusted,contact_at_border\n";
+  for (const HeightRecord& record : records) {
+    csv += fmt::format("{},{:.5f},{:.5f},{:.4f},{:.3f},{},{}\n", record.file, record.highest_mm, record.volume_mm3,
+                       record.contact_mm2, record.saturated_percent, record.trusted ? 1 : 0,
+                       record.contact_at_border ? 1 : 0);
+  }
+  return csv;
+}
+
+}  // namespace
+
+std::vector<HeightRecord> write_height_maps(const sensors::HeightModel& model, const sensors::HeightSettings& settings,
+                                            const std::vector<fs::path>& frames, const fs::path& folder,
+                                            HeightFormat format, const Progress& progress) {
+  std::set<std::string> stems;
+  for (const fs::path& frame : frames) {
+    if (!stems.insert(frame.stem().string()).second) {
+      fail("{}: another frame is called '{}', too; their height maps would be one file", frame.string(),
+           frame.stem().string());
+    }
+  }
+  sensors::HeightEstimator estimator(model, settings);
+  fs::create_directories(folder);
+  const double pixel_mm2 = model.mm_per_px * model.mm_per_px;
+  std::vector<HeightRecord> records;
+  for (const fs::path& frame : frames) {
+    datasets::on_picture(frame, [&](const cv::Mat& image) {
+      const sensors::HeightResult& result = estimator.estimate(image);
+      HeightRecord record;
+      record.file = frame.filename().string();
+      cv::minMaxLoc(result.height_mm, nullptr, &record.highest_mm);
+      record.volume_mm3 = pixel_mm2 * cv::sum(result.height_mm)[0];
+      record.contact_mm2 = pixel_mm2 * result.contact_pixels;
+      record.saturated_percent = 100.0 * result.saturated_share;
+      record.trusted = result.trusted();
+      record.contact_at_border = result.contact_at_border;
+      write_map(result.height_mm, folder / frame.filename(), format);
+      records.push_back(record);
+    });
+    if (progress) progress("heights", std::ssize(records), std::ssize(frames));
+  }
+  write_whole_file(folder / "heights.csv", csv_of(records));
+  return records;
+}
+
+}  // namespace touchstone::lab

@@ -1,0 +1,36 @@
+#pragma once
+// Height maps on disk, from frames on disk.
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "core/progress.h"
+#include "sensors/heights/height_estimator.h"
+
+namespace touchstone::lab {
+
+enum class HeightFormat {
+  exr,   ///< one float channel, `height_mm`
+  png16  ///< 16 bit grey: level 10000 is 0 mm, a level is 0.1 um: -1 to 5.55 mm
+};
+
+/// A line of the summary.
+struct HeightRecord {
+  std::string file;
+  double highest_mm = 0.0;
+  double volume_mm3 = 0.0;  ///< sum of the heights times a pixel's area
+  double contact_mm2 = 0.0;
+  double saturated_percent = 0.0;
+  bool trusted = true;
+  bool contact_at_border = false;
+};
+
+/// Estimates each frame and writes <folder>/<stem>.exr or .png, and <folder>/heights.csv when all are done. The folder
+/// is made if it isn't there. @throws Error naming the frame that can't be read or estimated, or if two have one stem
+std::vector<HeightRecord> write_height_maps(const sensors::HeightModel& model, const sensors::HeightSettings& settings,
+                                            const std::vector<std::filesystem::path>& frames,
+                                            const std::filesystem::path& folder, HeightFormat format,
+                                            const Progress& progress = {});
+
+}  // namespace touchstone::lab

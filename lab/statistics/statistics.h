@@ -1,0 +1,15 @@
+#pragma once
+// What rows and fits share of statistics.
+
+#include <string>
+
+namespace touchstone::lab {
+
+/// Which way a figure is good.
+enum class Better { lower, higher, near };
+std::string name_of(Better better);
+
+/// Half of a 95 % interval, in standard errors of a normal distribution.
+inline constexpr double kNormal95 = 1.96;
+
+}  // namespace touchstone::lab

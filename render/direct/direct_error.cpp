@@ -1,0 +1,172 @@
+#include "render/direct/direct_error.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "core/error.h"
+#include "render/direct/direct_fitness.h"
+#include "render/paths/trace_twice.h"
+#include "render/sampling/sample_sequence.h"
+
+namespace touchstone::render {
+namespace {
+
+/// One pixel at random in each of about `count` equal fields.
+cv::Mat spread_pixels(const Eigen::Vector2i& size, int count, std::uint64_t seed) {
+  const double aspect = static_cast<double>(size.x()) / size.y();
+  const int across = std::clamp(static_cast<int>(std::lround(std::sqrt(count * aspect))), 1, size.x());
+  const int down = std::clamp(static_cast<int>(std::lround(static_cast<double>(count) / across)), 1, size.y());
+  cv::Mat mask = cv::Mat::zeros(size.y(), size.x(), CV_8UC1);
+  for (int j = 0; j < down; ++j) {
+    for (int i = 0; i < across; ++i) {
+      SampleSequence numbers(seed, static_cast<std::uint64_t>(j) * across + i, 0);
+      const auto [u, v] = numbers.next_pair();
+      mask.at<unsigned char>(static_cast<int>((j + v) / down * size.y()),
+                             static_cast<int>((i + u) / across * size.x())) = 255;
+    }
+  }
+  return mask;
+}
+
+struct Mean {
+  double value = 0.0, error = 0.0;
+};
+
+Mean mean_of(const std::vector<double>& values) {
+  const auto count = static_cast<double>(values.size());
+  double sum = 0.0;
+  for (double value : values) sum += value;
+  double squares = 0.0;
+  for (double value : values) squares += (value - sum / count) * (value - sum / count);
+  return {sum / count, count > 1.0 ? std::sqrt(squares / (count - 1.0) / count) : INFINITY};
+}
+
+/// Of the mean square, from its root's.
+double square_error_of(const DirectError& error) {
+  if (std::isinf(error.rms)) return 0.0;
+  const bool told_from_none = error.rms > error.rms_error;  // else rms_error is the square error's root
+  return told_from_none ? 2.0 * error.rms * error.rms_error : error.rms_error * error.rms_error;
+}
+
+constexpr double kStandardErrors = 2.0;
+constexpr int kMorePaths = 4;
+
+}  // namespace
+
+double largest_rms(const DirectError& error) {
+  return std::sqrt(error.rms * error.rms + kStandardErrors * square_error_of(error));
+}
+
+double smallest_rms(const DirectError& error) {
+  return std::sqrt(std::max(0.0, error.rms * error.rms - kStandardErrors * square_error_of(error)));
+}
+
+DirectError measure_direct_error(const cv::Mat& picture, const Scene& scene, const Camera& camera,
+                                 const DirectErrorSettings& settings) {
+  const auto bands = static_cast<int>(scene.environment.size());
+  const Eigen::Vector2i size = size_of(camera);
+  if (settings.pixels < 2 || settings.samples < 1) {
+    fail("direct error: {} pixels of {} samples; at least 2 and 1 are needed", settings.pixels, settings.samples);
+  }
+  if (picture.type() != CV_32FC(bands) || picture.cols != size.x() || picture.rows != size.y()) {
+    fail("direct error: the picture has {} x {} pixels of {} channels; the camera has {} x {} of {} (32-bit floats)",
+         picture.cols, picture.rows, picture.channels(), size.x(), size.y(), bands);
+  }
+  const cv::Mat mask = spread_pixels(size, settings.pixels, settings.seed);
+  const auto traced = trace_twice(scene, camera, mask, settings.samples, settings.max_depth, settings.seed);
+  std::vector<double> products;
+  std::vector<double> differences;
+  std::vector<double> powers;
+  for (int row = 0; row < size.y(); ++row) {
+    for (int column = 0; column < size.x(); ++column) {
+      if (mask.at<unsigned char>(row, column) == 0) continue;
+      double product = 0.0;
+      double difference = 0.0;
+      double power = 0.0;
+      for (int k = bands * column; k < bands * (column + 1); ++k) {
+        const double one = picture.ptr<float>(row)[k];
+        const double a = traced[0].ptr<float>(row)[k];
+        const double b = traced[1].ptr<float>(row)[k];
+        product += (one - a) * (one - b) / bands;
+        difference += (one - 0.5 * (a + b)) / bands;
+        power += a * b / bands;
+      }
+      products.push_back(product);
+      differences.push_back(difference);
+      powers.push_back(power);
+    }
+  }
+  const double power = mean_of(powers).value;
+  const Mean square = mean_of(products);
+  const Mean shift = mean_of(differences);
+  DirectError error;
+  error.pixels = static_cast<int>(products.size());
+  if (!(power > 0.0)) {  // a dark scene: right or endlessly wrong
+    error.rms = square.value > 0.0 ? INFINITY : 0.0;
+    return error;
+  }
+  error.rms = std::sqrt(std::max(0.0, square.value) / power);
+  // The root's derivative, but for a root that isn't told from zero.
+  error.rms_error = square.value > square.error ? 0.5 * square.error / std::sqrt(square.value * power)
+                                                : std::sqrt(square.error / power);
+  error.mean = shift.value / std::sqrt(power);
+  error.mean_error = shift.error / std::sqrt(power);
+  return error;
+}
+
+DirectChoice choose_direct(const Scene& rest, const Scene& first, const Camera& camera,
+                           const Eigen::AlignedBox3d& reach, const DirectChoiceSettings& settings) {
+  if (!(settings.tolerance > 0.0) || !std::isfinite(settings.tolerance)) {
+    fail("direct choice: tolerance is {}; it must be above 0", settings.tolerance);
+  }
+  check_scene(rest);
+  check_scene(first);
+  make_ready(camera);
+  DirectChoice choice;
+  if (rest.interreflection != first.interreflection) {
+    choice.reason = "one of the scenes asks for interreflection, the other doesn't";
+    return choice;
+  }
+  Scene direct = rest;
+  direct.interreflection = false;
+  LightField field;
+  try {
+    LightFieldSettings light;
+    light.accuracy = std::clamp(0.5 * settings.tolerance, 1e-4, 1e-2);
+    light.guides = settings.guides;
+    field = make_light_field(direct, reach, light);
+  } catch (const Error& error) {
+    choice.reason = error.what();
+    return choice;
+  }
+  for (const Scene* scene : {&rest, &first}) {
+    Scene asked = *scene;
+    asked.interreflection = false;
+    choice.reason = unfit_for_direct(field, asked);
+    if (!choice.reason.empty()) return choice;
+  }
+  auto renderer = std::make_unique<DirectRenderer>(field, camera, direct, settings.direct);
+  if (rest.interreflection) {
+    choice.bounced = measure_rest_light(*renderer, rest, camera, settings.rest);
+    renderer->set_bounced_light(choice.bounced);
+  }
+  const cv::Mat picture = renderer->render(first).irradiance;
+  choice.error = measure_direct_error(picture, first, camera, settings.error);
+  if (largest_rms(choice.error) > settings.tolerance && smallest_rms(choice.error) < settings.tolerance &&
+      !settings.whatever) {
+    DirectErrorSettings more = settings.error;
+    more.samples *= kMorePaths;
+    choice.error = measure_direct_error(picture, first, camera, more);
+  }
+  choice.field = std::move(field);
+  if (!settings.whatever && largest_rms(choice.error) > settings.tolerance) {
+    choice.reason = fmt::format("the picture is {:.2f} +- {:.2f} % off, {:.2f} % are asked for", 100 * choice.error.rms,
+                                100 * choice.error.rms_error, 100 * settings.tolerance);
+    return choice;
+  }
+  choice.renderer = std::move(renderer);
+  return choice;
+}
+
+}  // namespace touchstone::render

@@ -1,0 +1,66 @@
+#pragma once
+// How far direct pictures are from what they stand for, measured on some hundred pixels: for a plan that chooses.
+
+#include <Eigen/Geometry>
+#include <memory>
+#include <opencv2/core/mat.hpp>
+#include <string>
+
+#include "render/direct/direct_renderer.h"
+#include "render/direct/rest_light.h"
+
+namespace touchstone::render {
+
+struct DirectErrorSettings {
+  int pixels = 400;    ///< looked at, one in each of as many fields of the picture
+  int samples = 64;    ///< paths a pixel, twice; choose_direct takes four times as many where these can't tell
+  int max_depth = 16;  ///< RenderSettings::max_depth
+  std::uint64_t seed = 0;
+};
+
+/// Parts of the picture's root mean square, each with its standard error.
+struct DirectError {
+  double rms = 0.0, rms_error = 0.0;    ///< root mean square difference
+  double mean = 0.0, mean_error = 0.0;  ///< direct minus traced
+  int pixels = 0;
+};
+
+/// What the root mean square difference isn't above, and not below, with two standard errors of its square, which is
+/// what is measured: a difference that isn't told from none has a root whose own error says little.
+double largest_rms(const DirectError& error);
+double smallest_rms(const DirectError& error);
+
+/// A picture against path tracing of `scene`, all bands. The paths' own noise is not in the result: what is averaged is
+/// the product of the differences from two renderings with independent numbers, whose noise has the mean zero.
+/// @throws Error as Tracer, or if the picture isn't CV_32FC(bands) of the camera's size, or settings are out of range
+DirectError measure_direct_error(const cv::Mat& picture, const Scene& scene, const Camera& camera,
+                                 const DirectErrorSettings& settings = {});
+
+/// A renderer that has been found good enough, or the reason why there's none.
+struct DirectChoice {
+  std::unique_ptr<DirectRenderer> renderer;  ///< null where direct light won't do; `reason` then says why
+  std::string reason;
+  DirectError error;  ///< of `first`, if it was drawn
+  /// What the renderer was made of, for further ones that draw the same pictures: with the camera and `rest` without
+  /// interreflection, and set_bounced_light.
+  LightField field;
+  cv::Mat bounced;
+};
+
+struct DirectChoiceSettings {
+  double tolerance = 0.015;  ///< of the root mean square difference: what largest_rms may be
+  bool whatever = false;     ///< the error is measured, but any will do
+  DirectSettings direct;
+  GuideCut guides;
+  DirectErrorSettings error;
+  RestLightSettings rest;  ///< used where the scene asks for interreflection
+};
+
+/// Makes a renderer for the fixture of `rest` and measures it on `first`, a pressed state: the choice between direct
+/// light and paths by measurement. Where the scene asks for interreflection, the bounced light of `rest` is carried
+/// along. `reach` is the box that lit things stay in (LightField::reach).
+/// @throws Error if scenes, camera or settings are faulty; what is merely unfit for direct light is in `reason`
+DirectChoice choose_direct(const Scene& rest, const Scene& first, const Camera& camera,
+                           const Eigen::AlignedBox3d& reach, const DirectChoiceSettings& settings = {});
+
+}  // namespace touchstone::render

@@ -1,0 +1,34 @@
+#pragma once
+// Bounced light of a fixture at rest, carried along to what is pressed into it.
+
+#include <cstdint>
+#include <opencv2/core/mat.hpp>
+
+#include "render/direct/direct_renderer.h"
+
+namespace touchstone::render {
+
+struct RestLightSettings {
+  int samples = 64;        ///< paths a pixel, at most
+  int paths = 20000;       ///< that each pixel's value is the mean of, smoothing counted: more than this aren't traced
+  int max_depth = 16;      ///< RenderSettings::max_depth
+  double smooth_mm = 0.5;  ///< standard deviation on the surface that the result is smoothed with, 0 to 1e3
+  std::uint64_t seed = 0;
+};
+
+/// The irradiance (W/m^2 in each band) that, coming from everywhere onto what each pixel shows, would add to the direct
+/// picture of `rest` what path tracing adds: CV_32FC(bands) of the camera's size, for
+/// DirectRenderer::set_bounced_light.
+///
+/// Light that has bounced comes from the whole neighbourhood, so where a membrane is pressed it changes less than
+/// direct light does: what is carried is therefore a sum, not a ratio, which would take bounced light away in a shadow.
+/// Left out is that pressing changes it at all: a dent shades its own floor and turns it away from the faces that
+/// mirror. measure_direct_error (direct_error.h) tells how much that is.
+///
+/// Noise of the path tracer is smoothed away with the response of the picture to a unit irradiance as weight, so that
+/// beads and printless edges don't smear.
+/// @throws Error as Tracer and DirectRenderer::render, or if a setting is out of range
+cv::Mat measure_rest_light(DirectRenderer& renderer, const Scene& rest, const Camera& camera,
+                           const RestLightSettings& settings = {});
+
+}  // namespace touchstone::render

@@ -1,0 +1,234 @@
+#include "sensors/heights/height_estimator.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/core.hpp>
+
+#include "core/error.h"
+#include "sensors/numerics/wide_clones.h"
+
+namespace touchstone::sensors {
+namespace {
+
+// Colours are fixed point numbers of 16 bits: differences to the background in 128ths; coefficients so scaled that the
+// upper half of their product counts 16ths of a table's cell.
+constexpr int kColourBits = 7;
+constexpr int kCellBits = 4;
+constexpr int kCoefficientBits = 16 - kColourBits + kCellBits;
+constexpr int kBandRows = 4;
+// Cells a digital number: one coefficient, and what a row of them adds up to for colours of 255.
+static_assert(ColourCorrection::kLargestGain / static_cast<double>(kFinestStep_DN) <=
+              std::min(32767.0 / (1 << kCoefficientBits), 32767.0 / (1 << kCellBits) / 256.0));
+constexpr float kClearly_DN = 12.0F;  // summed over the channels
+
+/// Is every pixel the first one's like? A frame of a gel differs from it in its first few.
+bool is_flat(const cv::Mat& frame) {
+  const auto first = frame.at<cv::Vec3b>(0, 0);
+  for (int v = 0; v < frame.rows; ++v) {
+    const auto* const row = frame.ptr<cv::Vec3b>(v);
+    if (!std::all_of(row, row + frame.cols, [&](const cv::Vec3b& pixel) { return pixel == first; })) return false;
+  }
+  return true;
+}
+
+inline std::int16_t upper_half(std::int16_t a, std::int16_t b) {
+  return static_cast<std::int16_t>((static_cast<std::int32_t>(a) * b) >> 16);
+}
+
+/// The table's cell along one channel for a row of differences.
+struct ChannelCells {
+  const std::int16_t* from_blue;
+  const std::int16_t* from_green;
+  const std::int16_t* from_red;
+  std::int16_t offset;
+  std::int16_t last;
+};
+
+inline std::int16_t cell_along(const ChannelCells& channel, int u, std::int16_t blue, std::int16_t green,
+                               std::int16_t red) {
+  const auto sum =
+      static_cast<std::int16_t>(upper_half(blue, channel.from_blue[u]) + upper_half(green, channel.from_green[u]) +
+                                upper_half(red, channel.from_red[u]) + channel.offset);
+  const auto cell = static_cast<std::int16_t>(sum >> kCellBits);
+  const std::int16_t above = cell < 0 ? std::int16_t{0} : cell;
+  return above > channel.last ? channel.last : above;
+}
+
+TS_WIDE_CLONES void find_cells(const unsigned char* const* planes, const std::int16_t* const* rest,
+                               const ChannelCells* channels, const int* sides, int count, std::int32_t* cells) {
+  const unsigned char* const blue = planes[0];
+  const unsigned char* const green = planes[1];
+  const unsigned char* const red = planes[2];
+  const std::int16_t* const rest_blue = rest[0];
+  const std::int16_t* const rest_green = rest[1];
+  const std::int16_t* const rest_red = rest[2];
+  const ChannelCells along_blue = channels[0];
+  const ChannelCells along_green = channels[1];
+  const ChannelCells along_red = channels[2];
+  const std::int32_t side_green = sides[1];
+  const std::int32_t side_red = sides[2];
+#pragma GCC ivdep
+  for (int u = 0; u < count; ++u) {
+    const auto b = static_cast<std::int16_t>((blue[u] << kColourBits) - rest_blue[u]);
+    const auto g = static_cast<std::int16_t>((green[u] << kColourBits) - rest_green[u]);
+    const auto r = static_cast<std::int16_t>((red[u] << kColourBits) - rest_red[u]);
+    const std::int32_t cell_b = cell_along(along_blue, u, b, g, r);
+    const std::int32_t cell_g = cell_along(along_green, u, b, g, r);
+    const std::int32_t cell_r = cell_along(along_red, u, b, g, r);
+    cells[u] = (cell_b * side_green + cell_g) * side_red + cell_r;
+  }
+}
+
+void fetch_slopes(const Eigen::Vector2f* table, const std::int32_t* cells, int count, float* slope_u, float* slope_v) {
+  for (int u = 0; u < count; ++u) {
+    const Eigen::Vector2f& slope = table[cells[u]];
+    slope_u[u] = slope.x();
+    slope_v[u] = slope.y();
+  }
+}
+
+struct Extremes {
+  int saturated = 0;
+  int dark = 0;
+};
+
+TS_WIDE_CLONES Extremes count_extremes(const unsigned char* blue, const unsigned char* green, const unsigned char* red,
+                                       int count) {
+  int saturated = 0;
+  int dark = 0;
+  for (int u = 0; u < count; ++u) {
+    saturated += (blue[u] == 255) | (green[u] == 255) | (red[u] == 255) ? 1 : 0;
+    dark += (blue[u] | green[u] | red[u]) == 0 ? 1 : 0;
+  }
+  return {saturated, dark};
+}
+
+const HeightModel& checked(const HeightModel& model) {
+  const std::string fault = fault_of(model);
+  if (!fault.empty()) fail("height model: {}", fault);
+  return model;
+}
+
+bool touches_border(const cv::Mat& mask) {
+  const auto any = [](const cv::Mat& line) { return cv::countNonZero(line) > 0; };
+  return any(mask.row(0)) || any(mask.row(mask.rows - 1)) || any(mask.col(0)) || any(mask.col(mask.cols - 1));
+}
+
+}  // namespace
+
+HeightEstimator::HeightEstimator(const HeightModel& model, const HeightSettings& settings)
+    : model_(checked(model)),
+      settings_(settings),
+      poisson_(model.background.mean.cols, model.background.mean.rows, settings.border) {
+  const cv::Mat& mean = model_.background.mean;
+  const int width = mean.cols;
+  const int height = mean.rows;
+  const auto pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+  rest_.resize(3 * pixels);
+  for (int v = 0; v < height; ++v) {
+    for (int u = 0; u < width; ++u) {
+      const auto& pixel = mean.at<cv::Vec3f>(v, u);
+      for (std::size_t c = 0; c < 3; ++c) {
+        rest_[c * pixels + static_cast<std::size_t>(v * width + u)] =
+            static_cast<std::int16_t>(std::lround(pixel[static_cast<int>(c)] * (1 << kColourBits)));
+      }
+    }
+  }
+  const ColourCorrection correction = correction_of(model_);
+  const int bands = (height + kBandRows - 1) / kBandRows;
+  matrix_.resize(static_cast<std::size_t>(bands) * 9 * static_cast<std::size_t>(width));
+  for (int band = 0; band < bands; ++band) {
+    for (int u = 0; u < width; ++u) {
+      const Eigen::Vector2d place(u + 0.5, std::min(band * kBandRows + 0.5 * kBandRows, height - 0.5));
+      const Eigen::Matrix3d cells_a_number = correction.at(place) / static_cast<double>(model_.table.step);
+      for (int i = 0; i < 9; ++i) {
+        matrix_[static_cast<std::size_t>((band * 9 + i) * width + u)] =
+            static_cast<std::int16_t>(std::lround(cells_a_number(i / 3, i % 3) * (1 << kCoefficientBits)));
+      }
+    }
+  }
+  for (int c = 0; c < 3; ++c) {
+    // Half a cell to round, and three times half a unit that the upper halves have lost.
+    const double zero = -static_cast<double>(model_.table.lowest[c] / model_.table.step);
+    offset_[c] = static_cast<std::int16_t>(std::lround(zero * (1 << kCellBits) + (1 << (kCellBits - 1)) + 1.5));
+  }
+  cell_.resize(static_cast<std::size_t>(width));
+  for (cv::Mat& plane : planes_) plane.create(height, width, CV_8UC1);
+  result_.slope_u.create(height, width, CV_32FC1);
+  result_.slope_v.create(height, width, CV_32FC1);
+  result_.height_mm.create(height, width, CV_32FC1);
+  result_.contact.create(height, width, CV_8UC1);
+}
+
+void HeightEstimator::look_up_slopes(const cv::Mat& frame) {
+  cv::split(frame, planes_);
+  const int width = frame.cols;
+  const auto pixels = static_cast<long>(frame.total());
+  Extremes extremes;
+  for (int v = 0; v < frame.rows; ++v) {
+    const unsigned char* const planes[] = {planes_[0].ptr(v), planes_[1].ptr(v), planes_[2].ptr(v)};
+    const long row = static_cast<long>(v) * width;
+    const std::int16_t* const rest[] = {rest_.data() + row, rest_.data() + pixels + row,
+                                        rest_.data() + 2 * pixels + row};
+    const std::int16_t* const coefficients = matrix_.data() + static_cast<long>(v / kBandRows) * 9 * width;
+    ChannelCells channels[3];
+    for (int c = 0; c < 3; ++c) {
+      const std::int16_t* const mine = coefficients + 3L * c * width;
+      channels[c] = {mine, mine + width, mine + 2L * width, offset_[c],
+                     static_cast<std::int16_t>(model_.table.cells[static_cast<std::size_t>(c)] - 1)};
+    }
+    find_cells(planes, rest, channels, model_.table.cells.data(), width, cell_.data());
+    fetch_slopes(model_.table.slopes.data(), cell_.data(), width, result_.slope_u.ptr<float>(v),
+                 result_.slope_v.ptr<float>(v));
+    const Extremes here = count_extremes(planes[0], planes[1], planes[2], width);
+    extremes.saturated += here.saturated;
+    extremes.dark += here.dark;
+  }
+  result_.saturated_share = static_cast<double>(extremes.saturated) / static_cast<double>(pixels);
+  result_.dark_share = static_cast<double>(extremes.dark) / static_cast<double>(pixels);
+}
+
+const HeightResult& HeightEstimator::estimate(const cv::Mat& frame) {
+  const std::string fault = frame_fault(frame, model_.background.mean.size());
+  if (!fault.empty()) fail("the frame {}", fault);
+  look_up_slopes(frame);
+  poisson_.integrate(result_.slope_u, result_.slope_v, model_.mm_per_px, result_.height_mm);
+  if (settings_.border == HeightBorder::free) level_by_border(result_.height_mm);
+  result_.contact_pixels = mark_contact(result_.height_mm, settings_.contact, result_.contact);
+  result_.overexposed = result_.saturated_share > settings_.most_saturated;
+  result_.dark = result_.dark_share > settings_.most_dark;
+  result_.flat = is_flat(frame);
+  result_.contact_at_border = touches_border(result_.contact);
+  return result_;
+}
+
+FrameCoverage HeightEstimator::coverage(const cv::Mat& frame) const {
+  const cv::Mat difference = difference_to(model_.background, frame);
+  const ColourCorrection correction = correction_of(model_);
+  std::int64_t measured = 0;
+  std::int64_t clear = 0;
+  std::int64_t clear_measured = 0;
+  std::int64_t steep = 0;
+  for (int v = 0; v < difference.rows; ++v) {
+    for (int u = 0; u < difference.cols; ++u) {
+      const auto& pixel = difference.at<cv::Vec3f>(v, u);
+      const Eigen::Vector3f colour(pixel[0], pixel[1], pixel[2]);
+      const Eigen::Matrix3f matrix = correction.at({u + 0.5, v + 0.5}).cast<float>();
+      const std::size_t cell = model_.table.index_of(matrix * colour);
+      const bool hit = model_.table.measured_near(matrix * colour);
+      measured += hit ? 1 : 0;
+      if (colour.lpNorm<1>() > kClearly_DN) {
+        ++clear;
+        clear_measured += hit ? 1 : 0;
+      }
+      steep += model_.table.slopes[cell].norm() > model_.steepest_calibrated ? 1 : 0;
+    }
+  }
+  const auto share = [](std::int64_t part, std::int64_t whole) {
+    return whole > 0 ? static_cast<double>(part) / static_cast<double>(whole) : 1.0;
+  };
+  const auto pixels = static_cast<std::int64_t>(difference.total());
+  return {share(measured, pixels), share(clear_measured, clear), share(steep, pixels)};
+}
+
+}  // namespace touchstone::sensors

@@ -1,0 +1,71 @@
+#pragma once
+// Frame in, height map out (source text 004, sec. 2.2.2, steps 1 to 3).
+
+#include <cstdint>
+#include <opencv2/core/mat.hpp>
+#include <vector>
+
+#include "sensors/heights/height_map.h"
+#include "sensors/heights/height_model.h"
+#include "sensors/numerics/poisson_solver.h"
+
+namespace touchstone::sensors {
+
+struct HeightSettings {
+  HeightBorder border = HeightBorder::zero;
+  ContactRule contact{};
+  double most_saturated = 0.02;  ///< share of saturated pixels from which a frame is flagged
+  double most_dark = 0.5;        ///< share of black pixels, likewise
+};
+
+/// What one frame gives. The images stay valid until the estimator's next frame.
+struct HeightResult {
+  cv::Mat height_mm;         ///< CV_32FC1, see height_map.h
+  cv::Mat slope_u, slope_v;  ///< CV_32FC1, as looked up
+  cv::Mat contact;           ///< CV_8UC1: 255 where ContactRule says contact
+  int contact_pixels = 0;
+  double saturated_share = 0.0;    ///< of the pixels: a channel is at 255
+  double dark_share = 0.0;         ///< all channels are 0
+  bool overexposed = false;        ///< more saturated pixels than the settings allow: heights there are too flat
+  bool dark = false;               ///< more black pixels than the settings allow: no light, or a covered camera
+  bool flat = false;               ///< all pixels are alike: no camera that sees a gel delivers that
+  bool contact_at_border = false;  ///< the contact runs out of the picture: use HeightBorder::free, and mind the level
+
+  bool trusted() const { return !overexposed && !dark && !flat; }
+};
+
+/// How well the calibration's colours cover those of a frame.
+struct FrameCoverage {
+  double measured_share = 0.0;  ///< of the pixels: calibration has hit the cell of their colour or one beside it
+  double contact_measured_share = 0.0;  ///< of those that differ clearly from the background (1 if there are none)
+  double steep_share = 0.0;             ///< of the pixels: steeper than 99 % of the calibration's, so extrapolated
+};
+
+/// Made once for a model; then every frame costs the same and allocates nothing. Not for two threads at once.
+/// Colours and slopes are looked up at places that are corrected in bands of four rows.
+class HeightEstimator {
+ public:
+  /// @throws Error if the model is faulty
+  explicit HeightEstimator(const HeightModel& model, const HeightSettings& settings = {});
+
+  /// @throws Error if the frame isn't a colour picture of the model's size
+  const HeightResult& estimate(const cv::Mat& frame);
+
+  /// @throws Error as estimate
+  FrameCoverage coverage(const cv::Mat& frame) const;
+
+ private:
+  void look_up_slopes(const cv::Mat& frame);
+
+  HeightModel model_;
+  HeightSettings settings_;
+  PoissonSolver poisson_;
+  HeightResult result_;
+  cv::Mat planes_[3];
+  std::vector<std::int16_t> rest_;    ///< 3 planes: the background in 128ths
+  std::vector<std::int16_t> matrix_;  ///< a band of four rows after the other: 9 rows of coefficients
+  std::int16_t offset_[3] = {};       ///< of the table, in 16ths of a cell
+  std::vector<std::int32_t> cell_;    ///< of one row
+};
+
+}  // namespace touchstone::sensors

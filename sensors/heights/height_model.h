@@ -1,0 +1,35 @@
+#pragma once
+// What a height estimator knows of one sensor: everything that calibration has found.
+
+#include <string>
+
+#include "sensors/heights/background.h"
+#include "sensors/heights/lamp_model.h"
+#include "sensors/heights/slope_table.h"
+
+namespace touchstone::sensors {
+
+/// Finest step of a model's table, digital numbers: finer ones don't fit the estimator's 16 bits under the strongest
+/// correction (ColourCorrection::kLargestGain).
+inline constexpr float kFinestStep_DN = 1.6F;
+/// Of the lamps, along each side of the picture.
+inline constexpr int kMostNodes = 64;
+
+struct HeightModel {
+  double mm_per_px = 0.0;
+  Background background;
+  LightCorrection correction = LightCorrection::none;
+  LampModel lamps;  ///< corrects places if `correction` is fitted; always there
+  SlopeTable table;
+  double steepest_calibrated = 0.0;  ///< slope that 99 % of the calibration's pixels are below
+  int presses = 0;                   ///< that it was made of
+};
+
+/// What is wrong with a model, or the empty string: sizes that don't fit, figures that aren't finite or are out of
+/// range.
+std::string fault_of(const HeightModel& model);
+
+/// The correction that belongs to the model.
+ColourCorrection correction_of(const HeightModel& model);
+
+}  // namespace touchstone::sensors

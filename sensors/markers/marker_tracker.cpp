@@ -1,0 +1,246 @@
+#include "sensors/markers/marker_tracker.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/error.h"
+
+namespace touchstone::sensors {
+
+namespace {
+
+constexpr double kNeighbourReach = 1.6;  ///< of the spacing: the eight round a marker of a square grid
+constexpr double kAreaLearning = 0.05;   ///< how fast a marker's usual area follows the measured one, a frame
+constexpr double kAtRest = 0.1;          ///< of the spacing
+
+/// The nearest of `places` to `from`, -1 if there's none.
+template <typename Places, typename PlaceOf>
+int nearest(const Places& places, PlaceOf place_of, const Eigen::Vector2d& from) {
+  int best = -1;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const double distance = (place_of(places[i]) - from).squaredNorm();
+    if (distance < least) {
+      least = distance;
+      best = static_cast<int>(i);
+    }
+  }
+  return best;
+}
+
+const Eigen::Vector2d& place_of_blob(const MarkerBlob& blob) {
+  return blob.centroid;
+}
+const Eigen::Vector2d& itself(const Eigen::Vector2d& place) {
+  return place;
+}
+
+bool holds(const MarkerBlob& blob, const Eigen::Vector2d& place) {
+  return place.x() >= blob.left - 1 && place.x() <= blob.right + 2 && place.y() >= blob.top - 1 &&
+         place.y() <= blob.bottom + 2;
+}
+
+}  // namespace
+
+const char* name_of(MarkerStatus status) {
+  switch (status) {
+    case MarkerStatus::kFound:
+      return "found";
+    case MarkerStatus::kFoundAgain:
+      return "found again";
+    case MarkerStatus::kHidden:
+      return "hidden";
+    case MarkerStatus::kMerged:
+      return "merged";
+    case MarkerStatus::kAtBorder:
+      return "at border";
+    case MarkerStatus::kTooFar:
+      return "too far";
+  }
+  return "?";
+}
+
+int TrackedMarkers::found() const {
+  return static_cast<int>(std::count_if(status.begin(), status.end(), [](MarkerStatus one) { return is_found(one); }));
+}
+
+MarkerTracker::MarkerTracker(const MarkerTrackerSettings& settings) : settings_(settings), finder_(settings.look) {
+  if (!(settings.longest_step >= 0.05 && settings.longest_step <= 0.5)) {
+    fail("marker longest_step is {}, it must be from 0.05 to 0.5 of the spacing", settings.longest_step);
+  }
+  if (!(settings.max_area_change > 1.0) || !std::isfinite(settings.max_area_change)) {
+    fail("marker max_area_change is {}, it must be above 1", settings.max_area_change);
+  }
+  nearest_marker_.reserve(MarkerFinder::kMostBlobs);
+  claimed_.reserve(MarkerFinder::kMostBlobs);
+}
+
+const TrackedMarkers& MarkerTracker::track(const Frame& frame) {
+  const bool first = result_.rest.empty();
+  if (!first && frame.t_us <= result_.t_us) {
+    fail("markers: the frame's time {} us isn't after the last one's, {} us", frame.t_us, result_.t_us);
+  }
+  if (first) finder_ = MarkerFinder(settings_.look);  // of whatever size this frame has
+  const std::vector<MarkerBlob>& blobs = finder_.find(frame.image);
+  if (first) {
+    if (finder_.light() != FrameLight::kNormal) fail("markers: the frame at rest is {}", name_of(finder_.light()));
+    begin(blobs);
+  } else if (finder_.light() != FrameLight::kNormal) {
+    std::fill(result_.status.begin(), result_.status.end(), MarkerStatus::kHidden);
+    std::fill(result_.area_px.begin(), result_.area_px.end(), 0);
+    result_.unclaimed = 0;
+  } else {
+    follow(blobs);
+  }
+  result_.light = finder_.light();
+  result_.t_us = frame.t_us;
+  return result_;
+}
+
+void MarkerTracker::begin(const std::vector<MarkerBlob>& blobs) {
+  // A blob much larger or smaller than most is none of the markers.
+  std::vector<int> areas;
+  for (const MarkerBlob& blob : blobs) {
+    if (!blob.at_border) areas.push_back(blob.area_px);
+  }
+  double usual = 0.0;
+  if (!areas.empty()) {
+    const auto middle = areas.begin() + static_cast<std::ptrdiff_t>(areas.size() / 2);
+    std::nth_element(areas.begin(), middle, areas.end());
+    usual = *middle;
+  }
+  std::vector<Eigen::Vector2d> rest;
+  std::vector<double> usual_area;
+  std::vector<int> area_px;
+  for (const MarkerBlob& blob : blobs) {
+    const bool is_marker =
+        blob.area_px <= settings_.max_area_change * usual && blob.area_px * settings_.max_area_change >= usual;
+    if (blob.at_border || !is_marker) continue;
+    rest.push_back(blob.centroid);
+    usual_area.push_back(blob.area_px);
+    area_px.push_back(blob.area_px);
+  }
+  if (static_cast<int>(rest.size()) < kLeastMarkers) {
+    fail("markers: the frame at rest shows {} of them, at least {} are needed", rest.size(), kLeastMarkers);
+  }
+
+  std::vector<double> distances;
+  for (const Eigen::Vector2d& place : rest) {
+    double least = std::numeric_limits<double>::infinity();
+    for (const Eigen::Vector2d& other : rest) {
+      if (&other != &place) least = std::min(least, (other - place).norm());
+    }
+    distances.push_back(least);
+  }
+  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
+  std::nth_element(distances.begin(), middle, distances.end());
+  spacing_px_ = *middle;
+
+  neighbours_.clear();
+  neighbour_begin_.assign(1, 0);
+  for (std::size_t i = 0; i < rest.size(); ++i) {
+    for (std::size_t j = 0; j < rest.size(); ++j) {
+      if (i != j && (rest[i] - rest[j]).norm() <= kNeighbourReach * spacing_px_) {
+        neighbours_.push_back(static_cast<int>(j));
+      }
+    }
+    neighbour_begin_.push_back(static_cast<int>(neighbours_.size()));
+  }
+  result_ = {};
+  result_.rest = std::move(rest);
+  result_.positions = result_.rest;
+  result_.status.assign(result_.rest.size(), MarkerStatus::kFound);
+  result_.area_px = std::move(area_px);
+  usual_area_ = std::move(usual_area);
+  expected_ = result_.rest;
+  nearest_blob_.assign(result_.rest.size(), -1);
+}
+
+bool MarkerTracker::is_at_rest(const std::vector<MarkerBlob>& blobs) {
+  const double reach = kAtRest * spacing_px_;
+  return std::all_of(result_.rest.begin(), result_.rest.end(), [&](const Eigen::Vector2d& home) {
+    const int blob = nearest(blobs, place_of_blob, home);
+    return blob >= 0 && (blobs[static_cast<std::size_t>(blob)].centroid - home).norm() <= reach;
+  });
+}
+
+Eigen::Vector2d MarkerTracker::carried_by_neighbours(std::size_t marker) const {
+  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+  int found = 0;
+  for (int i = neighbour_begin_[marker]; i < neighbour_begin_[marker + 1]; ++i) {
+    const auto other = static_cast<std::size_t>(neighbours_[static_cast<std::size_t>(i)]);
+    if (!is_found(result_.status[other])) continue;
+    sum += result_.displacement(other);
+    ++found;
+  }
+  if (found == 0) return result_.positions[marker];
+  return result_.rest[marker] + sum / found;
+}
+
+void MarkerTracker::predict() {
+  for (std::size_t i = 0; i < expected_.size(); ++i) {
+    expected_[i] = is_found(result_.status[i]) ? result_.positions[i] : carried_by_neighbours(i);
+  }
+}
+
+void MarkerTracker::follow(const std::vector<MarkerBlob>& blobs) {
+  if (result_.jumped && is_at_rest(blobs)) {
+    expected_ = result_.rest;
+    result_.jumped = false;
+  } else {
+    predict();
+  }
+  const std::size_t markers = result_.rest.size();
+  for (std::size_t i = 0; i < markers; ++i) nearest_blob_[i] = nearest(blobs, place_of_blob, expected_[i]);
+  nearest_marker_.resize(blobs.size());
+  claimed_.assign(blobs.size(), 0);
+  for (std::size_t b = 0; b < blobs.size(); ++b) nearest_marker_[b] = nearest(expected_, itself, blobs[b].centroid);
+
+  const double longest = settings_.longest_step * spacing_px_;
+  for (std::size_t i = 0; i < markers; ++i) {
+    const bool was_found = is_found(result_.status[i]);
+    MarkerStatus& status = result_.status[i];
+    result_.area_px[i] = 0;
+    status = MarkerStatus::kHidden;
+    const int index = nearest_blob_[i];
+    if (index < 0) continue;  // the picture has no blob at all
+    const MarkerBlob& blob = blobs[static_cast<std::size_t>(index)];
+    const bool mutual = nearest_marker_[static_cast<std::size_t>(index)] == static_cast<int>(i);
+    const bool is_large = blob.area_px > settings_.max_area_change * usual_area_[i];
+    if (is_large && (mutual || holds(blob, expected_[i]))) {
+      status = MarkerStatus::kMerged;
+    } else if (mutual && (blob.centroid - expected_[i]).norm() <= longest) {
+      claimed_[static_cast<std::size_t>(index)] = 1;
+      if (blob.at_border) {
+        status = MarkerStatus::kAtBorder;
+      } else if (blob.area_px * settings_.max_area_change >= usual_area_[i]) {
+        status = was_found ? MarkerStatus::kFound : MarkerStatus::kFoundAgain;
+        result_.positions[i] = blob.centroid;
+        result_.area_px[i] = blob.area_px;
+        usual_area_[i] += kAreaLearning * (blob.area_px - usual_area_[i]);
+      }
+    }
+  }
+
+  // Blobs as large as a marker that nobody claims: come into view, or gone too far from where they were.
+  result_.unclaimed = 0;
+  for (std::size_t b = 0; b < blobs.size(); ++b) {
+    if (claimed_[b] != 0 || blobs[b].at_border) continue;
+    const auto marker = static_cast<std::size_t>(nearest_marker_[b]);
+    const bool is_whole = blobs[b].area_px <= settings_.max_area_change * usual_area_[marker] &&
+                          blobs[b].area_px * settings_.max_area_change >= usual_area_[marker];
+    if (!is_whole) continue;
+    ++result_.unclaimed;
+    if (result_.status[marker] == MarkerStatus::kHidden &&
+        (blobs[b].centroid - expected_[marker]).norm() <= spacing_px_) {
+      result_.status[marker] = MarkerStatus::kTooFar;
+      result_.jumped = true;
+    }
+  }
+  for (std::size_t i = 0; i < markers; ++i) {
+    if (!is_found(result_.status[i])) result_.positions[i] = carried_by_neighbours(i);
+  }
+}
+
+}  // namespace touchstone::sensors

@@ -1,0 +1,37 @@
+#pragma once
+// The multi-scale local binary pattern of the fingertip GelSight's text, sec. 5.2.2: histograms of uniform patterns on
+// the levels of a Gaussian pyramid.
+
+#include <Eigen/Core>
+#include <opencv2/core/mat.hpp>
+
+#include "sensors/texture/local_binary_pattern.h"
+
+namespace touchstone::sensors {
+
+struct TextureOperator {
+  LbpCircle circle;
+  int levels = 4;  ///< n, of the pyramid, 1 to 8
+
+  bool operator==(const TextureOperator&) const = default;
+};
+
+/// @throws Error for a circle or a number of levels out of range
+void check(const TextureOperator& op);
+
+/// Numbers in a feature: n (P + 2).
+int feature_size(const TextureOperator& op);
+
+/// The smallest side, px, of an image whose every level has a label.
+int least_side(const TextureOperator& op);
+
+/// Eq. 10: the histograms of levels i = 0 to n - 1, each times 2^i, one after another; then divided by their sum and
+/// the square root taken of each (sec. 5.2.3), so that a feature has Euclidean length 1.
+/// @param gray CV_8UC1, from least_side() a side @throws Error for another kind or a smaller one
+Eigen::VectorXf texture_feature(const cv::Mat& gray, const TextureOperator& op);
+
+/// sqrt(1 - BC) with the Bhattacharyya coefficient BC of the two histograms (eqs. 12, 14), from 0 to 1: the Euclidean
+/// distance of their features over sqrt(2) (eq. 13). @pre sizes are equal
+double hellinger_distance(const Eigen::VectorXf& a, const Eigen::VectorXf& b);
+
+}  // namespace touchstone::sensors

@@ -1,0 +1,389 @@
+#include "sim/plan/plan.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/units.h"
+#include "fem/fine_relief/smooth_surface.h"
+#include "fem/vibration/vibration.h"
+#include "sim/plan/plan_direct.h"
+#include "sim/plan/plan_table.h"
+#include "sim/plan/plan_time.h"
+#include "sim/plan/scene_bands.h"
+#include "sim/scene/device_gel.h"
+
+namespace touchstone::sim {
+namespace {
+
+constexpr double kEdgesADetail = 4.0;     // a wave needs so many for its shape
+constexpr double kPixelsAnEdge = 10.0;    // for objects without detail: 0.3 um and a degree off under a ball of 4 mm
+constexpr double kAllowedInertia = 0.04;  // of a vibration's force: a fifth of the lowest eigenfrequency
+
+/// Fresnel reflectance of unpolarised light that meets a face from index n1 at sine `sine` towards index n2.
+double fresnel(double n1, double n2, double sine) {
+  const double sine2 = n1 / n2 * sine;
+  if (sine2 >= 1.0) return 1.0;
+  const double c1 = std::sqrt(1.0 - sine * sine);
+  const double c2 = std::sqrt(1.0 - sine2 * sine2);
+  const double s = (n1 * c1 - n2 * c2) / (n1 * c1 + n2 * c2);
+  const double p = (n1 * c2 - n2 * c1) / (n1 * c2 + n2 * c1);
+  return (s * s + p * p) / 2;
+}
+
+/// Part of a disc of radius `radius` that its copy moved sideways by `shift` covers.
+double disc_overlap(double radius, double shift) {
+  const double x = shift / (2.0 * radius);
+  if (x >= 1.0) return 0.0;
+  return 2.0 / kPi * (std::acos(x) - x * std::sqrt(1.0 - x * x));
+}
+
+/// Radius of the largest disc of the object that the gel can be wetted by.
+double bright_radius(const ObjectSpec& object) {
+  switch (object.shape.type) {
+    case ShapeKind::sphere:
+    case ShapeKind::rounded_cylinder:
+      return object.shape.radius_mm;
+    case ShapeKind::box:
+      return object.shape.size_mm.head<2>().norm() / 2;
+    case ShapeKind::mesh:
+    case ShapeKind::egg:
+    case ShapeKind::shell:
+    case ShapeKind::hexagon:
+      break;
+  }
+  double radius = 0.0;
+  for (const Eigen::Vector3d& vertex : visible_mesh(object.shape).vertices) {
+    radius = std::max(radius, vertex.head<2>().norm());
+  }
+  return radius;
+}
+
+void plan_elastic_objects(const SceneSpec& scene, Plan& plan, PlanTable& table) {
+  const ElasticSpec* softest = nullptr;
+  for (const MovedObject& moved : moved_objects(scene)) {
+    const auto& elastic = moved.object.elastic;
+    if (elastic && (softest == nullptr || elastic->youngs_modulus_MPa < softest->youngs_modulus_MPa)) {
+      softest = &*elastic;
+    }
+  }
+  if (softest == nullptr && scene.effects.elastic_object == Switch::on) {
+    fail_at(scene.where, "effects.elastic_object: on, but no object has the field `elastic` with its modulus");
+  }
+  plan.elastic_object =
+      table.add("elastic object", scene.effects.elastic_object, softest != nullptr,
+                softest == nullptr ? "no object has a finite Young's modulus: all are rigid"
+                                   : fmt::format("an object's Young's modulus is {:.3g} MPa, the gel's {:.3g} MPa",
+                                                 softest->youngs_modulus_MPa, scene.device.gel.youngs_modulus_MPa),
+                "set-up once an object (seconds, kept in the cache), then some tens of milliseconds a frame");
+}
+
+void plan_mechanics(const SceneSpec& scene, Plan& plan, PlanTable& table) {
+  table.add("gel mechanics", true, "truth is always asked for",
+            "set-up once a gel (seconds, kept in the cache), then about a millisecond a frame");
+  plan.finite_strain = table.add(
+      "finite strain", scene.effects.elasticity == Elasticity::neo_hookean,
+      scene.effects.elasticity == Elasticity::neo_hookean
+          ? "the scene asks for neo-Hookean elasticity"
+          : "linear elasticity is the default; where truth's largest strain is above some 0.2, effects.elasticity: "
+            "neo_hookean is worth its time (`touchstone plan --linear-range` tells)",
+      "some five factorisations of the whole gel for every tenth of its thickness: seconds to minutes a frame");
+  const std::vector<MovedObject> objects = moved_objects(scene);
+  // Of the object whose friction is called for, or else of the first.
+  const auto rubs = [](const MovedObject& moved) {
+    return moved.motion.is_tangential() && moved.object.friction > 0.0;
+  };
+  const auto rubbing = std::find_if(objects.begin(), objects.end(), rubs);
+  const MovedObject& judged = rubbing == objects.end() ? objects.front() : *rubbing;
+  const double mu = judged.object.friction;
+  const bool tangential = judged.motion.is_tangential();
+  const std::string why = mu == 0.0    ? "the object's friction is 0"
+                          : tangential ? fmt::format("the motion has a tangential part and friction is {}", mu)
+                                       : "the motion is a straight press: no tangential part, no tilt";
+  plan.friction =
+      table.add("friction", scene.effects.friction, rubbing != objects.end(), why, "a few milliseconds a frame");
+
+  plan_elastic_objects(scene, plan, table);
+
+  if (plan.finite_strain) {
+    const char* what = objects.size() > 1 ? "several objects" : plan.elastic_object ? "an elastic object" : nullptr;
+    if (what != nullptr) fail_at(scene.where, "effects.elasticity: neo_hookean can't be had with {} yet", what);
+    if (objects.front().motion.is_turned()) {
+      fail_at(scene.where, "effects.elasticity: neo_hookean can't be had with motions led by torques yet");
+    }
+  }
+
+  const fem::PronySeries series = prony_series(scene.device.gel);
+  const double seconds = (scene.motion.frame_count() - 1) / scene.motion.frame_rate_Hz;
+  const bool relaxes = fem::lasting_share(series) < 1.0;
+  plan.relaxation = table.add(
+      "stress relaxation", scene.effects.relaxation, relaxes,
+      relaxes
+          ? fmt::format("the gel's modulus falls by {:.1f} % within the motion's {:.3g} s and by {:.1f} % in the end",
+                        100 * (1.0 - fem::relaxation_at(series, seconds)), seconds,
+                        100 * (1.0 - fem::lasting_share(series)))
+          : "the gel has no Prony series: it is elastic",
+      "some vectors of the surface's size a frame");
+
+  double frequency = 0.0;
+  bool turned = false;
+  for (const MovedObject& moved : objects) {
+    frequency = std::max(frequency, moved.motion.highest_vibration_Hz());
+    turned = turned || moved.motion.is_turned();
+  }
+  const double missing = inertia_estimate(scene.device.gel, frequency);
+  const bool fast = missing > kAllowedInertia;
+  const bool inertia = scene.effects.inertia == Switch::automatic ? fast : scene.effects.inertia == Switch::on;
+  if (inertia && objects.size() > 1) {
+    fail_at(scene.where, "inertia isn't simulated with several objects; effects.inertia: off leaves it out");
+  }
+  if (inertia && turned) {
+    fail_at(scene.where,
+            "inertia isn't simulated for an object that is led by torques; effects.inertia: off leaves it out");
+  }
+  if (inertia && plan.elastic_object) {
+    fail_at(scene.where, "inertia isn't simulated with an elastic object; switch one of them off in effects");
+  }
+  plan.inertia = table.add(
+      "gel dynamics (inertia)", scene.effects.inertia, fast,
+      frequency == 0.0 ? "the motion doesn't vibrate"
+                       : fmt::format("the motion vibrates at {:.4g} Hz, a layer like the gel has its lowest "
+                                     "eigenfrequency at {:.4g} Hz: leaving inertia out errs by up to some {:.2g} % of "
+                                     "the vibration's force; allowed is {:.2g} %",
+                                     frequency, frequency / std::sqrt(missing), 100 * missing, 100 * kAllowedInertia),
+      "the gel's modes once (half a minute, kept in the cache), then milliseconds a frame");
+  if (plan.finite_strain && plan.inertia) {
+    fail_at(scene.where, "effects.elasticity: neo_hookean goes without inertia; switch one of them off");
+  }
+  if (plan.finite_strain && scene.device.mesh.force_error) {
+    fail_at(scene.where, "effects.elasticity: neo_hookean needs a mesh that is given by fine_mm");
+  }
+}
+
+/// Finest detail of the object, mm: of its relief, or the middle one of its mesh's edges.
+std::optional<double> finest_detail(const ObjectSpec& object) {
+  if (object.relief) return finest_detail(*object.relief);
+  if (object.shape.type != ShapeKind::mesh) return std::nullopt;
+  const TriangleMesh mesh = visible_mesh(object.shape);
+  std::vector<double> edges;
+  for (const auto& t : mesh.triangles) {
+    for (int k = 0; k < 3; ++k) edges.push_back((mesh.vertices[t[k]] - mesh.vertices[t[(k + 1) % 3]]).norm());
+  }
+  const auto middle = edges.begin() + static_cast<std::ptrdiff_t>(edges.size() / 2);
+  std::nth_element(edges.begin(), middle, edges.end());
+  return *middle;
+}
+
+/// @pre the gel isn't gentle
+std::string shape_in_words(const GelSpec& gel) {
+  if (gel.shape != GelShape::dome) return "this gel is neither";
+  return fmt::format("this dome slopes by {:.3g} degrees at its rim",
+                     std::asin(gel.base_radius_mm / gel.sphere_radius_mm) / kRadiansPerDegree);
+}
+
+void plan_relief(const SceneSpec& scene, Plan& plan, PlanTable& table) {
+  const bool seen = scene.outputs.camera() || scene.outputs.height;
+  const double edge = scene.device.mesh.fine_mm;
+  std::optional<double> detail;
+  for (const MovedObject& moved : moved_objects(scene)) {
+    const std::optional<double> one = finest_detail(moved.object);
+    if (one) detail = detail ? std::min(*detail, *one) : one;
+  }
+  const bool fine = detail && *detail < kEdgesADetail * edge;
+  // A coating shows each slope. On the gel's mesh a ball's contact ends on whole edges and what is free is averaged
+  // over them: of edges of 0.5 mm under a ball of 4 mm the surface comes out 15 um and its slope 2 to 4 degrees off.
+  const bool shows_slopes = scene.device.coating && scene.outputs.camera() && is_gentle(scene.device.gel) &&
+                            scene.more_objects.empty() && !plan.elastic_object && !plan.finite_strain;
+  const std::string why =
+      shows_slopes && !fine ? "a coating shows the surface's slope, which the gel's mesh has to some degrees only"
+      : !detail             ? "the object's shape is smooth: the gel's mesh has all of it"
+      : !fine
+          ? fmt::format("the object's finest detail of {:.3g} mm has {:.0f} or more of the gel's edges of {:.3g} mm",
+                        *detail, kEdgesADetail, edge)
+      : !seen ? "neither a picture nor a height map is asked for"
+              : fmt::format("the object has detail of {:.3g} mm, the gel's edges have {:.3g} mm", *detail, edge);
+  plan.fine_relief = table.add("fine relief", scene.effects.fine_relief, (fine && seen) || shows_slopes, why,
+                               fine ? "0.1 to 1 second a frame" : "10 to 50 milliseconds a frame");
+  if (plan.fine_relief && !scene.more_objects.empty()) {
+    fail_at(scene.where, "fine relief isn't simulated with several objects; effects.fine_relief: off leaves it out");
+  }
+  if (plan.fine_relief && plan.elastic_object) {
+    fail_at(scene.where, "fine relief isn't simulated with an elastic object; switch one of them off in effects");
+  }
+  if ((plan.fine_relief || scene.outputs.height) && !is_gentle(scene.device.gel)) {
+    fail_at(scene.where, "{} is for flat and gently domed gels only (up to {:.3g} degrees of slope); {}{}",
+            plan.fine_relief ? "fine relief" : "outputs.height", fem::kSteepestDome / kRadiansPerDegree,
+            shape_in_words(scene.device.gel), plan.fine_relief ? "; effects.fine_relief: off leaves it out" : "");
+  }
+  const double pixel = scene.membrane.pixel_um / kMicrometresPerMillimetre;
+  const bool asked = fine || scene.effects.fine_relief == Switch::on;
+  plan.relief_pixel_mm = asked ? pixel : std::max(pixel, edge / kPixelsAnEdge);
+  // A picture may be smoother than its pixels; waves and hairs are as fine as they say.
+  const bool known = scene.object.relief && is_sharp(*scene.object.relief);
+  if (plan.fine_relief && known && *detail < 2.0 * pixel) {
+    fail_at(scene.membrane.where,
+            "membrane.pixel_um: {} is too wide for the object's relief of {:.3g} mm; at most {:.3g}",
+            scene.membrane.pixel_um, *detail, 0.5 * *detail * kMicrometresPerMillimetre);
+  }
+}
+
+void plan_interreflection(const SceneSpec& scene, Plan& plan, PlanTable& table) {
+  const DeviceSpec& device = scene.device;
+  const GelSpec& gel = device.gel;
+  plan.scattering = table.add("scattering", gel.scattering_per_mm.largest() > 0.0,
+                              gel.scattering_per_mm.largest() > 0.0
+                                  ? fmt::format("the gel scatters {:.3g} times a mm", gel.scattering_per_mm.largest())
+                                  : "the gel is clear",
+                              "every scattering is a ray, and every frame is traced whole");
+  double albedo = 0.0;
+  double gain = 0.0;
+  const auto judge = [&](double own, double radius) {
+    const double own_gain = interreflection_estimate(gel, device.plate, own, radius);
+    if (own_gain > gain) {
+      albedo = own;
+      gain = own_gain;
+    }
+  };
+  if (device.coating) {
+    judge(device.coating->albedo.largest(), 0.5 * std::hypot(gel.size_x_mm, gel.size_y_mm));
+  } else {
+    for (const MovedObject& moved : moved_objects(scene)) {
+      double brightest = moved.object.albedo.largest();
+      for (const Colour& ink : inks_of(moved.object.print)) brightest = std::max(brightest, ink.largest());
+      judge(moved.object.radiance ? 0.0 : brightest, bright_radius(moved.object));
+    }
+  }
+  const std::string why = fmt::format(
+      "{} of albedo {:.2g} gives itself {:.1f} % of its light back through the plate; allowed to leave out is {:.1f} %",
+      device.coating ? "a coating" : "an object", albedo, 100 * gain, 100 * scene.light.interreflection_tolerance);
+  plan.interreflection = table.add(
+      "interreflection", scene.effects.interreflection, plan.scattering || gain > scene.light.interreflection_tolerance,
+      plan.scattering ? "light is scattered many times in a milky gel" : why, "3 to 5 times the rays");
+}
+
+void plan_print(const SceneSpec& scene, Plan& plan, PlanTable& table) {
+  bool printed = false;
+  bool skin = false;
+  for (const MovedObject& moved : moved_objects(scene)) {
+    printed = printed || !moved.object.print.empty();
+    skin = skin || depends_on_pressure(moved.object.print);
+  }
+  const bool coated = scene.device.coating.has_value();
+  const bool seen = printed && !coated && (scene.outputs.light() || scene.outputs.events);
+  const char* hidden = coated ? "the gel's coating hides the objects" : "no picture is asked for";
+  plan.object_print = table.add("print on objects", seen,
+                                !printed ? "nothing is printed on an object"
+                                : seen   ? "an object is printed on and the gel is clear"
+                                         : hidden,
+                                "a look-up a hit; pictures are turned into bands once a frame");
+  plan.skin_blanching = table.add("skin under pressure", seen && skin,
+                                  !skin  ? "no object has a skin's marks"
+                                  : seen ? "blood is pressed out of a skin's vessels, which its colour shows"
+                                         : hidden,
+                                  "some milliseconds a frame");
+  if (plan.skin_blanching && plan.fine_relief) {
+    fail_at(scene.where,
+            "a skin's marks can't be had with fine relief, which has no map of pressure for them; "
+            "effects.fine_relief: off leaves that out");
+  }
+}
+
+void plan_bands(const SceneSpec& scene, Plan& plan, PlanTable& table) {
+  plan.bands = choose_bands(scene);
+  check_light(scene, plan.bands);
+  const int count = plan.bands.count();
+  const std::string why =
+      plan.bands.ranges
+          ? fmt::format(
+                "between {:.4g} and {:.4g} nm they get what a pixel reads wrong by up to {:.2g} % (wanted {:.2g} %)",
+                scene.device.bands->from_nm, scene.device.bands->to_nm, 100 * band_error(scene, plan.bands),
+                100 * scene.device.bands->tolerance)
+          : fmt::format("the device gives its colours as numbers for {}",
+                        count == 1 ? "one band" : fmt::format("{} bands", count));
+  table.add("spectral bands", true, why, fmt::format("{} band{} a path", count, count == 1 ? "" : "s"));
+}
+
+void plan_light(const SceneSpec& scene, Plan& plan, PlanTable& table) {
+  const bool images = scene.outputs.camera();
+  plan.camera = table.add(
+      "camera and renderer", images,
+      images ? "an image or a stream of events is asked for" : "no image is asked for: truth alone needs none",
+      "most of the time of a frame");
+  if (!images) return;
+  if (!scene.device.camera) {
+    fail_at(scene.where, "outputs: an image is asked for, but the device '{}' ({}) has no camera", scene.device.name,
+            scene.device.where.file);
+  }
+  const bool hits = scene.outputs.first_hits();
+  table.add(
+      "truth of pixels", hits,
+      hits ? "depth, normals, ids, contact or flow is asked for" : "none of depth, normals, ids, contact, flow is",
+      "one ray a pixel: some 0.1 s a frame of 640x480");
+  const GelSpec& gel = scene.device.gel;
+  const bool clear_and_curved = gel.shape != GelShape::slab && !scene.device.coating;
+  if (gel.shape == GelShape::mesh || clear_and_curved) {
+    fail_at(scene.where,
+            "outputs: an image is asked for, but the gel of the device '{}' ({}) is {}; pictures can be had of slabs, "
+            "and of domes and fingertips with a coating; truth alone with frames, ideal and radiance all false",
+            scene.device.name, scene.device.where.file,
+            gel.shape == GelShape::mesh ? "a mesh" : "curved and has no coating");
+  }
+  const PlateSpec& plate = scene.device.plate;
+  const bool refracts = gel.refractive_index != 1.0 || plate.refractive_index != 1.0;
+  plan.refraction = table.add("refraction", refracts,
+                              refracts ? fmt::format("plate of index {} and gel of index {} stand before the camera",
+                                                     plate.refractive_index, gel.refractive_index)
+                                       : "no index differs from 1",
+                              "closed form at the flat faces: under a tenth of the rays' time");
+
+  plan_print(scene, plan, table);
+  plan_interreflection(scene, plan, table);
+  plan_bands(scene, plan, table);
+  const bool noise = scene.outputs.frames;
+  plan.sensor_noise =
+      table.add("sensor noise", scene.effects.sensor_noise, noise,
+                noise ? "frames are asked for as the camera delivers them" : "only ideal pictures are asked for",
+                "a few milliseconds a frame");
+}
+
+}  // namespace
+
+double interreflection_estimate(const GelSpec& gel, const PlateSpec& plate, double albedo, double disc_radius_mm) {
+  // A Lambertian disc sends 2 sin cos d(theta) of its light at theta; that part is reflected at the plate's lower face
+  // (and little at the face between gel and plate, left out) and comes down moved sideways.
+  constexpr int kSteps = 2000;
+  double once = 0.0;
+  for (int i = 0; i < kSteps; ++i) {
+    const double sine = (i + 0.5) / kSteps;
+    const double invariant = gel.refractive_index * sine;
+    if (invariant >= plate.refractive_index) continue;
+    const double plate_sine = invariant / plate.refractive_index;
+    const double shift = 2.0 * (gel.thickness_mm * sine / std::sqrt(1.0 - sine * sine) +
+                                plate.thickness_mm * plate_sine / std::sqrt(1.0 - plate_sine * plate_sine));
+    once +=
+        2.0 * sine / kSteps * fresnel(plate.refractive_index, 1.0, plate_sine) * disc_overlap(disc_radius_mm, shift);
+  }
+  const double gain = albedo * once;
+  return gain / (1.0 - gain);
+}
+
+double inertia_estimate(const GelSpec& gel, double frequency_Hz) {
+  const double lowest = fem::layer_shear_frequency({gel.youngs_modulus_MPa, gel.poisson_ratio},
+                                                   gel.density_kg_m3 * kTonnePerMm3, gel.thickness_mm);
+  return std::pow(frequency_Hz / lowest, 2);
+}
+
+Plan make_plan(const SceneSpec& scene) {
+  Plan plan;
+  PlanTable table(plan);
+  plan_mechanics(scene, plan, table);
+  plan_relief(scene, plan, table);
+  plan_light(scene, plan, table);
+  if (plan.camera) {
+    plan_time(scene, plan, table);
+    plan_direct_light(scene, plan, table);
+    plan_shared_paths(scene, plan, table);
+  }
+  return plan;
+}
+
+}  // namespace touchstone::sim

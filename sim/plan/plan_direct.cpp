@@ -1,0 +1,75 @@
+#include "sim/plan/plan_direct.h"
+
+#include "sim/scene/device_camera.h"
+
+namespace touchstone::sim {
+namespace {
+
+// Behind a narrower hole a pixel's mean would have less than some thirty paths.
+constexpr double kWidePoint_px = 6.0;
+
+}  // namespace
+
+std::string unfit_for_direct_light(const SceneSpec& scene, const Plan& plan) {
+  const DeviceSpec& device = scene.device;
+  if (!device.coating) return "the gel has no coating: its outer face refracts";
+  if (plan.scattering) return "the gel scatters light";
+  if (device.lamps.empty()) return "the device has no lamps";
+  for (const LampSpec& lamp : device.lamps) {
+    if (lamp.visible) return "a lamp has a body that is seen";
+  }
+  if (plan.events) return "event pixels' light is path-traced, and frames beside them are to match it";
+  if (scene.outputs.error) return "the standard error of path tracing is asked for";
+  return {};
+}
+
+void plan_direct_light(const SceneSpec& scene, Plan& plan, PlanTable& table) {
+  const std::string name = "direct light";
+  const Switch forced = scene.effects.direct_light;
+  if (!scene.outputs.light()) {
+    table.add(name, false, "no picture is asked for", "");
+    return;
+  }
+  const std::string unfit = unfit_for_direct_light(scene, plan);
+  if (forced == Switch::on && !unfit.empty()) fail_at(scene.where, "effects.direct_light: on, but {}", unfit);
+  const std::string why =
+      !unfit.empty()
+          ? unfit
+          : fmt::format(
+                "an opaque coating, {}; {:.3g} % off path tracing is allowed, which is measured on "
+                "the deepest press before the first picture",
+                plan.interreflection ? "with the bounced light of the gel at rest" : "without interreflection",
+                100 * scene.light.direct_tolerance);
+  plan.direct_light = table.add(name, forced, unfit.empty(), why,
+                                "in place of path tracing: some milliseconds a frame; once a scene a light field, its "
+                                "bounced light and the measurement");
+}
+
+void plan_shared_paths(const SceneSpec& scene, Plan& plan, PlanTable& table) {
+  const std::string name = "shared paths";
+  const Switch forced = scene.effects.shared_paths;
+  if (!scene.outputs.light()) {
+    table.add(name, false, "no picture is asked for", "");
+    return;
+  }
+  const double width_px = 2.0 * least_blur_radius_px(camera_of(*scene.device.camera));
+  const bool wide = width_px >= kWidePoint_px;
+  std::string unfit;
+  if (plan.scattering) unfit = "the gel scatters light, which has no one depth";
+  if (!wide) {
+    unfit =
+        fmt::format("the camera's hole makes points {:.2g} pixels wide; below {:.2g} each pixel needs its own paths",
+                    width_px, kWidePoint_px);
+  }
+  if (scene.device.camera->type == CameraType::lens) unfit = "through a lens the blur depends on the depth";
+  if (forced == Switch::on && !unfit.empty()) fail_at(scene.where, "effects.shared_paths: on, but {}", unfit);
+  plan.shared_paths = table.add(
+      name, forced, unfit.empty() && !plan.direct_light,
+      plan.direct_light ? "direct light has no paths"
+      : !unfit.empty()
+          ? unfit
+          : fmt::format("the hole makes points at least {:.2g} pixels wide: neighbours see the same places", width_px),
+      "one path a pixel or fewer, in place of some for each pixel that changes");
+}
+
+}  // namespace touchstone::sim

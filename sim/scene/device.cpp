@@ -1,0 +1,396 @@
+#include "sim/scene/device.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+
+#include "core/pixel_grab.h"
+#include "core/units.h"
+#include "fem/mesh/gel_body.h"
+#include "sim/files/gltf_mesh.h"
+#include "sim/scene/camera_preset.h"
+#include "sim/scene/device_camera.h"
+#include "sim/scene/device_gel.h"
+#include "sim/scene/scattered_print.h"
+
+namespace touchstone::render {
+
+EnumNames<BayerPattern> enum_names(BayerPattern) {
+  return {{"none", BayerPattern::none}, {"rggb", BayerPattern::rggb}, {"bggr", BayerPattern::bggr},
+          {"grbg", BayerPattern::grbg}, {"gbrg", BayerPattern::gbrg}, {"binned", BayerPattern::binned}};
+}
+
+EnumNames<MarkShape> enum_names(MarkShape) {
+  return {{"round", MarkShape::round}, {"square", MarkShape::square}};
+}
+
+}  // namespace touchstone::render
+
+namespace touchstone::sim {
+namespace {
+
+Allowed part_of_one() {
+  return Allowed::within(0.0, 1.0);
+}
+
+void check_beads_fit(const DeviceSpec& device, const SourceLocation& where) {
+  const BeadSpec& beads = *device.beads;
+  const GelSpec& gel = device.gel;
+  const double radius = beads.diameter_mm / 2;
+  if (beads.depth_mm < radius || beads.depth_mm > gel.thickness_mm - radius) {
+    fail_at(where, "beads.depth_mm: {} puts beads of diameter {} mm out of a gel of {} mm; allowed is from {} to {}",
+            beads.depth_mm, beads.diameter_mm, gel.thickness_mm, radius, gel.thickness_mm - radius);
+  }
+  if (gel.shape != GelShape::slab) return;  // set-up says where a bead isn't wholly inside the gel
+  const double half_grid = (beads.grid - 1) * beads.spacing_mm / 2 + radius;
+  if (half_grid > std::min(gel.size_x_mm, gel.size_y_mm) / 2) {
+    fail_at(where, "beads: a grid of {0} x {0} at {1} mm doesn't fit in a gel of {2} x {3} mm", beads.grid,
+            beads.spacing_mm, gel.size_x_mm, gel.size_y_mm);
+  }
+  if (beads.grid > 1 && beads.spacing_mm <= beads.diameter_mm) {
+    fail_at(where, "beads.spacing_mm: {} lets beads of diameter {} mm overlap; it must be above that", beads.spacing_mm,
+            beads.diameter_mm);
+  }
+}
+
+/// The gel can be meshed as it is asked for.
+void check_gel(DeviceSpec& device, const SourceLocation& where) {
+  try {
+    const fem::GelBody body = gel_body(device);
+    fem::check(body);
+    device.gel.thickness_mm = fem::thickness_of(body);
+  } catch (const Error& error) {
+    fail_at(where, "gel: {}", error.what());
+  }
+}
+
+void check_camera_outside(const DeviceSpec& device, const SourceLocation& where) {
+  const double plate_face = -device.gel.thickness_mm - device.plate.thickness_mm;
+  const char* key = device.camera->type == CameraType::lens ? "lens_position_mm" : "hole_position_mm";
+  if (device.camera->hole_position_mm.z() >= plate_face) {
+    fail_at(where, "camera.{}: z = {} is not in front of the plate, whose lower face is at z = {}", key,
+            device.camera->hole_position_mm.z(), plate_face);
+  }
+}
+
+/// No lamp is in the gel; those with a lens are before the plate, the others may be in it.
+void check_lamps_outside(const DeviceSpec& device, const SourceLocation& where) {
+  const double gel_face = -device.gel.thickness_mm;
+  const double plate_face = gel_face - device.plate.thickness_mm;
+  for (const LampSpec& lamp : device.lamps) {
+    const bool has_lens = lamp.type == LampType::spot || lamp.type == LampType::projector;
+    const double z = std::max(lamp.position_mm.z(), lamp.type == LampType::led_strip ? lamp.to_mm.z() : -INFINITY);
+    if (has_lens && z >= plate_face) {
+      fail_at(where, "lamps: a lamp at z = {} is not in front of the plate, whose lower face is at z = {}", z,
+              plate_face);
+    }
+    if (z >= gel_face) fail_at(where, "lamps: a lamp at z = {} is in the gel, which begins at z = {}", z, gel_face);
+  }
+}
+
+/// The fields of a lens.
+void lens_fields(YamlReader& in, CameraSpec& camera) {
+  const Allowed length = Allowed::above(0.0);
+  in.exactly_one_of({"focal_length_mm", "camera_matrix"});
+  in.optional("focal_length_mm", camera.focal_length_mm, length);
+  in.optional("camera_matrix", camera.camera_matrix);
+  in.required("f_number", camera.f_number, Allowed::within(0.5, 1000.0));
+  in.optional("focus_distance_mm", camera.focus_distance_mm, length);
+  in.not_beside("sensor_distance_mm", {"camera_matrix", "focus_distance_mm"});  // either of them tells it
+  in.optional("sensor_distance_mm", camera.sensor_distance_mm, length);
+  in.optional("distortion", camera.distortion);
+  in.required("lens_position_mm", camera.hole_position_mm);
+  const std::size_t numbers = camera.distortion.size();
+  if (in.has("distortion") && numbers != 4 && numbers != 5 && numbers != 8) {
+    fail_at(in.where("distortion"), "distortion: {} numbers; allowed are 4, 5 or 8: k1 k2 p1 p2 [k3 [k4 k5 k6]]",
+            numbers);
+  }
+}
+
+}  // namespace
+
+EnumNames<CoatingType> enum_names(CoatingType) {
+  return {{"matt", CoatingType::matt}, {"metal", CoatingType::metal}};
+}
+
+EnumNames<PrintPattern> enum_names(PrintPattern) {
+  return {{"grid", PrintPattern::grid}, {"scattered", PrintPattern::scattered}};
+}
+
+EnumNames<CameraType> enum_names(CameraType) {
+  return {{"pinhole", CameraType::pinhole}, {"lens", CameraType::lens}};
+}
+
+EnumNames<GelShape> enum_names(GelShape) {
+  return {
+      {"slab", GelShape::slab}, {"dome", GelShape::dome}, {"fingertip", GelShape::fingertip}, {"mesh", GelShape::mesh}};
+}
+
+void fields(YamlReader& in, GelLayerSpec& layer) {
+  in.optional("name", layer.name);
+  in.required("thickness_mm", layer.thickness_mm, Allowed::above_up_to(0.0, 1000.0));
+  in.required("youngs_modulus_MPa", layer.youngs_modulus_MPa, Allowed::above_up_to(0.0, 1e6));
+  in.optional("poisson_ratio", layer.poisson_ratio, Allowed::within(0.0, 0.5));
+}
+
+void fields(YamlReader& in, RelaxationTermSpec& term) {
+  in.required("share", term.share, Allowed::within(0.0, 1.0));
+  in.required("time_s", term.time_s, Allowed::above(0.0));
+}
+
+void fields(YamlReader& in, GelSpec& gel) {
+  const Allowed length = Allowed::above_up_to(0.0, 1000.0);
+  const Allowed length_or_none = Allowed::within(0.0, 1000.0);
+  in.optional("shape", gel.shape);
+  switch (gel.shape) {
+    case GelShape::slab:
+      in.required("size_x_mm", gel.size_x_mm, length);
+      in.required("size_y_mm", gel.size_y_mm, length);
+      in.required("thickness_mm", gel.thickness_mm, length);
+      break;
+    case GelShape::dome:
+      in.required("sphere_radius_mm", gel.sphere_radius_mm, Allowed::above_up_to(0.0, 1e5));
+      in.required("base_radius_mm", gel.base_radius_mm, length);
+      in.optional("thickness_mm", gel.thickness_mm, length);
+      break;
+    case GelShape::fingertip:
+      in.required("radius_mm", gel.radius_mm, length);
+      in.required("length_mm", gel.length_mm, length_or_none);
+      in.required("sleeve_mm", gel.sleeve_mm, length_or_none);
+      break;
+    case GelShape::mesh: {
+      std::string file;
+      in.required("file", file);
+      gel.file = in.folder() / file;
+      in.optional("mm_per_unit", gel.mm_per_unit, Allowed::above(0.0));
+      if (in.describing()) break;
+      try {
+        gel.surface = std::make_shared<const GelSurface>(read_gltf_gel(gel.file, gel.mm_per_unit));
+      } catch (const Error& error) {
+        fail_at(in.where("file"), "gel.file: {}", error.what());
+      }
+      break;
+    }
+  }
+  if (gel.shape != GelShape::mesh) in.optional("layers", gel.layers);
+  in.required("youngs_modulus_MPa", gel.youngs_modulus_MPa, Allowed::above_up_to(0.0, 1e6));
+  in.optional("poisson_ratio", gel.poisson_ratio, Allowed::within(0.0, 0.5));
+  in.optional("density_kg_m3", gel.density_kg_m3, Allowed::above_up_to(0.0, 1e5));
+  in.optional("relaxation", gel.relaxation);
+  in.optional("refractive_index", gel.refractive_index, Allowed::within(1.0, 4.0));
+  in.optional("absorption_per_mm", gel.absorption_per_mm, Allowed::at_least(0.0));
+  in.optional("scattering_per_mm", gel.scattering_per_mm, Allowed::within(0.0, 1000.0));
+  in.optional("scattering_anisotropy", gel.scattering_anisotropy, Allowed::within(-0.999, 0.999));
+  in.optional("frame_albedo", gel.frame_albedo, part_of_one());
+  double relaxing = 0.0;
+  for (const RelaxationTermSpec& term : gel.relaxation) relaxing += term.share;
+  if (relaxing >= 1.0) {
+    fail_at(in.where("relaxation"), "relaxation: the shares sum to {}; something must last: allowed is below 1",
+            relaxing);
+  }
+}
+
+void fields(YamlReader& in, MeshSpec& mesh) {
+  in.optional("fine_half_extent_mm", mesh.fine_half_extent_mm, Allowed::above(0.0));
+  in.optional("fine_depth_mm", mesh.fine_depth_mm, Allowed::above(0.0));
+  if (!in.has("force_error")) {
+    in.optional("fine_mm", mesh.fine_mm, Allowed::above(0.0));
+    in.optional("coarse_mm", mesh.coarse_mm, Allowed::at_least(mesh.fine_mm));
+    return;
+  }
+  in.not_beside("fine_mm", {"force_error"});  // from which they are found
+  in.not_beside("coarse_mm", {"force_error"});
+  in.optional("force_error", mesh.force_error, Allowed::within(1e-4, 0.5));
+  in.required("contact_radius_mm", mesh.contact_radius_mm,
+              Allowed::above_up_to(0.0, mesh.fine_half_extent_mm.minCoeff()));
+  in.optional("sharp_bodies", mesh.sharp_bodies);
+}
+
+void fields(YamlReader& in, BeadSpec& beads) {
+  in.required("grid", beads.grid, Allowed::within(1, 100));
+  in.required("spacing_mm", beads.spacing_mm, Allowed::above(0.0));
+  in.required("diameter_mm", beads.diameter_mm, Allowed::above(0.0));
+  in.required("depth_mm", beads.depth_mm, Allowed::above(0.0));
+  in.optional("reflectance", beads.reflectance, part_of_one());
+  in.optional("roughness", beads.roughness, Allowed::within(0.02, 1.0));
+}
+
+void fields(YamlReader& in, PlateSpec& plate) {
+  in.required("thickness_mm", plate.thickness_mm, Allowed::above(0.0));
+  in.required("refractive_index", plate.refractive_index, Allowed::within(1.0, 4.0));
+}
+
+void fields(YamlReader& in, PrintSpec& print) {
+  in.optional("pattern", print.pattern);
+  in.optional("seed", print.seed);
+  in.optional("colour", print.colour, part_of_one());
+  if (print.pattern == PrintPattern::scattered) {
+    double spacing = 0.0;
+    in.required("spacing_mm", spacing, Allowed::above(0.0));
+    in.required("radius_mm", print.radius_mm, Allowed::above_up_to(0.0, kMostScatterRadii * spacing));
+    print.spacing_mm = {spacing, spacing};
+    in.required("diameter_mm", print.width_mm, Allowed::above_up_to(0.0, kScatterDistance * spacing));
+    in.optional("diameter_spread", print.diameter_spread, Allowed::within(0.0, 0.5));
+    return;
+  }
+  in.required("grid", print.grid, Allowed::within(1, 1000));
+  in.required("spacing_mm", print.spacing_mm, Allowed::above(0.0));
+  in.optional("shape", print.shape);
+  in.required(print.shape == render::MarkShape::round ? "diameter_mm" : "side_mm", print.width_mm, Allowed::above(0.0));
+  in.optional("jitter_mm", print.jitter_mm, Allowed::at_least(0.0));
+}
+
+void fields(YamlReader& in, CoatingSpec& coating) {
+  in.required("type", coating.type);
+  in.required(coating.type == CoatingType::matt ? "albedo" : "reflectance", coating.albedo, part_of_one());
+  if (coating.type == CoatingType::metal) in.optional("roughness", coating.roughness, Allowed::within(0.02, 1.0));
+  in.optional("print", coating.print);
+}
+
+void fields(YamlReader& in, FilmSpec& films) {
+  in.required("grid", films.grid, Allowed::within(1, 1000));
+  in.required("spacing_mm", films.spacing_mm, Allowed::above(0.0));
+  in.required("side_mm", films.side_mm, Allowed::above_up_to(0.0, films.spacing_mm.minCoeff()));
+  in.optional("refractive_index", films.refractive_index, Allowed::within(1.0, 4.0));
+  in.required("transmittance", films.transmittance, part_of_one());
+}
+
+void fields(YamlReader& in, BandsSpec& bands) {
+  bands.where = in.where();
+  in.optional("from_nm", bands.from_nm, Allowed::within(200.0, 2000.0));
+  in.optional("to_nm", bands.to_nm, Allowed::within(bands.from_nm + 64.0, 3000.0));
+  in.optional("tolerance", bands.tolerance, Allowed::within(1e-4, 1.0));
+  in.optional("count", bands.count);
+  if (bands.count && std::ranges::find(render::kBandCounts, *bands.count) == render::kBandCounts.end()) {
+    fail_at(in.where("count"), "bands.count: {}; allowed are 1, 3, 8 and 16", *bands.count);
+  }
+}
+
+void fields(YamlReader& in, MotionChipSpec& chip) {
+  chip.where = in.where();
+  in.optional("automatic_shutter", chip.automatic_shutter);
+  in.optional("darkest_maximum", chip.darkest_maximum);
+  in.optional("brightest_maximum", chip.brightest_maximum);
+}
+
+void fields(YamlReader& in, CameraSpec& camera) {
+  const bool preset = read_preset(in, camera);
+  const auto needed = [&](const char* key, auto& value, Allowed allowed) {
+    preset ? in.optional(key, value, allowed) : in.required(key, value, allowed);
+  };
+  in.optional("type", camera.type);
+  needed("width", camera.width, Allowed::within(1, 8192));
+  needed("height", camera.height, Allowed::within(1, 8192));
+  in.optional("frame_rate_Hz", camera.frame_rate_Hz, Allowed::above(0.0));
+  needed("pixel_pitch_um", camera.pixel_pitch_um, Allowed::above(0.0));
+  const double whole_area = camera.pixel_pitch_um * camera.pixel_pitch_um;
+  if (!preset || in.has("pixel_pitch_um")) camera.active_area_um2 = whole_area;
+  in.optional("active_area_um2", camera.active_area_um2, Allowed::above_up_to(0.0, whole_area));
+  if (camera.type == CameraType::lens) {
+    lens_fields(in, camera);
+  } else {
+    in.required("hole_diameter_um", camera.hole_diameter_um, Allowed::above(0.0));
+    in.optional("foil_thickness_um", camera.foil_thickness_um, Allowed::at_least(0.0));
+    in.required("hole_to_sensor_mm", camera.hole_to_sensor_mm, Allowed::above(0.0));
+    in.required("hole_position_mm", camera.hole_position_mm);
+  }
+  in.required("look_at_mm", camera.look_at_mm);
+  in.optional("roll_deg", camera.roll_deg, Allowed::within(-180.0, 180.0));
+  in.required("exposure_us", camera.exposure_us, Allowed::at_least(0.0));
+  in.optional("row_time_us", camera.row_time_us, Allowed::at_least(0.0));
+  in.optional("bits", camera.bits, Allowed::within(1, 16));
+  in.optional("bayer", camera.bayer);
+  if (camera.bayer == render::BayerPattern::none && !preset) camera.quantum_efficiency_green = 1.0;
+  for (auto [key, efficiency] : {std::pair{"quantum_efficiency_red", &camera.quantum_efficiency_red},
+                                 std::pair{"quantum_efficiency_green", &camera.quantum_efficiency_green},
+                                 std::pair{"quantum_efficiency_blue", &camera.quantum_efficiency_blue}}) {
+    in.optional(key, *efficiency, part_of_one());
+    efficiency->where = in.where(key);
+  }
+  in.optional("white_balance", camera.white_balance, Allowed::above(0.0));
+  needed("full_well_e", camera.full_well_e, Allowed::above(0.0));
+  in.optional("gain_dB", camera.gain_dB, Allowed::within(0.0, 48.0));
+  in.optional("read_noise_e", camera.read_noise_e, Allowed::at_least(0.0));
+  in.optional("dark_current_e_per_s", camera.dark_current_e_per_s, Allowed::at_least(0.0));
+  in.optional("prnu", camera.prnu, Allowed::within(0.0, 0.5));
+  in.optional("dsnu_e", camera.dsnu_e, Allowed::at_least(0.0));
+  in.optional("black_level_DN", camera.black_level_DN, Allowed::at_least(0.0));
+  in.optional("motion_chip", camera.motion_chip);
+  in.optional("events", camera.events);
+  if (camera.motion_chip && (camera.width != kChipSide || camera.height != kChipSide)) {
+    fail_at(in.where("motion_chip"), "camera.motion_chip: a picture of {}x{} pixels; the chip has {}x{}", camera.width,
+            camera.height, kChipSide, kChipSide);
+  }
+  if (camera.events && camera.bayer == render::BayerPattern::binned) {
+    fail_at(in.where("events"),
+            "camera.events: event pixels are single ones; `bayer: binned` tells of means over several");
+  }
+  const double frame_us = kMicrosecondsPerSecond / camera.frame_rate_Hz;
+  if (camera.exposure_us > frame_us) {
+    fail_at(in.where("exposure_us"), "exposure_us: {} is longer than a frame of {} us at {} Hz", camera.exposure_us,
+            frame_us, camera.frame_rate_Hz);
+  }
+  if (camera.row_time_us * camera.height > frame_us) {
+    fail_at(in.where("row_time_us"), "row_time_us: {} for each of {} rows is longer than a frame of {} us at {} Hz",
+            camera.row_time_us, camera.height, frame_us, camera.frame_rate_Hz);
+  }
+  if ((camera.look_at_mm - camera.hole_position_mm).norm() < 1e-6) {
+    fail_at(in.where("look_at_mm"), "camera.look_at_mm: is the camera's own position; the camera has no direction");
+  }
+  try {
+    camera_of(camera);
+  } catch (const Error& error) {
+    fail_at(in.where(), "{}", error.what());
+  }
+}
+
+void fields(YamlReader& in, DeviceSpec& device) {
+  device.where = in.where();
+  in.required("name", device.name);
+  in.required("gel", device.gel);
+  in.optional("mesh", device.mesh);
+  in.optional("beads", device.beads);
+  in.required("plate", device.plate);
+  in.optional("lamps", device.lamps);
+  in.optional("coating", device.coating);
+  in.optional("films", device.films);
+  in.optional("bands", device.bands);
+  in.optional("band_wavelengths_nm", device.band_wavelengths_nm, Allowed::within(300.0, 1200.0));
+  in.not_beside("band_wavelengths_nm", {"bands"});  // which tell them
+  in.optional("room_radiance", device.room_radiance, Allowed::at_least(0.0));
+  in.optional("room_radiance_behind", device.room_radiance_behind, Allowed::at_least(0.0));
+  in.optional("camera", device.camera);
+  if (in.describing()) return;  // there is nothing to check
+  if (std::ranges::find(render::kBandCounts, static_cast<int>(device.band_wavelengths_nm.size())) ==
+      render::kBandCounts.end()) {
+    fail_at(in.where("band_wavelengths_nm"), "band_wavelengths_nm: {} wavelengths; allowed are 1, 3, 8 or 16 of them",
+            device.band_wavelengths_nm.size());
+  }
+  check_gel(device, in.where("gel"));
+  if (device.beads) check_beads_fit(device, in.where("beads"));
+  if (device.camera) check_camera_outside(device, in.where("camera"));
+  check_lamps_outside(device, in.where("lamps"));
+}
+
+DeviceSpec read_device(const std::filesystem::path& file) {
+  return read_yaml<DeviceSpec>(file);
+}
+
+fem::PronySeries prony_series(const GelSpec& gel) {
+  fem::PronySeries series;
+  for (const RelaxationTermSpec& term : gel.relaxation) series.push_back({term.share, term.time_s});
+  return series;
+}
+
+std::vector<Eigen::Vector3d> bead_centres(const BeadSpec& beads) {
+  std::vector<Eigen::Vector3d> centres;
+  const double half = (beads.grid - 1) * beads.spacing_mm / 2;
+  for (int row = 0; row < beads.grid; ++row) {
+    for (int column = 0; column < beads.grid; ++column) {
+      centres.emplace_back(column * beads.spacing_mm - half, row * beads.spacing_mm - half, -beads.depth_mm);
+    }
+  }
+  return centres;
+}
+
+}  // namespace touchstone::sim

@@ -1,0 +1,95 @@
+#include "sim/scene/device_camera.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/transform.h"
+#include "core/units.h"
+
+namespace touchstone::sim {
+
+RigidTransform pose_of(const CameraSpec& camera) {
+  // The camera looks out of the gel, along +z: with +y of the gel frame down the picture, +x runs to its right and
+  // nothing is mirrored. A camera that looks straight along y has +z down instead.
+  const Eigen::Vector3d view = (camera.look_at_mm - camera.hole_position_mm).normalized();
+  const Eigen::Vector3d down = std::abs(view.y()) > 0.999 ? Eigen::Vector3d(0, 0, 1) : Eigen::Vector3d(0, 1, 0);
+  const double roll = camera.roll_deg * kRadiansPerDegree;
+  return look_at(camera.hole_position_mm, camera.look_at_mm, Eigen::AngleAxisd(roll, view) * down);
+}
+
+render::PinholeCamera pinhole_camera(const CameraSpec& camera) {
+  render::PinholeCamera out;
+  out.width = camera.width;
+  out.height = camera.height;
+  out.pixel_pitch_um = camera.pixel_pitch_um;
+  out.hole_diameter_um = camera.hole_diameter_um;
+  out.foil_thickness_um = camera.foil_thickness_um;
+  out.distance_mm = camera.hole_to_sensor_mm;
+  out.gel_from_camera = pose_of(camera);
+  return out;
+}
+
+namespace {
+
+/// The list as OpenCV orders it; what isn't there is 0.
+render::LensDistortion distortion_of(const std::vector<double>& list) {
+  const auto at = [&list](std::size_t i) { return i < list.size() ? list[i] : 0.0; };
+  return {at(0), at(1), at(2), at(3), at(4), at(5), at(6), at(7)};
+}
+
+render::LensCamera lens_camera(const CameraSpec& camera) {
+  render::LensCamera out;
+  out.width = camera.width;
+  out.height = camera.height;
+  out.pixel_pitch_um = camera.pixel_pitch_um;
+  out.distortion = distortion_of(camera.distortion);
+  if (camera.focus_distance_mm) out.focus_distance_mm = *camera.focus_distance_mm;
+  if (camera.camera_matrix) {
+    const Eigen::Vector4d& matrix = *camera.camera_matrix;
+    out.matrix = {matrix[0], matrix[1], matrix[2], matrix[3]};
+  } else {
+    const double focal = *camera.focal_length_mm;
+    if (camera.sensor_distance_mm) out.focus_distance_mm = render::focus_of_sensor(focal, *camera.sensor_distance_mm);
+    out.matrix =
+        render::matrix_of_lens(focal, out.focus_distance_mm, camera.pixel_pitch_um, camera.width, camera.height);
+  }
+  out.aperture_mm = render::focal_length_mm(out) / camera.f_number;
+  out.gel_from_camera = pose_of(camera);
+  return out;
+}
+
+}  // namespace
+
+render::Camera camera_of(const CameraSpec& camera) {
+  if (camera.type == CameraType::pinhole) return pinhole_camera(camera);
+  render::LensCamera lens = lens_camera(camera);
+  check_camera(lens);
+  return lens;
+}
+
+double blur_disc_px(const render::Camera& camera, double distance_mm) {
+  if (const auto* lens = std::get_if<render::LensCamera>(&camera)) {
+    return 1e3 * render::blur_circle_mm(*lens, distance_mm) / lens->pixel_pitch_um;
+  }
+  const auto& pinhole = std::get<render::PinholeCamera>(camera);
+  return pinhole.hole_diameter_um * (1.0 + pinhole.distance_mm / distance_mm) / pinhole.pixel_pitch_um;
+}
+
+double blur_radius_px(const render::Camera& camera, double nearest_mm) {
+  // A lens's disc grows with the distance from the plane of focus on either side.
+  const double far = std::holds_alternative<render::LensCamera>(camera)
+                         ? blur_disc_px(camera, std::numeric_limits<double>::infinity())
+                         : 0.0;
+  return 0.5 * std::max(blur_disc_px(camera, nearest_mm), far);
+}
+
+double least_blur_radius_px(const render::Camera& camera) {
+  const auto* pinhole = std::get_if<render::PinholeCamera>(&camera);
+  if (pinhole == nullptr) return 0.0;
+  const double corner = 0.5 * std::hypot(pinhole->width, pinhole->height) * pinhole->pixel_pitch_um;
+  const double hidden_um = pinhole->foil_thickness_um * corner / (1e3 * pinhole->distance_mm);
+  return 0.5 * std::max(0.0, pinhole->hole_diameter_um - hidden_um) / pinhole->pixel_pitch_um;
+}
+
+}  // namespace touchstone::sim

@@ -1,0 +1,27 @@
+#pragma once
+// A device file's gel as fem asks for it.
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "fem/elements/compliance.h"
+#include "fem/mesh/gel_body.h"
+#include "sim/scene/device.h"
+
+namespace touchstone::sim {
+
+fem::GelBody gel_body(const DeviceSpec& device);
+
+/// The body's, then the layers' from the outer surface inwards.
+std::vector<fem::ElasticMaterial> gel_materials(const GelSpec& gel);
+
+std::vector<fem::Bead> gel_beads(const DeviceSpec& device);
+
+/// Height (gel frame's z, mm) of the undeformed outer surface over a place; of a dome or fingertip beyond its rim that
+/// of the rim. @pre the gel isn't a mesh
+double rest_height(const GelSpec& gel, const Eigen::Vector2d& place);
+
+/// Is the outer surface flat, or a dome so gentle that fine relief (fem/fine_relief/fine_relief.h) can have it?
+bool is_gentle(const GelSpec& gel);
+
+}  // namespace touchstone::sim

@@ -1,0 +1,97 @@
+#pragma once
+// An object file: the shape of a body, how it gives way and how it looks. See docs/file-formats.md.
+
+#include <Eigen/Core>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/triangle_mesh.h"
+#include "core/yaml_reader.h"
+#include "fem/shapes/contact_shape.h"
+#include "sim/files/colour.h"
+#include "sim/relief/relief.h"
+#include "sim/scene/object_print.h"
+
+namespace touchstone::sim {
+
+enum class ShapeKind { sphere, rounded_cylinder, box, mesh, egg, shell, hexagon };
+EnumNames<ShapeKind> enum_names(ShapeKind);
+
+/// Only the fields that belong to `type` may stand in the file.
+struct ShapeSpec {
+  ShapeKind type = ShapeKind::sphere;
+  double radius_mm = 0.0;                                      ///< sphere, rounded_cylinder; egg: of its equator
+  double edge_radius_mm = 0.0;                                 ///< rounded_cylinder
+  double height_mm = 0.0;                                      ///< rounded_cylinder
+  Eigen::Vector3d size_mm = Eigen::Vector3d::Zero();           ///< box
+  std::filesystem::path file;                                  ///< mesh: glTF, relative to the object file
+  double mm_per_unit = 1000.0;                                 ///< mesh: glTF's unit is the metre
+  double blunt_mm = 0.0;                                       ///< egg: from the equator to its end at -y
+  double sharp_mm = 0.0;                                       ///< egg: to its end at +y
+  Eigen::Vector2d axes_mm = Eigen::Vector2d::Zero();           ///< shell: whole axes of its outline, an ellipse
+  double thickness_mm = 0.0;                                   ///< shell: along z
+  Eigen::Vector2d curvature_per_mm = Eigen::Vector2d::Zero();  ///< shell: along x and y, see fem::ShellShape
+  double across_flats_mm = 0.0;                                ///< hexagon: a regular prism along x, a flat below
+  double length_mm = 0.0;                                      ///< hexagon: along x
+  SourceLocation where;
+};
+
+/// Width of one of the hexagon's flats, mm. @pre the shape is one
+double flat_width_mm(const ShapeSpec& hexagon);
+
+/// A luminous disc round or behind the object that the camera sees and that is never touched: a light panel. It stays
+/// where the motion starts, level.
+struct ScreenSpec {
+  double radius_mm = 0.0;
+  double behind_mm = 0.0;  ///< its front face above the object's origin at the start
+  Colour radiance = 1.0;   ///< W/m^2/sr in each band
+};
+
+/// A body that isn't rigid: linear elastic, held on its upper side.
+struct ElasticSpec {
+  double youngs_modulus_MPa = 0.0;
+  double poisson_ratio = 0.0;
+  double mesh_mm = 0.0;                  ///< its edges on the underside; they grow to three times that
+  std::optional<double> fine_radius_mm;  ///< how far from its z axis they are so fine; without it, all of the underside
+  /// Faces wholly at or above this z of the object frame are held. Without it: of a sphere, the cap above half its
+  /// radius; of others, the faces within a hundredth of the height from the top.
+  std::optional<double> held_above_mm;
+  SourceLocation where;
+};
+
+struct ObjectSpec {
+  std::string name;
+  ShapeSpec shape;
+  std::optional<ReliefSpec> relief;  ///< on the shape's lower side
+  Colour albedo = 0.5;
+  std::vector<PrintLayer> print;       ///< on the shape's lower side; none with a radiance
+  std::optional<Colour> radiance;      ///< W/m^2/sr in air: a diffuser lit from behind, which has no albedo
+  std::optional<ElasticSpec> elastic;  ///< without it the object is rigid
+  double friction = 0.0;               ///< Coulomb coefficient against the gel
+  std::optional<ScreenSpec> screen;
+  std::optional<double> mass_g;         ///< what a gripper lifts
+  std::optional<double> crush_force_N;  ///< normal force that breaks it
+};
+
+void fields(YamlReader& in, ShapeSpec& shape);
+void fields(YamlReader& in, ScreenSpec& screen);
+void fields(YamlReader& in, ElasticSpec& elastic);
+void fields(YamlReader& in, ObjectSpec& object);
+
+ObjectSpec read_object(const std::filesystem::path& file);
+
+/// The body as the contact solver sees it. Reads the mesh file if there is one.
+/// @throws Error for a mesh that is missing, open or crosses itself
+fem::ContactShape contact_shape(const ShapeSpec& shape);
+/// The same with the object's relief on it, in all its detail. @throws Error also for a relief that can't be read
+fem::ContactShape contact_shape(const ObjectSpec& object);
+/// What a gel meshed with edges of `edge_mm` can tell of the object: its relief is blurred by that.
+fem::ContactShape coarse_contact_shape(const ObjectSpec& object, double edge_mm);
+
+/// The body as the renderer sees it: a closed surface in the object frame.
+TriangleMesh visible_mesh(const ShapeSpec& shape);
+TriangleMesh visible_mesh(const ScreenSpec& screen);
+
+}  // namespace touchstone::sim

@@ -1,0 +1,133 @@
+#pragma once
+// A scene file: a device, the objects that touch it, their motions, and the outputs asked for. See
+// docs/file-formats.md.
+
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/yaml_reader.h"
+#include "sim/scene/device.h"
+#include "sim/scene/motion.h"
+#include "sim/scene/object.h"
+
+namespace touchstone::sim {
+
+/// What a scene's owner wants to have. Truth (forces, beads, surface) is always there.
+struct OutputSpec {
+  bool frames = true;     ///< what the camera delivers: PNG
+  bool ideal = false;     ///< frames without noise beside them: PNG
+  bool radiance = false;  ///< linear irradiance on the sensor: EXR, W/m^2 a band
+  bool height = false;    ///< the membrane's height: EXR, mm
+  // Truth of each pixel, layers of one EXR (sim/view/pixel_truth.h).
+  bool depth = false;
+  bool normals = false;
+  bool ids = false;
+  bool contact = false;
+  bool flow = false;
+  bool error = false;   ///< the achieved standard error of the light
+  bool events = false;  ///< what event pixels tell from the first frame to the last; by itself it asks for no picture
+  SourceLocation where = {};
+
+  /// Is light to be traced?
+  bool light() const { return frames || ideal || radiance || error; }
+  /// Is anything asked for that comes from a pixel's first hit?
+  bool first_hits() const { return depth || normals || ids || contact || flow; }
+  bool pixel_truth() const { return first_hits() || error; }
+  /// Is a camera needed?
+  bool camera() const { return light() || first_hits() || events; }
+};
+
+/// How exact the light has to be.
+struct LightSpec {
+  double noise_fraction = 1.0;  ///< a pixel is sampled until its standard error is this part of the imager's noise
+  /// Before the first look at a pixel's error; 8 are judged by two blocks of 4, which are alike by luck where a pixel
+  /// has a print's edge: there pictures of the reflex device were 2.7 of the imager's noise off instead of 1 (of 32:
+  /// 0.7).
+  int min_samples = 32;
+  int max_samples = 64;
+  double interreflection_tolerance = 0.05;  ///< part of a surface's light that may be left out
+  double motion_tolerance_px =
+      0.3;  ///< image motion that needn't show as rolling shutter or, times the camera's own blur, as motion blur
+  double change_tolerance = 0.25;   ///< a pixel that changed by less than this part of the noise keeps its old light
+  double direct_tolerance = 0.015;  ///< RMS difference from path tracing that direct light may have, relative
+  double event_step = 0.5;          ///< of the smallest threshold: what event pixels may change by between two pictures
+};
+
+/// Pixels of the fine contact and of the height map: square, the map centred on the gel's origin.
+struct MembraneSpec {
+  double pixel_um = 20.0;  ///< a third of the finest detail, or finer
+  /// Of the height map; without it, the part of the surface that the device meshes finely.
+  std::optional<Eigen::Vector2d> height_size_mm;
+  SourceLocation where;
+};
+
+enum class Switch { automatic, on, off };
+EnumNames<Switch> enum_names(Switch);
+
+/// How the gel answers to large strain.
+enum class Elasticity {
+  linear,      ///< fast, and good while PressState::largest_strain is small
+  neo_hookean  ///< at finite strain (fem/finite_strain/finite_press.h): seconds a frame
+};
+EnumNames<Elasticity> enum_names(Elasticity);
+
+/// A scene may force an effect on or off; `automatic` leaves it to the plan.
+struct EffectSwitches {
+  Elasticity elasticity = Elasticity::linear;
+  Switch friction = Switch::automatic;
+  Switch elastic_object = Switch::automatic;
+  Switch fine_relief = Switch::automatic;
+  Switch relaxation = Switch::automatic;
+  Switch inertia = Switch::automatic;
+  Switch interreflection = Switch::automatic;
+  Switch direct_light = Switch::automatic;
+  Switch shared_paths = Switch::automatic;
+  Switch motion_blur = Switch::automatic;
+  Switch rolling_shutter = Switch::automatic;
+  Switch sensor_noise = Switch::automatic;
+};
+
+/// An object beside the scene's first one, moved at the same time.
+struct AddedObject {
+  ObjectSpec object;
+  MotionSpec motion;  ///< of as many frames at the same rate as the first object's
+  SourceLocation where;
+};
+
+struct SceneSpec {
+  DeviceSpec device;
+  ObjectSpec object;
+  MotionSpec motion;
+  std::vector<AddedObject> more_objects;
+  OutputSpec outputs;
+  LightSpec light;
+  EffectSwitches effects;
+  MembraneSpec membrane;
+  double lamp_level = 1.0;  ///< the device's lamps are dimmed to this part of their power
+  std::uint64_t seed = 0;
+  SourceLocation where;
+};
+
+/// One object of a scene with its motion; they belong to the scene.
+struct MovedObject {
+  const ObjectSpec& object;
+  const MotionSpec& motion;
+};
+
+/// All objects, the first one first.
+std::vector<MovedObject> moved_objects(const SceneSpec& scene);
+
+void fields(YamlReader& in, AddedObject& added);
+void fields(YamlReader& in, OutputSpec& outputs);
+void fields(YamlReader& in, LightSpec& light);
+void fields(YamlReader& in, EffectSwitches& effects);
+void fields(YamlReader& in, MembraneSpec& membrane);
+void fields(YamlReader& in, SceneSpec& scene);
+
+/// Reads a scene and the device and object files that it names. @throws Error with file and line
+SceneSpec read_scene(const std::filesystem::path& file);
+
+}  // namespace touchstone::sim

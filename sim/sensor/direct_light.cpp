@@ -1,0 +1,164 @@
+#include "sim/sensor/direct_light.h"
+
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+
+#include "render/scene/film_screen.h"
+
+namespace touchstone::sim {
+namespace {
+
+constexpr double kSpareReach = 0.25;    // of the widest displacement, for states that weren't looked at
+constexpr double kSpareReachMm = 0.05;  // and for what is laid onto a body
+constexpr int kPathsToMeasure = 256;    // a pixel, for a standard error of a tenth of a percent
+
+/// What reflects nothing needs no light: it may stand outside of the light field.
+render::Scene with_blacks(render::Scene scene) {
+  for (render::Surface& surface : scene.surfaces) {
+    const auto* matt = std::get_if<render::Lambertian>(&surface.material);
+    if (matt != nullptr && !surface.print && (matt->albedo == 0.0).all()) surface.material = render::Black{};
+  }
+  return scene;
+}
+
+Eigen::AlignedBox3d lit_box(const render::Scene& scene) {
+  Eigen::AlignedBox3d box;
+  for (const render::Surface& surface : scene.surfaces) {
+    if (std::holds_alternative<render::Black>(surface.material) || render::is_film(surface)) continue;
+    for (const auto& vertex : surface.mesh.vertices) box.extend(vertex);
+  }
+  for (const render::Ball& ball : scene.balls) {
+    box.extend(Eigen::Vector3d(ball.centre.array() - ball.radius));
+    box.extend(Eigen::Vector3d(ball.centre.array() + ball.radius));
+  }
+  return box;
+}
+
+/// From and to which displacement all points of the surface and beads go in all states.
+Eigen::AlignedBox3d displacements(std::span<const Truth> truths) {
+  Eigen::AlignedBox3d box(Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
+  for (const Truth& truth : truths) {
+    for (const Eigen::MatrixX3d* field : {&truth.press.surface_displacement, &truth.press.bead_displacement}) {
+      if (field->rows() == 0) continue;
+      box.extend(Eigen::Vector3d(field->colwise().minCoeff().transpose()));
+      box.extend(Eigen::Vector3d(field->colwise().maxCoeff().transpose()));
+    }
+  }
+  return box;
+}
+
+/// The box that lit things stay in.
+Eigen::AlignedBox3d reach_of(const render::Scene& rest, const render::Scene& pressed, std::span<const Truth> truths,
+                             double back_z) {
+  const Eigen::AlignedBox3d still = lit_box(rest);
+  const Eigen::AlignedBox3d way = displacements(truths);
+  const double spare = kSpareReachMm + kSpareReach * way.sizes().maxCoeff();
+  Eigen::AlignedBox3d box(still.min() + way.min(), still.max() + way.max());
+  box.extend(lit_box(pressed));
+  box.min().array() -= spare;
+  box.max().array() += spare;
+  box.min().z() = std::max(box.min().z(), back_z);
+  return box;
+}
+
+std::string with_figures(const std::string& verdict, const render::DirectError& error) {
+  return fmt::format("{}: {:.2f} +- {:.2f} % off path tracing (root mean square over {} pixels of the deepest press)",
+                     verdict, 100 * error.rms, 100 * error.rms_error, error.pixels);
+}
+
+}  // namespace
+
+DirectLight::DirectLight(const SceneView& sight, const render::Camera& camera, std::span<const Truth> truths,
+                         std::span<const int> rays_tried, int edge_side, const render::GuideCut& guides)
+    : camera_(camera) {
+  TS_ASSERT(sight.plan.direct_light && !truths.empty() && !rays_tried.empty());
+  const SceneSpec& scene = sight.scene;
+  const bool forced = scene.effects.direct_light == Switch::on;
+  const fem::PressState still = at_rest(truths.front().press);
+  const render::Scene rest = with_blacks(sight.seen(still, {}));
+  const Truth& judged = deepest(truths);
+  const render::Scene pressed = with_blacks(sight.seen(judged.press, sight.relief(judged.press)));
+  render::DirectChoiceSettings settings;
+  settings.tolerance = scene.light.direct_tolerance;
+  settings.direct.edge_side = edge_side;
+  settings.guides = guides;
+  settings.direct.seed = settings.error.seed = settings.rest.seed = scene.seed;
+  settings.error.samples = kPathsToMeasure;
+  const Eigen::AlignedBox3d reach = reach_of(rest, pressed, truths, -scene.device.gel.thickness_mm);
+  render::DirectChoice chosen;
+  for (const int rays : rays_tried) {
+    settings.direct.samples = rays;
+    settings.whatever = forced && rays == rays_tried.back();
+    chosen = render::choose_direct(rest, pressed, camera, reach, settings);
+    if (chosen.renderer || chosen.error.pixels == 0) break;
+  }
+  if (chosen.error.pixels > 0) choice_.error = chosen.error;
+  if (!chosen.renderer) {
+    if (forced) fail_at(scene.where, "effects.direct_light: on, but {}", chosen.reason);
+    choice_.reason = choice_.error ? fmt::format("{}; allowed are {:.3g} %", with_figures("paths", chosen.error),
+                                                 100 * scene.light.direct_tolerance)
+                                   : fmt::format("paths: {}", chosen.reason);
+    return;
+  }
+  choice_.direct = true;
+  const int rays = settings.direct.samples;
+  choice_.reason =
+      with_figures(rays == 1 ? "direct light" : fmt::format("direct light of {} rays a pixel", rays), chosen.error);
+  settings_ = settings.direct;
+  rest_ = rest;
+  rest_.interreflection = false;
+  field_ = std::move(chosen.field);
+  bounced_ = chosen.bounced;
+  idle_.push_back(std::move(chosen.renderer));
+}
+
+DirectLight::DirectLight(const SceneView& sight, const render::Camera& camera, const fem::PressState& still,
+                         FoundLight found, int edge_side)
+    : choice_(std::move(found.choice)), camera_(camera), field_(std::move(found.field)), bounced_(found.bounced) {
+  if (!choice_.direct) return;
+  settings_.samples = found.rays;
+  settings_.edge_side = edge_side;
+  settings_.seed = sight.scene.seed;
+  rest_ = with_blacks(sight.seen(still, {}));
+  field_.fixture = rest_;
+  field_.fixture.surfaces.clear();
+  field_.fixture.balls.clear();
+  rest_.interreflection = false;
+}
+
+FoundLight DirectLight::found() const {
+  FoundLight found{choice_, settings_.samples, field_, bounced_};
+  found.field.fixture = {};
+  return found;
+}
+
+std::unique_ptr<render::DirectRenderer> DirectLight::borrow() const {
+  {
+    const std::lock_guard lock(mutex_);
+    if (!idle_.empty()) {
+      auto renderer = std::move(idle_.back());
+      idle_.pop_back();
+      return renderer;
+    }
+  }
+  auto renderer = std::make_unique<render::DirectRenderer>(field_, camera_, rest_, settings_);
+  renderer->set_bounced_light(bounced_);
+  return renderer;
+}
+
+std::optional<render::DirectImage> DirectLight::render(render::Scene scene) const {
+  TS_ASSERT(choice_.direct);
+  const render::Scene direct = with_blacks(std::move(scene));
+  if (!field_.reach.contains(lit_box(direct))) return std::nullopt;
+  // Isolated: a thread that waits in here for its own tasks would else begin another picture, and with it a renderer.
+  return tbb::this_task_arena::isolate([&] {
+    auto renderer = borrow();
+    render::DirectImage image = renderer->render(direct);
+    const std::lock_guard lock(mutex_);
+    idle_.push_back(std::move(renderer));
+    return image;
+  });
+}
+
+}  // namespace touchstone::sim

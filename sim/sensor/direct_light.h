@@ -1,0 +1,66 @@
+#pragma once
+// Direct light for a scene's camera: found good enough by measurement, or not taken.
+
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "render/direct/direct_error.h"
+#include "sim/press/truth.h"
+#include "sim/sensor/virtual_camera.h"
+#include "sim/view/scene_view.h"
+
+namespace touchstone::sim {
+
+/// Rays a pixel that are tried in turn; with one, shadows of wide lamps have no soft rims.
+inline constexpr int kRaysTried[] = {1, 16, 64};
+
+/// What finding direct light comes to, but for what the scene says anyhow (field.fixture is empty).
+struct FoundLight {
+  LightChoice choice;
+  int rays = 1;  ///< a pixel; the rest is for a choice of direct light
+  render::LightField field;
+  cv::Mat bounced;
+};
+
+/// Tier 1 of the renderers for one scene. Made once; `render` is pure and may be called from several threads.
+class DirectLight {
+ public:
+  /// Measures on the state of `truths` that is pressed deepest, with ever more rays a pixel until the scene's tolerance
+  /// holds; `choice` then says what became of it. Where the scene switches direct light on, the last is taken.
+  /// `edge_side` is DirectSettings::edge_side, `guides` is LightFieldSettings::guides.
+  /// @pre the plan has direct light, `truths` isn't empty
+  /// @throws Error with the scene's place if the scene switches direct light on and it can't be had
+  DirectLight(const SceneView& sight, const render::Camera& camera, std::span<const Truth> truths,
+              std::span<const int> rays_tried = kRaysTried, int edge_side = render::DirectSettings{}.edge_side,
+              const render::GuideCut& guides = {});
+
+  /// As it was found before, of the same scene and camera and with the same edge_side. `still`: the gel untouched.
+  DirectLight(const SceneView& sight, const render::Camera& camera, const fem::PressState& still, FoundLight found,
+              int edge_side);
+
+  const LightChoice& choice() const { return choice_; }
+  /// For the constructor above.
+  FoundLight found() const;
+
+  /// The picture of a scene as SceneView::seen gives it; nothing if the gel has gone where the light field doesn't
+  /// reach. @pre choice().direct
+  std::optional<render::DirectImage> render(render::Scene scene) const;
+
+ private:
+  std::unique_ptr<render::DirectRenderer> borrow() const;
+
+  LightChoice choice_;
+  render::Camera camera_;
+  render::Scene rest_;
+  render::LightField field_;
+  cv::Mat bounced_;
+  render::DirectSettings settings_;
+  mutable std::mutex mutex_;
+  mutable std::vector<std::unique_ptr<render::DirectRenderer>> idle_;  // a renderer serves one thread at a time
+};
+
+}  // namespace touchstone::sim

@@ -1,0 +1,136 @@
+#include "sim/sensor/event_stream.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/core.hpp>
+
+#include "core/units.h"
+#include "render/events/event_pixels.h"
+#include "sim/press/played_states.h"
+#include "sim/press/state_between.h"
+#include "sim/sensor/light_sequence.h"
+
+namespace touchstone::sim {
+namespace {
+
+constexpr double kFinestMotion_px = 0.02;
+constexpr int kMostParts = 16;  // of one cut; what changes suddenly within a part is cut again
+
+/// A state with its picture.
+struct Moment {
+  std::int64_t t_us = 0;
+  fem::PressState press;
+  SequencePicture picture;
+};
+
+class EventWatch {
+ public:
+  EventWatch(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel, std::uint64_t noise_seed,
+             const EventSink& sink)
+      : pixels_(scene.device.camera->events.value().pixels, {scene.device.camera->width, scene.device.camera->height},
+                scene.seed, noise_seed),
+        smallest_threshold_(pixels_.smallest_threshold()),
+        step_(scene.light.event_step * smallest_threshold_),
+        light_(scene, plan, gel, smallest_threshold_),
+        sink_(sink) {}
+
+  void begin(Moment& moment) {
+    moment.picture = light_.first(moment.press);
+    count(moment.picture);
+    show(moment, moment);
+  }
+
+  /// All that is seen after `before` until `after`, whose picture is made.
+  void go_on(const Moment& before, Moment& after) {
+    after.picture = light_.next(before.picture, after.press, light_.motion(before.press, after.press));
+    count(after.picture);
+    watch(before, after);
+  }
+
+  EventStreamReport report() const { return report_; }
+
+ private:
+  void watch(const Moment& before, const Moment& after) {
+    const int parts = parts_between(before, after);
+    if (parts == 1) {
+      show(before, after);
+      return;
+    }
+    const std::int64_t span_us = after.t_us - before.t_us;
+    Moment last = before;
+    for (int k = 1; k <= parts; ++k) {
+      if (k == parts) {
+        watch(last, after);
+        return;
+      }
+      Moment next;
+      next.t_us = before.t_us + span_us * k / parts;
+      next.press = state_between(before.press, after.press,
+                                 static_cast<double>(next.t_us - before.t_us) / static_cast<double>(span_us));
+      next.picture = light_.next(last.picture, next.press, light_.motion(last.press, next.press));
+      count(next.picture);
+      watch(last, next);
+      last = std::move(next);
+    }
+  }
+
+  /// Into how many parts the time between two pictures is to be cut.
+  int parts_between(const Moment& before, const Moment& after) const {
+    const double wanted =
+        1.0 + render::needed_subdivisions(before.picture.log_photocurrent, after.picture.log_photocurrent, step_);
+    const double worth = std::floor(light_.motion(before.press, after.press) / kFinestMotion_px);
+    const auto whole_us = static_cast<double>(after.t_us - before.t_us);
+    return std::max(1, static_cast<int>(std::min({wanted, worth, whole_us, static_cast<double>(kMostParts)})));
+  }
+
+  void show(const Moment& before, const Moment& now) {
+    events_.clear();
+    pixels_.advance(now.picture.photocurrent, now.t_us, events_);
+    cv::Mat change;
+    cv::absdiff(before.picture.log_photocurrent, now.picture.log_photocurrent, change);
+    report_.coarse_steps += cv::countNonZero(change > smallest_threshold_);
+    report_.events += static_cast<std::int64_t>(events_.size());
+    if (!events_.empty()) sink_(events_);
+  }
+
+  void count(const SequencePicture& picture) {
+    ++report_.pictures;
+    report_.pixels_traced += picture.pixels_traced;
+    report_.paths_traced += picture.paths_traced;
+  }
+
+  render::EventPixels pixels_;
+  double smallest_threshold_;
+  double step_;
+  LightSequence light_;
+  const EventSink& sink_;
+  std::vector<Event> events_;
+  EventStreamReport report_;
+};
+
+}  // namespace
+
+EventStreamReport watch_events(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel,
+                               std::uint64_t noise_seed, const EventSink& sink, const Progress& progress,
+                               const fem::GelVibration* vibration,
+                               const std::vector<std::shared_ptr<const fem::Compliance>>& elastic) {
+  TS_ASSERT(plan.events);
+  EventWatch watch(scene, plan, gel, noise_seed, sink);
+  Moment last;
+  play_states(scene, plan, gel, vibration, elastic, [&](int frame, int part, const fem::PressState& state) {
+    const double frames = frame - 1 + static_cast<double>(part) / plan.states_a_frame;
+    Moment now;
+    now.t_us = std::llround(frames * kMicrosecondsPerSecond / scene.motion.frame_rate_Hz);
+    now.press = state;
+    if (frame == 0) {
+      watch.begin(now);
+    } else {
+      watch.go_on(last, now);
+    }
+    last = std::move(now);
+    if (progress && part == plan.states_a_frame) progress("events", frame + 1, scene.motion.frame_count());
+  });
+  return watch.report();
+}
+
+}  // namespace touchstone::sim

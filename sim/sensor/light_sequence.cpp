@@ -1,0 +1,177 @@
+#include "sim/sensor/light_sequence.h"
+
+#include <cmath>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "core/error.h"
+#include "render/imager/imager.h"
+#include "sim/plan/image_motion.h"
+#include "sim/scene/device_camera.h"
+#include "sim/view/scene_view.h"
+
+namespace touchstone::sim {
+namespace {
+
+constexpr double kSameLight = 0.05;  // of the smallest threshold
+
+/// The device's imager as a counter of electrons a second.
+render::Imager electron_counter(const DeviceSpec& device, const SceneBands& bands) {
+  render::Imager imager = sim::imager(device, bands, false);
+  imager.exposure_s = 1.0;
+  return imager;
+}
+
+/// One channel's photocurrent of one pixel's light.
+double photocurrent(const render::QuantumEfficiency& per_irradiance, int channel, const float* light) {
+  double current = 0.0;
+  for (Eigen::Index band = 0; band < per_irradiance.cols(); ++band)
+    current += per_irradiance(channel, band) * light[band];
+  return current;
+}
+
+}  // namespace
+
+struct LightSequence::Parts {
+  Parts(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel, double smallest_threshold)
+      : sight(scene, plan, gel),
+        camera(camera_of(*scene.device.camera)),
+        size(render::size_of(camera).x(), render::size_of(camera).y()),
+        imager(electron_counter(scene.device, plan.bands)),
+        per_irradiance(render::response_of(imager).electrons_per_irradiance),
+        pixels(scene.device.camera->events.value().pixels),
+        tolerance(kSameLight * smallest_threshold),
+        scale(scene.device),
+        object_radius_mm(largest_object_radius(scene)) {
+    settings.seed = scene.seed;
+    settings.min_samples = settings.max_samples = scene.light.max_samples;
+    const double nearest = std::max(1e-3, -scene.device.gel.thickness_mm - scene.device.camera->hole_position_mm.z());
+    blur_px = blur_radius_px(camera, nearest);
+  }
+
+  SceneView sight;
+  render::Camera camera;
+  cv::Size size;
+  render::Imager imager;
+  render::QuantumEfficiency per_irradiance;  // electrons a second per W/m^2
+  render::EventPixelSettings pixels;
+  double tolerance;  // of logarithms
+  ImageScale scale;
+  double object_radius_mm;
+  double blur_px = 0.0;
+  render::RenderSettings settings;
+
+  /// Logarithms of all channels' photocurrents in a preview.
+  cv::Mat log_preview(const render::Tracer& tracer) const {
+    const cv::Mat light = tracer.preview(camera, 1);
+    const auto channels = static_cast<int>(per_irradiance.rows());
+    cv::Mat logs(light.size(), CV_32FC(channels));
+    for (int row = 0; row < light.rows; ++row) {
+      const auto* in = light.ptr<float>(row);
+      auto* out = logs.ptr<float>(row);
+      for (int column = 0; column < light.cols; ++column, in += light.channels()) {
+        for (int channel = 0; channel < channels; ++channel) {
+          *out++ = static_cast<float>(std::log(photocurrent(per_irradiance, channel, in) + pixels.dark_intensity));
+        }
+      }
+    }
+    return logs;
+  }
+
+  /// The largest difference of a preview's logarithms within the reach of a pixel's own area and the blur.
+  cv::Mat contrast(const cv::Mat& preview) const {
+    const int radius = 1 + static_cast<int>(std::ceil(blur_px));
+    const cv::Mat square = cv::getStructuringElement(cv::MORPH_RECT, {2 * radius + 1, 2 * radius + 1});
+    cv::Mat high;
+    cv::Mat low;
+    cv::dilate(preview, high, square);
+    cv::erode(preview, low, square);
+    return high - low;
+  }
+
+  /// The pixels whose light may have changed by more than the tolerance.
+  cv::Mat changed(const SequencePicture& before, const cv::Mat& preview, double moved_px) const {
+    cv::Mat mask(size, CV_8U, cv::Scalar(0));
+    const cv::Mat steep = contrast(preview);
+    const int channels = preview.channels();
+    const double per_px = 1.0 / std::max(1.0, blur_px);  // an edge takes so long to pass what a pixel sees
+    for (int row = 0; row < size.height; ++row) {
+      const auto* now = preview.ptr<float>(row);
+      const auto* then = before.preview.ptr<float>(row);
+      const auto* around = steep.ptr<float>(row);
+      const auto* traced_at = before.traced_at_px.ptr<double>(row);
+      auto* out = mask.ptr<unsigned char>(row);
+      for (int column = 0; column < size.width; ++column) {
+        const double moved = std::min(1.0, per_px * (moved_px - traced_at[column]));
+        for (int i = column * channels; i < (column + 1) * channels; ++i) {
+          if (std::abs(now[i] - then[i]) > tolerance || moved * around[i] > tolerance) out[column] = 255;
+        }
+      }
+    }
+    const int radius = 1 + static_cast<int>(std::ceil(blur_px));
+    cv::dilate(mask, mask, cv::getStructuringElement(cv::MORPH_RECT, {2 * radius + 1, 2 * radius + 1}));
+    return mask;
+  }
+
+  void put_light(const render::RenderedImage& image, const cv::Mat& mask, SequencePicture& picture) const {
+    const int bands = image.irradiance.channels();
+    for (int row = 0; row < size.height; ++row) {
+      const auto* light = image.irradiance.ptr<float>(row);
+      const auto* set = mask.ptr<unsigned char>(row);
+      auto* current = picture.photocurrent.ptr<float>(row);
+      for (int column = 0; column < size.width; ++column) {
+        if (set[column] == 0) continue;
+        const int channel = render::channel_of(imager.bayer, column, row);
+        current[column] = static_cast<float>(photocurrent(per_irradiance, channel, light + column * bands));
+      }
+    }
+    picture.log_photocurrent = render::log_intensity(picture.photocurrent, pixels);
+    picture.paths_traced = static_cast<std::int64_t>(image.counts.paths);
+    picture.pixels_traced = cv::countNonZero(mask);
+  }
+};
+
+LightSequence::LightSequence(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel,
+                             double smallest_threshold)
+    : parts_(std::make_unique<const Parts>(scene, plan, gel, smallest_threshold)) {}
+
+LightSequence::~LightSequence() = default;
+
+cv::Size LightSequence::size() const {
+  return parts_->size;
+}
+
+double LightSequence::motion(const fem::PressState& from, const fem::PressState& to) const {
+  return image_motion(parts_->scale, from, to, parts_->object_radius_mm);
+}
+
+SequencePicture LightSequence::first(const fem::PressState& press) const {
+  const render::Tracer tracer = parts_->sight.tracer(press);
+  SequencePicture picture;
+  picture.photocurrent = cv::Mat(parts_->size, CV_32FC1, cv::Scalar(0.0));
+  picture.preview = parts_->log_preview(tracer);
+  picture.traced_at_px = cv::Mat(parts_->size, CV_64FC1, cv::Scalar(0.0));
+  const cv::Mat all(parts_->size, CV_8U, cv::Scalar(255));
+  parts_->put_light(tracer.render(parts_->camera, parts_->settings), all, picture);
+  return picture;
+}
+
+SequencePicture LightSequence::next(const SequencePicture& before, const fem::PressState& press,
+                                    double moved_px) const {
+  SequencePicture picture = before;
+  picture.pixels_traced = picture.paths_traced = 0;
+  picture.moved_px = before.moved_px + moved_px;
+  const render::Tracer tracer = parts_->sight.tracer(press);
+  const cv::Mat preview = parts_->log_preview(tracer);
+  const cv::Mat mask = parts_->changed(before, preview, picture.moved_px);
+  if (cv::countNonZero(mask) == 0) return picture;
+  picture.photocurrent = before.photocurrent.clone();
+  picture.preview = before.preview.clone();
+  preview.copyTo(picture.preview, mask);
+  picture.traced_at_px = before.traced_at_px.clone();
+  picture.traced_at_px.setTo(picture.moved_px, mask);
+  parts_->put_light(tracer.render(parts_->camera, parts_->settings, mask), mask, picture);
+  return picture;
+}
+
+}  // namespace touchstone::sim

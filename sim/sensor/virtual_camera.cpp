@@ -1,0 +1,304 @@
+#include "sim/sensor/virtual_camera.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <opencv2/imgproc.hpp>
+
+#include "core/random.h"
+#include "core/units.h"
+#include "render/cameras/rolling_shutter.h"
+#include "render/paths/shared_paths.h"
+#include "sim/press/exposure_times.h"
+#include "sim/scene/device_camera.h"
+#include "sim/scene/device_imager.h"
+#include "sim/sensor/direct_light.h"
+#include "sim/sensor/key_frames.h"
+#include "sim/view/pixel_truth.h"
+#include "sim/view/scene_view.h"
+
+namespace touchstone::sim {
+namespace {
+
+// The light of key frames stays in other frames where nothing changes, so it is rendered better than theirs.
+constexpr double kKeyFrameFraction = 0.5;
+constexpr int kFirstFrameSamples = 4;
+// After the first frame, which stands for the gel at rest, one frame in so many is a key: 2 or 3 % more work, which
+// pays where frames are so dense that those next to each other are alike. Where a key needs the most samples there are
+// edges, which other frames don't have in the same place: it gets no more of them than they do.
+constexpr std::size_t kFramesPerKey = 50;
+
+/// The electrons of all channels together, as many as the one that sees most: a lamp of one colour counts even if the
+/// first samples of a pixel never chose it.
+render::NoiseTarget noise_target(const render::ImagerResponse& response, double fraction) {
+  const render::QuantumEfficiency& channels = response.electrons_per_irradiance;
+  render::NoiseTarget target;
+  target.electrons_per_irradiance = channels.colwise().sum().transpose().array();
+  const double all = target.electrons_per_irradiance.sum();
+  if (all > 0.0) target.electrons_per_irradiance *= channels.rowwise().sum().maxCoeff() / all;
+  target.read_noise_e = response.read_noise_e;
+  target.quantisation_e = response.quantisation_e / std::sqrt(12.0);
+  target.fraction = fraction;
+  return target;
+}
+
+}  // namespace
+
+struct VirtualCamera::Parts : SceneView {
+  Parts(const SceneSpec& scene_of, const Plan& plan_of, const fem::Compliance& gel_of)
+      : SceneView(scene_of, plan_of, gel_of),
+        exposure(scene_of, plan_of),
+        camera(camera_of(*scene.device.camera)),
+        ready(render::make_ready(camera)),
+        size(render::size_of(camera).x(), render::size_of(camera).y()),
+        imager(sim::imager(scene.device, plan.bands, plan.sensor_noise)),
+        ideal_imager(sim::imager(scene.device, plan.bands, false)),
+        response(render::response_of(imager)),
+        pattern(render::fixed_pattern(imager, size, scene.seed)) {
+    settings.seed = scene.seed;
+    settings.min_samples = scene.light.min_samples;
+    settings.max_samples = scene.light.max_samples;
+    settings.noise = noise_target(response, scene.light.noise_fraction);
+  }
+
+  ExposureTimes exposure;
+  render::Camera camera;
+  render::ReadyCamera ready;
+  cv::Size size;
+  render::Imager imager;
+  render::Imager ideal_imager;
+  render::ImagerResponse response;
+  render::FixedPattern pattern;
+  render::RenderSettings settings;
+  std::unique_ptr<const DirectLight> direct;  // where it holds; keys are then not needed
+  LightChoice choice{false, "paths: the plan has no direct light", {}};
+  std::optional<render::SharedPaths> shared;  // behind a wide hole; keys are then not needed
+  std::vector<KeyFrame> keys;                 // the first frame's, then in the order of time
+
+  /// The first frame's and those before and after a time: the gel at rest, and what the frame is most like.
+  std::vector<const KeyFrame*> keys_about(std::int64_t t_us) const {
+    std::vector<const KeyFrame*> about;
+    if (keys.empty()) return about;
+    about.push_back(&keys.front());
+    const auto after =
+        std::upper_bound(keys.begin() + 1, keys.end(), t_us, [](auto t, const KeyFrame& key) { return t < key.t_us; });
+    if (after != keys.begin() + 1) about.push_back(&*(after - 1));
+    if (after != keys.end()) about.push_back(&*after);
+    return about;
+  }
+
+  ChangeFinder change_finder() const {
+    const double nearest = std::max(1e-3, -scene.device.gel.thickness_mm - scene.device.camera->hole_position_mm.z());
+    const PointBlur blur{least_blur_radius_px(camera), blur_radius_px(camera, nearest)};
+    return {response, *settings.noise, scene.light.change_tolerance, blur, size};
+  }
+
+  /// What the keys about a time know of a frame, seen at one or more moments.
+  KnownLight known(std::int64_t t_us, std::span<const FrameLook> looks) const {
+    return known_light(keys_about(t_us), looks, change_finder(), size, plan.bands.count());
+  }
+  KnownLight nothing_known() const { return known_light({}, {}, change_finder(), size, plan.bands.count()); }
+
+  /// A state's light, well done.
+  KeyFrame key_frame(const Truth& truth) const {
+    const render::Scene seen_now = seen(truth.press, relief(truth.press));
+    const render::Tracer at_once(seen_now);
+    KeyFrame key;
+    key.t_us = truth.t_us;
+    key.look = look_of(seen_now, at_once, ready, camera);
+    KnownLight light = keys.empty() ? nothing_known() : known(truth.t_us, {&key.look, 1});
+    key.where = keys.empty() ? cv::Rect({0, 0}, size) : cv::boundingRect(light.missing);
+    if (key.where.empty()) return key;
+    render::RenderSettings well = settings;
+    well.noise = noise_target(response, kKeyFrameFraction * scene.light.noise_fraction);
+    if (keys.empty()) well.max_samples *= kFirstFrameSamples;
+    const render::RenderedImage image = at_once.render(camera, well, light.missing);
+    add_traced(image.irradiance, image.standard_error, light);
+    key.irradiance = light.irradiance(key.where).clone();
+    key.standard_error = light.standard_error(key.where).clone();
+    return key;
+  }
+
+  /// What needs no light.
+  Capture geometry(const Truth& truth, const std::optional<fem::ReliefAnswer>& relief) const {
+    Capture capture;
+    if (scene.outputs.height) capture.height = membrane->height(truth.press, relief);
+    if (scene.outputs.first_hits()) {
+      capture.pixel_truth = pixel_truth(SceneView::geometry(truth.press, relief), camera, scene.outputs);
+    }
+    return capture;
+  }
+
+  Capture develop(const cv::Mat& irradiance, const cv::Mat& error, const Truth& truth,
+                  const std::optional<fem::ReliefAnswer>& relief, const render::RayCounts& counts,
+                  std::int64_t pixels) const {
+    Capture capture = geometry(truth, relief);
+    if (scene.outputs.error) add_channel(capture.pixel_truth, error, "error.irradiance");
+    capture.paths_traced = static_cast<std::int64_t>(counts.paths);
+    capture.pixels_traced = pixels;
+    const auto picture = [&](const render::Imager& sensor) {
+      return render::develop(
+          render::expose(irradiance, sensor, pattern, scene.seed, static_cast<std::uint64_t>(truth.frame)), sensor);
+    };
+    if (scene.outputs.frames) capture.frame = picture(imager);
+    if (scene.outputs.ideal) capture.ideal = picture(ideal_imager);
+    if (scene.outputs.radiance) capture.radiance = irradiance;
+    return capture;
+  }
+
+  Capture take(const Truth& truth, bool whole) const {
+    Capture capture = take_light(truth, whole);
+    if (plan.direct_light && scene.outputs.light()) {
+      const bool beyond = direct && !capture.direct;
+      capture.light = beyond ? "paths: the gel has gone beyond the light field" : choice.reason;
+    }
+    return capture;
+  }
+
+  Capture take_light(const Truth& truth, bool whole) const {
+    const auto now = relief(truth.press);
+    if (!scene.outputs.light()) return geometry(truth, now);
+    const std::vector<double> times = exposure.of(truth);
+    if (direct) {
+      if (auto capture = take_direct(truth, now, times)) return *std::move(capture);
+      whole = true;  // there is no key to lean on
+    }
+    if (times.size() > 1) return take_over_time(truth, now, times, whole);
+    const render::Scene seen_now = seen(truth.press, now);
+    const render::Tracer at_once(seen_now);
+    if (shared && !whole) {
+      const render::RenderedImage image = shared->render(seen_now, at_once, settings, scene.outputs.error);
+      return develop(image.irradiance, image.standard_error, truth, now, image.counts, size.area());
+    }
+    KnownLight light = nothing_known();
+    if (!whole) {
+      const FrameLook look = look_of(seen_now, at_once, ready, camera);
+      light = known(truth.t_us, {&look, 1});
+    }
+    const int pixels = cv::countNonZero(light.missing);
+    if (pixels == 0) return develop(light.irradiance, light.standard_error, truth, now, {}, 0);
+    const render::RenderedImage image = at_once.render(camera, settings, light.missing);
+    add_traced(image.irradiance, image.standard_error, light);
+    return develop(light.irradiance, light.standard_error, truth, now, image.counts, pixels);
+  }
+
+  /// By direct light; nothing if at one of the moments the gel has gone where the light field doesn't reach.
+  std::optional<Capture> take_direct(const Truth& truth, const std::optional<fem::ReliefAnswer>& now,
+                                     const std::vector<double>& times) const {
+    std::optional<render::RollingExposure> sum;
+    if (times.size() > 1) sum.emplace(times, shutter_timing(), size, plan.bands.count());
+    render::RayCounts counts;
+    cv::Mat irradiance;
+    for (std::size_t i = 0; i < times.size(); ++i) {
+      const bool later = times[i] > 0.0;
+      const fem::PressState press = later ? state_after(truth, times[i]) : truth.press;
+      const auto image = direct->render(seen(press, later ? relief(press) : now));
+      if (!image) return std::nullopt;
+      counts.paths += image->primary;
+      counts.primary += image->primary;
+      irradiance = image->irradiance;
+      if (sum) sum->add(i, irradiance);
+    }
+    if (sum) irradiance = sum->irradiance();
+    Capture capture =
+        develop(irradiance, {}, truth, now, counts, static_cast<std::int64_t>(times.size()) * size.area());
+    capture.direct = true;
+    return capture;
+  }
+
+  render::ShutterTiming shutter_timing() const {
+    render::ShutterTiming timing;
+    if (plan.motion_blur) timing.exposure_s = scene.device.camera->exposure_us / kMicrosecondsPerSecond;
+    if (plan.rolling_shutter) timing.line_time_s = scene.device.camera->row_time_us / kMicrosecondsPerSecond;
+    return timing;
+  }
+
+  /// Light of the moments `times` (s) after the frame's begin, each row's mean over its own exposure. The moments have
+  /// samples of their own, so that their noise is averaged, too.
+  Capture take_over_time(const Truth& truth, const std::optional<fem::ReliefAnswer>& now,
+                         const std::vector<double>& times, bool whole) const {
+    const bool shares = shared && !whole;
+    std::vector<render::Scene> scenes;
+    std::vector<FrameLook> looks;
+    for (const double time : times) {
+      const fem::PressState press = state_after(truth, time);
+      scenes.push_back(seen(press, relief(press)));
+      if (!whole && !shares) looks.push_back(look_of(scenes.back(), render::Tracer(scenes.back()), ready, camera));
+    }
+    KnownLight light = whole || shares ? nothing_known() : known(truth.t_us, looks);
+    const int pixels = cv::countNonZero(light.missing);
+    if (pixels == 0) return develop(light.irradiance, light.standard_error, truth, now, {}, 0);
+    const render::ShutterTiming timing = shutter_timing();
+    render::RenderSettings of_moment = settings;
+    const double intervals_of_row = timing.exposure_s / times.back() * static_cast<double>(times.size() - 1);
+    of_moment.noise = noise_target(response, scene.light.noise_fraction * std::sqrt(std::max(1.0, intervals_of_row)));
+    render::RollingExposure sum(times, timing, size, plan.bands.count());
+    render::RayCounts counts;
+    for (std::size_t i = 0; i < times.size(); ++i) {
+      RandomStream seeds(scene.seed, i, Purpose::kMotion);
+      of_moment.seed = (std::uint64_t{seeds()} << 32) | seeds();
+      const render::Tracer tracer(scenes[i]);
+      const render::RenderedImage image = shares ? shared->render(scenes[i], tracer, of_moment, scene.outputs.error)
+                                                 : tracer.render(camera, of_moment, light.missing);
+      sum.add(i, image.irradiance, image.standard_error);
+      counts += image.counts;
+    }
+    add_traced(sum.irradiance(), sum.standard_error(), light);
+    return develop(light.irradiance, light.standard_error, truth, now, counts,
+                   static_cast<std::int64_t>(times.size()) * pixels);
+  }
+};
+
+VirtualCamera::VirtualCamera(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel,
+                             std::span<const Truth> truths) {
+  TS_ASSERT(plan.camera && scene.device.camera);
+  auto parts = std::make_unique<Parts>(scene, plan, gel);
+  if (!scene.outputs.light() || plan.scattering || truths.empty()) {
+    parts_ = std::move(parts);
+    return;
+  }
+  if (plan.direct_light) {
+    auto direct = std::make_unique<const DirectLight>(*parts, parts->camera, truths);
+    parts->choice = direct->choice();
+    if (direct->choice().direct) {
+      parts->direct = std::move(direct);
+      parts_ = std::move(parts);
+      return;
+    }
+  }
+  if (plan.shared_paths) {
+    std::vector<render::Scene> examples;
+    for (const Truth* truth : {&truths.front(), &deepest(truths)}) {
+      examples.push_back(parts->seen(truth->press, parts->relief(truth->press)));
+    }
+    parts->shared.emplace(examples, std::get<render::PinholeCamera>(parts->camera), parts->settings);
+    parts_ = std::move(parts);
+    return;
+  }
+  parts->keys.push_back(parts->key_frame(truths.front()));
+  // They lean on the first one alone, so that they can be made at the same time.
+  std::vector<KeyFrame> later((truths.size() - 1) / kFramesPerKey);
+  tbb::parallel_for(std::size_t{0}, later.size(),
+                    [&](std::size_t i) { later[i] = parts->key_frame(truths[(i + 1) * kFramesPerKey]); });
+  std::move(later.begin(), later.end(), std::back_inserter(parts->keys));
+  parts_ = std::move(parts);
+}
+
+VirtualCamera::~VirtualCamera() = default;
+
+const LightChoice& VirtualCamera::light_choice() const {
+  return parts_->choice;
+}
+
+Capture VirtualCamera::capture(const Truth& truth) const {
+  // A preview knows nothing of scattered light.
+  return parts_->take(truth, parts_->plan.scattering);
+}
+
+Capture VirtualCamera::capture_whole(const Truth& truth) const {
+  return parts_->take(truth, true);
+}
+
+}  // namespace touchstone::sim

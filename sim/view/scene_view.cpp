@@ -1,0 +1,52 @@
+#include "sim/view/scene_view.h"
+
+#include "sim/scene/device_gel.h"
+
+namespace touchstone::sim {
+
+SceneView::SceneView(const SceneSpec& scene_of, const Plan& plan_of, const fem::Compliance& gel_of)
+    : scene(scene_of),
+      plan(plan_of),
+      gel(gel_of, gel_body(scene.device)),
+      membrane(plan.fine_relief || scene.outputs.height ? std::make_unique<Membrane>(scene, plan, gel_of) : nullptr),
+      objects(visible_objects(scene)) {}
+
+SceneView::SceneView(const SceneSpec& scene_of, const Plan& plan_of, const fem::Compliance& gel_of,
+                     const SceneView& other)
+    : scene(scene_of), plan(plan_of), gel(other.gel), objects(visible_objects(scene)) {
+  if (!plan.fine_relief && !scene.outputs.height) return;
+  membrane = other.membrane ? std::make_unique<Membrane>(scene, plan, other.membrane->surface())
+                            : std::make_unique<Membrane>(scene, plan, gel_of);
+}
+
+render::Scene SceneView::seen_coating(const fem::PressState& press, const SeenGeometry& geometry) const {
+  render::Scene out = scene_without_surface(scene, plan, {}, {}, press);
+  out.surfaces.insert(out.surfaces.begin(), coated_surface(scene.device, plan.bands, geometry.sheet));
+  return out;
+}
+
+std::optional<fem::ReliefAnswer> SceneView::relief(const fem::PressState& press) const {
+  return membrane ? membrane->relief(press) : std::nullopt;
+}
+
+render::Scene SceneView::seen(const fem::PressState& press, const std::optional<fem::ReliefAnswer>& relief) const {
+  if (relief && relief->grid.size() > 0) return visible_scene(scene, plan, objects, *membrane, press, *relief);
+  return visible_scene(scene, plan, objects, gel, press);
+}
+
+SeenGeometry SceneView::geometry(const fem::PressState& press, const std::optional<fem::ReliefAnswer>& relief) const {
+  if (relief && relief->grid.size() > 0) return seen_geometry(scene, plan, objects, *membrane, press, *relief);
+  return seen_geometry(scene, plan, objects, gel, press);
+}
+
+fem::PressState at_rest(fem::PressState press) {
+  constexpr double kFarAway_mm = 1e4;
+  press.surface_displacement.setZero();
+  press.bead_displacement.setZero();
+  std::fill(press.node_state.begin(), press.node_state.end(), fem::NodeState::open);
+  press.gel_from_object.translation.z() += kFarAway_mm;
+  for (fem::BodyState& body : press.bodies) body.gel_from_object.translation.z() += kFarAway_mm;
+  return press;
+}
+
+}  // namespace touchstone::sim

@@ -1,0 +1,333 @@
+#include "lab/fit/unit_fit.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <cmath>
+#include <opencv2/core.hpp>
+
+#include "core/whole_file.h"
+#include "lab/fit/unit_fit_experiment.h"
+#include "sim/files/image_file.h"
+#include "sim/sensor/touch_rig.h"
+#include "tests/support/message_of.h"
+#include "tests/support/temporary_folder.h"
+
+namespace touchstone::lab {
+namespace {
+
+using test::message_of;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+/// From above the pad to 1.1 mm.
+sim::MotionSpec straight_down() {
+  sim::MotionSpec press;
+  press.start_mm = {0, 0, 1.6};
+  sim::MotionKey down;
+  down.z = sim::AxisKey{1.1, std::nullopt};
+  press.keys = {down};
+  return press;
+}
+
+/// A coated pad lit from three sides through its plate, red, green and blue; nothing is white.
+constexpr const char* kDevice = R"(name: small-lit
+gel: {size_x_mm: 8, size_y_mm: 8, thickness_mm: 3, youngs_modulus_MPa: 0.15, poisson_ratio: 0.49, refractive_index: 1.41}
+mesh: {fine_mm: 0.8, coarse_mm: 2, fine_half_extent_mm: [2.5, 2.5], fine_depth_mm: 1}
+plate: {thickness_mm: 3, refractive_index: 1.49}
+coating: {type: matt, albedo: 0.4}
+lamps:
+  - {type: led, position_mm: [-7, -5, -12], target_mm: [0, 0, 0], viewing_angle_deg: 60, power_W: [0.02, 0.001, 0.001]}
+  - {type: led, position_mm: [7, -5, -12], target_mm: [0, 0, 0], viewing_angle_deg: 60, power_W: [0.001, 0.02, 0.001]}
+  - {type: led, position_mm: [0, 8, -12], target_mm: [0, 0, 0], viewing_angle_deg: 60, power_W: [0.001, 0.001, 0.02]}
+camera:
+  type: lens
+  width: 40
+  height: 30
+  pixel_pitch_um: 44
+  focal_length_mm: 3
+  f_number: 4
+  focus_distance_mm: 17
+  lens_position_mm: [0, 0, -19]
+  look_at_mm: [0, 0, 0]
+  exposure_us: 16
+  full_well_e: 12000
+  read_noise_e: 8
+  bayer: binned
+  white_balance: [1, 1, 1]
+)";
+
+/// A folder with a small coated device with a colour camera, a ball, and the cache of its gel: made once.
+const test::TemporaryFolder& folder() {
+  static const test::TemporaryFolder one;
+  static const bool written = [] {
+    one.write("device.yaml", kDevice);
+    one.write("ball.yaml", "name: ball\nshape: {type: sphere, radius_mm: 1.5}\nalbedo: 0.5\nfriction: 0.5\n");
+    return true;
+  }();
+  static_cast<void>(written);
+  return one;
+}
+
+std::filesystem::path cache() {
+  return folder().path() / "cache";
+}
+
+UnitFitSpec small_fit() {
+  UnitFitSpec spec;
+  spec.name = "small";
+  spec.device = folder().path() / "device.yaml";
+  spec.coarse_px = 1;
+  spec.membrane_um = 120.0;
+  spec.deepest_mm = 0.6;
+  for (const Eigen::Vector2d& place : {Eigen::Vector2d(0, 0), Eigen::Vector2d(-1.0, 0.8), Eigen::Vector2d(1.0, -0.9)}) {
+    RecordedPress press;
+    press.object = folder().path() / "ball.yaml";
+    press.place_mm = place;
+    press.depth_mm = 0.4;
+    press.force_N = 0.1;
+    press.force_sd_N = 0.001;
+    spec.presses.push_back(press);
+  }
+  return spec;
+}
+
+Eigen::VectorXd vector(std::initializer_list<double> values) {
+  Eigen::VectorXd out(static_cast<Eigen::Index>(values.size()));
+  std::copy(values.begin(), values.end(), out.begin());
+  return out;
+}
+
+TEST(UnitSimulation, LampsOneByOneAddUpToAllOfThem) {
+  UnitFitSpec spec = small_fit();
+  add_unknown(spec, "lamps[*].power_W", UnknownHow::times, 0.5, 2.0);
+  add_unknown(spec, "gel.youngs_modulus_MPa", UnknownHow::times, 0.5, 2.0);
+  const PreparedFit fit = prepare_fit(spec);
+  ASSERT_EQ(fit.unknowns.size(), 4U);
+  EXPECT_EQ(fit.unknowns[1].name, "lamps[1].power_W");
+  const Eigen::VectorXd x = vector({std::log(1.2), std::log(0.7), 0.0, std::log(1.3)});
+  UnitSimulation simulation(fit, cache());
+  const SimulatedUnit shown = simulation.show(x, {{{0, 0}, 0.4}, {{-1.0, 0.8}, 0.4}, {{1.0, -0.9}, 0.4}});
+  // All at once, with paths of another seed.
+  sim::TouchRigSettings settings;
+  settings.seed = 77;
+  settings.deepest_mm = 0.6;
+  settings.membrane_um = 120.0;
+  settings.always_friction = true;
+  const sim::TouchRig rig(with_block_camera(device_at(fit, x), spec.coarse_px), cache(), settings);
+  const cv::Mat whole = mean_numbers(rig.background_light(), simulation.imager(x));
+  EXPECT_LT(cv::norm(shown.background, whole, cv::NORM_L2) / cv::norm(whole, cv::NORM_L2), 0.02);
+  EXPECT_NEAR(cv::mean(shown.background)[1], cv::mean(whole)[1], 0.01 * cv::mean(whole)[1]);
+  const sim::TouchObject ball = rig.object(fit.objects[0]);
+  EXPECT_NEAR(shown.force_N[0], rig.play(ball, straight_down()).back().press.wrench[2], 1e-6 * shown.force_N[0]);
+}
+
+TEST(UnitPictures, MeanAndNoiseOfExposuresAreAsTheImagerHasThem) {
+  UnitFitSpec spec = small_fit();
+  add_unknown(spec, "camera.exposure_us", UnknownHow::times, 0.5, 2.0);
+  const PreparedFit fit = prepare_fit(spec);
+  const render::Imager imager = UnitSimulation(fit, cache()).imager(vector({0.0}));
+  cv::Mat light(60, 80, CV_32FC3);
+  for (int v = 0; v < light.rows; ++v) {
+    for (int u = 0; u < light.cols; ++u) {  // slopes, so that rounding behind the white balance averages out
+      const float slope = 0.8F + 0.005F * static_cast<float>(u);
+      light.at<cv::Vec3f>(v, u) = cv::Vec3f(0.9F, 0.7F, 0.6F) * slope;
+    }
+  }
+  light *= 120.0 / cv::mean(mean_numbers(light, imager))[1];
+  const cv::Mat numbers = mean_numbers(light, imager);
+  sim::CameraSpec camera = *fit.device.camera;
+  camera.width = 80;
+  camera.height = 60;
+  constexpr int kUnits = 12;
+  double squares = 0.0, sum = 0.0;
+  int count = 0;
+  for (int unit = 0; unit < kUnits; ++unit) {
+    const cv::Mat frame = render::develop(render::expose(light, imager, static_cast<std::uint64_t>(unit), 0), imager);
+    const BlockPicture seen = block_picture(frame, "frame", camera, 4, {});
+    cv::Mat wanted = cv::Mat::zeros(seen.mean.size(), CV_64FC3);
+    for (int v = 0; v < 60; ++v) {
+      for (int u = 0; u < 80; ++u) wanted.at<cv::Vec3d>(v / 4, u / 4) += numbers.at<cv::Vec3d>(v, u) / 16.0;
+    }
+    const cv::Mat noise = block_noise(wanted, imager, 4, 1);
+    for (int i = 0; i < 3 * 15 * 20; ++i) {
+      ASSERT_GT(wanted.ptr<double>()[i], 5.0);
+      ASSERT_LT(wanted.ptr<double>()[i], 240.0);
+      const double off = (seen.mean.ptr<double>()[i] - wanted.ptr<double>()[i]) / noise.ptr<double>()[i];
+      squares += off * off;
+      sum += off;
+      ++count;
+    }
+  }
+  EXPECT_NEAR(squares / count, 1.0, 0.08);
+  EXPECT_NEAR(sum / count, 0.0, 0.05);
+}
+
+TEST(UnitFit, FindsHiddenNumbersWithinItsIntervals) {
+  UnitFitSpec spec = small_fit();
+  add_unknown(spec, "gel.youngs_modulus_MPa", UnknownHow::times, 0.4, 2.5);
+  add_unknown(spec, "lamps[*].power_W", UnknownHow::times, 0.5, 2.0);
+  int covered = 0, intervals = 0;
+  constexpr int kUnits = 6;
+  for (std::uint64_t seed = 1; seed <= kUnits; ++seed) {
+    spec.seed = 10 * seed;  // light whose own noise is another each time
+    const PreparedFit fit = prepare_fit(spec);
+    const Eigen::VectorXd hidden = hidden_unknowns(fit, 0.5, seed);
+    const RecordedUnit unit = record_unit(fit, hidden, 3, seed, cache());
+    const UnitFit found = fit_unit(unit.fit, unit.recording, cache());
+    EXPECT_TRUE(found.converged);
+    EXPECT_TRUE(found.untold.empty());
+    EXPECT_LT(found.misfit_after, found.misfit_before);
+    for (std::size_t k = 0; k < found.unknowns.size(); ++k) {
+      const FittedUnknown& one = found.unknowns[k];
+      const double truth = hidden_value(fit, hidden, k);
+      EXPECT_TRUE(one.told);
+      EXPECT_NEAR(one.value, truth, 0.08 * truth) << one.name;
+      // Hidden units share the mesh, whose error is the larger part of a coarse gel's interval: it's left out here.
+      const double deviation = std::hypot(std::max(one.by_noise, one.by_model), one.by_light);
+      EXPECT_LT(deviation, 0.05) << one.name << ": an interval that says something";
+      EXPECT_GE(one.deviation, deviation);
+      EXPECT_TRUE(one.low95 < one.value && one.value < one.high95);
+      ++intervals;
+      if (std::abs(std::log(one.value / truth)) <= 1.96 * deviation) ++covered;
+    }
+  }
+  EXPECT_EQ(intervals, 4 * kUnits);
+  // Of 24 intervals of 95 % fewer than 20 hold their number by chance once in 400 times, were they independent.
+  EXPECT_GE(covered, 20);
+}
+
+TEST(UnitFit, SaysThatPowerAndExposureAreToldAsAProductOnly) {
+  UnitFitSpec spec = small_fit();
+  add_unknown(spec, "lamps[*].power_W", UnknownHow::times, 0.5, 2.0, true);
+  add_unknown(spec, "camera.exposure_us", UnknownHow::times, 0.5, 2.0);
+  const PreparedFit fit = prepare_fit(spec);
+  const Eigen::VectorXd hidden = vector({std::log(1.2), std::log(0.9)});
+  const RecordedUnit unit = record_unit(fit, hidden, 3, 5, cache());
+  const UnitFit found = fit_unit(unit.fit, unit.recording, cache());
+  ASSERT_EQ(found.untold.size(), 1U);
+  EXPECT_THAT(found.untold[0].words,
+              AllOf(HasSubstr("lamps[*].power_W"), HasSubstr("camera.exposure_us"), HasSubstr("product")));
+  for (const FittedUnknown& one : found.unknowns) {
+    EXPECT_FALSE(one.told);
+    EXPECT_TRUE(std::isinf(one.high95));
+  }
+  const double product = found.unknowns[0].value * found.unknowns[1].value;
+  EXPECT_NEAR(product, hidden_value(fit, hidden, 0) * hidden_value(fit, hidden, 1), 0.02 * product);
+}
+
+TEST(UnitFit, AlbedoPowerAndExposureAllFreeAreSaidNotToBeTold) {
+  UnitFitSpec spec = small_fit();
+  spec.presses.resize(1);
+  add_unknown(spec, "lamps[*].power_W", UnknownHow::times, 0.5, 2.0, true);
+  add_unknown(spec, "camera.exposure_us", UnknownHow::times, 0.5, 2.0);
+  add_unknown(spec, "coating.albedo", UnknownHow::times, 0.6, 1.6);
+  const PreparedFit fit = prepare_fit(spec);
+  const RecordedUnit unit = record_unit(fit, vector({0.1, -0.1, 0.1}), 3, 6, cache());
+  const UnitFit found = fit_unit(unit.fit, unit.recording, cache());
+  ASSERT_FALSE(found.untold.empty());
+  EXPECT_FALSE(found.unknowns[0].told);
+  EXPECT_FALSE(found.unknowns[1].told);
+  const double truth = hidden_value(fit, vector({0.1, -0.1, 0.1}), 2);
+  EXPECT_TRUE(found.unknowns[2].low95 <= truth && truth <= found.unknowns[2].high95);
+}
+
+TEST(UnitFit, DepthsThatWereNotReadAreFoundInThePictures) {
+  UnitFitSpec spec = small_fit();
+
+  add_unknown(spec, "gel.youngs_modulus_MPa", UnknownHow::times, 0.4, 2.5);
+  const PreparedFit fit = prepare_fit(spec);
+  const Eigen::VectorXd hidden = vector({std::log(1.4)});
+  RecordedUnit unit = record_unit(fit, hidden, 3, 7, cache());
+  for (RecordedPress& press : unit.fit.spec.presses) press.depth_mm.reset();
+  const UnitFit found = fit_unit(unit.fit, unit.recording, cache());
+  for (const FittedPress& press : found.presses) {
+    EXPECT_GT(press.depth_deviation_mm, 0.0);
+    EXPECT_NEAR(press.depth_mm, 0.4, 0.02);
+    EXPECT_NEAR(press.depth_mm, 0.4, 3.0 * press.depth_deviation_mm);
+  }
+  const FittedUnknown& modulus = found.unknowns[0];
+  EXPECT_TRUE(modulus.told);
+  const double truth = hidden_value(fit, hidden, 0);
+  EXPECT_TRUE(modulus.low95 <= truth && truth <= modulus.high95)
+      << truth << " isn't in " << modulus.low95 << " to " << modulus.high95;
+}
+
+/// Writes the fit's file and pictures of a unit. Returns the file.
+std::filesystem::path written_fit(const test::TemporaryFolder& out, const std::string& unknowns,
+                                  const std::string& more = "") {
+  UnitFitSpec spec = small_fit();
+  add_unknown(spec, "gel.youngs_modulus_MPa", UnknownHow::times, 0.4, 2.5);
+  const PreparedFit fit = prepare_fit(spec);
+  for (const char* name : {"device.yaml", "ball.yaml"}) out.write(name, read_whole_file(folder().path() / name));
+  sim::TouchRigSettings settings;
+  settings.seed = 9;
+  settings.deepest_mm = 0.6;
+  settings.membrane_um = 120.0;
+  static const sim::TouchRig rig(fit.device, cache(), settings);
+  sim::write_png(out.path() / "rest.png", rig.background(1));
+  const sim::TouchObject ball = rig.object(fit.objects[0]);
+  sim::write_png(out.path() / "press.png",
+                 rig.look(ball, rig.play(ball, straight_down()).back().press, 1, 1, false).frame);
+  return out.write("fit.yaml",
+                   fmt::format("name: mine\ndevice: device.yaml\ncoarse_px: 2\nmembrane_um: 120\ndeepest_mm: 0.6\n"
+                               "backgrounds: [rest.png]\nunknowns:\n{}\npresses:\n  - {{picture: press.png, "
+                               "object: ball.yaml, place_mm: [0, 0], depth_mm: 0.4{}}}\n",
+                               unknowns, more));
+}
+
+TEST(UnitFitFiles, AreTheSameBytesOnOneThreadAndOnMany) {
+  const test::TemporaryFolder in, out;
+  const auto file = written_fit(in,
+                                "  - {path: 'lamps[*].power_W', times: [0.5, 2]}\n"
+                                "  - {path: 'lamps[1].position_mm[2]', plus: [-0.4, 0.4]}");
+  const UnitFit many = run_unit_fit(file, out.path() / "many", cache());
+  {
+    const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+    run_unit_fit(file, out.path() / "one", cache());
+  }
+  for (const char* name : {"mine.md", "mine.json", "mine.yaml", "mine.png"}) {
+    EXPECT_EQ(read_whole_file(out.path() / "many" / name), read_whole_file(out.path() / "one" / name)) << name;
+  }
+  const sim::DeviceSpec fitted = sim::read_device(out.path() / "many" / "mine.yaml");
+  EXPECT_NEAR(fitted.lamps[0].power_W.numbers[0], many.unknowns[0].value, 1e-12);
+  EXPECT_NEAR(fitted.lamps[1].position_mm.z(), -12.0, 0.1) << "nothing was hidden";
+}
+
+TEST(UnitFitFiles, MistakesNameFileLineFieldAndWhatIsAllowed) {
+  const test::TemporaryFolder in;
+  const auto message = [&](const std::string& unknowns, const std::string& more = "") {
+    const auto file = written_fit(in, unknowns, more);
+    return message_of([&] { read_recording(prepare_fit(file)); });
+  };
+  const std::string power = "  - {path: 'lamps[*].power_W', times: [0.5, 2]}";
+  EXPECT_EQ(message(power), "no error");
+  EXPECT_THAT(message("  - {path: 'lamps[*].powr_W', times: [0.5, 2]}"),
+              AllOf(HasSubstr("fit.yaml:8"), HasSubstr("power_W")));
+  EXPECT_THAT(message("  - {path: coating.albedo, times: [0.5, 3]}"), AllOf(HasSubstr("albedo"), HasSubstr("1.2")));
+  EXPECT_THAT(message("  - {path: coating.albedo, times: [1.5, 3]}"),
+              AllOf(HasSubstr("fit.yaml:8"), HasSubstr("at most 1")));
+  EXPECT_THAT(message("  - {path: gel.youngs_modulus_MPa, times: [0.5, 2]}"),
+              AllOf(HasSubstr("fit.yaml:8"), HasSubstr("force_N")));
+  EXPECT_EQ(message("  - {path: gel.youngs_modulus_MPa, times: [0.5, 2]}", ", force_N: 0.1, force_sd_N: 0.01"),
+            "no error");
+  EXPECT_THAT(message(power, ", force_N: 0.1"), AllOf(HasSubstr("fit.yaml:10"), HasSubstr("force_sd_N")));
+  EXPECT_THAT(message(power + "\n" + power), HasSubstr("unknown already"));
+  sim::write_png(in.path() / "small.png", cv::Mat(10, 20, CV_8UC3, cv::Scalar::all(90)));
+  sim::write_png(in.path() / "white.png", cv::Mat(30, 40, CV_8UC3, cv::Scalar::all(254)));
+  sim::write_png(in.path() / "grey.png", cv::Mat(30, 40, CV_8UC1, cv::Scalar::all(90)));
+  const auto with_picture = [&](const std::string& name) {
+    const std::string text = read_whole_file(written_fit(in, power));
+    const std::size_t at = text.find("press.png");
+    const auto file = in.write("other.yaml", std::string(text).replace(at, 9, name));
+    return message_of([&] { read_recording(prepare_fit(file)); });
+  };
+  EXPECT_THAT(with_picture("small.png"), AllOf(HasSubstr("other.yaml:10"), HasSubstr("20 x 10"), HasSubstr("40 x 30")));
+  EXPECT_THAT(with_picture("white.png"), AllOf(HasSubstr("white.png"), HasSubstr("expose less")));
+  EXPECT_THAT(with_picture("grey.png"), AllOf(HasSubstr("grey.png"), HasSubstr("channels")));
+  EXPECT_THAT(with_picture("none.png"), AllOf(HasSubstr("presses[0]: picture"), HasSubstr("there is no file")));
+}
+
+}  // namespace
+}  // namespace touchstone::lab

@@ -1,0 +1,255 @@
+// Light guides in a light field and in direct light, against the path tracer's connections.
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <cmath>
+
+#include "core/error.h"
+#include "lamp_scenes.h"
+#include "render/direct/direct_error.h"
+#include "render/direct/direct_renderer.h"
+#include "render/direct/light_field.h"
+#include "render/lamps/guide_connection.h"
+
+namespace touchstone::render {
+namespace {
+
+/// Air, acrylic from z = -6 to -3, silicone above; a guide that rises by `tilt` before x = -13.
+Scene guide_scene(double tilt, double half_power_angle) {
+  Scene scene = empty_scene(0.0);
+  scene.interreflection = false;
+  scene.media = {Medium{1.0, {}}, Medium{1.49, {}}, Medium{1.41, {}}};
+  scene.faces = {{-6.0, 0, 1}, {-3.0, 1, 2}};
+  GuideLamp lamp;
+  lamp.centre = {-13, 0, -4.5};
+  lamp.direction = {1, 0, 0};
+  lamp.tilt = tilt;
+  lamp.width = 18.0;
+  lamp.half_power_angle = half_power_angle;
+  lamp.power_W = grey(1.0);
+  scene.lamps = {lamp};
+  return scene;
+}
+
+/// The vector irradiance of lamp 0 of unit intensity at a place, the mean of `side`^2 connections.
+Eigen::Vector3d flow_by_connections(Scene scene, const Eigen::Vector3d& place, int side) {
+  std::visit([&](auto& lamp) { lamp.power_W = grey(emission_integral(scene.lamps[0])); }, scene.lamps[0]);
+  const PreparedScene<1> prepared(scene);
+  const Receiver receiver{place, Eigen::Vector3d::Zero(), 2, 2};
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  std::uint64_t uncounted = 0;
+  for (int i = 0; i < side; ++i) {
+    for (int j = 0; j < side; ++j) {
+      Arrival<1> arrival;
+      if (connect_to_guide(prepared, prepared.lamps[0], {(i + 0.5) / side, (j + 0.5) / side}, receiver, uncounted,
+                           arrival)) {
+        sum -= arrival.irradiance[0] * arrival.direction;
+      }
+    }
+  }
+  return sum / (static_cast<double>(side) * side);
+}
+
+TEST(GuideField, BeamsTogetherAreAllLight) {
+  LightFieldSettings rough;
+  rough.accuracy = 0.5;
+  LightFieldSettings fine;
+  fine.guide_points = 8;
+  for (double tilt : {0.0, 0.45, -0.3}) {
+    for (double lobe : {0.17, 0.6}) {
+      const Scene scene = guide_scene(tilt, lobe);
+      const LightField field =
+          make_light_field(scene, {Eigen::Vector3d(-0.1, -0.1, -1), Eigen::Vector3d(0.1, 0.1, 0)}, rough);
+      for (const Eigen::Vector3d& place :
+           {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(-9, 6, -0.5), Eigen::Vector3d(11, -8, -1.5)}) {
+        const Eigen::Vector3d expected = flow_by_connections(scene, place, 400);
+        const Eigen::Vector3d found = exact_flow(field, 0, place, fine).head<3>();
+        EXPECT_LT((found - expected).norm(), 5e-3 * expected.norm())
+            << "tilt " << tilt << ", lobe " << lobe << ", at " << place.transpose() << ": " << found.transpose()
+            << " for " << expected.transpose();
+      }
+    }
+  }
+}
+
+TEST(GuideField, RefusesAGuideInTheBoxesOwnLayer) {
+  const Scene scene = guide_scene(0.4, 0.2);
+  EXPECT_THROW(make_light_field(scene, {Eigen::Vector3d(-5, -5, -5), Eigen::Vector3d(5, 5, -4)}), Error);
+  LightFieldSettings bad;
+  bad.guides.sectors = 0;
+  EXPECT_THROW(make_light_field(scene, {Eigen::Vector3d(-5, -5, -1), Eigen::Vector3d(5, 5, 0)}, bad), Error);
+  bad = {};
+  bad.guide_points = 17;
+  EXPECT_THROW(make_light_field(scene, {Eigen::Vector3d(-5, -5, -1), Eigen::Vector3d(5, 5, 0)}, bad), Error);
+}
+
+TEST(GuideField, ManyGuidesShareTheBeamsThatThereAre) {
+  Scene scene = guide_scene(0.4, 0.2);
+  for (int k = 0; k < 5; ++k) scene.lamps.push_back(scene.lamps[0]);
+  LightFieldSettings settings;
+  settings.accuracy = 0.5;
+  settings.most_beams = 30;
+  const LightField field = make_light_field(scene, {Eigen::Vector3d(-1, -1, -1), Eigen::Vector3d(1, 1, 0)}, settings);
+  EXPECT_LE(field.beam_count(), 30);
+  EXPECT_EQ(field.lamp_of.back(), 5);
+  // However they are put together, nothing of the light is lost.
+  float flow[4 * 30];
+  look_up_flow(field, find_cell(field, 1.0f, 1.0f, 0.0f), flow);
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (int beam = 0; beam < field.beam_count(); ++beam) {
+    if (field.lamp_of[beam] == 0) sum += Eigen::Vector3d(flow[4 * beam], flow[4 * beam + 1], flow[4 * beam + 2]);
+  }
+  const Eigen::Vector3d whole = exact_flow(field, 0, {1, 1, 0}, settings).head<3>();
+  EXPECT_LT((sum - whole).norm(), 1e-4 * whole.norm());
+}
+
+/// A sheet of the gel's outer surface, |x|, |y| <= 8, with a dent as a ball of 2 mm makes it.
+TriangleMesh dented_sheet(double depth) {
+  constexpr int kCells = 120;
+  TriangleMesh mesh;
+  for (int j = 0; j <= kCells; ++j) {
+    for (int i = 0; i <= kCells; ++i) {
+      const double x = 8.0 * (2.0 * i / kCells - 1.0);
+      const double y = 8.0 * (2.0 * j / kCells - 1.0);
+      mesh.vertices.emplace_back(x, y, -depth * std::exp(-(x * x + y * y) / 1.5));
+    }
+  }
+  for (int j = 0; j < kCells; ++j) {
+    for (int i = 0; i < kCells; ++i) {
+      const int a = j * (kCells + 1) + i;
+      mesh.triangles.push_back({a, a + 1, a + kCells + 2});
+      mesh.triangles.push_back({a, a + kCells + 2, a + kCells + 1});
+    }
+  }
+  return mesh;
+}
+
+Eigen::AlignedBox3d sheet_reach() {
+  return {Eigen::Vector3d(-8, -8, -1.2), Eigen::Vector3d(8, 8, 0)};
+}
+
+/// A dented membrane under a guide before x = -13 and, weaker, one before y = 12.
+Scene dented_guide_scene(double depth) {
+  Scene scene = guide_scene(0.42, 0.17);
+  GuideLamp other = std::get<GuideLamp>(scene.lamps[0]);
+  other.centre = {0, 12, -4.5};
+  other.direction = {0, -1, 0};
+  other.power_W = grey(0.5);
+  scene.lamps.push_back(other);
+  scene.surfaces.push_back({dented_sheet(depth), Lambertian{grey(0.5)}});
+  return scene;
+}
+
+Print markers_of(const TriangleMesh& flat) {
+  Print print;
+  for (const auto& vertex : flat.vertices) print.material_mm.push_back(vertex.head<2>());
+  print.inks = {grey(0.03)};
+  for (int i = -4; i <= 4; ++i) {
+    for (int j = -4; j <= 4; ++j) print.marks.push_back({{1.2 * i, 1.2 * j}, 0.2, 0});
+  }
+  return print;
+}
+
+DirectError error_of(const Scene& scene, int pixels) {
+  LightFieldSettings settings;
+  settings.accuracy = 1e-2;
+  Scene fixture = scene;
+  const LightField field = make_light_field(fixture, sheet_reach(), settings);
+  const PinholeCamera camera = small_camera(96, 72);
+  DirectSettings direct;
+  const cv::Mat picture = DirectRenderer(field, camera, scene, direct).render(scene).irradiance;
+  DirectErrorSettings judge;
+  judge.pixels = pixels;
+  judge.samples = 64;
+  return measure_direct_error(picture, scene, camera, judge);
+}
+
+TEST(DirectGuides, ShadeAndShadowADentAsPathsDo) {
+  const DirectError flat = error_of(dented_guide_scene(0.0), 400);
+  EXPECT_LT(flat.rms, 0.01 + 2.0 * flat.rms_error);
+  const DirectError dented = error_of(dented_guide_scene(0.9), 400);
+  EXPECT_LT(dented.rms_error, 0.01) << "the test is too coarse";
+  EXPECT_LT(dented.rms, 0.02 + 2.0 * dented.rms_error);
+  EXPECT_LT(std::abs(dented.mean), 0.005 + 3.0 * dented.mean_error);
+}
+
+TEST(DirectGuides, CastShadowsThatMatter) {
+  const Scene scene = dented_guide_scene(0.9);
+  LightFieldSettings settings;
+  settings.accuracy = 1e-2;
+  const LightField field = make_light_field(scene, sheet_reach(), settings);
+  const PinholeCamera camera = small_camera(96, 72);
+  DirectSettings bare;
+  bare.shadows = false;
+  const cv::Mat with = DirectRenderer(field, camera, scene).render(scene).irradiance;
+  const cv::Mat without = DirectRenderer(field, camera, scene, bare).render(scene).irradiance;
+  // More than the error that ShadeAndShadowADentAsPathsDo allows, which thus fails without them.
+  EXPECT_GT(cv::norm(without - with, cv::NORM_L2), 0.025 * cv::norm(with, cv::NORM_L2));
+}
+
+TEST(DirectPrints, EqualThePathTracersPicture) {
+  Scene scene = dented_guide_scene(0.9);
+  scene.surfaces[0].print = markers_of(dented_sheet(0.0));
+  const DirectError error = error_of(scene, 800);
+  EXPECT_LT(error.rms_error, 0.015) << "the test is too coarse";
+  EXPECT_LT(error.rms, 0.03 + 2.0 * error.rms_error);
+  EXPECT_LT(std::abs(error.mean), 0.01 + 3.0 * error.mean_error);
+}
+
+TEST(DirectPrints, InkTakesThePlaceOfTheSurfacesColour) {
+  Scene scene = dented_guide_scene(0.5);
+  Scene inked = scene;
+  scene.surfaces[0].print = markers_of(dented_sheet(0.0));
+  scene.surfaces[0].print->inks = {grey(0.5)};  // that of the surface itself
+  LightFieldSettings settings;
+  settings.accuracy = 1e-1;
+  const LightField field = make_light_field(scene, sheet_reach(), settings);
+  const PinholeCamera camera = small_camera(48, 36);
+  const cv::Mat printed = DirectRenderer(field, camera, scene).render(scene).irradiance;
+  const cv::Mat plain = DirectRenderer(field, camera, inked).render(inked).irradiance;
+  EXPECT_EQ(cv::norm(printed, plain, cv::NORM_INF), 0.0);
+  scene.surfaces[0].print->marks = {{{0, 0}, 100.0, 0}};  // ink everywhere, half as bright
+  scene.surfaces[0].print->inks = {grey(0.25)};
+  const cv::Mat dark = DirectRenderer(field, camera, scene).render(scene).irradiance;
+  EXPECT_LT(cv::norm(2.0 * dark, plain, cv::NORM_INF), 1e-6 * cv::norm(plain, cv::NORM_INF));
+}
+
+TEST(DirectGuides, SameBytesForAnyThreads) {
+  const Scene scene = dented_guide_scene(0.9);
+  LightFieldSettings settings;
+  settings.accuracy = 3e-2;
+  const PinholeCamera camera = small_camera(48, 36);
+  cv::Mat pictures[2];
+  for (int k = 0; k < 2; ++k) {
+    const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, k == 0 ? 1 : 4);
+    const LightField field = make_light_field(scene, sheet_reach(), settings);
+    pictures[k] = DirectRenderer(field, camera, scene).render(scene).irradiance;
+  }
+  EXPECT_EQ(cv::norm(pictures[0], pictures[1], cv::NORM_INF), 0.0);
+}
+
+TEST(GuideSampling, IsFreeOfBiasAndCalm) {
+  // What a connection brings varies little, and its mean doesn't know how numbers are shared out.
+  for (double tilt : {0.0, 0.42}) {
+    const Scene scene = guide_scene(tilt, 0.17);
+    const PreparedScene<1> prepared(scene);
+    const Receiver receiver{{0, 1, -0.4}, Eigen::Vector3d::Zero(), 2, 2};
+    constexpr int kSide = 100;
+    double sum = 0.0;
+    double squares = 0.0;
+    std::uint64_t uncounted = 0;
+    for (int i = 0; i < kSide * kSide; ++i) {
+      Arrival<1> arrival;
+      const std::array<double, 2> numbers = {(i % kSide + 0.5) / kSide, (i / kSide + 0.5) / kSide};
+      if (!connect_to_guide(prepared, prepared.lamps[0], numbers, receiver, uncounted, arrival)) continue;
+      sum += arrival.irradiance[0];
+      squares += arrival.irradiance[0] * arrival.irradiance[0];
+    }
+    const double mean = sum / (kSide * kSide);
+    EXPECT_LT(squares / (kSide * kSide) - mean * mean, mean * mean) << "tilt " << tilt;
+  }
+}
+
+}  // namespace
+}  // namespace touchstone::render

@@ -1,0 +1,76 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "core/error.h"
+#include "render/direct/light_field.h"
+#include "tests/render/direct/direct_scenes.h"
+
+namespace touchstone::render {
+namespace {
+
+TEST(LightField, HoldsWhatLampsSend) {
+  const Scene scene = lit_stack(0.0);
+  const LightField field = make_light_field(scene, reach_of_membrane(), accuracy(2e-3));
+  EXPECT_LE(field.error, 2e-3);
+  EXPECT_GT(field.error, 0.0);
+  LightFieldSettings many;
+  many.lens_points = 12;  // nine times the places on the lens
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> side(-7.0, 7.0);
+  std::uniform_real_distribution<double> depth(-1.5, 0.0);
+  double wrong = 0.0;
+  double whole = 0.0;
+  for (int k = 0; k < 100; ++k) {
+    const Eigen::Vector3d at(side(random), side(random), depth(random));
+    float flow[12];
+    look_up_flow(field, find_cell(field, float(at.x()), float(at.y()), float(at.z())), flow);
+    double wrong_here = 0.0;
+    double whole_here = 0.0;
+    for (int lamp = 0; lamp < 3; ++lamp) {
+      const Eigen::Vector4d exact = exact_flow(field, lamp, at, many);
+      wrong_here += (Eigen::Vector3d(flow[4 * lamp], flow[4 * lamp + 1], flow[4 * lamp + 2]) - exact.head<3>()).norm();
+      whole_here += exact[3];
+    }
+    wrong += wrong_here * wrong_here;
+    whole += whole_here * whole_here;
+  }
+  EXPECT_LT(std::sqrt(wrong / whole), field.error + 5e-4);
+}
+
+TEST(LightField, ErrorFallsWithTheGrid) {
+  const Scene scene = lit_stack(0.0);
+  const LightField coarse = make_light_field(scene, reach_of_membrane(), accuracy(1e-2));
+  const LightField fine = make_light_field(scene, reach_of_membrane(), accuracy(5e-4));
+  EXPECT_LE(fine.error, 5e-4);
+  EXPECT_LE(coarse.error, 1e-2);
+  EXPECT_GT(fine.nodes.prod(), coarse.nodes.prod());
+}
+
+TEST(LightField, RefusesWhatItCannotHold) {
+  const Scene scene = lit_stack(0.0);
+  const Eigen::AlignedBox3d reach = reach_of_membrane();
+  Scene dark = scene;
+  dark.lamps.clear();
+  EXPECT_THROW(make_light_field(dark, reach), Error);
+  EXPECT_THROW(make_light_field(scene, Eigen::AlignedBox3d{}), Error);
+  EXPECT_THROW(make_light_field(scene, {Eigen::Vector3d(-1, -1, -6), Eigen::Vector3d(1, 1, 0)}), Error);  // a face
+  Scene inside = scene;
+  std::get<SpotLamp>(inside.lamps[0]).position = {0, 0, -1};
+  EXPECT_THROW(make_light_field(inside, reach), Error);
+  for (double bad : {0.0, -1.0, 2.0, std::numeric_limits<double>::quiet_NaN()}) {
+    EXPECT_THROW(make_light_field(scene, reach, accuracy(bad)), Error);
+  }
+  Scene sharp = scene;  // a lobe whose sharp rim crosses the membrane
+  std::get<SpotLamp>(sharp.lamps[0]).half_angle = 0.1;
+  std::get<SpotLamp>(sharp.lamps[0]).soft_angle = 0.0;
+  std::get<SpotLamp>(sharp.lamps[0]).lens_radius = 0.0;
+  LightFieldSettings small = accuracy(1e-4);
+  small.most_nodes = 5000;
+  EXPECT_THROW(make_light_field(sharp, reach, small), Error);
+}
+
+}  // namespace
+}  // namespace touchstone::render

@@ -1,0 +1,124 @@
+#include "sensors/heights/ball_press.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <opencv2/imgproc.hpp>
+
+#include "core/error.h"
+#include "tests/sensors/heights/painted_gel.h"
+
+namespace touchstone::sensors {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::ThrowsMessage;
+
+constexpr double kScale = 0.053;
+constexpr double kRadius = 1.0;  // the text's ball of 2 mm
+
+class BallPressTest : public ::testing::Test {
+ protected:
+  fixtures::GelPainter painter_{200, 160, kScale, {}};
+  Background background_ = painter_.background();
+  fixtures::Ball ball_{{5.2, 4.1}, kRadius, 0.7};
+  BallPress press_ = painter_.press(ball_);
+
+  auto taking_samples(const BallPress& press) {
+    return [this, press] { samples_of(press, background_, kScale); };
+  }
+  auto finding(const cv::Mat& frame) {
+    return [this, frame] { find_contact_circle(frame, background_, kRadius, kScale, "frame 3"); };
+  }
+};
+
+TEST(BallSlope, IsTheSpheresDerivative) {
+  const double radius = 1.7;
+  const auto height = [&](const Eigen::Vector2d& x) { return std::sqrt(radius * radius - x.squaredNorm()); };
+  for (const Eigen::Vector2d& x : {Eigen::Vector2d(0.0, 0.0), {0.5, -0.3}, {-1.2, 0.9}}) {
+    const double h = 1e-5;
+    const Eigen::Vector2d slope = ball_slope(x, radius);
+    EXPECT_NEAR(slope.x(), (height(x + Eigen::Vector2d(h, 0)) - height(x - Eigen::Vector2d(h, 0))) / (2 * h), 1e-7);
+    EXPECT_NEAR(slope.y(), (height(x + Eigen::Vector2d(0, h)) - height(x - Eigen::Vector2d(0, h))) / (2 * h), 1e-7);
+  }
+}
+
+TEST_F(BallPressTest, SamplesAreTheTouchedPartOnly) {
+  const std::vector<ColourSample> samples = samples_of(press_, background_, kScale);
+  const double radius_px = 0.7 / kScale - 1.0;
+  EXPECT_NEAR(static_cast<double>(samples.size()), kPi * radius_px * radius_px, 25.0);
+  for (const ColourSample& sample : samples) {
+    const fixtures::Relief truth = ball_.at(kScale * sample.place.cast<double>());
+    EXPECT_LT((truth.slope - sample.slope.cast<double>()).norm(), 1e-4);
+  }
+}
+
+TEST_F(BallPressTest, CircleIsFoundWhereverItIs) {
+  for (const Eigen::Vector2d& centre : {Eigen::Vector2d(5.2, 4.1), {2.5, 2.0}, {8.03, 6.27}}) {
+    for (const double contact : {0.45, 0.6, 0.8}) {
+      const BallPress press = painter_.press({centre, kRadius, contact});
+      const ContactCircle found = find_contact_circle(press.frame, background_, kRadius, kScale, "frame");
+      EXPECT_LT((found.centre - press.circle.centre).norm(), 0.15) << centre.transpose() << ", " << contact;
+      EXPECT_GT(found.radius, press.circle.radius - 1.5) << centre.transpose() << ", " << contact;
+      EXPECT_LT(found.radius, press.circle.radius + 0.5) << centre.transpose() << ", " << contact;
+    }
+  }
+}
+
+TEST_F(BallPressTest, PressOverTheEdgeIsRefused) {
+  BallPress press = painter_.press({{0.5, 4.0}, kRadius, 0.7});
+  EXPECT_THAT(taking_samples(press),
+              ThrowsMessage<Error>(HasSubstr("reaches over the edge of the picture of 200 x 160")));
+  EXPECT_THAT(finding(press.frame), ThrowsMessage<Error>(HasSubstr("frame 3: the contact touches the edge")));
+}
+
+TEST_F(BallPressTest, TwoBallsAreRefused) {
+  for (const double distance : {1.9, 2.5, 4.0}) {
+    const fixtures::Ball other{{5.2 + distance, 4.1}, kRadius, 0.7};
+    press_.frame = painter_.paint([&](const Eigen::Vector2d& place) {
+      const fixtures::Relief a = ball_.at(place);
+      const fixtures::Relief b = other.at(place);
+      return a.height > b.height ? a : b;
+    });
+    EXPECT_THROW(find_contact_circle(press_.frame, background_, kRadius, kScale, "frame"), Error) << distance;
+    EXPECT_THAT(taking_samples(press_), ThrowsMessage<Error>(HasSubstr("second contact"))) << distance;
+  }
+}
+
+TEST_F(BallPressTest, NothingPressedIsRefused) {
+  press_.frame = painter_.rest();
+  EXPECT_THAT(taking_samples(press_), ThrowsMessage<Error>(HasSubstr("nothing is pressed")));
+  EXPECT_THAT(finding(press_.frame), ThrowsMessage<Error>(HasSubstr("no contact is seen")));
+}
+
+TEST_F(BallPressTest, UnfitFiguresAreNamed) {
+  const auto with = [&](auto change) {
+    BallPress press = press_;
+    change(press);
+    return taking_samples(press);
+  };
+  EXPECT_THAT(with([](BallPress& p) { p.circle.radius = 20.0; }),
+              ThrowsMessage<Error>(HasSubstr("must be below the ball's")));
+  EXPECT_THAT(with([](BallPress& p) { p.circle.radius = 2.0; }), ThrowsMessage<Error>(HasSubstr("at least 4")));
+  EXPECT_THAT(with([](BallPress& p) { p.circle.radius = NAN; }), ThrowsMessage<Error>(HasSubstr("isn't finite")));
+  EXPECT_THAT(with([](BallPress& p) { p.ball_radius_mm = 0.0; }), ThrowsMessage<Error>(HasSubstr("above 0")));
+  EXPECT_THAT(with([](BallPress& p) { cv::extractChannel(p.frame, p.frame, 0); }),
+              ThrowsMessage<Error>(HasSubstr("grey")));
+  EXPECT_THAT(with([](BallPress& p) { p.frame = p.frame.rowRange(0, 100); }),
+              ThrowsMessage<Error>(HasSubstr("200 x 100 px")));
+}
+
+TEST_F(BallPressTest, SaturatedPixelsAreLeftOutOrTooMany) {
+  BallPress press = press_;
+  const int u = static_cast<int>(press.circle.centre.x());
+  const int v = static_cast<int>(press.circle.centre.y());
+  const std::size_t all = samples_of(press, background_, kScale).size();
+  press.frame = press_.frame.clone();
+  cv::rectangle(press.frame, cv::Rect(u - 2, v - 2, 4, 4), cv::Scalar(255, 90, 90), cv::FILLED);
+  EXPECT_EQ(samples_of(press, background_, kScale).size(), all - 16);
+  cv::rectangle(press.frame, cv::Rect(u - 6, v - 6, 12, 12), cv::Scalar(255, 90, 90), cv::FILLED);
+  EXPECT_THAT(taking_samples(press), ThrowsMessage<Error>(HasSubstr("are saturated; at most 20 %")));
+}
+
+}  // namespace
+}  // namespace touchstone::sensors

@@ -1,0 +1,134 @@
+// The whole chain on pictures made by formulas: a ball's imprint, with markers that go where they are told.
+
+#include "sensors/markers/touch_reader.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <opencv2/core.hpp>
+
+#include "core/error.h"
+#include "sensors/heights/height_calibration.h"
+#include "tests/sensors/heights/painted_gel.h"
+#include "tests/sensors/markers/painted_markers.h"
+
+namespace touchstone::sensors {
+namespace {
+
+constexpr int kWidth = 240;
+constexpr int kHeight = 180;
+constexpr double kScale = 0.053;
+const Eigen::Vector2d kCentre_px(120, 90);
+const fixtures::Ball kBall{kScale * kCentre_px, 6.0, 2.2};
+
+LinearForce line(double newton_per_unit) {
+  LinearForce force;
+  force.newton_per_unit = newton_per_unit;
+  return force;
+}
+
+class TouchReaderTest : public ::testing::Test {
+ protected:
+  TouchReaderTest() {
+    static const HeightModel model = [] {
+      fixtures::GelPainter painter(kWidth, kHeight, kScale, {});
+      HeightCalibrationSettings settings;
+      settings.mm_per_px = kScale;
+      settings.table.most_cells = 1U << 15U;
+      settings.correction = LightCorrection::none;
+      settings.cross_validate = false;
+      return calibrate_height(painter.presses(2, 2, 1.0, 0.75), painter.background(), settings).model;
+    }();
+    calibration_.height = model;
+    calibration_.background = frame(nothing, rest_);
+    calibration_.normal = line(0.1);
+    calibration_.shear = line(2.0);
+  }
+
+  /// The gel with its markers at these places.
+  cv::Mat frame(const fixtures::Field& field, const std::vector<Eigen::Vector2d>& places) {
+    cv::Mat picture = painter_.paint(field);
+    const cv::Mat ink =
+        fixtures::paint_markers({.width = kWidth, .height = kHeight, .brightness = 255, .shading = 0}, places);
+    cv::multiply(picture, ink, picture, 1.0 / 255);
+    return picture;
+  }
+  /// Markers moved by `motion(distance from the ball's middle, px)`.
+  template <typename Motion>
+  std::vector<Eigen::Vector2d> moved(Motion&& motion) const {
+    std::vector<Eigen::Vector2d> places = rest_;
+    for (Eigen::Vector2d& place : places) place += motion((place - kCentre_px).norm());
+    return places;
+  }
+
+  static fixtures::Relief nothing(const Eigen::Vector2d&) { return {}; }
+  static fixtures::Relief ball(const Eigen::Vector2d& place) { return kBall.at(place); }
+
+  fixtures::GelPainter painter_{kWidth, kHeight, kScale, {}};
+  std::vector<Eigen::Vector2d> rest_ = fixtures::marker_grid(22.6, kWidth, kHeight);
+  TouchCalibration calibration_;
+};
+
+TEST_F(TouchReaderTest, AnUntouchedGelHasNeitherPatchNorForceNorSlip) {
+  TouchReader reader(calibration_);
+  for (int i = 0; i < 3; ++i) {
+    const TouchReading& touch = reader.read({frame(nothing, rest_), i});
+    EXPECT_FALSE(touch.patch);
+    EXPECT_FALSE(touch.force_ratio);
+    EXPECT_LT(touch.height_max_mm, 0.03);
+    EXPECT_EQ(touch.shear_N, Eigen::Vector2d(0, 0));
+    EXPECT_FALSE(touch.rule_slip);
+    EXPECT_EQ(touch.rim.state, SlipState::kNoContact);
+    EXPECT_EQ(touch.markers_found, static_cast<int>(rest_.size()));
+  }
+}
+
+TEST_F(TouchReaderTest, ABallsDepthForceAndShearAreThoseOfTheFormula) {
+  TouchReader reader(calibration_);
+  const Eigen::Vector2d shift(2.4, -1.8);  // 3 px
+  reader.read({frame(ball, rest_), 0});
+  const TouchReading& touch = reader.read({frame(ball, moved([&](double) { return shift; })), 1});
+  const cv::Mat truth = painter_.heights(ball);
+  ASSERT_TRUE(touch.patch);
+  EXPECT_LT((touch.patch->centre - kCentre_px).norm(), 3.0);
+  EXPECT_NEAR(touch.height_max_mm, kBall.at(kBall.centre_mm).height, 0.15 * touch.height_max_mm);
+  EXPECT_NEAR(touch.normal_N, 0.1 * height_sum_mm3(truth, kScale), 0.15 * touch.normal_N);
+  EXPECT_LT((touch.shear_N - 2.0 * kScale * shift).norm(), 0.02 * touch.shear_N.norm());
+  ASSERT_TRUE(touch.force_ratio);
+  EXPECT_NEAR(*touch.force_ratio, touch.shear_N.norm() / touch.normal_N, 1e-12);
+  EXPECT_FALSE(touch.rim.slips());  // all moved as one
+}
+
+TEST_F(TouchReaderTest, ARimThatStaysBehindIsSlipUntilItIsForgotten) {
+  TouchReader reader(calibration_);
+  const double rim_px = kBall.contact_mm / kScale;
+  const auto with_step = [&](int step) {
+    return frame(ball, moved([&](double distance) {
+                   return Eigen::Vector2d(1.5 * step * std::max(0.0, 1.0 - std::pow(distance / rim_px, 2)), 0.0);
+                 }));
+  };
+  reader.read({with_step(0), 0});
+  EXPECT_TRUE(reader.read({with_step(1), 1}).rim.slips());
+  reader.forget_slip();
+  EXPECT_FALSE(reader.read({with_step(2), 2}).rim.slips());  // nothing to compare with
+  EXPECT_TRUE(reader.read({with_step(3), 3}).rim.slips());
+}
+
+TEST_F(TouchReaderTest, WhatCannotBeReadIsRefused) {
+  TouchReader reader(calibration_);
+  reader.read({frame(nothing, rest_), 5});
+  EXPECT_THROW(reader.read({frame(nothing, rest_), 5}), Error);
+  EXPECT_THROW(reader.read({cv::Mat(90, 120, CV_8UC3, cv::Scalar(90, 90, 90)), 6}), Error);
+  EXPECT_THROW(reader.read({cv::Mat(kHeight, kWidth, CV_8UC1, cv::Scalar(90)), 6}), Error);
+  EXPECT_FALSE(reader.read({frame(nothing, rest_), 6}).patch);
+  EXPECT_THROW(TouchReader(calibration_, {.least_patch_px = 0}), Error);
+  TouchCalibration bad = calibration_;
+  bad.background = cv::Mat(kHeight, kWidth, CV_8UC3, cv::Scalar(90, 90, 90));  // no markers
+  EXPECT_THROW(TouchReader{bad}, Error);
+  bad = calibration_;
+  bad.background = calibration_.background(cv::Rect(0, 0, 200, 150)).clone();
+  EXPECT_THROW(TouchReader{bad}, Error);
+}
+
+}  // namespace
+}  // namespace touchstone::sensors

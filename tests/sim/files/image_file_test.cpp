@@ -1,0 +1,206 @@
+#include "sim/files/image_file.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <fstream>
+#include <limits>
+#include <opencv2/core.hpp>
+#include <thread>
+
+#include "core/error.h"
+#include "core/whole_file.h"
+
+// OpenImageIO loses an error message's 31 bytes with each damaged PNG, when libpng jumps over its destructors.
+extern "C" const char* __lsan_default_suppressions() {
+  return "leak:libOpenImageIO";
+}
+
+namespace touchstone::sim {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+cv::Mat pattern(int type, int width = 37, int height = 23) {
+  cv::Mat image(height, width, type);
+  cv::RNG random(7);
+  random.fill(image, cv::RNG::UNIFORM, 0, CV_MAT_DEPTH(type) == CV_8U ? 256 : 65536);
+  return image;
+}
+
+bool same(const cv::Mat& a, const cv::Mat& b) {
+  return a.type() == b.type() && a.size() == b.size() && cv::norm(a, b, cv::NORM_INF) == 0.0;
+}
+
+class ImageFile : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::path(testing::TempDir()) / ("touchstone_image_file_" + std::to_string(getpid()));
+    fs::create_directories(folder_);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  bool empty() const { return fs::directory_iterator(folder_) == fs::directory_iterator(); }
+
+  // What read_image says of the file.
+  std::string complaint(const fs::path& path) const {
+    try {
+      read_image(path);
+    } catch (const Error& error) {
+      EXPECT_THAT(error.what(), HasSubstr(path.string()));
+      EXPECT_THAT(error.what(), testing::Not(HasSubstr("\n")));
+      return error.what();
+    }
+    return "";
+  }
+
+  fs::path folder_;
+};
+
+TEST_F(ImageFile, PngGivesBackEachNumber) {
+  for (const int type : {CV_8UC1, CV_8UC3, CV_16UC1, CV_16UC3}) {
+    const cv::Mat image = pattern(type);
+    const cv::Mat before = image.clone();
+    write_png(folder_ / "a.png", image);
+    EXPECT_TRUE(same(read_image(folder_ / "a.png"), before)) << type;
+    EXPECT_TRUE(same(image, before)) << "the caller's picture is left alone";
+  }
+  const cv::Mat one = pattern(CV_8UC1, 1, 1);
+  write_png(folder_ / "a.png", one);
+  EXPECT_TRUE(same(read_image(folder_ / "a.png"), one));
+}
+
+TEST_F(ImageFile, PartOfAPictureIsWrittenRowByRow) {
+  const cv::Mat whole = pattern(CV_16UC1, 50, 40);
+  const cv::Mat part = whole(cv::Rect(7, 5, 20, 11));
+  ASSERT_FALSE(part.isContinuous());
+  write_png(folder_ / "a.png", part);
+  EXPECT_TRUE(same(read_image(folder_ / "a.png"), part.clone()));
+}
+
+// Writer and reader could both be wrong in the same way, so the file read here is made by hand.
+TEST_F(ImageFile, RedIsRedInTheFile) {
+  // A PPM: red, green, blue, white.
+  std::ofstream(folder_ / "hand.ppm", std::ios::binary) << "P6\n2 2\n255\n"
+                                                        << std::string("\xff\0\0\0\xff\0\0\0\xff\xff\xff\xff", 12);
+  const cv::Mat image = read_image(folder_ / "hand.ppm");
+  ASSERT_EQ(image.type(), CV_8UC3);
+  EXPECT_EQ(image.at<cv::Vec3b>(0, 0), cv::Vec3b(0, 0, 255));
+  EXPECT_EQ(image.at<cv::Vec3b>(0, 1), cv::Vec3b(0, 255, 0));
+  EXPECT_EQ(image.at<cv::Vec3b>(1, 0), cv::Vec3b(255, 0, 0));
+  write_png(folder_ / "a.png", image);
+  EXPECT_TRUE(same(read_image(folder_ / "a.png"), image));
+}
+
+TEST_F(ImageFile, SamePictureGivesTheSameBytesASecondLater) {
+  const cv::Mat frame = pattern(CV_8UC3);
+  cv::Mat light;
+  pattern(CV_16UC3).convertTo(light, CV_32F, 1e-4);
+  const auto write = [&](const std::string& name) {
+    write_png(folder_ / (name + ".png"), frame, {{"seed", "7"}});
+    write_exr(folder_ / (name + ".exr"), light, {"R", "G", "B"}, {{"seed", "7"}});
+  };
+  write("a");
+  std::this_thread::sleep_for(std::chrono::milliseconds(1200));  // time stamps in files count seconds
+  write("b");
+  EXPECT_TRUE(read_whole_file(folder_ / "a.png") == read_whole_file(folder_ / "b.png"));
+  EXPECT_TRUE(read_whole_file(folder_ / "a.exr") == read_whole_file(folder_ / "b.exr"));
+}
+
+TEST_F(ImageFile, ExrGivesBackEachFloatByItsChannelsName) {
+  cv::Mat light;
+  pattern(CV_16UC3).convertTo(light, CV_32F, 1e-3);
+  light.at<cv::Vec3f>(3, 4) = {1e-30F, 3e30F, -0.0F};
+  write_exr(folder_ / "a.exr", light, {"R", "G", "B"});
+  const LinearImage read = read_exr(folder_ / "a.exr");
+  EXPECT_EQ(read.channel_names, (std::vector<std::string>{"R", "G", "B"}));
+  EXPECT_TRUE(same(read.image, light));
+
+  const std::vector<std::string> names = {"540nm", "450nm"};  // not in the order that the file keeps
+  const cv::Mat two(5, 4, CV_32FC2, cv::Scalar(5.0, 4.0));
+  write_exr(folder_ / "b.exr", two, names);
+  const LinearImage sorted = read_exr(folder_ / "b.exr");
+  ASSERT_EQ(sorted.channel_names.size(), 2u);
+  for (int i = 0; i < 2; ++i) {
+    EXPECT_EQ(sorted.image.at<cv::Vec2f>(2, 2)[i], sorted.channel_names[i] == "540nm" ? 5.0F : 4.0F);
+  }
+  const cv::Mat grey(3, 3, CV_32FC1, cv::Scalar(0.125));
+  write_exr(folder_ / "c.exr", grey, {"Y"});
+  EXPECT_TRUE(same(read_exr(folder_ / "c.exr").image, grey));
+}
+
+TEST_F(ImageFile, MetadataIsKept) {
+  write_png(folder_ / "a.png", pattern(CV_8UC1), {{"touchstone.seed", "18446744073709551615"}, {"unit", "DN"}});
+  EXPECT_EQ(image_metadata(folder_ / "a.png", "touchstone.seed"), "18446744073709551615");
+  EXPECT_EQ(image_metadata(folder_ / "a.png", "unit"), "DN");
+  EXPECT_EQ(image_metadata(folder_ / "a.png", "nothing"), "");
+  write_exr(folder_ / "a.exr", cv::Mat(2, 2, CV_32FC1, cv::Scalar(1)), {"Y"}, {{"unit", "W/m^2"}});
+  EXPECT_EQ(image_metadata(folder_ / "a.exr", "unit"), "W/m^2");
+  EXPECT_THROW(write_png(folder_ / "b.png", pattern(CV_8UC1), {{"", "x"}}), Error);
+  EXPECT_THROW(write_png(folder_ / "b.png", pattern(CV_8UC1), {{"DateTime", "2026:01:01 00:00:00"}}), Error);
+  EXPECT_FALSE(fs::exists(folder_ / "b.png"));
+}
+
+TEST_F(ImageFile, PicturesThatTheFormatCannotHoldAreRefused) {
+  for (const cv::Mat& bad : {cv::Mat(), cv::Mat(3, 3, CV_32FC1), cv::Mat(3, 3, CV_8UC2), cv::Mat(3, 3, CV_16SC1)}) {
+    EXPECT_THROW(write_png(folder_ / "a.png", bad), Error);
+  }
+  EXPECT_THROW(write_exr(folder_ / "a.exr", cv::Mat(), {}), Error);
+  EXPECT_THROW(write_exr(folder_ / "a.exr", pattern(CV_8UC1), {"Y"}), Error);
+  const cv::Mat two(3, 3, CV_32FC2, cv::Scalar::all(0));
+  EXPECT_THROW(write_exr(folder_ / "a.exr", two, {"Y"}), Error);
+  EXPECT_THROW(write_exr(folder_ / "a.exr", two, {"Y", "Y"}), Error);
+  EXPECT_THROW(write_exr(folder_ / "a.exr", two, {"Y", ""}), Error);
+  EXPECT_TRUE(empty()) << "nothing is written";
+}
+
+TEST_F(ImageFile, PlacesThatCannotBeWrittenAreNamed) {
+  const fs::path path = folder_ / "missing" / "a.png";
+  try {
+    write_png(path, pattern(CV_8UC1));
+    ADD_FAILURE() << "wrote into a folder that isn't there";
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), HasSubstr(path.string()));
+  }
+  EXPECT_TRUE(empty());
+}
+
+TEST_F(ImageFile, DamagedFilesAreRefusedByName) {
+  EXPECT_THAT(complaint(folder_ / "missing.png"), HasSubstr("no such file"));
+  EXPECT_NE(complaint(folder_), "") << "a folder";
+  write_whole_file(folder_ / "empty.png", "");
+  EXPECT_NE(complaint(folder_ / "empty.png"), "");
+  write_whole_file(folder_ / "text.png", "this is no picture\n");
+  EXPECT_NE(complaint(folder_ / "text.png"), "");
+  write_png(folder_ / "a.png", pattern(CV_8UC3, 200, 100));
+  const std::string whole = read_whole_file(folder_ / "a.png");
+  for (const std::size_t length : {whole.size() / 2, std::size_t{40}, std::size_t{8}}) {
+    write_whole_file(folder_ / "short.png", whole.substr(0, length));
+    EXPECT_NE(complaint(folder_ / "short.png"), "") << length << " bytes of " << whole.size();
+  }
+  write_exr(folder_ / "a.exr", cv::Mat(2, 2, CV_32FC1, cv::Scalar(1)), {"Y"});
+  EXPECT_THAT(complaint(folder_ / "a.exr"), HasSubstr("floats"));
+  EXPECT_THROW(read_exr(folder_ / "a.png"), Error);
+}
+
+// The promise that commands which touch no image file don't pay for OpenImageIO.
+TEST(ImageModule, IsLoadedByTheFirstUseOnly) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");  // a new process, in which nothing was read yet
+  const auto loaded = [] { return read_whole_file("/proc/self/maps").find("libOpenImageIO.so") != std::string::npos; };
+  EXPECT_EXIT(
+      {
+        const bool before = loaded();
+        try {
+          read_image("/proc/self/exe");
+        } catch (const Error&) {
+        }
+        _exit(!before && loaded() ? 0 : 1);
+      },
+      testing::ExitedWithCode(0), "");
+}
+
+}  // namespace
+}  // namespace touchstone::sim

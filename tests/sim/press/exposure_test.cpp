@@ -1,0 +1,221 @@
+// Motion blur and rolling shutter: what a camera makes of motion within a frame.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <opencv2/core.hpp>
+
+#include "sim/plan/image_motion.h"
+#include "sim/press/exposure_times.h"
+#include "sim/press/played_states.h"
+#include "sim/press/state_between.h"
+#include "tests/sim/press/moving_scene.h"
+
+namespace touchstone::sim {
+namespace {
+
+using ::testing::HasSubstr;
+
+/// A glowing bar that passes in the air through a dark picture, 40 mm/s to the right; 10 ms a frame.
+SceneSpec passing_bar() {
+  SceneSpec scene = moving_scene("  - {frames: 2, x: {position_mm: 0.4}}\n");
+  scene.object = parse_yaml<ObjectSpec>(
+      "name: bar\nshape: {type: box, size_mm: [1, 2.5, 0.5]}\nradiance: [5, 5, 5]\nfriction: 0\n", "object.yaml");
+  scene.motion.start_mm = {-0.4, 0.0, 0.5};
+  scene.device.lamps.clear();
+  scene.device.room_radiance = 0.0;
+  scene.device.beads.reset();
+  scene.device.camera->exposure_us = 8000.0;
+  scene.outputs = {.frames = false, .ideal = false, .radiance = true};
+  scene.light.min_samples = scene.light.max_samples = 128;
+  scene.light.noise_fraction = 1e-6;
+  return scene;
+}
+
+cv::Mat green_of(const Capture& capture) {
+  cv::Mat green;
+  cv::extractChannel(capture.radiance, green, 1);
+  return green;
+}
+
+struct Films {
+  Plan plan;
+  std::vector<Truth> truths;
+  std::vector<cv::Mat> pictures;  // green band, of the first frames
+};
+
+Films film(const SceneSpec& scene, std::size_t frames) {
+  Films films;
+  films.plan = make_plan(scene);
+  films.truths = play_motion(scene, films.plan, *moving_gel());
+  const VirtualCamera camera(scene, films.plan, *moving_gel(), films.truths.front());
+  for (std::size_t i = 0; i < frames; ++i) {
+    films.pictures.push_back(green_of(camera.capture(films.truths[i])));
+  }
+  return films;
+}
+
+/// Sum, mean column and variance over columns of some rows' light.
+struct Moments {
+  double sum = 0.0, mean = 0.0, variance = 0.0;
+  explicit Moments(const cv::Mat& picture) {
+    double square = 0.0;
+    for (int y = 0; y < picture.rows; ++y) {
+      for (int x = 0; x < picture.cols; ++x) {
+        const double light = picture.at<float>(y, x);
+        sum += light;
+        mean += light * (x + 0.5);
+        square += light * (x + 0.5) * (x + 0.5);
+      }
+    }
+    mean /= sum;
+    variance = square / sum - mean * mean;
+  }
+};
+
+TEST(MotionBlur, IsLeftOutWhereTheHoleBlursMore) {
+  SceneSpec scene = passing_bar();
+  EXPECT_TRUE(make_plan(scene).motion_blur);
+  scene.device.camera->hole_diameter_um = 2000;
+  EXPECT_FALSE(make_plan(scene).motion_blur);
+  scene.effects.motion_blur = Switch::on;
+  EXPECT_TRUE(make_plan(scene).motion_blur);
+}
+
+// A disc of diameter d has the variance d^2 / 16 along a line, a pixel 1/12: a disc of 4 pixels is sqrt(13) times as
+// wide.
+TEST(MotionBlur, PointImagesAreAsWideAsHoleAndPixelMakeThem) {
+  DeviceSpec device = passing_bar().device;
+  device.gel.refractive_index = device.plate.refractive_index = 1.0;
+  device.camera->hole_position_mm = {0, 0, -20};
+  device.camera->hole_to_sensor_mm = 5;
+  device.camera->hole_diameter_um = 1e-6;
+  EXPECT_NEAR(ImageScale(device).point_width(), 1.0, 1e-9);
+  device.camera->hole_diameter_um =
+      4 * device.camera->pixel_pitch_um / 1.25;  // the shadow of the hole is 1 + 5/20 wide
+  EXPECT_NEAR(ImageScale(device).point_width(), std::sqrt(13.0), 1e-9);
+}
+
+TEST(MotionBlur, MovesTheMeanByHalfTheWayAndAddsATwelfthOfItsSquare) {
+  const SceneSpec scene = passing_bar();
+  const Films blurred = film(scene, 1);
+  EXPECT_TRUE(blurred.plan.motion_blur);
+  EXPECT_FALSE(blurred.plan.rolling_shutter);
+  const ExposureTimes times(scene, blurred.plan);
+  const std::vector<double> moments = times.of(blurred.truths[0]);
+  EXPECT_EQ(times.window_s(), 0.008);
+  EXPECT_GE(moments.size(), 5u);
+
+  // Sharp pictures from begin to end of the exposure.
+  SceneSpec sharp = scene;
+  sharp.effects.motion_blur = Switch::off;
+  const VirtualCamera camera(sharp, make_plan(sharp), *moving_gel(), blurred.truths[0]);
+  std::vector<Moments> at;
+  double own_variance = 0.0;
+  constexpr int kPictures = 6;
+  for (int i = 0; i < kPictures; ++i) {
+    Truth truth;
+    truth.press = state_after(blurred.truths[0], times.window_s() * i / (kPictures - 1));
+    at.emplace_back(green_of(camera.capture_whole(truth)));
+    own_variance += at.back().variance / kPictures;
+  }
+  const double way = at.back().mean - at.front().mean;
+  EXPECT_GT(way, 1.0);
+  const Moments with_blur(blurred.pictures[0]);
+  EXPECT_NEAR(with_blur.sum / at.front().sum, 1.0, 0.01);
+  EXPECT_NEAR(with_blur.mean - at.front().mean, way / 2, 0.02 * way);
+  // Between moments light runs straight, which blurs by a sixth of their distance's square more.
+  const double step = way / static_cast<double>(moments.size() - 1);
+  const double expected = way * way / 12 + step * step / 6;
+  EXPECT_NEAR(with_blur.variance - own_variance, expected, 0.1 * expected);
+}
+
+TEST(MotionBlur, TheLastFrameStandsStill) {
+  SceneSpec scene = passing_bar();
+  scene.light.min_samples = scene.light.max_samples = 8;
+  const Films blurred = film(scene, 3);
+  scene.effects.motion_blur = Switch::off;
+  const Films sharp = film(scene, 3);
+  EXPECT_EQ(cv::norm(blurred.pictures.back(), sharp.pictures.back(), cv::NORM_INF), 0.0);
+  EXPECT_TRUE(blurred.truths.back().later.empty());
+}
+
+TEST(MotionBlur, WhatIsOffKeepsNoStates) {
+  SceneSpec scene = passing_bar();
+  scene.effects.motion_blur = Switch::off;
+  const Plan plan = make_plan(scene);
+  EXPECT_EQ(plan.states_a_frame, 1);
+  for (const Truth& truth : play_motion(scene, plan, *moving_gel())) EXPECT_TRUE(truth.later.empty());
+}
+
+TEST(MotionBlur, ASlowMotionNeedsNone) {
+  SceneSpec scene = passing_bar();
+  scene.device.camera->exposure_us = 100.0;
+  EXPECT_FALSE(make_plan(scene).motion_blur);
+  scene.effects.motion_blur = Switch::on;
+  const Plan plan = make_plan(scene);
+  EXPECT_TRUE(plan.motion_blur);
+  for (const Truth& truth : play_motion(scene, plan, *moving_gel())) {
+    EXPECT_TRUE(truth.later.empty()) << "states of a frame in which nothing moves";
+  }
+}
+
+TEST(RollingShutter, RowsSeeTheMotionAtTheirOwnTime) {
+  SceneSpec scene = passing_bar();
+  scene.device.camera->exposure_us = 100.0;
+  const Films global = film(scene, 2);
+  scene.device.camera->row_time_us = 300.0;
+  const Films rolling = film(scene, 1);
+  EXPECT_TRUE(rolling.plan.rolling_shutter);
+  EXPECT_FALSE(rolling.plan.motion_blur);
+  const double per_s = (Moments(global.pictures[1]).mean - Moments(global.pictures[0]).mean) / 0.01;
+  for (const int row : {11, 15, 19}) {
+    const double skew = Moments(rolling.pictures[0].row(row)).mean - Moments(global.pictures[0].row(row)).mean;
+    EXPECT_NEAR(skew, per_s * row * 300e-6, 0.05) << "row " << row;
+  }
+}
+
+TEST(ImageMotion, ABarMovesAsFarAsItsPicture) {
+  SceneSpec scene = passing_bar();
+  scene.effects.motion_blur = Switch::off;
+  const Films sharp = film(scene, 2);
+  const double seen = Moments(sharp.pictures[1]).mean - Moments(sharp.pictures[0]).mean;
+  const ImageScale scale(scene.device);
+  const double told = image_motion(scale, sharp.truths[0].press, sharp.truths[1].press, largest_object_radius(scene));
+  EXPECT_GE(told, seen) << "an estimate from above";
+  EXPECT_LT(told, 1.2 * seen);
+  EXPECT_NEAR(motion_speed(scene).pixels_per_s, 100.0 * told, 1e-6 * told);
+}
+
+TEST(StateBetween, IsNearWhatIsPlayedThere) {
+  SceneSpec scene = moving_scene("  - {frames: 4, z: {position_mm: 1.8}}\n");
+  scene.outputs = {.frames = false, .ideal = false};
+  scene.outputs.events = true;
+  Plan plan = make_plan(scene);
+  constexpr int kFiner = 4;
+  const int kept = plan.states_a_frame;
+  const double way = 0.05 / kept;  // of the ball from one kept state to the next
+  EXPECT_LE(way, 0.02);
+  plan.states_a_frame *= kFiner;
+  std::vector<fem::PressState> states;
+  play_states(scene, plan, *moving_gel(), nullptr, {},
+              [&](int, int, const fem::PressState& state) { states.push_back(state); });
+  ASSERT_EQ(static_cast<int>(states.size()), 1 + 4 * kept * kFiner);
+  double worst = 0.0;
+  for (std::size_t f = 0; f + kFiner < states.size(); f += kFiner) {
+    for (std::size_t k = 1; k < kFiner; ++k) {
+      const fem::PressState state = state_between(states[f], states[f + kFiner], static_cast<double>(k) / kFiner);
+      const fem::PressState& played = states[f + k];
+      EXPECT_NEAR(state.gel_from_object.translation.z(), played.gel_from_object.translation.z(), 1e-12);
+      worst = std::max(worst, (state.surface_displacement - played.surface_displacement).cwiseAbs().maxCoeff());
+    }
+  }
+  // A vertex that is met in between stands still first and then goes with the ball, which a straight line misses by at
+  // most a quarter of the way; the projection on hat functions, which the displacement is, overshoots that.
+  EXPECT_LT(worst, way / 2);
+  EXPECT_GT(worst, 0.0);
+}
+
+}  // namespace
+}  // namespace touchstone::sim

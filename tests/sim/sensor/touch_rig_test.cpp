@@ -1,0 +1,143 @@
+#include "sim/sensor/touch_rig.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <tbb/parallel_for.h>
+
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "core/error.h"
+#include "core/whole_file.h"
+#include "tests/support/small_scene.h"
+#include "tests/support/temporary_folder.h"
+
+namespace touchstone::sim {
+namespace {
+
+using ::testing::HasSubstr;
+
+/// Made once: the gel's set-up takes longest.
+const TouchRig& rig() {
+  static const test::TemporaryFolder cache;
+  static const TouchRig one(test::small_coated_device(), cache.path());
+  return one;
+}
+
+ObjectSpec ball(double radius_mm) {
+  ObjectSpec object;
+  object.name = "ball";
+  object.shape.radius_mm = radius_mm;
+  object.friction = 0.5;
+  return object;
+}
+
+MotionSpec press(double x, double y, double from, double to) {
+  MotionSpec motion;
+  motion.start_mm = {x, y, from};
+  MotionKey key;
+  key.z = AxisKey{to, std::nullopt};
+  motion.keys = {key};
+  return motion;
+}
+
+TEST(TouchRig, PlacesAndPixelsAreOneMapInBothDirections) {
+  for (const Eigen::Vector2d& place : {Eigen::Vector2d(0, 0), Eigen::Vector2d(1.5, -1.0), Eigen::Vector2d(-2.0, 0.7)}) {
+    EXPECT_LT((rig().gel_from_pixel(rig().pixel_from_gel(place)) - place).norm(), 1e-7);
+  }
+  const double step = (rig().gel_from_pixel({41, 30}) - rig().gel_from_pixel({40, 30})).norm();
+  EXPECT_NEAR(step, rig().mm_per_px(), 0.01 * step);
+}
+
+TEST(TouchRig, WhatDoesNotTouchLeavesTheBackgroundAndNoHeight) {
+  const TouchObject object = rig().object(ball(2));
+  const auto states = rig().play(object, press(0, 0, 5, 4));
+  const Touch touch = rig().look(object, states.back().press, 3, 1);
+  EXPECT_EQ(cv::norm(touch.frame, rig().background(3, 1), cv::NORM_INF), 0.0);
+  EXPECT_NE(cv::norm(touch.frame, rig().background(4, 1), cv::NORM_INF), 0.0) << "noise has a seed";
+  EXPECT_EQ(cv::countNonZero(touch.contact), 0);
+  EXPECT_LT(cv::norm(touch.height, cv::NORM_INF), 1e-6);
+}
+
+TEST(TouchRig, APressedBallIsSeenWhereItIsAndAsDeepAsItIs) {
+  const TouchObject object = rig().object(ball(4));
+  const auto states = rig().play(object, press(0.8, -0.5, 4.1, 3.6));
+  const Touch touch = rig().look(object, states.back().press, 3);
+  double deepest = 0.0;
+  cv::Point where;
+  cv::minMaxLoc(touch.height, nullptr, &deepest, nullptr, &where);
+  EXPECT_NEAR(deepest, 0.4, 0.02) << "the fine contact keeps the force and shifts the object a little";
+  const Eigen::Vector2d wanted = rig().pixel_from_gel({0.8, -0.5});
+  EXPECT_LT((Eigen::Vector2d(where.x + 0.5, where.y + 0.5) - wanted).norm(), 1.5);
+  const double seen_mm2 = cv::countNonZero(touch.contact) * std::pow(rig().mm_per_px(), 2);
+  EXPECT_NEAR(seen_mm2, states.back().press.contact_area, 0.15 * states.back().press.contact_area);
+  EXPECT_GT(cv::norm(touch.frame, rig().background(3), cv::NORM_INF), 20.0) << "its flanks are lit differently";
+}
+
+TEST(TouchRig, LooksAreTheSameFromAnyNumberOfThreads) {
+  const TouchObject object = rig().object(ball(1.5));
+  const auto states = rig().play(object, press(-0.5, 0.5, 1.6, 1.2));
+  const Touch alone = rig().look(object, states.back().press, 5);
+  std::vector<Touch> many(6);
+  tbb::parallel_for(0, 6, [&](int i) { many[i] = rig().look(object, states.back().press, 5); });
+  for (const Touch& one : many) {
+    EXPECT_EQ(cv::norm(one.frame, alone.frame, cv::NORM_INF), 0.0);
+    EXPECT_EQ(cv::norm(one.height, alone.height, cv::NORM_INF), 0.0);
+  }
+}
+
+TEST(TouchRig, LightThatWasKeptMakesTheSameFrames) {
+  const test::TemporaryFolder cache;
+  TouchRigSettings settings;
+  settings.light_key = "this device, this program";
+  const auto frame_of = [&](const TouchRig& one) {
+    const TouchObject object = one.object(ball(2));
+    return one.look(object, one.play(object, press(0.3, 0, 2.05, 1.8)).back().press, 3).light;
+  };
+  const auto kept = [&] {
+    std::vector<std::filesystem::path> files;
+    for (const auto& entry : std::filesystem::directory_iterator(cache.path())) {
+      if (entry.path().filename().string().starts_with("light-")) files.push_back(entry.path());
+    }
+    return files;
+  };
+  const TouchRig first(test::small_coated_device(), cache.path(), settings);
+  ASSERT_EQ(kept().size(), 1U);
+  const cv::Mat light = frame_of(first);
+  EXPECT_EQ(cv::norm(light, frame_of(rig()), cv::NORM_INF), 0.0) << "one that keeps none";
+  std::string content = read_whole_file(kept().front());
+  const TouchRig second(test::small_coated_device(), cache.path(), settings);
+  EXPECT_EQ(second.light().reason, first.light().reason);
+  EXPECT_EQ(second.light().error->rms, first.light().error->rms);
+  EXPECT_EQ(cv::norm(light, frame_of(second), cv::NORM_INF), 0.0);
+  EXPECT_EQ(cv::norm(first.background_light(), second.background_light(), cv::NORM_INF), 0.0);
+
+  content[content.size() / 2] ^= 1;
+  write_whole_file(kept().front(), content);
+  const TouchRig third(test::small_coated_device(), cache.path(), settings);
+  EXPECT_EQ(cv::norm(light, frame_of(third), cv::NORM_INF), 0.0) << "a damaged file is made anew";
+  EXPECT_NE(read_whole_file(kept().front()), content);
+
+  settings.deepest_mm *= 0.9;
+  const TouchRig fourth(test::small_coated_device(), cache.path(), settings);
+  EXPECT_EQ(kept().size(), 2U);
+}
+
+TEST(TouchRig, RefusesWhatItCannotShow) {
+  const test::TemporaryFolder cache;
+  const auto error_of = [](const auto& act) -> std::string {
+    try {
+      act();
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_THAT(error_of([&] { TouchRig(test::small_device(), cache.path()); }), HasSubstr("has no coating"));
+  const TouchObject object = rig().object(ball(2));
+  const auto states = rig().play(object, press(0, 0, 2.1, 0.2));
+  EXPECT_THAT(error_of([&] { rig().look(object, states.back().press, 1); }), HasSubstr("beyond the 1.2 mm in"));
+}
+
+}  // namespace
+}  // namespace touchstone::sim
