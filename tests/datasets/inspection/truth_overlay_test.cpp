@@ -38,6 +38,7 @@ constexpr const char* kScene =
 constexpr std::size_t kStraight = 2;  // the sample pressed straight down
 constexpr std::size_t kSheared = 4;
 constexpr double kEdge_mm = 0.5;
+constexpr double kArrow_px_per_N = 40.0;
 
 /// A set as `touchstone generate` makes it, made once: what is drawn is compared to its layers of pixel truth.
 class TruthOverlay : public ::testing::Test {
@@ -48,8 +49,8 @@ class TruthOverlay : public ::testing::Test {
     folder_->write("object.yaml", kObject);
     folder_->write("motion.yaml", kMotion);
     folder_->write("scene.yaml", kScene);
-    const auto job =
-        folder_->write("job.yaml", "name: askew\nseed: 3\nscenes:\n  - {name: press, scene: scene.yaml, split: train}\n");
+    const auto job = folder_->write(
+        "job.yaml", "name: askew\nseed: 3\nscenes:\n  - {name: press, scene: scene.yaml, split: train}\n");
     generate(job, folder_->path() / "set", {.source = simulator(folder_->path() / "cache")});
     set_ = new InspectedSet(read_inspected_set(folder_->path() / "set"));
     view_ = new GelView(prepare_job(job).scenes.front().spec.device);
@@ -64,7 +65,8 @@ class TruthOverlay : public ::testing::Test {
   static InspectedGel gel(std::size_t i) { return read_inspected_gel(*set_, i); }
   /// 255 where a pixel sees `id`.
   static cv::Mat seen(std::size_t i, int id) {
-    const sim::LinearImage truth = sim::read_exr(set_->folder / picture_name("pixels", "press", sample(i).frame, "exr"));
+    const sim::LinearImage truth =
+        sim::read_exr(set_->folder / picture_name("pixels", "press", sample(i).frame, "exr"));
     const auto at = std::find(truth.channel_names.begin(), truth.channel_names.end(), "id.ID");
     EXPECT_NE(at, truth.channel_names.end());
     cv::Mat ids;
@@ -125,7 +127,7 @@ TEST_F(TruthOverlay, CirclesStandAroundTheBeadsPixels) {
     const cv::Point2d expected = bead_seen(kSheared, bead);
     InspectedGel one = gel(kSheared);
     one.beads = {one.beads[static_cast<std::size_t>(bead)]};
-    const cv::Mat drawn = draw_truth(picture(), still(kSheared), one, *view_, {});
+    const cv::Mat drawn = draw_truth(picture(), still(kSheared), one, *view_, {}, kArrow_px_per_N);
     ASSERT_EQ(drawn.size(), cv::Size(480, 360));
     const cv::Mat circle = blue(drawn);
     ASSERT_GT(cv::countNonZero(circle), 10) << "bead " << bead;
@@ -142,7 +144,7 @@ TEST_F(TruthOverlay, TheCrossStandsWhereTheObjectIs) {
   InspectedGel bare = gel(kStraight);
   bare.beads.clear();
   bare.contact.assign(bare.contact.size(), false);
-  const cv::Mat cross = red(draw_truth(picture(), still(kStraight), bare, *view_, {}));
+  const cv::Mat cross = red(draw_truth(picture(), still(kStraight), bare, *view_, {}, kArrow_px_per_N));
   ASSERT_GT(cv::countNonZero(cross), 10);
   const cv::Point2d drawn = in_picture(middle_of(cross));
   EXPECT_LT(cv::norm(drawn - expected), 0.7) << drawn << ", the contact's middle is " << expected;
@@ -153,7 +155,7 @@ TEST_F(TruthOverlay, TheRimOfTheMeshRunsAroundTheContactsPixels) {
   ASSERT_GT(cv::countNonZero(contact), 300);
   InspectedGel bare = gel(kSheared);
   bare.beads.clear();
-  const cv::Mat rim = green(draw_truth(picture(), still(kSheared), bare, *view_, {}));
+  const cv::Mat rim = green(draw_truth(picture(), still(kSheared), bare, *view_, {}, kArrow_px_per_N));
   ASSERT_GT(cv::countNonZero(rim), 100);
   // Which mesh nodes touch is known to half an edge.
   const double px_per_mm = cv::norm(bead_seen(0, 1) - bead_seen(0, 0)) / 4.6;
@@ -171,7 +173,8 @@ TEST_F(TruthOverlay, TheRimOfTheMeshRunsAroundTheContactsPixels) {
     }
   }
   EXPECT_LT(worst / kScale, 0.5 * kEdge_mm * px_per_mm + 1.5);
-  EXPECT_LT(std::abs(off / cv::countNonZero(rim)) / kScale, 0.25 * kEdge_mm * px_per_mm) << "neither too wide nor too narrow";
+  EXPECT_LT(std::abs(off / cv::countNonZero(rim)) / kScale, 0.25 * kEdge_mm * px_per_mm)
+      << "neither too wide nor too narrow";
   // It goes all the way round: what is within it can't be left.
   cv::Mat closed = rim.clone();
   cv::floodFill(closed, cv::Point(0, 0), 255, nullptr, {}, {}, 4);
@@ -183,7 +186,7 @@ TEST_F(TruthOverlay, TheRimOfAMaskIsTheMasksOwn) {
   const cv::Mat contact = inspected_contact(*set_, kSheared);
   InspectedGel bare = gel(kSheared);
   bare.beads.clear();
-  const cv::Mat rim = green(draw_truth(picture(), still(kSheared), bare, *view_, contact));
+  const cv::Mat rim = green(draw_truth(picture(), still(kSheared), bare, *view_, contact, kArrow_px_per_N));
   ASSERT_GT(cv::countNonZero(rim), 100);
   cv::Mat large, wide, narrow;
   cv::resize(contact, large, rim.size(), 0, 0, cv::INTER_NEAREST);
@@ -201,8 +204,8 @@ TEST_F(TruthOverlay, TheArrowPointsAlongTheShear) {
   InspectedGel bare = gel(kSheared);
   bare.beads.clear();
   bare.contact.assign(bare.contact.size(), false);
-  const cv::Mat cross = red(draw_truth(picture(), still(kSheared), bare, *view_, {}));
-  const cv::Mat both = red(draw_truth(picture(), strong, bare, *view_, {}));
+  const cv::Mat cross = red(draw_truth(picture(), still(kSheared), bare, *view_, {}, kArrow_px_per_N));
+  const cv::Mat both = red(draw_truth(picture(), strong, bare, *view_, {}, kArrow_px_per_N));
   const cv::Point2d foot = middle_of(cross);
   cv::Point2d tip = foot;
   for (int row = 0; row < both.rows; ++row) {
