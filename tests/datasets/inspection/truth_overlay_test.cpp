@@ -196,6 +196,46 @@ TEST_F(TruthOverlay, TheRimOfAMaskIsTheMasksOwn) {
   EXPECT_EQ(cv::countNonZero(rim & ~wide), 0) << "nothing outside it";
 }
 
+TEST_F(TruthOverlay, BeadsBeforeTheContactAreNoRim) {
+  InspectedGel one = gel(kSheared);
+  one.beads.resize(1);
+  const cv::Point bead = bead_seen(kSheared, 0);
+  const cv::Point real(bead.x + 24, bead.y);
+  cv::Mat contact = cv::Mat::zeros(120, 160, CV_8U);
+  cv::circle(contact, bead, 36, 255, cv::FILLED);
+  cv::circle(contact, bead, 8, 0, cv::FILLED);
+  cv::circle(contact, real, 8, 0, cv::FILLED);
+  const cv::Mat rim = green(draw_truth(picture(), still(kSheared), one, *view_, contact, kArrow_px_per_N));
+  const auto around = [&](const cv::Point& place) {
+    cv::Mat disc = cv::Mat::zeros(rim.size(), CV_8U);
+    cv::circle(disc, kScale * place, kScale * 11, 255, cv::FILLED);
+    return cv::countNonZero(rim & disc);
+  };
+  EXPECT_EQ(around(bead), 0);
+  EXPECT_GT(around(real), 50) << "what isn't touched has a rim";
+}
+
+TEST_F(TruthOverlay, WithoutTheCameraNothingIsDrawnThatWouldNeedIt) {
+  const cv::Mat contact = inspected_contact(*set_, kSheared);
+  const cv::Mat with = draw_truth(picture(), sample(kSheared), gel(kSheared), {}, contact, kArrow_px_per_N);
+  EXPECT_GT(cv::countNonZero(green(with)), 100) << "the mask is the picture's own";
+  EXPECT_EQ(cv::countNonZero(red(with)) + cv::countNonZero(blue(with)), 0);
+  const cv::Mat without = draw_truth(picture(), sample(kSheared), gel(kSheared), {}, {}, kArrow_px_per_N);
+  cv::Mat grey;
+  cv::cvtColor(without, grey, cv::COLOR_BGR2GRAY);
+  EXPECT_GT(cv::countNonZero(grey), 0) << "the words";
+  EXPECT_EQ(cv::countNonZero(without_words(grey)), 0);
+}
+
+TEST(ArrowScale, TheLargestForceAlongTheGelFillsAQuarterOfASmallPicture) {
+  std::vector<InspectedSample> samples(3);
+  EXPECT_DOUBLE_EQ(arrow_scale_px_per_N(samples), 200.0);
+  samples[1].wrench << 0.9, -1.2, 7.0, 0, 0, 0;
+  EXPECT_DOUBLE_EQ(arrow_scale_px_per_N(samples), 80.0);
+  samples[1].wrench << 0.003, 0.004, 7.0, 0, 0, 0;
+  EXPECT_DOUBLE_EQ(arrow_scale_px_per_N(samples), 200.0) << "next to nothing stays next to nothing";
+}
+
 TEST_F(TruthOverlay, TheArrowPointsAlongTheShear) {
   const InspectedSample& one = sample(kSheared);
   ASSERT_GT(one.wrench.head<2>().norm(), 0.1);
