@@ -6,21 +6,17 @@
 
 #include "core/edited_yaml.h"
 #include "core/random.h"
+#include "core/transform.h"
 #include "core/units.h"
 #include "core/whole_file.h"
-#include "sim/relief/relief.h"
-#include "sim/scene/device_gel.h"
 
 namespace touchstone::datasets {
 namespace {
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-constexpr double kClearance_mm = 0.05;  // above the gel at the start
-constexpr double kDeepestShare = 0.4;   // of the gel's thickness, where the job doesn't say
+constexpr double kDeepestShare = 0.4;  // of the gel's thickness, where the job doesn't say
 constexpr double kLeastWidest_mm = 0.5;
 constexpr double kSpareWidth_mm = 0.2;
-constexpr double kDragStep_mm = 0.1;  // friction's history is stepped so finely
-constexpr int kPressSteps = 3;        // where there is friction
 constexpr std::int64_t kPiecesChecked = 20;
 constexpr double kMostSamples = 1e12;  // so that products with units stay whole numbers
 
@@ -75,19 +71,6 @@ void require_touchable(const sim::DeviceSpec& device, const PreparedDraw& prepar
     fail_at(prepared.job.where, "draw: presses of up to {} mm, but the gel of device {} is {} mm thick",
             prepared.deepest_mm, device.name, device.gel.thickness_mm);
   }
-}
-
-/// Of the object with its relief, turned, below its origin.
-double lowest_point(const sim::ObjectSpec& object, const Eigen::Matrix3d& rotation) {
-  double low = std::numeric_limits<double>::infinity();
-  if (object.shape.type == sim::ShapeKind::sphere) {
-    low = -object.shape.radius_mm;
-  } else {
-    for (const Eigen::Vector3d& vertex : sim::visible_mesh(object.shape).vertices) {
-      low = std::min(low, rotation.row(2).dot(vertex));
-    }
-  }
-  return low - (object.relief ? sim::relief_map(*object.relief).highest() : 0.0);
 }
 
 std::vector<DrawnBlock> blocks_of(const DrawJob& job) {
@@ -233,36 +216,18 @@ Eigen::Matrix3d rotation_of(const DrawnTouch& touch) {
          Eigen::AngleAxisd(touch.turn_deg * kRadiansPerDegree, Eigen::Vector3d::UnitZ()).toRotationMatrix();
 }
 
-sim::MotionSpec motion_of(const DrawnTouch& touch, const sim::ObjectSpec& object, const sim::DeviceSpec& device) {
-  const Eigen::Matrix3d rotation = rotation_of(touch);
-  sim::MotionSpec motion;
-  motion.frame_rate_Hz = device.camera->frame_rate_Hz;
-  const double level = sim::rest_height(device.gel, touch.place_mm);
-  const double touching = level - lowest_point(object, rotation);
-  motion.start_mm << touch.place_mm, touching + kClearance_mm;
-  // R = Rz Ry Rx.
-  motion.start_angles_deg =
-      Eigen::Vector3d(std::atan2(rotation(2, 1), rotation(2, 2)), -std::asin(std::clamp(rotation(2, 0), -1.0, 1.0)),
-                      std::atan2(rotation(1, 0), rotation(0, 0))) /
-      kRadiansPerDegree;
-  const bool rubs = object.friction > 0.0 && (touch.drag_mm > 0.0 || touch.tilt_deg > 0.0);  // else straight in
-  sim::MotionKey press;
-  press.frames = rubs ? kPressSteps : 1;
+sim::PressSpec press_of(const DrawnTouch& touch) {
+  const double toward = touch.drag_toward_deg * kRadiansPerDegree;
+  sim::PressSpec press;
+  press.place_mm = touch.place_mm;
+  press.angles_deg = xyz_from_rotation(rotation_of(touch)) / kRadiansPerDegree;
   if (std::isnan(touch.depth_mm)) {
-    press.z = sim::AxisKey{std::nullopt, touch.force_N};
+    press.force_N = touch.force_N;
   } else {
-    press.z = sim::AxisKey{touching - touch.depth_mm, std::nullopt};
+    press.depth_mm = touch.depth_mm;
   }
-  motion.keys.push_back(press);
-  if (touch.drag_mm > 0.0) {
-    const double toward = touch.drag_toward_deg * kRadiansPerDegree;
-    sim::MotionKey drag;
-    drag.frames = std::max(2, static_cast<int>(std::ceil(touch.drag_mm / kDragStep_mm)));
-    drag.x = sim::AxisKey{touch.place_mm.x() + touch.drag_mm * std::cos(toward), std::nullopt};
-    drag.y = sim::AxisKey{touch.place_mm.y() + touch.drag_mm * std::sin(toward), std::nullopt};
-    motion.keys.push_back(drag);
-  }
-  return motion;
+  press.drag_mm = touch.drag_mm * Eigen::Vector2d(std::cos(toward), std::sin(toward));
+  return press;
 }
 
 }  // namespace touchstone::datasets

@@ -44,7 +44,7 @@ struct UnitBench {
 /// What a drawn data set's samples come from: the simulator, or in tests something quicker.
 using BenchSource = std::function<UnitBench(const PreparedDraw& prepared, const DrawnUnit& unit)>;
 
-/// sim::TouchRig, with set-up results kept in `cache_folder`.
+/// sim::VirtualSensor, with set-up results kept in `cache_folder`.
 BenchSource rig_bench(const std::filesystem::path& cache_folder);
 
 }  // namespace touchstone::datasets

@@ -107,7 +107,7 @@ std::vector<double> hue_repeats_deg(const ChromaBench& bench, std::uint64_t seed
   std::vector<double> sum(markers, 0.0);
   std::vector<double> square(markers, 0.0);
   for (int i = 0; i < pictures; ++i) {
-    const sensors::ColourMarkerReading& reading = finder.find(bench.rig().background(seed, i));
+    const sensors::ColourMarkerReading& reading = finder.find(bench.sensor().background(seed, i));
     for (std::size_t m = 0; m < markers; ++m) {
       const double change =
           sensors::hue_difference(reading.markers[m].hue, bench.rest().markers[m].hue) / kRadiansPerDegree;
@@ -211,7 +211,7 @@ sensors::HueModel calibrate_field(const ChromaBench& bench, bool quick, std::uin
 
 sensors::TractionInversion elastic_inversion(const ChromaBench& bench, const std::filesystem::path& cache,
                                              const sensors::ViewParallax& parallax) {
-  const sim::DeviceSpec device = with_probe_mesh(bench.rig().device());
+  const sim::DeviceSpec device = with_probe_mesh(bench.sensor().device());
   const auto gel = sim::set_up_gel(device, cache);
   // Chosen on the presses of calibrate_field with another unit. Where an object is wide hue tells a fifth of the press
   // and is alike over neighbours, which noise isn't: so normal displacements count for next to nothing, lateral ones,

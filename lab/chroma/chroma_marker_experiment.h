@@ -86,7 +86,7 @@ struct FieldScore {
   double elastic_mean_um = 0.0, elastic_worst_um = 0.0;
 };
 /// Inverts fields told with `parallax`, taking their lateral displacements as seen: the compliance is of another mesh
-/// than the rig's.
+/// than the sensor's.
 sensors::TractionInversion elastic_inversion(const ChromaBench& bench, const std::filesystem::path& cache,
                                              const sensors::ViewParallax& parallax);
 

@@ -34,9 +34,9 @@ constexpr double kLinear_r2 = 0.99;
 }  // namespace
 
 std::vector<ValidationRow> validate_chroma_marker(const ValidateOptions& options) {
-  const sim::TouchRig rig(sim::read_device(options.scenes / "devices" / "chroma.yaml"), options.cache,
-                          chroma_rig_settings(kUnit));
-  const ChromaBench bench(rig, kRest);
+  const sim::VirtualSensor sensor(sim::read_device(options.scenes / "devices" / "chroma.yaml"), options.cache,
+                                  chroma_rig_settings(kUnit));
+  const ChromaBench bench(sensor, kRest);
   const MarkerTest test;
   const std::size_t marker = bench.marker_at(test.place_mm);
   const sensors::ColourMarker& rest = bench.rest().markers[marker];
@@ -74,7 +74,7 @@ std::vector<ValidationRow> validate_chroma_marker(const ValidateOptions& options
     shears.push_back(shear_series(bench, test, depth, {1, 0}, options.quick ? 5 : 20, kShear + k));
     std::vector<double> shift;
     for (const sensors::ColourMarker& seen : shears.back().seen) {
-      shift.push_back((seen.centroid_px - rest.centroid_px).norm() * rig.mm_per_px());
+      shift.push_back((seen.centroid_px - rest.centroid_px).norm() * sensor.mm_per_px());
     }
     const StraightLine line = line_through(shears.back().column_mm(0), shift);
     worst_r2 = std::min(worst_r2, line.r2);

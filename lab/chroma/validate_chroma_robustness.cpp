@@ -53,12 +53,12 @@ struct Clip {
 };
 
 Clip make_clip(const ValidateOptions& options) {
-  const sim::TouchRig rig(sim::read_device(options.scenes / "devices" / "chroma.yaml"), options.cache,
-                          chroma_rig_settings(kSeed));
-  const ChromaBench bench(rig, kSeed);
+  const sim::VirtualSensor sensor(sim::read_device(options.scenes / "devices" / "chroma.yaml"), options.cache,
+                                  chroma_rig_settings(kSeed));
+  const ChromaBench bench(sensor, kSeed);
   const sim::ObjectSpec ball = with_friction(ball_of(8.0), 1.0);
   sim::MotionSpec motion;
-  const double touching = reach_below(ball);
+  const double touching = sim::first_touch({}, ball, sensor.device().gel);
   motion.start_mm = {0.0, 0.0, touching};
   sim::MotionKey press, shear;
   press.frames = 2;
@@ -66,15 +66,15 @@ Clip make_clip(const ValidateOptions& options) {
   shear.frames = 2;
   shear.x = sim::AxisKey{0.6, std::nullopt};
   motion.keys = {press, shear};
-  const sim::TouchObject touched = rig.object(ball);
-  std::vector<sim::Truth> states = rig.play(touched, motion);
+  const sim::TouchObject touched = sensor.object(ball);
+  std::vector<sim::Truth> states = sensor.play(touched, motion);
   states.erase(states.begin());  // the ball only just touches
   Clip clip;
-  clip.rest = rig.background(kSeed);
+  clip.rest = sensor.background(kSeed);
   clip.frames = bench.pictures(touched, states, kSeed);
   sensors::HueCalibrationSettings settings;
   settings.spacing_mm = bench.spacing_mm();
-  settings.parallax = parallax_of(rig.device());
+  settings.parallax = parallax_of(sensor.device());
   const std::vector<sensors::HueSample> samples = samples_of_moved(bench.read(clip.frames, states), 0.02, 0);
   clip.model = sensors::calibrate_hue(bench.rest(), samples, settings);
   return clip;

@@ -11,7 +11,7 @@
 #include "sensors/markers/grasp_rule.h"
 #include "sim/grasp/arm_lift.h"
 #include "sim/grasp/gripper.h"
-#include "sim/sensor/touch_rig.h"
+#include "sim/sensor/virtual_sensor.h"
 
 namespace touchstone::lab {
 
@@ -56,7 +56,7 @@ struct GraspOutcome {
 };
 
 /// Plays one trial. @throws Error for an object without mass or crush force, or settings that make no sense
-GraspOutcome run_grasp_trial(const sim::TouchRig& rig, const GraspTrial& trial, const GraspLoopSettings& settings,
-                             const GraspSenses& senses);
+GraspOutcome run_grasp_trial(const sim::VirtualSensor& sensor, const GraspTrial& trial,
+                             const GraspLoopSettings& settings, const GraspSenses& senses);
 
 }  // namespace touchstone::lab

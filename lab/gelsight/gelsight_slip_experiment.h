@@ -10,7 +10,7 @@
 #include "sensors/heights/height_model.h"
 #include "sensors/markers/gel_force_model.h"
 #include "sensors/markers/touch_reader.h"
-#include "sim/sensor/touch_rig.h"
+#include "sim/sensor/virtual_sensor.h"
 
 namespace touchstone::lab {
 
@@ -59,7 +59,7 @@ struct SlipEstimators {
 
 /// Plays and judges one case at the device's frame rate; states come four times as often, so the onset is known to a
 /// quarter of a frame. A slide ends `frames_after` frames after its onset.
-SlipRun run_slip_case(const sim::TouchRig& rig, const SlipCase& what, const SlipEstimators& estimators,
+SlipRun run_slip_case(const sim::VirtualSensor& sensor, const SlipCase& what, const SlipEstimators& estimators,
                       std::uint64_t seed, int frames_after = 10);
 
 /// How one detector did over many runs.

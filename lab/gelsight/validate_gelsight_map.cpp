@@ -31,10 +31,10 @@ double suspected_robot_error_mm() {
 }
 
 /// Objects without friction on the gel: a straight press hardly notices, and takes a third of the time.
-sim::TouchObject greased(const sim::TouchRig& rig, const std::filesystem::path& file) {
+sim::TouchObject greased(const sim::VirtualSensor& sensor, const std::filesystem::path& file) {
   sim::ObjectSpec object = sim::read_object(file);
   object.friction = 0.0;
-  return rig.object(object);
+  return sensor.object(object);
 }
 
 ValidationRow row(const std::string& id, const std::string& title, const std::string& unit,
@@ -54,13 +54,13 @@ ValidationRow row(const std::string& id, const std::string& title, const std::st
 
 std::vector<ValidationRow> validate_gelsight_map(const ValidateOptions& options) {
   const auto begun = std::chrono::steady_clock::now();
-  sim::TouchRigSettings rig_settings;
+  sim::VirtualSensorSettings rig_settings;
   rig_settings.membrane_um = options.quick ? kQuickMembrane_um : kMembrane_um;
-  const sim::TouchRig rig(sim::read_device(options.scenes / "devices" / "gelsight-flat.yaml"), options.cache,
-                          rig_settings);
-  const TouchBench bench(rig, estimated_heights(rig, kSeed));
-  const sim::TouchObject coin = greased(rig, options.scenes / "objects" / "coin-quarter.yaml");
-  const sim::TouchObject plug = greased(rig, options.scenes / "objects" / "usb-a-plug.yaml");
+  const sim::VirtualSensor sensor(sim::read_device(options.scenes / "devices" / "gelsight-flat.yaml"), options.cache,
+                                  rig_settings);
+  const TouchBench bench(sensor, estimated_heights(sensor, kSeed));
+  const sim::TouchObject coin = greased(sensor, options.scenes / "objects" / "coin-quarter.yaml");
+  const sim::TouchObject plug = greased(sensor, options.scenes / "objects" / "usb-a-plug.yaml");
 
   MapExperimentSettings settings;
   settings.seed = kSeed;

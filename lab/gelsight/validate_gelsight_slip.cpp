@@ -86,15 +86,15 @@ std::vector<SlipCase> slip_cases(bool quick) {
 }
 
 /// Lines of the marked gel: one for each object of the cases, one for shear under the text's large flat end.
-sensors::GelForceModel fit_forces(const sim::TouchRig& rig, const sensors::HeightModel& heights,
+sensors::GelForceModel fit_forces(const sim::VirtualSensor& sensor, const sensors::HeightModel& heights,
                                   const std::vector<SlipCase>& cases, const sensors::LinearForce& shear) {
   sensors::GelForceModel model;
-  model.gel = rig.device().name;
+  model.gel = sensor.device().name;
   for (const SlipCase& one : cases) {
     const auto known = std::find_if(model.normal.begin(), model.normal.end(),
                                     [&](const auto& line) { return line.indenter == one.object.name; });
     if (known != model.normal.end()) continue;
-    const NormalSeries series = press_with_forces(rig, heights, one.object, even_forces(0.6, 4), kSeed + 3);
+    const NormalSeries series = press_with_forces(sensor, heights, one.object, even_forces(0.6, 4), kSeed + 3);
     model.normal.push_back({series.indenter, series.estimated});
   }
   model.shear = shear;
@@ -102,11 +102,11 @@ sensors::GelForceModel fit_forces(const sim::TouchRig& rig, const sensors::Heigh
 }
 
 /// Frames a second of the tracker on one core, on frames in memory that go to and fro.
-double tracking_rate_Hz(const sim::TouchRig& rig) {
+double tracking_rate_Hz(const sim::VirtualSensor& sensor) {
   constexpr int kRounds = 100;
   std::vector<cv::Mat> frames;
-  for (int i = 0; i < 4; ++i) frames.push_back(rig.background(kSeed, i));
-  sensors::MarkerTracker tracker(marker_settings(rig));
+  for (int i = 0; i < 4; ++i) frames.push_back(sensor.background(kSeed, i));
+  sensors::MarkerTracker tracker(marker_settings(sensor));
   std::int64_t t_us = 0;
   int found = 0;
   tracker.track({frames[0], t_us});
@@ -119,14 +119,14 @@ double tracking_rate_Hz(const sim::TouchRig& rig) {
   return kRounds * static_cast<double>(frames.size()) / seconds;
 }
 
-void add_force_rows(RowList& rows, const sim::TouchRig& rig, const sensors::HeightModel& heights, bool quick) {
+void add_force_rows(RowList& rows, const sim::VirtualSensor& sensor, const sensors::HeightModel& heights, bool quick) {
   rows.begin();
   std::vector<NormalSeries> series;
   for (const Indenter& one : balls(quick ? 3 : 6)) {
-    series.push_back(press_with_forces(rig, heights, one.object, one.forces_N, kSeed + 1));
+    series.push_back(press_with_forces(sensor, heights, one.object, one.forces_N, kSeed + 1));
   }
   const NormalSeries cylinder =
-      press_with_forces(rig, heights, flat_cylinder_of(8.5), even_forces(1.2, quick ? 3 : 6), kSeed + 2);
+      press_with_forces(sensor, heights, flat_cylinder_of(8.5), even_forces(1.2, quick ? 3 : 6), kSeed + 2);
   const auto worst = [&](auto line) {
     double least = 1.0;
     for (const NormalSeries& one : series) least = std::min(least, line(one).r2);
@@ -190,13 +190,13 @@ void add_slip_rows(RowList& rows, const std::vector<SlipRun>& runs, double frame
 std::vector<ValidationRow> validate_gelsight_slip(const ValidateOptions& options) {
   RowList rows("", options, RowList::Since::begin);
   const auto rig_of = [&](const char* device) {
-    return sim::TouchRig(sim::read_device(options.scenes / "devices" / device), options.cache);
+    return sim::VirtualSensor(sim::read_device(options.scenes / "devices" / device), options.cache);
   };
-  const sim::TouchRig bare = rig_of("gelsight-flat.yaml");
+  const sim::VirtualSensor bare = rig_of("gelsight-flat.yaml");
   const sensors::HeightModel heights = calibrate_rig(bare, {}, {}, kSeed).calibration.model;
   add_force_rows(rows, bare, heights, options.quick);
 
-  const sim::TouchRig marked = rig_of("gelsight-markers.yaml");
+  const sim::VirtualSensor marked = rig_of("gelsight-markers.yaml");
   rows.begin();
   const ShearTest shear = shear_until_slip(marked, with_friction(flat_cylinder_of(10.0), 0.6), 0.7, kShearDrag_mm,
                                            options.quick ? 12 : 24, kSeed + 4);

@@ -61,7 +61,7 @@ constexpr Row kRows[] = {
 
 std::vector<ValidationRow> validate_gelsight_texture(const ValidateOptions& options) {
   const auto begun = std::chrono::steady_clock::now();
-  sim::TouchRigSettings how;
+  sim::VirtualSensorSettings how;
   how.seed = kSeed;
   how.deepest_mm = 1.0;
   how.membrane_um = 30.0;  // of the fine contact; a pixel of the camera sees 19 um
@@ -69,15 +69,15 @@ std::vector<ValidationRow> validate_gelsight_texture(const ValidateOptions& opti
   sim::DeviceSpec device = sim::read_device(options.scenes / "devices" / "gelsight-portable.yaml");
   // All samples are cut from the middle of the picture: the imager reads out no more than that.
   device.camera->width = device.camera->height = kTextureView_px;
-  const sim::TouchRig rig(std::move(device), options.cache, how);
-  const HeightsOf heights = estimated_heights(rig, calibrate_view(rig, kSeed), kSeed);
+  const sim::VirtualSensor sensor(std::move(device), options.cache, how);
+  const HeightsOf heights = estimated_heights(sensor, calibrate_view(sensor, kSeed), kSeed);
 
   std::vector<sim::ObjectSpec> objects = texture_objects(options.scenes);
   if (options.quick) objects = some_of(objects);
   TexturePresses presses;
   presses.seed = kSeed;
   if (options.quick) presses.images = 2;
-  const TextureSamples samples = texture_samples(rig, objects, presses, heights, options.progress);
+  const TextureSamples samples = texture_samples(sensor, objects, presses, heights, options.progress);
   const int of_a_class = kSquares * presses.images;
 
   std::vector<ValidationRow> rows;
