@@ -63,7 +63,7 @@ void plan(const std::filesystem::path& file, bool linear_range, const GlobalOpti
   for (const datasets::PreparedScene& scene : job.scenes) {
     const bool as_before = before != nullptr && equal(before->plan, scene.plan);
     if (!as_before) fmt::print("\n");
-    fmt::print("{} ({}, {} samples){}\n", scene.entry.name, lab::name_of(scene.entry.split), scene.samples,
+    fmt::print("{} ({}, {} samples){}\n", scene.entry.name, datasets::name_of(scene.entry.split), scene.samples,
                as_before ? ": as above" : "");
     if (!as_before) print_plan(scene.plan);
     before = &scene;

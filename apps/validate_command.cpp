@@ -75,7 +75,7 @@ void validate(Options options, const GlobalOptions& global) {
     how.progress = bar.listener();
     rows = lab::validate(options.groups, lab::validation_groups(), how);
   }
-  if (!options.json.empty()) write_whole_file(options.json, datasets::to_json(rows));
+  if (!options.json.empty()) write_whole_file(options.json, lab::to_json(rows));
   if (!options.page.empty()) {
     const lab::PageHeader header{datasets::program_version(), datasets::processor_kind(), options.date};
     write_whole_file(options.page, lab::to_html(rows, header));

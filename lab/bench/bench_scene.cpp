@@ -14,6 +14,7 @@
 #include "render/imager/imager.h"
 #include "sim/scene/device_imager.h"
 #include "sim/view/visible_scene.h"
+#include "sim/press/play_motion.h"
 
 namespace touchstone::lab {
 namespace {

@@ -18,6 +18,7 @@
 #include "sim/scene/device_camera.h"
 #include "sim/scene/scene.h"
 #include "sim/view/scene_view.h"
+#include "sim/scene/device_imager.h"
 
 namespace touchstone::lab {
 namespace {

@@ -26,7 +26,7 @@ constexpr double kRoll_mm = 1.2;
 constexpr double kWay_mm_per_N = 3.0;
 constexpr double kLeastWay_mm = 0.6;
 
-sim::MotionSpec datasets::motion_of(const SlipCase& what, double frame_rate_Hz) {
+sim::MotionSpec motion_of(const SlipCase& what, double frame_rate_Hz) {
   sim::MotionSpec motion;
   motion.frame_rate_Hz = kStatesAFrame * frame_rate_Hz;
   const double way = what.motion == SlipMotion::roll
@@ -121,7 +121,7 @@ SlipRun run_slip_case(const sim::TouchRig& rig, const SlipCase& what, const Slip
   run.what = what;
   const sim::TouchObject object = rig.object(what.object);
   const double frame_rate_Hz = rig.device().camera->frame_rate_Hz;
-  std::vector<sim::Truth> truths = rig.play(object, datasets::motion_of(what, frame_rate_Hz));
+  std::vector<sim::Truth> truths = rig.play(object, motion_of(what, frame_rate_Hz));
   const std::size_t first_drag = as_count((kPressFrames + kHoldFrames) * kStatesAFrame);
   if (what.motion == SlipMotion::slide) {
     const auto sliding = std::find_if(truths.begin() + static_cast<std::ptrdiff_t>(first_drag), truths.end(),

@@ -9,6 +9,7 @@
 #include "sim/plan/image_motion.h"
 #include "sim/scene/device_camera.h"
 #include "sim/view/scene_view.h"
+#include "sim/scene/device_imager.h"
 
 namespace touchstone::sim {
 namespace {

@@ -13,6 +13,9 @@
 #include "sim/scene/device_gel.h"
 #include "sim/sensor/light_file.h"
 #include "sim/view/seen_geometry.h"
+#include "sim/press/play_motion.h"
+#include "sim/press/gel_setup.h"
+#include "sim/scene/device_imager.h"
 
 namespace touchstone::sim {
 namespace {

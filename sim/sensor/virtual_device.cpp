@@ -14,6 +14,9 @@
 #include "sim/scene/device_imager.h"
 #include "sim/sensor/touch_rig.h"
 #include "sim/view/visible_scene.h"
+#include "sim/press/play_motion.h"
+#include "sim/press/gel_setup.h"
+#include "sim/sensor/virtual_camera.h"
 
 namespace touchstone::sim {
 namespace {

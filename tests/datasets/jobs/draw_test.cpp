@@ -12,20 +12,20 @@
 #include "tests/support/message_of.h"
 #include "tests/support/small_draw.h"
 
-namespace touchstone::lab {
+namespace touchstone::datasets {
 namespace {
 
 using test::message_of;
 using ::testing::HasSubstr;
 
 struct OneSpread {
-  datasets::Spread spread;
+  Spread spread;
 };
 void fields(YamlReader& in, OneSpread& one) {
   in.required("spread", one.spread, Allowed::above(0.0));
 }
 
-datasets::Spread spread_of(const std::string& text) {
+Spread spread_of(const std::string& text) {
   return parse_yaml<OneSpread>("spread: " + text + "\n", "job.yaml").spread;
 }
 
@@ -33,7 +33,7 @@ struct Moments {
   double mean = 0.0, deviation = 0.0, least = INFINITY, most = -INFINITY;
 };
 
-Moments moments_of(const datasets::Spread& spread, int draws = 20000) {
+Moments moments_of(const Spread& spread, int draws = 20000) {
   RandomStream random(5, 0, Purpose::kTest);
   Moments moments;
   double square = 0.0;
@@ -48,7 +48,7 @@ Moments moments_of(const datasets::Spread& spread, int draws = 20000) {
   return moments;
 }
 
-TEST(datasets::Spread, DrawsHaveTheMomentsOfTheirDistribution) {
+TEST(Spread, DrawsHaveTheMomentsOfTheirDistribution) {
   const Moments even = moments_of(spread_of("{uniform: [2, 5]}"));
   EXPECT_NEAR(even.mean, 3.5, 0.03);
   EXPECT_NEAR(even.deviation, 3.0 / std::sqrt(12.0), 0.02);
@@ -71,7 +71,7 @@ TEST(datasets::Spread, DrawsHaveTheMomentsOfTheirDistribution) {
   EXPECT_EQ(moments_of(spread_of("2.5"), 3).mean, 2.5);
 }
 
-TEST(datasets::Spread, MistakesAreToldWithTheirPlace) {
+TEST(Spread, MistakesAreToldWithTheirPlace) {
   const auto told = [](const std::string& text) { return message_of([&] { spread_of(text); }); };
   EXPECT_THAT(told("{uniform: [5, 2]}"), HasSubstr("job.yaml:1: spread.uniform: from 5 to 2"));
   EXPECT_THAT(told("{uniform: [1]}"), HasSubstr("has 1 numbers, 2 are needed"));
@@ -123,26 +123,26 @@ TEST(EditedYaml, PathsThatLeadNowhereAreTold) {
 }
 
 TEST(Splits, UnitsAreDealtOutByTheirShares) {
-  datasets::SplitSpec spec;
+  SplitSpec spec;
   spec.share = {0.8, 0.1, 0.1};
   for (const auto& [units, train] : {std::pair{10, 8}, {20, 16}, {3, 1}, {4, 2}, {1000, 800}}) {
-    const auto splits = datasets::splits_of_units(spec, 9, units);
-    EXPECT_EQ(std::count(splits.begin(), splits.end(), datasets::DrawnSplit::train), train) << units;
-    EXPECT_EQ(std::count(splits.begin(), splits.end(), datasets::DrawnSplit::test), (units - train) / 2) << units;
+    const auto splits = splits_of_units(spec, 9, units);
+    EXPECT_EQ(std::count(splits.begin(), splits.end(), DrawnSplit::train), train) << units;
+    EXPECT_EQ(std::count(splits.begin(), splits.end(), DrawnSplit::test), (units - train) / 2) << units;
   }
-  EXPECT_NE(datasets::splits_of_units(spec, 9, 1000), datasets::splits_of_units(spec, 10, 1000));
+  EXPECT_NE(splits_of_units(spec, 9, 1000), splits_of_units(spec, 10, 1000));
   spec.where = {"job.yaml", 3};
-  EXPECT_THAT(message_of([&] { datasets::splits_of_units(spec, 9, 2); }), HasSubstr("job.yaml:3: splits: by unit"));
+  EXPECT_THAT(message_of([&] { splits_of_units(spec, 9, 2); }), HasSubstr("job.yaml:3: splits: by unit"));
 }
 
 TEST(Splits, SamplesMeetTheirSharesAsCloselyAsChanceHasIt) {
-  datasets::SplitSpec spec;
+  SplitSpec spec;
   spec.share = {0.7, 0.0, 0.3};
   int train = 0;
   for (int i = 0; i < 10000; ++i) {
-    const datasets::DrawnSplit split = datasets::split_of_sample(spec, 4, i);
-    EXPECT_NE(split, datasets::DrawnSplit::validate);
-    train += split == datasets::DrawnSplit::train ? 1 : 0;
+    const DrawnSplit split = split_of_sample(spec, 4, i);
+    EXPECT_NE(split, DrawnSplit::validate);
+    train += split == DrawnSplit::train ? 1 : 0;
   }
   EXPECT_NEAR(train, 7000, 4 * std::sqrt(10000 * 0.21));
 }
@@ -157,27 +157,27 @@ class Draw : public ::testing::Test {
     text.replace(at, from.size(), to);
     job();
     folder_.write("job.yaml", text);
-    return message_of([&] { datasets::prepare_draw(folder_.path() / "job.yaml"); });
+    return message_of([&] { prepare_draw(folder_.path() / "job.yaml"); });
   }
   test::TemporaryFolder folder_;
 };
 
 TEST_F(Draw, ATouchIsAFunctionOfJobAndIndexWithinItsRanges) {
-  const datasets::PreparedDraw prepared = datasets::prepare_draw(job());
-  const datasets::PreparedDraw again = datasets::prepare_draw(job());
+  const PreparedDraw prepared = prepare_draw(job());
+  const PreparedDraw again = prepare_draw(job());
   std::int64_t next = 0;
-  for (const datasets::DrawnBlock& block : prepared.blocks) {
+  for (const DrawnBlock& block : prepared.blocks) {
     EXPECT_EQ(block.first_sample, next);
     next += block.samples;
     EXPECT_LE(block.samples, prepared.job.samples_per_file);
     for (std::int64_t i = block.first_sample; i < next; ++i)
-      EXPECT_EQ(datasets::drawn_touch(prepared, i).unit, block.unit);
+      EXPECT_EQ(drawn_touch(prepared, i).unit, block.unit);
   }
   EXPECT_EQ(next, prepared.job.samples);
   std::set<std::uint64_t> seeds;
   for (std::int64_t i = prepared.job.samples; i-- > 0;) {
-    const datasets::DrawnTouch touch = datasets::drawn_touch(prepared, i);
-    const datasets::DrawnTouch same = datasets::drawn_touch(again, i);
+    const DrawnTouch touch = drawn_touch(prepared, i);
+    const DrawnTouch same = drawn_touch(again, i);
     EXPECT_EQ(touch.seed, same.seed);
     EXPECT_EQ(touch.place_mm, same.place_mm);
     EXPECT_EQ(touch.force_N, same.force_N);
@@ -187,7 +187,7 @@ TEST_F(Draw, ATouchIsAFunctionOfJobAndIndexWithinItsRanges) {
     EXPECT_LE(std::abs(touch.place_mm.x()), 1.5);
     EXPECT_LE(touch.tilt_deg, 5.0);
     seeds.insert(touch.seed);
-    const datasets::DrawnTouch second = datasets::drawn_touch(prepared, i, 1);
+    const DrawnTouch second = drawn_touch(prepared, i, 1);
     EXPECT_NE(second.seed, touch.seed);
     EXPECT_EQ(second.attempt, 1);
   }
@@ -195,10 +195,10 @@ TEST_F(Draw, ATouchIsAFunctionOfJobAndIndexWithinItsRanges) {
 }
 
 TEST_F(Draw, UnitsDifferAsTheJobSaysAndInNothingElse) {
-  const datasets::PreparedDraw prepared = datasets::prepare_draw(job());
+  const PreparedDraw prepared = prepare_draw(job());
   const sim::DeviceSpec design = sim::read_device(prepared.job.draw.device);
-  const datasets::DrawnUnit one = datasets::drawn_unit(prepared, 0);
-  const datasets::DrawnUnit other = datasets::drawn_unit(prepared, 1);
+  const DrawnUnit one = drawn_unit(prepared, 0);
+  const DrawnUnit other = drawn_unit(prepared, 1);
   EXPECT_NE(one.seed, other.seed);
   EXPECT_NE(one.device.gel.youngs_modulus_MPa, other.device.gel.youngs_modulus_MPa);
   EXPECT_EQ(one.device.gel.thickness_mm, design.gel.thickness_mm);
@@ -209,18 +209,18 @@ TEST_F(Draw, UnitsDifferAsTheJobSaysAndInNothingElse) {
 }
 
 TEST_F(Draw, PiecesKeepTheirLookAndRotationsAreTurnThenTilt) {
-  const datasets::PreparedDraw prepared = datasets::prepare_draw(job());
-  EXPECT_EQ(datasets::drawn_object(prepared, 0, 7).shape.radius_mm,
-            datasets::drawn_object(prepared, 0, 7).shape.radius_mm);
-  EXPECT_NE(datasets::drawn_object(prepared, 0, 7).shape.radius_mm,
-            datasets::drawn_object(prepared, 0, 8).shape.radius_mm);
+  const PreparedDraw prepared = prepare_draw(job());
+  EXPECT_EQ(drawn_object(prepared, 0, 7).shape.radius_mm,
+            drawn_object(prepared, 0, 7).shape.radius_mm);
+  EXPECT_NE(drawn_object(prepared, 0, 7).shape.radius_mm,
+            drawn_object(prepared, 0, 8).shape.radius_mm);
   for (int i = 0; i < 5; ++i) {
-    const datasets::DrawnTouch touch = datasets::drawn_touch(prepared, i);
-    const Eigen::Matrix3d wanted = datasets::rotation_of(touch);
+    const DrawnTouch touch = drawn_touch(prepared, i);
+    const Eigen::Matrix3d wanted = rotation_of(touch);
     EXPECT_NEAR(wanted(2, 2), std::cos(touch.tilt_deg * M_PI / 180), 1e-12);
     const sim::MotionSpec motion =
-        datasets::motion_of(touch, datasets::drawn_object(prepared, touch.object, touch.piece),
-                            datasets::drawn_unit(prepared, touch.unit).device);
+        motion_of(touch, drawn_object(prepared, touch.object, touch.piece),
+                            drawn_unit(prepared, touch.unit).device);
     EXPECT_TRUE(rotation_from_xyz(motion.start_angles_deg * M_PI / 180).isApprox(wanted, 1e-12));
   }
 }
@@ -246,4 +246,4 @@ TEST_F(Draw, MistakesAreToldBeforeAnythingIsWritten) {
 }
 
 }  // namespace
-}  // namespace touchstone::lab
+}  // namespace touchstone::datasets

@@ -7,7 +7,7 @@
 #include "tests/support/message_of.h"
 #include "tests/support/small_job.h"
 
-namespace touchstone::lab {
+namespace touchstone::datasets {
 namespace {
 
 using test::message_of;
@@ -18,61 +18,61 @@ std::string message_of_job(const std::string& text) {
   const test::TemporaryFolder folder;
   test::write_small_job(folder);
   const auto file = folder.write("job.yaml", text);
-  return message_of([&] { datasets::prepare_job(file); });
+  return message_of([&] { prepare_job(file); });
 }
 
-TEST(datasets::Job, SamplesRunOverAllScenesInOrder) {
+TEST(Job, SamplesRunOverAllScenesInOrder) {
   const test::TemporaryFolder folder;
-  const datasets::PreparedJob job = datasets::prepare_job(test::write_small_job(folder));
+  const PreparedJob job = prepare_job(test::write_small_job(folder));
   ASSERT_EQ(job.scenes.size(), 2u);
   EXPECT_EQ(job.samples, 12);
   EXPECT_EQ(job.scenes[0].first_sample, 0);
   EXPECT_EQ(job.scenes[1].first_sample, 6);
-  EXPECT_EQ(job.scenes[1].entry.split, datasets::Split::verify);
+  EXPECT_EQ(job.scenes[1].entry.split, Split::verify);
 }
 
-TEST(datasets::Job, StartAndSeedComeFromTheJob) {
+TEST(Job, StartAndSeedComeFromTheJob) {
   const test::TemporaryFolder folder;
-  const datasets::PreparedJob job = datasets::prepare_job(test::write_small_job(folder));
+  const PreparedJob job = prepare_job(test::write_small_job(folder));
   EXPECT_EQ(job.scenes[0].spec.motion.start_mm, Eigen::Vector3d(0, 0, 2.2));
   EXPECT_EQ(job.scenes[1].spec.motion.start_mm, Eigen::Vector3d(0.5, 0.2, 2.2));
-  for (const datasets::PreparedScene& scene : job.scenes) EXPECT_EQ(scene.spec.seed, 11u);
+  for (const PreparedScene& scene : job.scenes) EXPECT_EQ(scene.spec.seed, 11u);
 }
 
-TEST(datasets::Job, OutputsOfTheJobReplaceTheScenes) {
+TEST(Job, OutputsOfTheJobReplaceTheScenes) {
   const test::TemporaryFolder folder;
   test::write_small_job(folder);
   const auto file = folder.write("job.yaml", std::string(test::kSmallJob) + "outputs: {frames: false}\n");
-  for (const datasets::PreparedScene& scene : datasets::prepare_job(file).scenes) {
+  for (const PreparedScene& scene : prepare_job(file).scenes) {
     EXPECT_FALSE(scene.plan.camera);
     EXPECT_FALSE(scene.spec.outputs.radiance);
   }
 }
 
-TEST(datasets::Job, InputsAreAllFilesThatItNames) {
+TEST(Job, InputsAreAllFilesThatItNames) {
   const test::TemporaryFolder folder;
-  const datasets::PreparedJob job = datasets::prepare_job(test::write_small_job(folder));
+  const PreparedJob job = prepare_job(test::write_small_job(folder));
   std::vector<std::string> names;
-  for (const datasets::InputFile& file : job.inputs) names.push_back(file.name);
+  for (const InputFile& file : job.inputs) names.push_back(file.name);
   EXPECT_THAT(names, ::testing::ElementsAre("device.yaml", "job.yaml", "motion.yaml", "object.yaml", "scene.yaml"));
 }
 
-TEST(datasets::Job, InputsFollowNamesThroughFoldersAndGltfBuffers) {
+TEST(Job, InputsFollowNamesThroughFoldersAndGltfBuffers) {
   const test::TemporaryFolder folder;
   folder.write("jobs/a.yaml", "x: ../scenes/s.yaml\ny: nowhere.yaml\nz: 3\n");
   folder.write("scenes/s.yaml", "deep: {list: [mesh.gltf, word]}\n");
   folder.write("scenes/mesh.gltf", R"({"buffers": [{"uri": "mesh.bin"}, {"uri": "data:base64,AAAA"}]})");
   folder.write("scenes/mesh.bin", "bytes");
   std::vector<std::string> names;
-  for (const datasets::InputFile& file : datasets::input_files(folder.path() / "jobs/a.yaml"))
+  for (const InputFile& file : input_files(folder.path() / "jobs/a.yaml"))
     names.push_back(file.name);
   EXPECT_THAT(names, ::testing::ElementsAre("../scenes/mesh.bin", "../scenes/mesh.gltf", "../scenes/s.yaml", "a.yaml"));
 }
 
-TEST(datasets::Job, AYamlFileThatHoldsItselfEnds) {
+TEST(Job, AYamlFileThatHoldsItselfEnds) {
   const test::TemporaryFolder folder;
   const auto file = folder.write("a.yaml", "a: &a [*a, b.txt]\nself: a.yaml\n");
-  EXPECT_EQ(datasets::input_files(file).size(), 1u);
+  EXPECT_EQ(input_files(file).size(), 1u);
 }
 
 TEST(JobErrors, NameFileAndLine) {
@@ -118,7 +118,7 @@ TEST(JobErrors, TwoDevicesInOneDataSetAreRefused) {
   const auto file = folder.write("job.yaml",
                                  "name: a\nseed: 1\nscenes:\n  - {name: x, scene: scene.yaml, split: train}\n"
                                  "  - {name: y, scene: scene2.yaml, split: test}\n");
-  EXPECT_THAT(message_of([&] { datasets::prepare_job(file); }),
+  EXPECT_THAT(message_of([&] { prepare_job(file); }),
               AllOf(HasSubstr("job.yaml:5:"), HasSubstr("one device")));
 }
 
@@ -131,7 +131,7 @@ TEST(JobErrors, ScenesOfUnlikeNumbersOfObjectsAreRefused) {
   const auto file = folder.write("job.yaml",
                                  "name: a\nseed: 1\nscenes:\n  - {name: x, scene: scene.yaml, split: train}\n"
                                  "  - {name: y, scene: scene2.yaml, split: test}\n");
-  EXPECT_THAT(message_of([&] { datasets::prepare_job(file); }),
+  EXPECT_THAT(message_of([&] { prepare_job(file); }),
               AllOf(HasSubstr("job.yaml:5:"), HasSubstr("'y' has 2 objects, but 'x' has 1")));
 }
 
@@ -139,14 +139,14 @@ TEST(JobErrors, ImageWithoutACameraIsRefused) {
   const test::TemporaryFolder folder;
   const auto file = test::write_small_job(folder);
   folder.write("device.yaml", test::kSmallDevice);
-  EXPECT_THAT(message_of([&] { datasets::prepare_job(file); }), AllOf(HasSubstr("scene.yaml:"), HasSubstr("camera")));
+  EXPECT_THAT(message_of([&] { prepare_job(file); }), AllOf(HasSubstr("scene.yaml:"), HasSubstr("camera")));
 }
 
-TEST(datasets::Job, IsToldFromASceneByItsScenes) {
+TEST(Job, IsToldFromASceneByItsScenes) {
   const test::TemporaryFolder folder;
-  EXPECT_TRUE(datasets::is_job_file(test::write_small_job(folder)));
-  EXPECT_FALSE(datasets::is_job_file(folder.path() / "scene.yaml"));
+  EXPECT_TRUE(is_job_file(test::write_small_job(folder)));
+  EXPECT_FALSE(is_job_file(folder.path() / "scene.yaml"));
 }
 
 }  // namespace
-}  // namespace touchstone::lab
+}  // namespace touchstone::datasets

@@ -18,7 +18,7 @@
 #include "tests/support/message_of.h"
 #include "tests/support/small_job.h"
 
-namespace touchstone::lab {
+namespace touchstone::datasets {
 namespace {
 
 namespace fs = std::filesystem;
@@ -31,12 +31,12 @@ class DataSet : public ::testing::Test {
  protected:
   DataSet() : job_(test::write_small_job(folder_)), out_(folder_.path() / "out") {}
 
-  datasets::GenerateReport run(const fs::path& out, int threads = 2, bool timings = false) {
+  GenerateReport run(const fs::path& out, int threads = 2, bool timings = false) {
     calls_.pictures = 0;
     calls_.cameras = 0;
-    return datasets::generate(job_, out, {.source = test::fake_source(calls_), .threads = threads, .timings = timings});
+    return generate(job_, out, {.source = test::fake_source(calls_), .threads = threads, .timings = timings});
   }
-  datasets::GenerateReport run() { return run(out_); }
+  GenerateReport run() { return run(out_); }
 
   /// Starts a run that ends in the middle of its pictures.
   void run_broken_off(int at_picture) {
@@ -58,7 +58,7 @@ class DataSet : public ::testing::Test {
 };
 
 TEST_F(DataSet, HoldsFramesTruthAndManifest) {
-  const datasets::GenerateReport report = run();
+  const GenerateReport report = run();
   EXPECT_EQ(report.samples, 12);
   EXPECT_EQ(report.rendered, 12);
   const auto contents = contents_of(out_);
@@ -81,13 +81,13 @@ TEST_F(DataSet, TruthHasAllObjects) {
   truth.press.wrench = truth.press.bodies[0].wrench;
   truth.press.traction = truth.press.surface_displacement = Eigen::MatrixX3d::Zero(3, 3);
   truth.press.node_state.assign(3, fem::NodeState::open);
-  datasets::TruthHeader header;
+  TruthHeader header;
   header.samples = 1;
   header.objects = 2;
   header.scenes = {"pair"};
   const fs::path path = folder_.path() / "pair.h5";
-  datasets::TruthFileWriter writer(path, header, gel);
-  writer.append(0, datasets::Split::test, truth);
+  TruthFileWriter writer(path, header, gel);
+  writer.append(0, Split::test, truth);
   writer.close();
   const Hdf5Reader file(path);
   const auto wrench = file.read<double>("/objects/wrench");
@@ -101,12 +101,12 @@ TEST_F(DataSet, TruthHasAllObjects) {
 
 TEST_F(DataSet, TruthIsInItsRows) {
   run();
-  const datasets::TruthTable table = datasets::read_truth_table(out_ / "truth.h5");
+  const TruthTable table = read_truth_table(out_ / "truth.h5");
   ASSERT_EQ(table.samples(), 12);
   EXPECT_EQ(table.scene_names, (std::vector<std::string>{"middle", "beside"}));
   EXPECT_EQ(table.scene[7], 1);
   EXPECT_EQ(table.frame[7], 1);
-  EXPECT_EQ(table.split[7], datasets::Split::verify);
+  EXPECT_EQ(table.split[7], Split::verify);
   EXPECT_EQ(table.t_us[7], 33333);
   EXPECT_DOUBLE_EQ(table.wrench[11][2], 2.5);
   const Hdf5Reader file(out_ / "truth.h5");
@@ -191,7 +191,7 @@ TEST_F(DataSet, ABrokenOffRunGoesOnToTheSameBytes) {
     run_broken_off(at);
     EXPECT_TRUE(fs::exists(out_ / kUnfinished));
     EXPECT_FALSE(fs::exists(out_ / "dataset.json"));
-    const datasets::GenerateReport report = run();
+    const GenerateReport report = run();
     EXPECT_EQ(report.kept + report.rendered, 12);
     EXPECT_EQ(calls_.pictures, report.rendered) << "what is kept isn't rendered again";
     EXPECT_EQ(contents_of(out_), whole) << "broken off at picture " << at;
@@ -201,7 +201,7 @@ TEST_F(DataSet, ABrokenOffRunGoesOnToTheSameBytes) {
 
 TEST_F(DataSet, KeptFramesAreKept) {
   run_broken_off(9);
-  const datasets::GenerateReport report = run();
+  const GenerateReport report = run();
   EXPECT_GE(report.kept, 7) << "two threads may have been at work on two more";
 }
 
@@ -238,12 +238,12 @@ TEST_F(DataSet, StreamsOfEventsAreWrittenCheckedAndKept) {
 TEST_F(DataSet, LostChangedAndCutFramesAreMadeAgain) {
   const auto whole = whole_set();
   run_broken_off(10);
-  const std::vector<datasets::FrameRecord> records = datasets::read_journal(out_ / kUnfinished / "frames.log");
+  const std::vector<FrameRecord> records = read_journal(out_ / kUnfinished / "frames.log");
   ASSERT_GE(records.size(), 4u);
   fs::remove(out_ / records[0].files[0].name);
   fs::resize_file(out_ / records[1].files[1].name, 20);
   std::ofstream(out_ / records[2].files[0].name, std::ios::app) << "x";
-  const datasets::GenerateReport report = run();
+  const GenerateReport report = run();
   EXPECT_EQ(report.kept, static_cast<std::int64_t>(records.size()) - 3);
   EXPECT_EQ(contents_of(out_), whole);
 }
@@ -252,21 +252,21 @@ TEST_F(DataSet, ABrokenOffJournalLineAndTemporaryFilesDoNoHarm) {
   const auto whole = whole_set();
   run_broken_off(8);
   const fs::path journal = out_ / kUnfinished / "frames.log";
-  const std::size_t lines = datasets::read_journal(journal).size();
+  const std::size_t lines = read_journal(journal).size();
   fs::resize_file(journal, fs::file_size(journal) - 30);
   std::ofstream(out_ / "frames/middle/.000003.123.0.part.png") << "half";
   std::ofstream(out_ / ".truth.123.4.part.h5") << "half";
-  const datasets::GenerateReport report = run();
+  const GenerateReport report = run();
   EXPECT_EQ(report.kept, static_cast<std::int64_t>(lines) - 1);
   EXPECT_EQ(contents_of(out_), whole);
 }
 
 TEST_F(DataSet, CamerasOfFinishedScenesArentSetUpAgain) {
   run_broken_off(11);
-  for (const datasets::FrameRecord& record : datasets::read_journal(out_ / kUnfinished / "frames.log")) {
+  for (const FrameRecord& record : read_journal(out_ / kUnfinished / "frames.log")) {
     if (record.sample >= 6) fs::remove(out_ / record.files[0].name);
   }
-  const std::vector<datasets::FrameRecord> records = datasets::read_journal(out_ / kUnfinished / "frames.log");
+  const std::vector<FrameRecord> records = read_journal(out_ / kUnfinished / "frames.log");
   const auto of_first = std::count_if(records.begin(), records.end(), [](const auto& r) { return r.sample < 6; });
   run();
   EXPECT_EQ(calls_.cameras, of_first == 6 ? 1 : 2);
@@ -284,7 +284,7 @@ TEST_F(DataSet, KilledBeforeClearingUpIsFinishedByTheNextRun) {
 TEST_F(DataSet, AFinishedSetIsVerifiedAndLeftAlone) {
   run();
   const auto before = contents_of(out_);
-  const datasets::GenerateReport report = run();
+  const GenerateReport report = run();
   EXPECT_TRUE(report.was_finished);
   EXPECT_EQ(calls_.pictures, 0);
   EXPECT_EQ(contents_of(out_), before);
@@ -345,27 +345,27 @@ TEST_F(DataSet, AnEmptyFolderIsTaken) {
 }
 
 TEST_F(DataSet, AFailureBeforeTheFirstPictureLeavesNothing) {
-  datasets::SampleSource source = test::fake_source(calls_);
+  SampleSource source = test::fake_source(calls_);
   source.play_motion = [](const sim::SceneSpec&, const sim::Plan&, const fem::Compliance&,
                           const Progress&) -> std::vector<sim::Truth> { fail("frame 3: gross slip"); };
   const fs::path deep = folder_.path() / "new/deep/out";
-  EXPECT_THAT(message_of([&] { datasets::generate(job_, deep, {.source = source}); }), HasSubstr("gross slip"));
+  EXPECT_THAT(message_of([&] { generate(job_, deep, {.source = source}); }), HasSubstr("gross slip"));
   EXPECT_FALSE(fs::exists(folder_.path() / "new"));
   fs::create_directories(out_);
-  EXPECT_THAT(message_of([&] { datasets::generate(job_, out_, {.source = source}); }), HasSubstr("gross slip"));
+  EXPECT_THAT(message_of([&] { generate(job_, out_, {.source = source}); }), HasSubstr("gross slip"));
   EXPECT_TRUE(fs::is_empty(out_)) << "a folder that was there stays";
 }
 
 TEST_F(DataSet, ASecondRunOnTheSameFolderIsRefusedAndSaysWho) {
   run_broken_off(4);
-  const datasets::FolderLock lock(out_ / kUnfinished / "lock");
+  const FolderLock lock(out_ / kUnfinished / "lock");
   EXPECT_THAT(message_of([&] { run(); }),
               AllOf(HasSubstr("another run"), HasSubstr("process " + std::to_string(getpid()))));
 }
 
 TEST_F(DataSet, TheLockGoesWithItsHolder) {
-  { const datasets::FolderLock lock(folder_.path() / "lock"); }
-  EXPECT_NO_THROW(datasets::FolderLock(folder_.path() / "lock"));
+  { const FolderLock lock(folder_.path() / "lock"); }
+  EXPECT_NO_THROW(FolderLock(folder_.path() / "lock"));
 }
 
 TEST_F(DataSet, AManifestThatWasChangedIsRefused) {
@@ -373,11 +373,11 @@ TEST_F(DataSet, AManifestThatWasChangedIsRefused) {
   std::string text = read_whole_file(out_ / "dataset.json");
   text.replace(text.find("\"seed\": 11"), 10, "\"seed\": 12");
   write_whole_file(out_ / "dataset.json", text);
-  EXPECT_THAT(message_of([&] { datasets::read_manifest(out_); }), HasSubstr("content_sha256"));
+  EXPECT_THAT(message_of([&] { read_manifest(out_); }), HasSubstr("content_sha256"));
   write_whole_file(out_ / "dataset.json", text.substr(0, 100));
-  EXPECT_THAT(message_of([&] { datasets::read_manifest(out_); }), HasSubstr("isn't a whole manifest"));
+  EXPECT_THAT(message_of([&] { read_manifest(out_); }), HasSubstr("isn't a whole manifest"));
   write_whole_file(out_ / "dataset.json", "{}");
-  EXPECT_THROW(datasets::read_manifest(out_), Error);
+  EXPECT_THROW(read_manifest(out_), Error);
 }
 
 TEST_F(DataSet, WithoutImagesThereIsOnlyTruth) {
@@ -388,4 +388,4 @@ TEST_F(DataSet, WithoutImagesThereIsOnlyTruth) {
 }
 
 }  // namespace
-}  // namespace touchstone::lab
+}  // namespace touchstone::datasets

@@ -15,7 +15,7 @@
 #include "tests/support/small_draw.h"
 #include "tests/support/small_job.h"
 
-namespace touchstone::lab {
+namespace touchstone::datasets {
 namespace {
 
 namespace fs = std::filesystem;
@@ -30,18 +30,18 @@ struct Calls {
 };
 
 /// A bench whose records are plain functions of unit and touch.
-datasets::BenchSource quick_bench(Calls& calls) {
-  return [&calls](const datasets::PreparedDraw&, const datasets::DrawnUnit& unit) {
+BenchSource quick_bench(Calls& calls) {
+  return [&calls](const PreparedDraw&, const DrawnUnit& unit) {
     ++calls.units;
-    datasets::UnitBench bench;
+    UnitBench bench;
     bench.light = "a plain function";
     bench.background = cv::Mat(30, 40, CV_8UC3, cv::Scalar(unit.number, 20, 30));
-    bench.press = [&calls, unit](const datasets::DrawnTouch& touch, const sim::ObjectSpec& object) {
+    bench.press = [&calls, unit](const DrawnTouch& touch, const sim::ObjectSpec& object) {
       if (calls.presses++ == calls.stop_at) throw std::runtime_error("the process ends here");
       if (calls.refuse_every > 0 && touch.seed % static_cast<std::uint64_t>(calls.refuse_every) == 0) {
-        throw datasets::Unpressable("beside");
+        throw Unpressable("beside");
       }
-      datasets::BlockRecord record;
+      BlockRecord record;
       record.touch = touch;
       record.frame = cv::Mat(30, 40, CV_8UC3);
       record.height = cv::Mat(30, 40, CV_32F);
@@ -57,7 +57,7 @@ datasets::BenchSource quick_bench(Calls& calls) {
         }
       }
       record.wrench << 0.1, 0.2, touch.force_N, 1, 2, 3;
-      record.pose << datasets::rotation_of(touch), Eigen::Vector3d(touch.place_mm.x(), touch.place_mm.y(), 1.0);
+      record.pose << rotation_of(touch), Eigen::Vector3d(touch.place_mm.x(), touch.place_mm.y(), 1.0);
       record.force_error_N << 0.001, 0.002, 0.01 * touch.force_N;
       record.contact_area_mm2 = 1.5;
       record.deepest_mm = 0.3;
@@ -72,12 +72,12 @@ class DrawnDataset : public ::testing::Test {
  protected:
   DrawnDataset() : job_(test::write_small_draw(folder_)) {}
 
-  datasets::DrawnReport datasets::generate(const std::string& out, datasets::Shard shard = {}, int threads = 2) {
-    datasets::DrawnOptions options;
+  DrawnReport generate(const std::string& out, Shard shard = {}, int threads = 2) {
+    DrawnOptions options;
     options.source = quick_bench(calls_);
     options.threads = threads;
     options.shard = shard;
-    return datasets::generate_drawn(job_, folder_.path() / out, options);
+    return generate_drawn(job_, folder_.path() / out, options);
   }
   auto contents(const std::string& out) { return test::contents_of(folder_.path() / out); }
   fs::path block(const std::string& out, int number) {
@@ -91,32 +91,32 @@ class DrawnDataset : public ::testing::Test {
 };
 
 TEST_F(DrawnDataset, ShardsAndThreadsGiveTheBytesOfOneRun) {
-  const datasets::DrawnReport report = datasets::generate("one", {}, 1);
+  const DrawnReport report = generate("one", {}, 1);
   EXPECT_EQ(report.made, 10);
   EXPECT_EQ(calls_.units, 2);
   const auto one = contents("one");
   EXPECT_EQ(one.size(), 4u + 2u);
-  datasets::generate("many", {}, 4);
+  generate("many", {}, 4);
   EXPECT_EQ(contents("many"), one);
   for (const int count : {3, 7}) {
     const std::string out = fmt::format("shards-{}", count);
     std::int64_t made = 0;
-    for (int number = count; number >= 1; --number) made += datasets::generate(out, {number, count}).made;
+    for (int number = count; number >= 1; --number) made += generate(out, {number, count}).made;
     EXPECT_EQ(made, 10);
-    EXPECT_EQ(datasets::merge_drawn(job_, folder_.path() / out).samples, 10);
+    EXPECT_EQ(merge_drawn(job_, folder_.path() / out).samples, 10);
     EXPECT_EQ(contents(out), one) << count << " shards";
-    EXPECT_TRUE(datasets::merge_drawn(job_, folder_.path() / out).was_finished);
+    EXPECT_TRUE(merge_drawn(job_, folder_.path() / out).was_finished);
   }
-  EXPECT_TRUE(datasets::generate("one").was_finished);
+  EXPECT_TRUE(generate("one").was_finished);
 }
 
 TEST_F(DrawnDataset, ABlockHoldsItsSamplesWithUnitsAndShapes) {
-  datasets::generate("out");
+  generate("out");
   const Hdf5Reader file(block("out", 1));
   EXPECT_EQ(file.read<std::int64_t>("/sample").values, (std::vector<std::int64_t>{3, 4}));
   EXPECT_EQ(file.text_attribute("/wrench", "unit"), "N, N mm");
-  const datasets::PreparedDraw prepared = datasets::prepare_draw(job_);
-  const datasets::DrawnTouch touch = datasets::drawn_touch(prepared, 4);
+  const PreparedDraw prepared = prepare_draw(job_);
+  const DrawnTouch touch = drawn_touch(prepared, 4);
   EXPECT_EQ(file.read<std::uint64_t>("/seed").values[1], touch.seed);
   EXPECT_EQ(file.read<double>("/wrench").values[6 + 2], touch.force_N);
   const auto frame = file.read<std::uint8_t>("/frame");
@@ -125,21 +125,21 @@ TEST_F(DrawnDataset, ABlockHoldsItsSamplesWithUnitsAndShapes) {
   EXPECT_EQ(frame.values[(30 * 40 + 7 * 40) * 3 + 2], static_cast<std::uint8_t>(touch.seed)) << "blue is last";
   const auto height = file.read<float>("/height");
   EXPECT_TRUE(std::isnan(height.values[5]));
-  const double value = datasets::drawn_object(prepared, touch.object, touch.piece).shape.radius_mm +
-                       datasets::drawn_unit(prepared, 0).device.gel.youngs_modulus_MPa + 0.01 * 7 * 9;
+  const double value = drawn_object(prepared, touch.object, touch.piece).shape.radius_mm +
+                       drawn_unit(prepared, 0).device.gel.youngs_modulus_MPa + 0.01 * 7 * 9;
   EXPECT_NEAR(height.values[30 * 40 + 7 * 40 + 9], 0.001 * value, 1.0 / 16384);
   EXPECT_EQ(file.read<std::uint8_t>("/contact").values[30 * 40 + 7 * 40 + 2], 1);
-  EXPECT_EQ(file.read_texts("/device_yaml").at(0), datasets::drawn_unit(prepared, 0).text);
+  EXPECT_EQ(file.read_texts("/device_yaml").at(0), drawn_unit(prepared, 0).text);
 }
 
 TEST_F(DrawnDataset, TheManifestAndTheCardTellWhatIsThere) {
-  datasets::generate("out");
+  generate("out");
   const auto json = nlohmann::json::parse(read_whole_file(folder_.path() / "out/dataset.json"));
   EXPECT_EQ(json.at("samples"), 10);
   EXPECT_EQ(json.at("splits").at("train").get<int>() + json.at("splits").at("test").get<int>(), 10);
   EXPECT_EQ(json.at("units").size(), 2u);
   EXPECT_EQ(json.at("units")[1].at("drawn").at("gel.youngs_modulus_MPa"),
-            datasets::drawn_unit(datasets::prepare_draw(job_), 1).device.gel.youngs_modulus_MPa);
+            drawn_unit(prepare_draw(job_), 1).device.gel.youngs_modulus_MPa);
   int samples = 0;
   for (const auto& file : json.at("files")) {
     if (file.contains("samples")) samples += file.at("samples").get<int>();
@@ -153,14 +153,14 @@ TEST_F(DrawnDataset, TheManifestAndTheCardTellWhatIsThere) {
 }
 
 TEST_F(DrawnDataset, ABrokenOffRunGoesOnToTheSameBytes) {
-  datasets::generate("whole");
+  generate("whole");
   const auto whole = contents("whole");
   for (const int stop : {0, 2, 4, 7, 9}) {
     calls_.presses = 0;
     calls_.stop_at = stop;
-    EXPECT_THROW(datasets::generate("out", {}, 1), std::runtime_error);
+    EXPECT_THROW(generate("out", {}, 1), std::runtime_error);
     calls_.stop_at = -1;
-    const datasets::DrawnReport report = datasets::generate("out");
+    const DrawnReport report = generate("out");
     EXPECT_EQ(report.made + report.kept, 10);
     EXPECT_EQ(contents("out"), whole) << "stopped at " << stop;
     fs::remove_all(folder_.path() / "out");
@@ -168,95 +168,95 @@ TEST_F(DrawnDataset, ABrokenOffRunGoesOnToTheSameBytes) {
 }
 
 TEST_F(DrawnDataset, DamagedBlocksAreMadeAgainAndForeignOnesRefused) {
-  datasets::generate("whole");
+  generate("whole");
   const auto whole = contents("whole");
-  datasets::generate("out", {1, 1});
+  generate("out", {1, 1});
   fs::remove(folder_.path() / "out/dataset.json");
   fs::create_directories(folder_.path() / "out/.unfinished");
-  datasets::generate("begun", {1, 4});
+  generate("begun", {1, 4});
   fs::copy(folder_.path() / "begun/.unfinished/run.json", folder_.path() / "out/.unfinished/run.json");
   const std::string good = read_whole_file(block("out", 2));
   std::string turned = good;
   turned[good.size() / 2] ^= 1;
   for (const std::string& bad : {good.substr(0, good.size() - 100), good.substr(0, 100), std::string(), turned}) {
     write(block("out", 2), bad);
-    EXPECT_THAT(message_of([&] { datasets::merge_drawn(job_, folder_.path() / "out"); }),
+    EXPECT_THAT(message_of([&] { merge_drawn(job_, folder_.path() / "out"); }),
                 HasSubstr("000002.h5 (damaged)"));
-    const datasets::DrawnReport report = datasets::generate("out", {3, 4});
+    const DrawnReport report = generate("out", {3, 4});
     EXPECT_EQ(report.damaged_blocks, 1);
     EXPECT_EQ(read_whole_file(block("out", 2)), good);
   }
   fs::remove(block("out", 1));
-  EXPECT_THAT(message_of([&] { datasets::merge_drawn(job_, folder_.path() / "out"); }),
+  EXPECT_THAT(message_of([&] { merge_drawn(job_, folder_.path() / "out"); }),
               HasSubstr("1 of 4 files lack (blocks/000001.h5)"));
   write(block("out", 1), good);  // whole, but in the wrong place
-  EXPECT_THAT(message_of([&] { datasets::generate("out"); }), HasSubstr("000001.h5: is of another job or another run"));
-  EXPECT_THAT(message_of([&] { datasets::merge_drawn(job_, folder_.path() / "out"); }), HasSubstr("another run"));
+  EXPECT_THAT(message_of([&] { generate("out"); }), HasSubstr("000001.h5: is of another job or another run"));
+  EXPECT_THAT(message_of([&] { merge_drawn(job_, folder_.path() / "out"); }), HasSubstr("another run"));
   fs::remove(block("out", 1));
-  EXPECT_EQ(datasets::generate("out").made, 2);
+  EXPECT_EQ(generate("out").made, 2);
   EXPECT_EQ(contents("out"), whole);
 }
 
 TEST_F(DrawnDataset, ShardsThatLackAreNamed) {
   const fs::path out = folder_.path() / "out";
-  EXPECT_EQ(datasets::lacking_shards(job_, out, 4), (std::vector<int>{1, 2, 3, 4}));
+  EXPECT_EQ(lacking_shards(job_, out, 4), (std::vector<int>{1, 2, 3, 4}));
   EXPECT_FALSE(fs::exists(out));
-  datasets::generate("out", {2, 4});
-  EXPECT_EQ(datasets::lacking_shards(job_, out, 4), (std::vector<int>{1, 3, 4}));
-  EXPECT_EQ(datasets::lacking_shards(job_, out, 2), (std::vector<int>{1, 2}));
-  for (const int number : {1, 3, 4}) datasets::generate("out", {number, 4});
-  EXPECT_TRUE(datasets::lacking_shards(job_, out, 4).empty());
+  generate("out", {2, 4});
+  EXPECT_EQ(lacking_shards(job_, out, 4), (std::vector<int>{1, 3, 4}));
+  EXPECT_EQ(lacking_shards(job_, out, 2), (std::vector<int>{1, 2}));
+  for (const int number : {1, 3, 4}) generate("out", {number, 4});
+  EXPECT_TRUE(lacking_shards(job_, out, 4).empty());
   write(block("out", 2), "short");
-  EXPECT_EQ(datasets::lacking_shards(job_, out, 4), (std::vector<int>{3}));
-  EXPECT_EQ(datasets::lacking_shards(job_, out, 2), (std::vector<int>{2}));
-  EXPECT_THAT(message_of([&] { datasets::lacking_shards(job_, out, 0); }), HasSubstr("--lacking: 0 is not allowed"));
+  EXPECT_EQ(lacking_shards(job_, out, 4), (std::vector<int>{3}));
+  EXPECT_EQ(lacking_shards(job_, out, 2), (std::vector<int>{2}));
+  EXPECT_THAT(message_of([&] { lacking_shards(job_, out, 0); }), HasSubstr("--lacking: 0 is not allowed"));
 }
 
 TEST_F(DrawnDataset, AChangedJobAForeignFolderAndAChangedSetAreRefused) {
-  datasets::generate("out", {1, 2});
+  generate("out", {1, 2});
   const auto before = contents("out");
   std::string other = test::kSmallDraw;
   other.replace(other.find("seed: 3"), 7, "seed: 4");
   folder_.write("job.yaml", other);
-  EXPECT_THAT(message_of([&] { datasets::generate("out"); }), HasSubstr("since it was begun the job file has changed"));
-  EXPECT_THAT(message_of([&] { datasets::merge_drawn(job_, folder_.path() / "out"); }),
+  EXPECT_THAT(message_of([&] { generate("out"); }), HasSubstr("since it was begun the job file has changed"));
+  EXPECT_THAT(message_of([&] { merge_drawn(job_, folder_.path() / "out"); }),
               HasSubstr("the job file has changed"));
   EXPECT_EQ(contents("out"), before);
   test::write_small_draw(folder_);
   folder_.write("ball.yaml", "name: ball\nshape: {type: sphere, radius_mm: 1.6}\nfriction: 0.5\n");
-  EXPECT_THAT(message_of([&] { datasets::generate("out"); }), HasSubstr("a file that the job names has changed"));
+  EXPECT_THAT(message_of([&] { generate("out"); }), HasSubstr("a file that the job names has changed"));
   test::write_small_draw(folder_);
-  datasets::generate("out");
+  generate("out");
   folder_.write("other/file.txt", "mine");
-  EXPECT_THAT(message_of([&] { datasets::generate("other"); }), HasSubstr("isn't empty ('file.txt' is in it)"));
-  EXPECT_THAT(message_of([&] { datasets::merge_drawn(job_, folder_.path() / "none"); }),
+  EXPECT_THAT(message_of([&] { generate("other"); }), HasSubstr("isn't empty ('file.txt' is in it)"));
+  EXPECT_THAT(message_of([&] { merge_drawn(job_, folder_.path() / "none"); }),
               HasSubstr("holds nothing of this job"));
   write(block("out", 0), "short");
-  EXPECT_THAT(message_of([&] { datasets::generate("out"); }), HasSubstr("000000.h5: is missing or was changed"));
+  EXPECT_THAT(message_of([&] { generate("out"); }), HasSubstr("000000.h5: is missing or was changed"));
 }
 
 TEST_F(DrawnDataset, WhatCannotBePressedIsDrawnAgain) {
   calls_.refuse_every = 3;
-  EXPECT_GT(datasets::generate("out").drawn_again, 0);
+  EXPECT_GT(generate("out").drawn_again, 0);
   calls_.refuse_every = 1;
-  EXPECT_THAT(message_of([&] { datasets::generate("never", {}, 1); }),
+  EXPECT_THAT(message_of([&] { generate("never", {}, 1); }),
               HasSubstr("20 draws in a row couldn't be pressed"));
 }
 
 TEST_F(DrawnDataset, ARunKilledBeforeItsFirstBlockGoesOn) {
-  datasets::generate("whole");
+  generate("whole");
   fs::create_directories(folder_.path() / "out/.unfinished");
-  EXPECT_EQ(datasets::generate("out").made, 10);
+  EXPECT_EQ(generate("out").made, 10);
   EXPECT_EQ(contents("out"), contents("whole"));
 }
 
 TEST(Shards, AreRead) {
-  EXPECT_EQ(datasets::shard_of("2/8").number, 2);
-  EXPECT_EQ(datasets::shard_of("2/8").count, 8);
+  EXPECT_EQ(shard_of("2/8").number, 2);
+  EXPECT_EQ(shard_of("2/8").count, 8);
   for (const char* bad : {"", "3", "0/4", "5/4", "1/0", "a/b", "1/2/3", "-1/2", "1 /2"}) {
-    EXPECT_THAT(message_of([&] { datasets::shard_of(bad); }), HasSubstr("isn't a shard")) << bad;
+    EXPECT_THAT(message_of([&] { shard_of(bad); }), HasSubstr("isn't a shard")) << bad;
   }
 }
 
 }  // namespace
-}  // namespace touchstone::lab
+}  // namespace touchstone::datasets

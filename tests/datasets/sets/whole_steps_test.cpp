@@ -8,14 +8,14 @@
 #include <thread>
 #include <vector>
 
-namespace touchstone::lab {
+namespace touchstone::datasets {
 namespace {
 
 TEST(WholeSteps, AreAllDone) {
   std::vector<std::atomic<int>> done(1000);
-  datasets::for_each_whole(done.size(), [&](std::size_t i) { ++done[i]; });
+  for_each_whole(done.size(), [&](std::size_t i) { ++done[i]; });
   for (const auto& one : done) EXPECT_EQ(one, 1);
-  datasets::for_each_whole(0, [](std::size_t) { FAIL(); });
+  for_each_whole(0, [](std::size_t) { FAIL(); });
 }
 
 /// The first step to begin has a loop of its own under way when another one throws. TBB alone would cut that loop
@@ -26,7 +26,7 @@ TEST(WholeSteps, AStepAtWorkIsDoneWholeThoughAnotherOneThrows) {
   for (int round = 0; round < 20; ++round) {
     std::atomic<int> begun{0}, inner{0}, whole{0}, thrown{0};
     const auto run = [&] {
-      datasets::for_each_whole(64, [&](std::size_t) {
+      for_each_whole(64, [&](std::size_t) {
         if (begun++ == 0) {
           tbb::parallel_for(0, kInner, [&](int) {
             ++inner;
@@ -51,7 +51,7 @@ TEST(WholeSteps, NoMoreAreBegunAfterAnException) {
   std::atomic<int> begun{0};
   tbb::task_arena one_thread(1);
   EXPECT_THROW(one_thread.execute([&] {
-    datasets::for_each_whole(100, [&](std::size_t) {
+    for_each_whole(100, [&](std::size_t) {
       if (++begun == 3) throw std::runtime_error("enough");
     });
   }),
@@ -60,4 +60,4 @@ TEST(WholeSteps, NoMoreAreBegunAfterAnException) {
 }
 
 }  // namespace
-}  // namespace touchstone::lab
+}  // namespace touchstone::datasets
