@@ -18,7 +18,7 @@ const sim::PrintSpec& print_of(const sim::VirtualSensor& sensor) {
 sensors::ColourMarkerLook look_of(const sim::VirtualSensor& sensor) {
   sensors::ColourMarkerLook look;
   look.grid = print_of(sensor).grid;
-  // The text counts pixels of more than half saturation in pictures of enhanced contrast. In a levelled one the
+  // [Lin2019] counts pixels of more than half saturation in pictures of enhanced contrast. In a levelled one the
   // filter's yellow has some 0.47, as blue pixels see light of 500 to 540 nm; ink and filtered ink have 0.65 and more,
   // white 0.1.
   look.least_saturation = 0.3;
@@ -30,7 +30,7 @@ sensors::ColourMarkerLook look_of(const sim::VirtualSensor& sensor) {
 sim::VirtualSensorSettings chroma_sensor_settings(std::uint64_t seed) {
   sim::VirtualSensorSettings settings;
   settings.seed = seed;
-  settings.deepest_mm = 3.3;    // the text presses by 3 mm
+  settings.deepest_mm = 3.3;    // the paper presses by 3 mm
   settings.widest_mm = 1.3;     // and shears by 1 mm
   settings.membrane_um = 80.0;  // balls of 4 mm and larger are smooth on it
   settings.always_friction = true;

@@ -15,7 +15,7 @@
 namespace touchstone::lab {
 namespace {
 
-constexpr double kBall_mm = 2.0;  // radius of the text's
+constexpr double kBall_mm = 2.0;  // radius of the ball of [Lin2019]
 constexpr double kLeastMoved_mm = 0.02;
 
 sim::ObjectSpec ball_of(double radius_mm, double friction) {

@@ -1,8 +1,8 @@
 #pragma once
-// The experiments of seed 002 on a chroma device: hue against depth (fig. 8), centroid against lateral displacement
+// The experiments of [Lin2019] on a chroma device: hue against depth (fig. 8), centroid against lateral displacement
 // (fig. 9), the inverted model (sec. IV.D) and displacement fields under punches (fig. 10).
 //
-// Displacements of figs. 8 and 9 and of the inverse are those of the ball, as the text's stage told them. Fields are
+// Displacements of figs. 8 and 9 and of the inverse are those of the ball, as the paper's stage told them. Fields are
 // held against the finite elements' mean displacement of each marker.
 
 #include <cstdint>
@@ -27,7 +27,7 @@ struct MarkerSeries {
   std::vector<double> column_mm(int axis) const;
 };
 
-/// Steps over one marker: the ball of the text, 4 mm.
+/// Steps over one marker: the ball of the paper, 4 mm.
 struct MarkerTest {
   Eigen::Vector2d place_mm = {1.5, 1.5};  ///< of the marker's middle
   double friction = 1.0;                  ///< not given; soft silicone holds plastic well: usual figures are about 1

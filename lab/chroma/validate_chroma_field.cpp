@@ -1,5 +1,5 @@
-// Displacement fields of the chroma device under three punches (shared/seeds/002, sec. IV.E, fig. 10) against the
-// finite elements'.
+// Displacement fields of the chroma device under three punches [Lin2019, sec. IV.E, fig. 10] against the finite
+// elements'.
 
 #include "lab/chroma/chroma_marker_experiment.h"
 #include "lab/validation/row_list.h"
@@ -12,7 +12,7 @@ constexpr std::uint64_t kUnit = 41;  // the sensor
 constexpr std::uint64_t kRest = 1000;
 constexpr std::uint64_t kCalibration = 6000;
 constexpr std::uint64_t kTest = 7000;
-constexpr double kPublishedError_um = 350.0;  // of one marker, sec. IV.D: the text gives no figure for fields
+constexpr double kPublishedError_um = 350.0;  // of one marker, sec. IV.D: the paper gives no figure for fields
 
 }  // namespace
 

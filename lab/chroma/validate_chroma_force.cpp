@@ -1,7 +1,7 @@
-// Forces, friction and stick or slip from the chroma sensor's pictures (shared/seeds/002 leaves them open): punches and
-// balls are pressed on the gel and dragged until they slide; each frame's picture is read, its markers' displacements
-// told by a calibrated model and inverted. The text gives no figure. Asked for here: forces to a tenth of the mean
-// normal force, as the vhs text asks for 0.1 N of some newtons; friction to 0.1, which tells rubber from steel and the
+// Forces, friction and stick or slip from the chroma sensor's pictures ([Lin2019] leaves them open): punches and balls
+// are pressed on the gel and dragged until they slide; each frame's picture is read, its markers' displacements told by
+// a calibrated model and inverted. The paper gives no figure. Asked for here: forces to a tenth of the mean normal
+// force, as [VisioHaptic2024] asks for 0.1 N of some newtons; friction to 0.1, which tells rubber from steel and the
 // dry from the oiled.
 
 #include <cmath>

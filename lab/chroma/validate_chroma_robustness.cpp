@@ -1,5 +1,5 @@
-// Fig. 6 of the chroma sensor's text (shared/seeds/002, sec. III.D) on markers that light made: how well hue and a
-// black marker's size tell a displacement with few pixels and in uneven light; and how fast the estimator is.
+// Fig. 6 of [Lin2019, sec. III.D] on markers that light made: how well hue and a black marker's size tell a
+// displacement with few pixels and in uneven light; and how fast the estimator is.
 
 #include <fmt/format.h>
 
@@ -31,7 +31,7 @@ struct Ladder {
   RobustnessSettings settings;
 };
 
-/// The blur that the text puts over its pictures mixes so much white into the film's yellow that none of it has the
+/// The blur that the paper puts over its pictures mixes so much white into the film's yellow that none of it has the
 /// saturation of 0.5 that the sensor asks for; as in the drawing half of that is asked for here.
 Ladder rendered_ladder(const ValidateOptions& options) {
   RenderedRungs how;
@@ -170,12 +170,12 @@ std::vector<ValidationRow> validate_chroma_robustness(const ValidateOptions& opt
   Ladder sharp = rendered;
   sharp.settings.blur = 0.0;
   sharp.settings.least_saturation = RobustnessSettings().least_saturation;
-  add_pixels(sharp, "sharp_", "traced, without the text's blur, pixels of more than half saturation");
+  add_pixels(sharp, "sharp_", "traced, without the paper's blur, pixels of more than half saturation");
   report(1);
 
   const Ladder drawn{drawn_robustness_rungs(), drawn_robustness_settings()};
-  add_pixels(drawn, "drawn_", "the text's drawing");
-  add_gradient(drawn, drawn.settings.filter_px, "drawn_", "the text's drawing");
+  add_pixels(drawn, "drawn_", "the paper's drawing");
+  add_gradient(drawn, drawn.settings.filter_px, "drawn_", "the paper's drawing");
   report(2);
 
   const Clip clip = make_clip(options);

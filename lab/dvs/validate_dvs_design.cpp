@@ -1,10 +1,10 @@
-// What force an event-driven membrane can tell, and what its thickness and stiffness do to that. Source text 001, sec.
-// VI: "able to capture contact area changes for the contact forces up to 3.7 N", and "membrane properties such as
+// What force an event-driven membrane can tell, and what its thickness and stiffness do to that. [Naeini2020, sec. VI]:
+// "able to capture contact area changes for the contact forces up to 3.7 N", and "membrane properties such as
 // stiffness, shape, and thickness as well as DVS threshold can be altered in order to change the measurement range".
 //
 // A rigid piece is pressed level on the membrane, ever harder. What its contact adds to the change of light, counted in
 // OFF thresholds over all pixels, is what events can tell of the force: it grows while the faces' roughness is pressed
-// flat, and then no more. The range ends where nine tenths are told of what three times the text's largest force would
+// flat, and then no more. The range ends where nine tenths are told of what three times the paper's largest force would
 // tell.
 
 #include <algorithm>
@@ -117,7 +117,7 @@ std::vector<ValidationRow> validate_dvs_design(const ValidateOptions& options) {
         "N", range.high_N, Better::near, true);
     row.series = ValidationSeries{"force, N", "OFF events that contact tells", range.told};
     if (i == 0) {
-      // Roughness was chosen so (lab/dvs/dvs_grasps.h): a check that it still is, within a factor of the text's.
+      // Roughness was chosen so (lab/dvs/dvs_grasps.h): a check that it still is, within a factor of the paper's.
       row.published = kPublishedRange_N;
       row.holds = range.high_N > 0.67 * kPublishedRange_N && range.high_N < 1.5 * kPublishedRange_N;
     }

@@ -1,6 +1,6 @@
 #pragma once
-// The domed gelsight sensor against flat things (source text 004, sec. 2.2.1, fig. 2-9): where a plate touches the
-// dome, and what an estimator of heights that was made for flat gels makes of it.
+// The domed gelsight sensor against flat things [Li2015, sec. 2.2.1, fig. 2-9]: where a plate touches the dome, and
+// what an estimator of heights that was made for flat gels makes of it.
 
 #include <cstdint>
 #include <span>

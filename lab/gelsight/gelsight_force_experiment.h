@@ -1,6 +1,6 @@
 #pragma once
-// Forces from the pictures of a gelsight device (shared/seeds/004, sec. 4.2 and 4.3): the sum of the height map against
-// the normal force, the mean marker displacement against the shear force.
+// Forces from the pictures of a gelsight device [Li2015, sec. 4.2 and 4.3]: the sum of the height map against the
+// normal force, the mean marker displacement against the shear force.
 
 #include <string>
 #include <vector>
@@ -20,7 +20,7 @@ sensors::MarkerTrackerSettings marker_settings(const sim::VirtualSensor& sensor)
 cv::Mat without_markers(const cv::Mat& frame, const sensors::TrackedMarkers* markers, double diameter_px);
 
 /// The same calibration for a gel with markers under the same light: with the background of that gel, its markers
-/// filled. (The text doesn't say how it calibrates its second gel. Its table goes from colour to slope, and holds for
+/// filled. (The thesis doesn't say how it calibrates its second gel. Its table goes from colour to slope, and holds for
 /// both.)
 sensors::HeightModel for_marked_gel(sensors::HeightModel model, const sim::VirtualSensor& marked, std::uint64_t seed);
 

@@ -21,7 +21,7 @@ sim::ObjectSpec with_friction(sim::ObjectSpec object, double friction);
 /// depth, and a wider one, which shows gentle slopes on more pixels than the small one's middle has. Circles are
 /// annotated by hand: the contact's outline as it is, with errors of `annotation_px`.
 struct CalibrationPresses {
-  double ball_diameter_mm = 2.0;  ///< source text 004, sec. 2.2.2
+  double ball_diameter_mm = 2.0;  ///< [Li2015, sec. 2.2.2]
   int columns = 4;
   int rows = 3;
   Eigen::Vector2d extent_mm = {11.0, 7.6};  ///< between the outermost places

@@ -1,6 +1,6 @@
 #pragma once
-// Slip on a gelsight device with markers (shared/seeds/004, sec. 4.4): objects that slide, and objects that don't, seen
-// by the text's two ratios and by the incipient slip detector, against the stick-slip map of the finite elements.
+// Slip on a gelsight device with markers [Li2015, sec. 4.4]: objects that slide, and objects that don't, seen by the
+// thesis's two ratios and by the incipient slip detector, against the stick-slip map of the finite elements.
 
 #include <cstdint>
 #include <optional>
@@ -37,7 +37,7 @@ struct SlipFrame {
   double load = 0.0;      ///< true: shear force over friction times normal force
   double sticking = 0.0;  ///< true: share of the touching vertices
   std::optional<double> force_ratio, motion_ratio;
-  bool rule = false;           ///< the text's detector
+  bool rule = false;           ///< the thesis's detector
   sensors::IncipientSlip rim;  ///< the second one
   int markers_found = 0;
 };

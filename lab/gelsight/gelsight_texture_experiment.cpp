@@ -128,7 +128,7 @@ sim::ObjectSpec another_patch(const sim::ObjectSpec& object, std::uint64_t seed)
 
 sensors::HeightModel calibrate_view(const sim::VirtualSensor& sensor, std::uint64_t noise_seed) {
   constexpr int kBackgrounds = 8, kPlaces = 3;
-  constexpr double kBall_mm = 2.0;  // sec. 2.2.2
+  constexpr double kBall_mm = 2.0;  // [Li2015, sec. 2.2.2]
   constexpr double kDepths_mm[] = {0.2, 0.3};
   // Places, so that circles and their shadows stay within the view.
   const double between_mm = 0.28 * kTextureView_px * sensor.mm_per_px();

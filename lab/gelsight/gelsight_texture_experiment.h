@@ -1,7 +1,6 @@
 #pragma once
-// Material recognition with a GelSight: sec. 5.3.2 of the text (shared/seeds/004), Li and Adelson, CVPR 2013. Each of
-// 40 surfaces is pressed six times, turned at random; each height image gives four samples; some samples of each class
-// train the classifier, the others test it.
+// Material recognition with a GelSight [Li2015, sec. 5.3.2], [Li2013]. Each of 40 surfaces is pressed six times, turned
+// at random; each height image gives four samples; some samples of each class train the classifier, the others test it.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -80,7 +79,7 @@ TextureSamples texture_samples(const sim::VirtualSensor& sensor, const std::vect
 
 /// How samples are divided into those that train and those that test.
 enum class TextureSplit {
-  by_sample,  ///< the text's way: squares of one image may stand on both sides
+  by_sample,  ///< the thesis's way: squares of one image may stand on both sides
   by_image,   ///< stricter: all squares of an image stand on the same side
 };
 

@@ -51,7 +51,7 @@ sensors::PlaceMap fitted_places(const sim::VirtualSensor& sensor) {
   return sensors::fit_place_map(pixels, places, {width, height});
 }
 
-/// Contact where the level of rest isn't known: the higher of two classes of heights (Otsu 1979).
+/// Contact where the level of rest isn't known: the higher of two classes of heights [Otsu1979].
 cv::Mat higher_part(const cv::Mat& heights) {
   cv::Mat grey, mask;
   cv::normalize(heights, grey, 0.0, 255.0, cv::NORM_MINMAX, CV_8U);

@@ -1,6 +1,6 @@
-// Which ball to calibrate gelsight with. Source text 004, sec. 2.2.2: a larger one has more pixels, which fill the
-// table of colours better; a small one can be pressed in so far that steep slopes are seen, too; so "around 2 mm". Here
-// each size is used by itself, and what it teaches is tried on other balls.
+// Which ball to calibrate gelsight with. [Li2015, sec. 2.2.2]: a larger one has more pixels, which fill the table of
+// colours better; a small one can be pressed in so far that steep slopes are seen, too; so "around 2 mm". Here each
+// size is used by itself, and what it teaches is tried on other balls.
 
 #include <algorithm>
 #include <array>
@@ -91,14 +91,14 @@ std::vector<ValidationRow> validate_gelsight_design(const ValidateOptions& optio
   ValidationRow& more =
       rows.add("pixels_of_largest_over_smallest",
                "pixels that a press of the largest ball teaches from over those of the smallest; holds if "
-               "they rise from each size to the next, as the text says",
+               "they rise from each size to the next, as the thesis says",
                "1", pixels.back().second / pixels.front().second, Better::higher,
                std::is_sorted(pixels.begin(), pixels.end(), rises));
   more.series = ValidationSeries{"ball's diameter, mm", "pixels of a press", pixels};
   const auto best = std::min_element(error.begin(), error.end(), rises);
   ValidationRow& chosen = rows.add(
       "best_ball_mm",
-      fmt::format("the ball that calibrates best by itself, {:.1f} um off on others; the text's of 2 mm is {:.1f} "
+      fmt::format("the ball that calibrates best by itself, {:.1f} um off on others; the thesis's of 2 mm is {:.1f} "
                   "um off",
                   best->second,
                   std::find_if(error.begin(), error.end(), [](auto& e) { return e.first == 2.0; })->second),

@@ -15,7 +15,7 @@ namespace {
 constexpr double kAllowedRadius_percent = 3.0;  // a pixel and a half in the smallest disc
 constexpr double kAllowedCentre_mm = 0.1;
 constexpr double kTilt_deg = 6.0;
-constexpr double kPublishedResolution_um = 40.0;  // text, sec. 2.2.2: 10 to 40 um
+constexpr double kPublishedResolution_um = 40.0;  // [Li2015, sec. 2.2.2]: 10 to 40 um
 
 ValidationRow row(const char* id, std::string title, const char* unit, double ours, bool holds, bool quick,
                   std::chrono::steady_clock::time_point begun) {

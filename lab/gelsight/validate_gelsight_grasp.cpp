@@ -1,8 +1,8 @@
-// The grasps of the fingertip GelSight's text (shared/seeds/004, sec. 4.5, fig. 4-9): egg, chip and leaf are lifted
-// with the grasp rule, led by camera frames. The text shows one grasp of each, and all are held; here each is tried
-// over a range of frictions, weights, places and turns, with other noise each time. The rule's steps and the arm's
-// speed were chosen on one grasp of each object with a friction of 0.6 in the middle of the gel, none of the full
-// form's trials; how long slip is forgotten after it was told (GraspSenseSettings) was chosen on its second one.
+// The grasps of [Li2015, sec. 4.5, fig. 4-9]: egg, chip and leaf are lifted with the grasp rule, led by camera frames.
+// The thesis shows one grasp of each, and all are held; here each is tried over a range of frictions, weights, places
+// and turns, with other noise each time. The rule's steps and the arm's speed were chosen on one grasp of each object
+// with a friction of 0.6 in the middle of the gel, none of the full form's trials; how long slip is forgotten after it
+// was told (GraspSenseSettings) was chosen on its second one.
 
 #include <tbb/parallel_for.h>
 
@@ -64,7 +64,7 @@ struct Trials {
   }
 };
 
-/// The text names no friction; its own force ratios go from 0.04 to 2.21.
+/// The thesis names no friction; its own force ratios go from 0.04 to 2.21.
 std::vector<GraspTrial> trials_of(const std::vector<sim::ObjectSpec>& objects, bool quick) {
   struct Grasp {
     Eigen::Vector2d place_mm;
@@ -179,7 +179,7 @@ std::vector<ValidationRow> validate_gelsight_grasp(const ValidateOptions& option
     GraspSenseSettings ratios;
     ratios.rim = false;
     add_control("gelsight.grasp.ratios_held_of_trials",
-                "the same trials with slip by the text's two ratios alone, above 1 and 0.5", loop, ratios);
+                "the same trials with slip by the thesis's two ratios alone, above 1 and 0.5", loop, ratios);
   }
   return rows;
 }

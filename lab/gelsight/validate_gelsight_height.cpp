@@ -1,6 +1,5 @@
-// Height maps of the gelsight sensor (source text 004, sec. 2.2): error against the true membrane, resolution, what is
-// visible, rate. Calibrated on the simulated device with a 2 mm ball as a user would, tested on what calibration never
-// saw.
+// Height maps of the gelsight sensor [Li2015, sec. 2.2]: error against the true membrane, resolution, what is visible,
+// rate. Calibrated on the simulated device with a 2 mm ball as a user would, tested on what calibration never saw.
 
 #include <fmt/format.h>
 

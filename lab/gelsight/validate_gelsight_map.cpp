@@ -1,5 +1,5 @@
-// Localisation, mapping and insertion by touch: the published figures of the source text (004), ch. 3. Touches go the
-// whole way: gel, light, imager, height estimator calibrated by ball presses, registration.
+// Localisation, mapping and insertion by touch: the published figures of [Li2015, ch. 3]. Touches go the whole way:
+// gel, light, imager, height estimator calibrated by ball presses, registration.
 
 #include <fmt/format.h>
 
@@ -24,7 +24,7 @@ constexpr double kMembrane_um = 60.0;  // pixels of the fine contact: the camera
 constexpr double kQuickMembrane_um = 80.0;
 constexpr int kErrorRounds = 1000;
 
-/// The standard deviation along each axis at which a robot misses by more than 1 mm twice in 36 times: the text's two
+/// The standard deviation along each axis at which a robot misses by more than 1 mm twice in 36 times: the thesis's two
 /// failures, if they were the robot's (Rayleigh's distribution: exp(-1 / (2 s^2)) = 2 / 36).
 double suspected_robot_error_mm() {
   return 1.0 / std::sqrt(2.0 * std::log(18.0));
@@ -86,7 +86,7 @@ std::vector<ValidationRow> validate_gelsight_map(const ValidateOptions& options)
     rows.push_back(row("gelsight.map.rotation_sd_deg", "standard deviation of repeats, a plug's angle", "deg",
                        kPublishedTurnDeviation_deg, maps.turn_deg.mean_deviation, Better::lower));
   }
-  add_error("gelsight.map.features_translation_mm", "the same place by features alone, as the text has it", "mm",
+  add_error("gelsight.map.features_translation_mm", "the same place by features alone, as the thesis has it", "mm",
             kPublishedPlace_mm, maps.features_along_mm);
   add_error("gelsight.map.features_rotation_deg", "the same angle by features alone", "deg", kPublishedTurn_deg,
             maps.features_turn_deg);

@@ -1,7 +1,6 @@
-// The published figures of the gelsight sensor's forces and slip (shared/seeds/004, ch. 4): the sum of the height map
-// against the normal force, marker displacement against the shear force, and slip found against the stick-slip map of
-// the finite elements. The text gives no figure for the lines but "strongly linear"; R2 of 0.95 is what is asked for
-// here.
+// The published figures of the gelsight sensor's forces and slip [Li2015, ch. 4]: the sum of the height map against the
+// normal force, marker displacement against the shear force, and slip found against the stick-slip map of the finite
+// elements. The thesis gives no figure for the lines but "strongly linear"; R2 of 0.95 is what is asked for here.
 
 #include <tbb/parallel_for.h>
 
@@ -28,7 +27,7 @@ constexpr double kFramesToSee = 2.0;              // partial slip that lasts les
 constexpr double kShearDrag_mm = 0.45;            // it slides at some 0.3
 constexpr std::uint64_t kSeed = 4001;
 
-/// The objects of fig. 4-2 and the forces on them. The text's balls lie there with their own weight; here each gets
+/// The objects of fig. 4-2 and the forces on them. The thesis's balls lie there with their own weight; here each gets
 /// several. The small ball stops where it is pressed in by a quarter of the gel.
 struct Indenter {
   sim::ObjectSpec object;
@@ -85,7 +84,7 @@ std::vector<SlipCase> slip_cases(bool quick) {
   return cases;
 }
 
-/// Lines of the marked gel: one for each object of the cases, one for shear under the text's large flat end.
+/// Lines of the marked gel: one for each object of the cases, one for shear under the thesis's large flat end.
 sensors::GelForceModel fit_forces(const sim::VirtualSensor& sensor, const sensors::HeightModel& heights,
                                   const std::vector<SlipCase>& cases, const sensors::LinearForce& shear) {
   sensors::GelForceModel model;
@@ -175,14 +174,14 @@ void add_slip_rows(RowList& rows, const std::vector<SlipRun>& runs, double frame
   rows.add_bounded("gelsight.slip.false_alarms_percent",
                    "frames with slip at the rim reported while pressing, holding, loaded to a half, rolling", "%",
                    Better::lower, kMostFalseAlarms_percent, false, rim.false_alarms_percent());
-  rows.add_bounded("gelsight.slip.rule_found_percent", "slides that the text's rule rf > 1 and rm > 0.5 found", "%",
+  rows.add_bounded("gelsight.slip.rule_found_percent", "slides that the thesis's rule rf > 1 and rm > 0.5 found", "%",
                    Better::higher, 90.0, false, percent(rule.found, rule.slides));
   if (rule.found > 0) {
-    rows.add_bounded("gelsight.slip.rule_delay_ms", "the text's rule against the onset of gross sliding, median", "ms",
+    rows.add_bounded("gelsight.slip.rule_delay_ms", "the same rule against the onset of gross sliding, median", "ms",
                      Better::lower, 0.0, false, rule.median_delay_ms());
   }
-  rows.add_bounded("gelsight.slip.rule_false_alarms_percent", "frames with slip reported by the text's rule, as above",
-                   "%", Better::lower, kMostFalseAlarms_percent, false, rule.false_alarms_percent());
+  rows.add_bounded("gelsight.slip.rule_false_alarms_percent", "frames with slip reported by that rule, as above", "%",
+                   Better::lower, kMostFalseAlarms_percent, false, rule.false_alarms_percent());
 }
 
 }  // namespace

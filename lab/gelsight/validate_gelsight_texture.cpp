@@ -1,7 +1,7 @@
-// Material recognition of the gelsight text (shared/seeds/004, sec. 5.3.2, table 5.2): 40 surfaces, six presses of
-// each, four squares of 200 x 200 px of each press. The device is calibrated by ball presses as a user would; frames
-// are made with noise; heights are estimated from frames. Nothing is tuned on these samples: the operator is the
-// text's, the height of a gray level is fixed below.
+// Material recognition of [Li2015, sec. 5.3.2, table 5.2]: 40 surfaces, six presses of each, four squares of 200 x 200
+// px of each press. The device is calibrated by ball presses as a user would; frames are made with noise; heights are
+// estimated from frames. Nothing is tuned on these samples: the operator is the thesis's, the height of a gray level is
+// fixed below.
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -97,7 +97,7 @@ std::vector<ValidationRow> validate_gelsight_texture(const ValidateOptions& opti
         "{} textures right{}, ({}, {}), {} of {} samples a class train{}, mean of {} splits ({:.2f} to {:.2f}){}{}",
         objects.size(), row.membrane ? " by the membrane's true heights" : "", row.op.circle.neighbours,
         row.op.circle.radius_px, training, of_a_class,
-        row.split == TextureSplit::by_image ? ", whole presses held out (stricter than the text)" : "", kSplits,
+        row.split == TextureSplit::by_image ? ", whole presses held out (stricter than the thesis)" : "", kSplits,
         score.worst, score.best, wrong.empty() ? "" : "; most mistaken: ", fmt::join(wrong, ", "));
     result.unit = std::string("%");
     result.published = row.published;

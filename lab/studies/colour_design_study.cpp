@@ -26,7 +26,7 @@ constexpr std::uint64_t kTest = 5000;
 constexpr int kRestPictures = 10;
 constexpr double kBoundStep_mm = 0.05;  // of the ball, to either side: wide against what direct light's rays miss
 constexpr double kBoundShear = 0.25;    // of the shear: where the bound is asked for
-constexpr double kBall_mm = 2.0;        // radius of the text's ball
+constexpr double kBall_mm = 2.0;        // radius of the ball of [Lin2019]
 
 /// Least standard deviations (mm) of the ball's x, y, z from one whole picture, at mid depth.
 Eigen::Vector3d least_error(const ColourDesignSpec& spec, const sim::VirtualSensor& sensor,

@@ -1,6 +1,5 @@
 #pragma once
-// The published and closed-form figures that this program is held against, as rows with stable names
-// (shared/SENSORS.md, "Rows by name").
+// The published and closed-form figures that this program is held against, as rows with stable names.
 
 #include <filesystem>
 #include <functional>

@@ -1,4 +1,4 @@
-// Fig. 6 of the chroma sensor's text, on its own drawing.
+// Fig. 6 of [Lin2019], on its own drawing.
 
 #include "lab/chroma/chroma_robustness.h"
 

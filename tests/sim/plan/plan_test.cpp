@@ -158,8 +158,8 @@ TEST(Plan, AVibrationAlongTheSurfaceCallsForFriction) {
 }
 
 // Under a layer that is thin against the disc nothing gets away sideways, so what comes back at once is the internal
-// diffuse reflectance of an index of 1.5, 0.596 (Duntley's formula, e.g. Walsh 1926), less the light that the shifts of
-// the last grazing angles take away.
+// diffuse reflectance of an index of 1.5, 0.596 (Duntley's formula, as in [Walsh1926]), less the light that the shifts
+// of the last grazing angles take away.
 TEST(Plan, AWideBrightDiscGetsBackTheDiffuseReflectanceOfTheFace) {
   GelSpec gel;
   gel.thickness_mm = 0.001;
