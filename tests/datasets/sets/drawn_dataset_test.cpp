@@ -30,10 +30,10 @@ struct Calls {
 };
 
 /// A bench whose records are plain functions of unit and touch.
-BenchSource quick_bench(Calls& calls) {
+SensorSource quick_bench(Calls& calls) {
   return [&calls](const PreparedDraw&, const DrawnUnit& unit) {
     ++calls.units;
-    UnitBench bench;
+    UnitSensor bench;
     bench.light = "a plain function";
     bench.background = cv::Mat(30, 40, CV_8UC3, cv::Scalar(unit.number, 20, 30));
     bench.press = [&calls, unit](const DrawnTouch& touch, const sim::ObjectSpec& object) {

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "core/error.h"
-#include "lamp_scenes.h"
+#include "tests/render/lamps/lamp_scenes.h"
 #include "render/direct/direct_error.h"
 #include "render/direct/direct_renderer.h"
 #include "render/direct/light_field.h"

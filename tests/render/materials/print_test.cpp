@@ -7,7 +7,7 @@
 
 #include "core/random.h"
 #include "core/units.h"
-#include "light_scenes.h"
+#include "tests/render/paths/light_scenes.h"
 #include "render/materials/print.h"
 
 namespace touchstone::render {

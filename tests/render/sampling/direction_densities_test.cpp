@@ -9,7 +9,7 @@
 
 #include "core/random.h"
 #include "core/units.h"
-#include "light_scenes.h"
+#include "tests/render/paths/light_scenes.h"
 #include "render/materials/deep_walk.h"
 #include "render/materials/ggx.h"
 #include "render/materials/rough_dielectric.h"
