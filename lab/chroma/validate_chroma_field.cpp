@@ -19,7 +19,7 @@ constexpr double kPublishedError_um = 350.0;  // of one marker, sec. IV.D: the p
 std::vector<ValidationRow> validate_chroma_field(const ValidateOptions& options) {
   RowList rows("chroma.field.", options, RowList::Since::last_row);
   const sim::VirtualSensor sensor(sim::read_device(options.scenes / "devices" / "chroma.yaml"), options.cache,
-                                  chroma_rig_settings(kUnit));
+                                  chroma_sensor_settings(kUnit));
   const ChromaBench bench(sensor, kRest);
   const sensors::HueModel model = calibrate_field(bench, options.quick, kCalibration);
   sensors::TractionInversion inversion = elastic_inversion(bench, options.cache, model.parallax);

@@ -106,7 +106,7 @@ std::vector<ValidationRow> validate_chroma_force(const ValidateOptions& options)
   RowList rows("", options, RowList::Since::begin);
   const sim::DeviceSpec device = sim::read_device(options.scenes / "devices" / "chroma.yaml");
   ForceBench bench = set_up_force_bench(device, options.cache, options.progress);
-  sim::VirtualSensorSettings light = chroma_rig_settings(kUnit);
+  sim::VirtualSensorSettings light = chroma_sensor_settings(kUnit);
   light.widest_mm = kWidest_mm;
   const sim::VirtualSensor sensor(with_probe_mesh(device), options.cache, light);
   const ChromaBench camera(sensor, kUnit);

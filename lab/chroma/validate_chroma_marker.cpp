@@ -35,7 +35,7 @@ constexpr double kLinear_r2 = 0.99;
 
 std::vector<ValidationRow> validate_chroma_marker(const ValidateOptions& options) {
   const sim::VirtualSensor sensor(sim::read_device(options.scenes / "devices" / "chroma.yaml"), options.cache,
-                                  chroma_rig_settings(kUnit));
+                                  chroma_sensor_settings(kUnit));
   const ChromaBench bench(sensor, kRest);
   const MarkerTest test;
   const std::size_t marker = bench.marker_at(test.place_mm);

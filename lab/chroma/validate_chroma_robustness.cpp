@@ -54,7 +54,7 @@ struct Clip {
 
 Clip make_clip(const ValidateOptions& options) {
   const sim::VirtualSensor sensor(sim::read_device(options.scenes / "devices" / "chroma.yaml"), options.cache,
-                                  chroma_rig_settings(kSeed));
+                                  chroma_sensor_settings(kSeed));
   const ChromaBench bench(sensor, kSeed);
   const sim::ObjectSpec ball = with_friction(ball_of(8.0), 1.0);
   sim::MotionSpec motion;

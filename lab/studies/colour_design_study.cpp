@@ -127,7 +127,7 @@ std::vector<DesignFigure> colour_design_figures(const ColourDesignSpec& spec) {
 
 std::vector<double> colour_design(const ColourDesignSpec& spec, const sim::DeviceSpec& device,
                                   const std::filesystem::path& cache) {
-  const sim::VirtualSensor sensor(device, cache, chroma_rig_settings(kUnit));
+  const sim::VirtualSensor sensor(device, cache, chroma_sensor_settings(kUnit));
   const ChromaBench bench(sensor, kRest);
   const std::size_t marker = bench.marker_at(spec.place_mm);
   const MarkerTest test{bench.markers().markers[marker].centre, spec.friction};
