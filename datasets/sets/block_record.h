@@ -9,6 +9,7 @@
 
 #include "core/error.h"
 #include "datasets/jobs/drawn_touch.h"
+#include "sim/sensor/virtual_sensor.h"
 
 namespace touchstone::datasets {
 
@@ -43,6 +44,9 @@ struct UnitBench {
 
 /// What a drawn data set's samples come from: the simulator, or in tests something quicker.
 using BenchSource = std::function<UnitBench(const PreparedDraw& prepared, const DrawnUnit& unit)>;
+
+/// How a unit's sensor is set up. Its light isn't kept (sim::VirtualSensorSettings::light_key).
+sim::VirtualSensorSettings drawn_sensor_settings(const PreparedDraw& prepared, const DrawnUnit& unit);
 
 /// sim::VirtualSensor, with set-up results kept in `cache_folder`.
 BenchSource rig_bench(const std::filesystem::path& cache_folder);
