@@ -4,7 +4,6 @@
 
 #include "datasets/sets/run_identity.h"
 #include "sim/press/gel_setup.h"
-#include "sim/sensor/virtual_sensor.h"
 
 namespace touchstone::datasets {
 namespace {
@@ -59,18 +58,23 @@ BlockRecord pressed(const PreparedDraw& prepared, const sim::VirtualSensor& sens
 
 }  // namespace
 
+sim::VirtualSensorSettings drawn_sensor_settings(const PreparedDraw& prepared, const DrawnUnit& unit) {
+  sim::VirtualSensorSettings settings;
+  settings.seed = unit.seed;
+  settings.deepest_mm = prepared.deepest_mm;
+  settings.widest_mm = prepared.widest_mm;
+  settings.membrane_um = prepared.job.membrane_um;
+  settings.interreflection_tolerance = prepared.job.interreflection_tolerance;
+  settings.edge_side = prepared.job.edge_side;
+  settings.guides = prepared.job.guides;
+  settings.always_friction = true;  // else a straight press would have none beside a tilted one that has
+  return settings;
+}
+
 SensorSource virtual_sensors(const std::filesystem::path& cache_folder) {
   return [cache_folder](const PreparedDraw& prepared, const DrawnUnit& unit) {
-    sim::VirtualSensorSettings settings;
-    settings.seed = unit.seed;
-    settings.deepest_mm = prepared.deepest_mm;
-    settings.widest_mm = prepared.widest_mm;
-    settings.membrane_um = prepared.job.membrane_um;
-    settings.interreflection_tolerance = prepared.job.interreflection_tolerance;
-    settings.edge_side = prepared.job.edge_side;
-    settings.guides = prepared.job.guides;
+    sim::VirtualSensorSettings settings = drawn_sensor_settings(prepared, unit);
     settings.light_key = to_json(light_identity(prepared)) + unit.text;
-    settings.always_friction = true;  // else a straight press would have none beside a tilted one that has
     sim::keep_gel_of_unit_modulus(unit.device, cache_folder);
     const auto sensor = std::make_shared<const sim::VirtualSensor>(unit.device, cache_folder, settings);
     UnitSensor made;

@@ -12,6 +12,7 @@
 #include "core/frame.h"
 #include "core/motion_chip.h"
 #include "datasets/jobs/drawn_touch.h"
+#include "sim/sensor/virtual_sensor.h"
 
 namespace touchstone::datasets {
 
@@ -52,6 +53,9 @@ struct UnitSensor {
 
 /// What a drawn data set's samples come from: the simulator, or in tests something quicker.
 using SensorSource = std::function<UnitSensor(const PreparedDraw& prepared, const DrawnUnit& unit)>;
+
+/// How a unit's sensor is set up. Its light isn't kept (sim::VirtualSensorSettings::light_key).
+sim::VirtualSensorSettings drawn_sensor_settings(const PreparedDraw& prepared, const DrawnUnit& unit);
 
 /// sim::VirtualSensor, with set-up results kept in `cache_folder`.
 SensorSource virtual_sensors(const std::filesystem::path& cache_folder);

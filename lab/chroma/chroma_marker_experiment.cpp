@@ -91,13 +91,21 @@ MarkerSeries press_series(const ChromaBench& bench, const MarkerTest& test, doub
                           std::uint64_t seed) {
   const int steps = static_cast<int>(std::lround(deepest_mm / step_mm));
   const auto motion = press_and_drag(test.place_mm, kBall_mm, deepest_mm, steps, {0, 0}, 0);
-  return read_series(bench, test, bench.play(ball_of(kBall_mm, test.friction), motion, seed), 0);
+  return read_series(bench, test, bench.play(marker_ball(test), motion, seed), 0);
 }
 
 MarkerSeries shear_series(const ChromaBench& bench, const MarkerTest& test, double depth_mm,
                           const Eigen::Vector2d& end_mm, int steps, std::uint64_t seed) {
-  const auto motion = press_and_drag(test.place_mm, kBall_mm, depth_mm, 1, end_mm, steps);
-  return read_series(bench, test, bench.play(ball_of(kBall_mm, test.friction), motion, seed), 1);
+  const sim::MotionSpec motion = shear_motion(test, depth_mm, end_mm, steps);
+  return read_series(bench, test, bench.play(marker_ball(test), motion, seed), 1);
+}
+
+sim::ObjectSpec marker_ball(const MarkerTest& test) {
+  return ball_of(kBall_mm, test.friction);
+}
+
+sim::MotionSpec shear_motion(const MarkerTest& test, double depth_mm, const Eigen::Vector2d& end_mm, int steps) {
+  return press_and_drag(test.place_mm, kBall_mm, depth_mm, 1, end_mm, steps);
 }
 
 std::vector<double> hue_repeats_deg(const ChromaBench& bench, std::uint64_t seed, int pictures) {

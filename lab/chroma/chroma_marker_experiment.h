@@ -40,6 +40,10 @@ MarkerSeries press_series(const ChromaBench& bench, const MarkerTest& test, doub
 MarkerSeries shear_series(const ChromaBench& bench, const MarkerTest& test, double depth_mm,
                           const Eigen::Vector2d& end_mm, int steps, std::uint64_t seed);
 
+/// What shear_series presses, and how it moves.
+sim::ObjectSpec marker_ball(const MarkerTest& test);
+sim::MotionSpec shear_motion(const MarkerTest& test, double depth_mm, const Eigen::Vector2d& end_mm, int steps);
+
 /// Standard deviation (degrees) of each marker's hue in pictures of the untouched device. @pre at least 2 pictures
 std::vector<double> hue_repeats_deg(const ChromaBench& bench, std::uint64_t seed, int pictures);
 

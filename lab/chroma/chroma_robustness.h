@@ -19,6 +19,9 @@
 
 namespace touchstone::lab {
 
+/// R2 of the size of a black marker of 4 x 4 px (fig. 6b: "as low as").
+inline constexpr double kPublishedSizeR2 = 0.5;
+
 /// One displacement, as seen in colour and with a black marker on white in place of the coloured one.
 struct RobustnessRung {
   double displacement = 0.0;  ///< in any unit, or the marker's size
@@ -56,6 +59,10 @@ struct PixelRobustness {
 ///   size, or a displacement whose coloured picture has no saturated pixel
 std::vector<PixelRobustness> pixel_robustness(const std::vector<RobustnessRung>& rungs,
                                               const RobustnessSettings& settings);
+
+/// Whether so few pixels cost the count of a black marker's pixels at least half of what they cost it in the paper,
+/// where R2 falls from 1 to kPublishedSizeR2 ("dramatic effects").
+bool size_is_lost(const PixelRobustness& few);
 
 /// What a gradient does at one displacement: differences between with and without it, in percent of the measurement's
 /// range over all displacements.

@@ -151,10 +151,14 @@ std::vector<ValidationRow> validate_vhs_palpation(const ValidateOptions& options
       kPublished1000);
   add("levels_500Hz_percent", "every second sample", at_500, kPublished500);
   add("levels_250Hz_percent", "every fourth", at_250, kPublished250);
-  ValidationRow& fall =
-      rows.add("drop_to_250Hz_percent", "what is lost from 1000 Hz to 250 Hz", "%", mean_of(drop), Better::near,
-               std::abs(mean_of(drop) - (kPublished1000 - kPublished250)) <= kAllowedDrop);
-  fall.published = kPublished1000 - kPublished250;
+  // More levels than the paper's at 250 Hz are no success where nothing was lost on the way there.
+  constexpr double kPublishedDrop = kPublished1000 - kPublished250;
+  if (mean_of(drop) < kPublishedDrop - kAllowedDrop) {
+    deny(rows.last(), "at 250 Hz levels are lost that 500 and 1000 Hz tell");
+  }
+  ValidationRow& fall = rows.add("drop_to_250Hz_percent", "what is lost from 1000 Hz to 250 Hz", "%", mean_of(drop),
+                                 Better::near, std::abs(mean_of(drop) - kPublishedDrop) <= kAllowedDrop);
+  fall.published = kPublishedDrop;
   fall.ci95 = interval_of(drop, tests);
   if (seeds == 1) fall.ci95.reset();
   add("camera_percent", "told from the vhs sensor at 601.25 Hz; beside the paper's 500 Hz", camera, kPublished500);

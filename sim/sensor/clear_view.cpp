@@ -66,16 +66,7 @@ class ClearView final : public SensorView {
 
  private:
   SceneSpec scene_of(const ObjectSpec& object, const MotionSpec& motion) const {
-    SceneSpec scene;
-    scene.device = device_;
-    scene.object = object;
-    scene.motion = motion;
-    scene.seed = seed_;
-    scene.outputs = {.frames = true, .radiance = true};
-    scene.outputs.contact = true;
-    scene.effects.motion_blur = Switch::off;
-    scene.effects.rolling_shutter = Switch::off;
-    return scene;
+    return clear_scene(device_, seed_, object, motion);
   }
 
   Truth start_of(const SeenObject& object, const Eigen::Vector3d& start) const {
@@ -111,6 +102,20 @@ class ClearView final : public SensorView {
 };
 
 }  // namespace
+
+SceneSpec clear_scene(const DeviceSpec& device, std::uint64_t seed, const ObjectSpec& object,
+                      const MotionSpec& motion) {
+  SceneSpec scene;
+  scene.device = device;
+  scene.object = object;
+  scene.motion = motion;
+  scene.seed = seed;
+  scene.outputs = {.frames = true, .radiance = true};
+  scene.outputs.contact = true;
+  scene.effects.motion_blur = Switch::off;
+  scene.effects.rolling_shutter = Switch::off;
+  return scene;
+}
 
 std::unique_ptr<const SensorView> clear_view(const DeviceSpec& device, const fem::Compliance& gel,
                                              const VirtualSensorSettings& settings) {

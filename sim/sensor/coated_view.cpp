@@ -55,6 +55,29 @@ MotionSpec straight_press(double from_mm, double to_mm) {
   return motion;
 }
 
+/// `direct`: shown by direct light, else by paths.
+SceneSpec scene_with(const DeviceSpec& device, const VirtualSensorSettings& settings, bool direct,
+                     const ObjectSpec& object, const MotionSpec& motion) {
+  SceneSpec scene;
+  scene.device = device;
+  scene.object = object;
+  scene.motion = motion;
+  scene.seed = settings.seed;
+  scene.membrane.pixel_um = settings.membrane_um;
+  scene.light.interreflection_tolerance = settings.interreflection_tolerance;
+  scene.effects.fine_relief = is_gentle(device.gel) ? Switch::on : Switch::off;
+  if (settings.always_friction && object.friction > 0.0) scene.effects.friction = Switch::on;
+  scene.effects.motion_blur = Switch::off;
+  scene.effects.rolling_shutter = Switch::off;
+  scene.effects.direct_light = direct ? Switch::on : Switch::off;
+  return scene;
+}
+
+bool is_fit_for_direct_light(const DeviceSpec& device, const VirtualSensorSettings& settings) {
+  const SceneSpec any = scene_with(device, settings, false, judged_ball(), {});
+  return unfit_for_direct_light(any, make_plan(any)).empty();
+}
+
 /// Empty where the light isn't to be kept.
 std::string light_key(const VirtualSensorSettings& settings) {
   if (settings.light_key.empty()) return {};
@@ -79,8 +102,7 @@ class CoatedView final : public SensorView {
   CoatedView(const DeviceSpec& device, const fem::Compliance& gel, const std::filesystem::path& cache_folder,
              const VirtualSensorSettings& settings)
       : device_(device), gel_(gel), settings_(settings) {
-    const SceneSpec any = scene_with(judged_ball(), {});
-    fit_for_direct_ = unfit_for_direct_light(any, make_plan(any)).empty();
+    fit_for_direct_ = is_fit_for_direct_light(device_, settings_);
     const SceneSpec scene = scene_with(judged_ball(), {});
     judged_ = std::make_shared<const SceneView>(scene, make_plan(scene), gel_);
     const double radius = judged_ball().shape.radius_mm;
@@ -150,19 +172,7 @@ class CoatedView final : public SensorView {
   }
 
   SceneSpec scene_with(const ObjectSpec& object, const MotionSpec& motion) const {
-    SceneSpec scene;
-    scene.device = device_;
-    scene.object = object;
-    scene.motion = motion;
-    scene.seed = settings_.seed;
-    scene.membrane.pixel_um = settings_.membrane_um;
-    scene.light.interreflection_tolerance = settings_.interreflection_tolerance;
-    scene.effects.fine_relief = is_gentle(device_.gel) ? Switch::on : Switch::off;
-    if (settings_.always_friction && object.friction > 0.0) scene.effects.friction = Switch::on;
-    scene.effects.motion_blur = Switch::off;
-    scene.effects.rolling_shutter = Switch::off;
-    scene.effects.direct_light = fit_for_direct_ ? Switch::on : Switch::off;
-    return scene;
+    return sim::scene_with(device_, settings_, fit_for_direct_, object, motion);
   }
 
   std::vector<Truth> play(const MotionSpec& motion) const {
@@ -200,6 +210,11 @@ class CoatedView final : public SensorView {
 };
 
 }  // namespace
+
+SceneSpec coated_scene(const DeviceSpec& device, const VirtualSensorSettings& settings, const ObjectSpec& object,
+                       const MotionSpec& motion) {
+  return scene_with(device, settings, is_fit_for_direct_light(device, settings), object, motion);
+}
 
 std::unique_ptr<const SensorView> coated_view(const DeviceSpec& device, const fem::Compliance& gel,
                                               const std::filesystem::path& cache_folder,

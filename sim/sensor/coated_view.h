@@ -5,11 +5,17 @@
 #include <memory>
 
 #include "fem/elements/compliance.h"
+#include "sim/scene/scene.h"
 #include "sim/sensor/sensor_view.h"
 
 namespace touchstone::sim {
 
 struct VirtualSensorSettings;
+
+/// The scene that the view shows where `object` moves like this: its switches are the view's. Its outputs are a scene's
+/// defaults.
+SceneSpec coated_scene(const DeviceSpec& device, const VirtualSensorSettings& settings, const ObjectSpec& object,
+                       const MotionSpec& motion);
 
 /// @pre the device has a camera and a coating
 std::unique_ptr<const SensorView> coated_view(const DeviceSpec& device, const fem::Compliance& gel,

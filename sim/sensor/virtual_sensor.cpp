@@ -32,6 +32,20 @@ struct Sight {
   cv::Mat rest_light;
 };
 
+/// What is pressed, without pictures.
+SceneSpec unseen_scene(const DeviceSpec& device, const VirtualSensorSettings& settings, const ObjectSpec& object,
+                       const MotionSpec& motion) {
+  SceneSpec scene;
+  scene.device = device;
+  scene.object = object;
+  scene.motion = motion;
+  scene.seed = settings.seed;
+  scene.outputs = {};
+  scene.outputs.frames = false;
+  if (settings.always_friction && object.friction > 0.0) scene.effects.friction = Switch::on;
+  return scene;
+}
+
 /// Electrons a second in each pixel of a grey sensor.
 cv::Mat photocurrent(const cv::Mat& light, const render::ImagerResponse& response) {
   const int bands = light.channels();
@@ -82,15 +96,7 @@ struct VirtualSensor::Parts {
   bool with_noise(const Plan& plan) const { return plan.bands.count() == 0 || plan.sensor_noise; }
 
   SceneSpec mechanics_of(const ObjectSpec& object, const MotionSpec& motion) const {
-    SceneSpec scene;
-    scene.device = device;
-    scene.object = object;
-    scene.motion = motion;
-    scene.seed = settings.seed;
-    scene.outputs = {};
-    scene.outputs.frames = false;
-    if (settings.always_friction && object.friction > 0.0) scene.effects.friction = Switch::on;
-    return scene;
+    return unseen_scene(device, settings, object, motion);
   }
 
   std::vector<Truth> play(const ObjectSpec& object, const MotionSpec& motion) const {
@@ -186,6 +192,13 @@ struct VirtualSensor::Parts {
   mutable std::mutex making;
   mutable std::unique_ptr<const Sight> made;
 };
+
+SceneSpec touch_scene(const DeviceSpec& device, const VirtualSensorSettings& settings, const ObjectSpec& object,
+                      const MotionSpec& motion) {
+  if (!device.camera || is_milky(device)) return unseen_scene(device, settings, object, motion);
+  return device.coating ? coated_scene(device, settings, object, motion)
+                        : clear_scene(device, settings.seed, object, motion);
+}
 
 VirtualSensor::VirtualSensor(DeviceSpec device, const std::filesystem::path& cache_folder,
                              const VirtualSensorSettings& settings, const Progress& progress)

@@ -20,6 +20,7 @@
 #include "sim/press/press_spec.h"
 #include "sim/press/touch_session.h"
 #include "sim/press/truth.h"
+#include "sim/scene/scene.h"
 #include "sim/sensor/sensor_view.h"
 #include "sim/sensor/virtual_camera.h"
 
@@ -85,6 +86,12 @@ class TouchObject {
   friend class VirtualSensor;
   std::shared_ptr<const SeenObject> seen_;
 };
+
+/// The scene of what a virtual sensor does where `object` moves like this and pictures are asked for: its plan says
+/// which effects are simulated. A device without a camera is asked for no picture. A milky gel's pictures are maps
+/// (sim/sensor/milky_view.h), which no plan knows: this is its mechanics.
+SceneSpec touch_scene(const DeviceSpec& device, const VirtualSensorSettings& settings, const ObjectSpec& object,
+                      const MotionSpec& motion);
 
 /// Safe to use from many threads; the same press and seeds give the same bytes. The gel is set up at once, the light
 /// when it's first needed: a light field for a coated gel (paths where direct light can't draw it), maps for a milky
