@@ -39,10 +39,9 @@ bool& wanted_of(DrawnOutputs& outputs, DrawnOutput output) {
 }  // namespace
 
 EnumNames<DrawnOutput> enum_names(DrawnOutput) {
-  return {{"frame", DrawnOutput::frame},           {"height", DrawnOutput::height},
-          {"contact", DrawnOutput::contact},       {"beads", DrawnOutput::beads},
-          {"markers", DrawnOutput::markers},       {"traction", DrawnOutput::traction},
-          {"events", DrawnOutput::events},         {"statistics", DrawnOutput::statistics}};
+  return {{"frame", DrawnOutput::frame},   {"height", DrawnOutput::height},        {"contact", DrawnOutput::contact},
+          {"beads", DrawnOutput::beads},   {"markers", DrawnOutput::markers},      {"traction", DrawnOutput::traction},
+          {"events", DrawnOutput::events}, {"statistics", DrawnOutput::statistics}};
 }
 
 void fields(YamlReader& in, NumberVariation& vary) {

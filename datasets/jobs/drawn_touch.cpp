@@ -134,8 +134,8 @@ PreparedDraw prepare_draw(const std::filesystem::path& file) {
   for (int unit = 0; unit < job.draw.units.count; ++unit) {
     const DrawnUnit drawn = drawn_unit(prepared, unit);
     require_touchable(drawn.device, prepared);
-    if (prepared.job.outputs.pictures() && (drawn.device.camera->width != device.camera->width ||
-                                            drawn.device.camera->height != device.camera->height)) {
+    if (prepared.job.outputs.pictures() &&
+        (drawn.device.camera->width != device.camera->width || drawn.device.camera->height != device.camera->height)) {
       fail_at(job.where, "draw.units: unit {} has a picture of another size; a data set's pictures have one size",
               unit);
     }

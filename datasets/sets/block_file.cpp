@@ -189,13 +189,14 @@ void write_events(Hdf5Writer& file, Columns& columns, std::span<const BlockRecor
 }
 
 void write_statistics(Columns& columns) {
-  columns.many("statistics", "1", "6", {6},
-               "of the motion chip's last frame: dx, dy (counts, summed over the press), maximum, minimum, squal, average",
-               [](const BlockRecord& r, std::vector<double>& to) {
-                 const ChipStatistics& s = r.statistics;
-                 for (const int one : {s.dx, s.dy, s.maximum, s.minimum, s.squal}) to.push_back(one);
-                 to.push_back(s.average);
-               });
+  columns.many(
+      "statistics", "1", "6", {6},
+      "of the motion chip's last frame: dx, dy (counts, summed over the press), maximum, minimum, squal, average",
+      [](const BlockRecord& r, std::vector<double>& to) {
+        const ChipStatistics& s = r.statistics;
+        for (const int one : {s.dx, s.dy, s.maximum, s.minimum, s.squal}) to.push_back(one);
+        to.push_back(s.average);
+      });
 }
 
 void write_labels(Columns& columns) {

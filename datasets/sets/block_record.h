@@ -42,8 +42,8 @@ class Unpressable : public Error {
   using Error::Error;
 };
 
-/// A unit set up for pressing. `press` is a pure function of the unit, the touch and the object, and may be called from many
-/// threads at once. @throws Unpressable; the sample is then drawn again. Other errors end the run
+/// A unit set up for pressing. `press` is a pure function of the unit, the touch and the object, and may be called from
+/// many threads at once. @throws Unpressable; the sample is then drawn again. Other errors end the run
 struct UnitSensor {
   std::string light;   ///< how its pictures are lit, and how far that is off
   cv::Mat background;  ///< its frame untouched, as `frame`; with the imager's noise; empty where no picture is wanted
