@@ -35,7 +35,7 @@ class InspectedDraw : public ::testing::Test {
   static void SetUpTestSuite() {
     folder_ = new test::TemporaryFolder;
     const auto job = test::write_small_draw(*folder_, kBalls);
-    generate_drawn(job, folder_->path() / "set", {.source = rig_bench(folder_->path() / "cache"), .shard = {}});
+    generate_drawn(job, folder_->path() / "set", {.source = virtual_sensors(folder_->path() / "cache"), .shard = {}});
     set_ = new InspectedSet(read_inspected_set(folder_->path() / "set"));
   }
   static void TearDownTestSuite() {
