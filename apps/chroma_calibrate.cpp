@@ -94,9 +94,10 @@ void add_chroma_calibration(CLI::App& calibrations, const GlobalOptions&, Action
       ->check(CLI::Range(0.0, 1e6))
       ->capture_default_str();
   command
-      ->add_option("--form", options->form,
-                   "Of the model: the text's own; polynomials of one marker; or, of many forms, some of which look at "
-                   "a marker's neighbours, too, the best on series left out")
+      ->add_option(
+          "--form", options->form,
+          "Of the model: that of [Lin2019]; polynomials of one marker; or, of many forms, some of which look at "
+          "a marker's neighbours, too, the best on series left out")
       ->check(CLI::IsMember({"equation4", "isotropic", "polynomial", "best"}))
       ->capture_default_str();
   command->add_option("-o,--out", options->out, "The model: a .json file")->required();

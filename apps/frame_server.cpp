@@ -100,9 +100,9 @@ struct FrameServer::Parts {
     const auto frame = camera.latest();
     if (!frame) return answer_error(response, 503, "the camera is being stopped");
     response.set_content(
-        datasets::to_json(*frame->state,
-                          fmt::format("\"frame\":{},\"rate_Hz\":{},\"frames\":{},\"clients\":{},", frame->number,
-                                      camera.rate_Hz(), camera.state_count(), streams.load())) +
+        lab::to_json(*frame->state,
+                     fmt::format("\"frame\":{},\"rate_Hz\":{},\"frames\":{},\"clients\":{},", frame->number,
+                                 camera.rate_Hz(), camera.state_count(), streams.load())) +
             "\n",
         "application/json");
   }
@@ -114,7 +114,7 @@ struct FrameServer::Parts {
       const int number = count_of(requested, "frame");
       const auto state = camera.state_of(number);
       if (!state) fail("frame {} isn't due yet, or was too long ago", number);
-      response.set_content(datasets::to_json(*state, fmt::format("\"frame\":{},", number)) + "\n", "application/json");
+      response.set_content(lab::to_json(*state, fmt::format("\"frame\":{},", number)) + "\n", "application/json");
     } catch (const Error& error) {
       answer_error(response, 400, error.what());
     }

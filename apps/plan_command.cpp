@@ -4,7 +4,10 @@
 #include "apps/command.h"
 #include "apps/progress_bar.h"
 #include "core/error.h"
+#include "core/yaml_reader.h"
 #include "datasets/jobs/prepared_job.h"
+#include "datasets/sets/planned_draw.h"
+#include "lab/studies/study_plan.h"
 #include "sim/press/gel_plan.h"
 #include "sim/press/linear_range.h"
 
@@ -48,36 +51,112 @@ void print_linear_range(const sim::SceneSpec& scene, const GlobalOptions& global
   fmt::print("truth keeps the largest strain of each frame: look up there what its forces may be off\n");
 }
 
-void plan(const std::filesystem::path& file, bool linear_range, const GlobalOptions& global) {
-  const std::filesystem::path& cache = global.cache;
-  if (!datasets::is_job_file(file)) {
-    const sim::SceneSpec scene = sim::read_scene(file);
-    print_plan(sim::make_plan(scene));
-    fmt::print("\n{}", describe(sim::plan_gel(scene.device, cache)));
-    if (linear_range) print_linear_range(scene, global);
-    return;
-  }
+/// The plan of one of several things that are simulated, unless it's that of the one before.
+void print_next(const std::string& title, const sim::Plan& plan, const sim::Plan* before) {
+  const bool as_before = before != nullptr && equal(*before, plan);
+  fmt::print("{}{}{}\n", as_before ? "" : "\n", title, as_before ? ": as above" : "");
+  if (!as_before) print_plan(plan);
+}
+
+void print_gel(const std::string& title, const sim::DeviceSpec& device, const GlobalOptions& global) {
+  fmt::print("\n{}{}", title, describe(sim::plan_gel(device, global.cache)));
+}
+
+void plan_scene(const std::filesystem::path& file, bool linear_range, const GlobalOptions& global) {
+  const sim::SceneSpec scene = sim::read_scene(file);
+  print_plan(sim::make_plan(scene));
+  print_gel("", scene.device, global);
+  if (linear_range) print_linear_range(scene, global);
+}
+
+void plan_job(const std::filesystem::path& file, bool linear_range, const GlobalOptions& global) {
   const datasets::PreparedJob job = datasets::prepare_job(file);
   fmt::print("job {}: {} scenes, {} samples\n", job.job.name, job.scenes.size(), job.samples);
-  const datasets::PreparedScene* before = nullptr;
+  const sim::Plan* before = nullptr;
   for (const datasets::PreparedScene& scene : job.scenes) {
-    const bool as_before = before != nullptr && equal(before->plan, scene.plan);
-    if (!as_before) fmt::print("\n");
-    fmt::print("{} ({}, {} samples){}\n", scene.entry.name, lab::name_of(scene.entry.split), scene.samples,
-               as_before ? ": as above" : "");
-    if (!as_before) print_plan(scene.plan);
-    before = &scene;
+    print_next(
+        fmt::format("{} ({}, {} samples)", scene.entry.name, datasets::name_of(scene.entry.split), scene.samples),
+        scene.plan, before);
+    before = &scene.plan;
   }
-  fmt::print("\n{}", describe(sim::plan_gel(job.scenes.front().spec.device, cache)));
+  print_gel("", job.scenes.front().spec.device, global);
   if (linear_range) print_linear_range(job.scenes.front().spec, global);
+}
+
+void plan_draw(const std::filesystem::path& file, bool linear_range, const GlobalOptions& global) {
+  const datasets::PreparedDraw draw = datasets::prepare_draw(file);
+  const std::vector<datasets::PlannedDraw> planned = datasets::planned_draws(draw);
+  const std::size_t objects = draw.job.draw.objects.size();
+  std::vector<sim::Plan> plans;
+  for (const datasets::PlannedDraw& one : planned) plans.push_back(sim::make_plan(one.scene));
+  fmt::print("job {}: draws {} samples of {} units and {} objects, in {} files\n", draw.job.name, draw.job.samples,
+             draw.job.draw.units.count, objects, draw.blocks.size());
+  fmt::print("Of each object its first sample is planned. Switches are those of every job that draws.\n");
+  for (std::size_t k = 0; k < planned.size(); ++k) {
+    const datasets::PlannedDraw& one = planned[k];
+    print_next(fmt::format("{} (sample {}, unit {})", one.object, one.sample, one.unit), plans[k],
+               k == 0 ? nullptr : &plans[k - 1]);
+  }
+  if (planned.size() < objects) {
+    fmt::print("\n{} of the objects are in none of the samples that were searched\n", objects - planned.size());
+  }
+  const datasets::PlannedDraw& first = planned.front();
+  print_gel(fmt::format("unit {}: ", first.unit), first.scene.device, global);
+  if (linear_range) print_linear_range(first.scene, global);
+}
+
+void plan_study(const std::filesystem::path& file, bool linear_range, const GlobalOptions& global) {
+  const lab::StudySpec study = lab::read_study(file);
+  const std::vector<lab::StudyScene> scenes = lab::study_scenes(study);
+  if (linear_range && scenes.empty()) fail("{}: --linear-range: the study presses nothing", file.string());
+  std::vector<sim::Plan> plans;
+  for (const lab::StudyScene& one : scenes) plans.push_back(sim::make_plan(one.scene));
+  fmt::print("study {}: {} designs\n", study.name, lab::design_count(study));
+  if (scenes.empty()) {
+    fmt::print("by formula alone: nothing is simulated\n");
+    return;
+  }
+  fmt::print("The device is planned as its file has it. Switches are the study's own.\n");
+  for (std::size_t k = 0; k < scenes.size(); ++k) {
+    print_next(scenes[k].what, plans[k], k == 0 ? nullptr : &plans[k - 1]);
+  }
+  print_gel("", scenes.front().scene.device, global);
+  if (linear_range) print_linear_range(scenes.front().scene, global);
+}
+
+/// A kind of file that doesn't say what will be simulated: a key that only it has, and what it is.
+struct UnplannedFile {
+  const char* key;
+  const char* words;
+};
+constexpr UnplannedFile kUnplanned[] = {
+    {"gel", "it is a device's file and doesn't say what presses it"},
+    {"shape", "it is an object's file and doesn't say what it is pressed on"},
+    {"keys", "it is a motion's file and doesn't say what is moved, and on what"},
+    {"unknowns", "it is a fit's file; `touchstone fit` simulates its presses again and again with other numbers"},
+    {"lump", "it is a palpation's file; `touchstone validate vhs.palpation` presses its lumps by a law of their own"},
+};
+
+void plan(const std::filesystem::path& file, bool linear_range, const GlobalOptions& global) {
+  const YamlReader in = YamlReader::open(file);
+  for (const UnplannedFile& kind : kUnplanned) {
+    if (!in.has(kind.key) || in.has("object")) continue;  // a scene with a key too many is refused as a scene
+    fail("{}: {}; `touchstone plan` takes scenes, jobs of scenes, jobs that draw, and studies", file.string(),
+         kind.words);
+  }
+  if (in.has("draw")) return plan_draw(file, linear_range, global);
+  if (in.has("scenes")) return plan_job(file, linear_range, global);
+  if (in.has("kind") || in.has("vary")) return plan_study(file, linear_range, global);
+  plan_scene(file, linear_range, global);
 }
 
 }  // namespace
 
 void add_plan_command(CLI::App& app, const GlobalOptions& global, Action& action) {
-  CLI::App* command = app.add_subcommand("plan", "Show which effects a scene or job calls for, why, and their cost");
+  CLI::App* command =
+      app.add_subcommand("plan", "Show which effects a scene, a job or a study calls for, why, and their cost");
   auto file = std::make_shared<std::filesystem::path>();
-  command->add_option("SCENE|JOB", *file, "Scene or job file")->required();
+  command->add_option("SCENE|JOB|STUDY", *file, "Scene file, job file of either kind, or study file")->required();
   auto linear_range = std::make_shared<bool>(false);
   command->add_flag("--linear-range", *linear_range,
                     "Also press the (first) scene's object by finite strain, and tell how far the forces of linear "

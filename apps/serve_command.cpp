@@ -125,7 +125,7 @@ void serve_scene(const ServeOptions& options, const GlobalOptions& global) {
 /// Objects that may press a device: the shipped ones and those of the command line, by name.
 class Objects {
  public:
-  Objects(const sim::VirtualDevice& device, const std::vector<fs::path>& files) : device_(device) {
+  Objects(const sim::VirtualSensor& device, const std::vector<fs::path>& files) : device_(device) {
     const fs::path shipped = datasets::scenes_folder() / "objects";
     for (const auto& entry : fs::directory_iterator(shipped)) {
       if (entry.path().extension() == ".yaml") files_[entry.path().stem().string()] = entry.path();
@@ -136,7 +136,7 @@ class Objects {
     }
   }
 
-  const sim::VirtualObject& named(const std::string& name) {
+  const sim::TouchObject& named(const std::string& name) {
     const auto file = files_.find(name);
     if (file == files_.end()) {
       std::vector<std::string> known;
@@ -149,13 +149,13 @@ class Objects {
   }
 
  private:
-  const sim::VirtualDevice& device_;
+  const sim::VirtualSensor& device_;
   std::map<std::string, fs::path> files_;
-  std::map<std::string, sim::VirtualObject> made_;
+  std::map<std::string, sim::TouchObject> made_;
 };
 
-sim::Hold hold_of(const Requested& requested) {
-  sim::Hold hold;
+sim::PressSpec hold_of(const Requested& requested) {
+  sim::PressSpec hold;
   hold.place_mm = {number_of(requested, "x_mm", 0.0), number_of(requested, "y_mm", 0.0)};
   hold.angles_deg = {number_of(requested, "turn_x_deg", 0.0), number_of(requested, "turn_y_deg", 0.0),
                      number_of(requested, "turn_z_deg", 0.0)};
@@ -169,7 +169,7 @@ void serve_device(const ServeOptions& options, const GlobalOptions& global) {
   if (!options.frames.empty()) fail("--frames: {} is a device and has no frames", options.what.string());
   if (options.events_port) fail("--events-port: {} is a device; events want a scene", options.what.string());
   const sim::DeviceSpec spec = sim::read_device(options.what);
-  const sim::VirtualDevice device(spec, global.cache);
+  const sim::VirtualSensor device(spec, global.cache);
   Objects objects(device, options.objects);
   const std::string usual = options.objects.empty() ? "ball-8mm" : options.objects.front().stem().string();
   const ServedCamera::States rest = {std::make_shared<const lab::ShownState>(lab::shown_state(device.rest()))};
@@ -182,7 +182,7 @@ void serve_device(const ServeOptions& options, const GlobalOptions& global) {
                            "drag_x_mm", "drag_y_mm"});
     const auto name = requested.find("object");
     const std::lock_guard<std::mutex> lock(pressing);
-    const sim::HeldFrame held =
+    const sim::Touch held =
         device.press(objects.named(name == requested.end() ? usual : name->second), hold_of(requested));
     camera.show({std::make_shared<const lab::ShownState>(lab::shown_state(held))});
   };

@@ -38,7 +38,7 @@ std::shared_ptr<FrameOptions> add_frame_options(CLI::App& command, const std::st
       ->capture_default_str();
   command.add_flag("--bright-beads", options->bright_beads, "Beads are brighter than what is behind them");
   command.add_flag("--weighted-centroid", options->weighted_centroid,
-                   "Weigh pixels at a bead's rim by their grey value (the text counts each pixel the same)");
+                   "Weigh pixels at a bead's rim by their grey value ([VisioHaptic2024]: each counts the same)");
   return options;
 }
 

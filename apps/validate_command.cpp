@@ -75,7 +75,7 @@ void validate(Options options, const GlobalOptions& global) {
     how.progress = bar.listener();
     rows = lab::validate(options.groups, lab::validation_groups(), how);
   }
-  if (!options.json.empty()) write_whole_file(options.json, datasets::to_json(rows));
+  if (!options.json.empty()) write_whole_file(options.json, lab::to_json(rows));
   if (!options.page.empty()) {
     const lab::PageHeader header{datasets::program_version(), datasets::processor_kind(), options.date};
     write_whole_file(options.page, lab::to_html(rows, header));
@@ -90,7 +90,7 @@ void validate(Options options, const GlobalOptions& global) {
 
 void add_validate_command(CLI::App& app, const GlobalOptions& global, Action& action) {
   CLI::App* command = app.add_subcommand(
-      "validate", "Hold the simulator and its estimators against closed forms and published figures");
+      "validate", "Compare the simulator and its estimators with closed forms and published figures");
   auto options = std::make_shared<Options>();
   std::string known = "all";
   for (const lab::ValidationGroup& group : lab::validation_groups()) known += ", " + group.name;

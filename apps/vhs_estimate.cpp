@@ -50,7 +50,7 @@ void print_errors(const std::string& title, const std::array<lab::AxisErrors, 3>
   }
 }
 
-/// The table of sec. 4.4: load by load, true and estimated.
+/// The table of [VisioHaptic2024, sec. 4.4]: load by load, true and estimated.
 void print_verification(const lab::Verification& verification) {
   fmt::print("  axis    load N  frames    true N  estimated N  mean error N   published N\n");
   for (int axis = 0; axis < 3; ++axis) {

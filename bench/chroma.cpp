@@ -1,6 +1,7 @@
 // Frames a second of the chroma sensor's estimator on one core: pictures to readings, and pictures to the field of
-// displacements, at the resolution of its design (600 x 600 px), at 640 x 480, and on a picture as large as the text's
-// camera gives (7952 x 5304, of which the grid is a small part, and of which it is most). The text gives no speed.
+// displacements, at the resolution of its design (600 x 600 px), at 640 x 480, and on a picture as large as the camera
+// of [Lin2019] gives (7952 x 5304, of which the grid is a small part, and of which it is most). The paper gives no
+// speed.
 
 #include <benchmark/benchmark.h>
 

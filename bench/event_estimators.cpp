@@ -1,4 +1,4 @@
-// Estimators of force and material from event counts (seed 001) on one core: a window's estimate, which the text's
+// Estimators of force and material from event counts [Naeini2020] on one core: a window's estimate, which the paper's
 // windows give 7 ms for, and steps of training on 42 grasps of 44 windows.
 
 #include <benchmark/benchmark.h>
@@ -37,7 +37,7 @@ FeedForwardNetwork network(int inputs, int layers, int units, int outputs) {
   return random_network({.inputs = inputs, .hidden_layers = layers, .units = units, .outputs = outputs}, random);
 }
 
-/// Estimate of a window by the text's network, or another.
+/// Estimate of a window by the paper's network, or another.
 void time_delay_window(benchmark::State& state) {
   TimeDelayNetwork model;
   model.features = {Eigen::Vector2d(0.0, 0.0), Eigen::Vector2d(1e4, 1e4)};

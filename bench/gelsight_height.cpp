@@ -1,6 +1,6 @@
 // From a 320 x 240 frame of a coated gel to its height map on one core, whole and in parts; beside it the Poisson step
-// of SciPy (two-dimensional sine transforms, as the source text has it), which runs as a process of its own on the same
-// slopes. The published rate is 20 frames/s (shared/seeds/004, sec. 2.2.3).
+// of SciPy (two-dimensional sine transforms, as the thesis has it), which runs as a process of its own on the same
+// slopes. The published rate is 20 frames/s [Li2015, sec. 2.2.3].
 
 #include <benchmark/benchmark.h>
 

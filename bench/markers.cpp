@@ -1,6 +1,5 @@
 // Frames a second of the gelsight marker tracker on one core at 320 x 240, alone and with all that finds slip, beside
-// OpenCV's SimpleBlobDetector on the same frames. The text of the fingertip GelSight gives 25 to 30 frames/s (Matlab,
-// i7-3840QM).
+// OpenCV's SimpleBlobDetector on the same frames. The thesis [Li2015] gives 25 to 30 frames/s (Matlab, i7-3840QM).
 
 #include <benchmark/benchmark.h>
 

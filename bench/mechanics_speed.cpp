@@ -102,8 +102,9 @@ ResultTable throughput_table(const BenchOptions& options) {
     add("force-controlled step, mu 0.8", 0.8, one, other);
   }
   table.remarks = {
-      "The probe is the vhs text's, 6 mm wide with an edge of 0.3 mm radius. Presses are independent objects over one "
-      "compliance, a thread each, for forces and beads without the surface's displacement (PressOutput::forces)."};
+      "The probe is that of [VisioHaptic2024], 6 mm wide with an edge of 0.3 mm radius. Presses are independent "
+      "objects over one compliance, a thread each, for forces and beads without the surface's displacement "
+      "(PressOutput::forces)."};
   if (forces.size() > 1) {
     table.remarks.push_back(fmt::format("From {} to {} mm edges the frictionless force changes by {:.2f} %.", edges[0],
                                         edges[1], 100.0 * std::abs(forces[0] / forces[1] - 1.0)));

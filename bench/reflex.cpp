@@ -1,4 +1,4 @@
-// Estimators of the fingertip of 18x18 pixels (seed 003) on one core: a reflex's decision, which the chip gives 667 us
+// Estimators of the fingertip of 18x18 pixels [Knoop2013] on one core: a reflex's decision, which the chip gives 667 us
 // for, and a picture of explore mode, which comes each 216 ms.
 
 #include <benchmark/benchmark.h>
@@ -13,7 +13,7 @@
 namespace touchstone::sensors {
 namespace {
 
-/// The text's tree, a force of degree 1 or 2, and a law of shear.
+/// The paper's tree, a force of degree 1 or 2, and a law of shear.
 ReflexModel reflex_model(int degree) {
   ReflexModel model;
   model.tree.nodes.resize(7);

@@ -1,4 +1,4 @@
-# The Poisson step as the source text has it (shared/seeds/004, sec. 2.2.2): divergence, sine transform in two dimensions,
+# The Poisson step as the thesis has it [Li2015, sec. 2.2.2]: divergence, sine transform in two dimensions,
 # division by the Laplacian's eigenvalues, inverse transform. Reads 2 x 240 x 320 float32 slopes; prints the least
 # processor time of a solution in seconds.
 import sys

@@ -1,5 +1,5 @@
-// Texture recognition on one core: features of 200 x 200 height images, and the nearest of 960 of them. The text gives
-// no figure for its own speed; a camera gives 30 frames a second.
+// Texture recognition on one core: features of 200 x 200 height images, and the nearest of 960 of them. The thesis
+// [Li2015] gives no figure for its own speed; a camera gives 30 frames a second.
 
 #include <benchmark/benchmark.h>
 

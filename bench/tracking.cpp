@@ -1,6 +1,6 @@
 // Frames a second of the bead tracker on one core, alone, with the force and drawn for a window, and on all cores,
-// beside OpenCV's SimpleBlobDetector on the same frames (the peer that the text of the visio-haptic sensor names). 719
-// frames/s is the text's own figure.
+// beside OpenCV's SimpleBlobDetector on the same frames (the peer that [VisioHaptic2024] names). 719 frames/s is the
+// paper's own figure.
 
 #include <benchmark/benchmark.h>
 

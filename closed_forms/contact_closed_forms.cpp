@@ -166,7 +166,7 @@ Eigen::Vector3d cerruti_displacement(double youngs_modulus, double poisson_ratio
   const double r = std::hypot(x, y);
   const double along = shear / (2.0 * kPi * g * r) * ((1.0 - nu) + nu * x * x / (r * r));
   const double across = nu * shear * x * y / (2.0 * kPi * g * r * r * r);
-  // Ahead of the force the surface sinks: Johnson's z points into the body, ours out of it.
+  // Ahead of the force the surface sinks: the z of [Johnson1985] points into the body, ours out of it.
   return {along, across, -(1.0 - 2.0 * nu) * shear * x / (4.0 * kPi * g * r * r)};
 }
 

@@ -9,47 +9,48 @@
 
 namespace touchstone::closed_forms {
 
-/// Force of a rigid sphere (paraboloid) of radius R pressed by `depth` into a half space (Hertz 1882):
+/// Force of a rigid sphere (paraboloid) of radius R pressed by `depth` into a half space [Hertz1882]:
 /// F = 4 E sqrt(R) d^1.5 / (3 (1 - nu^2)); the contact radius is sqrt(R d).
 double hertz_force(double youngs_modulus, double poisson_ratio, double radius, double depth);
 double hertz_contact_radius(double radius, double depth);
 /// Largest pressure, in the middle: 3 F / (2 pi a^2).
 double hertz_largest_pressure(double force, double contact_radius);
 
-/// Force of a rigid flat punch of `radius` on a half space (Boussinesq; Sneddon 1965): F = 2 E a d / (1 - nu^2).
+/// Force of a rigid flat punch of `radius` on a half space (Boussinesq; [Sneddon1965]): F = 2 E a d / (1 - nu^2).
 double flat_punch_force(double youngs_modulus, double poisson_ratio, double radius, double depth);
 
-/// A true sphere on a half space (Sneddon, Int. J. Engng Sci. 3, 1965): depth and force for a contact radius,
+/// A true sphere on a half space [Sneddon1965]: depth and force for a contact radius,
 /// d = (a/2) ln((R+a)/(R-a)), F = E/(2 (1-nu^2)) [(a^2 + R^2) ln((R+a)/(R-a)) - 2 a R].
 double sneddon_sphere_depth(double radius, double contact_radius);
 double sneddon_sphere_force(double youngs_modulus, double poisson_ratio, double radius, double contact_radius);
 
-/// A rigid sphere under normal force P, sheared by Q < mu P (Cattaneo 1938, Mindlin 1949; coupling neglected, exact
+/// A rigid sphere under normal force P, sheared by Q < mu P ([Cattaneo1938], [Mindlin1949]; coupling neglected, exact
 /// along x at nu = 0.5 but for the slip's direction): stick radius over contact radius, and tangential displacement.
 double mindlin_stick_ratio(double shear, double friction, double force);
 double mindlin_displacement(double youngs_modulus, double poisson_ratio, double contact_radius, double shear,
                             double friction, double force);
 
 /// Surface displacement of a half space z < 0 at (x, y), from the origin, by a point force on the surface there.
-/// Boussinesq: a push P along -z. Components along x, y, z: u_r = -(1-2nu) P/(4 pi G r), u_z = -(1-nu) P/(2 pi G r).
+/// Boussinesq: a push P along -z [Johnson1985, sec. 3.2]. u_r = -(1-2nu) P/(4 pi G r), u_z = -(1-nu) P/(2 pi G r);
+/// given are the components along x, y, z.
 Eigen::Vector3d boussinesq_displacement(double youngs_modulus, double poisson_ratio, double push, double x, double y);
-/// Cerruti: a force Q along +x (Johnson, Contact Mechanics, sec. 3.6, his z into the body).
+/// Cerruti: a force Q along +x [Johnson1985, sec. 3.6], where z points into the body.
 Eigen::Vector3d cerruti_displacement(double youngs_modulus, double poisson_ratio, double shear, double x, double y);
 
-/// Stiffness factor of a flat punch on a bonded layer for nu = 0.3 (Hayes et al., J. Biomech. 5, 1972):
+/// Stiffness factor of a flat punch on a bonded layer for nu = 0.3 [Hayes1972]:
 /// P = 4 G a kappa w / (1 - nu). Known ratios a/h are 0.2, 0.4, 1 and 2. @pre ratio is one of these
 double hayes_kappa(double radius_over_thickness);
 
-/// Apparent modulus of a disc of radius R and thickness t bonded on both sides, incompressible (Gent and Lindley 1959):
+/// Apparent modulus of a disc of radius R and thickness t bonded on both sides, incompressible [Gent1959]:
 /// E (1 + 2 S^2), S = R/(2t). Approximate at small S.
 double gent_lindley_modulus(double youngs_modulus, double radius, double thickness);
 
-/// Force of a rigid sphere of radius R pressed by `depth` into an incompressible layer bonded below (Dimitriadis et
-/// al., Biophys. J. 82, 2002, eq. 12): 16/9 E sqrt(R) d^1.5 (1 + 1.133 x + 1.283 x^2 + 0.769 x^3 + 0.0975 x^4), where
+/// Force of a rigid sphere of radius R pressed by `depth` into an incompressible layer bonded below [Dimitriadis2002,
+/// eq. 12]: 16/9 E sqrt(R) d^1.5 (1 + 1.133 x + 1.283 x^2 + 0.769 x^3 + 0.0975 x^4), where
 /// x = sqrt(R d) / thickness. A series in x: 0.2 % low at 0.1, 1.1 % at 0.2, 2.7 % at 0.3.
 double dimitriadis_force(double youngs_modulus, double radius, double thickness, double depth);
 
-/// The same where the contact is much wider than the layer (Johnson, Contact Mechanics, sec. 5.8): the contact radius
+/// The same where the contact is much wider than the layer [Johnson1985, sec. 5.8]: the contact radius
 /// a = 2 sqrt(R d), F = pi E a^6 / (96 R thickness^3). 15 % low at a = 10 thicknesses, 5 % at 20.
 double thin_layer_force(double youngs_modulus, double radius, double thickness, double depth);
 
@@ -66,7 +67,7 @@ struct ElasticLayer {
 
 /// Surface compliance of layers, listed from the outside inwards, for pressure of wave number k (1/mm), over that of a
 /// half space of the outermost material. Love's function of each layer, (A + B z) exp(kz) + (C + D z) exp(-kz), is
-/// matched at the interfaces (Muki's formulas; see Johnson, Contact Mechanics, appendix 3, for the plane analogue).
+/// matched at the interfaces (by the formulas of [Muki1960]; see [Johnson1985, appendix 3] for the plane analogue).
 /// Equals bonded_layer_kernel for one layer.
 double layered_kernel(std::span<const ElasticLayer> layers, double wave_number);
 
@@ -76,7 +77,7 @@ struct LayerContact {
   double contact_radius = 0.0;  ///< mm
 };
 /// A flat punch of `radius` pressed by `depth`. The dual integral equations are brought to a Fredholm equation of the
-/// second kind with M's kernel (Lebedev and Ufliand 1958) and solved by Gauss' rule: some 10 digits.
+/// second kind with M's kernel [Lebedev1958] and solved by Gauss' rule: some 10 digits.
 LayerContact flat_punch_on_layer(double youngs_modulus, double poisson_ratio, double thickness, double radius,
                                  double depth);
 /// A smooth convex profile z = f(r), given by its slope f'(r), pressed by `depth`; the contact radius is where the

@@ -39,7 +39,7 @@ double internal_diffuse_reflectance(double index);
 
 /// A wide Lambertian plane covered by a clear layer of `index`, under surroundings of radiance one; radiance seen from
 /// air along the normal, the face's own mirror image included: F + (1 - F) albedo (1 - r)/(1 - albedo r), r the
-/// internal diffuse reflectance, F Fresnel's reflectance along the normal (after Saunderson 1942). One for a white
+/// internal diffuse reflectance, F Fresnel's reflectance along the normal (after [Saunderson1942]). One for a white
 /// plane.
 double covered_plane_radiance(double index, double albedo);
 

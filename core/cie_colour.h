@@ -1,6 +1,6 @@
 #pragma once
-// Colours as people see and measure them: sRGB (IEC 61966-2-1), CIE 1931 XYZ and CIE 1976 L*a*b* under D65, and the
-// colour difference CIEDE2000.
+// Colours as people see and measure them: sRGB [IEC61966], CIE 1931 XYZ and CIE 1976 L*a*b* under D65, and the colour
+// difference CIEDE2000.
 
 #include <Eigen/Core>
 
@@ -17,16 +17,16 @@ Eigen::Vector3d srgb_from_linear(const Eigen::Vector3d& linear);
 Eigen::Vector3d xyz_from_linear_srgb(const Eigen::Vector3d& linear);
 Eigen::Vector3d linear_srgb_from_xyz(const Eigen::Vector3d& xyz);
 
-/// (L*, a*, b*) beside a white of kD65White (ISO/CIE 11664-4).
+/// (L*, a*, b*) beside a white of kD65White [ISO11664, part 4].
 Eigen::Vector3d lab_from_xyz(const Eigen::Vector3d& xyz);
 /// Of an sRGB colour.
 Eigen::Vector3d lab_from_srgb(const Eigen::Vector3d& srgb);
 
 /// The colour of hue `hue_deg` (red 0, green 120, blue 240), saturation and lightness, 0 to 1, in the double cone of
-/// Joblove and Greenberg 1978 (HSL), as sRGB.
+/// HSL [Joblove1978], as sRGB.
 Eigen::Vector3d srgb_from_hsl(double hue_deg, double saturation, double lightness);
 
-/// CIEDE2000 (ISO/CIE 11664-6) between two (L*, a*, b*), parametric factors 1: about 1 is just seen.
+/// CIEDE2000 [ISO11664, part 6] between two (L*, a*, b*), parametric factors 1: about 1 is just seen.
 double ciede2000(const Eigen::Vector3d& lab_1, const Eigen::Vector3d& lab_2);
 
 }  // namespace touchstone

@@ -2,9 +2,9 @@
 // A motion chip's picture, as it is got out of the chip: one pixel a frame, so its pixels are of different times.
 //
 // The ADNS-2620's register Pixel_Data gives pixel 1 of the next frame after a write, and the next pixel of the next
-// frame with each read after that (Avago's data sheet): 324 frames a picture, 4.6 pictures a second at 1500 Hz. Pixels
-// are numbered from the lower left, up, column by column, to the upper right: the map of the register-compatible
-// ADNS-5050's data sheet, and what users of the 2610 and 2620 report.
+// frame with each read after that [ADNS2620]: 324 frames a picture, 4.6 pictures a second at 1500 Hz. Pixels are
+// numbered from the lower left, up, column by column, to the upper right: the map of the register-compatible ADNS-5050
+// [ADNS5050], and what users of the 2610 and 2620 report.
 
 #include <cstdint>
 #include <opencv2/core/mat.hpp>

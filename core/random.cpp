@@ -50,7 +50,7 @@ double RandomStream::poisson(double mean) {
   TS_ASSERT(mean >= 0.0 && std::isfinite(mean));
   if (mean == 0.0) return 0.0;
   if (mean > 1e4) return std::max(0.0, std::round(mean + std::sqrt(mean) * normal()));
-  if (mean < 12.0) {  // inversion by multiplication (Knuth)
+  if (mean < 12.0) {  // inversion by multiplication [Knuth1997, sec. 3.4.1]
     const double limit = std::exp(-mean);
     double product = uniform();
     double count = 0.0;
@@ -60,8 +60,7 @@ double RandomStream::poisson(double mean) {
     }
     return count;
   }
-  // Transformed rejection with squeeze, PTRS (W. Hoermann 1993, "The transformed rejection method for generating
-  // Poisson random variables").
+  // Transformed rejection with squeeze, PTRS [Hoermann1993].
   const double root = std::sqrt(mean);
   const double log_mean = std::log(mean);
   const double b = 0.931 + 2.53 * root;

@@ -33,8 +33,8 @@ enum class Purpose : std::uint32_t {
   kTest = 99,
 };
 
-/// Counter-based random numbers (Philox4x32-10, Salmon et al. 2011, by the Random123 library): a pure function of
-/// (seed, index, purpose) and of how many were drawn before, whatever the thread. It satisfies the standard's
+/// Counter-based random numbers (Philox4x32-10 [Salmon2011], by the Random123 library): a pure function of (seed,
+/// index, purpose) and of how many were drawn before, whatever the thread. It satisfies the standard's
 /// UniformRandomBitGenerator.
 class RandomStream {
  public:

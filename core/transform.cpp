@@ -1,5 +1,8 @@
 #include "core/transform.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include <cmath>
 
 #include "core/error.h"
@@ -26,6 +29,11 @@ RigidTransform look_at(const Eigen::Vector3d& eye, const Eigen::Vector3d& target
   frame.rotation.col(2) = z;
   frame.translation = eye;
   return frame;
+}
+
+Eigen::Vector3d xyz_from_rotation(const Eigen::Matrix3d& rotation) {
+  return {std::atan2(rotation(2, 1), rotation(2, 2)), -std::asin(std::clamp(rotation(2, 0), -1.0, 1.0)),
+          std::atan2(rotation(1, 0), rotation(0, 0))};
 }
 
 }  // namespace touchstone

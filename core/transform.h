@@ -29,6 +29,8 @@ struct RigidTransform {
 
 /// Rotation about the fixed axes x, then y, then z by the given angles (radians): R = Rz Ry Rx.
 Eigen::Matrix3d rotation_from_xyz(const Eigen::Vector3d& angles);
+/// Its inverse: the angles of a rotation, the one about y within a quarter turn.
+Eigen::Vector3d xyz_from_rotation(const Eigen::Matrix3d& rotation);
 
 /// A camera at `eye` that looks at `target`, the image's downward direction being nearest to `down`.
 /// @pre eye != target and `down` isn't along the view.

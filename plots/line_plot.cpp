@@ -16,7 +16,7 @@ constexpr double kLeft = 78.0;
 constexpr double kRight = 620.0;
 constexpr double kTop = 34.0;
 constexpr double kBottom = 346.0;
-// Distinct for the colour-blind (Okabe and Ito).
+// Distinct for the colour-blind [Okabe2008].
 constexpr std::array<const char*, 6> kColours = {"#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"};
 
 /// One axis: what it shows and where on the paper.

@@ -37,20 +37,20 @@ fs::path file_of(const std::string& name, const char* what, const char* folder) 
 }
 
 /// Equal settings make one device.
-auto key_of(const fs::path& file, const VirtualDeviceSettings& s) {
-  return std::tuple(file, s.seed, s.deepest_mm, s.widest_mm, s.membrane_um, s.drag_frames);
+auto key_of(const fs::path& file, const VirtualSensorSettings& s) {
+  return std::tuple(file, s.seed, s.deepest_mm, s.widest_mm, s.membrane_um);
 }
 
 }  // namespace
 
-const VirtualDevice& device(const std::string& name_or_file, const VirtualDeviceSettings& settings) {
+const VirtualSensor& device(const std::string& name_or_file, const VirtualSensorSettings& settings) {
   static std::mutex making;
-  static std::map<decltype(key_of({}, {})), std::unique_ptr<const VirtualDevice>> made;
+  static std::map<decltype(key_of({}, {})), std::unique_ptr<const VirtualSensor>> made;
   const fs::path file = file_of(name_or_file, "device", "devices");
   const std::lock_guard<std::mutex> lock(making);
   auto& kept = made[key_of(file, settings)];
   if (!kept) {
-    kept = std::make_unique<const VirtualDevice>(sim::read_device(file), sim::default_cache_folder(), settings);
+    kept = std::make_unique<const VirtualSensor>(sim::read_device(file), sim::default_cache_folder(), settings);
   }
   return *kept;
 }
@@ -68,7 +68,7 @@ sim::ObjectSpec ball(double diameter_mm, double friction) {
   return ball;
 }
 
-std::string keep_frames(const HeldFrame& held) {
+std::string keep_frames(const Touch& held) {
   const char* folder = std::getenv("TOUCHSTONE_FAILED_FRAMES");
   if (folder == nullptr || *folder == '\0' || held.frame.empty()) return "";
   static std::map<std::string, int> kept;

@@ -60,12 +60,20 @@ struct DrawSpec {
   std::optional<double> deepest_mm;                      ///< that the gel may be pressed in; default: see deepest_of
 };
 
-/// Pictures that a sample may have; the frame's own size.
+/// What a sample may have beside its wrench and pose, each as sim::Touch has it.
 struct DrawnOutputs {
-  bool frame = false, height = false, contact = false;
+  bool frame = false, height = false, contact = false;  ///< pictures of the frame's own size
+  bool beads = false, markers = false;                  ///< their true displacement
+  bool traction = false;                                ///< on the gel's surface vertices
+  bool events = false;
+  bool statistics = false;  ///< of a motion chip
   SourceLocation where;
+
+  bool pictures() const { return frame || height || contact; }
+  /// Does the sensor's camera have to be simulated?
+  bool camera() const { return pictures() || events || statistics; }
 };
-enum class DrawnOutput : std::uint8_t { frame, height, contact };
+enum class DrawnOutput : std::uint8_t { frame, height, contact, beads, markers, traction, events, statistics };
 EnumNames<DrawnOutput> enum_names(DrawnOutput);
 
 struct DrawJob {
@@ -74,10 +82,10 @@ struct DrawJob {
   std::uint64_t seed = 0;
   std::int64_t samples = 0;
   int samples_per_file = 100;
-  double membrane_um = 40.0;                ///< sim::TouchRigSettings::membrane_um
-  double interreflection_tolerance = 0.05;  ///< sim::TouchRigSettings
-  int edge_side = 4;                        ///< sim::TouchRigSettings
-  render::GuideCut guides;                  ///< sim::TouchRigSettings
+  double membrane_um = 40.0;                ///< sim::VirtualSensorSettings::membrane_um
+  double interreflection_tolerance = 0.05;  ///< sim::VirtualSensorSettings
+  int edge_side = 4;                        ///< sim::VirtualSensorSettings
+  render::GuideCut guides;                  ///< sim::VirtualSensorSettings
   DrawSpec draw;
   DrawnOutputs outputs;
   SplitSpec splits;

@@ -6,21 +6,18 @@
 
 #include "core/edited_yaml.h"
 #include "core/random.h"
+#include "core/transform.h"
 #include "core/units.h"
 #include "core/whole_file.h"
-#include "sim/relief/relief.h"
-#include "sim/scene/device_gel.h"
+#include "sim/sensor/milky_view.h"
 
 namespace touchstone::datasets {
 namespace {
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-constexpr double kClearance_mm = 0.05;  // above the gel at the start
-constexpr double kDeepestShare = 0.4;   // of the gel's thickness, where the job doesn't say
+constexpr double kDeepestShare = 0.4;  // of the gel's thickness, where the job doesn't say
 constexpr double kLeastWidest_mm = 0.5;
 constexpr double kSpareWidth_mm = 0.2;
-constexpr double kDragStep_mm = 0.1;  // friction's history is stepped so finely
-constexpr int kPressSteps = 3;        // where there is friction
 constexpr std::int64_t kPiecesChecked = 20;
 constexpr double kMostSamples = 1e12;  // so that products with units stay whole numbers
 
@@ -61,33 +58,30 @@ Spec read_varied(const std::string& text, const std::string& file, const std::st
   }
 }
 
+/// The device can give what the job's outputs want.
+void require_outputs(const sim::DeviceSpec& device, const DrawJob& job) {
+  const DrawnOutputs& wanted = job.outputs;
+  const auto refuse = [&](const char* output, const char* missing) {
+    fail_at(wanted.where, "outputs: '{}' can't be had of device {}: it has no {}", output, device.name, missing);
+  };
+  if (wanted.camera() && !device.camera) {
+    refuse(wanted.frame ? "frame" : wanted.height ? "height" : wanted.contact ? "contact" : "events", "camera");
+  }
+  if (wanted.height && !device.coating && !sim::is_milky(device)) {
+    refuse("height", "coating, and what its camera sees first isn't its outer face");
+  }
+  if (wanted.beads && !device.beads) refuse("beads", "beads");
+  if (wanted.markers && !(device.coating && device.coating->print)) refuse("markers", "printed coating");
+  if (wanted.events && !device.camera->events) refuse("events", "event pixels (camera: events:)");
+  if (wanted.statistics && !device.camera->motion_chip) refuse("statistics", "motion chip (camera: motion_chip:)");
+}
+
 void require_touchable(const sim::DeviceSpec& device, const PreparedDraw& prepared) {
-  if (!device.camera) fail_at(device.where, "device {}: has no camera; draw needs one", device.name);
-  if (!device.coating) {
-    fail_at(device.where, "device {}: has no coating; a job that draws needs a coated gel, others need scenes",
-            device.name);
-  }
-  if (device.films || device.beads) {
-    fail_at(device.where, "device {}: has {}; a job that draws can't have it, scenes can", device.name,
-            device.films ? "films" : "beads");
-  }
+  require_outputs(device, prepared.job);
   if (!(prepared.deepest_mm < device.gel.thickness_mm)) {
     fail_at(prepared.job.where, "draw: presses of up to {} mm, but the gel of device {} is {} mm thick",
             prepared.deepest_mm, device.name, device.gel.thickness_mm);
   }
-}
-
-/// Of the object with its relief, turned, below its origin.
-double lowest_point(const sim::ObjectSpec& object, const Eigen::Matrix3d& rotation) {
-  double low = std::numeric_limits<double>::infinity();
-  if (object.shape.type == sim::ShapeKind::sphere) {
-    low = -object.shape.radius_mm;
-  } else {
-    for (const Eigen::Vector3d& vertex : sim::visible_mesh(object.shape).vertices) {
-      low = std::min(low, rotation.row(2).dot(vertex));
-    }
-  }
-  return low - (object.relief ? sim::relief_map(*object.relief).highest() : 0.0);
 }
 
 std::vector<DrawnBlock> blocks_of(const DrawJob& job) {
@@ -140,7 +134,8 @@ PreparedDraw prepare_draw(const std::filesystem::path& file) {
   for (int unit = 0; unit < job.draw.units.count; ++unit) {
     const DrawnUnit drawn = drawn_unit(prepared, unit);
     require_touchable(drawn.device, prepared);
-    if (drawn.device.camera->width != device.camera->width || drawn.device.camera->height != device.camera->height) {
+    if (prepared.job.outputs.pictures() &&
+        (drawn.device.camera->width != device.camera->width || drawn.device.camera->height != device.camera->height)) {
       fail_at(job.where, "draw.units: unit {} has a picture of another size; a data set's pictures have one size",
               unit);
     }
@@ -176,9 +171,7 @@ sim::ObjectSpec drawn_object(const PreparedDraw& prepared, int object, std::int6
                       Purpose::kDrawnPiece);
   const std::string text =
       varied(prepared.object_texts[static_cast<std::size_t>(object)], name, spec.vary, random, nullptr);
-  sim::ObjectSpec read = read_varied<sim::ObjectSpec>(text, name, fmt::format("piece {} of object {}", piece, object));
-  if (read.elastic) fail_at(spec.where, "object {}: is elastic; a job that draws takes rigid ones", read.name);
-  return read;
+  return read_varied<sim::ObjectSpec>(text, name, fmt::format("piece {} of object {}", piece, object));
 }
 
 DrawnTouch drawn_touch(const PreparedDraw& prepared, std::int64_t sample, int attempt) {
@@ -233,36 +226,18 @@ Eigen::Matrix3d rotation_of(const DrawnTouch& touch) {
          Eigen::AngleAxisd(touch.turn_deg * kRadiansPerDegree, Eigen::Vector3d::UnitZ()).toRotationMatrix();
 }
 
-sim::MotionSpec motion_of(const DrawnTouch& touch, const sim::ObjectSpec& object, const sim::DeviceSpec& device) {
-  const Eigen::Matrix3d rotation = rotation_of(touch);
-  sim::MotionSpec motion;
-  motion.frame_rate_Hz = device.camera->frame_rate_Hz;
-  const double level = sim::rest_height(device.gel, touch.place_mm);
-  const double touching = level - lowest_point(object, rotation);
-  motion.start_mm << touch.place_mm, touching + kClearance_mm;
-  // R = Rz Ry Rx.
-  motion.start_angles_deg =
-      Eigen::Vector3d(std::atan2(rotation(2, 1), rotation(2, 2)), -std::asin(std::clamp(rotation(2, 0), -1.0, 1.0)),
-                      std::atan2(rotation(1, 0), rotation(0, 0))) /
-      kRadiansPerDegree;
-  const bool rubs = object.friction > 0.0 && (touch.drag_mm > 0.0 || touch.tilt_deg > 0.0);  // else straight in
-  sim::MotionKey press;
-  press.frames = rubs ? kPressSteps : 1;
+sim::PressSpec press_of(const DrawnTouch& touch) {
+  const double toward = touch.drag_toward_deg * kRadiansPerDegree;
+  sim::PressSpec press;
+  press.place_mm = touch.place_mm;
+  press.angles_deg = xyz_from_rotation(rotation_of(touch)) / kRadiansPerDegree;
   if (std::isnan(touch.depth_mm)) {
-    press.z = sim::AxisKey{std::nullopt, touch.force_N};
+    press.force_N = touch.force_N;
   } else {
-    press.z = sim::AxisKey{touching - touch.depth_mm, std::nullopt};
+    press.depth_mm = touch.depth_mm;
   }
-  motion.keys.push_back(press);
-  if (touch.drag_mm > 0.0) {
-    const double toward = touch.drag_toward_deg * kRadiansPerDegree;
-    sim::MotionKey drag;
-    drag.frames = std::max(2, static_cast<int>(std::ceil(touch.drag_mm / kDragStep_mm)));
-    drag.x = sim::AxisKey{touch.place_mm.x() + touch.drag_mm * std::cos(toward), std::nullopt};
-    drag.y = sim::AxisKey{touch.place_mm.y() + touch.drag_mm * std::sin(toward), std::nullopt};
-    motion.keys.push_back(drag);
-  }
-  return motion;
+  press.drag_mm = touch.drag_mm * Eigen::Vector2d(std::cos(toward), std::sin(toward));
+  return press;
 }
 
 }  // namespace touchstone::datasets

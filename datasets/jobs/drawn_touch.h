@@ -9,8 +9,8 @@
 
 #include "datasets/jobs/draw.h"
 #include "datasets/jobs/input_files.h"
+#include "sim/press/press_spec.h"
 #include "sim/scene/device.h"
-#include "sim/scene/motion.h"
 #include "sim/scene/object.h"
 
 namespace touchstone::datasets {
@@ -81,7 +81,7 @@ DrawnTouch drawn_touch(const PreparedDraw& prepared, std::int64_t sample, int at
 /// The rotation of a touch: its turn about z, then its tilt.
 Eigen::Matrix3d rotation_of(const DrawnTouch& touch);
 
-/// From just above the gel to the touch: the press, then the drag. The last frame is the sample.
-sim::MotionSpec motion_of(const DrawnTouch& touch, const sim::ObjectSpec& object, const sim::DeviceSpec& device);
+/// What a sensor is asked for.
+sim::PressSpec press_of(const DrawnTouch& touch);
 
 }  // namespace touchstone::datasets

@@ -6,8 +6,7 @@
 //   normal:      g = gap + (A z + B s)_n >= 0,  p >= 0,  p g = 0
 //   tangential:  d = (A z + B s)_t - drag,  |t| <= mu p,  d = 0 where |t| < mu p,  t = -mu p d/|d| where it slips
 //   rigid:       B^T z - hold s = force
-// (Wriggers, Computational Contact Mechanics, 2nd ed., sec. 5; the friction law as a projection: Alart and Curnier,
-// Comput. Methods Appl. Mech. Eng. 92, 1991.)
+// ([Wriggers2006, sec. 5]; the friction law as a projection: [Alart1991].)
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -62,10 +61,9 @@ struct ContactAnswer {
   bool converged = false;
 };
 
-/// Frictionless (components == 1): block principal pivoting (Judice and Pires, Computers Ops Res. 21, 1994), which is
-/// the primal-dual active set where that converges and ends also where that would cycle. `start` gives the first active
-/// set (p > 0); it may be empty. A border column that pushes one way (all its entries of one sign) must have a `force`
-/// above zero.
+/// Frictionless (components == 1): block principal pivoting [Judice1994], which is the primal-dual active set where
+/// that converges and ends also where that would cycle. `start` gives the first active set (p > 0); it may be empty. A
+/// border column that pushes one way (all its entries of one sign) must have a `force` above zero.
 ContactAnswer solve_frictionless(const ContactProblem& problem, const Eigen::VectorXd& start, ContactMemory& memory);
 
 /// With friction (components == 3): semismooth Newton on the projection equations, the factorised Jacobian kept while

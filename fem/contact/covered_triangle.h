@@ -9,7 +9,7 @@
 
 namespace touchstone::fem {
 
-/// Radon's rule of degree 5 on a triangle (J. Radon, Monatsh. Math. Phys. 52, 1948): barycentric points and weights.
+/// Radon's rule of degree 5 on a triangle [Radon1948]: barycentric points and weights.
 struct RadonRule {
   std::array<Eigen::Vector3d, 7> points;
   std::array<double, 7> weights;

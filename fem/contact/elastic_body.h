@@ -15,9 +15,8 @@ namespace touchstone::fem {
 /// The body's own compliance, ready to be added to the gel's. With the gel's hats phi_i and the body's psi_j, and
 /// B_ij = int phi_i psi_j dA over the gel's surface (points are carried over along the gel's normal), equal and
 /// opposite tractions on the two surfaces make the body's surface move by B W^-1 H W^-1 B^T seen by the gel's hats: H
-/// is the body's compliance, W its hats' weights (a mortar coupling with lumped mass: Wohlmuth, Acta Numerica 20, 2011,
-/// sec. 3). It is symmetric, and forces and torques are handed over whole wherever the gel's hats lie on the body's
-/// surface.
+/// is the body's compliance, W its hats' weights (a mortar coupling with lumped mass [Wohlmuth2011, sec. 3]). It is
+/// symmetric, and forces and torques are handed over whole wherever the gel's hats lie on the body's surface.
 class ElasticBody {
  public:
   /// `body`: in the object's frame, bonded where the object is held; it must outlive this.

@@ -259,8 +259,7 @@ class FrictionalNewton {
       if (answer.state[i] != NodeState::slip) continue;
       const Eigen::Vector2d v = predicted(i);
       const double length = v.norm();
-      // At most 1 at the answer; far from it the clamp keeps the step from pointing away (Hueber, Stadler and Wohlmuth,
-      // SIAM J. Sci. Comput. 30, 2008).
+      // At most 1 at the answer; far from it the clamp keeps the step from pointing away [Hueber2008].
       memory_.slip[i] = {v / length, std::min(1.0, problem_.friction[i] * std::max(0.0, answer.z[3 * i]) / length)};
     }
     const Eigen::Index size = reduced_size();

@@ -359,7 +359,7 @@ void PartSolver::follow_patches(const ContactAnswer& answer, Iterate& now) const
     now.lookup_error =
         std::max(now.lookup_error, std::hypot(residual[0], residual[1]) + std::abs(residual[2]) * body.patch_radius);
     const std::array<double, 3> scale = {1.0, 1.0, body.patch_radius};
-    // Aitken's rule for vectors (Irons and Tuck 1969) where the plain fixed point is slow.
+    // Aitken's rule for vectors [Irons1969] where the plain fixed point is slow.
     if (now.updates > kPlainUpdates && body.has_residual) {
       double cross = 0.0;
       double square = 0.0;

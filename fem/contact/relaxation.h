@@ -4,10 +4,10 @@
 // E(t) = E0 [g_inf + sum g_i exp(-t / tau_i)], g_inf = 1 - sum g_i. With nu constant the whole surface compliance
 // scales, so relaxation acts on the surface tractions alone: with H0, the compliance of the instantaneous modulus E0,
 // the displacement is u(t) = H0 e(t), where e is the pseudo-elastic traction, and the true traction is the hereditary
-// integral of e (Christensen, Theory of Viscoelasticity, 2nd ed., sec. 2.1; the correspondence principle):
+// integral of e ([Christensen1982, sec. 2.1]; the correspondence principle):
 //   tau = g_inf e + sum h_i,     dh_i/dt = g_i de/dt - h_i / tau_i.
-// Over a step dt in which e goes linearly, with x = dt / tau_i, that is integrated exactly (Taylor, Pister and
-// Goudreau, Int. J. Numer. Meth. Engng 2, 1970; Simo and Hughes, Computational Inelasticity, sec. 10.3):
+// Over a step dt in which e goes linearly, with x = dt / tau_i, that is integrated exactly ([Taylor1970]; [Simo1998,
+// sec. 10.3]):
 //   h_i' = exp(-x) h_i + g_i phi(x) (e' - e),  phi(x) = (1 - exp(-x)) / x,
 // so that tau' = G e' + r with G = g_inf + sum g_i phi(x_i) and r = sum [exp(-x_i) h_i - g_i phi(x_i) e] known
 // beforehand: in a step the gel is an elastic one of compliance H0 / G, displaced beforehand by -H0 r / G.

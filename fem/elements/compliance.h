@@ -51,8 +51,8 @@ struct Compliance {
 /// Eliminates the gel's inside once. The Taylor-Hood system K is bordered by the rows C that take displacements to what
 /// is asked for (int phi_i u_a over the outer surface; the mean over each bead's surface); the Schur complement of
 /// [K C^T; C 0] on the border is -C K^-1 C^T. A bead is a rigid sphere that moves with the gel and doesn't stiffen it:
-/// it goes where the gel's mean over its surface goes (Faxen's law for a sphere without a force on it). The vertices
-/// keep the mesh's order. `materials` has one entry for each region of the mesh. `thickness` is copied.
+/// it goes where the gel's mean over its surface goes (Faxen's law [Faxen1922] for a sphere without a force on it). The
+/// vertices keep the mesh's order. `materials` has one entry for each region of the mesh. `thickness` is copied.
 /// @throws Error for an unfit mesh (see fault_of) or material, for a bead that isn't wholly inside the gel, for more
 /// vertices and beads than kMostSurfaceVertices allows, or if memory runs out
 Compliance compute_compliance(const TetMesh& mesh, std::span<const ElasticMaterial> materials,

@@ -7,9 +7,9 @@
 namespace touchstone::fem {
 
 /// An order of elimination with little fill: nested dissection of the nodes by planes across the axes, each separator
-/// thinned to the fewest nodes that cover the edges it cuts (George, SIAM J. Numer. Anal. 10, 1973; a minimum cover of
-/// a bipartite graph: Koenig's theorem). A function of the space alone, with no random choice, unlike SCOTCH's. Returns
-/// all unknowns, first to be eliminated first; those of a node stay together.
+/// thinned to the fewest nodes that cover the edges it cuts ([George1973]; a minimum cover of a bipartite graph:
+/// Koenig's theorem). A function of the space alone, with no random choice, unlike SCOTCH's. Returns all unknowns,
+/// first to be eliminated first; those of a node stay together.
 std::vector<int> elimination_order(const TaylorHoodSpace& space);
 
 /// The same order with the parts that it was made of: each separator is a group, and so is each part that wasn't cut

@@ -5,10 +5,10 @@ namespace touchstone::fem {
 
 /// Eliminates the first unknowns of a dense symmetric matrix (lower half, by columns, `size` x `size`), of which the
 /// first `positive` make a positive definite block and the next `negative`, once those are gone, a negative definite
-/// one, as in a symmetric quasi-definite matrix (Vanderbei, SIAM J. Optim. 5, 1995: it has an L D L^T in any order).
-/// What is left in the last rows and columns is their Schur complement. Blocked Cholesky by OpenBLAS on one thread;
-/// large fronts are cut into tiles that oneTBB's threads share. The tiles and the order of sums within each don't
-/// depend on the number of threads. False if a pivot's sign is wrong. @pre OpenBLAS is set to one thread
+/// one, as in a symmetric quasi-definite matrix (it has an L D L^T in any order [Vanderbei1995]). What is left in the
+/// last rows and columns is their Schur complement. Blocked Cholesky by OpenBLAS on one thread; large fronts are cut
+/// into tiles that oneTBB's threads share. The tiles and the order of sums within each don't depend on the number of
+/// threads. False if a pivot's sign is wrong. @pre OpenBLAS is set to one thread
 bool eliminate_front(double* front, int size, int positive, int negative);
 
 }  // namespace touchstone::fem

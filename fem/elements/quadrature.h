@@ -14,12 +14,12 @@ struct SimplexPoint {
   double weight = 0.0;
 };
 
-/// Exact for polynomials up to `degree` (Stroud's conical product of Gauss-Legendre rules).
+/// Exact for polynomials up to `degree` (conical product of Gauss-Legendre rules [Stroud1971]).
 std::vector<SimplexPoint<4>> tetrahedron_rule(int degree);
 std::vector<SimplexPoint<3>> triangle_rule(int degree);
 
-/// Walkington's rule of degree 5 with 14 points (Quadrature on simplices of arbitrary dimension, 2000): symmetric in
-/// the corners, so that a symmetric mesh keeps its symmetry.
+/// Walkington's rule of degree 5 with 14 points [Walkington2000]: symmetric in the corners, so that a symmetric mesh
+/// keeps its symmetry.
 const std::vector<SimplexPoint<4>>& symmetric_tetrahedron_rule();
 
 struct SpherePoint {

@@ -10,10 +10,10 @@ namespace touchstone::fem {
 
 /// The same Schur complement as schur_complement() for a symmetric quasi-definite matrix: unknowns with a positive
 /// diagonal make a positive definite block, those with a negative one a negative definite block. A multifrontal
-/// elimination along the tree (Duff and Reid, ACM Trans. Math. Softw. 9, 1983) without pivoting across fronts, whose
-/// factor isn't kept; branches of the tree and tiles of the large fronts are shared among oneTBB's threads. The same
-/// input gives the same bytes on any number of threads. Nothing if a pivot comes out with the wrong sign: rounding has
-/// eaten it, and an elimination with pivoting is needed.
+/// elimination along the tree [Duff1983] without pivoting across fronts, whose factor isn't kept; branches of the tree
+/// and tiles of the large fronts are shared among oneTBB's threads. The same input gives the same bytes on any number
+/// of threads. Nothing if a pivot comes out with the wrong sign: rounding has eaten it, and an elimination with
+/// pivoting is needed.
 std::optional<Eigen::MatrixXd> quasi_definite_schur(const SymmetricEntries& matrix, int last,
                                                     const EliminationTree& tree, FactorReport* report = nullptr);
 

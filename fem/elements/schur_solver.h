@@ -1,7 +1,6 @@
 #pragma once
 // Sparse symmetric indefinite systems by MUMPS (sequential): the one file that knows it.
-// (Amestoy, Duff, L'Excellent, Koster, SIAM J. Matrix Anal. Appl. 23, 2001; Users' Guide 5.5, the Schur
-// complement: 3.18)
+// ([Amestoy2001]; the Schur complement: [MUMPS55, sec. 3.18])
 
 #include <Eigen/Core>
 #include <cstdint>

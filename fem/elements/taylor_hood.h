@@ -2,9 +2,9 @@
 // Linear elasticity by Taylor-Hood tetrahedra: displacement quadratic (vertices and middles of edges), pressure linear
 // and continuous (vertices). Find u, p with
 //   int 2 G eps(u):eps(v) - int p div v = int f.v + int t.v,     -int q div u - int p q / lambda = 0
-// (Hughes, The Finite Element Method, sec. 4.3; Taylor and Hood, Computers and Fluids 1, 1973). Solved without units:
-// lengths over `length`, stresses over `stress`; p = -lambda div u, stress = 2 G eps - p I. The pressure is scaled once
-// more, by each region's `pressure_scale`, so that nu = 0 (lambda = 0) needs no special case.
+// ([Hughes1987, sec. 4.3]; [Taylor1973]). Solved without units: lengths over `length`, stresses over `stress`; p =
+// -lambda div u, stress = 2 G eps - p I. The pressure is scaled once more, by each region's `pressure_scale`, so that
+// nu = 0 (lambda = 0) needs no special case.
 //
 // G and lambda are constant in each region of the mesh. Where regions of different materials meet, the pressure jumps
 // (the normal stress doesn't): a vertex there has a pressure of its own in each of them, without which the order of

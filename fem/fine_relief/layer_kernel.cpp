@@ -41,7 +41,7 @@ double layer_over_q(double nu, double q) {
 struct GaussRule {
   std::array<double, kPanelPoints> x, w;  // on [-1, 1]
   GaussRule() {
-    // Roots of Legendre's polynomial by Newton's iteration (Abramowitz and Stegun 25.4.29).
+    // Roots of Legendre's polynomial by Newton's iteration [Abramowitz1964, eq. 25.4.29].
     for (int i = 0; i < kPanelPoints; ++i) {
       double z = std::cos(std::numbers::pi * (i + 0.75) / (kPanelPoints + 0.5));
       double slope = 1.0;

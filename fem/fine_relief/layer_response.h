@@ -45,9 +45,9 @@ enum class GridEdges { free, periodic };
 /// one response, each with its own scratch. The transforms' order is fixed, so the same input gives the same bytes.
 ///
 /// Free: pressure is constant in each pixel, displacement is at pixel centres, by real-space influence coefficients:
-/// Love's solution of the half space under a loaded rectangle (Phil. Trans. R. Soc. A 228, 1929; Johnson, Contact
-/// Mechanics, eq. 3.25) and the layer's smooth correction, averaged over the pixel to second order. The convolution is
-/// made by Fourier transforms on a grid twice as large, where nothing wraps round: it has no padding error.
+/// Love's solution of the half space under a loaded rectangle ([Love1929]; [Johnson1985, eq. 3.25]) and the layer's
+/// smooth correction, averaged over the pixel to second order. The convolution is made by Fourier transforms on a grid
+/// twice as large, where nothing wraps round: it has no padding error.
 /// Periodic: the grid is one period, and each of its waves is answered by layer_compliance
 /// (fem/fine_relief/layer_kernel.h).
 class LayerResponse {

@@ -164,7 +164,8 @@ class Solver {
     over_rows([&](std::size_t k, Sums&) { values[k] = takes_part_[k] ? values[k] - mean : 0.0; });
   }
 
-  /// One step along the conjugate direction (Polak and Ribiere's, which begins anew by itself where the set changed).
+  /// One step along the conjugate direction (Polak and Ribiere's [Polak1969], which begins anew by itself where the set
+  /// changed).
   void step() {
     auto& p = answer_.pressure;
     inverse_.apply(residual_, response_, *inverse_scratch_);

@@ -36,11 +36,11 @@ struct PixelContactAnswer {
   bool converged = false;  ///< to the tolerance; if not, the best there is after `most_iterations`
 };
 
-/// Constrained conjugate gradients after Polonsky and Keer (Wear 231, 1999), preconditioned by the layer's inverse wave
-/// by wave, which takes the iterations from some 250 to 10 and makes them independent of the pixel; pixels that overlap
-/// take part in a step before they have pressure (Vollebregt, J. Optim. Theory Appl. 162, 2014). `start` may hold a
-/// pressure to begin with (one a pixel, e.g. the answer of the frame before); where it is empty, free grids begin with
-/// the answer on pixels of twice the width, and that so on. The same input gives the same bytes.
+/// Constrained conjugate gradients after [Polonsky1999], preconditioned by the layer's inverse wave by wave, which
+/// takes the iterations from some 250 to 10 and makes them independent of the pixel; pixels that overlap take part in a
+/// step before they have pressure [Vollebregt2014]. `start` may hold a pressure to begin with (one a pixel, e.g. the
+/// answer of the frame before); where it is empty, free grids begin with the answer on pixels of twice the width, and
+/// that so on. The same input gives the same bytes.
 /// @throws Error for NaN in the gap or the start, a gap of minus infinity, a force that isn't finite or is below zero,
 /// and a force above zero where no pixel has a body over it
 PixelContactAnswer solve_pixel_contact(const LayerResponse& layer, const PixelContact& contact,

@@ -234,7 +234,7 @@ bool FinitePartSolver::find_step(const FiniteSnapshot& from, const PartTarget& t
   }
   // A gel under pressure is stable in the hold of its contact, not under the same pressure as dead load (from a
   // pressure of some 2 G on). What is held is therefore made stiff, by terms that vanish where it holds (the augmented
-  // Lagrangian of Hestenes and Powell), so that the compliance stays positive definite.
+  // Lagrangian of [Hestenes1969] and [Powell1969]), so that the compliance stays positive definite.
   for (Eigen::Index j = 0; j < m; ++j) {
     const int v = step.block[static_cast<std::size_t>(j)];
     if (at.state[v] == NodeState::open) continue;
@@ -373,7 +373,7 @@ std::optional<FiniteSnapshot> FinitePartSolver::solve(const FiniteSnapshot& from
     }
     effort.candidates = std::max(effort.candidates, static_cast<int>(step.block.size()));
     if (!find_step(from, target, iterate, step, effort)) return std::nullopt;
-    // Aitken's rule (Irons and Tuck 1969) against steps that alternate.
+    // Aitken's rule [Irons1969] against steps that alternate.
     double next_factor = 1.0;
     if (iteration > kPlainSteps) {
       const double ratio = step.change.dot(last_change) / last_change.squaredNorm();

@@ -10,7 +10,7 @@
 // last step.
 //
 // A gel may relax (fem/contact/relaxation.h): all of its nominal stress, the pressure in it, is then the hereditary
-// integral of what the elastic gel has at the same displacements (quasi-linear, Fung 1972, with the same function for
+// integral of what the elastic gel has at the same displacements (quasi-linear [Fung1972], with the same function for
 // all of it). Equilibrium is linear in nominal stress, so a gel that is led by poses moves as the elastic one, and its
 // tractions and forces are the integrals of the elastic ones: exactly while contact doesn't change and the gel doesn't
 // turn, since the integral adds up stresses of different directions. Where contact grows that's first order in what

@@ -4,9 +4,9 @@
 //   W(F, p) = G/2 (F:F - 3) - G ln J - p (J - 1) - p^2 / (2 lambda),   J = det F
 //
 // Eliminating p (p = -lambda (J - 1)) gives the compressible neo-Hookean solid with the volume term lambda/2 (J - 1)^2
-// (Bonet and Wood, Nonlinear Continuum Mechanics for Finite Element Analysis, 2nd ed., sec. 6.4.3, whose volume term is
-// lambda/2 (ln J)^2). At small strain it is the linear elasticity of fem/elements/taylor_hood.h with the same G, lambda
-// and the same pressure, so the tangent at rest is the linear system itself; lambda may be infinite (nu = 0.5).
+// ([Bonet2008, sec. 6.4.3], whose volume term is lambda/2 (ln J)^2). At small strain it is the linear elasticity of
+// fem/elements/taylor_hood.h with the same G, lambda and the same pressure, so the tangent at rest is the linear system
+// itself; lambda may be infinite (nu = 0.5).
 //
 // Without units: stresses over Scales::stress, and p = stress * pressure_scale * q, as there.
 

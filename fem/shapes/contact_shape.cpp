@@ -263,7 +263,7 @@ namespace {
 
 /// From a point outside of an ellipse about the origin, its half axes `a` and `b`; 0 inside.
 /// The nearest point is (a2 x / (t + a2), b2 y / (t + b2)) with t the largest root of a convex falling function, to
-/// which Newton's steps from below come from one side. Eberly, Distance from a Point to an Ellipse, 2013, section 2.
+/// which Newton's steps from below come from one side. [Eberly2013, sec. 2]
 double distance_outside_ellipse(double a, double b, double x, double y) {
   x = std::abs(x);
   y = std::abs(y);

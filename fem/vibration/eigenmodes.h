@@ -5,8 +5,7 @@
 // are very large. Lanczos works on displacements alone, with the operator that takes x to the displacement part of
 // K^-1 [M x; 0], K being the whole mixed system: its largest eigenvalues are 1 / omega^2 of the lowest modes, and all
 // that is (nearly) incompressible has the eigenvalue zero there. One factorisation serves all of it (spectral
-// transformation: Ericsson and Ruhe, Math. Comp. 35, 1980; mixed problems: Boffi, Brezzi, Fortin, Mixed Finite Element
-// Methods and Applications, sec. 6.5).
+// transformation: [Ericsson1980]; mixed problems: [Boffi2013, sec. 6.5]).
 
 #include <Eigen/Core>
 #include <Eigen/SparseCore>

@@ -5,7 +5,7 @@
 // modes of E0 serve at every frequency, and the dynamic compliance is
 //   H(omega) = H0 / s + sum_k w_k w_k^T omega^2 / (s omega_k^2 (s omega_k^2 - omega^2)),
 // H0 the static compliance, w_k the mode as the surface (or a bead) sees it: static correction by mode acceleration
-// (Cornwell, Craig and Johnson, Earthquake Eng. Struct. Dyn. 11, 1983). What is left out are modes above the last,
+// [Cornwell1983]. What is left out are modes above the last,
 // each with its static part already in H0: their error falls with (omega / omega_last)^2 and is bounded beside every
 // answer. Time goes as exp(i omega t); amplitudes are complex.
 

@@ -12,6 +12,7 @@
 #include "core/seconds_since.h"
 #include "core/units.h"
 #include "render/imager/imager.h"
+#include "sim/press/play_motion.h"
 #include "sim/scene/device_imager.h"
 #include "sim/view/visible_scene.h"
 
@@ -75,11 +76,11 @@ void for_each_value(const cv::Mat& one, const cv::Mat& other, const std::vector<
 
 }  // namespace
 
-std::vector<sim::Hold> bench_holds(int count, double edge_mm, double depth_mm, std::uint64_t seed) {
-  std::vector<sim::Hold> holds;
+std::vector<sim::PressSpec> bench_holds(int count, double edge_mm, double depth_mm, std::uint64_t seed) {
+  std::vector<sim::PressSpec> holds;
   for (int k = 0; k < count; ++k) {
     RandomStream random(seed, static_cast<std::uint64_t>(k), Purpose::kStudy);
-    sim::Hold hold;
+    sim::PressSpec hold;
     hold.place_mm = edge_mm * Eigen::Vector2d(random.uniform() - 0.5, random.uniform() - 0.5);
     hold.depth_mm = depth_mm * (1.0 + kDepthSpread * (2.0 * random.uniform() - 1.0));
     const double angle = 2.0 * kPi * (k + random.uniform()) / count;
@@ -89,14 +90,22 @@ std::vector<sim::Hold> bench_holds(int count, double edge_mm, double depth_mm, s
   return holds;
 }
 
+/// One frame down, one aside.
+static sim::MotionSpec motion_of(const BenchPresses& presses, const sim::PressSpec& hold) {
+  constexpr double kFrameRate_Hz = 30.0;
+  sim::MotionSpec motion = sim::press_motion(hold, presses.touch_mm, presses.object.friction, kFrameRate_Hz);
+  for (sim::MotionKey& key : motion.keys) key.frames = 1;
+  return motion;
+}
+
 FeltForces feel(const BenchPresses& presses, const fem::Compliance& gel, const sim::DeviceSpec& device, double edge_mm,
                 const fem::PressTolerance& tolerance) {
   const fem::ContactShape shape = sim::coarse_contact_shape(presses.object, edge_mm);
   FeltForces felt;
   std::vector<Eigen::MatrixX3d> beads;
   double seconds = 0.0;
-  for (const sim::Hold& hold : presses.holds) {
-    const sim::MotionSpec motion = sim::press_motion(hold, presses.touch_mm, 1);
+  for (const sim::PressSpec& hold : presses.holds) {
+    const sim::MotionSpec motion = motion_of(presses, hold);
     fem::Press press(gel, shape, presses.object.friction, tolerance, sim::prony_series(device.gel),
                      fem::PressOutput::forces);
     Eigen::Vector3d at = motion.start_mm;
@@ -149,12 +158,12 @@ double force_difference(const std::vector<Eigen::Vector3d>& forces, const std::v
   return std::sqrt(sum / static_cast<double>(forces.size()));
 }
 
-sim::SceneSpec bench_scene(const sim::DeviceSpec& device, const BenchPresses& presses, const sim::Hold& hold,
+sim::SceneSpec bench_scene(const sim::DeviceSpec& device, const BenchPresses& presses, const sim::PressSpec& hold,
                            std::uint64_t seed) {
   sim::SceneSpec scene;
   scene.device = device;
   scene.object = presses.object;
-  scene.motion = sim::press_motion(hold, presses.touch_mm, 1);
+  scene.motion = motion_of(presses, hold);
   if (device.camera) scene.motion.frame_rate_Hz = device.camera->frame_rate_Hz;
   scene.outputs = {.frames = device.camera.has_value(), .radiance = device.camera.has_value()};
   scene.seed = seed;

@@ -12,21 +12,21 @@
 #include "fem/contact/press.h"
 #include "render/imager/imager.h"
 #include "sim/scene/scene.h"
-#include "sim/sensor/virtual_device.h"
+#include "sim/sensor/virtual_sensor.h"
 
 namespace touchstone::lab {
 
 /// An object held against a device in several ways, each pressed down and then dragged.
 struct BenchPresses {
   sim::ObjectSpec object;
-  double touch_mm = 0.0;  ///< see way_to_touch(), over the middle
-  std::vector<sim::Hold> holds;
+  double touch_mm = 0.0;  ///< see sim::first_touch(), over the middle
+  std::vector<sim::PressSpec> holds;
 };
 
 /// `count` holds near the gel's middle: places within an edge of the mesh, so that no place is luckier than another,
 /// depths within a fifth of `depth_mm`, dragged by a third of that into all directions. A pure function of its
 /// arguments.
-std::vector<sim::Hold> bench_holds(int count, double edge_mm, double depth_mm, std::uint64_t seed);
+std::vector<sim::PressSpec> bench_holds(int count, double edge_mm, double depth_mm, std::uint64_t seed);
 
 /// What the presses felt like: forces on the object, pressed and dragged, one after the other for each hold.
 struct FeltForces {
@@ -47,7 +47,7 @@ FeltForces feel(const BenchPresses& presses, const fem::Compliance& gel, const s
 double force_difference(const std::vector<Eigen::Vector3d>& forces, const std::vector<Eigen::Vector3d>& than);
 
 /// The scene of one hold: three frames, at rest, pressed and dragged.
-sim::SceneSpec bench_scene(const sim::DeviceSpec& device, const BenchPresses& presses, const sim::Hold& hold,
+sim::SceneSpec bench_scene(const sim::DeviceSpec& device, const BenchPresses& presses, const sim::PressSpec& hold,
                            std::uint64_t seed);
 
 /// A camera of at most so many pixels out of the middle of this one, with all else as it was.

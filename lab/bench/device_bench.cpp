@@ -265,8 +265,7 @@ DeviceBench bench_device(const sim::DeviceSpec& device, const BenchSettings& set
   const double thickness = parts.own_gel.thickness;
   parts.presses.object = settings.object ? *settings.object : ball_of(thickness);
   parts.depth_mm = settings.depth_mm.value_or(kDepth * thickness);
-  parts.presses.touch_mm = sim::way_to_touch(sim::contact_shape(parts.presses.object.shape), parts.own_gel,
-                                             Eigen::Vector2d::Zero(), Eigen::Vector3d::Zero());
+  parts.presses.touch_mm = sim::first_touch(sim::PressSpec{}, parts.presses.object, device.gel);
   parts.presses.holds = bench_holds(kHolds, device.mesh.fine_mm, parts.depth_mm, settings.seed);
   const FeltForces felt = feel(parts.presses, parts.own_gel, device, device.mesh.fine_mm);
   bench.presses = fmt::format(

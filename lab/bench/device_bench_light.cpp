@@ -148,7 +148,7 @@ BenchCurve samples_curve(const BenchParts& parts, const TruePictures& truth, con
 }
 
 /// A reference's scene; what is held beside it may have the scene's own seed.
-TruePictures shown_truly(sim::SceneSpec scene, const fem::Compliance& gel, const sim::Hold& hold) {
+TruePictures shown_truly(sim::SceneSpec scene, const fem::Compliance& gel, const sim::PressSpec& hold) {
   scene.seed += 2 * kOtherSeed;
   return {hold, run_twice(scene, gel, true), sim::imager(scene.device, sim::make_plan(scene).bands, true)};
 }
@@ -178,7 +178,7 @@ BenchCurve bands_curve(const BenchParts& parts, const Progress& progress) {
   curve.what =
       fmt::format("Bands of wavelength between {:.4g} and {:.4g} nm, free of the paths' noise, against {} of them.",
                   own.from_nm, own.to_nm, kBandCounts.back());
-  const sim::Hold& hold = parts.presses.holds.front();
+  const sim::PressSpec& hold = parts.presses.holds.front();
   const int planned = sim::make_plan(bench_scene(device, parts.presses, hold, 1)).bands.count();
   device.bands->count = kBandCounts.back();
   const TruePictures truth = true_pictures(parts, device, parts.own_gel, hold, parts.settings.seed + 40);
@@ -211,7 +211,7 @@ BenchCurve membrane_curve(const BenchParts& parts, const sim::Plan& plan, const 
       1e3 * parts.device.mesh.fine_mm / kFinestPixelsAnEdge);
   curve.each = "mechanics and a picture, s";
   curve.work = "paths a pixel";
-  const sim::Hold& hold = parts.presses.holds.front();
+  const sim::PressSpec& hold = parts.presses.holds.front();
   sim::SceneSpec scene = reference_scene(parts, parts.device, hold, parts.settings.seed + 60);
   const auto pixel_um = [&](double an_edge) { return 1e3 * parts.device.mesh.fine_mm / an_edge; };
   scene.membrane.pixel_um = pixel_um(kFinestPixelsAnEdge);
@@ -274,7 +274,7 @@ LightSetting try_light(const BenchParts& parts, const TruePictures& truth, const
   return one;
 }
 
-sim::SceneSpec reference_scene(const BenchParts& parts, const sim::DeviceSpec& device, const sim::Hold& hold,
+sim::SceneSpec reference_scene(const BenchParts& parts, const sim::DeviceSpec& device, const sim::PressSpec& hold,
                                std::uint64_t seed) {
   sim::SceneSpec scene = bench_scene(device, parts.presses, hold, seed);
   scene.effects = parts.exact;
@@ -286,13 +286,13 @@ sim::SceneSpec reference_scene(const BenchParts& parts, const sim::DeviceSpec& d
 }
 
 TruePictures true_pictures(const BenchParts& parts, const sim::DeviceSpec& device, const fem::Compliance& gel,
-                           const sim::Hold& hold, std::uint64_t seed) {
+                           const sim::PressSpec& hold, std::uint64_t seed) {
   return shown_truly(reference_scene(parts, device, hold, seed), gel, hold);
 }
 
 std::string prepare_pictures(BenchParts& parts) {
   if (!parts.device.camera) return "none: the device has no camera";
-  const sim::Hold& hold = parts.presses.holds.front();
+  const sim::PressSpec& hold = parts.presses.holds.front();
   std::string saturated;
   try {
     find_exact_effects(parts);
@@ -349,7 +349,7 @@ std::vector<BenchCurve> light_curves(const BenchParts& parts, std::vector<LightS
                                      const Progress& progress) {
   std::vector<BenchCurve> curves;
   if (parts.truth) {
-    const sim::Hold& hold = parts.presses.holds.front();
+    const sim::PressSpec& hold = parts.presses.holds.front();
     curves.push_back(light_curve(parts, *parts.own_truth, tries, progress));
     curves.push_back(samples_curve(parts, *parts.own_truth, progress));
     if (parts.device.bands) curves.push_back(bands_curve(parts, progress));

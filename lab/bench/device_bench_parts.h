@@ -19,7 +19,7 @@ inline constexpr double kMostSeconds = 40.0;  ///< for one setting of a curve
 
 /// Pictures of one hold by the reference's light, twice without common random numbers.
 struct TruePictures {
-  sim::Hold hold;
+  sim::PressSpec hold;
   TwoRuns runs;
   render::Imager imager;
 };
@@ -57,10 +57,10 @@ MadeGel make_gel(const sim::DeviceSpec& device, fem::Element element = fem::Elem
 BenchPoint mesh_point(const BenchParts& parts, double edges);
 
 /// Paths, the same number in each pixel, with what the plan leaves out.
-sim::SceneSpec reference_scene(const BenchParts& parts, const sim::DeviceSpec& device, const sim::Hold& hold,
+sim::SceneSpec reference_scene(const BenchParts& parts, const sim::DeviceSpec& device, const sim::PressSpec& hold,
                                std::uint64_t seed);
 TruePictures true_pictures(const BenchParts& parts, const sim::DeviceSpec& device, const fem::Compliance& gel,
-                           const sim::Hold& hold, std::uint64_t seed);
+                           const sim::PressSpec& hold, std::uint64_t seed);
 
 /// Makes parts.truth and parts.own_truth, or leaves them empty; in words, which or why.
 std::string prepare_pictures(BenchParts& parts);

@@ -9,16 +9,16 @@
 namespace touchstone::lab {
 namespace {
 
-const sim::PrintSpec& print_of(const sim::TouchRig& rig) {
-  const auto& coating = rig.device().coating;
-  if (!coating || !coating->print) fail("device {}: has no printed markers", rig.device().name);
+const sim::PrintSpec& print_of(const sim::VirtualSensor& sensor) {
+  const auto& coating = sensor.device().coating;
+  if (!coating || !coating->print) fail("device {}: has no printed markers", sensor.device().name);
   return *coating->print;
 }
 
-sensors::ColourMarkerLook look_of(const sim::TouchRig& rig) {
+sensors::ColourMarkerLook look_of(const sim::VirtualSensor& sensor) {
   sensors::ColourMarkerLook look;
-  look.grid = print_of(rig).grid;
-  // The text counts pixels of more than half saturation in pictures of enhanced contrast. In a levelled one the
+  look.grid = print_of(sensor).grid;
+  // [Lin2019] counts pixels of more than half saturation in pictures of enhanced contrast. In a levelled one the
   // filter's yellow has some 0.47, as blue pixels see light of 500 to 540 nm; ink and filtered ink have 0.65 and more,
   // white 0.1.
   look.least_saturation = 0.3;
@@ -27,10 +27,10 @@ sensors::ColourMarkerLook look_of(const sim::TouchRig& rig) {
 
 }  // namespace
 
-sim::TouchRigSettings chroma_rig_settings(std::uint64_t seed) {
-  sim::TouchRigSettings settings;
+sim::VirtualSensorSettings chroma_sensor_settings(std::uint64_t seed) {
+  sim::VirtualSensorSettings settings;
   settings.seed = seed;
-  settings.deepest_mm = 3.3;    // the text presses by 3 mm
+  settings.deepest_mm = 3.3;    // the paper presses by 3 mm
   settings.widest_mm = 1.3;     // and shears by 1 mm
   settings.membrane_um = 80.0;  // balls of 4 mm and larger are smooth on it
   settings.always_friction = true;
@@ -50,31 +50,31 @@ sensors::ViewParallax parallax_of(const sim::DeviceSpec& device) {
   return parallax;
 }
 
-ChromaBench::ChromaBench(const sim::TouchRig& rig, std::uint64_t seed)
-    : rig_(rig),
-      markers_(printed_markers(rig.device())),
-      means_(rig.gel(), markers_),
-      spacing_mm_(print_of(rig).spacing_mm.x()),
-      finder_(look_of(rig)),
-      rest_(finder_.find_rest(rig.background(seed))) {}
+ChromaBench::ChromaBench(const sim::VirtualSensor& sensor, std::uint64_t seed)
+    : sensor_(sensor),
+      markers_(printed_markers(sensor.device())),
+      means_(sensor.gel(), markers_),
+      spacing_mm_(print_of(sensor).spacing_mm.x()),
+      finder_(look_of(sensor)),
+      rest_(finder_.find_rest(sensor.background(seed))) {}
 
 std::vector<ChromaLook> ChromaBench::play(const sim::ObjectSpec& object, const sim::MotionSpec& motion,
                                           std::uint64_t noise_seed) const {
-  const sim::TouchObject touched = rig_.object(object);
-  const std::vector<sim::Truth> states = rig_.play(touched, motion);
+  const sim::TouchObject touched = sensor_.object(object);
+  const std::vector<sim::Truth> states = sensor_.play(touched, motion);
   return read(pictures(touched, states, noise_seed), states);
 }
 
 std::vector<ChromaLook> ChromaBench::look(const sim::ObjectSpec& object, std::span<const sim::Truth> states,
                                           std::uint64_t noise_seed) const {
-  return read(pictures(rig_.object(object), states, noise_seed), states);
+  return read(pictures(sensor_.object(object), states, noise_seed), states);
 }
 
 std::vector<cv::Mat> ChromaBench::pictures(const sim::TouchObject& object, std::span<const sim::Truth> states,
                                            std::uint64_t noise_seed) const {
   std::vector<cv::Mat> made(states.size());
   tbb::parallel_for(std::size_t{0}, states.size(), [&](std::size_t i) {
-    made[i] = rig_.look(object, states[i].press, noise_seed, static_cast<int>(i), false).frame;
+    made[i] = sensor_.capture(object, states[i].press, noise_seed, static_cast<int>(i), false).frame;
   });
   return made;
 }
@@ -126,7 +126,7 @@ std::vector<sensors::HueSample> samples_of_moved(const std::vector<ChromaLook>& 
 sensors::HueCalibrationSettings hue_settings_of(const ChromaBench& bench) {
   sensors::HueCalibrationSettings settings;
   settings.spacing_mm = bench.spacing_mm();
-  settings.parallax = parallax_of(bench.rig().device());
+  settings.parallax = parallax_of(bench.sensor().device());
   return settings;
 }
 

@@ -10,7 +10,7 @@
 #include "lab/press/marker_compliance_export.h"
 #include "sensors/colour/colour_marker_finder.h"
 #include "sensors/colour/hue_calibration.h"
-#include "sim/sensor/touch_rig.h"
+#include "sim/sensor/virtual_sensor.h"
 
 namespace touchstone::lab {
 
@@ -21,8 +21,8 @@ struct ChromaLook {
   sim::Truth state;
 };
 
-/// How far a chroma experiment presses and shears, for a rig's light.
-sim::TouchRigSettings chroma_rig_settings(std::uint64_t seed);
+/// How far a chroma experiment presses and shears, for a sensor's light.
+sim::VirtualSensorSettings chroma_sensor_settings(std::uint64_t seed);
 
 /// Apparent distance from the camera to the markers at rest and where its axis meets them, as the device's drawing
 /// says.
@@ -31,9 +31,9 @@ sensors::ViewParallax parallax_of(const sim::DeviceSpec& device);
 
 class ChromaBench {
  public:
-  /// Reads the picture at rest. Keeps a reference to the rig.
+  /// Reads the picture at rest. Keeps a reference to the sensor.
   /// @throws Error for a device without printed markers, or as ColourMarkerFinder::find_rest
-  ChromaBench(const sim::TouchRig& rig, std::uint64_t seed);
+  ChromaBench(const sim::VirtualSensor& sensor, std::uint64_t seed);
 
   /// Plays a motion and reads each of its frames: made side by side, read one after the other. Frame i has the noise of
   /// (noise_seed, i).
@@ -47,7 +47,7 @@ class ChromaBench {
                                 std::uint64_t noise_seed) const;
   std::vector<ChromaLook> read(std::span<const cv::Mat> frames, std::span<const sim::Truth> states) const;
 
-  const sim::TouchRig& rig() const { return rig_; }
+  const sim::VirtualSensor& sensor() const { return sensor_; }
   const sensors::ColourMarkerReading& rest() const { return rest_; }
   /// As it is after the picture at rest; to be copied.
   const sensors::ColourMarkerFinder& finder() const { return finder_; }
@@ -57,7 +57,7 @@ class ChromaBench {
   std::size_t marker_at(const Eigen::Vector2d& place_mm) const;
 
  private:
-  const sim::TouchRig& rig_;
+  const sim::VirtualSensor& sensor_;
   SurfaceMarkers markers_;
   MarkerMeans means_;
   double spacing_mm_;

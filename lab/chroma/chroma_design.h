@@ -1,13 +1,13 @@
 #pragma once
-// Design rules of a sensor that tells depth by how large its soft markers look behind a rigid filter (source text 002,
-// sec. III.C): eqs. 1 to 3, figs. 4 and 5. The filter is d before the pinhole, the marker t behind the filter.
+// Design rules of a sensor that tells depth by how large its soft markers look behind a rigid filter [Lin2019, sec.
+// III.C]: eqs. 1 to 3, figs. 4 and 5. The filter is d before the pinhole, the marker t behind the filter.
 //
 // What the equations say of the thickness. By eq. 3 a force F on one marker makes the strain e = F / (E L0^2), whatever
 // t is, so the marker's stretch S = 1 + nu e is the same for all t and its displacement is e t. By eq. 1 it then looks
 // larger by S / (1 - e t / (d + t)) - 1, and that only grows with t: with d + t held (the constraint that n markers
 // fill the field of view) up to d = 0, with d held towards S / (1 - e) - 1. No law in which the strain doesn't depend
 // on t changes this. So eqs. 1 to 3, read as they are printed, have no thickness that maximises the relative change.
-// Fig. 4c and the text ("greater marker mobility ... at the expense of a smaller change in the apparent area") have
+// Fig. 4c and the paper ("greater marker mobility ... at the expense of a smaller change in the apparent area") have
 // one. It is there in these readings (ApparentMeasure):
 //   - the change l - l0 of the picture itself, in mm or pixels, with the filter, at d, filling the view: a thicker
 //     sensor puts the marker farther away, where it is small. best_picture_thickness() is d (1 - nu) / (1 + nu) for
@@ -24,7 +24,7 @@
 
 namespace touchstone::lab {
 
-/// Width of the sensor in source text 002, mm.
+/// Width of the sensor in [Lin2019], mm.
 inline constexpr double kChromaSensorWidth_mm = 35.0;
 
 /// The angle (radians) that a lens sees on a sensor of this width: 2 atan(width / (2 focal length)). @throws Error

@@ -15,7 +15,7 @@ namespace touchstone::lab {
 sim::ObjectSpec visible_object(const ForceProbe& probe);
 
 /// Plays a probe on the camera's own gel and reads a picture of each frame. Frame i has the noise of (noise_seed, i).
-/// @throws Error if the gel goes beyond what the camera's rig was set up for
+/// @throws Error if the gel goes beyond what the camera's sensor was set up for
 std::vector<ChromaLook> photograph_probe(const ForceBench& bench, const ChromaBench& camera, const ForceProbe& probe,
                                          const DragSettings& drag, std::uint64_t noise_seed);
 

@@ -15,7 +15,7 @@
 namespace touchstone::lab {
 namespace {
 
-constexpr double kBall_mm = 2.0;  // radius of the text's
+constexpr double kBall_mm = 2.0;  // radius of the ball of [Lin2019]
 constexpr double kLeastMoved_mm = 0.02;
 
 sim::ObjectSpec ball_of(double radius_mm, double friction) {
@@ -91,13 +91,21 @@ MarkerSeries press_series(const ChromaBench& bench, const MarkerTest& test, doub
                           std::uint64_t seed) {
   const int steps = static_cast<int>(std::lround(deepest_mm / step_mm));
   const auto motion = press_and_drag(test.place_mm, kBall_mm, deepest_mm, steps, {0, 0}, 0);
-  return read_series(bench, test, bench.play(ball_of(kBall_mm, test.friction), motion, seed), 0);
+  return read_series(bench, test, bench.play(marker_ball(test), motion, seed), 0);
 }
 
 MarkerSeries shear_series(const ChromaBench& bench, const MarkerTest& test, double depth_mm,
                           const Eigen::Vector2d& end_mm, int steps, std::uint64_t seed) {
-  const auto motion = press_and_drag(test.place_mm, kBall_mm, depth_mm, 1, end_mm, steps);
-  return read_series(bench, test, bench.play(ball_of(kBall_mm, test.friction), motion, seed), 1);
+  const sim::MotionSpec motion = shear_motion(test, depth_mm, end_mm, steps);
+  return read_series(bench, test, bench.play(marker_ball(test), motion, seed), 1);
+}
+
+sim::ObjectSpec marker_ball(const MarkerTest& test) {
+  return ball_of(kBall_mm, test.friction);
+}
+
+sim::MotionSpec shear_motion(const MarkerTest& test, double depth_mm, const Eigen::Vector2d& end_mm, int steps) {
+  return press_and_drag(test.place_mm, kBall_mm, depth_mm, 1, end_mm, steps);
 }
 
 std::vector<double> hue_repeats_deg(const ChromaBench& bench, std::uint64_t seed, int pictures) {
@@ -107,7 +115,7 @@ std::vector<double> hue_repeats_deg(const ChromaBench& bench, std::uint64_t seed
   std::vector<double> sum(markers, 0.0);
   std::vector<double> square(markers, 0.0);
   for (int i = 0; i < pictures; ++i) {
-    const sensors::ColourMarkerReading& reading = finder.find(bench.rig().background(seed, i));
+    const sensors::ColourMarkerReading& reading = finder.find(bench.sensor().background(seed, i));
     for (std::size_t m = 0; m < markers; ++m) {
       const double change =
           sensors::hue_difference(reading.markers[m].hue, bench.rest().markers[m].hue) / kRadiansPerDegree;
@@ -211,7 +219,7 @@ sensors::HueModel calibrate_field(const ChromaBench& bench, bool quick, std::uin
 
 sensors::TractionInversion elastic_inversion(const ChromaBench& bench, const std::filesystem::path& cache,
                                              const sensors::ViewParallax& parallax) {
-  const sim::DeviceSpec device = with_probe_mesh(bench.rig().device());
+  const sim::DeviceSpec device = with_probe_mesh(bench.sensor().device());
   const auto gel = sim::set_up_gel(device, cache);
   // Chosen on the presses of calibrate_field with another unit. Where an object is wide hue tells a fifth of the press
   // and is alike over neighbours, which noise isn't: so normal displacements count for next to nothing, lateral ones,

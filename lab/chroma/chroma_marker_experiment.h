@@ -1,8 +1,8 @@
 #pragma once
-// The experiments of seed 002 on a chroma device: hue against depth (fig. 8), centroid against lateral displacement
+// The experiments of [Lin2019] on a chroma device: hue against depth (fig. 8), centroid against lateral displacement
 // (fig. 9), the inverted model (sec. IV.D) and displacement fields under punches (fig. 10).
 //
-// Displacements of figs. 8 and 9 and of the inverse are those of the ball, as the text's stage told them. Fields are
+// Displacements of figs. 8 and 9 and of the inverse are those of the ball, as the paper's stage told them. Fields are
 // held against the finite elements' mean displacement of each marker.
 
 #include <cstdint>
@@ -27,7 +27,7 @@ struct MarkerSeries {
   std::vector<double> column_mm(int axis) const;
 };
 
-/// Steps over one marker: the ball of the text, 4 mm.
+/// Steps over one marker: the ball of the paper, 4 mm.
 struct MarkerTest {
   Eigen::Vector2d place_mm = {1.5, 1.5};  ///< of the marker's middle
   double friction = 1.0;                  ///< not given; soft silicone holds plastic well: usual figures are about 1
@@ -39,6 +39,10 @@ MarkerSeries press_series(const ChromaBench& bench, const MarkerTest& test, doub
 /// Fig. 9 and sec. IV.D: pressed at once, then dragged to `end_mm` (x, y) in `steps` steps.
 MarkerSeries shear_series(const ChromaBench& bench, const MarkerTest& test, double depth_mm,
                           const Eigen::Vector2d& end_mm, int steps, std::uint64_t seed);
+
+/// What shear_series presses, and how it moves.
+sim::ObjectSpec marker_ball(const MarkerTest& test);
+sim::MotionSpec shear_motion(const MarkerTest& test, double depth_mm, const Eigen::Vector2d& end_mm, int steps);
 
 /// Standard deviation (degrees) of each marker's hue in pictures of the untouched device. @pre at least 2 pictures
 std::vector<double> hue_repeats_deg(const ChromaBench& bench, std::uint64_t seed, int pictures);
@@ -86,7 +90,7 @@ struct FieldScore {
   double elastic_mean_um = 0.0, elastic_worst_um = 0.0;
 };
 /// Inverts fields told with `parallax`, taking their lateral displacements as seen: the compliance is of another mesh
-/// than the rig's.
+/// than the sensor's.
 sensors::TractionInversion elastic_inversion(const ChromaBench& bench, const std::filesystem::path& cache,
                                              const sensors::ViewParallax& parallax);
 

@@ -156,6 +156,10 @@ double r2_of_fit(const std::vector<RobustnessRung>& rungs, const std::vector<Mea
 
 }  // namespace
 
+bool size_is_lost(const PixelRobustness& few) {
+  return 1.0 - few.size_r2 >= 0.5 * (1.0 - kPublishedSizeR2);
+}
+
 std::vector<PixelRobustness> pixel_robustness(const std::vector<RobustnessRung>& rungs,
                                               const RobustnessSettings& settings) {
   check(rungs, settings);

@@ -1,12 +1,13 @@
 #pragma once
-// Fig. 6 of the chroma sensor's text (shared/seeds/002, sec. III.D): how well a marker's hue, and a black marker's
-// size, tell a displacement when the marker is only a few pixels wide, and when the light isn't even.
+// Fig. 6 of [Lin2019, sec. III.D]: how well a marker's hue, and a black marker's size, tell a displacement when the
+// marker is only a few pixels wide, and when the light isn't even.
 //
-// What the text leaves open, and what is done here:
-// - A marker's apparent size is the side of its filter in px. "4 x 4 pixels" is taken for a filter of 4 px; if the text
+// What the paper leaves open, and what is done here:
+// - A marker's apparent size is the side of its filter in px. "4 x 4 pixels" is taken for a filter of 4 px; if the
+// paper
 //   means the whole picture, which is twice as wide in the drawing here, its row is that of 2 px.
 // - Pictures are made smaller by the Gaussian pyramid and then blurred by a Gaussian whose standard deviation is an
-//   eighth of the picture's size, as the text has it; then rounded to 8 bit, as a camera gives them.
+//   eighth of the picture's size, as the paper has it; then rounded to 8 bit, as a camera gives them.
 // - Fits are of the displacement by a polynomial of second order of the measurement: that is how it would be used.
 // - The size is the count of pixels in a picture of 1 bit (sensors/colour/marker_size.h). Fig. 6c names the
 // "luminosity" for
@@ -17,6 +18,9 @@
 #include <vector>
 
 namespace touchstone::lab {
+
+/// R2 of the size of a black marker of 4 x 4 px (fig. 6b: "as low as").
+inline constexpr double kPublishedSizeR2 = 0.5;
 
 /// One displacement, as seen in colour and with a black marker on white in place of the coloured one.
 struct RobustnessRung {
@@ -56,6 +60,10 @@ struct PixelRobustness {
 std::vector<PixelRobustness> pixel_robustness(const std::vector<RobustnessRung>& rungs,
                                               const RobustnessSettings& settings);
 
+/// Whether so few pixels cost the count of a black marker's pixels at least half of what they cost it in the paper,
+/// where R2 falls from 1 to kPublishedSizeR2 ("dramatic effects").
+bool size_is_lost(const PixelRobustness& few);
+
 /// What a gradient does at one displacement: differences between with and without it, in percent of the measurement's
 /// range over all displacements.
 struct GradientShift {
@@ -76,8 +84,8 @@ struct GradientRobustness {
 GradientRobustness gradient_robustness(const std::vector<RobustnessRung>& rungs, const RobustnessSettings& settings,
                                        double marker_px);
 
-/// The text's drawing: 512 x 512 px, an opaque magenta square under a yellow one of 256 px with 50 % opacity, on white;
-/// the displacement is the magenta's side as a part of the yellow's.
+/// The paper's drawing: 512 x 512 px, an opaque magenta square under a yellow one of 256 px with 50 % opacity, on
+/// white; the displacement is the magenta's side as a part of the yellow's.
 std::vector<RobustnessRung> drawn_robustness_rungs(double smallest = 0.7, double largest = 1.3, int count = 31);
 
 /// For the drawing: yellow of 50 % opacity on white has a saturation of 0.5 itself, so half of that parts it from

@@ -1,6 +1,6 @@
 #pragma once
-// The four spectra of fig. 2 of the chroma sensor's text (shared/seeds/002): white layer and magenta marker, each
-// beside the yellow film and behind it, as light that reaches the camera.
+// The four spectra of [Lin2019, fig. 2]: white layer and magenta marker, each beside the yellow film and behind it, as
+// light that reaches the camera.
 //
 // The device is sheared by half a marker, so that a marker stands half behind its film and half beside it: then one
 // picture has all four. They are path-traced, with all bounced light and its colour, and held against the products of
@@ -38,7 +38,7 @@ struct ChromaSpectrum {
   render::Spectrum product;   ///< of curves, see above; white's is that of lamp and white layer
   double error = 0.0;         ///< sum of |rendered - product|
   SeenHue rendered_hue;
-  SeenHue product_hue;  ///< of the products with the lamps' own light: what the text's fig. 2 has in mind
+  SeenHue product_hue;  ///< of the products with the lamps' own light: what the paper's fig. 2 has in mind
 };
 
 enum class ChromaColour { white, magenta, yellow, red };

@@ -1,7 +1,7 @@
 #pragma once
 // An optical bench for one coloured marker behind its filter: what a tilt of the surface does to the marker's picture
-// (source text 002, sec. V: "the center of a marker that experiences a pure tilt will be measured with a systematic
-// error. Spherical markers can limit this effect."). Only light, no mechanics: the white sheet is given its shape.
+// ([Lin2019, sec. V]: "the center of a marker that experiences a pure tilt will be measured with a systematic error.
+// Spherical markers can limit this effect."). Only light, no mechanics: the white sheet is given its shape.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -39,8 +39,8 @@ struct TiltBench {
   int samples = 256;                                   ///< paths a pixel
 };
 
-/// The text's camera, 66 um a pixel, a small one 60 mm (in air) away on which the marker is 7 pixels wide, and that of
-/// scenes/devices/chroma.yaml: as near, with the text's lens, 55 um a pixel and 8 mm of gel.
+/// The paper's camera, 66 um a pixel, a small one 60 mm (in air) away on which the marker is 7 pixels wide, and that of
+/// scenes/devices/chroma.yaml: as near, with the paper's lens, 55 um a pixel and 8 mm of gel.
 TiltBench far_bench();
 TiltBench compact_bench();
 TiltBench near_bench();

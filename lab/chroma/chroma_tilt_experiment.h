@@ -1,5 +1,5 @@
 #pragma once
-// The tilt error of coloured markers, and spherical markers as its remedy (source text 002, sec. V), on the bench of
+// The tilt error of coloured markers, and spherical markers as its remedy [Lin2019, sec. V], on the bench of
 // chroma_tilt_bench.h: each kind of marker is calibrated by moving it level, then tilted about its own centre, and what
 // its picture seems to say of a displacement is the systematic error, since the centre hasn't moved.
 
@@ -21,7 +21,7 @@ struct TiltReading {
   double ink_width_px = 0.0;      ///< the wider way across the ink: of a square its side, root of 12 times the variance
   double coloured_area_px = 0.0;  ///< number of pixels of more than half saturation
 };
-/// `picture` as tilt_picture gives it. Ink is looked for in saturated pixels only, as the text does, since a ball
+/// `picture` as tilt_picture gives it. Ink is looked for in saturated pixels only, as the paper does, since a ball
 /// throws a pink shade of saturation 0.3 on the sheet beside it. Their red and green are split into bare sheet and ink,
 /// under the film or beside it as their blue tells. @throws Error if nothing in it is coloured, or has ink
 TiltReading read_tilt_picture(const cv::Mat& picture, const TiltColours& colours);

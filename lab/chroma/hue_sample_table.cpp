@@ -15,7 +15,7 @@ namespace fs = std::filesystem;
 constexpr const char* kColumns = "file,marker_column,marker_row,x_mm,y_mm,z_mm,series";
 
 int place_in_grid(const std::string& cell, const char* field, int count, const SourceLocation& where) {
-  const int value = whole_number_in<int>(cell, field, where);
+  const int value = datasets::whole_number_in<int>(cell, field, where);
   if (value < 0 || value >= count) {
     fail_at(where, "{}: {} isn't in the grid, which has {}: 0 to {}", field, value, count, count - 1);
   }
@@ -36,7 +36,7 @@ std::vector<AnnotatedMarker> read_hue_sample_table(const fs::path& folder, const
     line.marker = static_cast<std::size_t>(row * grid.x() + column);
     line.displacement_mm = {datasets::number_in(cells[3], "x_mm", where), datasets::number_in(cells[4], "y_mm", where),
                             datasets::number_in(cells[5], "z_mm", where)};
-    line.series = whole_number_in<int>(cells[6], "series", where);
+    line.series = datasets::whole_number_in<int>(cells[6], "series", where);
     table.push_back(std::move(line));
   });
   if (table.empty()) fail("{}: has no marker", csv.string());

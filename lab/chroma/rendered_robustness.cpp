@@ -16,8 +16,8 @@ constexpr double kBlack = 0.04;  // a matt black print; a size by a threshold ha
 constexpr double kLargest = 1.6;
 constexpr int kRimParts = 16;  // the picture's rim that white is measured on is this part of its width
 
-/// The text's camera, as far from a gel as thick as the device's as it is from the text's, with pixels so small that
-/// the film has as many as are asked for. As on the device, the film stands before a marker of the usual side.
+/// The camera of [Lin2019], as far from a gel as thick as the device's as it is from the paper's, with pixels so small
+/// that the film has as many as are asked for. As on the device, the film stands before a marker of the usual side.
 TiltBench bench_of(const RenderedRungs& rungs) {
   TiltBench bench = far_bench();
   bench.camera_mm += kGel_mm - bench.gel_mm;

@@ -1,6 +1,6 @@
 #pragma once
-// Fig. 6 of the chroma sensor's text with pictures that light made, in place of a drawing: markers of several sizes on
-// the white sheet, behind the yellow film, traced in bands on the bench of chroma_tilt_bench.h with the colours of
+// Fig. 6 of [Lin2019] with pictures that light made, in place of a drawing: markers of several sizes on the white
+// sheet, behind the yellow film, traced in bands on the bench of chroma_tilt_bench.h with the colours of
 // scenes/devices/chroma.yaml.
 
 #include <cstdint>
@@ -19,7 +19,7 @@ struct RenderedRungs {
   int samples = 16;  ///< paths a pixel
 };
 
-/// As the text does it the marker alone changes its size, the sheet stays where it is. The rival is a black marker
+/// As the paper does it the marker alone changes its size, the sheet stays where it is. The rival is a black marker
 /// behind a film that takes nothing. Each set is exposed so that its white is at 0.9; the light's own unevenness stays.
 /// @throws Error for fewer than 2 rungs, sizes that aren't above 0, rise and leave white at the picture's rim (1.6 at
 ///   the most), or a film narrower than 4 px

@@ -1,5 +1,5 @@
-// Displacement fields of the chroma device under three punches (shared/seeds/002, sec. IV.E, fig. 10) against the
-// finite elements'.
+// Displacement fields of the chroma device under three punches [Lin2019, sec. IV.E, fig. 10] against the finite
+// elements'.
 
 #include "lab/chroma/chroma_marker_experiment.h"
 #include "lab/validation/row_list.h"
@@ -12,15 +12,15 @@ constexpr std::uint64_t kUnit = 41;  // the sensor
 constexpr std::uint64_t kRest = 1000;
 constexpr std::uint64_t kCalibration = 6000;
 constexpr std::uint64_t kTest = 7000;
-constexpr double kPublishedError_um = 350.0;  // of one marker, sec. IV.D: the text gives no figure for fields
+constexpr double kPublishedError_um = 350.0;  // of one marker, sec. IV.D: the paper gives no figure for fields
 
 }  // namespace
 
 std::vector<ValidationRow> validate_chroma_field(const ValidateOptions& options) {
   RowList rows("chroma.field.", options, RowList::Since::last_row);
-  const sim::TouchRig rig(sim::read_device(options.scenes / "devices" / "chroma.yaml"), options.cache,
-                          chroma_rig_settings(kUnit));
-  const ChromaBench bench(rig, kRest);
+  const sim::VirtualSensor sensor(sim::read_device(options.scenes / "devices" / "chroma.yaml"), options.cache,
+                                  chroma_sensor_settings(kUnit));
+  const ChromaBench bench(sensor, kRest);
   const sensors::HueModel model = calibrate_field(bench, options.quick, kCalibration);
   sensors::TractionInversion inversion = elastic_inversion(bench, options.cache, model.parallax);
   const auto add = [&](const std::string& id, const std::string& title, double ours_um) {

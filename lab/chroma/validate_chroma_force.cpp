@@ -1,7 +1,7 @@
-// Forces, friction and stick or slip from the chroma sensor's pictures (shared/seeds/002 leaves them open): punches and
-// balls are pressed on the gel and dragged until they slide; each frame's picture is read, its markers' displacements
-// told by a calibrated model and inverted. The text gives no figure. Asked for here: forces to a tenth of the mean
-// normal force, as the vhs text asks for 0.1 N of some newtons; friction to 0.1, which tells rubber from steel and the
+// Forces, friction and stick or slip from the chroma sensor's pictures ([Lin2019] leaves them open): punches and balls
+// are pressed on the gel and dragged until they slide; each frame's picture is read, its markers' displacements told by
+// a calibrated model and inverted. The paper gives no figure. Asked for here: forces to a tenth of the mean normal
+// force, as [VisioHaptic2024] asks for 0.1 N of some newtons; friction to 0.1, which tells rubber from steel and the
 // dry from the oiled.
 
 #include <cmath>
@@ -106,10 +106,10 @@ std::vector<ValidationRow> validate_chroma_force(const ValidateOptions& options)
   RowList rows("", options, RowList::Since::begin);
   const sim::DeviceSpec device = sim::read_device(options.scenes / "devices" / "chroma.yaml");
   ForceBench bench = set_up_force_bench(device, options.cache, options.progress);
-  sim::TouchRigSettings light = chroma_rig_settings(kUnit);
+  sim::VirtualSensorSettings light = chroma_sensor_settings(kUnit);
   light.widest_mm = kWidest_mm;
-  const sim::TouchRig rig(with_probe_mesh(device), options.cache, light);
-  const ChromaBench camera(rig, kUnit);
+  const sim::VirtualSensor sensor(with_probe_mesh(device), options.cache, light);
+  const ChromaBench camera(sensor, kUnit);
 
   const sensors::HueModel model = calibrate_on_probes(bench, camera, options.quick, kCalibration);
   const FieldNoise noise = verify(bench, camera, model, options.quick ? 2 : 3);

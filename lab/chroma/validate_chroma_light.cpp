@@ -7,7 +7,7 @@
 namespace touchstone::lab {
 
 std::vector<ValidationRow> validate_chroma_light(const ValidateOptions& options) {
-  const sim::TouchRigSettings settings = chroma_rig_settings(1);
+  const sim::VirtualSensorSettings settings = chroma_sensor_settings(1);
   return {direct_light_row("chroma.light.bench_error_percent", "chroma", settings, options),
           direct_light_row("chroma.light.compact_error_percent", "chroma-compact", settings, options)};
 }

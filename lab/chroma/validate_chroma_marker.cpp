@@ -1,5 +1,5 @@
 // One marker of the chroma device under a ball: hue against depth, centroid against shear, the inverted model
-// (shared/seeds/002, sec. IV.C and D, figs. 8 and 9).
+// [Lin2019, sec. IV.C and D, figs. 8 and 9].
 
 #include <algorithm>
 #include <cmath>
@@ -34,9 +34,9 @@ constexpr double kLinear_r2 = 0.99;
 }  // namespace
 
 std::vector<ValidationRow> validate_chroma_marker(const ValidateOptions& options) {
-  const sim::TouchRig rig(sim::read_device(options.scenes / "devices" / "chroma.yaml"), options.cache,
-                          chroma_rig_settings(kUnit));
-  const ChromaBench bench(rig, kRest);
+  const sim::VirtualSensor sensor(sim::read_device(options.scenes / "devices" / "chroma.yaml"), options.cache,
+                                  chroma_sensor_settings(kUnit));
+  const ChromaBench bench(sensor, kRest);
   const MarkerTest test;
   const std::size_t marker = bench.marker_at(test.place_mm);
   const sensors::ColourMarker& rest = bench.rest().markers[marker];
@@ -74,7 +74,7 @@ std::vector<ValidationRow> validate_chroma_marker(const ValidateOptions& options
     shears.push_back(shear_series(bench, test, depth, {1, 0}, options.quick ? 5 : 20, kShear + k));
     std::vector<double> shift;
     for (const sensors::ColourMarker& seen : shears.back().seen) {
-      shift.push_back((seen.centroid_px - rest.centroid_px).norm() * rig.mm_per_px());
+      shift.push_back((seen.centroid_px - rest.centroid_px).norm() * sensor.mm_per_px());
     }
     const StraightLine line = line_through(shears.back().column_mm(0), shift);
     worst_r2 = std::min(worst_r2, line.r2);
@@ -114,7 +114,7 @@ std::vector<ValidationRow> validate_chroma_marker(const ValidateOptions& options
   sensors::HueCalibrationSettings settings = hue_settings_of(bench);
   settings.form = {.form = sensors::HueForm::kEquation4};
   sensors::HueModel eq4 = sensors::calibrate_hue(bench.rest(), samples, settings);
-  // As the text has it, the line of hue is that of the presses without shear.
+  // As the paper has it, the line of hue is that of the presses without shear.
   eq4.line.hue_slope = hue_line.slope * kRadiansPerDegree;
   eq4.line.hue_offset = hue_line.offset * kRadiansPerDegree;
   const InverseScore linear = score_inverse(bench, eq4, marker, tests);
@@ -128,7 +128,7 @@ std::vector<ValidationRow> validate_chroma_marker(const ValidateOptions& options
            Better::lower, linear.largest_press_um <= kPublishedError_um)
       .published = kPublishedError_um;
 
-  // A non-linear model has to see shear in more than one direction: three series beside those of the text.
+  // A non-linear model has to see shear in more than one direction: three series beside those of the paper.
   int series = static_cast<int>(shears.size()) + 1;
   for (const double depth : {1.75, 2.25, 2.75}) {
     const auto more =

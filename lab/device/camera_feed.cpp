@@ -111,12 +111,12 @@ SceneFeed feed_of_scene(const sim::SceneSpec& scene_of, const std::filesystem::p
   return feed;
 }
 
-ShownState shown_state(const sim::HeldFrame& held) {
+ShownState shown_state(const sim::Touch& held) {
   ShownState state;
   state.what = held.what;
-  state.force_N = held.force_N;
+  state.force_N = held.force_N();
   state.force_error_N = held.error.force;
-  state.torque_Nmm = held.torque_Nmm;
+  state.torque_Nmm = held.torque_Nmm();
   state.contact_area_mm2 = held.press.contact_area;
   if (!held.press.bodies.empty()) state.gel_from_object = held.press.gel_from_object;
   state.expose = held.expose;

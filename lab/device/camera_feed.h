@@ -18,7 +18,7 @@
 #include "core/progress.h"
 #include "core/transform.h"
 #include "sim/scene/scene.h"
-#include "sim/sensor/virtual_device.h"
+#include "sim/sensor/virtual_sensor.h"
 
 namespace touchstone::lab {
 
@@ -56,7 +56,7 @@ SceneFeed feed_of_scene(const sim::SceneSpec& scene, const std::filesystem::path
                         const Progress& progress = {});
 
 /// A device's hold as a state that can be shown; the device must outlive it.
-ShownState shown_state(const sim::HeldFrame& held);
+ShownState shown_state(const sim::Touch& held);
 
 /// One line of JSON: what, scene_frame, t_us, force_N, force_error_N, torque_Nmm, gel_from_object (3 rows of 4, or
 /// null), contact_area_mm2; `more` (JSON members, "\"a\": 1, ") stands before them.

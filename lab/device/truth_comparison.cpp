@@ -33,7 +33,7 @@ std::string allowance(const Tolerance& tolerance, double size, double standard_e
 }
 
 /// What else a reader should know of the truth.
-std::string doubts(const sim::HeldFrame& truth) {
+std::string doubts(const sim::Touch& truth) {
   std::string words;
   if (truth.press.under_resolved) words += "; few of the mesh's vertices touch, so the truth may be percents off";
   if (truth.press.largest_strain > kLargeStrain) {
@@ -55,10 +55,10 @@ void check_picture(const cv::Mat& estimate, const cv::Mat& truth, const char* wh
 
 }  // namespace
 
-Comparison compare_force(const Eigen::Vector3d& estimate, const sim::HeldFrame& truth, const Tolerance& tolerance) {
+Comparison compare_force(const Eigen::Vector3d& estimate, const sim::Touch& truth, const Tolerance& tolerance) {
   check(tolerance);
-  const double size = truth.force_N.norm();
-  const Eigen::Vector3d off = estimate - truth.force_N;
+  const double size = truth.force_N().norm();
+  const Eigen::Vector3d off = estimate - truth.force_N();
   Comparison comparison{true, {}};
   int worst = 0;
   double most = -1.0;
@@ -73,21 +73,21 @@ Comparison compare_force(const Eigen::Vector3d& estimate, const sim::HeldFrame& 
   }
   comparison.message =
       fmt::format("force {} against {} of {}: {} is off by {:+.3f} N, allowed are {}{}", in_words(estimate, "N"),
-                  in_words(truth.force_N, "N"), truth.what, "xyz"[worst], off[worst],
+                  in_words(truth.force_N(), "N"), truth.what, "xyz"[worst], off[worst],
                   allowance(tolerance, size, truth.error.force[worst], "N"), doubts(truth));
   return comparison;
 }
 
-Comparison compare_normal_force(double estimate, const sim::HeldFrame& truth, const Tolerance& tolerance) {
+Comparison compare_normal_force(double estimate, const sim::Touch& truth, const Tolerance& tolerance) {
   check(tolerance);
-  const double z = truth.force_N.z();
+  const double z = truth.force_N().z();
   const double off = estimate - z;
   return {std::abs(off) <= allowed(tolerance, std::abs(z), truth.error.force.z()),
           fmt::format("normal force {:.3f} N against {:.3f} N of {}: off by {:+.3f} N, allowed are {}{}", estimate, z,
                       truth.what, off, allowance(tolerance, std::abs(z), truth.error.force.z(), "N"), doubts(truth))};
 }
 
-Comparison compare_heights(const cv::Mat& estimate_mm, const sim::HeldFrame& truth, const Tolerance& tolerance) {
+Comparison compare_heights(const cv::Mat& estimate_mm, const sim::Touch& truth, const Tolerance& tolerance) {
   check(tolerance);
   if (truth.height.empty()) fail("{}: has no height to compare with", truth.what);
   if (estimate_mm.type() != CV_32F && estimate_mm.type() != CV_64F) {
@@ -133,7 +133,7 @@ Comparison compare_heights(const cv::Mat& estimate_mm, const sim::HeldFrame& tru
   return comparison;
 }
 
-Comparison compare_contact(const cv::Mat& estimate, const sim::HeldFrame& truth, double least_overlap) {
+Comparison compare_contact(const cv::Mat& estimate, const sim::Touch& truth, double least_overlap) {
   if (!(least_overlap >= 0.0 && least_overlap <= 1.0)) fail("least overlap {}; allowed is 0 to 1", least_overlap);
   if (estimate.type() != CV_8U) fail("a contact mask must have one channel of 8 bits (CV_8UC1)");
   check_picture(estimate, truth.contact, "the contact mask");
@@ -146,7 +146,7 @@ Comparison compare_contact(const cv::Mat& estimate, const sim::HeldFrame& truth,
                       cv::countNonZero(touched), cv::countNonZero(truth.contact), overlap, least_overlap)};
 }
 
-Comparison compare_beads(const Eigen::MatrixX3d& estimate, const sim::HeldFrame& truth, const Tolerance& tolerance) {
+Comparison compare_beads(const Eigen::MatrixX3d& estimate, const sim::Touch& truth, const Tolerance& tolerance) {
   check(tolerance);
   const Eigen::MatrixX3d& beads = truth.press.bead_displacement;
   if (beads.rows() == 0) fail("{}: the device has no beads", truth.what);

@@ -1,5 +1,5 @@
 #pragma once
-// Force from events, grasp by grasp left out: shared/seeds/001, sec. V.C, tables II and III, figs. 9 to 11.
+// Force from events, grasp by grasp left out: [Naeini2020, sec. V.C, tables II and III, figs. 9 to 11].
 
 #include <cstdint>
 #include <optional>

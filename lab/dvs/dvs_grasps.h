@@ -1,5 +1,5 @@
 #pragma once
-// The 48 grasps of shared/seeds/001 (sec. V.D: foam 11, rubber 9, silicone 14, steel 14): what differs from one to the
+// The 48 grasps of [Naeini2020] (sec. V.D: foam 11, rubber 9, silicone 14, steel 14): what differs from one to the
 // next, drawn from a seed, and each one played: what the membrane's face does, the finger's true force and what the
 // reference sensor makes of it. No light: pictures and events are made from a grasp's faces.
 
@@ -16,20 +16,20 @@
 
 namespace touchstone::lab {
 
-/// One of the text's four materials.
+/// One of the paper's four materials.
 struct DvsMaterial {
   std::string name;
   std::string object_file;      ///< below the scenes' folder
-  int grasps = 0;               ///< text V.D
+  int grasps = 0;               ///< sec. V.D
   double modulus_spread = 0.0;  ///< standard deviation of ln E between pieces and grips
   double rms_slope = 0.0;       ///< of the painted piece's face
 };
 
-/// Foam, rubber, silicone, steel: the order of the text's classes, and of their moduli here.
+/// Foam, rubber, silicone, steel: the order of the paper's classes, and of their moduli here.
 std::span<const DvsMaterial> dvs_materials();
 
-/// RMS slope of the membrane's own face: "opaque" (text III.A), cast in a mould that isn't polished. With it the face
-/// is pressed flat at some 4 N, where the text's sensor saturates (VI).
+/// RMS slope of the membrane's own face: "opaque" (sec. III.A), cast in a mould that isn't polished. With it the face
+/// is pressed flat at some 4 N, where the paper's sensor saturates (VI).
 inline constexpr double kMembraneSlope = 0.07;
 
 /// One grasp.
@@ -49,12 +49,12 @@ struct DvsGraspParameters {
 struct DvsSpread {
   double force = 1.0;  ///< wanted
   double pose = 1.0;   ///< place, yaw, pitch, roll and clearance: a piece is put in by hand
-  /// Speeds, ring and damping, the bench's motion, light. The text's grasps are one gripper's, in one room, under one
+  /// Speeds, ring and damping, the bench's motion, light. The paper's grasps are one gripper's, in one room, under one
   /// program; 1 is as many benches as grasps.
   double bench = 0.1;
 };
 
-/// What the text leaves open is drawn evenly or, with (s), normally with that deviation, cut at 2.5 of them. Force
+/// What the paper leaves open is drawn evenly or, with (s), normally with that deviation, cut at 2.5 of them. Force
 /// wanted 0.3 to 3.5 N (the servo's steps make 0.15 to 3.7 N of it). Pose: place x +-1, y +-2 mm; yaw (1.5), pitch
 /// (0.06), roll (0.1 degrees: what the fingers' alignment leaves once the silicone on both has given way), clearance
 /// 0.6 to 1.4 mm. Piece and face, always in full: ln E (the material's); friction 0.5 to 1.2; roughness 0.9 to 1.1

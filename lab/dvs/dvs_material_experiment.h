@@ -1,5 +1,5 @@
 #pragma once
-// Material from one grasp: shared/seeds/001, sec. V.D, tables IV and V, fig. 12.
+// Material from one grasp: [Naeini2020, sec. V.D, tables IV and V, fig. 12].
 
 #include <cstdint>
 #include <span>

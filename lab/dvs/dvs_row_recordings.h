@@ -27,8 +27,9 @@ inline constexpr std::array<DvsPixelKind, 6> kDvsPixelKinds = {{{"device", "as t
 
 using DvsRecordings = std::shared_ptr<const std::vector<DvsRecording>>;
 
-/// The text's 48 grasps, seen by all kinds; the quick form: four of each material, seen by the first. The camera
-/// watches for 0.2 s before the servo moves. Made once, kept as long as the program runs. @throws Error as its parts
+/// The 48 grasps of [Naeini2020], seen by all kinds; the quick form: four of each material, seen by the first. The
+/// camera watches for 0.2 s before the servo moves. Made once, kept as long as the program runs. @throws Error as its
+/// parts
 DvsRecordings dvs_row_recordings(const ValidateOptions& options);
 
 /// The same 48, but more alike, seen by the first kind. `name` tells one spread from another.

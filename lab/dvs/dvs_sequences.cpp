@@ -12,7 +12,7 @@ namespace {
 constexpr int kTextWindow_ms = 7;
 constexpr double kReading_s = 0.007;
 
-/// So many of the text's windows, in windows of another length.
+/// So many of the windows of [Naeini2020], in windows of another length.
 int windows_of_time(int text_windows, int window_ms) {
   return std::max(1, (text_windows * kTextWindow_ms + window_ms / 2) / window_ms);
 }

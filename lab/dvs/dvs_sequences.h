@@ -1,5 +1,5 @@
 #pragma once
-// Recorded grasps as the estimators of shared/seeds/001 see them: windows, phases, accumulated counts and forces.
+// Recorded grasps as the estimators of [Naeini2020] see them: windows, phases, accumulated counts and forces.
 
 #include <Eigen/Core>
 #include <span>
@@ -16,11 +16,11 @@ namespace touchstone::lab {
 
 struct DvsSequenceSettings {
   int pixels = 0;     ///< which kind of DvsRecording::by_pixels
-  int window_ms = 7;  ///< text III.B; at least 1
+  int window_ms = 7;  ///< sec. III.B; at least 1
   sensors::Accumulation accumulation = sensors::Accumulation::kThroughHold;
 };
 
-/// The text's phases in windows of another length: as much time as 22 windows of 7 ms, and so on.
+/// The paper's phases in windows of another length: as much time as 22 windows of 7 ms, and so on.
 /// @throws Error unless the length is 1 to 70 ms
 sensors::GraspPhaseSettings dvs_phase_settings(int window_ms);
 
@@ -29,7 +29,7 @@ struct DvsSequence {
   int material = 0;
   sensors::GraspPhases phases;
   sensors::GraspSequence windows;
-  Eigen::VectorXd measured_N;     ///< by the reference sensor, with its errors: what the text trains and tests on
+  Eigen::VectorXd measured_N;     ///< by the reference sensor, with its errors: what the paper trains and tests on
   Eigen::VectorXd true_N;         ///< what the finger really pressed
   double touch_delay_ms = 0.0;    ///< from the true touch to the end of the window that tells it
   double release_delay_ms = 0.0;  ///< from the servo's order to open to the end of the window that tells it
@@ -64,7 +64,7 @@ enum class DvsForce { measured, truth };
 /// What estimators are given of a window.
 enum class DvsInputs {
   counts,           ///< accumulated ON and OFF: networks
-  counts_and_time,  ///< Gaussian processes (text III.D)
+  counts_and_time,  ///< Gaussian processes (sec. III.D)
   time,             ///< a control: what can be told without having seen anything but the touch
 };
 

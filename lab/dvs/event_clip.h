@@ -1,6 +1,6 @@
 #pragma once
 // The clip that event emulators are compared on: 346x260 pixels that see a sinusoid of 10 Hz and of another phase each,
-// 1000 frames a second. On such a clip v2e made 226 frames/s without noise and 97 with it on one thread.
+// 1000 frames a second. On such a clip v2e [Hu2021] made 226 frames/s without noise and 97 with it on one thread.
 
 #include <cstdint>
 #include <opencv2/core/mat.hpp>

@@ -1,6 +1,6 @@
-// Force from the dvs device's events (shared/seeds/001, sec. V.C): tables II and III, sensitivity, latency, and what
-// noise, thresholds and the windows' length do to the error. Shapes, folds and steps were chosen on grasps of another
-// seed than the rows' (dvs_row_recordings.cpp); nothing was tuned for force but what the text gives.
+// Force from the dvs device's events [Naeini2020, sec. V.C]: tables II and III, sensitivity, latency, and what noise,
+// thresholds and the windows' length do to the error. Shapes, folds and steps were chosen on grasps of another seed
+// than the rows' (dvs_row_recordings.cpp); nothing was tuned for force but what the paper gives.
 
 #include <algorithm>
 #include <array>
@@ -41,7 +41,7 @@ constexpr TextTable kTable3 = {{{0.16, 0.24, 0.15, 0.22, 0.19, 0.16, 0.24, 0.15}
                                 {0.18, 0.17, 0.16, 0.16, 0.16, 0.17, 0.19, 0.16},
                                 {0.18, 0.16, 0.24, 0.17, 0.20, 0.15, 0.24, 0.18}}};
 
-/// A figure's mean over folds with its 95 % interval, against the text's or another.
+/// A figure's mean over folds with its 95 % interval, against the paper's or another.
 void add_error(RowList& rows, const std::string& id, const std::string& title, double bound, bool published,
                const DvsForceScore& score, double DvsForceFold::*figure) {
   const double ours = score.mean(figure);
@@ -85,7 +85,7 @@ void add_tables(std::span<const DvsSequence> sequences, const ValidateOptions& o
       }
       ValidationRow& row = rows.add(
           fmt::format("{}.k{}", table.id, layers),
-          fmt::format("{} error of networks of {} hidden layers, mean of{} (the text's in brackets); each {}th "
+          fmt::format("{} error of networks of {} hidden layers, mean of{} (the paper's in brackets); each {}th "
                       "fold, at most {} steps of training",
                       table.what, layers, cells, kTableFolds, kTableSteps),
           "N^2", ours, Better::lower, ours <= published);

@@ -1,4 +1,4 @@
-// Material from one grasp's events (shared/seeds/001, sec. V.D): tables IV and V, the confusion matrix, and the same
+// Material from one grasp's events [Naeini2020, sec. V.D]: tables IV and V, the confusion matrix, and the same
 // classifier fed with the reference sensor's force.
 
 #include <array>
@@ -34,7 +34,7 @@ constexpr TextTable kTable5 = {{{70.83, 68.75, 62.50, 70.83, 62.50, 68.75},
 constexpr std::array<int, 3> kSoft = {0, 1, 2};
 constexpr std::array<int, 1> kSteel = {3};
 
-/// What telling materials hangs on: how alike the grasps are. "A similar range of applied force" (text IV, fig. 5).
+/// What telling materials hangs on: how alike the grasps are. "A similar range of applied force" (sec. IV, fig. 5).
 struct Alike {
   const char* id;
   const char* title;
@@ -102,10 +102,10 @@ void add_tables(std::span<const sensors::MaterialSample> samples, const Validate
         ours += right / kUnits.size();
         published += text[n] / kUnits.size();
       }
-      ValidationRow& row = rows.add(fmt::format("{}.k{}", table.id, layers),
-                                    fmt::format("{} told right by {} hidden layers, mean of{} (the text's in brackets)",
-                                                table.what, layers, cells),
-                                    "%", ours, Better::higher, ours >= published);
+      ValidationRow& row = rows.add(
+          fmt::format("{}.k{}", table.id, layers),
+          fmt::format("{} told right by {} hidden layers, mean of{} (paper's in brackets)", table.what, layers, cells),
+          "%", ours, Better::higher, ours >= published);
       row.published = published;
       row.series = series;
     }

@@ -1,11 +1,10 @@
 #pragma once
 // Least squares within bounds, for functions that cost much to evaluate.
 //
-// Levenberg's step (J^T J + lambda I) p = -J^T r, with the damping raised and lowered by how much of the promised
-// decrease came true (Madsen, Nielsen and Tingleff, "Methods for non-linear least squares problems", 2004, algorithm
-// 3.16). Variables must be scaled so that their ranges are alike, since the damping treats them alike. A variable that
-// stands at a bound and is pulled beyond stays there for the step (projected Newton: Bertsekas, SIAM J. Control Optim.
-// 20, 1982).
+// Levenberg's step [Levenberg1944] (J^T J + lambda I) p = -J^T r, with the damping raised and lowered by how much of
+// the promised decrease came true [Madsen2004, algorithm 3.16]. Variables must be scaled so that their ranges are
+// alike, since the damping treats them alike. A variable that stands at a bound and is pulled beyond stays there for
+// the step (projected Newton [Bertsekas1982]).
 
 #include <Eigen/Core>
 #include <functional>

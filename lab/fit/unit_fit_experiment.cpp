@@ -5,8 +5,7 @@
 #include "core/error.h"
 #include "core/random.h"
 #include "sim/press/gel_setup.h"
-#include "sim/sensor/touch_rig.h"
-#include "sim/sensor/virtual_device.h"
+#include "sim/sensor/virtual_sensor.h"
 
 namespace touchstone::lab {
 namespace {
@@ -52,31 +51,30 @@ RecordedUnit record_unit(const PreparedFit& fit, const Eigen::VectorXd& hidden, 
   TS_ASSERT(backgrounds >= 0);
   RecordedUnit unit{fit, {}};
   const sim::DeviceSpec device = device_at(fit, hidden);
-  sim::TouchRigSettings settings;
+  sim::VirtualSensorSettings settings;
   settings.seed = kOtherLight + seed;
   settings.deepest_mm = fit.deepest_mm;
   settings.widest_mm = kWidest_mm;
   settings.membrane_um = fit.spec.membrane_um;
   settings.always_friction = true;
   sim::keep_gel_of_unit_modulus(device, cache_folder);
-  const sim::TouchRig rig(device, cache_folder, settings);
+  const sim::VirtualSensor sensor(device, cache_folder, settings);
   const auto block = [&](const cv::Mat& picture, const std::string& name) {
     return block_picture(picture, name, *device.camera, fit.spec.coarse_px, fit.spec.where);
   };
   std::vector<BlockPicture> rest;
-  for (int i = 0; i < backgrounds; ++i) rest.push_back(block(rig.background(settings.seed, i), "rest"));
+  for (int i = 0; i < backgrounds; ++i) rest.push_back(block(sensor.background(settings.seed, i), "rest"));
   if (!rest.empty()) unit.recording.background = mean_picture(rest);
   RandomStream random(seed, 0, Purpose::kTest);
   for (std::size_t i = 0; i < fit.spec.presses.size(); ++i) {
     RecordedPress& label = unit.fit.spec.presses[i];
-    sim::Hold hold;
+    sim::PressSpec hold;
     hold.place_mm = label.place_mm;
     hold.angles_deg = label.angles_deg;
     hold.depth_mm = label.depth_mm.value();
-    const sim::TouchObject object = rig.object(fit.objects[i]);
-    const double touch = sim::way_to_touch(object.felt(), rig.gel(), hold.place_mm, hold.angles_deg);
-    const fem::PressState press = rig.play(object, sim::press_motion(hold, touch)).back().press;
-    const sim::Touch touched = rig.look(object, press, settings.seed, backgrounds + static_cast<int>(i), false);
+    const sim::TouchObject object = sensor.object(fit.objects[i]);
+    const fem::PressState press = sensor.play(object, sensor.motion_of(object, hold)).back().press;
+    const sim::Touch touched = sensor.capture(object, press, settings.seed, backgrounds + static_cast<int>(i), false);
     unit.recording.presses.push_back(block(touched.frame, fmt::format("press {}", i)));
     if (label.force_N) label.force_N = press.wrench[2] + label.force_sd_N * random.normal();
     label.place_mm += label.place_sd_mm * Eigen::Vector2d(random.normal(), random.normal());

@@ -28,7 +28,7 @@ struct RecordedUnit {
 /// whole pixels, all lamps at once, with the imager's noise and fixed pattern and with other seeds of light than the
 /// fit takes. The labels in `fit` are what is true; on the recording's they have errors of their standard deviations,
 /// and forces are those of the simulation. Presses without a force get none. `backgrounds`: exposures of the untouched
-/// sensor. @throws Error as sim::TouchRig
+/// sensor. @throws Error as sim::VirtualSensor
 RecordedUnit record_unit(const PreparedFit& fit, const Eigen::VectorXd& hidden, int backgrounds, std::uint64_t seed,
                          const std::filesystem::path& cache_folder);
 

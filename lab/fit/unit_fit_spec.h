@@ -55,7 +55,7 @@ struct UnitFitSpec {
   int coarse_px = 4;  ///< pixels along a side that are compared, and simulated, as one
   std::optional<double> deepest_mm;
   std::uint64_t seed = 1;     ///< of the simulated light
-  double membrane_um = 40.0;  ///< sim::TouchRigSettings::membrane_um
+  double membrane_um = 40.0;  ///< sim::VirtualSensorSettings::membrane_um
   SourceLocation where;
 };
 

@@ -9,8 +9,7 @@
 #include "lab/fit/unit_pictures.h"
 #include "sim/press/gel_setup.h"
 #include "sim/scene/device_imager.h"
-#include "sim/sensor/touch_rig.h"
-#include "sim/sensor/virtual_device.h"
+#include "sim/sensor/virtual_sensor.h"
 #include "sim/view/visible_scene.h"
 
 namespace touchstone::lab {
@@ -77,7 +76,7 @@ struct UnitSimulation::Parts {
     return whole.gel.youngs_modulus_MPa;
   }
 
-  const sim::TouchRig& rig(const sim::DeviceSpec& whole, const Key& key, int lamp) {
+  const sim::VirtualSensor& sensor(const sim::DeviceSpec& whole, const Key& key, int lamp) {
     auto& kept = rigs[static_cast<std::size_t>(lamp)];
     for (std::size_t i = 0; i < kept.size(); ++i) {
       if (kept[i].first != key) continue;
@@ -85,7 +84,7 @@ struct UnitSimulation::Parts {
                   kept.end());  // the newest last
       return *kept.back().second;
     }
-    sim::TouchRigSettings settings;
+    sim::VirtualSensorSettings settings;
     settings.seed = seed + static_cast<std::uint64_t>(lamp);  // lamps' light errs apart from each other
     settings.deepest_mm = fit.deepest_mm;
     settings.widest_mm = kWidest_mm;
@@ -93,30 +92,29 @@ struct UnitSimulation::Parts {
     settings.always_friction = true;
     if (kept.size() == kRigsKept) kept.erase(kept.begin());
     if (progress) progress("lamps' light", made, made + 1);
-    kept.emplace_back(key, std::make_unique<const sim::TouchRig>(device_of_lamp(whole, lamp), cache, settings));
+    kept.emplace_back(key, std::make_unique<const sim::VirtualSensor>(device_of_lamp(whole, lamp), cache, settings));
     ++made;
     if (progress) progress("lamps' light", made, made);
     return *kept.back().second;
   }
 
-  const PressedState& state(const sim::TouchRig& on, const Key& scene, int press, const PressPose& pose) {
+  const PressedState& state(const sim::VirtualSensor& on, const Key& scene, int press, const PressPose& pose) {
     const Key key = with_pose(scene, press, pose);
     const auto known = states.find(key);
     if (known != states.end()) return known->second;
     const RecordedPress& recorded = fit.spec.presses[static_cast<std::size_t>(press)];
-    sim::Hold hold;
+    sim::PressSpec hold;
     hold.place_mm = pose.place_mm;
     hold.angles_deg = recorded.angles_deg;
     hold.depth_mm = pose.depth_mm;
     return states.emplace(key, played(on, press, hold)).first->second;
   }
 
-  PressedState played(const sim::TouchRig& on, int press, const sim::Hold& hold) const {
+  PressedState played(const sim::VirtualSensor& on, int press, const sim::PressSpec& hold) const {
     const RecordedPress& recorded = fit.spec.presses[static_cast<std::size_t>(press)];
     try {
       const sim::TouchObject object = on.object(fit.objects[static_cast<std::size_t>(press)]);
-      const double touch = sim::way_to_touch(object.felt(), on.gel(), hold.place_mm, hold.angles_deg);
-      const sim::Truth truth = on.play(object, sim::press_motion(hold, touch)).back();
+      const sim::Truth truth = on.play(object, on.motion_of(object, hold)).back();
       return {truth.press, truth.press.wrench[2], truth.error.force.z()};
     } catch (const Error& error) {
       fail_at(recorded.where, "this press can't be simulated: {}", error.what());
@@ -132,11 +130,11 @@ struct UnitSimulation::Parts {
     const auto known = kept.find(key);
     if (known != kept.end()) return known->second;
     if (kept.size() * bytes_of_picture(whole) > kMostKept) kept.clear();
-    const sim::TouchRig& on = rig(whole, own, lamp);
+    const sim::VirtualSensor& on = sensor(whole, own, lamp);
     if (press < 0) return kept.emplace(key, on.background_light()).first->second;
     const PressedState& pressed = state(on, scene, press, pose);
     const sim::TouchObject object = on.object(fit.objects[static_cast<std::size_t>(press)]);
-    return kept.emplace(key, on.look(object, pressed.press, 1, 0, false).light).first->second;
+    return kept.emplace(key, on.capture(object, pressed.press, 1, 0, false).light).first->second;
   }
 
   /// All lamps' light, at their power.
@@ -172,8 +170,8 @@ struct UnitSimulation::Parts {
   Progress progress;
   std::uint64_t seed;
   int made = 0;
-  std::vector<std::vector<std::pair<Key, std::unique_ptr<const sim::TouchRig>>>> rigs;  // by lamp
-  std::vector<std::map<Key, cv::Mat>> lights;                                           // by lamp
+  std::vector<std::vector<std::pair<Key, std::unique_ptr<const sim::VirtualSensor>>>> rigs;  // by lamp
+  std::vector<std::map<Key, cv::Mat>> lights;                                                // by lamp
   std::map<Key, PressedState> states;
 };
 
@@ -189,7 +187,7 @@ SimulatedUnit UnitSimulation::show_press(const Eigen::VectorXd& x, int press, co
   const Key scene = parts_->key_of(x, -1);
   auto known = parts_->states.find(with_pose(scene, press, pose));
   if (known == parts_->states.end()) {
-    parts_->state(parts_->rig(whole, parts_->key_of(x, 0), 0), scene, press, pose);
+    parts_->state(parts_->sensor(whole, parts_->key_of(x, 0), 0), scene, press, pose);
     known = parts_->states.find(with_pose(scene, press, pose));
   }
   const double share = whole.gel.youngs_modulus_MPa / parts_->modulus_of(whole);
@@ -224,14 +222,14 @@ SimulatedUnit UnitSimulation::show_other_light(const Eigen::VectorXd& x, const s
 
 double UnitSimulation::depth_of_force(const Eigen::VectorXd& x, int press, const PressPose& pose, double force_N) {
   const sim::DeviceSpec whole = device_at(parts_->fit, x);
-  const sim::TouchRig& on = parts_->rig(whole, parts_->key_of(x, 0), 0);
-  sim::Hold hold;
+  const sim::VirtualSensor& on = parts_->sensor(whole, parts_->key_of(x, 0), 0);
+  sim::PressSpec hold;
   hold.place_mm = pose.place_mm;
   hold.angles_deg = parts_->fit.spec.presses[static_cast<std::size_t>(press)].angles_deg;
   hold.force_N = force_N * parts_->modulus_of(whole) / whole.gel.youngs_modulus_MPa;
   const sim::TouchObject object = on.object(parts_->fit.objects[static_cast<std::size_t>(press)]);
-  const double touch = sim::way_to_touch(object.felt(), on.gel(), hold.place_mm, hold.angles_deg);
-  return -touch - parts_->played(on, press, hold).press.gel_from_object.translation.z();
+  const double touch = sim::first_touch(hold, object.spec(), on.device().gel);
+  return touch - parts_->played(on, press, hold).press.gel_from_object.translation.z();
 }
 
 render::Imager UnitSimulation::imager(const Eigen::VectorXd& x) const {

@@ -50,8 +50,8 @@ double pixel_scale(const sim::DeviceSpec& device, double z) {
 
 }  // namespace
 
-PlateContact press_plate(const sim::TouchRig& rig, double depth_mm, double tilt, std::uint64_t noise_seed) {
-  const sim::GelSpec& gel = rig.device().gel;
+PlateContact press_plate(const sim::VirtualSensor& sensor, double depth_mm, double tilt, std::uint64_t noise_seed) {
+  const sim::GelSpec& gel = sensor.device().gel;
   TS_ASSERT(gel.shape == sim::GelShape::dome);
   const double sphere = gel.sphere_radius_mm;
   // The plate's lower face is `sphere - depth` from the sphere's centre, along its own normal.
@@ -65,9 +65,9 @@ PlateContact press_plate(const sim::TouchRig& rig, double depth_mm, double tilt,
   key.z = sim::AxisKey{height_at(depth_mm), std::nullopt};
   motion.keys = {key};
 
-  const sim::TouchObject object = rig.object(plate());
-  const fem::PressState press = rig.play(object, motion).back().press;
-  const sim::Touch touch = rig.look(object, press, noise_seed);
+  const sim::TouchObject object = sensor.object(plate());
+  const fem::PressState press = sensor.play(object, motion).back().press;
+  const sim::Touch touch = sensor.capture(object, press, noise_seed);
   const TouchedPixels touched = touched_pixels(touch);
   PlateContact contact;
   contact.depth_mm = depth_mm;
@@ -75,9 +75,9 @@ PlateContact press_plate(const sim::TouchRig& rig, double depth_mm, double tilt,
   const double touched_z = (sphere - depth_mm) * std::cos(tilt) - sphere;
   contact.expected_mm = {(sphere - depth_mm) * std::sin(tilt), 0.0};
   if (touched.count == 0.0) return contact;
-  const double scale = pixel_scale(rig.device(), touched_z);
-  contact.radius_mm = scale * rig.mm_per_px() * std::sqrt(touched.count / kPi);
-  contact.centre_mm = scale * rig.gel_from_pixel(touched.middle);
+  const double scale = pixel_scale(sensor.device(), touched_z);
+  contact.radius_mm = scale * sensor.mm_per_px() * std::sqrt(touched.count / kPi);
+  contact.centre_mm = scale * sensor.gel_from_pixel(touched.middle);
   return contact;
 }
 
@@ -108,26 +108,27 @@ double plate_radius_by_hertz(const sim::GelSpec& gel, double force) {
   return std::cbrt(0.75 * force * gel.sphere_radius_mm / modulus);
 }
 
-DomeHeights measure_dome_heights(const sim::TouchRig& rig, const CalibrationPresses& presses,
+DomeHeights measure_dome_heights(const sim::VirtualSensor& sensor, const CalibrationPresses& presses,
                                  sensors::LightCorrection correction, std::uint64_t seed) {
   CalibrationPresses exact = presses;  // the dome's circles are the truth's: the finder can't be held against it
   exact.annotation_px = 0.0;
   exact.most_saturated = sensors::PressSampling{}.most_saturated;
-  sensors::HeightEstimator estimator(calibrate_rig(rig, exact, correction, seed).calibration.model);
+  sensors::HeightEstimator estimator(calibrate_rig(sensor, exact, correction, seed).calibration.model);
   DomeHeights heights;
   constexpr std::uint64_t kTestNoise = 1'000'000;  // seeds that calibration never saw
   constexpr double kBall_mm = 4.0;
   constexpr double kBallDepth_mm = 0.4;
   constexpr double kPlateDepth_mm = 0.3;
-  const sim::TouchObject ball = rig.object(ball_of(kBall_mm));
+  const sim::TouchObject ball = sensor.object(ball_of(kBall_mm));
   std::uint64_t noise = seed + kTestNoise;
   for (const Eigen::Vector2d& place : {Eigen::Vector2d(0, 0), {2.7, -1.9}, {-4.3, 2.2}}) {
-    const sim::Touch touch = touch_once(rig, ball, {place, kBallDepth_mm}, ++noise);
-    heights.balls.push_back(height_error(estimator.estimate(touch.frame), touch, rig.mm_per_px()));
+    const sim::Touch touch =
+        sensor.press(ball, {.place_mm = place, .depth_mm = kBallDepth_mm}, {.noise_seed = ++noise});
+    heights.balls.push_back(height_error(estimator.estimate(touch.frame), touch, sensor.mm_per_px()));
   }
-  const sim::TouchObject flat = rig.object(plate());
-  const sim::Touch touch = touch_once(rig, flat, {{0, 0}, kPlateDepth_mm}, ++noise);
-  heights.plate = height_error(estimator.estimate(touch.frame), touch, rig.mm_per_px());
+  const sim::TouchObject flat = sensor.object(plate());
+  const sim::Touch touch = sensor.press(flat, {.depth_mm = kPlateDepth_mm}, {.noise_seed = ++noise});
+  heights.plate = height_error(estimator.estimate(touch.frame), touch, sensor.mm_per_px());
   return heights;
 }
 

@@ -1,13 +1,13 @@
 #pragma once
-// The domed gelsight sensor against flat things (source text 004, sec. 2.2.1, fig. 2-9): where a plate touches the
-// dome, and what an estimator of heights that was made for flat gels makes of it.
+// The domed gelsight sensor against flat things [Li2015, sec. 2.2.1, fig. 2-9]: where a plate touches the dome, and
+// what an estimator of heights that was made for flat gels makes of it.
 
 #include <cstdint>
 #include <span>
 #include <vector>
 
 #include "lab/gelsight/gelsight_height_experiment.h"
-#include "sim/sensor/touch_rig.h"
+#include "sim/sensor/virtual_sensor.h"
 
 namespace touchstone::lab {
 
@@ -22,8 +22,8 @@ struct PlateContact {
 
 /// A plate pressed on the dome, tilted by `tilt` (radians) about the gel frame's y axis. The places of pixels are those
 /// of the plane in which the plate touches: what is seen is nearer to the camera than the apex, so a pixel is smaller.
-/// @pre the rig's gel is a dome
-PlateContact press_plate(const sim::TouchRig& rig, double depth_mm, double tilt, std::uint64_t noise_seed);
+/// @pre the sensor's gel is a dome
+PlateContact press_plate(const sim::VirtualSensor& sensor, double depth_mm, double tilt, std::uint64_t noise_seed);
 
 /// Radius of the contact of a rigid plate on a dome under `force`, by closed forms: as a sphere of the dome's radius on
 /// an endless layer of its thickness, frictionless (profile_on_layer; to first order in the dome's slope), and by
@@ -40,7 +40,7 @@ struct DomeHeights {
   std::vector<HeightError> balls;  ///< of 4 mm, at the apex and at two places aside, 0.4 mm deep
   HeightError plate;               ///< 0.3 mm deep
 };
-DomeHeights measure_dome_heights(const sim::TouchRig& rig, const CalibrationPresses& presses,
+DomeHeights measure_dome_heights(const sim::VirtualSensor& sensor, const CalibrationPresses& presses,
                                  sensors::LightCorrection correction, std::uint64_t seed);
 
 }  // namespace touchstone::lab

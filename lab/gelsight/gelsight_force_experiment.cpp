@@ -24,38 +24,38 @@ constexpr double kClear_mm = 0.02;  ///< above the gel, where motions start
 constexpr int kLeastPatch_px = 50;
 
 /// Truths of a press with a force that grows through all of `forces_N`.
-std::vector<sim::Truth> press_truths(const sim::TouchRig& rig, const sim::TouchObject& object,
+std::vector<sim::Truth> press_truths(const sim::VirtualSensor& sensor, const sim::TouchObject& object,
                                      const std::vector<double>& forces_N) {
   sim::MotionSpec motion;
-  motion.start_mm = {0, 0, reach_below(object.spec()) + kClear_mm};
+  motion.start_mm = {0, 0, sim::first_touch({}, object.spec(), sensor.device().gel) + kClear_mm};
   for (const double force : forces_N) {
     sim::MotionKey key;
     key.z = sim::AxisKey{std::nullopt, force};
     motion.keys.push_back(key);
   }
-  std::vector<sim::Truth> truths = rig.play(object, motion);
+  std::vector<sim::Truth> truths = sensor.play(object, motion);
   truths.erase(truths.begin());  // the start, in the air
   return truths;
 }
 
-std::vector<cv::Mat> backgrounds(const sim::TouchRig& rig, std::uint64_t seed) {
+std::vector<cv::Mat> backgrounds(const sim::VirtualSensor& sensor, std::uint64_t seed) {
   std::vector<cv::Mat> frames;
-  for (int i = 0; i < kBackgroundFrames; ++i) frames.push_back(rig.background(seed, kBackgroundFrame + i));
+  for (int i = 0; i < kBackgroundFrames; ++i) frames.push_back(sensor.background(seed, kBackgroundFrame + i));
   return frames;
 }
 
-double diameter_px(const sim::TouchRig& rig) {
-  return rig.device().coating->print ? rig.device().coating->print->width_mm / rig.mm_per_px() : 0.0;
+double diameter_px(const sim::VirtualSensor& sensor) {
+  return sensor.device().coating->print ? sensor.device().coating->print->width_mm / sensor.mm_per_px() : 0.0;
 }
 
 }  // namespace
 
-sensors::MarkerTrackerSettings marker_settings(const sim::TouchRig& rig) {
-  const auto& print = rig.device().coating->print;
-  if (!print) fail("device {}: has no markers", rig.device().name);
+sensors::MarkerTrackerSettings marker_settings(const sim::VirtualSensor& sensor) {
+  const auto& print = sensor.device().coating->print;
+  if (!print) fail("device {}: has no markers", sensor.device().name);
   sensors::MarkerTrackerSettings settings;
-  settings.look.diameter_px = print->width_mm / rig.mm_per_px();
-  settings.look.spacing_px = print->spacing_mm.minCoeff() / rig.mm_per_px();
+  settings.look.diameter_px = print->width_mm / sensor.mm_per_px();
+  settings.look.spacing_px = print->spacing_mm.minCoeff() / sensor.mm_per_px();
   return settings;
 }
 
@@ -65,7 +65,7 @@ cv::Mat without_markers(const cv::Mat& frame, const sensors::TrackedMarkers* mar
   return filled;
 }
 
-sensors::HeightModel for_marked_gel(sensors::HeightModel model, const sim::TouchRig& marked, std::uint64_t seed) {
+sensors::HeightModel for_marked_gel(sensors::HeightModel model, const sim::VirtualSensor& marked, std::uint64_t seed) {
   std::vector<cv::Mat> rest = backgrounds(marked, seed);
   for (cv::Mat& frame : rest) {
     sensors::MarkerTracker tracker(marker_settings(marked));
@@ -76,31 +76,32 @@ sensors::HeightModel for_marked_gel(sensors::HeightModel model, const sim::Touch
   return model;
 }
 
-NormalSeries press_with_forces(const sim::TouchRig& rig, const sensors::HeightModel& model,
+NormalSeries press_with_forces(const sim::VirtualSensor& sensor, const sensors::HeightModel& model,
                                const sim::ObjectSpec& object, const std::vector<double>& forces_N, std::uint64_t seed) {
-  const sim::TouchObject touch_object = rig.object(object);
-  const std::vector<sim::Truth> truths = press_truths(rig, touch_object, forces_N);
+  const sim::TouchObject touch_object = sensor.object(object);
+  const std::vector<sim::Truth> truths = press_truths(sensor, touch_object, forces_N);
   std::vector<sim::Touch> touches(truths.size());
   tbb::parallel_for(std::size_t{0}, truths.size(), [&](std::size_t i) {
-    touches[i] = rig.look(touch_object, truths[i].press, seed, static_cast<int>(i));
+    touches[i] = sensor.capture(touch_object, truths[i].press, seed, static_cast<int>(i));
   });
-  const cv::Mat at_rest = rig.background(seed, kBackgroundFrame);
+  const cv::Mat at_rest = sensor.background(seed, kBackgroundFrame);
   NormalSeries series;
   series.indenter = object.name;
   sensors::HeightEstimator estimator(model);
   std::optional<sensors::MarkerTracker> tracker;
-  if (rig.device().coating->print) tracker.emplace(marker_settings(rig)).track({at_rest, 0});
+  if (sensor.device().coating->print) tracker.emplace(marker_settings(sensor)).track({at_rest, 0});
   std::vector<double> force, estimated, truth;
   for (std::size_t i = 0; i < truths.size(); ++i) {
     const cv::Mat& frame = touches[i].frame;
     const auto t_us = static_cast<std::int64_t>(i) + 1;
-    const cv::Mat bare = without_markers(frame, tracker ? &tracker->track({frame, t_us}) : nullptr, diameter_px(rig));
+    const cv::Mat bare =
+        without_markers(frame, tracker ? &tracker->track({frame, t_us}) : nullptr, diameter_px(sensor));
     cv::Mat true_height = touches[i].height.clone();
     cv::patchNaNs(true_height, 0.0);
     NormalSample sample;
     sample.force_N = truths[i].press.wrench[2];
-    sample.estimated_mm3 = sensors::height_sum_mm3(estimator.estimate(bare).height_mm, rig.mm_per_px());
-    sample.true_mm3 = sensors::height_sum_mm3(true_height, rig.mm_per_px());
+    sample.estimated_mm3 = sensors::height_sum_mm3(estimator.estimate(bare).height_mm, sensor.mm_per_px());
+    sample.true_mm3 = sensors::height_sum_mm3(true_height, sensor.mm_per_px());
     series.samples.push_back(sample);
     force.push_back(sample.force_N);
     estimated.push_back(sample.estimated_mm3);
@@ -124,25 +125,25 @@ PooledLines pool(const std::vector<NormalSeries>& series) {
           sensors::fit_linear_force(truth, force, sensors::FitLine::kFree)};
 }
 
-ShearTest shear_until_slip(const sim::TouchRig& rig, const sim::ObjectSpec& object, double normal_N, double drag_mm,
-                           int steps, std::uint64_t seed) {
-  const sim::TouchObject touch_object = rig.object(object);
+ShearTest shear_until_slip(const sim::VirtualSensor& sensor, const sim::ObjectSpec& object, double normal_N,
+                           double drag_mm, int steps, std::uint64_t seed) {
+  const sim::TouchObject touch_object = sensor.object(object);
   sim::MotionSpec motion;
-  motion.start_mm = {-0.5 * drag_mm, 0, reach_below(object) + kClear_mm};
+  motion.start_mm = {-0.5 * drag_mm, 0, sim::first_touch({}, object, sensor.device().gel) + kClear_mm};
   sim::MotionKey press, drag;
   press.frames = 3;
   press.z = sim::AxisKey{std::nullopt, normal_N};
   drag.frames = steps;
   drag.x = sim::AxisKey{0.5 * drag_mm, std::nullopt};
   motion.keys = {press, drag};
-  const std::vector<sim::Truth> truths = rig.play(touch_object, motion);
+  const std::vector<sim::Truth> truths = sensor.play(touch_object, motion);
   std::vector<cv::Mat> frames(truths.size());
   tbb::parallel_for(std::size_t{0}, truths.size(), [&](std::size_t i) {
-    frames[i] = rig.look(touch_object, truths[i].press, seed, static_cast<int>(i), false).frame;
+    frames[i] = sensor.capture(touch_object, truths[i].press, seed, static_cast<int>(i), false).frame;
   });
 
-  const cv::Mat background = rig.background(seed, kBackgroundFrame);
-  sensors::MarkerTracker tracker(marker_settings(rig));
+  const cv::Mat background = sensor.background(seed, kBackgroundFrame);
+  sensors::MarkerTracker tracker(marker_settings(sensor));
   tracker.track({background, -1});
   ShearTest test;
   cv::Mat contact;
@@ -151,14 +152,14 @@ ShearTest shear_until_slip(const sim::TouchRig& rig, const sim::ObjectSpec& obje
     const sensors::TrackedMarkers& markers = tracker.track({frames[i], static_cast<std::int64_t>(i)});
     if (static_cast<int>(i) < press.frames) continue;  // still pressing
     sensors::motion_ratio(background, background, frames[i], {}, &contact);
-    sensors::erase_markers(contact, markers, diameter_px(rig));
+    sensors::erase_markers(contact, markers, diameter_px(sensor));
     const auto patch = sensors::contact_patch(contact, kLeastPatch_px);
     if (!patch) fail("shear test of {}: no contact is seen in frame {}", object.name, i);
     const fem::PressState& state = truths[i].press;
     ShearSample sample;
     sample.drag_mm = drag_mm * (static_cast<double>(i) - press.frames) / steps;
     sample.force_N = state.wrench.head<2>().norm();
-    sample.displacement_mm = sensors::mean_displacement(markers, *patch).px.norm() * rig.mm_per_px();
+    sample.displacement_mm = sensors::mean_displacement(markers, *patch).px.norm() * sensor.mm_per_px();
     sample.slides =
         std::find(state.node_state.begin(), state.node_state.end(), fem::NodeState::stick) == state.node_state.end();
     test.samples.push_back(sample);

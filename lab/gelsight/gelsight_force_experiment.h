@@ -1,6 +1,6 @@
 #pragma once
-// Forces from the pictures of a gelsight device (shared/seeds/004, sec. 4.2 and 4.3): the sum of the height map against
-// the normal force, the mean marker displacement against the shear force.
+// Forces from the pictures of a gelsight device [Li2015, sec. 4.2 and 4.3]: the sum of the height map against the
+// normal force, the mean marker displacement against the shear force.
 
 #include <string>
 #include <vector>
@@ -8,21 +8,21 @@
 #include "sensors/heights/height_model.h"
 #include "sensors/markers/linear_force.h"
 #include "sensors/markers/marker_tracker.h"
-#include "sim/sensor/touch_rig.h"
+#include "sim/sensor/virtual_sensor.h"
 
 namespace touchstone::lab {
 
-/// What the tracker is told of a rig's markers: their size and distance in its picture, from the device's print.
+/// What the tracker is told of a sensor's markers: their size and distance in its picture, from the device's print.
 /// @throws Error for a device without a print
-sensors::MarkerTrackerSettings marker_settings(const sim::TouchRig& rig);
+sensors::MarkerTrackerSettings marker_settings(const sim::VirtualSensor& sensor);
 
 /// A frame without its markers, if the device has any: filled where the tracker finds them (`markers`, else nullptr).
 cv::Mat without_markers(const cv::Mat& frame, const sensors::TrackedMarkers* markers, double diameter_px);
 
 /// The same calibration for a gel with markers under the same light: with the background of that gel, its markers
-/// filled. (The text doesn't say how it calibrates its second gel. Its table goes from colour to slope, and holds for
+/// filled. (The thesis doesn't say how it calibrates its second gel. Its table goes from colour to slope, and holds for
 /// both.)
-sensors::HeightModel for_marked_gel(sensors::HeightModel model, const sim::TouchRig& marked, std::uint64_t seed);
+sensors::HeightModel for_marked_gel(sensors::HeightModel model, const sim::VirtualSensor& marked, std::uint64_t seed);
 
 /// One press of one indenter under its load.
 struct NormalSample {
@@ -37,7 +37,7 @@ struct NormalSeries {
 };
 
 /// Presses the middle of the gel with each of the forces (N, on the object, z). @pre at least three forces
-NormalSeries press_with_forces(const sim::TouchRig& rig, const sensors::HeightModel& model,
+NormalSeries press_with_forces(const sim::VirtualSensor& sensor, const sensors::HeightModel& model,
                                const sim::ObjectSpec& object, const std::vector<double>& forces_N, std::uint64_t seed);
 
 /// One line through the samples of several indenters: what fig. 4-2a shows for balls.
@@ -59,7 +59,7 @@ struct ShearTest {
   sensors::LinearForce line;  ///< through the samples before slip, by the force alone (samples_before_slip)
   std::size_t before_slip = 0;
 };
-ShearTest shear_until_slip(const sim::TouchRig& rig, const sim::ObjectSpec& object, double normal_N, double drag_mm,
-                           int steps, std::uint64_t seed);
+ShearTest shear_until_slip(const sim::VirtualSensor& sensor, const sim::ObjectSpec& object, double normal_N,
+                           double drag_mm, int steps, std::uint64_t seed);
 
 }  // namespace touchstone::lab

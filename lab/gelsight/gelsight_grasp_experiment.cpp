@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kStill_mm = 1e-3;  // less than that isn't called sliding
 
-sim::Gripper gripper_for(const sim::TouchRig& rig, const sim::TouchObject& object, const GraspTrial& trial,
+sim::Gripper gripper_for(const sim::VirtualSensor& sensor, const sim::TouchObject& object, const GraspTrial& trial,
                          double clearance_mm) {
   const sim::ObjectSpec& spec = trial.object;
   if (!spec.mass_g || !spec.crush_force_N) {
@@ -21,7 +21,7 @@ sim::Gripper gripper_for(const sim::TouchRig& rig, const sim::TouchObject& objec
          spec.mass_g ? "crush_force_N" : "mass_g");
   }
   sim::GraspedBody body;
-  body.shape = object.felt();
+  body.shape = object.shape();
   body.friction = spec.friction;
   body.mass_g = *spec.mass_g;
   body.crush_force_N = *spec.crush_force_N;
@@ -30,7 +30,7 @@ sim::Gripper gripper_for(const sim::TouchRig& rig, const sim::TouchObject& objec
   settings.gel_from_object.rotation =
       Eigen::AngleAxisd(trial.turn_deg * kRadiansPerDegree, Eigen::Vector3d::UnitZ()).toRotationMatrix();
   settings.gel_from_object.translation = {trial.place_mm.x(), trial.place_mm.y(), 0.0};
-  return {rig.gel(), body, settings};
+  return {sensor.gel(), body, settings};
 }
 
 /// Why the object doesn't count as held at the end of a trial; empty where it does.
@@ -60,8 +60,8 @@ int count_false_alarms(const std::vector<GraspMoment>& moments, int lag_frames) 
 
 }  // namespace
 
-GraspOutcome run_grasp_trial(const sim::TouchRig& rig, const GraspTrial& trial, const GraspLoopSettings& settings,
-                             const GraspSenses& senses) {
+GraspOutcome run_grasp_trial(const sim::VirtualSensor& sensor, const GraspTrial& trial,
+                             const GraspLoopSettings& settings, const GraspSenses& senses) {
   if (!(settings.frame_rate_Hz > 0.0) || !(settings.camera_lag_s >= 0.0) || !(settings.hold_s >= 0.0) ||
       !(settings.longest_s > settings.hold_s)) {
     fail("a grasp's loop of {} frames/s, a lag of {} s, {} s of holding and at most {} s makes no sense",
@@ -71,8 +71,8 @@ GraspOutcome run_grasp_trial(const sim::TouchRig& rig, const GraspTrial& trial, 
   const auto frames_in = [&](double seconds) { return static_cast<int>(std::lround(seconds / dt)); };
   const int lag_frames = frames_in(settings.camera_lag_s);
   const int hold_frames = frames_in(settings.hold_s);
-  const sim::TouchObject object = rig.object(trial.object);
-  sim::Gripper gripper = gripper_for(rig, object, trial, settings.clearance_mm);
+  const sim::TouchObject object = sensor.object(trial.object);
+  sim::Gripper gripper = gripper_for(sensor, object, trial, settings.clearance_mm);
   sim::ArmLift arm(settings.arm);
   sensors::GraspRule rule(settings.rule);
 
@@ -80,13 +80,13 @@ GraspOutcome run_grasp_trial(const sim::TouchRig& rig, const GraspTrial& trial, 
   sensors::GraspCommand command;
   std::deque<cv::Mat> on_their_way;  // frames that were taken and haven't arrived
   int frame = 0;
-  for (; frame < lag_frames; ++frame) on_their_way.push_back(rig.background(trial.noise_seed, frame));
+  for (; frame < lag_frames; ++frame) on_their_way.push_back(sensor.background(trial.noise_seed, frame));
   int held_frames = 0;
   const int last_frame = frames_in(settings.longest_s);
   for (int k = 0; k < last_frame; ++k, ++frame) {
     const double acceleration = arm.next(command.lift, dt);
     const sim::GripperState& truth = gripper.advance(command.close_by_mm, acceleration, dt);
-    on_their_way.push_back(rig.look(object, gripper.press(), trial.noise_seed, frame, false).frame);
+    on_their_way.push_back(sensor.capture(object, gripper.press(), trial.noise_seed, frame, false).frame);
     GraspMoment moment;
     moment.truth = truth;
     moment.sight = senses(on_their_way.front());

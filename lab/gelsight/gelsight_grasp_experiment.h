@@ -1,6 +1,6 @@
 #pragma once
-// The closed loop of the fingertip GelSight's text (shared/seeds/004, sec. 4.5): a simulated gripper lifts an object
-// off a table, led by nothing but what estimators make of the camera's frames.
+// The closed loop of [Li2015, sec. 4.5]: a simulated gripper lifts an object off a table, led by nothing but what
+// estimators make of the camera's frames.
 
 #include <cstdint>
 #include <functional>
@@ -11,7 +11,7 @@
 #include "sensors/markers/grasp_rule.h"
 #include "sim/grasp/arm_lift.h"
 #include "sim/grasp/gripper.h"
-#include "sim/sensor/touch_rig.h"
+#include "sim/sensor/virtual_sensor.h"
 
 namespace touchstone::lab {
 
@@ -28,7 +28,7 @@ struct GraspLoopSettings {
   sim::ArmLiftSettings arm;
   double clearance_mm = 0.1;
   double frame_rate_Hz = 30.0;
-  double camera_lag_s = 0.1;  ///< text 2.2.3; rounded to frames
+  double camera_lag_s = 0.1;  ///< sec. 2.2.3; rounded to frames
   double hold_s = 1.0;        ///< how long it has to be held, without sliding
   double longest_s = 10.0;    ///< a trial is over then, held or not
 };
@@ -56,7 +56,7 @@ struct GraspOutcome {
 };
 
 /// Plays one trial. @throws Error for an object without mass or crush force, or settings that make no sense
-GraspOutcome run_grasp_trial(const sim::TouchRig& rig, const GraspTrial& trial, const GraspLoopSettings& settings,
-                             const GraspSenses& senses);
+GraspOutcome run_grasp_trial(const sim::VirtualSensor& sensor, const GraspTrial& trial,
+                             const GraspLoopSettings& settings, const GraspSenses& senses);
 
 }  // namespace touchstone::lab

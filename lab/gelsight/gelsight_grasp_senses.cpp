@@ -45,7 +45,7 @@ class Eyes {
 
 }  // namespace
 
-sensors::TouchCalibration calibrate_for_grasps(const sim::TouchRig& flat, const sim::TouchRig& marked,
+sensors::TouchCalibration calibrate_for_grasps(const sim::VirtualSensor& flat, const sim::VirtualSensor& marked,
                                                std::uint64_t seed) {
   sensors::TouchCalibration calibration;
   const sensors::HeightModel of_flat = calibrate_rig(flat, {}, {}, seed).calibration.model;

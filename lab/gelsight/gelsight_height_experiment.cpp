@@ -18,29 +18,6 @@ namespace {
 
 constexpr double kEdgeRadius_mm = 0.1;
 constexpr double kCylinderHeight_mm = 6.0;
-constexpr double kClearance_mm = 0.05;  // above the gel, where presses start
-
-double half_height(const sim::ShapeSpec& shape) {
-  switch (shape.type) {
-    case sim::ShapeKind::sphere:
-      return shape.radius_mm;
-    case sim::ShapeKind::box:
-      return 0.5 * shape.size_mm.z();
-    case sim::ShapeKind::rounded_cylinder:
-      return 0.0;  // its origin is in the middle of its flat end
-    case sim::ShapeKind::egg:
-      return shape.radius_mm;
-    case sim::ShapeKind::shell: {
-      const Eigen::Vector2d rise = 0.125 * shape.curvature_per_mm.cwiseProduct(shape.axes_mm.cwiseAbs2());
-      return std::max(0.0, -rise.minCoeff());
-    }
-    case sim::ShapeKind::hexagon:
-      return 0.5 * shape.across_flats_mm;
-    case sim::ShapeKind::mesh:
-      break;
-  }
-  fail("the object's lowest point isn't known for a shape from a file");
-}
 
 /// One of the ways in which the gel is pressed at each place.
 struct BallPressed {
@@ -61,10 +38,6 @@ std::vector<Eigen::Vector2d> places_of(const CalibrationPresses& how) {
 }
 
 }  // namespace
-
-double reach_below(const sim::ObjectSpec& object) {
-  return half_height(object.shape) + (object.relief ? sim::relief_map(*object.relief).highest() : 0.0);
-}
 
 sim::ObjectSpec ball_of(double diameter_mm) {
   sim::ObjectSpec object;
@@ -88,26 +61,15 @@ sim::ObjectSpec with_friction(sim::ObjectSpec object, double friction) {
   return object;
 }
 
-sim::Touch touch_once(const sim::TouchRig& rig, const sim::TouchObject& object, const StraightPress& press,
-                      std::uint64_t noise_seed, bool truth) {
-  const double reach = reach_below(object.spec()) + sim::rest_height(rig.device().gel, press.place_mm);
-  sim::MotionSpec motion;
-  motion.start_mm = {press.place_mm.x(), press.place_mm.y(), reach + kClearance_mm};
-  sim::MotionKey key;
-  key.z = sim::AxisKey{reach - press.depth_mm, std::nullopt};
-  motion.keys = {key};
-  return rig.look(object, rig.play(object, motion).back().press, noise_seed, 0, truth);
-}
-
-CalibratedRig calibrate_rig(const sim::TouchRig& rig, const CalibrationPresses& how,
+CalibratedRig calibrate_rig(const sim::VirtualSensor& sensor, const CalibrationPresses& how,
                             std::optional<sensors::LightCorrection> correction, std::uint64_t noise_seed) {
   std::vector<cv::Mat> rest;
-  for (int i = 0; i < how.background_frames; ++i) rest.push_back(rig.background(noise_seed, i));
+  for (int i = 0; i < how.background_frames; ++i) rest.push_back(sensor.background(noise_seed, i));
   const sensors::Background background = sensors::mean_background(rest);
-  const double mm_per_px = rig.mm_per_px();
+  const double mm_per_px = sensor.mm_per_px();
   std::vector<BallPressed> ways;
   const auto add_way = [&](double diameter_mm, double depth_mm) {
-    ways.push_back({rig.object(ball_of(diameter_mm)), 0.5 * diameter_mm, depth_mm});
+    ways.push_back({sensor.object(ball_of(diameter_mm)), 0.5 * diameter_mm, depth_mm});
   };
   for (const double depth : how.depths_mm) add_way(how.ball_diameter_mm, depth);
   if (how.wide_ball_depth_mm > 0.0) add_way(how.wide_ball_diameter_mm, how.wide_ball_depth_mm);
@@ -118,7 +80,8 @@ CalibratedRig calibrate_rig(const sim::TouchRig& rig, const CalibrationPresses& 
   int small_ones = 0;
   for (const Eigen::Vector2d& place : places_of(how)) {
     for (const BallPressed& way : ways) {
-      const sim::Touch touch = touch_once(rig, way.ball, {place, way.depth_mm}, noise_seed + presses.size() + 1);
+      const sim::Touch touch = sensor.press(way.ball, {.place_mm = place, .depth_mm = way.depth_mm},
+                                            {.noise_seed = noise_seed + presses.size() + 1});
       const cv::Moments contact = cv::moments(touch.contact, true);
       if (contact.m00 < 1.0) fail("calibration: the ball at ({}, {}) mm isn't seen", place.x(), place.y());
       const Eigen::Vector2d centre(contact.m10 / contact.m00 + 0.5, contact.m01 / contact.m00 + 0.5);

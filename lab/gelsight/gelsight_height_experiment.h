@@ -7,18 +7,9 @@
 
 #include "sensors/heights/height_calibration.h"
 #include "sensors/heights/height_estimator.h"
-#include "sim/sensor/touch_rig.h"
+#include "sim/sensor/virtual_sensor.h"
 
 namespace touchstone::lab {
-
-/// A straight press of a rigid object.
-struct StraightPress {
-  Eigen::Vector2d place_mm = Eigen::Vector2d::Zero();  ///< of the object's origin, gel frame
-  double depth_mm = 0.0;                               ///< of its lowest point below the gel at rest there
-};
-
-/// The object's lowest point below its origin, mm: of its shape and its relief.
-double reach_below(const sim::ObjectSpec& object);
 
 sim::ObjectSpec ball_of(double diameter_mm);
 /// A cylinder's flat end, its edge rounded by 0.1 mm.
@@ -26,15 +17,11 @@ sim::ObjectSpec flat_cylinder_of(double diameter_mm);
 
 sim::ObjectSpec with_friction(sim::ObjectSpec object, double friction);
 
-/// The frame of a press and what is true of it.
-sim::Touch touch_once(const sim::TouchRig& rig, const sim::TouchObject& object, const StraightPress& press,
-                      std::uint64_t noise_seed, bool truth = true);
-
 /// How a user calibrates: some frames of the untouched gel, and a ball pressed in at a grid of places, each to every
 /// depth, and a wider one, which shows gentle slopes on more pixels than the small one's middle has. Circles are
 /// annotated by hand: the contact's outline as it is, with errors of `annotation_px`.
 struct CalibrationPresses {
-  double ball_diameter_mm = 2.0;  ///< source text 004, sec. 2.2.2
+  double ball_diameter_mm = 2.0;  ///< [Li2015, sec. 2.2.2]
   int columns = 4;
   int rows = 3;
   Eigen::Vector2d extent_mm = {11.0, 7.6};  ///< between the outermost places
@@ -53,7 +40,7 @@ struct CalibratedRig {
 };
 /// `correction`: absent, the one that errs least on presses that are left out (HeightCalibrationSettings).
 /// @throws Error as sensors::calibrate_height
-CalibratedRig calibrate_rig(const sim::TouchRig& rig, const CalibrationPresses& presses,
+CalibratedRig calibrate_rig(const sim::VirtualSensor& sensor, const CalibrationPresses& presses,
                             std::optional<sensors::LightCorrection> correction, std::uint64_t noise_seed);
 
 /// Estimated heights against the true membrane, over the pixels that see membrane.

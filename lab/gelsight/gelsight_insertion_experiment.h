@@ -1,6 +1,6 @@
 #pragma once
-// Inserting a plug by touch (source text 004, sec. 3.4): a robot grasps a plug that hangs somehow in a jig, finds by
-// touch how it holds it, and moves the gripper so that the plug hovers over its socket.
+// Inserting a plug by touch [Li2015, sec. 3.4]: a robot grasps a plug that hangs somehow in a jig, finds by touch how
+// it holds it, and moves the gripper so that the plug hovers over its socket.
 //
 // Frames: base (the robot's), gripper, touch (the sensor's, sensors/touch_map/touch_image.h, fixed to the gripper),
 // object (the plug's: centred on its face, x across, y along it, mouth at -y; sim/relief/plug_relief.h). The hand
@@ -15,7 +15,7 @@
 namespace touchstone::lab {
 
 /// The gripper's target (eq. 3): base_from_gripper* = base_from_object* (gripper_from_touch touch_from_object)^-1. The
-/// text's gTm and mTo are gripper_from_touch and touch_from_object.
+/// thesis's gTm and mTo are gripper_from_touch and touch_from_object.
 RigidTransform target_gripper(const RigidTransform& base_from_object_wanted, const RigidTransform& gripper_from_touch,
                               const RigidTransform& touch_from_object);
 
@@ -26,16 +26,16 @@ struct InsertionSettings {
   int trials = 36;
   int most_grasps = 6;  ///< of a trial; then it has failed
   std::uint64_t seed = 34;
-  /// How the plug hangs, uniform: the text's fig. 3-7 shows 3.5 mm by 3 mm (0.005 mm a pixel).
+  /// How the plug hangs, uniform: the thesis's fig. 3-7 shows 3.5 mm by 3 mm (0.005 mm a pixel).
   GripPlay hang = {{1.75, 1.5}, 0.175, 0.0, 0.0};
   /// Ours: how far across the plug the hand misses it at the first reach, uniform. So far that some are held by an edge
-  /// only, since else the text's search would have nothing to do.
+  /// only, since else the thesis's search would have nothing to do.
   double reach_mm = 8.0;
   GripPlay grasp = {{0.0, 0.0}, 0.0, 0.0044, 0.05};  ///< tilt (radians) and depth (mm) of each grasp
   /// The blind search across the plug: the hand's steps after a grasp that wasn't localised, over and over: 0.75 cm
-  /// forward, 1.5 cm back (text 3.4.4), and forward again to where it began.
+  /// forward, 1.5 cm back (sec. 3.4.4), and forward again to where it began.
   std::vector<double> search_mm = {7.5, -15.0, 7.5};
-  /// Standard deviation of where the hand stops, along each axis of the plane. The text suspects its two failures of
+  /// Standard deviation of where the hand stops, along each axis of the plane. The thesis suspects its two failures of
   /// it.
   double robot_error_mm = 0.0;
   double tolerance_mm = 1.0;  ///< of each end of the plug's mouth from where it should be

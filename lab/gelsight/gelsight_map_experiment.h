@@ -1,6 +1,6 @@
 #pragma once
-// Localisation by touch (source text 004, sec. 3.3.3): a map is made of an object by several touches, then touches at
-// known poses are localised on it.
+// Localisation by touch [Li2015, sec. 3.3.3]: a map is made of an object by several touches, then touches at known
+// poses are localised on it.
 
 #include <cstdint>
 #include <span>
@@ -36,7 +36,7 @@ struct Localisation {
   Eigen::Vector2d error_place_mm = Eigen::Vector2d::Zero();  ///< of the touch's place on the object, touch frame
   double error_mm = 0.0;                                     ///< its length
   double error = 0.0;                                        ///< of the angle, radians
-  /// The same of the pose by features alone, as in the text.
+  /// The same of the pose by features alone, as in the thesis.
   Eigen::Vector2d features_place_mm = Eigen::Vector2d::Zero();
   double features_mm = 0.0, features = 0.0;
 
@@ -57,7 +57,8 @@ struct GripPlay {
 Grip held(const Grip& middle, const GripPlay& play, std::uint64_t seed, std::uint64_t index);
 
 /// Mean of the absolute values, and the standard deviation of repeats about the mean of their own setting, averaged
-/// over the settings (what the text calls average standard deviation). Not localised touches are left out and counted.
+/// over the settings (what the thesis calls average standard deviation). Not localised touches are left out and
+/// counted.
 struct SeriesError {
   double mean_absolute = 0.0;
   double mean_deviation = 0.0;  ///< 0 with one repeat
@@ -68,7 +69,7 @@ struct SeriesError {
 /// `values[i]` are the repeats of setting i, signed errors, NaN where not localised.
 SeriesError series_error(std::span<const std::vector<double>> values);
 
-/// The text's two series.
+/// The thesis's two series.
 struct MapExperimentSettings {
   int repeats = 3;
   int step = 1;  ///< every step-th displacement and angle

@@ -26,14 +26,14 @@ constexpr double kRoll_mm = 1.2;
 constexpr double kWay_mm_per_N = 3.0;
 constexpr double kLeastWay_mm = 0.6;
 
-sim::MotionSpec datasets::motion_of(const SlipCase& what, double frame_rate_Hz) {
+sim::MotionSpec motion_of(const SlipCase& what, const sim::GelSpec& gel, double frame_rate_Hz) {
   sim::MotionSpec motion;
   motion.frame_rate_Hz = kStatesAFrame * frame_rate_Hz;
   const double way = what.motion == SlipMotion::roll
                          ? kRoll_mm
                          : std::max(kWay_mm_per_N * what.object.friction * what.normal_N, kLeastWay_mm);
   const double from = -0.5 * way;
-  motion.start_mm = {from, 0, reach_below(what.object) + kClear_mm};
+  motion.start_mm = {from, 0, sim::first_touch({}, what.object, gel) + kClear_mm};
   const auto states_for = [&](double length_mm) {
     return std::max(static_cast<int>(std::lround(length_mm / what.speed_mm_per_s * motion.frame_rate_Hz)), 1);
   };
@@ -115,13 +115,13 @@ std::string SlipCase::name() const {
   return text;
 }
 
-SlipRun run_slip_case(const sim::TouchRig& rig, const SlipCase& what, const SlipEstimators& estimators,
+SlipRun run_slip_case(const sim::VirtualSensor& sensor, const SlipCase& what, const SlipEstimators& estimators,
                       std::uint64_t seed, int frames_after) {
   SlipRun run;
   run.what = what;
-  const sim::TouchObject object = rig.object(what.object);
-  const double frame_rate_Hz = rig.device().camera->frame_rate_Hz;
-  std::vector<sim::Truth> truths = rig.play(object, datasets::motion_of(what, frame_rate_Hz));
+  const sim::TouchObject object = sensor.object(what.object);
+  const double frame_rate_Hz = sensor.device().camera->frame_rate_Hz;
+  std::vector<sim::Truth> truths = sensor.play(object, motion_of(what, sensor.device().gel, frame_rate_Hz));
   const std::size_t first_drag = as_count((kPressFrames + kHoldFrames) * kStatesAFrame);
   if (what.motion == SlipMotion::slide) {
     const auto sliding = std::find_if(truths.begin() + static_cast<std::ptrdiff_t>(first_drag), truths.end(),
@@ -140,14 +140,14 @@ SlipRun run_slip_case(const sim::TouchRig& rig, const SlipCase& what, const Slip
   }
 
   sensors::TouchReader reader({.height = estimators.heights,
-                               .markers = marker_settings(rig),
-                               .background = rig.background(seed, kBackgroundFrame),
+                               .markers = marker_settings(sensor),
+                               .background = sensor.background(seed, kBackgroundFrame),
                                .normal = sensors::normal_line(estimators.forces, what.object.name),
                                .shear = sensors::shear_line(estimators.forces)},
                               estimators.settings);
   for (std::size_t i = 0; i < truths.size(); i += kStatesAFrame) {
     const fem::PressState& state = truths[i].press;
-    const cv::Mat image = rig.look(object, state, seed, static_cast<int>(i), false).frame;
+    const cv::Mat image = sensor.capture(object, state, seed, static_cast<int>(i), false).frame;
     const sensors::TouchReading& touch = reader.read({image, static_cast<std::int64_t>(i)});
     SlipFrame frame;
     frame.t_s = static_cast<double>(i) / (kStatesAFrame * frame_rate_Hz);

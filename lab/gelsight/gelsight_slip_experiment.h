@@ -1,6 +1,6 @@
 #pragma once
-// Slip on a gelsight device with markers (shared/seeds/004, sec. 4.4): objects that slide, and objects that don't, seen
-// by the text's two ratios and by the incipient slip detector, against the stick-slip map of the finite elements.
+// Slip on a gelsight device with markers [Li2015, sec. 4.4]: objects that slide, and objects that don't, seen by the
+// thesis's two ratios and by the incipient slip detector, against the stick-slip map of the finite elements.
 
 #include <cstdint>
 #include <optional>
@@ -10,7 +10,7 @@
 #include "sensors/heights/height_model.h"
 #include "sensors/markers/gel_force_model.h"
 #include "sensors/markers/touch_reader.h"
-#include "sim/sensor/touch_rig.h"
+#include "sim/sensor/virtual_sensor.h"
 
 namespace touchstone::lab {
 
@@ -37,7 +37,7 @@ struct SlipFrame {
   double load = 0.0;      ///< true: shear force over friction times normal force
   double sticking = 0.0;  ///< true: share of the touching vertices
   std::optional<double> force_ratio, motion_ratio;
-  bool rule = false;           ///< the text's detector
+  bool rule = false;           ///< the thesis's detector
   sensors::IncipientSlip rim;  ///< the second one
   int markers_found = 0;
 };
@@ -59,7 +59,7 @@ struct SlipEstimators {
 
 /// Plays and judges one case at the device's frame rate; states come four times as often, so the onset is known to a
 /// quarter of a frame. A slide ends `frames_after` frames after its onset.
-SlipRun run_slip_case(const sim::TouchRig& rig, const SlipCase& what, const SlipEstimators& estimators,
+SlipRun run_slip_case(const sim::VirtualSensor& sensor, const SlipCase& what, const SlipEstimators& estimators,
                       std::uint64_t seed, int frames_after = 10);
 
 /// How one detector did over many runs.

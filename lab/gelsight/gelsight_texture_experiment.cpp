@@ -30,9 +30,9 @@ constexpr int kSquares = 4;  // of one image
 
 /// The state under a force, pressed straight from above without friction: a face that covers the whole view has nothing
 /// to slide on.
-fem::PressState pressed(const sim::TouchRig& rig, const sim::TouchObject& object, const Eigen::Vector2d& place,
+fem::PressState pressed(const sim::VirtualSensor& sensor, const sim::TouchObject& object, const Eigen::Vector2d& place,
                         double turn_deg, double force_N) {
-  fem::Press press(rig.gel(), object.felt(), 0.0);
+  fem::Press press(sensor.gel(), object.shape(), 0.0);
   fem::PressTarget target;
   target.rotation = rotation_from_xyz({0.0, 0.0, turn_deg * kRadiansPerDegree});
   target.axis = {fem::AxisControl::at(place.x()), fem::AxisControl::at(place.y()),
@@ -126,57 +126,61 @@ sim::ObjectSpec another_patch(const sim::ObjectSpec& object, std::uint64_t seed)
   return patch;
 }
 
-sensors::HeightModel calibrate_view(const sim::TouchRig& rig, std::uint64_t noise_seed) {
+sensors::HeightModel calibrate_view(const sim::VirtualSensor& sensor, std::uint64_t noise_seed) {
   constexpr int kBackgrounds = 8, kPlaces = 3;
-  constexpr double kBall_mm = 2.0;  // sec. 2.2.2
+  constexpr double kBall_mm = 2.0;  // [Li2015, sec. 2.2.2]
   constexpr double kDepths_mm[] = {0.2, 0.3};
   // Places, so that circles and their shadows stay within the view.
-  const double between_mm = 0.28 * kTextureView_px * rig.mm_per_px();
+  const double between_mm = 0.28 * kTextureView_px * sensor.mm_per_px();
   std::vector<cv::Mat> rest;
-  for (int i = 0; i < kBackgrounds; ++i) rest.push_back(view_of(rig.background(noise_seed, i)));
+  for (int i = 0; i < kBackgrounds; ++i) rest.push_back(view_of(sensor.background(noise_seed, i)));
   const sensors::Background background = sensors::mean_background(rest);
-  const sim::TouchObject ball = rig.object(ball_of(kBall_mm));
+  const sim::TouchObject ball = sensor.object(ball_of(kBall_mm));
   std::vector<sensors::BallPress> balls;
   for (int k = 0; k < kPlaces * kPlaces; ++k) {
     const Eigen::Vector2d place = between_mm * Eigen::Vector2d(k % kPlaces - 1, k / kPlaces - 1);
     for (const double depth : kDepths_mm) {
       sensors::BallPress press;
       press.name = fmt::format("ball press {}", balls.size() + 1);
-      press.frame = view_of(touch_once(rig, ball, {place, depth}, noise_seed + balls.size() + 1, false).frame);
+      press.frame = view_of(sensor
+                                .press(ball, {.place_mm = place, .depth_mm = depth},
+                                       {.truth = false, .noise_seed = noise_seed + balls.size() + 1})
+                                .frame);
       press.ball_radius_mm = 0.5 * kBall_mm;
       press.circle =
-          sensors::find_contact_circle(press.frame, background, press.ball_radius_mm, rig.mm_per_px(), press.name);
+          sensors::find_contact_circle(press.frame, background, press.ball_radius_mm, sensor.mm_per_px(), press.name);
       balls.push_back(std::move(press));
     }
   }
   sensors::HeightCalibrationSettings settings;
-  settings.mm_per_px = rig.mm_per_px();
+  settings.mm_per_px = sensor.mm_per_px();
   return sensors::calibrate_height(balls, background, settings).model;
 }
 
-HeightsOf estimated_heights(const sim::TouchRig& rig, const sensors::HeightModel& model, std::uint64_t noise_seed) {
+HeightsOf estimated_heights(const sim::VirtualSensor& sensor, const sensors::HeightModel& model,
+                            std::uint64_t noise_seed) {
   sensors::HeightSettings settings;
   settings.border = sensors::HeightBorder::free;  // the object covers the whole picture
   // An estimator serves one thread at a time; each thread gets a copy of this one.
   auto estimators = std::make_shared<tbb::enumerable_thread_specific<sensors::HeightEstimator>>(
       [model, settings] { return sensors::HeightEstimator(model, settings); });
   estimators->local();  // a faulty model shows here
-  return [&rig, estimators, noise_seed](const sim::TouchObject& object, const fem::PressState& press, int number) {
-    const sim::Touch touch = rig.look(object, press, noise_seed, number);
+  return [&sensor, estimators, noise_seed](const sim::TouchObject& object, const fem::PressState& press, int number) {
+    const sim::Touch touch = sensor.capture(object, press, noise_seed, number);
     return PressedHeights{estimators->local().estimate(view_of(touch.frame)).height_mm.clone(), view_of(touch.height)};
   };
 }
 
-PressedHeights press_texture(const sim::TouchRig& rig, const sim::ObjectSpec& object, const TexturePresses& presses,
-                             int texture, int image, const HeightsOf& look) {
+PressedHeights press_texture(const sim::VirtualSensor& sensor, const sim::ObjectSpec& object,
+                             const TexturePresses& presses, int texture, int image, const HeightsOf& look) {
   const auto number = (static_cast<std::uint64_t>(texture) << 16) + static_cast<std::uint64_t>(image);
   RandomStream random(presses.seed, number, Purpose::kPlacement);
   const std::uint64_t piece = (static_cast<std::uint64_t>(random()) << 32) + random();
   const double turn_deg = 360.0 * random.uniform();
   const Eigen::Vector2d place(presses.shift_mm * random.normal(), presses.shift_mm * random.normal());
   const double force = presses.force_N * std::max(0.2, 1.0 + presses.force_spread * random.normal());
-  const sim::TouchObject touching = rig.object(another_patch(object, piece));
-  return look(touching, pressed(rig, touching, place, turn_deg, force), static_cast<int>(number));
+  const sim::TouchObject touching = sensor.object(another_patch(object, piece));
+  return look(touching, pressed(sensor, touching, place, turn_deg, force), static_cast<int>(number));
 }
 
 std::vector<cv::Mat> middle_squares(const cv::Mat& image, int side) {
@@ -191,7 +195,7 @@ std::vector<cv::Mat> middle_squares(const cv::Mat& image, int side) {
   return squares;
 }
 
-TextureSamples texture_samples(const sim::TouchRig& rig, const std::vector<sim::ObjectSpec>& objects,
+TextureSamples texture_samples(const sim::VirtualSensor& sensor, const std::vector<sim::ObjectSpec>& objects,
                                const TexturePresses& presses, const HeightsOf& look, const Progress& progress) {
   constexpr int kSide = 200;
   const int images = static_cast<int>(objects.size()) * presses.images;
@@ -199,7 +203,7 @@ TextureSamples texture_samples(const sim::TouchRig& rig, const std::vector<sim::
   std::atomic<int> done = 0;
   tbb::parallel_for(0, images, [&](int k) {
     const int texture = k / presses.images;
-    const PressedHeights heights = press_texture(rig, objects[texture], presses, texture, k % presses.images, look);
+    const PressedHeights heights = press_texture(sensor, objects[texture], presses, texture, k % presses.images, look);
     estimated[k] = middle_squares(heights.estimated, kSide);
     membrane[k] = middle_squares(heights.membrane, kSide);
     if (progress) progress("pressing textures", ++done, images);

@@ -1,7 +1,6 @@
 #pragma once
-// Material recognition with a GelSight: sec. 5.3.2 of the text (shared/seeds/004), Li and Adelson, CVPR 2013. Each of
-// 40 surfaces is pressed six times, turned at random; each height image gives four samples; some samples of each class
-// train the classifier, the others test it.
+// Material recognition with a GelSight [Li2015, sec. 5.3.2], [Li2013]. Each of 40 surfaces is pressed six times, turned
+// at random; each height image gives four samples; some samples of each class train the classifier, the others test it.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -15,7 +14,7 @@
 #include "fem/contact/press.h"
 #include "sensors/heights/height_model.h"
 #include "sensors/texture/texture_model.h"
-#include "sim/sensor/touch_rig.h"
+#include "sim/sensor/virtual_sensor.h"
 
 namespace touchstone::lab {
 
@@ -47,16 +46,17 @@ inline constexpr int kTextureView_px = 400;
 
 /// A height model of the view's pixels alone, where light is good: from a ball of 2 mm pressed in at 3 x 3 places, its
 /// circle found in the frames, as a user would calibrate. @throws Error as sensors::calibrate_height
-sensors::HeightModel calibrate_view(const sim::TouchRig& rig, std::uint64_t noise_seed);
+sensors::HeightModel calibrate_view(const sim::VirtualSensor& sensor, std::uint64_t noise_seed);
 
-/// Heights of the view as the sensor gives them: from the camera's frame, by a model of calibrate_view. The rig must
+/// Heights of the view as the sensor gives them: from the camera's frame, by a model of calibrate_view. The sensor must
 /// outlive it. @throws Error if the model can't be used
-HeightsOf estimated_heights(const sim::TouchRig& rig, const sensors::HeightModel& model, std::uint64_t noise_seed);
+HeightsOf estimated_heights(const sim::VirtualSensor& sensor, const sensors::HeightModel& model,
+                            std::uint64_t noise_seed);
 
 /// The height images of press number `image` on class number `texture`: a new piece of the surface, at a random angle,
 /// place and force, all chosen by (seed, texture, image).
-PressedHeights press_texture(const sim::TouchRig& rig, const sim::ObjectSpec& object, const TexturePresses& presses,
-                             int texture, int image, const HeightsOf& look);
+PressedHeights press_texture(const sim::VirtualSensor& sensor, const sim::ObjectSpec& object,
+                             const TexturePresses& presses, int texture, int image, const HeightsOf& look);
 
 /// Four squares of `side` px about the image's middle, which don't overlap. @throws Error for a smaller image
 std::vector<cv::Mat> middle_squares(const cv::Mat& image, int side);
@@ -74,12 +74,12 @@ struct TextureSamples {
 };
 
 /// All samples of `objects`, by class, then image, then square; presses run in parallel.
-TextureSamples texture_samples(const sim::TouchRig& rig, const std::vector<sim::ObjectSpec>& objects,
+TextureSamples texture_samples(const sim::VirtualSensor& sensor, const std::vector<sim::ObjectSpec>& objects,
                                const TexturePresses& presses, const HeightsOf& look, const Progress& progress = {});
 
 /// How samples are divided into those that train and those that test.
 enum class TextureSplit {
-  by_sample,  ///< the text's way: squares of one image may stand on both sides
+  by_sample,  ///< the thesis's way: squares of one image may stand on both sides
   by_image,   ///< stricter: all squares of an image stand on the same side
 };
 

@@ -17,18 +17,16 @@
 namespace touchstone::lab {
 namespace {
 
-constexpr double kApproach_mm = 0.15;  // above the gel at the start: a tilted face doesn't touch yet
 constexpr int kMarkColumns = 15, kMarkRows = 11;
 constexpr double kMarkedShare = 0.96;  // of the picture that the marks cover
 
-sim::MotionSpec press_of(const Grip& grip, double origin_mm) {
-  sim::MotionSpec motion;
-  motion.start_mm = {grip.place_mm.x(), grip.place_mm.y(), origin_mm + kApproach_mm};
-  motion.start_angles_deg = Eigen::Vector3d(grip.tilt.x(), grip.tilt.y(), grip.angle) / kRadiansPerDegree;
-  sim::MotionKey key;
-  key.z = sim::AxisKey{origin_mm - grip.depth_mm, std::nullopt};
-  motion.keys = {key};
-  return motion;
+/// `origin_mm`: the height at which the untilted object first touches.
+sim::PressSpec press_of(const Grip& grip, double origin_mm) {
+  sim::PressSpec press;
+  press.place_mm = grip.place_mm;
+  press.angles_deg = Eigen::Vector3d(grip.tilt.x(), grip.tilt.y(), grip.angle) / kRadiansPerDegree;
+  press.height_mm = origin_mm - grip.depth_mm;
+  return press;
 }
 
 /// The pose in the plane of the object's touched face, `origin_mm` under its origin.
@@ -38,22 +36,22 @@ sensors::PlanarPose planar(const RigidTransform& gel_from_object, double origin_
   return {std::atan2(along.y(), along.x()), face.head<2>()};
 }
 
-sensors::PlaceMap fitted_places(const sim::TouchRig& rig) {
-  const int width = rig.device().camera->width, height = rig.device().camera->height;
+sensors::PlaceMap fitted_places(const sim::VirtualSensor& sensor) {
+  const int width = sensor.device().camera->width, height = sensor.device().camera->height;
   std::vector<Eigen::Vector2d> pixels, places;
   for (int j = 0; j < kMarkRows; ++j) {
     for (int i = 0; i < kMarkColumns; ++i) {
       const Eigen::Vector2d share(2.0 * i / (kMarkColumns - 1) - 1.0, 2.0 * j / (kMarkRows - 1) - 1.0);
       const Eigen::Vector2d pixel =
           0.5 * Eigen::Vector2d(width, height).cwiseProduct(Eigen::Vector2d::Ones() + kMarkedShare * share);
-      places.push_back(rig.gel_from_pixel(pixel));
+      places.push_back(sensor.gel_from_pixel(pixel));
       pixels.push_back(pixel - Eigen::Vector2d::Constant(0.5));  // continuous indices
     }
   }
   return sensors::fit_place_map(pixels, places, {width, height});
 }
 
-/// Contact where the level of rest isn't known: the higher of two classes of heights (Otsu 1979).
+/// Contact where the level of rest isn't known: the higher of two classes of heights [Otsu1979].
 cv::Mat higher_part(const cv::Mat& heights) {
   cv::Mat grey, mask;
   cv::normalize(heights, grey, 0.0, 255.0, cv::NORM_MINMAX, CV_8U);
@@ -63,19 +61,18 @@ cv::Mat higher_part(const cv::Mat& heights) {
 
 }  // namespace
 
-TouchBench::TouchBench(const sim::TouchRig& rig, HeightReader heights)
-    : rig_(rig), heights_(std::move(heights)), places_(fitted_places(rig)) {}
+TouchBench::TouchBench(const sim::VirtualSensor& sensor, HeightReader heights)
+    : sensor_(sensor), heights_(std::move(heights)), places_(fitted_places(sensor)) {}
 
 std::vector<HeldTouch> TouchBench::touches(const sim::TouchObject& object, std::span<const Grip> grips,
                                            std::uint64_t seed) const {
-  const double origin = reach_below(object.spec());
+  const double origin = sim::first_touch({}, object.spec(), sensor_.device().gel);
   std::vector<sim::Touch> seen(grips.size());
   std::vector<HeldTouch> touches(grips.size());
   tbb::parallel_for(std::size_t{0}, grips.size(), [&](std::size_t i) {
-    const fem::PressState press = rig_.play(object, press_of(grips[i], origin)).back().press;
-    seen[i] = rig_.look(object, press, seed + i);
-    touches[i].touch_from_object = planar(press.gel_from_object, origin);
-    touches[i].force_N = press.bodies.front().wrench[2];
+    seen[i] = sensor_.press(object, press_of(grips[i], origin), {.noise_seed = seed + i});
+    touches[i].touch_from_object = planar(seen[i].press.gel_from_object, origin);
+    touches[i].force_N = seen[i].force_N().z();
   });
   for (std::size_t i = 0; i < grips.size(); ++i) {
     const cv::Mat heights = heights_(seen[i]);
@@ -85,8 +82,8 @@ std::vector<HeldTouch> TouchBench::touches(const sim::TouchObject& object, std::
   return touches;
 }
 
-HeightReader estimated_heights(const sim::TouchRig& rig, std::uint64_t seed) {
-  const CalibratedRig calibrated = calibrate_rig(rig, {}, {}, seed);
+HeightReader estimated_heights(const sim::VirtualSensor& sensor, std::uint64_t seed) {
+  const CalibratedRig calibrated = calibrate_rig(sensor, {}, {}, seed);
   sensors::HeightSettings settings;
   settings.border = sensors::HeightBorder::free;
   const auto estimator = std::make_shared<sensors::HeightEstimator>(calibrated.calibration.model, settings);

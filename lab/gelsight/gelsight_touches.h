@@ -10,7 +10,7 @@
 #include "sensors/touch_map/place_map.h"
 #include "sensors/touch_map/planar_pose.h"
 #include "sensors/touch_map/touch_image.h"
-#include "sim/sensor/touch_rig.h"
+#include "sim/sensor/virtual_sensor.h"
 
 namespace touchstone::lab {
 
@@ -36,26 +36,26 @@ struct HeldTouch {
 class TouchBench {
  public:
   /// The place map is fitted to a grid of marks on the undeformed gel, as a target with printed dots would give it.
-  /// Keeps a reference to the rig.
-  TouchBench(const sim::TouchRig& rig, HeightReader heights);
+  /// Keeps a reference to the sensor.
+  TouchBench(const sim::VirtualSensor& sensor, HeightReader heights);
 
   /// Grip i has noise seed `seed` + i. Simulated side by side, read one after the other: the same touches with any
   /// number of threads.
   std::vector<HeldTouch> touches(const sim::TouchObject& object, std::span<const Grip> grips, std::uint64_t seed) const;
 
-  const sim::TouchRig& rig() const { return rig_; }
+  const sim::VirtualSensor& sensor() const { return sensor_; }
   const sensors::PlaceMap& places() const { return places_; }
 
  private:
-  const sim::TouchRig& rig_;
+  const sim::VirtualSensor& sensor_;
   HeightReader heights_;
   sensors::PlaceMap places_;
 };
 
-/// The estimator's heights: calibrated on the rig by ball presses as a user would
+/// The estimator's heights: calibrated on the sensor by ball presses as a user would
 /// (lab/gelsight/gelsight_height_experiment.h), integrated with a free border since objects run out of the picture.
 /// @throws Error as calibrate_rig does
-HeightReader estimated_heights(const sim::TouchRig& rig, std::uint64_t seed);
+HeightReader estimated_heights(const sim::VirtualSensor& sensor, std::uint64_t seed);
 
 /// True heights with normal noise of `noise_mm` in each pixel: a reader that leaves the estimator out.
 HeightReader true_heights(double noise_mm, std::uint64_t seed);

@@ -1,6 +1,6 @@
-// Which ball to calibrate gelsight with. Source text 004, sec. 2.2.2: a larger one has more pixels, which fill the
-// table of colours better; a small one can be pressed in so far that steep slopes are seen, too; so "around 2 mm". Here
-// each size is used by itself, and what it teaches is tried on other balls.
+// Which ball to calibrate gelsight with. [Li2015, sec. 2.2.2]: a larger one has more pixels, which fill the table of
+// colours better; a small one can be pressed in so far that steep slopes are seen, too; so "around 2 mm". Here each
+// size is used by itself, and what it teaches is tried on other balls.
 
 #include <algorithm>
 #include <array>
@@ -20,14 +20,15 @@ constexpr double kDeepest = 0.3;  // of a ball's diameter
 constexpr double kRim = 1.15;     // of the contact's radius: the membrane's own slope around it and the hand's errors
 
 /// Mean absolute error (um) over presses of other balls than any that calibrates.
-double error_elsewhere(const sim::TouchRig& rig, sensors::HeightEstimator& estimator) {
+double error_elsewhere(const sim::VirtualSensor& sensor, sensors::HeightEstimator& estimator) {
   double sum = 0.0;
   int count = 0;
   for (const double diameter : {3.0, 6.0, 16.0}) {
-    const sim::TouchObject ball = rig.object(ball_of(diameter));
+    const sim::TouchObject ball = sensor.object(ball_of(diameter));
     for (const double depth : {0.2, 0.5}) {
-      const sim::Touch touch = touch_once(rig, ball, {{0.7, -0.9}, depth}, kTestSeed + static_cast<unsigned>(count));
-      sum += height_error(estimator.estimate(touch.frame), touch, rig.mm_per_px()).mean_um;
+      const sim::Touch touch = sensor.press(ball, {.place_mm = {0.7, -0.9}, .depth_mm = depth},
+                                            {.noise_seed = kTestSeed + static_cast<unsigned>(count)});
+      sum += height_error(estimator.estimate(touch.frame), touch, sensor.mm_per_px()).mean_um;
       ++count;
     }
   }
@@ -37,14 +38,15 @@ double error_elsewhere(const sim::TouchRig& rig, sensors::HeightEstimator& estim
 }  // namespace
 
 std::vector<ValidationRow> validate_gelsight_design(const ValidateOptions& options) {
-  sim::TouchRigSettings settings;
+  sim::VirtualSensorSettings settings;
   settings.membrane_um = kMembrane_um;
-  const sim::TouchRig rig(sim::read_device(options.scenes / "devices" / "gelsight-flat.yaml"), options.cache, settings);
+  const sim::VirtualSensor sensor(sim::read_device(options.scenes / "devices" / "gelsight-flat.yaml"), options.cache,
+                                  settings);
   RowList rows("gelsight.design.", options, RowList::Since::last_row);
   std::vector<double> diameters = {2.0, 4.0, 12.7};
   if (!options.quick) diameters = {1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.7, 22.25};
-  const cv::Size picture = rig.background(kCalibrationSeed, 0).size();
-  const Eigen::Vector2d seen_mm = rig.mm_per_px() * Eigen::Vector2d(picture.width, picture.height);
+  const cv::Size picture = sensor.background(kCalibrationSeed, 0).size();
+  const Eigen::Vector2d seen_mm = sensor.mm_per_px() * Eigen::Vector2d(picture.width, picture.height);
   std::vector<std::pair<double, double>> steepest, error, pixels;
   for (const double diameter : diameters) {
     CalibrationPresses presses;
@@ -59,13 +61,13 @@ std::vector<ValidationRow> validate_gelsight_design(const ValidateOptions& optio
       presses.columns = 3;
       presses.rows = 2;
     }
-    const CalibratedRig made = calibrate_rig(rig, presses, {}, kCalibrationSeed);
+    const CalibratedRig made = calibrate_rig(sensor, presses, {}, kCalibrationSeed);
     const sensors::TableCoverage& coverage = made.calibration.coverage;
     sensors::HeightEstimator estimator(made.calibration.model);
     // Balls that can't go as deep as the others show slopes of their depth, not of their size.
     if (depth == kDepth_mm) steepest.emplace_back(diameter, coverage.steepest_slope);
     pixels.emplace_back(diameter, static_cast<double>(made.calibration.pixels) / made.presses);
-    error.emplace_back(diameter, error_elsewhere(rig, estimator));
+    error.emplace_back(diameter, error_elsewhere(sensor, estimator));
     rows.add(fmt::format("ball_{:g}mm_table_percent", diameter),
              fmt::format(
                  "cells of the colour table that {} presses of a ball of {:g} mm to {:.2g} mm fill: {} of {}, from {} "
@@ -89,14 +91,14 @@ std::vector<ValidationRow> validate_gelsight_design(const ValidateOptions& optio
   ValidationRow& more =
       rows.add("pixels_of_largest_over_smallest",
                "pixels that a press of the largest ball teaches from over those of the smallest; holds if "
-               "they rise from each size to the next, as the text says",
+               "they rise from each size to the next, as the thesis says",
                "1", pixels.back().second / pixels.front().second, Better::higher,
                std::is_sorted(pixels.begin(), pixels.end(), rises));
   more.series = ValidationSeries{"ball's diameter, mm", "pixels of a press", pixels};
   const auto best = std::min_element(error.begin(), error.end(), rises);
   ValidationRow& chosen = rows.add(
       "best_ball_mm",
-      fmt::format("the ball that calibrates best by itself, {:.1f} um off on others; the text's of 2 mm is {:.1f} "
+      fmt::format("the ball that calibrates best by itself, {:.1f} um off on others; the thesis's of 2 mm is {:.1f} "
                   "um off",
                   best->second,
                   std::find_if(error.begin(), error.end(), [](auto& e) { return e.first == 2.0; })->second),

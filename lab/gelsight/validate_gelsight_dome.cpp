@@ -15,7 +15,7 @@ namespace {
 constexpr double kAllowedRadius_percent = 3.0;  // a pixel and a half in the smallest disc
 constexpr double kAllowedCentre_mm = 0.1;
 constexpr double kTilt_deg = 6.0;
-constexpr double kPublishedResolution_um = 40.0;  // text, sec. 2.2.2: 10 to 40 um
+constexpr double kPublishedResolution_um = 40.0;  // [Li2015, sec. 2.2.2]: 10 to 40 um
 
 ValidationRow row(const char* id, std::string title, const char* unit, double ours, bool holds, bool quick,
                   std::chrono::steady_clock::time_point begun) {
@@ -35,10 +35,11 @@ ValidationRow row(const char* id, std::string title, const char* unit, double ou
 
 std::vector<ValidationRow> validate_gelsight_dome(const ValidateOptions& options) {
   auto begun = std::chrono::steady_clock::now();
-  sim::TouchRigSettings settings;
+  sim::VirtualSensorSettings settings;
   settings.seed = 11;
-  const sim::TouchRig rig(sim::read_device(options.scenes / "devices" / "gelsight-dome.yaml"), options.cache, settings);
-  const sim::GelSpec& gel = rig.device().gel;
+  const sim::VirtualSensor sensor(sim::read_device(options.scenes / "devices" / "gelsight-dome.yaml"), options.cache,
+                                  settings);
+  const sim::GelSpec& gel = sensor.device().gel;
   std::vector<ValidationRow> rows;
 
   const std::vector<double> depths =
@@ -48,7 +49,7 @@ std::vector<ValidationRow> validate_gelsight_dome(const ValidateOptions& options
   ValidationSeries series{"force, N", "radius of the contact disc, mm", {}};
   std::uint64_t noise = 0;
   for (const double depth : depths) {
-    const PlateContact contact = press_plate(rig, depth, 0.0, ++noise);
+    const PlateContact contact = press_plate(sensor, depth, 0.0, ++noise);
     const double error = 100.0 * (contact.radius_mm / plate_radius_on_layer(gel, contact.force_N) - 1.0);
     if (std::abs(error) > std::abs(worst)) worst = error;
     if (depth == depths.front()) {
@@ -71,7 +72,7 @@ std::vector<ValidationRow> validate_gelsight_dome(const ValidateOptions& options
   rows.back().reference = 0.0;
 
   begun = std::chrono::steady_clock::now();
-  const PlateContact tilted = press_plate(rig, 0.15, kTilt_deg * kRadiansPerDegree, ++noise);
+  const PlateContact tilted = press_plate(sensor, 0.15, kTilt_deg * kRadiansPerDegree, ++noise);
   const double centre_error = (tilted.centre_mm - tilted.expected_mm).norm();
   rows.push_back(
       row("gelsight.dome.tilted_centre_error_mm",
@@ -88,7 +89,7 @@ std::vector<ValidationRow> validate_gelsight_dome(const ValidateOptions& options
     presses.columns = 3;
     presses.rows = 2;
   }
-  const DomeHeights heights = measure_dome_heights(rig, presses, sensors::LightCorrection::none, 100);
+  const DomeHeights heights = measure_dome_heights(sensor, presses, sensors::LightCorrection::none, 100);
   double mean_um = 0.0;
   for (const HeightError& error : heights.balls) mean_um += error.mean_um / static_cast<double>(heights.balls.size());
   rows.push_back(row("gelsight.dome.height_error_um",

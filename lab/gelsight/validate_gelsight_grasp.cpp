@@ -1,8 +1,8 @@
-// The grasps of the fingertip GelSight's text (shared/seeds/004, sec. 4.5, fig. 4-9): egg, chip and leaf are lifted
-// with the grasp rule, led by camera frames. The text shows one grasp of each, and all are held; here each is tried
-// over a range of frictions, weights, places and turns, with other noise each time. The rule's steps and the arm's
-// speed were chosen on one grasp of each object with a friction of 0.6 in the middle of the gel, none of the full
-// form's trials; how long slip is forgotten after it was told (GraspSenseSettings) was chosen on its second one.
+// The grasps of [Li2015, sec. 4.5, fig. 4-9]: egg, chip and leaf are lifted with the grasp rule, led by camera frames.
+// The thesis shows one grasp of each, and all are held; here each is tried over a range of frictions, weights, places
+// and turns, with other noise each time. The rule's steps and the arm's speed were chosen on one grasp of each object
+// with a friction of 0.6 in the middle of the gel, none of the full form's trials; how long slip is forgotten after it
+// was told (GraspSenseSettings) was chosen on its second one.
 
 #include <tbb/parallel_for.h>
 
@@ -64,7 +64,7 @@ struct Trials {
   }
 };
 
-/// The text names no friction; its own force ratios go from 0.04 to 2.21.
+/// The thesis names no friction; its own force ratios go from 0.04 to 2.21.
 std::vector<GraspTrial> trials_of(const std::vector<sim::ObjectSpec>& objects, bool quick) {
   struct Grasp {
     Eigen::Vector2d place_mm;
@@ -94,13 +94,13 @@ std::vector<GraspTrial> trials_of(const std::vector<sim::ObjectSpec>& objects, b
 
 /// Plays the trials. `known`, if given, are outcomes of the same trials with at least as much answered to slip: where
 /// nothing was answered then, the same frames lead to the same end, and it isn't played again.
-Trials run(const sim::TouchRig& rig, const sensors::TouchCalibration& calibration,
+Trials run(const sim::VirtualSensor& sensor, const sensors::TouchCalibration& calibration,
            const std::vector<GraspTrial>& trials, const GraspLoopSettings& loop, const GraspSenseSettings& senses,
            const Trials* known = nullptr) {
   Trials result{trials, known != nullptr ? known->outcomes : std::vector<GraspOutcome>(trials.size())};
   tbb::parallel_for(std::size_t{0}, trials.size(), [&](std::size_t i) {
     if (known != nullptr && known->outcomes[i].slip_answers == 0) return;
-    result.outcomes[i] = run_grasp_trial(rig, trials[i], loop, grasp_senses(calibration, senses));
+    result.outcomes[i] = run_grasp_trial(sensor, trials[i], loop, grasp_senses(calibration, senses));
   });
   return result;
 }
@@ -109,15 +109,15 @@ Trials run(const sim::TouchRig& rig, const sensors::TouchCalibration& calibratio
 
 std::vector<ValidationRow> validate_gelsight_grasp(const ValidateOptions& options) {
   auto begun = std::chrono::steady_clock::now();
-  sim::TouchRigSettings light;
+  sim::VirtualSensorSettings light;
   light.widest_mm = kWidest_mm;
   light.membrane_um = kMembrane_um;
   light.edge_side = kEdgeSide;
   const auto rig_of = [&](const char* device) {
-    return sim::TouchRig(sim::read_device(options.scenes / "devices" / device), options.cache, light);
+    return sim::VirtualSensor(sim::read_device(options.scenes / "devices" / device), options.cache, light);
   };
-  const sim::TouchRig rig = rig_of("gelsight-markers.yaml");
-  const sensors::TouchCalibration calibration = calibrate_for_grasps(rig_of("gelsight-flat.yaml"), rig, kSeed);
+  const sim::VirtualSensor sensor = rig_of("gelsight-markers.yaml");
+  const sensors::TouchCalibration calibration = calibrate_for_grasps(rig_of("gelsight-flat.yaml"), sensor, kSeed);
   std::vector<sim::ObjectSpec> objects;
   for (const char* name : {"egg.yaml", "chip.yaml", "leaf.yaml"}) {
     objects.push_back(sim::read_object(options.scenes / "objects" / name));
@@ -146,7 +146,7 @@ std::vector<ValidationRow> validate_gelsight_grasp(const ValidateOptions& option
     row.holds = count == of;
   };
 
-  const Trials ruled = run(rig, calibration, trials, loop, {});
+  const Trials ruled = run(sensor, calibration, trials, loop, {});
   const int all = static_cast<int>(trials.size());
   add_count("gelsight.grasp.held_of_trials",
             "egg, chip and leaf lifted by the rule, held for a second without sliding, not crushed" + ruled.failures(),
@@ -166,7 +166,7 @@ std::vector<ValidationRow> validate_gelsight_grasp(const ValidateOptions& option
   const auto add_control = [&](const std::string& id, const std::string& title, const GraspLoopSettings& how,
                                const GraspSenseSettings& senses) {
     begun = std::chrono::steady_clock::now();
-    const Trials control = run(rig, calibration, trials, how, senses, &ruled);
+    const Trials control = run(sensor, calibration, trials, how, senses, &ruled);
     ValidationRow& row = add(id, title + control.failures(), fmt::format("of {}", all));
     row.reference = ruled.held();
     row.ours = control.held();
@@ -179,7 +179,7 @@ std::vector<ValidationRow> validate_gelsight_grasp(const ValidateOptions& option
     GraspSenseSettings ratios;
     ratios.rim = false;
     add_control("gelsight.grasp.ratios_held_of_trials",
-                "the same trials with slip by the text's two ratios alone, above 1 and 0.5", loop, ratios);
+                "the same trials with slip by the thesis's two ratios alone, above 1 and 0.5", loop, ratios);
   }
   return rows;
 }

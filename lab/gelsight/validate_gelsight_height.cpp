@@ -1,6 +1,5 @@
-// Height maps of the gelsight sensor (source text 004, sec. 2.2): error against the true membrane, resolution, what is
-// visible, rate. Calibrated on the simulated device with a 2 mm ball as a user would, tested on what calibration never
-// saw.
+// Height maps of the gelsight sensor [Li2015, sec. 2.2]: error against the true membrane, resolution, what is visible,
+// rate. Calibrated on the simulated device with a 2 mm ball as a user would, tested on what calibration never saw.
 
 #include <fmt/format.h>
 
@@ -29,7 +28,7 @@ constexpr double kPortableMembrane_um = 8.0;
 
 /// What all rows share.
 struct Bench {
-  const sim::TouchRig& rig;
+  const sim::VirtualSensor& sensor;
   sensors::HeightEstimator& estimator;
   bool quick;
 };
@@ -54,13 +53,13 @@ Errors errors_of_shapes(const Bench& bench) {
   int count = 0;
   int ball_count = 0;
   for (std::size_t i = 0; i < objects.size(); ++i) {
-    const sim::TouchObject object = bench.rig.object(objects[i]);
+    const sim::TouchObject object = bench.sensor.object(objects[i]);
     for (const double depth : {0.2, 0.5}) {
       for (const Eigen::Vector2d& place : {Eigen::Vector2d(0.7, -0.9), Eigen::Vector2d(-3.1, 2.0)}) {
         if (i >= balls && place.x() < 0.0) continue;  // it would run out of the picture
-        const sim::Touch touch =
-            touch_once(bench.rig, object, {place, depth}, kTestSeed + static_cast<unsigned>(count));
-        const HeightError error = height_error(bench.estimator.estimate(touch.frame), touch, bench.rig.mm_per_px());
+        const sim::Touch touch = bench.sensor.press(object, {.place_mm = place, .depth_mm = depth},
+                                                    {.noise_seed = kTestSeed + static_cast<unsigned>(count)});
+        const HeightError error = height_error(bench.estimator.estimate(touch.frame), touch, bench.sensor.mm_per_px());
         sum += error.mean_um;
         errors.worst_um = std::max(errors.worst_um, error.worst_um);
         ++count;
@@ -77,12 +76,13 @@ Errors errors_of_shapes(const Bench& bench) {
 }
 
 /// Standard deviation of a pixel's height from frame to frame, um, round the middle of a press that is held.
-double noise_um(const Bench& bench, const sim::TouchObject& object, const StraightPress& press) {
+double noise_um(const Bench& bench, const sim::TouchObject& object, const sim::PressSpec& press) {
   constexpr int kFrames = 6;
   cv::Mat sum;
   cv::Mat squares;
   for (int i = 0; i < kFrames; ++i) {
-    const sim::Touch touch = touch_once(bench.rig, object, press, kTestSeed + 500U + static_cast<unsigned>(i), false);
+    const sim::Touch touch =
+        bench.sensor.press(object, press, {.truth = false, .noise_seed = kTestSeed + 500U + static_cast<unsigned>(i)});
     cv::Mat heights;
     bench.estimator.estimate(touch.frame).height_mm.convertTo(heights, CV_64F);
     if (sum.empty()) {
@@ -94,16 +94,16 @@ double noise_um(const Bench& bench, const sim::TouchObject& object, const Straig
   }
   const cv::Mat variance = (squares - sum.mul(sum) / kFrames) / (kFrames - 1);
   const double half_mm = 1.0;
-  const auto middle = bench.rig.pixel_from_gel(press.place_mm);
-  const int half = static_cast<int>(half_mm / bench.rig.mm_per_px());
+  const auto middle = bench.sensor.pixel_from_gel(press.place_mm);
+  const int half = static_cast<int>(half_mm / bench.sensor.mm_per_px());
   const cv::Rect part(static_cast<int>(middle.x()) - half, static_cast<int>(middle.y()) - half, 2 * half, 2 * half);
   return kMicrometresPerMillimetre * std::sqrt(cv::mean(variance(part))[0]);
 }
 
 /// A square of the picture round the middle of the gel.
-cv::Rect middle_square(const sim::TouchRig& rig, double half_mm) {
-  const Eigen::Vector2d middle = rig.pixel_from_gel({0, 0});
-  const int half = static_cast<int>(half_mm / rig.mm_per_px());
+cv::Rect middle_square(const sim::VirtualSensor& sensor, double half_mm) {
+  const Eigen::Vector2d middle = sensor.pixel_from_gel({0, 0});
+  const int half = static_cast<int>(half_mm / sensor.mm_per_px());
   return {static_cast<int>(middle.x()) - half, static_cast<int>(middle.y()) - half, 2 * half, 2 * half};
 }
 
@@ -118,10 +118,11 @@ Transfer transfer_of(const Bench& bench, double pitch_mm) {
   constexpr double kDepth_mm = 0.12;
   sim::ObjectSpec object = flat_cylinder_of(4.0);
   object.relief = sim::ReliefSpec{sim::WavesRelief{kAmplitude_um, pitch_mm}};
-  const sim::TouchObject grating = bench.rig.object(object);
-  const sim::Touch touch = touch_once(bench.rig, grating, {{0, 0}, kDepth_mm}, kTestSeed + 700U, false);
-  const cv::Rect part = middle_square(bench.rig, 1.1);
-  const double wavelength_px = pitch_mm / bench.rig.mm_per_px();
+  const sim::TouchObject grating = bench.sensor.object(object);
+  const sim::Touch touch =
+      bench.sensor.press(grating, {.depth_mm = kDepth_mm}, {.truth = false, .noise_seed = kTestSeed + 700U});
+  const cv::Rect part = middle_square(bench.sensor, 1.1);
+  const double wavelength_px = pitch_mm / bench.sensor.mm_per_px();
   const double half_um = 0.5 * kAmplitude_um;
   const double amplitude_mm = wave_amplitude(bench.estimator.estimate(touch.frame).height_mm, part, wavelength_px);
   return {pitch_mm, kMicrometresPerMillimetre * amplitude_mm / half_um};
@@ -148,15 +149,16 @@ std::vector<double> portable_pitches_mm(bool quick) {
 /// Gratings on the portable device, which has more pixels than the fingertip. It's calibrated on a coarser membrane,
 /// for a ball has no detail; the unit is the same.
 std::vector<Transfer> portable_transfers(const ValidateOptions& options, CalibrationPresses presses) {
-  sim::TouchRigSettings settings;
+  sim::VirtualSensorSettings settings;
   settings.membrane_um = kMembrane_um;
   const sim::DeviceSpec device = sim::read_device(options.scenes / "devices" / "gelsight-portable.yaml");
   presses.extent_mm = {7.0, 4.6};  // it sees 12 x 9 mm
   sensors::HeightEstimator estimator(
-      calibrate_rig(sim::TouchRig(device, options.cache, settings), presses, {}, kCalibrationSeed).calibration.model);
+      calibrate_rig(sim::VirtualSensor(device, options.cache, settings), presses, {}, kCalibrationSeed)
+          .calibration.model);
   settings.membrane_um = kPortableMembrane_um;
-  const sim::TouchRig rig(device, options.cache, settings);
-  return transfers({rig, estimator, options.quick}, portable_pitches_mm(options.quick));
+  const sim::VirtualSensor sensor(device, options.cache, settings);
+  return transfers({sensor, estimator, options.quick}, portable_pitches_mm(options.quick));
 }
 
 /// The pitch at which the estimate's contrast falls to kSeen, between two pitches on a logarithmic scale; the finest
@@ -176,11 +178,12 @@ double resolved_pitch_mm(const std::vector<Transfer>& transfers) {
 /// How far the detail of an object stands over the noise: standard deviation of the estimate about its own blur over
 /// the middle of the contact, in standard deviations of the frame-to-frame noise of a plain press.
 double detail_over_noise(const Bench& bench, const sim::ObjectSpec& spec, double depth_mm, double noise) {
-  const sim::TouchObject object = bench.rig.object(spec);
-  const sim::Touch touch = touch_once(bench.rig, object, {{0, 0}, depth_mm}, kTestSeed + 800U, false);
-  const cv::Mat part = bench.estimator.estimate(touch.frame).height_mm(middle_square(bench.rig, 2.0));
+  const sim::TouchObject object = bench.sensor.object(spec);
+  const sim::Touch touch =
+      bench.sensor.press(object, {.depth_mm = depth_mm}, {.truth = false, .noise_seed = kTestSeed + 800U});
+  const cv::Mat part = bench.estimator.estimate(touch.frame).height_mm(middle_square(bench.sensor, 2.0));
   cv::Mat smooth;
-  const int width = 2 * static_cast<int>(0.5 / bench.rig.mm_per_px()) + 1;
+  const int width = 2 * static_cast<int>(0.5 / bench.sensor.mm_per_px()) + 1;
   cv::blur(part, smooth, {width, width}, {-1, -1}, cv::BORDER_REFLECT);
   cv::Scalar mean;
   cv::Scalar deviation;
@@ -209,18 +212,18 @@ std::vector<ValidationRow> validate_gelsight_height(const ValidateOptions& optio
     if (options.progress) options.progress("gelsight: height", done, 6);
   };
   report(0);
-  sim::TouchRigSettings rig_settings;
+  sim::VirtualSensorSettings rig_settings;
   rig_settings.membrane_um = kMembrane_um;
-  const sim::TouchRig rig(sim::read_device(options.scenes / "devices" / "gelsight-flat.yaml"), options.cache,
-                          rig_settings);
+  const sim::VirtualSensor sensor(sim::read_device(options.scenes / "devices" / "gelsight-flat.yaml"), options.cache,
+                                  rig_settings);
   CalibrationPresses presses;
   if (options.quick) {
     presses.columns = 3;
     presses.depths_mm = {0.5};
   }
-  const CalibratedRig calibrated = calibrate_rig(rig, presses, {}, kCalibrationSeed);
+  const CalibratedRig calibrated = calibrate_rig(sensor, presses, {}, kCalibrationSeed);
   sensors::HeightEstimator estimator(calibrated.calibration.model);
-  const Bench bench{rig, estimator, options.quick};
+  const Bench bench{sensor, estimator, options.quick};
   report(1);
 
   const Errors errors = errors_of_shapes(bench);
@@ -260,8 +263,8 @@ std::vector<ValidationRow> validate_gelsight_height(const ValidateOptions& optio
                  portable_transfers(options, presses));
   report(4);
 
-  const sim::TouchObject plain = rig.object(flat_cylinder_of(4.0));
-  const double noise = noise_um(bench, plain, {{0, 0}, 0.12});
+  const sim::TouchObject plain = sensor.object(flat_cylinder_of(4.0));
+  const double noise = noise_um(bench, plain, {.depth_mm = 0.12});
   rows.add("smallest_um", "height that stands three standard deviations over one pixel's noise in one frame", "um",
            kVisible * noise, Better::lower, kVisible * noise <= kPublishedResolution_um)
       .reference = kPublishedResolution_um;
@@ -274,7 +277,7 @@ std::vector<ValidationRow> validate_gelsight_height(const ValidateOptions& optio
   }
   report(5);
 
-  const double rate = rate_Hz(estimator, rig.background(kTestSeed));
+  const double rate = rate_Hz(estimator, sensor.background(kTestSeed));
   rows.add("rate_Hz", "frames of 320 x 240 to heights on one core; 100 times the published rate is asked for", "Hz",
            rate, Better::higher, rate >= kWantedSpeedUp * kPublishedRate_Hz)
       .published = kPublishedRate_Hz;

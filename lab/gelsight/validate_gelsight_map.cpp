@@ -1,5 +1,5 @@
-// Localisation, mapping and insertion by touch: the published figures of the source text (004), ch. 3. Touches go the
-// whole way: gel, light, imager, height estimator calibrated by ball presses, registration.
+// Localisation, mapping and insertion by touch: the published figures of [Li2015, ch. 3]. Touches go the whole way:
+// gel, light, imager, height estimator calibrated by ball presses, registration.
 
 #include <fmt/format.h>
 
@@ -24,17 +24,17 @@ constexpr double kMembrane_um = 60.0;  // pixels of the fine contact: the camera
 constexpr double kQuickMembrane_um = 80.0;
 constexpr int kErrorRounds = 1000;
 
-/// The standard deviation along each axis at which a robot misses by more than 1 mm twice in 36 times: the text's two
+/// The standard deviation along each axis at which a robot misses by more than 1 mm twice in 36 times: the thesis's two
 /// failures, if they were the robot's (Rayleigh's distribution: exp(-1 / (2 s^2)) = 2 / 36).
 double suspected_robot_error_mm() {
   return 1.0 / std::sqrt(2.0 * std::log(18.0));
 }
 
 /// Objects without friction on the gel: a straight press hardly notices, and takes a third of the time.
-sim::TouchObject greased(const sim::TouchRig& rig, const std::filesystem::path& file) {
+sim::TouchObject greased(const sim::VirtualSensor& sensor, const std::filesystem::path& file) {
   sim::ObjectSpec object = sim::read_object(file);
   object.friction = 0.0;
-  return rig.object(object);
+  return sensor.object(object);
 }
 
 ValidationRow row(const std::string& id, const std::string& title, const std::string& unit,
@@ -54,13 +54,13 @@ ValidationRow row(const std::string& id, const std::string& title, const std::st
 
 std::vector<ValidationRow> validate_gelsight_map(const ValidateOptions& options) {
   const auto begun = std::chrono::steady_clock::now();
-  sim::TouchRigSettings rig_settings;
+  sim::VirtualSensorSettings rig_settings;
   rig_settings.membrane_um = options.quick ? kQuickMembrane_um : kMembrane_um;
-  const sim::TouchRig rig(sim::read_device(options.scenes / "devices" / "gelsight-flat.yaml"), options.cache,
-                          rig_settings);
-  const TouchBench bench(rig, estimated_heights(rig, kSeed));
-  const sim::TouchObject coin = greased(rig, options.scenes / "objects" / "coin-quarter.yaml");
-  const sim::TouchObject plug = greased(rig, options.scenes / "objects" / "usb-a-plug.yaml");
+  const sim::VirtualSensor sensor(sim::read_device(options.scenes / "devices" / "gelsight-flat.yaml"), options.cache,
+                                  rig_settings);
+  const TouchBench bench(sensor, estimated_heights(sensor, kSeed));
+  const sim::TouchObject coin = greased(sensor, options.scenes / "objects" / "coin-quarter.yaml");
+  const sim::TouchObject plug = greased(sensor, options.scenes / "objects" / "usb-a-plug.yaml");
 
   MapExperimentSettings settings;
   settings.seed = kSeed;
@@ -86,7 +86,7 @@ std::vector<ValidationRow> validate_gelsight_map(const ValidateOptions& options)
     rows.push_back(row("gelsight.map.rotation_sd_deg", "standard deviation of repeats, a plug's angle", "deg",
                        kPublishedTurnDeviation_deg, maps.turn_deg.mean_deviation, Better::lower));
   }
-  add_error("gelsight.map.features_translation_mm", "the same place by features alone, as the text has it", "mm",
+  add_error("gelsight.map.features_translation_mm", "the same place by features alone, as the thesis has it", "mm",
             kPublishedPlace_mm, maps.features_along_mm);
   add_error("gelsight.map.features_rotation_deg", "the same angle by features alone", "deg", kPublishedTurn_deg,
             maps.features_turn_deg);

@@ -1,7 +1,7 @@
-// Material recognition of the gelsight text (shared/seeds/004, sec. 5.3.2, table 5.2): 40 surfaces, six presses of
-// each, four squares of 200 x 200 px of each press. The device is calibrated by ball presses as a user would; frames
-// are made with noise; heights are estimated from frames. Nothing is tuned on these samples: the operator is the
-// text's, the height of a gray level is fixed below.
+// Material recognition of [Li2015, sec. 5.3.2, table 5.2]: 40 surfaces, six presses of each, four squares of 200 x 200
+// px of each press. The device is calibrated by ball presses as a user would; frames are made with noise; heights are
+// estimated from frames. Nothing is tuned on these samples: the operator is the thesis's, the height of a gray level is
+// fixed below.
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -61,7 +61,7 @@ constexpr Row kRows[] = {
 
 std::vector<ValidationRow> validate_gelsight_texture(const ValidateOptions& options) {
   const auto begun = std::chrono::steady_clock::now();
-  sim::TouchRigSettings how;
+  sim::VirtualSensorSettings how;
   how.seed = kSeed;
   how.deepest_mm = 1.0;
   how.membrane_um = 30.0;  // of the fine contact; a pixel of the camera sees 19 um
@@ -69,15 +69,15 @@ std::vector<ValidationRow> validate_gelsight_texture(const ValidateOptions& opti
   sim::DeviceSpec device = sim::read_device(options.scenes / "devices" / "gelsight-portable.yaml");
   // All samples are cut from the middle of the picture: the imager reads out no more than that.
   device.camera->width = device.camera->height = kTextureView_px;
-  const sim::TouchRig rig(std::move(device), options.cache, how);
-  const HeightsOf heights = estimated_heights(rig, calibrate_view(rig, kSeed), kSeed);
+  const sim::VirtualSensor sensor(std::move(device), options.cache, how);
+  const HeightsOf heights = estimated_heights(sensor, calibrate_view(sensor, kSeed), kSeed);
 
   std::vector<sim::ObjectSpec> objects = texture_objects(options.scenes);
   if (options.quick) objects = some_of(objects);
   TexturePresses presses;
   presses.seed = kSeed;
   if (options.quick) presses.images = 2;
-  const TextureSamples samples = texture_samples(rig, objects, presses, heights, options.progress);
+  const TextureSamples samples = texture_samples(sensor, objects, presses, heights, options.progress);
   const int of_a_class = kSquares * presses.images;
 
   std::vector<ValidationRow> rows;
@@ -97,7 +97,7 @@ std::vector<ValidationRow> validate_gelsight_texture(const ValidateOptions& opti
         "{} textures right{}, ({}, {}), {} of {} samples a class train{}, mean of {} splits ({:.2f} to {:.2f}){}{}",
         objects.size(), row.membrane ? " by the membrane's true heights" : "", row.op.circle.neighbours,
         row.op.circle.radius_px, training, of_a_class,
-        row.split == TextureSplit::by_image ? ", whole presses held out (stricter than the text)" : "", kSplits,
+        row.split == TextureSplit::by_image ? ", whole presses held out (stricter than the thesis)" : "", kSplits,
         score.worst, score.best, wrong.empty() ? "" : "; most mistaken: ", fmt::join(wrong, ", "));
     result.unit = std::string("%");
     result.published = row.published;

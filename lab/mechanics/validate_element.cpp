@@ -172,8 +172,7 @@ MechanicsFinding order_of(ErrorOf error, const std::vector<int>& cells) {
 }  // namespace
 
 std::vector<MechanicsCase> element_cases(bool quick) {
-  // Theory: third order in displacement, second in pressure (Boffi, Brezzi, Fortin, Mixed Finite Element Methods and
-  // Applications, sec. 8.8).
+  // Theory: third order in displacement, second in pressure [Boffi2013, sec. 8.8].
   const std::vector<int> cells = quick ? std::vector<int>{4, 8} : std::vector<int>{3, 6, 12};
   return {
       {"mechanics.patch", "a linear field is exact, nu to 0.4999", 0.0, Better::lower, 1e-9, patch},

@@ -149,7 +149,7 @@ double point_force(const MechanicsGels& gels, double edge, int axis,
   Eigen::VectorXd traction = Eigen::VectorXd::Zero(3 * n);
   traction[3 * source + axis] = (axis == 2 ? -1.0 : 1.0) / weight[source];
   const Eigen::VectorXd response = gel.surface.view() * traction;
-  Eigen::MatrixX3d datasets::difference(n, 3);
+  Eigen::MatrixX3d difference(n, 3);
   Eigen::MatrixX3d expected(n, 3);
   int rows = 0;
   for (Eigen::Index i = 0; i < n; ++i) {

@@ -278,8 +278,7 @@ std::vector<MechanicsCase> layer_cases(bool quick) {
          return sphere_errors(gels, {0.3, 0.49}, {0.3, 0.5});
        }},
       // Where contact ends the displacement is smooth up to H^(5/2) only, so that quadratic elements reach order 3/2 in
-      // the energy's norm (Belhachmi and Ben Belgacem, Math. Comp. 72, 2003); twice that in the energy, whose
-      // derivative the force is.
+      // the energy's norm [Belhachmi2003]; twice that in the energy, whose derivative the force is.
       {"mechanics.order_force",
        fmt::format("order of the force's error in the edge length, {} to {} mm, a sphere on a bonded layer",
                    edges.front(), edges.back()),
@@ -290,11 +289,11 @@ std::vector<MechanicsCase> layer_cases(bool quick) {
        [flat_edges](const MechanicsGels& gels) {
          return flat_errors(gels, flat_edges, {0.3, 0.49}, layer_punch_force);
        }},
-      {"mechanics.hayes", "a flat punch on a bonded layer, nu 0.3, a/h 0.4, against Hayes 1972, " + flat_mesh, 0.0,
+      {"mechanics.hayes", "a flat punch on a bonded layer, nu 0.3, a/h 0.4, against [Hayes1972], " + flat_mesh, 0.0,
        Better::lower, flat_bound,
        [flat_edges](const MechanicsGels& gels) { return flat_errors(gels, flat_edges, {0.3}, hayes_force); }},
       {"mechanics.dimitriadis",
-       "a sphere on an incompressible bonded layer, chi 0.2, where Dimitriadis 2002 itself is 1.1 % low", 0.0,
+       "a sphere on an incompressible bonded layer, chi 0.2, where [Dimitriadis2002] itself is 1.1 % low", 0.0,
        Better::lower, 0.02, dimitriadis},
       {"mechanics.thin_layer",
        fmt::format("a sphere on a thin incompressible layer, a/h 9, against integral equations, edges of {} h",

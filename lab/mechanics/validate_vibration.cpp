@@ -1,5 +1,5 @@
-// The gel's vibration against closed forms, and what the text of the vhs sensor left unexamined: its resonances, and
-// whether a press may be taken as quasi-static at 100 Hz (shared/seeds/000, sec. 5).
+// The gel's vibration against closed forms, and what the paper of the vhs sensor left unexamined: its resonances, and
+// whether a press may be taken as quasi-static at 100 Hz [VisioHaptic2024, sec. 5].
 
 #include <algorithm>
 #include <chrono>
@@ -270,7 +270,7 @@ std::vector<ValidationRow> validate_vibration(const ValidateOptions& options) {
   tell(1);
   error("vibration.thickness", "a block's motion across at nu = 0", 1e-4, thickness());
   const double falls = order();
-  // Theory: an eigenvalue's error is of twice the order of the mode's strains, 2 x 2 (Boffi, Acta Numerica 19, 2010).
+  // Theory: an eigenvalue's error is of twice the order of the mode's strains, 2 x 2 [Boffi2010].
   add("vibration.order", "order of an eigenfrequency's error", "1", falls, 4.0, Better::higher, falls > 3.5, lap());
   tell(2);
   error("vibration.incompressible", "ten frequencies at nu 0.4999 and 0.5", 1e-3, incompressible());

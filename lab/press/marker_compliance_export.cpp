@@ -42,7 +42,7 @@ Polygon disc_about(const Eigen::Vector2d& centre, double radius) {
   return polygon;
 }
 
-/// The part of a convex polygon within another one (Sutherland and Hodgman).
+/// The part of a convex polygon within another one [Sutherland1974].
 Polygon common_part(Polygon subject, const Polygon& window) {
   for (std::size_t e = 0; e < window.size() && !subject.empty(); ++e) {
     const Eigen::Vector2d& from = window[e];

@@ -1,6 +1,6 @@
 #pragma once
-// The text's experiments with reflex and explore mode (shared/seeds/003, sec. IV), and what it leaves open: other
-// loads, shear, collisions.
+// The paper's experiments with reflex and explore mode [Knoop2013, sec. IV], and what it leaves open: other loads,
+// shear, collisions.
 
 #include <cstdint>
 #include <optional>
@@ -68,7 +68,7 @@ std::vector<sensors::ExploreReading> explore(const cv::Mat& rest, std::span<cons
 /// count as no press.
 sensors::DilationPress fit_press(std::span<const sensors::ExploreReading> readings,
                                  std::span<const ReflexPicture> pictures, int terms);
-/// The law of eq. 1 from a touch's own states, as the text has it from a force gauge.
+/// The law of eq. 1 from a touch's own states, as the paper has it from a force gauge.
 sensors::ExponentialForce fit_law(const ReflexTouch& touch);
 
 struct ExploreScore {

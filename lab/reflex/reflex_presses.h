@@ -1,6 +1,6 @@
 #pragma once
-// The presses that the experiments of the reflex fingertip are made of (shared/seeds/003, secs. III.C to IV, and what
-// it leaves open), as ways for sim::PathPlayer. docs/sensors/reflex.md says what they cost.
+// The presses that the experiments of the reflex fingertip are made of ([Knoop2013, secs. III.C to IV], and what it
+// leaves open), as ways for sim::PathPlayer. docs/sensors/reflex.md says what they cost.
 
 #include <cstdint>
 #include <functional>
@@ -26,7 +26,7 @@ struct ReflexPress {
   double tilt_towards_deg = 0.0;  ///< where the object's axis leans to, from x to y: there it touches first
   Eigen::Vector2d place_mm = Eigen::Vector2d::Zero();  ///< of the object's own origin
   double friction = 0.5;                               ///< of rubber on a dry plate
-  double deepest_mm = 5.0;                             ///< the text's range
+  double deepest_mm = 5.0;                             ///< the paper's range
   double step_mm = 0.1;                                ///< from state to state, at most
 };
 
@@ -45,9 +45,9 @@ struct ReflexShear {
 };
 sim::PressPath press_and_shear(const ReflexPress& press, const ReflexShear& shear);
 
-/// N, the text's eq. 1 for a plate pressed z_mm deep.
+/// N, the paper's eq. 1 for a plate pressed z_mm deep.
 double published_reflex_force(double z_mm);
-/// The text's root mean square error of it to its own data, N: what a law that meets it may differ by.
+/// The paper's root mean square error of it to its own data, N: what a law that meets it may differ by.
 inline constexpr double kReflexLawRms_N = 0.14;
 /// Root mean square difference of a force at depths (mm) from eq. 1, over `count` of them evenly from 0 to 5 mm, both
 /// ends included.

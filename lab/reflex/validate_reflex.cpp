@@ -1,7 +1,6 @@
-// The reflex device (shared/seeds/003): the text's figures of reflex and explore mode, and beyond them other loads,
-// shear, collisions and pictures that tell nothing. The tree, the forces and Z are learned from a plate pressed
-// straight down with one seed of noise; all but the rows that the text gives for its training set are of other seeds or
-// loads.
+// The reflex device [Knoop2013]: the paper's figures of reflex and explore mode, and beyond them other loads, shear,
+// collisions and pictures that tell nothing. The tree, the forces and Z are learned from a plate pressed straight down
+// with one seed of noise; all but the rows that the paper gives for its training set are of other seeds or loads.
 
 #include <algorithm>
 #include <array>
@@ -19,7 +18,7 @@
 namespace touchstone::lab {
 namespace {
 
-constexpr double kSpeed_mm_s = 2.0;  // the text's reciprocation
+constexpr double kSpeed_mm_s = 2.0;  // the paper's reciprocation
 constexpr double kGap_mm = 1.0;      // how far it goes back over the touch: fig. 6 shows some way without force
 constexpr double kDeepest_mm = 5.0;
 constexpr double kPublishedError_percent = 2.1, kPublishedMissed_N = 0.09;
@@ -27,7 +26,7 @@ constexpr double kPublishedRms_N = 0.65, kPublishedLightRms_N = 0.30, kPublished
 constexpr double kPublishedZRms_mm = 0.39, kPublishedZError_mm = 0.80, kPublishedForceError_N = 2.14;
 constexpr double kPublishedZ_mm = 16.03;
 constexpr double kAllowedDecision_us = 1.0;  // issue 8 of this project: "well under" it
-constexpr double kAllowedDrift_mm = 0.1;     // "none" of the text, as far as a picture of 6 bits can tell
+constexpr double kAllowedDrift_mm = 0.1;     // "none" of the paper, as far as a picture of 6 bits can tell
 
 enum Seed : std::uint64_t {
   kTraining = 1,
@@ -114,7 +113,7 @@ sensors::ReflexModel add_reflex_rows(const ReflexBench& bench, const Scale& scal
       "ms", Better::lower, kPublishedResponse_ms, true, 1e-3 * budget.most_us());
 
   const sensors::ReflexModel curved = train_reflex(training, 2);
-  rows.add_bounded("curved.rms_N", "force with the statistics' products as well (beyond the text); bound: the line's",
+  rows.add_bounded("curved.rms_N", "force with the statistics' products as well (beyond the paper); bound: the line's",
                    "N", Better::lower, score.rms_N, false, score_reflex(curved, training).rms_N);
   const std::vector<ReflexPoint> again = record(plate, motion, kTest);
   const ReflexScore other = score_reflex(model, again);
@@ -179,7 +178,7 @@ sensors::ExploreModel add_explore_rows(const ReflexBench& bench, const Scale& sc
     model.press = fit_press(readings, pictures, terms);
     const ExploreScore score = score_explore(model, readings, pictures);
     rows.add_bounded(prefix + "z_rms_mm",
-                     fmt::format("press of dilation at {} mm/s, Z = {:.2f} mm (text: {}), largest error {:.2f}; {}",
+                     fmt::format("press of dilation at {} mm/s, Z = {:.2f} mm (paper: {}), largest error {:.2f}; {}",
                                  kSpeed_mm_s, model.press.mm[0], kPublishedZ_mm, score.largest_mm, says(score)),
                      "mm", Better::lower, bounds[0], published, score.rms_mm);
     const auto still_readings = explore(rest, still, settings);

@@ -1,6 +1,6 @@
 #pragma once
-// How much larger a printed marker looks when something is pressed on it, against one figure of the device: source text
-// 002, fig. 4c, by eqs. 1 to 3 (chroma_design.h) and by pressing the gel (pressed_marker.h).
+// How much larger a printed marker looks when something is pressed on it, against one figure of the device: [Lin2019,
+// fig. 4c], by eqs. 1 to 3 (chroma_design.h) and by pressing the gel (pressed_marker.h).
 
 #include <filesystem>
 #include <optional>

@@ -19,7 +19,7 @@
 #include "sim/scene/device_camera.h"
 #include "sim/scene/device_imager.h"
 #include "sim/scene/scene.h"
-#include "sim/sensor/virtual_device.h"
+#include "sim/sensor/virtual_sensor.h"
 #include "sim/view/visible_scene.h"
 
 namespace touchstone::lab {
@@ -30,7 +30,7 @@ constexpr std::uint64_t kSeed = 11;
 constexpr int kLooks = 5;                  // pictures from the first touch to the load: as a tracker gets them
 constexpr double kFirstDepth_mm = 0.02;    // of the first one
 constexpr std::int64_t kFrame_us = 33333;  // between them
-constexpr double kWindow = 1.65;           // ROI-B in diameters of a bead: the text's 30 px for 18
+constexpr double kWindow = 1.65;           // ROI-B in diameters of a bead: 30 px for 18 in [VisioHaptic2024]
 constexpr int kDraws = 2000;               // of noise on an estimate
 constexpr int kRangeSteps = 24;
 constexpr double kClear_mm = 0.05;  // above the gel where a press begins
@@ -63,10 +63,10 @@ render::Imager imager_of(const sim::DeviceSpec& device, const sim::ObjectSpec& o
   return sim::imager(device, sim::choose_bands(scene), true);
 }
 
-Seen look_at(const BeadDesignSpec& spec, const sim::VirtualDevice& pictures, const BeadView& view) {
+Seen look_at(const BeadDesignSpec& spec, const sim::VirtualSensor& pictures, const BeadView& view) {
   const sim::DeviceSpec& device = pictures.device();
-  const sim::VirtualObject object = pictures.object(spec.object);
-  std::vector<sim::HeldFrame> looks;
+  const sim::TouchObject object = pictures.object(spec.object);
+  std::vector<sim::Touch> looks;
   looks.push_back(pictures.press(object, {.depth_mm = kFirstDepth_mm}));
   for (int k = 1; k <= kLooks; ++k) looks.push_back(pictures.press(object, {.force_N = spec.load_N * k / kLooks}));
   const auto beads = static_cast<Eigen::Index>(view.rest_mm.size());
@@ -267,10 +267,10 @@ std::vector<DesignFigure> bead_design_figures(const BeadDesignSpec& spec) {
 std::vector<double> bead_design(const BeadDesignSpec& spec, const sim::DeviceSpec& device,
                                 const std::filesystem::path& cache) {
   const BeadView view = bead_view(device);
-  const sim::VirtualDevice pictures(device, cache);
+  const sim::VirtualSensor pictures(device, cache);
   const fem::Compliance& gel = pictures.gel();
   const fem::ContactShape felt = sim::contact_shape(spec.object);
-  const double start_z = kClear_mm - sim::way_to_touch(felt, gel, {0, 0}, {0, 0, 0});
+  const double start_z = sim::first_touch(sim::PressSpec{}, spec.object, device.gel) + kClear_mm;
   const Seen seen = look_at(spec, pictures, view);
   const sensors::StiffnessForceModel model = trained_model(spec, device, gel, seen.deviation_px);
   std::vector<double> figures(kFigures, kNone);

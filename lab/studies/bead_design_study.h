@@ -6,7 +6,7 @@
 // by the sensor's own tracker: that gives the noise of its centroids and how wrong they are, and the light gives the
 // least noise that any tracker could have (centroid_bound.h). The motions of training and verification, thousands of
 // frames, are played with tracking that is ideal but for noise of that size (ideal_tracking.h); the force model is
-// trained and verified on them as the sensor's text does. The bound on the force comes from presses and the least noise
+// trained and verified on them as in [VisioHaptic2024]. The bound on the force comes from presses and the least noise
 // (force_bound.h).
 
 #include <Eigen/Core>
@@ -34,7 +34,7 @@ struct BeadDesignSpec {
   DesignBase base;  ///< the device
   sim::ObjectSpec object;
   sim::MotionSpec training;                  ///< a load cycle; its start is moved to each place
-  std::vector<Eigen::Vector2d> training_mm;  ///< places; empty: the middles of the squares between beads, as the text
+  std::vector<Eigen::Vector2d> training_mm;  ///< places; empty: the middles of the squares between beads, as the paper
   bool training_centre = true;               ///< and the middle of all, beside either
   sensors::StopRule training_ends = sensors::StopRule::kLossDrop;
   sim::MotionSpec verification;                ///< where it says

@@ -15,11 +15,11 @@ namespace touchstone::lab {
 ///   I = sum over the raw pixels there of grad(e) grad(e)^T / var(e)
 ///
 /// with e the mean electrons that the light frees in the pixel and var their variance in one exposure: shot noise, dark
-/// noise and rounding, not the fixed pattern, which can be calibrated away. (S. Kay, Fundamentals of Statistical Signal
-/// Processing I, 1993, sec. 3.9; the noise is taken to be normal, of a variance that is itself known.) No unbiased
-/// estimate of the shift has a covariance below I^-1. Gradients are central differences of the picture's own colour
-/// channel: a picture sharper than its pixels is told to know a little less than it does. Pixels at the full well or
-/// the largest number know nothing. The light's own noise adds what nobody knows: use pictures of little.
+/// noise and rounding, not the fixed pattern, which can be calibrated away. ([Kay1993, sec. 3.9]; the noise is taken to
+/// be normal, of a variance that is itself known.) No unbiased estimate of the shift has a covariance below I^-1.
+/// Gradients are central differences of the picture's own colour channel: a picture sharper than its pixels is told to
+/// know a little less than it does. Pixels at the full well or the largest number know nothing. The light's own noise
+/// adds what nobody knows: use pictures of little.
 /// @param irradiance W/m^2 on the sensor, CV_32FC(bands)
 /// @param centre_px pixel centres are at + 0.5
 /// @throws Error unless the picture has the imager's bands

@@ -10,7 +10,7 @@
 #include "lab/studies/centroid_bound.h"
 #include "sim/plan/scene_bands.h"
 #include "sim/scene/device_imager.h"
-#include "sim/sensor/virtual_device.h"
+#include "sim/sensor/virtual_sensor.h"
 #include "sim/view/visible_scene.h"
 
 namespace touchstone::lab {
@@ -26,15 +26,16 @@ constexpr std::uint64_t kTest = 5000;
 constexpr int kRestPictures = 10;
 constexpr double kBoundStep_mm = 0.05;  // of the ball, to either side: wide against what direct light's rays miss
 constexpr double kBoundShear = 0.25;    // of the shear: where the bound is asked for
-constexpr double kBall_mm = 2.0;        // radius of the text's ball
+constexpr double kBall_mm = 2.0;        // radius of the ball of [Lin2019]
 
 /// Least standard deviations (mm) of the ball's x, y, z from one whole picture, at mid depth.
-Eigen::Vector3d least_error(const ColourDesignSpec& spec, const sim::TouchRig& rig, const Eigen::Vector2d& place) {
+Eigen::Vector3d least_error(const ColourDesignSpec& spec, const sim::VirtualSensor& sensor,
+                            const Eigen::Vector2d& place) {
   sim::ObjectSpec ball;
   ball.name = "ball";
   ball.shape.radius_mm = kBall_mm;
   ball.friction = spec.friction;
-  const sim::TouchObject object = rig.object(ball);
+  const sim::TouchObject object = sensor.object(ball);
   const double depth = spec.shear_depths_mm[spec.shear_depths_mm.size() / 2];
   const auto light_at = [&](const Eigen::Vector3d& by) {
     sim::MotionSpec motion;
@@ -46,12 +47,12 @@ Eigen::Vector3d least_error(const ColourDesignSpec& spec, const sim::TouchRig& r
     drag.x = sim::AxisKey{place.x() + kBoundShear * spec.shear_mm + by.x(), std::nullopt};
     drag.y = sim::AxisKey{place.y() + kBoundShear * spec.shear_mm + by.y(), std::nullopt};
     motion.keys = {press, drag};
-    return rig.look(object, rig.play(object, motion).back().press, kRest, 0, false).light;
+    return sensor.capture(object, sensor.play(object, motion).back().press, kRest, 0, false).light;
   };
   sim::SceneSpec scene;
-  scene.device = rig.device();
+  scene.device = sensor.device();
   scene.object = ball;
-  const render::Imager imager = sim::imager(rig.device(), sim::choose_bands(scene), true);
+  const render::Imager imager = sim::imager(sensor.device(), sim::choose_bands(scene), true);
   std::vector<cv::Mat> slopes;
   for (int a = 0; a < 3; ++a) {
     const Eigen::Vector3d step = kBoundStep_mm * Eigen::Vector3d::Unit(a);
@@ -126,8 +127,8 @@ std::vector<DesignFigure> colour_design_figures(const ColourDesignSpec& spec) {
 
 std::vector<double> colour_design(const ColourDesignSpec& spec, const sim::DeviceSpec& device,
                                   const std::filesystem::path& cache) {
-  const sim::TouchRig rig(device, cache, chroma_rig_settings(kUnit));
-  const ChromaBench bench(rig, kRest);
+  const sim::VirtualSensor sensor(device, cache, chroma_sensor_settings(kUnit));
+  const ChromaBench bench(sensor, kRest);
   const std::size_t marker = bench.marker_at(spec.place_mm);
   const MarkerTest test{bench.markers().markers[marker].centre, spec.friction};
   std::vector<double> figures(kFigures, kNone);
@@ -166,7 +167,7 @@ std::vector<double> colour_design(const ColourDesignSpec& spec, const sim::Devic
   figures[kHueNoise] = hue_repeats_deg(bench, kRest, kRestPictures)[marker];
   figures[kSlope] = std::abs(hue_against_depth(bench, press, marker).line().slope);
   figures[kNoise] = 1000.0 * figures[kHueNoise] / figures[kSlope];
-  const Eigen::Vector3d least_um = 1000.0 * least_error(spec, rig, test.place_mm);
+  const Eigen::Vector3d least_um = 1000.0 * least_error(spec, sensor, test.place_mm);
   figures[kBoundPress] = least_um.z();
   figures[kBoundLateral] = least_um.head<2>().maxCoeff();
   figures[kFlawed] = flawed;

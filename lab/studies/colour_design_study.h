@@ -3,8 +3,8 @@
 // calibrated model makes of presses that it wasn't calibrated on, beside the least error that any estimate from the
 // same pictures could have.
 //
-// Each design is set up whole. A ball presses and shears one marker as in source text 002, secs. IV.C and D; the form
-// of model that errs least on series left out is calibrated, and tested on shears in another direction.
+// Each design is set up whole. A ball presses and shears one marker as in [Lin2019, secs. IV.C and D]; the form of
+// model that errs least on series left out is calibrated, and tested on shears in another direction.
 
 #include <Eigen/Core>
 #include <filesystem>

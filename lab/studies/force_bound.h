@@ -4,9 +4,9 @@
 // change.
 //
 // With y the beads' pixels, f the force, S = dy/df and y normal about its mean with the covariance C = diag(sigma^2),
-// Fisher's information is S^T C^-1 S, and no unbiased estimate of f has a covariance below its inverse (S. Kay,
-// Fundamentals of Statistical Signal Processing I, 1993, eq. 3.31). Who doesn't know where the object is has more to
-// tell from the same pixels: the information on force and place together, inverted, has the larger bound.
+// Fisher's information is S^T C^-1 S, and no unbiased estimate of f has a covariance below its inverse [Kay1993, eq.
+// 3.31]. Who doesn't know where the object is has more to tell from the same pixels: the information on force and place
+// together, inverted, has the larger bound.
 
 #include <Eigen/Core>
 

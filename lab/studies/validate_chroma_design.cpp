@@ -1,5 +1,5 @@
-// The chroma sensor's design (source text 002): how thick its gel should be by eqs. 1 to 3 and by pressing it (sec.
-// III.C, fig. 4c), what a tilt does to flat and to spherical markers (sec. V), and the four spectra of fig. 2.
+// The chroma sensor's design [Lin2019]: how thick its gel should be by eqs. 1 to 3 and by pressing it (sec. III.C, fig.
+// 4c), what a tilt does to flat and to spherical markers (sec. V), and the four spectra of fig. 2.
 
 #include <fmt/format.h>
 

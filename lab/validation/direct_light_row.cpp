@@ -15,11 +15,12 @@ constexpr double kAllowed_percent = 5.0;
 
 }  // namespace
 
-ValidationRow direct_light_row(const std::string& id, const std::string& name, const sim::TouchRigSettings& settings,
-                               const ValidateOptions& options) {
+ValidationRow direct_light_row(const std::string& id, const std::string& name,
+                               const sim::VirtualSensorSettings& settings, const ValidateOptions& options) {
   const auto begun = std::chrono::steady_clock::now();
-  const sim::TouchRig rig(sim::read_device(options.scenes / "devices" / (name + ".yaml")), options.cache, settings);
-  const sim::LightChoice& light = rig.light();
+  const sim::VirtualSensor sensor(sim::read_device(options.scenes / "devices" / (name + ".yaml")), options.cache,
+                                  settings);
+  const sim::LightChoice& light = sensor.light();
   ValidationRow row;
   row.id = id;
   row.title = fmt::format("{}: {}", name, light.reason);

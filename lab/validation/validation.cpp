@@ -36,6 +36,16 @@ std::string name_of(Better better) {
   return {};
 }
 
+void deny(ValidationRow& row, const std::string& finding) {
+  row.holds = false;
+  row.denies = finding;
+}
+
+std::string words_of(const ValidationRow& row) {
+  if (row.denies.empty()) return row.title;
+  return fmt::format("{} (doesn't hold: denies the finding that {})", row.title, row.denies);
+}
+
 std::vector<ValidationRow> validate(const std::vector<std::string>& names, const std::vector<ValidationGroup>& known,
                                     const ValidateOptions& options) {
   std::vector<std::string> allowed = {"all"};
@@ -61,6 +71,7 @@ std::vector<ValidationRow> validate(const std::vector<std::string>& names, const
     if (!wanted.contains("all") && !wanted.contains(group.name) && !wanted.contains(whole)) continue;
     for (ValidationRow& row : group.run(options)) {
       TS_ASSERT(ids.insert(row.id).second);
+      TS_ASSERT(row.denies.empty() || !row.holds);
       rows.push_back(std::move(row));
     }
   }
@@ -71,7 +82,7 @@ std::string to_json(const std::vector<ValidationRow>& rows) {
   ordered_json list = ordered_json::array();
   for (const ValidationRow& row : rows) {
     ordered_json record = {{"id", row.id},
-                           {"title", row.title},
+                           {"title", words_of(row)},
                            {"unit", row.unit},
                            {"published", number_or_null(row.published)},
                            {"reference", number_or_null(row.reference)},
@@ -97,7 +108,7 @@ std::string to_table(const std::vector<ValidationRow>& rows) {
   for (const ValidationRow& row : rows) {
     const std::optional<double>& against = row.published ? row.published : row.reference;
     table += fmt::format("{:<{}}  {:>11} {:>11}  {:<6} {:<6} {:<5} {}\n", row.id, widest, number_text(row.ours),
-                         number_text(against), row.unit, name_of(row.better), row.holds ? "yes" : "NO", row.title);
+                         number_text(against), row.unit, name_of(row.better), row.holds ? "yes" : "NO", words_of(row));
   }
   return table;
 }

@@ -1,6 +1,5 @@
 #pragma once
-// The published and closed-form figures that this program is held against, as rows with stable names
-// (shared/SENSORS.md, "Rows by name").
+// The published and closed-form figures that this program is held against, as rows with stable names.
 
 #include <filesystem>
 #include <functional>
@@ -34,10 +33,18 @@ struct ValidationRow {
   std::optional<std::pair<double, double>> ci95;  ///< 95 % interval of `ours` over seeds
   Better better = Better::lower;
   bool holds = false;                      ///< whether ours meets the row
+  std::string denies;                      ///< set by deny(): the source's finding that ours doesn't share
   bool quick = false;                      ///< made by the quick form
   double seconds = 0.0;                    ///< wall time that the row took
   std::optional<ValidationSeries> series;  ///< drawn on the page (validation_page.h); not in the JSON
 };
+
+/// A figure on the good side of a source's may still say the opposite of what the source found. Such a row doesn't
+/// hold, and says so beside its title. `finding`: what the source found, as a clause: "250 Hz are too few".
+void deny(ValidationRow& row, const std::string& finding);
+
+/// The title, and which finding the row denies.
+std::string words_of(const ValidationRow& row);
 
 struct ValidateOptions {
   bool quick = false;             ///< minutes, not hours: coarser or fewer cases, as each row says
@@ -63,7 +70,7 @@ std::vector<ValidationRow> validate(const std::vector<std::string>& names, const
                                     const ValidateOptions& options);
 
 /// A list of records {id, title, unit, published, reference, ours, ci95, better, holds, quick, seconds}; what isn't
-/// given, or isn't finite, is null.
+/// given, or isn't finite, is null. The title is words_of().
 std::string to_json(const std::vector<ValidationRow>& rows);
 
 /// The rows for people: id, ours, the figure it is held against, and whether it holds.

@@ -84,7 +84,7 @@ std::vector<std::pair<std::string, std::vector<const ValidationRow*>>> by_group(
 
 std::vector<std::string> cells(const ValidationRow& row) {
   return {row.id,
-          row.title + (row.quick ? " (quick form)" : ""),
+          words_of(row) + (row.quick ? " (quick form)" : ""),
           with_unit(number(row.ours), row.unit),
           interval(row),
           held_against(row),

@@ -1,5 +1,5 @@
 #pragma once
-// Five levels of softness from waveforms of one press: shared/seeds/000, sec. 2.3.1. The text makes pictures of the
+// Five levels of softness from waveforms of one press: [VisioHaptic2024, sec. 2.3.1]. The paper makes pictures of the
 // waveforms' frequencies over time and lets AlexNet tell them; here a small network does, on the same kind of pictures.
 
 #include <cstdint>
@@ -40,7 +40,7 @@ struct PalpationRecording {
   std::vector<PalpationWaveform> waveforms;
 };
 
-/// The text's force sensor behind a rigid face. `table` is of that face. The same arguments give the same numbers with
+/// The paper's force sensor behind a rigid face. `table` is of that face. The same arguments give the same numbers with
 /// any number of threads.
 PalpationRecording record_reference(const PalpationSpec& spec, const PalpationTable& table,
                                     const std::vector<std::vector<LumpMode>>& modes,

@@ -1,7 +1,7 @@
 #pragma once
-// Force over depth of lumps under a skin, pressed by a flat face: the vhs sensor's gel, or a rigid plate of the text's
-// own force sensor. Finite elements on both sides where both give way, computed at some moduli; what lies between is
-// interpolated.
+// Force over depth of lumps under a skin, pressed by a flat face: the vhs sensor's gel, or a rigid plate of the force
+// sensor of [VisioHaptic2024]. Finite elements on both sides where both give way, computed at some moduli; what lies
+// between is interpolated.
 //
 // Lengths alone fix the law of a rigid plate on a piece of moduli (E_skin, E_core) but for a factor: F = E_skin
 // f(E_core / E_skin, depth). The gel's adds one modulus, so its table has a few skins besides.

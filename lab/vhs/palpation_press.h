@@ -1,5 +1,5 @@
 #pragma once
-// One press of a linear actuator on a lump: the force over time (shared/seeds/000, sec. 2.3.1).
+// One press of a linear actuator on a lump: the force over time [VisioHaptic2024, sec. 2.3.1].
 //
 // The face is a mass on the spring of its holder. Along the motion, s being its way beyond the touch:
 //   m s'' = k (x - s) + c (x' - s') - F + shake

@@ -1,5 +1,5 @@
 #pragma once
-// What two sensors make of a press: the vhs sensor, by its beads, and the text's own force sensor.
+// What two sensors make of a press: the vhs sensor, by its beads, and the paper's own force sensor [VisioHaptic2024].
 //
 // The vhs sensor's frames aren't rendered press by press: a second of them takes 40 minutes of CPU time. Its chain is
 // played from the beads' true images on: their mean over the exposure, the noise that the tracker's centroids have on
@@ -18,7 +18,7 @@
 
 namespace touchstone::lab {
 
-/// The force model of the text, trained as sec. 4.3 says on the vhs-demo's four training cycles, by the beads' true
+/// The force model of the paper, trained as sec. 4.3 says on the vhs-demo's four training cycles, by the beads' true
 /// images. @throws Error as reading and playing them do
 sensors::StiffnessForceModel train_on_true_beads(const std::filesystem::path& scenes,
                                                  const std::filesystem::path& cache, const Progress& progress = {});
@@ -47,7 +47,7 @@ BeadNoise measure_bead_noise(const PalpationSpec& spec, const std::filesystem::p
                              const sensors::StiffnessForceModel& model, const BeadNoiseSettings& settings,
                              const std::filesystem::path& cache, const Progress& progress = {});
 
-/// The waveform that the text's force sensor records, N. A pure function.
+/// The waveform that the paper's force sensor records, N. A pure function.
 std::vector<double> reference_waveform(const PalpationReference& reference, const PalpationRun& run, std::uint64_t seed,
                                        std::uint64_t index);
 
@@ -55,7 +55,7 @@ std::vector<double> reference_waveform(const PalpationReference& reference, cons
 struct VhsChain {
   sensors::StiffnessForceModel model;
   sensors::BeadFilterSettings filter;
-  bool filtered = true;  ///< as the text's sec. 3.2.2
+  bool filtered = true;  ///< as the paper's sec. 3.2.2
   double noise_px = 0.0;
   double frame_rate_Hz = 601.25;
   double exposure_s = 1600e-6;

@@ -1,5 +1,5 @@
 #pragma once
-// What is palpated, and how: shared/seeds/000, sec. 2.3. Read from scenes/palpation/five-levels.yaml, which says where
+// What is palpated, and how: [VisioHaptic2024, sec. 2.3]. Read from scenes/palpation/five-levels.yaml, which says where
 // its figures come from.
 
 #include <array>
@@ -13,7 +13,7 @@
 
 namespace touchstone::lab {
 
-/// The text's five levels of softness (sec. 2.3), from soft to hard.
+/// The paper's five levels of softness (sec. 2.3), from soft to hard.
 enum class Softness { soft, elastic_soft, elastic_hard, cartilage_like_hard, bone_like_hard };
 inline constexpr int kSoftnessLevels = 5;
 EnumNames<Softness> enum_names(Softness);
@@ -49,7 +49,7 @@ struct PalpationMotion {
   double gap_mm = 0.5;
 };
 
-/// The force sensor that the text's figures were had with.
+/// The force sensor that the paper's figures were had with.
 struct PalpationReference {
   double digits_per_N = 328.0;
   double noise_digits = 1.0;  ///< standard deviation, before rounding

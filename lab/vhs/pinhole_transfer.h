@@ -19,7 +19,7 @@ double on_sensor(const PinholeOptics& optics, double frequency);
 double transfer_of_disc(const PinholeOptics& optics, double frequency);
 
 /// The same with diffraction in monochromatic light: the optical transfer function of a round aperture with its defect
-/// of focus (Hopkins, Proc. R. Soc. A 231, 1955): the autocorrelation of the pupil exp(i pi r^2 / (wavelength F)),
+/// of focus [Hopkins1955]: the autocorrelation of the pupil exp(i pi r^2 / (wavelength F)),
 /// 1/F = 1/to_object + 1/to_sensor, at the shift wavelength * to_object * frequency. For short waves it is the disc's.
 double transfer_with_diffraction(const PinholeOptics& optics, double frequency, double wavelength_nm);
 

@@ -1,5 +1,5 @@
-// The vhs sensor trained as its text trained it, on some 10,000 samples (shared/seeds/000, sec. 4.3): what so many
-// frames cost, and what they are good for. In full only: it takes three quarters of a core's hour.
+// The vhs sensor trained as its paper did, on some 10,000 samples [VisioHaptic2024, sec. 4.3]: what so many frames
+// cost, and what they are good for. In full only: it takes three quarters of a core's hour.
 
 #include <chrono>
 #include <ctime>
@@ -66,7 +66,7 @@ std::vector<ValidationRow> validate_vhs_cycle(const ValidateOptions& options) {
     add_errors("error", verification, "in the verification of sec. 4.4");
     add_errors("held_out", elsewhere, "in a load cycle at a place where none was trained");
   };
-  add("", "by the text's rule", sensors::TrainingSettings::as_published());
+  add("", "by the paper's rule", sensors::TrainingSettings::as_published());
   add("converged.", "to convergence", sensors::TrainingSettings::to_convergence());
   rows.add_bounded("lost_beads", "beads not found, summed over all frames", "1", Better::lower, 0.0, false, lost);
   return rows.rows();

@@ -1,6 +1,6 @@
-// What the vhs sensor's gel does to its accuracy, which its text leaves open ("elasticity and thickness of the urethane
-// rubber could also affect accuracy", shared/seeds/000, sec. 5.1). By ideal tracking with the noise of the tracker, so
-// that a design takes seconds.
+// What the vhs sensor's gel does to its accuracy, which its paper leaves open ("elasticity and thickness of the
+// urethane rubber could also affect accuracy", [VisioHaptic2024, sec. 5.1]). By ideal tracking with the noise of the
+// tracker, so that a design takes seconds.
 
 #include <algorithm>
 #include <array>
@@ -31,7 +31,7 @@ struct DesignFigures {
 };
 
 /// Trains on the demo's load cycles and one at the centre, and verifies as sec. 4.4 does. To convergence, and with the
-/// centre, so that neither where the text's rule ends the training nor what four squares say of the place between them
+/// centre, so that neither where the paper's rule ends the training nor what four squares say of the place between them
 /// hides what the gel does.
 DesignFigures try_design(const Design& design, const ValidateOptions& options) {
   const std::filesystem::path file = options.scenes / "jobs" / "vhs-demo.yaml";

@@ -1,7 +1,7 @@
-// Force at several points at once, what the vhs text leaves for future work (shared/seeds/000, sec. 5.1): balls of 1.5
-// mm radius are pressed on together, each with a force of its own; beads are seen by the sensor's own camera with noise
-// of 0.1 px, twice the tracker's; their motions are inverted with the gel's compliance. Which force belongs to which
-// point is judged by the patches nearest to each. The sensor's own 3x3 beads, and finer grids over 6 mm.
+// Force at several points at once, what [VisioHaptic2024, sec. 5.1] leaves for future work: balls of 1.5 mm radius are
+// pressed on together, each with a force of its own; beads are seen by the sensor's own camera with noise of 0.1 px,
+// twice the tracker's; their motions are inverted with the gel's compliance. Which force belongs to which point is
+// judged by the patches nearest to each. The sensor's own 3x3 beads, and finer grids over 6 mm.
 
 #include <cmath>
 #include <numbers>
@@ -14,7 +14,7 @@
 namespace touchstone::lab {
 namespace {
 
-constexpr double kForceError_N = 0.1;  // what the text reaches for one force
+constexpr double kForceError_N = 0.1;  // what the paper reaches for one force
 constexpr double kNoise_px = 0.1;
 constexpr double kDip = 0.75;  // of the pressure between two points, to be told for two
 constexpr std::uint64_t kFirstSeed = 1000;

@@ -1,5 +1,5 @@
 // The published figures of the vhs sensor that this program reaches so far: the load cycle on the four squares trains
-// the force model (shared/seeds/000, sec. 4.3), the verification of its sec. 4.4 and a cycle at a place that training
+// the force model [VisioHaptic2024, sec. 4.3], the verification of its sec. 4.4 and a cycle at a place that training
 // never saw test it. All of it goes the whole way: scene, gel, light, imager, PNG files, tracker, force model.
 
 #include <algorithm>
@@ -160,7 +160,7 @@ std::vector<ValidationRow> validate_vhs_force(const ValidateOptions& options) {
         "1", z_r2, false, r2(axis), Better::higher);
     draw(axis);
   }
-  add("vhs.linearity.z_r2", "likewise of z, the text's least; bound: the lesser of x and y", "1",
+  add("vhs.linearity.z_r2", "likewise of z, the paper's least; bound: the lesser of x and y", "1",
       std::min(mean_of(trials, r2(0)), mean_of(trials, r2(1))), false, r2(2));
   draw(2);
   add(

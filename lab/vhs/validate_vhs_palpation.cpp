@@ -1,4 +1,4 @@
-// Five levels of softness under a skin (shared/seeds/000, sec. 2.3.1): told from waveforms of the text's force sensor
+// Five levels of softness under a skin [VisioHaptic2024, sec. 2.3.1]: told from waveforms of the paper's force sensor
 // at 1000, 500 and 250 Hz, and from the vhs sensor's own at 601.25 Hz.
 
 #include <cmath>
@@ -13,11 +13,11 @@ namespace touchstone::lab {
 namespace {
 
 constexpr double kPublished1000 = 95.0, kPublished500 = 93.0, kPublished250 = 84.0;
-constexpr int kSeeds = 5;                   // the text's five trials
+constexpr int kSeeds = 5;                   // the paper's five trials
 constexpr double kStudent95OfFive = 2.776;  // t of 4 degrees of freedom
-constexpr double kHighest_Hz = 500.0;       // half the text's sampling rate
+constexpr double kHighest_Hz = 500.0;       // half the paper's sampling rate
 constexpr double kSlowestAlone_Hz = 125.0;  // half of 250: what that rate can't see
-constexpr double kAllowedDrop = 4.0;        // per cent, either side of the text's
+constexpr double kAllowedDrop = 4.0;        // per cent, either side of the paper's
 constexpr int kMorePieces = 4;              // times as many to train on
 constexpr double kChance = 100.0 / kSoftnessLevels;
 constexpr double kAllowedRatio = 0.1;  // of a force
@@ -147,17 +147,21 @@ std::vector<ValidationRow> validate_vhs_palpation(const ValidateOptions& options
     rows.last().ci95 = interval_of(told.percent, tests);
   };
   add("levels_1000Hz_percent",
-      "five levels told from the text's force sensor at 1000 Hz, of each what it was told to be", at_1000,
+      "five levels told from the paper's force sensor at 1000 Hz, of each what it was told to be", at_1000,
       kPublished1000);
   add("levels_500Hz_percent", "every second sample", at_500, kPublished500);
   add("levels_250Hz_percent", "every fourth", at_250, kPublished250);
-  ValidationRow& fall =
-      rows.add("drop_to_250Hz_percent", "what is lost from 1000 Hz to 250 Hz", "%", mean_of(drop), Better::near,
-               std::abs(mean_of(drop) - (kPublished1000 - kPublished250)) <= kAllowedDrop);
-  fall.published = kPublished1000 - kPublished250;
+  // More levels than the paper's at 250 Hz are no success where nothing was lost on the way there.
+  constexpr double kPublishedDrop = kPublished1000 - kPublished250;
+  if (mean_of(drop) < kPublishedDrop - kAllowedDrop) {
+    deny(rows.last(), "at 250 Hz levels are lost that 500 and 1000 Hz tell");
+  }
+  ValidationRow& fall = rows.add("drop_to_250Hz_percent", "what is lost from 1000 Hz to 250 Hz", "%", mean_of(drop),
+                                 Better::near, std::abs(mean_of(drop) - kPublishedDrop) <= kAllowedDrop);
+  fall.published = kPublishedDrop;
   fall.ci95 = interval_of(drop, tests);
   if (seeds == 1) fall.ci95.reset();
-  add("camera_percent", "told from the vhs sensor at 601.25 Hz; beside the text's 500 Hz", camera, kPublished500);
+  add("camera_percent", "told from the vhs sensor at 601.25 Hz; beside the paper's 500 Hz", camera, kPublished500);
   rows.add_bounded("noise_px", "noise of a bead's coordinate on rendered frames of an opal lump; the filter's setting",
                    "px", Better::lower, chain.filter.measurement_px, false, lit.noise_px);
   double ratio = 0.0;
@@ -170,19 +174,19 @@ std::vector<ValidationRow> validate_vhs_palpation(const ValidateOptions& options
   told_force.reference = 1.0;
   if (options.quick) return rows.rows();
   const double at_1000_percent = mean_of(at_1000.percent);
-  add("camera_without_noise_percent", "from the vhs sensor without noise; beside the text's force sensor",
+  add("camera_without_noise_percent", "from the vhs sensor without noise; beside the paper's force sensor",
       without_noise, at_1000_percent, false);
-  add("behind_gel_percent", "from the text's force sensor behind the vhs sensor's gel, 1000 Hz", behind_gel,
+  add("behind_gel_percent", "from the paper's force sensor behind the vhs sensor's gel, 1000 Hz", behind_gel,
       at_1000_percent, false);
-  add("above_125Hz_percent", "from the text's force sensor by what is above 125 Hz alone; by chance", fast_part,
+  add("above_125Hz_percent", "from the paper's force sensor by what is above 125 Hz alone; by chance", fast_part,
       kChance, false);
-  add("alike_skins_percent", "lumps whose skins are all alike, by the text's force sensor at 1000 Hz", alike_skins,
+  add("alike_skins_percent", "lumps whose skins are all alike, by the paper's force sensor at 1000 Hz", alike_skins,
       at_1000_percent, false);
   add("alike_skins_one_speed_percent", "and all presses at one speed", same_speed, at_1000_percent, false);
-  add("more_pieces_percent", "four times as many pieces to train on, by the text's force sensor at 1000 Hz",
+  add("more_pieces_percent", "four times as many pieces to train on, by the paper's force sensor at 1000 Hz",
       more_pieces, at_1000_percent, false);
-  add("unseen_material_percent", "materials that weren't in training, by the text's force sensor at 1000 Hz; by chance",
-      unseen, kChance, false);
+  add("unseen_material_percent", "materials not in training, by the paper's force sensor at 1000 Hz; by chance", unseen,
+      kChance, false);
   BeadNoiseSettings matt = frames;
   matt.lit = false;
   matt.repeats = 2;

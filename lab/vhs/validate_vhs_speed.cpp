@@ -1,5 +1,5 @@
-// How fast the vhs sensor's frames are worked on (sec. 4.2 of shared/seeds/000), beside OpenCV's SimpleBlobDetector on
-// the same frames in the same run. Rates are per second of a core's own work, the fastest of twenty parts, so that what
+// How fast the vhs sensor's frames are worked on [VisioHaptic2024, sec. 4.2], beside OpenCV's SimpleBlobDetector on the
+// same frames in the same run. Rates are per second of a core's own work, the fastest of twenty parts, so that what
 // else the machine does counts little; frames are in memory, of colour, as the camera gives them.
 
 #include <tbb/blocked_range.h>
@@ -211,7 +211,7 @@ std::vector<ValidationRow> validate_vhs_speed(const ValidateOptions& options) {
       fps[0]);
   rows.add_bounded("tracking_wanted_fps", "the same, held against what this program wants", "1/s", Better::higher,
                    kWanted_fps, false, fps[0]);
-  add("with_force_fps", "with forces, on one core; the text needed many", kPublishedWithForce_fps, fps[1]);
+  add("with_force_fps", "with forces, on one core; the paper needed many", kPublishedWithForce_fps, fps[1]);
   rows.add_bounded("force_Hz", "forces a second on one core; palpation needs 500", "Hz", Better::higher,
                    kNeededForce_Hz, true, fps[1]);
   add("with_display_fps", "with forces and both drawn into a picture for a window, on one core",

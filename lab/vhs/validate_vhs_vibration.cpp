@@ -1,5 +1,5 @@
-// The vibration test of the vhs sensor's text (shared/seeds/000, sec. 5) from frames: 100 Hz seen at 601.25 Hz, and
-// what the text leaves out, amplitude and phase. Those of the gel itself are validate_vibration.cpp's. In full only.
+// The vibration test of [VisioHaptic2024, sec. 5] from frames: 100 Hz seen at 601.25 Hz, and what the paper leaves out,
+// amplitude and phase. Those of the gel itself are validate_vibration.cpp's. In full only.
 
 #include <cmath>
 #include <complex>
@@ -16,7 +16,7 @@ namespace touchstone::lab {
 namespace {
 
 constexpr double kVibration_Hz = 100.0, kPublishedWidth_Hz = 10.0;  // "a peak range between 90 Hz and 110 Hz"
-constexpr double kAllowedAmplitude_percent = 10.0;                  // 0.01 N of 0.1 N, a tenth of the text's accuracy
+constexpr double kAllowedAmplitude_percent = 10.0;                  // 0.01 N of 0.1 N, a tenth of the paper's accuracy
 constexpr double kAllowedPhase_deg = 36.0;                          // 1 ms, a half of what palpation's 500 Hz leave
 
 }  // namespace
@@ -50,7 +50,7 @@ std::vector<ValidationRow> validate_vhs_vibration(const ValidateOptions& options
   const std::size_t line = strongest_line(lines);
   const double peak_Hz = static_cast<double>(line) * motion.frame_rate_Hz / static_cast<double>(told.size());
   rows.add("peak_Hz",
-           fmt::format("peak of the z force's spectrum from frames at {} Hz, {:.3f} N; the text: between 90 and 110",
+           fmt::format("peak of the z force's spectrum from frames at {} Hz, {:.3f} N; the paper: between 90 and 110",
                        motion.frame_rate_Hz, std::abs(lines[line])),
            "Hz", peak_Hz, Better::near, std::abs(peak_Hz - kVibration_Hz) <= kPublishedWidth_Hz)
       .published = kVibration_Hz;

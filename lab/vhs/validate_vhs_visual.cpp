@@ -1,4 +1,4 @@
-// What the vhs sensor's camera shows of the thing it touches (shared/seeds/000, secs. 2.1, 2.2, 4.1 and 5.1, fig. 5):
+// What the vhs sensor's camera shows of the thing it touches [VisioHaptic2024, secs. 2.1, 2.2, 4.1 and 5.1, fig. 5]:
 // the divisions of a rule, colours, brightness over the field, and a skin's marks under pressure.
 
 #include <fmt/format.h>
@@ -28,7 +28,7 @@ namespace {
 constexpr double kSubMillimetre_mm = 1.0;  // sec. 4.1 and 5
 constexpr double kAllowedTransfer = 0.02;  // of the printed contrast, absolute
 constexpr double kAllowedFalloff_percent = 1.0;
-constexpr double kAllowedColour_de2000 = 5.0;  // as ISO 12647-2 allows printed solids to be off (as CIE 1976's)
+constexpr double kAllowedColour_de2000 = 5.0;  // as [ISO12647] lets printed solids be off (as CIE 1976's)
 constexpr double kHalfGone = 0.5;
 constexpr double kStays = 0.2;
 constexpr double kSkins_percent = 95.0;

@@ -26,7 +26,7 @@ struct DistributionBench {
   std::vector<Eigen::Vector2d> rest_px;
 };
 
-/// The parallax by which the device's camera sees its beads (seed 002's figure for a sensor; see ViewParallax).
+/// The parallax by which the device's camera sees its beads (the figure of [Lin2019] for a sensor; see ViewParallax).
 /// @throws Error for a device without a pinhole camera straight before the gel, or without beads
 sensors::ViewParallax bead_parallax(const sim::DeviceSpec& device);
 

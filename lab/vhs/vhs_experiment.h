@@ -1,6 +1,6 @@
 #pragma once
-// The experiments of the vhs sensor's text (shared/seeds/000): tracking a load cycle, training the stiffness
-// coefficients (sec. 4.3), and the verification of the forces (sec. 4.4).
+// The experiments of [VisioHaptic2024]: tracking a load cycle, training the stiffness coefficients (sec. 4.3), and the
+// verification of the forces (sec. 4.4).
 
 #include <Eigen/Core>
 #include <array>
@@ -18,7 +18,7 @@
 
 namespace touchstone::lab {
 
-/// The mean error that the text publishes, for each axis.
+/// The mean error that the paper publishes, for each axis.
 inline constexpr double kPublishedForceError_N = 0.1;
 
 /// A sequence with what the tracker made of each of its frames.

@@ -10,7 +10,8 @@
 #include "datasets/jobs/scenes_folder.h"
 #include "python/src/bindings.h"
 #include "python/src/sensor.h"
-#include "sim/press/touch_height.h"
+#include "sim/press/first_touch.h"
+#include "sim/press/gel_setup.h"
 #include "sim/scene/object.h"
 
 namespace touchstone::python {
@@ -47,7 +48,7 @@ Spec spec_from(const py::handle& value, const char* folder) {
 
 std::shared_ptr<Sensor> make_sensor(const py::object& device, std::uint64_t unit, double deepest_mm, double widest_mm,
                                     double membrane_um, const std::string& cache, const py::object& progress) {
-  sim::TouchRigSettings settings;
+  sim::VirtualSensorSettings settings;
   settings.seed = unit;
   settings.deepest_mm = deepest_mm;
   settings.widest_mm = widest_mm;
@@ -64,77 +65,67 @@ std::shared_ptr<Sensor> make_sensor(const py::object& device, std::uint64_t unit
   return unlocked([&] { return std::make_shared<Sensor>(std::move(spec), folder, settings, listener); });
 }
 
-/// How press() shall bring the object to the gel.
-struct PressOrder {
-  std::optional<double> depth_mm, force_N;
-  std::optional<RigidTransform> pose;
-  Eigen::Vector2d at_mm;
-  Eigen::Matrix3d rotation;
-  std::optional<Eigen::Vector2d> shear_mm, shear_N;
-  double seconds = 0.0;
-};
-
-void check_order(const PressOrder& order) {
-  const int ways = (order.depth_mm ? 1 : 0) + (order.force_N ? 1 : 0) + (order.pose ? 1 : 0);
-  if (ways != 1) fail("press: exactly one of depth_mm, force_N and pose says how far; {} of them are given", ways);
-  if (order.shear_mm && order.shear_N) fail("press: shear_mm and shear_N exclude each other");
-  if (order.depth_mm && !std::isfinite(*order.depth_mm)) fail("press: depth_mm is {}", *order.depth_mm);
-  if (order.force_N && !(std::isfinite(*order.force_N) && *order.force_N > 0.0)) {
-    fail("press: force_N is {}; allowed is a finite force above 0", *order.force_N);
-  }
-}
-
-void carry_out(const PressOrder& order, const Sensor& sensor, const sim::ObjectSpec& object,
-               sim::TouchSession& session) {
-  fem::PressTarget target;
-  target.seconds = order.seconds;
-  if (order.pose) {
-    target.rotation = order.pose->rotation;
-    for (int a = 0; a < 3; ++a) target.axis[a] = fem::AxisControl::at(order.pose->translation[a]);
-  } else {
-    target.rotation = order.rotation;
-    for (int a = 0; a < 2; ++a) target.axis[a] = fem::AxisControl::at(order.at_mm[a]);
-    const fem::ContactShape felt = sim::coarse_contact_shape(object, sensor.device().mesh.fine_mm);
-    const bool by_force = order.force_N.has_value();
-    target.axis[2] =
-        by_force ? fem::AxisControl::with_force(*order.force_N)
-                 : fem::AxisControl::at(sim::touch_height(sensor.device().gel, felt, order.at_mm, order.rotation) -
-                                        *order.depth_mm);
-  }
-  session.step(target);
-  if (!order.shear_mm && !order.shear_N) return;
-  for (int a = 0; a < 2; ++a) {
-    target.axis[a] = order.shear_N ? fem::AxisControl::with_force((*order.shear_N)[a])
-                                   : fem::AxisControl::at(target.axis[a].value + (*order.shear_mm)[a]);
-  }
-  session.step(target);
-}
-
 std::shared_ptr<Touch> press(const Sensor& sensor, const py::object& touched, std::optional<double> depth_mm,
                              std::optional<double> force_N, const py::object& at_mm, const py::object& angles_deg,
                              const py::object& pose, const py::object& shear_mm, const py::object& shear_N,
                              double seconds, std::uint64_t noise_seed, int frame, bool look, bool truth) {
-  PressOrder order;
+  const int ways = (depth_mm ? 1 : 0) + (force_N ? 1 : 0) + (pose.is_none() ? 0 : 1);
+  if (ways != 1) fail("press: exactly one of depth_mm, force_N and pose says how far; {} of them are given", ways);
+  if (!shear_mm.is_none() && !shear_N.is_none()) fail("press: shear_mm and shear_N exclude each other");
+  sim::PressSpec order;
   order.depth_mm = depth_mm;
   order.force_N = force_N;
-  if (!pose.is_none()) order.pose = pose_from(pose, "pose");
-  order.at_mm = vector2_from(at_mm, "at_mm");
-  order.rotation = rotation_from_xyz(vector3_from(angles_deg, "angles_deg") * kRadiansPerDegree);
-  if (!shear_mm.is_none()) order.shear_mm = vector2_from(shear_mm, "shear_mm");
+  order.place_mm = vector2_from(at_mm, "at_mm");
+  order.angles_deg = vector3_from(angles_deg, "angles_deg");
+  if (!pose.is_none()) {
+    const RigidTransform gel_from_object = pose_from(pose, "pose");
+    const Eigen::Matrix3d& turned = gel_from_object.rotation;
+    if (!(turned * turned.transpose()).isIdentity(1e-6) || turned.determinant() < 0.0)
+      fail("pose: its rotation isn't one");
+    order.place_mm = gel_from_object.translation.head<2>();
+    order.height_mm = gel_from_object.translation.z();
+    order.angles_deg = xyz_from_rotation(gel_from_object.rotation) / kRadiansPerDegree;
+  }
+  if (!shear_mm.is_none()) order.drag_mm = vector2_from(shear_mm, "shear_mm");
   if (!shear_N.is_none()) order.shear_N = vector2_from(shear_N, "shear_N");
   order.seconds = seconds;
-  check_order(order);
+  sim::check(order);
   const SharedObject object = object_from(touched);
   return unlocked([&] {
-    sim::TouchSession session = sensor.session(object, {});
-    carry_out(order, sensor, *object, session);
-    return std::make_shared<Touch>(sensor.touch(object, session, {look, truth, noise_seed, frame}));
+    return std::make_shared<Touch>(sensor.press(object, order, {look, truth, noise_seed, frame}));
   });
 }
 
 template <typename Rows>
 py::object rows_of(const Rows& rows, const py::handle& owner) {
   return rows.size() == 0 ? py::object(py::none()) : py::object(array_within(rows, owner));
+}
+
+/// A copy, as records.
+py::object events_array(const std::vector<Event>& events) {
+  const auto count = static_cast<py::ssize_t>(events.size());
+  py::array_t<std::int64_t> t(count);
+  py::array_t<std::uint16_t> x(count), y(count);
+  py::array_t<bool> on(count);
+  for (py::ssize_t k = 0; k < count; ++k) {
+    const Event& event = events[static_cast<std::size_t>(k)];
+    t.mutable_at(k) = event.t_us;
+    x.mutable_at(k) = event.x;
+    y.mutable_at(k) = event.y;
+    on.mutable_at(k) = event.on;
+  }
+  const py::module_ numpy = py::module_::import("numpy");
+  py::list dtype;
+  dtype.append(py::make_tuple("t_us", "i8"));
+  dtype.append(py::make_tuple("x", "u2"));
+  dtype.append(py::make_tuple("y", "u2"));
+  dtype.append(py::make_tuple("on", "?"));
+  py::object records = numpy.attr("empty")(count, numpy.attr("dtype")(dtype));
+  records[py::str("t_us")] = t;
+  records[py::str("x")] = x;
+  records[py::str("y")] = y;
+  records[py::str("on")] = on;
+  return records;
 }
 
 /// A view of a list of points that `owner` holds.
@@ -172,7 +163,7 @@ void bind_sensor(py::module_& module) {
       .def("__repr__", [](const sim::ObjectSpec& self) { return fmt::format("<touchstone.Object '{}'>", self.name); });
 
   const auto of_touch = [](auto member) {
-    return [member](const py::object& self) { return array_of(self.cast<Touch&>().pictures.*member); };
+    return [member](const py::object& self) { return array_of(self.cast<Touch&>().of.*member); };
   };
   py::class_<Touch, std::shared_ptr<Touch>>(module, "Touch",
                                             "One touch: pictures and what is true of it. Its arrays of pictures and of "
@@ -188,16 +179,16 @@ void bind_sensor(py::module_& module) {
           "height_mm", of_touch(&sim::Touch::height),
           "float32: how far the membrane that a pixel sees is pressed in, along z; NaN where it sees none.")
       .def_property_readonly(
-          "contact", [](const Touch& self) { return bool_array_of(self.pictures.contact); },
+          "contact", [](const Touch& self) { return bool_array_of(self.of.contact); },
           "bool: the pixel sees membrane that lies on the object.")
       .def_property_readonly(
-          "wrench", [](const Touch& self) { return small_array(self.press.wrench); },
+          "wrench", [](const Touch& self) { return small_array(self.of.press.wrench); },
           "(6,): force N and torque N mm about the gel frame's origin, on the object.")
       .def_property_readonly(
-          "force_N", [](const Touch& self) { return small_array(self.press.wrench.head<3>().eval()); },
+          "force_N", [](const Touch& self) { return small_array(self.of.press.wrench.head<3>().eval()); },
           "(3,): on the object, gel frame; pressing gives a positive z.")
       .def_property_readonly(
-          "pose", [](const Touch& self) { return pose_array(self.press.gel_from_object); },
+          "pose", [](const Touch& self) { return pose_array(self.of.press.gel_from_object); },
           "(3, 4): gel_from_object, rotation and position in mm.")
       .def_property_readonly(
           "contact_state", [](const Touch& self) { return sim::name_of(self.reading.contact); },
@@ -205,40 +196,73 @@ void bind_sensor(py::module_& module) {
       .def_property_readonly(
           "slipping_share", [](const Touch& self) { return self.reading.slipping_share; }, "Of the contact's area.")
       .def_property_readonly(
-          "contact_area_mm2", [](const Touch& self) { return self.press.contact_area; }, "Of the coarse contact.")
+          "contact_area_mm2", [](const Touch& self) { return self.of.press.contact_area; }, "Of the coarse contact.")
       .def_property_readonly(
-          "force_error_N", [](const Touch& self) { return small_array(self.error.force); },
+          "force_error_N", [](const Touch& self) { return small_array(self.of.error.force); },
           "(3,): one standard error of each force component, from the mesh.")
       .def_property_readonly(
-          "displacement_error_mm", [](const Touch& self) { return self.error.displacement; },
+          "displacement_error_mm", [](const Touch& self) { return self.of.error.displacement; },
           "One standard error of the surface's displacement near the contact, root mean square.")
       .def_property_readonly(
-          "bead_error_mm", [](const Touch& self) { return self.error.beads; },
+          "bead_error_mm", [](const Touch& self) { return self.of.error.beads; },
           "One standard error of the bead that is furthest off.")
       .def_property_readonly(
-          "traction_error_MPa", [](const Touch& self) { return self.error.traction; },
+          "traction_error_MPa", [](const Touch& self) { return self.of.error.traction; },
           "One standard error of the traction over the contact, root mean square.")
       .def_property_readonly(
-          "largest_strain", [](const Touch& self) { return self.press.largest_strain; },
+          "largest_strain", [](const Touch& self) { return self.of.press.largest_strain; },
           "Of the gel: above some 0.2 linear elasticity is off by percents.")
       .def_property_readonly(
-          "under_resolved", [](const Touch& self) { return self.press.under_resolved; },
+          "under_resolved", [](const Touch& self) { return self.of.press.under_resolved; },
           "Too few vertices touch for a force exact to a percent.")
       .def_property_readonly(
           "surface_displacement_mm",
-          [](const py::object& self) { return rows_of(self.cast<Touch&>().press.surface_displacement, self); },
+          [](const py::object& self) { return rows_of(self.cast<Touch&>().of.press.surface_displacement, self); },
           "(n, 3): of the gel's surface vertices (Sensor.gel_vertices_mm).")
       .def_property_readonly(
-          "traction_MPa", [](const py::object& self) { return rows_of(self.cast<Touch&>().press.traction, self); },
+          "traction_MPa", [](const py::object& self) { return rows_of(self.cast<Touch&>().of.press.traction, self); },
           "(n, 3): on the gel.")
       .def_property_readonly(
           "bead_displacement_mm",
-          [](const py::object& self) { return rows_of(self.cast<Touch&>().press.bead_displacement, self); },
+          [](const py::object& self) { return rows_of(self.cast<Touch&>().of.press.bead_displacement, self); },
           "(m, 3), or None for a gel without beads.")
+      .def_property_readonly(
+          "background", of_touch(&sim::Touch::background),
+          "The untouched device's frame, with other noise; of a clear gel the object stands just above it.")
+      .def_property_readonly(
+          "markers_mm", [](const py::object& self) { return rows_of(self.cast<Touch&>().of.markers_mm, self); },
+          "(m, 3): the middles of printed markers on the undeformed gel, or None without a print.")
+      .def_property_readonly(
+          "marker_displacement_mm",
+          [](const py::object& self) { return rows_of(self.cast<Touch&>().of.marker_displacement, self); },
+          "(m, 3): how far the gel under each marker's middle has gone, or None.")
+      .def_property_readonly(
+          "events",
+          [](const Touch& self) -> py::object {
+            if (self.of.events.empty() && self.of.frame.empty()) return py::none();
+            return events_array(self.of.events);
+          },
+          "Structured array (t_us, x, y, on) of a device with event pixels, from the press's start to its end.")
+      .def_property_readonly(
+          "statistics",
+          [](const Touch& self) -> py::object {
+            if (!self.of.statistics) return py::none();
+            const ChipStatistics& s = *self.of.statistics;
+            py::dict of;
+            of["t_us"] = s.t_us;
+            of["dx"] = s.dx;
+            of["dy"] = s.dy;
+            of["maximum"] = s.maximum;
+            of["minimum"] = s.minimum;
+            of["squal"] = s.squal;
+            of["average"] = s.average;
+            return of;
+          },
+          "Of a device with a motion chip, a dict: the last frame's statistics; dx and dy are summed over the press.")
       .def_property_readonly(
           "node_state",
           [](const py::object& self) {
-            const auto& states = self.cast<Touch&>().press.node_state;
+            const auto& states = self.cast<Touch&>().of.press.node_state;
             return py::array_t<std::uint8_t>({static_cast<py::ssize_t>(states.size())}, {py::ssize_t{1}},
                                              reinterpret_cast<const std::uint8_t*>(states.data()), self);
           },
@@ -255,7 +279,7 @@ void bind_sensor(py::module_& module) {
       "cache: folder of set-up results; '': $TOUCHSTONE_CACHE or ~/.cache/touchstone.\n"
       "progress: called as progress(stage, done, total).\n\n"
       "Its gel is set up at once (seconds; later from the cache), its light with the first picture. Pictures need a "
-      "device with a camera and a coating; forces and sessions need neither. May be used from several threads.")
+      "device with a camera; forces and sessions need none. May be used from several threads.")
       .def(py::init(&make_sensor), py::arg("device"), py::kw_only(), py::arg("unit") = 1, py::arg("deepest_mm") = 1.2,
            py::arg("widest_mm") = 0.5, py::arg("membrane_um") = 40.0, py::arg("cache") = "",
            py::arg("progress") = py::none())
@@ -277,16 +301,16 @@ void bind_sensor(py::module_& module) {
           [](const py::object& self) { return rows_in<int>(self.cast<Sensor&>().gel().triangles, 3, self); },
           "(triangles, 3): vertices of each.")
       .def_property_readonly(
-          "mm_per_px", [](const Sensor& self) { return unlocked([&] { return self.rig().mm_per_px(); }); },
+          "mm_per_px", [](const Sensor& self) { return unlocked([&] { return self.virtual_sensor().mm_per_px(); }); },
           "In the middle of the undeformed membrane.")
       .def_property_readonly(
-          "light", [](const Sensor& self) { return unlocked([&] { return self.rig().light().reason; }); },
+          "light", [](const Sensor& self) { return unlocked([&] { return self.virtual_sensor().light().reason; }); },
           "How pictures are lit, and why.")
       .def(
           "gel_from_pixel",
           [](const Sensor& self, const py::object& pixel) {
             const Eigen::Vector2d at = vector2_from(pixel, "pixel");
-            return small_array(unlocked([&] { return self.rig().gel_from_pixel(at); }));
+            return small_array(unlocked([&] { return self.virtual_sensor().gel_from_pixel(at); }));
           },
           py::arg("pixel"),
           "Where on the undeformed membrane a point of the picture lies (mm); pixel centres are at + 0.5.")
@@ -294,13 +318,13 @@ void bind_sensor(py::module_& module) {
           "pixel_from_gel",
           [](const Sensor& self, const py::object& place) {
             const Eigen::Vector2d at = vector2_from(place, "place_mm");
-            return small_array(unlocked([&] { return self.rig().pixel_from_gel(at); }));
+            return small_array(unlocked([&] { return self.virtual_sensor().pixel_from_gel(at); }));
           },
           py::arg("place_mm"), "The inverse of gel_from_pixel.")
       .def(
           "background",
           [](const Sensor& self, std::uint64_t noise_seed, int frame) {
-            return array_of(unlocked([&] { return self.rig().background(noise_seed, frame); }));
+            return array_of(unlocked([&] { return self.virtual_sensor().background(noise_seed, frame); }));
           },
           py::kw_only(), py::arg("noise_seed") = 0, py::arg("frame") = 0,
           "The frame of the untouched device; noise by noise_seed and frame.")
@@ -311,10 +335,8 @@ void bind_sensor(py::module_& module) {
             const Eigen::Matrix3d rotation =
                 rotation_from_xyz(vector3_from(angles_deg, "angles_deg") * kRadiansPerDegree);
             const SharedObject object = object_from(touched);
-            return unlocked([&] {
-              return sim::touch_height(self.device().gel,
-                                       sim::coarse_contact_shape(*object, self.device().mesh.fine_mm), at, rotation);
-            });
+            return unlocked(
+                [&] { return sim::first_touch(self.device().gel, sim::contact_shape(*object), at, rotation); });
           },
           py::arg("object"), py::kw_only(), py::arg("at_mm") = py::make_tuple(0.0, 0.0),
           py::arg("angles_deg") = py::make_tuple(0.0, 0.0, 0.0),

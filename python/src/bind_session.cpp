@@ -18,7 +18,9 @@ class Session {
 
  public:
   Session(std::shared_ptr<Sensor> sensor, SharedObject object, const sim::TouchSessionSettings& settings)
-      : sensor_(std::move(sensor)), object_(std::move(object)), session_(sensor_->session(object_, settings)) {}
+      : sensor_(std::move(sensor)),
+        object_(std::move(object)),
+        session_(sensor_->virtual_sensor().session(sensor_->object(object_), settings)) {}
 
   sim::TouchReading step(const RigidTransform& pose, double seconds) {
     return alone([&] { return session_.step(pose, seconds); });
@@ -26,9 +28,9 @@ class Session {
   sim::TouchReading reading() {
     return alone([&] { return session_.reading(); });
   }
-  std::shared_ptr<Touch> look(const Look& how, bool frame_of_step) {
+  std::shared_ptr<Touch> look(const sim::TouchOptions& how, bool frame_of_step) {
     return alone([&] {
-      Look look = how;
+      sim::TouchOptions look = how;
       if (frame_of_step) look.frame = static_cast<int>(session_.reading().step);
       return std::make_shared<Touch>(sensor_->touch(object_, session_, look));
     });

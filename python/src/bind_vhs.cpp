@@ -135,7 +135,7 @@ void bind_vhs(py::module_& module) {
              py::arg("grid") = 3, py::arg("form") = "asymmetric",
              "Trains a StiffnessForceModel: returns a dict of model, rms_error_N (3,), r2 (3,), iterations.\n\n"
              "rest: (grid^2, 2) px without load. positions: as many for each sample. forces_N: (samples, 3).\n"
-             "form: 'asymmetric' (the text's), 'symmetric' or 'diagonal'.");
+             "form: 'asymmetric' (that of [VisioHaptic2024]), 'symmetric' or 'diagonal'.");
 }
 
 }  // namespace touchstone::python

@@ -5,7 +5,7 @@
 #include "python/src/bindings.h"
 
 PYBIND11_MODULE(_core, module) {
-  namespace lab = touchstone::lab;
+  namespace datasets = touchstone::datasets;
   namespace python = touchstone::python;
   module.doc() = "Touchstone's C++ part; use the package `touchstone`.";
   datasets::use_one_blas_thread();

@@ -11,54 +11,41 @@
 
 #include "core/progress.h"
 #include "sim/press/touch_session.h"
-#include "sim/sensor/touch_rig.h"
+#include "sim/sensor/virtual_sensor.h"
 
 namespace touchstone::python {
 
 /// A touched object; sensors know it by its address.
 using SharedObject = std::shared_ptr<const sim::ObjectSpec>;
 
-/// One touch: what mechanics tells, and the pictures where they were asked for.
+/// One touch: what the sensor delivers and what is true of it.
 struct Touch {
-  sim::TouchReading reading;
-  fem::PressState press;
-  fem::PressError error;
-  sim::Touch pictures;  ///< contact: 0 and 1; all empty without a picture
-  cv::Mat ideal;        ///< sim::TouchRig::ideal; empty without truth
+  sim::Touch of;              ///< contact: 0 and 1
+  sim::TouchReading reading;  ///< what its contact does
+  cv::Mat ideal;              ///< sim::VirtualSensor::ideal; empty without truth
   std::optional<render::DirectError> light_error;
 };
 
-/// What a touch's picture is made with.
-struct Look {
-  bool picture = true;
-  bool truth = true;
-  std::uint64_t noise_seed = 0;
-  int frame = 0;
-};
-
-/// A device. Its gel is set up at once, its light with the first picture.
+/// A device with the objects that touched it last.
 class Sensor {
  public:
-  Sensor(sim::DeviceSpec device, std::filesystem::path cache, const sim::TouchRigSettings& settings,
-         const Progress& progress);
+  Sensor(sim::DeviceSpec device, const std::filesystem::path& cache, const sim::VirtualSensorSettings& settings,
+         const Progress& progress)
+      : sensor_(std::move(device), cache, settings, progress) {}
 
-  const sim::DeviceSpec& device() const { return device_; }
-  const fem::Compliance& gel() const { return *gel_; }
-  const sim::TouchRig& rig() const;
+  const sim::VirtualSensor& virtual_sensor() const { return sensor_; }
+  const sim::DeviceSpec& device() const { return sensor_.device(); }
+  const fem::Compliance& gel() const { return sensor_.gel(); }
 
-  /// @throws Error for an elastic object
-  sim::TouchSession session(const SharedObject& object, const sim::TouchSessionSettings& settings) const;
-  Touch touch(const SharedObject& object, const sim::TouchSession& session, const Look& look) const;
+  sim::TouchObject object(const SharedObject& object) const;
+  Touch press(const SharedObject& object, const sim::PressSpec& press, const sim::TouchOptions& options) const;
+  Touch touch(const SharedObject& object, const sim::TouchSession& session, const sim::TouchOptions& options) const;
 
  private:
-  sim::TouchObject seen(const SharedObject& object) const;
+  Touch finished(sim::Touch touch, const sim::TouchReading& reading, const sim::TouchOptions& options) const;
 
-  sim::DeviceSpec device_;
-  std::filesystem::path cache_;
-  sim::TouchRigSettings settings_;
-  std::shared_ptr<const fem::Compliance> gel_;
+  sim::VirtualSensor sensor_;
   mutable std::mutex mutex_;
-  mutable std::unique_ptr<const sim::TouchRig> rig_;
   mutable std::deque<std::pair<SharedObject, sim::TouchObject>> seen_;  // the last few
 };
 

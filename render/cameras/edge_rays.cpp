@@ -87,10 +87,10 @@ void put_edge_rays(const CameraRays& rays, int point, int side, RayPacket& packe
   };
   const Eigen::Matrix<float, 3, 2> across = slope(0, 1);
   const Eigen::Matrix<float, 3, 2> down = slope(1, 0);
-  // A grid whose rows are set off against each other, and its columns, so that no two points share an x or a y (Chiu,
-  // Shirley and Wang 1994, "Multi-jittered sampling", without the jitter): an edge that runs with the pixels has as
-  // many places between them to be found at as there are points. Moved from pixel to pixel by less than that, in steps
-  // of the golden section, so that along such an edge the mean is right too.
+  // A grid whose rows are set off against each other, and its columns, so that no two points share an x or a y
+  // ([Chiu1994] without the jitter): an edge that runs with the pixels has as many places between them to be found at
+  // as there are points. Moved from pixel to pixel by less than that, in steps of the golden section, so that along
+  // such an edge the mean is right too.
   constexpr double kGolden = 0.6180339887498949;
   const auto moved = [](int by) {
     const double turns = kGolden * (by + 0.5);

@@ -1,9 +1,8 @@
 #pragma once
 // What the lamps of a static fixture send to each place that a membrane may reach, ahead of time.
 //
-// The vector irradiance F of a lamp (Gershun 1939) is the integral of radiance times direction: a matt surface of
-// normal n that sees all of the lamp gets the irradiance max(0, -n.F). It is smooth in space, so a coarse grid holds
-// it.
+// The vector irradiance F of a lamp [Gershun1939] is the integral of radiance times direction: a matt surface of normal
+// n that sees all of the lamp gets the irradiance max(0, -n.F). It is smooth in space, so a coarse grid holds it.
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>

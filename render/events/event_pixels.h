@@ -8,10 +8,8 @@
 //   reset               the pixel is blind for the refractory time; at its end d = 0
 //   shot noise          events at random times, at a rate that falls with the light
 //
-// After P. Lichtsteiner, C. Posch, T. Delbruck 2008, "A 128x128 120 dB 15 us latency asynchronous temporal contrast
-// vision sensor" (pixel, bandwidth in proportion to light); Y. Nozaki, T. Delbruck 2017, "Temperature and parasitic
-// photocurrent effects in dynamic vision sensors" (leak); Y. Hu, S.-C. Liu, T. Delbruck 2021, "v2e: from video frames
-// to realistic DVS events" (emulation from frames).
+// After [Lichtsteiner2008] (pixel, bandwidth in proportion to light), [Nozaki2017] (leak) and v2e [Hu2021] (emulation
+// from frames).
 
 #include <cstddef>
 #include <cstdint>
@@ -37,8 +35,7 @@ struct EventPixelSettings {
   double shot_half_intensity = 0.0;  ///< light at which they are half as many; needed where `shot_rate_hz` isn't 0
 };
 
-/// The smallest mean threshold that is taken. The most sensitive pixel known fires at 0.003 (T. Delbruck, R. Berner
-/// 2010, "Temporal contrast AER pixel with 0.3%-contrast event threshold").
+/// The smallest mean threshold that is taken. The most sensitive pixel known fires at 0.003 [Delbruck2010].
 inline constexpr double kLeastEventThreshold = 0.001;
 inline constexpr double kLargestEventThreshold = 5.0;
 inline constexpr double kLongestRefractory_us = 1e9;
@@ -51,15 +48,13 @@ void check(const EventPixelSettings& settings);
 inline constexpr int kDavis240cWidth = 240;
 inline constexpr int kDavis240cHeight = 180;
 
-/// The DAVIS 240C (C. Brandli et al. 2014, "A 240x180 130 dB 3 us latency global shutter spatiotemporal vision
-/// sensor"), where `intensity_at_1klux` is the intensity of a white surface under 1 klux.
-/// Published: threshold mismatch 3.5 % contrast (Brandli); 0.1 events per pixel and second in steady light at 25
-/// degrees and a dynamic range of 120 dB (G. Gallego et al. 2020, "Event-based vision: a survey", table 1), taken as
-/// the leak and, up to 100 klux, as a dark current like that of 0.1 lux; bandwidth 3 kHz at 1 klux (Lichtsteiner 2008,
-/// the DVS128, whose photoreceptor it has). Set by a camera's biases, so not one number: thresholds of 0.2 (the
-/// smallest published is 0.11) and a refractory time of 0.5 ms, which the v2e program takes for such cameras, as well
-/// as 5 shot events/s where it's dark. That they are half as many at 1 lux is our choice: above some 50 lux the leak is
-/// then more than they are.
+/// The DAVIS 240C [Brandli2014], where `intensity_at_1klux` is the intensity of a white surface under 1 klux.
+/// Published: threshold mismatch 3.5 % contrast [Brandli2014]; 0.1 events per pixel and second in steady light at 25
+/// degrees and a dynamic range of 120 dB [Gallego2022, table 1], taken as the leak and, up to 100 klux, as a dark
+/// current like that of 0.1 lux; bandwidth 3 kHz at 1 klux ([Lichtsteiner2008], the DVS128, whose photoreceptor it
+/// has). Set by a camera's biases, so not one number: thresholds of 0.2 (the smallest published is 0.11) and a
+/// refractory time of 0.5 ms, which v2e [Hu2021] takes for such cameras, as well as 5 shot events/s where it's dark.
+/// That they are half as many at 1 lux is our choice: above some 50 lux the leak is then more than they are.
 EventPixelSettings davis240c(double intensity_at_1klux);
 
 /// The natural logarithms of `intensity` + dark, CV_32FC1.

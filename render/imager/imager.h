@@ -1,5 +1,5 @@
 #pragma once
-// From light on the sensor to digital numbers, after the linear camera model of EMVA 1288 (release 4.0 linear):
+// From light on the sensor to digital numbers, after the linear camera model of [EMVA1288] (release 4.0 linear):
 //
 //   mean photons    mu_p = sum over bands of E_b A t lambda_b / (h c)          irradiance, active area, exposure
 //   mean electrons  mu_e = sum over bands of eta_b mu_p,b                      quantum efficiency of the pixel's

@@ -79,7 +79,7 @@ ImagerPreset c310_class_preset(double exposure_s) {
           .line_time_s = 1.0 / (30.0 * kLinesPerFrame),
           .source =
               "sensor of 3.6 x 2.7 mm, measured on an opened C310 "
-              "(pomeroyprinting.blogspot.com, \"Modifying a Logitech C310 HD webcam\", 2014); "
+              "[Pomeroy2014]; "
               "1280 x 720 at 30 Hz: Logitech",
           .uncertainty =
               "pitch to 5 %, line time to 5 %; no EMVA figures are public: full well, read noise and quantum "
@@ -108,7 +108,7 @@ ImagerPreset davis240c_frames_preset(double exposure_s) {
           .line_time_s = 0.0,
           .source =
               "240 x 180 pixels of 18.5 um, frames of 51 dB dynamic range with 0.5 % fixed pattern noise, global "
-              "shutter: Brandli et al., IEEE JSSC 49(10), 2333-2341, 2014, abstract",
+              "shutter: [Brandli2014, abstract]",
           .uncertainty =
               "fill factor 22 %, read noise 55 e- and dark signal 18000 e-/s are figures quoted for the "
               "sensor that weren't checked again, to a factor of 1.5; the full well follows from read noise "
@@ -136,7 +136,7 @@ ImagerPreset adns2620_preset(double exposure_s) {
           .line_time_s = 0.0,
           .source =
               "18 x 18 pixels of 6 bits, up to 3000 frames a second, 400 counts an inch, registers Pixel_Sum, "
-              "Maximum_Pixel, Minimum_Pixel, SQUAL and Shutter: Avago, ADNS-2620 Optical Mouse Sensor data sheet",
+              "Maximum_Pixel, Minimum_Pixel, SQUAL and Shutter: [ADNS2620]",
           .uncertainty =
               "the data sheet has no photometric figures: pitch (a count at 400 per inch is 63.5 um) to 20 %; "
               "full well, area and quantum efficiency together, so the sensitivity, to a factor of 3; read "

@@ -19,10 +19,10 @@
 
 namespace touchstone::render {
 
-/// The chip's own control of its exposure. The data sheet says that it keeps the average and the maximum of the pixels
-/// within normal operating ranges, and that each change is by 1/16 of the value; the ranges aren't public: those of the
-/// maximum here are ours, that of the average is left out. No register holds the exposure fixed. A picture that is too
-/// dark for the range at the longest exposure is therefore exposed evenly for as long as it is.
+/// The chip's own control of its exposure. The data sheet [ADNS2620] says that it keeps the average and the maximum of
+/// the pixels within normal operating ranges, and that each change is by 1/16 of the value; the ranges aren't public:
+/// those of the maximum here are ours, that of the average is left out. No register holds the exposure fixed. A picture
+/// that is too dark for the range at the longest exposure is therefore exposed evenly for as long as it is.
 struct ChipShutter {
   bool automatic = true;       ///< false: always the longest
   int darkest_maximum = 45;    ///< below it the exposure grows by 1/16, up to the longest

@@ -5,8 +5,8 @@
 
 namespace touchstone::render {
 
-/// The registers after the ADNS-2620's data sheet (Avago), but for `squal`: the chip's way to count features isn't
-/// public, and ours is told at `trackable_features`.
+/// The registers after the data sheet [ADNS2620], but for `squal`: the chip's way to count features isn't public, and
+/// ours is told at `trackable_features`.
 struct MouseStatistics {
   int pixel_sum = 0;     ///< Pixel_Sum: the sum of the 324 pixels / 128, rounded down; 0 to 159
   int maximum = 0;       ///< Maximum_Pixel, 0 to 63
@@ -21,8 +21,8 @@ MouseStatistics mouse_statistics(const cv::Mat& raw, double exposure_s);
 
 /// How many places of a CV_8UC1 picture can be told from their neighbours in both directions: windows of 3x3 pixels, of
 /// all that have their central differences inside the picture, whose mean gradient tensor has a smaller eigenvalue of
-/// at least 1 DN^2 per pixel^2 (the criterion of Shi and Tomasi 1994 with a threshold of one step a pixel). 14x14
-/// windows at most for 18x18 pixels. A flat picture, a ramp and a straight edge have none.
+/// at least 1 DN^2 per pixel^2 (the criterion of [Shi1994] with a threshold of one step a pixel). 14x14 windows at most
+/// for 18x18 pixels. A flat picture, a ramp and a straight edge have none.
 int trackable_features(const cv::Mat& raw);
 
 }  // namespace touchstone::render

@@ -2,8 +2,8 @@
 // The bodies of visible lamps: flat one-sided discs and rectangles that rays can meet.
 //
 // A lamp that is visible can be found in two ways: by a connection from the place that it lights, and by a path that
-// happens to run into it. Both are weighted with the balance heuristic (Veach 1997, chapter 9), so that the sum counts
-// the light once, whichever way does well: small lamps are found by connections, large ones that a glossy surface or a
+// happens to run into it. Both are weighted with the balance heuristic [Veach1997, ch. 9], so that the sum counts the
+// light once, whichever way does well: small lamps are found by connections, large ones that a glossy surface or a
 // place close by sees also by paths. What only a path can find (after a mirroring at a flat face, or straight from the
 // camera) it counts in full; what connections take in their own way (light through a Refractive surface, taken as flat,
 // and from a rough boundary) is theirs alone.

@@ -1,7 +1,6 @@
 #pragma once
 // Long ways through dense media in few steps: a random walk far from everything is replaced by its first passage of a
-// sphere round it (walk on spheres, M. E. Muller 1956, "Some continuous Monte Carlo methods for the Dirichlet
-// problem").
+// sphere round it (walk on spheres [Muller1956]).
 //
 // Far from all boundaries light in a medium that absorbs next to nothing is diffuse: averaged over directions it is a
 // function phi that solves phi'' = kappa^2 phi, kappa^2 = 3 sigma_a / l, with the transport mean free path

@@ -7,17 +7,17 @@
 
 namespace touchstone::render {
 
-/// Density of facet normals, D(m) of Walter et al. 2007 (eq. 33): its integral times cos is one.
+/// Density of facet normals, D(m) of [Walter2007, eq. 33]: its integral times cos is one.
 double ggx_distribution(double cos_m, double alpha);
 
-/// Smith's masking of one direction, G1 (Walter et al. 2007, eq. 34).
+/// Smith's masking of one direction, G1 [Walter2007, eq. 34].
 double ggx_masking(double cos_direction, double alpha);
 
-/// Masking and shadowing of a pair, height-correlated (Heitz 2014, eq. 99).
+/// Masking and shadowing of a pair, height-correlated [Heitz2014, eq. 99].
 double ggx_masking_shadowing(double cos_in, double cos_out, double alpha);
 
 /// A facet normal among those visible from `out`, density G1(out) max(0, out.m) D(m) / out.z, by the spherical-cap
-/// construction of Dupuy and Benyoub 2023. @pre out.z > 0
+/// construction of [Dupuy2023]. @pre out.z > 0
 Eigen::Vector3d sample_visible_normal(const Eigen::Vector3d& out, double alpha, double u, double v);
 
 /// Density per solid angle of the direction that `out` is mirrored to at a facet drawn by sample_visible_normal.
@@ -36,7 +36,7 @@ class GgxAlbedo {
 
   double operator()(double cosine) const;
   /// Factor on ggx_reflection that gives that light back, coloured by the reflectance at normal incidence once more:
-  /// 1 + reflectance * (value) after Turquin 2019, "Practical multiple scattering compensation for microfacet models".
+  /// 1 + reflectance * (value) after [Turquin2019].
   double missing_ratio(double cosine) const {
     const double e = (*this)(cosine);
     return (1.0 - e) / e;
@@ -47,7 +47,7 @@ class GgxAlbedo {
   std::array<double, kNodes> table_;
 };
 
-/// Schlick's (1 - cos)^5, the weight of white in R = R0 + (1 - R0) weight.
+/// Schlick's (1 - cos)^5, the weight of white in R = R0 + (1 - R0) weight [Schlick1994].
 double schlick_weight(double cos_half);
 
 }  // namespace touchstone::render

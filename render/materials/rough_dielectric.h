@@ -4,10 +4,9 @@
 //   scene.surfaces.push_back({face, RoughRefractive{gel, air, 0.2}});     // outward normal points to air
 //
 // The boundary is made of small smooth facets whose normals follow GGX of width `roughness` (alpha, as for
-// RoughConductor); each mirrors and refracts by Fresnel's equations (Walter et al. 2007, "Microfacet models for
-// refraction through rough surfaces"). Light that one facet sends to another, up to half of it at alpha 1, is given
-// back in a wide lobe on both sides (RoughBoundary), so that a clear body under an even sky looks like the sky. Where
-// the two indices are equal light goes straight on.
+// RoughConductor); each mirrors and refracts by Fresnel's equations [Walter2007]. Light that one facet sends to
+// another, up to half of it at alpha 1, is given back in a wide lobe on both sides (RoughBoundary), so that a clear
+// body under an even sky looks like the sky. Where the two indices are equal light goes straight on.
 //
 // It scatters, so it counts as a reflection for RenderSettings::max_depth, and lamps light it from both sides; what
 // lies behind it is lit by way of it, not by connections to lamps: of those it is a shadow caster, as light doesn't
@@ -88,9 +87,9 @@ inline RoughSample sample_rough_dielectric(const Eigen::Vector3d& out, double al
 ///
 /// With E(x) the share of the light seen along x that one facet explains, x any direction of either side, the lobe adds
 ///   f(x, y) = n_x^2 (1 - E(x)) (1 - E(y)) / M,   M = the integral of n^2 (1 - E) |cos| over both hemispheres,
-/// Kulla and Conty's compensation ("Revisiting physically based shading at Imageworks", 2017) taken over both sides at
-/// once: light that has met many facets is taken to have forgotten where it came from. Energy and reciprocity hold
-/// exactly; what is lost is the true shape of that light, which is less wide, and its share of either side.
+/// Kulla and Conty's compensation [Kulla2017] taken over both sides at once: light that has met many facets is taken to
+/// have forgotten where it came from. Energy and reciprocity hold exactly; what is lost is the true shape of that
+/// light, which is less wide, and its share of either side.
 ///
 /// E is tabulated, to some 3e-3. Sampling doesn't need it: a direction drawn for one facet is kept with its
 /// weight's probability, which is E on average, and the rest is drawn from the lobe. So each sample weighs one.

@@ -4,7 +4,8 @@
 //   Medium milky{1.41, absorption, scattering, 0.8};    // coefficients per mm in each band, mean cosine 0.8
 //
 // Between two events a photon flies a distance of density sigma_t exp(-sigma_t d), sigma_t = absorption + scattering;
-// then the share scattering / sigma_t of it goes on in a new direction by Henyey and Greenstein's phase function (1941)
+// then the share scattering / sigma_t of it goes on in a new direction by Henyey and Greenstein's phase function
+// [Henyey1941]
 //   p(cos) = (1 - g^2) / (4 pi (1 + g^2 - 2 g cos)^(3/2)),
 // whose mean cosine is g: 0 is the same to all sides, 0.9 is what fine particles in silicone do, below 0 throws light
 // back. Any number of scatterings is followed; RenderSettings::max_depth doesn't count them. Without interreflection
@@ -14,8 +15,8 @@
 //
 // One path carries all bands although each has its own mean free path. The distance is drawn for one band, chosen in
 // proportion to what the path carries in it, and the result is weighted by the density over all choices (the balance
-// heuristic of Veach 1997 over bands; Chiang, Kutz and Burley 2016). So the sum of a path's bands never grows at an
-// event, and bands whose coefficients differ by orders of magnitude give no fireflies.
+// heuristic of [Veach1997] over bands; [Chiang2016]). So the sum of a path's bands never grows at an event, and bands
+// whose coefficients differ by orders of magnitude give no fireflies.
 
 #include <Eigen/Core>
 #include <algorithm>

@@ -36,8 +36,8 @@ struct FilmLight {
 /// Light that meets a film of dye transmittance `dye` and index `index`, out of a medium of index `n_medium`, at cosine
 /// `cosine` in [0, 1]. With R and t the reflectance of one face and the dye's transmittance of one passage, the
 /// geometric series give passed = (1-R)^2 t / (1 - R^2 t^2) and reflected = R (1 + t passed) for each polarisation
-/// (Born and Wolf, Principles of Optics, 7.6, without the phase); the mean of the two is returned. Beyond the critical
-/// angle nothing passes.
+/// ([Born1999, sec. 7.6], without the phase); the mean of the two is returned. Beyond the critical angle nothing
+/// passes.
 template <int N>
 FilmLight<N> film_light(const Bands<N>& dye, double index, bool fresnel_faces, double n_medium, double cosine) {
   const FresnelFace face = fresnel(n_medium, index, cosine);

@@ -9,8 +9,8 @@
 
 namespace touchstone::render {
 
-/// The standard normal's value below which a share u lies, to a relative 1e-6. Rational approximations of M. J. Wichura
-/// 1988, "Algorithm AS 241: the percentage points of the normal distribution", the short form PPND7.
+/// The standard normal's value below which a share u lies, to a relative 1e-6. Rational approximations of
+/// [Wichura1988], the short form PPND7.
 /// u in [0, 1]; the ends give about +-8.2 standard deviations, not infinity.
 inline double normal_quantile(double u) {
   const double q = u - 0.5;
@@ -35,9 +35,8 @@ inline double normal_quantile(double u) {
 }
 
 /// The smallest whole number at or below which a share u of a Poisson distribution lies. Exact by summing up to a mean
-/// of 32; above, the Cornish-Fisher expansion to O(1/mean) (M. Giles 2016, "Algorithm 955: approximation of the inverse
-/// Poisson cumulative distribution function", eq. for the normal asymptotic), which gives the neighbouring number for
-/// less than one u in a thousand. @pre mean >= 0 and finite, u in [0, 1)
+/// of 32; above, the Cornish-Fisher expansion to O(1/mean) ([Giles2016], equation of the normal asymptotic), which
+/// gives the neighbouring number for less than one u in a thousand. @pre mean >= 0 and finite, u in [0, 1)
 inline double poisson_quantile(double mean, double u) {
   if (mean < 32.0) {
     double share = std::exp(-mean);

@@ -1,5 +1,5 @@
 #pragma once
-// Quasi-random numbers for one path: Owen-scrambled Sobol points, two dimensions at a time.
+// Quasi-random numbers for one path: Owen-scrambled [Owen1995] Sobol points [Sobol1967], two dimensions at a time.
 
 #include <array>
 #include <cstdint>
@@ -13,7 +13,7 @@ inline std::uint32_t reverse_bits(std::uint32_t x) {
   return ((x & 0x55555555u) << 1) | ((x >> 1) & 0x55555555u);
 }
 
-/// A bijective mix of 64 bits (the finaliser of SplitMix64, Steele et al. 2014).
+/// A bijective mix of 64 bits (the finaliser of SplitMix64 [Steele2014]).
 inline std::uint64_t mix_bits(std::uint64_t x) {
   x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ull;
   x = (x ^ (x >> 27)) * 0x94d049bb133111ebull;
@@ -21,7 +21,7 @@ inline std::uint64_t mix_bits(std::uint64_t x) {
 }
 
 /// A hash in which each bit depends on lower bits only: applied to a bit-reversed number it is an Owen scrambling
-/// (Laine and Karras 2011, with the constants of N. Vegdahl 2021).
+/// ([Laine2011], with the constants of [Vegdahl2021]).
 inline std::uint32_t hash_upwards(std::uint32_t x, std::uint32_t seed) {
   x ^= x * 0x3d20adeau;
   x += seed;
@@ -43,8 +43,8 @@ inline std::uint32_t sobol_second_reversed(std::uint32_t index) {
 }
 
 /// The numbers of sample `sample` of pixel `pixel`: each call of next_pair() gives the sample's point of another
-/// (0,2)-sequence, Owen-scrambled and shuffled on its own (padding; Burley 2020, "Practical hash-based Owen
-/// scrambling"). A pure function of (seed, pixel, sample, number of calls). Values in [0, 1).
+/// (0,2)-sequence, Owen-scrambled and shuffled on its own (padding [Burley2020]). A pure function of (seed, pixel,
+/// sample, number of calls). Values in [0, 1).
 class SampleSequence {
  public:
   SampleSequence(std::uint64_t seed, std::uint64_t pixel, std::uint32_t sample)

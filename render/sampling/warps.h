@@ -22,7 +22,7 @@ inline SineCosine sine_cosine_within_octant(double angle) {
   return {angle * sine, cosine};
 }
 
-/// Uniform on the unit disc, area-preserving and continuous (Shirley and Chiu 1997).
+/// Uniform on the unit disc, area-preserving and continuous [Shirley1997].
 inline Eigen::Vector2d square_to_disc(double u, double v) {
   const double a = 2.0 * u - 1.0;
   const double b = 2.0 * v - 1.0;
@@ -39,7 +39,7 @@ inline Eigen::Vector3d square_to_cosine_hemisphere(double u, double v) {
   return {disc.x(), disc.y(), std::sqrt(std::max(0.0, 1.0 - disc.squaredNorm()))};
 }
 
-/// A right-handed orthonormal frame whose third axis is a given unit vector (Duff et al. 2017).
+/// A right-handed orthonormal frame whose third axis is a given unit vector [Duff2017].
 struct NormalFrame {
   Eigen::Vector3d x, y, z;
 

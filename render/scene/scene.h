@@ -31,8 +31,8 @@ struct Lambertian {
   Spectrum albedo;
 };
 
-/// Metal: GGX microfacets of width `roughness` (the alpha of Walter et al. 2007, 1e-3 to 1), Fresnel reflectance by
-/// Schlick's formula from the `reflectance` at normal incidence. Light that a facet sends to another facet is
+/// Metal: GGX microfacets of width `roughness` (the alpha of [Walter2007], 1e-3 to 1), Fresnel reflectance by Schlick's
+/// formula [Schlick1994] from the `reflectance` at normal incidence. Light that a facet sends to another facet is
 /// given back in the shape of the single reflection (ggx.h, GgxAlbedo), so that a white metal loses nothing.
 struct RoughConductor {
   Spectrum reflectance;
@@ -63,7 +63,7 @@ using Material =
 /// A triangle surface, open or closed. With `normals` (one a vertex, unit, on the side that the triangles' own are) it
 /// is shaded as the curved surface that it stands for: normals are interpolated over a triangle, and what leaves it
 /// starts where the tangent planes of its corners are, if that is over the triangle, so that facets that turn away from
-/// a lamp a little earlier or later than the surface cast no shadows on it (Hanika 2021). What passes under the
+/// a lamp a little earlier or later than the surface cast no shadows on it [Hanika2021]. What passes under the
 /// triangles is stopped by them as ever. Without, each triangle is flat; but a Refractive surface always bends light by
 /// interpolated normals, those of vertex_normals() if none are given. Only Refractive, Lambertian, RoughConductor and
 /// DiffuseTransmitter surfaces look at them. A Lambertian or RoughConductor may be printed on.

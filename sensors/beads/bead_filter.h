@@ -6,9 +6,9 @@ namespace touchstone::sensors {
 
 struct BeadFilterSettings;
 
-/// The second-order Kalman filter of sec. 3.2.2 for one bead. The state of each axis is position and velocity; over an
-/// interval dt the acceleration is a constant drawn from a normal distribution. Both axes are measured together with
-/// the same noise, so they share one covariance.
+/// The second-order Kalman filter [Kalman1960] of [VisioHaptic2024, sec. 3.2.2] for one bead. The state of each axis is
+/// position and velocity; over an interval dt the acceleration is a constant drawn from a normal distribution. Both
+/// axes are measured together with the same noise, so they share one covariance.
 struct BeadFilter {
   Eigen::Vector2d position = Eigen::Vector2d::Zero();    ///< px
   Eigen::Vector2d velocity = Eigen::Vector2d::Zero();    ///< px/s

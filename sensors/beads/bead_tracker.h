@@ -1,8 +1,8 @@
 #pragma once
-// Follows a grid of beads from frame to frame: the marker tracker of the high-speed visio-haptic sensor, sec. 3.2
-// (steps i to ix) of "High-Speed Vision-Based Haptic Sensor for Robotic Dermatological Palpation".
+// Follows a grid of beads from frame to frame: the marker tracker of the high-speed visio-haptic sensor
+// [VisioHaptic2024, sec. 3.2, steps i to ix].
 //
-// What the text leaves open, and what is done here:
+// What the paper leaves open, and what is done here:
 // - Only the windows round the beads need the scaled grey values of step ii, so only they are scaled; the mean over
 //   ROI-A that gives the factor is the true one. ROI-A and the windows may reach over the image's border: they are cut.
 // - Step iv subtracts the window's mean from each grey value. Taken with the sign that makes beads positive, and
@@ -38,7 +38,7 @@ namespace touchstone::sensors {
 enum class BeadPolarity : std::uint8_t { kDark, kBright };
 
 enum class CentroidKind : std::uint8_t {
-  kBinary,    ///< each bead pixel counts the same (the text, step vii)
+  kBinary,    ///< each bead pixel counts the same (the paper, step vii)
   kWeighted,  ///< pixels at the rim count by how much of them the bead covers, judged by their grey value
 };
 

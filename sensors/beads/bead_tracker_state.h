@@ -1,6 +1,6 @@
 #pragma once
-// What BeadTracker keeps from frame to frame, and the steps of a frame: those of the text in bead_tracker.cpp, those
-// that compare beads with each other in bead_tracker_consistency.cpp.
+// What BeadTracker keeps from frame to frame, and the steps of a frame: those of [VisioHaptic2024] in bead_tracker.cpp,
+// those that compare beads with each other in bead_tracker_consistency.cpp.
 
 #include <Eigen/Core>
 #include <cstdint>

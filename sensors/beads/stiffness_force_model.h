@@ -1,6 +1,5 @@
 #pragma once
-// Force from bead positions by a matrix of stiffness coefficients: sec. 3.3 of "High-Speed Vision-Based Haptic Sensor
-// for Robotic Dermatological Palpation", eqs. 1 to 3.
+// Force from bead positions by a matrix of stiffness coefficients [VisioHaptic2024, sec. 3.3, eqs. 1 to 3].
 //
 // For beads on an N x N grid, P holds (p_x, p_y, p_z) of each: the image coordinates and the mean distance to the
 // adjacent beads (eq. 1), which are its neighbours left, right, above and below (2 at a corner, 3 at a side, 4 inside).
@@ -28,7 +27,7 @@ const char* name_of(MatrixForm form);
 
 /// When training ends (stiffness_training.h).
 enum class StopRule : std::uint8_t {
-  kLossDrop,     ///< the loss has dropped by a given factor (the text: two orders of magnitude)
+  kLossDrop,     ///< the loss has dropped by a given factor (the paper: two orders of magnitude)
   kConvergence,  ///< the loss no longer gets better
 };
 /// "loss_drop", "convergence"

@@ -71,7 +71,7 @@ struct AxisForm {
   }
 };
 
-/// U of one sample (fig. 3 of the text): 3 x squares.
+/// U of one sample [VisioHaptic2024, fig. 3]: 3 x squares.
 Eigen::Matrix3Xd box_sums(const std::vector<Eigen::Vector2d>& positions, const Eigen::Matrix3Xd& rest, int grid) {
   const int squares = grid - 1;
   Eigen::Matrix3Xd u = Eigen::Matrix3Xd::Zero(3, squares * squares);

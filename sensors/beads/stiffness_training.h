@@ -1,6 +1,6 @@
 #pragma once
-// Training of the stiffness coefficients by gradient descent from zero on the squared error (sec. 3.3.2 of the text in
-// stiffness_force_model.h).
+// Training of the stiffness coefficients by gradient descent from zero on the squared error [VisioHaptic2024, sec.
+// 3.3.2].
 //
 // The loss is a quadratic form in the coefficients, so the descent needs the samples once, for the normal matrix, and
 // then works on that: the iterates are those of full-batch gradient descent. Coefficients are scaled by the root mean
@@ -29,13 +29,13 @@ struct TrainingSettings {
   double loss_drop = 100.0;  ///< for StopRule::kLossDrop
   /// A step that would lower the loss by less than this part of it ends the descent, under either rule.
   double least_improvement = 1e-10;
-  bool momentum = false;  ///< Nesterov's, begun anew whenever it points uphill
+  bool momentum = false;  ///< Nesterov's [Nesterov1983], begun anew whenever it points uphill
   std::int64_t max_iterations = 1'000'000;
 
-  /// The text's rule: plain descent until the loss is a hundredth.
+  /// The paper's rule: plain descent until the loss is a hundredth.
   static TrainingSettings as_published() { return {}; }
   /// Descent with momentum until it no longer gets better. Where 5 N are to be known within 0.1 N this is needed: a
-  /// hundredth of the loss is a tenth of the RMS force, so an error near 0.3 N on z may be left by the text's rule.
+  /// hundredth of the loss is a tenth of the RMS force, so an error near 0.3 N on z may be left by the paper's rule.
   static TrainingSettings to_convergence() {
     return {.stop = StopRule::kConvergence, .least_improvement = 1e-14, .momentum = true};
   }

@@ -1,8 +1,8 @@
 #pragma once
-// Evens out the light in a picture of coloured markers on white (seed 002, sec. IV.B: "top-hat", then equalisation).
+// Evens out the light in a picture of coloured markers on white ([Lin2019, sec. IV.B]: "top-hat", then equalisation).
 //
-// What the text leaves open, and what is done here:
-// - The markers are darker than the white between them, so the text's top-hat is the dark one: the picture's closing
+// What the paper leaves open, and what is done here:
+// - The markers are darker than the white between them, so the paper's top-hat is the dark one: the picture's closing
 //   with an element larger than a marker less the picture itself. The closing is the white that would be seen if there
 //   were no markers. Light multiplies, so here the picture is divided by it and not subtracted from it: a subtraction
 //   would leave a hue that depends on how bright a place is lit. picture / closing = 1 - top-hat / closing.

@@ -1,8 +1,8 @@
 #pragma once
-// Reads a grid of soft magenta markers behind rigid yellow filters from colour pictures (seed 002, sec. IV.B): light
+// Reads a grid of soft magenta markers behind rigid yellow filters from colour pictures [Lin2019, sec. IV.B]: light
 // evened out (colour_levelling.h), regions segmented and labelled, of each the centroid and the mean hue.
 //
-// What the text leaves open, and what is done here:
+// What the paper leaves open, and what is done here:
 // - Ink takes green out of white and hardly blue, the filter takes blue and hardly green. So green tells where ink is
 //   and blue where filter is, each against the pixel's own largest channel: a shadow darkens all channels and changes
 //   neither. How far a pixel is on the way from white to the full colour, which the picture at rest shows, is how much
@@ -11,7 +11,7 @@
 //   of it is under (ink_ownership.h), what is filter without ink to that filter's cell. So regions that touch are told
 //   apart, and ink may reach a little under a neighbour's filter.
 // - Centroids and areas weigh a rim pixel by what is covered of it: a marker of 4 x 4 px has them to parts of a pixel.
-// - The mean hue is circular, as hue wraps at red, over pixels of more than half saturation, as the text has it.
+// - The mean hue is circular, as hue wraps at red, over pixels of more than half saturation, as the paper has it.
 
 #include <Eigen/Core>
 #include <array>

@@ -22,7 +22,7 @@ struct HueSample {
 /// along one axis at several depths and tried on shear along a diagonal.
 struct HueModelForm {
   HueForm form = HueForm::kIsotropic;
-  // Of eq. 4:
+  // Of [Lin2019, eq. 4]:
   bool of_ink = false;       ///< of the ink's centroid
   bool free_offset = false;  ///< h0 is fitted, not the hue at rest: a better line, but then rest isn't zero
   // Of the other two:

@@ -1,8 +1,8 @@
 #pragma once
-// From how a coloured marker looks to how it has moved (seed 002, sec. IV.C, D).
+// From how a coloured marker looks to how it has moved [Lin2019, sec. IV.C, D].
 //
-// The text's model, eq. 4: h = Gz w + h0 and c = (a w + b) d, of the press w (positive inwards, the text's delta_z),
-// the hue h, the centroid's shift c and the lateral displacement d; inverted, eq. 5. The text says itself that its
+// The paper's model, eq. 4: h = Gz w + h0 and c = (a w + b) d, of the press w (positive inwards, the paper's delta_z),
+// the hue h, the centroid's shift c and the lateral displacement d; inverted, eq. 5. The paper says itself that its
 // errors "can be improved by using a non-linear approximation": here a polynomial of the change in hue, the two
 // centroids' shifts, the two areas' logarithms and what its neighbours tell
 // (marker_surroundings.h), without a constant term, so what looks as at rest is at rest.
@@ -18,7 +18,7 @@
 namespace touchstone::sensors {
 
 enum class HueForm : std::uint8_t {
-  kEquation4,   ///< the text's own
+  kEquation4,   ///< the paper's own
   kIsotropic,   ///< a polynomial that knows no direction: it may learn from shear along one axis
   kPolynomial,  ///< any polynomial: it has to see shear in all directions
 };

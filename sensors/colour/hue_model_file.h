@@ -8,7 +8,7 @@
 namespace touchstone::sensors {
 
 /// The model as JSON (format "touchstone.hue_model", version 1). Numbers are written so that reading gives the same
-/// bits. Of eq. 4's line and the polynomials, the one that the form uses is written.
+/// bits. Of the line of [Lin2019, eq. 4] and the polynomials, the one that the form uses is written.
 /// @throws Error if the model is faulty (fault_of)
 std::string to_json(const HueModel& model);
 

@@ -29,8 +29,8 @@ struct MarkerChange {
 MarkerChange change_of(const ColourMarker& seen, const ColourMarker& rest, const PictureMap& map);
 
 /// How places off the camera's axis look displaced when they come nearer. A camera at the apparent distance D sees a
-/// marker at r from the axis, pressed by w, where one at r D / (D - w) would be in the plane at rest. The text (seed
-/// 002, sec. IV.E) leaves this out; so does this if the distance is 0.
+/// marker at r from the axis, pressed by w, where one at r D / (D - w) would be in the plane at rest. The paper
+/// [Lin2019, sec. IV.E] leaves this out; so does this if the distance is 0.
 struct ViewParallax {
   /// mm from the camera to the markers at rest, as it is for small motions of the markers in the gel: with a path in
   /// air, and windows of refractive indices n_i and thicknesses t_i, n_gel (d + sum t_i / n_i). 0: far away.

@@ -4,9 +4,9 @@
 
 namespace touchstone::sensors {
 
-/// How large a dark marker on white looks: what the hue is held against (seed 002, sec. III.D, fig. 6).
+/// How large a dark marker on white looks: what the hue is held against [Lin2019, sec. III.D, fig. 6].
 struct MarkerSize {
-  int pixels = 0;  ///< darker than the threshold: a picture of 1 bit, as the text has it
+  int pixels = 0;  ///< darker than the threshold: a picture of 1 bit, as the paper has it
   double darkness_px =
       0.0;  ///< sum of 1 - luminosity over all pixels: rims count by their greys, and so does the light
 };

@@ -1,5 +1,5 @@
 #pragma once
-// Events as iniVation AEDAT 4.0 (docs.inivation.com: "AEDAT 4.0"; FlatBuffers within packets).
+// Events as iniVation AEDAT 4.0 ([AEDAT40]; FlatBuffers within packets).
 
 #include <cstdint>
 #include <filesystem>

@@ -1,5 +1,5 @@
 #pragma once
-// Events as HDF5 in the layout of the DSEC data set (Gehrig et al., RA-L 2021; dsec.ifi.uzh.ch/data-format).
+// Events as HDF5 in the layout of the DSEC data set [Gehrig2021].
 
 #include <filesystem>
 #include <span>

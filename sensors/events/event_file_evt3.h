@@ -1,5 +1,5 @@
 #pragma once
-// Events as Prophesee RAW files of EVT 3.0 words (docs.prophesee.ai: "RAW File Format", "EVT 3.0 Format").
+// Events as Prophesee RAW files of EVT 3.0 words [EVT30].
 
 #include <cstddef>
 #include <filesystem>

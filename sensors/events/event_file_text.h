@@ -18,8 +18,8 @@ namespace touchstone::sensors {
 
 /// Reads lines of time, column, row and polarity (1 ON, 0 or -1 OFF), set apart by blanks, tabs or commas. A line of
 /// names (t_us or t_s, x, y, p), a comment or not, says their order and the unit of time. Without one the order is that
-/// one, and a time with a decimal point or exponent is in seconds (the layout of Mueggler et al., IJRR 2017), one
-/// without in us. Lines of two whole numbers ahead of the events are the camera's width and height; so are comments
+/// one, and a time with a decimal point or exponent is in seconds (the layout of [Mueggler2017]), one without in us.
+/// Lines of two whole numbers ahead of the events are the camera's width and height; so are comments
 /// "# width 346". Other comments (#) and empty lines are passed over.
 class TextEventReader {
  public:

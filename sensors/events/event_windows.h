@@ -1,5 +1,5 @@
 #pragma once
-// Events to counts: seed 001, sec. III.B, "framed over 7 ms intervals", ON and OFF apart (III.C).
+// Events to counts: [Naeini2020, sec. III.B], "framed over 7 ms intervals", ON and OFF apart (III.C).
 
 #include <cstdint>
 #include <opencv2/core/types.hpp>
@@ -20,7 +20,7 @@ struct EventCounts {
 
 struct EventWindowSettings {
   std::int64_t start_us = 0;       ///< of the first window
-  std::int64_t length_us = 7'000;  ///< of each; the text's 7 ms
+  std::int64_t length_us = 7'000;  ///< of each; the paper's 7 ms
   cv::Size size{240, 180};         ///< of the camera, px (DAVIS 240C)
   cv::Rect region;                 ///< only its pixels count; empty: all
 };

@@ -1,5 +1,5 @@
 #pragma once
-// How good force estimates are, as seed 001 counts it (sec. V.C).
+// How good force estimates are, as [Naeini2020] counts it (sec. V.C).
 
 #include <Eigen/Core>
 #include <optional>
@@ -7,15 +7,15 @@
 
 namespace touchstone::sensors {
 
-/// Mean of (estimate - reference)^2, N^2. The text calls it "MSE of 0.16 N"; it is taken for a mean square.
+/// Mean of (estimate - reference)^2, N^2. The paper calls it "MSE of 0.16 N"; it is taken for a mean square.
 /// @throws Error for no values, other lengths, or a value that isn't finite
 double mean_squared_error(const Eigen::VectorXd& estimate_N, const Eigen::VectorXd& reference_N);
 
 /// "The minimum value of changes in the estimated force for all the points over 0.2 N": the least difference of two
-/// estimates that follow each other, N, where `level_N` of both is at least `least_N`. The text eliminates "data points
-/// with the force value of less than 0.2 N" because its reference is bad there; whether it means the reference's or the
-/// estimated force it doesn't say, so the caller gives either as the level. Nothing where no two such follow each
-/// other.
+/// estimates that follow each other, N, where `level_N` of both is at least `least_N`. The paper eliminates "data
+/// points with the force value of less than 0.2 N" because its reference is bad there; whether it means the reference's
+/// or the estimated force it doesn't say, so the caller gives either as the level. Nothing where no two such follow
+/// each other.
 /// @throws Error as mean_squared_error()
 std::optional<double> least_force_change(const Eigen::VectorXd& estimate_N, const Eigen::VectorXd& level_N,
                                          double least_N = 0.2);

@@ -1,20 +1,20 @@
 #pragma once
-// When a grasp touches, holds and lets go, seen from counts alone: seed 001, sec. III.B and V.B.
+// When a grasp touches, holds and lets go, seen from counts alone: [Naeini2020, sec. III.B and V.B].
 //
 // First touch is "when the first significant number of negative events are triggered", the release begins with the
-// first significant spike of positive ones. The text doesn't say what is significant. Here: what the background's
+// first significant spike of positive ones. The paper doesn't say what is significant. Here: what the background's
 // Poisson rate would give less often than `false_alarm` in one window. The rate isn't known but from N events in B
 // windows before; given the sum of both, the count c of one more window of the same rate is binomial, one part in B + 1
-// (the exact test of two Poisson rates, J. Przyborowski and H. Wilenski, Biometrika 31, 1940), so the least c with
-// P(Binomial(N + c, 1 / (B + 1)) >= c) < false_alarm is a burst. Counts that scatter by more than Poisson's (variance
-// over mean v > 1: vibration, flicker) are divided by v first (quasi-Poisson).
+// (the exact test of two Poisson rates [Przyborowski1940]), so the least c with P(Binomial(N + c, 1 / (B + 1)) >= c) <
+// false_alarm is a burst. Counts that scatter by more than Poisson's (variance over mean v > 1: vibration, flicker) are
+// divided by v first (quasi-Poisson).
 //
 // The background of the touch is the beginning of the recording; that of the release is the last windows before, one
 // window after the other, because vibration fades in the hold.
 //
-// The text has phases by number, windows 1 to 22 and 23 to 144, "144 timestamps" a grasp in its fig. 8 with release and
-// all, and a hold of 700 ms, which is 100 windows: 22 + 100 + 22 = 144. So its release must begin near window 123, and
-// 'hold up to 144' can't be meant; the release is looked for here, and taken to be as long as the grasp.
+// The paper has phases by number, windows 1 to 22 and 23 to 144, "144 timestamps" a grasp in its fig. 8 with release
+// and all, and a hold of 700 ms, which is 100 windows: 22 + 100 + 22 = 144. So its release must begin near window 123,
+// and 'hold up to 144' can't be meant; the release is looked for here, and taken to be as long as the grasp.
 
 #include <cstdint>
 #include <span>

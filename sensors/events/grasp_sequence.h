@@ -1,8 +1,8 @@
 #pragma once
-// A grasp as the estimators of seed 001 see it: accumulated counts of the grasping and the releasing phase.
+// A grasp as the estimators of [Naeini2020] see it: accumulated counts of the grasping and the releasing phase.
 //
 // "The events are accumulated over time to provide a full memory of the sequences" (sec. III.C), and the holding phase
-// isn't considered (III.B). The text leaves open whether what happens in the hold is in the memory, and in the delays,
+// isn't considered (III.B). The paper leaves open whether what happens in the hold is in the memory, and in the delays,
 // all the same. It is here unless asked otherwise, since an estimator that runs along with a grasp counts it.
 
 #include <Eigen/Core>

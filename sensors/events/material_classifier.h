@@ -1,10 +1,10 @@
 #pragma once
-// Material of a grasped object from its events: seed 001, sec. IV, fig. 6.
+// Material of a grasped object from its events: [Naeini2020, sec. IV, fig. 6].
 //
 // "The input consists of two features (accumulation of positive and negative events) for all the sequences of each
-// grip". A grasp is one sample: the text's table IV has whole multiples of 1/192 (48 folds of 4 validation grasps), its
-// table V of 1/48. So the input is taken to be all windows' accumulated counts in a row, those of the grasping and
-// those of the releasing phase; the text doesn't say so outright. They are scaled to [-1, 1] by their ranges in
+// grip". A grasp is one sample: the paper's table IV has whole multiples of 1/192 (48 folds of 4 validation grasps),
+// its table V of 1/48. So the input is taken to be all windows' accumulated counts in a row, those of the grasping and
+// those of the releasing phase; the paper doesn't say so outright. They are scaled to [-1, 1] by their ranges in
 // training.
 
 #include <Eigen/Core>
@@ -40,7 +40,7 @@ struct MaterialClassifier {
 std::string fault_of(const MaterialClassifier& model);
 
 struct MaterialClassifierSettings {
-  int hidden_layers = 2;  ///< k; the text's choice
+  int hidden_layers = 2;  ///< k; the paper's choice
   int units = 30;         ///< n
   Sigmoid sigmoid = Sigmoid::kTanh;
   ScaledConjugateGradientSettings training;

@@ -1,10 +1,10 @@
 #pragma once
-// Force from accumulated event counts by a time delay neural network: seed 001, sec. III.C, fig. 4.
+// Force from accumulated event counts by a time delay neural network: [Naeini2020, sec. III.C, fig. 4].
 //
 // What the network sees of a window is its features and those of the windows before it, `delays` in all (3 of 7 ms: the
-// text's 21 ms). Before the first window nothing has been counted: there the features are 0. Features and force are
+// paper's 21 ms). Before the first window nothing has been counted: there the features are 0. Features and force are
 // scaled to [-1, 1] by their ranges in training (sensors/learning/range_scaling.h), as MATLAB's toolbox does unless
-// told not to; the text doesn't say.
+// told not to; the paper doesn't say.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -30,7 +30,7 @@ std::string fault_of(const TimeDelayNetwork& model);
 
 struct TimeDelayNetworkSettings {
   int delays = 3;         ///< 1 to 1000
-  int hidden_layers = 4;  ///< k; the text's best
+  int hidden_layers = 4;  ///< k; the paper's best
   int units = 40;         ///< n
   Sigmoid sigmoid = Sigmoid::kTanh;
   LevenbergMarquardtSettings training;

@@ -1,5 +1,5 @@
 #pragma once
-// The picture of the untouched gel, which every frame is held against (source text 004, sec. 2.2.2, step 1).
+// The picture of the untouched gel, which every frame is held against [Li2015, sec. 2.2.2, step 1].
 
 #include <opencv2/core/mat.hpp>
 #include <optional>

@@ -1,5 +1,5 @@
 #pragma once
-// From frames of a pressed ball to a height model (source text 004, sec. 2.2.2, step 0).
+// From frames of a pressed ball to a height model [Li2015, sec. 2.2.2, step 0].
 
 #include <optional>
 #include <span>

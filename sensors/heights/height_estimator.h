@@ -1,5 +1,5 @@
 #pragma once
-// Frame in, height map out (source text 004, sec. 2.2.2, steps 1 to 3).
+// Frame in, height map out [Li2015, sec. 2.2.2, steps 1 to 3].
 
 #include <cstdint>
 #include <opencv2/core/mat.hpp>

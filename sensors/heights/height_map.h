@@ -3,10 +3,10 @@
 //
 // - Pixel coordinates u (right) and v (down); the first pixel's centre is at (0.5, 0.5).
 // - A height is how far the membrane is pressed into the sensor, mm, CV_32FC1: 0 where it is at rest, positive under an
-//   object ("the larger the force, the larger the height map", source text 004, sec. 4.2), slightly negative where the
-//   gel bulges.
+//   object ("the larger the force, the larger the height map", [Li2015, sec. 4.2]), slightly negative where the gel
+//   bulges.
 // - Slopes are the height's derivatives along u and v, mm/mm, CV_32FC1. The membrane's normal towards the camera is
-//   (-slope_u, -slope_v, 1) / sqrt(1 + slope_u^2 + slope_v^2); the text's G = (Nx/Nz, Ny/Nz) is that up to the sign.
+//   (-slope_u, -slope_v, 1) / sqrt(1 + slope_u^2 + slope_v^2); the thesis's G = (Nx/Nz, Ny/Nz) is that up to the sign.
 // - One scale, mm_per_px, for the whole picture: the membrane's height changes it by height/distance, which is left out
 //   (1 mm before a camera 30 mm away: 3 %).
 

@@ -19,7 +19,7 @@ struct ColourSample {
 
 /// Which differences between places are taken out of the colours before they are looked up.
 enum class LightCorrection {
-  none,        ///< one table for all places, as the source text has it
+  none,        ///< one table for all places, as in [Li2015]
   background,  ///< each channel is scaled by its mean background / its background there: brightness that falls off
   fitted       ///< so scaled, colours are led back to the middle's by the lamps' vectors there, fitted to the presses
 };

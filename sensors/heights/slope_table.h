@@ -1,5 +1,5 @@
 #pragma once
-// The lookup table of the source text (004, sec. 2.2.2, step 0): from a colour difference to the membrane's slope.
+// The lookup table of [Li2015, sec. 2.2.2, step 0]: from a colour difference to the membrane's slope.
 
 #include <Eigen/Core>
 #include <array>
@@ -29,7 +29,7 @@ struct SlopeTableSettings {
   double finest_step_DN = 2.0;  ///< made larger until the grid has at most `most_cells`
   std::size_t most_cells = 1U << 20U;
   double prior_pixels = 4.0;  ///< as how many calibration pixels a cell's surroundings count
-  double steepest = 4.0;      ///< no slope is longer: the limit of step 2 of the text
+  double steepest = 4.0;      ///< no slope is longer: the limit of step 2 of the thesis
 };
 
 /// Each cell gets the lamps' slope for its colour (slope_by_lamps) plus the calibration's mean deviation from it: of

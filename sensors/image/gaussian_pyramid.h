@@ -7,7 +7,7 @@ namespace touchstone::sensors {
 
 inline constexpr int kMostPyramidLevels = 8;
 
-/// The image and its reductions by half: level i + 1 is level i, weighted by Burt and Adelson's kernel (1983) with
+/// The image and its reductions by half: level i + 1 is level i, weighted by the kernel of [Burt1983] with
 /// a = 0.375, that is (1, 4, 6, 4, 1) / 16 along each axis, at every second pixel. A side of n px becomes (n + 1) / 2;
 /// beyond its border an image is mirrored in its outermost pixels; brightness is rounded to 8 bit on each level.
 /// @param gray CV_8UC1, level 0 of the answer shares its pixels

@@ -1,7 +1,6 @@
 #pragma once
 // The least value of a function that is dear to evaluate, in few evaluations: Bayesian optimisation with a Gaussian
-// process as surrogate and expected improvement (D. R. Jones, M. Schonlau and W. J. Welch, J. Global Optimization 13,
-// 1998).
+// process as surrogate and expected improvement [Jones1998].
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -18,7 +17,7 @@ struct SearchBox {
 
 struct BayesianMinimumSettings {
   int evaluations = 10;  ///< in all
-  /// The first ones: the place that was given, then a Latin hypercube. At least 2, at most `evaluations`.
+  /// The first ones: the place that was given, then a Latin hypercube [McKay1979]. At least 2, at most `evaluations`.
   int first_evaluations = 4;
   int candidates = 2000;  ///< places at which the expected improvement is looked at, each time
   std::uint64_t seed = 1;

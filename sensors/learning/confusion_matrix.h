@@ -5,7 +5,7 @@
 
 namespace touchstone::sensors {
 
-/// How often samples of class `row` were taken for class `column`: seed 001, fig. 12.
+/// How often samples of class `row` were taken for class `column`: [Naeini2020, fig. 12].
 struct ConfusionMatrix {
   Eigen::MatrixXi counts;
 

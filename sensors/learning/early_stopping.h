@@ -7,7 +7,7 @@
 namespace touchstone::sensors {
 
 /// Keeps the parameters that were best on data that aren't trained on, and says when they no longer get better: after
-/// `patience` steps in a row without a new best one. (MATLAB's toolbox, which seed 001 used, takes 6.)
+/// `patience` steps in a row without a new best one. (MATLAB's toolbox, which [Naeini2020] used, takes 6.)
 class EarlyStopping {
  public:
   explicit EarlyStopping(int patience) : patience_(patience) {}

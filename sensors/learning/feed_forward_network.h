@@ -1,10 +1,10 @@
 #pragma once
-// A network of fully connected layers: k hidden ones of sigmoids and a linear output, which seed 001's time delay
-// network (fig. 4) and its classifier before the softmax (fig. 6) have in common.
+// A network of fully connected layers: k hidden ones of sigmoids and a linear output, which the time delay network
+// [Naeini2020, fig. 4] and the classifier before its softmax (fig. 6) have in common.
 //
 // "Sigmoid" may mean 1 / (1 + exp(-x)) or tanh(x). Since the first is (1 + tanh(x / 2)) / 2, networks of either are the
 // same functions, with other weights; what differs is how they train. tanh has its mean at zero and twice the slope,
-// and is what MATLAB's toolbox, which the text used, starts from; it is the default.
+// and is what MATLAB's toolbox, which the paper used, starts from; it is the default.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -41,8 +41,8 @@ struct NetworkShape {
   Sigmoid sigmoid = Sigmoid::kTanh;
 };
 
-/// Biases zero, weights uniform within sqrt(6 / (inputs + units)) of zero (X. Glorot and Y. Bengio 2010). The text has
-/// biases "set to zero at the first place" and weights "initialized randomly", without a range.
+/// Biases zero, weights uniform within sqrt(6 / (inputs + units)) of zero [Glorot2010]. The paper has biases "set to
+/// zero at the first place" and weights "initialized randomly", without a range.
 /// @throws Error naming what is out of its range
 FeedForwardNetwork random_network(const NetworkShape& shape, RandomStream& random);
 

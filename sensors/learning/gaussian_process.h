@@ -1,10 +1,9 @@
 #pragma once
-// Regression by a Gaussian process: seed 001, sec. III.D, eq. 4, with inputs ON and OFF counts and time.
+// Regression by a Gaussian process: [Naeini2020, sec. III.D, eq. 4], with inputs ON and OFF counts and time.
 //
 // k(x, x') = signal^2 exp(-1/2 sum over m of ((x_m - x'_m) / length_m)^2): eq. 4, whose print has lost the square of
-// the differences. To this come noise^2 on the diagonal and a constant mean, the targets' own (the text names neither,
-// and no force can be regressed without the first). All by Cholesky: C. E. Rasmussen and C. K. I. Williams, Gaussian
-// Processes for Machine Learning (2006), algorithm 2.1 and eq. 5.9.
+// the differences. To this come noise^2 on the diagonal and a constant mean, the targets' own (the paper names neither,
+// and no force can be regressed without the first). All by Cholesky [Rasmussen2006, algorithm 2.1, eq. 5.9].
 
 #include <Eigen/Core>
 #include <cstdint>

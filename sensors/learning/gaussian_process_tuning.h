@@ -1,8 +1,8 @@
 #pragma once
-// Lengths, signal and noise of a Gaussian process from data: seed 001, sec. III.D and V.C, "Bayesian optimization ...
-// over ten iterations"; and, beside it, by the gradient of the evidence.
+// Lengths, signal and noise of a Gaussian process from data: [Naeini2020, sec. III.D and V.C], "Bayesian optimization
+// ... over ten iterations"; and, beside it, by the gradient of the evidence.
 //
-// The text doesn't say what its optimisation makes small; it tunes "on the validation set". Both that and the evidence
+// The paper doesn't say what its optimisation makes small; it tunes "on the validation set". Both that and the evidence
 // can be asked for here. Searched are the logarithms of the lengths and of noise / signal; for each the signal follows
 // (with_best_signal).
 
@@ -15,7 +15,7 @@
 namespace touchstone::sensors {
 
 enum class TuningMethod : std::uint8_t {
-  kBayesian,  ///< 10 evaluations; the text's
+  kBayesian,  ///< 10 evaluations; the paper's
   kGradient,  ///< of the evidence, by scaled conjugate gradient from the same first place
 };
 enum class TuningAim : std::uint8_t {

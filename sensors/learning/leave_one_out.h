@@ -1,6 +1,6 @@
 #pragma once
-// Leave-one-out: each grasp is tested once by models that haven't seen it. Seed 001, sec. V.C (48 folds: 42 grasps to
-// train on, 5 to validate on, 1 to test) and V.D (43, 4 and 1).
+// Leave-one-out: each grasp is tested once by models that haven't seen it. [Naeini2020, sec. V.C] (48 folds: 42 grasps
+// to train on, 5 to validate on, 1 to test) and V.D (43, 4 and 1).
 
 #include <cstdint>
 #include <functional>
@@ -24,7 +24,7 @@ struct Fold {
 /// @throws Error for levels that aren't finite, or if fewer than 1 are left to train on
 std::vector<Fold> folds_by_level(std::span<const double> levels, int validation, std::uint64_t seed);
 
-/// One fold a grasp; of each class one of the other grasps is drawn to validate on (the text's "four experiments" are
+/// One fold a grasp; of each class one of the other grasps is drawn to validate on (the paper's "four experiments" are
 /// as many as its materials; how they were chosen it doesn't say). A class that would have none left to train on gives
 /// none.
 /// @throws Error for a label below 0, or if fewer than 1 are left to train on

@@ -1,9 +1,9 @@
 #pragma once
-// Levenberg-Marquardt for networks: seed 001, eqs. 2 and 3. Each step solves (J^T J + lambda I) p = -J^T F, F the
-// errors of all samples and J their derivatives by all parameters; lambda goes down after a step that lowers the sum of
-// squares at once, and up, with the step tried again, after one that doesn't.
+// Levenberg-Marquardt [Marquardt1963] for networks: [Naeini2020, eqs. 2 and 3]. Each step solves (J^T J + lambda I) p =
+// -J^T F, F the errors of all samples and J their derivatives by all parameters; lambda goes down after a step that
+// lowers the sum of squares at once, and up, with the step tried again, after one that doesn't.
 //
-// The text's network of k = 4, n = 40 has more parameters (5241 with two counts in three windows) than samples (some
+// The paper's network of k = 4, n = 40 has more parameters (5241 with two counts in three windows) than samples (some
 // 2000). Then the same step is p = -J^T (J J^T + lambda I)^-1 F, whose matrix is only as large as the samples are many.
 // And a network's J needn't be formed for it: a sample's derivatives by the weights of a layer are an outer product (of
 // what comes back to its sums, d, and what goes in, a), so (J J^T)_ij is the sum over layers of (d_i . d_j) (a_i . a_j
@@ -64,7 +64,7 @@ class LevenbergMarquardtSystem {
 Eigen::MatrixXd jacobian(const FeedForwardNetwork& network, const Eigen::MatrixXd& inputs);
 
 struct LevenbergMarquardtSettings {
-  double first_damping = 0.01;  ///< lambda of eq. 3; the text's
+  double first_damping = 0.01;  ///< lambda of eq. 3; the paper's
   double damping_up = 10.0;     ///< factor after a step that failed; above 1
   double damping_down = 0.1;    ///< factor after one that succeeded at once; above 0, below 1
   double most_damping = 1e10;

@@ -23,9 +23,9 @@ struct ScaledConjugateGradientEnd {
   int gradients = 0;         ///< evaluations of the function
 };
 
-/// Minimises from x on, which takes the best place: Scaled conjugate gradient, M. F. Moller, Neural Networks 6 (1993),
-/// steps 1 to 9. On a quadratic bowl of n dimensions it ends in n steps. A place where the function isn't finite counts
-/// as a step that fails.
+/// Minimises from x on, which takes the best place: scaled conjugate gradient [Moller1993, steps 1 to 9]. On a
+/// quadratic bowl of n dimensions it ends in n steps. A place where the function isn't finite counts as a step that
+/// fails.
 /// @param watch is told after each step that didn't fail: its number, x and the value there; if it returns true, that
 /// is
 ///   the end

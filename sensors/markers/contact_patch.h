@@ -42,7 +42,7 @@ struct MeanDisplacement {
   int markers = 0;  ///< measured ones on the patch, over which the mean goes
 };
 
-/// Mean displacement since rest of the markers on the patch (sec. 4.3 of seed 004).
+/// Mean displacement since rest of the markers on the patch [Li2015, sec. 4.3].
 MeanDisplacement mean_displacement(const TrackedMarkers& markers, const ContactPatch& patch);
 
 }  // namespace touchstone::sensors

@@ -1,6 +1,6 @@
 #pragma once
-// The grasp rule of the fingertip GelSight's text (shared/seeds/004, sec. 4.5) as a state machine: close until the
-// height map says touch, lift, and close further whenever slip is seen.
+// The grasp rule of [Li2015, sec. 4.5] as a state machine: close until the height map says touch, lift, and close
+// further whenever slip is seen.
 
 #include <optional>
 #include <string>
@@ -9,7 +9,7 @@ namespace touchstone::sensors {
 
 /// How the rule goes about. Lengths are of one finger's way: a gripper of two fingers closes by twice that.
 struct GraspRuleSettings {
-  /// Touch is where the height map's maximum exceeds this. The text's threshold is 2 without a unit; in a map that is
+  /// Touch is where the height map's maximum exceeds this. The thesis's threshold is 2 without a unit; in a map that is
   /// integrated from slopes without a pixel pitch that is two pixels, 0.106 mm. Less takes less force to see a touch
   /// that is wide and flat; much less leaves patches on which slip can't be seen: an object with a radius of 20 mm has
   /// one of 1.7 mm here, which six markers lie on. An untouched gel shows at most 0.006 mm (gelsight-markers, 300
@@ -20,13 +20,13 @@ struct GraspRuleSettings {
   double longest_approach_mm = 30.0;  ///< without touch after that the rule gives up
   double slip_step_mm = 0.05;         ///< each time that slip is seen
   /// After such a step slip isn't looked at for so many frames, and when lifting is done so many pass without slip
-  /// before the object counts as held: what is seen is as old as the camera's lag (text 2.2.3: some 100 ms).
+  /// before the object counts as held: what is seen is as old as the camera's lag (sec. 2.2.3: some 100 ms).
   int settle_frames = 3;
   double most_slip_travel_mm = 1.0;           ///< closing by slip ends here
   std::optional<double> most_normal_force_N;  ///< and at this estimated normal force, if one is given
   double lost_height_mm = 0.02;               ///< the object is lost where the maximum stays below this...
   int lost_frames = 5;                        ///< ...for so many frames in a row after touch
-  bool answer_slip = true;                    ///< false: the text's step 2 is left out, for comparison
+  bool answer_slip = true;                    ///< false: the thesis's step 2 is left out, for comparison
 };
 
 /// @throws Error that names the setting, its value and what is allowed

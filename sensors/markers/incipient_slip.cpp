@@ -13,8 +13,8 @@ namespace {
 
 /// Terms of the field: translation (2), turn, swelling, lag (2).
 constexpr int kTerms = 6;
-/// How much less a surface lags along the motion than across it (K. L. Johnson, Contact Mechanics, eq. 3.91, for a
-/// Poisson's ratio of 1/2: 2.5 x^2 + 3.5 y^2 along, -x y across).
+/// How much less a surface lags along the motion than across it ([Johnson1985, eq. 3.91], for a Poisson's ratio of 1/2:
+/// 2.5 x^2 + 3.5 y^2 along, -x y across).
 constexpr double kAlong = 2.0 / 7.0;
 /// A patch slides over the markers while they move by less than this part of its own motion against them. While they
 /// move more it carries them, and is ahead of their mean by what the rim lags.

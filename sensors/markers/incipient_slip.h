@@ -1,8 +1,7 @@
 #pragma once
-// Slip that begins at the contact's rim, before the object slides: a second detector beside the text's two ratios
-// (slip_rule.h), which look at what has gone already. The idea is Yuan, Li, Srinivasan, Adelson, "Measurement of shear
-// and slip with a GelSight tactile sensor", ICRA 2015: under a small shear load the contact moves as one, under a large
-// one the field of markers becomes inhomogeneous. The measure is our own:
+// Slip that begins at the contact's rim, before the object slides: a second detector beside the thesis's two ratios
+// (slip_rule.h), which look at what has gone already. The idea is that of [Yuan2015]: under a small shear load the
+// contact moves as one, under a large one the field of markers becomes inhomogeneous. The measure is our own:
 //
 // Over the last few frames, in which the contact's middle moved by `least_motion_px` or more, the markers on the
 // contact patch moved by u(x). That is taken apart by least squares into
@@ -11,7 +10,7 @@
 // squared distance from the middle; z is x in units of the edge (of the part of the patch that is looked at). While all
 // sticks the field moves with the object and l is small; where a rim slips, it stays behind: l.t/|t|^2 grows to some 1
 // as the stick zone shrinks. The second part of the lag is what an incompressible gel does under a round contact that
-// slips (K. L. Johnson, Contact Mechanics, eq. 3.91): its surface lags less along the motion than across it.
+// slips [Johnson1985, eq. 3.91]: its surface lags less along the motion than across it.
 //
 // Once the whole contact slides, the markers stand still and there's no lag to be seen. Then the patch itself moves
 // over the markers (`sliding`), the way they are sheared: by `slide_px` within the frames kept, while they go less than

@@ -1,5 +1,5 @@
 #pragma once
-// Force as a linear function of one measure of the picture (seed 004, sec. 4.2 and 4.3): normal force of the sum of the
+// Force as a linear function of one measure of the picture [Li2015, sec. 4.2 and 4.3]: normal force of the sum of the
 // height map, for each shape of indenter; shear force of the mean marker displacement, for each gel. Good for the gel,
 // and the shape, that it was fitted to, and within the range that it saw.
 

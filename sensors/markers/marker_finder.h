@@ -1,7 +1,7 @@
 #pragma once
-// Finds a gel's black markers in one picture: threshold, blobs, centroids (seed 004, sec. 4.3).
+// Finds a gel's black markers in one picture: threshold, blobs, centroids [Li2015, sec. 4.3].
 //
-// What the text leaves open, and what is done here:
+// What the thesis leaves open, and what is done here:
 // - "Threshold the image": with the mean of a window as wide as 1.5 spacings, so a marker in a lamp's shadow and one in
 //   full light are found alike. A pixel's brightness is its largest channel: a marker is dark in all of them, a slope
 //   that one lamp doesn't reach is lit by the others.
@@ -17,7 +17,7 @@
 
 namespace touchstone::sensors {
 
-/// What markers look like, in px of the picture. The defaults are the text's, 0.4 mm every 1.2 mm, in 320 px over 17
+/// What markers look like, in px of the picture. The defaults are the thesis's, 0.4 mm every 1.2 mm, in 320 px over 17
 /// mm.
 struct MarkerLook {
   double diameter_px = 7.5;      ///< 2 to 64

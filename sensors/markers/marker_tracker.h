@@ -1,8 +1,8 @@
 #pragma once
 // Follows a gel's markers from frame to frame by their nearest neighbours, and says how far each has moved since the
-// frame at rest (seed 004, sec. 4.3).
+// frame at rest [Li2015, sec. 4.3].
 //
-// What the text leaves open, and what is done here:
+// What the thesis leaves open, and what is done here:
 // - A marker and a blob belong together if each is the other's nearest, and not farther than `longest_step` of a
 // spacing.
 //   So no two markers share a blob, and a step that could lead to the neighbour's place is no match: it's reported.

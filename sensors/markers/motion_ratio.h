@@ -5,8 +5,8 @@
 
 namespace touchstone::sensors {
 
-/// Thresholds of sec. 4.4.2 (seed 004), on the sum of the absolute differences of a pixel's three channels, each scaled
-/// to 0..1: so the sum goes from 0 to 3, and 0.1 is 25.5 grey levels of 8 bit, over the channels together. The text
+/// Thresholds of [Li2015, sec. 4.4.2], on the sum of the absolute differences of a pixel's three channels, each scaled
+/// to 0..1: so the sum goes from 0 to 3, and 0.1 is 25.5 grey levels of 8 bit, over the channels together. The thesis
 /// takes the absolute value for motion; for contact it says "the image with background subtracted", and the absolute
 /// value is taken there too: pressed gel is darker on one side as it is brighter on the other.
 struct MotionRatioSettings {

@@ -13,7 +13,7 @@ inline constexpr int kTransformLanes = 16;
 /// value j of signal i at [j * kTransformLanes + i].
 ///
 /// A signal's even entries in order and its odd ones backwards have a Fourier transform that is the DCT but for a
-/// rotation of each term (Makhoul 1980); two real signals make one complex one. The Fourier transform works in place,
+/// rotation of each term [Makhoul1980]; two real signals make one complex one. The Fourier transform works in place,
 /// with factors 4, 2, 3, 5 and any others; a large prime factor p costs p^2, so lengths such as 241 are slow.
 class CosineTransform {
  public:

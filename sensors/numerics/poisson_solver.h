@@ -23,7 +23,7 @@ enum class HeightBorder {
 /// The five-point Laplacian is diagonal along v under a cosine transform (zero: of the rows with alternating signs,
 /// which is a sine transform whose zeros lie on the outline, half a pixel outside of the pixels' centres, so that its
 /// length is the picture's height and not a possibly prime height + 1); along u each term leaves a tridiagonal system
-/// (source text 004, sec. 2.2.2, step 3 does the same by sine transforms in both directions).
+/// ([Li2015, sec. 2.2.2, step 3] does the same by sine transforms in both directions).
 ///
 /// Memory is allocated by the constructor and, for the result, by the first call only. Fast where the height has small
 /// prime factors. Single precision: about 1e-5 of the range of heights.

@@ -172,7 +172,7 @@ Subtree subtree_of(const std::vector<GrownNode>& nodes, int at) {
   return {above.cost + below.cost, above.leaves + below.leaves};
 }
 
-/// Finds the node whose subtree spares the least cost a leaf ("weakest link", Breiman et al. 1984, 3.3).
+/// Finds the node whose subtree spares the least cost a leaf ("weakest link" [Breiman1984, sec. 3.3]).
 void find_weakest(const std::vector<GrownNode>& nodes, int at, int& weakest, double& spared) {
   const GrownNode& one = nodes[static_cast<std::size_t>(at)];
   if (one.node.above == 0) return;
@@ -237,7 +237,7 @@ void add_fold_cost(std::span<const ContactSample* const> samples, const std::vec
   }
 }
 
-/// The price of a leaf by cross-validation (Breiman et al. 1984, 3.4): the k-th sample of each kind is in fold k modulo
+/// The price of a leaf by cross-validation [Breiman1984, sec. 3.4]: the k-th sample of each kind is in fold k modulo
 /// folds, prices are the geometric means of those at which the whole tree changes.
 double best_price(std::span<const ContactSample* const> samples, const ContactTreeSettings& settings) {
   std::vector<int> fold_of(samples.size());

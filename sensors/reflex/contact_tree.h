@@ -1,6 +1,6 @@
 #pragma once
-// Does anything press? A decision tree on the statistics of a motion-sensing chip's frame (seed 003, sec. III.D, eq.
-// 2).
+// Does anything press? A decision tree on the statistics of a motion-sensing chip's frame [Knoop2013, sec. III.D, eq.
+// 2].
 
 #include <array>
 #include <span>
@@ -11,11 +11,11 @@
 
 namespace touchstone::sensors {
 
-/// The statistics that normal force shows in; DX and DY belong to shear (seed 003).
+/// The statistics that normal force shows in; DX and DY belong to shear [Knoop2013].
 enum class ChipFeature { maximum, minimum, squal, average };
 inline constexpr std::array<ChipFeature, 4> kChipFeatures = {ChipFeature::maximum, ChipFeature::minimum,
                                                              ChipFeature::squal, ChipFeature::average};
-/// As the text calls it: MAX, MIN, SQ, AVG.
+/// As the paper calls it: MAX, MIN, SQ, AVG.
 std::string name_of(ChipFeature feature);
 
 inline double value_of(const ChipStatistics& statistics, ChipFeature feature) {
@@ -61,7 +61,7 @@ inline bool force_present(const ContactTree& tree, const ChipStatistics& statist
 /// How many answers the tree has.
 int leaves_of(const ContactTree& tree);
 
-/// When the tree says that a force is present, as in the text's eq. 2: "MAX > 40 or (MAX > 38 and SQ < 82)". Each part
+/// When the tree says that a force is present, as in the paper's eq. 2: "MAX > 40 or (MAX > 38 and SQ < 82)". Each part
 /// is a way through the tree, without the conditions that change nothing since others of the parts cover what they
 /// forbid. "always" or "never" where nothing is asked.
 std::string rule_of(const ContactTree& tree);
@@ -76,18 +76,18 @@ inline constexpr int kDeepestContactTree = 14;
 
 struct ContactTreeSettings {
   int folds = 10;                  ///< of the cross-validation that prunes; 1: no pruning
-  bool one_standard_error = true;  ///< the smallest tree within one standard error of the best (Breiman et al. 1984)
+  bool one_standard_error = true;  ///< the smallest tree within one standard error of the best [Breiman1984]
   int most_depth = 8;              ///< 1 to kDeepestContactTree
   int least_samples = 10;          ///< a node with fewer isn't split
   double missed_weight = 1.0;      ///< how much a missed force weighs, beside a force where there is none
 };
 
-/// A tree grown by OpenCV's CART and pruned by cost and complexity (Breiman et al. 1984), which OpenCV 4 doesn't do: a
-/// leaf's price is found by cross-validation over folds that take turns. The same tree for the same samples.
+/// A tree grown by OpenCV's CART and pruned by cost and complexity [Breiman1984], which OpenCV 4 doesn't do: a leaf's
+/// price is found by cross-validation over folds that take turns. The same tree for the same samples.
 /// @throws Error for settings that make no sense, statistics out of range, or samples of one kind only
 ContactTree train_contact_tree(std::span<const ContactSample> samples, const ContactTreeSettings& settings = {});
 
-/// How often a tree is wrong, as the text counts it.
+/// How often a tree is wrong, as the paper counts it.
 struct ContactScore {
   int samples = 0;
   int missed = 0;  ///< a force is present, the tree says none

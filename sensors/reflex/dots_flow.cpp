@@ -18,8 +18,8 @@ std::optional<Unknowns> solve(const DotsPicture& before, const DotsPicture& now,
   Eigen::Matrix<double, 5, 5> normal = Eigen::Matrix<double, 5, 5>::Zero();
   Unknowns right = Unknowns::Zero();
   const double half = 0.5 * before.columns();
-  // Differences are taken over cubes of 2x2 pixels and both pictures, all of one middle (Horn and Schunck 1981):
-  // central differences beside the middle pixel's change would make steps of such coarse dots up to twice too long.
+  // Differences are taken over cubes of 2x2 pixels and both pictures, all of one middle [Horn1981]: central differences
+  // beside the middle pixel's change would make steps of such coarse dots up to twice too long.
   for (int row = 0; row + 1 < before.rows(); ++row) {
     for (int column = 0; column + 1 < before.columns(); ++column) {
       const Eigen::Vector2d corner = before.place_of(row, column);

@@ -1,5 +1,5 @@
 #pragma once
-// Explore mode's relative estimate (seed 003, eqs. 3 and 4): the dilation and the shift between two pictures that
+// Explore mode's relative estimate [Knoop2013, eqs. 3 and 4]: the dilation and the shift between two pictures that
 // follow each other, by least squares on the optical flow equation.
 
 #include <optional>
@@ -10,10 +10,10 @@
 namespace touchstone::sensors {
 
 struct DotsFlowSettings {
-  /// 1: the text's, one linear solution. More: the second picture is warped back by what was found and looked at
+  /// 1: the paper's, one linear solution. More: the second picture is warped back by what was found and looked at
   /// again, so that steps of a pixel have no bias.
   int rounds = 1;
-  /// Let the light change by a factor and an offset, as it does when the skin comes nearer to the lamps; the text's
+  /// Let the light change by a factor and an offset, as it does when the skin comes nearer to the lamps; the paper's
   /// equation has none.
   bool free_light = false;
   double most_step_px = 3.0;  ///< what isn't believed, at the picture's edge

@@ -1,5 +1,5 @@
 #pragma once
-// Explore mode's absolute estimate (seed 003, eqs. 5 to 7): the motion that makes a picture correlate best with the
+// Explore mode's absolute estimate [Knoop2013, eqs. 5 to 7]: the motion that makes a picture correlate best with the
 // picture at rest.
 
 #include <span>
@@ -45,9 +45,9 @@ struct DotsMatch {
   double overlap = 0.0;
 };
 
-/// The best peak that Nelder and Mead's simplex (OpenCV's DownhillSolver) reaches from any of the starts. With dots of
-/// two pixels and three to four pixels apart a start must be within some 1.5 px, at the picture's edge, of the truth.
-/// @throws Error for settings out of range or pictures of different sizes; @pre at least one start
+/// The best peak that Nelder and Mead's simplex ([Nelder1965], OpenCV's DownhillSolver) reaches from any of the starts.
+/// With dots of two pixels and three to four pixels apart a start must be within some 1.5 px, at the picture's edge, of
+/// the truth. @throws Error for settings out of range or pictures of different sizes; @pre at least one start
 DotsMatch match_dots(const DotsPicture& picture, const DotsPicture& rest, std::span<const DotsMotion> starts,
                      const DotsMatchSettings& settings = {});
 

@@ -1,6 +1,6 @@
 #pragma once
 // Where the dots on a fingertip's skin went in the picture: a plane parallel to the picture that comes nearer and moves
-// sideways (seed 003, eq. 5).
+// sideways [Knoop2013, eq. 5].
 
 #include <Eigen/Core>
 

@@ -1,6 +1,6 @@
 #pragma once
-// From the motion of the dots to press and force, as explore mode learned it (seed 003, sec. III.E and IV.C), and its
-// file. Shear, which the text leaves open, goes the same way: shift, lateral displacement, force.
+// From the motion of the dots to press and force, as explore mode learned it [Knoop2013, sec. III.E and IV.C], and its
+// file. Shear, which the paper leaves open, goes the same way: shift, lateral displacement, force.
 
 #include <filesystem>
 #include <optional>

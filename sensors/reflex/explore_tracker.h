@@ -1,5 +1,5 @@
 #pragma once
-// Explore mode (seed 003, sec. III.E): from each picture of the dots to their motion since rest. Absolute while the
+// Explore mode [Knoop2013, sec. III.E]: from each picture of the dots to their motion since rest. Absolute while the
 // picture correlates with the one at rest, else step by step; a picture that tells nothing is said to, with its reason.
 
 #include <cstdint>
@@ -31,26 +31,26 @@ enum class PictureFault {
 std::string name_of(PictureFault fault);
 
 struct ExploreSettings {
-  double absolute_from = 0.95;  ///< correlation with the picture at rest, the text's
+  double absolute_from = 0.95;  ///< correlation with the picture at rest, the paper's
   DotsMatchSettings match;
   DotsFlowSettings flow;
   /// Look for a step's best correlation, from where the flow says and from where the motion was going. false: the
-  /// flow's answer is taken, as in the text; with dots of 1.5 px it is short by a third.
+  /// flow's answer is taken, as in the paper; with dots of 1.5 px it is short by a third.
   bool step_by_match = true;
   /// A step is believed if the picture, warped back by it, correlates so well with the one it was measured against.
-  /// -1: always, as in the text.
+  /// -1: always, as in the paper.
   double step_correlation = 0.8;
   /// Steps are measured against the last picture but one as long as that correlates better than `key_correlation`, and
-  /// so on back: errors add up over key pictures and not over all. Above 1: against the last picture, as in the text.
+  /// so on back: errors add up over key pictures and not over all. Above 1: against the last picture, as in the paper.
   double key_correlation = 0.9;
   double search_reach_px = 4.0;  ///< when held, rest is sought with shifts up to this; 0: not sought
   /// A Gaussian laid over all pictures, for such as have more noise than a chip's; it costs dots at the picture's edge.
   double blur_px = 0.0;
   double white = 63.0;  ///< the largest number of a pixel
-  PixelTimes times;     ///< when each pixel was taken; empty: all at once, or not known, as in the text
+  PixelTimes times;     ///< when each pixel was taken; empty: all at once, or not known, as in the paper
 };
 
-/// The text's algorithm as it stands.
+/// The paper's algorithm as it stands.
 ExploreSettings text_explore_settings();
 
 /// @throws Error that names the setting, its value and what is allowed

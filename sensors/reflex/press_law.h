@@ -1,6 +1,6 @@
 #pragma once
-// The two laws of explore mode: from a picture's dilation to the press, and from the press to the force (seed 003,
-// eqs. 8 and 1).
+// The two laws of explore mode: from a picture's dilation to the press, and from the press to the force [Knoop2013,
+// eqs. 8 and 1].
 
 #include <array>
 #include <cmath>
@@ -8,7 +8,7 @@
 
 namespace touchstone::sensors {
 
-/// press = sum_i mm[i] (1 - 1/dilation)^(i+1). The first coefficient is the text's Z, the distance of the skin at rest
+/// press = sum_i mm[i] (1 - 1/dilation)^(i+1). The first coefficient is the paper's Z, the distance of the skin at rest
 /// (with z counted towards the camera: what comes nearer grows, so dilation = Z/(Z - press)); with `terms` 1 it's
 /// eq. 8. Two or three terms also take in that a dome flattens while it comes nearer.
 struct DilationPress {

@@ -1,5 +1,5 @@
 #pragma once
-// Reflex mode (seed 003, sec. II and III.D): each frame's statistics go straight to a decision, which goes straight to
+// Reflex mode [Knoop2013, sec. II and III.D]: each frame's statistics go straight to a decision, which goes straight to
 // the actuator, past whoever controls it.
 
 #include <Eigen/Core>

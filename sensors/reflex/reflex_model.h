@@ -1,5 +1,5 @@
 #pragma once
-// All that reflex mode learned (seed 003, sec. III.D), and its file.
+// All that reflex mode learned [Knoop2013, sec. III.D], and its file.
 
 #include <filesystem>
 #include <optional>

@@ -1,6 +1,6 @@
 #pragma once
-// How hard does it press? Normal force as a polynomial in the statistics of a motion-sensing chip's frame (seed 003,
-// sec. III.D): of degree 1 in the text, of degree 2 for better estimates at a few more multiplications.
+// How hard does it press? Normal force as a polynomial in the statistics of a motion-sensing chip's frame [Knoop2013,
+// sec. III.D]: of degree 1 in the paper, of degree 2 for better estimates at a few more multiplications.
 
 #include <array>
 #include <cstddef>
@@ -28,7 +28,7 @@ struct StatisticsForceSample {
   double force_N = 0.0;
 };
 
-/// Least squares; give it points with force only, as the text does: the tree keeps the others away. Of statistics that
+/// Least squares; give it points with force only, as the paper does: the tree keeps the others away. Of statistics that
 /// never change, or only together, the smallest coefficients are taken.
 /// @throws Error for a degree other than 1 and 2, statistics out of range, a force that isn't finite, or fewer samples
 /// than twice the terms

@@ -1,7 +1,7 @@
 #pragma once
-// A force's waveform as a picture of its frequencies over time: what shared/seeds/000, sec. 2.3.1, tells softness from
+// A force's waveform as a picture of its frequencies over time: what [VisioHaptic2024, sec. 2.3.1] tells softness from
 // ("FFT to transform the force sensor waveforms into frequency fluctuated images"). Neither windows nor scale are in
-// the text.
+// the paper.
 
 #include <Eigen/Core>
 #include <span>

@@ -2,11 +2,10 @@
 // Tells erythema from purpura as dermatologists do with a glass (diascopy): from a frame before and a frame under
 // pressure. What fades is blood in vessels, what stays isn't.
 //
-// The measure is an erythema index as narrow-band meters use it (B. L. Diffey, R. J. Oliver and P. M. Farr, Br. J.
-// Dermatol. 111, 1984): 100 log10 of red by green, since haemoglobin takes green and leaves red. As a ratio it knows
-// nothing of shading, fall-off or whether the gel wets the skin, and the colour of the light is a constant, which goes
-// out because a mark's index is taken less that of the skin round it in the same frame. A mark blanches if it loses
-// more than half of that under pressure.
+// The measure is an erythema index as narrow-band meters use it [Diffey1984]: 100 log10 of red by green, since
+// haemoglobin takes green and leaves red. As a ratio it knows nothing of shading, fall-off or whether the gel wets the
+// skin, and the colour of the light is a constant, which goes out because a mark's index is taken less that of the skin
+// round it in the same frame. A mark blanches if it loses more than half of that under pressure.
 
 #include <Eigen/Core>
 #include <opencv2/core/mat.hpp>

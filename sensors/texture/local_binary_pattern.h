@@ -1,6 +1,6 @@
 #pragma once
-// Local binary patterns on a circle, rotation invariant and "uniform": Ojala, Pietikainen and Maenpaa 2002, as the text
-// of the fingertip GelSight (ch. 5) has them in eqs. 5 to 9.
+// Local binary patterns on a circle, rotation invariant and "uniform" [Ojala2002], as [Li2015, ch. 5] has them in
+// eqs. 5 to 9.
 //
 // The P neighbours of a pixel stand at (R cos(2 pi p / P), R sin(2 pi p / P)) from it. Bit p is 1 where the neighbour
 // is at least as bright as the centre (eqs. 5, 6). A pattern with at most two changes from bit to bit round the circle
@@ -16,7 +16,7 @@ inline constexpr int kFewestNeighbours = 4;
 inline constexpr int kMostNeighbours = 24;
 inline constexpr double kLargestLbpRadius = 16.0;  ///< px; the pyramid reaches further for less
 
-/// The circle of neighbours; the text uses (16, 2) and (8, 1).
+/// The circle of neighbours; the thesis uses (16, 2) and (8, 1).
 struct LbpCircle {
   int neighbours = 16;     ///< P, from 4 to 24
   double radius_px = 2.0;  ///< R, from 1 to 16

@@ -1,6 +1,6 @@
 #pragma once
-// The multi-scale local binary pattern of the fingertip GelSight's text, sec. 5.2.2: histograms of uniform patterns on
-// the levels of a Gaussian pyramid.
+// The multi-scale local binary pattern of [Li2015, sec. 5.2.2]: histograms of uniform patterns on the levels of a
+// Gaussian pyramid.
 
 #include <Eigen/Core>
 #include <opencv2/core/mat.hpp>

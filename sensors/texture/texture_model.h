@@ -1,5 +1,5 @@
 #pragma once
-// Material recognition by touch: the nearest of known texture features. Fingertip GelSight's text, sec. 5.3.
+// Material recognition by touch: the nearest of known texture features [Li2015, sec. 5.3].
 
 #include <Eigen/Core>
 #include <cstdint>

@@ -1,7 +1,7 @@
 #pragma once
 // Direct alignment: the isometry under which two height images agree best, found from a nearby one by Gauss-Newton
-// steps on all their pixels (Lucas and Kanade 1981, on SE(2)). Keypoints stand on whole pixels of a scale space and
-// tell a pose to a part of a pixel at best; all pixels together tell it finer.
+// steps on all their pixels ([Lucas1981], on SE(2)). Keypoints stand on whole pixels of a scale space and tell a pose
+// to a part of a pixel at best; all pixels together tell it finer.
 
 #include "sensors/touch_map/planar_pose.h"
 #include "sensors/touch_map/relief_detail.h"
@@ -24,7 +24,8 @@ struct Alignment {
 };
 
 /// Minimises the sum of w (g from(p) + b - to(T p))^2 over the isometry T, the gain g and the offset b, where w is the
-/// product of both weights with Tukey's biweight of the residual. The gain takes up that a deeper press imprints more.
+/// product of both weights with Tukey's biweight [Beaton1974] of the residual. The gain takes up that a deeper press
+/// imprints more.
 Alignment align(const ReliefDetail& from, const ReliefDetail& to, const PlanarPose& start,
                 const AlignmentSettings& settings);
 

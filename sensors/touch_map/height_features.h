@@ -1,6 +1,6 @@
 #pragma once
-// Keypoints with binary descriptors on height images: BRISK (Leutenegger et al. 2011), as the source text has it
-// (sec. 3.3.1), by OpenCV's features2d.
+// Keypoints with binary descriptors on height images: BRISK [Leutenegger2011] as in [Li2015, sec. 3.3.1], by OpenCV's
+// features2d.
 
 #include <Eigen/Core>
 #include <array>

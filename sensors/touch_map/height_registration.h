@@ -1,6 +1,6 @@
 #pragma once
-// Registration of one touch with another, or with a map: features, RANSAC, confidence (source text sec. 3.3.1), then
-// direct alignment.
+// Registration of one touch with another, or with a map: features, RANSAC, confidence [Li2015, sec. 3.3.1], then direct
+// alignment.
 
 #include <string>
 
@@ -51,7 +51,7 @@ struct Registration {
   Outcome outcome = Outcome::no_contact;
   PlanarPose to_from_from;  ///< the refined pose where that was asked for and found, else the features' one. Means
                             ///< something only where localised
-  PlanarPose feature_pose;  ///< least squares over the inliers, as in the text
+  PlanarPose feature_pose;  ///< least squares over the inliers, as in the thesis
   bool refined = false;     ///< whether to_from_from is by direct alignment
   double confidence = 0.0;  ///< eq. 2
   int features = 0;         ///< of `from`

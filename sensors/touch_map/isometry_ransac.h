@@ -1,6 +1,6 @@
 #pragma once
-// RANSAC (Fischler and Bolles 1981) for an isometry of the plane from pairs of points, most of which may be wrong
-// (source text sec. 3.3.1).
+// RANSAC [Fischler1981] for an isometry of the plane from pairs of points, most of which may be wrong [Li2015, sec.
+// 3.3.1].
 
 #include <Eigen/Core>
 #include <cstdint>

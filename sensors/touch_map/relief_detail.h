@@ -34,8 +34,8 @@ cv::Mat support_of(const TouchImage& touch, const DetailSettings& settings);
 /// faint lines show beside deep steps. CV_32FC1, pure numbers.
 cv::Mat evened(const ReliefDetail& detail, double sigma_mm, double least_rms_mm);
 
-/// Differences of Gaussians with the means over `support` (CV_8UC1) alone (normalised convolution, Knutsson and Westin
-/// 1993), so that the untouched surroundings don't leak in.
+/// Differences of Gaussians with the means over `support` (CV_8UC1) alone (normalised convolution [Knutsson1993]), so
+/// that the untouched surroundings don't leak in.
 ReliefDetail relief_detail(const cv::Mat& height_mm, const cv::Mat& support, const PixelFrame& frame,
                            const DetailSettings& settings);
 

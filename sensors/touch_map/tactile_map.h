@@ -1,5 +1,5 @@
 #pragma once
-// The tactile map of one face of an object, made touch by touch, and the pose of a touch on it (source text sec. 3.3).
+// The tactile map of one face of an object, made touch by touch, and the pose of a touch on it [Li2015, sec. 3.3].
 //
 // Map frame: the touch frame of the first touch, the root (sensors/touch_map/touch_image.h). A touch's pose is
 // `map_from_touch`: it takes points of the touch frame to points of the map.
@@ -14,10 +14,10 @@ namespace touchstone::sensors {
 
 struct TactileMapSettings {
   RegistrationSettings registration;
-  /// Over which a touch's share in the average grows from its border inwards: no seams. 0: the text's plain average.
+  /// Over which a touch's share in the average grows from its border inwards: no seams. 0: the thesis's plain average.
   double blend_mm = 0.5;
   /// Ours: a touch is raised or lowered as a whole to the map's heights where they overlap, since no two presses are
-  /// equally deep. Off: heights as they come, as in the text.
+  /// equally deep. Off: heights as they come, as in the thesis.
   bool level = true;
 };
 

@@ -1,5 +1,5 @@
 #pragma once
-// Stick and slip under an object, and its friction, from the tractions and motions of a gel's markers: what seed 002
+// Stick and slip under an object, and its friction, from the tractions and motions of a gel's markers: what [Lin2019]
 // asks for ("the local friction coefficient, the ratio between the lateral shear stress and the normal stress").
 //
 // What can be seen. Coulomb's coefficient shows only where something slips: |q| = mu p there, |q| < mu p elsewhere. Two

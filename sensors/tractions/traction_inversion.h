@@ -1,6 +1,6 @@
 #pragma once
-// From how a gel's markers moved to the tractions that moved them, and so to the force: what seed 002 leaves open ("IV.
-// suitable means of measuring the force").
+// From how a gel's markers moved to the tractions that moved them, and so to the force: what [Lin2019] leaves open
+// ("IV. suitable means of measuring the force").
 //
 // Linear: displacement d = A t + noise, A from sensors/tractions/marker_compliance.h. The markers don't tell t by
 // themselves: a gel of nu = 0.5 bonded to its plate hardly moves under an even pressure, and what is finer than a
@@ -13,8 +13,8 @@
 // - Where nothing touches there's no traction. Which patches touch isn't known: the same problem with a short leash
 //   (`first_scale`) over all patches gives a first pressure, and its patches above 50, 40, ... 5, 0 % of its
 //   maximum are tried, and also no contact at all. That of the highest evidence (the likelihood of the displacements
-//   with the tractions integrated out, D. J. C. MacKay, Neural Computation 4, 1992, for the noise as stated) is taken.
-//   Outside of it all tractions are zero, inside the normal ones are at least zero.
+//   with the tractions integrated out [MacKay1992], for the noise as stated) is taken. Outside of it all tractions are
+//   zero, inside the normal ones are at least zero.
 // The discrepancy principle, by which the smallest contact that explains the markers would be taken, makes contacts too
 // small or too large by more (docs/sensors/chroma-force.md has the figures).
 //

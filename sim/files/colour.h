@@ -47,7 +47,7 @@ struct SceneBands {
 render::Spectrum in_bands(const Colour& colour, const SceneBands& bands, const char* what);
 
 /// Names of a picture's channels, one a band: R, G, B for three wavelengths that fall, Y for one, else in the layout
-/// of spectral EXR files (Fichet, Pacanowski and Wilkie, JCGT 10(3), 2021): "S0.550,3nm".
+/// of spectral EXR files [Fichet2021]: "S0.550,3nm".
 std::vector<std::string> channel_names(const SceneBands& bands);
 
 /// For viewers: red, green and blue, 0 to 1.

@@ -14,7 +14,7 @@ constexpr double kFrom_nm = 380.0;
 constexpr double kTo_nm = 780.0;
 constexpr int kSteps = 80;  // of 5 nm
 
-/// Relative power of D65 every 10 nm from 380 to 780 nm (CIE 15).
+/// Relative power of D65 every 10 nm from 380 to 780 nm [CIE15].
 constexpr std::array<double, 41> kD65 = {
     49.98,  54.65,  82.75,  91.49,  93.43,  86.68, 104.86, 117.01, 117.81, 114.86, 115.92, 108.81, 109.35, 107.80,
     104.79, 107.69, 104.41, 104.05, 100.00, 96.33, 95.79,  88.69,  90.01,  89.60,  87.70,  83.29,  83.70,  80.03,

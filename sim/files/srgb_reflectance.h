@@ -3,10 +3,10 @@
 //
 // Many spectra look alike; which one a printer's inks have isn't in a picture's file. Here the eight corners of the
 // sRGB cube get the smoothest spectra of a simple family, s = 1/2 + c / (2 sqrt(1 + c^2)) with c quadratic in the
-// wavelength (Jakob and Hanika, Computer Graphics Forum 38(2), 2019), which under D65 look exactly like the corner; and
-// a colour is their mix by the shares with which independent halftones of its parts of red, green and blue would cover
-// the paper (Demichel's equations; Neugebauer 1937). The mix is trilinear in those parts, as tristimulus values are, so
-// every colour looks under D65 exactly as its sRGB values say.
+// wavelength [Jakob2019], which under D65 look exactly like the corner; and a colour is their mix by the shares with
+// which independent halftones of its parts of red, green and blue would cover the paper (Demichel's equations
+// [Neugebauer1937]). The mix is trilinear in those parts, as tristimulus values are, so every colour looks under D65
+// exactly as its sRGB values say.
 
 #include <Eigen/Core>
 #include <array>
@@ -29,7 +29,7 @@ render::SpectralCurve srgb_reflectance(const Eigen::Vector3d& srgb);
 render::SpectralCurve single_ink_reflectance(const Eigen::Vector3d& srgb);
 
 /// XYZ of a reflectance under D65 for the 2 degree observer; of 1 everywhere it is kD65White. Colour matching functions
-/// by the fits of Wyman, Sloan and Shirley (JCGT 2(2), 2013), D65 by CIE 15's table.
+/// by the fits of [Wyman2013], D65 by the table of [CIE15].
 Eigen::Vector3d xyz_under_d65(const render::SpectralCurve& reflectance);
 
 }  // namespace touchstone::sim

@@ -1,9 +1,9 @@
 #pragma once
 // What the membrane on a gripper's static finger feels and shows of a hexagonal piece that the dynamic finger presses
-// on it (shared/seeds/001, sec. II, V.A).
+// on it [Naeini2020, sec. II, V.A].
 //
 // Gel frame: the piece lies along x on one of its flats, +z leads to the dynamic finger. That finger presses along its
-// own normal, which leans by `tilt_deg` from z: the membrane bears N along -z and N tan(tilt) along +y. For the text's
+// own normal, which leans by `tilt_deg` from z: the membrane bears N along -z and N tan(tilt) along +y. For the paper's
 // hexagon and 15 degrees the finger touches the edge of the upper flat at +y, and from there its line of force goes
 // through the lower flat 0.13 mm from its middle: nothing turns the piece, so its orientation is the grasp's and stays.
 //
@@ -43,9 +43,9 @@ struct GrippedPose {
 };
 
 struct GrippedFaceSettings {
-  double tilt_deg = 15.0;        ///< of the force to the membrane's normal (text V.A)
+  double tilt_deg = 15.0;        ///< of the force to the membrane's normal (sec. V.A)
   double least_force_N = 0.01;   ///< normal force of the first state
-  double largest_force_N = 6.0;  ///< of the last: the text's 3.7 N and what a finger that rings adds
+  double largest_force_N = 6.0;  ///< of the last: the paper's 3.7 N and what a finger that rings adds
   double force_ratio = 1.45;     ///< from one state to the next
   double cell_mm = 0.2;          ///< of the maps
   double rms_slope = 0.08;       ///< of the roughness of membrane and piece together, see fem::real_contact_share

@@ -13,7 +13,7 @@ namespace {
 constexpr int kPlays = 64;
 constexpr double kFinest = 1e-3;    // of the scale: the smallest threshold
 constexpr double kCoarsest = 10.0;  // likewise the largest
-constexpr double kScale_N = 3.7;    // the text's range, for which the loop is normalised
+constexpr double kScale_N = 3.7;    // the range of [Naeini2020], for which the loop is normalised
 constexpr double kTonnesPerGram = 1e-6;
 constexpr std::array<double, 4> kDriftTimes_s = {0.1, 1.0, 10.0, 100.0};
 constexpr double kDriftRightAfter_s = 1.0;

@@ -1,6 +1,6 @@
 #pragma once
-// A gripper's dynamic finger on a hobby servo: closes on a piece in the servo's steps, holds, opens (shared/seeds/001,
-// sec. III.B, V.A: a Dynamixel AX-12A led by an Arduino).
+// A gripper's dynamic finger on a hobby servo: closes on a piece in the servo's steps, holds, opens ([Naeini2020, sec.
+// III.B, V.A]: a Dynamixel AX-12A led by an Arduino).
 //
 // The finger is a mass on the servo's spring. Along its own normal, s being its travel beyond the touch:
 //   m s'' = k (x - s) + c (x' - s') - F(s) - tau F'(s) s' + shake
@@ -20,7 +20,7 @@ struct ServoFingerSettings {
   double step_deg = 300.0 / 1024;  ///< "Resolution 0.29 deg": 10 bits over 300 degrees
   double stall_torque_Nm = 1.5;    ///< at 12 V
   double slope_steps = 32.0;       ///< compliance slope, its default: full torque at that many steps from the goal
-  // Not in the text: chosen.
+  // Not in the paper: chosen.
   double lever_mm = 70.0;            ///< from the horn's axis to the piece
   double lag_s = 0.010;              ///< of the horn behind a step; the servo's loop has 10 to 20 ms
   double ring_Hz = 25.0;             ///< of the free finger on the servo's spring: some 75 g
@@ -37,9 +37,9 @@ struct FingerMotion {
   double target_force_N = 2.0;  ///< of the finger, when it holds: met as nearly as the servo's steps allow
   double closing_mm_s = 14.0;
   double opening_mm_s = 40.0;
-  double hold_s = 0.7;    ///< from the last closing step (text V.A)
+  double hold_s = 0.7;    ///< from the last closing step (sec. V.A)
   double rest_s = 0.05;   ///< before the first step
-  double apart_s = 0.36;  ///< after the first opening step: the text has 144 windows of 7 ms from the touch on (fig. 8)
+  double apart_s = 0.36;  ///< after the first opening step: 144 windows of 7 ms from the touch on (fig. 8)
   std::uint64_t shake_seed = 1;
 };
 

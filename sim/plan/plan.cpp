@@ -58,6 +58,20 @@ double bright_radius(const ObjectSpec& object) {
   return radius;
 }
 
+/// Radius of the largest disc that a gel's coat has, seen along z. @pre pictures can be had of it: it isn't a mesh
+double coat_radius(const GelSpec& gel) {
+  switch (gel.shape) {
+    case GelShape::dome:
+      return gel.base_radius_mm;
+    case GelShape::fingertip:
+      return gel.radius_mm;
+    case GelShape::slab:
+    case GelShape::mesh:
+      break;
+  }
+  return 0.5 * std::hypot(gel.size_x_mm, gel.size_y_mm);
+}
+
 void plan_elastic_objects(const SceneSpec& scene, Plan& plan, PlanTable& table) {
   const ElasticSpec* softest = nullptr;
   for (const MovedObject& moved : moved_objects(scene)) {
@@ -244,7 +258,7 @@ void plan_interreflection(const SceneSpec& scene, Plan& plan, PlanTable& table) 
     }
   };
   if (device.coating) {
-    judge(device.coating->albedo.largest(), 0.5 * std::hypot(gel.size_x_mm, gel.size_y_mm));
+    judge(device.coating->albedo.largest(), coat_radius(gel));
   } else {
     for (const MovedObject& moved : moved_objects(scene)) {
       double brightest = moved.object.albedo.largest();

@@ -31,6 +31,36 @@ void check_settings(const TouchSessionSettings& settings) {
   }
 }
 
+/// `weight` of the surface's vertices, mm^2.
+TouchReading reading_of(const fem::Compliance& gel, const Eigen::VectorXd& weight, const fem::PressState& state) {
+  TouchReading next;
+  next.gel_from_object = state.gel_from_object;
+  next.wrench = state.wrench;
+  next.contact_area_mm2 = state.contact_area;
+  next.under_resolved = state.under_resolved;
+  if (state.contact_vertices == 0) return next;
+  double slipping = 0.0;
+  double pressed = 0.0;
+  Eigen::Vector3d moment = Eigen::Vector3d::Zero();
+  for (std::size_t v = 0; v < state.node_state.size(); ++v) {
+    if (state.node_state[v] == fem::NodeState::open) continue;
+    const auto row = static_cast<Eigen::Index>(v);
+    const double load = weight[row] * state.traction.row(row).norm();
+    pressed += load;
+    moment += load * gel.vertices[v];
+    if (state.node_state[v] == fem::NodeState::slip) slipping += weight[row];
+  }
+  if (pressed > 0.0) next.centre_mm = moment / pressed;
+  next.slipping_share = std::min(1.0, slipping / state.contact_area);
+  constexpr double kAll = 1.0 - 1e-12;  // sums of the same weights in another order
+  next.contact = slipping == 0.0              ? TouchContact::sticking
+                 : next.slipping_share < kAll ? TouchContact::partly_slipping
+                                              : TouchContact::sliding;
+  next.error = fem::estimate_error(gel, state);
+  next.error.displacement = 0.0;
+  return next;
+}
+
 }  // namespace
 
 const char* name_of(TouchContact contact) {
@@ -45,6 +75,10 @@ const char* name_of(TouchContact contact) {
       return "sliding";
   }
   TS_ASSERT(false);
+}
+
+TouchReading reading_of(const fem::Compliance& gel, const fem::PressState& state) {
+  return reading_of(gel, gel.mass * Eigen::VectorXd::Ones(static_cast<Eigen::Index>(gel.vertices.size())), state);
 }
 
 struct TouchSession::Parts {
@@ -94,33 +128,9 @@ struct TouchSession::Parts {
   }
 
   TouchReading read(const fem::PressState& state, double seconds) const {
-    TouchReading next;
+    TouchReading next = reading_of(gel, weight, state);
     next.step = reading.step + 1;
     next.t_s = reading.t_s + seconds;
-    next.gel_from_object = state.gel_from_object;
-    next.wrench = state.wrench;
-    next.contact_area_mm2 = state.contact_area;
-    next.under_resolved = state.under_resolved;
-    if (state.contact_vertices == 0) return next;
-    double slipping = 0.0;
-    double pressed = 0.0;
-    Eigen::Vector3d moment = Eigen::Vector3d::Zero();
-    for (std::size_t v = 0; v < state.node_state.size(); ++v) {
-      if (state.node_state[v] == fem::NodeState::open) continue;
-      const auto row = static_cast<Eigen::Index>(v);
-      const double load = weight[row] * state.traction.row(row).norm();
-      pressed += load;
-      moment += load * gel.vertices[v];
-      if (state.node_state[v] == fem::NodeState::slip) slipping += weight[row];
-    }
-    if (pressed > 0.0) next.centre_mm = moment / pressed;
-    next.slipping_share = std::min(1.0, slipping / state.contact_area);
-    constexpr double kAll = 1.0 - 1e-12;  // sums of the same weights in another order
-    next.contact = slipping == 0.0              ? TouchContact::sticking
-                   : next.slipping_share < kAll ? TouchContact::partly_slipping
-                                                : TouchContact::sliding;
-    next.error = fem::estimate_error(gel, state);
-    next.error.displacement = 0.0;
     return next;
   }
 

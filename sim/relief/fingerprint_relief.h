@@ -11,8 +11,8 @@ namespace touchstone::sim {
 
 /// A whorl: a spiral of ridges round the z axis, longer along y, interrupted by minutiae (ends and forks) at random
 /// places. The crests' heights are (1 + cos(phase))/2; the phase is 2 pi / ridge_mm times an ellipse's radius, one turn
-/// of the spiral, and for each minutia the angle round it, of either sign (Sherlock and Monro 1993 draw prints with
-/// such terms). The print fades out towards the ellipse size_mm.
+/// of the spiral, and for each minutia the angle round it, of either sign ([Sherlock1993] draws prints with such
+/// terms). The print fades out towards the ellipse size_mm.
 struct FingerprintRelief {
   static constexpr const char* kType = "fingerprint";
   static constexpr bool kSharp = true;

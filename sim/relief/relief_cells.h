@@ -1,5 +1,5 @@
 #pragma once
-// Cells of a random foam or grain: a power diagram (Aurenhammer 1987) of scattered points on a tile that wraps round.
+// Cells of a random foam or grain: a power diagram [Aurenhammer1987] of scattered points on a tile that wraps round.
 
 #include <Eigen/Core>
 #include <vector>

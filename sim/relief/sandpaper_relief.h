@@ -26,9 +26,9 @@ void fields(YamlReader& in, SandpaperRelief& relief);
 fem::ReliefMap relief_map(const SandpaperRelief& relief);
 double finest_detail(const SandpaperRelief& relief);
 
-/// Mean grain size of a FEPA P-grade, mm: sieve grades of ISO 6344-2 (P40 425 um, P60 269, P80 201, P100 162, P120 125,
-/// P150 100, P180 82, P220 68) and sedimentation grades' ds50 of ISO 6344-3 (P240 58.5, P280 52.2, P320 46.2,
-/// P400 35.0).
+/// Mean grain size of a FEPA P-grade, mm: sieve grades of [ISO6344, part 2] (P40 425 um, P60 269, P80 201, P100 162,
+/// P120 125, P150 100, P180 82, P220 68) and sedimentation grades' ds50 of [ISO6344, part 3] (P240 58.5, P280 52.2,
+/// P320 46.2, P400 35.0).
 /// @throws Error for another grade, naming those that are known
 double grain_size_mm(int grit);
 

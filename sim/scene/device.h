@@ -150,10 +150,10 @@ struct MotionChipSpec {
   SourceLocation where;
 };
 
-/// A camera and its imager (EMVA 1288 terms). Only the fields that belong to `type` may stand in the file: of a lens
-/// either focal_length_mm or camera_matrix, and at most one of focus_distance_mm and sensor_distance_mm (neither: sharp
-/// at infinity; with a camera matrix, which tells the sensor's distance, focus_distance_mm only). A `preset` in the
-/// file gives the imager's figures, which the other fields override (sim/scene/camera_preset.h).
+/// A camera and its imager (in the terms of [EMVA1288]). Only the fields that belong to `type` may stand in the file:
+/// of a lens either focal_length_mm or camera_matrix, and at most one of focus_distance_mm and sensor_distance_mm
+/// (neither: sharp at infinity; with a camera matrix, which tells the sensor's distance, focus_distance_mm only). A
+/// `preset` in the file gives the imager's figures, which the other fields override (sim/scene/camera_preset.h).
 struct CameraSpec {
   CameraType type = CameraType::pinhole;
   int width = 0;

@@ -1,13 +1,13 @@
 #pragma once
-// Marks of a skin that dermatologists press with a glass: erythema fades, purpura stays (shared/seeds/000, sec. 2.1).
+// Marks of a skin that dermatologists press with a glass: erythema fades, purpura stays [VisioHaptic2024, sec. 2.1].
 //
 // Erythema is blood in widened vessels. A vessel is open while the pressure in it is above that on the skin; along a
-// capillary of human skin it falls from 32 mmHg at the arteriole to 12 mmHg at the venule (E. M. Landis, Heart 15,
-// 1930: means of micropunctures at the nail fold), taken as evenly. So of the vessels the share (p_a - p) / (p_a - p_v)
-// is open under the contact pressure p, within 0 and 1, and the mark's reflectance is that share of its own and the
-// rest of the surrounding skin's. Purpura is blood that has left the vessels: no pressure changes it. A press is taken
-// as long enough for the blood to flow (a second; "refill time" below 2 s is a healthy one), and what the gel's
-// pressure does deeper in the skin isn't solved: it is that of the face.
+// capillary of human skin it falls from 32 mmHg at the arteriole to 12 mmHg at the venule ([Landis1930]: means of
+// micropunctures at the nail fold), taken as evenly. So of the vessels the share (p_a - p) / (p_a - p_v) is open under
+// the contact pressure p, within 0 and 1, and the mark's reflectance is that share of its own and the rest of the
+// surrounding skin's. Purpura is blood that has left the vessels: no pressure changes it. A press is taken as long
+// enough for the blood to flow (a second; "refill time" below 2 s is a healthy one), and what the gel's pressure does
+// deeper in the skin isn't solved: it is that of the face.
 
 #include <Eigen/Core>
 #include <vector>

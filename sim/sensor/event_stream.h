@@ -9,6 +9,8 @@
 
 #include "core/frame.h"
 #include "core/progress.h"
+#include "fem/elements/compliance.h"
+#include "fem/vibration/vibration.h"
 #include "sim/plan/plan.h"
 #include "sim/scene/scene.h"
 

@@ -55,7 +55,7 @@ std::vector<float> floats_of(const Eigen::MatrixXd& columns) {
 }
 
 FoundLight light_in(const std::string& content, const std::string& key) {
-  MatrixFile matrices(content, kMark, "a rig's light", key, "rig");
+  MatrixFile matrices(content, kMark, "a sensor's light", key, "sensor");
   const Eigen::MatrixXd scalars = matrices.take();
   const Eigen::MatrixXd beams = matrices.take();
   const Eigen::MatrixXd flow = matrices.take();

@@ -1,5 +1,5 @@
 #pragma once
-// What a rig found out about its light, kept: the light field, the bounced light, and how far they are off.
+// What a sensor found out about its light, kept: the light field, the bounced light, and how far they are off.
 
 #include <filesystem>
 #include <optional>

@@ -32,10 +32,10 @@ struct GelSheet {
 /// The elements' edges (half a millimetre) are wide against what a camera resolves, and the displacement that mechanics
 /// gives per vertex overshoots beside a sharp rim (it's a projection on hat functions; here its means over the hats are
 /// taken). Seen through the gel both would
-/// show: as a many-cornered edge of contact with glints on it. So the surface is subdivided twice (Loop 1987; the pad's
-/// edge by straight halving) from vertices that lie on the body where they're in contact, and where the fine surface
-/// reaches into the body it's laid onto it: straight along z, of a fingertip along its undeformed surface's normal
-/// unless that leads past the body's face (over a millimetre away, and further than straight along z). The
+/// show: as a many-cornered edge of contact with glints on it. So the surface is subdivided twice ([Loop1987]; the
+/// pad's edge by straight halving) from vertices that lie on the body where they're in contact, and where the fine
+/// surface reaches into the body it's laid onto it: straight along z, of a fingertip along its undeformed surface's
+/// normal unless that leads past the body's face (over a millimetre away, and further than straight along z). The
 /// undeformed surface of domes and fingertips is subdivided on its true sphere and cylinder, to rounding. Made once a
 /// gel; safe to use from many threads.
 class VisibleGel {

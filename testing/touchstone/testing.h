@@ -4,7 +4,7 @@
 //
 //   using namespace touchstone::testing;
 //   TEST(MyEstimator, ReadsTwoNewtons) {
-//     const HeldFrame held = device("gelsight-flat").press(ball(8), {.force_N = 2});
+//     const Touch held = device("gelsight-flat").press(ball(8), {.force_N = 2});
 //     EXPECT_THAT(my_estimate(held.frame, held.background), IsForceOf(held, {.absolute = 0.1}));
 //   }
 //
@@ -21,7 +21,7 @@
 #include <utility>
 
 #include "lab/device/truth_comparison.h"
-#include "sim/sensor/virtual_device.h"
+#include "sim/sensor/virtual_sensor.h"
 
 namespace cv {
 
@@ -35,17 +35,18 @@ inline void PrintTo(const Mat& image, std::ostream* out) {
 namespace touchstone::testing {
 
 using lab::Tolerance;
-using sim::HeldFrame;
-using sim::Hold;
-using sim::VirtualDevice;
-using sim::VirtualDeviceSettings;
-using sim::VirtualObject;
+using sim::PressSpec;
+using sim::Touch;
+using sim::TouchObject;
+using sim::TouchOptions;
+using sim::VirtualSensor;
+using sim::VirtualSensorSettings;
 
 /// A device by its shipped name ("vhs", "gelsight-flat") or by its file. Set up when it's first asked for, which may
 /// take half a minute, and kept while the program runs: all tests share it. The gel's part is kept on disk between runs
 /// (in $TOUCHSTONE_CACHE or ~/.cache/touchstone).
 /// @throws Error naming the file that can't be read, or the shipped devices
-const VirtualDevice& device(const std::string& name_or_file, const VirtualDeviceSettings& settings = {});
+const VirtualSensor& device(const std::string& name_or_file, const VirtualSensorSettings& settings = {});
 
 /// An object by its shipped name ("probe-6mm") or by its file. @throws Error as device
 sim::ObjectSpec object(const std::string& name_or_file);
@@ -53,7 +54,7 @@ sim::ObjectSpec ball(double diameter_mm, double friction = 0.5);
 
 /// Where $TOUCHSTONE_FAILED_FRAMES names a folder: writes frame and background there as PNG, named after the running
 /// test, and says where. Matchers call it for what doesn't match.
-std::string keep_frames(const HeldFrame& held);
+std::string keep_frames(const Touch& held);
 
 /// Three numbers, as programs have them.
 inline Eigen::Vector3d as_vector(const Eigen::Vector3d& v) {
@@ -75,7 +76,7 @@ class TruthMatcher {
  public:
   using is_gtest_matcher = void;
 
-  TruthMatcher(HeldFrame truth, std::string what, Compare compare)
+  TruthMatcher(Touch truth, std::string what, Compare compare)
       : truth_(std::move(truth)), what_(std::move(what)), compare_(std::move(compare)) {}
 
   template <typename Estimate>
@@ -89,43 +90,43 @@ class TruthMatcher {
   void DescribeNegationTo(std::ostream* out) const { *out << "isn't " << what_ << " of " << truth_.what; }
 
  private:
-  HeldFrame truth_;
+  Touch truth_;
   std::string what_;
   Compare compare_;
 };
 
 /// The force on the object, N, each component (an Eigen::Vector3d, cv::Vec3d, cv::Point3d or std::array<double, 3>).
-inline auto IsForceOf(const HeldFrame& truth, const Tolerance& tolerance) {
-  return TruthMatcher(truth, "the force", [tolerance](const auto& estimate, const HeldFrame& held) {
+inline auto IsForceOf(const Touch& truth, const Tolerance& tolerance) {
+  return TruthMatcher(truth, "the force", [tolerance](const auto& estimate, const Touch& held) {
     return lab::compare_force(as_vector(estimate), held, tolerance);
   });
 }
 
 /// Its normal component, N, a number.
-inline auto IsNormalForceOf(const HeldFrame& truth, const Tolerance& tolerance) {
-  return TruthMatcher(truth, "the normal force", [tolerance](double estimate, const HeldFrame& held) {
+inline auto IsNormalForceOf(const Touch& truth, const Tolerance& tolerance) {
+  return TruthMatcher(truth, "the normal force", [tolerance](double estimate, const Touch& held) {
     return lab::compare_normal_force(estimate, held, tolerance);
   });
 }
 
 /// The height map, a cv::Mat of mm in the camera's pixels, in the mean of its absolute error.
-inline auto IsHeightOf(const HeldFrame& truth, const Tolerance& tolerance) {
-  return TruthMatcher(truth, "the height map", [tolerance](const cv::Mat& estimate, const HeldFrame& held) {
+inline auto IsHeightOf(const Touch& truth, const Tolerance& tolerance) {
+  return TruthMatcher(truth, "the height map", [tolerance](const cv::Mat& estimate, const Touch& held) {
     return lab::compare_heights(estimate, held, tolerance);
   });
 }
 
 /// The contact mask, a cv::Mat of 8 bits: pixels of both over pixels of either are at least `least_overlap`.
-inline auto IsContactOf(const HeldFrame& truth, double least_overlap) {
-  return TruthMatcher(truth, "the contact", [least_overlap](const cv::Mat& estimate, const HeldFrame& held) {
+inline auto IsContactOf(const Touch& truth, double least_overlap) {
+  return TruthMatcher(truth, "the contact", [least_overlap](const cv::Mat& estimate, const Touch& held) {
     return lab::compare_contact(estimate, held, least_overlap);
   });
 }
 
 /// The displacements of a vhs-like device's beads, a row a bead, mm, each component.
-inline auto AreBeadsOf(const HeldFrame& truth, const Tolerance& tolerance) {
+inline auto AreBeadsOf(const Touch& truth, const Tolerance& tolerance) {
   return TruthMatcher(truth, "the beads' displacement",
-                      [tolerance](const Eigen::MatrixX3d& estimate, const HeldFrame& held) {
+                      [tolerance](const Eigen::MatrixX3d& estimate, const Touch& held) {
                         return lab::compare_beads(estimate, held, tolerance);
                       });
 }

@@ -5,8 +5,8 @@
 namespace touchstone {
 namespace {
 
-// The pairs and differences that G. Sharma, W. Wu and E. N. Dalal publish for testing programs (Color Research and
-// Application 30(1), 2005, table 1): they reach each branch of the mean hue and of the rotation.
+// The pairs and differences that [Sharma2005, table 1] publishes for testing programs: they reach each branch of the
+// mean hue and of the rotation.
 TEST(Ciede2000, IsWhatSharmaWuAndDalalTabulate) {
   struct Pair {
     Eigen::Vector3d first, second;
@@ -60,7 +60,7 @@ TEST(CieColour, WhiteIsD65AndGreyHasNoHue) {
   EXPECT_NEAR((lab_from_srgb({1, 1, 1}) - Eigen::Vector3d(100, 0, 0)).norm(), 0.0, 1e-9);
 }
 
-// IEC 61966-2-1's own matrix, which it gives with four digits.
+// The matrix of [IEC61966], which it gives with four digits.
 TEST(CieColour, PrimariesAreThoseOfTheStandard) {
   EXPECT_NEAR((xyz_from_linear_srgb({1, 0, 0}) - Eigen::Vector3d(0.4124, 0.2126, 0.0193)).norm(), 0.0, 2e-4);
   EXPECT_NEAR((xyz_from_linear_srgb({0, 1, 0}) - Eigen::Vector3d(0.3576, 0.7152, 0.1192)).norm(), 0.0, 2e-4);

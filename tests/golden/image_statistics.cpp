@@ -43,8 +43,8 @@ struct Part {
     squared_variances += test_variance * test_variance;
   }
 
-  /// The normal statistic of the same tail as Student's t (Wallace 1959), whose degrees of freedom are Welch and
-  /// Satterthwaite's with the reference taken as well known.
+  /// The normal statistic of the same tail as Student's t [Wallace1959], whose degrees of freedom are those of
+  /// [Welch1947] and [Satterthwaite1946] with the reference taken as well known.
   double z(int batches) const {
     if (!(variance > 0.0)) return 0.0;
     const double t = difference / std::sqrt(variance);
@@ -86,7 +86,7 @@ ImageStatistics render_batches(const render::Scene& scene, const render::Camera&
   const render::Tracer tracer(scene);
   render::RenderSettings settings;
   settings.min_samples = settings.max_samples = samples;
-  cv::Mat mean, squares;  // Welford's recurrence
+  cv::Mat mean, squares;  // by the recurrence of [Welford1962]
   int bands = 0;
   for (int i = 0; i < batches; ++i) {
     settings.seed = first_seed + static_cast<std::uint64_t>(i);

@@ -1,8 +1,8 @@
 #pragma once
 // A picture as mean and variance, and whether two of them can be of the same scene.
 //
-// The test is that of Mitsuba 3's render tests (W. Jakob et al. 2022): a z-test in each pixel and band, and Sidak's
-// correction for how many there are. Here the variance of the reference counts, too; that of the test picture, known
+// The test is that of Mitsuba 3's render tests [Jakob2022]: a z-test in each pixel and band, and Sidak's correction
+// [Sidak1967] for how many there are. Here the variance of the reference counts, too; that of the test picture, known
 // from few batches only, is its own or what the reference's paths make expected, whichever is more, and its statistic
 // is Student's t; and besides pixels the means of 8 x 8 blocks and of the whole picture are tested, which see a bias
 // that drowns in the noise of one pixel.

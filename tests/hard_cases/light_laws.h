@@ -46,8 +46,7 @@ inline Eigen::ArrayXd values_of(const cv::Mat& image) {
 
 /// How far the one of `values` (a pixel's means of independent renderings) that is farthest from the others lies from
 /// their mean, in standard deviations of the others: a t statistic, turned into that of a normal distribution of the
-/// same tail (Wallace 1959, "Bounds on normal approximations to Student's and the chi-square distributions").
-/// Deviations below `floor` are rounding.
+/// same tail [Wallace1959]. Deviations below `floor` are rounding.
 inline double farthest(const Eigen::ArrayXd& values, double floor) {
   const auto count = static_cast<double>(values.size());
   const double freedom = count - 2.0;

@@ -426,7 +426,7 @@ TEST(HardCase26, AnObjectMovedByANanometreMovesTheAnswerAsLittle) {
 }
 
 TEST(HardCase20, ALoadCycleOfTheVhsProbeHoldsTheLawsAllTheWay) {
-  // The paper's verification (sec. 4.3 and 4.4): to 5 N, then sheared to and fro.
+  // The verification of [VisioHaptic2024, secs. 4.3 and 4.4]: to 5 N, then sheared to and fro.
   Press press(gel(), kProbe, 0.6);
   PressTarget target = at(0, 0, 0);
   Worst force{5e-6};

@@ -5,7 +5,8 @@
 //
 // A sampler's domain is mapped to the unit square and cut into bins. What each bin should hold is the density's
 // integral over it, by adaptive quadrature; bins that expect fewer than 5 are merged. Seeds are fixed, so a test that
-// passes does so for ever; the level is Sidak's for all such tests together: samplers that are all right would fail
+// passes does so for ever; the level is Sidak's [Sidak1967] for all such tests together: samplers that are all right
+// would fail
 // one or more of them, when they were written, with a probability of kOverallLevel.
 
 #include <gtest/gtest.h>

@@ -6,7 +6,9 @@
 #include <limits>
 
 #include "core/error.h"
+#include "core/transform.h"
 #include "core/units.h"
+#include "sim/press/first_touch.h"
 #include "tests/support/small_job.h"
 #include "tests/support/small_scene.h"
 #include "tests/support/temporary_folder.h"
@@ -19,14 +21,14 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 
 /// Made once: its gel and light take longest.
-const VirtualDevice& coated() {
+const VirtualSensor& coated() {
   static const test::TemporaryFolder cache;
-  static const VirtualDevice one(test::small_coated_device(), cache.path());
+  static const VirtualSensor one(test::small_coated_device(), cache.path());
   return one;
 }
 
-const HeldFrame& held_ball() {
-  static const HeldFrame held = coated().press(ball(8), {.place_mm = {0.5, -0.3}, .force_N = 0.3}, 7);
+const Touch& held_ball() {
+  static const Touch held = coated().press(ball(8), {.place_mm = {0.5, -0.3}, .force_N = 0.3}, {.noise_seed = 7});
   return held;
 }
 
@@ -47,82 +49,87 @@ std::string error_of(const Act& act) {
   return "no error";
 }
 
-TEST(VirtualDevice, AHeldForceIsThatForceWithAnErrorBar) {
-  const HeldFrame& held = held_ball();
-  EXPECT_NEAR(held.force_N.z(), 0.3, 1e-5);
+TEST(VirtualSensor, AHeldForceIsThatForceWithAnErrorBar) {
+  const Touch& held = held_ball();
+  EXPECT_NEAR(held.force_N().z(), 0.3, 1e-5);
   EXPECT_GT(held.error.force.z(), 0.0);
   EXPECT_LT(held.error.force.z(), 0.1 * 0.3);
   // A ball's pressure is symmetric about its middle, so its force goes through there.
-  EXPECT_NEAR(-held.torque_Nmm.y() / held.force_N.z(), 0.5, 0.02);
-  EXPECT_NEAR(held.torque_Nmm.x() / held.force_N.z(), -0.3, 0.02);
+  EXPECT_NEAR(-held.torque_Nmm().y() / held.force_N().z(), 0.5, 0.02);
+  EXPECT_NEAR(held.torque_Nmm().x() / held.force_N().z(), -0.3, 0.02);
   EXPECT_GT(cv::countNonZero(held.contact), 20);
   EXPECT_EQ(held.what, "small-coated, ball of 8 mm at (0.5, -0.3) mm with 0.3 N");
 }
 
-TEST(VirtualDevice, TheDepthThatAForceTookGivesThatForce) {
-  const VirtualObject object = coated().object(ball(8));
-  const HeldFrame by_force = coated().feel(object, {.place_mm = {0.5, -0.3}, .force_N = 0.3});
+TEST(VirtualSensor, TheDepthThatAForceTookGivesThatForce) {
+  const TouchObject object = coated().object(ball(8));
+  const Touch by_force = coated().press(object, {.place_mm = {0.5, -0.3}, .force_N = 0.3}, {.picture = false});
   const double depth = 4.0 - by_force.press.gel_from_object.translation.z();
   EXPECT_GT(depth, 0.05);
-  const HeldFrame by_depth = coated().feel(object, {.place_mm = {0.5, -0.3}, .depth_mm = depth});
-  EXPECT_NEAR(by_depth.force_N.z(), 0.3, 1e-3);
+  const Touch by_depth = coated().press(object, {.place_mm = {0.5, -0.3}, .depth_mm = depth}, {.picture = false});
+  EXPECT_NEAR(by_depth.force_N().z(), 0.3, 1e-3);
   EXPECT_TRUE(by_depth.frame.empty()) << "no picture was asked for";
 }
 
-TEST(VirtualDevice, ADragShearsAlongIt) {
-  const HeldFrame held = coated().feel(coated().object(ball(8, 0.8)), {.force_N = 0.3, .drag_mm = {0.05, 0}});
-  EXPECT_GT(held.force_N.x(), -0.8 * 0.3 - 1e-6);
-  EXPECT_LT(held.force_N.x(), -0.01) << "the gel holds the object back";
-  EXPECT_NEAR(held.force_N.z(), 0.3, 1e-5);
+TEST(VirtualSensor, ADragShearsAlongIt) {
+  const Touch held =
+      coated().press(coated().object(ball(8, 0.8)), {.force_N = 0.3, .drag_mm = {0.05, 0}}, {.picture = false});
+  EXPECT_GT(held.force_N().x(), -0.8 * 0.3 - 1e-6);
+  EXPECT_LT(held.force_N().x(), -0.01) << "the gel holds the object back";
+  EXPECT_NEAR(held.force_N().z(), 0.3, 1e-5);
 }
 
-TEST(VirtualDevice, FramesAreAPureFunctionOfHoldAndNoise) {
-  const Hold hold{.place_mm = {0.5, -0.3}, .force_N = 0.3};
-  const HeldFrame again = coated().press(ball(8), hold, 7);
-  const HeldFrame other = coated().press(ball(8), hold, 8);
+TEST(VirtualSensor, FramesAreAPureFunctionOfHoldAndNoise) {
+  const PressSpec hold{.place_mm = {0.5, -0.3}, .force_N = 0.3};
+  const Touch again = coated().press(ball(8), hold, {.noise_seed = 7});
+  const Touch other = coated().press(ball(8), hold, {.noise_seed = 8});
   EXPECT_EQ(cv::norm(again.frame, held_ball().frame, cv::NORM_INF), 0.0);
   EXPECT_NE(cv::norm(other.frame, held_ball().frame, cv::NORM_INF), 0.0);
   EXPECT_NE(cv::norm(again.background, coated().rest(7).frame, cv::NORM_INF), 0.0) << "noise of its own";
   EXPECT_EQ(cv::countNonZero(coated().rest().contact), 0);
 }
 
-TEST(VirtualDevice, AnObjectTouchesWhereItsLowestPointIs) {
-  const fem::Compliance& gel = coated().gel();
-  EXPECT_NEAR(sim::way_to_touch(fem::SphereShape{1.5}, gel, {0.21, 0.4}, {0, 0, 0}), -1.5, 1e-4);
+TEST(VirtualSensor, AnObjectTouchesWhereItsLowestPointIs) {
+  const sim::GelSpec& gel = coated().device().gel;
+  const auto turned = [](double x, double y, double z) {
+    return rotation_from_xyz(Eigen::Vector3d(x, y, z) * kRadiansPerDegree);
+  };
+  EXPECT_NEAR(sim::first_touch(gel, fem::SphereShape{1.5}, {0.21, 0.4}, turned(0, 0, 0)), 1.5, 1e-4);
   const double tilt = 10 * kRadiansPerDegree;
-  EXPECT_NEAR(sim::way_to_touch(fem::RoundedCylinder{1.0, 0.0, 5.0}, gel, {0, 0}, {10, 0, 0}), -std::sin(tilt), 1e-3);
+  EXPECT_NEAR(sim::first_touch(gel, fem::RoundedCylinder{1.0, 0.0, 5.0}, {0, 0}, turned(10, 0, 0)), std::sin(tilt),
+              1e-3);
   // Over the pad's edge (6 mm) the ball touches with its flank.
-  EXPECT_NEAR(sim::way_to_touch(fem::SphereShape{1.5}, gel, {6.9, 0}, {0, 0, 0}), -std::sqrt(1.5 * 1.5 - 0.81), 1e-3);
+  EXPECT_NEAR(sim::first_touch(gel, fem::SphereShape{1.5}, {6.9, 0}, turned(0, 0, 0)), std::sqrt(1.5 * 1.5 - 0.81),
+              1e-3);
 }
 
-TEST(VirtualDevice, HoldsThatCannotBeAreRefusedByName) {
-  const VirtualObject object = coated().object(ball(8));
-  const auto refused = [&](const Hold& hold) { return error_of([&] { coated().press(object, hold); }); };
-  EXPECT_THAT(refused({}),
-              AllOf(HasSubstr("small-coated, ball of 8 mm at (0, 0) mm"), HasSubstr("neither a force nor")));
-  EXPECT_THAT(refused({.force_N = 1, .depth_mm = 1}), HasSubstr("both a force and a depth"));
+TEST(VirtualSensor, HoldsThatCannotBeAreRefusedByName) {
+  const TouchObject object = coated().object(ball(8));
+  const auto refused = [&](const PressSpec& hold) { return error_of([&] { coated().press(object, hold); }); };
+  EXPECT_THAT(refused({}), AllOf(HasSubstr("small-coated, ball of 8 mm at (0, 0) mm"), HasSubstr("none of force_N")));
+  EXPECT_THAT(refused({.force_N = 1, .depth_mm = 1}), HasSubstr("several of force_N"));
   EXPECT_THAT(refused({.force_N = -1}), HasSubstr("force_N is -1"));
   EXPECT_THAT(refused({.depth_mm = std::numeric_limits<double>::quiet_NaN()}), HasSubstr("depth_mm is nan"));
   EXPECT_THAT(refused({.place_mm = {40, 0}, .force_N = 1}), HasSubstr("isn't over the gel"));
   EXPECT_THAT(refused({.depth_mm = 9}), HasSubstr("9 mm deep: "));
   sim::ObjectSpec soft = ball(8);
   soft.elastic = sim::ElasticSpec{1.0, 0.49, 0.5, {}, {}, {}};
-  EXPECT_THAT(error_of([&] { coated().object(soft); }), HasSubstr("is elastic"));
+  EXPECT_THAT(error_of([&] { coated().session(coated().object(soft)); }), HasSubstr("is elastic"));
   sim::DeviceSpec blind = test::small_coated_device();
   blind.camera.reset();
-  EXPECT_THAT(error_of([&] { VirtualDevice(blind, "/nowhere"); }), HasSubstr("has no camera"));
+  EXPECT_THAT(error_of([&] { VirtualSensor(blind, "/nowhere").rest(); }), HasSubstr("has no camera"));
 }
 
-TEST(VirtualDevice, AClearDeviceShowsWhatPressesItsBeads) {
+TEST(VirtualSensor, AClearDeviceShowsWhatPressesItsBeads) {
   const test::TemporaryFolder folder;
   const auto file = folder.write("clear.yaml", std::string(test::kSmallDevice) + test::kSmallCamera);
   const std::string cache = (folder.path() / "cache").string();
   setenv("TOUCHSTONE_CACHE", cache.c_str(), 1);
-  const VirtualDevice& clear = device(file.string());
+  const VirtualSensor& clear = device(file.string());
   unsetenv("TOUCHSTONE_CACHE");
   EXPECT_EQ(&clear, &device(file.string())) << "kept";
-  const HeldFrame held = clear.press(ball(4), {.force_N = 0.2}, 3);
-  EXPECT_NEAR(held.force_N.z(), 0.2, 1e-5);
+  const Touch held = clear.press(ball(4), {.force_N = 0.2}, {.noise_seed = 3});
+  EXPECT_NEAR(held.force_N().z(), 0.2, 1e-5);
   EXPECT_TRUE(held.height.empty());
   EXPECT_GT(cv::countNonZero(held.contact), 5);
   EXPECT_NE(cv::norm(held.frame, held.background, cv::NORM_INF), 0.0);
@@ -136,16 +143,17 @@ TEST(VirtualDevice, AClearDeviceShowsWhatPressesItsBeads) {
 }
 
 TEST(Matchers, AllowTheToleranceAndTheTruthsErrorBar) {
-  const HeldFrame& held = held_ball();
+  const Touch& held = held_ball();
   const double sigma = held.error.force.z();
   const Eigen::Vector3d z(0, 0, 1);
-  EXPECT_THAT(held.force_N, IsForceOf(held, {}));
-  EXPECT_THAT(Eigen::Vector3d(held.force_N + 1.9 * sigma * z), IsForceOf(held, {}));
-  EXPECT_THAT(Eigen::Vector3d(held.force_N - 2.1 * sigma * z), Not(IsForceOf(held, {})));
-  EXPECT_THAT(Eigen::Vector3d(held.force_N - 2.1 * sigma * z), IsForceOf(held, {.standard_errors = 2.2}));
-  EXPECT_THAT(Eigen::Vector3d(held.force_N + 0.04 * z), IsForceOf(held, {.absolute = 0.05}));
-  EXPECT_THAT(Eigen::Vector3d(held.force_N + 0.04 * z), IsForceOf(held, {.relative = 0.15}));
-  EXPECT_THAT(Eigen::Vector3d(held.force_N + 0.06 * z), Not(IsForceOf(held, {.absolute = 0.01, .standard_errors = 0})));
+  EXPECT_THAT(held.force_N(), IsForceOf(held, {}));
+  EXPECT_THAT(Eigen::Vector3d(held.force_N() + 1.9 * sigma * z), IsForceOf(held, {}));
+  EXPECT_THAT(Eigen::Vector3d(held.force_N() - 2.1 * sigma * z), Not(IsForceOf(held, {})));
+  EXPECT_THAT(Eigen::Vector3d(held.force_N() - 2.1 * sigma * z), IsForceOf(held, {.standard_errors = 2.2}));
+  EXPECT_THAT(Eigen::Vector3d(held.force_N() + 0.04 * z), IsForceOf(held, {.absolute = 0.05}));
+  EXPECT_THAT(Eigen::Vector3d(held.force_N() + 0.04 * z), IsForceOf(held, {.relative = 0.15}));
+  EXPECT_THAT(Eigen::Vector3d(held.force_N() + 0.06 * z),
+              Not(IsForceOf(held, {.absolute = 0.01, .standard_errors = 0})));
   EXPECT_THAT((cv::Vec3d(0, 0, 0.3)), IsForceOf(held, {.absolute = 0.02}));
   EXPECT_THAT((std::array<double, 3>{0, 0, 0.3}), IsForceOf(held, {.absolute = 0.02}));
   EXPECT_THAT(0.3, IsNormalForceOf(held, {.absolute = 0.001}));
@@ -155,7 +163,7 @@ TEST(Matchers, AllowTheToleranceAndTheTruthsErrorBar) {
 }
 
 TEST(Matchers, SayWhatIsOffByHowMuchAndWhatIsAllowed) {
-  const HeldFrame& held = held_ball();
+  const Touch& held = held_ball();
   const std::string says = complaint(IsForceOf(held, {.absolute = 0.1}), cv::Vec3d(0, 0, 0.61));
   EXPECT_THAT(says, HasSubstr("force (0.000, 0.000, 0.610) N against ("));
   EXPECT_THAT(says, HasSubstr("of small-coated, ball of 8 mm at (0.5, -0.3) mm with 0.3 N: z is off by +0.310 N"));
@@ -164,7 +172,7 @@ TEST(Matchers, SayWhatIsOffByHowMuchAndWhatIsAllowed) {
 }
 
 TEST(Matchers, HoldHeightsAndContactsAgainstTheTruth) {
-  const HeldFrame& held = held_ball();
+  const Touch& held = held_ball();
   EXPECT_THAT(held.height, IsHeightOf(held, {}));
   const cv::Mat shifted = held.height + 0.05;
   EXPECT_THAT(shifted, IsHeightOf(held, {.absolute = 0.0501}));

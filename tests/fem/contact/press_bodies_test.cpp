@@ -181,8 +181,8 @@ TEST(TorqueControl, ATiltedPlateAlignsItselfWithTheGel) {
 }
 
 TEST(TorqueControl, TiltsAPunchByTheClosedForm) {
-  // A flat punch of radius a bonded or not, tilted by theta: M = 4 E a^3 theta / (3 (1 - nu^2)) (Johnson, Contact
-  // Mechanics, sec. 5.1), while all of it stays in contact.
+  // A flat punch of radius a bonded or not, tilted by theta: M = 4 E a^3 theta / (3 (1 - nu^2)) [Johnson1985, sec.
+  // 5.1], while all of it stays in contact.
   const Compliance gel = test::half_space_gel(3.0, 0.2, {1.0, 0.3}, 100.0);
   const double radius = 2.0;
   Press press(gel, RoundedCylinder{radius, 0.0, 3.0}, 0.0);
@@ -200,7 +200,7 @@ TEST(TorqueControl, TiltsAPunchByTheClosedForm) {
 }
 
 TEST(TorqueControl, TwistsAStuckPunchByTheClosedForm) {
-  // M = 16 G a^3 phi / 3 (Johnson, sec. 3.9).
+  // M = 16 G a^3 phi / 3 [Johnson1985, sec. 3.9].
   const Compliance gel = test::half_space_gel(3.0, 0.2, {1.0, 0.3}, 100.0);
   const double radius = 2.0;
   Press press(gel, RoundedCylinder{radius, 0.0, 3.0}, std::numeric_limits<double>::infinity());

@@ -75,8 +75,7 @@ TEST(PressRelaxation, ASphereHeldAtItsDepthRelaxesAsTheModulusAndMovesNothing) {
   }
 }
 
-// With growing contact (Lee and Radok, J. Appl. Mech. 27, 1960) the gel is at each moment where an elastic one would be
-// under the force F E0 J(t).
+// With growing contact [Lee1960] the gel is at each moment where an elastic one would be under the force F E0 J(t).
 TEST(PressRelaxation, ASphereHeldAtItsForceCreepsAsItsComplianceWhileContactGrows) {
   const PronySeries one = {{0.4, 0.5}};
   const double force = 0.5;

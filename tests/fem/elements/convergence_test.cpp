@@ -1,5 +1,5 @@
 // Errors fall with the mesh as the theory of the element says: displacement O(h^3) and pressure O(h^2) in L2
-// (Boffi, Brezzi, Fortin, Mixed Finite Element Methods and Applications, sec. 8.8).
+// [Boffi2013, sec. 8.8].
 
 #include <gtest/gtest.h>
 

@@ -58,7 +58,7 @@ TEST(Quadrature, TriangleRuleIsExactUpToItsDegree) {
   }
 }
 
-/// Mean of x^a y^b z^c over the unit sphere, all even: Folland, Amer. Math. Monthly 108, 2001.
+/// Mean of x^a y^b z^c over the unit sphere, all even [Folland2001].
 TEST(Quadrature, SphereRuleIsExactUpToItsDegree) {
   for (const int degree : {2, 5, 8, 16}) {
     const auto rule = sphere_rule(degree);

@@ -28,7 +28,7 @@ TEST(VhsGel, IsSoundAndNearTheInfiniteLayer) {
   EXPECT_GT(gel.report.smallest_dihedral_deg, 5.0);
   EXPECT_LT(gel.surface.size() * sizeof(double), 500e6);
   EXPECT_EQ(Eigen::LLT<Eigen::MatrixXd>(gel.surface.view()).info(), Eigen::Success);
-  // Pads of this width are 1 % softer than the infinite layer (DESIGN.md).
+  // Pads of this width are 1 % softer than the infinite layer.
   const double ratio =
       fixtures::gaussian_work(gel, 1.0) / fixtures::gaussian_pressure_work(material, slab.thickness, 1.0);
   EXPECT_GT(ratio, 0.995);

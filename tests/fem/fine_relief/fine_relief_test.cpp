@@ -276,8 +276,8 @@ double imprint(const ReliefShape& stamp, double period, double depth) {
   return high - low;
 }
 
-// In the stamp's middle the pressure is nearly uniform, so Johnson's critical pressure decides whether the waves are
-// filled: p* = pi E* (amplitude/2) / period.
+// In the stamp's middle the pressure is nearly uniform, so the critical pressure of [Johnson1985, sec. 13.2] decides
+// whether the waves are filled: p* = pi E* (amplitude/2) / period.
 TEST(FineRelief, WavesAreFilledOrBridgedAsJohnsonSays) {
   const double plane_modulus = 0.33 / (1.0 - 0.49 * 0.49);
   const double depth = 0.15;

@@ -8,7 +8,8 @@
 namespace touchstone::fem::fixtures {
 
 /// Normal displacement over normal pressure on the face of an infinite bonded layer, frictionless, at wave number q
-/// over the thickness; relative to the half space (DESIGN.md, layer kernel).
+/// over the thickness; relative to the half space; the kernel of bonded_layer_kernel
+/// (closed_forms/contact_closed_forms.h).
 inline double layer_kernel(double q, double nu) {
   if (q > 20.0) {
     return 1.0;

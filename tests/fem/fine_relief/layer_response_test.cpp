@@ -106,8 +106,8 @@ TEST(LayerResponse, AWaveIsAnsweredByTheKernel) {
   for (std::size_t k = 0; k < u.size(); ++k) EXPECT_NEAR(u[k], expected * wave[k], 1e-12);
 }
 
-// Love's rectangle on the half space, at its centre: u = 8 (1 - nu^2) p a asinh(1) / (pi E) for the square of half side
-// a.
+// Love's rectangle [Love1929] on the half space, at its centre: u = 8 (1 - nu^2) p a asinh(1) / (pi E) for the square
+// of half side a.
 TEST(LayerResponse, OnAThickLayerASquareSinksAsLoveSays) {
   const ElasticMaterial m{1.0, 0.3};
   const PixelGrid grid = centred(33, 33, 0.01);

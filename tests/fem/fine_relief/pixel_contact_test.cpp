@@ -51,8 +51,8 @@ Wavy press_wave(int pixels, double amplitude, double mean_pressure) {
   return {static_cast<double>(answer.pixels_in_contact) / pixels, largest};
 }
 
-// Westergaard 1939; Johnson, Contact Mechanics, eq. 13.9: p_mean = p* sin^2(pi a / lambda), p* = pi E* amplitude /
-// lambda, a the half width of contact; the largest pressure is 2 p* sin(pi a / lambda).
+// [Westergaard1939]; [Johnson1985, eq. 13.9]: p_mean = p* sin^2(pi a / lambda), p* = pi E* amplitude / lambda, a the
+// half width of contact; the largest pressure is 2 p* sin(pi a / lambda).
 TEST(PixelContact, AWavySurfaceIsWestergaards) {
   const double amplitude = 0.01;
   const double full = kPi * kPlaneModulus * amplitude;
@@ -80,9 +80,9 @@ TEST(PixelContact, TheWavySurfacesErrorFallsWithThePixel) {
   }
 }
 
-// The isotropic wave h = amplitude (cos x + cos y) of Johnson, Greenwood and Higginson (Int. J. Mech. Sci. 27, 1985):
-// it is filled when both cosines are, each of which alone takes pi E* amplitude / lambda; under light loads each crest
-// is Hertz' sphere of curvature 4 pi^2 amplitude / lambda^2.
+// The isotropic wave h = amplitude (cos x + cos y) of [Johnson1985b]: it is filled when both cosines are, each of which
+// alone takes pi E* amplitude / lambda; under light loads each crest is Hertz' sphere of curvature 4 pi^2 amplitude /
+// lambda^2.
 TEST(PixelContact, AnIsotropicWaveMeetsBothLimits) {
   const double amplitude = 0.01;
   const PixelGrid grid{256, 256, 1.0 / 256, {0, 0}};

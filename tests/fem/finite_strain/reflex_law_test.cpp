@@ -1,4 +1,4 @@
-// The force law of the reflex fingertip (Knoop and Rossiter, fig. 7): F = 1.1293 (exp(0.4677 z) - 1) N, z in mm up
+// The force law of the reflex fingertip [Knoop2013, eq. 1, fig. 4]: F = 1.1293 (exp(0.4677 z) - 1) N, z in mm up
 // to 5.
 
 #include <gtest/gtest.h>
@@ -32,7 +32,7 @@ double rms_after_fit(const std::vector<double>& z, const std::vector<double>& fo
   return std::sqrt(sum / static_cast<double>(z.size()));
 }
 
-/// The text gives no size. A hemisphere of 8 mm on 4 mm of the same width, bonded on its back, pressed by a plate.
+/// The paper gives no size. A hemisphere of 8 mm on 4 mm of the same width, bonded on its back, pressed by a plate.
 TEST(ReflexLaw, ASoftFingertipFollowsItAtFiniteStrainAndNotInLinearElasticity) {
   FingertipGel tip;
   tip.radius = 8.0;
@@ -65,7 +65,7 @@ TEST(ReflexLaw, ASoftFingertipFollowsItAtFiniteStrainAndNotInLinearElasticity) {
   RecordProperty("finite_rms_N", std::to_string(finite_rms));
   const double linear_rms = rms_after_fit(z, linear_force, factor);
   RecordProperty("linear_rms_N", std::to_string(linear_rms));
-  EXPECT_LT(finite_rms, 0.2);  // the law itself is 0.14 N from the text's data
+  EXPECT_LT(finite_rms, 0.2);  // the law itself is 0.14 N from the paper's data
   EXPECT_GT(linear_rms, 2.0 * finite_rms);
 }
 

@@ -67,9 +67,9 @@ TEST(PixelError, SeesNothingBeyondTheFullWell) {
 }
 
 TEST(BenchHolds, LieWithinAnEdgeAndAFifthOfTheDepth) {
-  const std::vector<sim::Hold> holds = bench_holds(50, 0.5, 0.4, 7);
+  const std::vector<sim::PressSpec> holds = bench_holds(50, 0.5, 0.4, 7);
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();
-  for (const sim::Hold& hold : holds) {
+  for (const sim::PressSpec& hold : holds) {
     EXPECT_LE(hold.place_mm.cwiseAbs().maxCoeff(), 0.25);
     EXPECT_NEAR(*hold.depth_mm, 0.4, 0.2 * 0.4);
     EXPECT_NEAR(hold.drag_mm.norm(), 0.4 / 3.0, 1e-12);

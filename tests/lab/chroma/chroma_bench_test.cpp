@@ -22,7 +22,7 @@ constexpr std::size_t kPressFrames = 3;
 /// A device on its bench, and a ball of 12.7 mm that has been pressed in by 1.8 mm and then pulled along x by 0.6 mm.
 struct Pressed {
   sim::DeviceSpec device;
-  sim::TouchRig rig;
+  sim::VirtualSensor sensor;
   ChromaBench bench;
   std::vector<ChromaLook> looks;
   sensors::PictureMap map;
@@ -31,8 +31,8 @@ struct Pressed {
 
   explicit Pressed(const std::string& name)
       : device(sim::read_device(std::string(TOUCHSTONE_SOURCE_DIR) + "/scenes/devices/" + name + ".yaml")),
-        rig(device, cache(), chroma_rig_settings(5)),
-        bench(rig, 5),
+        sensor(device, cache(), chroma_sensor_settings(5)),
+        bench(sensor, 5),
         map(sensors::map_of_rest(bench.rest(), bench.spacing_mm())) {
     const sim::ObjectSpec ball =
         sim::read_object(std::string(TOUCHSTONE_SOURCE_DIR) + "/scenes/objects/ball-12.7mm.yaml");
@@ -85,7 +85,7 @@ TEST_P(ChromaDevices, AllMarkersAreReadAtRestWhereTheyArePrinted) {
   EXPECT_EQ(rest.light, sensors::FrameLight::kNormal);
   for (std::size_t i = 0; i < rest.markers.size(); ++i) {
     ASSERT_EQ(rest.markers[i].flaw, sensors::MarkerFlaw::kNone) << i;
-    const Eigen::Vector2d at = p.rig.gel_from_pixel(rest.markers[i].ink_centroid_px);
+    const Eigen::Vector2d at = p.sensor.gel_from_pixel(rest.markers[i].ink_centroid_px);
     EXPECT_LT((at - p.bench.markers().markers[i].centre).norm(), 0.1) << i;
     // Red: between the film's yellow and the ink's magenta.
     EXPECT_LT(std::abs(std::remainder(rest.markers[i].hue, 2.0 * kPi)), 0.35) << i;
@@ -99,12 +99,12 @@ TEST_P(ChromaDevices, WhiteIsBrightAndNothingIsWashedOut) {
     cv::minMaxLoc(frame.reshape(1), nullptr, &most);
     return most;
   };
-  const double white = brightest(p.rig.background(2));
+  const double white = brightest(p.sensor.background(2));
   EXPECT_GT(white, 150.0);
   EXPECT_LT(white, 195.0);
   const sim::TouchObject ball =
-      p.rig.object(sim::read_object(std::string(TOUCHSTONE_SOURCE_DIR) + "/scenes/objects/ball-12.7mm.yaml"));
-  EXPECT_LT(brightest(p.rig.look(ball, p.looks[kPressFrames].state.press, 3, 0, false).frame), 250.0);
+      p.sensor.object(sim::read_object(std::string(TOUCHSTONE_SOURCE_DIR) + "/scenes/objects/ball-12.7mm.yaml"));
+  EXPECT_LT(brightest(p.sensor.capture(ball, p.looks[kPressFrames].state.press, 3, 0, false).frame), 250.0);
 }
 
 TEST_P(ChromaDevices, HueFallsTowardsTheInksTheDeeperItIsPressed) {

@@ -70,7 +70,7 @@ TEST(TiltScene, KeepsTheMarkersCentreWhereItWas) {
     area += part;
     mean += part * (a + b + c) / 3.0;
   }
-  const double stretch = 1.0 + 0.5 * 0.3 / bench.gel_mm;  // eq. 3
+  const double stretch = 1.0 + 0.5 * 0.3 / bench.gel_mm;  // [Lin2019, eq. 3]
   EXPECT_NEAR(area, std::pow(bench.side_mm * stretch, 2), 1e-6);
   EXPECT_LT((mean / area - tilted.moved_mm).norm(), 1e-9);
   const render::Scene ball = tilt_scene(bench, spectra(), TiltMarker::ball, {0.6, Eigen::Vector3d::Zero()});

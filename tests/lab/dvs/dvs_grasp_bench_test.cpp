@@ -49,7 +49,7 @@ TEST(DvsGrasps, SofterPiecesTakeLongerAndCoverMoreAtTheSameForce) {
     const double travel = grasp.face->at_normal_force(1.9).travel_mm;
     EXPECT_LT(travel, 0.9 * last_travel);
     last_travel = travel;
-    EXPECT_GE(grasp.readings.size(), 144u) << "the text's 144 windows (fig. 8)";
+    EXPECT_GE(grasp.readings.size(), 144u) << "144 windows in [Naeini2020, fig. 8]";
     EXPECT_LT(grasp.face->states().back().approach_mm, 2.0);
   }
 }

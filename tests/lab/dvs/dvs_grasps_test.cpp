@@ -21,7 +21,8 @@ TEST(DvsGrasps, AreTheTextsFortyEightAndWithinTheirRanges) {
     grasps += dvs_materials()[static_cast<std::size_t>(material)].grasps;
     const sim::ObjectSpec piece =
         sim::read_object(kScenes / dvs_materials()[static_cast<std::size_t>(material)].object_file);
-    EXPECT_NEAR(piece.shape.across_flats_mm * 2 / std::sqrt(3.0), 7.5, 0.01) << "text V.A: 0.75 x 0.65 cm";
+    EXPECT_NEAR(piece.shape.across_flats_mm * 2 / std::sqrt(3.0), 7.5, 0.01)
+        << "[Naeini2020, sec. V.A]: 0.75 x 0.65 cm";
     EXPECT_EQ(piece.shape.length_mm, 35.5);
     const double modulus = piece.elastic ? piece.elastic->youngs_modulus_MPa : INFINITY;
     EXPECT_GT(modulus, last_modulus) << "foam, rubber, silicone, steel";

@@ -10,7 +10,7 @@
 #include "core/whole_file.h"
 #include "lab/fit/unit_fit_experiment.h"
 #include "sim/files/image_file.h"
-#include "sim/sensor/touch_rig.h"
+#include "sim/sensor/virtual_sensor.h"
 #include "tests/support/message_of.h"
 #include "tests/support/temporary_folder.h"
 
@@ -110,17 +110,17 @@ TEST(UnitSimulation, LampsOneByOneAddUpToAllOfThem) {
   UnitSimulation simulation(fit, cache());
   const SimulatedUnit shown = simulation.show(x, {{{0, 0}, 0.4}, {{-1.0, 0.8}, 0.4}, {{1.0, -0.9}, 0.4}});
   // All at once, with paths of another seed.
-  sim::TouchRigSettings settings;
+  sim::VirtualSensorSettings settings;
   settings.seed = 77;
   settings.deepest_mm = 0.6;
   settings.membrane_um = 120.0;
   settings.always_friction = true;
-  const sim::TouchRig rig(with_block_camera(device_at(fit, x), spec.coarse_px), cache(), settings);
-  const cv::Mat whole = mean_numbers(rig.background_light(), simulation.imager(x));
+  const sim::VirtualSensor sensor(with_block_camera(device_at(fit, x), spec.coarse_px), cache(), settings);
+  const cv::Mat whole = mean_numbers(sensor.background_light(), simulation.imager(x));
   EXPECT_LT(cv::norm(shown.background, whole, cv::NORM_L2) / cv::norm(whole, cv::NORM_L2), 0.02);
   EXPECT_NEAR(cv::mean(shown.background)[1], cv::mean(whole)[1], 0.01 * cv::mean(whole)[1]);
-  const sim::TouchObject ball = rig.object(fit.objects[0]);
-  EXPECT_NEAR(shown.force_N[0], rig.play(ball, straight_down()).back().press.wrench[2], 1e-6 * shown.force_N[0]);
+  const sim::TouchObject ball = sensor.object(fit.objects[0]);
+  EXPECT_NEAR(shown.force_N[0], sensor.play(ball, straight_down()).back().press.wrench[2], 1e-6 * shown.force_N[0]);
 }
 
 TEST(UnitPictures, MeanAndNoiseOfExposuresAreAsTheImagerHasThem) {
@@ -261,15 +261,15 @@ std::filesystem::path written_fit(const test::TemporaryFolder& out, const std::s
   add_unknown(spec, "gel.youngs_modulus_MPa", UnknownHow::times, 0.4, 2.5);
   const PreparedFit fit = prepare_fit(spec);
   for (const char* name : {"device.yaml", "ball.yaml"}) out.write(name, read_whole_file(folder().path() / name));
-  sim::TouchRigSettings settings;
+  sim::VirtualSensorSettings settings;
   settings.seed = 9;
   settings.deepest_mm = 0.6;
   settings.membrane_um = 120.0;
-  static const sim::TouchRig rig(fit.device, cache(), settings);
-  sim::write_png(out.path() / "rest.png", rig.background(1));
-  const sim::TouchObject ball = rig.object(fit.objects[0]);
+  static const sim::VirtualSensor sensor(fit.device, cache(), settings);
+  sim::write_png(out.path() / "rest.png", sensor.background(1));
+  const sim::TouchObject ball = sensor.object(fit.objects[0]);
   sim::write_png(out.path() / "press.png",
-                 rig.look(ball, rig.play(ball, straight_down()).back().press, 1, 1, false).frame);
+                 sensor.capture(ball, sensor.play(ball, straight_down()).back().press, 1, 1, false).frame);
   return out.write("fit.yaml",
                    fmt::format("name: mine\ndevice: device.yaml\ncoarse_px: 2\nmembrane_um: 120\ndeepest_mm: 0.6\n"
                                "backgrounds: [rest.png]\nunknowns:\n{}\npresses:\n  - {{picture: press.png, "

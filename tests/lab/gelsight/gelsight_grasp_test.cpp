@@ -19,12 +19,12 @@ namespace {
 
 using ::testing::HasSubstr;
 
-const sim::TouchRig& rig() {
+const sim::VirtualSensor& sensor() {
   static const test::TemporaryFolder cache;
-  static const sim::TouchRig one = [] {
-    sim::TouchRigSettings settings;
+  static const sim::VirtualSensor one = [] {
+    sim::VirtualSensorSettings settings;
     settings.widest_mm = 1.0;
-    return sim::TouchRig(test::small_coated_device(), cache.path(), settings);
+    return sim::VirtualSensor(test::small_coated_device(), cache.path(), settings);
   }();
   return one;
 }
@@ -77,7 +77,7 @@ GraspLoopSettings loop() {
 double heavy_g() {
   static const double mass = [] {
     GraspTrial light = ball(0.5);
-    const GraspOutcome outcome = run_grasp_trial(rig(), light, loop(), stand_in());
+    const GraspOutcome outcome = run_grasp_trial(sensor(), light, loop(), stand_in());
     EXPECT_TRUE(outcome.held) << outcome.failure;
     return 1.4 * 2.0 * light.object.friction * outcome.final_force_N / (sim::kGravity_mm_s2 * 1e-6);
   }();
@@ -85,7 +85,7 @@ double heavy_g() {
 }
 
 TEST(GraspLoop, ALightObjectIsHeldAtTheFirstTouch) {
-  const GraspOutcome outcome = run_grasp_trial(rig(), ball(0.5), loop(), stand_in());
+  const GraspOutcome outcome = run_grasp_trial(sensor(), ball(0.5), loop(), stand_in());
   EXPECT_TRUE(outcome.held) << outcome.failure;
   EXPECT_EQ(outcome.slid_mm, 0.0);
   EXPECT_GT(outcome.peak_force_N, 0.0);
@@ -93,8 +93,8 @@ TEST(GraspLoop, ALightObjectIsHeldAtTheFirstTouch) {
 }
 
 TEST(GraspLoop, SlipIsAnsweredByAStrongerGrip) {
-  const GraspOutcome light = run_grasp_trial(rig(), ball(0.5), loop(), stand_in());
-  const GraspOutcome heavy = run_grasp_trial(rig(), ball(heavy_g()), loop(), stand_in());
+  const GraspOutcome light = run_grasp_trial(sensor(), ball(0.5), loop(), stand_in());
+  const GraspOutcome heavy = run_grasp_trial(sensor(), ball(heavy_g()), loop(), stand_in());
   EXPECT_GT(heavy.slip_answers, light.slip_answers);
   EXPECT_GT(heavy.peak_force_N, 1.4 * light.peak_force_N);
   EXPECT_GT(heavy.slid_mm, 0.0);
@@ -103,7 +103,7 @@ TEST(GraspLoop, SlipIsAnsweredByAStrongerGrip) {
 TEST(GraspLoop, WithoutTheAnswerToSlipTheSameObjectStaysBehind) {
   GraspLoopSettings blind = loop();
   blind.rule.answer_slip = false;
-  const GraspOutcome outcome = run_grasp_trial(rig(), ball(heavy_g()), blind, stand_in());
+  const GraspOutcome outcome = run_grasp_trial(sensor(), ball(heavy_g()), blind, stand_in());
   EXPECT_FALSE(outcome.held);
   EXPECT_EQ(outcome.slip_answers, 0);
   EXPECT_LT(outcome.moments.back().truth.object_height_mm, 1.0);
@@ -113,7 +113,7 @@ TEST(GraspLoop, WhatIsSeenIsAsOldAsTheCamerasLag) {
   GraspLoopSettings settings = loop();
   const auto first_sight = [&](double lag_s) {
     settings.camera_lag_s = lag_s;
-    const GraspOutcome outcome = run_grasp_trial(rig(), ball(0.5), settings, stand_in());
+    const GraspOutcome outcome = run_grasp_trial(sensor(), ball(0.5), settings, stand_in());
     for (std::size_t k = 0; k < outcome.moments.size(); ++k) {
       if (outcome.moments[k].sight.height_max_mm > 0.04) return static_cast<int>(k);
     }
@@ -125,7 +125,7 @@ TEST(GraspLoop, WhatIsSeenIsAsOldAsTheCamerasLag) {
 TEST(GraspLoop, AFragileObjectIsCrushedAndSaidToBe) {
   GraspTrial trial = ball(0.5);
   trial.object.crush_force_N = 1e-3;
-  const GraspOutcome outcome = run_grasp_trial(rig(), trial, loop(), stand_in());
+  const GraspOutcome outcome = run_grasp_trial(sensor(), trial, loop(), stand_in());
   EXPECT_FALSE(outcome.held);
   EXPECT_THAT(outcome.failure, HasSubstr("crushed at"));
 }
@@ -134,7 +134,7 @@ TEST(GraspLoop, SensesThatSeeNothingCloseUntilTheLimit) {
   GraspLoopSettings settings = loop();
   settings.rule.longest_approach_mm = 0.2;
   const GraspOutcome outcome =
-      run_grasp_trial(rig(), ball(0.5), settings, [](const cv::Mat&) { return sensors::GraspSight{}; });
+      run_grasp_trial(sensor(), ball(0.5), settings, [](const cv::Mat&) { return sensors::GraspSight{}; });
   EXPECT_FALSE(outcome.held);
   EXPECT_THAT(outcome.failure, HasSubstr("nothing there"));
 }
@@ -142,13 +142,13 @@ TEST(GraspLoop, SensesThatSeeNothingCloseUntilTheLimit) {
 TEST(GraspLoop, RefusesWhatMakesNoSense) {
   GraspTrial weightless = ball(1.0);
   weightless.object.mass_g.reset();
-  EXPECT_THROW(run_grasp_trial(rig(), weightless, loop(), stand_in()), Error);
+  EXPECT_THROW(run_grasp_trial(sensor(), weightless, loop(), stand_in()), Error);
   GraspLoopSettings settings = loop();
   settings.camera_lag_s = -0.1;
-  EXPECT_THROW(run_grasp_trial(rig(), ball(1.0), settings, stand_in()), Error);
+  EXPECT_THROW(run_grasp_trial(sensor(), ball(1.0), settings, stand_in()), Error);
   settings = loop();
   settings.rule.touch_height_mm = 0.0;
-  EXPECT_THROW(run_grasp_trial(rig(), ball(1.0), settings, stand_in()), Error);
+  EXPECT_THROW(run_grasp_trial(sensor(), ball(1.0), settings, stand_in()), Error);
 }
 
 }  // namespace

@@ -9,7 +9,7 @@
 #include "lab/bench/device_bench_parts.h"
 #include "sim/plan/plan.h"
 #include "sim/scene/device_imager.h"
-#include "sim/sensor/virtual_device.h"
+#include "sim/sensor/virtual_sensor.h"
 #include "sim/view/visible_scene.h"
 
 namespace touchstone::lab {
@@ -22,9 +22,9 @@ sim::SceneSpec dots_scene(const sim::DeviceSpec& device, const fem::Compliance& 
   presses.object.name = "ball";
   presses.object.shape.type = sim::ShapeKind::sphere;
   presses.object.shape.radius_mm = 8.0;
-  sim::Hold hold;
+  sim::PressSpec hold;
   hold.depth_mm = 1.0;
-  presses.touch_mm = sim::way_to_touch(sim::contact_shape(presses.object.shape), gel, hold.place_mm, hold.angles_deg);
+  presses.touch_mm = sim::first_touch(hold, presses.object, device.gel);
   sim::SceneSpec scene = bench_scene(device, presses, hold, 3);
   scene.effects.direct_light = scene.effects.motion_blur = scene.effects.interreflection = sim::Switch::off;
   return scene;

@@ -27,7 +27,7 @@ render::MotionChipSettings chip_settings() {
 }
 
 /// A pinhole 16 mm before dots that a plate brings nearer, 0.47 mm a pixel, with light that grows by 5 % a mm; forces
-/// by eq. 1, and shear, where the way goes on sideways by `sideways_mm` along x, of 0.5 N/mm.
+/// by [Knoop2013, eq. 1], and shear, where the way goes on sideways by `sideways_mm` along x, of 0.5 N/mm.
 ReflexTouch painted_touch(const std::string& name, double deepest_mm, double sideways_mm = 0.0,
                           double towards_rad = 0.0) {
   const render::MotionChipSettings chip = chip_settings();

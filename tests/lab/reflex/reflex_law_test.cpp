@@ -28,8 +28,8 @@ TEST(ReflexLaw, TheDeviceMeetsItBothWaysWithFriction) {
   first.states.resize(down);
   const double rms = reflex_law_rms(reflex_law(press, first));
   RecordProperty("rms_N", std::to_string(rms));
-  EXPECT_LT(rms, 0.08);  // 0.066 measured; the text's own is kReflexLawRms_N
-  // Friction holds some force back on the way out: no more than the text's own error.
+  EXPECT_LT(rms, 0.08);  // 0.066 measured; that of [Knoop2013] is kReflexLawRms_N
+  // Friction holds some force back on the way out: no more than the paper's own error.
   double worst = 0.0;
   for (std::size_t k = 0; k < down; ++k) {
     const double lag = played.states[k].wrench[2] - played.states[played.states.size() - 1 - k].wrench[2];

@@ -99,7 +99,7 @@ TEST(ReflexLight, ThePressedSkinIsLargerAndBrighter) {
   const ChipStatistics rest = shown(light(), light().irradiance(skin().pressed(0))).statistics;
   const ChipStatistics touched = shown(light(), light().irradiance(skin().pressed(1))).statistics;
   const ChipStatistics deep = shown(light(), light().irradiance(skin().pressed(4))).statistics;
-  // The text's tree splits at MAX 38 and 40 of 63.
+  // The tree of [Knoop2013] splits at MAX 38 and 40 of 63.
   EXPECT_GT(rest.maximum, 30);
   EXPECT_LT(rest.maximum, 42);
   EXPECT_GT(touched.maximum, rest.maximum);

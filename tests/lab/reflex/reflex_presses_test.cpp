@@ -27,7 +27,7 @@ sim::DeviceSpec coarse(double factor) {
   return coarse;
 }
 
-/// Eq. 1 of the text to its own error, from the device's shape and moduli alone, on a mesh of edges 1.6 times as long.
+/// [Knoop2013, eq. 1] to its own error, from the device's shape and moduli alone, on a mesh of edges 1.6 times as long.
 TEST(ReflexPresses, ThePlatesForceIsTheTextsLaw) {
   const auto gel = sim::set_up_finite_gel(coarse(1.6));
   ReflexPress press;

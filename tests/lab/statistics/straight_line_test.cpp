@@ -14,7 +14,7 @@ TEST(StraightLine, FindsTheLineThatItsPointsLieOn) {
   EXPECT_NEAR(line.r2, 1.0, 1e-14);
 }
 
-// Anscombe's first set (The American Statistician 27, 1973), whose line he gives: y = 3 + 0.5 x, r2 = 0.667.
+// Anscombe's first set and its line [Anscombe1973]: y = 3 + 0.5 x, r2 = 0.667.
 TEST(StraightLine, AnscombesFirstSet) {
   const StraightLine line = line_through(std::array{10.0, 8.0, 13.0, 9.0, 11.0, 14.0, 6.0, 4.0, 12.0, 7.0, 5.0},
                                          std::array{8.04, 6.95, 7.58, 8.81, 8.33, 9.96, 7.24, 4.26, 10.84, 4.82, 5.68});

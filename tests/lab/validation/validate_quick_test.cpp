@@ -37,7 +37,7 @@ TEST_P(QuickValidation, EveryRowHoldsAndIsNamedAfterItsGroup) {
   }
 }
 
-// Of the chroma text's design rules and remedies some are refuted, so not every row of its group holds.
+// Of the design rules and remedies of [Lin2019] some are refuted, so not every row of its group holds.
 TEST(QuickChromaDesign, HasAFigureInEveryRow) {
   const std::vector<ValidationRow> rows = quick("chroma.design");
   EXPECT_EQ(rows.size(), 15u);
@@ -53,7 +53,8 @@ TEST(QuickChromaDesign, HasAFigureInEveryRow) {
   }
 }
 
-// The tree's error hangs on how much of the record lies just behind the touch; ours has more of it than the text's.
+// The tree's error hangs on how much of the record lies just behind the touch; ours has more of it than that of
+// [Knoop2013].
 TEST(QuickReflex, MeetsTheTextButForTheContactsError) {
   const std::vector<ValidationRow> rows = quick("reflex");
   EXPECT_EQ(rows.size(), 24u);
@@ -61,7 +62,7 @@ TEST(QuickReflex, MeetsTheTextButForTheContactsError) {
     EXPECT_EQ(row.id.rfind("reflex.", 0), 0u) << row.id;
     EXPECT_TRUE(std::isfinite(row.ours)) << row.id;
     EXPECT_TRUE(row.published || row.reference) << row.id;
-    // On the quick form's coarse mesh and few pictures the text's largest errors may be passed by a little.
+    // On the quick form's coarse mesh and few pictures the paper's largest errors may be passed by a little.
     if (row.id.find("error_percent") != std::string::npos || row.id.find("explore.max") != std::string::npos) {
       EXPECT_LT(row.ours, 2.0 * (row.published ? *row.published : *row.reference)) << row.id;
     } else {

@@ -7,6 +7,8 @@
 #include <nlohmann/json.hpp>
 
 #include "core/error.h"
+#include "lab/validation/row_list.h"
+#include "lab/validation/validation_page.h"
 
 namespace touchstone::lab {
 namespace {
@@ -80,6 +82,27 @@ TEST(Validation, JsonHasTheAgreedMembersInOrder) {
   EXPECT_EQ(json.at(0).at("ci95").at(1), 0.06);
   EXPECT_EQ(json.at(0).at("quick"), true);
   EXPECT_TRUE(json.at(1).at("ours").is_null()) << "NaN isn't JSON";
+}
+
+TEST(Validation, ARowThatDeniesItsSourcesFindingDoesNotHoldHoweverGoodItsFigure) {
+  const ValidationGroup group = {"light", [](const ValidateOptions& options) {
+                                   RowList rows("light.", options, RowList::Since::begin);
+                                   rows.add_bounded("told_percent", "told at 250 Hz", "%", Better::higher, 84.0, true,
+                                                    90.0);
+                                   EXPECT_TRUE(rows.last().holds);
+                                   deny(rows.last(), "250 Hz are too few");
+                                   return rows.rows();
+                                 }};
+  const std::vector<ValidationRow> rows = validate({"light"}, {group}, {});
+  ASSERT_EQ(rows.size(), 1u);
+  EXPECT_FALSE(rows[0].holds);
+  const std::string words = "told at 250 Hz (doesn't hold: denies the finding that 250 Hz are too few)";
+  EXPECT_THAT(to_table(rows), ::testing::AllOf(::testing::HasSubstr("NO"), ::testing::HasSubstr(words)));
+  const auto json = nlohmann::ordered_json::parse(to_json(rows));
+  EXPECT_EQ(json.at(0).at("holds"), false);
+  EXPECT_EQ(json.at(0).at("title"), words);
+  EXPECT_THAT(to_markdown(rows, {"1", "p", ""}), ::testing::HasSubstr("0 of 1 rows hold."));
+  EXPECT_THAT(to_markdown(rows, {"1", "p", ""}), ::testing::HasSubstr(words));
 }
 
 TEST(Validation, TableShowsEachRow) {

@@ -1,4 +1,4 @@
-// The photon transfer curve of every imager preset, from the dark to beyond saturation, after EMVA Standard 1288:
+// The photon transfer curve of every imager preset, from the dark to beyond saturation, after [EMVA1288]:
 //   mean = black + K (eta photons + dark),   variance = K^2 read^2 + 1/12 + K (mean - black).
 
 #include <gtest/gtest.h>

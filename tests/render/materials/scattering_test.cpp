@@ -8,9 +8,9 @@
 
 #include "core/random.h"
 #include "core/units.h"
-#include "light_scenes.h"
 #include "render/materials/scattering.h"
 #include "render/scene/ray_scene.h"
+#include "tests/render/paths/light_scenes.h"
 
 namespace touchstone::render {
 namespace {
@@ -63,7 +63,7 @@ Quadrature gauss(int count) {
   return rule;
 }
 
-/// Chandrasekhar's H for isotropic scattering (Radiative Transfer, ch. V), from
+/// Chandrasekhar's H for isotropic scattering [Chandrasekhar1960, ch. V], from
 /// 1 / H(mu) = sqrt(1 - albedo) + albedo / 2 int_0^1 x H(x) / (mu + x) dx.
 class ChandrasekharH {
  public:
@@ -88,8 +88,8 @@ class ChandrasekharH {
   std::vector<double> at_nodes_;
 };
 
-/// What a slab sends back and lets through of an even sky, at the nodes of `rule`: by doubling (van de Hulst 1980, ch.
-/// 4) of a layer so thin that it scatters once, from Henyey and Greenstein's phase function averaged over azimuth.
+/// What a slab sends back and lets through of an even sky, at the nodes of `rule`: by doubling [Hulst1980, ch. 4] of a
+/// layer so thin that it scatters once, from Henyey and Greenstein's phase function averaged over azimuth.
 struct SlabOfSky {
   Eigen::VectorXd reflected, passed;
 };

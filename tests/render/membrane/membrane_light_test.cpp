@@ -109,8 +109,7 @@ double twice_e3(double x) {
 }
 
 // The flux between black plates through a medium in radiative equilibrium is that of diffuse light through a slab that
-// scatters evenly and takes nothing: 0.7040, 0.5532 and 0.3900 for 0.5, 1 and 2 mean free paths (Heaslet and Warming
-// 1965, Int. J. Heat Mass Transfer 8, 979).
+// scatters evenly and takes nothing: 0.7040, 0.5532 and 0.3900 for 0.5, 1 and 2 mean free paths [Heaslet1965].
 TEST(MembraneWalks, DiffuseLightPassesASlabAsHeasletAndWarmingSay) {
   for (const auto& [depth, passed] : {std::pair{0.5, 0.7040}, {1.0, 0.5532}, {2.0, 0.3900}}) {
     const MembraneKernels kernels = walk_membrane(matched(depth), {.walks = 1 << 18});

@@ -102,7 +102,7 @@ TEST(SpectralBands, AdaptedOnesPutTheirEdgesOnASteepFilter) {
 TEST(SpectralBands, AdaptedOnesAreRightForTheChromaSensor) {
   const Chroma chroma;
   SpectralBands even = even_bands(400, 720, 3);
-  EXPECT_GT(chroma.worst(even), 0.3);  // DESIGN.md, Light: three bands won't do for the chroma sensor
+  EXPECT_GT(chroma.worst(even), 0.3);  // three bands won't do for the chroma sensor
   even = even_bands(400, 720, 16);
   const double eight = chroma.worst(chroma.adapted(8));
   const double sixteen = chroma.worst(chroma.adapted(16));

@@ -120,7 +120,7 @@ TEST(BeadTracker, BrightnessOfTheFrameHasNoSay) {
 
 TEST(BeadTracker, LoadCycleIsFollowedWithoutALoss) {
   // The pattern widens under normal load, moves with shear along x and y, and bends round the pressed square, at 30
-  // frames/s: the cycle of sec. 4.3 with noise and the fall-off of a pinhole.
+  // frames/s: the cycle of [VisioHaptic2024, sec. 4.3] with noise and the fall-off of a pinhole.
   BeadPicture picture = kSmall;
   picture.fall_off_px = 400.0;
   picture.noise = 3.0;

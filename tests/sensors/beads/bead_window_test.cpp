@@ -101,7 +101,7 @@ TEST(BrightnessScale, GreyOfColourIsOpenCvs) {
   }
 }
 
-/// Steps iii to vii of the text, spelled out with OpenCV's own functions.
+/// Steps iii to vii of [VisioHaptic2024, sec. 3.2], spelled out with OpenCV's own functions.
 Eigen::Vector2d plain_pipeline(const cv::Mat& grey, double contrast) {
   const double mean = cv::mean(grey)[0];
   cv::Mat enhanced;

@@ -71,8 +71,8 @@ inline ForceSamples samples_of(const StiffnessForceModel& model, int count, doub
   return samples;
 }
 
-/// Samples like those of the load cycle of sec. 4.3: the beads' motions are few smooth patterns, so that the features
-/// are strongly correlated; shear moves beads that the normal axis' features see too.
+/// Samples like those of the load cycle of [VisioHaptic2024, sec. 4.3]: the beads' motions are few smooth patterns, so
+/// that the features are strongly correlated; shear moves beads that the normal axis' features see too.
 inline ForceSamples load_cycle_samples(int count, double noise_px) {
   ForceSamples samples;
   samples.grid = 3;

@@ -24,7 +24,7 @@ double largest_difference(const StiffnessForceModel& a, const StiffnessForceMode
   return largest;
 }
 
-/// The text's rule, for samples whose loss may never drop so far.
+/// The rule of [VisioHaptic2024], for samples whose loss may never drop so far.
 TrainingSettings published_up_to(std::int64_t max_iterations) {
   TrainingSettings settings = TrainingSettings::as_published();
   settings.max_iterations = max_iterations;

@@ -172,7 +172,7 @@ TEST(ColourMarkerFinder, HueDoesNotDependOnAGradientOfLightOrItsColour) {
 }
 
 TEST(ColourMarkerFinder, NoisePicturesOfOneSceneAgreeToAThirdOfADegree) {
-  ColourPicture picture = small_colour_picture(30.0);  // 0.3 degrees is the text's own figure, of 50 pictures
+  ColourPicture picture = small_colour_picture(30.0);  // 0.3 degrees in [Lin2019], of 50 pictures
   const cv::Mat light = paint_colour_light(picture);
   ColourMarkerFinder finder = finder_for(picture);
   finder.find_rest(expose(light, 1.0, 2.0, 1));

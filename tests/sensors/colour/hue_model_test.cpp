@@ -1,4 +1,4 @@
-// Displacements from coloured markers' looks: made by eq. 4 itself, and painted.
+// Displacements from coloured markers' looks: made by [Lin2019, eq. 4] itself, and painted.
 
 #include "sensors/colour/hue_model.h"
 

@@ -142,7 +142,7 @@ struct PaintedGel {
 };
 
 /// Moves the markers by displacements (mm, gel frame: a press is -z): a pressed marker stretches by half the gel's
-/// compression (seed 002, eq. 3, for a Poisson's ratio of 0.5), and is seen larger and farther from the picture's
+/// compression ([Lin2019, eq. 3], for a Poisson's ratio of 0.5), and is seen larger and farther from the picture's
 /// middle as it is nearer (eq. 1).
 inline void displace(ColourPicture& picture, const std::vector<Eigen::Vector3d>& displacements,
                      const PaintedGel& gel = {}) {

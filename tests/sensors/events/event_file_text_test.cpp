@@ -27,7 +27,7 @@ class TextEvents : public ::testing::Test {
 };
 
 TEST_F(TextEvents, SecondsWithoutAHeader) {
-  // The layout of Mueggler et al. 2017: seconds, column, row, polarity; nine decimals, rounded to us.
+  // The layout of [Mueggler2017]: seconds, column, row, polarity; nine decimals, rounded to us.
   const EventRecording back = read("0.003811000 96 133 0\n0.0038115 96 134 1\r\n1e-2 0 0 1\n1.5e0 3 4 0");
   EXPECT_THAT(back.events, ElementsAre(Event{3811, 96, 133, false}, Event{3812, 96, 134, true},
                                        Event{10000, 0, 0, true}, Event{1'500'000, 3, 4, false}));
@@ -44,7 +44,7 @@ TEST_F(TextEvents, MicrosecondsWithoutAHeader) {
 }
 
 TEST_F(TextEvents, SizeAheadOfTheEvents) {
-  // The layout of Rebecq et al. (E2VID): a first line of width and height.
+  // The layout of E2VID [Rebecq2021]: a first line of width and height.
   const EventRecording back = read("240 180\n0.5 239 179 1\n");
   EXPECT_EQ(back.source.size, cv::Size(240, 180));
   EXPECT_THAT(back.events, ElementsAre(Event{500'000, 239, 179, true}));

@@ -1,4 +1,4 @@
-// Files of the models that seed 001's estimators make: network, classifier, Gaussian process.
+// Files of the models that the estimators of [Naeini2020] make: network, classifier, Gaussian process.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

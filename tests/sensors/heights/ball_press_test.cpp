@@ -15,7 +15,7 @@ using ::testing::HasSubstr;
 using ::testing::ThrowsMessage;
 
 constexpr double kScale = 0.053;
-constexpr double kRadius = 1.0;  // the text's ball of 2 mm
+constexpr double kRadius = 1.0;  // the ball of 2 mm of [Li2015]
 
 class BallPressTest : public ::testing::Test {
  protected:

@@ -33,7 +33,7 @@ TEST(LeaveOneOut, EachGraspIsTestedOnceAndValidationCoversAllLevels) {
   for (int test = 0; test < 48; ++test) {
     const Fold& fold = folds[static_cast<std::size_t>(test)];
     EXPECT_EQ(fold.test, test);
-    EXPECT_EQ(fold.training.size(), 42U);  // the text's
+    EXPECT_EQ(fold.training.size(), 42U);  // the paper's
     expect_partition(fold, 48);
     std::vector<double> chosen;
     for (const int i : fold.validation) chosen.push_back(levels[static_cast<std::size_t>(i)]);
@@ -53,8 +53,8 @@ TEST(LeaveOneOut, EachGraspIsTestedOnceAndValidationCoversAllLevels) {
 }
 
 TEST(LeaveOneOut, OfEachClassOneValidates) {
-  std::vector<int> labels;
-  for (int i = 0; i < 48; ++i) labels.push_back(i < 11 ? 0 : i < 20 ? 1 : i < 34 ? 2 : 3);  // the text's 48 grasps
+  std::vector<int> labels;  // of the 48 grasps of [Naeini2020]
+  for (int i = 0; i < 48; ++i) labels.push_back(i < 11 ? 0 : i < 20 ? 1 : i < 34 ? 2 : 3);
   for (const Fold& fold : folds_by_class(labels, 1)) {
     EXPECT_EQ(fold.training.size(), 43U);
     expect_partition(fold, 48);

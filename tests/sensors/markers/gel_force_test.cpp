@@ -1,4 +1,4 @@
-// Lines through samples, the model file that holds them, and the text's two ratios.
+// Lines through samples, the model file that holds them, and the two ratios of [Li2015, sec. 4.4].
 
 #include <gtest/gtest.h>
 
@@ -170,7 +170,7 @@ TEST(MotionRatio, CountsPixelsAboveTheThresholdOfSummedChannels) {
   EXPECT_EQ(cv::countNonZero(contact), 800);
   EXPECT_EQ(contact.at<std::uint8_t>(15, 53), 255);  // where the later picture has it
   EXPECT_EQ(contact.at<std::uint8_t>(15, 13), 0);
-  // Which picture comes first doesn't matter to the motion (the text's reason for the absolute value).
+  // Which picture comes first doesn't matter to the motion (the thesis's reason for the absolute value).
   EXPECT_EQ(motion_ratio(background, later, earlier).motion_px, ratio.motion_px);
 }
 

@@ -37,8 +37,8 @@ ContactPatch round_patch(const Eigen::Vector2d& centre, double radius) {
   return patch;
 }
 
-/// How far a surface goes with a disc of radius `stick` that is stuck to it, at a distance from its middle: Cattaneo's
-/// field, outside as a half space's (2/pi asin(stick/r)).
+/// How far a surface goes with a disc of radius `stick` that is stuck to it, at a distance from its middle: the field
+/// of [Cattaneo1938], outside as a half space's (2/pi asin(stick/r)).
 double part_carried(double distance, double stick) {
   return distance <= stick ? 1.0 : 2.0 / 3.14159265358979 * std::asin(stick / distance);
 }
@@ -179,7 +179,7 @@ TEST(IncipientSlip, LagGrowsAsTheStickZoneShrinks) {
 }
 
 TEST(IncipientSlip, IsFoundBeforeTheMiddleSlips) {
-  // Mindlin: under a shear load Q the stick radius is (1 - Q/(mu P))^(1/3) of the contact's; the object moves on
+  // [Mindlin1949]: under a shear load Q the stick radius is (1 - Q/(mu P))^(1/3) of the contact's; the object moves on
   // evenly.
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     IncipientSlipDetector detector(kWholePatch);

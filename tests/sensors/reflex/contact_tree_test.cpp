@@ -20,7 +20,7 @@ ChipStatistics statistics(int maximum, int squal, int minimum = 5, double averag
   return {.maximum = maximum, .minimum = minimum, .squal = squal, .average = average};
 }
 
-/// The text's eq. 2 as a tree.
+/// [Knoop2013, eq. 2] as a tree.
 ContactTree text_tree() {
   ContactTree tree;
   tree.nodes.resize(7);
@@ -32,7 +32,7 @@ ContactTree text_tree() {
   return tree;
 }
 
-/// 1000 statistics of which the text's rule holds, a part of them with the wrong label.
+/// 1000 statistics of which the paper's rule holds, a part of them with the wrong label.
 std::vector<ContactSample> samples_of_the_text(double wrong, std::uint64_t index = 0) {
   RandomStream random(1, index, Purpose::kTest);
   std::vector<ContactSample> samples;

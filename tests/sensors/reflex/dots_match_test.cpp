@@ -187,7 +187,7 @@ TEST(DotsFlow, ASmallStepIsFoundByOneSolution) {
     ASSERT_TRUE(found);
     EXPECT_NEAR(found->dilation - 1.0, 0.01, 0.003);
     EXPECT_LT((found->shift_px - step.shift_px).norm(), 0.03);
-    // The chip's dots of 1.5 px are too coarse for gradients: the text's solution is short by a third or so.
+    // The chip's dots of 1.5 px are too coarse for gradients: the solution of [Knoop2013] is short by a third or so.
     const auto short_one = dots_flow(DotsPicture(coarse.paint(DotsMotion{})), DotsPicture(coarse.paint(step)));
     ASSERT_TRUE(short_one);
     EXPECT_GT(short_one->shift_px.x(), 0.04);

@@ -57,8 +57,8 @@ TEST(ExploreTracker, FollowsAReciprocationWithoutDrift) {
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
     for (const ExploreSettings& settings : {ExploreSettings{}, text_explore_settings()}) {
       const Score score = reciprocate(settings, {.noise = 0.6, .seed = seed});
-      EXPECT_LT(score.rms_mm(), 0.12) << seed;  // the text: 0.39
-      EXPECT_LT(score.worst_mm, 0.4) << seed;   // the text: 0.80
+      EXPECT_LT(score.rms_mm(), 0.12) << seed;  // [Knoop2013]: 0.39
+      EXPECT_LT(score.worst_mm, 0.4) << seed;   // [Knoop2013]: 0.80
       EXPECT_LT(score.worst_at_rest_mm, 0.1) << seed;
       EXPECT_EQ(score.held, 0);
     }

@@ -1,4 +1,4 @@
-// Files of the models that seed 003's estimators make: reflex and explore mode.
+// Files of the models that the estimators of [Knoop2013] make: reflex and explore mode.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -73,7 +73,7 @@ TEST(LocalBinaryPattern, HandMadeNeighbourhoods) {
   EXPECT_EQ(label(60, 60, 10, 60), 3);
   EXPECT_EQ(label(60, 60, 60, 60), 4);  // a pit
   EXPECT_EQ(label(60, 10, 60, 10), 5);  // four changes: not uniform
-  EXPECT_EQ(label(50, 10, 10, 10), 1);  // equal counts as brighter, eq. 6
+  EXPECT_EQ(label(50, 10, 10, 10), 1);  // equal counts as brighter [Li2015, eq. 6]
   EXPECT_EQ(label(50, 50, 50, 50), 4);  // flat
 }
 

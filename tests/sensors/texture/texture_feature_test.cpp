@@ -77,7 +77,7 @@ TEST(TextureFeature, IsTheWeightedHistogramsOfAllLevels) {
   const Eigen::VectorXf feature = texture_feature(image, op);
   ASSERT_EQ(feature.size(), 72);
   EXPECT_NEAR(feature.squaredNorm(), 1.0, 1e-6);
-  // 196^2 + 2 96^2 + 4 46^2 + 8 21^2 weighted labels (eq. 11).
+  // 196^2 + 2 96^2 + 4 46^2 + 8 21^2 weighted labels [Li2015, eq. 11].
   const double all = 196.0 * 196 + 2.0 * 96 * 96 + 4.0 * 46 * 46 + 8.0 * 21 * 21;
   const std::vector<cv::Mat> levels = gaussian_pyramid(image, 4);
   for (int level = 0; level < 4; ++level) {

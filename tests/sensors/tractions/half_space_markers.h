@@ -8,8 +8,8 @@
 
 namespace touchstone::sensors::fixtures {
 
-/// Displacement of an incompressible half space's face, r away from a force along each axis (K. L. Johnson, Contact
-/// Mechanics, eqs. 3.19 and 3.75 with a Poisson's ratio of 1/2), times pi E.
+/// Displacement of an incompressible half space's face, r away from a force along each axis ([Johnson1985, eqs. 3.19,
+/// 3.75] with a Poisson's ratio of 1/2), times pi E.
 inline Eigen::Matrix3d half_space_answer(const Eigen::Vector2d& r) {
   const double distance = r.norm();
   Eigen::Matrix3d answer = Eigen::Matrix3d::Zero();

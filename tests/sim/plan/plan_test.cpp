@@ -117,6 +117,23 @@ TEST(Plan, ATighterToleranceCallsForInterreflection) {
   EXPECT_TRUE(make_plan(scene).interreflection);
 }
 
+// Side lengths are a slab's only; by them a coated dome or fingertip had no size and no light to give itself.
+TEST(Plan, ACoatedDomeAndFingertipGiveThemselvesLight) {
+  const std::filesystem::path devices = std::filesystem::path(TOUCHSTONE_SOURCE_DIR) / "scenes/devices";
+  SceneSpec scene;
+  scene.motion.keys = {MotionKey{}};
+  scene.effects.fine_relief = Switch::off;
+  const auto why = [&](const char* device) {
+    scene.device = read_device(devices / device);
+    return effect(make_plan(scene), "interreflection").why;
+  };
+  EXPECT_THAT(why("gelsight-dome.yaml"), HasSubstr("a coating of albedo 0.5 gives itself 0.4 % of its light back"));
+  EXPECT_THAT(why("reflex.yaml"), HasSubstr("a coating of albedo 0.04 gives itself 0.0 % of its light back"));
+  EXPECT_FALSE(make_plan(scene).interreflection) << "0.01 % may be left out";
+  scene.light.interreflection_tolerance = 1e-6;
+  EXPECT_TRUE(make_plan(scene).interreflection);
+}
+
 TEST(Plan, ALuminousProbeReflectsNothing) {
   SceneSpec scene = shipped("cycle.yaml");
   scene.light.interreflection_tolerance = 1e-12;
@@ -158,8 +175,8 @@ TEST(Plan, AVibrationAlongTheSurfaceCallsForFriction) {
 }
 
 // Under a layer that is thin against the disc nothing gets away sideways, so what comes back at once is the internal
-// diffuse reflectance of an index of 1.5, 0.596 (Duntley's formula, e.g. Walsh 1926), less the light that the shifts of
-// the last grazing angles take away.
+// diffuse reflectance of an index of 1.5, 0.596 (Duntley's formula, as in [Walsh1926]), less the light that the shifts
+// of the last grazing angles take away.
 TEST(Plan, AWideBrightDiscGetsBackTheDiffuseReflectanceOfTheFace) {
   GelSpec gel;
   gel.thickness_mm = 0.001;

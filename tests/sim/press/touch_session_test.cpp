@@ -7,8 +7,8 @@
 #include <numbers>
 
 #include "core/error.h"
+#include "sim/press/first_touch.h"
 #include "sim/press/gel_setup.h"
-#include "sim/press/touch_height.h"
 #include "tests/support/message_of.h"
 #include "tests/support/small_scene.h"
 #include "tests/support/temporary_folder.h"
@@ -153,20 +153,20 @@ TEST(TouchSession, AGelThatRelaxesForgetsItsForceAndKeepsItsSurface) {
 
 TEST(TouchHeight, IsThatOfClosedForms) {
   const Eigen::Matrix3d level = Eigen::Matrix3d::Identity();
-  EXPECT_NEAR(touch_height(device().gel, fem::SphereShape{2.5}, {1, 2}, level), 2.5, 1e-6);
+  EXPECT_NEAR(first_touch(device().gel, fem::SphereShape{2.5}, {1, 2}, level), 2.5, 1e-6);
   const double tilt = 0.3;
   const Eigen::Matrix3d tilted = Eigen::AngleAxisd(tilt, Eigen::Vector3d::UnitX()).toRotationMatrix();
-  EXPECT_NEAR(touch_height(device().gel, fem::BoxShape{{2, 3, 1}}, {0, 0}, tilted),
+  EXPECT_NEAR(first_touch(device().gel, fem::BoxShape{{2, 3, 1}}, {0, 0}, tilted),
               1.5 * std::sin(tilt) + 0.5 * std::cos(tilt), 1e-3);
   // Half of the ball beside the gel: what is over its edge touches at the ball's lowest line there.
-  EXPECT_NEAR(touch_height(device().gel, fem::SphereShape{2.0}, {7, 0}, level), std::sqrt(3.0), 1e-3);
+  EXPECT_NEAR(first_touch(device().gel, fem::SphereShape{2.0}, {7, 0}, level), std::sqrt(3.0), 1e-3);
   GelSpec dome;
   dome.shape = GelShape::dome;
   dome.sphere_radius_mm = 20;
   dome.base_radius_mm = 10;
-  EXPECT_NEAR(touch_height(dome, fem::SphereShape{3}, {4, 3}, level), std::sqrt(23.0 * 23.0 - 25.0) - 20.0, 1e-6);
+  EXPECT_NEAR(first_touch(dome, fem::SphereShape{3}, {4, 3}, level), std::sqrt(23.0 * 23.0 - 25.0) - 20.0, 1e-6);
   EXPECT_THAT(test::message_of([&] {
-                touch_height(device().gel, fem::SphereShape{1}, {20, 0}, level);
+                first_touch(device().gel, fem::SphereShape{1}, {20, 0}, level);
               }),
               HasSubstr("isn't over the gel"));
 }

@@ -61,7 +61,7 @@ TEST(MembraneCamera, GridIsTheMembrane) {
   EXPECT_NEAR(camera().behind(), 0.16 / 0.53, 1e-12);
 }
 
-// 48 x 36 mm are seen, 0.2 mm a pixel (text V.A): neighbours' places are 0.2 mm apart.
+// 48 x 36 mm are seen, 0.2 mm a pixel [Naeini2020, sec. V.A]: neighbours' places are 0.2 mm apart.
 TEST(MembraneCamera, PixelIsAFifthOfAMillimetre) {
   const DeviceSpec device = grasp_device();
   EXPECT_EQ(device.camera->width, 240);

@@ -1,0 +1,57 @@
+#include "datasets/sets/planned_draw.h"
+
+#include <algorithm>
+#include <optional>
+
+#include "datasets/sets/block_record.h"
+
+namespace touchstone::datasets {
+namespace {
+
+constexpr std::int64_t kSamplesSearched = 10'000;  // some milliseconds; jobs may have 1e12
+
+/// The outputs of a scene that has what `block_record` makes of a sample: a sensor lights and exposes a frame for
+/// each sample that has any picture, and reads height and contact from what each pixel's ray hits first.
+sim::OutputSpec outputs_of(const DrawnOutputs& wanted) {
+  sim::OutputSpec outputs;
+  outputs.frames = wanted.frame || wanted.height || wanted.contact;
+  outputs.depth = wanted.height;
+  outputs.contact = wanted.contact;
+  return outputs;
+}
+
+}  // namespace
+
+std::vector<PlannedDraw> planned_draws(const PreparedDraw& prepared) {
+  const std::size_t objects = prepared.job.draw.objects.size();
+  std::vector<std::optional<DrawnTouch>> first(objects);
+  std::size_t found = 0;
+  const std::int64_t searched = std::min(prepared.job.samples, kSamplesSearched);
+  for (std::int64_t sample = 0; sample < searched && found < objects; ++sample) {
+    const DrawnTouch touch = drawn_touch(prepared, sample);
+    std::optional<DrawnTouch>& of_object = first[static_cast<std::size_t>(touch.object)];
+    if (of_object) continue;
+    of_object = touch;
+    ++found;
+  }
+  std::vector<PlannedDraw> planned;
+  for (const std::optional<DrawnTouch>& touch : first) {
+    if (!touch) continue;
+    const DrawnUnit unit = drawn_unit(prepared, touch->unit);
+    const sim::ObjectSpec object = drawn_object(prepared, touch->object, touch->piece);
+    PlannedDraw one;
+    one.object = prepared.job.draw.objects[static_cast<std::size_t>(touch->object)].file.stem().string();
+    one.sample = touch->sample;
+    one.unit = touch->unit;
+    // Where the first touch is makes no difference to a plan, and a sample that misses the gel is drawn again.
+    const sim::MotionSpec motion =
+        sim::press_motion(press_of(*touch), 0.0, object.friction, unit.device.camera->frame_rate_Hz);
+    one.scene = sim::touch_scene(unit.device, drawn_sensor_settings(prepared, unit), object, motion);
+    one.scene.outputs = outputs_of(prepared.job.outputs);
+    one.scene.where = prepared.job.where;
+    planned.push_back(std::move(one));
+  }
+  return planned;
+}
+
+}  // namespace touchstone::datasets

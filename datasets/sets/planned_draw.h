@@ -1,0 +1,25 @@
+#pragma once
+// What a job that draws will simulate, for `touchstone plan`.
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "datasets/jobs/drawn_touch.h"
+#include "sim/scene/scene.h"
+
+namespace touchstone::datasets {
+
+/// A sample that stands for all that press the same object.
+struct PlannedDraw {
+  std::string object;  ///< the file's name without its ending
+  std::int64_t sample = 0;
+  int unit = 0;
+  sim::SceneSpec scene;  ///< as the unit's sensor plays and shows it, with the outputs that the job asks for
+};
+
+/// For each object of the job, in its order, the first sample that presses it. Objects that no sample presses, or none
+/// of the first ten thousand, are left out. @throws Error with file and line for a unit or object that can't be had
+std::vector<PlannedDraw> planned_draws(const PreparedDraw& prepared);
+
+}  // namespace touchstone::datasets

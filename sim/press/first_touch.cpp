@@ -1,0 +1,124 @@
+#include "sim/press/first_touch.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include "core/error.h"
+#include "sim/files/gltf_mesh.h"
+#include "sim/scene/device_gel.h"
+
+namespace touchstone::sim {
+namespace {
+
+constexpr int kHalf = 40;        // lines on either side of the first grid's middle
+constexpr int kFineHalf = 4;     // and of each finer one
+constexpr double kShrink = 3.0;  // of the spacing from grid to grid
+constexpr double kFinest_mm = 2e-4;
+constexpr double kMiss = -std::numeric_limits<double>::infinity();
+
+/// Height of the undeformed surface over a place; kMiss beside it.
+using Surface = std::function<double(const Eigen::Vector2d& place)>;
+
+Surface surface_of(const GelSpec& gel) {
+  if (gel.shape == GelShape::mesh) {
+    TS_ASSERT(gel.surface != nullptr);
+    return [solid = fem::MeshShape(gel.surface->mesh)](const Eigen::Vector2d& place) {
+      const auto down = fem::first_entry(solid, {place.x(), place.y(), 0.0}, -Eigen::Vector3d::UnitZ());
+      return down ? -*down : kMiss;
+    };
+  }
+  return [&gel](const Eigen::Vector2d& place) {
+    const bool on = gel.shape == GelShape::slab
+                        ? std::abs(place.x()) <= 0.5 * gel.size_x_mm && std::abs(place.y()) <= 0.5 * gel.size_y_mm
+                    : gel.shape == GelShape::dome ? place.norm() <= gel.base_radius_mm
+                                                  : place.norm() <= gel.radius_mm;
+    return on ? rest_height(gel, place) : kMiss;
+  };
+}
+
+/// The point of a body that lies farthest against the unit vector `up`, object frame; nothing where the shape has no
+/// closed form.
+std::optional<Eigen::Vector3d> lowest_point(const fem::ContactShape& shape, const Eigen::Vector3d& up) {
+  if (std::holds_alternative<fem::SphereShape>(shape)) return -std::get<fem::SphereShape>(shape).radius * up;
+  if (const auto* box = std::get_if<fem::BoxShape>(&shape)) {
+    const Eigen::Vector3d side(up.x() > 0   ? 1
+                               : up.x() < 0 ? -1
+                                            : 0,
+                               up.y() > 0   ? 1
+                               : up.y() < 0 ? -1
+                                            : 0,
+                               up.z() > 0   ? 1
+                               : up.z() < 0 ? -1
+                                            : 0);
+    return -0.5 * side.cwiseProduct(box->size);
+  }
+  if (const auto* cylinder = std::get_if<fem::RoundedCylinder>(&shape)) {
+    const double aside = up.head<2>().norm();
+    const Eigen::Vector3d outward =
+        aside > 0.0 ? Eigen::Vector3d(-up.x() / aside, -up.y() / aside, 0.0) : Eigen::Vector3d::Zero();
+    const double edge = cylinder->edge_radius;
+    const Eigen::Vector3d upper = cylinder->radius * outward + cylinder->height * Eigen::Vector3d::UnitZ();
+    if (up.z() < 0.0) return upper;
+    return (cylinder->radius - edge) * outward + edge * Eigen::Vector3d::UnitZ() - edge * up;
+  }
+  if (const auto* mesh = std::get_if<fem::MeshShape>(&shape)) {
+    const std::vector<Eigen::Vector3d>& vertices = mesh->mesh().vertices;
+    return *std::min_element(vertices.begin(), vertices.end(),
+                             [&](const auto& a, const auto& b) { return up.dot(a) < up.dot(b); });
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+double first_touch(const GelSpec& gel, const fem::ContactShape& shape, const Eigen::Vector2d& place_mm,
+                   const Eigen::Matrix3d& rotation) {
+  const Surface surface = surface_of(gel);
+  const Eigen::Matrix3d object_from_gel = rotation.transpose();
+  const Eigen::Vector3d up = object_from_gel.col(2);
+  // Of the origin, for the lowest point on the line over this place to touch.
+  const auto height_over = [&](const Eigen::Vector2d& place) {
+    const double rest = surface(place);
+    if (rest == kMiss) return kMiss;
+    const Eigen::Vector2d aside = place - place_mm;
+    const auto lowest = fem::first_entry(shape, object_from_gel * Eigen::Vector3d(aside.x(), aside.y(), 0.0), up);
+    return lowest ? rest - *lowest : kMiss;
+  };
+
+  if (gel.shape == GelShape::slab) {
+    // A plane: the body's lowest point touches first, if there is gel below it.
+    if (const auto low = lowest_point(shape, up)) {
+      const Eigen::Vector2d under = place_mm + (rotation * *low).head<2>();
+      if (surface(under) != kMiss) return -up.dot(*low);
+    }
+  }
+  const fem::BoundingBall ball = fem::bounding_ball(shape);
+  Eigen::Vector2d middle = place_mm + (rotation * ball.centre).head<2>();
+  double best = height_over(middle);
+  double spacing = ball.radius / kHalf;
+  for (int half = kHalf; spacing > kFinest_mm; half = kFineHalf, spacing /= kShrink) {
+    // Again while it pays: along a sharp rim the highest line of a grid may be far from the rim's own highest place.
+    for (bool better = true; better; half = kFineHalf) {
+      better = false;
+      const Eigen::Vector2d around = middle;
+      for (int j = -half; j <= half; ++j) {
+        for (int i = -half; i <= half; ++i) {
+          const Eigen::Vector2d place = around + spacing * Eigen::Vector2d(i, j);
+          const double height = height_over(place);
+          if (height <= best) continue;
+          best = height;
+          middle = place;
+          better = true;
+        }
+      }
+    }
+    if (best == kMiss) fail("the object isn't over the gel: place ({}, {}) mm", place_mm.x(), place_mm.y());
+  }
+  return best;
+}
+
+}  // namespace touchstone::sim

@@ -1,0 +1,225 @@
+#include "sim/sensor/coated_view.h"
+
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include "core/error.h"
+#include "core/sha256.h"
+#include "render/cameras/first_hits.h"
+#include "sim/plan/plan_direct.h"
+#include "sim/press/play_motion.h"
+#include "sim/scene/device_camera.h"
+#include "sim/scene/device_gel.h"
+#include "sim/sensor/direct_light.h"
+#include "sim/sensor/light_file.h"
+#include "sim/sensor/virtual_sensor.h"
+#include "sim/view/seen_geometry.h"
+
+namespace touchstone::sim {
+namespace {
+
+constexpr double kClearance_mm = 0.1;  // of the judged ball before its press
+constexpr int kRaysAPixel[] = {1};     // of direct light: some milliseconds a frame
+constexpr int kPathsAPixel = 256;      // where a device is unfit for direct light
+
+/// States that go as far as the light has to reach: pushed flat to the side and in.
+std::vector<Truth> farthest_states(const fem::PressState& rest, const VirtualSensorSettings& settings) {
+  std::vector<Truth> states;
+  for (const double side : {-1.0, 1.0}) {
+    Truth truth;
+    truth.press = rest;
+    truth.press.surface_displacement.col(0).setConstant(side * settings.widest_mm);
+    truth.press.surface_displacement.col(1).setConstant(side * settings.widest_mm);
+    truth.press.surface_displacement.col(2).setConstant(side < 0 ? -settings.deepest_mm : 0.1 * settings.deepest_mm);
+    states.push_back(std::move(truth));
+  }
+  return states;
+}
+
+/// A ball that shadows and shades as objects do: what the light's error is measured on.
+ObjectSpec judged_ball() {
+  constexpr double kRadius_mm = 3.0;
+  ObjectSpec ball;
+  ball.name = "ball";
+  ball.shape.radius_mm = kRadius_mm;
+  return ball;
+}
+
+MotionSpec straight_press(double from_mm, double to_mm) {
+  MotionSpec motion;
+  motion.start_mm = {0, 0, from_mm};
+  MotionKey key;
+  key.z = AxisKey{to_mm, std::nullopt};
+  motion.keys = {key};
+  return motion;
+}
+
+/// `direct`: shown by direct light, else by paths.
+SceneSpec scene_with(const DeviceSpec& device, const VirtualSensorSettings& settings, bool direct,
+                     const ObjectSpec& object, const MotionSpec& motion) {
+  SceneSpec scene;
+  scene.device = device;
+  scene.object = object;
+  scene.motion = motion;
+  scene.seed = settings.seed;
+  scene.membrane.pixel_um = settings.membrane_um;
+  scene.light.interreflection_tolerance = settings.interreflection_tolerance;
+  scene.effects.fine_relief = is_gentle(device.gel) && !object.elastic ? Switch::on : Switch::off;
+  if (settings.always_friction && object.friction > 0.0) scene.effects.friction = Switch::on;
+  scene.effects.motion_blur = Switch::off;
+  scene.effects.rolling_shutter = Switch::off;
+  scene.effects.direct_light = direct ? Switch::on : Switch::off;
+  return scene;
+}
+
+bool is_fit_for_direct_light(const DeviceSpec& device, const VirtualSensorSettings& settings) {
+  const SceneSpec any = scene_with(device, settings, false, judged_ball(), {});
+  return unfit_for_direct_light(any, make_plan(any)).empty();
+}
+
+/// Empty where the light isn't to be kept.
+std::string light_key(const VirtualSensorSettings& settings) {
+  if (settings.light_key.empty()) return {};
+  return sha256_of(fmt::format("touchstone light, format {}, {} {} {} {} {} {} {} {} {}\n{}", kLightFormat,
+                               settings.seed, settings.deepest_mm, settings.widest_mm, settings.membrane_um,
+                               settings.interreflection_tolerance, settings.always_friction, settings.edge_side,
+                               settings.guides.sectors, settings.guides.slices, settings.light_key));
+}
+
+/// A sensor works as well where its light can't be kept.
+void keep_light(const std::filesystem::path& folder, const std::string& key, const FoundLight& light) {
+  std::error_code ignored;
+  std::filesystem::create_directories(folder, ignored);
+  try {
+    write_light(folder, key, light);
+  } catch (const Error&) {
+  }
+}
+
+class CoatedView final : public SensorView {
+ public:
+  CoatedView(const DeviceSpec& device, const fem::Compliance& gel, const std::filesystem::path& cache_folder,
+             const VirtualSensorSettings& settings)
+      : device_(device), gel_(gel), settings_(settings) {
+    fit_for_direct_ = is_fit_for_direct_light(device_, settings_);
+    const SceneSpec scene = scene_with(judged_ball(), {});
+    judged_ = std::make_shared<const SceneView>(scene, make_plan(scene), gel_);
+    const double radius = judged_ball().shape.radius_mm;
+    const double above = radius + kClearance_mm;
+    rest_ = at_rest(play(straight_press(above, above)).front().press);
+    camera_ = camera_of(*device_.camera);
+    ready_ = render::make_ready(camera_);
+    rest_seen_ = judged_->geometry(rest_, {});
+    rest_hits_ = render::first_hits(rest_seen_.inside, ready_);
+    if (judged_->plan.direct_light) {
+      const std::string key = cache_folder.empty() ? "" : light_key(settings_);
+      std::optional<FoundLight> found;
+      if (!key.empty()) found = read_light(cache_folder, key);
+      if (found) {
+        direct_ = std::make_unique<const DirectLight>(*judged_, camera_, rest_, std::move(*found), settings_.edge_side);
+      } else {
+        std::vector<Truth> states = farthest_states(rest_, settings_);
+        states.push_back(play(straight_press(above, radius - 0.5 * settings_.deepest_mm)).back());
+        direct_ = std::make_unique<const DirectLight>(*judged_, camera_, states, kRaysAPixel, settings_.edge_side,
+                                                      settings_.guides);
+        if (!key.empty()) keep_light(cache_folder, key, direct_->found());
+      }
+      choice_ = direct_->choice();
+    }
+    rest_light_ = light(*judged_, rest_, {}, rest_seen_);
+  }
+
+  const Plan& plan() const override { return judged_->plan; }
+  const LightChoice& choice() const override { return choice_; }
+
+  SeenTouch see(const SeenObject& object, const fem::PressState& press, const Eigen::Vector3d&,
+                bool truth) const override {
+    const SceneView& view = view_of(object);
+    const auto relief = view.relief(press);
+    const SeenGeometry seen = view.geometry(press, relief);
+    SeenTouch touch;
+    touch.light = light(view, press, relief, seen);
+    if (!truth) return touch;
+    const std::vector<render::FirstHit> hits = render::first_hits(seen.inside, ready_);
+    const Eigen::Vector2i size = render::size_of(camera_);
+    touch.height = cv::Mat(size.y(), size.x(), CV_32F, cv::Scalar(std::numeric_limits<float>::quiet_NaN()));
+    touch.contact = cv::Mat(size.y(), size.x(), CV_8U, cv::Scalar(0));
+    for (std::size_t i = 0; i < hits.size(); ++i) {
+      const render::FirstHit& now = hits[i];
+      const render::FirstHit& before = rest_hits_[i];
+      if (now.object != 0 || before.object != 0) continue;
+      touch.height.ptr<float>()[i] = static_cast<float>(before.position.z() - now.position.z());
+      if (seen.sheet.touched[static_cast<std::size_t>(now.triangle)] >= 0) touch.contact.ptr<std::uint8_t>()[i] = 255;
+    }
+    return touch;
+  }
+
+  cv::Mat rest_light(const SeenObject*, const Eigen::Vector3d&) const override { return rest_light_; }
+
+  std::optional<Eigen::Vector2d> pixel_of(const Eigen::Vector3d& point) const override {
+    return render::project_through_faces(rest_seen_.inside, ready_, point);
+  }
+
+ private:
+  const SceneView& view_of(const SeenObject& object) const {
+    const std::lock_guard<std::mutex> lock(object.making);
+    if (!object.view) {
+      const SceneSpec scene = scene_with(object.spec, {});
+      object.view = std::make_shared<const SceneView>(scene, make_plan(scene), gel_, *judged_);
+    }
+    return *object.view;
+  }
+
+  SceneSpec scene_with(const ObjectSpec& object, const MotionSpec& motion) const {
+    return sim::scene_with(device_, settings_, fit_for_direct_, object, motion);
+  }
+
+  std::vector<Truth> play(const MotionSpec& motion) const {
+    const SceneSpec scene = scene_with(judged_ball(), motion);
+    return play_motion(scene, make_plan(scene), gel_);
+  }
+
+  /// Irradiance on the sensor. `seen` and `relief` as the view's geometry() and relief() gave them.
+  cv::Mat light(const SceneView& view, const fem::PressState& press, const std::optional<fem::ReliefAnswer>& relief,
+                const SeenGeometry& seen) const {
+    if (choice_.direct) {
+      if (auto image = direct_->render(view.seen_coating(press, seen))) return image->irradiance;
+      fail("the gel has gone beyond the {} mm in and {} mm aside that the sensor was set up for", settings_.deepest_mm,
+           settings_.widest_mm);
+    }
+    render::RenderSettings paths;
+    paths.seed = settings_.seed;
+    paths.min_samples = paths.max_samples = kPathsAPixel;
+    return view.tracer(press, relief).render(camera_, paths).irradiance;
+  }
+
+  DeviceSpec device_;
+  const fem::Compliance& gel_;
+  VirtualSensorSettings settings_;
+  bool fit_for_direct_ = false;
+  std::shared_ptr<const SceneView> judged_;  // any object's: what the device alone looks like
+  fem::PressState rest_;
+  render::Camera camera_;
+  render::ReadyCamera ready_;
+  SeenGeometry rest_seen_;
+  std::vector<render::FirstHit> rest_hits_;
+  std::unique_ptr<const DirectLight> direct_;
+  LightChoice choice_{false, "paths: the device is unfit for direct light", {}};
+  cv::Mat rest_light_;
+};
+
+}  // namespace
+
+SceneSpec coated_scene(const DeviceSpec& device, const VirtualSensorSettings& settings, const ObjectSpec& object,
+                       const MotionSpec& motion) {
+  return scene_with(device, settings, is_fit_for_direct_light(device, settings), object, motion);
+}
+
+std::unique_ptr<const SensorView> coated_view(const DeviceSpec& device, const fem::Compliance& gel,
+                                              const std::filesystem::path& cache_folder,
+                                              const VirtualSensorSettings& settings) {
+  return std::make_unique<const CoatedView>(device, gel, cache_folder, settings);
+}
+
+}  // namespace touchstone::sim

@@ -1,0 +1,143 @@
+// `touchstone plan` as a user runs it: every shipped file that says what will be simulated has a plan, every other one
+// is refused with the reason.
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <map>
+
+#include "core/whole_file.h"
+#include "tests/apps/run_program.h"
+#include "tests/support/small_draw.h"
+#include "tests/support/temporary_folder.h"
+
+namespace touchstone {
+namespace {
+
+namespace fs = std::filesystem;
+using test::ProgramRun;
+using test::run_program;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+const fs::path kScenes = fs::path(TOUCHSTONE_SOURCE_DIR) / "scenes";
+
+std::vector<fs::path> yaml_files_in(const fs::path& folder) {
+  std::vector<fs::path> files;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
+    if (entry.path().extension() == ".yaml") files.push_back(entry.path());
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+std::size_t count_of(const std::string& text, const std::string& part) {
+  std::size_t count = 0;
+  for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) ++count;
+  return count;
+}
+
+TEST(PlanCommand, PlansEachShippedFileThatSaysWhatWillBeSimulated) {
+  const fs::path device_beside_studies = kScenes / "studies" / "chroma-gel.yaml";
+  int planned = 0;
+  for (const char* folder : {"jobs", "studies", "chroma", "gelsight", "vhs"}) {
+    for (const fs::path& file : yaml_files_in(kScenes / folder)) {
+      if (file == device_beside_studies) continue;
+      const ProgramRun run = run_program({"--quiet", "plan", file.string()});
+      EXPECT_EQ(run.exit_code, 0) << file << ": " << run.err;
+      EXPECT_EQ(run.err, "") << file;
+      EXPECT_THAT(run.out, AllOf(HasSubstr("gel mechanics"), HasSubstr("camera and renderer"), HasSubstr("gel: ")))
+          << file;
+      ++planned;
+    }
+  }
+  EXPECT_EQ(planned, 7 + 4 + 1 + 5 + 8);
+}
+
+TEST(PlanCommand, SaysWhyItRefusesEachOtherShippedFile) {
+  const std::map<std::string, std::string> reasons = {
+      {"devices", "it is a device's file and doesn't say what presses it"},
+      {"objects", "it is an object's file and doesn't say what it is pressed on"},
+      {"motions", "it is a motion's file and doesn't say what is moved"},
+      {"palpation", "it is a palpation's file; `touchstone validate vhs.palpation`"},
+  };
+  const auto expect_reason = [](const fs::path& file, const std::string& reason) {
+    const ProgramRun run = run_program({"plan", file.string()});
+    test::expect_refused(run, reason);
+    EXPECT_THAT(run.err, AllOf(HasSubstr(file.string() + ": "), HasSubstr("takes scenes, jobs of scenes, jobs that "
+                                                                          "draw, and studies")));
+  };
+  for (const auto& [folder, reason] : reasons) {
+    const std::vector<fs::path> files = yaml_files_in(kScenes / folder);
+    EXPECT_FALSE(files.empty()) << folder;
+    for (const fs::path& file : files) expect_reason(file, reason);
+  }
+  expect_reason(kScenes / "studies" / "chroma-gel.yaml", reasons.at("devices"));
+  test::TemporaryFolder folder;
+  expect_reason(folder.write("fit.yaml", "name: f\ndevice: d.yaml\nunknowns: []\npresses: []\n"),
+                "it is a fit's file; `touchstone fit`");
+}
+
+TEST(PlanCommand, OfAJobThatDrawsPlansEachObject) {
+  const test::TemporaryFolder folder;
+  const fs::path job = test::write_small_draw(folder);
+  const ProgramRun run = run_program({"plan", job.string()});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("job small-draw: draws 10 samples of 2 units and 2 objects, in 4 files\n"));
+  EXPECT_THAT(run.out, AllOf(HasSubstr("\nball (sample "), HasSubstr("\npunch (sample ")));
+  // The virtual sensor's own switches, and the job's outputs: height and contact are of each pixel's first hit.
+  EXPECT_THAT(run.out, AllOf(HasSubstr("direct light            yes  the scene switches it on"),
+                             HasSubstr("motion blur             no   the scene switches it off"),
+                             HasSubstr("truth of pixels         yes")));
+  std::string text = read_whole_file(job);
+  text.replace(text.find("outputs: [frame, height, contact]"), 33, "outputs: []");
+  const ProgramRun unseen = run_program({"plan", folder.write("unseen.yaml", text).string()});
+  ASSERT_EQ(unseen.exit_code, 0) << unseen.err;
+  EXPECT_THAT(unseen.out, HasSubstr("no image is asked for: truth alone needs none"));
+}
+
+TEST(PlanCommand, RefusesAMistakeInAJobThatDrawsWithItsLine) {
+  const test::TemporaryFolder folder;
+  std::string text = test::kSmallDraw;
+  text.replace(text.find("tilt_deg"), 8, "tild_deg");
+  test::expect_refused(run_program({"plan", test::write_small_draw(folder, text).string()}),
+                       "job.yaml:18: draw: unknown key 'tild_deg'");
+}
+
+TEST(PlanCommand, OfAStudyPlansWhatEachDesignIsPutThrough) {
+  const ProgramRun beads = run_program({"plan", (kScenes / "studies" / "vhs-thickness-spacing.yaml").string()});
+  EXPECT_THAT(beads.out, AllOf(HasSubstr("study vhs-thickness-spacing: 64 designs\n"),
+                               HasSubstr("pressed with up to 5 N, pictured and tracked\n"),
+                               HasSubstr("the training's load cycle, without pictures\n"),
+                               HasSubstr("an image or a stream of events is asked for"),
+                               HasSubstr("no image is asked for: truth alone needs none")));
+  // By linear elasticity, and then at finite strain.
+  const ProgramRun presses = run_program({"plan", (kScenes / "studies" / "chroma-thickness.yaml").string()});
+  EXPECT_THAT(presses.out,
+              AllOf(HasSubstr("14 designs"), HasSubstr("with up to 1 N, linear\n"),
+                    HasSubstr("with up to 1 N, finite\n"), HasSubstr("the scene asks for neo-Hookean elasticity")));
+  EXPECT_EQ(count_of(presses.out, "linear elasticity is the default"), 1u);
+}
+
+TEST(PlanCommand, SaysThatAStudyByFormulaSimulatesNothing) {
+  const test::TemporaryFolder folder;
+  std::string text = read_whole_file(kScenes / "studies" / "chroma-thickness.yaml");
+  const auto put = [&](const std::string& from, const std::string& to) {
+    text.replace(text.find(from), from.size(), to);
+  };
+  put("device: chroma-gel.yaml", "device: " + (kScenes / "studies" / "chroma-gel.yaml").string());
+  put("../objects/ball-4mm.yaml", (kScenes / "objects" / "ball-4mm.yaml").string());
+  put("by: [formula, linear, finite]", "by: [formula]");
+  const std::string file = folder.write("formula.yaml", text).string();
+  const ProgramRun run = run_program({"plan", file});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_EQ(run.out, "study chroma-thickness: 14 designs\nby formula alone: nothing is simulated\n");
+  test::expect_refused(run_program({"plan", file, "--linear-range"}), "--linear-range: the study presses nothing");
+}
+
+}  // namespace
+}  // namespace touchstone
