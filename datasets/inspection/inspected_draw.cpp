@@ -50,6 +50,22 @@ cv::Mat picture_of(const InspectedSet& set, std::size_t sample, const std::strin
       .clone();
 }
 
+/// Between the pixels' centres; of the pixel alone where one beside it has none. @pre `at` is within the picture
+double height_at(const cv::Mat& height, const cv::Point2d& at) {
+  const auto low = [](double x, int size) {
+    return std::clamp(static_cast<int>(std::floor(x - 0.5)), 0, std::max(0, size - 2));
+  };
+  const int column = low(at.x, height.cols);
+  const int row = low(at.y, height.rows);
+  const int right = std::min(column + 1, height.cols - 1);
+  const int below = std::min(row + 1, height.rows - 1);
+  const double u = std::clamp(at.x - 0.5 - column, 0.0, 1.0);
+  const double v = std::clamp(at.y - 0.5 - row, 0.0, 1.0);
+  const double mean = (1.0 - v) * ((1.0 - u) * height.at<float>(row, column) + u * height.at<float>(row, right)) +
+                      v * ((1.0 - u) * height.at<float>(below, column) + u * height.at<float>(below, right));
+  return std::isfinite(mean) ? mean : height.at<float>(static_cast<int>(at.y), static_cast<int>(at.x));
+}
+
 void read_block(const ManifestBlock& block, InspectedSet& set, std::vector<std::array<std::int64_t, 3>>& splits,
                 std::vector<std::set<std::string>>& objects) {
   const fs::path path = set.folder / block.name;
@@ -222,12 +238,14 @@ InspectedGel drawn_gel(const InspectedSet& set, std::size_t sample) {
   if (height.empty() || !device || !device->camera || device->gel.shape == sim::GelShape::mesh) return gel;
   const cv::Mat contact = drawn_contact(set, sample);
   const GelView view(*device);
-  const auto pixel_at = [&](const Eigen::Vector3d& point) -> std::optional<cv::Point> {
+  const auto pixel_of = [](const cv::Point2d& at) {
+    return cv::Point(static_cast<int>(std::floor(at.x)), static_cast<int>(std::floor(at.y)));
+  };
+  const auto place_in_picture = [&](const Eigen::Vector3d& point) -> std::optional<cv::Point2d> {
     const auto at = view(point);
-    if (!at) return std::nullopt;
-    const cv::Point pixel(static_cast<int>(std::floor(at->x)), static_cast<int>(std::floor(at->y)));
-    if (!cv::Rect({}, height.size()).contains(pixel) || !std::isfinite(height.at<float>(pixel))) return std::nullopt;
-    return pixel;
+    if (!at || !cv::Rect({}, height.size()).contains(pixel_of(*at))) return std::nullopt;
+    if (!std::isfinite(height.at<float>(pixel_of(*at)))) return std::nullopt;
+    return at;
   };
   const sim::GelSpec& spec = device->gel;
   double half_x = 0.5 * spec.size_x_mm;
@@ -243,20 +261,20 @@ InspectedGel drawn_gel(const InspectedSet& set, std::size_t sample) {
     for (int i = 0; i < columns; ++i) {
       const Eigen::Vector2d place(-half_x + i * step, -half_y + j * step);
       const Eigen::Vector3d rest(place.x(), place.y(), sim::rest_height(spec, place));
-      // A pixel tells how deep what it sees lies; which pixel sees this point hangs on that.
+      // A pixel says how deep what it sees lies; which pixel sees this point depends on that.
       constexpr int kRounds = 4;
       double pressed = 0.0;
-      std::optional<cv::Point> pixel;
+      std::optional<cv::Point2d> at;
       for (int round = 0; round < kRounds; ++round) {
-        pixel = pixel_at(rest - pressed * Eigen::Vector3d::UnitZ());
-        if (!pixel) break;
-        pressed = height.at<float>(*pixel);
+        at = place_in_picture(rest - pressed * Eigen::Vector3d::UnitZ());
+        if (!at) break;
+        pressed = height_at(height, *at);
       }
-      if (!pixel) continue;
+      if (!at) continue;
       number[static_cast<std::size_t>(j) * columns + i] = static_cast<int>(gel.rest.size());
       gel.rest.push_back(rest);
       gel.displaced.emplace_back(rest - pressed * Eigen::Vector3d::UnitZ());
-      gel.contact.push_back(!contact.empty() && contact.at<std::uint8_t>(*pixel) != 0);
+      gel.contact.push_back(!contact.empty() && contact.at<std::uint8_t>(pixel_of(*at)) != 0);
     }
   }
   for (int j = 0; j + 1 < rows; ++j) {
