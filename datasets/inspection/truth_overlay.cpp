@@ -38,24 +38,33 @@ void outlined(cv::Mat& on, const cv::Point2d& from, const cv::Point2d& to, const
   cv::line(on, fine(from), fine(to), colour, 2, cv::LINE_AA, kFraction);
 }
 
-/// The rims of a mask that is enlarged as the picture is. A bead before the contact makes a hole in it, which is no
-/// rim.
-void draw_mask_rim(cv::Mat& on, const cv::Mat& mask, const std::vector<cv::Point2d>& beads) {
+/// A circle in the enlarged picture.
+struct Disc {
+  cv::Point2d centre;
+  double radius = 0.0;
+};
+
+/// The rims of a mask that is enlarged as the picture is, but what lies on or beside a hidden disc: a pixel that sees a
+/// bead isn't one of the mask, whatever is behind the bead.
+void draw_mask_rim(cv::Mat& on, const cv::Mat& mask, const std::vector<Disc>& hidden) {
   cv::Mat large;
   cv::resize(mask, large, on.size(), 0, 0, cv::INTER_NEAREST);
   std::vector<std::vector<cv::Point>> outlines;
-  std::vector<cv::Vec4i> tree;
-  cv::findContours(large, outlines, tree, cv::RETR_CCOMP, cv::CHAIN_APPROX_NONE);
-  std::vector<std::vector<cv::Point>> rims;
-  for (std::size_t i = 0; i < outlines.size(); ++i) {
-    const bool hole = tree[i][3] >= 0;
-    const bool of_bead = hole && std::any_of(beads.begin(), beads.end(), [&](const cv::Point2d& bead) {
-                           return cv::pointPolygonTest(outlines[i], cv::Point2f(bead), false) >= 0.0;
-                         });
-    if (!of_bead) rims.push_back(outlines[i]);
+  cv::findContours(large, outlines, cv::RETR_LIST, cv::CHAIN_APPROX_NONE);
+  const double pixel = static_cast<double>(on.cols) / mask.cols;
+  const auto is_hidden = [&](const cv::Point& at) {
+    return std::any_of(hidden.begin(), hidden.end(), [&](const Disc& disc) {
+      return cv::norm(cv::Point2d(at) - disc.centre) < disc.radius + 1.5 * pixel;
+    });
+  };
+  for (const auto& [colour, width] : {std::pair(kDark, 4), std::pair(kRim, 2)}) {
+    for (const std::vector<cv::Point>& outline : outlines) {
+      for (std::size_t i = 0; i < outline.size(); ++i) {
+        const cv::Point& next = outline[(i + 1) % outline.size()];
+        if (!is_hidden(outline[i]) && !is_hidden(next)) cv::line(on, outline[i], next, colour, width);
+      }
+    }
   }
-  cv::drawContours(on, rims, -1, kDark, 4);
-  cv::drawContours(on, rims, -1, kRim, 2);
 }
 
 /// The gel's x and y at a point as directions in the picture; nothing where the camera doesn't see it.
@@ -80,6 +89,7 @@ std::optional<std::pair<cv::Point2d, cv::Point2d>> directions_at(const Eigen::Ve
 struct GelView::Parts {
   render::Scene layers;
   render::ReadyCamera camera;
+  double bead_radius_mm = 0.0;  // 0: there are none
 };
 
 GelView::GelView(const sim::DeviceSpec& device) {
@@ -87,6 +97,7 @@ GelView::GelView(const sim::DeviceSpec& device) {
   auto parts = std::make_shared<Parts>();
   parts->layers = sim::clear_layers(device);
   parts->camera = render::make_ready(sim::camera_of(*device.camera));
+  if (device.beads) parts->bead_radius_mm = 0.5 * device.beads->diameter_mm;
   parts_ = std::move(parts);
 }
 
@@ -94,6 +105,18 @@ std::optional<cv::Point2d> GelView::operator()(const Eigen::Vector3d& point) con
   const auto pixel = render::project_through_faces(parts_->layers, parts_->camera, point);
   if (!pixel || !pixel->allFinite()) return std::nullopt;
   return cv::Point2d(pixel->x(), pixel->y());
+}
+
+std::optional<double> GelView::bead_radius_px(const Eigen::Vector3d& centre) const {
+  if (parts_->bead_radius_mm == 0.0) return std::nullopt;
+  const auto middle = (*this)(centre);
+  double radius = 0.0;
+  for (int axis = 0; axis < 2; ++axis) {
+    const auto side = (*this)(centre + parts_->bead_radius_mm * Eigen::Vector3d::Unit(axis));
+    if (!middle || !side) return std::nullopt;
+    radius = std::max(radius, cv::norm(*side - *middle));
+  }
+  return radius;
 }
 
 std::vector<std::pair<cv::Point2d, cv::Point2d>> contact_rim(const InspectedGel& gel, const GelView& view) {
@@ -153,10 +176,11 @@ cv::Mat draw_truth(const cv::Mat& picture, const InspectedSample& sample, const 
   // Pixel (0, 0) has its centre at (0.5, 0.5) and, for OpenCV's drawing, at (0, 0).
   const auto shown = [&](const cv::Point2d& at) { return cv::Point2d(scale * at.x - 0.5, scale * at.y - 0.5); };
 
-  std::vector<cv::Point2d> beads;
+  std::vector<Disc> beads;
   if (view) {
     for (const Eigen::Vector3d& bead : gel.beads) {
-      if (const auto at = (*view)(bead)) beads.push_back(shown(*at));
+      const auto at = (*view)(bead);
+      if (at) beads.push_back({shown(*at), scale * view->bead_radius_px(bead).value_or(0.0)});
     }
   }
   if (!contact.empty() && contact.size() == picture.size()) {
@@ -169,9 +193,9 @@ cv::Mat draw_truth(const cv::Mat& picture, const InspectedSample& sample, const 
     for (const auto& [from, to] : rim)
       cv::line(drawn, fine(shown(from)), fine(shown(to)), kRim, 2, cv::LINE_AA, kFraction);
   }
-  for (const cv::Point2d& bead : beads) {
-    cv::circle(drawn, fine(bead), 5 << kFraction, kDark, 4, cv::LINE_AA, kFraction);
-    cv::circle(drawn, fine(bead), 5 << kFraction, kBead, 2, cv::LINE_AA, kFraction);
+  for (const Disc& bead : beads) {
+    cv::circle(drawn, fine(bead.centre), 5 << kFraction, kDark, 4, cv::LINE_AA, kFraction);
+    cv::circle(drawn, fine(bead.centre), 5 << kFraction, kBead, 2, cv::LINE_AA, kFraction);
   }
   const Eigen::Vector3d force = sample.wrench.head<3>();
   if (view) {

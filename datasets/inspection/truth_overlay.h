@@ -18,6 +18,8 @@ class GelView {
   /// @throws Error if the device has no camera
   explicit GelView(const sim::DeviceSpec& device);
   std::optional<cv::Point2d> operator()(const Eigen::Vector3d& point) const;
+  /// How far a bead about `centre` reaches in the picture, px: nothing if the camera doesn't see it or has no beads.
+  std::optional<double> bead_radius_px(const Eigen::Vector3d& centre) const;
 
  private:
   struct Parts;
@@ -32,11 +34,10 @@ std::vector<std::pair<cv::Point2d, cv::Point2d>> contact_rim(const InspectedGel&
 Eigen::Vector3d surface_point(const InspectedGel& gel, const Eigen::Vector2d& place);
 
 /// The picture (8 bit, grey or BGR; enlarged to at least 480 px a row) with, in colour: the rim of the contact, that of
-/// `contact` (a mask of the picture's size, may be empty; it has holes where beads stand before the contact, which
-/// aren't drawn), else contact_rim; the beads' centres as circles; the gel's surface at the object's origin as a cross;
-/// the force along the gel as an arrow from there, of `arrow_px_per_N` of the enlarged picture's pixels a newton, and
-/// the force's three components in words. Where things appear is only known with `view`: without it there are the
-/// mask's rim and the words alone.
+/// `contact` (a mask of the picture's size, may be empty) but where beads hide it, else contact_rim; the beads' centres
+/// as circles; the gel's surface at the object's origin as a cross; the force along the gel as an arrow from there, of
+/// `arrow_px_per_N` of the enlarged picture's pixels a newton, and the force's three components in words. Where things
+/// appear is only known with `view`: without it there are the mask's rim and the words alone.
 cv::Mat draw_truth(const cv::Mat& picture, const InspectedSample& sample, const InspectedGel& gel,
                    const std::optional<GelView>& view, const cv::Mat& contact, double arrow_px_per_N);
 

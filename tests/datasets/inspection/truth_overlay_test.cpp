@@ -197,23 +197,28 @@ TEST_F(TruthOverlay, TheRimOfAMaskIsTheMasksOwn) {
   EXPECT_EQ(cv::countNonZero(rim & ~wide), 0) << "nothing outside it";
 }
 
-TEST_F(TruthOverlay, BeadsBeforeTheContactAreNoRim) {
+TEST_F(TruthOverlay, WhereABeadHidesTheContactThereIsNoRim) {
   InspectedGel one = gel(kSheared);
   one.beads.resize(1);
-  const cv::Point bead = bead_seen(kSheared, 0);
-  const cv::Point real(bead.x + 24, bead.y);
-  cv::Mat contact = cv::Mat::zeros(120, 160, CV_8U);
-  cv::circle(contact, bead, 36, 255, cv::FILLED);
-  cv::circle(contact, bead, 8, 0, cv::FILLED);
-  cv::circle(contact, real, 8, 0, cv::FILLED);
-  const cv::Mat rim = green(draw_truth(picture(), still(kSheared), one, *view_, contact, kArrow_px_per_N));
-  const auto around = [&](const cv::Point& place) {
-    cv::Mat disc = cv::Mat::zeros(rim.size(), CV_8U);
-    cv::circle(disc, kScale * place, kScale * 11, 255, cv::FILLED);
-    return cv::countNonZero(rim & disc);
-  };
-  EXPECT_EQ(around(bead), 0);
-  EXPECT_GT(around(real), 50) << "what isn't touched has a rim";
+  const cv::Mat bead = seen(kSheared, sim::PixelId::kFirstBead);
+  const cv::Point place = bead_seen(kSheared, 0);
+  // Once the bead stands within what touches, once at its edge.
+  for (const int off : {0, 30}) {
+    const cv::Point real(place.x + off + 14, place.y);
+    cv::Mat contact = cv::Mat::zeros(120, 160, CV_8U);
+    cv::circle(contact, place + cv::Point(off, 0), 30, 255, cv::FILLED);
+    cv::circle(contact, real, 5, 0, cv::FILLED);
+    cv::Mat whole_rim = green(draw_truth(picture(), still(kSheared), one, *view_, contact, kArrow_px_per_N));
+    contact.setTo(0, bead);
+    const cv::Mat rim = green(draw_truth(picture(), still(kSheared), one, *view_, contact, kArrow_px_per_N));
+    EXPECT_EQ(cv::countNonZero(rim != whole_rim), 0) << off << ": the bead's pixels make no difference";
+    cv::Mat about_real = cv::Mat::zeros(rim.size(), CV_8U);
+    cv::circle(about_real, kScale * real, kScale * 8, 255, cv::FILLED);
+    EXPECT_GT(cv::countNonZero(rim & about_real), 50) << off << ": what isn't touched has a rim";
+    cv::Mat on_bead;
+    cv::resize(bead, on_bead, rim.size(), 0, 0, cv::INTER_NEAREST);
+    EXPECT_EQ(cv::countNonZero(rim & on_bead), 0) << off;
+  }
 }
 
 TEST_F(TruthOverlay, WithoutTheCameraNothingIsDrawnThatWouldNeedIt) {
