@@ -75,7 +75,13 @@ constexpr const char* kViewerCode = R"(
   }
   new THREE.GLTFLoader().parse(bytes.buffer, "", function (model) {
     model.scene.traverse(function (part) {
-      if (part.isMesh) part.material.side = THREE.DoubleSide;
+      if (!part.isMesh) return;
+      part.material.side = THREE.DoubleSide;
+      // What is in contact lies on the object's own face: without this the two are seen in speckles.
+      if (part.name.replace(/_/g, " ") === "gel in contact") {
+        part.material.polygonOffset = true;
+        part.material.polygonOffsetFactor = part.material.polygonOffsetUnits = -4;
+      }
     });
     scene.add(model.scene);
     const ball = new THREE.Box3().setFromObject(model.scene).getBoundingSphere(new THREE.Sphere());
@@ -449,7 +455,7 @@ std::string inspection_page(const InspectedSet& set, const std::optional<Prepare
   std::string legend = fmt::format(
       "<p class=\"note\">Of each scene or sensor, or of some of them, the sample pressed hardest. Red: a cross where "
       "the object's origin is, and an arrow for the force along the gel on the object, {:.3g} px a newton; green: the "
-      "contact's rim; blue: the beads' centres.",
+      "contact's rim, of a set without a layer of it from the gel's mesh, to half an edge; blue: the beads' centres.",
       arrow_px_per_N);
   if (!note.empty()) legend += " Less is drawn: " + plots::escape_markup(note) + ".";
   section("Truth over frames", legend + "</p>\n" + overlays(set, job, shown, arrow_px_per_N));
