@@ -101,7 +101,7 @@ void plan_draw(const std::filesystem::path& file, bool linear_range, const Globa
     fmt::print("\n{} of the objects are in none of the samples that were searched\n", objects - planned.size());
   }
   const datasets::PlannedDraw& first = planned.front();
-  print_gel(fmt::format("unit {}: ", first.unit), first.scene.device, global);
+  print_gel(fmt::format("unit {}'s ", first.unit), first.scene.device, global);
   if (linear_range) print_linear_range(first.scene, global);
 }
 
@@ -139,14 +139,14 @@ constexpr UnplannedFile kUnplanned[] = {
 
 void plan(const std::filesystem::path& file, bool linear_range, const GlobalOptions& global) {
   const YamlReader in = YamlReader::open(file);
+  if (in.has("draw")) return plan_draw(file, linear_range, global);
+  if (in.has("scenes")) return plan_job(file, linear_range, global);
+  if (in.has("kind") || in.has("vary")) return plan_study(file, linear_range, global);
   for (const UnplannedFile& kind : kUnplanned) {
     if (!in.has(kind.key) || in.has("object")) continue;  // a scene with a key too many is refused as a scene
     fail("{}: {}; `touchstone plan` takes scenes, jobs of scenes, jobs that draw, and studies", file.string(),
          kind.words);
   }
-  if (in.has("draw")) return plan_draw(file, linear_range, global);
-  if (in.has("scenes")) return plan_job(file, linear_range, global);
-  if (in.has("kind") || in.has("vary")) return plan_study(file, linear_range, global);
   plan_scene(file, linear_range, global);
 }
 
