@@ -101,8 +101,8 @@ struct FrameServer::Parts {
     if (!frame) return answer_error(response, 503, "the camera is being stopped");
     response.set_content(
         lab::to_json(*frame->state,
-                          fmt::format("\"frame\":{},\"rate_Hz\":{},\"frames\":{},\"clients\":{},", frame->number,
-                                      camera.rate_Hz(), camera.state_count(), streams.load())) +
+                     fmt::format("\"frame\":{},\"rate_Hz\":{},\"frames\":{},\"clients\":{},", frame->number,
+                                 camera.rate_Hz(), camera.state_count(), streams.load())) +
             "\n",
         "application/json");
   }

@@ -22,7 +22,7 @@ struct Options {
 /// A job that draws its samples.
 void generate_drawn(const Options& options, const GlobalOptions& global) {
   datasets::DrawnOptions how;
-  how.source = datasets::rig_bench(global.cache);
+  how.source = datasets::virtual_sensors(global.cache);
   how.threads = global.threads;
   if (!options.shard.empty()) how.shard = datasets::shard_of(options.shard);
   datasets::DrawnReport report;

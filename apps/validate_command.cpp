@@ -90,7 +90,7 @@ void validate(Options options, const GlobalOptions& global) {
 
 void add_validate_command(CLI::App& app, const GlobalOptions& global, Action& action) {
   CLI::App* command = app.add_subcommand(
-      "validate", "PressSpec the simulator and its estimators against closed forms and published figures");
+      "validate", "Compare the simulator and its estimators with closed forms and published figures");
   auto options = std::make_shared<Options>();
   std::string known = "all";
   for (const lab::ValidationGroup& group : lab::validation_groups()) known += ", " + group.name;

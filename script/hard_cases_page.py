@@ -26,19 +26,19 @@ CASES = [
     Case("Poisson's ratio of exactly 0.5",
          "Gives the answer of a gel with 0.5 - 1e-8 to 0.5 - 1e-6: incompressibility is a limit, not a division by zero."),
     Case("Poisson's ratio from 0.3 to 0.5",
-         "Gives forces that rise smoothly and meet the closed form all the way; elements don't lock."),
+         "Gives forces that rise smoothly and meet the closed form over the whole range; elements don't lock."),
     Case("Sliver tetrahedra",
-         "Reports the mesh's smallest dihedral angle, and either gets such a mesh right or refuses it."),
+         "Reports the mesh's smallest dihedral angle, and gives right results on such a mesh or refuses it."),
     Case("A very thin layer (thinner than a tenth of the contact's radius)",
          "Meets the layer's solution in closed form, or says that the mesh doesn't resolve it."),
     Case("A sharp flat punch",
-         "Its force converges as the mesh gets finer. Its highest pressure is infinite in theory: grows, and isn't claimed."),
+         "The force converges as the mesh gets finer. The highest pressure is infinite in theory: it grows, and isn't given as a result."),
     Case("Contact at or over the pad's edge", "Gives a finite force, smaller than in the middle."),
     Case("A miss", "Gives a force of exactly zero."),
     Case("Overlap deeper than the gel", "Refuses it and says why; the press stays as it was."),
     Case("No friction (mu = 0)", "Gives the frictionless answer, bit for bit."),
     Case("Friction of mu = 5", "Converges, or says that it didn't."),
-    Case("Infinite friction", "Is the bonded limit: nothing slips, and large mu come closer to it the larger they are."),
+    Case("Infinite friction", "Is the bonded limit: nothing slips, and the larger mu is, the closer the result is to it."),
     Case("The same problem in m and Pa, in mm and MPa, and scaled by a million",
          "Gives the same answer after scaling."),
     Case("Vertices that coincide or nearly do (1e-9 mm)", "Refuses them and names the vertices."),
@@ -51,21 +51,21 @@ CASES = [
     Case("Stick-slip and reversal", "Converges as the steps are halved, and keeps the laws of contact in each."),
     Case("Uniform pressure on quadratic faces", "Gives uniform contact pressures back."),
     Case("Contact smaller than an element", "Doesn't oscillate, and warns."),
-    Case("Unloading", "Leaves no force where the material has no history."),
+    Case("Unloading", "Leaves no force if the material has no history."),
     Case("Rotation, mirror and another order of vertices",
-         "Changes nothing but the frame; the compliance is symmetric and positive definite."),
+         "Changes only the frame; the compliance is symmetric and positive definite."),
     Case("Shear at the limit of friction", "Reports gross slip, and meets any smaller shear."),
-    Case("An object moved by 1e-9 mm", "Moves its answer as little: contact doesn't chatter."),
+    Case("An object moved by 1e-9 mm", "Changes the answer as little: contact doesn't switch on and off."),
     Case("A camera inside the gel, coincident or index-matched faces, grazing light, a black membrane, a lamp in view, "
          "triangles without area, thick scattering",
          "Gives finite pictures without fireflies that make no energy (under a sky of radiance 1, loss-free scenes are 1 in "
          "every pixel), the same on any number of threads; or refuses by name."),
     Case("No light, too much light, a sensor of one pixel, no exposure",
-         "Gives black level, full well and the mean of the light, or refuses by name what no camera can be."),
+         "Gives black level, full well and the mean of the light, or refuses what no camera can be, and names it."),
     Case("Event pixels: no light, thresholds near zero, steps of 1e6 to 1, two events in a microsecond",
-         "Is silent in the dark, counts a step's events by its logarithm, and refuses thresholds that can't be."),
+         "Gives no events in the dark, counts a step's events by its logarithm, and refuses impossible thresholds."),
     Case("An estimator given frames that are black, saturated, constant or of another size",
-         "Says so, holds what it last knew, and goes on with the next good frame."),
+         "Reports it, keeps its last result, and goes on with the next good frame."),
 ]
 
 STYLE = """
@@ -175,8 +175,8 @@ def summary(cases):
     return f"{sum(holds(tests) for tests in cases)} of {len(cases)} cases hold."
 
 
-INTRO = ("Made by script/hard_cases. Each case is run by tests of tests/hard_cases, and what stands here as done was measured by "
-         "them in that run. Errors are quoted whole; a number in brackets is what the test allows.")
+INTRO = ("Made by script/hard_cases. Tests of tests/hard_cases run each case; what is written under 'ours' was measured by them in "
+         "that run. Errors are quoted in full; a number in brackets is what the test allows.")
 
 
 def to_html(cases, header):

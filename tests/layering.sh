@@ -46,11 +46,11 @@ sim/files: core fem/mesh render/spectra
 sim/relief: core fem/shapes sim/files
 sim/scene: core fem/mesh fem/elements fem/shapes fem/contact fem/fine_relief render/materials render/scene render/cameras render/imager render/events sim/files sim/relief
 sim/plan: core fem/contact fem/fine_relief fem/vibration sim/files sim/scene
-sim/press: core fem/mesh fem/elements fem/shapes fem/contact fem/finite_strain fem/error fem/vibration sim/scene sim/plan
+sim/press: core fem/mesh fem/elements fem/shapes fem/contact fem/finite_strain fem/error fem/vibration sim/files sim/scene sim/plan
 sim/view: core fem/mesh fem/elements fem/shapes fem/contact fem/fine_relief render/scene render/cameras render/paths sim/files sim/scene sim/plan
-sim/sensor: core fem/elements fem/shapes fem/contact fem/error fem/fine_relief render/spectra render/scene render/cameras render/paths render/direct render/membrane render/imager render/events sim/files sim/scene sim/plan sim/press sim/view
+sim/sensor: core fem/elements fem/shapes fem/contact fem/error fem/fine_relief fem/vibration render/spectra render/scene render/cameras render/paths render/direct render/membrane render/imager render/events sim/files sim/scene sim/plan sim/press sim/view
 sim/grasp: core fem/mesh fem/elements fem/contact fem/error fem/fine_relief fem/vibration sim/scene sim/press
-datasets/jobs: core render/lamps sim/relief sim/scene sim/plan
+datasets/jobs: core render/lamps sim/relief sim/scene sim/plan sim/press sim/sensor
 datasets/sets: core fem/elements sensors/events sim/files sim/scene sim/plan sim/press sim/view sim/sensor datasets/jobs
 datasets/exports: core sim/files datasets/sets
 datasets/inspection: core plots render/cameras sim/files sim/scene sim/plan sim/view datasets/jobs datasets/sets
@@ -66,7 +66,7 @@ lab/chroma: core plots fem/contact fem/finite_strain render/spectra render/scene
 lab/dvs: core render/membrane render/events sensors/learning sensors/events sim/scene sim/press sim/sensor sim/grasp datasets/sets lab/validation
 lab/reflex: core fem/contact fem/finite_strain render/cameras render/paths render/direct render/imager sensors/reflex sim/scene sim/plan sim/press sim/view datasets/sets lab/validation
 lab/studies: core plots fem/mesh fem/elements fem/shapes fem/contact render/sampling render/imager sensors/beads sensors/tractions sim/scene sim/plan sim/press sim/view sim/sensor datasets/jobs lab/validation lab/press lab/vhs lab/chroma
-lab/bench: core plots fem/mesh fem/elements fem/contact render/imager sim/scene sim/plan sim/view sim/sensor datasets/sets lab/statistics lab/studies
+lab/bench: core plots fem/mesh fem/elements fem/contact render/imager sim/scene sim/plan sim/press sim/view sim/sensor datasets/sets lab/statistics lab/studies
 lab/fit: core render/imager sim/files sim/relief sim/scene sim/press sim/view sim/sensor datasets/jobs datasets/inspection lab/validation lab/studies
 lab/schema: core sim/scene datasets/jobs lab/vhs lab/studies lab/fit
 apps: core plots sensors/beads sensors/heights sensors/colour sensors/tractions sensors/events sim/files sim/scene sim/plan sim/press sim/view sim/sensor datasets/jobs datasets/sets datasets/exports datasets/inspection lab/validation lab/press lab/device lab/vhs lab/gelsight lab/chroma lab/dvs lab/studies lab/bench lab/fit lab/schema

@@ -208,17 +208,20 @@ ordered_json write_units(const fs::path& folder, const fs::path& out, const Draw
     if (block.unit == last) continue;
     last = block.unit;
     const Hdf5Reader file(folder / block.name);
-    const auto background = file.read<std::uint8_t>("/background");
-    const auto& shape = background.shape;
-    const std::string picture = fmt::format("{}/{:06}.background.png", kUnits, block.unit);
     const std::string device = fmt::format("{}/{:06}.device.yaml", kUnits, block.unit);
-    sim::write_png(out / picture, picture_of(background.values, shape[0], shape[1], shape[2]));
     write_whole_file(out / device, file.read_texts("/device_yaml").at(0));
-    units.push_back({{"unit", block.unit},
-                     {"background", picture},
-                     {"background_sha256", sha256_of_file(out / picture)},
-                     {"device", device},
-                     {"device_sha256", sha256_of_file(out / device)}});
+    ordered_json unit = {{"unit", block.unit}};
+    if (file.has("/background")) {  // else no picture was asked for
+      const auto background = file.read<std::uint8_t>("/background");
+      const auto& shape = background.shape;
+      const std::string picture = fmt::format("{}/{:06}.background.png", kUnits, block.unit);
+      sim::write_png(out / picture, picture_of(background.values, shape[0], shape[1], shape[2]));
+      unit["background"] = picture;
+      unit["background_sha256"] = sha256_of_file(out / picture);
+    }
+    unit["device"] = device;
+    unit["device_sha256"] = sha256_of_file(out / device);
+    units.push_back(std::move(unit));
   }
   return units;
 }

@@ -108,7 +108,8 @@ void read_scenes(const DrawnManifest& manifest, const ordered_json& json, Inspec
       const Hdf5Reader file(path);
       scene.device_spec = device_in(file, path.string());
       if (scene.device_spec) scene.device = scene.device_spec->name;
-      for (const char* output : {"frame", "height", "contact"}) {
+      for (const char* output : {"frame", "height", "contact", "bead_displacement", "marker_displacement", "traction",
+                                 "events", "statistics"}) {
         if (file.has(output)) scene.outputs.emplace_back(output);
       }
       scene.light.emplace_back(file.text_attribute("/", "light"), 0);

@@ -31,12 +31,14 @@ table { border-collapse: collapse; font-size: 0.9em; margin: 0.6em 0; }
 th, td { text-align: left; padding: 0.25em 0.7em; border-bottom: 1px solid #ddd; vertical-align: top; }
 th { border-bottom: 2px solid #888; }
 td.number { text-align: right; font-variant-numeric: tabular-nums; }
+td:first-child { white-space: nowrap; }
+.wide { overflow-x: auto; }
 tr.off { color: #777; }
 img, svg { max-width: 100%; height: auto; }
 figure { display: inline-block; margin: 0.4em; vertical-align: top; } figcaption { font-size: 0.85em; }
 #view { width: 100%; height: 32em; background: #eef; }
 pre { background: #f6f6f6; padding: 0.8em; overflow-x: auto; font-size: 0.85em; }
-.note { color: #555; font-size: 0.9em; }
+.note { color: #555; font-size: 0.9em; overflow-wrap: anywhere; }
 )";
 
 // What the page does with three.js: turns the model that stands in it as base64 into a view to be turned by mouse.
@@ -114,6 +116,17 @@ std::string cell(const std::string& text, const char* kind = "td") {
 
 std::string number_cell(double value) {
   return fmt::format("<td class=\"number\">{:.4g}</td>", value);
+}
+
+/// A table that is scrolled by itself where it's wider than the page. @param head of its columns
+std::string table(const std::vector<std::string>& head, const std::string& rows) {
+  std::string html = "<div class=\"wide\"><table>";
+  if (!head.empty()) {
+    html += "<tr>";
+    for (const std::string& name : head) html += cell(name, "th");
+    html += "</tr>\n";
+  }
+  return html + rows + "</table></div>\n";
 }
 
 /// `count` numbers spread evenly over `first` ... `first + size - 1`, both ends among them.
@@ -254,9 +267,11 @@ const sim::DeviceSpec* device_of_sample(const InspectedSet& set, const std::opti
   return scene == nullptr ? nullptr : &scene->spec.device;
 }
 
-std::string overlays(const InspectedSet& set, const std::optional<PreparedJob>& job, int most) {
+/// @param shown samples
+std::string overlays(const InspectedSet& set, const std::optional<PreparedJob>& job,
+                     const std::vector<std::size_t>& shown, double arrow_px_per_N) {
   std::string html;
-  for (const std::size_t i : hardest(set, most)) {
+  for (const std::size_t i : shown) {
     const cv::Mat picture = inspected_frame(set, i);
     if (picture.empty()) continue;
     const InspectedSample& sample = set.samples[i];
@@ -264,55 +279,54 @@ std::string overlays(const InspectedSet& set, const std::optional<PreparedJob>& 
     if (const sim::DeviceSpec* device = device_of_sample(set, job, sample); device != nullptr && device->camera) {
       view.emplace(*device);
     }
-    html += picture_element(draw_truth(picture, sample, read_inspected_gel(set, i), view, inspected_contact(set, i)),
-                            fmt::format("{}: {} \xC2\xB1 {:.2g} N, {:.3g} mm\xC2\xB2 in contact", set.name_of_sample(i),
-                                        force_words(sample), sample.force_error.norm(), sample.contact_area));
+    html += picture_element(
+        draw_truth(picture, sample, read_inspected_gel(set, i), view, inspected_contact(set, i), arrow_px_per_N),
+        fmt::format("{}: {} \xC2\xB1 {:.2g} N, {:.3g} mm\xC2\xB2 in contact", set.name_of_sample(i),
+                    force_words(sample), sample.force_error.norm(), sample.contact_area));
   }
   return html.empty() ? "<p class=\"note\">The set has no frames.</p>\n" : html;
 }
 
 std::string plans(const InspectedSet& set) {
   // Scenes with the same effects share a table, whose reasons are those of the first of them.
-  struct Table {
-    std::string effects, rows, scenes;
+  struct Effects {
+    std::string names, rows, scenes;
   };
-  std::vector<Table> tables;
+  std::vector<Effects> tables;
   for (const InspectedScene& scene : set.scenes) {
-    Table table{{}, {}, scene.name};
+    Effects effects{{}, {}, scene.name};
     for (const sim::Effect& effect : scene.plan) {
-      table.effects += effect.name + (effect.on ? " on\n" : " off\n");
-      table.rows += fmt::format("<tr{}>{}{}{}{}</tr>\n", effect.on ? "" : " class=\"off\"", cell(effect.name),
-                                cell(effect.on ? "on" : "off"), cell(effect.why), cell(effect.cost));
+      effects.names += effect.name + (effect.on ? " on\n" : " off\n");
+      effects.rows += fmt::format("<tr{}>{}{}{}{}</tr>\n", effect.on ? "" : " class=\"off\"", cell(effect.name),
+                                  cell(effect.on ? "on" : "off"), cell(effect.why), cell(effect.cost));
     }
     const auto known =
-        std::find_if(tables.begin(), tables.end(), [&](const Table& other) { return other.effects == table.effects; });
+        std::find_if(tables.begin(), tables.end(), [&](const Effects& other) { return other.names == effects.names; });
     if (known == tables.end()) {
-      tables.push_back(std::move(table));
+      tables.push_back(std::move(effects));
     } else {
       known->scenes += ", " + scene.name;
     }
   }
   std::string html = "<p class=\"note\">Figures in the reasons are those of the first scene named.</p>\n";
-  for (const Table& table : tables) {
-    html += fmt::format("<h3>{}</h3>\n<table><tr><th>effect</th><th></th><th>why</th><th>cost</th></tr>\n{}</table>\n",
-                        plots::escape_markup(table.scenes), table.rows);
+  for (const Table& one : tables) {
+    html +=
+        fmt::format("<h3>{}</h3>\n", plots::escape_markup(one.scenes)) + table({"effect", "", "why", "cost"}, one.rows);
   }
   return html;
 }
 
 std::string scene_table(const InspectedSet& set) {
-  std::string html =
-      "<table><tr><th></th><th>split</th><th>samples</th><th>device</th><th>object</th><th>outputs</th>"
-      "<th>light</th></tr>\n";
+  std::string rows;
   for (const InspectedScene& scene : set.scenes) {
     std::string outputs, light;
     for (const std::string& output : scene.outputs) outputs += (outputs.empty() ? "" : ", ") + output;
     for (const auto& [how, samples] : scene.light)
       light += fmt::format("{}{}: {}", light.empty() ? "" : "; ", samples, how);
-    html += "<tr>" + cell(scene.name) + cell(scene.split) + number_cell(static_cast<double>(scene.samples)) +
+    rows += "<tr>" + cell(scene.name) + cell(scene.split) + number_cell(static_cast<double>(scene.samples)) +
             cell(scene.device) + cell(scene.object) + cell(outputs) + cell(light) + "</tr>\n";
   }
-  return html + "</table>\n";
+  return table({"", "split", "samples", "device", "object", "outputs", "light"}, rows);
 }
 
 /// What tells a drawn set's sensors apart.
@@ -320,28 +334,39 @@ std::string unit_table(const InspectedSet& set) {
   if (set.scenes.empty() || set.scenes.front().drawn.empty()) {
     return "<p class=\"note\">All sensors are the same.</p>\n";
   }
-  std::string html = "<table><tr><th></th>";
-  for (const auto& [path, value] : set.scenes.front().drawn) html += cell(path, "th");
-  html += "</tr>\n";
-  for (const InspectedScene& scene : set.scenes) {
-    html += "<tr>" + cell(scene.name);
-    for (const auto& [path, value] : scene.drawn) html += number_cell(value);
-    html += "</tr>\n";
+  const auto& first = set.scenes.front().drawn;
+  std::vector<std::string> head = {""};
+  std::string rows;
+  if (first.size() > set.scenes.size()) {
+    // What there is more of stands in rows: a page has more of them than columns.
+    for (const InspectedScene& scene : set.scenes) head.push_back(scene.name);
+    for (std::size_t k = 0; k < first.size(); ++k) {
+      rows += "<tr>" + cell(first[k].first);
+      for (const InspectedScene& scene : set.scenes) rows += number_cell(scene.drawn.at(k).second);
+      rows += "</tr>\n";
+    }
+  } else {
+    for (const auto& [path, value] : first) head.push_back(path);
+    for (const InspectedScene& scene : set.scenes) {
+      rows += "<tr>" + cell(scene.name);
+      for (const auto& [path, value] : scene.drawn) rows += number_cell(value);
+      rows += "</tr>\n";
+    }
   }
-  return html + "</table>\n";
+  return table(head, rows);
 }
 
 std::string timing_table(const InspectedSet& set) {
   if (set.timings.empty()) return "<p class=\"note\">The set was made without timings.</p>\n";
-  std::string html = "<table><tr><th>stage</th><th>wall seconds</th></tr>\n";
-  for (const auto& [stage, seconds] : set.timings) html += "<tr>" + cell(stage) + number_cell(seconds) + "</tr>\n";
-  return html + "</table>\n";
+  std::string rows;
+  for (const auto& [stage, seconds] : set.timings) rows += "<tr>" + cell(stage) + number_cell(seconds) + "</tr>\n";
+  return table({"stage", "wall seconds"}, rows);
 }
 
 std::string array_table(const InspectedSet& set) {
-  std::string html = "<table><tr><th>array</th><th>axes</th><th>unit</th></tr>\n";
-  for (const auto& [path, axes, unit] : set.arrays) html += "<tr>" + cell(path) + cell(axes) + cell(unit) + "</tr>\n";
-  return html + "</table>\n";
+  std::string rows;
+  for (const auto& [path, axes, unit] : set.arrays) rows += "<tr>" + cell(path) + cell(axes) + cell(unit) + "</tr>\n";
+  return table({"array", "axes", "unit"}, rows);
 }
 
 std::string view_3d(const InspectedSet& set, const std::optional<PreparedJob>& job,
@@ -417,13 +442,17 @@ std::string inspection_page(const InspectedSet& set, const std::optional<Prepare
   section(set.drawn ? "Sensors" : "Scenes", scene_table(set));
   if (set.drawn) section("What was drawn for each sensor", unit_table(set));
   section("Frames", sheet(set, options));
-  std::string legend =
-      "<p class=\"note\">Of each scene or sensor, or of some of them, the sample pressed hardest. Red: the object's "
-      "origin and the force along the "
-      "gel; "
-      "green: the contact; blue: the beads' centres.";
+  const std::vector<std::size_t> shown = hardest(set, options.most_overlays);
+  std::vector<InspectedSample> drawn_over;
+  for (const std::size_t i : shown) drawn_over.push_back(set.samples[i]);
+  const double arrow_px_per_N = arrow_scale_px_per_N(drawn_over);
+  std::string legend = fmt::format(
+      "<p class=\"note\">Of each scene or sensor, or of some of them, the sample pressed hardest. Red: a cross where "
+      "the object's origin is, and an arrow for the force along the gel on the object, {:.3g} px a newton; green: the "
+      "contact's rim; blue: the beads' centres.",
+      arrow_px_per_N);
   if (!note.empty()) legend += " Less is drawn: " + plots::escape_markup(note) + ".";
-  section("Truth over frames", legend + "</p>\n" + overlays(set, job, options.most_overlays));
+  section("Truth over frames", legend + "</p>\n" + overlays(set, job, shown, arrow_px_per_N));
   section("Forces and poses", (set.drawn ? "" : force_curves(set)) + histograms(set));
   section("Error bars", error_bars(set));
   section("3D", view_3d(set, job, viewer));

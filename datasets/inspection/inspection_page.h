@@ -32,7 +32,7 @@ std::optional<PreparedJob> job_of_set(const InspectedSet& set, const std::filesy
 std::vector<sim::GltfPart> sample_parts(const InspectedSample& sample, const InspectedGel& gel,
                                         const PreparedScene* scene);
 
-/// The page, HTML in UTF-8. Without `job` pictures are drawn over without the device's camera and the 3D view has no
+/// The page, HTML in UTF-8. Without `job` all that is drawn over pictures is the contact's mask and the 3D view has no
 /// object; without `viewer` there is no 3D view. The same set makes the same bytes.
 /// @param note what is to be told of `job`, as job_of_set said
 /// @throws Error naming a file of the set that can't be read

@@ -24,14 +24,24 @@ class GelView {
   std::shared_ptr<const Parts> parts_;
 };
 
-/// Segments of the rim of what touches, in pixels: the edges that one triangle with all corners in contact has alone.
+/// Segments of the rim of what touches, in pixels. Between a vertex that touches and one that doesn't the rim is
+/// halfway: it's known to half an edge.
 std::vector<std::pair<cv::Point2d, cv::Point2d>> contact_rim(const InspectedGel& gel, const GelView& view);
 
-/// The picture (8 bit, grey or BGR; enlarged to at least 480 px a row) with, in colour: the rim of the contact and the
-/// beads' centres, where `view` is given; the outline of `contact` (a mask of the picture's size, may be empty); the
-/// object's origin as a cross; the force on the gel's plane as an arrow from there, of a length in proportion to the
-/// force, and its three components in words.
+/// The point of the gel's displaced surface below or above `place`; of the undeformed plane z = 0 where there is none.
+Eigen::Vector3d surface_point(const InspectedGel& gel, const Eigen::Vector2d& place);
+
+/// The picture (8 bit, grey or BGR; enlarged to at least 480 px a row) with, in colour: the rim of the contact, that of
+/// `contact` (a mask of the picture's size, may be empty; it has holes where beads stand before the contact, which
+/// aren't drawn), else contact_rim; the beads' centres as circles; the gel's surface at the object's origin as a cross;
+/// the force along the gel as an arrow from there, of `arrow_px_per_N` of the enlarged picture's pixels a newton, and
+/// the force's three components in words. Where things appear is only known with `view`: without it there are the
+/// mask's rim and the words alone.
 cv::Mat draw_truth(const cv::Mat& picture, const InspectedSample& sample, const InspectedGel& gel,
-                   const std::optional<GelView>& view, const cv::Mat& contact);
+                   const std::optional<GelView>& view, const cv::Mat& contact, double arrow_px_per_N);
+
+/// How long arrows may be, so that the largest of these forces along the gel fills a quarter of a small picture's width
+/// and forces that are next to nothing stay so.
+double arrow_scale_px_per_N(const std::vector<InspectedSample>& samples);
 
 }  // namespace touchstone::datasets

@@ -14,10 +14,34 @@ constexpr double kMostPieces = 1e9;
 constexpr int kMostSamplesAFile = 1000;  // all of a file's samples are in memory at once
 constexpr double kLargestTilt_deg = 60.0;
 
+bool& wanted_of(DrawnOutputs& outputs, DrawnOutput output) {
+  switch (output) {
+    case DrawnOutput::frame:
+      return outputs.frame;
+    case DrawnOutput::height:
+      return outputs.height;
+    case DrawnOutput::contact:
+      return outputs.contact;
+    case DrawnOutput::beads:
+      return outputs.beads;
+    case DrawnOutput::markers:
+      return outputs.markers;
+    case DrawnOutput::traction:
+      return outputs.traction;
+    case DrawnOutput::events:
+      return outputs.events;
+    case DrawnOutput::statistics:
+      return outputs.statistics;
+  }
+  TS_ASSERT(false);
+}
+
 }  // namespace
 
 EnumNames<DrawnOutput> enum_names(DrawnOutput) {
-  return {{"frame", DrawnOutput::frame}, {"height", DrawnOutput::height}, {"contact", DrawnOutput::contact}};
+  return {{"frame", DrawnOutput::frame},   {"height", DrawnOutput::height},        {"contact", DrawnOutput::contact},
+          {"beads", DrawnOutput::beads},   {"markers", DrawnOutput::markers},      {"traction", DrawnOutput::traction},
+          {"events", DrawnOutput::events}, {"statistics", DrawnOutput::statistics}};
 }
 
 void fields(YamlReader& in, NumberVariation& vary) {
@@ -86,9 +110,7 @@ void fields(YamlReader& in, DrawJob& job) {
   in.required("outputs", outputs);
   job.outputs.where = in.where("outputs");
   for (const DrawnOutput output : outputs) {
-    bool& wanted = output == DrawnOutput::frame    ? job.outputs.frame
-                   : output == DrawnOutput::height ? job.outputs.height
-                                                   : job.outputs.contact;
+    bool& wanted = wanted_of(job.outputs, output);
     if (wanted) fail_at(job.outputs.where, "outputs: one stands here a second time");
     wanted = true;
   }

@@ -60,12 +60,20 @@ struct DrawSpec {
   std::optional<double> deepest_mm;                      ///< that the gel may be pressed in; default: see deepest_of
 };
 
-/// Pictures that a sample may have; the frame's own size.
+/// What a sample may have beside its wrench and pose, each as sim::Touch has it.
 struct DrawnOutputs {
-  bool frame = false, height = false, contact = false;
+  bool frame = false, height = false, contact = false;  ///< pictures of the frame's own size
+  bool beads = false, markers = false;                  ///< their true displacement
+  bool traction = false;                                ///< on the gel's surface vertices
+  bool events = false;
+  bool statistics = false;  ///< of a motion chip
   SourceLocation where;
+
+  bool pictures() const { return frame || height || contact; }
+  /// Does the sensor's camera have to be simulated?
+  bool camera() const { return pictures() || events || statistics; }
 };
-enum class DrawnOutput : std::uint8_t { frame, height, contact };
+enum class DrawnOutput : std::uint8_t { frame, height, contact, beads, markers, traction, events, statistics };
 EnumNames<DrawnOutput> enum_names(DrawnOutput);
 
 struct DrawJob {

@@ -9,6 +9,7 @@
 #include "core/transform.h"
 #include "core/units.h"
 #include "core/whole_file.h"
+#include "sim/sensor/milky_view.h"
 
 namespace touchstone::datasets {
 namespace {
@@ -57,16 +58,26 @@ Spec read_varied(const std::string& text, const std::string& file, const std::st
   }
 }
 
+/// The device can give what the job's outputs want.
+void require_outputs(const sim::DeviceSpec& device, const DrawJob& job) {
+  const DrawnOutputs& wanted = job.outputs;
+  const auto refuse = [&](const char* output, const char* missing) {
+    fail_at(wanted.where, "outputs: '{}' can't be had of device {}: it has no {}", output, device.name, missing);
+  };
+  if (wanted.camera() && !device.camera) {
+    refuse(wanted.frame ? "frame" : wanted.height ? "height" : wanted.contact ? "contact" : "events", "camera");
+  }
+  if (wanted.height && !device.coating && !sim::is_milky(device)) {
+    refuse("height", "coating, and what its camera sees first isn't its outer face");
+  }
+  if (wanted.beads && !device.beads) refuse("beads", "beads");
+  if (wanted.markers && !(device.coating && device.coating->print)) refuse("markers", "printed coating");
+  if (wanted.events && !device.camera->events) refuse("events", "event pixels (camera: events:)");
+  if (wanted.statistics && !device.camera->motion_chip) refuse("statistics", "motion chip (camera: motion_chip:)");
+}
+
 void require_touchable(const sim::DeviceSpec& device, const PreparedDraw& prepared) {
-  if (!device.camera) fail_at(device.where, "device {}: has no camera; draw needs one", device.name);
-  if (!device.coating) {
-    fail_at(device.where, "device {}: has no coating; a job that draws needs a coated gel, others need scenes",
-            device.name);
-  }
-  if (device.films || device.beads) {
-    fail_at(device.where, "device {}: has {}; a job that draws can't have it, scenes can", device.name,
-            device.films ? "films" : "beads");
-  }
+  require_outputs(device, prepared.job);
   if (!(prepared.deepest_mm < device.gel.thickness_mm)) {
     fail_at(prepared.job.where, "draw: presses of up to {} mm, but the gel of device {} is {} mm thick",
             prepared.deepest_mm, device.name, device.gel.thickness_mm);
@@ -123,7 +134,8 @@ PreparedDraw prepare_draw(const std::filesystem::path& file) {
   for (int unit = 0; unit < job.draw.units.count; ++unit) {
     const DrawnUnit drawn = drawn_unit(prepared, unit);
     require_touchable(drawn.device, prepared);
-    if (drawn.device.camera->width != device.camera->width || drawn.device.camera->height != device.camera->height) {
+    if (prepared.job.outputs.pictures() &&
+        (drawn.device.camera->width != device.camera->width || drawn.device.camera->height != device.camera->height)) {
       fail_at(job.where, "draw.units: unit {} has a picture of another size; a data set's pictures have one size",
               unit);
     }
@@ -159,9 +171,7 @@ sim::ObjectSpec drawn_object(const PreparedDraw& prepared, int object, std::int6
                       Purpose::kDrawnPiece);
   const std::string text =
       varied(prepared.object_texts[static_cast<std::size_t>(object)], name, spec.vary, random, nullptr);
-  sim::ObjectSpec read = read_varied<sim::ObjectSpec>(text, name, fmt::format("piece {} of object {}", piece, object));
-  if (read.elastic) fail_at(spec.where, "object {}: is elastic; a job that draws takes rigid ones", read.name);
-  return read;
+  return read_varied<sim::ObjectSpec>(text, name, fmt::format("piece {} of object {}", piece, object));
 }
 
 DrawnTouch drawn_touch(const PreparedDraw& prepared, std::int64_t sample, int attempt) {

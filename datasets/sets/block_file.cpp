@@ -129,6 +129,76 @@ void write_pictures(Columns& columns, const DrawnOutputs& wanted, const cv::Mat&
   }
 }
 
+void put_rows(const Eigen::MatrixX3d& rows, std::vector<double>& to) {
+  for (Eigen::Index row = 0; row < rows.rows(); ++row) {
+    for (int axis = 0; axis < 3; ++axis) to.push_back(rows(row, axis));
+  }
+}
+
+void write_places(Hdf5Writer& file, const std::string& name, const std::string& of, const std::string& meaning,
+                  const Eigen::MatrixX3d& places) {
+  std::vector<double> values;
+  put_rows(places, values);
+  file.write<double>({"/" + name, "mm", of + " x 3", "gel", meaning}, places.rows(), {3}, values);
+}
+
+/// What moves with the gel, and where it is at rest.
+void write_fields(Hdf5Writer& file, Columns& columns, const DrawnOutputs& wanted, const UnitSensor& sensor) {
+  const auto field = [&](const std::string& name, const std::string& unit, const std::string& of,
+                         const std::string& meaning, Eigen::Index rows, Eigen::MatrixX3d BlockRecord::*member) {
+    columns.many(name, unit, of + " x 3", {rows, 3}, meaning, [rows, member](const BlockRecord& r, auto& to) {
+      TS_ASSERT((r.*member).rows() == rows);
+      put_rows(r.*member, to);
+    });
+  };
+  if (wanted.beads) {
+    write_places(file, "bead_places", "beads", "of the beads' centres at rest", sensor.bead_places_mm);
+    field("bead_displacement", "mm", "beads", "of the beads", sensor.bead_places_mm.rows(), &BlockRecord::beads_mm);
+  }
+  if (wanted.markers) {
+    write_places(file, "marker_places", "markers", "of the printed markers' middles at rest", sensor.marker_places_mm);
+    field("marker_displacement", "mm", "markers", "of the gel under each printed marker's middle",
+          sensor.marker_places_mm.rows(), &BlockRecord::markers_mm);
+  }
+  if (wanted.traction) {
+    write_places(file, "gel_vertices", "vertices", "of the gel's surface at rest", sensor.gel_vertices_mm);
+    field("traction", "MPa", "vertices", "on the gel", sensor.gel_vertices_mm.rows(), &BlockRecord::traction_MPa);
+  }
+}
+
+/// Of all samples one after the other; events/count says how many are whose.
+void write_events(Hdf5Writer& file, Columns& columns, std::span<const BlockRecord> records) {
+  columns.one<std::int64_t>("events/count", "1", "of this sample's events; those of all samples stand in their order",
+                            [](const BlockRecord& r) { return static_cast<std::int64_t>(r.events.size()); });
+  std::vector<std::int64_t> t;
+  std::vector<std::uint16_t> x, y;
+  std::vector<std::uint8_t> on;
+  for (const BlockRecord& record : records) {
+    for (const Event& event : record.events) {
+      t.push_back(event.t_us);
+      x.push_back(event.x);
+      y.push_back(event.y);
+      on.push_back(event.on ? 1 : 0);
+    }
+  }
+  const auto count = static_cast<std::int64_t>(t.size());
+  file.write<std::int64_t>({"/events/t_us", "us", "events", "", "since the press's start"}, count, {}, t);
+  file.write<std::uint16_t>({"/events/x", "px", "events", "", "column"}, count, {}, x);
+  file.write<std::uint16_t>({"/events/y", "px", "events", "", "row"}, count, {}, y);
+  file.write<std::uint8_t>({"/events/on", "1", "events", "", "1 where the light grew"}, count, {}, on);
+}
+
+void write_statistics(Columns& columns) {
+  columns.many(
+      "statistics", "1", "6", {6},
+      "of the motion chip's last frame: dx, dy (counts, summed over the press), maximum, minimum, squal, average",
+      [](const BlockRecord& r, std::vector<double>& to) {
+        const ChipStatistics& s = r.statistics;
+        for (const int one : {s.dx, s.dy, s.maximum, s.minimum, s.squal}) to.push_back(one);
+        to.push_back(s.average);
+      });
+}
+
 void write_labels(Columns& columns) {
   using R = BlockRecord;
   columns.one<std::int64_t>("sample", "1", "number in the data set", [](const R& r) { return r.touch.sample; });
@@ -193,7 +263,7 @@ std::string block_name(const DrawnBlock& block) {
 }
 
 void write_block(const fs::path& out, const std::string& identity, const PreparedDraw& prepared,
-                 const DrawnBlock& block, const DrawnUnit& unit, const UnitBench& bench,
+                 const DrawnBlock& block, const DrawnUnit& unit, const UnitSensor& sensor,
                  std::span<const BlockRecord> records) {
   TS_ASSERT(static_cast<std::int64_t>(records.size()) == block.samples);
   write_whole_file(out / block_name(block), [&](const fs::path& temporary) {
@@ -204,18 +274,23 @@ void write_block(const fs::path& out, const std::string& identity, const Prepare
     file.set_attribute("job", prepared.job.name);
     if (!prepared.job.licence.empty()) file.set_attribute("licence", prepared.job.licence);
     file.set_attribute("unit", std::int64_t{unit.number});
-    file.set_attribute("light", bench.light);
+    file.set_attribute("light", sensor.light);
     file.write_texts({"/device_yaml", "1", "1", "", "the unit's device file, as drawn"}, {unit.text});
     std::vector<std::string> names;
     for (const DrawnObjectSpec& object : prepared.job.draw.objects) names.push_back(object.file.stem().string());
     file.write_texts({"/object_name", "1", "objects", "", "of the number in /object"}, names);
-    const std::vector<std::uint8_t> background = bytes_of(bench.background);
-    const std::int64_t channels = bench.background.channels();
-    file.write<std::uint8_t>({"/background", "DN", channels == 3 ? "row x column x rgb" : "row x column x grey", "",
-                              "the unit's frame untouched, with its noise"},
-                             bench.background.rows, {bench.background.cols, channels}, background);
     Columns columns(file, records);
-    write_pictures(columns, prepared.job.outputs, bench.background);
+    const DrawnOutputs& wanted = prepared.job.outputs;
+    if (!sensor.background.empty()) {
+      const std::int64_t channels = sensor.background.channels();
+      file.write<std::uint8_t>({"/background", "DN", channels == 3 ? "row x column x rgb" : "row x column x grey", "",
+                                "the unit's frame untouched, with its noise"},
+                               sensor.background.rows, {sensor.background.cols, channels}, bytes_of(sensor.background));
+      write_pictures(columns, wanted, sensor.background);
+    }
+    write_fields(file, columns, wanted, sensor);
+    if (wanted.events) write_events(file, columns, records);
+    if (wanted.statistics) write_statistics(columns);
     write_labels(columns);
     file.close([&](std::string_view rest) { return head_of(identity, block, sha256_of(rest)); });
   });

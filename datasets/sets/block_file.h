@@ -20,7 +20,7 @@ std::string block_name(const DrawnBlock& block);
 /// Writes a block so that it's there whole or not at all. `identity` stands for the run (run_checksum). Pictures are
 /// packed by many threads; the same samples give the same bytes. Not from several threads at once.
 void write_block(const std::filesystem::path& out, const std::string& identity, const PreparedDraw& prepared,
-                 const DrawnBlock& block, const DrawnUnit& unit, const UnitBench& bench,
+                 const DrawnBlock& block, const DrawnUnit& unit, const UnitSensor& sensor,
                  std::span<const BlockRecord> records);
 
 enum class BlockState {

@@ -21,11 +21,17 @@ RunIdentity light_identity(const PreparedDraw& prepared) {
   return identity;
 }
 
+Eigen::MatrixX3d rows_of(const std::vector<Eigen::Vector3d>& points) {
+  Eigen::MatrixX3d rows(static_cast<Eigen::Index>(points.size()), 3);
+  for (std::size_t k = 0; k < points.size(); ++k) rows.row(static_cast<Eigen::Index>(k)) = points[k].transpose();
+  return rows;
+}
+
 BlockRecord pressed(const PreparedDraw& prepared, const sim::VirtualSensor& sensor, const sim::TouchObject& object,
                     const DrawnTouch& touch) {
   const DrawnOutputs& wanted = prepared.job.outputs;
   sim::TouchOptions options;
-  options.picture = wanted.frame || wanted.height || wanted.contact;
+  options.picture = wanted.camera();
   options.truth = wanted.height || wanted.contact;
   options.noise_seed = touch.seed;
   const sim::Touch seen = sensor.press(object, press_of(touch), options);
@@ -42,6 +48,11 @@ BlockRecord pressed(const PreparedDraw& prepared, const sim::VirtualSensor& sens
   if (wanted.frame) record.frame = seen.frame;
   if (wanted.height) record.height = seen.height;
   if (wanted.contact) record.contact = seen.contact;
+  if (wanted.beads) record.beads_mm = press.bead_displacement;
+  if (wanted.markers) record.markers_mm = seen.marker_displacement;
+  if (wanted.traction) record.traction_MPa = press.traction;
+  if (wanted.events) record.events = seen.events;
+  if (wanted.statistics) record.statistics = seen.statistics.value();
   return record;
 }
 
@@ -60,24 +71,31 @@ sim::VirtualSensorSettings drawn_sensor_settings(const PreparedDraw& prepared, c
   return settings;
 }
 
-BenchSource rig_bench(const std::filesystem::path& cache_folder) {
+SensorSource virtual_sensors(const std::filesystem::path& cache_folder) {
   return [cache_folder](const PreparedDraw& prepared, const DrawnUnit& unit) {
     sim::VirtualSensorSettings settings = drawn_sensor_settings(prepared, unit);
     settings.light_key = to_json(light_identity(prepared)) + unit.text;
     sim::keep_gel_of_unit_modulus(unit.device, cache_folder);
     const auto sensor = std::make_shared<const sim::VirtualSensor>(unit.device, cache_folder, settings);
-    UnitBench bench;
-    bench.light = sensor->light().reason;
-    bench.background = sensor->background(unit.seed, kBackgroundFrame);
-    bench.press = [&prepared, sensor](const DrawnTouch& touch, const sim::ObjectSpec& object) {
-      const sim::TouchObject on_rig = sensor->object(object);  // what the sensor can't take at all isn't drawn again
+    UnitSensor made;
+    const DrawnOutputs& wanted = prepared.job.outputs;
+    made.light = "none: no picture is asked for";
+    if (wanted.camera()) {
+      made.light = sensor->light().reason;
+      made.background = sensor->background(unit.seed, kBackgroundFrame);
+    }
+    if (wanted.beads) made.bead_places_mm = rows_of(sim::bead_centres(unit.device.beads.value()));
+    if (wanted.markers) made.marker_places_mm = sensor->marker_places_mm();
+    if (wanted.traction) made.gel_vertices_mm = rows_of(sensor->gel().vertices);
+    made.press = [&prepared, sensor](const DrawnTouch& touch, const sim::ObjectSpec& object) {
+      const sim::TouchObject touching = sensor->object(object);  // what can't be taken at all isn't drawn again
       try {
-        return pressed(prepared, *sensor, on_rig, touch);
+        return pressed(prepared, *sensor, touching, touch);
       } catch (const Error& error) {
         throw Unpressable(error.what());
       }
     };
-    return bench;
+    return made;
   };
 }
 

@@ -6,8 +6,11 @@
 #include <memory>
 #include <opencv2/core/mat.hpp>
 #include <string>
+#include <vector>
 
 #include "core/error.h"
+#include "core/frame.h"
+#include "core/motion_chip.h"
 #include "datasets/jobs/drawn_touch.h"
 #include "sim/sensor/virtual_sensor.h"
 
@@ -26,6 +29,11 @@ struct BlockRecord {
   double deepest_mm = 0.0;  ///< that the surface is pressed in
   double largest_strain = 0.0;
   bool under_resolved = false;  ///< see fem::PressState
+  Eigen::MatrixX3d beads_mm;    ///< displacements, a row a bead, marker or vertex
+  Eigen::MatrixX3d markers_mm;
+  Eigen::MatrixX3d traction_MPa;
+  std::vector<Event> events;
+  ChipStatistics statistics;
 };
 
 /// A touch that mechanics or light can't do: beside the gel, too deep, a shear that friction can't hold.
@@ -34,21 +42,22 @@ class Unpressable : public Error {
   using Error::Error;
 };
 
-/// A unit on its bench. `press` is a pure function of the unit, the touch and the object, and may be called from many
-/// threads at once. @throws Unpressable; the sample is then drawn again. Other errors end the run
-struct UnitBench {
+/// A unit set up for pressing. `press` is a pure function of the unit, the touch and the object, and may be called from
+/// many threads at once. @throws Unpressable; the sample is then drawn again. Other errors end the run
+struct UnitSensor {
   std::string light;   ///< how its pictures are lit, and how far that is off
-  cv::Mat background;  ///< its frame untouched, as `frame`; with the imager's noise
+  cv::Mat background;  ///< its frame untouched, as `frame`; with the imager's noise; empty where no picture is wanted
+  Eigen::MatrixX3d bead_places_mm, marker_places_mm, gel_vertices_mm;  ///< at rest, of those that are wanted
   std::function<BlockRecord(const DrawnTouch& touch, const sim::ObjectSpec& object)> press;
 };
 
 /// What a drawn data set's samples come from: the simulator, or in tests something quicker.
-using BenchSource = std::function<UnitBench(const PreparedDraw& prepared, const DrawnUnit& unit)>;
+using SensorSource = std::function<UnitSensor(const PreparedDraw& prepared, const DrawnUnit& unit)>;
 
 /// How a unit's sensor is set up. Its light isn't kept (sim::VirtualSensorSettings::light_key).
 sim::VirtualSensorSettings drawn_sensor_settings(const PreparedDraw& prepared, const DrawnUnit& unit);
 
 /// sim::VirtualSensor, with set-up results kept in `cache_folder`.
-BenchSource rig_bench(const std::filesystem::path& cache_folder);
+SensorSource virtual_sensors(const std::filesystem::path& cache_folder);
 
 }  // namespace touchstone::datasets

@@ -255,12 +255,12 @@ void merge(const PreparedDraw& prepared, const Folder& folder, const Progress& p
 }
 
 /// Sample by sample: a touch that can't be pressed is drawn again.
-BlockRecord make_record(const PreparedDraw& prepared, const UnitBench& bench, std::int64_t sample) {
+BlockRecord make_record(const PreparedDraw& prepared, const UnitSensor& sensor, std::int64_t sample) {
   for (int attempt = 0;; ++attempt) {
     const DrawnTouch touch = drawn_touch(prepared, sample, attempt);
     const sim::ObjectSpec object = drawn_object(prepared, touch.object, touch.piece);
     try {
-      return bench.press(touch, object);
+      return sensor.press(touch, object);
     } catch (const Unpressable& error) {
       if (attempt + 1 < kMostAttempts) continue;
       fail("sample {}: {} draws in a row couldn't be pressed; the last one: {} of place ({:.3g}, {:.3g}) mm: {}",
@@ -312,7 +312,7 @@ DrawnReport generate_drawn(const fs::path& job_file, const fs::path& out, const 
   }
   is_begun(folder);
   begin(folder);
-  std::unique_ptr<UnitBench> bench;
+  std::unique_ptr<UnitSensor> sensor;
   std::optional<DrawnUnit> unit;
   std::atomic<std::int64_t> done{0};
   for (std::size_t k = first; k < end; ++k) {
@@ -327,23 +327,23 @@ DrawnReport generate_drawn(const fs::path& job_file, const fs::path& out, const 
     }
     auto clock = std::chrono::steady_clock::now();
     if (!unit || unit->number != block.unit) {
-      bench.reset();
+      sensor.reset();
       unit = drawn_unit(prepared, block.unit);
       if (progress) progress(fmt::format("unit {}", block.unit), block.unit, prepared.job.draw.units.count);
-      bench = std::make_unique<UnitBench>(options.source(prepared, *unit));
+      sensor = std::make_unique<UnitSensor>(options.source(prepared, *unit));
       report.set_up_s += seconds_since(clock);
       clock = std::chrono::steady_clock::now();
     }
     std::vector<BlockRecord> records(static_cast<std::size_t>(block.samples));
     tbb::parallel_for(std::size_t{0}, records.size(), [&](std::size_t i) {
-      records[i] = make_record(prepared, *bench, block.first_sample + static_cast<std::int64_t>(i));
+      records[i] = make_record(prepared, *sensor, block.first_sample + static_cast<std::int64_t>(i));
       const std::int64_t now = ++done;
       if (progress) progress("samples", now, report.samples);
     });
     for (const BlockRecord& record : records) report.drawn_again += record.touch.attempt;
     report.press_s += seconds_since(clock);
     clock = std::chrono::steady_clock::now();
-    write_block(out, folder.checksum, prepared, block, *unit, *bench, records);
+    write_block(out, folder.checksum, prepared, block, *unit, *sensor, records);
     report.write_s += seconds_since(clock);
     report.made += block.samples;
   }

@@ -26,7 +26,7 @@ struct Shard {
 Shard shard_of(const std::string& text);
 
 struct DrawnOptions {
-  BenchSource source;
+  SensorSource source;
   int threads = 0;  ///< at most so many; 0: as many as the machine has
   Shard shard;      ///< 1 of 1: everything, and then what merge_drawn does
 };

@@ -16,9 +16,9 @@
 #include "sim/press/gel_setup.h"
 #include "sim/press/play_motion.h"
 #include "sim/scene/device_camera.h"
+#include "sim/scene/device_imager.h"
 #include "sim/scene/scene.h"
 #include "sim/view/scene_view.h"
-#include "sim/scene/device_imager.h"
 
 namespace touchstone::lab {
 namespace {

@@ -66,7 +66,7 @@ py::dict generate(const std::string& job, const std::string& out, int threads, b
   const std::filesystem::path kept_in = cache.empty() ? sim::default_cache_folder() : std::filesystem::path(cache);
   if (datasets::is_draw_job_file(job)) {
     datasets::DrawnOptions how;
-    how.source = datasets::rig_bench(kept_in);
+    how.source = datasets::virtual_sensors(kept_in);
     how.threads = threads;
     if (!shard.empty()) how.shard = datasets::shard_of(shard);
     return dict_of(unlocked([&] { return datasets::generate_drawn(job, out, how, listener); }));

@@ -33,7 +33,20 @@ class _Block:
             self._kept[name] = self.array(name)[()]
         return self._kept[name]
 
+    def events(self, k):
+        """Sample k's events, a structured array as Touch.events has it."""
+        import numpy
+        ends = numpy.cumsum(self._whole("events/count"))
+        first, end = (ends[k - 1] if k > 0 else 0), ends[k]
+        dtype = [("t_us", "i8"), ("x", "u2"), ("y", "u2"), ("on", "?")]
+        records = numpy.empty(end - first, dtype)
+        for name, _ in dtype:
+            records[name] = self.array(f"events/{name}")[first:end]
+        return records
+
     def row(self, name, k):
+        if name == "events":
+            return self.events(k)
         array = self.array(name)
         if name == "frame":
             return _as_opencv(array[k])
@@ -123,7 +136,7 @@ class DrawnFiles(SetFiles):
         return sorted(self._described())
 
     def check_column(self, name):
-        if name == "background":
+        if name == "background" or name == "events" and "events/count" in self._described():
             return
         a_row_a_sample, _, _ = self._of(name)
         if not a_row_a_sample:
@@ -141,6 +154,8 @@ class DrawnFiles(SetFiles):
             array = self._block(0).array(name)
             shape = self.read(name, 0).shape
             return numpy.empty((0, *shape), array.dtype)
+        if name == "events":  # of as many as each sample has
+            return [self.read(name, row) for row in rows]
         result = None
         for place, row in enumerate(rows):
             value = self.read(name, row)
@@ -152,6 +167,8 @@ class DrawnFiles(SetFiles):
     def constant(self, name):
         if name == "object_name":
             return self._block(0).text(name)
+        if name in ("bead_places", "marker_places", "gel_vertices") and name in self._described():
+            return self._block(0).array(name)[()]
         self._of(name)
         raise Error(f"'{name}' of {self.folder} isn't the same for all samples; use array(), background(unit) or "
                     "device_yaml(unit)")

@@ -51,6 +51,7 @@ std::vector<FirstHit> first_hits(const Scene& scene, const ReadyCamera& camera) 
 
 std::optional<Eigen::Vector2d> project_through_faces(const Scene& scene, const ReadyCamera& camera,
                                                      const Eigen::Vector3d& point) {
+  check_faces(scene);
   const RigidTransform& pose = pose_of(camera);
   const Eigen::Vector3d eye = pose.translation;
   const Eigen::Vector3d way = point - eye;

@@ -29,6 +29,7 @@ std::vector<FirstHit> first_hits(const Scene& scene, const ReadyCamera& camera);
 /// whatever stands in between: p = n sin(angle) is the same in all layers (Snell), and the layers' ways across must add
 /// up to the point's distance from the camera's plumb line. nullopt if it's behind the camera, or level with it and not
 /// in its layer, or so far aside that no image point looks there (image_point).
+/// @throws Error as check_faces: the faces' media must be in the scene
 std::optional<Eigen::Vector2d> project_through_faces(const Scene& scene, const ReadyCamera& camera,
                                                      const Eigen::Vector3d& point);
 

@@ -12,6 +12,10 @@
 
 namespace touchstone::render {
 
+/// Throws Error if a face names a medium that the scene doesn't have, or stands below the one before it, or the two
+/// don't agree on the medium between them.
+void check_faces(const Scene& scene);
+
 /// The number of a height's layer: that of the faces below it.
 inline int layer_of_height(const std::vector<FlatFace>& faces, double z) {
   int layer = 0;

@@ -7,6 +7,7 @@
 
 #include "core/error.h"
 #include "render/materials/layer_connection.h"
+#include "render/scene/flat_faces.h"
 #include "render/scene/scene_limits.h"
 
 namespace touchstone::render {
@@ -165,6 +166,37 @@ void check_mesh(const TriangleMesh& mesh, const std::string& what) {
 
 }  // namespace
 
+void check_faces(const Scene& scene) {
+  if (scene.media.empty()) fail("scene: no medium; media[0] fills the space");
+  if (scene.faces.size() > kMaxLayers - 3) {
+    fail("scene: {} flat faces; {} are allowed", scene.faces.size(), kMaxLayers - 3);
+  }
+  // Words are only put together where they are needed: points are projected by the million.
+  const auto check_medium = [&](int medium, std::size_t face, const char* side) {
+    const auto count = static_cast<int>(scene.media.size());
+    if (medium < 0 || medium >= count) {
+      fail("face {}: {} is medium {}; the scene has media 0 to {}", face, side, medium, count - 1);
+    }
+  };
+  for (std::size_t i = 0; i < scene.faces.size(); ++i) {
+    const FlatFace& face = scene.faces[i];
+    if (!(std::abs(face.z) <= kFarthest)) {
+      fail("face {}: z is {} mm; it must be within 100 m of the origin", i, face.z);
+    }
+    check_medium(face.medium_below, i, "medium_below");
+    check_medium(face.medium_above, i, "medium_above");
+    if (i == 0) continue;
+    const FlatFace& below = scene.faces[i - 1];
+    if (face.z < below.z) {
+      fail("face {}: z is {}; faces run from low to high and the one before is at {}", i, face.z, below.z);
+    }
+    if (face.medium_below != below.medium_above) {
+      fail("face {}: medium_below is {}; the face below it ends in medium {}", i, face.medium_below,
+           below.medium_above);
+    }
+  }
+}
+
 void check_scene(const Scene& scene) {
   const Eigen::Index bands = scene.environment.size();
   if (bands < 1) fail("scene: the environment has no band; give a radiance (0 for darkness) for each band");
@@ -186,23 +218,7 @@ void check_scene(const Scene& scene) {
     }
   }
 
-  if (scene.faces.size() > kMaxLayers - 3) {
-    fail("scene: {} flat faces; {} are allowed", scene.faces.size(), kMaxLayers - 3);
-  }
-  for (std::size_t i = 0; i < scene.faces.size(); ++i) {
-    const FlatFace& face = scene.faces[i];
-    const std::string what = fmt::format("face {}", i);
-    if (!(std::abs(face.z) <= kFarthest)) fail("{}: z is {} mm; it must be within 100 m of the origin", what, face.z);
-    check_medium_index(face.medium_below, scene, what + ": medium_below");
-    check_medium_index(face.medium_above, scene, what + ": medium_above");
-    if (i == 0) continue;
-    const FlatFace& below = scene.faces[i - 1];
-    if (face.z < below.z)
-      fail("{}: z is {}; faces run from low to high and the one before is at {}", what, face.z, below.z);
-    if (face.medium_below != below.medium_above) {
-      fail("{}: medium_below is {}; the face below it ends in medium {}", what, face.medium_below, below.medium_above);
-    }
-  }
+  check_faces(scene);
 
   for (std::size_t i = 0; i < scene.surfaces.size(); ++i) {
     const std::string what = fmt::format("surface {}", i);

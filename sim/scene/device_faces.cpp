@@ -7,4 +7,13 @@ std::vector<render::FlatFace> flat_faces(const DeviceSpec& device) {
           {-device.gel.thickness_mm, kPlate, kGel}};
 }
 
+render::Scene clear_layers(const DeviceSpec& device) {
+  render::Scene layers;
+  layers.media.resize(3);
+  layers.media[kPlate].index = device.plate.refractive_index;
+  layers.media[kGel].index = device.gel.refractive_index;
+  layers.faces = flat_faces(device);
+  return layers;
+}
+
 }  // namespace touchstone::sim

@@ -14,4 +14,8 @@ enum MediumIndex { kAir = 0, kPlate = 1, kGel = 2 };
 /// Where air, plate and gel meet.
 std::vector<render::FlatFace> flat_faces(const DeviceSpec& device);
 
+/// Air, plate and gel, clear and with nothing in them: how light bends in front of a device, and no more. It has no
+/// bands.
+render::Scene clear_layers(const DeviceSpec& device);
+
 }  // namespace touchstone::sim

@@ -8,8 +8,8 @@
 #include "render/imager/imager.h"
 #include "sim/plan/image_motion.h"
 #include "sim/scene/device_camera.h"
-#include "sim/view/scene_view.h"
 #include "sim/scene/device_imager.h"
+#include "sim/view/scene_view.h"
 
 namespace touchstone::sim {
 namespace {

@@ -322,6 +322,10 @@ void VirtualSensor::add_truth(const fem::PressState& press, const fem::PressErro
   touch.marker_displacement = marker_displacement(parts_->markers, *parts_->gel, press);
 }
 
+const Eigen::MatrixX3d& VirtualSensor::marker_places_mm() const {
+  return parts_->markers.rest_mm;
+}
+
 cv::Mat VirtualSensor::background(std::uint64_t noise_seed, int frame) const {
   const Sight& by = parts_->sight();
   if (!parts_->has_chip()) return parts_->develop(by.rest_light, noise_seed, frame);

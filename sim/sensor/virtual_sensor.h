@@ -140,6 +140,8 @@ class VirtualSensor {
                 bool truth = true) const;
   /// Fills in what mechanics says of a state: press, error, markers.
   void add_truth(const fem::PressState& press, const fem::PressError& error, Touch& touch) const;
+  /// As Touch::markers_mm.
+  const Eigen::MatrixX3d& marker_places_mm() const;
   /// The frame of the untouched device.
   cv::Mat background(std::uint64_t noise_seed, int frame = 0) const;
   /// The light of the untouched device.

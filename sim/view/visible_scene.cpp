@@ -208,16 +208,12 @@ render::Scene scene_without_surface(const SceneSpec& scene, const Plan& plan, co
                                     const std::vector<RigidTransform>& poses, const fem::PressState& press) {
   const DeviceSpec& device = scene.device;
   const SceneBands& bands = plan.bands;
-  render::Scene out;
-  out.media.resize(3);
-  out.media[kPlate].index = device.plate.refractive_index;
-  out.media[kGel].index = device.gel.refractive_index;
+  render::Scene out = clear_layers(device);
   out.media[kGel].absorption = in_bands(device.gel.absorption_per_mm, bands, "gel.absorption_per_mm");
   if (plan.scattering) {
     out.media[kGel].scattering = in_bands(device.gel.scattering_per_mm, bands, "gel.scattering_per_mm");
     out.media[kGel].anisotropy = device.gel.scattering_anisotropy;
   }
-  out.faces = flat_faces(device);
   out.surfaces.push_back(
       {gel_walls(device.gel), render::Lambertian{in_bands(device.gel.frame_albedo, bands, "gel.frame_albedo")}});
   const std::vector<MovedObject> all = moved_objects(scene);

@@ -40,6 +40,18 @@ class InspectPage : public ::testing::Test {
     delete html_;
     delete folder_;
   }
+  /// Runs chromium on a page of `folder`, its profile and picture there: its document on standard output.
+  static ProgramRun browse(const std::filesystem::path& folder, const std::string& page) {
+    return run_words(
+        {"/bin/sh", "-c",
+         "HOME=\"$1\" timeout 900 chromium --headless --no-sandbox --disable-dev-shm-usage --use-angle=swiftshader "
+         "--enable-unsafe-swiftshader --enable-logging=stderr --user-data-dir=\"$1/profile\" "
+         "--window-size=800,600 --virtual-time-budget=20000 --screenshot=\"$1/page.png\" --dump-dom "
+         "\"file://$1/$2\"",
+         "sh", folder.string(), page});
+  }
+  static bool has_browser() { return run_words({"/bin/sh", "-c", "command -v chromium"}).exit_code == 0; }
+
   static std::string path(const std::string& name) { return (folder_->path() / name).string(); }
   static int count(const std::string& text) {
     int found = 0;
@@ -134,17 +146,38 @@ TEST_F(InspectPage, RefusesWhatIsNotTheSetsOwn) {
 
 TEST_F(InspectPage, ShowsInABrowserWithoutErrors) {
   if (html_->find("id=\"model\"") == std::string::npos) GTEST_SKIP() << "built without three.js";
-  if (run_words({"/bin/sh", "-c", "command -v chromium"}).exit_code != 0) GTEST_SKIP() << "there is no chromium";
-  const ProgramRun run = run_words(
-      {"/bin/sh", "-c",
-       "HOME=\"$1\" timeout 900 chromium --headless --no-sandbox --disable-dev-shm-usage --use-angle=swiftshader "
-       "--enable-unsafe-swiftshader --enable-logging=stderr --user-data-dir=\"$1/profile\" "
-       "--window-size=800,600 --virtual-time-budget=20000 --screenshot=\"$1/page.png\" --dump-dom "
-       "\"file://$1/page.html\"",
-       "sh", folder_->path().string()});
+  if (!has_browser()) GTEST_SKIP() << "there is no chromium";
+  const ProgramRun run = browse(folder_->path(), "page.html");
   ASSERT_EQ(run.exit_code, 0) << run.err;
   EXPECT_THAT(run.out, HasSubstr("data-ready=\"yes\"")) << "the model was read and drawn";
   EXPECT_THAT(run.err, Not(HasSubstr("CONSOLE"))) << "the page has said something";
+}
+
+// A drawn set's sensors may differ in many numbers.
+TEST_F(InspectPage, IsNoWiderThanItsWindow) {
+  if (!has_browser()) GTEST_SKIP() << "there is no chromium";
+  const TemporaryFolder folder;
+  std::string draw = test::kSmallDraw;
+  draw.replace(draw.find("power_W'"), 8, "power_W[*]'");
+  const std::string job = test::write_small_draw(folder, draw).string();
+  const auto at = [&](const std::string& name) { return (folder.path() / name).string(); };
+  const ProgramRun made = run_program({"--quiet", "--cache", at("cache"), "generate", job, "-o", at("set")});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  ASSERT_EQ(run_program({"inspect", at("set"), "-o", at("page.html")}).exit_code, 0);
+  for (const auto& [page, where] :
+       {std::pair(path("page.html"), folder_->path()), std::pair(at("page.html"), folder.path())}) {
+    std::string html = read_whole_file(page);
+    const std::string end = "</body>";
+    html.replace(html.rfind(end), end.size(),
+                 "<script>document.body.setAttribute('data-beyond', document.documentElement.scrollWidth - "
+                 "document.documentElement.clientWidth);</script></body>");
+    write_whole_file(where / "measured.html", html);
+    const ProgramRun run = browse(where, "measured.html");
+    ASSERT_EQ(run.exit_code, 0) << run.err;
+    const std::size_t found = run.out.find("data-beyond=\"");
+    ASSERT_NE(found, std::string::npos);
+    EXPECT_EQ(run.out.substr(found, 15), "data-beyond=\"0\"") << page;
+  }
 }
 
 }  // namespace

@@ -16,16 +16,13 @@ TEST(LayerReference, MeetsHayesTable) {
     const double nu = 0.3;
     const double g = 1.0 / (2.0 * (1.0 + nu));
     const LayerContact found = flat_punch_on_layer(1.0, nu, 1.0 / ratio, 1.0, 0.01);
-    EXPECT_NEAR(found.force * (1.0 - nu) / (4.0 * g * 0.01), hayes_kappa(ratio),
-                1e-5 * hayes_kappa(ratio))
-        << ratio;
+    EXPECT_NEAR(found.force * (1.0 - nu) / (4.0 * g * 0.01), hayes_kappa(ratio), 1e-5 * hayes_kappa(ratio)) << ratio;
   }
 }
 
 TEST(LayerReference, ThickLayerIsAHalfSpace) {
   const double thickness = 1e5;
-  EXPECT_NEAR(flat_punch_on_layer(2.0, 0.45, thickness, 1.5, 0.1).force,
-              flat_punch_force(2.0, 0.45, 1.5, 0.1), 1e-4);
+  EXPECT_NEAR(flat_punch_on_layer(2.0, 0.45, thickness, 1.5, 0.1).force, flat_punch_force(2.0, 0.45, 1.5, 0.1), 1e-4);
   const LayerContact sphere = sphere_on_layer(2.0, 0.45, thickness, 4.0, 0.5);
   EXPECT_NEAR(sneddon_sphere_depth(4.0, sphere.contact_radius), 0.5, 1e-5);
   EXPECT_NEAR(sphere.force, sneddon_sphere_force(2.0, 0.45, 4.0, sphere.contact_radius), 1e-4);
@@ -52,8 +49,7 @@ TEST(LayerReference, ThinCompressibleLayerHasTheConfinedModulus) {
   const double nu = 0.3;
   const double confined = (1.0 - nu) / ((1.0 + nu) * (1.0 - 2.0 * nu));
   EXPECT_NEAR(bonded_layer_kernel(nu, 1e-4) * 2.0 * (1.0 - nu * nu) / 1e-4, 1.0 / confined, 1e-6);
-  EXPECT_NEAR(bonded_layer_kernel(nu, 1e-3 * (1.0 - 1e-9)),
-              bonded_layer_kernel(nu, 1e-3 * (1.0 + 1e-9)), 1e-9);
+  EXPECT_NEAR(bonded_layer_kernel(nu, 1e-3 * (1.0 - 1e-9)), bonded_layer_kernel(nu, 1e-3 * (1.0 + 1e-9)), 1e-9);
   EXPECT_NEAR(bonded_layer_kernel(nu, 40.0), 1.0, 1e-12);
 }
 
@@ -101,8 +97,7 @@ TEST(SneddonSphere, IsHertzWhenShallow) {
   const double a = 0.05, radius = 10.0;
   const double depth = sneddon_sphere_depth(radius, a);
   EXPECT_NEAR(depth, a * a / radius, 1e-5 * depth);
-  EXPECT_NEAR(sneddon_sphere_force(1.0, 0.3, radius, a),
-              hertz_force(1.0, 0.3, radius, depth), 1e-8);
+  EXPECT_NEAR(sneddon_sphere_force(1.0, 0.3, radius, a), hertz_force(1.0, 0.3, radius, depth), 1e-8);
 }
 
 TEST(PointForces, ObeyBettiReciprocity) {
@@ -119,13 +114,11 @@ TEST(Mindlin, SlipsAsAWholeAtTheLimit) {
   EXPECT_DOUBLE_EQ(mindlin_stick_ratio(0.0, 0.5, 1.0), 1.0);
   const double small = 1e-6;  // bonded disc: Q = 16 G a d / (2 (2 - nu))... the linear limit of the displacement
   const double g = 1.0 / 2.6;
-  EXPECT_NEAR(mindlin_displacement(1.0, 0.3, 2.0, small, 0.5, 1.0), (2.0 - 0.3) * small / (8.0 * g * 2.0),
-              1e-11);
+  EXPECT_NEAR(mindlin_displacement(1.0, 0.3, 2.0, small, 0.5, 1.0), (2.0 - 0.3) * small / (8.0 * g * 2.0), 1e-11);
 }
 
 TEST(Dimitriadis, IsHertzOnAThickLayerAndMeetsIntegralEquationsOnAThinnerOne) {
-  EXPECT_NEAR(dimitriadis_force(2.0, 5.0, 1e9, 0.01) / hertz_force(2.0, 0.5, 5.0, 0.01),
-              1.0, 1e-9);
+  EXPECT_NEAR(dimitriadis_force(2.0, 5.0, 1e9, 0.01) / hertz_force(2.0, 0.5, 5.0, 0.01), 1.0, 1e-9);
   const double radius = 200.0;  // so flat that sphere and paraboloid are one
   double before = 1e-4;
   for (const double chi : {0.05, 0.1, 0.2}) {

@@ -113,10 +113,10 @@ TEST(VirtualSensor, HoldsThatCannotBeAreRefusedByName) {
   EXPECT_THAT(refused({.depth_mm = 9}), HasSubstr("9 mm deep: "));
   sim::ObjectSpec soft = ball(8);
   soft.elastic = sim::ElasticSpec{1.0, 0.49, 0.5, {}, {}, {}};
-  EXPECT_THAT(error_of([&] { coated().object(soft); }), HasSubstr("is elastic"));
+  EXPECT_THAT(error_of([&] { coated().session(coated().object(soft)); }), HasSubstr("is elastic"));
   sim::DeviceSpec blind = test::small_coated_device();
   blind.camera.reset();
-  EXPECT_THAT(error_of([&] { VirtualSensor(blind, "/nowhere"); }), HasSubstr("has no camera"));
+  EXPECT_THAT(error_of([&] { VirtualSensor(blind, "/nowhere").rest(); }), HasSubstr("has no camera"));
 }
 
 TEST(VirtualSensor, AClearDeviceShowsWhatPressesItsBeads) {
@@ -127,7 +127,7 @@ TEST(VirtualSensor, AClearDeviceShowsWhatPressesItsBeads) {
   const VirtualSensor& clear = device(file.string());
   unsetenv("TOUCHSTONE_CACHE");
   EXPECT_EQ(&clear, &device(file.string())) << "kept";
-  const Touch held = clear.press(ball(4), {.force_N = 0.2}, 3);
+  const Touch held = clear.press(ball(4), {.force_N = 0.2}, {.noise_seed = 3});
   EXPECT_NEAR(held.force_N().z(), 0.2, 1e-5);
   EXPECT_TRUE(held.height.empty());
   EXPECT_GT(cv::countNonZero(held.contact), 5);

@@ -65,8 +65,7 @@ TEST(ContactSheet, CaptionsStandBelowTheirImageInsideTheTile) {
 }
 
 TEST(ContactSheet, LongWordsAreShrunkToTheTile) {
-  const cv::Mat sheet =
-      contact_sheet({cv::Mat(10, 64, CV_8UC1, cv::Scalar(0))}, {"anextraordinarilylongword"}, 1, 64);
+  const cv::Mat sheet = contact_sheet({cv::Mat(10, 64, CV_8UC1, cv::Scalar(0))}, {"anextraordinarilylongword"}, 1, 64);
   const cv::Rect ink = inked(sheet(cv::Rect(0, 18, sheet.cols, sheet.rows - 18)));
   EXPECT_GT(ink.width, 40);
   EXPECT_LE(ink.x + ink.width, 8 + 64 + 1);

@@ -170,8 +170,7 @@ TEST_F(Draw, ATouchIsAFunctionOfJobAndIndexWithinItsRanges) {
     EXPECT_EQ(block.first_sample, next);
     next += block.samples;
     EXPECT_LE(block.samples, prepared.job.samples_per_file);
-    for (std::int64_t i = block.first_sample; i < next; ++i)
-      EXPECT_EQ(drawn_touch(prepared, i).unit, block.unit);
+    for (std::int64_t i = block.first_sample; i < next; ++i) EXPECT_EQ(drawn_touch(prepared, i).unit, block.unit);
   }
   EXPECT_EQ(next, prepared.job.samples);
   std::set<std::uint64_t> seeds;
@@ -210,17 +209,14 @@ TEST_F(Draw, UnitsDifferAsTheJobSaysAndInNothingElse) {
 
 TEST_F(Draw, PiecesKeepTheirLookAndRotationsAreTurnThenTilt) {
   const PreparedDraw prepared = prepare_draw(job());
-  EXPECT_EQ(drawn_object(prepared, 0, 7).shape.radius_mm,
-            drawn_object(prepared, 0, 7).shape.radius_mm);
-  EXPECT_NE(drawn_object(prepared, 0, 7).shape.radius_mm,
-            drawn_object(prepared, 0, 8).shape.radius_mm);
+  EXPECT_EQ(drawn_object(prepared, 0, 7).shape.radius_mm, drawn_object(prepared, 0, 7).shape.radius_mm);
+  EXPECT_NE(drawn_object(prepared, 0, 7).shape.radius_mm, drawn_object(prepared, 0, 8).shape.radius_mm);
   for (int i = 0; i < 5; ++i) {
     const DrawnTouch touch = drawn_touch(prepared, i);
     const Eigen::Matrix3d wanted = rotation_of(touch);
     EXPECT_NEAR(wanted(2, 2), std::cos(touch.tilt_deg * M_PI / 180), 1e-12);
     const sim::MotionSpec motion =
-        motion_of(touch, drawn_object(prepared, touch.object, touch.piece),
-                            drawn_unit(prepared, touch.unit).device);
+        motion_of(touch, drawn_object(prepared, touch.object, touch.piece), drawn_unit(prepared, touch.unit).device);
     EXPECT_TRUE(rotation_from_xyz(motion.start_angles_deg * M_PI / 180).isApprox(wanted, 1e-12));
   }
 }

@@ -64,8 +64,7 @@ TEST(Job, InputsFollowNamesThroughFoldersAndGltfBuffers) {
   folder.write("scenes/mesh.gltf", R"({"buffers": [{"uri": "mesh.bin"}, {"uri": "data:base64,AAAA"}]})");
   folder.write("scenes/mesh.bin", "bytes");
   std::vector<std::string> names;
-  for (const InputFile& file : input_files(folder.path() / "jobs/a.yaml"))
-    names.push_back(file.name);
+  for (const InputFile& file : input_files(folder.path() / "jobs/a.yaml")) names.push_back(file.name);
   EXPECT_THAT(names, ::testing::ElementsAre("../scenes/mesh.bin", "../scenes/mesh.gltf", "../scenes/s.yaml", "a.yaml"));
 }
 
@@ -118,8 +117,7 @@ TEST(JobErrors, TwoDevicesInOneDataSetAreRefused) {
   const auto file = folder.write("job.yaml",
                                  "name: a\nseed: 1\nscenes:\n  - {name: x, scene: scene.yaml, split: train}\n"
                                  "  - {name: y, scene: scene2.yaml, split: test}\n");
-  EXPECT_THAT(message_of([&] { prepare_job(file); }),
-              AllOf(HasSubstr("job.yaml:5:"), HasSubstr("one device")));
+  EXPECT_THAT(message_of([&] { prepare_job(file); }), AllOf(HasSubstr("job.yaml:5:"), HasSubstr("one device")));
 }
 
 TEST(JobErrors, ScenesOfUnlikeNumbersOfObjectsAreRefused) {

@@ -30,10 +30,10 @@ struct Calls {
 };
 
 /// A bench whose records are plain functions of unit and touch.
-BenchSource quick_bench(Calls& calls) {
+SensorSource quick_bench(Calls& calls) {
   return [&calls](const PreparedDraw&, const DrawnUnit& unit) {
     ++calls.units;
-    UnitBench bench;
+    UnitSensor bench;
     bench.light = "a plain function";
     bench.background = cv::Mat(30, 40, CV_8UC3, cv::Scalar(unit.number, 20, 30));
     bench.press = [&calls, unit](const DrawnTouch& touch, const sim::ObjectSpec& object) {
@@ -180,8 +180,7 @@ TEST_F(DrawnDataset, DamagedBlocksAreMadeAgainAndForeignOnesRefused) {
   turned[good.size() / 2] ^= 1;
   for (const std::string& bad : {good.substr(0, good.size() - 100), good.substr(0, 100), std::string(), turned}) {
     write(block("out", 2), bad);
-    EXPECT_THAT(message_of([&] { merge_drawn(job_, folder_.path() / "out"); }),
-                HasSubstr("000002.h5 (damaged)"));
+    EXPECT_THAT(message_of([&] { merge_drawn(job_, folder_.path() / "out"); }), HasSubstr("000002.h5 (damaged)"));
     const DrawnReport report = generate("out", {3, 4});
     EXPECT_EQ(report.damaged_blocks, 1);
     EXPECT_EQ(read_whole_file(block("out", 2)), good);
@@ -219,8 +218,7 @@ TEST_F(DrawnDataset, AChangedJobAForeignFolderAndAChangedSetAreRefused) {
   other.replace(other.find("seed: 3"), 7, "seed: 4");
   folder_.write("job.yaml", other);
   EXPECT_THAT(message_of([&] { generate("out"); }), HasSubstr("since it was begun the job file has changed"));
-  EXPECT_THAT(message_of([&] { merge_drawn(job_, folder_.path() / "out"); }),
-              HasSubstr("the job file has changed"));
+  EXPECT_THAT(message_of([&] { merge_drawn(job_, folder_.path() / "out"); }), HasSubstr("the job file has changed"));
   EXPECT_EQ(contents("out"), before);
   test::write_small_draw(folder_);
   folder_.write("ball.yaml", "name: ball\nshape: {type: sphere, radius_mm: 1.6}\nfriction: 0.5\n");
@@ -229,8 +227,7 @@ TEST_F(DrawnDataset, AChangedJobAForeignFolderAndAChangedSetAreRefused) {
   generate("out");
   folder_.write("other/file.txt", "mine");
   EXPECT_THAT(message_of([&] { generate("other"); }), HasSubstr("isn't empty ('file.txt' is in it)"));
-  EXPECT_THAT(message_of([&] { merge_drawn(job_, folder_.path() / "none"); }),
-              HasSubstr("holds nothing of this job"));
+  EXPECT_THAT(message_of([&] { merge_drawn(job_, folder_.path() / "none"); }), HasSubstr("holds nothing of this job"));
   write(block("out", 0), "short");
   EXPECT_THAT(message_of([&] { generate("out"); }), HasSubstr("000000.h5: is missing or was changed"));
 }
@@ -239,8 +236,7 @@ TEST_F(DrawnDataset, WhatCannotBePressedIsDrawnAgain) {
   calls_.refuse_every = 3;
   EXPECT_GT(generate("out").drawn_again, 0);
   calls_.refuse_every = 1;
-  EXPECT_THAT(message_of([&] { generate("never", {}, 1); }),
-              HasSubstr("20 draws in a row couldn't be pressed"));
+  EXPECT_THAT(message_of([&] { generate("never", {}, 1); }), HasSubstr("20 draws in a row couldn't be pressed"));
 }
 
 TEST_F(DrawnDataset, ARunKilledBeforeItsFirstBlockGoesOn) {

@@ -31,7 +31,7 @@ struct Pressed {
 
   explicit Pressed(const std::string& name)
       : device(sim::read_device(std::string(TOUCHSTONE_SOURCE_DIR) + "/scenes/devices/" + name + ".yaml")),
-        sensor(device, cache(), chroma_rig_settings(5)),
+        sensor(device, cache(), chroma_sensor_settings(5)),
         bench(sensor, 5),
         map(sensors::map_of_rest(bench.rest(), bench.spacing_mm())) {
     const sim::ObjectSpec ball =

@@ -15,7 +15,7 @@
 #include "core/error.h"
 #include "core/random.h"
 #include "core/units.h"
-#include "light_scenes.h"
+#include "tests/render/paths/light_scenes.h"
 
 namespace touchstone::render {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "closed_forms/light_closed_forms.h"
 #include "core/units.h"
-#include "light_scenes.h"
+#include "tests/render/paths/light_scenes.h"
 
 namespace touchstone::render {
 namespace {

@@ -6,11 +6,11 @@
 #include <cmath>
 
 #include "core/error.h"
-#include "lamp_scenes.h"
 #include "render/direct/direct_error.h"
 #include "render/direct/direct_renderer.h"
 #include "render/direct/light_field.h"
 #include "render/lamps/guide_connection.h"
+#include "tests/render/lamps/lamp_scenes.h"
 
 namespace touchstone::render {
 namespace {

@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "core/random.h"
-#include "event_light.h"
 #include "render/imager/imager_presets.h"
 #include "render/sampling/noise_quantile.h"
+#include "tests/render/events/event_light.h"
 #include "tests/support/chi_squared.h"
 
 namespace touchstone::render {

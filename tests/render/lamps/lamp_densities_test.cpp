@@ -10,9 +10,9 @@
 
 #include "core/random.h"
 #include "core/units.h"
-#include "light_scenes.h"
 #include "render/cameras/lens_camera.h"
 #include "render/cameras/pinhole_camera.h"
+#include "tests/render/paths/light_scenes.h"
 #include "tests/support/chi_squared.h"
 
 namespace touchstone::render {

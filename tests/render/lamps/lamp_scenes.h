@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "core/units.h"
-#include "light_scenes.h"
+#include "tests/render/paths/light_scenes.h"
 
 namespace touchstone::render {
 

@@ -7,8 +7,8 @@
 
 #include "core/random.h"
 #include "core/units.h"
-#include "light_scenes.h"
 #include "render/materials/print.h"
+#include "tests/render/paths/light_scenes.h"
 
 namespace touchstone::render {
 namespace {

@@ -8,9 +8,9 @@
 
 #include "core/random.h"
 #include "core/units.h"
-#include "light_scenes.h"
 #include "render/materials/scattering.h"
 #include "render/scene/ray_scene.h"
+#include "tests/render/paths/light_scenes.h"
 
 namespace touchstone::render {
 namespace {

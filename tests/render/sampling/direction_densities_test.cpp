@@ -9,12 +9,12 @@
 
 #include "core/random.h"
 #include "core/units.h"
-#include "light_scenes.h"
 #include "render/materials/deep_walk.h"
 #include "render/materials/ggx.h"
 #include "render/materials/rough_dielectric.h"
 #include "render/materials/scattering.h"
 #include "render/sampling/warps.h"
+#include "tests/render/paths/light_scenes.h"
 #include "tests/support/chi_squared.h"
 
 namespace touchstone::render {

@@ -1,9 +1,9 @@
+#include "sim/sensor/virtual_camera.h"
 #include "sim/plan/plan.h"
 #include "sim/press/gel_setup.h"
 #include "sim/press/play_motion.h"
 #include "sim/press/truth.h"
 #include "sim/scene/scene.h"
-#include "sim/sensor/virtual_camera.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -92,7 +92,7 @@ TEST(VirtualSensor, LightThatWasKeptMakesTheSameFrames) {
   settings.light_key = "this device, this program";
   const auto frame_of = [&](const VirtualSensor& one) {
     const TouchObject object = one.object(ball(2));
-    return one.look(object, one.play(object, press(0.3, 0, 2.05, 1.8)).back().press, 3).light;
+    return one.capture(object, one.play(object, press(0.3, 0, 2.05, 1.8)).back().press, 3).light;
   };
   const auto kept = [&] {
     std::vector<std::filesystem::path> files;
@@ -102,6 +102,8 @@ TEST(VirtualSensor, LightThatWasKeptMakesTheSameFrames) {
     return files;
   };
   const VirtualSensor first(test::small_coated_device(), cache.path(), settings);
+  EXPECT_EQ(kept().size(), 0U) << "nobody has asked for light";
+  first.light();
   ASSERT_EQ(kept().size(), 1U);
   const cv::Mat light = frame_of(first);
   EXPECT_EQ(cv::norm(light, frame_of(sensor()), cv::NORM_INF), 0.0) << "one that keeps none";
@@ -120,6 +122,7 @@ TEST(VirtualSensor, LightThatWasKeptMakesTheSameFrames) {
 
   settings.deepest_mm *= 0.9;
   const VirtualSensor fourth(test::small_coated_device(), cache.path(), settings);
+  fourth.light();
   EXPECT_EQ(kept().size(), 2U);
 }
 
@@ -133,10 +136,29 @@ TEST(VirtualSensor, RefusesWhatItCannotShow) {
     }
     return "";
   };
-  EXPECT_THAT(error_of([&] { VirtualSensor(test::small_device(), cache.path()); }), HasSubstr("has no coating"));
+  DeviceSpec blind = test::small_coated_device();
+  blind.camera.reset();
+  const VirtualSensor without(blind, cache.path());
+  EXPECT_NEAR(without.press(ball(2), {.force_N = 0.1}, {.picture = false}).force_N().z(), 0.1, 1e-5);
+  EXPECT_THAT(error_of([&] { without.press(ball(2), {.force_N = 0.1}); }), HasSubstr("has no camera"));
+  EXPECT_THAT(error_of([&] { without.light(); }), HasSubstr("has no camera"));
   const TouchObject object = sensor().object(ball(2));
   const auto states = sensor().play(object, press(0, 0, 2.1, 0.2));
   EXPECT_THAT(error_of([&] { sensor().capture(object, states.back().press, 1); }), HasSubstr("beyond the 1.2 mm in"));
+}
+
+// A press and its capture are the same picture: press() is play() and capture() of its last state.
+TEST(VirtualSensor, APressIsItsMotionsLastState) {
+  const TouchObject object = sensor().object(ball(2));
+  const PressSpec how{.place_mm = {0.4, 0.1}, .depth_mm = 0.3};
+  const Touch pressed = sensor().press(object, how, {.noise_seed = 5});
+  const Truth last = sensor().play(object, sensor().motion_of(object, how)).back();
+  const Touch captured = sensor().capture(object, last.press, 5);
+  EXPECT_EQ(cv::norm(pressed.frame, captured.frame, cv::NORM_INF), 0.0);
+  EXPECT_EQ(cv::norm(pressed.light, captured.light, cv::NORM_INF), 0.0);
+  EXPECT_EQ(pressed.force_N(), Eigen::Vector3d(last.press.wrench.head<3>()));
+  EXPECT_EQ(cv::norm(pressed.expose(5), pressed.frame, cv::NORM_INF), 0.0);
+  EXPECT_NEAR(last.press.gel_from_object.translation.z(), 2.0 - 0.3, 1e-12);
 }
 
 }  // namespace

@@ -1,0 +1,102 @@
+"""Every shipped device is pressed by a ball, and delivers what its kind delivers, beside the truth."""
+
+import os
+import pathlib
+
+import numpy as np
+import pytest
+
+import touchstone as ts
+
+SCENES = pathlib.Path(os.environ["TOUCHSTONE_SCENES"])
+DEVICES = sorted(path.stem for path in (SCENES / "devices").glob("*.yaml"))
+CLEAR = {"vhs", "vhs-spectral"}
+PRINTED = {"chroma", "chroma-compact", "gelsight-markers", "reflex"}
+FORCE_N = 0.5
+
+
+@pytest.fixture(scope="module", params=DEVICES)
+def touched(request):
+    sensor = ts.Sensor(request.param)
+    return request.param, sensor, sensor.press("ball-8mm", force_N=FORCE_N)
+
+
+def test_there_are_ten():
+    assert len(DEVICES) == 10
+
+
+def test_a_ball_makes_a_frame_with_its_force(touched):
+    name, sensor, touch = touched
+    assert touch.frame.shape[:2] == sensor.picture_shape and touch.frame.dtype == np.uint8
+    assert touch.force_N[2] == pytest.approx(FORCE_N, rel=1e-4)
+    assert 0 < touch.force_error_N[2] < 0.2 * FORCE_N
+    # The picture shows the press: it differs from the untouched one by more than two untouched ones do.
+    background = touch.background.astype(float)
+    off = np.abs(touch.frame.astype(float) - background).max()
+    noise = np.abs(background - sensor.background(noise_seed=7).astype(float)) if name not in CLEAR else 0
+    assert off > 3 * np.mean(noise)
+    # Where it should: the contact's middle is seen under the ball, at the gel's middle.
+    if sensor.picture_shape[0] > 18:
+        rows, columns = np.nonzero(touch.contact)
+        assert len(rows) > 10
+        middle = sensor.gel_from_pixel((columns.mean() + 0.5, rows.mean() + 0.5))
+        assert np.linalg.norm(middle) < 0.5
+
+
+def test_truth_of_its_kind(touched):
+    name, sensor, touch = touched
+    assert (touch.bead_displacement_mm is not None) == (name in CLEAR)
+    if name in CLEAR:
+        assert touch.height_mm is None
+        assert touch.bead_displacement_mm[:, 2].min() < -0.01
+    else:
+        assert np.nanmax(touch.height_mm) > 0.02
+    assert (touch.markers_mm is not None) == (name in PRINTED)
+    if name in PRINTED:
+        # The marker nearest to the ball goes in, and all go with the gel: none further than the deepest vertex.
+        nearest = np.argmin(np.linalg.norm(touch.markers_mm[:, :2], axis=1))
+        deepest = -touch.surface_displacement_mm[:, 2].min()
+        assert 0 < -touch.marker_displacement_mm[nearest, 2] <= deepest
+        assert np.abs(touch.marker_displacement_mm).max() <= np.abs(touch.surface_displacement_mm).max()
+
+
+def test_events_of_the_press(touched):
+    name, sensor, touch = touched
+    if name != "dvs-grasp":
+        assert len(touch.events) == 0
+        return
+    events = touch.events
+    assert len(events) > 50 and (np.diff(events["t_us"]) >= 0).all()
+    # A grey ball before the membrane makes it darker, and where it touches: most events are OFF and about the contact.
+    assert (~events["on"]).sum() > 4 * events["on"].sum()
+    at = sensor.pixel_from_gel((0, 0))
+    off = events[~events["on"]]
+    assert np.linalg.norm((np.median(off["x"]) + 0.5 - at[0], np.median(off["y"]) + 0.5 - at[1])) < 5
+
+
+def test_the_chips_statistics(touched):
+    name, sensor, touch = touched
+    assert (touch.statistics is not None) == (name == "reflex")
+    if name == "reflex":
+        statistics = touch.statistics
+        assert statistics["maximum"] == touch.frame.max() and statistics["minimum"] == touch.frame.min()
+        assert abs(statistics["average"] - touch.frame.mean()) < 128 / 324 + 1e-9
+
+
+def test_the_same_press_gives_the_same_bytes(touched):
+    name, sensor, touch = touched
+    again = sensor.press("ball-8mm", force_N=FORCE_N)
+    assert np.array_equal(again.frame, touch.frame) and np.array_equal(again.wrench, touch.wrench)
+    assert np.array_equal(again.events, touch.events)
+
+
+def test_mechanics_need_no_optics(tmp_path):
+    sensor = ts.Sensor({
+        "name": "pad",
+        "gel": {"size_x_mm": 10, "size_y_mm": 10, "thickness_mm": 3, "youngs_modulus_MPa": 0.2},
+        "mesh": {"fine_mm": 0.8, "coarse_mm": 2, "fine_half_extent_mm": [3, 3], "fine_depth_mm": 1},
+    })
+    touch = sensor.press("ball-8mm", force_N=0.3, look=False)
+    assert touch.force_N[2] == pytest.approx(0.3, rel=1e-4) and touch.frame is None
+    with pytest.raises(ts.Error, match="no camera"):
+        sensor.press("ball-8mm", force_N=0.3)

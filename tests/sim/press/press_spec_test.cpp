@@ -1,0 +1,100 @@
+#include "sim/press/press_spec.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "core/transform.h"
+#include "core/units.h"
+#include "sim/press/first_touch.h"
+#include "tests/support/message_of.h"
+
+namespace touchstone::sim {
+namespace {
+
+using test::message_of;
+using ::testing::HasSubstr;
+
+ObjectSpec ball(double radius_mm) {
+  ObjectSpec object;
+  object.name = "ball";
+  object.shape.radius_mm = radius_mm;
+  return object;
+}
+
+GelSpec slab() {
+  GelSpec gel;
+  gel.size_x_mm = gel.size_y_mm = 20.0;
+  gel.thickness_mm = 4.0;
+  return gel;
+}
+
+// A ball over a plane touches at its radius, on a dome where the two spheres touch: sqrt((R + r)^2 - x^2) - R.
+TEST(PressSpec, FirstTouchIsExactForSpheres) {
+  EXPECT_DOUBLE_EQ(first_touch({.place_mm = {1, 2}}, ball(3), slab()), 3.0);
+  GelSpec dome;
+  dome.shape = GelShape::dome;
+  dome.sphere_radius_mm = 20.0;
+  dome.base_radius_mm = 8.0;
+  EXPECT_NEAR(first_touch({.place_mm = {4, 3}}, ball(3), dome), std::sqrt(23.0 * 23.0 - 25.0) - 20.0, 1e-6);
+}
+
+// The rim of a flat disc of radius a, tilted by t, is a sin t below its middle.
+TEST(PressSpec, FirstTouchOfATiltedDiscIsItsRim) {
+  ObjectSpec disc = ball(0);
+  disc.shape.type = ShapeKind::rounded_cylinder;
+  disc.shape.radius_mm = 2.0;
+  disc.shape.height_mm = 3.0;
+  for (const double tilt_deg : {0.5, 3.0, 10.0, 25.0}) {
+    EXPECT_NEAR(first_touch({.angles_deg = {tilt_deg, 0, 0}}, disc, slab()),
+                2.0 * std::sin(tilt_deg * kRadiansPerDegree), 1e-5)
+        << tilt_deg;
+  }
+}
+
+TEST(PressSpec, DepthsCountFromTheFirstTouch) {
+  const MotionSpec motion = press_motion({.place_mm = {1, 0}, .depth_mm = 0.3}, 3.0, 0.0, 30.0);
+  EXPECT_GT(motion.start_mm.z(), 3.0);
+  ASSERT_EQ(motion.keys.size(), 1u);
+  EXPECT_DOUBLE_EQ(motion.keys[0].z->position_mm.value(), 2.7);
+  EXPECT_EQ(motion.frame_count(), 2);
+}
+
+TEST(PressSpec, StepsWhereFrictionHasAHistory) {
+  const auto frames = [](const PressSpec& press, double friction) {
+    return press_motion(press, 3.0, friction, 30.0).frame_count() - 1;
+  };
+  EXPECT_EQ(frames({.force_N = 1}, 0.5), 1);
+  EXPECT_EQ(frames({.angles_deg = {5, 0, 0}, .force_N = 1}, 0.0), 1);
+  EXPECT_EQ(frames({.angles_deg = {5, 0, 0}, .force_N = 1}, 0.5), 3);
+  EXPECT_EQ(frames({.angles_deg = {0, 0, 90}, .force_N = 1}, 0.5), 1) << "a turn about z goes straight in";
+  EXPECT_EQ(frames({.force_N = 1, .drag_mm = {0.3, 0.4}}, 0.5), 3 + 5) << "0.5 mm in steps of 0.1";
+  EXPECT_EQ(frames({.force_N = 1, .shear_N = Eigen::Vector2d(0.1, 0)}, 0.5), 3 + 5);
+}
+
+TEST(PressSpec, SecondsAreOfEachPart) {
+  const MotionSpec motion = press_motion({.force_N = 1, .drag_mm = {0.5, 0}, .seconds = 2.0}, 3.0, 0.5, 30.0);
+  for (const MotionKey& key : motion.keys) EXPECT_DOUBLE_EQ(key.frames / motion.frame_rate_Hz, 2.0);
+}
+
+TEST(PressSpec, WhatMakesNoSenseIsRefused) {
+  const auto refused = [](const PressSpec& press) { return message_of([&] { check(press); }); };
+  EXPECT_THAT(refused({}), HasSubstr("none of force_N, depth_mm and height_mm"));
+  EXPECT_THAT(refused({.force_N = 1, .height_mm = 0}), HasSubstr("several of"));
+  EXPECT_THAT(refused({.force_N = 0}), HasSubstr("force_N is 0"));
+  EXPECT_THAT(refused({.depth_mm = std::nan("")}), HasSubstr("depth_mm is nan"));
+  EXPECT_THAT(refused({.depth_mm = 1, .drag_mm = {INFINITY, 0}}), HasSubstr("must be finite"));
+  EXPECT_THAT(refused({.depth_mm = 1, .drag_mm = {1, 0}, .shear_N = Eigen::Vector2d(1, 0)}), HasSubstr("both drag_mm"));
+  EXPECT_THAT(refused({.depth_mm = 1, .seconds = -1}), HasSubstr("seconds is -1"));
+}
+
+// Any rotation comes back from its angles.
+TEST(PressSpec, AnglesOfARotation) {
+  for (const Eigen::Vector3d& angles : {Eigen::Vector3d(0.1, -0.4, 2.5), Eigen::Vector3d(-1.2, 1.3, -3.0)}) {
+    EXPECT_LT((xyz_from_rotation(rotation_from_xyz(angles)) - angles).norm(), 1e-12);
+  }
+}
+
+}  // namespace
+}  // namespace touchstone::sim
