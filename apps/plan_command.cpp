@@ -101,6 +101,9 @@ void plan_draw(const std::filesystem::path& file, bool linear_range, const Globa
     fmt::print("\n{} of the objects are in none of the samples that were searched\n", objects - planned.size());
   }
   const datasets::PlannedDraw& first = planned.front();
+  if (first.by_maps) {
+    fmt::print("\nPictures are made from maps of what touches the milky gel; the plan is of the mechanics alone.\n");
+  }
   print_gel(fmt::format("unit {}'s ", first.unit), first.scene.device, global);
   if (linear_range) print_linear_range(first.scene, global);
 }
