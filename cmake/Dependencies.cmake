@@ -1,5 +1,12 @@
 # One function per outside library: it finds it, or stops with the name of the Debian package that brings it.
-# A folder's CMakeLists.txt calls those it needs, so a part of the house asks for nothing that it doesn't link.
+# A folder's CMakeLists.txt calls those it needs, so a part asks for nothing that it doesn't link. What the folder of a
+# library asks for is noted there, and an installed Touchstone asks for it again (TouchstoneInstall.cmake).
+
+# Notes a call for the folder that is being read.
+function(touchstone_note_need macro)
+  list(JOIN ARGN "\" \"" arguments)
+  set_property(DIRECTORY APPEND PROPERTY TOUCHSTONE_NEEDS "${macro}(\"${arguments}\")")
+endfunction()
 
 macro(touchstone_missing library package)
   message(FATAL_ERROR "${library} was not found. Install Debian's '${package}' "
@@ -9,8 +16,9 @@ endmacro()
 macro(touchstone_require_package library package)
   find_package(${library} QUIET ${ARGN})
   if(NOT ${library}_FOUND)
-    touchstone_missing(${library} ${package})
+    touchstone_missing("${library}" "${package}")
   endif()
+  touchstone_note_need(touchstone_require_package "${library}" "${package}" ${ARGN})
 endmacro()
 
 macro(touchstone_need_eigen)
@@ -38,7 +46,7 @@ macro(touchstone_need_opencv)
 endmacro()
 
 macro(touchstone_need_threads)
-  find_package(Threads REQUIRED)
+  touchstone_require_package(Threads libc6-dev)
 endmacro()
 
 macro(touchstone_need_tbb)
@@ -61,9 +69,13 @@ macro(touchstone_need_archive)
   touchstone_plain_library(LibArchive::Archive libarchive-dev archive.h archive)
 endmacro()
 
+# Not noted: it is linked by its path, and CMake finds it only in projects that have C.
 macro(touchstone_need_hdf5)
   set(HDF5_PREFER_PARALLEL FALSE)
-  touchstone_require_package(HDF5 libhdf5-dev COMPONENTS C HL)
+  find_package(HDF5 QUIET COMPONENTS C HL)
+  if(NOT HDF5_FOUND)
+    touchstone_missing(HDF5 libhdf5-dev)
+  endif()
 endmacro()
 
 macro(touchstone_need_zlib)
@@ -84,6 +96,7 @@ endmacro()
 
 # Libraries without a CMake config: header and library are looked up, an imported target is made.
 macro(touchstone_plain_library target package header)
+  touchstone_note_need(touchstone_plain_library "${target}" "${package}" "${header}" ${ARGN})
   if(NOT TARGET ${target})
     string(MAKE_C_IDENTIFIER "${target}" _id)
     find_path(${_id}_INCLUDE ${header})
@@ -91,12 +104,12 @@ macro(touchstone_plain_library target package header)
     foreach(_name ${ARGN})
       find_library(${_id}_${_name}_LIBRARY ${_name})
       if(NOT ${_id}_${_name}_LIBRARY)
-        touchstone_missing(${_name} ${package})
+        touchstone_missing("${_name}" "${package}")
       endif()
       list(APPEND _links "${${_id}_${_name}_LIBRARY}")
     endforeach()
     if(NOT ${_id}_INCLUDE)
-      touchstone_missing(${header} ${package})
+      touchstone_missing("${header}" "${package}")
     endif()
     add_library(${target} INTERFACE IMPORTED)
     target_include_directories(${target} SYSTEM INTERFACE "${${_id}_INCLUDE}")

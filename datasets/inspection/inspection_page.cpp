@@ -309,7 +309,7 @@ std::string plans(const InspectedSet& set) {
     }
   }
   std::string html = "<p class=\"note\">Figures in the reasons are those of the first scene named.</p>\n";
-  for (const Table& one : tables) {
+  for (const Effects& one : tables) {
     html +=
         fmt::format("<h3>{}</h3>\n", plots::escape_markup(one.scenes)) + table({"effect", "", "why", "cost"}, one.rows);
   }

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/installed_copy.h"
 
 namespace touchstone::datasets {
 
@@ -14,13 +15,12 @@ std::filesystem::path scenes_folder() {
   if (given != nullptr && *given != '\0') {
     places.emplace_back(given);
   } else {
+    for (const fs::path& folder : installed_data_folders()) places.push_back(folder / "scenes");
     places.emplace_back(TOUCHSTONE_SOURCE_SCENES);
-    std::error_code error;
-    const fs::path program = fs::read_symlink("/proc/self/exe", error);
-    if (!error) places.push_back(program.parent_path().parent_path() / "share/touchstone/scenes");
   }
+  std::error_code ignored;
   for (const fs::path& place : places) {
-    if (fs::is_directory(place / "devices")) return place;
+    if (fs::is_directory(place / "devices", ignored)) return place;
   }
   fail("{}: there is no folder of scenes; TOUCHSTONE_SCENES may name one", places.front().string());
 }

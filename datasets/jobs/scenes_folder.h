@@ -4,8 +4,8 @@
 
 namespace touchstone::datasets {
 
-/// Where devices and scenes lie: $TOUCHSTONE_SCENES, else the source tree's scenes/ that this program was built from,
-/// else the installed share/touchstone/scenes beside the program. @throws Error if there is none of them
+/// Where devices and scenes lie: $TOUCHSTONE_SCENES, else the installed share/touchstone/scenes that belong to this
+/// code (core/installed_copy.h), else the source tree's scenes/ that it was built from. @throws Error if there is none
 std::filesystem::path scenes_folder();
 
 }  // namespace touchstone::datasets

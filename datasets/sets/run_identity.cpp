@@ -1,11 +1,9 @@
 #include "datasets/sets/run_identity.h"
 
-#include <dlfcn.h>
-#include <link.h>
-
 #include <nlohmann/json.hpp>
 
 #include "core/error.h"
+#include "core/installed_copy.h"
 #include "core/sha256.h"
 #include "datasets/sets/processor.h"
 
@@ -19,18 +17,6 @@ namespace {
 using nlohmann::ordered_json;
 
 constexpr const char* kFormat = "touchstone-run";
-
-/// The file that this code was loaded from: the running program, or the module within another one (Python's).
-std::string own_file() {
-  Dl_info info;
-  link_map* map = nullptr;
-  const auto* here = reinterpret_cast<const void*>(&program_version);
-  if (dladdr1(here, &info, reinterpret_cast<void**>(&map), RTLD_DL_LINKMAP) != 0 && map != nullptr &&
-      map->l_name != nullptr && *map->l_name != '\0') {
-    return map->l_name;
-  }
-  return "/proc/self/exe";
-}
 
 }  // namespace
 

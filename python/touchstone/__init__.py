@@ -14,22 +14,8 @@ import os as _os
 import warnings as _warnings
 
 from ._errors import Error
-
-
-def _find_installed_scenes():
-    """An installed package lies in PREFIX/lib/python3/dist-packages, the scenes in PREFIX/share/touchstone."""
-    if _os.environ.get("TOUCHSTONE_SCENES"):
-        return
-    prefix = _os.path.abspath(_os.path.join(_os.path.dirname(__file__), *[_os.pardir] * 4))
-    scenes = _os.path.join(prefix, "share", "touchstone", "scenes")
-    if _os.path.isdir(_os.path.join(scenes, "devices")):
-        _os.environ["TOUCHSTONE_SCENES"] = scenes
-
-
-_find_installed_scenes()
-
-from . import _core  # noqa: E402
-from ._core import (  # noqa: E402
+from . import _core
+from ._core import (
     BeadTracker,
     ColourMarkerReader,
     ColourMarkerReading,
@@ -54,8 +40,8 @@ from ._core import (  # noqa: E402
     train_stiffness,
     write_png,
 )
-from ._core import __version__  # noqa: E402
-from .dataset import Dataset  # noqa: E402
+from ._core import __version__
+from .dataset import Dataset
 
 # OpenBLAS's names of x86 processors without AVX2: what it says of one that it doesn't know (apps/blas_kind.cpp).
 _OLD_CORES = {"Generic", "Katmai", "Coppermine", "Northwood", "Prescott", "Banias", "Core2", "Penryn", "Dunnington",

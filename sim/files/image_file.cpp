@@ -8,6 +8,7 @@
 #include <set>
 
 #include "core/error.h"
+#include "core/installed_copy.h"
 #include "core/whole_file.h"
 #include "sim/files/image_module.h"
 
@@ -16,26 +17,16 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Where the module may be: beside or below the program (or library) that this code is in, as in an installed tree that
-// was moved; where it was installed; where it was built.
+// Where the module may be: beside the file that this code is in, as in a folder that was moved; where Touchstone is
+// installed; where it was built.
 std::vector<fs::path> module_places() {
   const fs::path name = TOUCHSTONE_IMAGE_MODULE_NAME;
   std::vector<fs::path> places;
-  std::vector<fs::path> self = {"/proc/self/exe"};
-  Dl_info here{};  // another file than the program where this code is in a shared library, such as Python's module
-  if (dladdr(reinterpret_cast<const void*>(&module_places), &here) != 0 && here.dli_fname != nullptr) {
-    self.insert(self.begin(), here.dli_fname);
-  }
-  for (const fs::path& file : self) {
-    std::error_code unknown;  // a program may be known by a name that isn't a path
-    const fs::path folder = fs::canonical(file, unknown).parent_path();
-    if (unknown) continue;
-    places.push_back(folder / name);
-    places.push_back(folder / "touchstone" / name);
-    places.push_back(folder.parent_path() / TOUCHSTONE_IMAGE_MODULE_LIBDIR / "touchstone" / name);
-  }
-  places.push_back(fs::path(TOUCHSTONE_IMAGE_MODULE_INSTALLED) / name);
-  places.push_back(fs::path(TOUCHSTONE_IMAGE_MODULE_BUILT));
+  std::error_code unknown;
+  const fs::path own = fs::canonical(own_file(), unknown).parent_path();
+  if (!unknown) places = {own / name, own / "touchstone" / name};
+  for (const fs::path& folder : installed_module_folders()) places.push_back(folder / name);
+  places.push_back(TOUCHSTONE_IMAGE_MODULE_BUILT);
   return places;
 }
 
@@ -45,8 +36,9 @@ const TouchstoneImageModule& load_module() {
   const auto found =
       std::find_if(places.begin(), places.end(), [&](const fs::path& p) { return fs::exists(p, ignored); });
   if (found == places.end()) {
-    fail("the module for image files, {}, is missing; it was looked for beside the program and in {}",
-         TOUCHSTONE_IMAGE_MODULE_NAME, TOUCHSTONE_IMAGE_MODULE_INSTALLED);
+    std::string all;
+    for (const fs::path& place : places) all += (all.empty() ? "" : ", ") + place.string();
+    fail("the module for image files is missing; it was looked for as {}", all);
   }
   // It stays open to the end of the process: OpenImageIO starts threads that can't be taken back.
   void* const module = dlopen(found->c_str(), RTLD_NOW | RTLD_LOCAL);

@@ -14,7 +14,7 @@ set_target_properties(touchstone_image_module PROPERTIES PREFIX "" CXX_VISIBILIT
 
 set(_module_name "touchstone_image_module${CMAKE_SHARED_MODULE_SUFFIX}")
 set_source_files_properties("${CMAKE_CURRENT_LIST_DIR}/image_file.cpp" TARGET_DIRECTORY touchstone_sim PROPERTIES COMPILE_DEFINITIONS
-  "TOUCHSTONE_IMAGE_MODULE_NAME=\"${_module_name}\";TOUCHSTONE_IMAGE_MODULE_LIBDIR=\"${CMAKE_INSTALL_LIBDIR}\";TOUCHSTONE_IMAGE_MODULE_INSTALLED=\"${CMAKE_INSTALL_FULL_LIBDIR}/touchstone\";TOUCHSTONE_IMAGE_MODULE_BUILT=\"${CMAKE_CURRENT_BINARY_DIR}/${_module_name}\"")
+  "TOUCHSTONE_IMAGE_MODULE_NAME=\"${_module_name}\";TOUCHSTONE_IMAGE_MODULE_BUILT=\"${CMAKE_CURRENT_BINARY_DIR}/${_module_name}\"")
 set_target_properties(touchstone_image_module PROPERTIES LIBRARY_OUTPUT_DIRECTORY "${CMAKE_CURRENT_BINARY_DIR}")
 target_link_libraries(touchstone_sim PRIVATE opencv_core opencv_imgproc ${CMAKE_DL_LIBS})
 add_dependencies(touchstone_sim touchstone_image_module)

@@ -1,8 +1,11 @@
 #include "sim/press/first_touch.h"
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <optional>
+#include <vector>
 
 #include "core/error.h"
 #include "sim/files/gltf_mesh.h"
@@ -12,7 +15,6 @@ namespace touchstone::sim {
 namespace {
 
 constexpr int kHalf = 40;        // lines on either side of the first grid's middle
-constexpr int kConvexHalf = 8;   // where the height over a plane has one lowest place: the finer grids find it
 constexpr int kFineHalf = 4;     // and of each finer one
 constexpr double kShrink = 3.0;  // of the spacing from grid to grid
 constexpr double kFinest_mm = 2e-4;
@@ -38,6 +40,39 @@ Surface surface_of(const GelSpec& gel) {
   };
 }
 
+/// The point of a body that lies farthest against the unit vector `up`, object frame; nothing where the shape has no
+/// closed form.
+std::optional<Eigen::Vector3d> lowest_point(const fem::ContactShape& shape, const Eigen::Vector3d& up) {
+  if (std::holds_alternative<fem::SphereShape>(shape)) return -std::get<fem::SphereShape>(shape).radius * up;
+  if (const auto* box = std::get_if<fem::BoxShape>(&shape)) {
+    const Eigen::Vector3d side(up.x() > 0   ? 1
+                               : up.x() < 0 ? -1
+                                            : 0,
+                               up.y() > 0   ? 1
+                               : up.y() < 0 ? -1
+                                            : 0,
+                               up.z() > 0   ? 1
+                               : up.z() < 0 ? -1
+                                            : 0);
+    return -0.5 * side.cwiseProduct(box->size);
+  }
+  if (const auto* cylinder = std::get_if<fem::RoundedCylinder>(&shape)) {
+    const double aside = up.head<2>().norm();
+    const Eigen::Vector3d outward =
+        aside > 0.0 ? Eigen::Vector3d(-up.x() / aside, -up.y() / aside, 0.0) : Eigen::Vector3d::Zero();
+    const double edge = cylinder->edge_radius;
+    const Eigen::Vector3d upper = cylinder->radius * outward + cylinder->height * Eigen::Vector3d::UnitZ();
+    if (up.z() < 0.0) return upper;
+    return (cylinder->radius - edge) * outward + edge * Eigen::Vector3d::UnitZ() - edge * up;
+  }
+  if (const auto* mesh = std::get_if<fem::MeshShape>(&shape)) {
+    const std::vector<Eigen::Vector3d>& vertices = mesh->mesh().vertices;
+    return *std::min_element(vertices.begin(), vertices.end(),
+                             [&](const auto& a, const auto& b) { return up.dot(a) < up.dot(b); });
+  }
+  return std::nullopt;
+}
+
 }  // namespace
 
 double first_touch(const GelSpec& gel, const fem::ContactShape& shape, const Eigen::Vector2d& place_mm,
@@ -54,21 +89,31 @@ double first_touch(const GelSpec& gel, const fem::ContactShape& shape, const Eig
     return lowest ? rest - *lowest : kMiss;
   };
 
+  if (gel.shape == GelShape::slab) {
+    // A plane: the body's lowest point touches first, if there is gel below it.
+    if (const auto low = lowest_point(shape, up)) {
+      const Eigen::Vector2d under = place_mm + (rotation * *low).head<2>();
+      if (surface(under) != kMiss) return -up.dot(*low);
+    }
+  }
   const fem::BoundingBall ball = fem::bounding_ball(shape);
   Eigen::Vector2d middle = place_mm + (rotation * ball.centre).head<2>();
   double best = height_over(middle);
-  const bool one_lowest = gel.shape == GelShape::slab && fem::is_convex(shape);
-  const int first_half = one_lowest ? kConvexHalf : kHalf;
-  double spacing = ball.radius / first_half;
-  for (int half = first_half; spacing > kFinest_mm; half = kFineHalf, spacing /= kShrink) {
-    const Eigen::Vector2d around = middle;
-    for (int j = -half; j <= half; ++j) {
-      for (int i = -half; i <= half; ++i) {
-        const Eigen::Vector2d place = around + spacing * Eigen::Vector2d(i, j);
-        const double height = height_over(place);
-        if (height <= best) continue;
-        best = height;
-        middle = place;
+  double spacing = ball.radius / kHalf;
+  for (int half = kHalf; spacing > kFinest_mm; half = kFineHalf, spacing /= kShrink) {
+    // Again while it pays: along a sharp rim the highest line of a grid may be far from the rim's own highest place.
+    for (bool better = true; better; half = kFineHalf) {
+      better = false;
+      const Eigen::Vector2d around = middle;
+      for (int j = -half; j <= half; ++j) {
+        for (int i = -half; i <= half; ++i) {
+          const Eigen::Vector2d place = around + spacing * Eigen::Vector2d(i, j);
+          const double height = height_over(place);
+          if (height <= best) continue;
+          best = height;
+          middle = place;
+          better = true;
+        }
       }
     }
     if (best == kMiss) fail("the object isn't over the gel: place ({}, {}) mm", place_mm.x(), place_mm.y());

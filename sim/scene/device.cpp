@@ -350,7 +350,7 @@ void fields(YamlReader& in, DeviceSpec& device) {
   in.required("gel", device.gel);
   in.optional("mesh", device.mesh);
   in.optional("beads", device.beads);
-  in.required("plate", device.plate);
+  in.optional("plate", device.plate);
   in.optional("lamps", device.lamps);
   in.optional("coating", device.coating);
   in.optional("films", device.films);
@@ -368,7 +368,10 @@ void fields(YamlReader& in, DeviceSpec& device) {
   }
   check_gel(device, in.where("gel"));
   if (device.beads) check_beads_fit(device, in.where("beads"));
-  if (device.camera) check_camera_outside(device, in.where("camera"));
+  if (device.camera) {
+    if (!in.has("plate")) fail_at(device.where, "{}'plate' is missing, through which the camera looks", in.context());
+    check_camera_outside(device, in.where("camera"));
+  }
   check_lamps_outside(device, in.where("lamps"));
 }
 

@@ -33,7 +33,7 @@ class ClearView final : public SensorView {
     nothing_.spec = far_ball();
     // What a point of the gel projects to needs the device's faces and media alone.
     still_ = render::make_ready(camera_of(*device_.camera));
-    faces_ = scene_without_surface(scene_of(far_ball(), {}), plan_, {}, {}, fem::PressState{});
+    faces_ = clear_layers(device_);
   }
 
   const Plan& plan() const override { return plan_; }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <utility>
 
 #include "core/error.h"
@@ -10,6 +11,7 @@
 #include "render/cameras/first_hits.h"
 #include "render/imager/imager.h"
 #include "sim/scene/device_camera.h"
+#include "sim/scene/device_faces.h"
 #include "sim/sensor/membrane_camera.h"
 #include "sim/sensor/virtual_sensor.h"
 #include "sim/view/visible_scene.h"
@@ -21,6 +23,14 @@ constexpr double kMapCell_mm = 0.1;    // of the maps of what stands before the 
 constexpr double kTouching_mm = 1e-3;  // fine contact leaves less than that between gel and object
 constexpr double kFar_mm = 1e3;        // what is further off isn't there
 
+/// A grey camera sees the mean of an object's colours, which shipped objects give for red, green and blue.
+ObjectSpec in_grey(ObjectSpec object) {
+  if (const std::vector<double>& of = object.albedo.numbers; of.size() > 1) {
+    object.albedo = Colour(std::accumulate(of.begin(), of.end(), 0.0) / static_cast<double>(of.size()));
+  }
+  return object;
+}
+
 class MilkyView final : public SensorView {
  public:
   MilkyView(const DeviceSpec& device, const fem::Compliance& gel, const VirtualSensorSettings& settings)
@@ -28,7 +38,7 @@ class MilkyView final : public SensorView {
     plan_ = make_plan(scene_of(ObjectSpec{}));
     choice_.reason = "maps: the gel is a milky slab before the room (sim/sensor/membrane_camera.h)";
     ready_ = render::make_ready(camera_of(*device_.camera));
-    faces_ = scene_without_surface(scene_of(ObjectSpec{}), plan_, {}, {}, fem::PressState{});
+    faces_ = clear_layers(device_);
     rest_light_ = camera_.irradiance(camera_.free_face());
     const int columns = static_cast<int>(std::ceil(device_.gel.size_x_mm / kMapCell_mm));
     const int rows = static_cast<int>(std::ceil(device_.gel.size_y_mm / kMapCell_mm));
@@ -69,7 +79,7 @@ class MilkyView final : public SensorView {
     }
     const fem::BoundingBall ball = fem::bounding_ball(shape);
     const double top = (gel_from_object * ball.centre).z() + ball.radius;
-    const double albedo = in_one_band(device_, object.spec.albedo, "albedo");
+    const double albedo = in_one_band(device_, in_grey(object.spec).albedo, "albedo");
     SeenTouch seen;
     seen.light = camera_.irradiance(
         face_state(camera_.grid(), map_, coverage, gap, kFar_mm, albedo, std::max(top, kMapCell_mm)));
@@ -96,7 +106,7 @@ class MilkyView final : public SensorView {
   SceneSpec scene_of(const ObjectSpec& object) const {
     SceneSpec scene;
     scene.device = device_;
-    scene.object = object;
+    scene.object = in_grey(object);
     scene.seed = settings_.seed;
     scene.outputs = {};
     scene.outputs.frames = false;

@@ -48,7 +48,7 @@ ONLY_READERS = [
     r"leave nothing of cells", r"there's no grit", r"each level needs one", r"add up to", r"each unit needs one", r"that differ in nothing",
     # studies of designs
     r"a number that is to be changed must stand there", r"is varied twice", r"(values|vary): is empty", r"values: \S+ after \S+, they must rise",
-    r"'from' is missing", r"needs two depths or more", r"it must be at least load_N",
+    r"'plate' is missing, through which", r"'from' is missing", r"needs two depths or more", r"it must be at least load_N",
 ]
 
 KIND_OF_FOLDER = {"devices": "device", "objects": "object", "motions": "motion", "jobs": "job", "studies": "study",

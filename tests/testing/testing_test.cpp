@@ -8,6 +8,7 @@
 #include "core/error.h"
 #include "core/transform.h"
 #include "core/units.h"
+#include "sim/press/first_touch.h"
 #include "tests/support/small_job.h"
 #include "tests/support/small_scene.h"
 #include "tests/support/temporary_folder.h"

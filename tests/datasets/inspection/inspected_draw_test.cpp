@@ -35,7 +35,7 @@ class InspectedDraw : public ::testing::Test {
   static void SetUpTestSuite() {
     folder_ = new test::TemporaryFolder;
     const auto job = test::write_small_draw(*folder_, kBalls);
-    generate_drawn(job, folder_->path() / "set", {.source = rig_bench(folder_->path() / "cache"), .shard = {}});
+    generate_drawn(job, folder_->path() / "set", {.source = virtual_sensors(folder_->path() / "cache"), .shard = {}});
     set_ = new InspectedSet(read_inspected_set(folder_->path() / "set"));
   }
   static void TearDownTestSuite() {
@@ -71,7 +71,9 @@ TEST_F(InspectedDraw, TheSurfaceIsTheImprintOfTheBall) {
     middle /= touching;
     EXPECT_LT((middle - centre.head<2>()).norm(), 0.1) << "sample " << i << " touches at " << middle.transpose();
     EXPECT_NEAR(gel.displaced[deepest].z(), centre.z() - kRadius, 0.02) << "sample " << i;
-    EXPECT_LT(worst, 0.05) << "sample " << i << ": what touches lies on the ball";
+    // A vertex may be half a pixel (0.12 mm) off where its height was read, and the flank is steep: 0.076 to 0.097 mm
+    // were seen. A flat sheet is off by its whole depth.
+    EXPECT_LT(worst, 0.12) << "sample " << i << ": what touches lies on the ball";
   }
 }
 

@@ -215,9 +215,7 @@ TEST_F(Draw, PiecesKeepTheirLookAndRotationsAreTurnThenTilt) {
     const DrawnTouch touch = drawn_touch(prepared, i);
     const Eigen::Matrix3d wanted = rotation_of(touch);
     EXPECT_NEAR(wanted(2, 2), std::cos(touch.tilt_deg * M_PI / 180), 1e-12);
-    const sim::MotionSpec motion =
-        motion_of(touch, drawn_object(prepared, touch.object, touch.piece), drawn_unit(prepared, touch.unit).device);
-    EXPECT_TRUE(rotation_from_xyz(motion.start_angles_deg * M_PI / 180).isApprox(wanted, 1e-12));
+    EXPECT_TRUE(rotation_from_xyz(press_of(touch).angles_deg * M_PI / 180).isApprox(wanted, 1e-12));
   }
 }
 

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/error.h"
 #include "core/hdf5_file.h"
 #include "datasets/sets/block_record.h"
 #include "datasets/sets/drawn_dataset.h"
@@ -110,12 +111,16 @@ outputs: [OUTPUTS]
 class DrawnDevices : public ::testing::Test {
  protected:
   std::filesystem::path job(const std::string& device, const std::string& outputs,
-                            const std::string& object = "ball.yaml") {
+                            const std::string& object = "ball.yaml", int units = 2) {
     test::write_small_draw(folder_);
+    if (object == "dark.yaml") {
+      folder_.write("dark.yaml", "name: dark\nshape: {type: sphere, radius_mm: 1.5}\nalbedo: 0.03\nfriction: 0.5\n");
+    }
     folder_.write("kind.yaml", device);
     std::string text = kJob;
     text.replace(text.find("OBJECT"), 6, object);
     text.replace(text.find("OUTPUTS"), 7, outputs);
+    text.replace(text.find("count: 2"), 8, fmt::format("count: {}", units));
     return folder_.write("job.yaml", text);
   }
 
@@ -154,7 +159,7 @@ TEST_F(DrawnDevices, AClearGelHasItsBeads) {
 }
 
 TEST_F(DrawnDevices, AMilkyGelHasHeightsAndEvents) {
-  const Hdf5Reader file = make(job(milky_device(), "frame, height, contact, events"));
+  const Hdf5Reader file = make(job(milky_device(), "frame, height, contact, events", "dark.yaml", 1));
   const auto count = file.read<std::int64_t>("/events/count").values;
   ASSERT_EQ(count.size(), 2u);
   EXPECT_GT(count[0], 10);

@@ -45,13 +45,5 @@ TEST(HeightError, CountsWhereMembraneIsSeenOnly) {
   EXPECT_DOUBLE_EQ(error.contact_overlap, 0.5);
 }
 
-TEST(ReachBelow, IsTheLowestPointOfShapeAndRelief) {
-  EXPECT_DOUBLE_EQ(reach_below(ball_of(4.75)), 2.375);
-  sim::ObjectSpec cylinder = flat_cylinder_of(8.5);
-  EXPECT_DOUBLE_EQ(reach_below(cylinder), 0.0);
-  cylinder.relief = sim::ReliefSpec{sim::WavesRelief{40.0, 0.5}};
-  EXPECT_NEAR(reach_below(cylinder), 0.04, 1e-6);
-}
-
 }  // namespace
 }  // namespace touchstone::lab

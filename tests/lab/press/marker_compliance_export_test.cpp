@@ -160,9 +160,9 @@ TEST(MarkerComplianceExport, AMarkerIsTheMeanOfThePressesSurface) {
     }
     return worst;
   };
-  const double coarse = datasets::difference(8, 1.0);
-  EXPECT_LT(datasets::difference(16, 0.5), 0.6 * coarse);
-  EXPECT_LT(datasets::difference(32, 0.25), 0.3 * coarse);
+  const double coarse = difference(8, 1.0);
+  EXPECT_LT(difference(16, 0.5), 0.6 * coarse);
+  EXPECT_LT(difference(32, 0.25), 0.3 * coarse);
 }
 
 TEST(MarkerComplianceExport, DiscsAndSquaresOfOneAreaMoveAlike) {

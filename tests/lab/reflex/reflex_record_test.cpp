@@ -33,7 +33,7 @@ ReflexWay::Picture picture(const Share& share) {
   };
 }
 
-double datasets::number_of(const ReflexWay& way, double parameter) {
+double number_of(const ReflexWay& way, double parameter) {
   cv::Mat light;
   way.light_at(parameter, light);
   return light.at<float>(5, 5) / full_light();
@@ -57,7 +57,7 @@ TEST(ReflexWay, IsAsNearToPicturesInBetweenAsAsked) {
     EXPECT_GT(way.parameters().size(), 5.0 / std::sqrt(8 * allowed / 2.7));
     EXPECT_LT(way.parameters().size(), 4 * 5.0 / std::sqrt(8 * allowed / 2.7));
     EXPECT_LE(way.largest_off(), allowed);
-    for (double z = 0.0; z <= 5.0; z += 0.01) EXPECT_NEAR(datasets::number_of(way, z), share(z, 5), allowed) << z;
+    for (double z = 0.0; z <= 5.0; z += 0.01) EXPECT_NEAR(number_of(way, z), share(z, 5), allowed) << z;
   }
 }
 
@@ -67,9 +67,9 @@ TEST(ReflexWay, StraightLightTakesThePicturesAtItsCornersAndOneBetween) {
                       chip_settings());
   EXPECT_EQ(way.parameters().size(), 5U);
   EXPECT_NEAR(way.largest_off(), 0.0, 1e-6);
-  EXPECT_NEAR(datasets::number_of(way, 2.5), 0.35, 1e-6);
-  EXPECT_NEAR(datasets::number_of(way, -1.0), 0.2, 1e-6);  // before the first: the first
-  EXPECT_NEAR(datasets::number_of(way, 9.0), 0.4, 1e-6);
+  EXPECT_NEAR(number_of(way, 2.5), 0.35, 1e-6);
+  EXPECT_NEAR(number_of(way, -1.0), 0.2, 1e-6);  // before the first: the first
+  EXPECT_NEAR(number_of(way, 9.0), 0.4, 1e-6);
 }
 
 TEST(ReflexWay, BadInputIsRefused) {

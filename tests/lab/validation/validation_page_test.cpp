@@ -95,7 +95,7 @@ TEST(ValidationPage, NoRowsAreAPageToo) {
   EXPECT_THAT(to_html({}, {"1", "p", ""}), HasSubstr("0 of 0 rows hold."));
 }
 
-TEST(plots::LinePlot, PowerLawIsAStraightLine) {
+TEST(LinePlot, PowerLawIsAStraightLine) {
   plots::LinePlot plot;
   plot.curves = {{"law", {{1.0, 1.0}, {10.0, 100.0}, {100.0, 10000.0}}, false}};
   const std::string svg = plots::to_svg(plot);
@@ -107,7 +107,7 @@ TEST(plots::LinePlot, PowerLawIsAStraightLine) {
   EXPECT_LT(y[2], y[0]) << "larger is higher";
 }
 
-TEST(plots::LinePlot, LeavesOutWhatHasNoPlace) {
+TEST(LinePlot, LeavesOutWhatHasNoPlace) {
   const double nan = std::nan("");
   plots::LinePlot plot;
   plot.curves = {{"a", {{0.0, 1.0}, {-1.0, 1.0}, {1.0, nan}, {std::numeric_limits<double>::infinity(), 1.0}}, false},
@@ -118,7 +118,7 @@ TEST(plots::LinePlot, LeavesOutWhatHasNoPlace) {
   EXPECT_THAT(svg, Not(HasSubstr("inf")));
 }
 
-TEST(plots::LinePlot, EmptyPlotAndConstantCurveHaveFiniteAxes) {
+TEST(LinePlot, EmptyPlotAndConstantCurveHaveFiniteAxes) {
   for (const bool logarithmic : {false, true}) {
     plots::LinePlot plot;
     plot.log_x = plot.log_y = logarithmic;
@@ -129,7 +129,7 @@ TEST(plots::LinePlot, EmptyPlotAndConstantCurveHaveFiniteAxes) {
   }
 }
 
-TEST(plots::LinePlot, LabelsAreEscaped) {
+TEST(LinePlot, LabelsAreEscaped) {
   plots::LinePlot plot;
   plot.title = "a<b";
   plot.x_label = "x & y\x01";

@@ -19,7 +19,7 @@ ReadyCamera camera_below() {
   camera.distance_mm = 5.0;
   camera.hole_diameter_um = 100.0;
   camera.foil_thickness_um = 0.0;
-  camera.pose.translation = {0.0, 0.0, -18.0};
+  camera.gel_from_camera.translation = {0.0, 0.0, -18.0};
   return make_ready(camera);
 }
 

@@ -53,6 +53,26 @@ TEST(PressSpec, FirstTouchOfATiltedDiscIsItsRim) {
   }
 }
 
+TEST(PressSpec, FirstTouchOfAReliefIsItsHighestPlace) {
+  ObjectSpec disc = ball(0);
+  disc.shape.type = ShapeKind::rounded_cylinder;
+  disc.shape.radius_mm = 4.25;
+  disc.shape.edge_radius_mm = 0.1;
+  disc.shape.height_mm = 6.0;
+  EXPECT_DOUBLE_EQ(first_touch({.place_mm = {1, 2}}, disc, slab()), 0.0);
+  disc.relief = ReliefSpec{WavesRelief{40.0, 0.5}};
+  EXPECT_NEAR(first_touch({.place_mm = {1, 2}}, disc, slab()), 0.04, 1e-5);
+}
+
+// A ball over the pad's edge touches with its flank: sqrt(R^2 - d^2), d from the edge.
+TEST(PressSpec, FirstTouchBesideThePadIsAFlank) {
+  EXPECT_NEAR(first_touch({.place_mm = {10.9, 0}}, ball(1.5), slab()), std::sqrt(1.5 * 1.5 - 0.81), 1e-3);
+  EXPECT_THAT(message_of([] {
+                first_touch({.place_mm = {12, 0}}, ball(1.5), slab());
+              }),
+              HasSubstr("isn't over the gel"));
+}
+
 TEST(PressSpec, DepthsCountFromTheFirstTouch) {
   const MotionSpec motion = press_motion({.place_mm = {1, 0}, .depth_mm = 0.3}, 3.0, 0.0, 30.0);
   EXPECT_GT(motion.start_mm.z(), 3.0);

@@ -1,0 +1,50 @@
+// docs/testing.md in a program of somebody else's: a shipped object is pressed on a device of one's own, and a small
+// estimator is held against the truth.
+
+#include <datasets/jobs/scenes_folder.h>
+#include <touchstone/testing.h>
+
+#include <cstdlib>
+#include <filesystem>
+
+using namespace touchstone::testing;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+namespace {
+
+const VirtualSensor& my_device() {
+  return device(std::getenv("MY_DEVICE"));
+}
+
+/// Mean change of grey of the pixels.
+double change(const Touch& held) {
+  cv::Mat difference;
+  cv::absdiff(held.frame, held.background, difference);
+  const cv::Scalar mean = cv::mean(difference);
+  return mean[0] + mean[1] + mean[2];
+}
+
+/// The force by a line through what two forces changed.
+double my_force(const Touch& held) {
+  static const double at_2 = change(my_device().press(object("ball-4mm"), {.force_N = 0.2}));
+  static const double at_6 = change(my_device().press(object("ball-4mm"), {.force_N = 0.6}));
+  return 0.2 + 0.4 * (change(held) - at_2) / (at_6 - at_2);
+}
+
+TEST(MyEstimator, ReadsFourTenthsOfANewton) {
+  const Touch held = my_device().press(object("ball-4mm"), {.place_mm = {0.3, 0.2}, .force_N = 0.4});
+  EXPECT_THAT(my_force(held), IsNormalForceOf(held, {.absolute = 0.06}));
+  EXPECT_THAT(my_force(held) + 0.2, Not(IsNormalForceOf(held, {.absolute = 0.06})));
+}
+
+TEST(MyEstimator, WhatDoesNotMatchIsKeptAsPictures) {
+  const Touch held = my_device().press(object("ball-4mm"), {.force_N = 0.4});
+  EXPECT_THAT(keep_frames(held), HasSubstr("MyEstimator.WhatDoesNotMatchIsKeptAsPictures-1.png"));
+}
+
+TEST(InstalledCopy, HasScenesOfItsOwn) {
+  EXPECT_EQ(touchstone::datasets::scenes_folder().string(), std::getenv("WANTED_SCENES"));
+}
+
+}  // namespace
