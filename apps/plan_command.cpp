@@ -89,7 +89,7 @@ void plan_draw(const std::filesystem::path& file, bool linear_range, const Globa
   const std::size_t objects = draw.job.draw.objects.size();
   std::vector<sim::Plan> plans;
   for (const datasets::PlannedDraw& one : planned) plans.push_back(sim::make_plan(one.scene));
-  fmt::print("job {}: draws {} samples of {} units and {} objects, in {} files\n", draw.job.name, draw.job.samples,
+  fmt::print("job {}: draws {} samples; units: {}, objects: {}, files: {}\n", draw.job.name, draw.job.samples,
              draw.job.draw.units.count, objects, draw.blocks.size());
   fmt::print("Of each object its first sample is planned. Switches are those of every job that draws.\n");
   for (std::size_t k = 0; k < planned.size(); ++k) {

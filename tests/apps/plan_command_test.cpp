@@ -87,7 +87,7 @@ TEST(PlanCommand, OfAJobThatDrawsPlansEachObject) {
   const fs::path job = test::write_small_draw(folder);
   const ProgramRun run = run_program({"plan", job.string()});
   ASSERT_EQ(run.exit_code, 0) << run.err;
-  EXPECT_THAT(run.out, HasSubstr("job small-draw: draws 10 samples of 2 units and 2 objects, in 4 files\n"));
+  EXPECT_THAT(run.out, HasSubstr("job small-draw: draws 10 samples; units: 2, objects: 2, files: 4\n"));
   EXPECT_THAT(run.out, AllOf(HasSubstr("\nball (sample "), HasSubstr("\npunch (sample ")));
   // The virtual sensor's own switches, and the job's outputs: height and contact are of each pixel's first hit.
   EXPECT_THAT(run.out, AllOf(HasSubstr("direct light             yes  the scene switches it on"),
