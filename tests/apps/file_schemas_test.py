@@ -258,8 +258,8 @@ def context(data, path):
 def keys_in_sources(source):
     """Keys that `fields` functions read by their plain names."""
     found = set()
-    for folder in ("sim", "lab"):
-        for file in sorted((source / folder).glob("*.cpp")):
+    for folder in ("sim", "datasets", "lab"):
+        for file in sorted((source / folder).rglob("*.cpp")):
             found |= set(re.findall(r'(?:in\.(?:required|optional|required_name)|needed)\(\s*(?:[^";]*?)"(\w+)"',
                                     file.read_text()))
     return found

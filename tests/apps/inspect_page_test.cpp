@@ -118,7 +118,7 @@ TEST_F(InspectPage, ShowsDrawnSets) {
   };
   EXPECT_EQ(times("src=\"data:image/jpeg;base64,/9j/"), 3) << "the sheet, and one picture with its truth a sensor";
   EXPECT_EQ(times("<svg "), 12 + 2) << "histograms, error bars";
-  for (const char* part : {"<h1>small-draw</h1>", "<td>unit 1</td>", "<th>gel.youngs_modulus_MPa</th>", "train 5",
+  for (const char* part : {"<h1>small-draw</h1>", "<td>unit 1</td>", "<td>gel.youngs_modulus_MPa</td>", "train 5",
                            "test 5", "<td>/drawn/force_N</td>", "small-coated", "unit 0, sample "}) {
     EXPECT_NE(page.find(part), std::string::npos) << part;
   }

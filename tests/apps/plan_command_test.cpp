@@ -90,9 +90,9 @@ TEST(PlanCommand, OfAJobThatDrawsPlansEachObject) {
   EXPECT_THAT(run.out, HasSubstr("job small-draw: draws 10 samples; units: 2, objects: 2, files: 4\n"));
   EXPECT_THAT(run.out, AllOf(HasSubstr("\nball (sample "), HasSubstr("\npunch (sample ")));
   // The virtual sensor's own switches, and the job's outputs: height and contact are of each pixel's first hit.
-  EXPECT_THAT(run.out, AllOf(HasSubstr("direct light             yes  the scene switches it on"),
-                             HasSubstr("motion blur              no   the scene switches it off"),
-                             HasSubstr("truth of pixels          yes")));
+  EXPECT_THAT(run.out, AllOf(HasSubstr("direct light            yes  the scene switches it on"),
+                             HasSubstr("motion blur             no   the scene switches it off"),
+                             HasSubstr("truth of pixels         yes")));
   std::string text = read_whole_file(job);
   text.replace(text.find("outputs: [frame, height, contact]"), 33, "outputs: []");
   const ProgramRun unseen = run_program({"plan", folder.write("unseen.yaml", text).string()});
@@ -129,7 +129,7 @@ TEST(PlanCommand, RefusesAMistakeInAJobThatDrawsWithItsLine) {
   std::string text = test::kSmallDraw;
   text.replace(text.find("tilt_deg"), 8, "tild_deg");
   test::expect_refused(run_program({"plan", test::write_small_draw(folder, text).string()}),
-                       "job.yaml:19: draw: unknown key 'tild_deg'");
+                       "job.yaml:18: draw: unknown key 'tild_deg'");
 }
 
 TEST(PlanCommand, OfAStudyPlansWhatEachDesignIsPutThrough) {

@@ -200,7 +200,7 @@ TEST_F(DrawnDevices, MechanicsAloneNeedNeitherPlateNorCamera) {
 
 TEST_F(DrawnDevices, ElasticObjectsArePressed) {
   const auto of = [&](const char* name, const std::string& more) {
-    folder_.write(name, "name: ball\nshape: {type: sphere, radius_mm: 1.5}\nfriction: 0.5\n" + more);
+    folder_.write(name, "name: ball\nshape: {type: sphere, radius_mm: 1.5}\n" + more);
     return job("name: pad" + gel(), "", name);
   };
   const auto depth = [&](const std::filesystem::path& job, const std::string& out) {
