@@ -69,14 +69,19 @@ std::shared_ptr<Touch> press(const Sensor& sensor, const py::object& touched, st
                              std::optional<double> force_N, const py::object& at_mm, const py::object& angles_deg,
                              const py::object& pose, const py::object& shear_mm, const py::object& shear_N,
                              double seconds, std::uint64_t noise_seed, int frame, bool look, bool truth) {
+  const int ways = (depth_mm ? 1 : 0) + (force_N ? 1 : 0) + (pose.is_none() ? 0 : 1);
+  if (ways != 1) fail("press: exactly one of depth_mm, force_N and pose says how far; {} of them are given", ways);
+  if (!shear_mm.is_none() && !shear_N.is_none()) fail("press: shear_mm and shear_N exclude each other");
   sim::PressSpec order;
   order.depth_mm = depth_mm;
   order.force_N = force_N;
   order.place_mm = vector2_from(at_mm, "at_mm");
   order.angles_deg = vector3_from(angles_deg, "angles_deg");
   if (!pose.is_none()) {
-    if (depth_mm || force_N) fail("press: pose stands beside depth_mm or force_N; give exactly one of the three");
     const RigidTransform gel_from_object = pose_from(pose, "pose");
+    const Eigen::Matrix3d& turned = gel_from_object.rotation;
+    if (!(turned * turned.transpose()).isIdentity(1e-6) || turned.determinant() < 0.0)
+      fail("pose: its rotation isn't one");
     order.place_mm = gel_from_object.translation.head<2>();
     order.height_mm = gel_from_object.translation.z();
     order.angles_deg = xyz_from_rotation(gel_from_object.rotation) / kRadiansPerDegree;

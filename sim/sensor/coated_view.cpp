@@ -65,7 +65,7 @@ SceneSpec scene_with(const DeviceSpec& device, const VirtualSensorSettings& sett
   scene.seed = settings.seed;
   scene.membrane.pixel_um = settings.membrane_um;
   scene.light.interreflection_tolerance = settings.interreflection_tolerance;
-  scene.effects.fine_relief = is_gentle(device.gel) ? Switch::on : Switch::off;
+  scene.effects.fine_relief = is_gentle(device.gel) && !object.elastic ? Switch::on : Switch::off;
   if (settings.always_friction && object.friction > 0.0) scene.effects.friction = Switch::on;
   scene.effects.motion_blur = Switch::off;
   scene.effects.rolling_shutter = Switch::off;

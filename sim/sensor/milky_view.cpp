@@ -112,7 +112,7 @@ class MilkyView final : public SensorView {
     scene.outputs.frames = false;
     scene.outputs.height = true;
     scene.membrane.pixel_um = std::max(settings_.membrane_um, 0.5e3 * kMapCell_mm);
-    scene.effects.fine_relief = Switch::on;
+    scene.effects.fine_relief = object.elastic ? Switch::off : Switch::on;
     return scene;
   }
 
