@@ -89,7 +89,7 @@ void plan_draw(const std::filesystem::path& file, bool linear_range, const Globa
   const std::size_t objects = draw.job.draw.objects.size();
   std::vector<sim::Plan> plans;
   for (const datasets::PlannedDraw& one : planned) plans.push_back(sim::make_plan(one.scene));
-  fmt::print("job {}: draws {} samples of {} units and {} objects, in {} files\n", draw.job.name, draw.job.samples,
+  fmt::print("job {}: draws {} samples; units: {}, objects: {}, files: {}\n", draw.job.name, draw.job.samples,
              draw.job.draw.units.count, objects, draw.blocks.size());
   fmt::print("Of each object its first sample is planned. Switches are those of every job that draws.\n");
   for (std::size_t k = 0; k < planned.size(); ++k) {
@@ -101,7 +101,10 @@ void plan_draw(const std::filesystem::path& file, bool linear_range, const Globa
     fmt::print("\n{} of the objects are in none of the samples that were searched\n", objects - planned.size());
   }
   const datasets::PlannedDraw& first = planned.front();
-  print_gel(fmt::format("unit {}: ", first.unit), first.scene.device, global);
+  if (first.by_maps) {
+    fmt::print("\nPictures are made from maps of what touches the milky gel; the plan is of the mechanics alone.\n");
+  }
+  print_gel(fmt::format("unit {}'s ", first.unit), first.scene.device, global);
   if (linear_range) print_linear_range(first.scene, global);
 }
 
@@ -139,14 +142,14 @@ constexpr UnplannedFile kUnplanned[] = {
 
 void plan(const std::filesystem::path& file, bool linear_range, const GlobalOptions& global) {
   const YamlReader in = YamlReader::open(file);
+  if (in.has("draw")) return plan_draw(file, linear_range, global);
+  if (in.has("scenes")) return plan_job(file, linear_range, global);
+  if (in.has("kind") || in.has("vary")) return plan_study(file, linear_range, global);
   for (const UnplannedFile& kind : kUnplanned) {
     if (!in.has(kind.key) || in.has("object")) continue;  // a scene with a key too many is refused as a scene
     fail("{}: {}; `touchstone plan` takes scenes, jobs of scenes, jobs that draw, and studies", file.string(),
          kind.words);
   }
-  if (in.has("draw")) return plan_draw(file, linear_range, global);
-  if (in.has("scenes")) return plan_job(file, linear_range, global);
-  if (in.has("kind") || in.has("vary")) return plan_study(file, linear_range, global);
   plan_scene(file, linear_range, global);
 }
 

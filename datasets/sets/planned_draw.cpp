@@ -10,14 +10,32 @@ namespace {
 
 constexpr std::int64_t kSamplesSearched = 10'000;  // some milliseconds; jobs may have 1e12
 
-/// The outputs of a scene that has what `block_record` makes of a sample: a sensor lights and exposes a frame for
-/// each sample that has any picture, and reads height and contact from what each pixel's ray hits first.
+/// The outputs of a scene that has what a sample has: a sensor lights and exposes a frame for each sample that asks its
+/// camera for anything, and reads height and contact from what each pixel's ray hits first.
 sim::OutputSpec outputs_of(const DrawnOutputs& wanted) {
   sim::OutputSpec outputs;
-  outputs.frames = wanted.frame || wanted.height || wanted.contact;
+  outputs.frames = wanted.camera();
   outputs.depth = wanted.height;
   outputs.contact = wanted.contact;
   return outputs;
+}
+
+PlannedDraw planned(const PreparedDraw& prepared, const DrawnTouch& touch) {
+  const DrawnUnit unit = drawn_unit(prepared, touch.unit);
+  const sim::ObjectSpec object = drawn_object(prepared, touch.object, touch.piece);
+  const DrawnOutputs& wanted = prepared.job.outputs;
+  PlannedDraw one;
+  one.object = prepared.job.draw.objects[static_cast<std::size_t>(touch.object)].file.stem().string();
+  one.sample = touch.sample;
+  one.unit = touch.unit;
+  // Where the first touch is makes no difference to a plan, and a sample that misses the gel is drawn again.
+  const double rate_Hz = unit.device.camera ? unit.device.camera->frame_rate_Hz : sim::MotionSpec().frame_rate_Hz;
+  const sim::MotionSpec motion = sim::press_motion(press_of(touch), 0.0, object.friction, rate_Hz);
+  one.scene = sim::touch_scene(unit.device, drawn_sensor_settings(prepared, unit), object, motion, wanted.camera());
+  one.by_maps = wanted.camera() && !one.scene.outputs.camera();
+  if (one.scene.outputs.camera()) one.scene.outputs = outputs_of(wanted);
+  one.scene.where = prepared.job.where;
+  return one;
 }
 
 }  // namespace
@@ -34,24 +52,11 @@ std::vector<PlannedDraw> planned_draws(const PreparedDraw& prepared) {
     of_object = touch;
     ++found;
   }
-  std::vector<PlannedDraw> planned;
+  std::vector<PlannedDraw> all;
   for (const std::optional<DrawnTouch>& touch : first) {
-    if (!touch) continue;
-    const DrawnUnit unit = drawn_unit(prepared, touch->unit);
-    const sim::ObjectSpec object = drawn_object(prepared, touch->object, touch->piece);
-    PlannedDraw one;
-    one.object = prepared.job.draw.objects[static_cast<std::size_t>(touch->object)].file.stem().string();
-    one.sample = touch->sample;
-    one.unit = touch->unit;
-    // Where the first touch is makes no difference to a plan, and a sample that misses the gel is drawn again.
-    const sim::MotionSpec motion =
-        sim::press_motion(press_of(*touch), 0.0, object.friction, unit.device.camera->frame_rate_Hz);
-    one.scene = sim::touch_scene(unit.device, drawn_sensor_settings(prepared, unit), object, motion);
-    one.scene.outputs = outputs_of(prepared.job.outputs);
-    one.scene.where = prepared.job.where;
-    planned.push_back(std::move(one));
+    if (touch) all.push_back(planned(prepared, *touch));
   }
-  return planned;
+  return all;
 }
 
 }  // namespace touchstone::datasets

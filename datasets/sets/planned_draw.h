@@ -15,7 +15,8 @@ struct PlannedDraw {
   std::string object;  ///< the file's name without its ending
   std::int64_t sample = 0;
   int unit = 0;
-  sim::SceneSpec scene;  ///< as the unit's sensor plays and shows it, with the outputs that the job asks for
+  sim::SceneSpec scene;  ///< as the unit's sensor plays and shows it, with the job's outputs
+  bool by_maps = false;  ///< its pictures are maps of a milky gel, of which the scene says nothing
 };
 
 /// For each object of the job, in its order, the first sample that presses it. Objects that no sample presses, or none

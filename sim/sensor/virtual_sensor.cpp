@@ -194,8 +194,8 @@ struct VirtualSensor::Parts {
 };
 
 SceneSpec touch_scene(const DeviceSpec& device, const VirtualSensorSettings& settings, const ObjectSpec& object,
-                      const MotionSpec& motion) {
-  if (!device.camera || is_milky(device)) return unseen_scene(device, settings, object, motion);
+                      const MotionSpec& motion, bool picture) {
+  if (!picture || !device.camera || is_milky(device)) return unseen_scene(device, settings, object, motion);
   return device.coating ? coated_scene(device, settings, object, motion)
                         : clear_scene(device, settings.seed, object, motion);
 }

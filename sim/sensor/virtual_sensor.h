@@ -87,11 +87,11 @@ class TouchObject {
   std::shared_ptr<const SeenObject> seen_;
 };
 
-/// The scene of what a virtual sensor does where `object` moves like this and pictures are asked for: its plan says
-/// which effects are simulated. A device without a camera is asked for no picture. A milky gel's pictures are maps
-/// (sim/sensor/milky_view.h), which no plan knows: this is its mechanics.
+/// The scene of what a virtual sensor does where `object` moves like this: its plan says which effects are simulated.
+/// It asks for no image where `picture` is false, of a device without a camera, and of a milky gel, whose pictures are
+/// maps (sim/sensor/milky_view.h), which no plan knows.
 SceneSpec touch_scene(const DeviceSpec& device, const VirtualSensorSettings& settings, const ObjectSpec& object,
-                      const MotionSpec& motion);
+                      const MotionSpec& motion, bool picture = true);
 
 /// Safe to use from many threads; the same press and seeds give the same bytes. The gel is set up at once, the light
 /// when it's first needed: a light field for a coated gel (paths where direct light can't draw it), maps for a milky

@@ -87,7 +87,7 @@ TEST(PlanCommand, OfAJobThatDrawsPlansEachObject) {
   const fs::path job = test::write_small_draw(folder);
   const ProgramRun run = run_program({"plan", job.string()});
   ASSERT_EQ(run.exit_code, 0) << run.err;
-  EXPECT_THAT(run.out, HasSubstr("job small-draw: draws 10 samples of 2 units and 2 objects, in 4 files\n"));
+  EXPECT_THAT(run.out, HasSubstr("job small-draw: draws 10 samples; units: 2, objects: 2, files: 4\n"));
   EXPECT_THAT(run.out, AllOf(HasSubstr("\nball (sample "), HasSubstr("\npunch (sample ")));
   // The virtual sensor's own switches, and the job's outputs: height and contact are of each pixel's first hit.
   EXPECT_THAT(run.out, AllOf(HasSubstr("direct light            yes  the scene switches it on"),
@@ -98,6 +98,30 @@ TEST(PlanCommand, OfAJobThatDrawsPlansEachObject) {
   const ProgramRun unseen = run_program({"plan", folder.write("unseen.yaml", text).string()});
   ASSERT_EQ(unseen.exit_code, 0) << unseen.err;
   EXPECT_THAT(unseen.out, HasSubstr("no image is asked for: truth alone needs none"));
+}
+
+TEST(PlanCommand, OfAJobThatDrawsTakesDevicesWithoutACameraAndMilkyOnes) {
+  const test::TemporaryFolder folder;
+  std::string text = read_whole_file(test::write_small_draw(folder));
+  const auto put = [&](const std::string& from, const std::string& to) {
+    ASSERT_NE(text.find(from), std::string::npos) << from;
+    text.replace(text.find(from), from.size(), to);
+  };
+  std::string blind = test::kDrawDevice;
+  blind.erase(blind.find("lamps:"));
+  folder.write("blind.yaml", blind);
+  put("device: device.yaml", "device: blind.yaml");
+  put("      - {path: 'lamps[*].power_W', times: {uniform: [0.9, 1.1]}}\n", "");
+  put("outputs: [frame, height, contact]", "outputs: [traction]");
+  const ProgramRun run = run_program({"plan", folder.write("blind-job.yaml", text).string()});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("no image is asked for: truth alone needs none"));
+  EXPECT_THAT(run.out, Not(HasSubstr("milky")));
+  put("device: blind.yaml", "device: " + (kScenes / "devices" / "dvs-grasp.yaml").string());
+  put("outputs: [traction]", "outputs: [frame, events]");
+  const ProgramRun milky = run_program({"plan", folder.write("milky-job.yaml", text).string()});
+  ASSERT_EQ(milky.exit_code, 0) << milky.err;
+  EXPECT_THAT(milky.out, HasSubstr("Pictures are made from maps of what touches the milky gel"));
 }
 
 TEST(PlanCommand, RefusesAMistakeInAJobThatDrawsWithItsLine) {
