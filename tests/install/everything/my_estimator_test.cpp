@@ -5,7 +5,8 @@
 #include <touchstone/testing.h>
 
 #include <cstdlib>
-#include <filesystem>
+#include <fstream>
+#include <string>
 
 using namespace touchstone::testing;
 using ::testing::HasSubstr;
@@ -44,7 +45,20 @@ TEST(MyEstimator, WhatDoesNotMatchIsKeptAsPictures) {
 }
 
 TEST(InstalledCopy, HasScenesOfItsOwn) {
-  EXPECT_EQ(touchstone::datasets::scenes_folder().string(), std::getenv("WANTED_SCENES"));
+  EXPECT_EQ(touchstone::datasets::scenes_folder().string(),
+            std::string(std::getenv("PREFIX")) + "/share/touchstone/scenes");
+}
+
+TEST(InstalledCopy, HasAnImageModuleOfItsOwn) {
+  ASSERT_NE(keep_frames(my_device().rest()), "");  // writes pictures, which loads the module
+  std::ifstream maps("/proc/self/maps");
+  int seen = 0;
+  for (std::string line; std::getline(maps, line);) {
+    if (line.find("touchstone_image_module") == std::string::npos) continue;
+    ++seen;
+    EXPECT_THAT(line, HasSubstr(std::string(std::getenv("PREFIX")) + "/lib"));
+  }
+  EXPECT_GT(seen, 0);
 }
 
 }  // namespace
