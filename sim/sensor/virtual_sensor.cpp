@@ -27,7 +27,7 @@ constexpr int kEventSteps = 12;                    // of a press that event pixe
 /// What light needs and mechanics doesn't.
 struct Sight {
   std::unique_ptr<const SensorView> view;
-  render::Imager imager, ideal_imager;
+  render::Imager imager, ideal_imager;  // for light of the untouched device's bands
   render::FixedPattern pattern;
   cv::Mat rest_light;
 };
@@ -76,8 +76,8 @@ struct VirtualSensor::Parts {
                   : is_milky(device) ? milky_view(device, *gel, settings)
                                      : clear_view(device, *gel, settings);
       const Plan& plan = now->view->plan();
-      now->imager = sim::imager(device, bands_of(plan), with_noise(plan));
-      now->ideal_imager = sim::imager(device, bands_of(plan), false);
+      now->imager = sim::imager(device, bands_of(plan.bands), with_noise(plan));
+      now->ideal_imager = sim::imager(device, bands_of(plan.bands), false);
       now->pattern = render::fixed_pattern(now->imager, {device.camera->width, device.camera->height}, settings.seed);
       now->rest_light = now->view->rest_light(nullptr, Eigen::Vector3d::Zero());
       made = std::move(now);
@@ -86,8 +86,8 @@ struct VirtualSensor::Parts {
   }
 
   /// Maps of a milky gel ask the plan for no picture, which then says nothing of its bands and noise.
-  SceneBands bands_of(const Plan& plan) const {
-    if (plan.bands.count() > 0) return plan.bands;
+  SceneBands bands_of(const SceneBands& planned) const {
+    if (planned.count() > 0) return planned;
     SceneBands bands;
     bands.centres_nm = Eigen::Map<const Eigen::ArrayXd>(device.band_wavelengths_nm.data(),
                                                         static_cast<Eigen::Index>(device.band_wavelengths_nm.size()));
@@ -105,10 +105,17 @@ struct VirtualSensor::Parts {
     return play_motion(scene, plan, *gel, {}, nullptr, set_up_elastic_objects(scene, plan, cache_folder));
   }
 
-  cv::Mat develop(const cv::Mat& irradiance, std::uint64_t noise_seed, int frame) const {
-    const Sight& by = sight();
+  cv::Mat develop(const cv::Mat& irradiance, const render::Imager& imager, std::uint64_t noise_seed, int frame) const {
     return render::develop(
-        render::expose(irradiance, by.imager, by.pattern, noise_seed, static_cast<std::uint64_t>(frame)), by.imager);
+        render::expose(irradiance, imager, sight().pattern, noise_seed, static_cast<std::uint64_t>(frame)), imager);
+  }
+  /// Of light of the untouched device's bands.
+  cv::Mat develop(const cv::Mat& irradiance, std::uint64_t noise_seed, int frame) const {
+    return develop(irradiance, sight().imager, noise_seed, frame);
+  }
+  SceneBands bands_of(const SeenObject& object) const { return bands_of(sight().view->bands(object)); }
+  render::Imager imager_of(const SeenObject& object) const {
+    return sim::imager(device, bands_of(object), with_noise(sight().view->plan()));
   }
 
   bool has_events() const { return device.camera && device.camera->events; }
@@ -148,9 +155,10 @@ struct VirtualSensor::Parts {
     touch.height = seen.height;
     touch.contact = seen.contact;
     const cv::Mat rest = object.spec.screen ? by.view->rest_light(&object, start) : rest_of(object, start);
-    touch.expose = [this, light = touch.light](std::uint64_t seed) { return develop(light, seed, 0); };
-    touch.frame = develop(touch.light, options.noise_seed, options.frame);
-    touch.background = develop(rest, options.noise_seed ^ kOtherNoise, options.frame);
+    const render::Imager imager = imager_of(object);
+    touch.expose = [this, light = touch.light, imager](std::uint64_t seed) { return develop(light, imager, seed, 0); };
+    touch.frame = develop(touch.light, imager, options.noise_seed, options.frame);
+    touch.background = develop(rest, imager, options.noise_seed ^ kOtherNoise, options.frame);
     if (has_chip()) {
       std::vector<cv::Mat> lights;
       for (std::size_t k = 1; k + 1 < states.size(); ++k) {
@@ -158,7 +166,7 @@ struct VirtualSensor::Parts {
       }
       lights.push_back(touch.light);
       const render::MotionChipSettings chip =
-          motion_chip(device, bands_of(by.view->plan()), with_noise(by.view->plan()));
+          motion_chip(device, bands_of(object), with_noise(by.view->plan()));
       const ChipTouch shown = chip_touch(chip, rest, lights, settings.seed, options.noise_seed);
       touch.frame = shown.raw;
       touch.statistics = shown.statistics;
@@ -168,8 +176,7 @@ struct VirtualSensor::Parts {
       };
     }
     if (has_events()) {
-      const SceneBands bands = bands_of(by.view->plan());
-      render::Imager counter = sim::imager(device, bands, false);
+      render::Imager counter = sim::imager(device, bands_of(object), false);
       counter.exposure_s = 1.0;
       const render::ImagerResponse response = render::response_of(counter);
       const auto light = [&](const fem::PressState& press) {
@@ -311,7 +318,7 @@ Touch VirtualSensor::capture(const TouchObject& object, const fem::PressState& p
   touch.light = seen.light;
   touch.height = seen.height;
   touch.contact = seen.contact;
-  touch.frame = parts_->develop(touch.light, noise_seed, frame);
+  touch.frame = parts_->develop(touch.light, parts_->imager_of(*object.seen_), noise_seed, frame);
   return touch;
 }
 
@@ -330,7 +337,7 @@ cv::Mat VirtualSensor::background(std::uint64_t noise_seed, int frame) const {
   const Sight& by = parts_->sight();
   if (!parts_->has_chip()) return parts_->develop(by.rest_light, noise_seed, frame);
   const Plan& plan = by.view->plan();
-  const render::MotionChipSettings chip = motion_chip(parts_->device, parts_->bands_of(plan), parts_->with_noise(plan));
+  const render::MotionChipSettings chip = motion_chip(parts_->device, parts_->bands_of(plan.bands), parts_->with_noise(plan));
   return chip_touch(chip, by.rest_light, {}, parts_->settings.seed, noise_seed + static_cast<std::uint64_t>(frame)).raw;
 }
 
