@@ -146,11 +146,11 @@ double YamlPlace::made_up(Allowed allowed) {
   if (allowed.holds(0.0) && choose(2) == 1) return 0.0;
   constexpr double kDecades = 4.0;  // 0.01 to 100
   const double part = even(name_, round_);
-  const double way = std::pow(10.0, kDecades * (part - 0.5));
+  const double offset = std::pow(10.0, kDecades * (part - 0.5));
   const bool low = std::isfinite(allowed.low);
   const bool high = std::isfinite(allowed.high);
   if (low && high) return allowed.low + std::max(0.0, allowed.high - allowed.low) * std::max(part, 1e-6);
-  return low ? allowed.low + way : high ? allowed.high - way : part < 0.5 ? -way : way;
+  return low ? allowed.low + offset : high ? allowed.high - offset : part < 0.5 ? -offset : offset;
 }
 
 double YamlPlace::number(Allowed allowed) {

@@ -51,7 +51,7 @@ struct PressSnapshot {
   void forget(int body);
 };
 
-/// The pose at `fraction` of the straight way from a to b (rotations by slerp).
+/// The pose at `fraction` of the straight path from a to b (rotations by slerp).
 RigidTransform between(const RigidTransform& a, const RigidTransform& b, double fraction);
 
 /// @throws Error unless the target is finite, its rotation one, and its normal force and its time not negative

@@ -16,7 +16,7 @@
 
 namespace touchstone::lab {
 
-/// An object held against a device in several ways, each pressed down and then dragged.
+/// An object held against a device in several poses, each pressed down and then dragged.
 struct BenchPresses {
   sim::ObjectSpec object;
   double touch_mm = 0.0;  ///< see sim::first_touch(), over the middle

@@ -62,7 +62,7 @@ std::optional<MeshPick> pick_mesh(const BenchParts& parts, BenchCurve& mesh) {
   return best;
 }
 
-/// The cheapest way of light within an error; of paths also one between those that were tried.
+/// The cheapest setting of light within an error; of paths also one between those that were tried.
 std::optional<LightSetting> pick_light(const BenchParts& parts, const std::vector<LightSetting>& tries, double wanted) {
   std::optional<LightSetting> best;
   const LightSetting* coarser = nullptr;  // paths with more noise than wanted, the least of them
@@ -212,7 +212,7 @@ BenchChoice cheapest_choice(const BenchParts& parts, BenchCurve& mesh, const std
     light = pick_light(parts, tries, left_for_light());
     if (!light) {
       light = next_best(tries);
-      choice.remark += fmt::format("{}No way of light that was tried holds the wanted pixel error; the best is {}.",
+      choice.remark += fmt::format("{}No setting of light that was tried holds the wanted pixel error; the best is {}.",
                                    choice.remark.empty() ? "" : " ", light ? light->words : "none");
     }
   }

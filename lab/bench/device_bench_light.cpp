@@ -40,8 +40,8 @@ void add_run(const SceneRun& run, BenchPoint& point) {
   point.work = static_cast<double>(run.paths) / static_cast<double>(pictures_of(run) * run.electrons.front().total());
 }
 
-/// The ways of light that this device's scenes can be shown by.
-std::vector<LightSetting> ways_of_light(const BenchParts& parts) {
+/// The settings of light that this device's scenes can be shown by.
+std::vector<LightSetting> settings_of_light(const BenchParts& parts) {
   const sim::SceneSpec scene = bench_scene(parts.device, parts.presses, parts.presses.holds.front(), 1);
   std::vector<LightSetting> tries;
   using sim::Switch;
@@ -93,7 +93,7 @@ BenchCurve light_curve(const BenchParts& parts, const TruePictures& truth, std::
   curve.once = "a scene's camera, s";
   curve.each = "a picture, s";
   curve.work = "paths a pixel";
-  tries = ways_of_light(parts);
+  tries = settings_of_light(parts);
   std::int64_t done = 0;
   bool enough = false;
   double last_s = 0.0;  // of paths; half of the noise takes four times as much

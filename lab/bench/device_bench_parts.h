@@ -87,7 +87,7 @@ LightSetting try_light(const BenchParts& parts, const TruePictures& truth, const
                        const fem::Compliance& gel, LightSetting one, std::uint64_t seed, BenchPoint& point);
 
 /// The curves of light, samples, bands, the fine contact's pixels and events, as far as the device has them. `tries`
-/// gets the ways of light that were tried.
+/// gets the settings of light that were tried.
 std::vector<BenchCurve> light_curves(const BenchParts& parts, std::vector<LightSetting>& tries,
                                      const Progress& progress);
 

@@ -88,7 +88,7 @@ std::string csv_of(const DeviceBench& bench) {
   return csv;
 }
 
-/// A way of light's words, short enough for a legend; + for what the plan leaves out.
+/// A light setting's words, short enough for a legend; + for what the plan leaves out.
 std::string short_name(std::string words) {
   const std::size_t exact = words.find(", with ");
   if (exact != std::string::npos) words = words.substr(0, exact) + " +";

@@ -48,7 +48,7 @@ struct MarkerTruth {
   double stick = 0.0, slip = 0.0;                          ///< share of the square's area whose vertices do
 };
 
-/// One state of a probe's way.
+/// One state of a probe's path.
 struct ForceFrame {
   const ForceProbe& probe;
   const fem::PressState& press;

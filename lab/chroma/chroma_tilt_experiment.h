@@ -18,7 +18,7 @@ struct TiltReading {
   double hue = 0.0;  ///< radians, -pi to pi, 0 is red: circular mean over pixels of more than half saturation
   Eigen::Vector2d ink_px = Eigen::Vector2d::Zero();  ///< centroid of the ink
   double ink_area_px = 0.0;                          ///< pixels counted by what ink covers of them
-  double ink_width_px = 0.0;      ///< the wider way across the ink: of a square its side, root of 12 times the variance
+  double ink_width_px = 0.0;      ///< the ink's larger width: of a square its side, root of 12 times the variance
   double coloured_area_px = 0.0;  ///< number of pixels of more than half saturation
 };
 /// `picture` as tilt_picture gives it. Ink is looked for in saturated pixels only, as the paper does, since a ball
@@ -41,7 +41,7 @@ struct TiltError {
   double hue_change = 0.0;  ///< radians, from level
   double normal_um = 0.0;   ///< by the hue: towards the film
   double size_um = 0.0;     ///< by the ink's area: towards the film
-  double width_um = 0.0;    ///< by the ink's wider way, which a tilt leaves as it is: towards the film
+  double width_um = 0.0;    ///< by the ink's larger width, which a tilt leaves as it is: towards the film
   double lateral_um = 0.0;  ///< by the ink's centroid: along x, to the side that is tilted towards the film
   double across_um = 0.0;   ///< likewise along y
 };

@@ -101,7 +101,7 @@ void add_table_error(const DvsGraspBench& bench, const sim::MembraneCamera& came
   RandomStream numbers(kSeed, 0, Purpose::kGrasp);
   double worst = 0.0;
   for (int k = 0; k < count; ++k) {
-    // Evenly over the way that the light goes, which is mostly near the touch.
+    // Evenly over the range that the light goes through, which is mostly near the touch.
     const std::vector<double>& travels = light.travels_mm();
     const auto place = std::min(static_cast<std::size_t>(numbers.uniform() * static_cast<double>(travels.size() - 1)),
                                 travels.size() - 2);

@@ -38,7 +38,7 @@ struct FitCertainty {
 
 /// With J^T J = V S^2 V^T a combination v_k has the standard error s / S_k, where s is the root mean square misfit
 /// (at least 1; pictures' and numbers' apart): what is wrong with the model widens all intervals. Errors of a model are
-/// alike over some way in the picture, and in all pictures, so that pixels count for less than they are: a shared
+/// alike over some distance in the picture, and in all pictures, so that pixels count for less than they are: a shared
 /// variable's standard error is at least the delete-a-group jackknife's, whose groups are tiles ([Efron1993, sec.
 /// 11.5]; one Gauss-Newton step for each tile left out, the other variables held). What pictures leave open of a
 /// variable that isn't shared, and that a single tile may tell, is widened by `alike`, by which sums of residuals over

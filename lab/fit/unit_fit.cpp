@@ -74,19 +74,19 @@ Variables variables_of(const PreparedFit& fit, const std::vector<PressPose>& pos
       ranges.emplace_back(low - label, high - label);
     };
     if (press.place_sd_mm > 0.0) {
-      const double way = kLabelRange * press.place_sd_mm;
-      free(PoseVariable::Of::x, press.place_mm.x(), press.place_sd_mm, press.place_mm.x() - way,
-           press.place_mm.x() + way);
-      free(PoseVariable::Of::y, press.place_mm.y(), press.place_sd_mm, press.place_mm.y() - way,
-           press.place_mm.y() + way);
+      const double half = kLabelRange * press.place_sd_mm;
+      free(PoseVariable::Of::x, press.place_mm.x(), press.place_sd_mm, press.place_mm.x() - half,
+           press.place_mm.x() + half);
+      free(PoseVariable::Of::y, press.place_mm.y(), press.place_sd_mm, press.place_mm.y() - half,
+           press.place_mm.y() + half);
     }
     if (!press.depth_mm) {
       free(PoseVariable::Of::depth, poses[i].depth_mm, 0.0, kLeastDepth_mm, fit.deepest_mm);
     } else if (press.depth_sd_mm > 0.0) {
-      const double way = kLabelRange * press.depth_sd_mm;
+      const double half = kLabelRange * press.depth_sd_mm;
       free(PoseVariable::Of::depth, *press.depth_mm, press.depth_sd_mm,
-           std::min(*press.depth_mm, std::max(kLeastDepth_mm, *press.depth_mm - way)),
-           std::max(*press.depth_mm, std::min(fit.deepest_mm, *press.depth_mm + way)));
+           std::min(*press.depth_mm, std::max(kLeastDepth_mm, *press.depth_mm - half)),
+           std::max(*press.depth_mm, std::min(fit.deepest_mm, *press.depth_mm + half)));
     }
   }
   const auto count = static_cast<Eigen::Index>(ranges.size());

@@ -44,7 +44,7 @@ std::string failure_of(const std::vector<GraspMoment>& moments, const GraspLoopS
   const auto frames = static_cast<int>(moments.size());
   const GraspMoment& then = moments[static_cast<std::size_t>(std::max(0, frames - 1 - hold_frames))];
   if (last.truth.slid_mm - then.truth.slid_mm > kStill_mm) return "slides while it is held";
-  if (last.truth.object_height_mm < 0.5 * settings.arm.height_mm) return "lifted less than half-way";
+  if (last.truth.object_height_mm < 0.5 * settings.arm.height_mm) return "lifted less than half the height";
   return "";
 }
 
@@ -78,20 +78,20 @@ GraspOutcome run_grasp_trial(const sim::VirtualSensor& sensor, const GraspTrial&
 
   GraspOutcome outcome;
   sensors::GraspCommand command;
-  std::deque<cv::Mat> on_their_way;  // frames that were taken and haven't arrived
+  std::deque<cv::Mat> in_transit;  // frames that were taken and haven't arrived
   int frame = 0;
-  for (; frame < lag_frames; ++frame) on_their_way.push_back(sensor.background(trial.noise_seed, frame));
+  for (; frame < lag_frames; ++frame) in_transit.push_back(sensor.background(trial.noise_seed, frame));
   int held_frames = 0;
   const int last_frame = frames_in(settings.longest_s);
   for (int k = 0; k < last_frame; ++k, ++frame) {
     const double acceleration = arm.next(command.lift, dt);
     const sim::GripperState& truth = gripper.advance(command.close_by_mm, acceleration, dt);
-    on_their_way.push_back(sensor.capture(object, gripper.press(), trial.noise_seed, frame, false).frame);
+    in_transit.push_back(sensor.capture(object, gripper.press(), trial.noise_seed, frame, false).frame);
     GraspMoment moment;
     moment.truth = truth;
-    moment.sight = senses(on_their_way.front());
+    moment.sight = senses(in_transit.front());
     moment.sight.lifted = arm.done();
-    on_their_way.pop_front();
+    in_transit.pop_front();
     command = rule.next(moment.sight);
     moment.phase = command.phase;
     outcome.moments.push_back(moment);

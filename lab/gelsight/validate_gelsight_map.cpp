@@ -1,5 +1,5 @@
-// Localisation, mapping and insertion by touch: the published figures of [Li2015, ch. 3]. Touches go the whole way:
-// gel, light, imager, height estimator calibrated by ball presses, registration.
+// Localisation, mapping and insertion by touch: the published figures of [Li2015, ch. 3]. Touches go through the whole
+// chain: gel, light, imager, height estimator calibrated by ball presses, registration.
 
 #include <fmt/format.h>
 

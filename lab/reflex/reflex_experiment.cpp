@@ -21,14 +21,14 @@ double mean_of_times(const GrabbedImage& grabbed) {
 
 ReflexMotion reciprocation(double from_mm, double to_mm, double speed_mm_s) {
   TS_ASSERT(to_mm > from_mm && speed_mm_s > 0.0);
-  const double way_mm = to_mm - from_mm;
+  const double travel_mm = to_mm - from_mm;
   return [=](double t_s) {
-    const double gone_mm = std::fmod(speed_mm_s * std::max(t_s, 0.0), 2.0 * way_mm);
-    return from_mm + std::min(gone_mm, 2.0 * way_mm - gone_mm);
+    const double gone_mm = std::fmod(speed_mm_s * std::max(t_s, 0.0), 2.0 * travel_mm);
+    return from_mm + std::min(gone_mm, 2.0 * travel_mm - gone_mm);
   };
 }
 
-ReflexMotion one_way(double from_mm, double to_mm, double speed_mm_s) {
+ReflexMotion single_stroke(double from_mm, double to_mm, double speed_mm_s) {
   TS_ASSERT(to_mm > from_mm && speed_mm_s > 0.0);
   return [=](double t_s) { return std::min(from_mm + speed_mm_s * std::max(t_s, 0.0), to_mm); };
 }
@@ -41,7 +41,7 @@ std::vector<ReflexPoint> record_points(const ReflexBench& bench, const ReflexTou
   cv::Mat light;
   for (int frame = 1; static_cast<int>(record.size()) < points; ++frame) {
     const double place_mm = motion(chip.next_middle_s());
-    touch.way.light_at(place_mm, light);
+    touch.path_light.light_at(place_mm, light);
     const ChipStatistics told = chip.expose(light).statistics;
     if (frame % every == 0) record.push_back({told, touch.truth(place_mm)});
   }
@@ -97,7 +97,7 @@ std::vector<ReflexPicture> record_pictures(const ReflexBench& bench, const Refle
                                            const ReflexMotion& motion, int pictures, std::uint64_t noise_seed) {
   render::MotionChip chip = bench.start_chip(noise_seed);
   std::vector<ReflexPicture> record;
-  for (GrabbedImage& grabbed : record_images(touch.way, motion, chip, pictures)) {
+  for (GrabbedImage& grabbed : record_images(touch.path_light, motion, chip, pictures)) {
     const double middle_s = mean_of_times(grabbed);
     record.push_back({std::move(grabbed), touch.truth(motion(middle_s))});
   }
@@ -110,7 +110,7 @@ std::vector<ReflexPicture> record_still(const ReflexBench& bench, const ReflexTo
   std::vector<ReflexPicture> record;
   for (const double place_mm : places_mm) {
     const ReflexMotion still = [place_mm](double) { return place_mm; };
-    record.push_back({std::move(record_images(touch.way, still, chip, 1).front()), touch.truth(place_mm)});
+    record.push_back({std::move(record_images(touch.path_light, still, chip, 1).front()), touch.truth(place_mm)});
   }
   return record;
 }
@@ -242,7 +242,7 @@ Collision collide(const ReflexBench& bench, const ReflexTouch& touch, Watcher wa
   sensors::ExploreTracker tracker(rest, {});
   cv::Mat light;
   return play_collision(collision, plate, [&](double t_s, double press_mm) -> std::optional<double> {
-    touch.way.light_at(press_mm, light);
+    touch.path_light.light_at(press_mm, light);
     const render::ChipFrame frame = chip.expose(light);
     if (watcher == Watcher::reflex) {
       if (!loop.next(frame.statistics).stop) return {};

@@ -18,7 +18,7 @@ namespace touchstone::lab {
 /// There and back between two places at one speed, beginning at the first.
 ReflexMotion reciprocation(double from_mm, double to_mm, double speed_mm_s);
 /// Straight on from one place to another, and then staying there.
-ReflexMotion one_way(double from_mm, double to_mm, double speed_mm_s);
+ReflexMotion single_stroke(double from_mm, double to_mm, double speed_mm_s);
 
 /// A frame's statistics and what was true in the middle of its exposure.
 struct ReflexPoint {

@@ -92,7 +92,7 @@ const ReflexTouch& ReflexBench::touch(const std::string& name) const {
 
 ReflexBench set_up_reflex_bench(const sim::DeviceSpec& device, const std::filesystem::path& cache_folder,
                                 std::span<const ReflexTouchSpec> specs, const ReflexLightSettings& light,
-                                const ReflexWaySettings& way, const Progress& progress) {
+                                const ReflexPathLightSettings& path_light, const Progress& progress) {
   if (specs.empty()) fail("a bench needs a touch");
   ReflexBench bench;
   bench.device = device;
@@ -127,11 +127,14 @@ ReflexBench set_up_reflex_bench(const sim::DeviceSpec& device, const std::filesy
       bench.light_error = optics.error();
       bench.chip = sim::motion_chip(device, optics.bands(), true);
     }
-    const ReflexWay::Picture picture = [&](double place) {
+    const ReflexPathLight::Picture picture = [&](double place) {
       return optics.irradiance(skin_sheet(skin, played[i].state(place), shape));
     };
-    ReflexTouch touch{
-        specs[i].name, played[i].at, {}, ReflexWay(picture, played[i].at, bench.chip, way), played[i].stopped};
+    ReflexTouch touch{specs[i].name,
+                      played[i].at,
+                      {},
+                      ReflexPathLight(picture, played[i].at, bench.chip, path_light),
+                      played[i].stopped};
     for (std::size_t k = 0; k < played[i].states.size(); ++k) {
       touch.states.push_back(truth_of(specs[i].path.points[k], played[i].states[k]));
     }

@@ -1,6 +1,6 @@
 #pragma once
 // Touches of the reflex fingertip, ready to be shown to its chip: what presses at finite strain gave, and the light of
-// any place on their ways.
+// any place on their paths.
 
 #include <Eigen/Core>
 #include <filesystem>
@@ -17,7 +17,7 @@
 
 namespace touchstone::lab {
 
-/// What is true at a place of a touch's way.
+/// What is true at a place of a touch's path.
 struct ReflexTruth {
   bool contact = false;
   double press_mm = 0.0;  ///< from where the object touches; the gap, negative, where it doesn't
@@ -26,13 +26,13 @@ struct ReflexTruth {
   Eigen::Vector2d shear_N = Eigen::Vector2d::Zero();     ///< of the object on the fingertip, along its motion
 };
 
-/// A touch that was played and can be looked at. Places are those of its path, depths or ways in mm; negative ones are
-/// gaps over the touch.
+/// A touch that was played and can be looked at. Places are those of its path, depths or travels in mm; negative ones
+/// are gaps over the touch.
 struct ReflexTouch {
   std::string name;
   std::vector<double> at;           ///< of its states, rising from 0
   std::vector<ReflexTruth> states;  ///< as many
-  ReflexWay way;
+  ReflexPathLight path_light;
   std::string stopped;  ///< why the path could be played no further; empty if it could
 
   double end() const { return at.back(); }
@@ -67,6 +67,6 @@ struct ReflexBench {
 /// @throws Error as its parts, for a path that doesn't begin with a touch at 0, and if none has two states
 ReflexBench set_up_reflex_bench(const sim::DeviceSpec& device, const std::filesystem::path& cache_folder,
                                 std::span<const ReflexTouchSpec> specs, const ReflexLightSettings& light = {},
-                                const ReflexWaySettings& way = {}, const Progress& progress = {});
+                                const ReflexPathLightSettings& path_light = {}, const Progress& progress = {});
 
 }  // namespace touchstone::lab

@@ -19,7 +19,7 @@ namespace touchstone::lab {
 namespace {
 
 constexpr double kSpeed_mm_s = 2.0;  // the paper's reciprocation
-constexpr double kGap_mm = 1.0;      // how far it goes back over the touch: fig. 6 shows some way without force
+constexpr double kGap_mm = 1.0;      // how far it goes back over the touch: fig. 6 shows some travel without force
 constexpr double kDeepest_mm = 5.0;
 constexpr double kPublishedError_percent = 2.1, kPublishedMissed_N = 0.09;
 constexpr double kPublishedRms_N = 0.65, kPublishedLightRms_N = 0.30, kPublishedResponse_ms = 2.0;
@@ -47,14 +47,14 @@ struct Scale {
       : mesh(quick ? 2.0 : 1.0), every(quick ? 9 : 36), pictures(quick ? 150 : 1000), crashes(quick ? 2 : 8) {
     if (!quick) return;
     light.side = 4;
-    way.allowed = 1.0 / 63;
+    path_light.allowed = 1.0 / 63;
   }
   double mesh;   ///< edges, in those of the device
   int every;     ///< frames a training point: 1000 points over one reciprocation or four
   int pictures;  ///< of explore mode's record
   int crashes;   ///< for each speed and watcher, at other phases of the frames
   ReflexLightSettings light;
-  ReflexWaySettings way;
+  ReflexPathLightSettings path_light;
 };
 
 std::string says(const ReflexScore& score) {
@@ -121,11 +121,11 @@ sensors::ReflexModel add_reflex_rows(const ReflexBench& bench, const Scale& scal
                    Better::lower, kPublishedError_percent, false, other.error_percent);
   rows.add_bounded("again.rms_N", fmt::format("its force; with products {:.2f}", score_reflex(curved, again).rms_N),
                    "N", Better::lower, kPublishedRms_N, false, other.rms_N);
-  // Once along all of a touch's way, some 1000 points.
+  // Once along all of a touch's path, some 1000 points.
   const auto along = [&](const ReflexTouch& touch, std::uint64_t seed) {
     const int frames = static_cast<int>((touch.end() + kGap_mm) / kSpeed_mm_s * bench.chip.frame_rate_Hz);
     const int every = std::max(frames / 1000, 1);
-    return record_points(bench, touch, one_way(-kGap_mm, touch.end(), kSpeed_mm_s), frames / every, every, seed);
+    return record_points(bench, touch, single_stroke(-kGap_mm, touch.end(), kSpeed_mm_s), frames / every, every, seed);
   };
   for (const ReflexTouch& touch : bench.touches) {
     if (&touch == &plate) continue;
@@ -214,7 +214,7 @@ void add_shear_rows(const ReflexBench& bench, const sensors::ReflexModel& reflex
     std::vector<sensors::ExploreReading> readings;
   };
   const auto record = [&](const ReflexTouch& touch, std::uint64_t seed) {
-    const ReflexMotion motion = one_way(-kGap_mm, touch.end(), kSpeed_mm_s);
+    const ReflexMotion motion = single_stroke(-kGap_mm, touch.end(), kSpeed_mm_s);
     const double seconds = (touch.end() + kGap_mm) / kSpeed_mm_s;
     const int frames = static_cast<int>(seconds * bench.chip.frame_rate_Hz);
     Record one;
@@ -306,7 +306,7 @@ void add_collision_rows(const ReflexBench& bench, const sensors::ReflexModel& re
 void add_fault_rows(const ReflexBench& bench, const sensors::ReflexModel& reflex, RowList& rows) {
   const cv::Mat rest = rest_picture(bench, 8, kRest);
   cv::Mat light, bare;
-  bench.touches.front().way.light_at(0.0, light);
+  bench.touches.front().path_light.light_at(0.0, light);
   const cv::Scalar mean = cv::mean(light);
   bare = cv::Mat(light.size(), light.type(), mean);
   struct Case {
@@ -354,7 +354,7 @@ std::vector<ValidationRow> validate_reflex(const ValidateOptions& options) {
   device.mesh.fine_mm *= scale.mesh;
   device.mesh.coarse_mm *= scale.mesh;
   const ReflexBench bench = set_up_reflex_bench(device, options.cache, reflex_row_touches(options.quick), scale.light,
-                                                scale.way, options.progress);
+                                                scale.path_light, options.progress);
   const ReflexTouch& plate = bench.touch("plate");
   rows.add_bounded("law.rms_N", "force of a plate from 0 to 5 mm, of finite elements, against eq. 1", "N",
                    Better::lower, kReflexLawRms_N, true,

@@ -148,13 +148,13 @@ std::vector<double> colour_design(const ColourDesignSpec& spec, const sim::Devic
   }
   // A model that isn't linear has to see shear in more than one direction; at depths between those that are tested.
   for (std::size_t k = 0; k + 1 < depths.size(); ++k) {
-    const Eigen::Vector2d way(spec.shear_mm, spec.shear_mm);
-    add(shear_series(bench, test, 0.5 * (depths[k] + depths[k + 1]), way, spec.shear_steps, kDiagonal + k));
+    const Eigen::Vector2d shear(spec.shear_mm, spec.shear_mm);
+    add(shear_series(bench, test, 0.5 * (depths[k] + depths[k + 1]), shear, spec.shear_steps, kDiagonal + k));
   }
   std::vector<MarkerSeries> tests;
   for (std::size_t k = 1; k < depths.size(); ++k) {
-    const Eigen::Vector2d way(spec.shear_mm, spec.shear_mm);
-    tests.push_back(shear_series(bench, test, depths[k], way, spec.shear_steps, kTest + k));
+    const Eigen::Vector2d shear(spec.shear_mm, spec.shear_mm);
+    tests.push_back(shear_series(bench, test, depths[k], shear, spec.shear_steps, kTest + k));
     flawed += tests.back().flawed;
   }
   const sensors::HueModel model = best_hue_model(bench, samples, forms_of_one_marker(), HueAim::displacement);

@@ -17,7 +17,7 @@ namespace touchstone::lab {
 /// A column.
 struct DesignFigure {
   std::string name;               ///< "force_error_N", with its unit
-  Better better = Better::lower;  ///< `near`: neither way is
+  Better better = Better::lower;  ///< `near`: neither is
   std::string meaning;            ///< one sentence
 };
 

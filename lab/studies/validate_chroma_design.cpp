@@ -127,15 +127,15 @@ void add_tilt_rows(const ValidateOptions& options, std::vector<ValidationRow>& r
        [](const TiltError& e) { return std::hypot(e.lateral_um, e.across_um); }, kTextError_um},
       {"hue_deg", "change of hue", "deg", [](const TiltError& e) { return std::abs(e.hue_change) / kRadiansPerDegree; },
        std::nullopt},
-      {"width_um", "depth by the wider way across the ink", "um",
-       [](const TiltError& e) { return std::abs(e.width_um); }, kTextError_um},
+      {"width_um", "depth by the ink's larger width", "um", [](const TiltError& e) { return std::abs(e.width_um); },
+       kTextError_um},
   };
   const double seconds = seconds_since(begun);
   for (const TiltCase& one : cases) {
     const OverSeeds of_flat = over_seeds(flat, one.figure);
     const OverSeeds of_ball = over_seeds(ball, one.figure);
     for (const bool is_ball : {false, true}) {
-      // A ball has no wider way across.
+      // A ball has no larger width.
       if (is_ball && std::string(one.id) == "width_um") continue;
       const OverSeeds& ours = is_ball ? of_ball : of_flat;
       ValidationRow row;

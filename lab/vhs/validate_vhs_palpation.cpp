@@ -151,7 +151,7 @@ std::vector<ValidationRow> validate_vhs_palpation(const ValidateOptions& options
       kPublished1000);
   add("levels_500Hz_percent", "every second sample", at_500, kPublished500);
   add("levels_250Hz_percent", "every fourth", at_250, kPublished250);
-  // More levels than the paper's at 250 Hz are no success where nothing was lost on the way there.
+  // More levels than the paper's at 250 Hz are no success where nothing was lost before.
   constexpr double kPublishedDrop = kPublished1000 - kPublished250;
   if (mean_of(drop) < kPublishedDrop - kAllowedDrop) {
     deny(rows.last(), "at 250 Hz levels are lost that 500 and 1000 Hz tell");

@@ -42,7 +42,7 @@ std::vector<ValidationRow> validate_vhs_vibration(const ValidateOptions& options
   const sim::MotionSpec motion = sim::read_scene(options.scenes / "vhs" / "vibration.yaml").motion;
   std::vector<double> told, truth;
   for (const ForceRecord& record : records) {
-    if (record.frame <= motion.keys.front().frames) continue;  // the way to the preload
+    if (record.frame <= motion.keys.front().frames) continue;  // the approach to the preload
     told.push_back(record.estimate.force.z());
     truth.push_back(record.truth.value().z());
   }

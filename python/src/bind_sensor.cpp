@@ -69,8 +69,8 @@ std::shared_ptr<Touch> press(const Sensor& sensor, const py::object& touched, st
                              std::optional<double> force_N, const py::object& at_mm, const py::object& angles_deg,
                              const py::object& pose, const py::object& shear_mm, const py::object& shear_N,
                              double seconds, std::uint64_t noise_seed, int frame, bool look, bool truth) {
-  const int ways = (depth_mm ? 1 : 0) + (force_N ? 1 : 0) + (pose.is_none() ? 0 : 1);
-  if (ways != 1) fail("press: exactly one of depth_mm, force_N and pose says how far; {} of them are given", ways);
+  const int given = (depth_mm ? 1 : 0) + (force_N ? 1 : 0) + (pose.is_none() ? 0 : 1);
+  if (given != 1) fail("press: exactly one of depth_mm, force_N and pose says how far; {} of them are given", given);
   if (!shear_mm.is_none() && !shear_N.is_none()) fail("press: shear_mm and shear_N exclude each other");
   sim::PressSpec order;
   order.depth_mm = depth_mm;

@@ -261,7 +261,7 @@ cv::Mat expose(const cv::Mat& irradiance, const Imager& imager, const FixedPatte
     fail("irradiance must be a picture of 32 bit floats that isn't empty");
   }
   if (irradiance.cols > kLongestSide || irradiance.rows > kLongestSide) {
-    fail("irradiance has {}x{} pixels; allowed is up to {} each way", irradiance.cols, irradiance.rows, kLongestSide);
+    fail("irradiance has {}x{} pixels; allowed is up to {} each", irradiance.cols, irradiance.rows, kLongestSide);
   }
   if (irradiance.channels() != imager.wavelengths_nm.size()) {
     fail("irradiance has {} bands, the imager has {}", irradiance.channels(), imager.wavelengths_nm.size());

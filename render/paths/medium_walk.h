@@ -63,7 +63,7 @@ class MediumWalk {
   /// there is no room.
   [[gnu::noinline]] bool jump(Leg& leg, SampleSequence& numbers) const {
     const DeepWalk<N>& walk = scene_.media[leg.medium].deep;
-    // Light that isn't even after a scattering stands for a place further on. Bands take their mean one: ways along
+    // Light that isn't even after a scattering stands for a place further on. Bands take their mean one: paths along
     // which walks come are even this deep, so what is left is of second order.
     const Eigen::Vector3d centre =
         leg.origin + (leg.throughput * walk.drift).sum() / leg.throughput.sum() * leg.direction;

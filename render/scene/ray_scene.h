@@ -62,7 +62,7 @@ class RayScene {
   /// none.
   double refractive_along_z(const Eigen::Vector3d& origin, bool up, double most) const;
 
-  /// Are there Refractive surfaces, and does one cross the way between two points?
+  /// Are there Refractive surfaces, and does one cross the line between two points?
   bool has_refractive() const;
   bool meets_refractive(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const;
   /// How far the nearest surface or ball is from a point, if that is less than `most` (mm, finite); else `most`.

@@ -51,7 +51,7 @@ struct BeadLook {
   double min_difference = 15.0;
   /// Largest ratio of the region's principal second moments; 1 is a disc, half a disc has 3.6.
   double max_elongation = 4.0;
-  /// Largest ratio, either way, between the region's area and the bead's own area in the frames before.
+  /// Largest ratio, of either to the other, between the region's area and the bead's own area in the frames before.
   double max_area_change = 2.0;
   /// A bead's core: what Otsu's method highlights among the bead's own pixels. Its least part of the usual area (also
   /// that of the darkest pixels, where there is no such core; 1 = no cores), its largest elongation, and how far its

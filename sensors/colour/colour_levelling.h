@@ -47,7 +47,7 @@ class ColourLevelling {
   cv::Size size_;
   cv::Mat small_bytes_, small_, white_, gain_;
   std::vector<int> left_;             ///< for each column, the reduced one to its left, times 3
-  std::vector<float> towards_right_;  ///< and the part of the way to the next
+  std::vector<float> towards_right_;  ///< and the fraction of the distance to the next
   std::vector<float> row_gain_;
   cv::Mat levelled_;
 };

@@ -5,7 +5,7 @@
 // What the paper leaves open, and what is done here:
 // - Ink takes green out of white and hardly blue, the filter takes blue and hardly green. So green tells where ink is
 //   and blue where filter is, each against the pixel's own largest channel: a shadow darkens all channels and changes
-//   neither. How far a pixel is on the way from white to the full colour, which the picture at rest shows, is how much
+//   neither. How far a pixel is on the line from white to the full colour, which the picture at rest shows, is how much
 //   of it is covered. Patches of ink are connected pixels of more than 0.7, so those with a blurred gap stay apart.
 // - Filters are rigid: where they are is known from the picture at rest. A patch of ink belongs to the filter that most
 //   of it is under (ink_ownership.h), what is filter without ink to that filter's cell. So regions that touch are told

@@ -1,5 +1,5 @@
 #pragma once
-// The check that every event passes on its way from or into a file.
+// The check that every event passes when it is read from or written to a file.
 
 #include <cstdint>
 #include <limits>

@@ -147,7 +147,7 @@ LampModel fit_lamps(std::span<const ColourSample> samples, const cv::Size& size,
   }
   const Eigen::LDLT<Eigen::Matrix3d> factor(all.normal);
   if (factor.info() != Eigen::Success || !(factor.vectorD().minCoeff() > 1e-9 * all.normal.trace())) {
-    fail("the presses' slopes don't determine the lamps: they have to point all ways");
+    fail("the presses' slopes don't determine the lamps: they have to point in all directions");
   }
   const Eigen::Matrix3d mean = factor.solve(all.right).transpose();
   LampModel model{size.width, size.height, how.columns, how.rows, {}};

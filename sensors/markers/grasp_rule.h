@@ -7,7 +7,7 @@
 
 namespace touchstone::sensors {
 
-/// How the rule goes about. Lengths are of one finger's way: a gripper of two fingers closes by twice that.
+/// How the rule goes about. Lengths are of one finger's travel: a gripper of two fingers closes by twice that.
 struct GraspRuleSettings {
   /// Touch is where the height map's maximum exceeds this. The thesis's threshold is 2 without a unit; in a map that is
   /// integrated from slopes without a pixel pitch that is two pixels, 0.106 mm. Less takes less force to see a touch
@@ -45,7 +45,7 @@ enum class GraspPhase {
   touched,        ///< the threshold is exceeded, but not yet in enough frames: the gripper waits
   lifting,        ///< the arm moves up
   holding,        ///< lifted, and no slip since
-  nothing_there,  ///< ends: closed all the way without touch
+  nothing_there,  ///< ends: closed completely without touch
   slipping,       ///< ends: slip is seen, and the limits forbid to close further
   lost            ///< ends: the touch has gone
 };

@@ -17,7 +17,7 @@ namespace touchstone::sim {
 
 struct ReferenceForceSensorSettings {
   double window_s = 0.007;  ///< one reading each (sec. V.B)
-  /// The reading on the way back from a peak P less that on the way there is this part of P at no force, where it is
+  /// The reading on unloading from a peak P less that on loading is this part of P at no force, where it is
   /// largest. Rate-independent; see HysteresisLoop.
   double hysteresis = 0.045;
   double gain_error = 0.025;       ///< repeatability: each grasp has its gain within 1 +- that

@@ -21,7 +21,7 @@ struct TouchSessionSettings {
   /// How far the object may go in a step that begins in contact, mm, turns included. More is taken for a mistake of the
   /// caller's (metres for millimetres, another frame's pose), unless it ends well off the gel.
   double largest_step_mm = 5.0;
-  /// Steps with friction are cut into parts of this length: friction depends on the way, not on its ends alone.
+  /// Steps with friction are cut into parts of this length: friction depends on the path, not on its ends alone.
   double largest_part_mm = 0.1;
 };
 
@@ -63,7 +63,7 @@ class TouchSession {
   TouchSession(TouchSession&&) noexcept;
   TouchSession& operator=(TouchSession&&) noexcept;
 
-  /// Leads the object along the straight way to a pose within `seconds`. The first step places it there: a contact it
+  /// Leads the object along the straight path to a pose within `seconds`. The first step places it there: a contact it
   /// then has was made straight from above.
   /// @throws Error, the session being as before the step, for a time that isn't finite and above 0; a pose that isn't
   /// finite or whose rotation isn't one; a step beyond TouchSessionSettings; a pose deeper than the gel; an iteration

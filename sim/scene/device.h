@@ -172,7 +172,7 @@ struct CameraSpec {
   std::vector<double> distortion;                ///< lens: OpenCV's k1 k2 p1 p2 [k3 [k4 k5 k6]]; empty: none
   Eigen::Vector3d hole_position_mm = Eigen::Vector3d::Zero();  ///< of a lens its centre: `lens_position_mm` in the file
   Eigen::Vector3d look_at_mm = Eigen::Vector3d::Zero();
-  double roll_deg = 0.0;  ///< about its axis; what it sees turns the other way in its picture
+  double roll_deg = 0.0;  ///< about its axis; what it sees turns in the opposite direction in its picture
   double exposure_us = 1000.0;
   double row_time_us = 0.0;  ///< from row to row of a rolling shutter, the top row first; 0: all rows at once
   int bits = 8;              ///< 1 to 16

@@ -52,9 +52,9 @@ Eigen::AlignedBox3d displacements(std::span<const Truth> truths) {
 Eigen::AlignedBox3d reach_of(const render::Scene& rest, const render::Scene& pressed, std::span<const Truth> truths,
                              double back_z) {
   const Eigen::AlignedBox3d still = lit_box(rest);
-  const Eigen::AlignedBox3d way = displacements(truths);
-  const double spare = kSpareReachMm + kSpareReach * way.sizes().maxCoeff();
-  Eigen::AlignedBox3d box(still.min() + way.min(), still.max() + way.max());
+  const Eigen::AlignedBox3d displacement = displacements(truths);
+  const double spare = kSpareReachMm + kSpareReach * displacement.sizes().maxCoeff();
+  Eigen::AlignedBox3d box(still.min() + displacement.min(), still.max() + displacement.max());
   box.extend(lit_box(pressed));
   box.min().array() -= spare;
   box.max().array() += spare;

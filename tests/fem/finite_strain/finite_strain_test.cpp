@@ -254,7 +254,8 @@ TEST(FiniteStrain, WorkOfTheLoadIsTheStoredEnergy) {
     before = now;
   }
   EXPECT_NEAR(work, problem.stored_energy(state), 1e-3 * work);
-  EXPECT_GT(std::abs(0.5 * before - work), 5e-3 * work);  // it isn't linear here: half load times way would be wrong
+  EXPECT_GT(std::abs(0.5 * before - work),
+            5e-3 * work);  // it isn't linear here: half load times displacement would be wrong
 }
 
 /// A block between lubricated plates, incompressible: force per undeformed area G (l - 1/l^2).

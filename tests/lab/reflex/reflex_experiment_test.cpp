@@ -27,7 +27,7 @@ render::MotionChipSettings chip_settings() {
 }
 
 /// A pinhole 16 mm before dots that a plate brings nearer, 0.47 mm a pixel, with light that grows by 5 % a mm; forces
-/// by [Knoop2013, eq. 1], and shear, where the way goes on sideways by `sideways_mm` along x, of 0.5 N/mm.
+/// by [Knoop2013, eq. 1], and shear, where the path goes on sideways by `sideways_mm` along x, of 0.5 N/mm.
 ReflexTouch painted_touch(const std::string& name, double deepest_mm, double sideways_mm = 0.0,
                           double towards_rad = 0.0) {
   const render::MotionChipSettings chip = chip_settings();
@@ -35,7 +35,7 @@ ReflexTouch painted_touch(const std::string& name, double deepest_mm, double sid
   const Eigen::Vector2d towards(std::cos(towards_rad), std::sin(towards_rad));
   const auto lateral_mm = [=](double place) { return std::max(place - deepest_mm, 0.0) * towards; };
   const auto press_mm = [=](double place) { return std::clamp(place, 0.0, deepest_mm); };
-  const ReflexWay::Picture picture = [=](double place) {
+  const ReflexPathLight::Picture picture = [=](double place) {
     sensors::fixtures::FingertipPainter painter{.spacing_px = 4.3, .radius_px = 1.06, .ground = 3.0, .dot = 36.0};
     painter.gain = 1.0 + 0.05 * press_mm(place);
     const double dilation = sensors::fixtures::dilation_of(press_mm(place));
@@ -57,7 +57,7 @@ ReflexTouch painted_touch(const std::string& name, double deepest_mm, double sid
     states.push_back({place > 0.0, press_mm(place), lateral_mm(place), published_reflex_force(press_mm(place)),
                       0.5 * lateral_mm(place)});
   }
-  return {name, at, states, ReflexWay(picture, at, chip, {.allowed = 1.0 / 63}), ""};
+  return {name, at, states, ReflexPathLight(picture, at, chip, {.allowed = 1.0 / 63}), ""};
 }
 
 const ReflexBench& bench() {
@@ -97,8 +97,8 @@ TEST(ReflexMotion, GoesThereAndBack) {
   EXPECT_EQ(motion(3.0), 5.0);
   EXPECT_EQ(motion(5.5), 0.0);
   EXPECT_EQ(motion(6.0), -1.0);
-  EXPECT_EQ(one_way(-1.0, 2.0, 2.0)(1.0), 1.0);
-  EXPECT_EQ(one_way(-1.0, 2.0, 2.0)(9.0), 2.0);
+  EXPECT_EQ(single_stroke(-1.0, 2.0, 2.0)(1.0), 1.0);
+  EXPECT_EQ(single_stroke(-1.0, 2.0, 2.0)(9.0), 2.0);
 }
 
 TEST(ReflexExperiment, ScoresCountWhatIsMissedAndHowFarForcesAreOff) {
@@ -181,7 +181,7 @@ TEST(ReflexExperiment, ShearIsLearnedInBothModes) {
   std::vector<sensors::ShearSample> counts, shifts;
   for (std::size_t i = 1; i < bench().touches.size(); ++i) {
     const ReflexTouch& touch = bench().touches[i];
-    const ReflexMotion motion = one_way(-0.5, touch.end(), 2.0);
+    const ReflexMotion motion = single_stroke(-0.5, touch.end(), 2.0);
     const int frames = static_cast<int>(1500.0 * (touch.end() + 0.5) / 2.0);
     const auto told = reflex_shear_samples(reflex, record_points(bench(), touch, motion, frames, 1, i), 10);
     counts.insert(counts.end(), told.begin(), told.end());

@@ -113,14 +113,14 @@ TEST(CentroidBound, IsReachedByTheEfficientEstimateFromExposedFrames) {
 }
 
 TEST(PictureInformation, OnAShiftIsThatOfTheShift) {
-  // Where only the spot moves, the whole picture knows what the spot's surroundings know: gradients the one way,
+  // Where only the spot moves, the whole picture knows what the spot's surroundings know: gradients in one direction,
   // pictures of moved spots the other.
   for (const render::Imager& imager : {grey_imager(5.0), colour_imager()}) {
     const Eigen::Vector2d centre(31.4, 32.9);
     const cv::Mat light = spot(imager, 6000.0, 0.8, 4.0, centre);
     std::vector<cv::Mat> slopes;
-    for (const Eigen::Vector2d& way : {Eigen::Vector2d(1, 0), Eigen::Vector2d(0, 1)}) {
-      slopes.push_back((spot(imager, 6000.0, 0.8, 4.0, centre + way) - spot(imager, 6000.0, 0.8, 4.0, centre - way)) /
+    for (const Eigen::Vector2d& step : {Eigen::Vector2d(1, 0), Eigen::Vector2d(0, 1)}) {
+      slopes.push_back((spot(imager, 6000.0, 0.8, 4.0, centre + step) - spot(imager, 6000.0, 0.8, 4.0, centre - step)) /
                        2.0);
     }
     const Eigen::Matrix2d shift = shift_information(light, imager, centre, 29.0);

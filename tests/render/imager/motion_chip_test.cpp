@@ -93,7 +93,7 @@ TEST(MotionChip, ASceneAtRestDoesntMove) {
   }
 }
 
-TEST(MotionChip, CountsAddUpToTheWayHoweverSlow) {
+TEST(MotionChip, CountsAddUpToTheTravelHoweverSlow) {
   // 6.4 pixels right and 4.3 up in 64, 640 and 6400 frames: between 0.1 and 0.001 pixels a frame, there and back.
   for (const int frames : {64, 640, 6400}) {
     const MotionChipSettings chip = settings();

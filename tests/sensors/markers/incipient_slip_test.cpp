@@ -281,7 +281,7 @@ TEST(IncipientSlip, TooFewMarkersGiveNoLag) {
 }
 
 TEST(IncipientSlip, IsFoundInPictures) {
-  // The whole way: pictures, tracker, patch, detector, with noise.
+  // The whole chain: pictures, tracker, patch, detector, with noise.
   fixtures::MarkerPicture picture;
   picture.noise = 2.0;
   const auto rest = fixtures::marker_grid();

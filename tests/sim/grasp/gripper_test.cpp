@@ -178,8 +178,8 @@ TEST(Gripper, WithoutATableItFallsAsFrictionLetsIt) {
   EXPECT_NEAR(speed, expected_speed, 5e-3 * expected_speed);
   EXPECT_NEAR(gripper.state().normal_force_N, normal, 0.1 * normal);  // a ball that slides bears less towards the rim
   // What gravity gave went into motion and friction.
-  const double way = gripper.state().sunk_mm - begin;
-  const double given = mass * kGravity_mm_s2 * way;
+  const double travel = gripper.state().sunk_mm - begin;
+  const double given = mass * kGravity_mm_s2 * travel;
   EXPECT_NEAR(0.5 * mass * speed * speed + friction_work, given, 1e-6 * given);
 }
 
