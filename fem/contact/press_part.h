@@ -145,8 +145,8 @@ class PartSolver {
   Eigen::MatrixXd combined_normal_;  ///< its normal rows and columns
   ContactMemory memory_;
   std::vector<std::array<bool, 6>> remembered_axes_;
-  struct Looked;
-  std::vector<Looked> looked_;  ///< per body: the last gap and where it was looked up
+  struct CachedGap;
+  std::vector<CachedGap> cached_gaps_;  ///< per body: the last gap and where it was looked up
   std::string why_not_;
 };
 

@@ -20,16 +20,16 @@ namespace touchstone::lab {
 struct BenchPresses {
   sim::ObjectSpec object;
   double touch_mm = 0.0;  ///< see sim::first_touch(), over the middle
-  std::vector<sim::PressSpec> holds;
+  std::vector<sim::PressSpec> specs;
 };
 
 /// `count` holds near the gel's middle: places within an edge of the mesh, so that no place is luckier than another,
 /// depths within a fifth of `depth_mm`, dragged by a third of that into all directions. A pure function of its
 /// arguments.
-std::vector<sim::PressSpec> bench_holds(int count, double edge_mm, double depth_mm, std::uint64_t seed);
+std::vector<sim::PressSpec> bench_presses(int count, double edge_mm, double depth_mm, std::uint64_t seed);
 
 /// What the presses felt like: forces on the object, pressed and dragged, one after the other for each hold.
-struct FeltForces {
+struct PressForces {
   std::vector<Eigen::Vector3d> force_N;
   Eigen::MatrixX3d beads_mm;  ///< all beads of all states, one after the other
   double reach_mm = 0.0;      ///< from the gel's middle to the farthest vertex that was touched
@@ -40,14 +40,14 @@ struct FeltForces {
 /// Presses without pictures, each from a fresh start. `edge_mm` is what a relief is blurred by
 /// (sim::coarse_contact_shape).
 /// @throws Error that says which hold can't be had
-FeltForces feel(const BenchPresses& presses, const fem::Compliance& gel, const sim::DeviceSpec& device, double edge_mm,
-                const fem::PressTolerance& tolerance = {});
+PressForces solve_presses(const BenchPresses& presses, const fem::Compliance& gel, const sim::DeviceSpec& device,
+                          double edge_mm, const fem::PressTolerance& tolerance = {});
 
 /// Root mean square over the states of the force's difference, relative to the other's force.
 double force_difference(const std::vector<Eigen::Vector3d>& forces, const std::vector<Eigen::Vector3d>& than);
 
 /// The scene of one hold: three frames, at rest, pressed and dragged.
-sim::SceneSpec bench_scene(const sim::DeviceSpec& device, const BenchPresses& presses, const sim::PressSpec& hold,
+sim::SceneSpec bench_scene(const sim::DeviceSpec& device, const BenchPresses& presses, const sim::PressSpec& spec,
                            std::uint64_t seed);
 
 /// A camera of at most so many pixels out of the middle of this one, with all else as it was.

@@ -20,7 +20,7 @@ constexpr double kOverReference = 1.25;  // of the finest mesh that is tried, ti
 constexpr double kBelow = 0.97;          // of a wanted error: where to aim
 constexpr double kAboutAsGood = 1.1;     // times the best error
 constexpr int kMostVerifications = 3;
-constexpr int kVerifyingHolds = 6;
+constexpr int kVerifyingPresses = 6;
 constexpr double kMostWholeSeconds = 40.0;
 
 double frame_seconds(const LightSetting& one) {
@@ -117,7 +117,7 @@ struct Verified {
 /// The choice and the device as it is on presses that nothing was chosen by.
 Verified verify(const BenchParts& parts, const BenchChoice& choice, const LightSetting* light, std::uint64_t seed) {
   BenchParts other = parts;
-  other.presses.holds = bench_holds(kVerifyingHolds, parts.whole_device.mesh.fine_mm, parts.depth_mm, seed);
+  other.presses.specs = bench_presses(kVerifyingPresses, parts.whole_device.mesh.fine_mm, parts.depth_mm, seed);
   other.finest_forces = feel(other.presses, parts.finest_gel, parts.device, parts.finest_device.mesh.fine_mm);
   const sim::DeviceSpec device = with_edges(parts.device, choice.edges);
   const fem::Compliance gel = make_gel(device).gel;
@@ -129,7 +129,7 @@ Verified verify(const BenchParts& parts, const BenchChoice& choice, const LightS
   verified.as_is_force = off(parts.own_gel, parts.device.mesh.fine_mm);
   if (!parts.truth) return verified;
   const TruePictures truth =
-      true_pictures(other, parts.finest_device, parts.finest_gel, other.presses.holds.front(), seed);
+      true_pictures(other, parts.finest_device, parts.finest_gel, other.presses.specs.front(), seed);
   BenchPoint ignored;
   if (light != nullptr) verified.pixel = try_light(other, truth, device, gel, *light, seed + 7, ignored).pixel_error;
   verified.as_is_pixel = try_light(other, truth, parts.device, parts.own_gel, {}, seed + 8, ignored).pixel_error;
@@ -154,7 +154,7 @@ WholeSeconds whole_seconds(const BenchParts& parts, double edges, const LightSet
   }
   const sim::DeviceSpec device = with_edges(seconds.by_middle ? parts.device : parts.whole_device, edges);
   const MadeGel made = make_gel(device);
-  sim::SceneSpec scene = bench_scene(device, parts.presses, parts.presses.holds.front(), parts.settings.seed + 5);
+  sim::SceneSpec scene = bench_scene(device, parts.presses, parts.presses.specs.front(), parts.settings.seed + 5);
   if (!parts.truth) scene.outputs = {.frames = false};
   scene.light = light.light;
   scene.effects = light.effects;

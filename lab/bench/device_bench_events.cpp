@@ -106,7 +106,7 @@ BenchCurve events_curve(const BenchParts& parts, const Progress& progress) {
       kSameEvent_us);
   curve.each = "the whole press, s";
   curve.work = "pictures";
-  sim::SceneSpec scene = bench_scene(parts.device, parts.presses, parts.presses.holds.front(), parts.settings.seed);
+  sim::SceneSpec scene = bench_scene(parts.device, parts.presses, parts.presses.specs.front(), parts.settings.seed);
   scene.outputs = {};
   scene.outputs.frames = false;
   scene.outputs.events = true;

@@ -19,7 +19,7 @@ inline constexpr double kMostSeconds = 40.0;  ///< for one setting of a curve
 
 /// Pictures of one hold by the reference's light, twice without common random numbers.
 struct TruePictures {
-  sim::PressSpec hold;
+  sim::PressSpec spec;
   TwoRuns runs;
   render::Imager imager;
 };
@@ -35,7 +35,7 @@ struct BenchParts {
   double finest_edges = 0.0;  ///< times the device's
   fem::Compliance finest_gel;
   double finest_seconds = 0.0;
-  FeltForces finest_forces;               ///< of `presses`
+  PressForces finest_forces;              ///< of `presses`
   sim::EffectSwitches exact;              ///< of the reference's pictures
   std::string exact_words;                ///< ", with interreflection": what of it the plan leaves out; empty: nothing
   int reference_paths = 0;                ///< a pixel, of true pictures
@@ -57,10 +57,10 @@ MadeGel make_gel(const sim::DeviceSpec& device, fem::Element element = fem::Elem
 BenchPoint mesh_point(const BenchParts& parts, double edges);
 
 /// Paths, the same number in each pixel, with what the plan leaves out.
-sim::SceneSpec reference_scene(const BenchParts& parts, const sim::DeviceSpec& device, const sim::PressSpec& hold,
+sim::SceneSpec reference_scene(const BenchParts& parts, const sim::DeviceSpec& device, const sim::PressSpec& spec,
                                std::uint64_t seed);
 TruePictures true_pictures(const BenchParts& parts, const sim::DeviceSpec& device, const fem::Compliance& gel,
-                           const sim::PressSpec& hold, std::uint64_t seed);
+                           const sim::PressSpec& spec, std::uint64_t seed);
 
 /// Makes parts.truth and parts.own_truth, or leaves them empty; in words, which or why.
 std::string prepare_pictures(BenchParts& parts);

@@ -8,7 +8,7 @@
 
 #include "core/error.h"
 #include "core/units.h"
-#include "lab/chroma/chroma_bench.h"
+#include "lab/chroma/chroma_setup.h"
 #include "render/cameras/first_hits.h"
 #include "render/paths/path_tracer.h"
 #include "sensors/colour/hue.h"

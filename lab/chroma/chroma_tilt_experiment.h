@@ -1,6 +1,6 @@
 #pragma once
-// The tilt error of coloured markers, and spherical markers as its remedy [Lin2019, sec. V], on the bench of
-// chroma_tilt_bench.h: each kind of marker is calibrated by moving it level, then tilted about its own centre, and what
+// The tilt error of coloured markers, and spherical markers as its remedy [Lin2019, sec. V], on the setup of
+// chroma_tilt_setup.h: each kind of marker is calibrated by moving it level, then tilted about its own centre, and what
 // its picture seems to say of a displacement is the systematic error, since the centre hasn't moved.
 
 #include <cstdint>
@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "core/progress.h"
-#include "lab/chroma/chroma_tilt_bench.h"
+#include "lab/chroma/chroma_tilt_setup.h"
 
 namespace touchstone::lab {
 
@@ -59,7 +59,7 @@ std::vector<double> reported_tilts();
 
 /// Calibrates and tilts one kind of marker. Each reading is the mean over four pictures that lie half a pixel apart on
 /// the pixels, so that what is left isn't the grid's luck. @throws Error as tilt_scene and read_tilt_picture
-TiltTable measure_tilt(const TiltBench& bench, const TiltSpectra& spectra, TiltMarker marker,
+TiltTable measure_tilt(const TiltSetup& setup, const TiltSpectra& spectra, TiltMarker marker,
                        std::span<const double> tilts, std::uint64_t seed, const Progress& progress = {});
 
 /// The whole experiment: flat, rigid and ball before the far and the compact camera, on the axis.

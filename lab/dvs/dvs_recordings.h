@@ -44,14 +44,14 @@ struct DvsRecordSettings {
 DvsRecordSettings own_pixels(const sim::DeviceSpec& device);
 
 /// Plays a grasp and watches it, from the time 0 to the last moment that is played. `sink` is given the events of the
-/// first kind of pixels. The same for any number of threads. @throws Error as DvsGraspBench::play and EventPixels, for
+/// first kind of pixels. The same for any number of threads. @throws Error as DvsGraspSetup::play and EventPixels, for
 /// settings that make no sense
-DvsRecording record_dvs_grasp(const DvsGraspBench& bench, const sim::MembraneCamera& camera,
+DvsRecording record_dvs_grasp(const DvsGraspSetup& setup, const sim::MembraneCamera& camera,
                               const DvsGraspParameters& parameters, const DvsRecordSettings& settings,
                               const sim::EventSink& sink = {});
 
 /// Grasps side by side, in the order given. @throws Error as record_dvs_grasp
-std::vector<DvsRecording> record_dvs_grasps(const DvsGraspBench& bench, const sim::MembraneCamera& camera,
+std::vector<DvsRecording> record_dvs_grasps(const DvsGraspSetup& setup, const sim::MembraneCamera& camera,
                                             std::span<const DvsGraspParameters> grasps,
                                             const DvsRecordSettings& settings, const Progress& progress = {});
 

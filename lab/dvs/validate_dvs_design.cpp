@@ -21,7 +21,7 @@ namespace {
 
 constexpr double kPublishedRange_N = 3.7;
 constexpr double kHardest_N = 3.0 * kPublishedRange_N;
-constexpr double kToldShare = 0.9;
+constexpr double kUpperShare = 0.9;
 constexpr int kSteel = 3;
 constexpr double kLeastChange = 0.1;   // of a range's end: less is none
 constexpr double kFew_events = 100.0;  // a touch of so many stands out of some 35 events of noise in 7 ms
@@ -37,7 +37,7 @@ struct Membrane {
 
 struct MembraneRange {
   double low_N = 0.0;                           ///< where the contact has told kFew_events
-  double high_N = 0.0;                          ///< where it has told kToldShare of all
+  double high_N = 0.0;                          ///< where it has told kUpperShare of all
   double events = 0.0;                          ///< at kHardest_N
   double depth_mm = 0.0;                        ///< of the piece at high_N
   std::vector<std::pair<double, double>> told;  ///< events by force
@@ -85,7 +85,7 @@ MembraneRange try_membrane(const Membrane& membrane, const ValidateOptions& opti
   }
   range.events = range.told.back().second;
   range.low_N = force_at(range.told, kFew_events);
-  range.high_N = force_at(range.told, kToldShare * range.events);
+  range.high_N = force_at(range.told, kUpperShare * range.events);
   range.depth_mm = face.at_normal_force(range.high_N).approach_mm;
   return range;
 }
@@ -118,7 +118,7 @@ std::vector<ValidationRow> validate_dvs_design(const ValidateOptions& options) {
         fmt::format("{}_range_N", membrane.name),
         fmt::format("membrane of {:g} mm and {:g} MPa: force to which contact goes on to tell, {:.0f} % of {:.0f} "
                     "OFF events; from {:.2g} N on, {:.2g} mm deep",
-                    membrane.thickness_mm, membrane.youngs_modulus_MPa, 100.0 * kToldShare, range.events, range.low_N,
+                    membrane.thickness_mm, membrane.youngs_modulus_MPa, 100.0 * kUpperShare, range.events, range.low_N,
                     range.depth_mm),
         "N", range.high_N, Better::near, true);
     const bool by_thickness_alone = membrane.youngs_modulus_MPa == membranes[0].youngs_modulus_MPa;

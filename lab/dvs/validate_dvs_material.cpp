@@ -41,7 +41,7 @@ struct Alike {
   DvsSpread spread;
 };
 constexpr std::array<Alike, 3> kAlike = {
-    {{"many_benches_percent", "each on a bench of its own", {.bench = 1.0}},
+    {{"many_setups_percent", "each on a setup of its own", {.setup = 1.0}},
      {"one_force_percent", "grasps that all want 1.7 to 2.1 N, in place of 0.3 to 3.5 N", {.force = 0.125}},
      {"all_alike_percent", "of one force, and poses of a tenth of the spread", {.force = 0.125, .pose = 0.1}}}};
 

@@ -380,7 +380,8 @@ UnitFit fit_unit(const PreparedFit& fit, const UnitRecording& recording, UnitSim
     const Vector part = certainty.untold.col(k).head(variables.unknowns);
     if (part.norm() > kOfDevice) untold.col(kept++) = part;
   }
-  out.untold = untold_combinations(fit.unknowns, untold.leftCols(kept), variables.scale.head(variables.unknowns));
+  out.untold =
+      unidentifiable_combinations(fit.unknowns, untold.leftCols(kept), variables.scale.head(variables.unknowns));
   const std::vector<PressPose> poses = all.poses(found.x);
   for (std::size_t i = 0; i < poses.size(); ++i) {
     out.presses.push_back({poses[i].place_mm.x(), poses[i].place_mm.y(), poses[i].depth_mm, 0.0, 0.0,
@@ -402,7 +403,7 @@ UnitFit fit_unit(const PreparedFit& fit, const UnitRecording& recording, UnitSim
   out.residuals = all.rows;
   out.steps = found.steps;
   out.converged = found.converged;
-  out.rigs = simulation.rigs_made();
+  out.rigs = simulation.lamp_setups();
   out.device_text = text_at(fit, all.unknowns(found.x));
   if (!recording.background.mean.empty()) out.shown.push_back(shown.background);
   out.shown.insert(out.shown.end(), shown.presses.begin(), shown.presses.end());

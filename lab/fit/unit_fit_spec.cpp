@@ -105,7 +105,7 @@ void require_fit(const sim::DeviceSpec& device) {
 }
 
 /// That something was recorded of which the unknown could be told at all.
-void require_told(const FitUnknown& unknown, const UnitFitSpec& spec, const SourceLocation& where) {
+void require_identifiable(const FitUnknown& unknown, const UnitFitSpec& spec, const SourceLocation& where) {
   const bool modulus = std::any_of(unknown.numbers.begin(), unknown.numbers.end(), [](const FittedNumber& number) {
     return number.number.path.starts_with("gel.") && number.number.path.find("youngs_modulus_MPa") != std::string::npos;
   });
@@ -238,7 +238,7 @@ PreparedFit prepare_fit(const UnitFitSpec& spec) {
   std::size_t asked = 0;
   for (const FitUnknown& unknown : fit.unknowns) {
     while (spec.unknowns[asked].path != unknown.path) ++asked;
-    require_told(unknown, spec, spec.unknowns[asked].where);
+    require_identifiable(unknown, spec, spec.unknowns[asked].where);
   }
   // Both ends of each range, before minutes of work.
   for (std::size_t k = 0; k < fit.unknowns.size(); ++k) {

@@ -85,9 +85,9 @@ std::string words_of(const std::vector<Part>& parts) {
 
 }  // namespace
 
-std::vector<UnidentifiableCombination> untold_combinations(const std::vector<FitUnknown>& unknowns,
-                                                           const Eigen::MatrixXd& untold,
-                                                           const Eigen::VectorXd& scale) {
+std::vector<UnidentifiableCombination> unidentifiable_combinations(const std::vector<FitUnknown>& unknowns,
+                                                                   const Eigen::MatrixXd& untold,
+                                                                   const Eigen::VectorXd& scale) {
   TS_ASSERT(untold.rows() == scale.size() && untold.rows() == static_cast<Eigen::Index>(unknowns.size()));
   std::vector<UnidentifiableCombination> all;
   if (untold.cols() == 0) return all;

@@ -15,7 +15,7 @@
 namespace touchstone::lab {
 namespace {
 
-constexpr std::size_t kRigsKept = 2;  // of each lamp: where the fit stands, and a step beside it
+constexpr std::size_t kSensorsKept = 2;  // of each lamp: where the fit stands, and a step beside it
 constexpr double kWidest_mm = 0.5;
 constexpr std::uint64_t kOtherLight = 500'000;  // beyond any number of lamps
 constexpr std::size_t kMostKept = 256U << 20U;  // bytes of pictures of each lamp
@@ -90,7 +90,7 @@ struct UnitSimulation::Parts {
     settings.widest_mm = kWidest_mm;
     settings.membrane_um = fit.spec.membrane_um;
     settings.always_friction = true;
-    if (kept.size() == kRigsKept) kept.erase(kept.begin());
+    if (kept.size() == kSensorsKept) kept.erase(kept.begin());
     if (progress) progress("lamps' light", made, made + 1);
     kept.emplace_back(key, std::make_unique<const sim::VirtualSensor>(device_of_lamp(whole, lamp), cache, settings));
     ++made;
@@ -237,8 +237,8 @@ render::Imager UnitSimulation::imager(const Eigen::VectorXd& x) const {
   return sim::imager(whole, Parts::bands_of(whole), true);
 }
 
-int UnitSimulation::rigs_made() const {
-  return parts_->made + (other_ ? other_->rigs_made() : 0);
+int UnitSimulation::lamp_setups() const {
+  return parts_->made + (other_ ? other_->lamp_setups() : 0);
 }
 
 }  // namespace touchstone::lab

@@ -53,7 +53,7 @@ class UnitSimulation {
   double depth_of_force(const Eigen::VectorXd& x, int press, const PressPose& pose, double force_N);
 
   render::Imager imager(const Eigen::VectorXd& x) const;
-  int rigs_made() const;  ///< lamps' light set up so far: what takes longest
+  int lamp_setups() const;  ///< lamps' light set up so far: what takes longest
 
  private:
   struct Parts;

@@ -101,7 +101,8 @@ std::vector<ValidationRow> validate_gelsight_unit(const ValidateOptions& options
   const UnitFit found = fit_unit(unit.fit, unit.recording, options.cache);
   const bool named =
       names(found, "lamps[*].power_W", "camera.exposure_us") && !found.unknowns[0].told && !found.unknowns[1].told;
-  rows.add("untold_named", "power and exposure, both unknown, are said not to be told", "1", named, Better::near, named)
+  rows.add("unidentifiable_named", "power and exposure, both unknown, are said not to be told", "1", named,
+           Better::near, named)
       .reference = 1.0;
   return rows.rows();
 }

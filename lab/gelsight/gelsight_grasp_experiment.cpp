@@ -53,7 +53,7 @@ int count_false_alarms(const std::vector<GraspMoment>& moments, int lag_frames) 
   int alarms = 0;
   for (std::size_t k = 0; k < moments.size(); ++k) {
     const std::size_t before = k - std::min(k, static_cast<std::size_t>(2 * lag_frames + 1));
-    alarms += moments[k].sight.slip && moments[k].truth.slid_mm - moments[before].truth.slid_mm <= kStill_mm;
+    alarms += moments[k].reading.slip && moments[k].truth.slid_mm - moments[before].truth.slid_mm <= kStill_mm;
   }
   return alarms;
 }
@@ -89,10 +89,10 @@ GraspOutcome run_grasp_trial(const sim::VirtualSensor& sensor, const GraspTrial&
     in_transit.push_back(sensor.capture(object, gripper.press(), trial.noise_seed, frame, false).frame);
     GraspMoment moment;
     moment.truth = truth;
-    moment.sight = senses(in_transit.front());
-    moment.sight.lifted = arm.done();
+    moment.reading = senses(in_transit.front());
+    moment.reading.lifted = arm.done();
     in_transit.pop_front();
-    command = rule.next(moment.sight);
+    command = rule.next(moment.reading);
     moment.phase = command.phase;
     outcome.moments.push_back(moment);
     held_frames = command.phase == sensors::GraspPhase::holding ? held_frames + 1 : 0;

@@ -34,12 +34,12 @@ struct GraspLoopSettings {
 };
 
 /// What estimators make of the frames of one trial, handed over in their order; the first is of the untouched gel.
-using GraspSenses = std::function<sensors::GraspSight(const cv::Mat& frame)>;
+using GraspSenses = std::function<sensors::GraspReading(const cv::Mat& frame)>;
 
 /// One frame of a trial: what was true, and what the rule was told and did.
 struct GraspMoment {
   sim::GripperState truth;
-  sensors::GraspSight sight;  ///< of the frame that was taken camera_lag_s before
+  sensors::GraspReading reading;  ///< of the frame that was taken camera_lag_s before
   sensors::GraspPhase phase = sensors::GraspPhase::approaching;
 };
 

@@ -61,8 +61,9 @@ sim::ObjectSpec with_friction(sim::ObjectSpec object, double friction) {
   return object;
 }
 
-CalibratedRig calibrate_rig(const sim::VirtualSensor& sensor, const CalibrationPresses& how,
-                            std::optional<sensors::LightCorrection> correction, std::uint64_t noise_seed) {
+HeightCalibrationResult calibrate_heights(const sim::VirtualSensor& sensor, const CalibrationPresses& how,
+                                          std::optional<sensors::LightCorrection> correction,
+                                          std::uint64_t noise_seed) {
   std::vector<cv::Mat> rest;
   for (int i = 0; i < how.background_frames; ++i) rest.push_back(sensor.background(noise_seed, i));
   const sensors::Background background = sensors::mean_background(rest);
@@ -75,7 +76,7 @@ CalibratedRig calibrate_rig(const sim::VirtualSensor& sensor, const CalibrationP
   if (how.wide_ball_depth_mm > 0.0) add_kind(how.wide_ball_diameter_mm, how.wide_ball_depth_mm);
   RandomStream hand(noise_seed, 0, Purpose::kPlacement);
   std::vector<sensors::BallPress> presses;
-  CalibratedRig result;
+  HeightCalibrationResult result;
   double squares = 0.0;
   int small_ones = 0;
   for (const Eigen::Vector2d& place : places_of(how)) {

@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kGripDepth_mm = 0.25;
 
-/// Where the touch sensor sits in the hand, and the socket on the bench: any poses do, both are known to the robot.
+/// Where the touch sensor sits in the hand, and the socket on the setup: any poses do, both are known to the robot.
 RigidTransform gripper_from_touch() {
   return {rotation_from_xyz({0.0, kPi / 2, 0.3}), {12.0, 0.0, 95.0}};
 }
@@ -69,7 +69,7 @@ double mouth_error(const InsertionSettings& settings, const sensors::PlanarPose&
   return worst;
 }
 
-InsertionExperiment run_insertion(const TouchBench& bench, const sim::TouchObject& plug, const ObjectMap& map,
+InsertionExperiment run_insertion(const TouchSetup& setup, const sim::TouchObject& plug, const ObjectMap& map,
                                   const InsertionSettings& settings) {
   const auto trials = static_cast<std::size_t>(settings.trials);
   InsertionExperiment result;
@@ -93,7 +93,7 @@ InsertionExperiment run_insertion(const TouchBench& bench, const sim::TouchObjec
     }
     if (open.empty()) break;
     const std::uint64_t noise = settings.seed + 10000 * static_cast<std::uint64_t>(grasp + 1);
-    const std::vector<HeldTouch> touches = bench.touches(plug, grips, noise);
+    const std::vector<TouchSample> touches = setup.touches(plug, grips, noise);
     for (std::size_t k = 0; k < open.size(); ++k) {
       InsertionTrial& trial = result.trials[open[k]];
       ++trial.grasps;

@@ -192,7 +192,7 @@ std::string to_csv(const std::vector<SlipRun>& runs) {
   return text;
 }
 
-SlipScore score(const std::vector<SlipRun>& runs, SlipDetector detector, double foretold_s) {
+SlipScore score(const std::vector<SlipRun>& runs, SlipDetector detector, double least_warning_s) {
   const auto reports = [&](const SlipFrame& frame) {
     return detector == SlipDetector::rule ? frame.rule : frame.rim.slips();
   };
@@ -212,15 +212,15 @@ SlipScore score(const std::vector<SlipRun>& runs, SlipDetector detector, double 
     }
     ++result.slides;
     constexpr double kRounding_s = 1e-9;
-    const bool foretold = run.partial_s && *run.onset_s - *run.partial_s >= foretold_s - kRounding_s;
-    if (foretold) ++result.foretold;
+    const bool predictable = run.partial_s && *run.onset_s - *run.partial_s >= least_warning_s - kRounding_s;
+    if (predictable) ++result.predictable;
     const auto found = std::find_if(loaded, run.frames.end(), reports);
     if (found == run.frames.end()) continue;
     ++result.found;
     const double delay_s = found->t_s - *run.onset_s;
     if (delay_s <= 0.0) {
       ++result.found_before;
-      if (foretold) ++result.foretold_before;
+      if (predictable) ++result.predicted;
     }
     result.delays_ms.push_back(1e3 * delay_s);
   }

@@ -113,11 +113,11 @@ std::vector<ValidationRow> validate_gelsight_grasp(const ValidateOptions& option
   light.widest_mm = kWidest_mm;
   light.membrane_um = kMembrane_um;
   light.edge_side = kEdgeSide;
-  const auto rig_of = [&](const char* device) {
+  const auto sensor_of = [&](const char* device) {
     return sim::VirtualSensor(sim::read_device(options.scenes / "devices" / device), options.cache, light);
   };
-  const sim::VirtualSensor sensor = rig_of("gelsight-markers.yaml");
-  const sensors::TouchCalibration calibration = calibrate_for_grasps(rig_of("gelsight-flat.yaml"), sensor, kSeed);
+  const sim::VirtualSensor sensor = sensor_of("gelsight-markers.yaml");
+  const sensors::TouchCalibration calibration = calibrate_for_grasps(sensor_of("gelsight-flat.yaml"), sensor, kSeed);
   std::vector<sim::ObjectSpec> objects;
   for (const char* name : {"egg.yaml", "chip.yaml", "leaf.yaml"}) {
     objects.push_back(sim::read_object(options.scenes / "objects" / name));

@@ -33,10 +33,10 @@ ReflexMotion single_stroke(double from_mm, double to_mm, double speed_mm_s) {
   return [=](double t_s) { return std::min(from_mm + speed_mm_s * std::max(t_s, 0.0), to_mm); };
 }
 
-std::vector<ReflexPoint> record_points(const ReflexBench& bench, const ReflexTouch& touch, const ReflexMotion& motion,
+std::vector<ReflexPoint> record_points(const ReflexSetup& setup, const ReflexTouch& touch, const ReflexMotion& motion,
                                        int points, int every, std::uint64_t noise_seed) {
   TS_ASSERT(every >= 1);
-  render::MotionChip chip = bench.start_chip(noise_seed);
+  render::MotionChip chip = setup.start_chip(noise_seed);
   std::vector<ReflexPoint> record;
   cv::Mat light;
   for (int frame = 1; static_cast<int>(record.size()) < points; ++frame) {
@@ -93,9 +93,9 @@ ReflexScore score_reflex(const sensors::ReflexModel& model, std::span<const Refl
   return score;
 }
 
-std::vector<ReflexPicture> record_pictures(const ReflexBench& bench, const ReflexTouch& touch,
+std::vector<ReflexPicture> record_pictures(const ReflexSetup& setup, const ReflexTouch& touch,
                                            const ReflexMotion& motion, int pictures, std::uint64_t noise_seed) {
-  render::MotionChip chip = bench.start_chip(noise_seed);
+  render::MotionChip chip = setup.start_chip(noise_seed);
   std::vector<ReflexPicture> record;
   for (GrabbedImage& grabbed : record_images(touch.path_light, motion, chip, pictures)) {
     const double middle_s = mean_of_times(grabbed);
@@ -104,9 +104,9 @@ std::vector<ReflexPicture> record_pictures(const ReflexBench& bench, const Refle
   return record;
 }
 
-std::vector<ReflexPicture> record_still(const ReflexBench& bench, const ReflexTouch& touch,
+std::vector<ReflexPicture> record_still(const ReflexSetup& setup, const ReflexTouch& touch,
                                         std::span<const double> places_mm, std::uint64_t noise_seed) {
-  render::MotionChip chip = bench.start_chip(noise_seed);
+  render::MotionChip chip = setup.start_chip(noise_seed);
   std::vector<ReflexPicture> record;
   for (const double place_mm : places_mm) {
     const ReflexMotion still = [place_mm](double) { return place_mm; };
@@ -115,11 +115,11 @@ std::vector<ReflexPicture> record_still(const ReflexBench& bench, const ReflexTo
   return record;
 }
 
-cv::Mat rest_picture(const ReflexBench& bench, int pictures, std::uint64_t noise_seed) {
+cv::Mat rest_picture(const ReflexSetup& setup, int pictures, std::uint64_t noise_seed) {
   TS_ASSERT(pictures >= 1);
   cv::Mat sum = cv::Mat::zeros(kChipSide, kChipSide, CV_32FC1);
   const std::vector<double> places(static_cast<std::size_t>(pictures), kFar_mm);
-  for (const ReflexPicture& one : record_still(bench, bench.touches.front(), places, noise_seed)) {
+  for (const ReflexPicture& one : record_still(setup, setup.touches.front(), places, noise_seed)) {
     cv::Mat numbers;
     one.grabbed.image.convertTo(numbers, CV_32F);
     sum += numbers;
@@ -226,17 +226,17 @@ double shear_size_N(std::span<const sensors::ShearSample> samples) {
   return shear_rms_N({}, samples);
 }
 
-Collision collide(const ReflexBench& bench, const ReflexTouch& touch, Watcher watcher,
+Collision collide(const ReflexSetup& setup, const ReflexTouch& touch, Watcher watcher,
                   const sensors::ReflexModel& reflex, const sensors::ExploreModel& explore, const cv::Mat& rest,
                   const ReflexCollisionSettings& settings, std::uint64_t noise_seed) {
   const PlateForce plate = [&](double, double press_mm) { return touch.truth(press_mm).normal_N; };
   CollisionSettings collision = settings.collision;
   collision.most_press_mm = std::min(collision.most_press_mm, touch.end());
-  collision.frame_s = 1.0 / bench.chip.frame_rate_Hz;
+  collision.frame_s = 1.0 / setup.chip.frame_rate_Hz;
   if (watcher == Watcher::nobody) {
     return play_collision(collision, plate, [](double, double) { return std::optional<double>(); });
   }
-  render::MotionChip chip = bench.start_chip(noise_seed);
+  render::MotionChip chip = setup.start_chip(noise_seed);
   render::PixelGrabber grabber;
   sensors::ReflexLoop loop(reflex, settings.reflex);
   sensors::ExploreTracker tracker(rest, {});

@@ -27,7 +27,7 @@ struct ReflexPoint {
 };
 
 /// So many points, one each `every` frames: all frames are made, since DX and DY are of one after the other.
-std::vector<ReflexPoint> record_points(const ReflexBench& bench, const ReflexTouch& touch, const ReflexMotion& motion,
+std::vector<ReflexPoint> record_points(const ReflexSetup& setup, const ReflexTouch& touch, const ReflexMotion& motion,
                                        int points, int every, std::uint64_t noise_seed);
 
 /// Tree and force of a training set, as sec. III.D has them; forces of degree 1 or 2.
@@ -52,13 +52,13 @@ struct ReflexPicture {
   GrabbedImage grabbed;
   ReflexTruth truth;
 };
-std::vector<ReflexPicture> record_pictures(const ReflexBench& bench, const ReflexTouch& touch,
+std::vector<ReflexPicture> record_pictures(const ReflexSetup& setup, const ReflexTouch& touch,
                                            const ReflexMotion& motion, int pictures, std::uint64_t noise_seed);
 /// One picture each at these places, nothing moving.
-std::vector<ReflexPicture> record_still(const ReflexBench& bench, const ReflexTouch& touch,
+std::vector<ReflexPicture> record_still(const ReflexSetup& setup, const ReflexTouch& touch,
                                         std::span<const double> places_mm, std::uint64_t noise_seed);
 /// The mean of some pictures without contact, CV_32FC1.
-cv::Mat rest_picture(const ReflexBench& bench, int pictures, std::uint64_t noise_seed);
+cv::Mat rest_picture(const ReflexSetup& setup, int pictures, std::uint64_t noise_seed);
 
 /// What explore mode makes of pictures, in their order.
 std::vector<sensors::ExploreReading> explore(const cv::Mat& rest, std::span<const ReflexPicture> pictures,
@@ -109,7 +109,7 @@ struct ReflexCollisionSettings {
 
 /// Drives the fingertip at the plate of a touch straight down, from before its first frame on. The chip sees what is
 /// true at each exposure's middle.
-Collision collide(const ReflexBench& bench, const ReflexTouch& touch, Watcher watcher,
+Collision collide(const ReflexSetup& setup, const ReflexTouch& touch, Watcher watcher,
                   const sensors::ReflexModel& reflex, const sensors::ExploreModel& explore, const cv::Mat& rest,
                   const ReflexCollisionSettings& settings, std::uint64_t noise_seed);
 

@@ -84,18 +84,18 @@ ReflexTruth ReflexTouch::truth(double place) const {
   return here;
 }
 
-const ReflexTouch& ReflexBench::touch(const std::string& name) const {
+const ReflexTouch& ReflexSetup::touch(const std::string& name) const {
   const auto found = std::find_if(touches.begin(), touches.end(), [&](const auto& one) { return one.name == name; });
   TS_ASSERT(found != touches.end());
   return *found;
 }
 
-ReflexBench set_up_reflex_bench(const sim::DeviceSpec& device, const std::filesystem::path& cache_folder,
-                                std::span<const ReflexTouchSpec> specs, const ReflexLightSettings& light,
-                                const ReflexPathLightSettings& path_light, const Progress& progress) {
-  if (specs.empty()) fail("a bench needs a touch");
-  ReflexBench bench;
-  bench.device = device;
+ReflexSetup set_up_reflex(const sim::DeviceSpec& device, const std::filesystem::path& cache_folder,
+                          std::span<const ReflexTouchSpec> specs, const ReflexLightSettings& light,
+                          const ReflexPathLightSettings& path_light, const Progress& progress) {
+  if (specs.empty()) fail("a setup needs a touch");
+  ReflexSetup setup;
+  setup.device = device;
   sim::PathPlayer player(device, cache_folder);
   std::vector<sim::PlayedPath> played;
   for (const ReflexTouchSpec& spec : specs) {
@@ -103,7 +103,7 @@ ReflexBench set_up_reflex_bench(const sim::DeviceSpec& device, const std::filesy
       fail("the touch {} doesn't begin at 0", spec.name);
     }
     played.push_back(player.play(spec.path, progress));
-    if (!played.back().note.empty()) bench.notes.push_back(played.back().note);
+    if (!played.back().note.empty()) setup.notes.push_back(played.back().note);
     if (played.back().states.size() < 2) {
       fail("the touch {} has {} states, two are needed: {}", spec.name, played.back().states.size(),
            played.back().stopped);
@@ -124,8 +124,8 @@ ReflexBench set_up_reflex_bench(const sim::DeviceSpec& device, const std::filesy
     // A light field for each touch: that of all of them would be a much larger one.
     const ReflexLight optics(device, rest, reached, light);
     if (i == 0) {
-      bench.light_error = optics.error();
-      bench.chip = sim::motion_chip(device, optics.bands(), true);
+      setup.light_error = optics.error();
+      setup.chip = sim::motion_chip(device, optics.bands(), true);
     }
     const ReflexPathLight::Picture picture = [&](double place) {
       return optics.irradiance(skin_sheet(skin, played[i].state(place), shape));
@@ -133,14 +133,14 @@ ReflexBench set_up_reflex_bench(const sim::DeviceSpec& device, const std::filesy
     ReflexTouch touch{specs[i].name,
                       played[i].at,
                       {},
-                      ReflexPathLight(picture, played[i].at, bench.chip, path_light),
+                      ReflexPathLight(picture, played[i].at, setup.chip, path_light),
                       played[i].stopped};
     for (std::size_t k = 0; k < played[i].states.size(); ++k) {
       touch.states.push_back(truth_of(specs[i].path.points[k], played[i].states[k]));
     }
-    bench.touches.push_back(std::move(touch));
+    setup.touches.push_back(std::move(touch));
   }
-  return bench;
+  return setup;
 }
 
 }  // namespace touchstone::lab

@@ -51,7 +51,7 @@ struct ReflexTouchSpec {
 std::vector<ReflexTouchSpec> reflex_row_touches(bool quick);
 
 /// The device, its chip and its touches. Immutable.
-struct ReflexBench {
+struct ReflexSetup {
   sim::DeviceSpec device;
   render::MotionChipSettings chip;
   render::DirectError light_error;  ///< against path tracing (ReflexLight::error)
@@ -65,8 +65,8 @@ struct ReflexBench {
 
 /// Plays all paths (or takes them from the cache) and makes their light.
 /// @throws Error as its parts, for a path that doesn't begin with a touch at 0, and if none has two states
-ReflexBench set_up_reflex_bench(const sim::DeviceSpec& device, const std::filesystem::path& cache_folder,
-                                std::span<const ReflexTouchSpec> specs, const ReflexLightSettings& light = {},
-                                const ReflexPathLightSettings& path_light = {}, const Progress& progress = {});
+ReflexSetup set_up_reflex(const sim::DeviceSpec& device, const std::filesystem::path& cache_folder,
+                          std::span<const ReflexTouchSpec> specs, const ReflexLightSettings& light = {},
+                          const ReflexPathLightSettings& path_light = {}, const Progress& progress = {});
 
 }  // namespace touchstone::lab

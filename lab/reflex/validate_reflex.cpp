@@ -82,12 +82,12 @@ double decision_us(const sensors::ReflexModel& model, std::span<const ReflexPoin
 }
 
 /// The rows of reflex mode; gives what was learned.
-sensors::ReflexModel add_reflex_rows(const ReflexBench& bench, const Scale& scale, RowList& rows,
+sensors::ReflexModel add_reflex_rows(const ReflexSetup& setup, const Scale& scale, RowList& rows,
                                      sensors::ReflexBudget& budget) {
-  const ReflexTouch& plate = bench.touch("plate");
+  const ReflexTouch& plate = setup.touch("plate");
   const ReflexMotion motion = reciprocation(-kGap_mm, std::min(kDeepest_mm, plate.end()), kSpeed_mm_s);
   const auto record = [&](const ReflexTouch& touch, const ReflexMotion& how, std::uint64_t seed) {
-    return record_points(bench, touch, how, 1000, scale.every, seed);
+    return record_points(setup, touch, how, 1000, scale.every, seed);
   };
   const std::vector<ReflexPoint> training = record(plate, motion, kTraining);
   sensors::ReflexModel model = train_reflex(training);
@@ -123,11 +123,11 @@ sensors::ReflexModel add_reflex_rows(const ReflexBench& bench, const Scale& scal
                    "N", Better::lower, kPublishedRms_N, false, other.rms_N);
   // Once along all of a touch's path, some 1000 points.
   const auto along = [&](const ReflexTouch& touch, std::uint64_t seed) {
-    const int frames = static_cast<int>((touch.end() + kGap_mm) / kSpeed_mm_s * bench.chip.frame_rate_Hz);
+    const int frames = static_cast<int>((touch.end() + kGap_mm) / kSpeed_mm_s * setup.chip.frame_rate_Hz);
     const int every = std::max(frames / 1000, 1);
-    return record_points(bench, touch, single_stroke(-kGap_mm, touch.end(), kSpeed_mm_s), frames / every, every, seed);
+    return record_points(setup, touch, single_stroke(-kGap_mm, touch.end(), kSpeed_mm_s), frames / every, every, seed);
   };
-  for (const ReflexTouch& touch : bench.touches) {
+  for (const ReflexTouch& touch : setup.touches) {
     if (&touch == &plate) continue;
     const ReflexScore held = score_reflex(model, along(touch, kLoads));
     rows.add_bounded(
@@ -136,16 +136,16 @@ sensors::ReflexModel add_reflex_rows(const ReflexBench& bench, const Scale& scal
         Better::lower, kPublishedMissed_N, false, held.missed_below_N);
     rows.add_bounded(touch.name + ".rms_N", "its force", "N", Better::lower, kPublishedRms_N, false, held.rms_N);
   }
-  if (bench.touches.size() == 1) return model;
+  if (setup.touches.size() == 1) return model;
   // The remedy: learn from several loads.
   std::vector<ReflexPoint> mixed = training;
   for (const char* name : {"ball", "cylinder", "shear-x-4"}) {
-    const auto more = along(bench.touch(name), kMixed);
+    const auto more = along(setup.touch(name), kMixed);
     mixed.insert(mixed.end(), more.begin(), more.end());
   }
   const sensors::ReflexModel broad = train_reflex(mixed, 2);
   for (const char* name : {"tilt", "shear-45-3"}) {
-    const ReflexScore held = score_reflex(broad, along(bench.touch(name), kLoads));
+    const ReflexScore held = score_reflex(broad, along(setup.touch(name), kLoads));
     rows.add_bounded(
         fmt::format("mixed.{}.rms_N", name),
         fmt::format("learned from plate, ball, cylinder and shear along x at 4 mm, with products, '{}': {}",
@@ -156,22 +156,22 @@ sensors::ReflexModel add_reflex_rows(const ReflexBench& bench, const Scale& scal
 }
 
 /// The rows of explore mode; gives what was learned, without shear.
-sensors::ExploreModel add_explore_rows(const ReflexBench& bench, const Scale& scale, RowList& rows) {
-  const ReflexTouch& plate = bench.touch("plate");
+sensors::ExploreModel add_explore_rows(const ReflexSetup& setup, const Scale& scale, RowList& rows) {
+  const ReflexTouch& plate = setup.touch("plate");
   const double deepest_mm = std::min(kDeepest_mm, plate.end());
   const auto pictures =
-      record_pictures(bench, plate, reciprocation(0.0, deepest_mm, kSpeed_mm_s), scale.pictures, kPictures);
+      record_pictures(setup, plate, reciprocation(0.0, deepest_mm, kSpeed_mm_s), scale.pictures, kPictures);
   constexpr int kPoints = 50;  // 0 to 5 mm and back
   std::vector<double> places;
   for (int i = 0; i < kPoints; ++i) {
     places.push_back(deepest_mm * (i < kPoints / 2 ? i : kPoints - 1 - i) / (kPoints / 2 - 1));
   }
-  const auto still = record_still(bench, plate, places, kStill);
+  const auto still = record_still(setup, plate, places, kStill);
   const sensors::ExponentialForce law = fit_law(plate);
 
   const auto add = [&](const std::string& prefix, const sensors::ExploreSettings& settings, int terms,
                        int rest_pictures, bool published, const std::array<double, 3>& bounds) {
-    const cv::Mat rest = rest_picture(bench, rest_pictures, kRest);
+    const cv::Mat rest = rest_picture(setup, rest_pictures, kRest);
     const auto readings = explore(rest, pictures, settings);
     sensors::ExploreModel model;
     model.force = law;
@@ -197,17 +197,17 @@ sensors::ExploreModel add_explore_rows(const ReflexBench& bench, const Scale& sc
   const auto text = add("explore.", sensors::text_explore_settings(), 1, 1, true,
                         {kPublishedZRms_mm, kPublishedZError_mm, kPublishedForceError_N});
   sensors::ExploreSettings ours;
-  ours.times = sensors::chip_pixel_times(1.0 / bench.chip.frame_rate_Hz);
+  ours.times = sensors::chip_pixel_times(1.0 / setup.chip.frame_rate_Hz);
   return add("explore.ours.", ours, 3, 8, false, text.second).first;
 }
 
-void add_shear_rows(const ReflexBench& bench, const sensors::ReflexModel& reflex, sensors::ExploreModel& model,
+void add_shear_rows(const ReflexSetup& setup, const sensors::ReflexModel& reflex, sensors::ExploreModel& model,
                     RowList& rows) {
   std::vector<sensors::ShearSample> counts, shifts;
   std::vector<sensors::LateralSample> lateral;
   sensors::ExploreSettings settings;
-  settings.times = sensors::chip_pixel_times(1.0 / bench.chip.frame_rate_Hz);
-  const cv::Mat rest = rest_picture(bench, 8, kRest);
+  settings.times = sensors::chip_pixel_times(1.0 / setup.chip.frame_rate_Hz);
+  const cv::Mat rest = rest_picture(setup, 8, kRest);
   struct Record {
     std::vector<ReflexPoint> points;
     std::vector<ReflexPicture> pictures;
@@ -216,15 +216,15 @@ void add_shear_rows(const ReflexBench& bench, const sensors::ReflexModel& reflex
   const auto record = [&](const ReflexTouch& touch, std::uint64_t seed) {
     const ReflexMotion motion = single_stroke(-kGap_mm, touch.end(), kSpeed_mm_s);
     const double seconds = (touch.end() + kGap_mm) / kSpeed_mm_s;
-    const int frames = static_cast<int>(seconds * bench.chip.frame_rate_Hz);
+    const int frames = static_cast<int>(seconds * setup.chip.frame_rate_Hz);
     Record one;
-    one.points = record_points(bench, touch, motion, frames, 1, seed);
-    one.pictures = record_pictures(bench, touch, motion, frames / kChipPixels, seed);
+    one.points = record_points(setup, touch, motion, frames, 1, seed);
+    one.pictures = record_pictures(setup, touch, motion, frames / kChipPixels, seed);
     one.readings = explore(rest, one.pictures, settings);
     return one;
   };
   std::vector<Record> training;
-  for (const ReflexTouch& touch : bench.touches) {
+  for (const ReflexTouch& touch : setup.touches) {
     if (touch.name.rfind("shear-x", 0) != 0 && touch.name.rfind("shear-y", 0) != 0) continue;
     training.push_back(record(touch, kShearTraining));
     const Record& one = training.back();
@@ -241,7 +241,7 @@ void add_shear_rows(const ReflexBench& bench, const sensors::ReflexModel& reflex
   }
   const sensors::ShearLaw of_counts = sensors::fit_shear_law(counts);
   model.shear = sensors::fit_shear_law(shifts);
-  const Record test = record(bench.touch("shear-45-3"), kShearTest);
+  const Record test = record(setup.touch("shear-45-3"), kShearTest);
   const auto told = reflex_shear_samples(reflex, test.points, 10);
   const auto seen = explore_shear_samples(model, test.readings, test.pictures);
   const double half_N = 0.5 * shear_size_N(told);
@@ -257,11 +257,11 @@ void add_shear_rows(const ReflexBench& bench, const sensors::ReflexModel& reflex
       Better::lower, half_N, false, shear_rms_N(*model.shear, seen));
 }
 
-void add_collision_rows(const ReflexBench& bench, const sensors::ReflexModel& reflex,
+void add_collision_rows(const ReflexSetup& setup, const sensors::ReflexModel& reflex,
                         const sensors::ExploreModel& model, const Scale& scale, const sensors::ReflexBudget& budget,
                         RowList& rows) {
-  const ReflexTouch& plate = bench.touch("plate");
-  const cv::Mat rest = rest_picture(bench, 8, kRest);
+  const ReflexTouch& plate = setup.touch("plate");
+  const cv::Mat rest = rest_picture(setup, 8, kRest);
   for (const double speed_mm_s : {5.0, 10.0, 20.0, 50.0, 100.0}) {
     struct Sum {
       double peak_N = 0.0, reaction_ms = 0.0;
@@ -275,9 +275,9 @@ void add_collision_rows(const ReflexBench& bench, const sensors::ReflexModel& re
         settings.budget = budget;
         settings.collision.speed_mm_s = speed_mm_s;
         // The touch comes at any time of a frame and of a picture.
-        settings.collision.gap_mm = kGap_mm + speed_mm_s * kChipPixels / bench.chip.frame_rate_Hz * i / scale.crashes;
+        settings.collision.gap_mm = kGap_mm + speed_mm_s * kChipPixels / setup.chip.frame_rate_Hz * i / scale.crashes;
         const Collision run =
-            collide(bench, plate, watcher, reflex, model, rest, settings, kCrash + static_cast<std::uint64_t>(i));
+            collide(setup, plate, watcher, reflex, model, rest, settings, kCrash + static_cast<std::uint64_t>(i));
         sum.peak_N = std::max(sum.peak_N, run.peak_force_N);
         sum.beyond += run.beyond_law ? 1 : 0;
         if (!run.reaction_ms()) continue;
@@ -303,10 +303,10 @@ void add_collision_rows(const ReflexBench& bench, const sensors::ReflexModel& re
 }
 
 /// Light that tells nothing, to both modes: it has to be said.
-void add_fault_rows(const ReflexBench& bench, const sensors::ReflexModel& reflex, RowList& rows) {
-  const cv::Mat rest = rest_picture(bench, 8, kRest);
+void add_fault_rows(const ReflexSetup& setup, const sensors::ReflexModel& reflex, RowList& rows) {
+  const cv::Mat rest = rest_picture(setup, 8, kRest);
   cv::Mat light, bare;
-  bench.touches.front().path_light.light_at(0.0, light);
+  setup.touches.front().path_light.light_at(0.0, light);
   const cv::Scalar mean = cv::mean(light);
   bare = cv::Mat(light.size(), light.type(), mean);
   struct Case {
@@ -320,7 +320,7 @@ void add_fault_rows(const ReflexBench& bench, const sensors::ReflexModel& reflex
   int told = 0;
   std::string titles;
   for (const Case& one : cases) {
-    render::MotionChip chip = bench.start_chip(kTest);
+    render::MotionChip chip = setup.start_chip(kTest);
     render::PixelGrabber grabber;
     sensors::ReflexLoop loop(reflex, {});
     sensors::ExploreTracker tracker(rest, {});
@@ -339,7 +339,7 @@ void add_fault_rows(const ReflexBench& bench, const sensors::ReflexModel& reflex
     titles += fmt::format("{}{}: {}, {}", titles.empty() ? "" : "; ", name_of(one.picture),
                           chip_says ? name_of(one.chip) : name_of(decision.fault), name_of(fault));
   }
-  rows.add_bounded("faults.told_percent",
+  rows.add_bounded("faults.detected_percent",
                    fmt::format("of light that tells nothing, told by reflex and by explore mode ({})", titles), "%",
                    Better::higher, 100.0, false, 100.0 * told / (2.0 * static_cast<double>(cases.size())));
 }
@@ -353,9 +353,9 @@ std::vector<ValidationRow> validate_reflex(const ValidateOptions& options) {
   sim::DeviceSpec device = sim::read_device(options.scenes / "devices" / "reflex.yaml");
   device.mesh.fine_mm *= scale.mesh;
   device.mesh.coarse_mm *= scale.mesh;
-  const ReflexBench bench = set_up_reflex_bench(device, options.cache, reflex_row_touches(options.quick), scale.light,
-                                                scale.path_light, options.progress);
-  const ReflexTouch& plate = bench.touch("plate");
+  const ReflexSetup setup = set_up_reflex(device, options.cache, reflex_row_touches(options.quick), scale.light,
+                                          scale.path_light, options.progress);
+  const ReflexTouch& plate = setup.touch("plate");
   rows.add_bounded("law.rms_N", "force of a plate from 0 to 5 mm, of finite elements, against eq. 1", "N",
                    Better::lower, kReflexLawRms_N, true,
                    reflex_law_rms([&](double z_mm) { return plate.truth(z_mm).normal_N; }));
@@ -363,11 +363,11 @@ std::vector<ValidationRow> validate_reflex(const ValidateOptions& options) {
   for (int k = 0; k <= 50; ++k) law.points.emplace_back(0.1 * k, plate.truth(0.1 * k).normal_N);
   rows.last().series = law;
   sensors::ReflexBudget budget;
-  const sensors::ReflexModel reflex = add_reflex_rows(bench, scale, rows, budget);
-  sensors::ExploreModel model = add_explore_rows(bench, scale, rows);
-  if (!options.quick) add_shear_rows(bench, reflex, model, rows);
-  add_collision_rows(bench, reflex, model, scale, budget, rows);
-  add_fault_rows(bench, reflex, rows);
+  const sensors::ReflexModel reflex = add_reflex_rows(setup, scale, rows, budget);
+  sensors::ExploreModel model = add_explore_rows(setup, scale, rows);
+  if (!options.quick) add_shear_rows(setup, reflex, model, rows);
+  add_collision_rows(setup, reflex, model, scale, budget, rows);
+  add_fault_rows(setup, reflex, rows);
   return rows.rows();
 }
 

@@ -98,15 +98,15 @@ OverSeeds over_seeds(const Values& values, const Figure& figure) {
 /// A tilt of the surface about a marker's own centre, before the device's own camera: what it seems to be.
 void add_tilt_rows(const ValidateOptions& options, std::vector<ValidationRow>& rows) {
   const TiltSpectra spectra = read_tilt_spectra(options.scenes / "spectra");
-  TiltBench bench = near_bench();
-  bench.samples = options.quick ? 16 : 64;
+  TiltSetup setup = near_setup();
+  setup.samples = options.quick ? 16 : 64;
   const int seeds = options.quick ? 1 : 4;
   const std::array<double, 1> tilts = {kTilt_deg * kRadiansPerDegree};
   const auto measure = [&](TiltMarker marker) {
     std::vector<TiltError> errors;
     for (int k = 0; k < seeds; ++k) {
       errors.push_back(
-          measure_tilt(bench, spectra, marker, tilts, kSeed + static_cast<std::uint64_t>(100 * k), options.progress)
+          measure_tilt(setup, spectra, marker, tilts, kSeed + static_cast<std::uint64_t>(100 * k), options.progress)
               .errors.front());
     }
     return errors;

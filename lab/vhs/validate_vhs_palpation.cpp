@@ -168,10 +168,10 @@ std::vector<ValidationRow> validate_vhs_palpation(const ValidateOptions& options
   for (std::size_t i = 0; i < lit.force_N.size(); ++i) {
     ratio += lit.model_N[i] / lit.force_N[i] / static_cast<double>(lit.force_N.size());
   }
-  ValidationRow& told_force =
+  ValidationRow& force_estimate =
       rows.add("force_ratio", "z force that the sensor trained on the flat probe reads on a lump, over the true one",
                "1", ratio, Better::near, std::abs(ratio - 1.0) <= kAllowedRatio);
-  told_force.reference = 1.0;
+  force_estimate.reference = 1.0;
   if (options.quick) return rows.rows();
   const double at_1000_percent = mean_of(at_1000.percent);
   add("camera_without_noise_percent", "from the vhs sensor without noise; beside the paper's force sensor",

@@ -38,7 +38,7 @@ DirectBatch::DirectBatch(const DirectFrame& frame)
       directions_(frame.shadow_reach != nullptr ? flows_.size() : 0),
       pass_(field_.pass.empty() ? 0 : lanes_.size() * stride_ * bands_) {}
 
-void DirectBatch::look(std::span<const RayPacket> rays, DirectCounts& counts) {
+void DirectBatch::intersect(std::span<const RayPacket> rays, DirectCounts& counts) {
   TS_ASSERT(rays.size() <= kMostPackets);
   rays_ = rays;
   PacketHits hits;

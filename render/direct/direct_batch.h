@@ -34,7 +34,7 @@ class DirectBatch {
   explicit DirectBatch(const DirectFrame& frame);
 
   /// What the rays meet and what each lamp would send there; at most kMostPackets.
-  void look(std::span<const RayPacket> rays, DirectCounts& counts);
+  void intersect(std::span<const RayPacket> rays, DirectCounts& counts);
 
   /// Lets a lane's shadows come from the point of each lens that (u, v) in [0, 1)^2 stands for, not from its middle,
   /// and from that part of a guide's beams. Without, the sixteen lanes of a packet take sixteen parts of a beam.

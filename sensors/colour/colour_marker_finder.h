@@ -26,7 +26,7 @@
 namespace touchstone::sensors {
 
 /// What to look for.
-struct ColourMarkerLook {
+struct ColourMarkerAppearance {
   Eigen::Vector2i grid = {10, 10};    ///< columns, rows; 2 to 64 each
   double spacing_px = 0.0;            ///< between neighbours, in the picture; 0: found in the picture at rest
   double least_saturation = 0.5;      ///< of a pixel that counts for the mean hue (HSV); 0.2 to 0.8
@@ -40,7 +40,7 @@ struct ColourMarkerLook {
 class ColourMarkerFinder {
  public:
   /// @throws Error naming the setting that is out of its range
-  explicit ColourMarkerFinder(const ColourMarkerLook& look);
+  explicit ColourMarkerFinder(const ColourMarkerAppearance& appearance);
 
   /// Takes a picture of the unloaded sensor as the reference for all that follow. Markers that aren't whole in it are
   /// flawed there and in every later picture. The sensor may be turned by up to about 40 degrees.
@@ -83,7 +83,7 @@ class ColourMarkerFinder {
   MarkerFlaw flaw_of(const Sums& sums, std::size_t marker) const;
   FrameLight light_of_picture() const;
 
-  ColourMarkerLook look_;
+  ColourMarkerAppearance appearance_;
   cv::Size size_;    ///< of a whole picture
   cv::Rect region_;  ///< looked at
   int reduction_ = 1;

@@ -33,7 +33,7 @@ struct GraspRuleSettings {
 void check(const GraspRuleSettings& settings);
 
 /// What one frame says.
-struct GraspSight {
+struct GraspReading {
   double height_max_mm = 0.0;  ///< of the height map, indentation positive
   bool slip = false;           ///< force ratio and motion ratio both over their thresholds
   std::optional<double> normal_force_N;
@@ -58,14 +58,14 @@ struct GraspCommand {
   bool lift = false;         ///< the arm may move up; false: it stands
 };
 
-/// Give it one sight a frame. Deterministic; it knows nothing but what it was given.
+/// Give it one reading a frame. Deterministic; it knows nothing but what it was given.
 class GraspRule {
  public:
   /// @throws Error as check()
   explicit GraspRule(const GraspRuleSettings& settings);
 
   /// @throws Error for a height or force that isn't finite
-  GraspCommand next(const GraspSight& sight);
+  GraspCommand next(const GraspReading& reading);
 
   GraspPhase phase() const { return phase_; }
   double approach_travel_mm() const { return approached_; }  ///< of each finger until touch
@@ -73,9 +73,9 @@ class GraspRule {
   int slip_answers() const { return answers_; }              ///< how often it closed further
 
  private:
-  GraspCommand approach(const GraspSight& sight);
-  GraspCommand lift(const GraspSight& sight);
-  GraspCommand tighten(const GraspSight& sight);
+  GraspCommand approach(const GraspReading& reading);
+  GraspCommand lift(const GraspReading& reading);
+  GraspCommand tighten(const GraspReading& reading);
   GraspCommand end(GraspPhase phase);
 
   GraspRuleSettings settings_;

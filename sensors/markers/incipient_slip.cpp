@@ -158,8 +158,8 @@ void IncipientSlipDetector::remember(const TrackedMarkers& markers, const Contac
   }
 }
 
-const IncipientSlip& IncipientSlipDetector::look(const TrackedMarkers& markers,
-                                                 const std::optional<ContactPatch>& patch) {
+const IncipientSlip& IncipientSlipDetector::update(const TrackedMarkers& markers,
+                                                   const std::optional<ContactPatch>& patch) {
   result_ = {};
   if (past_.front().found.size() != markers.rest.size()) {
     kept_ = 0;

@@ -72,7 +72,7 @@ class IncipientSlipDetector {
 
   /// `patch`: where the gel is touched in this frame; none: nothing touches, and the frames before are forgotten. They
   /// are forgotten, too, if the tracker says that it may have mixed up markers, or if it has another number of them.
-  const IncipientSlip& look(const TrackedMarkers& markers, const std::optional<ContactPatch>& patch);
+  const IncipientSlip& update(const TrackedMarkers& markers, const std::optional<ContactPatch>& patch);
 
   /// Forgets all frames, as when the tracker is restarted.
   void restart() { kept_ = 0; }

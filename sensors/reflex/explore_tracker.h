@@ -83,7 +83,7 @@ class ExploreTracker {
     DotsPicture picture;
     DotsMotion motion;
   };
-  PictureFault look(const cv::Mat& picture) const;
+  PictureFault find_fault(const cv::Mat& picture) const;
   bool take_absolute(const DotsPicture& picture);
   bool take_step(const DotsPicture& picture);
   void hold(PictureFault fault);

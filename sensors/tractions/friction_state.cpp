@@ -82,7 +82,7 @@ void FrictionObserver::restart() {
   slid_.clear();
 }
 
-const FrictionState& FrictionObserver::look(const MarkerField& field, const TractionField& tractions) {
+const FrictionState& FrictionObserver::update(const MarkerField& field, const TractionField& tractions) {
   const std::size_t count = field.displacement.size();
   if (field.measured.size() != count || tractions.markers.size() != count) {
     fail("friction: the field has {} markers, the tractions are of {}", count, tractions.markers.size());

@@ -87,7 +87,7 @@ class FrictionObserver {
 
   /// `tractions` is what TractionInversion made of `field`. Where nothing is in contact, all before is forgotten.
   /// @throws Error if the two don't belong to the same number of markers, or the number has changed
-  const FrictionState& look(const MarkerField& field, const TractionField& tractions);
+  const FrictionState& update(const MarkerField& field, const TractionField& tractions);
 
   /// Forgets all frames.
   void restart();

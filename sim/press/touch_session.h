@@ -1,7 +1,7 @@
 #pragma once
 // An object on a gel, step by step, for a control loop: a pose goes in, the wrench and what the contact does come out,
 // in milliseconds; the surface is worked out, and a picture can be made, only when it is asked for
-// (VirtualSensor::look(object, session.press(), ...)). Friction and relaxation remember all steps.
+// (VirtualSensor::touch(object, session, ...)). Friction and relaxation remember all steps.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -74,7 +74,7 @@ class TouchSession {
 
   /// Of the last step.
   const TouchReading& reading() const;
-  /// All that mechanics tells of the last step, with the surface's displacement: what VirtualSensor::look takes.
+  /// All that mechanics tells of the last step, with the surface's displacement: what VirtualSensor::touch takes.
   fem::PressState press() const;
   /// The error bars that belong to press().
   fem::PressError error(const fem::PressState& press) const;

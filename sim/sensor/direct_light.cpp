@@ -69,16 +69,16 @@ std::string with_figures(const std::string& verdict, const render::DirectError& 
 
 }  // namespace
 
-DirectLight::DirectLight(const SceneView& sight, const render::Camera& camera, std::span<const Truth> truths,
+DirectLight::DirectLight(const SceneView& view, const render::Camera& camera, std::span<const Truth> truths,
                          std::span<const int> rays_tried, int edge_side, const render::GuideCut& guides)
     : camera_(camera) {
-  TS_ASSERT(sight.plan.direct_light && !truths.empty() && !rays_tried.empty());
-  const SceneSpec& scene = sight.scene;
+  TS_ASSERT(view.plan.direct_light && !truths.empty() && !rays_tried.empty());
+  const SceneSpec& scene = view.scene;
   const bool forced = scene.effects.direct_light == Switch::on;
   const fem::PressState still = at_rest(truths.front().press);
-  const render::Scene rest = with_blacks(sight.seen(still, {}));
+  const render::Scene rest = with_blacks(view.seen(still, {}));
   const Truth& judged = deepest(truths);
-  const render::Scene pressed = with_blacks(sight.seen(judged.press, sight.relief(judged.press)));
+  const render::Scene pressed = with_blacks(view.seen(judged.press, view.relief(judged.press)));
   render::DirectChoiceSettings settings;
   settings.tolerance = scene.light.direct_tolerance;
   settings.direct.edge_side = edge_side;
@@ -113,14 +113,14 @@ DirectLight::DirectLight(const SceneView& sight, const render::Camera& camera, s
   idle_.push_back(std::move(chosen.renderer));
 }
 
-DirectLight::DirectLight(const SceneView& sight, const render::Camera& camera, const fem::PressState& still,
+DirectLight::DirectLight(const SceneView& view, const render::Camera& camera, const fem::PressState& still,
                          FoundLight found, int edge_side)
     : choice_(std::move(found.choice)), camera_(camera), field_(std::move(found.field)), bounced_(found.bounced) {
   if (!choice_.direct) return;
   settings_.samples = found.rays;
   settings_.edge_side = edge_side;
-  settings_.seed = sight.scene.seed;
-  rest_ = with_blacks(sight.seen(still, {}));
+  settings_.seed = view.scene.seed;
+  rest_ = with_blacks(view.seen(still, {}));
   field_.fixture = rest_;
   field_.fixture.surfaces.clear();
   field_.fixture.balls.clear();

@@ -15,7 +15,7 @@ namespace touchstone::sim {
 
 /// The shape of an object file, read and turned once for all frames; object frame.
 struct VisibleObject {
-  fem::ContactShape felt;
+  fem::ContactShape shape;
   TriangleMesh body;
   std::optional<TriangleMesh> screen;
   ReadyPrint print;                         ///< no layers: none

@@ -136,8 +136,8 @@ TEST(FitCertainty, AProductIsToldAndItsFactorsAreNot) {
   EXPECT_TRUE(std::isinf(certainty.deviation[0]));
   EXPECT_LT(certainty.deviation[2], 0.1);
   // In logarithms both act alike: the second's range is twice the first's.
-  const auto words =
-      untold_combinations({unknown("a"), unknown("b"), unknown("c")}, certainty.untold, Eigen::Vector3d(1, 2, 1));
+  const auto words = unidentifiable_combinations({unknown("a"), unknown("b"), unknown("c")}, certainty.untold,
+                                                 Eigen::Vector3d(1, 2, 1));
   ASSERT_EQ(words.size(), 1U);
   EXPECT_EQ(words[0].words, "`a` and `b` only as their product");
 }
@@ -148,7 +148,7 @@ TEST(FitCertainty, WhatNothingHangsOnIsToldOfAlone) {
   untold.col(0) << 0.8 * h, -0.8 * h, 0.0, 0.6;
   untold.col(1) << -0.6 * h, 0.6 * h, 0.0, 0.8;
   const auto words =
-      untold_combinations({unknown("a"), unknown("b"), unknown("c"), unknown("d")}, untold, Vector::Ones(4));
+      unidentifiable_combinations({unknown("a"), unknown("b"), unknown("c"), unknown("d")}, untold, Vector::Ones(4));
   ASSERT_EQ(words.size(), 2U);
   EXPECT_EQ(words[0].words, "`d`: what was recorded hardly hangs on it, or not at all");
   EXPECT_EQ(words[1].words, "`a` and `b` only as their product");

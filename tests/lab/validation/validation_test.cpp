@@ -87,8 +87,8 @@ TEST(Validation, JsonHasTheAgreedMembersInOrder) {
 TEST(Validation, ARowThatDeniesItsSourcesFindingDoesNotHoldHoweverGoodItsFigure) {
   const ValidationGroup group = {"light", [](const ValidateOptions& options) {
                                    RowList rows("light.", options, RowList::Since::begin);
-                                   rows.add_bounded("told_percent", "told at 250 Hz", "%", Better::higher, 84.0, true,
-                                                    90.0);
+                                   rows.add_bounded("detected_percent", "told at 250 Hz", "%", Better::higher, 84.0,
+                                                    true, 90.0);
                                    EXPECT_TRUE(rows.last().holds);
                                    deny(rows.last(), "250 Hz are too few");
                                    return rows.rows();

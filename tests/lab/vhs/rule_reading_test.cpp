@@ -10,7 +10,7 @@
 #include "core/random.h"
 #include "core/units.h"
 #include "lab/vhs/pinhole_transfer.h"
-#include "lab/vhs/vhs_visual_bench.h"
+#include "lab/vhs/vhs_pictures.h"
 
 namespace touchstone::lab {
 namespace {

@@ -150,11 +150,11 @@ TEST(Guide, HasTheLightOfALuminousEndThatPathsRunInto) {
     small.surfaces.push_back({square_sheet(0.02, place.z, place.up), Lambertian{grey(0.5)}});
     small.surfaces.push_back({square_sheet(0.02, place.z + (place.up ? -0.01 : 0.01), place.up), Black{}});
     const Eigen::Vector3d eye(0, 0, place.z + (place.up ? 0.5 : -0.5));
-    const Eigen::Vector3d look(0, 0, place.up ? -1 : 1);
+    const Eigen::Vector3d viewing(0, 0, place.up ? -1 : 1);
     small.lamps = {lamp};
-    const Estimate by_images = view(small, eye, look, 1000);
+    const Estimate by_images = view(small, eye, viewing, 1000);
     small.lamps = {end};
-    const Estimate by_paths = view(small, eye, look, 8000);
+    const Estimate by_paths = view(small, eye, viewing, 8000);
     expect_equal(by_images, by_paths, 0.02, place.what);
   }
 }
