@@ -131,7 +131,7 @@ class Objects {
       if (entry.path().extension() == ".yaml") files_[entry.path().stem().string()] = entry.path();
     }
     for (const fs::path& file : files) {
-      sim::read_object(file);  // a mistake in it is told now
+      sim::read_object(file);  // a mistake in it is reported now
       files_[file.stem().string()] = file;
     }
   }

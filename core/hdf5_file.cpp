@@ -52,7 +52,7 @@ std::shared_ptr<void> hold() {
   return guard != nullptr ? guard() : nullptr;
 }
 
-/// HDF5 prints its own stack of errors unless told not to; ours are exceptions.
+/// HDF5 prints its own stack of errors unless asked not to; ours are exceptions.
 void keep_hdf5_quiet() {
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
 }

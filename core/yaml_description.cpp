@@ -65,7 +65,7 @@ bool differ(const YamlCall& base, const YamlCall& other, const std::string& key,
     const auto now = asked.place->asked();
     if (bounds ? then != now : without_bounds(then) != without_bounds(now)) return true;
   }
-  // What a stopped call lacks behind its last field says nothing.
+  // What is missing behind a stopped call's last field says nothing.
   const YamlCall::Asked* last = other.asked.empty() ? nullptr : base.find(other.asked.back().key);
   const YamlCall::Asked* end = base.asked.data() + base.asked.size();
   const YamlCall::Asked* reached = !other.stopped ? end : last == nullptr ? base.asked.data() : last + 1;
@@ -322,7 +322,7 @@ YamlMap YamlPlace::explore(const YamlPicks& fixed, const Ask& ask, int depth) co
     split.by = std::move(field);
     return split;
   }
-  // Other values, many at a time: bounds and defaults that depend on them aren't told.
+  // Other values, many at a time: bounds and defaults that depend on them aren't described.
   for (int round = 1; round <= kRounds; ++round) {
     const YamlCall other = call(fixed, round, ask);
     for (const YamlCall::Asked& asked : other.asked) {

@@ -95,7 +95,7 @@ class YamlReader {
   std::filesystem::path folder() const;
 
   // For types that may stand in several forms: they have, in the place of `fields`, a function
-  // `read_value(YamlReader& in, T& value, Allowed allowed)` that looks what stands there.
+  // `read_value(YamlReader& in, T& value, Allowed allowed)` that looks at what stands there.
   bool is_list() const;
   bool is_map() const;
   std::string text() const { return scalar("a number, a list or a file's name"); }

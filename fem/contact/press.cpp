@@ -253,7 +253,8 @@ double Press::Parts::add_segment(std::size_t b, const PressTarget& target, Path&
     if (!touch) clear = 1.0;
   }
   if (!here.touching || no_force) path.start.forget(static_cast<int>(b));
-  if (!meets) to.forced = to.turned = {};  // nothing to push against: it goes where it is told and turns no further
+  if (!meets)
+    to.forced = to.turned = {};  // nothing to push against: it goes to the given position and turns no further
   // A forced axis that nothing can push on stays where it is: without friction, along the surface.
   if (friction(b) == 0.0) {
     const auto& normals = solver.surface().normals;

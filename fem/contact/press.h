@@ -29,8 +29,8 @@
 
 namespace touchstone::fem {
 
-/// What one translation axis of the object is told: its position (mm, the object frame's origin in the gel frame) or
-/// the force on the object (N, gel frame; pressing gives Fz > 0).
+/// What one translation axis of the object is commanded: its position (mm, the object frame's origin in the gel frame)
+/// or the force on the object (N, gel frame; pressing gives Fz > 0).
 struct AxisControl {
   enum class Kind { position, force };
   Kind kind = Kind::position;

@@ -305,17 +305,17 @@ BodyErrors measure_body(const std::vector<Level>& levels, const LadderGel& ladde
       if (radius < kLeastRadius * levels[i].factor) continue;
       RelativeErrors sums;
       RelativeErrors squares;
-      std::array<int, kErrorKinds> told{};
+      std::array<int, kErrorKinds> counts{};
       for (std::size_t k = 0; k < places.size(); ++k) {
         const RelativeErrors one = difference(gel, weight, places[k], bodies[k].reach, readings[0][k], readings[i][k]);
         for (int kind = 0; kind < kErrorKinds; ++kind) {
           sums.values[kind] += one.values[kind];
           squares.values[kind] += one.values[kind] * one.values[kind];
-          told[kind] += one.values[kind] != 0.0;
+          counts[kind] += one.values[kind] != 0.0;
         }
       }
       for (int kind = 0; kind < kErrorKinds; ++kind) {
-        const double n = told[kind];
+        const double n = counts[kind];
         if (n < 2.0) continue;
         Sample sample{contact, levels[i].factor, sums.values[kind] / n, 0.0};
         sample.scatter = sharp && is_force(kind)

@@ -24,7 +24,7 @@ constexpr double kDrag = 1.0 / 3.0;  // of the depth
 
 using Clock = std::chrono::steady_clock;
 
-/// The channels that a picture's pixels are told apart by.
+/// The channels that a picture's pixels are compared by.
 int channels_of(const render::Imager& imager) {
   return static_cast<int>(imager.quantum_efficiency.rows());
 }

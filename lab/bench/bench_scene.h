@@ -23,12 +23,12 @@ struct BenchPresses {
   std::vector<sim::PressSpec> specs;
 };
 
-/// `count` holds near the gel's middle: places within an edge of the mesh, so that no place is luckier than another,
+/// `count` presses near the gel's middle: places within an edge of the mesh, so that no place is luckier than another,
 /// depths within a fifth of `depth_mm`, dragged by a third of that into all directions. A pure function of its
 /// arguments.
 std::vector<sim::PressSpec> bench_presses(int count, double edge_mm, double depth_mm, std::uint64_t seed);
 
-/// What the presses felt like: forces on the object, pressed and dragged, one after the other for each hold.
+/// What the presses gave: forces on the object, pressed and dragged, one after the other for each press.
 struct PressForces {
   std::vector<Eigen::Vector3d> force_N;
   Eigen::MatrixX3d beads_mm;  ///< all beads of all states, one after the other
@@ -39,14 +39,14 @@ struct PressForces {
 
 /// Presses without pictures, each from a fresh start. `edge_mm` is what a relief is blurred by
 /// (sim::coarse_contact_shape).
-/// @throws Error that says which hold can't be had
+/// @throws Error that says which press can't be had
 PressForces solve_presses(const BenchPresses& presses, const fem::Compliance& gel, const sim::DeviceSpec& device,
                           double edge_mm, const fem::PressTolerance& tolerance = {});
 
 /// Root mean square over the states of the force's difference, relative to the other's force.
 double force_difference(const std::vector<Eigen::Vector3d>& forces, const std::vector<Eigen::Vector3d>& than);
 
-/// The scene of one hold: three frames, at rest, pressed and dragged.
+/// The scene of one press: three frames, at rest, pressed and dragged.
 sim::SceneSpec bench_scene(const sim::DeviceSpec& device, const BenchPresses& presses, const sim::PressSpec& spec,
                            std::uint64_t seed);
 

@@ -78,7 +78,7 @@ std::optional<LightSetting> pick_light(const BenchParts& parts, const std::vecto
   }
   if (best && best->adaptive_paths && holds != nullptr && coarser != nullptr) {
     // Between two that were measured the error goes as a power of the noise that is asked for. What is too small to be
-    // told is taken for as large as it may be.
+    // distinguished from zero is taken for as large as it may be.
     const double measured = std::max(holds->pixel_error, parts.least_pixel_error);
     const double slope = std::log(coarser->pixel_error / measured) /
                          std::log(coarser->light.noise_fraction / holds->light.noise_fraction);
@@ -216,10 +216,11 @@ BenchChoice cheapest_choice(const BenchParts& parts, BenchCurve& mesh, const std
                                    choice.remark.empty() ? "" : " ", light ? light->words : "none");
     }
   }
-  const bool told = parts.least_pixel_error <= parts.settings.pixel_error;
-  if (!told) {
+  const bool resolved = parts.least_pixel_error <= parts.settings.pixel_error;
+  if (!resolved) {
     choice.remark += fmt::format(
-        "{}Pixel errors under {:.2g} of the noise aren't told from none, as the reference has noise of its own and "
+        "{}Pixel errors under {:.2g} of the noise can't be distinguished from zero, as the reference has noise of its "
+        "own and "
         "takes long; ask for a larger --pixel-error.",
         choice.remark.empty() ? "" : " ", parts.least_pixel_error);
   }
@@ -237,7 +238,7 @@ BenchChoice cheapest_choice(const BenchParts& parts, BenchCurve& mesh, const std
     choice.as_is_force = verified.as_is_force;
     choice.as_is_pixel = verified.as_is_pixel;
     const bool force_holds = verified.force <= parts.settings.force_error;
-    const bool pixel_holds = !parts.truth || (verified.pixel <= parts.settings.pixel_error && told);
+    const bool pixel_holds = !parts.truth || (verified.pixel <= parts.settings.pixel_error && resolved);
     choice.holds = force_holds && pixel_holds;
     if (choice.holds || !choice.remark.empty() || round + 1 == kMostVerifications) break;
     const std::string found =

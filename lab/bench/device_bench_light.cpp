@@ -19,7 +19,8 @@ using Clock = std::chrono::steady_clock;
 
 constexpr int kPlenty = 4096;  // paths a pixel: enough for the noise that is asked for to decide
 constexpr std::array kNoiseFractions = {8.0, 4.0, 2.0, 1.0, 0.5};  // of the wanted pixel error
-constexpr double kReferenceShare = 0.35;      // of the wanted pixel error: what is to be told from none
+constexpr double kReferenceShare =
+    0.35;  // of the wanted pixel error: the least error that is to be distinguished from zero
 constexpr double kNoisiestReference = 4.0;    // of the imager's noise
 constexpr double kMostReferenceSeconds = 20;  // for the pictures of one scene; there are some twenty
 constexpr int kPilotPaths = 8;
@@ -313,13 +314,13 @@ std::string prepare_pictures(BenchParts& parts) {
         unsaturated_part * static_cast<double>(pilot.runs[0].electrons.size() * picture.total()) * picture.channels();
     // A reference's noise is left in a mean over N values by its square over sqrt(N).
     const double left = std::pow(values, -0.25);
-    const double told = kReferenceShare * parts.settings.pixel_error;
-    const double wanted = std::pow(noise / std::min(kNoisiestReference, told / left), 2);
+    const double least = kReferenceShare * parts.settings.pixel_error;
+    const double wanted = std::pow(noise / std::min(kNoisiestReference, least / left), 2);
     const double seconds = static_cast<double>(pictures_of(pilot.runs[0])) * pilot.runs[0].picture_seconds;
     const double afforded = kMostReferenceSeconds / seconds;
     const double times = std::clamp(std::min(wanted, afforded), 1.0, static_cast<double>(kPlenty) / kPilotPaths);
     parts.reference_paths = static_cast<int>(std::ceil(kPilotPaths * times));
-    parts.least_pixel_error = std::max(told, noise * left / std::sqrt(times));
+    parts.least_pixel_error = std::max(least, noise * left / std::sqrt(times));
     parts.truth = true_pictures(parts, parts.finest_device, parts.finest_gel, spec, parts.settings.seed);
     parts.own_truth = true_pictures(parts, parts.device, parts.own_gel, spec, parts.settings.seed + 30);
   } catch (const Error& error) {
@@ -334,7 +335,7 @@ std::string prepare_pictures(BenchParts& parts) {
   return words +
          fmt::format(
              ", of a pressed and a dragged state; {} paths a pixel for the reference{}, so that errors under {:.2g} "
-             "aren't told from none",
+             "can't be distinguished from zero",
              parts.reference_paths, parts.exact_words, parts.least_pixel_error) +
          saturated;
 }

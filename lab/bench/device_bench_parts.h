@@ -17,7 +17,7 @@ namespace touchstone::lab {
 
 inline constexpr double kMostSeconds = 40.0;  ///< for one setting of a curve
 
-/// Pictures of one hold by the reference's light, twice without common random numbers.
+/// Pictures of one press by the reference's light, twice without common random numbers.
 struct TruePictures {
   sim::PressSpec spec;
   TwoRuns runs;
@@ -40,7 +40,7 @@ struct BenchParts {
   std::string exact_words;                ///< ", with interreflection": what of it the plan leaves out; empty: nothing
   int reference_paths = 0;                ///< a pixel, of true pictures
   double least_pixel_error = 0.0;         ///< see DeviceBench
-  std::optional<TruePictures> truth;      ///< of the first hold on the finest gel; nothing where there are no pictures
+  std::optional<TruePictures> truth;      ///< of the first press on the finest gel; nothing where there are no pictures
   std::optional<TruePictures> own_truth;  ///< likewise on the device's own gel
 };
 
@@ -81,7 +81,7 @@ struct LightSetting {
 
 std::string paths_in_words(double noise_fraction);
 
-/// Shows a hold's scene that way, and fills in what it took and how far it is from the truth; `point` gets the same.
+/// Shows a press's scene that way, and fills in what it took and how far it is from the truth; `point` gets the same.
 /// What can't be had is in the point's note.
 LightSetting try_light(const BenchParts& parts, const TruePictures& truth, const sim::DeviceSpec& device,
                        const fem::Compliance& gel, LightSetting one, std::uint64_t seed, BenchPoint& point);

@@ -199,7 +199,7 @@ void play_probe(const ForceSetup& setup, const ForceProbe& probe, const DragSett
     const double drag_mm = drag.step_mm * number;
     const fem::PressState& state = press.step(target_at(probe, drag_mm));
     const bool slides = has_come_to_slide(state);
-    look({probe, state, number, drag_mm, slides, reader.of(state)});
+    on_frame({probe, state, number, drag_mm, slides, reader.of(state)});
     if ((slides || after > 0) && ++after > drag.frames_after) return;
   }
 }
@@ -250,7 +250,7 @@ ForceRun run_force_probe(const ForceSetup& setup, const ForceProbe& probe, const
     }
     const auto start = std::chrono::steady_clock::now();
     const sensors::TractionField tractions = inversion.invert(field);
-    const sensors::FrictionState& friction = observer.look(field, tractions);
+    const sensors::FrictionState& friction = observer.update(field, tractions);
     const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - start;
     ForceSample sample;
     sample.frame = frame.number;

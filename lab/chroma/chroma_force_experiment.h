@@ -83,7 +83,7 @@ sim::DeviceSpec with_probe_mesh(sim::DeviceSpec device);
 ForceSetup set_up_force(sim::DeviceSpec device, const std::filesystem::path& cache_folder,
                         const Progress& progress = {});
 
-/// Plays a probe: `look` is called for each frame, in their order.
+/// Plays a probe: `on_frame` is called for each frame, in their order.
 void play_probe(const ForceSetup& setup, const ForceProbe& probe, const DragSettings& drag,
                 const std::function<void(const ForceFrame&)>& on_frame);
 

@@ -28,7 +28,7 @@ std::vector<ForceProbe> calibration_probes(bool quick);
 sensors::HueModel calibrate_on_probes(const ForceSetup& setup, const ChromaSetup& camera, bool quick,
                                       std::uint64_t noise_seed);
 
-/// What a model says of all looks, in their order, with lateral displacements as seen
+/// What a model says of all records, in their order, with lateral displacements as seen
 /// (sensors/tractions/seen_markers.h).
 std::vector<sensors::MarkerField> fields_of(const std::vector<ChromaRecord>& records, const ChromaSetup& camera,
                                             const sensors::HueModel& model,

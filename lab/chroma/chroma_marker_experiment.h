@@ -2,8 +2,8 @@
 // The experiments of [Lin2019] on a chroma device: hue against depth (fig. 8), centroid against lateral displacement
 // (fig. 9), the inverted model (sec. IV.D) and displacement fields under punches (fig. 10).
 //
-// Displacements of figs. 8 and 9 and of the inverse are those of the ball, as the paper's stage told them. Fields are
-// held against the finite elements' mean displacement of each marker.
+// Displacements of figs. 8 and 9 and of the inverse are those of the ball, as the paper's stage measured them. Fields
+// are held against the finite elements' mean displacement of each marker.
 
 #include <cstdint>
 #include <filesystem>
@@ -89,8 +89,8 @@ struct FieldScore {
   /// The same of the displacements under those tractions that explain the estimate best: what mechanics adds to it.
   double elastic_mean_um = 0.0, elastic_worst_um = 0.0;
 };
-/// Inverts fields told with `parallax`, taking their lateral displacements as seen: the compliance is of another mesh
-/// than the sensor's.
+/// Inverts fields estimated with `parallax`, taking their lateral displacements as seen: the compliance is of another
+/// mesh than the sensor's.
 sensors::TractionInversion elastic_inversion(const ChromaSetup& setup, const std::filesystem::path& cache,
                                              const sensors::ViewParallax& parallax);
 

@@ -45,7 +45,7 @@ struct RobustnessSettings {
   LightGradient kind = LightGradient::light;
 };
 
-/// How well displacements are told at one size.
+/// How well displacements are estimated at one size.
 struct PixelRobustness {
   double marker_px = 0.0;
   double hue_r2 = 0.0;       ///< of the fit of second order; 0 where there's no fit

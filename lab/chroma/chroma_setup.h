@@ -1,6 +1,6 @@
 #pragma once
-// A chroma device on a setup: objects press its markers, its camera's pictures are read, and the truth of each marker
-// is kept beside the reading.
+// A chroma device in an experimental setup: objects press its markers, its camera's pictures are read, and the truth of
+// each marker is kept beside the reading.
 
 #include <cstdint>
 #include <opencv2/core/mat.hpp>
@@ -71,7 +71,7 @@ std::vector<sensors::HueSample> samples_of(const std::vector<ChromaRecord>& reco
 /// Samples of all markers that have moved by at least `least_mm`.
 std::vector<sensors::HueSample> samples_of_moved(const std::vector<ChromaRecord>& records, double least_mm, int series);
 
-/// What calibrate_hue is told of the setup; the form is its default.
+/// What calibrate_hue is given of the setup; the form is its default.
 sensors::HueCalibrationSettings hue_settings_of(const ChromaSetup& setup);
 
 /// What a model is to be good at: displacements, or the lateral ones, which mechanics then makes fields of.

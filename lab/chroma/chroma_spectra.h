@@ -12,7 +12,8 @@
 // then be that times magenta's curve, times the film's (it passes the film once on its way out), and times both.
 // Products are of the curves at every nanometre, weighted by the lamps' light and then averaged over a band; the
 // rendering multiplies the curves' means. So the error has in it what bands leave out, what stands by a marker and
-// colours its light, and the slant at which films are seen. How far the light itself is off the lamps' is told apart.
+// colours its light, and the slant at which films are seen. How far the light itself is off the lamps' is given
+// separately.
 
 #include <array>
 #include <cstdint>

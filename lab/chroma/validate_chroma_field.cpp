@@ -41,7 +41,8 @@ std::vector<ValidationRow> validate_chroma_field(const ValidateOptions& options)
         field.elastic_mean_um);
     add(field.punch + "_elastic_worst_um", "the same, the worst marker", field.elastic_worst_um);
     add(field.punch + "_lateral_um",
-        "of the field as told by markers alone: root mean square error of a lateral component", field.lateral_rms_um);
+        "of the field as estimated by markers alone: root mean square error of a lateral component",
+        field.lateral_rms_um);
     add(field.punch + "_press_um", "the same, root mean square of the normal component", field.press_rms_um);
   }
   return rows.rows();

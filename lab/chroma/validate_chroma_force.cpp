@@ -1,8 +1,8 @@
 // Forces, friction and stick or slip from the chroma sensor's pictures ([Lin2019] leaves them open): punches and balls
-// are pressed on the gel and dragged until they slide; each frame's picture is read, its markers' displacements told by
-// a calibrated model and inverted. The paper gives no figure. Asked for here: forces to a tenth of the mean normal
-// force, as [VisioHaptic2024] asks for 0.1 N of some newtons; friction to 0.1, which tells rubber from steel and the
-// dry from the oiled.
+// are pressed on the gel and dragged until they slide; each frame's picture is read, its markers' displacements
+// estimated by a calibrated model and inverted. The paper gives no figure. Asked for here: forces to a tenth of the
+// mean normal force, as [VisioHaptic2024] asks for 0.1 N of some newtons; friction to 0.1, which tells rubber from
+// steel and the dry from the oiled.
 
 #include <cmath>
 #include <utility>

@@ -1,6 +1,6 @@
 #pragma once
 // What a virtual camera shows over time, for programs that open it like a real one (`touchstone serve`): the frames of
-// a scene, or a device that is told what presses it. Light is computed once; each time that a frame is shown it is
+// a scene, or a device that gets presses on request. Light is computed once; each time that a frame is shown it is
 // exposed anew, with noise of its own.
 
 #include <Eigen/Core>

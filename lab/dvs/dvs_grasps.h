@@ -49,7 +49,7 @@ struct DvsGraspParameters {
 struct DvsSpread {
   double force = 1.0;  ///< wanted
   double pose = 1.0;   ///< place, yaw, pitch, roll and clearance: a piece is put in by hand
-  /// Speeds, ring and damping, the setup's motion, light. The paper's grasps are one gripper's, in one room, under one
+  /// Speeds, ring and damping, the setup's motion, light. The paper's grasps are one gripper's, in one light, under one
   /// program; 1 is as many setups as grasps.
   double setup = 0.1;
 };

@@ -1,7 +1,7 @@
 #pragma once
 // The light that a grasp of lab/dvs/dvs_grasps.h puts on the event camera's pixels.
 //
-// What the membrane shows hangs on the finger's travel alone (sim/grasp/gripped_face.h), and to and fro it passes the
+// What the membrane shows depends on the finger's travel alone (sim/grasp/gripped_face.h), and to and fro it passes the
 // same travels. So a grasp's light is pictures at some travels, the logarithm running straight between two: as many as
 // bring that near to pictures made in between.
 

@@ -14,7 +14,7 @@
 
 namespace touchstone::lab {
 
-/// What one kind of event pixels told of a grasp.
+/// What one kind of event pixels recorded of a grasp.
 struct DvsEvents {
   std::vector<sensors::EventCounts> counts;  ///< per millisecond, from the recording's start
   std::int64_t events = 0;                   ///< all, also those of a last millisecond that isn't whole
@@ -25,7 +25,7 @@ struct DvsRecording {
   std::vector<DvsEvents> by_pixels;         ///< one of each kind of event pixels that was asked for
   std::vector<sim::ForceReading> readings;  ///< from the first touch on; seconds on the recording's clock
   double touch_s = 0.0;                     ///< truth: the first touch
-  double release_s = 0.0;                   ///< truth: the servo is told to open
+  double release_s = 0.0;                   ///< truth: the servo is commanded to open
   double apart_s = 0.0;                     ///< truth: the last moment of contact
   std::int64_t pictures = 0;                ///< made of the membrane
   std::int64_t steps = 0;                   ///< of each event pixel, from one light to the next

@@ -65,7 +65,7 @@ enum class DvsForce { measured, truth };
 enum class DvsInputs {
   counts,           ///< accumulated ON and OFF: networks
   counts_and_time,  ///< Gaussian processes (sec. III.D)
-  time,             ///< a control: what can be told without having seen anything but the touch
+  time,             ///< a control: what can be estimated without having seen anything but the touch
 };
 
 std::vector<sensors::ForceSeries> force_series_of(std::span<const DvsSequence> sequences, DvsForce force,

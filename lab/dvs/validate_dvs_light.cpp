@@ -151,10 +151,10 @@ void add_event_counts(const DvsGraspSetup& setup, const sim::MembraneCamera& cam
   settings.pixels[0].on_threshold *= kFineThresholds;
   settings.pixels[0].off_threshold *= kFineThresholds;
   const DvsRecording recording = record_dvs_grasp(setup, camera, p, settings);
-  sensors::EventCounts told;
+  sensors::EventCounts recorded;
   for (const sensors::EventCounts& counts : recording.by_pixels[0].counts) {
-    told.on += counts.on;
-    told.off += counts.off;
+    recorded.on += counts.on;
+    recorded.off += counts.off;
   }
   const DvsGrasp grasp = setup.play(p);
   ThresholdCount truth;
@@ -174,8 +174,8 @@ void add_event_counts(const DvsGraspSetup& setup, const sim::MembraneCamera& cam
                      "%", Better::lower, kAllowedCount_percent, false,
                      100.0 * std::abs(static_cast<double>(ours - whole)) / static_cast<double>(whole));
   };
-  add("off_count_error_percent", "OFF", told.off, truth.off);
-  add("on_count_error_percent", "ON", told.on, truth.on);
+  add("off_count_error_percent", "OFF", recorded.off, truth.off);
+  add("on_count_error_percent", "ON", recorded.on, truth.on);
 }
 
 /// Events of pixels that see the free face for some seconds.

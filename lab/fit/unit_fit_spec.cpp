@@ -104,7 +104,7 @@ void require_fit(const sim::DeviceSpec& device) {
   }
 }
 
-/// That something was recorded of which the unknown could be told at all.
+/// That something was recorded that the unknown could be identified by.
 void require_identifiable(const FitUnknown& unknown, const UnitFitSpec& spec, const SourceLocation& where) {
   const bool modulus = std::any_of(unknown.numbers.begin(), unknown.numbers.end(), [](const FittedNumber& number) {
     return number.number.path.starts_with("gel.") && number.number.path.find("youngs_modulus_MPa") != std::string::npos;
@@ -112,9 +112,10 @@ void require_identifiable(const FitUnknown& unknown, const UnitFitSpec& spec, co
   const bool force = std::any_of(spec.presses.begin(), spec.presses.end(),
                                  [](const RecordedPress& press) { return press.force_N.has_value(); });
   if (modulus && !force) {
-    fail_at(where,
-            "path '{}': no press has a force_N, and without one a modulus can't be told: shapes don't hang on it",
-            unknown.path);
+    fail_at(
+        where,
+        "path '{}': no press has a force_N, and without one a modulus can't be identified: shapes don't depend on it",
+        unknown.path);
   }
 }
 

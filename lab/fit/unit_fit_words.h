@@ -8,10 +8,10 @@
 
 namespace touchstone::lab {
 
-/// Combinations that span what `untold` (columns: orthonormal, rows: unknowns, in units of half ranges, whose lengths
-/// are `scale`) does, each with as few unknowns as can be: by elimination, the largest part first.
+/// Combinations that span what `unidentified` (columns: orthonormal, rows: unknowns, in units of half ranges, whose
+/// lengths are `scale`) does, each with as few unknowns as can be: by elimination, the largest part first.
 std::vector<UnidentifiableCombination> unidentifiable_combinations(const std::vector<FitUnknown>& unknowns,
-                                                                   const Eigen::MatrixXd& untold,
+                                                                   const Eigen::MatrixXd& unidentified,
                                                                    const Eigen::VectorXd& scale);
 
 }  // namespace touchstone::lab

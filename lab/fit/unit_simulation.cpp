@@ -20,7 +20,7 @@ constexpr double kWidest_mm = 0.5;
 constexpr std::uint64_t kOtherLight = 500'000;  // beyond any number of lamps
 constexpr std::size_t kMostKept = 256U << 20U;  // bytes of pictures of each lamp
 
-/// What a press' state hangs on: the scene's numbers, the press, its pose.
+/// What a press' state depends on: the scene's numbers, the press, its pose.
 using Key = std::vector<double>;
 
 Key with_pose(Key key, int press, const PressPose& pose) {
@@ -39,7 +39,7 @@ struct UnitSimulation::Parts {
   Parts(const PreparedFit& of, std::filesystem::path cache_folder, Progress listener, std::uint64_t first_seed)
       : fit(of), cache(std::move(cache_folder)), progress(std::move(listener)), seed(first_seed) {
     const auto lamps = fit.device.lamps.size();
-    rigs.resize(lamps);
+    by_lamp.resize(lamps);
     lights.resize(lamps);
     sim::keep_gel_of_unit_modulus(fit.device, cache);
   }
@@ -77,7 +77,7 @@ struct UnitSimulation::Parts {
   }
 
   const sim::VirtualSensor& sensor(const sim::DeviceSpec& whole, const Key& key, int lamp) {
-    auto& kept = rigs[static_cast<std::size_t>(lamp)];
+    auto& kept = by_lamp[static_cast<std::size_t>(lamp)];
     for (std::size_t i = 0; i < kept.size(); ++i) {
       if (kept[i].first != key) continue;
       std::rotate(kept.begin() + static_cast<std::ptrdiff_t>(i), kept.begin() + static_cast<std::ptrdiff_t>(i) + 1,
@@ -170,8 +170,8 @@ struct UnitSimulation::Parts {
   Progress progress;
   std::uint64_t seed;
   int made = 0;
-  std::vector<std::vector<std::pair<Key, std::unique_ptr<const sim::VirtualSensor>>>> rigs;  // by lamp
-  std::vector<std::map<Key, cv::Mat>> lights;                                                // by lamp
+  std::vector<std::vector<std::pair<Key, std::unique_ptr<const sim::VirtualSensor>>>> by_lamp;  // by lamp
+  std::vector<std::map<Key, cv::Mat>> lights;                                                   // by lamp
   std::map<Key, PressedState> states;
 };
 

@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kGripDepth_mm = 0.25;
 
-/// Where the touch sensor sits in the hand, and the socket on the setup: any poses do, both are known to the robot.
+/// Where the touch sensor sits in the hand, and the socket on the table: any poses do, both are known to the robot.
 RigidTransform gripper_from_touch() {
   return {rotation_from_xyz({0.0, kPi / 2, 0.3}), {12.0, 0.0, 95.0}};
 }
@@ -27,7 +27,7 @@ Eigen::Vector2d robot_miss(const InsertionSettings& settings, std::uint64_t inde
   return settings.robot_error_mm * Eigen::Vector2d(x, y);
 }
 
-/// One trial on its way: the plug hangs still, the hand moves between grasps.
+/// One trial while it runs: the plug hangs still, the hand moves between grasps.
 struct Reach {
   Grip hang;          // of the plug, relative to the hand's first place
   double hand = 0.0;  // across the plug

@@ -68,7 +68,7 @@ struct SlipScore {
   int found = 0;                  ///< in which slip was reported at all
   int found_before = 0;           ///< not later than the onset
   std::vector<double> delays_ms;  ///< report - onset of those found; negative: before
-  int predictable = 0;   ///< slides whose partial slip lasts as long as score() was told: there's time to see it
+  int predictable = 0;   ///< slides whose partial slip lasts as long as score() is given: there's time to see it
   int predicted = 0;     ///< of those, found not later than the onset
   int quiet_runs = 0;    ///< without an onset
   int false_runs = 0;    ///< of those, with a report

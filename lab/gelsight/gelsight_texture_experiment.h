@@ -68,7 +68,8 @@ struct TextureSample {
   cv::Mat heights;  ///< CV_32FC1, mm
 };
 
-/// The same squares twice, so that what the estimator of heights loses can be told from what surfaces have in common.
+/// The same squares twice, so that what the estimator of heights loses can be separated from what surfaces have in
+/// common.
 struct TextureSamples {
   std::vector<TextureSample> estimated, membrane;
 };

@@ -2,7 +2,7 @@
 // The thesis shows one grasp of each, and all are held; here each is tried over a range of frictions, weights, places
 // and turns, with other noise each time. The rule's steps and the arm's speed were chosen on one grasp of each object
 // with a friction of 0.6 in the middle of the gel, none of the full form's trials; how long slip is forgotten after it
-// was told (GraspSenseSettings) was chosen on its second one.
+// was given (GraspSenseSettings) was chosen on its second one.
 
 #include <tbb/parallel_for.h>
 

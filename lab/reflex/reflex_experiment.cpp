@@ -42,8 +42,8 @@ std::vector<ReflexPoint> record_points(const ReflexSetup& setup, const ReflexTou
   for (int frame = 1; static_cast<int>(record.size()) < points; ++frame) {
     const double place_mm = motion(chip.next_middle_s());
     touch.path_light.light_at(place_mm, light);
-    const ChipStatistics told = chip.expose(light).statistics;
-    if (frame % every == 0) record.push_back({told, touch.truth(place_mm)});
+    const ChipStatistics statistics = chip.expose(light).statistics;
+    if (frame % every == 0) record.push_back({statistics, touch.truth(place_mm)});
   }
   return record;
 }
@@ -162,18 +162,18 @@ ExploreScore score_explore(const sensors::ExploreModel& model, std::span<const s
   int touched = 0;
   for (std::size_t i = 0; i < readings.size(); ++i) {
     const ReflexTruth& truth = pictures[i].truth;
-    const sensors::ExploreForce told = sensors::estimate(model, readings[i].motion);
-    const double error_mm = std::abs(told.press_mm - std::max(truth.press_mm, 0.0));
-    const double error_N = std::abs(told.force_N - truth.normal_N);
+    const sensors::ExploreForce estimate = sensors::estimate(model, readings[i].motion);
+    const double error_mm = std::abs(estimate.press_mm - std::max(truth.press_mm, 0.0));
+    const double error_N = std::abs(estimate.force_N - truth.normal_N);
     squares_mm += error_mm * error_mm;
     squares_N += error_N * error_N;
     score.largest_mm = std::max(score.largest_mm, error_mm);
     score.largest_N = std::max(score.largest_N, error_N);
     if (truth.contact) {
       ++touched;
-      shear += (told.shear_N - truth.shear_N).squaredNorm();
+      shear += (estimate.shear_N - truth.shear_N).squaredNorm();
     } else if (touched > 0) {
-      score.drift_mm = std::max(score.drift_mm, std::abs(told.press_mm));
+      score.drift_mm = std::max(score.drift_mm, std::abs(estimate.press_mm));
     }
     score.absolute += readings[i].mode == sensors::ExploreMode::absolute ? 1 : 0;
     score.relative += readings[i].mode == sensors::ExploreMode::relative ? 1 : 0;
@@ -210,8 +210,8 @@ std::vector<sensors::ShearSample> explore_shear_samples(const sensors::ExploreMo
   std::vector<sensors::ShearSample> samples;
   for (std::size_t i = 0; i < readings.size(); ++i) {
     if (!pictures[i].truth.contact || readings[i].mode == sensors::ExploreMode::held) continue;
-    const sensors::ExploreForce told = sensors::estimate(model, readings[i].motion);
-    samples.push_back({told.lateral_mm, told.force_N, pictures[i].truth.shear_N});
+    const sensors::ExploreForce estimate = sensors::estimate(model, readings[i].motion);
+    samples.push_back({estimate.lateral_mm, estimate.force_N, pictures[i].truth.shear_N});
   }
   return samples;
 }

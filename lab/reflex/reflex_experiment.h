@@ -76,7 +76,7 @@ struct ExploreScore {
   double rms_mm = 0.0, largest_mm = 0.0;  ///< of the press
   double rms_N = 0.0, largest_N = 0.0;    ///< of the normal force
   double shear_rms_N = 0.0;               ///< of both axes together, of pictures in contact
-  double drift_mm = 0.0;                  ///< the largest press told without contact after the first contact
+  double drift_mm = 0.0;                  ///< the largest press estimated without contact after the first contact
 };
 ExploreScore score_explore(const sensors::ExploreModel& model, std::span<const sensors::ExploreReading> readings,
                            std::span<const ReflexPicture> pictures);
@@ -101,8 +101,8 @@ struct ReflexCollisionSettings {
   CollisionSettings collision;
   sensors::ReflexSettings reflex;
   sensors::ReflexBudget budget;
-  /// Explore mode stops where its force exceeds this; a picture is told after it's complete, over USB and through a
-  /// program on a computer.
+  /// Explore mode stops where its force exceeds this; a picture is evaluated after it's complete, over USB and through
+  /// a program on a computer.
   double explore_stop_above_N = 0.3;
   double explore_after_s = 0.010;
 };

@@ -90,8 +90,8 @@ std::vector<ChipStatistics> record_statistics(const ReflexPathLight& path_light,
   cv::Mat light;
   for (int k = 0; k < frames; ++k) {
     path_light.light_at(motion(chip.next_middle_s()), light);
-    const ChipStatistics told = chip.expose(light).statistics;
-    if ((k + 1) % every == 0) record.push_back(told);
+    const ChipStatistics statistics = chip.expose(light).statistics;
+    if ((k + 1) % every == 0) record.push_back(statistics);
   }
   return record;
 }

@@ -18,7 +18,7 @@ struct ReflexPathLightSettings {
   /// How far the light of any pixel between two pictures may be off, in parts of the light that makes the largest
   /// number at the longest exposure; what a step of 6 bits is, is 1/63.
   double allowed = 0.4 / 63;
-  double least_step = 1e-3;  ///< states nearer to each other than this aren't looked between
+  double least_step = 1e-3;  ///< states nearer to each other than this aren't refined
   int most_pictures = 2000;
 };
 

@@ -22,7 +22,8 @@ ReflexTruth truth_of(const sim::PathPoint& point, const fem::PressState& state) 
   return truth;
 }
 
-/// Finer where the touch begins: there a contact is told or missed, and the force grows with the square of the depth.
+/// Finer where the touch begins: there a contact is detected or missed, and the force grows with the square of the
+/// depth.
 void refine_beginning(sim::PressPath& path) {
   std::vector<sim::PathPoint> points;
   for (const double depth : {0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4}) points.push_back({depth, {0.0, 0.0, -depth}});
@@ -93,7 +94,7 @@ const ReflexTouch& ReflexSetup::touch(const std::string& name) const {
 ReflexSetup set_up_reflex(const sim::DeviceSpec& device, const std::filesystem::path& cache_folder,
                           std::span<const ReflexTouchSpec> specs, const ReflexLightSettings& light,
                           const ReflexPathLightSettings& path_light, const Progress& progress) {
-  if (specs.empty()) fail("a setup needs a touch");
+  if (specs.empty()) fail("the reflex setup needs a touch");
   ReflexSetup setup;
   setup.device = device;
   sim::PathPlayer player(device, cache_folder);

@@ -59,7 +59,7 @@ struct ReflexSetup {
   std::vector<std::string> notes;  ///< of caches
 
   const ReflexTouch& touch(const std::string& name) const;  ///< @pre it's one of them
-  /// A chip that begins to look: of this unit, with noise of its own.
+  /// A chip that begins to record: of this unit, with noise of its own.
   render::MotionChip start_chip(std::uint64_t noise_seed) const { return {chip, 1, noise_seed}; }
 };
 

@@ -92,11 +92,12 @@ sensors::ReflexModel add_reflex_rows(const ReflexSetup& setup, const Scale& scal
   const std::vector<ReflexPoint> training = record(plate, motion, kTraining);
   sensors::ReflexModel model = train_reflex(training);
   const ReflexScore score = score_reflex(model, training);
-  rows.add_bounded("contact.error_percent",
-                   fmt::format("contact told wrongly on the training set, '{}': {}", rule_of(model.tree), says(score)),
-                   "%", Better::lower, kPublishedError_percent, true, score.error_percent);
+  rows.add_bounded(
+      "contact.error_percent",
+      fmt::format("contact classified wrongly on the training set, '{}': {}", rule_of(model.tree), says(score)), "%",
+      Better::lower, kPublishedError_percent, true, score.error_percent);
   rows.add_bounded("contact.missed_below_N",
-                   fmt::format("the largest force of a contact that wasn't told, {:.2f} mm", score.missed_below_mm),
+                   fmt::format("the largest force of a contact that wasn't detected, {:.2f} mm", score.missed_below_mm),
                    "N", Better::lower, kPublishedMissed_N, true, score.missed_below_N);
   rows.add_bounded("force.rms_N", "force by tree and linear model on the training set", "N", Better::lower,
                    kPublishedRms_N, true, score.rms_N);
@@ -190,8 +191,8 @@ sensors::ExploreModel add_explore_rows(const ReflexSetup& setup, const Scale& sc
                                  law.rate_per_mm, test.rms_N),
                      "N", Better::lower, bounds[2], published, test.largest_N);
     const double back_mm = std::abs(model.press.press_mm(still_readings.back().motion.dilation));
-    rows.add_bounded(prefix + "drift_mm", "what is told when the plate has gone back to the touch", "mm", Better::lower,
-                     kAllowedDrift_mm, false, std::max(back_mm, score.drift_mm));
+    rows.add_bounded(prefix + "drift_mm", "the press that is estimated when the plate has gone back to the touch", "mm",
+                     Better::lower, kAllowedDrift_mm, false, std::max(back_mm, score.drift_mm));
     return std::pair(model, std::array<double, 3>{score.rms_mm, test.largest_mm, test.largest_N});
   };
   const auto text = add("explore.", sensors::text_explore_settings(), 1, 1, true,
@@ -242,15 +243,15 @@ void add_shear_rows(const ReflexSetup& setup, const sensors::ReflexModel& reflex
   const sensors::ShearLaw of_counts = sensors::fit_shear_law(counts);
   model.shear = sensors::fit_shear_law(shifts);
   const Record test = record(setup.touch("shear-45-3"), kShearTest);
-  const auto told = reflex_shear_samples(reflex, test.points, 10);
+  const auto samples = reflex_shear_samples(reflex, test.points, 10);
   const auto seen = explore_shear_samples(model, test.readings, test.pictures);
-  const double half_N = 0.5 * shear_size_N(told);
+  const double half_N = 0.5 * shear_size_N(samples);
   rows.add_bounded(
       "shear.reflex_rms_N",
       fmt::format("shear of counts, 1.5 mm to and fro at 45 degrees under a press of 3 mm, learned along x "
                   "and y under 2 and 4 mm ({:.2f} there); bound: half of the shear's own root mean square",
                   of_counts.rms_residual_N),
-      "N", Better::lower, half_N, false, shear_rms_N(of_counts, told));
+      "N", Better::lower, half_N, false, shear_rms_N(of_counts, samples));
   rows.add_bounded(
       "shear.explore_rms_N",
       fmt::format("the same by the dots' shift ({:.2f} where it was learned)", model.shear->rms_residual_N), "N",
@@ -317,7 +318,7 @@ void add_fault_rows(const ReflexSetup& setup, const sensors::ReflexModel& reflex
   const std::vector<Case> cases = {{light * 0.0, sensors::ChipFault::dark, sensors::PictureFault::dark},
                                    {light * 1e4, sensors::ChipFault::saturated, sensors::PictureFault::saturated},
                                    {bare, sensors::ChipFault::flat, sensors::PictureFault::flat}};
-  int told = 0;
+  int detected = 0;
   std::string titles;
   for (const Case& one : cases) {
     render::MotionChip chip = setup.start_chip(kTest);
@@ -335,13 +336,13 @@ void add_fault_rows(const ReflexSetup& setup, const sensors::ReflexModel& reflex
       image = grabber.add(frame);
     }
     const sensors::PictureFault fault = tracker.next({image->image, image->first_us}).fault;
-    told += (blind ? 1 : 0) + (fault != sensors::PictureFault::none ? 1 : 0);
+    detected += (blind ? 1 : 0) + (fault != sensors::PictureFault::none ? 1 : 0);
     titles += fmt::format("{}{}: {}, {}", titles.empty() ? "" : "; ", name_of(one.picture),
                           chip_says ? name_of(one.chip) : name_of(decision.fault), name_of(fault));
   }
   rows.add_bounded("faults.detected_percent",
-                   fmt::format("of light that tells nothing, told by reflex and by explore mode ({})", titles), "%",
-                   Better::higher, 100.0, false, 100.0 * told / (2.0 * static_cast<double>(cases.size())));
+                   fmt::format("of pictures without information, detected by reflex and by explore mode ({})", titles),
+                   "%", Better::higher, 100.0, false, 100.0 * detected / (2.0 * static_cast<double>(cases.size())));
 }
 
 }  // namespace

@@ -249,7 +249,7 @@ const std::vector<Kind>& kinds() {
       {"motion", schema_of<sim::MotionSpec>},
       {"scene", schema_of<sim::SceneSpec>},
       {"job",
-       [] {  // told apart as is_draw_job_file does
+       [] {  // distinguished as is_draw_job_file does
          return Json{{"if", {{"required", {"draw"}}}},
                      {"then", schema_of<datasets::DrawJob>()},
                      {"else", schema_of<datasets::Job>()}};

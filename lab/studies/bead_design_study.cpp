@@ -238,7 +238,7 @@ std::vector<DesignFigure> bead_design_figures(const BeadDesignSpec& spec) {
       {"error_at_load_N", Better::lower,
        fmt::format("root mean square error of a press of {}, worst axis: bias and noise", load)},
       {"noise_N", Better::lower,
-       "standard deviation of the force without load, worst axis: what can be told from nothing"},
+       "standard deviation of the force without load, worst axis: the least force that is detected"},
       {"bound_N", Better::lower,
        fmt::format(
            "least standard deviation that any unbiased estimate can have at {}, worst axis, for who knows where "
@@ -257,7 +257,7 @@ std::vector<DesignFigure> bead_design_figures(const BeadDesignSpec& spec) {
       {"least_noise_px", Better::lower, "the least that any method could have from the same light (Cramer-Rao)"},
       {"range_N", Better::higher,
        fmt::format("normal force at which the press is deeper than {:.3g} of the gel's thickness, or a bead leaves its "
-                   "cell; {:.4g} is as far as was looked",
+                   "cell; {:.4g} is the end of the search",
                    spec.deepest_share, spec.most_N)},
       {"depth_mm", Better::near, fmt::format("how far {} press in", load)},
       {"largest_strain", Better::lower,

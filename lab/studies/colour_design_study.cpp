@@ -193,16 +193,16 @@ StudyResult report(const std::string& name, const ColourDesignSpec& spec, const 
     meeting += table.values[d][largest] <= spec.error_um;
     if (!best || table.values[d][largest] < table.values[*best][largest]) best = d;
   }
-  DesignStory told;
-  told.name = name;
-  told.title =
+  DesignStory report;
+  report.name = name;
+  report.title =
       fmt::format("{} designs; wanted is a largest error of {:.4g} um in presses that the model wasn't calibrated on.",
                   table.points.size(), spec.error_um);
-  told.answer = fmt::format("{} of {} designs can be read, {} of them meet it.\n", had, table.points.size(), meeting);
+  report.answer = fmt::format("{} of {} designs can be read, {} of them meet it.\n", had, table.points.size(), meeting);
   if (best) {
     const std::vector<double>& of = table.values[*best];
-    told.chosen = {*best};
-    told.answer += fmt::format(
+    report.chosen = {*best};
+    report.answer += fmt::format(
         "\n**{}: {}**: {:.3g} um at worst ({:.3g} um as the device is), {:.3g} um root mean square ({:.3g}). Its hue "
         "turns by "
         "{:.3g} degrees a mm ({:.3g}), so its noise is worth {:.2g} um of depth ({:.2g}); a whole picture could tell "
@@ -212,17 +212,17 @@ StudyResult report(const std::string& name, const ColourDesignSpec& spec, const 
         name_of_point(table.plan, table.points[*best]), of[kLargest], table.base[kLargest], of[kRms], table.base[kRms],
         of[kSlope], table.base[kSlope], of[kNoise], table.base[kNoise], of[kBoundPress], of[kBoundLateral],
         table.base[kBoundPress], table.base[kBoundLateral]);
-    told.answer +=
+    report.answer +=
         of[kRms] > 3.0 * std::max(of[kBoundPress], of[kBoundLateral])
             ? "\nThe picture knows more than the model reads from one marker: another estimator would help more than "
               "another sensor.\n"
             : "\nThe model is near what the picture knows: to be better, the sensor must change.\n";
   }
-  told.pareto = {number("rms_error_um"), number("depth_noise_um"), number("bound_press_um")};
+  report.pareto = {number("rms_error_um"), number("depth_noise_um"), number("bound_press_um")};
   for (const char* drawn : {"largest_error_um", "rms_error_um", "depth_noise_um", "hue_deg_per_mm", "bound_press_um"}) {
-    told.drawn.push_back(number(drawn));
+    report.drawn.push_back(number(drawn));
   }
-  return design_report(table, told);
+  return design_report(table, report);
 }
 
 }  // namespace touchstone::lab

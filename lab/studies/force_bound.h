@@ -1,6 +1,6 @@
 #pragma once
 // The least error that any unbiased estimate of a force can have which is made from where the beads are seen: the
-// Cramer-Rao bound. It hangs on the gel and the camera, not on the estimator, so it tells a designer which of them to
+// Cramer-Rao bound. It depends on the gel and the camera, not on the estimator, so it shows a designer which of them to
 // change.
 //
 // With y the beads' pixels, f the force, S = dy/df and y normal about its mean with the covariance C = diag(sigma^2),

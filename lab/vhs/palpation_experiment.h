@@ -69,7 +69,7 @@ struct SoftnessSettings {
 
 struct SoftnessScore {
   sensors::ConfusionMatrix levels;  ///< of the test waveforms
-  /// Of each material's test waveforms, in per cent, how many were told right.
+  /// Of each material's test waveforms, in per cent, how many were classified correctly.
   std::vector<double> right_percent;
   double percent() const { return 100.0 * levels.accuracy(); }
 };

@@ -16,7 +16,7 @@ namespace {
 
 constexpr double kForceError_N = 0.1;  // what the paper reaches for one force
 constexpr double kNoise_px = 0.1;
-constexpr double kDip = 0.75;  // of the pressure between two points, to be told for two
+constexpr double kDip = 0.75;  // of the pressure between two points, to count as two
 constexpr std::uint64_t kFirstSeed = 1000;
 
 struct Layout {

@@ -1,5 +1,5 @@
-// Five levels of softness under a skin [VisioHaptic2024, sec. 2.3.1]: told from waveforms of the paper's force sensor
-// at 1000, 500 and 250 Hz, and from the vhs sensor's own at 601.25 Hz.
+// Five levels of softness under a skin [VisioHaptic2024, sec. 2.3.1]: classified from waveforms of the paper's force
+// sensor at 1000, 500 and 250 Hz, and from the vhs sensor's own at 601.25 Hz.
 
 #include <cmath>
 #include <numeric>
@@ -55,7 +55,7 @@ std::string matrix_text(const Eigen::MatrixXi& counts) {
 }
 
 /// What the trials made of one sensor.
-struct Told {
+struct Classified {
   Figures percent;
   Eigen::MatrixXi counts = Eigen::MatrixXi::Zero(kSoftnessLevels, kSoftnessLevels);
   void add(const SoftnessScore& score) {
@@ -98,7 +98,7 @@ std::vector<ValidationRow> validate_vhs_palpation(const ValidateOptions& options
   const PalpationTable rigid(spec, PalpationFace::rigid, device, *gel, table, options.cache, options.progress);
   const PalpationTable soft(spec, PalpationFace::gel, device, *gel, table, options.cache, options.progress);
 
-  Told at_1000, at_500, at_250, camera, without_noise, behind_gel, fast_part, unseen, alike_skins, same_speed,
+  Classified at_1000, at_500, at_250, camera, without_noise, behind_gel, fast_part, unseen, alike_skins, same_speed,
       more_pieces;
   Figures drop;
   const int seeds = options.quick ? 1 : kSeeds;
@@ -140,14 +140,14 @@ std::vector<ValidationRow> validate_vhs_palpation(const ValidateOptions& options
     if (options.progress) options.progress("palpation, trials", k + 1, seeds);
   }
   const int tests = at_1000.counts.sum() / seeds;
-  const auto add = [&](const std::string& id, const std::string& title, const Told& told, double bound,
+  const auto add = [&](const std::string& id, const std::string& title, const Classified& classified, double bound,
                        bool published = true) {
-    rows.add_bounded(id, fmt::format("{}: {}", title, matrix_text(told.counts)), "%", Better::higher, bound, published,
-                     mean_of(told.percent));
-    rows.last().ci95 = interval_of(told.percent, tests);
+    rows.add_bounded(id, fmt::format("{}: {}", title, matrix_text(classified.counts)), "%", Better::higher, bound,
+                     published, mean_of(classified.percent));
+    rows.last().ci95 = interval_of(classified.percent, tests);
   };
   add("levels_1000Hz_percent",
-      "five levels told from the paper's force sensor at 1000 Hz, of each what it was told to be", at_1000,
+      "five levels classified from the paper's force sensor at 1000 Hz, of each what it was classified as", at_1000,
       kPublished1000);
   add("levels_500Hz_percent", "every second sample", at_500, kPublished500);
   add("levels_250Hz_percent", "every fourth", at_250, kPublished250);
@@ -161,7 +161,8 @@ std::vector<ValidationRow> validate_vhs_palpation(const ValidateOptions& options
   fall.published = kPublishedDrop;
   fall.ci95 = interval_of(drop, tests);
   if (seeds == 1) fall.ci95.reset();
-  add("camera_percent", "told from the vhs sensor at 601.25 Hz; beside the paper's 500 Hz", camera, kPublished500);
+  add("camera_percent", "classified from the vhs sensor at 601.25 Hz; beside the paper's 500 Hz", camera,
+      kPublished500);
   rows.add_bounded("noise_px", "noise of a bead's coordinate on rendered frames of an opal lump; the filter's setting",
                    "px", Better::lower, chain.filter.measurement_px, false, lit.noise_px);
   double ratio = 0.0;

@@ -37,7 +37,7 @@ std::vector<Eigen::Vector2d> seen_at(const sim::DeviceSpec& device, const std::v
   return px;
 }
 
-/// Pressure (MPa) told for the patch at a place of the gel's face; 0 beside the patches.
+/// Pressure (MPa) estimated for the patch at a place of the gel's face; 0 beside the patches.
 double pressure_at(const sensors::MarkerCompliance& c, const sensors::TractionField& field, const Eigen::Vector2d& at) {
   const Eigen::Vector2d index = (at - c.first_patch) / c.patch_side;
   const Eigen::Vector2i cell = index.array().round().cast<int>();

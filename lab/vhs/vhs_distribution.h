@@ -1,6 +1,6 @@
 #pragma once
-// Force at several points at once, told from beads: balls are pressed on the vhs sensor's gel together, each with a
-// force of its own; where the camera sees the beads is inverted with the gel's compliance.
+// Force at several points at once, estimated from beads: balls are pressed on the vhs sensor's gel together, each with
+// a force of its own; where the camera sees the beads is inverted with the gel's compliance.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -42,8 +42,8 @@ struct LoadPoint {
 /// What one press of some points gave.
 struct DistributionTrial {
   std::vector<double> estimated_N;  ///< of each point: over the patches nearest to it
-  std::vector<double> place_mm;     ///< how far the told force's centre is from the true one, of each point
-  double total_N = 0.0;             ///< told, true minus told being the error
+  std::vector<double> place_mm;     ///< how far the estimated force's centre is from the true one, of each point
+  double total_N = 0.0;             ///< estimated, true minus estimated being the error
   double true_total_N = 0.0;
   double dip = 0.0;  ///< of two points: least pressure between them over the lower of the pressures at them; 1: no dip
 };

@@ -107,7 +107,7 @@ DirectError measure_direct_error(const cv::Mat& picture, const Scene& scene, con
     return error;
   }
   error.rms = std::sqrt(std::max(0.0, square.value) / power);
-  // The root's derivative, but for a root that isn't told from zero.
+  // The root's derivative, but for a root that can't be distinguished from zero.
   error.rms_error = square.value > square.error ? 0.5 * square.error / std::sqrt(square.value * power)
                                                 : std::sqrt(square.error / power);
   error.mean = shift.value / std::sqrt(power);

@@ -26,7 +26,7 @@ struct DirectError {
 };
 
 /// What the root mean square difference isn't above, and not below, with two standard errors of its square, which is
-/// what is measured: a difference that isn't told from none has a root whose own error says little.
+/// what is measured: a difference that can't be distinguished from zero has a root whose own error says little.
 double largest_rms(const DirectError& error);
 double smallest_rms(const DirectError& error);
 

@@ -76,7 +76,7 @@ class ShadowReach {
   std::vector<std::uint64_t> doubt_;  // by cell
 };
 
-/// Do the triangles hang together by common vertices? True without any.
+/// Are the triangles connected by common vertices? True without any.
 bool is_connected(const TriangleMesh& mesh);
 
 }  // namespace touchstone::render

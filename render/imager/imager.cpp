@@ -346,7 +346,7 @@ Imager imx273_skipping(int bits, double exposure_s) {
   imager.dsnu_e = 1.0;
   imager.bayer = BayerPattern::rggb;
   if (bits < 8 || bits > 16) fail("imager: an IMX273 of {} bits; allowed is from 8 to 16", bits);
-  // Black level and gain hang together: full well + black level fill the range.
+  // Black level and gain depend on each other: full well + black level fill the range.
   const double largest = largest_number(imager);
   imager.black_level_DN = std::ceil(4.0 * imager.read_noise_e * largest / imager.full_well_e);
   imager.gain_DN_per_e = (largest - imager.black_level_DN) / imager.full_well_e;

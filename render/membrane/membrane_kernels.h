@@ -6,7 +6,7 @@
 // where it is absorbed. What the outer face then does with it (air mirrors it, a touching body swallows it) is no part
 // of these figures, so that they serve for any state of the face (membrane_light.h).
 //
-// Directions at the face are told apart by sectors of the cosine to its normal: what is totally reflected by air, and
+// Directions at the face are grouped into sectors of the cosine to its normal: what is totally reflected by air, and
 // two of what isn't. All walks start and end evenly over azimuth; by symmetry a kernel is then a function of the
 // distance only.
 

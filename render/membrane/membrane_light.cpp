@@ -196,7 +196,7 @@ void for_each_ray(const MembraneOptics& optics, const Camera& camera, const Take
   }
   const ImageGrid grid = pixel_grid(ready);
   const CameraRays rays = trace_to_layer(fixture, ready, grid, kMembraneLayer, 1, 0);
-  // The light is the mean over the stop and the pixel; where it comes from is told by their middles.
+  // The light is the mean over the stop and the pixel; where it comes from is approximated by their middles.
   const CameraRays spread = trace_to_layer(fixture, ready, grid, kMembraneLayer, kLensSamples, 0);
   const auto mean_of = [&](const std::vector<float>& parts, std::size_t slot) {
     double sum = 0.0;

@@ -55,7 +55,7 @@ class RayScene {
   /// Are there ThinFilms?
   bool has_films() const;
 
-  /// The nearest ThinFilm within `most` (mm, finite): only distance, normal and object of `hit` are told.
+  /// The nearest ThinFilm within `most` (mm, finite): only distance, normal and object of `hit` are set.
   bool intersect_film(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double most, RayHit& hit) const;
 
   /// Distance to the nearest Refractive surface straight along +z (`up`) or -z within `most`; negative if there is

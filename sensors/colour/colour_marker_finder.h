@@ -8,8 +8,8 @@
 //   neither. How far a pixel is on the line from white to the full colour, which the picture at rest shows, is how much
 //   of it is covered. Patches of ink are connected pixels of more than 0.7, so those with a blurred gap stay apart.
 // - Filters are rigid: where they are is known from the picture at rest. A patch of ink belongs to the filter that most
-//   of it is under (ink_ownership.h), what is filter without ink to that filter's cell. So regions that touch are told
-//   apart, and ink may reach a little under a neighbour's filter.
+//   of it is under (ink_ownership.h), what is filter without ink to that filter's cell. So regions that touch are
+//   separated apart, and ink may reach a little under a neighbour's filter.
 // - Centroids and areas weigh a rim pixel by what is covered of it: a marker of 4 x 4 px has them to parts of a pixel.
 // - The mean hue is circular, as hue wraps at red, over pixels of more than half saturation, as the paper has it.
 

@@ -26,7 +26,7 @@ struct ScaledConjugateGradientEnd {
 /// Minimises from x on, which takes the best place: scaled conjugate gradient [Moller1993, steps 1 to 9]. On a
 /// quadratic bowl of n dimensions it ends in n steps. A place where the function isn't finite counts as a step that
 /// fails.
-/// @param watch is told after each step that didn't fail: its number, x and the value there; if it returns true, that
+/// @param watch is called after each step that didn't fail: its number, x and the value there; if it returns true, that
 /// is
 ///   the end
 /// @throws Error if a setting is out of its range, or value or gradient aren't finite at the first place

@@ -96,7 +96,7 @@ struct ContactScore {
 };
 ContactScore score(const ContactTree& tree, std::span<const ContactSample> samples);
 
-/// Whether a chip can have told this: registers within their ranges, AVG between MIN and MAX.
+/// Whether a chip can have sent this: registers within their ranges, AVG between MIN and MAX.
 bool is_possible(const ChipStatistics& statistics);
 
 }  // namespace touchstone::sensors

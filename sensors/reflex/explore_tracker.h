@@ -14,7 +14,7 @@ namespace touchstone::sensors {
 enum class ExploreMode {
   absolute,  ///< against the picture at rest: no drift
   relative,  ///< a step from an earlier picture
-  held       ///< nothing could be measured: the motion is that of the last picture that told it
+  held       ///< nothing could be measured: the motion is that of the last picture that gave one
 };
 std::string name_of(ExploreMode mode);
 

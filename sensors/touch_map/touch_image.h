@@ -17,7 +17,7 @@ struct TouchImage {
   double mm_per_px = 0.0;  ///< of both axes
 };
 
-/// A touch whose contact is told by height alone: where it is above `contact_above_mm`.
+/// A touch whose contact is given by height alone: where it is above `contact_above_mm`.
 /// @throws Error as `check` does
 TouchImage touch_by_height(const cv::Mat& height_mm, double mm_per_px, double contact_above_mm);
 

@@ -266,7 +266,7 @@ void FrictionObserver::read_friction() {
     result_.friction = FrictionEstimate{value, std::hypot(1.0 / std::sqrt(weight), kCommonError * value), true};
     return;
   }
-  if (!slid_.empty() || result_.state != ContactSlip::kPartial) return;  // what slid as a whole told more
+  if (!slid_.empty() || result_.state != ContactSlip::kPartial) return;  // what slid as a whole gave more
   double weight = 0.0, sum = 0.0;
   for (const MarkerFriction& marker : result_.markers) {
     if (marker.state != MarkerSlip::kSlip || !marker.lag || marker.ratio_error <= 0.0) continue;

@@ -9,7 +9,7 @@
 
 namespace touchstone::sensors {
 
-/// Lateral displacements as seen; normal ones stay. Exactly what HueEstimator was told where it undid `parallax`.
+/// Lateral displacements as seen; normal ones stay. Exactly what HueEstimator measured before it undid `parallax`.
 /// @throws Error if field and compliance aren't of the same markers
 MarkerField as_seen(MarkerField field, const MarkerCompliance& compliance, const ViewParallax& parallax);
 

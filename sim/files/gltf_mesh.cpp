@@ -164,7 +164,7 @@ class GltfSolid {
       open.pop_back();
       if (index < 0 || index >= static_cast<int>(model_.nodes.size()))
         refuse("names node {}, which isn't there", index);
-      if (visited_[index]) refuse("node {} hangs in the tree of nodes twice", index);
+      if (visited_[index]) refuse("node {} is in the tree of nodes twice", index);
       visited_[index] = true;
       const tinygltf::Node& node = model_.nodes[index];
       const Eigen::Affine3d transform = parent * transform_of(node, index);

@@ -156,7 +156,7 @@ void Gripper::release() {
 
 const GripperState& Gripper::advance(double close_by_mm, double arm_acceleration, double seconds) {
   if (!std::isfinite(close_by_mm) || !std::isfinite(arm_acceleration)) {
-    fail("the gripper is told to close by {} mm and to accelerate by {} mm/s^2", close_by_mm, arm_acceleration);
+    fail("the gripper is commanded to close by {} mm and to accelerate by {} mm/s^2", close_by_mm, arm_acceleration);
   }
   if (!(seconds > 0.0) || !std::isfinite(seconds)) fail("an interval of {} s, it must be above 0 and finite", seconds);
   const double travel_end = state_.finger_travel_mm + close_by_mm;

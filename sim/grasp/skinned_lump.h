@@ -2,8 +2,8 @@
 // A lump under a skin, as dermatologists feel for: a domed piece of one material, glued to a plate on its back, with a
 // layer of another over it ([VisioHaptic2024, sec. 2.3]: benchmark materials under a pseudo-skin of 2 mm).
 //
-// Both materials are linear elastic with one Poisson's ratio, so the piece's answer hangs on the ratio of their moduli,
-// and its stiffness on the skin's besides: one set-up serves all pieces of a ratio.
+// Both materials are linear elastic with one Poisson's ratio, so the piece's answer depends on the ratio of their
+// moduli, and its stiffness on the skin's besides: one set-up serves all pieces of a ratio.
 
 #include <filesystem>
 #include <memory>

@@ -1,5 +1,5 @@
 #pragma once
-// An object file: the shape of a body, how it gives way and how it looks. See docs/file-formats.md.
+// An object file: the shape of a body, its stiffness and its appearance. See docs/file-formats.md.
 
 #include <Eigen/Core>
 #include <filesystem>

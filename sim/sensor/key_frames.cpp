@@ -10,7 +10,7 @@
 namespace touchstone::sim {
 namespace {
 
-// Centroids of beads are told to some hundredths of a pixel, far less than what one pixel's noise lets pass.
+// Centroids of beads are measured to some hundredths of a pixel, far less than what one pixel's noise lets pass.
 constexpr double kStill_px = 0.02;
 // How much wider than its radius a ball can look, seen askew and through the gel.
 constexpr double kWidest = 1.25;

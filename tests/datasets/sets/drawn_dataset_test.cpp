@@ -187,7 +187,7 @@ TEST_F(DrawnDataset, DamagedBlocksAreMadeAgainAndForeignOnesRefused) {
   }
   fs::remove(block("out", 1));
   EXPECT_THAT(message_of([&] { merge_drawn(job_, folder_.path() / "out"); }),
-              HasSubstr("1 of 4 files lack (blocks/000001.h5)"));
+              HasSubstr("1 of 4 files are missing (blocks/000001.h5)"));
   write(block("out", 1), good);  // whole, but in the wrong place
   EXPECT_THAT(message_of([&] { generate("out"); }), HasSubstr("000001.h5: is of another job or another run"));
   EXPECT_THAT(message_of([&] { merge_drawn(job_, folder_.path() / "out"); }), HasSubstr("another run"));
@@ -196,19 +196,19 @@ TEST_F(DrawnDataset, DamagedBlocksAreMadeAgainAndForeignOnesRefused) {
   EXPECT_EQ(contents("out"), whole);
 }
 
-TEST_F(DrawnDataset, ShardsThatLackAreNamed) {
+TEST_F(DrawnDataset, MissingShardsAreNamed) {
   const fs::path out = folder_.path() / "out";
-  EXPECT_EQ(lacking_shards(job_, out, 4), (std::vector<int>{1, 2, 3, 4}));
+  EXPECT_EQ(missing_shards(job_, out, 4), (std::vector<int>{1, 2, 3, 4}));
   EXPECT_FALSE(fs::exists(out));
   generate("out", {2, 4});
-  EXPECT_EQ(lacking_shards(job_, out, 4), (std::vector<int>{1, 3, 4}));
-  EXPECT_EQ(lacking_shards(job_, out, 2), (std::vector<int>{1, 2}));
+  EXPECT_EQ(missing_shards(job_, out, 4), (std::vector<int>{1, 3, 4}));
+  EXPECT_EQ(missing_shards(job_, out, 2), (std::vector<int>{1, 2}));
   for (const int number : {1, 3, 4}) generate("out", {number, 4});
-  EXPECT_TRUE(lacking_shards(job_, out, 4).empty());
+  EXPECT_TRUE(missing_shards(job_, out, 4).empty());
   write(block("out", 2), "short");
-  EXPECT_EQ(lacking_shards(job_, out, 4), (std::vector<int>{3}));
-  EXPECT_EQ(lacking_shards(job_, out, 2), (std::vector<int>{2}));
-  EXPECT_THAT(message_of([&] { lacking_shards(job_, out, 0); }), HasSubstr("--lacking: 0 is not allowed"));
+  EXPECT_EQ(missing_shards(job_, out, 4), (std::vector<int>{3}));
+  EXPECT_EQ(missing_shards(job_, out, 2), (std::vector<int>{2}));
+  EXPECT_THAT(message_of([&] { missing_shards(job_, out, 0); }), HasSubstr("--missing: 0 is not allowed"));
 }
 
 TEST_F(DrawnDataset, AChangedJobAForeignFolderAndAChangedSetAreRefused) {

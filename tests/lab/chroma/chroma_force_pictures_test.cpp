@@ -36,7 +36,7 @@ TEST(ChromaForcePictures, CalibrationHasProbesOfItsOwn) {
   }
 }
 
-TEST(ChromaForcePictures, ToldFieldsAreThoseOfTheirFrames) {
+TEST(ChromaForcePictures, GivenFieldsAreThoseOfTheirFrames) {
   std::vector<sensors::MarkerField> fields(2);
   fields[0].grid = {1, 1};
   fields[1].grid = {2, 2};

@@ -121,7 +121,7 @@ TEST(ChromaForce, FramesWithTooFewMarkersAreCountedNotInverted) {
 }
 
 /// Where strains are small, linear and finite elasticity are one; deeper, the linear map must fall behind.
-TEST(ChromaForce, LargeStrainsAreToldApartFromSmallOnes) {
+TEST(ChromaForce, LargeStrainsDifferFromSmallOnes) {
   fem::SlabMesh slab;
   slab.size_x = slab.size_y = 15.0;
   slab.thickness = 4.0;

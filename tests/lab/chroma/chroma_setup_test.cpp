@@ -19,7 +19,7 @@ namespace {
 
 constexpr std::size_t kPressFrames = 3;
 
-/// A device on its setup, and a ball of 12.7 mm that has been pressed in by 1.8 mm and then pulled along x by 0.6 mm.
+/// A device in its setup, and a ball of 12.7 mm that has been pressed in by 1.8 mm and then pulled along x by 0.6 mm.
 struct Pressed {
   sim::DeviceSpec device;
   sim::VirtualSensor sensor;

@@ -178,7 +178,7 @@ TEST(DvsRecordings, KindsOfPixelsSeeTheSameLight) {
   EXPECT_GE(all.on + all.off, alone.by_pixels[0].events - 20) << "the last, part millisecond";
 }
 
-// Ten times as fine a table of light and as small changes told give the same events but for pixels on the verge.
+// Ten times as fine a table of light and as small changes seen give the same events but for pixels on the verge.
 TEST(DvsRecordings, ToleranceHardlyMatters) {
   DvsRecordSettings settings;
   settings.pixels = {without_noise()};

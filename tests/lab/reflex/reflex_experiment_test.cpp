@@ -183,8 +183,8 @@ TEST(ReflexExperiment, ShearIsLearnedInBothModes) {
     const ReflexTouch& touch = setup().touches[i];
     const ReflexMotion motion = single_stroke(-0.5, touch.end(), 2.0);
     const int frames = static_cast<int>(1500.0 * (touch.end() + 0.5) / 2.0);
-    const auto told = reflex_shear_samples(reflex, record_points(setup(), touch, motion, frames, 1, i), 10);
-    counts.insert(counts.end(), told.begin(), told.end());
+    const auto found = reflex_shear_samples(reflex, record_points(setup(), touch, motion, frames, 1, i), 10);
+    counts.insert(counts.end(), found.begin(), found.end());
     const auto pictures = record_pictures(setup(), touch, motion, frames / kChipPixels, i);
     const auto seen = explore_shear_samples(model, explore(rest, pictures, settings), pictures);
     shifts.insert(shifts.end(), seen.begin(), seen.end());

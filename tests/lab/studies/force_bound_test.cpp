@@ -148,7 +148,7 @@ TEST(LeastDeviations, AreThoseOfTheInverseAndInfiniteWhereNothingTells) {
   const Eigen::MatrixXd weighted = deviation.cwiseInverse().asDiagonal() * sensitivity;
   const Eigen::VectorXd wanted = (weighted.transpose() * weighted).inverse().diagonal().cwiseSqrt();
   EXPECT_LT((least_deviations(sensitivity, deviation) - wanted).norm(), 1e-12);
-  // A third unknown that does what the first does: neither can be told, the second can.
+  // A third unknown that does what the first does: neither can be identified, the second can.
   Eigen::MatrixXd more(4, 3);
   more << sensitivity, 1e6 * sensitivity.col(0);
   const Eigen::VectorXd found = least_deviations(more, deviation);
@@ -197,7 +197,7 @@ TEST(ForceSensitivity, OfAFlatPunchIsThePixelsMotionOverItsForce) {
 }
 
 TEST(ForceBound, IsReachedByTheEfficientEstimateThroughRealPresses) {
-  // Each draw: pixels with noise, the force that explains them best (Gauss-Newton with a press at each look). The
+  // Each draw: pixels with noise, the force that explains them best (Gauss-Newton with a press at each iteration). The
   // scatter is the bound's; 150 draws have a standard error of 6 %.
   constexpr int kDraws = 150;
   constexpr double kNoise_px = 0.05;
@@ -253,7 +253,7 @@ TEST(DistributionBound, OfOnePatchIsTheForceBoundOfItsTraction) {
                                     {{0, 0}, {0, 0, 0.5}}),
                   deviation);
   for (int a = 0; a < 3; ++a) EXPECT_NEAR(one(a, 0) / of_punch.place_known[a], 1.0, 0.35) << "axis " << a;
-  // The same place in four parts is harder to tell, in 36 parts with 18 numbers it can't be told.
+  // The same place in four parts is harder to estimate, in 36 parts with 18 numbers it can't be identified.
   patches = {{2, 2}, 2.0, {-1.0, -1.0}};
   const auto four =
       distribution_bound(bead_compliance(*setup().gel, setup().view.rest_mm, patches), setup().view, deviation);

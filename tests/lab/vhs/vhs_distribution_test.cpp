@@ -54,7 +54,7 @@ TEST(BeadParallax, OtherDevicesAreRefused) {
   EXPECT_THAT(message_of([&] { bead_parallax(device); }), HasSubstr("no beads"));
 }
 
-TEST(VhsDistribution, TwoForcesAtOnceAreToldApart) {
+TEST(VhsDistribution, TwoForcesAtOnceAreSeparated) {
   sensors::TractionInversion inversion(setup().compliance, bead_inversion());
   const std::vector<LoadPoint> points = {{{-1.6, 0.2}, 0.7}, {{1.5, -0.4}, 0.3}};
   const DistributionTrial trial = press_points(setup(), inversion, points, 0.1, 1);

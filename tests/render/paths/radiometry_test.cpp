@@ -213,7 +213,7 @@ TEST(Surroundings, AreHiddenByADiscAndASphereAsTheirFormFactorsSay) {
   const auto patch_under = [](const Scene& extra) {
     Scene scene = extra;
     scene.surfaces.push_back({square_sheet(0.01, 0.0), Lambertian{grey(0.6)}});
-    // A steep look that passes beside the thing above.
+    // A steep ray that passes beside the thing above.
     return Tracer(scene).radiance({-20, 0, 1.0}, Eigen::Vector3d(20, 0, -1.0), samples(16384))[0];
   };
   Scene disc = empty_scene(1.0);

@@ -87,7 +87,7 @@ TEST_F(BeadTrackerFaults, BeadThatLeavesItsCellIsReset) {
   EXPECT_EQ(next(beads).status[8], BeadStatus::kFound);
 }
 
-TEST_F(BeadTrackerFaults, JumpOfOneBeadIsDoubtedUnlessToldOtherwise) {
+TEST_F(BeadTrackerFaults, JumpOfOneBeadIsDoubtedUnlessSetOtherwise) {
   auto beads = rest;
   beads[0] += Eigen::Vector2d(-22.0, 25.0);
   for (const bool consistent : {false, true}) {
@@ -319,7 +319,7 @@ SpeckScores track_among_specks(const Specks& specks) {
   return scores;
 }
 
-TEST_F(BeadTrackerFaults, SpecksThatLookLikeBeadsAreToldByTheirMotion) {
+TEST_F(BeadTrackerFaults, SpecksThatLookLikeBeadsAreFoundByTheirMotion) {
   for (const double px_per_frame : {0.0, 2.5}) {
     for (const int count : {5, 20}) {
       const auto [with, without] = track_among_specks({count, px_per_frame});

@@ -1,4 +1,4 @@
-// Displacements from coloured markers' looks: made by [Lin2019, eq. 4] itself, and painted.
+// Displacements from coloured markers' appearance: made by [Lin2019, eq. 4] itself, and painted.
 
 #include "sensors/colour/hue_model.h"
 
@@ -188,7 +188,7 @@ TEST(HueModel, FlawedMarkersAreNotMeasured) {
   EXPECT_THROW(HueEstimator(model, rest).estimate(other), Error);
 }
 
-TEST(HueModel, LooksThatCalibrationDidNotSeeAreSaid) {
+TEST(HueModel, AppearancesThatCalibrationDidNotSeeAreReported) {
   const ColourMarkerReading rest = rest_reading();
   const HueLine truth{.hue_slope = 0.2, .gain_slope = 0.05, .gain = 0.5};
   for (const HueForm form : {HueForm::kEquation4, HueForm::kIsotropic, HueForm::kPolynomial}) {

@@ -25,7 +25,7 @@ ColourMarkerReading even_grid() {
 }
 
 // The determinant of what the whole grid is mapped by is what each cell grows by, whichever neighbours tell it.
-TEST(MarkerSurroundings, AnAffineMapsDeterminantIsToldEverywhere) {
+TEST(MarkerSurroundings, AnAffineMapsDeterminantIsFoundEverywhere) {
   const ColourMarkerReading rest = even_grid();
   Eigen::Matrix2d map;
   map << 1.1, 0.2, -0.1, 0.95;
@@ -37,11 +37,11 @@ TEST(MarkerSurroundings, AnAffineMapsDeterminantIsToldEverywhere) {
   seen.markers[12].flaw = MarkerFlaw::kTwoFilters;  // its neighbours make do with the others
   tell_surroundings(rest, seen);
   for (std::size_t i = 0; i < seen.markers.size(); ++i) {
-    const MarkerSurroundings& told = seen.markers[i].surroundings;
-    EXPECT_EQ(told.known, i != 12) << i;
-    if (!told.known) continue;
-    EXPECT_NEAR(told.log_cell_area, std::log(map.determinant()), 1e-12) << i;
-    EXPECT_NEAR(told.log_ink_area, std::log(1.3), 1e-12) << i;
+    const MarkerSurroundings& found = seen.markers[i].surroundings;
+    EXPECT_EQ(found.known, i != 12) << i;
+    if (!found.known) continue;
+    EXPECT_NEAR(found.log_cell_area, std::log(map.determinant()), 1e-12) << i;
+    EXPECT_NEAR(found.log_ink_area, std::log(1.3), 1e-12) << i;
   }
 }
 
@@ -55,7 +55,7 @@ TEST(MarkerSurroundings, AtRestNothingHasChanged) {
   }
 }
 
-// The marker's own size isn't among them: it is told apart.
+// The marker's own size isn't among them: it is given separately.
 TEST(MarkerSurroundings, OnlyTheNeighboursSizesCount) {
   const ColourMarkerReading rest = even_grid();
   ColourMarkerReading seen = rest;

@@ -87,7 +87,7 @@ TEST(ArmLift, RisesByItsHeightAndStands) {
   }
 }
 
-TEST(ArmLift, StopsWhereItIsToldToLiftNoLonger) {
+TEST(ArmLift, StopsWhereItIsNoLongerCommandedToLift) {
   ArmLift arm({20, 20, 100});
   EXPECT_EQ(arm.next(false, 0.1), 0.0);  // not begun: nothing to stop
   for (int k = 0; k < 5; ++k) arm.next(true, 0.1);
@@ -264,7 +264,7 @@ TEST(Gripper, ForceBeyondWhatTheObjectBearsCrushesIt) {
   gripper.advance(0.1, 0.0, kFrame_s);
   EXPECT_TRUE(gripper.state().crushed);
   gripper.advance(-0.3, 0.0, kFrame_s);
-  EXPECT_TRUE(gripper.state().crushed);  // that doesn't mend
+  EXPECT_TRUE(gripper.state().crushed);  // that stays so
 }
 
 TEST(Gripper, RefusesWhatMakesNoSense) {

@@ -185,7 +185,7 @@ TEST(PressPath, ADamagedCacheIsntUsed) {
     const PlayedPath anew = player.play(path);
     EXPECT_NE(anew.note.find(why), std::string::npos) << anew.note;
     expect_equal(anew.states.at(0), played.states.at(0));
-    EXPECT_EQ(player.play(path).note, "") << "it was mended";
+    EXPECT_EQ(player.play(path).note, "") << "it was repaired";
   }
   std::filesystem::remove_all(folder.path());
   std::ofstream(folder.path()) << "a file where the folder was";
