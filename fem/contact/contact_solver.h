@@ -44,7 +44,7 @@ struct ContactMemory {
   std::vector<NodeState> state;  ///< empty: nothing is remembered
   DenseCholesky cholesky;        ///< frictionless: of the active rows and columns
   SinglePrecisionLu lu;          ///< with friction: of the Jacobian, the slipping vertices' directions eliminated
-  Eigen::MatrixXd jacobian;      ///< its room, kept
+  Eigen::MatrixXd jacobian;      ///< its storage, kept
   std::vector<SlipFrame> slip;   ///< with friction: per vertex, what the Jacobian was made with
   void forget() { state.clear(); }
 };

@@ -24,7 +24,7 @@ namespace touchstone::lab {
 namespace {
 
 constexpr double kHalfPatch_mm = 0.2;    // of the square that is looked at: clear of what the lens blurs at rims
-constexpr double kLeastMarker_mm = 1.0;  // narrower ones leave no room for it
+constexpr double kLeastMarker_mm = 1.0;  // narrower ones leave no space for it
 constexpr double kStep_nm = 1.0;         // of the products
 constexpr const char* kNames[] = {"white", "magenta", "yellow", "red"};
 constexpr std::size_t kPalette[] = {0, 3, 4, 1};  // blue for white

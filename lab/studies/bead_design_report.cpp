@@ -18,8 +18,8 @@ EnumNames<StopRule> enum_names(StopRule) {
 namespace touchstone::lab {
 namespace {
 
-/// Above this part of the wanted error the bound leaves estimators no room.
-constexpr double kBoundLeavesRoom = 0.5;
+/// Above this part of the wanted error the bound leaves estimators no margin.
+constexpr double kBoundLeavesMargin = 0.5;
 
 class Story {
  public:
@@ -73,7 +73,7 @@ class Story {
         "No unbiased estimate from these beads and this light can scatter by less than {:.2g} N there ({:.2g} N if the "
         "place must be found, too); ours is off by {:.3g} N, of which noise is {:.2g} N. ",
         bound, unknown, of(d, "error_at_load_N"), of(d, "noise_N"));
-    if (unknown > kBoundLeavesRoom * spec_.error_N) {
+    if (unknown > kBoundLeavesMargin * spec_.error_N) {
       return text +
              "So the sensor is at its limit: more beads, light or softness would help, another estimator hardly.";
     }

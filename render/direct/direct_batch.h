@@ -25,7 +25,7 @@ struct DirectCounts {
   std::uint64_t primary = 0, shadow_rays = 0, spared = 0;
 };
 
-/// One at a time for each thread: it is room to work in. Steps are to be called in their order. Lane k is lane k % 16
+/// One at a time for each thread: it is working memory. Steps are to be called in their order. Lane k is lane k % 16
 /// of packet k / 16.
 class DirectBatch {
  public:

@@ -61,7 +61,7 @@ struct DirectRenderer::Parts {
   CameraRays rays;
   // By pixel and band, where central rays are spread; see CameraRays.
   std::vector<float> through, veil;
-  std::vector<float> radiance;                // [band][grid point], room for a frame
+  std::vector<float> radiance;                // [band][grid point], memory for a frame
   std::vector<DirectBatch::Visibility> seen;  // by grid point, where edges get more rays
   std::vector<float> bounced;                 // [grid point][band], irradiance; empty for none
   std::map<double, GgxAlbedo> conductors;     // by roughness

@@ -25,7 +25,7 @@ namespace touchstone::render {
 
 inline constexpr double kJumpMargin = 10.0;    ///< to stay away from things, in transport (or longer) mean free paths
 inline constexpr double kMostAbsorbed = 1e-3;  ///< sigma_a l, above which walks aren't long anyway
-inline constexpr int kJumpEvery = 16;          ///< scatterings between two looks for room
+inline constexpr int kJumpEvery = 16;          ///< scatterings between two checks for free space
 
 /// What jumps in a medium need: `margin` in mm, infinite where there are none, and kappa in 1/mm of each band.
 template <int N>

@@ -76,8 +76,8 @@ class Walker {
     for (;;) {
       const bool up = direction.z() > 0.0;
       const double rise = std::abs(direction.z());
-      const double room = up ? -position.z() : position.z() + optics_.thickness_mm;
-      const double to_face = rise > 0.0 ? std::max(0.0, room) / rise : INFINITY;
+      const double depth = up ? -position.z() : position.z() + optics_.thickness_mm;
+      const double to_face = rise > 0.0 ? std::max(0.0, depth) / rise : INFINITY;
       const double flight =
           optics_.scattering_per_mm > 0.0 ? -std::log1p(-number()) / optics_.scattering_per_mm : INFINITY;
       const double distance = std::min(flight, to_face);

@@ -19,7 +19,7 @@ namespace touchstone::sensors {
 /// Levels pictures. After the first picture of a size little is allocated. One object is for one thread.
 class ColourLevelling {
  public:
-  /// Where white lies in a levelled picture, of 255: the rest is room for noise.
+  /// Where white lies in a levelled picture, of 255: the rest is margin for noise.
   static constexpr int kWhite = 230;
 
   /// @param spacing_px between neighbouring markers, whose sides are about two thirds of it. White between them must

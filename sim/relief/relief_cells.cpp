@@ -38,7 +38,7 @@ std::vector<Eigen::Vector2d> scatter(const Eigen::Vector2d& size, double per_mm2
   const int rows = std::max(1, static_cast<int>(size.y() / std::max(least, 1e-3 * size.y())));
   std::vector<std::vector<int>> buckets(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
   std::vector<Eigen::Vector2d> points;
-  const auto has_room = [&](const Eigen::Vector2d& place) {
+  const auto fits = [&](const Eigen::Vector2d& place) {
     const int column = bucket_of(place.x(), size.x(), columns), row = bucket_of(place.y(), size.y(), rows);
     for (int j = row - 1; j <= row + 1; ++j) {
       for (int i = column - 1; i <= column + 1; ++i) {
@@ -53,7 +53,7 @@ std::vector<Eigen::Vector2d> scatter(const Eigen::Vector2d& size, double per_mm2
     Eigen::Vector2d place;
     for (int t = 0; t < kTries; ++t) {
       place = {size.x() * random.uniform(), size.y() * random.uniform()};
-      if (has_room(place)) break;
+      if (fits(place)) break;
     }
     const auto bucket = static_cast<std::size_t>(bucket_of(place.y(), size.y(), rows)) * columns +
                         static_cast<std::size_t>(bucket_of(place.x(), size.x(), columns));
