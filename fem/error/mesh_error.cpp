@@ -150,7 +150,7 @@ Reading read(const Level& level, const ReferenceBody& body, const Vector3d& plac
   return result;
 }
 
-/// How two readings of the same press differ; the first sets the scale. Zero for what they don't tell.
+/// How two readings of the same press differ; the first sets the scale. Zero for what they don't give.
 RelativeErrors difference(const Compliance& gel, const Eigen::VectorXd& weight, const Vector3d& place, double reach,
                           const Reading& first, const Reading& other) {
   RelativeErrors result;
@@ -214,7 +214,7 @@ struct Law {
   double at(double radius) const { return scale * std::pow(radius, -size); }
 };
 
-/// Least squares of the logarithms. Few samples can't tell both orders apart, so each is drawn a little: the mesh's
+/// Least squares of the logarithms. Few samples can't separate both orders, so each is drawn a little: the mesh's
 /// towards `expected`, with `strength`, the size's towards the mesh's, as it is where the contact's edge makes the
 /// error.
 Law fit(const std::vector<Sample>& samples, double expected, double strength) {

@@ -79,7 +79,7 @@ inline constexpr std::uint64_t kOtherSeed = 0x9e3779b97f4a7c15;
 using TwoRuns = std::array<SceneRun, 2>;
 TwoRuns run_twice(sim::SceneSpec scene, const fem::Compliance& gel, bool whole = false);
 
-/// The part of the values of a scene's pictures that the imager can tell, as they don't fill its pixels' wells.
+/// The part of the values of a scene's pictures that the imager can measure, as they don't fill its pixels' wells.
 double part_below_full_well(const TwoRuns& runs, const render::Imager& imager);
 
 /// Root mean square over pixels and channels of how far pictures are from true ones, in units of the imager's temporal

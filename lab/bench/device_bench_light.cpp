@@ -304,7 +304,7 @@ std::string prepare_pictures(BenchParts& parts) {
     const double unsaturated_part = part_below_full_well(pilot.runs, pilot.imager);
     if (unsaturated_part < kLeastUnsaturated) {
       return fmt::format(
-          "none: {:.3g} % of the pixels are at their full well; a shorter camera.exposure_us tells them apart",
+          "none: {:.3g} % of the pixels are at their full well; a shorter camera.exposure_us separates them",
           100.0 * (1.0 - unsaturated_part));
     }
     if (unsaturated_part < 1.0)

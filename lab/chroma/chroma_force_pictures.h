@@ -34,7 +34,7 @@ std::vector<sensors::MarkerField> fields_of(const std::vector<ChromaRecord>& rec
                                             const sensors::HueModel& model,
                                             const sensors::MarkerCompliance& compliance);
 
-/// Tells the field of a frame by the frame's number. @pre there is one for each frame that is asked for
+/// Gives the field of a frame by the frame's number. @pre there is one for each frame that is asked for
 MarkerReader fields_from(std::vector<sensors::MarkerField> fields);
 
 }  // namespace touchstone::lab

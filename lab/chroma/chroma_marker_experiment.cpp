@@ -221,7 +221,7 @@ sensors::TractionInversion elastic_inversion(const ChromaSetup& setup, const std
                                              const sensors::ViewParallax& parallax) {
   const sim::DeviceSpec device = with_probe_mesh(setup.sensor().device());
   const auto gel = sim::set_up_gel(device, cache);
-  // Chosen on the presses of calibrate_field with another unit. Where an object is wide hue tells a fifth of the press
+  // Chosen on the presses of calibrate_field with another unit. Where an object is wide hue shows a fifth of the press
   // and is alike over neighbours, which noise isn't: so normal displacements count for next to nothing, lateral ones,
   // which err by 2 um where nothing touches, for all; a rim's pressure is of the order of the modulus.
   constexpr sensors::TractionSettings kNoise{.lateral_noise_mm = 0.002, .normal_noise_mm = 1.0, .scale = 1.0};

@@ -17,7 +17,7 @@
 
 namespace touchstone::lab {
 
-/// A ball is pressed on a marker and dragged at its depth; what the picture tells of that marker.
+/// A ball is pressed on a marker and dragged at its depth; what the picture shows of that marker.
 struct MarkerSeries {
   double depth_mm = 0.0;                    ///< of the ball; of a press without drag the last one
   std::vector<Eigen::Vector3d> ball_mm;     ///< displacement of the ball since it touched: a press is -z

@@ -13,7 +13,7 @@
 
 namespace touchstone::lab {
 
-/// What a picture of one marker tells, by plain code on ideal pictures: no mosaic, no noise, no segmentation.
+/// What a picture of one marker gives, by plain code on ideal pictures: no mosaic, no noise, no segmentation.
 struct TiltReading {
   double hue = 0.0;  ///< radians, -pi to pi, 0 is red: circular mean over pixels of more than half saturation
   Eigen::Vector2d ink_px = Eigen::Vector2d::Zero();  ///< centroid of the ink
@@ -23,7 +23,7 @@ struct TiltReading {
 };
 /// `picture` as tilt_picture gives it. Ink is looked for in saturated pixels only, as the paper does, since a ball
 /// throws a pink shade of saturation 0.3 on the sheet beside it. Their red and green are split into bare sheet and ink,
-/// under the film or beside it as their blue tells. @throws Error if nothing in it is coloured, or has ink
+/// under the film or beside it as their blue shows. @throws Error if nothing in it is coloured, or has ink
 TiltReading read_tilt_picture(const cv::Mat& picture, const TiltColours& colours);
 
 /// How a level marker's reading goes with its displacement.

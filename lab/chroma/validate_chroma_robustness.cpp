@@ -142,7 +142,7 @@ std::vector<ValidationRow> validate_chroma_robustness(const ValidateOptions& opt
                     what),
         "1", few.size_r2, Better::near, few.hue_r2 > few.size_r2);
     size.published = kPublishedSizeR2;
-    if (!size_is_lost(few)) deny(size, "the size of a marker of 4 x 4 px tells little of a displacement");
+    if (!size_is_lost(few)) deny(size, "the size of a marker of 4 x 4 px shows little of a displacement");
     size.series = series(&PixelRobustness::size_r2, "R2 by size");
   };
   const auto add_gradient = [&](const Ladder& ladder, double marker_px, const std::string& suffix,

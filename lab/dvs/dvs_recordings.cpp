@@ -128,7 +128,7 @@ DvsRecording record_dvs_grasp(const DvsGraspSetup& setup, const sim::MembraneCam
   for (std::size_t k = 1; k < moments.size(); ++k) {
     const double change = light.path_at(moments[k].travel_mm) - light.path_at(moments[shown].travel_mm);
     if (std::abs(change) < allowed && k + 1 < moments.size()) continue;
-    // Until the moment before nothing worth telling has changed.
+    // Until the moment before nothing worth a picture has changed.
     sim::FingerMoment before = moments[k - 1];
     if (k - 1 > shown) {
       before.travel_mm = moments[shown].travel_mm;

@@ -1,11 +1,11 @@
-// What force an event-driven membrane can tell, and what its thickness and stiffness do to that. [Naeini2020, sec. VI]:
-// "able to capture contact area changes for the contact forces up to 3.7 N", and "membrane properties such as
+// What force an event-driven membrane can measure, and what its thickness and stiffness do to that. [Naeini2020, sec.
+// VI]: "able to capture contact area changes for the contact forces up to 3.7 N", and "membrane properties such as
 // stiffness, shape, and thickness as well as DVS threshold can be altered in order to change the measurement range".
 //
 // A rigid piece is pressed level on the membrane, ever harder. What its contact adds to the change of light, counted in
-// OFF thresholds over all pixels, is what events can tell of the force: it grows while the faces' roughness is pressed
+// OFF thresholds over all pixels, is what events can show of the force: it grows while the faces' roughness is pressed
 // flat, and then no more. The range ends where nine tenths are reached of what three times the paper's largest force
-// would tell.
+// would give.
 
 #include <algorithm>
 #include <cmath>
@@ -116,7 +116,7 @@ std::vector<ValidationRow> validate_dvs_design(const ValidateOptions& options) {
     const MembraneRange range = try_membrane(membrane, options);
     ValidationRow& row = rows.add(
         fmt::format("{}_range_N", membrane.name),
-        fmt::format("membrane of {:g} mm and {:g} MPa: force to which contact goes on to tell, {:.0f} % of {:.0f} "
+        fmt::format("membrane of {:g} mm and {:g} MPa: force up to which contact adds events, {:.0f} % of {:.0f} "
                     "OFF events; from {:.2g} N on, {:.2g} mm deep",
                     membrane.thickness_mm, membrane.youngs_modulus_MPa, 100.0 * kUpperShare, range.events, range.low_N,
                     range.depth_mm),

@@ -152,12 +152,12 @@ std::vector<ValidationRow> validate_dvs_force(const ValidateOptions& options) {
   }
   rows.add_bounded(
       "touch.delay_ms",
-      fmt::format("from the true first touch to the end of the window that tells it, mean; the latest {:.1f}",
+      fmt::format("from the true first touch to the end of the window that shows it, mean; the latest {:.1f}",
                   latest_touch),
       "ms", Better::lower, kPublishedLatency_ms, false, touch);
   rows.add_bounded(
       "release.delay_ms",
-      fmt::format("from the servo's order to open to the end of the window that tells it, mean; the latest "
+      fmt::format("from the servo's order to open to the end of the window that shows it, mean; the latest "
                   "{:.1f}",
                   latest_release),
       "ms", Better::lower, kPublishedLatency_ms, false, release);

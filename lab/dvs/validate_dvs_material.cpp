@@ -144,8 +144,9 @@ std::vector<ValidationRow> validate_dvs_material(const ValidateOptions& options)
                 kPublishedForceSensor, force_right, grasps);
   force.better = Better::near;
   force.holds = std::abs(force.ours - kPublishedForceSensor) <= kAllowedDifference;
-  rows.add_bounded("over_force_sensor_percent", "by how much events tell more materials right than the force sensor",
-                   "%", Better::higher, kPublished - kPublishedForceSensor, true, 100.0 * (right - force_right));
+  rows.add_bounded("over_force_sensor_percent",
+                   "by how much events classify more materials correctly than the force sensor", "%", Better::higher,
+                   kPublished - kPublishedForceSensor, true, 100.0 * (right - force_right));
   if (!options.quick) {
     add_tables(samples, options, rows);
     for (const Alike& alike : kAlike) {

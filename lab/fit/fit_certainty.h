@@ -41,9 +41,9 @@ struct FitCertainty {
 /// alike over some distance in the picture, and in all pictures, so that pixels count for less than they are: a shared
 /// variable's standard error is at least the delete-a-group jackknife's, whose groups are tiles ([Efron1993, sec.
 /// 11.5]; one Gauss-Newton step for each tile left out, the other variables held). What pictures leave open of a
-/// variable that isn't shared, and that a single tile may tell, is widened by `alike`, by which sums of residuals over
-/// patches scatter more than those of independent ones (the blocking of [Flyvbjerg1989]). A combination is unidentified
-/// if 1.96 of its standard errors reach over half of its range in units of the variables, which is 1.
+/// variable that isn't shared, and that a single tile may identify, is widened by `alike`, by which sums of residuals
+/// over patches scatter more than those of independent ones (the blocking of [Flyvbjerg1989]). A combination is
+/// unidentified if 1.96 of its standard errors reach over half of its range in units of the variables, which is 1.
 /// @pre at least one row and one column, sizes fit
 FitCertainty certainty_of(const LinearisedFit& fit);
 

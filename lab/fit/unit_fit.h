@@ -35,8 +35,8 @@ struct FittedUnknown {
   bool at_end = false;                                                   ///< at an end of its allowed range
 };
 
-/// A combination of unknowns that the data can't tell: all of them may move so at once, and nothing that was recorded
-/// changes by what could be noticed.
+/// A combination of unknowns that the data can't identify: all of them may move so at once, and nothing that was
+/// recorded changes by what could be noticed.
 struct UnidentifiableCombination {
   struct Part {
     std::string name;

@@ -74,7 +74,7 @@ std::string to_markdown(const PreparedFit& fit, const UnitFit& result) {
       "random "
       "numbers for the simulated light; by the mesh: what the gel's mesh makes of forces. The interval is of all "
       "together.\n";
-  text += "\n## What the data can't tell\n\n";
+  text += "\n## What the data can't identify\n\n";
   if (result.unidentified.empty()) text += "Nothing: each unknown's interval is narrower than its allowed range.\n";
   for (const UnidentifiableCombination& combination : result.unidentified)
     text += fmt::format("- {}\n", combination.words);

@@ -1,5 +1,5 @@
 #pragma once
-// What a fit can't tell, in words.
+// What a fit can't identify, in words.
 
 #include <Eigen/Core>
 #include <vector>

@@ -1,5 +1,5 @@
 #pragma once
-// What the reflex fingertip's chip tells while its skin moves: pictures at some states of a motion, between which the
+// What the reflex fingertip's chip reports while its skin moves: pictures at some states of a motion, between which the
 // light runs straight, shown to the chip frame by frame.
 
 #include <cstdint>
@@ -22,7 +22,7 @@ struct ReflexPathLightSettings {
   int most_pictures = 2000;
 };
 
-/// The light of all states of a motion that one parameter tells: how deep a plate is, how far along a path.
+/// The light of all states of a motion that one parameter describes: how deep a plate is, how far along a path.
 class ReflexPathLight {
  public:
   /// A state's irradiance, CV_32FC1, 18x18, W/m^2.

@@ -1,6 +1,6 @@
 // The reflex device [Knoop2013]: the paper's figures of reflex and explore mode, and beyond them other loads, shear,
-// collisions and pictures that tell nothing. The tree, the forces and Z are learned from a plate pressed straight down
-// with one seed of noise; all but the rows that the paper gives for its training set are of other seeds or loads.
+// collisions and pictures without information. The tree, the forces and Z are learned from a plate pressed straight
+// down with one seed of noise; all but the rows that the paper gives for its training set are of other seeds or loads.
 
 #include <algorithm>
 #include <array>
@@ -26,7 +26,7 @@ constexpr double kPublishedRms_N = 0.65, kPublishedLightRms_N = 0.30, kPublished
 constexpr double kPublishedZRms_mm = 0.39, kPublishedZError_mm = 0.80, kPublishedForceError_N = 2.14;
 constexpr double kPublishedZ_mm = 16.03;
 constexpr double kAllowedDecision_us = 1.0;  // issue 8 of this project: "well under" it
-constexpr double kAllowedDrift_mm = 0.1;     // "none" of the paper, as far as a picture of 6 bits can tell
+constexpr double kAllowedDrift_mm = 0.1;     // "none" of the paper, as far as a picture of 6 bits can show
 
 enum Seed : std::uint64_t {
   kTraining = 1,
@@ -303,7 +303,7 @@ void add_collision_rows(const ReflexSetup& setup, const sensors::ReflexModel& re
   }
 }
 
-/// Light that tells nothing, to both modes: it has to be said.
+/// Light without information, to both modes: it has to be said.
 void add_fault_rows(const ReflexSetup& setup, const sensors::ReflexModel& reflex, RowList& rows) {
   const cv::Mat rest = rest_picture(setup, 8, kRest);
   cv::Mat light, bare;

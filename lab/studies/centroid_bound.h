@@ -1,5 +1,5 @@
 #pragma once
-// How well any method can tell where something in a picture is: the Cramer-Rao bound of a shift.
+// How well any method can estimate where something in a picture is: the Cramer-Rao bound of a shift.
 
 #include <Eigen/Core>
 #include <opencv2/core/mat.hpp>

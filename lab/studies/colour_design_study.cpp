@@ -205,7 +205,8 @@ StudyResult report(const std::string& name, const ColourDesignSpec& spec, const 
     report.answer += fmt::format(
         "\n**{}: {}**: {:.3g} um at worst ({:.3g} um as the device is), {:.3g} um root mean square ({:.3g}). Its hue "
         "turns by "
-        "{:.3g} degrees a mm ({:.3g}), so its noise is worth {:.2g} um of depth ({:.2g}); a whole picture could tell "
+        "{:.3g} degrees a mm ({:.3g}), so its noise is worth {:.2g} um of depth ({:.2g}); a whole picture could "
+        "measure "
         "the depth to "
         "{:.2g} um and the place to {:.2g} um (bounds; as it is {:.2g} and {:.2g}).\n",
         meeting > 0 ? "The smallest error" : "None meets it. Nearest comes",

@@ -1,6 +1,7 @@
 #pragma once
 // Five levels of softness from waveforms of one press: [VisioHaptic2024, sec. 2.3.1]. The paper makes pictures of the
-// waveforms' frequencies over time and lets AlexNet tell them; here a small network does, on the same kind of pictures.
+// waveforms' frequencies over time and lets AlexNet classify them; here a small network does, on the same kind of
+// pictures.
 
 #include <cstdint>
 #include <optional>

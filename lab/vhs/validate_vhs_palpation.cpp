@@ -154,7 +154,7 @@ std::vector<ValidationRow> validate_vhs_palpation(const ValidateOptions& options
   // More levels than the paper's at 250 Hz are no success where nothing was lost before.
   constexpr double kPublishedDrop = kPublished1000 - kPublished250;
   if (mean_of(drop) < kPublishedDrop - kAllowedDrop) {
-    deny(rows.last(), "at 250 Hz levels are lost that 500 and 1000 Hz tell");
+    deny(rows.last(), "at 250 Hz levels are lost that 500 and 1000 Hz distinguish");
   }
   ValidationRow& fall = rows.add("drop_to_250Hz_percent", "what is lost from 1000 Hz to 250 Hz", "%", mean_of(drop),
                                  Better::near, std::abs(mean_of(drop) - kPublishedDrop) <= kAllowedDrop);

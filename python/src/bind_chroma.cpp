@@ -112,7 +112,7 @@ py::array bools_of(const std::vector<std::uint8_t>& values) {
 
 void bind_chroma(py::module_& module) {
   py::class_<ColourMarkerReading>(module, "ColourMarkerReading",
-                                  "What one picture tells of a grid of coloured markers, row by row; NaN where flawed.")
+                                  "What one picture shows of a grid of coloured markers, row by row; NaN where flawed.")
       .def_property_readonly(
           "grid", [](const ColourMarkerReading& self) { return py::make_tuple(self.grid.x(), self.grid.y()); },
           "(columns, rows).")

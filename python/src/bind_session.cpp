@@ -59,7 +59,7 @@ std::shared_ptr<Session> make_session(const std::shared_ptr<Sensor>& sensor, con
 
 void bind_session(py::module_& module) {
   using Reading = sim::TouchReading;
-  py::class_<Reading>(module, "Reading", "What a step of a Session tells.")
+  py::class_<Reading>(module, "Reading", "What a step of a Session gives.")
       .def_readonly("step", &Reading::step, "Counted from 1; 0 before the first.")
       .def_readonly("t_s", &Reading::t_s, "The steps' times, summed.")
       .def_readonly("contact_area_mm2", &Reading::contact_area_mm2, "Of the contact.")

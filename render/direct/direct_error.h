@@ -13,7 +13,7 @@ namespace touchstone::render {
 
 struct DirectErrorSettings {
   int pixels = 400;    ///< looked at, one in each of as many fields of the picture
-  int samples = 64;    ///< paths a pixel, twice; choose_direct takes four times as many where these can't tell
+  int samples = 64;    ///< paths a pixel, twice; choose_direct takes four times as many where these aren't enough
   int max_depth = 16;  ///< RenderSettings::max_depth
   std::uint64_t seed = 0;
 };

@@ -1,5 +1,5 @@
 #pragma once
-// What the optical mouse sensor ADNS-2620 tells of each frame without handing the frame over.
+// What the optical mouse sensor ADNS-2620 reports of each frame without handing the frame over.
 
 #include <opencv2/core/mat.hpp>
 

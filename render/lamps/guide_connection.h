@@ -113,7 +113,7 @@ double steepness_from(const PreparedScene<N>& scene, int plate_medium, const Lay
   return std::acos(std::min(1.0, cosine));
 }
 
-/// The light that comes to the receiver at one azimuth and one steepness in the plate (both in radians; `up` tells its
+/// The light that comes to the receiver at one azimuth and one steepness in the plate (both in radians; `up` gives its
 /// sense there): `arrival.irradiance` is that per radian of either. False where none does. Mirroring at faces other
 /// than the plate's two is left out, and so are shadows inside the plate. `connections` counts shadow tests.
 /// @pre `beyond` is the receiver's, empty for one in the plate, in whose medium it then is

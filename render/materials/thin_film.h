@@ -1,5 +1,5 @@
 #pragma once
-// A thin clear coloured film, such as the yellow filter foil of a sensor that tells depth by hue.
+// A thin clear coloured film, such as the yellow filter foil of a sensor that measures depth by hue.
 //
 //   scene.surfaces.push_back({sheet, ThinFilm{transmittance}});                    // dye only, both sides wetted
 //   scene.surfaces.push_back({sheet, ThinFilm{transmittance, 1.49, true}});        // a foil in air, with its faces

@@ -413,7 +413,7 @@ std::optional<BeadMeasurement> measure_bead(const GreyWindow& window, const Bead
   }
 
   // The core: what stands out of the highlighted pixels themselves. Of a bead alone it is the bead's own middle; where
-  // something half as dark touches the bead, only the core tells where the bead is.
+  // something half as dark touches the bead, only the core shows where the bead is.
   constexpr int kCoreRounds = 2;
   for (int i = 0; i < kCoreRounds && round.next_threshold(); ++i) {
     std::optional<BeadMeasurement> middle = round.find(core, appearance.core_elongation);

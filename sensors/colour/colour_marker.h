@@ -1,5 +1,5 @@
 #pragma once
-// What one picture tells of a grid of coloured markers behind coloured filters [Lin2019]: each soft marker is seen
+// What one picture shows of a grid of coloured markers behind coloured filters [Lin2019]: each soft marker is seen
 // through a rigid filter square of its own, so a region of the picture shows filter, marker and both in a mix.
 //
 // Markers are numbered row by row: y grows from row to row, as down the upright picture, and x along a row.

@@ -3,7 +3,7 @@
 // evened out (colour_levelling.h), regions segmented and labelled, of each the centroid and the mean hue.
 //
 // What the paper leaves open, and what is done here:
-// - Ink takes green out of white and hardly blue, the filter takes blue and hardly green. So green tells where ink is
+// - Ink takes green out of white and hardly blue, the filter takes blue and hardly green. So green shows where ink is
 //   and blue where filter is, each against the pixel's own largest channel: a shadow darkens all channels and changes
 //   neither. How far a pixel is on the line from white to the full colour, which the picture at rest shows, is how much
 //   of it is covered. Patches of ink are connected pixels of more than 0.7, so those with a blurred gap stay apart.

@@ -58,7 +58,7 @@ class TimeDelayEstimator {
 
   /// Forgets all windows: the next one is a grasp's first.
   void begin();
-  /// Takes the next window's features, tells its force in N. @throws Error for another number of features than the
+  /// Takes the next window's features, gives its force in N. @throws Error for another number of features than the
   /// model's, or one that isn't finite; it then counts as not given
   double next(std::span<const double> features);
 

@@ -10,7 +10,7 @@ namespace touchstone::sensors {
 using ValueAndGradient = std::function<double(const Eigen::VectorXd& x, Eigen::VectorXd& gradient)>;
 
 struct ScaledConjugateGradientSettings {
-  double first_sigma = 5e-5;     ///< Moller's sigma: length of the step that tells the curvature; above 0, at most 1e-2
+  double first_sigma = 5e-5;     ///< Moller's sigma: length of the step that gives the curvature; above 0, at most 1e-2
   double first_lambda = 5e-7;    ///< Moller's lambda_1; above 0, at most 1
   double least_gradient = 1e-9;  ///< largest entry: below, it ends
   int most_steps = 1000;         ///< at least 1

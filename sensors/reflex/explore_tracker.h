@@ -1,6 +1,7 @@
 #pragma once
 // Explore mode [Knoop2013, sec. III.E]: from each picture of the dots to their motion since rest. Absolute while the
-// picture correlates with the one at rest, else step by step; a picture that tells nothing is said to, with its reason.
+// picture correlates with the one at rest, else step by step; a picture without information is reported, with the
+// reason.
 
 #include <cstdint>
 #include <string>
@@ -18,7 +19,7 @@ enum class ExploreMode {
 };
 std::string name_of(ExploreMode mode);
 
-/// Why a picture tells nothing.
+/// Why a picture can't be used.
 enum class PictureFault {
   none,
   foreign,    ///< another size or type than the picture at rest

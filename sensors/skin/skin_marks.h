@@ -1,6 +1,6 @@
 #pragma once
-// Tells erythema from purpura as dermatologists do with a glass (diascopy): from a frame before and a frame under
-// pressure. What fades is blood in vessels, what stays isn't.
+// Distinguishes erythema from purpura as dermatologists do with a glass (diascopy): from a frame before and a frame
+// under pressure. What fades is blood in vessels, what stays isn't.
 //
 // The measure is an erythema index as narrow-band meters use it [Diffey1984]: 100 log10 of red by green, since
 // haemoglobin takes green and leaves red. As a ratio it knows nothing of shading, fall-off or whether the gel wets the

@@ -1,5 +1,5 @@
 #pragma once
-// What one touch tells of the surface that was touched: heights over the sensor's pixels.
+// What one touch gives of the surface that was touched: heights over the sensor's pixels.
 //
 // Touch frame: origin at the image's centre, x along its rows (u, right), y along its columns (v, down), mm. So a
 // positive angle turns clockwise as the image is looked at. Pixel (column u, row v) has its centre at

@@ -41,7 +41,7 @@ std::shared_ptr<const fem::Compliance> as_pressing_body(const SkinnedLump& lump,
 /// A plate for lumps whose skin has 1 MPa: a pad a thousand times as stiff, which gives way by less than a hundredth of
 /// what they do. So a plate meets a lump as a gel does, flat against round: a press that took the dome for the gel
 /// would let contact act along its normals, and be a quarter too stiff at a sixth of the radius. Its edges are longer
-/// than the lump's: without a give of its own a finer one would ask for more than the lump's vertices can tell.
+/// than the lump's: without a give of its own a finer one would ask for more than the lump's vertices can resolve.
 std::shared_ptr<const fem::Compliance> set_up_plate(const SkinnedLump& lump, const std::filesystem::path& cache_folder);
 
 /// Its `count` lowest modes for the same moduli and a density in kg/m^3, cached likewise. With s times both moduli

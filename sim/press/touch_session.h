@@ -34,7 +34,7 @@ enum class TouchContact : std::uint8_t {
 /// "none", "sticking", "partly_slipping", "sliding"
 const char* name_of(TouchContact contact);
 
-/// What a step tells. Forces act on the object, gel frame: pressing gives a positive z.
+/// What a step gives. Forces act on the object, gel frame: pressing gives a positive z.
 struct TouchReading {
   std::int64_t step = 0;  ///< counted from 1; 0 before the first
   double t_s = 0.0;       ///< the steps' times, summed
@@ -49,7 +49,7 @@ struct TouchReading {
   bool under_resolved = false;  ///< see fem::PressState
 };
 
-/// What a state tells, by itself: its step and time are 0.
+/// What a state gives by itself: its step and time are 0.
 TouchReading reading_of(const fem::Compliance& gel, const fem::PressState& state);
 
 /// One object on one gel. Not for two threads at once; sessions on one gel are independent of each other.
@@ -74,7 +74,7 @@ class TouchSession {
 
   /// Of the last step.
   const TouchReading& reading() const;
-  /// All that mechanics tells of the last step, with the surface's displacement: what VirtualSensor::touch takes.
+  /// All that mechanics gives of the last step, with the surface's displacement: what VirtualSensor::touch takes.
   fem::PressState press() const;
   /// The error bars that belong to press().
   fem::PressError error(const fem::PressState& press) const;

@@ -152,7 +152,7 @@ struct MotionChipSpec {
 
 /// A camera and its imager (in the terms of [EMVA1288]). Only the fields that belong to `type` may stand in the file:
 /// of a lens either focal_length_mm or camera_matrix, and at most one of focus_distance_mm and sensor_distance_mm
-/// (neither: sharp at infinity; with a camera matrix, which tells the sensor's distance, focus_distance_mm only). A
+/// (neither: sharp at infinity; with a camera matrix, which gives the sensor's distance, focus_distance_mm only). A
 /// `preset` in the file gives the imager's figures, which the other fields override (sim/scene/camera_preset.h).
 struct CameraSpec {
   CameraType type = CameraType::pinhole;
@@ -191,7 +191,7 @@ struct CameraSpec {
   double dsnu_e = 0.0;
   double black_level_DN = 0.0;
   std::optional<MotionChipSpec> motion_chip;
-  std::optional<EventCameraSpec> events;  ///< its pixels also, or only, tell changes of their light
+  std::optional<EventCameraSpec> events;  ///< its pixels also, or only, report changes of their light
 };
 
 /// The range of wavelengths that is simulated, and into how many bands it is cut.

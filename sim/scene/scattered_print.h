@@ -16,7 +16,7 @@ inline constexpr double kScatterDistance = 0.75;
 /// The disc that dots fill has a radius of no more than so many spacings (30 thousand dots).
 inline constexpr double kMostScatterRadii = 100.0;
 
-/// The dots of a print of the pattern `scattered`, in the coordinates of along_surface: as many as its spacing tells,
+/// The dots of a print of the pattern `scattered`, in the coordinates of along_surface: as many as its spacing gives,
 /// in a disc about the origin. The same print gives the same dots.
 std::vector<render::PrintedMark> scattered_marks(const PrintSpec& print);
 

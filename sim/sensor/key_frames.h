@@ -16,7 +16,7 @@
 
 namespace touchstone::sim {
 
-/// What a frame looks like without noise: enough to tell where another one differs.
+/// What a frame looks like without noise: enough to find where another one differs.
 struct FrameAppearance {
   cv::Mat preview;                                       ///< Tracer::preview, each kPreviewStride-th pixel
   std::vector<std::optional<Eigen::Vector2d>> balls_px;  ///< where the scene's balls (beads) appear, if they do
@@ -54,7 +54,7 @@ class ChangeFinder {
 
   /// CV_8U, 255 for the pixels that may have changed: those where the preview, as blurred as all points are at least,
   /// differs, with what more blur reaches from there; and those about a ball that moved, however little of its rim the
-  /// preview's rays tell.
+  /// preview's rays show.
   cv::Mat changed(const FrameAppearance& before, const FrameAppearance& now) const;
 
  private:
