@@ -18,7 +18,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr int kPresses = 6;
+constexpr int kBenchPresses = 6;
 constexpr double kFriction = 0.5;
 constexpr double kDepth = 0.1;  // of the gel's thickness
 constexpr std::array kEdges = {2.5, 2.0, 1.6, 1.25, 1.0, 0.8};
@@ -266,12 +266,12 @@ DeviceBench bench_device(const sim::DeviceSpec& device, const BenchSettings& set
   parts.presses.object = settings.object ? *settings.object : ball_of(thickness);
   parts.depth_mm = settings.depth_mm.value_or(kDepth * thickness);
   parts.presses.touch_mm = sim::first_touch(sim::PressSpec{}, parts.presses.object, device.gel);
-  parts.presses.specs = bench_presses(kPresses, device.mesh.fine_mm, parts.depth_mm, settings.seed);
+  parts.presses.specs = bench_presses(kBenchPresses, device.mesh.fine_mm, parts.depth_mm, settings.seed);
   const PressForces forces = solve_presses(parts.presses, parts.own_gel, device, device.mesh.fine_mm);
   bench.presses = fmt::format(
       "{}, pressed {:.3g} mm deep (a fifth more or less) at {} places within an edge of the middle and dragged by "
       "{:.3g} mm; {:.3g} N on the mean",
-      parts.presses.object.name, parts.depth_mm, kPresses, parts.presses.specs.front().drag_mm.norm(),
+      parts.presses.object.name, parts.depth_mm, kBenchPresses, parts.presses.specs.front().drag_mm.norm(),
       mean_normal_force(forces));
 
   tell("the reference's gel");

@@ -118,12 +118,13 @@ struct Verified {
 Verified verify(const BenchParts& parts, const BenchChoice& choice, const LightSetting* light, std::uint64_t seed) {
   BenchParts other = parts;
   other.presses.specs = bench_presses(kVerifyingPresses, parts.whole_device.mesh.fine_mm, parts.depth_mm, seed);
-  other.finest_forces = feel(other.presses, parts.finest_gel, parts.device, parts.finest_device.mesh.fine_mm);
+  other.finest_forces = solve_presses(other.presses, parts.finest_gel, parts.device, parts.finest_device.mesh.fine_mm);
   const sim::DeviceSpec device = with_edges(parts.device, choice.edges);
   const fem::Compliance gel = make_gel(device).gel;
   Verified verified;
   const auto off = [&](const fem::Compliance& one, double edge_mm) {
-    return force_difference(feel(other.presses, one, parts.device, edge_mm).force_N, other.finest_forces.force_N);
+    return force_difference(solve_presses(other.presses, one, parts.device, edge_mm).force_N,
+                            other.finest_forces.force_N);
   };
   verified.force = off(gel, device.mesh.fine_mm);
   verified.as_is_force = off(parts.own_gel, parts.device.mesh.fine_mm);

@@ -158,8 +158,8 @@ ChromaSpectra measure_chroma_spectra(const sim::DeviceSpec& device, const std::f
   const auto gel = sim::set_up_gel(scene.device, cache);
   fem::PressState press = sim::at_rest(sim::play_motion(scene, plan, *gel).front().press);
   press.surface_displacement.col(0).setConstant(patches.shear_mm);
-  const sim::SceneView sight(scene, plan, *gel);
-  const render::Scene seen = sight.seen(press, {});
+  const sim::SceneView view(scene, plan, *gel);
+  const render::Scene seen = view.seen(press, {});
   const render::Camera camera = sim::camera_of(*device.camera);
   const render::ReadyCamera ready = render::make_ready(camera);
   const render::Imager imager = sim::imager(device, plan.bands, false);

@@ -23,15 +23,15 @@ constexpr double kUnsheared = 0.05;     ///< of the limit
 constexpr double kStillSticking = 0.9;  ///< of what sticks before the drag: with less, partial slip has begun
 constexpr double kRoll_mm = 1.2;
 /// How far a sliding object goes at most before it slides, mm for each N that friction holds, and mm at least.
-constexpr double kTravel_mm_per_N = 3.0;
-constexpr double kLeastTravel_mm = 0.6;
+constexpr double kSlide_mm_per_N = 3.0;
+constexpr double kLeastSlide_mm = 0.6;
 
 sim::MotionSpec motion_of(const SlipCase& what, const sim::GelSpec& gel, double frame_rate_Hz) {
   sim::MotionSpec motion;
   motion.frame_rate_Hz = kStatesAFrame * frame_rate_Hz;
   const double travel = what.motion == SlipMotion::roll
                             ? kRoll_mm
-                            : std::max(kTravel_mm_per_N * what.object.friction * what.normal_N, kLeastTravel_mm);
+                            : std::max(kSlide_mm_per_N * what.object.friction * what.normal_N, kLeastSlide_mm);
   const double from = -0.5 * travel;
   motion.start_mm = {from, 0, sim::first_touch({}, what.object, gel) + kClear_mm};
   const auto states_for = [&](double length_mm) {

@@ -26,7 +26,7 @@ struct ServoFingerSettings {
   double ring_Hz = 25.0;             ///< of the free finger on the servo's spring: some 75 g
   double damping = 0.10;             ///< of it, of critical
   double loss_s = 0.5e-3;            ///< tau: at 50 Hz a loss tangent of 0.16; soft silicones have 0.1 to 0.2
-  double shake_um = 3.0;             ///< RMS motion of the free finger by what shakes its bench
+  double shake_um = 3.0;             ///< RMS motion of the free finger by what shakes its mount
   double largest_closing_mm = 30.0;  ///< beyond the start: the servo is commanded no further
   double time_step_s = 5e-5;
 };

@@ -22,21 +22,21 @@ namespace fs = std::filesystem;
 using test::message_of;
 using ::testing::HasSubstr;
 
-/// What a quick bench was asked for, and when it ends the run.
+/// What a quick sensor was asked for, and when it ends the run.
 struct Calls {
   std::atomic<int> units{0}, presses{0};
   int stop_at = -1;
   int refuse_every = 0;  // touches whose seed is a multiple of this can't be pressed
 };
 
-/// A bench whose records are plain functions of unit and touch.
+/// A sensor whose records are plain functions of unit and touch.
 SensorSource quick_bench(Calls& calls) {
   return [&calls](const PreparedDraw&, const DrawnUnit& unit) {
     ++calls.units;
-    UnitSensor bench;
-    bench.light = "a plain function";
-    bench.background = cv::Mat(30, 40, CV_8UC3, cv::Scalar(unit.number, 20, 30));
-    bench.press = [&calls, unit](const DrawnTouch& touch, const sim::ObjectSpec& object) {
+    UnitSensor sensor;
+    sensor.light = "a plain function";
+    sensor.background = cv::Mat(30, 40, CV_8UC3, cv::Scalar(unit.number, 20, 30));
+    sensor.press = [&calls, unit](const DrawnTouch& touch, const sim::ObjectSpec& object) {
       if (calls.presses++ == calls.stop_at) throw std::runtime_error("the process ends here");
       if (calls.refuse_every > 0 && touch.seed % static_cast<std::uint64_t>(calls.refuse_every) == 0) {
         throw Unpressable("beside");
@@ -64,7 +64,7 @@ SensorSource quick_bench(Calls& calls) {
       record.largest_strain = 0.1;
       return record;
     };
-    return bench;
+    return sensor;
   };
 }
 

@@ -164,15 +164,15 @@ TEST(LeastDeviations, AreThoseOfTheInverseAndInfiniteWhereNothingTells) {
 }
 
 /// The vhs sensor on a coarse mesh.
-struct Setup {
+struct SensorSetup {
   sim::DeviceSpec device;
   std::shared_ptr<const fem::Compliance> gel;
   BeadView view;
 };
-const Setup& setup() {
+const SensorSetup& setup() {
   static const test::TemporaryFolder cache;
-  static const Setup made = [] {
-    Setup one;
+  static const SensorSetup made = [] {
+    SensorSetup one;
     one.device = sim::read_device(std::filesystem::path(TOUCHSTONE_SOURCE_DIR) / "scenes" / "devices" / "vhs.yaml");
     one.device.mesh.fine_mm = 0.8;
     one.gel = sim::set_up_gel(one.device, cache.path());
