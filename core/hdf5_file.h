@@ -108,7 +108,7 @@ class Hdf5Writer {
   void add_dataset(const Hdf5Description& description, Hdf5Id type, std::size_t item_bytes, std::int64_t rows,
                    const std::vector<std::int64_t>& row_shape);
   void add_chunked_dataset(const Hdf5Description& description, Hdf5Id type, std::int64_t rows,
-                           const std::vector<std::int64_t>& row_shape, std::int64_t rows_a_chunk);
+                           const std::vector<std::int64_t>& row_shape, std::int64_t rows_per_chunk);
   void add_growing_dataset(const Hdf5Description& description, Hdf5Id type, std::size_t item_bytes);
   void append_numbers(const std::string& path, Hdf5Id type, const void* values, std::int64_t count);
   void write_rows(const std::string& path, Hdf5Id type, std::int64_t first, std::int64_t count, const void* values,

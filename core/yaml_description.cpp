@@ -42,13 +42,13 @@ void merge(std::vector<YamlForm>& forms, const std::vector<YamlForm>& seen) {
       continue;
     }
     const Allowed any;
-    if (same->allowed.low != form.allowed.low || same->allowed.low_itself != form.allowed.low_itself) {
+    if (same->allowed.low != form.allowed.low || same->allowed.low_included != form.allowed.low_included) {
       same->allowed.low = any.low;
-      same->allowed.low_itself = true;
+      same->allowed.low_included = true;
     }
-    if (same->allowed.high != form.allowed.high || same->allowed.high_itself != form.allowed.high_itself) {
+    if (same->allowed.high != form.allowed.high || same->allowed.high_included != form.allowed.high_included) {
       same->allowed.high = any.high;
-      same->allowed.high_itself = true;
+      same->allowed.high_included = true;
     }
     merge(same->items, form.items);
   }

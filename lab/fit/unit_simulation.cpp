@@ -41,7 +41,7 @@ struct UnitSimulation::Parts {
     const auto lamps = fit.device.lamps.size();
     by_lamp.resize(lamps);
     lights.resize(lamps);
-    sim::keep_gel_of_unit_modulus(fit.device, cache);
+    sim::cache_gel_of_unit_modulus(fit.device, cache);
   }
 
   /// The numbers that act on the scene and, with a lamp, on that lamp: under these its light is kept.

@@ -106,7 +106,7 @@ GraspOutcome run_grasp_trial(const sim::VirtualSensor& sensor, const GraspTrial&
   outcome.crush_force_N = *trial.object.crush_force_N;
   outcome.final_force_N = end.normal_force_N;
   outcome.slid_mm = end.slid_mm;
-  outcome.slip_answers = rule.slip_answers();
+  outcome.slip_reactions = rule.slip_reactions();
   outcome.false_alarms = count_false_alarms(outcome.moments, lag_frames);
   return outcome;
 }

@@ -50,7 +50,7 @@ struct GraspOutcome {
   double crush_force_N = 0.0;
   double final_force_N = 0.0;  ///< one finger's
   double slid_mm = 0.0;        ///< the object against the fingers, all in all
-  int slip_answers = 0;        ///< how often the rule closed further
+  int slip_reactions = 0;      ///< how often the rule closed further
   int false_alarms = 0;        ///< frames in which slip was reported though nothing slid since two lags before
   std::vector<GraspMoment> moments;
 };

@@ -99,7 +99,7 @@ Trials run(const sim::VirtualSensor& sensor, const sensors::TouchCalibration& ca
            const Trials* known = nullptr) {
   Trials result{trials, known != nullptr ? known->outcomes : std::vector<GraspOutcome>(trials.size())};
   tbb::parallel_for(std::size_t{0}, trials.size(), [&](std::size_t i) {
-    if (known != nullptr && known->outcomes[i].slip_answers == 0) return;
+    if (known != nullptr && known->outcomes[i].slip_reactions == 0) return;
     result.outcomes[i] = run_grasp_trial(sensor, trials[i], loop, grasp_senses(calibration, senses));
   });
   return result;
@@ -125,7 +125,7 @@ std::vector<ValidationRow> validate_gelsight_grasp(const ValidateOptions& option
   const std::vector<GraspTrial> trials = trials_of(objects, options.quick);
   const GraspLoopSettings loop;
   GraspLoopSettings blind = loop;
-  blind.rule.answer_slip = false;
+  blind.rule.react_to_slip = false;
 
   std::vector<ValidationRow> rows;
   const auto add = [&](const std::string& id, const std::string& title, const std::string& unit) -> ValidationRow& {

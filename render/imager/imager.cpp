@@ -43,10 +43,10 @@ std::array<int, 4> channels_of(BayerPattern bayer) {
   return {0, 0, 0, 0};
 }
 
-void require_finite(const char* name, double value, double low, bool low_itself = true) {
-  const bool holds = std::isfinite(value) && (low_itself ? value >= low : value > low);
+void require_finite(const char* name, double value, double low, bool low_included = true) {
+  const bool holds = std::isfinite(value) && (low_included ? value >= low : value > low);
   if (!holds) {
-    fail("imager: {} is {}; allowed is a finite number {} {}", name, value, low_itself ? "from" : "above", low);
+    fail("imager: {} is {}; allowed is a finite number {} {}", name, value, low_included ? "from" : "above", low);
   }
 }
 

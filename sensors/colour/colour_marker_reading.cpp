@@ -199,7 +199,7 @@ void ColourMarkerFinder::read(const ColourMarkerReading* rest, ColourMarkerReadi
     }
   }
   for (std::size_t i = 0; i < count; ++i) reading.markers[i].flaw = flaws[i];
-  tell_surroundings(rest ? *rest : reading, reading);
+  find_surroundings(rest ? *rest : reading, reading);
 }
 
 }  // namespace touchstone::sensors

@@ -15,7 +15,7 @@ bool is_sound(const ColourMarkerReading& rest, const ColourMarkerReading& readin
 
 }  // namespace
 
-void tell_surroundings(const ColourMarkerReading& rest, ColourMarkerReading& reading) {
+void find_surroundings(const ColourMarkerReading& rest, ColourMarkerReading& reading) {
   TS_ASSERT(rest.grid == reading.grid && rest.markers.size() == reading.markers.size());
   const int columns = reading.grid.x();
   const int rows = reading.grid.y();

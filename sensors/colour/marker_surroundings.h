@@ -9,6 +9,6 @@ namespace touchstone::sensors {
 
 /// Fills in the surroundings of all sound markers of `reading`, which may be `rest` itself.
 /// @pre both are of the same grid
-void tell_surroundings(const ColourMarkerReading& rest, ColourMarkerReading& reading);
+void find_surroundings(const ColourMarkerReading& rest, ColourMarkerReading& reading);
 
 }  // namespace touchstone::sensors

@@ -101,7 +101,7 @@ GraspCommand GraspRule::lift(const GraspReading& reading) {
   calm_ = reading.lifted && !reading.slip ? calm_ + 1 : 0;
   const bool settled = settling_ == 0;
   settling_ = std::max(0, settling_ - 1);
-  if (reading.slip && settled && settings_.answer_slip) return tighten(reading);
+  if (reading.slip && settled && settings_.react_to_slip) return tighten(reading);
   // Slip that isn't answered yet takes an object out of the state of being held, too.
   phase_ = calm_ > settings_.settle_frames ? GraspPhase::holding : GraspPhase::lifting;
   return {phase_, 0.0, true};

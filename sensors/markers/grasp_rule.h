@@ -26,7 +26,7 @@ struct GraspRuleSettings {
   std::optional<double> most_normal_force_N;  ///< and at this estimated normal force, if one is given
   double lost_height_mm = 0.02;               ///< the object is lost where the maximum stays below this...
   int lost_frames = 5;                        ///< ...for so many frames in a row after touch
-  bool answer_slip = true;                    ///< false: the thesis's step 2 is left out, for comparison
+  bool react_to_slip = true;                  ///< false: the thesis's step 2 is left out, for comparison
 };
 
 /// @throws Error that names the setting, its value and what is allowed
@@ -70,7 +70,7 @@ class GraspRule {
   GraspPhase phase() const { return phase_; }
   double approach_travel_mm() const { return approached_; }  ///< of each finger until touch
   double slip_travel_mm() const { return tightened_; }       ///< of each finger in answer to slip
-  int slip_answers() const { return answers_; }              ///< how often it closed further
+  int slip_reactions() const { return answers_; }            ///< how often it closed further
 
  private:
   GraspCommand approach(const GraspReading& reading);

@@ -139,7 +139,7 @@ void Gripper::slide(double arm_acceleration, double seconds) {
   sliding_ = !balance(half_load(arm_acceleration));
 }
 
-void Gripper::take_table_away() {
+void Gripper::remove_table() {
   table_ = false;
   state_.on_table = false;
 }

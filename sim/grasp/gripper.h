@@ -67,7 +67,7 @@ class Gripper {
   const GripperState& advance(double close_by_mm, double arm_acceleration_mm_s2, double seconds);
 
   /// From now on nothing but the fingers carries the object.
-  void take_table_away();
+  void remove_table();
 
   const GripperState& state() const { return state_; }
   const fem::PressState& press() const { return press_.state(); }

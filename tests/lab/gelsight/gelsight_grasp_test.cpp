@@ -95,17 +95,17 @@ TEST(GraspLoop, ALightObjectIsHeldAtTheFirstTouch) {
 TEST(GraspLoop, SlipIsAnsweredByAStrongerGrip) {
   const GraspOutcome light = run_grasp_trial(sensor(), ball(0.5), loop(), stand_in());
   const GraspOutcome heavy = run_grasp_trial(sensor(), ball(heavy_g()), loop(), stand_in());
-  EXPECT_GT(heavy.slip_answers, light.slip_answers);
+  EXPECT_GT(heavy.slip_reactions, light.slip_reactions);
   EXPECT_GT(heavy.peak_force_N, 1.4 * light.peak_force_N);
   EXPECT_GT(heavy.slid_mm, 0.0);
 }
 
 TEST(GraspLoop, WithoutTheAnswerToSlipTheSameObjectStaysBehind) {
   GraspLoopSettings blind = loop();
-  blind.rule.answer_slip = false;
+  blind.rule.react_to_slip = false;
   const GraspOutcome outcome = run_grasp_trial(sensor(), ball(heavy_g()), blind, stand_in());
   EXPECT_FALSE(outcome.held);
-  EXPECT_EQ(outcome.slip_answers, 0);
+  EXPECT_EQ(outcome.slip_reactions, 0);
   EXPECT_LT(outcome.moments.back().truth.object_height_mm, 1.0);
 }
 

@@ -35,7 +35,7 @@ TEST(MarkerSurroundings, AnAffineMapsDeterminantIsFoundEverywhere) {
     marker.ink_area_px *= 1.3;
   }
   seen.markers[12].flaw = MarkerFlaw::kTwoFilters;  // its neighbours make do with the others
-  tell_surroundings(rest, seen);
+  find_surroundings(rest, seen);
   for (std::size_t i = 0; i < seen.markers.size(); ++i) {
     const MarkerSurroundings& found = seen.markers[i].surroundings;
     EXPECT_EQ(found.known, i != 12) << i;
@@ -47,7 +47,7 @@ TEST(MarkerSurroundings, AnAffineMapsDeterminantIsFoundEverywhere) {
 
 TEST(MarkerSurroundings, AtRestNothingHasChanged) {
   ColourMarkerReading rest = even_grid();
-  tell_surroundings(rest, rest);
+  find_surroundings(rest, rest);
   for (const ColourMarker& marker : rest.markers) {
     EXPECT_TRUE(marker.surroundings.known);
     EXPECT_EQ(marker.surroundings.log_cell_area, 0.0);
@@ -60,7 +60,7 @@ TEST(MarkerSurroundings, OnlyTheNeighboursSizesCount) {
   const ColourMarkerReading rest = even_grid();
   ColourMarkerReading seen = rest;
   seen.markers[12].ink_area_px *= 2.0;
-  tell_surroundings(rest, seen);
+  find_surroundings(rest, seen);
   EXPECT_EQ(seen.markers[12].surroundings.log_ink_area, 0.0);
   EXPECT_NEAR(seen.markers[13].surroundings.log_ink_area, std::log(2.0) / 4, 1e-12);
 }
@@ -69,12 +69,12 @@ TEST(MarkerSurroundings, WithoutANeighbourAlongBothAxesTheyAreUnknown) {
   ColourMarkerReading rest = even_grid();
   rest.markers[11].flaw = rest.markers[13].flaw = MarkerFlaw::kMissing;
   ColourMarkerReading seen = rest;
-  tell_surroundings(rest, seen);
+  find_surroundings(rest, seen);
   EXPECT_FALSE(seen.markers[12].surroundings.known);
   EXPECT_TRUE(seen.markers[17].surroundings.known);
   // One that was missing at rest doesn't count when it is seen later.
   seen.markers[11].flaw = seen.markers[13].flaw = MarkerFlaw::kNone;
-  tell_surroundings(rest, seen);
+  find_surroundings(rest, seen);
   EXPECT_FALSE(seen.markers[12].surroundings.known);
 }
 
@@ -82,7 +82,7 @@ TEST(MarkerSurroundings, AFoldedCellIsUnknown) {
   const ColourMarkerReading rest = even_grid();
   ColourMarkerReading seen = rest;
   std::swap(seen.markers[11].ink_centroid_px, seen.markers[13].ink_centroid_px);
-  tell_surroundings(rest, seen);
+  find_surroundings(rest, seen);
   EXPECT_FALSE(seen.markers[12].surroundings.known);
 }
 

@@ -87,7 +87,7 @@ TEST(GraspRule, WithoutTouchItGivesUpAtTheLongestApproach) {
 TEST(GraspRule, SlipBeforeTouchMeansNothing) {
   GraspRule rule(settings());
   EXPECT_EQ(rule.next(reading(0.0, true)).close_by_mm, 0.02);
-  EXPECT_EQ(rule.slip_answers(), 0);
+  EXPECT_EQ(rule.slip_reactions(), 0);
 }
 
 TEST(GraspRule, WithoutSlipTheWidthStays) {
@@ -105,7 +105,7 @@ TEST(GraspRule, SlipIsAnsweredOnceAndThenGivenTimeToShow) {
   EXPECT_EQ(rule.next(reading(0.2, true)).close_by_mm, 0.05);
   for (int frame = 0; frame < 3; ++frame) EXPECT_EQ(rule.next(reading(0.2, true)).close_by_mm, 0.0);
   EXPECT_EQ(rule.next(reading(0.2, true)).close_by_mm, 0.05);
-  EXPECT_EQ(rule.slip_answers(), 2);
+  EXPECT_EQ(rule.slip_reactions(), 2);
 }
 
 TEST(GraspRule, TheLastStepEndsAtTheLimitAndSlipBeyondItIsReported) {
@@ -167,7 +167,7 @@ TEST(GraspRule, ATouchThatGoesIsAnObjectLost) {
 
 TEST(GraspRule, WithoutItsSecondStepSlipIsSeenAndLeft) {
   GraspRuleSettings s = settings();
-  s.answer_slip = false;
+  s.react_to_slip = false;
   GraspRule rule = lifting(s);
   for (int frame = 0; frame < 10; ++frame) EXPECT_EQ(rule.next(reading(0.2, true, true)).close_by_mm, 0.0);
   EXPECT_EQ(rule.phase(), GraspPhase::lifting);  // never held while it slips

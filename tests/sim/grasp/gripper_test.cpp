@@ -158,7 +158,7 @@ TEST(Gripper, WithoutATableItFallsAsFrictionLetsIt) {
   const GraspedBody body = ball(mass_for(normal, share));
   Gripper gripper(gel(), body, settings());
   close_to(gripper, 0.4);
-  gripper.take_table_away();
+  gripper.remove_table();
   gripper.advance(0.0, 0.0, 1e-6);  // the gel is sheared until all slips
   ASSERT_TRUE(gripper.state().slipping);
   const double begin = gripper.state().sunk_mm;
@@ -188,7 +188,7 @@ TEST(Gripper, ItFallsOutAndThenTheGelIsBare) {
   s.drop_mm = 3.0;
   Gripper gripper(gel(), ball(mass_for(force_at(0.3), 0.5)), s);
   close_to(gripper, 0.3);
-  gripper.take_table_away();
+  gripper.remove_table();
   for (int frame = 0; frame < 5 && !gripper.state().dropped; ++frame) gripper.advance(0.0, 0.0, kFrame_s);
   EXPECT_TRUE(gripper.state().dropped);
   EXPECT_EQ(gripper.state().normal_force_N, 0.0);
@@ -209,7 +209,7 @@ TEST(Gripper, ClosingFurtherCatchesWhatSlides) {
   GripperSettings s = settings();
   Gripper gripper(gel(), ball(mass_for(force_at(0.4), 0.8)), s);
   close_to(gripper, 0.4);
-  gripper.take_table_away();
+  gripper.remove_table();
   gripper.advance(0.0, 0.0, 0.02);
   EXPECT_TRUE(gripper.state().slipping);
   EXPECT_GT(gripper.state().sliding_speed_mm_s, 0.0);
@@ -229,7 +229,7 @@ TEST(Gripper, HalfTheStepMovesTheAnswerLittleAndAQuarterLess) {
     s.slide_step_s = slide_step;
     Gripper gripper(gel(), ball(mass), s);
     close_to(gripper, 0.4);
-    gripper.take_table_away();
+    gripper.remove_table();
     gripper.advance(0.0, 0.0, 0.02);
     gripper.advance(0.2, 0.0, 0.04);  // brakes it
     return gripper.state().sunk_mm;
