@@ -110,7 +110,7 @@ FitCertainty certainty_of(const LinearisedFit& fit) {
   out.picture_misfit = root_mean_square(squares[0], counts[0], static_cast<double>(n));
   out.number_misfit = root_mean_square(squares[1], counts[1], 0.0);
 
-  // Singular values by the triangle of a QR, so that they aren't squared on the way.
+  // Singular values by the triangle of a QR, so that they aren't squared in between.
   Matrix triangle = fit.jacobian;
   if (rows > n)
     triangle = Eigen::HouseholderQR<Matrix>(fit.jacobian).matrixQR().topRows(n).triangularView<Eigen::Upper>();

@@ -81,7 +81,7 @@ TextureSamples texture_samples(const sim::VirtualSensor& sensor, const std::vect
 
 /// How samples are divided into those that train and those that test.
 enum class TextureSplit {
-  by_sample,  ///< the thesis's way: squares of one image may stand on both sides
+  by_sample,  ///< as in the thesis: squares of one image may stand on both sides
   by_image,   ///< stricter: all squares of an image stand on the same side
 };
 

@@ -52,7 +52,7 @@ double largest_error(const TaylorHoodSpace& space, const ElasticSolution& soluti
 
 TEST(FiniteStrain, PatchTestAtLargeDeformation) {
   TetMesh mesh = fixtures::box_mesh({3, 2, 1.5}, 3, 2, 2, 0.15);
-  // Held all round but for the top: with its sides free too, a block under dead loads buckles on the way.
+  // Held all round but for the top: with its sides free too, a block under dead loads buckles before.
   mesh.bonded.clear();
   for (const auto& face : boundary_faces(mesh)) {
     if (std::find(mesh.outer.begin(), mesh.outer.end(), face) == mesh.outer.end()) mesh.bonded.push_back(face);

@@ -225,7 +225,7 @@ TEST_F(GltfMesh, OpenOrTwistedSurfacesAreRefused) {
   expect_refused(inside_out.embedded(), "inside out");
   Cube one = cube_;
   std::swap(one.indices[0], one.indices[1]);
-  expect_refused(one.embedded(), "face opposite ways");
+  expect_refused(one.embedded(), "have opposite orientations");
   expect_refused(cube_.embedded(R"([{"mesh": 0, "scale": [1, 0, 1]}])"), "isn't a closed solid");
 }
 
