@@ -62,7 +62,7 @@ struct InsertionExperiment {
 double mouth_error(const InsertionSettings& settings, const sensors::PlanarPose& touch_from_object_true,
                    const sensors::PlanarPose& touch_from_object_found, const Eigen::Vector2d& robot_error);
 
-InsertionExperiment run_insertion(const TouchBench& bench, const sim::TouchObject& plug, const ObjectMap& map,
+InsertionExperiment run_insertion(const TouchSetup& setup, const sim::TouchObject& plug, const ObjectMap& map,
                                   const InsertionSettings& settings);
 
 /// The same grasps and poses with a robot that stops elsewhere: successes as settings.robot_error_mm has it, averaged

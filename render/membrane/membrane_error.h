@@ -16,7 +16,7 @@ namespace touchstone::render {
 Scene membrane_scene(const MembraneOptics& optics, const FaceGrid& grid, const FaceState& state, double behind);
 
 struct MembraneErrorSettings {
-  int fields = 12;     ///< along the picture's longer side: what is averaged to tell the worst place
+  int fields = 12;     ///< along the picture's longer side: what is averaged to find the worst place
   int pixels = 16;     ///< looked at in each field
   int samples = 128;   ///< paths a pixel, twice
   int max_depth = 64;  ///< RenderSettings::max_depth

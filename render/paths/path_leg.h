@@ -12,7 +12,7 @@ namespace touchstone::render {
 inline constexpr int kRouletteFrom = 3;  ///< scatterings, at surfaces or in a medium, from which on chance ends paths
 
 template <int N>
-struct PathLeg {  // without default values: a path makes room for a dozen and mostly uses three
+struct PathLeg {  // without default values: a path makes space for a dozen and mostly uses three
   Eigen::Vector3d origin, direction;
   Bands<N> throughput;
   double s_share;  ///< of the light, polarised square to the plane of incidence at the flat faces

@@ -55,14 +55,14 @@ class RayScene {
   /// Are there ThinFilms?
   bool has_films() const;
 
-  /// The nearest ThinFilm within `most` (mm, finite): only distance, normal and object of `hit` are told.
+  /// The nearest ThinFilm within `most` (mm, finite): only distance, normal and object of `hit` are set.
   bool intersect_film(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double most, RayHit& hit) const;
 
   /// Distance to the nearest Refractive surface straight along +z (`up`) or -z within `most`; negative if there is
   /// none.
   double refractive_along_z(const Eigen::Vector3d& origin, bool up, double most) const;
 
-  /// Are there Refractive surfaces, and does one cross the way between two points?
+  /// Are there Refractive surfaces, and does one cross the line between two points?
   bool has_refractive() const;
   bool meets_refractive(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const;
   /// How far the nearest surface or ball is from a point, if that is less than `most` (mm, finite); else `most`.

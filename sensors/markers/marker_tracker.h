@@ -23,9 +23,9 @@
 namespace touchstone::sensors {
 
 struct MarkerTrackerSettings {
-  MarkerLook look = {};
+  MarkerAppearance appearance = {};
   double longest_step = 0.4;     ///< between two frames, as a part of the spacing; 0.05 to 0.5
-  double max_area_change = 1.8;  ///< either way, against the marker's own usual area; above 1
+  double max_area_change = 1.8;  ///< up or down, against the marker's own usual area; above 1
 };
 
 enum class MarkerStatus : std::uint8_t {

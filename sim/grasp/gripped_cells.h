@@ -20,7 +20,7 @@ namespace touchstone::sim {
 
 inline constexpr int kAlong = 6;  // degrees of the smooth field along and across the flat
 inline constexpr int kAcross = 2;
-inline constexpr std::array kDecays = {0.5, 1.5};  // thicknesses over which the piece's ends are felt
+inline constexpr std::array kDecays = {0.5, 1.5};  // thicknesses over which the piece's ends have an effect
 inline constexpr int kTerms = (kAlong + 1 + 2 * static_cast<int>(kDecays.size())) * (kAcross + 1);
 
 /// Height of the flat's plane over z = 0 at a place.

@@ -25,7 +25,7 @@ constexpr double kFrameRate_Hz = 30.0;             // of a press on a device wit
 constexpr int kEventSteps = 12;                    // of a press that event pixels watch, at least, down and aside
 
 /// What light needs and mechanics doesn't.
-struct Sight {
+struct Optics {
   std::unique_ptr<const SensorView> view;
   render::Imager imager, ideal_imager;  // for light of the untouched device's bands
   render::FixedPattern pattern;
@@ -67,11 +67,11 @@ struct VirtualSensor::Parts {
         gel(set_up_gel(device, cache, progress)),
         markers(marker_places(device, *gel)) {}
 
-  const Sight& sight() const {
+  const Optics& optics() const {
     const std::lock_guard<std::mutex> lock(making);
     if (!made) {
       if (!device.camera) fail("device {}: has no camera, so it can't be looked through", device.name);
-      auto now = std::make_unique<Sight>();
+      auto now = std::make_unique<Optics>();
       now->view = device.coating     ? coated_view(device, *gel, cache_folder, settings)
                   : is_milky(device) ? milky_view(device, *gel, settings)
                                      : clear_view(device, *gel, settings);
@@ -107,15 +107,15 @@ struct VirtualSensor::Parts {
 
   cv::Mat develop(const cv::Mat& irradiance, const render::Imager& imager, std::uint64_t noise_seed, int frame) const {
     return render::develop(
-        render::expose(irradiance, imager, sight().pattern, noise_seed, static_cast<std::uint64_t>(frame)), imager);
+        render::expose(irradiance, imager, optics().pattern, noise_seed, static_cast<std::uint64_t>(frame)), imager);
   }
   /// Of light of the untouched device's bands.
   cv::Mat develop(const cv::Mat& irradiance, std::uint64_t noise_seed, int frame) const {
-    return develop(irradiance, sight().imager, noise_seed, frame);
+    return develop(irradiance, optics().imager, noise_seed, frame);
   }
-  SceneBands bands_of(const SeenObject& object) const { return bands_of(sight().view->bands(object)); }
+  SceneBands bands_of(const SeenObject& object) const { return bands_of(optics().view->bands(object)); }
   render::Imager imager_of(const SeenObject& object) const {
-    return sim::imager(device, bands_of(object), with_noise(sight().view->plan()));
+    return sim::imager(device, bands_of(object), with_noise(optics().view->plan()));
   }
 
   bool has_events() const { return device.camera && device.camera->events; }
@@ -148,7 +148,7 @@ struct VirtualSensor::Parts {
   /// What the camera delivers at the end of `states`, the first of which is out of contact.
   void show(const SeenObject& object, const std::vector<Truth>& states, const TouchOptions& options,
             Touch& touch) const {
-    const Sight& by = sight();
+    const Optics& by = optics();
     const Eigen::Vector3d start = states.front().press.gel_from_object.translation;
     SeenTouch seen = by.view->see(object, states.back().press, start, options.truth);
     touch.light = seen.light;
@@ -165,8 +165,7 @@ struct VirtualSensor::Parts {
         lights.push_back(by.view->see(object, states[k].press, start, false).light);
       }
       lights.push_back(touch.light);
-      const render::MotionChipSettings chip =
-          motion_chip(device, bands_of(object), with_noise(by.view->plan()));
+      const render::MotionChipSettings chip = motion_chip(device, bands_of(object), with_noise(by.view->plan()));
       const ChipTouch shown = chip_touch(chip, rest, lights, settings.seed, options.noise_seed);
       touch.frame = shown.raw;
       touch.statistics = shown.statistics;
@@ -188,7 +187,7 @@ struct VirtualSensor::Parts {
 
   /// The background of a touch: of a clear device it has the object in it, just above the gel.
   cv::Mat rest_of(const SeenObject& object, const Eigen::Vector3d& start) const {
-    return device.coating ? sight().rest_light : sight().view->rest_light(&object, start);
+    return device.coating ? optics().rest_light : optics().view->rest_light(&object, start);
   }
 
   DeviceSpec device;
@@ -197,7 +196,7 @@ struct VirtualSensor::Parts {
   std::shared_ptr<const fem::Compliance> gel;
   MarkerPlaces markers;
   mutable std::mutex making;
-  mutable std::unique_ptr<const Sight> made;
+  mutable std::unique_ptr<const Optics> made;
 };
 
 SceneSpec touch_scene(const DeviceSpec& device, const VirtualSensorSettings& settings, const ObjectSpec& object,
@@ -221,7 +220,7 @@ const fem::Compliance& VirtualSensor::gel() const {
 }
 
 const LightChoice& VirtualSensor::light() const {
-  return parts_->sight().view->choice();
+  return parts_->optics().view->choice();
 }
 
 double VirtualSensor::mm_per_px() const {
@@ -232,7 +231,7 @@ double VirtualSensor::mm_per_px() const {
 }
 
 Eigen::Vector2d VirtualSensor::pixel_from_gel(const Eigen::Vector2d& place) const {
-  const auto pixel = parts_->sight().view->pixel_of({place.x(), place.y(), 0.0});
+  const auto pixel = parts_->optics().view->pixel_of({place.x(), place.y(), 0.0});
   if (!pixel) fail("place ({}, {}) mm on the gel isn't seen by the camera", place.x(), place.y());
   return *pixel;
 }
@@ -300,7 +299,7 @@ Touch VirtualSensor::press(const ObjectSpec& object_of, const PressSpec& how, co
 }
 
 Touch VirtualSensor::rest(std::uint64_t noise_seed) const {
-  const Sight& by = parts_->sight();
+  const Optics& by = parts_->optics();
   Touch touch;
   touch.what = fmt::format("{}, untouched", parts_->device.name);
   touch.light = by.rest_light;
@@ -313,7 +312,7 @@ Touch VirtualSensor::rest(std::uint64_t noise_seed) const {
 
 Touch VirtualSensor::capture(const TouchObject& object, const fem::PressState& press, std::uint64_t noise_seed,
                              int frame, bool truth) const {
-  const SeenTouch seen = parts_->sight().view->see(*object.seen_, press, press.gel_from_object.translation, truth);
+  const SeenTouch seen = parts_->optics().view->see(*object.seen_, press, press.gel_from_object.translation, truth);
   Touch touch;
   touch.light = seen.light;
   touch.height = seen.height;
@@ -334,19 +333,20 @@ const Eigen::MatrixX3d& VirtualSensor::marker_places_mm() const {
 }
 
 cv::Mat VirtualSensor::background(std::uint64_t noise_seed, int frame) const {
-  const Sight& by = parts_->sight();
+  const Optics& by = parts_->optics();
   if (!parts_->has_chip()) return parts_->develop(by.rest_light, noise_seed, frame);
   const Plan& plan = by.view->plan();
-  const render::MotionChipSettings chip = motion_chip(parts_->device, parts_->bands_of(plan.bands), parts_->with_noise(plan));
+  const render::MotionChipSettings chip =
+      motion_chip(parts_->device, parts_->bands_of(plan.bands), parts_->with_noise(plan));
   return chip_touch(chip, by.rest_light, {}, parts_->settings.seed, noise_seed + static_cast<std::uint64_t>(frame)).raw;
 }
 
 const cv::Mat& VirtualSensor::background_light() const {
-  return parts_->sight().rest_light;
+  return parts_->optics().rest_light;
 }
 
 cv::Mat VirtualSensor::ideal(const cv::Mat& light) const {
-  const Sight& by = parts_->sight();
+  const Optics& by = parts_->optics();
   return render::develop(render::expose(light, by.ideal_imager, by.pattern, 0, 0), by.ideal_imager);
 }
 
