@@ -75,7 +75,8 @@ render::Spectrum in_bands(const Colour& colour, const SceneBands& bands, const c
   const bool grey = std::ranges::all_of(colour.numbers, [&](double value) { return value == colour.numbers.front(); });
   if (grey) return render::flat_spectrum(bands.count(), colour.numbers[0]);
   if (given != bands.count()) {
-    fail_at(colour.where, "{}: has {} numbers, but the scene has {} bands; allowed is one number for all, {}{}, or, "
+    fail_at(colour.where,
+            "{}: has {} numbers, but the scene has {} bands; allowed is one number for all, {}{}, or, "
             "for what reflects, an sRGB colour such as '#c29a84'",
             what, given, bands.count(), bands.count() > 1 ? fmt::format("or {}", bands.count()) : "no list of others",
             bands.ranges ? ", or a spectrum's file" : "");
