@@ -34,6 +34,7 @@ template <typename... Args>
   throw Error(fmt::format(format, std::forward<Args>(args)...));
 }
 
+/// The same, with the place in an input file at which it went wrong.
 template <typename... Args>
 [[noreturn]] void fail_at(const SourceLocation& where, fmt::format_string<Args...> format, Args&&... args) {
   throw Error(where, fmt::format(format, std::forward<Args>(args)...));

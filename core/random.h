@@ -38,6 +38,7 @@ enum class Purpose : std::uint32_t {
 /// UniformRandomBitGenerator.
 class RandomStream {
  public:
+  /// What the standard asks of a UniformRandomBitGenerator.
   using result_type = std::uint32_t;
 
   RandomStream(std::uint64_t seed, std::uint64_t index, Purpose purpose);

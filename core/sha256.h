@@ -26,6 +26,7 @@ class Sha256 {
   std::unique_ptr<Context> context_;
 };
 
+/// Of these bytes, as 64 hexadecimal digits in small letters.
 std::string sha256_of(std::string_view bytes);
 /// @throws Error if the file can't be read
 std::string sha256_of_file(const std::filesystem::path& path);

@@ -23,10 +23,12 @@ struct YamlPick {
   bool present = false;
   int value = 0;  ///< which of its values, by number
 };
+/// By the path of a field: what stands there in this call.
 using YamlPicks = std::map<std::string, YamlPick>;
 
 /// What one call asked for, in order.
 struct YamlCall {
+  /// One question of a `fields` function about a key.
   struct Asked {
     std::string key;
     bool read = false;                 ///< else it was only asked whether it is there
@@ -47,9 +49,11 @@ struct YamlCall {
 /// A place in the file that isn't there.
 class YamlPlace {
  public:
+  /// What the reading function took this place for.
   enum class Shape { scalar, list, map };
   /// Calls `fields` on a place that is a map.
   using Ask = std::function<void(std::shared_ptr<YamlPlace>)>;
+  /// Types whose fields are already described: a type within itself is described once.
   using Known = std::map<std::type_index, std::shared_ptr<const YamlMap>>;
 
   explicit YamlPlace(std::shared_ptr<Known> known) : known_(std::move(known)) {}

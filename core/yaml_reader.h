@@ -56,6 +56,8 @@ using YamlScalar = std::variant<bool, std::int64_t, double, std::string>;
 
 struct YamlMap;
 
+/// A place in a YAML file that is being read: a map whose fields are asked for by name, or a value. Every mistake is an
+/// Error with file, line, field, the value found and what is allowed.
 class YamlReader {
  public:
   /// Parses a file whose root is a map. @throws Error with file and line

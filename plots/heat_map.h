@@ -6,6 +6,7 @@
 
 namespace touchstone::plots {
 
+/// Values over a grid: one cell for each pair of x and y.
 struct HeatMap {
   std::string title;
   std::string x_label, y_label;

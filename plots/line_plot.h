@@ -18,6 +18,7 @@ struct PlotCurve {
   std::optional<std::size_t> colour = {};  ///< number in the palette of six; none: as the curves' order
 };
 
+/// Curves over one pair of axes; on a logarithmic axis only values above 0 are shown.
 struct LinePlot {
   std::string title;
   std::string x_label;

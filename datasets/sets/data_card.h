@@ -37,8 +37,8 @@ struct DrawnFigures {
   std::map<std::string, std::int64_t> light;  ///< how pictures are lit: units
 };
 
-inline constexpr double kSmallForce_N = 0.05;
-inline constexpr double kLargeStrain = 0.2;
+inline constexpr double kSmallForce_N = 0.05;  ///< forces below it have no relative error on the card
+inline constexpr double kLargeStrain = 0.2;  ///< presses beyond it are counted: the gel is computed as linearly elastic
 
 /// README.md
 std::string data_card(const PreparedDraw& prepared, const DrawnFigures& figures);

@@ -16,6 +16,7 @@
 
 namespace touchstone::datasets {
 
+/// How a job of scenes is run; none of it changes a sample.
 struct GenerateOptions {
   SampleSource source;
   int threads = 0;      ///< at most so many; 0: as many as the machine has

@@ -96,6 +96,7 @@ class LayerResponse {
   mutable std::unique_ptr<const LayerResponse> inverse_, wider_;
 };
 
+/// Memory of one transform, which threads don't share. It belongs to the response that made it.
 class LayerResponse::Scratch {
  public:
   ~Scratch();

@@ -28,6 +28,7 @@
 
 namespace touchstone::fem {
 
+/// As fem::Press for one rigid body, at finite strain. It can be moved, not copied.
 class FinitePress {
  public:
   /// `friction` as for Press. The gel must outlive this. Of the tolerance, `force`, `lookup_mm` (here: what the gaps
