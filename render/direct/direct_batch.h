@@ -21,6 +21,7 @@ struct DirectFrame {
   const std::vector<DirectMaterial>& materials;  ///< by object
 };
 
+/// How many rays were cast; `spared` shadow rays weren't needed (ShadowReach).
 struct DirectCounts {
   std::uint64_t primary = 0, shadow_rays = 0, spared = 0;
 };

@@ -11,7 +11,7 @@
 
 namespace touchstone::render {
 
-inline constexpr int kMostDirectLamps = 64;
+inline constexpr int kMostDirectLamps = 64;  ///< lamps and beams of guides: each is a bit of ShadowReach's masks
 
 /// Where the lamps stand as seen from the cells of a coarse map over a light field's box: made once a fixture.
 struct LampBearings {

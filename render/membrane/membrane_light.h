@@ -27,6 +27,7 @@
 
 namespace touchstone::render {
 
+/// Cells, reach and tolerance of the convolutions.
 struct MembraneLightSettings {
   double behind = 1.0;            ///< radiance of what is behind the membrane, in parts of the room's
   double view_cell_mm = 0.2;      ///< cells on which the camera's kernel is applied, and
@@ -36,6 +37,7 @@ struct MembraneLightSettings {
   double tolerance = 1e-4;  ///< of the exchange's sum, in parts of the room's radiance
 };
 
+/// One membrane before one camera, made ready: then a picture takes some transforms. It can be moved, not copied.
 class MembraneLight {
  public:
   /// @param grid the outer face's; the membrane ends where it ends, and beside it what is behind is seen

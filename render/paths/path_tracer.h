@@ -24,6 +24,7 @@ struct NoiseTarget {
   double fraction = 0.5;
 };
 
+/// How many paths a pixel gets, and how long they may be.
 struct RenderSettings {
   std::uint64_t seed = 0;
   int min_samples = 16;   ///< paths per pixel before the first look at the error; powers of two sample best

@@ -6,6 +6,7 @@
 
 namespace touchstone::render {
 
+/// Bit 0 becomes bit 31, and so on.
 inline std::uint32_t reverse_bits(std::uint32_t x) {
   x = __builtin_bswap32(x);
   x = ((x & 0x0f0f0f0fu) << 4) | ((x >> 4) & 0x0f0f0f0fu);

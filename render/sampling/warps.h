@@ -9,6 +9,7 @@
 
 namespace touchstone::render {
 
+/// Of one angle.
 struct SineCosine {
   double sine, cosine;
 };

@@ -110,6 +110,7 @@ struct GuideLamp {
   Spectrum power_W;
 };
 
+/// Every kind of lamp.
 using LampKinds = std::variant<SpotLamp, LedLamp, AreaLamp, ProjectedLamp, GuideLamp>;
 
 /// One of these. It is the variant (std::visit, std::get and the like take it) with its copying out of line: inlined it
@@ -133,6 +134,7 @@ double emission_integral(const Lamp& lamp);
 
 /// Where a lamp's middle is, and what it sends (W in each band).
 const Eigen::Vector3d& lamp_position(const Lamp& lamp);
+/// What it sends into its medium, W in each band.
 const Spectrum& lamp_power(const Lamp& lamp);
 
 /// How far it reaches from its middle; 0 for a point, and for a guide, whose end stands inside its plate.
@@ -140,6 +142,7 @@ double lamp_extent(const Lamp& lamp);
 
 /// Where it faces (not always a unit vector), and the radius of the disc that a round lamp is; 0 of other kinds.
 const Eigen::Vector3d& lamp_direction(const Lamp& lamp);
+/// The radius of a round lamp, mm; 0 of other kinds.
 double disc_radius(const Lamp& lamp);
 
 /// Has it a body that rays can meet?

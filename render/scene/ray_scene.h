@@ -35,6 +35,8 @@ struct RecordedRay {
   bool shadow;  ///< asked only whether anything opaque is in the way
 };
 
+/// The surfaces and balls of a scene, ready for rays; Embree's scene belongs to it, so it isn't copied or moved. Any
+/// number of threads may ask it.
 class RayScene {
  public:
   /// @pre check_scene(scene) holds.

@@ -25,6 +25,7 @@ struct SlopeTable {
   bool measured_near(const Eigen::Vector3f& colour) const;
 };
 
+/// How fine the table's grid is, and what fills cells without samples.
 struct SlopeTableSettings {
   double finest_step_DN = 2.0;  ///< made larger until the grid has at most `most_cells`
   std::size_t most_cells = 1U << 20U;
@@ -45,6 +46,7 @@ struct TableCoverage {
   std::size_t cells_hit = 0;
   double steepest_slope = 0.0;  ///< of the calibration: 99 % of its pixels are less steep
 };
+/// How much of the table these samples reach.
 TableCoverage coverage_of(const SlopeTable& table, std::span<const ColourSample> samples);
 
 }  // namespace touchstone::sensors

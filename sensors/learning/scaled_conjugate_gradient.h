@@ -9,6 +9,7 @@ namespace touchstone::sensors {
 /// Value of a function at x; fills its gradient.
 using ValueAndGradient = std::function<double(const Eigen::VectorXd& x, Eigen::VectorXd& gradient)>;
 
+/// Moller's constants, and when the search ends.
 struct ScaledConjugateGradientSettings {
   double first_sigma = 5e-5;     ///< Moller's sigma: length of the step that tells the curvature; above 0, at most 1e-2
   double first_lambda = 5e-7;    ///< Moller's lambda_1; above 0, at most 1
@@ -16,6 +17,7 @@ struct ScaledConjugateGradientSettings {
   int most_steps = 1000;         ///< at least 1
 };
 
+/// Why the search ended, and what it took.
 struct ScaledConjugateGradientEnd {
   bool is_flat = false;      ///< the gradient has vanished
   bool was_stopped = false;  ///< by `watch`

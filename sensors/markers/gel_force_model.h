@@ -13,6 +13,7 @@ namespace touchstone::sensors {
 /// What was fitted for one gel: a line for each shape of indenter (measure: height_sum_mm3, mm^3), and one for shear
 /// (measure: mean marker displacement, mm).
 struct GelForceModel {
+  /// The line of one shape of indenter.
   struct Normal {
     std::string indenter;  ///< "ball 12.7 mm"; no two alike
     LinearForce line;

@@ -22,12 +22,14 @@
 
 namespace touchstone::sensors {
 
+/// How markers look, how far they may go between frames, and how much their area may change.
 struct MarkerTrackerSettings {
   MarkerLook look = {};
   double longest_step = 0.4;     ///< between two frames, as a part of the spacing; 0.05 to 0.5
   double max_area_change = 1.8;  ///< either way, against the marker's own usual area; above 1
 };
 
+/// Was a marker measured in the frame, and if not, why not?
 enum class MarkerStatus : std::uint8_t {
   kFound,
   kFoundAgain,  ///< wasn't measured in the frame before
@@ -36,6 +38,7 @@ enum class MarkerStatus : std::uint8_t {
   kAtBorder,    ///< cut by the picture's edge
   kTooFar,      ///< the nearest blob without a marker is more than the longest step away
 };
+/// Was the marker measured in this frame?
 inline bool is_found(MarkerStatus status) {
   return status == MarkerStatus::kFound || status == MarkerStatus::kFoundAgain;
 }

@@ -20,6 +20,7 @@
 
 namespace touchstone::sensors {
 
+/// Objects sort their keys, so the same model gives the same bytes.
 using Json = nlohmann::json;
 
 /// @throws Error naming the file if the text is nested deeper than kDeepestJson: for any such text, JSON or not

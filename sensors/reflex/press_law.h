@@ -22,6 +22,7 @@ struct DilationPress {
   }
 };
 
+/// One picture at a known press.
 struct DilationSample {
   double dilation = 1.0;
   double press_mm = 0.0;
@@ -40,6 +41,7 @@ struct ExponentialForce {
   double force_N(double press_mm) const { return press_mm > 0.0 ? scale_N * std::expm1(rate_per_mm * press_mm) : 0.0; }
 };
 
+/// One known press with its force.
 struct PressSample {
   double press_mm = 0.0;
   double force_N = 0.0;

@@ -19,6 +19,7 @@ struct ShearLaw {
   }
 };
 
+/// One known displacement with its forces.
 struct ShearSample {
   Eigen::Vector2d displacement = Eigen::Vector2d::Zero();
   double normal_N = 0.0;

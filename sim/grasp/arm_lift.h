@@ -3,6 +3,7 @@
 
 namespace touchstone::sim {
 
+/// How far and how fast the arm goes up; it also stops with this acceleration.
 struct ArmLiftSettings {
   double height_mm = 10.0;
   double speed_mm_s = 5.0;

@@ -18,10 +18,11 @@
 
 namespace touchstone::sim {
 
-inline constexpr int kAlong = 6;  // degrees of the smooth field along and across the flat
-inline constexpr int kAcross = 2;
-inline constexpr std::array kDecays = {0.5, 1.5};  // thicknesses over which the piece's ends are felt
-inline constexpr int kTerms = (kAlong + 1 + 2 * static_cast<int>(kDecays.size())) * (kAcross + 1);
+inline constexpr int kAlong = 6;                   ///< degree of the smooth field along the flat
+inline constexpr int kAcross = 2;                  ///< across it
+inline constexpr std::array kDecays = {0.5, 1.5};  ///< thicknesses over which the piece's ends count
+inline constexpr int kTerms =
+    (kAlong + 1 + 2 * static_cast<int>(kDecays.size())) * (kAcross + 1);  ///< of the smooth field
 
 /// Height of the flat's plane over z = 0 at a place.
 class FlatPlane {
@@ -140,6 +141,7 @@ class CellContact {
     return result;
   }
 
+  /// How contact was solved on the cells, in one state.
   struct Answer {
     std::vector<double> pressure, gap;  // per cell, MPa and mm
     std::vector<double> start;          // to begin the next state with

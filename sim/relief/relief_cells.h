@@ -8,6 +8,7 @@
 
 namespace touchstone::sim {
 
+/// A point of the diagram, with its weight: a place belongs to the point of the least d^2 - weight.
 struct CellPoint {
   Eigen::Vector2d place;  ///< mm
   double weight = 0.0;    ///< mm^2: the larger, the more of its neighbours' room it takes
@@ -27,6 +28,7 @@ struct CellPlace {
   Eigen::Vector2d from_point;  ///< mm, from the cell's point
 };
 
+/// The diagram of some points; it wraps round the rectangle's sides.
 class CellDiagram {
  public:
   /// @pre there are at least 4 points on the rectangle

@@ -17,6 +17,7 @@ struct AxisKey {
   std::optional<double> force_N;
 };
 
+/// An axis of the gel frame.
 enum class Axis { x, y, z };
 EnumNames<Axis> enum_names(Axis);
 

@@ -26,6 +26,7 @@
 
 namespace touchstone::sim {
 
+/// What the sensor is set up for: how deep it will be pressed, and how accurate its pictures are to be.
 struct VirtualSensorSettings {
   std::uint64_t seed = 1;     ///< of the unit: its imager's fixed pattern, and the light's samples
   double deepest_mm = 1.2;    ///< how far the gel will be pressed in: what a light field has to hold

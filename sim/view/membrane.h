@@ -47,6 +47,6 @@ class Membrane {
   int columns_, rows_;
 };
 
-inline constexpr int kMostHeightPixels = 4096;
+inline constexpr int kMostHeightPixels = 4096;  ///< along a side of a height map: more are refused
 
 }  // namespace touchstone::sim
