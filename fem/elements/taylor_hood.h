@@ -113,6 +113,7 @@ ElasticSolution solve_elastic(const TaylorHoodSpace& space, const ElasticMateria
 /// In one tetrahedron, at barycentric coordinates.
 Eigen::Vector3d displacement_at(const TaylorHoodSpace& space, const ElasticSolution& solution, int element,
                                 const Eigen::Vector4d& barycentric);
+/// The pressure there, MPa.
 double pressure_at(const TaylorHoodSpace& space, const ElasticSolution& solution, int element,
                    const Eigen::Vector4d& barycentric);
 /// Row a, column b: d u_a / d x_b.

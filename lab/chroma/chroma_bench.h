@@ -29,6 +29,7 @@ sim::VirtualSensorSettings chroma_sensor_settings(std::uint64_t seed);
 /// @throws Error for a device without a camera
 sensors::ViewParallax parallax_of(const sim::DeviceSpec& device);
 
+/// A chroma device with a reader of its markers.
 class ChromaBench {
  public:
   /// Reads the picture at rest. Keeps a reference to the sensor.

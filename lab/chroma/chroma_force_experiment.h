@@ -18,6 +18,7 @@
 
 namespace touchstone::lab {
 
+/// The probe's touching end: a flat square, a flat round or half a ball.
 enum class ProbeShape : std::uint8_t { square, cylinder, hemisphere };
 /// "square", "cylinder", "hemisphere"
 const char* name_of(ProbeShape shape);
@@ -33,6 +34,7 @@ struct ForceProbe {
 
   std::string name() const;
 };
+/// The probe as fem takes it.
 fem::ContactShape contact_shape(const ForceProbe& probe);
 
 /// Probes of all three shapes in turn: places within 4 mm of the middle, depths, friction 0.3 to 1.2 and directions
@@ -116,12 +118,14 @@ struct SlipCounts {
   double agreement() const;
 };
 
+/// One probe's press and drag.
 struct ForceRun {
   ForceProbe probe;
   std::vector<ForceSample> samples;  ///< of the frames that were read
   int unread = 0;                    ///< frames with too few measured markers to invert
   SlipCounts markers;
 };
+/// Presses the probe, drags it, and reads each frame.
 ForceRun run_force_probe(const ForceBench& bench, const ForceProbe& probe, const MarkerReader& reader,
                          const DragSettings& drag = {});
 
@@ -143,6 +147,7 @@ struct ForceScore {
   SlipCounts markers;
   double mean_milliseconds = 0.0;
 };
+/// Over all samples of all runs.
 ForceScore score(const std::vector<ForceRun>& runs);
 
 /// Forces of a probe pressed straight down at finite strain, and what linear inversion makes of its markers.

@@ -42,6 +42,7 @@ MarkerSeries shear_series(const ChromaBench& bench, const MarkerTest& test, doub
 
 /// What shear_series presses, and how it moves.
 sim::ObjectSpec marker_ball(const MarkerTest& test);
+/// A press to this depth, then a drag to `end_mm` (along the gel, from the first place) in so many steps.
 sim::MotionSpec shear_motion(const MarkerTest& test, double depth_mm, const Eigen::Vector2d& end_mm, int steps);
 
 /// Standard deviation (degrees) of each marker's hue in pictures of the untouched device. @pre at least 2 pictures
@@ -52,6 +53,7 @@ struct HueAgainstDepth {
   std::vector<double> depth_mm, change_deg;
   StraightLine line() const { return line_through(depth_mm, change_deg); }
 };
+/// Of one marker, over a press series, with the line through it.
 HueAgainstDepth hue_against_depth(const ChromaBench& bench, const MarkerSeries& press, std::size_t marker);
 
 /// The usual forms of a model that needs nothing but the marker itself.
@@ -68,6 +70,7 @@ struct InverseScore {
   double worst_r2 = 1.0;  ///< of the lateral components against the ball's, those that moved
   int samples = 0;
 };
+/// Of one marker, over series that the model wasn't calibrated on.
 InverseScore score_inverse(const ChromaBench& bench, const sensors::HueModel& model, std::size_t marker,
                            const std::vector<MarkerSeries>& series);
 
@@ -105,6 +108,7 @@ struct PunchTest {
   double height_mm = 0.0;  ///< of the origin over the lowest point
   double depth_mm = 0.0;
 };
+/// The punches of fig. 10.
 std::vector<PunchTest> fig10_punches();
 
 }  // namespace touchstone::lab

@@ -35,6 +35,7 @@ enum class LightGradient {
   overlay,  ///< one from black to white: it adds grey too, as a haze would, so saturations change
 };
 
+/// How pictures are made smaller, read, and lit unevenly.
 struct RobustnessSettings {
   double smallest_px = 4.0;       ///< apparent size down to which pictures are reduced; at least 2
   double filter_px = 256.0;       ///< side of the filter in the rungs' pictures
@@ -73,6 +74,7 @@ struct GradientShift {
   double darkness_percent = 0.0;
 };
 
+/// What a gradient does to hue and size: each displacement, their mean and the worst.
 struct GradientRobustness {
   std::vector<GradientShift> shifts;
   GradientShift mean;  ///< over displacements

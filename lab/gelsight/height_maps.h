@@ -10,6 +10,7 @@
 
 namespace touchstone::lab {
 
+/// How a height map is stored.
 enum class HeightFormat {
   exr,   ///< one float channel, `height_mm`
   png16  ///< 16 bit grey: level 10000 is 0 mm, a level is 0.1 um: -1 to 5.55 mm

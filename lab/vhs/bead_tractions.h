@@ -16,6 +16,7 @@ namespace touchstone::lab {
 /// Chosen on presses of two points, others than those of the rows vhs.distribution.
 sensors::TractionSettings bead_inversion();
 
+/// How many frames gave a force.
 struct TractionSummary {
   int frames = 0;
   int in_contact = 0;     ///< frames with a force

@@ -17,6 +17,7 @@
 
 namespace touchstone::lab {
 
+/// What presses on the lump.
 enum class PalpationFace {
   rigid,  ///< a plate, as stiff as sim::set_up_plate's
   gel     ///< the vhs sensor's
@@ -43,6 +44,7 @@ struct PalpationLaw {
   double at(const std::vector<double>& values, double depth) const;
 };
 
+/// At which depths and moduli the law is computed.
 struct PalpationTableSettings {
   double deepest_mm = 2.2;
   int depths = 11;          ///< at which is pressed

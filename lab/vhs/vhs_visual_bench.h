@@ -15,6 +15,7 @@
 
 namespace touchstone::lab {
 
+/// One picture with the light and the press behind it.
 struct VhsPicture {
   cv::Mat frame;       ///< as the camera delivers it, BGR
   cv::Mat irradiance;  ///< CV_32FC(bands), W/m^2 on the sensor
