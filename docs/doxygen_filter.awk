@@ -1,36 +1,61 @@
 # What Doxygen reads in place of a header or of a folder's CMakeLists.txt (docs/Doxyfile). Lines keep their numbers, so that
 # its warnings point at the right ones.
 # - The plain comment on top describes the file, or the folder.
+# - Indented lines of a comment, but for those of a list, are shown as they are.
 # - A comment holds for all overloads that follow without an empty line: each gets a copy.
 # - `fields` and `enum_names`, which read a type from YAML (core/yaml_reader.h), aren't shown.
-FNR == 1 { top = 1; folder = FILENAME }
-folder ~ /CMakeLists\.txt$/ {
-  if (FNR == 1 && /^# /) { sub(/\/[^\/]*$/, "", folder); printf "/// @dir %s\n", folder; folder = FILENAME }
+
+# Prints one line late, so that what follows can still be marked in it.
+function show(line) {
+  if (held != "" || FNR > 1) print held
+  held = line
+}
+
+function close_verbatim() {
+  if (verbatim) held = held " @endverbatim"
+  verbatim = 0
+}
+
+FNR == 1 { top = 1 }
+FILENAME ~ /CMakeLists\.txt$/ {
+  folder = FILENAME
+  sub(/\/[^\/]*$/, "", folder)
   top = top && sub(/^# /, "/// ")
-  print top ? $0 : ""
+  if (FNR == 1) held = "/// @dir " folder
+  show(top ? $0 : "")
   next
 }
-FNR == 1 && /^#pragma once/ { print "/// @file"; next }
-top && sub(/^\/\//, "///") { print; next }
-{ top = 0 }
-/^(void fields\(YamlReader|EnumNames<.*> enum_names\()/ { print ""; next }
+FNR == 1 && /^#pragma once/ { show("/// @file"); next }
+top && !sub(/^\/\//, "///") { top = 0 }
+/^(void fields\(YamlReader|EnumNames<.*> enum_names\()/ { $0 = "" }
 /^ *$/ { comment = name = "" }
-/^ *\/\/\/ / {
+
+/^ *\/\/\/( |$)/ {
   if (!inside) comment = name = ""
   inside = 1
   match($0, /^ */)
   indent = RLENGTH
-  comment = comment substr($0, indent + 4)
-  print
+  text = substr($0, indent + 4)
+  comment = comment text
+  if (text ~ /^ ? ?[^ ]/ || text == "") list = text ~ /^ *(-|[0-9]+\.) /
+  if (text ~ /^   +[^ ]/ && !list) {
+    if (!verbatim) held = held " @verbatim"
+    verbatim = 1
+  } else if (text != "") {
+    close_verbatim()
+  }
+  show($0)
   next
 }
 {
-  inside = 0
+  close_verbatim()
+  inside = list = 0
   match($0, /^ */)
   if (comment != "" && RLENGTH == indent && match($0, /[A-Za-z_0-9]+\(/)) {
     called = substr($0, RSTART, RLENGTH)
     if (name == "") name = called
     else if (called == name && !/&&\)|= d/) $0 = "/**" comment " */ " $0
   }
-  print
+  show($0)
 }
+END { print held }

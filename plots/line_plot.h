@@ -28,7 +28,7 @@ struct LinePlot {
   std::vector<PlotCurve> curves;
 };
 
-/// The plot as one <svg> element, 640 x 400, with its own colours and no outside resource. Points that aren't finite,
+/// The plot as one SVG element, 640 x 400, with its own colours and no outside resource. Points that aren't finite,
 /// and those not above zero on a logarithmic axis, are left out. Plain ASCII if the labels are.
 std::string to_svg(const LinePlot& plot);
 

@@ -23,7 +23,7 @@ struct TractionSummary {
   int without_force = 0;  ///< frames with too few beads found
 };
 
-/// Writes <folder>/tractions.csv, a line for each patch in contact of each frame, and <folder>/forces.csv, a line for
+/// Writes FOLDER/tractions.csv, a line for each patch in contact of each frame, and FOLDER/forces.csv, a line for
 /// each frame (docs/file-formats.md). The folder is made if it isn't there.
 /// @param rest_px the beads without load, row by row; if empty, those of each sequence's first frame
 /// @throws Error for a compliance of another number of beads, or as sensors::view_of; if a sequence's first frame is
