@@ -19,6 +19,7 @@ struct SourceLocation {
 /// `what()` is one line, `file:line: message` where the place is known.
 class Error : public std::runtime_error {
  public:
+  /// A mistake that has no place in a file.
   explicit Error(const std::string& message);
   Error(SourceLocation where, const std::string& message);
 

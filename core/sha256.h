@@ -16,6 +16,7 @@ class Sha256 {
   Sha256(const Sha256&) = delete;
   Sha256& operator=(const Sha256&) = delete;
 
+  /// Hashes these bytes behind those before them.
   void add(const void* bytes, std::size_t size);
   void add(std::string_view text);
   /// Ends the sum. Nothing can be added afterwards.

@@ -1,9 +1,10 @@
-# What Doxygen reads in place of a header or of a folder's CMakeLists.txt (docs/Doxyfile). Lines keep their numbers, so that
-# its warnings point at the right ones.
+# What Doxygen reads in place of a header, of a folder's CMakeLists.txt, or of a page in Markdown (docs/Doxyfile). Lines keep
+# their numbers, so that its warnings point at the right ones.
 # - The plain comment on top describes the file, or the folder.
 # - Indented lines of a comment, but for those of a list, are shown as they are.
 # - A comment holds for all overloads that follow without an empty line: each gets a copy.
 # - `fields` and `enum_names`, which read a type from YAML (core/yaml_reader.h), aren't shown.
+# - In pages, a link to a heading leads to its page: Doxygen 1.9.4 doesn't know GitHub's names of headings.
 
 # Prints one line late, so that what follows can still be marked in it.
 function show(line) {
@@ -17,6 +18,15 @@ function close_verbatim() {
 }
 
 FNR == 1 { top = 1 }
+FILENAME ~ /\.md$/ {
+  while (match($0, /\[[^]]*\]\(#[^)]*\)/)) {
+    text = substr($0, RSTART + 1, index(substr($0, RSTART), "]") - 2)
+    $0 = substr($0, 1, RSTART - 1) text substr($0, RSTART + RLENGTH)
+  }
+  gsub(/\.md#[^)]*\)/, ".md)")
+  show($0)
+  next
+}
 FILENAME ~ /CMakeLists\.txt$/ {
   folder = FILENAME
   sub(/\/[^\/]*$/, "", folder)

@@ -25,7 +25,9 @@ struct Spread {
   double mean = 0.0, deviation = 0.0;  ///< normal, before it is cut off
   std::vector<double> choices;         ///< one_of
 
+  /// Always this value.
   static Spread of(double value);
+  /// Evenly between the two. @pre low <= high
   static Spread uniform(double low, double high);
 
   /// The next draw; how many random numbers it takes depends on what they are.

@@ -148,6 +148,7 @@ class Press {
   /// The same for one body.
   const PressState& step(const PressTarget& target) { return step(std::span(&target, 1)); }
 
+  /// After the last step; before the first one the gel at rest.
   const PressState& state() const;
 
  private:

@@ -68,6 +68,7 @@ class HeightField {
   /// `fine` may be null: coarse heights everywhere. The surface must outlive this.
   HeightField(const SmoothSurface& surface, const PressState& press, const ReliefAnswer* fine);
 
+  /// The height over a place that a camera sees.
   double at(const Eigen::Vector2d& point) const;
   /// How far the material point that stood at `material` on the undeformed surface has moved along z.
   double at_material(const Eigen::Vector2d& material) const;

@@ -49,6 +49,7 @@ class FinitePress {
   /// would turn inside out or Newton's method stalls in the smallest part allowed
   const PressState& step(const PressTarget& target);
 
+  /// After the last step; before the first one the gel at rest.
   const PressState& state() const;
 
   /// The pose straight above or below `pose` in which the body just touches the undeformed gel; nothing if it isn't

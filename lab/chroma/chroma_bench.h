@@ -46,6 +46,7 @@ class ChromaBench {
   /// The two halves of that, for who wants the pictures too. @pre as many pictures as states
   std::vector<cv::Mat> pictures(const sim::TouchObject& object, std::span<const sim::Truth> states,
                                 std::uint64_t noise_seed) const;
+  /// Reads them as frames that follow each other from rest.
   std::vector<ChromaLook> read(std::span<const cv::Mat> frames, std::span<const sim::Truth> states) const;
 
   const sim::VirtualSensor& sensor() const { return sensor_; }

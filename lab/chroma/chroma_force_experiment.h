@@ -32,6 +32,7 @@ struct ForceProbe {
   double friction = 0.6;
   double direction_rad = 0.0;  ///< of the drag, from x to y
 
+  /// Shape, width, depth, place and friction, for a table's row.
   std::string name() const;
 };
 /// The probe as fem takes it.
@@ -113,6 +114,7 @@ struct ForceSample {
 struct SlipCounts {
   int stick_as_stick = 0, stick_as_slip = 0, stick_as_unknown = 0;
   int slip_as_stick = 0, slip_as_slip = 0, slip_as_unknown = 0;
+  /// Adds up, count by count.
   SlipCounts& operator+=(const SlipCounts& other);
   /// Of those that weren't called unknown, the part that was right; NaN without any.
   double agreement() const;

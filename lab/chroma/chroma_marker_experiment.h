@@ -24,6 +24,7 @@ struct MarkerSeries {
   std::vector<sensors::ColourMarker> seen;  ///< as long as `ball_mm`; flawed ones are left out of both
   int flawed = 0;                           ///< pictures in which the marker could not be read
   double largest_strain = 0.0;              ///< of the gel's surface over the series, see fem::PressState
+  /// One axis of `ball_mm`.
   std::vector<double> column_mm(int axis) const;
 };
 

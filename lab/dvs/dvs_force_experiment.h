@@ -40,6 +40,7 @@ struct DvsForceFold {
 struct DvsForceScore {
   std::vector<DvsForceFold> folds;
 
+  /// Over the folds.
   double mean(double DvsForceFold::*figure) const;
   /// Standard error of that mean, from how folds differ. 0 for one fold.
   double standard_error(double DvsForceFold::*figure) const;

@@ -57,6 +57,7 @@ struct InsertionTrial {
 /// All trials.
 struct InsertionExperiment {
   std::vector<InsertionTrial> trials;
+  /// How many plugs were inserted.
   int successes() const;
   int grasps() const;  ///< of all trials: one each, and one more for each grasp that wasn't localised
 };

@@ -30,6 +30,7 @@ struct SlipCase {
   double speed_mm_per_s = 2.0;  ///< slide and roll
   double part_of_limit = 0.5;   ///< load
 
+  /// Motion, object, friction, force and speed, for a table's row.
   std::string name() const;
 };
 

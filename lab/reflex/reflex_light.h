@@ -52,7 +52,9 @@ class ReflexLight {
   ~ReflexLight();
   ReflexLight(ReflexLight&&) noexcept;
 
+  /// As it was given.
   const sim::DeviceSpec& device() const;
+  /// The scene's bands, in the order of the pictures' channels.
   const sim::SceneBands& bands() const;
   /// Against path tracing, in the parts of pixels that are drawn.
   const render::DirectError& error() const;

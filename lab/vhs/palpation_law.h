@@ -38,6 +38,7 @@ struct PalpationLaw {
   /// mm, at which the force is this one; the deepest for more. @pre the forces rise
   double depth(double force) const;
   double radius(double depth) const;  ///< mm
+  /// px, as `bead_px`, at this depth (mm).
   Eigen::VectorXd beads(double depth) const;
 
  private:

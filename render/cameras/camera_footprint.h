@@ -48,6 +48,7 @@ struct CameraFootprint {
   /// The sum of a pixel's squared weights: what is left of the variance of independent points.
   float sum_of_squares(int row, int column) const;
 
+  /// That of a pixel, by its block and its phase.
   const Kernel& kernel_at(int row, int column) const;
   int block_at(int row, int column) const { return row / block * blocks_across + column / block; }
 };

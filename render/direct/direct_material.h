@@ -24,6 +24,7 @@ struct DirectPrint {
   std::vector<std::array<float, kMaxBands>> mark_colours;
   const PrintedPicture* picture = nullptr;
 
+  /// @pre the surface has a print
   explicit DirectPrint(const Surface& surface);
 
   /// The ink at a place of a triangle, or `plain` where there is none.

@@ -246,6 +246,7 @@ class GuideSteepness {
     }
   }
 
+  /// Of value(), per radian.
   double density(double steepness) const {
     double sum = 0.0;
     for (const Part& part : parts_) {

@@ -96,6 +96,7 @@ struct PreparedScene {
   LampBodies lamp_bodies;
   bool has_films;
 
+  /// @pre check_scene(scene) holds, and it has N bands
   explicit PreparedScene(const Scene& scene)
       : faces(scene.faces),
         environment(scene.environment),

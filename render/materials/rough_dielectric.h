@@ -98,6 +98,7 @@ inline RoughSample sample_rough_dielectric(const Eigen::Vector3d& out, double al
 class RoughBoundary {
  public:
   RoughBoundary() = default;
+  /// Tabulates E for both sides.
   RoughBoundary(double alpha, double n_outside, double n_inside);
 
   /// Scattering function in 1/sr; `inside` says on which side `out` is. Vectors as for rough_dielectric.

@@ -38,6 +38,7 @@ std::array<double, kFaceSectors + 1> sector_limits(double index);
 struct RadialShare {
   std::vector<double> in_annulus;
   double beyond = 0.0;
+  /// All annuli and what is beyond.
   double total() const;
 };
 

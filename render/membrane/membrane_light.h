@@ -53,6 +53,7 @@ class MembraneLight {
   /// number of threads. @throws Error if the state doesn't fit the grid or a value is out of range
   cv::Mat irradiance(const FaceState& state) const;
 
+  /// That of the constructor.
   const FaceGrid& grid() const;
 
  private:

@@ -41,6 +41,7 @@ class PacketScene {
   /// its balls are others.
   bool move_to(const Scene& scene);
 
+  /// The nearest hit of each valid ray.
   void intersect(const RayPacket& rays, PacketHits& hits) const;
 
   /// Sets valid lanes of `rays` that meet something within `far` to 0 in `free`, the other valid ones to -1.

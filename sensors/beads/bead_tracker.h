@@ -149,6 +149,7 @@ class BeadTracker {
   /// Forgets all frames: the next one is the first.
   void restart();
 
+  /// As they were given.
   const BeadTrackerSettings& settings() const;
 
  private:

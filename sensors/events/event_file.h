@@ -36,6 +36,7 @@ class EventReader {
   /// @throws Error naming file, place, value and what is allowed where the file is damaged, an event is beside the
   ///   picture or earlier than the one before it
   std::span<const Event> next();
+  /// What the file says of its camera.
   const EventSource& source() const;
 
  private:

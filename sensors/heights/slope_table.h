@@ -20,6 +20,7 @@ struct SlopeTable {
   std::vector<Eigen::Vector2f> slopes;  ///< R fastest, then G, then B
   std::vector<std::uint16_t> hits;      ///< calibration pixels that fell into each cell, at most 65535
 
+  /// The number of the colour's cell in `slopes` and `hits`; the nearest cell for a colour outside of the grid.
   std::size_t index_of(const Eigen::Vector3f& colour) const;
   /// Whether calibration has hit the colour's cell or one of the 26 beside it.
   bool measured_near(const Eigen::Vector3f& colour) const;

@@ -19,6 +19,7 @@ struct GaussianProcessParameters {
 
   /// Logarithms: of the lengths, the signal, the noise.
   Eigen::VectorXd logarithms() const;
+  /// The inverse of logarithms().
   static GaussianProcessParameters from_logarithms(const Eigen::VectorXd& logarithms);
 };
 

@@ -16,6 +16,7 @@ struct DilationPress {
   std::array<double, 3> mm{};
   double rms_residual_mm = 0.0;
 
+  /// mm; below 0 for a dilation below 1.
   double press_mm(double dilation) const {
     const double nearer = 1.0 - 1.0 / dilation;
     return nearer * (mm[0] + nearer * (mm[1] + nearer * mm[2]));

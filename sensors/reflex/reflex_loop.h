@@ -53,6 +53,7 @@ class ReflexLoop {
   /// @throws Error for a model with a fault, and as check()
   ReflexLoop(ReflexModel model, const ReflexSettings& settings);
 
+  /// Decides on one frame. Never throws: what a chip can't say is ChipFault.
   ReflexDecision next(const ChipStatistics& statistics);
 
   /// Lets the actuator move again; shear is summed from here.

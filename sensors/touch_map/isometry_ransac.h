@@ -36,6 +36,7 @@ struct PoseNeighbourhood {
   double distance_mm = 0.0;
   double angle = 0.0;
 
+  /// Is the other one so near?
   bool holds(const PlanarPose& other) const;
 };
 

@@ -30,6 +30,7 @@ struct MarkerCompliance {
   int markers() const { return marker_grid.prod(); }
   int patches() const { return patch_grid.prod(); }
   double patch_area() const { return patch_side * patch_side; }  ///< mm^2
+  /// mm, in the plane z = 0 of the gel frame.
   Eigen::Vector2d patch_centre(int patch) const {
     return first_patch + patch_side * Eigen::Vector2d(patch % patch_grid.x(), patch / patch_grid.x());
   }

@@ -27,6 +27,7 @@ struct Colour {
   Colour(double in_all_bands) : numbers{in_all_bands} {}
   Colour(std::initializer_list<double> of_each_band) : numbers(of_each_band) {}
 
+  /// Of all numbers, or of the curve.
   double largest() const;
 };
 

@@ -16,6 +16,7 @@ void check(const ArmLiftSettings& settings);
 /// The arm stands until it is first told to lift, and stops with the same acceleration where it's told no longer.
 class ArmLift {
  public:
+  /// An arm that stands at height 0. @throws Error as check()
   explicit ArmLift(const ArmLiftSettings& settings);
 
   /// The mean acceleration (mm/s^2, up) over the next `seconds`.

@@ -27,9 +27,11 @@ inline constexpr int kTerms =
 /// Height of the flat's plane over z = 0 at a place.
 class FlatPlane {
  public:
+  /// Of a flat that is `below_origin` mm below the piece's origin.
   FlatPlane(const RigidTransform& gel_from_piece, double below_origin)
       : through_(gel_from_piece * Eigen::Vector3d(0, 0, -below_origin)),
         normal_(gel_from_piece.turn(Eigen::Vector3d::UnitZ())) {}
+  /// mm.
   double at(double x, double y) const {
     return through_.z() - (normal_.x() * (x - through_.x()) + normal_.y() * (y - through_.y())) / normal_.z();
   }
@@ -41,6 +43,7 @@ class FlatPlane {
 /// Carries forces from the gel's vertices to the elastic piece, and its displacements back.
 class PieceAnswer {
  public:
+  /// `vertices` are those of the gel that may touch. `body` must outlive this.
   PieceAnswer(const fem::Compliance& body, const fem::Compliance& gel, const std::vector<int>& vertices,
               const RigidTransform& gel_from_piece)
       : body_(body), turn_(gel_from_piece.rotation), weight_(body.mass * Eigen::VectorXd::Ones(body.mass.cols())) {

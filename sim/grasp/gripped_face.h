@@ -88,6 +88,7 @@ class GrippedFace {
   const std::vector<GripPoint>& states() const { return states_; }
   /// @throws Error if that is beyond the last state
   GripPoint at_travel(double travel_mm) const;
+  /// @throws Error likewise
   GripPoint at_normal_force(double normal_N) const;
 
   /// The face at a load. A pure function.

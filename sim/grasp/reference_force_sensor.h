@@ -50,6 +50,7 @@ class HysteresisLoop {
  public:
   /// @throws Error unless 0 <= width < 0.5 and scale > 0
   HysteresisLoop(double width, double scale);
+  /// The reading of the next force. All forces before it count.
   double next(double force);
 
  private:

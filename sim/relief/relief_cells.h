@@ -34,6 +34,7 @@ class CellDiagram {
   /// @pre there are at least 4 points on the rectangle
   CellDiagram(const Eigen::Vector2d& size, std::vector<CellPoint> points);
 
+  /// Which cell a place is in, and how near its walls are.
   CellPlace at(const Eigen::Vector2d& place) const;
   const std::vector<CellPoint>& points() const { return points_; }
 

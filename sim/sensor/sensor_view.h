@@ -37,7 +37,9 @@ class SensorView {
  public:
   virtual ~SensorView() = default;
 
+  /// Which effects the view simulates.
   virtual const Plan& plan() const = 0;
+  /// How its pictures are lit, and why so.
   virtual const LightChoice& choice() const = 0;
 
   /// `start_mm`: where the object's motion began, which is where its screen stands.

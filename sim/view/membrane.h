@@ -38,6 +38,7 @@ class Membrane {
     TriangleMesh wet;
     std::vector<Eigen::Vector3d> rest;  ///< per vertex of either: the same material point on the undeformed gel
   };
+  /// As fine as the relief's grid.
   Sheet sheet(const fem::PressState& press, const fem::ReliefAnswer& relief) const;
 
  private:

@@ -77,9 +77,11 @@ class TruthMatcher {
  public:
   using is_gtest_matcher = void;  ///< GoogleMock's mark of a matcher
 
+  /// `what` names the quantity in messages: "the force".
   TruthMatcher(Touch truth, std::string what, Compare compare)
       : truth_(std::move(truth)), what_(std::move(what)), compare_(std::move(compare)) {}
 
+  /// GoogleMock asks this; frames of what doesn't match are kept (keep_frames).
   template <typename Estimate>
   bool MatchAndExplain(const Estimate& estimate, ::testing::MatchResultListener* listener) const {
     const lab::Comparison comparison = compare_(estimate, truth_);
