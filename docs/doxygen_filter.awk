@@ -1,7 +1,7 @@
 # What Doxygen reads in place of a header, of a folder's CMakeLists.txt, or of a page in Markdown (docs/Doxyfile). Lines keep
 # their numbers, so that its warnings point at the right ones.
 # - The plain comment on top describes the file, or the folder.
-# - Indented lines of a comment, but for those of a list, are shown as they are.
+# - Indented lines of a comment, but for those of a list or of @throws and the like, are shown as they are.
 # - A comment holds for all overloads that follow without an empty line: each gets a copy.
 # - `fields` and `enum_names`, which read a type from YAML (core/yaml_reader.h), aren't shown.
 # - In pages, a link to a heading leads to its page: Doxygen 1.9.4 doesn't know GitHub's names of headings.
@@ -47,10 +47,14 @@ top && !sub(/^\/\//, "///") { top = 0 }
   indent = RLENGTH
   text = substr($0, indent + 4)
   comment = comment text
-  if (text ~ /^ ? ?[^ ]/ || text == "") list = text ~ /^ *(-|[0-9]+\.) /
+  if (text == "") list = 0
+  else if (text ~ /@(throws|pre|param)/) list = 2
+  else if (list < 2 && text !~ /^   /) list = text ~ /^ *(-|[0-9]+\.) /
+  else if (text ~ /^ *(-|[0-9]+\.) /) list = 1
   if (text ~ /^   +[^ ]/ && !list) {
     if (!verbatim) held = held " @verbatim"
     verbatim = 1
+    $0 = text
   } else if (text != "") {
     close_verbatim()
   }

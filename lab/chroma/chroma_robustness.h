@@ -4,14 +4,12 @@
 //
 // What the paper leaves open, and what is done here:
 // - A marker's apparent size is the side of its filter in px. "4 x 4 pixels" is taken for a filter of 4 px; if the
-// paper
-//   means the whole picture, which is twice as wide in the drawing here, its row is that of 2 px.
+//   paper means the whole picture, which is twice as wide in the drawing here, its row is that of 2 px.
 // - Pictures are made smaller by the Gaussian pyramid and then blurred by a Gaussian whose standard deviation is an
 //   eighth of the picture's size, as the paper has it; then rounded to 8 bit, as a camera gives them.
 // - Fits are of the displacement by a polynomial of second order of the measurement: that is how it would be used.
 // - The size is the count of pixels in a picture of 1 bit (sensors/colour/marker_size.h). Fig. 6c names the
-// "luminosity" for
-//   the black-and-white method, so the gradient is tried on both, the count and the darkness.
+//   "luminosity" for the black-and-white method, so the gradient is tried on both, the count and the darkness.
 // - The gradient is laid over pictures as they are, before any levelling: that hue needs none is the claim.
 
 #include <opencv2/core/mat.hpp>

@@ -5,8 +5,8 @@
 // between the room on the camera's side and the outer face. At the face, h_j(x) is the light that a walk brings which
 // arrives in sector j at the place x, g_i(x) that of one which leaves it evenly in sector i, both in parts of the
 // room's radiance:
-//   g_i = e_i + sum_j exchange_ij * h_j                                      (e: out to the camera's side; *: over the
-//   face) h_j = (1 - c) [r_j g_j + (1 - r_j) o] + c a g_matt,
+//   g_i = e_i + sum_j exchange_ij * h_j              (e: out to the camera's side; *: over the face)
+//   h_j = (1 - c) [r_j g_j + (1 - r_j) o] + c a g_matt,
 // with the contact's coverage c(x) and the body's albedo a, Fresnel's mean reflectance r, g_matt the mean over all
 // sectors, and what comes from outside
 //   o = (1 - shadow) behind + shadow a (light on the body through the face).

@@ -14,10 +14,9 @@
 //  - through the flat faces between the two straight on, exactly, by one connection to a point of the lamp
 //    (lamp_connection.h);
 //  - by mirror images of a lamp in flat faces, and through curved faces: only where a path hits the lamp itself, so
-//  only
-//    that of lamps with `visible` set and some size (lamp_bodies.h). A GuideLamp has its mirror images in its plate
-//    built in. For other lamps light mirrored by a face on its way is left out. Measured with an LED of radius 2 mm
-//    before and after it was made visible, in glass and gel over beads: from below in air what is left out is under
+//    only that of lamps with `visible` set and some size (lamp_bodies.h). A GuideLamp has its mirror images in its
+//    plate built in. For other lamps light mirrored by a face on its way is left out. Measured with an LED of radius 2
+//    mm before and after it was made visible, in glass and gel over beads: from below in air what is left out is under
 //    0.2 % of a bead's light and of an object's on the gel, and nothing of a membrane's; from the plate's side as much
 //    again as the direct light, from the gel's side a quarter of a bead's light and twice that of an object on the gel.
 //    So a lamp inside plate or gel should be a GuideLamp, or visible.

@@ -25,8 +25,7 @@ EventFormat event_format_of_name(const std::filesystem::path& file);
 class EventReader {
  public:
   /// @throws Error naming the file: it isn't there, is empty, isn't a file of events, is of a kind or version that
-  /// isn't
-  ///   read, or its beginning is damaged
+  /// isn't read, or its beginning is damaged
   explicit EventReader(const std::filesystem::path& file, const EventReadOptions& options = {});
   ~EventReader();
   EventReader(const EventReader&) = delete;

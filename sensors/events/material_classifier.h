@@ -60,8 +60,7 @@ struct TrainedMaterialClassifier {
 /// be empty). A pure function of its arguments.
 /// @param fold which of several trainings it is: each has first weights of its own
 /// @throws Error for no or doubled names, a label without a name, features that aren't finite or of different numbers,
-/// a
-///   material without a training sample, an index that isn't there, or a setting out of its range
+/// a material without a training sample, an index that isn't there, or a setting out of its range
 TrainedMaterialClassifier train_material_classifier(std::span<const MaterialSample> samples,
                                                     const std::vector<std::string>& materials,
                                                     std::span<const int> training, std::span<const int> validation,

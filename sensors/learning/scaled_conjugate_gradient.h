@@ -29,8 +29,7 @@ struct ScaledConjugateGradientEnd {
 /// quadratic bowl of n dimensions it ends in n steps. A place where the function isn't finite counts as a step that
 /// fails.
 /// @param watch is told after each step that didn't fail: its number, x and the value there; if it returns true, that
-/// is
-///   the end
+/// is the end
 /// @throws Error if a setting is out of its range, or value or gradient aren't finite at the first place
 ScaledConjugateGradientEnd minimise_by_scaled_conjugate_gradient(
     const ValueAndGradient& function, Eigen::VectorXd& x, const ScaledConjugateGradientSettings& settings = {},

@@ -38,8 +38,7 @@ std::string fault_of(const GelForceModel& model);
 std::string to_json(const GelForceModel& model);
 /// Reads what to_json wrote; `name` stands for the file in messages.
 /// @throws Error naming file and field: not JSON, another format or version, a field missing, unknown or of the wrong
-/// kind, a
-///   faulty model
+/// kind, a faulty model
 GelForceModel gel_force_model_from_json(const std::string& text, const std::string& name);
 
 /// Writes the file whole or not at all.
