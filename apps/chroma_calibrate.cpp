@@ -61,7 +61,7 @@ void calibrate(const CalibrateOptions& options) {
   std::set<int> series;
   for (const sensors::HueSample& sample : read.samples) series.insert(sample.series);
   if (series.size() < 2) {
-    fmt::print("  all is of one series: there's nothing to tell how it does on another\n");
+    fmt::print("  all is of one series: nothing shows how it does on another\n");
     return;
   }
   try {

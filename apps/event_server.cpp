@@ -98,7 +98,7 @@ struct EventServer::Parts {
 
   Parts(EventLoop of, const std::string& address, int port)
       : loop(std::move(of)), start(Clock::now()), listening(listen_at(address, port)) {
-    // What can't be told in EVT 3.0 is refused here and not to a client.
+    // What EVT 3.0 can't hold is refused here and not to a client.
     sensors::Evt3Encoder("--events", loop.size, datasets::program_name(), [](std::string_view) {});
     acceptor = std::thread([this] { accept_clients(); });
   }

@@ -10,11 +10,11 @@ namespace touchstone::apps {
 namespace {
 
 void print(const lab::FittedUnknown& unknown) {
-  if (unknown.told) {
+  if (unknown.identified) {
     fmt::print("{}: {:.5g} -> {:.5g}, 95 % from {:.5g} to {:.5g}{}\n", unknown.name, unknown.start, unknown.value,
                unknown.low95, unknown.high95, unknown.at_end ? "; at the end of its allowed range" : "");
   } else {
-    fmt::print("{}: {:.5g} -> {:.5g}, but not told by the data\n", unknown.name, unknown.start, unknown.value);
+    fmt::print("{}: {:.5g} -> {:.5g}, but not identified by the data\n", unknown.name, unknown.start, unknown.value);
   }
 }
 
@@ -25,8 +25,8 @@ void fit(const std::filesystem::path& file, const std::filesystem::path& out, co
     result = lab::run_unit_fit(file, out, global.cache, bar.listener());
   }
   for (const lab::FittedUnknown& unknown : result.unknowns) print(unknown);
-  for (const lab::UnidentifiableCombination& combination : result.untold)
-    fmt::print("not told: {}\n", combination.words);
+  for (const lab::UnidentifiableCombination& combination : result.unidentified)
+    fmt::print("not identified: {}\n", combination.words);
   fmt::print("misfit {:.2f} -> {:.2f} of the noise\n", result.misfit_before, result.misfit_after);
   if (!result.converged) spdlog::warn("the fit hasn't converged; take its intervals with care");
   fmt::print("{}: the fitted device, the report and its pictures\n", out.string());

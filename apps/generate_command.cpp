@@ -38,7 +38,7 @@ void generate_drawn(const Options& options, const GlobalOptions& global) {
   if (report.kept > 0) fmt::print(", {} kept from an earlier run", report.kept);
   if (report.damaged_blocks > 0) fmt::print(", {} damaged files made again", report.damaged_blocks);
   if (report.drawn_again > 0) fmt::print(", {} touches drawn again", report.drawn_again);
-  fmt::print("; {:.1f} s setting up units, {:.1f} s pressing and looking, {:.1f} s writing\n", report.set_up_s,
+  fmt::print("; {:.1f} s setting up units, {:.1f} s pressing and rendering, {:.1f} s writing\n", report.set_up_s,
              report.press_s, report.write_s);
   if (how.shard.count > 1) {
     fmt::print("when all {} shards are there: touchstone merge {} -o {}\n", how.shard.count, options.job.string(),

@@ -13,15 +13,15 @@ namespace {
 struct Options {
   std::filesystem::path job;
   std::filesystem::path out;
-  std::optional<int> lacking;
+  std::optional<int> missing;
 };
 
 void merge(const Options& options, const GlobalOptions& global) {
   if (!datasets::is_draw_job_file(options.job)) {
     fail("{}: isn't a job that draws; only those have shards to merge", options.job.string());
   }
-  if (options.lacking) {
-    fmt::print("{}\n", fmt::join(datasets::lacking_shards(options.job, options.out, *options.lacking), ","));
+  if (options.missing) {
+    fmt::print("{}\n", fmt::join(datasets::missing_shards(options.job, options.out, *options.missing), ","));
     return;
   }
   datasets::DrawnReport report;
@@ -44,7 +44,7 @@ void add_merge_command(CLI::App& app, const GlobalOptions& global, Action& actio
   auto options = std::make_shared<Options>();
   command->add_option("JOB", options->job, "Job file, as given to generate")->required();
   command->add_option("-o,--out", options->out, "Folder of the data set")->required();
-  command->add_option("--lacking", options->lacking,
+  command->add_option("--missing,--lacking", options->missing,
                       "N: merge nothing, but print which of N shards aren't there yet, as 2,5,7");
   command->callback([&action, &global, options] { action = [options, &global] { merge(*options, global); }; });
 }

@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kTerminalInterval_s = 0.1;
 constexpr double kPlainInterval_s = 5.0;
-constexpr double kSameAgain_s = 60.0;  // until a plain line says that nothing new was told
+constexpr double kSameAgain_s = 60.0;  // until a plain line says that there is nothing new
 constexpr int kBarWidth = 24;
 
 double seconds_between(std::chrono::steady_clock::time_point from, std::chrono::steady_clock::time_point to) {

@@ -54,8 +54,8 @@ void record_dvs(const DvsOptions& options, const GlobalOptions& global) {
   if (options.grasps < 0 || options.grasps > most) {
     fail("--grasps is {}; allowed is 1 to {}, or 0 for all", options.grasps, most);
   }
-  const lab::DvsGraspBench bench(datasets::scenes_folder(), global.cache);
-  std::vector<lab::DvsGraspParameters> grasps = bench.draw(options.seed);
+  const lab::DvsGraspSetup setup(datasets::scenes_folder(), global.cache);
+  std::vector<lab::DvsGraspParameters> grasps = setup.draw(options.seed);
   if (options.grasps > 0) {  // spread over the materials
     std::vector<lab::DvsGraspParameters> some;
     for (int k = 0; k < options.grasps; ++k) {
@@ -63,8 +63,8 @@ void record_dvs(const DvsOptions& options, const GlobalOptions& global) {
     }
     grasps = some;
   }
-  const sim::MembraneCamera camera(bench.device());
-  const cv::Size size(bench.device().camera->width, bench.device().camera->height);
+  const sim::MembraneCamera camera(setup.device());
+  const cv::Size size(setup.device().camera->width, setup.device().camera->height);
   std::filesystem::create_directories(options.out);
   std::string table = "grasp,material,youngs_modulus_MPa,target_N,light_level,touch_s,release_s,apart_s,events\n";
   auto bar = std::make_unique<ProgressBar>(global.quiet);
@@ -74,7 +74,7 @@ void record_dvs(const DvsOptions& options, const GlobalOptions& global) {
     write_whole_file(options.out / (name + ".h5"), [&](const std::filesystem::path& temporary) {
       sensors::EventWriter writer(temporary, size, datasets::program_name());
       const lab::DvsRecording recording =
-          lab::record_dvs_grasp(bench, camera, grasps[k], lab::own_pixels(bench.device()),
+          lab::record_dvs_grasp(setup, camera, grasps[k], lab::own_pixels(setup.device()),
                                 [&](std::span<const Event> events) { writer.append(events); });
       writer.close();
       write_whole_file(options.out / (name + ".csv"), to_csv(recording));

@@ -131,7 +131,7 @@ class Objects {
       if (entry.path().extension() == ".yaml") files_[entry.path().stem().string()] = entry.path();
     }
     for (const fs::path& file : files) {
-      sim::read_object(file);  // a mistake in it is told now
+      sim::read_object(file);  // a mistake in it is reported now
       files_[file.stem().string()] = file;
     }
   }
@@ -154,15 +154,15 @@ class Objects {
   std::map<std::string, sim::TouchObject> made_;
 };
 
-sim::PressSpec hold_of(const Requested& requested) {
-  sim::PressSpec hold;
-  hold.place_mm = {number_of(requested, "x_mm", 0.0), number_of(requested, "y_mm", 0.0)};
-  hold.angles_deg = {number_of(requested, "turn_x_deg", 0.0), number_of(requested, "turn_y_deg", 0.0),
-                     number_of(requested, "turn_z_deg", 0.0)};
-  hold.drag_mm = {number_of(requested, "drag_x_mm", 0.0), number_of(requested, "drag_y_mm", 0.0)};
-  if (requested.count("force_N") > 0) hold.force_N = number_of(requested, "force_N");
-  if (requested.count("depth_mm") > 0) hold.depth_mm = number_of(requested, "depth_mm");
-  return hold;
+sim::PressSpec press_of(const Requested& requested) {
+  sim::PressSpec press;
+  press.place_mm = {number_of(requested, "x_mm", 0.0), number_of(requested, "y_mm", 0.0)};
+  press.angles_deg = {number_of(requested, "turn_x_deg", 0.0), number_of(requested, "turn_y_deg", 0.0),
+                      number_of(requested, "turn_z_deg", 0.0)};
+  press.drag_mm = {number_of(requested, "drag_x_mm", 0.0), number_of(requested, "drag_y_mm", 0.0)};
+  if (requested.count("force_N") > 0) press.force_N = number_of(requested, "force_N");
+  if (requested.count("depth_mm") > 0) press.depth_mm = number_of(requested, "depth_mm");
+  return press;
 }
 
 void serve_device(const ServeOptions& options, const GlobalOptions& global) {
@@ -172,7 +172,7 @@ void serve_device(const ServeOptions& options, const GlobalOptions& global) {
   const sim::VirtualSensor device(spec, global.cache);
   Objects objects(device, options.objects);
   const std::string usual = options.objects.empty() ? "ball-8mm" : options.objects.front().stem().string();
-  const ServedCamera::States rest = {std::make_shared<const lab::ShownState>(lab::shown_state(device.rest()))};
+  const ServedCamera::States rest = {std::make_shared<const lab::CameraState>(lab::camera_state(device.rest()))};
   const double rate = options.rate_Hz > 0.0 ? options.rate_Hz : spec.camera->frame_rate_Hz;
   ServedCamera camera(rest, rate, options.quality);
   std::mutex pressing;  // one after the other
@@ -183,8 +183,8 @@ void serve_device(const ServeOptions& options, const GlobalOptions& global) {
     const auto name = requested.find("object");
     const std::lock_guard<std::mutex> lock(pressing);
     const sim::Touch held =
-        device.press(objects.named(name == requested.end() ? usual : name->second), hold_of(requested));
-    camera.show({std::make_shared<const lab::ShownState>(lab::shown_state(held))});
+        device.press(objects.named(name == requested.end() ? usual : name->second), press_of(requested));
+    camera.show({std::make_shared<const lab::CameraState>(lab::camera_state(held))});
   };
   settings.commands["/release"] = [&](const Requested& requested) {
     allow_only(requested, {});

@@ -31,7 +31,7 @@ Clock::time_point ServedCamera::time_of(std::int64_t number) const {
          std::chrono::ceil<Clock::duration>(std::chrono::duration<double>(static_cast<double>(number) / rate_Hz_));
 }
 
-std::shared_ptr<const lab::ShownState> ServedCamera::state_at(std::int64_t number) const {
+std::shared_ptr<const lab::CameraState> ServedCamera::state_at(std::int64_t number) const {
   const auto after = std::upper_bound(changes_.begin(), changes_.end(), number,
                                       [](std::int64_t n, const Change& change) { return n < change.from; });
   if (after == changes_.begin()) return nullptr;
@@ -41,7 +41,7 @@ std::shared_ptr<const lab::ShownState> ServedCamera::state_at(std::int64_t numbe
   return (*change.states)[static_cast<std::size_t>(which)];
 }
 
-std::shared_ptr<const lab::ShownState> ServedCamera::state_of(std::int64_t number) const {
+std::shared_ptr<const lab::CameraState> ServedCamera::state_of(std::int64_t number) const {
   const std::lock_guard<std::mutex> lock(mutex_);
   return number > due() ? nullptr : state_at(number);
 }
@@ -73,10 +73,10 @@ int ServedCamera::state_count() const {
   return static_cast<int>(changes_.back().states->size());
 }
 
-std::shared_ptr<const ShownFrame> ServedCamera::frame(std::int64_t number) {
+std::shared_ptr<const ServedFrame> ServedCamera::frame(std::int64_t number) {
   const std::lock_guard<std::mutex> making(making_);
   if (made_ && made_->number >= number) return made_;
-  auto made = std::make_shared<ShownFrame>();
+  auto made = std::make_shared<ServedFrame>();
   made->number = number;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -88,11 +88,11 @@ std::shared_ptr<const ShownFrame> ServedCamera::frame(std::int64_t number) {
   return made_;
 }
 
-std::shared_ptr<const ShownFrame> ServedCamera::latest() {
+std::shared_ptr<const ServedFrame> ServedCamera::latest() {
   return frame(due());
 }
 
-std::shared_ptr<const ShownFrame> ServedCamera::next(std::int64_t after) {
+std::shared_ptr<const ServedFrame> ServedCamera::next(std::int64_t after) {
   {
     std::unique_lock<std::mutex> lock(mutex_);
     stopping_.wait_until(lock, time_of(after + 1), [this] { return stopped_; });

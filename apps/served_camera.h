@@ -15,26 +15,26 @@
 namespace touchstone::apps {
 
 /// One frame as it is delivered. Its noise is that of its number: no two frames have the same.
-struct ShownFrame {
+struct ServedFrame {
   std::int64_t number = 0;
-  std::shared_ptr<const lab::ShownState> state;
+  std::shared_ptr<const lab::CameraState> state;
   std::string jpeg;
 };
 
 /// Safe to use from many threads.
 class ServedCamera {
  public:
-  using States = std::vector<std::shared_ptr<const lab::ShownState>>;
+  using States = std::vector<std::shared_ptr<const lab::CameraState>>;
 
   /// Shows `states` one a frame, again and again. @pre not empty, rate above 0
   ServedCamera(States states, double rate_Hz, int jpeg_quality);
 
   /// The frame that is due now, and when asked for one after `after` the first that is due later.
   /// Null once the camera was stopped.
-  std::shared_ptr<const ShownFrame> latest();
-  std::shared_ptr<const ShownFrame> next(std::int64_t after);
+  std::shared_ptr<const ServedFrame> latest();
+  std::shared_ptr<const ServedFrame> next(std::int64_t after);
   /// What the frame of this number shows; nothing for one that isn't due yet or was too long ago.
-  std::shared_ptr<const lab::ShownState> state_of(std::int64_t number) const;
+  std::shared_ptr<const lab::CameraState> state_of(std::int64_t number) const;
 
   /// From the next frame on other states, from their first one.
   void show(States states);
@@ -55,9 +55,9 @@ class ServedCamera {
 
   std::int64_t due() const;
   std::chrono::steady_clock::time_point time_of(std::int64_t number) const;
-  std::shared_ptr<const lab::ShownState> state_at(std::int64_t number) const;
+  std::shared_ptr<const lab::CameraState> state_at(std::int64_t number) const;
   void change(std::shared_ptr<const States> states, std::optional<int> held);
-  std::shared_ptr<const ShownFrame> frame(std::int64_t number);
+  std::shared_ptr<const ServedFrame> frame(std::int64_t number);
 
   const double rate_Hz_;
   const int quality_;
@@ -67,7 +67,7 @@ class ServedCamera {
   bool stopped_ = false;
   std::vector<Change> changes_;
   std::mutex making_;  // one thread makes a frame, the others wait for it
-  std::shared_ptr<const ShownFrame> made_;
+  std::shared_ptr<const ServedFrame> made_;
 };
 
 }  // namespace touchstone::apps

@@ -44,7 +44,7 @@ std::shared_ptr<FrameOptions> add_frame_options(CLI::App& command, const std::st
 
 std::vector<lab::TrackedSequence> tracked_frames(const FrameOptions& options, const GlobalOptions& global) {
   sensors::BeadTrackerSettings settings = options.tracker;
-  if (options.bright_beads) settings.look.polarity = sensors::BeadPolarity::kBright;
+  if (options.bright_beads) settings.appearance.polarity = sensors::BeadPolarity::kBright;
   if (options.weighted_centroid) settings.centroid = sensors::CentroidKind::kWeighted;
   std::vector<lab::TrackedSequence> tracked;
   {

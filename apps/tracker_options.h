@@ -27,7 +27,7 @@ struct FrameOptions {
 /// Adds the options; `split` is the default of --split.
 std::shared_ptr<FrameOptions> add_frame_options(CLI::App& command, const std::string& split);
 
-/// The sequences that the options name, tracked. Shows progress unless told to be quiet, and warns of lost beads.
+/// The sequences that the options name, tracked. Shows progress unless asked to be quiet, and warns of lost beads.
 /// @throws Error if they don't fit together
 std::vector<lab::TrackedSequence> tracked_frames(const FrameOptions& options, const GlobalOptions& global);
 

@@ -81,7 +81,7 @@ void write_distribution(const EstimateOptions& options, const std::vector<lab::T
 
 void estimate(const EstimateOptions& options, const FrameOptions& frames, const GlobalOptions& global) {
   if (options.compliance.empty() != options.distribution.empty()) {
-    fail("--compliance and --distribution belong together: the gel's compliance, and the folder for what it tells");
+    fail("--compliance and --distribution belong together: the gel's compliance, and the folder for the result");
   }
   if (!options.out.empty()) require_writable_place(options.out);
   const sensors::StiffnessForceModel model = sensors::load_stiffness_model(options.model);

@@ -140,7 +140,7 @@ def set_up_cycles(description):
     cycles.caustics_reflective = cycles.caustics_refractive = True
     cycles.use_auto_tile = False
     # The default pattern of this version (PMJ) has points in common for all seeds: means then err by more than the seeds'
-    # scatter tells.
+    # scatter shows.
     cycles.sampling_pattern = "SOBOL"
     cycles.max_bounces = cycles.glossy_bounces = cycles.transmission_bounces = description["most_bounces"]
     cycles.diffuse_bounces = description["most_matt_bounces"]

@@ -16,7 +16,7 @@ double smooth_step(double from, double to, double x) {
   return t * t * (3.0 - 2.0 * t);
 }
 
-/// The membrane hangs on to what presses it and leaves it over some tenths of a mm, as a gel does.
+/// The membrane follows what presses it and leaves it over some tenths of a mm, as a gel does.
 double under_ball(double x, double y) {
   constexpr double radius = 2.0;
   constexpr double depth = 0.6;

@@ -65,7 +65,7 @@ void track_and_find_slip(benchmark::State& state) {
     benchmark::DoNotOptimize(ratio);
     erase_markers(contact, markers, 4.0);
     contact(cv::Rect(100, 60, 120, 120)).setTo(255);
-    IncipientSlip slip = detector.look(markers, contact_patch(contact, 50));
+    IncipientSlip slip = detector.update(markers, contact_patch(contact, 50));
     benchmark::DoNotOptimize(slip);
   }
   report(state, frame);

@@ -133,7 +133,7 @@ ResultTable mesh_table(const std::vector<LadderStep>& ladder) {
 
 namespace {
 
-/// A sphere pressed, sheared and turned back: the forces that are left, and the seconds of the way.
+/// A sphere pressed, sheared and turned back: the forces that are left, and the seconds that it took.
 struct SlidePath {
   Eigen::Vector3d force = Eigen::Vector3d::Zero();
   double seconds = 0.0;

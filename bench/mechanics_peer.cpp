@@ -122,7 +122,7 @@ ResultTable peer_table(const std::vector<LadderStep>& ladder, const BenchOptions
   std::map<std::string, std::optional<Before>> before;
   double least_ratio = std::numeric_limits<double>::infinity();
   double worst_sphere = 0.0;
-  double dearest_setup = 0.0;  // over the peer's solve
+  double longest_setup = 0.0;  // over the peer's solve
   for (const LadderStep& step : ladder) {
     const bool too_fine = step.edge < (options.quick ? 0.7 : 0.35);  // minutes for the peer
     if (too_fine) continue;
@@ -156,7 +156,7 @@ ResultTable peer_table(const std::vector<LadderStep>& ladder, const BenchOptions
       curves[3].points.emplace_back(step.setup_seconds, std::abs(our.value / wanted - 1.0));
       curves[4].points.emplace_back(our.seconds, std::abs(our.value / wanted - 1.0));
       least_ratio = std::min(least_ratio, ratio);
-      dearest_setup = std::max(dearest_setup, step.setup_seconds / peer.total_seconds);
+      longest_setup = std::max(longest_setup, step.setup_seconds / peer.total_seconds);
       worst_sphere = std::max(worst_sphere, std::abs(theirs / our.value - 1.0));
     }
   }

@@ -57,7 +57,7 @@ void invert(benchmark::State& state) {
     const MarkerField& field = clip[frame++ % kFrames];
     const TractionField tractions = inversion.invert(field);
     factorisations += tractions.factorisations;
-    benchmark::DoNotOptimize(observer.look(field, tractions).ratio);
+    benchmark::DoNotOptimize(observer.update(field, tractions).ratio);
   }
   state.counters["frames/s"] = benchmark::Counter(static_cast<double>(frame), benchmark::Counter::kIsRate);
   state.counters["factorisations"] = static_cast<double>(factorisations) / static_cast<double>(frame);

@@ -27,7 +27,7 @@ if(TOUCHSTONE_SANITIZE)
 endif()
 
 # Two precompiled headers, one for libraries and one for tests: positions and macros differ. Outside headers only, so that a
-# change in the house recompiles what it did before. A file must still name what it needs: the preset dev has none.
+# change in the project recompiles what it did before. A file must still name what it needs: the preset dev has none.
 set(TOUCHSTONE_PCH_HEADERS <algorithm> <array> <cmath> <cstdint> <filesystem> <functional> <limits> <memory> <optional>
   <span> <string> <utility> <vector> <Eigen/Core> <Eigen/Geometry> <Eigen/LU> <fmt/format.h> <opencv2/core.hpp>)
 

@@ -94,7 +94,7 @@ double ciede2000(const Eigen::Vector3d& lab_1, const Eigen::Vector3d& lab_2) {
   const double hue_2 = hue_deg(ab_2.x(), ab_2.y());
   const bool grey = chroma_1 * chroma_2 == 0.0;
 
-  double turn = grey ? 0.0 : hue_2 - hue_1;  // the short way round
+  double turn = grey ? 0.0 : hue_2 - hue_1;  // the shorter arc
   if (turn > 180.0) turn -= 360.0;
   if (turn < -180.0) turn += 360.0;
   const double lightness = lab_2[0] - lab_1[0];

@@ -46,7 +46,7 @@ std::vector<Step> steps_of(const std::string& path, const SourceLocation& where)
       if (steps.empty()) broken("begins with a dot");
       ++at;
     } else if (!steps.empty()) {
-      broken("lacks a dot");
+      broken("has no dot");
     }
     const std::size_t end = std::min(path.find_first_of(".[", at), path.size());
     if (end == at) broken("has an empty key");

@@ -52,7 +52,7 @@ std::shared_ptr<void> hold() {
   return guard != nullptr ? guard() : nullptr;
 }
 
-/// HDF5 prints its own stack of errors unless told not to; ours are exceptions.
+/// HDF5 prints its own stack of errors unless asked not to; ours are exceptions.
 void keep_hdf5_quiet() {
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
 }
@@ -172,7 +172,7 @@ void Hdf5Writer::add_dataset(const Hdf5Description& description, Hdf5Id type, st
 }
 
 void Hdf5Writer::add_chunked_dataset(const Hdf5Description& description, Hdf5Id type, std::int64_t rows,
-                                     const std::vector<std::int64_t>& row_shape, std::int64_t rows_a_chunk) {
+                                     const std::vector<std::int64_t>& row_shape, std::int64_t rows_per_chunk) {
   const auto held = hold();
   TS_ASSERT(!datasets_.contains(description.path) && rows >= 0);
   Dataset dataset;
@@ -184,7 +184,7 @@ void Hdf5Writer::add_chunked_dataset(const Hdf5Description& description, Hdf5Id 
   check_done(H5Pset_obj_track_times(creation, 0), "times");
   if (!empty) {
     std::vector<hsize_t> chunk = shape;
-    chunk[0] = static_cast<hsize_t>(rows_a_chunk);
+    chunk[0] = static_cast<hsize_t>(rows_per_chunk);
     check_done(H5Pset_chunk(creation, static_cast<int>(chunk.size()), chunk.data()), "chunks");
     check_done(H5Pset_shuffle(creation), "shuffle");
     check_done(H5Pset_deflate(creation, kDeflateLevel), "compression");

@@ -109,7 +109,7 @@ class Hdf5Writer {
   void add_dataset(const Hdf5Description& description, Hdf5Id type, std::size_t item_bytes, std::int64_t rows,
                    const std::vector<std::int64_t>& row_shape);
   void add_chunked_dataset(const Hdf5Description& description, Hdf5Id type, std::int64_t rows,
-                           const std::vector<std::int64_t>& row_shape, std::int64_t rows_a_chunk);
+                           const std::vector<std::int64_t>& row_shape, std::int64_t rows_per_chunk);
   void add_growing_dataset(const Hdf5Description& description, Hdf5Id type, std::size_t item_bytes);
   void append_numbers(const std::string& path, Hdf5Id type, const void* values, std::int64_t count);
   void write_rows(const std::string& path, Hdf5Id type, std::int64_t first, std::int64_t count, const void* values,
@@ -173,7 +173,7 @@ class Hdf5Reader {
   /// Goes through all that HDF5 itself keeps of a list of whole numbers (not through the numbers): where damage would
   /// end the process, it does so here. For use within isolated_call.
   void walk_list(const std::string& path) const;
-  /// Reads into `values` as many numbers of a list as it has room for, from number `first` on. What T can't hold
+  /// Reads into `values` as many numbers of a list as fit, from number `first` on. What T can't hold
   /// becomes the nearest value that it can. @pre they are there
   template <typename T>
   void read_part(const std::string& path, std::int64_t first, std::span<T> values) const {

@@ -1,5 +1,5 @@
 #pragma once
-// What a motion-sensing chip (that of an optical mouse) tells of each frame.
+// What a motion-sensing chip (that of an optical mouse) reports of each frame.
 
 #include <cstdint>
 

@@ -6,7 +6,7 @@
 
 namespace touchstone {
 
-/// How long work tells how far it is: `stage` is what is being done, `done` of `total` steps of it. May be called from
+/// How long work reports its progress: `stage` is what is being done, `done` of `total` steps of it. May be called from
 /// several threads at once. An empty function means that nobody listens.
 using Progress = std::function<void(const std::string& stage, std::int64_t done, std::int64_t total)>;
 

@@ -78,8 +78,9 @@ std::string fault_of_edges(const TriangleMesh& mesh) {
                          edge.low, edge.high, owners);
     }
     if (edge.upwards == edges[begin + 1].upwards) {
-      return fmt::format("triangles {} and {}, which share the edge between vertices {} and {}, face opposite ways",
-                         edge.triangle, edges[begin + 1].triangle, edge.low, edge.high);
+      return fmt::format(
+          "triangles {} and {}, which share the edge between vertices {} and {}, have opposite orientations",
+          edge.triangle, edges[begin + 1].triangle, edge.low, edge.high);
     }
     begin = end;
   }

@@ -42,13 +42,13 @@ void merge(std::vector<YamlForm>& forms, const std::vector<YamlForm>& seen) {
       continue;
     }
     const Allowed any;
-    if (same->allowed.low != form.allowed.low || same->allowed.low_itself != form.allowed.low_itself) {
+    if (same->allowed.low != form.allowed.low || same->allowed.low_included != form.allowed.low_included) {
       same->allowed.low = any.low;
-      same->allowed.low_itself = true;
+      same->allowed.low_included = true;
     }
-    if (same->allowed.high != form.allowed.high || same->allowed.high_itself != form.allowed.high_itself) {
+    if (same->allowed.high != form.allowed.high || same->allowed.high_included != form.allowed.high_included) {
       same->allowed.high = any.high;
-      same->allowed.high_itself = true;
+      same->allowed.high_included = true;
     }
     merge(same->items, form.items);
   }
@@ -65,7 +65,7 @@ bool differ(const YamlCall& base, const YamlCall& other, const std::string& key,
     const auto now = asked.place->asked();
     if (bounds ? then != now : without_bounds(then) != without_bounds(now)) return true;
   }
-  // What a stopped call lacks behind its last field says nothing.
+  // What is missing behind a stopped call's last field says nothing.
   const YamlCall::Asked* last = other.asked.empty() ? nullptr : base.find(other.asked.back().key);
   const YamlCall::Asked* end = base.asked.data() + base.asked.size();
   const YamlCall::Asked* reached = !other.stopped ? end : last == nullptr ? base.asked.data() : last + 1;
@@ -146,11 +146,11 @@ double YamlPlace::made_up(Allowed allowed) {
   if (allowed.holds(0.0) && choose(2) == 1) return 0.0;
   constexpr double kDecades = 4.0;  // 0.01 to 100
   const double part = even(name_, round_);
-  const double way = std::pow(10.0, kDecades * (part - 0.5));
+  const double offset = std::pow(10.0, kDecades * (part - 0.5));
   const bool low = std::isfinite(allowed.low);
   const bool high = std::isfinite(allowed.high);
   if (low && high) return allowed.low + std::max(0.0, allowed.high - allowed.low) * std::max(part, 1e-6);
-  return low ? allowed.low + way : high ? allowed.high - way : part < 0.5 ? -way : way;
+  return low ? allowed.low + offset : high ? allowed.high - offset : part < 0.5 ? -offset : offset;
 }
 
 double YamlPlace::number(Allowed allowed) {
@@ -322,7 +322,7 @@ YamlMap YamlPlace::explore(const YamlPicks& fixed, const Ask& ask, int depth) co
     split.by = std::move(field);
     return split;
   }
-  // Other values, many at a time: bounds and defaults that depend on them aren't told.
+  // Other values, many at a time: bounds and defaults that depend on them aren't described.
   for (int round = 1; round <= kRounds; ++round) {
     const YamlCall other = call(fixed, round, ask);
     for (const YamlCall::Asked& asked : other.asked) {

@@ -17,17 +17,17 @@
 namespace touchstone {
 
 bool Allowed::holds(double value) const {
-  return (low_itself ? value >= low : value > low) && (high_itself ? value <= high : value < high);
+  return (low_included ? value >= low : value > low) && (high_included ? value <= high : value < high);
 }
 
 std::string Allowed::text() const {
   const bool has_low = std::isfinite(low);
   const bool has_high = std::isfinite(high);
   if (has_low && has_high) {
-    return fmt::format("{} {} {} {}", low_itself ? "from" : "above", low, high_itself ? "to" : "and below", high);
+    return fmt::format("{} {} {} {}", low_included ? "from" : "above", low, high_included ? "to" : "and below", high);
   }
-  if (has_low) return fmt::format("{} {}", low_itself ? "at least" : "above", low);
-  if (has_high) return fmt::format("{} {}", high_itself ? "at most" : "below", high);
+  if (has_low) return fmt::format("{} {}", low_included ? "at least" : "above", low);
+  if (has_high) return fmt::format("{} {}", high_included ? "at most" : "below", high);
   return "a finite number";
 }
 

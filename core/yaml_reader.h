@@ -32,15 +32,15 @@ namespace touchstone {
 struct Allowed {
   double low = -std::numeric_limits<double>::infinity();
   double high = std::numeric_limits<double>::infinity();
-  bool low_itself = true;
-  bool high_itself = true;
+  bool low_included = true;
+  bool high_included = true;
 
   static Allowed any() { return {}; }
-  static Allowed above(double low) { return {.low = low, .low_itself = false}; }
+  static Allowed above(double low) { return {.low = low, .low_included = false}; }
   static Allowed at_least(double low) { return {.low = low}; }
   static Allowed within(double low, double high) { return {.low = low, .high = high}; }
   /// low < value <= high
-  static Allowed above_up_to(double low, double high) { return {.low = low, .high = high, .low_itself = false}; }
+  static Allowed above_up_to(double low, double high) { return {.low = low, .high = high, .low_included = false}; }
 
   bool operator==(const Allowed&) const = default;
   /// Is the value within the bounds? NaN never is.
@@ -99,7 +99,7 @@ class YamlReader {
   std::filesystem::path folder() const;
 
   // For types that may stand in several forms: they have, in the place of `fields`, a function
-  // `read_value(YamlReader& in, T& value, Allowed allowed)` that looks what stands there.
+  // `read_value(YamlReader& in, T& value, Allowed allowed)` that looks at what stands there.
   /// Does a list stand here?
   bool is_list() const;
   /// Does a map stand here?

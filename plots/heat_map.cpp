@@ -16,7 +16,8 @@ namespace {
 constexpr double kWidth = 640.0, kHeight = 440.0;
 constexpr double kLeft = 78.0, kRight = 626.0, kTop = 34.0, kBottom = 386.0;
 
-/// Even in lightness and told apart by the colour-blind: anchors of Matplotlib's "viridis" [Walt2015], which is CC0.
+/// Even in lightness and distinguishable for the colour-blind: anchors of Matplotlib's "viridis" [Walt2015], which is
+/// CC0.
 std::array<int, 3> colour_at(double share) {
   static constexpr std::array<std::array<double, 3>, 6> kAnchors = {
       {{68, 1, 84}, {65, 68, 135}, {42, 120, 142}, {34, 168, 132}, {122, 209, 81}, {253, 231, 37}}};

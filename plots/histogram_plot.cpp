@@ -48,9 +48,9 @@ std::string to_svg(const HistogramPlot& plot) {
   double high = *most;
   // Rounding isn't spread.
   if (high - low <= 1e-9 * std::max(std::abs(low), std::abs(high))) {
-    const double room = std::max(1e-6, 0.05 * std::abs(low));
-    low -= room;
-    high += room;
+    const double margin = std::max(1e-6, 0.05 * std::abs(low));
+    low -= margin;
+    high += margin;
   }
   const int bins = std::clamp(static_cast<int>(values.size() / 4), 5, std::max(5, plot.bins));
   std::vector<int> counts(static_cast<std::size_t>(bins), 0);

@@ -32,12 +32,12 @@ class Axis {
     high_ = std::max(high_, scaled(value));
   }
 
-  /// Some room at both ends; an axis without extent, or without points, gets one.
+  /// Some margin at both ends; an axis without extent, or without points, gets one.
   void close() {
     if (!(low_ <= high_)) low_ = high_ = 0.0;
-    const double room = high_ > low_ ? 0.06 * (high_ - low_) : std::max(0.5, 0.1 * std::abs(high_));
-    low_ -= room;
-    high_ += room;
+    const double margin = high_ > low_ ? 0.06 * (high_ - low_) : std::max(0.5, 0.1 * std::abs(high_));
+    low_ -= margin;
+    high_ += margin;
   }
 
   double place(double value) const {

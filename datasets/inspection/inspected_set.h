@@ -29,8 +29,9 @@ struct InspectedScene {
   std::vector<std::string> outputs;                         ///< those that it has
   std::vector<sim::Effect> plan;                            ///< each effect, on or off, and why
   std::vector<std::pair<std::string, std::int64_t>> light;  ///< how its pictures are lit, and how many
-  std::vector<std::pair<std::string, double>> drawn;        ///< of a drawn set: what tells this sensor from the others
-  std::shared_ptr<const sim::DeviceSpec> device_spec;       ///< of a drawn set, null if it can't be read back
+  std::vector<std::pair<std::string, double>>
+      drawn;  ///< of a drawn set: what distinguishes this sensor from the others
+  std::shared_ptr<const sim::DeviceSpec> device_spec;  ///< of a drawn set, null if it can't be read back
 };
 
 /// One sample with its truth, as the set's files give it.

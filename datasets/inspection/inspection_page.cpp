@@ -335,7 +335,7 @@ std::string scene_table(const InspectedSet& set) {
   return table({"", "split", "samples", "device", "object", "outputs", "light"}, rows);
 }
 
-/// What tells a drawn set's sensors apart.
+/// What distinguishes a drawn set's sensors.
 std::string unit_table(const InspectedSet& set) {
   if (set.scenes.empty() || set.scenes.front().drawn.empty()) {
     return "<p class=\"note\">All sensors are the same.</p>\n";
@@ -389,7 +389,7 @@ std::string view_3d(const InspectedSet& set, const std::optional<PreparedJob>& j
   }
   const InspectedSample& sample = set.samples[best];
   const InspectedGel gel = read_inspected_gel(set, best);
-  if (gel.triangles.empty()) return "<p class=\"note\">The set doesn't tell the gel's surface.</p>\n";
+  if (gel.triangles.empty()) return "<p class=\"note\">The set doesn't hold the gel's surface.</p>\n";
   const std::string model = sim::glb_bytes(sample_parts(sample, gel, scene_of_sample(job, sample)), {});
   std::string html = fmt::format(
       "<p class=\"note\">{}, {}: what touches the gel is red, the arrow is the force on the object{}; drag turns it, "

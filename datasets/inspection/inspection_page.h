@@ -35,7 +35,7 @@ std::vector<sim::GltfPart> sample_parts(const InspectedSample& sample, const Ins
 
 /// The page, HTML in UTF-8. Without `job` all that is drawn over pictures is the contact's mask and the 3D view has no
 /// object; without `viewer` there is no 3D view. The same set makes the same bytes.
-/// @param note what is to be told of `job`, as job_of_set said
+/// @param note what is to be said of `job`, as job_of_set said
 /// @throws Error naming a file of the set that can't be read
 std::string inspection_page(const InspectedSet& set, const std::optional<PreparedJob>& job, const std::string& note,
                             const std::optional<ViewerScripts>& viewer, const InspectionOptions& options = {});

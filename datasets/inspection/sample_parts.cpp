@@ -13,7 +13,7 @@ constexpr double kArrowOfGel = 0.4;      // of the gel's width, at most
 constexpr double kBeadRadius_mm = 0.25;  // of a set whose device isn't known
 constexpr int kSides = 16;
 
-/// A cone or a cylinder about the way from `from` to `to`, without ends.
+/// A cone or a cylinder about the line from `from` to `to`, without ends.
 void add_cone(const Eigen::Vector3d& from, const Eigen::Vector3d& to, double radius_from, double radius_to,
               TriangleMesh& mesh) {
   const Eigen::Vector3d along = (to - from).normalized();

@@ -48,8 +48,8 @@ void fields(YamlReader& in, NumberVariation& vary) {
   vary.where = in.where();
   in.required("path", vary.path);
   in.exactly_one_of({"set", "times", "plus"});
-  for (const auto& [name, how] :
-       {std::pair{"set", VaryHow::set}, std::pair{"times", VaryHow::times}, std::pair{"plus", VaryHow::plus}}) {
+  for (const auto& [name, how] : {std::pair{"set", VariationKind::set}, std::pair{"times", VariationKind::times},
+                                  std::pair{"plus", VariationKind::plus}}) {
     if (!in.has(name)) continue;
     vary.how = how;
     in.required(name, vary.spread);

@@ -15,13 +15,13 @@
 namespace touchstone::datasets {
 
 /// What becomes of the numbers at a path of a device's or an object's file.
-enum class VaryHow : std::uint8_t { set, times, plus };
+enum class VariationKind : std::uint8_t { set, times, plus };
 
 /// Numbers of a file that are drawn. Each place that the path leads to gets a draw of its own (core/edited_yaml.h);
 /// numbers of one list get the same.
 struct NumberVariation {
   std::string path;
-  VaryHow how = VaryHow::set;
+  VariationKind how = VariationKind::set;
   Spread spread;
   SourceLocation where;
 };

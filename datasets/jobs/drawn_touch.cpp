@@ -34,9 +34,9 @@ std::string varied(std::string text, const std::string& name, const std::vector<
     for (const std::vector<YamlNumber>& group : find_yaml_numbers(text, name, vary.path, vary.where)) {
       const double value = vary.spread.draw(random);
       for (const YamlNumber& number : group) {
-        const double now = vary.how == VaryHow::set     ? value
-                           : vary.how == VaryHow::times ? number.value * value
-                                                        : number.value + value;
+        const double now = vary.how == VariationKind::set     ? value
+                           : vary.how == VariationKind::times ? number.value * value
+                                                              : number.value + value;
         if (!std::isfinite(now)) {
           fail_at(vary.where, "path '{}': {} became {} by {}", vary.path, number.path, now, value);
         }

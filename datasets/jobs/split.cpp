@@ -57,9 +57,9 @@ std::vector<DrawnSplit> splits_of_units(const SplitSpec& spec, std::uint64_t see
     double most = -INFINITY;
     for (std::size_t s = 0; s < kDrawnSplits; ++s) {
       if (!(spec.share[s] > 0) || (left < 0 && count[s] == 1)) continue;
-      const double lacks = sign * (spec.share[s] * units - count[s]);
-      if (lacks > most) {
-        most = lacks;
+      const double missing = sign * (spec.share[s] * units - count[s]);
+      if (missing > most) {
+        most = missing;
         best = s;
       }
     }

@@ -75,7 +75,7 @@ SensorSource virtual_sensors(const std::filesystem::path& cache_folder) {
   return [cache_folder](const PreparedDraw& prepared, const DrawnUnit& unit) {
     sim::VirtualSensorSettings settings = drawn_sensor_settings(prepared, unit);
     settings.light_key = to_json(light_identity(prepared)) + unit.text;
-    sim::keep_gel_of_unit_modulus(unit.device, cache_folder);
+    sim::cache_gel_of_unit_modulus(unit.device, cache_folder);
     const auto sensor = std::make_shared<const sim::VirtualSensor>(unit.device, cache_folder, settings);
     UnitSensor made;
     const DrawnOutputs& wanted = prepared.job.outputs;

@@ -27,8 +27,8 @@ std::string bars(const Histogram& histogram) {
   return text;
 }
 
-std::string how(VaryHow how) {
-  return how == VaryHow::set ? "set to" : how == VaryHow::times ? "times" : "plus";
+std::string how(VariationKind how) {
+  return how == VariationKind::set ? "set to" : how == VariationKind::times ? "times" : "plus";
 }
 
 std::string list_of(const std::vector<NumberVariation>& all) {

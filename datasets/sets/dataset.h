@@ -1,7 +1,7 @@
 #pragma once
 // From a job to a data set in a folder:
 //   OUT/frames/SCENE/000012.png   what the camera delivers (also ideal/ and radiance/, where asked for)
-//   OUT/events/SCENE.h5           what event pixels tell of a scene, where asked for (sensors/events/event_file.h)
+//   OUT/events/SCENE.h5           what event pixels give of a scene, where asked for (sensors/events/event_file.h)
 //   OUT/truth.h5                   what is true at each sample (truth_file.h)
 //   OUT/dataset.json               what it is and how it came to be (manifest.h); written last
 // Sample i is a pure function of (job, i): the same job gives the same bytes with any number of threads, and a run

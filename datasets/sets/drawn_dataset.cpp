@@ -226,21 +226,21 @@ void merge(const PreparedDraw& prepared, const Folder& folder, const Progress& p
     }
     if (progress) progress("checking", ++done, count);
   });
-  std::vector<std::string> lacking;
-  std::int64_t lack = 0;
+  std::vector<std::string> named;
+  std::int64_t missing = 0;
   for (std::size_t k = 0; k < states.size(); ++k) {
     if (states[k] == BlockState::foreign) refuse_foreign(folder, prepared.blocks[k]);
     if (states[k] == BlockState::whole) continue;
     constexpr std::size_t kNamed = 3;
-    ++lack;
-    if (lacking.size() < kNamed) {
-      lacking.push_back(files[k].name.empty() ? block_name(prepared.blocks[k]) : files[k].name);
-      if (states[k] == BlockState::damaged) lacking.back() += " (damaged)";
+    ++missing;
+    if (named.size() < kNamed) {
+      named.push_back(files[k].name.empty() ? block_name(prepared.blocks[k]) : files[k].name);
+      if (states[k] == BlockState::damaged) named.back() += " (damaged)";
     }
   }
-  if (lack > 0) {
-    fail("{}: {} of {} files lack ({}{}); `touchstone generate` makes them", folder.out.string(), lack, count,
-         fmt::join(lacking, ", "), lack > static_cast<std::int64_t>(lacking.size()) ? " ..." : "");
+  if (missing > 0) {
+    fail("{}: {} of {} files are missing ({}{}); `touchstone generate` makes them", folder.out.string(), missing, count,
+         fmt::join(named, ", "), missing > static_cast<std::int64_t>(named.size()) ? " ..." : "");
   }
   DrawnFigures figures(prepared);
   for (std::size_t k = 0; k < prepared.blocks.size(); ++k) {
@@ -370,14 +370,14 @@ DrawnReport merge_drawn(const fs::path& job_file, const fs::path& out, const Pro
   return report;
 }
 
-std::vector<int> lacking_shards(const fs::path& job_file, const fs::path& out, int count) {
-  if (count < 1) fail("--lacking: {} is not allowed; allowed is at least 1", count);
+std::vector<int> missing_shards(const fs::path& job_file, const fs::path& out, int count) {
+  if (count < 1) fail("--missing: {} is not allowed; allowed is at least 1", count);
   const PreparedDraw prepared = prepare_draw(job_file);
   const Folder folder = folder_of(prepared, out);
-  std::vector<int> lacking;
+  std::vector<int> missing;
   if (const auto manifest = finished_manifest(folder)) {
     verify(folder, *manifest);
-    return lacking;
+    return missing;
   }
   is_begun(folder);
   std::vector<BlockState> states(prepared.blocks.size());
@@ -391,9 +391,9 @@ std::vector<int> lacking_shards(const fs::path& job_file, const fs::path& out, i
       if (states[k] == BlockState::foreign) refuse_foreign(folder, prepared.blocks[k]);
       whole = whole && states[k] == BlockState::whole;
     }
-    if (!whole) lacking.push_back(number);
+    if (!whole) missing.push_back(number);
   }
-  return lacking;
+  return missing;
 }
 
 }  // namespace touchstone::datasets

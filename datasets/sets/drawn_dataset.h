@@ -50,12 +50,12 @@ DrawnReport generate_drawn(const std::filesystem::path& job_file, const std::fil
 
 /// Checks that all blocks are there and whole and writes card and manifest. The folder is then what a single run of
 /// everything makes, byte for byte. On a finished set it verifies all checksums.
-/// @throws Error that names the first blocks that lack; as generate_drawn
+/// @throws Error that names the first missing blocks; as generate_drawn
 DrawnReport merge_drawn(const std::filesystem::path& job_file, const std::filesystem::path& out,
                         const Progress& progress = {});
 
 /// Of `count` shards the numbers of those that aren't all there yet, damaged files included; none of a finished set,
 /// all where nothing was begun. Writes nothing. @throws Error as merge_drawn, for a count below 1
-std::vector<int> lacking_shards(const std::filesystem::path& job_file, const std::filesystem::path& out, int count);
+std::vector<int> missing_shards(const std::filesystem::path& job_file, const std::filesystem::path& out, int count);
 
 }  // namespace touchstone::datasets

@@ -46,7 +46,7 @@ std::string manifest_text(const PreparedJob& job, const RunIdentity& identity, c
                           const std::vector<ArrayShape>& arrays, const std::vector<WrittenFile>& files,
                           const CountedWork& work, const RunTimings* timings);
 
-/// A scene as its data set tells it.
+/// A scene as its data set describes it.
 struct ManifestScene {
   std::string name;
   Split split = Split::train;

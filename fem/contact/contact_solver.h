@@ -44,7 +44,7 @@ struct ContactMemory {
   std::vector<NodeState> state;  ///< empty: nothing is remembered
   DenseCholesky cholesky;        ///< frictionless: of the active rows and columns
   SinglePrecisionLu lu;          ///< with friction: of the Jacobian, the slipping vertices' directions eliminated
-  Eigen::MatrixXd jacobian;      ///< its room, kept
+  Eigen::MatrixXd jacobian;      ///< its storage, kept
   std::vector<SlipFrame> slip;   ///< with friction: per vertex, what the Jacobian was made with
   void forget() { state.clear(); }
 };
@@ -64,13 +64,13 @@ struct ContactAnswer {
 
 /// Frictionless (components == 1): block principal pivoting [Judice1994], which is the primal-dual active set where
 /// that converges and ends also where that would cycle. `start` gives the first active set (p > 0); it may be empty. A
-/// border column that pushes one way (all its entries of one sign) must have a `force` above zero.
+/// border column that pushes in one direction (all its entries of one sign) must have a `force` above zero.
 ContactAnswer solve_frictionless(const ContactProblem& problem, const Eigen::VectorXd& start, ContactMemory& memory);
 
 /// With friction (components == 3): semismooth Newton on the projection equations, the factorised Jacobian kept while
 /// the sets of open, sticking and slipping vertices stay and it converges fast; block Gauss-Seidel sweeps with
 /// projection on the disc where it stalls. It begins with the remembered sets, as if all went on sticking, sliding the
-/// same way or staying apart, or, without memory, with sweeps. `start` is z to begin with, or empty. Ends when
+/// same direction or staying apart, or, without memory, with sweeps. `start` is z to begin with, or empty. Ends when
 /// `residual` <= tolerance.
 ContactAnswer solve_frictional(const ContactProblem& problem, const Eigen::VectorXd& start, double tolerance,
                                ContactMemory& memory);

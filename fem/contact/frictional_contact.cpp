@@ -115,7 +115,7 @@ class FrictionalNewton {
   }
 
   /// One step with the remembered sets and Jacobian, whatever the current iterate looks like: what stuck goes on
-  /// sticking, what slid goes on sliding the same way. False if nothing fitting is remembered.
+  /// sticking, what slid goes on sliding in the same direction. False if nothing fitting is remembered.
   bool predict() {
     if (static_cast<int>(memory_.state.size()) != m_) return false;
     for (int i = 0; i < m_; ++i) {

@@ -18,7 +18,7 @@ constexpr int kBondedHalvings = 1;
 
 using Kind = AxisControl::Kind;
 
-/// A straight way: positions and rotations from `start` to `to`, forces and torques from those at `start` to those of
+/// A straight path: positions and rotations from `start` to `to`, forces and torques from those at `start` to those of
 /// `to`.
 struct Path {
   PressSnapshot start;
@@ -114,7 +114,7 @@ struct Press::Parts {
   std::optional<RigidTransform> straight_above(std::size_t body, RigidTransform pose) const;
   std::optional<RigidTransform> before_touch(std::size_t body, const PressTarget& target, RigidTransform& to,
                                              double& clear) const;
-  double add_way(std::size_t body, const PressTarget& target, Path& path) const;
+  double add_segment(std::size_t body, const PressTarget& target, Path& path) const;
   std::optional<PressSnapshot> advance(const Path& path, const PressSnapshot& from, double begin, double end,
                                        int halvings, Effort& effort);
   std::optional<PressSnapshot> walk(const Path& path, int halvings, Effort& effort);
@@ -146,7 +146,7 @@ std::optional<PressSnapshot> Press::Parts::advance(const Path& path, const Press
     }
     const bool turned = target.turned[0] || target.turned[1] || target.turned[2];
     if (turned) {
-      // What torque has turned the body by since the path's start comes on top of the way.
+      // What torque has turned the body by since the path's start comes on top of the path.
       const Eigen::Matrix3d so_far = between(start.pose, path.to[b].pose, begin).rotation;
       target.pose.rotation = from.bodies[b].pose.rotation * so_far.transpose() * target.pose.rotation;
     }
@@ -200,7 +200,7 @@ std::optional<RigidTransform> Press::Parts::before_touch(std::size_t body, const
 }
 
 /// Sets one body's start and end. The share of the step after which it may touch.
-double Press::Parts::add_way(std::size_t b, const PressTarget& target, Path& path) const {
+double Press::Parts::add_segment(std::size_t b, const PressTarget& target, Path& path) const {
   double clear = 0.0;
   const BodySnapshot& here = now.bodies[b];
   BodySnapshot& start = path.start.bodies[b];
@@ -253,7 +253,8 @@ double Press::Parts::add_way(std::size_t b, const PressTarget& target, Path& pat
     if (!touch) clear = 1.0;
   }
   if (!here.touching || no_force) path.start.forget(static_cast<int>(b));
-  if (!meets) to.forced = to.turned = {};  // nothing to push against: it goes where it is told and turns no further
+  if (!meets)
+    to.forced = to.turned = {};  // nothing to push against: it goes to the given position and turns no further
   // A forced axis that nothing can push on stays where it is: without friction, along the surface.
   if (friction(b) == 0.0) {
     const auto& normals = solver.surface().normals;
@@ -273,8 +274,8 @@ PressSnapshot Press::Parts::follow(std::span<const PressTarget> targets, Effort&
   path.start = now;
   path.seconds = targets.front().seconds;
   double clear = 1.0;
-  for (std::size_t b = 0; b < targets.size(); ++b) clear = std::min(clear, add_way(b, targets[b], path));
-  if (solver.relaxes() && clear > 0.0 && clear < 1.0) {  // nothing touches yet: the gel recovers on the way
+  for (std::size_t b = 0; b < targets.size(); ++b) clear = std::min(clear, add_segment(b, targets[b], path));
+  if (solver.relaxes() && clear > 0.0 && clear < 1.0) {  // nothing touches yet: the gel recovers on the path
     path.start = solver.apart(now, path.start.bodies, clear * path.seconds);
     path.seconds *= 1.0 - clear;
   }

@@ -8,8 +8,8 @@
 //
 // Friction remembers: each step adds the relative motion of object and gel since the last one, and what sticks is
 // carried along. A step that starts out of contact takes its history from the touch on: with all axes
-// position-controlled, from where the straight way from the last pose first touches; with z force-controlled (or at the
-// very first step) from straight above the target.
+// position-controlled, from where the straight path from the last pose first touches; with z force-controlled (or at
+// the very first step) from straight above the target.
 
 #include <Eigen/Core>
 #include <array>
@@ -29,8 +29,8 @@
 
 namespace touchstone::fem {
 
-/// What one translation axis of the object is told: its position (mm, the object frame's origin in the gel frame) or
-/// the force on the object (N, gel frame; pressing gives Fz > 0).
+/// What one translation axis of the object is commanded: its position (mm, the object frame's origin in the gel frame)
+/// or the force on the object (N, gel frame; pressing gives Fz > 0).
 struct AxisControl {
   /// What is prescribed along the axis; the other one follows.
   enum class Kind { position, force };
@@ -125,8 +125,8 @@ class Press {
   /// `relaxation`: the gel's moduli relax by this series from those of the compliance, which are the instantaneous
   /// ones. Over each step (each part of it where it's cut, see PressState::parts) the displacement is taken to go
   /// linearly. While nothing touches, the gel recovers; a step that starts out of contact and has its z
-  /// position-controlled begins to load at the share of its time at which its straight way touches the undeformed face,
-  /// else with its whole time.
+  /// position-controlled begins to load at the share of its time at which its straight path touches the undeformed
+  /// face, else with its whole time.
   /// @throws Error for a shape, a friction or a relaxation that isn't allowed
   Press(const Compliance& gel, ContactShape shape, double friction, PressTolerance tolerance = {},
         PronySeries relaxation = {}, PressOutput output = PressOutput::fields);

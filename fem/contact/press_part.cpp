@@ -50,7 +50,7 @@ PartSolver::PartSolver(const Compliance& gel, std::vector<PressBody> bodies, dou
       surface_(gel),
       block_(gel, surface_),
       remembered_axes_(bodies_.size()),
-      looked_(bodies_.size()) {
+      cached_gaps_(bodies_.size()) {
   size_ = std::accumulate(surface_.triangle_size.begin(), surface_.triangle_size.end(), 0.0) /
           static_cast<double>(surface_.triangle_size.size());
   for (const PressBody& body : bodies_) {

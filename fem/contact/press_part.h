@@ -52,7 +52,7 @@ struct PressSnapshot {
   void forget(int body);
 };
 
-/// The pose at `fraction` of the straight way from a to b (rotations by slerp).
+/// The pose at `fraction` of the straight path from a to b (rotations by slerp).
 RigidTransform between(const RigidTransform& a, const RigidTransform& b, double fraction);
 
 /// @throws Error unless the target is finite, its rotation one, and its normal force and its time not negative
@@ -146,8 +146,8 @@ class PartSolver {
   Eigen::MatrixXd combined_normal_;  ///< its normal rows and columns
   ContactMemory memory_;
   std::vector<std::array<bool, 6>> remembered_axes_;
-  struct Looked;
-  std::vector<Looked> looked_;  ///< per body: the last gap and where it was looked up
+  struct CachedGap;
+  std::vector<CachedGap> cached_gaps_;  ///< per body: the last gap and where it was looked up
   std::string why_not_;
 };
 

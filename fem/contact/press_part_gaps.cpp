@@ -40,57 +40,57 @@ Eigen::Vector3d PartSolver::relative_at(const PressSnapshot& snapshot, int verte
 /// The gap of one body at its pose, looked up or carried over from a place nearby.
 WeightedGap PartSolver::gap_of(std::size_t b, const Iterate& now, PartEffort& effort) {
   const Body& body = now.bodies[b];
-  Looked& looked = looked_[b];
+  CachedGap& cached = cached_gaps_[b];
   const ContactShape& shape = bodies_[b].shape;
   // Some more than what is asked for, so that it serves the next, deeper place, too.
   const GapReach reach = surface_.flat ? GapReach{now.reach + kLeastReach * gel_.thickness, 1.5 * kBulge} : GapReach{};
-  const auto look = [&] {
-    looked.gap = weighted_gap(surface_, shape, body.pose, body.lookup, reach);
-    looked.pose = body.pose;
-    looked.lookup = body.lookup;
-    looked.valid = surface_.flat && surface_.normals.front() == Eigen::Vector3d::UnitZ();
-    looked.has_slopes = false;
+  const auto evaluate = [&] {
+    cached.gap = weighted_gap(surface_, shape, body.pose, body.lookup, reach);
+    cached.pose = body.pose;
+    cached.lookup = body.lookup;
+    cached.valid = surface_.flat && surface_.normals.front() == Eigen::Vector3d::UnitZ();
+    cached.has_slopes = false;
     ++effort.geometry_updates;
-    return looked.gap;
+    return cached.gap;
   };
-  if (!looked.valid || looked.pose.rotation != body.pose.rotation) return look();
-  const Eigen::Vector3d motion = body.pose.translation - looked.pose.translation;
+  if (!cached.valid || cached.pose.rotation != body.pose.rotation) return evaluate();
+  const Eigen::Vector3d motion = body.pose.translation - cached.pose.translation;
   const auto n = static_cast<Eigen::Index>(gel_.vertices.size());
   Eigen::MatrixX2d slid = Eigen::MatrixX2d::Zero(n, 2);  // of the gel under the body
   for (Eigen::Index v = 0; v < n; ++v) {
-    if (!std::isfinite(looked.gap.weighted[v])) continue;
+    if (!std::isfinite(cached.gap.weighted[v])) continue;
     const Eigen::Vector3d& x = gel_.vertices[static_cast<std::size_t>(v)];
-    slid.row(v) = (body.lookup.displacement(x) - looked.lookup.displacement(x) - motion).head<2>().transpose();
+    slid.row(v) = (body.lookup.displacement(x) - cached.lookup.displacement(x) - motion).head<2>().transpose();
   }
   const double farthest = std::sqrt(slid.rowwise().squaredNorm().maxCoeff());
-  if (farthest > std::sqrt(lookup_mm_ * kSharpestCurve * size_)) return look();
-  WeightedGap gap = looked.gap;
+  if (farthest > std::sqrt(lookup_mm_ * kSharpestCurve * size_)) return evaluate();
+  WeightedGap gap = cached.gap;
   if (farthest > 0.0) {
-    if (!looked.has_slopes) {
-      looked.plain_slope = looked.edge_slope = Eigen::MatrixX2d::Zero(n, 2);
+    if (!cached.has_slopes) {
+      cached.plain_slope = cached.edge_slope = Eigen::MatrixX2d::Zero(n, 2);
       const double step = kSlopeStep * size_;
       for (int axis = 0; axis < 2; ++axis) {
-        RigidTransform beside = looked.pose;
+        RigidTransform beside = cached.pose;
         beside.translation[axis] -= step;
-        const WeightedGap there = weighted_gap(surface_, shape, beside, looked.lookup, reach);
+        const WeightedGap there = weighted_gap(surface_, shape, beside, cached.lookup, reach);
         ++effort.geometry_updates;
         for (Eigen::Index v = 0; v < n; ++v) {
           if (!std::isfinite(gap.weighted[v]) || !std::isfinite(there.weighted[v])) continue;
-          looked.plain_slope(v, axis) = (there.plain[v] - gap.plain[v]) / step;
-          looked.edge_slope(v, axis) = (there.edge[v] - gap.edge[v]) / step;
+          cached.plain_slope(v, axis) = (there.plain[v] - gap.plain[v]) / step;
+          cached.edge_slope(v, axis) = (there.edge[v] - gap.edge[v]) / step;
         }
       }
-      looked.has_slopes = true;
+      cached.has_slopes = true;
     }
     for (Eigen::Index v = 0; v < n; ++v) {
       if (!std::isfinite(gap.weighted[v])) continue;
-      gap.plain[v] += looked.plain_slope.row(v).dot(slid.row(v));
-      gap.edge[v] = std::max(0.0, gap.edge[v] + looked.edge_slope.row(v).dot(slid.row(v)));
+      gap.plain[v] += cached.plain_slope.row(v).dot(slid.row(v));
+      gap.edge[v] = std::max(0.0, gap.edge[v] + cached.edge_slope.row(v).dot(slid.row(v)));
     }
   }
   gap.move_along_normals(surface_.weight, motion.z());
   const double depth = std::max(0.0, -gap.deepest);
-  if (gap.reach < std::max(0.0, gap.deepest) + now.reach + kBulge * depth) return look();
+  if (gap.reach < std::max(0.0, gap.deepest) + now.reach + kBulge * depth) return evaluate();
   return gap;
 }
 

@@ -13,7 +13,7 @@ inline constexpr double kLeastReach = 0.02;
 
 /// Where a gap was looked up, so that it serves again nearby: exactly after a motion along the normal of a flat
 /// surface, to second order after a small one across it.
-struct PartSolver::Looked {
+struct PartSolver::CachedGap {
   bool valid = false;
   RigidTransform pose;
   PatchMotion lookup;

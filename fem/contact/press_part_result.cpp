@@ -45,7 +45,7 @@ PressSnapshot untouched(std::vector<BodySnapshot> bodies, int n) {
 }
 
 /// The answer as a snapshot; nothing if a vertex outside the block may penetrate, which is then required, or if the gel
-/// rises higher than was looked.
+/// rises higher than was searched.
 std::optional<PressSnapshot> PartSolver::accept(const ContactAnswer& answer, const PressSnapshot& from, Iterate& now,
                                                 PartEffort& effort) {
   const int n = static_cast<int>(gel_.vertices.size());
@@ -89,8 +89,8 @@ std::optional<PressSnapshot> PartSolver::accept(const ContactAnswer& answer, con
   }
   remember(from, next);
   for (const Body& body : now.bodies) {
-    const double looked = body.gap.reach - std::max(0.0, body.gap.deepest);
-    if (highest > looked) {
+    const double searched = body.gap.reach - std::max(0.0, body.gap.deepest);
+    if (highest > searched) {
       now.reach = 2.0 * highest;
       now.grew = true;
     }

@@ -26,7 +26,7 @@ int openblas_get_num_threads(void);
 namespace touchstone::fem {
 namespace {
 
-/// Room for doubles, straight from the system: pages that are never touched are never there.
+/// Memory for doubles, straight from the system: pages that are never touched are never there.
 class Numbers {
  public:
   Numbers() = default;
@@ -54,7 +54,7 @@ class Numbers {
   std::size_t count_ = 0;
 };
 
-/// Room that is used again and again: to take fresh pages for each front cost a fifth of the time.
+/// Memory that is used again and again: to take fresh pages for each front cost a fifth of the time.
 class Pool {
  public:
   /// At least `count` doubles of any value.
@@ -244,8 +244,8 @@ class Elimination {
     if (failed_) return {};
 
     const auto size = static_cast<std::ptrdiff_t>(group.rows.size());
-    Numbers room = pool_.take(static_cast<std::size_t>(size * size));
-    double* const front = room.get();
+    Numbers memory = pool_.take(static_cast<std::size_t>(size * size));
+    double* const front = memory.get();
     each(size, [&](std::ptrdiff_t j) { std::fill(front + j * size + j, front + (j + 1) * size, 0.0); });
     const auto place_in_front = [&](int place) {
       const auto pivots = static_cast<std::ptrdiff_t>(group.positive + group.negative);
@@ -264,7 +264,7 @@ class Elimination {
     }
     if (!eliminate_front(front, static_cast<int>(size), group.positive, group.negative)) failed_ = true;
     Update result = left_over(group, front, size);
-    pool_.give_back(std::move(room));
+    pool_.give_back(std::move(memory));
     return result;
   }
 

@@ -36,7 +36,7 @@ Compliance from_unit_modulus(const std::string& key, const std::string& unit_key
     try {
       return read_compliance(path, unit_key);
     } catch (const Error&) {
-      return make_unit();  // who asks for that gel itself is told, and has the file replaced
+      return make_unit();  // who asks for that gel itself gets the error, and has the file replaced
     }
   };
   return cached_compliance(key, cache_dir, [&] { return with_modulus(unit(), youngs_modulus); });

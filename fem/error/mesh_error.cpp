@@ -150,7 +150,7 @@ Reading read(const Level& level, const ReferenceBody& body, const Vector3d& plac
   return result;
 }
 
-/// How two readings of the same press differ; the first sets the scale. Zero for what they don't tell.
+/// How two readings of the same press differ; the first sets the scale. Zero for what they don't give.
 RelativeErrors difference(const Compliance& gel, const Eigen::VectorXd& weight, const Vector3d& place, double reach,
                           const Reading& first, const Reading& other) {
   RelativeErrors result;
@@ -214,7 +214,7 @@ struct Law {
   double at(double radius) const { return scale * std::pow(radius, -size); }
 };
 
-/// Least squares of the logarithms. Few samples can't tell both orders apart, so each is drawn a little: the mesh's
+/// Least squares of the logarithms. Few samples can't separate both orders, so each is drawn a little: the mesh's
 /// towards `expected`, with `strength`, the size's towards the mesh's, as it is where the contact's edge makes the
 /// error.
 Law fit(const std::vector<Sample>& samples, double expected, double strength) {
@@ -305,17 +305,17 @@ BodyErrors measure_body(const std::vector<Level>& levels, const LadderGel& ladde
       if (radius < kLeastRadius * levels[i].factor) continue;
       RelativeErrors sums;
       RelativeErrors squares;
-      std::array<int, kErrorKinds> told{};
+      std::array<int, kErrorKinds> counts{};
       for (std::size_t k = 0; k < places.size(); ++k) {
         const RelativeErrors one = difference(gel, weight, places[k], bodies[k].reach, readings[0][k], readings[i][k]);
         for (int kind = 0; kind < kErrorKinds; ++kind) {
           sums.values[kind] += one.values[kind];
           squares.values[kind] += one.values[kind] * one.values[kind];
-          told[kind] += one.values[kind] != 0.0;
+          counts[kind] += one.values[kind] != 0.0;
         }
       }
       for (int kind = 0; kind < kErrorKinds; ++kind) {
-        const double n = told[kind];
+        const double n = counts[kind];
         if (n < 2.0) continue;
         Sample sample{contact, levels[i].factor, sums.values[kind] / n, 0.0};
         sample.scatter = sharp && is_force(kind)

@@ -22,7 +22,7 @@ constexpr double kSharpBorder = 1.0;
 constexpr double kFewVertices = 1.0;
 constexpr double kFewVerticesOrder = 3.0;
 
-/// Vertices in contact that hang together by triangles, as lists of vertices.
+/// Vertices in contact that are connected by triangles, as lists of vertices.
 std::vector<std::vector<int>> patches_of(const Compliance& gel, const PressState& state) {
   std::vector<int> root(gel.vertices.size());
   std::iota(root.begin(), root.end(), 0);

@@ -64,7 +64,7 @@ void check(const PixelGrid& grid) {
   if (!grid.first.allFinite()) fail("the pixel grid stands at ({}, {}) mm", grid.first.x(), grid.first.y());
 }
 
-/// Two-dimensional transform of real rows, in place: each row of `width` numbers is stored with room for its
+/// Two-dimensional transform of real rows, in place: each row of `width` numbers is stored with space for its
 /// width/2 + 1 waves. One-dimensional plans by ourselves, so that rows that hold no pressure are left out and the rest
 /// can be shared among threads without changing a bit of the answer.
 struct LayerResponse::Transform {
@@ -77,8 +77,8 @@ struct LayerResponse::Transform {
     const std::size_t waves = width / 2 + 1;
     stride = (waves + kColumnsAtOnce - 1) / kColumnsAtOnce * kColumnsAtOnce;
     if (stride % 64 == 0) stride += kColumnsAtOnce;  // columns would fall on each other in the processor's cache
-    const std::unique_ptr<Scratch> room(new Scratch(doubles()));
-    double* const real = room->data_;
+    const std::unique_ptr<Scratch> scratch(new Scratch(doubles()));
+    double* const real = scratch->data_;
     auto* const complex = reinterpret_cast<fftw_complex*>(real);
     const int step = static_cast<int>(stride);
     const std::lock_guard lock(planner());
@@ -209,7 +209,7 @@ void LayerResponse::fill_free() {
       corners[static_cast<std::size_t>(j) * (nx + 1) + i] = corner((i - 0.5) * pitch, (j - 0.5) * pitch);
     }
   });
-  Scratch room(t.doubles());
+  Scratch scratch(t.doubles());
   tbb::parallel_for(0, ny, [&](int j) {
     for (int i = 0; i < nx; ++i) {
       const double r = std::hypot(i, j) * pitch;
@@ -222,18 +222,18 @@ void LayerResponse::fill_free() {
         influence = half_space * (at(1, 1) - at(0, 1) - at(1, 0) + at(0, 0) + area / thickness_ * mean_of_correction);
       }
       for (const int y : {j, (t.height - j) % t.height}) {
-        for (const int x : {i, (t.width - i) % t.width}) t.row(room.data_, y)[x] = influence;
+        for (const int x : {i, (t.width - i) % t.width}) t.row(scratch.data_, y)[x] = influence;
       }
     }
   });
   t.for_rows(t.height, [&](int j) {
-    double* const row = t.row(room.data_, j);
+    double* const row = t.row(scratch.data_, j);
     fftw_execute_dft_r2c(t.row_forward, row, reinterpret_cast<fftw_complex*>(row));
   });
   symbol_ = std::make_unique<double[]>(t.stride * static_cast<std::size_t>(t.height));
   const double pixels = static_cast<double>(t.width) * t.height;
   t.for_columns([&](int first) {
-    auto* const column = reinterpret_cast<fftw_complex*>(room.data_) + first;
+    auto* const column = reinterpret_cast<fftw_complex*>(scratch.data_) + first;
     fftw_execute_dft(t.columns_forward, column, column);
     for (int j = 0; j < t.height; ++j) {
       for (int c = 0; c < kColumnsAtOnce; ++c) {

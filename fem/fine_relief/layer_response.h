@@ -52,7 +52,7 @@ enum class GridEdges { free, periodic };
 /// (fem/fine_relief/layer_kernel.h).
 class LayerResponse {
  public:
-  /// Room for one application of a response.
+  /// Memory for one application of a response.
   class Scratch;
 
   /// @throws Error for a material, thickness or grid that isn't allowed, or if pixels of a free grid are wider than

@@ -27,7 +27,7 @@ struct PixelContactAnswer {
   std::vector<double> displacement;  ///< mm, into the layer
   double shift = 0.0;                ///< mm, how far the body moved away from the layer to meet the force
   double force = 0.0;                ///< N, the pressure's sum
-  double force_residual = 0.0;       ///< N, what it lacks of the wanted force
+  double force_residual = 0.0;       ///< N, the wanted force less its own
   double largest_gap = 0.0;          ///< mm, the largest |g| where p > 0
   double largest_overlap = 0.0;      ///< mm, the largest -g where p = 0
   int pixels_in_contact = 0;

@@ -19,7 +19,7 @@ constexpr int kPlainSteps = 2;    // before Aitken's rule
 constexpr int kTurningSteps = 4;  // after these the lines of contact stay
 constexpr int kMostBacktracks = 5;
 constexpr double kLeastShrink = 0.2;  // of the least J in one Newton step
-constexpr double kLeastRatio = 0.1;   // J: below, elements have found a way out that the gel hasn't
+constexpr double kLeastRatio = 0.1;   // J: below, elements deform as the gel can't
 constexpr double kBalanced = 1e-8;    // residual over the elements' forces
 constexpr double kAtRest = 1e-4;      // of the elements' forces at a part's start: below, a gel is as good as at rest
 constexpr double kHold = 1000.0;      // stiffness that holds what touches, over the surface's own
@@ -167,15 +167,15 @@ std::vector<int> FinitePartSolver::candidates(const FiniteSnapshot& at) const {
 Eigen::Vector2d FinitePartSolver::slid(const FiniteSnapshot& from, const FiniteSnapshot& at, int vertex,
                                        const Eigen::Matrix3d& axes) const {
   const RigidTransform motion = at.pose * from.pose.inverse();
-  Eigen::Vector3d way = Eigen::Vector3d::Zero();
+  Eigen::Vector3d slip = Eigen::Vector3d::Zero();
   for (RowSparse::InnerIterator it(gel_.coupling, vertex); it; ++it) {
     const int node = static_cast<int>(it.col());
     const Eigen::Vector3d place = gel_.space.position(node);
     const Eigen::Vector3d was = place + from.elastic.displacement.row(node).transpose();
     const Eigen::Vector3d is = place + at.elastic.displacement.row(node).transpose();
-    way += it.value() * (is - motion * was);
+    slip += it.value() * (is - motion * was);
   }
-  return axes.rightCols<2>().transpose() * way;
+  return axes.rightCols<2>().transpose() * slip;
 }
 
 /// The largest of the iterate's errors over what is allowed: at most 1 at a solution.
@@ -219,7 +219,7 @@ bool FinitePartSolver::find_step(const FiniteSnapshot& from, const PartTarget& t
   const int c = friction_ > 0.0 ? 3 : 1;
   const auto m = static_cast<Eigen::Index>(step.block.size());
   const LawRows laws = law_rows(gel_, at.gap, iterate.axes, step.block, c, forced);
-  Eigen::VectorXd opening(c * m);  // gaps and ways slid, at this iterate
+  Eigen::VectorXd opening(c * m);  // gaps and slips, at this iterate
   for (Eigen::Index j = 0; j < m; ++j) {
     const int v = step.block[static_cast<std::size_t>(j)];
     opening[c * j] = at.gap.weighted[v];

@@ -15,7 +15,7 @@
 namespace touchstone::fem {
 namespace {
 
-constexpr double kLargestPart = 0.1;  // of the thickness: the way of one part
+constexpr double kLargestPart = 0.1;  // of the thickness: the motion in one part
 constexpr double kLargestForceGrowth = 3.0;
 constexpr double kFirstTouch = 0.02;   // of the thickness: where a force-controlled press begins
 constexpr int kResolvedVertices = 13;  // as in press_report.cpp
@@ -56,7 +56,7 @@ struct FinitePress::Parts {
 
   double overlap(const RigidTransform& pose) const { return solver.overlap(pose); }
   void refuse_too_deep(const RigidTransform& pose) const;
-  void refuse_way_through(const RigidTransform& pose) const;
+  void refuse_path_through(const RigidTransform& pose) const;
   std::optional<FiniteSnapshot> advance(const FiniteSnapshot& start, const PartTarget& target,
                                         const FiniteSnapshot& from, double begin, double end, int halvings,
                                         Effort& effort);
@@ -73,20 +73,20 @@ void FinitePress::Parts::refuse_too_deep(const RigidTransform& pose) const {
   if (depth > gel.thickness) fail("the object reaches {:.4g} mm into a gel of {:.4g} mm", depth, gel.thickness);
 }
 
-/// A body that has gone through a curved gel is beside it again: that isn't a way out.
-void FinitePress::Parts::refuse_way_through(const RigidTransform& pose) const {
+/// A body that has gone through a curved gel is beside it again: that doesn't make the path allowed.
+void FinitePress::Parts::refuse_path_through(const RigidTransform& pose) const {
   if (!placed || !(pose.translation.z() < now.pose.translation.z())) return;
-  const double way = (pose.translation - now.pose.translation).norm();
-  const int parts = static_cast<int>(std::min(1000.0, std::ceil(4.0 * way / gel.thickness)));
+  const double distance = (pose.translation - now.pose.translation).norm();
+  const int parts = static_cast<int>(std::min(1000.0, std::ceil(4.0 * distance / gel.thickness)));
   for (int k = 1; k < parts; ++k) {
     const double depth = overlap(between(now.pose, pose, static_cast<double>(k) / parts));
     if (depth > 0.45 * gel.thickness) {
-      fail("the object goes through the gel: it reaches {:.4g} mm into {:.4g} mm on its way", depth, gel.thickness);
+      fail("the object goes through the gel: it reaches {:.4g} mm into {:.4g} mm on its path", depth, gel.thickness);
     }
   }
 }
 
-/// From the share `begin` of the way from `start` to the target to the share `end`, halved where it doesn't converge.
+/// From the share `begin` of the path from `start` to the target to the share `end`, halved where it doesn't converge.
 std::optional<FiniteSnapshot> FinitePress::Parts::advance(const FiniteSnapshot& start, const PartTarget& target,
                                                           const FiniteSnapshot& from, double begin, double end,
                                                           int halvings, Effort& effort) {
@@ -152,7 +152,7 @@ FiniteSnapshot FinitePress::Parts::follow(const PressTarget& target, Effort& eff
   for (int a = 0; a < 2 && friction == 0.0; ++a) to.forced[a] = false;
 
   if (!to.forced[2] && !(overlap(to.pose) > 0.0)) {
-    refuse_way_through(to.pose);
+    refuse_path_through(to.pose);
     if (shear > 0.0) {
       fail("gross slip: a shear force of {:.6g} N is wanted, but the object doesn't touch the gel", shear);
     }
@@ -194,11 +194,11 @@ FiniteSnapshot FinitePress::Parts::follow(const PressTarget& target, Effort& eff
   }
 
   double parts = 1.0;
-  Eigen::Vector3d way = to.pose.translation - start.pose.translation;
+  Eigen::Vector3d motion = to.pose.translation - start.pose.translation;
   for (int a = 0; a < 3; ++a) {
-    if (to.forced[a]) way[a] = 0.0;
+    if (to.forced[a]) motion[a] = 0.0;
   }
-  parts = std::max(parts, std::ceil(way.norm() / std::min(kLargestPart * gel.thickness, tolerance.largest_motion)));
+  parts = std::max(parts, std::ceil(motion.norm() / std::min(kLargestPart * gel.thickness, tolerance.largest_motion)));
   FiniteSnapshot at = start;
   if (to.forced[2]) {
     // Forces grow by a factor at a time, not by equal amounts: a contact that widens follows its tangent only so far.

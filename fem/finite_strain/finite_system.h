@@ -11,7 +11,7 @@
 namespace touchstone::fem {
 
 /// Rows of laws (mm^3 per unknown's unit of the gel's length scale, over that scale: mm^2) over the gel's unknowns and,
-/// behind them, the object's shifts. With c rows a vertex (1 without friction, 3 with it): the gap, and the way slid in
+/// behind them, the object's shifts. With c rows a vertex (1 without friction, 3 with it): the gap, and the slip in
 /// two directions.
 using LawRow = std::vector<std::pair<int, double>>;
 /// The laws of all vertices that may touch, c rows a vertex.

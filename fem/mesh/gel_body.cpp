@@ -48,7 +48,7 @@ void check_slab(const SlabGel& gel) {
   const double layers = total_thickness(gel.layers);
   if (layers == 0.0) return;
   if (layers > gel.mesh.thickness - 0.5 * gel.mesh.fine) {
-    fail("the slab's layers are {} mm thick together; there is room for {:.3g} mm", layers,
+    fail("the slab's layers are {} mm thick together; there is space for {:.3g} mm", layers,
          gel.mesh.thickness - 0.5 * gel.mesh.fine);
   }
   SlabMesh core = core_of(gel);

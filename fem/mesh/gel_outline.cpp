@@ -140,12 +140,12 @@ void check(const Outline& o) {
   }
   const double layers = total_thickness(o.layers);
   if (layers > 0.0) {
-    const double room =
+    const double space =
         std::min({o.thickness, o.smooth() ? o.base : o.thickness,
                   cylinder > 0.0 && !o.smooth() ? std::min(cylinder, o.sphere - 1.02 * o.base) : o.thickness}) -
         0.5 * o.fine;
-    if (layers > room) {
-      fail("{}'s layers are {} mm thick together; there is room for {:.3g} mm", o.name, layers, std::max(0.0, room));
+    if (layers > space) {
+      fail("{}'s layers are {} mm thick together; there is space for {:.3g} mm", o.name, layers, std::max(0.0, space));
     }
   }
   check_tetrahedra(estimated_tetrahedra(o), o.name, o.fine, "fine part");

@@ -59,7 +59,7 @@ void fill_background(const FillInput& from, tetgenio& background) {
             corners[step + 1] = index(at[0], at[1], at[2]);
           }
           if (order >= 3) {
-            std::swap(corners[2], corners[3]);  // odd orders turn the other way
+            std::swap(corners[2], corners[3]);  // odd orders have the opposite orientation
           }
           next = std::copy(std::begin(corners), std::end(corners), next);
         }

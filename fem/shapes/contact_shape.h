@@ -34,7 +34,7 @@ struct BoxShape {
 /// The shapes that a relief may lie on.
 using PlainShape = std::variant<SphereShape, RoundedCylinder, BoxShape, MeshShape, EggShape, ShellShape>;
 
-/// A body whose lower side bears a relief: at each (x, y) of the object frame the surface that looks to -z lies lower
+/// A body whose lower side bears a relief: at each (x, y) of the object frame the surface that faces -z lies lower
 /// than the plain body's by the map's height. Lines that run up (direction.z > 0) meet the relief; others the plain
 /// body. Tilted lines are followed by a fixed point: right where the relief's slope times the tangent of the tilt is
 /// below one.

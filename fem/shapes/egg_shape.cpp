@@ -12,12 +12,12 @@ namespace {
 LineInterval inside_ellipsoid(double radius, double half_length, const Eigen::Vector3d& p, const Eigen::Vector3d& d) {
   const Eigen::Vector3d scale(1.0 / radius, 1.0 / half_length, 1.0 / radius);
   const Eigen::Vector3d start = scale.cwiseProduct(p);
-  const Eigen::Vector3d way = scale.cwiseProduct(d);
-  const double way2 = way.squaredNorm();
-  const double middle = -start.dot(way) / way2;
-  const double rest = 1.0 - (start + middle * way).squaredNorm();
+  const Eigen::Vector3d direction = scale.cwiseProduct(d);
+  const double direction2 = direction.squaredNorm();
+  const double middle = -start.dot(direction) / direction2;
+  const double rest = 1.0 - (start + middle * direction).squaredNorm();
   if (rest < 0.0) return {1.0, 0.0};
-  const double half = std::sqrt(rest / way2);
+  const double half = std::sqrt(rest / direction2);
   return {middle - half, middle + half};
 }
 

@@ -21,7 +21,7 @@ class ReliefMap {
   double highest() const { return highest_; }
 
   /// The map as seen through a window of triangular weight, `width` (mm) from its middle to its end: what a mesh with
-  /// edges of `width` can tell of it. Detail below is averaged away.
+  /// edges of `width` can resolve of it. Detail below is averaged away.
   ReliefMap blurred(double width) const;
 
  private:

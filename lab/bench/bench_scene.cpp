@@ -24,7 +24,7 @@ constexpr double kDrag = 1.0 / 3.0;  // of the depth
 
 using Clock = std::chrono::steady_clock;
 
-/// The channels that a picture's pixels are told apart by.
+/// The channels that a picture's pixels are compared by.
 int channels_of(const render::Imager& imager) {
   return static_cast<int>(imager.quantum_efficiency.rows());
 }
@@ -76,36 +76,36 @@ void for_each_value(const cv::Mat& one, const cv::Mat& other, const std::vector<
 
 }  // namespace
 
-std::vector<sim::PressSpec> bench_holds(int count, double edge_mm, double depth_mm, std::uint64_t seed) {
-  std::vector<sim::PressSpec> holds;
+std::vector<sim::PressSpec> bench_presses(int count, double edge_mm, double depth_mm, std::uint64_t seed) {
+  std::vector<sim::PressSpec> specs;
   for (int k = 0; k < count; ++k) {
     RandomStream random(seed, static_cast<std::uint64_t>(k), Purpose::kStudy);
-    sim::PressSpec hold;
-    hold.place_mm = edge_mm * Eigen::Vector2d(random.uniform() - 0.5, random.uniform() - 0.5);
-    hold.depth_mm = depth_mm * (1.0 + kDepthSpread * (2.0 * random.uniform() - 1.0));
+    sim::PressSpec spec;
+    spec.place_mm = edge_mm * Eigen::Vector2d(random.uniform() - 0.5, random.uniform() - 0.5);
+    spec.depth_mm = depth_mm * (1.0 + kDepthSpread * (2.0 * random.uniform() - 1.0));
     const double angle = 2.0 * kPi * (k + random.uniform()) / count;
-    hold.drag_mm = kDrag * depth_mm * Eigen::Vector2d(std::cos(angle), std::sin(angle));
-    holds.push_back(hold);
+    spec.drag_mm = kDrag * depth_mm * Eigen::Vector2d(std::cos(angle), std::sin(angle));
+    specs.push_back(spec);
   }
-  return holds;
+  return specs;
 }
 
 /// One frame down, one aside.
-static sim::MotionSpec motion_of(const BenchPresses& presses, const sim::PressSpec& hold) {
+static sim::MotionSpec motion_of(const BenchPresses& presses, const sim::PressSpec& spec) {
   constexpr double kFrameRate_Hz = 30.0;
-  sim::MotionSpec motion = sim::press_motion(hold, presses.touch_mm, presses.object.friction, kFrameRate_Hz);
+  sim::MotionSpec motion = sim::press_motion(spec, presses.touch_mm, presses.object.friction, kFrameRate_Hz);
   for (sim::MotionKey& key : motion.keys) key.frames = 1;
   return motion;
 }
 
-FeltForces feel(const BenchPresses& presses, const fem::Compliance& gel, const sim::DeviceSpec& device, double edge_mm,
-                const fem::PressTolerance& tolerance) {
+PressForces solve_presses(const BenchPresses& presses, const fem::Compliance& gel, const sim::DeviceSpec& device,
+                          double edge_mm, const fem::PressTolerance& tolerance) {
   const fem::ContactShape shape = sim::coarse_contact_shape(presses.object, edge_mm);
-  FeltForces felt;
+  PressForces found;
   std::vector<Eigen::MatrixX3d> beads;
   double seconds = 0.0;
-  for (const sim::PressSpec& hold : presses.holds) {
-    const sim::MotionSpec motion = motion_of(presses, hold);
+  for (const sim::PressSpec& spec : presses.specs) {
+    const sim::MotionSpec motion = motion_of(presses, spec);
     fem::Press press(gel, shape, presses.object.friction, tolerance, sim::prony_series(device.gel),
                      fem::PressOutput::forces);
     Eigen::Vector3d at = motion.start_mm;
@@ -116,7 +116,7 @@ FeltForces feel(const BenchPresses& presses, const fem::Compliance& gel, const s
       const auto begun = Clock::now();
       const fem::PressState& state = press.step(target);
       seconds += seconds_since(begun);
-      felt.solves += state.solves;
+      found.solves += state.solves;
       return state;
     };
     try {
@@ -126,27 +126,27 @@ FeltForces feel(const BenchPresses& presses, const fem::Compliance& gel, const s
         if (key.y) at.y() = key.y->position_mm.value();
         if (key.z) at.z() = key.z->position_mm.value();
         const fem::PressState& state = step_to(at);
-        felt.force_N.push_back(state.wrench.head<3>());
+        found.force_N.push_back(state.wrench.head<3>());
         for (std::size_t v = 0; v < gel.vertices.size(); ++v) {
-          if (state.node_owner[v] >= 0) felt.reach_mm = std::max(felt.reach_mm, gel.vertices[v].head<2>().norm());
+          if (state.node_owner[v] >= 0) found.reach_mm = std::max(found.reach_mm, gel.vertices[v].head<2>().norm());
         }
         beads.push_back(state.bead_displacement);
       }
     } catch (const Error& error) {
-      fail("{} {:.3g} mm deep at ({:.3g}, {:.3g}) mm: {}", presses.object.name, *hold.depth_mm, hold.place_mm.x(),
-           hold.place_mm.y(), error.what());
+      fail("{} {:.3g} mm deep at ({:.3g}, {:.3g}) mm: {}", presses.object.name, *spec.depth_mm, spec.place_mm.x(),
+           spec.place_mm.y(), error.what());
     }
   }
-  felt.seconds = seconds / (3.0 * static_cast<double>(presses.holds.size()));
+  found.seconds = seconds / (3.0 * static_cast<double>(presses.specs.size()));
   Eigen::Index rows = 0;
   for (const Eigen::MatrixX3d& one : beads) rows += one.rows();
-  felt.beads_mm.resize(rows, 3);
+  found.beads_mm.resize(rows, 3);
   rows = 0;
   for (const Eigen::MatrixX3d& one : beads) {
-    felt.beads_mm.middleRows(rows, one.rows()) = one;
+    found.beads_mm.middleRows(rows, one.rows()) = one;
     rows += one.rows();
   }
-  return felt;
+  return found;
 }
 
 double force_difference(const std::vector<Eigen::Vector3d>& forces, const std::vector<Eigen::Vector3d>& than) {
@@ -158,12 +158,12 @@ double force_difference(const std::vector<Eigen::Vector3d>& forces, const std::v
   return std::sqrt(sum / static_cast<double>(forces.size()));
 }
 
-sim::SceneSpec bench_scene(const sim::DeviceSpec& device, const BenchPresses& presses, const sim::PressSpec& hold,
+sim::SceneSpec bench_scene(const sim::DeviceSpec& device, const BenchPresses& presses, const sim::PressSpec& spec,
                            std::uint64_t seed) {
   sim::SceneSpec scene;
   scene.device = device;
   scene.object = presses.object;
-  scene.motion = motion_of(presses, hold);
+  scene.motion = motion_of(presses, spec);
   if (device.camera) scene.motion.frame_rate_Hz = device.camera->frame_rate_Hz;
   scene.outputs = {.frames = device.camera.has_value(), .radiance = device.camera.has_value()};
   scene.seed = seed;

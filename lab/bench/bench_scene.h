@@ -16,20 +16,20 @@
 
 namespace touchstone::lab {
 
-/// An object held against a device in several ways, each pressed down and then dragged.
+/// An object held against a device in several poses, each pressed down and then dragged.
 struct BenchPresses {
   sim::ObjectSpec object;
   double touch_mm = 0.0;  ///< see sim::first_touch(), over the middle
-  std::vector<sim::PressSpec> holds;
+  std::vector<sim::PressSpec> specs;
 };
 
-/// `count` holds near the gel's middle: places within an edge of the mesh, so that no place is luckier than another,
+/// `count` presses near the gel's middle: places within an edge of the mesh, so that no place is luckier than another,
 /// depths within a fifth of `depth_mm`, dragged by a third of that into all directions. A pure function of its
 /// arguments.
-std::vector<sim::PressSpec> bench_holds(int count, double edge_mm, double depth_mm, std::uint64_t seed);
+std::vector<sim::PressSpec> bench_presses(int count, double edge_mm, double depth_mm, std::uint64_t seed);
 
-/// What the presses felt like: forces on the object, pressed and dragged, one after the other for each hold.
-struct FeltForces {
+/// What the presses gave: forces on the object, pressed and dragged, one after the other for each press.
+struct PressForces {
   std::vector<Eigen::Vector3d> force_N;
   Eigen::MatrixX3d beads_mm;  ///< all beads of all states, one after the other
   double reach_mm = 0.0;      ///< from the gel's middle to the farthest vertex that was touched
@@ -39,15 +39,15 @@ struct FeltForces {
 
 /// Presses without pictures, each from a fresh start. `edge_mm` is what a relief is blurred by
 /// (sim::coarse_contact_shape).
-/// @throws Error that says which hold can't be had
-FeltForces feel(const BenchPresses& presses, const fem::Compliance& gel, const sim::DeviceSpec& device, double edge_mm,
-                const fem::PressTolerance& tolerance = {});
+/// @throws Error that says which press can't be had
+PressForces solve_presses(const BenchPresses& presses, const fem::Compliance& gel, const sim::DeviceSpec& device,
+                          double edge_mm, const fem::PressTolerance& tolerance = {});
 
 /// Root mean square over the states of the force's difference, relative to the other's force.
 double force_difference(const std::vector<Eigen::Vector3d>& forces, const std::vector<Eigen::Vector3d>& than);
 
-/// The scene of one hold: three frames, at rest, pressed and dragged.
-sim::SceneSpec bench_scene(const sim::DeviceSpec& device, const BenchPresses& presses, const sim::PressSpec& hold,
+/// The scene of one press: three frames, at rest, pressed and dragged.
+sim::SceneSpec bench_scene(const sim::DeviceSpec& device, const BenchPresses& presses, const sim::PressSpec& spec,
                            std::uint64_t seed);
 
 /// A camera of at most so many pixels out of the middle of this one, with all else as it was.
@@ -80,7 +80,7 @@ using TwoRuns = std::array<SceneRun, 2>;
 /// Shows it twice; `whole` as for run_scene.
 TwoRuns run_twice(sim::SceneSpec scene, const fem::Compliance& gel, bool whole = false);
 
-/// The part of the values of a scene's pictures that the imager can tell, as they don't fill its pixels' wells.
+/// The part of the values of a scene's pictures that the imager can measure, as they don't fill its pixels' wells.
 double part_below_full_well(const TwoRuns& runs, const render::Imager& imager);
 
 /// Root mean square over pixels and channels of how far pictures are from true ones, in units of the imager's temporal

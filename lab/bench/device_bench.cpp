@@ -18,7 +18,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr int kHolds = 6;
+constexpr int kBenchPresses = 6;
 constexpr double kFriction = 0.5;
 constexpr double kDepth = 0.1;  // of the gel's thickness
 constexpr std::array kEdges = {2.5, 2.0, 1.6, 1.25, 1.0, 0.8};
@@ -68,15 +68,15 @@ sim::DeviceSpec reference_device(const sim::DeviceSpec& device, double reach_mm,
   return finest;
 }
 
-double beads_difference_um(const FeltForces& felt, const FeltForces& than) {
-  if (felt.beads_mm.rows() == 0) return kUnknown;
-  return 1e3 * std::sqrt((felt.beads_mm - than.beads_mm).rowwise().squaredNorm().mean());
+double beads_difference_um(const PressForces& forces, const PressForces& than) {
+  if (forces.beads_mm.rows() == 0) return kUnknown;
+  return 1e3 * std::sqrt((forces.beads_mm - than.beads_mm).rowwise().squaredNorm().mean());
 }
 
-double mean_normal_force(const FeltForces& felt) {
+double mean_normal_force(const PressForces& forces) {
   double sum = 0.0;
-  for (const Eigen::Vector3d& force : felt.force_N) sum += force.z();
-  return sum / static_cast<double>(felt.force_N.size());
+  for (const Eigen::Vector3d& force : forces.force_N) sum += force.z();
+  return sum / static_cast<double>(forces.force_N.size());
 }
 
 std::string edges_in_words(const sim::MeshSpec& mesh) {
@@ -89,12 +89,12 @@ BenchPoint measured_mesh(const BenchParts& parts, const sim::DeviceSpec& device,
   point.value = device.mesh.fine_mm;
   try {
     const MadeGel made = make_gel(device, element);
-    const FeltForces felt = feel(parts.presses, made.gel, device, device.mesh.fine_mm);
+    const PressForces forces = solve_presses(parts.presses, made.gel, device, device.mesh.fine_mm);
     point.once_s = made.seconds;
-    point.each_s = felt.seconds;
+    point.each_s = forces.seconds;
     point.work = 1e-9 * made.gel.report.operations;
-    point.force_error = force_difference(felt.force_N, parts.finest_forces.force_N);
-    point.beads_um = beads_difference_um(felt, parts.finest_forces);
+    point.force_error = force_difference(forces.force_N, parts.finest_forces.force_N);
+    point.beads_um = beads_difference_um(forces, parts.finest_forces);
     if (pictures) point.pixel_error = mesh_pixel_error(parts, device, made.gel);
   } catch (const Error& error) {
     point.note = error.what();
@@ -108,7 +108,7 @@ BenchCurve mesh_curve(const BenchParts& parts, const Progress& progress) {
   curve.what = fmt::format(
       "Edges of the gel's mesh, all times the same number. Forces of {} presses, pressed and dragged; pictures of the "
       "first. Against a mesh with edges of {:.3g} mm.",
-      parts.presses.holds.size(), parts.finest_device.mesh.fine_mm);
+      parts.presses.specs.size(), parts.finest_device.mesh.fine_mm);
   curve.once = "set-up, s";
   curve.each = "a press, ms";
   curve.work = "operations of the set-up, 1e9";
@@ -155,28 +155,28 @@ BenchCurve contact_curve(const BenchParts& parts) {
       "then the longest step that friction is followed by. On the device's own mesh, against the tightest of each.";
   curve.each = "a press, ms";
   curve.work = "systems solved a press";
-  const double states = 3.0 * static_cast<double>(parts.presses.holds.size());
+  const double states = 3.0 * static_cast<double>(parts.presses.specs.size());
   const auto run = [&](const fem::PressTolerance& tolerance) {
-    return feel(parts.presses, parts.own_gel, parts.device, parts.device.mesh.fine_mm, tolerance);
+    return solve_presses(parts.presses, parts.own_gel, parts.device, parts.device.mesh.fine_mm, tolerance);
   };
-  const auto add = [&](const char* series, const FeltForces& felt, const FeltForces& than, double value,
+  const auto add = [&](const char* series, const PressForces& forces, const PressForces& than, double value,
                        const std::string& setting, bool as_is) {
     BenchPoint point;
     point.series = series;
     point.setting = setting;
     point.value = value;
-    point.each_s = felt.seconds;
-    point.work = static_cast<double>(felt.solves) / states;
-    point.force_error = force_difference(felt.force_N, than.force_N);
-    point.beads_um = beads_difference_um(felt, than);
+    point.each_s = forces.seconds;
+    point.work = static_cast<double>(forces.solves) / states;
+    point.force_error = force_difference(forces.force_N, than.force_N);
+    point.beads_um = beads_difference_um(forces, than);
     point.as_is = as_is;
     curve.points.push_back(point);
   };
   fem::PressTolerance tight;
   tight.traction = 1e-13;
   tight.lookup_mm = 1e-9;
-  const FeltForces tightest = run(tight);
-  const FeltForces by_default = run({});
+  const PressForces tightest = run(tight);
+  const PressForces by_default = run({});
   for (const double traction : {1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10}) {
     fem::PressTolerance tolerance;
     tolerance.traction = traction;
@@ -185,10 +185,10 @@ BenchCurve contact_curve(const BenchParts& parts) {
     add("tolerance of the laws", own ? by_default : run(tolerance), tightest, traction,
         fmt::format("traction to {:.0e}", traction), own);
   }
-  const double drag = parts.presses.holds.front().drag_mm.norm();
+  const double drag = parts.presses.specs.front().drag_mm.norm();
   fem::PressTolerance short_steps;
   short_steps.largest_motion = drag / 64;
-  const FeltForces shortest = run(short_steps);
+  const PressForces shortest = run(short_steps);
   const char* steps = "steps of friction";
   add(steps, by_default, shortest, drag, "one step a frame", true);
   for (const double share : {2.0, 4.0, 8.0, 16.0, 32.0}) {
@@ -266,20 +266,20 @@ DeviceBench bench_device(const sim::DeviceSpec& device, const BenchSettings& set
   parts.presses.object = settings.object ? *settings.object : ball_of(thickness);
   parts.depth_mm = settings.depth_mm.value_or(kDepth * thickness);
   parts.presses.touch_mm = sim::first_touch(sim::PressSpec{}, parts.presses.object, device.gel);
-  parts.presses.holds = bench_holds(kHolds, device.mesh.fine_mm, parts.depth_mm, settings.seed);
-  const FeltForces felt = feel(parts.presses, parts.own_gel, device, device.mesh.fine_mm);
+  parts.presses.specs = bench_presses(kBenchPresses, device.mesh.fine_mm, parts.depth_mm, settings.seed);
+  const PressForces forces = solve_presses(parts.presses, parts.own_gel, device, device.mesh.fine_mm);
   bench.presses = fmt::format(
       "{}, pressed {:.3g} mm deep (a fifth more or less) at {} places within an edge of the middle and dragged by "
       "{:.3g} mm; {:.3g} N on the mean",
-      parts.presses.object.name, parts.depth_mm, kHolds, parts.presses.holds.front().drag_mm.norm(),
-      mean_normal_force(felt));
+      parts.presses.object.name, parts.depth_mm, kBenchPresses, parts.presses.specs.front().drag_mm.norm(),
+      mean_normal_force(forces));
 
   tell("the reference's gel");
-  parts.finest_device = reference_device(parts.device, felt.reach_mm, settings.most_tetrahedra, parts.finest_edges);
+  parts.finest_device = reference_device(parts.device, forces.reach_mm, settings.most_tetrahedra, parts.finest_edges);
   MadeGel finest = make_gel(parts.finest_device);
   parts.finest_gel = std::move(finest.gel);
   parts.finest_seconds = finest.seconds;
-  parts.finest_forces = feel(parts.presses, parts.finest_gel, device, parts.finest_device.mesh.fine_mm);
+  parts.finest_forces = solve_presses(parts.presses, parts.finest_gel, device, parts.finest_device.mesh.fine_mm);
 
   tell("the reference's pictures");
   bench.pictures = prepare_pictures(parts);

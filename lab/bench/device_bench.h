@@ -3,7 +3,7 @@
 // that can be set, the cheapest setting for a wanted error, and what each effect buys.
 //
 // Errors are differences from a reference made on the spot: a mesh much finer where it is touched, light traced with
-// many more paths and another seed. What the references are off themselves is told beside them. Errors of the model
+// many more paths and another seed. The references' own errors are given beside them. Errors of the model
 // (linear elasticity, ray optics) aren't in them; the table of effects has finite strain's.
 
 #include <cstdint>
@@ -98,14 +98,14 @@ struct DeviceBench {
   std::string presses;             ///< in words
   std::string reference;           ///< in words, with what it's off itself
   std::string pictures;            ///< in words: how large; or why there are none
-  double least_pixel_error = 0.0;  ///< smaller ones aren't told from none, as the reference has noise itself
+  double least_pixel_error = 0.0;  ///< smaller ones can't be distinguished from zero, as the reference has noise itself
   std::vector<BenchCurve> curves;
   BenchChoice choice;
   std::vector<EffectShare> effects;
   BenchSettings settings;
 };
 
-/// @throws Error for a device that can't be pressed so, or settings out of range; what can't be had of pictures is told
+/// @throws Error for a device that can't be pressed so, or settings out of range; what can't be had of pictures is said
 ///   in the result
 DeviceBench bench_device(const sim::DeviceSpec& device, const BenchSettings& settings, const Progress& progress = {});
 

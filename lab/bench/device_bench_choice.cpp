@@ -20,7 +20,7 @@ constexpr double kOverReference = 1.25;  // of the finest mesh that is tried, ti
 constexpr double kBelow = 0.97;          // of a wanted error: where to aim
 constexpr double kAboutAsGood = 1.1;     // times the best error
 constexpr int kMostVerifications = 3;
-constexpr int kVerifyingHolds = 6;
+constexpr int kVerifyingPresses = 6;
 constexpr double kMostWholeSeconds = 40.0;
 
 double frame_seconds(const LightSetting& one) {
@@ -62,7 +62,7 @@ std::optional<MeshPick> pick_mesh(const BenchParts& parts, BenchCurve& mesh) {
   return best;
 }
 
-/// The cheapest way of light within an error; of paths also one between those that were tried.
+/// The cheapest setting of light within an error; of paths also one between those that were tried.
 std::optional<LightSetting> pick_light(const BenchParts& parts, const std::vector<LightSetting>& tries, double wanted) {
   std::optional<LightSetting> best;
   const LightSetting* coarser = nullptr;  // paths with more noise than wanted, the least of them
@@ -78,7 +78,7 @@ std::optional<LightSetting> pick_light(const BenchParts& parts, const std::vecto
   }
   if (best && best->adaptive_paths && holds != nullptr && coarser != nullptr) {
     // Between two that were measured the error goes as a power of the noise that is asked for. What is too small to be
-    // told is taken for as large as it may be.
+    // distinguished from zero is taken for as large as it may be.
     const double measured = std::max(holds->pixel_error, parts.least_pixel_error);
     const double slope = std::log(coarser->pixel_error / measured) /
                          std::log(coarser->light.noise_fraction / holds->light.noise_fraction);
@@ -117,19 +117,20 @@ struct Verified {
 /// The choice and the device as it is on presses that nothing was chosen by.
 Verified verify(const BenchParts& parts, const BenchChoice& choice, const LightSetting* light, std::uint64_t seed) {
   BenchParts other = parts;
-  other.presses.holds = bench_holds(kVerifyingHolds, parts.whole_device.mesh.fine_mm, parts.depth_mm, seed);
-  other.finest_forces = feel(other.presses, parts.finest_gel, parts.device, parts.finest_device.mesh.fine_mm);
+  other.presses.specs = bench_presses(kVerifyingPresses, parts.whole_device.mesh.fine_mm, parts.depth_mm, seed);
+  other.finest_forces = solve_presses(other.presses, parts.finest_gel, parts.device, parts.finest_device.mesh.fine_mm);
   const sim::DeviceSpec device = with_edges(parts.device, choice.edges);
   const fem::Compliance gel = make_gel(device).gel;
   Verified verified;
   const auto off = [&](const fem::Compliance& one, double edge_mm) {
-    return force_difference(feel(other.presses, one, parts.device, edge_mm).force_N, other.finest_forces.force_N);
+    return force_difference(solve_presses(other.presses, one, parts.device, edge_mm).force_N,
+                            other.finest_forces.force_N);
   };
   verified.force = off(gel, device.mesh.fine_mm);
   verified.as_is_force = off(parts.own_gel, parts.device.mesh.fine_mm);
   if (!parts.truth) return verified;
   const TruePictures truth =
-      true_pictures(other, parts.finest_device, parts.finest_gel, other.presses.holds.front(), seed);
+      true_pictures(other, parts.finest_device, parts.finest_gel, other.presses.specs.front(), seed);
   BenchPoint ignored;
   if (light != nullptr) verified.pixel = try_light(other, truth, device, gel, *light, seed + 7, ignored).pixel_error;
   verified.as_is_pixel = try_light(other, truth, parts.device, parts.own_gel, {}, seed + 8, ignored).pixel_error;
@@ -154,7 +155,7 @@ WholeSeconds whole_seconds(const BenchParts& parts, double edges, const LightSet
   }
   const sim::DeviceSpec device = with_edges(seconds.by_middle ? parts.device : parts.whole_device, edges);
   const MadeGel made = make_gel(device);
-  sim::SceneSpec scene = bench_scene(device, parts.presses, parts.presses.holds.front(), parts.settings.seed + 5);
+  sim::SceneSpec scene = bench_scene(device, parts.presses, parts.presses.specs.front(), parts.settings.seed + 5);
   if (!parts.truth) scene.outputs = {.frames = false};
   scene.light = light.light;
   scene.effects = light.effects;
@@ -212,14 +213,15 @@ BenchChoice cheapest_choice(const BenchParts& parts, BenchCurve& mesh, const std
     light = pick_light(parts, tries, left_for_light());
     if (!light) {
       light = next_best(tries);
-      choice.remark += fmt::format("{}No way of light that was tried holds the wanted pixel error; the best is {}.",
+      choice.remark += fmt::format("{}No setting of light that was tried holds the wanted pixel error; the best is {}.",
                                    choice.remark.empty() ? "" : " ", light ? light->words : "none");
     }
   }
-  const bool told = parts.least_pixel_error <= parts.settings.pixel_error;
-  if (!told) {
+  const bool resolved = parts.least_pixel_error <= parts.settings.pixel_error;
+  if (!resolved) {
     choice.remark += fmt::format(
-        "{}Pixel errors under {:.2g} of the noise aren't told from none, as the reference has noise of its own and "
+        "{}Pixel errors under {:.2g} of the noise can't be distinguished from zero, as the reference has noise of its "
+        "own and "
         "takes long; ask for a larger --pixel-error.",
         choice.remark.empty() ? "" : " ", parts.least_pixel_error);
   }
@@ -237,7 +239,7 @@ BenchChoice cheapest_choice(const BenchParts& parts, BenchCurve& mesh, const std
     choice.as_is_force = verified.as_is_force;
     choice.as_is_pixel = verified.as_is_pixel;
     const bool force_holds = verified.force <= parts.settings.force_error;
-    const bool pixel_holds = !parts.truth || (verified.pixel <= parts.settings.pixel_error && told);
+    const bool pixel_holds = !parts.truth || (verified.pixel <= parts.settings.pixel_error && resolved);
     choice.holds = force_holds && pixel_holds;
     if (choice.holds || !choice.remark.empty() || round + 1 == kMostVerifications) break;
     const std::string found =

@@ -43,7 +43,7 @@ double once_seconds(const TwoRuns& runs) {
 std::vector<EffectShare> effect_shares(const BenchParts& parts, const Progress& progress) {
   std::vector<EffectShare> shares;
   sim::SceneSpec scene =
-      bench_scene(parts.device, parts.presses, parts.presses.holds.front(), parts.settings.seed + 70);
+      bench_scene(parts.device, parts.presses, parts.presses.specs.front(), parts.settings.seed + 70);
   if (!parts.truth) scene.outputs = {.frames = false};
   const sim::Plan plan = sim::make_plan(scene);
   const TwoRuns with = run_twice(scene, parts.own_gel);

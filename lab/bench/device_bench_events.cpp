@@ -22,8 +22,8 @@ constexpr std::array kEventSteps = {4.0, 2.0, 1.0, 0.5, 0.25, 0.125};
 constexpr int kFewestEventPixels = 16 * 16;
 constexpr double kSameEvent_us = 1000.0;
 
-/// Part of the true events that the others lack, have too many of, or have at another time: the k-th event of a pixel
-/// and a sign is the other's k-th.
+/// Part of the true events that are missing among the others, that they have too many of, or have at another time: the
+/// k-th event of a pixel and a sign is the other's k-th.
 double event_difference(const std::vector<Event>& events, const std::vector<Event>& truth) {
   using Key = std::tuple<int, int, bool>;
   std::map<Key, std::array<std::vector<std::int64_t>, 2>> times;
@@ -106,7 +106,7 @@ BenchCurve events_curve(const BenchParts& parts, const Progress& progress) {
       kSameEvent_us);
   curve.each = "the whole press, s";
   curve.work = "pictures";
-  sim::SceneSpec scene = bench_scene(parts.device, parts.presses, parts.presses.holds.front(), parts.settings.seed);
+  sim::SceneSpec scene = bench_scene(parts.device, parts.presses, parts.presses.specs.front(), parts.settings.seed);
   scene.outputs = {};
   scene.outputs.frames = false;
   scene.outputs.events = true;

@@ -19,12 +19,13 @@ using Clock = std::chrono::steady_clock;
 
 constexpr int kPlenty = 4096;  // paths a pixel: enough for the noise that is asked for to decide
 constexpr std::array kNoiseFractions = {8.0, 4.0, 2.0, 1.0, 0.5};  // of the wanted pixel error
-constexpr double kReferenceShare = 0.35;      // of the wanted pixel error: what is to be told from none
+constexpr double kReferenceShare =
+    0.35;  // of the wanted pixel error: the least error that is to be distinguished from zero
 constexpr double kNoisiestReference = 4.0;    // of the imager's noise
 constexpr double kMostReferenceSeconds = 20;  // for the pictures of one scene; there are some twenty
 constexpr int kPilotPaths = 8;
-constexpr double kLeastTold = 0.5;  // of a picture's pixels: those below their full well
-constexpr double kEnough = 0.7;     // of the wanted error: what is better costs a multiple, and nobody asked for it
+constexpr double kLeastUnsaturated = 0.5;  // of a picture's pixels: those below their full well
+constexpr double kEnough = 0.7;  // of the wanted error: what is better costs a multiple, and nobody asked for it
 constexpr std::array kSamples = {1, 4, 16, 64, 256};
 constexpr std::array kBandCounts = {1, 3, 8, 16};
 constexpr std::array kPixelsAnEdge = {2.5, 5.0, 10.0};
@@ -40,9 +41,9 @@ void add_run(const SceneRun& run, BenchPoint& point) {
   point.work = static_cast<double>(run.paths) / static_cast<double>(pictures_of(run) * run.electrons.front().total());
 }
 
-/// The ways of light that this device's scenes can be shown by.
-std::vector<LightSetting> ways_of_light(const BenchParts& parts) {
-  const sim::SceneSpec scene = bench_scene(parts.device, parts.presses, parts.presses.holds.front(), 1);
+/// The settings of light that this device's scenes can be shown by.
+std::vector<LightSetting> settings_of_light(const BenchParts& parts) {
+  const sim::SceneSpec scene = bench_scene(parts.device, parts.presses, parts.presses.specs.front(), 1);
   std::vector<LightSetting> tries;
   using sim::Switch;
   const auto add = [&](const std::string& words, Switch direct, Switch shared, double noise_fraction, bool exact,
@@ -93,7 +94,7 @@ BenchCurve light_curve(const BenchParts& parts, const TruePictures& truth, std::
   curve.once = "a scene's camera, s";
   curve.each = "a picture, s";
   curve.work = "paths a pixel";
-  tries = ways_of_light(parts);
+  tries = settings_of_light(parts);
   std::int64_t done = 0;
   bool enough = false;
   double last_s = 0.0;  // of paths; half of the noise takes four times as much
@@ -133,7 +134,7 @@ BenchCurve samples_curve(const BenchParts& parts, const TruePictures& truth, con
     BenchPoint point;
     point.setting = fmt::format("{} paths a pixel", samples);
     point.value = samples;
-    sim::SceneSpec scene = reference_scene(parts, parts.device, truth.hold, parts.settings.seed + 3);
+    sim::SceneSpec scene = reference_scene(parts, parts.device, truth.spec, parts.settings.seed + 3);
     scene.light.min_samples = scene.light.max_samples = samples;
     const SceneRun run = run_scene(scene, parts.own_gel, true);
     add_run(run, point);
@@ -148,9 +149,9 @@ BenchCurve samples_curve(const BenchParts& parts, const TruePictures& truth, con
 }
 
 /// A reference's scene; what is held beside it may have the scene's own seed.
-TruePictures shown_truly(sim::SceneSpec scene, const fem::Compliance& gel, const sim::PressSpec& hold) {
+TruePictures render_truth(sim::SceneSpec scene, const fem::Compliance& gel, const sim::PressSpec& spec) {
   scene.seed += 2 * kOtherSeed;
-  return {hold, run_twice(scene, gel, true), sim::imager(scene.device, sim::make_plan(scene).bands, true)};
+  return {spec, run_twice(scene, gel, true), sim::imager(scene.device, sim::make_plan(scene).bands, true)};
 }
 
 /// A setting whose error is to be free of the paths' noise: it's shown twice.
@@ -178,10 +179,10 @@ BenchCurve bands_curve(const BenchParts& parts, const Progress& progress) {
   curve.what =
       fmt::format("Bands of wavelength between {:.4g} and {:.4g} nm, free of the paths' noise, against {} of them.",
                   own.from_nm, own.to_nm, kBandCounts.back());
-  const sim::PressSpec& hold = parts.presses.holds.front();
-  const int planned = sim::make_plan(bench_scene(device, parts.presses, hold, 1)).bands.count();
+  const sim::PressSpec& spec = parts.presses.specs.front();
+  const int planned = sim::make_plan(bench_scene(device, parts.presses, spec, 1)).bands.count();
   device.bands->count = kBandCounts.back();
-  const TruePictures truth = true_pictures(parts, device, parts.own_gel, hold, parts.settings.seed + 40);
+  const TruePictures truth = true_pictures(parts, device, parts.own_gel, spec, parts.settings.seed + 40);
   for (const int count : kBandCounts) {
     if (progress) progress("bands", static_cast<std::int64_t>(curve.points.size()), kBandCounts.size());
     device.bands->count = count;
@@ -192,7 +193,7 @@ BenchCurve bands_curve(const BenchParts& parts, const Progress& progress) {
       point.pixel_error = 0.0;
       point.note = "the reference";
     } else {
-      point = noise_free_point(parts, truth, reference_scene(parts, device, hold, parts.settings.seed + 50));
+      point = noise_free_point(parts, truth, reference_scene(parts, device, spec, parts.settings.seed + 50));
     }
     point.setting = count == 1 ? "1 band" : fmt::format("{} bands", count);
     point.value = count;
@@ -211,11 +212,11 @@ BenchCurve membrane_curve(const BenchParts& parts, const sim::Plan& plan, const 
       1e3 * parts.device.mesh.fine_mm / kFinestPixelsAnEdge);
   curve.each = "mechanics and a picture, s";
   curve.work = "paths a pixel";
-  const sim::PressSpec& hold = parts.presses.holds.front();
-  sim::SceneSpec scene = reference_scene(parts, parts.device, hold, parts.settings.seed + 60);
+  const sim::PressSpec& spec = parts.presses.specs.front();
+  sim::SceneSpec scene = reference_scene(parts, parts.device, spec, parts.settings.seed + 60);
   const auto pixel_um = [&](double an_edge) { return 1e3 * parts.device.mesh.fine_mm / an_edge; };
   scene.membrane.pixel_um = pixel_um(kFinestPixelsAnEdge);
-  const TruePictures truth = shown_truly(scene, parts.own_gel, hold);
+  const TruePictures truth = render_truth(scene, parts.own_gel, spec);
   for (const double an_edge : kPixelsAnEdge) {
     if (progress) progress("contact pixels", static_cast<std::int64_t>(curve.points.size()), kPixelsAnEdge.size());
     scene.membrane.pixel_um = pixel_um(an_edge);
@@ -230,7 +231,7 @@ BenchCurve membrane_curve(const BenchParts& parts, const sim::Plan& plan, const 
 
 /// What the plan leaves out of pictures because it shows little: the reference has it.
 void find_exact_effects(BenchParts& parts) {
-  sim::SceneSpec scene = bench_scene(parts.device, parts.presses, parts.presses.holds.front(), 1);
+  sim::SceneSpec scene = bench_scene(parts.device, parts.presses, parts.presses.specs.front(), 1);
   const sim::Plan plan = sim::make_plan(scene);
   scene.effects.interreflection = sim::Switch::on;
   parts.exact = scene.effects;
@@ -257,7 +258,7 @@ LightSetting try_light(const BenchParts& parts, const TruePictures& truth, const
   point.series = one.adaptive_paths ? "paths" : one.words;
   point.value = one.adaptive_paths ? one.light.noise_fraction : kUnknown;
   try {
-    sim::SceneSpec scene = bench_scene(device, parts.presses, truth.hold, seed);
+    sim::SceneSpec scene = bench_scene(device, parts.presses, truth.spec, seed);
     scene.light = one.light;
     scene.effects = one.effects;
     const SceneRun run = run_scene(scene, gel);
@@ -274,9 +275,9 @@ LightSetting try_light(const BenchParts& parts, const TruePictures& truth, const
   return one;
 }
 
-sim::SceneSpec reference_scene(const BenchParts& parts, const sim::DeviceSpec& device, const sim::PressSpec& hold,
+sim::SceneSpec reference_scene(const BenchParts& parts, const sim::DeviceSpec& device, const sim::PressSpec& spec,
                                std::uint64_t seed) {
-  sim::SceneSpec scene = bench_scene(device, parts.presses, hold, seed);
+  sim::SceneSpec scene = bench_scene(device, parts.presses, spec, seed);
   scene.effects = parts.exact;
   scene.effects.direct_light = sim::Switch::off;
   scene.effects.shared_paths = sim::Switch::off;
@@ -286,42 +287,42 @@ sim::SceneSpec reference_scene(const BenchParts& parts, const sim::DeviceSpec& d
 }
 
 TruePictures true_pictures(const BenchParts& parts, const sim::DeviceSpec& device, const fem::Compliance& gel,
-                           const sim::PressSpec& hold, std::uint64_t seed) {
-  return shown_truly(reference_scene(parts, device, hold, seed), gel, hold);
+                           const sim::PressSpec& spec, std::uint64_t seed) {
+  return render_truth(reference_scene(parts, device, spec, seed), gel, spec);
 }
 
 std::string prepare_pictures(BenchParts& parts) {
   if (!parts.device.camera) return "none: the device has no camera";
-  const sim::PressSpec& hold = parts.presses.holds.front();
+  const sim::PressSpec& spec = parts.presses.specs.front();
   std::string saturated;
   try {
     find_exact_effects(parts);
     parts.reference_paths = kPilotPaths;
-    const TruePictures pilot = true_pictures(parts, parts.device, parts.own_gel, hold, parts.settings.seed + 10);
+    const TruePictures pilot = true_pictures(parts, parts.device, parts.own_gel, spec, parts.settings.seed + 10);
     // Each against the other as if that were true: half of the squares are either one's.
     const double noise = pixel_error(pilot.runs[0], {pilot.runs[1], pilot.runs[1]}, pilot.imager) / std::sqrt(2.0);
-    const double told_part = part_below_full_well(pilot.runs, pilot.imager);
-    if (told_part < kLeastTold) {
+    const double unsaturated_part = part_below_full_well(pilot.runs, pilot.imager);
+    if (unsaturated_part < kLeastUnsaturated) {
       return fmt::format(
-          "none: {:.3g} % of the pixels are at their full well; a shorter camera.exposure_us tells them apart",
-          100.0 * (1.0 - told_part));
+          "none: {:.3g} % of the pixels are at their full well; a shorter camera.exposure_us separates them",
+          100.0 * (1.0 - unsaturated_part));
     }
-    if (told_part < 1.0)
-      saturated = fmt::format("; {:.2g} % are at their full well and left out", 100.0 * (1.0 - told_part));
+    if (unsaturated_part < 1.0)
+      saturated = fmt::format("; {:.2g} % are at their full well and left out", 100.0 * (1.0 - unsaturated_part));
     const cv::Mat& picture = pilot.runs[0].electrons.front();
     const double values =
-        told_part * static_cast<double>(pilot.runs[0].electrons.size() * picture.total()) * picture.channels();
+        unsaturated_part * static_cast<double>(pilot.runs[0].electrons.size() * picture.total()) * picture.channels();
     // A reference's noise is left in a mean over N values by its square over sqrt(N).
     const double left = std::pow(values, -0.25);
-    const double told = kReferenceShare * parts.settings.pixel_error;
-    const double wanted = std::pow(noise / std::min(kNoisiestReference, told / left), 2);
+    const double least = kReferenceShare * parts.settings.pixel_error;
+    const double wanted = std::pow(noise / std::min(kNoisiestReference, least / left), 2);
     const double seconds = static_cast<double>(pictures_of(pilot.runs[0])) * pilot.runs[0].picture_seconds;
     const double afforded = kMostReferenceSeconds / seconds;
     const double times = std::clamp(std::min(wanted, afforded), 1.0, static_cast<double>(kPlenty) / kPilotPaths);
     parts.reference_paths = static_cast<int>(std::ceil(kPilotPaths * times));
-    parts.least_pixel_error = std::max(told, noise * left / std::sqrt(times));
-    parts.truth = true_pictures(parts, parts.finest_device, parts.finest_gel, hold, parts.settings.seed);
-    parts.own_truth = true_pictures(parts, parts.device, parts.own_gel, hold, parts.settings.seed + 30);
+    parts.least_pixel_error = std::max(least, noise * left / std::sqrt(times));
+    parts.truth = true_pictures(parts, parts.finest_device, parts.finest_gel, spec, parts.settings.seed);
+    parts.own_truth = true_pictures(parts, parts.device, parts.own_gel, spec, parts.settings.seed + 30);
   } catch (const Error& error) {
     return fmt::format("none: {}", error.what());
   }
@@ -334,14 +335,14 @@ std::string prepare_pictures(BenchParts& parts) {
   return words +
          fmt::format(
              ", of a pressed and a dragged state; {} paths a pixel for the reference{}, so that errors under {:.2g} "
-             "aren't told from none",
+             "can't be distinguished from zero",
              parts.reference_paths, parts.exact_words, parts.least_pixel_error) +
          saturated;
 }
 
 double mesh_pixel_error(const BenchParts& parts, const sim::DeviceSpec& device, const fem::Compliance& gel) {
   const TruePictures& truth = *parts.truth;
-  return pixel_error(true_pictures(parts, device, gel, truth.hold, parts.settings.seed + 20).runs, truth.runs,
+  return pixel_error(true_pictures(parts, device, gel, truth.spec, parts.settings.seed + 20).runs, truth.runs,
                      truth.imager);
 }
 
@@ -349,11 +350,11 @@ std::vector<BenchCurve> light_curves(const BenchParts& parts, std::vector<LightS
                                      const Progress& progress) {
   std::vector<BenchCurve> curves;
   if (parts.truth) {
-    const sim::PressSpec& hold = parts.presses.holds.front();
+    const sim::PressSpec& spec = parts.presses.specs.front();
     curves.push_back(light_curve(parts, *parts.own_truth, tries, progress));
     curves.push_back(samples_curve(parts, *parts.own_truth, progress));
     if (parts.device.bands) curves.push_back(bands_curve(parts, progress));
-    const sim::Plan plan = sim::make_plan(bench_scene(parts.device, parts.presses, hold, 1));
+    const sim::Plan plan = sim::make_plan(bench_scene(parts.device, parts.presses, spec, 1));
     if (parts.exact.fine_relief == sim::Switch::on) curves.push_back(membrane_curve(parts, plan, progress));
   }
   if (parts.device.camera && parts.device.camera->events) curves.push_back(events_curve(parts, progress));

@@ -17,9 +17,9 @@ namespace touchstone::lab {
 
 inline constexpr double kMostSeconds = 40.0;  ///< for one setting of a curve
 
-/// Pictures of one hold by the reference's light, twice without common random numbers.
+/// Pictures of one press by the reference's light, twice without common random numbers.
 struct TruePictures {
-  sim::PressSpec hold;
+  sim::PressSpec spec;
   TwoRuns runs;
   render::Imager imager;
 };
@@ -36,12 +36,12 @@ struct BenchParts {
   double finest_edges = 0.0;  ///< times the device's
   fem::Compliance finest_gel;
   double finest_seconds = 0.0;
-  FeltForces finest_forces;               ///< of `presses`
+  PressForces finest_forces;              ///< of `presses`
   sim::EffectSwitches exact;              ///< of the reference's pictures
   std::string exact_words;                ///< ", with interreflection": what of it the plan leaves out; empty: nothing
   int reference_paths = 0;                ///< a pixel, of true pictures
   double least_pixel_error = 0.0;         ///< see DeviceBench
-  std::optional<TruePictures> truth;      ///< of the first hold on the finest gel; nothing where there are no pictures
+  std::optional<TruePictures> truth;      ///< of the first press on the finest gel; nothing where there are no pictures
   std::optional<TruePictures> own_truth;  ///< likewise on the device's own gel
 };
 
@@ -60,11 +60,11 @@ MadeGel make_gel(const sim::DeviceSpec& device, fem::Element element = fem::Elem
 BenchPoint mesh_point(const BenchParts& parts, double edges);
 
 /// Paths, the same number in each pixel, with what the plan leaves out.
-sim::SceneSpec reference_scene(const BenchParts& parts, const sim::DeviceSpec& device, const sim::PressSpec& hold,
+sim::SceneSpec reference_scene(const BenchParts& parts, const sim::DeviceSpec& device, const sim::PressSpec& spec,
                                std::uint64_t seed);
 /// The pictures of a press twice, with other random numbers the second time.
 TruePictures true_pictures(const BenchParts& parts, const sim::DeviceSpec& device, const fem::Compliance& gel,
-                           const sim::PressSpec& hold, std::uint64_t seed);
+                           const sim::PressSpec& spec, std::uint64_t seed);
 
 /// Makes parts.truth and parts.own_truth, or leaves them empty; in words, which or why.
 std::string prepare_pictures(BenchParts& parts);
@@ -86,13 +86,13 @@ struct LightSetting {
 /// "paths to 0.5 of the imager's noise", for a row's label.
 std::string paths_in_words(double noise_fraction);
 
-/// Shows a hold's scene that way, and fills in what it took and how far it is from the truth; `point` gets the same.
+/// Shows a press's scene that way, and fills in what it took and how far it is from the truth; `point` gets the same.
 /// What can't be had is in the point's note.
 LightSetting try_light(const BenchParts& parts, const TruePictures& truth, const sim::DeviceSpec& device,
                        const fem::Compliance& gel, LightSetting one, std::uint64_t seed, BenchPoint& point);
 
 /// The curves of light, samples, bands, the fine contact's pixels and events, as far as the device has them. `tries`
-/// gets the ways of light that were tried.
+/// gets the settings of light that were tried.
 std::vector<BenchCurve> light_curves(const BenchParts& parts, std::vector<LightSetting>& tries,
                                      const Progress& progress);
 

@@ -88,7 +88,7 @@ std::string csv_of(const DeviceBench& bench) {
   return csv;
 }
 
-/// A way of light's words, short enough for a legend; + for what the plan leaves out.
+/// A light setting's words, short enough for a legend; + for what the plan leaves out.
 std::string short_name(std::string words) {
   const std::size_t exact = words.find(", with ");
   if (exact != std::string::npos) words = words.substr(0, exact) + " +";
@@ -98,7 +98,7 @@ std::string short_name(std::string words) {
   return words;
 }
 
-/// Error against seconds. Pixel errors too small to be told stand on a line of their own.
+/// Error against seconds. Pixel errors too small to be distinguished from zero stand on a line of their own.
 std::optional<plots::LinePlot> plot_of(const BenchCurve& curve, double least_pixel_error) {
   plots::LinePlot plot;
   plot.title = curve.name + ": error against seconds";
@@ -123,7 +123,7 @@ std::optional<plots::LinePlot> plot_of(const BenchCurve& curve, double least_pix
     std::move(parts.begin(), parts.end(), std::back_inserter(plot.curves));
     if (limit.points.size() < 2) return;
     std::sort(limit.points.begin(), limit.points.end());
-    limit.name = "told from none";
+    limit.name = "least measurable error";
     limit.dashed = true;
     plot.curves.push_back(limit);
   };

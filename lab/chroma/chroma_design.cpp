@@ -149,7 +149,7 @@ BestThickness best_thickness(ApparentMeasure measure, const ChromaDesign& design
     fail("the greatest thickness: {} mm must be above the least, {} mm", to_mm, from_mm);
   }
   const auto value = [&](double thickness) { return apparent_measure(measure, design, thickness); };
-  // All measures rise to one maximum and fall from there, but a coarse look first costs nothing.
+  // All measures rise to one maximum and fall from there, but a coarse search first costs nothing.
   constexpr int kSteps = 200;
   const double step = (to_mm - from_mm) / kSteps;
   const auto place = [&](int k) { return k == kSteps ? to_mm : from_mm + step * k; };

@@ -1,5 +1,5 @@
 #pragma once
-// Design rules of a sensor that tells depth by how large its soft markers look behind a rigid filter [Lin2019, sec.
+// Design rules of a sensor that measures depth by how large its soft markers look behind a rigid filter [Lin2019, sec.
 // III.C]: eqs. 1 to 3, figs. 4 and 5. The filter is d before the pinhole, the marker t behind the filter.
 //
 // What the equations say of the thickness. By eq. 3 a force F on one marker makes the strain e = F / (E L0^2), whatever

@@ -86,7 +86,7 @@ class ForceTable {
       return {};
     }
     const sensors::TractionField tractions = inversion_.invert(markers);
-    const sensors::FrictionState& friction = observer_.look(markers, tractions);
+    const sensors::FrictionState& friction = observer_.update(markers, tractions);
     for (int i = 0; i < 6; ++i) csv += fmt::format(",{:.5f}", tractions.wrench[i]);
     for (int i = 0; i < 6; ++i) csv += fmt::format(",{:.5f}", tractions.sigma(i));
     csv += fmt::format(",{:.3f},{}", tractions.misfit, sensors::name_of(friction.state));

@@ -177,30 +177,29 @@ sim::DeviceSpec with_probe_mesh(sim::DeviceSpec device) {
   return device;
 }
 
-ForceBench set_up_force_bench(sim::DeviceSpec device, const std::filesystem::path& cache_folder,
-                              const Progress& progress) {
+ForceSetup set_up_force(sim::DeviceSpec device, const std::filesystem::path& cache_folder, const Progress& progress) {
   check_marker_compliance(device);
-  ForceBench bench;
-  bench.markers = printed_markers(device);
+  ForceSetup setup;
+  setup.markers = printed_markers(device);
   device = with_probe_mesh(std::move(device));
-  bench.truth_gel = sim::set_up_gel(device, cache_folder, progress);
+  setup.truth_gel = sim::set_up_gel(device, cache_folder, progress);
   device.mesh.fine_mm = kEstimatorEdge;
-  bench.compliance = export_marker_compliance(device, *sim::set_up_gel(device, cache_folder, progress));
-  return bench;
+  setup.compliance = export_marker_compliance(device, *sim::set_up_gel(device, cache_folder, progress));
+  return setup;
 }
 
-void play_probe(const ForceBench& bench, const ForceProbe& probe, const DragSettings& drag,
-                const std::function<void(const ForceFrame&)>& look) {
-  TS_ASSERT(bench.truth_gel != nullptr && drag.step_mm > 0.0);
-  const TruthReader reader(*bench.truth_gel, bench.markers);
-  fem::Press press(*bench.truth_gel, contact_shape(probe), probe.friction);
+void play_probe(const ForceSetup& setup, const ForceProbe& probe, const DragSettings& drag,
+                const std::function<void(const ForceFrame&)>& on_frame) {
+  TS_ASSERT(setup.truth_gel != nullptr && drag.step_mm > 0.0);
+  const TruthReader reader(*setup.truth_gel, setup.markers);
+  fem::Press press(*setup.truth_gel, contact_shape(probe), probe.friction);
   const auto steps = static_cast<int>(std::floor(drag.longest_mm / drag.step_mm + 1e-9));
   int after = 0;
   for (int number = 0; number <= steps; ++number) {
     const double drag_mm = drag.step_mm * number;
     const fem::PressState& state = press.step(target_at(probe, drag_mm));
     const bool slides = has_come_to_slide(state);
-    look({probe, state, number, drag_mm, slides, reader.of(state)});
+    on_frame({probe, state, number, drag_mm, slides, reader.of(state)});
     if ((slides || after > 0) && ++after > drag.frames_after) return;
   }
 }
@@ -237,13 +236,13 @@ double SlipCounts::agreement() const {
   return known > 0 ? static_cast<double>(right) / known : std::numeric_limits<double>::quiet_NaN();
 }
 
-ForceRun run_force_probe(const ForceBench& bench, const ForceProbe& probe, const MarkerReader& reader,
+ForceRun run_force_probe(const ForceSetup& setup, const ForceProbe& probe, const MarkerReader& reader,
                          const DragSettings& drag) {
   ForceRun run;
   run.probe = probe;
-  sensors::TractionInversion inversion(bench.compliance, bench.inversion);
-  sensors::FrictionObserver observer(bench.friction);
-  play_probe(bench, probe, drag, [&](const ForceFrame& frame) {
+  sensors::TractionInversion inversion(setup.compliance, setup.inversion);
+  sensors::FrictionObserver observer(setup.friction);
+  play_probe(setup, probe, drag, [&](const ForceFrame& frame) {
     const sensors::MarkerField field = reader(frame);
     if (std::count(field.measured.begin(), field.measured.end(), 1) < sensors::TractionInversion::kLeastMarkers) {
       ++run.unread;
@@ -251,7 +250,7 @@ ForceRun run_force_probe(const ForceBench& bench, const ForceProbe& probe, const
     }
     const auto start = std::chrono::steady_clock::now();
     const sensors::TractionField tractions = inversion.invert(field);
-    const sensors::FrictionState& friction = observer.look(field, tractions);
+    const sensors::FrictionState& friction = observer.update(field, tractions);
     const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - start;
     ForceSample sample;
     sample.frame = frame.number;
@@ -316,17 +315,17 @@ ForceScore score(const std::vector<ForceRun>& runs) {
   return result;
 }
 
-std::vector<LargeStrainRow> large_strain_ladder(const ForceBench& bench, const fem::FiniteGel& finite, ForceProbe probe,
+std::vector<LargeStrainRow> large_strain_ladder(const ForceSetup& setup, const fem::FiniteGel& finite, ForceProbe probe,
                                                 const std::vector<double>& depths_mm, const MarkerReader& reader) {
-  TS_ASSERT(bench.truth_gel != nullptr);
-  if (finite.outer.mesh_vertex.size() != bench.truth_gel->vertices.size()) {
+  TS_ASSERT(setup.truth_gel != nullptr);
+  if (finite.outer.mesh_vertex.size() != setup.truth_gel->vertices.size()) {
     fail("the gel at finite strain has {} surface vertices, the linear one {}: they need the same mesh",
-         finite.outer.mesh_vertex.size(), bench.truth_gel->vertices.size());
+         finite.outer.mesh_vertex.size(), setup.truth_gel->vertices.size());
   }
-  const TruthReader truth(*bench.truth_gel, bench.markers);
-  sensors::TractionInversion inversion(bench.compliance, bench.inversion);
+  const TruthReader truth(*setup.truth_gel, setup.markers);
+  sensors::TractionInversion inversion(setup.compliance, setup.inversion);
   fem::FinitePress large(finite, contact_shape(probe), probe.friction);
-  fem::Press linear(*bench.truth_gel, contact_shape(probe), probe.friction);
+  fem::Press linear(*setup.truth_gel, contact_shape(probe), probe.friction);
   std::vector<LargeStrainRow> rows;
   for (std::size_t k = 0; k < depths_mm.size(); ++k) {
     probe.depth_mm = depths_mm[k];

@@ -51,7 +51,7 @@ struct MarkerTruth {
   double stick = 0.0, slip = 0.0;                          ///< share of the square's area whose vertices do
 };
 
-/// One state of a probe's way.
+/// One state of a probe's path.
 struct ForceFrame {
   const ForceProbe& probe;
   const fem::PressState& press;
@@ -70,7 +70,7 @@ struct DragSettings {
 
 /// The gel, its markers and what the estimator knows of them. `truth_gel` and the gel that `compliance` was made of may
 /// have different meshes: then the estimator doesn't share the truth's discretisation.
-struct ForceBench {
+struct ForceSetup {
   std::shared_ptr<const fem::Compliance> truth_gel;
   SurfaceMarkers markers;
   sensors::MarkerCompliance compliance;
@@ -81,14 +81,14 @@ struct ForceBench {
 /// A device with a mesh that is fine wherever probes go: edges of 0.85 mm within 2 mm of the gel's sides.
 sim::DeviceSpec with_probe_mesh(sim::DeviceSpec device);
 
-/// The bench of a device with printed markers: the truth's gel has with_probe_mesh, the estimator's a mesh that goes as
+/// The setup of a device with printed markers: the truth's gel has with_probe_mesh, the estimator's a mesh that goes as
 /// far with edges of 1 mm. @throws Error as check_marker_compliance
-ForceBench set_up_force_bench(sim::DeviceSpec device, const std::filesystem::path& cache_folder,
-                              const Progress& progress = {});
+ForceSetup set_up_force(sim::DeviceSpec device, const std::filesystem::path& cache_folder,
+                        const Progress& progress = {});
 
-/// Plays a probe: `look` is called for each frame, in their order.
-void play_probe(const ForceBench& bench, const ForceProbe& probe, const DragSettings& drag,
-                const std::function<void(const ForceFrame&)>& look);
+/// Plays a probe: `on_frame` is called for each frame, in their order.
+void play_probe(const ForceSetup& setup, const ForceProbe& probe, const DragSettings& drag,
+                const std::function<void(const ForceFrame&)>& on_frame);
 
 /// What a sensor says of a frame.
 using MarkerReader = std::function<sensors::MarkerField(const ForceFrame& frame)>;
@@ -128,7 +128,7 @@ struct ForceRun {
   SlipCounts markers;
 };
 /// Presses the probe, drags it, and reads each frame.
-ForceRun run_force_probe(const ForceBench& bench, const ForceProbe& probe, const MarkerReader& reader,
+ForceRun run_force_probe(const ForceSetup& setup, const ForceProbe& probe, const MarkerReader& reader,
                          const DragSettings& drag = {});
 
 /// All runs together. Means are over frames; a run's friction is the last estimate.
@@ -163,7 +163,7 @@ struct LargeStrainRow {
   double misfit = 0.0;
 };
 /// Ends at the first depth that finite strain has no answer for.
-std::vector<LargeStrainRow> large_strain_ladder(const ForceBench& bench, const fem::FiniteGel& finite, ForceProbe probe,
+std::vector<LargeStrainRow> large_strain_ladder(const ForceSetup& setup, const fem::FiniteGel& finite, ForceProbe probe,
                                                 const std::vector<double>& depths_mm, const MarkerReader& reader);
 
 }  // namespace touchstone::lab

@@ -56,16 +56,16 @@ sim::ObjectSpec visible_object(const ForceProbe& probe) {
   return object;
 }
 
-std::vector<ChromaLook> photograph_probe(const ForceBench& bench, const ChromaBench& camera, const ForceProbe& probe,
-                                         const DragSettings& drag, std::uint64_t noise_seed) {
+std::vector<ChromaRecord> photograph_probe(const ForceSetup& setup, const ChromaSetup& camera, const ForceProbe& probe,
+                                           const DragSettings& drag, std::uint64_t noise_seed) {
   std::vector<sim::Truth> states;
-  play_probe(bench, probe, drag, [&](const ForceFrame& frame) {
+  play_probe(setup, probe, drag, [&](const ForceFrame& frame) {
     sim::Truth state;
     state.frame = frame.number;
     state.press = frame.press;
     states.push_back(std::move(state));
   });
-  return camera.look(visible_object(probe), states, noise_seed);
+  return camera.record(visible_object(probe), states, noise_seed);
 }
 
 std::vector<ForceProbe> calibration_probes(bool quick) {
@@ -83,31 +83,31 @@ std::vector<ForceProbe> calibration_probes(bool quick) {
   return probes;
 }
 
-sensors::HueModel calibrate_on_probes(const ForceBench& bench, const ChromaBench& camera, bool quick,
+sensors::HueModel calibrate_on_probes(const ForceSetup& setup, const ChromaSetup& camera, bool quick,
                                       std::uint64_t noise_seed) {
   const DragSettings drag{.step_mm = quick ? 0.5 : 0.25, .longest_mm = 1.5};
   std::vector<sensors::HueSample> samples;
   int series = 0;
   for (const ForceProbe& probe : calibration_probes(quick)) {
-    const auto looks = photograph_probe(bench, camera, probe, drag, noise_seed + static_cast<std::uint64_t>(series));
-    const auto moved = samples_of_moved(looks, kLeastMoved_mm, series++);
+    const auto records = photograph_probe(setup, camera, probe, drag, noise_seed + static_cast<std::uint64_t>(series));
+    const auto moved = samples_of_moved(records, kLeastMoved_mm, series++);
     samples.insert(samples.end(), moved.begin(), moved.end());
   }
   return best_hue_model(camera, samples, forms_to_try(), HueAim::displacement);
 }
 
-std::vector<sensors::MarkerField> fields_of(const std::vector<ChromaLook>& looks, const ChromaBench& camera,
+std::vector<sensors::MarkerField> fields_of(const std::vector<ChromaRecord>& records, const ChromaSetup& camera,
                                             const sensors::HueModel& model,
                                             const sensors::MarkerCompliance& compliance) {
   const sensors::HueEstimator estimator(model, camera.rest());
   std::vector<sensors::MarkerField> fields;
-  for (const ChromaLook& look : looks) {
-    fields.push_back(sensors::as_seen(estimator.estimate(look.reading).field, compliance, model.parallax));
+  for (const ChromaRecord& record : records) {
+    fields.push_back(sensors::as_seen(estimator.estimate(record.reading).field, compliance, model.parallax));
   }
   return fields;
 }
 
-MarkerReader told_fields(std::vector<sensors::MarkerField> fields) {
+MarkerReader fields_from(std::vector<sensors::MarkerField> fields) {
   return [fields = std::move(fields)](const ForceFrame& frame) {
     TS_ASSERT(static_cast<std::size_t>(frame.number) < fields.size());
     return fields[static_cast<std::size_t>(frame.number)];

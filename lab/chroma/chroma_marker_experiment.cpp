@@ -60,22 +60,22 @@ sim::MotionSpec press_and_drag(const Eigen::Vector2d& place, double height_mm, d
   return motion;
 }
 
-MarkerSeries read_series(const ChromaBench& bench, const MarkerTest& test, const std::vector<ChromaLook>& looks,
+MarkerSeries read_series(const ChromaSetup& setup, const MarkerTest& test, const std::vector<ChromaRecord>& records,
                          std::size_t first) {
-  const std::size_t marker = bench.marker_at(test.place_mm);
+  const std::size_t marker = setup.marker_at(test.place_mm);
   const Eigen::Vector3d touch(test.place_mm.x(), test.place_mm.y(), kBall_mm);
   MarkerSeries series;
-  for (std::size_t i = first; i < looks.size(); ++i) {
-    const sensors::ColourMarker& seen = looks[i].reading.markers[marker];
-    series.largest_strain = std::max(series.largest_strain, looks[i].state.press.largest_strain);
+  for (std::size_t i = first; i < records.size(); ++i) {
+    const sensors::ColourMarker& seen = records[i].reading.markers[marker];
+    series.largest_strain = std::max(series.largest_strain, records[i].state.press.largest_strain);
     if (seen.flaw != sensors::MarkerFlaw::kNone) {
       ++series.flawed;
       continue;
     }
-    series.ball_mm.push_back(looks[i].state.press.gel_from_object.translation - touch);
+    series.ball_mm.push_back(records[i].state.press.gel_from_object.translation - touch);
     series.seen.push_back(seen);
   }
-  series.depth_mm = kBall_mm - looks.back().state.press.gel_from_object.translation.z();
+  series.depth_mm = kBall_mm - records.back().state.press.gel_from_object.translation.z();
   return series;
 }
 
@@ -87,17 +87,17 @@ std::vector<double> MarkerSeries::column_mm(int axis) const {
   return column;
 }
 
-MarkerSeries press_series(const ChromaBench& bench, const MarkerTest& test, double deepest_mm, double step_mm,
+MarkerSeries press_series(const ChromaSetup& setup, const MarkerTest& test, double deepest_mm, double step_mm,
                           std::uint64_t seed) {
   const int steps = static_cast<int>(std::lround(deepest_mm / step_mm));
   const auto motion = press_and_drag(test.place_mm, kBall_mm, deepest_mm, steps, {0, 0}, 0);
-  return read_series(bench, test, bench.play(marker_ball(test), motion, seed), 0);
+  return read_series(setup, test, setup.play(marker_ball(test), motion, seed), 0);
 }
 
-MarkerSeries shear_series(const ChromaBench& bench, const MarkerTest& test, double depth_mm,
+MarkerSeries shear_series(const ChromaSetup& setup, const MarkerTest& test, double depth_mm,
                           const Eigen::Vector2d& end_mm, int steps, std::uint64_t seed) {
   const sim::MotionSpec motion = shear_motion(test, depth_mm, end_mm, steps);
-  return read_series(bench, test, bench.play(marker_ball(test), motion, seed), 1);
+  return read_series(setup, test, setup.play(marker_ball(test), motion, seed), 1);
 }
 
 sim::ObjectSpec marker_ball(const MarkerTest& test) {
@@ -108,17 +108,17 @@ sim::MotionSpec shear_motion(const MarkerTest& test, double depth_mm, const Eige
   return press_and_drag(test.place_mm, kBall_mm, depth_mm, 1, end_mm, steps);
 }
 
-std::vector<double> hue_repeats_deg(const ChromaBench& bench, std::uint64_t seed, int pictures) {
+std::vector<double> hue_repeats_deg(const ChromaSetup& setup, std::uint64_t seed, int pictures) {
   TS_ASSERT(pictures > 1);
-  sensors::ColourMarkerFinder finder = bench.finder();
-  const std::size_t markers = bench.rest().markers.size();
+  sensors::ColourMarkerFinder finder = setup.finder();
+  const std::size_t markers = setup.rest().markers.size();
   std::vector<double> sum(markers, 0.0);
   std::vector<double> square(markers, 0.0);
   for (int i = 0; i < pictures; ++i) {
-    const sensors::ColourMarkerReading& reading = finder.find(bench.sensor().background(seed, i));
+    const sensors::ColourMarkerReading& reading = finder.find(setup.sensor().background(seed, i));
     for (std::size_t m = 0; m < markers; ++m) {
       const double change =
-          sensors::hue_difference(reading.markers[m].hue, bench.rest().markers[m].hue) / kRadiansPerDegree;
+          sensors::hue_difference(reading.markers[m].hue, setup.rest().markers[m].hue) / kRadiansPerDegree;
       sum[m] += change;
       square[m] += change * change;
     }
@@ -130,11 +130,11 @@ std::vector<double> hue_repeats_deg(const ChromaBench& bench, std::uint64_t seed
   return deviations;
 }
 
-HueAgainstDepth hue_against_depth(const ChromaBench& bench, const MarkerSeries& press, std::size_t marker) {
+HueAgainstDepth hue_against_depth(const ChromaSetup& setup, const MarkerSeries& press, std::size_t marker) {
   HueAgainstDepth found;
   for (std::size_t i = 0; i < press.seen.size(); ++i) {
     found.depth_mm.push_back(-press.ball_mm[i].z());
-    found.change_deg.push_back(sensors::hue_difference(press.seen[i].hue, bench.rest().markers[marker].hue) /
+    found.change_deg.push_back(sensors::hue_difference(press.seen[i].hue, setup.rest().markers[marker].hue) /
                                kRadiansPerDegree);
   }
   return found;
@@ -156,9 +156,9 @@ std::vector<sensors::HueSample> samples_of(const MarkerSeries& series, std::size
   return samples;
 }
 
-InverseScore score_inverse(const ChromaBench& bench, const sensors::HueModel& model, std::size_t marker,
+InverseScore score_inverse(const ChromaSetup& setup, const sensors::HueModel& model, std::size_t marker,
                            const std::vector<MarkerSeries>& series) {
-  const sensors::HueEstimator estimator(model, bench.rest());
+  const sensors::HueEstimator estimator(model, setup.rest());
   InverseScore score;
   double squares = 0.0;
   for (const MarkerSeries& one : series) {
@@ -187,7 +187,7 @@ InverseScore score_inverse(const ChromaBench& bench, const sensors::HueModel& mo
   return score;
 }
 
-sensors::HueModel calibrate_field(const ChromaBench& bench, bool quick, std::uint64_t seed) {
+sensors::HueModel calibrate_field(const ChromaSetup& setup, bool quick, std::uint64_t seed) {
   struct Touch {
     sim::ObjectSpec object;
     double height_mm, depth_mm;
@@ -209,52 +209,52 @@ sensors::HueModel calibrate_field(const ChromaBench& bench, bool quick, std::uin
   int number = 0;
   for (const Touch& touch : touches) {
     const auto motion = press_and_drag(touch.place, touch.height_mm, touch.depth_mm, 6, touch.drag, 4);
-    const auto looks = bench.play(touch.object, motion, seed + static_cast<std::uint64_t>(number));
-    const auto found = samples_of_moved(looks, kLeastMoved_mm, number);
+    const auto records = setup.play(touch.object, motion, seed + static_cast<std::uint64_t>(number));
+    const auto found = samples_of_moved(records, kLeastMoved_mm, number);
     samples.insert(samples.end(), found.begin(), found.end());
     ++number;
   }
-  return best_hue_model(bench, samples, sensors::usual_hue_forms(), HueAim::lateral);
+  return best_hue_model(setup, samples, sensors::usual_hue_forms(), HueAim::lateral);
 }
 
-sensors::TractionInversion elastic_inversion(const ChromaBench& bench, const std::filesystem::path& cache,
+sensors::TractionInversion elastic_inversion(const ChromaSetup& setup, const std::filesystem::path& cache,
                                              const sensors::ViewParallax& parallax) {
-  const sim::DeviceSpec device = with_probe_mesh(bench.sensor().device());
+  const sim::DeviceSpec device = with_probe_mesh(setup.sensor().device());
   const auto gel = sim::set_up_gel(device, cache);
-  // Chosen on the presses of calibrate_field with another unit. Where an object is wide hue tells a fifth of the press
+  // Chosen on the presses of calibrate_field with another unit. Where an object is wide hue shows a fifth of the press
   // and is alike over neighbours, which noise isn't: so normal displacements count for next to nothing, lateral ones,
   // which err by 2 um where nothing touches, for all; a rim's pressure is of the order of the modulus.
   constexpr sensors::TractionSettings kNoise{.lateral_noise_mm = 0.002, .normal_noise_mm = 1.0, .scale = 1.0};
   return sensors::TractionInversion(sensors::as_seen(export_marker_compliance(device, *gel), parallax), kNoise);
 }
 
-FieldScore field_under(const ChromaBench& bench, const sensors::HueModel& model, sensors::TractionInversion& inversion,
+FieldScore field_under(const ChromaSetup& setup, const sensors::HueModel& model, sensors::TractionInversion& inversion,
                        const sim::ObjectSpec& punch, double height_mm, double depth_mm, const Eigen::Vector2d& place_mm,
                        std::uint64_t seed) {
-  const auto looks = bench.play(punch, press_and_drag(place_mm, height_mm, depth_mm, 3, {0, 0}, 0), seed);
-  const ChromaLook& look = looks.back();
-  const sensors::HueField found = sensors::HueEstimator(model, bench.rest()).estimate(look.reading);
+  const auto records = setup.play(punch, press_and_drag(place_mm, height_mm, depth_mm, 3, {0, 0}, 0), seed);
+  const ChromaRecord& record = records.back();
+  const sensors::HueField found = sensors::HueEstimator(model, setup.rest()).estimate(record.reading);
   FieldScore score;
   const sensors::MarkerField seen = sensors::as_seen(found.field, inversion.compliance(), model.parallax);
   const sensors::MarkerField elastic =
       sensors::as_they_are(sensors::displacements_under(inversion.compliance(), inversion.invert(seen).traction),
                            inversion.compliance(), model.parallax);
   score.punch = punch.name;
-  score.truth = look.truth;
+  score.truth = record.truth;
   double press = 0.0;
   double lateral = 0.0;
-  for (std::size_t i = 0; i < look.truth.size(); ++i) {
-    const double off_um = 1000.0 * (elastic.displacement[i] - look.truth[i]).norm();
-    score.elastic_mean_um += off_um / static_cast<double>(look.truth.size());
+  for (std::size_t i = 0; i < record.truth.size(); ++i) {
+    const double off_um = 1000.0 * (elastic.displacement[i] - record.truth[i]).norm();
+    score.elastic_mean_um += off_um / static_cast<double>(record.truth.size());
     score.elastic_worst_um = std::max(score.elastic_worst_um, off_um);
-    score.largest_true_um = std::max(score.largest_true_um, 1000.0 * look.truth[i].norm());
+    score.largest_true_um = std::max(score.largest_true_um, 1000.0 * record.truth[i].norm());
     if (found.field.measured[i] == 0) {
       ++score.flawed;
       score.estimate.push_back(Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN()));
       continue;
     }
     score.estimate.push_back(found.field.displacement[i]);
-    const Eigen::Vector3d error_um = 1000.0 * (found.field.displacement[i] - look.truth[i]);
+    const Eigen::Vector3d error_um = 1000.0 * (found.field.displacement[i] - record.truth[i]);
     ++score.measured;
     if (found.extrapolated[i] != 0) ++score.extrapolated;
     score.mean_um += error_um.norm();

@@ -1,5 +1,5 @@
 #pragma once
-// Fig. 6 of [Lin2019, sec. III.D]: how well a marker's hue, and a black marker's size, tell a displacement when the
+// Fig. 6 of [Lin2019, sec. III.D]: how well a marker's hue, and a black marker's size, measure a displacement when the
 // marker is only a few pixels wide, and when the light isn't even.
 //
 // What the paper leaves open, and what is done here:
@@ -44,7 +44,7 @@ struct RobustnessSettings {
   LightGradient kind = LightGradient::light;
 };
 
-/// How well displacements are told at one size.
+/// How well displacements are estimated at one size.
 struct PixelRobustness {
   double marker_px = 0.0;
   double hue_r2 = 0.0;       ///< of the fit of second order; 0 where there's no fit

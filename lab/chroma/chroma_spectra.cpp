@@ -8,7 +8,7 @@
 
 #include "core/error.h"
 #include "core/units.h"
-#include "lab/chroma/chroma_bench.h"
+#include "lab/chroma/chroma_setup.h"
 #include "render/cameras/first_hits.h"
 #include "render/paths/path_tracer.h"
 #include "sensors/colour/hue.h"
@@ -24,7 +24,7 @@ namespace touchstone::lab {
 namespace {
 
 constexpr double kHalfPatch_mm = 0.2;    // of the square that is looked at: clear of what the lens blurs at rims
-constexpr double kLeastMarker_mm = 1.0;  // narrower ones leave no room for it
+constexpr double kLeastMarker_mm = 1.0;  // narrower ones leave no space for it
 constexpr double kStep_nm = 1.0;         // of the products
 constexpr const char* kNames[] = {"white", "magenta", "yellow", "red"};
 constexpr std::size_t kPalette[] = {0, 3, 4, 1};  // blue for white
@@ -158,8 +158,8 @@ ChromaSpectra measure_chroma_spectra(const sim::DeviceSpec& device, const std::f
   const auto gel = sim::set_up_gel(scene.device, cache);
   fem::PressState press = sim::at_rest(sim::play_motion(scene, plan, *gel).front().press);
   press.surface_displacement.col(0).setConstant(patches.shear_mm);
-  const sim::SceneView sight(scene, plan, *gel);
-  const render::Scene seen = sight.seen(press, {});
+  const sim::SceneView view(scene, plan, *gel);
+  const render::Scene seen = view.seen(press, {});
   const render::Camera camera = sim::camera_of(*device.camera);
   const render::ReadyCamera ready = render::make_ready(camera);
   const render::Imager imager = sim::imager(device, plan.bands, false);

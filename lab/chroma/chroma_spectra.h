@@ -9,10 +9,11 @@
 // What is compared. What falls on the white layer isn't the lamps' light: some of it has passed films, and much of it
 // was bounced by coloured things before. No product of curves knows how much. So light as it leaves the white layer
 // beside the film, as rendered, is taken for what falls there, divided by white's curve; the three other spectra should
-// then be that times magenta's curve, times the film's (it passes the film once on its way out), and times both.
+// then be that times magenta's curve, times the film's (it passes the film once on its path out), and times both.
 // Products are of the curves at every nanometre, weighted by the lamps' light and then averaged over a band; the
 // rendering multiplies the curves' means. So the error has in it what bands leave out, what stands by a marker and
-// colours its light, and the slant at which films are seen. How far the light itself is off the lamps' is told apart.
+// colours its light, and the slant at which films are seen. How far the light itself is off the lamps' is given
+// separately.
 
 #include <array>
 #include <cstdint>

@@ -79,16 +79,16 @@ std::vector<double> reported_tilts() {
   return tilts;
 }
 
-TiltTable measure_tilt(const TiltBench& bench, const TiltSpectra& spectra, TiltMarker marker,
+TiltTable measure_tilt(const TiltSetup& setup, const TiltSpectra& spectra, TiltMarker marker,
                        std::span<const double> tilts, std::uint64_t seed, const Progress& progress) {
   const auto total = static_cast<std::int64_t>(kPressed_mm.size() + 3 + tilts.size());
   std::int64_t done = 0;
   const TiltColours colours = tilt_colours(spectra);
-  const auto look = [&](const TiltPose& pose, std::uint64_t with_seed) {
+  const auto read_at = [&](const TiltPose& pose, std::uint64_t with_seed) {
     TiltReading mean;
     Eigen::Vector2d hue = Eigen::Vector2d::Zero();
     for (const Eigen::Vector2d& phase : kPhases_px) {
-      TiltBench shifted = bench;
+      TiltSetup shifted = setup;
       shifted.phase_px += phase;
       const TiltReading one = read_tilt_picture(tilt_picture(shifted, spectra, marker, pose, with_seed++), colours);
       hue += Eigen::Vector2d(std::cos(one.hue), std::sin(one.hue));
@@ -103,12 +103,12 @@ TiltTable measure_tilt(const TiltBench& bench, const TiltSpectra& spectra, TiltM
   };
   TiltTable table;
   table.marker = marker;
-  const TiltReading level = look({}, seed);
+  const TiltReading level = read_at({}, seed);
   std::vector<double> hues;
   std::vector<double> areas;
   std::vector<double> widths;
   for (const double pressed : kPressed_mm) {
-    const TiltReading reading = pressed == 0.0 ? level : look({0.0, {0.0, 0.0, -pressed}}, seed);
+    const TiltReading reading = pressed == 0.0 ? level : read_at({0.0, {0.0, 0.0, -pressed}}, seed);
     hues.push_back(sensors::hue_difference(reading.hue, level.hue));
     areas.push_back(reading.ink_area_px / level.ink_area_px - 1.0);
     widths.push_back(reading.ink_width_px / level.ink_width_px - 1.0);
@@ -119,14 +119,14 @@ TiltTable measure_tilt(const TiltBench& bench, const TiltSpectra& spectra, TiltM
   calibration.hue_fit_r2 = hue.r2;
   calibration.area_slope = line_through(kPressed_mm, areas).slope;
   calibration.width_slope = line_through(kPressed_mm, widths).slope;
-  const TiltReading right = look({0.0, {kAside_mm, 0.0, 0.0}}, seed);
-  const TiltReading left = look({0.0, {-kAside_mm, 0.0, 0.0}}, seed);
+  const TiltReading right = read_at({0.0, {kAside_mm, 0.0, 0.0}}, seed);
+  const TiltReading left = read_at({0.0, {-kAside_mm, 0.0, 0.0}}, seed);
   calibration.centroid_gain = (right.ink_px.x() - left.ink_px.x()) / (2.0 * kAside_mm);
 
   const double um_a_radian = kMicrometresPerMillimetre / calibration.hue_slope;
   const double um_a_pixel = kMicrometresPerMillimetre / calibration.centroid_gain;
   for (const double tilt : tilts) {
-    const TiltReading reading = tilt == 0.0 ? level : look({tilt, Eigen::Vector3d::Zero()}, seed);
+    const TiltReading reading = tilt == 0.0 ? level : read_at({tilt, Eigen::Vector3d::Zero()}, seed);
     TiltError error;
     error.tilt = tilt;
     error.hue_change = sensors::hue_difference(reading.hue, level.hue);
@@ -139,7 +139,7 @@ TiltTable measure_tilt(const TiltBench& bench, const TiltSpectra& spectra, TiltM
     error.across_um = um_a_pixel * (reading.ink_px.y() - level.ink_px.y());
     table.errors.push_back(error);
   }
-  const TiltReading again = look({}, seed + kPhases);
+  const TiltReading again = read_at({}, seed + kPhases);
   table.noise_normal_um = std::abs(um_a_radian * sensors::hue_difference(again.hue, level.hue)) / std::sqrt(2.0);
   table.noise_lateral_um = std::abs(um_a_pixel) * (again.ink_px - level.ink_px).norm() / 2.0;
   return table;
@@ -153,12 +153,12 @@ TiltExperiment run_tilt_experiment(const std::filesystem::path& spectra, int sam
   for (const TiltMarker marker : {TiltMarker::flat, TiltMarker::rigid, TiltMarker::ball}) {
     // Tilted, the rigid square looks as the flat one does.
     const std::span<const double> angles = marker == TiltMarker::rigid ? std::span<const double>() : tilts;
-    TiltBench bench = far_bench();
-    bench.samples = samples;
-    experiment.far.push_back(measure_tilt(bench, light, marker, angles, seed, progress));
-    bench = compact_bench();
-    bench.samples = 4 * samples;  // its pixels are a sixteenth as many
-    experiment.compact.push_back(measure_tilt(bench, light, marker, angles, seed, progress));
+    TiltSetup setup = far_setup();
+    setup.samples = samples;
+    experiment.far.push_back(measure_tilt(setup, light, marker, angles, seed, progress));
+    setup = compact_setup();
+    setup.samples = 4 * samples;  // its pixels are a sixteenth as many
+    experiment.compact.push_back(measure_tilt(setup, light, marker, angles, seed, progress));
   }
   return experiment;
 }

@@ -1,6 +1,6 @@
 #pragma once
-// The tilt error of coloured markers, and spherical markers as its remedy [Lin2019, sec. V], on the bench of
-// chroma_tilt_bench.h: each kind of marker is calibrated by moving it level, then tilted about its own centre, and what
+// The tilt error of coloured markers, and spherical markers as its remedy [Lin2019, sec. V], on the setup of
+// chroma_tilt_setup.h: each kind of marker is calibrated by moving it level, then tilted about its own centre, and what
 // its picture seems to say of a displacement is the systematic error, since the centre hasn't moved.
 
 #include <cstdint>
@@ -9,21 +9,21 @@
 #include <vector>
 
 #include "core/progress.h"
-#include "lab/chroma/chroma_tilt_bench.h"
+#include "lab/chroma/chroma_tilt_setup.h"
 
 namespace touchstone::lab {
 
-/// What a picture of one marker tells, by plain code on ideal pictures: no mosaic, no noise, no segmentation.
+/// What a picture of one marker gives, by plain code on ideal pictures: no mosaic, no noise, no segmentation.
 struct TiltReading {
   double hue = 0.0;  ///< radians, -pi to pi, 0 is red: circular mean over pixels of more than half saturation
   Eigen::Vector2d ink_px = Eigen::Vector2d::Zero();  ///< centroid of the ink
   double ink_area_px = 0.0;                          ///< pixels counted by what ink covers of them
-  double ink_width_px = 0.0;      ///< the wider way across the ink: of a square its side, root of 12 times the variance
+  double ink_width_px = 0.0;      ///< the ink's larger width: of a square its side, root of 12 times the variance
   double coloured_area_px = 0.0;  ///< number of pixels of more than half saturation
 };
 /// `picture` as tilt_picture gives it. Ink is looked for in saturated pixels only, as the paper does, since a ball
 /// throws a pink shade of saturation 0.3 on the sheet beside it. Their red and green are split into bare sheet and ink,
-/// under the film or beside it as their blue tells. @throws Error if nothing in it is coloured, or has ink
+/// under the film or beside it as their blue shows. @throws Error if nothing in it is coloured, or has ink
 TiltReading read_tilt_picture(const cv::Mat& picture, const TiltColours& colours);
 
 /// How a level marker's reading goes with its displacement.
@@ -41,7 +41,7 @@ struct TiltError {
   double hue_change = 0.0;  ///< radians, from level
   double normal_um = 0.0;   ///< by the hue: towards the film
   double size_um = 0.0;     ///< by the ink's area: towards the film
-  double width_um = 0.0;    ///< by the ink's wider way, which a tilt leaves as it is: towards the film
+  double width_um = 0.0;    ///< by the ink's larger width, which a tilt leaves as it is: towards the film
   double lateral_um = 0.0;  ///< by the ink's centroid: along x, to the side that is tilted towards the film
   double across_um = 0.0;   ///< likewise along y
 };
@@ -60,7 +60,7 @@ std::vector<double> reported_tilts();
 
 /// Calibrates and tilts one kind of marker. Each reading is the mean over four pictures that lie half a pixel apart on
 /// the pixels, so that what is left isn't the grid's luck. @throws Error as tilt_scene and read_tilt_picture
-TiltTable measure_tilt(const TiltBench& bench, const TiltSpectra& spectra, TiltMarker marker,
+TiltTable measure_tilt(const TiltSetup& setup, const TiltSpectra& spectra, TiltMarker marker,
                        std::span<const double> tilts, std::uint64_t seed, const Progress& progress = {});
 
 /// The whole experiment: flat, rigid and ball before the far and the compact camera, on the axis.

@@ -18,17 +18,17 @@ constexpr int kRimParts = 16;  // the picture's rim that white is measured on is
 
 /// The camera of [Lin2019], as far from a gel as thick as the device's as it is from the paper's, with pixels so small
 /// that the film has as many as are asked for. As on the device, the film stands before a marker of the usual side.
-TiltBench bench_of(const RenderedRungs& rungs) {
-  TiltBench bench = far_bench();
-  bench.camera_mm += kGel_mm - bench.gel_mm;
-  bench.gel_mm = kGel_mm;
-  const auto camera = std::get<render::LensCamera>(tilt_camera(bench));
-  bench.film_mm = bench.side_mm * (1.0 - kGel_mm / kGelIndex / camera.focus_distance_mm);
-  const double marker_px = bench.side_mm * camera.matrix.fx / camera.focus_distance_mm;
-  bench.pixel_pitch_um *= marker_px / rungs.filter_px;
-  bench.half_view_mm = bench.side_mm * (1.0 - 1e-9);  // a whole number of pixels mustn't be rounded up by one
-  bench.samples = rungs.samples;
-  return bench;
+TiltSetup setup_of(const RenderedRungs& rungs) {
+  TiltSetup setup = far_setup();
+  setup.camera_mm += kGel_mm - setup.gel_mm;
+  setup.gel_mm = kGel_mm;
+  const auto camera = std::get<render::LensCamera>(tilt_camera(setup));
+  setup.film_mm = setup.side_mm * (1.0 - kGel_mm / kGelIndex / camera.focus_distance_mm);
+  const double marker_px = setup.side_mm * camera.matrix.fx / camera.focus_distance_mm;
+  setup.pixel_pitch_um *= marker_px / rungs.filter_px;
+  setup.half_view_mm = setup.side_mm * (1.0 - 1e-9);  // a whole number of pixels mustn't be rounded up by one
+  setup.samples = rungs.samples;
+  return setup;
 }
 
 /// Black markers behind a film that takes no light; its faces in the gel reflect a thousandth.
@@ -57,19 +57,19 @@ std::vector<RobustnessRung> rendered_robustness_rungs(const TiltSpectra& spectra
          rungs.largest, kLargest);
   }
   if (!(rungs.filter_px >= 4.0)) fail("rendered markers: a film of {} px, at least 4 are needed", rungs.filter_px);
-  const TiltBench usual = bench_of(rungs);
+  const TiltSetup usual = setup_of(rungs);
   const TiltSpectra black = black_and_white(spectra);
   std::vector<RobustnessRung> made;
   double colour_exposure = 0.0, black_exposure = 0.0;
   for (int i = 0; i < rungs.count; ++i) {
     RobustnessRung rung;
     rung.displacement = rungs.smallest + (rungs.largest - rungs.smallest) * i / (rungs.count - 1);
-    TiltBench bench = usual;
-    bench.side_mm *= rung.displacement;
-    const auto look = [&](const TiltSpectra& colours, int part) {
-      return tilt_picture(bench, colours, TiltMarker::flat, {}, seed + static_cast<std::uint64_t>(2 * i + part));
+    TiltSetup setup = usual;
+    setup.side_mm *= rung.displacement;
+    const auto picture_of = [&](const TiltSpectra& colours, int part) {
+      return tilt_picture(setup, colours, TiltMarker::flat, {}, seed + static_cast<std::uint64_t>(2 * i + part));
     };
-    const cv::Mat colour = look(spectra, 0), grey = look(black, 1);
+    const cv::Mat colour = picture_of(spectra, 0), grey = picture_of(black, 1);
     if (i == 0) {
       colour_exposure = kWhite / white_of(colour);
       black_exposure = kWhite / white_of(grey);

@@ -1,13 +1,13 @@
 #pragma once
 // Fig. 6 of [Lin2019] with pictures that light made, in place of a drawing: markers of several sizes on the white
-// sheet, behind the yellow film, traced in bands on the bench of chroma_tilt_bench.h with the colours of
+// sheet, behind the yellow film, traced in bands on the setup of chroma_tilt_setup.h with the colours of
 // scenes/devices/chroma.yaml.
 
 #include <cstdint>
 #include <vector>
 
 #include "lab/chroma/chroma_robustness.h"
-#include "lab/chroma/chroma_tilt_bench.h"
+#include "lab/chroma/chroma_tilt_setup.h"
 
 namespace touchstone::lab {
 

@@ -20,15 +20,15 @@ std::vector<ValidationRow> validate_chroma_field(const ValidateOptions& options)
   RowList rows("chroma.field.", options, RowList::Since::last_row);
   const sim::VirtualSensor sensor(sim::read_device(options.scenes / "devices" / "chroma.yaml"), options.cache,
                                   chroma_sensor_settings(kUnit));
-  const ChromaBench bench(sensor, kRest);
-  const sensors::HueModel model = calibrate_field(bench, options.quick, kCalibration);
-  sensors::TractionInversion inversion = elastic_inversion(bench, options.cache, model.parallax);
+  const ChromaSetup setup(sensor, kRest);
+  const sensors::HueModel model = calibrate_field(setup, options.quick, kCalibration);
+  sensors::TractionInversion inversion = elastic_inversion(setup, options.cache, model.parallax);
   const auto add = [&](const std::string& id, const std::string& title, double ours_um) {
     rows.add_bounded(id, title, "um", Better::lower, kPublishedError_um, false, ours_um);
   };
   int number = 0;
   for (const PunchTest& punch : fig10_punches()) {
-    const FieldScore field = field_under(bench, model, inversion, punch.object, punch.height_mm, punch.depth_mm,
+    const FieldScore field = field_under(setup, model, inversion, punch.object, punch.height_mm, punch.depth_mm,
                                          {0.4, -0.3}, kTest + number++);
     const std::string under =
         fmt::format("a {} {:.1f} mm deep, {} of 100 markers measured", field.punch, punch.depth_mm, field.measured);
@@ -41,7 +41,8 @@ std::vector<ValidationRow> validate_chroma_field(const ValidateOptions& options)
         field.elastic_mean_um);
     add(field.punch + "_elastic_worst_um", "the same, the worst marker", field.elastic_worst_um);
     add(field.punch + "_lateral_um",
-        "of the field as told by markers alone: root mean square error of a lateral component", field.lateral_rms_um);
+        "of the field as estimated by markers alone: root mean square error of a lateral component",
+        field.lateral_rms_um);
     add(field.punch + "_press_um", "the same, root mean square of the normal component", field.press_rms_um);
   }
   return rows.rows();

@@ -1,8 +1,8 @@
 // Forces, friction and stick or slip from the chroma sensor's pictures ([Lin2019] leaves them open): punches and balls
-// are pressed on the gel and dragged until they slide; each frame's picture is read, its markers' displacements told by
-// a calibrated model and inverted. The paper gives no figure. Asked for here: forces to a tenth of the mean normal
-// force, as [VisioHaptic2024] asks for 0.1 N of some newtons; friction to 0.1, which tells rubber from steel and the
-// dry from the oiled.
+// are pressed on the gel and dragged until they slide; each frame's picture is read, its markers' displacements
+// estimated by a calibrated model and inverted. The paper gives no figure. Asked for here: forces to a tenth of the
+// mean normal force, as [VisioHaptic2024] asks for 0.1 N of some newtons; friction to 0.1, which tells rubber from
+// steel and the dry from the oiled.
 
 #include <cmath>
 #include <utility>
@@ -28,18 +28,18 @@ struct FieldNoise {
   double lateral_mm = 0.0, normal_mm = 0.0;
 };
 
-FieldNoise verify(const ForceBench& bench, const ChromaBench& camera, const sensors::HueModel& model, int count) {
+FieldNoise verify(const ForceSetup& setup, const ChromaSetup& camera, const sensors::HueModel& model, int count) {
   const DragSettings drag{.step_mm = 0.4, .frames_after = 3};
   FieldNoise noise;
   int markers = 0;
   std::uint64_t seed = kVerification;
   for (const ForceProbe& probe : draw_force_probes(count, kVerification)) {
-    const std::vector<ChromaLook> looks = photograph_probe(bench, camera, probe, drag, ++seed);
-    const std::vector<sensors::MarkerField> fields = fields_of(looks, camera, model, bench.compliance);
-    for (std::size_t k = 0; k < looks.size(); ++k) {
+    const std::vector<ChromaRecord> records = photograph_probe(setup, camera, probe, drag, ++seed);
+    const std::vector<sensors::MarkerField> fields = fields_of(records, camera, model, setup.compliance);
+    for (std::size_t k = 0; k < records.size(); ++k) {
       sensors::MarkerField truth = fields[k];
-      truth.displacement = looks[k].truth;
-      truth = sensors::as_seen(std::move(truth), bench.compliance, model.parallax);
+      truth.displacement = records[k].truth;
+      truth = sensors::as_seen(std::move(truth), setup.compliance, model.parallax);
       for (std::size_t m = 0; m < truth.displacement.size(); ++m) {
         if (!truth.measured[m]) continue;
         const Eigen::Vector3d error = fields[k].displacement[m] - truth.displacement[m];
@@ -105,20 +105,20 @@ void add_friction_rows(RowList& rows, const ForceScore& score, bool from_picture
 std::vector<ValidationRow> validate_chroma_force(const ValidateOptions& options) {
   RowList rows("", options, RowList::Since::begin);
   const sim::DeviceSpec device = sim::read_device(options.scenes / "devices" / "chroma.yaml");
-  ForceBench bench = set_up_force_bench(device, options.cache, options.progress);
+  ForceSetup setup = set_up_force(device, options.cache, options.progress);
   sim::VirtualSensorSettings light = chroma_sensor_settings(kUnit);
   light.widest_mm = kWidest_mm;
   const sim::VirtualSensor sensor(with_probe_mesh(device), options.cache, light);
-  const ChromaBench camera(sensor, kUnit);
+  const ChromaSetup camera(sensor, kUnit);
 
-  const sensors::HueModel model = calibrate_on_probes(bench, camera, options.quick, kCalibration);
-  const FieldNoise noise = verify(bench, camera, model, options.quick ? 2 : 3);
-  bench.inversion.lateral_noise_mm = bench.friction.lateral_noise_mm = noise.lateral_mm;
-  bench.inversion.normal_noise_mm = noise.normal_mm;
+  const sensors::HueModel model = calibrate_on_probes(setup, camera, options.quick, kCalibration);
+  const FieldNoise noise = verify(setup, camera, model, options.quick ? 2 : 3);
+  setup.inversion.lateral_noise_mm = setup.friction.lateral_noise_mm = noise.lateral_mm;
+  setup.inversion.normal_noise_mm = noise.normal_mm;
 
   // What the camera sees has parallax in it; the ideal is of displacements without.
-  const ForceBench straight = bench;
-  bench.compliance = sensors::as_seen(bench.compliance, model.parallax);
+  const ForceSetup straight = setup;
+  setup.compliance = sensors::as_seen(setup.compliance, model.parallax);
 
   DragSettings drag;
   drag.step_mm = options.quick ? 0.3 : 0.2;
@@ -127,9 +127,9 @@ std::vector<ValidationRow> validate_chroma_force(const ValidateOptions& options)
   std::uint64_t seed = kProbes;
   for (const ForceProbe& probe : draw_force_probes(options.quick ? 2 : 9, kProbes)) {
     const std::vector<sensors::MarkerField> fields =
-        fields_of(photograph_probe(bench, camera, probe, drag, ++seed), camera, model, straight.compliance);
-    pictures.push_back(run_force_probe(bench, probe, told_fields(fields), drag));
-    const MarkerReader noisy = noisy_truth(bench.compliance.marker_grid, noise.lateral_mm, noise.normal_mm, seed);
+        fields_of(photograph_probe(setup, camera, probe, drag, ++seed), camera, model, straight.compliance);
+    pictures.push_back(run_force_probe(setup, probe, fields_from(fields), drag));
+    const MarkerReader noisy = noisy_truth(setup.compliance.marker_grid, noise.lateral_mm, noise.normal_mm, seed);
     const MarkerReader ideal_reader = [&](const ForceFrame& frame) {
       sensors::MarkerField field = noisy(frame);
       field.measured = fields[static_cast<std::size_t>(frame.number)].measured;

@@ -36,21 +36,21 @@ constexpr double kLinear_r2 = 0.99;
 std::vector<ValidationRow> validate_chroma_marker(const ValidateOptions& options) {
   const sim::VirtualSensor sensor(sim::read_device(options.scenes / "devices" / "chroma.yaml"), options.cache,
                                   chroma_sensor_settings(kUnit));
-  const ChromaBench bench(sensor, kRest);
+  const ChromaSetup setup(sensor, kRest);
   const MarkerTest test;
-  const std::size_t marker = bench.marker_at(test.place_mm);
-  const sensors::ColourMarker& rest = bench.rest().markers[marker];
+  const std::size_t marker = setup.marker_at(test.place_mm);
+  const sensors::ColourMarker& rest = setup.rest().markers[marker];
   RowList rows("chroma.", options, RowList::Since::last_row);
 
   const int pictures = options.quick ? 10 : 50;
-  const std::vector<double> repeats = hue_repeats_deg(bench, kRest, pictures);
+  const std::vector<double> repeats = hue_repeats_deg(setup, kRest, pictures);
   const double repeat = std::accumulate(repeats.begin(), repeats.end(), 0.0) / static_cast<double>(repeats.size());
   rows.add("hue.repeat_deg", fmt::format("standard deviation of a marker's hue in {} pictures of one state", pictures),
            "deg", repeat, Better::lower, repeat <= kPublishedRepeat_deg)
       .published = kPublishedRepeat_deg;
 
-  const MarkerSeries press = press_series(bench, test, 3.0, options.quick ? 0.25 : 0.05, kPress);
-  const auto& [depths, hues] = hue_against_depth(bench, press, marker);
+  const MarkerSeries press = press_series(setup, test, 3.0, options.quick ? 0.25 : 0.05, kPress);
+  const auto& [depths, hues] = hue_against_depth(setup, press, marker);
   const StraightLine hue_line = line_through(depths, hues);
   {
     ValidationRow& row = rows.add(
@@ -71,7 +71,7 @@ std::vector<ValidationRow> validate_chroma_marker(const ValidateOptions& options
   const int depth_steps = options.quick ? 3 : 15;
   for (int k = 0; k <= depth_steps; ++k) {
     const double depth = 1.5 + 1.5 * k / depth_steps;
-    shears.push_back(shear_series(bench, test, depth, {1, 0}, options.quick ? 5 : 20, kShear + k));
+    shears.push_back(shear_series(setup, test, depth, {1, 0}, options.quick ? 5 : 20, kShear + k));
     std::vector<double> shift;
     for (const sensors::ColourMarker& seen : shears.back().seen) {
       shift.push_back((seen.centroid_px - rest.centroid_px).norm() * sensor.mm_per_px());
@@ -104,20 +104,20 @@ std::vector<ValidationRow> validate_chroma_marker(const ValidateOptions& options
   std::vector<MarkerSeries> tests;
   int number = 0;
   for (const double depth : {2.0, 2.5, 3.0}) {
-    tests.push_back(shear_series(bench, test, depth, {1, 1}, options.quick ? 5 : 10, kTest + number++));
+    tests.push_back(shear_series(setup, test, depth, {1, 1}, options.quick ? 5 : 10, kTest + number++));
   }
   std::vector<sensors::HueSample> samples = samples_of(press, marker, 0);
   for (std::size_t k = 0; k < shears.size(); ++k) {
     const auto more = samples_of(shears[k], marker, static_cast<int>(k) + 1);
     samples.insert(samples.end(), more.begin(), more.end());
   }
-  sensors::HueCalibrationSettings settings = hue_settings_of(bench);
+  sensors::HueCalibrationSettings settings = hue_settings_of(setup);
   settings.form = {.form = sensors::HueForm::kEquation4};
-  sensors::HueModel eq4 = sensors::calibrate_hue(bench.rest(), samples, settings);
+  sensors::HueModel eq4 = sensors::calibrate_hue(setup.rest(), samples, settings);
   // As the paper has it, the line of hue is that of the presses without shear.
   eq4.line.hue_slope = hue_line.slope * kRadiansPerDegree;
   eq4.line.hue_offset = hue_line.offset * kRadiansPerDegree;
-  const InverseScore linear = score_inverse(bench, eq4, marker, tests);
+  const InverseScore linear = score_inverse(setup, eq4, marker, tests);
   rows.add("inverse.r2", "lateral displacement by eq. 5 against the ball's at depths 2, 2.5 and 3 mm, the worst", "1",
            linear.worst_r2, Better::higher, linear.worst_r2 >= kPublishedInverse_r2)
       .published = kPublishedInverse_r2;
@@ -132,12 +132,12 @@ std::vector<ValidationRow> validate_chroma_marker(const ValidateOptions& options
   int series = static_cast<int>(shears.size()) + 1;
   for (const double depth : {1.75, 2.25, 2.75}) {
     const auto more =
-        samples_of(shear_series(bench, test, depth, {1, 1}, options.quick ? 5 : 10, kExtra + series), marker, series);
+        samples_of(shear_series(setup, test, depth, {1, 1}, options.quick ? 5 : 10, kExtra + series), marker, series);
     samples.insert(samples.end(), more.begin(), more.end());
     ++series;
   }
-  const sensors::HueModel best_model = best_hue_model(bench, samples, sensors::usual_hue_forms(), HueAim::displacement);
-  const InverseScore best = score_inverse(bench, best_model, marker, tests);
+  const sensors::HueModel best_model = best_hue_model(setup, samples, sensors::usual_hue_forms(), HueAim::displacement);
+  const InverseScore best = score_inverse(setup, best_model, marker, tests);
   const std::string form = summary_of(best_model);
   rows.add("inverse.nonlinear_error_um", fmt::format("largest error of a lateral component by {}", form), "um",
            best.largest_lateral_um, Better::lower, best.largest_lateral_um <= kPublishedError_um)
@@ -148,8 +148,8 @@ std::vector<ValidationRow> validate_chroma_marker(const ValidateOptions& options
   rows.add("inverse.nonlinear_rms_um", fmt::format("root mean square error of a component by {}", form), "um",
            best.rms_um, Better::lower, best.rms_um <= linear.rms_um)
       .reference = linear.rms_um;
-  const sensors::HueModel alone_model = best_hue_model(bench, samples, forms_of_one_marker(), HueAim::displacement);
-  const InverseScore alone = score_inverse(bench, alone_model, marker, tests);
+  const sensors::HueModel alone_model = best_hue_model(setup, samples, forms_of_one_marker(), HueAim::displacement);
+  const InverseScore alone = score_inverse(setup, alone_model, marker, tests);
   rows.add("inverse.alone_press_error_um",
            fmt::format("largest error of the normal component by {}", summary_of(alone_model)), "um",
            alone.largest_press_um, Better::lower, alone.largest_press_um <= kPublishedError_um)

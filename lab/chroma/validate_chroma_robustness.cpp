@@ -8,7 +8,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/seconds_since.h"
-#include "lab/chroma/chroma_bench.h"
+#include "lab/chroma/chroma_setup.h"
 #include "lab/chroma/rendered_robustness.h"
 #include "lab/gelsight/gelsight_height_experiment.h"
 #include "lab/validation/row_list.h"
@@ -54,7 +54,7 @@ struct Clip {
 Clip make_clip(const ValidateOptions& options) {
   const sim::VirtualSensor sensor(sim::read_device(options.scenes / "devices" / "chroma.yaml"), options.cache,
                                   chroma_sensor_settings(kSeed));
-  const ChromaBench bench(sensor, kSeed);
+  const ChromaSetup setup(sensor, kSeed);
   const sim::ObjectSpec ball = with_friction(ball_of(8.0), 1.0);
   sim::MotionSpec motion;
   const double touching = sim::first_touch({}, ball, sensor.device().gel);
@@ -70,12 +70,12 @@ Clip make_clip(const ValidateOptions& options) {
   states.erase(states.begin());  // the ball only just touches
   Clip clip;
   clip.rest = sensor.background(kSeed);
-  clip.frames = bench.pictures(touched, states, kSeed);
+  clip.frames = setup.pictures(touched, states, kSeed);
   sensors::HueCalibrationSettings settings;
-  settings.spacing_mm = bench.spacing_mm();
+  settings.spacing_mm = setup.spacing_mm();
   settings.parallax = parallax_of(sensor.device());
-  const std::vector<sensors::HueSample> samples = samples_of_moved(bench.read(clip.frames, states), 0.02, 0);
-  clip.model = sensors::calibrate_hue(bench.rest(), samples, settings);
+  const std::vector<sensors::HueSample> samples = samples_of_moved(setup.read(clip.frames, states), 0.02, 0);
+  clip.model = sensors::calibrate_hue(setup.rest(), samples, settings);
   return clip;
 }
 
@@ -142,7 +142,7 @@ std::vector<ValidationRow> validate_chroma_robustness(const ValidateOptions& opt
                     what),
         "1", few.size_r2, Better::near, few.hue_r2 > few.size_r2);
     size.published = kPublishedSizeR2;
-    if (!size_is_lost(few)) deny(size, "the size of a marker of 4 x 4 px tells little of a displacement");
+    if (!size_is_lost(few)) deny(size, "the size of a marker of 4 x 4 px shows little of a displacement");
     size.series = series(&PixelRobustness::size_r2, "R2 by size");
   };
   const auto add_gradient = [&](const Ladder& ladder, double marker_px, const std::string& suffix,

@@ -25,7 +25,7 @@ struct Electronics {
   std::uint64_t seed = 0;
 };
 
-void take_truth(const sim::Truth& truth, ShownState& state) {
+void take_truth(const sim::Truth& truth, CameraState& state) {
   state.frame = truth.frame;
   state.t_us = truth.t_us;
   state.force_N = truth.press.wrench.head<3>();
@@ -80,7 +80,7 @@ SceneFeed feed_of_scene(const sim::SceneSpec& scene_of, const std::filesystem::p
   feed.states.resize(truths.size());
   std::atomic<std::int64_t> done{0};
   tbb::parallel_for(std::size_t{0}, truths.size(), [&](std::size_t i) {
-    auto state = std::make_shared<ShownState>();
+    auto state = std::make_shared<CameraState>();
     take_truth(truths[i], *state);
     state->what = fmt::format("{}, {} in frame {}", scene.device.name, scene.object.name, truths[i].frame);
     const cv::Mat light = camera(truths[i]).radiance;
@@ -111,8 +111,8 @@ SceneFeed feed_of_scene(const sim::SceneSpec& scene_of, const std::filesystem::p
   return feed;
 }
 
-ShownState shown_state(const sim::Touch& held) {
-  ShownState state;
+CameraState camera_state(const sim::Touch& held) {
+  CameraState state;
   state.what = held.what;
   state.force_N = held.force_N();
   state.force_error_N = held.error.force;
@@ -123,7 +123,7 @@ ShownState shown_state(const sim::Touch& held) {
   return state;
 }
 
-std::string to_json(const ShownState& state, const std::string& more) {
+std::string to_json(const CameraState& state, const std::string& more) {
   nlohmann::ordered_json json = {{"what", state.what},
                                  {"scene_frame", state.frame},
                                  {"t_us", state.t_us},

@@ -1,6 +1,6 @@
 #pragma once
 // What a virtual camera shows over time, for programs that open it like a real one (`touchstone serve`): the frames of
-// a scene, or a device that is told what presses it. Light is computed once; each time that a frame is shown it is
+// a scene, or a device that gets presses on request. Light is computed once; each time that a frame is shown it is
 // exposed anew, with noise of its own.
 
 #include <Eigen/Core>
@@ -23,7 +23,7 @@
 namespace touchstone::lab {
 
 /// One state of what is shown. Forces are on the (first) object, gel frame.
-struct ShownState {
+struct CameraState {
   std::string what;       ///< in words
   int frame = 0;          ///< of the scene; 0 of a device
   std::int64_t t_us = 0;  ///< in the scene's time
@@ -40,7 +40,7 @@ struct SceneFeed {
   std::string device;
   double frame_rate_Hz = 30.0;
   cv::Size size;
-  std::vector<std::shared_ptr<const ShownState>> states;  ///< one a frame
+  std::vector<std::shared_ptr<const CameraState>> states;  ///< one a frame
   bool has_events = false;
   std::vector<Event> events;   ///< from 0 to the last frame's time
   std::int64_t period_us = 0;  ///< from one showing to the next: a frame longer than the events
@@ -55,10 +55,10 @@ SceneFeed feed_of_scene(const sim::SceneSpec& scene, const std::filesystem::path
                         const Progress& progress = {});
 
 /// A device's hold as a state that can be shown; the device must outlive it.
-ShownState shown_state(const sim::Touch& held);
+CameraState camera_state(const sim::Touch& held);
 
 /// One line of JSON: what, scene_frame, t_us, force_N, force_error_N, torque_Nmm, gel_from_object (3 rows of 4, or
 /// null), contact_area_mm2; `more` (JSON members, "\"a\": 1, ") stands before them.
-std::string to_json(const ShownState& state, const std::string& more = "");
+std::string to_json(const CameraState& state, const std::string& more = "");
 
 }  // namespace touchstone::lab

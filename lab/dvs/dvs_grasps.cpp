@@ -34,7 +34,7 @@ DvsGraspParameters draw_dvs_grasp(int material, const sim::ObjectSpec& piece, st
   if (material < 0 || material >= static_cast<int>(dvs_materials().size())) {
     fail("material {} is asked for, there are {}", material, dvs_materials().size());
   }
-  for (const double part : {spread.force, spread.bench, spread.pose}) {
+  for (const double part : {spread.force, spread.setup, spread.pose}) {
     if (!(part >= 0.0 && part <= 1.0)) fail("a part of {} of the grasps' spread is asked for, 0 to 1 can be", part);
   }
   const DvsMaterial& of = dvs_materials()[static_cast<std::size_t>(material)];
@@ -56,18 +56,18 @@ DvsGraspParameters draw_dvs_grasp(int material, const sim::ObjectSpec& piece, st
   p.rms_slope = std::hypot(kMembraneSlope, of.rms_slope) * even(0.9, 1.1);
   p.motion.clearance_mm = even(0.6, 1.4, spread.pose);
   p.motion.target_force_N = even(0.3, 3.5, spread.force);
-  p.motion.closing_mm_s = even(13.0, 20.0, spread.bench);
-  p.motion.opening_mm_s = even(30.0, 60.0, spread.bench);
-  p.finger.ring_Hz = even(20.0, 32.0, spread.bench);
-  p.finger.damping = even(0.07, 0.15, spread.bench);
-  p.finger.shake_um = even(1.0, 5.0, spread.bench);
-  p.light_level = even(0.8, 1.25, spread.bench);
+  p.motion.closing_mm_s = even(13.0, 20.0, spread.setup);
+  p.motion.opening_mm_s = even(30.0, 60.0, spread.setup);
+  p.finger.ring_Hz = even(20.0, 32.0, spread.setup);
+  p.finger.damping = even(0.07, 0.15, spread.setup);
+  p.finger.shake_um = even(1.0, 5.0, spread.setup);
+  p.light_level = even(0.8, 1.25, spread.setup);
   p.noise_seed = seed * kSeedsApart + index;
   p.motion.shake_seed = p.noise_seed;
   return p;
 }
 
-DvsGraspBench::DvsGraspBench(const std::filesystem::path& scenes, const std::filesystem::path& cache_folder)
+DvsGraspSetup::DvsGraspSetup(const std::filesystem::path& scenes, const std::filesystem::path& cache_folder)
     : device_(sim::read_device(scenes / "devices/dvs-grasp.yaml")), gel_(sim::set_up_gel(device_, cache_folder)) {
   for (const DvsMaterial& material : dvs_materials()) {
     pieces_.push_back(sim::read_object(scenes / material.object_file));
@@ -78,7 +78,7 @@ DvsGraspBench::DvsGraspBench(const std::filesystem::path& scenes, const std::fil
   }
 }
 
-std::vector<DvsGraspParameters> DvsGraspBench::draw(std::uint64_t seed, const DvsSpread& spread) const {
+std::vector<DvsGraspParameters> DvsGraspSetup::draw(std::uint64_t seed, const DvsSpread& spread) const {
   std::vector<DvsGraspParameters> all;
   for (int material = 0; material < static_cast<int>(pieces_.size()); ++material) {
     for (int k = 0; k < dvs_materials()[static_cast<std::size_t>(material)].grasps; ++k) {
@@ -88,7 +88,7 @@ std::vector<DvsGraspParameters> DvsGraspBench::draw(std::uint64_t seed, const Dv
   return all;
 }
 
-DvsGrasp DvsGraspBench::play(const DvsGraspParameters& parameters, const sim::ReferenceForceSensorSettings& sensor,
+DvsGrasp DvsGraspSetup::play(const DvsGraspParameters& parameters, const sim::ReferenceForceSensorSettings& sensor,
                              const sim::GrippedFaceSettings& face) const {
   const auto at = static_cast<std::size_t>(parameters.material);
   if (parameters.material < 0 || at >= pieces_.size()) {

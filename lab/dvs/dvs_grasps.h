@@ -49,16 +49,16 @@ struct DvsGraspParameters {
 struct DvsSpread {
   double force = 1.0;  ///< wanted
   double pose = 1.0;   ///< place, yaw, pitch, roll and clearance: a piece is put in by hand
-  /// Speeds, ring and damping, the bench's motion, light. The paper's grasps are one gripper's, in one room, under one
-  /// program; 1 is as many benches as grasps.
-  double bench = 0.1;
+  /// Speeds, ring and damping, the setup's motion, light. The paper's grasps are one gripper's, in one light, under one
+  /// program; 1 is as many setups as grasps.
+  double setup = 0.1;
 };
 
 /// What the paper leaves open is drawn evenly or, with (s), normally with that deviation, cut at 2.5 of them. Force
 /// wanted 0.3 to 3.5 N (the servo's steps make 0.15 to 3.7 N of it). Pose: place x +-1, y +-2 mm; yaw (1.5), pitch
 /// (0.06), roll (0.1 degrees: what the fingers' alignment leaves once the silicone on both has given way), clearance
 /// 0.6 to 1.4 mm. Piece and face, always in full: ln E (the material's); friction 0.5 to 1.2; roughness 0.9 to 1.1
-/// times. Bench: closing 13 to 20 mm/s, opening 30 to 60 mm/s; ring 20 to 32 Hz, damping 0.07 to 0.15, motion 1 to 5
+/// times. Setup: closing 13 to 20 mm/s, opening 30 to 60 mm/s; ring 20 to 32 Hz, damping 0.07 to 0.15, motion 1 to 5
 /// um; light 0.8 to 1.25 times. A pure function of seed, index and what is given.
 /// @throws Error for a material that isn't there, or a spread that isn't 0 to 1
 DvsGraspParameters draw_dvs_grasp(int material, const sim::ObjectSpec& piece, std::uint64_t seed, std::uint64_t index,
@@ -73,10 +73,10 @@ struct DvsGrasp {
 };
 
 /// The device and the four pieces, set up once. Safe to use from many threads.
-class DvsGraspBench {
+class DvsGraspSetup {
  public:
   /// @throws Error for scene files that are missing or wrong
-  DvsGraspBench(const std::filesystem::path& scenes, const std::filesystem::path& cache_folder);
+  DvsGraspSetup(const std::filesystem::path& scenes, const std::filesystem::path& cache_folder);
 
   const sim::DeviceSpec& device() const { return device_; }
   const sim::ObjectSpec& piece(int material) const { return pieces_[static_cast<std::size_t>(material)]; }

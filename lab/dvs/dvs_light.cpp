@@ -28,21 +28,21 @@ void refine(const Pictures::value_type& before, const Pictures::value_type& afte
 
 }  // namespace
 
-render::FaceState dvs_face(const DvsGraspBench& bench, const sim::MembraneCamera& camera, const DvsGrasp& grasp,
+render::FaceState dvs_face(const DvsGraspSetup& setup, const sim::MembraneCamera& camera, const DvsGrasp& grasp,
                            double travel_mm) {
-  const sim::ObjectSpec& piece = bench.piece(grasp.parameters.material);
+  const sim::ObjectSpec& piece = setup.piece(grasp.parameters.material);
   const sim::GripPoint point = grasp.face->at_travel(travel_mm);
   const sim::FaceMap map = grasp.face->map(point);
   return sim::face_state(camera.grid(), grasp.face->grid(), map.coverage, map.gap_mm, sim::kNoPiece_mm,
-                         sim::in_one_band(bench.device(), piece.albedo, "albedo"),
+                         sim::in_one_band(setup.device(), piece.albedo, "albedo"),
                          piece.shape.across_flats_mm - point.approach_mm);
 }
 
-DvsTravelLight::DvsTravelLight(const DvsGraspBench& bench, const sim::MembraneCamera& camera, const DvsGrasp& grasp,
+DvsTravelLight::DvsTravelLight(const DvsGraspSetup& setup, const sim::MembraneCamera& camera, const DvsGrasp& grasp,
                                const render::EventPixelSettings& pixels, double allowed)
     : dark_(pixels.dark_intensity) {
   const auto picture = [&](double travel) {
-    const cv::Mat light = camera.photocurrent(dvs_face(bench, camera, grasp, travel));
+    const cv::Mat light = camera.photocurrent(dvs_face(setup, camera, grasp, travel));
     return render::log_intensity(light * grasp.parameters.light_level, pixels);
   };
   const std::vector<sim::FingerMoment>& moments = grasp.run.moments;

@@ -1,7 +1,7 @@
 #pragma once
 // The light that a grasp of lab/dvs/dvs_grasps.h puts on the event camera's pixels.
 //
-// What the membrane shows hangs on the finger's travel alone (sim/grasp/gripped_face.h), and to and fro it passes the
+// What the membrane shows depends on the finger's travel alone (sim/grasp/gripped_face.h), and to and fro it passes the
 // same travels. So a grasp's light is pictures at some travels, the logarithm running straight between two: as many as
 // bring that near to pictures made in between.
 
@@ -18,7 +18,7 @@
 namespace touchstone::lab {
 
 /// What stands before the membrane when the finger is at a travel. @throws Error as sim::GrippedFace::at_travel
-render::FaceState dvs_face(const DvsGraspBench& bench, const sim::MembraneCamera& camera, const DvsGrasp& grasp,
+render::FaceState dvs_face(const DvsGraspSetup& setup, const sim::MembraneCamera& camera, const DvsGrasp& grasp,
                            double travel_mm);
 
 /// Of any travel that a grasp's finger makes. Immutable.
@@ -27,7 +27,7 @@ class DvsTravelLight {
   /// Refines until a picture in the middle between two is off by `allowed` at most, in any pixel's natural logarithm of
   /// the photocurrent (plus `pixels`' dark one); that picture is then taken as well.
   /// @throws Error as dvs_face and render::log_intensity
-  DvsTravelLight(const DvsGraspBench& bench, const sim::MembraneCamera& camera, const DvsGrasp& grasp,
+  DvsTravelLight(const DvsGraspSetup& setup, const sim::MembraneCamera& camera, const DvsGrasp& grasp,
                  const render::EventPixelSettings& pixels, double allowed);
 
   /// The travels of the pictures that were made, mm, rising; at least two.

@@ -108,7 +108,7 @@ DvsRecordSettings own_pixels(const sim::DeviceSpec& device) {
   return settings;
 }
 
-DvsRecording record_dvs_grasp(const DvsGraspBench& bench, const sim::MembraneCamera& camera,
+DvsRecording record_dvs_grasp(const DvsGraspSetup& setup, const sim::MembraneCamera& camera,
                               const DvsGraspParameters& parameters, const DvsRecordSettings& settings,
                               const sim::EventSink& sink) {
   if (settings.pixels.empty()) fail("a grasp's recording: no event pixels are given; at least one kind is needed");
@@ -116,9 +116,9 @@ DvsRecording record_dvs_grasp(const DvsGraspBench& bench, const sim::MembraneCam
   if (!(settings.tolerance > 0.0 && settings.tolerance <= 0.5)) {
     fail("a grasp's recording: tolerance is {}; allowed is above 0 to 0.5", settings.tolerance);
   }
-  const DvsGrasp grasp = bench.play(parameters, settings.force_sensor);
+  const DvsGrasp grasp = setup.play(parameters, settings.force_sensor);
   const double allowed = settings.tolerance * smallest_threshold(settings.pixels);
-  const DvsTravelLight light(bench, camera, grasp, settings.pixels.front(), allowed);
+  const DvsTravelLight light(setup, camera, grasp, settings.pixels.front(), allowed);
 
   const std::vector<sim::FingerMoment>& moments = grasp.run.moments;
   const cv::Mat first = light.photocurrent_at(moments.front().travel_mm);
@@ -128,7 +128,7 @@ DvsRecording record_dvs_grasp(const DvsGraspBench& bench, const sim::MembraneCam
   for (std::size_t k = 1; k < moments.size(); ++k) {
     const double change = light.path_at(moments[k].travel_mm) - light.path_at(moments[shown].travel_mm);
     if (std::abs(change) < allowed && k + 1 < moments.size()) continue;
-    // Until the moment before nothing worth telling has changed.
+    // Until the moment before nothing worth a picture has changed.
     sim::FingerMoment before = moments[k - 1];
     if (k - 1 > shown) {
       before.travel_mm = moments[shown].travel_mm;
@@ -150,7 +150,7 @@ DvsRecording record_dvs_grasp(const DvsGraspBench& bench, const sim::MembraneCam
   return recording;
 }
 
-std::vector<DvsRecording> record_dvs_grasps(const DvsGraspBench& bench, const sim::MembraneCamera& camera,
+std::vector<DvsRecording> record_dvs_grasps(const DvsGraspSetup& setup, const sim::MembraneCamera& camera,
                                             std::span<const DvsGraspParameters> grasps,
                                             const DvsRecordSettings& settings, const Progress& progress) {
   std::vector<DvsRecording> recordings(grasps.size());
@@ -160,7 +160,7 @@ std::vector<DvsRecording> record_dvs_grasps(const DvsGraspBench& bench, const si
       [&](const tbb::blocked_range<std::size_t>& range) {
         for (std::size_t k = range.begin(); k != range.end(); ++k) {
           // A thread that waits for the rest of a picture's pixels takes no other grasp meanwhile.
-          tbb::this_task_arena::isolate([&] { recordings[k] = record_dvs_grasp(bench, camera, grasps[k], settings); });
+          tbb::this_task_arena::isolate([&] { recordings[k] = record_dvs_grasp(setup, camera, grasps[k], settings); });
           if (progress) progress("grasps", ++done, static_cast<std::int64_t>(grasps.size()));
         }
       },

@@ -14,7 +14,7 @@
 
 namespace touchstone::lab {
 
-/// What one kind of event pixels told of a grasp.
+/// What one kind of event pixels recorded of a grasp.
 struct DvsEvents {
   std::vector<sensors::EventCounts> counts;  ///< per millisecond, from the recording's start
   std::int64_t events = 0;                   ///< all, also those of a last millisecond that isn't whole
@@ -26,7 +26,7 @@ struct DvsRecording {
   std::vector<DvsEvents> by_pixels;         ///< one of each kind of event pixels that was asked for
   std::vector<sim::ForceReading> readings;  ///< from the first touch on; seconds on the recording's clock
   double touch_s = 0.0;                     ///< truth: the first touch
-  double release_s = 0.0;                   ///< truth: the servo is told to open
+  double release_s = 0.0;                   ///< truth: the servo is commanded to open
   double apart_s = 0.0;                     ///< truth: the last moment of contact
   std::int64_t pictures = 0;                ///< made of the membrane
   std::int64_t steps = 0;                   ///< of each event pixel, from one light to the next
@@ -46,14 +46,14 @@ struct DvsRecordSettings {
 DvsRecordSettings own_pixels(const sim::DeviceSpec& device);
 
 /// Plays a grasp and watches it, from the time 0 to the last moment that is played. `sink` is given the events of the
-/// first kind of pixels. The same for any number of threads. @throws Error as DvsGraspBench::play and EventPixels, for
+/// first kind of pixels. The same for any number of threads. @throws Error as DvsGraspSetup::play and EventPixels, for
 /// settings that make no sense
-DvsRecording record_dvs_grasp(const DvsGraspBench& bench, const sim::MembraneCamera& camera,
+DvsRecording record_dvs_grasp(const DvsGraspSetup& setup, const sim::MembraneCamera& camera,
                               const DvsGraspParameters& parameters, const DvsRecordSettings& settings,
                               const sim::EventSink& sink = {});
 
 /// Grasps side by side, in the order given. @throws Error as record_dvs_grasp
-std::vector<DvsRecording> record_dvs_grasps(const DvsGraspBench& bench, const sim::MembraneCamera& camera,
+std::vector<DvsRecording> record_dvs_grasps(const DvsGraspSetup& setup, const sim::MembraneCamera& camera,
                                             std::span<const DvsGraspParameters> grasps,
                                             const DvsRecordSettings& settings, const Progress& progress = {});
 

@@ -14,10 +14,10 @@ constexpr std::uint64_t kSeed = 4801;  // choices were made on the grasps of 470
 constexpr double kWatched_s = 0.2;
 constexpr int kQuickGrasps = 4;
 
-std::vector<DvsGraspParameters> grasps_of(const DvsGraspBench& bench, bool quick, const DvsSpread& spread = {}) {
+std::vector<DvsGraspParameters> grasps_of(const DvsGraspSetup& setup, bool quick, const DvsSpread& spread = {}) {
   std::vector<DvsGraspParameters> chosen;
   std::array<int, 4> of_each{};
-  for (DvsGraspParameters grasp : bench.draw(kSeed, spread)) {
+  for (DvsGraspParameters grasp : setup.draw(kSeed, spread)) {
     if (quick && ++of_each.at(static_cast<std::size_t>(grasp.material)) > kQuickGrasps) continue;
     grasp.motion.rest_s = kWatched_s;
     chosen.push_back(grasp);
@@ -39,9 +39,9 @@ DvsRecordings kept(const std::string& name, const auto& made) {
 
 DvsRecordings dvs_row_recordings(const ValidateOptions& options) {
   return kept((options.quick ? "quick " : "all ") + options.scenes.string(), [&] {
-    const DvsGraspBench bench(options.scenes, options.cache);
-    const sim::MembraneCamera camera(bench.device());
-    DvsRecordSettings settings = own_pixels(bench.device());
+    const DvsGraspSetup setup(options.scenes, options.cache);
+    const sim::MembraneCamera camera(setup.device());
+    DvsRecordSettings settings = own_pixels(setup.device());
     const render::EventPixelSettings own = settings.pixels.front();
     settings.pixels.clear();
     for (const DvsPixelKind& kind : kDvsPixelKinds) {
@@ -52,15 +52,15 @@ DvsRecordings dvs_row_recordings(const ValidateOptions& options) {
       pixels.off_threshold *= kind.thresholds;
       if (options.quick) break;
     }
-    return record_dvs_grasps(bench, camera, grasps_of(bench, options.quick), settings, options.progress);
+    return record_dvs_grasps(setup, camera, grasps_of(setup, options.quick), settings, options.progress);
   });
 }
 
 DvsRecordings dvs_alike_recordings(const ValidateOptions& options, const std::string& name, const DvsSpread& spread) {
   return kept(name + " " + options.scenes.string(), [&] {
-    const DvsGraspBench bench(options.scenes, options.cache);
-    const sim::MembraneCamera camera(bench.device());
-    return record_dvs_grasps(bench, camera, grasps_of(bench, false, spread), own_pixels(bench.device()),
+    const DvsGraspSetup setup(options.scenes, options.cache);
+    const sim::MembraneCamera camera(setup.device());
+    return record_dvs_grasps(setup, camera, grasps_of(setup, false, spread), own_pixels(setup.device()),
                              options.progress);
   });
 }

@@ -34,7 +34,7 @@ using DvsRecordings = std::shared_ptr<const std::vector<DvsRecording>>;
 /// parts
 DvsRecordings dvs_row_recordings(const ValidateOptions& options);
 
-/// The same 48, but more alike, seen by the first kind. `name` tells one spread from another.
+/// The same 48, but more alike, seen by the first kind. `name` distinguishes the spreads.
 DvsRecordings dvs_alike_recordings(const ValidateOptions& options, const std::string& name, const DvsSpread& spread);
 
 }  // namespace touchstone::lab

@@ -32,8 +32,8 @@ struct DvsSequence {
   sensors::GraspSequence windows;
   Eigen::VectorXd measured_N;     ///< by the reference sensor, with its errors: what the paper trains and tests on
   Eigen::VectorXd true_N;         ///< what the finger really pressed
-  double touch_delay_ms = 0.0;    ///< from the true touch to the end of the window that tells it
-  double release_delay_ms = 0.0;  ///< from the servo's order to open to the end of the window that tells it
+  double touch_delay_ms = 0.0;    ///< from the true touch to the end of the window that shows it
+  double release_delay_ms = 0.0;  ///< from the servo's order to open to the end of the window that shows it
   double apart_ms = 0.0;          ///< from the end of that window to the last moment of contact
 
   double peak_true_N() const { return true_N.maxCoeff(); }
@@ -66,7 +66,7 @@ enum class DvsForce { measured, truth };
 enum class DvsInputs {
   counts,           ///< accumulated ON and OFF: networks
   counts_and_time,  ///< Gaussian processes (sec. III.D)
-  time,             ///< a control: what can be told without having seen anything but the touch
+  time,             ///< a control: what can be estimated without having seen anything but the touch
 };
 
 /// Inputs and force of the judged windows, a series for each grasp.

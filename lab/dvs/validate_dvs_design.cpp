@@ -1,11 +1,11 @@
-// What force an event-driven membrane can tell, and what its thickness and stiffness do to that. [Naeini2020, sec. VI]:
-// "able to capture contact area changes for the contact forces up to 3.7 N", and "membrane properties such as
+// What force an event-driven membrane can measure, and what its thickness and stiffness do to that. [Naeini2020, sec.
+// VI]: "able to capture contact area changes for the contact forces up to 3.7 N", and "membrane properties such as
 // stiffness, shape, and thickness as well as DVS threshold can be altered in order to change the measurement range".
 //
 // A rigid piece is pressed level on the membrane, ever harder. What its contact adds to the change of light, counted in
-// OFF thresholds over all pixels, is what events can tell of the force: it grows while the faces' roughness is pressed
-// flat, and then no more. The range ends where nine tenths are told of what three times the paper's largest force would
-// tell.
+// OFF thresholds over all pixels, is what events can show of the force: it grows while the faces' roughness is pressed
+// flat, and then no more. The range ends where nine tenths are reached of what three times the paper's largest force
+// would give.
 
 #include <algorithm>
 #include <cmath>
@@ -21,7 +21,7 @@ namespace {
 
 constexpr double kPublishedRange_N = 3.7;
 constexpr double kHardest_N = 3.0 * kPublishedRange_N;
-constexpr double kToldShare = 0.9;
+constexpr double kUpperShare = 0.9;
 constexpr int kSteel = 3;
 constexpr double kLeastChange = 0.1;   // of a range's end: less is none
 constexpr double kFew_events = 100.0;  // a touch of so many stands out of some 35 events of noise in 7 ms
@@ -36,22 +36,22 @@ struct Membrane {
 };
 
 struct MembraneRange {
-  double low_N = 0.0;                           ///< where the contact has told kFew_events
-  double high_N = 0.0;                          ///< where it has told kToldShare of all
-  double events = 0.0;                          ///< at kHardest_N
-  double depth_mm = 0.0;                        ///< of the piece at high_N
-  std::vector<std::pair<double, double>> told;  ///< events by force
+  double low_N = 0.0;                                      ///< where the contact has given kFew_events
+  double high_N = 0.0;                                     ///< where it has given kUpperShare of all
+  double events = 0.0;                                     ///< at kHardest_N
+  double depth_mm = 0.0;                                   ///< of the piece at high_N
+  std::vector<std::pair<double, double>> events_by_force;  ///< events by force
 };
 
 /// Where a rising curve passes a level; its last force if it doesn't.
-double force_at(const std::vector<std::pair<double, double>>& told, double level) {
-  for (std::size_t k = 1; k < told.size(); ++k) {
-    if (told[k].second < level) continue;
-    const auto [f0, n0] = told[k - 1];
-    const auto [f1, n1] = told[k];
+double force_at(const std::vector<std::pair<double, double>>& events_by_force, double level) {
+  for (std::size_t k = 1; k < events_by_force.size(); ++k) {
+    if (events_by_force[k].second < level) continue;
+    const auto [f0, n0] = events_by_force[k - 1];
+    const auto [f1, n1] = events_by_force[k];
     return n1 > n0 ? f0 + (f1 - f0) * (level - n0) / (n1 - n0) : f1;
   }
-  return told.back().first;
+  return events_by_force.back().first;
 }
 
 MembraneRange try_membrane(const Membrane& membrane, const ValidateOptions& options) {
@@ -81,11 +81,11 @@ MembraneRange try_membrane(const Membrane& membrane, const ValidateOptions& opti
   for (const sim::GripPoint& state : face.states()) {
     cv::Mat darker = touch - log_at(state);
     cv::max(darker, 0.0, darker);
-    range.told.emplace_back(state.normal_N, cv::sum(darker)[0] / pixels.off_threshold);
+    range.events_by_force.emplace_back(state.normal_N, cv::sum(darker)[0] / pixels.off_threshold);
   }
-  range.events = range.told.back().second;
-  range.low_N = force_at(range.told, kFew_events);
-  range.high_N = force_at(range.told, kToldShare * range.events);
+  range.events = range.events_by_force.back().second;
+  range.low_N = force_at(range.events_by_force, kFew_events);
+  range.high_N = force_at(range.events_by_force, kUpperShare * range.events);
   range.depth_mm = face.at_normal_force(range.high_N).approach_mm;
   return range;
 }
@@ -116,13 +116,13 @@ std::vector<ValidationRow> validate_dvs_design(const ValidateOptions& options) {
     const MembraneRange range = try_membrane(membrane, options);
     ValidationRow& row = rows.add(
         fmt::format("{}_range_N", membrane.name),
-        fmt::format("membrane of {:g} mm and {:g} MPa: force to which contact goes on to tell, {:.0f} % of {:.0f} "
+        fmt::format("membrane of {:g} mm and {:g} MPa: force up to which contact adds events, {:.0f} % of {:.0f} "
                     "OFF events; from {:.2g} N on, {:.2g} mm deep",
-                    membrane.thickness_mm, membrane.youngs_modulus_MPa, 100.0 * kToldShare, range.events, range.low_N,
+                    membrane.thickness_mm, membrane.youngs_modulus_MPa, 100.0 * kUpperShare, range.events, range.low_N,
                     range.depth_mm),
         "N", range.high_N, Better::near, true);
     const bool by_thickness_alone = membrane.youngs_modulus_MPa == membranes[0].youngs_modulus_MPa;
-    row.series = ValidationSeries{"force, N", "OFF events that contact tells", range.told};
+    row.series = ValidationSeries{"force, N", "OFF events that contact gives", range.events_by_force};
     if (i == 0) {
       // Roughness was chosen so (lab/dvs/dvs_grasps.h): a check that it still is, within a factor of the paper's.
       row.title += "; no finding, the faces' roughness was chosen for it";
@@ -156,7 +156,7 @@ std::vector<ValidationRow> validate_dvs_design(const ValidateOptions& options) {
   };
   spread("thickness_changes_range", "largest over smallest end of the range, by the membrane's thickness",
          "membrane's thickness, mm", "range's end, N", by_thickness, kOfThickness);
-  spread("thickness_changes_first_force", "largest over smallest force that a touch is told from, by the thickness",
+  spread("thickness_changes_first_force", "largest over smallest force that a touch is detected from, by the thickness",
          "membrane's thickness, mm", "range's beginning, N", first_by_thickness, kOfThickness);
   spread("stiffness_changes_range", "largest over smallest end of the range, by the membrane's modulus",
          "membrane's modulus, MPa", "range's end, N", by_modulus, kOfStiffness);

@@ -139,7 +139,7 @@ std::vector<ValidationRow> validate_dvs_force(const ValidateOptions& options) {
   const auto all = static_cast<double>(recordings->size());
   rows.add_bounded(
       "touch.seen_percent",
-      fmt::format("of {} grasps, those whose touch and release are told; the hardest that isn't presses by "
+      fmt::format("of {} grasps, those whose touch and release are detected; the hardest that isn't presses by "
                   "{:.2f} N",
                   recordings->size(), sequences.unseen_peak_N),
       "%", Better::higher, 90.0, false, 100.0 * static_cast<double>(sequences.seen.size()) / all);
@@ -152,12 +152,12 @@ std::vector<ValidationRow> validate_dvs_force(const ValidateOptions& options) {
   }
   rows.add_bounded(
       "touch.delay_ms",
-      fmt::format("from the true first touch to the end of the window that tells it, mean; the latest {:.1f}",
+      fmt::format("from the true first touch to the end of the window that shows it, mean; the latest {:.1f}",
                   latest_touch),
       "ms", Better::lower, kPublishedLatency_ms, false, touch);
   rows.add_bounded(
       "release.delay_ms",
-      fmt::format("from the servo's order to open to the end of the window that tells it, mean; the latest "
+      fmt::format("from the servo's order to open to the end of the window that shows it, mean; the latest "
                   "{:.1f}",
                   latest_release),
       "ms", Better::lower, kPublishedLatency_ms, false, release);
@@ -182,7 +182,7 @@ std::vector<ValidationRow> validate_dvs_force(const ValidateOptions& options) {
   const DvsForceScore clock = test_force_processes(sequences.seen, {}, settings, options.progress, DvsInputs::time);
   const double by_time = clock.mean(&DvsForceFold::test_mse);
   ValidationRow& control = rows.add("gp.time_alone_mse",
-                                    "a control: Gaussian processes that are told the time since the touch and nothing "
+                                    "a control: Gaussian processes that are given the time since the touch and nothing "
                                     "of the events; held against those that see them, and should be worse",
                                     "N^2", by_time, Better::higher, by_time > process.mean(&DvsForceFold::test_mse));
   control.reference = process.mean(&DvsForceFold::test_mse);

@@ -40,15 +40,15 @@ render::EventPixelSettings without_noise(render::EventPixelSettings pixels) {
 }
 
 /// A piece over the middle of the membrane, pressed by some newtons.
-DvsGraspParameters sample_grasp(const DvsGraspBench& bench, int material) {
-  DvsGraspParameters p = draw_dvs_grasp(material, bench.piece(material), kSeed, 0);
+DvsGraspParameters sample_grasp(const DvsGraspSetup& setup, int material) {
+  DvsGraspParameters p = draw_dvs_grasp(material, setup.piece(material), kSeed, 0);
   p.motion.target_force_N = 2.5;
   p.light_level = 1.0;
   return p;
 }
 
 // Against random walks. Those see a cell as wetted or not, so both are given that.
-void add_membrane_errors(const DvsGraspBench& bench, const sim::MembraneCamera& camera, const DvsGrasp& grasp,
+void add_membrane_errors(const DvsGraspSetup& setup, const sim::MembraneCamera& camera, const DvsGrasp& grasp,
                          const ValidateOptions& options, RowList& rows) {
   const double deepest = grasp.face->at_normal_force(2.5).travel_mm;
   struct Sample {
@@ -62,12 +62,12 @@ void add_membrane_errors(const DvsGraspBench& bench, const sim::MembraneCamera& 
                                           {"half", "pressed half as deep as by 2.5 N", 0.5 * deepest, false},
                                           {"deepest", "pressed by 2.5 N", deepest, true}}};
   const cv::Mat free = camera.irradiance(camera.free_face());
-  const auto seen_by = sim::camera_of(bench.device().camera.value());
-  const double room = sim::in_one_band(bench.device(), bench.device().room_radiance, "room_radiance");
+  const auto seen_by = sim::camera_of(setup.device().camera.value());
+  const double room = sim::in_one_band(setup.device(), setup.device().room_radiance, "room_radiance");
   for (const Sample& sample : samples) {
     if (options.quick && !sample.quick) continue;
     rows.begin();
-    render::FaceState state = dvs_face(bench, camera, grasp, sample.travel_mm);
+    render::FaceState state = dvs_face(setup, camera, grasp, sample.travel_mm);
     cv::threshold(state.contact, state.contact, kWettedHalf, 1.0, cv::THRESH_BINARY);
     render::MembraneErrorSettings settings;
     settings.samples = options.quick ? 512 : 2048;
@@ -91,22 +91,22 @@ void add_membrane_errors(const DvsGraspBench& bench, const sim::MembraneCamera& 
 }
 
 // Light between a grasp's pictures against pictures made there.
-void add_table_error(const DvsGraspBench& bench, const sim::MembraneCamera& camera, const DvsGrasp& grasp,
+void add_table_error(const DvsGraspSetup& setup, const sim::MembraneCamera& camera, const DvsGrasp& grasp,
                      const DvsRecordSettings& recording, const ValidateOptions& options, RowList& rows) {
   rows.begin();
   const render::EventPixelSettings& pixels = recording.pixels.front();
   const double threshold = std::min(pixels.on_threshold, pixels.off_threshold);
-  const DvsTravelLight light(bench, camera, grasp, pixels, recording.tolerance * threshold);
+  const DvsTravelLight light(setup, camera, grasp, pixels, recording.tolerance * threshold);
   const int count = options.quick ? 40 : 400;
   RandomStream numbers(kSeed, 0, Purpose::kGrasp);
   double worst = 0.0;
   for (int k = 0; k < count; ++k) {
-    // Evenly over the way that the light goes, which is mostly near the touch.
+    // Evenly over the range that the light goes through, which is mostly near the touch.
     const std::vector<double>& travels = light.travels_mm();
     const auto place = std::min(static_cast<std::size_t>(numbers.uniform() * static_cast<double>(travels.size() - 1)),
                                 travels.size() - 2);
     const double travel = travels[place] + numbers.uniform() * (travels[place + 1] - travels[place]);
-    const cv::Mat made = render::log_intensity(camera.photocurrent(dvs_face(bench, camera, grasp, travel)), pixels);
+    const cv::Mat made = render::log_intensity(camera.photocurrent(dvs_face(setup, camera, grasp, travel)), pixels);
     worst = std::max(worst, cv::norm(made, light.log_at(travel), cv::NORM_INF) / threshold);
   }
   rows.add_bounded("between_pictures_percent",
@@ -136,34 +136,34 @@ struct ThresholdCount {
 };
 
 // Ideal pixels' events of a grasp against the light's own course: pictures made at the moments, no table, no skipping.
-void add_event_counts(const DvsGraspBench& bench, const sim::MembraneCamera& camera, const ValidateOptions& options,
+void add_event_counts(const DvsGraspSetup& setup, const sim::MembraneCamera& camera, const ValidateOptions& options,
                       RowList& rows) {
   rows.begin();
-  DvsGraspParameters p = sample_grasp(bench, 3);
+  DvsGraspParameters p = sample_grasp(setup, 3);
   if (options.quick) {
     p.motion.hold_s = 0.05;
     p.motion.apart_s = 0.1;
   }
   DvsRecordSettings settings;
-  settings.pixels = {without_noise(bench.device().camera->events->pixels)};
+  settings.pixels = {without_noise(setup.device().camera->events->pixels)};
   // The pixels of a flat all change by about as much. Where that is a whole number of thresholds, a change that is off
   // by a thousandth is a whole event more or less; with small thresholds it is one of many.
   settings.pixels[0].on_threshold *= kFineThresholds;
   settings.pixels[0].off_threshold *= kFineThresholds;
-  const DvsRecording recording = record_dvs_grasp(bench, camera, p, settings);
-  sensors::EventCounts told;
+  const DvsRecording recording = record_dvs_grasp(setup, camera, p, settings);
+  sensors::EventCounts recorded;
   for (const sensors::EventCounts& counts : recording.by_pixels[0].counts) {
-    told.on += counts.on;
-    told.off += counts.off;
+    recorded.on += counts.on;
+    recorded.off += counts.off;
   }
-  const DvsGrasp grasp = bench.play(p);
+  const DvsGrasp grasp = setup.play(p);
   ThresholdCount truth;
   double last = std::numeric_limits<double>::infinity();
   constexpr double kLeastTravel_mm = 2e-4;
   for (const sim::FingerMoment& moment : grasp.run.moments) {
     if (std::abs(moment.travel_mm - last) < kLeastTravel_mm) continue;
     last = moment.travel_mm;
-    const cv::Mat light = camera.photocurrent(dvs_face(bench, camera, grasp, moment.travel_mm)) * p.light_level;
+    const cv::Mat light = camera.photocurrent(dvs_face(setup, camera, grasp, moment.travel_mm)) * p.light_level;
     truth.see(render::log_intensity(light, settings.pixels[0]), settings.pixels[0]);
   }
   const auto add = [&](const char* id, const char* name, std::int64_t ours, std::int64_t whole) {
@@ -174,8 +174,8 @@ void add_event_counts(const DvsGraspBench& bench, const sim::MembraneCamera& cam
                      "%", Better::lower, kAllowedCount_percent, false,
                      100.0 * std::abs(static_cast<double>(ours - whole)) / static_cast<double>(whole));
   };
-  add("off_count_error_percent", "OFF", told.off, truth.off);
-  add("on_count_error_percent", "ON", told.on, truth.on);
+  add("off_count_error_percent", "OFF", recorded.off, truth.off);
+  add("on_count_error_percent", "ON", recorded.on, truth.on);
 }
 
 /// Events of pixels that see the free face for some seconds.
@@ -191,12 +191,12 @@ sensors::EventCounts watch_still(const render::EventPixelSettings& settings, con
   return counts;
 }
 
-void add_still_rows(const DvsGraspBench& bench, const sim::MembraneCamera& camera, const DvsGrasp& grasp,
+void add_still_rows(const DvsGraspSetup& setup, const sim::MembraneCamera& camera, const DvsGrasp& grasp,
                     const ValidateOptions& options, RowList& rows) {
   rows.begin();
-  const render::EventPixelSettings& own = bench.device().camera->events->pixels;
+  const render::EventPixelSettings& own = setup.device().camera->events->pixels;
   const cv::Mat touched =
-      camera.photocurrent(dvs_face(bench, camera, grasp, grasp.face->at_normal_force(2.5).travel_mm));
+      camera.photocurrent(dvs_face(setup, camera, grasp, grasp.face->at_normal_force(2.5).travel_mm));
   const auto pixels = static_cast<double>(touched.total());
   const sensors::EventCounts still = watch_still(without_noise(own), touched, 10.0);
   ValidationRow& none = rows.add("still_events", "events of a face at rest in 10 s, noise off", "1",
@@ -280,10 +280,10 @@ void add_speed(const ValidateOptions& options, RowList& rows) {
   add("noisy", "with all noise", event_clip_noisy(), kV2eNoisyFrames_s);
 }
 
-void add_cost(const DvsGraspBench& bench, const sim::MembraneCamera& camera, const ValidateOptions& options,
+void add_cost(const DvsGraspSetup& setup, const sim::MembraneCamera& camera, const ValidateOptions& options,
               RowList& rows) {
   rows.begin();
-  std::vector<DvsGraspParameters> grasps = bench.draw(kSeed);
+  std::vector<DvsGraspParameters> grasps = setup.draw(kSeed);
   if (options.quick) {
     std::vector<DvsGraspParameters> one_each;
     for (const DvsGraspParameters& p : grasps) {
@@ -293,7 +293,7 @@ void add_cost(const DvsGraspBench& bench, const sim::MembraneCamera& camera, con
   }
   const double begun = core_seconds();
   const std::vector<DvsRecording> recordings =
-      record_dvs_grasps(bench, camera, grasps, own_pixels(bench.device()), options.progress);
+      record_dvs_grasps(setup, camera, grasps, own_pixels(setup.device()), options.progress);
   const double took = core_seconds() - begun;
   std::int64_t pictures = 0;
   for (const DvsRecording& recording : recordings) pictures += recording.pictures;
@@ -309,15 +309,15 @@ void add_cost(const DvsGraspBench& bench, const sim::MembraneCamera& camera, con
 
 std::vector<ValidationRow> validate_dvs_light(const ValidateOptions& options) {
   RowList rows("dvs.light.", options, RowList::Since::last_row);
-  const DvsGraspBench bench(options.scenes, options.cache);
-  const sim::MembraneCamera camera(bench.device());
-  const DvsGrasp grasp = bench.play(sample_grasp(bench, 3));
-  add_membrane_errors(bench, camera, grasp, options, rows);
-  add_table_error(bench, camera, grasp, own_pixels(bench.device()), options, rows);
-  add_event_counts(bench, camera, options, rows);
-  add_still_rows(bench, camera, grasp, options, rows);
+  const DvsGraspSetup setup(options.scenes, options.cache);
+  const sim::MembraneCamera camera(setup.device());
+  const DvsGrasp grasp = setup.play(sample_grasp(setup, 3));
+  add_membrane_errors(setup, camera, grasp, options, rows);
+  add_table_error(setup, camera, grasp, own_pixels(setup.device()), options, rows);
+  add_event_counts(setup, camera, options, rows);
+  add_still_rows(setup, camera, grasp, options, rows);
   add_speed(options, rows);
-  add_cost(bench, camera, options, rows);
+  add_cost(setup, camera, options, rows);
   return rows.rows();
 }
 

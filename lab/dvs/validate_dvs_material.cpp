@@ -34,14 +34,15 @@ constexpr TextTable kTable5 = {{{70.83, 68.75, 62.50, 70.83, 62.50, 68.75},
 constexpr std::array<int, 3> kSoft = {0, 1, 2};
 constexpr std::array<int, 1> kSteel = {3};
 
-/// What telling materials hangs on: how alike the grasps are. "A similar range of applied force" (sec. IV, fig. 5).
+/// What the classification of materials depends on: how alike the grasps are. "A similar range of applied force" (sec.
+/// IV, fig. 5).
 struct Alike {
   const char* id;
   const char* title;
   DvsSpread spread;
 };
 constexpr std::array<Alike, 3> kAlike = {
-    {{"many_benches_percent", "each on a bench of its own", {.bench = 1.0}},
+    {{"many_setups_percent", "each on a setup of its own", {.setup = 1.0}},
      {"one_force_percent", "grasps that all want 1.7 to 2.1 N, in place of 0.3 to 3.5 N", {.force = 0.125}},
      {"all_alike_percent", "of one force, and poses of a tenth of the spread", {.force = 0.125, .pose = 0.1}}}};
 
@@ -102,10 +103,11 @@ void add_tables(std::span<const sensors::MaterialSample> samples, const Validate
         ours += right / kUnits.size();
         published += text[n] / kUnits.size();
       }
-      ValidationRow& row = rows.add(
-          fmt::format("{}.k{}", table.id, layers),
-          fmt::format("{} told right by {} hidden layers, mean of{} (paper's in brackets)", table.what, layers, cells),
-          "%", ours, Better::higher, ours >= published);
+      ValidationRow& row =
+          rows.add(fmt::format("{}.k{}", table.id, layers),
+                   fmt::format("{} classified correctly by {} hidden layers, mean of{} (paper's in brackets)",
+                               table.what, layers, cells),
+                   "%", ours, Better::higher, ours >= published);
       row.published = published;
       row.series = series;
     }
@@ -122,11 +124,13 @@ std::vector<ValidationRow> validate_dvs_material(const ValidateOptions& options)
   const DvsMaterialSettings settings;
   const DvsMaterialScore score = test_material_classifiers(samples, names(), settings, options.progress);
   const double right = score.test.accuracy();
-  add_share(rows, "accuracy_percent",
-            fmt::format("materials told right in unseen grasps by 2 hidden layers of 30, of {} whose touch was told; "
-                        "what each was told to be: {}",
-                        grasps, matrix_text(score.test)),
-            kPublished, right, grasps);
+  add_share(
+      rows, "accuracy_percent",
+      fmt::format(
+          "materials classified correctly in unseen grasps by 2 hidden layers of 30, of {} whose touch was detected; "
+          "what each was classified as: {}",
+          grasps, matrix_text(score.test)),
+      kPublished, right, grasps);
   add_share(rows, "soft_accuracy_percent", "of foam, rubber and silicone", kPublishedSoft, score.test.accuracy(kSoft),
             score.test.counts.topRows(kSoft.size()).sum());
   add_share(rows, "steel_percent", "of steel", kPublishedSteel, score.test.accuracy(kSteel),
@@ -140,16 +144,17 @@ std::vector<ValidationRow> validate_dvs_material(const ValidateOptions& options)
                 kPublishedForceSensor, force_right, grasps);
   force.better = Better::near;
   force.holds = std::abs(force.ours - kPublishedForceSensor) <= kAllowedDifference;
-  rows.add_bounded("over_force_sensor_percent", "by how much events tell more materials right than the force sensor",
-                   "%", Better::higher, kPublished - kPublishedForceSensor, true, 100.0 * (right - force_right));
+  rows.add_bounded("over_force_sensor_percent",
+                   "by how much events classify more materials correctly than the force sensor", "%", Better::higher,
+                   kPublished - kPublishedForceSensor, true, 100.0 * (right - force_right));
   if (!options.quick) {
     add_tables(samples, options, rows);
     for (const Alike& alike : kAlike) {
       const std::vector<sensors::MaterialSample> grasped =
           event_samples(dvs_sequences(*dvs_alike_recordings(options, alike.id, alike.spread)).seen);
-      const DvsMaterialScore told = test_material_classifiers(grasped, names(), settings, options.progress);
-      add_share(rows, alike.id, fmt::format("{}: {}", alike.title, matrix_text(told.test)), kPublished,
-                told.test.accuracy(), static_cast<int>(grasped.size()));
+      const DvsMaterialScore classified = test_material_classifiers(grasped, names(), settings, options.progress);
+      add_share(rows, alike.id, fmt::format("{}: {}", alike.title, matrix_text(classified.test)), kPublished,
+                classified.test.accuracy(), static_cast<int>(grasped.size()));
     }
   }
   return rows.rows();

@@ -37,7 +37,7 @@ Matrix part_of(const LinearisedFit& fit, bool pictures) {
 }
 
 /// Variances of the shared variables by leaving out one tile after the other; the others are held where they are. In
-/// directions that aren't told it says nothing.
+/// directions that aren't identified it says nothing.
 Vector jackknife(const LinearisedFit& fit, double misfit) {
   const Eigen::Index n = fit.jacobian.cols();
   const Eigen::Index shared = std::min<Eigen::Index>(fit.shared, n);
@@ -106,11 +106,11 @@ FitCertainty certainty_of(const LinearisedFit& fit) {
     squares[kind] += fit.residuals[i] * fit.residuals[i];
     ++counts[kind];
   }
-  // Which kind of rows a variable uses up isn't told apart: pictures have them in plenty, numbers few.
+  // Which kind of rows a variable uses up isn't distinguished: pictures have them in plenty, numbers few.
   out.picture_misfit = root_mean_square(squares[0], counts[0], static_cast<double>(n));
   out.number_misfit = root_mean_square(squares[1], counts[1], 0.0);
 
-  // Singular values by the triangle of a QR, so that they aren't squared on the way.
+  // Singular values by the triangle of a QR, so that they aren't squared in between.
   Matrix triangle = fit.jacobian;
   if (rows > n)
     triangle = Eigen::HouseholderQR<Matrix>(fit.jacobian).matrixQR().topRows(n).triangularView<Eigen::Upper>();
@@ -136,7 +136,7 @@ FitCertainty certainty_of(const LinearisedFit& fit) {
     for (std::size_t i = 0; i < which.size(); ++i) out_columns.col(static_cast<Eigen::Index>(i)) = V.col(which[i]);
     return out_columns;
   };
-  out.untold = columns(unknown);
+  out.unidentified = columns(unknown);
   const Matrix basis = columns(known);
 
   out.by_noise = out.by_model = out.by_light = out.by_mesh = Vector::Zero(n);
@@ -170,8 +170,8 @@ FitCertainty certainty_of(const LinearisedFit& fit) {
       free = std::hypot(free, part * spread);
     }
     out.deviation[i] = std::hypot(out.deviation[i], free);
-    out.told.push_back(kNormal95 * out.deviation[i] < 1.0 ? 1 : 0);
-    if (out.told.back() == 0) out.deviation[i] = std::numeric_limits<double>::infinity();
+    out.identified.push_back(kNormal95 * out.deviation[i] < 1.0 ? 1 : 0);
+    if (out.identified.back() == 0) out.deviation[i] = std::numeric_limits<double>::infinity();
   }
   return out;
 }

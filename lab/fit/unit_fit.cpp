@@ -74,19 +74,19 @@ Variables variables_of(const PreparedFit& fit, const std::vector<PressPose>& pos
       ranges.emplace_back(low - label, high - label);
     };
     if (press.place_sd_mm > 0.0) {
-      const double way = kLabelRange * press.place_sd_mm;
-      free(PoseVariable::Of::x, press.place_mm.x(), press.place_sd_mm, press.place_mm.x() - way,
-           press.place_mm.x() + way);
-      free(PoseVariable::Of::y, press.place_mm.y(), press.place_sd_mm, press.place_mm.y() - way,
-           press.place_mm.y() + way);
+      const double half = kLabelRange * press.place_sd_mm;
+      free(PoseVariable::Of::x, press.place_mm.x(), press.place_sd_mm, press.place_mm.x() - half,
+           press.place_mm.x() + half);
+      free(PoseVariable::Of::y, press.place_mm.y(), press.place_sd_mm, press.place_mm.y() - half,
+           press.place_mm.y() + half);
     }
     if (!press.depth_mm) {
       free(PoseVariable::Of::depth, poses[i].depth_mm, 0.0, kLeastDepth_mm, fit.deepest_mm);
     } else if (press.depth_sd_mm > 0.0) {
-      const double way = kLabelRange * press.depth_sd_mm;
+      const double half = kLabelRange * press.depth_sd_mm;
       free(PoseVariable::Of::depth, *press.depth_mm, press.depth_sd_mm,
-           std::min(*press.depth_mm, std::max(kLeastDepth_mm, *press.depth_mm - way)),
-           std::max(*press.depth_mm, std::min(fit.deepest_mm, *press.depth_mm + way)));
+           std::min(*press.depth_mm, std::max(kLeastDepth_mm, *press.depth_mm - half)),
+           std::max(*press.depth_mm, std::min(fit.deepest_mm, *press.depth_mm + half)));
     }
   }
   const auto count = static_cast<Eigen::Index>(ranges.size());
@@ -288,17 +288,17 @@ FittedUnknown fitted(const FitUnknown& unknown, const Variables& variables, Eige
   out.how = unknown.how;
   out.start = number.value;
   out.value = number_at(unknown, number, scale * x[k]);
-  out.told = certainty.told[static_cast<std::size_t>(k)] != 0;
+  out.identified = certainty.identified[static_cast<std::size_t>(k)] != 0;
   out.deviation = scale * certainty.deviation[k];
   out.by_noise = scale * certainty.by_noise[k];
   out.by_model = scale * certainty.by_model[k];
   out.by_light = scale * certainty.by_light[k];
   out.by_mesh = scale * certainty.by_mesh[k];
   const bool times = unknown.how == UnknownHow::times;
-  const double ends[2] = {
-      out.told ? number_at(unknown, number, scale * x[k] - kNormal95 * out.deviation) : (times ? 0.0 : -kInfinity),
-      out.told ? number_at(unknown, number, scale * x[k] + kNormal95 * out.deviation)
-               : (times && number.value < 0.0 ? -kInfinity : kInfinity)};
+  const double ends[2] = {out.identified ? number_at(unknown, number, scale * x[k] - kNormal95 * out.deviation)
+                                         : (times ? 0.0 : -kInfinity),
+                          out.identified ? number_at(unknown, number, scale * x[k] + kNormal95 * out.deviation)
+                                         : (times && number.value < 0.0 ? -kInfinity : kInfinity)};
   out.low95 = std::min(ends[0], ends[1]);
   out.high95 = std::max(ends[0], ends[1]);
   out.at_end = x[k] <= variables.low[k] || x[k] >= variables.high[k];
@@ -374,13 +374,14 @@ UnitFit fit_unit(const PreparedFit& fit, const UnitRecording& recording, UnitSim
     out.unknowns.push_back(fitted(fit.unknowns[static_cast<std::size_t>(k)], variables, k, found.x, certainty));
   }
   // Directions in which only poses move say nothing of the device.
-  Eigen::MatrixXd untold(variables.unknowns, certainty.untold.cols());
+  Eigen::MatrixXd unidentified(variables.unknowns, certainty.unidentified.cols());
   Eigen::Index kept = 0;
-  for (Eigen::Index k = 0; k < certainty.untold.cols(); ++k) {
-    const Vector part = certainty.untold.col(k).head(variables.unknowns);
-    if (part.norm() > kOfDevice) untold.col(kept++) = part;
+  for (Eigen::Index k = 0; k < certainty.unidentified.cols(); ++k) {
+    const Vector part = certainty.unidentified.col(k).head(variables.unknowns);
+    if (part.norm() > kOfDevice) unidentified.col(kept++) = part;
   }
-  out.untold = untold_combinations(fit.unknowns, untold.leftCols(kept), variables.scale.head(variables.unknowns));
+  out.unidentified =
+      unidentifiable_combinations(fit.unknowns, unidentified.leftCols(kept), variables.scale.head(variables.unknowns));
   const std::vector<PressPose> poses = all.poses(found.x);
   for (std::size_t i = 0; i < poses.size(); ++i) {
     out.presses.push_back({poses[i].place_mm.x(), poses[i].place_mm.y(), poses[i].depth_mm, 0.0, 0.0,
@@ -402,7 +403,7 @@ UnitFit fit_unit(const PreparedFit& fit, const UnitRecording& recording, UnitSim
   out.residuals = all.rows;
   out.steps = found.steps;
   out.converged = found.converged;
-  out.rigs = simulation.rigs_made();
+  out.lamp_setups = simulation.lamp_setups();
   out.device_text = text_at(fit, all.unknowns(found.x));
   if (!recording.background.mean.empty()) out.shown.push_back(shown.background);
   out.shown.insert(out.shown.end(), shown.presses.begin(), shown.presses.end());

@@ -1,6 +1,6 @@
 #pragma once
 // Calibration to a real unit: the numbers of a device's file with which the simulation shows and feels what was
-// recorded with it, how well they are known, and what can't be told. docs/calibration.md tells the method.
+// recorded with it, how well they are known, and what can't be identified. docs/calibration.md describes the method.
 
 #include <filesystem>
 #include <opencv2/core/mat.hpp>
@@ -28,15 +28,15 @@ struct FittedUnknown {
   std::string name;
   UnknownHow how = UnknownHow::times;
   double start = 0.0, value = 0.0;   ///< of the first number that it stands for, as the device's file has it
-  bool told = true;                  ///< false: its interval is open
-  double low95 = 0.0, high95 = 0.0;  ///< of the same number; -inf or 0, and inf where it isn't told
+  bool identified = true;            ///< false: its interval is open
+  double low95 = 0.0, high95 = 0.0;  ///< of the same number; -inf or 0, and inf where it isn't identified
   double deviation = 0.0;            ///< standard error: of the logarithm (times) or of the number (plus)
   double by_noise = 0.0, by_model = 0.0, by_light = 0.0, by_mesh = 0.0;  ///< what it's made of (fit_certainty.h)
   bool at_end = false;                                                   ///< at an end of its allowed range
 };
 
-/// A combination of unknowns that the data can't tell: all of them may move so at once, and nothing that was recorded
-/// changes by what could be noticed.
+/// A combination of unknowns that the data can't identify: all of them may move so at once, and nothing that was
+/// recorded changes by what could be noticed.
 struct UnidentifiableCombination {
   /// How far one unknown moves in the combination.
   struct Part {
@@ -65,14 +65,14 @@ struct FittedPress {
 /// The fitted numbers, how sure they are, and how well the recordings are met.
 struct UnitFit {
   std::vector<FittedUnknown> unknowns;
-  std::vector<UnidentifiableCombination> untold;
+  std::vector<UnidentifiableCombination> unidentified;
   std::vector<FittedPress> presses;
   std::vector<FitMisfit> misfits;
   double misfit_before = 0.0, misfit_after = 0.0;  ///< of all residuals, in standard deviations of their noise
   std::int64_t residuals = 0;
   int steps = 0;
   bool converged = false;
-  int rigs = 0;                ///< lamps' light that was set up
+  int lamp_setups = 0;         ///< lamps' light that was set up
   std::string device_text;     ///< the device's file with the fitted numbers
   std::vector<cv::Mat> shown;  ///< simulated in the end, CV_64F: background if there is one, then presses
 };

@@ -57,7 +57,7 @@ RecordedUnit record_unit(const PreparedFit& fit, const Eigen::VectorXd& hidden, 
   settings.widest_mm = kWidest_mm;
   settings.membrane_um = fit.spec.membrane_um;
   settings.always_friction = true;
-  sim::keep_gel_of_unit_modulus(device, cache_folder);
+  sim::cache_gel_of_unit_modulus(device, cache_folder);
   const sim::VirtualSensor sensor(device, cache_folder, settings);
   const auto block = [&](const cv::Mat& picture, const std::string& name) {
     return block_picture(picture, name, *device.camera, fit.spec.coarse_px, fit.spec.where);

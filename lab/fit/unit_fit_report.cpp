@@ -24,7 +24,7 @@ const char* name_of(UnknownHow how) {
 }
 
 std::string interval_text(const FittedUnknown& unknown) {
-  if (!unknown.told) return "not told";
+  if (!unknown.identified) return "not identified";
   return fmt::format("{:.5g} to {:.5g}", unknown.low95, unknown.high95);
 }
 
@@ -74,10 +74,11 @@ std::string to_markdown(const PreparedFit& fit, const UnitFit& result) {
       "random "
       "numbers for the simulated light; by the mesh: what the gel's mesh makes of forces. The interval is of all "
       "together.\n";
-  text += "\n## What the data can't tell\n\n";
-  if (result.untold.empty()) text += "Nothing: each unknown's interval is narrower than its allowed range.\n";
-  for (const UnidentifiableCombination& combination : result.untold) text += fmt::format("- {}\n", combination.words);
-  if (!result.untold.empty()) {
+  text += "\n## What the data can't identify\n\n";
+  if (result.unidentified.empty()) text += "Nothing: each unknown's interval is narrower than its allowed range.\n";
+  for (const UnidentifiableCombination& combination : result.unidentified)
+    text += fmt::format("- {}\n", combination.words);
+  if (!result.unidentified.empty()) {
     text +=
         "\nOf these unknowns the fitted device has one choice of many that show the same. Give one of them a known "
         "value, "
@@ -118,9 +119,9 @@ std::string to_json(const PreparedFit& fit, const UnitFit& result) {
                                {"how", name_of(unknown.how)},
                                {"start", number(unknown.start)},
                                {"fitted", number(unknown.value)},
-                               {"told", unknown.told},
-                               {"low95", unknown.told ? number(unknown.low95) : Json(nullptr)},
-                               {"high95", unknown.told ? number(unknown.high95) : Json(nullptr)},
+                               {"identified", unknown.identified},
+                               {"low95", unknown.identified ? number(unknown.low95) : Json(nullptr)},
+                               {"high95", unknown.identified ? number(unknown.high95) : Json(nullptr)},
                                {"standard_error", number(unknown.deviation)},
                                {"by_noise", number(unknown.by_noise)},
                                {"by_model", number(unknown.by_model)},
@@ -128,13 +129,13 @@ std::string to_json(const PreparedFit& fit, const UnitFit& result) {
                                {"by_mesh", number(unknown.by_mesh)},
                                {"at_end", unknown.at_end}});
   }
-  all["untold"] = Json::array();
-  for (const UnidentifiableCombination& combination : result.untold) {
+  all["unidentified"] = Json::array();
+  for (const UnidentifiableCombination& combination : result.unidentified) {
     Json parts = Json::array();
     for (const auto& part : combination.parts) {
       parts.push_back({{"name", part.name}, {"how", name_of(part.how)}, {"move", number(part.move)}});
     }
-    all["untold"].push_back({{"words", combination.words}, {"parts", parts}});
+    all["unidentified"].push_back({{"words", combination.words}, {"parts", parts}});
   }
   all["misfits"] = Json::array();
   for (const FitMisfit& misfit : result.misfits) {

@@ -104,17 +104,18 @@ void require_fit(const sim::DeviceSpec& device) {
   }
 }
 
-/// That something was recorded of which the unknown could be told at all.
-void require_told(const FitUnknown& unknown, const UnitFitSpec& spec, const SourceLocation& where) {
+/// That something was recorded that the unknown could be identified by.
+void require_identifiable(const FitUnknown& unknown, const UnitFitSpec& spec, const SourceLocation& where) {
   const bool modulus = std::any_of(unknown.numbers.begin(), unknown.numbers.end(), [](const FittedNumber& number) {
     return number.number.path.starts_with("gel.") && number.number.path.find("youngs_modulus_MPa") != std::string::npos;
   });
   const bool force = std::any_of(spec.presses.begin(), spec.presses.end(),
                                  [](const RecordedPress& press) { return press.force_N.has_value(); });
   if (modulus && !force) {
-    fail_at(where,
-            "path '{}': no press has a force_N, and without one a modulus can't be told: shapes don't hang on it",
-            unknown.path);
+    fail_at(
+        where,
+        "path '{}': no press has a force_N, and without one a modulus can't be identified: shapes don't depend on it",
+        unknown.path);
   }
 }
 
@@ -238,7 +239,7 @@ PreparedFit prepare_fit(const UnitFitSpec& spec) {
   std::size_t asked = 0;
   for (const FitUnknown& unknown : fit.unknowns) {
     while (spec.unknowns[asked].path != unknown.path) ++asked;
-    require_told(unknown, spec, spec.unknowns[asked].where);
+    require_identifiable(unknown, spec, spec.unknowns[asked].where);
   }
   // Both ends of each range, before minutes of work.
   for (std::size_t k = 0; k < fit.unknowns.size(); ++k) {

@@ -9,9 +9,9 @@
 namespace touchstone::lab {
 namespace {
 
-constexpr double kSamePart = 0.02;  // of the largest part: less isn't told of
+constexpr double kSamePart = 0.02;  // of the largest part: less is left out
 constexpr double kAlike = 0.03;     // by which logarithms that are called equal may differ
-constexpr double kTold = 0.1;       // of the largest part: how far it's moved where the words give numbers
+constexpr double kMoved = 0.1;      // of the largest part: how far it's moved where the words give numbers
 
 using Part = UnidentifiableCombination::Part;
 
@@ -50,7 +50,7 @@ std::string list_of(const std::vector<std::string>& names) {
 
 std::string words_of(const std::vector<Part>& parts) {
   if (parts.size() == 1) {
-    return fmt::format("`{}`: what was recorded hardly hangs on it, or not at all", parts.front().name);
+    return fmt::format("`{}`: what was recorded hardly depends on it, or not at all", parts.front().name);
   }
   std::vector<std::string> up, down;
   bool alike = true;
@@ -77,21 +77,21 @@ std::string words_of(const std::vector<Part>& parts) {
     const Part& part = parts[i];
     text +=
         part.how == UnknownHow::times
-            ? fmt::format("{} `{}` is multiplied by {:.3g}", i == 0 ? "" : ",", part.name, std::exp(kTold * part.move))
-            : fmt::format("{} {:+.3g} is added to `{}`", i == 0 ? "" : ",", kTold * part.move, part.name);
+            ? fmt::format("{} `{}` is multiplied by {:.3g}", i == 0 ? "" : ",", part.name, std::exp(kMoved * part.move))
+            : fmt::format("{} {:+.3g} is added to `{}`", i == 0 ? "" : ",", kMoved * part.move, part.name);
   }
   return text;
 }
 
 }  // namespace
 
-std::vector<UnidentifiableCombination> untold_combinations(const std::vector<FitUnknown>& unknowns,
-                                                           const Eigen::MatrixXd& untold,
-                                                           const Eigen::VectorXd& scale) {
-  TS_ASSERT(untold.rows() == scale.size() && untold.rows() == static_cast<Eigen::Index>(unknowns.size()));
+std::vector<UnidentifiableCombination> unidentifiable_combinations(const std::vector<FitUnknown>& unknowns,
+                                                                   const Eigen::MatrixXd& unidentified,
+                                                                   const Eigen::VectorXd& scale) {
+  TS_ASSERT(unidentified.rows() == scale.size() && unidentified.rows() == static_cast<Eigen::Index>(unknowns.size()));
   std::vector<UnidentifiableCombination> all;
-  if (untold.cols() == 0) return all;
-  const Eigen::MatrixXd rows = echelon(untold.transpose());
+  if (unidentified.cols() == 0) return all;
+  const Eigen::MatrixXd rows = echelon(unidentified.transpose());
   for (Eigen::Index r = 0; r < rows.rows(); ++r) {
     const double most = rows.row(r).cwiseAbs().maxCoeff();
     UnidentifiableCombination combination;

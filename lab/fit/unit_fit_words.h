@@ -1,5 +1,5 @@
 #pragma once
-// What a fit can't tell, in words.
+// What a fit can't identify, in words.
 
 #include <Eigen/Core>
 #include <vector>
@@ -8,9 +8,10 @@
 
 namespace touchstone::lab {
 
-/// Combinations that span what `untold` (columns: orthonormal, rows: unknowns, in units of half ranges, whose lengths
-/// are `scale`) does, each with as few unknowns as can be: by elimination, the largest part first.
-std::vector<UnidentifiableCombination> untold_combinations(const std::vector<FitUnknown>& unknowns,
-                                                           const Eigen::MatrixXd& untold, const Eigen::VectorXd& scale);
+/// Combinations that span what `unidentified` (columns: orthonormal, rows: unknowns, in units of half ranges, whose
+/// lengths are `scale`) does, each with as few unknowns as can be: by elimination, the largest part first.
+std::vector<UnidentifiableCombination> unidentifiable_combinations(const std::vector<FitUnknown>& unknowns,
+                                                                   const Eigen::MatrixXd& unidentified,
+                                                                   const Eigen::VectorXd& scale);
 
 }  // namespace touchstone::lab

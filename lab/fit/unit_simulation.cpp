@@ -15,12 +15,12 @@
 namespace touchstone::lab {
 namespace {
 
-constexpr std::size_t kRigsKept = 2;  // of each lamp: where the fit stands, and a step beside it
+constexpr std::size_t kSensorsKept = 2;  // of each lamp: where the fit stands, and a step beside it
 constexpr double kWidest_mm = 0.5;
 constexpr std::uint64_t kOtherLight = 500'000;  // beyond any number of lamps
 constexpr std::size_t kMostKept = 256U << 20U;  // bytes of pictures of each lamp
 
-/// What a press' state hangs on: the scene's numbers, the press, its pose.
+/// What a press' state depends on: the scene's numbers, the press, its pose.
 using Key = std::vector<double>;
 
 Key with_pose(Key key, int press, const PressPose& pose) {
@@ -39,9 +39,9 @@ struct UnitSimulation::Parts {
   Parts(const PreparedFit& of, std::filesystem::path cache_folder, Progress listener, std::uint64_t first_seed)
       : fit(of), cache(std::move(cache_folder)), progress(std::move(listener)), seed(first_seed) {
     const auto lamps = fit.device.lamps.size();
-    rigs.resize(lamps);
+    by_lamp.resize(lamps);
     lights.resize(lamps);
-    sim::keep_gel_of_unit_modulus(fit.device, cache);
+    sim::cache_gel_of_unit_modulus(fit.device, cache);
   }
 
   /// The numbers that act on the scene and, with a lamp, on that lamp: under these its light is kept.
@@ -77,7 +77,7 @@ struct UnitSimulation::Parts {
   }
 
   const sim::VirtualSensor& sensor(const sim::DeviceSpec& whole, const Key& key, int lamp) {
-    auto& kept = rigs[static_cast<std::size_t>(lamp)];
+    auto& kept = by_lamp[static_cast<std::size_t>(lamp)];
     for (std::size_t i = 0; i < kept.size(); ++i) {
       if (kept[i].first != key) continue;
       std::rotate(kept.begin() + static_cast<std::ptrdiff_t>(i), kept.begin() + static_cast<std::ptrdiff_t>(i) + 1,
@@ -90,7 +90,7 @@ struct UnitSimulation::Parts {
     settings.widest_mm = kWidest_mm;
     settings.membrane_um = fit.spec.membrane_um;
     settings.always_friction = true;
-    if (kept.size() == kRigsKept) kept.erase(kept.begin());
+    if (kept.size() == kSensorsKept) kept.erase(kept.begin());
     if (progress) progress("lamps' light", made, made + 1);
     kept.emplace_back(key, std::make_unique<const sim::VirtualSensor>(device_of_lamp(whole, lamp), cache, settings));
     ++made;
@@ -170,8 +170,8 @@ struct UnitSimulation::Parts {
   Progress progress;
   std::uint64_t seed;
   int made = 0;
-  std::vector<std::vector<std::pair<Key, std::unique_ptr<const sim::VirtualSensor>>>> rigs;  // by lamp
-  std::vector<std::map<Key, cv::Mat>> lights;                                                // by lamp
+  std::vector<std::vector<std::pair<Key, std::unique_ptr<const sim::VirtualSensor>>>> by_lamp;  // by lamp
+  std::vector<std::map<Key, cv::Mat>> lights;                                                   // by lamp
   std::map<Key, PressedState> states;
 };
 
@@ -237,8 +237,8 @@ render::Imager UnitSimulation::imager(const Eigen::VectorXd& x) const {
   return sim::imager(whole, Parts::bands_of(whole), true);
 }
 
-int UnitSimulation::rigs_made() const {
-  return parts_->made + (other_ ? other_->rigs_made() : 0);
+int UnitSimulation::lamp_setups() const {
+  return parts_->made + (other_ ? other_->lamp_setups() : 0);
 }
 
 }  // namespace touchstone::lab

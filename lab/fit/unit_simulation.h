@@ -1,6 +1,6 @@
 #pragma once
-// What a device with other numbers would have shown and felt of a fit's presses: quickly, by simulating anew only what
-// the numbers act on.
+// What a device with other numbers would have shown and measured of a fit's presses: quickly, by simulating anew only
+// what the numbers act on.
 //
 // Light is in proportion to each lamp's power, so each lamp is simulated alone, with 1 W in each band, and its pictures
 // are added up. What the imager makes of light is a formula. A gel of one material under a rigid body has the same
@@ -26,7 +26,7 @@ struct PressPose {
   bool operator==(const PressPose&) const = default;
 };
 
-/// What is seen and felt. Pictures: CV_64FC(1 or 3) as mean_numbers, of blocks.
+/// What is seen and measured. Pictures: CV_64FC(1 or 3) as mean_numbers, of blocks.
 struct SimulatedUnit {
   cv::Mat background;
   std::vector<cv::Mat> presses;
@@ -54,7 +54,7 @@ class UnitSimulation {
 
   /// The device's imager with the numbers of x.
   render::Imager imager(const Eigen::VectorXd& x) const;
-  int rigs_made() const;  ///< lamps' light set up so far: what takes longest
+  int lamp_setups() const;  ///< lamps' light set up so far: what takes longest
 
  private:
   struct Parts;

@@ -1,5 +1,5 @@
 // Does a fit to a unit's recorded presses find the unit's numbers, within the intervals that it reports, and does it
-// say what can't be told? Units with hidden numbers are recorded by simulation with other seeds of light.
+// say what can't be identified? Units with hidden numbers are recorded by simulation with other seeds of light.
 
 #include <algorithm>
 #include <cmath>
@@ -42,13 +42,14 @@ void count(const PreparedFit& fit, const Eigen::VectorXd& hidden, const UnitFit&
 }
 
 bool names(const UnitFit& found, const std::string& one, const std::string& other) {
-  return std::any_of(found.untold.begin(), found.untold.end(), [&](const UnidentifiableCombination& combination) {
-    const auto has = [&](const std::string& name) {
-      return std::any_of(combination.parts.begin(), combination.parts.end(),
-                         [&](const UnidentifiableCombination::Part& part) { return part.name == name; });
-    };
-    return has(one) && has(other);
-  });
+  return std::any_of(
+      found.unidentified.begin(), found.unidentified.end(), [&](const UnidentifiableCombination& combination) {
+        const auto has = [&](const std::string& name) {
+          return std::any_of(combination.parts.begin(), combination.parts.end(),
+                             [&](const UnidentifiableCombination::Part& part) { return part.name == name; });
+        };
+        return has(one) && has(other);
+      });
 }
 
 }  // namespace
@@ -99,9 +100,10 @@ std::vector<ValidationRow> validate_gelsight_unit(const ValidateOptions& options
   const RecordedUnit unit =
       record_unit(unclear, hidden_unknowns(unclear, kHiddenPart, 1), kBackgrounds, 1, options.cache);
   const UnitFit found = fit_unit(unit.fit, unit.recording, options.cache);
-  const bool named =
-      names(found, "lamps[*].power_W", "camera.exposure_us") && !found.unknowns[0].told && !found.unknowns[1].told;
-  rows.add("untold_named", "power and exposure, both unknown, are said not to be told", "1", named, Better::near, named)
+  const bool named = names(found, "lamps[*].power_W", "camera.exposure_us") && !found.unknowns[0].identified &&
+                     !found.unknowns[1].identified;
+  rows.add("unidentifiable_named", "power and exposure, both unknown, are said not to be identified", "1", named,
+           Better::near, named)
       .reference = 1.0;
   return rows.rows();
 }

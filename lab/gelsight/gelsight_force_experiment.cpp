@@ -54,8 +54,8 @@ sensors::MarkerTrackerSettings marker_settings(const sim::VirtualSensor& sensor)
   const auto& print = sensor.device().coating->print;
   if (!print) fail("device {}: has no markers", sensor.device().name);
   sensors::MarkerTrackerSettings settings;
-  settings.look.diameter_px = print->width_mm / sensor.mm_per_px();
-  settings.look.spacing_px = print->spacing_mm.minCoeff() / sensor.mm_per_px();
+  settings.appearance.diameter_px = print->width_mm / sensor.mm_per_px();
+  settings.appearance.spacing_px = print->spacing_mm.minCoeff() / sensor.mm_per_px();
   return settings;
 }
 

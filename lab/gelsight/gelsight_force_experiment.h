@@ -12,7 +12,7 @@
 
 namespace touchstone::lab {
 
-/// What the tracker is told of a sensor's markers: their size and distance in its picture, from the device's print.
+/// What the tracker is given of a sensor's markers: their size and distance in its picture, from the device's print.
 /// @throws Error for a device without a print
 sensors::MarkerTrackerSettings marker_settings(const sim::VirtualSensor& sensor);
 

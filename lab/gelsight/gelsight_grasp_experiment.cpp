@@ -44,7 +44,7 @@ std::string failure_of(const std::vector<GraspMoment>& moments, const GraspLoopS
   const auto frames = static_cast<int>(moments.size());
   const GraspMoment& then = moments[static_cast<std::size_t>(std::max(0, frames - 1 - hold_frames))];
   if (last.truth.slid_mm - then.truth.slid_mm > kStill_mm) return "slides while it is held";
-  if (last.truth.object_height_mm < 0.5 * settings.arm.height_mm) return "lifted less than half-way";
+  if (last.truth.object_height_mm < 0.5 * settings.arm.height_mm) return "lifted less than half the height";
   return "";
 }
 
@@ -53,7 +53,7 @@ int count_false_alarms(const std::vector<GraspMoment>& moments, int lag_frames) 
   int alarms = 0;
   for (std::size_t k = 0; k < moments.size(); ++k) {
     const std::size_t before = k - std::min(k, static_cast<std::size_t>(2 * lag_frames + 1));
-    alarms += moments[k].sight.slip && moments[k].truth.slid_mm - moments[before].truth.slid_mm <= kStill_mm;
+    alarms += moments[k].reading.slip && moments[k].truth.slid_mm - moments[before].truth.slid_mm <= kStill_mm;
   }
   return alarms;
 }
@@ -78,21 +78,21 @@ GraspOutcome run_grasp_trial(const sim::VirtualSensor& sensor, const GraspTrial&
 
   GraspOutcome outcome;
   sensors::GraspCommand command;
-  std::deque<cv::Mat> on_their_way;  // frames that were taken and haven't arrived
+  std::deque<cv::Mat> in_transit;  // frames that were taken and haven't arrived
   int frame = 0;
-  for (; frame < lag_frames; ++frame) on_their_way.push_back(sensor.background(trial.noise_seed, frame));
+  for (; frame < lag_frames; ++frame) in_transit.push_back(sensor.background(trial.noise_seed, frame));
   int held_frames = 0;
   const int last_frame = frames_in(settings.longest_s);
   for (int k = 0; k < last_frame; ++k, ++frame) {
     const double acceleration = arm.next(command.lift, dt);
     const sim::GripperState& truth = gripper.advance(command.close_by_mm, acceleration, dt);
-    on_their_way.push_back(sensor.capture(object, gripper.press(), trial.noise_seed, frame, false).frame);
+    in_transit.push_back(sensor.capture(object, gripper.press(), trial.noise_seed, frame, false).frame);
     GraspMoment moment;
     moment.truth = truth;
-    moment.sight = senses(on_their_way.front());
-    moment.sight.lifted = arm.done();
-    on_their_way.pop_front();
-    command = rule.next(moment.sight);
+    moment.reading = senses(in_transit.front());
+    moment.reading.lifted = arm.done();
+    in_transit.pop_front();
+    command = rule.next(moment.reading);
     moment.phase = command.phase;
     outcome.moments.push_back(moment);
     held_frames = command.phase == sensors::GraspPhase::holding ? held_frames + 1 : 0;
@@ -106,7 +106,7 @@ GraspOutcome run_grasp_trial(const sim::VirtualSensor& sensor, const GraspTrial&
   outcome.crush_force_N = *trial.object.crush_force_N;
   outcome.final_force_N = end.normal_force_N;
   outcome.slid_mm = end.slid_mm;
-  outcome.slip_answers = rule.slip_answers();
+  outcome.slip_reactions = rule.slip_reactions();
   outcome.false_alarms = count_false_alarms(outcome.moments, lag_frames);
   return outcome;
 }

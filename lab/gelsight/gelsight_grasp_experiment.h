@@ -35,12 +35,12 @@ struct GraspLoopSettings {
 };
 
 /// What estimators make of the frames of one trial, handed over in their order; the first is of the untouched gel.
-using GraspSenses = std::function<sensors::GraspSight(const cv::Mat& frame)>;
+using GraspSenses = std::function<sensors::GraspReading(const cv::Mat& frame)>;
 
-/// One frame of a trial: what was true, and what the rule was told and did.
+/// One frame of a trial: what was true, and what the rule was given and did.
 struct GraspMoment {
   sim::GripperState truth;
-  sensors::GraspSight sight;  ///< of the frame that was taken camera_lag_s before
+  sensors::GraspReading reading;  ///< of the frame that was taken camera_lag_s before
   sensors::GraspPhase phase = sensors::GraspPhase::approaching;
 };
 
@@ -52,8 +52,8 @@ struct GraspOutcome {
   double crush_force_N = 0.0;
   double final_force_N = 0.0;  ///< one finger's
   double slid_mm = 0.0;        ///< the object against the fingers, all in all
-  int slip_answers = 0;        ///< how often the rule closed further
-  int false_alarms = 0;        ///< frames that were told to show slip though nothing slid since two lags before
+  int slip_reactions = 0;      ///< how often the rule closed further
+  int false_alarms = 0;        ///< frames in which slip was reported though nothing slid since two lags before
   std::vector<GraspMoment> moments;
 };
 

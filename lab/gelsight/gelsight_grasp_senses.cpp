@@ -17,23 +17,23 @@ constexpr double kCalibrationFriction = 0.5;
 constexpr int kFrameOfBackground = 2000000;  // its noise is no other frame's
 
 /// The estimators of one trial, and what they remember.
-class Eyes {
+class Perception {
  public:
-  Eyes(const sensors::TouchCalibration& calibration, const GraspSenseSettings& settings)
+  Perception(const sensors::TouchCalibration& calibration, const GraspSenseSettings& settings)
       : settings_(settings), reader_(calibration, {.rule = settings.rule}) {}
 
-  sensors::GraspSight look(const cv::Mat& frame) {
+  sensors::GraspReading sense(const cv::Mat& frame) {
     const sensors::TouchReading& touch = reader_.read({frame, frames_++});
-    sensors::GraspSight sight;
-    sight.height_max_mm = touch.height_max_mm;
-    sight.normal_force_N = touch.normal_N;
-    sight.slip = touch.rule_slip || (settings_.rim && touch.rim.slips());
-    if (sight.slip) forgetting_ = settings_.forget_frames;
+    sensors::GraspReading reading;
+    reading.height_max_mm = touch.height_max_mm;
+    reading.normal_force_N = touch.normal_N;
+    reading.slip = touch.rule_slip || (settings_.rim && touch.rim.slips());
+    if (reading.slip) forgetting_ = settings_.forget_frames;
     if (forgetting_ > 0) {
       reader_.forget_slip();
       --forgetting_;
     }
-    return sight;
+    return reading;
   }
 
  private:
@@ -48,7 +48,7 @@ class Eyes {
 sensors::TouchCalibration calibrate_for_grasps(const sim::VirtualSensor& flat, const sim::VirtualSensor& marked,
                                                std::uint64_t seed) {
   sensors::TouchCalibration calibration;
-  const sensors::HeightModel of_flat = calibrate_rig(flat, {}, {}, seed).calibration.model;
+  const sensors::HeightModel of_flat = calibrate_heights(flat, {}, {}, seed).calibration.model;
   calibration.height = for_marked_gel(of_flat, marked, seed);
   calibration.markers = marker_settings(marked);
   calibration.background = marked.background(seed, kFrameOfBackground);
@@ -63,7 +63,9 @@ sensors::TouchCalibration calibrate_for_grasps(const sim::VirtualSensor& flat, c
 }
 
 GraspSenses grasp_senses(const sensors::TouchCalibration& calibration, const GraspSenseSettings& settings) {
-  return [eyes = std::make_shared<Eyes>(calibration, settings)](const cv::Mat& frame) { return eyes->look(frame); };
+  return [perception = std::make_shared<Perception>(calibration, settings)](const cv::Mat& frame) {
+    return perception->sense(frame);
+  };
 }
 
 }  // namespace touchstone::lab

@@ -21,8 +21,8 @@ sensors::TouchCalibration calibrate_for_grasps(const sim::VirtualSensor& flat, c
 struct GraspSenseSettings {
   sensors::SlipThresholds rule;  ///< of the thesis's two ratios
   bool rim = true;  ///< slip that begins at the contact's rim counts, too (sensors/markers/incipient_slip.h)
-  /// After slip was told, the rim's detector forgets its frames for so many: the gripper's answer, seen a camera's lag
-  /// later, moves the contact too, and would be taken for slip and answered again.
+  /// After slip was reported, the rim's detector forgets its frames for so many: the gripper's answer, seen a camera's
+  /// lag later, moves the contact too, and would be taken for slip and answered again.
   int forget_frames = 4;
 };
 

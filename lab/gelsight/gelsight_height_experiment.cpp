@@ -19,7 +19,7 @@ namespace {
 constexpr double kEdgeRadius_mm = 0.1;
 constexpr double kCylinderHeight_mm = 6.0;
 
-/// One of the ways in which the gel is pressed at each place.
+/// One of the presses that the gel gets at each place.
 struct BallPressed {
   sim::TouchObject ball;
   double radius_mm = 0.0;
@@ -61,26 +61,27 @@ sim::ObjectSpec with_friction(sim::ObjectSpec object, double friction) {
   return object;
 }
 
-CalibratedRig calibrate_rig(const sim::VirtualSensor& sensor, const CalibrationPresses& how,
-                            std::optional<sensors::LightCorrection> correction, std::uint64_t noise_seed) {
+HeightCalibrationResult calibrate_heights(const sim::VirtualSensor& sensor, const CalibrationPresses& how,
+                                          std::optional<sensors::LightCorrection> correction,
+                                          std::uint64_t noise_seed) {
   std::vector<cv::Mat> rest;
   for (int i = 0; i < how.background_frames; ++i) rest.push_back(sensor.background(noise_seed, i));
   const sensors::Background background = sensors::mean_background(rest);
   const double mm_per_px = sensor.mm_per_px();
-  std::vector<BallPressed> ways;
-  const auto add_way = [&](double diameter_mm, double depth_mm) {
-    ways.push_back({sensor.object(ball_of(diameter_mm)), 0.5 * diameter_mm, depth_mm});
+  std::vector<BallPressed> kinds;
+  const auto add_kind = [&](double diameter_mm, double depth_mm) {
+    kinds.push_back({sensor.object(ball_of(diameter_mm)), 0.5 * diameter_mm, depth_mm});
   };
-  for (const double depth : how.depths_mm) add_way(how.ball_diameter_mm, depth);
-  if (how.wide_ball_depth_mm > 0.0) add_way(how.wide_ball_diameter_mm, how.wide_ball_depth_mm);
+  for (const double depth : how.depths_mm) add_kind(how.ball_diameter_mm, depth);
+  if (how.wide_ball_depth_mm > 0.0) add_kind(how.wide_ball_diameter_mm, how.wide_ball_depth_mm);
   RandomStream hand(noise_seed, 0, Purpose::kPlacement);
   std::vector<sensors::BallPress> presses;
-  CalibratedRig result;
+  HeightCalibrationResult result;
   double squares = 0.0;
   int small_ones = 0;
   for (const Eigen::Vector2d& place : places_of(how)) {
-    for (const BallPressed& way : ways) {
-      const sim::Touch touch = sensor.press(way.ball, {.place_mm = place, .depth_mm = way.depth_mm},
+    for (const BallPressed& kind : kinds) {
+      const sim::Touch touch = sensor.press(kind.ball, {.place_mm = place, .depth_mm = kind.depth_mm},
                                             {.noise_seed = noise_seed + presses.size() + 1});
       const cv::Moments contact = cv::moments(touch.contact, true);
       if (contact.m00 < 1.0) fail("calibration: the ball at ({}, {}) mm isn't seen", place.x(), place.y());
@@ -88,7 +89,7 @@ CalibratedRig calibrate_rig(const sim::VirtualSensor& sensor, const CalibrationP
       sensors::BallPress press;
       press.name = fmt::format("press {}", presses.size() + 1);
       press.frame = touch.frame;
-      press.ball_radius_mm = way.radius_mm;
+      press.ball_radius_mm = kind.radius_mm;
       press.circle.centre = centre + how.annotation_px * Eigen::Vector2d(hand.normal(), hand.normal());
       press.circle.radius = std::sqrt(contact.m00 / kPi) + how.annotation_px * hand.normal();
       presses.push_back(press);
@@ -96,7 +97,7 @@ CalibratedRig calibrate_rig(const sim::VirtualSensor& sensor, const CalibrationP
         const sensors::ContactCircle found =
             sensors::find_contact_circle(press.frame, background, press.ball_radius_mm, mm_per_px, press.name);
         ++result.found_circles;
-        if (&way == &ways.back() && how.wide_ball_depth_mm > 0.0) continue;
+        if (&kind == &kinds.back() && how.wide_ball_depth_mm > 0.0) continue;
         squares += (found.centre - centre).squaredNorm();
         ++small_ones;
       } catch (const Error&) {

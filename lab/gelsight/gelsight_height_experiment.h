@@ -35,7 +35,7 @@ struct CalibrationPresses {
   double most_saturated = 0.5;  ///< of a press's pixels
 };
 /// A calibration, and how well its circles were found.
-struct CalibratedRig {
+struct HeightCalibrationResult {
   sensors::HeightCalibration calibration;
   int presses = 0;
   int found_circles = 0;         ///< by find_contact_circle
@@ -43,8 +43,8 @@ struct CalibratedRig {
 };
 /// `correction`: absent, the one that errs least on presses that are left out (HeightCalibrationSettings).
 /// @throws Error as sensors::calibrate_height
-CalibratedRig calibrate_rig(const sim::VirtualSensor& sensor, const CalibrationPresses& presses,
-                            std::optional<sensors::LightCorrection> correction, std::uint64_t noise_seed);
+HeightCalibrationResult calibrate_heights(const sim::VirtualSensor& sensor, const CalibrationPresses& presses,
+                                          std::optional<sensors::LightCorrection> correction, std::uint64_t noise_seed);
 
 /// Estimated heights against the true membrane, over the pixels that see membrane.
 struct HeightError {

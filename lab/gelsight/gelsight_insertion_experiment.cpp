@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kGripDepth_mm = 0.25;
 
-/// Where the touch sensor sits in the hand, and the socket on the bench: any poses do, both are known to the robot.
+/// Where the touch sensor sits in the hand, and the socket on the table: any poses do, both are known to the robot.
 RigidTransform gripper_from_touch() {
   return {rotation_from_xyz({0.0, kPi / 2, 0.3}), {12.0, 0.0, 95.0}};
 }
@@ -27,7 +27,7 @@ Eigen::Vector2d robot_miss(const InsertionSettings& settings, std::uint64_t inde
   return settings.robot_error_mm * Eigen::Vector2d(x, y);
 }
 
-/// One trial on its way: the plug hangs still, the hand moves between grasps.
+/// One trial while it runs: the plug hangs still, the hand moves between grasps.
 struct Reach {
   Grip hang;          // of the plug, relative to the hand's first place
   double hand = 0.0;  // across the plug
@@ -69,7 +69,7 @@ double mouth_error(const InsertionSettings& settings, const sensors::PlanarPose&
   return worst;
 }
 
-InsertionExperiment run_insertion(const TouchBench& bench, const sim::TouchObject& plug, const ObjectMap& map,
+InsertionExperiment run_insertion(const TouchSetup& setup, const sim::TouchObject& plug, const ObjectMap& map,
                                   const InsertionSettings& settings) {
   const auto trials = static_cast<std::size_t>(settings.trials);
   InsertionExperiment result;
@@ -93,7 +93,7 @@ InsertionExperiment run_insertion(const TouchBench& bench, const sim::TouchObjec
     }
     if (open.empty()) break;
     const std::uint64_t noise = settings.seed + 10000 * static_cast<std::uint64_t>(grasp + 1);
-    const std::vector<HeldTouch> touches = bench.touches(plug, grips, noise);
+    const std::vector<TouchSample> touches = setup.touches(plug, grips, noise);
     for (std::size_t k = 0; k < open.size(); ++k) {
       InsertionTrial& trial = result.trials[open[k]];
       ++trial.grasps;

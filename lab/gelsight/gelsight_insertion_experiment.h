@@ -67,7 +67,7 @@ double mouth_error(const InsertionSettings& settings, const sensors::PlanarPose&
                    const sensors::PlanarPose& touch_from_object_found, const Eigen::Vector2d& robot_error);
 
 /// Grasps plugs that hang at random, localises each grasp on the map, and moves the plug over the socket.
-InsertionExperiment run_insertion(const TouchBench& bench, const sim::TouchObject& plug, const ObjectMap& map,
+InsertionExperiment run_insertion(const TouchSetup& setup, const sim::TouchObject& plug, const ObjectMap& map,
                                   const InsertionSettings& settings);
 
 /// The same grasps and poses with a robot that stops elsewhere: successes as settings.robot_error_mm has it, averaged

@@ -25,13 +25,13 @@ struct Series {
   std::vector<std::vector<Localisation>> found;
 };
 
-Series run_series(const TouchBench& bench, const sim::TouchObject& object, const ObjectMap& map,
+Series run_series(const TouchSetup& setup, const sim::TouchObject& object, const ObjectMap& map,
                   std::span<const Grip> settings, const GripPlay& play, int repeats, std::uint64_t seed) {
   std::vector<Grip> grips;
   for (const Grip& setting : settings) {
     for (int repeat = 0; repeat < repeats; ++repeat) grips.push_back(held(setting, play, seed, grips.size()));
   }
-  const std::vector<HeldTouch> touches = bench.touches(object, grips, seed);
+  const std::vector<TouchSample> touches = setup.touches(object, grips, seed);
   Series series;
   for (std::size_t i = 0; i < touches.size(); ++i) {
     if (i % static_cast<std::size_t>(repeats) == 0) series.found.emplace_back();
@@ -60,20 +60,21 @@ void note_lost(const Series& series, std::span<const double> settings, const std
 }
 
 /// Touches that make a map: the object at these places, turned so.
-std::vector<HeldTouch> map_touches(const TouchBench& bench, const sim::TouchObject& object,
-                                   const std::vector<std::pair<Eigen::Vector2d, double>>& places, std::uint64_t seed) {
+std::vector<TouchSample> map_touches(const TouchSetup& setup, const sim::TouchObject& object,
+                                     const std::vector<std::pair<Eigen::Vector2d, double>>& places,
+                                     std::uint64_t seed) {
   std::vector<Grip> grips;
   for (const auto& [place, degrees] : places) {
     grips.push_back(held({.place_mm = place, .angle = degrees * kRadiansPerDegree}, kJigPlay, seed, grips.size()));
   }
-  return bench.touches(object, grips, seed);
+  return setup.touches(object, grips, seed);
 }
 
 }  // namespace
 
-ObjectMap build_map(std::span<const HeldTouch> touches, const sensors::TactileMapSettings& settings) {
+ObjectMap build_map(std::span<const TouchSample> touches, const sensors::TactileMapSettings& settings) {
   ObjectMap result{sensors::TactileMap(settings), {}, 0};
-  for (const HeldTouch& touch : touches) {
+  for (const TouchSample& touch : touches) {
     const bool root = result.map.empty();
     const sensors::Registration added = result.map.add(touch.image);
     ++result.offered;
@@ -84,7 +85,7 @@ ObjectMap build_map(std::span<const HeldTouch> touches, const sensors::TactileMa
   return result;
 }
 
-Localisation localise(const ObjectMap& map, const HeldTouch& touch) {
+Localisation localise(const ObjectMap& map, const TouchSample& touch) {
   const sensors::Registration found = map.map.localise(touch.image);
   const sensors::PlanarPose true_map_from_touch = map.map_from_object * touch.touch_from_object.inverse();
   Localisation result;
@@ -151,16 +152,16 @@ SeriesError series_error(std::span<const std::vector<double>> values) {
   return result;
 }
 
-MapExperiment run_map_experiment(const TouchBench& bench, const sim::TouchObject& coin, const sim::TouchObject& plug,
+MapExperiment run_map_experiment(const TouchSetup& setup, const sim::TouchObject& coin, const sim::TouchObject& plug,
                                  const MapExperimentSettings& settings) {
   // The maps are made of touches elsewhere than those that are localised afterwards.
   const ObjectMap coin_map = build_map(
-      map_touches(bench, coin, {{{0.4, 0}, 3}, {{3.6, 0}, -8}, {{-3.3, 0}, 6}, {{6.3, 0}, 5}, {{-6.4, 0}, -4}},
+      map_touches(setup, coin, {{{0.4, 0}, 3}, {{3.6, 0}, -8}, {{-3.3, 0}, 6}, {{6.3, 0}, 5}, {{-6.4, 0}, -4}},
                   settings.seed),
       settings.map);
   // Every touch of the plug is turned by some 30 degrees against one before it: what the estimator gets wrong at steep
   // edges stays with the sensor and not with the plug, so touches far apart in angle agree less.
-  const ObjectMap plug_map = build_map(map_touches(bench, plug,
+  const ObjectMap plug_map = build_map(map_touches(setup, plug,
                                                    {{{0.3, 0.2}, 4},
                                                     {{0, 0.5}, 31},
                                                     {{0.5, -0.5}, -26},
@@ -181,8 +182,8 @@ MapExperiment run_map_experiment(const TouchBench& bench, const sim::TouchObject
     angles.push_back(degrees);
     turned.push_back({.angle = degrees * kRadiansPerDegree});
   }
-  const Series along = run_series(bench, coin, coin_map, displaced, kJigPlay, settings.repeats, settings.seed + 1000);
-  const Series turn = run_series(bench, plug, plug_map, turned, kJigPlay, settings.repeats, settings.seed + 2000);
+  const Series along = run_series(setup, coin, coin_map, displaced, kJigPlay, settings.repeats, settings.seed + 1000);
+  const Series turn = run_series(setup, plug, plug_map, turned, kJigPlay, settings.repeats, settings.seed + 2000);
 
   MapExperiment result{coin_map, plug_map, {}, {}, {}, {}, {}, {}};
   const auto degrees_of = [](double radians) { return radians / kRadiansPerDegree; };

@@ -25,7 +25,7 @@ struct ObjectMap {
 };
 
 /// Touches in their order; the first becomes the root. @throws Error if the first one has no contact
-ObjectMap build_map(std::span<const HeldTouch> touches, const sensors::TactileMapSettings& settings = {});
+ObjectMap build_map(std::span<const TouchSample> touches, const sensors::TactileMapSettings& settings = {});
 
 /// One touch on the map.
 struct Localisation {
@@ -44,7 +44,7 @@ struct Localisation {
 };
 
 /// Localises one touch and compares with its true pose.
-Localisation localise(const ObjectMap& map, const HeldTouch& touch);
+Localisation localise(const ObjectMap& map, const TouchSample& touch);
 
 /// Chance in how an object is held: each uniform within +- its bound.
 struct GripPlay {
@@ -88,7 +88,7 @@ struct MapExperiment {
 };
 
 /// The quarter at displacements -6..6 mm in steps of 1 mm, the plug at -90..90 degrees in steps of 10.
-MapExperiment run_map_experiment(const TouchBench& bench, const sim::TouchObject& coin, const sim::TouchObject& plug,
+MapExperiment run_map_experiment(const TouchSetup& setup, const sim::TouchObject& coin, const sim::TouchObject& plug,
                                  const MapExperimentSettings& settings);
 
 }  // namespace touchstone::lab

@@ -23,16 +23,16 @@ constexpr double kUnsheared = 0.05;     ///< of the limit
 constexpr double kStillSticking = 0.9;  ///< of what sticks before the drag: with less, partial slip has begun
 constexpr double kRoll_mm = 1.2;
 /// How far a sliding object goes at most before it slides, mm for each N that friction holds, and mm at least.
-constexpr double kWay_mm_per_N = 3.0;
-constexpr double kLeastWay_mm = 0.6;
+constexpr double kSlide_mm_per_N = 3.0;
+constexpr double kLeastSlide_mm = 0.6;
 
 sim::MotionSpec motion_of(const SlipCase& what, const sim::GelSpec& gel, double frame_rate_Hz) {
   sim::MotionSpec motion;
   motion.frame_rate_Hz = kStatesAFrame * frame_rate_Hz;
-  const double way = what.motion == SlipMotion::roll
-                         ? kRoll_mm
-                         : std::max(kWay_mm_per_N * what.object.friction * what.normal_N, kLeastWay_mm);
-  const double from = -0.5 * way;
+  const double travel = what.motion == SlipMotion::roll
+                            ? kRoll_mm
+                            : std::max(kSlide_mm_per_N * what.object.friction * what.normal_N, kLeastSlide_mm);
+  const double from = -0.5 * travel;
   motion.start_mm = {from, 0, sim::first_touch({}, what.object, gel) + kClear_mm};
   const auto states_for = [&](double length_mm) {
     return std::max(static_cast<int>(std::lround(length_mm / what.speed_mm_per_s * motion.frame_rate_Hz)), 1);
@@ -45,8 +45,8 @@ sim::MotionSpec motion_of(const SlipCase& what, const sim::GelSpec& gel, double 
   switch (what.motion) {
     case SlipMotion::slide: {
       sim::MotionKey slide;
-      slide.frames = states_for(way);
-      slide.x = sim::AxisKey{from + way, std::nullopt};
+      slide.frames = states_for(travel);
+      slide.x = sim::AxisKey{from + travel, std::nullopt};
       motion.keys.push_back(slide);
       break;
     }
@@ -64,9 +64,9 @@ sim::MotionSpec motion_of(const SlipCase& what, const sim::GelSpec& gel, double 
     }
     case SlipMotion::roll: {
       sim::MotionKey roll;
-      roll.frames = states_for(way);
-      roll.x = sim::AxisKey{from + way, std::nullopt};
-      roll.angles_deg = Eigen::Vector3d(0, way / what.object.shape.radius_mm * 180.0 / std::numbers::pi, 0);
+      roll.frames = states_for(travel);
+      roll.x = sim::AxisKey{from + travel, std::nullopt};
+      roll.angles_deg = Eigen::Vector3d(0, travel / what.object.shape.radius_mm * 180.0 / std::numbers::pi, 0);
       motion.keys.push_back(roll);
       break;
     }
@@ -126,7 +126,7 @@ SlipRun run_slip_case(const sim::VirtualSensor& sensor, const SlipCase& what, co
   if (what.motion == SlipMotion::slide) {
     const auto sliding = std::find_if(truths.begin() + static_cast<std::ptrdiff_t>(first_drag), truths.end(),
                                       [](const sim::Truth& truth) { return share_sticking(truth.press) == 0.0; });
-    if (sliding == truths.end()) fail("{}: doesn't slide on its way", what.name());
+    if (sliding == truths.end()) fail("{}: doesn't slide on its path", what.name());
     const auto onset = static_cast<std::size_t>(sliding - truths.begin());
     const auto time_of = [&](std::size_t state) {
       return static_cast<double>(state) / (kStatesAFrame * frame_rate_Hz);
@@ -192,7 +192,7 @@ std::string to_csv(const std::vector<SlipRun>& runs) {
   return text;
 }
 
-SlipScore score(const std::vector<SlipRun>& runs, SlipDetector detector, double foretold_s) {
+SlipScore score(const std::vector<SlipRun>& runs, SlipDetector detector, double least_warning_s) {
   const auto reports = [&](const SlipFrame& frame) {
     return detector == SlipDetector::rule ? frame.rule : frame.rim.slips();
   };
@@ -212,15 +212,15 @@ SlipScore score(const std::vector<SlipRun>& runs, SlipDetector detector, double 
     }
     ++result.slides;
     constexpr double kRounding_s = 1e-9;
-    const bool foretold = run.partial_s && *run.onset_s - *run.partial_s >= foretold_s - kRounding_s;
-    if (foretold) ++result.foretold;
+    const bool predictable = run.partial_s && *run.onset_s - *run.partial_s >= least_warning_s - kRounding_s;
+    if (predictable) ++result.predictable;
     const auto found = std::find_if(loaded, run.frames.end(), reports);
     if (found == run.frames.end()) continue;
     ++result.found;
     const double delay_s = found->t_s - *run.onset_s;
     if (delay_s <= 0.0) {
       ++result.found_before;
-      if (foretold) ++result.foretold_before;
+      if (predictable) ++result.predicted;
     }
     result.delays_ms.push_back(1e3 * delay_s);
   }

@@ -72,11 +72,11 @@ struct SlipScore {
   int found = 0;                  ///< in which slip was reported at all
   int found_before = 0;           ///< not later than the onset
   std::vector<double> delays_ms;  ///< report - onset of those found; negative: before
-  int foretold = 0;         ///< slides whose partial slip lasts as long as score() was told: there's time to see it
-  int foretold_before = 0;  ///< of those, found not later than the onset
-  int quiet_runs = 0;       ///< without an onset
-  int false_runs = 0;       ///< of those, with a report
-  int quiet_frames = 0;     ///< frames of quiet runs, and of the others' before any shear
+  int predictable = 0;   ///< slides whose partial slip lasts as long as score() is given: there's time to see it
+  int predicted = 0;     ///< of those, found not later than the onset
+  int quiet_runs = 0;    ///< without an onset
+  int false_runs = 0;    ///< of those, with a report
+  int quiet_frames = 0;  ///< frames of quiet runs, and of the others' before any shear
   int false_frames = 0;
 
   double median_delay_ms() const;       ///< NaN if none was found
@@ -90,7 +90,7 @@ std::string to_csv(const std::vector<SlipRun>& runs);
 /// The thesis's two ratios, or lag at the contact's rim.
 enum class SlipDetector { rule, incipient };
 /// A detector reports from its first frame on that says slip; frames before an object's shear load reaches a twentieth
-/// of its limit are quiet ones. `foretold_s`: how long partial slip has to last for SlipScore::foretold.
-SlipScore score(const std::vector<SlipRun>& runs, SlipDetector detector, double foretold_s = 0.0);
+/// of its limit are quiet ones. `least_warning_s`: how long partial slip has to last for SlipScore::predictable.
+SlipScore score(const std::vector<SlipRun>& runs, SlipDetector detector, double least_warning_s = 0.0);
 
 }  // namespace touchstone::lab

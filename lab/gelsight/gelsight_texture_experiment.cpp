@@ -172,7 +172,7 @@ HeightsOf estimated_heights(const sim::VirtualSensor& sensor, const sensors::Hei
 }
 
 PressedHeights press_texture(const sim::VirtualSensor& sensor, const sim::ObjectSpec& object,
-                             const TexturePresses& presses, int texture, int image, const HeightsOf& look) {
+                             const TexturePresses& presses, int texture, int image, const HeightsOf& heights_of) {
   const auto number = (static_cast<std::uint64_t>(texture) << 16) + static_cast<std::uint64_t>(image);
   RandomStream random(presses.seed, number, Purpose::kPlacement);
   const std::uint64_t piece = (static_cast<std::uint64_t>(random()) << 32) + random();
@@ -180,7 +180,7 @@ PressedHeights press_texture(const sim::VirtualSensor& sensor, const sim::Object
   const Eigen::Vector2d place(presses.shift_mm * random.normal(), presses.shift_mm * random.normal());
   const double force = presses.force_N * std::max(0.2, 1.0 + presses.force_spread * random.normal());
   const sim::TouchObject touching = sensor.object(another_patch(object, piece));
-  return look(touching, pressed(sensor, touching, place, turn_deg, force), static_cast<int>(number));
+  return heights_of(touching, pressed(sensor, touching, place, turn_deg, force), static_cast<int>(number));
 }
 
 std::vector<cv::Mat> middle_squares(const cv::Mat& image, int side) {
@@ -196,14 +196,15 @@ std::vector<cv::Mat> middle_squares(const cv::Mat& image, int side) {
 }
 
 TextureSamples texture_samples(const sim::VirtualSensor& sensor, const std::vector<sim::ObjectSpec>& objects,
-                               const TexturePresses& presses, const HeightsOf& look, const Progress& progress) {
+                               const TexturePresses& presses, const HeightsOf& heights_of, const Progress& progress) {
   constexpr int kSide = 200;
   const int images = static_cast<int>(objects.size()) * presses.images;
   std::vector<std::vector<cv::Mat>> estimated(images), membrane(images);
   std::atomic<int> done = 0;
   tbb::parallel_for(0, images, [&](int k) {
     const int texture = k / presses.images;
-    const PressedHeights heights = press_texture(sensor, objects[texture], presses, texture, k % presses.images, look);
+    const PressedHeights heights =
+        press_texture(sensor, objects[texture], presses, texture, k % presses.images, heights_of);
     estimated[k] = middle_squares(heights.estimated, kSide);
     membrane[k] = middle_squares(heights.membrane, kSide);
     if (progress) progress("pressing textures", ++done, images);

@@ -57,7 +57,7 @@ HeightsOf estimated_heights(const sim::VirtualSensor& sensor, const sensors::Hei
 /// The height images of press number `image` on class number `texture`: a new piece of the surface, at a random angle,
 /// place and force, all chosen by (seed, texture, image).
 PressedHeights press_texture(const sim::VirtualSensor& sensor, const sim::ObjectSpec& object,
-                             const TexturePresses& presses, int texture, int image, const HeightsOf& look);
+                             const TexturePresses& presses, int texture, int image, const HeightsOf& heights_of);
 
 /// Four squares of `side` px about the image's middle, which don't overlap. @throws Error for a smaller image
 std::vector<cv::Mat> middle_squares(const cv::Mat& image, int side);
@@ -69,18 +69,20 @@ struct TextureSample {
   cv::Mat heights;  ///< CV_32FC1, mm
 };
 
-/// The same squares twice, so that what the estimator of heights loses can be told from what surfaces have in common.
+/// The same squares twice, so that what the estimator of heights loses can be separated from what surfaces have in
+/// common.
 struct TextureSamples {
   std::vector<TextureSample> estimated, membrane;
 };
 
 /// All samples of `objects`, by class, then image, then square; presses run in parallel.
 TextureSamples texture_samples(const sim::VirtualSensor& sensor, const std::vector<sim::ObjectSpec>& objects,
-                               const TexturePresses& presses, const HeightsOf& look, const Progress& progress = {});
+                               const TexturePresses& presses, const HeightsOf& heights_of,
+                               const Progress& progress = {});
 
 /// How samples are divided into those that train and those that test.
 enum class TextureSplit {
-  by_sample,  ///< the thesis's way: squares of one image may stand on both sides
+  by_sample,  ///< as in the thesis: squares of one image may stand on both sides
   by_image,   ///< stricter: all squares of an image stand on the same side
 };
 

@@ -61,14 +61,14 @@ cv::Mat higher_part(const cv::Mat& heights) {
 
 }  // namespace
 
-TouchBench::TouchBench(const sim::VirtualSensor& sensor, HeightReader heights)
+TouchSetup::TouchSetup(const sim::VirtualSensor& sensor, HeightReader heights)
     : sensor_(sensor), heights_(std::move(heights)), places_(fitted_places(sensor)) {}
 
-std::vector<HeldTouch> TouchBench::touches(const sim::TouchObject& object, std::span<const Grip> grips,
-                                           std::uint64_t seed) const {
+std::vector<TouchSample> TouchSetup::touches(const sim::TouchObject& object, std::span<const Grip> grips,
+                                             std::uint64_t seed) const {
   const double origin = sim::first_touch({}, object.spec(), sensor_.device().gel);
   std::vector<sim::Touch> seen(grips.size());
-  std::vector<HeldTouch> touches(grips.size());
+  std::vector<TouchSample> touches(grips.size());
   tbb::parallel_for(std::size_t{0}, grips.size(), [&](std::size_t i) {
     seen[i] = sensor_.press(object, press_of(grips[i], origin), {.noise_seed = seed + i});
     touches[i].touch_from_object = planar(seen[i].press.gel_from_object, origin);
@@ -83,7 +83,7 @@ std::vector<HeldTouch> TouchBench::touches(const sim::TouchObject& object, std::
 }
 
 HeightReader estimated_heights(const sim::VirtualSensor& sensor, std::uint64_t seed) {
-  const CalibratedRig calibrated = calibrate_rig(sensor, {}, {}, seed);
+  const HeightCalibrationResult calibrated = calibrate_heights(sensor, {}, {}, seed);
   sensors::HeightSettings settings;
   settings.border = sensors::HeightBorder::free;
   const auto estimator = std::make_shared<sensors::HeightEstimator>(calibrated.calibration.model, settings);

@@ -27,22 +27,23 @@ struct Grip {
 using HeightReader = std::function<cv::Mat(const sim::Touch& touch)>;
 
 /// One touch. Touch frame and gel frame agree.
-struct HeldTouch {
+struct TouchSample {
   sensors::TouchImage image;
   sensors::PlanarPose touch_from_object;  ///< true, of the touched face
   double force_N = 0.0;
 };
 
 /// A gelsight device with its height estimator and its map of places.
-class TouchBench {
+class TouchSetup {
  public:
   /// The place map is fitted to a grid of marks on the undeformed gel, as a target with printed dots would give it.
   /// Keeps a reference to the sensor.
-  TouchBench(const sim::VirtualSensor& sensor, HeightReader heights);
+  TouchSetup(const sim::VirtualSensor& sensor, HeightReader heights);
 
   /// Grip i has noise seed `seed` + i. Simulated side by side, read one after the other: the same touches with any
   /// number of threads.
-  std::vector<HeldTouch> touches(const sim::TouchObject& object, std::span<const Grip> grips, std::uint64_t seed) const;
+  std::vector<TouchSample> touches(const sim::TouchObject& object, std::span<const Grip> grips,
+                                   std::uint64_t seed) const;
 
   const sim::VirtualSensor& sensor() const { return sensor_; }
   const sensors::PlaceMap& places() const { return places_; }
@@ -55,7 +56,7 @@ class TouchBench {
 
 /// The estimator's heights: calibrated on the sensor by ball presses as a user would
 /// (lab/gelsight/gelsight_height_experiment.h), integrated with a free border since objects run out of the picture.
-/// @throws Error as calibrate_rig does
+/// @throws Error as calibrate_heights does
 HeightReader estimated_heights(const sim::VirtualSensor& sensor, std::uint64_t seed);
 
 /// True heights with normal noise of `noise_mm` in each pixel: a reader that leaves the estimator out.

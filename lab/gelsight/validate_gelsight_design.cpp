@@ -61,7 +61,7 @@ std::vector<ValidationRow> validate_gelsight_design(const ValidateOptions& optio
       presses.columns = 3;
       presses.rows = 2;
     }
-    const CalibratedRig made = calibrate_rig(sensor, presses, {}, kCalibrationSeed);
+    const HeightCalibrationResult made = calibrate_heights(sensor, presses, {}, kCalibrationSeed);
     const sensors::TableCoverage& coverage = made.calibration.coverage;
     sensors::HeightEstimator estimator(made.calibration.model);
     // Balls that can't go as deep as the others show slopes of their depth, not of their size.

@@ -2,7 +2,7 @@
 // The thesis shows one grasp of each, and all are held; here each is tried over a range of frictions, weights, places
 // and turns, with other noise each time. The rule's steps and the arm's speed were chosen on one grasp of each object
 // with a friction of 0.6 in the middle of the gel, none of the full form's trials; how long slip is forgotten after it
-// was told (GraspSenseSettings) was chosen on its second one.
+// was given (GraspSenseSettings) was chosen on its second one.
 
 #include <tbb/parallel_for.h>
 
@@ -99,7 +99,7 @@ Trials run(const sim::VirtualSensor& sensor, const sensors::TouchCalibration& ca
            const Trials* known = nullptr) {
   Trials result{trials, known != nullptr ? known->outcomes : std::vector<GraspOutcome>(trials.size())};
   tbb::parallel_for(std::size_t{0}, trials.size(), [&](std::size_t i) {
-    if (known != nullptr && known->outcomes[i].slip_answers == 0) return;
+    if (known != nullptr && known->outcomes[i].slip_reactions == 0) return;
     result.outcomes[i] = run_grasp_trial(sensor, trials[i], loop, grasp_senses(calibration, senses));
   });
   return result;
@@ -113,11 +113,11 @@ std::vector<ValidationRow> validate_gelsight_grasp(const ValidateOptions& option
   light.widest_mm = kWidest_mm;
   light.membrane_um = kMembrane_um;
   light.edge_side = kEdgeSide;
-  const auto rig_of = [&](const char* device) {
+  const auto sensor_of = [&](const char* device) {
     return sim::VirtualSensor(sim::read_device(options.scenes / "devices" / device), options.cache, light);
   };
-  const sim::VirtualSensor sensor = rig_of("gelsight-markers.yaml");
-  const sensors::TouchCalibration calibration = calibrate_for_grasps(rig_of("gelsight-flat.yaml"), sensor, kSeed);
+  const sim::VirtualSensor sensor = sensor_of("gelsight-markers.yaml");
+  const sensors::TouchCalibration calibration = calibrate_for_grasps(sensor_of("gelsight-flat.yaml"), sensor, kSeed);
   std::vector<sim::ObjectSpec> objects;
   for (const char* name : {"egg.yaml", "chip.yaml", "leaf.yaml"}) {
     objects.push_back(sim::read_object(options.scenes / "objects" / name));
@@ -125,7 +125,7 @@ std::vector<ValidationRow> validate_gelsight_grasp(const ValidateOptions& option
   const std::vector<GraspTrial> trials = trials_of(objects, options.quick);
   const GraspLoopSettings loop;
   GraspLoopSettings blind = loop;
-  blind.rule.answer_slip = false;
+  blind.rule.react_to_slip = false;
 
   std::vector<ValidationRow> rows;
   const auto add = [&](const std::string& id, const std::string& title, const std::string& unit) -> ValidationRow& {

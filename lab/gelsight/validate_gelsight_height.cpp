@@ -27,7 +27,7 @@ constexpr double kMembrane_um = 20.0;
 constexpr double kPortableMembrane_um = 8.0;
 
 /// What all rows share.
-struct Bench {
+struct Setup {
   const sim::VirtualSensor& sensor;
   sensors::HeightEstimator& estimator;
   bool quick;
@@ -40,10 +40,10 @@ struct Errors {
   double ball_worst_um = 0.0;
 };
 
-Errors errors_of_shapes(const Bench& bench) {
+Errors errors_of_shapes(const Setup& setup) {
   std::vector<sim::ObjectSpec> objects;
   for (const double diameter : {2.0, 4.0, 4.75, 8.0, 12.7, 22.25, 25.45}) {
-    if (!bench.quick || diameter == 4.0 || diameter == 12.7) objects.push_back(ball_of(diameter));
+    if (!setup.quick || diameter == 4.0 || diameter == 12.7) objects.push_back(ball_of(diameter));
   }
   const std::size_t balls = objects.size();
   objects.push_back(flat_cylinder_of(8.5));
@@ -53,13 +53,13 @@ Errors errors_of_shapes(const Bench& bench) {
   int count = 0;
   int ball_count = 0;
   for (std::size_t i = 0; i < objects.size(); ++i) {
-    const sim::TouchObject object = bench.sensor.object(objects[i]);
+    const sim::TouchObject object = setup.sensor.object(objects[i]);
     for (const double depth : {0.2, 0.5}) {
       for (const Eigen::Vector2d& place : {Eigen::Vector2d(0.7, -0.9), Eigen::Vector2d(-3.1, 2.0)}) {
         if (i >= balls && place.x() < 0.0) continue;  // it would run out of the picture
-        const sim::Touch touch = bench.sensor.press(object, {.place_mm = place, .depth_mm = depth},
+        const sim::Touch touch = setup.sensor.press(object, {.place_mm = place, .depth_mm = depth},
                                                     {.noise_seed = kTestSeed + static_cast<unsigned>(count)});
-        const HeightError error = height_error(bench.estimator.estimate(touch.frame), touch, bench.sensor.mm_per_px());
+        const HeightError error = height_error(setup.estimator.estimate(touch.frame), touch, setup.sensor.mm_per_px());
         sum += error.mean_um;
         errors.worst_um = std::max(errors.worst_um, error.worst_um);
         ++count;
@@ -76,15 +76,15 @@ Errors errors_of_shapes(const Bench& bench) {
 }
 
 /// Standard deviation of a pixel's height from frame to frame, um, round the middle of a press that is held.
-double noise_um(const Bench& bench, const sim::TouchObject& object, const sim::PressSpec& press) {
+double noise_um(const Setup& setup, const sim::TouchObject& object, const sim::PressSpec& press) {
   constexpr int kFrames = 6;
   cv::Mat sum;
   cv::Mat squares;
   for (int i = 0; i < kFrames; ++i) {
     const sim::Touch touch =
-        bench.sensor.press(object, press, {.truth = false, .noise_seed = kTestSeed + 500U + static_cast<unsigned>(i)});
+        setup.sensor.press(object, press, {.truth = false, .noise_seed = kTestSeed + 500U + static_cast<unsigned>(i)});
     cv::Mat heights;
-    bench.estimator.estimate(touch.frame).height_mm.convertTo(heights, CV_64F);
+    setup.estimator.estimate(touch.frame).height_mm.convertTo(heights, CV_64F);
     if (sum.empty()) {
       sum = cv::Mat::zeros(heights.size(), CV_64F);
       squares = sum.clone();
@@ -94,8 +94,8 @@ double noise_um(const Bench& bench, const sim::TouchObject& object, const sim::P
   }
   const cv::Mat variance = (squares - sum.mul(sum) / kFrames) / (kFrames - 1);
   const double half_mm = 1.0;
-  const auto middle = bench.sensor.pixel_from_gel(press.place_mm);
-  const int half = static_cast<int>(half_mm / bench.sensor.mm_per_px());
+  const auto middle = setup.sensor.pixel_from_gel(press.place_mm);
+  const int half = static_cast<int>(half_mm / setup.sensor.mm_per_px());
   const cv::Rect part(static_cast<int>(middle.x()) - half, static_cast<int>(middle.y()) - half, 2 * half, 2 * half);
   return kMicrometresPerMillimetre * std::sqrt(cv::mean(variance(part))[0]);
 }
@@ -113,24 +113,24 @@ struct Transfer {
   double estimate = 0.0;
 };
 
-Transfer transfer_of(const Bench& bench, double pitch_mm) {
+Transfer transfer_of(const Setup& setup, double pitch_mm) {
   constexpr double kAmplitude_um = 20.0;
   constexpr double kDepth_mm = 0.12;
   sim::ObjectSpec object = flat_cylinder_of(4.0);
   object.relief = sim::ReliefSpec{sim::WavesRelief{kAmplitude_um, pitch_mm}};
-  const sim::TouchObject grating = bench.sensor.object(object);
+  const sim::TouchObject grating = setup.sensor.object(object);
   const sim::Touch touch =
-      bench.sensor.press(grating, {.depth_mm = kDepth_mm}, {.truth = false, .noise_seed = kTestSeed + 700U});
-  const cv::Rect part = middle_square(bench.sensor, 1.1);
-  const double wavelength_px = pitch_mm / bench.sensor.mm_per_px();
+      setup.sensor.press(grating, {.depth_mm = kDepth_mm}, {.truth = false, .noise_seed = kTestSeed + 700U});
+  const cv::Rect part = middle_square(setup.sensor, 1.1);
+  const double wavelength_px = pitch_mm / setup.sensor.mm_per_px();
   const double half_um = 0.5 * kAmplitude_um;
-  const double amplitude_mm = wave_amplitude(bench.estimator.estimate(touch.frame).height_mm, part, wavelength_px);
+  const double amplitude_mm = wave_amplitude(setup.estimator.estimate(touch.frame).height_mm, part, wavelength_px);
   return {pitch_mm, kMicrometresPerMillimetre * amplitude_mm / half_um};
 }
 
-std::vector<Transfer> transfers(const Bench& bench, const std::vector<double>& pitches_mm) {
+std::vector<Transfer> transfers(const Setup& setup, const std::vector<double>& pitches_mm) {
   std::vector<Transfer> result;
-  for (const double pitch : pitches_mm) result.push_back(transfer_of(bench, pitch));
+  for (const double pitch : pitches_mm) result.push_back(transfer_of(setup, pitch));
   return result;
 }
 
@@ -154,7 +154,7 @@ std::vector<Transfer> portable_transfers(const ValidateOptions& options, Calibra
   const sim::DeviceSpec device = sim::read_device(options.scenes / "devices" / "gelsight-portable.yaml");
   presses.extent_mm = {7.0, 4.6};  // it sees 12 x 9 mm
   sensors::HeightEstimator estimator(
-      calibrate_rig(sim::VirtualSensor(device, options.cache, settings), presses, {}, kCalibrationSeed)
+      calibrate_heights(sim::VirtualSensor(device, options.cache, settings), presses, {}, kCalibrationSeed)
           .calibration.model);
   settings.membrane_um = kPortableMembrane_um;
   const sim::VirtualSensor sensor(device, options.cache, settings);
@@ -177,13 +177,13 @@ double resolved_pitch_mm(const std::vector<Transfer>& transfers) {
 
 /// How far the detail of an object stands over the noise: standard deviation of the estimate about its own blur over
 /// the middle of the contact, in standard deviations of the frame-to-frame noise of a plain press.
-double detail_over_noise(const Bench& bench, const sim::ObjectSpec& spec, double depth_mm, double noise) {
-  const sim::TouchObject object = bench.sensor.object(spec);
+double detail_over_noise(const Setup& setup, const sim::ObjectSpec& spec, double depth_mm, double noise) {
+  const sim::TouchObject object = setup.sensor.object(spec);
   const sim::Touch touch =
-      bench.sensor.press(object, {.depth_mm = depth_mm}, {.truth = false, .noise_seed = kTestSeed + 800U});
-  const cv::Mat part = bench.estimator.estimate(touch.frame).height_mm(middle_square(bench.sensor, 2.0));
+      setup.sensor.press(object, {.depth_mm = depth_mm}, {.truth = false, .noise_seed = kTestSeed + 800U});
+  const cv::Mat part = setup.estimator.estimate(touch.frame).height_mm(middle_square(setup.sensor, 2.0));
   cv::Mat smooth;
-  const int width = 2 * static_cast<int>(0.5 / bench.sensor.mm_per_px()) + 1;
+  const int width = 2 * static_cast<int>(0.5 / setup.sensor.mm_per_px()) + 1;
   cv::blur(part, smooth, {width, width}, {-1, -1}, cv::BORDER_REFLECT);
   cv::Scalar mean;
   cv::Scalar deviation;
@@ -212,21 +212,21 @@ std::vector<ValidationRow> validate_gelsight_height(const ValidateOptions& optio
     if (options.progress) options.progress("gelsight: height", done, 6);
   };
   report(0);
-  sim::VirtualSensorSettings rig_settings;
-  rig_settings.membrane_um = kMembrane_um;
+  sim::VirtualSensorSettings sensor_settings;
+  sensor_settings.membrane_um = kMembrane_um;
   const sim::VirtualSensor sensor(sim::read_device(options.scenes / "devices" / "gelsight-flat.yaml"), options.cache,
-                                  rig_settings);
+                                  sensor_settings);
   CalibrationPresses presses;
   if (options.quick) {
     presses.columns = 3;
     presses.depths_mm = {0.5};
   }
-  const CalibratedRig calibrated = calibrate_rig(sensor, presses, {}, kCalibrationSeed);
+  const HeightCalibrationResult calibrated = calibrate_heights(sensor, presses, {}, kCalibrationSeed);
   sensors::HeightEstimator estimator(calibrated.calibration.model);
-  const Bench bench{sensor, estimator, options.quick};
+  const Setup setup{sensor, estimator, options.quick};
   report(1);
 
-  const Errors errors = errors_of_shapes(bench);
+  const Errors errors = errors_of_shapes(setup);
   rows.add("error_um",
            "height against the true membrane, mean over the picture; balls and a flat cylinder, 0.2 and 0.5 mm deep",
            "um", errors.mean_um, Better::lower, errors.mean_um <= kPublishedResolution_um)
@@ -257,20 +257,20 @@ std::vector<ValidationRow> validate_gelsight_height(const ValidateOptions& optio
     for (const Transfer& transfer : curve) series.points.emplace_back(transfer.pitch_mm, transfer.estimate);
     row.series = std::move(series);
   };
-  add_resolution("resolution_um", "320 x 240 pixels of 53 um", transfers(bench, fingertip_pitches_mm(options.quick)));
+  add_resolution("resolution_um", "320 x 240 pixels of 53 um", transfers(setup, fingertip_pitches_mm(options.quick)));
   report(3);
   add_resolution("portable_resolution_um", "portable device, 640 x 480 pixels of 19 um",
                  portable_transfers(options, presses));
   report(4);
 
   const sim::TouchObject plain = sensor.object(flat_cylinder_of(4.0));
-  const double noise = noise_um(bench, plain, {.depth_mm = 0.12});
+  const double noise = noise_um(setup, plain, {.depth_mm = 0.12});
   rows.add("smallest_um", "height that stands three standard deviations over one pixel's noise in one frame", "um",
            kVisible * noise, Better::lower, kVisible * noise <= kPublishedResolution_um)
       .reference = kPublishedResolution_um;
   for (const auto& [name, depth] : {std::pair{"hair-100um", 0.15}, {"print-60um", 0.15}, {"fingerprint", 0.2}}) {
     const sim::ObjectSpec object = sim::read_object(options.scenes / "objects" / (std::string(name) + ".yaml"));
-    const double ratio = detail_over_noise(bench, object, depth, noise);
+    const double ratio = detail_over_noise(setup, object, depth, noise);
     rows.add(std::string(name) + "_over_noise", "detail of it in the height map, in standard deviations of the noise",
              "1", ratio, Better::higher, ratio >= kVisible)
         .reference = kVisible;

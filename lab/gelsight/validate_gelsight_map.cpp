@@ -1,5 +1,5 @@
-// Localisation, mapping and insertion by touch: the published figures of [Li2015, ch. 3]. Touches go the whole way:
-// gel, light, imager, height estimator calibrated by ball presses, registration.
+// Localisation, mapping and insertion by touch: the published figures of [Li2015, ch. 3]. Touches go through the whole
+// chain: gel, light, imager, height estimator calibrated by ball presses, registration.
 
 #include <fmt/format.h>
 
@@ -54,11 +54,11 @@ ValidationRow row(const std::string& id, const std::string& title, const std::st
 
 std::vector<ValidationRow> validate_gelsight_map(const ValidateOptions& options) {
   const auto begun = std::chrono::steady_clock::now();
-  sim::VirtualSensorSettings rig_settings;
-  rig_settings.membrane_um = options.quick ? kQuickMembrane_um : kMembrane_um;
+  sim::VirtualSensorSettings sensor_settings;
+  sensor_settings.membrane_um = options.quick ? kQuickMembrane_um : kMembrane_um;
   const sim::VirtualSensor sensor(sim::read_device(options.scenes / "devices" / "gelsight-flat.yaml"), options.cache,
-                                  rig_settings);
-  const TouchBench bench(sensor, estimated_heights(sensor, kSeed));
+                                  sensor_settings);
+  const TouchSetup setup(sensor, estimated_heights(sensor, kSeed));
   const sim::TouchObject coin = greased(sensor, options.scenes / "objects" / "coin-quarter.yaml");
   const sim::TouchObject plug = greased(sensor, options.scenes / "objects" / "usb-a-plug.yaml");
 
@@ -66,9 +66,9 @@ std::vector<ValidationRow> validate_gelsight_map(const ValidateOptions& options)
   settings.seed = kSeed;
   settings.repeats = options.quick ? 1 : 3;
   settings.step = options.quick ? 3 : 1;
-  const MapExperiment maps = run_map_experiment(bench, coin, plug, settings);
+  const MapExperiment maps = run_map_experiment(setup, coin, plug, settings);
   InsertionSettings insertion;
-  const InsertionExperiment inserted = run_insertion(bench, plug, maps.plug, insertion);
+  const InsertionExperiment inserted = run_insertion(setup, plug, maps.plug, insertion);
 
   std::vector<ValidationRow> rows;
   const auto add_error = [&](const std::string& id, const std::string& title, const std::string& unit, double published,

@@ -170,10 +170,10 @@ void add_slip_rows(RowList& rows, const std::vector<SlipRun>& runs, double frame
                    "gross sliding",
                    "%", Better::higher, 90.0, false, percent(rim.found_before, rim.slides));
   rows.add_bounded(
-      "gelsight.slip.found_before_of_foretold_percent",
+      "gelsight.slip.found_before_of_predictable_percent",
       fmt::format("the same of the {} slides of {} whose rim slips for {:g} frames or more before all does",
-                  rim.foretold, rim.slides, kFramesToSee),
-      "%", Better::higher, 90.0, false, percent(rim.foretold_before, rim.foretold));
+                  rim.predictable, rim.slides, kFramesToSee),
+      "%", Better::higher, 90.0, false, percent(rim.predicted, rim.predictable));
   rows.add_bounded("gelsight.slip.false_alarms_percent",
                    "frames with slip at the rim reported while pressing, holding, loaded to a half, rolling, in runs "
                    "that the detector was tuned on",
@@ -192,14 +192,14 @@ void add_slip_rows(RowList& rows, const std::vector<SlipRun>& runs, double frame
 
 std::vector<ValidationRow> validate_gelsight_slip(const ValidateOptions& options) {
   RowList rows("", options, RowList::Since::begin);
-  const auto rig_of = [&](const char* device) {
+  const auto sensor_of = [&](const char* device) {
     return sim::VirtualSensor(sim::read_device(options.scenes / "devices" / device), options.cache);
   };
-  const sim::VirtualSensor bare = rig_of("gelsight-flat.yaml");
-  const sensors::HeightModel heights = calibrate_rig(bare, {}, {}, kSeed).calibration.model;
+  const sim::VirtualSensor bare = sensor_of("gelsight-flat.yaml");
+  const sensors::HeightModel heights = calibrate_heights(bare, {}, {}, kSeed).calibration.model;
   add_force_rows(rows, bare, heights, options.quick);
 
-  const sim::VirtualSensor marked = rig_of("gelsight-markers.yaml");
+  const sim::VirtualSensor marked = sensor_of("gelsight-markers.yaml");
   rows.begin();
   const ShearTest shear = shear_until_slip(marked, with_friction(flat_cylinder_of(10.0), 0.6), 0.7, kShearDrag_mm,
                                            options.quick ? 12 : 24, kSeed + 4);

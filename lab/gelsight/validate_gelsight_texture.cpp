@@ -23,7 +23,7 @@ constexpr double kGrayStep_mm = 0.002;  // chosen before any sample was made: fa
 constexpr std::uint64_t kSeed = 1;
 constexpr int kSquares = 4;
 
-/// In the quick form: some of each kind, with the ones that are hard to tell apart.
+/// In the quick form: some of each kind, with the ones that are hard to distinguish.
 std::vector<sim::ObjectSpec> some_of(const std::vector<sim::ObjectSpec>& objects) {
   std::vector<sim::ObjectSpec> some;
   for (const sim::ObjectSpec& object : objects) {

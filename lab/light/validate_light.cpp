@@ -297,7 +297,7 @@ std::vector<ValidationRow> validate_light(const ValidateOptions& options) {
       // Of 6400 paths few are lost or won at all: Russian roulette and one choice of two at faces are the only spread.
       {"light.furnace", "white things in gel under glass, in surroundings of one", "1", 5e-4, furnace},
       {"light.slab", "what a plate of n = 1.5 passes at 0, 45 and 69 degrees", "1", 3e-4, slab},
-      {"light.beer_lambert", "absorption along slanted ways", "1", 1e-9, beer_lambert},
+      {"light.beer_lambert", "absorption along slanted paths", "1", 1e-9, beer_lambert},
       // The closed form's own error is foil / distance, 5e-4; the rest is sampling.
       {"light.pinhole", "fall-off behind 100 um in 50 um of foil, to 31 degrees", "1", 1e-3, pinhole},
       {"light.disc", "surroundings hidden by a coaxial disc", "1", 1e-3, disc},

@@ -76,7 +76,7 @@ struct ShearedSphere {
   }
 
   /// How far it has gone, over what the theory says.
-  double way_over_theory(double share) {
+  double displacement_over_theory(double share) {
     const double wanted = closed_forms::mindlin_displacement(kValidationModulus, kNu, contact_radius,
                                                              share * kFriction * kForce, kFriction, kForce);
     return (shear(share).gel_from_object.translation.x() - start) / wanted;
@@ -92,12 +92,12 @@ MechanicsFinding mindlin(const MechanicsGels& gels, double edge) {
   const fem::Compliance gel = gels.thick(ShearedSphere::kNu, edge);
   ShearedSphere sphere(gel);
   double worst = 0.0;
-  for (double share : {0.3, 0.6, 0.9}) worst = std::max(worst, std::abs(sphere.way_over_theory(share) - 1.0));
+  for (double share : {0.3, 0.6, 0.9}) worst = std::max(worst, std::abs(sphere.displacement_over_theory(share) - 1.0));
   return {worst, {}};
 }
 
-/// Force over way at 5 % of sliding, the mean over places. Nearer to no force the slipping ring is much thinner than an
-/// edge, all sticks, and the traction is that of a sharp edge: 1.5 % too stiff at 2 % of sliding.
+/// Force over displacement at 5 % of sliding, the mean over places. Nearer to no force the slipping ring is much
+/// thinner than an edge, all sticks, and the traction is that of a sharp edge: 1.5 % too stiff at 2 % of sliding.
 MechanicsFinding tangential_stiffness(const MechanicsGels& gels, const std::vector<double>& edges) {
   constexpr int kPlaces = 3;
   MechanicsFinding finding;
@@ -108,7 +108,7 @@ MechanicsFinding tangential_stiffness(const MechanicsGels& gels, const std::vect
     for (int i = 0; i < kPlaces; ++i) {
       for (int j = 0; j < kPlaces; ++j) {
         ShearedSphere sphere(gel, edge * (i + 0.5) / kPlaces, std::sqrt(0.75) * edge * (j + 0.5) / kPlaces);
-        sum += 1.0 / sphere.way_over_theory(0.05);
+        sum += 1.0 / sphere.displacement_over_theory(0.05);
       }
     }
     finding.ours = std::abs(sum / (kPlaces * kPlaces) - 1.0);

@@ -162,8 +162,8 @@ MechanicsFinding block(const MechanicsGels& gels) {
   return {worst, {}};
 }
 
-/// A pressure cos(kx) on the layer, whose free sides are felt far into an almost incompressible one, at wave numbers 1
-/// and 1.5 over the thickness.
+/// A pressure cos(kx) on the layer, whose free sides have an effect far into an almost incompressible one, at wave
+/// numbers 1 and 1.5 over the thickness.
 MechanicsFinding wavy(const MechanicsGels& gels, double width) {
   double worst = 0.0;
   for (double nu : {0.3, 0.49}) {

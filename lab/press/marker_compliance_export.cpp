@@ -188,10 +188,10 @@ PatchGrid patches_over(const fem::Compliance& gel, const SurfaceMarkers& markers
   PatchGrid patches;
   patches.side = side;
   for (int a = 0; a < 2; ++a) {
-    const double room = std::min(middle[a] - face_low[a], face_high[a] - middle[a]);
+    const double margin = std::min(middle[a] - face_low[a], face_high[a] - middle[a]);
     const double reach = 0.5 * (high - low)[a] + beyond;
     const double wanted = std::ceil(2.0 * reach / side - 1e-9);
-    const double most = std::floor(2.0 * room / side + 1e-9);
+    const double most = std::floor(2.0 * margin / side + 1e-9);
     const double count = std::min(wanted, most);
     if (!(count >= 1.0 && count <= sensors::kMostPatches)) {
       fail("patches of {} mm don't suit the gel: {:.0f} would stand in a row", side, count);

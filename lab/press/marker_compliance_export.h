@@ -38,7 +38,7 @@ struct PatchGrid {
 PatchGrid patches_over(const fem::Compliance& gel, const SurfaceMarkers& markers, double side);
 
 /// Markers on the surface. A marker moves as the mean over its area of the surface displacement, which is the
-/// projection on the hats that PressState tells; a patch's uniform traction acts as its projection on the hats, which
+/// projection on the hats that PressState gives; a patch's uniform traction acts as its projection on the hats, which
 /// has the same force and the same work on all hats. With v the hats' integrals over an area and M the mass matrix,
 /// both come to M^-1 v, and marker against patch is (M^-1 v)^T surface (M^-1 w) over the marker's area: where marker
 /// and patch change places the numbers stay. Discs are taken as polygons of 64 corners with the disc's area.

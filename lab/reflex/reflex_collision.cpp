@@ -50,7 +50,7 @@ Collision play_collision(const CollisionSettings& settings, const PlateForce& fo
     if (t_s > settings.longest_s) return result;
     while (settings.first_frame_s + static_cast<double>(frames) * settings.frame_s <= t_s) {
       const double asked_s = settings.first_frame_s + static_cast<double>(frames++) * settings.frame_s;
-      // Between two steps the way is straight to far below what matters here.
+      // Between two steps the path is straight to far below what matters here.
       const std::optional<double> sent_s = watch(asked_s, press_mm - (t_s - asked_s) * speed_mm_s);
       if (!sent_s || result.stop_sent_s) continue;
       if (*sent_s < asked_s) fail("collision: a stop sent at {} s, before it was asked for at {} s", *sent_s, asked_s);
@@ -78,7 +78,7 @@ Collision play_collision(const CollisionSettings& settings, const PlateForce& fo
     const double motor_mm_s2 = std::clamp(asked_mm_s2, -most_mm_s2, most_mm_s2);
     if (motor_mm_s2 == asked_mm_s2) integral_mm += step_s * off_mm_s;  // no winding up at the motor's end
     const double plate_mm_s2 = kMmPerM * plate_N / actuator.mass_kg;
-    // Midpoint in the way, explicit in the velocity: the force hardly changes in a step of 10 us.
+    // Midpoint in the position, explicit in the velocity: the force hardly changes in a step of 10 us.
     const double next_mm_s = speed_mm_s + step_s * (motor_mm_s2 - plate_mm_s2);
     press_mm += 0.5 * step_s * (speed_mm_s + next_mm_s);
     speed_mm_s = next_mm_s;

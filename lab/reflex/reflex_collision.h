@@ -20,12 +20,12 @@ struct ActuatorSettings {
   double bus_s = 1e-3;
 };
 
-/// The plate's force on the fingertip, N, at a time since the start and a press; told in order of time, once a step, so
-/// that it may have a memory (stress relaxation). No press, no force.
+/// The plate's force on the fingertip, N, at a time since the start and a press; asked for in order of time, once a
+/// step, so that it may have a memory (stress relaxation). No press, no force.
 using PlateForce = std::function<double(double t_s, double press_mm)>;
 
-/// Who looks: asked at the end of each of the chip's frames with the true press (negative: the gap that is left). Gives
-/// the time at which a stop is sent, not before it was asked, or nothing.
+/// The observer: asked at the end of each of the chip's frames with the true press (negative: the gap that is left).
+/// Gives the time at which a stop is sent, not before it was asked, or nothing.
 using StopWatch = std::function<std::optional<double>(double t_s, double press_mm)>;
 
 /// How the actuator comes, and when the run ends.
@@ -48,7 +48,7 @@ struct Collision {
   std::optional<double> standstill_s;  ///< where the mass no longer moves on
   double peak_force_N = 0.0;
   double peak_press_mm = 0.0;
-  bool beyond_law = false;  ///< the press went over most_press_mm: the peak is more than what is told
+  bool beyond_law = false;  ///< the press went over most_press_mm: the peak is more than what is reported
 
   /// From the touch to the drive's braking; below 0 for a false alarm. Nothing if there was no stop.
   std::optional<double> reaction_ms() const;

@@ -21,29 +21,29 @@ double mean_of_times(const GrabbedImage& grabbed) {
 
 ReflexMotion reciprocation(double from_mm, double to_mm, double speed_mm_s) {
   TS_ASSERT(to_mm > from_mm && speed_mm_s > 0.0);
-  const double way_mm = to_mm - from_mm;
+  const double travel_mm = to_mm - from_mm;
   return [=](double t_s) {
-    const double gone_mm = std::fmod(speed_mm_s * std::max(t_s, 0.0), 2.0 * way_mm);
-    return from_mm + std::min(gone_mm, 2.0 * way_mm - gone_mm);
+    const double gone_mm = std::fmod(speed_mm_s * std::max(t_s, 0.0), 2.0 * travel_mm);
+    return from_mm + std::min(gone_mm, 2.0 * travel_mm - gone_mm);
   };
 }
 
-ReflexMotion one_way(double from_mm, double to_mm, double speed_mm_s) {
+ReflexMotion single_stroke(double from_mm, double to_mm, double speed_mm_s) {
   TS_ASSERT(to_mm > from_mm && speed_mm_s > 0.0);
   return [=](double t_s) { return std::min(from_mm + speed_mm_s * std::max(t_s, 0.0), to_mm); };
 }
 
-std::vector<ReflexPoint> record_points(const ReflexBench& bench, const ReflexTouch& touch, const ReflexMotion& motion,
+std::vector<ReflexPoint> record_points(const ReflexSetup& setup, const ReflexTouch& touch, const ReflexMotion& motion,
                                        int points, int every, std::uint64_t noise_seed) {
   TS_ASSERT(every >= 1);
-  render::MotionChip chip = bench.start_chip(noise_seed);
+  render::MotionChip chip = setup.start_chip(noise_seed);
   std::vector<ReflexPoint> record;
   cv::Mat light;
   for (int frame = 1; static_cast<int>(record.size()) < points; ++frame) {
     const double place_mm = motion(chip.next_middle_s());
-    touch.way.light_at(place_mm, light);
-    const ChipStatistics told = chip.expose(light).statistics;
-    if (frame % every == 0) record.push_back({told, touch.truth(place_mm)});
+    touch.path_light.light_at(place_mm, light);
+    const ChipStatistics statistics = chip.expose(light).statistics;
+    if (frame % every == 0) record.push_back({statistics, touch.truth(place_mm)});
   }
   return record;
 }
@@ -93,33 +93,33 @@ ReflexScore score_reflex(const sensors::ReflexModel& model, std::span<const Refl
   return score;
 }
 
-std::vector<ReflexPicture> record_pictures(const ReflexBench& bench, const ReflexTouch& touch,
+std::vector<ReflexPicture> record_pictures(const ReflexSetup& setup, const ReflexTouch& touch,
                                            const ReflexMotion& motion, int pictures, std::uint64_t noise_seed) {
-  render::MotionChip chip = bench.start_chip(noise_seed);
+  render::MotionChip chip = setup.start_chip(noise_seed);
   std::vector<ReflexPicture> record;
-  for (GrabbedImage& grabbed : record_images(touch.way, motion, chip, pictures)) {
+  for (GrabbedImage& grabbed : record_images(touch.path_light, motion, chip, pictures)) {
     const double middle_s = mean_of_times(grabbed);
     record.push_back({std::move(grabbed), touch.truth(motion(middle_s))});
   }
   return record;
 }
 
-std::vector<ReflexPicture> record_still(const ReflexBench& bench, const ReflexTouch& touch,
+std::vector<ReflexPicture> record_still(const ReflexSetup& setup, const ReflexTouch& touch,
                                         std::span<const double> places_mm, std::uint64_t noise_seed) {
-  render::MotionChip chip = bench.start_chip(noise_seed);
+  render::MotionChip chip = setup.start_chip(noise_seed);
   std::vector<ReflexPicture> record;
   for (const double place_mm : places_mm) {
     const ReflexMotion still = [place_mm](double) { return place_mm; };
-    record.push_back({std::move(record_images(touch.way, still, chip, 1).front()), touch.truth(place_mm)});
+    record.push_back({std::move(record_images(touch.path_light, still, chip, 1).front()), touch.truth(place_mm)});
   }
   return record;
 }
 
-cv::Mat rest_picture(const ReflexBench& bench, int pictures, std::uint64_t noise_seed) {
+cv::Mat rest_picture(const ReflexSetup& setup, int pictures, std::uint64_t noise_seed) {
   TS_ASSERT(pictures >= 1);
   cv::Mat sum = cv::Mat::zeros(kChipSide, kChipSide, CV_32FC1);
   const std::vector<double> places(static_cast<std::size_t>(pictures), kFar_mm);
-  for (const ReflexPicture& one : record_still(bench, bench.touches.front(), places, noise_seed)) {
+  for (const ReflexPicture& one : record_still(setup, setup.touches.front(), places, noise_seed)) {
     cv::Mat numbers;
     one.grabbed.image.convertTo(numbers, CV_32F);
     sum += numbers;
@@ -162,18 +162,18 @@ ExploreScore score_explore(const sensors::ExploreModel& model, std::span<const s
   int touched = 0;
   for (std::size_t i = 0; i < readings.size(); ++i) {
     const ReflexTruth& truth = pictures[i].truth;
-    const sensors::ExploreForce told = sensors::estimate(model, readings[i].motion);
-    const double error_mm = std::abs(told.press_mm - std::max(truth.press_mm, 0.0));
-    const double error_N = std::abs(told.force_N - truth.normal_N);
+    const sensors::ExploreForce estimate = sensors::estimate(model, readings[i].motion);
+    const double error_mm = std::abs(estimate.press_mm - std::max(truth.press_mm, 0.0));
+    const double error_N = std::abs(estimate.force_N - truth.normal_N);
     squares_mm += error_mm * error_mm;
     squares_N += error_N * error_N;
     score.largest_mm = std::max(score.largest_mm, error_mm);
     score.largest_N = std::max(score.largest_N, error_N);
     if (truth.contact) {
       ++touched;
-      shear += (told.shear_N - truth.shear_N).squaredNorm();
+      shear += (estimate.shear_N - truth.shear_N).squaredNorm();
     } else if (touched > 0) {
-      score.drift_mm = std::max(score.drift_mm, std::abs(told.press_mm));
+      score.drift_mm = std::max(score.drift_mm, std::abs(estimate.press_mm));
     }
     score.absolute += readings[i].mode == sensors::ExploreMode::absolute ? 1 : 0;
     score.relative += readings[i].mode == sensors::ExploreMode::relative ? 1 : 0;
@@ -210,8 +210,8 @@ std::vector<sensors::ShearSample> explore_shear_samples(const sensors::ExploreMo
   std::vector<sensors::ShearSample> samples;
   for (std::size_t i = 0; i < readings.size(); ++i) {
     if (!pictures[i].truth.contact || readings[i].mode == sensors::ExploreMode::held) continue;
-    const sensors::ExploreForce told = sensors::estimate(model, readings[i].motion);
-    samples.push_back({told.lateral_mm, told.force_N, pictures[i].truth.shear_N});
+    const sensors::ExploreForce estimate = sensors::estimate(model, readings[i].motion);
+    samples.push_back({estimate.lateral_mm, estimate.force_N, pictures[i].truth.shear_N});
   }
   return samples;
 }
@@ -226,23 +226,23 @@ double shear_size_N(std::span<const sensors::ShearSample> samples) {
   return shear_rms_N({}, samples);
 }
 
-Collision collide(const ReflexBench& bench, const ReflexTouch& touch, Watcher watcher,
+Collision collide(const ReflexSetup& setup, const ReflexTouch& touch, Watcher watcher,
                   const sensors::ReflexModel& reflex, const sensors::ExploreModel& explore, const cv::Mat& rest,
                   const ReflexCollisionSettings& settings, std::uint64_t noise_seed) {
   const PlateForce plate = [&](double, double press_mm) { return touch.truth(press_mm).normal_N; };
   CollisionSettings collision = settings.collision;
   collision.most_press_mm = std::min(collision.most_press_mm, touch.end());
-  collision.frame_s = 1.0 / bench.chip.frame_rate_Hz;
+  collision.frame_s = 1.0 / setup.chip.frame_rate_Hz;
   if (watcher == Watcher::nobody) {
     return play_collision(collision, plate, [](double, double) { return std::optional<double>(); });
   }
-  render::MotionChip chip = bench.start_chip(noise_seed);
+  render::MotionChip chip = setup.start_chip(noise_seed);
   render::PixelGrabber grabber;
   sensors::ReflexLoop loop(reflex, settings.reflex);
   sensors::ExploreTracker tracker(rest, {});
   cv::Mat light;
   return play_collision(collision, plate, [&](double t_s, double press_mm) -> std::optional<double> {
-    touch.way.light_at(press_mm, light);
+    touch.path_light.light_at(press_mm, light);
     const render::ChipFrame frame = chip.expose(light);
     if (watcher == Watcher::reflex) {
       if (!loop.next(frame.statistics).stop) return {};

@@ -18,7 +18,7 @@ namespace touchstone::lab {
 /// There and back between two places at one speed, beginning at the first.
 ReflexMotion reciprocation(double from_mm, double to_mm, double speed_mm_s);
 /// Straight on from one place to another, and then staying there.
-ReflexMotion one_way(double from_mm, double to_mm, double speed_mm_s);
+ReflexMotion single_stroke(double from_mm, double to_mm, double speed_mm_s);
 
 /// A frame's statistics and what was true in the middle of its exposure.
 struct ReflexPoint {
@@ -27,7 +27,7 @@ struct ReflexPoint {
 };
 
 /// So many points, one each `every` frames: all frames are made, since DX and DY are of one after the other.
-std::vector<ReflexPoint> record_points(const ReflexBench& bench, const ReflexTouch& touch, const ReflexMotion& motion,
+std::vector<ReflexPoint> record_points(const ReflexSetup& setup, const ReflexTouch& touch, const ReflexMotion& motion,
                                        int points, int every, std::uint64_t noise_seed);
 
 /// Tree and force of a training set, as sec. III.D has them; forces of degree 1 or 2.
@@ -55,13 +55,13 @@ struct ReflexPicture {
   ReflexTruth truth;
 };
 /// Shows the touch to the chip until it has given so many pictures.
-std::vector<ReflexPicture> record_pictures(const ReflexBench& bench, const ReflexTouch& touch,
+std::vector<ReflexPicture> record_pictures(const ReflexSetup& setup, const ReflexTouch& touch,
                                            const ReflexMotion& motion, int pictures, std::uint64_t noise_seed);
 /// One picture each at these places, nothing moving.
-std::vector<ReflexPicture> record_still(const ReflexBench& bench, const ReflexTouch& touch,
+std::vector<ReflexPicture> record_still(const ReflexSetup& setup, const ReflexTouch& touch,
                                         std::span<const double> places_mm, std::uint64_t noise_seed);
 /// The mean of some pictures without contact, CV_32FC1.
-cv::Mat rest_picture(const ReflexBench& bench, int pictures, std::uint64_t noise_seed);
+cv::Mat rest_picture(const ReflexSetup& setup, int pictures, std::uint64_t noise_seed);
 
 /// What explore mode makes of pictures, in their order.
 std::vector<sensors::ExploreReading> explore(const cv::Mat& rest, std::span<const ReflexPicture> pictures,
@@ -80,7 +80,7 @@ struct ExploreScore {
   double rms_mm = 0.0, largest_mm = 0.0;  ///< of the press
   double rms_N = 0.0, largest_N = 0.0;    ///< of the normal force
   double shear_rms_N = 0.0;               ///< of both axes together, of pictures in contact
-  double drift_mm = 0.0;                  ///< the largest press told without contact after the first contact
+  double drift_mm = 0.0;                  ///< the largest press estimated without contact after the first contact
 };
 /// Press and force of each reading against the picture's truth.
 ExploreScore score_explore(const sensors::ExploreModel& model, std::span<const sensors::ExploreReading> readings,
@@ -107,15 +107,15 @@ struct ReflexCollisionSettings {
   CollisionSettings collision;
   sensors::ReflexSettings reflex;
   sensors::ReflexBudget budget;
-  /// Explore mode stops where its force exceeds this; a picture is told after it's complete, over USB and through a
-  /// program on a computer.
+  /// Explore mode stops where its force exceeds this; a picture is evaluated after it's complete, over USB and through
+  /// a program on a computer.
   double explore_stop_above_N = 0.3;
   double explore_after_s = 0.010;
 };
 
 /// Drives the fingertip at the plate of a touch straight down, from before its first frame on. The chip sees what is
 /// true at each exposure's middle.
-Collision collide(const ReflexBench& bench, const ReflexTouch& touch, Watcher watcher,
+Collision collide(const ReflexSetup& setup, const ReflexTouch& touch, Watcher watcher,
                   const sensors::ReflexModel& reflex, const sensors::ExploreModel& explore, const cv::Mat& rest,
                   const ReflexCollisionSettings& settings, std::uint64_t noise_seed);
 

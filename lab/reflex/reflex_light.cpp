@@ -22,7 +22,7 @@ namespace {
 
 constexpr double kSpare_mm = 0.05;  // beyond the skins that were named
 
-/// The same view with `times` as many pixels each way.
+/// The same view with `times` as many pixels along each axis.
 render::Camera finer(render::Camera camera, int times) {
   std::visit(
       [times](auto& one) {

@@ -27,12 +27,12 @@ double radians(double degrees) {
 /// Adds points straight on from the last one, none further than `step` from the next.
 void go(const Eigen::Vector3d& to, double step, sim::PressPath& path) {
   const sim::PathPoint from = path.points.back();
-  const double way = (to - from.shift_mm).norm();
+  const double length = (to - from.shift_mm).norm();
   // A step that fits but for rounding fits.
-  const int steps = std::max(1, static_cast<int>(std::ceil(way / step - 1e-9)));
+  const int steps = std::max(1, static_cast<int>(std::ceil(length / step - 1e-9)));
   for (int k = 1; k <= steps; ++k) {
     const double share = static_cast<double>(k) / steps;
-    path.points.push_back({from.at + share * way, from.shift_mm + share * (to - from.shift_mm)});
+    path.points.push_back({from.at + share * length, from.shift_mm + share * (to - from.shift_mm)});
   }
 }
 

@@ -1,6 +1,6 @@
 #pragma once
 // The presses that the experiments of the reflex fingertip are made of ([Knoop2013, secs. III.C to IV], and what it
-// leaves open), as ways for sim::PathPlayer. docs/sensors/reflex.md says what they cost.
+// leaves open), as paths for sim::PathPlayer. docs/sensors/reflex.md says what they cost.
 
 #include <cstdint>
 #include <functional>
@@ -37,7 +37,7 @@ sim::PressPath press_down(const ReflexPress& press);
 
 /// Down to `deepest_mm` as press_down, then sideways by `reach_mm` in the direction `towards_deg` (from x to y), back
 /// through the middle to as far on the other side, and to the middle again, in steps of at most `shear_step_mm`. `at`
-/// is the length of the way (mm). What sticks and slips depends on all of it.
+/// is the length of the path (mm). What sticks and slips depends on all of it.
 /// @throws Error as press_down, and for a reach or step that isn't finite and above zero
 struct ReflexShear {
   double reach_mm = 2.0;

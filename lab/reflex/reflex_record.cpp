@@ -23,8 +23,8 @@ double full_light(const render::MotionChipSettings& chip) {
 }
 
 struct Refinement {
-  const ReflexWay::Picture& picture;
-  const ReflexWaySettings& settings;
+  const ReflexPathLight::Picture& picture;
+  const ReflexPathLightSettings& settings;
   double full;
   std::map<double, cv::Mat> made;
   double largest_off = 0.0;
@@ -59,8 +59,8 @@ struct Refinement {
 
 }  // namespace
 
-ReflexWay::ReflexWay(const Picture& picture, std::span<const double> corners, const render::MotionChipSettings& chip,
-                     const ReflexWaySettings& settings) {
+ReflexPathLight::ReflexPathLight(const Picture& picture, std::span<const double> corners,
+                                 const render::MotionChipSettings& chip, const ReflexPathLightSettings& settings) {
   check(chip);
   const bool rising = std::adjacent_find(corners.begin(), corners.end(), std::greater_equal<>()) == corners.end();
   if (corners.size() < 2 || !rising || !std::isfinite(corners.front()) || !std::isfinite(corners.back())) {
@@ -76,33 +76,33 @@ ReflexWay::ReflexWay(const Picture& picture, std::span<const double> corners, co
   largest_off_ = all.largest_off;
 }
 
-void ReflexWay::light_at(double parameter, cv::Mat& light) const {
+void ReflexPathLight::light_at(double parameter, cv::Mat& light) const {
   const auto above = std::upper_bound(parameters_.begin() + 1, parameters_.end() - 1, parameter);
   const auto k = static_cast<std::size_t>(above - parameters_.begin()) - 1;
   const double part = std::clamp((parameter - parameters_[k]) / (parameters_[k + 1] - parameters_[k]), 0.0, 1.0);
   cv::addWeighted(pictures_[k], 1.0 - part, pictures_[k + 1], part, 0.0, light);
 }
 
-std::vector<ChipStatistics> record_statistics(const ReflexWay& way, const ReflexMotion& motion,
+std::vector<ChipStatistics> record_statistics(const ReflexPathLight& path_light, const ReflexMotion& motion,
                                               render::MotionChip& chip, int frames, int every) {
   if (every < 1) fail("reflex: one in {} frames is asked for; allowed is from 1", every);
   std::vector<ChipStatistics> record;
   cv::Mat light;
   for (int k = 0; k < frames; ++k) {
-    way.light_at(motion(chip.next_middle_s()), light);
-    const ChipStatistics told = chip.expose(light).statistics;
-    if ((k + 1) % every == 0) record.push_back(told);
+    path_light.light_at(motion(chip.next_middle_s()), light);
+    const ChipStatistics statistics = chip.expose(light).statistics;
+    if ((k + 1) % every == 0) record.push_back(statistics);
   }
   return record;
 }
 
-std::vector<GrabbedImage> record_images(const ReflexWay& way, const ReflexMotion& motion, render::MotionChip& chip,
-                                        int images) {
+std::vector<GrabbedImage> record_images(const ReflexPathLight& path_light, const ReflexMotion& motion,
+                                        render::MotionChip& chip, int images) {
   std::vector<GrabbedImage> record;
   render::PixelGrabber grabber;
   cv::Mat light;
   while (static_cast<int>(record.size()) < images) {
-    way.light_at(motion(chip.next_middle_s()), light);
+    path_light.light_at(motion(chip.next_middle_s()), light);
     if (auto image = grabber.add(chip.expose(light))) record.push_back(std::move(*image));
   }
   return record;

@@ -22,7 +22,8 @@ ReflexTruth truth_of(const sim::PathPoint& point, const fem::PressState& state) 
   return truth;
 }
 
-/// Finer where the touch begins: there a contact is told or missed, and the force grows with the square of the depth.
+/// Finer where the touch begins: there a contact is detected or missed, and the force grows with the square of the
+/// depth.
 void refine_beginning(sim::PressPath& path) {
   std::vector<sim::PathPoint> points;
   for (const double depth : {0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4}) points.push_back({depth, {0.0, 0.0, -depth}});
@@ -84,18 +85,18 @@ ReflexTruth ReflexTouch::truth(double place) const {
   return here;
 }
 
-const ReflexTouch& ReflexBench::touch(const std::string& name) const {
+const ReflexTouch& ReflexSetup::touch(const std::string& name) const {
   const auto found = std::find_if(touches.begin(), touches.end(), [&](const auto& one) { return one.name == name; });
   TS_ASSERT(found != touches.end());
   return *found;
 }
 
-ReflexBench set_up_reflex_bench(const sim::DeviceSpec& device, const std::filesystem::path& cache_folder,
-                                std::span<const ReflexTouchSpec> specs, const ReflexLightSettings& light,
-                                const ReflexWaySettings& way, const Progress& progress) {
-  if (specs.empty()) fail("a bench needs a touch");
-  ReflexBench bench;
-  bench.device = device;
+ReflexSetup set_up_reflex(const sim::DeviceSpec& device, const std::filesystem::path& cache_folder,
+                          std::span<const ReflexTouchSpec> specs, const ReflexLightSettings& light,
+                          const ReflexPathLightSettings& path_light, const Progress& progress) {
+  if (specs.empty()) fail("the reflex setup needs a touch");
+  ReflexSetup setup;
+  setup.device = device;
   sim::PathPlayer player(device, cache_folder);
   std::vector<sim::PlayedPath> played;
   for (const ReflexTouchSpec& spec : specs) {
@@ -103,7 +104,7 @@ ReflexBench set_up_reflex_bench(const sim::DeviceSpec& device, const std::filesy
       fail("the touch {} doesn't begin at 0", spec.name);
     }
     played.push_back(player.play(spec.path, progress));
-    if (!played.back().note.empty()) bench.notes.push_back(played.back().note);
+    if (!played.back().note.empty()) setup.notes.push_back(played.back().note);
     if (played.back().states.size() < 2) {
       fail("the touch {} has {} states, two are needed: {}", spec.name, played.back().states.size(),
            played.back().stopped);
@@ -124,20 +125,23 @@ ReflexBench set_up_reflex_bench(const sim::DeviceSpec& device, const std::filesy
     // A light field for each touch: that of all of them would be a much larger one.
     const ReflexLight optics(device, rest, reached, light);
     if (i == 0) {
-      bench.light_error = optics.error();
-      bench.chip = sim::motion_chip(device, optics.bands(), true);
+      setup.light_error = optics.error();
+      setup.chip = sim::motion_chip(device, optics.bands(), true);
     }
-    const ReflexWay::Picture picture = [&](double place) {
+    const ReflexPathLight::Picture picture = [&](double place) {
       return optics.irradiance(skin_sheet(skin, played[i].state(place), shape));
     };
-    ReflexTouch touch{
-        specs[i].name, played[i].at, {}, ReflexWay(picture, played[i].at, bench.chip, way), played[i].stopped};
+    ReflexTouch touch{specs[i].name,
+                      played[i].at,
+                      {},
+                      ReflexPathLight(picture, played[i].at, setup.chip, path_light),
+                      played[i].stopped};
     for (std::size_t k = 0; k < played[i].states.size(); ++k) {
       touch.states.push_back(truth_of(specs[i].path.points[k], played[i].states[k]));
     }
-    bench.touches.push_back(std::move(touch));
+    setup.touches.push_back(std::move(touch));
   }
-  return bench;
+  return setup;
 }
 
 }  // namespace touchstone::lab

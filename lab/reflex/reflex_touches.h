@@ -1,6 +1,6 @@
 #pragma once
 // Touches of the reflex fingertip, ready to be shown to its chip: what presses at finite strain gave, and the light of
-// any place on their ways.
+// any place on their paths.
 
 #include <Eigen/Core>
 #include <filesystem>
@@ -17,7 +17,7 @@
 
 namespace touchstone::lab {
 
-/// What is true at a place of a touch's way.
+/// What is true at a place of a touch's path.
 struct ReflexTruth {
   bool contact = false;
   double press_mm = 0.0;  ///< from where the object touches; the gap, negative, where it doesn't
@@ -26,13 +26,13 @@ struct ReflexTruth {
   Eigen::Vector2d shear_N = Eigen::Vector2d::Zero();     ///< of the object on the fingertip, along its motion
 };
 
-/// A touch that was played and can be looked at. Places are those of its path, depths or ways in mm; negative ones are
-/// gaps over the touch.
+/// A touch that was played and can be looked at. Places are those of its path, depths or travels in mm; negative ones
+/// are gaps over the touch.
 struct ReflexTouch {
   std::string name;
   std::vector<double> at;           ///< of its states, rising from 0
   std::vector<ReflexTruth> states;  ///< as many
-  ReflexWay way;
+  ReflexPathLight path_light;
   std::string stopped;  ///< why the path could be played no further; empty if it could
 
   double end() const { return at.back(); }
@@ -52,7 +52,7 @@ struct ReflexTouchSpec {
 std::vector<ReflexTouchSpec> reflex_row_touches(bool quick);
 
 /// The device, its chip and its touches. Immutable.
-struct ReflexBench {
+struct ReflexSetup {
   sim::DeviceSpec device;
   render::MotionChipSettings chip;
   render::DirectError light_error;  ///< against path tracing (ReflexLight::error)
@@ -60,14 +60,14 @@ struct ReflexBench {
   std::vector<std::string> notes;  ///< of caches
 
   const ReflexTouch& touch(const std::string& name) const;  ///< @pre it's one of them
-  /// A chip that begins to look: of this unit, with noise of its own.
+  /// A chip that begins to record: of this unit, with noise of its own.
   render::MotionChip start_chip(std::uint64_t noise_seed) const { return {chip, 1, noise_seed}; }
 };
 
 /// Plays all paths (or takes them from the cache) and makes their light.
 /// @throws Error as its parts, for a path that doesn't begin with a touch at 0, and if none has two states
-ReflexBench set_up_reflex_bench(const sim::DeviceSpec& device, const std::filesystem::path& cache_folder,
-                                std::span<const ReflexTouchSpec> specs, const ReflexLightSettings& light = {},
-                                const ReflexWaySettings& way = {}, const Progress& progress = {});
+ReflexSetup set_up_reflex(const sim::DeviceSpec& device, const std::filesystem::path& cache_folder,
+                          std::span<const ReflexTouchSpec> specs, const ReflexLightSettings& light = {},
+                          const ReflexPathLightSettings& path_light = {}, const Progress& progress = {});
 
 }  // namespace touchstone::lab

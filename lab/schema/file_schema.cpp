@@ -54,8 +54,9 @@ std::string escaped(const std::string& text) {
 
 Json number_schema(const char* type, const Allowed& allowed) {
   Json schema = {{"type", type}};
-  if (std::isfinite(allowed.low)) schema[allowed.low_itself ? "minimum" : "exclusiveMinimum"] = number(allowed.low);
-  if (std::isfinite(allowed.high)) schema[allowed.high_itself ? "maximum" : "exclusiveMaximum"] = number(allowed.high);
+  if (std::isfinite(allowed.low)) schema[allowed.low_included ? "minimum" : "exclusiveMinimum"] = number(allowed.low);
+  if (std::isfinite(allowed.high))
+    schema[allowed.high_included ? "maximum" : "exclusiveMaximum"] = number(allowed.high);
   return schema;
 }
 
@@ -249,7 +250,7 @@ const std::vector<Kind>& kinds() {
       {"motion", schema_of<sim::MotionSpec>},
       {"scene", schema_of<sim::SceneSpec>},
       {"job",
-       [] {  // told apart as is_draw_job_file does
+       [] {  // distinguished as is_draw_job_file does
          return Json{{"if", {{"required", {"draw"}}}},
                      {"then", schema_of<datasets::DrawJob>()},
                      {"else", schema_of<datasets::Job>()}};

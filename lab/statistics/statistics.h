@@ -5,7 +5,7 @@
 
 namespace touchstone::lab {
 
-/// Which way a figure is good.
+/// In which direction a figure is better.
 enum class Better { lower, higher, near };
 /// "lower", "higher" or "near".
 std::string name_of(Better better);

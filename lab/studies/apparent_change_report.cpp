@@ -93,7 +93,7 @@ plots::LinePlot plot_of(const ApparentChangeSpec& spec, const ApparentChangeResu
   plot.x_label = lab::name_of(spec.vary.field);
   plot.y_label = "apparent change";
   plot.log_x = false;
-  // Beside the formula the better one of the simulations: with both, lenses couldn't be told apart.
+  // Beside the formula the better one of the simulations: with both, lenses couldn't be distinguished.
   const ApparentSource best = *std::max_element(spec.by.begin(), spec.by.end());
   for (const ApparentChangeRow& row : result.rows) {
     const bool formula = row.source == ApparentSource::formula;

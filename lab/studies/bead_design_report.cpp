@@ -18,8 +18,8 @@ EnumNames<StopRule> enum_names(StopRule) {
 namespace touchstone::lab {
 namespace {
 
-/// Above this part of the wanted error the bound leaves estimators no room.
-constexpr double kBoundLeavesRoom = 0.5;
+/// Above this part of the wanted error the bound leaves estimators no margin.
+constexpr double kBoundLeavesMargin = 0.5;
 
 class Story {
  public:
@@ -73,7 +73,7 @@ class Story {
         "No unbiased estimate from these beads and this light can scatter by less than {:.2g} N there ({:.2g} N if the "
         "place must be found, too); ours is off by {:.3g} N, of which noise is {:.2g} N. ",
         bound, unknown, of(d, "error_at_load_N"), of(d, "noise_N"));
-    if (unknown > kBoundLeavesRoom * spec_.error_N) {
+    if (unknown > kBoundLeavesMargin * spec_.error_N) {
       return text +
              "So the sensor is at its limit: more beads, light or softness would help, another estimator hardly.";
     }
@@ -130,9 +130,9 @@ void fields(YamlReader& in, BeadDesignSpec& spec) {
 
 StudyResult report(const std::string& name, const BeadDesignSpec& spec, const DesignTable& table) {
   const Story story(spec, table);
-  DesignStory told;
-  told.name = name;
-  told.title = fmt::format(
+  DesignStory report;
+  report.name = name;
+  report.title = fmt::format(
       "{} designs; wanted are {:.4g} N, in the verification and at {:.4g} N. An estimate comes from a model that is "
       "trained and verified on each design itself, with the noise that its tracker has on its rendered pictures.",
       table.points.size(), spec.error_N, spec.load_N);
@@ -144,22 +144,22 @@ StudyResult report(const std::string& name, const BeadDesignSpec& spec, const De
     meeting += story.meets(d);
     bearing += story.bears(d);
   }
-  told.answer = fmt::format("{} of {} designs bear {:.4g} N, {} of them with the wanted error.\n\n", bearing,
-                            table.points.size(), spec.load_N, meeting);
+  report.answer = fmt::format("{} of {} designs bear {:.4g} N, {} of them with the wanted error.\n\n", bearing,
+                              table.points.size(), spec.load_N, meeting);
   if (nearest) {
-    told.chosen.push_back(*nearest);
-    told.answer +=
+    report.chosen.push_back(*nearest);
+    report.answer +=
         fmt::format("**{}: {}** ({}). {}\n\n{}\n", meeting > 0 ? "The smallest error" : "None meets it. Nearest comes",
                     name_of_point(table.plan, table.points[*nearest]), story.errors(*nearest), story.cost(*nearest),
                     story.advice(*nearest));
     if (const auto widest = story.best(&Story::meets, by_range); widest && *widest != *nearest) {
-      told.chosen.push_back(*widest);
-      told.answer +=
+      report.chosen.push_back(*widest);
+      report.answer +=
           fmt::format("\n**The largest range that still meets it: {}** ({}). {}\n",
                       name_of_point(table.plan, table.points[*widest]), story.errors(*widest), story.cost(*widest));
     }
   }
-  told.answer += fmt::format(
+  report.answer += fmt::format(
       "\nAs it is, the device has {:.3g} N in the verification, {:.3g} N at {:.4g} N, a bound of {:.2g} N and a range "
       "of "
       "{:.3g} N.\n",
@@ -170,7 +170,7 @@ StudyResult report(const std::string& name, const BeadDesignSpec& spec, const De
     if (std::isfinite(ratio) && (!least || ratio < *least)) least = ratio;
   }
   if (least) {
-    told.answer +=
+    report.answer +=
         *least >= 1.0
             ? fmt::format("\nNo design's error is below its bound: the least is {:.3g} times as large.\n", *least)
             : fmt::format(
@@ -178,12 +178,12 @@ StudyResult report(const std::string& name, const BeadDesignSpec& spec, const De
                   "what it was trained on can scatter less than an unbiased one.\n",
                   *least);
   }
-  told.pareto = {story.number("error_N"), story.number("range_N"), story.number("bound_N")};
+  report.pareto = {story.number("error_N"), story.number("range_N"), story.number("bound_N")};
   for (const char* drawn :
        {"error_N", "error_at_load_N", "bound_N", "range_N", "displacement_error_um", "largest_strain"}) {
-    told.drawn.push_back(story.number(drawn));
+    report.drawn.push_back(story.number(drawn));
   }
-  return design_report(table, told);
+  return design_report(table, report);
 }
 
 }  // namespace touchstone::lab

@@ -27,7 +27,7 @@ namespace {
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 constexpr std::uint64_t kSeed = 11;
-constexpr int kLooks = 5;                  // pictures from the first touch to the load: as a tracker gets them
+constexpr int kTouches = 5;                // pictures from the first touch to the load: as a tracker gets them
 constexpr double kFirstDepth_mm = 0.02;    // of the first one
 constexpr std::int64_t kFrame_us = 33333;  // between them
 constexpr double kWindow = 1.65;           // ROI-B in diameters of a bead: 30 px for 18 in [VisioHaptic2024]
@@ -66,30 +66,31 @@ render::Imager imager_of(const sim::DeviceSpec& device, const sim::ObjectSpec& o
 Seen look_at(const BeadDesignSpec& spec, const sim::VirtualSensor& pictures, const BeadView& view) {
   const sim::DeviceSpec& device = pictures.device();
   const sim::TouchObject object = pictures.object(spec.object);
-  std::vector<sim::Touch> looks;
-  looks.push_back(pictures.press(object, {.depth_mm = kFirstDepth_mm}));
-  for (int k = 1; k <= kLooks; ++k) looks.push_back(pictures.press(object, {.force_N = spec.load_N * k / kLooks}));
+  std::vector<sim::Touch> touches;
+  touches.push_back(pictures.press(object, {.depth_mm = kFirstDepth_mm}));
+  for (int k = 1; k <= kTouches; ++k)
+    touches.push_back(pictures.press(object, {.force_N = spec.load_N * k / kTouches}));
   const auto beads = static_cast<Eigen::Index>(view.rest_mm.size());
-  const Eigen::MatrixX2d first = bead_pixels(view, looks.front().press.bead_displacement);
-  const Eigen::MatrixX2d last = bead_pixels(view, looks.back().press.bead_displacement);
+  const Eigen::MatrixX2d first = bead_pixels(view, touches.front().press.bead_displacement);
+  const Eigen::MatrixX2d last = bead_pixels(view, touches.back().press.bead_displacement);
   const sensors::BeadTrackerSettings settings = tracker_settings(device, view);
   Eigen::MatrixX2d sum = Eigen::MatrixX2d::Zero(beads, 2), squares = sum;
   double displacement2 = 0.0;
   for (int n = 0; n < spec.exposures; ++n) {
     sensors::BeadTracker tracker(settings);
     Eigen::MatrixX2d from(beads, 2), to(beads, 2);
-    for (std::size_t k = 0; k < looks.size(); ++k) {
+    for (std::size_t k = 0; k < touches.size(); ++k) {
       Frame frame;
       frame.t_us = static_cast<std::int64_t>(k) * kFrame_us;
-      frame.image = looks[k].expose(kSeed + static_cast<std::uint64_t>(n) * looks.size() + k);
+      frame.image = touches[k].expose(kSeed + static_cast<std::uint64_t>(n) * touches.size() + k);
       const sensors::TrackedBeads& found = tracker.track(frame);
       for (Eigen::Index i = 0; i < beads; ++i) {
         const auto b = static_cast<std::size_t>(i);
         if (!sensors::is_found(found.status[b])) {
-          fail("the tracker loses bead {} at {:.3g} N", i, spec.load_N * static_cast<double>(k) / kLooks);
+          fail("the tracker loses bead {} at {:.3g} N", i, spec.load_N * static_cast<double>(k) / kTouches);
         }
         if (k == 0) from.row(i) = found.measured[b].transpose();
-        if (k + 1 == looks.size()) to.row(i) = found.measured[b].transpose();
+        if (k + 1 == touches.size()) to.row(i) = found.measured[b].transpose();
       }
     }
     sum += to;
@@ -107,7 +108,8 @@ Seen look_at(const BeadDesignSpec& spec, const sim::VirtualSensor& pictures, con
                                 0.5 * sim::blur_disc_px(sim::camera_of(camera), away));
   seen.least_px.resize(2 * beads);
   for (Eigen::Index i = 0; i < beads; ++i) {
-    const Eigen::Matrix2d information = shift_information(looks.back().light, imager, last.row(i).transpose(), radius);
+    const Eigen::Matrix2d information =
+        shift_information(touches.back().light, imager, last.row(i).transpose(), radius);
     if (!std::isfinite(least_deviation_px(information))) fail("bead {} has no contrast", i);
     seen.least_px.segment<2>(2 * i) = information.inverse().diagonal().cwiseSqrt();
   }
@@ -173,11 +175,11 @@ Eigen::Vector3d scatter(const sensors::StiffnessForceModel& model, const Eigen::
 
 /// The normal force at which the press goes deeper than allowed or a bead leaves its cell.
 double range_of(const BeadDesignSpec& spec, const sim::DeviceSpec& device, const fem::Compliance& gel,
-                const BeadView& view, const fem::ContactShape& felt, double start_z) {
+                const BeadView& view, const fem::ContactShape& contact, double start_z) {
   const double half_cell = 0.5 * device.beads->spacing_mm * px_per_mm(view);
   const Eigen::MatrixX2d rest =
       bead_pixels(view, Eigen::MatrixX3d::Zero(static_cast<Eigen::Index>(view.rest_mm.size()), 3));
-  fem::Press press(gel, felt, spec.object.friction, {}, {}, fem::PressOutput::forces);
+  fem::Press press(gel, contact, spec.object.friction, {}, {}, fem::PressOutput::forces);
   fem::PressTarget target;
   target.axis = {fem::AxisControl::at(0.0), fem::AxisControl::at(0.0), fem::AxisControl::at(start_z)};
   press.step(target);
@@ -236,7 +238,7 @@ std::vector<DesignFigure> bead_design_figures(const BeadDesignSpec& spec) {
       {"error_at_load_N", Better::lower,
        fmt::format("root mean square error of a press of {}, worst axis: bias and noise", load)},
       {"noise_N", Better::lower,
-       "standard deviation of the force without load, worst axis: what can be told from nothing"},
+       "standard deviation of the force without load, worst axis: the least force that is detected"},
       {"bound_N", Better::lower,
        fmt::format(
            "least standard deviation that any unbiased estimate can have at {}, worst axis, for who knows where "
@@ -255,7 +257,7 @@ std::vector<DesignFigure> bead_design_figures(const BeadDesignSpec& spec) {
       {"least_noise_px", Better::lower, "the least that any method could have from the same light (Cramer-Rao)"},
       {"range_N", Better::higher,
        fmt::format("normal force at which the press is deeper than {:.3g} of the gel's thickness, or a bead leaves its "
-                   "cell; {:.4g} is as far as was looked",
+                   "cell; {:.4g} is the end of the search",
                    spec.deepest_share, spec.most_N)},
       {"depth_mm", Better::near, fmt::format("how far {} press in", load)},
       {"largest_strain", Better::lower,
@@ -269,7 +271,7 @@ std::vector<double> bead_design(const BeadDesignSpec& spec, const sim::DeviceSpe
   const BeadView view = bead_view(device);
   const sim::VirtualSensor pictures(device, cache);
   const fem::Compliance& gel = pictures.gel();
-  const fem::ContactShape felt = sim::contact_shape(spec.object);
+  const fem::ContactShape contact = sim::contact_shape(spec.object);
   const double start_z = sim::first_touch(sim::PressSpec{}, spec.object, device.gel) + kClear_mm;
   const Seen seen = look_at(spec, pictures, view);
   const sensors::StiffnessForceModel model = trained_model(spec, device, gel, seen.deviation_px);
@@ -283,7 +285,7 @@ std::vector<double> bead_design(const BeadDesignSpec& spec, const sim::DeviceSpe
   figures[kError] = std::max({figures[kErrorX], figures[kErrorY], figures[kErrorZ]});
   figures[kElsewhere] = std::max({elsewhere[0].mean_absolute, elsewhere[1].mean_absolute, elsewhere[2].mean_absolute});
   const BoundLoad load{{0, 0}, {0, 0, spec.load_N}};
-  const ForceSensitivity at = force_sensitivity(gel, view, felt, spec.object.friction, start_z, load);
+  const ForceSensitivity at = force_sensitivity(gel, view, contact, spec.object.friction, start_z, load);
   const ForceBound bound = force_bound(at, seen.least_px);
   const Eigen::Vector3d error = scatter(model, at.pixels, load.force_N, seen.deviation_px);
   figures[kErrorAtLoad] = error.maxCoeff();
@@ -301,7 +303,7 @@ std::vector<double> bead_design(const BeadDesignSpec& spec, const sim::DeviceSpe
   figures[kDisplacement] = seen.displacement_um;
   figures[kTrackerNoise] = seen.deviation_px;
   figures[kLeastNoise] = std::sqrt(seen.least_px.squaredNorm() / static_cast<double>(seen.least_px.size()));
-  figures[kRange] = range_of(spec, device, gel, view, felt, start_z);
+  figures[kRange] = range_of(spec, device, gel, view, contact, start_z);
   figures[kDepth] = at.depth_mm - kClear_mm;
   figures[kStrain] = at.largest_strain;
   figures[kFrameRate] = std::min(device.camera->frame_rate_Hz, 1e6 / device.camera->exposure_us);

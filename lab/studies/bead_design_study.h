@@ -40,7 +40,7 @@ struct BeadDesignSpec {
   sensors::StopRule training_ends = sensors::StopRule::kLossDrop;
   sim::MotionSpec verification;                ///< where it says
   Eigen::Vector2d elsewhere_mm = {0.4, -0.3};  ///< the load cycle once more, at a place that isn't trained
-  double load_N = 5.0;                         ///< normal: at which error, bound and strain are told
+  double load_N = 5.0;                         ///< normal: at which error, bound and strain are given
   double error_N = 0.1;                        ///< that is wanted there and in the verification
   double most_N = 20.0;                        ///< up to which the range is looked for
   double deepest_share = 0.25;                 ///< of the gel's thickness: beyond it a press is out of range

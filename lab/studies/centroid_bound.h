@@ -1,5 +1,5 @@
 #pragma once
-// How well any method can tell where something in a picture is: the Cramer-Rao bound of a shift.
+// How well any method can estimate where something in a picture is: the Cramer-Rao bound of a shift.
 
 #include <Eigen/Core>
 #include <opencv2/core/mat.hpp>
@@ -17,7 +17,7 @@ namespace touchstone::lab {
 /// with e the mean electrons that the light frees in the pixel and var their variance in one exposure: shot noise, dark
 /// noise and rounding, not the fixed pattern, which can be calibrated away. ([Kay1993, sec. 3.9]; the noise is taken to
 /// be normal, of a variance that is itself known.) No unbiased estimate of the shift has a covariance below I^-1.
-/// Gradients are central differences of the picture's own colour channel: a picture sharper than its pixels is told to
+/// Gradients are central differences of the picture's own colour channel: a picture sharper than its pixels appears to
 /// know a little less than it does. Pixels at the full well or the largest number know nothing. The light's own noise
 /// adds what nobody knows: use pictures of little.
 /// @param irradiance W/m^2 on the sensor, CV_32FC(bands)
@@ -26,13 +26,13 @@ namespace touchstone::lab {
 Eigen::Matrix2d shift_information(const cv::Mat& irradiance, const render::Imager& imager,
                                   const Eigen::Vector2d& centre_px, double radius_px);
 
-/// The same of any n numbers that the picture hangs on, over all of it: n x n. `slopes` are the derivatives of the
+/// The same of any n numbers that the picture depends on, over all of it: n x n. `slopes` are the derivatives of the
 /// light by each of them. @throws Error likewise @pre there is a slope, all as large as the picture
 Eigen::MatrixXd picture_information(const cv::Mat& irradiance, const std::vector<cv::Mat>& slopes,
                                     const render::Imager& imager);
 
 /// Mean of the least standard deviations of x and y, px: sqrt(trace(I^-1) / 2); infinite where one of them can't be
-/// told.
+/// estimated.
 double least_deviation_px(const Eigen::Matrix2d& information);
 
 }  // namespace touchstone::lab

@@ -128,12 +128,12 @@ std::vector<DesignFigure> colour_design_figures(const ColourDesignSpec& spec) {
 std::vector<double> colour_design(const ColourDesignSpec& spec, const sim::DeviceSpec& device,
                                   const std::filesystem::path& cache) {
   const sim::VirtualSensor sensor(device, cache, chroma_sensor_settings(kUnit));
-  const ChromaBench bench(sensor, kRest);
-  const std::size_t marker = bench.marker_at(spec.place_mm);
-  const MarkerTest test{bench.markers().markers[marker].centre, spec.friction};
+  const ChromaSetup setup(sensor, kRest);
+  const std::size_t marker = setup.marker_at(spec.place_mm);
+  const MarkerTest test{setup.markers().markers[marker].centre, spec.friction};
   std::vector<double> figures(kFigures, kNone);
 
-  const MarkerSeries press = press_series(bench, test, spec.deepest_mm, spec.press_step_mm, kPress);
+  const MarkerSeries press = press_series(setup, test, spec.deepest_mm, spec.press_step_mm, kPress);
   int flawed = press.flawed;
   std::vector<sensors::HueSample> samples = samples_of(press, marker, 0);
   int series = 1;
@@ -144,28 +144,28 @@ std::vector<double> colour_design(const ColourDesignSpec& spec, const sim::Devic
   };
   const auto& depths = spec.shear_depths_mm;
   for (std::size_t k = 0; k < depths.size(); ++k) {
-    add(shear_series(bench, test, depths[k], {spec.shear_mm, 0}, spec.shear_steps, kShear + k));
+    add(shear_series(setup, test, depths[k], {spec.shear_mm, 0}, spec.shear_steps, kShear + k));
   }
   // A model that isn't linear has to see shear in more than one direction; at depths between those that are tested.
   for (std::size_t k = 0; k + 1 < depths.size(); ++k) {
-    const Eigen::Vector2d way(spec.shear_mm, spec.shear_mm);
-    add(shear_series(bench, test, 0.5 * (depths[k] + depths[k + 1]), way, spec.shear_steps, kDiagonal + k));
+    const Eigen::Vector2d shear(spec.shear_mm, spec.shear_mm);
+    add(shear_series(setup, test, 0.5 * (depths[k] + depths[k + 1]), shear, spec.shear_steps, kDiagonal + k));
   }
   std::vector<MarkerSeries> tests;
   for (std::size_t k = 1; k < depths.size(); ++k) {
-    const Eigen::Vector2d way(spec.shear_mm, spec.shear_mm);
-    tests.push_back(shear_series(bench, test, depths[k], way, spec.shear_steps, kTest + k));
+    const Eigen::Vector2d shear(spec.shear_mm, spec.shear_mm);
+    tests.push_back(shear_series(setup, test, depths[k], shear, spec.shear_steps, kTest + k));
     flawed += tests.back().flawed;
   }
-  const sensors::HueModel model = best_hue_model(bench, samples, forms_of_one_marker(), HueAim::displacement);
-  const InverseScore score = score_inverse(bench, model, marker, tests);
+  const sensors::HueModel model = best_hue_model(setup, samples, forms_of_one_marker(), HueAim::displacement);
+  const InverseScore score = score_inverse(setup, model, marker, tests);
   if (score.samples == 0) fail("no picture of the test could be read");
   figures[kLargest] = score.largest_um;
   figures[kLargestPress] = score.largest_press_um;
   figures[kLargestLateral] = score.largest_lateral_um;
   figures[kRms] = score.rms_um;
-  figures[kHueNoise] = hue_repeats_deg(bench, kRest, kRestPictures)[marker];
-  figures[kSlope] = std::abs(hue_against_depth(bench, press, marker).line().slope);
+  figures[kHueNoise] = hue_repeats_deg(setup, kRest, kRestPictures)[marker];
+  figures[kSlope] = std::abs(hue_against_depth(setup, press, marker).line().slope);
   figures[kNoise] = 1000.0 * figures[kHueNoise] / figures[kSlope];
   const Eigen::Vector3d least_um = 1000.0 * least_error(spec, sensor, test.place_mm);
   figures[kBoundPress] = least_um.z();
@@ -193,36 +193,37 @@ StudyResult report(const std::string& name, const ColourDesignSpec& spec, const 
     meeting += table.values[d][largest] <= spec.error_um;
     if (!best || table.values[d][largest] < table.values[*best][largest]) best = d;
   }
-  DesignStory told;
-  told.name = name;
-  told.title =
+  DesignStory report;
+  report.name = name;
+  report.title =
       fmt::format("{} designs; wanted is a largest error of {:.4g} um in presses that the model wasn't calibrated on.",
                   table.points.size(), spec.error_um);
-  told.answer = fmt::format("{} of {} designs can be read, {} of them meet it.\n", had, table.points.size(), meeting);
+  report.answer = fmt::format("{} of {} designs can be read, {} of them meet it.\n", had, table.points.size(), meeting);
   if (best) {
     const std::vector<double>& of = table.values[*best];
-    told.chosen = {*best};
-    told.answer += fmt::format(
+    report.chosen = {*best};
+    report.answer += fmt::format(
         "\n**{}: {}**: {:.3g} um at worst ({:.3g} um as the device is), {:.3g} um root mean square ({:.3g}). Its hue "
         "turns by "
-        "{:.3g} degrees a mm ({:.3g}), so its noise is worth {:.2g} um of depth ({:.2g}); a whole picture could tell "
+        "{:.3g} degrees a mm ({:.3g}), so its noise is worth {:.2g} um of depth ({:.2g}); a whole picture could "
+        "measure "
         "the depth to "
         "{:.2g} um and the place to {:.2g} um (bounds; as it is {:.2g} and {:.2g}).\n",
         meeting > 0 ? "The smallest error" : "None meets it. Nearest comes",
         name_of_point(table.plan, table.points[*best]), of[kLargest], table.base[kLargest], of[kRms], table.base[kRms],
         of[kSlope], table.base[kSlope], of[kNoise], table.base[kNoise], of[kBoundPress], of[kBoundLateral],
         table.base[kBoundPress], table.base[kBoundLateral]);
-    told.answer +=
+    report.answer +=
         of[kRms] > 3.0 * std::max(of[kBoundPress], of[kBoundLateral])
             ? "\nThe picture knows more than the model reads from one marker: another estimator would help more than "
               "another sensor.\n"
             : "\nThe model is near what the picture knows: to be better, the sensor must change.\n";
   }
-  told.pareto = {number("rms_error_um"), number("depth_noise_um"), number("bound_press_um")};
+  report.pareto = {number("rms_error_um"), number("depth_noise_um"), number("bound_press_um")};
   for (const char* drawn : {"largest_error_um", "rms_error_um", "depth_noise_um", "hue_deg_per_mm", "bound_press_um"}) {
-    told.drawn.push_back(number(drawn));
+    report.drawn.push_back(number(drawn));
   }
-  return design_report(table, told);
+  return design_report(table, report);
 }
 
 }  // namespace touchstone::lab

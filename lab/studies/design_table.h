@@ -17,7 +17,7 @@ namespace touchstone::lab {
 /// A column.
 struct DesignFigure {
   std::string name;               ///< "force_error_N", with its unit
-  Better better = Better::lower;  ///< `near`: neither way is
+  Better better = Better::lower;  ///< `near`: neither is
   std::string meaning;            ///< one sentence
 };
 
@@ -42,7 +42,7 @@ DesignTable try_designs(const DesignPlan& plan, const DesignBase& base, std::vec
 std::size_t figure_number(std::span<const DesignFigure> figures, const std::string& name, const SourceLocation& where);
 
 /// The designs than which none is better in one of these figures and as good in the others, in their order. Designs
-/// that lack one of the figures aren't among them.
+/// that have no value for one of the figures aren't among them.
 std::vector<std::size_t> pareto_front(const DesignTable& table, std::span<const std::size_t> figures);
 
 /// How a figure goes with the variables near all of the designs: log(figure) = c + sum of slope log(variable), by least

@@ -88,7 +88,8 @@ Eigen::VectorXd least_deviations(const Eigen::MatrixXd& sensitivity, const Eigen
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   const Eigen::Index n = sensitivity.cols();
   const Eigen::MatrixXd weighted = deviation.cwiseInverse().asDiagonal() * sensitivity;
-  // Unknowns of different units are scaled to equal information before what can't be told is told from rounding.
+  // Unknowns of different units are scaled to equal information before what can't be identified is separated from
+  // rounding.
   Eigen::VectorXd scale = weighted.colwise().norm();
   for (Eigen::Index k = 0; k < n; ++k) {
     if (!(scale[k] > 0.0)) scale[k] = 1.0;

@@ -1,12 +1,12 @@
 #pragma once
 // The least error that any unbiased estimate of a force can have which is made from where the beads are seen: the
-// Cramer-Rao bound. It hangs on the gel and the camera, not on the estimator, so it tells a designer which of them to
+// Cramer-Rao bound. It depends on the gel and the camera, not on the estimator, so it shows a designer which of them to
 // change.
 //
 // With y the beads' pixels, f the force, S = dy/df and y normal about its mean with the covariance C = diag(sigma^2),
 // Fisher's information is S^T C^-1 S, and no unbiased estimate of f has a covariance below its inverse [Kay1993, eq.
-// 3.31]. Who doesn't know where the object is has more to tell from the same pixels: the information on force and place
-// together, inverted, has the larger bound.
+// 3.31]. Who doesn't know where the object is has more to estimate from the same pixels: the information on force and
+// place together, inverted, has the larger bound.
 
 #include <Eigen/Core>
 
@@ -38,7 +38,7 @@ struct ForceSensitivity {
 ForceSensitivity force_sensitivity(const fem::Compliance& gel, const BeadView& view, const fem::ContactShape& object,
                                    double friction, double start_z_mm, const BoundLoad& load);
 
-/// One standard deviation, N, of x, y, z; infinite where the beads can't tell.
+/// One standard deviation, N, of x, y, z; infinite where the beads don't identify it.
 struct ForceBound {
   Eigen::Vector3d place_known;
   Eigen::Vector3d place_unknown;
@@ -49,7 +49,7 @@ ForceBound force_bound(const ForceSensitivity& sensitivity, const Eigen::VectorX
 
 /// The bound on the forces of a grid of patches, each of uniform traction, that act at once: 3 x patches, N, one
 /// standard deviation of x, y, z of each. `compliance` is that of the beads (bead_compliance), without load. Infinite
-/// where there are more unknowns than the beads can tell.
+/// where there are more unknowns than the beads can identify.
 Eigen::Matrix3Xd distribution_bound(const sensors::MarkerCompliance& compliance, const BeadView& view,
                                     const Eigen::VectorXd& deviation_px);
 

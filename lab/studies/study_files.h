@@ -5,7 +5,7 @@
 
 namespace touchstone::lab {
 
-/// What a study leaves behind: files by name, their text, and what is to be told beside.
+/// What a study leaves behind: files by name, their text, and what is to be printed beside.
 struct StudyFile {
   std::string name;
   std::string text;

@@ -98,15 +98,15 @@ OverSeeds over_seeds(const Values& values, const Figure& figure) {
 /// A tilt of the surface about a marker's own centre, before the device's own camera: what it seems to be.
 void add_tilt_rows(const ValidateOptions& options, std::vector<ValidationRow>& rows) {
   const TiltSpectra spectra = read_tilt_spectra(options.scenes / "spectra");
-  TiltBench bench = near_bench();
-  bench.samples = options.quick ? 16 : 64;
+  TiltSetup setup = near_setup();
+  setup.samples = options.quick ? 16 : 64;
   const int seeds = options.quick ? 1 : 4;
   const std::array<double, 1> tilts = {kTilt_deg * kRadiansPerDegree};
   const auto measure = [&](TiltMarker marker) {
     std::vector<TiltError> errors;
     for (int k = 0; k < seeds; ++k) {
       errors.push_back(
-          measure_tilt(bench, spectra, marker, tilts, kSeed + static_cast<std::uint64_t>(100 * k), options.progress)
+          measure_tilt(setup, spectra, marker, tilts, kSeed + static_cast<std::uint64_t>(100 * k), options.progress)
               .errors.front());
     }
     return errors;
@@ -127,15 +127,15 @@ void add_tilt_rows(const ValidateOptions& options, std::vector<ValidationRow>& r
        [](const TiltError& e) { return std::hypot(e.lateral_um, e.across_um); }, kTextError_um},
       {"hue_deg", "change of hue", "deg", [](const TiltError& e) { return std::abs(e.hue_change) / kRadiansPerDegree; },
        std::nullopt},
-      {"width_um", "depth by the wider way across the ink", "um",
-       [](const TiltError& e) { return std::abs(e.width_um); }, kTextError_um},
+      {"width_um", "depth by the ink's larger width", "um", [](const TiltError& e) { return std::abs(e.width_um); },
+       kTextError_um},
   };
   const double seconds = seconds_since(begun);
   for (const TiltCase& one : cases) {
     const OverSeeds of_flat = over_seeds(flat, one.figure);
     const OverSeeds of_ball = over_seeds(ball, one.figure);
     for (const bool is_ball : {false, true}) {
-      // A ball has no wider way across.
+      // A ball has no larger width.
       if (is_ball && std::string(one.id) == "width_um") continue;
       const OverSeeds& ours = is_ball ? of_ball : of_flat;
       ValidationRow row;

@@ -51,7 +51,7 @@ struct ValidateOptions {
   bool quick = false;             ///< minutes, not hours: coarser or fewer cases, as each row says
   std::filesystem::path cache;    ///< where set-up results are kept
   std::filesystem::path scenes;   ///< the folder scenes/ with devices and scenes
-  std::filesystem::path scratch;  ///< a folder for files that a row makes on its way; exists
+  std::filesystem::path scratch;  ///< a folder for files that a row makes while it runs; exists
   Progress progress;
 };
 

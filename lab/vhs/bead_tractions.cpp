@@ -52,14 +52,15 @@ TractionSummary write_bead_tractions(const std::vector<TrackedSequence>& sequenc
         ++summary.without_force;
         continue;
       }
-      const sensors::TractionField told = inversion.invert(field);
-      forces += fmt::format("{},{},{:.5f},{:.5f},{:.5f},{:.5f},{:.5f},{:.5f}\n", frame, found, told.wrench[0],
-                            told.wrench[1], told.wrench[2], told.sigma(0), told.sigma(1), told.sigma(2));
-      if (told.in_contact) ++summary.in_contact;
+      const sensors::TractionField field_estimate = inversion.invert(field);
+      forces += fmt::format("{},{},{:.5f},{:.5f},{:.5f},{:.5f},{:.5f},{:.5f}\n", frame, found, field_estimate.wrench[0],
+                            field_estimate.wrench[1], field_estimate.wrench[2], field_estimate.sigma(0),
+                            field_estimate.sigma(1), field_estimate.sigma(2));
+      if (field_estimate.in_contact) ++summary.in_contact;
       for (int p = 0; p < compliance.patches(); ++p) {
-        if (told.contact[static_cast<std::size_t>(p)] == 0) continue;
+        if (field_estimate.contact[static_cast<std::size_t>(p)] == 0) continue;
         const Eigen::Vector2d at = compliance.patch_centre(p);
-        const auto traction = told.traction.col(p);
+        const auto traction = field_estimate.traction.col(p);
         tractions += fmt::format("{},{:.3f},{:.3f},{:.6f},{:.6f},{:.6f}\n", frame, at.x(), at.y(), traction.x(),
                                  traction.y(), -traction.z());
       }

@@ -11,9 +11,9 @@
 
 namespace touchstone::lab {
 
-/// How the inversion is told of beads: lateral displacements to 3 um, 0.1 px of the vhs sensor's; normal ones unseen.
-/// Tractions are rougher than chroma's: correlated over a fifth of the gel's thickness, half of its modulus strong.
-/// Chosen on presses of two points, others than those of the rows vhs.distribution.
+/// How beads are described to the inversion: lateral displacements to 3 um, 0.1 px of the vhs sensor's; normal ones
+/// unseen. Tractions are rougher than chroma's: correlated over a fifth of the gel's thickness, half of its modulus
+/// strong. Chosen on presses of two points, others than those of the rows vhs.distribution.
 sensors::TractionSettings bead_inversion();
 
 /// How many frames gave a force.

@@ -1,6 +1,6 @@
 #pragma once
-// What an ideal tracker would tell of a motion: for studies of a design, whose forces then are as good as its mechanics
-// and its view allow, at seconds instead of minutes of pictures.
+// What an ideal tracker would measure of a motion: for studies of a design, whose forces then are as good as its
+// mechanics and its view allow, at seconds instead of minutes of pictures.
 
 #include <cstdint>
 #include <string>
@@ -11,7 +11,7 @@
 
 namespace touchstone::lab {
 
-/// Plays the scene's motion and tells where the centres of the device's beads appear through plate and gel, all found.
+/// Plays the scene's motion and gives where the centres of the device's beads appear through plate and gel, all found.
 /// @param noise_px standard deviation that each coordinate has, normal and of its own; `seed` draws it
 /// @throws Error if the device has no beads or no camera, a bead can't be seen, or as sim::play_motion
 TrackedSequence track_ideally(const std::string& name, const sim::SceneSpec& scene, const fem::Compliance& gel,

@@ -1,6 +1,7 @@
 #pragma once
 // Five levels of softness from waveforms of one press: [VisioHaptic2024, sec. 2.3.1]. The paper makes pictures of the
-// waveforms' frequencies over time and lets AlexNet tell them; here a small network does, on the same kind of pictures.
+// waveforms' frequencies over time and lets AlexNet classify them; here a small network does, on the same kind of
+// pictures.
 
 #include <cstdint>
 #include <optional>
@@ -73,7 +74,7 @@ struct SoftnessSettings {
 /// How often level and material are right.
 struct SoftnessScore {
   sensors::ConfusionMatrix levels;  ///< of the test waveforms
-  /// Of each material's test waveforms, in per cent, how many were told right.
+  /// Of each material's test waveforms, in per cent, how many were classified correctly.
   std::vector<double> right_percent;
   double percent() const { return 100.0 * levels.accuracy(); }
 };

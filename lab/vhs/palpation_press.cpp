@@ -72,7 +72,7 @@ struct Heredity {
   double elastic = 0.0;
 };
 
-/// The commanded way of the nut: at speed, then braking from `stop_s` on.
+/// The commanded travel of the nut: at speed, then braking from `stop_s` on.
 double ramp(double t, double speed, double acceleration, double stop_s) {
   if (t <= stop_s) return speed * t;
   const double braked = std::min(t - stop_s, speed / acceleration);
@@ -233,8 +233,8 @@ PalpationRun play_press(const PalpationSpec& spec, const PressedPiece& piece, do
     run.force_N.push_back(force);
     run.depth_mm.push_back(piece.law.depth(force));
     if (std::isinf(run.stop_s)) {
-      const double way = 0.5 * speed * speed / axis.acceleration_mm_s2;  // that braking takes
-      if (force >= motion.stop_force_N || commanded >= motion.deepest_mm - way) run.stop_s = t;
+      const double braking_mm = 0.5 * speed * speed / axis.acceleration_mm_s2;  // that braking takes
+      if (force >= motion.stop_force_N || commanded >= motion.deepest_mm - braking_mm) run.stop_s = t;
     }
     const double pull = stiffness * (nut - s) + damping * (nut_speed - v) -
                         force * kMillimetresPerMetre / axis.mass_kg + shake * random.normal();

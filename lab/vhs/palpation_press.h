@@ -1,7 +1,7 @@
 #pragma once
 // One press of a linear actuator on a lump: the force over time [VisioHaptic2024, sec. 2.3.1].
 //
-// The face is a mass on the spring of its holder. Along the motion, s being its way beyond the touch:
+// The face is a mass on the spring of its holder. Along the motion, s being its travel beyond the touch:
 //   m s'' = k (x - s) + c (x' - s') - F + shake
 // x is the screw's nut: the commanded ramp, and on it the errors of the screw's turn and of the motor's steps. F is the
 // elastic force of the law at the depth d, relaxed by the hereditary integral of fem/contact/relaxation.h with the

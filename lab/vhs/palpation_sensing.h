@@ -53,7 +53,7 @@ BeadNoise measure_bead_noise(const PalpationSpec& spec, const std::filesystem::p
 std::vector<double> reference_waveform(const PalpationReference& reference, const PalpationRun& run, std::uint64_t seed,
                                        std::uint64_t index);
 
-/// The vhs sensor's way from beads to force.
+/// How the vhs sensor gets from beads to force.
 struct VhsChain {
   sensors::StiffnessForceModel model;
   sensors::BeadFilterSettings filter;

@@ -1,6 +1,7 @@
 // The published figures of the vhs sensor that this program reaches so far: the load cycle on the four squares trains
 // the force model [VisioHaptic2024, sec. 4.3], the verification of its sec. 4.4 and a cycle at a place that training
-// never saw test it. All of it goes the whole way: scene, gel, light, imager, PNG files, tracker, force model.
+// never saw test it. All of it goes through the whole chain: scene, gel, light, imager, PNG files, tracker, force
+// model.
 
 #include <algorithm>
 #include <chrono>

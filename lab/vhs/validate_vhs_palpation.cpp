@@ -1,5 +1,5 @@
-// Five levels of softness under a skin [VisioHaptic2024, sec. 2.3.1]: told from waveforms of the paper's force sensor
-// at 1000, 500 and 250 Hz, and from the vhs sensor's own at 601.25 Hz.
+// Five levels of softness under a skin [VisioHaptic2024, sec. 2.3.1]: classified from waveforms of the paper's force
+// sensor at 1000, 500 and 250 Hz, and from the vhs sensor's own at 601.25 Hz.
 
 #include <cmath>
 #include <numeric>
@@ -55,7 +55,7 @@ std::string matrix_text(const Eigen::MatrixXi& counts) {
 }
 
 /// What the trials made of one sensor.
-struct Told {
+struct Classified {
   Figures percent;
   Eigen::MatrixXi counts = Eigen::MatrixXi::Zero(kSoftnessLevels, kSoftnessLevels);
   void add(const SoftnessScore& score) {
@@ -98,7 +98,7 @@ std::vector<ValidationRow> validate_vhs_palpation(const ValidateOptions& options
   const PalpationTable rigid(spec, PalpationFace::rigid, device, *gel, table, options.cache, options.progress);
   const PalpationTable soft(spec, PalpationFace::gel, device, *gel, table, options.cache, options.progress);
 
-  Told at_1000, at_500, at_250, camera, without_noise, behind_gel, fast_part, unseen, alike_skins, same_speed,
+  Classified at_1000, at_500, at_250, camera, without_noise, behind_gel, fast_part, unseen, alike_skins, same_speed,
       more_pieces;
   Figures drop;
   const int seeds = options.quick ? 1 : kSeeds;
@@ -140,38 +140,39 @@ std::vector<ValidationRow> validate_vhs_palpation(const ValidateOptions& options
     if (options.progress) options.progress("palpation, trials", k + 1, seeds);
   }
   const int tests = at_1000.counts.sum() / seeds;
-  const auto add = [&](const std::string& id, const std::string& title, const Told& told, double bound,
+  const auto add = [&](const std::string& id, const std::string& title, const Classified& classified, double bound,
                        bool published = true) {
-    rows.add_bounded(id, fmt::format("{}: {}", title, matrix_text(told.counts)), "%", Better::higher, bound, published,
-                     mean_of(told.percent));
-    rows.last().ci95 = interval_of(told.percent, tests);
+    rows.add_bounded(id, fmt::format("{}: {}", title, matrix_text(classified.counts)), "%", Better::higher, bound,
+                     published, mean_of(classified.percent));
+    rows.last().ci95 = interval_of(classified.percent, tests);
   };
   add("levels_1000Hz_percent",
-      "five levels told from the paper's force sensor at 1000 Hz, of each what it was told to be", at_1000,
+      "five levels classified from the paper's force sensor at 1000 Hz, of each what it was classified as", at_1000,
       kPublished1000);
   add("levels_500Hz_percent", "every second sample", at_500, kPublished500);
   add("levels_250Hz_percent", "every fourth", at_250, kPublished250);
-  // More levels than the paper's at 250 Hz are no success where nothing was lost on the way there.
+  // More levels than the paper's at 250 Hz are no success where nothing was lost before.
   constexpr double kPublishedDrop = kPublished1000 - kPublished250;
   if (mean_of(drop) < kPublishedDrop - kAllowedDrop) {
-    deny(rows.last(), "at 250 Hz levels are lost that 500 and 1000 Hz tell");
+    deny(rows.last(), "at 250 Hz levels are lost that 500 and 1000 Hz distinguish");
   }
   ValidationRow& fall = rows.add("drop_to_250Hz_percent", "what is lost from 1000 Hz to 250 Hz", "%", mean_of(drop),
                                  Better::near, std::abs(mean_of(drop) - kPublishedDrop) <= kAllowedDrop);
   fall.published = kPublishedDrop;
   fall.ci95 = interval_of(drop, tests);
   if (seeds == 1) fall.ci95.reset();
-  add("camera_percent", "told from the vhs sensor at 601.25 Hz; beside the paper's 500 Hz", camera, kPublished500);
+  add("camera_percent", "classified from the vhs sensor at 601.25 Hz; beside the paper's 500 Hz", camera,
+      kPublished500);
   rows.add_bounded("noise_px", "noise of a bead's coordinate on rendered frames of an opal lump; the filter's setting",
                    "px", Better::lower, chain.filter.measurement_px, false, lit.noise_px);
   double ratio = 0.0;
   for (std::size_t i = 0; i < lit.force_N.size(); ++i) {
     ratio += lit.model_N[i] / lit.force_N[i] / static_cast<double>(lit.force_N.size());
   }
-  ValidationRow& told_force =
+  ValidationRow& force_estimate =
       rows.add("force_ratio", "z force that the sensor trained on the flat probe reads on a lump, over the true one",
                "1", ratio, Better::near, std::abs(ratio - 1.0) <= kAllowedRatio);
-  told_force.reference = 1.0;
+  force_estimate.reference = 1.0;
   if (options.quick) return rows.rows();
   const double at_1000_percent = mean_of(at_1000.percent);
   add("camera_without_noise_percent", "from the vhs sensor without noise; beside the paper's force sensor",

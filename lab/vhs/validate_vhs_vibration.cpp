@@ -40,15 +40,15 @@ std::vector<ValidationRow> validate_vhs_vibration(const ValidateOptions& options
   const std::vector<ForceRecord> records =
       estimate_forces(tracked(datasets::Split::test), model, RestChoice::first_frame);
   const sim::MotionSpec motion = sim::read_scene(options.scenes / "vhs" / "vibration.yaml").motion;
-  std::vector<double> told, truth;
+  std::vector<double> estimates, truth;
   for (const ForceRecord& record : records) {
-    if (record.frame <= motion.keys.front().frames) continue;  // the way to the preload
-    told.push_back(record.estimate.force.z());
+    if (record.frame <= motion.keys.front().frames) continue;  // the approach to the preload
+    estimates.push_back(record.estimate.force.z());
     truth.push_back(record.truth.value().z());
   }
-  const auto lines = spectral_lines(told), true_lines = spectral_lines(truth);
+  const auto lines = spectral_lines(estimates), true_lines = spectral_lines(truth);
   const std::size_t line = strongest_line(lines);
-  const double peak_Hz = static_cast<double>(line) * motion.frame_rate_Hz / static_cast<double>(told.size());
+  const double peak_Hz = static_cast<double>(line) * motion.frame_rate_Hz / static_cast<double>(estimates.size());
   rows.add("peak_Hz",
            fmt::format("peak of the z force's spectrum from frames at {} Hz, {:.3f} N; the paper: between 90 and 110",
                        motion.frame_rate_Hz, std::abs(lines[line])),
@@ -56,7 +56,7 @@ std::vector<ValidationRow> validate_vhs_vibration(const ValidateOptions& options
       .published = kVibration_Hz;
   ValidationSeries spectrum{"frequency, Hz", "z force, N", {}, false};
   for (std::size_t k = 1; k < lines.size(); ++k) {
-    const double frequency_Hz = static_cast<double>(k) * motion.frame_rate_Hz / static_cast<double>(told.size());
+    const double frequency_Hz = static_cast<double>(k) * motion.frame_rate_Hz / static_cast<double>(estimates.size());
     spectrum.points.emplace_back(frequency_Hz, std::abs(lines[k]));
   }
   rows.last().series = spectrum;

@@ -17,7 +17,7 @@
 #include "core/units.h"
 #include "lab/validation/row_list.h"
 #include "lab/validation/validation.h"
-#include "lab/vhs/vhs_visual_bench.h"
+#include "lab/vhs/vhs_pictures.h"
 #include "sensors/skin/colour_correction.h"
 #include "sensors/skin/skin_marks.h"
 #include "sim/files/srgb_reflectance.h"
@@ -466,7 +466,7 @@ void add_skin_rows(const ValidateOptions& options, RowList& rows) {
       }
     }
   }
-  rows.add_bounded("marks_told_apart_percent",
+  rows.add_bounded("marks_distinguished_percent",
                    "marks of skins of several tones that the estimator calls rightly erythema or purpura", "%",
                    Better::higher, kSkins_percent, false, 100.0 * right / all);
 }

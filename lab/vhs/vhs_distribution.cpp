@@ -37,7 +37,7 @@ std::vector<Eigen::Vector2d> seen_at(const sim::DeviceSpec& device, const std::v
   return px;
 }
 
-/// Pressure (MPa) told for the patch at a place of the gel's face; 0 beside the patches.
+/// Pressure (MPa) estimated for the patch at a place of the gel's face; 0 beside the patches.
 double pressure_at(const sensors::MarkerCompliance& c, const sensors::TractionField& field, const Eigen::Vector2d& at) {
   const Eigen::Vector2d index = (at - c.first_patch) / c.patch_side;
   const Eigen::Vector2i cell = index.array().round().cast<int>();
@@ -85,20 +85,20 @@ sensors::ViewParallax bead_parallax(const sim::DeviceSpec& device) {
   return parallax;
 }
 
-DistributionBench set_up_distribution(sim::DeviceSpec device, int grid, double spacing_mm,
+DistributionSetup set_up_distribution(sim::DeviceSpec device, int grid, double spacing_mm,
                                       const std::filesystem::path& cache, const Progress& progress) {
-  DistributionBench bench;
-  bench.device = std::move(device);
-  bench.parallax = bead_parallax(bench.device);
-  bench.device.beads->grid = grid;
-  bench.device.beads->spacing_mm = spacing_mm;
-  bench.gel = sim::set_up_gel(bench.device, cache, progress);
-  bench.compliance = sensors::as_seen(export_marker_compliance(bench.device, *bench.gel), bench.parallax);
-  bench.rest_px = seen_at(bench.device, bench.compliance.marker_rest);
-  return bench;
+  DistributionSetup setup;
+  setup.device = std::move(device);
+  setup.parallax = bead_parallax(setup.device);
+  setup.device.beads->grid = grid;
+  setup.device.beads->spacing_mm = spacing_mm;
+  setup.gel = sim::set_up_gel(setup.device, cache, progress);
+  setup.compliance = sensors::as_seen(export_marker_compliance(setup.device, *setup.gel), setup.parallax);
+  setup.rest_px = seen_at(setup.device, setup.compliance.marker_rest);
+  return setup;
 }
 
-DistributionTrial press_points(const DistributionBench& bench, sensors::TractionInversion& inversion,
+DistributionTrial press_points(const DistributionSetup& setup, sensors::TractionInversion& inversion,
                                const std::vector<LoadPoint>& points, double noise_px, std::uint64_t seed) {
   double largest = 0.0;
   std::vector<fem::PressBody> bodies;
@@ -106,7 +106,7 @@ DistributionTrial press_points(const DistributionBench& bench, sensors::Traction
     largest = std::max(largest, point.force_N);
     bodies.push_back({.shape = fem::SphereShape{kBallRadius_mm}, .friction = kFriction, .elastic = nullptr});
   }
-  fem::Press press(*bench.gel, std::move(bodies), {}, {}, fem::PressOutput::forces);
+  fem::Press press(*setup.gel, std::move(bodies), {}, {}, fem::PressOutput::forces);
   const int steps = std::max(1, static_cast<int>(std::ceil(largest / kStep_N)));
   for (int step = 1; step <= steps; ++step) {
     std::vector<fem::PressTarget> targets;
@@ -117,41 +117,41 @@ DistributionTrial press_points(const DistributionBench& bench, sensors::Traction
     press.step(targets);
   }
 
-  std::vector<Eigen::Vector3d> beads = bench.compliance.marker_rest;
+  std::vector<Eigen::Vector3d> beads = setup.compliance.marker_rest;
   for (std::size_t i = 0; i < beads.size(); ++i) {
     beads[i] += press.state().bead_displacement.row(static_cast<Eigen::Index>(i)).transpose();
   }
   RandomStream random(seed, 0, Purpose::kImagerNoise);
   sensors::TrackedBeads tracked;
-  tracked.positions = seen_at(bench.device, beads);
+  tracked.positions = seen_at(setup.device, beads);
   for (Eigen::Vector2d& place : tracked.positions) {
     place += noise_px * Eigen::Vector2d(random.normal(), random.normal());
   }
   tracked.status.assign(beads.size(), sensors::BeadStatus::kFound);
-  const sensors::BeadView view = sensors::view_of(bench.rest_px, bench.compliance);
+  const sensors::BeadView view = sensors::view_of(setup.rest_px, setup.compliance);
   const sensors::TractionField field =
-      inversion.invert(sensors::bead_field(tracked, bench.rest_px, view, bench.compliance));
+      inversion.invert(sensors::bead_field(tracked, setup.rest_px, view, setup.compliance));
 
   DistributionTrial trial;
-  trial.told_N.assign(points.size(), 0.0);
+  trial.estimated_N.assign(points.size(), 0.0);
   std::vector<Eigen::Vector2d> moment(points.size(), Eigen::Vector2d::Zero());
-  for (int p = 0; p < bench.compliance.patches(); ++p) {
-    const Eigen::Vector2d at = bench.compliance.patch_centre(p);
+  for (int p = 0; p < setup.compliance.patches(); ++p) {
+    const Eigen::Vector2d at = setup.compliance.patch_centre(p);
     std::size_t nearest = 0;
     for (std::size_t k = 1; k < points.size(); ++k) {
       if ((at - points[k].place).norm() < (at - points[nearest].place).norm()) nearest = k;
     }
-    const double force = -field.traction(2, p) * bench.compliance.patch_area();
-    trial.told_N[nearest] += force;
+    const double force = -field.traction(2, p) * setup.compliance.patch_area();
+    trial.estimated_N[nearest] += force;
     moment[nearest] += force * at;
   }
   for (std::size_t k = 0; k < points.size(); ++k) {
-    trial.place_mm.push_back(trial.told_N[k] > 0.0 ? (moment[k] / trial.told_N[k] - points[k].place).norm()
-                                                   : std::numeric_limits<double>::quiet_NaN());
-    trial.total_N += trial.told_N[k];
+    trial.place_mm.push_back(trial.estimated_N[k] > 0.0 ? (moment[k] / trial.estimated_N[k] - points[k].place).norm()
+                                                        : std::numeric_limits<double>::quiet_NaN());
+    trial.total_N += trial.estimated_N[k];
     trial.true_total_N += press.state().bodies[k].wrench[2];
   }
-  if (points.size() == 2) trial.dip = dip_between(bench.compliance, field, points[0].place, points[1].place);
+  if (points.size() == 2) trial.dip = dip_between(setup.compliance, field, points[0].place, points[1].place);
   return trial;
 }
 

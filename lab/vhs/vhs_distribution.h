@@ -1,6 +1,6 @@
 #pragma once
-// Force at several points at once, told from beads: balls are pressed on the vhs sensor's gel together, each with a
-// force of its own; where the camera sees the beads is inverted with the gel's compliance.
+// Force at several points at once, estimated from beads: balls are pressed on the vhs sensor's gel together, each with
+// a force of its own; where the camera sees the beads is inverted with the gel's compliance.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -18,7 +18,7 @@
 namespace touchstone::lab {
 
 /// The sensor, made anew with another grid of beads.
-struct DistributionBench {
+struct DistributionSetup {
   sim::DeviceSpec device;
   std::shared_ptr<const fem::Compliance> gel;
   sensors::MarkerCompliance compliance;  ///< of displacements as seen
@@ -31,7 +31,7 @@ struct DistributionBench {
 sensors::ViewParallax bead_parallax(const sim::DeviceSpec& device);
 
 /// Sets up the gel with a grid of so many beads a side.
-DistributionBench set_up_distribution(sim::DeviceSpec device, int grid, double spacing_mm,
+DistributionSetup set_up_distribution(sim::DeviceSpec device, int grid, double spacing_mm,
                                       const std::filesystem::path& cache, const Progress& progress = {});
 
 /// A ball of 1.5 mm radius with friction 0.5 that is pressed on straight down.
@@ -42,15 +42,15 @@ struct LoadPoint {
 
 /// What one press of some points gave.
 struct DistributionTrial {
-  std::vector<double> told_N;    ///< of each point: over the patches nearest to it
-  std::vector<double> place_mm;  ///< how far the told force's centre is from the true one, of each point
-  double total_N = 0.0;          ///< told, true minus told being the error
+  std::vector<double> estimated_N;  ///< of each point: over the patches nearest to it
+  std::vector<double> place_mm;     ///< how far the estimated force's centre is from the true one, of each point
+  double total_N = 0.0;             ///< estimated, true minus estimated being the error
   double true_total_N = 0.0;
   double dip = 0.0;  ///< of two points: least pressure between them over the lower of the pressures at them; 1: no dip
 };
 
 /// Presses, sees the beads with independent noise of `noise_px` along x and y, and inverts.
-DistributionTrial press_points(const DistributionBench& bench, sensors::TractionInversion& inversion,
+DistributionTrial press_points(const DistributionSetup& setup, sensors::TractionInversion& inversion,
                                const std::vector<LoadPoint>& points, double noise_px, std::uint64_t seed);
 
 }  // namespace touchstone::lab

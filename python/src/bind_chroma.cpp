@@ -18,18 +18,20 @@ using sensors::HueModel;
 
 /// A finder with the picture at rest that it began with.
 struct Finder {
-  Finder(const sensors::ColourMarkerLook& look, const cv::Mat& rest) : finder(look) { finder.find_rest(rest); }
+  Finder(const sensors::ColourMarkerAppearance& appearance, const cv::Mat& rest) : finder(appearance) {
+    finder.find_rest(rest);
+  }
   sensors::ColourMarkerFinder finder;
 };
 using Reader = Guarded<Finder>;
 
 std::shared_ptr<Reader> make_reader(const py::object& rest, const py::object& grid) {
   const Picture picture = picture_from(rest, "rest");
-  sensors::ColourMarkerLook look;
+  sensors::ColourMarkerAppearance appearance;
   const Eigen::Vector2d sides = vector2_from(grid, "grid");
-  look.grid = sides.cast<int>();
-  if (look.grid.cast<double>() != sides) fail("grid: ({}, {}) are not whole numbers", sides.x(), sides.y());
-  return unlocked([&] { return std::make_shared<Reader>(look, picture.mat); });
+  appearance.grid = sides.cast<int>();
+  if (appearance.grid.cast<double>() != sides) fail("grid: ({}, {}) are not whole numbers", sides.x(), sides.y());
+  return unlocked([&] { return std::make_shared<Reader>(appearance, picture.mat); });
 }
 
 template <typename Number>
@@ -110,7 +112,7 @@ py::array bools_of(const std::vector<std::uint8_t>& values) {
 
 void bind_chroma(py::module_& module) {
   py::class_<ColourMarkerReading>(module, "ColourMarkerReading",
-                                  "What one picture tells of a grid of coloured markers, row by row; NaN where flawed.")
+                                  "What one picture shows of a grid of coloured markers, row by row; NaN where flawed.")
       .def_property_readonly(
           "grid", [](const ColourMarkerReading& self) { return py::make_tuple(self.grid.x(), self.grid.y()); },
           "(columns, rows).")

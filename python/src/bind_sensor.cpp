@@ -69,8 +69,8 @@ std::shared_ptr<Touch> press(const Sensor& sensor, const py::object& touched, st
                              std::optional<double> force_N, const py::object& at_mm, const py::object& angles_deg,
                              const py::object& pose, const py::object& shear_mm, const py::object& shear_N,
                              double seconds, std::uint64_t noise_seed, int frame, bool look, bool truth) {
-  const int ways = (depth_mm ? 1 : 0) + (force_N ? 1 : 0) + (pose.is_none() ? 0 : 1);
-  if (ways != 1) fail("press: exactly one of depth_mm, force_N and pose says how far; {} of them are given", ways);
+  const int given = (depth_mm ? 1 : 0) + (force_N ? 1 : 0) + (pose.is_none() ? 0 : 1);
+  if (given != 1) fail("press: exactly one of depth_mm, force_N and pose says how far; {} of them are given", given);
   if (!shear_mm.is_none() && !shear_N.is_none()) fail("press: shear_mm and shear_N exclude each other");
   sim::PressSpec order;
   order.depth_mm = depth_mm;
@@ -346,7 +346,8 @@ void bind_sensor(py::module_& module) {
            py::arg("angles_deg") = py::make_tuple(0.0, 0.0, 0.0), py::arg("pose") = py::none(),
            py::arg("shear_mm") = py::none(), py::arg("shear_N") = py::none(), py::arg("seconds") = 0.1,
            py::arg("noise_seed") = 0, py::arg("frame") = 0, py::arg("look") = true, py::arg("truth") = true,
-           "Presses an object on the untouched gel and looks.\n\nExactly one of: depth_mm, beyond the first touch; "
+           "Presses an object on the untouched gel and takes a picture.\n\nExactly one of: depth_mm, beyond the first "
+           "touch; "
            "force_N, the normal force (above 0); pose, a (3, 4) or (4, 4) array gel_from_object in mm.\nat_mm: place "
            "of the object's origin, with depth_mm and force_N. angles_deg: turned about x, then y, then z.\nshear_mm, "
            "shear_N: moved aside afterwards, or until this force is on it.\nseconds: of each of these steps; matters "

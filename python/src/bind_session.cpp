@@ -59,7 +59,7 @@ std::shared_ptr<Session> make_session(const std::shared_ptr<Sensor>& sensor, con
 
 void bind_session(py::module_& module) {
   using Reading = sim::TouchReading;
-  py::class_<Reading>(module, "Reading", "What a step of a Session tells.")
+  py::class_<Reading>(module, "Reading", "What a step of a Session gives.")
       .def_readonly("step", &Reading::step, "Counted from 1; 0 before the first.")
       .def_readonly("t_s", &Reading::t_s, "The steps' times, summed.")
       .def_readonly("contact_area_mm2", &Reading::contact_area_mm2, "Of the contact.")
@@ -96,7 +96,7 @@ void bind_session(py::module_& module) {
       "largest_part_mm=0.1)\n\n"
       "Friction and relaxation remember all steps. A step costs milliseconds; pictures are made when look() asks.\n"
       "largest_step_mm: a step in contact that goes further is refused as a mistake (metres for millimetres).\n"
-      "largest_part_mm: steps are cut into parts of this length, since friction depends on the way.\n"
+      "largest_part_mm: steps are cut into parts of this length, since friction depends on the path.\n"
       "For one thread at a time; sessions of one sensor are independent.")
       .def(py::init(&make_session), py::arg("sensor"), py::arg("object"), py::kw_only(),
            py::arg("largest_step_mm") = 5.0, py::arg("largest_part_mm") = 0.1)

@@ -22,7 +22,7 @@ std::shared_ptr<Tracker> make_tracker(int grid, int roi_a_px, int roi_b_px, cons
   settings.roi_a_px = roi_a_px;
   settings.roi_b_px = roi_b_px;
   if (polarity == "bright") {
-    settings.look.polarity = sensors::BeadPolarity::kBright;
+    settings.appearance.polarity = sensors::BeadPolarity::kBright;
   } else if (polarity != "dark") {
     fail("polarity: '{}' is not known; allowed is one of: dark, bright", polarity);
   }

@@ -86,7 +86,7 @@ def merge(job, out, *, progress=None):
     """Checks that all shards of a drawn data set are in folder `out`, and writes its card and manifest.
 
     progress: as for generate. Returns a dict as generate does.
-    Raises Error that names the files that lack, or if the job isn't one that draws.
+    Raises Error that names the files that are missing, or if the job isn't one that draws.
     """
     return _core.merge(_os.fspath(job), _os.fspath(out), progress=progress)
 

@@ -48,7 +48,7 @@ inline std::optional<Eigen::Vector3d> view_direction(const ReadyCamera& camera, 
                     camera);
 }
 
-/// The way back: the image point, in the picture or beside it, that looks along a vector of the camera frame of any
+/// The inverse: the image point, in the picture or beside it, that looks along a vector of the camera frame of any
 /// length; nullopt where none does.
 inline std::optional<Eigen::Vector2d> image_point(const ReadyCamera& camera, const Eigen::Vector3d& direction) {
   return std::visit([&](const auto& one) { return image_point(one, direction); }, camera);

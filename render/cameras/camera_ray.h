@@ -1,5 +1,5 @@
 #pragma once
-// One way for light from the scene to a point of a camera's sensor.
+// One path of light from the scene to a point of a camera's sensor.
 
 #include <Eigen/Core>
 

@@ -15,10 +15,10 @@ namespace {
 
 constexpr float kFarAway = 1e6f;  // mm
 
-/// A face on the way, and the layer before it.
+/// A face on the path, and the layer before it.
 struct Passed {
   double reflectance_s, reflectance_p;
-  double way;  // in the layer before the face
+  double distance;  // in the layer before the face
   const Medium* before;
 };
 
@@ -38,10 +38,10 @@ void add_stack(const std::array<Passed, kMaxLayers>& passed, int count, int band
   reflected = 0.0;
   through = 1.0;
   for (int k = count - 1; k >= 0; --k) {
-    // The stack behind face k begins with a layer that is crossed on the way to face k + 1.
+    // The stack behind face k begins with a layer that is crossed on the path to face k + 1.
     double pass = 1.0;
     if (k + 1 < count && passed[k + 1].before->absorption.size() > 0) {
-      pass = std::exp(-passed[k + 1].before->absorption[band] * passed[k + 1].way);
+      pass = std::exp(-passed[k + 1].before->absorption[band] * passed[k + 1].distance);
     }
     const double r = s_polarised ? passed[k].reflectance_s : passed[k].reflectance_p;
     const double inner = pass * pass * reflected;
@@ -51,7 +51,7 @@ void add_stack(const std::array<Passed, kMaxLayers>& passed, int count, int band
     reflected = r + (1.0 - r) * t * inner;
   }
   if (count > 0 && passed[0].before->absorption.size() > 0) {
-    const double pass = std::exp(-passed[0].before->absorption[band] * passed[0].way);
+    const double pass = std::exp(-passed[0].before->absorption[band] * passed[0].distance);
     through *= pass;
     reflected *= pass * pass;
   }
@@ -69,9 +69,9 @@ Followed follow(const Scene& scene, const Eigen::Vector3d& origin, const Eigen::
   while (ray.layer != layer) {
     if (ray.direction.z() == 0.0 || ray.up() != (layer > ray.layer)) return result;  // leads away
     const Medium& before = medium_of_layer(scene, ray.layer);
-    const double way = way_to_face(scene, ray);
-    const FresnelFace face = cross_face(scene, way, ray);
-    passed[count++] = {face.reflectance_s, face.reflectance_p, way, &before};
+    const double distance = distance_to_face(scene, ray);
+    const FresnelFace face = cross_face(scene, distance, ray);
+    passed[count++] = {face.reflectance_s, face.reflectance_p, distance, &before};
     total = face.cos_refracted <= 0.0;
     if (total) break;
   }
@@ -86,7 +86,7 @@ Followed follow(const Scene& scene, const Eigen::Vector3d& origin, const Eigen::
   result.arrives = true;
   result.origin = ray.origin;
   result.direction = ray.direction;
-  result.far = std::min(way_to_face(scene, ray), double(kFarAway));
+  result.far = std::min(distance_to_face(scene, ray), double(kFarAway));
   return result;
 }
 

@@ -12,9 +12,9 @@ namespace touchstone::render {
 /// The middles of a camera's pixels.
 ImageGrid pixel_grid(const ReadyCamera& camera);
 
-/// Packets of 4 x 4 grid points, row by row of such tiles, one set after another for each sample. `far` is the way to
-/// the next face or a large number. What a lane's ray brings to the sensor per basic radiance at its end, and what it
-/// brings of the surroundings by mirroring, is kept by [packet][lane][band]; `veil` is empty where it would be zero.
+/// Packets of 4 x 4 grid points, row by row of such tiles, one set after another for each sample. `far` is the distance
+/// to the next face or a large number. What a lane's ray brings to the sensor per basic radiance at its end, and what
+/// it brings of the surroundings by mirroring, is kept by [packet][lane][band]; `veil` is empty where it would be zero.
 struct CameraRays {
   static constexpr int kSide = 4;
   ImageGrid grid;

@@ -13,7 +13,7 @@ namespace touchstone::render {
 std::vector<int> edge_points(std::span<const float> radiance, const ImageGrid& grid, int bands, double contrast);
 
 /// Puts side x side rays through a grid point's square into a packet, from `first_lane` on: what a central ray is in
-/// the layer changes so smoothly over the picture that the next grid points' rays tell it.
+/// the layer changes so smoothly over the picture that the next grid points' rays show it.
 /// @pre rays of one sample
 void put_edge_rays(const CameraRays& rays, int point, int side, RayPacket& packet, int first_lane);
 

@@ -15,9 +15,9 @@ namespace {
 FirstHit trace(const Scene& scene, const RayScene& rays, RayInLayer ray) {
   FirstHit first;
   for (;;) {
-    const double way = way_to_face(scene, ray);
+    const double distance = distance_to_face(scene, ray);
     RayHit hit;
-    if (rays.intersect(ray.origin, ray.direction, way, hit)) {
+    if (rays.intersect(ray.origin, ray.direction, distance, hit)) {
       first.object = hit.object;
       first.triangle = hit.triangle;
       first.u = hit.weight_1;
@@ -26,7 +26,7 @@ FirstHit trace(const Scene& scene, const RayScene& rays, RayInLayer ray) {
       first.normal = hit.shading_normal;
       return first;
     }
-    if (std::isinf(way) || cross_face(scene, way, ray).cos_refracted <= 0.0) return first;
+    if (std::isinf(distance) || cross_face(scene, distance, ray).cos_refracted <= 0.0) return first;
   }
 }
 
@@ -54,15 +54,15 @@ std::optional<Eigen::Vector2d> project_through_faces(const Scene& scene, const R
   check_faces(scene);
   const RigidTransform& pose = pose_of(camera);
   const Eigen::Vector3d eye = pose.translation;
-  const Eigen::Vector3d way = point - eye;
+  const Eigen::Vector3d offset = point - eye;
   const auto seen_along = [&](const Eigen::Vector3d& direction) {
     return image_point(camera, pose.inverse().turn(direction));
   };
   const int eye_layer = layer_of_height(scene.faces, eye.z());
   const int point_layer = layer_of_height(scene.faces, point.z());
-  const double across = way.head<2>().norm();
-  if (eye_layer == point_layer || across == 0.0) return seen_along(way);
-  if (way.z() == 0.0) return std::nullopt;
+  const double across = offset.head<2>().norm();
+  if (eye_layer == point_layer || across == 0.0) return seen_along(offset);
+  if (offset.z() == 0.0) return std::nullopt;
 
   // The layers between, from the eye: thickness and index.
   std::vector<Eigen::Vector2d> layers;
@@ -76,10 +76,10 @@ std::optional<Eigen::Vector2d> project_through_faces(const Scene& scene, const R
     layers.emplace_back(to - from, medium_of_layer(scene, layer).index);
     least_index = std::min(least_index, layers.back().y());
   }
-  // Newton on p, held between bounds. The way across grows with p without bound, convexly.
+  // Newton on p, held between bounds. The distance across grows with p without bound, convexly.
   double below = 0.0;
   double above = least_index;
-  double p = least_index * across / way.norm();
+  double p = least_index * across / offset.norm();
   constexpr int kMostSteps = 100;
   for (int step = 0; step < kMostSteps; ++step) {
     double reach = -across;
@@ -97,8 +97,8 @@ std::optional<Eigen::Vector2d> project_through_faces(const Scene& scene, const R
   }
   const double index = medium_of_layer(scene, eye_layer).index;
   const double sine = std::min(1.0, p / index);
-  const Eigen::Vector2d sideways = way.head<2>() * (sine / across);
-  return seen_along({sideways.x(), sideways.y(), std::copysign(std::sqrt(1.0 - sine * sine), way.z())});
+  const Eigen::Vector2d sideways = offset.head<2>() * (sine / across);
+  return seen_along({sideways.x(), sideways.y(), std::copysign(std::sqrt(1.0 - sine * sine), offset.z())});
 }
 
 }  // namespace touchstone::render

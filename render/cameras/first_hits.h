@@ -1,6 +1,6 @@
 #pragma once
 // What each pixel of a camera sees first: one ray a pixel, through its centre and that of hole or lens, distorted as
-// the lens does and bent at the flat faces. And the way back: where a point of the scene appears.
+// the lens does and bent at the flat faces. And the inverse: where a point of the scene appears.
 
 #include <Eigen/Core>
 #include <optional>
@@ -26,9 +26,9 @@ struct FirstHit {
 std::vector<FirstHit> first_hits(const Scene& scene, const ReadyCamera& camera);
 
 /// Where `point` (gel frame) appears in pixels, seen through the centre of hole or lens and the scene's flat faces,
-/// whatever stands in between: p = n sin(angle) is the same in all layers (Snell), and the layers' ways across must add
-/// up to the point's distance from the camera's plumb line. nullopt if it's behind the camera, or level with it and not
-/// in its layer, or so far aside that no image point looks there (image_point).
+/// whatever stands in between: p = n sin(angle) is the same in all layers (Snell), and the layers' distances across
+/// must add up to the point's distance from the camera's plumb line. nullopt if it's behind the camera, or level with
+/// it and not in its layer, or so far aside that no image point looks there (image_point).
 /// @throws Error as check_faces: the faces' media must be in the scene
 std::optional<Eigen::Vector2d> project_through_faces(const Scene& scene, const ReadyCamera& camera,
                                                      const Eigen::Vector3d& point);

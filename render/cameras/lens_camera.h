@@ -74,7 +74,7 @@ PreparedLens prepare(const LensCamera& camera);
 CameraRay lens_ray(const PreparedLens& camera, double x, double y, double u, double v);
 
 /// The unit vector of the camera frame along which an image point looks through the lens's centre; nullopt where the
-/// distortion can't be inverted: nowhere in a checked camera's picture, and beside it from some way on.
+/// distortion can't be inverted: nowhere in a checked camera's picture, and beside it from some distance on.
 std::optional<Eigen::Vector3d> view_direction(const PreparedLens& camera, double x, double y);
 
 /// The image point that looks along a vector of the camera frame; nullopt where none does: it doesn't point forwards,

@@ -35,10 +35,10 @@ DirectBatch::DirectBatch(const DirectFrame& frame)
       lanes_(kMostPackets * kPacket),
       amounts_(lanes_.size() * stride_),
       flows_(lanes_.size() * stride_ * 3),
-      ways_(frame.shadow_reach != nullptr ? flows_.size() : 0),
+      directions_(frame.shadow_reach != nullptr ? flows_.size() : 0),
       pass_(field_.pass.empty() ? 0 : lanes_.size() * stride_ * bands_) {}
 
-void DirectBatch::look(std::span<const RayPacket> rays, DirectCounts& counts) {
+void DirectBatch::intersect(std::span<const RayPacket> rays, DirectCounts& counts) {
   TS_ASSERT(rays.size() <= kMostPackets);
   rays_ = rays;
   PacketHits hits;
@@ -95,14 +95,14 @@ void DirectBatch::look(std::span<const RayPacket> rays, DirectCounts& counts) {
   }
 }
 
-/// The share of a camera ray that meets film on the way of the given length.
+/// The share of a camera ray that meets film within the given distance.
 float DirectBatch::film_before(const RayPacket& packet, int slot, float distance) const {
   const FilmScreen& films = fixture_.films;
   if (films.empty()) return 0.0f;
-  const float way = (films.z() - packet.origin[2][slot]) / packet.direction[2][slot];
-  if (!(way >= -kOnFace && way < distance)) return 0.0f;
-  return films.camera_cover(packet.origin[0][slot] + way * packet.direction[0][slot],
-                            packet.origin[1][slot] + way * packet.direction[1][slot]);
+  const float to_films = (films.z() - packet.origin[2][slot]) / packet.direction[2][slot];
+  if (!(to_films >= -kOnFace && to_films < distance)) return 0.0f;
+  return films.camera_cover(packet.origin[0][slot] + to_films * packet.direction[0][slot],
+                            packet.origin[1][slot] + to_films * packet.direction[1][slot]);
 }
 
 void DirectBatch::light_lane(int lane, DirectCounts& counts) {
@@ -134,15 +134,15 @@ void DirectBatch::light_lane(int lane, DirectCounts& counts) {
   one.doubt &= lit;
   counts.spared += std::popcount(lit ^ one.doubt);
   if (one.doubt != 0) {
-    float* way = ways_.data() + static_cast<std::size_t>(lane) * stride_ * 3;
+    float* direction = directions_.data() + static_cast<std::size_t>(lane) * stride_ * 3;
     for (int group = 0; group < fixture_.groups; ++group) {
       const Four x = four(flow + group * 12);
       const Four y = four(flow + group * 12 + 4);
       const Four z = four(flow + group * 12 + 8);
       const Four scale = -(x * x + y * y + z * z).max(1e-30f).sqrt().inverse();
-      Eigen::Map<Four>(way + group * 12) = scale * x;
-      Eigen::Map<Four>(way + group * 12 + 4) = scale * y;
-      Eigen::Map<Four>(way + group * 12 + 8) = scale * z;
+      Eigen::Map<Four>(direction + group * 12) = scale * x;
+      Eigen::Map<Four>(direction + group * 12 + 4) = scale * y;
+      Eigen::Map<Four>(direction + group * 12 + 8) = scale * z;
     }
   }
   if (pass_.empty()) return;
@@ -165,8 +165,8 @@ Eigen::Vector3f DirectBatch::flow_of(int lane, int lamp) const {
   return {from[0], from[4], from[8]};
 }
 
-Eigen::Vector3f DirectBatch::way_to(int lane, int lamp) const {
-  const float* from = ways_.data() + static_cast<std::size_t>(lane) * stride_ * 3 + lamp / 4 * 12 + lamp % 4;
+Eigen::Vector3f DirectBatch::direction_to(int lane, int lamp) const {
+  const float* from = directions_.data() + static_cast<std::size_t>(lane) * stride_ * 3 + lamp / 4 * 12 + lamp % 4;
   return {from[0], from[4], from[8]};
 }
 
@@ -174,13 +174,13 @@ void DirectBatch::set_flow(int lane, int lamp, const Eigen::Vector3f& flow) {
   float* to = flows_.data() + static_cast<std::size_t>(lane) * stride_ * 3 + lamp / 4 * 12 + lamp % 4;
   for (int a = 0; a < 3; ++a) to[4 * a] = flow[a];
   if ((lanes_[lane].doubt >> lamp & 1u) == 0) return;
-  const Eigen::Vector3f way = -flow.normalized();
-  float* way_at = ways_.data() + (to - flows_.data());
-  for (int a = 0; a < 3; ++a) way_at[4 * a] = way[a];
+  const Eigen::Vector3f direction = -flow.normalized();
+  float* direction_at = directions_.data() + (to - flows_.data());
+  for (int a = 0; a < 3; ++a) direction_at[4 * a] = direction[a];
 }
 
-// The field of a lens point is that of the lens's middle seen from a place set off the other way, since flat layers
-// look alike from everywhere; a source that is higher is one that is set off along its own ray.
+// The field of a lens point is that of the lens's middle seen from a place shifted in the opposite direction, since
+// flat layers look alike from everywhere; a source that is higher is one that is set off along its own ray.
 void DirectBatch::choose_lens_points(int lane, double u, double v) {
   Lane& one = lanes_[lane];
   one.spread[0] = static_cast<float>(u - 0.5);
@@ -264,10 +264,10 @@ void DirectBatch::cast_shadows(DirectCounts& counts) {
   }
 }
 
-/// Where a shadow ray to the lamp goes. A beam is as wide as the ways to the beams beside it differ; one at the rim is
-/// taken to be as wide outwards as it is inwards.
+/// Where a shadow ray to the lamp goes. A beam is as wide as the directions to the beams beside it differ; one at the
+/// rim is taken to be as wide outwards as it is inwards.
 Eigen::Vector3f DirectBatch::towards(int lane, int lamp) const {
-  const Eigen::Vector3f middle = way_to(lane, lamp);
+  const Eigen::Vector3f middle = direction_to(lane, lamp);
   const BesideBeam& beside = field_.beside[lamp];
   Eigen::Vector3f sum = middle;
   // Each beam begins elsewhere in the sequence, so that a place sees different parts of different beams.
@@ -277,8 +277,8 @@ Eigen::Vector3f DirectBatch::towards(int lane, int lamp) const {
     const bool up = (share > 0.0f && more >= 0) || less < 0;
     const int other = up ? more : less;
     if (other < 0) return;
-    const Eigen::Vector3f way = way_to(lane, other);
-    if (way != Eigen::Vector3f::Zero()) sum += (up ? share : -share) * (way - middle);
+    const Eigen::Vector3f direction = direction_to(lane, other);
+    if (direction != Eigen::Vector3f::Zero()) sum += (up ? share : -share) * (direction - middle);
   };
   const float* spread = lanes_[lane].spread;
   add_part(spread[0], 0.4375f, lamp, beside.flatter, beside.steeper);
@@ -382,7 +382,7 @@ void DirectBatch::reflect_from_matt(int lane, float* sum) const {
   }
 }
 
-/// As from a matt surface, less what films keep where each lamp's way crosses their plane. Lamps of one colour are
+/// As from a matt surface, less what films keep where each lamp's ray crosses their plane. Lamps of one colour are
 /// added up first, those parts that meet film by their slope: the bands are many, and film takes of each another share.
 void DirectBatch::reflect_through_films(int lane, float* sum) const {
   const Lane& one = lanes_[lane];
@@ -395,14 +395,14 @@ void DirectBatch::reflect_through_films(int lane, float* sum) const {
     for (int lamp = 0; lamp < lamps_; ++lamp) {
       if (amount[lamp] == 0.0f || fixture_.colour_of[lamp] != static_cast<int>(colour)) continue;
       const Eigen::Vector3f flow = flow_of(lane, lamp);
-      const float way = height / -flow.z();
+      const float to_films = height / -flow.z();
       const bool before_films = fixture_.lamp_in_layer[lamp] &&
                                 (lamp_position(field_.lamp(lamp)).z() - double(films.z())) * double(-height) > 0.0;
-      if (before_films || !(way > 0.0f)) {
+      if (before_films || !(to_films > 0.0f)) {
         light.plain += amount[lamp];
         continue;
       }
-      const float cover = films.lamp_cover(one.place[0] - way * flow.x(), one.place[1] - way * flow.y());
+      const float cover = films.lamp_cover(one.place[0] - to_films * flow.x(), one.place[1] - to_films * flow.y());
       films.add(amount[lamp], cover, std::abs(flow.z()) / flow.norm(), light);
     }
     float left[kMaxBands];

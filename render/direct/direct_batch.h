@@ -26,7 +26,7 @@ struct DirectCounts {
   std::uint64_t primary = 0, shadow_rays = 0, spared = 0;
 };
 
-/// One at a time for each thread: it is room to work in. Steps are to be called in their order. Lane k is lane k % 16
+/// One at a time for each thread: it is working memory. Steps are to be called in their order. Lane k is lane k % 16
 /// of packet k / 16.
 class DirectBatch {
  public:
@@ -36,7 +36,7 @@ class DirectBatch {
   explicit DirectBatch(const DirectFrame& frame);
 
   /// What the rays meet and what each lamp would send there; at most kMostPackets.
-  void look(std::span<const RayPacket> rays, DirectCounts& counts);
+  void intersect(std::span<const RayPacket> rays, DirectCounts& counts);
 
   /// Lets a lane's shadows come from the point of each lens that (u, v) in [0, 1)^2 stands for, not from its middle,
   /// and from that part of a guide's beams. Without, the sixteen lanes of a packet take sixteen parts of a beam.
@@ -70,7 +70,7 @@ class DirectBatch {
     const float* colour;             // the material's, or that of the ink
     std::uint64_t doubt;             // see ShadowReach
     float spread[2];                 // where in the beams of guides shadow rays go, each -1/2 to 1/2
-    float film;                      // the part of the camera's way to it that goes through film
+    float film;                      // the part of the camera's rays to it that goes through film
   };
 
   const RayPacket& packet_of(int lane) const { return rays_[lane / kPacket]; }
@@ -78,7 +78,7 @@ class DirectBatch {
   const float* amounts(int lane) const { return amounts_.data() + static_cast<std::size_t>(lane) * stride_; }
   Eigen::Array4f passing(int lane, int group, int band) const;
   Eigen::Vector3f flow_of(int lane, int lamp) const;
-  Eigen::Vector3f way_to(int lane, int lamp) const;
+  Eigen::Vector3f direction_to(int lane, int lamp) const;
   Eigen::Vector3f towards(int lane, int lamp) const;
   void set_flow(int lane, int lamp, const Eigen::Vector3f& flow);
   float film_before(const RayPacket& packet, int slot, float distance) const;
@@ -99,7 +99,7 @@ class DirectBatch {
   std::vector<float> amounts_;  // [lane][lamp]: cosine times irradiance of unit intensity
   std::vector<float> flows_;    // [lane][group][axis][4]
   std::vector<float>
-      ways_;  // likewise, where shadows are in doubt: unit vectors against the flows, 0 where there's none
+      directions_;  // likewise, where shadows are in doubt: unit vectors against the flows, 0 where there's none
   std::vector<float> pass_;  // [lane][band][lamp], empty where nothing absorbs
   RayPacket shadow_;
 };

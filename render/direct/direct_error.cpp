@@ -45,8 +45,8 @@ Mean mean_of(const std::vector<double>& values) {
 /// Of the mean square, from its root's.
 double square_error_of(const DirectError& error) {
   if (std::isinf(error.rms)) return 0.0;
-  const bool told_from_none = error.rms > error.rms_error;  // else rms_error is the square error's root
-  return told_from_none ? 2.0 * error.rms * error.rms_error : error.rms_error * error.rms_error;
+  const bool above_its_error = error.rms > error.rms_error;  // else rms_error is the square error's root
+  return above_its_error ? 2.0 * error.rms * error.rms_error : error.rms_error * error.rms_error;
 }
 
 constexpr double kStandardErrors = 2.0;
@@ -107,7 +107,7 @@ DirectError measure_direct_error(const cv::Mat& picture, const Scene& scene, con
     return error;
   }
   error.rms = std::sqrt(std::max(0.0, square.value) / power);
-  // The root's derivative, but for a root that isn't told from zero.
+  // The root's derivative, but for a root that can't be distinguished from zero.
   error.rms_error = square.value > square.error ? 0.5 * square.error / std::sqrt(square.value * power)
                                                 : std::sqrt(square.error / power);
   error.mean = shift.value / std::sqrt(power);

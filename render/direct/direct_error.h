@@ -14,7 +14,7 @@ namespace touchstone::render {
 /// How many pixels and paths the measurement takes.
 struct DirectErrorSettings {
   int pixels = 400;    ///< looked at, one in each of as many fields of the picture
-  int samples = 64;    ///< paths a pixel, twice; choose_direct takes four times as many where these can't tell
+  int samples = 64;    ///< paths a pixel, twice; choose_direct takes four times as many where these aren't enough
   int max_depth = 16;  ///< RenderSettings::max_depth
   std::uint64_t seed = 0;
 };
@@ -27,7 +27,7 @@ struct DirectError {
 };
 
 /// What the root mean square difference isn't above, and not below, with two standard errors of its square, which is
-/// what is measured: a difference that isn't told from none has a root whose own error says little.
+/// what is measured: a difference that can't be distinguished from zero has a root whose own error says little.
 double largest_rms(const DirectError& error);
 /// What the root mean square difference isn't below, likewise: 0 where noise alone may explain the difference.
 double smallest_rms(const DirectError& error);

@@ -61,7 +61,7 @@ struct DirectRenderer::Parts {
   CameraRays rays;
   // By pixel and band, where central rays are spread; see CameraRays.
   std::vector<float> through, veil;
-  std::vector<float> radiance;                // [band][grid point], room for a frame
+  std::vector<float> radiance;                // [band][grid point], memory for a frame
   std::vector<DirectBatch::Visibility> seen;  // by grid point, where edges get more rays
   std::vector<float> bounced;                 // [grid point][band], irradiance; empty for none
   std::map<double, GgxAlbedo> conductors;     // by roughness
@@ -211,7 +211,7 @@ void DirectRenderer::Parts::cast(const DirectFrame& frame, DirectImage& image) {
       const int packets = std::min(DirectBatch::kMostPackets, task_end - first);
       for (int sample = 0; sample < samples; ++sample) {
         const std::size_t number = static_cast<std::size_t>(sample) * rays.tiles + first;
-        batch.look({rays.packets.data() + number, static_cast<std::size_t>(packets)}, counts);
+        batch.intersect({rays.packets.data() + number, static_cast<std::size_t>(packets)}, counts);
         const auto for_lanes = [&](auto&& work) {  // work(lane, row, column) of those on the grid
           for (int lane = 0; lane < packets * kPacket; ++lane) {
             const int tile = first + lane / kPacket;
@@ -295,7 +295,7 @@ void DirectRenderer::Parts::refine(const DirectFrame& frame, DirectImage& image)
                     k % points_a_packet * rays_a_point);
     }
     DirectBatch batch(frame);
-    batch.look(packets, task_counts[task]);
+    batch.intersect(packets, task_counts[task]);
     if (settings.shadows) {
       for (int k = 0; k < count; ++k) {
         const DirectBatch::Visibility known = known_round(edges[first + k]);

@@ -168,14 +168,14 @@ LampBearings::LampBearings(const LightField& field, bool soft)
     // What the lamps send to 27 places of the cell, and beside it as far as lenses ask.
     for (int column = 0; column < columns; ++column) {
       const float x = left + (static_cast<float>(column) + 0.5f) * cell;
-      const auto way = [&](float px, float py, float pz, int lamp, Eigen::Vector3f& to) {
+      const auto find_direction = [&](float px, float py, float pz, int lamp, Eigen::Vector3f& to) {
         to = -look_up_flow(field, find_cell(field, px, py, pz), lamp);
         return to.squaredNorm() > 0.0f && to.z() != 0.0f;
       };
       for (int lamp = 0; lamp < lamps; ++lamp) {
         Bearing& made = bearings[(static_cast<std::size_t>(line) * columns + column) * lamps + lamp];
         Eigen::Vector3f to;
-        if (!way(x, y, middle_z, lamp, to)) continue;
+        if (!find_direction(x, y, middle_z, lamp, to)) continue;
         made.side = to.z() > 0.0f ? 1.0f : -1.0f;
         const Eigen::Vector2f middle = to.head<2>() / std::abs(to.z());
         made.x = middle.x();
@@ -195,8 +195,8 @@ LampBearings::LampBearings(const LightField& field, bool soft)
           return known ? (flat.normalized() - middle.normalized()).norm() : 2.0f;
         };
         for (int k = 0; k < 27 && std::isfinite(spread); ++k) {
-          const bool lit =
-              way(x + off * step(k % 3), y + off * step(k / 3 % 3), middle_z + 0.5f * slab * step(k / 9), lamp, to);
+          const bool lit = find_direction(x + off * step(k % 3), y + off * step(k / 3 % 3),
+                                          middle_z + 0.5f * slab * step(k / 9), lamp, to);
           spread = lit && to.z() * made.side > 0.0f
                        ? std::max(spread, (to.head<2>() / std::abs(to.z()) - middle).norm())
                        : kEndless;
@@ -211,7 +211,7 @@ LampBearings::LampBearings(const LightField& field, bool soft)
           float most_swing = 0.0f;
           for (const int next : {one, other}) {
             if (next < 0) continue;
-            const bool lit = way(x, y, middle_z, next, to);
+            const bool lit = find_direction(x, y, middle_z, next, to);
             most = lit && to.z() * made.side > 0.0f ? std::max(most, (to.head<2>() / std::abs(to.z()) - middle).norm())
                                                     : kEndless;
             most_swing = std::max(most_swing, lit ? swings(to) : 2.0f);
@@ -360,7 +360,7 @@ ShadowReach::ShadowReach(const LampBearings& bearings, const Scene& scene, bool 
     const float most = to.length + to.spread;
     const float margin = 0.71f * map.cell + to.spread * (std::abs(far) + r) + kPad;
     const float half = r * std::sqrt(1.0f + most * most) + margin;
-    // Across the bearing the ellipse is as wide as the ball, but ways that differ turn it.
+    // Across the bearing the ellipse is as wide as the ball, but directions that differ turn it.
     const float narrow = margin + r * (1.0f + to.spread * (1.0f + most) / std::max(to.length, 1e-6f));
     const float along = x * ex + y * ey;
     return std::abs(x * ey - y * ex) <= std::min(narrow, half) && along >= to.length * near - half &&

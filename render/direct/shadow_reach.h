@@ -15,11 +15,11 @@ inline constexpr int kMostDirectLamps = 64;  ///< lamps and beams of guides: eac
 
 /// Where the lamps stand as seen from the cells of a coarse map over a light field's box: made once a fixture.
 struct LampBearings {
-  /// Ways towards a lamp are written as mm across a mm of height.
+  /// Directions towards a lamp are written as mm across a mm of height.
   struct Bearing {
     float x = 0.0f, y = 0.0f;
     float length = 0.0f;                                    ///< of (x, y)
-    float spread = std::numeric_limits<float>::infinity();  ///< no way from the cell differs by more
+    float spread = std::numeric_limits<float>::infinity();  ///< no direction from the cell differs by more
     float swing = std::numeric_limits<float>::infinity();   ///< nor its unit vector across by more
     float side = 0.0f;                                      ///< 1: the lamp is above, -1: below
   };
@@ -47,8 +47,8 @@ struct LampBearings {
   }
 };
 
-/// Where the first surface is a connected sheet whose triangles all face the same way along z (a height field), a ray
-/// that leaves it and climbs faster than the sheet does anywhere under its way can't meet it, and a ball hides a lamp
+/// Where the first surface is a connected sheet whose triangles all face the same side along z (a height field), a ray
+/// that leaves it and climbs faster than the sheet does anywhere under its path can't meet it, and a ball hides a lamp
 /// only from the places that lie in its shadow. Other surfaces are taken for columns along z over the cells they
 /// cover, but for walls round a sheet and guides that stand within them: what runs straight from guide to sheet doesn't
 /// meet those. All answers are safe: a lamp that something hides is never left out.
@@ -77,7 +77,7 @@ class ShadowReach {
   std::vector<std::uint64_t> doubt_;  // by cell
 };
 
-/// Do the triangles hang together by common vertices? True without any.
+/// Are the triangles connected by common vertices? True without any.
 bool is_connected(const TriangleMesh& mesh);
 
 }  // namespace touchstone::render

@@ -23,7 +23,7 @@ struct EventPixels::Interval {
   double length_us = 0.0;
   std::int64_t leak = 0;        ///< rise of the leak's ramp, in levels
   std::int32_t small_leak = 0;  ///< the same, or 0 where it's too much for 32 bits
-  bool all_fire = false;        ///< no pixel can be told by 32 bits not to fire
+  bool all_fire = false;        ///< no pixel's 32 bits show that it doesn't fire
   float per_dark = 0.0F;        ///< photocurrent of an intensity of 1
   float relaxations = 0.0F;     ///< of the photoreceptor at the dark's current
   float dark_waits = 0.0F;      ///< mean number of noise events in the dark
@@ -43,7 +43,7 @@ namespace {
 
 constexpr int kLongestSide = 1 << 16;  // a pixel's row and column share 32 bits of its random stream's index
 constexpr int kRowsOfBand = 16;
-constexpr int kBlock = 64;  // pixels that are looked over for events at once
+constexpr int kBlock = 64;  // pixels that are checked for events at once
 constexpr std::int64_t kLargestTime_us = std::int64_t{1} << 52;
 constexpr std::int64_t kLargestSmallLeak = std::int64_t{1} << 28;
 constexpr std::uint32_t kPhaseOfLeak = 0xffffffffu;  // a number that no noise event bears
@@ -248,7 +248,7 @@ template <bool kLagging, bool kNoisy>
 void EventPixels::watch_row(const Interval& interval, const float* light, int row, std::vector<Event>& events) {
   const std::size_t first = static_cast<std::size_t>(row) * static_cast<std::size_t>(size_.width);
   std::array<std::int32_t, kBlock> rise;
-  std::array<std::int32_t, kBlock> calls;  // for a closer look
+  std::array<std::int32_t, kBlock> calls;  // to be checked
   std::array<float, kBlock> now, mean;     // photocurrent
   std::array<float, kBlock> exponent, gone, catch_up;
   std::array<float, kBlock> waits;

@@ -40,7 +40,7 @@ struct Relaxation {
 };
 
 /// The E that relaxation() takes: beyond these bounds nothing changes in the last digit of a float. A function of its
-/// own, for a loop of its own: compilers make two ways of one that begins with a clamp, and no vector code of that.
+/// own, for a loop of its own: compilers make two branches of one that begins with a clamp, and no vector code of that.
 inline float relaxation_exponent(float e) {
   const float positive = e > 1e-30F ? e : 1e-30F;
   return positive < 80.0F ? positive : 80.0F;
@@ -49,7 +49,7 @@ inline float relaxation_exponent(float e) {
 /// Relative errors below 1e-6. @pre e comes from relaxation_exponent
 inline Relaxation relaxation(float e) {
   const auto n = static_cast<std::int32_t>(e * static_cast<float>(std::numbers::log2e) + 0.5F);
-  const float y = static_cast<float>(n) * static_cast<float>(std::numbers::ln2) - e;  // at most ln(2)/2 either way
+  const float y = static_cast<float>(n) * static_cast<float>(std::numbers::ln2) - e;  // at most ln(2)/2 up or down
   // exp(y) - 1 by Taylor's series: a small E keeps all its digits.
   const float q =
       y * (1.0F +

@@ -43,10 +43,10 @@ std::array<int, 4> channels_of(BayerPattern bayer) {
   return {0, 0, 0, 0};
 }
 
-void require_finite(const char* name, double value, double low, bool low_itself = true) {
-  const bool holds = std::isfinite(value) && (low_itself ? value >= low : value > low);
+void require_finite(const char* name, double value, double low, bool low_included = true) {
+  const bool holds = std::isfinite(value) && (low_included ? value >= low : value > low);
   if (!holds) {
-    fail("imager: {} is {}; allowed is a finite number {} {}", name, value, low_itself ? "from" : "above", low);
+    fail("imager: {} is {}; allowed is a finite number {} {}", name, value, low_included ? "from" : "above", low);
   }
 }
 
@@ -261,7 +261,7 @@ cv::Mat expose(const cv::Mat& irradiance, const Imager& imager, const FixedPatte
     fail("irradiance must be a picture of 32 bit floats that isn't empty");
   }
   if (irradiance.cols > kLongestSide || irradiance.rows > kLongestSide) {
-    fail("irradiance has {}x{} pixels; allowed is up to {} each way", irradiance.cols, irradiance.rows, kLongestSide);
+    fail("irradiance has {}x{} pixels; allowed is up to {} each", irradiance.cols, irradiance.rows, kLongestSide);
   }
   if (irradiance.channels() != imager.wavelengths_nm.size()) {
     fail("irradiance has {} bands, the imager has {}", irradiance.channels(), imager.wavelengths_nm.size());
@@ -346,7 +346,7 @@ Imager imx273_skipping(int bits, double exposure_s) {
   imager.dsnu_e = 1.0;
   imager.bayer = BayerPattern::rggb;
   if (bits < 8 || bits > 16) fail("imager: an IMX273 of {} bits; allowed is from 8 to 16", bits);
-  // Black level and gain hang together: full well + black level fill the range.
+  // Black level and gain depend on each other: full well + black level fill the range.
   const double largest = largest_number(imager);
   imager.black_level_DN = std::ceil(4.0 * imager.read_noise_e * largest / imager.full_well_e);
   imager.gain_DN_per_e = (largest - imager.black_level_DN) / imager.full_well_e;

@@ -4,7 +4,7 @@
 //   MotionChip chip(settings, unit_seed, noise_seed);
 //   for (...) {
 //     ChipFrame frame = chip.expose(light_at(chip.next_middle_s()));
-//     frame.statistics;                                                  // what the registers tell each frame
+//     frame.statistics;                                                  // the registers after each frame
 //     if (auto image = grabber.add(frame)) ...                           // one every 324 frames
 //   }
 

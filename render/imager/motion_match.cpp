@@ -78,18 +78,18 @@ MotionMatch match_motion(const cv::Mat& now, const cv::Mat& before) {
       }
     }
   }
-  Lowest x_way;
-  Lowest y_way;
+  Lowest along_x;
+  Lowest along_y;
   if (std::abs(best_x) < kMatchReach) {
-    x_way = lowest_of(sum_at(best_x - 1, best_y), sum_at(best_x, best_y), sum_at(best_x + 1, best_y));
+    along_x = lowest_of(sum_at(best_x - 1, best_y), sum_at(best_x, best_y), sum_at(best_x + 1, best_y));
   }
   if (std::abs(best_y) < kMatchReach) {
-    y_way = lowest_of(sum_at(best_x, best_y - 1), sum_at(best_x, best_y), sum_at(best_x, best_y + 1));
+    along_y = lowest_of(sum_at(best_x, best_y - 1), sum_at(best_x, best_y), sum_at(best_x, best_y + 1));
   }
   const int pixels = (now.rows - 2 * kMatchReach) * (now.cols - 2 * kMatchReach);
   MotionMatch match;
-  match.shift = {best_x + x_way.place, best_y + y_way.place};
-  match.difference = std::max(0.0, sum_at(best_x, best_y) - x_way.depth - y_way.depth) / pixels;
+  match.shift = {best_x + along_x.place, best_y + along_y.place};
+  match.difference = std::max(0.0, sum_at(best_x, best_y) - along_x.depth - along_y.depth) / pixels;
   return match;
 }
 

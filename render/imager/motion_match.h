@@ -7,7 +7,7 @@
 namespace touchstone::render {
 
 /// By how much the content of `now` lies to the right of (x) and below (y) that of `before`, pixels (both CV_8UC1, of
-/// one size, at least 9x9). Block matching: over shifts of up to kMatchReach pixels each way the mean squared
+/// one size, at least 9x9). Block matching: over shifts of up to kMatchReach pixels in each direction the mean squared
 /// difference of the part of `now` that is in view of `before` at all of them; the least one, and the parabolas through
 /// it and its neighbours along x and y.
 struct MotionMatch {

@@ -23,7 +23,7 @@ struct GuideCut {
 /// The vector irradiance (W/m^2, along the light) of each beam of guide `lamp` at a place of `layer`, beyond its plate,
 /// without shadows: by Gauss and Legendre's rule with `points` azimuths a sector and `points` elevations a slice. The
 /// beams of a sector stand together, from flat to steep.
-/// @pre `layer` isn't the plate's; `out` has room for cut.beams()
+/// @pre `layer` isn't the plate's; `out` has space for cut.beams()
 void guide_beam_flows(const PreparedScene<1>& scene, const PreparedLamp<1>& lamp, const GuideCut& cut, int layer,
                       const Eigen::Vector3d& place, int points, Eigen::Vector3d* out);
 

@@ -3,14 +3,14 @@
 //
 // Unfold the plate: light that is mirrored at its faces goes straight on through a pile of plates, so that the exit
 // face becomes an endless upright strip in which a place of the plate sees whatever rises steeply enough. Looking back
-// along a direction with the rise V over the way to the exit face, one counts the faces that it crosses; each costs
+// along a direction with the rise V over the path to the exit face, one counts the faces that it crosses; each costs
 // Fresnel's reflectance at that angle, and an odd number turns the lobe upside down. So the vector irradiance at a
 // receiver is
 //   F = - int L(w') T_up(w) R_low(w)^i R_high(w)^j w dw  over the directions w whose line back meets the strip's width,
-// L the exit face's radiance, w' = w or its mirror image, T what the faces on the way from plate to receiver pass.
+// L the exit face's radiance, w' = w or its mirror image, T what the faces on the path from plate to receiver pass.
 // A direction stands for a point of the lamp: its azimuth is drawn within what the exit face's width leaves, azimuth
 // and elevation about those of the lobe with normal densities that are nowhere far below it (cos^m x <= exp(-m x^2 /
-// 2)). That leaves an integrand without peaks, however narrow the lobe and however far the receiver is, and the way
+// 2)). That leaves an integrand without peaks, however narrow the lobe and however far the receiver is, and the path
 // from the receiver back to the exit face is known without an equation to solve.
 
 #include <Eigen/Core>
@@ -59,13 +59,13 @@ LayersBeyondPlate layers_beyond_plate(const PreparedScene<N>& scene, int plate, 
   return out;
 }
 
-/// The way from a guide's exit face to a receiver at one azimuth (from `ahead`), seen in the level plane, where nothing
-/// bends.
+/// The path from a guide's exit face to a receiver at one azimuth (from `ahead`), seen in the level plane, where
+/// nothing bends.
 struct GuideBearing {
   double azimuth;
   double distance;         ///< from the exit face to the receiver, in the level plane, mm
   double crest, reach;     ///< at an elevation e the lobe's cosine is reach cos(e - crest)
-  Eigen::Vector3d toward;  ///< unit, level: the way of the light
+  Eigen::Vector3d toward;  ///< unit, level: along the light's path
 };
 
 /// How far a receiver stands before a guide's exit face, and how far aside from its middle (mm).
@@ -115,7 +115,7 @@ double steepness_from(const PreparedScene<N>& scene, int plate_medium, const Lay
   return std::acos(std::min(1.0, cosine));
 }
 
-/// The light that comes to the receiver at one azimuth and one steepness in the plate (both in radians; `up` tells its
+/// The light that comes to the receiver at one azimuth and one steepness in the plate (both in radians; `up` gives its
 /// sense there): `arrival.irradiance` is that per radian of either. False where none does. Mirroring at faces other
 /// than the plate's two is left out, and so are shadows inside the plate. `connections` counts shadow tests.
 /// @pre `beyond` is the receiver's, empty for one in the plate, in whose medium it then is
@@ -311,9 +311,9 @@ bool connect_to_guide(const PreparedScene<N>& scene, const PreparedLamp<N>& lamp
   return true;
 }
 
-/// One sample of a lamp's light at the receiver, by whatever way its kind has: the mean over `numbers` uniform in the
-/// unit square is the light. Numbers beyond it stand for a wider lamp; of a guide, whose numbers are directions, they
-/// are taken back to its rim.
+/// One sample of a lamp's light at the receiver, by whatever method its kind has: the mean over `numbers` uniform in
+/// the unit square is the light. Numbers beyond it stand for a wider lamp; of a guide, whose numbers are directions,
+/// they are taken back to its rim.
 template <int N>
 bool connect(const PreparedScene<N>& scene, const PreparedLamp<N>& lamp, const std::array<double, 2>& numbers,
              const Receiver& receiver, std::uint64_t& connections, Arrival<N>& arrival) {

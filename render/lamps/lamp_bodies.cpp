@@ -28,10 +28,10 @@ LampBodies::Hit LampBodies::nearest(const Eigen::Vector3d& origin, const Eigen::
 
 bool LampBodies::stand_between(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const {
   constexpr double kEnd = 1e-7;
-  const Eigen::Vector3d way = to - from;
+  const Eigen::Vector3d offset = to - from;
   for (const LampBody& body : bodies_) {
-    const double part = (body.centre - from).dot(body.frame.z) / way.dot(body.frame.z);
-    if (part > kEnd && part < 1.0 - kEnd && covers(body, from + part * way)) return true;
+    const double part = (body.centre - from).dot(body.frame.z) / offset.dot(body.frame.z);
+    if (part > kEnd && part < 1.0 - kEnd && covers(body, from + part * offset)) return true;
   }
   return false;
 }

@@ -20,8 +20,9 @@ struct LampChoice {
 
 /// What the choice among a scene's lamps looks at, arranged so that eight lamps are weighed at once. Without a grid a
 /// lamp's weight is a rule of thumb: power, distance and, at a matt surface, the cosine after refraction as if all of
-/// the way were in the lamp's medium. With a grid it is the lamp's light in the cell, lobe and refraction and Fresnel's
-/// loss and all but shadow, on a surface of the receiver's normal. No lamp that shines is ever left without a chance.
+/// the path were in the lamp's medium. With a grid it is the lamp's light in the cell, lobe and refraction and
+/// Fresnel's loss and all but shadow, on a surface of the receiver's normal. No lamp that shines is ever left without a
+/// chance.
 class LampChooser {
  public:
   /// `power`: in W, 0 for a lamp that's off; `index`: of the medium that the lamp stands in.

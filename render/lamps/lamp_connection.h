@@ -34,10 +34,10 @@ template <int N>
 [[gnu::noinline]] Bands<N> passed_by_films(const PreparedScene<N>& scene, const Eigen::Vector3d& from,
                                            const Eigen::Vector3d& to, int medium) {
   Bands<N> passed = Bands<N>::Ones();
-  const Eigen::Vector3d way = to - from;
-  const double length = way.norm();
+  const Eigen::Vector3d offset = to - from;
+  const double length = offset.norm();
   if (!(length > 0.0)) return passed;
-  const Eigen::Vector3d direction = way / length;
+  const Eigen::Vector3d direction = offset / length;
   double at = 0.0;
   RayHit hit;
   while (scene.rays.intersect_film(from + at * direction, direction, length - at, hit)) {
@@ -94,16 +94,16 @@ bool connect_to_lamp(const PreparedScene<N>& scene, const PreparedLamp<N>& lamp,
   for (int k = 1; k < count; ++k) bends = bends || layers[k].index != layers[0].index;
 
   if (!bends) {
-    const Eigen::Vector3d way = p - source;
-    const double distance2 = way.squaredNorm();
+    const Eigen::Vector3d offset = p - source;
+    const double distance2 = offset.squaredNorm();
     if (!(distance2 > 1e-18)) return false;
     const double distance = std::sqrt(distance2);
-    from_lamp = way / distance;
+    from_lamp = offset / distance;
     arrival.direction = -from_lamp;
     if (!is_particle && arrival.direction.dot(receiver.normal) <= 0.0) return false;
     per_area = 1.0 / distance2;
     arrival.angle_per_lamp_area = per_area;
-    const double height = std::abs(way.z());
+    const double height = std::abs(offset.z());
     for (int k = 0; k < count; ++k) {
       if (!scene.media[media[k]].weakens) continue;
       const double share = height > 0.0 ? layers[k].thickness / height : (k + 1 == count ? 1.0 : 0.0);

@@ -35,16 +35,16 @@ double angle_per_lamp_area(const PreparedScene<N>& scene, const PreparedLamp<N>&
   }
   add_layer(receiver.position.z(), receiver.medium);
 
-  const Eigen::Vector3d way = receiver.position - point;
+  const Eigen::Vector3d offset = receiver.position - point;
   if (!bends) {
-    const double distance2 = way.squaredNorm();
-    return distance2 > 0.0 ? std::abs(way.dot(lamp.frame.z)) / (distance2 * std::sqrt(distance2)) : 0.0;
+    const double distance2 = offset.squaredNorm();
+    return distance2 > 0.0 ? std::abs(offset.dot(lamp.frame.z)) / (distance2 * std::sqrt(distance2)) : 0.0;
   }
-  const double lateral = way.head<2>().norm();
+  const double lateral = offset.head<2>().norm();
   const auto path = solve_layer_path({layers, static_cast<std::size_t>(count)}, lateral);
   if (!path) return 0.0;
-  Eigen::Vector3d from_lamp(0.0, 0.0, std::copysign(path->cosine[0], way.z()));
-  if (lateral > 0.0) from_lamp.head<2>() = way.head<2>() * (path->tangent[0] * path->cosine[0] / lateral);
+  Eigen::Vector3d from_lamp(0.0, 0.0, std::copysign(path->cosine[0], offset.z()));
+  if (lateral > 0.0) from_lamp.head<2>() = offset.head<2>() * (path->tangent[0] * path->cosine[0] / lateral);
   const double ratio = layers[0].index / layers[count - 1].index;
   return path->jacobian * ratio * ratio * std::abs(from_lamp.dot(lamp.frame.z));
 }
@@ -63,7 +63,7 @@ bool bends_at_surface(const PreparedScene<N>& scene, const PreparedLamp<N>& lamp
   return scene.rays.refractive_along_z(receiver.position, !lamp_is_below, std::abs(z - edge)) >= 0.0;
 }
 
-/// Does a Refractive surface cross the way from the receiver along `direction` through the flat faces to the lamp?
+/// Does a Refractive surface cross the path from the receiver along `direction` through the flat faces to the lamp?
 template <int N>
 bool passes_refractive(const PreparedScene<N>& scene, const PreparedLamp<N>& lamp, const Receiver& receiver,
                        Eigen::Vector3d direction) {

@@ -22,7 +22,7 @@ namespace touchstone::render {
 template <int N>
 struct PreparedMedium {
   double index;
-  bool weakens;  ///< does light get less on its way?
+  bool weakens;  ///< does light get less on its path?
   Bands<N> absorption;
   bool scatters;
   Bands<N> scattering;

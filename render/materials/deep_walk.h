@@ -1,18 +1,18 @@
 #pragma once
-// Long ways through dense media in few steps: a random walk far from everything is replaced by its first passage of a
+// Long paths through dense media in few steps: a random walk far from everything is replaced by its first passage of a
 // sphere round it (walk on spheres [Muller1956]).
 //
 // Far from all boundaries light in a medium that absorbs next to nothing is diffuse: averaged over directions it is a
 // function phi that solves phi'' = kappa^2 phi, kappa^2 = 3 sigma_a / l, with the transport mean free path
 // l = 1 / (sigma_a + (1 - g) sigma_s). So phi at a sphere's centre is its mean over the sphere times
-// kappa R / sinh(kappa R). A walk that has just met a particle at x on its way along d stands for phi at x + g l d. Its
-// next place is then anywhere on the sphere, with any direction.
+// kappa R / sinh(kappa R). A walk that has just met a particle at x on its path along d stands for phi at x + g l d.
+// Its next place is then anywhere on the sphere, with any direction.
 //
 // Without absorption and for even scattering this is exact up to what boundaries and lamps leave within the
 // margin, exp(-kJumpMargin) of their light: any harmonic phi, with its directions, solves the transport equation.
 // Otherwise it leaves out terms of (l / R)^2, at most 1 / kJumpMargin^2, where the light isn't isotropic, and an error
 // of kappa by the order of sigma_a l, at most kMostAbsorbed / 2. All bands jump together, by the margin of the one of
-// the longest way; where one of them hardly scatters or absorbs more there are no jumps.
+// the longest path; where one of them hardly scatters or absorbs more there are no jumps.
 
 #include <Eigen/Core>
 #include <cmath>
@@ -25,7 +25,7 @@ namespace touchstone::render {
 
 inline constexpr double kJumpMargin = 10.0;    ///< to stay away from things, in transport (or longer) mean free paths
 inline constexpr double kMostAbsorbed = 1e-3;  ///< sigma_a l, above which walks aren't long anyway
-inline constexpr int kJumpEvery = 16;          ///< scatterings between two looks for room
+inline constexpr int kJumpEvery = 16;          ///< scatterings between two checks for free space
 
 /// What jumps in a medium need: `margin` in mm, infinite where there are none, and kappa in 1/mm of each band.
 template <int N>

@@ -53,7 +53,7 @@ bool solve_layer_path(std::span<const Layer> layers, double lateral, LayerPath& 
       turn += rate3 * stretch2 * bend[k];
     }
     const double rest = lateral - reach_per_t * t;
-    // Halley's step where the curve bends little on the way to Newton's root, else Newton's own, which can't diverge.
+    // Halley's step where the curve bends little up to Newton's root, else Newton's own, which can't diverge.
     const double curving = 1.5 * t * turn * rest;  // in units of slope^2
     const double slope2 = slope * slope;
     const double increment = std::abs(curving) < 0.5 * slope2 ? rest * slope / (slope2 - curving) : rest / slope;

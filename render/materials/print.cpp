@@ -16,7 +16,7 @@ PrintIndex::PrintIndex(const std::vector<PrintedMark>& marks) : marks_(marks) {
     low_ = low_.cwiseMin(mark.centre - half_size(mark));
     high = high.cwiseMax(mark.centre + half_size(mark));
   }
-  // About one cell a mark, square, and not more than a thousand either way.
+  // About one cell a mark, square, and not more than a thousand along either axis.
   const Eigen::Vector2d size = high - low_;
   const double cell =
       std::max(std::sqrt(size.x() * size.y() / static_cast<double>(marks_.size())), size.maxCoeff() / 1000.0);

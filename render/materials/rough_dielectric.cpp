@@ -85,9 +85,9 @@ std::optional<Eigen::Vector3d> RoughBoundary::sample(const Eigen::Vector3d& out,
                                                      SampleSequence& numbers) const {
   if (!(out.z() > 0.0)) return std::nullopt;
   const auto [u, v] = numbers.next_pair();
-  const auto [way, keep] = numbers.next_pair();
+  const auto [choice, keep] = numbers.next_pair();
   const RoughSample one =
-      sample_rough_dielectric(out, alpha_, index_[inside ? 1 : 0], index_[inside ? 0 : 1], u, v, way);
+      sample_rough_dielectric(out, alpha_, index_[inside ? 1 : 0], index_[inside ? 0 : 1], u, v, choice);
   if (keep < one.weight) return one.in;
   if (!(up_to_.back() > 0.0)) return std::nullopt;
   return sample_lobe(inside, numbers);

@@ -30,8 +30,8 @@
 
 namespace touchstone::render {
 
-/// Henyey and Greenstein's phase function (1/sr, its integral over the sphere is one) at the cosine between the ways
-/// before and after, for a mean cosine g, |g| < 1.
+/// Henyey and Greenstein's phase function (1/sr, its integral over the sphere is one) at the cosine between the
+/// directions before and after, for a mean cosine g, |g| < 1.
 inline double henyey_greenstein(double cosine, double g) {
   const double d = 1.0 + g * g - 2.0 * g * cosine;
   return (1.0 - g * g) / (4.0 * kPi * d * std::sqrt(d));
@@ -68,7 +68,7 @@ Flight<N> sample_flight(const Bands<N>& extinction, const Bands<N>& throughput, 
 /// Factor on the throughput of a path that came through `distance` without meeting a particle.
 template <int N>
 Bands<N> weight_of_passing(const Bands<N>& extinction, const Flight<N>& flight, double distance) {
-  Bands<N> left = Bands<N>::Ones();  // a band of no extinction passes even an endless way
+  Bands<N> left = Bands<N>::Ones();  // a band of no extinction passes even an endless path
   for (int band = 0; band < N; ++band) {
     if (extinction[band] > 0.0) left[band] = std::exp(-extinction[band] * distance);
   }

@@ -1,10 +1,10 @@
 #pragma once
-// A thin clear coloured film, such as the yellow filter foil of a sensor that tells depth by hue.
+// A thin clear coloured film, such as the yellow filter foil of a sensor that measures depth by hue.
 //
 //   scene.surfaces.push_back({sheet, ThinFilm{transmittance}});                    // dye only, both sides wetted
 //   scene.surfaces.push_back({sheet, ThinFilm{transmittance, 1.49, true}});        // a foil in air, with its faces
 //
-// The dye takes light away and doesn't scatter: what passes at an angle goes a way longer by 1 / cos(angle inside), so
+// The dye takes light away and doesn't scatter: what passes at an angle has a path longer by 1 / cos(angle inside), so
 // its transmittance is t^(1 / cos) of the one t at normal incidence (Beer-Lambert). The film has no thickness in the
 // scene: a ray goes on where it met the film, without the sideways shift d sin(a - b) / cos(b) of a real foil (20 um
 // for a foil of 0.05 mm at 50 degrees). It stands in one medium, whose index bends the ray to its angle inside.

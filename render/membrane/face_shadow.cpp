@@ -69,14 +69,14 @@ cv::Mat least_gap(const cv::Mat& gap, int factor) {
   return out;
 }
 
-/// A way over the grid.
+/// A march over the grid along one azimuth.
 struct Step {
   int columns, rows;
-  // 1 / distance of where a body that is met here ends and begins: half way, by ratio, to the next step and to the
+  // 1 / distance of where a body that is met here ends and begins: the geometric middle to the next step and to the
   // last.
   float per_mm_end, per_mm_begin;
 };
-struct Way {
+struct March {
   float cosine, sine;
   std::vector<Step> steps;
 };
@@ -88,18 +88,18 @@ BodyShadow shadow_of_body(const FaceGrid& grid, const FaceState& state, double i
   const double spacing = grid.spacing_mm * factor;
   const EnteringLight light(index);
   const double reach = std::hypot(gap.cols, gap.rows) * spacing;
-  std::vector<Way> ways(kAzimuths);
+  std::vector<March> marches(kAzimuths);
   for (int k = 0; k < kAzimuths; ++k) {
     const double azimuth = 2.0 * kPi * (k + 0.5) / kAzimuths;
-    ways[k].cosine = static_cast<float>(std::cos(azimuth));
-    ways[k].sine = static_cast<float>(std::sin(azimuth));
+    marches[k].cosine = static_cast<float>(std::cos(azimuth));
+    marches[k].sine = static_cast<float>(std::sin(azimuth));
     double last = 0.25 * spacing;
     for (double distance = spacing; distance < reach;) {
       const double next = std::max(distance + spacing, distance * kStepGrowth);
       const int columns = static_cast<int>(std::lround(distance * std::cos(azimuth) / spacing));
       const int rows = static_cast<int>(std::lround(distance * std::sin(azimuth) / spacing));
-      ways[k].steps.push_back({columns, rows, static_cast<float>(1.0 / std::sqrt(distance * next)),
-                               static_cast<float>(1.0 / std::sqrt(distance * last))});
+      marches[k].steps.push_back({columns, rows, static_cast<float>(1.0 / std::sqrt(distance * next)),
+                                  static_cast<float>(1.0 / std::sqrt(distance * last))});
       last = distance;
       distance = next;
     }
@@ -114,10 +114,10 @@ BodyShadow shadow_of_body(const FaceGrid& grid, const FaceState& state, double i
     }
   }
   using Sums = std::array<std::array<float, 3>, kFaceSectors>;
-  const auto add = [](std::array<float, 3>& sum, const Way& way, float share) {
+  const auto add = [](std::array<float, 3>& sum, const March& march, float share) {
     sum[0] += share;
-    sum[1] += share * way.cosine;
-    sum[2] += share * way.sine;
+    sum[1] += share * march.cosine;
+    sum[2] += share * march.sine;
   };
   // What isn't there is infinitely high, and begins nowhere.
   cv::Mat low(gap.size(), CV_32FC1);
@@ -138,11 +138,11 @@ BodyShadow shadow_of_body(const FaceGrid& grid, const FaceState& state, double i
     std::fill(under.begin(), under.end(), Sums{});
     std::fill(beside.begin(), beside.end(), Sums{});
     const auto* own = low.ptr<float>(row);
-    for (const Way& way : ways) {
+    for (const March& march : marches) {
       // Rays that rise between these slopes meet the body; under it all that are steeper, too.
       std::fill(lowest.begin(), lowest.end(), kNone);
       std::fill(highest.begin(), highest.end(), 0.0F);
-      for (const Step& step : way.steps) {
+      for (const Step& step : march.steps) {
         const int y = row + step.rows;
         if (y < 0 || y >= gap.rows) break;
         const auto* below = low.ptr<float>(y);
@@ -158,9 +158,9 @@ BodyShadow shadow_of_body(const FaceGrid& grid, const FaceState& state, double i
         if (!(from < kNone)) continue;
         for (int sector = 0; sector < kFaceSectors; ++sector) {
           if (!light.enters(sector)) continue;
-          add(under[column][sector], way, light.within(sector, from));
+          add(under[column][sector], march, light.within(sector, from));
           if (highest[column] > lowest[column]) {
-            add(beside[column][sector], way,
+            add(beside[column][sector], march,
                 light.within(sector, lowest[column]) - light.within(sector, highest[column]));
           }
         }

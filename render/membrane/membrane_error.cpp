@@ -68,8 +68,8 @@ struct Sum {
 
 Scene membrane_scene(const MembraneOptics& optics, const FaceGrid& grid, const FaceState& state, double behind) {
   for (const cv::Mat* map : {&state.contact, &state.gap_mm}) {
-    const bool may_lack = map == &state.gap_mm && map->empty();
-    if (!may_lack && (map->type() != CV_32FC1 || map->cols != grid.columns || map->rows != grid.rows)) {
+    const bool may_be_empty = map == &state.gap_mm && map->empty();
+    if (!may_be_empty && (map->type() != CV_32FC1 || map->cols != grid.columns || map->rows != grid.rows)) {
       fail("membrane scene: a map of {} x {} cells; the grid has {} x {} (32-bit floats, one channel)", map->cols,
            map->rows, grid.columns, grid.rows);
     }

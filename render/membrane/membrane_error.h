@@ -17,7 +17,7 @@ Scene membrane_scene(const MembraneOptics& optics, const FaceGrid& grid, const F
 
 /// How many pixels and paths the measurement takes.
 struct MembraneErrorSettings {
-  int fields = 12;     ///< along the picture's longer side: what is averaged to tell the worst place
+  int fields = 12;     ///< along the picture's longer side: what is averaged to find the worst place
   int pixels = 16;     ///< looked at in each field
   int samples = 128;   ///< paths a pixel, twice
   int max_depth = 64;  ///< RenderSettings::max_depth

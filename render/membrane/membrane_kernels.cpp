@@ -76,13 +76,13 @@ class Walker {
     for (;;) {
       const bool up = direction.z() > 0.0;
       const double rise = std::abs(direction.z());
-      const double room = up ? -position.z() : position.z() + optics_.thickness_mm;
-      const double to_face = rise > 0.0 ? std::max(0.0, room) / rise : INFINITY;
+      const double depth = up ? -position.z() : position.z() + optics_.thickness_mm;
+      const double to_face = rise > 0.0 ? std::max(0.0, depth) / rise : INFINITY;
       const double flight =
           optics_.scattering_per_mm > 0.0 ? -std::log1p(-number()) / optics_.scattering_per_mm : INFINITY;
-      const double way = std::min(flight, to_face);
-      if (!std::isfinite(way)) return End::kFaded;  // level in a clear membrane
-      fade(way);
+      const double distance = std::min(flight, to_face);
+      if (!std::isfinite(distance)) return End::kFaded;  // level in a clear membrane
+      fade(distance);
       if (weight < kLightWalk && !goes_on()) return End::kFaded;
       if (flight < to_face) {
         position += flight * direction;
@@ -98,9 +98,9 @@ class Walker {
   }
 
  private:
-  void fade(double way) {
+  void fade(double distance) {
     if (optics_.absorption_per_mm == 0.0) return;
-    const double left = std::exp(-optics_.absorption_per_mm * way);
+    const double left = std::exp(-optics_.absorption_per_mm * distance);
     absorbed += weight * (1.0 - left);
     weight *= left;
   }
@@ -124,7 +124,7 @@ class Walker {
     direction = frame.to_world({sine * std::cos(angle), sine * std::sin(angle), cosine}).normalized();
   }
 
-  /// At the membrane's back on the way down: up again in the membrane, or false where the light leaves the plate.
+  /// At the membrane's back on the path down: up again in the membrane, or false where the light leaves the plate.
   bool pass_plate() {
     const FresnelFace in = fresnel(optics_.index, optics_.plate_index, -direction.z());
     if (number() < in.mean_reflectance()) {

@@ -6,7 +6,7 @@
 // where it is absorbed. What the outer face then does with it (air mirrors it, a touching body swallows it) is no part
 // of these figures, so that they serve for any state of the face (membrane_light.h).
 //
-// Directions at the face are told apart by sectors of the cosine to its normal: what is totally reflected by air, and
+// Directions at the face are grouped into sectors of the cosine to its normal: what is totally reflected by air, and
 // two of what isn't. All walks start and end evenly over azimuth; by symmetry a kernel is then a function of the
 // distance only.
 
@@ -59,17 +59,17 @@ struct MembraneKernels {
   /// Of light that leaves the face evenly (matt) in sector i, what arrives next in sector j. Distance from the start.
   std::array<std::array<RadialShare, kFaceSectors>, kFaceSectors> exchange;
   std::array<double, kFaceSectors> exchange_absorbed = {};
-  /// Of what of that air lets out: the mean cosine of the angle between its way along the face and the way from the
+  /// Of what of that air lets out: the mean cosine of the angle between its path along the face and the line from the
   /// start, times the share.
   std::array<std::array<RadialShare, kFaceSectors>, kFaceSectors> exchange_outward;
-  /// Mean Fresnel reflectance, inside, of what arrives in a sector on these ways.
+  /// Mean Fresnel reflectance, inside, of what arrives in a sector on these paths.
   std::array<double, kFaceSectors> exchange_reflectance = {};
   /// Of a walk along a camera's ray, from where it enters the membrane, what arrives first in sector j after at least
   /// one scattering or mirroring. Distance from where the straight ray meets the face.
   std::array<ViewKernel, kFaceSectors> view;
   std::array<RadialShare, kFaceSectors> view_outward;  ///< as exchange_outward
   std::array<double, kFaceSectors> view_reflectance = {};
-  /// What is absorbed on those ways: at s, absorbed[0] + (s^2 - S / 2) absorbed[1]. Without the straight ray's.
+  /// What is absorbed on those paths: at s, absorbed[0] + (s^2 - S / 2) absorbed[1]. Without the straight ray's.
   std::array<double, 2> view_absorbed = {};
 };
 

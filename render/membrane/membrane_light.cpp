@@ -88,9 +88,9 @@ double even_face_radiance(const MembraneKernels& kernels, const EvenFace& face, 
   const double square = kernels.largest_sine * kernels.largest_sine;
   const double slant = squared_sine - square / 2.0;
   const double matt = contact * albedo * mean_over_sectors(kernels, face.g);
-  const double way = optics.thickness_mm / std::sqrt(1.0 - squared_sine);
+  const double length = optics.thickness_mm / std::sqrt(1.0 - squared_sine);
   double out =
-      1.0 - std::exp(-optics.scattering_per_mm * way) - kernels.view_absorbed[0] - slant * kernels.view_absorbed[1];
+      1.0 - std::exp(-optics.scattering_per_mm * length) - kernels.view_absorbed[0] - slant * kernels.view_absorbed[1];
   double seen = 0.0;
   for (int j = 0; j < kSectors; ++j) {
     const double share = kernels.view[j].even.total() + slant * kernels.view[j].slant.total();
@@ -196,7 +196,7 @@ void for_each_ray(const MembraneOptics& optics, const Camera& camera, const Take
   }
   const ImageGrid grid = pixel_grid(ready);
   const CameraRays rays = trace_to_layer(fixture, ready, grid, kMembraneLayer, 1, 0);
-  // The light is the mean over the stop and the pixel; where it comes from is told by their middles.
+  // The light is the mean over the stop and the pixel; where it comes from is approximated by their middles.
   const CameraRays spread = trace_to_layer(fixture, ready, grid, kMembraneLayer, kLensSamples, 0);
   const auto mean_of = [&](const std::vector<float>& parts, std::size_t slot) {
     double sum = 0.0;

@@ -62,23 +62,23 @@ class MediumWalk {
 
  private:
   /// Sets a leg that has just met a particle far from everything onto a sphere round it (deep_walk.h). False where
-  /// there is no room.
+  /// there is no free space.
   [[gnu::noinline]] bool jump(Leg& leg, SampleSequence& numbers) const {
     const DeepWalk<N>& walk = scene_.media[leg.medium].deep;
-    // Light that isn't even after a scattering stands for a place further on. Bands take their mean one: ways along
+    // Light that isn't even after a scattering stands for a place further on. Bands take their mean one: paths along
     // which walks come are even this deep, so what is left is of second order.
     const Eigen::Vector3d centre =
         leg.origin + (leg.throughput * walk.drift).sum() / leg.throughput.sum() * leg.direction;
-    double room = 1e6;
+    double clearance = 1e6;
     const int face_count = static_cast<int>(scene_.faces.size());
-    if (leg.layer < face_count) room = std::min(room, scene_.faces[leg.layer].z - centre.z());
-    if (leg.layer > 0) room = std::min(room, centre.z() - scene_.faces[leg.layer - 1].z);
+    if (leg.layer < face_count) clearance = std::min(clearance, scene_.faces[leg.layer].z - centre.z());
+    if (leg.layer > 0) clearance = std::min(clearance, centre.z() - scene_.faces[leg.layer - 1].z);
     for (const PreparedLamp<N>& lamp : scene_.lamps) {
       const double extent = std::max(lamp.radius, std::hypot(lamp.half_width, lamp.half_height));
-      room = std::min(room, (lamp.position - centre).norm() - extent);
+      clearance = std::min(clearance, (lamp.position - centre).norm() - extent);
     }
-    if (room < 2.0 * walk.margin) return false;
-    const double radius = scene_.rays.clearance(centre, room) - walk.margin;
+    if (clearance < 2.0 * walk.margin) return false;
+    const double radius = scene_.rays.clearance(centre, clearance) - walk.margin;
     if (radius < walk.margin) return false;
     const auto [a, b] = numbers.next_pair();
     leg.origin = centre + radius * square_to_sphere(a, b);

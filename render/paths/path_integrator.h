@@ -89,7 +89,7 @@ class PathIntegrator {
     if (medium.weakens) leg.throughput *= (-medium.absorption * distance).exp();
   }
 
-  /// The way to the leg's end was free.
+  /// The path to the leg's end was free.
   void pass(Leg& leg, const Flight<N>* flight, double distance) const {
     if (flight == nullptr) [[likely]] {
       absorb(leg, distance);
@@ -98,7 +98,8 @@ class PathIntegrator {
     }
   }
 
-  /// The leg ends on a RoughRefractive surface: lamp light from both sides, then one way on. False where the path ends.
+  /// The leg ends on a RoughRefractive surface: lamp light from both sides, then one branch is followed. False where
+  /// the path ends.
   [[gnu::noinline]] bool meet_rough_boundary(Leg& leg, const RayHit& hit, const PreparedMaterial<N>& material,
                                              const LampNumbers& at_first_hit, Branches& branches,
                                              SampleSequence& numbers, RayCounts& counts, Bands<N>& sum) const {

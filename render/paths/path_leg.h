@@ -13,7 +13,7 @@ inline constexpr int kRouletteFrom = 3;  ///< scatterings, at surfaces or in a m
 
 /// One straight leg: where it is, and what its path has met so far.
 template <int N>
-struct PathLeg {  // without default values: a path makes room for a dozen and mostly uses three
+struct PathLeg {  // without default values: a path makes space for a dozen and mostly uses three
   Eigen::Vector3d origin, direction;
   Bands<N> throughput;
   double s_share;  ///< of the light, polarised square to the plane of incidence at the flat faces

@@ -64,7 +64,7 @@ struct RenderedImage {
 /// Paths carry basic radiance, L / n^2, which is the same on both sides of a face but for Fresnel's loss.
 ///
 /// Diffuse transmitters and rough boundaries are lit by connections on both sides; lamps shine through thin films; in
-/// scattering media each scattering is lit by one connection, weakened by absorption and scattering on its way.
+/// scattering media each scattering is lit by one connection, weakened by absorption and scattering on its path.
 ///
 /// What is biased, and where: a connection from a point *beyond* a Refractive surface (an object that is near the gel
 /// but doesn't touch it) treats that surface as flat and horizontal at the height found straight below the point; a

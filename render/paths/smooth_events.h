@@ -1,9 +1,9 @@
 #pragma once
 // What happens to a path at smooth boundaries: flat faces, Refractive surfaces, thin films.
 //
-// Before the first diffuse or metallic hit a ray that meets a smooth boundary goes both ways, weighted by Fresnel's
-// reflectance, so that mirror images in the glass add no noise; a branch weaker than kFaintest is followed now and
-// then with that weight (Russian roulette). After that hit a random number chooses one way.
+// Before the first diffuse or metallic hit a ray that meets a smooth boundary follows both branches, weighted by
+// Fresnel's reflectance, so that mirror images in the glass add no noise; a branch weaker than kFaintest is followed
+// now and then with that weight (Russian roulette). After that hit a random number chooses one branch.
 
 #include <Eigen/Core>
 #include <algorithm>
@@ -98,7 +98,7 @@ class SmoothEvents {
     part(leg, mean, mean, mirror, refract, branches, numbers, sum);
   }
 
-  /// The leg ends on a film: it goes on straight, and where the film mirrors goes one of two ways or both.
+  /// The leg ends on a film: it goes on straight, and where the film mirrors follows one of two branches or both.
   [[gnu::noinline]] void meet_film(Leg& leg, const RayHit& hit, const PreparedMaterial<N>& material, Branches& branches,
                                    SampleSequence& numbers) const {
     ++leg.smooth;
@@ -146,22 +146,22 @@ class SmoothEvents {
  private:
   static constexpr double kFaintest = 0.01;
 
-  /// Goes on at a smooth boundary with one of two ways, and before the first diffuse hit with the other one as well.
-  /// `mirror` and `refract` turn the leg into either.
+  /// Goes on at a smooth boundary with one of two branches, and before the first diffuse hit with the other one as
+  /// well. `mirror` and `refract` turn the leg into either.
   template <typename Mirror, typename Refract>
   void part(Leg& leg, double reflectance_s, double reflectance_p, const Mirror& mirror, const Refract& refract,
             Branches& branches, SampleSequence& numbers, Bands<N>& sum) const {
     const double s = leg.s_share;
     const double reflectance = s * reflectance_s + (1.0 - s) * reflectance_p;
     const double transmittance = 1.0 - reflectance;
-    const auto take = [&](Leg& way, bool mirrored) {
+    const auto take = [&](Leg& branch, bool mirrored) {
       const double whole = mirrored ? reflectance : transmittance;
       const double of_s = s * (mirrored ? reflectance_s : 1.0 - reflectance_s);
-      way.s_share = whole > 0.0 ? of_s / whole : 0.5;
+      branch.s_share = whole > 0.0 ? of_s / whole : 0.5;
       if (mirrored) {
-        mirror(way);
+        mirror(branch);
       } else {
-        refract(way);
+        refract(branch);
       }
     };
     if (reflectance >= 1.0) return take(leg, true);

@@ -27,7 +27,7 @@ std::string unfit_for_screen(const Scene& scene);
 ///
 /// Two means over the plane stand for many rays. A camera whose hole or lens sees a point of a membrane through a disc
 /// of the plane gets the mean over that disc: exact where the membrane is in focus. The light that reaches a place
-/// from a wide lamp comes through much of the plane, so films in its way count by their share of it, the mean of a
+/// from a wide lamp comes through much of the plane, so films in its path count by their share of it, the mean of a
 /// Gaussian: what that leaves out, the soft shadows of single films, measure_direct_error tells.
 class FilmScreen {
  public:
@@ -40,7 +40,7 @@ class FilmScreen {
   float z() const { return z_; }
   float camera_cover(float x, float y) const { return cover(camera_, x, y); }
   float lamp_cover(float x, float y) const { return cover(lamps_, x, y); }
-  /// Light on its way through the plane: what meets no film, and what does, shared out to the table's cosines.
+  /// Light that goes through the plane: what meets no film, and what does, shared out to the table's cosines.
   static constexpr int kCosines = 16;
   /// Shares of the light, by the cosine at which it passes the films.
   struct Light {

@@ -1,5 +1,5 @@
 #pragma once
-// Layers between a scene's flat faces, and a ray's way through them.
+// Layers between a scene's flat faces, and a ray's path through them.
 
 #include <Eigen/Core>
 #include <algorithm>
@@ -44,8 +44,8 @@ struct RayInLayer {
   int face_ahead() const { return up() ? layer : layer - 1; }
 };
 
-/// The way to the face ahead, mm; infinite where there is none.
-inline double way_to_face(const Scene& scene, const RayInLayer& ray) {
+/// The distance to the face ahead, mm; infinite where there is none.
+inline double distance_to_face(const Scene& scene, const RayInLayer& ray) {
   const int face = ray.face_ahead();
   if (ray.direction.z() == 0.0 || face < 0 || face >= static_cast<int>(scene.faces.size())) {
     return std::numeric_limits<double>::infinity();
@@ -53,11 +53,12 @@ inline double way_to_face(const Scene& scene, const RayInLayer& ray) {
   return std::max(0.0, (scene.faces[face].z - ray.origin.z()) / ray.direction.z());
 }
 
-/// Takes the ray over `way`, which way_to_face gave, and through the face there by Snell's law. Under total reflection
+/// Takes the ray over `distance`, which distance_to_face gave, and through the face there by Snell's law. Under total
+/// reflection
 /// (`cos_refracted` 0) it stops before the face. @pre there is a face ahead
-inline FresnelFace cross_face(const Scene& scene, double way, RayInLayer& ray) {
+inline FresnelFace cross_face(const Scene& scene, double distance, RayInLayer& ray) {
   const bool up = ray.up();
-  ray.origin += way * ray.direction;
+  ray.origin += distance * ray.direction;
   ray.origin.z() = scene.faces[ray.face_ahead()].z;
   const int next = up ? ray.layer + 1 : ray.layer - 1;
   const double n_from = medium_of_layer(scene, ray.layer).index;

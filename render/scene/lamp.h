@@ -15,7 +15,7 @@
 //    (lamp_connection.h);
 //  - by mirror images of a lamp in flat faces, and through curved faces: only where a path hits the lamp itself, so
 //    only that of lamps with `visible` set and some size (lamp_bodies.h). A GuideLamp has its mirror images in its
-//    plate built in. For other lamps light mirrored by a face on its way is left out. Measured with an LED of radius 2
+//    plate built in. For other lamps light mirrored by a face on its path is left out. Measured with an LED of radius 2
 //    mm before and after it was made visible, in glass and gel over beads: from below in air what is left out is under
 //    0.2 % of a bead's light and of an object's on the gel, and nothing of a membrane's; from the plate's side as much
 //    again as the direct light, from the gel's side a quarter of a bead's light and twice that of an object on the gel.
@@ -95,11 +95,11 @@ struct ProjectedLamp {
 /// the rectangle's own plane), m from `half_power_angle`; both angles are those inside the plate. An LED of half-power
 /// angle a in air shows asin(sin(a) / n) in a plate of index n.
 ///
-/// Light that meets the plate's faces is mirrored there by Fresnel's equations as often as its way has it (fully, where
-/// the angle is beyond the critical one), which is taken from mirror images of the exit face (guide_connection.h).
-/// Where the medium next to the plate has a lower index, rays flatter than the critical angle stay in the plate: a gel
-/// of index 1.41 on acrylic of 1.49 gets no light that rises by less than 19 degrees. The layer's faces are endless,
-/// there is no far end that sends light back.
+/// Light that meets the plate's faces is mirrored there by Fresnel's equations as often as its path has it (fully,
+/// where the angle is beyond the critical one), which is taken from mirror images of the exit face
+/// (guide_connection.h). Where the medium next to the plate has a lower index, rays flatter than the critical angle
+/// stay in the plate: a gel of index 1.41 on acrylic of 1.49 gets no light that rises by less than 19 degrees. The
+/// layer's faces are endless, there is no far end that sends light back.
 struct GuideLamp {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   Eigen::Vector3d direction = Eigen::Vector3d::UnitX();

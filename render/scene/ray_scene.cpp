@@ -299,10 +299,10 @@ bool RayScene::intersect_film(const Eigen::Vector3d& origin, const Eigen::Vector
 bool RayScene::occluded(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const {
   const State& state = *state_;
   if (state.opaque_heights.misses(from.z(), to.z()) || !finite(from, to)) return false;
-  const Eigen::Vector3d way = to - from;
-  const double length = way.norm();
+  const Eigen::Vector3d offset = to - from;
+  const double length = offset.norm();
   if (!(length > 0.0)) return false;
-  RTCRay ray = embree_ray(from, way / length, length * (1.0 - 1e-6));
+  RTCRay ray = embree_ray(from, offset / length, length * (1.0 - 1e-6));
   if (state.recorded != nullptr) state.keep(ray, true);
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
@@ -351,9 +351,9 @@ namespace {
 double squared_distance(const Eigen::Vector3d& point, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                         const Eigen::Vector3d& c) {
   const auto from_edge = [&](const Eigen::Vector3d& p, const Eigen::Vector3d& q) {
-    const Eigen::Vector3d way = q - p;
-    const double along = std::clamp((point - p).dot(way) / way.squaredNorm(), 0.0, 1.0);
-    return (point - p - along * way).squaredNorm();
+    const Eigen::Vector3d edge = q - p;
+    const double along = std::clamp((point - p).dot(edge) / edge.squaredNorm(), 0.0, 1.0);
+    return (point - p - along * edge).squaredNorm();
   };
   const Eigen::Vector3d normal = (b - a).cross(c - a);
   const auto inside = [&](const Eigen::Vector3d& p, const Eigen::Vector3d& q) {

@@ -57,14 +57,14 @@ class RayScene {
   /// Are there ThinFilms?
   bool has_films() const;
 
-  /// The nearest ThinFilm within `most` (mm, finite): only distance, normal and object of `hit` are told.
+  /// The nearest ThinFilm within `most` (mm, finite): only distance, normal and object of `hit` are set.
   bool intersect_film(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double most, RayHit& hit) const;
 
   /// Distance to the nearest Refractive surface straight along +z (`up`) or -z within `most`; negative if there is
   /// none.
   double refractive_along_z(const Eigen::Vector3d& origin, bool up, double most) const;
 
-  /// Are there Refractive surfaces, and does one cross the way between two points?
+  /// Are there Refractive surfaces, and does one cross the line between two points?
   bool has_refractive() const;
   /// Does a Refractive surface stand between the two points?
   bool meets_refractive(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const;

@@ -3,11 +3,11 @@
 //
 // In a band a lamp has its exact power, and all else (reflectance, transmittance, efficiency, coefficient) its mean
 // over the band, weighted by the lamps' light. What a pixel reads of one lamp is then exact where only one thing on the
-// way varies within a band, and wrong by the things' covariance where several do: steep edges of a filter hurt, as do
+// path varies within a band, and wrong by the things' covariance where several do: steep edges of a filter hurt, as do
 // wide bands. So the bands' edges are put where the covariance is least, by dynamic programming over all ways to cut
-// the range (adapted_bands). On the way of a white LED's light through yellow film, off magenta print, back through the
-// film and into a colour pixel, sixteen such bands err by at most 0.8 %, eight by 3.2 %; sixteen even ones err by 3.3 %
-// and three by 42 %.
+// the range (adapted_bands). On the path of a white LED's light through yellow film, off magenta print, back through
+// the film and into a colour pixel, sixteen such bands err by at most 0.8 %, eight by 3.2 %; sixteen even ones err
+// by 3.3 % and three by 42 %.
 
 #include <optional>
 #include <span>
@@ -39,7 +39,7 @@ Spectrum band_means(const SpectralCurve& curve, const SpectralBands& bands);
 /// the bands is lost: the sum is at most `power_W`. @throws Error if nothing of it is in the bands
 Spectrum band_powers(const SpectralCurve& emission, double power_W, const SpectralBands& bands);
 
-/// Light on its way: emitted by a lamp, then weakened by each factor in turn (a film twice is two factors), the last
+/// Light on its path: emitted by a lamp, then weakened by each factor in turn (a film twice is two factors), the last
 /// one being the camera's efficiency.
 struct SpectralPath {
   SpectralCurve emission;

@@ -29,17 +29,18 @@ void check(const BeadTrackerSettings& s) {
   require(s.contrast > 0 && s.contrast <= 100, "contrast", s.contrast, "above 0, up to 100");
   require(s.morphology_px >= 1 && s.morphology_px % 2 == 1 && s.morphology_px < s.roi_b_px, "morphology_px",
           s.morphology_px, "odd, at least 1 and below roi_b_px");
-  require(s.look.min_area_px >= 1 && std::isfinite(s.look.min_area_px), "look.min_area_px", s.look.min_area_px,
-          "at least 1");
-  require(s.look.max_area_fraction > 0 && s.look.max_area_fraction <= 1, "look.max_area_fraction",
-          s.look.max_area_fraction, "above 0, up to 1");
-  require(s.look.min_difference > 0 && s.look.min_difference < 255, "look.min_difference", s.look.min_difference,
-          "between 0 and 255");
-  require(s.look.max_elongation > 1, "look.max_elongation", s.look.max_elongation, "above 1");
-  require(s.look.max_area_change > 1, "look.max_area_change", s.look.max_area_change, "above 1");
-  require(s.look.least_core > 0 && s.look.least_core <= 1, "look.least_core", s.look.least_core, "above 0, up to 1");
-  require(s.look.core_elongation > 1, "look.core_elongation", s.look.core_elongation, "above 1");
-  require(s.look.core_shift_px >= 0, "look.core_shift_px", s.look.core_shift_px, "at least 0");
+  require(s.appearance.min_area_px >= 1 && std::isfinite(s.appearance.min_area_px), "appearance.min_area_px",
+          s.appearance.min_area_px, "at least 1");
+  require(s.appearance.max_area_fraction > 0 && s.appearance.max_area_fraction <= 1, "appearance.max_area_fraction",
+          s.appearance.max_area_fraction, "above 0, up to 1");
+  require(s.appearance.min_difference > 0 && s.appearance.min_difference < 255, "appearance.min_difference",
+          s.appearance.min_difference, "between 0 and 255");
+  require(s.appearance.max_elongation > 1, "appearance.max_elongation", s.appearance.max_elongation, "above 1");
+  require(s.appearance.max_area_change > 1, "appearance.max_area_change", s.appearance.max_area_change, "above 1");
+  require(s.appearance.least_core > 0 && s.appearance.least_core <= 1, "appearance.least_core", s.appearance.least_core,
+          "above 0, up to 1");
+  require(s.appearance.core_elongation > 1, "appearance.core_elongation", s.appearance.core_elongation, "above 1");
+  require(s.appearance.core_shift_px >= 0, "appearance.core_shift_px", s.appearance.core_shift_px, "at least 0");
   require(s.consistency.lone_motion > 0 && s.consistency.lone_motion <= 1, "consistency.lone_motion",
           s.consistency.lone_motion, "above 0, up to 1");
   require(s.consistency.lone_displacement > 0 && s.consistency.lone_displacement <= 1, "consistency.lone_displacement",

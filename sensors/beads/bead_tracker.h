@@ -9,7 +9,7 @@
 //   clipped to 0..255 as 8-bit images are, this leaves bead pixels bright and most of the background at 0, for dark
 //   and for bright beads alike.
 // - Step vii takes the centroid of all highlighted pixels. Where several connected regions are left, this tracker takes
-//   the one whose centroid is nearest to the bead's last position, among those that look like a bead (BeadLook).
+//   the one whose centroid is nearest to the bead's last position, among those that look like a bead (BeadAppearance).
 //   Otsu's method is then applied again to the highlighted class alone: where a bead touches something half as dark,
 //   this core lies elsewhere than the whole region, and its centroid is taken. Where what touches it is nearly as dark,
 //   so that neither looks like a bead alone, the window's darkest pixels are taken (a fifth of the bead's usual area).
@@ -44,7 +44,7 @@ enum class CentroidKind : std::uint8_t {
 };
 
 /// What a region must be like to be taken for a bead.
-struct BeadLook {
+struct BeadAppearance {
   BeadPolarity polarity = BeadPolarity::kDark;
   double min_area_px = 12.0;
   double max_area_fraction = 0.6;  ///< of the window ROI-B
@@ -52,7 +52,7 @@ struct BeadLook {
   double min_difference = 15.0;
   /// Largest ratio of the region's principal second moments; 1 is a disc, half a disc has 3.6.
   double max_elongation = 4.0;
-  /// Largest ratio, either way, between the region's area and the bead's own area in the frames before.
+  /// Largest ratio, of either to the other, between the region's area and the bead's own area in the frames before.
   double max_area_change = 2.0;
   /// A bead's core: what Otsu's method highlights among the bead's own pixels. Its least part of the usual area (also
   /// that of the darkest pixels, where there is no such core; 1 = no cores), its largest elongation, and how far its
@@ -94,7 +94,7 @@ struct BeadTrackerSettings {
   double mean_brightness = 150.0;  ///< to which ROI-A's mean grey value is scaled
   double contrast = 2.0;           ///< factor of step iv
   int morphology_px = 3;           ///< side of the square element of step vi, odd; 1 = no opening and closing
-  BeadLook look = {};
+  BeadAppearance appearance = {};
   BeadConsistency consistency = {};
   CentroidKind centroid = CentroidKind::kBinary;
   int max_hidden_frames = 10;

@@ -322,7 +322,7 @@ class ThresholdRound {
       : window_(window),
         search_(search),
         settings_(search.settings),
-        contrasts_(contrasts_of(window, settings_.look.polarity, settings_.contrast)) {}
+        contrasts_(contrasts_of(window, settings_.appearance.polarity, settings_.contrast)) {}
 
   /// False if there's no further threshold, or one that doesn't part two clearly different classes.
   bool next_threshold() {
@@ -331,7 +331,7 @@ class ThresholdRound {
     last_low_ = first_ + *threshold;
     difference_ = class_difference(contrasts_, first_, last_low_);
     first_ = last_low_ + 1;
-    return difference_ >= settings_.look.min_difference;
+    return difference_ >= settings_.appearance.min_difference;
   }
 
   /// Moves the threshold to where about so many of the window's pixels are above it. @pre two contrasts occur
@@ -348,7 +348,7 @@ class ThresholdRound {
   /// The region at this threshold that looks like a bead and is nearest to the expected place (or the largest).
   std::optional<BeadMeasurement> find(const AreaRange& areas, double max_elongation) {
     BitWindow bits;
-    binarise(window_, contrasts_, last_low_, settings_.look.polarity, bits);
+    binarise(window_, contrasts_, last_low_, settings_.appearance.polarity, bits);
     const int radius = window_.stride == 1 ? settings_.morphology_px / 2 : 0;
     if (radius > 0) {
       open_regions(bits, radius);
@@ -392,44 +392,44 @@ class ThresholdRound {
 
 std::optional<BeadMeasurement> measure_bead(const GreyWindow& window, const BeadSearch& search) {
   const BeadTrackerSettings& settings = search.settings;
-  const BeadLook& look = settings.look;
-  AreaRange whole{look.min_area_px, look.max_area_fraction * settings.roi_b_px * settings.roi_b_px};
+  const BeadAppearance& appearance = settings.appearance;
+  AreaRange whole{appearance.min_area_px, appearance.max_area_fraction * settings.roi_b_px * settings.roi_b_px};
   AreaRange core = whole;
   if (search.expected_area_px > 0.0) {
-    whole.least = std::max(whole.least, search.expected_area_px / look.max_area_change);
-    whole.most = std::min(whole.most, search.expected_area_px * look.max_area_change);
-    core.least = std::max(core.least, search.expected_area_px * look.least_core);
+    whole.least = std::max(whole.least, search.expected_area_px / appearance.max_area_change);
+    whole.most = std::min(whole.most, search.expected_area_px * appearance.max_area_change);
+    core.least = std::max(core.least, search.expected_area_px * appearance.least_core);
     core.most = std::min(core.most, search.expected_area_px);
   }
   ThresholdRound round(window, search);
   if (!round.next_threshold()) return std::nullopt;
-  const std::optional<BeadMeasurement> bead = round.find(whole, look.max_elongation);
+  const std::optional<BeadMeasurement> bead = round.find(whole, appearance.max_elongation);
   // A region of more than the bead's area, and not its shape: the bead and something that touches it.
-  bool joined = search.expected_area_px > 0.0 && look.least_core < 1.0 &&
-                (!bead || bead->cut || bead->elongation > look.core_elongation);
+  bool joined = search.expected_area_px > 0.0 && appearance.least_core < 1.0 &&
+                (!bead || bead->cut || bead->elongation > appearance.core_elongation);
   if (joined) {
     const AreaRange larger{search.expected_area_px, std::numeric_limits<double>::infinity()};
     joined = round.find(larger, std::numeric_limits<double>::infinity()).has_value();
   }
 
   // The core: what stands out of the highlighted pixels themselves. Of a bead alone it is the bead's own middle; where
-  // something half as dark touches the bead, only the core tells where the bead is.
+  // something half as dark touches the bead, only the core shows where the bead is.
   constexpr int kCoreRounds = 2;
   for (int i = 0; i < kCoreRounds && round.next_threshold(); ++i) {
-    std::optional<BeadMeasurement> middle = round.find(core, look.core_elongation);
+    std::optional<BeadMeasurement> middle = round.find(core, appearance.core_elongation);
     if (!middle || middle->cut) continue;
-    if (bead && !bead->cut && (middle->centroid - bead->centroid).norm() <= look.core_shift_px) return bead;
+    if (bead && !bead->cut && (middle->centroid - bead->centroid).norm() <= appearance.core_shift_px) return bead;
     middle->is_core = true;
     return middle;
   }
   // What touches the bead is nearly as dark: only the bead's darkest pixels are its own.
   if (joined) {
-    round.highlight(look.least_core * search.expected_area_px);
-    const AreaRange darkest{std::max(look.min_area_px, 0.5 * look.least_core * search.expected_area_px),
-                            look.least_core * search.expected_area_px};
+    round.highlight(appearance.least_core * search.expected_area_px);
+    const AreaRange darkest{std::max(appearance.min_area_px, 0.5 * appearance.least_core * search.expected_area_px),
+                            appearance.least_core * search.expected_area_px};
     // So few pixels are often in a row; a line alone is longer still.
-    std::optional<BeadMeasurement> middle = round.find(darkest, 2.0 * look.max_elongation);
-    if (middle && !middle->cut && middle->difference >= look.min_difference) {
+    std::optional<BeadMeasurement> middle = round.find(darkest, 2.0 * appearance.max_elongation);
+    if (middle && !middle->cut && middle->difference >= appearance.min_difference) {
       middle->is_core = true;
       return middle;
     }

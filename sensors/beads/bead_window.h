@@ -56,7 +56,7 @@ struct BeadMeasurement {
   double area_px = 0.0;
   double difference = 0.0;  ///< between the mean grey values of background and bead class
   bool cut = false;         ///< the region touches the window's border
-  bool is_core = false;     ///< only the middle of the bead, see BeadLook::core_shift_px
+  bool is_core = false;     ///< only the middle of the bead, see BeadAppearance::core_shift_px
   double elongation = 1.0;  ///< ratio of its principal second moments
 };
 
@@ -69,7 +69,7 @@ struct BeadSearch {
 };
 
 /// Steps iv to vii: contrast, Otsu's threshold, opening and closing, centroid of the region that looks like the bead
-/// (BeadLook). Nothing if no region does.
+/// (BeadAppearance). Nothing if no region does.
 std::optional<BeadMeasurement> measure_bead(const GreyWindow& window, const BeadSearch& search);
 
 /// How many pixels have one value.

@@ -20,7 +20,8 @@ constexpr double kWhiteShare = 0.9;  ///< of the picture's pixels, that are no b
 constexpr double kLeastSaturation = 0.4;
 constexpr double kLeastBrightness = 0.1;  ///< of white: the hue of what is darker is noise
 constexpr int kLeastArea_px = 6;
-constexpr double kAreaRatio = 2.0;  ///< regions of the grid differ in area by less, either way, from the usual
+constexpr double kAreaRatio =
+    2.0;  ///< regions of the grid differ in area by a smaller factor, up or down, from the usual
 constexpr double kNodeReach = 0.3;  ///< a node is within so many spacings of where its neighbours put it
 constexpr double kLineShare = 0.3;  ///< a column counts if so much of it is seen
 constexpr std::size_t kMostRegions = 4096;

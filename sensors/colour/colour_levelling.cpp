@@ -23,7 +23,7 @@ int odd(double value) {
 }
 
 /// Where a coordinate (px, pixel centres whole) of `size` pixels falls among `reduced` ones: the pixel before it, which
-/// has one after it if there are two, and the part of the way to that one, from 0 to 1.
+/// has one after it if there are two, and the fraction of the distance to that one, from 0 to 1.
 std::pair<int, float> place_among(int pixel, int size, int reduced) {
   const double at = (pixel + 0.5) * reduced / size - 0.5;
   const int before = std::clamp(static_cast<int>(std::floor(at)), 0, std::max(reduced - 2, 0));

@@ -19,7 +19,7 @@ namespace touchstone::sensors {
 /// Levels pictures. After the first picture of a size little is allocated. One object is for one thread.
 class ColourLevelling {
  public:
-  /// Where white lies in a levelled picture, of 255: the rest is room for noise.
+  /// Where white lies in a levelled picture, of 255: the rest is margin for noise.
   static constexpr int kWhite = 230;
 
   /// @param spacing_px between neighbouring markers, whose sides are about two thirds of it. White between them must
@@ -47,7 +47,7 @@ class ColourLevelling {
   cv::Size size_;
   cv::Mat small_bytes_, small_, white_, gain_;
   std::vector<int> left_;             ///< for each column, the reduced one to its left, times 3
-  std::vector<float> towards_right_;  ///< and the part of the way to the next
+  std::vector<float> towards_right_;  ///< and the fraction of the distance to the next
   std::vector<float> row_gain_;
   cv::Mat levelled_;
 };

@@ -1,5 +1,5 @@
 #pragma once
-// What one picture tells of a grid of coloured markers behind coloured filters [Lin2019]: each soft marker is seen
+// What one picture shows of a grid of coloured markers behind coloured filters [Lin2019]: each soft marker is seen
 // through a rigid filter square of its own, so a region of the picture shows filter, marker and both in a mix.
 //
 // Markers are numbered row by row: y grows from row to row, as down the upright picture, and x along a row.
@@ -17,7 +17,7 @@ enum class MarkerFlaw : std::uint8_t {
   kNone,
   kMissing,       ///< no coloured region where the grid has one, or one without ink, or without its filter
   kTwoFilters,    ///< its ink shows under a neighbour's filter, or runs into a neighbour's region
-  kOverexposed,   ///< too much of it has a channel at full scale: hue can't be told
+  kOverexposed,   ///< too much of it has a channel at full scale: hue can't be measured
   kUnderexposed,  ///< too dark for a hue
   kColourless,    ///< too few of its pixels are saturated in colour
   kCutOff,        ///< the picture's edge goes through it

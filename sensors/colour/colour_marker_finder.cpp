@@ -76,17 +76,17 @@ struct ColourCounts {
 
 }  // namespace
 
-ColourMarkerFinder::ColourMarkerFinder(const ColourMarkerLook& look) : look_(look) {
-  check_range("columns", look.grid.x(), 2, 64);
-  check_range("rows", look.grid.y(), 2, 64);
-  if (look.spacing_px != 0.0) check_range("spacing_px", look.spacing_px, 4.0, 4096.0);
-  check_range("least_saturation", look.least_saturation, 0.2, 0.8);
-  check_range("most_under_neighbour", look.most_under_neighbour, 0.0, 0.2);
-  check_range("least_white", look.least_white, 4.0, 128.0);
+ColourMarkerFinder::ColourMarkerFinder(const ColourMarkerAppearance& appearance) : appearance_(appearance) {
+  check_range("columns", appearance.grid.x(), 2, 64);
+  check_range("rows", appearance.grid.y(), 2, 64);
+  if (appearance.spacing_px != 0.0) check_range("spacing_px", appearance.spacing_px, 4.0, 4096.0);
+  check_range("least_saturation", appearance.least_saturation, 0.2, 0.8);
+  check_range("most_under_neighbour", appearance.most_under_neighbour, 0.0, 0.2);
+  check_range("least_white", appearance.least_white, 4.0, 128.0);
 }
 
 const ColourMarkerReading& ColourMarkerFinder::find_rest(const cv::Mat& image) {
-  ColourMarkerFinder next(look_);
+  ColourMarkerFinder next(appearance_);
   next.take_rest(image);
   *this = std::move(next);
   return rest_;
@@ -102,7 +102,7 @@ void ColourMarkerFinder::take_rest(const cv::Mat& image) {
   cv::Mat smaller = image;
   if (shrink > 1) cv::resize(image, smaller, {image.cols / shrink, image.rows / shrink}, 0, 0, cv::INTER_AREA);
   const double scale = static_cast<double>(image.cols) / smaller.cols;
-  ColourLattice lattice = find_colour_lattice(smaller, look_.grid, look_.spacing_px / scale);
+  ColourLattice lattice = find_colour_lattice(smaller, appearance_.grid, appearance_.spacing_px / scale);
   for (Eigen::Vector2d& place : lattice.places) place *= scale;
   const double spacing = lattice.spacing_px * scale;
 

@@ -3,13 +3,13 @@
 // evened out (colour_levelling.h), regions segmented and labelled, of each the centroid and the mean hue.
 //
 // What the paper leaves open, and what is done here:
-// - Ink takes green out of white and hardly blue, the filter takes blue and hardly green. So green tells where ink is
+// - Ink takes green out of white and hardly blue, the filter takes blue and hardly green. So green shows where ink is
 //   and blue where filter is, each against the pixel's own largest channel: a shadow darkens all channels and changes
-//   neither. How far a pixel is on the way from white to the full colour, which the picture at rest shows, is how much
+//   neither. How far a pixel is on the line from white to the full colour, which the picture at rest shows, is how much
 //   of it is covered. Patches of ink are connected pixels of more than 0.7, so those with a blurred gap stay apart.
 // - Filters are rigid: where they are is known from the picture at rest. A patch of ink belongs to the filter that most
-//   of it is under (ink_ownership.h), what is filter without ink to that filter's cell. So regions that touch are told
-//   apart, and ink may reach a little under a neighbour's filter.
+//   of it is under (ink_ownership.h), what is filter without ink to that filter's cell. So regions that touch are
+//   separated apart, and ink may reach a little under a neighbour's filter.
 // - Centroids and areas weigh a rim pixel by what is covered of it: a marker of 4 x 4 px has them to parts of a pixel.
 // - The mean hue is circular, as hue wraps at red, over pixels of more than half saturation, as the paper has it.
 
@@ -26,7 +26,7 @@
 namespace touchstone::sensors {
 
 /// What to look for.
-struct ColourMarkerLook {
+struct ColourMarkerAppearance {
   Eigen::Vector2i grid = {10, 10};    ///< columns, rows; 2 to 64 each
   double spacing_px = 0.0;            ///< between neighbours, in the picture; 0: found in the picture at rest
   double least_saturation = 0.5;      ///< of a pixel that counts for the mean hue (HSV); 0.2 to 0.8
@@ -40,7 +40,7 @@ struct ColourMarkerLook {
 class ColourMarkerFinder {
  public:
   /// @throws Error naming the setting that is out of its range
-  explicit ColourMarkerFinder(const ColourMarkerLook& look);
+  explicit ColourMarkerFinder(const ColourMarkerAppearance& appearance);
 
   /// Takes a picture of the unloaded sensor as the reference for all that follow. Markers that aren't whole in it are
   /// flawed there and in every later picture. The sensor may be turned by up to about 40 degrees.
@@ -83,7 +83,7 @@ class ColourMarkerFinder {
   MarkerFlaw flaw_of(const Sums& sums, std::size_t marker) const;
   FrameLight light_of_picture() const;
 
-  ColourMarkerLook look_;
+  ColourMarkerAppearance appearance_;
   cv::Size size_;    ///< of a whole picture
   cv::Rect region_;  ///< looked at
   int reduction_ = 1;

@@ -52,7 +52,7 @@ void ColourMarkerFinder::find_ink() {
       if (patch >= 0) ++patches_[static_cast<std::size_t>(patch)].under[static_cast<std::size_t>(filter[x])];
     }
   }
-  owners_ = own_ink(patches_, markers, {usual_area_, look_.most_under_neighbour});
+  owners_ = own_ink(patches_, markers, {usual_area_, appearance_.most_under_neighbour});
 }
 
 int ColourMarkerFinder::patch_near(int x, int y) const {
@@ -120,7 +120,7 @@ void ColourMarkerFinder::add_up() {
       if (std::max({raw[0], raw[1], raw[2]}) >= kFullScale) ++sums.clipped;
       const int highest = std::max({bgr[0], bgr[1], bgr[2]});
       const int lowest = std::min({bgr[0], bgr[1], bgr[2]});
-      if (highest - lowest > look_.least_saturation * highest) {
+      if (highest - lowest > appearance_.least_saturation * highest) {
         sums.hue += hue_direction(bgr[0], bgr[1], bgr[2]);
         ++sums.saturated;
       }
@@ -148,7 +148,7 @@ FrameLight ColourMarkerFinder::light_of_picture() const {
 MarkerFlaw ColourMarkerFinder::flaw_of(const Sums& sums, std::size_t marker) const {
   const double white = levelling_.front().white_at(filter_place_[marker]).maxCoeff();
   if (white >= kBrightestWhite || sums.clipped > kMostClipped * usual_area_) return MarkerFlaw::kOverexposed;
-  if (white < look_.least_white) return MarkerFlaw::kUnderexposed;
+  if (white < appearance_.least_white) return MarkerFlaw::kUnderexposed;
   if (filter_area_[marker] < kLeastFilter * usual_area_) return MarkerFlaw::kMissing;
   if (cut_off_[marker]) return MarkerFlaw::kCutOff;
   if (owners_.flaws[marker] == MarkerFlaw::kTwoFilters) return MarkerFlaw::kTwoFilters;
@@ -165,7 +165,7 @@ MarkerFlaw ColourMarkerFinder::flaw_of(const Sums& sums, std::size_t marker) con
 void ColourMarkerFinder::read(const ColourMarkerReading* rest, ColourMarkerReading& reading) {
   const std::size_t count = filter_place_.size();
   reading.light = light_of_picture();
-  reading.grid = look_.grid;
+  reading.grid = appearance_.grid;
   reading.markers.assign(count, {});
   const Eigen::Vector2d origin(region_.x, region_.y);
   std::vector<MarkerFlaw> flaws(count);
@@ -192,14 +192,14 @@ void ColourMarkerFinder::read(const ColourMarkerReading* rest, ColourMarkerReadi
     if (rest) shift[i] = (marker.ink_centroid_px - rest->markers[i].ink_centroid_px) / spacing_px();
   }
   if (rest) {
-    doubt_enclosed(look_.grid, shift, missing_at_rest, flaws);
+    doubt_enclosed(appearance_.grid, shift, missing_at_rest, flaws);
     // Ink that has left the grid: the others may have moved into its neighbours' places.
     if (owners_.stray > stray_at_rest_) {
       std::replace(flaws.begin(), flaws.end(), MarkerFlaw::kNone, MarkerFlaw::kTwoFilters);
     }
   }
   for (std::size_t i = 0; i < count; ++i) reading.markers[i].flaw = flaws[i];
-  tell_surroundings(rest ? *rest : reading, reading);
+  find_surroundings(rest ? *rest : reading, reading);
 }
 
 }  // namespace touchstone::sensors

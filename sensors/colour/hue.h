@@ -30,7 +30,7 @@ inline Eigen::Vector2d hue_direction(double blue, double green, double red) {
 /// The hue of a sum of directions, radians in [0, 2 pi): their circular mean. @pre direction isn't zero
 double hue_of(const Eigen::Vector2d& direction);
 
-/// `hue` less `from` the short way round, radians in (-pi, pi].
+/// `hue` less `from` along the shorter arc, radians in (-pi, pi].
 double hue_difference(double hue, double from);
 
 }  // namespace touchstone::sensors

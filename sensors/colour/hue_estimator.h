@@ -13,8 +13,8 @@ namespace touchstone::sensors {
 /// One marker's displacement.
 struct HueEstimate {
   Eigen::Vector3d displacement_mm = Eigen::Vector3d::Zero();  ///< gel frame: a press is -z
-  bool measured = false;                                      ///< false: the marker is flawed, or the model can't tell
-  bool extrapolated = false;                                  ///< it looks as nothing did in calibration
+  bool measured = false;      ///< false: the marker is flawed, or the model doesn't apply
+  bool extrapolated = false;  ///< it looks as nothing did in calibration
 };
 
 /// A whole grid's.
@@ -23,8 +23,8 @@ struct HueField {
   std::vector<std::uint8_t> extrapolated;  ///< 0 or 1, for each marker; 0 where not measured
 };
 
-/// Tells displacements from readings, by a model and the markers' looks at rest. What one marker taught holds for all:
-/// each has its own hue and place at rest, and its own gains if it has some.
+/// Estimates displacements from readings, by a model and the markers' appearance at rest. What one marker taught holds
+/// for all: each has its own hue and place at rest, and its own gains if it has some.
 class HueEstimator {
  public:
   /// @param rest of the sensor as it is now, not that of the calibration: mounted anew, it looks different

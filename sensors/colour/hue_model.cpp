@@ -12,7 +12,7 @@ namespace touchstone::sensors {
 namespace {
 
 constexpr int kMostDegree = 4;
-constexpr double kLeastGain = 0.02;  ///< a shift of the centroid by a fiftieth of the displacement tells nothing of it
+constexpr double kLeastGain = 0.02;  ///< a shift of the centroid by a fiftieth of the displacement says nothing of it
 constexpr double kBeyond = 0.05;     ///< of what was seen
 
 void add_terms(int feature, int left, Eigen::RowVectorXi& exponents, std::vector<Eigen::RowVectorXi>& rows) {

@@ -4,7 +4,7 @@
 // The paper's model, eq. 4: h = Gz w + h0 and c = (a w + b) d, of the press w (positive inwards, the paper's delta_z),
 // the hue h, the centroid's shift c and the lateral displacement d; inverted, eq. 5. The paper says itself that its
 // errors "can be improved by using a non-linear approximation": here a polynomial of the change in hue, the two
-// centroids' shifts, the two areas' logarithms and what its neighbours tell
+// centroids' shifts, the two areas' logarithms and what its neighbours show
 // (marker_surroundings.h), without a constant term, so what looks as at rest is at rest.
 // Lateral displacements are those that are seen (ViewParallax); the true ones follow from them.
 

@@ -1,5 +1,5 @@
 #pragma once
-// Which filter's marker a patch of ink is. Filters are rigid and stay where they were at rest, so they tell; a soft
+// Which filter's marker a patch of ink is. Filters are rigid and stay where they were at rest, so they decide; a soft
 // marker that has moved by a whole spacing looks as if it were its neighbour at rest. That can't be seen in one marker,
 // but it can in the grid: the gel holds together, so between markers at home and markers one filter off lie some under
 // two filters, and at the grid's edge a marker comes to lie under no filter.

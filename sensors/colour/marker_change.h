@@ -11,7 +11,7 @@ namespace touchstone::sensors {
 struct MarkerChange {
   static constexpr int kSize = 9;
 
-  double hue = 0.0;                                           ///< radians, the short way round
+  double hue = 0.0;                                           ///< radians, along the shorter arc
   Eigen::Vector2d centroid_mm = Eigen::Vector2d::Zero();      ///< of all that is coloured, in the plane at rest
   Eigen::Vector2d ink_centroid_mm = Eigen::Vector2d::Zero();  ///< of its ink
   double log_coloured_area = 0.0;                             ///< logarithm of the ratio to that at rest

@@ -15,14 +15,14 @@ bool is_sound(const ColourMarkerReading& rest, const ColourMarkerReading& readin
 
 }  // namespace
 
-void tell_surroundings(const ColourMarkerReading& rest, ColourMarkerReading& reading) {
+void find_surroundings(const ColourMarkerReading& rest, ColourMarkerReading& reading) {
   TS_ASSERT(rest.grid == reading.grid && rest.markers.size() == reading.markers.size());
   const int columns = reading.grid.x();
   const int rows = reading.grid.y();
   for (int i = 0; i < columns * rows; ++i) {
     const auto marker = static_cast<std::size_t>(i);
-    MarkerSurroundings& told = reading.markers[marker].surroundings;
-    told = {};
+    MarkerSurroundings& found = reading.markers[marker].surroundings;
+    found = {};
     if (!is_sound(rest, reading, marker)) continue;
     const Eigen::Vector2i place(i % columns, i / columns);
     Eigen::Matrix2d cell_at_rest;
@@ -58,7 +58,7 @@ void tell_surroundings(const ColourMarkerReading& rest, ColourMarkerReading& rea
     // A cell that is folded over has no logarithm.
     const double growth = cell.determinant() / cell_at_rest.determinant();
     if (!(growth > 0.0)) continue;
-    told = {true, std::log(growth), log_ink_area / neighbours};
+    found = {true, std::log(growth), log_ink_area / neighbours};
   }
 }
 

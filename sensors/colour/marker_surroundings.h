@@ -1,5 +1,5 @@
 #pragma once
-// What a marker's neighbours tell of it. One marker alone can't tell how far it was pressed: nearer to the camera and
+// What a marker's neighbours show of it. One marker alone doesn't show how far it was pressed: nearer to the camera and
 // stretched it looks the same, larger. Its neighbours' places show how the skin between them stretched, and their sizes
 // how steep the dent is.
 
@@ -9,6 +9,6 @@ namespace touchstone::sensors {
 
 /// Fills in the surroundings of all sound markers of `reading`, which may be `rest` itself.
 /// @pre both are of the same grid
-void tell_surroundings(const ColourMarkerReading& rest, ColourMarkerReading& reading);
+void find_surroundings(const ColourMarkerReading& rest, ColourMarkerReading& reading);
 
 }  // namespace touchstone::sensors

@@ -1,5 +1,5 @@
 #pragma once
-// The check that every event passes on its way from or into a file.
+// The check that every event passes when it is read from or written to a file.
 
 #include <cstdint>
 #include <limits>
@@ -15,7 +15,7 @@ namespace touchstone::sensors {
 class EventCheck {
  public:
   /// @param file stands in messages
-  /// @param size of the camera, or the largest that the format can tell of, pixels
+  /// @param size of the camera, or the largest that the format can hold, pixels
   EventCheck(std::string file, cv::Size size) : file_(std::move(file)), size_(size) {}
 
   cv::Size size() const { return size_; }

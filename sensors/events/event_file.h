@@ -18,10 +18,10 @@ namespace touchstone::sensors {
 /// @throws Error for other endings
 EventFormat event_format_of_name(const std::filesystem::path& file);
 
-/// Reads a file's events in portions, so that a file of any length takes the same memory. What the file is, is told by
-/// its first bytes, and by its name only if they don't. Times are those of the file's own clock, us, and never go
-/// backwards. Each event is within the camera's pixels.
-/// Not for use from several threads at once; HDF5 files not even by several readers at once.
+/// Reads a file's events in portions, so that a file of any length takes the same memory. The kind of file is
+/// recognised by its first bytes, and by its name only if they don't. Times are those of the file's own clock, us, and
+/// never go backwards. Each event is within the camera's pixels. Not for use from several threads at once; HDF5 files
+/// not even by several readers at once.
 class EventReader {
  public:
   /// @throws Error naming the file: it isn't there, is empty, isn't a file of events, is of a kind or version that

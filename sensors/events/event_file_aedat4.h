@@ -30,7 +30,7 @@ class Aedat4EventReader {
   const EventSource& source() const { return source_; }
 
  private:
-  /// What the header tells of a stream.
+  /// What the header says of a stream.
   struct Stream {
     std::string type;  ///< EVTS, FRME, IMUS, TRIG
     int width = 0, height = 0;

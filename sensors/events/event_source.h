@@ -1,5 +1,5 @@
 #pragma once
-// What a file of events tells of itself, and how it is to be read.
+// What a file of events says of itself, and how it is to be read.
 
 #include <cstddef>
 #include <cstdint>

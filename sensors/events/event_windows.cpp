@@ -29,7 +29,7 @@ EventWindows::EventWindows(const EventWindowSettings& settings)
 
 std::int64_t EventWindows::window_at(std::int64_t t_us) const {
   if (t_us < settings_.start_us) return -1;
-  // Unsigned, since the way from the start to the latest time there is may be more than a signed number holds.
+  // Unsigned, since the time from the start to the latest time there is may be more than a signed number holds.
   const std::uint64_t since = static_cast<std::uint64_t>(t_us) - static_cast<std::uint64_t>(settings_.start_us);
   const std::uint64_t window = since / static_cast<std::uint64_t>(settings_.length_us);
   if (window > static_cast<std::uint64_t>(kMostWindows)) return kMostWindows + 1;

@@ -7,7 +7,7 @@
 
 namespace touchstone::sensors {
 
-/// One grasp to train or to test force estimators on: what they see, and the force that a reference told.
+/// One grasp to train or to test force estimators on: what they see, and the force that a reference measured.
 struct ForceSeries {
   Eigen::MatrixXd
       features;  ///< a window a row: accumulated ON and OFF counts (sensors/events/grasp_sequence.h), maybe time

@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::size_t kFirstBytes = 1 << 18;
 
-/// Room for more content; false if there's as much as is allowed.
+/// Makes space for more content; false if there's as much as is allowed.
 bool grow(std::vector<char>& content, std::size_t used, std::size_t most_bytes) {
   if (used < content.size()) return true;
   if (content.size() >= most_bytes) return false;
@@ -34,12 +34,12 @@ std::string unpack_lz4(std::span<const char> frame, std::size_t most_bytes, std:
   std::size_t used = 0;
   for (std::size_t hint = 1; hint != 0;) {
     if (!grow(content, used, most_bytes)) return too_much(most_bytes);
-    std::size_t room = content.size() - used;
+    std::size_t space = content.size() - used;
     std::size_t left = frame.size() - taken;
-    hint = LZ4F_decompress(context.get(), content.data() + used, &room, frame.data() + taken, &left, nullptr);
+    hint = LZ4F_decompress(context.get(), content.data() + used, &space, frame.data() + taken, &left, nullptr);
     if (LZ4F_isError(hint)) return fmt::format("isn't a sound LZ4 frame ({})", LZ4F_getErrorName(hint));
-    if (room == 0 && left == 0 && hint != 0) return "is an LZ4 frame that is broken off";
-    used += room;
+    if (space == 0 && left == 0 && hint != 0) return "is an LZ4 frame that is broken off";
+    used += space;
     taken += left;
   }
   if (taken != frame.size()) return fmt::format("has {} bytes behind its LZ4 frame", frame.size() - taken);

@@ -4,7 +4,7 @@
 // What the network sees of a window is its features and those of the windows before it, `delays` in all (3 of 7 ms: the
 // paper's 21 ms). Before the first window nothing has been counted: there the features are 0. Features and force are
 // scaled to [-1, 1] by their ranges in training (sensors/learning/range_scaling.h), as MATLAB's toolbox does unless
-// told not to; the paper doesn't say.
+// asked not to; the paper doesn't say.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -61,7 +61,7 @@ class TimeDelayEstimator {
 
   /// Forgets all windows: the next one is a grasp's first.
   void begin();
-  /// Takes the next window's features, tells its force in N. @throws Error for another number of features than the
+  /// Takes the next window's features, gives its force in N. @throws Error for another number of features than the
   /// model's, or one that isn't finite; it then counts as not given
   double next(std::span<const double> features);
 

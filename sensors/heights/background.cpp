@@ -16,7 +16,7 @@ constexpr double kMostSaturated = 0.01;
 std::string frame_fault(const cv::Mat& frame, const cv::Size& size) {
   if (frame.empty()) return "is empty";
   if (frame.channels() == 1)
-    return "is grey; slopes in two directions can't be told from one brightness: colour is needed";
+    return "is grey; slopes in two directions can't be estimated from one brightness: colour is needed";
   if (frame.channels() != 3) return fmt::format("has {} channels; 3 (BGR) are needed", frame.channels());
   if (frame.depth() != CV_8U) return "isn't of 8 bits a channel";
   if (!size.empty() && frame.size() != size) {

@@ -20,7 +20,7 @@ struct Background {
 std::string frame_fault(const cv::Mat& frame, const cv::Size& size);
 
 /// @throws Error if there is no frame, if one is unfit or differs in size from the first, or if more than 1 % of a
-/// frame's pixels are saturated (a difference to 255 tells nothing)
+/// frame's pixels are saturated (a difference to 255 shows nothing)
 Background mean_background(std::span<const cv::Mat> frames);
 
 /// frame - background with its sign, CV_32FC3. @throws Error naming what makes the frame unfit

@@ -180,7 +180,7 @@ std::vector<ColourSample> samples_of(const BallPress& press, const Background& b
     fail("{}: ball radius {} mm: it must be above 0", press.name, press.ball_radius_mm);
   }
   if (circle.radius < kSmallestRadius_px) {
-    fail("{}: contact radius {:.1f} px: at least {:.0f} are needed to tell slopes", press.name, circle.radius,
+    fail("{}: contact radius {:.1f} px: at least {:.0f} are needed to estimate slopes", press.name, circle.radius,
          kSmallestRadius_px);
   }
   if (circle.radius * mm_per_px >= press.ball_radius_mm) {

@@ -18,7 +18,7 @@ namespace touchstone::sensors {
 /// The unit normal towards the camera of a membrane with these slopes.
 Eigen::Vector3d normal_of(const Eigen::Vector2d& slope);
 
-/// What counts as contact: higher than both the floor and a share of the map's highest point. Geometry alone can't tell
+/// What counts as contact: higher than both the floor and a share of the map's highest point. Geometry alone can't show
 /// where an object's edge lets go of the gel; under a ball the membrane stands at half of the depth there on a thick
 /// gel (Hertz) and lower on a thin one.
 struct ContactRule {

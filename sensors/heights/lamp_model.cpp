@@ -34,7 +34,7 @@ Eigen::Matrix<double, 3, 2> tilt_derivative(const Eigen::Vector2d& slope) {
 
 /// What the middle would most likely have shown where the lamps `here` show a colour: the linear estimate of least mean
 /// square error for tilts of the usual size and colours that matt shading misses by some digital numbers. It is
-/// middle * here^-1 where that is well determined, and fades out along what the lamps don't tell.
+/// middle * here^-1 where that is well determined, and fades out along what the lamps don't determine.
 Eigen::Matrix3d likeliest_map(const Eigen::Matrix3d& middle, const Eigen::Matrix3d& here) {
   const Eigen::Vector3d usual_tilt(0.1, 0.1, 0.02);  // variances of the normals of a press
   constexpr double kMisfit_DN = 3.0;
@@ -147,7 +147,7 @@ LampModel fit_lamps(std::span<const ColourSample> samples, const cv::Size& size,
   }
   const Eigen::LDLT<Eigen::Matrix3d> factor(all.normal);
   if (factor.info() != Eigen::Success || !(factor.vectorD().minCoeff() > 1e-9 * all.normal.trace())) {
-    fail("the presses' slopes don't determine the lamps: they have to point all ways");
+    fail("the presses' slopes don't determine the lamps: they have to point in all directions");
   }
   const Eigen::Matrix3d mean = factor.solve(all.right).transpose();
   LampModel model{size.width, size.height, how.columns, how.rows, {}};

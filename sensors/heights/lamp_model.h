@@ -43,8 +43,8 @@ struct LampModel {
 struct LampFit {
   int columns = 8;
   int rows = 6;
-  /// How far around a node presses tell its lamps: standard deviation of their weight's fall-off, as a share of the
-  /// picture's width. The presses of the default calibration are 0.22 of it apart.
+  /// How far around a node presses determine its lamps: standard deviation of their weight's fall-off, as a share of
+  /// the picture's width. The presses of the default calibration are 0.22 of it apart.
   double reach = 0.25;
   double prior = 0.01;    ///< as which share of all samples, all over the picture, the mean lamps count at a node
   double steepest = 0.6;  ///< slopes up to which every lamp is taken to stand above the membrane's horizon

@@ -89,7 +89,7 @@ template <typename Value, typename Wide>
   constexpr int kLanes = static_cast<int>(LaneSums<Value>::kLanes);
   constexpr int kBits = std::numeric_limits<Value>::digits;
   constexpr Wide kFirst = std::numeric_limits<Value>::max();
-  constexpr int kMost = std::numeric_limits<Value>::max();  // so many of the largest values have room
+  constexpr int kMost = std::numeric_limits<Value>::max();  // so many of the largest values fit
   constexpr int kAhead = 8;                                 // rows lie apart: nobody else fetches the next ones
   Pairs first[3] = {}, second[3] = {};
   int held = 0;

@@ -56,7 +56,7 @@ Eigen::MatrixXd latin_hypercube(Eigen::Index count, Eigen::Index coordinates, Ra
 }
 
 /// The process through values of mean 0 and standard deviation 1 (or all 0): of a few lengths, the same along all
-/// coordinates, that with the most evidence. Ten values can't tell more than one.
+/// coordinates, that with the most evidence. Ten values can't determine more than one.
 GaussianProcess surrogate(const Eigen::MatrixXd& places, const Eigen::VectorXd& values) {
   GaussianProcess best;
   bool has_one = false;

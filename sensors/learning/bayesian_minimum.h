@@ -1,6 +1,6 @@
 #pragma once
-// The least value of a function that is dear to evaluate, in few evaluations: Bayesian optimisation with a Gaussian
-// process as surrogate and expected improvement [Jones1998].
+// The least value of a function that is expensive to evaluate, in few evaluations: Bayesian optimisation with a
+// Gaussian process as surrogate and expected improvement [Jones1998].
 
 #include <Eigen/Core>
 #include <cstdint>

@@ -132,7 +132,7 @@ TunedGaussianProcess tune_gaussian_process(const Eigen::MatrixXd& inputs, const 
         const auto count = static_cast<double>(rows.size());
         gradient = -evidence_gradient(process) / count;
         return -process.log_evidence / count;
-      } catch (const Error&) {  // too little noise to be factorised, or a length beyond all measure: no way there
+      } catch (const Error&) {  // too little noise to be factorised, or a length beyond all measure: no step there
         return std::numeric_limits<double>::infinity();
       }
     };

@@ -7,7 +7,7 @@
 // 2000). Then the same step is p = -J^T (J J^T + lambda I)^-1 F, whose matrix is only as large as the samples are many.
 // And a network's J needn't be formed for it: a sample's derivatives by the weights of a layer are an outer product (of
 // what comes back to its sums, d, and what goes in, a), so (J J^T)_ij is the sum over layers of (d_i . d_j) (a_i . a_j
-// + 1). Which of the two forms is cheaper is told by their operations.
+// + 1). Which of the two forms is cheaper is decided by their operations.
 //
 // Ceres 2.1 was measured beside it: 1848 samples, one core of a busy machine, DENSE_NORMAL_CHOLESKY, one residual block
 // with the same analytic Jacobian, trust region radius 100 (a damping of 0.01). Seconds an iteration: k = 4, n =

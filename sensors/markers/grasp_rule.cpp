@@ -63,14 +63,14 @@ GraspRule::GraspRule(const GraspRuleSettings& settings) : settings_(settings) {
   check(settings);
 }
 
-GraspCommand GraspRule::next(const GraspSight& sight) {
-  if (!std::isfinite(sight.height_max_mm)) fail("the height map's maximum is {} mm", sight.height_max_mm);
-  if (sight.normal_force_N && !std::isfinite(*sight.normal_force_N)) {
-    fail("the estimated normal force is {} N", *sight.normal_force_N);
+GraspCommand GraspRule::next(const GraspReading& reading) {
+  if (!std::isfinite(reading.height_max_mm)) fail("the height map's maximum is {} mm", reading.height_max_mm);
+  if (reading.normal_force_N && !std::isfinite(*reading.normal_force_N)) {
+    fail("the estimated normal force is {} N", *reading.normal_force_N);
   }
   if (has_ended_badly(phase_)) return {phase_, 0.0, false};
-  if (phase_ == GraspPhase::approaching || phase_ == GraspPhase::touched) return approach(sight);
-  return lift(sight);
+  if (phase_ == GraspPhase::approaching || phase_ == GraspPhase::touched) return approach(reading);
+  return lift(reading);
 }
 
 GraspCommand GraspRule::end(GraspPhase phase) {
@@ -78,8 +78,8 @@ GraspCommand GraspRule::end(GraspPhase phase) {
   return {phase_, 0.0, false};
 }
 
-GraspCommand GraspRule::approach(const GraspSight& sight) {
-  touching_ = sight.height_max_mm > settings_.touch_height_mm ? touching_ + 1 : 0;
+GraspCommand GraspRule::approach(const GraspReading& reading) {
+  touching_ = reading.height_max_mm > settings_.touch_height_mm ? touching_ + 1 : 0;
   if (touching_ >= settings_.touch_frames) {
     phase_ = GraspPhase::lifting;
     return {phase_, 0.0, true};
@@ -95,21 +95,21 @@ GraspCommand GraspRule::approach(const GraspSight& sight) {
   return {phase_, settings_.approach_step_mm, false};
 }
 
-GraspCommand GraspRule::lift(const GraspSight& sight) {
-  missing_ = sight.height_max_mm < settings_.lost_height_mm ? missing_ + 1 : 0;
+GraspCommand GraspRule::lift(const GraspReading& reading) {
+  missing_ = reading.height_max_mm < settings_.lost_height_mm ? missing_ + 1 : 0;
   if (missing_ >= settings_.lost_frames) return end(GraspPhase::lost);
-  calm_ = sight.lifted && !sight.slip ? calm_ + 1 : 0;
-  const bool look = settling_ == 0;
+  calm_ = reading.lifted && !reading.slip ? calm_ + 1 : 0;
+  const bool settled = settling_ == 0;
   settling_ = std::max(0, settling_ - 1);
-  if (sight.slip && look && settings_.answer_slip) return tighten(sight);
+  if (reading.slip && settled && settings_.react_to_slip) return tighten(reading);
   // Slip that isn't answered yet takes an object out of the state of being held, too.
   phase_ = calm_ > settings_.settle_frames ? GraspPhase::holding : GraspPhase::lifting;
   return {phase_, 0.0, true};
 }
 
-GraspCommand GraspRule::tighten(const GraspSight& sight) {
+GraspCommand GraspRule::tighten(const GraspReading& reading) {
   const double step = std::min(settings_.slip_step_mm, settings_.most_slip_travel_mm - tightened_);
-  const bool too_strong = settings_.most_normal_force_N && sight.normal_force_N >= settings_.most_normal_force_N;
+  const bool too_strong = settings_.most_normal_force_N && reading.normal_force_N >= settings_.most_normal_force_N;
   if (step < kLeastStep_mm || too_strong) return end(GraspPhase::slipping);
   tightened_ += step;
   ++answers_;

@@ -7,7 +7,7 @@
 
 namespace touchstone::sensors {
 
-/// How the rule goes about. Lengths are of one finger's way: a gripper of two fingers closes by twice that.
+/// How the rule goes about. Lengths are of one finger's travel: a gripper of two fingers closes by twice that.
 struct GraspRuleSettings {
   /// Touch is where the height map's maximum exceeds this. The thesis's threshold is 2 without a unit; in a map that is
   /// integrated from slopes without a pixel pitch that is two pixels, 0.106 mm. Less takes less force to see a touch
@@ -26,14 +26,14 @@ struct GraspRuleSettings {
   std::optional<double> most_normal_force_N;  ///< and at this estimated normal force, if one is given
   double lost_height_mm = 0.02;               ///< the object is lost where the maximum stays below this...
   int lost_frames = 5;                        ///< ...for so many frames in a row after touch
-  bool answer_slip = true;                    ///< false: the thesis's step 2 is left out, for comparison
+  bool react_to_slip = true;                  ///< false: the thesis's step 2 is left out, for comparison
 };
 
 /// @throws Error that names the setting, its value and what is allowed
 void check(const GraspRuleSettings& settings);
 
 /// What one frame says.
-struct GraspSight {
+struct GraspReading {
   double height_max_mm = 0.0;  ///< of the height map, indentation positive
   bool slip = false;           ///< force ratio and motion ratio both over their thresholds
   std::optional<double> normal_force_N;
@@ -46,7 +46,7 @@ enum class GraspPhase {
   touched,        ///< the threshold is exceeded, but not yet in enough frames: the gripper waits
   lifting,        ///< the arm moves up
   holding,        ///< lifted, and no slip since
-  nothing_there,  ///< ends: closed all the way without touch
+  nothing_there,  ///< ends: closed completely without touch
   slipping,       ///< ends: slip is seen, and the limits forbid to close further
   lost            ///< ends: the touch has gone
 };
@@ -62,24 +62,24 @@ struct GraspCommand {
   bool lift = false;         ///< the arm may move up; false: it stands
 };
 
-/// Give it one sight a frame. Deterministic; it knows nothing but what it was given.
+/// Give it one reading a frame. Deterministic; it knows nothing but what it was given.
 class GraspRule {
  public:
   /// @throws Error as check()
   explicit GraspRule(const GraspRuleSettings& settings);
 
   /// @throws Error for a height or force that isn't finite
-  GraspCommand next(const GraspSight& sight);
+  GraspCommand next(const GraspReading& reading);
 
   GraspPhase phase() const { return phase_; }
   double approach_travel_mm() const { return approached_; }  ///< of each finger until touch
   double slip_travel_mm() const { return tightened_; }       ///< of each finger in answer to slip
-  int slip_answers() const { return answers_; }              ///< how often it closed further
+  int slip_reactions() const { return answers_; }            ///< how often it closed further
 
  private:
-  GraspCommand approach(const GraspSight& sight);
-  GraspCommand lift(const GraspSight& sight);
-  GraspCommand tighten(const GraspSight& sight);
+  GraspCommand approach(const GraspReading& reading);
+  GraspCommand lift(const GraspReading& reading);
+  GraspCommand tighten(const GraspReading& reading);
   GraspCommand end(GraspPhase phase);
 
   GraspRuleSettings settings_;

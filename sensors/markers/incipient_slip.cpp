@@ -22,7 +22,7 @@ constexpr double kCarried = 0.5;
 /// A mask that covers less of its patch is the rim of a flat end. Now this part of a rim is seen and now that, and the
 /// patch's middle wanders with them: it tells no sliding.
 constexpr double kLeastCover = 0.15;
-/// Below this part of its largest one, a pivot says that the markers' places can't tell the terms apart.
+/// Below this part of its largest one, a pivot says that the markers' places can't separate the terms.
 constexpr double kLeastPivot = 1e-6;
 
 /// Markers out of the patch aren't held by the object.
@@ -158,8 +158,8 @@ void IncipientSlipDetector::remember(const TrackedMarkers& markers, const Contac
   }
 }
 
-const IncipientSlip& IncipientSlipDetector::look(const TrackedMarkers& markers,
-                                                 const std::optional<ContactPatch>& patch) {
+const IncipientSlip& IncipientSlipDetector::update(const TrackedMarkers& markers,
+                                                   const std::optional<ContactPatch>& patch) {
   result_ = {};
   if (past_.front().found.size() != markers.rest.size()) {
     kept_ = 0;

@@ -13,9 +13,9 @@
 // slips [Johnson1985, eq. 3.91]: its surface lags less along the motion than across it.
 //
 // Once the whole contact slides, the markers stand still and there's no lag to be seen. Then the patch itself moves
-// over the markers (`sliding`), the way they are sheared: by `slide_px` within the frames kept, while they go less than
-// half as far, and the gel is sheared by `least_shear_px` or more. Without that shear a ball that rolls in would look
-// the same.
+// over the markers (`sliding`), in the direction in which they are sheared: by `slide_px` within the frames kept, while
+// they go less than half as far, and the gel is sheared by `least_shear_px` or more. Without that shear a ball that
+// rolls in would look the same.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -75,7 +75,7 @@ class IncipientSlipDetector {
 
   /// `patch`: where the gel is touched in this frame; none: nothing touches, and the frames before are forgotten. They
   /// are forgotten, too, if the tracker says that it may have mixed up markers, or if it has another number of them.
-  const IncipientSlip& look(const TrackedMarkers& markers, const std::optional<ContactPatch>& patch);
+  const IncipientSlip& update(const TrackedMarkers& markers, const std::optional<ContactPatch>& patch);
 
   /// Forgets all frames, as when the tracker is restarted.
   void restart() { kept_ = 0; }

@@ -21,12 +21,12 @@ void check_range(const char* name, double value, double low, double high) {
 
 }  // namespace
 
-MarkerFinder::MarkerFinder(const MarkerLook& look) : look_(look) {
-  check_range("diameter_px", look.diameter_px, 2.0, 64.0);
-  check_range("spacing_px", look.spacing_px, look.diameter_px, 256.0);
-  check_range("darkness", look.darkness, 0.1, 0.95);
-  check_range("least_difference", look.least_difference, 0.0, 255.0);
-  check_range("least_area", look.least_area, 0.0, 1.0);
+MarkerFinder::MarkerFinder(const MarkerAppearance& appearance) : appearance_(appearance) {
+  check_range("diameter_px", appearance.diameter_px, 2.0, 64.0);
+  check_range("spacing_px", appearance.spacing_px, appearance.diameter_px, 256.0);
+  check_range("darkness", appearance.darkness, 0.1, 0.95);
+  check_range("least_difference", appearance.least_difference, 0.0, 255.0);
+  check_range("least_area", appearance.least_area, 0.0, 1.0);
   blobs_.reserve(kMostBlobs);
 }
 
@@ -36,9 +36,9 @@ const std::vector<MarkerBlob>& MarkerFinder::find(const cv::Mat& image) {
     fail("markers: the picture has {} channels of depth {}, 8 bit grey or BGR is needed", image.channels(),
          image.depth());
   }
-  if (image.cols < look_.spacing_px || image.rows < look_.spacing_px) {
+  if (image.cols < appearance_.spacing_px || image.rows < appearance_.spacing_px) {
     fail("markers: the picture is {} x {} px, smaller than their spacing of {} px", image.cols, image.rows,
-         look_.spacing_px);
+         appearance_.spacing_px);
   }
   if (width_ != 0 && (image.cols != width_ || image.rows != height_)) {
     fail("markers: the picture is {} x {} px, the first one was {} x {}", image.cols, image.rows, width_, height_);
@@ -89,7 +89,7 @@ void MarkerFinder::read_brightness(const cv::Mat& image) {
 
 void MarkerFinder::mark_dark_pixels() {
   // The window's mean by running sums: of columns over rows, then of those along the row.
-  const int reach = static_cast<int>(std::lround(0.75 * look_.spacing_px));
+  const int reach = static_cast<int>(std::lround(0.75 * appearance_.spacing_px));
   const auto row_of = [&](int y) {
     return brightness_.data() + static_cast<std::ptrdiff_t>(y) * static_cast<std::ptrdiff_t>(width_);
   };
@@ -113,8 +113,8 @@ void MarkerFinder::mark_dark_pixels() {
       const int columns = std::min(x + reach, width_ - 1) - std::max(x - reach, 0) + 1;
       const float mean = static_cast<float>(window) / static_cast<float>(rows * columns);
       const float value = row[x];
-      const bool dark = value < static_cast<float>(look_.darkness) * mean &&
-                        mean - value >= static_cast<float>(look_.least_difference);
+      const bool dark = value < static_cast<float>(appearance_.darkness) * mean &&
+                        mean - value >= static_cast<float>(appearance_.least_difference);
       label[x] = dark ? -1 : 0;
     }
   }
@@ -147,7 +147,7 @@ void MarkerFinder::take_blob(int x0, int y0) {
       }
     }
   }
-  if (blob.area_px < look_.least_area * 0.25 * kPi * look_.diameter_px * look_.diameter_px) return;
+  if (blob.area_px < appearance_.least_area * 0.25 * kPi * appearance_.diameter_px * appearance_.diameter_px) return;
   blob.at_border = blob.left == 0 || blob.top == 0 || blob.right == width_ - 1 || blob.bottom == height_ - 1;
   blob.centroid = weighted_centroid(blob, label);
   blobs_.push_back(blob);

@@ -19,7 +19,7 @@ namespace touchstone::sensors {
 
 /// What markers look like, in px of the picture. The defaults are the thesis's, 0.4 mm every 1.2 mm, in 320 px over 17
 /// mm.
-struct MarkerLook {
+struct MarkerAppearance {
   double diameter_px = 7.5;      ///< 2 to 64
   double spacing_px = 22.6;      ///< between neighbours' centres; larger than the diameter, at most 256
   double darkness = 0.65;        ///< a marker's pixels are darker than this part of the window's mean; 0.1 to 0.95
@@ -42,7 +42,7 @@ class MarkerFinder {
   static constexpr std::size_t kMostBlobs = 4096;
 
   /// @throws Error naming the setting that is out of its range
-  explicit MarkerFinder(const MarkerLook& look);
+  explicit MarkerFinder(const MarkerAppearance& appearance);
 
   /// The blobs in row order of their first pixels, valid until the next call; none if light() isn't normal.
   /// @throws Error unless the picture is 8 bit, grey or BGR, at least a spacing wide and high, and of the first one's
@@ -51,7 +51,7 @@ class MarkerFinder {
 
   /// Of the last picture: dark, saturated, flat (one value everywhere), or normal.
   FrameLight light() const { return light_; }
-  const MarkerLook& look() const { return look_; }
+  const MarkerAppearance& appearance() const { return appearance_; }
 
  private:
   void read_brightness(const cv::Mat& image);
@@ -59,7 +59,7 @@ class MarkerFinder {
   void take_blob(int x, int y);
   Eigen::Vector2d weighted_centroid(const MarkerBlob& blob, std::int32_t label) const;
 
-  MarkerLook look_;
+  MarkerAppearance appearance_;
   FrameLight light_ = FrameLight::kNormal;
   int width_ = 0, height_ = 0;
   std::vector<std::uint8_t> brightness_;  ///< largest channel

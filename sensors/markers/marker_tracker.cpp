@@ -65,7 +65,8 @@ int TrackedMarkers::found() const {
   return static_cast<int>(std::count_if(status.begin(), status.end(), [](MarkerStatus one) { return is_found(one); }));
 }
 
-MarkerTracker::MarkerTracker(const MarkerTrackerSettings& settings) : settings_(settings), finder_(settings.look) {
+MarkerTracker::MarkerTracker(const MarkerTrackerSettings& settings)
+    : settings_(settings), finder_(settings.appearance) {
   if (!(settings.longest_step >= 0.05 && settings.longest_step <= 0.5)) {
     fail("marker longest_step is {}, it must be from 0.05 to 0.5 of the spacing", settings.longest_step);
   }
@@ -81,7 +82,7 @@ const TrackedMarkers& MarkerTracker::track(const Frame& frame) {
   if (!first && frame.t_us <= result_.t_us) {
     fail("markers: the frame's time {} us isn't after the last one's, {} us", frame.t_us, result_.t_us);
   }
-  if (first) finder_ = MarkerFinder(settings_.look);  // of whatever size this frame has
+  if (first) finder_ = MarkerFinder(settings_.appearance);  // of whatever size this frame has
   const std::vector<MarkerBlob>& blobs = finder_.find(frame.image);
   if (first) {
     if (finder_.light() != FrameLight::kNormal) fail("markers: the frame at rest is {}", name_of(finder_.light()));

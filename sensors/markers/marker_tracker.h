@@ -23,9 +23,9 @@ namespace touchstone::sensors {
 
 /// How markers look, how far they may go between frames, and how much their area may change.
 struct MarkerTrackerSettings {
-  MarkerLook look = {};
+  MarkerAppearance appearance = {};
   double longest_step = 0.4;     ///< between two frames, as a part of the spacing; 0.05 to 0.5
-  double max_area_change = 1.8;  ///< either way, against the marker's own usual area; above 1
+  double max_area_change = 1.8;  ///< up or down, against the marker's own usual area; above 1
 };
 
 /// Was a marker measured in the frame, and if not, why not?

@@ -26,7 +26,7 @@ TouchReader::TouchReader(const TouchCalibration& calibration, const TouchReaderS
 }
 
 const TouchReading& TouchReader::read(const Frame& frame) {
-  const double diameter_px = calibration_.markers.look.diameter_px;
+  const double diameter_px = calibration_.markers.appearance.diameter_px;
   const double mm_per_px = calibration_.height.mm_per_px;
   reading_ = {};
   const MotionRatio motion = motion_ratio(calibration_.background, before_, frame.image, settings_.motion, &contact_);
@@ -51,7 +51,7 @@ const TouchReading& TouchReader::read(const Frame& frame) {
     reading_.force_ratio = force_ratio(reading_.shear_N, reading_.normal_N);
   }
   reading_.rule_slip = lit && is_slip(reading_.force_ratio, reading_.motion_ratio, settings_.rule);
-  reading_.rim = rim_.look(markers, reading_.patch);
+  reading_.rim = rim_.update(markers, reading_.patch);
   return reading_;
 }
 

@@ -1,5 +1,5 @@
 #pragma once
-// Frame in, touch out: what a fingertip with markers tells of one picture [Li2015, ch. 4] -- how deep, how hard,
+// Frame in, touch out: what a fingertip with markers reads from one picture [Li2015, ch. 4] -- how deep, how hard,
 // sheared how far, and whether it slips. The order in which the parts of this library are asked is here, once:
 // markers are followed, painted over for the heights and taken out of the contact mask, and what is left of that mask
 // says which of them lie on the object.

@@ -298,7 +298,7 @@ bool is_possible(const ChipStatistics& s) {
 std::string fault_of(const ContactTree& tree) {
   if (tree.nodes.empty()) return "the tree has no node";
   const auto count = static_cast<int>(tree.nodes.size());
-  // Ways that meet again would double with each node, and rule_of goes along all of them, by recursion.
+  // Paths that meet again would double with each node, and rule_of goes along all of them, by recursion.
   std::vector<int> depth(tree.nodes.size(), 0);
   for (int i = 0; i < count; ++i) {
     const ContactTreeNode& node = tree.nodes[static_cast<std::size_t>(i)];
@@ -308,7 +308,7 @@ std::string fault_of(const ContactTree& tree) {
         return fmt::format("node {} leads to node {}; from {} to {} may follow it", i, next, i + 1, count - 1);
       }
       int& below = depth[static_cast<std::size_t>(next)];
-      if (below > 0) return fmt::format("two ways lead to node {}; one is allowed", next);
+      if (below > 0) return fmt::format("two paths lead to node {}; one is allowed", next);
       below = depth[static_cast<std::size_t>(i)] + 1;
       if (below > kDeepestContactTree) {
         return fmt::format("node {} is behind {} questions; at most {} are allowed", next, below, kDeepestContactTree);

@@ -64,7 +64,7 @@ inline bool force_present(const ContactTree& tree, const ChipStatistics& statist
 int leaves_of(const ContactTree& tree);
 
 /// When the tree says that a force is present, as in the paper's eq. 2: "MAX > 40 or (MAX > 38 and SQ < 82)". Each part
-/// is a way through the tree, without the conditions that change nothing since others of the parts cover what they
+/// is a path through the tree, without the conditions that change nothing since others of the parts cover what they
 /// forbid. "always" or "never" where nothing is asked.
 std::string rule_of(const ContactTree& tree);
 
@@ -74,7 +74,7 @@ struct ContactSample {
   bool force_present = false;
 };
 
-/// Questions on the longest way that a tree may have: rule_of goes along every way.
+/// Questions on the longest path that a tree may have: rule_of goes along every path.
 inline constexpr int kDeepestContactTree = 14;
 
 /// How large a tree may grow, and how it is pruned.
@@ -101,7 +101,7 @@ struct ContactScore {
 /// How often the tree's answer is right on these samples, and how often it misses a force or sees one that isn't there.
 ContactScore score(const ContactTree& tree, std::span<const ContactSample> samples);
 
-/// Whether a chip can have told this: registers within their ranges, AVG between MIN and MAX.
+/// Whether a chip can have sent this: registers within their ranges, AVG between MIN and MAX.
 bool is_possible(const ChipStatistics& statistics);
 
 }  // namespace touchstone::sensors

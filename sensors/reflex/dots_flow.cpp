@@ -45,7 +45,8 @@ std::optional<Unknowns> solve(const DotsPicture& before, const DotsPicture& now,
     }
   }
   const int size = free_light ? 5 : 3;
-  // Dilation and shifts must be told from each other and from no gradient at all: DN^2, over the whole picture.
+  // Dilation and shifts must be distinguishable from each other and from no gradient at all: DN^2, over the whole
+  // picture.
   constexpr double kLeastGradient = 1.0;
   constexpr double kLeastPart = 1e-3;
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> gradients(normal.topLeftCorner<3, 3>());

@@ -106,7 +106,8 @@ DotsMatch match(const DotsPicture& picture, const DotsPicture& rest, std::span<c
 Eigen::Vector2d DotsSkew::seen(const DotsMotion& motion, const Eigen::Vector2d& place) const {
   Eigen::Vector2d at = motion(place);
   if (times == nullptr) return at;
-  // The time hangs on the place and the place on the time: the motion within a picture is small, so two rounds will do.
+  // The time depends on the place and the place on the time: the motion within a picture is small, so two rounds will
+  // do.
   for (int round = 0; round < 2; ++round) {
     const double column = std::clamp(at.x() + 0.5 * (times->cols - 1), 0.0, static_cast<double>(times->cols - 1));
     const double row = std::clamp(at.y() + 0.5 * (times->rows - 1), 0.0, static_cast<double>(times->rows - 1));

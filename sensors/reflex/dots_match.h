@@ -54,8 +54,8 @@ struct DotsMatch {
 DotsMatch match_dots(const DotsPicture& picture, const DotsPicture& rest, std::span<const DotsMotion> starts,
                      const DotsMatchSettings& settings = {});
 
-/// How a picture is skewed if the motion grew evenly from `before` over `interval_s`: the skew hangs on the motion that
-/// is sought, so it is found along with it.
+/// How a picture is skewed if the motion grew evenly from `before` over `interval_s`: the skew depends on the motion
+/// that is sought, so it is found along with it.
 struct KeyFrameHistory {
   DotsMotion before;
   double interval_s = 0.0;  ///< between the two pictures' middles; 0: nothing is known, no skew

@@ -113,7 +113,7 @@ ExploreTracker::ExploreTracker(const cv::Mat& rest, const ExploreSettings& setti
   key_ = last_ = {rest_, {}};
 }
 
-PictureFault ExploreTracker::look(const cv::Mat& picture) const {
+PictureFault ExploreTracker::find_fault(const cv::Mat& picture) const {
   if (picture.type() != CV_8UC1 || picture.rows != rest_.rows() || picture.cols != rest_.columns()) {
     return PictureFault::foreign;
   }
@@ -179,7 +179,7 @@ const ExploreReading& ExploreTracker::next(const Frame& frame) {
   const ExploreMode mode_before = reading_.mode;
   reading_.t_us = frame.t_us + static_cast<std::int64_t>(std::llround(1e6 * middle_s_));
   reading_.correlation = reading_.overlap = reading_.step_correlation = 0.0;
-  reading_.fault = look(frame.image);
+  reading_.fault = find_fault(frame.image);
   if (reading_.fault != PictureFault::none) {
     hold(reading_.fault);
     return reading_;

@@ -1,6 +1,7 @@
 #pragma once
 // Explore mode [Knoop2013, sec. III.E]: from each picture of the dots to their motion since rest. Absolute while the
-// picture correlates with the one at rest, else step by step; a picture that tells nothing is said to, with its reason.
+// picture correlates with the one at rest, else step by step; a picture without information is reported, with the
+// reason.
 
 #include <cstdint>
 #include <string>
@@ -15,12 +16,12 @@ namespace touchstone::sensors {
 enum class ExploreMode {
   absolute,  ///< against the picture at rest: no drift
   relative,  ///< a step from an earlier picture
-  held       ///< nothing could be measured: the motion is that of the last picture that told it
+  held       ///< nothing could be measured: the motion is that of the last picture that gave one
 };
 /// "absolute", "relative" or "held".
 std::string name_of(ExploreMode mode);
 
-/// Why a picture tells nothing.
+/// Why a picture can't be used.
 enum class PictureFault {
   none,
   foreign,    ///< another size or type than the picture at rest
@@ -89,7 +90,7 @@ class ExploreTracker {
     DotsPicture picture;
     DotsMotion motion;
   };
-  PictureFault look(const cv::Mat& picture) const;
+  PictureFault find_fault(const cv::Mat& picture) const;
   bool take_absolute(const DotsPicture& picture);
   bool take_step(const DotsPicture& picture);
   void hold(PictureFault fault);

@@ -14,7 +14,7 @@ namespace touchstone::sensors {
 /// Why a frame's statistics can't be believed.
 enum class ChipFault {
   none,
-  impossible,  ///< no chip can have told this: registers out of range, a disturbed line
+  impossible,  ///< no chip can have sent this: registers out of range, a disturbed line
   dark,        ///< all pixels are black: no lamp
   saturated,   ///< the darkest pixel is white: light from outside, or a lamp's supply
   flat,        ///< all pixels are alike: no dots in view

@@ -9,7 +9,7 @@ namespace touchstone::sensors {
 
 ShearLaw fit_shear_law(std::span<const ShearSample> samples) {
   constexpr std::size_t kLeast = 8;
-  constexpr double kLeastPivot = 1e-6;  // of the largest: below it a figure can't be told from the others
+  constexpr double kLeastPivot = 1e-6;  // of the largest: below it a figure can't be separated from the others
   if (samples.size() < kLeast) fail("shear law: {} samples, at least {} are needed", samples.size(), kLeast);
   const auto count = static_cast<Eigen::Index>(samples.size());
   Eigen::Matrix<double, Eigen::Dynamic, 4> terms(count, 4);

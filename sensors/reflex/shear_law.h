@@ -28,7 +28,7 @@ struct ShearSample {
 };
 
 /// Least squares. @throws Error for fewer than 8 samples, values that aren't finite, or displacements and normal forces
-/// that can't tell the eight figures from each other (all along one line, or all of one normal force)
+/// that don't identify the eight figures (all along one line, or all of one normal force)
 ShearLaw fit_shear_law(std::span<const ShearSample> samples);
 
 }  // namespace touchstone::sensors

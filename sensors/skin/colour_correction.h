@@ -38,7 +38,7 @@ struct ColourMatrix {
   Eigen::Vector3d lab(const Eigen::Vector3d& rgb) const;
 };
 
-/// One row a patch. @throws Error for fewer than three patches, or if they don't tell the matrix
+/// One row a patch. @throws Error for fewer than three patches, or if they don't determine the matrix
 ColourMatrix fit_colour_matrix(const Eigen::MatrixX3d& rgb, const Eigen::MatrixX3d& xyz);
 
 }  // namespace touchstone::sensors

@@ -1,5 +1,6 @@
 #pragma once
-// A force's waveform as a picture of its frequencies over time: what [VisioHaptic2024, sec. 2.3.1] tells softness from
+// A force's waveform as a picture of its frequencies over time: what [VisioHaptic2024, sec. 2.3.1] classifies softness
+// from
 // ("FFT to transform the force sensor waveforms into frequency fluctuated images"). Neither windows nor scale are in
 // the paper.
 

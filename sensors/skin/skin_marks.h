@@ -1,6 +1,6 @@
 #pragma once
-// Tells erythema from purpura as dermatologists do with a glass (diascopy): from a frame before and a frame under
-// pressure. What fades is blood in vessels, what stays isn't.
+// Distinguishes erythema from purpura as dermatologists do with a glass (diascopy): from a frame before and a frame
+// under pressure. What fades is blood in vessels, what stays isn't.
 //
 // The measure is an erythema index as narrow-band meters use it [Diffey1984]: 100 log10 of red by green, since
 // haemoglobin takes green and leaves red. As a ratio it knows nothing of shading, fall-off or whether the gel wets the
@@ -41,7 +41,7 @@ struct SkinMarkSettings {
   double bead_px = 44.0;        ///< dark things narrower than this are beads (0.5 mm and the blur): left out
   double blanched_share = 0.5;  ///< from there on it's erythema
   /// Behind gel that wets it a skin is darker than behind air, by about the gel's index squared. A mark that keeps more
-  /// than this part of its light isn't touched, and is unknown. 0: don't look (for a first frame in which the skin is
+  /// than this part of its light isn't touched, and is unknown. 0: no check (for a first frame in which the skin is
   /// wetted already).
   double wetted_part = 0.8;
 };

@@ -13,7 +13,7 @@ constexpr double kTukey = 4.685;           // of the residuals' sigma: 95 % effi
 constexpr double kSigmaOfMedian = 1.4826;  // of normal residuals' median absolute value
 constexpr std::size_t kLeastOverlapPixels = 50;
 constexpr double kRounding_mm = 1e-6;  // detail below is what single precision leaves of a plane
-constexpr double kWorse = 0.02;        // correlation lost on the way: robust weights may cost a little of it
+constexpr double kWorse = 0.02;        // correlation lost by the alignment: robust weights may cost a little of it
 
 /// A pixel of `from` that is looked up in `to`.
 struct Sample {

@@ -1,7 +1,7 @@
 #pragma once
 // Direct alignment: the isometry under which two height images agree best, found from a nearby one by Gauss-Newton
-// steps on all their pixels ([Lucas1981], on SE(2)). Keypoints stand on whole pixels of a scale space and tell a pose
-// to a part of a pixel at best; all pixels together tell it finer.
+// steps on all their pixels ([Lucas1981], on SE(2)). Keypoints stand on whole pixels of a scale space and give a pose
+// to a part of a pixel at best; all pixels together give it finer.
 
 #include "sensors/touch_map/planar_pose.h"
 #include "sensors/touch_map/relief_detail.h"

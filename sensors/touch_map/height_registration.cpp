@@ -52,7 +52,7 @@ std::vector<Candidate> candidates_of(const DescribedSurface& from, const Describ
 }
 
 /// The best correlation elsewhere: of the other candidates that aren't the same pose after all, and of the pose moved a
-/// little any way, which an edge or a grating wouldn't show.
+/// little in any direction, which an edge or a grating wouldn't show.
 double rival_of(const Candidate& best, const std::vector<Candidate>& candidates, const DescribedSurface& from,
                 const DescribedSurface& to, const std::vector<PointPair>& pairs, const RegistrationSettings& settings) {
   const PlanarPose& pose = best.heights.to_from_from;
@@ -65,9 +65,9 @@ double rival_of(const Candidate& best, const std::vector<Candidate>& candidates,
   }
   constexpr int kDirections = 8;
   for (int i = 0; i < kDirections; ++i) {
-    const double way = 2.0 * kPi * i / kDirections;
+    const double angle = 2.0 * kPi * i / kDirections;
     PlanarPose moved = pose;
-    moved.translation += settings.elsewhere_mm * Eigen::Vector2d(std::cos(way), std::sin(way));
+    moved.translation += settings.elsewhere_mm * Eigen::Vector2d(std::cos(angle), std::sin(angle));
     rival = std::max(rival, compare(from.detail, to.detail, moved, settings.alignment).correlation);
   }
   return rival;

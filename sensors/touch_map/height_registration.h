@@ -28,8 +28,8 @@ struct RegistrationSettings {
   double elsewhere_angle = 0.1;  ///< radians
   double least_share = 0.4;      ///< of the best candidate's inliers, for another to be one
   /// Ours: what the best pose leaves unexplained (1 - correlation), as a share of what the next candidate leaves, or
-  /// the pose moved by `elsewhere_mm` any way; more is ambiguous. Turned by half a turn, a plug still correlates by
-  /// 0.7.
+  /// the pose moved by `elsewhere_mm` in any direction; more is ambiguous. Turned by half a turn, a plug still
+  /// correlates by 0.7.
   double most_rival_share = 0.75;
   double least_overlap = 0.25;     ///< ours: share of the touch that must lie on the map
   bool refine = true;              ///< ours: the pose by direct alignment of the heights; else the features' one
@@ -73,7 +73,7 @@ struct DescribedSurface {
   HeightFeatures features;
 };
 
-/// A pure function of its arguments. Where the outcome isn't `localised`, what was found on the way is told all the
+/// A pure function of its arguments. Where the outcome isn't `localised`, what was found until then is given all the
 /// same. @throws Error where the pixels' pitches differ by more than 1 %
 Registration register_surfaces(const DescribedSurface& from, const DescribedSurface& to,
                                const RegistrationSettings& settings);

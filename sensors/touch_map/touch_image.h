@@ -1,5 +1,5 @@
 #pragma once
-// What one touch tells of the surface that was touched: heights over the sensor's pixels.
+// What one touch gives of the surface that was touched: heights over the sensor's pixels.
 //
 // Touch frame: origin at the image's centre, x along its rows (u, right), y along its columns (v, down), mm. So a
 // positive angle turns clockwise as the image is looked at. Pixel (column u, row v) has its centre at
@@ -18,7 +18,7 @@ struct TouchImage {
   double mm_per_px = 0.0;  ///< of both axes
 };
 
-/// A touch whose contact is told by height alone: where it is above `contact_above_mm`.
+/// A touch whose contact is given by height alone: where it is above `contact_above_mm`.
 /// @throws Error as `check` does
 TouchImage touch_by_height(const cv::Mat& height_mm, double mm_per_px, double contact_above_mm);
 

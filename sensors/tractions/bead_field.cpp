@@ -24,7 +24,7 @@ Eigen::Vector2d BeadView::lateral_mm(const Eigen::Vector2d& motion_px) const {
 
 BeadView view_of(std::span<const Eigen::Vector2d> rest_px, const MarkerCompliance& compliance) {
   check_number(rest_px.size(), "rest", compliance);
-  if (rest_px.size() < 2) fail("beads: one bead alone tells no scale");
+  if (rest_px.size() < 2) fail("beads: one bead alone gives no scale");
   Eigen::Vector2d mean_px = Eigen::Vector2d::Zero(), mean_mm = Eigen::Vector2d::Zero();
   const double count = static_cast<double>(rest_px.size());
   for (std::size_t i = 0; i < rest_px.size(); ++i) {

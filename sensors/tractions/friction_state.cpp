@@ -82,7 +82,7 @@ void FrictionObserver::restart() {
   slid_.clear();
 }
 
-const FrictionState& FrictionObserver::look(const MarkerField& field, const TractionField& tractions) {
+const FrictionState& FrictionObserver::update(const MarkerField& field, const TractionField& tractions) {
   const std::size_t count = field.displacement.size();
   if (field.measured.size() != count || tractions.markers.size() != count) {
     fail("friction: the field has {} markers, the tractions are of {}", count, tractions.markers.size());
@@ -266,7 +266,7 @@ void FrictionObserver::read_friction() {
     result_.friction = FrictionEstimate{value, std::hypot(1.0 / std::sqrt(weight), kCommonError * value), true};
     return;
   }
-  if (!slid_.empty() || result_.state != ContactSlip::kPartial) return;  // what slid as a whole told more
+  if (!slid_.empty() || result_.state != ContactSlip::kPartial) return;  // what slid as a whole gave more
   double weight = 0.0, sum = 0.0;
   for (const MarkerFriction& marker : result_.markers) {
     if (marker.state != MarkerSlip::kSlip || !marker.lag || marker.ratio_error <= 0.0) continue;

@@ -3,7 +3,7 @@
 // asks for ("the local friction coefficient, the ratio between the lateral shear stress and the normal stress").
 //
 // What can be seen. Coulomb's coefficient shows only where something slips: |q| = mu p there, |q| < mu p elsewhere. Two
-// things tell slip, both in material coordinates (where the gel was at rest), in which a sticking contact can't move:
+// things show slip, both in material coordinates (where the gel was at rest), in which a sticking contact can't move:
 // - Of a part: as the object is dragged, markers that stick under it all move as one rigid body; those that slip lag
 //   behind. Those that went furthest, a third of them, are taken for the object; a marker's lag is the part of their
 //   motion, along it, that it doesn't take part in.
@@ -91,7 +91,7 @@ class FrictionObserver {
 
   /// `tractions` is what TractionInversion made of `field`. Where nothing is in contact, all before is forgotten.
   /// @throws Error if the two don't belong to the same number of markers, or the number has changed
-  const FrictionState& look(const MarkerField& field, const TractionField& tractions);
+  const FrictionState& update(const MarkerField& field, const TractionField& tractions);
 
   /// Forgets all frames.
   void restart();

@@ -1,6 +1,6 @@
 #pragma once
 // Marker displacements as a camera sees them, for inversion. Off the camera's axis a press shows as a shift as well
-// (ViewParallax). To undo that takes the press, which hue hardly tells where a wide object stretches no marker; what is
+// (ViewParallax). To undo that takes the press, which hue hardly shows where a wide object stretches no marker; what is
 // seen laterally is then better inverted as it is, with a compliance of what is seen.
 
 #include "sensors/colour/marker_change.h"
@@ -9,7 +9,7 @@
 
 namespace touchstone::sensors {
 
-/// Lateral displacements as seen; normal ones stay. Exactly what HueEstimator was told where it undid `parallax`.
+/// Lateral displacements as seen; normal ones stay. Exactly what HueEstimator measured before it undid `parallax`.
 /// @throws Error if field and compliance aren't of the same markers
 MarkerField as_seen(MarkerField field, const MarkerCompliance& compliance, const ViewParallax& parallax);
 

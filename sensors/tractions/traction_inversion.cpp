@@ -132,7 +132,7 @@ TractionInversion::TractionInversion(MarkerCompliance compliance, const Traction
   }
   const Eigen::LLT<Eigen::MatrixXd> factor(correlation_);
   if (factor.info() != Eigen::Success) {
-    fail("correlation is {}: so smooth that tractions on patches of {} mm can't be told apart", settings_.correlation,
+    fail("correlation is {}: so smooth that tractions on patches of {} mm can't be separated", settings_.correlation,
          compliance_.patch_side);
   }
   inverse_correlation_ = factor.solve(Eigen::MatrixXd::Identity(patches, patches));

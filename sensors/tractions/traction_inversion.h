@@ -2,7 +2,7 @@
 // From how a gel's markers moved to the tractions that moved them, and so to the force: what [Lin2019] leaves open
 // ("IV. suitable means of measuring the force").
 //
-// Linear: displacement d = A t + noise, A from sensors/tractions/marker_compliance.h. The markers don't tell t by
+// Linear: displacement d = A t + noise, A from sensors/tractions/marker_compliance.h. The markers don't determine t by
 // themselves: a gel of nu = 0.5 bonded to its plate hardly moves under an even pressure, and what is finer than a
 // marker spacing escapes them. So three things are added, in Bayes' terms:
 // - Smoothness: tractions are taken for a random field of zero mean, of standard deviation `scale` * E and covariance
@@ -19,7 +19,7 @@
 // small or too large by more (docs/sensors/chroma-force.md has the figures).
 //
 // Signs: tractions are those on the gel, wrenches those on the object that touches it (a press has Fz > 0), both in the
-// gel frame, as fem::PressState tells them.
+// gel frame, as fem::PressState gives them.
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>

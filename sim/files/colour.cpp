@@ -72,10 +72,12 @@ render::Spectrum in_bands(const Colour& colour, const SceneBands& bands, const c
     return render::band_means(*colour.curve, *bands.ranges);
   }
   const auto given = static_cast<int>(colour.numbers.size());
-  if (given == 1) return render::flat_spectrum(bands.count(), colour.numbers[0]);
+  const bool grey = std::ranges::all_of(colour.numbers, [&](double value) { return value == colour.numbers.front(); });
+  if (grey) return render::flat_spectrum(bands.count(), colour.numbers[0]);
   if (given != bands.count()) {
-    fail_at(colour.where, "{}: has {} numbers, but the scene has {} bands; allowed is one number for all, {}{}", what,
-            given, bands.count(), bands.count() > 1 ? fmt::format("or {}", bands.count()) : "no list",
+    fail_at(colour.where, "{}: has {} numbers, but the scene has {} bands; allowed is one number for all, {}{}, or, "
+            "for what reflects, an sRGB colour such as '#c29a84'",
+            what, given, bands.count(), bands.count() > 1 ? fmt::format("or {}", bands.count()) : "no list of others",
             bands.ranges ? ", or a spectrum's file" : "");
   }
   return Eigen::Map<const Eigen::ArrayXd>(colour.numbers.data(), given);

@@ -164,7 +164,7 @@ class GltfSolid {
       open.pop_back();
       if (index < 0 || index >= static_cast<int>(model_.nodes.size()))
         refuse("names node {}, which isn't there", index);
-      if (visited_[index]) refuse("node {} hangs in the tree of nodes twice", index);
+      if (visited_[index]) refuse("node {} is in the tree of nodes twice", index);
       visited_[index] = true;
       const tinygltf::Node& node = model_.nodes[index];
       const Eigen::Affine3d transform = parent * transform_of(node, index);
@@ -213,9 +213,9 @@ class GltfSolid {
     // Each length is compared with what is left, so that no sum can overflow.
     const bool view_fits = view.byteOffset <= data.size() && view.byteLength <= data.size() - view.byteOffset;
     const bool starts = view_fits && accessor.byteOffset <= view.byteLength;
-    const std::size_t room = starts ? view.byteLength - accessor.byteOffset : 0;
+    const std::size_t available = starts ? view.byteLength - accessor.byteOffset : 0;
     const bool fits =
-        accessor.count == 0 || (room >= element_size && accessor.count - 1 <= (room - element_size) / stride);
+        accessor.count == 0 || (available >= element_size && accessor.count - 1 <= (available - element_size) / stride);
     if (!view_fits || !starts || stride < element_size || !fits) {
       refuse("accessor {} ({} elements) reaches beyond its buffer", index, accessor.count);
     }

@@ -30,7 +30,7 @@ struct GltfCamera {
 
 /// The bytes of a .glb. Vertices are stored in mm of the gel frame, rounded to float; a root node `gel frame, mm` takes
 /// them to glTF's metres with y up (gel +z is up, gel +y towards -z). Parts without triangles are left out. Cameras
-/// hang beside that root, as glTF wants them unscaled. The same parts give the same bytes.
+/// stand beside that root, as glTF wants them unscaled. The same parts give the same bytes.
 /// @throws Error for a vertex that isn't finite, or more than 4 GB
 std::string glb_bytes(const std::vector<GltfPart>& parts, const std::vector<GltfCamera>& cameras);
 

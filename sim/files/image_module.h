@@ -23,7 +23,7 @@ struct TouchstoneImageToWrite {
   const char* const* metadata_values;
 };
 
-/// What a file holds, as its reader is told before pixels are read.
+/// What a file holds, as its reader learns before pixels are read.
 struct TouchstoneImageInfo {
   int width, height, channels;
   TouchstoneDepth depth;

@@ -70,12 +70,12 @@ Samples samples_of(const Eigen::Vector3d& coefficients, Eigen::Matrix<double, kS
 /// The spectrum of the family that looks like `xyz`. Newton's method, led from grey to the colour in small steps: the
 /// corners' spectra are nearly rectangles.
 Samples spectrum_of(const Eigen::Vector3d& xyz) {
-  constexpr int kWay = 64;
+  constexpr int kContinuation = 64;
   constexpr int kMostIterations = 50;
   constexpr double kClose = 1e-12;
   Eigen::Vector3d coefficients = Eigen::Vector3d::Zero();
-  for (int step = 1; step <= kWay; ++step) {
-    const double part = static_cast<double>(step) / kWay;
+  for (int step = 1; step <= kContinuation; ++step) {
+    const double part = static_cast<double>(step) / kContinuation;
     const Eigen::Vector3d target = (1.0 - part) * 0.5 * kD65White + part * xyz;
     for (int i = 0; i < kMostIterations; ++i) {
       Eigen::Matrix<double, kSteps + 1, 3> derivative;

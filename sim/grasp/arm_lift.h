@@ -13,7 +13,7 @@ struct ArmLiftSettings {
 /// @throws Error for a setting that isn't above zero and finite
 void check(const ArmLiftSettings& settings);
 
-/// The arm stands until it is first told to lift, and stops with the same acceleration where it's told no longer.
+/// The arm stands until it is first commanded to lift, and stops with the same acceleration where it isn't any longer.
 class ArmLift {
  public:
   /// An arm that stands at height 0. @throws Error as check()

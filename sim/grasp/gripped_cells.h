@@ -20,7 +20,7 @@ namespace touchstone::sim {
 
 inline constexpr int kAlong = 6;                   ///< degree of the smooth field along the flat
 inline constexpr int kAcross = 2;                  ///< across it
-inline constexpr std::array kDecays = {0.5, 1.5};  ///< thicknesses over which the piece's ends count
+inline constexpr std::array kDecays = {0.5, 1.5};  ///< thicknesses over which the piece's ends have an effect
 inline constexpr int kTerms =
     (kAlong + 1 + 2 * static_cast<int>(kDecays.size())) * (kAcross + 1);  ///< of the smooth field
 

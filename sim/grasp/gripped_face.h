@@ -13,7 +13,7 @@
 // answers the cells' pressure, and what it doesn't know (the piece's height and sides, the pad's ends) is taken from
 // the press, as a smooth field: displacements there less the layer's to the same pressure, fitted by polynomials.
 //
-// How stiff the membrane is hangs on how the flat's rims lie in the mesh: 0.0162 to 0.0188 mm/N with edges of 0.5 mm,
+// How stiff the membrane is depends on how the flat's rims lie in the mesh: 0.0162 to 0.0188 mm/N with edges of 0.5 mm,
 // where an endless layer of cells has 0.0172. A servo of 0.53 mm/N behind it doesn't notice.
 //
 // What friction adds is the shear's displacement: the piece sticks, and the membrane under it goes along by the mean of

@@ -73,7 +73,7 @@ void Gripper::step_to(double sunk) {
   target.axis = {fem::AxisControl::at(start_.x()), fem::AxisControl::at(start_.y() - sunk),
                  fem::AxisControl::at(start_.z() - state_.finger_travel_mm)};
   const fem::PressState& press = press_.step(target);
-  const double way = sunk - state_.sunk_mm;
+  const double step = sunk - state_.sunk_mm;
   state_.sunk_mm = sunk;
   state_.normal_force_N = press.wrench[2];
   state_.friction_N = press.wrench[1];
@@ -82,7 +82,7 @@ void Gripper::step_to(double sunk) {
   state_.crushed = state_.peak_normal_force_N > body_.crush_force_N;
   state_.slipping = state_.touched && !anything_sticks(press) &&
                     std::abs(state_.friction_N) >= kAllFriction * body_.friction * state_.normal_force_N;
-  if (state_.slipping) state_.slid_mm += std::abs(way);
+  if (state_.slipping) state_.slid_mm += std::abs(step);
 }
 
 /// Sinks or lifts the object until the fingers' friction is `load`. False where it slides before.
@@ -94,11 +94,11 @@ bool Gripper::balance(double load) {
     if (!state_.touched || (missing > 0.0 && state_.slipping)) return false;
     // What has begun to slip gives way ever more, but comes back as stiff as it was at first.
     const double softness = missing > 0.0 ? stiffness : stiffness_;
-    double way = softness > 0.0 ? missing / softness : std::copysign(kFirstMotion_mm, missing);
-    way = std::clamp(way, -kLongestMotion_mm, kLongestMotion_mm);
+    double step = softness > 0.0 ? missing / softness : std::copysign(kFirstMotion_mm, missing);
+    step = std::clamp(step, -kLongestMotion_mm, kLongestMotion_mm);
     const double before = state_.friction_N;
-    step_to(state_.sunk_mm + way);
-    const double found = (state_.friction_N - before) / way;
+    step_to(state_.sunk_mm + step);
+    const double found = (state_.friction_N - before) / step;
     if (stiffness_ == 0.0 && found > 0.0) stiffness_ = stiffness = found;
     if (missing > 0.0) stiffness = std::max(found, kSoftening * stiffness);
   }
@@ -139,7 +139,7 @@ void Gripper::slide(double arm_acceleration, double seconds) {
   sliding_ = !balance(half_load(arm_acceleration));
 }
 
-void Gripper::take_table_away() {
+void Gripper::remove_table() {
   table_ = false;
   state_.on_table = false;
 }
@@ -156,7 +156,7 @@ void Gripper::release() {
 
 const GripperState& Gripper::advance(double close_by_mm, double arm_acceleration, double seconds) {
   if (!std::isfinite(close_by_mm) || !std::isfinite(arm_acceleration)) {
-    fail("the gripper is told to close by {} mm and to accelerate by {} mm/s^2", close_by_mm, arm_acceleration);
+    fail("the gripper is commanded to close by {} mm and to accelerate by {} mm/s^2", close_by_mm, arm_acceleration);
   }
   if (!(seconds > 0.0) || !std::isfinite(seconds)) fail("an interval of {} s, it must be above 0 and finite", seconds);
   const double travel_end = state_.finger_travel_mm + close_by_mm;

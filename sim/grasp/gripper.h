@@ -43,7 +43,7 @@ struct GripperState {
   double finger_travel_mm = 0.0;  ///< each finger has closed by that
   double arm_height_mm = 0.0;
   double arm_speed_mm_s = 0.0;
-  double sunk_mm = 0.0;             ///< the object's way down relative to the fingers
+  double sunk_mm = 0.0;             ///< the object's motion down relative to the fingers
   double slid_mm = 0.0;             ///< that part of it that it slid as a whole
   double sliding_speed_mm_s = 0.0;  ///< relative to the fingers, down; 0 while any of the contact sticks
   double object_height_mm = 0.0;    ///< over where it stood; 0 when it was dropped
@@ -70,7 +70,7 @@ class Gripper {
   const GripperState& advance(double close_by_mm, double arm_acceleration_mm_s2, double seconds);
 
   /// From now on nothing but the fingers carries the object.
-  void take_table_away();
+  void remove_table();
 
   const GripperState& state() const { return state_; }
   const fem::PressState& press() const { return press_.state(); }

@@ -1,6 +1,6 @@
 #pragma once
 // The piezoresistive film that the force estimates are trained and judged against ([Naeini2020, sec. V.B]: FlexiForce
-// A201 on the dynamic finger under a layer of silicone), with its errors: what it tells isn't the force.
+// A201 on the dynamic finger under a layer of silicone), with its errors: what it reads isn't the force.
 //
 // Figures of its public data sheet [FlexiForceA201]: linearity +-3 % and hysteresis < 4.5 % of full scale,
 // repeatability +-2.5 %, drift < 5 % per decade of time, response < 5 us. The paper adjusted it to 111 N and used 3.7 N
@@ -18,7 +18,7 @@ namespace touchstone::sim {
 /// The film's errors; 0 turns off each of them that can be.
 struct ReferenceForceSensorSettings {
   double window_s = 0.007;  ///< one reading each (sec. V.B)
-  /// The reading on the way back from a peak P less that on the way there is this part of P at no force, where it is
+  /// The reading on unloading from a peak P less that on loading is this part of P at no force, where it is
   /// largest. Rate-independent; see HysteresisLoop.
   double hysteresis = 0.045;
   double gain_error = 0.025;       ///< repeatability: each grasp has its gain within 1 +- that

@@ -130,8 +130,8 @@ FingerRun play_servo_finger(const GrippedFace& face, const ServoFingerSettings& 
       commanded = std::max(0, steps - static_cast<int>(std::min<double>(opened, steps)));
     } else if (now >= motion.rest_s) {
       phase = now < closed_s ? FingerPhase::closing : FingerPhase::holding;
-      const double told = std::floor((now - motion.rest_s) * motion.closing_mm_s / step_mm) + 1.0;
-      commanded = static_cast<int>(std::min<double>(told, steps));
+      const double due = std::floor((now - motion.rest_s) * motion.closing_mm_s / step_mm) + 1.0;
+      commanded = static_cast<int>(std::min<double>(due, steps));
     }
     if (k % shake_every == 0 && shake_N > 0.0) shake = shake_N * numbers.normal();
 

@@ -27,8 +27,8 @@ struct ServoFingerSettings {
   double ring_Hz = 25.0;             ///< of the free finger on the servo's spring: some 75 g
   double damping = 0.10;             ///< of it, of critical
   double loss_s = 0.5e-3;            ///< tau: at 50 Hz a loss tangent of 0.16; soft silicones have 0.1 to 0.2
-  double shake_um = 3.0;             ///< RMS motion of the free finger by what shakes its bench
-  double largest_closing_mm = 30.0;  ///< beyond the start: the servo is told no more
+  double shake_um = 3.0;             ///< RMS motion of the free finger by what shakes its mount
+  double largest_closing_mm = 30.0;  ///< beyond the start: the servo is commanded no further
   double time_step_s = 5e-5;
 };
 
@@ -54,7 +54,7 @@ struct FingerMoment {
   double speed_mm_s = 0.0;
   double acceleration_mm_s2 = 0.0;
   double force_N = 0.0;                      ///< on the piece, along the finger's normal, with the silicone's loss
-  FingerPhase phase = FingerPhase::resting;  ///< what the servo has been told
+  FingerPhase phase = FingerPhase::resting;  ///< what the servo has been commanded
 };
 
 /// One grasp, from before the touch until the finger is off the piece.
@@ -62,7 +62,7 @@ struct FingerRun {
   std::vector<FingerMoment> moments;  ///< evenly in time, from 0 on
   double static_force_N = 0.0;        ///< at rest on the last closing step
   double first_touch_s = 0.0;
-  double release_s = 0.0;  ///< when the servo is told to open
+  double release_s = 0.0;  ///< when the servo is commanded to open
   double apart_s = 0.0;    ///< the last moment of contact
 };
 

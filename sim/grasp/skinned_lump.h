@@ -2,8 +2,8 @@
 // A lump under a skin, as dermatologists feel for: a domed piece of one material, glued to a plate on its back, with a
 // layer of another over it ([VisioHaptic2024, sec. 2.3]: benchmark materials under a pseudo-skin of 2 mm).
 //
-// Both materials are linear elastic with one Poisson's ratio, so the piece's answer hangs on the ratio of their moduli,
-// and its stiffness on the skin's besides: one set-up serves all pieces of a ratio.
+// Both materials are linear elastic with one Poisson's ratio, so the piece's answer depends on the ratio of their
+// moduli, and its stiffness on the skin's besides: one set-up serves all pieces of a ratio.
 
 #include <filesystem>
 #include <memory>
@@ -41,7 +41,7 @@ std::shared_ptr<const fem::Compliance> as_pressing_body(const SkinnedLump& lump,
 /// A plate for lumps whose skin has 1 MPa: a pad a thousand times as stiff, which gives way by less than a hundredth of
 /// what they do. So a plate meets a lump as a gel does, flat against round: a press that took the dome for the gel
 /// would let contact act along its normals, and be a quarter too stiff at a sixth of the radius. Its edges are longer
-/// than the lump's: without a give of its own a finer one would ask for more than the lump's vertices can tell.
+/// than the lump's: without a give of its own a finer one would ask for more than the lump's vertices can resolve.
 std::shared_ptr<const fem::Compliance> set_up_plate(const SkinnedLump& lump, const std::filesystem::path& cache_folder);
 
 /// Its `count` lowest modes for the same moduli and a density in kg/m^3, cached likewise. With s times both moduli

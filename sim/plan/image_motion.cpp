@@ -31,7 +31,7 @@ struct Reach {
 };
 
 /// What is known of one axis while its keys are gone through.
-struct AxisWay {
+struct AxisTrack {
   double position_mm = 0.0;  // as last led
   double force_N = 0.0;
   bool by_force = false;
@@ -39,16 +39,16 @@ struct AxisWay {
   /// mm that the key leads it.
   double go(const AxisKey& key, double stiffness) {
     if (key.position_mm) {
-      const double way = std::abs(*key.position_mm - position_mm);
+      const double distance = std::abs(*key.position_mm - position_mm);
       position_mm = *key.position_mm;
       by_force = false;
       force_N = 0.0;
-      return way;
+      return distance;
     }
-    const double way = std::abs(*key.force_N - force_N) / stiffness;
+    const double distance = std::abs(*key.force_N - force_N) / stiffness;
     force_N = *key.force_N;
     by_force = true;
-    return way;
+    return distance;
   }
 };
 
@@ -108,8 +108,8 @@ MotionSpeed motion_speed(const SceneSpec& scene) {
   for (const MovedObject& moved : moved_objects(scene)) {
     const Reach reach(moved.object);
     const double stiffness = gel.youngs_modulus_MPa * reach.from_axis / (1.0 - gel.poisson_ratio * gel.poisson_ratio);
-    AxisWay ways[3];
-    for (int a = 0; a < 3; ++a) ways[a].position_mm = moved.motion.start_mm[a];
+    AxisTrack tracks[3];
+    for (int a = 0; a < 3; ++a) tracks[a].position_mm = moved.motion.start_mm[a];
     Eigen::Vector3d angles_deg = moved.motion.start_angles_deg;
     for (const MotionKey& key : moved.motion.keys) {
       const double seconds = key.frames / moved.motion.frame_rate_Hz;
@@ -117,8 +117,8 @@ MotionSpeed motion_speed(const SceneSpec& scene) {
       const std::optional<AxisKey>* const axes[3] = {&key.x, &key.y, &key.z};
       for (int a = 0; a < 3; ++a) {
         if (!*axes[a]) continue;
-        velocity[a] = ways[a].go(**axes[a], stiffness) / seconds;
-        speed.led_by_force = speed.led_by_force || (ways[a].by_force && velocity[a] > 0.0);
+        velocity[a] = tracks[a].go(**axes[a], stiffness) / seconds;
+        speed.led_by_force = speed.led_by_force || (tracks[a].by_force && velocity[a] > 0.0);
       }
       if (key.vibration) {
         velocity[static_cast<int>(key.vibration->axis)] +=

@@ -10,14 +10,14 @@ namespace touchstone::sim {
 namespace {
 
 // Between kept states all runs straight. A point of the gel that the object meets in between is then off by at most a
-// quarter of the way, and a vibration is a polygon that lacks 4 % of its height.
-constexpr double kWayBetweenStates_mm = 0.02;
+// quarter of the travel, and a vibration is a polygon that is 4 % less high.
+constexpr double kTravelBetweenStates_mm = 0.02;
 constexpr double kStatesAPeriod = 12.0;
-constexpr int kStatesUnderForce = 4;  // the way isn't known beforehand
+constexpr int kStatesUnderForce = 4;  // the travel isn't known beforehand
 constexpr int kMostStates = 64;
 
 int states_a_frame(const SceneSpec& scene, const MotionSpeed& speed) {
-  double states = speed.mm_per_s / scene.motion.frame_rate_Hz / kWayBetweenStates_mm;
+  double states = speed.mm_per_s / scene.motion.frame_rate_Hz / kTravelBetweenStates_mm;
   for (const MovedObject& moved : moved_objects(scene)) {
     states = std::max(states, kStatesAPeriod * moved.motion.highest_vibration_Hz() / scene.motion.frame_rate_Hz);
   }
@@ -84,7 +84,7 @@ void plan_time(const SceneSpec& scene, Plan& plan, PlanTable& table) {
   plan.events = table.add("event pixels", scene.outputs.events,
                           scene.outputs.events ? "a stream of events is asked for" : "no events are asked for",
                           "a picture of what changes for every half threshold that a pixel passes");
-  // At finite strain a state costs more than all its light, and exposures do with straight ways from frame to frame.
+  // At finite strain a state costs more than all its light, and exposures do with straight paths from frame to frame.
   const bool exposed = (plan.motion_blur || plan.rolling_shutter) && !plan.finite_strain;
   if (exposed || plan.events) plan.states_a_frame = states_a_frame(scene, speed);
   if (plan.events && scene.motion.frame_rate_Hz * plan.states_a_frame > kMicrosecondsPerSecond) {

@@ -94,7 +94,7 @@ std::vector<render::SpectralCurve> distinct(const std::vector<render::SpectralCu
   return out;
 }
 
-/// The light and its ways.
+/// The light and its paths.
 struct LightPaths {
   std::vector<render::SpectralPath> paths;
   std::optional<render::SpectralCurve> light;

@@ -7,7 +7,7 @@ namespace touchstone::sim {
 
 /// The bands that a scene's light is carried in. A device without `bands` has its band_wavelengths_nm; with them the
 /// edges are put where the light's own curves are steep, and without a count the fewest of 1, 3, 8 and 16 are taken
-/// that hold the tolerance on every way from a lamp over a coloured thing (twice through the film, if there is one)
+/// that hold the tolerance on every path from a lamp over a coloured thing (twice through the film, if there is one)
 /// into each of the camera's channels.
 /// @throws Error if a lamp or the camera says nothing of the bands' range
 SceneBands choose_bands(const SceneSpec& scene);

@@ -46,8 +46,8 @@ std::string gel_key(const DeviceSpec& device) {
   return goal ? fem::compliance_key(body, *goal, materials, beads) : fem::compliance_key(body, materials, beads);
 }
 
-void keep_gel_of_unit_modulus(const DeviceSpec& device, const std::filesystem::path& cache_folder,
-                              const Progress& progress) {
+void cache_gel_of_unit_modulus(const DeviceSpec& device, const std::filesystem::path& cache_folder,
+                               const Progress& progress) {
   std::error_code ignored;
   if (cache_folder.empty() || !device.gel.layers.empty()) return;
   if (std::filesystem::exists(fem::compliance_file(cache_folder, gel_key(device)), ignored)) return;

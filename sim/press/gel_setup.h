@@ -37,7 +37,7 @@ std::string gel_key(const DeviceSpec& device);
 /// For who is about to set up many gels that differ in their modulus alone: keeps the one of 1 MPa that they are made
 /// from, unless the device's own is there. Without it each is worked out anew. Nothing is kept for gels with layers,
 /// whose moduli would have to vary together. @throws Error as set_up_gel()
-void keep_gel_of_unit_modulus(const DeviceSpec& device, const std::filesystem::path& cache_folder,
-                              const Progress& progress = {});
+void cache_gel_of_unit_modulus(const DeviceSpec& device, const std::filesystem::path& cache_folder,
+                               const Progress& progress = {});
 
 }  // namespace touchstone::sim

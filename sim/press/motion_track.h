@@ -1,5 +1,5 @@
 #pragma once
-// One object's way along its motion, as targets of a press.
+// One object's path along its motion, as targets of a press.
 
 #include <Eigen/Core>
 #include <array>

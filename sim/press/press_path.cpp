@@ -42,7 +42,7 @@ fem::ContactShape shape_of(const PressPath& path) {
 
 fem::PressState PlayedPath::state(double place) const {
   if (at.empty() || !(place >= at.front() && place <= at.back())) {
-    fail("the place {:.6g} isn't on the way, which {}{}{}", place,
+    fail("the place {:.6g} isn't on the path, which {}{}{}", place,
          at.empty() ? std::string("has no states") : fmt::format("goes from {:.6g} to {:.6g}", at.front(), at.back()),
          stopped.empty() ? "" : ": ", stopped);
   }

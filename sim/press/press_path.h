@@ -1,5 +1,5 @@
 #pragma once
-// Presses at finite strain along given ways, kept state by state: what takes seconds a state is done once and kept on
+// Presses at finite strain along given paths, kept state by state: what takes seconds a state is done once and kept on
 // disk, and pictures of any moment are made of what lies between two states.
 
 #include <Eigen/Core>
@@ -20,13 +20,13 @@ namespace touchstone::sim {
 /// Raised with each change of the file's layout, or of what fem::FinitePress answers.
 inline constexpr int kPressPathFormat = 2;
 
-/// A state that is wanted on the way.
+/// A state that is wanted on the path.
 struct PathPoint {
-  double at = 0.0;                                     ///< the motion's own parameter: a depth, a way, a time
+  double at = 0.0;                                     ///< the motion's own parameter: a depth, a travel, a time
   Eigen::Vector3d shift_mm = Eigen::Vector3d::Zero();  ///< gel frame, from where the object touches: z < 0 is into it
 };
 
-/// One rigid object's way, without a turn. It begins out of touch or from straight above the first point.
+/// One rigid object's path, without a turn. It begins out of touch or from straight above the first point.
 struct PressPath {
   std::variant<fem::SphereShape, fem::RoundedCylinder, fem::BoxShape> shape;
   double friction = 0.0;
@@ -45,7 +45,7 @@ struct PlayedPath {
   std::string stopped;                  ///< why there are no more, with the point; empty if all could be had
   std::string note;                     ///< of the cache; empty if there is nothing to say
 
-  /// The state at a place of the way, straight between two (state_between). @throws Error beyond the first or last
+  /// The state at a place of the path, straight between two (state_between). @throws Error beyond the first or last
   fem::PressState state(double place) const;
 };
 

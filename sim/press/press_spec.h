@@ -21,7 +21,7 @@ struct PressSpec {
   std::optional<double> height_mm = {};                  ///< of the object's origin at the end: gel frame's z
   Eigen::Vector2d drag_mm = Eigen::Vector2d::Zero();     ///< then moved along the gel, its force or height being held
   std::optional<Eigen::Vector2d> shear_N = {};           ///< or led aside until this force is on it; not beside drag_mm
-  /// Time of the way down and of the way aside, each; for gels that relax. Without it a step is a frame of the camera.
+  /// Time of the press and of the drag, each; for gels that relax. Without it a step is a frame of the camera.
   std::optional<double> seconds = {};
 };
 
@@ -32,7 +32,7 @@ void check(const PressSpec& press);
 /// "at (0, 0) mm with 2 N dragged by (0.1, 0) mm", for messages.
 std::string in_words(const PressSpec& press);
 
-/// Where the object just touches the undeformed gel on the press's way down: first_touch() of the object with all its
+/// Where the object just touches the undeformed gel on the press's path down: first_touch() of the object with all its
 /// relief. @throws Error as first_touch
 double first_touch(const PressSpec& press, const ObjectSpec& object, const GelSpec& gel);
 

@@ -106,7 +106,7 @@ struct TouchSession::Parts {
   }
 
   /// Refuses a pose that the last one can hardly have led to. Lifting off may be as fast as it likes.
-  void check_way(const fem::PressTarget& target) const {
+  void check_path(const fem::PressTarget& target) const {
     if (!(target.seconds > 0.0) || !std::isfinite(target.seconds)) {
       fail("a step of a session takes {} s; allowed is a finite time above 0", target.seconds);
     }
@@ -135,7 +135,7 @@ struct TouchSession::Parts {
   }
 
   const TouchReading& step(const fem::PressTarget& target) {
-    check_way(target);
+    check_path(target);
     reading = read(press->step(target), target.seconds);
     return reading;
   }

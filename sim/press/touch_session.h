@@ -1,7 +1,7 @@
 #pragma once
 // An object on a gel, step by step, for a control loop: a pose goes in, the wrench and what the contact does come out,
 // in milliseconds; the surface is worked out, and a picture can be made, only when it is asked for
-// (VirtualSensor::look(object, session.press(), ...)). Friction and relaxation remember all steps.
+// (VirtualSensor::touch(object, session, ...)). Friction and relaxation remember all steps.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -22,7 +22,7 @@ struct TouchSessionSettings {
   /// How far the object may go in a step that begins in contact, mm, turns included. More is taken for a mistake of the
   /// caller's (metres for millimetres, another frame's pose), unless it ends well off the gel.
   double largest_step_mm = 5.0;
-  /// Steps with friction are cut into parts of this length: friction depends on the way, not on its ends alone.
+  /// Steps with friction are cut into parts of this length: friction depends on the path, not on its ends alone.
   double largest_part_mm = 0.1;
 };
 
@@ -36,7 +36,7 @@ enum class TouchContact : std::uint8_t {
 /// "none", "sticking", "partly_slipping", "sliding"
 const char* name_of(TouchContact contact);
 
-/// What a step tells. Forces act on the object, gel frame: pressing gives a positive z.
+/// What a step gives. Forces act on the object, gel frame: pressing gives a positive z.
 struct TouchReading {
   std::int64_t step = 0;  ///< counted from 1; 0 before the first
   double t_s = 0.0;       ///< the steps' times, summed
@@ -51,7 +51,7 @@ struct TouchReading {
   bool under_resolved = false;  ///< see fem::PressState
 };
 
-/// What a state tells, by itself: its step and time are 0.
+/// What a state gives by itself: its step and time are 0.
 TouchReading reading_of(const fem::Compliance& gel, const fem::PressState& state);
 
 /// One object on one gel. Not for two threads at once; sessions on one gel are independent of each other.
@@ -65,7 +65,7 @@ class TouchSession {
   TouchSession(TouchSession&&) noexcept;
   TouchSession& operator=(TouchSession&&) noexcept;
 
-  /// Leads the object along the straight way to a pose within `seconds`. The first step places it there: a contact it
+  /// Leads the object along the straight path to a pose within `seconds`. The first step places it there: a contact it
   /// then has was made straight from above.
   /// @throws Error, the session being as before the step, for a time that isn't finite and above 0; a pose that isn't
   /// finite or whose rotation isn't one; a step beyond TouchSessionSettings; a pose deeper than the gel; an iteration
@@ -76,7 +76,7 @@ class TouchSession {
 
   /// Of the last step.
   const TouchReading& reading() const;
-  /// All that mechanics tells of the last step, with the surface's displacement: what VirtualSensor::look takes.
+  /// All that mechanics gives of the last step, with the surface's displacement: what VirtualSensor::touch takes.
   fem::PressState press() const;
   /// The error bars that belong to press().
   fem::PressError error(const fem::PressState& press) const;

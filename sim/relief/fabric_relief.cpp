@@ -74,7 +74,8 @@ double yarn_top(const FabricRelief& relief, const Yarn& yarn, double width, doub
   return top;
 }
 
-/// From -1 to 1: how a yarn lies that is at `low` at the last crossing and at `high` at the next, `t` of the way.
+/// From -1 to 1: how a yarn lies that is at `low` at the last crossing and at `high` at the next, at the fraction `t`
+/// between them.
 double between_crossings(double low, double high, double t) {
   return low + (high - low) * 0.5 * (1.0 - std::cos(kPi * t));
 }

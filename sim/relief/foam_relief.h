@@ -12,7 +12,7 @@ namespace touchstone::sim {
 enum class FoamKind {
   open,    ///< a net of struts, thicker where three meet, with pits between them; some walls are missing
   closed,  ///< walls, and between them cut cells as round bowls
-  beads,   ///< the other way round: domes with grooves between them (expanded beads)
+  beads,   ///< inverted: domes with grooves between them (expanded beads)
 };
 EnumNames<FoamKind> enum_names(FoamKind);
 

@@ -11,11 +11,11 @@ namespace touchstone::sim {
 /// A point of the diagram, with its weight: a place belongs to the point of the least d^2 - weight.
 struct CellPoint {
   Eigen::Vector2d place;  ///< mm
-  double weight = 0.0;    ///< mm^2: the larger, the more of its neighbours' room it takes
+  double weight = 0.0;    ///< mm^2: the larger, the more of its neighbours' area it takes
 };
 
 /// Points scattered on a periodic rectangle, none nearer to another than `closeness` times the mean distance
-/// 1/sqrt(density), in as far as a few tries a point find room (up to 0.7 they do).
+/// 1/sqrt(density), in as far as a few tries a point succeed (up to 0.7 they do).
 std::vector<Eigen::Vector2d> scatter(const Eigen::Vector2d& size, double per_mm2, double closeness,
                                      RandomStream& random);
 

@@ -7,7 +7,7 @@
 namespace touchstone::sim {
 namespace {
 
-/// A row of a preset's efficiencies, which are told at a few wavelengths from blue to red: between them a line.
+/// A row of a preset's efficiencies, which are given at a few wavelengths from blue to red: between them a line.
 Colour efficiency_of(const render::Imager& imager, Eigen::Index row) {
   const Eigen::VectorXd values = imager.quantum_efficiency.row(row).transpose();
   Colour colour;

@@ -156,7 +156,7 @@ struct MotionChipSpec {
 
 /// A camera and its imager (in the terms of [EMVA1288]). Only the fields that belong to `type` may stand in the file:
 /// of a lens either focal_length_mm or camera_matrix, and at most one of focus_distance_mm and sensor_distance_mm
-/// (neither: sharp at infinity; with a camera matrix, which tells the sensor's distance, focus_distance_mm only). A
+/// (neither: sharp at infinity; with a camera matrix, which gives the sensor's distance, focus_distance_mm only). A
 /// `preset` in the file gives the imager's figures, which the other fields override (sim/scene/camera_preset.h).
 struct CameraSpec {
   CameraType type = CameraType::pinhole;
@@ -176,7 +176,7 @@ struct CameraSpec {
   std::vector<double> distortion;                ///< lens: OpenCV's k1 k2 p1 p2 [k3 [k4 k5 k6]]; empty: none
   Eigen::Vector3d hole_position_mm = Eigen::Vector3d::Zero();  ///< of a lens its centre: `lens_position_mm` in the file
   Eigen::Vector3d look_at_mm = Eigen::Vector3d::Zero();
-  double roll_deg = 0.0;  ///< about its axis; what it sees turns the other way in its picture
+  double roll_deg = 0.0;  ///< about its axis; what it sees turns in the opposite direction in its picture
   double exposure_us = 1000.0;
   double row_time_us = 0.0;  ///< from row to row of a rolling shutter, the top row first; 0: all rows at once
   int bits = 8;              ///< 1 to 16
@@ -195,7 +195,7 @@ struct CameraSpec {
   double dsnu_e = 0.0;
   double black_level_DN = 0.0;
   std::optional<MotionChipSpec> motion_chip;
-  std::optional<EventCameraSpec> events;  ///< its pixels also, or only, tell changes of their light
+  std::optional<EventCameraSpec> events;  ///< its pixels also, or only, report changes of their light
 };
 
 /// The range of wavelengths that is simulated, and into how many bands it is cut.

@@ -16,7 +16,7 @@ enum class LampType { spot, led, led_strip, led_ring, led_array, area, projector
 EnumNames<LampType> enum_names(LampType);
 
 /// One entry of a device's `lamps`: a lamp, or LEDs in a row, ring or field. Only the fields that belong to `type` may
-/// stand in the file; what they mean is told by render/scene/lamp.h and render/scene/lamp_arrays.h.
+/// stand in the file; what they mean is described in render/scene/lamp.h and render/scene/lamp_arrays.h.
 struct LampSpec {
   LampType type = LampType::spot;
   Eigen::Vector3d position_mm = Eigen::Vector3d::Zero();  ///< of rows and fields: `from_mm`, `corner_mm`

@@ -97,7 +97,7 @@ fem::ShellShape shell_shape(const ShapeSpec& shape) {
   return {shape.axes_mm, shape.thickness_mm, shape.curvature_per_mm};
 }
 
-/// A regular hexagon's prism along x about the origin; one flat looks to -z.
+/// A regular hexagon's prism along x about the origin; one flat faces -z.
 TriangleMesh hexagon_mesh(const ShapeSpec& shape) {
   const double corner = shape.across_flats_mm / std::sqrt(3.0);  // from the axis
   const double flat = 0.5 * shape.across_flats_mm;

@@ -1,5 +1,5 @@
 #pragma once
-// An object file: the shape of a body, how it gives way and how it looks. See docs/file-formats.md.
+// An object file: the shape of a body, its stiffness and its appearance. See docs/file-formats.md.
 
 #include <Eigen/Core>
 #include <filesystem>
@@ -90,7 +90,7 @@ ObjectSpec read_object(const std::filesystem::path& file);
 fem::ContactShape contact_shape(const ShapeSpec& shape);
 /// The same with the object's relief on it, in all its detail. @throws Error also for a relief that can't be read
 fem::ContactShape contact_shape(const ObjectSpec& object);
-/// What a gel meshed with edges of `edge_mm` can tell of the object: its relief is blurred by that.
+/// What a gel meshed with edges of `edge_mm` can resolve of the object: its relief is blurred by that.
 fem::ContactShape coarse_contact_shape(const ObjectSpec& object, double edge_mm);
 
 /// The body as the renderer sees it: a closed surface in the object frame.

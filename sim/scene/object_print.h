@@ -86,7 +86,7 @@ void fields(YamlReader& in, PrintLayer& layer);
 /// @throws Error with file and line if a picture isn't the first layer
 void check_layers(const std::vector<PrintLayer>& layers);
 
-/// Does the print's look depend on how the object is pressed?
+/// Does the print's appearance depend on how the object is pressed?
 bool depends_on_pressure(const std::vector<PrintLayer>& layers);
 
 /// sRGB of a hue circle's k-th disc, and where its centre lies.

@@ -10,13 +10,13 @@
 namespace touchstone::sim {
 
 /// No two centres are nearer to each other than this part of the spacing, the root of the surface's area per dot. Discs
-/// thrown one after the other where there's room fill a plane to 0.547 [Feder1980]; at this distance the spacing takes
+/// thrown one after the other where they fit fill a plane to 0.547 [Feder1980]; at this distance the spacing takes
 /// 0.442.
 inline constexpr double kScatterDistance = 0.75;
 /// The disc that dots fill has a radius of no more than so many spacings (30 thousand dots).
 inline constexpr double kMostScatterRadii = 100.0;
 
-/// The dots of a print of the pattern `scattered`, in the coordinates of along_surface: as many as its spacing tells,
+/// The dots of a print of the pattern `scattered`, in the coordinates of along_surface: as many as its spacing gives,
 /// in a disc about the origin. The same print gives the same dots.
 std::vector<render::PrintedMark> scattered_marks(const PrintSpec& print);
 

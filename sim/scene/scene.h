@@ -28,7 +28,7 @@ struct OutputSpec {
   bool contact = false;
   bool flow = false;
   bool error = false;   ///< the achieved standard error of the light
-  bool events = false;  ///< what event pixels tell from the first frame to the last; by itself it asks for no picture
+  bool events = false;  ///< what event pixels record from the first frame to the last; by itself it asks for no picture
   SourceLocation where = {};
 
   /// Is light to be traced?

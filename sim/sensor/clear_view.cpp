@@ -39,6 +39,12 @@ class ClearView final : public SensorView {
   const Plan& plan() const override { return plan_; }
   const LightChoice& choice() const override { return choice_; }
 
+  SceneBands bands(const SeenObject& object) const override {
+    const std::lock_guard<std::mutex> lock(object.making);
+    if (!object.bands) object.bands = make_plan(scene_of(object.spec, {})).bands;
+    return *object.bands;
+  }
+
   SeenTouch see(const SeenObject& object, const fem::PressState& press, const Eigen::Vector3d& start_mm,
                 bool truth) const override {
     Truth now;

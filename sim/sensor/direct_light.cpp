@@ -52,9 +52,9 @@ Eigen::AlignedBox3d displacements(std::span<const Truth> truths) {
 Eigen::AlignedBox3d reach_of(const render::Scene& rest, const render::Scene& pressed, std::span<const Truth> truths,
                              double back_z) {
   const Eigen::AlignedBox3d still = lit_box(rest);
-  const Eigen::AlignedBox3d way = displacements(truths);
-  const double spare = kSpareReachMm + kSpareReach * way.sizes().maxCoeff();
-  Eigen::AlignedBox3d box(still.min() + way.min(), still.max() + way.max());
+  const Eigen::AlignedBox3d displacement = displacements(truths);
+  const double spare = kSpareReachMm + kSpareReach * displacement.sizes().maxCoeff();
+  Eigen::AlignedBox3d box(still.min() + displacement.min(), still.max() + displacement.max());
   box.extend(lit_box(pressed));
   box.min().array() -= spare;
   box.max().array() += spare;
@@ -69,16 +69,16 @@ std::string with_figures(const std::string& verdict, const render::DirectError& 
 
 }  // namespace
 
-DirectLight::DirectLight(const SceneView& sight, const render::Camera& camera, std::span<const Truth> truths,
+DirectLight::DirectLight(const SceneView& view, const render::Camera& camera, std::span<const Truth> truths,
                          std::span<const int> rays_tried, int edge_side, const render::GuideCut& guides)
     : camera_(camera) {
-  TS_ASSERT(sight.plan.direct_light && !truths.empty() && !rays_tried.empty());
-  const SceneSpec& scene = sight.scene;
+  TS_ASSERT(view.plan.direct_light && !truths.empty() && !rays_tried.empty());
+  const SceneSpec& scene = view.scene;
   const bool forced = scene.effects.direct_light == Switch::on;
   const fem::PressState still = at_rest(truths.front().press);
-  const render::Scene rest = with_blacks(sight.seen(still, {}));
+  const render::Scene rest = with_blacks(view.seen(still, {}));
   const Truth& judged = deepest(truths);
-  const render::Scene pressed = with_blacks(sight.seen(judged.press, sight.relief(judged.press)));
+  const render::Scene pressed = with_blacks(view.seen(judged.press, view.relief(judged.press)));
   render::DirectChoiceSettings settings;
   settings.tolerance = scene.light.direct_tolerance;
   settings.direct.edge_side = edge_side;
@@ -113,14 +113,14 @@ DirectLight::DirectLight(const SceneView& sight, const render::Camera& camera, s
   idle_.push_back(std::move(chosen.renderer));
 }
 
-DirectLight::DirectLight(const SceneView& sight, const render::Camera& camera, const fem::PressState& still,
+DirectLight::DirectLight(const SceneView& view, const render::Camera& camera, const fem::PressState& still,
                          FoundLight found, int edge_side)
     : choice_(std::move(found.choice)), camera_(camera), field_(std::move(found.field)), bounced_(found.bounced) {
   if (!choice_.direct) return;
   settings_.samples = found.rays;
   settings_.edge_side = edge_side;
-  settings_.seed = sight.scene.seed;
-  rest_ = with_blacks(sight.seen(still, {}));
+  settings_.seed = view.scene.seed;
+  rest_ = with_blacks(view.seen(still, {}));
   field_.fixture = rest_;
   field_.fixture.surfaces.clear();
   field_.fixture.balls.clear();

@@ -34,12 +34,12 @@ class DirectLight {
   /// `edge_side` is DirectSettings::edge_side, `guides` is LightFieldSettings::guides.
   /// @pre the plan has direct light, `truths` isn't empty
   /// @throws Error with the scene's place if the scene switches direct light on and it can't be had
-  DirectLight(const SceneView& sight, const render::Camera& camera, std::span<const Truth> truths,
+  DirectLight(const SceneView& view, const render::Camera& camera, std::span<const Truth> truths,
               std::span<const int> rays_tried = kRaysTried, int edge_side = render::DirectSettings{}.edge_side,
               const render::GuideCut& guides = {});
 
   /// As it was found before, of the same scene and camera and with the same edge_side. `still`: the gel untouched.
-  DirectLight(const SceneView& sight, const render::Camera& camera, const fem::PressState& still, FoundLight found,
+  DirectLight(const SceneView& view, const render::Camera& camera, const fem::PressState& still, FoundLight found,
               int edge_side);
 
   const LightChoice& choice() const { return choice_; }

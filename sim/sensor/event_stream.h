@@ -33,8 +33,8 @@ struct EventStreamReport {
 ///
 /// Pictures (sim/sensor/light_sequence.h) are made at the states that are played (plan.states_a_frame) and, between two
 /// of them, as densely as no pixel changes by light.event_step of the smallest threshold from one to the next; but no
-/// denser than a motion of 0.02 pixels, which the paths of a pixel can't tell, or a microsecond. Between pictures the
-/// logarithm runs straight.
+/// denser than a motion of 0.02 pixels, which the paths of a pixel can't resolve, or a microsecond. Between pictures
+/// the logarithm runs straight.
 ///
 /// Thresholds belong to the unit, the scene's seed; `noise_seed` is of the noise in time. The same for any number of
 /// threads. `vibration` and `elastic` as in play_motion.

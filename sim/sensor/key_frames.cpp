@@ -10,7 +10,7 @@
 namespace touchstone::sim {
 namespace {
 
-// Centroids of beads are told to some hundredths of a pixel, far less than what one pixel's noise lets pass.
+// Centroids of beads are measured to some hundredths of a pixel, far less than what one pixel's noise lets pass.
 constexpr double kStill_px = 0.02;
 // How much wider than its radius a ball can look, seen askew and through the gel.
 constexpr double kWidest = 1.25;
@@ -37,10 +37,10 @@ void widen(cv::Mat& mask, int radius) {
 
 }  // namespace
 
-FrameLook look_of(const render::Scene& scene, const render::Tracer& tracer, const render::ReadyCamera& camera,
-                  const render::Camera& viewer) {
-  FrameLook look;
-  look.preview = tracer.preview(viewer, kPreviewStride);
+FrameAppearance appearance_of(const render::Scene& scene, const render::Tracer& tracer,
+                              const render::ReadyCamera& camera, const render::Camera& viewer) {
+  FrameAppearance appearance;
+  appearance.preview = tracer.preview(viewer, kPreviewStride);
   for (const render::Ball& ball : scene.balls) {
     const auto appears = [&](const Eigen::Vector3d& point) {
       return render::project_through_faces(scene, camera, point);
@@ -51,10 +51,10 @@ FrameLook look_of(const render::Scene& scene, const render::Tracer& tracer, cons
       const auto rim = appears(ball.centre + ball.radius * Eigen::Vector3d::Unit(axis));
       if (rim) radius_px = std::max(radius_px, kWidest * (*rim - *centre).norm());
     }
-    look.balls_px.push_back(centre);
-    look.radii_px.push_back(radius_px);
+    appearance.balls_px.push_back(centre);
+    appearance.radii_px.push_back(radius_px);
   }
-  return look;
+  return appearance;
 }
 
 ChangeFinder::ChangeFinder(const render::ImagerResponse& response, const render::NoiseTarget& target, double tolerance,
@@ -67,7 +67,7 @@ ChangeFinder::ChangeFinder(const render::ImagerResponse& response, const render:
   TS_ASSERT(blur.least_px >= 0.0 && blur.most_px >= blur.least_px);
 }
 
-cv::Mat ChangeFinder::changed(const FrameLook& before, const FrameLook& now) const {
+cv::Mat ChangeFinder::changed(const FrameAppearance& before, const FrameAppearance& now) const {
   TS_ASSERT(before.preview.size() == now.preview.size() && before.balls_px.size() == now.balls_px.size());
   cv::Mat mask(now.preview.size(), CV_8U, cv::Scalar(0));
   const int bands = static_cast<int>(electrons_per_irradiance_.size());
@@ -115,13 +115,13 @@ cv::Mat ChangeFinder::changed(const FrameLook& before, const FrameLook& now) con
   return whole;
 }
 
-KnownLight known_light(std::span<const KeyFrame* const> keys, std::span<const FrameLook> looks,
+KnownLight known_light(std::span<const KeyFrame* const> keys, std::span<const FrameAppearance> appearances,
                        const ChangeFinder& finder, cv::Size size, int bands) {
   KnownLight known{cv::Mat(size, CV_32FC(bands), cv::Scalar::all(0.0)), cv::Mat(size, CV_32FC1, cv::Scalar(0.0)),
                    cv::Mat(size, CV_8U, cv::Scalar(255))};
   for (const KeyFrame* key : keys) {
     cv::Mat changed(size, CV_8U, cv::Scalar(0));
-    for (const FrameLook& look : looks) changed |= finder.changed(key->look, look);
+    for (const FrameAppearance& appearance : appearances) changed |= finder.changed(key->appearance, appearance);
     const cv::Mat takes = known.missing(key->where) & ~changed(key->where);
     key->irradiance.copyTo(known.irradiance(key->where), takes);
     key->standard_error.copyTo(known.standard_error(key->where), takes);

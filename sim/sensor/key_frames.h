@@ -16,8 +16,8 @@
 
 namespace touchstone::sim {
 
-/// What a frame looks like without noise: enough to tell where another one differs.
-struct FrameLook {
+/// What a frame looks like without noise: enough to find where another one differs.
+struct FrameAppearance {
   cv::Mat preview;                                       ///< Tracer::preview, each kPreviewStride-th pixel
   std::vector<std::optional<Eigen::Vector2d>> balls_px;  ///< where the scene's balls (beads) appear, if they do
   std::vector<double> radii_px;                          ///< of the balls there, at most
@@ -27,13 +27,13 @@ inline constexpr int kPreviewStride = 2;  ///< pixels, along both axes
 
 /// @param tracer of the scene
 /// @param camera `viewer` made ready
-FrameLook look_of(const render::Scene& scene, const render::Tracer& tracer, const render::ReadyCamera& camera,
-                  const render::Camera& viewer);
+FrameAppearance appearance_of(const render::Scene& scene, const render::Tracer& tracer,
+                              const render::ReadyCamera& camera, const render::Camera& viewer);
 
 /// Light that is kept.
 struct KeyFrame {
   std::int64_t t_us = 0;
-  FrameLook look;
+  FrameAppearance appearance;
   cv::Rect where;          ///< the part of the picture that is kept
   cv::Mat irradiance;      ///< of that part, W/m^2 in each band
   cv::Mat standard_error;  ///< of the irradiance
@@ -45,7 +45,7 @@ struct PointBlur {
   double most_px = 0.0;
 };
 
-/// Tells what changed from one look to another.
+/// Finds what changed between two frames.
 class ChangeFinder {
  public:
   /// @param tolerance a change of this part of the imager's noise is none
@@ -54,8 +54,8 @@ class ChangeFinder {
 
   /// CV_8U, 255 for the pixels that may have changed: those where the preview, as blurred as all points are at least,
   /// differs, with what more blur reaches from there; and those about a ball that moved, however little of its rim the
-  /// preview's rays tell.
-  cv::Mat changed(const FrameLook& before, const FrameLook& now) const;
+  /// preview's rays show.
+  cv::Mat changed(const FrameAppearance& before, const FrameAppearance& now) const;
 
  private:
   render::ImagerResponse response_;
@@ -72,9 +72,9 @@ struct KnownLight {
   cv::Mat missing;         ///< CV_8U, 255 or 0
 };
 
-/// The light of a frame as far as keys have it; of several keys that have a pixel, the one that comes first. `looks`
-/// are the frame's at one or more moments: a pixel that changed at any of them is missing.
-KnownLight known_light(std::span<const KeyFrame* const> keys, std::span<const FrameLook> looks,
+/// The light of a frame as far as keys have it; of several keys that have a pixel, the one that comes first.
+/// `appearances` are the frame's at one or more moments: a pixel that changed at any of them is missing.
+KnownLight known_light(std::span<const KeyFrame* const> keys, std::span<const FrameAppearance> appearances,
                        const ChangeFinder& finder, cv::Size size, int bands);
 
 /// Sets what was missing.

@@ -35,7 +35,7 @@ double photocurrent(const render::QuantumEfficiency& per_irradiance, int channel
 
 struct LightSequence::Parts {
   Parts(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel, double smallest_threshold)
-      : sight(scene, plan, gel),
+      : view(scene, plan, gel),
         camera(camera_of(*scene.device.camera)),
         size(render::size_of(camera).x(), render::size_of(camera).y()),
         imager(electron_counter(scene.device, plan.bands)),
@@ -50,7 +50,7 @@ struct LightSequence::Parts {
     blur_px = blur_radius_px(camera, nearest);
   }
 
-  SceneView sight;
+  SceneView view;
   render::Camera camera;
   cv::Size size;
   render::Imager imager;
@@ -147,7 +147,7 @@ double LightSequence::motion(const fem::PressState& from, const fem::PressState&
 }
 
 SequencePicture LightSequence::first(const fem::PressState& press) const {
-  const render::Tracer tracer = parts_->sight.tracer(press);
+  const render::Tracer tracer = parts_->view.tracer(press);
   SequencePicture picture;
   picture.photocurrent = cv::Mat(parts_->size, CV_32FC1, cv::Scalar(0.0));
   picture.preview = parts_->log_preview(tracer);
@@ -162,7 +162,7 @@ SequencePicture LightSequence::next(const SequencePicture& before, const fem::Pr
   SequencePicture picture = before;
   picture.pixels_traced = picture.paths_traced = 0;
   picture.moved_px = before.moved_px + moved_px;
-  const render::Tracer tracer = parts_->sight.tracer(press);
+  const render::Tracer tracer = parts_->view.tracer(press);
   const cv::Mat preview = parts_->log_preview(tracer);
   const cv::Mat mask = parts_->changed(before, preview, picture.moved_px);
   if (cv::countNonZero(mask) == 0) return picture;

@@ -30,6 +30,7 @@ struct SeenObject {
   mutable std::mutex making;                      ///< of what follows, which a sensor's view makes at the first picture
   mutable std::shared_ptr<const SceneView> view;  ///< of coated and milky gels
   mutable std::map<std::array<double, 3>, std::shared_ptr<const VirtualCamera>> cameras;  ///< by where a screen stands
+  mutable std::optional<SceneBands> bands;                                                ///< of clear gels
 };
 
 /// One backend. Its functions may be called from many threads at once and are pure.
@@ -41,6 +42,8 @@ class SensorView {
   virtual const Plan& plan() const = 0;
   /// How its pictures are lit, and why so.
   virtual const LightChoice& choice() const = 0;
+  /// The bands of the light of an object's pictures: those of plan(), but where the object's colour is seen.
+  virtual SceneBands bands(const SeenObject& /*object*/) const { return plan().bands; }
 
   /// `start_mm`: where the object's motion began, which is where its screen stands.
   /// @throws Error if the gel went beyond what the light was set up for

@@ -96,8 +96,8 @@ struct VirtualCamera::Parts : SceneView {
   }
 
   /// What the keys about a time know of a frame, seen at one or more moments.
-  KnownLight known(std::int64_t t_us, std::span<const FrameLook> looks) const {
-    return known_light(keys_about(t_us), looks, change_finder(), size, plan.bands.count());
+  KnownLight known(std::int64_t t_us, std::span<const FrameAppearance> appearances) const {
+    return known_light(keys_about(t_us), appearances, change_finder(), size, plan.bands.count());
   }
   KnownLight nothing_known() const { return known_light({}, {}, change_finder(), size, plan.bands.count()); }
 
@@ -107,8 +107,8 @@ struct VirtualCamera::Parts : SceneView {
     const render::Tracer at_once(seen_now);
     KeyFrame key;
     key.t_us = truth.t_us;
-    key.look = look_of(seen_now, at_once, ready, camera);
-    KnownLight light = keys.empty() ? nothing_known() : known(truth.t_us, {&key.look, 1});
+    key.appearance = appearance_of(seen_now, at_once, ready, camera);
+    KnownLight light = keys.empty() ? nothing_known() : known(truth.t_us, {&key.appearance, 1});
     key.where = keys.empty() ? cv::Rect({0, 0}, size) : cv::boundingRect(light.missing);
     if (key.where.empty()) return key;
     render::RenderSettings well = settings;
@@ -174,8 +174,8 @@ struct VirtualCamera::Parts : SceneView {
     }
     KnownLight light = nothing_known();
     if (!whole) {
-      const FrameLook look = look_of(seen_now, at_once, ready, camera);
-      light = known(truth.t_us, {&look, 1});
+      const FrameAppearance appearance = appearance_of(seen_now, at_once, ready, camera);
+      light = known(truth.t_us, {&appearance, 1});
     }
     const int pixels = cv::countNonZero(light.missing);
     if (pixels == 0) return develop(light.irradiance, light.standard_error, truth, now, {}, 0);
@@ -221,13 +221,14 @@ struct VirtualCamera::Parts : SceneView {
                          const std::vector<double>& times, bool whole) const {
     const bool shares = shared && !whole;
     std::vector<render::Scene> scenes;
-    std::vector<FrameLook> looks;
+    std::vector<FrameAppearance> appearances;
     for (const double time : times) {
       const fem::PressState press = state_after(truth, time);
       scenes.push_back(seen(press, relief(press)));
-      if (!whole && !shares) looks.push_back(look_of(scenes.back(), render::Tracer(scenes.back()), ready, camera));
+      if (!whole && !shares)
+        appearances.push_back(appearance_of(scenes.back(), render::Tracer(scenes.back()), ready, camera));
     }
-    KnownLight light = whole || shares ? nothing_known() : known(truth.t_us, looks);
+    KnownLight light = whole || shares ? nothing_known() : known(truth.t_us, appearances);
     const int pixels = cv::countNonZero(light.missing);
     if (pixels == 0) return develop(light.irradiance, light.standard_error, truth, now, {}, 0);
     const render::ShutterTiming timing = shutter_timing();

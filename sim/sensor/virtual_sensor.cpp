@@ -25,9 +25,9 @@ constexpr double kFrameRate_Hz = 30.0;             // of a press on a device wit
 constexpr int kEventSteps = 12;                    // of a press that event pixels watch, at least, down and aside
 
 /// What light needs and mechanics doesn't.
-struct Sight {
+struct Optics {
   std::unique_ptr<const SensorView> view;
-  render::Imager imager, ideal_imager;
+  render::Imager imager, ideal_imager;  // for light of the untouched device's bands
   render::FixedPattern pattern;
   cv::Mat rest_light;
 };
@@ -67,17 +67,17 @@ struct VirtualSensor::Parts {
         gel(set_up_gel(device, cache, progress)),
         markers(marker_places(device, *gel)) {}
 
-  const Sight& sight() const {
+  const Optics& optics() const {
     const std::lock_guard<std::mutex> lock(making);
     if (!made) {
       if (!device.camera) fail("device {}: has no camera, so it can't be looked through", device.name);
-      auto now = std::make_unique<Sight>();
+      auto now = std::make_unique<Optics>();
       now->view = device.coating     ? coated_view(device, *gel, cache_folder, settings)
                   : is_milky(device) ? milky_view(device, *gel, settings)
                                      : clear_view(device, *gel, settings);
       const Plan& plan = now->view->plan();
-      now->imager = sim::imager(device, bands_of(plan), with_noise(plan));
-      now->ideal_imager = sim::imager(device, bands_of(plan), false);
+      now->imager = sim::imager(device, bands_of(plan.bands), with_noise(plan));
+      now->ideal_imager = sim::imager(device, bands_of(plan.bands), false);
       now->pattern = render::fixed_pattern(now->imager, {device.camera->width, device.camera->height}, settings.seed);
       now->rest_light = now->view->rest_light(nullptr, Eigen::Vector3d::Zero());
       made = std::move(now);
@@ -86,8 +86,8 @@ struct VirtualSensor::Parts {
   }
 
   /// Maps of a milky gel ask the plan for no picture, which then says nothing of its bands and noise.
-  SceneBands bands_of(const Plan& plan) const {
-    if (plan.bands.count() > 0) return plan.bands;
+  SceneBands bands_of(const SceneBands& planned) const {
+    if (planned.count() > 0) return planned;
     SceneBands bands;
     bands.centres_nm = Eigen::Map<const Eigen::ArrayXd>(device.band_wavelengths_nm.data(),
                                                         static_cast<Eigen::Index>(device.band_wavelengths_nm.size()));
@@ -105,10 +105,17 @@ struct VirtualSensor::Parts {
     return play_motion(scene, plan, *gel, {}, nullptr, set_up_elastic_objects(scene, plan, cache_folder));
   }
 
-  cv::Mat develop(const cv::Mat& irradiance, std::uint64_t noise_seed, int frame) const {
-    const Sight& by = sight();
+  cv::Mat develop(const cv::Mat& irradiance, const render::Imager& imager, std::uint64_t noise_seed, int frame) const {
     return render::develop(
-        render::expose(irradiance, by.imager, by.pattern, noise_seed, static_cast<std::uint64_t>(frame)), by.imager);
+        render::expose(irradiance, imager, optics().pattern, noise_seed, static_cast<std::uint64_t>(frame)), imager);
+  }
+  /// Of light of the untouched device's bands.
+  cv::Mat develop(const cv::Mat& irradiance, std::uint64_t noise_seed, int frame) const {
+    return develop(irradiance, optics().imager, noise_seed, frame);
+  }
+  SceneBands bands_of(const SeenObject& object) const { return bands_of(optics().view->bands(object)); }
+  render::Imager imager_of(const SeenObject& object) const {
+    return sim::imager(device, bands_of(object), with_noise(optics().view->plan()));
   }
 
   bool has_events() const { return device.camera && device.camera->events; }
@@ -141,24 +148,24 @@ struct VirtualSensor::Parts {
   /// What the camera delivers at the end of `states`, the first of which is out of contact.
   void show(const SeenObject& object, const std::vector<Truth>& states, const TouchOptions& options,
             Touch& touch) const {
-    const Sight& by = sight();
+    const Optics& by = optics();
     const Eigen::Vector3d start = states.front().press.gel_from_object.translation;
     SeenTouch seen = by.view->see(object, states.back().press, start, options.truth);
     touch.light = seen.light;
     touch.height = seen.height;
     touch.contact = seen.contact;
     const cv::Mat rest = object.spec.screen ? by.view->rest_light(&object, start) : rest_of(object, start);
-    touch.expose = [this, light = touch.light](std::uint64_t seed) { return develop(light, seed, 0); };
-    touch.frame = develop(touch.light, options.noise_seed, options.frame);
-    touch.background = develop(rest, options.noise_seed ^ kOtherNoise, options.frame);
+    const render::Imager imager = imager_of(object);
+    touch.expose = [this, light = touch.light, imager](std::uint64_t seed) { return develop(light, imager, seed, 0); };
+    touch.frame = develop(touch.light, imager, options.noise_seed, options.frame);
+    touch.background = develop(rest, imager, options.noise_seed ^ kOtherNoise, options.frame);
     if (has_chip()) {
       std::vector<cv::Mat> lights;
       for (std::size_t k = 1; k + 1 < states.size(); ++k) {
         lights.push_back(by.view->see(object, states[k].press, start, false).light);
       }
       lights.push_back(touch.light);
-      const render::MotionChipSettings chip =
-          motion_chip(device, bands_of(by.view->plan()), with_noise(by.view->plan()));
+      const render::MotionChipSettings chip = motion_chip(device, bands_of(object), with_noise(by.view->plan()));
       const ChipTouch shown = chip_touch(chip, rest, lights, settings.seed, options.noise_seed);
       touch.frame = shown.raw;
       touch.statistics = shown.statistics;
@@ -168,8 +175,7 @@ struct VirtualSensor::Parts {
       };
     }
     if (has_events()) {
-      const SceneBands bands = bands_of(by.view->plan());
-      render::Imager counter = sim::imager(device, bands, false);
+      render::Imager counter = sim::imager(device, bands_of(object), false);
       counter.exposure_s = 1.0;
       const render::ImagerResponse response = render::response_of(counter);
       const auto light = [&](const fem::PressState& press) {
@@ -181,7 +187,7 @@ struct VirtualSensor::Parts {
 
   /// The background of a touch: of a clear device it has the object in it, just above the gel.
   cv::Mat rest_of(const SeenObject& object, const Eigen::Vector3d& start) const {
-    return device.coating ? sight().rest_light : sight().view->rest_light(&object, start);
+    return device.coating ? optics().rest_light : optics().view->rest_light(&object, start);
   }
 
   DeviceSpec device;
@@ -190,7 +196,7 @@ struct VirtualSensor::Parts {
   std::shared_ptr<const fem::Compliance> gel;
   MarkerPlaces markers;
   mutable std::mutex making;
-  mutable std::unique_ptr<const Sight> made;
+  mutable std::unique_ptr<const Optics> made;
 };
 
 SceneSpec touch_scene(const DeviceSpec& device, const VirtualSensorSettings& settings, const ObjectSpec& object,
@@ -214,7 +220,7 @@ const fem::Compliance& VirtualSensor::gel() const {
 }
 
 const LightChoice& VirtualSensor::light() const {
-  return parts_->sight().view->choice();
+  return parts_->optics().view->choice();
 }
 
 double VirtualSensor::mm_per_px() const {
@@ -225,7 +231,7 @@ double VirtualSensor::mm_per_px() const {
 }
 
 Eigen::Vector2d VirtualSensor::pixel_from_gel(const Eigen::Vector2d& place) const {
-  const auto pixel = parts_->sight().view->pixel_of({place.x(), place.y(), 0.0});
+  const auto pixel = parts_->optics().view->pixel_of({place.x(), place.y(), 0.0});
   if (!pixel) fail("place ({}, {}) mm on the gel isn't seen by the camera", place.x(), place.y());
   return *pixel;
 }
@@ -293,7 +299,7 @@ Touch VirtualSensor::press(const ObjectSpec& object_of, const PressSpec& how, co
 }
 
 Touch VirtualSensor::rest(std::uint64_t noise_seed) const {
-  const Sight& by = parts_->sight();
+  const Optics& by = parts_->optics();
   Touch touch;
   touch.what = fmt::format("{}, untouched", parts_->device.name);
   touch.light = by.rest_light;
@@ -306,12 +312,12 @@ Touch VirtualSensor::rest(std::uint64_t noise_seed) const {
 
 Touch VirtualSensor::capture(const TouchObject& object, const fem::PressState& press, std::uint64_t noise_seed,
                              int frame, bool truth) const {
-  const SeenTouch seen = parts_->sight().view->see(*object.seen_, press, press.gel_from_object.translation, truth);
+  const SeenTouch seen = parts_->optics().view->see(*object.seen_, press, press.gel_from_object.translation, truth);
   Touch touch;
   touch.light = seen.light;
   touch.height = seen.height;
   touch.contact = seen.contact;
-  touch.frame = parts_->develop(touch.light, noise_seed, frame);
+  touch.frame = parts_->develop(touch.light, parts_->imager_of(*object.seen_), noise_seed, frame);
   return touch;
 }
 
@@ -327,19 +333,20 @@ const Eigen::MatrixX3d& VirtualSensor::marker_places_mm() const {
 }
 
 cv::Mat VirtualSensor::background(std::uint64_t noise_seed, int frame) const {
-  const Sight& by = parts_->sight();
+  const Optics& by = parts_->optics();
   if (!parts_->has_chip()) return parts_->develop(by.rest_light, noise_seed, frame);
   const Plan& plan = by.view->plan();
-  const render::MotionChipSettings chip = motion_chip(parts_->device, parts_->bands_of(plan), parts_->with_noise(plan));
+  const render::MotionChipSettings chip =
+      motion_chip(parts_->device, parts_->bands_of(plan.bands), parts_->with_noise(plan));
   return chip_touch(chip, by.rest_light, {}, parts_->settings.seed, noise_seed + static_cast<std::uint64_t>(frame)).raw;
 }
 
 const cv::Mat& VirtualSensor::background_light() const {
-  return parts_->sight().rest_light;
+  return parts_->optics().rest_light;
 }
 
 cv::Mat VirtualSensor::ideal(const cv::Mat& light) const {
-  const Sight& by = parts_->sight();
+  const Optics& by = parts_->optics();
   return render::develop(render::expose(light, by.ideal_imager, by.pattern, 0, 0), by.ideal_imager);
 }
 

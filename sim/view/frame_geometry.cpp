@@ -42,12 +42,13 @@ FrameGeometry frame_geometry(const SceneSpec& scene, const fem::Compliance& gel,
   FrameGeometry out;
   const std::vector<VisibleObject> objects = visible_objects(scene);
   const std::vector<MovedObject> all = moved_objects(scene);
-  const std::vector<PlacedShape> felt = placed_shapes(objects, press);
-  add_gel(VisibleGel(gel, gel_body(scene.device)).sheet(press, felt), out.parts);
+  const std::vector<PlacedShape> shapes = placed_shapes(objects, press);
+  add_gel(VisibleGel(gel, gel_body(scene.device)).sheet(press, shapes), out.parts);
   if (scene.device.beads) add_beads(*scene.device.beads, press, out.parts);
   for (std::size_t k = 0; k < objects.size(); ++k) {
     const ObjectSpec& object = all[k].object;
-    out.parts.push_back({object.name, moved(objects[k].body, felt[k].gel_from_object), display_colour(object.albedo)});
+    out.parts.push_back(
+        {object.name, moved(objects[k].body, shapes[k].gel_from_object), display_colour(object.albedo)});
     if (!objects[k].screen) continue;
     const RigidTransform start{Eigen::Matrix3d::Identity(), all[k].motion.start_mm};
     out.parts.push_back({object.name + " screen", moved(*objects[k].screen, start), {1.0, 1.0, 1.0}});

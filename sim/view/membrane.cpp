@@ -21,9 +21,9 @@ std::vector<double> sheet_lines(double first, double pitch, int pixels, double l
   const auto outwards = [&](double from, double sign, double to) {
     std::vector<double> steps;
     double sum = 0.0;
-    const double way = sign * (to - from);
-    if (way < kSameLine * pitch) return steps;
-    for (double step = kGrowth * pitch; sum < way; step = std::min(widest, kGrowth * step)) {
+    const double length = sign * (to - from);
+    if (length < kSameLine * pitch) return steps;
+    for (double step = kGrowth * pitch; sum < length; step = std::min(widest, kGrowth * step)) {
       steps.push_back(step);
       sum += step;
     }
@@ -31,7 +31,7 @@ std::vector<double> sheet_lines(double first, double pitch, int pixels, double l
     std::vector<double> at;
     double gone = 0.0;
     for (const double step : steps) {
-      gone += step * way / sum;
+      gone += step * length / sum;
       at.push_back(from + sign * gone);
     }
     return at;

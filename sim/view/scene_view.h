@@ -23,7 +23,7 @@ struct SceneView {
 
   /// The fine contact, where it's called for.
   std::optional<fem::ReliefAnswer> relief(const fem::PressState& press) const;
-  /// What first hits and viewers are told of; `relief` as relief() gave it.
+  /// What first hits and viewers get; `relief` as relief() gave it.
   SeenGeometry geometry(const fem::PressState& press, const std::optional<fem::ReliefAnswer>& relief) const;
   /// What a coated gel's camera sees, from what geometry() gave: the same as seen(). @pre the device has a coating
   render::Scene seen_coating(const fem::PressState& press, const SeenGeometry& geometry) const;

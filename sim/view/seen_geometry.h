@@ -1,5 +1,6 @@
 #pragma once
-// A frame's geometry with what each piece of it means: what first hits are told apart by, and what is written as glTF.
+// A frame's geometry with what each piece of it means: what first hits are distinguished by, and what is written as
+// glTF.
 
 #include <vector>
 

@@ -77,8 +77,8 @@ Weights subdivide(std::vector<std::array<int, 3>>& triangles, int vertices) {
   return matrix;
 }
 
-/// Where a point of the undeformed surface that subdivision gave truly lies, and the way along which it is laid onto
-/// bodies. On the border only the rim's own points are wanted.
+/// Where a point of the undeformed surface that subdivision gave truly lies, and the direction along which it is laid
+/// onto bodies. On the border only the rim's own points are wanted.
 struct TrueSurface {
   std::function<Eigen::Vector3d(const Eigen::Vector3d& point, bool on_border)> place;
   std::function<Eigen::Vector3d(const Eigen::Vector3d& point)> up;
@@ -216,29 +216,30 @@ GelSheet VisibleGel::sheet(const fem::PressState& press, std::span<const PlacedS
   std::vector<Above> above;
   for (const PlacedShape& body : bodies) above.emplace_back(body.shape, body.gel_from_object);
   const auto owner = [&](int vertex) { return bodies.size() == 1 ? 0 : press.node_owner[vertex]; };
-  // Where a body leans against a fingertip's side, the way along the side's normal runs beside its face, to tens of
-  // millimetres away: there the way is straight along z, if that's the shorter one.
-  const auto way_to = [&](std::size_t body, const Eigen::Vector3d& point, const Eigen::Vector3d& up) {
+  // Where a body leans against a fingertip's side, the line along the side's normal runs beside its face, to tens of
+  // millimetres away: there the point moves straight along z, if that's the shorter one.
+  const auto projection_onto = [&](std::size_t body, const Eigen::Vector3d& point, const Eigen::Vector3d& up) {
     constexpr double kFar_mm = 1.0;
-    std::optional<std::pair<double, Eigen::Vector3d>> way;
-    if (const auto gap = above[body].gap(point, up)) way.emplace(*gap, up);
-    if (!way || std::abs(way->first) <= kFar_mm) return way;
+    std::optional<std::pair<double, Eigen::Vector3d>> projection;
+    if (const auto gap = above[body].gap(point, up)) projection.emplace(*gap, up);
+    if (!projection || std::abs(projection->first) <= kFar_mm) return projection;
     const Eigen::Vector3d z = Eigen::Vector3d::UnitZ();
     const auto straight = above[body].gap(point, z);
-    if (straight && std::abs(*straight) < std::abs(way->first)) way.emplace(*straight, z);
-    return way;
+    if (straight && std::abs(*straight) < std::abs(projection->first)) projection.emplace(*straight, z);
+    return projection;
   };
   struct Nearest {
     double gap;
-    Eigen::Vector3d way;
+    Eigen::Vector3d direction;
     int body;
   };
-  // To the body that comes first on the way up, or reaches deepest.
+  // To the body that comes first upwards, or reaches deepest.
   const auto nearest_gap = [&](const Eigen::Vector3d& point, const Eigen::Vector3d& up) {
     std::optional<Nearest> nearest;
     for (std::size_t k = 0; k < above.size(); ++k) {
-      const auto way = way_to(k, point, up);
-      if (way && (!nearest || way->first < nearest->gap)) nearest = {way->first, way->second, static_cast<int>(k)};
+      const auto projection = projection_onto(k, point, up);
+      if (projection && (!nearest || projection->first < nearest->gap))
+        nearest = {projection->first, projection->second, static_cast<int>(k)};
     }
     return nearest;
   };
@@ -247,8 +248,9 @@ GelSheet VisibleGel::sheet(const fem::PressState& press, std::span<const PlacedS
   for (Eigen::Index i = 0; i < moved.rows(); ++i) {
     if (!touches(static_cast<int>(i))) continue;
     const Eigen::Vector3d point = (rest_.row(i) + moved.row(i)).transpose();
-    const auto way = way_to(static_cast<std::size_t>(owner(static_cast<int>(i))), point, up_.row(i).transpose());
-    if (way) moved.row(i) += (way->first * way->second).transpose();
+    const auto projection =
+        projection_onto(static_cast<std::size_t>(owner(static_cast<int>(i))), point, up_.row(i).transpose());
+    if (projection) moved.row(i) += (projection->first * projection->second).transpose();
   }
   const Eigen::MatrixX3d fine = fine_rest_ + fine_from_coarse_ * moved;
 
@@ -273,7 +275,7 @@ GelSheet VisibleGel::sheet(const fem::PressState& press, std::span<const PlacedS
     const Eigen::Vector3d up = fine_up_.row(i).transpose();
     const auto nearest = nearest_gap(mesh.vertices[i], up);
     if (nearest && (in_contact[i] || nearest->gap < kWettedMm)) {
-      mesh.vertices[i] += nearest->gap * nearest->way;
+      mesh.vertices[i] += nearest->gap * nearest->direction;
       touched[i] = nearest->body;
     }
   }

@@ -57,7 +57,7 @@ class VisibleGel {
  private:
   Eigen::MatrixX3d rest_;          // of the mechanics' vertices
   Eigen::MatrixX3d fine_rest_;     // of the visible ones
-  Eigen::MatrixX3d up_, fine_up_;  // unit: ways out of the gel along which it is laid onto bodies
+  Eigen::MatrixX3d up_, fine_up_;  // unit: directions out of the gel along which it is laid onto bodies
   Eigen::SparseMatrix<double, Eigen::RowMajor> averaged_;  // hat-weighted means from values at the vertices
   Eigen::SparseMatrix<double, Eigen::RowMajor> fine_from_coarse_;
   std::vector<std::array<int, 3>> coarse_, fine_;  // triangles; those of coarse triangle i begin at fine_[i * kParts]

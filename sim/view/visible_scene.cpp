@@ -182,7 +182,7 @@ std::vector<PlacedShape> placed_shapes(const std::vector<VisibleObject>& objects
   const std::vector<RigidTransform> poses = poses_of(press);
   TS_ASSERT(poses.size() == objects.size());
   std::vector<PlacedShape> placed;
-  for (std::size_t k = 0; k < objects.size(); ++k) placed.push_back({objects[k].felt, poses[k]});
+  for (std::size_t k = 0; k < objects.size(); ++k) placed.push_back({objects[k].shape, poses[k]});
   return placed;
 }
 
@@ -258,10 +258,10 @@ render::Scene scene_in_coating(const SceneSpec& scene, const Plan& plan, const f
 
 render::Scene visible_scene(const SceneSpec& scene, const Plan& plan, const std::vector<VisibleObject>& objects,
                             const VisibleGel& gel, const fem::PressState& press) {
-  const std::vector<PlacedShape> felt = placed_shapes(objects, press);
+  const std::vector<PlacedShape> shapes = placed_shapes(objects, press);
   if (scene.device.coating) {
     render::Scene out = scene_in_coating(scene, plan, press);
-    out.surfaces.insert(out.surfaces.begin(), coated_surface(scene.device, plan.bands, gel.sheet(press, felt)));
+    out.surfaces.insert(out.surfaces.begin(), coated_surface(scene.device, plan.bands, gel.sheet(press, shapes)));
     return out;
   }
   render::Scene out = scene_without_surface(scene, plan, objects, poses_of(press), press);
@@ -277,7 +277,7 @@ render::Scene visible_scene(const SceneSpec& scene, const Plan& plan, const std:
       surface += objects[k].screen ? 2 : 1;
     }
   }
-  out.surfaces.insert(out.surfaces.begin(), gel_surface(gel.dry_surface(press, felt)));
+  out.surfaces.insert(out.surfaces.begin(), gel_surface(gel.dry_surface(press, shapes)));
   return out;
 }
 

@@ -15,7 +15,7 @@ namespace touchstone::sim {
 
 /// The shape of an object file, read and turned once for all frames; object frame.
 struct VisibleObject {
-  fem::ContactShape felt;
+  fem::ContactShape shape;
   TriangleMesh body;
   std::optional<TriangleMesh> screen;
   ReadyPrint print;                         ///< no layers: none
@@ -65,8 +65,8 @@ render::Scene scene_without_surface(const SceneSpec& scene, const Plan& plan, co
 render::Scene visible_scene(const SceneSpec& scene, const Plan& plan, const std::vector<VisibleObject>& objects,
                             const VisibleGel& gel, const fem::PressState& press);
 
-/// The same with the surface of a fine relief: what lies on the object has the object's own look, and the object, a
-/// single one, stands where the fine contact shifted it to.
+/// The same with the surface of a fine relief: what lies on the object has the object's own appearance, and the object,
+/// a single one, stands where the fine contact shifted it to.
 render::Scene visible_scene(const SceneSpec& scene, const Plan& plan, const std::vector<VisibleObject>& objects,
                             const Membrane& membrane, const fem::PressState& press, const fem::ReliefAnswer& relief);
 

@@ -8,7 +8,7 @@
 //     EXPECT_THAT(my_estimate(held.frame, held.background), IsForceOf(held, {.absolute = 0.1}));
 //   }
 //
-// CMake: find_package(Touchstone), target_link_libraries(my_tests Touchstone::testing). docs/testing.md tells more.
+// CMake: find_package(Touchstone), target_link_libraries(my_tests Touchstone::testing). docs/testing.md says more.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -244,15 +244,15 @@ def changed(data, path, value):
 
 def context(data, path):
     """What the fields at a place may depend on: the texts beside it and above it."""
-    told = []
+    beside = []
     for depth in range(len(path) + 1):
         above = at(data, path[:depth])
         if isinstance(above, dict):
-            told.append(tuple((k, v) for k, v in above.items() if k in ("type", "shape", "kind", "weave", "embossing",
+            beside.append(tuple((k, v) for k, v in above.items() if k in ("type", "shape", "kind", "weave", "embossing",
                                                                         "pattern", "preset", "field", "bayer")
                               and isinstance(v, str)))
-            told.append(tuple(sorted(above)) if depth == len(path) else ())
-    return tuple(told)
+            beside.append(tuple(sorted(above)) if depth == len(path) else ())
+    return tuple(beside)
 
 
 def keys_in_sources(source):
@@ -296,9 +296,9 @@ def main(touchstone, read_yaml_files, source):
         if set(schemas) != set(KIND_OF_FOLDER.values()):
             wrong.append(f"kinds are {sorted(schemas)}")
         read = keys_in_sources(source)
-        lacking = read - set().union(*(keys_in_schema(schema) for schema in schemas.values()))
-        if len(read) < 250 or lacking:
-            wrong.append(f"of {len(read)} keys that the sources read no schema has {sorted(lacking)}")
+        missing = read - set().union(*(keys_in_schema(schema) for schema in schemas.values()))
+        if len(read) < 250 or missing:
+            wrong.append(f"of {len(read)} keys that the sources read no schema has {sorted(missing)}")
 
         reader = Reader(read_yaml_files)
         counts = collections.Counter()
@@ -323,20 +323,20 @@ def main(touchstone, read_yaml_files, source):
                 seen.add(place)
                 bad = changed(data, path, value)
                 spoilt_file.write_text(json.dumps(bad, ensure_ascii=False))
-                told = next(validator.iter_errors(bad), None)
+                fault = next(validator.iter_errors(bad), None)
                 refusal = reader.error(kind, spoilt_file)
                 counts["spoilt"] += 1
                 what = f"{file.relative_to(folder)} at {'.'.join(map(str, path))}, {how} ({json.dumps(value)[:80]})"
-                if told and not refusal:
-                    wrong.append(f"{what}: the schema alone refuses it: {told.message[:200]}")
-                elif how.startswith("!") and not (told and refusal):
+                if fault and not refusal:
+                    wrong.append(f"{what}: the schema alone refuses it: {fault.message[:200]}")
+                elif how.startswith("!") and not (fault and refusal):
                     wrong.append(f"{what}: taken by {'the schema' if refusal else 'both'}; {refusal}")
-                elif refusal and not told:
+                elif refusal and not fault:
                     known = [pattern for pattern in ONLY_READERS if re.search(pattern, refusal)]
                     met.update(known)
                     if not known:
                         wrong.append(f"{what}: the reader alone refuses it: {refusal}")
-                counts["refused by both" if told and refusal else "taken" if not refusal else "only by the reader"] += 1
+                counts["refused by both" if fault and refusal else "taken" if not refusal else "only by the reader"] += 1
             spoilt_file.unlink(missing_ok=True)
         for pattern in ONLY_READERS:
             if not met[pattern]:

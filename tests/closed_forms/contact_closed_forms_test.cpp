@@ -125,7 +125,7 @@ TEST(Dimitriadis, IsHertzOnAThickLayerAndMeetsIntegralEquationsOnAThinnerOne) {
     const double depth = std::pow(chi * 5.0, 2) / radius;
     const double exact = sphere_on_layer(1.0, 0.5, 5.0, radius, depth).force;
     const double error = 1.0 - dimitriadis_force(1.0, radius, 5.0, depth) / exact;
-    EXPECT_GT(error, before) << "the series is cut: the farther, the more it lacks";
+    EXPECT_GT(error, before) << "the series is cut: the farther, the more is missing";
     EXPECT_LT(error, 0.3 * chi * chi);
     before = error;
   }

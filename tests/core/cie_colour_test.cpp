@@ -67,7 +67,7 @@ TEST(CieColour, PrimariesAreThoseOfTheStandard) {
   EXPECT_NEAR((xyz_from_linear_srgb({0, 0, 1}) - Eigen::Vector3d(0.1805, 0.0722, 0.9505)).norm(), 0.0, 3e-4);
 }
 
-TEST(CieColour, WaysThereAndBackAreTheIdentity) {
+TEST(CieColour, ThereAndBackIsTheIdentity) {
   for (const double v : {-0.1, 0.0, 0.002, 0.0031308, 0.04, 0.3, 1.0, 1.2}) {
     const Eigen::Vector3d srgb(v, 0.5 * v, 0.1);
     EXPECT_NEAR((srgb_from_linear(linear_from_srgb(srgb)) - srgb).norm(), 0.0, 1e-7) << v;

@@ -85,7 +85,7 @@ TEST(ClosedMesh, WrongSensesAreNamed) {
   EXPECT_EQ(fault_of_closed_mesh(turned_inside_out(cube(2))), "it is inside out");
   TriangleMesh mesh = cube(2);
   std::swap(mesh.triangles[9][0], mesh.triangles[9][1]);
-  EXPECT_THAT(fault_of_closed_mesh(mesh), HasSubstr("face opposite ways"));
+  EXPECT_THAT(fault_of_closed_mesh(mesh), HasSubstr("have opposite orientations"));
 }
 
 TEST(ClosedMesh, CrossingBodiesAreNamed) {

@@ -151,7 +151,7 @@ TEST(YamlDescription, BranchesWhereANameDecidesOnARange) {
   EXPECT_EQ(field(map->branches[1].map, "values").forms.at(0).items.at(0).allowed, Allowed::within(0.0, 0.5));
 }
 
-// Fields that depend on whether another is there, told by `has` or by std::optional, and on a number that is zero.
+// Fields that depend on whether another is there, seen by `has` or by std::optional, and on a number that is zero.
 
 struct Surface {
   std::optional<double> radiance;

@@ -8,7 +8,7 @@ namespace touchstone::fuzz {
 
 bool reads(std::string_view bytes) {
   if (bytes.starts_with("\x89HDF")) return false;
-  const auto file = scratch_file(bytes, "events.txt");  // the others are told by their first bytes
+  const auto file = scratch_file(bytes, "events.txt");  // the others are recognised by their first bytes
   const bool read = gives_result([&] { sensors::read_events(file); });
   return gives_result([&] { sensors::read_events(file, {.size = cv::Size(34, 26), .stream = 0}); }) || read;
 }

@@ -107,7 +107,7 @@ TEST(HardCase27Media, GreyMilkOf5000MeanFreePathsReturnsLess) {
   double before = 1.0;
   std::string all;
   for (const double albedo : {0.999, 0.99, 0.5, 0.0}) {
-    const Seen seen = look(slab(milk(1000.0 * albedo, 1000.0 * (1.0 - albedo)), 1.0), few_pixels(), 64);
+    const Seen seen = render_checked(slab(milk(1000.0 * albedo, 1000.0 * (1.0 - albedo)), 1.0), few_pixels(), 64);
     EXPECT_LT(seen.most(), before) << albedo;
     before = seen.most();
     all += fmt::format("{}{:.4g} at an albedo of {}", all.empty() ? "" : ", ", before, albedo);
@@ -147,7 +147,7 @@ TEST(HardCase27Media, GelSoDarkThatNothingReturnsShowsTheFacesOnly) {
     Scene scene = slab(Medium{1.41, grey(absorption)}, 1.0);
     scene.surfaces.push_back({square_sheet(12.0, -1.0, false), Lambertian{grey(1.0)}});
     scene.lamps.push_back(lamp_at({8, 0, -20}, {-8, 0, 20}, 1.0, 1.0));
-    const Seen seen = look(scene, few_pixels(), 64);
+    const Seen seen = render_checked(scene, few_pixels(), 64);
     EXPECT_LT(away(std::abs(seen.least() - mirrored_by_the_faces())), away.bar) << absorption;
     EXPECT_LT(most(seen.most()), most.bar) << absorption;
   }
@@ -164,13 +164,13 @@ TEST(HardCase27Media, MilkBehindAPlateThatLetsNothingThroughIsDark) {
       Scene scene = slab(milk(scattering, 0.0), 1.0);
       scene.media[1].absorption = grey(absorption);
       scene.lamps.push_back(lamp_at({8, 0, -20}, {-8, 0, 20}, 1.0, 1.0));
-      EXPECT_LT(plate(look(scene, few_pixels(), 64).most()), plate.bar);
+      EXPECT_LT(plate(render_checked(scene, few_pixels(), 64).most()), plate.bar);
     }
     // A black film in the milk ends what passes it; what comes from before it is left.
     Scene film = slab(milk(scattering, 0.0), 0.0);
     film.surfaces.push_back({square_sheet(100.0, -2.5), ThinFilm{grey(0.0)}});
     film.balls.push_back({{0, 0, -1}, 0.5, Emitter{grey(1.0)}});
-    EXPECT_LT(behind(look(film, few_pixels(), 32).most()), behind.bar);
+    EXPECT_LT(behind(render_checked(film, few_pixels(), 32).most()), behind.bar);
   }
   did("milk behind an opaque plate under a sky of 1: {}; a lamp of 1 behind a black film in milk: {}", plate.text(),
       behind.text());
@@ -182,7 +182,7 @@ TEST(HardCase27Media, BandsThatDieAtDifferentDepthsStayFinite) {
   const Spectrum dies = Bands<3>(0.0, 30.0, 1e6);
   scene.media = {Medium{1.0}, Medium{1.5, dies}, Medium{1.41, dies, Bands<3>(5.0, 1e-6, 0.0), 0.9}};
   scene.faces = {{-7.0, 0, 1}, {-5.0, 1, 2}, {0.0, 2, 0}};
-  const Seen seen = look(scene, few_pixels(), 64);
+  const Seen seen = render_checked(scene, few_pixels(), 64);
   EXPECT_LT(seen.most(), 1.2);
   did("three bands that die after 0, 0.03 and 1e-6 mm under a sky of 1: {} (allowed up to 1.2)", seen.range());
 }
@@ -200,8 +200,8 @@ TEST(HardCase27Lamps, ThousandsAreTheirSum) {
     lamp.position += radius * (std::cos(turn) * frame.x + std::sin(turn) * frame.y);
     many.lamps.push_back(lamp);
   }
-  const Seen a = look(one, few_pixels(), 64);
-  const Seen b = look(many, few_pixels(), 64);
+  const Seen a = render_checked(one, few_pixels(), 64);
+  const Seen b = render_checked(many, few_pixels(), 64);
   expect_alike("4000 point lamps on a lens of 1 mm against one lamp of that size", a, b);
 }
 
@@ -210,8 +210,8 @@ TEST(HardCase27Lamps, OneWithLightAmongThousandsWithoutIsFound) {
   one.lamps.push_back(lamp_at({8, 0, -20}, {-8, 0, 20}, 0.5, 1.0));
   Scene many = one;
   for (int i = 0; i < 5000; ++i) many.lamps.push_back(lamp_at({8, 0, -20}, {-8, 0, 20}, 0.5, 0.0));
-  const Seen a = look(one, few_pixels(), 64);
-  const Seen b = look(many, few_pixels(), 64);
+  const Seen a = render_checked(one, few_pixels(), 64);
+  const Seen b = render_checked(many, few_pixels(), 64);
   expect_alike("one lamp among 5000 without light against it alone", a, b);
 }
 
@@ -243,8 +243,8 @@ TEST(HardCase27Lamps, ExactlyAtAFaceIsJustBelowIt) {
     Scene below = at;
     at.lamps.push_back(lamp_at({6, 0, z}, {-1, 0, 1}, 0.0, 1.0));
     below.lamps.push_back(lamp_at({6, 0, z - 1e-7}, {-1, 0, 1}, 0.0, 1.0));
-    const Seen a = look(at, few_pixels());
-    const Seen b = look(below, few_pixels());
+    const Seen a = render_checked(at, few_pixels());
+    const Seen b = render_checked(below, few_pixels());
     EXPECT_GT(a.most(), 0.0);
     EXPECT_LT(away(((a.mean - b.mean).abs() / b.most()).maxCoeff()), away.bar) << z;
   }
@@ -259,7 +259,7 @@ TEST(HardCase27Lamps, OnTheMembraneItLightsItsOwnSideOnly) {
     Scene scene = sheet();
     scene.lamps.push_back(lamp_at({1, 0, 0}, {0, 0, sense}, 0.5, 1.0));
     scene.interreflection = false;
-    EXPECT_EQ(most(look(scene, few_pixels()).most()), 0.0) << sense;
+    EXPECT_EQ(most(render_checked(scene, few_pixels()).most()), 0.0) << sense;
   }
   did("a lamp in the membrane's own plane, facing either way: the membrane shows {}", most.seen);
 }
@@ -277,7 +277,7 @@ TEST(HardCase27Lamps, CloseToTheMembraneItLightsAsItsIntegralSays) {
     const Tracer tracer(scene);
     const double seen = tracer.radiance({0, 0, -5}, {0, 0, 1}, samples(1 << 18))[0] * kPi;
     EXPECT_LT(away(std::abs(seen / irradiance - 1.0)), away.bar) << height;
-    if (height >= 0.05) look(scene, few_pixels(), 1024);
+    if (height >= 0.05) render_checked(scene, few_pixels(), 1024);
   }
   did("a lamp of 1 mm 0.5, 0.05 and 0.005 mm off a sheet: its light differs from the integral's by {}",
       away.text("relative"));
@@ -289,7 +289,7 @@ TEST(HardCase27Lamps, InsideABodyOrBehindTheMembraneLightsNothing) {
   scene.lamps.push_back(lamp_at({6, 0, -15}, {-6, 0, 15}, 0.2, 1.0));
   scene.lamps.push_back(lamp_at({0, 0, 5}, {0, 0, -1}, 0.2, 1.0));
   scene.interreflection = false;
-  const double most = look(scene, few_pixels()).most();
+  const double most = render_checked(scene, few_pixels()).most();
   EXPECT_EQ(most, 0.0);
   did("a lamp inside a ball and one behind the membrane: the membrane shows {}", most);
 }
@@ -297,7 +297,7 @@ TEST(HardCase27Lamps, InsideABodyOrBehindTheMembraneLightsNothing) {
 TEST(HardCase28Lamps, NoLightAtAllIsZero) {
   Scene scene = sheet();
   scene.lamps.push_back(lamp_at({8, 0, -20}, {-8, 0, 20}, 0.5, 0.0));
-  const double most = look(scene, few_pixels()).most();
+  const double most = render_checked(scene, few_pixels()).most();
   EXPECT_EQ(most, 0.0);
   did("a lamp of 0 W: the picture is {} everywhere", most);
 }
@@ -306,7 +306,7 @@ TEST(HardCase27Lamps, SurroundingsAloneAreEnough) {
   Scene scene = sheet(1.0);
   scene.environment = grey(2.0);
   scene.surfaces[0].mesh = square_sheet(1000.0, 0.0, false);
-  const Seen seen = look(scene, few_pixels(), 64, 10000);
+  const Seen seen = render_checked(scene, few_pixels(), 64, 10000);
   EXPECT_TRUE(seen.is(2.0));
   did("no lamp, a sky of 2 over a white membrane: {}", seen.range());
 }
@@ -335,8 +335,8 @@ TEST(HardCase28Lamps, TheBrightestThatIsTakenStaysFiniteAndTheFaintestCounts) {
     scene.lamps.push_back(lamp_at({8, 0, -20}, {-8, 0, 20}, 0.5, power));
     Scene plain = sheet();
     plain.lamps.push_back(lamp_at({8, 0, -20}, {-8, 0, 20}, 0.5, 1.0));
-    const Seen a = look(scene, few_pixels(), 64);
-    const Seen b = look(plain, few_pixels(), 64);
+    const Seen a = render_checked(scene, few_pixels(), 64);
+    const Seen b = render_checked(plain, few_pixels(), 64);
     EXPECT_LT(away(((a.mean / power - b.mean).abs() / b.most()).maxCoeff()), away.bar) << power;
   }
   did("a lamp of 1e-30 W and one of 1e12 W: the picture of 1 W times as much, to {} of the brightest", away.text());

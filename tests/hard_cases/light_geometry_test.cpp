@@ -73,7 +73,7 @@ TEST(HardCase27Light, GrazingViewOfAWhiteSheetIsTheFurnace) {
     Scene scene = empty_scene(1.0);
     scene.media.push_back(Medium{1.5});
     scene.surfaces.push_back({square_sheet(50.0, 0.0), material});
-    const Seen seen = look(scene, camera);
+    const Seen seen = render_checked(scene, camera);
     EXPECT_LE(most(seen.most()), most.bar) << material.index();  // a metal's lost light comes back in the mean only
     EXPECT_GT(seen.least(), 0.0) << material.index();
     if (material.index() == 0) {
@@ -90,7 +90,7 @@ TEST(HardCase27Light, CameraInsideTheGelSeesTheFurnaceWithoutTheFacesLoss) {
   scene.balls.push_back({{0.5, 0, -1.0}, 0.4, kWhite});
   PinholeCamera camera = few_pixels();
   camera.gel_from_camera = look_at({0, 0, -4.0}, {0, 0, 0}, {0, 1, 0});
-  const Seen seen = look(scene, camera);
+  const Seen seen = render_checked(scene, camera);
   EXPECT_TRUE(seen.is(1.41 * 1.41));
   did("a camera inside the gel (n = 1.41) under a sky of 1 with a white bead in it: {} (n squared is {:.5g})",
       seen.range(), 1.41 * 1.41);
@@ -101,7 +101,7 @@ TEST(HardCase27Light, CameraOnAFaceSeesOneOfItsSides) {
     Scene scene = sensor_stack(1.0);
     PinholeCamera camera = few_pixels();
     camera.gel_from_camera = look_at({0, 0, z}, {0, 0, 0}, {0, 1, 0});
-    const Seen seen = look(scene, camera);
+    const Seen seen = render_checked(scene, camera);
     const double below = z == -7.0 ? 1.0 : 1.52 * 1.52;
     EXPECT_TRUE(seen.is(below)) << seen.mean.transpose();
     did("a camera in the plane of a face at {} mm under a sky of 1: {} (one of the face's sides: {:.5g})", z,
@@ -112,13 +112,13 @@ TEST(HardCase27Light, CameraOnAFaceSeesOneOfItsSides) {
 TEST(HardCase27Light, CameraInsideABodySeesThatBodyOnly) {
   Scene scene = empty_scene(5.0);
   scene.balls.push_back({{0, 0, -27}, 1.0, Emitter{grey(0.25)}});
-  const Seen inside = look(scene, few_pixels());
+  const Seen inside = render_checked(scene, few_pixels());
   EXPECT_TRUE(inside.is(0.25));
   scene.balls[0].material = Black{};
-  const double black = look(scene, few_pixels()).most();
+  const double black = render_checked(scene, few_pixels()).most();
   EXPECT_EQ(black, 0.0);
   scene.balls[0].material = Lambertian{grey(0.5)};
-  const double matt = look(scene, few_pixels()).most();
+  const double matt = render_checked(scene, few_pixels()).most();
   EXPECT_EQ(matt, 0.0) << "no light gets in";
   did("a camera inside a ball that shines with 0.25: {}; inside a black one: {}; inside a matt one: {}", inside.range(),
       black, matt);
@@ -159,15 +159,15 @@ TEST(HardCase27Light, LayersOfNoThicknessActAsTheirFacesSay) {
   Scene scene = sensor_stack(1.0);
   scene.faces = {{-7.0, 0, 1}, {-5.0, 1, 0}, {-5.0, 0, 2}};
   scene.surfaces.push_back({square_sheet(40.0, 0.0, false), kWhite});
-  const Seen sky = look(scene, few_pixels(), 256, 10000);
+  const Seen sky = render_checked(scene, few_pixels(), 256, 10000);
   EXPECT_TRUE(sky.is(1.0));
   scene.environment = grey(0.0);
   scene.lamps.push_back(lamp_at({8, 0, -20}, 1.0));
-  const Seen crack = look(scene, few_pixels());
+  const Seen crack = render_checked(scene, few_pixels());
   EXPECT_GT(crack.most(), 0.0);
   // Less comes through two more mirrors than through bonded glass and gel.
   scene.faces = {{-7.0, 0, 1}, {-5.0, 1, 2}};
-  const Seen bonded = look(scene, few_pixels());
+  const Seen bonded = render_checked(scene, few_pixels());
   EXPECT_LT(crack.most(), bonded.most());
   did("a crack of no thickness between glass and gel under a sky of 1: {}; of a lamp {:.3g} of what bonded faces let "
       "through",
@@ -180,7 +180,7 @@ TEST(HardCase27Light, GelSheetInTheGlassFaceKeepsTheFurnace) {
   scene.faces = {{-7.0, 0, 1}, {-5.0, 1, 0}};
   scene.surfaces.push_back({square_sheet(40.0, -5.0, false), Refractive{2, 0}});
   scene.surfaces.push_back({square_sheet(40.0, 0.0), Refractive{2, 0}});
-  const Seen seen = look(scene, few_pixels());
+  const Seen seen = render_checked(scene, few_pixels());
   EXPECT_TRUE(seen.is(1.0));
   did("the gel's face as triangles exactly in the glass's flat face under a sky of 1: {}", seen.range());
 }
@@ -203,7 +203,7 @@ TEST(HardCase27Light, BeadsAtTheMembraneKeepTheFurnace) {
     scene.surfaces.push_back({square_sheet(40.0, 0.0), Refractive{2, 0}});
     scene.balls.push_back({{0.3, 0, z}, 0.5, kWhite});
     scene.balls.push_back({{0.3, 0, z}, 0.5, kWhite});
-    const Seen seen = look(scene, few_pixels(), 64, 10000);
+    const Seen seen = render_checked(scene, few_pixels(), 64, 10000);
     EXPECT_TRUE(seen.is(1.0)) << z << ": " << seen.least() << " to " << seen.most();
     least = std::min(least, seen.least());
     most = std::max(most, seen.most());
@@ -218,7 +218,7 @@ TEST(HardCase27Light, BeadsThroughTheGlassFaceKeepTheFurnace) {
   scene.balls.push_back({{0, 0, -5.0}, 0.5, kWhite});
   scene.balls.push_back({{2, 0, -7.0}, 0.5, kWhite});
   scene.balls.push_back({{-2, 0, -4.5}, 0.5, kWhite});
-  const Seen seen = look(scene, few_pixels(), 64, 10000);
+  const Seen seen = render_checked(scene, few_pixels(), 64, 10000);
   EXPECT_TRUE(seen.is(1.0));
   did("white beads cut by the glass's faces under a sky of 1: {}", seen.range());
 }
@@ -226,22 +226,22 @@ TEST(HardCase27Light, BeadsThroughTheGlassFaceKeepTheFurnace) {
 TEST(HardCase27Light, BlackMembraneGivesNothingBack) {
   Scene scene = sensor();
   scene.surfaces[0].material = Black{};
-  const double black = look(scene, few_pixels()).most();
+  const double black = render_checked(scene, few_pixels()).most();
   EXPECT_EQ(black, 0.0);
   scene.surfaces[0].material = Lambertian{grey(0.0)};
-  EXPECT_EQ(look(scene, few_pixels()).most(), 0.0);
+  EXPECT_EQ(render_checked(scene, few_pixels()).most(), 0.0);
   scene.surfaces[0].material = RoughConductor{grey(0.0), 0.2};  // Schlick's rim light is all that is left
-  const double rim = look(scene, few_pixels()).most();
+  const double rim = render_checked(scene, few_pixels()).most();
   scene.surfaces[0].material = RoughConductor{grey(1.0), 0.2};
   Worst share{0.05};
-  EXPECT_LT(share(rim / look(scene, few_pixels()).most()), share.bar);
+  EXPECT_LT(share(rim / render_checked(scene, few_pixels()).most()), share.bar);
   did("a black membrane: {}; a metal that reflects nothing but at its rim: {} of a bright one", black, share.text());
 }
 
 TEST(HardCase27Light, ABrightLampInViewIsItsRadianceAndNoMore) {
   Scene scene = sensor(0.0);
   scene.balls.push_back({{0, 0, -12}, 3.0, Emitter{grey(1e6)}});
-  const Seen seen = look(scene, few_pixels(), 1024);
+  const Seen seen = render_checked(scene, few_pixels(), 1024);
   EXPECT_LE(seen.most(), 1e6 * (1.0 + 1e-6));
   EXPECT_GT(seen.most(), 0.9e6);
   EXPECT_GT(seen.least(), 1e3) << "it lights the membrane, too";
@@ -277,7 +277,7 @@ TEST(HardCase27Light, TrianglesBelowSinglePrecisionAreTakenAndHarmless) {
   scene.surfaces.push_back({needle, Refractive{0, 2}});
   Worst away{1e-3};
   EXPECT_LT(away(difference(sensor(0.3), scene)), away.bar);
-  look(scene, few_pixels());
+  render_checked(scene, few_pixels());
   did("a sheet of 1e-9 mm and needles of 1e-9 mm, points and lines in single precision: pixels differ by {}",
       away.text("relative"));
 }
@@ -289,7 +289,7 @@ TEST(HardCase27Light, OneTriangleAndNoTriangle) {
   one.triangles = {{0, 1, 2}};
   scene.surfaces.push_back({one, kWhite});
   scene.surfaces.push_back({TriangleMesh{}, kWhite});
-  const Seen seen = look(scene, few_pixels(), 256, 10000);
+  const Seen seen = render_checked(scene, few_pixels(), 256, 10000);
   EXPECT_TRUE(seen.is(1.0));
   did("a sheet of one white triangle and one of none under a sky of 1: {}", seen.range());
 }
@@ -342,7 +342,7 @@ TEST(HardCase27Light, AMetreFromTheOriginTheFurnaceHolds) {
   scene.balls.push_back({far + Eigen::Vector3d(0, 0, -5), 2.0, kWhite});
   PinholeCamera camera = few_pixels();
   camera.gel_from_camera.translation += far;
-  const Seen seen = look(scene, camera, 64, 10000);
+  const Seen seen = render_checked(scene, camera, 64, 10000);
   EXPECT_TRUE(seen.is(1.0));
   did("a white sheet and a ball a metre from the origin under a sky of 1: {}", seen.range());
 }
@@ -353,14 +353,14 @@ TEST(HardCase27Light, TinyBodiesAreHarmless) {
   scene.surfaces.push_back({square_sheet(1e-6, -1.0, false), kWhite});
   scene.balls.push_back({{0, 0, -2}, 1e-6, kWhite});
   scene.balls.push_back({{0, 0, -3}, 1e-6, Refractive{0, 2}});
-  const Seen from_afar = look(scene, few_pixels(), 64, 10000);
+  const Seen from_afar = render_checked(scene, few_pixels(), 64, 10000);
   EXPECT_TRUE(from_afar.is(1.0));
   // Looked at from as near.
   PinholeCamera camera = few_pixels();
   camera.hole_diameter_um = 1e-4;
   camera.foil_thickness_um = 0.0;
   camera.gel_from_camera = look_at({0, 0, -1.0 - 1e-5}, {0, 0, -1}, {0, 1, 0});
-  const Seen from_near = look(scene, camera, 64, 10000);
+  const Seen from_near = render_checked(scene, camera, 64, 10000);
   EXPECT_TRUE(from_near.is(1.41 * 1.41));
   did("white bodies of 1e-6 mm under a sky of 1: {}; from 1e-5 mm off, in gel of n squared = {:.5g}: {}",
       from_afar.range(), 1.41 * 1.41, from_near.range());

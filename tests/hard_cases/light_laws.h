@@ -66,7 +66,7 @@ inline double farthest(const Eigen::ArrayXd& values, double floor) {
 /// that one and four threads give the same bytes, and of each pixel that none of its 40 means lies beyond 6 standard
 /// deviations of the others. A mean of `samples_each` paths must be close to Gaussian, or the last law fails rightly:
 /// a pixel whose light comes on one path in a thousand needs thousands.
-inline Seen look(const Scene& scene, const Camera& camera, int samples_each = 256, int max_depth = 64) {
+inline Seen render_checked(const Scene& scene, const Camera& camera, int samples_each = 256, int max_depth = 64) {
   constexpr int kRuns = 40;
   const Tracer tracer(scene);
   // What surroundings of radiance one would give: turns irradiance into radiance, as hole and paths are the same.

@@ -49,7 +49,7 @@ TEST(HardCase28Camera, OnePixelIsTheMeanOfMany) {
   Worst away{5e-3};
   EXPECT_LT(away(std::abs(a / b - 1.0)), away.bar);
   did("a sensor of one pixel against 144 on the same area: light differs by {}", away.text("relative"));
-  look(sky_and_sheet(), one);
+  render_checked(sky_and_sheet(), one);
   EXPECT_EQ(Tracer(sky_and_sheet()).preview(one, 100).size(), cv::Size(1, 1));
 }
 
@@ -92,7 +92,7 @@ TEST(HardCase28Camera, AHoleAsWideAsItsDistanceIsTheDiscsFormFactorAndWiderOnesA
     const double expected = kPi * r * r / (r * r + 9.0);
     EXPECT_LT(away(std::abs(mean_irradiance(empty_scene(1.0), camera, 1 << 16) / expected - 1.0)), away.bar)
         << diameter_mm;
-    look(empty_scene(1.0), camera);
+    render_checked(empty_scene(1.0), camera);
   }
   did("a hole as wide as its distance and four times that: light differs from the disc's form factor by {}",
       away.text("relative"));
@@ -121,7 +121,7 @@ TEST(HardCase28Camera, AFoilThatHidesAllGivesADarkPicture) {
 TEST(HardCase28Camera, ALensFocusedAtAHairsBreadthKeepsTheSky) {
   LensCamera lens = one_lens();
   lens.focus_distance_mm = 1e-3;
-  const Seen seen = look(empty_scene(2.0), lens, 64);
+  const Seen seen = render_checked(empty_scene(2.0), lens, 64);
   EXPECT_TRUE(seen.is(2.0));
   did("a lens focused at 0.001 mm under a sky of 2: {}", seen.range());
 }

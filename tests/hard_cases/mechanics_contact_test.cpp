@@ -425,7 +425,7 @@ TEST(HardCase26, AnObjectMovedByANanometreMovesTheAnswerAsLittle) {
       force.text("N"), beads.text("mm"));
 }
 
-TEST(HardCase20, ALoadCycleOfTheVhsProbeHoldsTheLawsAllTheWay) {
+TEST(HardCase20, ALoadCycleOfTheVhsProbeHoldsTheLawsThroughout) {
   // The verification of [VisioHaptic2024, secs. 4.3 and 4.4]: to 5 N, then sheared to and fro.
   Press press(gel(), kProbe, 0.6);
   PressTarget target = at(0, 0, 0);

@@ -52,8 +52,8 @@ TEST(HardCase1, APoissonsRatioOfAHalfIsThatOfNearlyAHalf) {
   const double slope = (layers_force(0.5) / layers_force(0.49) - 1.0) / 0.01;
   for (const double less : {1e-8, 1e-7, 1e-6}) {
     const double below = sphere_force(gel_of(layer(0.6), 1.0, 0.5 - less), 0.3);
-    // What the solver leaves, and what nu lacks times the slope of the layer's force there: twice that of the last
-    // hundredth, as it still grows.
+    // What the solver leaves, and what nu is short of times the slope of the layer's force there: twice that of the
+    // last hundredth, as it still grows.
     Worst away{1e-6 + 2.0 * less * slope};
     EXPECT_LT(away(std::abs(at_half / below - 1.0)), away.bar);
     did("force under a ball at nu = 0.5 differs from that at 0.5 - {} by {}", less, away.text("relative"));

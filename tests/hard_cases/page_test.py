@@ -108,7 +108,7 @@ class PageTest(unittest.TestCase):
         self.assertEqual(code, 1)
         self.assertIn("none.json: there is no such file", said)
 
-    def test_a_program_is_run_and_one_that_dies_is_told(self):
+    def test_a_program_is_run_and_one_that_dies_is_reported(self):
         program = self.program("""
             tests = [{"name": "HardCase3", "testsuite": [{"name": "A"}, {"name": "B"}, {"name": "C"}]}]
             out = next(a for a in sys.argv if a.startswith("--gtest_output=json:")).split(":", 1)[1]

@@ -43,7 +43,7 @@ def folder(tmp_path_factory, job):
         ts.merge(job, out)
     first = ts.generate(job, out, shard="1/2")
     assert (first["samples"], first["rendered"], first["kept"]) == (5, 5, 0)
-    with pytest.raises(ts.Error, match="2 of 4 files lack"):
+    with pytest.raises(ts.Error, match="2 of 4 files are missing"):
         ts.merge(job, out)
     assert ts.generate(job, out, shard="2/2")["rendered"] == 5
     assert ts.merge(job, out)["samples"] == 10

@@ -248,7 +248,7 @@ def test_a_device_without_a_coating_tells_forces(tmp_path):
 
 
 def test_a_slow_blas_is_warned_of(tmp_path):
-    """OpenBLAS is told by its variable to take this processor for an old one, as it does by itself with new ones."""
+    """Its variable makes OpenBLAS take this processor for an old one, as it does by itself with new ones."""
     if ts._core.vector_instructions() == "baseline":
         pytest.skip("this processor has no better kernels")
     script = "import touchstone"

@@ -11,7 +11,7 @@
 
 namespace {
 
-/// Whether `file`, as the compiler was told it, is `source`, a path relative to the folder of tests.
+/// Whether `file`, as the compiler was given it, is `source`, a path relative to the folder of tests.
 bool is_source(std::string_view file, std::string_view source) {
   if (!file.ends_with(source)) return false;
   return file.size() == source.size() || file[file.size() - source.size() - 1] == '/';

@@ -176,7 +176,7 @@ TEST_F(TruthOverlay, TheRimOfTheMeshRunsAroundTheContactsPixels) {
   EXPECT_LT(worst / kScale, 0.5 * kEdge_mm * px_per_mm + 2.0);
   EXPECT_LT(std::abs(off / cv::countNonZero(rim)) / kScale, 0.25 * kEdge_mm * px_per_mm)
       << "neither too wide nor too narrow";
-  // It goes all the way round: what is within it can't be left.
+  // It goes all round: what is within it can't be left.
   cv::Mat closed = rim.clone();
   cv::floodFill(closed, cv::Point(0, 0), 255, nullptr, {}, {}, 4);
   const cv::Point2d inside = middle_of(contact) * kScale;

@@ -71,19 +71,20 @@ TEST(Spread, DrawsHaveTheMomentsOfTheirDistribution) {
   EXPECT_EQ(moments_of(spread_of("2.5"), 3).mean, 2.5);
 }
 
-TEST(Spread, MistakesAreToldWithTheirPlace) {
-  const auto told = [](const std::string& text) { return message_of([&] { spread_of(text); }); };
-  EXPECT_THAT(told("{uniform: [5, 2]}"), HasSubstr("job.yaml:1: spread.uniform: from 5 to 2"));
-  EXPECT_THAT(told("{uniform: [1]}"), HasSubstr("has 1 numbers, 2 are needed"));
-  EXPECT_THAT(told("{uniform: [-1, 2]}"), HasSubstr("draws go from -1 to 2; allowed is above 0"));
-  EXPECT_THAT(told("{log_uniform: [0, 2]}"), HasSubstr("0 is not allowed"));
-  EXPECT_THAT(told("{unifrom: [1, 2]}"), HasSubstr("did you mean 'uniform'?"));
-  EXPECT_THAT(told("{uniform: [1, 2], whole: [1, 2]}"), HasSubstr("uniform and whole stand here together"));
-  EXPECT_THAT(told("{whole: [1, 2.5]}"), HasSubstr("both must be whole numbers"));
-  EXPECT_THAT(told("{one_of: []}"), HasSubstr("at least one is needed"));
-  EXPECT_THAT(told("{normal: {mean: 1, deviation: 0.1, within: [2, 3]}}"), HasSubstr("of the draws would fall within"));
-  EXPECT_THAT(told("{}"), HasSubstr("none of uniform, log_uniform, whole, normal, one_of stands here"));
-  EXPECT_THAT(told("wide"), HasSubstr("isn't a finite number"));
+TEST(Spread, MistakesAreReportedWithTheirPlace) {
+  const auto error_of = [](const std::string& text) { return message_of([&] { spread_of(text); }); };
+  EXPECT_THAT(error_of("{uniform: [5, 2]}"), HasSubstr("job.yaml:1: spread.uniform: from 5 to 2"));
+  EXPECT_THAT(error_of("{uniform: [1]}"), HasSubstr("has 1 numbers, 2 are needed"));
+  EXPECT_THAT(error_of("{uniform: [-1, 2]}"), HasSubstr("draws go from -1 to 2; allowed is above 0"));
+  EXPECT_THAT(error_of("{log_uniform: [0, 2]}"), HasSubstr("0 is not allowed"));
+  EXPECT_THAT(error_of("{unifrom: [1, 2]}"), HasSubstr("did you mean 'uniform'?"));
+  EXPECT_THAT(error_of("{uniform: [1, 2], whole: [1, 2]}"), HasSubstr("uniform and whole stand here together"));
+  EXPECT_THAT(error_of("{whole: [1, 2.5]}"), HasSubstr("both must be whole numbers"));
+  EXPECT_THAT(error_of("{one_of: []}"), HasSubstr("at least one is needed"));
+  EXPECT_THAT(error_of("{normal: {mean: 1, deviation: 0.1, within: [2, 3]}}"),
+              HasSubstr("of the draws would fall within"));
+  EXPECT_THAT(error_of("{}"), HasSubstr("none of uniform, log_uniform, whole, normal, one_of stands here"));
+  EXPECT_THAT(error_of("wide"), HasSubstr("isn't a finite number"));
 }
 
 TEST(EditedYaml, ChangesNumbersAndLeavesTheRestAsItIs) {
@@ -102,24 +103,24 @@ TEST(EditedYaml, ChangesNumbersAndLeavesTheRestAsItIs) {
       "a: 2   # first\nlamps:\n  - {power: [1, 2e-1], name: x}\n  - {power: [30.25, 4], name: y}\nb: {c: -0.1}\n");
 }
 
-TEST(EditedYaml, PathsThatLeadNowhereAreTold) {
+TEST(EditedYaml, PathsThatLeadNowhereAreReported) {
   const std::string text =
       "gel: {thickness_mm: 3}\nlist: [1, 2]\nword: soft\nquoted: '3'\na: &x [5]\nb: *x\nc: &y 5\nd: *y\n";
-  const auto told = [&](const std::string& path) {
+  const auto error_of = [&](const std::string& path) {
     return message_of([&] { find_yaml_numbers(text, "device.yaml", path, {"job.yaml", 7}); });
   };
-  EXPECT_THAT(told("gel.thicknes_mm"), HasSubstr("job.yaml:7: path 'gel.thicknes_mm'"));
-  EXPECT_THAT(told("gel.thicknes_mm"), HasSubstr("did you mean 'thickness_mm'?"));
-  EXPECT_THAT(told("list[2]"), HasSubstr("has 2 items"));
-  EXPECT_THAT(told("gel[0]"), HasSubstr("isn't a list"));
-  EXPECT_THAT(told("word"), HasSubstr("isn't a number"));
-  EXPECT_THAT(told("quoted"), HasSubstr("plain number"));
-  EXPECT_THAT(told("b"), HasSubstr("shared by an alias"));
-  EXPECT_THAT(told("d"), HasSubstr("plain number"));
-  EXPECT_THAT(told("d"), HasSubstr("plain number"));
-  EXPECT_THAT(told("gel"), HasSubstr("isn't a number"));
-  EXPECT_THAT(told("list[x]"), HasSubstr("brackets"));
-  EXPECT_THAT(told(""), HasSubstr("is empty"));
+  EXPECT_THAT(error_of("gel.thicknes_mm"), HasSubstr("job.yaml:7: path 'gel.thicknes_mm'"));
+  EXPECT_THAT(error_of("gel.thicknes_mm"), HasSubstr("did you mean 'thickness_mm'?"));
+  EXPECT_THAT(error_of("list[2]"), HasSubstr("has 2 items"));
+  EXPECT_THAT(error_of("gel[0]"), HasSubstr("isn't a list"));
+  EXPECT_THAT(error_of("word"), HasSubstr("isn't a number"));
+  EXPECT_THAT(error_of("quoted"), HasSubstr("plain number"));
+  EXPECT_THAT(error_of("b"), HasSubstr("shared by an alias"));
+  EXPECT_THAT(error_of("d"), HasSubstr("plain number"));
+  EXPECT_THAT(error_of("d"), HasSubstr("plain number"));
+  EXPECT_THAT(error_of("gel"), HasSubstr("isn't a number"));
+  EXPECT_THAT(error_of("list[x]"), HasSubstr("brackets"));
+  EXPECT_THAT(error_of(""), HasSubstr("is empty"));
 }
 
 TEST(Splits, UnitsAreDealtOutByTheirShares) {
@@ -150,7 +151,7 @@ TEST(Splits, SamplesMeetTheirSharesAsCloselyAsChanceHasIt) {
 class Draw : public ::testing::Test {
  protected:
   std::filesystem::path job() { return test::write_small_draw(folder_); }
-  std::string told(const std::string& from, const std::string& to) {
+  std::string error_of(const std::string& from, const std::string& to) {
     std::string text = test::kSmallDraw;
     const std::size_t at = text.find(from);
     EXPECT_NE(at, std::string::npos) << from;
@@ -207,7 +208,7 @@ TEST_F(Draw, UnitsDifferAsTheJobSaysAndInNothingElse) {
   EXPECT_EQ(one.drawn[0].second, one.device.gel.youngs_modulus_MPa);
 }
 
-TEST_F(Draw, PiecesKeepTheirLookAndRotationsAreTurnThenTilt) {
+TEST_F(Draw, PiecesKeepTheirAppearanceAndRotationsAreTurnThenTilt) {
   const PreparedDraw prepared = prepare_draw(job());
   EXPECT_EQ(drawn_object(prepared, 0, 7).shape.radius_mm, drawn_object(prepared, 0, 7).shape.radius_mm);
   EXPECT_NE(drawn_object(prepared, 0, 7).shape.radius_mm, drawn_object(prepared, 0, 8).shape.radius_mm);
@@ -219,24 +220,27 @@ TEST_F(Draw, PiecesKeepTheirLookAndRotationsAreTurnThenTilt) {
   }
 }
 
-TEST_F(Draw, MistakesAreToldBeforeAnythingIsWritten) {
-  EXPECT_THAT(told("samples: 10", "samples: 1"), HasSubstr("each unit needs one at least"));
-  EXPECT_THAT(told("gel.youngs_modulus_MPa", "gel.youngs_modulus"), HasSubstr("did you mean 'youngs_modulus_MPa'?"));
-  EXPECT_THAT(told("times: {uniform: [0.8, 1.2]}", "times: {uniform: [-2, -1]}"), HasSubstr("unit 0, as drawn: "));
-  EXPECT_THAT(told("times: {uniform: [0.8, 1.2]}", "times: 1, plus: 2"),
+TEST_F(Draw, MistakesAreReportedBeforeAnythingIsWritten) {
+  EXPECT_THAT(error_of("samples: 10", "samples: 1"), HasSubstr("each unit needs one at least"));
+  EXPECT_THAT(error_of("gel.youngs_modulus_MPa", "gel.youngs_modulus"),
+              HasSubstr("did you mean 'youngs_modulus_MPa'?"));
+  EXPECT_THAT(error_of("times: {uniform: [0.8, 1.2]}", "times: {uniform: [-2, -1]}"), HasSubstr("unit 0, as drawn: "));
+  EXPECT_THAT(error_of("times: {uniform: [0.8, 1.2]}", "times: 1, plus: 2"),
               HasSubstr("times and plus stand here together"));
-  EXPECT_THAT(told("force_N: {log_uniform: [0.05, 0.3]}", "force_N: 1\n  depth_mm: 1"),
+  EXPECT_THAT(error_of("force_N: {log_uniform: [0.05, 0.3]}", "force_N: 1\n  depth_mm: 1"),
               HasSubstr("force_N and depth_mm stand here together"));
-  EXPECT_THAT(told("  force_N: {log_uniform: [0.05, 0.3]}\n", ""), HasSubstr("none of force_N, depth_mm stands here"));
-  EXPECT_THAT(told("force_N: {log_uniform: [0.05, 0.3]}", "depth_mm: 5"), HasSubstr("is 3 mm thick"));
-  EXPECT_THAT(told("train: 0.5", "train: 0.6"), HasSubstr("add up to 1.1"));
-  EXPECT_THAT(told("outputs: [frame, height, contact]", "outputs: [frame, hight]"),
+  EXPECT_THAT(error_of("  force_N: {log_uniform: [0.05, 0.3]}\n", ""),
+              HasSubstr("none of force_N, depth_mm stands here"));
+  EXPECT_THAT(error_of("force_N: {log_uniform: [0.05, 0.3]}", "depth_mm: 5"), HasSubstr("is 3 mm thick"));
+  EXPECT_THAT(error_of("train: 0.5", "train: 0.6"), HasSubstr("add up to 1.1"));
+  EXPECT_THAT(error_of("outputs: [frame, height, contact]", "outputs: [frame, hight]"),
               HasSubstr("did you mean 'height'?"));
-  EXPECT_THAT(told("outputs: [frame, height, contact]", "outputs: [frame, frame]"), HasSubstr("second time"));
-  EXPECT_THAT(told("ball.yaml", "bull.yaml"), HasSubstr("there is no file"));
-  EXPECT_THAT(told("weight: 2", "wieght: 2"), HasSubstr("did you mean 'weight'?"));
-  EXPECT_THAT(told("set: {uniform: [1, 2]}", "set: {uniform: [-2, -1]}"), HasSubstr("piece 0 of object 0, as drawn: "));
-  EXPECT_THAT(told("device: device.yaml", "device: bare.yaml"), HasSubstr("has no coating"));
+  EXPECT_THAT(error_of("outputs: [frame, height, contact]", "outputs: [frame, frame]"), HasSubstr("second time"));
+  EXPECT_THAT(error_of("ball.yaml", "bull.yaml"), HasSubstr("there is no file"));
+  EXPECT_THAT(error_of("weight: 2", "wieght: 2"), HasSubstr("did you mean 'weight'?"));
+  EXPECT_THAT(error_of("set: {uniform: [1, 2]}", "set: {uniform: [-2, -1]}"),
+              HasSubstr("piece 0 of object 0, as drawn: "));
+  EXPECT_THAT(error_of("device: device.yaml", "device: bare.yaml"), HasSubstr("has no coating"));
 }
 
 }  // namespace

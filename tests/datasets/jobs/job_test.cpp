@@ -140,7 +140,7 @@ TEST(JobErrors, ImageWithoutACameraIsRefused) {
   EXPECT_THAT(message_of([&] { prepare_job(file); }), AllOf(HasSubstr("scene.yaml:"), HasSubstr("camera")));
 }
 
-TEST(Job, IsToldFromASceneByItsScenes) {
+TEST(Job, IsDistinguishedFromASceneByItsScenes) {
   const test::TemporaryFolder folder;
   EXPECT_TRUE(is_job_file(test::write_small_job(folder)));
   EXPECT_FALSE(is_job_file(folder.path() / "scene.yaml"));

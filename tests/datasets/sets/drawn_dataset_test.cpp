@@ -22,21 +22,21 @@ namespace fs = std::filesystem;
 using test::message_of;
 using ::testing::HasSubstr;
 
-/// What a quick bench was asked for, and when it ends the run.
+/// What a quick sensor was asked for, and when it ends the run.
 struct Calls {
   std::atomic<int> units{0}, presses{0};
   int stop_at = -1;
   int refuse_every = 0;  // touches whose seed is a multiple of this can't be pressed
 };
 
-/// A bench whose records are plain functions of unit and touch.
+/// A sensor whose records are plain functions of unit and touch.
 SensorSource quick_bench(Calls& calls) {
   return [&calls](const PreparedDraw&, const DrawnUnit& unit) {
     ++calls.units;
-    UnitSensor bench;
-    bench.light = "a plain function";
-    bench.background = cv::Mat(30, 40, CV_8UC3, cv::Scalar(unit.number, 20, 30));
-    bench.press = [&calls, unit](const DrawnTouch& touch, const sim::ObjectSpec& object) {
+    UnitSensor sensor;
+    sensor.light = "a plain function";
+    sensor.background = cv::Mat(30, 40, CV_8UC3, cv::Scalar(unit.number, 20, 30));
+    sensor.press = [&calls, unit](const DrawnTouch& touch, const sim::ObjectSpec& object) {
       if (calls.presses++ == calls.stop_at) throw std::runtime_error("the process ends here");
       if (calls.refuse_every > 0 && touch.seed % static_cast<std::uint64_t>(calls.refuse_every) == 0) {
         throw Unpressable("beside");
@@ -64,7 +64,7 @@ SensorSource quick_bench(Calls& calls) {
       record.largest_strain = 0.1;
       return record;
     };
-    return bench;
+    return sensor;
   };
 }
 
@@ -187,7 +187,7 @@ TEST_F(DrawnDataset, DamagedBlocksAreMadeAgainAndForeignOnesRefused) {
   }
   fs::remove(block("out", 1));
   EXPECT_THAT(message_of([&] { merge_drawn(job_, folder_.path() / "out"); }),
-              HasSubstr("1 of 4 files lack (blocks/000001.h5)"));
+              HasSubstr("1 of 4 files are missing (blocks/000001.h5)"));
   write(block("out", 1), good);  // whole, but in the wrong place
   EXPECT_THAT(message_of([&] { generate("out"); }), HasSubstr("000001.h5: is of another job or another run"));
   EXPECT_THAT(message_of([&] { merge_drawn(job_, folder_.path() / "out"); }), HasSubstr("another run"));
@@ -196,19 +196,19 @@ TEST_F(DrawnDataset, DamagedBlocksAreMadeAgainAndForeignOnesRefused) {
   EXPECT_EQ(contents("out"), whole);
 }
 
-TEST_F(DrawnDataset, ShardsThatLackAreNamed) {
+TEST_F(DrawnDataset, MissingShardsAreNamed) {
   const fs::path out = folder_.path() / "out";
-  EXPECT_EQ(lacking_shards(job_, out, 4), (std::vector<int>{1, 2, 3, 4}));
+  EXPECT_EQ(missing_shards(job_, out, 4), (std::vector<int>{1, 2, 3, 4}));
   EXPECT_FALSE(fs::exists(out));
   generate("out", {2, 4});
-  EXPECT_EQ(lacking_shards(job_, out, 4), (std::vector<int>{1, 3, 4}));
-  EXPECT_EQ(lacking_shards(job_, out, 2), (std::vector<int>{1, 2}));
+  EXPECT_EQ(missing_shards(job_, out, 4), (std::vector<int>{1, 3, 4}));
+  EXPECT_EQ(missing_shards(job_, out, 2), (std::vector<int>{1, 2}));
   for (const int number : {1, 3, 4}) generate("out", {number, 4});
-  EXPECT_TRUE(lacking_shards(job_, out, 4).empty());
+  EXPECT_TRUE(missing_shards(job_, out, 4).empty());
   write(block("out", 2), "short");
-  EXPECT_EQ(lacking_shards(job_, out, 4), (std::vector<int>{3}));
-  EXPECT_EQ(lacking_shards(job_, out, 2), (std::vector<int>{2}));
-  EXPECT_THAT(message_of([&] { lacking_shards(job_, out, 0); }), HasSubstr("--lacking: 0 is not allowed"));
+  EXPECT_EQ(missing_shards(job_, out, 4), (std::vector<int>{3}));
+  EXPECT_EQ(missing_shards(job_, out, 2), (std::vector<int>{2}));
+  EXPECT_THAT(message_of([&] { missing_shards(job_, out, 0); }), HasSubstr("--missing: 0 is not allowed"));
 }
 
 TEST_F(DrawnDataset, AChangedJobAForeignFolderAndAChangedSetAreRefused) {

@@ -179,7 +179,7 @@ TEST(WeightedGap, MovedAlongTheNormalIsThatOfTheMovedBody) {
 }
 
 TEST(SilhouetteDistance, HasTheSignOfAHitAndNeverExceedsTheDistance) {
-  // The same outline by two ways: the sign of the distance, and whether the line enters; upright, tilted, from below
+  // The same outline by two methods: the sign of the distance, and whether the line enters; upright, tilted, from below
   // and lying. Between two lines it may change by their distance at most.
   const auto relief = std::make_shared<const ReliefMap>(2, 2, Eigen::Vector2d(-0.5, -0.5), Eigen::Vector2d(1, 1),
                                                         std::array{true, true}, std::vector<float>(4, 0.01F));
@@ -187,12 +187,12 @@ TEST(SilhouetteDistance, HasTheSignOfAHitAndNeverExceedsTheDistance) {
       RoundedCylinder{1.1, 0.2, 1.0}, RoundedCylinder{1.1, 0.0, 1.0},
       RoundedCylinder{0.8, 0.8, 1.6}, SphereShape{0.9},
       BoxShape{{1.0, 1.8, 0.5}},      ReliefShape{RoundedCylinder{1.1, 0.2, 1.0}, relief}};
-  const std::vector<Eigen::Vector3d> ways{{0, 0, 1},      {1e-9, 0, 1},     {0.1, 0.05, 1},  {-0.3, 0.2, 1},
-                                          {0.9, -1.4, 1}, {0.2, 0.1, -1.0}, {1, 0.3, 0.002}, {0.5, 0, 0.5}};
+  const std::vector<Eigen::Vector3d> directions{{0, 0, 1},      {1e-9, 0, 1},     {0.1, 0.05, 1},  {-0.3, 0.2, 1},
+                                                {0.9, -1.4, 1}, {0.2, 0.1, -1.0}, {1, 0.3, 0.002}, {0.5, 0, 0.5}};
   for (const ContactShape& shape : shapes) {
-    for (const Eigen::Vector3d& way : ways) {
-      const Eigen::Vector3d d = way.normalized();
-      if (std::holds_alternative<BoxShape>(shape) && way.head<2>() != Eigen::Vector2d::Zero()) {
+    for (const Eigen::Vector3d& direction : directions) {
+      const Eigen::Vector3d d = direction.normalized();
+      if (std::holds_alternative<BoxShape>(shape) && direction.head<2>() != Eigen::Vector2d::Zero()) {
         EXPECT_FALSE(silhouette_distance(std::get<BoxShape>(shape), Eigen::Vector3d::Zero(), d).has_value());
         continue;
       }

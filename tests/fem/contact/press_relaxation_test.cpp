@@ -115,7 +115,7 @@ TEST(PressRelaxation, ARampOfAFlatPunchIsExactInAnyNumberOfSteps) {
     for (int k = 1; k <= steps; ++k) press.step(at(0, 0, -0.2 * k / steps, seconds / steps));
     EXPECT_NEAR(press.state().wrench[2], share * whole, 1e-9 * whole) << steps;
   }
-  // Half of the way, and so half of the time, is through air.
+  // Half of the path, and so half of the time, is through air.
   Press from_above = relaxing(punch, 0.0);
   from_above.step(at(0, 0, 0.2, 0.0));
   EXPECT_NEAR(from_above.step(at(0, 0, -0.2, 2.0 * seconds)).wrench[2], share * whole, 1e-9 * whole);

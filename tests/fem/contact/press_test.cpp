@@ -147,7 +147,7 @@ TEST(Press, ASymmetricPressGivesNoShear) {
   }
 }
 
-TEST(Press, WithoutFrictionTheWayDoesNotMatter) {
+TEST(Press, WithoutFrictionThePathDoesNotMatter) {
   Press one(gel(), SphereShape{kRadius}, 0.0, tight());
   Press many(gel(), SphereShape{kRadius}, 0.0, tight());
   many.step(sphere_at(-0.4, 0.3, 0.1));
@@ -320,7 +320,7 @@ TEST(Press, AStuckTwistGivesATorqueAndNoForce) {
 }
 
 TEST(Press, NoFrictionIsBitwiseTheFrictionlessAnswer) {
-  // Friction zero with a way that would matter, against the same way straight down.
+  // Friction zero with a path that would matter, against the same depth straight down.
   Press press(gel(), SphereShape{kRadius}, 0.0);
   Press again(gel(), SphereShape{kRadius}, -0.0);
   const PressState& a = press.step(sphere_at(0.1, 0, 0.2));

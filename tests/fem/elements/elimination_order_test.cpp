@@ -36,7 +36,7 @@ TEST(EliminationOrder, BranchesOfTheTreeDontMeet) {
     const int later = std::max(group[matrix.rows[k]], group[matrix.columns[k]]);
     int above = std::min(group[matrix.rows[k]], group[matrix.columns[k]]);
     while (above >= 0 && above < later) above = tree.parent[above];
-    ASSERT_EQ(above, later);  // two unknowns that meet lie on one way to the root
+    ASSERT_EQ(above, later);  // two unknowns that meet lie on one path to the root
   }
 }
 

@@ -316,7 +316,7 @@ TEST_F(ComplianceCache, FileHasTheSameBytesFromOneThreadAndFromMany) {
   EXPECT_TRUE(read_whole_file(file()) == many);
 }
 
-TEST_F(ComplianceCache, FileIsAsLargeAsForetold) {
+TEST_F(ComplianceCache, FileIsAsLargeAsPredicted) {
   const Compliance gel = get();
   const double size = static_cast<double>(std::filesystem::file_size(file()));
   EXPECT_NEAR(compliance_file_bytes(static_cast<int>(gel.vertices.size()), 2), size, 3 * 4096.0);

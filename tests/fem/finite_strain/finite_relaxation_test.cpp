@@ -74,7 +74,7 @@ TEST(FiniteRelaxation, ASphereHeldAtItsDepthRelaxesAsTheModulusAndMovesNothing) 
 }
 
 /// Into the gel and half out again: its shape is the elastic one's, its force that force's hereditary integral.
-TEST(FiniteRelaxation, TheForceIsTheElasticForcesIntegralAlongTheWay) {
+TEST(FiniteRelaxation, TheForceIsTheElasticForcesIntegralAlongThePath) {
   FinitePress press = pressed(0.0);
   FinitePress elastic = pressed(0.0, {});
   // The mesh's surface is touched a little below the apex: until then there's no force.
@@ -117,7 +117,8 @@ TEST(FiniteRelaxation, AHeldForceMakesItCreepWithThatForce) {
   EXPECT_GT(force.back(), 1.3);
 }
 
-/// After a long hold the gel has forgotten half of its force; who goes back at once is pushed by nothing half way.
+/// After a long hold the gel has forgotten half of its force; who goes back at once is pushed by nothing at half the
+/// depth.
 TEST(FiniteRelaxation, AGelThatIsLetGoFastNeverPulls) {
   FinitePress press = pressed(0.3);
   press.step(sphere_at(0.0, 0.6, 0.0));

@@ -52,7 +52,7 @@ double largest_error(const TaylorHoodSpace& space, const ElasticSolution& soluti
 
 TEST(FiniteStrain, PatchTestAtLargeDeformation) {
   TetMesh mesh = fixtures::box_mesh({3, 2, 1.5}, 3, 2, 2, 0.15);
-  // Held all round but for the top: with its sides free too, a block under dead loads buckles on the way.
+  // Held all round but for the top: with its sides free too, a block under dead loads buckles before.
   mesh.bonded.clear();
   for (const auto& face : boundary_faces(mesh)) {
     if (std::find(mesh.outer.begin(), mesh.outer.end(), face) == mesh.outer.end()) mesh.bonded.push_back(face);
@@ -254,7 +254,8 @@ TEST(FiniteStrain, WorkOfTheLoadIsTheStoredEnergy) {
     before = now;
   }
   EXPECT_NEAR(work, problem.stored_energy(state), 1e-3 * work);
-  EXPECT_GT(std::abs(0.5 * before - work), 5e-3 * work);  // it isn't linear here: half load times way would be wrong
+  EXPECT_GT(std::abs(0.5 * before - work),
+            5e-3 * work);  // it isn't linear here: half load times displacement would be wrong
 }
 
 /// A block between lubricated plates, incompressible: force per undeformed area G (l - 1/l^2).

@@ -9,7 +9,8 @@
 namespace touchstone::fem::fixtures {
 
 /// The box |x| <= size_x/2, |y| <= size_y/2, -size_z <= z <= 0 as nx * ny * nz boxes of six tetrahedra each. Inner
-/// vertices are pushed by up to `unevenness` times the spacing, each its own way, so that nothing is right by symmetry.
+/// vertices are pushed by up to `unevenness` times the spacing, each in its own direction, so that nothing is right by
+/// symmetry.
 inline TetMesh box_mesh(const Eigen::Vector3d& size, int nx, int ny, int nz, double unevenness = 0.0) {
   TetMesh mesh;
   const std::array<int, 3> cells = {nx, ny, nz};

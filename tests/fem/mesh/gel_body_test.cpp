@@ -317,7 +317,7 @@ TEST(GelBody, ShapesThatCannotBeAreRefused) {
   EXPECT_THAT(error_of(dome), HasSubstr("meets its base at 11.5 degrees"));
   dome = {};
   dome.layers = {1.6};
-  EXPECT_THAT(error_of(dome), HasSubstr("there is room for"));
+  EXPECT_THAT(error_of(dome), HasSubstr("there is space for"));
   dome = {};
   dome.fine = 0.05;
   dome.coarse = 0.1;
@@ -328,7 +328,7 @@ TEST(GelBody, ShapesThatCannotBeAreRefused) {
   tip = {};
   tip.sleeve = 7.9;
   EXPECT_THAT(error_of(tip), HasSubstr("are left"));
-  EXPECT_THAT(error_of(layered_slab({1.0, 1.9})), HasSubstr("there is room for"));
+  EXPECT_THAT(error_of(layered_slab({1.0, 1.9})), HasSubstr("there is space for"));
   EXPECT_THAT(error_of(layered_slab({1e-4})), HasSubstr("at most 1000 times as wide as high"));
 }
 

@@ -66,18 +66,18 @@ TEST(PixelError, SeesNothingBeyondTheFullWell) {
             0.0);
 }
 
-TEST(BenchHolds, LieWithinAnEdgeAndAFifthOfTheDepth) {
-  const std::vector<sim::PressSpec> holds = bench_holds(50, 0.5, 0.4, 7);
+TEST(BenchPresses, LieWithinAnEdgeAndAFifthOfTheDepth) {
+  const std::vector<sim::PressSpec> specs = bench_presses(50, 0.5, 0.4, 7);
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();
-  for (const sim::PressSpec& hold : holds) {
-    EXPECT_LE(hold.place_mm.cwiseAbs().maxCoeff(), 0.25);
-    EXPECT_NEAR(*hold.depth_mm, 0.4, 0.2 * 0.4);
-    EXPECT_NEAR(hold.drag_mm.norm(), 0.4 / 3.0, 1e-12);
-    sum += hold.drag_mm;
+  for (const sim::PressSpec& spec : specs) {
+    EXPECT_LE(spec.place_mm.cwiseAbs().maxCoeff(), 0.25);
+    EXPECT_NEAR(*spec.depth_mm, 0.4, 0.2 * 0.4);
+    EXPECT_NEAR(spec.drag_mm.norm(), 0.4 / 3.0, 1e-12);
+    sum += spec.drag_mm;
   }
   EXPECT_LT(sum.norm(), 0.1) << "into all directions";
-  EXPECT_EQ(bench_holds(50, 0.5, 0.4, 7)[17].place_mm, holds[17].place_mm);
-  EXPECT_NE(bench_holds(50, 0.5, 0.4, 8)[17].place_mm, holds[17].place_mm);
+  EXPECT_EQ(bench_presses(50, 0.5, 0.4, 7)[17].place_mm, specs[17].place_mm);
+  EXPECT_NE(bench_presses(50, 0.5, 0.4, 8)[17].place_mm, specs[17].place_mm);
 }
 
 TEST(MiddleOf, KeepsTheAxisAndTheMosaic) {

@@ -12,16 +12,16 @@ TEST(ChromaForcePictures, AProbeLooksAsItFeels) {
   for (const ForceProbe& probe : draw_force_probes(3, 8)) {
     const sim::ObjectSpec object = visible_object(probe);
     EXPECT_EQ(object.friction, probe.friction);
-    const fem::ContactShape seen = sim::contact_shape(object.shape), felt = contact_shape(probe);
-    ASSERT_EQ(seen.index(), felt.index());
-    if (const auto* box = std::get_if<fem::BoxShape>(&felt)) {
+    const fem::ContactShape seen = sim::contact_shape(object.shape), pressed = contact_shape(probe);
+    ASSERT_EQ(seen.index(), pressed.index());
+    if (const auto* box = std::get_if<fem::BoxShape>(&pressed)) {
       EXPECT_EQ(std::get<fem::BoxShape>(seen).size, box->size);
-    } else if (const auto* cylinder = std::get_if<fem::RoundedCylinder>(&felt)) {
+    } else if (const auto* cylinder = std::get_if<fem::RoundedCylinder>(&pressed)) {
       EXPECT_EQ(std::get<fem::RoundedCylinder>(seen).radius, cylinder->radius);
       EXPECT_EQ(std::get<fem::RoundedCylinder>(seen).edge_radius, cylinder->edge_radius);
       EXPECT_EQ(std::get<fem::RoundedCylinder>(seen).height, cylinder->height);
     } else {
-      EXPECT_EQ(std::get<fem::SphereShape>(seen).radius, std::get<fem::SphereShape>(felt).radius);
+      EXPECT_EQ(std::get<fem::SphereShape>(seen).radius, std::get<fem::SphereShape>(pressed).radius);
     }
   }
 }
@@ -36,11 +36,11 @@ TEST(ChromaForcePictures, CalibrationHasProbesOfItsOwn) {
   }
 }
 
-TEST(ChromaForcePictures, ToldFieldsAreThoseOfTheirFrames) {
+TEST(ChromaForcePictures, GivenFieldsAreThoseOfTheirFrames) {
   std::vector<sensors::MarkerField> fields(2);
   fields[0].grid = {1, 1};
   fields[1].grid = {2, 2};
-  const MarkerReader reader = told_fields(fields);
+  const MarkerReader reader = fields_from(fields);
   const ForceProbe probe;
   const fem::PressState press;
   EXPECT_EQ(reader({probe, press, 1, 0.0, false, {}}).grid.x(), 2);

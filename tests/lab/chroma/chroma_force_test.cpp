@@ -11,9 +11,9 @@
 namespace touchstone::lab {
 namespace {
 
-const ForceBench& bench() {
-  static const ForceBench made = [] {
-    ForceBench result;
+const ForceSetup& setup() {
+  static const ForceSetup made = [] {
+    ForceSetup result;
     fem::SlabMesh slab;
     slab.size_x = slab.size_y = 26.0;
     slab.thickness = 5.0;
@@ -48,7 +48,7 @@ ForceProbe punch() {
 TEST(ChromaForce, AProbeIsPressedDraggedAndSlides) {
   int frames = 0, sliding = 0;
   double before = 0.0;
-  play_probe(bench(), punch(), {}, [&](const ForceFrame& frame) {
+  play_probe(setup(), punch(), {}, [&](const ForceFrame& frame) {
     EXPECT_EQ(frame.number, frames);
     EXPECT_NEAR(frame.drag_mm, 0.1 * frames, 1e-12);
     EXPECT_GT(frame.press.wrench[2], 0.0);
@@ -76,7 +76,7 @@ TEST(ChromaForce, AProbeIsPressedDraggedAndSlides) {
 }
 
 TEST(ChromaForce, ForcesAndFrictionComeBackFromNoisyMarkers) {
-  const ForceRun run = run_force_probe(bench(), punch(), noisy_truth({7, 7}, 0.02, 0.06, 11));
+  const ForceRun run = run_force_probe(setup(), punch(), noisy_truth({7, 7}, 0.02, 0.06, 11));
   const ForceScore result = score({run});
   EXPECT_EQ(result.frames, static_cast<int>(run.samples.size()));
   EXPECT_LT(result.relative, 0.06);
@@ -95,9 +95,9 @@ TEST(ChromaForce, ForcesAndFrictionComeBackFromNoisyMarkers) {
 
 TEST(ChromaForce, RunsRepeat) {
   const DragSettings drag{0.1, 0.3, 2};
-  const ForceRun first = run_force_probe(bench(), punch(), noisy_truth({7, 7}, 0.02, 0.06, 11), drag);
-  const ForceRun second = run_force_probe(bench(), punch(), noisy_truth({7, 7}, 0.02, 0.06, 11), drag);
-  const ForceRun other = run_force_probe(bench(), punch(), noisy_truth({7, 7}, 0.02, 0.06, 12), drag);
+  const ForceRun first = run_force_probe(setup(), punch(), noisy_truth({7, 7}, 0.02, 0.06, 11), drag);
+  const ForceRun second = run_force_probe(setup(), punch(), noisy_truth({7, 7}, 0.02, 0.06, 11), drag);
+  const ForceRun other = run_force_probe(setup(), punch(), noisy_truth({7, 7}, 0.02, 0.06, 12), drag);
   ASSERT_EQ(first.samples.size(), 4u);
   for (std::size_t k = 0; k < 4; ++k) {
     EXPECT_EQ(first.samples[k].estimate, second.samples[k].estimate);
@@ -113,7 +113,7 @@ TEST(ChromaForce, FramesWithTooFewMarkersAreCountedNotInverted) {
     for (std::size_t m = left; m < field.measured.size(); ++m) field.measured[m] = 0;
     return field;
   };
-  const ForceRun run = run_force_probe(bench(), punch(), lost, {0.1, 0.4, 2});
+  const ForceRun run = run_force_probe(setup(), punch(), lost, {0.1, 0.4, 2});
   EXPECT_EQ(run.samples.size(), 2u);
   EXPECT_EQ(run.unread, 3);
   EXPECT_EQ(score({run, run}).unread, 6);
@@ -121,7 +121,7 @@ TEST(ChromaForce, FramesWithTooFewMarkersAreCountedNotInverted) {
 }
 
 /// Where strains are small, linear and finite elasticity are one; deeper, the linear map must fall behind.
-TEST(ChromaForce, LargeStrainsAreToldApartFromSmallOnes) {
+TEST(ChromaForce, LargeStrainsDifferFromSmallOnes) {
   fem::SlabMesh slab;
   slab.size_x = slab.size_y = 15.0;
   slab.thickness = 4.0;
@@ -130,7 +130,7 @@ TEST(ChromaForce, LargeStrainsAreToldApartFromSmallOnes) {
   slab.fine_half_x = slab.fine_half_y = 3.0;
   slab.fine_depth = 1.0;
   const std::array materials = {fem::ElasticMaterial{0.4, 0.49}};
-  ForceBench small;
+  ForceSetup small;
   small.truth_gel =
       std::make_shared<const fem::Compliance>(fem::compute_compliance(fem::mesh_slab(slab), materials, {}, 4.0));
   const fem::FiniteGel finite(fem::mesh_slab(slab), materials, {}, 4.0);
@@ -154,18 +154,18 @@ TEST(ChromaForce, LargeStrainsAreToldApartFromSmallOnes) {
   EXPECT_GT(rows[1].largest_strain, rows[0].largest_strain);
   EXPECT_THAT(
       [&] {
-        large_strain_ladder(bench(), finite, ball, {0.1}, noisy_truth({7, 7}, 0, 0, 1));
+        large_strain_ladder(setup(), finite, ball, {0.1}, noisy_truth({7, 7}, 0, 0, 1));
       },
       ::testing::ThrowsMessage<Error>(::testing::HasSubstr("they need the same mesh")));
 }
 
-TEST(ChromaForce, ABenchNeedsMarkers) {
+TEST(ChromaForce, ASetupNeedsMarkers) {
   sim::DeviceSpec bare;
   bare.gel.shape = sim::GelShape::slab;
-  EXPECT_THAT([&] { set_up_force_bench(bare, {}); },
+  EXPECT_THAT([&] { set_up_force(bare, {}); },
               ::testing::ThrowsMessage<Error>(::testing::HasSubstr("neither printed markers nor beads")));
   bare.beads = sim::BeadSpec{};
-  EXPECT_THAT([&] { set_up_force_bench(bare, {}); },
+  EXPECT_THAT([&] { set_up_force(bare, {}); },
               ::testing::ThrowsMessage<Error>(::testing::HasSubstr("no printed markers")));
 }
 

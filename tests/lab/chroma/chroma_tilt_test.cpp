@@ -56,9 +56,9 @@ TEST(TiltPicture, WithoutInkIsRefused) {
 }
 
 TEST(TiltScene, KeepsTheMarkersCentreWhereItWas) {
-  const TiltBench bench = far_bench();
+  const TiltSetup setup = far_setup();
   const TiltPose tilted{0.6, {0.1, -0.2, -0.3}};
-  const render::Scene flat = tilt_scene(bench, spectra(), TiltMarker::flat, tilted);
+  const render::Scene flat = tilt_scene(setup, spectra(), TiltMarker::flat, tilted);
   const render::Surface& ink = flat.surfaces.at(1);
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   double area = 0.0;
@@ -70,16 +70,16 @@ TEST(TiltScene, KeepsTheMarkersCentreWhereItWas) {
     area += part;
     mean += part * (a + b + c) / 3.0;
   }
-  const double stretch = 1.0 + 0.5 * 0.3 / bench.gel_mm;  // [Lin2019, eq. 3]
-  EXPECT_NEAR(area, std::pow(bench.side_mm * stretch, 2), 1e-6);
+  const double stretch = 1.0 + 0.5 * 0.3 / setup.gel_mm;  // [Lin2019, eq. 3]
+  EXPECT_NEAR(area, std::pow(setup.side_mm * stretch, 2), 1e-6);
   EXPECT_LT((mean / area - tilted.moved_mm).norm(), 1e-9);
-  const render::Scene ball = tilt_scene(bench, spectra(), TiltMarker::ball, {0.6, Eigen::Vector3d::Zero()});
+  const render::Scene ball = tilt_scene(setup, spectra(), TiltMarker::ball, {0.6, Eigen::Vector3d::Zero()});
   EXPECT_LT((ball.balls.at(0).centre - Eigen::Vector3d(0, 0, -1.05)).norm(), 1e-12);
 }
 
-TEST(TiltScene, RefusesWhatTheBenchCantHave) {
+TEST(TiltScene, RefusesWhatTheSetupCantHave) {
   const auto refused = [](TiltMarker marker, const TiltPose& pose) {
-    EXPECT_THROW(tilt_scene(far_bench(), spectra(), marker, pose), Error);
+    EXPECT_THROW(tilt_scene(far_setup(), spectra(), marker, pose), Error);
   };
   refused(TiltMarker::flat, {0.8, Eigen::Vector3d::Zero()});
   refused(TiltMarker::flat, {-0.1, Eigen::Vector3d::Zero()});
@@ -91,45 +91,45 @@ TEST(TiltScene, RefusesWhatTheBenchCantHave) {
 }
 
 TEST(TiltedMarker, LooksNarrowerAndYellowerAndAPressedOneLarger) {
-  TiltBench bench = far_bench();
-  bench.samples = 16;
+  TiltSetup setup = far_setup();
+  setup.samples = 16;
   const TiltColours colours = tilt_colours(spectra());
-  const auto look = [&](TiltMarker marker, const TiltPose& pose) {
-    return read_tilt_picture(tilt_picture(bench, spectra(), marker, pose, 3), colours);
+  const auto read_at = [&](TiltMarker marker, const TiltPose& pose) {
+    return read_tilt_picture(tilt_picture(setup, spectra(), marker, pose, 3), colours);
   };
-  const TiltReading level = look(TiltMarker::flat, {});
-  const TiltReading tilted = look(TiltMarker::flat, {0.5, Eigen::Vector3d::Zero()});
+  const TiltReading level = read_at(TiltMarker::flat, {});
+  const TiltReading tilted = read_at(TiltMarker::flat, {0.5, Eigen::Vector3d::Zero()});
   EXPECT_NEAR(tilted.ink_area_px / level.ink_area_px, std::cos(0.5), 0.02);
   EXPECT_NEAR(tilted.ink_width_px, level.ink_width_px, 0.01 * level.ink_width_px);
   EXPECT_GT(tilted.hue, level.hue + 2.0 * kRadiansPerDegree);
   EXPECT_NEAR(tilted.ink_px.x(), level.ink_px.x(), 0.1);
-  const TiltReading pressed = look(TiltMarker::flat, {0.0, {0, 0, -1}});
+  const TiltReading pressed = read_at(TiltMarker::flat, {0.0, {0, 0, -1}});
   EXPECT_GT(pressed.ink_area_px, 1.1 * level.ink_area_px);
   EXPECT_LT(pressed.hue, level.hue - 2.0 * kRadiansPerDegree);
   // A ball has no tilt of its own.
-  const TiltReading ball = look(TiltMarker::ball, {});
-  const TiltReading turned = look(TiltMarker::ball, {0.5, Eigen::Vector3d::Zero()});
+  const TiltReading ball = read_at(TiltMarker::ball, {});
+  const TiltReading turned = read_at(TiltMarker::ball, {0.5, Eigen::Vector3d::Zero()});
   EXPECT_LT(std::abs(turned.hue - ball.hue), 0.2 * (tilted.hue - level.hue));
 }
 
-TEST(NearBench, IsTheDevicesOwn) {
+TEST(NearSetup, IsTheDevicesOwn) {
   const sim::DeviceSpec device = sim::read_device(datasets::scenes_folder() / "devices" / "chroma.yaml");
-  const TiltBench bench = near_bench();
-  EXPECT_EQ(bench.gel_mm, device.gel.thickness_mm);
-  EXPECT_EQ(bench.plate_mm, device.plate.thickness_mm);
-  EXPECT_EQ(bench.side_mm, device.coating->print->width_mm);
-  EXPECT_EQ(bench.film_mm, device.films->side_mm);
-  EXPECT_EQ(bench.lens_mm, device.camera->focal_length_mm);
-  EXPECT_EQ(bench.camera_mm, -device.camera->hole_position_mm.z());
-  EXPECT_EQ(bench.pixel_pitch_um, device.camera->pixel_pitch_um);
-  EXPECT_EQ(bench.f_number, device.camera->f_number);
+  const TiltSetup setup = near_setup();
+  EXPECT_EQ(setup.gel_mm, device.gel.thickness_mm);
+  EXPECT_EQ(setup.plate_mm, device.plate.thickness_mm);
+  EXPECT_EQ(setup.side_mm, device.coating->print->width_mm);
+  EXPECT_EQ(setup.film_mm, device.films->side_mm);
+  EXPECT_EQ(setup.lens_mm, device.camera->focal_length_mm);
+  EXPECT_EQ(setup.camera_mm, -device.camera->hole_position_mm.z());
+  EXPECT_EQ(setup.pixel_pitch_um, device.camera->pixel_pitch_um);
+  EXPECT_EQ(setup.f_number, device.camera->f_number);
 }
 
 TEST(MeasureTilt, FindsTheGainThatTheLensHas) {
-  TiltBench bench = far_bench();
-  bench.samples = 8;
-  bench.half_view_mm = 1.6;
-  const TiltTable table = measure_tilt(bench, spectra(), TiltMarker::rigid, std::vector<double>{}, 5);
+  TiltSetup setup = far_setup();
+  setup.samples = 8;
+  setup.half_view_mm = 1.6;
+  const TiltTable table = measure_tilt(setup, spectra(), TiltMarker::rigid, std::vector<double>{}, 5);
   EXPECT_TRUE(table.errors.empty());
   // 24 mm before what is 378 mm away, on pixels of 4.51 um.
   EXPECT_NEAR(table.calibration.centroid_gain, 24.0 / (378.0 - 24.0) / 4.51e-3, 0.6);

@@ -46,20 +46,20 @@ TEST(DvsGrasps, AreTheTextsFortyEightAndWithinTheirRanges) {
   EXPECT_NE(draw_dvs_grasp(0, foam, 1, 5).motion.target_force_N, draw_dvs_grasp(0, foam, 2, 5).motion.target_force_N);
   EXPECT_THROW(draw_dvs_grasp(4, foam, 1, 5), Error);
   EXPECT_THROW(draw_dvs_grasp(0, foam, 1, 5, {.force = 1.5}), Error);
-  EXPECT_THROW(draw_dvs_grasp(0, foam, 1, 5, {.bench = std::nan("")}), Error);
+  EXPECT_THROW(draw_dvs_grasp(0, foam, 1, 5, {.setup = std::nan("")}), Error);
 }
 
 // Without a spread all are the middle of what is drawn, but for the pieces' own moduli and faces.
 TEST(DvsGrasps, SpreadSaysHowUnlikeTheyAre) {
   const sim::ObjectSpec foam = sim::read_object(kScenes / dvs_materials()[0].object_file);
   for (std::uint64_t index = 0; index < 20; ++index) {
-    const DvsGraspParameters alike = draw_dvs_grasp(0, foam, 3, index, {.force = 0.0, .pose = 0.0, .bench = 0.0});
+    const DvsGraspParameters alike = draw_dvs_grasp(0, foam, 3, index, {.force = 0.0, .pose = 0.0, .setup = 0.0});
     EXPECT_DOUBLE_EQ(alike.motion.target_force_N, 1.9);
     EXPECT_DOUBLE_EQ(alike.motion.closing_mm_s, 16.5);
     EXPECT_DOUBLE_EQ(alike.motion.clearance_mm, 1.0);
     EXPECT_DOUBLE_EQ(alike.light_level, 1.025);
     EXPECT_EQ(alike.pose.yaw_deg, 0.0);
-    const DvsGraspParameters all = draw_dvs_grasp(0, foam, 3, index, {.bench = 1.0});
+    const DvsGraspParameters all = draw_dvs_grasp(0, foam, 3, index, {.setup = 1.0});
     EXPECT_EQ(all.friction, alike.friction);
     EXPECT_EQ(all.youngs_modulus_MPa, alike.youngs_modulus_MPa);
     const DvsGraspParameters usual = draw_dvs_grasp(0, foam, 3, index);

@@ -27,9 +27,9 @@ const std::filesystem::path kScenes = std::filesystem::path(TOUCHSTONE_SOURCE_DI
 constexpr int kSteel = 3;
 
 /// The device with edges twice as long, and its pieces.
-const DvsGraspBench& bench() {
+const DvsGraspSetup& setup() {
   static const test::TemporaryFolder folder;
-  static const DvsGraspBench made = [] {
+  static const DvsGraspSetup made = [] {
     std::filesystem::copy(kScenes, folder.path() / "scenes", std::filesystem::copy_options::recursive);
     std::string device = read_whole_file(kScenes / "devices/dvs-grasp.yaml");
     for (const auto& [from, to] : {std::pair("fine_mm: 0.5", "fine_mm: 0.8"), {"coarse_mm: 1.5", "coarse_mm: 4"}}) {
@@ -47,19 +47,19 @@ const DvsGraspBench& bench() {
       piece.replace(at, from.size(), "mesh_mm: 2.4");
       folder.write("scenes/" + file, piece);
     }
-    return DvsGraspBench(folder.path() / "scenes", folder.path());
+    return DvsGraspSetup(folder.path() / "scenes", folder.path());
   }();
   return made;
 }
 
 const sim::MembraneCamera& camera() {
-  static const sim::MembraneCamera made(bench().device(), {.cell_mm = 0.5, .walks = 1 << 16});
+  static const sim::MembraneCamera made(setup().device(), {.cell_mm = 0.5, .walks = 1 << 16});
   return made;
 }
 
 /// A short grasp: some 0.4 s.
 DvsGraspParameters short_grasp(int material) {
-  DvsGraspParameters p = draw_dvs_grasp(material, bench().piece(material), 5, 0);
+  DvsGraspParameters p = draw_dvs_grasp(material, setup().piece(material), 5, 0);
   p.motion.target_force_N = 2.0;
   p.motion.clearance_mm = 1.0;
   p.motion.hold_s = 0.15;
@@ -68,7 +68,7 @@ DvsGraspParameters short_grasp(int material) {
 }
 
 render::EventPixelSettings without_noise() {
-  render::EventPixelSettings pixels = bench().device().camera->events->pixels;
+  render::EventPixelSettings pixels = setup().device().camera->events->pixels;
   pixels.threshold_spread = pixels.leak_rate_hz = pixels.shot_rate_hz = pixels.bandwidth_hz = 0.0;
   pixels.refractory_us = 0;
   return pixels;
@@ -87,15 +87,15 @@ EventCounts sum(const std::vector<EventCounts>& counts, double from_s = 0.0, dou
 
 TEST(DvsRecordings, AreTheSameForAnyNumberOfThreads) {
   const std::vector<DvsGraspParameters> grasps = {short_grasp(kSteel), short_grasp(0)};
-  const DvsRecordSettings settings = own_pixels(bench().device());
+  const DvsRecordSettings settings = own_pixels(setup().device());
   std::vector<DvsRecording> one, four;
   {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, 1);
-    one = record_dvs_grasps(bench(), camera(), grasps, settings);
+    one = record_dvs_grasps(setup(), camera(), grasps, settings);
   }
   {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, 4);
-    four = record_dvs_grasps(bench(), camera(), grasps, settings);
+    four = record_dvs_grasps(setup(), camera(), grasps, settings);
   }
   ASSERT_EQ(one.size(), 2u);
   ASSERT_EQ(four.size(), 2u);
@@ -121,7 +121,7 @@ TEST(DvsRecordings, TellOfTheTouchAndTheRelease) {
   settings.pixels = {without_noise(), without_noise()};
   settings.pixels[1].on_threshold *= 0.2;
   settings.pixels[1].off_threshold *= 0.2;
-  const DvsRecording r = record_dvs_grasp(bench(), camera(), p, settings);
+  const DvsRecording r = record_dvs_grasp(setup(), camera(), p, settings);
   const std::vector<EventCounts>& counts = r.by_pixels[0].counts;
   EXPECT_EQ(sum(counts, 0.0, p.motion.rest_s), EventCounts());
   const EventCounts held = sum(counts, r.release_s - 0.1, r.release_s);
@@ -152,17 +152,17 @@ TEST(DvsRecordings, TellOfTheTouchAndTheRelease) {
 }
 
 TEST(DvsRecordings, KindsOfPixelsSeeTheSameLight) {
-  const render::EventPixelSettings own = bench().device().camera->events->pixels;
+  const render::EventPixelSettings own = setup().device().camera->events->pixels;
   render::EventPixelSettings keener = own;
   keener.on_threshold = 0.1;
   keener.off_threshold = 0.1;
-  DvsRecordSettings settings = own_pixels(bench().device());
+  DvsRecordSettings settings = own_pixels(setup().device());
   settings.tolerance *= own.on_threshold / keener.on_threshold;  // as without the third kind
   settings.pixels = {own, own, keener};
   std::int64_t sunk = 0;
   std::int64_t last_us = 0;
   const DvsRecording r =
-      record_dvs_grasp(bench(), camera(), short_grasp(kSteel), settings, [&](std::span<const Event> events) {
+      record_dvs_grasp(setup(), camera(), short_grasp(kSteel), settings, [&](std::span<const Event> events) {
         sunk += static_cast<std::int64_t>(events.size());
         EXPECT_GE(events.front().t_us, last_us);
         last_us = events.back().t_us;
@@ -171,20 +171,20 @@ TEST(DvsRecordings, KindsOfPixelsSeeTheSameLight) {
   EXPECT_EQ(r.by_pixels[0].counts, r.by_pixels[1].counts);
   EXPECT_GT(sum(r.by_pixels[2].counts).off, 2 * sum(r.by_pixels[0].counts).off);
   EXPECT_EQ(sunk, r.by_pixels[0].events);
-  const DvsRecording alone = record_dvs_grasp(bench(), camera(), short_grasp(kSteel), own_pixels(bench().device()));
+  const DvsRecording alone = record_dvs_grasp(setup(), camera(), short_grasp(kSteel), own_pixels(setup().device()));
   EXPECT_EQ(alone.by_pixels[0].counts, r.by_pixels[0].counts);
   const EventCounts all = sum(alone.by_pixels[0].counts);
   EXPECT_LE(all.on + all.off, alone.by_pixels[0].events);
   EXPECT_GE(all.on + all.off, alone.by_pixels[0].events - 20) << "the last, part millisecond";
 }
 
-// Ten times as fine a table of light and as small changes told give the same events but for pixels on the verge.
+// Ten times as fine a table of light and as small changes seen give the same events but for pixels on the verge.
 TEST(DvsRecordings, ToleranceHardlyMatters) {
   DvsRecordSettings settings;
   settings.pixels = {without_noise()};
-  const DvsRecording usual = record_dvs_grasp(bench(), camera(), short_grasp(kSteel), settings);
+  const DvsRecording usual = record_dvs_grasp(setup(), camera(), short_grasp(kSteel), settings);
   settings.tolerance = 0.005;
-  const DvsRecording fine = record_dvs_grasp(bench(), camera(), short_grasp(kSteel), settings);
+  const DvsRecording fine = record_dvs_grasp(setup(), camera(), short_grasp(kSteel), settings);
   EXPECT_GT(fine.steps, usual.steps);
   const auto close = [](std::int64_t a, std::int64_t b) { return 100 * std::abs(a - b) <= b; };
   EXPECT_TRUE(close(sum(usual.by_pixels[0].counts).off, sum(fine.by_pixels[0].counts).off));
@@ -194,7 +194,7 @@ TEST(DvsRecordings, ToleranceHardlyMatters) {
 TEST(DvsRecordings, WrongSettingsAreRefused) {
   const auto refusal = [](const DvsRecordSettings& settings) {
     try {
-      record_dvs_grasp(bench(), camera(), short_grasp(kSteel), settings);
+      record_dvs_grasp(setup(), camera(), short_grasp(kSteel), settings);
     } catch (const Error& error) {
       return std::string(error.what());
     }
@@ -202,13 +202,13 @@ TEST(DvsRecordings, WrongSettingsAreRefused) {
   };
   DvsRecordSettings settings;
   EXPECT_THAT(refusal(settings), HasSubstr("no event pixels"));
-  settings = own_pixels(bench().device());
+  settings = own_pixels(setup().device());
   settings.tolerance = 0.0;
   EXPECT_THAT(refusal(settings), HasSubstr("tolerance is 0"));
-  settings = own_pixels(bench().device());
+  settings = own_pixels(setup().device());
   settings.pixels.front().on_threshold = -1.0;
   EXPECT_THAT(refusal(settings), HasSubstr("on_threshold"));
-  sim::DeviceSpec blind = bench().device();
+  sim::DeviceSpec blind = setup().device();
   blind.camera->events.reset();
   EXPECT_THROW(own_pixels(blind), Error);
 }
@@ -216,15 +216,15 @@ TEST(DvsRecordings, WrongSettingsAreRefused) {
 // Pictures are made where they're wanted: between two of them the light is a straight line, and that's near to a
 // picture.
 TEST(DvsTravelLight, IsNearToPicturesBetween) {
-  const DvsGrasp grasp = bench().play(short_grasp(kSteel));
+  const DvsGrasp grasp = setup().play(short_grasp(kSteel));
   const render::EventPixelSettings pixels = without_noise();
   constexpr double kAllowed = 0.01;
-  const DvsTravelLight light(bench(), camera(), grasp, pixels, kAllowed);
+  const DvsTravelLight light(setup(), camera(), grasp, pixels, kAllowed);
   const std::vector<double>& travels = light.travels_mm();
   ASSERT_GE(travels.size(), 20u);
   EXPECT_TRUE(std::is_sorted(travels.begin(), travels.end()));
   const auto picture = [&](double travel) {
-    const cv::Mat electrons = camera().photocurrent(dvs_face(bench(), camera(), grasp, travel));
+    const cv::Mat electrons = camera().photocurrent(dvs_face(setup(), camera(), grasp, travel));
     return render::log_intensity(electrons * grasp.parameters.light_level, pixels);
   };
   EXPECT_LT(cv::norm(picture(travels[3]), light.log_at(travels[3]), cv::NORM_INF), 1e-5);

@@ -95,7 +95,7 @@ double coverage(double white, double alike) {
     fit.tiles = kTiles;
     fit.shared = 2;
     const FitCertainty certainty = certainty_of(fit);
-    EXPECT_EQ(certainty.untold.cols(), 0);
+    EXPECT_EQ(certainty.unidentified.cols(), 0);
     for (int k = 0; k < 2; ++k) inside += std::abs(found[k] - truth[k]) <= 1.96 * certainty.deviation[k] ? 1 : 0;
   }
   return static_cast<double>(inside) / (2.0 * kTrials);
@@ -119,7 +119,7 @@ FitUnknown unknown(const std::string& name, UnknownHow how = UnknownHow::times) 
   return {name, name, how, 0.5, 2.0, {}};
 }
 
-TEST(FitCertainty, AProductIsToldAndItsFactorsAreNot) {
+TEST(FitCertainty, AProductIsIdentifiedAndItsFactorsAreNot) {
   const Linear problem = linear_problem();
   LinearisedFit fit;
   fit.jacobian.resize(problem.jacobian.rows(), 3);
@@ -129,28 +129,28 @@ TEST(FitCertainty, AProductIsToldAndItsFactorsAreNot) {
   fit.tiles = kTiles;
   fit.shared = 3;
   const FitCertainty certainty = certainty_of(fit);
-  ASSERT_EQ(certainty.untold.cols(), 1);
-  EXPECT_EQ(certainty.told[0], 0);
-  EXPECT_EQ(certainty.told[1], 0);
-  EXPECT_EQ(certainty.told[2], 1);
+  ASSERT_EQ(certainty.unidentified.cols(), 1);
+  EXPECT_EQ(certainty.identified[0], 0);
+  EXPECT_EQ(certainty.identified[1], 0);
+  EXPECT_EQ(certainty.identified[2], 1);
   EXPECT_TRUE(std::isinf(certainty.deviation[0]));
   EXPECT_LT(certainty.deviation[2], 0.1);
   // In logarithms both act alike: the second's range is twice the first's.
-  const auto words =
-      untold_combinations({unknown("a"), unknown("b"), unknown("c")}, certainty.untold, Eigen::Vector3d(1, 2, 1));
+  const auto words = unidentifiable_combinations({unknown("a"), unknown("b"), unknown("c")}, certainty.unidentified,
+                                                 Eigen::Vector3d(1, 2, 1));
   ASSERT_EQ(words.size(), 1U);
   EXPECT_EQ(words[0].words, "`a` and `b` only as their product");
 }
 
-TEST(FitCertainty, WhatNothingHangsOnIsToldOfAlone) {
-  Matrix untold = Matrix::Zero(4, 2);  // the product of a and b, and d: in some rotation
+TEST(FitCertainty, WhatNothingDependsOnIsNamedAlone) {
+  Matrix unidentified = Matrix::Zero(4, 2);  // the product of a and b, and d: in some rotation
   const double h = std::sqrt(0.5);
-  untold.col(0) << 0.8 * h, -0.8 * h, 0.0, 0.6;
-  untold.col(1) << -0.6 * h, 0.6 * h, 0.0, 0.8;
-  const auto words =
-      untold_combinations({unknown("a"), unknown("b"), unknown("c"), unknown("d")}, untold, Vector::Ones(4));
+  unidentified.col(0) << 0.8 * h, -0.8 * h, 0.0, 0.6;
+  unidentified.col(1) << -0.6 * h, 0.6 * h, 0.0, 0.8;
+  const auto words = unidentifiable_combinations({unknown("a"), unknown("b"), unknown("c"), unknown("d")}, unidentified,
+                                                 Vector::Ones(4));
   ASSERT_EQ(words.size(), 2U);
-  EXPECT_EQ(words[0].words, "`d`: what was recorded hardly hangs on it, or not at all");
+  EXPECT_EQ(words[0].words, "`d`: what was recorded hardly depends on it, or not at all");
   EXPECT_EQ(words[1].words, "`a` and `b` only as their product");
 }
 

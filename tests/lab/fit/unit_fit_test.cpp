@@ -177,12 +177,12 @@ TEST(UnitFit, FindsHiddenNumbersWithinItsIntervals) {
     const RecordedUnit unit = record_unit(fit, hidden, 3, seed, cache());
     const UnitFit found = fit_unit(unit.fit, unit.recording, cache());
     EXPECT_TRUE(found.converged);
-    EXPECT_TRUE(found.untold.empty());
+    EXPECT_TRUE(found.unidentified.empty());
     EXPECT_LT(found.misfit_after, found.misfit_before);
     for (std::size_t k = 0; k < found.unknowns.size(); ++k) {
       const FittedUnknown& one = found.unknowns[k];
       const double truth = hidden_value(fit, hidden, k);
-      EXPECT_TRUE(one.told);
+      EXPECT_TRUE(one.identified);
       EXPECT_NEAR(one.value, truth, 0.08 * truth) << one.name;
       // Hidden units share the mesh, whose error is the larger part of a coarse gel's interval: it's left out here.
       const double deviation = std::hypot(std::max(one.by_noise, one.by_model), one.by_light);
@@ -198,7 +198,7 @@ TEST(UnitFit, FindsHiddenNumbersWithinItsIntervals) {
   EXPECT_GE(covered, 20);
 }
 
-TEST(UnitFit, SaysThatPowerAndExposureAreToldAsAProductOnly) {
+TEST(UnitFit, SaysThatPowerAndExposureAreIdentifiedAsAProductOnly) {
   UnitFitSpec spec = small_fit();
   add_unknown(spec, "lamps[*].power_W", UnknownHow::times, 0.5, 2.0, true);
   add_unknown(spec, "camera.exposure_us", UnknownHow::times, 0.5, 2.0);
@@ -206,18 +206,18 @@ TEST(UnitFit, SaysThatPowerAndExposureAreToldAsAProductOnly) {
   const Eigen::VectorXd hidden = vector({std::log(1.2), std::log(0.9)});
   const RecordedUnit unit = record_unit(fit, hidden, 3, 5, cache());
   const UnitFit found = fit_unit(unit.fit, unit.recording, cache());
-  ASSERT_EQ(found.untold.size(), 1U);
-  EXPECT_THAT(found.untold[0].words,
+  ASSERT_EQ(found.unidentified.size(), 1U);
+  EXPECT_THAT(found.unidentified[0].words,
               AllOf(HasSubstr("lamps[*].power_W"), HasSubstr("camera.exposure_us"), HasSubstr("product")));
   for (const FittedUnknown& one : found.unknowns) {
-    EXPECT_FALSE(one.told);
+    EXPECT_FALSE(one.identified);
     EXPECT_TRUE(std::isinf(one.high95));
   }
   const double product = found.unknowns[0].value * found.unknowns[1].value;
   EXPECT_NEAR(product, hidden_value(fit, hidden, 0) * hidden_value(fit, hidden, 1), 0.02 * product);
 }
 
-TEST(UnitFit, AlbedoPowerAndExposureAllFreeAreSaidNotToBeTold) {
+TEST(UnitFit, AlbedoPowerAndExposureAllFreeAreReportedAsUnidentified) {
   UnitFitSpec spec = small_fit();
   spec.presses.resize(1);
   add_unknown(spec, "lamps[*].power_W", UnknownHow::times, 0.5, 2.0, true);
@@ -226,9 +226,9 @@ TEST(UnitFit, AlbedoPowerAndExposureAllFreeAreSaidNotToBeTold) {
   const PreparedFit fit = prepare_fit(spec);
   const RecordedUnit unit = record_unit(fit, vector({0.1, -0.1, 0.1}), 3, 6, cache());
   const UnitFit found = fit_unit(unit.fit, unit.recording, cache());
-  ASSERT_FALSE(found.untold.empty());
-  EXPECT_FALSE(found.unknowns[0].told);
-  EXPECT_FALSE(found.unknowns[1].told);
+  ASSERT_FALSE(found.unidentified.empty());
+  EXPECT_FALSE(found.unknowns[0].identified);
+  EXPECT_FALSE(found.unknowns[1].identified);
   const double truth = hidden_value(fit, vector({0.1, -0.1, 0.1}), 2);
   EXPECT_TRUE(found.unknowns[2].low95 <= truth && truth <= found.unknowns[2].high95);
 }
@@ -248,7 +248,7 @@ TEST(UnitFit, DepthsThatWereNotReadAreFoundInThePictures) {
     EXPECT_NEAR(press.depth_mm, 0.4, 3.0 * press.depth_deviation_mm);
   }
   const FittedUnknown& modulus = found.unknowns[0];
-  EXPECT_TRUE(modulus.told);
+  EXPECT_TRUE(modulus.identified);
   const double truth = hidden_value(fit, hidden, 0);
   EXPECT_TRUE(modulus.low95 <= truth && truth <= modulus.high95)
       << truth << " isn't in " << modulus.low95 << " to " << modulus.high95;

@@ -53,13 +53,13 @@ GraspSenses stand_in() {
     cv::absdiff(frame, memory->first, difference);
     cv::threshold(difference, mask, kDiffers, 255, cv::THRESH_BINARY);
     const cv::Moments moments = cv::moments(mask, true);
-    sensors::GraspSight sight;
-    sight.height_max_mm = kHeightOfAPixel * moments.m00;
-    if (moments.m00 < 20) return sight;
+    sensors::GraspReading reading;
+    reading.height_max_mm = kHeightOfAPixel * moments.m00;
+    if (moments.m00 < 20) return reading;
     const cv::Point2d middle(moments.m10 / moments.m00, moments.m01 / moments.m00);
-    sight.slip = memory->middle && cv::norm(middle - *memory->middle) > kMoved_px;
+    reading.slip = memory->middle && cv::norm(middle - *memory->middle) > kMoved_px;
     memory->middle = middle;
-    return sight;
+    return reading;
   };
 }
 
@@ -95,17 +95,17 @@ TEST(GraspLoop, ALightObjectIsHeldAtTheFirstTouch) {
 TEST(GraspLoop, SlipIsAnsweredByAStrongerGrip) {
   const GraspOutcome light = run_grasp_trial(sensor(), ball(0.5), loop(), stand_in());
   const GraspOutcome heavy = run_grasp_trial(sensor(), ball(heavy_g()), loop(), stand_in());
-  EXPECT_GT(heavy.slip_answers, light.slip_answers);
+  EXPECT_GT(heavy.slip_reactions, light.slip_reactions);
   EXPECT_GT(heavy.peak_force_N, 1.4 * light.peak_force_N);
   EXPECT_GT(heavy.slid_mm, 0.0);
 }
 
 TEST(GraspLoop, WithoutTheAnswerToSlipTheSameObjectStaysBehind) {
   GraspLoopSettings blind = loop();
-  blind.rule.answer_slip = false;
+  blind.rule.react_to_slip = false;
   const GraspOutcome outcome = run_grasp_trial(sensor(), ball(heavy_g()), blind, stand_in());
   EXPECT_FALSE(outcome.held);
-  EXPECT_EQ(outcome.slip_answers, 0);
+  EXPECT_EQ(outcome.slip_reactions, 0);
   EXPECT_LT(outcome.moments.back().truth.object_height_mm, 1.0);
 }
 
@@ -115,7 +115,7 @@ TEST(GraspLoop, WhatIsSeenIsAsOldAsTheCamerasLag) {
     settings.camera_lag_s = lag_s;
     const GraspOutcome outcome = run_grasp_trial(sensor(), ball(0.5), settings, stand_in());
     for (std::size_t k = 0; k < outcome.moments.size(); ++k) {
-      if (outcome.moments[k].sight.height_max_mm > 0.04) return static_cast<int>(k);
+      if (outcome.moments[k].reading.height_max_mm > 0.04) return static_cast<int>(k);
     }
     return -1;
   };
@@ -134,7 +134,7 @@ TEST(GraspLoop, SensesThatSeeNothingCloseUntilTheLimit) {
   GraspLoopSettings settings = loop();
   settings.rule.longest_approach_mm = 0.2;
   const GraspOutcome outcome =
-      run_grasp_trial(sensor(), ball(0.5), settings, [](const cv::Mat&) { return sensors::GraspSight{}; });
+      run_grasp_trial(sensor(), ball(0.5), settings, [](const cv::Mat&) { return sensors::GraspReading{}; });
   EXPECT_FALSE(outcome.held);
   EXPECT_THAT(outcome.failure, HasSubstr("nothing there"));
 }

@@ -53,7 +53,7 @@ TEST(SlipScore, ReportsWithoutSlipAreFalseAlarms) {
   EXPECT_EQ(score({}, SlipDetector::rule).false_alarms_percent(), 0.0);
 }
 
-TEST(SlipScore, OnlySlidesWithTimeEnoughAreForetold) {
+TEST(SlipScore, OnlySlidesWithTimeEnoughArePredictable) {
   std::vector<SlipRun> runs = {run_with(8.0 / 30.0, {}, {7}), run_with(8.0 / 30.0, {}, {9}),
                                run_with(8.0 / 30.0, {}, {9})};
   runs[0].partial_s = 6.0 / 30.0;  // two frames
@@ -61,8 +61,8 @@ TEST(SlipScore, OnlySlidesWithTimeEnoughAreForetold) {
   runs[2].partial_s = 7.0 / 30.0;
   const SlipScore result = score(runs, SlipDetector::incipient, 2.0 / 30.0);
   EXPECT_EQ(result.slides, 3);
-  EXPECT_EQ(result.foretold, 2);
-  EXPECT_EQ(result.foretold_before, 1);
+  EXPECT_EQ(result.predictable, 2);
+  EXPECT_EQ(result.predicted, 1);
 }
 
 TEST(SlipScore, ACaseHasANameThatTellsItApart) {

@@ -22,10 +22,10 @@ sim::SceneSpec dots_scene(const sim::DeviceSpec& device, const fem::Compliance& 
   presses.object.name = "ball";
   presses.object.shape.type = sim::ShapeKind::sphere;
   presses.object.shape.radius_mm = 8.0;
-  sim::PressSpec hold;
-  hold.depth_mm = 1.0;
-  presses.touch_mm = sim::first_touch(hold, presses.object, device.gel);
-  sim::SceneSpec scene = bench_scene(device, presses, hold, 3);
+  sim::PressSpec spec;
+  spec.depth_mm = 1.0;
+  presses.touch_mm = sim::first_touch(spec, presses.object, device.gel);
+  sim::SceneSpec scene = bench_scene(device, presses, spec, 3);
   scene.effects.direct_light = scene.effects.motion_blur = scene.effects.interreflection = sim::Switch::off;
   return scene;
 }

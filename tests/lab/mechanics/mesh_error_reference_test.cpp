@@ -23,7 +23,7 @@ class LayerReference : public ::testing::TestWithParam<double> {};
 
 TEST_P(LayerReference, TrueForceErrorsAreOfTheEstimatesSize) {
   const double nu = GetParam();
-  // Half as wide as four thicknesses: the layer's own end is felt to some 0.1 %.
+  // Half as wide as four thicknesses: the layer's own end has an effect of some 0.1 %.
   const fem::SlabMesh slab{40.0, 40.0, kThickness, kEdge, 2.5, 3.0, 3.0, 1.0};
   const fem::Compliance gel = fem::cached_compliance(slab, {kModulus, nu}, {}, {});
   RandomStream random(3, 0, Purpose::kTest);

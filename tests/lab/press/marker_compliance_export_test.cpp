@@ -70,7 +70,7 @@ TEST(MarkerComplianceExport, IsReciprocal) {
   EXPECT_GT(Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(u).eigenvalues().minCoeff(), 0.0) << "it takes work";
 }
 
-/// The same numbers by either way round: few markers under many patches, or many under few.
+/// The same numbers by either order: few markers under many patches, or many under few.
 TEST(MarkerComplianceExport, DoesntDependOnWhichAreMore) {
   const SurfaceMarkers nine = grid_of(3, 2.0, 0.8);
   const PatchGrid sixteen = patches_of(4, 1.5), four = patches_of(2, 1.5);

@@ -27,7 +27,7 @@ render::MotionChipSettings chip_settings() {
 }
 
 /// A pinhole 16 mm before dots that a plate brings nearer, 0.47 mm a pixel, with light that grows by 5 % a mm; forces
-/// by [Knoop2013, eq. 1], and shear, where the way goes on sideways by `sideways_mm` along x, of 0.5 N/mm.
+/// by [Knoop2013, eq. 1], and shear, where the path goes on sideways by `sideways_mm` along x, of 0.5 N/mm.
 ReflexTouch painted_touch(const std::string& name, double deepest_mm, double sideways_mm = 0.0,
                           double towards_rad = 0.0) {
   const render::MotionChipSettings chip = chip_settings();
@@ -35,7 +35,7 @@ ReflexTouch painted_touch(const std::string& name, double deepest_mm, double sid
   const Eigen::Vector2d towards(std::cos(towards_rad), std::sin(towards_rad));
   const auto lateral_mm = [=](double place) { return std::max(place - deepest_mm, 0.0) * towards; };
   const auto press_mm = [=](double place) { return std::clamp(place, 0.0, deepest_mm); };
-  const ReflexWay::Picture picture = [=](double place) {
+  const ReflexPathLight::Picture picture = [=](double place) {
     sensors::fixtures::FingertipPainter painter{.spacing_px = 4.3, .radius_px = 1.06, .ground = 3.0, .dot = 36.0};
     painter.gain = 1.0 + 0.05 * press_mm(place);
     const double dilation = sensors::fixtures::dilation_of(press_mm(place));
@@ -57,12 +57,12 @@ ReflexTouch painted_touch(const std::string& name, double deepest_mm, double sid
     states.push_back({place > 0.0, press_mm(place), lateral_mm(place), published_reflex_force(press_mm(place)),
                       0.5 * lateral_mm(place)});
   }
-  return {name, at, states, ReflexWay(picture, at, chip, {.allowed = 1.0 / 63}), ""};
+  return {name, at, states, ReflexPathLight(picture, at, chip, {.allowed = 1.0 / 63}), ""};
 }
 
-const ReflexBench& bench() {
-  static const ReflexBench kBench = [] {
-    ReflexBench made;
+const ReflexSetup& setup() {
+  static const ReflexSetup kSetup = [] {
+    ReflexSetup made;
     made.chip = chip_settings();
     made.touches.push_back(painted_touch("plate", 5.0));
     for (const double depth : {2.0, 4.0}) {
@@ -72,11 +72,11 @@ const ReflexBench& bench() {
     }
     return made;
   }();
-  return kBench;
+  return kSetup;
 }
 
 TEST(ReflexTouch, TruthIsStraightBetweenStates) {
-  const ReflexTouch& touch = bench().touches[1];  // 2 mm down, then along x
+  const ReflexTouch& touch = setup().touches[1];  // 2 mm down, then along x
   EXPECT_FALSE(touch.truth(-0.5).contact);
   EXPECT_EQ(touch.truth(-0.5).press_mm, -0.5);
   EXPECT_FALSE(touch.truth(0.0).contact);
@@ -97,8 +97,8 @@ TEST(ReflexMotion, GoesThereAndBack) {
   EXPECT_EQ(motion(3.0), 5.0);
   EXPECT_EQ(motion(5.5), 0.0);
   EXPECT_EQ(motion(6.0), -1.0);
-  EXPECT_EQ(one_way(-1.0, 2.0, 2.0)(1.0), 1.0);
-  EXPECT_EQ(one_way(-1.0, 2.0, 2.0)(9.0), 2.0);
+  EXPECT_EQ(single_stroke(-1.0, 2.0, 2.0)(1.0), 1.0);
+  EXPECT_EQ(single_stroke(-1.0, 2.0, 2.0)(9.0), 2.0);
 }
 
 TEST(ReflexExperiment, ScoresCountWhatIsMissedAndHowFarForcesAreOff) {
@@ -130,25 +130,25 @@ TEST(ReflexExperiment, ScoresCountWhatIsMissedAndHowFarForcesAreOff) {
 }
 
 TEST(ReflexExperiment, ReflexModeLearnsTheTouch) {
-  const ReflexTouch& plate = bench().touches[0];
-  const auto training = record_points(bench(), plate, reciprocation(-1.0, 5.0, 2.0), 500, 18, 1);
+  const ReflexTouch& plate = setup().touches[0];
+  const auto training = record_points(setup(), plate, reciprocation(-1.0, 5.0, 2.0), 500, 18, 1);
   ASSERT_EQ(training.size(), 500u);
   const sensors::ReflexModel model = train_reflex(training), curved = train_reflex(training, 2);
-  const auto test = record_points(bench(), plate, reciprocation(-1.0, 5.0, 2.0), 500, 18, 2);
+  const auto test = record_points(setup(), plate, reciprocation(-1.0, 5.0, 2.0), 500, 18, 2);
   const ReflexScore score = score_reflex(model, test);
   EXPECT_LT(score.error_percent, 10.0);
   EXPECT_LT(score.missed_below_N, 0.5);
   EXPECT_LT(score.rms_N, 1.0);
   EXPECT_LT(score_reflex(curved, test).rms_N, score.rms_N);
   // The same bytes again.
-  const auto again = record_points(bench(), plate, reciprocation(-1.0, 5.0, 2.0), 500, 18, 2);
+  const auto again = record_points(setup(), plate, reciprocation(-1.0, 5.0, 2.0), 500, 18, 2);
   EXPECT_EQ(score_reflex(model, again).rms_N, score.rms_N);
 }
 
 TEST(ReflexExperiment, ExploreModeFindsThePinholesDistance) {
-  const ReflexTouch& plate = bench().touches[0];
-  const auto pictures = record_pictures(bench(), plate, reciprocation(0.0, 5.0, 2.0), 50, 3);
-  const cv::Mat rest = rest_picture(bench(), 4, 4);
+  const ReflexTouch& plate = setup().touches[0];
+  const auto pictures = record_pictures(setup(), plate, reciprocation(0.0, 5.0, 2.0), 50, 3);
+  const cv::Mat rest = rest_picture(setup(), 4, 4);
   sensors::ExploreModel model;
   model.force = fit_law(plate);
   EXPECT_NEAR(model.force.scale_N, 1.1293, 0.01);
@@ -169,23 +169,23 @@ TEST(ReflexExperiment, ExploreModeFindsThePinholesDistance) {
 }
 
 TEST(ReflexExperiment, ShearIsLearnedInBothModes) {
-  const auto training = record_points(bench(), bench().touches[0], reciprocation(-1.0, 5.0, 2.0), 500, 18, 1);
+  const auto training = record_points(setup(), setup().touches[0], reciprocation(-1.0, 5.0, 2.0), 500, 18, 1);
   const sensors::ReflexModel reflex = train_reflex(training, 2);
   sensors::ExploreModel model;
-  model.force = fit_law(bench().touches[0]);
+  model.force = fit_law(setup().touches[0]);
   model.press = {1, {16.0, 0.0, 0.0}, 0.0};
   model.lateral_mm_per_px = 0.47 * Eigen::Matrix2d::Identity();
-  const cv::Mat rest = rest_picture(bench(), 4, 4);
+  const cv::Mat rest = rest_picture(setup(), 4, 4);
   sensors::ExploreSettings settings;
   settings.times = sensors::chip_pixel_times();
   std::vector<sensors::ShearSample> counts, shifts;
-  for (std::size_t i = 1; i < bench().touches.size(); ++i) {
-    const ReflexTouch& touch = bench().touches[i];
-    const ReflexMotion motion = one_way(-0.5, touch.end(), 2.0);
+  for (std::size_t i = 1; i < setup().touches.size(); ++i) {
+    const ReflexTouch& touch = setup().touches[i];
+    const ReflexMotion motion = single_stroke(-0.5, touch.end(), 2.0);
     const int frames = static_cast<int>(1500.0 * (touch.end() + 0.5) / 2.0);
-    const auto told = reflex_shear_samples(reflex, record_points(bench(), touch, motion, frames, 1, i), 10);
-    counts.insert(counts.end(), told.begin(), told.end());
-    const auto pictures = record_pictures(bench(), touch, motion, frames / kChipPixels, i);
+    const auto found = reflex_shear_samples(reflex, record_points(setup(), touch, motion, frames, 1, i), 10);
+    counts.insert(counts.end(), found.begin(), found.end());
+    const auto pictures = record_pictures(setup(), touch, motion, frames / kChipPixels, i);
     const auto seen = explore_shear_samples(model, explore(rest, pictures, settings), pictures);
     shifts.insert(shifts.end(), seen.begin(), seen.end());
   }
@@ -196,18 +196,18 @@ TEST(ReflexExperiment, ShearIsLearnedInBothModes) {
 }
 
 TEST(ReflexExperiment, AReflexIsSoonerThanExploringAndThatThanNobody) {
-  const ReflexTouch& plate = bench().touches[0];
-  const auto training = record_points(bench(), plate, reciprocation(-1.0, 5.0, 2.0), 500, 18, 1);
+  const ReflexTouch& plate = setup().touches[0];
+  const auto training = record_points(setup(), plate, reciprocation(-1.0, 5.0, 2.0), 500, 18, 1);
   const sensors::ReflexModel reflex = train_reflex(training);
   sensors::ExploreModel model;
   model.force = fit_law(plate);
   model.press = {1, {16.0, 0.0, 0.0}, 0.0};
-  const cv::Mat rest = rest_picture(bench(), 4, 4);
+  const cv::Mat rest = rest_picture(setup(), 4, 4);
   ReflexCollisionSettings settings;
   settings.collision.speed_mm_s = 10.0;
   settings.collision.actuator.most_acceleration_mm_s2 = 1e5;  // 50 N
   settings.reflex.stop_frames = 3;                            // one frame's noise is no touch
-  const auto run = [&](Watcher watcher) { return collide(bench(), plate, watcher, reflex, model, rest, settings, 5); };
+  const auto run = [&](Watcher watcher) { return collide(setup(), plate, watcher, reflex, model, rest, settings, 5); };
   const Collision fast = run(Watcher::reflex), slow = run(Watcher::explore), none = run(Watcher::nobody);
   ASSERT_TRUE(fast.reaction_ms() && slow.reaction_ms());
   EXPECT_LT(*fast.reaction_ms(), 100.0);
@@ -265,14 +265,14 @@ TEST(ReflexTouch, TheRowsTouchesBeginWithATouch) {
   }
 }
 
-TEST(ReflexTouch, ABenchNeedsATouchThatBeginsAtZero) {
+TEST(ReflexTouch, ASetupNeedsATouchThatBeginsAtZero) {
   const auto device = sim::read_device(TOUCHSTONE_SOURCE_DIR "/scenes/devices/reflex.yaml");
-  EXPECT_THAT([&] { set_up_reflex_bench(device, "", {}); }, ThrowsMessage<Error>(HasSubstr("needs a touch")));
+  EXPECT_THAT([&] { set_up_reflex(device, "", {}); }, ThrowsMessage<Error>(HasSubstr("needs a touch")));
   std::vector<ReflexTouchSpec> specs = {{"late", press_down({})}};
   specs[0].path.points.erase(specs[0].path.points.begin());
-  EXPECT_THAT([&] { set_up_reflex_bench(device, "", specs); }, ThrowsMessage<Error>(HasSubstr("doesn't begin at 0")));
+  EXPECT_THAT([&] { set_up_reflex(device, "", specs); }, ThrowsMessage<Error>(HasSubstr("doesn't begin at 0")));
   specs[0].path.points = {{}};
-  EXPECT_THAT([&] { set_up_reflex_bench(device, "", specs); }, ThrowsMessage<Error>(HasSubstr("two are needed")));
+  EXPECT_THAT([&] { set_up_reflex(device, "", specs); }, ThrowsMessage<Error>(HasSubstr("two are needed")));
 }
 
 }  // namespace

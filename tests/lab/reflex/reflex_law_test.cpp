@@ -11,7 +11,7 @@
 namespace touchstone::lab {
 namespace {
 
-TEST(ReflexLaw, TheDeviceMeetsItBothWaysWithFriction) {
+TEST(ReflexLaw, TheDeviceMeetsItLoadingAndUnloadingWithFriction) {
   const auto gel = sim::set_up_finite_gel(sim::read_device(TOUCHSTONE_SOURCE_DIR "/scenes/devices/reflex.yaml"));
   ReflexPress press;
   press.step_mm = 0.25;
@@ -29,7 +29,7 @@ TEST(ReflexLaw, TheDeviceMeetsItBothWaysWithFriction) {
   const double rms = reflex_law_rms(reflex_law(press, first));
   RecordProperty("rms_N", std::to_string(rms));
   EXPECT_LT(rms, 0.08);  // 0.066 measured; that of [Knoop2013] is kReflexLawRms_N
-  // Friction holds some force back on the way out: no more than the paper's own error.
+  // Friction holds some force back on loading: no more than the paper's own error.
   double worst = 0.0;
   for (std::size_t k = 0; k < down; ++k) {
     const double lag = played.states[k].wrench[2] - played.states[played.states.size() - 1 - k].wrench[2];

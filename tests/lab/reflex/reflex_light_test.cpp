@@ -121,9 +121,9 @@ TEST(ReflexLight, WhatMovesRightIsSeenToMoveRight) {
   int dx = 0;
   int dy = 0;
   for (int k = 0; k <= 16; ++k) {
-    const ChipStatistics told = chip.expose(light().irradiance(skin().pressed(2.0, k / 16.0))).statistics;
-    dx += told.dx;
-    dy += told.dy;
+    const ChipStatistics statistics = chip.expose(light().irradiance(skin().pressed(2.0, k / 16.0))).statistics;
+    dx += statistics.dx;
+    dy += statistics.dy;
   }
   // 1 mm at the apex, less beside it; a pixel is some 0.45 mm there.
   EXPECT_GE(dx, 1);

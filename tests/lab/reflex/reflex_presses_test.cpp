@@ -32,7 +32,7 @@ TEST(ReflexPresses, ThePlatesForceIsTheTextsLaw) {
   const auto gel = sim::set_up_finite_gel(coarse(1.6));
   ReflexPress press;
   press.step_mm = 0.5;
-  press.friction = 0.0;  // it adds 0.02 N at most and makes it three times as dear
+  press.friction = 0.0;  // it adds 0.02 N at most and makes it three times as expensive
   const sim::PlayedPath played = sim::play_path(*gel, press_down(press));
   ASSERT_EQ(played.stopped, "");
   const sim::ForceLaw law = reflex_law(press, played);

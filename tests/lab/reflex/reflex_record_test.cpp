@@ -25,7 +25,7 @@ double full_light() {
 
 /// A pixel's part of the full light is `share(parameter)`, but for the upper left one, which is dark.
 template <typename Share>
-ReflexWay::Picture picture(const Share& share) {
+ReflexPathLight::Picture picture(const Share& share) {
   return [share](double parameter) {
     cv::Mat light(18, 18, CV_32FC1, cv::Scalar(full_light() * share(parameter)));
     light.at<float>(0, 0) = 0.0f;
@@ -33,16 +33,16 @@ ReflexWay::Picture picture(const Share& share) {
   };
 }
 
-double number_of(const ReflexWay& way, double parameter) {
+double number_of(const ReflexPathLight& path_light, double parameter) {
   cv::Mat light;
-  way.light_at(parameter, light);
+  path_light.light_at(parameter, light);
   return light.at<float>(5, 5) / full_light();
 }
 
 const std::vector<double> kEnds = {0.0, 5.0};
 
 /// Pixels whose courses bend at different places, as dots' rims do.
-TEST(ReflexWay, IsAsNearToPicturesInBetweenAsAsked) {
+TEST(ReflexPathLight, IsAsNearToPicturesInBetweenAsAsked) {
   const auto share = [](double z, int column) { return 0.5 + 0.3 * std::sin(3.0 * z + 0.5 * column); };
   const auto waves = [&](double z) {
     cv::Mat light(18, 18, CV_32FC1);
@@ -50,51 +50,52 @@ TEST(ReflexWay, IsAsNearToPicturesInBetweenAsAsked) {
     return light;
   };
   for (const double allowed : {0.02, 0.002}) {
-    ReflexWaySettings settings;
+    ReflexPathLightSettings settings;
     settings.allowed = allowed;
-    const ReflexWay way(waves, kEnds, chip_settings(), settings);
+    const ReflexPathLight path_light(waves, kEnds, chip_settings(), settings);
     // A chord of s over a curve of bend b is off by b s^2 / 8: with b = 2.7 the steps that hold, halved from 5.
-    EXPECT_GT(way.parameters().size(), 5.0 / std::sqrt(8 * allowed / 2.7));
-    EXPECT_LT(way.parameters().size(), 4 * 5.0 / std::sqrt(8 * allowed / 2.7));
-    EXPECT_LE(way.largest_off(), allowed);
-    for (double z = 0.0; z <= 5.0; z += 0.01) EXPECT_NEAR(number_of(way, z), share(z, 5), allowed) << z;
+    EXPECT_GT(path_light.parameters().size(), 5.0 / std::sqrt(8 * allowed / 2.7));
+    EXPECT_LT(path_light.parameters().size(), 4 * 5.0 / std::sqrt(8 * allowed / 2.7));
+    EXPECT_LE(path_light.largest_off(), allowed);
+    for (double z = 0.0; z <= 5.0; z += 0.01) EXPECT_NEAR(number_of(path_light, z), share(z, 5), allowed) << z;
   }
 }
 
-TEST(ReflexWay, StraightLightTakesThePicturesAtItsCornersAndOneBetween) {
+TEST(ReflexPathLight, StraightLightTakesThePicturesAtItsCornersAndOneBetween) {
   const std::vector<double> corners = {0.0, 1.0, 3.0};
-  const ReflexWay way(picture([](double z) { return z < 1.0 ? 0.2 : 0.2 + 0.1 * (z - 1.0); }), corners,
-                      chip_settings());
-  EXPECT_EQ(way.parameters().size(), 5U);
-  EXPECT_NEAR(way.largest_off(), 0.0, 1e-6);
-  EXPECT_NEAR(number_of(way, 2.5), 0.35, 1e-6);
-  EXPECT_NEAR(number_of(way, -1.0), 0.2, 1e-6);  // before the first: the first
-  EXPECT_NEAR(number_of(way, 9.0), 0.4, 1e-6);
+  const ReflexPathLight path_light(picture([](double z) { return z < 1.0 ? 0.2 : 0.2 + 0.1 * (z - 1.0); }), corners,
+                                   chip_settings());
+  EXPECT_EQ(path_light.parameters().size(), 5U);
+  EXPECT_NEAR(path_light.largest_off(), 0.0, 1e-6);
+  EXPECT_NEAR(number_of(path_light, 2.5), 0.35, 1e-6);
+  EXPECT_NEAR(number_of(path_light, -1.0), 0.2, 1e-6);  // before the first: the first
+  EXPECT_NEAR(number_of(path_light, 9.0), 0.4, 1e-6);
 }
 
-TEST(ReflexWay, BadInputIsRefused) {
+TEST(ReflexPathLight, BadInputIsRefused) {
   const auto flat = picture([](double) { return 0.5; });
-  const auto with = [&](const std::vector<double>& corners) { ReflexWay(flat, corners, chip_settings()); };
+  const auto with = [&](const std::vector<double>& corners) { ReflexPathLight(flat, corners, chip_settings()); };
   EXPECT_THROW(with({0.0}), Error);
   EXPECT_THROW(with({0.0, 0.0}), Error);
   EXPECT_THROW(with({1.0, 0.0}), Error);
   EXPECT_THROW(with({0.0, std::numeric_limits<double>::infinity()}), Error);
   const auto small = [](double) { return cv::Mat(18, 17, CV_32FC1, cv::Scalar(0)); };
-  EXPECT_THROW(ReflexWay(small, kEnds, chip_settings()), Error);
+  EXPECT_THROW(ReflexPathLight(small, kEnds, chip_settings()), Error);
   render::MotionChipSettings colour = chip_settings();
   colour.imager = render::adns2620_preset(620e-6).imager;  // three bands
-  EXPECT_THROW(ReflexWay(flat, kEnds, colour), Error);
-  ReflexWaySettings few;
+  EXPECT_THROW(ReflexPathLight(flat, kEnds, colour), Error);
+  ReflexPathLightSettings few;
   few.most_pictures = 10;
-  EXPECT_THROW(ReflexWay(picture([](double z) { return 0.5 + 0.5 * std::sin(100 * z); }), kEnds, chip_settings(), few),
-               Error);
+  EXPECT_THROW(
+      ReflexPathLight(picture([](double z) { return 0.5 + 0.5 * std::sin(100 * z); }), kEnds, chip_settings(), few),
+      Error);
 }
 
 TEST(ReflexRecord, StatisticsFollowTheMotion) {
-  const ReflexWay way(picture([](double z) { return 0.1 + 0.1 * z; }), kEnds, chip_settings());
+  const ReflexPathLight path_light(picture([](double z) { return 0.1 + 0.1 * z; }), kEnds, chip_settings());
   render::MotionChip chip(chip_settings(), 1, 2);
   const auto record = record_statistics(
-      way, [](double t) { return 100.0 * t; }, chip, 75, 15);
+      path_light, [](double t) { return 100.0 * t; }, chip, 75, 15);
   ASSERT_EQ(record.size(), 5U);
   for (std::size_t k = 0; k < record.size(); ++k) {
     const double middle_s = static_cast<double>(15 * k + 14) / 1500.0 + 310e-6;
@@ -102,16 +103,16 @@ TEST(ReflexRecord, StatisticsFollowTheMotion) {
     EXPECT_NEAR(record[k].maximum, 1 + 62 * (0.1 + 10.0 * middle_s), 0.6);
   }
   EXPECT_THROW(record_statistics(
-                   way, [](double) { return 0.0; }, chip, 5, 0),
+                   path_light, [](double) { return 0.0; }, chip, 5, 0),
                Error);
 }
 
 TEST(ReflexRecord, PicturesAreSkewedByMotion) {
-  const ReflexWay way(picture([](double z) { return 0.1 + 0.1 * z; }), kEnds, chip_settings());
+  const ReflexPathLight path_light(picture([](double z) { return 0.1 + 0.1 * z; }), kEnds, chip_settings());
   render::MotionChip chip(chip_settings(), 1, 2);
   const double speed = 10.0;  // 2 mm while a picture is grabbed
   const auto images = record_images(
-      way, [&](double t) { return speed * t; }, chip, 2);
+      path_light, [&](double t) { return speed * t; }, chip, 2);
   ASSERT_EQ(images.size(), 2U);
   for (int image = 0; image < 2; ++image) {
     for (int n = 0; n < kChipPixels; ++n) {

@@ -107,7 +107,7 @@ TEST_F(ApparentChangeStudy, WritesTheSameBytesTwice) {
 }
 
 TEST_F(ApparentChangeStudy, LeavesEmptyWhatCantBeHad) {
-  // 2 N go through the column of [Lin2019, eq. 3], and a gel of 20 mm leaves no room for the camera.
+  // 2 N go through the column of [Lin2019, eq. 3], and a gel of 20 mm leaves no space for the camera.
   const ApparentChangeSpec wanted = std::get<ApparentChangeSpec>(
       read(replaced(replaced(kStudy, "[1.5, 2, 3]", "[2, 20]"), "[0.05, 0.1]", "[2]") + "by: [formula]\n").kind);
   const ApparentChangeResult result = run_apparent_change(wanted, folder_.path());

@@ -113,14 +113,14 @@ TEST(CentroidBound, IsReachedByTheEfficientEstimateFromExposedFrames) {
 }
 
 TEST(PictureInformation, OnAShiftIsThatOfTheShift) {
-  // Where only the spot moves, the whole picture knows what the spot's surroundings know: gradients the one way,
+  // Where only the spot moves, the whole picture knows what the spot's surroundings know: gradients in one direction,
   // pictures of moved spots the other.
   for (const render::Imager& imager : {grey_imager(5.0), colour_imager()}) {
     const Eigen::Vector2d centre(31.4, 32.9);
     const cv::Mat light = spot(imager, 6000.0, 0.8, 4.0, centre);
     std::vector<cv::Mat> slopes;
-    for (const Eigen::Vector2d& way : {Eigen::Vector2d(1, 0), Eigen::Vector2d(0, 1)}) {
-      slopes.push_back((spot(imager, 6000.0, 0.8, 4.0, centre + way) - spot(imager, 6000.0, 0.8, 4.0, centre - way)) /
+    for (const Eigen::Vector2d& step : {Eigen::Vector2d(1, 0), Eigen::Vector2d(0, 1)}) {
+      slopes.push_back((spot(imager, 6000.0, 0.8, 4.0, centre + step) - spot(imager, 6000.0, 0.8, 4.0, centre - step)) /
                        2.0);
     }
     const Eigen::Matrix2d shift = shift_information(light, imager, centre, 29.0);
@@ -148,7 +148,7 @@ TEST(LeastDeviations, AreThoseOfTheInverseAndInfiniteWhereNothingTells) {
   const Eigen::MatrixXd weighted = deviation.cwiseInverse().asDiagonal() * sensitivity;
   const Eigen::VectorXd wanted = (weighted.transpose() * weighted).inverse().diagonal().cwiseSqrt();
   EXPECT_LT((least_deviations(sensitivity, deviation) - wanted).norm(), 1e-12);
-  // A third unknown that does what the first does: neither can be told, the second can.
+  // A third unknown that does what the first does: neither can be identified, the second can.
   Eigen::MatrixXd more(4, 3);
   more << sensitivity, 1e6 * sensitivity.col(0);
   const Eigen::VectorXd found = least_deviations(more, deviation);
@@ -164,15 +164,15 @@ TEST(LeastDeviations, AreThoseOfTheInverseAndInfiniteWhereNothingTells) {
 }
 
 /// The vhs sensor on a coarse mesh.
-struct Bench {
+struct SensorSetup {
   sim::DeviceSpec device;
   std::shared_ptr<const fem::Compliance> gel;
   BeadView view;
 };
-const Bench& bench() {
+const SensorSetup& setup() {
   static const test::TemporaryFolder cache;
-  static const Bench made = [] {
-    Bench one;
+  static const SensorSetup made = [] {
+    SensorSetup one;
     one.device = sim::read_device(std::filesystem::path(TOUCHSTONE_SOURCE_DIR) / "scenes" / "devices" / "vhs.yaml");
     one.device.mesh.fine_mm = 0.8;
     one.gel = sim::set_up_gel(one.device, cache.path());
@@ -187,8 +187,8 @@ constexpr double kFriction = 0.5;
 TEST(ForceSensitivity, OfAFlatPunchIsThePixelsMotionOverItsForce) {
   // A flat punch keeps its contact, so all is linear but the perspective.
   const BoundLoad load{{0.2, -0.1}, {0.3, 0.0, 3.0}};
-  const ForceSensitivity found = force_sensitivity(*bench().gel, bench().view, kProbe, kFriction, 0.05, load);
-  const Eigen::MatrixX2d rest = bead_pixels(bench().view, Eigen::MatrixX3d::Zero(9, 3));
+  const ForceSensitivity found = force_sensitivity(*setup().gel, setup().view, kProbe, kFriction, 0.05, load);
+  const Eigen::MatrixX2d rest = bead_pixels(setup().view, Eigen::MatrixX3d::Zero(9, 3));
   Eigen::VectorXd moved(18);
   for (int i = 0; i < 9; ++i) moved.segment<2>(2 * i) = found.pixels.segment<2>(2 * i) - rest.row(i).transpose();
   EXPECT_GT(moved.norm(), 10.0);
@@ -197,17 +197,17 @@ TEST(ForceSensitivity, OfAFlatPunchIsThePixelsMotionOverItsForce) {
 }
 
 TEST(ForceBound, IsReachedByTheEfficientEstimateThroughRealPresses) {
-  // Each draw: pixels with noise, the force that explains them best (Gauss-Newton with a press at each look). The
+  // Each draw: pixels with noise, the force that explains them best (Gauss-Newton with a press at each iteration). The
   // scatter is the bound's; 150 draws have a standard error of 6 %.
   constexpr int kDraws = 150;
   constexpr double kNoise_px = 0.05;
   const BoundLoad load{{0.3, 0.2}, {0.2, -0.1, 2.0}};
-  const ForceSensitivity at = force_sensitivity(*bench().gel, bench().view, kProbe, kFriction, 0.05, load);
+  const ForceSensitivity at = force_sensitivity(*setup().gel, setup().view, kProbe, kFriction, 0.05, load);
   const Eigen::VectorXd deviation = Eigen::VectorXd::Constant(18, kNoise_px);
   const ForceBound bound = force_bound(at, deviation);
   const Eigen::MatrixXd gain = (at.force.transpose() * at.force).inverse() * at.force.transpose();
   const auto pixels_at = [&](const Eigen::Vector3d& force) {
-    fem::Press press(*bench().gel, kProbe, kFriction, {}, {}, fem::PressOutput::forces);
+    fem::Press press(*setup().gel, kProbe, kFriction, {}, {}, fem::PressOutput::forces);
     fem::PressTarget target;
     target.axis = {fem::AxisControl::at(load.place_mm.x()), fem::AxisControl::at(load.place_mm.y()),
                    fem::AxisControl::at(0.05)};
@@ -219,7 +219,7 @@ TEST(ForceBound, IsReachedByTheEfficientEstimateThroughRealPresses) {
     }
     target.axis[0] = fem::AxisControl::with_force(force.x());
     target.axis[1] = fem::AxisControl::with_force(force.y());
-    const Eigen::MatrixX2d pixels = bead_pixels(bench().view, press.step(target).bead_displacement);
+    const Eigen::MatrixX2d pixels = bead_pixels(setup().view, press.step(target).bead_displacement);
     Eigen::VectorXd rows(18);
     for (int i = 0; i < 9; ++i) rows.segment<2>(2 * i) = pixels.row(i).transpose();
     return rows;
@@ -244,23 +244,23 @@ TEST(DistributionBound, OfOnePatchIsTheForceBoundOfItsTraction) {
   PatchGrid patches{{1, 1}, 4.0, {0.0, 0.0}};
   const Eigen::VectorXd deviation = Eigen::VectorXd::Constant(18, 0.05);
   const auto one =
-      distribution_bound(bead_compliance(*bench().gel, bench().view.rest_mm, patches), bench().view, deviation);
+      distribution_bound(bead_compliance(*setup().gel, setup().view.rest_mm, patches), setup().view, deviation);
   ASSERT_EQ(one.cols(), 1);
   EXPECT_TRUE(one.array().isFinite().all());
   // A round punch that covers about the same area: within a third.
   const ForceBound of_punch =
-      force_bound(force_sensitivity(*bench().gel, bench().view, fem::RoundedCylinder{2.26, 0.0, 6.0}, kFriction, 0.05,
+      force_bound(force_sensitivity(*setup().gel, setup().view, fem::RoundedCylinder{2.26, 0.0, 6.0}, kFriction, 0.05,
                                     {{0, 0}, {0, 0, 0.5}}),
                   deviation);
   for (int a = 0; a < 3; ++a) EXPECT_NEAR(one(a, 0) / of_punch.place_known[a], 1.0, 0.35) << "axis " << a;
-  // The same place in four parts is harder to tell, in 36 parts with 18 numbers it can't be told.
+  // The same place in four parts is harder to estimate, in 36 parts with 18 numbers it can't be identified.
   patches = {{2, 2}, 2.0, {-1.0, -1.0}};
   const auto four =
-      distribution_bound(bead_compliance(*bench().gel, bench().view.rest_mm, patches), bench().view, deviation);
+      distribution_bound(bead_compliance(*setup().gel, setup().view.rest_mm, patches), setup().view, deviation);
   for (int p = 0; p < 4; ++p) EXPECT_GT(four(2, p), one(2, 0));
   patches = {{6, 6}, 0.8, {-2.0, -2.0}};
   const auto many =
-      distribution_bound(bead_compliance(*bench().gel, bench().view.rest_mm, patches), bench().view, deviation);
+      distribution_bound(bead_compliance(*setup().gel, setup().view.rest_mm, patches), setup().view, deviation);
   EXPECT_FALSE(many.array().isFinite().any());
 }
 

@@ -53,7 +53,7 @@ TEST(QuickChromaDesign, HasAFigureInEveryRow) {
   }
 }
 
-// The tree's error hangs on how much of the record lies just behind the touch; ours has more of it than that of
+// The tree's error depends on how much of the record lies just behind the touch; ours has more of it than that of
 // [Knoop2013].
 TEST(QuickReflex, MeetsTheTextButForTheContactsError) {
   const std::vector<ValidationRow> rows = quick("reflex");

@@ -87,8 +87,8 @@ TEST(Validation, JsonHasTheAgreedMembersInOrder) {
 TEST(Validation, ARowThatDeniesItsSourcesFindingDoesNotHoldHoweverGoodItsFigure) {
   const ValidationGroup group = {"light", [](const ValidateOptions& options) {
                                    RowList rows("light.", options, RowList::Since::begin);
-                                   rows.add_bounded("told_percent", "told at 250 Hz", "%", Better::higher, 84.0, true,
-                                                    90.0);
+                                   rows.add_bounded("detected_percent", "detected at 250 Hz", "%", Better::higher, 84.0,
+                                                    true, 90.0);
                                    EXPECT_TRUE(rows.last().holds);
                                    deny(rows.last(), "250 Hz are too few");
                                    return rows.rows();
@@ -96,7 +96,7 @@ TEST(Validation, ARowThatDeniesItsSourcesFindingDoesNotHoldHoweverGoodItsFigure)
   const std::vector<ValidationRow> rows = validate({"light"}, {group}, {});
   ASSERT_EQ(rows.size(), 1u);
   EXPECT_FALSE(rows[0].holds);
-  const std::string words = "told at 250 Hz (doesn't hold: denies the finding that 250 Hz are too few)";
+  const std::string words = "detected at 250 Hz (doesn't hold: denies the finding that 250 Hz are too few)";
   EXPECT_THAT(to_table(rows), ::testing::AllOf(::testing::HasSubstr("NO"), ::testing::HasSubstr(words)));
   const auto json = nlohmann::ordered_json::parse(to_json(rows));
   EXPECT_EQ(json.at(0).at("holds"), false);

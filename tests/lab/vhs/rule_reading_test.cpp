@@ -10,7 +10,7 @@
 #include "core/random.h"
 #include "core/units.h"
 #include "lab/vhs/pinhole_transfer.h"
-#include "lab/vhs/vhs_visual_bench.h"
+#include "lab/vhs/vhs_pictures.h"
 
 namespace touchstone::lab {
 namespace {
@@ -130,7 +130,7 @@ TEST(PinholeTransfer, OnTheAxisOfAThinFoilIsTheDiscs) {
   for (const double per_mm : {0.5, 1.0, 1.8, 2.4, 3.0}) {
     EXPECT_NEAR(transfer_at(device, view, {0, 0}, per_mm), transfer_of_disc(optics, per_mm), 5e-3) << per_mm;
   }
-  // A foil narrows the hole off the axis along the way there, and fine lines across that way are seen better.
+  // A foil narrows the hole off the axis along that direction, and fine lines across it are seen better.
   device.camera->foil_thickness_um = 50.0;
   EXPECT_GT(transfer_at(device, view, {6, 0}, 1.8), transfer_at(device, view, {0, 0}, 1.8) + 0.05);
 }

@@ -23,9 +23,9 @@ sim::DeviceSpec vhs() {
 }
 
 /// The sensor with more beads, and a coarse mesh, made once.
-const DistributionBench& bench() {
+const DistributionSetup& setup() {
   static const test::TemporaryFolder cache;
-  static const DistributionBench made = [] {
+  static const DistributionSetup made = [] {
     sim::DeviceSpec device = vhs();
     device.mesh.fine_mm = 0.8;
     return set_up_distribution(device, 5, 1.5, cache.path());
@@ -36,7 +36,7 @@ const DistributionBench& bench() {
 TEST(BeadParallax, IsWhatAPinholeThroughGlassAndGelSees) {
   // 15.4 mm of air, 2 mm of glass of 1.517, 4.55 mm of gel of 1.48 before the beads.
   EXPECT_NEAR(bead_parallax(vhs()).viewing_distance_mm, 1.48 * (15.4 + 2.0 / 1.517) + 4.55, 1e-9);
-  const DistributionBench& b = bench();
+  const DistributionSetup& b = setup();
   // A bead at 3 mm that is pressed by 0.1 mm looks shifted by 3 * 0.1 / 29.3 mm; the faces' own answer agrees.
   const sensors::BeadView view = sensors::view_of(b.rest_px, b.compliance);
   EXPECT_LT(view.rms_px, 0.3);
@@ -54,30 +54,30 @@ TEST(BeadParallax, OtherDevicesAreRefused) {
   EXPECT_THAT(message_of([&] { bead_parallax(device); }), HasSubstr("no beads"));
 }
 
-TEST(VhsDistribution, TwoForcesAtOnceAreToldApart) {
-  sensors::TractionInversion inversion(bench().compliance, bead_inversion());
+TEST(VhsDistribution, TwoForcesAtOnceAreSeparated) {
+  sensors::TractionInversion inversion(setup().compliance, bead_inversion());
   const std::vector<LoadPoint> points = {{{-1.6, 0.2}, 0.7}, {{1.5, -0.4}, 0.3}};
-  const DistributionTrial trial = press_points(bench(), inversion, points, 0.1, 1);
+  const DistributionTrial trial = press_points(setup(), inversion, points, 0.1, 1);
   EXPECT_NEAR(trial.true_total_N, 1.0, 1e-5);
-  EXPECT_NEAR(trial.told_N[0], 0.7, 0.1);
-  EXPECT_NEAR(trial.told_N[1], 0.3, 0.1);
+  EXPECT_NEAR(trial.estimated_N[0], 0.7, 0.1);
+  EXPECT_NEAR(trial.estimated_N[1], 0.3, 0.1);
   EXPECT_LT(trial.place_mm[0], 0.4);
   EXPECT_LT(trial.place_mm[1], 0.4);
   EXPECT_LT(trial.dip, 0.5);
-  const DistributionTrial near = press_points(bench(), inversion, {{{-0.4, 0.0}, 0.5}, {{0.4, 0.0}, 0.5}}, 0.1, 1);
+  const DistributionTrial near = press_points(setup(), inversion, {{{-0.4, 0.0}, 0.5}, {{0.4, 0.0}, 0.5}}, 0.1, 1);
   EXPECT_NEAR(near.total_N, 1.0, 0.15);
   EXPECT_GT(near.dip, 0.75) << "0.8 mm are half of the beads' spacing";
 }
 
 TEST(BeadTractions, TablesSumToTheForces) {
-  const sensors::MarkerCompliance& map = bench().compliance;
+  const sensors::MarkerCompliance& map = setup().compliance;
   // Beads as a pressure of 0.03 MPa on the nine patches in the middle, with shear, moves them.
   Eigen::Matrix3Xd traction = Eigen::Matrix3Xd::Zero(3, map.patches());
   for (int p = 0; p < map.patches(); ++p) {
     if (map.patch_centre(p).cwiseAbs().maxCoeff() < 1.4 * map.patch_side) traction.col(p) << 0.005, 0.0, -0.03;
   }
   const sensors::MarkerField moved = sensors::displacements_under(map, traction);
-  const double px_per_mm = sensors::view_of(bench().rest_px, map).px_per_mm;
+  const double px_per_mm = sensors::view_of(setup().rest_px, map).px_per_mm;
   TrackedSequence sequence;
   sequence.source.name = "press";
   for (int frame = 0; frame < 3; ++frame) {
@@ -85,7 +85,7 @@ TEST(BeadTractions, TablesSumToTheForces) {
     labelled.frame = frame;
     sensors::TrackedBeads& beads = sequence.beads.emplace_back();
     beads.t_us = 1000 * frame;
-    beads.positions = bench().rest_px;
+    beads.positions = setup().rest_px;
     beads.status.assign(25, frame < 2 ? sensors::BeadStatus::kFound : sensors::BeadStatus::kHidden);
     for (std::size_t i = 0; i < 25 && frame == 1; ++i)
       beads.positions[i] += px_per_mm * moved.displacement[i].head<2>();

@@ -111,7 +111,7 @@ TEST(LensIrradiance, DistortionMovesLightAndLosesNone) {
   const PreparedLens bent = prepare(camera);
   camera.distortion = {};
   const PreparedLens straight = prepare(camera);
-  // The flux through a small square of the field of view, by both ways.
+  // The flux through a small square of the field of view, by both methods.
   for (double a : {0.0, 0.2, 0.5}) {
     const Eigen::Vector2d tangents(a, 0.3 * a);
     const auto flux = [&](const PreparedLens& lens) {
@@ -180,8 +180,8 @@ TEST(LensFocus, OutOfFocusThePointIsADiscOfTheThinLensFormula) {
   }
 }
 
-// A bright ball, small and out of focus: the variance of a disc of diameter c is (c/4)^2 each way, to which the ball
-// (of radius r, seen as a disc) and the pixel add theirs.
+// A bright ball, small and out of focus: the variance of a disc of diameter c is (c/4)^2 along each axis, to which the
+// ball (of radius r, seen as a disc) and the pixel add theirs.
 TEST(LensFocus, RenderedBlurHasTheDiscsVariance) {
   LensCamera camera = wide_lens();
   camera.width = camera.height = 48;

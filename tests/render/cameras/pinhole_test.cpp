@@ -54,7 +54,7 @@ TEST(PinholeImage, At30DegreesAFoilOfHalfTheHoleLeaves36Percent) {
 }
 
 // Far off the axis the two rims leave a lens of the hole open. Drawn uniformly over it a sample's weight varies only
-// with the way's own length and slant.
+// with the path's own length and slant.
 TEST(PinholeRay, WeightHardlyVariesOverTheHole) {
   const PinholeCamera camera = wide_camera(50.0);
   for (double x : {30.5, 45.0, 54.0}) {  // 0, 19 and 29 degrees

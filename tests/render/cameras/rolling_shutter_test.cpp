@@ -64,7 +64,7 @@ TEST(RollingShutter, SkewOfAMovingEdgeIsLineTimeTimesSpeed) {
 }
 
 // A pixel that the edge passes within the exposure has the share of the time in which it was bright.
-TEST(RollingShutter, MotionBlurIsALinearRampAsWideAsTheWay) {
+TEST(RollingShutter, MotionBlurIsALinearRampAsWideAsTheMotion) {
   std::vector<TimedIrradiance> instants;
   for (int i = 0; i <= 200; ++i) instants.push_back({i * 1e-4, edge_at(10.0 + 0.1 * i, 64, 1)});  // 20 px
   const cv::Mat image = rolling_exposure(instants, {0.0, 200e-4, 0.0});

@@ -96,13 +96,13 @@ TEST(DirectError, LeavesTheReferencesNoiseOut) {
   EXPECT_LT(std::abs(error.mean), 4.0 * error.mean_error + 2e-3);
 }
 
-/// The square's bound is its value and two standard errors: of one that isn't told from 0, twice (0.6 %)^2.
+/// The square's bound is its value and two standard errors: of one that can't be distinguished from 0, twice (0.6 %)^2.
 TEST(DirectError, ItsRootIsBoundedByItsSquare) {
   EXPECT_DOUBLE_EQ(largest_rms({.rms = 0.0, .rms_error = 0.006}), std::sqrt(2.0) * 0.006);
   EXPECT_EQ(smallest_rms({.rms = 0.0, .rms_error = 0.006}), 0.0);
-  const DirectError told{.rms = 0.1, .rms_error = 0.001};
-  EXPECT_NEAR(largest_rms(told), 0.102, 3e-5);
-  EXPECT_NEAR(smallest_rms(told), 0.098, 3e-5);
+  const DirectError distinct{.rms = 0.1, .rms_error = 0.001};
+  EXPECT_NEAR(largest_rms(distinct), 0.102, 3e-5);
+  EXPECT_NEAR(smallest_rms(distinct), 0.098, 3e-5);
   const DirectError endless{.rms = std::numeric_limits<double>::infinity()};
   EXPECT_TRUE(std::isinf(largest_rms(endless)));
   EXPECT_TRUE(std::isinf(smallest_rms(endless)));

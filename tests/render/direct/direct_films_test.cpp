@@ -86,7 +86,7 @@ Scene without_films(Scene scene) {
   return scene;
 }
 
-/// A lamp between film and surface: its light meets film only on its way to the camera.
+/// A lamp between film and surface: its light meets film only on its path to the camera.
 Scene lamp_above_films() {
   Scene scene = white_surface();
   SpotLamp lamp = half_space_lamp({7.5, 4.0, -3.0}, {0, 0, 1}, 1.0);
@@ -161,7 +161,7 @@ TEST(DirectFilms, AWideLampShinesThroughAsPathsDo) {
     double most = 0.0;
     for (int band = 0; band < 3; ++band) {
       const double share = found[band] / bare[band];
-      EXPECT_LT(share, std::pow(yellow()[band], 2.0)) << "slanting ways are longer";
+      EXPECT_LT(share, std::pow(yellow()[band], 2.0)) << "slanting paths are longer";
       most = std::max(most, std::abs(share / (traced[band] / traced_bare[band]) - 1.0));
     }
     return most;

@@ -33,9 +33,9 @@ TEST(DirectRenderer, PointSourceOverAMattPlane) {
       const Eigen::Vector3d from = camera.gel_from_camera * ray->origin;
       const Eigen::Vector3d along = camera.gel_from_camera.turn(ray->direction);
       const Eigen::Vector3d place = from - along * (from.z() / along.z());
-      const Eigen::Vector3d way = lamp - place;
+      const Eigen::Vector3d offset = lamp - place;
       // L = rho I cos / (pi r^2), in W and m.
-      const double radiance = 0.6 * 2.0 * (-way.z() / way.norm()) / (kPi * way.squaredNorm() * 1e-6);
+      const double radiance = 0.6 * 2.0 * (-offset.z() / offset.norm()) / (kPi * offset.squaredNorm() * 1e-6);
       EXPECT_NEAR(image.irradiance.at<float>(row, column) / (ray->weight * radiance), 1.0, 3e-3);
     }
   }

@@ -81,14 +81,15 @@ TEST(EventPixels, ARampGivesItsChangeOverTheThreshold) {
 }
 
 TEST(EventPixels, NoRemainderIsLostInSwingsOfThousandsOfFrames) {
-  // Up and down 200 times through 10.5 thresholds each way: whatever was lost or gained in a turn would add up.
+  // Up and down 200 times through 10.5 thresholds in each direction: whatever was lost or gained in a turn would add
+  // up.
   EventPixels pixels(ideal(), {1, 1}, 1, 1);
   const auto light = [](double t) {
     const double phase = std::fmod(t / 5000.0, 2.0);
     return 3.0 * std::exp(2.1 * (phase < 1.0 ? phase : 2.0 - phase));
   };
   const std::vector<Event> events = watch(pixels, light, 0, 200 * 10000, 50);
-  // First way up 10; each way down and up again from the last event's level another 10 of each kind.
+  // First up 10; each later move down and up again from the last event's level another 10 of each kind.
   EXPECT_EQ(events.size(), 200u * 20u);
   EXPECT_EQ(std::count_if(events.begin(), events.end(), [](const Event& event) { return event.on; }), 2000);
   EXPECT_TRUE(in_order(events));

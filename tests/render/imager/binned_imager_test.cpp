@@ -295,7 +295,7 @@ TEST(BinnedImager, SameBytesWithAnyNumberOfThreads) {
   expect_same_bytes_on_any_threads(binned(), 1e-3F, 0.03F);
 }
 
-TEST(BinnedImager, AChannelsNoiseDoesNotHangOnTheOthersLight) {
+TEST(BinnedImager, AChannelsNoiseDoesNotDependOnTheOthersLight) {
   Imager imager = binned();
   imager.quantum_efficiency = Eigen::Matrix3d::Identity() * 0.5;
   const cv::Size size(60, 40);

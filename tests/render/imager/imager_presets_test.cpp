@@ -87,7 +87,7 @@ TEST(MouseStatistics, OfKnownPictures) {
   EXPECT_EQ(statistics.shutter, 0);
 }
 
-TEST(MouseStatistics, CountPlacesThatCanBeTrackedBothWays) {
+TEST(MouseStatistics, CountPlacesThatCanBeTrackedAlongBothAxes) {
   cv::Mat raw(18, 18, CV_8UC1);
   const auto fill = [&raw](const auto& value) {
     for (int row = 0; row < 18; ++row) {
@@ -99,7 +99,7 @@ TEST(MouseStatistics, CountPlacesThatCanBeTrackedBothWays) {
   EXPECT_EQ(trackable_features(raw), 0);
   fill([&](int row, int) { return number(row < 9 ? 5 : 60); });  // a straight edge
   EXPECT_EQ(trackable_features(raw), 0);
-  // One pixel d brighter than the rest: the window round it sees gradients of d/2 on either side, each way:
+  // One pixel d brighter than the rest: the window round it sees gradients of d/2 on either side, along each axis:
   // the tensor's eigenvalues are d^2/18. Only windows at most 1 off in one direction see both axes' pixels.
   fill([&](int row, int column) { return number(row == 8 && column == 8 ? 40 : 10); });
   const int features = trackable_features(raw);

@@ -87,13 +87,13 @@ TEST(MotionChip, ASceneAtRestDoesntMove) {
   MotionChip moving(chip, 1, 2);
   const cv::Mat light = blobs(chip, 0.3, 0.4);
   for (int k = 0; k < 500; ++k) {
-    const ChipStatistics told = moving.expose(light).statistics;
-    EXPECT_EQ(told.dx, 0);
-    EXPECT_EQ(told.dy, 0);
+    const ChipStatistics statistics = moving.expose(light).statistics;
+    EXPECT_EQ(statistics.dx, 0);
+    EXPECT_EQ(statistics.dy, 0);
   }
 }
 
-TEST(MotionChip, CountsAddUpToTheWayHoweverSlow) {
+TEST(MotionChip, CountsAddUpToTheTravelHoweverSlow) {
   // 6.4 pixels right and 4.3 up in 64, 640 and 6400 frames: between 0.1 and 0.001 pixels a frame, there and back.
   for (const int frames : {64, 640, 6400}) {
     const MotionChipSettings chip = settings();
@@ -102,9 +102,9 @@ TEST(MotionChip, CountsAddUpToTheWayHoweverSlow) {
     int y = 0;
     for (int k = 0; k <= 2 * frames; ++k) {
       const double part = 1.0 - std::abs(1.0 - static_cast<double>(k) / frames);
-      const ChipStatistics told = moving.expose(blobs(chip, 6.4 * part, -4.3 * part)).statistics;
-      x += told.dx;
-      y += told.dy;
+      const ChipStatistics statistics = moving.expose(blobs(chip, 6.4 * part, -4.3 * part)).statistics;
+      x += statistics.dx;
+      y += statistics.dy;
       if (k == frames) {
         EXPECT_NEAR(x, 6.4, 1.2) << frames;
         EXPECT_NEAR(y, -4.3, 1.2) << frames;
@@ -119,10 +119,10 @@ TEST(MotionChip, NothingToSeeDoesntMove) {
   const MotionChipSettings chip = settings();
   MotionChip dark(chip, 1, 2);
   for (int k = 0; k < 100; ++k) {
-    const ChipStatistics told = dark.expose(even(chip, 1.0 + 0.5 * k)).statistics;
-    EXPECT_EQ(told.dx, 0);
-    EXPECT_EQ(told.dy, 0);
-    EXPECT_LT(told.squal, kLeastFeatures);
+    const ChipStatistics statistics = dark.expose(even(chip, 1.0 + 0.5 * k)).statistics;
+    EXPECT_EQ(statistics.dx, 0);
+    EXPECT_EQ(statistics.dy, 0);
+    EXPECT_LT(statistics.squal, kLeastFeatures);
   }
 }
 
@@ -130,9 +130,9 @@ TEST(MotionChip, LightOfAnotherLevelIsntMotion) {
   const MotionChipSettings chip = settings();
   MotionChip moving(chip, 1, 2);
   for (int k = 0; k < 200; ++k) {
-    const ChipStatistics told = moving.expose(blobs(chip, 0.2, 0.6, 0.5 + 0.004 * k)).statistics;
-    EXPECT_EQ(told.dx, 0);
-    EXPECT_EQ(told.dy, 0);
+    const ChipStatistics statistics = moving.expose(blobs(chip, 0.2, 0.6, 0.5 + 0.004 * k)).statistics;
+    EXPECT_EQ(statistics.dx, 0);
+    EXPECT_EQ(statistics.dy, 0);
   }
 }
 
@@ -195,7 +195,7 @@ TEST(MotionChip, TheShutterFollowsTheLightByASixteenth) {
   // And back, when the light falls.
   for (int k = 0; k < 60; ++k) before = bright.expose(even(chip, 30)).shutter;
   EXPECT_EQ(before, 14400);
-  // Saturated, where it is told to stay.
+  // Saturated, where it is set to stay.
   MotionChipSettings fixed = chip;
   fixed.shutter.automatic = false;
   MotionChip held(fixed, 1, 2);

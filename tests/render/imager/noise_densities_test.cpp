@@ -98,7 +98,7 @@ TEST(NoiseDensities, NumbersOfEveryImager) {
     const cv::Size size(400, 400);
     const FixedPattern pattern = {cv::Mat(size, CV_32FC1, cv::Scalar(1.0)), cv::Mat(size, CV_32FC1, cv::Scalar(0.0))};
     const int numbers = 1 << imager.bits;
-    // The middle one lies between two numbers, so that also steps wider than the noise are told apart.
+    // The middle one lies between two numbers, so that also steps wider than the noise are distinguished.
     const double between = (std::floor(0.02 * numbers) + 0.5 - imager.black_level_DN) / imager.gain_DN_per_e;
     for (const double electrons : {0.0, std::max(between, 0.5 / imager.gain_DN_per_e), 0.97 * imager.full_well_e}) {
       SCOPED_TRACE(testing::Message() << name << " at " << electrons << " electrons");

@@ -35,7 +35,7 @@ struct Patch {
   double x, y, half;
 };
 
-/// Share of the guide's power that lands on a patch of the plane z = 0 by the first way out of the plate, by following
+/// Share of the guide's power that lands on a patch of the plane z = 0 by the first exit from the plate, by following
 /// photons, each of one polarisation, that are mirrored or let through by chance.
 Estimate share_by_photons(const Scene& scene, const GuideLamp& lamp, const Patch& patch, int photons) {
   const double low = scene.faces[0].z;
@@ -49,25 +49,25 @@ Estimate share_by_photons(const Scene& scene, const GuideLamp& lamp, const Patch
   int landed = 0;
   for (int i = 0; i < photons; ++i) {
     Eigen::Vector3d at(lamp.centre.x(), lamp.width * (random.uniform() - 0.5), low + (high - low) * random.uniform());
-    Eigen::Vector3d way;
+    Eigen::Vector3d direction;
     do {
       const double cosine = std::pow(1.0 - random.uniform(), 1.0 / (m + 1.0));
       const double azimuth = 2.0 * kPi * random.uniform();
       const double sine = std::sqrt(1.0 - cosine * cosine);
-      way = frame.to_world({sine * std::cos(azimuth), sine * std::sin(azimuth), cosine});
-    } while (way.x() <= 0.0);
+      direction = frame.to_world({sine * std::cos(azimuth), sine * std::sin(azimuth), cosine});
+    } while (direction.x() <= 0.0);
     const bool is_s = random.uniform() < 0.5;
     for (int bounce = 0; bounce < 10000; ++bounce) {
-      const bool up = way.z() > 0.0;
-      at += ((up ? high : low) - at.z()) / way.z() * way;
+      const bool up = direction.z() > 0.0;
+      at += ((up ? high : low) - at.z()) / direction.z() * direction;
       if (!(at.x() < 100.0)) break;
-      const FresnelFace face = fresnel(n_plate, up ? n_gel : n_air, std::abs(way.z()));
+      const FresnelFace face = fresnel(n_plate, up ? n_gel : n_air, std::abs(direction.z()));
       if (random.uniform() < (is_s ? face.reflectance_s : face.reflectance_p)) {
-        way.z() = -way.z();
+        direction.z() = -direction.z();
         continue;
       }
       if (up) {
-        const Eigen::Vector2d flat = way.head<2>() * (n_plate / n_gel);
+        const Eigen::Vector2d flat = direction.head<2>() * (n_plate / n_gel);
         const Eigen::Vector2d end = at.head<2>() - high * flat / std::sqrt(1.0 - flat.squaredNorm());
         if (std::abs(end.x() - patch.x) < patch.half && std::abs(end.y() - patch.y) < patch.half) ++landed;
       }
@@ -150,11 +150,11 @@ TEST(Guide, HasTheLightOfALuminousEndThatPathsRunInto) {
     small.surfaces.push_back({square_sheet(0.02, place.z, place.up), Lambertian{grey(0.5)}});
     small.surfaces.push_back({square_sheet(0.02, place.z + (place.up ? -0.01 : 0.01), place.up), Black{}});
     const Eigen::Vector3d eye(0, 0, place.z + (place.up ? 0.5 : -0.5));
-    const Eigen::Vector3d look(0, 0, place.up ? -1 : 1);
+    const Eigen::Vector3d viewing(0, 0, place.up ? -1 : 1);
     small.lamps = {lamp};
-    const Estimate by_images = view(small, eye, look, 1000);
+    const Estimate by_images = view(small, eye, viewing, 1000);
     small.lamps = {end};
-    const Estimate by_paths = view(small, eye, look, 8000);
+    const Estimate by_paths = view(small, eye, viewing, 8000);
     expect_equal(by_images, by_paths, 0.02, place.what);
   }
 }

@@ -27,9 +27,9 @@ LampChooser row_of_lamps() {
 
 /// What a lamp of row_of_lamps sends, 1 / distance^2 and no more; none beyond 14 mm.
 Eigen::Vector3d light_of_row(int lamp, const Eigen::Vector3d& place) {
-  const Eigen::Vector3d way = Eigen::Vector3d(3.0 * lamp - 15.0, 0.0, -5.0) - place;
-  if (lamp == 3 || way.norm() > 14.0) return Eigen::Vector3d::Zero();
-  return way.normalized() * ((1.0 + 0.1 * lamp) * 1e5 / way.squaredNorm());
+  const Eigen::Vector3d offset = Eigen::Vector3d(3.0 * lamp - 15.0, 0.0, -5.0) - place;
+  if (lamp == 3 || offset.norm() > 14.0) return Eigen::Vector3d::Zero();
+  return offset.normalized() * ((1.0 + 0.1 * lamp) * 1e5 / offset.squaredNorm());
 }
 
 /// The share of the numbers 0 to 1 that give each lamp is what choose() says, and the shares fill one.

@@ -200,9 +200,9 @@ TEST(HoleDensities, PinholeBehindAFoil) {
     }
     const auto open = [&](double a, double b) {
       const Eigen::Vector3d place(reach * (2.0 * a - 1.0), reach * (2.0 * b - 1.0), 0.0);
-      const Eigen::Vector3d way = place - sensor;
+      const Eigen::Vector3d offset = place - sensor;
       for (double z : {-0.03, 0.03}) {
-        if ((place + way * (z / way.z())).head<2>().norm() > radius) return 0.0;
+        if ((place + offset * (z / offset.z())).head<2>().norm() > radius) return 0.0;
       }
       return 4.0 * reach * reach;
     };

@@ -138,21 +138,21 @@ TEST(Projector, KeepsThePatternsSides) {
 TEST(EveryLamp, SendsItsPowerAllInAll) {
   Scene plate = empty_scene(0.0);
   plate.faces = {{-1.0, 0, 0}, {2.0, 0, 0}};  // of no optical effect, so a guide's light leaves it as it came
-  const Eigen::Vector3d way(0.4, -0.5, 0.8);
+  const Eigen::Vector3d direction(0.4, -0.5, 0.8);
   SpotLamp spot;
-  spot.direction = way;
+  spot.direction = direction;
   spot.lens_radius = 2.0;
   LedLamp led;
-  led.direction = way;
+  led.direction = direction;
   led.radius = 1.0;
   led.half_power_angle = 0.4;
   AreaLamp area;
-  area.direction = way;
+  area.direction = direction;
   area.half_power_angle = 0.9;
   ProjectedLamp thrown = projector(cv::Mat(8, 16, CV_8UC1, cv::Scalar(77)));
   thrown.pattern.at<unsigned char>(3, 3) = 0;
   thrown.position.setZero();
-  thrown.direction = way;
+  thrown.direction = direction;
   GuideLamp level;
   level.centre = {0, 0, 0.5};
   level.direction = {0.6, 0.8, 0};

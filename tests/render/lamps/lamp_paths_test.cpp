@@ -35,9 +35,10 @@ TEST(SeenLamp, ShowsItsRadianceFromBeforeAndBlackFromBehind) {
   scene.lamps = {square_above(2.0, true)};
   const Tracer tracer(scene);
   for (double angle : {0.0, 0.6}) {
-    const Eigen::Vector3d look(std::sin(angle), 0, std::cos(angle));
-    EXPECT_NEAR(tracer.radiance(Eigen::Vector3d(0.5, 0, 2) - 3.0 * look, look, samples(1))[0], 1.0, 1e-12) << angle;
-    EXPECT_EQ(tracer.radiance(Eigen::Vector3d(0.5, 0, 2) + 3.0 * look, -look, samples(1))[0], 0.0) << angle;
+    const Eigen::Vector3d viewing(std::sin(angle), 0, std::cos(angle));
+    EXPECT_NEAR(tracer.radiance(Eigen::Vector3d(0.5, 0, 2) - 3.0 * viewing, viewing, samples(1))[0], 1.0, 1e-12)
+        << angle;
+    EXPECT_EQ(tracer.radiance(Eigen::Vector3d(0.5, 0, 2) + 3.0 * viewing, -viewing, samples(1))[0], 0.0) << angle;
   }
   EXPECT_EQ(tracer.radiance({1.6, 0, 0}, {0, 0, 1}, samples(1))[0], 0.3) << "beside it";
   scene.lamps = {square_above(2.0, false)};
@@ -58,8 +59,8 @@ TEST(SeenLamp, NarrowLobeShowsLessFromTheSide) {
   const double on_axis = (m + 1.0) / (2.0 * kPi) / (kPi * 1e-6);
   const Tracer tracer(scene);
   for (double angle : {0.0, 0.5, 1.2}) {
-    const Eigen::Vector3d look(std::sin(angle), 0, std::cos(angle));
-    EXPECT_NEAR(tracer.radiance(led.position - 4.0 * look, look, samples(1))[0] / on_axis,
+    const Eigen::Vector3d viewing(std::sin(angle), 0, std::cos(angle));
+    EXPECT_NEAR(tracer.radiance(led.position - 4.0 * viewing, viewing, samples(1))[0] / on_axis,
                 std::pow(std::cos(angle), m - 1.0), 1e-9);
   }
 }

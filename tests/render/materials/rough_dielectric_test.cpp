@@ -18,8 +18,8 @@ Eigen::Vector3d tilted(double cosine, double azimuth = 0.0) {
   return {sine * std::cos(azimuth), sine * std::sin(azimuth), cosine};
 }
 
-// A path may go either way: f(out, in) n_in^2 = f(in, out) n_out^2 across, and the same without the squares above. With
-// one facet and with all of them.
+// A path may go in either direction: f(out, in) n_in^2 = f(in, out) n_out^2 across, and the same without the squares
+// above. With one facet and with all of them.
 TEST(RoughDielectric, IsReciprocal) {
   RandomStream stream(1, 0, Purpose::kTest);
   const Eigen::Vector3d mirror(1, 1, -1);  // the other side's frame has +z on its own side

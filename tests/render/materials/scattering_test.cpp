@@ -154,12 +154,12 @@ TEST(Flight, BandsTogetherLoseNothingAndGainNothing) {
     const Flight<3> flight = sample_flight<3>(extinction, throughput, u, stream.uniform());
     const Bands<3> scattered = throughput * weight_of_scattering<3>(extinction, extinction, flight);
     EXPECT_NEAR(scattered.sum(), throughput.sum(), 1e-9);
-    const double free_way = flight.distance * stream.uniform();
-    EXPECT_NEAR((throughput * weight_of_passing<3>(extinction, flight, free_way)).sum(), throughput.sum(), 1e-9);
+    const double free_path = flight.distance * stream.uniform();
+    EXPECT_NEAR((throughput * weight_of_passing<3>(extinction, flight, free_path)).sum(), throughput.sum(), 1e-9);
   }
 }
 
-TEST(Flight, EndlessWayPassesOnlyTheClearBand) {
+TEST(Flight, EndlessPathPassesOnlyTheClearBand) {
   const Flight<3> flight = sample_flight<3>({0.0, 1.0, 2.0}, {1.0, 1.0, 1.0}, 0.1, 0.5);
   ASSERT_TRUE(std::isinf(flight.distance));
   const Bands<3> weight = weight_of_passing<3>({0.0, 1.0, 2.0}, flight, flight.distance);
@@ -220,8 +220,8 @@ TEST(ScatteringMedium, HalfSpaceUnderALampFollowsChandrasekhar) {
     const ChandrasekharH h(albedo);
     for (double mu0 : {0.3, 0.9}) {
       Scene scene = slab(particles(albedo, 0.0), 0.0, 0.0);
-      const Eigen::Vector3d way = at_cosine(mu0, true);
-      scene.lamps.push_back(half_space_lamp(kFar * way, -way, kFar * kFar * 1e-6));  // E = 1
+      const Eigen::Vector3d direction = at_cosine(mu0, true);
+      scene.lamps.push_back(half_space_lamp(kFar * direction, -direction, kFar * kFar * 1e-6));  // E = 1
       for (double mu : {0.2, 1.0}) {
         const Estimate seen = view(scene, {0, 0, 1}, at_cosine(mu, false), 1500);
         const double expected = albedo / (4.0 * kPi) * mu0 / (mu + mu0) * h(mu) * h(mu0);

@@ -134,7 +134,7 @@ TEST(MembraneWalks, AreReciprocal) {
   }
 }
 
-// Without scattering and mirroring a body's light is weakened on the two ways through.
+// Without scattering and mirroring a body's light is weakened on the two paths through.
 TEST(MembraneLight, ClearAbsorberOverABodyFollowsBeerLambert) {
   for (double absorption : {0.0, 0.3, 1.5}) {
     const MembraneKernels kernels = walk_membrane(matched(0.0, absorption), {.walks = 1 << 18});

@@ -12,7 +12,7 @@
 namespace touchstone::render {
 namespace {
 
-TEST(ThinFilm, DyeFollowsTheWayInside) {
+TEST(ThinFilm, DyeFollowsThePathInside) {
   const Bands<3> dye(0.9, 0.5, 0.01);
   for (double angle : {0.0, 0.4, 1.0, 1.5}) {
     const double inside = std::cos(std::asin(std::sin(angle) / 1.5));

@@ -41,7 +41,7 @@ TEST(Absorption, FollowsBeerAndLambert) {
     EXPECT_NEAR(tracer.radiance({0, 0, -5}, slanted(angle), samples(1))[0], std::exp(-0.3 * 2.0 / std::cos(angle)),
                 1e-12);
   }
-  // The same for lamp light on its way through the layer and back.
+  // The same for lamp light on its path through the layer and back.
   scene.environment = grey(0.0);
   scene.interreflection = false;
   scene.surfaces.push_back({square_sheet(10.0, 3.0, false), Lambertian{grey(0.5)}});
@@ -213,7 +213,7 @@ TEST(Surroundings, AreHiddenByADiscAndASphereAsTheirFormFactorsSay) {
   const auto patch_under = [](const Scene& extra) {
     Scene scene = extra;
     scene.surfaces.push_back({square_sheet(0.01, 0.0), Lambertian{grey(0.6)}});
-    // A steep look that passes beside the thing above.
+    // A steep ray that passes beside the thing above.
     return Tracer(scene).radiance({-20, 0, 1.0}, Eigen::Vector3d(20, 0, -1.0), samples(16384))[0];
   };
   Scene disc = empty_scene(1.0);

@@ -79,9 +79,9 @@ TEST(SmoothShading, ASphereOfFacetsShinesAsTheSphere) {
     const double x = 4.8 * random.uniform() - 2.4;
     const double y = 4.8 * random.uniform() - 2.4;
     const Eigen::Vector3d place(x, y, kCentre.z() - std::sqrt(kRadius * kRadius - x * x - y * y));
-    const Eigen::Vector3d way = lamp - place;
-    const double cosine = std::max(0.0, way.normalized().dot((place - kCentre) / kRadius));
-    const double expected = 0.6 / kPi * 5.0 * cosine / way.squaredNorm() * 1e6;
+    const Eigen::Vector3d offset = lamp - place;
+    const double cosine = std::max(0.0, offset.normalized().dot((place - kCentre) / kRadius));
+    const double expected = 0.6 / kPi * 5.0 * cosine / offset.squaredNorm() * 1e6;
     all += expected * expected;
     wrong += std::pow(seen_from_below(smooth, x, y) - expected, 2);
     wrong_of_facets += std::pow(seen_from_below(facets, x, y) - expected, 2);
@@ -101,9 +101,9 @@ TEST(SmoothShading, TheTerminatorIsTheSpheresOwn) {
   for (double y = -1.0; y <= 1.0; y += 0.037) {
     for (double x = -1.5; x <= 2.0; x += 0.041) {
       const Eigen::Vector3d place(x, y, kCentre.z() - std::sqrt(kRadius * kRadius - x * x - y * y));
-      const Eigen::Vector3d way = lamp - place;
-      const double cosine = std::max(0.0, way.normalized().dot((place - kCentre) / kRadius));
-      const double scale = 0.6 / kPi * 5.0 / way.squaredNorm() * 1e6;
+      const Eigen::Vector3d offset = lamp - place;
+      const double cosine = std::max(0.0, offset.normalized().dot((place - kCentre) / kRadius));
+      const double scale = 0.6 / kPi * 5.0 / offset.squaredNorm() * 1e6;
       EXPECT_NEAR(seen_from_below(smooth, x, y), scale * cosine, 2e-3 * scale) << x << " " << y;
     }
   }

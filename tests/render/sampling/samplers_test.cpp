@@ -135,10 +135,10 @@ TEST(Pinhole, OpenAreaOfTwoRimsIsSampledExactly) {
     for (int i = 0; i < kGrid; ++i) {
       for (int j = 0; j < kGrid; ++j) {
         const Eigen::Vector3d place(-0.06 + (i + 0.5) * step, -0.06 + (j + 0.5) * step, 0.0);
-        const Eigen::Vector3d way = place - sensor;
+        const Eigen::Vector3d offset = place - sensor;
         bool open = true;
-        for (double z : {-0.03, 0.03}) open = open && (place + way * (z / way.z())).head<2>().norm() <= 0.05;
-        if (open) expected += step * step * way.z() * way.z() / std::pow(way.squaredNorm(), 2);
+        for (double z : {-0.03, 0.03}) open = open && (place + offset * (z / offset.z())).head<2>().norm() <= 0.05;
+        if (open) expected += step * step * offset.z() * offset.z() / std::pow(offset.squaredNorm(), 2);
       }
     }
     EXPECT_NEAR(sampled / expected, 1.0, 2e-3) << "x " << x;

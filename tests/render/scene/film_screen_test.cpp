@@ -108,7 +108,7 @@ TEST(FilmScreen, LeavesWhatAThinFilmLeaves) {
   }
 }
 
-TEST(FilmScreen, LightOfManyWaysAddsUp) {
+TEST(FilmScreen, LightOfManyDirectionsAddsUp) {
   const FilmScreen screen(with_films({film(1.0, 0.0, three(0.9, 0.5, 0.02))}), 1.41, 0.0, 0.0);
   FilmScreen::Light together;
   double apart[3] = {};

@@ -87,7 +87,7 @@ TEST_F(BeadTrackerFaults, BeadThatLeavesItsCellIsReset) {
   EXPECT_EQ(next(beads).status[8], BeadStatus::kFound);
 }
 
-TEST_F(BeadTrackerFaults, JumpOfOneBeadIsDoubtedUnlessToldOtherwise) {
+TEST_F(BeadTrackerFaults, JumpOfOneBeadIsDoubtedUnlessSetOtherwise) {
   auto beads = rest;
   beads[0] += Eigen::Vector2d(-22.0, 25.0);
   for (const bool consistent : {false, true}) {
@@ -319,7 +319,7 @@ SpeckScores track_among_specks(const Specks& specks) {
   return scores;
 }
 
-TEST_F(BeadTrackerFaults, SpecksThatLookLikeBeadsAreToldByTheirMotion) {
+TEST_F(BeadTrackerFaults, SpecksThatLookLikeBeadsAreFoundByTheirMotion) {
   for (const double px_per_frame : {0.0, 2.5}) {
     for (const int count : {5, 20}) {
       const auto [with, without] = track_among_specks({count, px_per_frame});
@@ -410,8 +410,9 @@ TEST_F(BeadTrackerFaults, SettingsOutOfRangeAreRefusedByName) {
   EXPECT_THAT(refused([](auto& s) { s.morphology_px = 2; }), HasSubstr("morphology_px is 2"));
   EXPECT_THAT(refused([&](auto& s) { s.mean_brightness = nan; }), HasSubstr("mean_brightness is nan"));
   EXPECT_THAT(refused([&](auto& s) { s.contrast = nan; }), HasSubstr("contrast"));
-  EXPECT_THAT(refused([](auto& s) { s.look.max_area_fraction = 1.5; }), HasSubstr("look.max_area_fraction"));
-  EXPECT_THAT(refused([&](auto& s) { s.look.min_difference = nan; }), HasSubstr("look.min_difference"));
+  EXPECT_THAT(refused([](auto& s) { s.appearance.max_area_fraction = 1.5; }),
+              HasSubstr("appearance.max_area_fraction"));
+  EXPECT_THAT(refused([&](auto& s) { s.appearance.min_difference = nan; }), HasSubstr("appearance.min_difference"));
   EXPECT_THAT(refused([](auto& s) { s.filter.measurement_px = 0.0; }), HasSubstr("filter.measurement_px"));
   EXPECT_THAT(refused([](auto& s) { s.filter.acceleration_px_per_s2 = -1.0; }), HasSubstr("filter.acceleration"));
   EXPECT_THAT(refused([](auto& s) { s.consistency.lone_motion = 0.0; }), HasSubstr("consistency.lone_motion is 0"));

@@ -78,7 +78,7 @@ TEST(BeadTracker, BrightBeadsAreFoundAsDarkOnes) {
   picture.background = 60.0;
   picture.bead = 220.0;
   BeadTrackerSettings settings;
-  settings.look.polarity = BeadPolarity::kBright;
+  settings.appearance.polarity = BeadPolarity::kBright;
   const Errors errors = measure_errors(picture, settings);
   EXPECT_LT(errors.bias.cwiseAbs().maxCoeff(), 0.02);
   EXPECT_LT(errors.rms, 0.1);
@@ -196,7 +196,7 @@ TEST(BeadTracker, AHalfDarkStripeDoesNotDragABead) {
   EXPECT_EQ(with_core.lost, 0);
   EXPECT_LT(with_core.error_px, 0.5);
   BeadTrackerSettings whole_region;
-  whole_region.look.least_core = 1.0;  // a core is never that large
+  whole_region.appearance.least_core = 1.0;  // a core is never that large
   const Worst without = track_past_a_stripe(depth, whole_region);
   EXPECT_TRUE(without.lost > 0 || without.error_px > 3.0 * with_core.error_px)
       << "the stripe is no trial: " << without.lost << " lost, " << without.error_px << " px";

@@ -149,12 +149,12 @@ TEST(MeasureBead, NoiseShadeAndLinesAreNoBead) {
   RandomStream random(4, 0, Purpose::kTest);
   BeadTrackerSettings settings;
   int taken = 0;
-  const auto look = [&](const cv::Mat& image) {
+  const auto compare = [&](const cv::Mat& image) {
     const auto found = measure_bead(window_of(image), {settings, {15.0, 15.0}, 0.0, false});
     if (found && !found->cut) ++taken;  // what is cut is measured again by the tracker, and refused if it stays so
   };
   for (int trial = 0; trial < 200; ++trial) {
-    look(noise_image(random, 30, 30, 150.0, 20.0 * random.uniform()));
+    compare(noise_image(random, 30, 30, 150.0, 20.0 * random.uniform()));
     cv::Mat ramp(30, 30, CV_8U);
     const double slope_x = 6.0 * (random.uniform() - 0.5);
     const double slope_y = 6.0 * (random.uniform() - 0.5);
@@ -164,11 +164,11 @@ TEST(MeasureBead, NoiseShadeAndLinesAreNoBead) {
             cv::saturate_cast<std::uint8_t>(150 + slope_x * (x - 15) + slope_y * (y - 15) + 2.0 * random.normal());
       }
     }
-    look(ramp);
+    compare(ramp);
     cv::Mat line = noise_image(random, 30, 30, 150.0, 2.0);
     const int column = 3 + static_cast<int>(20 * random.uniform());
     noise_image(random, 4, 22, 40.0, 2.0).copyTo(line(cv::Rect(column, 4, 4, 22)));
-    look(line);
+    compare(line);
   }
   EXPECT_EQ(taken, 0);
 }

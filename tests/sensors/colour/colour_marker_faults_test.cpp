@@ -253,8 +253,8 @@ TEST(ColourMarkerFaults, NonsenseAfterRestIsNeverRead) {
 }
 
 TEST(ColourMarkerFaults, SettingsOutOfTheirRangesAreNamed) {
-  const auto message = [](const ColourMarkerLook& look) {
-    return message_of([&] { ColourMarkerFinder finder(look); });
+  const auto message = [](const ColourMarkerAppearance& appearance) {
+    return message_of([&] { ColourMarkerFinder finder(appearance); });
   };
   EXPECT_NE(message({.grid = {1, 10}}).find("columns"), std::string::npos);
   EXPECT_NE(message({.grid = {10, 100}}).find("rows"), std::string::npos);

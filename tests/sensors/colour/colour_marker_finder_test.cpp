@@ -79,7 +79,7 @@ TEST(ColourMarkerFinder, FollowsInkThatMovesByMoreThanHalfAMarker) {
     const ColourMarkerReading reading = finder.find(paint_colour_markers(picture));
     ASSERT_EQ(count_flawed(reading), 0) << shift;
     EXPECT_LT(worst_ink_error(picture, reading), 0.15) << shift;
-    // The union of two equal squares has its middle half way between theirs.
+    // The union of two equal squares has its middle midway between theirs.
     for (std::size_t i = 0; i < picture.count(); ++i) {
       const Eigen::Vector2d half = picture.rest(i) + Eigen::Vector2d(0.5 * shift, -0.2 * shift);
       EXPECT_LT((reading.markers[i].centroid_px - half).norm(), 0.2) << i;

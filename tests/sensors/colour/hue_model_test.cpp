@@ -1,4 +1,4 @@
-// Displacements from coloured markers' looks: made by [Lin2019, eq. 4] itself, and painted.
+// Displacements from coloured markers' appearance: made by [Lin2019, eq. 4] itself, and painted.
 
 #include "sensors/colour/hue_model.h"
 
@@ -45,7 +45,7 @@ ColourMarkerReading rest_reading() {
 }
 
 /// What eq. 4 makes of a displacement.
-ColourMarker look_of(const ColourMarker& rest, const Eigen::Vector3d& displacement, const HueLine& line) {
+ColourMarker marker_moved_by(const ColourMarker& rest, const Eigen::Vector3d& displacement, const HueLine& line) {
   ColourMarker seen = rest;
   const double press = -displacement.z();
   const double hue = rest.hue + line.hue_offset + line.hue_slope * press;
@@ -64,7 +64,7 @@ std::vector<HueSample> shear_series(const ColourMarkerReading& rest, const HueLi
     for (double press = 0.5; press <= 2.0; press += 0.25) {
       for (double x = 0.0; x <= 1.0; x += 0.1) {
         const Eigen::Vector3d displacement(x, 0.0, -press);
-        samples.push_back({marker, look_of(rest.markers[marker], displacement, line), displacement, series});
+        samples.push_back({marker, marker_moved_by(rest.markers[marker], displacement, line), displacement, series});
       }
       ++series;
     }
@@ -93,7 +93,7 @@ TEST(HueModel, EquationFiveInvertsItForEveryMarkerOfTheGrid) {
   for (std::size_t i = 0; i < rest.markers.size(); ++i) {
     displacements.emplace_back(0.05 * static_cast<double>(i), 0.4 - 0.05 * static_cast<double>(i),
                                -0.15 * static_cast<double>(i));
-    reading.markers[i] = look_of(rest.markers[i], displacements[i], truth);
+    reading.markers[i] = marker_moved_by(rest.markers[i], displacements[i], truth);
   }
   const HueField field = estimator.estimate(reading);
   EXPECT_EQ(field.field.grid, rest.grid);
@@ -117,7 +117,7 @@ TEST(HueModel, AFreeOffsetIsRecovered) {
 // the stretch of up to 0.1 is taken for up to 3 mm.
 TEST(HueModel, NeighboursTellAStretchFromAPress) {
   const ColourMarkerReading rest = rest_reading();
-  const auto look = [&](double press, double stretch, double x) {
+  const auto sample_of = [&](double press, double stretch, double x) {
     HueSample sample{5, rest.markers[5], {x, 0.0, -press}, 0};
     sample.seen.ink_area_px *= std::exp(press / 30 + stretch);
     sample.seen.ink_centroid_px.x() += kPxPerMm * x;
@@ -125,7 +125,7 @@ TEST(HueModel, NeighboursTellAStretchFromAPress) {
     return sample;
   };
   std::vector<HueSample> samples;
-  for (int i = 0; i < 60; ++i) samples.push_back(look(0.1 * (i % 20), 0.025 * ((7 * i) % 5), 0.1 * (i % 7)));
+  for (int i = 0; i < 60; ++i) samples.push_back(sample_of(0.1 * (i % 20), 0.025 * ((7 * i) % 5), 0.1 * (i % 7)));
   HueCalibrationSettings settings;
   settings.form = {.features = {.hue = false, .centroid = false, .coloured_area = false}, .degree = 1, .ridge = 1e-9};
   EXPECT_GT(calibrate_hue(rest, samples, settings).rms_error_mm, 0.3);
@@ -133,7 +133,7 @@ TEST(HueModel, NeighboursTellAStretchFromAPress) {
   const HueModel model = calibrate_hue(rest, samples, settings);
   EXPECT_LT(model.rms_error_mm, 1e-4);
   const HueEstimator estimator(model, rest);
-  ColourMarker seen = look(1.23, 0.07, 0.4).seen;
+  ColourMarker seen = sample_of(1.23, 0.07, 0.4).seen;
   EXPECT_NEAR(estimator.estimate(5, seen).displacement_mm.z(), -1.23, 1e-4);
   // Without neighbours nothing is said; without enough samples that have them nothing is learned.
   seen.surroundings = {};
@@ -188,14 +188,14 @@ TEST(HueModel, FlawedMarkersAreNotMeasured) {
   EXPECT_THROW(HueEstimator(model, rest).estimate(other), Error);
 }
 
-TEST(HueModel, LooksThatCalibrationDidNotSeeAreSaid) {
+TEST(HueModel, AppearancesThatCalibrationDidNotSeeAreReported) {
   const ColourMarkerReading rest = rest_reading();
   const HueLine truth{.hue_slope = 0.2, .gain_slope = 0.05, .gain = 0.5};
   for (const HueForm form : {HueForm::kEquation4, HueForm::kIsotropic, HueForm::kPolynomial}) {
     const HueModel model = calibrate_hue(rest, shear_series(rest, truth, {5}), {.form = {.form = form}});
     const HueEstimator estimator(model, rest);
     const auto extrapolated = [&](const Eigen::Vector3d& displacement) {
-      return estimator.estimate(2, look_of(rest.markers[2], displacement, truth)).extrapolated;
+      return estimator.estimate(2, marker_moved_by(rest.markers[2], displacement, truth)).extrapolated;
     };
     EXPECT_FALSE(extrapolated({0.6, 0.5, -1.2}));
     EXPECT_FALSE(extrapolated({0.0, -0.9, -1.9}));
@@ -203,7 +203,7 @@ TEST(HueModel, LooksThatCalibrationDidNotSeeAreSaid) {
     EXPECT_TRUE(extrapolated({0.0, 0.0, 0.3}));
     EXPECT_TRUE(extrapolated({1.0, 0.9, -1.0}));
     // Within each range, but no such pair was there: the hue of no press, and a shift that only a shear makes.
-    ColourMarker swollen = look_of(rest.markers[2], {0.5, 0.0, -1.0}, truth);
+    ColourMarker swollen = marker_moved_by(rest.markers[2], {0.5, 0.0, -1.0}, truth);
     swollen.ink_area_px *= 1.4;
     EXPECT_TRUE(estimator.estimate(2, swollen).extrapolated);
   }

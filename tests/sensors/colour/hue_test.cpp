@@ -41,7 +41,7 @@ TEST(Hue, IsAtLeastZeroAndBelowTheWholeCircle) {
   EXPECT_NEAR(hue_of({0.0, -1.0}), 1.5 * kPi, 1e-12);
 }
 
-TEST(Hue, DifferenceGoesTheShortWayRound) {
+TEST(Hue, DifferenceGoesAlongTheShorterArc) {
   EXPECT_NEAR(hue_difference(0.1, 2.0 * kPi - 0.1), 0.2, 1e-12);
   EXPECT_NEAR(hue_difference(2.0 * kPi - 0.1, 0.1), -0.2, 1e-12);
   EXPECT_NEAR(hue_difference(2.0, 1.0), 1.0, 1e-12);

@@ -25,7 +25,7 @@ ColourMarkerReading even_grid() {
 }
 
 // The determinant of what the whole grid is mapped by is what each cell grows by, whichever neighbours tell it.
-TEST(MarkerSurroundings, AnAffineMapsDeterminantIsToldEverywhere) {
+TEST(MarkerSurroundings, AnAffineMapsDeterminantIsFoundEverywhere) {
   const ColourMarkerReading rest = even_grid();
   Eigen::Matrix2d map;
   map << 1.1, 0.2, -0.1, 0.95;
@@ -35,19 +35,19 @@ TEST(MarkerSurroundings, AnAffineMapsDeterminantIsToldEverywhere) {
     marker.ink_area_px *= 1.3;
   }
   seen.markers[12].flaw = MarkerFlaw::kTwoFilters;  // its neighbours make do with the others
-  tell_surroundings(rest, seen);
+  find_surroundings(rest, seen);
   for (std::size_t i = 0; i < seen.markers.size(); ++i) {
-    const MarkerSurroundings& told = seen.markers[i].surroundings;
-    EXPECT_EQ(told.known, i != 12) << i;
-    if (!told.known) continue;
-    EXPECT_NEAR(told.log_cell_area, std::log(map.determinant()), 1e-12) << i;
-    EXPECT_NEAR(told.log_ink_area, std::log(1.3), 1e-12) << i;
+    const MarkerSurroundings& found = seen.markers[i].surroundings;
+    EXPECT_EQ(found.known, i != 12) << i;
+    if (!found.known) continue;
+    EXPECT_NEAR(found.log_cell_area, std::log(map.determinant()), 1e-12) << i;
+    EXPECT_NEAR(found.log_ink_area, std::log(1.3), 1e-12) << i;
   }
 }
 
 TEST(MarkerSurroundings, AtRestNothingHasChanged) {
   ColourMarkerReading rest = even_grid();
-  tell_surroundings(rest, rest);
+  find_surroundings(rest, rest);
   for (const ColourMarker& marker : rest.markers) {
     EXPECT_TRUE(marker.surroundings.known);
     EXPECT_EQ(marker.surroundings.log_cell_area, 0.0);
@@ -55,12 +55,12 @@ TEST(MarkerSurroundings, AtRestNothingHasChanged) {
   }
 }
 
-// The marker's own size isn't among them: it is told apart.
+// The marker's own size isn't among them: it is given separately.
 TEST(MarkerSurroundings, OnlyTheNeighboursSizesCount) {
   const ColourMarkerReading rest = even_grid();
   ColourMarkerReading seen = rest;
   seen.markers[12].ink_area_px *= 2.0;
-  tell_surroundings(rest, seen);
+  find_surroundings(rest, seen);
   EXPECT_EQ(seen.markers[12].surroundings.log_ink_area, 0.0);
   EXPECT_NEAR(seen.markers[13].surroundings.log_ink_area, std::log(2.0) / 4, 1e-12);
 }
@@ -69,12 +69,12 @@ TEST(MarkerSurroundings, WithoutANeighbourAlongBothAxesTheyAreUnknown) {
   ColourMarkerReading rest = even_grid();
   rest.markers[11].flaw = rest.markers[13].flaw = MarkerFlaw::kMissing;
   ColourMarkerReading seen = rest;
-  tell_surroundings(rest, seen);
+  find_surroundings(rest, seen);
   EXPECT_FALSE(seen.markers[12].surroundings.known);
   EXPECT_TRUE(seen.markers[17].surroundings.known);
   // One that was missing at rest doesn't count when it is seen later.
   seen.markers[11].flaw = seen.markers[13].flaw = MarkerFlaw::kNone;
-  tell_surroundings(rest, seen);
+  find_surroundings(rest, seen);
   EXPECT_FALSE(seen.markers[12].surroundings.known);
 }
 
@@ -82,7 +82,7 @@ TEST(MarkerSurroundings, AFoldedCellIsUnknown) {
   const ColourMarkerReading rest = even_grid();
   ColourMarkerReading seen = rest;
   std::swap(seen.markers[11].ink_centroid_px, seen.markers[13].ink_centroid_px);
-  tell_surroundings(rest, seen);
+  find_surroundings(rest, seen);
   EXPECT_FALSE(seen.markers[12].surroundings.known);
 }
 

@@ -139,7 +139,7 @@ TEST_F(Aedat4Events, OneOfSeveralStreamsMustBeChosen) {
   EXPECT_THAT(refusal(file, 1), HasSubstr("no stream 1"));
 }
 
-TEST_F(Aedat4Events, HeadersThatArentReadAreTold) {
+TEST_F(Aedat4Events, HeadersThatArentReadAreReported) {
   EXPECT_THAT(refusal("#!AER-DAT3.1\r\n#Format: RAW\r\n"), AllOf(HasSubstr("#!AER-DAT3.1"), HasSubstr("4.0")));
   EXPECT_THAT(refusal("something else"), HasSubstr("isn't AEDAT"));
   EXPECT_THAT(refusal(kVersion + "ab"), HasSubstr("broken off"));
@@ -155,7 +155,7 @@ TEST_F(Aedat4Events, HeadersThatArentReadAreTold) {
               HasSubstr("70000 x 0"));
 }
 
-TEST_F(Aedat4Events, DamagedPacketsAreTold) {
+TEST_F(Aedat4Events, DamagedPacketsAreReported) {
   const std::string head = header(0, -1, info_);
   const std::string at = "byte " + std::to_string(head.size());
   EXPECT_THAT(refusal(head + "abc"), AllOf(HasSubstr(at), HasSubstr("broken off after 3 bytes")));
@@ -176,7 +176,7 @@ TEST_F(Aedat4Events, DamagedPacketsAreTold) {
               AllOf(HasSubstr("event 2"), HasSubstr("backwards")));
 }
 
-TEST_F(Aedat4Events, DamagedFramesAreTold) {
+TEST_F(Aedat4Events, DamagedFramesAreReported) {
   const std::string frame = lz4(packet_of(kFirst));
   const auto with = [&](int compression, const std::string& content) {
     return refusal(header(compression, -1, info_) + in_stream(0, content));

@@ -97,7 +97,7 @@ TEST_F(DsecEvents, ArraysMustBeThereBeWholeNumbersAndOfOneLength) {
   EXPECT_THAT(refusal(), HasSubstr("/events/t"));
 }
 
-TEST_F(DsecEvents, OtherFilesOfOursAreTold) {
+TEST_F(DsecEvents, OtherFilesOfOursAreReported) {
   const auto write_attributes = [&](const std::string& format, std::int64_t version, std::int64_t width) {
     Hdf5Writer writer(file_);
     writer.set_attribute("format", format);

@@ -97,7 +97,7 @@ TEST_F(Evt3Events, HeadersOfOtherKindsOfCameras) {
   EXPECT_EQ(read("% evt 3.0\n% endianness little\n" + events).events.size(), 1u);
 }
 
-TEST_F(Evt3Events, HeadersThatArentReadAreTold) {
+TEST_F(Evt3Events, HeadersThatArentReadAreReported) {
   EXPECT_THAT(refusal("% evt 2.0\n% end\n"), AllOf(HasSubstr("e.raw:1"), HasSubstr("'2.0'"), HasSubstr("3.0")));
   EXPECT_THAT(refusal("% format EVT21;height=7;width=9\n% end\n"), AllOf(HasSubstr("EVT21"), HasSubstr("EVT3")));
   EXPECT_THAT(refusal("% date today\n% end\n"), HasSubstr("doesn't say its encoding"));
@@ -111,7 +111,7 @@ TEST_F(Evt3Events, HeadersThatArentReadAreTold) {
   EXPECT_THAT(refusal("% evt 3.0\n% touchstone_t_offset_us 5\n"), HasSubstr("multiple"));
 }
 
-TEST_F(Evt3Events, DamagedWordsAreTold) {
+TEST_F(Evt3Events, DamagedWordsAreReported) {
   const std::string head = "% evt 3.0\n% geometry 640x480\n% end\n";
   EXPECT_THAT(refusal(head + words({0x8000, 0x6001}) + "x"), HasSubstr("within a word"));
   EXPECT_THAT(refusal(head + words({0x8000, 0x1234})),

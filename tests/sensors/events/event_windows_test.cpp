@@ -92,7 +92,7 @@ TEST(EventWindows, FaultyEventsAreNamedAndThoseBeforeAreKept) {
   EXPECT_THAT(fault({106, 4, 0, true}), HasSubstr("event 2: its pixel is (4, 0), the camera has 4 x 3"));
   EXPECT_THAT(fault({106, 0, 3, true}), HasSubstr("(0, 3)"));
   EXPECT_THAT(fault({std::numeric_limits<std::int64_t>::max(), 0, 0, true}), HasSubstr("only 10000000 windows"));
-  // Across portions, and after the end was told.
+  // Across portions, and after the end was announced.
   EventWindows counting(kSmall);
   counting.add(std::vector<Event>{{120, 0, 0, true}});
   EXPECT_THAT(message_of([&] { counting.add(std::vector<Event>{{119, 0, 0, true}}); }), HasSubstr("event 1"));

@@ -38,8 +38,8 @@ inline SyntheticGrasp synthetic_grasp(int index, int material, double noise_per_
   for (int window = 0; window < kWindows; ++window) {
     double force = 0.0;
     if (window >= grasp.first_touch && window < grasp.release) {
-      const double way = speed * (window + 1 - grasp.first_touch) / 22.0;
-      force = peak * (1.0 - std::exp(-3.0 * way));
+      const double travel = speed * (window + 1 - grasp.first_touch) / 22.0;
+      force = peak * (1.0 - std::exp(-3.0 * travel));
     } else if (window >= grasp.release) {
       force = peak * std::exp(-0.5 * (window + 1 - grasp.release));
     }

@@ -45,7 +45,7 @@ struct Ball {
 struct Light {
   double elevation_deg = 35.0;
   double fall_off = 0.0;  ///< relative change of a lamp's light from the middle to the side nearest to it
-  double bend_deg = 0.0;  ///< change of its elevation on that way
+  double bend_deg = 0.0;  ///< change of its elevation over that distance
   double level = 1.0;     ///< of all lamps: above 1.4 pictures saturate
   double noise_DN = 1.0;
 };

@@ -29,7 +29,7 @@ TEST(GaussianProcess, OfTwoSamplesIsTheClosedForm) {
   EXPECT_NEAR(process.weights[1], -1.0 / (a - b), 1e-14);
   EXPECT_NEAR(process.log_evidence, -1.0 / (a - b) - 0.5 * std::log(a * a - b * b) - std::log(2.0 * std::numbers::pi),
               1e-13);
-  // Half way between: both samples weigh the same, so the mean is theirs; far away it is the prior's.
+  // Midway between: both samples weigh the same, so the mean is theirs; far away it is the prior's.
   const GaussianProcessPrediction at = predict_with_variance(process, Eigen::Vector2d(0.5, 100.0));
   EXPECT_NEAR(at.mean[0], 5.0, 1e-14);
   EXPECT_NEAR(at.mean[1], 5.0, 1e-14);

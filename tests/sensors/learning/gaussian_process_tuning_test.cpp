@@ -86,9 +86,10 @@ Drawn draw(int count, const GaussianProcessParameters& truth, std::uint64_t seed
   Eigen::MatrixXd covariance(count, count);
   for (int i = 0; i < count; ++i) {
     for (int j = 0; j < count; ++j) {
-      const Eigen::Vector2d way = (drawn.inputs.row(i) - drawn.inputs.row(j)).transpose().cwiseQuotient(truth.lengths);
-      covariance(i, j) =
-          truth.signal * truth.signal * std::exp(-0.5 * way.squaredNorm()) + (i == j ? truth.noise * truth.noise : 0.0);
+      const Eigen::Vector2d offset =
+          (drawn.inputs.row(i) - drawn.inputs.row(j)).transpose().cwiseQuotient(truth.lengths);
+      covariance(i, j) = truth.signal * truth.signal * std::exp(-0.5 * offset.squaredNorm()) +
+                         (i == j ? truth.noise * truth.noise : 0.0);
     }
   }
   const Eigen::MatrixXd factor = covariance.llt().matrixL();

@@ -85,12 +85,12 @@ TEST(LeaveOneOut, FaultyInputIsNamed) {
 TEST(LeaveOneOut, EveryFoldRunsOnceOnAnyNumberOfThreads) {
   for (const int threads : {0, 1, 3, 100}) {
     std::vector<int> runs(48, 0);
-    std::atomic<int> told{0};
+    std::atomic<int> reported{0};
     run_folds(
         48, threads, [&](int fold) { ++runs[static_cast<std::size_t>(fold)]; },
-        [&](const std::string&, std::int64_t, std::int64_t total) { told += total == 48; });
+        [&](const std::string&, std::int64_t, std::int64_t total) { reported += total == 48; });
     EXPECT_THAT(runs, testing::Each(1));
-    EXPECT_EQ(told, 48);
+    EXPECT_EQ(reported, 48);
   }
   run_folds(0, 4, [](int) { FAIL(); });
 }

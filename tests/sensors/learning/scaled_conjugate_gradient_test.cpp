@@ -48,19 +48,19 @@ TEST(ScaledConjugateGradient, FindsTheEndOfRosenbrocksValley) {
   EXPECT_LE(end.gradients, 2 * end.steps + 1);
 }
 
-TEST(ScaledConjugateGradient, EndsWhenItIsToldTo) {
+TEST(ScaledConjugateGradient, EndsWhenItIsAskedTo) {
   const ValueAndGradient bowl = [](const Eigen::VectorXd& x, Eigen::VectorXd& gradient) {
     gradient = Eigen::Vector2d(x[0], 50.0 * x[1]);
     return 0.5 * x.dot(gradient);
   };
   Eigen::VectorXd x = Eigen::Vector2d(1.0, 1.0);
-  Eigen::VectorXd told;
+  Eigen::VectorXd watched;
   const auto end = minimise_by_scaled_conjugate_gradient(bowl, x, {}, [&](int, const Eigen::VectorXd& at, double) {
-    told = at;
+    watched = at;
     return true;
   });
   EXPECT_TRUE(end.was_stopped);
-  EXPECT_EQ(x, told);
+  EXPECT_EQ(x, watched);
   x = Eigen::Vector2d::Zero();
   EXPECT_TRUE(minimise_by_scaled_conjugate_gradient(bowl, x).is_flat);
 }

@@ -142,16 +142,16 @@ TEST_F(Allocation, NoneForMarkersAndSlipAfterTheFirstFrame) {
   IncipientSlipDetector detector;
   cv::Mat contact;
   double sum = 0.0;
-  const auto look = [&](std::size_t i) {
+  const auto update = [&](std::size_t i) {
     const TrackedMarkers& markers = tracker.track(frames[i]);
     sum += motion_ratio(frames[0].image, frames[i > 0 ? i - 1 : 0].image, frames[i].image, {}, &contact).motion_px;
     erase_markers(contact, markers, 4.0);
     contact(cv::Rect(100, 60, 120, 120)).setTo(255);
-    sum += detector.look(markers, contact_patch(contact, 50)).motion_px;
+    sum += detector.update(markers, contact_patch(contact, 50)).motion_px;
   };
-  look(0);
+  update(0);
   const long before = allocations;
-  for (std::size_t i = 1; i < frames.size(); ++i) look(i);
+  for (std::size_t i = 1; i < frames.size(); ++i) update(i);
   EXPECT_EQ(allocations, before);
   EXPECT_GT(sum, 0.0);
 }

@@ -140,11 +140,11 @@ TEST(IncipientSlip, StickingMotionHasNoLag) {
   for (int frame = 0; frame < 40; ++frame) {
     const Eigen::Vector2d shift(frame < 30 ? 0.6 : 0.0, 0.3);
     centre += shift;
-    const IncipientSlip& slip = detector.look(field.step([&](const Eigen::Vector2d& place) {
+    const IncipientSlip& slip = detector.update(field.step([&](const Eigen::Vector2d& place) {
       const Eigen::Vector2d from = place - kCentre;
       return Eigen::Vector2d(shift + 0.004 * Eigen::Vector2d(-from.y(), from.x()) + 0.002 * from);
     }),
-                                              round_patch(centre, kRadius));
+                                                round_patch(centre, kRadius));
     EXPECT_EQ(slip.state, SlipState::kSticking) << "frame " << frame;
     if (slip.lag) {
       EXPECT_LT(std::abs(*slip.lag), 4.0 * slip.lag_error + 0.02) << "frame " << frame;
@@ -160,10 +160,10 @@ TEST(IncipientSlip, LagGrowsAsTheStickZoneShrinks) {
     field.noise_px = 0.0;
     IncipientSlip slip;
     for (int frame = 0; frame < 5; ++frame) {  // object and patch go by a pixel a frame, with what sticks
-      slip = detector.look(field.step([&](const Eigen::Vector2d& place) {
+      slip = detector.update(field.step([&](const Eigen::Vector2d& place) {
         return Eigen::Vector2d(part_carried((place - kCentre).norm(), stick * kRadius), 0.0);
       }),
-                           round_patch(kCentre + Eigen::Vector2d(frame + 1, 0), kRadius));
+                             round_patch(kCentre + Eigen::Vector2d(frame + 1, 0), kRadius));
     }
     ASSERT_TRUE(slip.lag);
     EXPECT_GT(*slip.lag, before) << "stick zone of " << stick;
@@ -196,10 +196,10 @@ TEST(IncipientSlip, IsFoundBeforeTheMiddleSlips) {
       const double step = moved(next) - moved(load);
       const double stick = std::cbrt(1.0 - load) * kRadius;
       centre.x() += frame < kGross ? step : 1.0;
-      const IncipientSlip& slip = detector.look(field.step([&](const Eigen::Vector2d& place) {
+      const IncipientSlip& slip = detector.update(field.step([&](const Eigen::Vector2d& place) {
         return Eigen::Vector2d(step * part_carried((place - kCentre).norm(), std::max(stick, 1e-9)), 0.0);
       }),
-                                                round_patch(centre, kRadius));
+                                                  round_patch(centre, kRadius));
       if (found < 0 && slip.state != SlipState::kSticking) found = frame;
     }
     EXPECT_GT(found, kGross / 3) << "seed " << seed;
@@ -216,7 +216,7 @@ TEST(IncipientSlip, AFlatPunchThatSlidesAtOnceIsSeenSliding) {
   for (int frame = 0; frame < 40; ++frame) {
     const double step = frame < 20 ? 0.8 : 0.0;
     centre.x() += 0.8;
-    const IncipientSlip& slip = detector.look(
+    const IncipientSlip& slip = detector.update(
         field.step([&](const Eigen::Vector2d&) { return Eigen::Vector2d(step, 0.0); }), round_patch(centre, kRadius));
     if (found < 0 && slip.state != SlipState::kSticking) {
       found = frame;
@@ -241,10 +241,10 @@ TEST(IncipientSlip, PressingHoldingAndRollingInAreNoSlip) {
     } else if (frame >= 40) {  // rolling: the dent goes on, no marker is carried along
       centre.x() += 2.0;
     }
-    const IncipientSlip& slip = detector.look(field.step([&](const Eigen::Vector2d& place) {
+    const IncipientSlip& slip = detector.update(field.step([&](const Eigen::Vector2d& place) {
       return Eigen::Vector2d(swelling * (place - centre) - swelling_before * (place - centre_before));
     }),
-                                              round_patch(centre, radius));
+                                                round_patch(centre, radius));
     EXPECT_EQ(slip.state, SlipState::kSticking)
         << "frame " << frame << " slide " << slip.slide_px << " shear " << slip.shear_px;
     centre_before = centre;
@@ -256,16 +256,16 @@ TEST(IncipientSlip, WithoutContactAllIsForgotten) {
   IncipientSlipDetector detector(kWholePatch);
   Field field;
   const auto motion = [](const Eigen::Vector2d&) { return Eigen::Vector2d(1.0, 0.0); };
-  EXPECT_EQ(detector.look(field.step(motion), std::nullopt).state, SlipState::kNoContact);
-  EXPECT_FALSE(detector.look(field.step(motion), round_patch(kCentre, kRadius)).lag);  // nothing to compare with
-  EXPECT_TRUE(detector.look(field.step(motion), round_patch(kCentre, kRadius)).lag);
+  EXPECT_EQ(detector.update(field.step(motion), std::nullopt).state, SlipState::kNoContact);
+  EXPECT_FALSE(detector.update(field.step(motion), round_patch(kCentre, kRadius)).lag);  // nothing to compare with
+  EXPECT_TRUE(detector.update(field.step(motion), round_patch(kCentre, kRadius)).lag);
   field.markers.jumped = true;
-  EXPECT_FALSE(detector.look(field.step(motion), round_patch(kCentre, kRadius)).lag);
+  EXPECT_FALSE(detector.update(field.step(motion), round_patch(kCentre, kRadius)).lag);
   field.markers.jumped = false;
-  EXPECT_FALSE(detector.look(field.step(motion), round_patch(kCentre, kRadius)).lag);
-  EXPECT_TRUE(detector.look(field.step(motion), round_patch(kCentre, kRadius)).lag);
+  EXPECT_FALSE(detector.update(field.step(motion), round_patch(kCentre, kRadius)).lag);
+  EXPECT_TRUE(detector.update(field.step(motion), round_patch(kCentre, kRadius)).lag);
   Field others(30.0);  // another gel
-  EXPECT_FALSE(detector.look(others.step(motion), round_patch(kCentre, kRadius)).lag);
+  EXPECT_FALSE(detector.update(others.step(motion), round_patch(kCentre, kRadius)).lag);
 }
 
 TEST(IncipientSlip, TooFewMarkersGiveNoLag) {
@@ -273,7 +273,7 @@ TEST(IncipientSlip, TooFewMarkersGiveNoLag) {
   Field field;
   for (int frame = 0; frame < 5; ++frame) {
     const auto& markers = field.step([](const Eigen::Vector2d&) { return Eigen::Vector2d(1.0, 0.0); });
-    const IncipientSlip& slip = detector.look(markers, round_patch(kCentre, 25.0));
+    const IncipientSlip& slip = detector.update(markers, round_patch(kCentre, 25.0));
     EXPECT_LT(slip.markers, 8);
     EXPECT_FALSE(slip.lag);
     EXPECT_EQ(slip.state, SlipState::kSticking);
@@ -281,7 +281,7 @@ TEST(IncipientSlip, TooFewMarkersGiveNoLag) {
 }
 
 TEST(IncipientSlip, IsFoundInPictures) {
-  // The whole way: pictures, tracker, patch, detector, with noise.
+  // The whole chain: pictures, tracker, patch, detector, with noise.
   fixtures::MarkerPicture picture;
   picture.noise = 2.0;
   const auto rest = fixtures::marker_grid();
@@ -294,7 +294,7 @@ TEST(IncipientSlip, IsFoundInPictures) {
         tracker.track({fixtures::paint_markers(picture, places, static_cast<std::uint64_t>(1 + frame)), frame});
     cv::Mat mask = disc(kCentre + Eigen::Vector2d(0.8 * frame, 0.0), kRadius);
     erase_markers(mask, markers, 5.0);
-    states.push_back(detector.look(markers, contact_patch(mask, 100)).state);
+    states.push_back(detector.update(markers, contact_patch(mask, 100)).state);
     const double stick = frame < 6 ? kRadius : 0.3 * kRadius;
     for (std::size_t i = 0; i < rest.size(); ++i) {
       places[i].x() += 0.8 * part_carried((rest[i] - kCentre).norm(), stick);

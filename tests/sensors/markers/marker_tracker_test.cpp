@@ -260,11 +260,11 @@ TEST(MarkerTracker, BadInputIsRefusedAndChangesNothing) {
     change(settings);
     EXPECT_THROW(MarkerTracker{settings}, Error);
   };
-  refuses([](auto& s) { s.look.diameter_px = 1.0; });
-  refuses([](auto& s) { s.look.spacing_px = 5.0; });
-  refuses([](auto& s) { s.look.darkness = std::nan(""); });
-  refuses([](auto& s) { s.look.least_difference = -1.0; });
-  refuses([](auto& s) { s.look.least_area = 2.0; });
+  refuses([](auto& s) { s.appearance.diameter_px = 1.0; });
+  refuses([](auto& s) { s.appearance.spacing_px = 5.0; });
+  refuses([](auto& s) { s.appearance.darkness = std::nan(""); });
+  refuses([](auto& s) { s.appearance.least_difference = -1.0; });
+  refuses([](auto& s) { s.appearance.least_area = 2.0; });
   refuses([](auto& s) { s.longest_step = 0.6; });
   refuses([](auto& s) { s.max_area_change = 1.0; });
 }

@@ -1,4 +1,4 @@
-// The whole chain on pictures made by formulas: a ball's imprint, with markers that go where they are told.
+// The whole chain on pictures made by formulas: a ball's imprint, with markers that go where the test moves them.
 
 #include "sensors/markers/touch_reader.h"
 

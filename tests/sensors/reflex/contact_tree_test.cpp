@@ -186,7 +186,7 @@ TEST(ContactTree, WhatIsWrongIsNamed) {
   EXPECT_THAT(fault_of(tree), HasSubstr("node 3 leads to node 7"));
   tree = {};
   tree.nodes = {{ChipFeature::maximum, 37.0, 1, 1, false}, {}};  // of sixty such nodes, rule_of would never end
-  EXPECT_THAT(fault_of(tree), HasSubstr("two ways lead to node 1"));
+  EXPECT_THAT(fault_of(tree), HasSubstr("two paths lead to node 1"));
   tree.nodes.clear();
   for (int i = 0; i <= kDeepestContactTree; ++i) {
     tree.nodes.push_back({ChipFeature::maximum, 37.0, 2 * i + 2, 2 * i + 1, false});

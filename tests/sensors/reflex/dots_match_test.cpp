@@ -23,7 +23,7 @@ double error_px(const DotsMotion& found, const DotsMotion& truth) {
   return std::abs(found.dilation - truth.dilation) * kHalf_px + (found.shift_px - truth.shift_px).norm();
 }
 
-/// A motion whose dots go up to `reach_px` far, each of the three ways.
+/// A motion whose dots go up to `reach_px` far, in each of the three kinds.
 DotsMotion some_motion(std::uint64_t index, double reach_px) {
   RandomStream random(7, index, Purpose::kTest);
   const auto step = [&] { return reach_px * (2.0 * random.uniform() - 1.0); };
@@ -63,7 +63,8 @@ TEST(DotsMatch, APictureIsItsOwn) {
 }
 
 TEST(DotsMatch, RecoversMotionsFromNoisyCoarsePictures) {
-  // Six bits, noise of half a step and more. From rest up to 1 px at the edge each way: the root mean square of errors.
+  // Six bits, noise of half a step and more. From rest up to 1 px at the edge in each direction: the root mean square
+  // of errors.
   for (const double gain : {1.0, 1.4}) {
     double squares = 0.0;
     constexpr int kTrials = 60;

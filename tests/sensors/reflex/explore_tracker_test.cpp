@@ -180,8 +180,8 @@ TEST(ExploreTracker, PixelTimesTakeOutTheSkewOfAMovingSkin) {
   const double interval_s = 324.0 / 1500.0, middle_s = 0.5 * 323.0 / 1500.0;
   const FingertipPainter painter{.noise = 0.3};
   const auto motion_at = [](double t) {
-    const double way = std::fmod(4.0 * t, 10.0);
-    const double press_mm = std::min(way, 10.0 - way);
+    const double travel = std::fmod(4.0 * t, 10.0);
+    const double press_mm = std::min(travel, 10.0 - travel);
     return DotsMotion{dilation_of(press_mm), {0.2 * press_mm, 0.1 * press_mm}};
   };
   double squares[2] = {0.0, 0.0};

@@ -64,7 +64,7 @@ struct Camera {
   double noise_mm = 0.002;
 };
 
-/// What a touch sees whose frame lies on the surface as told.
+/// What a touch sees whose frame lies on the surface as given.
 inline TouchImage touch_of(const Surface& surface, const PlanarPose& surface_from_touch, std::uint64_t seed,
                            const Camera& camera = {}) {
   RandomStream random(seed, 1, Purpose::kTest);

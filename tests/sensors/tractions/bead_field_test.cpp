@@ -49,7 +49,7 @@ TEST_F(BeadsInView, ScaleTurnAndOriginAreThoseOfThePicture) {
   }
 }
 
-TEST_F(BeadsInView, MotionsAreToldInTheGelsAxes) {
+TEST_F(BeadsInView, MotionsAreGivenInTheGelsAxes) {
   const auto rest = pictured(0.2);
   const BeadView view = view_of(rest, map_);
   auto moved = rest;

@@ -65,19 +65,19 @@ struct Scene {
   }
 };
 
-FrictionState look(FrictionObserver& observer, const Scene& scene) {
-  return observer.look(scene.field(), scene.tractions());
+FrictionState update(FrictionObserver& observer, const Scene& scene) {
+  return observer.update(scene.field(), scene.tractions());
 }
 
 TEST(Friction, AnObjectThatCarriesAllMarkersSticks) {
   FrictionObserver observer;
   Scene scene;
-  EXPECT_EQ(look(observer, scene).state, ContactSlip::kUnknown) << "nothing has moved";
+  EXPECT_EQ(update(observer, scene).state, ContactSlip::kUnknown) << "nothing has moved";
   FrictionState state;
   for (int k = 1; k <= 8; ++k) {
     scene.move_all(0.1);
     scene.load_all(0.05 * k);
-    state = look(observer, scene);
+    state = update(observer, scene);
   }
   EXPECT_EQ(state.state, ContactSlip::kSticking);
   EXPECT_FALSE(state.friction.has_value()) << "only that it's above 0.4 is known";
@@ -91,7 +91,7 @@ TEST(Friction, AnObjectThatCarriesAllMarkersSticks) {
 TEST(Friction, ARimThatLagsSlipsAndTellsTheFriction) {
   FrictionObserver observer;
   Scene scene;
-  look(observer, scene);
+  update(observer, scene);
   FrictionState state;
   for (int k = 1; k <= 8; ++k) {
     for (int m = 0; m < kMarkers; ++m) {
@@ -99,7 +99,7 @@ TEST(Friction, ARimThatLagsSlipsAndTellsTheFriction) {
       scene.moved[static_cast<std::size_t>(m)] += Scene::is_rim(m) ? 0.04 : 0.1;
       scene.ratio[static_cast<std::size_t>(m)] = Scene::is_rim(m) ? 0.6 : 0.03 * k;
     }
-    state = look(observer, scene);
+    state = update(observer, scene);
   }
   EXPECT_EQ(state.state, ContactSlip::kPartial);
   ASSERT_TRUE(state.friction.has_value());
@@ -121,12 +121,12 @@ TEST(Friction, AContactThatMovesOverItsMarkersSlides) {
   for (int k = 0; k <= 6; ++k) {
     scene.move_all(0.1);
     scene.load_all(0.1 * k);
-    state = look(observer, scene);
+    state = update(observer, scene);
   }
   scene.load_all(0.7);
   for (int k = 0; k < 12; ++k) {
     scene.centre += 0.1;
-    state = look(observer, scene);
+    state = update(observer, scene);
   }
   EXPECT_EQ(state.state, ContactSlip::kSliding);
   EXPECT_GE(state.slide_mm, 0.4);
@@ -136,7 +136,7 @@ TEST(Friction, AContactThatMovesOverItsMarkersSlides) {
   EXPECT_EQ(state.markers[24].state, MarkerSlip::kSlip);
   // Stopped and held, with less shear: what was read of friction stays known.
   scene.load_all(0.3);
-  for (int k = 0; k < 30; ++k) state = look(observer, scene);
+  for (int k = 0; k < 30; ++k) state = update(observer, scene);
   EXPECT_NEAR(state.friction->value, 0.7, 0.01);
   EXPECT_EQ(state.state, ContactSlip::kSticking);
   EXPECT_EQ(state.markers[24].state, MarkerSlip::kUnknown);
@@ -149,7 +149,7 @@ TEST(Friction, AContactThatGoesAgainstTheShearDoesntSlide) {
   FrictionState state;
   for (int k = 0; k < 14; ++k) {
     scene.centre -= 0.1;
-    state = look(observer, scene);
+    state = update(observer, scene);
     EXPECT_NE(state.state, ContactSlip::kSliding);
   }
 }
@@ -160,7 +160,7 @@ TEST(Friction, WhileShearGrowsItIsNoSliding) {
   for (int k = 1; k < 14; ++k) {
     scene.centre += 0.1;
     scene.load_all(0.05 * k);
-    EXPECT_NE(look(observer, scene).state, ContactSlip::kSliding) << k;
+    EXPECT_NE(update(observer, scene).state, ContactSlip::kSliding) << k;
   }
 }
 
@@ -170,14 +170,14 @@ TEST(Friction, LosingContactForgets) {
   scene.load_all(0.5);
   for (int k = 0; k < 14; ++k) {
     scene.centre += 0.1;
-    look(observer, scene);
+    update(observer, scene);
   }
   TractionField none = scene.tractions();
   none.in_contact = false;
-  const FrictionState& state = observer.look(scene.field(), none);
+  const FrictionState& state = observer.update(scene.field(), none);
   EXPECT_EQ(state.state, ContactSlip::kNoContact);
   EXPECT_FALSE(state.friction.has_value());
-  EXPECT_EQ(look(observer, scene).state, ContactSlip::kUnknown);
+  EXPECT_EQ(update(observer, scene).state, ContactSlip::kUnknown);
 }
 
 TEST(Friction, MarkersAtTheContactsRimStayUnknown) {
@@ -189,7 +189,7 @@ TEST(Friction, MarkersAtTheContactsRimStayUnknown) {
     scene.load_all(0.2);
     TractionField tractions = scene.tractions();
     tractions.markers[8].contact = 0.5;
-    state = observer.look(scene.field(), tractions);
+    state = observer.update(scene.field(), tractions);
   }
   EXPECT_EQ(state.markers[8].state, MarkerSlip::kUnknown);
   EXPECT_EQ(state.markers[9].state, MarkerSlip::kStick);
@@ -200,10 +200,10 @@ TEST(Friction, BadInputIsRefused) {
   const Scene scene;
   MarkerField field = scene.field();
   field.measured.pop_back();
-  EXPECT_THAT([&] { observer.look(field, scene.tractions()); }, ThrowsMessage<Error>(HasSubstr("49 markers")));
+  EXPECT_THAT([&] { observer.update(field, scene.tractions()); }, ThrowsMessage<Error>(HasSubstr("49 markers")));
   TractionField fewer = scene.tractions();
   fewer.markers.pop_back();
-  EXPECT_THAT([&] { observer.look(scene.field(), fewer); }, ThrowsMessage<Error>(HasSubstr("tractions are of 48")));
+  EXPECT_THAT([&] { observer.update(scene.field(), fewer); }, ThrowsMessage<Error>(HasSubstr("tractions are of 48")));
   const auto with = [](auto&& change) {
     FrictionSettings settings;
     change(settings);

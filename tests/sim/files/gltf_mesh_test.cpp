@@ -63,7 +63,7 @@ struct Cube {
           std::array<float, 3> p{};
           p[axis] = side;
           p[(axis + 1) % 3] = u;
-          p[(axis + 2) % 3] = v * side;  // turns the face over where it must look the other way
+          p[(axis + 2) % 3] = v * side;  // turns the face over where it must face the other side
           vertices.push_back(p);
         }
         for (const int corner : {0, 1, 2, 0, 2, 3}) indices.push_back(static_cast<std::uint16_t>(base + corner));
@@ -225,7 +225,7 @@ TEST_F(GltfMesh, OpenOrTwistedSurfacesAreRefused) {
   expect_refused(inside_out.embedded(), "inside out");
   Cube one = cube_;
   std::swap(one.indices[0], one.indices[1]);
-  expect_refused(one.embedded(), "face opposite ways");
+  expect_refused(one.embedded(), "have opposite orientations");
   expect_refused(cube_.embedded(R"([{"mesh": 0, "scale": [1, 0, 1]}])"), "isn't a closed solid");
 }
 

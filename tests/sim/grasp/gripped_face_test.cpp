@@ -227,7 +227,7 @@ TEST(GrippedFace, ApartTheGapIsWhatTheFingerIsAway) {
               1e-3);
 }
 
-TEST(GrippedFace, ForceRisesWithTravelAndTheWayBackIsTheSame) {
+TEST(GrippedFace, ForceRisesWithTravelAndUnloadingIsTheSame) {
   const GrippedFace face = face_of(0.5, pitched(0.1));
   double last = 0.0;
   for (int k = 1; k < 60; ++k) {

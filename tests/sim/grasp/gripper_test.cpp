@@ -87,7 +87,7 @@ TEST(ArmLift, RisesByItsHeightAndStands) {
   }
 }
 
-TEST(ArmLift, StopsWhereItIsToldToLiftNoLonger) {
+TEST(ArmLift, StopsWhereItIsNoLongerCommandedToLift) {
   ArmLift arm({20, 20, 100});
   EXPECT_EQ(arm.next(false, 0.1), 0.0);  // not begun: nothing to stop
   for (int k = 0; k < 5; ++k) arm.next(true, 0.1);
@@ -158,7 +158,7 @@ TEST(Gripper, WithoutATableItFallsAsFrictionLetsIt) {
   const GraspedBody body = ball(mass_for(normal, share));
   Gripper gripper(gel(), body, settings());
   close_to(gripper, 0.4);
-  gripper.take_table_away();
+  gripper.remove_table();
   gripper.advance(0.0, 0.0, 1e-6);  // the gel is sheared until all slips
   ASSERT_TRUE(gripper.state().slipping);
   const double begin = gripper.state().sunk_mm;
@@ -178,8 +178,8 @@ TEST(Gripper, WithoutATableItFallsAsFrictionLetsIt) {
   EXPECT_NEAR(speed, expected_speed, 5e-3 * expected_speed);
   EXPECT_NEAR(gripper.state().normal_force_N, normal, 0.1 * normal);  // a ball that slides bears less towards the rim
   // What gravity gave went into motion and friction.
-  const double way = gripper.state().sunk_mm - begin;
-  const double given = mass * kGravity_mm_s2 * way;
+  const double travel = gripper.state().sunk_mm - begin;
+  const double given = mass * kGravity_mm_s2 * travel;
   EXPECT_NEAR(0.5 * mass * speed * speed + friction_work, given, 1e-6 * given);
 }
 
@@ -188,7 +188,7 @@ TEST(Gripper, ItFallsOutAndThenTheGelIsBare) {
   s.drop_mm = 3.0;
   Gripper gripper(gel(), ball(mass_for(force_at(0.3), 0.5)), s);
   close_to(gripper, 0.3);
-  gripper.take_table_away();
+  gripper.remove_table();
   for (int frame = 0; frame < 5 && !gripper.state().dropped; ++frame) gripper.advance(0.0, 0.0, kFrame_s);
   EXPECT_TRUE(gripper.state().dropped);
   EXPECT_EQ(gripper.state().normal_force_N, 0.0);
@@ -209,7 +209,7 @@ TEST(Gripper, ClosingFurtherCatchesWhatSlides) {
   GripperSettings s = settings();
   Gripper gripper(gel(), ball(mass_for(force_at(0.4), 0.8)), s);
   close_to(gripper, 0.4);
-  gripper.take_table_away();
+  gripper.remove_table();
   gripper.advance(0.0, 0.0, 0.02);
   EXPECT_TRUE(gripper.state().slipping);
   EXPECT_GT(gripper.state().sliding_speed_mm_s, 0.0);
@@ -229,7 +229,7 @@ TEST(Gripper, HalfTheStepMovesTheAnswerLittleAndAQuarterLess) {
     s.slide_step_s = slide_step;
     Gripper gripper(gel(), ball(mass), s);
     close_to(gripper, 0.4);
-    gripper.take_table_away();
+    gripper.remove_table();
     gripper.advance(0.0, 0.0, 0.02);
     gripper.advance(0.2, 0.0, 0.04);  // brakes it
     return gripper.state().sunk_mm;
@@ -264,7 +264,7 @@ TEST(Gripper, ForceBeyondWhatTheObjectBearsCrushesIt) {
   gripper.advance(0.1, 0.0, kFrame_s);
   EXPECT_TRUE(gripper.state().crushed);
   gripper.advance(-0.3, 0.0, kFrame_s);
-  EXPECT_TRUE(gripper.state().crushed);  // that doesn't mend
+  EXPECT_TRUE(gripper.state().crushed);  // that stays so
 }
 
 TEST(Gripper, RefusesWhatMakesNoSense) {

@@ -70,7 +70,7 @@ TEST(HysteresisLoop, LoopsAreClosedAndForgetWhatWasInThem) {
   go(with, 0.0, 2.0);
   const double there = go(without, 0.0, 2.0);
   const double low = go(with, 2.0, 1.0);
-  EXPECT_GT(low, 1.0 * there / 2.0) << "on the way back it tells more";
+  EXPECT_GT(low, 1.0 * there / 2.0) << "on unloading it reads more";
   EXPECT_NEAR(go(with, 1.0, 2.0), there, 1e-12) << "an inner loop closes";
   EXPECT_NEAR(go(with, 2.0, 3.0), go(without, 2.0, 3.0), 1e-12) << "and leaves nothing behind";
   HysteresisLoop none(0.0, 3.7);

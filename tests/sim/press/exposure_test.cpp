@@ -97,7 +97,7 @@ TEST(MotionBlur, PointImagesAreAsWideAsHoleAndPixelMakeThem) {
   EXPECT_NEAR(ImageScale(device).point_width(), std::sqrt(13.0), 1e-9);
 }
 
-TEST(MotionBlur, MovesTheMeanByHalfTheWayAndAddsATwelfthOfItsSquare) {
+TEST(MotionBlur, MovesTheMeanByHalfTheTravelAndAddsATwelfthOfItsSquare) {
   const SceneSpec scene = passing_bar();
   const Films blurred = film(scene, 1);
   EXPECT_TRUE(blurred.plan.motion_blur);
@@ -120,14 +120,14 @@ TEST(MotionBlur, MovesTheMeanByHalfTheWayAndAddsATwelfthOfItsSquare) {
     at.emplace_back(green_of(camera.capture_whole(truth)));
     own_variance += at.back().variance / kPictures;
   }
-  const double way = at.back().mean - at.front().mean;
-  EXPECT_GT(way, 1.0);
+  const double travel = at.back().mean - at.front().mean;
+  EXPECT_GT(travel, 1.0);
   const Moments with_blur(blurred.pictures[0]);
   EXPECT_NEAR(with_blur.sum / at.front().sum, 1.0, 0.01);
-  EXPECT_NEAR(with_blur.mean - at.front().mean, way / 2, 0.02 * way);
+  EXPECT_NEAR(with_blur.mean - at.front().mean, travel / 2, 0.02 * travel);
   // Between moments light runs straight, which blurs by a sixth of their distance's square more.
-  const double step = way / static_cast<double>(moments.size() - 1);
-  const double expected = way * way / 12 + step * step / 6;
+  const double step = travel / static_cast<double>(moments.size() - 1);
+  const double expected = travel * travel / 12 + step * step / 6;
   EXPECT_NEAR(with_blur.variance - own_variance, expected, 0.1 * expected);
 }
 
@@ -182,10 +182,10 @@ TEST(ImageMotion, ABarMovesAsFarAsItsPicture) {
   const Films sharp = film(scene, 2);
   const double seen = Moments(sharp.pictures[1]).mean - Moments(sharp.pictures[0]).mean;
   const ImageScale scale(scene.device);
-  const double told = image_motion(scale, sharp.truths[0].press, sharp.truths[1].press, largest_object_radius(scene));
-  EXPECT_GE(told, seen) << "an estimate from above";
-  EXPECT_LT(told, 1.2 * seen);
-  EXPECT_NEAR(motion_speed(scene).pixels_per_s, 100.0 * told, 1e-6 * told);
+  const double bound = image_motion(scale, sharp.truths[0].press, sharp.truths[1].press, largest_object_radius(scene));
+  EXPECT_GE(bound, seen) << "an estimate from above";
+  EXPECT_LT(bound, 1.2 * seen);
+  EXPECT_NEAR(motion_speed(scene).pixels_per_s, 100.0 * bound, 1e-6 * bound);
 }
 
 TEST(StateBetween, IsNearWhatIsPlayedThere) {
@@ -195,8 +195,8 @@ TEST(StateBetween, IsNearWhatIsPlayedThere) {
   Plan plan = make_plan(scene);
   constexpr int kFiner = 4;
   const int kept = plan.states_a_frame;
-  const double way = 0.05 / kept;  // of the ball from one kept state to the next
-  EXPECT_LE(way, 0.02);
+  const double travel = 0.05 / kept;  // of the ball from one kept state to the next
+  EXPECT_LE(travel, 0.02);
   plan.states_a_frame *= kFiner;
   std::vector<fem::PressState> states;
   play_states(scene, plan, *moving_gel(), nullptr, {},
@@ -212,8 +212,8 @@ TEST(StateBetween, IsNearWhatIsPlayedThere) {
     }
   }
   // A vertex that is met in between stands still first and then goes with the ball, which a straight line misses by at
-  // most a quarter of the way; the projection on hat functions, which the displacement is, overshoots that.
-  EXPECT_LT(worst, way / 2);
+  // most a quarter of the motion; the projection on hat functions, which the displacement is, overshoots that.
+  EXPECT_LT(worst, travel / 2);
   EXPECT_GT(worst, 0.0);
 }
 

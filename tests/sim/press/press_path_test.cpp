@@ -92,7 +92,7 @@ TEST(PressPath, BetweenTwoStatesAllRunsStraight) {
             1e-12);
   EXPECT_NEAR(middle.wrench[2], 0.5 * (played.states[1].wrench[2] + played.states[2].wrench[2]), 1e-12);
   EXPECT_NE(message_of([&] { played.state(1.1); }).find("goes from 0 to 1"), std::string::npos);
-  EXPECT_NE(message_of([&] { played.state(std::nan("")); }).find("isn't on the way"), std::string::npos);
+  EXPECT_NE(message_of([&] { played.state(std::nan("")); }).find("isn't on the path"), std::string::npos);
   EXPECT_NE(message_of([&] { PlayedPath{}.state(0.0); }).find("has no states"), std::string::npos);
 }
 
@@ -185,7 +185,7 @@ TEST(PressPath, ADamagedCacheIsntUsed) {
     const PlayedPath anew = player.play(path);
     EXPECT_NE(anew.note.find(why), std::string::npos) << anew.note;
     expect_equal(anew.states.at(0), played.states.at(0));
-    EXPECT_EQ(player.play(path).note, "") << "it was mended";
+    EXPECT_EQ(player.play(path).note, "") << "it was repaired";
   }
   std::filesystem::remove_all(folder.path());
   std::ofstream(folder.path()) << "a file where the folder was";
@@ -295,7 +295,7 @@ TEST(RelaxingForce, RelaxesAsTheSeriesAndNeverPulls) {
   EXPECT_THROW(RelaxingForce(quadratic(), {{1.2, 1.0}}), Error);
 }
 
-/// It is fem::FinitePress's own: the same law, the same series, the same way.
+/// It is fem::FinitePress's own: the same law, the same series, the same path.
 TEST(RelaxingForce, IsTheForceOfAPressThatRelaxes) {
   const auto gel = set_up_finite_gel(device());
   const fem::PronySeries series = {{0.3, 0.5}};

@@ -213,10 +213,10 @@ TEST(PrintOfAnObject, IsOnTheWettedSheetOfAFineRelief) {
   const test::TemporaryFolder cache;
   const auto gel = set_up_gel(spec.device, cache.path());
   const fem::PressState press = play_motion(spec, plan, *gel).back().press;
-  const SceneView sight(spec, plan, *gel);
-  const auto relief = sight.relief(press);
+  const SceneView view(spec, plan, *gel);
+  const auto relief = view.relief(press);
   ASSERT_TRUE(relief);
-  const render::Scene scene = sight.seen(press, relief);
+  const render::Scene scene = view.seen(press, relief);
   const render::Surface& wet = scene.surfaces.back();
   ASSERT_FALSE(wet.mesh.triangles.empty());
   ASSERT_TRUE(wet.print && scene.surfaces.at(2).print);

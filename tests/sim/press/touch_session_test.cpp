@@ -100,7 +100,7 @@ TEST(TouchSession, AContactSticksThenSlipsInPartThenSlidesAtItsFriction) {
       << "less than all of it, since not every vertex slides in quite the same direction";
 }
 
-TEST(TouchSession, AResultDependsOnTheWay) {
+TEST(TouchSession, AResultDependsOnThePath) {
   TouchSession dragged = session(), direct = session();
   for (const RigidTransform& pose : {at(-0.2, 0, 1.6), at(0, 0, 1.6)}) dragged.step(pose, 0.01);
   direct.step(at(0, 0, 1.6), 0.01);

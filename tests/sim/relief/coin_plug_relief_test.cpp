@@ -32,8 +32,8 @@ TEST(CoinRelief, HasItsRimAllRoundAndNothingBeyond) {
        {std::tuple("coin-penny", 9.525, 0.15), std::tuple("coin-quarter", 12.13, 0.17)}) {
     const fem::ReliefMap map = shipped(name);
     for (int i = 0; i < 36; ++i) {
-      const Eigen::Vector2d way(std::cos(i * kPi / 18), std::sin(i * kPi / 18));
-      const Eigen::Vector2d crest = (radius - 0.4) * way, outside = (radius + 0.1) * way;
+      const Eigen::Vector2d direction(std::cos(i * kPi / 18), std::sin(i * kPi / 18));
+      const Eigen::Vector2d crest = (radius - 0.4) * direction, outside = (radius + 0.1) * direction;
       EXPECT_NEAR(map.at(crest.x(), crest.y()), rim, 0.02 * rim) << name;
       EXPECT_EQ(map.at(outside.x(), outside.y()), 0.0) << name;
     }

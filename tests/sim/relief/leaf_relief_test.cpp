@@ -25,7 +25,7 @@ TEST(LeafRelief, TheMidribRunsAlongX) {
   const fem::ReliefMap map = relief_map(leaf());
   for (double x = -29.0; x < 29.0; x += 1.7) {
     EXPECT_NEAR(map.at(x, 0.0), 0.5, 0.01);
-    EXPECT_NEAR(map.at(x, 0.3), 0.25, 0.01);  // half-way up its side, where no side vein is higher
+    EXPECT_NEAR(map.at(x, 0.3), 0.25, 0.01);  // at half the height of its side, where no side vein is higher
   }
   EXPECT_NEAR(map.highest(), 0.5, 0.01);
 }
@@ -38,7 +38,7 @@ TEST(LeafRelief, SideVeinsLeaveInPairsAtTheirAngle) {
     for (const double side : {-1.0, 1.0}) {
       const double thinned = 0.2 * (1.0 - aside / 20.0);
       EXPECT_NEAR(map.at(5.0 + aside * cotangent, side * aside), thinned, 0.1 * thinned);
-      EXPECT_NEAR(map.at(2.5 + aside * cotangent, side * aside), 0.0, 1e-12);  // half-way to the next
+      EXPECT_NEAR(map.at(2.5 + aside * cotangent, side * aside), 0.0, 1e-12);  // midway to the next
     }
   }
 }

@@ -255,7 +255,7 @@ TEST(FoamRelief, CellsHaveTheirMeanSize) {
   }
 }
 
-TEST(CellDiagram, WallsAreHalfWayBetweenPointsOfOneWeight) {
+TEST(CellDiagram, WallsAreMidwayBetweenPointsOfOneWeight) {
   const Eigen::Vector2d size(4.0, 4.0);
   std::vector<CellPoint> points;
   for (int j = 0; j < 4; ++j) {
@@ -282,9 +282,9 @@ TEST(CellDiagram, ScatteredPointsKeepTheirDistance) {
   double least = 1e9;
   for (std::size_t a = 0; a < points.size(); ++a) {
     for (std::size_t b = 0; b < a; ++b) {
-      Eigen::Vector2d way = points[a] - points[b];
-      for (int k = 0; k < 2; ++k) way[k] -= size[k] * std::round(way[k] / size[k]);
-      least = std::min(least, way.norm());
+      Eigen::Vector2d offset = points[a] - points[b];
+      for (int k = 0; k < 2; ++k) offset[k] -= size[k] * std::round(offset[k] / size[k]);
+      least = std::min(least, offset.norm());
     }
   }
   EXPECT_GE(least, 0.6 / std::sqrt(20.0) - 1e-12);
@@ -338,7 +338,7 @@ TEST(TissueRelief, KnobsAreRaisedByTheEmbossing) {
   tissue.emboss_um = 150;
   tissue.size_mm = 6.0;
   const fem::ReliefMap map = relief_map(tissue);
-  // Knobs of a hexagonal lattice stand at (0, 0) and at (1/2, sqrt(3)/2) of the pitch; half way along x is the sheet.
+  // Knobs of a hexagonal lattice stand at (0, 0) and at (1/2, sqrt(3)/2) of the pitch; midway along x is the sheet.
   double knobs = 0.0, sheet = 0.0;
   for (int k = 0; k < 4; ++k) {
     for (const double off : {-0.1, 0.0, 0.1}) {

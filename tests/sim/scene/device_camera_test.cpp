@@ -112,8 +112,8 @@ TEST(DeviceCamera, BlurIsTheLargestAtTheNearOrTheFarEnd) {
   EXPECT_NEAR(blur_radius_px(lens, 20.0), 0.5 * render::blur_circle_mm(camera, infinite) / px, 1e-9);
 }
 
-// The camera turns clockwise, as seen from behind it, so its picture turns the other way.
-TEST(DeviceCamera, ARolledCamerasPictureIsTurnedTheOtherWay) {
+// The camera turns clockwise, as seen from behind it, so its picture turns in the opposite direction.
+TEST(DeviceCamera, ARolledCamerasPictureIsTurnedInTheOppositeDirection) {
   const render::LensCamera upright = lens_of(kLens);
   EXPECT_EQ(error_of(kLens + "roll_deg: -180\n"), "");
   for (const double roll_deg : {-90.0, 3.0, 40.0, 180.0}) {

@@ -79,7 +79,7 @@ TEST(ScatteredPrint, TheSeedChoosesTheDots) {
   EXPECT_GT(most, 0.59);
 }
 
-TEST(ScatteredPrint, ATinyDiscHoldsWhatFindsRoom) {
+TEST(ScatteredPrint, ATinyDiscHoldsWhatFits) {
   PrintSpec print = dots();
   print.radius_mm = 1.4;  // two dots by area, but the first one may take the middle
   for (std::uint64_t seed = 0; seed < 10; ++seed) {

@@ -79,11 +79,11 @@ TEST(VisibleMesh, VolumesAreThoseOfTheSolids) {
 TEST(VisibleMesh, ItIsTheBodyThatTheContactSolverFeels) {
   for (const ShapeSpec& shape :
        {cylinder(3, 0.5, 6), egg(3.5, 4, 5), shell({7, 8}, 0.5, {0.1, -0.2}), hexagon(6.5, 8)}) {
-    const auto felt = contact_shape(shape);
+    const auto contact = contact_shape(shape);
     const fem::ContactShape seen = fem::MeshShape(visible_mesh(shape));
     for (double r = 0.05; r < 2.95; r += 0.1) {
       const Eigen::Vector3d below(r * 0.6, r * 0.8, -7.0);
-      const auto a = fem::first_entry(felt, below, Eigen::Vector3d::UnitZ());
+      const auto a = fem::first_entry(contact, below, Eigen::Vector3d::UnitZ());
       const auto b = fem::first_entry(seen, below, Eigen::Vector3d::UnitZ());
       ASSERT_TRUE(a && b) << r;
       EXPECT_NEAR(*a, *b, 0.01) << r;

@@ -64,9 +64,9 @@ TEST(EventStream, EventsAddUpToTheChangeOfLogIntensity) {
   int busy = 0;
   for (int y = 0; y < change.rows; ++y) {
     for (int x = 0; x < change.cols; ++x) {
-      const double untold = change.at<float>(y, x) - (kOn * on.at<int>(y, x) - kOff * off.at<int>(y, x));
-      EXPECT_LT(untold, kOn + kLeftAlone) << "column " << x << ", row " << y;
-      EXPECT_GT(untold, -kOff - kLeftAlone) << "column " << x << ", row " << y;
+      const double unreported = change.at<float>(y, x) - (kOn * on.at<int>(y, x) - kOff * off.at<int>(y, x));
+      EXPECT_LT(unreported, kOn + kLeftAlone) << "column " << x << ", row " << y;
+      EXPECT_GT(unreported, -kOff - kLeftAlone) << "column " << x << ", row " << y;
       busy += std::abs(change.at<float>(y, x)) > kOff ? 1 : 0;
     }
   }

@@ -154,7 +154,7 @@ TEST(PlayMotion, AForceThatCannotBeMetNamesTheKeysLine) {
 }
 
 // Light of the pixels that were not traced again must be what tracing the whole frame would give, within the noise.
-// `all`: the camera is told of all frames, not of the first alone. Gives how many pixels were traced.
+// `all`: the camera is given all frames, not of the first alone. Gives how many pixels were traced.
 std::int64_t expect_partial_frame_agrees(Played p, std::size_t frame, bool all = false) {
   p.scene.outputs = {.frames = false, .ideal = false, .radiance = true};
   p.scene.light.max_samples = 64;

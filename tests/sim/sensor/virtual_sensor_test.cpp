@@ -74,7 +74,7 @@ TEST(VirtualSensor, APressedBallIsSeenWhereItIsAndAsDeepAsItIs) {
   EXPECT_GT(cv::norm(touch.frame, sensor().background(3), cv::NORM_INF), 20.0) << "its flanks are lit differently";
 }
 
-TEST(VirtualSensor, LooksAreTheSameFromAnyNumberOfThreads) {
+TEST(VirtualSensor, PicturesAreTheSameFromAnyNumberOfThreads) {
   const TouchObject object = sensor().object(ball(1.5));
   const auto states = sensor().play(object, press(-0.5, 0.5, 1.6, 1.2));
   const Touch alone = sensor().capture(object, states.back().press, 5);

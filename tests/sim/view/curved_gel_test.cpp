@@ -91,14 +91,14 @@ struct Pressed {
   SceneSpec scene;
   Plan plan;
   std::shared_ptr<const fem::Compliance> gel;
-  SceneView sight;
+  SceneView view;
   std::vector<Truth> truths;
 
   explicit Pressed(SceneSpec scene_of_it)
       : scene(std::move(scene_of_it)),
         plan(make_plan(scene)),
         gel(gel_of(scene.device)),
-        sight(scene, plan, *gel),
+        view(scene, plan, *gel),
         truths(play_motion(scene, plan, *gel)) {}
   const fem::PressState& press() const { return truths.back().press; }
 };
@@ -118,8 +118,8 @@ double area_of(const TriangleMesh& mesh) {
 
 TEST(CurvedGel, ARestingDomeIsItsSphere) {
   const Pressed dome(scene_of(dome_device(), kPlate, 0, 0, 3.0));  // 2 mm above the apex
-  const std::vector<PlacedShape> felt = placed_shapes(dome.sight.objects, dome.press());
-  const GelSheet sheet = dome.sight.gel.sheet(dome.press(), felt);
+  const std::vector<PlacedShape> shapes = placed_shapes(dome.view.objects, dome.press());
+  const GelSheet sheet = dome.view.gel.sheet(dome.press(), shapes);
   double widest = 0.0;
   for (std::size_t i = 0; i < sheet.mesh.vertices.size(); ++i) {
     EXPECT_NEAR(off_the_dome(sheet.mesh.vertices[i]), 0.0, 1e-9);
@@ -133,7 +133,7 @@ TEST(CurvedGel, ARestingDomeIsItsSphere) {
 
 TEST(CurvedGel, NormalsOfARestingDomeAreTheSpheres) {
   const Pressed dome(scene_of(dome_device(), kPlate, 0, 0, 3.0));
-  const render::Scene seen = dome.sight.seen(dome.press(), {});
+  const render::Scene seen = dome.view.seen(dome.press(), {});
   const render::Surface& sheet = seen.surfaces[0];
   ASSERT_EQ(sheet.normals.size(), sheet.mesh.vertices.size());
   double squares = 0.0;
@@ -153,10 +153,10 @@ TEST(CurvedGel, NormalsOfARestingDomeAreTheSpheres) {
 TEST(CurvedGel, AFlatPlateFlattensTheDomeToADisc) {
   const Pressed dome(scene_of(dome_device(), kPlate, 0, 0, 1.0 - 0.25));
   ASSERT_TRUE(dome.plan.fine_relief) << "a gentle dome gets the fine contact";
-  const auto relief = dome.sight.relief(dome.press());
+  const auto relief = dome.view.relief(dome.press());
   ASSERT_TRUE(relief && relief->grid.size() > 0);
   const double face = -0.25 + relief->solved.shift;
-  const GelSheet sheet = whole_sheet(dome.sight.membrane->sheet(dome.press(), *relief));
+  const GelSheet sheet = whole_sheet(dome.view.membrane->sheet(dome.press(), *relief));
   double touched_area = 0.0;
   double widest = 0.0;
   double narrowest = 1e9;
@@ -190,8 +190,8 @@ TEST(CurvedGel, APlateOnADomeIsABallOnASlab) {
   const Pressed slab(scene_of(device("size_x_mm: 12, size_y_mm: 12, thickness_mm: 4"),
                               fmt::format("name: ball\nshape: {{type: sphere, radius_mm: {}}}\n", kSphere), 0, 0,
                               kSphere - kDepth));
-  const auto one = dome.sight.relief(dome.press());
-  const auto other = slab.sight.relief(slab.press());
+  const auto one = dome.view.relief(dome.press());
+  const auto other = slab.view.relief(slab.press());
   ASSERT_TRUE(one && other);
   const auto radius = [](const fem::ReliefAnswer& answer) {
     double pixels = 0.0;
@@ -207,15 +207,15 @@ TEST(CurvedGel, TheHeightMapIsOverTheRestingDome) {
   scene.outputs.height = true;
   scene.membrane.pixel_um = 100;
   const Pressed dome(scene);
-  const auto relief = dome.sight.relief(dome.press());
-  const cv::Mat height = dome.sight.membrane->height(dome.press(), relief);
+  const auto relief = dome.view.relief(dome.press());
+  const cv::Mat height = dome.view.membrane->height(dome.press(), relief);
   const double face = -0.25 + relief->solved.shift;
   EXPECT_NEAR(height.at<float>(height.rows / 2, height.cols / 2), face, 2e-3);  // the apex was at 0
   // On the disc the surface is the face; a millimetre aside the dome was lower by what it falls there.
   const int aside = height.cols / 2 + 10;
   const double x = 0.1 * (aside + 0.5 - 0.5 * height.cols);
   EXPECT_NEAR(height.at<float>(height.rows / 2, aside), face + (kSphere - std::sqrt(kSphere * kSphere - x * x)), 2e-3);
-  const cv::Mat rest = dome.sight.membrane->height(dome.truths.front().press, {});
+  const cv::Mat rest = dome.view.membrane->height(dome.truths.front().press, {});
   EXPECT_EQ(cv::countNonZero(cv::abs(rest) > 1e-9f), 0);
 }
 
@@ -241,9 +241,9 @@ TEST(CurvedGel, ADomeLooksTheSameByDirectLightAndByPaths) {
 
 TEST(CurvedGel, APressBesideTheApexTouchesThere) {
   const Pressed dome(scene_of(dome_device(), kBall, 3.0, 0, 2.0 - 0.31 - 0.2));  // the dome is 0.31 mm down there
-  const auto relief = dome.sight.relief(dome.press());
+  const auto relief = dome.view.relief(dome.press());
   ASSERT_TRUE(relief && relief->grid.size() > 0);
-  const GelSheet sheet = whole_sheet(dome.sight.membrane->sheet(dome.press(), *relief));
+  const GelSheet sheet = whole_sheet(dome.view.membrane->sheet(dome.press(), *relief));
   const Eigen::Vector3d centre = dome.press().gel_from_object.translation + Eigen::Vector3d(0, 0, relief->solved.shift);
   int touched = 0;
   for (std::size_t k = 0; k < sheet.mesh.triangles.size(); ++k) {
@@ -257,15 +257,15 @@ TEST(CurvedGel, APressBesideTheApexTouchesThere) {
 // What photometric stereo reads: a ball's slopes, to a part of a degree, though the mesh has edges of 0.7 mm.
 void expect_the_balls_own_slopes(const Pressed& pressed) {
   ASSERT_TRUE(pressed.plan.fine_relief);
-  const auto relief = pressed.sight.relief(pressed.press());
+  const auto relief = pressed.view.relief(pressed.press());
   ASSERT_TRUE(relief && relief->grid.size() > 0);
-  const render::Scene seen = pressed.sight.seen(pressed.press(), relief);
+  const render::Scene seen = pressed.view.seen(pressed.press(), relief);
   const render::Surface& sheet = seen.surfaces[0];
   const Eigen::Vector3d centre =
       pressed.press().gel_from_object.translation + Eigen::Vector3d(0, 0, relief->solved.shift);
   double squares = 0.0;
   int count = 0;
-  const GelSheet whole = whole_sheet(pressed.sight.membrane->sheet(pressed.press(), *relief));
+  const GelSheet whole = whole_sheet(pressed.view.membrane->sheet(pressed.press(), *relief));
   std::vector<char> inside(sheet.normals.size(), 1);  // all triangles round it touch
   std::vector<char> used(sheet.normals.size(), 0);
   for (std::size_t k = 0; k < whole.mesh.triangles.size(); ++k) {
@@ -294,16 +294,16 @@ TEST(CurvedGel, ABallShowsItsOwnSlopes) {
 TEST(CurvedGel, OffTheGelNothingTouches) {
   const Pressed beside(scene_of(dome_device(), kBall, 9.0, 0, 1.0));
   EXPECT_EQ(beside.press().contact_vertices, 0);
-  const auto relief = beside.sight.relief(beside.press());
+  const auto relief = beside.view.relief(beside.press());
   EXPECT_TRUE(!relief || relief->grid.size() == 0);
-  const render::Scene seen = beside.sight.seen(beside.press(), relief);
+  const render::Scene seen = beside.view.seen(beside.press(), relief);
   for (const Eigen::Vector3d& vertex : seen.surfaces[0].mesh.vertices) EXPECT_NEAR(off_the_dome(vertex), 0.0, 1e-9);
 }
 
 TEST(CurvedGel, APressAtTheRimStaysOnTheGel) {
   const Pressed rim(scene_of(dome_device(), kBall, 5.6, 0, 2.0 + kRimZ));
   ASSERT_GT(rim.press().contact_vertices, 0);
-  const render::Scene seen = rim.sight.seen(rim.press(), rim.sight.relief(rim.press()));
+  const render::Scene seen = rim.view.seen(rim.press(), rim.view.relief(rim.press()));
   EXPECT_NO_THROW(render::check_scene(seen));
   for (const Eigen::Vector3d& vertex : seen.surfaces[0].mesh.vertices) {
     EXPECT_GT(vertex.z(), -kThickness);
@@ -327,8 +327,8 @@ TEST(CurvedGel, AFingertipIsAHemisphereOnACylinder) {
   constexpr double kRadius = 5.0;
   const Pressed tip(scene_of(device("shape: fingertip, radius_mm: 5, length_mm: 3, sleeve_mm: 1.5"), kBall, 0, 0, 1.8));
   EXPECT_FALSE(tip.plan.fine_relief);
-  const std::vector<PlacedShape> felt = placed_shapes(tip.sight.objects, tip.press());
-  const GelSheet sheet = tip.sight.gel.sheet(tip.press(), felt);
+  const std::vector<PlacedShape> shapes = placed_shapes(tip.view.objects, tip.press());
+  const GelSheet sheet = tip.view.gel.sheet(tip.press(), shapes);
   for (const Eigen::Vector3d& rest : sheet.rest) {
     const double off = rest.z() < -kRadius ? rest.head<2>().norm() - kRadius
                                            : (rest - Eigen::Vector3d(0, 0, -kRadius)).norm() - kRadius;
@@ -346,15 +346,15 @@ TEST(CurvedGel, AFingertipIsAHemisphereOnACylinder) {
     touched += sheet.touched[k] >= 0;
   }
   EXPECT_GT(touched, 10);
-  EXPECT_NO_THROW(render::check_scene(tip.sight.seen(tip.press(), {})));
+  EXPECT_NO_THROW(render::check_scene(tip.view.seen(tip.press(), {})));
 }
 
 TEST(CurvedGel, PrintMovesWithTheDome) {
   SceneSpec scene = scene_of(dome_device(), kPlate, 0, 0, 1.0 - 0.25);
   scene.device.coating->print = PrintSpec{.grid = {3, 3}, .spacing_mm = {2.0, 2.0}, .width_mm = 0.5, .colour = 0.05};
   const Pressed dome(scene);
-  const auto relief = dome.sight.relief(dome.press());
-  const render::Scene seen = dome.sight.seen(dome.press(), relief);
+  const auto relief = dome.view.relief(dome.press());
+  const render::Scene seen = dome.view.seen(dome.press(), relief);
   const render::Surface& sheet = seen.surfaces[0];
   ASSERT_TRUE(sheet.print);
   ASSERT_EQ(sheet.print->material_mm.size(), sheet.mesh.vertices.size());

@@ -92,8 +92,8 @@ TEST(LensTruth, DepthOfAFlatGelBeforeATiltedLensIsThatOfTheBentRay) {
       for (const auto& [thickness, index] : {std::pair(11.0, 1.0), std::pair(1.0, 1.5), std::pair(4.0, 1.45)}) {
         across += thickness * std::tan(std::asin(sine / index));
       }
-      const Eigen::Vector2d way = across / sine * in_air.head<2>();
-      const Eigen::Vector3d place(eye.x() + way.x(), eye.y() + way.y(), 0.0);
+      const Eigen::Vector2d offset = across / sine * in_air.head<2>();
+      const Eigen::Vector3d place(eye.x() + offset.x(), eye.y() + offset.y(), 0.0);
       if (place.head<2>().cwiseAbs().maxCoeff() > 5.9) continue;  // beside the pad
       const double expected = (place - eye).dot(axis);
       ASSERT_NEAR(depth.at<float>(row, column), expected, 2e-5) << row << " " << column;

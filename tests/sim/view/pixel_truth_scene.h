@@ -80,7 +80,7 @@ inline void make_lens(CameraSpec& camera) {
 }
 
 /// Where a point appears to a camera that looks straight up: the angle in air by bisection, on the sum of the layers'
-/// ways by Snell's law.
+/// paths by Snell's law.
 inline Eigen::Vector2d projected_by_bisection(const DeviceSpec& device, const Eigen::Vector3d& point) {
   const CameraSpec& camera = *device.camera;
   const double glass_low = -device.gel.thickness_mm - device.plate.thickness_mm;
@@ -91,9 +91,9 @@ inline Eigen::Vector2d projected_by_bisection(const DeviceSpec& device, const Ei
     const double angle = 0.5 * (low + high);
     const double in_glass = std::asin(std::sin(angle) / device.plate.refractive_index);
     const double in_gel = std::asin(std::sin(angle) / device.gel.refractive_index);
-    const double way = air * std::tan(angle) + device.plate.thickness_mm * std::tan(in_glass) +
-                       (point.z() + device.gel.thickness_mm) * std::tan(in_gel);
-    (way < r ? low : high) = angle;
+    const double offset = air * std::tan(angle) + device.plate.thickness_mm * std::tan(in_glass) +
+                          (point.z() + device.gel.thickness_mm) * std::tan(in_gel);
+    (offset < r ? low : high) = angle;
   }
   const Eigen::Vector2d tangents = std::tan(low) / std::max(r, 1e-12) * point.head<2>();
   if (camera.type == CameraType::lens) {

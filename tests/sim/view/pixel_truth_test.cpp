@@ -158,7 +158,7 @@ TEST(PixelTruth, ADeviceWithoutACameraIsRefused) {
   }
 }
 
-TEST_P(PixelTruthOf, ProjectionIsTheWayBackFromEveryHitOfATiltedCamera) {
+TEST_P(PixelTruthOf, ProjectionIsTheInverseOfEveryHitOfATiltedCamera) {
   const PlayedTruth& p = pressed_truth();
   SceneSpec scene = seen_by(p.scene);
   scene.device.camera->hole_position_mm = {3.0, -2.0, -16.0};

@@ -1,4 +1,4 @@
-#include "lab/chroma/chroma_tilt_bench.h"
+#include "lab/chroma/chroma_tilt_setup.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -29,8 +29,8 @@ constexpr int kFineSides = 4;    // the sheet is so finely cut over this many ma
 constexpr double kGuideSide_mm = 20.0;
 constexpr double kGuideWidth_mm = 36.0;
 
-double ball_depth(const TiltBench& bench) {
-  return 0.5 * bench.side_mm + kBallGap_mm;
+double ball_depth(const TiltSetup& setup) {
+  return 0.5 * setup.side_mm + kBallGap_mm;
 }
 
 /// 1 near the marker, 0 far from it.
@@ -51,15 +51,15 @@ std::vector<double> grid_lines(double side) {
 }
 
 /// Where the sheet's material is; (u, v) from the marker's middle.
-Eigen::Vector3d sheet_point(const TiltBench& bench, TiltMarker marker, const TiltPose& pose, double u, double v) {
+Eigen::Vector3d sheet_point(const TiltSetup& setup, TiltMarker marker, const TiltPose& pose, double u, double v) {
   const Eigen::Vector3d rest(u, v, 0.0);
-  const double depth = marker == TiltMarker::ball ? ball_depth(bench) : 0.0;
+  const double depth = marker == TiltMarker::ball ? ball_depth(setup) : 0.0;
   const double pressed = std::max(0.0, -pose.moved_mm.z());
-  const double stretch = marker == TiltMarker::flat ? column_stretch(pressed, bench.gel_mm, bench.poisson_ratio) : 1.0;
+  const double stretch = marker == TiltMarker::flat ? column_stretch(pressed, setup.gel_mm, setup.poisson_ratio) : 1.0;
   const Eigen::Vector3d arm(stretch * u, stretch * v, depth);  // from the centre that it turns about
   const Eigen::Vector3d moved =
       Eigen::AngleAxisd(pose.tilt, Eigen::Vector3d::UnitY()) * arm - Eigen::Vector3d(0.0, 0.0, depth) + pose.moved_mm;
-  const Eigen::Vector3d place(bench.place_mm.x(), bench.place_mm.y(), 0.0);
+  const Eigen::Vector3d place(setup.place_mm.x(), setup.place_mm.y(), 0.0);
   return place + rest + share_of_motion(std::hypot(u, v)) * (moved - rest);
 }
 
@@ -67,15 +67,15 @@ Eigen::Vector3d sheet_point(const TiltBench& bench, TiltMarker marker, const Til
 struct Sheet {
   TriangleMesh white, ink;
 };
-Sheet make_sheet(const TiltBench& bench, TiltMarker marker, const TiltPose& pose) {
-  const std::vector<double> lines = grid_lines(bench.side_mm);
+Sheet make_sheet(const TiltSetup& setup, TiltMarker marker, const TiltPose& pose) {
+  const std::vector<double> lines = grid_lines(setup.side_mm);
   const int count = static_cast<int>(lines.size());
   Sheet sheet;
   for (const double v : lines) {
-    for (const double u : lines) sheet.white.vertices.push_back(sheet_point(bench, marker, pose, u, v));
+    for (const double u : lines) sheet.white.vertices.push_back(sheet_point(setup, marker, pose, u, v));
   }
   sheet.ink.vertices = sheet.white.vertices;
-  const double half = 0.5 * bench.side_mm;
+  const double half = 0.5 * setup.side_mm;
   for (int j = 0; j + 1 < count; ++j) {
     for (int i = 0; i + 1 < count; ++i) {
       const double u = 0.5 * (lines[i] + lines[i + 1]);
@@ -90,20 +90,20 @@ Sheet make_sheet(const TiltBench& bench, TiltMarker marker, const TiltPose& pose
   return sheet;
 }
 
-TriangleMesh square_film(const TiltBench& bench) {
-  const double h = 0.5 * bench.film_mm;
-  const double z = -bench.gel_mm + kFilmInGel_mm;
+TriangleMesh square_film(const TiltSetup& setup) {
+  const double h = 0.5 * setup.film_mm;
+  const double z = -setup.gel_mm + kFilmInGel_mm;
   TriangleMesh mesh;
   for (const Eigen::Vector2d& corner : {Eigen::Vector2d(-h, -h), {h, -h}, {h, h}, {-h, h}}) {
-    mesh.vertices.emplace_back(bench.place_mm.x() + corner.x(), bench.place_mm.y() + corner.y(), z);
+    mesh.vertices.emplace_back(setup.place_mm.x() + corner.x(), setup.place_mm.y() + corner.y(), z);
   }
   mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
   return mesh;
 }
 
 /// How far the film is from the lens as seen in air.
-double distance_in_air(const TiltBench& bench) {
-  return bench.camera_mm - bench.gel_mm - bench.plate_mm + bench.plate_mm / kPlateIndex + bench.gel_mm / kGelIndex;
+double distance_in_air(const TiltSetup& setup) {
+  return setup.camera_mm - setup.gel_mm - setup.plate_mm + setup.plate_mm / kPlateIndex + setup.gel_mm / kGelIndex;
 }
 
 /// 3 x bands, in proportion to the electrons of a watt: efficiency times photons, which are as the wavelength.
@@ -113,28 +113,28 @@ Eigen::MatrixXd electrons_a_watt(const TiltSpectra& spectra) {
 
 }  // namespace
 
-TiltBench far_bench() {
+TiltSetup far_setup() {
   return {};
 }
 
-TiltBench compact_bench() {
-  TiltBench bench;
-  bench.lens_mm = 4.0;
-  bench.camera_mm = 64.0;
-  bench.pixel_pitch_um = 20.0;
-  return bench;
+TiltSetup compact_setup() {
+  TiltSetup setup;
+  setup.lens_mm = 4.0;
+  setup.camera_mm = 64.0;
+  setup.pixel_pitch_um = 20.0;
+  return setup;
 }
 
-TiltBench near_bench() {
-  TiltBench bench;
-  bench.gel_mm = 8.0;
-  bench.film_mm = 1.54;
-  bench.camera_mm = 65.06;
-  bench.pixel_pitch_um = 36.08;
-  bench.f_number = 11.0;
-  bench.half_view_mm = 2.2;
-  bench.samples = 64;
-  return bench;
+TiltSetup near_setup() {
+  TiltSetup setup;
+  setup.gel_mm = 8.0;
+  setup.film_mm = 1.54;
+  setup.camera_mm = 65.06;
+  setup.pixel_pitch_um = 36.08;
+  setup.f_number = 11.0;
+  setup.half_view_mm = 2.2;
+  setup.samples = 64;
+  return setup;
 }
 
 TiltSpectra read_tilt_spectra(const std::filesystem::path& spectra) {
@@ -175,29 +175,29 @@ TiltColours tilt_colours(const TiltSpectra& spectra) {
           colour(twice * spectra.magenta)};
 }
 
-render::Scene tilt_scene(const TiltBench& bench, const TiltSpectra& spectra, TiltMarker marker, const TiltPose& pose) {
+render::Scene tilt_scene(const TiltSetup& setup, const TiltSpectra& spectra, TiltMarker marker, const TiltPose& pose) {
   if (!(pose.tilt >= 0.0 && pose.tilt <= 0.25 * kPi + 1e-12)) {
     fail("a tilt of {:.4g} rad must be from 0 to pi / 4", pose.tilt);
   }
-  const double reach = std::max(marker == TiltMarker::ball ? ball_depth(bench) + 0.5 * bench.side_mm : 0.0,
+  const double reach = std::max(marker == TiltMarker::ball ? ball_depth(setup) + 0.5 * setup.side_mm : 0.0,
                                 kFadedRadius_mm * std::sin(pose.tilt));
-  if (!(pose.moved_mm.z() <= 0.0 && reach - pose.moved_mm.z() < bench.gel_mm)) {
+  if (!(pose.moved_mm.z() <= 0.0 && reach - pose.moved_mm.z() < setup.gel_mm)) {
     fail("a marker moved by {:.4g} mm must be moved towards the film, and stay clear of it", pose.moved_mm.z());
   }
   render::Scene scene;
   scene.media = {{1.0}, {kPlateIndex}, {kGelIndex}};
-  scene.faces = {{-bench.gel_mm - bench.plate_mm, kAir, kPlate}, {-bench.gel_mm, kPlate, kGel}};
+  scene.faces = {{-setup.gel_mm - setup.plate_mm, kAir, kPlate}, {-setup.gel_mm, kPlate, kGel}};
   scene.environment = render::flat_spectrum(spectra.bands.count(), 0.0);
-  Sheet sheet = make_sheet(bench, marker, pose);
+  Sheet sheet = make_sheet(setup, marker, pose);
   scene.surfaces.push_back({std::move(sheet.white), render::Lambertian{spectra.white}});
   if (marker == TiltMarker::ball) {
-    const Eigen::Vector3d rest(bench.place_mm.x(), bench.place_mm.y(), -ball_depth(bench));
-    scene.balls.push_back({rest + pose.moved_mm, 0.5 * bench.side_mm, render::Lambertian{spectra.magenta}});
+    const Eigen::Vector3d rest(setup.place_mm.x(), setup.place_mm.y(), -ball_depth(setup));
+    scene.balls.push_back({rest + pose.moved_mm, 0.5 * setup.side_mm, render::Lambertian{spectra.magenta}});
   } else {
     scene.surfaces.push_back({std::move(sheet.ink), render::Lambertian{spectra.magenta}});
   }
-  scene.surfaces.push_back({square_film(bench), render::ThinFilm{spectra.film, kFilmIndex, false}});
-  const double z = -bench.gel_mm - 0.5 * bench.plate_mm;
+  scene.surfaces.push_back({square_film(setup), render::ThinFilm{spectra.film, kFilmIndex, false}});
+  const double z = -setup.gel_mm - 0.5 * setup.plate_mm;
   for (const Eigen::Vector2d& side : {Eigen::Vector2d(-1.0, 0.0), {1.0, 0.0}, {0.0, 1.0}}) {
     const Eigen::Vector2d at = kGuideSide_mm * side;
     scene.lamps.push_back(render::GuideLamp{
@@ -206,28 +206,28 @@ render::Scene tilt_scene(const TiltBench& bench, const TiltSpectra& spectra, Til
   return scene;
 }
 
-render::Camera tilt_camera(const TiltBench& bench) {
+render::Camera tilt_camera(const TiltSetup& setup) {
   render::LensCamera camera;
-  const double focus = distance_in_air(bench);
-  const double px_per_mm = bench.lens_mm / (focus - bench.lens_mm) * kMicrometresPerMillimetre / bench.pixel_pitch_um;
-  camera.width = camera.height = 2 * static_cast<int>(std::ceil(bench.half_view_mm * px_per_mm));
-  camera.pixel_pitch_um = bench.pixel_pitch_um;
-  camera.aperture_mm = bench.lens_mm / bench.f_number;
+  const double focus = distance_in_air(setup);
+  const double px_per_mm = setup.lens_mm / (focus - setup.lens_mm) * kMicrometresPerMillimetre / setup.pixel_pitch_um;
+  camera.width = camera.height = 2 * static_cast<int>(std::ceil(setup.half_view_mm * px_per_mm));
+  camera.pixel_pitch_um = setup.pixel_pitch_um;
+  camera.aperture_mm = setup.lens_mm / setup.f_number;
   camera.focus_distance_mm = focus;
-  camera.matrix = render::matrix_of_lens(bench.lens_mm, focus, bench.pixel_pitch_um, camera.width, camera.height);
-  camera.matrix.cx += bench.phase_px.x() - bench.place_mm.x() * px_per_mm;
-  camera.matrix.cy += bench.phase_px.y() - bench.place_mm.y() * px_per_mm;
-  camera.gel_from_camera.translation = {0.0, 0.0, -bench.camera_mm};
+  camera.matrix = render::matrix_of_lens(setup.lens_mm, focus, setup.pixel_pitch_um, camera.width, camera.height);
+  camera.matrix.cx += setup.phase_px.x() - setup.place_mm.x() * px_per_mm;
+  camera.matrix.cy += setup.phase_px.y() - setup.place_mm.y() * px_per_mm;
+  camera.gel_from_camera.translation = {0.0, 0.0, -setup.camera_mm};
   return camera;
 }
 
-cv::Mat tilt_picture(const TiltBench& bench, const TiltSpectra& spectra, TiltMarker marker, const TiltPose& pose,
+cv::Mat tilt_picture(const TiltSetup& setup, const TiltSpectra& spectra, TiltMarker marker, const TiltPose& pose,
                      std::uint64_t seed) {
-  const render::Tracer tracer(tilt_scene(bench, spectra, marker, pose));
+  const render::Tracer tracer(tilt_scene(setup, spectra, marker, pose));
   render::RenderSettings settings;
   settings.seed = seed;
-  settings.min_samples = settings.max_samples = bench.samples;
-  const cv::Mat light = tracer.render(tilt_camera(bench), settings).irradiance;
+  settings.min_samples = settings.max_samples = setup.samples;
+  const cv::Mat light = tracer.render(tilt_camera(setup), settings).irradiance;
   const int bands = spectra.bands.count();
   const Eigen::MatrixXd electrons = electrons_a_watt(spectra);
   const Eigen::Vector3d grey = electrons * spectra.lamp.matrix();

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
-"""Presses a ball on a virtual sensor and tells what its camera sees and what is true.
+"""Presses a ball on a virtual sensor and prints what its camera sees and what is true.
 
-    press_and_look.py [DEVICE] [-o FOLDER]     DEVICE: a file, or a shipped device's name as gelsight-flat
+    press_by_force.py [DEVICE] [-o FOLDER]     DEVICE: a file, or a shipped device's name as gelsight-flat
 """
 
 import argparse

@@ -1,4 +1,4 @@
-#include "lab/chroma/chroma_bench.h"
+#include "lab/chroma/chroma_setup.h"
 
 #include <tbb/parallel_for.h>
 
@@ -15,14 +15,14 @@ const sim::PrintSpec& print_of(const sim::VirtualSensor& sensor) {
   return *coating->print;
 }
 
-sensors::ColourMarkerLook look_of(const sim::VirtualSensor& sensor) {
-  sensors::ColourMarkerLook look;
-  look.grid = print_of(sensor).grid;
+sensors::ColourMarkerAppearance appearance_of(const sim::VirtualSensor& sensor) {
+  sensors::ColourMarkerAppearance record;
+  record.grid = print_of(sensor).grid;
   // [Lin2019] counts pixels of more than half saturation in pictures of enhanced contrast. In a levelled one the
   // filter's yellow has some 0.47, as blue pixels see light of 500 to 540 nm; ink and filtered ink have 0.65 and more,
   // white 0.1.
-  look.least_saturation = 0.3;
-  return look;
+  record.least_saturation = 0.3;
+  return record;
 }
 
 }  // namespace
@@ -50,27 +50,27 @@ sensors::ViewParallax parallax_of(const sim::DeviceSpec& device) {
   return parallax;
 }
 
-ChromaBench::ChromaBench(const sim::VirtualSensor& sensor, std::uint64_t seed)
+ChromaSetup::ChromaSetup(const sim::VirtualSensor& sensor, std::uint64_t seed)
     : sensor_(sensor),
       markers_(printed_markers(sensor.device())),
       means_(sensor.gel(), markers_),
       spacing_mm_(print_of(sensor).spacing_mm.x()),
-      finder_(look_of(sensor)),
+      finder_(appearance_of(sensor)),
       rest_(finder_.find_rest(sensor.background(seed))) {}
 
-std::vector<ChromaLook> ChromaBench::play(const sim::ObjectSpec& object, const sim::MotionSpec& motion,
-                                          std::uint64_t noise_seed) const {
+std::vector<ChromaRecord> ChromaSetup::play(const sim::ObjectSpec& object, const sim::MotionSpec& motion,
+                                            std::uint64_t noise_seed) const {
   const sim::TouchObject touched = sensor_.object(object);
   const std::vector<sim::Truth> states = sensor_.play(touched, motion);
   return read(pictures(touched, states, noise_seed), states);
 }
 
-std::vector<ChromaLook> ChromaBench::look(const sim::ObjectSpec& object, std::span<const sim::Truth> states,
-                                          std::uint64_t noise_seed) const {
+std::vector<ChromaRecord> ChromaSetup::record(const sim::ObjectSpec& object, std::span<const sim::Truth> states,
+                                              std::uint64_t noise_seed) const {
   return read(pictures(sensor_.object(object), states, noise_seed), states);
 }
 
-std::vector<cv::Mat> ChromaBench::pictures(const sim::TouchObject& object, std::span<const sim::Truth> states,
+std::vector<cv::Mat> ChromaSetup::pictures(const sim::TouchObject& object, std::span<const sim::Truth> states,
                                            std::uint64_t noise_seed) const {
   std::vector<cv::Mat> made(states.size());
   tbb::parallel_for(std::size_t{0}, states.size(), [&](std::size_t i) {
@@ -79,19 +79,19 @@ std::vector<cv::Mat> ChromaBench::pictures(const sim::TouchObject& object, std::
   return made;
 }
 
-std::vector<ChromaLook> ChromaBench::read(std::span<const cv::Mat> frames, std::span<const sim::Truth> states) const {
+std::vector<ChromaRecord> ChromaSetup::read(std::span<const cv::Mat> frames, std::span<const sim::Truth> states) const {
   TS_ASSERT(frames.size() == states.size());
   sensors::ColourMarkerFinder finder = finder_;
-  std::vector<ChromaLook> looks(states.size());
+  std::vector<ChromaRecord> records(states.size());
   for (std::size_t i = 0; i < states.size(); ++i) {
-    looks[i].reading = finder.find(frames[i]);
-    looks[i].truth = means_.of(states[i].press.surface_displacement);
-    looks[i].state = states[i];
+    records[i].reading = finder.find(frames[i]);
+    records[i].truth = means_.of(states[i].press.surface_displacement);
+    records[i].state = states[i];
   }
-  return looks;
+  return records;
 }
 
-std::size_t ChromaBench::marker_at(const Eigen::Vector2d& place_mm) const {
+std::size_t ChromaSetup::marker_at(const Eigen::Vector2d& place_mm) const {
   std::size_t nearest = 0;
   for (std::size_t i = 1; i < markers_.markers.size(); ++i) {
     if ((markers_.markers[i].centre - place_mm).norm() < (markers_.markers[nearest].centre - place_mm).norm()) {
@@ -101,44 +101,45 @@ std::size_t ChromaBench::marker_at(const Eigen::Vector2d& place_mm) const {
   return nearest;
 }
 
-std::vector<sensors::HueSample> samples_of(const std::vector<ChromaLook>& looks, std::size_t marker, int series) {
+std::vector<sensors::HueSample> samples_of(const std::vector<ChromaRecord>& records, std::size_t marker, int series) {
   std::vector<sensors::HueSample> samples;
-  for (const ChromaLook& look : looks) {
-    const sensors::ColourMarker& seen = look.reading.markers[marker];
-    if (seen.flaw == sensors::MarkerFlaw::kNone) samples.push_back({marker, seen, look.truth[marker], series});
+  for (const ChromaRecord& record : records) {
+    const sensors::ColourMarker& seen = record.reading.markers[marker];
+    if (seen.flaw == sensors::MarkerFlaw::kNone) samples.push_back({marker, seen, record.truth[marker], series});
   }
   return samples;
 }
 
-std::vector<sensors::HueSample> samples_of_moved(const std::vector<ChromaLook>& looks, double least_mm, int series) {
+std::vector<sensors::HueSample> samples_of_moved(const std::vector<ChromaRecord>& records, double least_mm,
+                                                 int series) {
   std::vector<sensors::HueSample> samples;
-  for (const ChromaLook& look : looks) {
-    for (std::size_t marker = 0; marker < look.truth.size(); ++marker) {
-      const sensors::ColourMarker& seen = look.reading.markers[marker];
-      if (seen.flaw == sensors::MarkerFlaw::kNone && look.truth[marker].norm() >= least_mm) {
-        samples.push_back({marker, seen, look.truth[marker], series});
+  for (const ChromaRecord& record : records) {
+    for (std::size_t marker = 0; marker < record.truth.size(); ++marker) {
+      const sensors::ColourMarker& seen = record.reading.markers[marker];
+      if (seen.flaw == sensors::MarkerFlaw::kNone && record.truth[marker].norm() >= least_mm) {
+        samples.push_back({marker, seen, record.truth[marker], series});
       }
     }
   }
   return samples;
 }
 
-sensors::HueCalibrationSettings hue_settings_of(const ChromaBench& bench) {
+sensors::HueCalibrationSettings hue_settings_of(const ChromaSetup& setup) {
   sensors::HueCalibrationSettings settings;
-  settings.spacing_mm = bench.spacing_mm();
-  settings.parallax = parallax_of(bench.sensor().device());
+  settings.spacing_mm = setup.spacing_mm();
+  settings.parallax = parallax_of(setup.sensor().device());
   return settings;
 }
 
-sensors::HueModel best_hue_model(const ChromaBench& bench, const std::vector<sensors::HueSample>& samples,
+sensors::HueModel best_hue_model(const ChromaSetup& setup, const std::vector<sensors::HueSample>& samples,
                                  const std::vector<sensors::HueModelForm>& forms, HueAim aim) {
-  sensors::HueCalibrationSettings settings = hue_settings_of(bench);
-  const auto scores = sensors::rank_hue_forms(bench.rest(), samples, settings, forms);
+  sensors::HueCalibrationSettings settings = hue_settings_of(setup);
+  const auto scores = sensors::rank_hue_forms(setup.rest(), samples, settings, forms);
   const auto error = [&](const sensors::HueFormScore& score) {
     return aim == HueAim::lateral ? score.errors.rms_lateral_mm : score.errors.rms_mm();
   };
   settings.form = std::ranges::min_element(scores, {}, error)->form;
-  return sensors::calibrate_hue(bench.rest(), samples, settings);
+  return sensors::calibrate_hue(setup.rest(), samples, settings);
 }
 
 }  // namespace touchstone::lab

@@ -1,6 +1,6 @@
 #pragma once
-// A chroma device on a bench: objects press its markers, its camera's pictures are read, and the truth of each marker
-// is kept beside the reading.
+// A chroma device in an experimental setup: objects press its markers, its camera's pictures are read, and the truth of
+// each marker is kept beside the reading.
 
 #include <cstdint>
 #include <opencv2/core/mat.hpp>
@@ -15,7 +15,7 @@
 namespace touchstone::lab {
 
 /// One picture, read, and what is true of it.
-struct ChromaLook {
+struct ChromaRecord {
   sensors::ColourMarkerReading reading;
   std::vector<Eigen::Vector3d> truth;  ///< mm, of each marker: mean displacement over its square
   sim::Truth state;
@@ -30,24 +30,24 @@ sim::VirtualSensorSettings chroma_sensor_settings(std::uint64_t seed);
 sensors::ViewParallax parallax_of(const sim::DeviceSpec& device);
 
 /// A chroma device with a reader of its markers.
-class ChromaBench {
+class ChromaSetup {
  public:
   /// Reads the picture at rest. Keeps a reference to the sensor.
   /// @throws Error for a device without printed markers, or as ColourMarkerFinder::find_rest
-  ChromaBench(const sim::VirtualSensor& sensor, std::uint64_t seed);
+  ChromaSetup(const sim::VirtualSensor& sensor, std::uint64_t seed);
 
   /// Plays a motion and reads each of its frames: made side by side, read one after the other. Frame i has the noise of
   /// (noise_seed, i).
-  std::vector<ChromaLook> play(const sim::ObjectSpec& object, const sim::MotionSpec& motion,
-                               std::uint64_t noise_seed) const;
+  std::vector<ChromaRecord> play(const sim::ObjectSpec& object, const sim::MotionSpec& motion,
+                                 std::uint64_t noise_seed) const;
   /// The same for states that are there already.
-  std::vector<ChromaLook> look(const sim::ObjectSpec& object, std::span<const sim::Truth> states,
-                               std::uint64_t noise_seed) const;
+  std::vector<ChromaRecord> record(const sim::ObjectSpec& object, std::span<const sim::Truth> states,
+                                   std::uint64_t noise_seed) const;
   /// The two halves of that, for who wants the pictures too. @pre as many pictures as states
   std::vector<cv::Mat> pictures(const sim::TouchObject& object, std::span<const sim::Truth> states,
                                 std::uint64_t noise_seed) const;
   /// Reads them as frames that follow each other from rest.
-  std::vector<ChromaLook> read(std::span<const cv::Mat> frames, std::span<const sim::Truth> states) const;
+  std::vector<ChromaRecord> read(std::span<const cv::Mat> frames, std::span<const sim::Truth> states) const;
 
   const sim::VirtualSensor& sensor() const { return sensor_; }
   const sensors::ColourMarkerReading& rest() const { return rest_; }
@@ -68,19 +68,19 @@ class ChromaBench {
 };
 
 /// Samples of one marker, those pictures in which it is sound; all are of series `series`.
-std::vector<sensors::HueSample> samples_of(const std::vector<ChromaLook>& looks, std::size_t marker, int series);
+std::vector<sensors::HueSample> samples_of(const std::vector<ChromaRecord>& records, std::size_t marker, int series);
 
 /// Samples of all markers that have moved by at least `least_mm`.
-std::vector<sensors::HueSample> samples_of_moved(const std::vector<ChromaLook>& looks, double least_mm, int series);
+std::vector<sensors::HueSample> samples_of_moved(const std::vector<ChromaRecord>& records, double least_mm, int series);
 
-/// What calibrate_hue is told of the bench; the form is its default.
-sensors::HueCalibrationSettings hue_settings_of(const ChromaBench& bench);
+/// What calibrate_hue is given of the setup; the form is its default.
+sensors::HueCalibrationSettings hue_settings_of(const ChromaSetup& setup);
 
 /// What a model is to be good at: displacements, or the lateral ones, which mechanics then makes fields of.
 enum class HueAim { displacement, lateral };
 
 /// The model of that form among `forms` that errs least on series left out (sensors::rank_hue_forms).
-sensors::HueModel best_hue_model(const ChromaBench& bench, const std::vector<sensors::HueSample>& samples,
+sensors::HueModel best_hue_model(const ChromaSetup& setup, const std::vector<sensors::HueSample>& samples,
                                  const std::vector<sensors::HueModelForm>& forms, HueAim aim);
 
 }  // namespace touchstone::lab

@@ -20,9 +20,9 @@ using ::testing::HasSubstr;
 const std::filesystem::path kScenes = std::filesystem::path(TOUCHSTONE_SOURCE_DIR) / "scenes";
 
 /// Set up once: some ten seconds.
-const DvsGraspBench& bench() {
+const DvsGraspSetup& setup() {
   static const test::TemporaryFolder cache;
-  static const DvsGraspBench made(kScenes, cache.path());
+  static const DvsGraspSetup made(kScenes, cache.path());
   return made;
 }
 
@@ -31,14 +31,14 @@ TEST(DvsGrasps, SofterPiecesTakeLongerAndCoverMoreAtTheSameForce) {
   double last_time = 1e9;
   double last_travel = 1e9;
   for (const int material : {0, 1, 3}) {
-    DvsGraspParameters p = draw_dvs_grasp(material, bench().piece(material), 3, 0);
+    DvsGraspParameters p = draw_dvs_grasp(material, setup().piece(material), 3, 0);
     p.pose = {};
     p.pose.pitch_deg = 0.1;
     p.rms_slope = 0.08;
     p.motion.target_force_N = 2.0;
     p.motion.clearance_mm = 1.0;
     if (material == 0) p.youngs_modulus_MPa = 0.15;
-    const DvsGrasp grasp = bench().play(p);
+    const DvsGrasp grasp = setup().play(p);
     const sim::FaceMap map = grasp.face->map(grasp.face->at_normal_force(1.0));
     const double cover = cv::sum(map.coverage)[0] * grasp.face->grid().pixel_area();
     EXPECT_LT(cover, 0.95 * last_cover);
@@ -55,10 +55,10 @@ TEST(DvsGrasps, SofterPiecesTakeLongerAndCoverMoreAtTheSameForce) {
 }
 
 TEST(DvsGrasps, TheSameParametersGiveTheSameGrasp) {
-  const DvsGraspParameters p = bench().draw(11).back();
+  const DvsGraspParameters p = setup().draw(11).back();
   EXPECT_EQ(p.material, 3);
-  const DvsGrasp one = bench().play(p);
-  const DvsGrasp two = bench().play(p);
+  const DvsGrasp one = setup().play(p);
+  const DvsGrasp two = setup().play(p);
   ASSERT_EQ(one.readings.size(), two.readings.size());
   for (std::size_t k = 0; k < one.readings.size(); ++k)
     EXPECT_EQ(one.readings[k].measured_N, two.readings[k].measured_N);
@@ -68,19 +68,19 @@ TEST(DvsGrasps, TheSameParametersGiveTheSameGrasp) {
 }
 
 TEST(DvsGrasps, WrongMaterialsAndMissingScenesAreRefused) {
-  DvsGraspParameters p = bench().draw(1).front();
+  DvsGraspParameters p = setup().draw(1).front();
   p.material = 4;
-  EXPECT_THROW(bench().play(p), Error);
+  EXPECT_THROW(setup().play(p), Error);
   p.material = 0;
   p.youngs_modulus_MPa = 0.0;
   try {
-    bench().play(p);
+    setup().play(p);
     ADD_FAILURE();
   } catch (const Error& error) {
     EXPECT_THAT(error.what(), HasSubstr("Young's modulus is 0"));
   }
   const test::TemporaryFolder empty;
-  EXPECT_THROW(DvsGraspBench(empty.path(), empty.path()), Error);
+  EXPECT_THROW(DvsGraspSetup(empty.path(), empty.path()), Error);
 }
 
 }  // namespace

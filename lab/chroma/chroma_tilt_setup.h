@@ -1,5 +1,5 @@
 #pragma once
-// An optical bench for one coloured marker behind its filter: what a tilt of the surface does to the marker's picture
+// An optical setup for one coloured marker behind its filter: what a tilt of the surface does to the marker's picture
 // ([Lin2019, sec. V]: "the center of a marker that experiences a pure tilt will be measured with a systematic error.
 // Spherical markers can limit this effect."). Only light, no mechanics: the white sheet is given its shape.
 
@@ -22,9 +22,9 @@ enum class TiltMarker {
   ball,   ///< a matt ball as wide as the square, in the gel right under the sheet
 };
 
-/// The bench: the chroma sensor's optics (air, plate, gel, three light guides at the plate's sides, one yellow film
+/// The setup: the chroma sensor's optics (air, plate, gel, three light guides at the plate's sides, one yellow film
 /// square at the gel's back, a white sheet for its outer surface) about one marker.
-struct TiltBench {
+struct TiltSetup {
   double gel_mm = 5.0;
   double plate_mm = 8.0;
   double side_mm = 2.0;          ///< of the marker; the ball's diameter
@@ -42,11 +42,11 @@ struct TiltBench {
 
 /// The paper's camera, 66 um a pixel, a small one 60 mm (in air) away on which the marker is 7 pixels wide, and that of
 /// scenes/devices/chroma.yaml: as near, with the paper's lens, 55 um a pixel and 8 mm of gel.
-TiltBench far_bench();
+TiltSetup far_setup();
 /// The small camera 60 mm away.
-TiltBench compact_bench();
+TiltSetup compact_setup();
 /// The device's own distance.
-TiltBench near_bench();
+TiltSetup near_setup();
 
 /// How the sheet stands at the marker: it is turned and moved as a whole within 1.6 mm, and fades from there to rest at
 /// 4.2 mm. The turn is about the marker's own centre, so the centre moves by `moved_mm` only.
@@ -74,14 +74,14 @@ struct TiltColours {
 /// The camera's colours of the four spectra, DN without noise.
 TiltColours tilt_colours(const TiltSpectra& spectra);
 
-/// The bench as the tracer takes it. @throws Error for a tilt beyond pi / 4, or a marker that is moved to the film
-render::Scene tilt_scene(const TiltBench& bench, const TiltSpectra& spectra, TiltMarker marker, const TiltPose& pose);
+/// The setup as the tracer takes it. @throws Error for a tilt beyond pi / 4, or a marker that is moved to the film
+render::Scene tilt_scene(const TiltSetup& setup, const TiltSpectra& spectra, TiltMarker marker, const TiltPose& pose);
 /// Its camera: the part of the picture about the marker.
-render::Camera tilt_camera(const TiltBench& bench);
+render::Camera tilt_camera(const TiltSetup& setup);
 
 /// The picture: CV_32FC3, red, green and blue, in proportion to the electrons of pixels of each colour at every place
 /// (no mosaic, no noise but the paths'), white balanced so that the lamps' light is grey.
-cv::Mat tilt_picture(const TiltBench& bench, const TiltSpectra& spectra, TiltMarker marker, const TiltPose& pose,
+cv::Mat tilt_picture(const TiltSetup& setup, const TiltSpectra& spectra, TiltMarker marker, const TiltPose& pose,
                      std::uint64_t seed);
 
 }  // namespace touchstone::lab

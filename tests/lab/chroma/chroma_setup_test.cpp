@@ -1,6 +1,6 @@
 // Pictures of both chroma devices, read: at rest, pressed beside the axis and sheared.
 
-#include "lab/chroma/chroma_bench.h"
+#include "lab/chroma/chroma_setup.h"
 
 #include <gtest/gtest.h>
 
@@ -19,12 +19,12 @@ namespace {
 
 constexpr std::size_t kPressFrames = 3;
 
-/// A device on its bench, and a ball of 12.7 mm that has been pressed in by 1.8 mm and then pulled along x by 0.6 mm.
+/// A device in its setup, and a ball of 12.7 mm that has been pressed in by 1.8 mm and then pulled along x by 0.6 mm.
 struct Pressed {
   sim::DeviceSpec device;
   sim::VirtualSensor sensor;
-  ChromaBench bench;
-  std::vector<ChromaLook> looks;
+  ChromaSetup setup;
+  std::vector<ChromaRecord> records;
   sensors::PictureMap map;
 
   static constexpr double kX = 7.5, kY = 4.5, kRadius = 6.35;
@@ -32,8 +32,8 @@ struct Pressed {
   explicit Pressed(const std::string& name)
       : device(sim::read_device(std::string(TOUCHSTONE_SOURCE_DIR) + "/scenes/devices/" + name + ".yaml")),
         sensor(device, cache(), chroma_sensor_settings(5)),
-        bench(sensor, 5),
-        map(sensors::map_of_rest(bench.rest(), bench.spacing_mm())) {
+        setup(sensor, 5),
+        map(sensors::map_of_rest(setup.rest(), setup.spacing_mm())) {
     const sim::ObjectSpec ball =
         sim::read_object(std::string(TOUCHSTONE_SOURCE_DIR) + "/scenes/objects/ball-12.7mm.yaml");
     sim::MotionSpec motion;
@@ -45,7 +45,7 @@ struct Pressed {
     pull.frames = 2;
     pull.x = sim::AxisKey{kX + 0.6, std::nullopt};
     motion.keys = {press, pull};
-    looks = bench.play(ball, motion, 11);
+    records = setup.play(ball, motion, 11);
   }
 
   /// The devices have the same gel.
@@ -55,14 +55,14 @@ struct Pressed {
   }
   /// Of a marker that is sound in frame `frame`.
   sensors::MarkerChange change(std::size_t frame, std::size_t marker) const {
-    return sensors::change_of(looks[frame].reading.markers[marker], bench.rest().markers[marker], map);
+    return sensors::change_of(records[frame].reading.markers[marker], setup.rest().markers[marker], map);
   }
   /// Markers that are sound there and pressed by at least so much.
   std::vector<std::size_t> pressed(std::size_t frame, double least_mm) const {
     std::vector<std::size_t> found;
-    for (std::size_t i = 0; i < looks[frame].truth.size(); ++i) {
-      const bool sound = looks[frame].reading.markers[i].flaw == sensors::MarkerFlaw::kNone;
-      if (sound && -looks[frame].truth[i].z() >= least_mm) found.push_back(i);
+    for (std::size_t i = 0; i < records[frame].truth.size(); ++i) {
+      const bool sound = records[frame].reading.markers[i].flaw == sensors::MarkerFlaw::kNone;
+      if (sound && -records[frame].truth[i].z() >= least_mm) found.push_back(i);
     }
     return found;
   }
@@ -80,13 +80,13 @@ class ChromaDevices : public testing::TestWithParam<const char*> {
 
 TEST_P(ChromaDevices, AllMarkersAreReadAtRestWhereTheyArePrinted) {
   const Pressed& p = on();
-  const auto& rest = p.bench.rest();
+  const auto& rest = p.setup.rest();
   ASSERT_EQ(rest.markers.size(), 100u);
   EXPECT_EQ(rest.light, sensors::FrameLight::kNormal);
   for (std::size_t i = 0; i < rest.markers.size(); ++i) {
     ASSERT_EQ(rest.markers[i].flaw, sensors::MarkerFlaw::kNone) << i;
     const Eigen::Vector2d at = p.sensor.gel_from_pixel(rest.markers[i].ink_centroid_px);
-    EXPECT_LT((at - p.bench.markers().markers[i].centre).norm(), 0.1) << i;
+    EXPECT_LT((at - p.setup.markers().markers[i].centre).norm(), 0.1) << i;
     // Red: between the film's yellow and the ink's magenta.
     EXPECT_LT(std::abs(std::remainder(rest.markers[i].hue, 2.0 * kPi)), 0.35) << i;
   }
@@ -104,7 +104,7 @@ TEST_P(ChromaDevices, WhiteIsBrightAndNothingIsWashedOut) {
   EXPECT_LT(white, 195.0);
   const sim::TouchObject ball =
       p.sensor.object(sim::read_object(std::string(TOUCHSTONE_SOURCE_DIR) + "/scenes/objects/ball-12.7mm.yaml"));
-  EXPECT_LT(brightest(p.sensor.capture(ball, p.looks[kPressFrames].state.press, 3, 0, false).frame), 250.0);
+  EXPECT_LT(brightest(p.sensor.capture(ball, p.records[kPressFrames].state.press, 3, 0, false).frame), 250.0);
 }
 
 TEST_P(ChromaDevices, HueFallsTowardsTheInksTheDeeperItIsPressed) {
@@ -124,11 +124,11 @@ TEST_P(ChromaDevices, HueFallsTowardsTheInksTheDeeperItIsPressed) {
 
 TEST_P(ChromaDevices, InkFollowsShear) {
   const Pressed& p = on();
-  const std::size_t last = p.looks.size() - 1;
+  const std::size_t last = p.records.size() - 1;
   int count = 0;
   for (const std::size_t i : p.pressed(last, 0.7)) {
-    const double truth = p.looks[last].truth[i].x() - p.looks[kPressFrames].truth[i].x();
-    if (p.looks[kPressFrames].reading.markers[i].flaw != sensors::MarkerFlaw::kNone || truth < 0.1) continue;
+    const double truth = p.records[last].truth[i].x() - p.records[kPressFrames].truth[i].x();
+    if (p.records[kPressFrames].reading.markers[i].flaw != sensors::MarkerFlaw::kNone || truth < 0.1) continue;
     const double seen = p.change(last, i).ink_centroid_mm.x() - p.change(kPressFrames, i).ink_centroid_mm.x();
     EXPECT_NEAR(seen, truth, 0.1 + 0.1 * truth) << i;
     ++count;
@@ -143,9 +143,9 @@ TEST_P(ChromaDevices, ParallaxTakenOffLeavesASmallerLateralError) {
   double without = 0.0;
   double with = 0.0;
   for (const std::size_t i : p.pressed(kPressFrames, 0.4)) {
-    const Eigen::Vector3d& truth = p.looks[kPressFrames].truth[i];
+    const Eigen::Vector3d& truth = p.records[kPressFrames].truth[i];
     const Eigen::Vector2d seen = p.change(kPressFrames, i).ink_centroid_mm;
-    const Eigen::Vector2d place = p.bench.markers().markers[i].centre;
+    const Eigen::Vector2d place = p.setup.markers().markers[i].centre;
     without += (seen - truth.head<2>()).squaredNorm();
     with += (parallax.true_one(seen, -truth.z(), place) - truth.head<2>()).squaredNorm();
   }
@@ -153,10 +153,10 @@ TEST_P(ChromaDevices, ParallaxTakenOffLeavesASmallerLateralError) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Devices, ChromaDevices, testing::Values("chroma", "chroma-compact"), [](const auto& device) {
-  return std::string(device.param) == "chroma" ? "Bench" : "Compact";
+  return std::string(device.param) == "chroma" ? "Setup" : "Compact";
 });
 
-TEST(ChromaBench, DistanceToTheMarkersIsThatOfTheDrawing) {
+TEST(ChromaSetup, DistanceToTheMarkersIsThatOfTheDrawing) {
   sim::DeviceSpec device = sim::read_device(std::string(TOUCHSTONE_SOURCE_DIR) + "/scenes/devices/chroma-compact.yaml");
   EXPECT_NEAR(parallax_of(device).viewing_distance_mm, 1.41 * 30.0, 0.02);
   device.camera.reset();

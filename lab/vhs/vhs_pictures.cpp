@@ -1,4 +1,4 @@
-#include "lab/vhs/vhs_visual_bench.h"
+#include "lab/vhs/vhs_pictures.h"
 
 #include <cmath>
 #include <cstdint>
