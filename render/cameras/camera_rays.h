@@ -41,7 +41,7 @@ struct LayerRay {
   double weight = 0.0;                ///< irradiance on the sensor per basic radiance, mean over the bands
 };
 /// For the place (x, y) of the picture in pixels, and (u, v) in the hole or lens, each from 0 to 1. What bends or
-/// weakens on the way to `layer` counts; surfaces don't.
+/// weakens before `layer` counts; surfaces don't.
 std::optional<LayerRay> ray_in_layer(const Scene& fixture, const ReadyCamera& camera, int layer, double x, double y,
                                      double u, double v);
 

@@ -32,7 +32,7 @@ class DirectBatch {
  public:
   static constexpr int kMostPackets = 16;
 
-  /// Makes room for kMostPackets packets. The frame must outlive this.
+  /// Allocates kMostPackets packets. The frame must outlive this.
   explicit DirectBatch(const DirectFrame& frame);
 
   /// What the rays meet and what each lamp would send there; at most kMostPackets.

@@ -74,7 +74,7 @@ Eigen::VectorXd sum_gradient(const LayerValues& values, const std::vector<Eigen:
 /// evaluate() for one sample at a time, without allocating. One object is for one thread.
 class NetworkRunner {
  public:
-  /// Makes room for the values of networks of this shape.
+  /// Allocates the values of networks of this shape.
   explicit NetworkRunner(const FeedForwardNetwork& network);
   /// @pre network is that of the constructor, inputs fit. What it returns holds until the next call
   const Eigen::VectorXd& run(const FeedForwardNetwork& network, const Eigen::VectorXd& inputs);

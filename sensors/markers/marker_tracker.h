@@ -21,7 +21,7 @@
 
 namespace touchstone::sensors {
 
-/// How markers look, how far they may go between frames, and how much their area may change.
+/// What markers look like, how far they may go between frames, and how much their area may change.
 struct MarkerTrackerSettings {
   MarkerAppearance appearance = {};
   double longest_step = 0.4;     ///< between two frames, as a part of the spacing; 0.05 to 0.5
