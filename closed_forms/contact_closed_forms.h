@@ -12,6 +12,7 @@ namespace touchstone::closed_forms {
 /// Force of a rigid sphere (paraboloid) of radius R pressed by `depth` into a half space [Hertz1882]:
 /// F = 4 E sqrt(R) d^1.5 / (3 (1 - nu^2)); the contact radius is sqrt(R d).
 double hertz_force(double youngs_modulus, double poisson_ratio, double radius, double depth);
+/// Radius of the contact of hertz_force, mm: sqrt(R d).
 double hertz_contact_radius(double radius, double depth);
 /// Largest pressure, in the middle: 3 F / (2 pi a^2).
 double hertz_largest_pressure(double force, double contact_radius);
@@ -22,11 +23,13 @@ double flat_punch_force(double youngs_modulus, double poisson_ratio, double radi
 /// A true sphere on a half space [Sneddon1965]: depth and force for a contact radius,
 /// d = (a/2) ln((R+a)/(R-a)), F = E/(2 (1-nu^2)) [(a^2 + R^2) ln((R+a)/(R-a)) - 2 a R].
 double sneddon_sphere_depth(double radius, double contact_radius);
+/// Force on that sphere, N: the second equation above.
 double sneddon_sphere_force(double youngs_modulus, double poisson_ratio, double radius, double contact_radius);
 
 /// A rigid sphere under normal force P, sheared by Q < mu P ([Cattaneo1938], [Mindlin1949]; coupling neglected, exact
 /// along x at nu = 0.5 but for the slip's direction): stick radius over contact radius, and tangential displacement.
 double mindlin_stick_ratio(double shear, double friction, double force);
+/// How far the sphere has moved along the surface under Q, mm, beyond the gel far from it.
 double mindlin_displacement(double youngs_modulus, double poisson_ratio, double contact_radius, double shear,
                             double friction, double force);
 

@@ -19,6 +19,7 @@ struct SourceLocation {
 /// `what()` is one line, `file:line: message` where the place is known.
 class Error : public std::runtime_error {
  public:
+  /// A mistake that has no place in a file.
   explicit Error(const std::string& message);
   Error(SourceLocation where, const std::string& message);
 
@@ -34,6 +35,7 @@ template <typename... Args>
   throw Error(fmt::format(format, std::forward<Args>(args)...));
 }
 
+/// The same, with the place in an input file at which it went wrong.
 template <typename... Args>
 [[noreturn]] void fail_at(const SourceLocation& where, fmt::format_string<Args...> format, Args&&... args) {
   throw Error(where, fmt::format(format, std::forward<Args>(args)...));

@@ -43,6 +43,7 @@ std::vector<std::uint8_t> pack_hdf5_row(const void* values, std::size_t bytes, s
 /// do what is asked.
 class Hdf5Writer {
  public:
+  /// A file without a user block.
   explicit Hdf5Writer(const std::filesystem::path& file);
   /// `user_block` bytes before what HDF5 knows of (0, or a power of 2 from 512 up) are left to the caller, see close.
   Hdf5Writer(const std::filesystem::path& file, std::size_t user_block);
@@ -133,11 +134,13 @@ struct Hdf5Array {
 /// Reads files of any HDF5 writer. Each function throws Error, naming file and dataset.
 class Hdf5Reader {
  public:
+  /// Opens the file. @throws Error if it isn't there or isn't HDF5
   explicit Hdf5Reader(const std::filesystem::path& file);
   ~Hdf5Reader();
   Hdf5Reader(const Hdf5Reader&) = delete;
   Hdf5Reader& operator=(const Hdf5Reader&) = delete;
 
+  /// A whole dataset; HDF5 turns its numbers into T.
   template <typename T>
   Hdf5Array<T> read(const std::string& path) const {
     Hdf5Array<T> array;
@@ -176,11 +179,15 @@ class Hdf5Reader {
   void read_part(const std::string& path, std::int64_t first, std::span<T> values) const {
     read_list_part(path, hdf5_type<T>(), first, static_cast<std::int64_t>(values.size()), values.data());
   }
+  /// A list of texts.
   std::vector<std::string> read_texts(const std::string& path) const;
   /// A text attribute of a dataset, or of the file if `path` is "/".
   std::string text_attribute(const std::string& path, const std::string& name) const;
+  /// A whole number, likewise.
   std::int64_t integer_attribute(const std::string& path, const std::string& name) const;
+  /// Is there a dataset or a group of this path?
   bool has(const std::string& path) const;
+  /// Has the dataset, or the file if `path` is "/", this attribute?
   bool has_attribute(const std::string& path, const std::string& name) const;
 
  private:

@@ -11,9 +11,12 @@
 
 namespace touchstone {
 
+/// Pixels along a side of the chip's square picture.
 inline constexpr int kChipSide = 18;
+/// Pixels of a picture, and so frames that it takes to read one.
 inline constexpr int kChipPixels = kChipSide * kChipSide;
 
+/// Where a pixel lies in the picture as a person sees it.
 struct ChipPlace {
   int row = 0;     ///< from the top of the picture
   int column = 0;  ///< from the left
@@ -29,6 +32,7 @@ constexpr int grabbed_frame(ChipPlace place) {
   return place.column * kChipSide + (kChipSide - 1 - place.row);
 }
 
+/// One picture read out of the chip, with the time that it took.
 struct GrabbedImage {
   cv::Mat image;              ///< CV_8UC1, 18x18, 0 to 63
   std::int64_t first_us = 0;  ///< end of the exposure of the first pixel grabbed

@@ -38,12 +38,15 @@ enum class Purpose : std::uint32_t {
 /// UniformRandomBitGenerator.
 class RandomStream {
  public:
+  /// What the standard asks of a UniformRandomBitGenerator.
   using result_type = std::uint32_t;
 
+  /// The stream of these three; another purpose or index shares no numbers with it.
   RandomStream(std::uint64_t seed, std::uint64_t index, Purpose purpose);
 
   static constexpr result_type min() { return 0; }
   static constexpr result_type max() { return 0xffffffffu; }
+  /// The next number.
   result_type operator()();
 
   /// Uniform in [0, 1), of 53 bits.

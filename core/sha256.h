@@ -16,6 +16,7 @@ class Sha256 {
   Sha256(const Sha256&) = delete;
   Sha256& operator=(const Sha256&) = delete;
 
+  /// Hashes these bytes behind those before them.
   void add(const void* bytes, std::size_t size);
   void add(std::string_view text);
   /// Ends the sum. Nothing can be added afterwards.
@@ -26,6 +27,7 @@ class Sha256 {
   std::unique_ptr<Context> context_;
 };
 
+/// Of these bytes, as 64 hexadecimal digits in small letters.
 std::string sha256_of(std::string_view bytes);
 /// @throws Error if the file can't be read
 std::string sha256_of_file(const std::filesystem::path& path);

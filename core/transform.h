@@ -19,6 +19,7 @@ struct RigidTransform {
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();
 
   Eigen::Vector3d operator*(const Eigen::Vector3d& point) const { return rotation * point + translation; }
+  /// Of `other` first, then of this.
   RigidTransform operator*(const RigidTransform& other) const {
     return {rotation * other.rotation, rotation * other.translation + translation};
   }

@@ -15,6 +15,7 @@ std::string read_whole_file(const std::filesystem::path& path);
 void write_whole_file(const std::filesystem::path& path,
                       const std::function<void(const std::filesystem::path& temporary)>& write);
 
+/// The same, with this content.
 void write_whole_file(const std::filesystem::path& path, std::string_view content);
 
 }  // namespace touchstone

@@ -15,6 +15,7 @@ namespace touchstone {
 
 /// One form that a value may have.
 struct YamlForm {
+  /// What stands there; `name` is a text out of a fixed list.
   enum class Kind { number, integer, boolean, text, name, list, map };
   Kind kind = Kind::text;
   Allowed allowed = {};                     ///< number, integer; without the bounds that depend on other fields
@@ -27,6 +28,7 @@ struct YamlForm {
   bool operator==(const YamlForm&) const = default;
 };
 
+/// A key of a map, and what may stand behind it.
 struct YamlField {
   std::string key;
   bool required = false;
@@ -39,6 +41,7 @@ struct YamlField {
 
 /// Which keys can stand together.
 struct YamlRule {
+  /// Exactly one of the keys must be there, or at most one of two may be.
   enum class Kind { exactly_one, not_both };
   Kind kind = Kind::exactly_one;
   std::vector<std::string> keys;
@@ -48,6 +51,7 @@ struct YamlRule {
 
 /// A case of a field, on which it depends what other fields there are.
 struct YamlCase {
+  /// Is the field absent, there, there with this value, or there with another one?
   enum class Kind { absent, present, equal, other };  ///< other: there, but not equal
   Kind kind = Kind::absent;
   YamlScalar value = false;  ///< equal, other
@@ -67,6 +71,7 @@ struct YamlMap {
   bool operator==(const YamlMap&) const = default;
 };
 
+/// The fields that there are in some cases of the field YamlMap::by.
 struct YamlBranch {
   std::vector<YamlCase> cases;  ///< any of them
   YamlMap map;

@@ -43,6 +43,7 @@ struct Allowed {
   static Allowed above_up_to(double low, double high) { return {.low = low, .high = high, .low_included = false}; }
 
   bool operator==(const Allowed&) const = default;
+  /// Is the value within the bounds? NaN never is.
   bool holds(double value) const;
   std::string text() const;  ///< "above 0", "from 0 to 0.5"
 };
@@ -56,6 +57,8 @@ using YamlScalar = std::variant<bool, std::int64_t, double, std::string>;
 
 struct YamlMap;
 
+/// A place in a YAML file that is being read: a map whose fields are asked for by name, or a value. Every mistake is an
+/// Error with file, line, field, the value found and what is allowed.
 class YamlReader {
  public:
   /// Parses a file whose root is a map. @throws Error with file and line
@@ -87,6 +90,7 @@ class YamlReader {
   /// Refuses `key` if any of `others` stands in the map, too.
   void not_beside(const std::string& key, const std::vector<std::string>& others);
 
+  /// Does the key stand in the map? From now on it counts as a known one.
   bool has(const std::string& key) const;
   /// Where the field `key` stands, or the map itself if it isn't there.
   SourceLocation where(const std::string& key) const;
@@ -96,11 +100,14 @@ class YamlReader {
 
   // For types that may stand in several forms: they have, in the place of `fields`, a function
   // `read_value(YamlReader& in, T& value, Allowed allowed)` that looks at what stands there.
+  /// Does a list stand here?
   bool is_list() const;
+  /// Does a map stand here?
   bool is_map() const;
   std::string text() const { return scalar("a number, a list or a file's name"); }
   /// The text, if it begins and ends so.
   std::optional<std::string> text_with(const std::string& begin, const std::string& end) const;
+  /// The number that stands here. @throws Error if there is none, or one that isn't allowed
   double number(Allowed allowed) const;
   std::vector<double> numbers(Allowed allowed) const;  ///< of a list
   std::string context() const;                         ///< the field, for messages: "gel.thickness_mm: " or ""

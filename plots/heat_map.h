@@ -6,6 +6,7 @@
 
 namespace touchstone::plots {
 
+/// Values over a grid: one cell for each pair of x and y.
 struct HeatMap {
   std::string title;
   std::string x_label, y_label;
@@ -15,7 +16,7 @@ struct HeatMap {
   bool logarithmic = false;                 ///< colours by the logarithm, if all values are above 0
 };
 
-/// The plot as one <svg> element, 640 x 440, with its own colours and no outside resource: a cell a value, with the
+/// The plot as one SVG element, 640 x 440, with its own colours and no outside resource: a cell a value, with the
 /// value in it; dark is low. Plain ASCII if the labels are. @pre values are as many as x and y
 std::string to_svg(const HeatMap& map);
 

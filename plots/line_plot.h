@@ -18,6 +18,7 @@ struct PlotCurve {
   std::optional<std::size_t> colour = {};  ///< number in the palette of six; none: as the curves' order
 };
 
+/// Curves over one pair of axes; on a logarithmic axis only values above 0 are shown.
 struct LinePlot {
   std::string title;
   std::string x_label;
@@ -27,7 +28,7 @@ struct LinePlot {
   std::vector<PlotCurve> curves;
 };
 
-/// The plot as one <svg> element, 640 x 400, with its own colours and no outside resource. Points that aren't finite,
+/// The plot as one SVG element, 640 x 400, with its own colours and no outside resource. Points that aren't finite,
 /// and those not above zero on a logarithmic axis, are left out. Plain ASCII if the labels are.
 std::string to_svg(const LinePlot& plot);
 

@@ -11,6 +11,7 @@ namespace touchstone::datasets {
 /// Writes a tar file (ustar). Each function throws Error, naming the file, if it can't do what is asked.
 class TarWriter {
  public:
+  /// Begins the file, in the place of one of that name.
   explicit TarWriter(const std::filesystem::path& file);
   ~TarWriter();
   TarWriter(const TarWriter&) = delete;

@@ -12,12 +12,14 @@
 
 namespace touchstone::datasets {
 
+/// What is exported, and into how many files.
 struct WebDatasetOptions {
   std::vector<std::string> splits;      ///< of train, validate, test; empty: all that have samples
   std::int64_t samples_per_tar = 1000;  ///< at most so many; samples are dealt to tars evenly
   int threads = 0;                      ///< at most so many; 0: as many as the machine has
 };
 
+/// What an export has written.
 struct WebDatasetReport {
   std::int64_t samples = 0, tars = 0, bytes = 0;
 };

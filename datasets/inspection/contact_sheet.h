@@ -11,8 +11,7 @@ namespace touchstone::datasets {
 /// keep their proportions. A caption is plain ASCII; it breaks at '\n' and between words where it's wider than its
 /// tile, and a word that is wider alone is shrunk.
 /// @throws Error if there is no image, an image is empty or of another type, there aren't as many captions as images,
-/// or
-///   columns < 1 or tile_width_px < 32
+/// or columns < 1 or tile_width_px < 32
 cv::Mat contact_sheet(const std::vector<cv::Mat>& images, const std::vector<std::string>& captions, int columns,
                       int tile_width_px);
 

@@ -13,6 +13,7 @@ InspectedSet read_inspected_draw(const std::filesystem::path& folder);
 
 /// A sample's picture, BGR or grey, and 255 where what a pixel sees is in contact; empty if the set has none.
 cv::Mat drawn_frame(const InspectedSet& set, std::size_t sample);
+/// CV_8UC1, of the frame's size: 255 where the object touches what the pixel sees, else 0; empty if the set has none.
 cv::Mat drawn_contact(const InspectedSet& set, std::size_t sample);
 
 /// The part of the gel's surface that the camera sees, from the sample's height map: pressed in along z alone, which is

@@ -34,6 +34,7 @@ struct InspectedScene {
   std::shared_ptr<const sim::DeviceSpec> device_spec;  ///< of a drawn set, null if it can't be read back
 };
 
+/// One sample with its truth, as the set's files give it.
 struct InspectedSample {
   int scene = 0;
   int frame = 0;
@@ -47,6 +48,8 @@ struct InspectedSample {
   bool under_resolved = false;
 };
 
+/// A set of scenes or a drawn one, with all of its samples' truth but without pictures: they are read when they are
+/// shown.
 struct InspectedSet {
   std::filesystem::path folder;
   bool drawn = false;                 ///< by a job that draws (datasets/inspection/inspected_draw.h)

@@ -15,6 +15,7 @@ struct ViewerScripts {
   std::string three, gltf_loader, orbit_controls;
 };
 
+/// How much of a set its page shows.
 struct InspectionOptions {
   int tiles_per_scene = 6;  ///< of the contact sheet
   int most_tiles = 60;

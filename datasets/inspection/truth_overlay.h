@@ -17,6 +17,7 @@ class GelView {
  public:
   /// @throws Error if the device has no camera
   explicit GelView(const sim::DeviceSpec& device);
+  /// Pixels, centres at + 0.5.
   std::optional<cv::Point2d> operator()(const Eigen::Vector3d& point) const;
   /// How far a bead about `centre` reaches in the picture, px: nothing if the camera doesn't see it or has no beads.
   std::optional<double> bead_radius_px(const Eigen::Vector3d& centre) const;

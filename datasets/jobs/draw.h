@@ -32,6 +32,7 @@ struct UnitsSpec {
   std::vector<NumberVariation> vary;
 };
 
+/// One of the objects that a job presses, with what varies from piece to piece.
 struct DrawnObjectSpec {
   std::filesystem::path file;
   double weight = 1.0;                 ///< how often it's taken, relative to the others
@@ -45,6 +46,7 @@ struct PlaceSpec {
   Spread x, y;
 };
 
+/// What is drawn for each sample: unit, object, place, angles and how hard.
 struct DrawSpec {
   std::filesystem::path device;
   UnitsSpec units;
@@ -73,9 +75,11 @@ struct DrawnOutputs {
   /// Does the sensor's camera have to be simulated?
   bool camera() const { return pictures() || events || statistics; }
 };
+/// What can be stored of a sample, by its name in the job file.
 enum class DrawnOutput : std::uint8_t { frame, height, contact, beads, markers, traction, events, statistics };
 EnumNames<DrawnOutput> enum_names(DrawnOutput);
 
+/// A job file of drawn samples, as read and checked.
 struct DrawJob {
   std::string name;
   std::string licence;  ///< of the data set: an SPDX name or any text; empty: none stated

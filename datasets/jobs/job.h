@@ -17,6 +17,7 @@ namespace touchstone::datasets {
 /// `test` is held out.
 enum class Split : std::uint8_t { train = 0, verify = 1, test = 2 };
 EnumNames<Split> enum_names(Split);
+/// "train", "verify" or "test".
 std::string name_of(Split split);
 /// @throws Error that lists the known names
 Split split_named(const std::string& name);
@@ -30,6 +31,7 @@ struct JobScene {
   SourceLocation where;
 };
 
+/// A job file of scenes, as read and checked.
 struct Job {
   std::string name;
   std::uint64_t seed = 0;

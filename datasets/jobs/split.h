@@ -12,7 +12,9 @@ namespace touchstone::datasets {
 
 /// Numbers as in the files' `split`.
 enum class DrawnSplit : std::uint8_t { train = 0, validate = 1, test = 2 };
+/// How many kinds there are; they are numbered from 0.
 inline constexpr int kDrawnSplits = 3;
+/// "train", "validate" or "test".
 std::string name_of(DrawnSplit split);
 
 /// What is dealt out as a whole.

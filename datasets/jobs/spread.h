@@ -16,14 +16,18 @@
 
 namespace touchstone::datasets {
 
+/// A distribution of one number, checked when it is read. A function of random numbers alone: see draw().
 struct Spread {
+  /// The distributions that a job file can name; `whole` is a whole number, each as likely.
   enum class Kind { constant, uniform, log_uniform, normal, one_of, whole };
   Kind kind = Kind::constant;
   double low = 0.0, high = 0.0;        ///< no draw is outside of them; of a constant both are its value
   double mean = 0.0, deviation = 0.0;  ///< normal, before it is cut off
   std::vector<double> choices;         ///< one_of
 
+  /// Always this value.
   static Spread of(double value);
+  /// Evenly between the two. @pre low <= high
   static Spread uniform(double low, double high);
 
   /// The next draw; how many random numbers it takes depends on what they are.

@@ -23,12 +23,15 @@ void write_block(const std::filesystem::path& out, const std::string& identity, 
                  const DrawnBlock& block, const DrawnUnit& unit, const UnitSensor& sensor,
                  std::span<const BlockRecord> records);
 
+/// What stands where a block's file is expected.
 enum class BlockState {
   absent,
   whole,
   damaged,  ///< cut off or changed: it is to be made again
   foreign   ///< whole, but of another job, another run or another place in it
 };
+/// Reads the whole file and checks it against its checksum; a file that can't be parsed is `damaged`. `identity` is the
+/// run's, as for write_block. @throws Error if the file can't be read
 BlockState state_of_block(const std::filesystem::path& out, const std::string& identity, const DrawnBlock& block);
 
 /// All of a block but its pictures, column by column.
@@ -40,6 +43,8 @@ struct BlockColumns {
   std::int64_t under_resolved = 0;
   std::string light;
 };
+/// Of a block that is `whole`. @throws Error naming the file, where an array is missing or of another length than the
+/// block
 BlockColumns read_block_columns(const std::filesystem::path& out, const DrawnBlock& block);
 
 }  // namespace touchstone::datasets

@@ -39,6 +39,7 @@ struct BlockRecord {
 /// A touch that mechanics or light can't do: beside the gel, too deep, a shear that friction can't hold.
 class Unpressable : public Error {
  public:
+  /// The reason in words, as of any Error.
   using Error::Error;
 };
 

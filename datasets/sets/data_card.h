@@ -20,13 +20,16 @@ struct Histogram {
   double least = 0.0, most = 0.0, sum = 0.0;
   std::int64_t samples = 0;
 
+  /// Counts a value; one outside of the bounds counts in the outermost bin.
   void add(double value);
   double mean() const { return samples > 0 ? sum / static_cast<double>(samples) : 0.0; }
 };
 
 /// What a data set's blocks hold in all; memory doesn't grow with them.
 struct DrawnFigures {
+  /// Without samples; the histograms' bounds are what the job's draws can give.
   explicit DrawnFigures(const PreparedDraw& prepared);
+  /// Counts a block's samples.
   void add(const BlockColumns& block);
 
   std::vector<Histogram> histograms;
@@ -37,8 +40,8 @@ struct DrawnFigures {
   std::map<std::string, std::int64_t> light;  ///< how pictures are lit: units
 };
 
-inline constexpr double kSmallForce_N = 0.05;
-inline constexpr double kLargeStrain = 0.2;
+inline constexpr double kSmallForce_N = 0.05;  ///< forces below it have no relative error on the card
+inline constexpr double kLargeStrain = 0.2;  ///< presses beyond it are counted: the gel is computed as linearly elastic
 
 /// README.md
 std::string data_card(const PreparedDraw& prepared, const DrawnFigures& figures);

@@ -1,9 +1,9 @@
 #pragma once
 // From a job to a data set in a folder:
-//   OUT/frames/<scene>/000012.png    what the camera delivers (also ideal/ and radiance/, where asked for)
-//   OUT/events/<scene>.h5            what event pixels give of a scene, where asked for (sensors/events/event_file.h)
-//   OUT/truth.h5                     what is true at each sample (truth_file.h)
-//   OUT/dataset.json                 what it is and how it came to be (manifest.h); written last
+//   OUT/frames/SCENE/000012.png   what the camera delivers (also ideal/ and radiance/, where asked for)
+//   OUT/events/SCENE.h5           what event pixels give of a scene, where asked for (sensors/events/event_file.h)
+//   OUT/truth.h5                   what is true at each sample (truth_file.h)
+//   OUT/dataset.json               what it is and how it came to be (manifest.h); written last
 // Sample i is a pure function of (job, i): the same job gives the same bytes with any number of threads, and a run
 // that was killed and started again gives the bytes of one that never was.
 
@@ -16,6 +16,7 @@
 
 namespace touchstone::datasets {
 
+/// How a job of scenes is run; none of it changes a sample.
 struct GenerateOptions {
   SampleSource source;
   int threads = 0;      ///< at most so many; 0: as many as the machine has

@@ -25,6 +25,7 @@ struct Shard {
 /// Reads "2/8". @throws Error
 Shard shard_of(const std::string& text);
 
+/// How a job that draws is run; none of it changes a sample.
 struct DrawnOptions {
   SensorSource source;
   int threads = 0;  ///< at most so many; 0: as many as the machine has

@@ -19,6 +19,7 @@ struct ManifestBlock {
   std::int64_t first_sample = 0, samples = 0;
 };
 
+/// Of a finished set: what it is called, and which file holds which sample.
 struct DrawnManifest {
   std::string name, licence, content_sha256;
   std::int64_t samples = 0;

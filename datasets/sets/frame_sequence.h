@@ -13,6 +13,7 @@
 
 namespace touchstone::datasets {
 
+/// One picture's file, when it was taken, and the force at that time.
 struct LabelledFrame {
   std::filesystem::path file;
   std::int64_t t_us = 0;

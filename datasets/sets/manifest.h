@@ -52,7 +52,7 @@ struct ManifestScene {
   Split split = Split::train;
   std::int64_t first_sample = 0;
   std::int64_t samples = 0;
-  bool has_frames = false;  ///< pictures lie in frames/<name>/
+  bool has_frames = false;  ///< pictures lie in frames/NAME/
 };
 
 /// What programs read back of a manifest.
@@ -74,7 +74,7 @@ Manifest read_manifest(const std::filesystem::path& folder);
 /// Compares every file of the manifest with its checksum. @throws Error that names the first that differs
 void verify_files(const std::filesystem::path& folder, const Manifest& manifest);
 
-/// frames/<scene>/000012.png and the like: `folder` is "frames", "ideal" or "radiance".
+/// frames/SCENE/000012.png and the like: `folder` is "frames", "ideal" or "radiance".
 std::string picture_name(const std::string& folder, const std::string& scene, std::int64_t frame,
                          const std::string& ending);
 

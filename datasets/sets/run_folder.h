@@ -41,6 +41,7 @@ class RunFolder {
 
   /// Records of earlier runs whose files are all there, whole, sorted by sample.
   std::vector<FrameRecord> whole_records() const;
+  /// The file of the records.
   std::filesystem::path journal() const;
   /// From now on what is in the folder is worth keeping.
   void keep();

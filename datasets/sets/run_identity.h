@@ -29,6 +29,7 @@ RunIdentity identity_of(const PreparedJob& job);
 /// empty string.
 std::string difference(const RunIdentity& before, const RunIdentity& now);
 
+/// As run_identity_from_json reads it back.
 std::string to_json(const RunIdentity& identity);
 /// @throws Error naming `name` if the text isn't what to_json wrote
 RunIdentity run_identity_from_json(const std::string& text, const std::string& name);

@@ -19,6 +19,7 @@ namespace touchstone::datasets {
 /// What a data set's samples come from: the simulator; in tests, something that counts or fails on purpose. Each
 /// function is a pure function of its arguments and may be called from several threads at once.
 struct SampleSource {
+  /// What the camera delivers of a state of the gel.
   using Camera = std::function<sim::Capture(const sim::Truth&)>;
 
   std::function<std::shared_ptr<const fem::Compliance>(const sim::DeviceSpec&, const Progress&)> set_up_gel;

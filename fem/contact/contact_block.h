@@ -13,6 +13,7 @@ namespace touchstone::fem {
 /// displacement. The whole compliance is touched only when the block changes.
 class ContactBlock {
  public:
+  /// An empty block. The gel must outlive this.
   ContactBlock(const Compliance& gel, const ContactSurface& surface);
 
   /// Makes the block hold `needed` (vertex indices, rising, unique). An old block that holds them and isn't far too

@@ -15,6 +15,7 @@ namespace touchstone::fem {
 
 /// What contact asks of the outer surface's geometry, made once.
 struct ContactSurface {
+  /// The outer surface of a gel that is set up.
   explicit ContactSurface(const Compliance& gel);
   /// `mass` is n x n: int phi_i phi_j dA (P1 hats).
   ContactSurface(std::vector<Eigen::Vector3d> vertices, std::vector<std::array<int, 3>> triangles,

@@ -49,6 +49,7 @@ struct ContactMemory {
   void forget() { state.clear(); }
 };
 
+/// What the solver found: tractions and shifts, and how well they obey the laws.
 struct ContactAnswer {
   Eigen::VectorXd z;             ///< c m, MPa
   Eigen::VectorXd shift;         ///< k, mm

@@ -15,6 +15,7 @@ struct RadonRule {
   std::array<double, 7> weights;
   RadonRule();
 };
+/// The rule, made once for the program.
 const RadonRule& radon_rule();
 
 /// The part of a cell on the side of its corners that hit, one or two of them: `piece(a, b, c)` is called for each of

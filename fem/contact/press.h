@@ -32,6 +32,7 @@ namespace touchstone::fem {
 /// What one translation axis of the object is commanded: its position (mm, the object frame's origin in the gel frame)
 /// or the force on the object (N, gel frame; pressing gives Fz > 0).
 struct AxisControl {
+  /// What is prescribed along the axis; the other one follows.
   enum class Kind { position, force };
   Kind kind = Kind::position;
   double value = 0.0;
@@ -40,6 +41,7 @@ struct AxisControl {
   static AxisControl with_force(double force) { return {Kind::force, force}; }
 };
 
+/// Where the object is to be at the end of a step, or what is to act on it.
 struct PressTarget {
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< gel from object
   std::array<AxisControl, 3> axis;                         ///< x, y, z
@@ -112,6 +114,8 @@ struct PressState {
   int parts = 0;   ///< in how many parts the step was made
 };
 
+/// The gel and what presses on it, with the history of friction and relaxation: step() leads from one state to the
+/// next. It can be moved, not copied.
 class Press {
  public:
   /// One rigid body. `friction` is Coulomb's mu >= 0; infinity: what touches sticks (a step in which that has no
@@ -144,6 +148,7 @@ class Press {
   /// The same for one body.
   const PressState& step(const PressTarget& target) { return step(std::span(&target, 1)); }
 
+  /// After the last step; before the first one the gel at rest.
   const PressState& state() const;
 
  private:

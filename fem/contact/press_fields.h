@@ -11,6 +11,7 @@ namespace touchstone::fem {
 /// Made once for a gel, which must outlive it. Safe to use from many threads.
 class PressFields {
  public:
+  /// Makes what all states share.
   explicit PressFields(const Compliance& gel);
   ~PressFields();
   PressFields(PressFields&&) noexcept;

@@ -46,6 +46,7 @@ struct PressSnapshot {
   double residual = 0.0;         ///< of the contact laws
   RelaxationHistory history;     ///< of (traction; weighted displacement by the unrelaxed gel), 6 n; may be empty
 
+  /// Is any body in contact?
   bool touching() const;
   /// As if this body had never touched.
   void forget(int body);

@@ -37,6 +37,7 @@ struct PartSolver::Body {
   WeightedGap gap;  ///< after the last shift
 };
 
+/// One iterate: where the bodies are looked up, and the block of vertices that may touch.
 struct PartSolver::Iterate {
   std::vector<Body> bodies;
   double lookup_error = 0.0;

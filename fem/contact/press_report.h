@@ -7,6 +7,7 @@
 
 namespace touchstone::fem {
 
+/// Factorisation of the surface's mass matrix, by which loads at vertices become tractions.
 using SurfaceMassFactor = Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>>;
 
 /// What a snapshot means for the user: wrenches, displacements of surface and beads, and how well it was solved.

@@ -23,6 +23,7 @@ struct PronyTerm {
   double share = 0.0;  ///< g_i, of E0
   double time = 1.0;   ///< tau_i, s
 };
+/// Its terms; empty: the gel doesn't relax. The shares' sum is below 1.
 using PronySeries = std::vector<PronyTerm>;
 
 /// @throws Error unless each share is finite and at least 0, each time finite and above 0, and the shares' sum below 1

@@ -27,6 +27,7 @@ class DenseCholesky {
  public:
   /// Takes the matrix over; only its lower half is read. False if it isn't positive definite.
   bool compute(Eigen::MatrixXd matrix);
+  /// A^-1 right, column by column. @pre compute() gave true
   Eigen::MatrixXd solve(Eigen::MatrixXd right) const;
 
  private:

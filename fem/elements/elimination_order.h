@@ -19,6 +19,7 @@ struct EliminationTree {
   std::vector<int> end;     ///< group g eliminates order[end[g-1]] up to order[end[g]-1]
   std::vector<int> parent;  ///< the group of the separator that cut it off, which is a later one; -1: none
 };
+/// As elimination_order, with its groups.
 EliminationTree elimination_tree(const TaylorHoodSpace& space);
 
 }  // namespace touchstone::fem

@@ -16,7 +16,7 @@ enum class ErrorOf {
   beads,         ///< of the bead that is furthest off, relative to the largest bead displacement
   traction       ///< over the contact, RMS, relative to the mean traction
 };
-inline constexpr int kErrorKinds = 6;
+inline constexpr int kErrorKinds = 6;  ///< of ErrorKind
 
 /// One value for each ErrorOf.
 struct RelativeErrors {

@@ -16,12 +16,14 @@ struct SimplexPoint {
 
 /// Exact for polynomials up to `degree` (conical product of Gauss-Legendre rules [Stroud1971]).
 std::vector<SimplexPoint<4>> tetrahedron_rule(int degree);
+/// The same on a triangle.
 std::vector<SimplexPoint<3>> triangle_rule(int degree);
 
 /// Walkington's rule of degree 5 with 14 points [Walkington2000]: symmetric in the corners, so that a symmetric mesh
 /// keeps its symmetry.
 const std::vector<SimplexPoint<4>>& symmetric_tetrahedron_rule();
 
+/// A direction and the solid angle that it stands for.
 struct SpherePoint {
   Eigen::Vector3d direction;  ///< unit vector
   double weight = 0.0;

@@ -20,6 +20,7 @@ struct SymmetricEntries {
   std::vector<int> columns;
   std::vector<double> values;
 
+  /// Adds `value` to the entry. @pre within the size, in the triangle
   void add(int row, int column, double value) {
     rows.push_back(row);
     columns.push_back(column);
@@ -82,6 +83,7 @@ class SymmetricFactor {
   SymmetricFactor(const SymmetricFactor&) = delete;
   SymmetricFactor& operator=(const SymmetricFactor&) = delete;
 
+  /// Rows of the matrix.
   int size() const;
   /// matrix^-1 * right, without iterative refinement. The same input gives the same bytes.
   Eigen::VectorXd solve(Eigen::VectorXd right) const;

@@ -11,6 +11,7 @@ namespace touchstone::fem {
 /// live as long as any copy of this. Copying it copies no numbers.
 class SharedMatrix {
  public:
+  /// The numbers where they lie, by columns.
   using View = Eigen::Map<const Eigen::MatrixXd>;
 
   /// Of size 0 x 0.

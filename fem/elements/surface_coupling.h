@@ -16,6 +16,7 @@ struct OuterSurface {
   std::vector<int> mesh_vertex;               ///< vertex of the mesh under each vertex of the surface
   std::vector<std::array<int, 3>> triangles;  ///< over the surface's vertices
 };
+/// Made from the faces TetMesh::outer.
 OuterSurface outer_surface(const TetMesh& mesh);
 
 /// n x n: int phi_i phi_j dA over the surface, mm^2.

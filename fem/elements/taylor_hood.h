@@ -60,6 +60,7 @@ TaylorHoodSpace make_space(const TetMesh& mesh, std::span<const ElasticMaterial>
 
 /// The scales that take units away.
 struct Scales {
+  /// The material of one region, without units.
   struct Region {
     double shear = 1.0;            ///< G / stress
     double pressure_scale = 1.0;   ///< p = stress * pressure_scale * (pressure unknown)
@@ -98,6 +99,7 @@ struct ElasticLoads {
 /// given at the bonded faces isn't in it.
 Eigen::VectorXd load_vector(const TaylorHoodSpace& space, const Scales& scales, const ElasticLoads& loads);
 
+/// Displacement and pressure at the nodes of the space.
 struct ElasticSolution {
   Eigen::MatrixX3d displacement;  ///< nodes x 3, mm
   Eigen::VectorXd pressure;       ///< per pressure of the space (the first ones: vertices), MPa
@@ -111,6 +113,7 @@ ElasticSolution solve_elastic(const TaylorHoodSpace& space, const ElasticMateria
 /// In one tetrahedron, at barycentric coordinates.
 Eigen::Vector3d displacement_at(const TaylorHoodSpace& space, const ElasticSolution& solution, int element,
                                 const Eigen::Vector4d& barycentric);
+/// The pressure there, MPa.
 double pressure_at(const TaylorHoodSpace& space, const ElasticSolution& solution, int element,
                    const Eigen::Vector4d& barycentric);
 /// Row a, column b: d u_a / d x_b.

@@ -22,6 +22,7 @@ namespace touchstone::fem {
 /// force becomes another: for an object that the coarse mesh can't see, such as a lone hair).
 enum class ReliefControl { force, pose };
 
+/// How finely the relief is resolved, where it is looked up, and to what tolerance contact is solved.
 struct ReliefSettings {
   double pitch = 0.02;  ///< mm, of pixels: a third of the finest detail
   /// mm of surface round the coarse contact that the grid begins with; below 0: two edges of the mesh or a quarter of
@@ -67,6 +68,7 @@ class HeightField {
   /// `fine` may be null: coarse heights everywhere. The surface must outlive this.
   HeightField(const SmoothSurface& surface, const PressState& press, const ReliefAnswer* fine);
 
+  /// The height over a place that a camera sees.
   double at(const Eigen::Vector2d& point) const;
   /// How far the material point that stood at `material` on the undeformed surface has moved along z.
   double at_material(const Eigen::Vector2d& material) const;

@@ -23,7 +23,7 @@ struct PixelGrid {
   std::size_t at(int i, int j) const { return static_cast<std::size_t>(j) * nx + static_cast<std::size_t>(i); }
   Eigen::Vector2d centre(int i, int j) const { return first + pitch * Eigen::Vector2d(i, j); }
   std::vector<double> columns_x() const;  ///< of the pixels' centres, mm
-  std::vector<double> rows_y() const;
+  std::vector<double> rows_y() const;     ///< along y
   double pixel_area() const { return pitch * pitch; }
   bool operator==(const PixelGrid&) const = default;
 };
@@ -75,6 +75,7 @@ class LayerResponse {
   /// call. @pre a free grid; pixels of a quarter of kWidestPixel or less are always fine enough
   const LayerResponse& on_wider_pixels() const;
 
+  /// Memory for apply(), one for each thread.
   std::unique_ptr<Scratch> make_scratch() const;
   /// @pre both spans have a value per pixel, and the scratch is of this response; they may be the same array
   void apply(std::span<const double> pressure, std::span<double> displacement, Scratch& scratch) const;
@@ -96,6 +97,7 @@ class LayerResponse {
   mutable std::unique_ptr<const LayerResponse> inverse_, wider_;
 };
 
+/// Memory of one transform, which threads don't share. It belongs to the response that made it.
 class LayerResponse::Scratch {
  public:
   ~Scratch();

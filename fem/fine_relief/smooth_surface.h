@@ -50,6 +50,7 @@ class SmoothSurface {
   explicit SmoothSurface(const Compliance& gel, double sphere_radius = std::numeric_limits<double>::infinity());
   ~SmoothSurface();
 
+  /// The coarse displacement as smooth fields over x and y.
   SmoothDisplacement displacement(const PressState& press) const;
 
   /// Normal displacement (mm, negative under pressure) at the pixels of reference_grid(): the rest, and what the

@@ -17,6 +17,7 @@ namespace touchstone::fem {
 
 /// The lines along which gaps are looked up: points of the undeformed surface whose lines hit the body, and directions.
 struct GapLines {
+  /// A point of integration within a triangle of the surface.
   struct Point {
     Eigen::Vector3d barycentric;
     double weight = 0.0;  ///< mm^2, of undeformed surface

@@ -35,6 +35,7 @@ FiniteSnapshot untouched(const FiniteGel& gel, const RigidTransform& pose);
 
 /// What contact does to the gel's nodes (nodes x 3, N): by its tractions, and by its edges against bulging.
 Eigen::MatrixX3d traction_forces(const FiniteGel& gel, const FiniteSnapshot& at);
+/// The part of these forces that acts against bulging (nodes x 3, N).
 Eigen::MatrixX3d bulge_forces(const FiniteGel& gel, const FiniteSnapshot& at);
 
 /// Newton's method for parts. Keeps nothing between them.

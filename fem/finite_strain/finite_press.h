@@ -28,6 +28,7 @@
 
 namespace touchstone::fem {
 
+/// As fem::Press for one rigid body, at finite strain. It can be moved, not copied.
 class FinitePress {
  public:
   /// `friction` as for Press. The gel must outlive this. Of the tolerance, `force`, `lookup_mm` (here: what the gaps
@@ -48,6 +49,7 @@ class FinitePress {
   /// would turn inside out or Newton's method stalls in the smallest part allowed
   const PressState& step(const PressTarget& target);
 
+  /// After the last step; before the first one the gel at rest.
   const PressState& state() const;
 
   /// The pose straight above or below `pose` in which the body just touches the undeformed gel; nothing if it isn't

@@ -27,6 +27,7 @@ class FiniteStrain {
   const TaylorHoodSpace& space() const { return space_; }
   const Scales& scales() const { return scales_; }
 
+  /// No displacement, no pressure.
   ElasticSolution at_rest() const;
 
   /// int W dV, N mm; at a solution it is the elastic energy stored. Infinite if a tetrahedron is inside out.
@@ -41,6 +42,7 @@ class FiniteStrain {
     Eigen::VectorXd values;
     double scale = 0.0;
   };
+  /// At any state in which no tetrahedron is inside out.
   Residual residual(const ElasticSolution& state) const;
 
   /// The residual's derivative, symmetric. Element blocks are added in the elements' order whatever the number of

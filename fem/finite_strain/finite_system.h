@@ -14,6 +14,7 @@ namespace touchstone::fem {
 /// behind them, the object's shifts. With c rows a vertex (1 without friction, 3 with it): the gap, and the slip in
 /// two directions.
 using LawRow = std::vector<std::pair<int, double>>;
+/// The laws of all vertices that may touch, c rows a vertex.
 struct LawRows {
   std::vector<LawRow> rows;
   int inner = 0;  ///< unknowns and shifts

@@ -28,6 +28,7 @@ struct NeoHookeanStress {
 /// W. Infinite where J <= 0.
 double energy(const NeoHookean& material, const Eigen::Matrix3d& gradient, double q);
 
+/// Its derivatives by F and by the pressure unknown. Only where J > 0.
 NeoHookeanStress stress(const NeoHookean& material, const Eigen::Matrix3d& gradient, double q);
 
 /// The change of stress() with F and q: its derivative at (F, q) applied to (dF, dq).

@@ -19,6 +19,7 @@ struct SlabGel {
   std::vector<double> layers;
 };
 
+/// A gel of any shape; meshes and checks visit it.
 using GelBody = std::variant<SlabGel, DomeGel, FingertipGel, SolidGel>;
 
 /// Meshes whose body has a smaller angle between two faces are refused (layers' flat prisms apart).
@@ -35,6 +36,7 @@ double thickness_of(const GelBody& body);
 
 /// Edge length where contact is made, and how far from the middle of the outer surface the edges are so fine, mm.
 double fine_edge(const GelBody& body);
+/// How far from the middle of the outer surface the edges are as long as fine_edge, mm.
 double fine_reach(const GelBody& body);
 
 /// Shortest side of a slab, else the thickness, mm.

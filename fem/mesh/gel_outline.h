@@ -39,12 +39,14 @@ struct Outline {
   double edge_at(const Eigen::Vector3d& x) const;
 };
 
+/// The shape in the terms that both kinds share. Nothing is checked.
 Outline outline_of(const DomeGel& dome);
 Outline outline_of(const FingertipGel& fingertip);
 
 /// @throws Error as check(DomeGel) and check(FingertipGel) say
 void check(const Outline& outline);
 
+/// How many tetrahedra a mesh of it will have, within a factor of 1.6.
 double estimated_tetrahedra(const Outline& outline);
 
 }  // namespace touchstone::fem

@@ -13,6 +13,7 @@ class TriangleTree {
   /// @pre indices in range
   TriangleTree(std::vector<Eigen::Vector3d> vertices, std::vector<std::array<int, 3>> triangles);
 
+  /// Where the line meets a triangle.
   struct Hit {
     double along = 0.0;  ///< signed distance from the point
     int triangle = -1;

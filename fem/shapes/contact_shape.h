@@ -31,6 +31,7 @@ struct BoxShape {
   Eigen::Vector3d size = Eigen::Vector3d::Ones();
 };
 
+/// The shapes that a relief may lie on.
 using PlainShape = std::variant<SphereShape, RoundedCylinder, BoxShape, MeshShape, EggShape, ShellShape>;
 
 /// A body whose lower side bears a relief: at each (x, y) of the object frame the surface that faces -z lies lower
@@ -42,6 +43,7 @@ struct ReliefShape {
   std::shared_ptr<const ReliefMap> relief;
 };
 
+/// Any shape: a plain one, or one with relief.
 using ContactShape = std::variant<SphereShape, RoundedCylinder, BoxShape, MeshShape, EggShape, ShellShape, ReliefShape>;
 
 /// Whether the gap over a plane is convex wherever the body stands.
@@ -93,6 +95,7 @@ struct BoundingBall {
   Eigen::Vector3d centre;
   double radius;
 };
+/// Of the shape with its relief; not the smallest one for every shape.
 BoundingBall bounding_ball(const ContactShape& shape);
 
 }  // namespace touchstone::fem

@@ -13,6 +13,7 @@ struct LineInterval {
   bool empty() const { return enter > leave; }
 };
 
+/// The part of the line in both; empty if there is none.
 LineInterval common(const LineInterval& a, const LineInterval& b);
 
 /// Where low <= coordinate <= high, for a coordinate start + t slope.

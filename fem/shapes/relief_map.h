@@ -16,6 +16,7 @@ class ReliefMap {
   ReliefMap(int nx, int ny, Eigen::Vector2d first, Eigen::Vector2d spacing, std::array<bool, 2> repeated,
             std::vector<float> heights);
 
+  /// Height over a place of the plane, mm.
   double at(double x, double y) const;
   double highest() const { return highest_; }
 

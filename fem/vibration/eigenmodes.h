@@ -18,6 +18,7 @@ namespace touchstone::fem {
 /// nodes x nodes: int N_i N_j dV, mm^3, the quadratic functions. Exact.
 Eigen::SparseMatrix<double> volume_mass(const TaylorHoodSpace& space);
 
+/// The lowest modes of the gel, clamped where it is bonded.
 struct Eigenmodes {
   Eigen::VectorXd angular_frequency;  ///< k, rad/s, rising
   Eigen::MatrixXd displacement;       ///< 3 nodes x k: component a of node i in row 3 i + a. int rho u_j . u_k dV =

@@ -77,6 +77,7 @@ inline constexpr std::uint64_t kOtherSeed = 0x9e3779b97f4a7c15;
 
 /// The same twice, with other random numbers the second time; direct light, which has none, is shown once.
 using TwoRuns = std::array<SceneRun, 2>;
+/// Shows it twice; `whole` as for run_scene.
 TwoRuns run_twice(sim::SceneSpec scene, const fem::Compliance& gel, bool whole = false);
 
 /// The part of the values of a scene's pictures that the imager can measure, as they don't fill its pixels' wells.

@@ -19,6 +19,7 @@
 
 namespace touchstone::lab {
 
+/// What error is wanted, on which presses, and how fine the references may be.
 struct BenchSettings {
   double force_error = 0.01;              ///< wanted: relative, root mean square over presses; above 0
   double pixel_error = 1.0;               ///< wanted: root mean square over pixels, of the imager's noise; above 0
@@ -30,7 +31,8 @@ struct BenchSettings {
   std::uint64_t seed = 1;
 };
 
-inline constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+inline constexpr double kUnknown =
+    std::numeric_limits<double>::quiet_NaN();  ///< a figure that wasn't or couldn't be measured
 
 /// One setting tried.
 struct BenchPoint {
@@ -90,6 +92,7 @@ struct EffectShare {
   std::string note;
 };
 
+/// All that a device's bench found.
 struct DeviceBench {
   std::string device;
   std::string presses;             ///< in words

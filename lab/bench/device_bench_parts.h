@@ -24,6 +24,7 @@ struct TruePictures {
   render::Imager imager;
 };
 
+/// The device, its reference gel and what was pressed on it.
 struct BenchParts {
   BenchSettings settings;
   sim::DeviceSpec whole_device;  ///< as it is
@@ -44,6 +45,7 @@ struct BenchParts {
   std::optional<TruePictures> own_truth;  ///< likewise on the device's own gel
 };
 
+/// The same device with all edge lengths of its gel's mesh multiplied.
 sim::DeviceSpec with_edges(sim::DeviceSpec device, double factor);
 
 /// Set up anew, whatever a cache has.
@@ -51,6 +53,7 @@ struct MadeGel {
   fem::Compliance gel;
   double seconds = 0.0;
 };
+/// Makes the gel without its cache, since the time counts.
 MadeGel make_gel(const sim::DeviceSpec& device, fem::Element element = fem::Element::taylor_hood);
 
 /// The device with other edges, in forces and, where there is a truth, in pictures. What can't be had is in its note.
@@ -59,6 +62,7 @@ BenchPoint mesh_point(const BenchParts& parts, double edges);
 /// Paths, the same number in each pixel, with what the plan leaves out.
 sim::SceneSpec reference_scene(const BenchParts& parts, const sim::DeviceSpec& device, const sim::PressSpec& spec,
                                std::uint64_t seed);
+/// The pictures of a press twice, with other random numbers the second time.
 TruePictures true_pictures(const BenchParts& parts, const sim::DeviceSpec& device, const fem::Compliance& gel,
                            const sim::PressSpec& spec, std::uint64_t seed);
 
@@ -79,6 +83,7 @@ struct LightSetting {
   double once_s = kUnknown, each_s = kUnknown;
 };
 
+/// "paths to 0.5 of the imager's noise", for a row's label.
 std::string paths_in_words(double noise_fraction);
 
 /// Shows a press's scene that way, and fills in what it took and how far it is from the truth; `point` gets the same.
@@ -100,12 +105,14 @@ struct HoldingMesh {
   const BenchPoint* holds = nullptr;
   const BenchPoint* coarser = nullptr;
 };
+/// Compares a curve's meshes from the finest one on.
 HoldingMesh coarsest_holding(const BenchCurve& mesh, double force_error, double pixel_error);
 
 /// `mesh` gets finer meshes where none of its own holds the wanted errors.
 BenchChoice cheapest_choice(const BenchParts& parts, BenchCurve& mesh, const std::vector<LightSetting>& tries,
                             const Progress& progress);
 
+/// What each effect that the plan may leave out contributes on the device's presses, and what it costs.
 std::vector<EffectShare> effect_shares(const BenchParts& parts, const Progress& progress);
 
 }  // namespace touchstone::lab

@@ -38,6 +38,7 @@ double distance_in_view(double marker_mm, double angle_of_view, int markers);
 /// How much larger a marker looks that came nearer by `displacement_mm` from `distance_mm`: exactly and to first order
 /// (eq. 2). @throws Error unless the distance is above 0, and the displacement less than it
 double apparent_change(double displacement_mm, double distance_mm);
+/// To first order: displacement over distance (eq. 2). @throws Error as apparent_change
 double apparent_change_first_order(double displacement_mm, double distance_mm);
 
 /// A soft square on the gel: its side, and the gel under it.

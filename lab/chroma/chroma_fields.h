@@ -28,8 +28,8 @@ struct FieldSummary {
   int without_force = 0;  ///< frames with too few markers, measured and not extrapolated; 0 without forces
 };
 
-/// Estimates each frame, in their order, and writes <folder>/displacements.csv and, if `forces` are given,
-/// <folder>/forces.csv when all are done (docs/file-formats.md, "Recorded frames"). The folder is made if it isn't
+/// Estimates each frame, in their order, and writes FOLDER/displacements.csv and, if `forces` are given,
+/// FOLDER/forces.csv when all are done (docs/file-formats.md, "Recorded frames"). The folder is made if it isn't
 /// there.
 /// @param rest the picture of the unloaded sensor
 /// @throws Error naming the picture that can't be read or is unfit (see ColourMarkerFinder); for a model that doesn't

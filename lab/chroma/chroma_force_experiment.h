@@ -18,6 +18,7 @@
 
 namespace touchstone::lab {
 
+/// The probe's touching end: a flat square, a flat round or half a ball.
 enum class ProbeShape : std::uint8_t { square, cylinder, hemisphere };
 /// "square", "cylinder", "hemisphere"
 const char* name_of(ProbeShape shape);
@@ -31,8 +32,10 @@ struct ForceProbe {
   double friction = 0.6;
   double direction_rad = 0.0;  ///< of the drag, from x to y
 
+  /// Shape, width, depth, place and friction, for a table's row.
   std::string name() const;
 };
+/// The probe as fem takes it.
 fem::ContactShape contact_shape(const ForceProbe& probe);
 
 /// Probes of all three shapes in turn: places within 4 mm of the middle, depths, friction 0.3 to 1.2 and directions
@@ -111,17 +114,20 @@ struct ForceSample {
 struct SlipCounts {
   int stick_as_stick = 0, stick_as_slip = 0, stick_as_unknown = 0;
   int slip_as_stick = 0, slip_as_slip = 0, slip_as_unknown = 0;
+  /// Adds up, count by count.
   SlipCounts& operator+=(const SlipCounts& other);
   /// Of those that weren't called unknown, the part that was right; NaN without any.
   double agreement() const;
 };
 
+/// One probe's press and drag.
 struct ForceRun {
   ForceProbe probe;
   std::vector<ForceSample> samples;  ///< of the frames that were read
   int unread = 0;                    ///< frames with too few measured markers to invert
   SlipCounts markers;
 };
+/// Presses the probe, drags it, and reads each frame.
 ForceRun run_force_probe(const ForceSetup& setup, const ForceProbe& probe, const MarkerReader& reader,
                          const DragSettings& drag = {});
 
@@ -143,6 +149,7 @@ struct ForceScore {
   SlipCounts markers;
   double mean_milliseconds = 0.0;
 };
+/// Over all samples of all runs.
 ForceScore score(const std::vector<ForceRun>& runs);
 
 /// Forces of a probe pressed straight down at finite strain, and what linear inversion makes of its markers.

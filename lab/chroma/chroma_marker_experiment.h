@@ -24,6 +24,7 @@ struct MarkerSeries {
   std::vector<sensors::ColourMarker> seen;  ///< as long as `ball_mm`; flawed ones are left out of both
   int flawed = 0;                           ///< pictures in which the marker could not be read
   double largest_strain = 0.0;              ///< of the gel's surface over the series, see fem::PressState
+  /// One axis of `ball_mm`.
   std::vector<double> column_mm(int axis) const;
 };
 
@@ -42,6 +43,7 @@ MarkerSeries shear_series(const ChromaSetup& setup, const MarkerTest& test, doub
 
 /// What shear_series presses, and how it moves.
 sim::ObjectSpec marker_ball(const MarkerTest& test);
+/// A press to this depth, then a drag to `end_mm` (along the gel, from the first place) in so many steps.
 sim::MotionSpec shear_motion(const MarkerTest& test, double depth_mm, const Eigen::Vector2d& end_mm, int steps);
 
 /// Standard deviation (degrees) of each marker's hue in pictures of the untouched device. @pre at least 2 pictures
@@ -52,6 +54,7 @@ struct HueAgainstDepth {
   std::vector<double> depth_mm, change_deg;
   StraightLine line() const { return line_through(depth_mm, change_deg); }
 };
+/// Of one marker, over a press series, with the line through it.
 HueAgainstDepth hue_against_depth(const ChromaSetup& setup, const MarkerSeries& press, std::size_t marker);
 
 /// The usual forms of a model that needs nothing but the marker itself.
@@ -68,6 +71,7 @@ struct InverseScore {
   double worst_r2 = 1.0;  ///< of the lateral components against the ball's, those that moved
   int samples = 0;
 };
+/// Of one marker, over series that the model wasn't calibrated on.
 InverseScore score_inverse(const ChromaSetup& setup, const sensors::HueModel& model, std::size_t marker,
                            const std::vector<MarkerSeries>& series);
 
@@ -105,6 +109,7 @@ struct PunchTest {
   double height_mm = 0.0;  ///< of the origin over the lowest point
   double depth_mm = 0.0;
 };
+/// The punches of fig. 10.
 std::vector<PunchTest> fig10_punches();
 
 }  // namespace touchstone::lab

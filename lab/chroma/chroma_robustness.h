@@ -4,14 +4,12 @@
 //
 // What the paper leaves open, and what is done here:
 // - A marker's apparent size is the side of its filter in px. "4 x 4 pixels" is taken for a filter of 4 px; if the
-// paper
-//   means the whole picture, which is twice as wide in the drawing here, its row is that of 2 px.
+//   paper means the whole picture, which is twice as wide in the drawing here, its row is that of 2 px.
 // - Pictures are made smaller by the Gaussian pyramid and then blurred by a Gaussian whose standard deviation is an
 //   eighth of the picture's size, as the paper has it; then rounded to 8 bit, as a camera gives them.
 // - Fits are of the displacement by a polynomial of second order of the measurement: that is how it would be used.
 // - The size is the count of pixels in a picture of 1 bit (sensors/colour/marker_size.h). Fig. 6c names the
-// "luminosity" for
-//   the black-and-white method, so the gradient is tried on both, the count and the darkness.
+//   "luminosity" for the black-and-white method, so the gradient is tried on both, the count and the darkness.
 // - The gradient is laid over pictures as they are, before any levelling: that hue needs none is the claim.
 
 #include <opencv2/core/mat.hpp>
@@ -35,6 +33,7 @@ enum class LightGradient {
   overlay,  ///< one from black to white: it adds grey too, as a haze would, so saturations change
 };
 
+/// How pictures are made smaller, read, and lit unevenly.
 struct RobustnessSettings {
   double smallest_px = 4.0;       ///< apparent size down to which pictures are reduced; at least 2
   double filter_px = 256.0;       ///< side of the filter in the rungs' pictures
@@ -73,6 +72,7 @@ struct GradientShift {
   double darkness_percent = 0.0;
 };
 
+/// What a gradient does to hue and size: each displacement, their mean and the worst.
 struct GradientRobustness {
   std::vector<GradientShift> shifts;
   GradientShift mean;  ///< over displacements

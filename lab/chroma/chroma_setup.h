@@ -29,6 +29,7 @@ sim::VirtualSensorSettings chroma_sensor_settings(std::uint64_t seed);
 /// @throws Error for a device without a camera
 sensors::ViewParallax parallax_of(const sim::DeviceSpec& device);
 
+/// A chroma device with a reader of its markers.
 class ChromaSetup {
  public:
   /// Reads the picture at rest. Keeps a reference to the sensor.
@@ -45,6 +46,7 @@ class ChromaSetup {
   /// The two halves of that, for who wants the pictures too. @pre as many pictures as states
   std::vector<cv::Mat> pictures(const sim::TouchObject& object, std::span<const sim::Truth> states,
                                 std::uint64_t noise_seed) const;
+  /// Reads them as frames that follow each other from rest.
   std::vector<ChromaRecord> read(std::span<const cv::Mat> frames, std::span<const sim::Truth> states) const;
 
   const sim::VirtualSensor& sensor() const { return sensor_; }

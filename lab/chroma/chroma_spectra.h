@@ -42,8 +42,10 @@ struct ChromaSpectrum {
   SeenHue product_hue;  ///< of the products with the lamps' own light: what the paper's fig. 2 has in mind
 };
 
+/// Layer, marker, and each of them behind the film: yellow is the white layer, red the magenta marker.
 enum class ChromaColour { white, magenta, yellow, red };
 
+/// The four spectra, in the same bands.
 struct ChromaSpectra {
   render::SpectralBands bands;
   std::array<ChromaSpectrum, 4> colours;  ///< by ChromaColour

@@ -46,6 +46,7 @@ struct TiltError {
   double across_um = 0.0;   ///< likewise along y
 };
 
+/// One kind of marker, calibrated and then tilted.
 struct TiltTable {
   TiltMarker marker = TiltMarker::flat;
   TiltCalibration calibration;

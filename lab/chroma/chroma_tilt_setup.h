@@ -15,6 +15,7 @@
 
 namespace touchstone::lab {
 
+/// What the marker is.
 enum class TiltMarker {
   flat,   ///< a square printed on the sheet: it goes with it, and stretches by eq. 3 as it is pressed in
   rigid,  ///< the same, but it doesn't stretch: what of the flat marker's hue is perspective alone
@@ -42,7 +43,9 @@ struct TiltSetup {
 /// The paper's camera, 66 um a pixel, a small one 60 mm (in air) away on which the marker is 7 pixels wide, and that of
 /// scenes/devices/chroma.yaml: as near, with the paper's lens, 55 um a pixel and 8 mm of gel.
 TiltSetup far_setup();
+/// The small camera 60 mm away.
 TiltSetup compact_setup();
+/// The device's own distance.
 TiltSetup near_setup();
 
 /// How the sheet stands at the marker: it is turned and moved as a whole within 1.6 mm, and fades from there to rest at
@@ -68,6 +71,7 @@ struct TiltColours {
   Eigen::Vector3d white, magenta;            ///< beside the film
   Eigen::Vector3d film_white, film_magenta;  ///< lit and seen through it
 };
+/// The camera's colours of the four spectra, DN without noise.
 TiltColours tilt_colours(const TiltSpectra& spectra);
 
 /// The setup as the tracer takes it. @throws Error for a tilt beyond pi / 4, or a marker that is moved to the film

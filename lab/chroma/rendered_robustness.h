@@ -11,6 +11,7 @@
 
 namespace touchstone::lab {
 
+/// Pictures of one marker behind its film, from a small marker to a large one.
 struct RenderedRungs {
   double filter_px = 128.0;  ///< side of the film in the picture, which is twice as wide; whole
   double smallest = 0.7;     ///< side of the marker, of the film's

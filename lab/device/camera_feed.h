@@ -49,8 +49,7 @@ struct SceneFeed {
 /// Plays a scene and computes the light of its frames `first` to `last` (numbers in the scene; none: all), and its
 /// events where its `outputs` have them.
 /// @throws Error for a scene without frames or with other frames than these, whose light wouldn't fit into
-/// `most_bytes`,
-///   and as sim::play_motion
+/// `most_bytes`, and as sim::play_motion
 SceneFeed feed_of_scene(const sim::SceneSpec& scene, const std::filesystem::path& cache_folder,
                         const std::optional<std::pair<int, int>>& first_last, std::int64_t most_bytes,
                         const Progress& progress = {});

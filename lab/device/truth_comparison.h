@@ -17,6 +17,7 @@ struct Tolerance {
   double standard_errors = 2.0;  ///< of the truth: what the simulator's mesh makes of it (fem::PressError)
 };
 
+/// The verdict, and a line that says why.
 struct Comparison {
   bool within = false;
   std::string message;  ///< one line: estimate, truth, the worst part's error and what is allowed, and where that comes

@@ -13,6 +13,7 @@
 
 namespace touchstone::lab {
 
+/// Which force is learned, and how grasps are shared out to folds.
 struct DvsForceSettings {
   DvsForce learned = DvsForce::measured;
   int validation = 5;        ///< grasps of a fold, drawn over the range of peak forces
@@ -35,9 +36,11 @@ struct DvsForceFold {
   double window_us = 0.0;              ///< to estimate one window, of the thread's own time
 };
 
+/// The folds' results; figures are means over them.
 struct DvsForceScore {
   std::vector<DvsForceFold> folds;
 
+  /// Over the folds.
   double mean(double DvsForceFold::*figure) const;
   /// Standard error of that mean, from how folds differ. 0 for one fold.
   double standard_error(double DvsForceFold::*figure) const;

@@ -64,6 +64,7 @@ struct DvsSpread {
 DvsGraspParameters draw_dvs_grasp(int material, const sim::ObjectSpec& piece, std::uint64_t seed, std::uint64_t index,
                                   const DvsSpread& spread = {});
 
+/// One grasp, played.
 struct DvsGrasp {
   DvsGraspParameters parameters;
   std::shared_ptr<const sim::GrippedFace> face;  ///< map(at_travel(moment.travel_mm)) is the face at a moment

@@ -12,12 +12,14 @@
 
 namespace touchstone::lab {
 
+/// The classifier, and how grasps are shared out to folds.
 struct DvsMaterialSettings {
   sensors::MaterialClassifierSettings classifier;
   std::uint64_t seed = 102;  ///< of the folds
   int threads = 0;           ///< 0: as many as the machine has; results are the same
 };
 
+/// Confusion over all folds.
 struct DvsMaterialScore {
   sensors::ConfusionMatrix test;        ///< each grasp once, by a classifier that hasn't seen it
   sensors::ConfusionMatrix validation;  ///< of each fold one grasp a material

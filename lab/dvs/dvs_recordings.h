@@ -20,6 +20,7 @@ struct DvsEvents {
   std::int64_t events = 0;                   ///< all, also those of a last millisecond that isn't whole
 };
 
+/// One grasp as recorded, with its truth.
 struct DvsRecording {
   DvsGraspParameters parameters;
   std::vector<DvsEvents> by_pixels;         ///< one of each kind of event pixels that was asked for
@@ -31,6 +32,7 @@ struct DvsRecording {
   std::int64_t steps = 0;                   ///< of each event pixel, from one light to the next
 };
 
+/// Which event pixels are shown the grasp, and how finely.
 struct DvsRecordSettings {
   std::vector<render::EventPixelSettings> pixels;  ///< kinds, at least one; the device's own first
   std::uint64_t unit_seed = 1;                     ///< thresholds: one sensor for all grasps

@@ -18,6 +18,7 @@ struct DvsPixelKind {
   double noise;       ///< of the device's leak and shot noise
   double thresholds;  ///< of the device's
 };
+/// In the order of DvsRecording::by_pixels.
 inline constexpr std::array<DvsPixelKind, 6> kDvsPixelKinds = {{{"device", "as the device has them", 1.0, 1.0},
                                                                 {"noise_0", "without noise", 0.0, 1.0},
                                                                 {"noise_10", "with ten times the noise", 10.0, 1.0},
@@ -25,6 +26,7 @@ inline constexpr std::array<DvsPixelKind, 6> kDvsPixelKinds = {{{"device", "as t
                                                                 {"threshold_150", "thresholds of 3/2", 1.0, 1.5},
                                                                 {"threshold_200", "thresholds of twice", 1.0, 2.0}}};
 
+/// Shared by both groups of rows, so that it's made once.
 using DvsRecordings = std::shared_ptr<const std::vector<DvsRecording>>;
 
 /// The 48 grasps of [Naeini2020], seen by all kinds; the quick form: four of each material, seen by the first. The

@@ -14,6 +14,7 @@
 
 namespace touchstone::lab {
 
+/// Which counts are taken, in which windows.
 struct DvsSequenceSettings {
   int pixels = 0;     ///< which kind of DvsRecording::by_pixels
   int window_ms = 7;  ///< sec. III.B; at least 1
@@ -68,11 +69,13 @@ enum class DvsInputs {
   time,             ///< a control: what can be estimated without having seen anything but the touch
 };
 
+/// Inputs and force of the judged windows, a series for each grasp.
 std::vector<sensors::ForceSeries> force_series_of(std::span<const DvsSequence> sequences, DvsForce force,
                                                   DvsInputs inputs);
 
 /// For the classifier: accumulated ON and OFF of the judged windows, or in their place the measured force of those.
 std::vector<sensors::MaterialSample> event_samples(std::span<const DvsSequence> sequences);
+/// The control: the measured force in place of the events.
 std::vector<sensors::MaterialSample> force_sensor_samples(std::span<const DvsSequence> sequences);
 
 }  // namespace touchstone::lab

@@ -11,6 +11,7 @@
 
 namespace touchstone::lab {
 
+/// Residuals as a function of some variables, and the box that these may be in.
 struct LeastSquaresProblem {
   std::function<Eigen::VectorXd(const Eigen::VectorXd& x)> residuals;
   /// Rows as the residuals, columns as x. `at` is what residuals(x) gave.
@@ -18,6 +19,7 @@ struct LeastSquaresProblem {
   Eigen::VectorXd low, high;  ///< of x
 };
 
+/// Damping, and when the search ends.
 struct LeastSquaresSettings {
   double first_damping = 1e-4;  ///< times the largest diagonal entry of J^T J
   /// Ends where a whole step would lower the sum of squares by less than this part of the mean square of a residual: at
@@ -26,6 +28,7 @@ struct LeastSquaresSettings {
   int most_steps = 30;  ///< Jacobians
 };
 
+/// The best place found.
 struct LeastSquaresResult {
   Eigen::VectorXd x;
   Eigen::VectorXd residuals;

@@ -23,6 +23,7 @@ struct LinearisedFit {
   Eigen::VectorXd mesh_error, light_error;
 };
 
+/// Standard errors, where they come from, and what can't be identified.
 struct FitCertainty {
   Eigen::VectorXd deviation;     ///< standard error of each variable, all in all; infinite where nothing holds it
   Eigen::VectorXd by_noise;      ///< of it: as J^T J has it, with the residuals' own variance

@@ -38,6 +38,7 @@ struct FittedUnknown {
 /// A combination of unknowns that the data can't identify: all of them may move so at once, and nothing that was
 /// recorded changes by what could be noticed.
 struct UnidentifiableCombination {
+  /// How far one unknown moves in the combination.
   struct Part {
     std::string name;
     UnknownHow how = UnknownHow::times;
@@ -61,6 +62,7 @@ struct FittedPress {
   double force_N = 0.0;                                       ///< that the simulation has there
 };
 
+/// The fitted numbers, how sure they are, and how well the recordings are met.
 struct UnitFit {
   std::vector<FittedUnknown> unknowns;
   std::vector<UnidentifiableCombination> unidentified;

@@ -46,6 +46,7 @@ struct RecordedPress {
   SourceLocation where;
 };
 
+/// All of a fit's file, checked.
 struct UnitFitSpec {
   std::string name;  ///< of its files; letters, digits, - and _
   std::filesystem::path device;
@@ -72,6 +73,7 @@ enum class NumberActs : std::uint8_t {
   on_scene        ///< all light, maybe the mechanics
 };
 
+/// One number of the device's file, and what of the simulation it changes.
 struct FittedNumber {
   YamlNumber number;
   NumberActs acts = NumberActs::on_scene;

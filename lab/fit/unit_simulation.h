@@ -52,6 +52,7 @@ class UnitSimulation {
   /// How deep a press is whose force is known. @throws Error likewise
   double depth_of_force(const Eigen::VectorXd& x, int press, const PressPose& pose, double force_N);
 
+  /// The device's imager with the numbers of x.
   render::Imager imager(const Eigen::VectorXd& x) const;
   int lamp_setups() const;  ///< lamps' light set up so far: what takes longest
 

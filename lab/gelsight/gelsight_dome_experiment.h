@@ -29,6 +29,7 @@ PlateContact press_plate(const sim::VirtualSensor& sensor, double depth_mm, doub
 /// an endless layer of its thickness, frictionless (profile_on_layer; to first order in the dome's slope), and by
 /// Hertz, which knows no plate behind the gel.
 double plate_radius_on_layer(const sim::GelSpec& gel, double force);
+/// By Hertz: the whole gel a half space.
 double plate_radius_by_hertz(const sim::GelSpec& gel, double force);
 
 /// Heights by a calibration whose balls were pressed on the dome itself, and whose background is the dome's own. Their
@@ -40,6 +41,7 @@ struct DomeHeights {
   std::vector<HeightError> balls;  ///< of 4 mm, at the apex and at two places aside, 0.4 mm deep
   HeightError plate;               ///< 0.3 mm deep
 };
+/// Presses balls and a plate on the dome, and compares estimated with true heights.
 DomeHeights measure_dome_heights(const sim::VirtualSensor& sensor, const CalibrationPresses& presses,
                                  sensors::LightCorrection correction, std::uint64_t seed);
 

@@ -30,6 +30,7 @@ struct NormalSample {
   double estimated_mm3 = 0.0;  ///< sum of the estimated height map
   double true_mm3 = 0.0;       ///< sum of the membrane's true heights in the same pixels
 };
+/// One indenter at rising forces.
 struct NormalSeries {
   std::string indenter;
   std::vector<NormalSample> samples;
@@ -44,6 +45,7 @@ NormalSeries press_with_forces(const sim::VirtualSensor& sensor, const sensors::
 struct PooledLines {
   sensors::LinearForce estimated, truth;
 };
+/// The lines through all series together.
 PooledLines pool(const std::vector<NormalSeries>& series);
 
 /// A quasi-static shear test (fig. 4-6): a flat end pressed with a constant force is dragged to the side until it
@@ -54,11 +56,13 @@ struct ShearSample {
   double displacement_mm = 0.0;  ///< mean of the markers on the patch, since the press, as estimated
   bool slides = false;           ///< no vertex of the contact sticks
 };
+/// One drag at a held normal force.
 struct ShearTest {
   std::vector<ShearSample> samples;
   sensors::LinearForce line;  ///< through the samples before slip, by the force alone (samples_before_slip)
   std::size_t before_slip = 0;
 };
+/// Presses the object, drags it `drag_mm` along x in so many steps, and reads the markers at each.
 ShearTest shear_until_slip(const sim::VirtualSensor& sensor, const sim::ObjectSpec& object, double normal_N,
                            double drag_mm, int steps, std::uint64_t seed);
 

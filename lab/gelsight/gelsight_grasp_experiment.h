@@ -23,6 +23,7 @@ struct GraspTrial {
   std::uint64_t noise_seed = 1;
 };
 
+/// The loop's times and limits.
 struct GraspLoopSettings {
   sensors::GraspRuleSettings rule;
   sim::ArmLiftSettings arm;
@@ -43,6 +44,7 @@ struct GraspMoment {
   sensors::GraspPhase phase = sensors::GraspPhase::approaching;
 };
 
+/// How one trial ended.
 struct GraspOutcome {
   bool held = false;    ///< lifted, held for hold_s without sliding, not crushed
   std::string failure;  ///< why not, for people; empty where it's held

@@ -17,6 +17,7 @@ namespace touchstone::lab {
 sensors::TouchCalibration calibrate_for_grasps(const sim::VirtualSensor& flat, const sim::VirtualSensor& marked,
                                                std::uint64_t seed);
 
+/// What counts as slip in the loop.
 struct GraspSenseSettings {
   sensors::SlipThresholds rule;  ///< of the thesis's two ratios
   bool rim = true;  ///< slip that begins at the contact's rim counts, too (sensors/markers/incipient_slip.h)

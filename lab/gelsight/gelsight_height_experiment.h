@@ -11,10 +11,12 @@
 
 namespace touchstone::lab {
 
+/// A rigid ball.
 sim::ObjectSpec ball_of(double diameter_mm);
 /// A cylinder's flat end, its edge rounded by 0.1 mm.
 sim::ObjectSpec flat_cylinder_of(double diameter_mm);
 
+/// The same object with Coulomb's `friction` on the gel.
 sim::ObjectSpec with_friction(sim::ObjectSpec object, double friction);
 
 /// How a user calibrates: some frames of the untouched gel, and a ball pressed in at a grid of places, each to every
@@ -32,6 +34,7 @@ struct CalibrationPresses {
   double annotation_px = 0.3;   ///< standard deviation of each coordinate and of the radius
   double most_saturated = 0.5;  ///< of a press's pixels
 };
+/// A calibration, and how well its circles were found.
 struct HeightCalibrationResult {
   sensors::HeightCalibration calibration;
   int presses = 0;
@@ -53,6 +56,7 @@ struct HeightError {
   double contact_overlap = 0.0;  ///< of the estimated and the true contact: common pixels / pixels of either
   double flank_slope = 0.0;      ///< true: 99 % of the contact's pixels are less steep
 };
+/// Compares both over the picture.
 HeightError height_error(const sensors::HeightResult& estimate, const sim::Touch& touch, double mm_per_px);
 
 /// The wave along u of a given wavelength in a part of a height map: least squares amplitude (half of trough to crest),

@@ -22,6 +22,7 @@ RigidTransform target_gripper(const RigidTransform& base_from_object_wanted, con
 /// A pose of the touch's plane in space.
 RigidTransform in_space(const sensors::PlanarPose& pose);
 
+/// How plugs hang, how the hand errs, and what counts as inserted.
 struct InsertionSettings {
   int trials = 36;
   int most_grasps = 6;  ///< of a trial; then it has failed
@@ -42,6 +43,7 @@ struct InsertionSettings {
   double mouth_half_width_mm = 6.0, mouth_y_mm = -6.0;
 };
 
+/// One plug, from the first grasp to the socket.
 struct InsertionTrial {
   int grasps = 0;
   bool localised = false;
@@ -52,8 +54,10 @@ struct InsertionTrial {
   bool inserted = false;
 };
 
+/// All trials.
 struct InsertionExperiment {
   std::vector<InsertionTrial> trials;
+  /// How many plugs were inserted.
   int successes() const;
   int grasps() const;  ///< of all trials: one each, and one more for each grasp that wasn't localised
 };
@@ -62,6 +66,7 @@ struct InsertionExperiment {
 double mouth_error(const InsertionSettings& settings, const sensors::PlanarPose& touch_from_object_true,
                    const sensors::PlanarPose& touch_from_object_found, const Eigen::Vector2d& robot_error);
 
+/// Grasps plugs that hang at random, localises each grasp on the map, and moves the plug over the socket.
 InsertionExperiment run_insertion(const TouchSetup& setup, const sim::TouchObject& plug, const ObjectMap& map,
                                   const InsertionSettings& settings);
 

@@ -43,6 +43,7 @@ struct Localisation {
   bool found() const { return outcome == sensors::Outcome::localised; }
 };
 
+/// Localises one touch and compares with its true pose.
 Localisation localise(const ObjectMap& map, const TouchSample& touch);
 
 /// Chance in how an object is held: each uniform within +- its bound.
@@ -77,6 +78,7 @@ struct MapExperimentSettings {
   sensors::TactileMapSettings map;
 };
 
+/// Maps of a coin and a plug, and how well touches are localised on them.
 struct MapExperiment {
   ObjectMap coin, plug;
   SeriesError along_mm, turn_deg;                    ///< displacement along x, angle

@@ -14,6 +14,7 @@
 
 namespace touchstone::lab {
 
+/// How the object is moved.
 enum class SlipMotion {
   slide,  ///< pressed, held, then dragged along x until it slides
   hold,   ///< pressed and held
@@ -21,6 +22,7 @@ enum class SlipMotion {
   roll,   ///< a ball pressed, then rolled in along x
 };
 
+/// An object, how hard it is pressed and how it moves.
 struct SlipCase {
   sim::ObjectSpec object;  ///< with its friction
   double normal_N = 0.5;
@@ -28,6 +30,7 @@ struct SlipCase {
   double speed_mm_per_s = 2.0;  ///< slide and roll
   double part_of_limit = 0.5;   ///< load
 
+  /// Motion, object, friction, force and speed, for a table's row.
   std::string name() const;
 };
 
@@ -42,6 +45,7 @@ struct SlipFrame {
   int markers_found = 0;
 };
 
+/// One case, frame by frame, with the truth of when it slips.
 struct SlipRun {
   SlipCase what;
   std::vector<SlipFrame> frames;
@@ -83,6 +87,7 @@ struct SlipScore {
 /// verdicts.
 std::string to_csv(const std::vector<SlipRun>& runs);
 
+/// The thesis's two ratios, or lag at the contact's rim.
 enum class SlipDetector { rule, incipient };
 /// A detector reports from its first frame on that says slip; frames before an object's shear load reaches a twentieth
 /// of its limit are quiet ones. `least_warning_s`: how long partial slip has to last for SlipScore::predictable.

@@ -24,6 +24,7 @@ std::vector<sim::ObjectSpec> texture_objects(const std::filesystem::path& scenes
 /// The same kind of surface, another piece of it. @throws Error for an object whose relief isn't a random one
 sim::ObjectSpec another_patch(const sim::ObjectSpec& object, std::uint64_t seed);
 
+/// How each surface is pressed.
 struct TexturePresses {
   int images = 6;             ///< of each class
   double force_N = 8.0;       ///< mean: some 30 kPa under the disc, a firm touch by hand
@@ -85,6 +86,7 @@ enum class TextureSplit {
   by_image,   ///< stricter: all squares of an image stand on the same side
 };
 
+/// How often the material is right.
 struct TextureScore {
   double percent = 0.0;            ///< of the test samples right, mean over the splits
   double standard_error = 0.0;     ///< of that mean, from the splits' scatter

@@ -33,6 +33,7 @@ struct TouchSample {
   double force_N = 0.0;
 };
 
+/// A gelsight device with its height estimator and its map of places.
 class TouchSetup {
  public:
   /// The place map is fitted to a grid of marks on the undeformed gel, as a target with printed dots would give it.

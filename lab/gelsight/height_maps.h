@@ -10,6 +10,7 @@
 
 namespace touchstone::lab {
 
+/// How a height map is stored.
 enum class HeightFormat {
   exr,   ///< one float channel, `height_mm`
   png16  ///< 16 bit grey: level 10000 is 0 mm, a level is 0.1 um: -1 to 5.55 mm
@@ -26,7 +27,7 @@ struct HeightRecord {
   bool contact_at_border = false;
 };
 
-/// Estimates each frame and writes <folder>/<stem>.exr or .png, and <folder>/heights.csv when all are done. The folder
+/// Estimates each frame and writes FOLDER/STEM.exr or .png, and FOLDER/heights.csv when all are done. The folder
 /// is made if it isn't there. @throws Error naming the frame that can't be read or estimated, or if two have one stem
 std::vector<HeightRecord> write_height_maps(const sensors::HeightModel& model, const sensors::HeightSettings& settings,
                                             const std::vector<std::filesystem::path>& frames,

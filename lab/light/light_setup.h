@@ -7,6 +7,7 @@
 
 namespace touchstone::lab {
 
+/// A spectrum of the one band.
 inline render::Spectrum grey(double value) {
   return render::Spectrum::Constant(1, value);
 }

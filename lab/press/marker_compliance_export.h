@@ -55,7 +55,9 @@ sensors::MarkerCompliance bead_compliance(const fem::Compliance& gel, const std:
 /// its area. @throws Error as marker_compliance
 class MarkerMeans {
  public:
+  /// Where the markers lie on this gel.
   MarkerMeans(const fem::Compliance& gel, const SurfaceMarkers& markers);
+  /// mm, gel frame, by marker.
   std::vector<Eigen::Vector3d> of(const Eigen::MatrixX3d& surface_displacement) const;
 
  private:

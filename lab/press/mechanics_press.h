@@ -15,6 +15,7 @@ inline fem::PressTarget press_target(double x, double y, double z) {
   return target;
 }
 
+/// |value / expected - 1|.
 inline double relative_error(double value, double expected) {
   return std::abs(value / expected - 1.0);
 }

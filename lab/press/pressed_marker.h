@@ -35,6 +35,7 @@ struct MarkerPoints {
   SurfacePoints outline;
   SurfacePoints area;
 };
+/// On a surface of these vertices and triangles. @throws Error as locate_points
 MarkerPoints square_marker(std::span<const Eigen::Vector3d> vertices, std::span<const std::array<int, 3>> triangles,
                            double side_mm);
 

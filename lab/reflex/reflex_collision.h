@@ -28,6 +28,7 @@ using PlateForce = std::function<double(double t_s, double press_mm)>;
 /// Gives the time at which a stop is sent, not before it was asked, or nothing.
 using StopWatch = std::function<std::optional<double>(double t_s, double press_mm)>;
 
+/// How the actuator comes, and when the run ends.
 struct CollisionSettings {
   ActuatorSettings actuator;
   double speed_mm_s = 20.0;
@@ -39,6 +40,7 @@ struct CollisionSettings {
   double step_s = 1e-5;
 };
 
+/// One run, with the truth.
 struct Collision {
   double touch_s = 0.0;                ///< truth
   std::optional<double> stop_sent_s;   ///< the first stop's

@@ -34,6 +34,7 @@ std::vector<ReflexPoint> record_points(const ReflexSetup& setup, const ReflexTou
 sensors::ReflexModel train_reflex(std::span<const ReflexPoint> points, int degree = 1,
                                   const sensors::ContactTreeSettings& tree = {});
 
+/// How well a model does on points.
 struct ReflexScore {
   int points = 0;
   double error_percent = 0.0;  ///< of the tree: both kinds, as shares of all points
@@ -45,6 +46,7 @@ struct ReflexScore {
   double rms_below_1N_N = 0.0;   ///< over those in contact with less than 1 N
   double largest_error_N = 0.0;
 };
+/// Asks the model about each point.
 ReflexScore score_reflex(const sensors::ReflexModel& model, std::span<const ReflexPoint> points);
 
 /// A picture as it was grabbed, and what was true at the mean of its pixels' times.
@@ -52,6 +54,7 @@ struct ReflexPicture {
   GrabbedImage grabbed;
   ReflexTruth truth;
 };
+/// Shows the touch to the chip until it has given so many pictures.
 std::vector<ReflexPicture> record_pictures(const ReflexSetup& setup, const ReflexTouch& touch,
                                            const ReflexMotion& motion, int pictures, std::uint64_t noise_seed);
 /// One picture each at these places, nothing moving.
@@ -71,6 +74,7 @@ sensors::DilationPress fit_press(std::span<const sensors::ExploreReading> readin
 /// The law of eq. 1 from a touch's own states, as the paper has it from a force gauge.
 sensors::ExponentialForce fit_law(const ReflexTouch& touch);
 
+/// How well explore mode does on pictures with known truth.
 struct ExploreScore {
   int pictures = 0, absolute = 0, relative = 0, held = 0;
   double rms_mm = 0.0, largest_mm = 0.0;  ///< of the press
@@ -78,6 +82,7 @@ struct ExploreScore {
   double shear_rms_N = 0.0;               ///< of both axes together, of pictures in contact
   double drift_mm = 0.0;                  ///< the largest press estimated without contact after the first contact
 };
+/// Press and force of each reading against the picture's truth.
 ExploreScore score_explore(const sensors::ExploreModel& model, std::span<const sensors::ExploreReading> readings,
                            std::span<const ReflexPicture> pictures);
 
@@ -97,6 +102,7 @@ double shear_size_N(std::span<const sensors::ShearSample> samples);
 /// Who watches a collision.
 enum class Watcher { reflex, explore, nobody };
 
+/// Who watches, and how late what it says arrives.
 struct ReflexCollisionSettings {
   CollisionSettings collision;
   sensors::ReflexSettings reflex;

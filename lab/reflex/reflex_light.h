@@ -21,6 +21,7 @@
 
 namespace touchstone::lab {
 
+/// How finely the chip's pixels are sampled.
 struct ReflexLightSettings {
   double lamp_level = 1.0;  ///< of the lamps' power; 0: they're off
   /// A pixel is cut into side x side, 1 to 16. With 8 the lens's blur is just below 4 of them, up to where rims of dots
@@ -51,7 +52,9 @@ class ReflexLight {
   ~ReflexLight();
   ReflexLight(ReflexLight&&) noexcept;
 
+  /// As it was given.
   const sim::DeviceSpec& device() const;
+  /// The scene's bands, in the order of the pictures' channels.
   const sim::SceneBands& bands() const;
   /// Against path tracing, in the parts of pixels that are drawn.
   const render::DirectError& error() const;

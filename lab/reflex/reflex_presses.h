@@ -20,6 +20,7 @@ enum class ReflexObject : std::uint8_t {
 /// "plate", "ball", "cylinder", "probe"
 const char* name_of(ReflexObject object);
 
+/// One object, where and how tilted, and how deep it goes.
 struct ReflexPress {
   ReflexObject object = ReflexObject::plate;
   double tilt_deg = 0.0;          ///< of the object's axis from z, to 30
@@ -43,6 +44,7 @@ struct ReflexShear {
   double towards_deg = 0.0;
   double shear_step_mm = 0.25;
 };
+/// The press, then the drag at its end.
 sim::PressPath press_and_shear(const ReflexPress& press, const ReflexShear& shear);
 
 /// N, the paper's eq. 1 for a plate pressed z_mm deep.

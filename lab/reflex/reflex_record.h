@@ -14,6 +14,7 @@
 
 namespace touchstone::lab {
 
+/// How finely the path is cut into pictures.
 struct ReflexPathLightSettings {
   /// How far the light of any pixel between two pictures may be off, in parts of the light that makes the largest
   /// number at the longest exposure; what a step of 6 bits is, is 1/63.

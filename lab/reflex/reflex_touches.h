@@ -40,6 +40,7 @@ struct ReflexTouch {
   ReflexTruth truth(double place) const;
 };
 
+/// A press by its name.
 struct ReflexTouchSpec {
   std::string name;
   sim::PressPath path;

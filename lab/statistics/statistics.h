@@ -7,6 +7,7 @@ namespace touchstone::lab {
 
 /// In which direction a figure is better.
 enum class Better { lower, higher, near };
+/// "lower", "higher" or "near".
 std::string name_of(Better better);
 
 /// Half of a 95 % interval, in standard errors of a normal distribution.

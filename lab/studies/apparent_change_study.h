@@ -19,6 +19,7 @@ namespace touchstone::lab {
 enum class StudyField { gel_thickness_mm, gel_youngs_modulus_MPa, gel_poisson_ratio };
 EnumNames<StudyField> enum_names(StudyField);
 std::string name_of(StudyField field);  ///< "gel.thickness_mm"
+/// The field itself, in a device that can be changed.
 double& field_of(sim::DeviceSpec& device, StudyField field);
 
 /// Which figure a study varies, and the values that it takes, rising.
@@ -35,6 +36,7 @@ enum class ApparentSource {
   finite,   ///< the same at finite strain (neo-Hookean)
 };
 EnumNames<ApparentSource> enum_names(ApparentSource);
+/// As in files.
 std::string name_of(ApparentSource source);
 
 /// What to study. Lenses look straight at the marker, from where `markers_in_view` markers fill their view.
@@ -57,7 +59,7 @@ void fields(YamlReader& in, ApparentChangeSpec& spec);
 inline constexpr ApparentMeasure kStudiedMeasures[] = {
     ApparentMeasure::relative_whole_fixed, ApparentMeasure::relative_film_fixed, ApparentMeasure::picture_film_fixed,
     ApparentMeasure::area_film_fixed};
-inline constexpr int kStudiedMeasureCount = 4;
+inline constexpr int kStudiedMeasureCount = 4;  ///< of kStudiedMeasures
 
 /// One press seen by one lens. What couldn't be had is NaN.
 struct ApparentChangeRow {
@@ -72,6 +74,7 @@ struct ApparentChangeRow {
   double measure[kStudiedMeasureCount] = {};
 };
 
+/// What came of a study of this kind.
 struct ApparentChangeResult {
   std::vector<ApparentChangeRow> rows;  ///< by source, object, force, lens, value
   std::vector<std::string> notes;       ///< presses that couldn't be had, and why

@@ -29,6 +29,7 @@ EnumNames<StopRule> enum_names(StopRule);  // of the field `training_ends`
 
 namespace touchstone::lab {
 
+/// A study of this kind, as its file has it.
 struct BeadDesignSpec {
   DesignPlan plan;
   DesignBase base;  ///< the device

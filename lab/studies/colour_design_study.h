@@ -18,6 +18,7 @@
 
 namespace touchstone::lab {
 
+/// A study of this kind, as its file has it.
 struct ColourDesignSpec {
   DesignPlan plan;
   DesignBase base;                                             ///< the device
@@ -44,6 +45,7 @@ std::vector<double> colour_design(const ColourDesignSpec& spec, const sim::Devic
 DesignTable run_colour_design(const ColourDesignSpec& spec, const std::filesystem::path& cache,
                               const Progress& progress = {});
 
+/// Tables and plots of the designs, with their captions.
 StudyResult report(const std::string& name, const ColourDesignSpec& spec, const DesignTable& table);
 
 }  // namespace touchstone::lab

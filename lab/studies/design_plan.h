@@ -22,6 +22,7 @@ struct DesignVariable {
   SourceLocation where;
 };
 
+/// How designs are laid out over the variables.
 enum class DesignSampling {
   grid,             ///< all combinations of the values
   latin_hypercube,  ///< each variable's range is cut into as many strips as there are designs, one design in each
@@ -29,6 +30,7 @@ enum class DesignSampling {
 };
 EnumNames<DesignSampling> enum_names(DesignSampling);
 
+/// Which numbers vary, and how many designs there are.
 struct DesignPlan {
   DesignSampling sampling = DesignSampling::grid;
   std::vector<DesignVariable> vary;
@@ -36,7 +38,7 @@ struct DesignPlan {
   std::uint64_t seed = 1;
 };
 
-inline constexpr int kMostDesigns = 10000;
+inline constexpr int kMostDesigns = 10000;  ///< more are refused
 
 void fields(YamlReader& in, DesignVariable& variable);
 /// Reads `sampling`, `vary`, `designs` and `seed` of the map that the plan stands in.

@@ -21,6 +21,7 @@ struct DesignFigure {
   std::string meaning;            ///< one sentence
 };
 
+/// Designs as rows, figures as columns.
 struct DesignTable {
   DesignPlan plan;
   std::vector<DesignFigure> figures;
@@ -52,6 +53,7 @@ struct Elasticity {
   double r2 = 0.0;        ///< how much of the figure's variation this law explains
   int designs = 0;        ///< that it rests on
 };
+/// Of one figure (its column in the table).
 Elasticity elasticity(const DesignTable& table, std::size_t figure);
 
 /// What a study's files say beside its table.

@@ -19,6 +19,7 @@ namespace touchstone::lab {
 /// One alternative a kind; the names in files are in study.cpp.
 using StudyKind = std::variant<ApparentChangeSpec, BeadDesignSpec, ColourDesignSpec>;
 
+/// All of a study's file, checked.
 struct StudySpec {
   std::string name;  ///< also of its files; letters, digits, - and _
   StudyKind kind;

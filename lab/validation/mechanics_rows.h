@@ -31,6 +31,7 @@ class MechanicsGels {
   fem::Compliance even(double poisson_ratio, double width = 24.0) const {
     return slab({width, width, 2.0, 0.9, 0.9, 0.5 * width, 0.5 * width, 1.0}, poisson_ratio);
   }
+  /// Any slab, with this Poisson's ratio.
   fem::Compliance slab(const fem::SlabMesh& mesh, double poisson_ratio) const {
     return fem::cached_compliance(mesh, {kValidationModulus, poisson_ratio}, {}, cache_);
   }

@@ -9,6 +9,7 @@
 
 namespace touchstone::lab {
 
+/// Rows in the order in which they were added.
 class RowList {
  public:
   /// What the seconds of a row are counted from.

@@ -46,6 +46,7 @@ void deny(ValidationRow& row, const std::string& finding);
 /// The title, and which finding the row denies.
 std::string words_of(const ValidationRow& row);
 
+/// Where the rows find their files, and whether they may take hours.
 struct ValidateOptions {
   bool quick = false;             ///< minutes, not hours: coarser or fewer cases, as each row says
   std::filesystem::path cache;    ///< where set-up results are kept

@@ -16,13 +16,14 @@ namespace touchstone::lab {
 /// strong. Chosen on presses of two points, others than those of the rows vhs.distribution.
 sensors::TractionSettings bead_inversion();
 
+/// How many frames gave a force.
 struct TractionSummary {
   int frames = 0;
   int in_contact = 0;     ///< frames with a force
   int without_force = 0;  ///< frames with too few beads found
 };
 
-/// Writes <folder>/tractions.csv, a line for each patch in contact of each frame, and <folder>/forces.csv, a line for
+/// Writes FOLDER/tractions.csv, a line for each patch in contact of each frame, and FOLDER/forces.csv, a line for
 /// each frame (docs/file-formats.md). The folder is made if it isn't there.
 /// @param rest_px the beads without load, row by row; if empty, those of each sequence's first frame
 /// @throws Error for a compliance of another number of beads, or as sensors::view_of; if a sequence's first frame is

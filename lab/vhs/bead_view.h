@@ -10,6 +10,7 @@
 
 namespace touchstone::lab {
 
+/// A device's beads and its camera, without the rest of its scene.
 struct BeadView {
   std::vector<Eigen::Vector3d> rest_mm;  ///< without load, row by row, gel frame
   render::Scene faces;

@@ -27,8 +27,10 @@ struct PalpationTrialSettings {
   std::uint64_t seed = 1;
 };
 
+/// What a waveform is for: no piece is in two sets.
 enum class PalpationSet : std::uint8_t { training, validation, test };
 
+/// The force over time of one press, at the recording's rate.
 struct PalpationWaveform {
   int material = 0;
   PalpationSet set = PalpationSet::training;
@@ -54,6 +56,7 @@ PalpationRecording record_vhs(const PalpationSpec& spec, const PalpationTable& t
 /// Every `factor`-th sample of each waveform.
 PalpationRecording downsampled(const PalpationRecording& recording, int factor);
 
+/// Which part of the spectrogram the networks see, and how they are trained.
 struct SoftnessSettings {
   sensors::ForceSpectrogramSettings spectrogram;
   double highest_Hz = 0.0;  ///< rows of the picture above are left out; 0: none
@@ -68,6 +71,7 @@ struct SoftnessSettings {
   static SoftnessSettings chosen();
 };
 
+/// How often level and material are right.
 struct SoftnessScore {
   sensors::ConfusionMatrix levels;  ///< of the test waveforms
   /// Of each material's test waveforms, in per cent, how many were classified correctly.

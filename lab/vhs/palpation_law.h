@@ -17,6 +17,7 @@
 
 namespace touchstone::lab {
 
+/// What presses on the lump.
 enum class PalpationFace {
   rigid,  ///< a plate, as stiff as sim::set_up_plate's
   gel     ///< the vhs sensor's
@@ -37,12 +38,14 @@ struct PalpationLaw {
   /// mm, at which the force is this one; the deepest for more. @pre the forces rise
   double depth(double force) const;
   double radius(double depth) const;  ///< mm
+  /// px, as `bead_px`, at this depth (mm).
   Eigen::VectorXd beads(double depth) const;
 
  private:
   double at(const std::vector<double>& values, double depth) const;
 };
 
+/// At which depths and moduli the law is computed.
 struct PalpationTableSettings {
   double deepest_mm = 2.2;
   int depths = 11;          ///< at which is pressed

@@ -31,8 +31,10 @@ struct LumpMode {
   double damping = 0.0;  ///< zeta
 };
 
+/// Radii of the lump's top at which LumpMode::top is given, mm.
 inline constexpr std::array<double, 5> kTopRadii_mm = {1.5, 3.0, 4.5, 6.0, 7.5};
 
+/// How many modes are computed, on which mesh.
 struct LumpModeSettings {
   int count = 40;  ///< modes of all shapes; those that don't move the top are left out
   double mesh_mm = 1.5;
@@ -59,9 +61,11 @@ struct PressedPiece {
   fem::PronySeries relaxation;  ///< of the force
   std::vector<LumpMode> modes;  ///< of the piece's own moduli
 };
+/// Law, relaxation and modes of one piece, with the moduli that it has.
 PressedPiece pressed_piece(const PalpationSpec& spec, const PalpationTable& table, const PalpationPiece& piece,
                            const std::vector<std::vector<LumpMode>>& modes);
 
+/// One press, sampled evenly.
 struct PalpationRun {
   double step_s = 0.0;
   std::vector<double> force_N;   ///< true, evenly in time from the start on

@@ -35,6 +35,7 @@ struct BeadNoise {
   int lost = 0;  ///< beads that weren't found, summed over the frames
 };
 
+/// On which states the noise is measured.
 struct BeadNoiseSettings {
   int material = 9;  ///< of the spec
   /// A lump of opal lit from behind in a light panel, as the calibration's probe; else matt skin in a dim room.
@@ -43,6 +44,7 @@ struct BeadNoiseSettings {
   int repeats = 8;  ///< frames of each state, and of the gel at rest
   std::uint64_t seed = 1;
 };
+/// Renders and tracks those states, and takes the noise from how their repeats differ.
 BeadNoise measure_bead_noise(const PalpationSpec& spec, const std::filesystem::path& scenes,
                              const sensors::StiffnessForceModel& model, const BeadNoiseSettings& settings,
                              const std::filesystem::path& cache, const Progress& progress = {});

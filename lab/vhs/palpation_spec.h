@@ -15,11 +15,12 @@ namespace touchstone::lab {
 
 /// The paper's five levels of softness (sec. 2.3), from soft to hard.
 enum class Softness { soft, elastic_soft, elastic_hard, cartilage_like_hard, bone_like_hard };
-inline constexpr int kSoftnessLevels = 5;
+inline constexpr int kSoftnessLevels = 5;  ///< of Softness
 EnumNames<Softness> enum_names(Softness);
 /// Their names in order.
 std::vector<std::string> softness_names();
 
+/// A material of a lump or of its skin, as drawn from piece to piece.
 struct PalpationMaterial {
   std::string name;  ///< of the skin: empty
   Softness level = Softness::soft;
@@ -41,6 +42,7 @@ struct PalpationAxis {
   double shake_um = 0.5;  ///< RMS of the free mass
 };
 
+/// How the actuator comes down.
 struct PalpationMotion {
   double speed_mm_s = 10.0;
   double speed_spread = 0.0;  ///< standard deviation of its logarithm
@@ -56,6 +58,7 @@ struct PalpationReference {
   double rate_Hz = 1000.0;
 };
 
+/// All of the file, checked.
 struct PalpationSpec {
   sim::SkinnedLump lump;
   double density_kg_m3 = 1050.0;

@@ -3,6 +3,7 @@
 
 namespace touchstone::lab {
 
+/// The camera and how far the pattern is from it.
 struct PinholeOptics {
   double hole_mm = 0.0;       ///< diameter
   double to_sensor_mm = 0.0;  ///< hole to sensor

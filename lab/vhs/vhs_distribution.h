@@ -30,6 +30,7 @@ struct DistributionSetup {
 /// @throws Error for a device without a pinhole camera straight before the gel, or without beads
 sensors::ViewParallax bead_parallax(const sim::DeviceSpec& device);
 
+/// Sets up the gel with a grid of so many beads a side.
 DistributionSetup set_up_distribution(sim::DeviceSpec device, int grid, double spacing_mm,
                                       const std::filesystem::path& cache, const Progress& progress = {});
 

@@ -45,6 +45,7 @@ struct ForceRelations {
   std::array<std::vector<std::pair<double, double>>, 3> points;  ///< (U_s px, F N) that the lines go through
   double z_of_all_r2 = 0.0;  ///< of F_z of all three, the coupling that gives eq. 3 its last row
 };
+/// The lines of fig. 6a through these samples.
 ForceRelations force_relations(const sensors::ForceSamples& samples);
 
 /// Against which positions displacements are measured.
@@ -61,6 +62,7 @@ struct ForceRecord {
   std::optional<Eigen::Vector3d> truth;
 };
 
+/// The force of each frame; truth is kept beside it where there is one.
 std::vector<ForceRecord> estimate_forces(const std::vector<TrackedSequence>& sequences,
                                          const sensors::StiffnessForceModel& model, RestChoice rest);
 
@@ -91,6 +93,7 @@ struct Verification {
   std::array<AxisErrors, 3> errors;
   std::optional<double> error_at_5N_percent;  ///< mean absolute error of z near 5 N, of 5 N
 };
+/// Errors of each axis over all records that have truth.
 Verification verify_forces(const std::vector<ForceRecord>& records);
 
 }  // namespace touchstone::lab

@@ -15,6 +15,7 @@
 
 namespace touchstone::lab {
 
+/// One picture with the light and the press behind it.
 struct VhsPicture {
   cv::Mat frame;       ///< as the camera delivers it, BGR
   cv::Mat irradiance;  ///< CV_32FC(bands), W/m^2 on the sensor
@@ -31,6 +32,7 @@ VhsPicture vhs_picture(const sim::SceneSpec& scene, int paths, const std::filesy
 /// Where points of a level face at height `z_mm` (gel frame) that touches the gel appear.
 class VhsView {
  public:
+  /// By the device's camera, through plate and gel. @pre it has one
   VhsView(const sim::DeviceSpec& device, double z_mm);
   /// Pixels, centres at + 0.5; also beside the picture.
   Eigen::Vector2d pixel_of(const Eigen::Vector2d& place_mm) const;

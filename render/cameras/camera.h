@@ -9,6 +9,7 @@
 
 namespace touchstone::render {
 
+/// A camera as a scene's user gives it; Tracer and DirectRenderer make it ready.
 using Camera = std::variant<PinholeCamera, LensCamera>;
 
 /// What the tracer samples: a camera that has been checked.

@@ -19,10 +19,12 @@ namespace touchstone::render {
 /// for each place of a pixel in a square. A picture is cut into blocks of `block` pixels in which they stay the same.
 /// Mean and variance of what is seen along both axes of the picture are kept.
 struct CameraFootprint {
+  /// One ray of a kernel, by the pixel whose centre it goes through.
   struct Tap {
     std::int32_t column, row;  ///< of the grid, from the square that the pixel lies in
     float weight;
   };
+  /// The weighted rays that stand for all of a pixel.
   struct Kernel {
     std::vector<Tap> taps;  ///< weights sum up to 1
   };
@@ -46,6 +48,7 @@ struct CameraFootprint {
   /// The sum of a pixel's squared weights: what is left of the variance of independent points.
   float sum_of_squares(int row, int column) const;
 
+  /// That of a pixel, by its block and its phase.
   const Kernel& kernel_at(int row, int column) const;
   int block_at(int row, int column) const { return row / block * blocks_across + column / block; }
 };

@@ -40,6 +40,8 @@ struct LayerRay {
   double far = 0.0;                   ///< to the next face, mm, or a large number
   double weight = 0.0;                ///< irradiance on the sensor per basic radiance, mean over the bands
 };
+/// For the place (x, y) of the picture in pixels, and (u, v) in the hole or lens, each from 0 to 1. What bends or
+/// weakens before `layer` counts; surfaces don't.
 std::optional<LayerRay> ray_in_layer(const Scene& fixture, const ReadyCamera& camera, int layer, double x, double y,
                                      double u, double v);
 

@@ -21,6 +21,7 @@ struct DirectFrame {
   const std::vector<DirectMaterial>& materials;  ///< by object
 };
 
+/// How many rays were cast; `spared` shadow rays weren't needed (ShadowReach).
 struct DirectCounts {
   std::uint64_t primary = 0, shadow_rays = 0, spared = 0;
 };
@@ -31,6 +32,7 @@ class DirectBatch {
  public:
   static constexpr int kMostPackets = 16;
 
+  /// Allocates kMostPackets packets. The frame must outlive this.
   explicit DirectBatch(const DirectFrame& frame);
 
   /// What the rays meet and what each lamp would send there; at most kMostPackets.

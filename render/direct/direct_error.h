@@ -11,6 +11,7 @@
 
 namespace touchstone::render {
 
+/// How many pixels and paths the measurement takes.
 struct DirectErrorSettings {
   int pixels = 400;    ///< looked at, one in each of as many fields of the picture
   int samples = 64;    ///< paths a pixel, twice; choose_direct takes four times as many where these aren't enough
@@ -28,6 +29,7 @@ struct DirectError {
 /// What the root mean square difference isn't above, and not below, with two standard errors of its square, which is
 /// what is measured: a difference that can't be distinguished from zero has a root whose own error says little.
 double largest_rms(const DirectError& error);
+/// What the root mean square difference isn't below, likewise: 0 where noise alone may explain the difference.
 double smallest_rms(const DirectError& error);
 
 /// A picture against path tracing of `scene`, all bands. The paths' own noise is not in the result: what is averaged is
@@ -47,6 +49,7 @@ struct DirectChoice {
   cv::Mat bounced;
 };
 
+/// What choose_direct may choose, and how accurate it has to be.
 struct DirectChoiceSettings {
   double tolerance = 0.015;  ///< of the root mean square difference: what largest_rms may be
   bool whatever = false;     ///< the error is measured, but any will do

@@ -13,6 +13,7 @@
 
 namespace touchstone::render {
 
+/// The materials that direct light knows: a Lambertian, a RoughConductor, an Emitter, a Black.
 enum class DirectKind { kMatt, kMetal, kLuminous, kBlack };
 
 /// What is printed on a surface (print.h), as long as its scene lives.
@@ -23,12 +24,14 @@ struct DirectPrint {
   std::vector<std::array<float, kMaxBands>> mark_colours;
   const PrintedPicture* picture = nullptr;
 
+  /// @pre the surface has a print
   explicit DirectPrint(const Surface& surface);
 
   /// The ink at a place of a triangle, or `plain` where there is none.
   const float* colour_at(int triangle, float u, float v, const float* plain) const;
 };
 
+/// One surface's or ball's material, in single precision.
 struct DirectMaterial {
   DirectKind kind = DirectKind::kBlack;
   std::array<float, kMaxBands> colour{};  ///< albedo, reflectance at normal incidence, or radiance

@@ -12,6 +12,7 @@
 
 namespace touchstone::render {
 
+/// How finely a picture is sampled, and what of its blur is drawn.
 struct DirectSettings {
   /// Per pixel, at most 64. With 1 rays go through the middle of the hole or lens, and shadows are cast from the middle
   /// of each lamp's lens; the picture is then spread over what the whole hole sees (camera_footprint.h). With more,

@@ -14,6 +14,7 @@
 
 namespace touchstone::render {
 
+/// How fine the grid is made, and how lamps are cut into beams.
 struct LightFieldSettings {
   double accuracy = 2e-3;  ///< relative RMS error of interpolation to reach, see LightField::error
   int lens_points = 4;     ///< a lamp's lens is averaged over lens_points^2 places; a point lamp takes one

@@ -8,6 +8,7 @@
 
 namespace touchstone::render {
 
+/// How many paths the light at rest is traced with, and how it is smoothed.
 struct RestLightSettings {
   int samples = 64;        ///< paths a pixel, at most
   int paths = 20000;       ///< that each pixel's value is the mean of, smoothing counted: more than this aren't traced

@@ -11,7 +11,7 @@
 
 namespace touchstone::render {
 
-inline constexpr int kMostDirectLamps = 64;
+inline constexpr int kMostDirectLamps = 64;  ///< lamps and beams of guides: each is a bit of ShadowReach's masks
 
 /// Where the lamps stand as seen from the cells of a coarse map over a light field's box: made once a fixture.
 struct LampBearings {
@@ -41,6 +41,7 @@ struct LampBearings {
   int cell_at(float x, float y) const;
   /// Number of the slab that holds a height, the nearest one for heights beside them.
   int slab_at(float z) const;
+  /// That of a lamp, by slab and cell of the map.
   const Bearing& bearing(int at_slab, int row, int column, int lamp) const {
     return bearings[((static_cast<std::size_t>(at_slab) * rows + row) * columns + column) * lamps + lamp];
   }

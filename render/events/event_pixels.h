@@ -37,16 +37,16 @@ struct EventPixelSettings {
 
 /// The smallest mean threshold that is taken. The most sensitive pixel known fires at 0.003 [Delbruck2010].
 inline constexpr double kLeastEventThreshold = 0.001;
-inline constexpr double kLargestEventThreshold = 5.0;
-inline constexpr double kLongestRefractory_us = 1e9;
-inline constexpr double kFastestEventRate_hz = 1e6;  ///< one a microsecond, the finest time there is
+inline constexpr double kLargestEventThreshold = 5.0;  ///< larger mean thresholds are refused
+inline constexpr double kLongestRefractory_us = 1e9;   ///< longer refractory times are refused
+inline constexpr double kFastestEventRate_hz = 1e6;    ///< one a microsecond, the finest time there is
 
 /// Refuses settings that make no sense. @throws Error that names field, value and what is allowed
 void check(const EventPixelSettings& settings);
 
 /// Pixels of the DAVIS 240C.
 inline constexpr int kDavis240cWidth = 240;
-inline constexpr int kDavis240cHeight = 180;
+inline constexpr int kDavis240cHeight = 180;  ///< of its rows
 
 /// The DAVIS 240C [Brandli2014], where `intensity_at_1klux` is the intensity of a white surface under 1 klux.
 /// Published: threshold mismatch 3.5 % contrast [Brandli2014]; 0.1 events per pixel and second in steady light at 25

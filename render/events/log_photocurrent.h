@@ -12,8 +12,8 @@
 
 namespace touchstone::render {
 
-inline constexpr double kLevelPerLog2 = 16777216.0;  ///< 2^24
-inline constexpr double kLevelPerLog = kLevelPerLog2 * std::numbers::log2e;
+inline constexpr double kLevelPerLog2 = 16777216.0;                          ///< 2^24
+inline constexpr double kLevelPerLog = kLevelPerLog2 * std::numbers::log2e;  ///< levels of a natural logarithm of 1
 /// Levels of photocurrents up to this are far from overflow, also as differences.
 inline constexpr double kLargestPhotocurrent = 0x1.0p60;
 

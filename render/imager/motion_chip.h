@@ -29,6 +29,7 @@ struct ChipShutter {
   int brightest_maximum = 62;  ///< above it the exposure falls by 1/16
 };
 
+/// A chip's picture, clock and shutter.
 struct MotionChipSettings {
   Imager imager;                  ///< grey, 6 bits; its exposure is the longest there is
   double frame_rate_Hz = 1500.0;  ///< the chip's default; exact, without the oscillator's tolerance
@@ -38,6 +39,7 @@ struct MotionChipSettings {
 /// Refuses settings that make no sense. @throws Error that names field, value and what is allowed
 void check(const MotionChipSettings& settings);
 
+/// What the chip makes of one exposure.
 struct ChipFrame {
   std::int64_t index = 0;
   cv::Mat raw;                ///< CV_8UC1, 18x18

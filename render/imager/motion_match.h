@@ -14,7 +14,7 @@ struct MotionMatch {
   Eigen::Vector2d shift = Eigen::Vector2d::Zero();
   double difference = 0.0;  ///< mean squared, at the parabolas' lowest point: what the motion doesn't explain
 };
-inline constexpr int kMatchReach = 3;
+inline constexpr int kMatchReach = 3;  ///< pixels, along each axis: motions further than that aren't found
 
 /// @throws Error for other pictures
 MotionMatch match_motion(const cv::Mat& now, const cv::Mat& before);
@@ -35,8 +35,9 @@ class MotionCounter {
   cv::Mat reference_;
   Eigen::Vector2d left_over_ = Eigen::Vector2d::Zero();
 };
-inline constexpr double kStaleDifference = 4.0;
-inline constexpr double kStaleShare = 0.2;
-inline constexpr int kLeastFeatures = 8;
+inline constexpr double kStaleDifference =
+    4.0;                                    ///< grey levels squared; what a MotionMatcher takes a new key picture for
+inline constexpr double kStaleShare = 0.2;  ///< likewise: of the picture's variance
+inline constexpr int kLeastFeatures = 8;    ///< likewise: SQUAL below it
 
 }  // namespace touchstone::render

@@ -72,12 +72,14 @@ struct GuideBearing {
 struct BeforeGuide {
   double forward, beside;
 };
+/// Where a place lies before the guide's exit face.
 template <int N>
 BeforeGuide before_guide(const PreparedLamp<N>& lamp, const Eigen::Vector3d& place) {
   const Eigen::Vector3d& ahead = lamp.exit_normal;
   return {(place - lamp.position).dot(ahead), (place - lamp.position).dot(Eigen::Vector3d(-ahead.y(), ahead.x(), 0.0))};
 }
 
+/// The direction with this azimuth, at a place `forward` mm before the exit face.
 template <int N>
 GuideBearing guide_bearing(const PreparedLamp<N>& lamp, double forward, double azimuth) {
   const Eigen::Vector3d& ahead = lamp.exit_normal;
@@ -244,6 +246,7 @@ class GuideSteepness {
     }
   }
 
+  /// Of value(), per radian.
   double density(double steepness) const {
     double sum = 0.0;
     for (const Part& part : parts_) {

@@ -24,11 +24,13 @@ struct LampBody {
   int lamp = 0;                                ///< its number in the scene
 };
 
+/// All visible lamps of a scene; they are few, so each ray tries all of them.
 class LampBodies {
  public:
   bool empty() const { return bodies_.empty(); }
   void add(const LampBody& body) { bodies_.push_back(body); }
 
+  /// The body that a ray meets.
   struct Hit {
     int lamp = -1;  ///< -1: nothing met
     double distance = 0.0;

@@ -12,6 +12,7 @@
 
 namespace touchstone::render {
 
+/// A lamp by its number in the scene, and with what probability it was chosen.
 struct LampChoice {
   int lamp;
   double probability;

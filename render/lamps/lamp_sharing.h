@@ -101,6 +101,7 @@ inline void share_with_paths(const PreparedScene<N>& scene, const PreparedLamp<N
 
 /// How the light of a lamp that the path runs into is shared with the connections of where the path last scattered.
 struct Departure {
+  /// Who counts the light: the path that runs into the lamp, the connection, or both by their weights.
   enum class Sharing { kAllToPath, kShared, kAllToConnection } sharing = Sharing::kAllToPath;
   Receiver from;
   bool is_matt = false;

@@ -18,6 +18,7 @@
 
 namespace touchstone::render {
 
+/// How a lamp's light is spread over directions.
 enum class LampKind { kSpot, kLobe, kProjector, kGuide };
 
 /// The grey pattern of a projector, row by row from the top.
@@ -35,6 +36,7 @@ struct PreparedPattern {
   }
 };
 
+/// A lamp of any kind, with N bands.
 template <int N>
 struct PreparedLamp {
   LampKind kind = LampKind::kSpot;

@@ -18,6 +18,7 @@
 
 namespace touchstone::render {
 
+/// A medium with N bands; coefficients are per mm.
 template <int N>
 struct PreparedMedium {
   double index;
@@ -30,6 +31,7 @@ struct PreparedMedium {
   DeepWalk<N> deep;
 };
 
+/// The materials of Material, by number.
 enum class SurfaceKind {
   kLambertian,
   kConductor,
@@ -41,6 +43,7 @@ enum class SurfaceKind {
   kRoughRefractive
 };
 
+/// A material with N bands; which fields count depends on `kind`.
 template <int N>
 struct PreparedMaterial {
   SurfaceKind kind = SurfaceKind::kBlack;
@@ -55,6 +58,7 @@ struct PreparedMaterial {
   int inside = 0, outside = 0;
 };
 
+/// A Print with N bands, ready to be looked up.
 template <int N>
 struct PreparedPrint {
   std::vector<Eigen::Vector2d> points;
@@ -92,6 +96,7 @@ struct PreparedScene {
   LampBodies lamp_bodies;
   bool has_films;
 
+  /// @pre check_scene(scene) holds, and it has N bands
   explicit PreparedScene(const Scene& scene)
       : faces(scene.faces),
         environment(scene.environment),

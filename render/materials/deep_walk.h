@@ -35,6 +35,8 @@ struct DeepWalk {
   Bands<N> drift = Bands<N>::Zero();  ///< g l, mm
 };
 
+/// For a medium with these coefficients (per mm) and mean cosine g. The margin is infinite where the medium absorbs
+/// more than the walk allows.
 template <int N>
 DeepWalk<N> deep_walk(const Bands<N>& absorption, const Bands<N>& scattering, double g) {
   DeepWalk<N> walk;

@@ -32,8 +32,10 @@ double ggx_reflection(const Eigen::Vector3d& out, const Eigen::Vector3d& in, dou
 class GgxAlbedo {
  public:
   GgxAlbedo() { table_.fill(1.0); }
+  /// Tabulates it for one alpha.
   explicit GgxAlbedo(double alpha);
 
+  /// E at a cosine in [0, 1]; between the nodes a line.
   double operator()(double cosine) const;
   /// Factor on ggx_reflection that gives that light back, coloured by the reflectance at normal incidence once more:
   /// 1 + reflectance * (value) after [Turquin2019].

@@ -24,8 +24,10 @@
 
 namespace touchstone::render {
 
+/// Square and rectangle have their sides along the material's x and y.
 enum class MarkShape : std::uint8_t { round, square, rectangle };
 
+/// One mark of a single ink.
 struct PrintedMark {
   Eigen::Vector2d centre = Eigen::Vector2d::Zero();  ///< mm, material coordinates
   double half_width = 0.0;                           ///< mm, above 0: the radius, or half of a side (along x)
@@ -57,6 +59,7 @@ struct PrintedPicture {
   }
 };
 
+/// Ink on one surface, in material coordinates: where the gel was at rest.
 struct Print {
   std::vector<Eigen::Vector2d> material_mm;  ///< one for each vertex of the surface's mesh
   std::vector<Spectrum> inks;                ///< take the place of the material's own colour; 0 to 1

@@ -64,6 +64,8 @@ struct RoughSample {
   Eigen::Vector3d in;
   double weight = 0.0;  ///< on basic radiance, L / n^2; 0 to 1: the chance that no other facet stands in the way
 };
+/// `out` is a unit vector in the boundary's own frame, z its normal on this side, with the index `n_out`; u, v and w
+/// are random numbers from 0 to 1.
 inline RoughSample sample_rough_dielectric(const Eigen::Vector3d& out, double alpha, double n_out, double n_in,
                                            double u, double v, double w) {
   if (!(out.z() > 0.0)) return {out, 0.0};
@@ -96,6 +98,7 @@ inline RoughSample sample_rough_dielectric(const Eigen::Vector3d& out, double al
 class RoughBoundary {
  public:
   RoughBoundary() = default;
+  /// Tabulates E for both sides.
   RoughBoundary(double alpha, double n_outside, double n_inside);
 
   /// Scattering function in 1/sr; `inside` says on which side `out` is. Vectors as for rough_dielectric.

@@ -88,6 +88,7 @@ Bands<N> weight_of_scattering(const Bands<N>& extinction, const Bands<N>& scatte
 /// weights grow no faster than the walks become rare and none is a firefly; that is as long as walks
 /// last in a layer of some 8,000 mean free paths. Beyond a half is kept, and the mean length is finite.
 inline constexpr std::int64_t kFreeScatterings = 65536;
+/// Is a walk of so many scatterings to be ended by chance now? At kFreeScatterings and each time that it has doubled.
 inline bool roulette_is_due(std::int64_t scatterings) {
   return scatterings >= kFreeScatterings && (scatterings & (scatterings - 1)) == 0;
 }

@@ -20,6 +20,7 @@
 
 namespace touchstone::render {
 
+/// A foil without thickness, which bends nothing.
 struct ThinFilm {
   Spectrum transmittance;  ///< of the dye at normal incidence without the faces' losses, 0 to 1 in each band
   double index = 1.5;      ///< of the film's substance, 1 to 5

@@ -20,6 +20,7 @@ struct FaceKernel {
 /// Fields on a grid of square cells, taken to be zero beyond it. Single precision, by OpenCV's transforms.
 class FaceConvolution {
  public:
+  /// Transforms are wider than the grid by the reach, so that nothing wraps round.
   FaceConvolution(int columns, int rows, double cell_mm, double reach_mm);
 
   int columns() const { return columns_; }

@@ -15,6 +15,7 @@ namespace touchstone::render {
 /// and where `behind` isn't 1 a luminous panel far behind. @throws Error if the maps don't fit the grid
 Scene membrane_scene(const MembraneOptics& optics, const FaceGrid& grid, const FaceState& state, double behind);
 
+/// How many pixels and paths the measurement takes.
 struct MembraneErrorSettings {
   int fields = 12;     ///< along the picture's longer side: what is averaged to find the worst place
   int pixels = 16;     ///< looked at in each field

@@ -38,6 +38,7 @@ std::array<double, kFaceSectors + 1> sector_limits(double index);
 struct RadialShare {
   std::vector<double> in_annulus;
   double beyond = 0.0;
+  /// All annuli and what is beyond.
   double total() const;
 };
 
@@ -49,6 +50,7 @@ struct ViewKernel {
   RadialShare even, slant, aside, oval;
 };
 
+/// All figures of one membrane, by sector of the direction at the face and annulus of the distance.
 struct MembraneKernels {
   MembraneOptics optics;
   double largest_sine = 0.0;  ///< S = largest_sine^2
@@ -71,6 +73,7 @@ struct MembraneKernels {
   std::array<double, 2> view_absorbed = {};
 };
 
+/// How many walks the figures are means of.
 struct MembraneWalkSettings {
   std::uint64_t seed = 1;
   int walks = 1 << 21;        ///< from each sector, and twice as many from the camera

@@ -5,8 +5,8 @@
 // between the room on the camera's side and the outer face. At the face, h_j(x) is the light that a walk brings which
 // arrives in sector j at the place x, g_i(x) that of one which leaves it evenly in sector i, both in parts of the
 // room's radiance:
-//   g_i = e_i + sum_j exchange_ij * h_j                                      (e: out to the camera's side; *: over the
-//   face) h_j = (1 - c) [r_j g_j + (1 - r_j) o] + c a g_matt,
+//   g_i = e_i + sum_j exchange_ij * h_j              (e: out to the camera's side; *: over the face)
+//   h_j = (1 - c) [r_j g_j + (1 - r_j) o] + c a g_matt,
 // with the contact's coverage c(x) and the body's albedo a, Fresnel's mean reflectance r, g_matt the mean over all
 // sectors, and what comes from outside
 //   o = (1 - shadow) behind + shadow a (light on the body through the face).
@@ -27,6 +27,7 @@
 
 namespace touchstone::render {
 
+/// Cells, reach and tolerance of the convolutions.
 struct MembraneLightSettings {
   double behind = 1.0;            ///< radiance of what is behind the membrane, in parts of the room's
   double view_cell_mm = 0.2;      ///< cells on which the camera's kernel is applied, and
@@ -36,6 +37,7 @@ struct MembraneLightSettings {
   double tolerance = 1e-4;  ///< of the exchange's sum, in parts of the room's radiance
 };
 
+/// One membrane before one camera, made ready: then a picture takes some transforms. It can be moved, not copied.
 class MembraneLight {
  public:
   /// @param grid the outer face's; the membrane ends where it ends, and beside it what is behind is seen
@@ -51,6 +53,7 @@ class MembraneLight {
   /// number of threads. @throws Error if the state doesn't fit the grid or a value is out of range
   cv::Mat irradiance(const FaceState& state) const;
 
+  /// That of the constructor.
   const FaceGrid& grid() const;
 
  private:

@@ -14,9 +14,11 @@
 
 namespace touchstone::render {
 
+/// Free flights and scatterings in the media of one scene; its functions change the leg that they are given.
 template <int N>
 class MediumWalk {
  public:
+  /// The path's present leg.
   using Leg = PathLeg<N>;
 
   explicit MediumWalk(const PreparedScene<N>& scene) : scene_(scene) {}

@@ -11,6 +11,7 @@ namespace touchstone::render {
 
 inline constexpr int kRouletteFrom = 3;  ///< scatterings, at surfaces or in a medium, from which on chance ends paths
 
+/// One straight leg: where it is, and what its path has met so far.
 template <int N>
 struct PathLeg {  // without default values: a path makes space for a dozen and mostly uses three
   Eigen::Vector3d origin, direction;

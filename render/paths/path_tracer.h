@@ -24,6 +24,7 @@ struct NoiseTarget {
   double fraction = 0.5;
 };
 
+/// How many paths a pixel gets, and how long they may be.
 struct RenderSettings {
   std::uint64_t seed = 0;
   int min_samples = 16;   ///< paths per pixel before the first look at the error; powers of two sample best
@@ -40,6 +41,7 @@ struct RayCounts {
   std::uint64_t bounces = 0;      ///< legs after that hit or a scattering in a medium
   std::uint64_t direct = 0;       ///< those of the connections that came from what a path met first
   std::uint64_t direct_lit = 0;   ///< those of them that nothing stood in the way of
+  /// Adds up, count by count.
   RayCounts& operator+=(const RayCounts& other);
 };
 

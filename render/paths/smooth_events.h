@@ -17,10 +17,13 @@
 
 namespace touchstone::render {
 
+/// What flat faces, Refractive surfaces and films of one scene make of a leg.
 template <int N>
 class SmoothEvents {
  public:
+  /// The path's present leg.
   using Leg = PathLeg<N>;
+  /// The legs that are followed later.
   using Branches = PathBranches<N>;
 
   explicit SmoothEvents(const PreparedScene<N>& scene) : scene_(scene), dark_((scene.environment == 0.0).all()) {}

@@ -6,6 +6,7 @@
 
 namespace touchstone::render {
 
+/// Bit 0 becomes bit 31, and so on.
 inline std::uint32_t reverse_bits(std::uint32_t x) {
   x = __builtin_bswap32(x);
   x = ((x & 0x0f0f0f0fu) << 4) | ((x >> 4) & 0x0f0f0f0fu);
@@ -47,6 +48,7 @@ inline std::uint32_t sobol_second_reversed(std::uint32_t index) {
 /// sample, number of calls). Values in [0, 1).
 class SampleSequence {
  public:
+  /// At its first pair.
   SampleSequence(std::uint64_t seed, std::uint64_t pixel, std::uint32_t sample)
       : key_(mix_bits(seed + 0x9e3779b97f4a7c15ull * (pixel + 1))), reversed_sample_(reverse_bits(sample)) {}
 
@@ -58,6 +60,7 @@ class SampleSequence {
   }
   bool is_centre() const { return fixed_; }
 
+  /// Two numbers that are evenly spread over the samples of the pixel.
   std::array<double, 2> next_pair() {
     if (fixed_) return {0.5, 0.5};
     const Point point = advance();

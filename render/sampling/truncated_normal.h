@@ -12,12 +12,14 @@ namespace touchstone::render {
 /// less than a millionth of its mass there. `value` is its quantile, `density` its density between the bounds.
 class TruncatedNormal {
  public:
+  /// The normal density of this middle and deviation, cut off at both ends. @pre low < high, deviation above 0
   TruncatedNormal(double middle, double deviation, double low, double high)
       : middle_(middle), deviation_(deviation), low_(low), width_(high - low) {
     below_ = 0.5 * std::erfc((middle - low) / (deviation * std::sqrt(2.0)));
     mass_ = 0.5 * std::erfc((middle - high) / (deviation * std::sqrt(2.0))) - below_;
     even_ = !(mass_ > 1e-6);
   }
+  /// The value below which the share u of the density lies.
   double value(double u) const {
     if (even_) return low_ + u * width_;
     const double x = middle_ + deviation_ * normal_quantile(below_ + u * mass_);
@@ -25,6 +27,7 @@ class TruncatedNormal {
   }
   /// What the bounds leave of the whole normal distribution.
   double mass() const { return mass_; }
+  /// 0 outside of the ends.
   double density(double x) const {
     if (even_) return 1.0 / width_;
     const double off = (x - middle_) / deviation_;

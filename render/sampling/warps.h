@@ -9,6 +9,7 @@
 
 namespace touchstone::render {
 
+/// Of one angle.
 struct SineCosine {
   double sine, cosine;
 };
@@ -43,6 +44,7 @@ inline Eigen::Vector3d square_to_cosine_hemisphere(double u, double v) {
 struct NormalFrame {
   Eigen::Vector3d x, y, z;
 
+  /// Any two axes beside the normal, which is a unit vector.
   explicit NormalFrame(const Eigen::Vector3d& normal) : z(normal) {
     const double sign = std::copysign(1.0, normal.z());
     const double a = -1.0 / (sign + normal.z());

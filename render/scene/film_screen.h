@@ -42,6 +42,7 @@ class FilmScreen {
   float lamp_cover(float x, float y) const { return cover(lamps_, x, y); }
   /// Light that goes through the plane: what meets no film, and what does, shared out to the table's cosines.
   static constexpr int kCosines = 16;
+  /// Shares of the light, by the cosine at which it passes the films.
   struct Light {
     float plain = 0.0f;
     float filtered[kCosines + 1] = {};

@@ -29,6 +29,7 @@ inline int medium_of_layer(const std::vector<FlatFace>& faces, int layer) {
   return layer == 0 ? faces.front().medium_below : faces[layer - 1].medium_above;
 }
 
+/// The medium itself.
 inline const Medium& medium_of_layer(const Scene& scene, int layer) {
   return scene.media[medium_of_layer(scene.faces, layer)];
 }

@@ -14,10 +14,9 @@
 //  - through the flat faces between the two straight on, exactly, by one connection to a point of the lamp
 //    (lamp_connection.h);
 //  - by mirror images of a lamp in flat faces, and through curved faces: only where a path hits the lamp itself, so
-//  only
-//    that of lamps with `visible` set and some size (lamp_bodies.h). A GuideLamp has its mirror images in its plate
-//    built in. For other lamps light mirrored by a face on its path is left out. Measured with an LED of radius 2 mm
-//    before and after it was made visible, in glass and gel over beads: from below in air what is left out is under
+//    only that of lamps with `visible` set and some size (lamp_bodies.h). A GuideLamp has its mirror images in its
+//    plate built in. For other lamps light mirrored by a face on its path is left out. Measured with an LED of radius 2
+//    mm before and after it was made visible, in glass and gel over beads: from below in air what is left out is under
 //    0.2 % of a bead's light and of an object's on the gel, and nothing of a membrane's; from the plate's side as much
 //    again as the direct light, from the gel's side a quarter of a bead's light and twice that of an object on the gel.
 //    So a lamp inside plate or gel should be a GuideLamp, or visible.
@@ -110,6 +109,7 @@ struct GuideLamp {
   Spectrum power_W;
 };
 
+/// Every kind of lamp.
 using LampKinds = std::variant<SpotLamp, LedLamp, AreaLamp, ProjectedLamp, GuideLamp>;
 
 /// One of these. It is the variant (std::visit, std::get and the like take it) with its copying out of line: inlined it
@@ -133,6 +133,7 @@ double emission_integral(const Lamp& lamp);
 
 /// Where a lamp's middle is, and what it sends (W in each band).
 const Eigen::Vector3d& lamp_position(const Lamp& lamp);
+/// What it sends into its medium, W in each band.
 const Spectrum& lamp_power(const Lamp& lamp);
 
 /// How far it reaches from its middle; 0 for a point, and for a guide, whose end stands inside its plate.
@@ -140,6 +141,7 @@ double lamp_extent(const Lamp& lamp);
 
 /// Where it faces (not always a unit vector), and the radius of the disc that a round lamp is; 0 of other kinds.
 const Eigen::Vector3d& lamp_direction(const Lamp& lamp);
+/// The radius of a round lamp, mm; 0 of other kinds.
 double disc_radius(const Lamp& lamp);
 
 /// Has it a body that rays can meet?

@@ -7,7 +7,7 @@
 
 namespace touchstone::render {
 
-inline constexpr int kPacket = 16;
+inline constexpr int kPacket = 16;  ///< rays of a packet
 
 /// Rays of lanes whose `valid` is -1; 0 leaves a lane out. All lanes must hold finite numbers (Embree aborts else).
 struct alignas(64) RayPacket {
@@ -17,6 +17,7 @@ struct alignas(64) RayPacket {
   int valid[kPacket];
 };
 
+/// What sixteen rays have met, ray by ray; where one meets nothing, only its `object` counts.
 struct alignas(64) PacketHits {
   float distance[kPacket];
   float normal[3][kPacket];      ///< not of unit length, in the surface's own sense
@@ -40,6 +41,7 @@ class PacketScene {
   /// its balls are others.
   bool move_to(const Scene& scene);
 
+  /// The nearest hit of each valid ray.
   void intersect(const RayPacket& rays, PacketHits& hits) const;
 
   /// Sets valid lanes of `rays` that meet something within `far` to 0 in `free`, the other valid ones to -1.

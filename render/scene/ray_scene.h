@@ -35,6 +35,8 @@ struct RecordedRay {
   bool shadow;  ///< asked only whether anything opaque is in the way
 };
 
+/// The surfaces and balls of a scene, ready for rays; Embree's scene belongs to it, so it isn't copied or moved. Any
+/// number of threads may ask it.
 class RayScene {
  public:
   /// @pre check_scene(scene) holds.
@@ -64,6 +66,7 @@ class RayScene {
 
   /// Are there Refractive surfaces, and does one cross the line between two points?
   bool has_refractive() const;
+  /// Does a Refractive surface stand between the two points?
   bool meets_refractive(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const;
   /// How far the nearest surface or ball is from a point, if that is less than `most` (mm, finite); else `most`.
   double clearance(const Eigen::Vector3d& point, double most) const;

@@ -57,6 +57,7 @@ struct Refractive {
   int medium_outside = 0;
 };
 
+/// What a surface or a ball is made of.
 using Material =
     std::variant<Lambertian, RoughConductor, Black, Emitter, Refractive, DiffuseTransmitter, ThinFilm, RoughRefractive>;
 
@@ -74,6 +75,7 @@ struct Surface {
   std::vector<Eigen::Vector3d> normals = {};
 };
 
+/// A sphere, such as a bead in the gel: exact, without triangles.
 struct Ball {
   Eigen::Vector3d centre;
   double radius = 0.0;

@@ -18,6 +18,7 @@ struct BeadFilter {
   void start(const BeadFilterSettings& settings, const Eigen::Vector2d& where);
   /// The state `dt` seconds later. @pre dt > 0
   void predict(const BeadFilterSettings& settings, double dt);
+  /// Takes a measured position, px.
   void correct(const BeadFilterSettings& settings, const Eigen::Vector2d& measured);
 };
 

@@ -8,6 +8,7 @@
 
 namespace touchstone::sensors {
 
+/// How large rings and arrow are drawn.
 struct BeadOverlay {
   double px_per_N = 40.0;  ///< length of the arrow of the force along x and y; above 0
   int ring_px = 12;        ///< radius of the ring round each bead; above 0

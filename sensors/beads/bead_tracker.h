@@ -37,6 +37,7 @@ namespace touchstone::sensors {
 /// Whether beads are darker or brighter than what is behind them.
 enum class BeadPolarity : std::uint8_t { kDark, kBright };
 
+/// How a bead's centroid is taken from its pixels.
 enum class CentroidKind : std::uint8_t {
   kBinary,    ///< each bead pixel counts the same (the paper, step vii)
   kWeighted,  ///< pixels at the rim count by how much of them the bead covers, judged by their grey value
@@ -85,6 +86,7 @@ struct BeadConsistency {
   double first_offset = 0.2;
 };
 
+/// All that the tracker can be set to; the defaults are those of the published sensor where the paper gives them.
 struct BeadTrackerSettings {
   int grid = 3;                    ///< N: beads a side; 2 to 32
   int roi_a_px = 220;              ///< side of ROI-A, which is split into N x N cells
@@ -101,6 +103,7 @@ struct BeadTrackerSettings {
   std::optional<Eigen::Vector2d> first_centre_px = std::nullopt;
 };
 
+/// Where a bead's position in a frame comes from.
 enum class BeadStatus : std::uint8_t {
   kFound,       ///< measured in the window round its last position
   kFoundAgain,  ///< measured after a search of its whole cell
@@ -146,6 +149,7 @@ class BeadTracker {
   /// Forgets all frames: the next one is the first.
   void restart();
 
+  /// As they were given.
   const BeadTrackerSettings& settings() const;
 
  private:

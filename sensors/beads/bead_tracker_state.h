@@ -14,6 +14,7 @@
 
 namespace touchstone::sensors {
 
+/// All that a tracker remembers.
 struct BeadTracker::State {
   /// What is known of one bead from the frames before.
   struct Bead {
@@ -55,6 +56,7 @@ struct BeadTracker::State {
   void follow(const cv::Mat& image, std::size_t bead, bool visible, double dt);
   void accept(std::size_t bead, const BeadMeasurement& measurement, BeadStatus status, double dt);
   void hold_or_reset(std::size_t bead);
+  /// What a displacement is measured from.
   enum class Since { kFrameBefore, kFirstFrame };
   std::optional<Eigen::Vector2d> motion_of_neighbours(std::size_t bead, Since since) const;
   Eigen::Vector2d median_step(int down, int right) const;

@@ -50,6 +50,7 @@ struct GreyWindow {
 bool read_window(const cv::Mat& image, const BrightnessScale& scale, const Eigen::Vector2d& centre, int side,
                  int stride, GreyWindow& window);
 
+/// The region in a window that was taken for the bead.
 struct BeadMeasurement {
   Eigen::Vector2d centroid = Eigen::Vector2d::Zero();  ///< px of the image
   double area_px = 0.0;

@@ -24,6 +24,7 @@ struct BitWindow {
 /// Erosion and dilation by a square of side 2 radius + 1. What is outside the image has no say, as in OpenCV's
 /// default for morphology.
 void erode(BitWindow& window, int radius);
+/// The set pixels grow by the square.
 void dilate(BitWindow& window, int radius);
 /// Erosion then dilation: removes what is thinner than the square.
 void open_regions(BitWindow& window, int radius);

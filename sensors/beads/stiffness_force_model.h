@@ -41,6 +41,7 @@ struct TrainingSummary {
   Eigen::Vector3d rms_error_N = Eigen::Vector3d::Zero();  ///< on the training samples, per axis
 };
 
+/// A trained model. It holds for the gel, the camera and the direction of forces that it was trained with.
 struct StiffnessForceModel {
   int grid = 3;  ///< N, beads a side
   MatrixForm form = MatrixForm::kAsymmetric;
@@ -67,6 +68,7 @@ Eigen::Vector3d estimate_force(const StiffnessForceModel& model, std::span<const
 bool is_extrapolated(const StiffnessForceModel& model, std::span<const Eigen::Vector2d> positions,
                      std::span<const Eigen::Vector2d> rest);
 
+/// The force of one frame, and whether to believe it.
 struct ForceEstimate {
   std::int64_t t_us = 0;
   Eigen::Vector3d force = Eigen::Vector3d::Zero();  ///< N
@@ -77,6 +79,7 @@ struct ForceEstimate {
 /// The force of one tracked frame, against the model's own rest positions, or against those given (where the sensor
 /// was mounted anew, its own first frame without load).
 ForceEstimate estimate(const StiffnessForceModel& model, const TrackedBeads& beads);
+/// Against rest positions given here, N^2 in px.
 ForceEstimate estimate(const StiffnessForceModel& model, const TrackedBeads& beads,
                        std::span<const Eigen::Vector2d> rest);
 

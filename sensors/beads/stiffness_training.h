@@ -23,6 +23,7 @@ struct ForceSamples {
   std::vector<Eigen::Vector3d> forces;                  ///< one a sample
 };
 
+/// When the descent ends, and how it goes.
 struct TrainingSettings {
   MatrixForm form = MatrixForm::kAsymmetric;
   StopRule stop = StopRule::kLossDrop;
@@ -41,6 +42,7 @@ struct TrainingSettings {
   }
 };
 
+/// Why the descent ended.
 enum class TrainingEnd : std::uint8_t {
   kLossDropped,  ///< the wanted drop was reached
   kConverged,    ///< no more improvement (also under StopRule::kLossDrop, if the wanted drop can't be reached)
@@ -49,11 +51,13 @@ enum class TrainingEnd : std::uint8_t {
 /// "loss dropped", "converged", "out of iterations"
 const char* name_of(TrainingEnd end);
 
+/// The loss at one iteration.
 struct LossRecord {
   std::int64_t iteration = 0;
   Eigen::Vector3d loss = Eigen::Vector3d::Zero();  ///< mean squared error per axis, N^2
 };
 
+/// How the training went, and what errors are left on its samples.
 struct TrainingReport {
   TrainingSettings settings;
   TrainingEnd end = TrainingEnd::kOutOfIterations;
@@ -64,6 +68,7 @@ struct TrainingReport {
   std::vector<LossRecord> history;               ///< iterations 0, 1, 2, 5, 10, 20, 50, ... and the last
 };
 
+/// What training gives.
 struct TrainedModel {
   StiffnessForceModel model;
   TrainingReport report;

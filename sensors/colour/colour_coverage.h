@@ -3,7 +3,7 @@
 
 namespace touchstone::sensors {
 
-inline constexpr int kHalfCovered = 128;
+inline constexpr int kHalfCovered = 128;  ///< from there on a pixel belongs to the marker
 /// From here on a pixel is ink for certain. Above a half, so two markers' ink with a blurred gap of a pixel between
 /// them stays apart; the rims, by weight_of, come to them afterwards.
 inline constexpr int kInkCore = 179;

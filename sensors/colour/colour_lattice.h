@@ -15,6 +15,7 @@ struct ColourLattice {
   std::vector<Eigen::Vector2d> places;  ///< px; of a region that wasn't seen, where its neighbours put it
   std::vector<std::uint8_t> seen;       ///< 0 or 1
 
+  /// How many markers were seen at their place.
   int count_seen() const;
 };
 

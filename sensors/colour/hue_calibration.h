@@ -33,14 +33,15 @@ struct HueModelForm {
                           ///< counts as 8
 };
 
+/// The grid, the view and the form of the model.
 struct HueCalibrationSettings {
   double spacing_mm = 3.0;  ///< between the grid's markers
   ViewParallax parallax = {};
   HueModelForm form = {};
   bool own_gains = false;  ///< fits the gains of each marker that has at least kLeastOwnSamples
 };
-inline constexpr int kLeastOwnSamples = 20;
-inline constexpr int kLeastHueSamples = 8;
+inline constexpr int kLeastOwnSamples = 20;  ///< of a marker, for gains of its own
+inline constexpr int kLeastHueSamples = 8;   ///< in all, for a calibration
 
 /// Least squares of the form on all samples.
 /// @param rest the picture at rest that goes with the samples
@@ -67,6 +68,7 @@ HueErrors hue_errors(const HueModel& model, const ColourMarkerReading& rest, con
 HueErrors cross_validate_hue(const ColourMarkerReading& rest, const std::vector<HueSample>& samples,
                              const HueCalibrationSettings& settings);
 
+/// A form and how well it does on presses that it wasn't fitted to.
 struct HueFormScore {
   HueModelForm form;
   HueErrors errors;  ///< cross-validated

@@ -31,6 +31,7 @@ class HueEstimator {
   /// @throws Error if the model is faulty (fault_of), or has gains for a marker that the grid hasn't; or as map_of_rest
   HueEstimator(const HueModel& model, const ColourMarkerReading& rest);
 
+  /// All markers of a picture; flawed ones have no estimate. @throws Error if the reading's grid isn't that of the rest
   HueField estimate(const ColourMarkerReading& reading) const;
   /// @throws Error if the reading's grid isn't that of the rest
   HueEstimate estimate(std::size_t marker, const ColourMarker& seen) const;

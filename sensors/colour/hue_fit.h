@@ -23,8 +23,10 @@ struct HueRow {
 /// @throws Error if there is no press, no lateral displacement, or (for a free offset) but one press
 HueLine fit_line(const std::vector<HueRow>& rows, const HueModelForm& form);
 
+/// A polynomial without a direction.
 HueIsotropic fit_isotropic(const std::vector<HueRow>& rows, const HueModelForm& form);
 
+/// A polynomial of all features.
 HuePolynomial fit_polynomial(const std::vector<HueRow>& rows, const HueModelForm& form);
 
 /// What the rows, and no change at all, span.

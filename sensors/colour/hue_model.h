@@ -17,6 +17,7 @@
 
 namespace touchstone::sensors {
 
+/// Which model takes what is seen to a displacement.
 enum class HueForm : std::uint8_t {
   kEquation4,   ///< the paper's own
   kIsotropic,   ///< a polynomial that knows no direction: it may learn from shear along one axis
@@ -87,6 +88,7 @@ struct HueRange {
   double largest_distance = 0.0;  ///< of a change by that measure, squared
 };
 
+/// A calibrated model of one grid of markers; only the part of its form is filled.
 struct HueModel {
   HueForm form = HueForm::kEquation4;
   double spacing_mm = 3.0;  ///< of the grid

@@ -19,11 +19,13 @@ struct InkPatch {
   std::vector<int> under;  ///< px of it under each marker's filter
 };
 
+/// What a patch must be like to be a marker's own.
 struct InkRules {
   double usual_area_px = 0.0;         ///< of a filter
   double most_under_neighbour = 0.1;  ///< part of a patch's area
 };
 
+/// Whose each patch of ink is, and which markers can't be measured for that.
 struct InkOwners {
   std::vector<int> owner;         ///< of each patch: a marker, or -1
   std::vector<MarkerFlaw> flaws;  ///< of each marker: none, missing (no ink is its own), two filters, cut off

@@ -20,6 +20,7 @@ struct MarkerChange {
   double log_cell_area = 0.0;       ///< MarkerSurroundings, of its neighbours
   double log_neighbour_area = 0.0;
 
+  /// The numbers in the order of the fields.
   Eigen::Matrix<double, kSize, 1> vector() const;
   /// For models that are of one marker alone: what its neighbours do is then no sign that it looks strange.
   void forget_surroundings();

@@ -25,8 +25,7 @@ EventFormat event_format_of_name(const std::filesystem::path& file);
 class EventReader {
  public:
   /// @throws Error naming the file: it isn't there, is empty, isn't a file of events, is of a kind or version that
-  /// isn't
-  ///   read, or its beginning is damaged
+  /// isn't read, or its beginning is damaged
   explicit EventReader(const std::filesystem::path& file, const EventReadOptions& options = {});
   ~EventReader();
   EventReader(const EventReader&) = delete;
@@ -36,6 +35,7 @@ class EventReader {
   /// @throws Error naming file, place, value and what is allowed where the file is damaged, an event is beside the
   ///   picture or earlier than the one before it
   std::span<const Event> next();
+  /// What the file says of its camera.
   const EventSource& source() const;
 
  private:

@@ -22,6 +22,7 @@ namespace touchstone::sensors {
 /// Times are us, as they stand (a real camera's: since 1970). The table of packets at the file's end isn't needed.
 class Aedat4EventReader {
  public:
+  /// Reads the header and chooses the stream of events. @throws Error as EventReader
   Aedat4EventReader(const std::filesystem::path& file, const EventReadOptions& options);
 
   /// Puts the next packet that has events into `events`, nothing at the end.
@@ -59,6 +60,7 @@ class Aedat4EventWriter {
   Aedat4EventWriter(const std::filesystem::path& file, cv::Size size, const std::string& program);
   /// @pre within the picture, in the order of time
   void append(std::span<const Event> events);
+  /// Writes the last packet and the table. @throws Error if the file can't be written
   void close();
 
  private:

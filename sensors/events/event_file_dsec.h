@@ -17,6 +17,7 @@ namespace touchstone::sensors {
 /// ms_to_idx isn't needed. The camera's size is in the attributes `width` and `height` of files of ours only.
 class DsecEventReader {
  public:
+  /// Opens the file. @throws Error as EventReader
   DsecEventReader(const std::filesystem::path& file, const EventReadOptions& options);
 
   /// Puts the next portion into `events`, nothing at the end.
@@ -39,9 +40,11 @@ class DsecEventReader {
 /// the whole millisecond before the first event.
 class DsecEventWriter {
  public:
+  /// Begins the file. @throws Error if it can't be written
   DsecEventWriter(const std::filesystem::path& file, cv::Size size, const std::string& program);
   /// @pre within the picture, in the order of time
   void append(std::span<const Event> events);
+  /// Writes what is left, and ms_to_idx. @throws Error if the file can't be written
   void close();
 
  private:

@@ -23,6 +23,7 @@ namespace touchstone::sensors {
 /// counted. A file that ends on a whole word looks whole: the format has no length.
 class Evt3EventReader {
  public:
+  /// Reads the header. @throws Error as EventReader
   Evt3EventReader(const std::filesystem::path& file, const EventReadOptions& options);
 
   /// Puts the next portion into `events`, nothing at the end.
@@ -102,6 +103,7 @@ class Evt3EventWriter {
   Evt3EventWriter& operator=(const Evt3EventWriter&) = delete;
   /// @pre within the picture, in the order of time
   void append(std::span<const Event> events) { encoder_.append(events); }
+  /// Writes what is left. @throws Error if the file can't be written
   void close();
 
  private:

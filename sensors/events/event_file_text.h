@@ -23,6 +23,7 @@ namespace touchstone::sensors {
 /// "# width 346". Other comments (#) and empty lines are passed over.
 class TextEventReader {
  public:
+  /// Opens the file. @throws Error as EventReader
   TextEventReader(const std::filesystem::path& file, const EventReadOptions& options);
 
   /// Puts the next portion into `events`, nothing at the end.
@@ -57,9 +58,11 @@ class TextEventReader {
 /// Writes "t_us x y p", or the same with commas for names that end in .csv, behind comments on program and camera.
 class TextEventWriter {
  public:
+  /// Begins the file. @throws Error if it can't be written
   TextEventWriter(const std::filesystem::path& file, cv::Size size, const std::string& program);
   /// @pre within the picture, in the order of time
   void append(std::span<const Event> events);
+  /// Writes what is left. @throws Error if the file can't be written
   void close();
 
  private:

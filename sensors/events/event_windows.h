@@ -18,6 +18,7 @@ struct EventCounts {
   bool operator==(const EventCounts&) const = default;
 };
 
+/// Which events are counted, and over what times.
 struct EventWindowSettings {
   std::int64_t start_us = 0;       ///< of the first window
   std::int64_t length_us = 7'000;  ///< of each; the paper's 7 ms

@@ -23,6 +23,7 @@
 
 namespace touchstone::sensors {
 
+/// What counts as significant, and how many windows a phase has.
 struct GraspPhaseSettings {
   int background_windows = 20;  ///< 140 ms; at least 2
   double false_alarm = 1e-6;  ///< in a window; above 0, below 0.5. Searching 1000 windows then errs once in 1000 grasps

@@ -15,6 +15,7 @@
 
 namespace touchstone::sensors {
 
+/// Do the windows of the holding phase count in the memory?
 enum class Accumulation : std::uint8_t {
   kThroughHold,  ///< from first touch on, all windows; those of the hold are there, but not judged
   kSkipHold,     ///< as if the release followed the grasping phase at once

@@ -30,6 +30,7 @@ struct MaterialSample {
 /// @pre rows within the features
 Eigen::VectorXd grasp_features(const Eigen::MatrixXd& features, std::span<const int> judged);
 
+/// A trained classifier: features are scaled, then the network's outputs go through a softmax.
 struct MaterialClassifier {
   std::vector<std::string> materials;  ///< names, each once
   RangeScaling features;
@@ -39,6 +40,7 @@ struct MaterialClassifier {
 /// What is wrong with a model (sizes, ranges, names, the network), or nothing.
 std::string fault_of(const MaterialClassifier& model);
 
+/// The network's size and how it is trained.
 struct MaterialClassifierSettings {
   int hidden_layers = 2;  ///< k; the paper's choice
   int units = 30;         ///< n
@@ -48,6 +50,7 @@ struct MaterialClassifierSettings {
   std::uint64_t seed = 1;  ///< of the first weights
 };
 
+/// What training gives.
 struct TrainedMaterialClassifier {
   MaterialClassifier model;
   NetworkTrainingReport report;  ///< losses are mean cross entropies, nats
@@ -57,13 +60,13 @@ struct TrainedMaterialClassifier {
 /// be empty). A pure function of its arguments.
 /// @param fold which of several trainings it is: each has first weights of its own
 /// @throws Error for no or doubled names, a label without a name, features that aren't finite or of different numbers,
-/// a
-///   material without a training sample, an index that isn't there, or a setting out of its range
+/// a material without a training sample, an index that isn't there, or a setting out of its range
 TrainedMaterialClassifier train_material_classifier(std::span<const MaterialSample> samples,
                                                     const std::vector<std::string>& materials,
                                                     std::span<const int> training, std::span<const int> validation,
                                                     const MaterialClassifierSettings& settings, int fold = 0);
 
+/// The answer for one grasp.
 struct MaterialGuess {
   int label = 0;                  ///< the likeliest; of equally likely ones the first
   Eigen::VectorXd probabilities;  ///< the softmax; their sum is 1

@@ -18,6 +18,7 @@
 
 namespace touchstone::sensors {
 
+/// A trained network: features of the last windows in, force out.
 struct TimeDelayNetwork {
   int delays = 3;              ///< windows that are looked at, the newest with them
   RangeScaling features;       ///< of each feature
@@ -28,6 +29,7 @@ struct TimeDelayNetwork {
 /// What is wrong with a model (sizes, ranges, the network), or nothing.
 std::string fault_of(const TimeDelayNetwork& model);
 
+/// The network's size and how it is trained.
 struct TimeDelayNetworkSettings {
   int delays = 3;         ///< 1 to 1000
   int hidden_layers = 4;  ///< k; the paper's best
@@ -37,6 +39,7 @@ struct TimeDelayNetworkSettings {
   std::uint64_t seed = 1;  ///< of the first weights
 };
 
+/// What training gives.
 struct TrainedTimeDelayNetwork {
   TimeDelayNetwork model;
   NetworkTrainingReport report;  ///< losses are of the scaled force

@@ -30,6 +30,7 @@ struct BallPress {
 /// @pre the offset is shorter than the radius
 Eigen::Vector2d ball_slope(const Eigen::Vector2d& offset_mm, double ball_radius_mm);
 
+/// Which pixels of a press are samples.
 struct PressSampling {
   double rim_px = 1.0;          ///< pixels nearer to the circle's rim are left out: half of their light is from outside
   double most_saturated = 0.2;  ///< share of the circle's pixels that may be saturated; they are left out

@@ -10,6 +10,7 @@
 
 namespace touchstone::sensors {
 
+/// The pixels' size, how light is corrected, and how the table is made.
 struct HeightCalibrationSettings {
   double mm_per_px = 0.0;
   std::optional<LightCorrection> correction{};  ///< absent: the one with the least left-out error; `background` below 3
@@ -26,6 +27,7 @@ struct SlopeError {
   double rms = 0.0;
 };
 
+/// A model and how well it does.
 struct HeightCalibration {
   HeightModel model;
   std::size_t pixels = 0;        ///< that were learnt from

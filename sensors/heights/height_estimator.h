@@ -11,6 +11,7 @@
 
 namespace touchstone::sensors {
 
+/// How heights end at the picture's border, what is contact, and which frames are flagged.
 struct HeightSettings {
   HeightBorder border = HeightBorder::zero;
   ContactRule contact{};

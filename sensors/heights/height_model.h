@@ -15,6 +15,7 @@ inline constexpr float kFinestStep_DN = 1.6F;
 /// Of the lamps, along each side of the picture.
 inline constexpr int kMostNodes = 64;
 
+/// All that calibration has found about one sensor, and all that its model file holds.
 struct HeightModel {
   double mm_per_px = 0.0;
   Background background;

@@ -23,6 +23,7 @@ enum class LightCorrection {
   background,  ///< each channel is scaled by its mean background / its background there: brightness that falls off
   fitted       ///< so scaled, colours are led back to the middle's by the lamps' vectors there, fitted to the presses
 };
+/// "none", "background" or "fitted".
 const char* name_of(LightCorrection correction);
 
 /// Matt shading by far lamps: colour(n) - colour(rest) = A (n - n_rest), A a 3 x 3 matrix (channels by normal) that

@@ -20,11 +20,13 @@ struct SlopeTable {
   std::vector<Eigen::Vector2f> slopes;  ///< R fastest, then G, then B
   std::vector<std::uint16_t> hits;      ///< calibration pixels that fell into each cell, at most 65535
 
+  /// The number of the colour's cell in `slopes` and `hits`; the nearest cell for a colour outside of the grid.
   std::size_t index_of(const Eigen::Vector3f& colour) const;
   /// Whether calibration has hit the colour's cell or one of the 26 beside it.
   bool measured_near(const Eigen::Vector3f& colour) const;
 };
 
+/// How fine the table's grid is, and what fills cells without samples.
 struct SlopeTableSettings {
   double finest_step_DN = 2.0;  ///< made larger until the grid has at most `most_cells`
   std::size_t most_cells = 1U << 20U;
@@ -45,6 +47,7 @@ struct TableCoverage {
   std::size_t cells_hit = 0;
   double steepest_slope = 0.0;  ///< of the calibration: 99 % of its pixels are less steep
 };
+/// How much of the table these samples reach.
 TableCoverage coverage_of(const SlopeTable& table, std::span<const ColourSample> samples);
 
 }  // namespace touchstone::sensors

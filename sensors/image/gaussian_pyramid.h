@@ -5,7 +5,7 @@
 
 namespace touchstone::sensors {
 
-inline constexpr int kMostPyramidLevels = 8;
+inline constexpr int kMostPyramidLevels = 8;  ///< each has half the side of the one before
 
 /// The image and its reductions by half: level i + 1 is level i, weighted by the kernel of [Burt1983] with
 /// a = 0.375, that is (1, 4, 6, 4, 1) / 16 along each axis, at every second pixel. A side of n px becomes (n + 1) / 2;

@@ -15,6 +15,7 @@ struct SearchBox {
   Eigen::VectorXd high;
 };
 
+/// How often the function is evaluated, and where at first.
 struct BayesianMinimumSettings {
   int evaluations = 10;  ///< in all
   /// The first ones: the place that was given, then a Latin hypercube [McKay1979]. At least 2, at most `evaluations`.
@@ -24,6 +25,7 @@ struct BayesianMinimumSettings {
   std::uint64_t stream = 0;  ///< which of several searches it is
 };
 
+/// The best place, and all that were tried.
 struct BayesianMinimum {
   Eigen::VectorXd place;                ///< of the least value
   double value = 0.0;                   ///< the least one

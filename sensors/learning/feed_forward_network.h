@@ -15,10 +15,12 @@
 
 namespace touchstone::sensors {
 
+/// The function of a hidden unit: tanh(x), or 1 / (1 + exp(-x)).
 enum class Sigmoid : std::uint8_t { kTanh, kLogistic };
 /// "tanh", "logistic"
 const char* name_of(Sigmoid sigmoid);
 
+/// Weights and biases, layer by layer.
 struct FeedForwardNetwork {
   Sigmoid sigmoid = Sigmoid::kTanh;      ///< of all layers but the last, which is linear
   std::vector<Eigen::MatrixXd> weights;  ///< of each layer: its units x its inputs
@@ -33,6 +35,7 @@ struct FeedForwardNetwork {
 /// What is wrong with a network (no layer, sizes that don't fit, values that aren't finite), or nothing.
 std::string fault_of(const FeedForwardNetwork& network);
 
+/// How many units each layer has.
 struct NetworkShape {
   int inputs = 1;
   int hidden_layers = 1;  ///< k, 0 to 100: 0 is a linear map
@@ -71,6 +74,7 @@ Eigen::VectorXd sum_gradient(const LayerValues& values, const std::vector<Eigen:
 /// evaluate() for one sample at a time, without allocating. One object is for one thread.
 class NetworkRunner {
  public:
+  /// Allocates the values of networks of this shape.
   explicit NetworkRunner(const FeedForwardNetwork& network);
   /// @pre network is that of the constructor, inputs fit. What it returns holds until the next call
   const Eigen::VectorXd& run(const FeedForwardNetwork& network, const Eigen::VectorXd& inputs);

@@ -19,6 +19,7 @@ struct GaussianProcessParameters {
 
   /// Logarithms: of the lengths, the signal, the noise.
   Eigen::VectorXd logarithms() const;
+  /// The inverse of logarithms().
   static GaussianProcessParameters from_logarithms(const Eigen::VectorXd& logarithms);
 };
 
@@ -54,6 +55,7 @@ GaussianProcess with_best_signal(GaussianProcess process);
 /// @throws Error for another number of inputs than the process has, or one that isn't finite
 Eigen::VectorXd predict(const GaussianProcess& process, const Eigen::MatrixXd& places);
 
+/// One entry for each place asked for.
 struct GaussianProcessPrediction {
   Eigen::VectorXd mean;
   /// Of the function itself, squared standard deviation; what would be measured has noise^2 more. At least 0.

@@ -14,10 +14,12 @@
 
 namespace touchstone::sensors {
 
+/// How the process' parameters are searched.
 enum class TuningMethod : std::uint8_t {
   kBayesian,  ///< 10 evaluations; the paper's
   kGradient,  ///< of the evidence, by scaled conjugate gradient from the same first place
 };
+/// What the search makes best.
 enum class TuningAim : std::uint8_t {
   kValidation,  ///< least mean squared error on the validation samples; not for kGradient
   kEvidence,    ///< most evidence
@@ -26,6 +28,7 @@ enum class TuningAim : std::uint8_t {
 const char* name_of(TuningMethod method);
 const char* name_of(TuningAim aim);
 
+/// What is searched for, where, and with how many samples.
 struct TuningSettings {
   TuningMethod method = TuningMethod::kBayesian;
   TuningAim aim = TuningAim::kValidation;
@@ -40,6 +43,7 @@ struct TuningSettings {
   std::uint64_t seed = 1;
 };
 
+/// The process with the best parameters, and what the search took.
 struct TunedGaussianProcess {
   GaussianProcess process;     ///< of all samples
   int samples_used = 0;        ///< while parameters were looked for

@@ -32,6 +32,7 @@ struct NetworkSamples {
   Eigen::MatrixXd targets;
 };
 
+/// Which of two systems with the same solution is solved for a step; kCheaper takes the smaller one.
 enum class StepForm : std::uint8_t {
   kCheaper,
   kNormal,  ///< a matrix of parameters x parameters
@@ -63,6 +64,7 @@ class LevenbergMarquardtSystem {
 /// J, samples x parameters. @pre the network has one output, sizes fit
 Eigen::MatrixXd jacobian(const FeedForwardNetwork& network, const Eigen::MatrixXd& inputs);
 
+/// How the damping changes, and when training ends.
 struct LevenbergMarquardtSettings {
   double first_damping = 0.01;  ///< lambda of eq. 3; the paper's
   double damping_up = 10.0;     ///< factor after a step that failed; above 1
@@ -75,6 +77,7 @@ struct LevenbergMarquardtSettings {
   StepForm form = StepForm::kCheaper;
 };
 
+/// Why training ended.
 enum class NetworkTrainingEnd : std::uint8_t {
   kValidation,  ///< early stopping
   kFlat,        ///< the gradient has vanished
@@ -84,11 +87,13 @@ enum class NetworkTrainingEnd : std::uint8_t {
 /// "validation", "flat", "stuck", "out of steps"
 const char* name_of(NetworkTrainingEnd end);
 
+/// The losses after one step.
 struct NetworkTrainingStep {
   double training_loss = 0.0;
   double validation_loss = 0.0;  ///< 0 without validation samples
 };
 
+/// How training went, and which step's network was kept.
 struct NetworkTrainingReport {
   NetworkTrainingEnd end = NetworkTrainingEnd::kOutOfSteps;
   int steps = 0;                             ///< taken

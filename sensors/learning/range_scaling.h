@@ -11,9 +11,11 @@ struct RangeScaling {
   Eigen::VectorXd high;
 
   Eigen::Index size() const { return low.size(); }
+  /// Quantity i; beyond -1 or 1 where the value is outside of its range in training.
   double scaled(Eigen::Index i, double value) const {
     return high[i] > low[i] ? (value - low[i]) * (2.0 / (high[i] - low[i])) - 1.0 : 0.0;
   }
+  /// Back.
   double unscaled(Eigen::Index i, double value) const {
     return high[i] > low[i] ? low[i] + (value + 1.0) * (0.5 * (high[i] - low[i])) : low[i];
   }

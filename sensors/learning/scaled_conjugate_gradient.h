@@ -9,6 +9,7 @@ namespace touchstone::sensors {
 /// Value of a function at x; fills its gradient.
 using ValueAndGradient = std::function<double(const Eigen::VectorXd& x, Eigen::VectorXd& gradient)>;
 
+/// Moller's constants, and when the search ends.
 struct ScaledConjugateGradientSettings {
   double first_sigma = 5e-5;     ///< Moller's sigma: length of the step that gives the curvature; above 0, at most 1e-2
   double first_lambda = 5e-7;    ///< Moller's lambda_1; above 0, at most 1
@@ -16,6 +17,7 @@ struct ScaledConjugateGradientSettings {
   int most_steps = 1000;         ///< at least 1
 };
 
+/// Why the search ended, and what it took.
 struct ScaledConjugateGradientEnd {
   bool is_flat = false;      ///< the gradient has vanished
   bool was_stopped = false;  ///< by `watch`
@@ -27,8 +29,7 @@ struct ScaledConjugateGradientEnd {
 /// quadratic bowl of n dimensions it ends in n steps. A place where the function isn't finite counts as a step that
 /// fails.
 /// @param watch is called after each step that didn't fail: its number, x and the value there; if it returns true, that
-/// is
-///   the end
+/// is the end
 /// @throws Error if a setting is out of its range, or value or gradient aren't finite at the first place
 ScaledConjugateGradientEnd minimise_by_scaled_conjugate_gradient(
     const ValueAndGradient& function, Eigen::VectorXd& x, const ScaledConjugateGradientSettings& settings = {},

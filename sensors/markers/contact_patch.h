@@ -37,6 +37,7 @@ void erase_markers(cv::Mat& mask, const TrackedMarkers& markers, double radius_p
 /// @throws Error unless the mask is CV_8UC1 and not empty
 std::optional<ContactPatch> contact_patch(const cv::Mat& mask, int least_px);
 
+/// How far the markers on the patch have moved since rest.
 struct MeanDisplacement {
   Eigen::Vector2d px = Eigen::Vector2d::Zero();
   int markers = 0;  ///< measured ones on the patch, over which the mean goes

@@ -13,6 +13,7 @@ namespace touchstone::sensors {
 /// What was fitted for one gel: a line for each shape of indenter (measure: height_sum_mm3, mm^3), and one for shear
 /// (measure: mean marker displacement, mm).
 struct GelForceModel {
+  /// The line of one shape of indenter.
   struct Normal {
     std::string indenter;  ///< "ball 12.7 mm"; no two alike
     LinearForce line;
@@ -37,8 +38,7 @@ std::string fault_of(const GelForceModel& model);
 std::string to_json(const GelForceModel& model);
 /// Reads what to_json wrote; `name` stands for the file in messages.
 /// @throws Error naming file and field: not JSON, another format or version, a field missing, unknown or of the wrong
-/// kind, a
-///   faulty model
+/// kind, a faulty model
 GelForceModel gel_force_model_from_json(const std::string& text, const std::string& name);
 
 /// Writes the file whole or not at all.

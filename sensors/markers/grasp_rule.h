@@ -40,6 +40,7 @@ struct GraspReading {
   bool lifted = false;  ///< the arm has reached its goal
 };
 
+/// Where a grasp is; a phase marked "ends" is its last one.
 enum class GraspPhase {
   approaching,    ///< closing, no touch yet
   touched,        ///< the threshold is exceeded, but not yet in enough frames: the gripper waits
@@ -49,9 +50,12 @@ enum class GraspPhase {
   slipping,       ///< ends: slip is seen, and the limits forbid to close further
   lost            ///< ends: the touch has gone
 };
+/// As the enumerators: "approaching", "nothing there", ...
 std::string name_of(GraspPhase phase);
+/// Is it one of the phases that a grasp fails in?
 bool has_ended_badly(GraspPhase phase);
 
+/// What the gripper and the arm shall do next.
 struct GraspCommand {
   GraspPhase phase = GraspPhase::approaching;
   double close_by_mm = 0.0;  ///< each finger, now

@@ -27,6 +27,7 @@
 
 namespace touchstone::sensors {
 
+/// Which motion is compared, and from which lag on it is slip.
 struct IncipientSlipSettings {
   int history_frames = 15;       ///< how far back motion is sought (0.5 s at 30 frames/s); 2 to 1000
   double least_motion_px = 0.7;  ///< of the middle; below, noise of the centroids is too large a part of it. Above 0
@@ -41,6 +42,7 @@ struct IncipientSlipSettings {
   double least_shear_px = 2.0;  ///< mean displacement of the patch's markers since rest; at least 0
 };
 
+/// What the markers say about slip.
 enum class SlipState : std::uint8_t {
   kNoContact,
   kSticking,   ///< or nothing that says otherwise
@@ -50,6 +52,7 @@ enum class SlipState : std::uint8_t {
 /// "no contact", "sticking", "incipient", "sliding"
 const char* name_of(SlipState state);
 
+/// The detector's answer for one frame, with the figures behind it.
 struct IncipientSlip {
   SlipState state = SlipState::kNoContact;
   std::optional<double> lag;  ///< none: too little motion, or too few markers

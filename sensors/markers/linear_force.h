@@ -24,6 +24,7 @@ struct LinearForce {
   bool has_seen(double measure) const { return measure >= lowest_seen && measure <= highest_seen; }
 };
 
+/// Which line is fitted to the samples.
 enum class FitLine {
   kFree,           ///< slope and offset
   kThroughOrigin,  ///< slope only: no force where nothing is measured

@@ -4,14 +4,13 @@
 //
 // What the thesis leaves open, and what is done here:
 // - A marker and a blob belong together if each is the other's nearest, and not farther than `longest_step` of a
-// spacing.
-//   So no two markers share a blob, and a step that could lead to the neighbour's place is no match: it's reported.
+//   spacing. So no two markers share a blob, and a step that could lead to the neighbour's place is no match: it's
+//   reported.
 // - A marker that isn't measured is held where its neighbours' mean displacement carries it, and looked for there.
 // - Where the gel's middle jumps by about a whole spacing between two frames, markers take their neighbours' names
-// there. But
-//   the gel's rim stays, so between the two there's a place that jumps by half a spacing, where a blob waits beyond the
-//   longest step (`kTooFar`). From such a frame on `jumped` is set, until every rest position has its blob again: then
-//   the gel is at rest, and each marker is home.
+//   there. But the gel's rim stays, so between the two there's a place that jumps by half a spacing, where a blob waits
+//   beyond the longest step (`kTooFar`). From such a frame on `jumped` is set, until every rest position has its blob
+//   again: then the gel is at rest, and each marker is home.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -22,12 +21,14 @@
 
 namespace touchstone::sensors {
 
+/// What markers look like, how far they may go between frames, and how much their area may change.
 struct MarkerTrackerSettings {
   MarkerAppearance appearance = {};
   double longest_step = 0.4;     ///< between two frames, as a part of the spacing; 0.05 to 0.5
   double max_area_change = 1.8;  ///< up or down, against the marker's own usual area; above 1
 };
 
+/// Was a marker measured in the frame, and if not, why not?
 enum class MarkerStatus : std::uint8_t {
   kFound,
   kFoundAgain,  ///< wasn't measured in the frame before
@@ -36,6 +37,7 @@ enum class MarkerStatus : std::uint8_t {
   kAtBorder,    ///< cut by the picture's edge
   kTooFar,      ///< the nearest blob without a marker is more than the longest step away
 };
+/// Was the marker measured in this frame?
 inline bool is_found(MarkerStatus status) {
   return status == MarkerStatus::kFound || status == MarkerStatus::kFoundAgain;
 }
@@ -69,8 +71,7 @@ class MarkerTracker {
   /// Looks at the next frame; the first one is the gel at rest. The result is valid until the next call.
   /// A later frame without light (dark, saturated, flat) has no marker found, and all of them held.
   /// @throws Error as MarkerFinder::find; for a first frame without light, or with fewer markers than kLeastMarkers;
-  /// for a
-  ///   time that isn't later than the last frame's. The tracker is then as it was before the call
+  /// for a time that isn't later than the last frame's. The tracker is then as it was before the call
   const TrackedMarkers& track(const Frame& frame);
 
   /// What the last call of track() returned; empty before the first.

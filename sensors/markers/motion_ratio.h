@@ -15,6 +15,7 @@ struct MotionRatioSettings {
   int least_contact_px = 50;  ///< fewer are noise, and no ratio is given
 };
 
+/// The two pictures' ratio, with what it is made of.
 struct MotionRatio {
   int contact_px = 0;           ///< Ac: pixels in which the earlier picture differs from the background (fig. 4-8c)
   int motion_px = 0;            ///< Am: pixels in which the two pictures differ; may be more than Ac

@@ -14,6 +14,7 @@ namespace touchstone::sensors {
 /// force is below `least_normal_N`, since noise over nothing says nothing.
 std::optional<double> force_ratio(const Eigen::Vector2d& shear_N, double normal_N, double least_normal_N = 0.02);
 
+/// A frame is slip if both ratios are above their thresholds; the thesis's values.
 struct SlipThresholds {
   double force_ratio = 1.0;   ///< Tf
   double motion_ratio = 0.5;  ///< Tm

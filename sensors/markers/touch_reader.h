@@ -27,6 +27,7 @@ struct TouchCalibration {
   LinearForce shear;   ///< of the mean marker displacement, mm
 };
 
+/// The thresholds of slip, and the least contact.
 struct TouchReaderSettings {
   MotionRatioSettings motion = {};
   SlipThresholds rule = {};

@@ -20,6 +20,7 @@
 
 namespace touchstone::sensors {
 
+/// Objects sort their keys, so the same model gives the same bytes.
 using Json = nlohmann::json;
 
 /// @throws Error naming the file if the text is nested deeper than kDeepestJson: for any such text, JSON or not
@@ -49,12 +50,14 @@ struct JsonField {
   std::string path;
   const std::string& file;
 
+  /// Throws an Error with file and path; the message is formatted by {fmt}.
   template <typename... Args>
   [[noreturn]] void refuse(fmt::format_string<Args...> format, Args&&... args) const {
     const std::string message = fmt::format(format, std::forward<Args>(args)...);
     fail_at({file, 0}, "{}{}{}", path, path.empty() ? "" : ": ", message);
   }
 
+  /// The value behind a name of a map. It must be there.
   JsonField at(const char* key) const {
     const auto found = value.find(key);
     if (found == value.end()) refuse("'{}' is missing", key);
@@ -80,11 +83,13 @@ struct JsonField {
     for (const std::string& name : names) at(name.c_str());
   }
 
+  /// Refuses what isn't a list of this length.
   void expect_list(std::size_t size) const {
     if (!value.is_array()) refuse("is a {}, a list of {} is needed", value.type_name(), size);
     if (value.size() != size) refuse("has {} entries, {} are needed", value.size(), size);
   }
 
+  /// A finite number.
   double number() const {
     if (!value.is_number()) refuse("is a {}, a number is needed", value.type_name());
     const double number = value.get<double>();
@@ -92,6 +97,7 @@ struct JsonField {
     return number;
   }
 
+  /// From `low` to `high`.
   std::int64_t whole_number(std::int64_t low, std::int64_t high) const {
     if (!value.is_number_integer()) refuse("is {}, a whole number is needed", value.dump());
     // Unsigned values beyond the signed range would turn negative: compare them as they are.
@@ -102,11 +108,13 @@ struct JsonField {
     return value.get<std::int64_t>();
   }
 
+  /// A string.
   std::string text() const {
     if (!value.is_string()) refuse("is a {}, text is needed", value.type_name());
     return value.get<std::string>();
   }
 
+  /// A list of N finite numbers.
   template <int N>
   Eigen::Matrix<double, N, 1> vector() const {
     expect_list(N);
@@ -115,6 +123,7 @@ struct JsonField {
     return result;
   }
 
+  /// A list of this many such lists.
   template <int N>
   std::vector<Eigen::Matrix<double, N, 1>> vectors(std::size_t size) const {
     expect_list(size);
@@ -123,6 +132,7 @@ struct JsonField {
     return result;
   }
 
+  /// The one of `values` whose name_of() stands here.
   template <typename E, std::size_t N>
   E name_among(const std::array<E, N>& values) const {
     const std::string name = text();

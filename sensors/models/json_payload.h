@@ -16,6 +16,7 @@ namespace touchstone::sensors {
 
 static_assert(std::endian::native == std::endian::little, "the files are little-endian");
 
+/// The numbers as they lie in memory.
 template <typename T>
 void append(std::string& payload, const T* values, std::size_t count) {
   payload.append(reinterpret_cast<const char*>(values), count * sizeof(T));
@@ -35,6 +36,7 @@ inline std::string with_payload(Json json, const std::string& payload) {
   return json.dump() + "\n" + payload;
 }
 
+/// A file taken apart; `payload` points into its text.
 struct JsonAndPayload {
   Json json;
   std::string_view payload;  ///< not checked yet

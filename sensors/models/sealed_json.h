@@ -29,6 +29,7 @@ inline Json unseal(const std::string& text, const std::string& name, const char*
   return json;
 }
 
+/// A list of numbers.
 inline Json json_of(const Eigen::VectorXd& vector) {
   Json list = Json::array();
   for (const double value : vector) list.push_back(value);

@@ -14,6 +14,7 @@
 
 namespace touchstone::sensors {
 
+/// Which part of the result is wanted.
 enum class ProductPart : std::uint8_t {
   kAll,
   kLower,  ///< on and below the diagonal; above it c is left as it was, or written in parts

@@ -13,11 +13,13 @@ namespace touchstone::sensors {
 
 /// The statistics that normal force shows in; DX and DY belong to shear [Knoop2013].
 enum class ChipFeature { maximum, minimum, squal, average };
+/// All of them, in the order of their numbers.
 inline constexpr std::array<ChipFeature, 4> kChipFeatures = {ChipFeature::maximum, ChipFeature::minimum,
                                                              ChipFeature::squal, ChipFeature::average};
 /// As the paper calls it: MAX, MIN, SQ, AVG.
 std::string name_of(ChipFeature feature);
 
+/// The statistic itself, in the chip's units.
 inline double value_of(const ChipStatistics& statistics, ChipFeature feature) {
   switch (feature) {
     case ChipFeature::maximum:
@@ -66,6 +68,7 @@ int leaves_of(const ContactTree& tree);
 /// forbid. "always" or "never" where nothing is asked.
 std::string rule_of(const ContactTree& tree);
 
+/// One frame, and whether there was a force.
 struct ContactSample {
   ChipStatistics statistics;
   bool force_present = false;
@@ -74,6 +77,7 @@ struct ContactSample {
 /// Questions on the longest path that a tree may have: rule_of goes along every path.
 inline constexpr int kDeepestContactTree = 14;
 
+/// How large a tree may grow, and how it is pruned.
 struct ContactTreeSettings {
   int folds = 10;                  ///< of the cross-validation that prunes; 1: no pruning
   bool one_standard_error = true;  ///< the smallest tree within one standard error of the best [Breiman1984]
@@ -94,6 +98,7 @@ struct ContactScore {
   int false_alarms = 0;
   double error_percent() const { return samples > 0 ? 100.0 * (missed + false_alarms) / samples : 0.0; }
 };
+/// How often the tree's answer is right on these samples, and how often it misses a force or sees one that isn't there.
 ContactScore score(const ContactTree& tree, std::span<const ContactSample> samples);
 
 /// Whether a chip can have sent this: registers within their ranges, AVG between MIN and MAX.

@@ -9,6 +9,7 @@
 
 namespace touchstone::sensors {
 
+/// How the flow equation is solved.
 struct DotsFlowSettings {
   /// 1: the paper's, one linear solution. More: the second picture is warped back by what was found and looked at
   /// again, so that steps of a pixel have no bias.

@@ -20,6 +20,7 @@ struct DotsSkew {
   Eigen::Vector2d seen(const DotsMotion& motion, const Eigen::Vector2d& place) const;
 };
 
+/// How alike the pictures are under a motion, and over how much of them.
 struct DotsCorrelation {
   double correlation = 0.0;  ///< Pearson's, -1 to 1; 0 where nothing varies
   double overlap = 0.0;      ///< the part of the picture at rest that is still in view, 0 to 1
@@ -31,6 +32,7 @@ struct DotsCorrelation {
 DotsCorrelation correlate(const DotsPicture& picture, const DotsPicture& rest, const DotsMotion& motion,
                           const DotsSkew& skew = {});
 
+/// Where the best motion is sought, and what is believed.
 struct DotsMatchSettings {
   /// A peak with less in view isn't taken: few pixels always correlate somewhere. A dilation of 1.45 leaves 0.47.
   double least_overlap = 0.3;
@@ -39,6 +41,7 @@ struct DotsMatchSettings {
   double least_dilation = 0.7, most_dilation = 2.0;  ///< what isn't believed
 };
 
+/// The best motion found; correlation -1 if nothing was.
 struct DotsMatch {
   DotsMotion motion;
   double correlation = -1.0;

@@ -26,6 +26,7 @@ class DotsPicture {
   int columns() const { return columns_; }
   bool empty() const { return values_.empty(); }
   double at(int row, int column) const { return values_[static_cast<std::size_t>(row * columns_ + column)]; }
+  /// px from the picture's middle.
   Eigen::Vector2d place_of(int row, int column) const {
     return {column - 0.5 * (columns_ - 1), row - 0.5 * (rows_ - 1)};
   }

@@ -12,6 +12,7 @@
 
 namespace touchstone::sensors {
 
+/// A calibrated model of one fingertip.
 struct ExploreModel {
   DilationPress press;
   ExponentialForce force;
@@ -21,12 +22,14 @@ struct ExploreModel {
   std::optional<ShearLaw> shear;  ///< of the lateral displacement, mm
 };
 
+/// Press and forces of one picture.
 struct ExploreForce {
   double press_mm = 0.0;
   double force_N = 0.0;
   Eigen::Vector2d lateral_mm = Eigen::Vector2d::Zero();
   Eigen::Vector2d shear_N = Eigen::Vector2d::Zero();  ///< 0 without a law for it
 };
+/// Of a motion since rest. Never throws: a motion beyond the calibration gives what its laws say there.
 ExploreForce estimate(const ExploreModel& model, const DotsMotion& motion);
 
 /// mm per pixel of shift over dilation, 2x2, by least squares from known lateral displacements.

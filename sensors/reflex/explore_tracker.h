@@ -12,11 +12,13 @@
 
 namespace touchstone::sensors {
 
+/// Where the motion of a picture comes from.
 enum class ExploreMode {
   absolute,  ///< against the picture at rest: no drift
   relative,  ///< a step from an earlier picture
   held       ///< nothing could be measured: the motion is that of the last picture that gave one
 };
+/// "absolute", "relative" or "held".
 std::string name_of(ExploreMode mode);
 
 /// Why a picture can't be used.
@@ -29,8 +31,10 @@ enum class PictureFault {
   no_dots,    ///< hardly any fine structure: the dots are lost, or out of focus
   jump        ///< neither rest nor the last pictures are recognised: too large a motion, or a damaged skin
 };
+/// For messages; "none" without a fault.
 std::string name_of(PictureFault fault);
 
+/// From which correlations on a motion is believed, and how steps are measured.
 struct ExploreSettings {
   double absolute_from = 0.95;  ///< correlation with the picture at rest, the paper's
   DotsMatchSettings match;
@@ -57,6 +61,7 @@ ExploreSettings text_explore_settings();
 /// @throws Error that names the setting, its value and what is allowed
 void check(const ExploreSettings& settings);
 
+/// The motion in one picture, and how sure it is.
 struct ExploreReading {
   std::int64_t t_us = 0;  ///< what the motion is of: the mean of the pixels' times
   ExploreMode mode = ExploreMode::held;
@@ -67,6 +72,7 @@ struct ExploreReading {
   double step_correlation = 0.0;  ///< with the picture that a step was measured against; 0 in absolute mode
 };
 
+/// Takes pictures in their order. One object is for one thread.
 class ExploreTracker {
  public:
   /// `rest`: the picture without force, of type CV_8UC1, or CV_32FC1 if it's the mean of several.

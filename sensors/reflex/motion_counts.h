@@ -10,6 +10,7 @@
 
 namespace touchstone::sensors {
 
+/// The sum, frame by frame. One object is for one thread.
 class MotionCounts {
  public:
   /// `release_frames`: the sum is set to zero after so many frames in a row without force, so that a single frame

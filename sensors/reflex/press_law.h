@@ -16,12 +16,14 @@ struct DilationPress {
   std::array<double, 3> mm{};
   double rms_residual_mm = 0.0;
 
+  /// mm; below 0 for a dilation below 1.
   double press_mm(double dilation) const {
     const double nearer = 1.0 - 1.0 / dilation;
     return nearer * (mm[0] + nearer * (mm[1] + nearer * mm[2]));
   }
 };
 
+/// One picture at a known press.
 struct DilationSample {
   double dilation = 1.0;
   double press_mm = 0.0;
@@ -40,6 +42,7 @@ struct ExponentialForce {
   double force_N(double press_mm) const { return press_mm > 0.0 ? scale_N * std::expm1(rate_per_mm * press_mm) : 0.0; }
 };
 
+/// One known press with its force.
 struct PressSample {
   double press_mm = 0.0;
   double force_N = 0.0;

@@ -20,11 +20,13 @@ enum class ChipFault {
   flat,        ///< all pixels are alike: no dots in view
   no_features  ///< there is contrast, but the chip can't find a feature: the dots are lost or out of focus
 };
+/// For messages; "none" without a fault.
 std::string name_of(ChipFault fault);
 
 /// No allocation. A picture that's flat to within `flat_range` steps has no dots.
 ChipFault fault_of(const ChipStatistics& statistics, int flat_range = 3);
 
+/// When the actuator is stopped.
 struct ReflexSettings {
   double stop_above_N = 0.0;    ///< with 0 any force that the tree sees stops
   int stop_frames = 1;          ///< frames in a row that must say so
@@ -36,6 +38,7 @@ struct ReflexSettings {
 /// @throws Error that names the setting, its value and what is allowed
 void check(const ReflexSettings& settings);
 
+/// What one frame leads to.
 struct ReflexDecision {
   ChipFault fault = ChipFault::none;  ///< if there is one, the forces are those of the last frame without
   bool force_present = false;
@@ -50,6 +53,7 @@ class ReflexLoop {
   /// @throws Error for a model with a fault, and as check()
   ReflexLoop(ReflexModel model, const ReflexSettings& settings);
 
+  /// Decides on one frame. Never throws: what a chip can't say is ChipFault.
   ReflexDecision next(const ChipStatistics& statistics);
 
   /// Lets the actuator move again; shear is summed from here.

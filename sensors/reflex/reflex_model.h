@@ -11,6 +11,7 @@
 
 namespace touchstone::sensors {
 
+/// A calibrated model of one fingertip.
 struct ReflexModel {
   ContactTree tree;
   StatisticsForce force;

@@ -14,11 +14,13 @@ struct ShearLaw {
   Eigen::Matrix2d per_N = Eigen::Matrix2d::Zero();
   double rms_residual_N = 0.0;  ///< of the fit, both axes together: sqrt(mean of the error's square length)
 
+  /// Both axes, N.
   Eigen::Vector2d force_N(const Eigen::Vector2d& displacement, double normal_N) const {
     return (stiffness + per_N * normal_N) * displacement;
   }
 };
 
+/// One known displacement with its forces.
 struct ShearSample {
   Eigen::Vector2d displacement = Eigen::Vector2d::Zero();
   double normal_N = 0.0;

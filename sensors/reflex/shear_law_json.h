@@ -13,6 +13,7 @@ inline Json json_of(const ShearLaw& law, const std::string& per) {
           {"rms_residual_N", law.rms_residual_N}};
 }
 
+/// The law that json_of wrote with the same `per`. @throws Error naming the field that isn't as it should be
 inline ShearLaw shear_law_of(const JsonField& json, const std::string& per) {
   const std::string stiffness = "N_per_" + per, grows = "per_" + per;
   json.expect_map({stiffness, grows, "rms_residual_N"});

@@ -12,8 +12,10 @@ namespace touchstone::sensors {
 
 /// 1, then MAX, MIN, SQ, AVG, then their ten products in the order of the rows of an upper triangle.
 inline constexpr std::size_t kStatisticsTerms = 15;
+/// The terms of one frame, in that order.
 std::array<double, kStatisticsTerms> statistics_terms(const ChipStatistics& statistics);
 
+/// The polynomial, fitted to one fingertip.
 struct StatisticsForce {
   int degree = 1;                                       ///< 1 or 2; with 1 the products' coefficients are 0
   std::array<double, kStatisticsTerms> coefficients{};  ///< N per term
@@ -23,6 +25,7 @@ struct StatisticsForce {
   double force_N(const ChipStatistics& statistics) const;
 };
 
+/// One frame at a known force.
 struct StatisticsForceSample {
   ChipStatistics statistics;
   double force_N = 0.0;

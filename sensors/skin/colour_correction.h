@@ -34,6 +34,7 @@ Eigen::Vector3d mean_of_one_white(const cv::Mat& picture, const FlatField& field
 struct ColourMatrix {
   Eigen::Matrix3d xyz_from_rgb = Eigen::Matrix3d::Identity();
 
+  /// CIE L*a*b* of (R, G, B) of white, D65.
   Eigen::Vector3d lab(const Eigen::Vector3d& rgb) const;
 };
 

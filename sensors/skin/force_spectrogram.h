@@ -10,6 +10,7 @@
 
 namespace touchstone::sensors {
 
+/// Where the waveform begins, and how it is cut in windows.
 struct ForceSpectrogramSettings {
   double window_s = 0.064;  ///< Hann's, above 0
   double hop_s = 0.032;     ///< from window to window, above 0

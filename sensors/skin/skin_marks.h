@@ -13,12 +13,14 @@
 
 namespace touchstone::sensors {
 
+/// What a mark is, by whether it fades.
 enum class SkinMarkKind {
   erythema,  ///< fades
   purpura,   ///< stays
   unknown,   ///< one of the frames doesn't show it (dark, white, behind beads), or it isn't touched in the second
 };
 
+/// One mark, with the figures that it is judged by.
 struct SkinMark {
   SkinMarkKind kind = SkinMarkKind::unknown;
   Eigen::Vector2d centre = Eigen::Vector2d::Zero();  ///< px in the first frame, pixel centres at + 0.5
@@ -29,6 +31,7 @@ struct SkinMark {
   double darkened = 0.0;                             ///< its red light under pressure by that before
 };
 
+/// What is taken for a mark, and from when on it has faded.
 struct SkinMarkSettings {
   double smooth_px = 4.0;    ///< standard deviation of the smoothing against noise
   double least_index = 3.0;  ///< above the skin's median: what is fainter is no mark

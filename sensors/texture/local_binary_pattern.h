@@ -12,8 +12,8 @@
 
 namespace touchstone::sensors {
 
-inline constexpr int kFewestNeighbours = 4;
-inline constexpr int kMostNeighbours = 24;
+inline constexpr int kFewestNeighbours = 4;        ///< P of a circle: at least so many
+inline constexpr int kMostNeighbours = 24;         ///< and at most so many
 inline constexpr double kLargestLbpRadius = 16.0;  ///< px; the pyramid reaches further for less
 
 /// The circle of neighbours; the thesis uses (16, 2) and (8, 1).

@@ -9,6 +9,7 @@
 
 namespace touchstone::sensors {
 
+/// The circle of neighbours and the levels of the pyramid.
 struct TextureOperator {
   LbpCircle circle;
   int levels = 4;  ///< n, of the pyramid, 1 to 8

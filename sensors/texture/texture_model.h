@@ -11,10 +11,11 @@
 
 namespace touchstone::sensors {
 
-inline constexpr int kMostTextureClasses = 65535;
+inline constexpr int kMostTextureClasses = 65535;  ///< more are refused
 
 /// Features of known materials, and how they were made.
 struct TextureModel {
+  /// A row for each sample.
   using Features = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
   TextureOperator op;
@@ -32,6 +33,7 @@ std::string fault_of(const TextureModel& model);
 /// @throws Error as texture_feature() and height_gray() do, or for an empty name
 void learn_texture(TextureModel& model, const std::string& name, const cv::Mat& heights_mm);
 
+/// The answer for one touch.
 struct TextureMatch {
   int label = 0;          ///< index in TextureModel::classes
   int votes = 1;          ///< of the three nearest samples, how many are of this class

@@ -8,6 +8,7 @@
 
 namespace touchstone::sensors {
 
+/// When the search ends, and how many pixels it takes.
 struct AlignmentSettings {
   int most_steps = 40;
   double least_step_mm = 5e-4;      ///< a smaller step is the last
@@ -15,6 +16,7 @@ struct AlignmentSettings {
   std::size_t most_pixels = 20000;  ///< of `from`, evenly chosen
 };
 
+/// The pose found, and how well the heights agree under it.
 struct Alignment {
   PlanarPose to_from_from;
   double correlation = 0.0;  ///< weighted, of both details over the overlap: -1 to 1; 0 without an overlap

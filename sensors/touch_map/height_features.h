@@ -20,11 +20,13 @@ namespace touchstone::sensors {
 /// 512 bits.
 using BinaryDescriptor = std::array<std::uint64_t, 8>;
 
+/// Keypoints of one touch or map, each with its descriptor.
 struct HeightFeatures {
   std::vector<Eigen::Vector2d> points;  ///< mm, in the detail's frame
   std::vector<BinaryDescriptor> descriptors;
 };
 
+/// How keypoints are found and described.
 struct FeatureSettings {
   /// Of the picture in which features are looked for. A pressed membrane is smooth over some tenths of a millimetre,
   /// and the detector looks at rings of 3 px radius: on finer pixels it sees no corners.
@@ -67,6 +69,7 @@ struct FeatureMatch {
   int distance = 0;      ///< bits
 };
 
+/// Which descriptors are taken for the same place.
 struct MatchSettings {
   int most_bits = 140;    ///< of 512: the threshold on the Hamming distance
   int most_partners = 8;  ///< of each feature, the nearest first: relief repeats itself, as a plug's corners do

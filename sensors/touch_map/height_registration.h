@@ -12,6 +12,7 @@
 
 namespace touchstone::sensors {
 
+/// The settings of all steps, and from when on a pose is believed.
 struct RegistrationSettings {
   DetailSettings detail;
   FeatureSettings features;
@@ -45,8 +46,10 @@ enum class Outcome {
   ambiguous,       ///< the heights agree nearly as well elsewhere: a repeating pattern
   disagrees,       ///< the heights differ under the pose found, or hardly overlap
 };
+/// For messages: "localised", "no contact", "low confidence", ...
 std::string name_of(Outcome outcome);
 
+/// The pose of one touch, or why there is none.
 struct Registration {
   Outcome outcome = Outcome::no_contact;
   PlanarPose to_from_from;  ///< the refined pose where that was asked for and found, else the features' one. Means

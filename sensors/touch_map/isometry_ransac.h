@@ -19,6 +19,7 @@ struct PointPair {
   int to_id = 0;             ///< the same for `to`
 };
 
+/// What an inlier is, and how many samples are drawn.
 struct RansacSettings {
   double inlier_mm = 0.12;    ///< a pair is an inlier when the moved point is nearer than that to its partner
   double baseline_mm = 0.5;   ///< least distance between the two points of a sample
@@ -35,9 +36,11 @@ struct PoseNeighbourhood {
   double distance_mm = 0.0;
   double angle = 0.0;
 
+  /// Is the other one so near?
   bool holds(const PlanarPose& other) const;
 };
 
+/// The pose that most pairs agree with.
 struct RansacResult {
   PlanarPose to_from_from;   ///< least squares over the inliers
   std::vector<int> inliers;  ///< indices of pairs, each point in one of them only

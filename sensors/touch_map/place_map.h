@@ -16,6 +16,7 @@ struct PlaceMap {
   double rms_px = 0.0;                                                        ///< of the fit, over the marks
   double mm_per_px = 0.0;                                                     ///< in the picture's middle
 
+  /// The pixel that sees a place of the gel (mm).
   Eigen::Vector2d pixel_of(const Eigen::Vector2d& place) const;
 };
 

@@ -14,12 +14,15 @@ struct PlanarPose {
   double angle = 0.0;                                     ///< radians
   Eigen::Vector2d translation = Eigen::Vector2d::Zero();  ///< mm
 
+  /// R(angle).
   Eigen::Matrix2d rotation() const {
     const double c = std::cos(angle), s = std::sin(angle);
     return (Eigen::Matrix2d() << c, -s, s, c).finished();
   }
   Eigen::Vector2d operator*(const Eigen::Vector2d& point) const { return rotation() * point + translation; }
+  /// Of `other` first, then of this.
   PlanarPose operator*(const PlanarPose& other) const;
+  /// p_b of p_a.
   PlanarPose inverse() const;
 };
 

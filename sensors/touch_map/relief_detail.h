@@ -7,6 +7,7 @@
 
 namespace touchstone::sensors {
 
+/// Which lengths are noise, detail and shape.
 struct DetailSettings {
   double noise_mm = 0.04;  ///< sigma of the Gaussian that takes noise away
   /// Sigma of the Gaussian whose mean is taken for shape. Beside steep edges estimated heights bulge over a millimetre
@@ -19,6 +20,7 @@ struct DetailSettings {
   double fade_mm = 0.1;    ///< over which detail fades in from the support's border, so that it makes no corners
 };
 
+/// The detail of one touch.
 struct ReliefDetail {
   cv::Mat detail_mm;    ///< CV_32FC1: heights less their mean over the neighbourhood; 0 outside the support and fading
                         ///< towards its border

@@ -12,6 +12,7 @@
 
 namespace touchstone::sensors {
 
+/// How touches are registered and joined.
 struct TactileMapSettings {
   RegistrationSettings registration;
   /// Over which a touch's share in the average grows from its border inwards: no seams. 0: the thesis's plain average.
@@ -29,6 +30,7 @@ struct TactileMapData {
   int touches = 0;
 };
 
+/// A map that grows by touches. One object is for one thread.
 class TactileMap {
  public:
   /// An empty map. @throws Error for settings out of range

@@ -11,6 +11,7 @@
 
 namespace touchstone::sensors {
 
+/// Heights and contact of one touch.
 struct TouchImage {
   cv::Mat height_mm;       ///< CV_32FC1
   cv::Mat contact;         ///< CV_8UC1, not 0 where the object touches

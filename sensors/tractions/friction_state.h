@@ -25,10 +25,12 @@
 
 namespace touchstone::sensors {
 
+/// Does the object stick at this marker?
 enum class MarkerSlip : std::uint8_t { kNoContact, kUnknown, kStick, kSlip };
 /// "no contact", "unknown", "stick", "slip"
 const char* name_of(MarkerSlip state);
 
+/// Does the object stick as a whole?
 enum class ContactSlip : std::uint8_t {
   kNoContact,
   kUnknown,   ///< it hasn't been dragged far enough yet
@@ -39,6 +41,7 @@ enum class ContactSlip : std::uint8_t {
 /// "no contact", "unknown", "sticking", "partial", "sliding"
 const char* name_of(ContactSlip state);
 
+/// Noise, how far back motion is sought, and what a verdict takes.
 struct FrictionSettings {
   double lateral_noise_mm = 0.02;  ///< of a marker's displacement, as for the inversion; above 0
   int history_frames = 15;         ///< how far back motion is sought; 4 to 1000
@@ -67,6 +70,7 @@ struct FrictionEstimate {
   bool of_sliding = false;  ///< read while all slid; else off the slipping markers only
 };
 
+/// The answer for one frame.
 struct FrictionState {
   ContactSlip state = ContactSlip::kNoContact;
   std::vector<MarkerFriction> markers;

@@ -14,6 +14,7 @@
 
 namespace touchstone::sensors {
 
+/// The linear map and the grids that it belongs to.
 struct MarkerCompliance {
   Eigen::Vector2i marker_grid = Eigen::Vector2i::Zero();  ///< columns, rows
   std::vector<Eigen::Vector3d> marker_rest;               ///< mm, gel frame, undeformed; columns * rows
@@ -29,6 +30,7 @@ struct MarkerCompliance {
   int markers() const { return marker_grid.prod(); }
   int patches() const { return patch_grid.prod(); }
   double patch_area() const { return patch_side * patch_side; }  ///< mm^2
+  /// mm, in the plane z = 0 of the gel frame.
   Eigen::Vector2d patch_centre(int patch) const {
     return first_patch + patch_side * Eigen::Vector2d(patch % patch_grid.x(), patch / patch_grid.x());
   }
@@ -36,7 +38,7 @@ struct MarkerCompliance {
 
 /// The most markers, and the most patches, that a grid may have.
 inline constexpr int kMostMarkers = 10000;
-inline constexpr int kMostPatches = 4096;
+inline constexpr int kMostPatches = 4096;  ///< likewise
 
 /// What makes the map unusable, or "": an empty or too large grid, sizes that don't fit each other, a number that isn't
 /// finite, a length or modulus that isn't positive, a Poisson's ratio outside of (-1, 0.5], a matrix of zeros.

@@ -31,6 +31,7 @@
 
 namespace touchstone::sensors {
 
+/// The noise of what is measured, and what is expected of tractions.
 struct TractionSettings {
   double lateral_noise_mm = 0.02;  ///< standard deviation of a marker's displacement along x and along y; above 0
   double normal_noise_mm = 0.06;   ///< likewise along z
@@ -46,9 +47,12 @@ struct MarkerTraction {
   double contact = 0.0;                                  ///< share of the square that is in contact, 0 to 1
 };
 
+/// A wrench: force (N), then torque (N mm).
 using Vector6d = Eigen::Matrix<double, 6, 1>;
+/// Its covariance.
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
+/// The tractions that explain one frame, with what is uncertain about them.
 struct TractionField {
   Eigen::Matrix3Xd traction;          ///< on the gel, MPa, a column for each patch
   std::vector<std::uint8_t> contact;  ///< of each patch: 0 or 1

@@ -1,11 +1,10 @@
 #pragma once
 // Quantities that have a value in each spectral band, as files give them:
 //
-//   albedo: 0.8                          # the same in all bands
-//   albedo: [0.8, 0.6, 0.5]              # one number a band
-//   albedo: ../spectra/silicone-white.csv   # a spectrum (render/spectra/spectral_curve.h), for a device that has
-//   `bands` albedo: '#d6a58c'                    # a print of an sRGB colour (sim/files/srgb_reflectance.h), for any
-//   device
+//   albedo: 0.8                             # the same in all bands
+//   albedo: [0.8, 0.6, 0.5]                 # one number a band
+//   albedo: ../spectra/silicone-white.csv   # a spectrum (render/spectra/spectral_curve.h); the device has `bands`
+//   albedo: '#d6a58c'                       # a print of an sRGB colour (sim/files/srgb_reflectance.h); any device
 
 #include <Eigen/Core>
 #include <optional>
@@ -28,6 +27,7 @@ struct Colour {
   Colour(double in_all_bands) : numbers{in_all_bands} {}
   Colour(std::initializer_list<double> of_each_band) : numbers(of_each_band) {}
 
+  /// Of all numbers, or of the curve.
   double largest() const;
 };
 

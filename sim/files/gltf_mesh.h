@@ -13,9 +13,8 @@ namespace touchstone::sim {
 /// metre: 1000), vertices welded that are nearer than a millionth of the solid's diagonal. Axes stay as they are in the
 /// file. Materials and pictures aren't looked at.
 /// @throws Error that names the file and the fault: unreadable or damaged; primitives other than triangle lists;
-/// sparse,
-///   compressed, quantised, skinned or morphed geometry; nodes in a circle; numbers that aren't finite; a surface that
-///   isn't closed, crosses itself or is inside out (fault_of_closed_mesh)
+/// sparse, compressed, quantised, skinned or morphed geometry; nodes in a circle; numbers that aren't finite; a surface
+/// that isn't closed, crosses itself or is inside out (fault_of_closed_mesh)
 TriangleMesh read_gltf_mesh(const std::filesystem::path& path, double mm_per_unit);
 
 /// A gel's surface: what each of its triangles is.

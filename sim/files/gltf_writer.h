@@ -21,6 +21,7 @@ struct GltfPart {
   std::vector<Eigen::Vector3d> places = {Eigen::Vector3d::Zero()};
 };
 
+/// A camera of the file, from which a viewer can look.
 struct GltfCamera {
   RigidTransform gel_from_camera;  ///< core/transform.h: +z along the view, +y down
   double vertical_view = 0.5;      ///< radians, of the whole picture

@@ -6,6 +6,7 @@
 
 extern "C" {
 
+/// Of a channel: 8 bit, 16 bit or float.
 enum TouchstoneDepth { kTouchstoneU8 = 0, kTouchstoneU16 = 1, kTouchstoneFloat = 2 };
 
 /// Pixels to write; rows top down, channels interleaved in the file's order (RGB).
@@ -30,6 +31,7 @@ struct TouchstoneImageInfo {
   const char* metadata_value;  // of the key asked for; "" if there's none
 };
 
+/// The functions of the module, found by kTouchstoneImageModuleSymbol.
 struct TouchstoneImageModule {
   int version;
   /// 0 if it worked, else `message` says why not.
@@ -41,6 +43,8 @@ struct TouchstoneImageModule {
               std::size_t message_size);
 };
 
-constexpr int kTouchstoneImageModuleVersion = 1;
-constexpr const char* kTouchstoneImageModuleSymbol = "touchstone_image_module_table";
+constexpr int kTouchstoneImageModuleVersion =
+    1;  ///< changes with any of these structs; a module of another version isn't used
+constexpr const char* kTouchstoneImageModuleSymbol =
+    "touchstone_image_module_table";  ///< the module's function that returns its table
 }

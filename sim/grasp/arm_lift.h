@@ -3,6 +3,7 @@
 
 namespace touchstone::sim {
 
+/// How far and how fast the arm goes up; it also stops with this acceleration.
 struct ArmLiftSettings {
   double height_mm = 10.0;
   double speed_mm_s = 5.0;
@@ -15,6 +16,7 @@ void check(const ArmLiftSettings& settings);
 /// The arm stands until it is first commanded to lift, and stops with the same acceleration where it isn't any longer.
 class ArmLift {
  public:
+  /// An arm that stands at height 0. @throws Error as check()
   explicit ArmLift(const ArmLiftSettings& settings);
 
   /// The mean acceleration (mm/s^2, up) over the next `seconds`.

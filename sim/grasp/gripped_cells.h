@@ -18,17 +18,20 @@
 
 namespace touchstone::sim {
 
-inline constexpr int kAlong = 6;  // degrees of the smooth field along and across the flat
-inline constexpr int kAcross = 2;
-inline constexpr std::array kDecays = {0.5, 1.5};  // thicknesses over which the piece's ends have an effect
-inline constexpr int kTerms = (kAlong + 1 + 2 * static_cast<int>(kDecays.size())) * (kAcross + 1);
+inline constexpr int kAlong = 6;                   ///< degree of the smooth field along the flat
+inline constexpr int kAcross = 2;                  ///< across it
+inline constexpr std::array kDecays = {0.5, 1.5};  ///< thicknesses over which the piece's ends have an effect
+inline constexpr int kTerms =
+    (kAlong + 1 + 2 * static_cast<int>(kDecays.size())) * (kAcross + 1);  ///< of the smooth field
 
 /// Height of the flat's plane over z = 0 at a place.
 class FlatPlane {
  public:
+  /// Of a flat that is `below_origin` mm below the piece's origin.
   FlatPlane(const RigidTransform& gel_from_piece, double below_origin)
       : through_(gel_from_piece * Eigen::Vector3d(0, 0, -below_origin)),
         normal_(gel_from_piece.turn(Eigen::Vector3d::UnitZ())) {}
+  /// mm.
   double at(double x, double y) const {
     return through_.z() - (normal_.x() * (x - through_.x()) + normal_.y() * (y - through_.y())) / normal_.z();
   }
@@ -40,6 +43,7 @@ class FlatPlane {
 /// Carries forces from the gel's vertices to the elastic piece, and its displacements back.
 class PieceAnswer {
  public:
+  /// `vertices` are those of the gel that may touch. `body` must outlive this.
   PieceAnswer(const fem::Compliance& body, const fem::Compliance& gel, const std::vector<int>& vertices,
               const RigidTransform& gel_from_piece)
       : body_(body), turn_(gel_from_piece.rotation), weight_(body.mass * Eigen::VectorXd::Ones(body.mass.cols())) {
@@ -140,6 +144,7 @@ class CellContact {
     return result;
   }
 
+  /// How contact was solved on the cells, in one state.
   struct Answer {
     std::vector<double> pressure, gap;  // per cell, MPa and mm
     std::vector<double> start;          // to begin the next state with

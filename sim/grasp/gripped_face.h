@@ -42,6 +42,7 @@ struct GrippedPose {
   double roll_deg = 0.0;                               ///< above 0: its long side at +y stands off
 };
 
+/// Which states are solved, on which cells, and how rough the faces are.
 struct GrippedFaceSettings {
   double tilt_deg = 15.0;        ///< of the force to the membrane's normal (sec. V.A)
   double least_force_N = 0.01;   ///< normal force of the first state
@@ -69,7 +70,7 @@ struct FaceMap {
   cv::Mat pressure_MPa;  ///< mean of the cell; they sum up to the normal force
 };
 
-inline constexpr double kNoPiece_mm = 10.0;
+inline constexpr double kNoPiece_mm = 10.0;  ///< a gap that stands for none
 
 /// One piece in one pose. Immutable; many threads may ask it.
 class GrippedFace {
@@ -87,6 +88,7 @@ class GrippedFace {
   const std::vector<GripPoint>& states() const { return states_; }
   /// @throws Error if that is beyond the last state
   GripPoint at_travel(double travel_mm) const;
+  /// @throws Error likewise
   GripPoint at_normal_force(double normal_N) const;
 
   /// The face at a load. A pure function.

@@ -17,8 +17,9 @@
 
 namespace touchstone::sim {
 
-inline constexpr double kGravity_mm_s2 = 9806.65;
+inline constexpr double kGravity_mm_s2 = 9806.65;  ///< standard gravity
 
+/// What is gripped: rigid, with a weight.
 struct GraspedBody {
   fem::ContactShape shape;
   double friction = 0.0;  ///< Coulomb's, against the gel; finite
@@ -26,6 +27,7 @@ struct GraspedBody {
   double crush_force_N = std::numeric_limits<double>::infinity();  ///< normal force of a finger that breaks it
 };
 
+/// Where it stands at first, and how finely time is cut.
 struct GripperSettings {
   RigidTransform gel_from_object;   ///< at the start; its z is set anew, see clearance_mm
   double clearance_mm = 0.1;        ///< between gel and object at the start, least over the gel's vertices
@@ -56,6 +58,7 @@ struct GripperState {
   bool dropped = false;   ///< slid or fallen out of the fingers; from then on the gel is bare
 };
 
+/// Both fingers and what is between them, step by step.
 class Gripper {
  public:
   /// The compliance must outlive this. @throws Error for a body or setting that makes no sense, or an object that isn't

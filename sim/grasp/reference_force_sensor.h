@@ -15,6 +15,7 @@
 
 namespace touchstone::sim {
 
+/// The film's errors; 0 turns off each of them that can be.
 struct ReferenceForceSensorSettings {
   double window_s = 0.007;  ///< one reading each (sec. V.B)
   /// The reading on unloading from a peak P less that on loading is this part of P at no force, where it is
@@ -33,6 +34,7 @@ struct ReferenceForceSensorSettings {
   int median = 3;               ///< readings, odd: "third-order median filter" (sec. V.B); 1: none
 };
 
+/// What one window of the sensor gives, with what it should have given.
 struct ForceReading {
   double seconds = 0.0;     ///< the window's end, when it is read
   double true_N = 0.0;      ///< mean force on the finger over the window
@@ -48,6 +50,7 @@ class HysteresisLoop {
  public:
   /// @throws Error unless 0 <= width < 0.5 and scale > 0
   HysteresisLoop(double width, double scale);
+  /// The reading of the next force. All forces before it count.
   double next(double force);
 
  private:

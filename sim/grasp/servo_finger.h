@@ -15,6 +15,7 @@
 
 namespace touchstone::sim {
 
+/// The servo, its lever and the finger on it.
 struct ServoFingerSettings {
   // Public figures of the AX-12A (Robotis' e-manual).
   double step_deg = 300.0 / 1024;  ///< "Resolution 0.29 deg": 10 bits over 300 degrees
@@ -43,8 +44,10 @@ struct FingerMotion {
   std::uint64_t shake_seed = 1;
 };
 
+/// What the servo was commanded to do last.
 enum class FingerPhase { resting, closing, holding, opening };
 
+/// The finger at one moment.
 struct FingerMoment {
   double seconds = 0.0;
   double travel_mm = 0.0;  ///< beyond the touch; below 0: apart
@@ -54,6 +57,7 @@ struct FingerMoment {
   FingerPhase phase = FingerPhase::resting;  ///< what the servo has been commanded
 };
 
+/// One grasp, from before the touch until the finger is off the piece.
 struct FingerRun {
   std::vector<FingerMoment> moments;  ///< evenly in time, from 0 on
   double static_force_N = 0.0;        ///< at rest on the last closing step

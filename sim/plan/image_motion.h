@@ -12,6 +12,7 @@ class ImageScale {
  public:
   /// @pre the device has a camera
   explicit ImageScale(const DeviceSpec& device);
+  /// Of a motion in the gel frame.
   double pixels(const Eigen::Vector3d& motion_mm) const;
   /// Of a motion across the view.
   double pixels_across(double mm) const { return pixels_per_mm_ * mm; }

@@ -21,6 +21,7 @@ fem::PressState state_after(const Truth& truth, double after_s);
 /// What a scene's exposures need of its motion.
 class ExposureTimes {
  public:
+  /// Of one scene, by its plan: which of blur and rolling shutter are simulated.
   ExposureTimes(const SceneSpec& scene, const Plan& plan);
 
   /// How long a frame gathers light, s: the exposure, if its blur is simulated, and what the last row lags behind the

@@ -35,6 +35,7 @@ struct PressPath {
   std::vector<PathPoint> points;                           ///< at least one, `at` rising
 };
 
+/// The body that presses, as fem takes it.
 fem::ContactShape shape_of(const PressPath& path);
 
 /// What came of a path.

@@ -17,6 +17,7 @@
 
 namespace touchstone::sim {
 
+/// What a single step may do.
 struct TouchSessionSettings {
   /// How far the object may go in a step that begins in contact, mm, turns included. More is taken for a mistake of the
   /// caller's (metres for millimetres, another frame's pose), unless it ends well off the gel.
@@ -25,6 +26,7 @@ struct TouchSessionSettings {
   double largest_part_mm = 0.1;
 };
 
+/// How the contact moves over the object.
 enum class TouchContact : std::uint8_t {
   none,             ///< nothing touches
   sticking,         ///< all that touches is carried along

@@ -22,6 +22,7 @@ struct CoinRelief {
 
 void fields(YamlReader& in, CoinRelief& relief);
 
+/// The coin's face once, not repeated.
 fem::ReliefMap relief_map(const CoinRelief& relief);
 
 /// Width of a glyph's stroke, mm.

@@ -9,6 +9,7 @@
 
 namespace touchstone::sim {
 
+/// How the yarns are bound.
 enum class Weave {
   plain,        ///< over one, under one
   basket,       ///< plain weave of pairs of yarns
@@ -21,6 +22,7 @@ enum class Weave {
 };
 EnumNames<Weave> enum_names(Weave);
 
+/// A cloth, laid flat. The pattern is regular, each yarn's width and the fuzz are random.
 struct FabricRelief {
   static constexpr const char* kType = "fabric";
   static constexpr bool kSharp = false;
@@ -44,7 +46,9 @@ struct FabricRelief {
 };
 
 void fields(YamlReader& in, FabricRelief& relief);
+/// One period, random by `seed`.
 fem::ReliefMap relief_map(const FabricRelief& relief);
+/// The narrowest thing of it that a tile shows, mm: kTileDetail.
 double finest_detail(const FabricRelief& relief);
 
 /// Whether warp end `end` lies over weft pick `pick`, in a woven cloth. @pre the weave is one of the first five

@@ -24,6 +24,7 @@ struct FingerprintRelief {
 };
 
 void fields(YamlReader& in, FingerprintRelief& relief);
+/// One finger's print, not repeated.
 fem::ReliefMap relief_map(const FingerprintRelief& relief);
 /// ridge_mm.
 double finest_detail(const FingerprintRelief& relief);

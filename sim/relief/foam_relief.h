@@ -8,6 +8,7 @@
 
 namespace touchstone::sim {
 
+/// What stands out and what lies deep.
 enum class FoamKind {
   open,    ///< a net of struts, thicker where three meet, with pits between them; some walls are missing
   closed,  ///< walls, and between them cut cells as round bowls
@@ -15,6 +16,7 @@ enum class FoamKind {
 };
 EnumNames<FoamKind> enum_names(FoamKind);
 
+/// A cut foam.
 struct FoamRelief {
   static constexpr const char* kType = "foam";
   static constexpr bool kSharp = false;
@@ -33,7 +35,9 @@ struct FoamRelief {
 };
 
 void fields(YamlReader& in, FoamRelief& relief);
+/// One period, random by `seed`.
 fem::ReliefMap relief_map(const FoamRelief& relief);
+/// The narrowest thing of it that a tile shows, mm: kTileDetail.
 double finest_detail(const FoamRelief& relief);
 
 }  // namespace touchstone::sim

@@ -28,6 +28,7 @@ void fields(YamlReader& in, LeafRelief& leaf);
 
 /// The narrowest vein's width, mm.
 double finest_detail(const LeafRelief& leaf);
+/// The leaf once, not repeated.
 fem::ReliefMap relief_map(const LeafRelief& leaf);
 
 }  // namespace touchstone::sim

@@ -9,6 +9,7 @@
 
 namespace touchstone::sim {
 
+/// A moulded grain.
 struct PlasticRelief {
   static constexpr const char* kType = "plastic";
   static constexpr bool kSharp = false;
@@ -24,7 +25,9 @@ struct PlasticRelief {
 };
 
 void fields(YamlReader& in, PlasticRelief& relief);
+/// One period, random by `seed`.
 fem::ReliefMap relief_map(const PlasticRelief& relief);
+/// The narrowest thing of it that a tile shows, mm: kTileDetail.
 double finest_detail(const PlasticRelief& relief);
 
 }  // namespace touchstone::sim

@@ -27,6 +27,7 @@ struct PlugRelief {
 /// Refuses windows that don't lie on the face side by side.
 void fields(YamlReader& in, PlugRelief& relief);
 
+/// The plug's face once, not repeated.
 fem::ReliefMap relief_map(const PlugRelief& relief);
 
 /// The smaller side of a window, mm: the seam is left for finer pixels to see.

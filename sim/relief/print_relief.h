@@ -24,6 +24,7 @@ struct PrintRelief {
 
 /// @throws Error also for a letter that there isn't
 void fields(YamlReader& in, PrintRelief& relief);
+/// The text once, not repeated.
 fem::ReliefMap relief_map(const PrintRelief& relief);
 /// stroke_mm.
 double finest_detail(const PrintRelief& relief);

@@ -25,6 +25,7 @@
 
 namespace touchstone::sim {
 
+/// Every kind of relief; which one is its `kType` in the file.
 using ReliefKind = std::variant<WavesRelief, GridRelief, HairRelief, ImageRelief, PrintRelief, FingerprintRelief,
                                 CoinRelief, PlugRelief, FabricRelief, FoamRelief, TissueRelief, SandpaperRelief,
                                 PlasticRelief, WoodRelief, LeafRelief>;

@@ -8,6 +8,7 @@
 
 namespace touchstone::sim {
 
+/// A point of the diagram, with its weight: a place belongs to the point of the least d^2 - weight.
 struct CellPoint {
   Eigen::Vector2d place;  ///< mm
   double weight = 0.0;    ///< mm^2: the larger, the more of its neighbours' area it takes
@@ -27,11 +28,13 @@ struct CellPlace {
   Eigen::Vector2d from_point;  ///< mm, from the cell's point
 };
 
+/// The diagram of some points; it wraps round the rectangle's sides.
 class CellDiagram {
  public:
   /// @pre there are at least 4 points on the rectangle
   CellDiagram(const Eigen::Vector2d& size, std::vector<CellPoint> points);
 
+  /// Which cell a place is in, and how near its walls are.
   CellPlace at(const Eigen::Vector2d& place) const;
   const std::vector<CellPoint>& points() const { return points_; }
 

@@ -18,6 +18,7 @@ inline constexpr double kTilePitch = 0.02;
 /// The finest detail that such a tile can show, mm.
 inline constexpr double kTileDetail = 3.0 * kTilePitch;
 
+/// Heights at the points of one period.
 struct ReliefTile {
   int nx = 0;
   int ny = 0;

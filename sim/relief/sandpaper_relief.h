@@ -8,6 +8,7 @@
 
 namespace touchstone::sim {
 
+/// Grains of one grade on their paper.
 struct SandpaperRelief {
   static constexpr const char* kType = "sandpaper";
   static constexpr bool kSharp = false;
@@ -23,7 +24,9 @@ struct SandpaperRelief {
 };
 
 void fields(YamlReader& in, SandpaperRelief& relief);
+/// One period, random by `seed`.
 fem::ReliefMap relief_map(const SandpaperRelief& relief);
+/// The narrowest thing of it that a tile shows, mm: kTileDetail.
 double finest_detail(const SandpaperRelief& relief);
 
 /// Mean grain size of a FEPA P-grade, mm: sieve grades of [ISO6344, part 2] (P40 425 um, P60 269, P80 201, P100 162,

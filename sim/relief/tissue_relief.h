@@ -8,6 +8,7 @@
 
 namespace touchstone::sim {
 
+/// The pattern pressed into the sheet.
 enum class Embossing {
   none,
   dots,     ///< round knobs in a hexagonal pattern
@@ -15,6 +16,7 @@ enum class Embossing {
 };
 EnumNames<Embossing> enum_names(Embossing);
 
+/// A sheet of tissue.
 struct TissueRelief {
   static constexpr const char* kType = "tissue";
   static constexpr bool kSharp = false;
@@ -34,7 +36,9 @@ struct TissueRelief {
 };
 
 void fields(YamlReader& in, TissueRelief& relief);
+/// One period, random by `seed`.
 fem::ReliefMap relief_map(const TissueRelief& relief);
+/// The narrowest thing of it that a tile shows, mm: kTileDetail.
 double finest_detail(const TissueRelief& relief);
 
 }  // namespace touchstone::sim

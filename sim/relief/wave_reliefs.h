@@ -34,6 +34,7 @@ void fields(YamlReader& in, WavesRelief& relief);
 void fields(YamlReader& in, GridRelief& relief);
 void fields(YamlReader& in, HairRelief& relief);
 
+/// One period of the waves, or the hair, without end along y.
 fem::ReliefMap relief_map(const WavesRelief& relief);
 fem::ReliefMap relief_map(const GridRelief& relief);
 fem::ReliefMap relief_map(const HairRelief& relief);

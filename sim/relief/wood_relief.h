@@ -8,6 +8,7 @@
 
 namespace touchstone::sim {
 
+/// A planed board.
 struct WoodRelief {
   static constexpr const char* kType = "wood";
   static constexpr bool kSharp = false;
@@ -27,7 +28,9 @@ struct WoodRelief {
 };
 
 void fields(YamlReader& in, WoodRelief& relief);
+/// One period, random by `seed`.
 fem::ReliefMap relief_map(const WoodRelief& relief);
+/// The narrowest thing of it that a tile shows, mm: kTileDetail.
 double finest_detail(const WoodRelief& relief);
 
 }  // namespace touchstone::sim

@@ -31,6 +31,7 @@ struct RelaxationTermSpec {
 
 struct GelSurface;
 
+/// `gel.shape` of the file; which fields of GelSpec count depends on it.
 enum class GelShape { slab, dome, fingertip, mesh };
 EnumNames<GelShape> enum_names(GelShape);
 
@@ -99,6 +100,7 @@ struct PlateSpec {
   double refractive_index = 1.0;
 };
 
+/// How the dots of a coating's print lie.
 enum class PrintPattern { grid, scattered };
 EnumNames<PrintPattern> enum_names(PrintPattern);  // of `coating.print.pattern`
 
@@ -117,6 +119,7 @@ struct PrintSpec {
   Colour colour = 0.05;
 };
 
+/// How the coating sends light back: as a Lambertian, or as a RoughConductor.
 enum class CoatingType { matt, metal };
 EnumNames<CoatingType> enum_names(CoatingType);
 
@@ -138,6 +141,7 @@ struct FilmSpec {
   Colour transmittance = 1.0;  ///< of one passage at normal incidence
 };
 
+/// Which kind of camera; which fields of CameraSpec count depends on it.
 enum class CameraType { pinhole, lens };
 EnumNames<CameraType> enum_names(CameraType);
 
@@ -203,6 +207,7 @@ struct BandsSpec {
   SourceLocation where;
 };
 
+/// All of a device file, checked.
 struct DeviceSpec {
   std::string name;
   GelSpec gel;

@@ -10,11 +10,13 @@
 
 namespace touchstone::sim {
 
+/// The shape and its edge lengths, of any kind of gel.
 fem::GelBody gel_body(const DeviceSpec& device);
 
 /// The body's, then the layers' from the outer surface inwards.
 std::vector<fem::ElasticMaterial> gel_materials(const GelSpec& gel);
 
+/// The device's beads, centres in the gel frame, mm; none where it has none.
 std::vector<fem::Bead> gel_beads(const DeviceSpec& device);
 
 /// Height (gel frame's z, mm) of the undeformed outer surface over a place; of a dome or fingertip beyond its rim that

@@ -11,6 +11,7 @@
 
 namespace touchstone::sim {
 
+/// `type` of a lamp in the file; strips, rings and arrays become several lamps.
 enum class LampType { spot, led, led_strip, led_ring, led_array, area, projector, guide };
 EnumNames<LampType> enum_names(LampType);
 

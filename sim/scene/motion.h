@@ -17,6 +17,7 @@ struct AxisKey {
   std::optional<double> force_N;
 };
 
+/// An axis of the gel frame.
 enum class Axis { x, y, z };
 EnumNames<Axis> enum_names(Axis);
 
@@ -50,6 +51,7 @@ struct MotionSpec {
   double frame_rate_Hz = 30.0;
   std::vector<MotionKey> keys;
 
+  /// The frame of the start and those of all keys.
   int frame_count() const;
   /// Whether any key leads it by torques.
   bool is_turned() const;

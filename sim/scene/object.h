@@ -16,6 +16,7 @@
 
 namespace touchstone::sim {
 
+/// `shape.type` of the file; which fields of ShapeSpec count depends on it.
 enum class ShapeKind { sphere, rounded_cylinder, box, mesh, egg, shell, hexagon };
 EnumNames<ShapeKind> enum_names(ShapeKind);
 
@@ -61,6 +62,7 @@ struct ElasticSpec {
   SourceLocation where;
 };
 
+/// All of an object file, checked.
 struct ObjectSpec {
   std::string name;
   ShapeSpec shape;
@@ -80,6 +82,7 @@ void fields(YamlReader& in, ScreenSpec& screen);
 void fields(YamlReader& in, ElasticSpec& elastic);
 void fields(YamlReader& in, ObjectSpec& object);
 
+/// @throws Error with file and line for what can't be read or isn't allowed
 ObjectSpec read_object(const std::filesystem::path& file);
 
 /// The body as the contact solver sees it. Reads the mesh file if there is one.

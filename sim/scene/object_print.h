@@ -70,6 +70,7 @@ struct ImagePrint {
   SourceLocation where;
 };
 
+/// One layer of print, with where the file says so.
 struct PrintLayer {
   std::variant<RulePrint, HueCirclePrint, SpecksPrint, ImagePrint, SkinPrint> kind;
   SourceLocation where;
@@ -90,6 +91,7 @@ bool depends_on_pressure(const std::vector<PrintLayer>& layers);
 
 /// sRGB of a hue circle's k-th disc, and where its centre lies.
 Eigen::Vector3d disc_srgb(const HueCirclePrint& print, int k);
+/// Where the k-th disc's middle lies, mm, object frame.
 Eigen::Vector2d disc_centre(const HueCirclePrint& print, int k);
 
 /// All inks, for who chooses bands or judges brightness; for an image those that its colours are mixed of.

@@ -64,6 +64,7 @@ struct MembraneSpec {
   SourceLocation where;
 };
 
+/// On or off by the user's wish, or as the plan finds it to matter.
 enum class Switch { automatic, on, off };
 EnumNames<Switch> enum_names(Switch);
 
@@ -97,6 +98,7 @@ struct AddedObject {
   SourceLocation where;
 };
 
+/// All of a scene file with the files that it names, checked.
 struct SceneSpec {
   DeviceSpec device;
   ObjectSpec object;

@@ -19,6 +19,7 @@
 
 namespace touchstone::sim {
 
+/// Erythema fades under pressure, purpura doesn't.
 enum class LesionKind { erythema, purpura };
 EnumNames<LesionKind> enum_names(LesionKind);
 
@@ -31,6 +32,7 @@ struct SkinPatch {
   Colour colour = 0.5;       ///< of its middle, without pressure
 };
 
+/// The marks on a skin and the pressures at which its vessels shut.
 struct SkinPrint {
   static constexpr const char* kType = "skin";
   std::vector<SkinPatch> patches;  ///< the later ones over the earlier ones

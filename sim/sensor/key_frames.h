@@ -23,7 +23,7 @@ struct FrameAppearance {
   std::vector<double> radii_px;                          ///< of the balls there, at most
 };
 
-inline constexpr int kPreviewStride = 2;
+inline constexpr int kPreviewStride = 2;  ///< pixels, along both axes
 
 /// @param tracer of the scene
 /// @param camera `viewer` made ready

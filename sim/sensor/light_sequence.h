@@ -40,6 +40,7 @@ class LightSequence {
   LightSequence(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel, double smallest_threshold);
   ~LightSequence();
 
+  /// Of the camera, px.
   cv::Size size() const;
   /// How far the image moves between two states, pixels (sim/plan/image_motion.h).
   double motion(const fem::PressState& from, const fem::PressState& to) const;

@@ -11,6 +11,7 @@
 
 namespace touchstone::sim {
 
+/// How finely the membrane's light is computed.
 struct MembraneCameraSettings {
   double cell_mm = 0.2;  ///< of the face's grid, at most; the membrane's sides are cut in an even number of cells
   int walks = 1 << 20;   ///< render::MembraneWalkSettings::walks

@@ -38,7 +38,9 @@ class SensorView {
  public:
   virtual ~SensorView() = default;
 
+  /// Which effects the view simulates.
   virtual const Plan& plan() const = 0;
+  /// How its pictures are lit, and why so.
   virtual const LightChoice& choice() const = 0;
   /// The bands of the light of an object's pictures: those of plan(), but where the object's colour is seen.
   virtual SceneBands bands(const SeenObject& /*object*/) const { return plan().bands; }

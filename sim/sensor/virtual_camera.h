@@ -49,7 +49,9 @@ class VirtualCamera {
   VirtualCamera(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel, const Truth& first)
       : VirtualCamera(scene, plan, gel, std::span<const Truth>(&first, 1)) {}
   ~VirtualCamera();
+  /// How its pictures are lit, and why so.
   const LightChoice& light_choice() const;
+  /// The picture of one state. A pure function of the constructor's arguments and the state.
   Capture capture(const Truth& truth) const;
   /// The same without the short cut: every pixel is traced.
   Capture capture_whole(const Truth& truth) const;

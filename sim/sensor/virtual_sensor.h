@@ -26,6 +26,7 @@
 
 namespace touchstone::sim {
 
+/// What the sensor is set up for: how deep it will be pressed, and how accurate its pictures are to be.
 struct VirtualSensorSettings {
   std::uint64_t seed = 1;     ///< of the unit: its imager's fixed pattern, and the light's samples
   double deepest_mm = 1.2;    ///< how far the gel will be pressed in: what a light field has to hold
@@ -98,13 +99,16 @@ SceneSpec touch_scene(const DeviceSpec& device, const VirtualSensorSettings& set
 /// one, paths for a clear one, which take seconds for an object's first frame. light() says which, and why.
 class VirtualSensor {
  public:
+  /// Sets up the gel, or reads it from the cache. @throws Error for a device or settings that make no sense
   VirtualSensor(DeviceSpec device, const std::filesystem::path& cache_folder,
                 const VirtualSensorSettings& settings = {}, const Progress& progress = {});
   ~VirtualSensor();
   VirtualSensor(const VirtualSensor&) = delete;
   VirtualSensor& operator=(const VirtualSensor&) = delete;
 
+  /// As it was given.
   const DeviceSpec& device() const;
+  /// Its compliance.
   const fem::Compliance& gel() const;
   /// How pictures are lit. @throws Error for a device without a camera, as all that needs light
   const LightChoice& light() const;
@@ -112,6 +116,7 @@ class VirtualSensor {
   double mm_per_px() const;
   /// Where on the undeformed membrane a point of the picture (pixels, centres at + 0.5) lies, gel frame, mm.
   Eigen::Vector2d gel_from_pixel(const Eigen::Vector2d& pixel) const;
+  /// The inverse; also for places beside the picture.
   Eigen::Vector2d pixel_from_gel(const Eigen::Vector2d& place) const;
 
   /// @throws Error for an object whose files can't be read

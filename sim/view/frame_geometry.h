@@ -9,6 +9,7 @@
 
 namespace touchstone::sim {
 
+/// One frame's surfaces and cameras, as write_glb takes them.
 struct FrameGeometry {
   std::vector<GltfPart> parts;  ///< `gel surface`, `gel in contact`, `bead` (at each bead), the objects by their names
   std::vector<GltfCamera> cameras;  ///< the device's, if it has one

@@ -38,6 +38,7 @@ class Membrane {
     TriangleMesh wet;
     std::vector<Eigen::Vector3d> rest;  ///< per vertex of either: the same material point on the undeformed gel
   };
+  /// As fine as the relief's grid.
   Sheet sheet(const fem::PressState& press, const fem::ReliefAnswer& relief) const;
 
  private:
@@ -47,6 +48,6 @@ class Membrane {
   int columns_, rows_;
 };
 
-inline constexpr int kMostHeightPixels = 4096;
+inline constexpr int kMostHeightPixels = 4096;  ///< along a side of a height map: more are refused
 
 }  // namespace touchstone::sim

@@ -16,6 +16,7 @@ namespace touchstone::sim {
 
 /// All of a scene that can be seen, ready to be traced at any of its states. Safe to use from many threads.
 struct SceneView {
+  /// Makes what all states share. @throws Error as Membrane, or for an object's file that can't be read
   SceneView(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel);
   /// Another scene with the same gel: takes from `other` what depends on the gel alone, most of the work.
   SceneView(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel, const SceneView& other);
@@ -28,6 +29,7 @@ struct SceneView {
   render::Scene seen_coating(const fem::PressState& press, const SeenGeometry& geometry) const;
   /// `relief` as relief() gave it.
   render::Scene seen(const fem::PressState& press, const std::optional<fem::ReliefAnswer>& relief) const;
+  /// The same, ready to be traced.
   render::Tracer tracer(const fem::PressState& press, const std::optional<fem::ReliefAnswer>& relief) const {
     return render::Tracer(seen(press, relief));
   }

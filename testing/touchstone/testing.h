@@ -50,6 +50,7 @@ const VirtualSensor& device(const std::string& name_or_file, const VirtualSensor
 
 /// An object by its shipped name ("probe-6mm") or by its file. @throws Error as device
 sim::ObjectSpec object(const std::string& name_or_file);
+/// A rigid ball with Coulomb's `friction` on the gel. @throws Error for a diameter that isn't above 0
 sim::ObjectSpec ball(double diameter_mm, double friction = 0.5);
 
 /// Where $TOUCHSTONE_FAILED_FRAMES names a folder: writes frame and background there as PNG, named after the running
@@ -74,11 +75,13 @@ inline Eigen::Vector3d as_vector(const std::array<double, 3>& v) {
 template <typename Compare>
 class TruthMatcher {
  public:
-  using is_gtest_matcher = void;
+  using is_gtest_matcher = void;  ///< GoogleMock's mark of a matcher
 
+  /// `what` names the quantity in messages: "the force".
   TruthMatcher(Touch truth, std::string what, Compare compare)
       : truth_(std::move(truth)), what_(std::move(what)), compare_(std::move(compare)) {}
 
+  /// GoogleMock asks this; frames of what doesn't match are kept (keep_frames).
   template <typename Estimate>
   bool MatchAndExplain(const Estimate& estimate, ::testing::MatchResultListener* listener) const {
     const lab::Comparison comparison = compare_(estimate, truth_);
