@@ -4,10 +4,7 @@
 
 #include "apps/command.h"
 #include "apps/progress_bar.h"
-#include "core/error.h"
-#include "datasets/jobs/draw.h"
-#include "datasets/sets/dataset.h"
-#include "datasets/sets/drawn_dataset.h"
+#include "datasets/sets/generate.h"
 
 namespace touchstone::apps {
 namespace {
@@ -19,43 +16,11 @@ struct Options {
   bool no_timings = false;
 };
 
-/// A job that draws its samples.
-void generate_drawn(const Options& options, const GlobalOptions& global) {
-  datasets::DrawnOptions how;
-  how.source = datasets::virtual_sensors(global.cache);
-  how.threads = global.threads;
-  if (!options.shard.empty()) how.shard = datasets::shard_of(options.shard);
-  datasets::DrawnReport report;
-  {
-    ProgressBar bar(global.quiet);
-    report = datasets::generate_drawn(options.job, options.out, how, bar.listener());
-  }
-  if (report.was_finished) {
-    print_finished(options.out, report.samples);
-    return;
-  }
-  fmt::print("{}: {} samples, {} of them made", options.out.string(), report.samples, report.made);
-  if (report.kept > 0) fmt::print(", {} kept from an earlier run", report.kept);
-  if (report.damaged_blocks > 0) fmt::print(", {} damaged files made again", report.damaged_blocks);
-  if (report.drawn_again > 0) fmt::print(", {} touches drawn again", report.drawn_again);
-  fmt::print("; {:.1f} s setting up units, {:.1f} s pressing and rendering, {:.1f} s writing\n", report.set_up_s,
-             report.press_s, report.write_s);
-  if (how.shard.count > 1) {
-    fmt::print("when all {} shards are there: touchstone merge {} -o {}\n", how.shard.count, options.job.string(),
-               options.out.string());
-  }
-}
-
 void generate(const Options& options, const GlobalOptions& global) {
-  if (datasets::is_draw_job_file(options.job)) {
-    generate_drawn(options, global);
-    return;
-  }
-  if (!options.shard.empty()) fail("--shard: {} isn't a job that draws; only those have shards", options.job.string());
-  datasets::GenerateOptions how;
-  how.source = datasets::simulator(global.cache);
+  datasets::GenerateOptions how = datasets::simulated(global.cache);
   how.threads = global.threads;
   how.timings = !options.no_timings;
+  if (!options.shard.empty()) how.shard = datasets::shard_of(options.shard);
   datasets::GenerateReport report;
   {
     ProgressBar bar(global.quiet);
@@ -66,9 +31,19 @@ void generate(const Options& options, const GlobalOptions& global) {
     print_finished(options.out, report.samples);
     return;
   }
-  fmt::print("{}: {} samples, {} of them rendered", options.out.string(), report.samples, report.rendered);
-  if (report.kept > 0) fmt::print(", {} kept from a run that was broken off", report.kept);
+  fmt::print("{}: {} samples, {} of them made", options.out.string(), report.samples, report.made);
+  if (report.kept > 0) fmt::print(", {} kept from an earlier run", report.kept);
+  if (report.damaged_blocks > 0) fmt::print(", {} damaged files made again", report.damaged_blocks);
+  if (report.drawn_again > 0) fmt::print(", {} touches drawn again", report.drawn_again);
+  if (report.press_s > 0.0) {
+    fmt::print("; {:.1f} s setting up units, {:.1f} s pressing and rendering, {:.1f} s writing", report.set_up_s,
+               report.press_s, report.write_s);
+  }
   fmt::print("\n");
+  if (how.shard.count > 1) {
+    fmt::print("when all {} shards are there: touchstone merge {} -o {}\n", how.shard.count, options.job.string(),
+               options.out.string());
+  }
 }
 
 }  // namespace

@@ -83,8 +83,9 @@ void write_sheet(const InspectOptions& options) {
   if (!options.job.empty()) fail("--job: is for a page, and {} is a picture", options.out.string());
   std::vector<cv::Mat> pictures;
   std::vector<std::string> captions;
-  datasets::holds_drawn_set(options.data) ? add_frames_of_units(options, pictures, captions)
-                                          : add_frames_of_scenes(options, pictures, captions);
+  datasets::read_manifest(options.data).source == datasets::SetSource::draw
+      ? add_frames_of_units(options, pictures, captions)
+      : add_frames_of_scenes(options, pictures, captions);
   sim::write_png(options.out, datasets::contact_sheet(pictures, captions, options.columns, options.tile_width));
   fmt::print("{}: {} frames with their forces x, y, z on the object\n", options.out.string(), pictures.size());
 }

@@ -3,9 +3,7 @@
 
 #include "apps/command.h"
 #include "apps/progress_bar.h"
-#include "core/error.h"
-#include "datasets/jobs/draw.h"
-#include "datasets/sets/drawn_dataset.h"
+#include "datasets/sets/generate.h"
 
 namespace touchstone::apps {
 namespace {
@@ -17,17 +15,14 @@ struct Options {
 };
 
 void merge(const Options& options, const GlobalOptions& global) {
-  if (!datasets::is_draw_job_file(options.job)) {
-    fail("{}: isn't a job that draws; only those have shards to merge", options.job.string());
-  }
   if (options.missing) {
     fmt::print("{}\n", fmt::join(datasets::missing_shards(options.job, options.out, *options.missing), ","));
     return;
   }
-  datasets::DrawnReport report;
+  datasets::GenerateReport report;
   {
     ProgressBar bar(global.quiet);
-    report = datasets::merge_drawn(options.job, options.out, bar.listener());
+    report = datasets::merge(options.job, options.out, bar.listener());
   }
   if (report.was_finished) {
     print_finished(options.out, report.samples);

@@ -26,7 +26,7 @@ std::shared_ptr<FrameOptions> add_frame_options(CLI::App& command, const std::st
   auto options = std::make_shared<FrameOptions>();
   options->split = split;
   command.add_option("--data", options->data, "A data set that `touchstone generate` made");
-  command.add_option("--split", options->split, "Its scenes: train, verify, test or all")->capture_default_str();
+  command.add_option("--split", options->split, "Its scenes: train, validate, test or all")->capture_default_str();
   command.add_option("--frames", options->frames, "A folder of recorded frames (.png, in the order of their names)");
   command.add_option("--forces", options->forces,
                      "Times and forces of recorded frames: CSV with the header "

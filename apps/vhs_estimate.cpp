@@ -112,7 +112,7 @@ void add_vhs_estimation(CLI::App& estimations, const GlobalOptions& global, Acti
       estimations.add_subcommand("vhs", "Force from its frames; where the true forces are known, the errors too");
   auto options = std::make_shared<EstimateOptions>();
   command->add_option("--model", options->model, "The model that `touchstone calibrate` made")->required();
-  const auto frames = add_frame_options(*command, "verify");
+  const auto frames = add_frame_options(*command, "validate");
   command->add_option("-o,--out", options->out, "The forces: a .csv file, one line a frame");
   command
       ->add_option("--rest", options->rest,

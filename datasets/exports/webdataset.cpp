@@ -15,7 +15,7 @@
 #include "core/sha256.h"
 #include "core/whole_file.h"
 #include "datasets/exports/tar_file.h"
-#include "datasets/sets/drawn_manifest.h"
+#include "datasets/sets/manifest.h"
 #include "datasets/sets/run_folder.h"
 #include "datasets/sets/run_identity.h"
 #include "sim/files/image_file.h"
@@ -28,7 +28,6 @@ using nlohmann::ordered_json;
 
 constexpr const char* kIndex = "index.json";
 constexpr const char* kUnits = "units";
-constexpr const char* kSplits[] = {"train", "validate", "test"};
 constexpr std::int64_t kBatch = 32;  // samples that are in memory at once
 
 /// Pixels of a file (red, green, blue) as pictures are in memory.
@@ -158,8 +157,8 @@ struct Sample {
 };
 
 /// The samples of each split, in order.
-std::vector<std::vector<std::int64_t>> samples_by_split(const fs::path& folder, const DrawnManifest& manifest) {
-  std::vector<std::vector<std::int64_t>> result(std::size(kSplits));
+std::vector<std::vector<std::int64_t>> samples_by_split(const fs::path& folder, const Manifest& manifest) {
+  std::vector<std::vector<std::int64_t>> result(kSplits);
   for (const ManifestBlock& block : manifest.blocks) {
     const fs::path path = folder / block.name;
     const auto split = Hdf5Reader(path).read<std::uint8_t>("/split").values;
@@ -177,8 +176,9 @@ std::vector<std::vector<std::int64_t>> samples_by_split(const fs::path& folder, 
 bool is_ours(const fs::path& file) {
   const std::string name = file.filename().string();
   if (is_temporary_file(file) || name == kUnits) return true;
-  return std::any_of(std::begin(kSplits), std::end(kSplits),
-                     [&](const std::string& split) { return name.starts_with(split + "-") && name.ends_with(".tar"); });
+  return std::ranges::any_of(enum_names(Split{}), [&](const auto& split) {
+    return name.starts_with(std::string(split.first) + "-") && name.ends_with(".tar");
+  });
 }
 
 /// Makes `out`, and removes what a killed export left there.
@@ -201,7 +201,7 @@ void begin(const fs::path& out) {
 }
 
 /// What is once a sensor.
-ordered_json write_units(const fs::path& folder, const fs::path& out, const DrawnManifest& manifest) {
+ordered_json write_units(const fs::path& folder, const fs::path& out, const Manifest& manifest) {
   ordered_json units = ordered_json::array();
   int last = -1;
   for (const ManifestBlock& block : manifest.blocks) {
@@ -229,7 +229,7 @@ ordered_json write_units(const fs::path& folder, const fs::path& out, const Draw
 /// Goes through samples of rising numbers, block by block.
 class TarMaker {
  public:
-  TarMaker(const fs::path& folder, const fs::path& out, const DrawnManifest& manifest)
+  TarMaker(const fs::path& folder, const fs::path& out, const Manifest& manifest)
       : folder_(folder), out_(out), manifest_(manifest) {}
 
   void write(const std::string& name, const std::string& split, const std::vector<std::int64_t>& numbers,
@@ -266,21 +266,17 @@ class TarMaker {
 
   const fs::path& folder_;
   const fs::path& out_;
-  const DrawnManifest& manifest_;
+  const Manifest& manifest_;
   std::size_t block_ = 0;
   std::unique_ptr<OpenBlock> open_;
 };
 
-/// Which splits are wanted: numbers of kSplits. @throws Error
+/// Which splits are wanted: by their numbers. @throws Error
 std::vector<std::size_t> wanted_splits(const fs::path& folder, const std::vector<std::string>& names,
                                        const std::vector<std::vector<std::int64_t>>& samples) {
   std::vector<std::size_t> wanted;
   for (const std::string& name : names) {
-    const auto* const found = std::find(std::begin(kSplits), std::end(kSplits), name);
-    if (found == std::end(kSplits)) {
-      fail("--split: '{}' is not known; allowed is one of: {}", name, fmt::join(kSplits, ", "));
-    }
-    const auto number = static_cast<std::size_t>(found - std::begin(kSplits));
+    const auto number = static_cast<std::size_t>(split_named(name));
     if (samples[number].empty()) fail("--split: '{}' of {} has no samples", name, folder.string());
     if (std::find(wanted.begin(), wanted.end(), number) == wanted.end()) wanted.push_back(number);
   }
@@ -321,8 +317,8 @@ WebDatasetReport export_webdataset(const fs::path& folder, const fs::path& out, 
   if (options.threads > 0) {
     limit.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(options.threads));
   }
-  const DrawnManifest manifest = read_drawn_manifest(folder);
-  check_blocks(folder, manifest);
+  const Manifest manifest = read_manifest(folder, SetSource::draw);
+  verify_files(folder, manifest);
   const auto by_split = samples_by_split(folder, manifest);
   const std::vector<std::size_t> wanted = wanted_splits(folder, options.splits, by_split);
   std::int64_t all = 0;
@@ -340,15 +336,16 @@ WebDatasetReport export_webdataset(const fs::path& folder, const fs::path& out, 
   WebDatasetReport report;
   TarMaker maker(folder, out, manifest);
   for (const std::size_t split : wanted) {
+    const std::string split_name = name_of(static_cast<Split>(split));
     const std::vector<std::int64_t>& samples = by_split[split];
     const auto count = static_cast<std::int64_t>(samples.size());
     const std::int64_t tars = (count + options.samples_per_tar - 1) / options.samples_per_tar;
     ordered_json files = ordered_json::array();
     for (std::int64_t tar = 0; tar < tars; ++tar) {
-      const std::string name = fmt::format("{}-{:06}.tar", kSplits[split], tar);
+      const std::string name = fmt::format("{}-{:06}.tar", split_name, tar);
       std::vector<std::int64_t> dealt;
       for (std::int64_t k = tar; k < count; k += tars) dealt.push_back(samples[static_cast<std::size_t>(k)]);
-      maker.write(name, kSplits[split], dealt, [&](std::int64_t more) {
+      maker.write(name, split_name, dealt, [&](std::int64_t more) {
         report.samples += more;
         if (progress) progress("samples", report.samples, all);
       });
@@ -358,7 +355,7 @@ WebDatasetReport export_webdataset(const fs::path& folder, const fs::path& out, 
       ++report.tars;
       report.bytes += bytes;
     }
-    index["splits"][kSplits[split]] = {{"samples", count}, {"files", std::move(files)}};
+    index["splits"][split_name] = {{"samples", count}, {"files", std::move(files)}};
   }
   write_whole_file(out / kIndex, index.dump(1, ' ', false, ordered_json::error_handler_t::replace) + "\n");
   return report;

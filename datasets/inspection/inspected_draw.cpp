@@ -104,7 +104,7 @@ std::shared_ptr<const sim::DeviceSpec> device_in(const Hdf5Reader& file, const s
   }
 }
 
-void read_scenes(const DrawnManifest& manifest, const ordered_json& json, InspectedSet& set) {
+void read_scenes(const Manifest& manifest, const ordered_json& json, InspectedSet& set) {
   for (const ordered_json& unit : json.at("units")) {
     InspectedScene scene;
     scene.name = fmt::format("unit {}", unit.at("unit").get<int>());
@@ -174,33 +174,12 @@ void read_arrays(InspectedSet& set) {
 
 }  // namespace
 
-bool holds_drawn_set(const fs::path& folder) {
-  const fs::path file = folder / "dataset.json";
-  if (std::error_code error; !fs::is_regular_file(file, error)) return false;
-  const ordered_json json = ordered_json::parse(read_whole_file(file), nullptr, false);
-  return json.is_object() && json.value("format", "") == kDrawnSetFormat;
-}
-
-InspectedSet read_inspected_draw(const fs::path& folder) {
-  const DrawnManifest manifest = read_drawn_manifest(folder);
-  check_blocks(folder, manifest);
-  InspectedSet set;
-  set.drawn = true;
-  set.folder = folder;
-  set.job_name = manifest.name;
-  set.content_sha256 = manifest.content_sha256;
-  set.blocks = manifest.blocks;
-  const fs::path file = folder / "dataset.json";
+void read_drawn_samples(const Manifest& manifest, InspectedSet& set) {
+  const fs::path file = set.folder / "dataset.json";
   try {
     const ordered_json json = ordered_json::parse(read_whole_file(file));
     set.job_file = json.at("job").at("file");
     set.job_text = json.at("job").at("text");
-    set.version = json.at("run").at("version");
-    set.processor = json.at("run").at("processor");
-    for (const ordered_json& one : json.at("files")) {
-      ++set.files;
-      set.bytes += one.at("bytes").get<std::int64_t>();
-    }
     read_scenes(manifest, json, set);
   } catch (const nlohmann::json::exception& error) {
     fail("{}: isn't a whole manifest ({})", file.string(), error.what());
@@ -211,13 +190,12 @@ InspectedSet read_inspected_draw(const fs::path& folder) {
   for (std::size_t k = 0; k < set.scenes.size(); ++k) {
     for (std::size_t s = 0; s < splits[k].size(); ++s) {
       if (splits[k][s] == 0) continue;
-      set.scenes[k].split += fmt::format("{}{} {}", set.scenes[k].split.empty() ? "" : ", ",
-                                         name_of(static_cast<DrawnSplit>(s)), splits[k][s]);
+      set.scenes[k].split +=
+          fmt::format("{}{} {}", set.scenes[k].split.empty() ? "" : ", ", name_of(static_cast<Split>(s)), splits[k][s]);
     }
     set.scenes[k].object = fmt::format("{}", fmt::join(objects[k], ", "));
   }
   read_arrays(set);
-  return set;
 }
 
 cv::Mat drawn_frame(const InspectedSet& set, std::size_t sample) {

@@ -5,11 +5,9 @@
 
 namespace touchstone::datasets {
 
-/// Is it a drawn set's folder? False also where there is no set at all.
-bool holds_drawn_set(const std::filesystem::path& folder);
-
-/// @throws Error if the folder isn't a finished drawn set, or is damaged
-InspectedSet read_inspected_draw(const std::filesystem::path& folder);
+/// What a drawn set's blocks hold, for `set`, which knows its folder and its manifest's figures already.
+/// @throws Error if a block can't be read
+void read_drawn_samples(const Manifest& manifest, InspectedSet& set);
 
 /// A sample's picture, BGR or grey, and 255 where what a pixel sees is in contact; empty if the set has none.
 cv::Mat drawn_frame(const InspectedSet& set, std::size_t sample);

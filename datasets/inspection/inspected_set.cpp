@@ -51,7 +51,6 @@ void read_more(const std::filesystem::path& file, InspectedSet& set) {
     const ordered_json json = ordered_json::parse(read_whole_file(file));
     set.job_file = json.at("job").at("file");
     set.job_text = json.at("job").at("text");
-    set.processor = json.at("processor");
     for (const ordered_json& scene : json.at("scenes")) set.scenes.push_back(scene_of(scene));
     for (const ordered_json& array : json.at("arrays")) {
       std::string axes = array.at("axes");
@@ -149,17 +148,24 @@ std::string InspectedSet::name_of_sample(std::size_t sample) const {
 }
 
 InspectedSet read_inspected_set(const std::filesystem::path& folder) {
-  if (holds_drawn_set(folder)) return read_inspected_draw(folder);
   const Manifest manifest = read_manifest(folder);
   InspectedSet set;
+  set.drawn = manifest.source == SetSource::draw;
   set.folder = folder;
-  set.job_name = manifest.job_name;
-  set.job_sha256 = manifest.job_sha256;
-  set.inputs_sha256 = manifest.inputs_sha256;
+  set.job_name = manifest.name;
   set.content_sha256 = manifest.content_sha256;
-  set.version = manifest.version;
+  set.job_sha256 = manifest.run.job_sha256;
+  set.inputs_sha256 = manifest.run.inputs_sha256;
+  set.version = manifest.run.version;
+  set.processor = manifest.run.processor;
+  set.blocks = manifest.blocks;
   set.files = static_cast<std::int64_t>(manifest.files.size());
   for (const WrittenFile& file : manifest.files) set.bytes += static_cast<std::int64_t>(file.bytes);
+  if (set.drawn) {
+    verify_files(folder, manifest);
+    read_drawn_samples(manifest, set);
+    return set;
+  }
   read_more(folder / "dataset.json", set);
   read_columns(folder / "truth.h5", set);
   if (static_cast<std::int64_t>(set.samples.size()) != manifest.samples) {

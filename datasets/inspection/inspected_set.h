@@ -13,7 +13,7 @@
 
 #include "core/hdf5_file.h"
 #include "core/transform.h"
-#include "datasets/sets/drawn_manifest.h"
+#include "datasets/sets/manifest.h"
 #include "sim/plan/plan.h"
 #include "sim/scene/device.h"
 

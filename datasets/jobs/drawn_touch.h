@@ -32,10 +32,10 @@ struct PreparedDraw {
   std::vector<InputFile> inputs;
   std::string device_text;
   std::vector<std::string> object_texts;
-  std::vector<DrawnBlock> blocks;       ///< of all samples, in their order
-  std::vector<DrawnSplit> unit_splits;  ///< for SplitBy::unit
-  double deepest_mm = 0.0;              ///< that the gel will be pressed in
-  double widest_mm = 0.0;               ///< and moved along itself
+  std::vector<DrawnBlock> blocks;  ///< of all samples, in their order
+  std::vector<Split> unit_splits;  ///< for SplitBy::unit
+  double deepest_mm = 0.0;         ///< that the gel will be pressed in
+  double widest_mm = 0.0;          ///< and moved along itself
 };
 
 /// @throws Error with file and line
@@ -66,7 +66,7 @@ struct DrawnTouch {
   int unit = 0;
   int object = 0;          ///< number in the job's list
   std::int64_t piece = 0;  ///< of that object
-  DrawnSplit split = DrawnSplit::train;
+  Split split = Split::train;
   std::uint64_t seed = 0;  ///< of the imager's noise
   Eigen::Vector2d place_mm = Eigen::Vector2d::Zero();
   double turn_deg = 0.0, tilt_deg = 0.0, tilt_axis_deg = 0.0;

@@ -4,34 +4,11 @@
 #include <cctype>
 #include <set>
 
-#include "core/nearest_name.h"
-
 namespace touchstone::datasets {
 bool is_folder_name(const std::string& name) {
   return !name.empty() && name.size() <= 100 && std::all_of(name.begin(), name.end(), [](unsigned char letter) {
     return (std::isalnum(letter) != 0 && letter < 128) || letter == '-' || letter == '_';
   });
-}
-
-EnumNames<Split> enum_names(Split) {
-  return {{"train", Split::train}, {"verify", Split::verify}, {"test", Split::test}};
-}
-
-std::string name_of(Split split) {
-  for (const auto& [name, value] : enum_names(Split{})) {
-    if (value == split) return name;
-  }
-  TS_ASSERT(false);
-  return {};
-}
-
-Split split_named(const std::string& name) {
-  std::vector<std::string> known;
-  for (const auto& [known_name, value] : enum_names(Split{})) {
-    if (known_name == name) return value;
-    known.push_back(known_name);
-  }
-  fail("split '{}' is not known{}; allowed is one of: {}", name, did_you_mean(name, known), fmt::join(known, ", "));
 }
 
 void fields(YamlReader& in, JobScene& scene) {
@@ -55,6 +32,7 @@ void fields(YamlReader& in, Job& job) {
   job.where = in.where();
   in.required("name", job.name);
   in.required("seed", job.seed);
+  in.optional("licence", job.licence);
   in.required("scenes", job.scenes);
   in.optional("outputs", job.outputs);
   if (job.scenes.empty()) fail_at(in.where("scenes"), "scenes: has no scene; at least one is needed");

@@ -9,18 +9,10 @@
 #include <vector>
 
 #include "core/yaml_reader.h"
+#include "datasets/jobs/split.h"
 #include "sim/scene/scene.h"
 
 namespace touchstone::datasets {
-
-/// What a scene's samples are for. `train` teaches an estimator, `verify` is the verification of the sensor's own text,
-/// `test` is held out.
-enum class Split : std::uint8_t { train = 0, verify = 1, test = 2 };
-EnumNames<Split> enum_names(Split);
-/// "train", "verify" or "test".
-std::string name_of(Split split);
-/// @throws Error that lists the known names
-Split split_named(const std::string& name);
 
 /// One scene of a job: a scene file, and what differs from it here.
 struct JobScene {
@@ -34,6 +26,7 @@ struct JobScene {
 /// A job file of scenes, as read and checked.
 struct Job {
   std::string name;
+  std::string licence;  ///< of the data set: an SPDX name or any text; empty: none stated
   std::uint64_t seed = 0;
   std::vector<JobScene> scenes;
   std::optional<sim::OutputSpec> outputs;  ///< instead of every scene's own outputs, as a whole

@@ -4,13 +4,30 @@
 #include <cmath>
 #include <numeric>
 
+#include "core/nearest_name.h"
 #include "core/random.h"
 
 namespace touchstone::datasets {
 
-std::string name_of(DrawnSplit split) {
-  constexpr std::array<const char*, kDrawnSplits> kNames = {"train", "validate", "test"};
-  return kNames.at(static_cast<std::size_t>(split));
+EnumNames<Split> enum_names(Split) {
+  return {{"train", Split::train}, {"validate", Split::validate}, {"test", Split::test}};
+}
+
+std::string name_of(Split split) {
+  for (const auto& [name, value] : enum_names(Split{})) {
+    if (value == split) return name;
+  }
+  TS_ASSERT(false);
+  return {};
+}
+
+Split split_named(const std::string& name) {
+  std::vector<std::string> known;
+  for (const auto& [known_name, value] : enum_names(Split{})) {
+    if (known_name == name) return value;
+    known.push_back(known_name);
+  }
+  fail("split '{}' is not known{}; allowed is one of: {}", name, did_you_mean(name, known), fmt::join(known, ", "));
 }
 
 EnumNames<SplitBy> enum_names(SplitBy) {
@@ -21,9 +38,8 @@ void fields(YamlReader& in, SplitSpec& spec) {
   constexpr double kRounding = 1e-9;
   spec.where = in.where();
   spec.share = {};
-  for (int k = 0; k < kDrawnSplits; ++k) {
-    in.optional(name_of(static_cast<DrawnSplit>(k)), spec.share[static_cast<std::size_t>(k)],
-                Allowed::within(0.0, 1.0));
+  for (int k = 0; k < kSplits; ++k) {
+    in.optional(name_of(static_cast<Split>(k)), spec.share[static_cast<std::size_t>(k)], Allowed::within(0.0, 1.0));
   }
   in.optional("by", spec.by);
   const double sum = std::accumulate(spec.share.begin(), spec.share.end(), 0.0);
@@ -32,7 +48,7 @@ void fields(YamlReader& in, SplitSpec& spec) {
   }
 }
 
-std::vector<DrawnSplit> splits_of_units(const SplitSpec& spec, std::uint64_t seed, int units) {
+std::vector<Split> splits_of_units(const SplitSpec& spec, std::uint64_t seed, int units) {
   const auto wanted =
       static_cast<int>(std::count_if(spec.share.begin(), spec.share.end(), [](double s) { return s > 0; }));
   if (units < wanted) {
@@ -47,15 +63,15 @@ std::vector<DrawnSplit> splits_of_units(const SplitSpec& spec, std::uint64_t see
               order[std::min(k - 1, static_cast<std::size_t>(random.uniform() * static_cast<double>(k)))]);
   }
   // How many units each gets: rounded down, at least one; what is left goes where most was cut off.
-  std::array<int, kDrawnSplits> count{};
-  for (std::size_t s = 0; s < kDrawnSplits; ++s) {
+  std::array<int, kSplits> count{};
+  for (std::size_t s = 0; s < kSplits; ++s) {
     if (spec.share[s] > 0) count[s] = std::max(1, static_cast<int>(spec.share[s] * units + 1e-9));
   }
   for (int left = units - std::accumulate(count.begin(), count.end(), 0); left != 0; left += left > 0 ? -1 : 1) {
     const double sign = left > 0 ? 1.0 : -1.0;
     std::size_t best = 0;
     double most = -INFINITY;
-    for (std::size_t s = 0; s < kDrawnSplits; ++s) {
+    for (std::size_t s = 0; s < kSplits; ++s) {
       if (!(spec.share[s] > 0) || (left < 0 && count[s] == 1)) continue;
       const double missing = sign * (spec.share[s] * units - count[s]);
       if (missing > most) {
@@ -65,26 +81,26 @@ std::vector<DrawnSplit> splits_of_units(const SplitSpec& spec, std::uint64_t see
     }
     count[best] += left > 0 ? 1 : -1;
   }
-  std::vector<DrawnSplit> splits(static_cast<std::size_t>(units));
+  std::vector<Split> splits(static_cast<std::size_t>(units));
   std::size_t next = 0;
-  for (std::size_t s = 0; s < kDrawnSplits; ++s) {
-    for (int k = 0; k < count[s]; ++k) splits[static_cast<std::size_t>(order[next++])] = static_cast<DrawnSplit>(s);
+  for (std::size_t s = 0; s < kSplits; ++s) {
+    for (int k = 0; k < count[s]; ++k) splits[static_cast<std::size_t>(order[next++])] = static_cast<Split>(s);
   }
   TS_ASSERT(next == order.size());
   return splits;
 }
 
-DrawnSplit split_of_sample(const SplitSpec& spec, std::uint64_t seed, std::int64_t sample) {
+Split split_of_sample(const SplitSpec& spec, std::uint64_t seed, std::int64_t sample) {
   const double drawn = RandomStream(seed, static_cast<std::uint64_t>(sample) + 1, Purpose::kSplit).uniform();
   double below = 0.0;
   std::size_t last = 0;
-  for (std::size_t s = 0; s < kDrawnSplits; ++s) {
+  for (std::size_t s = 0; s < kSplits; ++s) {
     if (!(spec.share[s] > 0)) continue;
     last = s;
     below += spec.share[s];
-    if (drawn < below) return static_cast<DrawnSplit>(s);
+    if (drawn < below) return static_cast<Split>(s);
   }
-  return static_cast<DrawnSplit>(last);
+  return static_cast<Split>(last);
 }
 
 }  // namespace touchstone::datasets

@@ -100,10 +100,9 @@ std::string data_card(const PreparedDraw& prepared, const DrawnFigures& figures)
   card += fmt::format("- files: {} in `blocks/`, of up to {} samples; `dataset.json` has their checksums\n",
                       prepared.blocks.size(), job.samples_per_file);
   card += "- splits (by " + std::string(job.splits.by == SplitBy::unit ? "unit" : "sample") + "):";
-  for (int k = 0; k < kDrawnSplits; ++k) {
+  for (int k = 0; k < kSplits; ++k) {
     const std::int64_t count = figures.splits[static_cast<std::size_t>(k)];
-    card +=
-        fmt::format("{} {} {} ({:.1f} %)", k > 0 ? "," : "", name_of(static_cast<DrawnSplit>(k)), count, share(count));
+    card += fmt::format("{} {} {} ({:.1f} %)", k > 0 ? "," : "", name_of(static_cast<Split>(k)), count, share(count));
   }
   card += "\n\n## What is drawn\n";
   card += fmt::format("- units: {}{}\n{}", draw.units.count, draw.units.vary.empty() ? ", all alike" : "",

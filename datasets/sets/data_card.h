@@ -33,7 +33,7 @@ struct DrawnFigures {
   void add(const BlockColumns& block);
 
   std::vector<Histogram> histograms;
-  std::array<std::int64_t, kDrawnSplits> splits{};
+  std::array<std::int64_t, kSplits> splits{};
   std::vector<std::int64_t> objects;  ///< samples of each
   std::int64_t drawn_again = 0, under_resolved = 0, strained = 0, untouched = 0;
   double worst_force_error = 0.0;             ///< relative, of forces above kSmallForce_N

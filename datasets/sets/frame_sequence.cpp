@@ -20,7 +20,7 @@ constexpr const char* kForceColumns = "file,t_us,force_x_N,force_y_N,force_z_N";
 }  // namespace
 
 std::vector<FrameSequence> frames_of_data_set(const fs::path& folder, std::optional<Split> split) {
-  const Manifest manifest = read_manifest(folder);
+  const Manifest manifest = read_manifest(folder, SetSource::scenes);
   const TruthTable truth = read_truth_table(folder / "truth.h5");
   if (truth.samples() != manifest.samples) {
     fail("{}: truth.h5 has {} samples, dataset.json {}", folder.string(), truth.samples(), manifest.samples);

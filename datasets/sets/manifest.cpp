@@ -2,129 +2,90 @@
 
 #include <tbb/parallel_for.h>
 
-#include <cmath>
-#include <nlohmann/json.hpp>
-
 #include "core/error.h"
 #include "core/sha256.h"
 #include "core/whole_file.h"
+#include "datasets/sets/manifest_parts.h"
 
 namespace touchstone::datasets {
 namespace {
 
+namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
 constexpr const char* kFormat = "touchstone-dataset";
-constexpr int kFormatVersion = 1;
+constexpr int kFormatVersion = 2;  // 1: before sets of scenes and drawn sets had one form
 
-ordered_json plan_json(const sim::Plan& plan) {
-  ordered_json table = ordered_json::array();
-  for (const sim::Effect& effect : plan.effects) {
-    table.push_back({{"effect", effect.name}, {"on", effect.on}, {"why", effect.why}, {"cost", effect.cost}});
-  }
-  return table;
+const char* name_of(SetSource source) {
+  return source == SetSource::scenes ? "scenes" : "draw";
 }
 
-ordered_json scene_json(const PreparedScene& scene, const std::filesystem::path& folder) {
-  const sim::SceneSpec& spec = scene.spec;
-  ordered_json json = {{"name", scene.entry.name},
-                       {"file", scene.entry.scene.lexically_relative(folder).generic_string()},
-                       {"split", name_of(scene.entry.split)},
-                       {"seed", spec.seed},
-                       {"first_sample", scene.first_sample},
-                       {"samples", scene.samples},
-                       {"device", spec.device.name},
-                       {"object", spec.object.name},
-                       {"start_mm", {spec.motion.start_mm.x(), spec.motion.start_mm.y(), spec.motion.start_mm.z()}},
-                       {"frame_rate_Hz", spec.motion.frame_rate_Hz},
-                       {"outputs",
-                        {{"frames", scene.plan.camera && spec.outputs.frames},
-                         {"ideal", scene.plan.camera && spec.outputs.ideal},
-                         {"radiance", scene.plan.camera && spec.outputs.radiance},
-                         {"height", spec.outputs.height}}}};
-  for (const auto& [name, wanted] : {std::pair{"depth", spec.outputs.depth}, std::pair{"normals", spec.outputs.normals},
-                                     std::pair{"ids", spec.outputs.ids}, std::pair{"contact", spec.outputs.contact},
-                                     std::pair{"flow", spec.outputs.flow}, std::pair{"error", spec.outputs.error},
-                                     std::pair{"events", spec.outputs.events}}) {
-    json["outputs"][name] = scene.plan.camera && wanted;
+void read_blocks(const fs::path& file, const ordered_json& json, Manifest& manifest) {
+  std::int64_t next = 0;
+  for (const ordered_json& one : json.at("files")) {
+    if (!one.contains("first_sample")) continue;  // the card
+    ManifestBlock block{one.at("file"), one.at("unit"), one.at("first_sample"), one.at("samples")};
+    if (block.first_sample != next) fail("{}: sample {} is in no file", file.string(), next);
+    next += block.samples;
+    manifest.blocks.push_back(std::move(block));
   }
-  if (scene.plan.camera && spec.device.camera) {
-    json["picture"] = {{"width", spec.device.camera->width}, {"height", spec.device.camera->height}};
-  }
-  if (scene.plan.camera) {
-    const render::Spectrum& centres = scene.plan.bands.centres_nm;
-    json["band_centres_nm"] = std::vector<double>(centres.begin(), centres.end());
-    if (scene.plan.bands.ranges) json["band_edges_nm"] = scene.plan.bands.ranges->edges_nm;
-  }
-  json["plan"] = plan_json(scene.plan);
-  return json;
-}
-
-/// The checksum of all that isn't different in every run.
-std::string content_checksum(ordered_json manifest) {
-  manifest.erase("content_sha256");
-  manifest.erase("timings");
-  return sha256_of(manifest.dump(-1, ' ', false, ordered_json::error_handler_t::replace));
+  if (next != manifest.samples) fail("{}: its files hold {} of {} samples", file.string(), next, manifest.samples);
 }
 
 }  // namespace
+
+ordered_json manifest_json(const ManifestHead& head, const RunIdentity& identity) {
+  ordered_json manifest = {{"format", kFormat},
+                           {"format_version", kFormatVersion},
+                           {"content_sha256", ""},
+                           {"source", name_of(head.source)},
+                           {"program", {{"name", "touchstone"}, {"version", identity.version}}},
+                           {"run", ordered_json::parse(to_json(identity))},
+                           {"name", head.name},
+                           {"licence", head.licence},
+                           {"samples", head.samples},
+                           {"seed", head.seed}};
+  manifest["job"] = {{"file", head.job_file}, {"text", head.job_text}};
+  for (const InputFile& input : *head.inputs) {
+    manifest["inputs"].push_back({{"file", input.name}, {"sha256", input.sha256}});
+  }
+  for (int k = 0; k < kSplits; ++k) {
+    manifest["splits"][name_of(static_cast<Split>(k))] = head.splits[static_cast<std::size_t>(k)];
+  }
+  return manifest;
+}
+
+ordered_json file_json(const WrittenFile& file) {
+  return {{"file", file.name}, {"bytes", file.bytes}, {"sha256", file.sha256}};
+}
+
+std::string content_checksum(ordered_json manifest) {
+  for (const char* beside : {"content_sha256", "run", "timings"}) manifest.erase(beside);
+  return sha256_of(manifest.dump(-1, ' ', false, ordered_json::error_handler_t::replace));
+}
+
+std::string manifest_text(ordered_json manifest) {
+  manifest["content_sha256"] = content_checksum(manifest);
+  return manifest.dump(1, ' ', false, ordered_json::error_handler_t::replace) + "\n";
+}
 
 std::string picture_name(const std::string& folder, const std::string& scene, std::int64_t frame,
                          const std::string& ending) {
   return fmt::format("{}/{}/{:06}.{}", folder, scene, frame, ending);
 }
 
-std::string manifest_text(const PreparedJob& job, const RunIdentity& identity, const fem::ComplianceReport& gel,
-                          const std::vector<ArrayShape>& arrays, const std::vector<WrittenFile>& files,
-                          const CountedWork& work, const RunTimings* timings) {
-  ordered_json manifest = {{"format", kFormat},
-                           {"format_version", kFormatVersion},
-                           {"content_sha256", ""},
-                           {"program", {{"name", "touchstone"}, {"version", identity.version}}},
-                           {"processor", identity.processor},
-                           {"samples", job.samples}};
-  manifest["job"] = {{"name", job.job.name},
-                     {"seed", job.job.seed},
-                     {"file", job.file.filename().string()},
-                     {"sha256", identity.job_sha256},
-                     {"inputs_sha256", identity.inputs_sha256},
-                     {"text", job.text}};
-  for (const InputFile& input : job.inputs) {
-    manifest["inputs"].push_back({{"file", input.name}, {"sha256", input.sha256}});
+Manifest read_manifest(const fs::path& folder) {
+  const fs::path file = folder / "dataset.json";
+  if (!fs::is_regular_file(file)) {
+    fail("{}: isn't a data set; it has no dataset.json, which is written last (touchstone generate, merge)",
+         folder.string());
   }
-  manifest["gel_mesh"] = {{"tetrahedra", gel.tetrahedra},
-                          {"unknowns", gel.unknowns},
-                          {"smallest_dihedral_deg", std::round(100.0 * gel.smallest_dihedral_deg) / 100.0}};
-  for (std::size_t i = 0; i < job.scenes.size(); ++i) {
-    ordered_json scene = scene_json(job.scenes[i], job.file.parent_path());
-    for (const auto& [how, samples] : work.light[i]) scene["light"].push_back({{"how", how}, {"samples", samples}});
-    manifest["scenes"].push_back(std::move(scene));
-  }
-  for (const ArrayShape& array : arrays) {
-    manifest["arrays"].push_back(
-        {{"path", array.path}, {"unit", array.unit}, {"axes", array.axes}, {"shape", array.shape}});
-  }
-  manifest["work"] = {
-      {"pictures", work.pictures}, {"pixels_traced", work.pixels_traced}, {"paths_traced", work.paths_traced}};
-  for (const WrittenFile& file : files) {
-    manifest["files"].push_back({{"file", file.name}, {"bytes", file.bytes}, {"sha256", file.sha256}});
-  }
-  manifest["content_sha256"] = content_checksum(manifest);
-  if (timings != nullptr) {
-    ordered_json stages = ordered_json::object();
-    for (const auto& [stage, seconds] : timings->stages) stages[stage] = seconds;
-    manifest["timings"] = {
-        {"wall_s", stages}, {"threads", timings->threads}, {"samples_rendered", timings->samples_rendered}};
-  }
-  return manifest.dump(1, ' ', false, ordered_json::error_handler_t::replace) + "\n";
-}
-
-Manifest read_manifest(const std::filesystem::path& folder) {
-  const std::filesystem::path file = folder / "dataset.json";
-  if (!std::filesystem::is_regular_file(file)) fail("{}: isn't a data set; it has no dataset.json", folder.string());
   try {
     const ordered_json json = ordered_json::parse(read_whole_file(file));
-    if (json.at("format") != kFormat) fail("{}: isn't the manifest of a data set", file.string());
+    const std::string format = json.at("format");
+    if (format != kFormat) {
+      fail("{}: format: '{}' isn't a data set's; allowed is '{}'", file.string(), format, kFormat);
+    }
     if (json.at("format_version") != kFormatVersion) {
       fail("{}: has format version {}; this program reads {}", file.string(), json.at("format_version").dump(),
            kFormatVersion);
@@ -134,14 +95,23 @@ Manifest read_manifest(const std::filesystem::path& folder) {
     if (manifest.content_sha256 != content_checksum(json)) {
       fail("{}: was changed; its content doesn't meet its content_sha256", file.string());
     }
-    manifest.job_name = json.at("job").at("name");
-    manifest.job_sha256 = json.at("job").at("sha256");
-    manifest.inputs_sha256 = json.at("job").at("inputs_sha256");
-    manifest.version = json.at("program").at("version");
+    const std::string source = json.at("source");
+    if (source != "scenes" && source != "draw") {
+      fail("{}: source: '{}' is not known; allowed are scenes and draw", file.string(), source);
+    }
+    manifest.source = source == "scenes" ? SetSource::scenes : SetSource::draw;
+    manifest.name = json.at("name");
+    manifest.licence = json.at("licence");
+    manifest.run = run_identity_from_json(json.at("run").dump(), file.string());
     manifest.samples = json.at("samples");
-    for (const ordered_json& scene : json.at("scenes")) {
-      manifest.scenes.push_back({scene.at("name"), split_named(scene.at("split")), scene.at("first_sample"),
-                                 scene.at("samples"), scene.at("outputs").at("frames")});
+    if (manifest.source == SetSource::scenes) {
+      for (const ordered_json& scene : json.at("scenes")) {
+        manifest.scenes.push_back({scene.at("name"), split_named(scene.at("split")), scene.at("first_sample"),
+                                   scene.at("samples"), scene.at("outputs").at("frames")});
+      }
+    } else {
+      manifest.units = static_cast<int>(json.at("units").size());
+      read_blocks(file, json, manifest);
     }
     for (const ordered_json& entry : json.at("files")) {
       manifest.files.push_back({entry.at("file"), entry.at("sha256"), entry.at("bytes")});
@@ -152,17 +122,30 @@ Manifest read_manifest(const std::filesystem::path& folder) {
   }
 }
 
-void verify_files(const std::filesystem::path& folder, const Manifest& manifest) {
+Manifest read_manifest(const fs::path& folder, SetSource wanted) {
+  Manifest manifest = read_manifest(folder);
+  if (manifest.source != wanted) {
+    fail("{}: source: is '{}'; allowed is '{}': {}", (folder / "dataset.json").string(), name_of(manifest.source),
+         name_of(wanted),
+         wanted == SetSource::scenes ? "frames in the order of time are needed" : "presses that were drawn are needed");
+  }
+  return manifest;
+}
+
+void verify_files(const fs::path& folder, const Manifest& manifest) {
   std::vector<char> bad(manifest.files.size(), 0);
   tbb::parallel_for(std::size_t{0}, manifest.files.size(), [&](std::size_t i) {
-    const std::filesystem::path file = folder / manifest.files[i].name;
-    bad[i] = !std::filesystem::is_regular_file(file) || sha256_of_file(file) != manifest.files[i].sha256;
+    const fs::path file = folder / manifest.files[i].name;
+    bad[i] = !fs::is_regular_file(file) || sha256_of_file(file) != manifest.files[i].sha256;
   });
   for (std::size_t i = 0; i < bad.size(); ++i) {
     if (bad[i] == 0) continue;
-    const std::filesystem::path file = folder / manifest.files[i].name;
-    if (!std::filesystem::exists(file)) fail("{}: is missing; dataset.json lists it", file.string());
-    fail("{}: was changed; it doesn't meet its checksum in dataset.json", file.string());
+    const fs::path file = folder / manifest.files[i].name;
+    if (!fs::exists(file)) fail("{}: is missing; dataset.json lists it", file.string());
+    fail(
+        "{}: was changed; it doesn't meet its checksum in dataset.json; remove dataset.json and generate again to "
+        "make it anew",
+        file.string());
   }
 }
 

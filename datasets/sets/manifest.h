@@ -1,50 +1,19 @@
 #pragma once
-// dataset.json: what a data set holds and how it came to be. See docs/file-formats.md.
+// dataset.json: what a data set holds and how it came to be; of both sources of samples. See docs/file-formats.md.
 
 #include <cstdint>
 #include <filesystem>
-#include <map>
 #include <string>
-#include <utility>
 #include <vector>
 
-#include "datasets/jobs/prepared_job.h"
+#include "datasets/jobs/split.h"
 #include "datasets/sets/run_identity.h"
 #include "datasets/sets/run_journal.h"
-#include "fem/elements/compliance.h"
 
 namespace touchstone::datasets {
 
-/// Work that was counted: the same in every run of a job.
-struct CountedWork {
-  std::int64_t pictures = 0;
-  std::int64_t pixels_traced = 0;
-  std::int64_t paths_traced = 0;
-  /// By scene: how its pictures are lit (sim::Capture::light), and how many so; where the plan has direct light.
-  std::vector<std::map<std::string, std::int64_t>> light;
-};
-
-/// Wall times and what they are for: different in every run.
-struct RunTimings {
-  std::vector<std::pair<std::string, double>> stages;  ///< name, seconds; in the order of the work
-  int threads = 0;
-  std::int64_t samples_rendered = 0;  ///< by the run that finished the set; fewer than all if it went on from another
-};
-
-/// One array of the truth file.
-struct ArrayShape {
-  std::string path;
-  std::string unit;
-  std::string axes;  ///< "samples x 6"
-  std::vector<std::int64_t> shape;
-};
-
-/// The manifest's text. `timings` may be null: then nothing in it differs between runs. The member `content_sha256` is
-/// the SHA-256 of the manifest, as JSON without white space, without `content_sha256` and `timings`; because the
-/// manifest holds the checksum of every file, it stands for the whole data set.
-std::string manifest_text(const PreparedJob& job, const RunIdentity& identity, const fem::ComplianceReport& gel,
-                          const std::vector<ArrayShape>& arrays, const std::vector<WrittenFile>& files,
-                          const CountedWork& work, const RunTimings* timings);
+/// Where a set's samples come from: the frames of scenes, or presses that are drawn at random.
+enum class SetSource : std::uint8_t { scenes, draw };
 
 /// A scene as its data set describes it.
 struct ManifestScene {
@@ -52,29 +21,41 @@ struct ManifestScene {
   Split split = Split::train;
   std::int64_t first_sample = 0;
   std::int64_t samples = 0;
-  bool has_frames = false;  ///< pictures lie in frames/NAME/
+  bool has_frames = false;  ///< pictures lie in frames/<name>/
+};
+
+/// One of a drawn set's blocks: samples first_sample to first_sample + samples - 1, all of one unit.
+struct ManifestBlock {
+  std::string name;  ///< blocks/000012.h5
+  int unit = 0;
+  std::int64_t first_sample = 0, samples = 0;
 };
 
 /// What programs read back of a manifest.
 struct Manifest {
-  std::string job_name;
-  std::string job_sha256;
-  std::string inputs_sha256;
-  std::string version;
+  SetSource source = SetSource::scenes;
+  std::string name;     ///< the job's
+  std::string licence;  ///< empty: none stated
   std::string content_sha256;
+  RunIdentity run;
   std::int64_t samples = 0;
-  std::vector<ManifestScene> scenes;
-  std::vector<WrittenFile> files;
+  std::vector<ManifestScene> scenes;  ///< of a set of scenes
+  int units = 0;                      ///< of a drawn set
+  std::vector<ManifestBlock> blocks;  ///< likewise: by first_sample, without gaps
+  std::vector<WrittenFile> files;     ///< all of the set's files, but dataset.json
 };
 
 /// @throws Error if the folder has no dataset.json, or one that isn't ours, is broken, or whose content_sha256 doesn't
 ///   meet its content
 Manifest read_manifest(const std::filesystem::path& folder);
+/// Likewise, and if the set is of the other source.
+Manifest read_manifest(const std::filesystem::path& folder, SetSource wanted);
 
-/// Compares every file of the manifest with its checksum. @throws Error that names the first that differs
+/// Compares every file of the manifest with its checksum, by many threads. @throws Error that names the first that
+/// differs
 void verify_files(const std::filesystem::path& folder, const Manifest& manifest);
 
-/// frames/SCENE/000012.png and the like: `folder` is "frames", "ideal" or "radiance".
+/// frames/<scene>/000012.png and the like: `folder` is "frames", "ideal" or "radiance".
 std::string picture_name(const std::string& folder, const std::string& scene, std::int64_t frame,
                          const std::string& ending);
 

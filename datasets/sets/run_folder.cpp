@@ -61,9 +61,9 @@ FolderState state_of_folder(const fs::path& out, const RunIdentity& identity) {
   if (fs::exists(out / "dataset.json")) {
     const Manifest manifest = read_manifest(out);
     RunIdentity before = identity;
-    before.job_sha256 = manifest.job_sha256;
-    before.inputs_sha256 = manifest.inputs_sha256;
-    before.version = manifest.version;
+    before.job_sha256 = manifest.run.job_sha256;
+    before.inputs_sha256 = manifest.run.inputs_sha256;
+    before.version = manifest.run.version;
     const std::string differs = difference(before, identity);
     if (!differs.empty()) {
       fail("{}: holds a finished data set, and since it was made {} has changed; give another folder", out.string(),
@@ -81,6 +81,28 @@ FolderState state_of_folder(const fs::path& out, const RunIdentity& identity) {
          entry.path().filename().string());
   }
   return FolderState::absent;
+}
+
+void begin_shared(const fs::path& out, const RunIdentity& identity) {
+  std::error_code error;
+  fs::create_directories(out / kUnfinished, error);
+  if (error) fail("{}: can't be made ({})", (out / kUnfinished).string(), error.message());
+  // Before all else, as it says whose the folder is.
+  write_whole_file(out / kUnfinished / "run.json", to_json(identity));
+  state_of_folder(out, identity);  // another job's run may have begun here at the same time: the last record counts
+}
+
+void finish_folder(const fs::path& out) {
+  try {
+    std::vector<fs::path> temporary;
+    for (const auto& entry : fs::recursive_directory_iterator(out)) {
+      if (entry.is_regular_file() && is_temporary_file(entry.path())) temporary.push_back(entry.path());
+    }
+    for (const fs::path& file : temporary) fs::remove(file);
+    fs::remove_all(out / kUnfinished);
+  } catch (const fs::filesystem_error& error) {
+    fail("{}: can't be cleared up ({})", out.string(), error.code().message());
+  }
 }
 
 RunFolder::RunFolder(const fs::path& out, const RunIdentity& identity) : out_(out) {
@@ -133,22 +155,9 @@ void RunFolder::keep() {
   keep_ = true;
 }
 
-void RunFolder::remove_temporary_files() const {
-  std::vector<fs::path> temporary;
-  for (const auto& entry : fs::recursive_directory_iterator(out_)) {
-    if (entry.is_regular_file() && is_temporary_file(entry.path())) temporary.push_back(entry.path());
-  }
-  for (const fs::path& file : temporary) fs::remove(file);
-}
-
 void RunFolder::finish() {
   keep_ = true;
-  try {
-    remove_temporary_files();
-    fs::remove_all(out_ / kUnfinished);
-  } catch (const fs::filesystem_error& error) {
-    fail("{}: can't be cleared up ({})", out_.string(), error.code().message());
-  }
+  finish_folder(out_);
 }
 
 }  // namespace touchstone::datasets

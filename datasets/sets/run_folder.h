@@ -28,8 +28,15 @@ enum class FolderState {
 /// Looks without touching. @throws Error if what is there is something else: another job's set, or foreign files
 FolderState state_of_folder(const std::filesystem::path& out, const RunIdentity& identity);
 
-/// The right to write into the folder, held until the run ends. If it ends before anything worth keeping was recorded,
-/// all that this object made is removed again.
+/// Records whose the folder is that many runs will write into, and makes it if needed.
+/// @throws Error as state_of_folder, or if it can't be written
+void begin_shared(const std::filesystem::path& out, const RunIdentity& identity);
+
+/// Removes temporary files that killed runs left, and the records: the set is whole. @throws Error if it can't
+void finish_folder(const std::filesystem::path& out);
+
+/// The right to write into the folder alone, held until the run ends. If it ends before anything worth keeping was
+/// recorded, all that this object made is removed again.
 class RunFolder {
  public:
   /// Makes the folder if needed, takes its lock, and records whose it is.
@@ -45,12 +52,10 @@ class RunFolder {
   std::filesystem::path journal() const;
   /// From now on what is in the folder is worth keeping.
   void keep();
-  /// Removes temporary files that killed runs left, and the records: the set is whole.
+  /// finish_folder().
   void finish();
 
  private:
-  void remove_temporary_files() const;
-
   std::filesystem::path out_;
   std::filesystem::path remove_if_useless_;  // the topmost folder that was made, or empty
   bool keep_ = false;

@@ -93,7 +93,7 @@ struct TruthFileWriter::Parts {
   void make_columns() {
     column<std::int64_t>({"/t_us", "us", "samples", "", "Time since the scene's first frame."}, {});
     column<std::int32_t>({"/scene", "1", "samples", "", "Number of the sample's scene, from 0."}, {});
-    column<std::uint8_t>({"/split", "1", "samples", "", "0 train, 1 verify, 2 test."}, {});
+    column<std::uint8_t>({"/split", "1", "samples", "", "0 train, 1 validate, 2 test."}, {});
     column<std::int32_t>({"/frame", "1", "samples", "", "Number of the frame within its scene, from 0."}, {});
     column<double>({"/pose", "mm (last column)", "samples x 3 x 4", "gel",
                     "gel_from_object: rotation matrix, then the position of the object's origin."},

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "datasets/jobs/job.h"
-#include "datasets/sets/manifest.h"
+#include "datasets/jobs/split.h"
 #include "fem/elements/compliance.h"
 #include "sim/press/truth.h"
 
@@ -23,6 +23,14 @@ struct TruthHeader {
   std::int64_t objects = 1;                ///< K, in every scene
   std::vector<std::string> scenes;         ///< names, in the job's order
   std::vector<Eigen::Vector3d> bead_rest;  ///< m centres without load, gel frame, mm
+};
+
+/// One array of the truth file.
+struct ArrayShape {
+  std::string path;
+  std::string unit;
+  std::string axes;  ///< "samples x 6"
+  std::vector<std::int64_t> shape;
 };
 
 /// Writes a truth file sample by sample, in order. The same samples give the same bytes.

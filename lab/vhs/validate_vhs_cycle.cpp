@@ -5,7 +5,7 @@
 #include <ctime>
 
 #include "core/seconds_since.h"
-#include "datasets/sets/dataset.h"
+#include "datasets/sets/generate.h"
 #include "datasets/sets/sample_source.h"
 #include "lab/validation/row_list.h"
 #include "lab/vhs/vhs_experiment.h"
@@ -22,15 +22,14 @@ std::vector<ValidationRow> validate_vhs_cycle(const ValidateOptions& options) {
   if (options.quick) return {};
   RowList rows("vhs.cycle.", options, RowList::Since::begin);
   const std::filesystem::path data = options.scratch / "vhs-load-cycle";
-  datasets::GenerateOptions how;
-  how.source = datasets::simulator(options.cache);
+  datasets::GenerateOptions how = datasets::simulated(options.cache);
   const auto begun = std::chrono::steady_clock::now();
   const std::clock_t processor_begun = std::clock();
   const datasets::GenerateReport report =
       datasets::generate(options.scenes / "jobs" / "vhs-load-cycle.yaml", data, how, options.progress);
   const double minutes = seconds_since(begun) / 60.0;
   const double processor_s = static_cast<double>(std::clock() - processor_begun) / CLOCKS_PER_SEC;
-  if (report.rendered == report.samples) {  // not the rest of a run that was broken off
+  if (report.made == report.samples) {  // not the rest of a run that was broken off
     rows.add_bounded(
         "processor_s_a_frame",
         fmt::format("processor time of each of {} frames with their mechanics, in all {:.0f} minutes here; "
@@ -48,7 +47,7 @@ std::vector<ValidationRow> validate_vhs_cycle(const ValidateOptions& options) {
     return sequences;
   };
   const sensors::ForceSamples samples = training_samples(tracked(datasets::Split::train), tracker.grid);
-  const std::vector<TrackedSequence> verification = tracked(datasets::Split::verify),
+  const std::vector<TrackedSequence> verification = tracked(datasets::Split::validate),
                                      elsewhere = tracked(datasets::Split::test);
   const std::string axes = "xyz";
   const auto add = [&](const std::string& name, const std::string& how_trained,

@@ -66,7 +66,7 @@ DesignFigures try_design(const Design& design, const ValidateOptions& options) {
     const Verification found = verify_forces(estimate_forces(of(split), model, RestChoice::model));
     return std::array{found.errors[0].mean_absolute, found.errors[1].mean_absolute, found.errors[2].mean_absolute};
   };
-  figures.verified = errors(datasets::Split::verify);
+  figures.verified = errors(datasets::Split::validate);
   figures.elsewhere = errors(datasets::Split::test);
   RandomStream random(kSeed, 0, Purpose::kCentroidNoise);
   constexpr int kDraws = 1000;

@@ -11,7 +11,7 @@
 #include "core/error.h"
 #include "core/seconds_since.h"
 #include "core/whole_file.h"
-#include "datasets/sets/dataset.h"
+#include "datasets/sets/generate.h"
 #include "datasets/sets/sample_source.h"
 #include "lab/validation/validation.h"
 #include "lab/vhs/vhs_experiment.h"
@@ -64,7 +64,7 @@ Trial evaluate(const std::filesystem::path& data, const Progress& progress) {
   };
   const sensors::ForceSamples training = training_samples(tracked(datasets::Split::train), tracker.grid);
   trial.relations = force_relations(training);
-  const std::vector<TrackedSequence> verification = tracked(datasets::Split::verify);
+  const std::vector<TrackedSequence> verification = tracked(datasets::Split::validate);
   const auto errors = [&](const std::vector<TrackedSequence>& sequences, const sensors::StiffnessForceModel& model) {
     const Verification all = verify_forces(estimate_forces(sequences, model, RestChoice::model));
     return std::pair(all,
@@ -100,8 +100,7 @@ std::vector<ValidationRow> validate_vhs_force(const ValidateOptions& options) {
   const std::uint64_t first_seed = datasets::read_job(job).seed;
   std::vector<Trial> trials;
   std::filesystem::path data;
-  datasets::GenerateOptions how;
-  how.source = datasets::simulator(options.cache);
+  datasets::GenerateOptions how = datasets::simulated(options.cache);
   for (int i = 0; i < (options.quick ? 1 : kSeeds); ++i) {
     const std::uint64_t seed = first_seed + static_cast<std::uint64_t>(i);
     data = options.scratch / fmt::format("vhs-{}", seed);

@@ -19,8 +19,8 @@
 #include "core/random.h"
 #include "core/seconds_since.h"
 #include "core/whole_file.h"
-#include "datasets/sets/dataset.h"
 #include "datasets/sets/frame_sequence.h"
+#include "datasets/sets/generate.h"
 #include "datasets/sets/sample_source.h"
 #include "lab/validation/row_list.h"
 #include "sensors/beads/bead_overlay.h"
@@ -53,15 +53,14 @@ Clip rendered_clip(const ValidateOptions& options) {
   const std::filesystem::path job = options.scratch / "vhs-speed.yaml";
   const std::filesystem::path scene = std::filesystem::absolute(options.scenes / "vhs" / "verification.yaml");
   write_whole_file(job, fmt::format("name: vhs-speed\nseed: 1\nscenes:\n  - {{name: verification, scene: '{}', split: "
-                                    "verify}}\n",
+                                    "validate}}\n",
                                     scene.string()));
-  datasets::GenerateOptions how;
-  how.source = datasets::simulator(options.cache);
+  datasets::GenerateOptions how = datasets::simulated(options.cache);
   const std::filesystem::path data = options.scratch / "vhs-speed";
   datasets::generate(job, data, how, options.progress);
   Clip clip;
   clip.bead_radius_px = 9.0;
-  const std::vector<datasets::FrameSequence> sequences = datasets::frames_of_data_set(data, datasets::Split::verify);
+  const std::vector<datasets::FrameSequence> sequences = datasets::frames_of_data_set(data, datasets::Split::validate);
   for (const datasets::LabelledFrame& frame : sequences.front().frames) {
     cv::Mat image = sim::read_image(frame.file);
     if (image.channels() == 1) cv::cvtColor(image, image, cv::COLOR_GRAY2BGR);

@@ -5,7 +5,7 @@
 #include <complex>
 
 #include "core/units.h"
-#include "datasets/sets/dataset.h"
+#include "datasets/sets/generate.h"
 #include "datasets/sets/sample_source.h"
 #include "lab/mechanics/spectral_line.h"
 #include "lab/validation/row_list.h"
@@ -25,8 +25,7 @@ std::vector<ValidationRow> validate_vhs_vibration(const ValidateOptions& options
   if (options.quick) return {};
   RowList rows("vhs.vibration.", options, RowList::Since::begin);
   const std::filesystem::path data = options.scratch / "vhs-vibration";
-  datasets::GenerateOptions how;
-  how.source = datasets::simulator(options.cache);
+  datasets::GenerateOptions how = datasets::simulated(options.cache);
   datasets::generate(options.scenes / "jobs" / "vhs-vibration.yaml", data, how, options.progress);
   const sensors::BeadTrackerSettings tracker;
   const auto tracked = [&](datasets::Split split) {

@@ -39,7 +39,7 @@ def features(data):
 
 def main(folder):
     made = ts.generate(here / "quick-job.yaml", folder)
-    print(f"{made['samples']} samples, {made['rendered']} of them made now")
+    print(f"{made['samples']} samples, {made['made']} of them made now")
     train = ts.Dataset(folder, "train")
     test = ts.Dataset(folder, "test")
     model = make_pipeline(StandardScaler(), PCA(6, random_state=0), PolynomialFeatures(2),

@@ -5,10 +5,8 @@
 #include "core/error.h"
 #include "core/field_error.h"
 #include "core/hdf5_file.h"
-#include "datasets/jobs/draw.h"
 #include "datasets/jobs/scenes_folder.h"
-#include "datasets/sets/dataset.h"
-#include "datasets/sets/drawn_dataset.h"
+#include "datasets/sets/generate.h"
 #include "python/src/bindings.h"
 #include "sim/files/image_file.h"
 
@@ -47,15 +45,15 @@ class Hdf5Lock {
   py::object lock_;
 };
 
-py::dict dict_of(const datasets::DrawnReport& report) {
+py::dict dict_of(const datasets::GenerateReport& report) {
   py::dict result;
   result["was_finished"] = report.was_finished;
   result["samples"] = report.samples;
-  result["rendered"] = report.made;
+  result["made"] = report.made;
   result["kept"] = report.kept;
   result["damaged_blocks"] = report.damaged_blocks;
   result["drawn_again"] = report.drawn_again;
-  result["warning"] = "";  // there as in the other kind's report
+  result["warning"] = report.warning;
   return result;
 }
 
@@ -63,35 +61,17 @@ py::dict generate(const std::string& job, const std::string& out, int threads, b
                   const std::string& shard, const py::object& progress) {
   if (threads < 0) fail("threads: {} is not allowed; allowed is at least 0 (0: as many as the machine has)", threads);
   const Progress listener = progress_to(progress);
-  const std::filesystem::path kept_in = cache.empty() ? sim::default_cache_folder() : std::filesystem::path(cache);
-  if (datasets::is_draw_job_file(job)) {
-    datasets::DrawnOptions how;
-    how.source = datasets::virtual_sensors(kept_in);
-    how.threads = threads;
-    if (!shard.empty()) how.shard = datasets::shard_of(shard);
-    return dict_of(unlocked([&] { return datasets::generate_drawn(job, out, how, listener); }));
-  }
-  if (!shard.empty()) fail("shard: {} isn't a job that draws; only those have shards", job);
-  const datasets::GenerateReport report = unlocked([&] {
-    datasets::GenerateOptions how;
-    how.source = datasets::simulator(kept_in);
-    how.threads = threads;
-    how.timings = timings;
-    return datasets::generate(job, out, how, listener);
-  });
-  py::dict result;
-  result["was_finished"] = report.was_finished;
-  result["samples"] = report.samples;
-  result["rendered"] = report.rendered;
-  result["kept"] = report.kept;
-  result["warning"] = report.warning;
-  return result;
+  datasets::GenerateOptions how =
+      datasets::simulated(cache.empty() ? sim::default_cache_folder() : std::filesystem::path(cache));
+  how.threads = threads;
+  how.timings = timings;
+  if (!shard.empty()) how.shard = datasets::shard_of(shard);
+  return dict_of(unlocked([&] { return datasets::generate(job, out, how, listener); }));
 }
 
 py::dict merge(const std::string& job, const std::string& out, const py::object& progress) {
-  if (!datasets::is_draw_job_file(job)) fail("{}: isn't a job that draws; only those have shards to merge", job);
   const Progress listener = progress_to(progress);
-  return dict_of(unlocked([&] { return datasets::merge_drawn(job, out, listener); }));
+  return dict_of(unlocked([&] { return datasets::merge(job, out, listener); }));
 }
 
 }  // namespace

@@ -74,8 +74,9 @@ def generate(job, out, *, threads=0, timings=True, cache=None, shard=None, progr
     shard: of a job that draws, "I/N": only the I-th of N parts, I from 1 to N; merge() then puts them together.
     progress: called as progress(stage, done, total), also from other threads; what it raises ends the run.
 
-    Returns a dict: was_finished, samples, rendered, kept, warning (of a damaged cache; empty); of a job that draws
-    also damaged_blocks (files made again) and drawn_again (touches that couldn't be pressed).
+    Returns a dict: was_finished, samples (of the job or the shard), made (by this call), kept (of earlier ones),
+    warning (of a damaged cache; empty), damaged_blocks (files of a drawn set made again) and drawn_again (touches that
+    couldn't be pressed).
     Raises Error for a mistake in the job, a folder with anything else in it, a full disk.
     """
     return _core.generate(_os.fspath(job), _os.fspath(out), threads=threads, timings=timings,

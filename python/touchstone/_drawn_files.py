@@ -3,7 +3,7 @@
 import bisect
 
 from ._errors import Error
-from ._set_files import SetFiles, import_h5py, open_h5, text_of
+from ._set_files import SPLITS, SetFiles, import_h5py, open_h5, text_of
 
 _MOST_OPEN = 64  # blocks that a process keeps open
 _KEPT_ROW_BYTES = 1024  # columns of smaller rows are read whole and kept, of others (pictures) a row
@@ -62,8 +62,6 @@ class _Block:
 
 
 class DrawnFiles(SetFiles):
-    splits = ("train", "validate", "test")
-
     def __init__(self, folder, manifest):
         super().__init__(folder, manifest)
         self.samples = int(manifest["samples"])
@@ -125,7 +123,7 @@ class DrawnFiles(SetFiles):
             chosen = {one["unit"] for one in self.manifest["units"] if one["split"] == split}
             return [block["first_sample"] + k for block in self._blocks if block["unit"] in chosen
                     for k in range(block["samples"])]
-        wanted = self.splits.index(split)
+        wanted = SPLITS.index(split)
         return [block["first_sample"] + k for number, block in enumerate(self._blocks)
                 for k in range(block["samples"]) if self._block(number).row("split", k) == wanted]
 

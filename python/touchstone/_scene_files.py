@@ -8,8 +8,6 @@ _PICTURES = {"frame": "frames", "ideal": "ideal"}  # what samples call them, and
 
 
 class SceneFiles(SetFiles):
-    splits = ("train", "verify", "test")
-
     def __init__(self, folder, manifest):
         super().__init__(folder, manifest)
         self._scenes = manifest["scenes"]

@@ -9,6 +9,9 @@ import re
 from ._errors import Error
 
 
+SPLITS = ("train", "validate", "test")
+
+
 def read_manifest(folder):
     """dataset.json as a dict. Raises Error if there is none, or if it doesn't meet its own content_sha256."""
     path = folder / "dataset.json"
@@ -21,7 +24,8 @@ def read_manifest(folder):
         # As the checksum is over text, numbers must stay as they were written.
         content = json.loads(text, parse_float=lambda number: "\0" + number)
         stated = content.pop("content_sha256", None)
-        content.pop("timings", None)
+        for beside in ("run", "timings"):  # don't belong to what the set holds
+            content.pop(beside, None)
     except (ValueError, AttributeError) as error:
         raise Error(f"{path}: isn't the manifest of a data set ({error!r})", str(path)) from None
     compact = re.sub(r'"\\u0000([^"]*)"', r"\1", json.dumps(content, separators=(",", ":"), ensure_ascii=False))
@@ -58,7 +62,7 @@ def text_of(item, attribute):
 class SetFiles:
     """What Dataset asks of a folder; _scene_files.py and _drawn_files.py are the two kinds.
 
-    A row is a sample's number in the whole set. The kinds have: `splits` (names), `samples`, `scenes` (names),
+    A row is a sample's number in the whole set. The kinds have: `samples`, `scenes` (names),
     rows(split), group(row), array_names(), check_column(name), read(name, row), column(name, rows), constant(name),
     unit(name), meaning(name), background(unit), device_yaml(unit).
     """

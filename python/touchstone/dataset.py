@@ -5,19 +5,25 @@ import pathlib
 from ._drawn_files import DrawnFiles
 from ._errors import Error
 from ._scene_files import SceneFiles
-from ._set_files import read_manifest
+from ._set_files import SPLITS, read_manifest
 
-_KINDS = {"touchstone-dataset": SceneFiles, "touchstone-drawn-dataset": DrawnFiles}
+_FORMAT, _VERSION = "touchstone-dataset", 2
+_SOURCES = {"scenes": SceneFiles, "draw": DrawnFiles}
 
 
 def _open_set(folder):
     path = pathlib.Path(folder) / "dataset.json"
     manifest = read_manifest(path.parent)
-    kind = manifest.get("format")
-    if kind not in _KINDS:
-        raise Error(f"{path}: format: '{kind}' is not known; allowed is one of: {', '.join(_KINDS)}", str(path))
+    if manifest.get("format") != _FORMAT:
+        raise Error(f"{path}: format: '{manifest.get('format')}' isn't a data set's; allowed is '{_FORMAT}'", str(path))
+    if manifest.get("format_version") != _VERSION:
+        raise Error(f"{path}: has format version {manifest.get('format_version')}; this program reads {_VERSION}",
+                    str(path))
+    source = manifest.get("source")
+    if source not in _SOURCES:
+        raise Error(f"{path}: source: '{source}' is not known; allowed is one of: {', '.join(_SOURCES)}", str(path))
     try:
-        return _KINDS[kind](path.parent, manifest)
+        return _SOURCES[source](path.parent, manifest)
     except (ValueError, KeyError, TypeError) as error:
         if isinstance(error, Error):
             raise
@@ -32,7 +38,7 @@ class Dataset:
     scenes and of jobs that draw are read alike; pictures are BGR in both, also where files hold red, green, blue.
 
     folder: of the data set.
-    split: "train", "test", and "verify" (jobs with scenes) or "validate" (jobs that draw); None: all.
+    split: "train", "validate" or "test"; None: all.
     columns: what a sample holds: pictures ("frame"; with scenes "ideal"; drawn "height", "contact", and
       "background", the frame of the sample's unit untouched) and arrays that have a row a sample ("wrench", "pose",
       "error/force_N", "drawn/force_N", ...; array_names() has them all).
@@ -43,8 +49,8 @@ class Dataset:
 
     def __init__(self, folder, split=None, *, columns=("frame", "wrench"), transform=None):
         self._files = _open_set(folder)
-        if split is not None and split not in self._files.splits:
-            raise Error(f"split: '{split}' is not known; allowed is one of: {', '.join(self._files.splits)}")
+        if split is not None and split not in SPLITS:
+            raise Error(f"split: '{split}' is not known; allowed is one of: {', '.join(SPLITS)}")
         self.folder = self._files.folder
         self.split = split
         self.columns = tuple(columns)

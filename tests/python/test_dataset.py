@@ -40,7 +40,8 @@ def folder(tmp_path_factory, job):
     stages = []
     report = ts.generate(job, out, timings=False,
                          progress=lambda stage, done, total: stages.append((stage, done, total)))
-    assert report == {"was_finished": False, "samples": 24, "rendered": 24, "kept": 0, "warning": ""}
+    assert report == {"was_finished": False, "samples": 24, "made": 24, "kept": 0, "warning": "",
+                      "damaged_blocks": 0, "drawn_again": 0}
     assert ("frames", 24, 24) in stages
     return out
 
@@ -54,7 +55,7 @@ def test_a_finished_set_is_verified_not_made_again(folder, job):
 def test_splits_samples_and_columns_agree(folder):
     data = ts.Dataset(folder, columns=("frame", "ideal", "wrench", "pose", "surface_displacement_mm", "error/force_N"))
     train, test = ts.Dataset(folder, "train"), ts.Dataset(folder, "test")
-    assert (len(data), len(train), len(test), len(ts.Dataset(folder, "verify"))) == (24, 16, 8, 0)
+    assert (len(data), len(train), len(test), len(ts.Dataset(folder, "validate"))) == (24, 16, 8, 0)
     with h5py.File(folder / "truth.h5") as file:
         wrench = file["wrench"][()]
         assert np.array_equal(data.array("wrench"), wrench)
@@ -158,7 +159,7 @@ def test_ctrl_c_breaks_it_off_and_the_same_call_goes_on(folder, tmp_path, job):
     with pytest.raises(Stop, match="enough"):
         ts.generate(job, out, timings=False, progress=stop)
     report = ts.generate(job, out, timings=False)
-    assert report["kept"] >= 5 and report["kept"] + report["rendered"] == 24
+    assert report["kept"] >= 5 and report["kept"] + report["made"] == 24
     assert contents(out) == contents(folder)
 
 

@@ -42,10 +42,10 @@ def folder(tmp_path_factory, job):
     with pytest.raises(ts.Error, match="holds nothing of this job"):
         ts.merge(job, out)
     first = ts.generate(job, out, shard="1/2")
-    assert (first["samples"], first["rendered"], first["kept"]) == (5, 5, 0)
+    assert (first["samples"], first["made"], first["kept"]) == (5, 5, 0)
     with pytest.raises(ts.Error, match="2 of 4 files are missing"):
         ts.merge(job, out)
-    assert ts.generate(job, out, shard="2/2")["rendered"] == 5
+    assert ts.generate(job, out, shard="2/2")["made"] == 5
     assert ts.merge(job, out)["samples"] == 10
     assert ts.generate(job, out)["was_finished"]
     return out
@@ -170,7 +170,7 @@ def test_mistakes_and_damage_are_named(folder, job, tmp_path, examples):
         ts.Dataset(copy)[6]
     assert caught.value.file == str(block)
     manifest = copy / "dataset.json"
-    manifest.write_text(manifest.read_text().replace("touchstone-drawn-dataset", "touchstone-drawn-datasex"))
+    manifest.write_text(manifest.read_text().replace('"source": "draw"', '"source": "drew"'))
     with pytest.raises(ts.Error, match="content_sha256"):
         ts.Dataset(copy)
 

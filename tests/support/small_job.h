@@ -42,7 +42,7 @@ inline const char* const kSmallScene =
 inline const char* const kSmallJob =
     "name: small-job\nseed: 11\nscenes:\n"
     "  - {name: middle, scene: scene.yaml, split: train}\n"
-    "  - {name: beside, scene: scene.yaml, start_mm: [0.5, 0.2, 2.2], split: verify}\n";
+    "  - {name: beside, scene: scene.yaml, start_mm: [0.5, 0.2, 2.2], split: validate}\n";
 
 /// Writes job.yaml and all that it names; 2 scenes of 6 samples. Returns the job file.
 inline std::filesystem::path write_small_job(const TemporaryFolder& folder) {

@@ -8,7 +8,7 @@
 #include <regex>
 
 #include "datasets/inspection/inspection_page.h"
-#include "datasets/sets/drawn_dataset.h"
+#include "datasets/sets/generate.h"
 #include "tests/support/small_draw.h"
 
 namespace touchstone::datasets {
@@ -35,7 +35,7 @@ class InspectedDraw : public ::testing::Test {
   static void SetUpTestSuite() {
     folder_ = new test::TemporaryFolder;
     const auto job = test::write_small_draw(*folder_, kBalls);
-    generate_drawn(job, folder_->path() / "set", {.source = virtual_sensors(folder_->path() / "cache"), .shard = {}});
+    generate(job, folder_->path() / "set", simulated(folder_->path() / "cache"));
     set_ = new InspectedSet(read_inspected_set(folder_->path() / "set"));
   }
   static void TearDownTestSuite() {

@@ -7,7 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "datasets/jobs/prepared_job.h"
-#include "datasets/sets/dataset.h"
+#include "datasets/sets/generate.h"
 #include "datasets/sets/manifest.h"
 #include "sim/files/image_file.h"
 #include "sim/view/pixel_truth.h"
@@ -51,7 +51,7 @@ class TruthOverlay : public ::testing::Test {
     folder_->write("scene.yaml", kScene);
     const auto job = folder_->write(
         "job.yaml", "name: askew\nseed: 3\nscenes:\n  - {name: press, scene: scene.yaml, split: train}\n");
-    generate(job, folder_->path() / "set", {.source = simulator(folder_->path() / "cache")});
+    generate(job, folder_->path() / "set", simulated(folder_->path() / "cache"));
     set_ = new InspectedSet(read_inspected_set(folder_->path() / "set"));
     view_ = new GelView(prepare_job(job).scenes.front().spec.device);
   }

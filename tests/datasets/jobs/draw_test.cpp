@@ -128,8 +128,8 @@ TEST(Splits, UnitsAreDealtOutByTheirShares) {
   spec.share = {0.8, 0.1, 0.1};
   for (const auto& [units, train] : {std::pair{10, 8}, {20, 16}, {3, 1}, {4, 2}, {1000, 800}}) {
     const auto splits = splits_of_units(spec, 9, units);
-    EXPECT_EQ(std::count(splits.begin(), splits.end(), DrawnSplit::train), train) << units;
-    EXPECT_EQ(std::count(splits.begin(), splits.end(), DrawnSplit::test), (units - train) / 2) << units;
+    EXPECT_EQ(std::count(splits.begin(), splits.end(), Split::train), train) << units;
+    EXPECT_EQ(std::count(splits.begin(), splits.end(), Split::test), (units - train) / 2) << units;
   }
   EXPECT_NE(splits_of_units(spec, 9, 1000), splits_of_units(spec, 10, 1000));
   spec.where = {"job.yaml", 3};
@@ -141,9 +141,9 @@ TEST(Splits, SamplesMeetTheirSharesAsCloselyAsChanceHasIt) {
   spec.share = {0.7, 0.0, 0.3};
   int train = 0;
   for (int i = 0; i < 10000; ++i) {
-    const DrawnSplit split = split_of_sample(spec, 4, i);
-    EXPECT_NE(split, DrawnSplit::validate);
-    train += split == DrawnSplit::train ? 1 : 0;
+    const Split split = split_of_sample(spec, 4, i);
+    EXPECT_NE(split, Split::validate);
+    train += split == Split::train ? 1 : 0;
   }
   EXPECT_NEAR(train, 7000, 4 * std::sqrt(10000 * 0.21));
 }

@@ -28,7 +28,7 @@ TEST(Job, SamplesRunOverAllScenesInOrder) {
   EXPECT_EQ(job.samples, 12);
   EXPECT_EQ(job.scenes[0].first_sample, 0);
   EXPECT_EQ(job.scenes[1].first_sample, 6);
-  EXPECT_EQ(job.scenes[1].entry.split, Split::verify);
+  EXPECT_EQ(job.scenes[1].entry.split, Split::validate);
 }
 
 TEST(Job, StartAndSeedComeFromTheJob) {

@@ -6,7 +6,7 @@
 #include "core/error.h"
 #include "core/hdf5_file.h"
 #include "datasets/sets/block_record.h"
-#include "datasets/sets/drawn_dataset.h"
+#include "datasets/sets/generate.h"
 #include "tests/support/message_of.h"
 #include "tests/support/small_draw.h"
 #include "tests/support/small_job.h"
@@ -124,12 +124,12 @@ class DrawnDevices : public ::testing::Test {
     return folder_.write("job.yaml", text);
   }
 
-  DrawnReport generate(const std::filesystem::path& job, const std::string& out, Shard shard = {}) {
-    DrawnOptions options;
-    options.source = virtual_sensors(folder_.path() / "cache");
+  GenerateReport generate(const std::filesystem::path& job, const std::string& out, Shard shard = {}) {
+    GenerateOptions options;
+    options.sensors = virtual_sensors(folder_.path() / "cache");
     options.threads = 2;
     options.shard = shard;
-    return generate_drawn(job, folder_.path() / out, options);
+    return touchstone::datasets::generate(job, folder_.path() / out, options);
   }
 
   /// Made whole and in two shards. @returns the first block of the whole one
@@ -137,7 +137,7 @@ class DrawnDevices : public ::testing::Test {
     EXPECT_EQ(generate(job, "whole").made, 6);
     generate(job, "parts", {2, 2});
     generate(job, "parts", {1, 2});
-    EXPECT_EQ(merge_drawn(job, folder_.path() / "parts").samples, 6);
+    EXPECT_EQ(merge(job, folder_.path() / "parts").samples, 6);
     EXPECT_EQ(test::contents_of(folder_.path() / "parts"), test::contents_of(folder_.path() / "whole"));
     return Hdf5Reader(folder_.path() / "whole/blocks/000000.h5");
   }

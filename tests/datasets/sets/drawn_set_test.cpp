@@ -1,4 +1,4 @@
-#include "datasets/sets/drawn_dataset.h"
+#include "datasets/sets/generate.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -72,12 +72,12 @@ class DrawnDataset : public ::testing::Test {
  protected:
   DrawnDataset() : job_(test::write_small_draw(folder_)) {}
 
-  DrawnReport generate(const std::string& out, Shard shard = {}, int threads = 2) {
-    DrawnOptions options;
-    options.source = quick_bench(calls_);
+  GenerateReport generate(const std::string& out, Shard shard = {}, int threads = 2) {
+    GenerateOptions options;
+    options.sensors = quick_bench(calls_);
     options.threads = threads;
     options.shard = shard;
-    return generate_drawn(job_, folder_.path() / out, options);
+    return touchstone::datasets::generate(job_, folder_.path() / out, options);
   }
   auto contents(const std::string& out) { return test::contents_of(folder_.path() / out); }
   fs::path block(const std::string& out, int number) {
@@ -91,7 +91,7 @@ class DrawnDataset : public ::testing::Test {
 };
 
 TEST_F(DrawnDataset, ShardsAndThreadsGiveTheBytesOfOneRun) {
-  const DrawnReport report = generate("one", {}, 1);
+  const GenerateReport report = generate("one", {}, 1);
   EXPECT_EQ(report.made, 10);
   EXPECT_EQ(calls_.units, 2);
   const auto one = contents("one");
@@ -103,9 +103,9 @@ TEST_F(DrawnDataset, ShardsAndThreadsGiveTheBytesOfOneRun) {
     std::int64_t made = 0;
     for (int number = count; number >= 1; --number) made += generate(out, {number, count}).made;
     EXPECT_EQ(made, 10);
-    EXPECT_EQ(merge_drawn(job_, folder_.path() / out).samples, 10);
+    EXPECT_EQ(merge(job_, folder_.path() / out).samples, 10);
     EXPECT_EQ(contents(out), one) << count << " shards";
-    EXPECT_TRUE(merge_drawn(job_, folder_.path() / out).was_finished);
+    EXPECT_TRUE(merge(job_, folder_.path() / out).was_finished);
   }
   EXPECT_TRUE(generate("one").was_finished);
 }
@@ -160,7 +160,7 @@ TEST_F(DrawnDataset, ABrokenOffRunGoesOnToTheSameBytes) {
     calls_.stop_at = stop;
     EXPECT_THROW(generate("out", {}, 1), std::runtime_error);
     calls_.stop_at = -1;
-    const DrawnReport report = generate("out");
+    const GenerateReport report = generate("out");
     EXPECT_EQ(report.made + report.kept, 10);
     EXPECT_EQ(contents("out"), whole) << "stopped at " << stop;
     fs::remove_all(folder_.path() / "out");
@@ -180,17 +180,17 @@ TEST_F(DrawnDataset, DamagedBlocksAreMadeAgainAndForeignOnesRefused) {
   turned[good.size() / 2] ^= 1;
   for (const std::string& bad : {good.substr(0, good.size() - 100), good.substr(0, 100), std::string(), turned}) {
     write(block("out", 2), bad);
-    EXPECT_THAT(message_of([&] { merge_drawn(job_, folder_.path() / "out"); }), HasSubstr("000002.h5 (damaged)"));
-    const DrawnReport report = generate("out", {3, 4});
+    EXPECT_THAT(message_of([&] { merge(job_, folder_.path() / "out"); }), HasSubstr("000002.h5 (damaged)"));
+    const GenerateReport report = generate("out", {3, 4});
     EXPECT_EQ(report.damaged_blocks, 1);
     EXPECT_EQ(read_whole_file(block("out", 2)), good);
   }
   fs::remove(block("out", 1));
-  EXPECT_THAT(message_of([&] { merge_drawn(job_, folder_.path() / "out"); }),
+  EXPECT_THAT(message_of([&] { merge(job_, folder_.path() / "out"); }),
               HasSubstr("1 of 4 files are missing (blocks/000001.h5)"));
   write(block("out", 1), good);  // whole, but in the wrong place
   EXPECT_THAT(message_of([&] { generate("out"); }), HasSubstr("000001.h5: is of another job or another run"));
-  EXPECT_THAT(message_of([&] { merge_drawn(job_, folder_.path() / "out"); }), HasSubstr("another run"));
+  EXPECT_THAT(message_of([&] { merge(job_, folder_.path() / "out"); }), HasSubstr("another run"));
   fs::remove(block("out", 1));
   EXPECT_EQ(generate("out").made, 2);
   EXPECT_EQ(contents("out"), whole);
@@ -218,7 +218,7 @@ TEST_F(DrawnDataset, AChangedJobAForeignFolderAndAChangedSetAreRefused) {
   other.replace(other.find("seed: 3"), 7, "seed: 4");
   folder_.write("job.yaml", other);
   EXPECT_THAT(message_of([&] { generate("out"); }), HasSubstr("since it was begun the job file has changed"));
-  EXPECT_THAT(message_of([&] { merge_drawn(job_, folder_.path() / "out"); }), HasSubstr("the job file has changed"));
+  EXPECT_THAT(message_of([&] { merge(job_, folder_.path() / "out"); }), HasSubstr("the job file has changed"));
   EXPECT_EQ(contents("out"), before);
   test::write_small_draw(folder_);
   folder_.write("ball.yaml", "name: ball\nshape: {type: sphere, radius_mm: 1.6}\nfriction: 0.5\n");
@@ -227,9 +227,9 @@ TEST_F(DrawnDataset, AChangedJobAForeignFolderAndAChangedSetAreRefused) {
   generate("out");
   folder_.write("other/file.txt", "mine");
   EXPECT_THAT(message_of([&] { generate("other"); }), HasSubstr("isn't empty ('file.txt' is in it)"));
-  EXPECT_THAT(message_of([&] { merge_drawn(job_, folder_.path() / "none"); }), HasSubstr("holds nothing of this job"));
+  EXPECT_THAT(message_of([&] { merge(job_, folder_.path() / "none"); }), HasSubstr("holds nothing of this job"));
   write(block("out", 0), "short");
-  EXPECT_THAT(message_of([&] { generate("out"); }), HasSubstr("000000.h5: is missing or was changed"));
+  EXPECT_THAT(message_of([&] { generate("out"); }), HasSubstr("000000.h5: is missing"));
 }
 
 TEST_F(DrawnDataset, WhatCannotBePressedIsDrawnAgain) {

@@ -1,6 +1,5 @@
-#include "datasets/sets/dataset.h"
+#include "datasets/sets/scene_set.h"
 
-#include <tbb/global_control.h>
 #include <tbb/info.h>
 
 #include <algorithm>
@@ -12,9 +11,9 @@
 #include "core/random.h"
 #include "core/sha256.h"
 #include "core/whole_file.h"
-#include "datasets/jobs/prepared_job.h"
 #include "datasets/sets/manifest.h"
 #include "datasets/sets/run_folder.h"
+#include "datasets/sets/scene_manifest.h"
 #include "datasets/sets/truth_file.h"
 #include "datasets/sets/whole_steps.h"
 #include "sensors/events/event_file.h"
@@ -128,7 +127,7 @@ class Run {
       journal.append(*record_of(place));
       counter.step();
     });
-    report_.rendered = static_cast<std::int64_t>(missing.size());
+    report_.made = static_cast<std::int64_t>(missing.size());
     clock_.end("frames");
     events(journal);
   }
@@ -179,9 +178,9 @@ class Run {
     RunTimings timings;
     timings.stages = clock_.stages;
     timings.threads = options.threads > 0 ? options.threads : tbb::info::default_concurrency();
-    timings.samples_rendered = report_.rendered;
-    write_whole_file(out_ / "dataset.json", manifest_text(job_, identity, gel_->report, arrays_, files, work,
-                                                          options.timings ? &timings : nullptr));
+    timings.samples_made = report_.made;
+    write_whole_file(out_ / "dataset.json", scene_manifest(job_, identity, gel_->report, arrays_, files, work,
+                                                           options.timings ? &timings : nullptr));
   }
 
   GenerateReport report() const {
@@ -327,31 +326,23 @@ class Run {
 
 }  // namespace
 
-GenerateReport generate(const fs::path& job_file, const fs::path& out, const GenerateOptions& options,
-                        const Progress& progress) {
-  std::optional<tbb::global_control> limit;
-  if (options.threads > 0) {
-    limit.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(options.threads));
-  }
-  const PreparedJob job = prepare_job(job_file);
+GenerateReport generate_scenes(const PreparedJob& job, const fs::path& out, const GenerateOptions& options,
+                               const Progress& progress) {
   const RunIdentity identity = identity_of(job);
+  GenerateReport finished;
+  finished.was_finished = true;
+  finished.samples = job.samples;
   if (state_of_folder(out, identity) == FolderState::finished && !fs::exists(out / kUnfinished)) {
     verify_files(out, read_manifest(out));
-    GenerateReport report;
-    report.was_finished = true;
-    report.samples = job.samples;
-    return report;
+    return finished;
   }
   RunFolder folder(out, identity);
   if (state_of_folder(out, identity) == FolderState::finished) {  // killed between its last file and clearing up
     verify_files(out, read_manifest(out));
     folder.finish();
-    GenerateReport report;
-    report.was_finished = true;
-    report.samples = job.samples;
-    return report;
+    return finished;
   }
-  Run run(job, out, options.source, progress);
+  Run run(job, out, options.scenes, progress);
   run.mechanics();
   run.pictures(folder, folder.whole_records());
   run.truth();

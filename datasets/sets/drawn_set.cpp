@@ -1,16 +1,11 @@
-#include "datasets/sets/drawn_dataset.h"
+#include "datasets/sets/drawn_set.h"
 
-#include <tbb/global_control.h>
-#include <tbb/info.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <atomic>
-#include <charconv>
 #include <chrono>
 #include <memory>
-#include <mutex>
-#include <nlohmann/json.hpp>
 #include <optional>
 
 #include "core/error.h"
@@ -19,7 +14,7 @@
 #include "core/whole_file.h"
 #include "datasets/sets/block_file.h"
 #include "datasets/sets/data_card.h"
-#include "datasets/sets/drawn_manifest.h"
+#include "datasets/sets/manifest_parts.h"
 #include "datasets/sets/run_folder.h"
 #include "datasets/sets/run_identity.h"
 
@@ -29,7 +24,6 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
-constexpr int kFormatVersion = 1;
 constexpr int kMostAttempts = 20;  // draws of one sample
 
 /// A data set's folder, and whose it is.
@@ -37,75 +31,7 @@ struct Folder {
   fs::path out;
   RunIdentity identity;
   std::string checksum;  // of the identity: what blocks carry
-
-  fs::path record() const { return out / kUnfinished / "run.json"; }
-  fs::path manifest() const { return out / "dataset.json"; }
 };
-
-std::string content_checksum(ordered_json manifest) {
-  manifest.erase("content_sha256");
-  return sha256_of(manifest.dump(-1, ' ', false, ordered_json::error_handler_t::replace));
-}
-
-/// The manifest of a finished set, whole and of this job; nothing if there is none.
-std::optional<ordered_json> finished_manifest(const Folder& folder) {
-  std::error_code error;
-  if (!fs::exists(folder.manifest(), error)) return std::nullopt;
-  try {
-    ordered_json json = ordered_json::parse(read_whole_file(folder.manifest()));
-    if (json.at("format") != kDrawnSetFormat) {
-      fail("{}: holds a data set of another kind; give another folder", folder.out.string());
-    }
-    if (json.at("content_sha256") != content_checksum(json)) {
-      fail("{}: was changed; its content doesn't meet its content_sha256", folder.manifest().string());
-    }
-    const RunIdentity before = run_identity_from_json(json.at("run").dump(), folder.manifest().string());
-    const std::string differs = difference(before, folder.identity);
-    if (!differs.empty()) {
-      fail("{}: holds a finished data set, and since it was made {} has changed; give another folder",
-           folder.out.string(), differs);
-    }
-    return json;
-  } catch (const nlohmann::json::exception& error_of) {
-    fail("{}: isn't a whole manifest ({})", folder.manifest().string(), error_of.what());
-  }
-}
-
-/// Is there anything of this job's run? @throws Error if there is something else
-bool is_begun(const Folder& folder) {
-  std::error_code error;
-  if (!fs::exists(folder.out, error)) return false;
-  if (!fs::is_directory(folder.out)) fail("{}: isn't a folder", folder.out.string());
-  if (fs::exists(folder.record(), error)) {
-    const RunIdentity before = run_identity_from_json(read_whole_file(folder.record()), folder.record().string());
-    const std::string differs = difference(before, folder.identity);
-    if (!differs.empty()) {
-      fail(
-          "{}: holds an unfinished data set, and since it was begun {} has changed; finish it as it was begun, or "
-          "give another folder",
-          folder.out.string(), differs);
-    }
-    return true;
-  }
-  for (const auto& entry : fs::directory_iterator(folder.out)) {
-    if (entry.path().filename() == kUnfinished && entry.is_directory()) continue;  // killed before its first record
-    fail("{}: isn't empty ('{}' is in it) and isn't a data set of this job; give another folder", folder.out.string(),
-         entry.path().filename().string());
-  }
-  return false;
-}
-
-void begin(const Folder& folder) {
-  const auto make = [](const fs::path& path) {
-    std::error_code error;
-    fs::create_directories(path, error);
-    if (error) fail("{}: can't be made ({})", path.string(), error.message());
-  };
-  make(folder.out / kUnfinished);
-  write_whole_file(folder.record(), to_json(folder.identity));  // before all else: it says whose the folder is
-  make(folder.out / "blocks");
-  is_begun(folder);  // another job's run may have begun here at the same time: the last record counts
-}
 
 Folder folder_of(const PreparedDraw& prepared, const fs::path& out) {
   Folder folder;
@@ -120,37 +46,27 @@ void refuse_foreign(const Folder& folder, const DrawnBlock& block) {
        (folder.out / block_name(block)).string());
 }
 
-struct BlockFile {
-  std::string name, sha256;
-  std::int64_t bytes = 0;
-};
-
 ordered_json drawn_json(const std::vector<DrawnNumber>& drawn) {
   ordered_json json = ordered_json::object();
   for (const auto& [path, value] : drawn) json[path] = value;
   return json;
 }
 
-std::string manifest_text(const PreparedDraw& prepared, const Folder& folder, const DrawnFigures& figures,
-                          const std::vector<BlockFile>& files) {
+std::string text_of_manifest(const PreparedDraw& prepared, const Folder& folder, const DrawnFigures& figures,
+                             const std::vector<WrittenFile>& files) {
   const DrawJob& job = prepared.job;
-  ordered_json manifest = {{"format", kDrawnSetFormat},
-                           {"format_version", kFormatVersion},
-                           {"content_sha256", ""},
-                           {"program", {{"name", "touchstone"}, {"version", folder.identity.version}}},
-                           {"run", ordered_json::parse(to_json(folder.identity))},
-                           {"name", job.name},
-                           {"licence", job.licence},
-                           {"samples", job.samples},
-                           {"seed", job.seed}};
-  manifest["job"] = {{"file", prepared.file.filename().string()}, {"text", prepared.text}};
-  for (const InputFile& input : prepared.inputs) {
-    manifest["inputs"].push_back({{"file", input.name}, {"sha256", input.sha256}});
-  }
+  ManifestHead head;
+  head.source = SetSource::draw;
+  head.name = job.name;
+  head.licence = job.licence;
+  head.seed = job.seed;
+  head.samples = job.samples;
+  head.job_file = prepared.file.filename().string();
+  head.job_text = prepared.text;
+  head.inputs = &prepared.inputs;
+  head.splits = figures.splits;
+  ordered_json manifest = manifest_json(head, folder.identity);
   manifest["splits"]["by"] = job.splits.by == SplitBy::unit ? "unit" : "sample";
-  for (int k = 0; k < kDrawnSplits; ++k) {
-    manifest["splits"][name_of(static_cast<DrawnSplit>(k))] = figures.splits[static_cast<std::size_t>(k)];
-  }
   for (int number = 0; number < job.draw.units.count; ++number) {
     const DrawnUnit unit = drawn_unit(prepared, number);
     ordered_json json = {{"unit", number}, {"seed", unit.seed}, {"drawn", drawn_json(unit.drawn)}};
@@ -170,7 +86,7 @@ std::string manifest_text(const PreparedDraw& prepared, const Folder& folder, co
                                    {"histogram", {{"low", one.low}, {"high", one.high}, {"count", one.count}}}});
   }
   for (std::size_t k = 0; k < files.size(); ++k) {
-    ordered_json file = {{"file", files[k].name}, {"bytes", files[k].bytes}, {"sha256", files[k].sha256}};
+    ordered_json file = file_json(files[k]);
     if (k < prepared.blocks.size()) {
       const DrawnBlock& block = prepared.blocks[k];
       file["unit"] = block.unit;
@@ -179,44 +95,22 @@ std::string manifest_text(const PreparedDraw& prepared, const Folder& folder, co
     }
     manifest["files"].push_back(std::move(file));
   }
-  manifest["content_sha256"] = content_checksum(manifest);
-  return manifest.dump(1, ' ', false, ordered_json::error_handler_t::replace) + "\n";
+  return manifest_text(std::move(manifest));
 }
 
-void verify(const Folder& folder, const ordered_json& manifest) {
-  std::vector<std::pair<std::string, std::string>> files;
-  for (const ordered_json& file : manifest.at("files")) files.emplace_back(file.at("file"), file.at("sha256"));
-  std::vector<char> bad(files.size(), 0);
-  tbb::parallel_for(std::size_t{0}, files.size(), [&](std::size_t k) {
-    const fs::path path = folder.out / files[k].first;
-    bad[k] = !fs::is_regular_file(path) || sha256_of_file(path) != files[k].second;
-  });
-  for (std::size_t k = 0; k < files.size(); ++k) {
-    if (bad[k] != 0) {
-      fail("{}: is missing or was changed; remove dataset.json and generate again to make it anew",
-           (folder.out / files[k].first).string());
-    }
-  }
-}
-
-/// Removes what killed runs left in the finished folder.
-void clear_up(const Folder& folder) {
-  std::error_code ignored;
-  for (const fs::path& place : {folder.out, folder.out / "blocks"}) {
-    std::vector<fs::path> left;
-    for (const auto& entry : fs::directory_iterator(place, ignored)) {
-      if (is_temporary_file(entry.path())) left.push_back(entry.path());
-    }
-    for (const fs::path& file : left) fs::remove(file, ignored);
-  }
-  fs::remove_all(folder.out / kUnfinished, ignored);
+/// Is the set whole already? Then its checksums are verified.
+bool is_finished(const Folder& folder) {
+  if (state_of_folder(folder.out, folder.identity) != FolderState::finished) return false;
+  verify_files(folder.out, read_manifest(folder.out));
+  if (fs::exists(folder.out / kUnfinished)) finish_folder(folder.out);  // killed between its last file and clearing up
+  return true;
 }
 
 /// Card and manifest of a folder whose blocks are all there.
 void merge(const PreparedDraw& prepared, const Folder& folder, const Progress& progress) {
   const auto count = static_cast<std::int64_t>(prepared.blocks.size());
   std::vector<BlockState> states(prepared.blocks.size());
-  std::vector<BlockFile> files(prepared.blocks.size());
+  std::vector<WrittenFile> files(prepared.blocks.size());
   std::atomic<std::int64_t> done{0};
   tbb::parallel_for(std::size_t{0}, prepared.blocks.size(), [&](std::size_t k) {
     const std::string name = block_name(prepared.blocks[k]);
@@ -250,8 +144,8 @@ void merge(const PreparedDraw& prepared, const Folder& folder, const Progress& p
   const std::string card = data_card(prepared, figures);
   write_whole_file(folder.out / "README.md", card);
   files.push_back({"README.md", sha256_of(card), static_cast<std::int64_t>(card.size())});
-  write_whole_file(folder.manifest(), manifest_text(prepared, folder, figures, files));
-  clear_up(folder);
+  write_whole_file(folder.out / "dataset.json", text_of_manifest(prepared, folder, figures, files));
+  finish_folder(folder.out);
 }
 
 /// Sample by sample: a touch that can't be pressed is drawn again.
@@ -278,40 +172,21 @@ std::pair<std::size_t, std::size_t> blocks_of(const Shard& shard, std::size_t al
 
 }  // namespace
 
-Shard shard_of(const std::string& text) {
-  Shard shard;
-  const std::size_t slash = text.find('/');
-  const auto read = [&](std::size_t from, std::size_t to, int& value) {
-    const auto result = std::from_chars(text.data() + from, text.data() + to, value);
-    return from < to && result.ec == std::errc() && result.ptr == text.data() + to;
-  };
-  if (slash == std::string::npos || !read(0, slash, shard.number) || !read(slash + 1, text.size(), shard.count) ||
-      shard.count < 1 || shard.number < 1 || shard.number > shard.count) {
-    fail("--shard: '{}' isn't a shard; allowed is I/N, the I-th of N parts, I from 1 to N", text);
-  }
-  return shard;
-}
-
-DrawnReport generate_drawn(const fs::path& job_file, const fs::path& out, const DrawnOptions& options,
-                           const Progress& progress) {
-  std::optional<tbb::global_control> limit;
-  if (options.threads > 0) {
-    limit.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(options.threads));
-  }
-  const PreparedDraw prepared = prepare_draw(job_file);
+GenerateReport generate_draw(const PreparedDraw& prepared, const fs::path& out, const GenerateOptions& options,
+                             const Progress& progress) {
   const Folder folder = folder_of(prepared, out);
   const Shard& shard = options.shard;
   const auto [first, end] = blocks_of(shard, prepared.blocks.size());
-  DrawnReport report;
+  GenerateReport report;
   for (std::size_t k = first; k < end; ++k) report.samples += prepared.blocks[k].samples;
-  if (const auto manifest = finished_manifest(folder)) {
-    verify(folder, *manifest);
-    clear_up(folder);
+  if (is_finished(folder)) {
     report.was_finished = true;
     return report;
   }
-  is_begun(folder);
-  begin(folder);
+  begin_shared(out, folder.identity);
+  std::error_code error;
+  fs::create_directories(out / "blocks", error);
+  if (error) fail("{}: can't be made ({})", (out / "blocks").string(), error.message());
   std::unique_ptr<UnitSensor> sensor;
   std::optional<DrawnUnit> unit;
   std::atomic<std::int64_t> done{0};
@@ -330,7 +205,7 @@ DrawnReport generate_drawn(const fs::path& job_file, const fs::path& out, const 
       sensor.reset();
       unit = drawn_unit(prepared, block.unit);
       if (progress) progress(fmt::format("unit {}", block.unit), block.unit, prepared.job.draw.units.count);
-      sensor = std::make_unique<UnitSensor>(options.source(prepared, *unit));
+      sensor = std::make_unique<UnitSensor>(options.sensors(prepared, *unit));
       report.set_up_s += seconds_since(clock);
       clock = std::chrono::steady_clock::now();
     }
@@ -351,35 +226,29 @@ DrawnReport generate_drawn(const fs::path& job_file, const fs::path& out, const 
   return report;
 }
 
-DrawnReport merge_drawn(const fs::path& job_file, const fs::path& out, const Progress& progress) {
-  const PreparedDraw prepared = prepare_draw(job_file);
+GenerateReport merge_draw(const PreparedDraw& prepared, const fs::path& out, const Progress& progress) {
   const Folder folder = folder_of(prepared, out);
-  DrawnReport report;
+  GenerateReport report;
   report.samples = prepared.job.samples;
-  if (const auto manifest = finished_manifest(folder)) {
-    verify(folder, *manifest);
-    clear_up(folder);
+  if (is_finished(folder)) {
     report.was_finished = true;
     return report;
   }
-  if (!is_begun(folder)) {
+  if (state_of_folder(out, folder.identity) == FolderState::absent) {
     fail("{}: holds nothing of this job; run `touchstone generate {} -o {} --shard I/N` first", out.string(),
-         job_file.string(), out.string());
+         prepared.file.string(), out.string());
   }
   merge(prepared, folder, progress);
   return report;
 }
 
-std::vector<int> missing_shards(const fs::path& job_file, const fs::path& out, int count) {
-  if (count < 1) fail("--missing: {} is not allowed; allowed is at least 1", count);
-  const PreparedDraw prepared = prepare_draw(job_file);
+std::vector<int> missing_shards_of_draw(const PreparedDraw& prepared, const fs::path& out, int count) {
   const Folder folder = folder_of(prepared, out);
   std::vector<int> missing;
-  if (const auto manifest = finished_manifest(folder)) {
-    verify(folder, *manifest);
+  if (state_of_folder(out, folder.identity) == FolderState::finished) {
+    verify_files(out, read_manifest(out));
     return missing;
   }
-  is_begun(folder);
   std::vector<BlockState> states(prepared.blocks.size());
   tbb::parallel_for(std::size_t{0}, states.size(), [&](std::size_t k) {
     states[k] = state_of_block(folder.out, folder.checksum, prepared.blocks[k]);

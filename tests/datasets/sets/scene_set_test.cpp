@@ -1,4 +1,4 @@
-#include "datasets/sets/dataset.h"
+#include "datasets/sets/generate.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -34,7 +34,7 @@ class DataSet : public ::testing::Test {
   GenerateReport run(const fs::path& out, int threads = 2, bool timings = false) {
     calls_.pictures = 0;
     calls_.cameras = 0;
-    return generate(job_, out, {.source = test::fake_source(calls_), .threads = threads, .timings = timings});
+    return generate(job_, out, {.scenes = test::fake_source(calls_), .threads = threads, .timings = timings});
   }
   GenerateReport run() { return run(out_); }
 
@@ -60,7 +60,7 @@ class DataSet : public ::testing::Test {
 TEST_F(DataSet, HoldsFramesTruthAndManifest) {
   const GenerateReport report = run();
   EXPECT_EQ(report.samples, 12);
-  EXPECT_EQ(report.rendered, 12);
+  EXPECT_EQ(report.made, 12);
   const auto contents = contents_of(out_);
   EXPECT_EQ(contents.size(), 12u + 12u + 2u);
   EXPECT_TRUE(contents.contains("frames/middle/000000.png"));
@@ -106,7 +106,7 @@ TEST_F(DataSet, TruthIsInItsRows) {
   EXPECT_EQ(table.scene_names, (std::vector<std::string>{"middle", "beside"}));
   EXPECT_EQ(table.scene[7], 1);
   EXPECT_EQ(table.frame[7], 1);
-  EXPECT_EQ(table.split[7], Split::verify);
+  EXPECT_EQ(table.split[7], Split::validate);
   EXPECT_EQ(table.t_us[7], 33333);
   EXPECT_DOUBLE_EQ(table.wrench[11][2], 2.5);
   const Hdf5Reader file(out_ / "truth.h5");
@@ -148,7 +148,7 @@ TEST_F(DataSet, ManifestTellsJobPlanSeedsWorkAndChecksums) {
   run();
   const auto manifest = nlohmann::json::parse(read_whole_file(out_ / "dataset.json"));
   EXPECT_EQ(manifest.at("job").at("text"), test::kSmallJob);
-  EXPECT_EQ(manifest.at("job").at("sha256"), sha256_of(test::kSmallJob));
+  EXPECT_EQ(manifest.at("run").at("job_sha256"), sha256_of(test::kSmallJob));
   EXPECT_EQ(manifest.at("scenes").at(1).at("first_sample"), 6);
   EXPECT_EQ(manifest.at("scenes").at(1).at("seed"), 11);
   EXPECT_FALSE(manifest.at("scenes").at(0).at("plan").at(0).at("why").get<std::string>().empty());
@@ -173,6 +173,7 @@ TEST_F(DataSet, TimingsAreAllThatDiffersBetweenRuns) {
   EXPECT_EQ(one.dump(), two.dump());
   const std::string stated = one.at("content_sha256");
   one.erase("content_sha256");
+  one.erase("run");
   EXPECT_EQ(sha256_of(one.dump()), stated);
 }
 
@@ -192,8 +193,8 @@ TEST_F(DataSet, ABrokenOffRunGoesOnToTheSameBytes) {
     EXPECT_TRUE(fs::exists(out_ / kUnfinished));
     EXPECT_FALSE(fs::exists(out_ / "dataset.json"));
     const GenerateReport report = run();
-    EXPECT_EQ(report.kept + report.rendered, 12);
-    EXPECT_EQ(calls_.pictures, report.rendered) << "what is kept isn't rendered again";
+    EXPECT_EQ(report.kept + report.made, 12);
+    EXPECT_EQ(calls_.pictures, report.made) << "what is kept isn't rendered again";
     EXPECT_EQ(contents_of(out_), whole) << "broken off at picture " << at;
     fs::remove_all(out_);
   }
@@ -230,7 +231,7 @@ TEST_F(DataSet, StreamsOfEventsAreWrittenCheckedAndKept) {
   EXPECT_FALSE(fs::exists(out_ / "events/beside.h5")) << "half a stream";
   calls_.fail_at_stream = -1;
   calls_.streams = 0;
-  EXPECT_EQ(run().rendered, 0);
+  EXPECT_EQ(run().made, 0);
   EXPECT_EQ(calls_.streams, 1) << "the finished stream is kept";
   EXPECT_EQ(contents_of(out_), whole);
 }
@@ -341,7 +342,7 @@ TEST_F(DataSet, AForeignFolderIsRefusedAndNothingTouched) {
 
 TEST_F(DataSet, AnEmptyFolderIsTaken) {
   fs::create_directories(out_);
-  EXPECT_EQ(run().rendered, 12);
+  EXPECT_EQ(run().made, 12);
 }
 
 TEST_F(DataSet, AFailureBeforeTheFirstPictureLeavesNothing) {
@@ -349,10 +350,10 @@ TEST_F(DataSet, AFailureBeforeTheFirstPictureLeavesNothing) {
   source.play_motion = [](const sim::SceneSpec&, const sim::Plan&, const fem::Compliance&,
                           const Progress&) -> std::vector<sim::Truth> { fail("frame 3: gross slip"); };
   const fs::path deep = folder_.path() / "new/deep/out";
-  EXPECT_THAT(message_of([&] { generate(job_, deep, {.source = source}); }), HasSubstr("gross slip"));
+  EXPECT_THAT(message_of([&] { generate(job_, deep, {.scenes = source}); }), HasSubstr("gross slip"));
   EXPECT_FALSE(fs::exists(folder_.path() / "new"));
   fs::create_directories(out_);
-  EXPECT_THAT(message_of([&] { generate(job_, out_, {.source = source}); }), HasSubstr("gross slip"));
+  EXPECT_THAT(message_of([&] { generate(job_, out_, {.scenes = source}); }), HasSubstr("gross slip"));
   EXPECT_TRUE(fs::is_empty(out_)) << "a folder that was there stays";
 }
 
