@@ -7,18 +7,12 @@
 #include <string_view>
 
 #include "core/error.h"
+#include "core/overloaded.h"
 #include "fem/mesh/layer_columns.h"
 #include "fem/mesh/tetgen_fill.h"
 
 namespace touchstone::fem {
 namespace {
-
-template <typename... Ts>
-struct Overloaded : Ts... {
-  using Ts::operator()...;
-};
-template <typename... Ts>
-Overloaded(Ts...) -> Overloaded<Ts...>;
 
 /// What is left of a slab under its layers, in a frame of its own with z = 0 on top.
 SlabMesh core_of(const SlabGel& gel) {

@@ -6,19 +6,13 @@
 #include <string>
 
 #include "core/error.h"
+#include "core/overloaded.h"
 #include "render/materials/layer_connection.h"
 #include "render/scene/flat_faces.h"
 #include "render/scene/scene_limits.h"
 
 namespace touchstone::render {
 namespace {
-
-template <typename... Ts>
-struct Overloaded : Ts... {
-  using Ts::operator()...;
-};
-template <typename... Ts>
-Overloaded(Ts...) -> Overloaded<Ts...>;
 
 void check_position(const Eigen::Vector3d& position, const std::string& what) {
   if (!position.allFinite()) fail("{} isn't finite", what);

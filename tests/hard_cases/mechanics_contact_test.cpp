@@ -22,6 +22,7 @@
 #include "fem/mesh/slab.h"
 #include "tests/hard_cases/hard_case.h"
 #include "tests/support/half_space_gel.h"
+#include "tests/support/press_steps.h"
 
 namespace touchstone::fem {
 namespace {
@@ -29,6 +30,8 @@ namespace {
 using test::did;
 using test::refused;
 using test::Worst;
+using test::press_refusal;
+using test::target_at;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kRadius = 8.0;
@@ -46,14 +49,8 @@ const Compliance& gel() {
   return made;
 }
 
-PressTarget at(double x, double y, double z) {
-  PressTarget target;
-  target.axis = {AxisControl::at(x), AxisControl::at(y), AxisControl::at(z)};
-  return target;
-}
-
 PressTarget sphere_at(double x, double y, double depth) {
-  return at(x, y, kRadius - depth);
+  return target_at(x, y, kRadius - depth);
 }
 
 PressTolerance tight() {
@@ -61,15 +58,6 @@ PressTolerance tight() {
   tolerance.lookup_mm = 1e-11;
   tolerance.traction = 1e-12;
   return tolerance;
-}
-
-std::string message_of(Press& press, const PressTarget& target) {
-  try {
-    press.step(target);
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
 }
 
 void expect_contact_laws(const PressState& state) {
@@ -154,7 +142,7 @@ TEST(HardCase7, AMissHasExactlyNoForce) {
   Press press(gel(), kProbe, 0.5);
   Worst force{0.0};
   Worst beads{0.0};
-  for (const auto& target : {at(0, 0, 1e-9), at(0, 0, 3), at(40, 0, -1)}) {
+  for (const auto& target : {target_at(0, 0, 1e-9), target_at(0, 0, 3), target_at(40, 0, -1)}) {
     const PressState& state = press.step(target);
     EXPECT_EQ(force(state.wrench.cwiseAbs().maxCoeff()), 0.0);
     EXPECT_EQ(beads(state.bead_displacement.cwiseAbs().maxCoeff()), 0.0);
@@ -165,7 +153,7 @@ TEST(HardCase7, AMissHasExactlyNoForce) {
 
 TEST(HardCase8, OverlapDeeperThanTheGelIsRefused) {
   Press press(gel(), kProbe, 0.5);
-  const std::string message = message_of(press, at(0, 0, -5.01));
+  const std::string message = press_refusal(press, target_at(0, 0, -5.01));
   EXPECT_NE(message.find("5.01 mm into a gel of 5 mm"), std::string::npos);
   did("{}", refused(message));
   EXPECT_EQ(press.state().wrench.norm(), 0.0);
@@ -177,8 +165,8 @@ TEST(HardCase9, NoFrictionIsBitwiseTheFrictionlessPath) {
   Worst traction{0.0};
   Worst shear{0.0};
   for (const double depth : {0.1, 0.5, 0.3}) {
-    const PressState& a = zero.step(at(0.1, 0.2, -depth));
-    const PressState& b = negative_zero.step(at(0.1, 0.2, -depth));
+    const PressState& a = zero.step(target_at(0.1, 0.2, -depth));
+    const PressState& b = negative_zero.step(target_at(0.1, 0.2, -depth));
     EXPECT_EQ(traction((a.traction - b.traction).cwiseAbs().maxCoeff()), 0.0);
     EXPECT_EQ(shear(a.traction.leftCols<2>().cwiseAbs().maxCoeff()), 0.0);
     EXPECT_EQ(a.sweeps, 0);
@@ -192,8 +180,8 @@ TEST(HardCase9, NoFrictionIsBitwiseTheFrictionlessPath) {
 TEST(HardCase10, AFrictionOfFiveConvergesOrSaysSo) {
   Press press(gel(), kProbe, 5.0);
   int answered = 0;
-  for (const auto& target : {at(0, 0, -0.3), at(0.1, 0, -0.3), at(0.3, 0.1, -0.4), at(-0.2, 0, -0.4), at(0, 0, -0.1)}) {
-    const std::string message = message_of(press, target);
+  for (const auto& target : {target_at(0, 0, -0.3), target_at(0.1, 0, -0.3), target_at(0.3, 0.1, -0.4), target_at(-0.2, 0, -0.4), target_at(0, 0, -0.1)}) {
+    const std::string message = press_refusal(press, target);
     if (message.empty()) {
       ++answered;
       expect_contact_laws(press.state());
@@ -208,14 +196,14 @@ TEST(HardCase10, AFrictionOfFiveConvergesOrSaysSo) {
 
 TEST(HardCase11, AnInfiniteFrictionIsTheBondedLimit) {
   Press bonded(gel(), kProbe, kInfinity);
-  bonded.step(at(0, 0, -0.4));
-  bonded.step(at(0.1, 0, -0.4));
+  bonded.step(target_at(0, 0, -0.4));
+  bonded.step(target_at(0.1, 0, -0.4));
   for (const NodeState s : bonded.state().node_state) EXPECT_NE(s, NodeState::slip);
   double before = kInfinity;
   for (const double friction : {0.1, 0.3, 1.0, 1000.0}) {
     Press press(gel(), kProbe, friction);
-    press.step(at(0, 0, -0.4));
-    press.step(at(0.1, 0, -0.4));
+    press.step(target_at(0, 0, -0.4));
+    press.step(target_at(0.1, 0, -0.4));
     const double away = (press.state().wrench - bonded.state().wrench).norm();
     EXPECT_LE(away, before + 1e-9);
     before = away;
@@ -228,12 +216,12 @@ TEST(HardCase14, NotANumberIsRefusedAtTheBorder) {
   Press press(gel(), kProbe, 0.5);
   const double nan = std::numeric_limits<double>::quiet_NaN();
   for (int axis = 0; axis < 3; ++axis) {
-    PressTarget target = at(0, 0, -0.1);
+    PressTarget target = target_at(0, 0, -0.1);
     target.axis[axis].value = nan;
-    const std::string of_nan = message_of(press, target);
+    const std::string of_nan = press_refusal(press, target);
     EXPECT_NE(of_nan.find("finite"), std::string::npos);
     target.axis[axis] = AxisControl::with_force(kInfinity);
-    const std::string of_infinity = message_of(press, target);
+    const std::string of_infinity = press_refusal(press, target);
     EXPECT_NE(of_infinity.find("finite"), std::string::npos);
     if (axis == 2) did("a pose of NaN is {}\na force of infinity is {}", refused(of_nan), refused(of_infinity));
   }
@@ -252,10 +240,10 @@ TEST(HardCase19, TwoObjectsEqualTheJointProblem) {
   Press apart(flat_gel, std::vector<PressBody>{{BoxShape{size}, 0.4, nullptr}, {BoxShape{size}, 0.4, nullptr}});
   Worst away{1e-9};  // rounding: both take the same vertices, and look the gel up at the same places
   for (const Eigen::Vector3d& offset : {Eigen::Vector3d(0, 0, -0.15), Eigen::Vector3d(0.03, 0.01, -0.15)}) {
-    const PressState& one = joint.step(at(offset.x(), offset.y(), offset.z()));
+    const PressState& one = joint.step(target_at(offset.x(), offset.y(), offset.z()));
     const std::array<PressTarget, 2> targets = {
-        at(left.x() + offset.x(), left.y() + offset.y(), left.z() + offset.z()),
-        at(right.x() + offset.x(), right.y() + offset.y(), right.z() + offset.z())};
+        target_at(left.x() + offset.x(), left.y() + offset.y(), left.z() + offset.z()),
+        target_at(right.x() + offset.x(), right.y() + offset.y(), right.z() + offset.z())};
     const PressState& two = apart.step(targets);
     ASSERT_EQ(two.bodies.size(), 2u);
     EXPECT_GT(two.bodies[1].wrench[2], 0.01);
@@ -316,7 +304,7 @@ TEST(HardCase22, AContactSmallerThanATriangleDoesNotOscillateAndWarns) {
   Press press(gel(), SphereShape{0.3}, 0.3);
   double before = 0.0;
   for (int k = 1; k <= 10; ++k) {
-    const PressState& state = press.step(at(0.11, 0.07, 0.3 - 0.02 * k));
+    const PressState& state = press.step(target_at(0.11, 0.07, 0.3 - 0.02 * k));
     expect_contact_laws(state);
     EXPECT_TRUE(state.under_resolved);
     EXPECT_GE(state.wrench[2], before);  // deeper is never weaker
@@ -331,10 +319,10 @@ TEST(HardCase22, AContactSmallerThanATriangleDoesNotOscillateAndWarns) {
 TEST(HardCase23, UnloadingLeavesNoForceWithoutHistory) {
   for (const double friction : {0.0, 0.5}) {
     Press press(gel(), kProbe, friction);
-    press.step(at(0, 0, -0.5));
-    press.step(at(0.2, 0, -0.5));
-    press.step(at(0.2, 0, -0.1));
-    const PressState& state = press.step(at(0.2, 0, 0.01));
+    press.step(target_at(0, 0, -0.5));
+    press.step(target_at(0.2, 0, -0.5));
+    press.step(target_at(0.2, 0, -0.1));
+    const PressState& state = press.step(target_at(0.2, 0, 0.01));
     EXPECT_EQ(state.wrench.norm(), 0.0);
     EXPECT_EQ(state.traction.norm(), 0.0);
     EXPECT_EQ(state.bead_displacement.norm(), 0.0);
@@ -372,8 +360,8 @@ TEST(HardCase24, RotationMirrorAndPermutationDoNotChangeTheAnswer) {
       Press there(other, SphereShape{kRadius}, friction, tight());
       for (const Eigen::Vector3d& p : {Eigen::Vector3d(0.3, 0.1, kRadius - 0.3), {0.4, 0.1, kRadius - 0.3}}) {
         const Eigen::Vector3d q = turn * p;
-        const PressState& a = here.step(at(p.x(), p.y(), p.z()));
-        const PressState& b = there.step(at(q.x(), q.y(), q.z()));
+        const PressState& a = here.step(target_at(p.x(), p.y(), p.z()));
+        const PressState& b = there.step(target_at(q.x(), q.y(), q.z()));
         EXPECT_LT(force((turn * a.wrench.head<3>() - b.wrench.head<3>()).norm() / a.wrench.norm()), force.bar);
         // A torque is an axial vector.
         const Eigen::Vector3d turned_torque = turn.determinant() * turn * a.wrench.tail<3>();
@@ -393,15 +381,15 @@ TEST(HardCase24, RotationMirrorAndPermutationDoNotChangeTheAnswer) {
 
 TEST(HardCase25, AShearAtTheFrictionLimitIsReportedAsGrossSlip) {
   Press press(gel(), kProbe, 0.6);
-  PressTarget target = at(0, 0, 0);
+  PressTarget target = target_at(0, 0, 0);
   target.axis[2] = AxisControl::with_force(2.0);
   press.step(target);
   target.axis[0] = AxisControl::with_force(0.6 * 2.0);
-  const std::string message = message_of(press, target);
+  const std::string message = press_refusal(press, target);
   EXPECT_NE(message.find("gross slip"), std::string::npos);
   EXPECT_NE(message.find("1.2"), std::string::npos);  // the number that can't be had
   target.axis[0] = AxisControl::with_force(0.9 * 0.6 * 2.0);
-  EXPECT_EQ(message_of(press, target), "");
+  EXPECT_EQ(press_refusal(press, target), "");
   EXPECT_NEAR(press.state().wrench[0], 1.08, 1e-6);
   did("1.2 N of shear under 2 N with mu = 0.6 is {}\n1.08 N of shear is met to {:.1g} N", refused(message),
       std::abs(press.state().wrench[0] - 1.08));
@@ -428,7 +416,7 @@ TEST(HardCase26, AnObjectMovedByANanometreMovesTheAnswerAsLittle) {
 TEST(HardCase20, ALoadCycleOfTheVhsProbeHoldsTheLawsThroughout) {
   // The verification of [VisioHaptic2024, secs. 4.3 and 4.4]: to 5 N, then sheared to and fro.
   Press press(gel(), kProbe, 0.6);
-  PressTarget target = at(0, 0, 0);
+  PressTarget target = target_at(0, 0, 0);
   Worst force{5e-6};
   Worst residual{1e-6};
   const auto step = [&] {

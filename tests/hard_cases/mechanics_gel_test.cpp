@@ -16,31 +16,18 @@
 #include "fem/mesh/gel_body.h"
 #include "fem/shapes/mesh_shape.h"
 #include "tests/hard_cases/hard_case.h"
+#include "tests/support/box_gel.h"
 #include "tests/support/message_of.h"
 
 namespace touchstone::fem {
 namespace {
 
 using Eigen::Vector3d;
+using test::box_gel;
 using test::did;
 using test::message_of;
 using test::Worst;
 using ::testing::HasSubstr;
-
-/// A box, z from -size.z() to 0, top outer and bottom bonded.
-SolidGel box_gel(const Vector3d& size) {
-  SolidGel gel;
-  for (int corner = 0; corner < 8; ++corner) {
-    const Vector3d at((corner & 1) ? 0.5 : -0.5, (corner & 2) ? 0.5 : -0.5, (corner & 4) ? 0.0 : -1.0);
-    gel.surface.vertices.push_back(at.cwiseProduct(size));
-  }
-  gel.surface.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
-                           {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
-  gel.faces.assign(12, FaceKind::side);
-  gel.faces[0] = gel.faces[1] = FaceKind::bonded;
-  gel.faces[2] = gel.faces[3] = FaceKind::outer;
-  return gel;
-}
 
 std::string error_of(const GelBody& body) {
   return message_of([&] { mesh_gel(body); });

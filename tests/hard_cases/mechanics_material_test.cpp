@@ -12,12 +12,14 @@
 #include "fem/error/press_error.h"
 #include "fem/mesh/slab.h"
 #include "tests/hard_cases/hard_case.h"
+#include "tests/support/press_steps.h"
 
 namespace touchstone::fem {
 namespace {
 
 using test::did;
 using test::Worst;
+using test::target_at;
 
 /// 5 mm thick, half-width 4 thicknesses; all lengths times `unit`.
 SlabMesh layer(double fine, double unit = 1.0) {
@@ -35,14 +37,8 @@ Compliance gel_of(const SlabMesh& slab, double modulus, double poisson_ratio) {
   return compute_compliance(mesh_slab(slab), {modulus, poisson_ratio}, {}, slab.thickness);
 }
 
-PressTarget at(double x, double y, double z) {
-  PressTarget target;
-  target.axis = {AxisControl::at(x), AxisControl::at(y), AxisControl::at(z)};
-  return target;
-}
-
 double sphere_force(const Compliance& gel, double depth) {
-  return Press(gel, SphereShape{8.0}, 0.0).step(at(0.013, 0.021, 8.0 - depth)).wrench[2];
+  return Press(gel, SphereShape{8.0}, 0.0).step(target_at(0.013, 0.021, 8.0 - depth)).wrench[2];
 }
 
 TEST(HardCase1, APoissonsRatioOfAHalfIsThatOfNearlyAHalf) {
@@ -88,7 +84,7 @@ TEST(HardCase5, UnderASharpPunchTheForceConvergesAndThePeakPressureDoesNot) {
     for (int k = 0; k < kPlaces; ++k) {
       Press press(gel, RoundedCylinder{1.9, 0.0, 3.0}, 0.0);
       const PressState& state = press.step(
-          at(fine * (0.618 * k - std::floor(0.618 * k) - 0.5), fine * (0.755 * k - std::floor(0.755 * k) - 0.5), -0.1));
+          target_at(fine * (0.618 * k - std::floor(0.618 * k) - 0.5), fine * (0.755 * k - std::floor(0.755 * k) - 0.5), -0.1));
       square += std::pow(state.wrench[2] / expected - 1.0, 2) / kPlaces;
       peak += -state.traction.col(2).minCoeff() / kPlaces;
     }
@@ -120,8 +116,8 @@ TEST(HardCase12, OtherUnitsGiveTheSameAnswerAfterScaling) {
       tolerance.lookup_mm = 1e-8 * unit.length;
       tolerance.force = 1e-9;
       Press press(gel, SphereShape{8.0 * unit.length}, 0.4, tolerance);
-      press.step(at(0.013 * unit.length, 0.021 * unit.length, (8.0 - 0.3) * unit.length));
-      const PressState& state = press.step(at(0.063 * unit.length, 0.021 * unit.length, (8.0 - 0.3) * unit.length));
+      press.step(target_at(0.013 * unit.length, 0.021 * unit.length, (8.0 - 0.3) * unit.length));
+      const PressState& state = press.step(target_at(0.063 * unit.length, 0.021 * unit.length, (8.0 - 0.3) * unit.length));
       return state.wrench.head<3>() / (unit.stress * unit.length * unit.length);
     };
     TetMesh mesh = mesh_slab(layer(0.6));

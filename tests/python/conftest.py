@@ -1,5 +1,8 @@
+import os
 import pathlib
+import pickle
 
+import numpy as np
 import pytest
 
 import touchstone as ts
@@ -22,3 +25,18 @@ def sensor():
 @pytest.fixture(scope="session")
 def ball():
     return ts.Object(EXAMPLES / "quick-ball.yaml")
+
+
+@pytest.fixture(scope="session")
+def other_processes():
+    """Checks that a data set gives a sample's wrench after pickling, and in a forked process."""
+    def check(data, sample, wanted):
+        assert np.array_equal(pickle.loads(pickle.dumps(data))[sample]["wrench"], wanted)
+        read, write = os.pipe()
+        child = os.fork()
+        if child == 0:
+            os.write(write, data[sample]["wrench"].tobytes())
+            os._exit(0)
+        assert os.waitpid(child, 0)[1] == 0
+        assert os.read(read, 1000) == wanted.tobytes()
+    return check

@@ -1,7 +1,6 @@
 import hashlib
 import os
 import pathlib
-import pickle
 import shutil
 import signal
 import threading
@@ -118,17 +117,10 @@ def test_damage_is_found(folder, tmp_path):
         ts.Dataset(copy).verify()
 
 
-def test_a_set_can_go_to_other_processes(folder):
+def test_a_set_can_go_to_other_processes(folder, other_processes):
     data = ts.Dataset(folder, "test")
     wanted = data[3]["wrench"]
-    assert np.array_equal(pickle.loads(pickle.dumps(data))[3]["wrench"], wanted)
-    read, write = os.pipe()
-    child = os.fork()
-    if child == 0:
-        os.write(write, data[3]["wrench"].tobytes())
-        os._exit(0)
-    assert os.waitpid(child, 0)[1] == 0
-    assert os.read(read, 1000) == wanted.tobytes()
+    other_processes(data, 3, wanted)
 
 
 def test_torch_takes_it(folder):

@@ -1,5 +1,3 @@
-import os
-import pickle
 
 import numpy as np
 import pytest
@@ -175,17 +173,10 @@ def test_mistakes_and_damage_are_named(folder, job, tmp_path, examples):
         ts.Dataset(copy)
 
 
-def test_a_drawn_set_can_go_to_other_processes(folder):
+def test_a_drawn_set_can_go_to_other_processes(folder, other_processes):
     data = ts.Dataset(folder, "test", columns=("wrench", "frame"))
     wanted = data[3]["wrench"]
-    assert np.array_equal(pickle.loads(pickle.dumps(data))[3]["wrench"], wanted)
-    read, write = os.pipe()
-    child = os.fork()
-    if child == 0:
-        os.write(write, data[3]["wrench"].tobytes())
-        os._exit(0)
-    assert os.waitpid(child, 0)[1] == 0
-    assert os.read(read, 1000) == wanted.tobytes()
+    other_processes(data, 3, wanted)
 
 
 def test_torch_takes_a_drawn_set(folder):

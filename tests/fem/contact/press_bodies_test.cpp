@@ -12,15 +12,12 @@
 #include "fem/contact/press.h"
 #include "fem/mesh/slab.h"
 #include "tests/support/half_space_gel.h"
+#include "tests/support/press_steps.h"
 
 namespace touchstone::fem {
 namespace {
 
-PressTarget at(double x, double y, double z) {
-  PressTarget target;
-  target.axis = {AxisControl::at(x), AxisControl::at(y), AxisControl::at(z)};
-  return target;
-}
+using test::target_at;
 
 const Compliance& flat_gel() {
   static const Compliance gel = test::half_space_gel(3.0, 0.25, {1.0, 0.49}, 10.0);
@@ -44,9 +41,9 @@ const Compliance& slab_gel() {
 TEST(SeveralBodies, ThatMissChangeNothing) {
   Press alone(flat_gel(), SphereShape{4.0}, 0.3);
   Press with(flat_gel(), std::vector<PressBody>{{SphereShape{4.0}, 0.3, nullptr}, {BoxShape{{1, 1, 1}}, 0.3, nullptr}});
-  for (const PressTarget& target : {at(0, 0, 3.9), at(0.05, 0, 3.85)}) {
+  for (const PressTarget& target : {target_at(0, 0, 3.9), target_at(0.05, 0, 3.85)}) {
     const Eigen::Matrix<double, 6, 1> expected = alone.step(target).wrench;
-    const PressState& state = with.step(std::array{target, at(1.0, 1.0, 3.0)});
+    const PressState& state = with.step(std::array{target, target_at(1.0, 1.0, 3.0)});
     EXPECT_EQ(state.bodies[0].wrench, expected);
     EXPECT_EQ(state.bodies[1].wrench.norm(), 0.0);
   }
@@ -55,20 +52,20 @@ TEST(SeveralBodies, ThatMissChangeNothing) {
 TEST(SeveralBodies, FeelEachOtherThroughTheGel) {
   // A second sphere beside the first lowers the gel there: the first, held in place, carries less.
   Press alone(flat_gel(), SphereShape{4.0}, 0.0);
-  const double by_itself = alone.step(at(-1.2, 0, 3.9)).wrench[2];
+  const double by_itself = alone.step(target_at(-1.2, 0, 3.9)).wrench[2];
   Press pair(flat_gel(), std::vector<PressBody>{{SphereShape{4.0}, 0.0, nullptr}, {SphereShape{4.0}, 0.0, nullptr}});
-  const PressState& state = pair.step(std::array{at(-1.2, 0, 3.9), at(1.2, 0, 3.9)});
+  const PressState& state = pair.step(std::array{target_at(-1.2, 0, 3.9), target_at(1.2, 0, 3.9)});
   EXPECT_LT(state.bodies[0].wrench[2], 0.97 * by_itself);
   EXPECT_NEAR(state.bodies[0].wrench[2], state.bodies[1].wrench[2], 1e-7);
   EXPECT_EQ(state.wrench, state.bodies[0].wrench);
   // One leaves: the other is as if it had never been there.
-  const PressState& after = pair.step(std::array{at(-1.2, 0, 3.9), at(1.2, 0, 5.0)});
+  const PressState& after = pair.step(std::array{target_at(-1.2, 0, 3.9), target_at(1.2, 0, 5.0)});
   EXPECT_NEAR(after.bodies[0].wrench[2], by_itself, 1e-9);
 }
 
 TEST(SeveralBodies, AreHeldByTheirOwnForces) {
   Press pair(flat_gel(), std::vector<PressBody>{{SphereShape{4.0}, 0.5, nullptr}, {SphereShape{3.0}, 0.2, nullptr}});
-  std::array<PressTarget, 2> targets = {at(-1.2, 0, 4.5), at(1.2, 0, 3.5)};
+  std::array<PressTarget, 2> targets = {target_at(-1.2, 0, 4.5), target_at(1.2, 0, 3.5)};
   targets[0].axis[2] = AxisControl::with_force(0.05);
   targets[1].axis[2] = AxisControl::with_force(0.02);
   pair.step(targets);
@@ -86,7 +83,7 @@ TEST(SeveralBodies, AFlatOneLeavesTheOtherItsFirstContact) {
   // Both are led by force from the air; the punch alone has more vertices right under it than the first block takes.
   Press pair(flat_gel(),
              std::vector<PressBody>{{RoundedCylinder{1.2, 0.2, 3.0}, 0.5, nullptr}, {SphereShape{2.0}, 0.5, nullptr}});
-  std::array<PressTarget, 2> targets = {at(-1.5, 0, 0.5), at(1.5, 0, 2.5)};
+  std::array<PressTarget, 2> targets = {target_at(-1.5, 0, 0.5), target_at(1.5, 0, 2.5)};
   targets[0].axis[2] = AxisControl::with_force(0.1);
   targets[1].axis[2] = AxisControl::with_force(0.03);
   const PressState& state = pair.step(targets);
@@ -107,9 +104,9 @@ const Eigen::Matrix3d kUpsideDown = Eigen::Vector3d(1, -1, -1).asDiagonal();
 TEST(ElasticBody, AMirrorImageOfTheGelYieldsAsMuchAsTheGel) {
   // By symmetry the interface stays plane: each half is as if pressed half as deep by a rigid plate.
   Press rigid(slab_gel(), BoxShape{{20.0, 20.0, 2.0}}, 0.0);
-  const double expected = rigid.step(at(0, 0, 1.0 - 0.05)).wrench[2];
+  const double expected = rigid.step(target_at(0, 0, 1.0 - 0.05)).wrench[2];
   Press pair(slab_gel(), std::vector<PressBody>{elastic_box(1.0, 0.0)});
-  PressTarget target = at(0, 0, 1.0 - 0.1);
+  PressTarget target = target_at(0, 0, 1.0 - 0.1);
   target.rotation = kUpsideDown;
   const PressState& state = pair.step(target);
   EXPECT_NEAR(state.wrench[2], expected, 0.01 * expected);
@@ -145,7 +142,7 @@ TEST(ElasticBody, VeryStiffIsRigid) {
   Press rigid(slab_gel(), BoxShape{{8.0, 8.0, 2.0}}, 0.4);
   Press steel(slab_gel(), std::vector<PressBody>{elastic_box(1e7, 0.4)});
   for (const double x : {0.0, 0.02}) {
-    PressTarget target = at(x, 0, 1.0 - 0.05);
+    PressTarget target = target_at(x, 0, 1.0 - 0.05);
     target.rotation = kUpsideDown;
     const Eigen::Matrix<double, 6, 1> expected = rigid.step(target).wrench;
     EXPECT_LT((steel.step(target).wrench - expected).norm(), 1e-5 * expected.norm());
@@ -159,7 +156,7 @@ TEST(ElasticBody, AndGelMayExchangeTheirRoles) {
   hard.surface = SharedMatrix(slab_gel().surface.view() / 20.0);
   Press exchanged(hard, std::vector<PressBody>{elastic_box(1.0, 50.0)});
   for (const double x : {0.0, 0.02}) {
-    PressTarget target = at(x, 0, 1.0 - 0.05);
+    PressTarget target = target_at(x, 0, 1.0 - 0.05);
     target.rotation = kUpsideDown;
     const Eigen::Matrix<double, 6, 1> expected = usual.step(target).wrench;
     const Eigen::Matrix<double, 6, 1> found = exchanged.step(target).wrench;
@@ -169,7 +166,7 @@ TEST(ElasticBody, AndGelMayExchangeTheirRoles) {
 
 TEST(TorqueControl, ATiltedPlateAlignsItselfWithTheGel) {
   Press press(flat_gel(), BoxShape{{2.0, 2.0, 1.0}}, 0.0);
-  PressTarget target = at(0.0, 0.0, 0.5);
+  PressTarget target = target_at(0.0, 0.0, 0.5);
   target.axis[2] = AxisControl::with_force(0.2);
   target.rotation = Eigen::AngleAxisd(0.06, Eigen::Vector3d(1, 0.5, 0).normalized()).toRotationMatrix();
   target.torque = {0.0, 0.0, std::nullopt};
@@ -186,7 +183,7 @@ TEST(TorqueControl, TiltsAPunchByTheClosedForm) {
   const Compliance gel = test::half_space_gel(3.0, 0.2, {1.0, 0.3}, 100.0);
   const double radius = 2.0;
   Press press(gel, RoundedCylinder{radius, 0.0, 3.0}, 0.0);
-  PressTarget target = at(0.01, 0.02, -0.1);
+  PressTarget target = target_at(0.01, 0.02, -0.1);
   press.step(target);
   target.torque[0] = 0.05;
   const PressState& state = press.step(target);
@@ -204,7 +201,7 @@ TEST(TorqueControl, TwistsAStuckPunchByTheClosedForm) {
   const Compliance gel = test::half_space_gel(3.0, 0.2, {1.0, 0.3}, 100.0);
   const double radius = 2.0;
   Press press(gel, RoundedCylinder{radius, 0.0, 3.0}, std::numeric_limits<double>::infinity());
-  PressTarget target = at(0.01, 0.02, -0.1);
+  PressTarget target = target_at(0.01, 0.02, -0.1);
   press.step(target);
   const double before = press.state().wrench[5];
   target.torque[2] = before + 0.05;
@@ -217,7 +214,7 @@ TEST(TorqueControl, TwistsAStuckPunchByTheClosedForm) {
 
 TEST(TorqueControl, HoldsAllSixComponents) {
   Press press(flat_gel(), BoxShape{{2.0, 2.0, 1.0}}, 0.6);
-  PressTarget target = at(0.1, -0.1, 0.6);
+  PressTarget target = target_at(0.1, -0.1, 0.6);
   target.axis[2] = AxisControl::with_force(0.3);
   press.step(target);
   target.axis[0] = AxisControl::with_force(0.05);
@@ -234,7 +231,7 @@ TEST(TorqueControl, HoldsAllSixComponents) {
 
 TEST(TorqueControl, RefusesWhatCannotBeHeld) {
   Press press(flat_gel(), BoxShape{{2.0, 2.0, 1.0}}, 0.3);
-  PressTarget target = at(0, 0, 0.4);
+  PressTarget target = target_at(0, 0, 0.4);
   target.torque[0] = std::numeric_limits<double>::quiet_NaN();
   EXPECT_THROW(press.step(target), Error);
   target.torque[0] = 50.0;  // more than the normal force can hold at the box's edge: it would turn over

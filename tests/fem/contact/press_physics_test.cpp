@@ -8,9 +8,12 @@
 #include "closed_forms/contact_closed_forms.h"
 #include "fem/contact/press.h"
 #include "fem/mesh/slab.h"
+#include "tests/support/press_steps.h"
 
 namespace touchstone::fem {
 namespace {
+
+using test::target_at;
 
 constexpr double kModulus = 1.0;
 
@@ -48,12 +51,6 @@ const Compliance& layer_gel(double poisson_ratio) {
   return poisson_ratio < 0.4 ? compressible : soft;
 }
 
-PressTarget at(double x, double y, double z) {
-  PressTarget target;
-  target.axis = {AxisControl::at(x), AxisControl::at(y), AxisControl::at(z)};
-  return target;
-}
-
 class ThickGel : public testing::TestWithParam<double> {};
 
 TEST_P(ThickGel, ASphereMeetsHertzWithinTwoPercent) {
@@ -61,7 +58,7 @@ TEST_P(ThickGel, ASphereMeetsHertzWithinTwoPercent) {
   const double radius = 8.0;
   for (const double depth : {0.05, 0.1, 0.15}) {  // a of 0.63 to 1.1 mm: 3 to 5 edges, under a 50th of the thickness
     Press press(gel, SphereShape{radius}, 0.0);
-    const PressState& state = press.step(at(0.013, 0.021, radius - depth));
+    const PressState& state = press.step(target_at(0.013, 0.021, radius - depth));
     const double hertz = closed_forms::hertz_force(kModulus, GetParam(), radius, depth);
     EXPECT_NEAR(state.wrench[2], hertz, 0.02 * hertz) << depth;
     const double a = closed_forms::hertz_contact_radius(radius, depth);
@@ -76,7 +73,7 @@ TEST_P(ThickGel, ASphereMeetsTheLayerReferenceWithinHalfAPercent) {
   const double radius = 8.0;
   for (const double depth : {0.1, 0.15}) {
     Press press(gel, SphereShape{radius}, 0.0);
-    const PressState& state = press.step(at(0.013, 0.021, radius - depth));
+    const PressState& state = press.step(target_at(0.013, 0.021, radius - depth));
     const double wanted = closed_forms::sphere_on_layer(kModulus, GetParam(), gel.thickness, radius, depth).force;
     EXPECT_NEAR(state.wrench[2], wanted, 0.006 * wanted) << depth;
   }
@@ -84,7 +81,7 @@ TEST_P(ThickGel, ASphereMeetsTheLayerReferenceWithinHalfAPercent) {
 
 TEST_P(ThickGel, AFlatPunchMeetsItsClosedForm) {
   Press press(thick_gel(GetParam()), RoundedCylinder{1.0, 0.0, 3.0}, 0.0);
-  const PressState& state = press.step(at(0.013, 0.021, -0.05));
+  const PressState& state = press.step(target_at(0.013, 0.021, -0.05));
   const double wanted = closed_forms::flat_punch_force(kModulus, GetParam(), 1.0, 0.05);
   EXPECT_NEAR(state.wrench[2], wanted, 0.035 * wanted);
 }
@@ -96,8 +93,8 @@ TEST(ThickGel, NearIncompressibilityDoesNotLock) {
   const double radius = 8.0;
   Press one(thick_gel(0.3), SphereShape{radius}, 0.0);
   Press other(thick_gel(0.4999), SphereShape{radius}, 0.0);
-  const double a = one.step(at(0, 0, radius - 0.1)).wrench[2] * (1.0 - 0.3 * 0.3);
-  const double b = other.step(at(0, 0, radius - 0.1)).wrench[2] * (1.0 - 0.4999 * 0.4999);
+  const double a = one.step(target_at(0, 0, radius - 0.1)).wrench[2] * (1.0 - 0.3 * 0.3);
+  const double b = other.step(target_at(0, 0, radius - 0.1)).wrench[2] * (1.0 - 0.4999 * 0.4999);
   EXPECT_NEAR(a / b, 1.0, 0.01);
 }
 
@@ -108,7 +105,7 @@ TEST(ThickGel, ASphereShearedFollowsCattaneoAndMindlin) {
   const double friction = 0.3;
   const double force = 0.12;
   Press press(gel, SphereShape{radius}, friction);
-  PressTarget target = at(0, 0, 0);
+  PressTarget target = target_at(0, 0, 0);
   target.axis[2] = AxisControl::with_force(force);
   const double depth = radius - press.step(target).gel_from_object.translation.z();
   const double a = closed_forms::hertz_contact_radius(radius, depth);
@@ -132,7 +129,7 @@ TEST(ThickGel, ASphereShearedFollowsCattaneoAndMindlin) {
 TEST(LayerGel, AFlatPunchMeetsHayes) {
   const double nu = 0.3;
   Press press(layer_gel(nu), RoundedCylinder{2.0, 0.0, 3.0}, 0.0);
-  const double force = press.step(at(0.013, 0.021, -0.1)).wrench[2];
+  const double force = press.step(target_at(0.013, 0.021, -0.1)).wrench[2];
   const double shear_modulus = kModulus / (2.0 * (1.0 + nu));
   const double wanted = 4.0 * shear_modulus * 2.0 * closed_forms::hayes_kappa(0.4) * 0.1 / (1.0 - nu);
   EXPECT_NEAR(force, wanted, 0.02 * wanted);
@@ -144,12 +141,12 @@ TEST_P(LayerGel, BodiesMeetTheLayerReference) {
   const double nu = GetParam();
   for (const double depth : {0.1, 0.3, 0.5}) {
     Press press(layer_gel(nu), SphereShape{8.0}, 0.0);
-    const double force = press.step(at(0.013, 0.021, 8.0 - depth)).wrench[2];
+    const double force = press.step(target_at(0.013, 0.021, 8.0 - depth)).wrench[2];
     const double wanted = closed_forms::sphere_on_layer(kModulus, nu, 5.0, 8.0, depth).force;
     EXPECT_NEAR(force, wanted, (depth < 0.2 ? 0.02 : 0.006) * wanted) << depth;  // two edges a radius, then more
   }
   Press press(layer_gel(nu), RoundedCylinder{2.0, 0.0, 3.0}, 0.0);
-  const double force = press.step(at(0.013, 0.021, -0.1)).wrench[2];
+  const double force = press.step(target_at(0.013, 0.021, -0.1)).wrench[2];
   const double wanted = closed_forms::flat_punch_on_layer(kModulus, nu, 5.0, 2.0, 0.1).force;
   EXPECT_NEAR(force, wanted, 0.02 * wanted);
 }
@@ -163,7 +160,7 @@ TEST_P(LayerGel, ARoundedPunchMeetsTheLayerReference) {
     return out <= 0.0 ? 0.0 : out / std::sqrt(std::max(1e-12, punch.edge_radius * punch.edge_radius - out * out));
   };
   Press press(layer_gel(nu), punch, 0.0);
-  const double force = press.step(at(0.013, 0.021, -0.15)).wrench[2];
+  const double force = press.step(target_at(0.013, 0.021, -0.15)).wrench[2];
   const double wanted = closed_forms::profile_on_layer(kModulus, nu, 5.0, slope, 0.15, punch.radius).force;
   EXPECT_NEAR(force, wanted, 0.03 * wanted);
 }
@@ -173,9 +170,9 @@ TEST_P(LayerGel, ShearNeedsAboutAsMuchAsBetweenSlipAndBond) {
   const double nu = GetParam();
   const double shear_modulus = kModulus / (2.0 * (1.0 + nu));
   Press press(layer_gel(nu), RoundedCylinder{2.0, 0.0, 3.0}, std::numeric_limits<double>::infinity());
-  press.step(at(0.013, 0.021, -0.3));
+  press.step(target_at(0.013, 0.021, -0.3));
   const double before = press.state().wrench[0];
-  const PressState& state = press.step(at(0.013 + 0.02, 0.021, -0.3));
+  const PressState& state = press.step(target_at(0.013 + 0.02, 0.021, -0.3));
   const double half_space = 8.0 * shear_modulus * 2.0 * 0.02 / (2.0 - nu);
   EXPECT_GT(before - state.wrench[0], 1.02 * half_space);
   EXPECT_LT(before - state.wrench[0], 1.6 * half_space);

@@ -12,9 +12,13 @@
 #include "core/units.h"
 #include "tests/core/test_solids.h"
 #include "tests/support/half_space_gel.h"
+#include "tests/support/press_steps.h"
 
 namespace touchstone::fem {
 namespace {
+
+using test::press_refusal;
+using test::target_at;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kRadius = 10.0;
@@ -24,15 +28,9 @@ const Compliance& gel() {
   return made;
 }
 
-PressTarget at(double x, double y, double z) {
-  PressTarget target;
-  target.axis = {AxisControl::at(x), AxisControl::at(y), AxisControl::at(z)};
-  return target;
-}
-
 /// A sphere's lowest point at (x, y), `depth` under the undeformed surface.
 PressTarget sphere_at(double x, double y, double depth) {
-  return at(x, y, kRadius - depth);
+  return target_at(x, y, kRadius - depth);
 }
 
 PressTolerance tight() {
@@ -46,15 +44,6 @@ void expect_equal_states(const PressState& a, const PressState& b, double tolera
   EXPECT_LT((a.wrench - b.wrench).norm(), tolerance * a.wrench.norm());
   EXPECT_LT((a.traction - b.traction).norm(), tolerance * a.traction.norm());
   EXPECT_LT((a.surface_displacement - b.surface_displacement).norm(), tolerance * a.surface_displacement.norm());
-}
-
-std::string message_of(Press& press, const PressTarget& target) {
-  try {
-    press.step(target);
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
 }
 
 TEST(Press, BeforeTheFirstStepNothingTouches) {
@@ -182,7 +171,7 @@ TEST(Press, WithFrictionUnloadingToAirLeavesNothing) {
 TEST(Press, ForceControlMeetsTheForce) {
   for (const double friction : {0.0, 0.5}) {
     Press press(gel(), SphereShape{kRadius}, friction);
-    PressTarget target = at(0, 0, 0);
+    PressTarget target = target_at(0, 0, 0);
     for (const double force : {0.2, 0.5, 0.1, 0.6}) {
       target.axis[2] = AxisControl::with_force(force);
       const PressState& state = press.step(target);
@@ -196,7 +185,7 @@ TEST(Press, ForceAndPoseControlAgree) {
   Press by_pose(gel(), SphereShape{kRadius}, 0.0, tight());
   const double force = by_pose.step(sphere_at(0.1, 0, 0.2)).wrench[2];
   Press by_force(gel(), SphereShape{kRadius}, 0.0, tight());
-  PressTarget target = at(0.1, 0, 0);
+  PressTarget target = target_at(0.1, 0, 0);
   target.axis[2] = AxisControl::with_force(force);
   by_force.step(target);
   EXPECT_NEAR(by_force.state().gel_from_object.translation.z(), kRadius - 0.2, 1e-9);
@@ -204,7 +193,7 @@ TEST(Press, ForceAndPoseControlAgree) {
 
 TEST(Press, NoNormalForceMeansJustTouching) {
   Press press(gel(), SphereShape{kRadius}, 0.5);
-  PressTarget target = at(0, 0, 0);
+  PressTarget target = target_at(0, 0, 0);
   target.axis[2] = AxisControl::with_force(0.3);
   press.step(target);
   target.axis[2] = AxisControl::with_force(0.0);
@@ -215,7 +204,7 @@ TEST(Press, NoNormalForceMeansJustTouching) {
 
 TEST(Press, ShearForceControlMeetsBothForces) {
   Press press(gel(), SphereShape{kRadius}, 0.5);
-  PressTarget target = at(0, 0, 0);
+  PressTarget target = target_at(0, 0, 0);
   target.axis[2] = AxisControl::with_force(0.4);
   press.step(target);
   double moved = 0.0;
@@ -235,7 +224,7 @@ TEST(Press, FollowsCattaneoAndMindlin) {
   const double friction = 0.3;
   const double force = 0.6;
   Press press(gel(), SphereShape{kRadius}, friction);
-  PressTarget target = at(0, 0, 0);
+  PressTarget target = target_at(0, 0, 0);
   target.axis[2] = AxisControl::with_force(force);
   const PressState first = press.step(target);
   const double depth = kRadius - first.gel_from_object.translation.z();
@@ -258,17 +247,17 @@ TEST(Press, FollowsCattaneoAndMindlin) {
 
 TEST(Press, GrossSlipIsRefusedAtTheLimitAndBeyond) {
   Press press(gel(), SphereShape{kRadius}, 0.5);
-  PressTarget target = at(0, 0, 0);
+  PressTarget target = target_at(0, 0, 0);
   target.axis[2] = AxisControl::with_force(0.4);
   press.step(target);
   const PressState before = press.state();
   for (const double shear : {0.2, 0.21, 5.0}) {
     target.axis[0] = AxisControl::with_force(shear);
-    EXPECT_NE(message_of(press, target).find("gross slip"), std::string::npos);
+    EXPECT_NE(press_refusal(press, target).find("gross slip"), std::string::npos);
     expect_equal_states(before, press.state(), 1e-15);  // as before the step
   }
   target.axis[0] = AxisControl::with_force(0.19);
-  EXPECT_EQ(message_of(press, target), "");
+  EXPECT_EQ(press_refusal(press, target), "");
 }
 
 TEST(Press, GrossSlipIsRefusedAtHeldDepth) {
@@ -276,11 +265,11 @@ TEST(Press, GrossSlipIsRefusedAtHeldDepth) {
   press.step(sphere_at(0, 0, 0.2));
   PressTarget target = sphere_at(0, 0, 0.2);
   target.axis[0] = AxisControl::with_force(5.0);
-  EXPECT_NE(message_of(press, target).find("gross slip"), std::string::npos);
+  EXPECT_NE(press_refusal(press, target).find("gross slip"), std::string::npos);
   Press smooth(gel(), SphereShape{kRadius}, 0.0);
-  EXPECT_NE(message_of(smooth, target).find("gross slip"), std::string::npos);
+  EXPECT_NE(press_refusal(smooth, target).find("gross slip"), std::string::npos);
   target.axis[2] = AxisControl::at(kRadius + 1.0);
-  EXPECT_NE(message_of(press, target).find("gross slip"), std::string::npos);
+  EXPECT_NE(press_refusal(press, target).find("gross slip"), std::string::npos);
 }
 
 TEST(Press, ALongSlideCarriesMuTimesTheNormalForce) {
@@ -400,7 +389,7 @@ TEST(Press, ScalesWithUnits) {
   Press other(scaled, SphereShape{kRadius * length}, 0.4, tolerance);
   for (const auto& [x, depth] : {std::pair{0.0, 0.1}, {0.02, 0.2}, {0.1, 0.15}}) {
     plain.step(sphere_at(x, 0, depth));
-    other.step(at(x * length, 0, (kRadius - depth) * length));
+    other.step(target_at(x * length, 0, (kRadius - depth) * length));
     const double force = stress * length * length;
     EXPECT_LT((other.state().wrench.head<3>() / force - plain.state().wrench.head<3>()).norm(), 1e-9);
     EXPECT_LT((other.state().traction / stress - plain.state().traction).norm(), 1e-7);
@@ -410,38 +399,38 @@ TEST(Press, ScalesWithUnits) {
 TEST(Press, RefusesWhatIsDeeperThanTheGel) {
   for (const double friction : {0.0, 0.5}) {
     Press press(gel(), SphereShape{kRadius}, friction);
-    EXPECT_NE(message_of(press, sphere_at(0, 0, 5.1)).find("reaches"), std::string::npos);
-    PressTarget target = at(0, 0, 0);
+    EXPECT_NE(press_refusal(press, sphere_at(0, 0, 5.1)).find("reaches"), std::string::npos);
+    PressTarget target = target_at(0, 0, 0);
     target.axis[2] = AxisControl::with_force(1e4);
-    EXPECT_NE(message_of(press, target), "");
+    EXPECT_NE(press_refusal(press, target), "");
   }
 }
 
 TEST(Press, RefusesBadTargets) {
   Press press(gel(), SphereShape{kRadius}, 0.5);
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_NE(message_of(press, at(nan, 0, 0)).find("finite"), std::string::npos);
-  EXPECT_NE(message_of(press, at(0, 0, kInfinity)).find("finite"), std::string::npos);
+  EXPECT_NE(press_refusal(press, target_at(nan, 0, 0)).find("finite"), std::string::npos);
+  EXPECT_NE(press_refusal(press, target_at(0, 0, kInfinity)).find("finite"), std::string::npos);
   PressTarget target = sphere_at(0, 0, 0.1);
   target.rotation(0, 1) = nan;
-  EXPECT_NE(message_of(press, target).find("rotation"), std::string::npos);
+  EXPECT_NE(press_refusal(press, target).find("rotation"), std::string::npos);
   target.rotation = 2.0 * Eigen::Matrix3d::Identity();
-  EXPECT_NE(message_of(press, target).find("rotation"), std::string::npos);
+  EXPECT_NE(press_refusal(press, target).find("rotation"), std::string::npos);
   target.rotation = Eigen::Vector3d(1, 1, -1).asDiagonal();
-  EXPECT_NE(message_of(press, target).find("rotation"), std::string::npos);
-  target = at(0, 0, 0);
+  EXPECT_NE(press_refusal(press, target).find("rotation"), std::string::npos);
+  target = target_at(0, 0, 0);
   target.axis[2] = AxisControl::with_force(-0.1);
-  EXPECT_NE(message_of(press, target).find("can't pull"), std::string::npos);
-  target = at(100, 0, 0);
+  EXPECT_NE(press_refusal(press, target).find("can't pull"), std::string::npos);
+  target = target_at(100, 0, 0);
   target.axis[2] = AxisControl::with_force(0.1);
-  EXPECT_NE(message_of(press, target).find("isn't over the gel"), std::string::npos);
+  EXPECT_NE(press_refusal(press, target).find("isn't over the gel"), std::string::npos);
   EXPECT_THROW(Press(gel(), SphereShape{1.0}, -0.1), Error);
   EXPECT_THROW(Press(gel(), SphereShape{1.0}, nan), Error);
 }
 
 TEST(Press, AContactOverTheEdgeOfThePadIsFinite) {
   Press press(gel(), BoxShape{{4.0, 4.0, 2.0}}, 0.3);
-  const PressState& state = press.step(at(3.0, 0, 1.0 - 0.1));
+  const PressState& state = press.step(target_at(3.0, 0, 1.0 - 0.1));
   EXPECT_TRUE(state.wrench.allFinite());
   EXPECT_GT(state.wrench[2], 0.0);
   EXPECT_GT(-state.wrench[4], 0.0);  // its middle stands at x > 0
@@ -449,10 +438,10 @@ TEST(Press, AContactOverTheEdgeOfThePadIsFinite) {
 
 TEST(Press, AContactSmallerThanATriangleSaysThatItIsUnderResolved) {
   Press press(gel(), SphereShape{0.2}, 0.3);
-  const PressState& state = press.step(at(0.03, 0.02, 0.2 - 0.02));
+  const PressState& state = press.step(target_at(0.03, 0.02, 0.2 - 0.02));
   EXPECT_GE(state.wrench[2], 0.0);
   EXPECT_TRUE(state.under_resolved);
-  PressTarget pushed = at(0.03, 0.02, 0);
+  PressTarget pushed = target_at(0.03, 0.02, 0);
   pushed.axis[2] = AxisControl::with_force(0.02);
   EXPECT_NEAR(press.step(pushed).wrench[2], 0.02, 1e-9);
   EXPECT_TRUE(press.state().under_resolved);
@@ -463,8 +452,8 @@ TEST(Press, AContactSmallerThanATriangleSaysThatItIsUnderResolved) {
 
 TEST(Press, TheForceOfASharpPunchIsProportionalToItsDepth) {
   Press press(gel(), RoundedCylinder{1.2, 0.0, 3.0}, 0.0);
-  const double shallow = press.step(at(0, 0, -0.05)).wrench[2];
-  const double deep = press.step(at(0, 0, -0.2)).wrench[2];
+  const double shallow = press.step(target_at(0, 0, -0.05)).wrench[2];
+  const double deep = press.step(target_at(0, 0, -0.2)).wrench[2];
   EXPECT_NEAR(deep, 4.0 * shallow, 1e-6 * deep);
   const double wanted = closed_forms::flat_punch_force(1.0, 0.45, 1.2, 0.2);
   EXPECT_NEAR(deep, wanted, 0.05 * wanted);
@@ -475,7 +464,7 @@ TEST(Press, AFinelyFacetedSphereIsNearlyASphere) {
   for (const double friction : {0.0, 0.4}) {
     Press smooth(gel(), SphereShape{4.0}, friction);
     Press mesh(gel(), faceted, friction);
-    for (const auto& target : {at(0, 0, 4.0 - 0.2), at(0.05, 0, 4.0 - 0.25)}) {
+    for (const auto& target : {target_at(0, 0, 4.0 - 0.2), target_at(0.05, 0, 4.0 - 0.25)}) {
       const Eigen::Matrix<double, 6, 1> wanted = smooth.step(target).wrench;
       EXPECT_LT((mesh.step(target).wrench - wanted).norm(), 0.01 * wanted.norm());
     }
@@ -487,7 +476,7 @@ TEST(Press, ABoxAndItsMeshPressAlike) {
   for (auto& v : mesh.vertices) v = (v - Eigen::Vector3d::Constant(0.5)).cwiseProduct(Eigen::Vector3d(2.0, 1.5, 1.0));
   Press box(gel(), BoxShape{{2.0, 1.5, 1.0}}, 0.3);
   Press faceted(gel(), MeshShape(mesh), 0.3);
-  PressTarget target = at(0.03, 0.02, 0.5 - 0.1);
+  PressTarget target = target_at(0.03, 0.02, 0.5 - 0.1);
   target.rotation = Eigen::AngleAxisd(0.1, Eigen::Vector3d(1, 0.4, 0.2).normalized()).toRotationMatrix();
   const Eigen::Matrix<double, 6, 1> wanted = box.step(target).wrench;
   EXPECT_GT(wanted[2], 0.0);
@@ -497,7 +486,7 @@ TEST(Press, ABoxAndItsMeshPressAlike) {
 TEST(Press, ATiltedPunchLeansOnItsLowSide) {
   for (const double friction : {0.0, 0.5}) {
     Press press(gel(), RoundedCylinder{1.5, 0.3, 2.0}, friction);
-    PressTarget target = at(0, 0, 0);
+    PressTarget target = target_at(0, 0, 0);
     target.axis[2] = AxisControl::with_force(0.3);
     // A turn about y by a positive angle lowers the side at x > 0.
     target.rotation = Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitY()).toRotationMatrix();
@@ -510,7 +499,7 @@ TEST(Press, ATiltedPunchLeansOnItsLowSide) {
 
 TEST(Press, RockingWithFrictionKeepsTheLaws) {
   Press press(gel(), RoundedCylinder{1.5, 0.3, 2.0}, 0.5);
-  PressTarget target = at(0, 0, 0);
+  PressTarget target = target_at(0, 0, 0);
   target.axis[2] = AxisControl::with_force(0.3);
   for (const double angle : {0.0, 0.05, 0.1, -0.1, 0.0}) {
     target.rotation = Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitY()).toRotationMatrix();

@@ -6,9 +6,12 @@
 
 #include "core/error.h"
 #include "fem/error/press_error.h"
+#include "tests/support/press_steps.h"
 
 namespace touchstone::fem {
 namespace {
+
+using test::target_at;
 
 const SlabMesh kSlab{7.0, 7.0, 2.0, 0.5, 1.2, 2.0, 2.0, 0.6};
 const ElasticMaterial kMaterial{0.33, 0.49};
@@ -24,16 +27,10 @@ const Compliance& gel() {
   return gel;
 }
 
-PressTarget at(double x, double y, double z) {
-  PressTarget target;
-  target.axis = {AxisControl::at(x), AxisControl::at(y), AxisControl::at(z)};
-  return target;
-}
-
 /// Pressed by a punch of 0.9 mm at a place.
 PressState punched(double x, double y) {
   Press press(gel(), RoundedCylinder{0.9, 0.0, 5.0}, 0.0);
-  return press.step(at(x, y, -0.1));
+  return press.step(target_at(x, y, -0.1));
 }
 
 TEST(MeshError, FallsWithTheContactsSizeAndIsAtMostWhole) {
@@ -89,7 +86,7 @@ TEST(MeshError, AGelWithEdgesOfItsThicknessIsUnknown) {
   made.mesh_error = measure_mesh_error(made, ladder_of(coarse, kMaterial, {}));
   EXPECT_TRUE(made.mesh_error.smooth.errors.empty());
   Press press(made, SphereShape{8.0}, 0.0);
-  const PressState& state = press.step(at(0.0, 0.0, 7.9));
+  const PressState& state = press.step(target_at(0.0, 0.0, 7.9));
   EXPECT_NEAR(estimate_error(made, state).force.z(), state.wrench[2], 1e-12);
 }
 
@@ -108,7 +105,7 @@ TEST(MeshError, LevelsThatCantBeMadeAreLeftOut) {
 
 TEST(PressError, IsZeroOutOfContact) {
   Press press(gel(), SphereShape{2.0}, 0.3);
-  const PressError error = estimate_error(gel(), press.step(at(0.0, 0.0, 2.1)));
+  const PressError error = estimate_error(gel(), press.step(target_at(0.0, 0.0, 2.1)));
   EXPECT_EQ(error.force.norm(), 0.0);
   EXPECT_EQ(error.displacement, 0.0);
   EXPECT_EQ(error.beads, 0.0);
@@ -119,8 +116,8 @@ TEST(PressError, TellsSpheresFromPunchesByTheirPressure) {
   // Contacts of the same size, three edges in radius.
   Press sphere(gel(), SphereShape{6.0}, 0.0);
   Press punch(gel(), RoundedCylinder{1.5, 0.0, 5.0}, 0.0);
-  const PressState& under_sphere = sphere.step(at(0.07, 0.05, 6.0 - 0.3));
-  const PressState& under_punch = punch.step(at(0.07, 0.05, -0.1));
+  const PressState& under_sphere = sphere.step(target_at(0.07, 0.05, 6.0 - 0.3));
+  const PressState& under_punch = punch.step(target_at(0.07, 0.05, -0.1));
   const double smooth = estimate_error(gel(), under_sphere).force.z() / under_sphere.wrench[2];
   const double sharp = estimate_error(gel(), under_punch).force.z() / under_punch.wrench[2];
   const auto is_of = [](double value, const BodyErrors& body) {
@@ -159,8 +156,8 @@ TEST(PressError, ScalesWithTheLoad) {
   // A punch's answer is linear in its depth, so its errors are too.
   Press shallow(gel(), RoundedCylinder{0.9, 0.0, 5.0}, 0.0);
   Press deep(gel(), RoundedCylinder{0.9, 0.0, 5.0}, 0.0);
-  const PressError small = estimate_error(gel(), shallow.step(at(0.1, 0.0, -1e-4)));
-  const PressError large = estimate_error(gel(), deep.step(at(0.1, 0.0, -2e-4)));
+  const PressError small = estimate_error(gel(), shallow.step(target_at(0.1, 0.0, -1e-4)));
+  const PressError large = estimate_error(gel(), deep.step(target_at(0.1, 0.0, -2e-4)));
   EXPECT_NEAR(large.force.z() / small.force.z(), 2.0, 1e-4);
   EXPECT_NEAR(large.displacement / small.displacement, 2.0, 1e-4);
   EXPECT_NEAR(large.beads / small.beads, 2.0, 1e-4);

@@ -14,9 +14,12 @@
 #include "fem/finite_strain/linear_range.h"
 #include "fem/mesh/gel_body.h"
 #include "tests/fem/mesh/box_mesh.h"
+#include "tests/support/press_steps.h"
 
 namespace touchstone::fem {
 namespace {
+
+using test::target_at;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kRadius = 5.0;
@@ -33,14 +36,8 @@ const FiniteGel& soft_gel() {
   return gel;
 }
 
-PressTarget at(double x, double y, double z) {
-  PressTarget target;
-  target.axis = {AxisControl::at(x), AxisControl::at(y), AxisControl::at(z)};
-  return target;
-}
-
 PressTarget sphere_at(double depth) {
-  return at(0, 0, kRadius - depth);
+  return target_at(0, 0, kRadius - depth);
 }
 
 std::string message_of(FinitePress& press, const PressTarget& target) {
@@ -54,7 +51,7 @@ std::string message_of(FinitePress& press, const PressTarget& target) {
 
 TEST(FinitePress, AMissGivesExactlyZero) {
   FinitePress press(soft_gel(), SphereShape{kRadius}, 0.5);
-  for (const auto& target : {sphere_at(-0.1), at(100, 0, 0), sphere_at(0.0)}) {
+  for (const auto& target : {sphere_at(-0.1), target_at(100, 0, 0), sphere_at(0.0)}) {
     const PressState& state = press.step(target);
     EXPECT_EQ(state.wrench.norm(), 0.0);
     EXPECT_EQ(state.surface_displacement.norm(), 0.0);
@@ -73,8 +70,8 @@ TEST(FinitePress, LetGoTheGelComesToRest) {
     FinitePress press(gel, BoxShape{{60, 60, 30}}, friction);
     const double touch = press.touching({})->translation.z();
     for (const double depth : {-0.5, 0.0, 1e-12, 1e-3}) {
-      EXPECT_GT(press.step(at(0, 0, touch - 0.6)).wrench[2], 0.1);
-      const PressState& state = press.step(at(0, 0, touch - depth));
+      EXPECT_GT(press.step(target_at(0, 0, touch - 0.6)).wrench[2], 0.1);
+      const PressState& state = press.step(target_at(0, 0, touch - depth));
       EXPECT_LT(state.wrench[2], 1e-2) << depth;
       EXPECT_LT(state.factorisations, 30) << depth;
       const double left = state.contact_vertices == 0 ? state.surface_displacement.norm() : 0.0;
@@ -162,8 +159,8 @@ TEST(FinitePress, SmallPressesEqualTheLinearOnes) {
     for (const double depth : {0.08, 0.04, 0.02}) {
       Press press(linear, BoxShape{{20, 20, 2}}, friction);
       FinitePress finite(gel, BoxShape{{20, 20, 2}}, friction);
-      const PressState& a = press.step(at(0, 0, 1.0 - depth));
-      const PressState& b = finite.step(at(0, 0, 1.0 - depth));
+      const PressState& a = press.step(target_at(0, 0, 1.0 - depth));
+      const PressState& b = finite.step(target_at(0, 0, 1.0 - depth));
       const double difference = std::abs(b.wrench[2] / a.wrench[2] - 1.0);
       if (before > 0.0) {
         EXPECT_NEAR(before / difference, 2.0, 0.3) << friction;  // first order in the strain
@@ -235,7 +232,7 @@ TEST(FinitePress, TheContactLawsHold) {
   const FiniteGel& gel = soft_gel();
   FinitePress press(gel, SphereShape{kRadius}, 0.4);
   press.step(sphere_at(0.5));
-  const PressState& state = press.step(at(0.1, 0.05, kRadius - 0.6));
+  const PressState& state = press.step(target_at(0.1, 0.05, kRadius - 0.6));
   EXPECT_LT(state.largest_penetration, 1e-5);
   EXPECT_EQ(state.largest_tension, 0.0);
   EXPECT_LT(state.cone_violation, 1e-6);
@@ -250,7 +247,7 @@ TEST(FinitePress, ADraggedSphereSlidesAtTheFrictionsLimit) {
   constexpr double kMu = 0.2;
   FinitePress press(soft_gel(), SphereShape{kRadius}, kMu);
   press.step(sphere_at(0.4));
-  for (const double x : {0.1, 0.2, 0.4}) press.step(at(x, 0, kRadius - 0.4));
+  for (const double x : {0.1, 0.2, 0.4}) press.step(target_at(x, 0, kRadius - 0.4));
   const PressState& state = press.state();
   EXPECT_LT(state.wrench[0], 0.0);
   // The gel also stands in the way like a wave before a ship: a few percent of the normal force.
@@ -278,7 +275,7 @@ TEST(FinitePress, AWantedForceIsMet) {
   target.axis[2] = AxisControl::with_force(1.5);
   const double height = other.step(target).gel_from_object.translation.z();
   FinitePress third(soft_gel(), SphereShape{kRadius}, 0.0);
-  EXPECT_NEAR(third.step(at(0, 0, height)).wrench[2], 1.5, 1e-4);
+  EXPECT_NEAR(third.step(target_at(0, 0, height)).wrench[2], 1.5, 1e-4);
 }
 
 TEST(FinitePress, ForceConvergesAsTheMeshGetsFiner) {

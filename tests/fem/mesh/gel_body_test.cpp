@@ -13,6 +13,7 @@
 #include "fem/elements/taylor_hood.h"
 #include "fem/mesh/layer_columns.h"
 #include "fem/mesh/tetgen_fill.h"
+#include "tests/support/box_gel.h"
 
 namespace touchstone::fem {
 namespace {
@@ -208,18 +209,9 @@ TEST(Fingertip, TheSleeveAndTheBackAreBondedTheRestCanBeTouched) {
   }
 }
 
-/// A box with its top outer and its bottom bonded.
+/// A box, meshed finely within 1.5 mm of the middle.
 SolidGel box_gel(const Vector3d& size) {
-  SolidGel gel;
-  for (int corner = 0; corner < 8; ++corner) {
-    const Vector3d at((corner & 1) ? 0.5 : -0.5, (corner & 2) ? 0.5 : -0.5, (corner & 4) ? 0.0 : -1.0);
-    gel.surface.vertices.push_back(at.cwiseProduct(size));
-  }
-  gel.surface.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
-                           {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
-  gel.faces.assign(12, FaceKind::side);
-  gel.faces[0] = gel.faces[1] = FaceKind::bonded;
-  gel.faces[2] = gel.faces[3] = FaceKind::outer;
+  SolidGel gel = test::box_gel(size);
   gel.fine_half_x = gel.fine_half_y = 1.5;
   return gel;
 }

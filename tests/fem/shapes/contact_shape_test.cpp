@@ -77,16 +77,20 @@ TEST(FirstEntry, OfASphereIsOnItsNearSide) {
   }
 }
 
-TEST(FirstEntry, DoesNotDependOnWhereTheLineStarts) {
-  RandomStream random(2, 0, Purpose::kTest);
-  const ContactShape shapes[] = {SphereShape{1.0},
+/// A shape of each kind.
+std::vector<ContactShape> one_of_each() {
+  return {SphereShape{1.0},
                                  RoundedCylinder{1.0, 0.3, 2.0},
                                  BoxShape{{1.0, 2.0, 3.0}},
                                  MeshShape(box_mesh({1.0, 2.0, 3.0})),
                                  EggShape{1.0, 1.2, 1.5},
                                  EggShape{2.0, 0.4, 0.7},
                                  ShellShape{{3.0, 2.0}, 0.2, {0.4, -0.3}}};
-  for (const auto& shape : shapes) {
+}
+
+TEST(FirstEntry, DoesNotDependOnWhereTheLineStarts) {
+  RandomStream random(2, 0, Purpose::kTest);
+  for (const ContactShape& shape : one_of_each()) {
     for (int k = 0; k < 100; ++k) {
       const Eigen::Vector3d d = random_direction(random);
       const Eigen::Vector3d p = 0.5 * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
@@ -240,14 +244,7 @@ TEST(MeshShape, RefusesAnOpenMesh) {
 
 TEST(BoundingBall, HoldsEachEntryPoint) {
   RandomStream random(6, 0, Purpose::kTest);
-  const ContactShape shapes[] = {SphereShape{1.0},
-                                 RoundedCylinder{1.0, 0.3, 2.0},
-                                 BoxShape{{1.0, 2.0, 3.0}},
-                                 MeshShape(box_mesh({1.0, 2.0, 3.0})),
-                                 EggShape{1.0, 1.2, 1.5},
-                                 EggShape{2.0, 0.4, 0.7},
-                                 ShellShape{{3.0, 2.0}, 0.2, {0.4, -0.3}}};
-  for (const auto& shape : shapes) {
+  for (const ContactShape& shape : one_of_each()) {
     const BoundingBall ball = bounding_ball(shape);
     for (int k = 0; k < 200; ++k) {
       const Eigen::Vector3d d = random_direction(random);
