@@ -147,9 +147,10 @@ bool BeadTracker::State::adjust_brightness(const cv::Mat& image) {
 
 Eigen::Vector2d BeadTracker::State::cell_centre(std::size_t bead) const {
   const auto grid = static_cast<std::size_t>(settings.grid);
+  const std::size_t row = bead / grid, column = bead % grid;
   const double half = 0.5 * settings.roi_a_px;
-  return {roi_a_centre.x() - half + (static_cast<double>(bead % grid) + 0.5) * cell_side,
-          roi_a_centre.y() - half + (static_cast<double>(bead / grid) + 0.5) * cell_side};
+  return {roi_a_centre.x() - half + (static_cast<double>(column) + 0.5) * cell_side,
+          roi_a_centre.y() - half + (static_cast<double>(row) + 0.5) * cell_side};
 }
 
 bool BeadTracker::State::in_cell(std::size_t bead, const Eigen::Vector2d& where) const {

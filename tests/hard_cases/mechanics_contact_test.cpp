@@ -28,10 +28,10 @@ namespace touchstone::fem {
 namespace {
 
 using test::did;
-using test::refused;
-using test::Worst;
 using test::press_refusal;
+using test::refused;
 using test::target_at;
+using test::Worst;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kRadius = 8.0;
@@ -180,7 +180,8 @@ TEST(HardCase9, NoFrictionIsBitwiseTheFrictionlessPath) {
 TEST(HardCase10, AFrictionOfFiveConvergesOrSaysSo) {
   Press press(gel(), kProbe, 5.0);
   int answered = 0;
-  for (const auto& target : {target_at(0, 0, -0.3), target_at(0.1, 0, -0.3), target_at(0.3, 0.1, -0.4), target_at(-0.2, 0, -0.4), target_at(0, 0, -0.1)}) {
+  for (const auto& target : {target_at(0, 0, -0.3), target_at(0.1, 0, -0.3), target_at(0.3, 0.1, -0.4),
+                             target_at(-0.2, 0, -0.4), target_at(0, 0, -0.1)}) {
     const std::string message = press_refusal(press, target);
     if (message.empty()) {
       ++answered;

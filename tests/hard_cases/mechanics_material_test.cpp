@@ -18,8 +18,8 @@ namespace touchstone::fem {
 namespace {
 
 using test::did;
-using test::Worst;
 using test::target_at;
+using test::Worst;
 
 /// 5 mm thick, half-width 4 thicknesses; all lengths times `unit`.
 SlabMesh layer(double fine, double unit = 1.0) {
@@ -83,8 +83,8 @@ TEST(HardCase5, UnderASharpPunchTheForceConvergesAndThePeakPressureDoesNot) {
     constexpr int kPlaces = 12;
     for (int k = 0; k < kPlaces; ++k) {
       Press press(gel, RoundedCylinder{1.9, 0.0, 3.0}, 0.0);
-      const PressState& state = press.step(
-          target_at(fine * (0.618 * k - std::floor(0.618 * k) - 0.5), fine * (0.755 * k - std::floor(0.755 * k) - 0.5), -0.1));
+      const PressState& state = press.step(target_at(fine * (0.618 * k - std::floor(0.618 * k) - 0.5),
+                                                     fine * (0.755 * k - std::floor(0.755 * k) - 0.5), -0.1));
       square += std::pow(state.wrench[2] / expected - 1.0, 2) / kPlaces;
       peak += -state.traction.col(2).minCoeff() / kPlaces;
     }
@@ -117,7 +117,8 @@ TEST(HardCase12, OtherUnitsGiveTheSameAnswerAfterScaling) {
       tolerance.force = 1e-9;
       Press press(gel, SphereShape{8.0 * unit.length}, 0.4, tolerance);
       press.step(target_at(0.013 * unit.length, 0.021 * unit.length, (8.0 - 0.3) * unit.length));
-      const PressState& state = press.step(target_at(0.063 * unit.length, 0.021 * unit.length, (8.0 - 0.3) * unit.length));
+      const PressState& state =
+          press.step(target_at(0.063 * unit.length, 0.021 * unit.length, (8.0 - 0.3) * unit.length));
       return state.wrench.head<3>() / (unit.stress * unit.length * unit.length);
     };
     TetMesh mesh = mesh_slab(layer(0.6));

@@ -80,12 +80,12 @@ TEST(FirstEntry, OfASphereIsOnItsNearSide) {
 /// A shape of each kind.
 std::vector<ContactShape> one_of_each() {
   return {SphereShape{1.0},
-                                 RoundedCylinder{1.0, 0.3, 2.0},
-                                 BoxShape{{1.0, 2.0, 3.0}},
-                                 MeshShape(box_mesh({1.0, 2.0, 3.0})),
-                                 EggShape{1.0, 1.2, 1.5},
-                                 EggShape{2.0, 0.4, 0.7},
-                                 ShellShape{{3.0, 2.0}, 0.2, {0.4, -0.3}}};
+          RoundedCylinder{1.0, 0.3, 2.0},
+          BoxShape{{1.0, 2.0, 3.0}},
+          MeshShape(box_mesh({1.0, 2.0, 3.0})),
+          EggShape{1.0, 1.2, 1.5},
+          EggShape{2.0, 0.4, 0.7},
+          ShellShape{{3.0, 2.0}, 0.2, {0.4, -0.3}}};
 }
 
 TEST(FirstEntry, DoesNotDependOnWhereTheLineStarts) {
