@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/locked_work.h"
 #include "core/nearest_name.h"
 #include "datasets/jobs/scenes_folder.h"
 #include "sim/files/image_file.h"
@@ -47,12 +48,13 @@ const VirtualSensor& device(const std::string& name_or_file, const VirtualSensor
   static std::mutex making;
   static std::map<decltype(key_of({}, {})), std::unique_ptr<const VirtualSensor>> made;
   const fs::path file = file_of(name_or_file, "device", "devices");
-  const std::lock_guard<std::mutex> lock(making);
-  auto& kept = made[key_of(file, settings)];
-  if (!kept) {
-    kept = std::make_unique<const VirtualSensor>(sim::read_device(file), sim::default_cache_folder(), settings);
-  }
-  return *kept;
+  return *locked_work(making, [&] {
+    auto& kept = made[key_of(file, settings)];
+    if (!kept) {
+      kept = std::make_unique<const VirtualSensor>(sim::read_device(file), sim::default_cache_folder(), settings);
+    }
+    return kept.get();
+  });
 }
 
 sim::ObjectSpec object(const std::string& name_or_file) {

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/locked_work.h"
 #include "fem/fine_relief/layer_kernel.h"
 
 namespace touchstone::fem {
@@ -165,13 +166,13 @@ LayerResponse::LayerResponse(const LayerResponse& of, Inverse)
 LayerResponse::~LayerResponse() = default;
 
 const LayerResponse& LayerResponse::rough_inverse() const {
-  std::call_once(inverse_made_, [&] { inverse_.reset(new LayerResponse(*this, Inverse{})); });
+  work_once(inverse_made_, [&] { inverse_.reset(new LayerResponse(*this, Inverse{})); });
   return *inverse_;
 }
 
 const LayerResponse& LayerResponse::on_wider_pixels() const {
   TS_ASSERT(edges_ == GridEdges::free);
-  std::call_once(wider_made_, [&] {
+  work_once(wider_made_, [&] {
     const PixelGrid wider{(grid_.nx + 1) / 2, (grid_.ny + 1) / 2, 2.0 * grid_.pitch,
                           grid_.first + Eigen::Vector2d::Constant(0.5 * grid_.pitch)};
     wider_ = std::make_unique<const LayerResponse>(material_, thickness_, wider, GridEdges::free);

@@ -5,6 +5,7 @@
 #include <mutex>
 #include <string>
 
+#include "core/locked_work.h"
 #include "sim/sensor/membrane_camera.h"
 
 namespace touchstone::lab {
@@ -29,10 +30,11 @@ std::vector<DvsGraspParameters> grasps_of(const DvsGraspSetup& setup, bool quick
 DvsRecordings kept(const std::string& name, const auto& made) {
   static std::mutex mutex;
   static std::map<std::string, DvsRecordings> all;
-  const std::lock_guard lock(mutex);
-  DvsRecordings& recordings = all[name];
-  if (!recordings) recordings = std::make_shared<const std::vector<DvsRecording>>(made());
-  return recordings;
+  return locked_work(mutex, [&] {
+    DvsRecordings& recordings = all[name];
+    if (!recordings) recordings = std::make_shared<const std::vector<DvsRecording>>(made());
+    return recordings;
+  });
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <mutex>
 
+#include "core/locked_work.h"
 #include "core/sha256.h"
 #include "core/units.h"
 #include "fem/error/compliance_cache.h"
@@ -196,10 +197,11 @@ std::vector<std::shared_ptr<const fem::Compliance>> set_up_elastic_objects(const
   if (!plan.elastic_object) return all;
   // Scenes of one object ask for it at once: the first makes it, the others read it.
   static std::mutex one_at_a_time;
-  const std::lock_guard lock(one_at_a_time);
-  for (const MovedObject& moved : moved_objects(scene)) {
-    all.push_back(moved.object.elastic ? set_up_elastic_object(moved.object, cache_folder) : nullptr);
-  }
+  locked_work(one_at_a_time, [&] {
+    for (const MovedObject& moved : moved_objects(scene)) {
+      all.push_back(moved.object.elastic ? set_up_elastic_object(moved.object, cache_folder) : nullptr);
+    }
+  });
   return all;
 }
 

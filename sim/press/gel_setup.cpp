@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "core/error.h"
+#include "core/locked_work.h"
 #include "core/units.h"
 #include "fem/error/compliance_cache.h"
 #include "fem/vibration/vibration_cache.h"
@@ -82,10 +83,11 @@ std::shared_ptr<const fem::GelVibration> set_up_vibration(const SceneSpec& scene
   const std::vector<fem::Bead> beads = gel_beads(device);
   // Scenes of one gel ask for the same modes at once: the first makes them, the others read them.
   static std::mutex one_at_a_time;
-  const std::lock_guard lock(one_at_a_time);
-  return std::make_shared<const fem::GelVibration>(fem::cached_vibration(
-      fem::compliance_key(body, materials, beads), [&] { return fem::mesh_gel(body); }, materials, beads,
-      device.gel.density_kg_m3 * kTonnePerMm3, kModes, cache_folder));
+  return locked_work(one_at_a_time, [&] {
+    return std::make_shared<const fem::GelVibration>(fem::cached_vibration(
+        fem::compliance_key(body, materials, beads), [&] { return fem::mesh_gel(body); }, materials, beads,
+        device.gel.density_kg_m3 * kTonnePerMm3, kModes, cache_folder));
+  });
 }
 
 }  // namespace touchstone::sim

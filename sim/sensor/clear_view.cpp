@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/locked_work.h"
 #include "render/cameras/first_hits.h"
 #include "sim/press/play_motion.h"
 #include "sim/scene/device_camera.h"
@@ -40,9 +41,10 @@ class ClearView final : public SensorView {
   const LightChoice& choice() const override { return choice_; }
 
   SceneBands bands(const SeenObject& object) const override {
-    const std::lock_guard<std::mutex> lock(object.making);
-    if (!object.bands) object.bands = make_plan(scene_of(object.spec, {})).bands;
-    return *object.bands;
+    return locked_work(object.making, [&] {
+      if (!object.bands) object.bands = make_plan(scene_of(object.spec, {})).bands;
+      return *object.bands;
+    });
   }
 
   SeenTouch see(const SeenObject& object, const fem::PressState& press, const Eigen::Vector3d& start_mm,
@@ -86,15 +88,16 @@ class ClearView final : public SensorView {
   std::shared_ptr<const VirtualCamera> camera(const SeenObject& object, const Eigen::Vector3d& start) const {
     const std::array<double, 3> key =
         object.spec.screen ? std::array<double, 3>{start.x(), start.y(), start.z()} : std::array<double, 3>{};
-    const std::lock_guard<std::mutex> lock(object.making);
-    auto& kept = object.cameras[key];
-    if (!kept) {
-      MotionSpec still;
-      still.start_mm = start;
-      const SceneSpec scene = scene_of(object.spec, still);
-      kept = std::make_shared<const VirtualCamera>(scene, make_plan(scene), gel_, start_of(object, start));
-    }
-    return kept;
+    return locked_work(object.making, [&] {
+      auto& kept = object.cameras[key];
+      if (!kept) {
+        MotionSpec still;
+        still.start_mm = start;
+        const SceneSpec scene = scene_of(object.spec, still);
+        kept = std::make_shared<const VirtualCamera>(scene, make_plan(scene), gel_, start_of(object, start));
+      }
+      return kept;
+    });
   }
 
   DeviceSpec device_;

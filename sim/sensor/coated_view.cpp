@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/locked_work.h"
 #include "core/sha256.h"
 #include "render/cameras/first_hits.h"
 #include "sim/plan/plan_direct.h"
@@ -163,11 +164,11 @@ class CoatedView final : public SensorView {
 
  private:
   const SceneView& view_of(const SeenObject& object) const {
-    const std::lock_guard<std::mutex> lock(object.making);
-    if (!object.view) {
+    locked_work(object.making, [&] {
+      if (object.view) return;
       const SceneSpec scene = scene_with(object.spec, {});
       object.view = std::make_shared<const SceneView>(scene, make_plan(scene), gel_, *judged_);
-    }
+    });
     return *object.view;
   }
 

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/locked_work.h"
 #include "fem/fine_relief/fine_relief.h"
 #include "render/cameras/first_hits.h"
 #include "render/imager/imager.h"
@@ -95,11 +96,11 @@ class MilkyView final : public SensorView {
 
  private:
   const SceneView& view_of(const SeenObject& object) const {
-    const std::lock_guard<std::mutex> lock(object.making);
-    if (!object.view) {
+    locked_work(object.making, [&] {
+      if (object.view) return;
       const SceneSpec scene = scene_of(object.spec);
       object.view = std::make_shared<const SceneView>(scene, make_plan(scene), gel_);
-    }
+    });
     return *object.view;
   }
 

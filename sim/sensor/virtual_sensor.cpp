@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/locked_work.h"
 #include "core/units.h"
 #include "render/imager/imager.h"
 #include "sim/press/elastic_object.h"
@@ -68,8 +69,8 @@ struct VirtualSensor::Parts {
         markers(marker_places(device, *gel)) {}
 
   const Optics& optics() const {
-    const std::lock_guard<std::mutex> lock(making);
-    if (!made) {
+    locked_work(making, [this] {
+      if (made) return;
       if (!device.camera) fail("device {}: has no camera, so it can't be looked through", device.name);
       auto now = std::make_unique<Optics>();
       now->view = device.coating     ? coated_view(device, *gel, cache_folder, settings)
@@ -81,7 +82,7 @@ struct VirtualSensor::Parts {
       now->pattern = render::fixed_pattern(now->imager, {device.camera->width, device.camera->height}, settings.seed);
       now->rest_light = now->view->rest_light(nullptr, Eigen::Vector3d::Zero());
       made = std::move(now);
-    }
+    });
     return *made;
   }
 

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
+#include <tbb/parallel_for.h>
 
 #include <cmath>
 #include <numbers>
@@ -199,6 +200,19 @@ TEST(LayerResponse, TheNumberOfThreadsChangesNoBit) {
     one = answer(LayerResponse(m, 1.0, grid, GridEdges::free), p);
   }
   EXPECT_EQ(one, answer(LayerResponse(m, 1.0, grid, GridEdges::free), p));
+}
+
+// Each first one makes the inverse by loops, while the others wait for it. That no thread takes another's step
+// meanwhile, and waits for itself, tests/core/locked_work_test.cpp shows without chance.
+TEST(LayerResponse, StepsOfALoopMayAskForTheInverseAtOnce) {
+  const tbb::global_control four(tbb::global_control::max_allowed_parallelism, 4);
+  const ElasticMaterial m{0.33, 0.49};
+  for (int round = 0; round < 20; ++round) {
+    const LayerResponse layer(m, 1.0, centred(48, 48, 0.05), GridEdges::free);
+    std::vector<const LayerResponse*> inverses(32, nullptr);
+    tbb::parallel_for(std::size_t{0}, inverses.size(), [&](std::size_t i) { inverses[i] = &layer.rough_inverse(); });
+    for (const LayerResponse* inverse : inverses) ASSERT_EQ(inverse, &layer.rough_inverse());
+  }
 }
 
 TEST(LayerResponse, RefusesWhatItCantDo) {
