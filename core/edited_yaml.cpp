@@ -57,7 +57,7 @@ std::vector<Step> steps_of(const std::string& path, const SourceLocation& where)
   return steps;
 }
 
-constexpr int kDeepest = 64;         // an alias may hold itself
+constexpr int kDeepest = 64;         // keys and lists in each other; an alias may hold itself
 constexpr int kMostNodes = 100'000;  // a hundred aliases of aliases stand for more nodes than there are atoms
 
 /// How many nodes stand at a place: two where an alias repeats one.
@@ -135,11 +135,11 @@ class Search {
   }
 
   void collect(const YAML::Node& node, const std::string& here, std::vector<YamlNumber>& group, int depth = 0) const {
+    if (static_cast<int>(steps_.size()) + depth > kDeepest) {  // marks_ don't count what is so deep
+      fail_at(where_, "path '{}' stands more than {} keys and lists deep in {}, or holds itself", path_, kDeepest,
+              name_);
+    }
     if (node.IsSequence()) {
-      if (depth > kDeepest) {
-        fail_at(where_, "path '{}': '{}' of {} is a list that holds itself, or more than {} in each other", path_,
-                path_, name_, kDeepest);
-      }
       for (std::size_t i = 0; i < node.size(); ++i) collect(node[i], fmt::format("{}[{}]", here, i), group, depth + 1);
       return;
     }

@@ -22,7 +22,7 @@ struct YamlNumber {
 /// `lamps[*].power_W` gives a group a lamp, and `lamps[*].power_W[*]` one a number.
 /// `name` stands for the text in messages, `where` is where the path was asked for.
 /// @throws Error if a key isn't there (it names the nearest), a list is shorter, what is there isn't made of plain
-///   numbers, or stands behind a YAML alias, so that a change would show elsewhere
+///   numbers, stands behind a YAML alias, so that a change would show elsewhere, or more than 64 keys and lists deep
 std::vector<std::vector<YamlNumber>> find_yaml_numbers(const std::string& text, const std::string& name,
                                                        const std::string& path, const SourceLocation& where);
 

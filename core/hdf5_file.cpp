@@ -371,7 +371,8 @@ void Hdf5Writer::close(const std::function<std::string(std::string_view rest)>& 
 Hdf5Reader::Hdf5Reader(const std::filesystem::path& file) : name_(file.string()) {
   const auto held = hold();
   keep_hdf5_quiet();
-  if (!std::filesystem::is_regular_file(file)) fail("{}: there is no such file", name_);
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(file, ignored)) fail("{}: there is no such file", name_);
   file_ = H5Fopen(name_.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
   if (file_ < 0) fail("{}: isn't an HDF5 file, or is broken off", name_);
 }

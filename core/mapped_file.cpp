@@ -1,35 +1,21 @@
 #include "core/mapped_file.h"
 
-#include <fcntl.h>
 #include <sys/mman.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include <cerrno>
 #include <cstring>
 
 #include "core/error.h"
+#include "core/input_file.h"
 
 namespace touchstone {
 
 MappedFile map_file(const std::filesystem::path& path) {
-  const int file = open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  struct stat about {};
-  void* memory = MAP_FAILED;
-  bool readable = file >= 0 && fstat(file, &about) == 0;
-  int reason = errno;
-  if (readable && !S_ISREG(about.st_mode)) {
-    readable = false;
-    reason = EINVAL;
-  }
-  const auto size = static_cast<std::size_t>(about.st_size);
-  if (readable && size > 0) {
-    memory = mmap(nullptr, size, PROT_READ, MAP_SHARED, file, 0);
-    reason = errno;
-  }
-  if (file >= 0) close(file);  // the mapping outlives it
-  if (readable && size == 0) return {};
-  if (memory == MAP_FAILED) fail("{}: can't be read ({})", path.string(), std::strerror(reason));
+  const InputFile file(path);
+  const std::size_t size = file.size();
+  if (size == 0) return {};
+  void* const memory = mmap(nullptr, size, PROT_READ, MAP_SHARED, file.descriptor(), 0);  // outlives the handle
+  if (memory == MAP_FAILED) fail("{}: can't be read ({})", path.string(), std::strerror(errno));
   return {std::shared_ptr<const char>(static_cast<const char*>(memory),
                                       [memory, size](const char*) { munmap(memory, size); }),
           size};

@@ -15,7 +15,8 @@ struct MappedFile {
   std::size_t size = 0;
 };
 
-/// Maps the whole file for reading. An empty file has no bytes. @throws Error if it can't be read
+/// Maps the whole file for reading. An empty file has no bytes. @throws Error if it can't be read or is no file
+/// (core/input_file.h)
 MappedFile map_file(const std::filesystem::path& path);
 
 }  // namespace touchstone

@@ -3,9 +3,9 @@
 #include <openssl/evp.h>
 
 #include <array>
-#include <fstream>
 
 #include "core/error.h"
+#include "core/input_file.h"
 
 namespace touchstone {
 
@@ -44,14 +44,10 @@ std::string sha256_of(std::string_view bytes) {
 }
 
 std::string sha256_of_file(const std::filesystem::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  if (!in) fail("{}: can't be read", path.string());
+  InputFile file(path);
   Sha256 sum;
   std::array<char, 1 << 16> buffer{};
-  while (in.read(buffer.data(), buffer.size()) || in.gcount() > 0) {
-    sum.add(buffer.data(), static_cast<std::size_t>(in.gcount()));
-  }
-  if (in.bad()) fail("{}: can't be read", path.string());  // a folder, for one
+  while (const std::size_t size = file.read(buffer.data(), buffer.size())) sum.add(buffer.data(), size);
   return sum.digest();
 }
 

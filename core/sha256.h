@@ -29,7 +29,7 @@ class Sha256 {
 
 /// Of these bytes, as 64 hexadecimal digits in small letters.
 std::string sha256_of(std::string_view bytes);
-/// @throws Error if the file can't be read
+/// @throws Error if the file can't be read or is no file (core/input_file.h)
 std::string sha256_of_file(const std::filesystem::path& path);
 
 }  // namespace touchstone

@@ -2,20 +2,25 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <fstream>
-#include <sstream>
 
 #include "core/error.h"
+#include "core/input_file.h"
 
 namespace touchstone {
 
 std::string read_whole_file(const std::filesystem::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  if (!in || std::filesystem::is_directory(path)) fail("{}: can't be read", path.string());
-  std::ostringstream content;
-  content << in.rdbuf();
-  return std::move(content).str();
+  InputFile file(path);
+  // More than its size shows where it ends: those of /proc don't know their size.
+  std::string content(std::max<std::size_t>(file.size() + 1, 4096), '\0');
+  std::size_t size = 0;
+  while ((size += file.read(content.data() + size, content.size() - size)) == content.size()) {
+    content.resize(2 * content.size());
+  }
+  content.resize(size);
+  return content;
 }
 
 void write_whole_file(const std::filesystem::path& path,

@@ -7,7 +7,7 @@
 
 namespace touchstone {
 
-/// Reads a whole file. @throws Error if it can't be read
+/// Reads a whole file. @throws Error if it can't be read or is no file (core/input_file.h)
 std::string read_whole_file(const std::filesystem::path& path);
 
 /// Writes a file so that it's there whole or not at all: `write` fills a temporary file beside `path`, which is then

@@ -1,11 +1,11 @@
 #include "sensors/events/event_file.h"
 
 #include <array>
-#include <fstream>
 #include <string_view>
 #include <variant>
 
 #include "core/error.h"
+#include "core/input_file.h"
 #include "sensors/events/event_check.h"
 #include "sensors/events/event_file_aedat4.h"
 #include "sensors/events/event_file_dsec.h"
@@ -21,10 +21,10 @@ using AnyWriter = std::variant<TextEventWriter, DsecEventWriter, Evt3EventWriter
 /// What the file's first bytes say that it is, and where they don't, its name.
 EventFormat format_of(const std::filesystem::path& file) {
   std::array<char, 9> first{};
-  std::ifstream in(file, std::ios::binary);
-  if (!in || !std::filesystem::is_regular_file(file)) fail("{}: there is no such file", file.string());
-  in.read(first.data(), first.size());
-  const std::string_view bytes(first.data(), static_cast<std::size_t>(in.gcount()));
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(file, ignored)) fail("{}: there is no such file", file.string());
+  InputFile in(file);
+  const std::string_view bytes(first.data(), in.read(first.data(), first.size()));
   if (bytes.empty()) fail("{}: is empty", file.string());
   if (bytes.starts_with("\x89HDF\r\n\x1a\n")) return EventFormat::dsec;
   if (bytes.starts_with("#!AER-DAT")) return EventFormat::aedat4;

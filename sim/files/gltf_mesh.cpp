@@ -80,6 +80,14 @@ class GltfSolid {
     loader.SetImageLoader([](tinygltf::Image*, const int, std::string*, std::string*, int, int, const unsigned char*,
                              int, void*) { return true; },
                           nullptr);
+    tinygltf::FsCallbacks files = {&tinygltf::FileExists, &tinygltf::ExpandFilePath, &tinygltf::ReadWholeFile,
+                                   &tinygltf::WriteWholeFile, nullptr};
+    // A buffer's or a picture's name may be that of a pipe, which would keep us waiting, or of an endless device.
+    files.FileExists = [](const std::string& file, void*) {
+      std::error_code ignored;
+      return std::filesystem::is_regular_file(file, ignored);
+    };
+    loader.SetFsCallbacks(files);
     std::string error;
     std::string warning;
     bool read = false;

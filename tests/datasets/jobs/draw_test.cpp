@@ -5,7 +5,6 @@
 #include <cmath>
 #include <set>
 
-#include "core/edited_yaml.h"
 #include "core/transform.h"
 #include "datasets/jobs/draw.h"
 #include "datasets/jobs/drawn_touch.h"
@@ -85,42 +84,6 @@ TEST(Spread, MistakesAreReportedWithTheirPlace) {
               HasSubstr("of the draws would fall within"));
   EXPECT_THAT(error_of("{}"), HasSubstr("none of uniform, log_uniform, whole, normal, one_of stands here"));
   EXPECT_THAT(error_of("wide"), HasSubstr("isn't a finite number"));
-}
-
-TEST(EditedYaml, ChangesNumbersAndLeavesTheRestAsItIs) {
-  const std::string text =
-      "a: 1.5   # first\nlamps:\n  - {power: [1, 2e-1], name: x}\n  - {power: [3, 4], name: y}\nb: {c: +7}\n";
-  const auto each = find_yaml_numbers(text, "t", "lamps[*].power", {});
-  ASSERT_EQ(each.size(), 2u);
-  ASSERT_EQ(each[1].size(), 2u);
-  EXPECT_EQ(each[1][1].path, "lamps[1].power[1]");
-  EXPECT_EQ(each[0][1].value, 0.2);
-  EXPECT_EQ(find_yaml_numbers(text, "t", "lamps[*].power[*]", {}).size(), 4u);
-  const YamlNumber first = find_yaml_numbers(text, "t", "a", {})[0][0];
-  const YamlNumber last = find_yaml_numbers(text, "t", "b.c", {})[0][0];
-  EXPECT_EQ(
-      with_yaml_numbers(text, {{last, -0.1}, {first, 2.0}, {each[1][0], 30.25}}),
-      "a: 2   # first\nlamps:\n  - {power: [1, 2e-1], name: x}\n  - {power: [30.25, 4], name: y}\nb: {c: -0.1}\n");
-}
-
-TEST(EditedYaml, PathsThatLeadNowhereAreReported) {
-  const std::string text =
-      "gel: {thickness_mm: 3}\nlist: [1, 2]\nword: soft\nquoted: '3'\na: &x [5]\nb: *x\nc: &y 5\nd: *y\n";
-  const auto error_of = [&](const std::string& path) {
-    return message_of([&] { find_yaml_numbers(text, "device.yaml", path, {"job.yaml", 7}); });
-  };
-  EXPECT_THAT(error_of("gel.thicknes_mm"), HasSubstr("job.yaml:7: path 'gel.thicknes_mm'"));
-  EXPECT_THAT(error_of("gel.thicknes_mm"), HasSubstr("did you mean 'thickness_mm'?"));
-  EXPECT_THAT(error_of("list[2]"), HasSubstr("has 2 items"));
-  EXPECT_THAT(error_of("gel[0]"), HasSubstr("isn't a list"));
-  EXPECT_THAT(error_of("word"), HasSubstr("isn't a number"));
-  EXPECT_THAT(error_of("quoted"), HasSubstr("plain number"));
-  EXPECT_THAT(error_of("b"), HasSubstr("shared by an alias"));
-  EXPECT_THAT(error_of("d"), HasSubstr("plain number"));
-  EXPECT_THAT(error_of("d"), HasSubstr("plain number"));
-  EXPECT_THAT(error_of("gel"), HasSubstr("isn't a number"));
-  EXPECT_THAT(error_of("list[x]"), HasSubstr("brackets"));
-  EXPECT_THAT(error_of(""), HasSubstr("is empty"));
 }
 
 TEST(Splits, UnitsAreDealtOutByTheirShares) {

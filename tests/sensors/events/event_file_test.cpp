@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <fstream>
 
@@ -110,6 +111,12 @@ TEST_P(EventFile, WhatDoesntFitIsntWritten) {
   EXPECT_THAT(refused({100, 1, kHeight, true}), HasSubstr("rows 0 to 259"));
   EXPECT_THAT(message_of([&] { EventWriter(file("b"), {0, 5}, "x"); }), HasSubstr("0 x 5 pixels"));
   EXPECT_THAT(message_of([&] { write_events(file("none/a"), {}); }), HasSubstr("can't be written"));
+}
+
+// It isn't opened, which would wait for who writes into it.
+TEST_P(EventFile, APipeIsRefusedAtOnce) {
+  ASSERT_EQ(mkfifo(file("pipe").c_str(), 0600), 0);
+  EXPECT_THAT(message_of([&] { read_events(file("pipe")); }), HasSubstr("there is no such file"));
 }
 
 TEST_P(EventFile, AnEmptyFileAndAnotherCameraAreRefused) {

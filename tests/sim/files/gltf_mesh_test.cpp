@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <Eigen/Geometry>
@@ -303,6 +304,8 @@ TEST_F(GltfMesh, FilesThatAreNoneAreRefused) {
   expect_refused(R"({"asset": {"version": "2.0"}})", "");
   expect_refused("[[[[", "isn't a readable glTF file");
   expect_refused(cube_.json("missing.bin"), "isn't a readable glTF file");
+  ASSERT_EQ(mkfifo((folder_ / "pipe.bin").c_str(), 0600), 0);  // nobody writes into it: opening it would wait for ever
+  expect_refused(cube_.json("pipe.bin"), "isn't a readable glTF file");
 }
 
 TEST_F(GltfMesh, TruncatedFilesAreRefusedAtEveryLength) {
