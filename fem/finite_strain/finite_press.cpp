@@ -11,12 +11,12 @@
 #include "fem/contact/press_report.h"
 #include "fem/elements/surface_strain.h"
 #include "fem/finite_strain/finite_part.h"
+#include "fem/finite_strain/force_growth.h"
 
 namespace touchstone::fem {
 namespace {
 
-constexpr double kLargestPart = 0.1;  // of the thickness: the motion in one part
-constexpr double kLargestForceGrowth = 3.0;
+constexpr double kLargestPart = 0.1;   // of the thickness: the motion in one part
 constexpr double kFirstTouch = 0.02;   // of the thickness: where a force-controlled press begins
 constexpr int kResolvedVertices = 13;  // as in press_report.cpp
 
@@ -201,10 +201,10 @@ FiniteSnapshot FinitePress::Parts::follow(const PressTarget& target, Effort& eff
   parts = std::max(parts, std::ceil(motion.norm() / std::min(kLargestPart * gel.thickness, tolerance.largest_motion)));
   FiniteSnapshot at = start;
   if (to.forced[2]) {
-    // Forces grow by a factor at a time, not by equal amounts: a contact that widens follows its tangent only so far.
-    while (at.force.z() * kLargestForceGrowth < to.force.z() * 0.999) {
+    ForceGrowth growth(to.force.z());
+    while (const std::optional<double> force = growth.next(at.force.z())) {
       PartTarget part = to;
-      part.force = to.force * (at.force.z() * kLargestForceGrowth / to.force.z());
+      part.force = to.force * (*force / to.force.z());
       part.pose = between(start.pose, to.pose, 1.0);
       auto next = advance(at, part, at, 0.0, 1.0, tolerance.most_halvings, effort);
       if (!next) fail_to_converge(effort);

@@ -46,7 +46,8 @@ class FinitePress {
   /// method doesn't converge. In the state, `solves` counts contact problems, `factorisations` those of the gel,
   /// `parts` the parts; `lookup_error` is zero.
   /// @throws Error, the state being as before the step, as Press::step; for a target with torques; and if a tetrahedron
-  /// would turn inside out or Newton's method stalls in the smallest part allowed
+  /// would turn inside out, Newton's method stalls in the smallest part allowed, or a wanted normal force isn't come
+  /// nearer to (fem/finite_strain/force_growth.h)
   const PressState& step(const PressTarget& target);
 
   /// After the last step; before the first one the gel at rest.

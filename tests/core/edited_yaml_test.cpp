@@ -66,9 +66,9 @@ TEST(EditedYaml, WhatStandsTooDeepIsRefused) {
   const auto [deep, deep_path] = nested(64);
   EXPECT_EQ(find_yaml_numbers(deep, "device.yaml", deep_path, {})[0][0].value, 1.5);
   for (const int depth : {65, 70, 200}) {
-    const auto [text, path] = nested(depth);
-    const std::string error = message_of([&, &text = text, &path = path] {
-      find_yaml_numbers(text, "device.yaml", path, {"job.yaml", 7});
+    const auto whole = nested(depth);
+    const std::string error = message_of([&] {
+      find_yaml_numbers(whole.first, "device.yaml", whole.second, {"job.yaml", 7});
     });
     EXPECT_THAT(error, HasSubstr("job.yaml:7: path 'k.k")) << depth;
     EXPECT_THAT(error, HasSubstr("more than 64 keys and lists deep")) << depth;

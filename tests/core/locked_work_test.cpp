@@ -60,7 +60,9 @@ bool takes_other_tasks(std::chrono::milliseconds part_waits,
     });
   });
   EXPECT_TRUE(queued) << "no second thread came";
-  if (queued) EXPECT_TRUE(comes_true(other_run, kLongestWait)) << "the other task was lost";
+  if (queued) {
+    EXPECT_TRUE(comes_true(other_run, kLongestWait)) << "the other task was lost";
+  }
   return taken;
 }
 
