@@ -35,8 +35,6 @@ struct DvsSequence {
   double touch_delay_ms = 0.0;    ///< from the true touch to the end of the window that shows it
   double release_delay_ms = 0.0;  ///< from the servo's order to open to the end of the window that shows it
   double apart_ms = 0.0;          ///< from the end of that window to the last moment of contact
-
-  double peak_true_N() const { return true_N.maxCoeff(); }
 };
 
 /// The force of windows, from readings of their own length and time: the readings' course, straight from middle to

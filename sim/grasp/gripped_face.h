@@ -96,9 +96,6 @@ class GrippedFace {
 
   /// mm along y that the membrane under the piece goes per N of shear.
   double shear_compliance() const { return gel_shear_; }
-  /// mm, RMS over the flat, the largest of all states: what the smooth field leaves of the press's displacements (the
-  /// elements' wiggles).
-  double largest_misfit_mm() const { return misfit_; }
 
  private:
   /// A cell that the piece is over, as the unloaded pose has it.
@@ -122,7 +119,6 @@ class GrippedFace {
   std::vector<GripPoint> states_;
   std::vector<std::vector<float>> signed_;  ///< per state and bearing cell: pressure (MPa) or -gap * per_gap_
   double gel_shear_ = 0.0;
-  double misfit_ = 0.0;
 };
 
 }  // namespace touchstone::sim

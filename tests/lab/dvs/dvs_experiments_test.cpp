@@ -82,7 +82,7 @@ TEST(DvsSequences, BeginWithTheTouchAndHaveTheForcesOfTheirWindows) {
     EXPECT_NEAR(sequence.true_N[row], force_of(from + 3.5, 1.4), 1e-9) << row;
     EXPECT_NEAR(sequence.measured_N[row], 1.1 * sequence.true_N[row], 1e-12);
   }
-  EXPECT_NEAR(sequence.peak_true_N(), 1.4, 1e-9);
+  EXPECT_NEAR(sequence.true_N.maxCoeff(), 1.4, 1e-9);
 }
 
 TEST(DvsSequences, LeaveTheHoldOutIfAsked) {
@@ -98,7 +98,7 @@ TEST(DvsSequences, WindowsOfOtherLengthsSpanTheSameTime) {
     const DvsSequence sequence = dvs_sequence(made(0, 2.0, 3), {.window_ms = length});
     EXPECT_NEAR(static_cast<double>(sequence.windows.grasp_windows) * length, 154.0, 0.5 * length);
     EXPECT_LE(sequence.touch_delay_ms, length);
-    EXPECT_NEAR(sequence.peak_true_N(), 2.0, 1e-9);
+    EXPECT_NEAR(sequence.true_N.maxCoeff(), 2.0, 1e-9);
   }
   // A window of 28 ms on a straight rise has the mean of its four parts: the force in its middle.
   const auto readings = made(0, 2.0, 3).readings;
