@@ -36,6 +36,10 @@ void print_errors(const char* what, const sensors::HueErrors& errors) {
   fmt::print("  {}: RMS {:.0f} um lateral (an axis), {:.0f} um of press; largest {:.0f} um\n", what,
              kMicrometresPerMillimetre * errors.rms_lateral_mm, kMicrometresPerMillimetre * errors.rms_press_mm,
              kMicrometresPerMillimetre * errors.largest_mm);
+  if (errors.declined > 0) {
+    fmt::print("    {} more have no estimate: their marker, or a neighbour that the form needs, is flawed\n",
+               errors.declined);
+  }
 }
 
 void calibrate(const CalibrateOptions& options) {

@@ -41,17 +41,8 @@ Eigen::Vector3d linear_from_srgb(const Eigen::Vector3d& srgb) {
   return srgb.unaryExpr([](double v) { return v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4); });
 }
 
-Eigen::Vector3d srgb_from_linear(const Eigen::Vector3d& linear) {
-  return linear.unaryExpr([](double v) { return v <= 0.0031308 ? 12.92 * v : 1.055 * std::pow(v, 1.0 / 2.4) - 0.055; });
-}
-
 Eigen::Vector3d xyz_from_linear_srgb(const Eigen::Vector3d& linear) {
   return primaries() * linear;
-}
-
-Eigen::Vector3d linear_srgb_from_xyz(const Eigen::Vector3d& xyz) {
-  static const Eigen::Matrix3d inverse = primaries().inverse();
-  return inverse * xyz;
 }
 
 Eigen::Vector3d lab_from_xyz(const Eigen::Vector3d& xyz) {

@@ -11,13 +11,9 @@ inline const Eigen::Vector3d kD65White(0.95047, 1.0, 1.08883);
 
 /// sRGB values, 0 to 1, as parts of the primaries' light, 0 to 1; values beyond are continued (below 0 linearly).
 Eigen::Vector3d linear_from_srgb(const Eigen::Vector3d& srgb);
-/// The inverse of linear_from_srgb.
-Eigen::Vector3d srgb_from_linear(const Eigen::Vector3d& linear);
 
-/// XYZ of light in sRGB's primaries; (1, 1, 1) is kD65White. And back.
+/// XYZ of light in sRGB's primaries; (1, 1, 1) is kD65White.
 Eigen::Vector3d xyz_from_linear_srgb(const Eigen::Vector3d& linear);
-/// The inverse of xyz_from_linear_srgb: parts of the primaries' light, below 0 for what they can't show.
-Eigen::Vector3d linear_srgb_from_xyz(const Eigen::Vector3d& xyz);
 
 /// (L*, a*, b*) beside a white of kD65White [ISO11664, part 4].
 Eigen::Vector3d lab_from_xyz(const Eigen::Vector3d& xyz);

@@ -27,11 +27,6 @@ constexpr ChipPlace grabbed_place(int n) {
   return {kChipSide - 1 - n % kChipSide, n / kChipSide};
 }
 
-/// Its inverse: which frame of a picture gives the pixel.
-constexpr int grabbed_frame(ChipPlace place) {
-  return place.column * kChipSide + (kChipSide - 1 - place.row);
-}
-
 /// One picture read out of the chip, with the time that it took.
 struct GrabbedImage {
   cv::Mat image;              ///< CV_8UC1, 18x18, 0 to 63

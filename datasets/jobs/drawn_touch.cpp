@@ -6,6 +6,7 @@
 
 #include "core/edited_yaml.h"
 #include "core/random.h"
+#include "core/random_pairs.h"
 #include "core/transform.h"
 #include "core/units.h"
 #include "core/whole_file.h"
@@ -20,11 +21,6 @@ constexpr double kLeastWidest_mm = 0.5;
 constexpr double kSpareWidth_mm = 0.2;
 constexpr std::int64_t kPiecesChecked = 20;
 constexpr double kMostSamples = 1e12;  // so that products with units stay whole numbers
-
-std::uint64_t drawn_seed(RandomStream& random) {
-  const std::uint64_t high = random();
-  return (high << 32) | random();
-}
 
 /// Applies what is to be varied, in order, each to what the ones before it left.
 std::string varied(std::string text, const std::string& name, const std::vector<NumberVariation>& all,
@@ -156,7 +152,7 @@ DrawnUnit drawn_unit(const PreparedDraw& prepared, int unit) {
   DrawnUnit drawn;
   drawn.number = unit;
   RandomStream random(prepared.job.seed, static_cast<std::uint64_t>(unit), Purpose::kDrawnUnit);
-  drawn.seed = drawn_seed(random);
+  drawn.seed = next_seed(random);
   const std::string name = prepared.job.draw.device.string();
   drawn.text = varied(prepared.device_text, name, prepared.job.draw.units.vary, random, &drawn.drawn);
   drawn.device = read_varied<sim::DeviceSpec>(drawn.text, name, fmt::format("unit {}", unit));
@@ -186,7 +182,7 @@ DrawnTouch drawn_touch(const PreparedDraw& prepared, std::int64_t sample, int at
   for (const DrawnObjectSpec& object : job.draw.objects) weights += object.weight;
   RandomStream random(job.seed, static_cast<std::uint64_t>(sample), Purpose::kDrawnTouch);
   for (touch.attempt = 0; touch.attempt <= attempt; ++touch.attempt) {
-    touch.seed = drawn_seed(random);
+    touch.seed = next_seed(random);
     double choice = random.uniform() * weights;
     touch.object = 0;
     while (touch.object + 1 < static_cast<int>(job.draw.objects.size())) {

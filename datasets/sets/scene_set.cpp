@@ -9,6 +9,7 @@
 
 #include "core/error.h"
 #include "core/random.h"
+#include "core/random_pairs.h"
 #include "core/sha256.h"
 #include "core/whole_file.h"
 #include "datasets/sets/manifest.h"
@@ -202,7 +203,7 @@ class Run {
       if (error) fail("{}: can't be made ({})", (out_ / "events").string(), error.message());
       const std::string name = "events/" + scene.entry.name + ".h5";
       RandomStream seeds(scene.spec.seed, static_cast<std::uint64_t>(scene.first_sample), Purpose::kEventNoise);
-      const std::uint64_t noise_seed = (std::uint64_t{seeds()} << 32) | seeds();
+      const std::uint64_t noise_seed = next_seed(seeds);
       const sim::CameraSpec& camera = scene.spec.device.camera.value();
       FrameRecord record;
       record.sample = job_.samples + static_cast<std::int64_t>(i);

@@ -2,7 +2,6 @@
 
 #include <chrono>
 #include <cmath>
-#include <limits>
 
 #include "core/error.h"
 #include "fem/finite_strain/finite_press.h"
@@ -63,23 +62,6 @@ std::vector<LinearRangeRow> measure_linear_range(const Compliance& linear, const
     }
   }
   return range;
-}
-
-double estimated_difference(std::span<const LinearRangeRow> range, double largest_strain) {
-  if (range.empty()) return std::numeric_limits<double>::quiet_NaN();
-  double strain = 0.0;
-  double difference = 0.0;
-  for (const LinearRangeRow& row : range) {
-    if (row.largest_strain > strain) {
-      if (largest_strain <= row.largest_strain) {
-        const double share = (largest_strain - strain) / (row.largest_strain - strain);
-        return difference + share * (row.difference() - difference);
-      }
-      strain = row.largest_strain;
-      difference = row.difference();
-    }
-  }
-  return strain > 0.0 ? difference * largest_strain / strain : difference;
 }
 
 }  // namespace touchstone::fem

@@ -38,9 +38,4 @@ std::vector<LinearRangeRow> measure_linear_range(const Compliance& linear, const
                                                  std::span<const double> depths = kRangeDepths,
                                                  const Progress& progress = {});
 
-/// What the table says of a press of this largest_strain: the part by which its linear force is off. Linear between the
-/// rows (and zero at no strain), beyond the last row in proportion to it. Another body, place or motion may differ:
-/// it's an estimate. NaN for an empty table.
-double estimated_difference(std::span<const LinearRangeRow> range, double largest_strain);
-
 }  // namespace touchstone::fem

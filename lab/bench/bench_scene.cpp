@@ -9,6 +9,7 @@
 
 #include "core/error.h"
 #include "core/random.h"
+#include "core/random_pairs.h"
 #include "core/seconds_since.h"
 #include "core/units.h"
 #include "render/imager/imager.h"
@@ -81,7 +82,7 @@ std::vector<sim::PressSpec> bench_presses(int count, double edge_mm, double dept
   for (int k = 0; k < count; ++k) {
     RandomStream random(seed, static_cast<std::uint64_t>(k), Purpose::kStudy);
     sim::PressSpec spec;
-    spec.place_mm = edge_mm * Eigen::Vector2d(random.uniform() - 0.5, random.uniform() - 0.5);
+    spec.place_mm = edge_mm * (uniform_pair(random).array() - 0.5).matrix();
     spec.depth_mm = depth_mm * (1.0 + kDepthSpread * (2.0 * random.uniform() - 1.0));
     const double angle = 2.0 * kPi * (k + random.uniform()) / count;
     spec.drag_mm = kDrag * depth_mm * Eigen::Vector2d(std::cos(angle), std::sin(angle));

@@ -1,8 +1,6 @@
 #include "lab/chroma/chroma_design.h"
 
 #include <cmath>
-#include <functional>
-#include <limits>
 
 #include "core/error.h"
 #include "core/units.h"
@@ -23,31 +21,6 @@ void require_nearer(double displacement_mm, double distance_mm) {
   if (!(displacement_mm < distance_mm)) {
     fail("a displacement of {} mm must be less than the marker's distance of {} mm", displacement_mm, distance_mm);
   }
-}
-
-/// Golden section search for a maximum. @pre one maximum between the ends
-double golden_maximum(const std::function<double(double)>& value, double low, double high, double tolerance) {
-  const double ratio = 0.5 * (std::sqrt(5.0) - 1.0);
-  double a = high - ratio * (high - low);
-  double b = low + ratio * (high - low);
-  double at_a = value(a);
-  double at_b = value(b);
-  while (high - low > tolerance) {
-    if (at_a < at_b) {
-      low = a;
-      a = b;
-      at_a = at_b;
-      b = low + ratio * (high - low);
-      at_b = value(b);
-    } else {
-      high = b;
-      b = a;
-      at_b = at_a;
-      a = high - ratio * (high - low);
-      at_a = value(a);
-    }
-  }
-  return 0.5 * (low + high);
 }
 
 }  // namespace
@@ -71,11 +44,6 @@ double distance_in_view(double marker_mm, double angle_of_view, int markers) {
 
 double apparent_change(double displacement_mm, double distance_mm) {
   return stretched_apparent_change(1.0, displacement_mm, distance_mm);
-}
-
-double apparent_change_first_order(double displacement_mm, double distance_mm) {
-  require_nearer(displacement_mm, distance_mm);
-  return displacement_mm / distance_mm;
 }
 
 double column_strain(double force_N, const SoftMarker& marker) {
@@ -141,33 +109,6 @@ double apparent_measure(ApparentMeasure measure, const ChromaDesign& design, dou
     default:
       return relative;
   }
-}
-
-BestThickness best_thickness(ApparentMeasure measure, const ChromaDesign& design, double from_mm, double to_mm) {
-  require_above_zero(from_mm, "the least thickness, mm");
-  if (!(to_mm > from_mm && std::isfinite(to_mm))) {
-    fail("the greatest thickness: {} mm must be above the least, {} mm", to_mm, from_mm);
-  }
-  const auto value = [&](double thickness) { return apparent_measure(measure, design, thickness); };
-  // All measures rise to one maximum and fall from there, but a coarse search first costs nothing.
-  constexpr int kSteps = 200;
-  const double step = (to_mm - from_mm) / kSteps;
-  const auto place = [&](int k) { return k == kSteps ? to_mm : from_mm + step * k; };
-  int best = 0;
-  double largest = -std::numeric_limits<double>::infinity();
-  for (int k = 0; k <= kSteps; ++k) {
-    const double here = value(place(k));
-    if (here > largest) {
-      largest = here;
-      best = k;
-    }
-  }
-  const double tolerance = 1e-6 * (to_mm - from_mm);
-  const double found =
-      golden_maximum(value, place(std::max(0, best - 1)), place(std::min(kSteps, best + 1)), 0.5 * tolerance);
-  if (found - from_mm < tolerance) return {from_mm, value(from_mm), false};
-  if (to_mm - found < tolerance) return {to_mm, value(to_mm), false};
-  return {found, value(found), true};
 }
 
 double best_picture_thickness(const ChromaDesign& design) {

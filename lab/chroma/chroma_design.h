@@ -35,11 +35,9 @@ double angle_of_view(double focal_length_mm, double sensor_mm = kChromaSensorWid
 /// @throws Error unless the side is above 0, the angle above 0 and below pi, n at least 1, and theta / n below pi / 2
 double distance_in_view(double marker_mm, double angle_of_view, int markers);
 
-/// How much larger a marker looks that came nearer by `displacement_mm` from `distance_mm`: exactly and to first order
-/// (eq. 2). @throws Error unless the distance is above 0, and the displacement less than it
+/// How much larger a marker looks that came nearer by `displacement_mm` from `distance_mm`; to first order,
+/// displacement over distance (eq. 2). @throws Error unless the distance is above 0, and the displacement less than it
 double apparent_change(double displacement_mm, double distance_mm);
-/// To first order: displacement over distance (eq. 2). @throws Error as apparent_change
-double apparent_change_first_order(double displacement_mm, double distance_mm);
 
 /// A soft square on the gel: its side, and the gel under it.
 struct SoftMarker {
@@ -84,17 +82,8 @@ struct ChromaDesign {
 /// Eqs. 1 to 3 together (fig. 4c). @throws Error as the functions above, or if the thickness is at or beyond d + t
 double apparent_measure(ApparentMeasure measure, const ChromaDesign& design, double thickness_mm);
 
-/// The thickness in a range with the largest apparent_measure.
-struct BestThickness {
-  double thickness_mm = 0.0;
-  double measure = 0.0;
-  bool interior = false;  ///< false: it's an end of the range
-};
-/// To a millionth of the range. @throws Error as apparent_measure, or unless 0 < from < to
-BestThickness best_thickness(ApparentMeasure measure, const ChromaDesign& design, double from_mm, double to_mm);
-
-/// In closed form, of picture_film_fixed: d (1 - s) / (s - (1 - e)) with s^2 = (1 + nu e)(1 - e), which is
-/// d (1 - nu) / (1 + nu) where e is 0. @throws Error as column_strain, or unless d is above 0
+/// The thickness with the largest picture_film_fixed, in closed form: d (1 - s) / (s - (1 - e)) with s^2 = (1 + nu e)(1
+/// - e), which is d (1 - nu) / (1 + nu) where e is 0. @throws Error as column_strain, or unless d is above 0
 double best_picture_thickness(const ChromaDesign& design);
 
 }  // namespace touchstone::lab

@@ -136,7 +136,7 @@ sensors::HueModel best_hue_model(const ChromaSetup& setup, const std::vector<sen
   sensors::HueCalibrationSettings settings = hue_settings_of(setup);
   const auto scores = sensors::rank_hue_forms(setup.rest(), samples, settings, forms);
   const auto error = [&](const sensors::HueFormScore& score) {
-    return aim == HueAim::lateral ? score.errors.rms_lateral_mm : score.errors.rms_mm();
+    return aim == HueAim::lateral ? score.errors.rms_lateral_mm : score.errors.rms_of_all_mm();
   };
   settings.form = std::ranges::min_element(scores, {}, error)->form;
   return sensors::calibrate_hue(setup.rest(), samples, settings);

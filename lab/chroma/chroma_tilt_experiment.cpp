@@ -21,8 +21,6 @@ constexpr std::array kPressed_mm = {0.0, 0.25, 0.5, 0.75, 1.0};
 constexpr double kAside_mm = 0.3;
 constexpr int kPhases = 4;
 const Eigen::Vector2d kPhases_px[kPhases] = {{0.0, 0.0}, {0.5, 0.0}, {0.0, 0.5}, {0.5, 0.5}};
-constexpr int kReportedTilts = 10;
-constexpr double kTiltStep_deg = 5.0;
 
 /// The share of a pixel that ink covers, if bare sheet and ink are lit alike.
 double ink_cover(const cv::Vec3f& c, const TiltColours& colours) {
@@ -71,12 +69,6 @@ TiltReading read_tilt_picture(const cv::Mat& picture, const TiltColours& colours
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(variance, Eigen::EigenvaluesOnly);
   reading.ink_width_px = std::sqrt(12.0 * std::max(0.0, axes.eigenvalues()[1]));
   return reading;
-}
-
-std::vector<double> reported_tilts() {
-  std::vector<double> tilts;
-  for (int k = 0; k < kReportedTilts; ++k) tilts.push_back(k * kTiltStep_deg * kRadiansPerDegree);
-  return tilts;
 }
 
 TiltTable measure_tilt(const TiltSetup& setup, const TiltSpectra& spectra, TiltMarker marker,
@@ -143,24 +135,6 @@ TiltTable measure_tilt(const TiltSetup& setup, const TiltSpectra& spectra, TiltM
   table.noise_normal_um = std::abs(um_a_radian * sensors::hue_difference(again.hue, level.hue)) / std::sqrt(2.0);
   table.noise_lateral_um = std::abs(um_a_pixel) * (again.ink_px - level.ink_px).norm() / 2.0;
   return table;
-}
-
-TiltExperiment run_tilt_experiment(const std::filesystem::path& spectra, int samples, std::uint64_t seed,
-                                   const Progress& progress) {
-  const TiltSpectra light = read_tilt_spectra(spectra);
-  const std::vector<double> tilts = reported_tilts();
-  TiltExperiment experiment;
-  for (const TiltMarker marker : {TiltMarker::flat, TiltMarker::rigid, TiltMarker::ball}) {
-    // Tilted, the rigid square looks as the flat one does.
-    const std::span<const double> angles = marker == TiltMarker::rigid ? std::span<const double>() : tilts;
-    TiltSetup setup = far_setup();
-    setup.samples = samples;
-    experiment.far.push_back(measure_tilt(setup, light, marker, angles, seed, progress));
-    setup = compact_setup();
-    setup.samples = 4 * samples;  // its pixels are a sixteenth as many
-    experiment.compact.push_back(measure_tilt(setup, light, marker, angles, seed, progress));
-  }
-  return experiment;
 }
 
 }  // namespace touchstone::lab

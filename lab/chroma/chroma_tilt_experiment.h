@@ -4,7 +4,6 @@
 // its picture seems to say of a displacement is the systematic error, since the centre hasn't moved.
 
 #include <cstdint>
-#include <filesystem>
 #include <span>
 #include <vector>
 
@@ -55,20 +54,9 @@ struct TiltTable {
   double noise_lateral_um = 0.0;  ///< likewise
 };
 
-/// The tilts that are reported, radians: 0 to 45 degrees in steps of 5.
-std::vector<double> reported_tilts();
-
 /// Calibrates and tilts one kind of marker. Each reading is the mean over four pictures that lie half a pixel apart on
 /// the pixels, so that what is left isn't the grid's luck. @throws Error as tilt_scene and read_tilt_picture
 TiltTable measure_tilt(const TiltSetup& setup, const TiltSpectra& spectra, TiltMarker marker,
                        std::span<const double> tilts, std::uint64_t seed, const Progress& progress = {});
-
-/// The whole experiment: flat, rigid and ball before the far and the compact camera, on the axis.
-struct TiltExperiment {
-  std::vector<TiltTable> far, compact;  ///< flat, rigid (calibrated only), ball
-};
-/// `spectra` is the folder scenes/spectra; `samples` paths a pixel of the far camera, four times as many of the other.
-TiltExperiment run_tilt_experiment(const std::filesystem::path& spectra, int samples, std::uint64_t seed,
-                                   const Progress& progress = {});
 
 }  // namespace touchstone::lab

@@ -117,14 +117,6 @@ TiltSetup far_setup() {
   return {};
 }
 
-TiltSetup compact_setup() {
-  TiltSetup setup;
-  setup.lens_mm = 4.0;
-  setup.camera_mm = 64.0;
-  setup.pixel_pitch_um = 20.0;
-  return setup;
-}
-
 TiltSetup near_setup() {
   TiltSetup setup;
   setup.gel_mm = 8.0;

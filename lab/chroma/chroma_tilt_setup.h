@@ -40,12 +40,9 @@ struct TiltSetup {
   int samples = 256;                                   ///< paths a pixel
 };
 
-/// The paper's camera, 66 um a pixel, a small one 60 mm (in air) away on which the marker is 7 pixels wide, and that of
-/// scenes/devices/chroma.yaml: as near, with the paper's lens, 55 um a pixel and 8 mm of gel.
+/// The paper's camera, 66 um a pixel.
 TiltSetup far_setup();
-/// The small camera 60 mm away.
-TiltSetup compact_setup();
-/// The device's own distance.
+/// That of scenes/devices/chroma.yaml: 60 mm (in air) away, with the paper's lens, 55 um a pixel and 8 mm of gel.
 TiltSetup near_setup();
 
 /// How the sheet stands at the marker: it is turned and moved as a whole within 1.6 mm, and fades from there to rest at

@@ -99,16 +99,6 @@ Eigen::VectorXd window_forces(std::span<const sim::ForceReading> readings, doubl
   return forces;
 }
 
-DvsSequence dvs_sequence(const DvsRecording& recording, const DvsSequenceSettings& settings) {
-  const std::vector<sensors::EventCounts> windows = windows_seen(recording, settings);
-  try {
-    return sequence_of(recording, windows, sensors::find_grasp_phases(windows, dvs_phase_settings(settings.window_ms)),
-                       settings);
-  } catch (const Error& error) {
-    fail("grasp with noise seed {}: {}", recording.parameters.noise_seed, error.what());
-  }
-}
-
 DvsSequences dvs_sequences(std::span<const DvsRecording> recordings, const DvsSequenceSettings& settings) {
   const sensors::GraspPhaseSettings phases = dvs_phase_settings(settings.window_ms);
   DvsSequences all;

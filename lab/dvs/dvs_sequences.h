@@ -35,8 +35,6 @@ struct DvsSequence {
   double touch_delay_ms = 0.0;    ///< from the true touch to the end of the window that shows it
   double release_delay_ms = 0.0;  ///< from the servo's order to open to the end of the window that shows it
   double apart_ms = 0.0;          ///< from the end of that window to the last moment of contact
-
-  double peak_true_N() const { return true_N.maxCoeff(); }
 };
 
 /// The force of windows, from readings of their own length and time: the readings' course, straight from middle to
@@ -46,17 +44,14 @@ struct DvsSequence {
 Eigen::VectorXd window_forces(std::span<const sim::ForceReading> readings, double sim::ForceReading::*force,
                               double first_window_s, int window_ms, Eigen::Index windows);
 
-/// @throws Error for a kind of pixels that wasn't recorded, or where the grasp has no touch, no release or no end
-/// (sensors::find_grasp_phases), naming the grasp by its noise seed
-DvsSequence dvs_sequence(const DvsRecording& recording, const DvsSequenceSettings& settings = {});
-
 /// Many grasps. A press so light that its events are lost in the noise has no touch to begin with.
 struct DvsSequences {
   std::vector<DvsSequence> seen;
-  std::vector<std::string> unseen;  ///< of each grasp that isn't, why
+  std::vector<std::string> unseen;  ///< of each grasp that isn't, its noise seed and why: no touch, no release, no end
   double unseen_peak_N = 0.0;       ///< the hardest press (true force) among those
 };
-/// @throws Error as dvs_sequence, but for grasps without touch, release or end
+/// @throws Error for a kind of pixels that wasn't recorded, a window's length out of range, or readings that end before
+/// the windows do
 DvsSequences dvs_sequences(std::span<const DvsRecording> recordings, const DvsSequenceSettings& settings = {});
 
 /// Which force is learned.

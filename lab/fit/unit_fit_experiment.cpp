@@ -4,6 +4,7 @@
 
 #include "core/error.h"
 #include "core/random.h"
+#include "core/random_pairs.h"
 #include "sim/press/gel_setup.h"
 #include "sim/sensor/virtual_sensor.h"
 
@@ -77,7 +78,7 @@ RecordedUnit record_unit(const PreparedFit& fit, const Eigen::VectorXd& hidden, 
     const sim::Touch touched = sensor.capture(object, press, settings.seed, backgrounds + static_cast<int>(i), false);
     unit.recording.presses.push_back(block(touched.frame, fmt::format("press {}", i)));
     if (label.force_N) label.force_N = press.wrench[2] + label.force_sd_N * random.normal();
-    label.place_mm += label.place_sd_mm * Eigen::Vector2d(random.normal(), random.normal());
+    label.place_mm += label.place_sd_mm * normal_pair(random);
     label.depth_mm = *label.depth_mm + label.depth_sd_mm * random.normal();
   }
   return unit;

@@ -8,6 +8,7 @@
 
 #include "core/error.h"
 #include "core/random.h"
+#include "core/random_pairs.h"
 #include "core/units.h"
 #include "fem/shapes/relief_map.h"
 #include "sim/scene/device_gel.h"
@@ -90,7 +91,7 @@ HeightCalibrationResult calibrate_heights(const sim::VirtualSensor& sensor, cons
       press.name = fmt::format("press {}", presses.size() + 1);
       press.frame = touch.frame;
       press.ball_radius_mm = kind.radius_mm;
-      press.circle.centre = centre + how.annotation_px * Eigen::Vector2d(hand.normal(), hand.normal());
+      press.circle.centre = centre + how.annotation_px * normal_pair(hand);
       press.circle.radius = std::sqrt(contact.m00 / kPi) + how.annotation_px * hand.normal();
       presses.push_back(press);
       try {

@@ -15,6 +15,7 @@
 
 #include "core/error.h"
 #include "core/random.h"
+#include "core/random_pairs.h"
 #include "core/transform.h"
 #include "core/units.h"
 #include "fem/contact/press.h"
@@ -175,9 +176,9 @@ PressedHeights press_texture(const sim::VirtualSensor& sensor, const sim::Object
                              const TexturePresses& presses, int texture, int image, const HeightsOf& heights_of) {
   const auto number = (static_cast<std::uint64_t>(texture) << 16) + static_cast<std::uint64_t>(image);
   RandomStream random(presses.seed, number, Purpose::kPlacement);
-  const std::uint64_t piece = (static_cast<std::uint64_t>(random()) << 32) + random();
+  const std::uint64_t piece = next_seed(random);
   const double turn_deg = 360.0 * random.uniform();
-  const Eigen::Vector2d place(presses.shift_mm * random.normal(), presses.shift_mm * random.normal());
+  const Eigen::Vector2d place = presses.shift_mm * normal_pair(random);
   const double force = presses.force_N * std::max(0.2, 1.0 + presses.force_spread * random.normal());
   const sim::TouchObject touching = sensor.object(another_patch(object, piece));
   return heights_of(touching, pressed(sensor, touching, place, turn_deg, force), static_cast<int>(number));

@@ -3,13 +3,11 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <cmath>
 #include <memory>
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
 #include "core/error.h"
-#include "core/random.h"
 #include "core/units.h"
 #include "lab/gelsight/gelsight_height_experiment.h"
 #include "sensors/heights/height_estimator.h"
@@ -88,18 +86,6 @@ HeightReader estimated_heights(const sim::VirtualSensor& sensor, std::uint64_t s
   settings.border = sensors::HeightBorder::free;
   const auto estimator = std::make_shared<sensors::HeightEstimator>(calibrated.calibration.model, settings);
   return [estimator](const sim::Touch& touch) { return estimator->estimate(touch.frame).height_mm.clone(); };
-}
-
-HeightReader true_heights(double noise_mm, std::uint64_t seed) {
-  const auto random = std::make_shared<RandomStream>(seed, 0, Purpose::kPlacement);
-  return [noise_mm, random](const sim::Touch& touch) {
-    cv::Mat heights = touch.height.clone();
-    for (auto height = heights.begin<float>(); height != heights.end<float>(); ++height) {
-      const double rest = std::isfinite(*height) ? *height : 0.0;  // out of the membrane's sight
-      *height = static_cast<float>(rest + noise_mm * random->normal());
-    }
-    return heights;
-  };
 }
 
 }  // namespace touchstone::lab

@@ -59,7 +59,4 @@ class TouchSetup {
 /// @throws Error as calibrate_heights does
 HeightReader estimated_heights(const sim::VirtualSensor& sensor, std::uint64_t seed);
 
-/// True heights with normal noise of `noise_mm` in each pixel: a reader that leaves the estimator out.
-HeightReader true_heights(double noise_mm, std::uint64_t seed);
-
 }  // namespace touchstone::lab

@@ -191,11 +191,4 @@ cv::Mat ReflexLight::traced(const sim::GelSheet& skin, int paths, std::uint64_t 
   return render::Tracer(parts_->seen(skin)).render(parts_->camera, settings).irradiance;
 }
 
-cv::Mat ReflexLight::portrait(const sim::GelSheet& skin, int times, int paths) const {
-  render::RenderSettings settings;
-  settings.seed = parts_->settings.seed;
-  settings.min_samples = settings.max_samples = paths;
-  return render::Tracer(parts_->seen(skin)).render(finer(parts_->camera, times), settings).irradiance;
-}
-
 }  // namespace touchstone::lab

@@ -64,8 +64,6 @@ class ReflexLight {
   cv::Mat irradiance(const sim::GelSheet& skin) const;
   /// The same by path tracing, of so many paths a pixel.
   cv::Mat traced(const sim::GelSheet& skin, int paths, std::uint64_t seed) const;
-  /// Traced with so many times as many pixels along each axis, for people to look at.
-  cv::Mat portrait(const sim::GelSheet& skin, int times, int paths) const;
 
  private:
   struct Parts;

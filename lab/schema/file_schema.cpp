@@ -7,6 +7,7 @@
 
 #include "core/error.h"
 #include "core/nearest_name.h"
+#include "core/yaml_form.h"
 #include "datasets/jobs/draw.h"
 #include "datasets/jobs/job.h"
 #include "lab/fit/unit_fit_spec.h"
@@ -263,8 +264,7 @@ const std::vector<Kind>& kinds() {
 }
 
 std::string text_of(const Json& schema, const std::string& title) {
-  Json whole = {{"$schema", "http://json-schema.org/draft-07/schema#"}};
-  if (!title.empty()) whole["title"] = title;
+  Json whole = {{"$schema", "http://json-schema.org/draft-07/schema#"}, {"title", title}};
   whole.update(schema);
   return whole.dump(1) + "\n";
 }
@@ -283,10 +283,6 @@ std::string file_schema(const std::string& kind) {
   }
   const std::vector<std::string> known = file_kinds();
   fail("there is no kind of file '{}'{}; known are {}", kind, did_you_mean(kind, known), fmt::join(known, ", "));
-}
-
-std::string json_schema(const YamlMap& map) {
-  return text_of(map_schema(map), "");
 }
 
 }  // namespace touchstone::lab

@@ -6,8 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "core/yaml_form.h"
-
 namespace touchstone::lab {
 
 /// The kinds of files: device, object, motion, scene, job, study, palpation, fit.
@@ -15,8 +13,5 @@ std::vector<std::string> file_kinds();
 
 /// The schema of one kind, as text. The same bytes each time. @throws Error for a kind that isn't known
 std::string file_schema(const std::string& kind);
-
-/// The schema of any struct that YAML is read into.
-std::string json_schema(const YamlMap& map);
 
 }  // namespace touchstone::lab

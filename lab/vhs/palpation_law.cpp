@@ -186,7 +186,7 @@ PalpationTable::PalpationTable(const PalpationSpec& spec, PalpationFace face, co
                                       ? bead_pixels(device, Eigen::MatrixX3d::Zero(gel.beads.rows() / 3, 3))
                                       : Eigen::VectorXd();
   nodes_.resize(ratios_.size() * log_skins_.size());
-  std::vector<double> misfits(nodes_.size(), 0.0), strains(nodes_.size(), 0.0);
+  std::vector<double> strains(nodes_.size(), 0.0);
   tbb::parallel_for(std::size_t{0}, nodes_.size(), [&](std::size_t at) {
     const fem::Compliance& piece = *pieces[at % ratios_.size()];
     const double skin = std::exp(log_skins_[at / ratios_.size()]);
@@ -216,7 +216,6 @@ PalpationTable::PalpationTable(const PalpationSpec& spec, PalpationFace face, co
     const Eigen::VectorXd law = rising_law(depths, forces);
     const Eigen::MatrixXd moved = fitted(depths, beads, even, kMostTerms);
     const Eigen::VectorXd area = fitted(depths, areas, even, kMostTerms);
-    const auto force_at = [&](double depth) { return terms_at(depth, static_cast<int>(law.size())).dot(law); };
     Node& node = nodes_[at];
     node.log_force.resize(fine);
     node.area.resize(fine);
@@ -224,19 +223,14 @@ PalpationTable::PalpationTable(const PalpationSpec& spec, PalpationFace face, co
     for (Eigen::Index i = 0; i < fine; ++i) {
       const double depth = step_ * static_cast<double>(i + 1);
       const Eigen::RowVectorXd terms = terms_at(depth, kMostTerms);
-      const double force = force_at(depth);
+      const double force = terms_at(depth, static_cast<int>(law.size())).dot(law);
       TS_ASSERT(force > 0.0);
       node.log_force[i] = std::log(force / std::pow(depth, 1.5));
       node.area[i] = std::max(0.0, terms.dot(area) / std::sqrt(depth));
       if (at_rest.size() > 0) node.beads.row(i) = terms * moved;
     }
-    for (int i = 0; i < settings.depths; ++i) {
-      const double off = force_at(depths[static_cast<std::size_t>(i)]) - forces(i, 0);
-      misfits[at] = std::max(misfits[at], std::abs(off) / forces(settings.depths - 1, 0));
-    }
     tell();
   });
-  misfit_ = *std::max_element(misfits.begin(), misfits.end());
   strain_ = *std::max_element(strains.begin(), strains.end());
   presses_ = static_cast<int>(nodes_.size()) * settings.depths;
 }

@@ -67,8 +67,6 @@ class PalpationTable {
   /// @throws Error for moduli beyond those of the spec's pieces and six times their spread
   PalpationLaw law(double skin_MPa, double core_MPa) const;
 
-  /// What the smooth laws leave of the presses' forces: the largest part of the force at the deepest place.
-  double largest_misfit() const { return misfit_; }
   /// Largest strain measure of the gel (fem::PressState::largest_strain) in any press up to the stop force; of a plate
   /// its own, next to nothing. The lumps' isn't known.
   double largest_strain() const { return strain_; }
@@ -86,7 +84,7 @@ class PalpationTable {
   std::vector<double> ratios_;     ///< places, see ratio_place
   std::vector<double> log_skins_;  ///< one for a rigid face
   std::vector<Node> nodes_;
-  double misfit_ = 0.0, strain_ = 0.0;
+  double strain_ = 0.0;
   int presses_ = 0;
 };
 

@@ -5,6 +5,7 @@
 
 #include "core/error.h"
 #include "core/random.h"
+#include "core/random_pairs.h"
 #include "core/units.h"
 #include "datasets/jobs/job.h"
 #include "sensors/beads/bead_filter.h"
@@ -189,7 +190,7 @@ std::vector<double> vhs_waveform(const VhsChain& chain, const PalpationLaw& law,
     for (std::size_t k = first; k < last; ++k) moved += law.beads(std::clamp(run.depth_mm[k], 0.0, law.deepest_mm()));
     moved /= static_cast<double>(last - first);
     for (std::size_t b = 0; b < beads; ++b) {
-      const Eigen::Vector2d error(chain.noise_px * random.normal(), chain.noise_px * random.normal());
+      const Eigen::Vector2d error = chain.noise_px * normal_pair(random);
       const Eigen::Vector2d measured = chain.model.rest[b] + moved.segment<2>(static_cast<Eigen::Index>(2 * b)) + error;
       if (!chain.filtered) {
         seen[b] = measured;

@@ -44,20 +44,4 @@ double transfer_with_diffraction(const PinholeOptics& optics, double frequency, 
   return 4.0 * sum * width / kSteps / (kPi * a * a) * pixel_transfer(optics, frequency);
 }
 
-double first_zero(const PinholeOptics& optics, double wavelength_nm) {
-  const auto transfer = [&](double frequency) {
-    return wavelength_nm > 0.0 ? transfer_with_diffraction(optics, frequency, wavelength_nm)
-                               : transfer_of_disc(optics, frequency);
-  };
-  const double step = 0.01 / (optics.hole_mm * (1.0 + optics.to_object_mm / optics.to_sensor_mm));
-  double low = 0.0;
-  while (transfer(low + step) > 0.0) low += step;
-  double high = low + step;
-  for (int i = 0; i < 60; ++i) {
-    const double middle = 0.5 * (low + high);
-    (transfer(middle) > 0.0 ? low : high) = middle;
-  }
-  return high;
-}
-
 }  // namespace touchstone::lab

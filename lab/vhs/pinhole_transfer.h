@@ -24,8 +24,4 @@ double transfer_of_disc(const PinholeOptics& optics, double frequency);
 /// 1/F = 1/to_object + 1/to_sensor, at the shift wavelength * to_object * frequency. For short waves it is the disc's.
 double transfer_with_diffraction(const PinholeOptics& optics, double frequency, double wavelength_nm);
 
-/// The smallest frequency (1/mm on the object) at which no contrast is left; with a wavelength of 0 without
-/// diffraction.
-double first_zero(const PinholeOptics& optics, double wavelength_nm);
-
 }  // namespace touchstone::lab

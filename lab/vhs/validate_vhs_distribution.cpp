@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "core/random.h"
+#include "core/random_pairs.h"
 #include "lab/validation/row_list.h"
 #include "lab/vhs/bead_tractions.h"
 #include "lab/vhs/vhs_distribution.h"
@@ -36,7 +37,7 @@ DistributionScore score_points(const DistributionSetup& setup, sensors::Traction
     const std::uint64_t seed = kFirstSeed + static_cast<std::uint64_t>(press);
     RandomStream random(seed, 0, Purpose::kPlacement);
     const double turn = 2.0 * std::numbers::pi * random.uniform();
-    const Eigen::Vector2d middle(random.uniform() - 0.5, random.uniform() - 0.5);
+    const Eigen::Vector2d middle = (uniform_pair(random).array() - 0.5).matrix();
     const double radius = 0.5 * apart_mm / std::sin(std::numbers::pi / count);
     std::vector<LoadPoint> points;
     for (int k = 0; k < count; ++k) {

@@ -6,6 +6,7 @@
 
 #include "core/error.h"
 #include "core/random.h"
+#include "core/random_pairs.h"
 #include "fem/contact/press.h"
 #include "lab/press/marker_compliance_export.h"
 #include "lab/press/mechanics_press.h"
@@ -125,7 +126,7 @@ DistributionTrial press_points(const DistributionSetup& setup, sensors::Traction
   sensors::TrackedBeads tracked;
   tracked.positions = seen_at(setup.device, beads);
   for (Eigen::Vector2d& place : tracked.positions) {
-    place += noise_px * Eigen::Vector2d(random.normal(), random.normal());
+    place += noise_px * normal_pair(random);
   }
   tracked.status.assign(beads.size(), sensors::BeadStatus::kFound);
   const sensors::BeadView view = sensors::view_of(setup.rest_px, setup.compliance);

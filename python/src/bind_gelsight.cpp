@@ -1,5 +1,7 @@
 // Heights from frames of a coated gel: sensors/heights/height_estimator.h.
 
+#include <cmath>
+
 #include "core/error.h"
 #include "python/src/bindings.h"
 #include "python/src/estimator.h"
@@ -37,7 +39,11 @@ py::tuple calibrate_height(const py::object& frames, const py::object& ball_diam
   std::vector<std::optional<sensors::ContactCircle>> known(pictures.size());
   std::vector<double> radii_mm;
   for (std::size_t i = 0; i < pictures.size(); ++i) {
-    radii_mm.push_back(0.5 * py::object(diameters[i]).cast<double>());
+    const auto diameter = py::object(diameters[i]).cast<double>();
+    if (!(diameter > 0.0) || !std::isfinite(diameter)) {
+      fail("ball_diameters_mm: number {} of it is {}; allowed is above 0", i, diameter);
+    }
+    radii_mm.push_back(0.5 * diameter);
     if (!circles_given) continue;
     const py::object circle = circles.cast<py::sequence>()[i];
     if (circle.is_none()) continue;
@@ -47,7 +53,9 @@ py::tuple calibrate_height(const py::object& frames, const py::object& ball_diam
   sensors::HeightCalibrationSettings settings;
   settings.mm_per_px = mm_per_px;
   settings.correction = correction_named(correction);
-  if (!(mm_per_px > 0.0)) fail("mm_per_px: {} is not allowed; allowed is above 0", mm_per_px);
+  if (!(mm_per_px > 0.0) || !std::isfinite(mm_per_px)) {
+    fail("mm_per_px: {} is not allowed; allowed is above 0", mm_per_px);
+  }
   const sensors::HeightCalibration made = unlocked([&] {
     std::vector<cv::Mat> untouched;
     for (const Picture& picture : rest) untouched.push_back(picture.mat);

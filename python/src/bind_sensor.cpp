@@ -294,12 +294,14 @@ void bind_sensor(py::module_& module) {
           "(height, width), or None without a camera.")
       .def_property_readonly(
           "gel_vertices_mm",
-          [](const py::object& self) { return rows_in<double>(self.cast<Sensor&>().gel().vertices, 3, self); },
-          "(n, 3): the outer surface's vertices at rest, gel frame.")
+          [](const py::object& self) {
+            return read_only(rows_in<double>(self.cast<Sensor&>().gel().vertices, 3, self));
+          },
+          "(n, 3): the outer surface's vertices at rest, gel frame; read-only.")
       .def_property_readonly(
           "gel_triangles",
-          [](const py::object& self) { return rows_in<int>(self.cast<Sensor&>().gel().triangles, 3, self); },
-          "(triangles, 3): vertices of each.")
+          [](const py::object& self) { return read_only(rows_in<int>(self.cast<Sensor&>().gel().triangles, 3, self)); },
+          "(triangles, 3): vertices of each; read-only.")
       .def_property_readonly(
           "mm_per_px", [](const Sensor& self) { return unlocked([&] { return self.virtual_sensor().mm_per_px(); }); },
           "In the middle of the undeformed membrane.")

@@ -42,6 +42,12 @@ py::object array_of(const cv::Mat& picture);
 /// The same of a mask, as bool. @pre its values are 0 and 1
 py::object bool_array_of(const cv::Mat& mask);
 
+/// The same array, which Python can't write into: what others read, too.
+inline py::array read_only(py::array array) {
+  array.attr("setflags")(py::arg("write") = false);
+  return array;
+}
+
 /// Rows of numbers within `owner`, without a copy. Eigen keeps columns together.
 template <typename Matrix>
 py::array array_within(const Matrix& matrix, const py::handle& owner) {

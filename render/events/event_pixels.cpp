@@ -67,8 +67,8 @@ NoiseEvent noise_event(std::uint64_t seed, std::uint32_t x, std::uint32_t y, std
 // Of one pixel. The most sensitive tail is cut, or a pixel at zero would fire for ever, and so is what 32 bits of level
 // wouldn't hold together with the largest change of light.
 std::int32_t threshold_level(double mean, double spread, double normal) {
-  constexpr double kLargest = 20.0;
-  const double threshold = std::clamp(mean + spread * normal, std::max(0.1 * mean, kLeastEventThreshold), kLargest);
+  constexpr double kMostThreshold = 20.0;
+  const double threshold = std::clamp(mean + spread * normal, std::max(0.1 * mean, kLeastEventThreshold), kMostThreshold);
   return static_cast<std::int32_t>(std::lround(threshold * kLevelPerLog));
 }
 

@@ -135,16 +135,27 @@ double HueErrors::rms_mm() const {
   return std::sqrt(2.0 * rms_lateral_mm * rms_lateral_mm + rms_press_mm * rms_press_mm);
 }
 
+double HueErrors::rms_of_all_mm() const {
+  const auto estimated = static_cast<double>(samples), without = static_cast<double>(declined);
+  const double squares = estimated * rms_mm() * rms_mm() + without * rms_declined_mm * rms_declined_mm;
+  return std::sqrt(squares / std::max(1.0, estimated + without));
+}
+
 namespace {
 
 struct ErrorSums {
-  std::size_t count = 0;
-  double lateral = 0.0, press = 0.0, largest = 0.0;
+  std::size_t count = 0, declined = 0;
+  double lateral = 0.0, press = 0.0, largest = 0.0, unestimated = 0.0;
 
   void add(const HueModel& model, const ColourMarkerReading& rest, const std::vector<HueSample>& samples) {
     const HueEstimator estimator(model, rest);
     for (const HueSample& sample : samples) {
       const HueEstimate estimate = estimator.estimate(sample.marker, sample.seen);
+      if (!estimate.measured) {
+        ++declined;
+        unestimated += sample.displacement_mm.squaredNorm();
+        continue;
+      }
       const Eigen::Vector3d error = estimate.displacement_mm - sample.displacement_mm;
       ++count;
       lateral += 0.5 * error.head<2>().squaredNorm();
@@ -154,7 +165,8 @@ struct ErrorSums {
   }
   HueErrors errors() const {
     const double n = std::max<double>(1.0, static_cast<double>(count));
-    return {count, std::sqrt(lateral / n), std::sqrt(press / n), largest};
+    const double without = std::max<double>(1.0, static_cast<double>(declined));
+    return {count, std::sqrt(lateral / n), std::sqrt(press / n), largest, declined, std::sqrt(unestimated / without)};
   }
 };
 
@@ -220,8 +232,9 @@ std::vector<HueFormScore> rank_hue_forms(const ColourMarkerReading& rest, const 
     }
   }
   if (scores.empty()) fail("hue calibration: no form fits: {}", last);
-  std::stable_sort(scores.begin(), scores.end(),
-                   [](const HueFormScore& a, const HueFormScore& b) { return a.errors.rms_mm() < b.errors.rms_mm(); });
+  std::stable_sort(scores.begin(), scores.end(), [](const HueFormScore& a, const HueFormScore& b) {
+    return a.errors.rms_of_all_mm() < b.errors.rms_of_all_mm();
+  });
   return scores;
 }
 

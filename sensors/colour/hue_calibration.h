@@ -51,13 +51,17 @@ inline constexpr int kLeastHueSamples = 8;   ///< in all, for a calibration
 HueModel calibrate_hue(const ColourMarkerReading& rest, const std::vector<HueSample>& samples,
                        const HueCalibrationSettings& settings);
 
-/// Errors over samples, mm.
+/// Errors over samples that the model estimates, mm. Those that it declines (their marker is flawed, or a neighbour
+/// that the form needs) aren't in the first four.
 struct HueErrors {
-  std::size_t samples = 0;
+  std::size_t samples = 0;      ///< that were estimated
   double rms_lateral_mm = 0.0;  ///< per axis
   double rms_press_mm = 0.0;
   double largest_mm = 0.0;  ///< of the displacement's length
-  double rms_mm() const;    ///< of the displacement's length
+  std::size_t declined = 0;
+  double rms_declined_mm = 0.0;  ///< of the declined samples' own displacement
+  double rms_mm() const;         ///< of the displacement's length
+  double rms_of_all_mm() const;  ///< likewise, with each declined sample as one that was taken for unmoved
 };
 
 /// A model's errors on samples.

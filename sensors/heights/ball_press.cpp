@@ -12,6 +12,8 @@
 namespace touchstone::sensors {
 namespace {
 
+constexpr double kWidestBall = 10.0;  // radius by the frame's larger side: of a flatter ball no outline is found
+
 constexpr double kSmallestRadius_px = 4.0;
 constexpr double kFaintest_percent = 15.0;  // less is no contact
 constexpr float kDarkest_DN = 10.0F;        // a darker background doesn't count for less
@@ -232,9 +234,18 @@ std::vector<ColourSample> samples_of(const BallPress& press, const Background& b
 
 ContactCircle find_contact_circle(const cv::Mat& frame, const Background& background, double ball_radius_mm,
                                   double mm_per_px, const std::string& name) {
-  TS_ASSERT(mm_per_px > 0.0 && ball_radius_mm > 0.0);
   const std::string fault = frame_fault(frame, background.mean.size());
   if (!fault.empty()) fail("{}: the frame {}", name, fault);
+  if (!(ball_radius_mm > 0.0) || !std::isfinite(ball_radius_mm)) {
+    fail("{}: ball radius {} mm: it must be above 0", name, ball_radius_mm);
+  }
+  const double widest_px = kWidestBall * std::max(frame.cols, frame.rows);
+  if (!(mm_per_px > 0.0) || !(ball_radius_mm / mm_per_px <= widest_px)) {
+    fail(
+        "{}: mm_per_px {}: with it the ball's radius is {:.3g} px; allowed are at most {:.0f} px, {:.0f} times the "
+        "frame",
+        name, mm_per_px, ball_radius_mm / mm_per_px, widest_px, kWidestBall);
+  }
   const cv::Mat difference = difference_to(background, frame);
   const cv::Mat brightening = change_of(difference, background, Change::brighter);
   const cv::Mat change = change_of(difference, background, Change::either);

@@ -72,17 +72,4 @@ void level_by_border(cv::Mat& heights_mm) {
   }
 }
 
-cv::Mat picture_of_normals(const cv::Mat& slope_u, const cv::Mat& slope_v) {
-  TS_ASSERT(slope_u.type() == CV_32FC1 && slope_v.type() == CV_32FC1 && slope_u.size() == slope_v.size());
-  cv::Mat picture(slope_u.size(), CV_8UC3);
-  for (int v = 0; v < picture.rows; ++v) {
-    for (int u = 0; u < picture.cols; ++u) {
-      const Eigen::Vector3d normal = normal_of({slope_u.at<float>(v, u), slope_v.at<float>(v, u)});
-      const auto level = [](double part) { return cv::saturate_cast<unsigned char>(127.5 * (1.0 + part)); };
-      picture.at<cv::Vec3b>(v, u) = {level(normal.z()), level(-normal.y()), level(normal.x())};
-    }
-  }
-  return picture;
-}
-
 }  // namespace touchstone::sensors

@@ -34,7 +34,4 @@ int mark_contact(const cv::Mat& heights_mm, const ContactRule& rule, cv::Mat& ma
 /// @pre heights is CV_32FC1
 void level_by_border(cv::Mat& heights_mm);
 
-/// Normals as a picture (CV_8UC3, BGR): red, green and blue are u, v (up) and towards the camera, -1 to 1 as 0 to 255.
-cv::Mat picture_of_normals(const cv::Mat& slope_u, const cv::Mat& slope_v);
-
 }  // namespace touchstone::sensors

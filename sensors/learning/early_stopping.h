@@ -22,7 +22,6 @@ class EarlyStopping {
     return step - best_step_ >= patience_;
   }
 
-  double best_loss() const { return best_loss_; }
   int best_step() const { return best_step_; }
   const Eigen::VectorXd& best() const { return best_; }
 

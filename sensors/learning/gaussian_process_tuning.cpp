@@ -110,10 +110,14 @@ TunedGaussianProcess tune_gaussian_process(const Eigen::MatrixXd& inputs, const 
     };
     const auto cost = [&](const Eigen::VectorXd& place) {
       ++tuned.factorisations;
-      const GaussianProcess process = process_at(place);
-      if (settings.aim == TuningAim::kEvidence) return -process.log_evidence / static_cast<double>(rows.size());
-      return (predict(process, validation_inputs) - validation_targets).squaredNorm() /
-             static_cast<double>(validation_targets.size());
+      try {
+        const GaussianProcess process = process_at(place);
+        if (settings.aim == TuningAim::kEvidence) return -process.log_evidence / static_cast<double>(rows.size());
+        return (predict(process, validation_inputs) - validation_targets).squaredNorm() /
+               static_cast<double>(validation_targets.size());
+      } catch (const Error&) {  // too little noise to be factorised: the search looks elsewhere
+        return std::numeric_limits<double>::infinity();
+      }
     };
     BayesianMinimumSettings search;
     search.evaluations = settings.evaluations;

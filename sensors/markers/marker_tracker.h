@@ -78,7 +78,10 @@ class MarkerTracker {
   const TrackedMarkers& tracked() const { return result_; }
 
   /// Forgets all frames: the next one is the gel at rest.
-  void restart() { result_.rest.clear(); }
+  void restart() {
+    result_ = TrackedMarkers();
+    spacing_px_ = 0.0;
+  }
 
   /// Median distance of a marker to its nearest neighbour at rest, px; 0 before the first frame.
   double spacing_px() const { return spacing_px_; }

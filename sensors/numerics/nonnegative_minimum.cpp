@@ -30,10 +30,11 @@ Eigen::VectorXd with_few_held(const Eigen::LLT<Eigen::MatrixXd>& factor, const E
 /// The same by a factor of the free rows.
 Eigen::VectorXd with_few_free(const Eigen::MatrixXd& H, const Eigen::VectorXd& b,
                               const std::vector<Eigen::Index>& free) {
-  const Eigen::VectorXd part = b(free);
+  Eigen::VectorXd part(static_cast<Eigen::Index>(free.size()));
+  for (std::size_t k = 0; k < free.size(); ++k) part[static_cast<Eigen::Index>(k)] = b[free[k]];
   const Eigen::VectorXd solved = Eigen::LLT<Eigen::MatrixXd>(H(free, free)).solve(part);
   Eigen::VectorXd x = Eigen::VectorXd::Zero(b.size());
-  x(free) = solved;
+  for (std::size_t k = 0; k < free.size(); ++k) x[free[k]] = solved[static_cast<Eigen::Index>(k)];
   return x;
 }
 

@@ -323,11 +323,6 @@ std::string fault_of(const ContactTree& tree) {
   return {};
 }
 
-int leaves_of(const ContactTree& tree) {
-  return static_cast<int>(
-      std::count_if(tree.nodes.begin(), tree.nodes.end(), [](const ContactTreeNode& node) { return node.above == 0; }));
-}
-
 std::string rule_of(const ContactTree& tree) {
   std::vector<Box> present;
   collect(tree, 0, {}, present);

@@ -60,9 +60,6 @@ inline bool force_present(const ContactTree& tree, const ChipStatistics& statist
   return node->force_present;
 }
 
-/// How many answers the tree has.
-int leaves_of(const ContactTree& tree);
-
 /// When the tree says that a force is present, as in the paper's eq. 2: "MAX > 40 or (MAX > 38 and SQ < 82)". Each part
 /// is a path through the tree, without the conditions that change nothing since others of the parts cover what they
 /// forbid. "always" or "never" where nothing is asked.

@@ -78,8 +78,8 @@ struct ReflexBudget {
   double decision_us = 0.0;  ///< measured
   double actuator_us = 0.0;  ///< from the decision to where the actuator begins to brake
 
+  /// The least: touch at a frame's very end.
   double after_frame_us() const { return registers * register_us + decision_us + actuator_us; }
-  double least_us() const { return after_frame_us(); }                  ///< touch at a frame's very end
   double mean_us() const { return 0.5 * frame_us + after_frame_us(); }  ///< touch at any time
   /// Touch just after a frame was exposed, and a host that is still reading the frame before when this one is ready.
   double most_us() const { return frame_us + registers * register_us + after_frame_us(); }

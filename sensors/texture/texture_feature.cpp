@@ -2,7 +2,6 @@
 
 #include <cmath>
 #include <cstdint>
-#include <numbers>
 #include <vector>
 
 #include "core/error.h"
@@ -42,12 +41,6 @@ Eigen::VectorXf texture_feature(const cv::Mat& gray, const TextureOperator& op) 
     for (const std::uint32_t count : lbp_histogram(pyramid[level], op.circle)) counts[k++] = weight * count;
   }
   return (counts / counts.sum()).cwiseSqrt().cast<float>();
-}
-
-double hellinger_distance(const Eigen::VectorXf& a, const Eigen::VectorXf& b) {
-  TS_ASSERT(a.size() == b.size());
-  // From the difference: 1 - BC would lose all digits between neighbours.
-  return (a.cast<double>() - b.cast<double>()).norm() / std::numbers::sqrt2;
 }
 
 }  // namespace touchstone::sensors

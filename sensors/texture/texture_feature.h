@@ -31,8 +31,4 @@ int least_side(const TextureOperator& op);
 /// @param gray CV_8UC1, from least_side() a side @throws Error for another kind or a smaller one
 Eigen::VectorXf texture_feature(const cv::Mat& gray, const TextureOperator& op);
 
-/// sqrt(1 - BC) with the Bhattacharyya coefficient BC of the two histograms (eqs. 12, 14), from 0 to 1: the Euclidean
-/// distance of their features over sqrt(2) (eq. 13). @pre sizes are equal
-double hellinger_distance(const Eigen::VectorXf& a, const Eigen::VectorXf& b);
-
 }  // namespace touchstone::sensors

@@ -113,8 +113,7 @@ class CellContact {
     part_ = {right - left + 1, top - bottom + 1, grid.pitch, grid.centre(left, bottom)};
     layer_ = std::make_unique<const fem::LayerResponse>(both, gel.thickness, part_, fem::GridEdges::free);
     for (const int cell : cells) cells_.push_back(part_.at(cell % grid.nx - left, cell / grid.nx - bottom));
-    terms_at_vertices_ = terms(at_vertices, half_length / gel.thickness);
-    fit_.compute(terms_at_vertices_);
+    fit_.compute(terms(at_vertices, half_length / gel.thickness));
     // P1 values at the part's pixels.
     const fem::TriangleTree tree(gel.vertices, gel.triangles);
     std::vector<Eigen::Triplet<double>> hats;
@@ -148,7 +147,6 @@ class CellContact {
   struct Answer {
     std::vector<double> pressure, gap;  // per cell, MPa and mm
     std::vector<double> start;          // to begin the next state with
-    double misfit = 0.0;                // mm
   };
   /// `pressure` and `apart` per vertex of the gel: the press's pressure (MPa), and how far it moves the two faces apart
   /// (mm, hat means).
@@ -172,8 +170,6 @@ class CellContact {
     for (std::size_t k = 0; k < cells_.size(); ++k) gap[cells_[k]] = height[k] + smooth[static_cast<Eigen::Index>(k)];
     fem::PixelContactAnswer solved = fem::solve_pixel_contact(*layer_, {gap, force}, {}, start);
     Answer answer;
-    answer.misfit =
-        std::sqrt((terms_at_vertices_ * coefficients - rest).squaredNorm() / static_cast<double>(rest.size()));
     for (const std::size_t pixel : cells_) {
       answer.pressure.push_back(solved.pressure[pixel]);
       answer.gap.push_back(gap[pixel] + solved.shift + solved.displacement[pixel]);
@@ -226,7 +222,7 @@ class CellContact {
   std::unique_ptr<const fem::LayerResponse> layer_;
   std::vector<std::size_t> cells_;  // pixels of the part
   Eigen::SparseMatrix<double, Eigen::RowMajor> hats_;
-  Eigen::MatrixXd terms_at_cells_, terms_at_vertices_;
+  Eigen::MatrixXd terms_at_cells_;
   Eigen::ColPivHouseholderQR<Eigen::MatrixXd> fit_;
 };
 

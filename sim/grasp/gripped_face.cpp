@@ -187,7 +187,6 @@ GrippedFace::GrippedFace(const DeviceSpec& device, const fem::Compliance& gel, c
 
     const CellContact::Answer cells =
         fine.solve(FlatPlane(state.gel_from_object, half_height), pressure, apart, point.normal_N, start);
-    misfit_ = std::max(misfit_, cells.misfit);
     signed_.emplace_back();
     for (std::size_t k = 0; k < bearing_.size(); ++k) {
       signed_.back().push_back(

@@ -94,12 +94,6 @@ class GrippedFace {
   /// The face at a load. A pure function.
   FaceMap map(const GripPoint& point) const;
 
-  /// mm along y that the membrane under the piece goes per N of shear.
-  double shear_compliance() const { return gel_shear_; }
-  /// mm, RMS over the flat, the largest of all states: what the smooth field leaves of the press's displacements (the
-  /// elements' wiggles).
-  double largest_misfit_mm() const { return misfit_; }
-
  private:
   /// A cell that the piece is over, as the unloaded pose has it.
   struct Cell {
@@ -121,8 +115,7 @@ class GrippedFace {
   std::vector<int> bearing_;  ///< cells, places in the grid, at least half of which lies under the flat
   std::vector<GripPoint> states_;
   std::vector<std::vector<float>> signed_;  ///< per state and bearing cell: pressure (MPa) or -gap * per_gap_
-  double gel_shear_ = 0.0;
-  double misfit_ = 0.0;
+  double gel_shear_ = 0.0;                  ///< mm along y that the membrane under the piece goes per N of shear
 };
 
 }  // namespace touchstone::sim

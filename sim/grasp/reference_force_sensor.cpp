@@ -156,13 +156,4 @@ std::vector<ForceReading> read_reference_force(std::span<const FingerMoment> mom
   return readings;
 }
 
-ReferenceForceSensorSettings ideal_force_sensor() {
-  ReferenceForceSensorSettings ideal;
-  ideal.hysteresis = ideal.gain_error = ideal.drift_per_decade = ideal.lag_s = 0.0;
-  ideal.noise_N = ideal.carried_g = ideal.shaken_N_s_mm = 0.0;
-  ideal.adc_bits = 0;
-  ideal.median = 1;
-  return ideal;
-}
-
 }  // namespace touchstone::sim

@@ -62,7 +62,4 @@ class HysteresisLoop {
 std::vector<ForceReading> read_reference_force(std::span<const FingerMoment> moments, double from_s,
                                                const ReferenceForceSensorSettings& settings, std::uint64_t seed);
 
-/// The same sensor without any of its errors.
-ReferenceForceSensorSettings ideal_force_sensor();
-
 }  // namespace touchstone::sim

@@ -52,6 +52,30 @@ struct AxisTrack {
   }
 };
 
+constexpr double kTurningContact = 0.25;        // contact's radius by the object's, under a torque that turns it
+constexpr double kMostTurning_rad = kPi / 2.0;  // by one key: beyond it the contact is another
+
+/// The torques on an object while its keys are gone through.
+struct TurnTrack {
+  Eigen::Vector3d torque_Nmm = Eigen::Vector3d::Zero();
+
+  /// Radians that the key's torques turn it, as a rigid round punch of radius a on a half space, which resists tilting
+  /// by 8 G a^3 / (3 (1 - nu)) and twisting by 16 G a^3 / 3 [Johnson1985]. `plane_MPa`: E / (1 - nu^2).
+  double go(const MotionKey& key, double radius_mm, double plane_MPa, double poisson_ratio) {
+    const double cube = std::pow(kTurningContact * radius_mm, 3);
+    const double tilting = 4.0 / 3.0 * plane_MPa * cube;
+    const double twisting = 8.0 / 3.0 * plane_MPa * (1.0 - poisson_ratio) * cube;
+    const std::optional<TurnKey>* const turns[3] = {&key.turn_x, &key.turn_y, &key.turn_z};
+    double angle = 0.0;
+    for (int a = 0; a < 3; ++a) {
+      if (!*turns[a]) continue;
+      angle += std::abs((*turns[a])->torque_Nmm - torque_Nmm[a]) / (a == 2 ? twisting : tilting);
+      torque_Nmm[a] = (*turns[a])->torque_Nmm;
+    }
+    return std::min(angle, kMostTurning_rad);
+  }
+};
+
 }  // namespace
 
 ImageScale::ImageScale(const DeviceSpec& device) {
@@ -111,6 +135,7 @@ MotionSpeed motion_speed(const SceneSpec& scene) {
     AxisTrack tracks[3];
     for (int a = 0; a < 3; ++a) tracks[a].position_mm = moved.motion.start_mm[a];
     Eigen::Vector3d angles_deg = moved.motion.start_angles_deg;
+    TurnTrack turns;
     for (const MotionKey& key : moved.motion.keys) {
       const double seconds = key.frames / moved.motion.frame_rate_Hz;
       Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
@@ -128,7 +153,11 @@ MotionSpeed motion_speed(const SceneSpec& scene) {
       if (key.angles_deg) {
         turning = (*key.angles_deg - angles_deg).cwiseAbs().sum() * kRadiansPerDegree / seconds * reach.from_origin;
         angles_deg = *key.angles_deg;
+        turns.torque_Nmm.setZero();
       }
+      const double turned = turns.go(key, reach.from_axis, stiffness / reach.from_axis, gel.poisson_ratio);
+      turning += turned / seconds * reach.from_origin;
+      speed.led_by_force = speed.led_by_force || turned > 0.0;
       speed.mm_per_s = std::max(speed.mm_per_s, velocity.norm() + turning);
       if (scale) {
         speed.pixels_per_s = std::max(speed.pixels_per_s, scale->pixels(velocity) + scale->pixels_across(turning));

@@ -43,7 +43,7 @@ struct MotionSpeed {
 };
 
 /// Of all objects and keys. Where a force leads, the speed is that of a rigid flat punch of half the object's radius on
-/// a half space; how a torque turns an object isn't in it.
+/// a half space; where a torque does, of one of a quarter of it, since a narrow contact turns more easily.
 MotionSpeed motion_speed(const SceneSpec& scene);
 
 }  // namespace touchstone::sim

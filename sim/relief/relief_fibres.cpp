@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "core/random_pairs.h"
 #include "core/units.h"
 
 namespace touchstone::sim {
@@ -16,7 +17,7 @@ void lay_fibres(ReliefTile& layer, const Fibres& fibres, const std::function<dou
   const Eigen::Vector2d size = layer.size();
   const int count = static_cast<int>(std::lround(fibres.per_mm2 * size.x() * size.y()));
   for (int k = 0; k < count; ++k) {
-    Eigen::Vector2d place(size.x() * random.uniform(), size.y() * random.uniform());
+    Eigen::Vector2d place = size.cwiseProduct(uniform_pair(random));
     const double length = fibres.length_mm * (0.5 + random.uniform());
     const double radius = 0.5 * fibres.diameter_mm * (0.7 + 0.6 * random.uniform());
     double direction = 2.0 * kPi * random.uniform();

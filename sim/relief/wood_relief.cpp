@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include "core/random_pairs.h"
 #include "core/units.h"
 #include "sim/relief/relief_tile.h"
 
@@ -43,7 +44,7 @@ void cut_vessels(const WoodRelief& relief, const Rings& rings, ReliefTile& tile)
   const double kept = 1.0 - 0.7 * relief.ring_porosity;
   const int count = static_cast<int>(std::lround(relief.vessels_per_mm2 * size.x() * size.y() / kept));
   for (int k = 0; k < count; ++k) {
-    const Eigen::Vector2d middle(size.x() * random.uniform(), size.y() * random.uniform());
+    const Eigen::Vector2d middle = size.cwiseProduct(uniform_pair(random));
     const double half_length = 0.5 * relief.vessel_length_mm * (0.4 + 1.2 * random.uniform());
     const double half_width = 0.5 * relief.vessel_um * kMicrometre * std::max(0.4, 1.0 + 0.25 * random.normal());
     const double depth = relief.vessel_depth_um * kMicrometre * std::max(0.2, 1.0 + 0.3 * random.normal());

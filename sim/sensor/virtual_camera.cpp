@@ -8,6 +8,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/random.h"
+#include "core/random_pairs.h"
 #include "core/units.h"
 #include "render/cameras/rolling_shutter.h"
 #include "render/paths/shared_paths.h"
@@ -239,7 +240,7 @@ struct VirtualCamera::Parts : SceneView {
     render::RayCounts counts;
     for (std::size_t i = 0; i < times.size(); ++i) {
       RandomStream seeds(scene.seed, i, Purpose::kMotion);
-      of_moment.seed = (std::uint64_t{seeds()} << 32) | seeds();
+      of_moment.seed = next_seed(seeds);
       const render::Tracer tracer(scenes[i]);
       const render::RenderedImage image = shares ? shared->render(scenes[i], tracer, of_moment, scene.outputs.error)
                                                  : tracer.render(camera, of_moment, light.missing);

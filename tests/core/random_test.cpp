@@ -1,4 +1,5 @@
 #include "core/random.h"
+#include "core/random_pairs.h"
 
 #include <gtest/gtest.h>
 
@@ -116,6 +117,19 @@ TEST(RandomStream, PoissonRefusesAMeanThatIsNone) {
   RandomStream stream(1, 1, Purpose::kTest);
   EXPECT_DEATH(stream.poisson(-1.0), "mean >= 0");
   EXPECT_DEATH(stream.poisson(std::nan("")), "mean >= 0");
+}
+
+TEST(RandomPairs, HaveAFixedOrder) {
+  RandomStream one(5, 0, Purpose::kTest), two(5, 0, Purpose::kTest);
+  const Eigen::Vector2d normal = normal_pair(one);
+  EXPECT_EQ(normal.y(), two.normal());
+  EXPECT_EQ(normal.x(), two.normal());
+  const Eigen::Vector2d uniform = uniform_pair(one);
+  EXPECT_EQ(uniform.y(), two.uniform());
+  EXPECT_EQ(uniform.x(), two.uniform());
+  const std::uint64_t seed = next_seed(one);
+  EXPECT_EQ(seed >> 32, two());
+  EXPECT_EQ(seed & 0xffffffffu, two());
 }
 
 }  // namespace

@@ -136,5 +136,13 @@ def test_heights_are_checked_and_shared_between_threads(sensor, ball):
         ts.calibrate_height([frame], [3.0, 4.0], background, mm_per_px=0.1)
     with pytest.raises(ts.Error, match="no picture is given"):
         ts.calibrate_height([], [], background, mm_per_px=0.1)
+    for diameter in (0.0, -1.0, float("nan"), float("inf")):
+        with pytest.raises(ts.Error, match="ball_diameters_mm: number 0 of it is"):
+            ts.calibrate_height([frame], [diameter], background, mm_per_px=0.1)
+    for scale in (0.0, -1.0, float("nan"), float("inf")):
+        with pytest.raises(ts.Error, match="mm_per_px: .* is not allowed"):
+            ts.calibrate_height([frame], [3.0], background, mm_per_px=scale)
+    with pytest.raises(ts.Error, match="mm_per_px 1e-09: with it the ball's radius is"):
+        ts.calibrate_height([frame], [3.0], background, mm_per_px=1e-9)
     with pytest.raises(ts.Error, match="border: 'open' is not known"):
         ts.HeightEstimator(model, border="open")

@@ -257,3 +257,19 @@ def test_a_slow_blas_is_warned_of(tmp_path):
         run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True,
                              env={"PYTHONPATH": package, "OPENBLAS_CORETYPE": core, "PATH": os.environ["PATH"]})
         assert ("will be slow" in run.stderr) == warned, run.stderr
+
+
+def test_a_sensors_own_arrays_cant_be_written(sensor, ball):
+    before = sensor.press(ball, force_N=0.3, look=False).force_N
+    for array in (sensor.gel_vertices_mm, sensor.gel_triangles):
+        with pytest.raises(ValueError, match="read-only"):
+            array += 1
+        with pytest.raises(ValueError):
+            array.setflags(write=True)
+    # What a touch has is the caller's: no later press knows of it.
+    touch = sensor.press(ball, force_N=0.3)
+    for array in (touch.frame, touch.background, touch.height_mm, touch.surface_displacement_mm, touch.traction_MPa):
+        array[...] = 0
+    again = sensor.press(ball, force_N=0.3)
+    assert np.array_equal(again.force_N, before) and again.frame.max() > 0 and np.nanmax(again.height_mm) > 0
+    assert np.abs(again.surface_displacement_mm).max() > 0 and sensor.background().max() > 0

@@ -329,13 +329,6 @@ TEST(LinearRange, TheDifferenceGrowsWithDepthFromNothing) {
     EXPECT_GT(std::abs(range[k].difference()), std::abs(range[k - 1].difference()));
   }
   EXPECT_DOUBLE_EQ(range[1].depth, 0.15);
-  // The estimate goes through the rows.
-  EXPECT_EQ(estimated_difference(range, 0.0), 0.0);
-  for (const LinearRangeRow& row : range) {
-    EXPECT_NEAR(estimated_difference(range, row.largest_strain), row.difference(), 1e-12);
-  }
-  EXPECT_NEAR(estimated_difference(range, 2 * range[2].largest_strain), 2 * range[2].difference(), 1e-12);
-  EXPECT_TRUE(std::isnan(estimated_difference({}, 0.1)));
 }
 
 TEST(LinearRange, BadDepthsAreRefused) {

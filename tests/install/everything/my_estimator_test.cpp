@@ -2,6 +2,7 @@
 // estimator is held against the truth.
 
 #include <datasets/jobs/scenes_folder.h>
+#include <sensors/learning/gaussian_process_file.h>
 #include <touchstone/testing.h>
 
 #include <cstdlib>
@@ -42,6 +43,17 @@ TEST(MyEstimator, ReadsFourTenthsOfANewton) {
 TEST(MyEstimator, WhatDoesNotMatchIsKeptAsPictures) {
   const Touch held = my_device().press(object("ball-4mm"), {.force_N = 0.4});
   EXPECT_THAT(keep_frames(held), HasSubstr("MyEstimator.WhatDoesNotMatchIsKeptAsPictures-1.png"));
+}
+
+TEST(InstalledCopy, KeepsTrainedModels) {
+  namespace sensors = touchstone::sensors;
+  const Eigen::MatrixXd changes = Eigen::Vector3d(0.0, 5.0, 9.0);
+  const auto learned =
+      sensors::condition({Eigen::VectorXd::Constant(1, 6.0), 0.5, 0.01}, changes, Eigen::Vector3d(0.0, 0.3, 0.6));
+  const std::string file = ::testing::TempDir() + "force.json";
+  sensors::save(learned, file);
+  const Eigen::MatrixXd place = Eigen::MatrixXd::Constant(1, 1, 7.0);
+  EXPECT_EQ(sensors::predict(sensors::load_gaussian_process(file), place), sensors::predict(learned, place));
 }
 
 TEST(InstalledCopy, HasScenesOfItsOwn) {

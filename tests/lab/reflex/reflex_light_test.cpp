@@ -163,13 +163,6 @@ TEST(ReflexLight, SameBytesOnAnyNumberOfThreads) {
   EXPECT_EQ(cv::norm(all, alone, cv::NORM_INF), 0.0);
 }
 
-TEST(ReflexLight, PortraitsAreTheSamePictureWithMorePixels) {
-  const sim::GelSheet sheet = skin().pressed(0);
-  const cv::Mat portrait = light().portrait(sheet, 4, 32);
-  ASSERT_EQ(portrait.size(), cv::Size(72, 72));
-  EXPECT_NEAR(cv::mean(portrait)[0] / cv::mean(light().irradiance(sheet))[0], 1.0, 0.03);
-}
-
 TEST(ReflexLight, BadInputIsRefused) {
   const sim::GelSheet rest = skin().pressed(0);
   const std::vector<sim::GelSheet> reached = {rest};

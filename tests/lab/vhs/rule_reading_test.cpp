@@ -67,7 +67,9 @@ constexpr PinholeOptics kOptics{0.1, 5.0, 20.0, 0.0};
 
 TEST(PinholeTransfer, OfADiscVanishesAtBesselsFirstZero) {
   // The disc is 0.1 mm (1 + 20 / 5) wide on the object; J1's first zero is 3.8317.
-  EXPECT_NEAR(first_zero(kOptics, 0.0), 3.831706 / (kPi * 0.5), 1e-6);
+  const double zero = 3.831706 / (kPi * 0.5);
+  EXPECT_GT(transfer_of_disc(kOptics, zero - 1e-6), 0.0);
+  EXPECT_LT(transfer_of_disc(kOptics, zero + 1e-6), 0.0);
   EXPECT_NEAR(transfer_of_disc(kOptics, 0.0), 1.0, 1e-12);
   EXPECT_LT(transfer_of_disc(kOptics, 3.0), 0.0);
 }

@@ -57,7 +57,6 @@ TEST(PixelGrab, GoesUpTheColumnsFromTheLowerLeftToTheUpperRight) {
   std::set<int> places;
   for (int n = 0; n < kChipPixels; ++n) {
     const ChipPlace place = grabbed_place(n);
-    EXPECT_EQ(grabbed_frame(place), n);
     places.insert(place.row * kChipSide + place.column);
   }
   EXPECT_EQ(places.size(), 324U);

@@ -138,6 +138,13 @@ TEST(HueModel, NeighboursTellAStretchFromAPress) {
   // Without neighbours nothing is said; without enough samples that have them nothing is learned.
   seen.surroundings = {};
   EXPECT_FALSE(estimator.estimate(5, seen).measured);
+  std::vector<HueSample> some = samples;
+  some[0].seen.surroundings = some[1].seen.surroundings = {};
+  const HueErrors errors = hue_errors(model, rest, some);
+  EXPECT_EQ(errors.declined, 2u);
+  EXPECT_EQ(errors.samples, samples.size() - 2);
+  EXPECT_LT(errors.rms_mm(), 1e-4) << "what isn't estimated isn't an error of the estimates";
+  EXPECT_GT(errors.rms_of_all_mm(), 0.01);
   for (std::size_t i = 7; i < samples.size(); ++i) samples[i].seen.surroundings = {};
   EXPECT_THAT(message_of([&] { calibrate_hue(rest, samples, settings); }),
               HasSubstr("7 samples have sound neighbours"));

@@ -161,6 +161,22 @@ TEST(GaussianProcessTuning, ASubsetTunesAndAllAreUsed) {
   EXPECT_NE(other.process.weights, tuned.process.weights);
 }
 
+TEST(GaussianProcessTuning, TheSearchSkipsWhereTheNoiseIsTooSmallToFactorise) {
+  // Each sample stands twice: with a noise of 1e-9 of the signal the covariance isn't positive definite in doubles.
+  const Drawn once = draw(100, {Eigen::Vector2d(150.0, 0.3), 2.0, 0.1}, 6);
+  Eigen::MatrixXd inputs(200, once.inputs.cols());
+  inputs << once.inputs, once.inputs;
+  Eigen::VectorXd targets(200);
+  targets << once.targets, once.targets;
+  TuningSettings settings;
+  settings.aim = TuningAim::kEvidence;
+  settings.least_noise_ratio = 1e-9;
+  settings.evaluations = 40;
+  const TunedGaussianProcess tuned = tune_gaussian_process(inputs, targets, {}, {}, settings);
+  EXPECT_TRUE(tuned.process.weights.allFinite());
+  EXPECT_EQ(tuned.values.size(), 40U);
+}
+
 TEST(GaussianProcessTuning, WhatNeverChangesDoesNoHarm) {
   Drawn drawn = draw(40, {Eigen::Vector2d(150.0, 0.3), 2.0, 0.1}, 5);
   drawn.inputs.col(1).setConstant(7.0);

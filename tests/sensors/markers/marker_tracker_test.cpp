@@ -79,6 +79,19 @@ TEST(MarkerTracker, DisplacementsAreMeasuredInNoise) {
   }
 }
 
+TEST(MarkerTracker, RestartForgetsAllFrames) {
+  const auto rest = marker_grid();
+  MarkerTracker tracker({});
+  tracker.track({paint_markers({}, rest), 0});
+  tracker.restart();
+  EXPECT_TRUE(tracker.tracked().positions.empty());
+  EXPECT_TRUE(tracker.tracked().status.empty());
+  EXPECT_EQ(tracker.spacing_px(), 0.0);
+  const auto moved = sheared(rest, {3.0, 1.0});
+  EXPECT_EQ(tracker.track({paint_markers({}, moved), 0}).found(), static_cast<int>(rest.size()));
+  EXPECT_LT(tracker.tracked().displacement(0).norm(), 1e-12) << "the next frame is the gel at rest";
+}
+
 TEST(MarkerTracker, ThresholdFollowsTheLight) {
   // A third of the light, a steep fall-off and a shadow in which the membrane is as dark as markers are elsewhere.
   const auto rest = marker_grid();

@@ -214,7 +214,7 @@ TEST(ReflexLoop, WhatMakesNoSenseIsNamed) {
 
 TEST(ReflexBudget, AddsUpToLessThanTheTextsTwoMilliseconds) {
   const ReflexBudget budget{.decision_us = 1.0};
-  EXPECT_DOUBLE_EQ(budget.least_us(), 433.0);
+  EXPECT_DOUBLE_EQ(budget.after_frame_us(), 433.0);
   EXPECT_NEAR(budget.mean_us(), 766.3, 0.1);
   EXPECT_NEAR(budget.most_us(), 1531.7, 0.1);
 }

@@ -97,19 +97,6 @@ TEST(TextureFeature, AQuarterTurnChangesNothingWhereThePyramidHasAMiddle) {
   }
 }
 
-TEST(TextureFeature, EuclideanDistanceIsHellingersTimesRootTwo) {
-  const Eigen::VectorXf a = texture_feature(random_image(120, 90, 1), {});
-  const Eigen::VectorXf b = texture_feature(cv::Mat(90, 120, CV_8UC1, cv::Scalar(4)), {});
-  const double coefficient = a.cast<double>().dot(b.cast<double>());  // eq. 12
-  const double hellinger = hellinger_distance(a, b);
-  EXPECT_NEAR(hellinger * hellinger, 1.0 - coefficient, 1e-6);            // eq. 14
-  EXPECT_NEAR((a - b).squaredNorm(), 2.0 * hellinger * hellinger, 1e-6);  // eq. 13
-  EXPECT_EQ(hellinger_distance(a, a), 0.0);
-  Eigen::VectorXf first = Eigen::VectorXf::Zero(4), last = Eigen::VectorXf::Zero(4);
-  first[0] = last[3] = 1.0F;
-  EXPECT_NEAR(hellinger_distance(first, last), 1.0, 1e-7);  // histograms without a bin in common
-}
-
 TEST(TextureFeature, TheLeastSideIsTheLeast) {
   for (const TextureOperator op :
        {TextureOperator{}, TextureOperator{{8, 1.0}, 4}, TextureOperator{{24, 3.0}, 2}, TextureOperator{{8, 1.5}, 1}}) {

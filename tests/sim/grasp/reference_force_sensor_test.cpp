@@ -29,6 +29,16 @@ std::vector<FingerMoment> under(double seconds, const std::function<double(doubl
   return moments;
 }
 
+/// The sensor without any of its errors.
+ReferenceForceSensorSettings ideal_force_sensor() {
+  ReferenceForceSensorSettings ideal;
+  ideal.hysteresis = ideal.gain_error = ideal.drift_per_decade = ideal.lag_s = 0.0;
+  ideal.noise_N = ideal.carried_g = ideal.shaken_N_s_mm = 0.0;
+  ideal.adc_bits = 0;
+  ideal.median = 1;
+  return ideal;
+}
+
 TEST(ReferenceForceSensor, WithoutErrorsTellsTheForce) {
   const auto moments = under(1.0, [](double t) { return 3.0 * t; });
   const auto readings = read_reference_force(moments, 0.1, ideal_force_sensor(), 1);

@@ -8,8 +8,10 @@
 
 #include "sim/plan/image_motion.h"
 #include "sim/press/exposure_times.h"
+#include "sim/press/play_motion.h"
 #include "sim/press/played_states.h"
 #include "sim/press/state_between.h"
+#include "sim/sensor/virtual_camera.h"
 #include "tests/sim/press/moving_scene.h"
 
 namespace touchstone::sim {
@@ -186,6 +188,24 @@ TEST(ImageMotion, ABarMovesAsFarAsItsPicture) {
   EXPECT_GE(bound, seen) << "an estimate from above";
   EXPECT_LT(bound, 1.2 * seen);
   EXPECT_NEAR(motion_speed(scene).pixels_per_s, 100.0 * bound, 1e-6 * bound);
+}
+
+TEST(ImageMotion, ATorqueTurnsAsFastAsThePlanSays) {
+  SceneSpec scene = moving_scene("  - {frames: 4, z: {force_N: 0.5}}\n  - {frames: 2, turn_y: {torque_Nmm: 0.4}}\n");
+  scene.device.camera->exposure_us = 8000.0;
+  SceneSpec still = scene;
+  still.motion.keys.pop_back();
+  const MotionSpeed speed = motion_speed(scene);
+  EXPECT_GT(speed.pixels_per_s, 1.5 * motion_speed(still).pixels_per_s);
+  EXPECT_TRUE(speed.led_by_force);
+  EXPECT_TRUE(make_plan(scene).motion_blur);
+  scene.effects.motion_blur = Switch::off;
+  const std::vector<Truth> truths = play_motion(scene, make_plan(scene), *moving_gel());
+  const ImageScale scale(scene.device);
+  const double turned =
+      image_motion(scale, truths[truths.size() - 2].press, truths.back().press, largest_object_radius(scene));
+  EXPECT_GT(turned, 0.1) << "it does turn";
+  EXPECT_LE(turned * scene.motion.frame_rate_Hz, speed.pixels_per_s);
 }
 
 TEST(StateBetween, IsNearWhatIsPlayedThere) {
