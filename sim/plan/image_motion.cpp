@@ -52,8 +52,8 @@ struct AxisTrack {
   }
 };
 
-constexpr double kTurningContact = 0.25;        // contact's radius by the object's, under a torque that turns it
-constexpr double kMostTurning_rad = kPi / 2.0;  // by one key: beyond it the contact is another
+constexpr double kTurningContact = 0.25;  // contact's radius by the object's, under a torque that turns it
+constexpr double kMostTurning_rad = 0.8;  // that a press takes of a torque
 
 /// The torques on an object while its keys are gone through.
 struct TurnTrack {

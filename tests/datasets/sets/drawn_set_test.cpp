@@ -229,7 +229,7 @@ TEST_F(DrawnDataset, AChangedJobAForeignFolderAndAChangedSetAreRefused) {
   EXPECT_THAT(message_of([&] { generate("other"); }), HasSubstr("isn't empty ('file.txt' is in it)"));
   EXPECT_THAT(message_of([&] { merge(job_, folder_.path() / "none"); }), HasSubstr("holds nothing of this job"));
   write(block("out", 0), "short");
-  EXPECT_THAT(message_of([&] { generate("out"); }), HasSubstr("000000.h5: is missing"));
+  EXPECT_THAT(message_of([&] { generate("out"); }), HasSubstr("000000.h5: was changed"));
 }
 
 TEST_F(DrawnDataset, WhatCannotBePressedIsDrawnAgain) {
