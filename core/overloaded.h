@@ -7,6 +7,7 @@ template <typename... Ts>
 struct Overloaded : Ts... {
   using Ts::operator()...;
 };
+/// Its types are those of the lambdas.
 template <typename... Ts>
 Overloaded(Ts...) -> Overloaded<Ts...>;
 

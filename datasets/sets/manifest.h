@@ -21,7 +21,7 @@ struct ManifestScene {
   Split split = Split::train;
   std::int64_t first_sample = 0;
   std::int64_t samples = 0;
-  bool has_frames = false;  ///< pictures lie in frames/<name>/
+  bool has_frames = false;  ///< pictures lie in a folder of its name within frames/
 };
 
 /// One of a drawn set's blocks: samples first_sample to first_sample + samples - 1, all of one unit.
@@ -55,7 +55,7 @@ Manifest read_manifest(const std::filesystem::path& folder, SetSource wanted);
 /// differs
 void verify_files(const std::filesystem::path& folder, const Manifest& manifest);
 
-/// frames/<scene>/000012.png and the like: `folder` is "frames", "ideal" or "radiance".
+/// `frames/SCENE/000012.png` and the like: `folder` is "frames", "ideal" or "radiance".
 std::string picture_name(const std::string& folder, const std::string& scene, std::int64_t frame,
                          const std::string& ending);
 

@@ -22,10 +22,11 @@ sim::TouchObject Sensor::object(const SharedObject& object) const {
   return made;
 }
 
-Touch Sensor::finished(sim::Touch touch, const sim::TouchReading& reading, const sim::TouchOptions& options) const {
+Touch Sensor::finished(const sim::TouchObject& by, sim::Touch touch, const sim::TouchReading& reading,
+                       const sim::TouchOptions& options) const {
   Touch finished;
   finished.reading = reading;
-  if (options.picture && options.truth) finished.ideal = sensor_.ideal(touch.light);
+  if (options.picture && options.truth) finished.ideal = sensor_.ideal(by, touch.light);
   if (options.picture) finished.light_error = sensor_.light().error;
   if (!touch.contact.empty()) touch.contact.setTo(1, touch.contact != 0);
   finished.of = std::move(touch);
@@ -34,20 +35,22 @@ Touch Sensor::finished(sim::Touch touch, const sim::TouchReading& reading, const
 
 Touch Sensor::press(const SharedObject& object_of, const sim::PressSpec& press,
                     const sim::TouchOptions& options) const {
-  sim::Touch touch = sensor_.press(object(object_of), press, options);
+  const sim::TouchObject by = object(object_of);
+  sim::Touch touch = sensor_.press(by, press, options);
   const sim::TouchReading reading = sim::reading_of(gel(), touch.press);
-  return finished(std::move(touch), reading, options);
+  return finished(by, std::move(touch), reading, options);
 }
 
 Touch Sensor::touch(const SharedObject& object_of, const sim::TouchSession& session,
                     const sim::TouchOptions& options) const {
   const fem::PressState press = session.press();
+  const sim::TouchObject by = object(object_of);
   sim::Touch touch;
   if (options.picture) {
-    touch = sensor_.capture(object(object_of), press, options.noise_seed, options.frame, options.truth);
+    touch = sensor_.capture(by, press, options.noise_seed, options.frame, options.truth);
   }
   sensor_.add_truth(press, session.error(press), touch);
-  return finished(std::move(touch), session.reading(), options);
+  return finished(by, std::move(touch), session.reading(), options);
 }
 
 }  // namespace touchstone::python

@@ -42,7 +42,8 @@ class Sensor {
   Touch touch(const SharedObject& object, const sim::TouchSession& session, const sim::TouchOptions& options) const;
 
  private:
-  Touch finished(sim::Touch touch, const sim::TouchReading& reading, const sim::TouchOptions& options) const;
+  Touch finished(const sim::TouchObject& by, sim::Touch touch, const sim::TouchReading& reading,
+                 const sim::TouchOptions& options) const;
 
   sim::VirtualSensor sensor_;
   mutable std::mutex mutex_;

@@ -28,7 +28,7 @@ constexpr int kEventSteps = 12;                    // of a press that event pixe
 /// What light needs and mechanics doesn't.
 struct Optics {
   std::unique_ptr<const SensorView> view;
-  render::Imager imager, ideal_imager;  // for light of the untouched device's bands
+  render::Imager imager;  // for light of the untouched device's bands
   render::FixedPattern pattern;
   cv::Mat rest_light;
 };
@@ -78,7 +78,6 @@ struct VirtualSensor::Parts {
                                      : clear_view(device, *gel, settings);
       const Plan& plan = now->view->plan();
       now->imager = sim::imager(device, bands_of(plan.bands), with_noise(plan));
-      now->ideal_imager = sim::imager(device, bands_of(plan.bands), false);
       now->pattern = render::fixed_pattern(now->imager, {device.camera->width, device.camera->height}, settings.seed);
       now->rest_light = now->view->rest_light(nullptr, Eigen::Vector3d::Zero());
       made = std::move(now);
@@ -346,13 +345,9 @@ const cv::Mat& VirtualSensor::background_light() const {
   return parts_->optics().rest_light;
 }
 
-cv::Mat VirtualSensor::ideal(const cv::Mat& light) const {
-  const Optics& by = parts_->optics();
-  return render::develop(render::expose(light, by.ideal_imager, by.pattern, 0, 0), by.ideal_imager);
-}
-
-cv::Mat VirtualSensor::develop(const cv::Mat& light, std::uint64_t noise_seed, int frame) const {
-  return parts_->develop(light, noise_seed, frame);
+cv::Mat VirtualSensor::ideal(const TouchObject& object, const cv::Mat& light) const {
+  const render::Imager imager = sim::imager(parts_->device, parts_->bands_of(*object.seen_), false);
+  return render::develop(render::expose(light, imager, parts_->optics().pattern, 0, 0), imager);
 }
 
 }  // namespace touchstone::sim

@@ -151,10 +151,8 @@ class VirtualSensor {
   cv::Mat background(std::uint64_t noise_seed, int frame = 0) const;
   /// The light of the untouched device.
   const cv::Mat& background_light() const;
-  /// The frame of a light without noise and fixed pattern.
-  cv::Mat ideal(const cv::Mat& light) const;
-  /// A frame of the light of any of them, with other noise.
-  cv::Mat develop(const cv::Mat& light, std::uint64_t noise_seed, int frame = 0) const;
+  /// The frame of a touch's light by this object, without noise and fixed pattern.
+  cv::Mat ideal(const TouchObject& object, const cv::Mat& light) const;
 
  private:
   struct Parts;

@@ -101,7 +101,7 @@ def test_mistakes_are_one_line_and_killed_exports_are_written_over(folder, tmp_p
         run = export(*arguments)
         assert run.returncode != 0 and message in run.stderr, run.stderr
 
-    refused("'tset' is not known; allowed is one of: train, validate, test",
+    refused("split 'tset' is not known",
             folder, tmp_path / "out", "--split", "tset")
     refused("'validate' of", folder, tmp_path / "out", "--split", "validate")
     refused("--samples-per-tar: 0 is not allowed", folder, tmp_path / "out", "--samples-per-tar", "0")
