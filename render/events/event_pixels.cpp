@@ -68,7 +68,8 @@ NoiseEvent noise_event(std::uint64_t seed, std::uint32_t x, std::uint32_t y, std
 // wouldn't hold together with the largest change of light.
 std::int32_t threshold_level(double mean, double spread, double normal) {
   constexpr double kMostThreshold = 20.0;
-  const double threshold = std::clamp(mean + spread * normal, std::max(0.1 * mean, kLeastEventThreshold), kMostThreshold);
+  const double threshold =
+      std::clamp(mean + spread * normal, std::max(0.1 * mean, kLeastEventThreshold), kMostThreshold);
   return static_cast<std::int32_t>(std::lround(threshold * kLevelPerLog));
 }
 
