@@ -95,17 +95,17 @@ def test_a_spectral_device_shows_colour(touched):
     name, sensor, touch = touched
     if name != "vhs-spectral":
         return
-    skin = {"name": "skin", "shape": {"type": "sphere", "radius_mm": 4}, "albedo": "#c29a84"}
-    coloured = sensor.press(skin, force_N=FORCE_N)
+    red_ball = {"name": "red", "shape": {"type": "sphere", "radius_mm": 4}, "albedo": "#c02020"}
+    coloured = sensor.press(red_ball, force_N=FORCE_N)
     means = coloured.frame[touch.contact > 0].reshape(-1, 3).astype(float).mean(axis=0)
     grey = touch.frame[touch.contact > 0].reshape(-1, 3).astype(float).mean(axis=0)
-    red, green, blue = means / grey  # what the skin reflects by what a grey ball of 0.6 does
+    blue, green, red = means / grey  # by what a grey ball of 0.6 gives, which is near white
     assert red > 1.1 * green > 1.1 * 1.05 * blue
     # A grey of three equal numbers is one number; three others aren't bands of a spectrum.
-    even = dict(skin, albedo=[0.6, 0.6, 0.6])
-    assert np.array_equal(sensor.press(even, force_N=FORCE_N).frame, sensor.press(dict(skin, albedo=0.6), force_N=FORCE_N).frame)
+    even, one = (sensor.press(dict(red_ball, albedo=albedo), force_N=FORCE_N) for albedo in ([0.6, 0.6, 0.6], 0.6))
+    assert np.array_equal(even.frame, one.frame)
     with pytest.raises(ts.Error, match="has 3 numbers, but the scene has"):
-        sensor.press(dict(skin, albedo=[0.7, 0.6, 0.5]), force_N=FORCE_N)
+        sensor.press(dict(red_ball, albedo=[0.7, 0.6, 0.5]), force_N=FORCE_N)
 
 
 def test_mechanics_need_no_optics(tmp_path):

@@ -105,7 +105,7 @@ def test_mistakes_are_one_line_and_killed_exports_are_written_over(folder, tmp_p
             folder, tmp_path / "out", "--split", "tset")
     refused("'validate' of", folder, tmp_path / "out", "--split", "validate")
     refused("--samples-per-tar: 0 is not allowed", folder, tmp_path / "out", "--samples-per-tar", "0")
-    refused("dataset.json: isn't there", examples, tmp_path / "out")
+    refused("isn't a data set; it has no dataset.json", examples, tmp_path / "out")
     assert not (tmp_path / "out").exists()
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "train-000009.tar").write_text("of a killed export")
