@@ -213,7 +213,7 @@ InspectedGel drawn_gel(const InspectedSet& set, std::size_t sample) {
   InspectedGel gel;
   const auto& device = set.scenes[static_cast<std::size_t>(set.samples[sample].scene)].device_spec;
   const cv::Mat height = picture_of<float>(set, sample, "/height");
-  if (height.empty() || !device || !device->camera || device->gel.shape == sim::GelShape::mesh) return gel;
+  if (height.empty() || !device || !device->camera || device->gel.mesh()) return gel;
   const cv::Mat contact = drawn_contact(set, sample);
   const GelView view(*device);
   const auto pixel_of = [](const cv::Point2d& at) {
@@ -226,11 +226,9 @@ InspectedGel drawn_gel(const InspectedSet& set, std::size_t sample) {
     return at;
   };
   const sim::GelSpec& spec = device->gel;
-  double half_x = 0.5 * spec.size_x_mm;
-  double half_y = 0.5 * spec.size_y_mm;
-  if (spec.shape != sim::GelShape::slab) {
-    half_x = half_y = spec.shape == sim::GelShape::dome ? spec.base_radius_mm : spec.radius_mm;
-  }
+  const auto face = sim::round_face(spec);
+  const double half_x = face ? face->radius_mm : 0.5 * spec.slab()->size_x_mm;
+  const double half_y = face ? face->radius_mm : 0.5 * spec.slab()->size_y_mm;
   const double step = 2.0 * std::max(half_x, half_y) / kCellsAcross;
   const int columns = static_cast<int>(std::floor(2.0 * half_x / step)) + 1;
   const int rows = static_cast<int>(std::floor(2.0 * half_y / step)) + 1;

@@ -181,9 +181,10 @@ sim::CameraSpec middle_of(sim::CameraSpec camera, int most_pixels) {
   };
   const int width = less(camera.width);
   const int height = less(camera.height);
-  if (camera.camera_matrix) {
-    (*camera.camera_matrix)[2] -= 0.5 * (camera.width - width);
-    (*camera.camera_matrix)[3] -= 0.5 * (camera.height - height);
+  auto* lens = std::get_if<sim::LensSpec>(&camera.optics);
+  if (lens && lens->camera_matrix) {
+    (*lens->camera_matrix)[2] -= 0.5 * (camera.width - width);
+    (*lens->camera_matrix)[3] -= 0.5 * (camera.height - height);
   }
   camera.width = width;
   camera.height = height;

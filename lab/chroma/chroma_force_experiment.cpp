@@ -168,11 +168,12 @@ std::vector<ForceProbe> draw_force_probes(int count, std::uint64_t seed) {
 }
 
 sim::DeviceSpec with_probe_mesh(sim::DeviceSpec device) {
+  const auto& slab = std::get<sim::SlabSpec>(device.gel.shape);
   device.mesh = {};
   device.mesh.fine_mm = kTruthEdge;
   device.mesh.coarse_mm = kCoarseEdge;
   device.mesh.fine_half_extent_mm =
-      (0.5 * Eigen::Vector2d(device.gel.size_x_mm, device.gel.size_y_mm).array() - kSideStrip).max(kTruthEdge);
+      (0.5 * Eigen::Vector2d(slab.size_x_mm, slab.size_y_mm).array() - kSideStrip).max(kTruthEdge);
   device.mesh.fine_depth_mm = kFineDepth;
   return device;
 }

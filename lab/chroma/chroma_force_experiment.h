@@ -79,6 +79,7 @@ struct ForceSetup {
 };
 
 /// A device with a mesh that is fine wherever probes go: edges of 0.85 mm within 2 mm of the gel's sides.
+/// @pre the gel is a slab
 sim::DeviceSpec with_probe_mesh(sim::DeviceSpec device);
 
 /// The setup of a device with printed markers: the truth's gel has with_probe_mesh, the estimator's a mesh that goes as

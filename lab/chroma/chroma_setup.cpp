@@ -41,7 +41,7 @@ sim::VirtualSensorSettings chroma_sensor_settings(std::uint64_t seed) {
 sensors::ViewParallax parallax_of(const sim::DeviceSpec& device) {
   if (!device.camera) fail("device {}: has no camera", device.name);
   const sim::CameraSpec& camera = *device.camera;
-  const double air = -camera.hole_position_mm.z() - device.plate.thickness_mm - device.gel.thickness_mm;
+  const double air = -camera.position_mm.z() - device.plate.thickness_mm - device.gel.thickness_mm;
   sensors::ViewParallax parallax;
   parallax.viewing_distance_mm =
       device.gel.refractive_index * (air + device.plate.thickness_mm / device.plate.refractive_index +

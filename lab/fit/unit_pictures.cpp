@@ -175,8 +175,9 @@ sim::DeviceSpec with_block_camera(sim::DeviceSpec device, int block_px) {
   camera.width /= block_px;
   camera.height /= block_px;
   camera.pixel_pitch_um *= block_px;
-  if (camera.camera_matrix) {  // whose first pixel's centre is at 0
-    Eigen::Vector4d& matrix = *camera.camera_matrix;
+  auto* lens = std::get_if<sim::LensSpec>(&camera.optics);
+  if (lens && lens->camera_matrix) {  // whose first pixel's centre is at 0
+    Eigen::Vector4d& matrix = *lens->camera_matrix;
     matrix.head<2>() /= block_px;
     matrix.tail<2>() = (matrix.tail<2>().array() + 0.5) / block_px - 0.5;
   }

@@ -42,7 +42,7 @@ TouchedPixels touched_pixels(const sim::Touch& touch) {
 /// How large a pixel is in the plane `z`, relative to that at the apex: by the reduced distance from the lens, which
 /// refraction at the flat faces leaves alone for rays near the axis.
 double pixel_scale(const sim::DeviceSpec& device, double z) {
-  const double air = -device.camera->hole_position_mm.z() - device.gel.thickness_mm - device.plate.thickness_mm;
+  const double air = -device.camera->position_mm.z() - device.gel.thickness_mm - device.plate.thickness_mm;
   const double reduced = air + device.plate.thickness_mm / device.plate.refractive_index +
                          device.gel.thickness_mm / device.gel.refractive_index;
   return 1.0 + z / (device.gel.refractive_index * reduced);
@@ -51,9 +51,9 @@ double pixel_scale(const sim::DeviceSpec& device, double z) {
 }  // namespace
 
 PlateContact press_plate(const sim::VirtualSensor& sensor, double depth_mm, double tilt, std::uint64_t noise_seed) {
-  const sim::GelSpec& gel = sensor.device().gel;
-  TS_ASSERT(gel.shape == sim::GelShape::dome);
-  const double sphere = gel.sphere_radius_mm;
+  const sim::DomeSpec* dome = sensor.device().gel.dome();
+  TS_ASSERT(dome != nullptr);
+  const double sphere = dome->sphere_radius_mm;
   // The plate's lower face is `sphere - depth` from the sphere's centre, along its own normal.
   const auto height_at = [&](double depth) {
     return (sphere - depth + 0.5 * kPlateThickness_mm) / std::cos(tilt) - sphere;
@@ -82,13 +82,13 @@ PlateContact press_plate(const sim::VirtualSensor& sensor, double depth_mm, doub
 }
 
 double plate_radius_on_layer(const sim::GelSpec& gel, double force) {
+  const double sphere = std::get<sim::DomeSpec>(gel.shape).sphere_radius_mm;
   const auto at = [&](double depth) {
-    return closed_forms::sphere_on_layer(gel.youngs_modulus_MPa, gel.poisson_ratio, gel.thickness_mm,
-                                         gel.sphere_radius_mm, depth);
+    return closed_forms::sphere_on_layer(gel.youngs_modulus_MPa, gel.poisson_ratio, gel.thickness_mm, sphere, depth);
   };
   // From Hertz's depth on: force goes about as depth to 1.5, and each look at the layer takes its time.
   const double hertz = plate_radius_by_hertz(gel, force);
-  double depth = hertz * hertz / gel.sphere_radius_mm;
+  double depth = hertz * hertz / sphere;
   closed_forms::LayerContact contact;
   constexpr int kMostSteps = 12;
   constexpr double kGood = 1e-3;  // of the force; a third of that of the radius
@@ -105,7 +105,7 @@ double plate_radius_on_layer(const sim::GelSpec& gel, double force) {
 
 double plate_radius_by_hertz(const sim::GelSpec& gel, double force) {
   const double modulus = gel.youngs_modulus_MPa / (1.0 - gel.poisson_ratio * gel.poisson_ratio);
-  return std::cbrt(0.75 * force * gel.sphere_radius_mm / modulus);
+  return std::cbrt(0.75 * force * std::get<sim::DomeSpec>(gel.shape).sphere_radius_mm / modulus);
 }
 
 DomeHeights measure_dome_heights(const sim::VirtualSensor& sensor, const CalibrationPresses& presses,

@@ -27,9 +27,9 @@ PlateContact press_plate(const sim::VirtualSensor& sensor, double depth_mm, doub
 
 /// Radius of the contact of a rigid plate on a dome under `force`, by closed forms: as a sphere of the dome's radius on
 /// an endless layer of its thickness, frictionless (profile_on_layer; to first order in the dome's slope), and by
-/// Hertz, which knows no plate behind the gel.
+/// Hertz, which knows no plate behind the gel. @pre the gel is a dome
 double plate_radius_on_layer(const sim::GelSpec& gel, double force);
-/// By Hertz: the whole gel a half space.
+/// By Hertz: the whole gel a half space. @pre the gel is a dome
 double plate_radius_by_hertz(const sim::GelSpec& gel, double force);
 
 /// Heights by a calibration whose balls were pressed on the dome itself, and whose background is the dome's own. Their

@@ -297,7 +297,7 @@ SurfaceMarkers printed_markers(const sim::DeviceSpec& device) {
 }
 
 void check_marker_compliance(const sim::DeviceSpec& device) {
-  if (device.gel.shape != sim::GelShape::slab) {
+  if (!device.gel.slab()) {
     fail_at(device.where, "the gel isn't a slab: how markers move under tractions is exported of slabs only");
   }
   if (device.coating && device.coating->print) {

@@ -196,7 +196,7 @@ void fields(YamlReader& in, ApparentChangeSpec& spec) {
   in.optional("by", spec.by);
   if (in.describing()) return;  // the files that it names aren't there
   spec.device = sim::read_device(in.folder() / device);
-  if (spec.device.gel.shape != sim::GelShape::slab || !spec.device.gel.layers.empty()) {
+  if (!spec.device.gel.slab() || !spec.device.gel.layers.empty()) {
     fail_at(in.where("device"), "device: {} isn't a slab of one material, which the formula knows alone",
             spec.device.name);
   }

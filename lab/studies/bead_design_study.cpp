@@ -103,7 +103,7 @@ Seen look_at(const BeadDesignSpec& spec, const sim::VirtualSensor& pictures, con
   seen.displacement_um = 1e3 * std::sqrt(displacement2) / px_per_mm(view);
   const render::Imager imager = imager_of(device, spec.object);
   const sim::CameraSpec& camera = *device.camera;
-  const double away = (camera.hole_position_mm - view.rest_mm.front()).norm();
+  const double away = (camera.position_mm - view.rest_mm.front()).norm();
   const double radius = kRim * (0.5 * device.beads->diameter_mm * px_per_mm(view) +
                                 0.5 * sim::blur_disc_px(sim::camera_of(camera), away));
   seen.least_px.resize(2 * beads);

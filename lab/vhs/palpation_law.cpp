@@ -119,10 +119,12 @@ Eigen::VectorXd PalpationLaw::beads(double depth) const {
 Eigen::VectorXd bead_pixels(const sim::DeviceSpec& device, const Eigen::MatrixX3d& displacement) {
   TS_ASSERT(device.camera && device.beads);
   const sim::CameraSpec& spec = *device.camera;
-  if (spec.type != sim::CameraType::pinhole) fail_at(device.where, "camera: palpation needs a pinhole");
+  if (!std::holds_alternative<sim::PinholeSpec>(spec.optics)) {
+    fail_at(device.where, "camera: palpation needs a pinhole");
+  }
   const render::PinholeCamera camera = sim::pinhole_camera(spec);
   const RigidTransform camera_from_gel = camera.gel_from_camera.inverse();
-  const Eigen::Vector3d hole = spec.hole_position_mm;
+  const Eigen::Vector3d hole = spec.position_mm;
   const std::vector<Eigen::Vector3d> rest = sim::bead_centres(*device.beads);
   TS_ASSERT(displacement.rows() == static_cast<Eigen::Index>(rest.size()));
   Eigen::VectorXd pixels(2 * displacement.rows());

@@ -203,9 +203,9 @@ void add_rule_rows(const ValidateOptions& options, RowList& rows) {
 
 /// E by the closed form of a hole in a foil, of a luminous face behind glass, by that in the picture's middle.
 double falloff_at(const sim::DeviceSpec& device, double angle) {
-  const sim::CameraSpec& camera = *device.camera;
-  const double hole = camera.hole_diameter_um / kMicrometresPerMillimetre;
-  const double foil = camera.foil_thickness_um / kMicrometresPerMillimetre;
+  const auto& pinhole = std::get<sim::PinholeSpec>(device.camera->optics);
+  const double hole = pinhole.hole_diameter_um / kMicrometresPerMillimetre;
+  const double foil = pinhole.foil_thickness_um / kMicrometresPerMillimetre;
   // Both faces of the plate, without what goes to and fro: the luminous face reflects nothing.
   const auto fresnel = [](double n1, double n2, double sine) {  // `sine` in n1
     const double c1 = std::sqrt(1.0 - sine * sine);
@@ -220,7 +220,7 @@ double falloff_at(const sim::DeviceSpec& device, double angle) {
     return (1.0 - fresnel(1.0, glass, sine)) * (1.0 - fresnel(glass, device.gel.refractive_index, sine / glass));
   };
   const auto light = [&](double at) {
-    return closed_forms::pinhole_irradiance(1.0, hole, camera.hole_to_sensor_mm, at, foil) * passed(at);
+    return closed_forms::pinhole_irradiance(1.0, hole, pinhole.hole_to_sensor_mm, at, foil) * passed(at);
   };
   return light(angle) / light(0.0);
 }
@@ -233,6 +233,7 @@ void add_falloff_rows(const ValidateOptions& options, RowList& rows) {
   const VhsPicture picture = vhs_picture(scene, 16, options.cache, options.progress);
   const cv::Mat light = sum_of_bands(picture.irradiance);
   const double pitch = scene.device.camera->pixel_pitch_um / kMicrometresPerMillimetre;
+  const double to_sensor = std::get<sim::PinholeSpec>(scene.device.camera->optics).hole_to_sensor_mm;
   // Means over rings of 20 pixels; the last one are the corners.
   constexpr double kRing_px = 20.0;
   const auto rings = static_cast<std::size_t>(std::hypot(0.5 * light.cols, 0.5 * light.rows) / kRing_px);
@@ -245,7 +246,7 @@ void add_falloff_rows(const ValidateOptions& options, RowList& rows) {
       const auto ring = static_cast<std::size_t>(away / kRing_px);
       if (ring >= rings) continue;
       sums[ring] += light.at<float>(row, column);
-      expected[ring] += falloff_at(scene.device, std::atan(away * pitch / scene.device.camera->hole_to_sensor_mm));
+      expected[ring] += falloff_at(scene.device, std::atan(away * pitch / to_sensor));
       ++counts[ring];
     }
   }

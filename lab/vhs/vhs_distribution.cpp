@@ -26,8 +26,8 @@ constexpr double kStep_N = 0.25;  // of the largest force, a step
 std::vector<Eigen::Vector2d> seen_at(const sim::DeviceSpec& device, const std::vector<Eigen::Vector3d>& beads) {
   const render::Scene faces = bare_faces(device.gel.thickness_mm, device.gel.refractive_index,
                                          device.plate.thickness_mm, device.plate.refractive_index);
-  const render::ReadyCamera camera =
-      camera_before(device.camera->hole_to_sensor_mm, -device.camera->hole_position_mm.z());
+  const render::ReadyCamera camera = camera_before(std::get<sim::PinholeSpec>(device.camera->optics).hole_to_sensor_mm,
+                                                   -device.camera->position_mm.z());
   const Eigen::Vector2d middle = 0.5 * render::size_of(camera).cast<double>();
   std::vector<Eigen::Vector2d> px;
   for (const Eigen::Vector3d& bead : beads) {
@@ -70,10 +70,10 @@ double dip_between(const sensors::MarkerCompliance& c, const sensors::TractionFi
 
 sensors::ViewParallax bead_parallax(const sim::DeviceSpec& device) {
   if (!device.beads) fail_at(device.where, "the device has no beads");
-  if (!device.camera || device.camera->type != sim::CameraType::pinhole) {
+  if (!device.camera || !std::holds_alternative<sim::PinholeSpec>(device.camera->optics)) {
     fail_at(device.where, "the device has no pinhole camera");
   }
-  const Eigen::Vector3d hole = device.camera->hole_position_mm;
+  const Eigen::Vector3d hole = device.camera->position_mm;
   if ((device.camera->look_at_mm - hole).head<2>().norm() > 1e-9) {
     fail_at(device.where, "the camera doesn't look straight at the gel");
   }

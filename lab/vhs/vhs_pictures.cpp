@@ -88,15 +88,16 @@ cv::Mat VhsView::disc_mask(const Eigen::Vector2d& centre_mm, double radius_mm) c
 double transfer_at(const sim::DeviceSpec& device, const VhsView& view, const Eigen::Vector2d& place_mm, double per_mm) {
   constexpr int kAcross = 80;  // places in the hole, on a grid
   const sim::CameraSpec& camera = *device.camera;
-  const double radius = 0.5 * camera.hole_diameter_um / kMicrometresPerMillimetre;
-  const double half_foil = 0.5 * camera.foil_thickness_um / kMicrometresPerMillimetre;
+  const auto& pinhole = std::get<sim::PinholeSpec>(camera.optics);
+  const double radius = 0.5 * pinhole.hole_diameter_um / kMicrometresPerMillimetre;
+  const double half_foil = 0.5 * pinhole.foil_thickness_um / kMicrometresPerMillimetre;
   const double pitch = camera.pixel_pitch_um / kMicrometresPerMillimetre;
   const Eigen::Vector2d pixel = view.pixel_of(place_mm);
   // The sensor point, before read-out turns the picture upright.
   const Eigen::Vector2d sensor =
       -pitch * (pixel - 0.5 * Eigen::Vector2d(static_cast<double>(camera.width), static_cast<double>(camera.height)));
-  const double distance = camera.hole_to_sensor_mm;
-  const double thicknesses[] = {-camera.hole_position_mm.z() - device.gel.thickness_mm - device.plate.thickness_mm,
+  const double distance = pinhole.hole_to_sensor_mm;
+  const double thicknesses[] = {-camera.position_mm.z() - device.gel.thickness_mm - device.plate.thickness_mm,
                                 device.plate.thickness_mm, device.gel.thickness_mm};
   const double indices[] = {1.0, device.plate.refractive_index, device.gel.refractive_index};
   double sum = 0.0;
@@ -164,8 +165,9 @@ VhsPicture diffracted_picture(const sim::SceneSpec& scene, int paths, const std:
                               const Progress& progress) {
   constexpr double kNarrower = 0.1;
   sim::SceneSpec sharp = scene;
-  sharp.device.camera->hole_diameter_um *= kNarrower;
-  sharp.device.camera->foil_thickness_um *= kNarrower;
+  auto& pinhole = std::get<sim::PinholeSpec>(sharp.device.camera->optics);
+  pinhole.hole_diameter_um *= kNarrower;
+  pinhole.foil_thickness_um *= kNarrower;
   VhsPicture picture = vhs_picture(sharp, paths, cache, progress);
   picture.irradiance *= 1.0 / (kNarrower * kNarrower);
   const sim::Plan plan = sim::make_plan(scene);
@@ -177,10 +179,11 @@ VhsPicture diffracted_picture(const sim::SceneSpec& scene, int paths, const std:
 
 PinholeOptics optics_of(const sim::DeviceSpec& device) {
   const sim::CameraSpec& camera = *device.camera;
+  const auto& pinhole = std::get<sim::PinholeSpec>(camera.optics);
   PinholeOptics optics;
-  optics.hole_mm = camera.hole_diameter_um / kMicrometresPerMillimetre;
-  optics.to_sensor_mm = camera.hole_to_sensor_mm;
-  const double air = -camera.hole_position_mm.z() - device.gel.thickness_mm - device.plate.thickness_mm;
+  optics.hole_mm = pinhole.hole_diameter_um / kMicrometresPerMillimetre;
+  optics.to_sensor_mm = pinhole.hole_to_sensor_mm;
+  const double air = -camera.position_mm.z() - device.gel.thickness_mm - device.plate.thickness_mm;
   optics.to_object_mm = air + device.plate.thickness_mm / device.plate.refractive_index +
                         device.gel.thickness_mm / device.gel.refractive_index;
   optics.pixel_mm = camera.pixel_pitch_um / kMicrometresPerMillimetre;

@@ -57,7 +57,7 @@ cv::Mat spread_by_diffraction(const cv::Mat& sharp, const PinholeOptics& optics,
 VhsPicture diffracted_picture(const sim::SceneSpec& scene, int paths, const std::filesystem::path& cache,
                               const Progress& progress);
 
-/// The device's pinhole as closed forms take it, for a face at the gel's outer surface.
+/// The device's pinhole as closed forms take it, for a face at the gel's outer surface. @pre the device has a pinhole
 PinholeOptics optics_of(const sim::DeviceSpec& device);
 
 /// Contrast that geometry leaves of a sine along x of `per_mm` (with its dark places at multiples of 1 / per_mm) at a

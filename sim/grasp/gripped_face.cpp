@@ -72,7 +72,7 @@ GrippedFace::GrippedFace(const DeviceSpec& device, const fem::Compliance& gel, c
       cosine_(std::cos(settings.tilt_deg * kRadiansPerDegree)),
       sine_(std::sin(settings.tilt_deg * kRadiansPerDegree)) {
   check_settings(settings, pose);
-  if (device.gel.shape != GelShape::slab) fail("device {}: a gripped face needs a gel that is a slab", device.name);
+  if (!device.gel.slab()) fail("device {}: a gripped face needs a gel that is a slab", device.name);
   if (piece.shape.type != ShapeKind::hexagon) {
     fail("object {}: a gripped piece must be of the shape hexagon", piece.name);
   }
@@ -210,9 +210,10 @@ GrippedFace::GrippedFace(const DeviceSpec& device, const fem::Compliance& gel, c
 void GrippedFace::lay_out(const DeviceSpec& device, const ObjectSpec& piece, const RigidTransform& gel_from_piece,
                           const Eigen::Vector2d& flat) {
   const double cell = settings_.cell_mm;
+  const auto& slab = std::get<SlabSpec>(device.gel.shape);
   grid_.pitch = cell;
-  grid_.nx = std::max(1, static_cast<int>(std::lround(device.gel.size_x_mm / cell)));
-  grid_.ny = std::max(1, static_cast<int>(std::lround(device.gel.size_y_mm / cell)));
+  grid_.nx = std::max(1, static_cast<int>(std::lround(slab.size_x_mm / cell)));
+  grid_.ny = std::max(1, static_cast<int>(std::lround(slab.size_y_mm / cell)));
   grid_.first = -0.5 * cell * Eigen::Vector2d(grid_.nx - 1, grid_.ny - 1);
   fem::check(grid_);
 

@@ -85,7 +85,7 @@ ImageScale::ImageScale(const DeviceSpec& device) {
   axis_ = pose_of(camera).turn(Eigen::Vector3d::UnitZ());
   // Behind flat faces the surface appears nearer.
   const auto nearer = [](double thickness, double index) { return thickness * (1.0 - 1.0 / index); };
-  const double distance = -camera.hole_position_mm.z() - nearer(device.gel.thickness_mm, device.gel.refractive_index) -
+  const double distance = -camera.position_mm.z() - nearer(device.gel.thickness_mm, device.gel.refractive_index) -
                           nearer(device.plate.thickness_mm, device.plate.refractive_index);
   pixels_per_mm_ = focal_pixels(eye) / distance;
   const double half_diagonal = 0.5 * std::hypot(camera.width, camera.height);

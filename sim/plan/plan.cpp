@@ -60,16 +60,9 @@ double bright_radius(const ObjectSpec& object) {
 
 /// Radius of the largest disc that a gel's coat has, seen along z. @pre pictures can be had of it: it isn't a mesh
 double coat_radius(const GelSpec& gel) {
-  switch (gel.shape) {
-    case GelShape::dome:
-      return gel.base_radius_mm;
-    case GelShape::fingertip:
-      return gel.radius_mm;
-    case GelShape::slab:
-    case GelShape::mesh:
-      break;
-  }
-  return 0.5 * std::hypot(gel.size_x_mm, gel.size_y_mm);
+  if (const auto face = round_face(gel)) return face->radius_mm;
+  const auto& slab = std::get<SlabSpec>(gel.shape);
+  return 0.5 * std::hypot(slab.size_x_mm, slab.size_y_mm);
 }
 
 void plan_elastic_objects(const SceneSpec& scene, Plan& plan, PlanTable& table) {
@@ -189,9 +182,10 @@ std::optional<double> finest_detail(const ObjectSpec& object) {
 
 /// @pre the gel isn't gentle
 std::string shape_in_words(const GelSpec& gel) {
-  if (gel.shape != GelShape::dome) return "this gel is neither";
+  const DomeSpec* dome = gel.dome();
+  if (dome == nullptr) return "this gel is neither";
   return fmt::format("this dome slopes by {:.3g} degrees at its rim",
-                     std::asin(gel.base_radius_mm / gel.sphere_radius_mm) / kRadiansPerDegree);
+                     std::asin(dome->base_radius_mm / dome->sphere_radius_mm) / kRadiansPerDegree);
 }
 
 void plan_relief(const SceneSpec& scene, Plan& plan, PlanTable& table) {
@@ -333,13 +327,12 @@ void plan_light(const SceneSpec& scene, Plan& plan, PlanTable& table) {
       hits ? "depth, normals, ids, contact or flow is asked for" : "none of depth, normals, ids, contact, flow is",
       "one ray a pixel: some 0.1 s a frame of 640x480");
   const GelSpec& gel = scene.device.gel;
-  const bool clear_and_curved = gel.shape != GelShape::slab && !scene.device.coating;
-  if (gel.shape == GelShape::mesh || clear_and_curved) {
+  const bool clear_and_curved = !gel.slab() && !scene.device.coating;
+  if (gel.mesh() || clear_and_curved) {
     fail_at(scene.where,
             "outputs: an image is asked for, but the gel of the device '{}' ({}) is {}; pictures can be had of slabs, "
             "and of domes and fingertips with a coating; truth alone with frames, ideal and radiance all false",
-            scene.device.name, scene.device.where.file,
-            gel.shape == GelShape::mesh ? "a mesh" : "curved and has no coating");
+            scene.device.name, scene.device.where.file, gel.mesh() ? "a mesh" : "curved and has no coating");
   }
   const PlateSpec& plate = scene.device.plate;
   const bool refracts = gel.refractive_index != 1.0 || plate.refractive_index != 1.0;

@@ -61,7 +61,9 @@ void plan_shared_paths(const SceneSpec& scene, Plan& plan, PlanTable& table) {
         fmt::format("the camera's hole makes points {:.2g} pixels wide; below {:.2g} each pixel needs its own paths",
                     width_px, kWidePoint_px);
   }
-  if (scene.device.camera->type == CameraType::lens) unfit = "through a lens the blur depends on the depth";
+  if (std::holds_alternative<LensSpec>(scene.device.camera->optics)) {
+    unfit = "through a lens the blur depends on the depth";
+  }
   if (forced == Switch::on && !unfit.empty()) fail_at(scene.where, "effects.shared_paths: on, but {}", unfit);
   plan.shared_paths = table.add(
       name, forced, unfit.empty() && !plan.direct_light,

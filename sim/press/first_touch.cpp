@@ -24,19 +24,20 @@ constexpr double kMiss = -std::numeric_limits<double>::infinity();
 using Surface = std::function<double(const Eigen::Vector2d& place)>;
 
 Surface surface_of(const GelSpec& gel) {
-  if (gel.shape == GelShape::mesh) {
-    TS_ASSERT(gel.surface != nullptr);
-    return [solid = fem::MeshShape(gel.surface->mesh)](const Eigen::Vector2d& place) {
+  if (const GelMeshSpec* mesh = gel.mesh()) {
+    TS_ASSERT(mesh->surface != nullptr);
+    return [solid = fem::MeshShape(mesh->surface->mesh)](const Eigen::Vector2d& place) {
       const auto down = fem::first_entry(solid, {place.x(), place.y(), 0.0}, -Eigen::Vector3d::UnitZ());
       return down ? -*down : kMiss;
     };
   }
-  return [&gel](const Eigen::Vector2d& place) {
-    const bool on = gel.shape == GelShape::slab
-                        ? std::abs(place.x()) <= 0.5 * gel.size_x_mm && std::abs(place.y()) <= 0.5 * gel.size_y_mm
-                    : gel.shape == GelShape::dome ? place.norm() <= gel.base_radius_mm
-                                                  : place.norm() <= gel.radius_mm;
-    return on ? rest_height(gel, place) : kMiss;
+  if (const SlabSpec* slab = gel.slab()) {
+    return [half = Eigen::Array2d(0.5 * slab->size_x_mm, 0.5 * slab->size_y_mm)](const Eigen::Vector2d& place) {
+      return (place.array().abs() <= half).all() ? 0.0 : kMiss;
+    };
+  }
+  return [&gel, radius = round_face(gel)->radius_mm](const Eigen::Vector2d& place) {
+    return place.norm() <= radius ? rest_height(gel, place) : kMiss;
   };
 }
 
@@ -89,7 +90,7 @@ double first_touch(const GelSpec& gel, const fem::ContactShape& shape, const Eig
     return lowest ? rest - *lowest : kMiss;
   };
 
-  if (gel.shape == GelShape::slab) {
+  if (gel.slab()) {
     // A plane: the body's lowest point touches first, if there is gel below it.
     if (const auto low = lowest_point(shape, up)) {
       const Eigen::Vector2d under = place_mm + (rotation * *low).head<2>();

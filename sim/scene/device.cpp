@@ -29,8 +29,31 @@ EnumNames<MarkShape> enum_names(MarkShape) {
 namespace touchstone::sim {
 namespace {
 
+/// `gel.shape` of the file.
+enum class GelShape { slab, dome, fingertip, mesh };
+
+EnumNames<GelShape> enum_names(GelShape) {
+  return {
+      {"slab", GelShape::slab}, {"dome", GelShape::dome}, {"fingertip", GelShape::fingertip}, {"mesh", GelShape::mesh}};
+}
+
+/// `camera.type` of the file.
+enum class CameraType { pinhole, lens };
+
+EnumNames<CameraType> enum_names(CameraType) {
+  return {{"pinhole", CameraType::pinhole}, {"lens", CameraType::lens}};
+}
+
 Allowed part_of_one() {
   return Allowed::within(0.0, 1.0);
+}
+
+Allowed gel_length() {
+  return Allowed::above_up_to(0.0, 1000.0);
+}
+
+Allowed gel_length_or_none() {
+  return Allowed::within(0.0, 1000.0);
 }
 
 void check_beads_fit(const DeviceSpec& device, const SourceLocation& where) {
@@ -41,11 +64,12 @@ void check_beads_fit(const DeviceSpec& device, const SourceLocation& where) {
     fail_at(where, "beads.depth_mm: {} puts beads of diameter {} mm out of a gel of {} mm; allowed is from {} to {}",
             beads.depth_mm, beads.diameter_mm, gel.thickness_mm, radius, gel.thickness_mm - radius);
   }
-  if (gel.shape != GelShape::slab) return;  // set-up says where a bead isn't wholly inside the gel
+  const SlabSpec* slab = gel.slab();
+  if (slab == nullptr) return;  // set-up says where a bead isn't wholly inside the gel
   const double half_grid = (beads.grid - 1) * beads.spacing_mm / 2 + radius;
-  if (half_grid > std::min(gel.size_x_mm, gel.size_y_mm) / 2) {
+  if (half_grid > std::min(slab->size_x_mm, slab->size_y_mm) / 2) {
     fail_at(where, "beads: a grid of {0} x {0} at {1} mm doesn't fit in a gel of {2} x {3} mm", beads.grid,
-            beads.spacing_mm, gel.size_x_mm, gel.size_y_mm);
+            beads.spacing_mm, slab->size_x_mm, slab->size_y_mm);
   }
   if (beads.grid > 1 && beads.spacing_mm <= beads.diameter_mm) {
     fail_at(where, "beads.spacing_mm: {} lets beads of diameter {} mm overlap; it must be above that", beads.spacing_mm,
@@ -66,10 +90,11 @@ void check_gel(DeviceSpec& device, const SourceLocation& where) {
 
 void check_camera_outside(const DeviceSpec& device, const SourceLocation& where) {
   const double plate_face = -device.gel.thickness_mm - device.plate.thickness_mm;
-  const char* key = device.camera->type == CameraType::lens ? "lens_position_mm" : "hole_position_mm";
-  if (device.camera->hole_position_mm.z() >= plate_face) {
-    fail_at(where, "camera.{}: z = {} is not in front of the plate, whose lower face is at z = {}", key,
-            device.camera->hole_position_mm.z(), plate_face);
+  const CameraSpec& camera = *device.camera;
+  if (camera.position_mm.z() >= plate_face) {
+    fail_at(where, "camera.{}: z = {} is not in front of the plate, whose lower face is at z = {}",
+            std::holds_alternative<LensSpec>(camera.optics) ? "lens_position_mm" : "hole_position_mm",
+            camera.position_mm.z(), plate_face);
   }
 }
 
@@ -88,19 +113,25 @@ void check_lamps_outside(const DeviceSpec& device, const SourceLocation& where) 
   }
 }
 
-/// The fields of a lens.
-void lens_fields(YamlReader& in, CameraSpec& camera) {
+void hole_fields(YamlReader& in, PinholeSpec& hole, Eigen::Vector3d& position_mm) {
+  in.required("hole_diameter_um", hole.hole_diameter_um, Allowed::above(0.0));
+  in.optional("foil_thickness_um", hole.foil_thickness_um, Allowed::at_least(0.0));
+  in.required("hole_to_sensor_mm", hole.hole_to_sensor_mm, Allowed::above(0.0));
+  in.required("hole_position_mm", position_mm);
+}
+
+void lens_fields(YamlReader& in, LensSpec& lens, Eigen::Vector3d& position_mm) {
   const Allowed length = Allowed::above(0.0);
   in.exactly_one_of({"focal_length_mm", "camera_matrix"});
-  in.optional("focal_length_mm", camera.focal_length_mm, length);
-  in.optional("camera_matrix", camera.camera_matrix);
-  in.required("f_number", camera.f_number, Allowed::within(0.5, 1000.0));
-  in.optional("focus_distance_mm", camera.focus_distance_mm, length);
+  in.optional("focal_length_mm", lens.focal_length_mm, length);
+  in.optional("camera_matrix", lens.camera_matrix);
+  in.required("f_number", lens.f_number, Allowed::within(0.5, 1000.0));
+  in.optional("focus_distance_mm", lens.focus_distance_mm, length);
   in.not_beside("sensor_distance_mm", {"camera_matrix", "focus_distance_mm"});  // either of them tells it
-  in.optional("sensor_distance_mm", camera.sensor_distance_mm, length);
-  in.optional("distortion", camera.distortion);
-  in.required("lens_position_mm", camera.hole_position_mm);
-  const std::size_t numbers = camera.distortion.size();
+  in.optional("sensor_distance_mm", lens.sensor_distance_mm, length);
+  in.optional("distortion", lens.distortion);
+  in.required("lens_position_mm", position_mm);
+  const std::size_t numbers = lens.distortion.size();
   if (in.has("distortion") && numbers != 4 && numbers != 5 && numbers != 8) {
     fail_at(in.where("distortion"), "distortion: {} numbers; allowed are 4, 5 or 8: k1 k2 p1 p2 [k3 [k4 k5 k6]]",
             numbers);
@@ -117,15 +148,6 @@ EnumNames<PrintPattern> enum_names(PrintPattern) {
   return {{"grid", PrintPattern::grid}, {"scattered", PrintPattern::scattered}};
 }
 
-EnumNames<CameraType> enum_names(CameraType) {
-  return {{"pinhole", CameraType::pinhole}, {"lens", CameraType::lens}};
-}
-
-EnumNames<GelShape> enum_names(GelShape) {
-  return {
-      {"slab", GelShape::slab}, {"dome", GelShape::dome}, {"fingertip", GelShape::fingertip}, {"mesh", GelShape::mesh}};
-}
-
 void fields(YamlReader& in, GelLayerSpec& layer) {
   in.optional("name", layer.name);
   in.required("thickness_mm", layer.thickness_mm, Allowed::above_up_to(0.0, 1000.0));
@@ -138,41 +160,55 @@ void fields(YamlReader& in, RelaxationTermSpec& term) {
   in.required("time_s", term.time_s, Allowed::above(0.0));
 }
 
+void fields(YamlReader& in, SlabSpec& slab) {
+  in.required("size_x_mm", slab.size_x_mm, gel_length());
+  in.required("size_y_mm", slab.size_y_mm, gel_length());
+}
+
+void fields(YamlReader& in, DomeSpec& dome) {
+  in.required("sphere_radius_mm", dome.sphere_radius_mm, Allowed::above_up_to(0.0, 1e5));
+  in.required("base_radius_mm", dome.base_radius_mm, gel_length());
+}
+
+void fields(YamlReader& in, FingertipSpec& tip) {
+  in.required("radius_mm", tip.radius_mm, gel_length());
+  in.required("length_mm", tip.length_mm, gel_length_or_none());
+  in.required("sleeve_mm", tip.sleeve_mm, gel_length_or_none());
+}
+
+void fields(YamlReader& in, GelMeshSpec& mesh) {
+  std::string file;
+  in.required("file", file);
+  mesh.file = in.folder() / file;
+  in.optional("mm_per_unit", mesh.mm_per_unit, Allowed::above(0.0));
+  if (in.describing()) return;
+  try {
+    mesh.surface = std::make_shared<const GelSurface>(read_gltf_gel(mesh.file, mesh.mm_per_unit));
+  } catch (const Error& error) {
+    fail_at(in.where("file"), "gel.file: {}", error.what());
+  }
+}
+
 void fields(YamlReader& in, GelSpec& gel) {
-  const Allowed length = Allowed::above_up_to(0.0, 1000.0);
-  const Allowed length_or_none = Allowed::within(0.0, 1000.0);
-  in.optional("shape", gel.shape);
-  switch (gel.shape) {
+  auto shape = GelShape::slab;
+  in.optional("shape", shape);
+  switch (shape) {
     case GelShape::slab:
-      in.required("size_x_mm", gel.size_x_mm, length);
-      in.required("size_y_mm", gel.size_y_mm, length);
-      in.required("thickness_mm", gel.thickness_mm, length);
+      fields(in, gel.shape.emplace<SlabSpec>());
+      in.required("thickness_mm", gel.thickness_mm, gel_length());
       break;
     case GelShape::dome:
-      in.required("sphere_radius_mm", gel.sphere_radius_mm, Allowed::above_up_to(0.0, 1e5));
-      in.required("base_radius_mm", gel.base_radius_mm, length);
-      in.optional("thickness_mm", gel.thickness_mm, length);
+      fields(in, gel.shape.emplace<DomeSpec>());
+      in.optional("thickness_mm", gel.thickness_mm, gel_length());
       break;
     case GelShape::fingertip:
-      in.required("radius_mm", gel.radius_mm, length);
-      in.required("length_mm", gel.length_mm, length_or_none);
-      in.required("sleeve_mm", gel.sleeve_mm, length_or_none);
+      fields(in, gel.shape.emplace<FingertipSpec>());
       break;
-    case GelShape::mesh: {
-      std::string file;
-      in.required("file", file);
-      gel.file = in.folder() / file;
-      in.optional("mm_per_unit", gel.mm_per_unit, Allowed::above(0.0));
-      if (in.describing()) break;
-      try {
-        gel.surface = std::make_shared<const GelSurface>(read_gltf_gel(gel.file, gel.mm_per_unit));
-      } catch (const Error& error) {
-        fail_at(in.where("file"), "gel.file: {}", error.what());
-      }
+    case GelShape::mesh:
+      fields(in, gel.shape.emplace<GelMeshSpec>());
       break;
-    }
   }
-  if (gel.shape != GelShape::mesh) in.optional("layers", gel.layers);
+  if (shape != GelShape::mesh) in.optional("layers", gel.layers);
   in.required("youngs_modulus_MPa", gel.youngs_modulus_MPa, Allowed::above_up_to(0.0, 1e6));
   in.optional("poisson_ratio", gel.poisson_ratio, Allowed::within(0.0, 0.5));
   in.optional("density_kg_m3", gel.density_kg_m3, Allowed::above_up_to(0.0, 1e5));
@@ -278,7 +314,8 @@ void fields(YamlReader& in, CameraSpec& camera) {
   const auto needed = [&](const char* key, auto& value, Allowed allowed) {
     preset ? in.optional(key, value, allowed) : in.required(key, value, allowed);
   };
-  in.optional("type", camera.type);
+  auto type = CameraType::pinhole;
+  in.optional("type", type);
   needed("width", camera.width, Allowed::within(1, 8192));
   needed("height", camera.height, Allowed::within(1, 8192));
   in.optional("frame_rate_Hz", camera.frame_rate_Hz, Allowed::above(0.0));
@@ -286,13 +323,10 @@ void fields(YamlReader& in, CameraSpec& camera) {
   const double whole_area = camera.pixel_pitch_um * camera.pixel_pitch_um;
   if (!preset || in.has("pixel_pitch_um")) camera.active_area_um2 = whole_area;
   in.optional("active_area_um2", camera.active_area_um2, Allowed::above_up_to(0.0, whole_area));
-  if (camera.type == CameraType::lens) {
-    lens_fields(in, camera);
+  if (type == CameraType::lens) {
+    lens_fields(in, camera.optics.emplace<LensSpec>(), camera.position_mm);
   } else {
-    in.required("hole_diameter_um", camera.hole_diameter_um, Allowed::above(0.0));
-    in.optional("foil_thickness_um", camera.foil_thickness_um, Allowed::at_least(0.0));
-    in.required("hole_to_sensor_mm", camera.hole_to_sensor_mm, Allowed::above(0.0));
-    in.required("hole_position_mm", camera.hole_position_mm);
+    hole_fields(in, camera.optics.emplace<PinholeSpec>(), camera.position_mm);
   }
   in.required("look_at_mm", camera.look_at_mm);
   in.optional("roll_deg", camera.roll_deg, Allowed::within(-180.0, 180.0));
@@ -334,7 +368,7 @@ void fields(YamlReader& in, CameraSpec& camera) {
     fail_at(in.where("row_time_us"), "row_time_us: {} for each of {} rows is longer than a frame of {} us at {} Hz",
             camera.row_time_us, camera.height, frame_us, camera.frame_rate_Hz);
   }
-  if ((camera.look_at_mm - camera.hole_position_mm).norm() < 1e-6) {
+  if ((camera.look_at_mm - camera.position_mm).norm() < 1e-6) {
     fail_at(in.where("look_at_mm"), "camera.look_at_mm: is the camera's own position; the camera has no direction");
   }
   try {

@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "core/yaml_reader.h"
@@ -31,9 +32,31 @@ struct RelaxationTermSpec {
 
 struct GelSurface;
 
-/// `gel.shape` of the file; which fields of GelSpec count depends on it.
-enum class GelShape { slab, dome, fingertip, mesh };
-EnumNames<GelShape> enum_names(GelShape);
+/// A flat gel with upright sides.
+struct SlabSpec {
+  double size_x_mm = 0.0;
+  double size_y_mm = 0.0;
+};
+
+/// A spherical cap; where the gel is thicker than the cap is high, on a cylinder (fem::DomeGel).
+struct DomeSpec {
+  double sphere_radius_mm = 0.0;
+  double base_radius_mm = 0.0;
+};
+
+/// A hemisphere on a cylinder, held in a sleeve (fem::FingertipGel).
+struct FingertipSpec {
+  double radius_mm = 0.0;
+  double length_mm = 0.0;
+  double sleeve_mm = 0.0;
+};
+
+/// A solid from a file (fem::SolidGel).
+struct GelMeshSpec {
+  std::filesystem::path file;                 ///< glTF with named faces, relative to the device file
+  double mm_per_unit = 1000.0;                ///< glTF's unit is the metre
+  std::shared_ptr<const GelSurface> surface;  ///< as read
+};
 
 /// A layer of a gel. Optically it is the gel's body.
 struct GelLayerSpec {
@@ -44,24 +67,14 @@ struct GelLayerSpec {
 };
 
 /// The soft body, clamped to the plate on its back. Gel frame: origin in the middle of the outer surface, +z out of the
-/// gel, back at z = -thickness. Only the fields that belong to `shape` may stand in the file (see the structs of
-/// fem/mesh/gel_body.h).
+/// gel, back at z = -thickness. `shape` in the file says which shape it has; fields of other shapes may not stand
+/// there.
 struct GelSpec {
-  GelShape shape = GelShape::slab;
-  double size_x_mm = 0.0;         ///< slab
-  double size_y_mm = 0.0;         ///< slab
-  double thickness_mm = 0.0;      ///< all: of a slab and a dome as given, else worked out; layers are part of it
-  double sphere_radius_mm = 0.0;  ///< dome
-  double base_radius_mm = 0.0;    ///< dome
-  double radius_mm = 0.0;         ///< fingertip
-  double length_mm = 0.0;         ///< fingertip
-  double sleeve_mm = 0.0;         ///< fingertip
-  std::filesystem::path file;     ///< mesh: glTF with named faces, relative to the device file
-  double mm_per_unit = 1000.0;    ///< mesh: glTF's unit is the metre
-  std::shared_ptr<const GelSurface> surface;  ///< mesh: as read
-  std::vector<GelLayerSpec> layers;           ///< from the outer surface inwards; not for a mesh
-  double youngs_modulus_MPa = 0.0;            ///< of the body below the layers; instantaneous, where the gel relaxes
-  double poisson_ratio = 0.49;                ///< constant in time
+  std::variant<SlabSpec, DomeSpec, FingertipSpec, GelMeshSpec> shape;
+  double thickness_mm = 0.0;         ///< of a slab and a dome as given, else worked out; layers are part of it
+  std::vector<GelLayerSpec> layers;  ///< from the outer surface inwards; not for a mesh
+  double youngs_modulus_MPa = 0.0;   ///< of the body below the layers; instantaneous, where the gel relaxes
+  double poisson_ratio = 0.49;       ///< constant in time
   double density_kg_m3 = 1000.0;
   std::vector<RelaxationTermSpec> relaxation;  ///< of all moduli: a Prony series; empty: elastic
   double refractive_index = 1.0;
@@ -69,6 +82,12 @@ struct GelSpec {
   Colour scattering_per_mm = 0.0;      ///< of a milky gel
   double scattering_anisotropy = 0.0;  ///< mean cosine of a scattering
   Colour frame_albedo = 0.0;           ///< of the frame that holds the pad at its sides; 0 is black
+
+  // Null if the gel has another shape.
+  const SlabSpec* slab() const { return std::get_if<SlabSpec>(&shape); }
+  const DomeSpec* dome() const { return std::get_if<DomeSpec>(&shape); }
+  const FingertipSpec* fingertip() const { return std::get_if<FingertipSpec>(&shape); }
+  const GelMeshSpec* mesh() const { return std::get_if<GelMeshSpec>(&shape); }
 };
 
 /// How fine the gel is meshed: `fine_mm` where contact and beads are, graded to `coarse_mm` elsewhere; or, in their
@@ -141,9 +160,24 @@ struct FilmSpec {
   Colour transmittance = 1.0;  ///< of one passage at normal incidence
 };
 
-/// Which kind of camera; which fields of CameraSpec count depends on it.
-enum class CameraType { pinhole, lens };
-EnumNames<CameraType> enum_names(CameraType);
+/// A hole in a foil.
+struct PinholeSpec {
+  double hole_diameter_um = 0.0;
+  double foil_thickness_um = 0.0;
+  double hole_to_sensor_mm = 0.0;
+};
+
+/// A lens. The file has either focal_length_mm or camera_matrix, and at most one of focus_distance_mm and
+/// sensor_distance_mm (neither: sharp at infinity; with a camera matrix, which gives the sensor's distance,
+/// focus_distance_mm only).
+struct LensSpec {
+  std::optional<double> focal_length_mm;
+  std::optional<Eigen::Vector4d> camera_matrix;  ///< OpenCV's fx, fy, cx, cy, pixels (centres are whole numbers)
+  double f_number = 0.0;                         ///< focal length / diameter of the stop
+  std::optional<double> focus_distance_mm;       ///< to what is sharp, in air
+  std::optional<double> sensor_distance_mm;
+  std::vector<double> distortion;  ///< OpenCV's k1 k2 p1 p2 [k3 [k4 k5 k6]]; empty: none
+};
 
 /// What an optical mouse's chip does by itself beside exposing its pixels (render/imager/motion_chip.h). Its longest
 /// exposure is the camera's.
@@ -154,27 +188,17 @@ struct MotionChipSpec {
   SourceLocation where;
 };
 
-/// A camera and its imager (in the terms of [EMVA1288]). Only the fields that belong to `type` may stand in the file:
-/// of a lens either focal_length_mm or camera_matrix, and at most one of focus_distance_mm and sensor_distance_mm
-/// (neither: sharp at infinity; with a camera matrix, which gives the sensor's distance, focus_distance_mm only). A
-/// `preset` in the file gives the imager's figures, which the other fields override (sim/scene/camera_preset.h).
+/// A camera and its imager (in the terms of [EMVA1288]). `type` in the file says whether it has a hole or a lens; the
+/// fields of the other may not stand there. A `preset` in the file gives the imager's figures, which the other fields
+/// override (sim/scene/camera_preset.h).
 struct CameraSpec {
-  CameraType type = CameraType::pinhole;
+  std::variant<PinholeSpec, LensSpec> optics;
   int width = 0;
   int height = 0;
   double frame_rate_Hz = 30.0;
   double pixel_pitch_um = 0.0;
   double active_area_um2 = 0.0;
-  double hole_diameter_um = 0.0;                 ///< pinhole
-  double foil_thickness_um = 0.0;                ///< pinhole
-  double hole_to_sensor_mm = 0.0;                ///< pinhole
-  std::optional<double> focal_length_mm;         ///< lens
-  std::optional<Eigen::Vector4d> camera_matrix;  ///< lens: OpenCV's fx, fy, cx, cy, pixels (centres are whole numbers)
-  double f_number = 0.0;                         ///< lens: focal length / diameter of the stop
-  std::optional<double> focus_distance_mm;       ///< lens: to what is sharp, in air
-  std::optional<double> sensor_distance_mm;      ///< lens
-  std::vector<double> distortion;                ///< lens: OpenCV's k1 k2 p1 p2 [k3 [k4 k5 k6]]; empty: none
-  Eigen::Vector3d hole_position_mm = Eigen::Vector3d::Zero();  ///< of a lens its centre: `lens_position_mm` in the file
+  Eigen::Vector3d position_mm = Eigen::Vector3d::Zero();  ///< in the file `hole_position_mm` or `lens_position_mm`
   Eigen::Vector3d look_at_mm = Eigen::Vector3d::Zero();
   double roll_deg = 0.0;  ///< about its axis; what it sees turns in the opposite direction in its picture
   double exposure_us = 1000.0;
@@ -227,6 +251,10 @@ struct DeviceSpec {
 
 void fields(YamlReader& in, GelLayerSpec& layer);
 void fields(YamlReader& in, RelaxationTermSpec& term);
+void fields(YamlReader& in, SlabSpec& slab);
+void fields(YamlReader& in, DomeSpec& dome);
+void fields(YamlReader& in, FingertipSpec& tip);
+void fields(YamlReader& in, GelMeshSpec& mesh);
 void fields(YamlReader& in, GelSpec& gel);
 void fields(YamlReader& in, MeshSpec& mesh);
 void fields(YamlReader& in, BeadSpec& beads);

@@ -12,20 +12,21 @@ namespace touchstone::sim {
 RigidTransform pose_of(const CameraSpec& camera) {
   // The camera looks out of the gel, along +z: with +y of the gel frame down the picture, +x runs to its right and
   // nothing is mirrored. A camera that looks straight along y has +z down instead.
-  const Eigen::Vector3d view = (camera.look_at_mm - camera.hole_position_mm).normalized();
+  const Eigen::Vector3d view = (camera.look_at_mm - camera.position_mm).normalized();
   const Eigen::Vector3d down = std::abs(view.y()) > 0.999 ? Eigen::Vector3d(0, 0, 1) : Eigen::Vector3d(0, 1, 0);
   const double roll = camera.roll_deg * kRadiansPerDegree;
-  return look_at(camera.hole_position_mm, camera.look_at_mm, Eigen::AngleAxisd(roll, view) * down);
+  return look_at(camera.position_mm, camera.look_at_mm, Eigen::AngleAxisd(roll, view) * down);
 }
 
 render::PinholeCamera pinhole_camera(const CameraSpec& camera) {
+  const auto& hole = std::get<PinholeSpec>(camera.optics);
   render::PinholeCamera out;
   out.width = camera.width;
   out.height = camera.height;
   out.pixel_pitch_um = camera.pixel_pitch_um;
-  out.hole_diameter_um = camera.hole_diameter_um;
-  out.foil_thickness_um = camera.foil_thickness_um;
-  out.distance_mm = camera.hole_to_sensor_mm;
+  out.hole_diameter_um = hole.hole_diameter_um;
+  out.foil_thickness_um = hole.foil_thickness_um;
+  out.distance_mm = hole.hole_to_sensor_mm;
   out.gel_from_camera = pose_of(camera);
   return out;
 }
@@ -38,23 +39,23 @@ render::LensDistortion distortion_of(const std::vector<double>& list) {
   return {at(0), at(1), at(2), at(3), at(4), at(5), at(6), at(7)};
 }
 
-render::LensCamera lens_camera(const CameraSpec& camera) {
+render::LensCamera lens_camera(const CameraSpec& camera, const LensSpec& lens) {
   render::LensCamera out;
   out.width = camera.width;
   out.height = camera.height;
   out.pixel_pitch_um = camera.pixel_pitch_um;
-  out.distortion = distortion_of(camera.distortion);
-  if (camera.focus_distance_mm) out.focus_distance_mm = *camera.focus_distance_mm;
-  if (camera.camera_matrix) {
-    const Eigen::Vector4d& matrix = *camera.camera_matrix;
+  out.distortion = distortion_of(lens.distortion);
+  if (lens.focus_distance_mm) out.focus_distance_mm = *lens.focus_distance_mm;
+  if (lens.camera_matrix) {
+    const Eigen::Vector4d& matrix = *lens.camera_matrix;
     out.matrix = {matrix[0], matrix[1], matrix[2], matrix[3]};
   } else {
-    const double focal = *camera.focal_length_mm;
-    if (camera.sensor_distance_mm) out.focus_distance_mm = render::focus_of_sensor(focal, *camera.sensor_distance_mm);
+    const double focal = *lens.focal_length_mm;
+    if (lens.sensor_distance_mm) out.focus_distance_mm = render::focus_of_sensor(focal, *lens.sensor_distance_mm);
     out.matrix =
         render::matrix_of_lens(focal, out.focus_distance_mm, camera.pixel_pitch_um, camera.width, camera.height);
   }
-  out.aperture_mm = render::focal_length_mm(out) / camera.f_number;
+  out.aperture_mm = render::focal_length_mm(out) / lens.f_number;
   out.gel_from_camera = pose_of(camera);
   return out;
 }
@@ -62,10 +63,11 @@ render::LensCamera lens_camera(const CameraSpec& camera) {
 }  // namespace
 
 render::Camera camera_of(const CameraSpec& camera) {
-  if (camera.type == CameraType::pinhole) return pinhole_camera(camera);
-  render::LensCamera lens = lens_camera(camera);
-  check_camera(lens);
-  return lens;
+  const auto* lens = std::get_if<LensSpec>(&camera.optics);
+  if (lens == nullptr) return pinhole_camera(camera);
+  render::LensCamera out = lens_camera(camera, *lens);
+  check_camera(out);
+  return out;
 }
 
 double blur_disc_px(const render::Camera& camera, double distance_mm) {

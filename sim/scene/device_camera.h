@@ -9,7 +9,7 @@ namespace touchstone::sim {
 /// Where the camera stands and looks.
 RigidTransform pose_of(const CameraSpec& camera);
 
-/// A camera with a hole, as the renderer takes it. @pre the camera's type is pinhole
+/// A camera with a hole, as the renderer takes it. @pre its optics are a PinholeSpec
 render::PinholeCamera pinhole_camera(const CameraSpec& camera);
 
 /// The pinhole or the lens of a device. @throws Error if a lens can't be made: it can't focus so near, or its

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "core/overloaded.h"
 #include "fem/fine_relief/smooth_surface.h"
 #include "sim/files/gltf_mesh.h"
 
@@ -15,23 +16,27 @@ fem::GelBody gel_body(const DeviceSpec& device) {
   const Eigen::Vector2d& half = mesh.fine_half_extent_mm;
   std::vector<double> layers;
   for (const GelLayerSpec& layer : gel.layers) layers.push_back(layer.thickness_mm);
-  switch (gel.shape) {
-    case GelShape::slab:
-      return fem::SlabGel{{gel.size_x_mm, gel.size_y_mm, gel.thickness_mm, mesh.fine_mm, mesh.coarse_mm, half.x(),
-                           half.y(), mesh.fine_depth_mm},
-                          layers};
-    case GelShape::dome:
-      return fem::DomeGel{gel.sphere_radius_mm, gel.base_radius_mm, gel.thickness_mm,   mesh.fine_mm,
-                          mesh.coarse_mm,       half.maxCoeff(),    mesh.fine_depth_mm, layers};
-    case GelShape::fingertip:
-      return fem::FingertipGel{gel.radius_mm,  gel.length_mm,   gel.sleeve_mm,      mesh.fine_mm,
-                               mesh.coarse_mm, half.maxCoeff(), mesh.fine_depth_mm, layers};
-    case GelShape::mesh:
-      break;
-  }
-  TS_ASSERT(gel.surface != nullptr);
-  return fem::SolidGel{gel.surface->mesh, gel.surface->faces, mesh.fine_mm,      mesh.coarse_mm,
-                       half.x(),          half.y(),           mesh.fine_depth_mm};
+  return std::visit(
+      Overloaded{[&](const SlabSpec& slab) -> fem::GelBody {
+                   return fem::SlabGel{{slab.size_x_mm, slab.size_y_mm, gel.thickness_mm, mesh.fine_mm, mesh.coarse_mm,
+                                        half.x(), half.y(), mesh.fine_depth_mm},
+                                       layers};
+                 },
+                 [&](const DomeSpec& dome) -> fem::GelBody {
+                   return fem::DomeGel{dome.sphere_radius_mm, dome.base_radius_mm, gel.thickness_mm,   mesh.fine_mm,
+                                       mesh.coarse_mm,        half.maxCoeff(),     mesh.fine_depth_mm, layers};
+                 },
+                 [&](const FingertipSpec& tip) -> fem::GelBody {
+                   return fem::FingertipGel{tip.radius_mm,  tip.length_mm,   tip.sleeve_mm,      mesh.fine_mm,
+                                            mesh.coarse_mm, half.maxCoeff(), mesh.fine_depth_mm, layers};
+                 },
+                 [&](const GelMeshSpec& solid) -> fem::GelBody {
+                   TS_ASSERT(solid.surface != nullptr);
+                   return fem::SolidGel{
+                       solid.surface->mesh, solid.surface->faces, mesh.fine_mm, mesh.coarse_mm, half.x(), half.y(),
+                       mesh.fine_depth_mm};
+                 }},
+      gel.shape);
 }
 
 std::vector<fem::ElasticMaterial> gel_materials(const GelSpec& gel) {
@@ -50,18 +55,25 @@ std::vector<fem::Bead> gel_beads(const DeviceSpec& device) {
   return beads;
 }
 
+std::optional<RoundFace> round_face(const GelSpec& gel) {
+  if (const DomeSpec* dome = gel.dome()) return RoundFace{dome->sphere_radius_mm, dome->base_radius_mm};
+  if (const FingertipSpec* tip = gel.fingertip()) return RoundFace{tip->radius_mm, tip->radius_mm};
+  return std::nullopt;
+}
+
 double rest_height(const GelSpec& gel, const Eigen::Vector2d& place) {
-  TS_ASSERT(gel.shape != GelShape::mesh);
-  if (gel.shape == GelShape::slab) return 0.0;
-  const bool dome = gel.shape == GelShape::dome;
-  const double sphere = dome ? gel.sphere_radius_mm : gel.radius_mm;
-  const double across = std::min(place.norm(), dome ? gel.base_radius_mm : gel.radius_mm);
+  TS_ASSERT(gel.mesh() == nullptr);
+  const std::optional<RoundFace> face = round_face(gel);
+  if (!face) return 0.0;
+  const double sphere = face->sphere_radius_mm;
+  const double across = std::min(place.norm(), face->radius_mm);
   return std::sqrt(sphere * sphere - across * across) - sphere;
 }
 
 bool is_gentle(const GelSpec& gel) {
-  return gel.shape == GelShape::slab ||
-         (gel.shape == GelShape::dome && gel.base_radius_mm <= std::sin(fem::kSteepestDome) * gel.sphere_radius_mm);
+  const DomeSpec* dome = gel.dome();
+  return gel.slab() != nullptr ||
+         (dome != nullptr && dome->base_radius_mm <= std::sin(fem::kSteepestDome) * dome->sphere_radius_mm);
 }
 
 }  // namespace touchstone::sim

@@ -2,6 +2,7 @@
 // A device file's gel as fem asks for it.
 
 #include <Eigen/Core>
+#include <optional>
 #include <vector>
 
 #include "fem/elements/compliance.h"
@@ -18,6 +19,15 @@ std::vector<fem::ElasticMaterial> gel_materials(const GelSpec& gel);
 
 /// The device's beads, centres in the gel frame, mm; none where it has none.
 std::vector<fem::Bead> gel_beads(const DeviceSpec& device);
+
+/// The outer surface of a dome or a fingertip: the radius of its sphere, and of the circle that it fills, seen along z.
+struct RoundFace {
+  double sphere_radius_mm = 0.0;
+  double radius_mm = 0.0;
+};
+
+/// Nothing for a slab or a mesh.
+std::optional<RoundFace> round_face(const GelSpec& gel);
 
 /// Height (gel frame's z, mm) of the undeformed outer surface over a place; of a dome or fingertip beyond its rim that
 /// of the rim. @pre the gel isn't a mesh

@@ -6,6 +6,7 @@
 #include "core/error.h"
 #include "core/random.h"
 #include "core/units.h"
+#include "sim/scene/device_gel.h"
 
 namespace touchstone::sim {
 namespace {
@@ -53,11 +54,10 @@ std::vector<render::PrintedMark> scattered_marks(const PrintSpec& print) {
 }
 
 Eigen::Vector2d along_surface(const GelSpec& gel, const Eigen::Vector3d& point) {
-  const bool dome = gel.shape == GelShape::dome;
-  if (!dome && gel.shape != GelShape::fingertip) return point.head<2>();
+  const std::optional<RoundFace> face = round_face(gel);
+  if (!face) return point.head<2>();
   // Archimedes: on a sphere and on the cylinder round it equal heights have equal areas.
-  const double sphere = dome ? gel.sphere_radius_mm : gel.radius_mm;
-  const double outwards = std::sqrt(2.0 * sphere * std::max(0.0, -point.z()));
+  const double outwards = std::sqrt(2.0 * face->sphere_radius_mm * std::max(0.0, -point.z()));
   const double across = point.head<2>().norm();
   return across > 0.0 ? Eigen::Vector2d(outwards / across * point.head<2>()) : Eigen::Vector2d(0.0, 0.0);
 }

@@ -46,7 +46,7 @@ struct LightSequence::Parts {
         object_radius_mm(largest_object_radius(scene)) {
     settings.seed = scene.seed;
     settings.min_samples = settings.max_samples = scene.light.max_samples;
-    const double nearest = std::max(1e-3, -scene.device.gel.thickness_mm - scene.device.camera->hole_position_mm.z());
+    const double nearest = std::max(1e-3, -scene.device.gel.thickness_mm - scene.device.camera->position_mm.z());
     blur_px = blur_radius_px(camera, nearest);
   }
 

@@ -22,7 +22,7 @@ SceneBands one_band(const DeviceSpec& device) {
   };
   if (!device.camera) refuse("the device has no camera");
   if (device.camera->bayer != render::BayerPattern::none) refuse("its camera has colours; allowed is bayer: none");
-  if (device.gel.shape != GelShape::slab) refuse("its gel isn't a slab");
+  if (!device.gel.slab()) refuse("its gel isn't a slab");
   if (!device.lamps.empty()) refuse("it has lamps; allowed is light of the room alone");
   if (device.coating || device.beads || device.films) refuse("it has a coating, beads or films");
   if (device.bands || device.band_wavelengths_nm.size() != 1) {
@@ -69,9 +69,10 @@ MembraneCamera::MembraneCamera(const DeviceSpec& device, const MembraneCameraSet
   counter.exposure_s = 1.0;
   electrons_per_irradiance_ = render::response_of(counter).electrons_per_irradiance(0, 0);
 
-  const double cell = std::min({settings.cell_mm, device.gel.size_x_mm / 2, device.gel.size_y_mm / 2});
-  const double x = device.gel.size_x_mm;
-  const double y = device.gel.size_y_mm;
+  const auto& slab = std::get<SlabSpec>(device.gel.shape);
+  const double x = slab.size_x_mm;
+  const double y = slab.size_y_mm;
+  const double cell = std::min({settings.cell_mm, x / 2, y / 2});
   // Square cells that end with the membrane along x, and beyond it by less than two along y.
   const int columns = even_cells(x, cell);
   const double side = x / columns;

@@ -41,8 +41,9 @@ class MilkyView final : public SensorView {
     ready_ = render::make_ready(camera_of(*device_.camera));
     faces_ = clear_layers(device_);
     rest_light_ = camera_.irradiance(camera_.free_face());
-    const int columns = static_cast<int>(std::ceil(device_.gel.size_x_mm / kMapCell_mm));
-    const int rows = static_cast<int>(std::ceil(device_.gel.size_y_mm / kMapCell_mm));
+    const auto& slab = std::get<SlabSpec>(device_.gel.shape);
+    const int columns = static_cast<int>(std::ceil(slab.size_x_mm / kMapCell_mm));
+    const int rows = static_cast<int>(std::ceil(slab.size_y_mm / kMapCell_mm));
     map_.pitch = kMapCell_mm;
     map_.nx = columns;
     map_.ny = rows;
@@ -196,10 +197,9 @@ class MilkyView final : public SensorView {
 }  // namespace
 
 bool is_milky(const DeviceSpec& device) {
-  return device.gel.scattering_per_mm.largest() > 0.0 && device.gel.shape == GelShape::slab &&
-         device.gel.layers.empty() && !device.coating && !device.beads && !device.films && device.lamps.empty() &&
-         !device.bands && device.band_wavelengths_nm.size() == 1 && device.camera &&
-         device.camera->bayer == render::BayerPattern::none;
+  return device.gel.scattering_per_mm.largest() > 0.0 && device.gel.slab() && device.gel.layers.empty() &&
+         !device.coating && !device.beads && !device.films && device.lamps.empty() && !device.bands &&
+         device.band_wavelengths_nm.size() == 1 && device.camera && device.camera->bayer == render::BayerPattern::none;
 }
 
 std::unique_ptr<const SensorView> milky_view(const DeviceSpec& device, const fem::Compliance& gel,

@@ -91,7 +91,7 @@ struct VirtualCamera::Parts : SceneView {
   }
 
   ChangeFinder change_finder() const {
-    const double nearest = std::max(1e-3, -scene.device.gel.thickness_mm - scene.device.camera->hole_position_mm.z());
+    const double nearest = std::max(1e-3, -scene.device.gel.thickness_mm - scene.device.camera->position_mm.z());
     const PointBlur blur{least_blur_radius_px(camera), blur_radius_px(camera, nearest)};
     return {response, *settings.noise, scene.light.change_tolerance, blur, size};
   }

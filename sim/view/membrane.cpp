@@ -49,7 +49,7 @@ std::vector<double> sheet_lines(double first, double pitch, int pixels, double l
 Membrane::Membrane(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel)
     : Membrane(scene, plan,
                std::make_shared<const fem::SmoothSurface>(
-                   gel, scene.device.gel.shape == GelShape::dome ? scene.device.gel.sphere_radius_mm : INFINITY)) {}
+                   gel, scene.device.gel.dome() ? scene.device.gel.dome()->sphere_radius_mm : INFINITY)) {}
 
 Membrane::Membrane(const SceneSpec& scene, const Plan& plan, std::shared_ptr<const fem::SmoothSurface> surface)
     : surface_(std::move(surface)), pixel_(scene.membrane.pixel_um * 1e-3), relief_pixel_(plan.relief_pixel_mm) {

@@ -32,19 +32,19 @@ TriangleMesh round_wall(double radius, double low, double high) {
   return mesh;
 }
 
-/// The frame that holds the gel: walls round its sides, from the plate to its outer surface.
+/// The frame that holds the gel: walls round its sides, from the plate to its outer surface. @pre it isn't a mesh
 TriangleMesh gel_walls(const GelSpec& gel) {
-  if (gel.shape == GelShape::dome) {
-    const double rim =
-        std::sqrt(gel.sphere_radius_mm * gel.sphere_radius_mm - gel.base_radius_mm * gel.base_radius_mm) -
-        gel.sphere_radius_mm;
-    return round_wall(gel.base_radius_mm, -gel.thickness_mm, rim);
+  if (const DomeSpec* dome = gel.dome()) {
+    const double sphere = dome->sphere_radius_mm;
+    const double base = dome->base_radius_mm;
+    return round_wall(base, -gel.thickness_mm, std::sqrt(sphere * sphere - base * base) - sphere);
   }
-  if (gel.shape == GelShape::fingertip) {
-    return round_wall(gel.radius_mm, -gel.thickness_mm, -gel.thickness_mm + gel.sleeve_mm);
+  if (const FingertipSpec* tip = gel.fingertip()) {
+    return round_wall(tip->radius_mm, -gel.thickness_mm, -gel.thickness_mm + tip->sleeve_mm);
   }
-  const double x = gel.size_x_mm / 2;
-  const double y = gel.size_y_mm / 2;
+  const auto& slab = std::get<SlabSpec>(gel.shape);
+  const double x = slab.size_x_mm / 2;
+  const double y = slab.size_y_mm / 2;
   const Eigen::Vector2d corners[4] = {{-x, -y}, {x, -y}, {x, y}, {-x, y}};
   TriangleMesh mesh;
   for (const Eigen::Vector2d& corner : corners) {

@@ -84,14 +84,15 @@ TEST(MiddleOf, KeepsTheAxisAndTheMosaic) {
   sim::CameraSpec camera;
   camera.width = 1456;
   camera.height = 1088;
-  camera.camera_matrix = Eigen::Vector4d(2000, 2000, 731.5, 541.5);
+  camera.optics.emplace<sim::LensSpec>().camera_matrix = Eigen::Vector4d(2000, 2000, 731.5, 541.5);
   const sim::CameraSpec middle = middle_of(camera, 320 * 240);
+  const Eigen::Vector4d matrix = std::get<sim::LensSpec>(middle.optics).camera_matrix.value();
   EXPECT_LE(middle.width * middle.height, 320 * 240);
   EXPECT_GT(middle.width * middle.height, 310 * 232);
   EXPECT_EQ((camera.width - middle.width) % 4, 0) << "whole blocks of the mosaic on either side";
   EXPECT_EQ((camera.height - middle.height) % 4, 0);
-  EXPECT_EQ((*middle.camera_matrix)[2] - 0.5 * middle.width, 731.5 - 0.5 * camera.width);
-  EXPECT_EQ((*middle.camera_matrix)[3] - 0.5 * middle.height, 541.5 - 0.5 * camera.height);
+  EXPECT_EQ(matrix[2] - 0.5 * middle.width, 731.5 - 0.5 * camera.width);
+  EXPECT_EQ(matrix[3] - 0.5 * middle.height, 541.5 - 0.5 * camera.height);
   EXPECT_EQ(middle_of(middle, 320 * 240).width, middle.width);
 }
 

@@ -161,7 +161,6 @@ TEST(ChromaForce, LargeStrainsDifferFromSmallOnes) {
 
 TEST(ChromaForce, ASetupNeedsMarkers) {
   sim::DeviceSpec bare;
-  bare.gel.shape = sim::GelShape::slab;
   EXPECT_THAT([&] { set_up_force(bare, {}); },
               ::testing::ThrowsMessage<Error>(::testing::HasSubstr("neither printed markers nor beads")));
   bare.beads = sim::BeadSpec{};

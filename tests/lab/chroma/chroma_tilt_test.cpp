@@ -114,15 +114,16 @@ TEST(TiltedMarker, LooksNarrowerAndYellowerAndAPressedOneLarger) {
 
 TEST(NearSetup, IsTheDevicesOwn) {
   const sim::DeviceSpec device = sim::read_device(datasets::scenes_folder() / "devices" / "chroma.yaml");
+  const auto& lens = std::get<sim::LensSpec>(device.camera->optics);
   const TiltSetup setup = near_setup();
   EXPECT_EQ(setup.gel_mm, device.gel.thickness_mm);
   EXPECT_EQ(setup.plate_mm, device.plate.thickness_mm);
   EXPECT_EQ(setup.side_mm, device.coating->print->width_mm);
   EXPECT_EQ(setup.film_mm, device.films->side_mm);
-  EXPECT_EQ(setup.lens_mm, device.camera->focal_length_mm);
-  EXPECT_EQ(setup.camera_mm, -device.camera->hole_position_mm.z());
+  EXPECT_EQ(setup.lens_mm, lens.focal_length_mm);
+  EXPECT_EQ(setup.camera_mm, -device.camera->position_mm.z());
   EXPECT_EQ(setup.pixel_pitch_um, device.camera->pixel_pitch_um);
-  EXPECT_EQ(setup.f_number, device.camera->f_number);
+  EXPECT_EQ(setup.f_number, lens.f_number);
 }
 
 TEST(MeasureTilt, FindsTheGainThatTheLensHas) {

@@ -9,9 +9,7 @@ namespace {
 
 sim::GelSpec dome() {
   sim::GelSpec gel;
-  gel.shape = sim::GelShape::dome;
-  gel.sphere_radius_mm = 30.0;
-  gel.base_radius_mm = 10.0;
+  gel.shape = sim::DomeSpec{.sphere_radius_mm = 30.0, .base_radius_mm = 10.0};
   gel.thickness_mm = 4.7;
   gel.youngs_modulus_MPa = 0.15;
   gel.poisson_ratio = 0.49;

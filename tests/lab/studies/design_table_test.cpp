@@ -91,7 +91,7 @@ TEST(DesignAt, ChangesTheNumbersAndNamesWhatTheDeviceRefuses) {
   const sim::DeviceSpec device = design_at(base, plan, {3, 2});
   EXPECT_EQ(device.gel.thickness_mm, 3.0);
   EXPECT_EQ(device.beads->spacing_mm, 2.0);
-  EXPECT_EQ(device.gel.size_x_mm, 20.0);
+  EXPECT_EQ(std::get<sim::SlabSpec>(device.gel.shape).size_x_mm, 20.0);
   EXPECT_THAT(message_of([&] {
                 design_at(base, plan, {3, -2});
               }),

@@ -261,7 +261,7 @@ TEST(PalpationSensing, BeadsAreSeenWhereTheDevicesPageSays) {
   EXPECT_NEAR(rest[10] - rest[8], 2.0 * 5.0 / apparent / 6.9e-3, 0.3);
   displacement(5, 2) = -0.5;
   EXPECT_GT(bead_pixels(device, displacement)[10], rest[10] + 0.5) << "nearer to the camera, further out";
-  device.camera->type = sim::CameraType::lens;
+  device.camera->optics = sim::LensSpec{};
   EXPECT_THAT(message_of([&] { bead_pixels(device, displacement); }), HasSubstr("palpation needs a pinhole"));
 }
 

@@ -125,7 +125,8 @@ TEST(VhsView, LooksStraightAtTheMiddleAndAsThePublishedScaleSays) {
 
 TEST(PinholeTransfer, OnTheAxisOfAThinFoilIsTheDiscs) {
   sim::DeviceSpec device = sim::read_scene(kScenes / "vhs/steel-rule.yaml").device;
-  device.camera->foil_thickness_um = 1e-3;
+  auto& pinhole = std::get<sim::PinholeSpec>(device.camera->optics);
+  pinhole.foil_thickness_um = 1e-3;
   const VhsView view(device, 0.0);
   PinholeOptics optics = optics_of(device);
   optics.pixel_mm = 0.0;
@@ -133,7 +134,7 @@ TEST(PinholeTransfer, OnTheAxisOfAThinFoilIsTheDiscs) {
     EXPECT_NEAR(transfer_at(device, view, {0, 0}, per_mm), transfer_of_disc(optics, per_mm), 5e-3) << per_mm;
   }
   // A foil narrows the hole off the axis along that direction, and fine lines across it are seen better.
-  device.camera->foil_thickness_um = 50.0;
+  pinhole.foil_thickness_um = 50.0;
   EXPECT_GT(transfer_at(device, view, {6, 0}, 1.8), transfer_at(device, view, {0, 0}, 1.8) + 0.05);
 }
 

@@ -48,7 +48,7 @@ TEST(BeadParallax, OtherDevicesAreRefused) {
   device.camera->look_at_mm.x() += 1.0;
   EXPECT_THAT(message_of([&] { bead_parallax(device); }), HasSubstr("straight"));
   device = vhs();
-  device.camera->type = sim::CameraType::lens;
+  device.camera->optics = sim::LensSpec{};
   EXPECT_THAT(message_of([&] { bead_parallax(device); }), HasSubstr("no pinhole"));
   device.beads.reset();
   EXPECT_THAT(message_of([&] { bead_parallax(device); }), HasSubstr("no beads"));

@@ -289,7 +289,7 @@ TEST(GrippedFace, WhatMakesNoSenseIsRefused) {
   expect_refused([&] { with([](P, S, O o) { o.shape.type = ShapeKind::box; }); }, "must be of the shape hexagon");
   expect_refused([&] { with([](P, S, O o) { o.print.emplace_back(); }); }, "has a print");
   DeviceSpec dome = device();
-  dome.gel.shape = GelShape::dome;
+  dome.gel.shape = DomeSpec{};
   expect_refused([&] { GrippedFace(dome, gel(), piece(), nullptr, {}); }, "a slab");
   expect_refused([] { level_rigid().at_travel(5.0); }, "more than the 6 N");
   expect_refused([] { level_rigid().at_normal_force(7.0); }, "from 0 to 6 N");

@@ -71,15 +71,16 @@ TEST(Plan, AnImageFromADeviceWithoutACameraIsRefused) {
 
 TEST(Plan, AnImageOfAGelThatIsNoSlabIsRefusedAndItsTruthIsnt) {
   SceneSpec scene = shipped("cycle.yaml");
-  for (const GelShape shape : {GelShape::dome, GelShape::fingertip, GelShape::mesh}) {
-    scene.device.gel.shape = shape;
+  GelSpec& gel = scene.device.gel;
+  for (const auto& shape : std::vector<decltype(gel.shape)>{DomeSpec{}, FingertipSpec{}, GelMeshSpec{}}) {
+    gel.shape = shape;
     scene.outputs = {};
     scene.outputs.frames = true;
     try {
       make_plan(scene);
       FAIL() << "no error";
     } catch (const Error& error) {
-      EXPECT_THAT(error.what(), HasSubstr(shape == GelShape::mesh ? "is a mesh" : "curved and has no coating"));
+      EXPECT_THAT(error.what(), HasSubstr(gel.mesh() ? "is a mesh" : "curved and has no coating"));
       EXPECT_GT(error.where().line, 0);
     }
     scene.outputs.frames = scene.outputs.ideal = scene.outputs.radiance = false;
@@ -91,7 +92,7 @@ TEST(Plan, FineReliefAndHeightsOfAGelThatIsNeitherFlatNorAGentleDomeAreRefused) 
   SceneSpec scene = shipped("cycle.yaml");
   scene.outputs = {};
   scene.outputs.frames = false;
-  scene.device.gel.shape = GelShape::fingertip;
+  scene.device.gel.shape = FingertipSpec{};
   scene.effects.fine_relief = Switch::on;
   EXPECT_THAT(test::message_of([&] { make_plan(scene); }),
               AllOf(HasSubstr("cycle.yaml:"), HasSubstr("fine relief is for flat and gently domed gels"),

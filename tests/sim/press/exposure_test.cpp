@@ -79,7 +79,7 @@ struct Moments {
 TEST(MotionBlur, IsLeftOutWhereTheHoleBlursMore) {
   SceneSpec scene = passing_bar();
   EXPECT_TRUE(make_plan(scene).motion_blur);
-  scene.device.camera->hole_diameter_um = 2000;
+  std::get<PinholeSpec>(scene.device.camera->optics).hole_diameter_um = 2000;
   EXPECT_FALSE(make_plan(scene).motion_blur);
   scene.effects.motion_blur = Switch::on;
   EXPECT_TRUE(make_plan(scene).motion_blur);
@@ -90,12 +90,12 @@ TEST(MotionBlur, IsLeftOutWhereTheHoleBlursMore) {
 TEST(MotionBlur, PointImagesAreAsWideAsHoleAndPixelMakeThem) {
   DeviceSpec device = passing_bar().device;
   device.gel.refractive_index = device.plate.refractive_index = 1.0;
-  device.camera->hole_position_mm = {0, 0, -20};
-  device.camera->hole_to_sensor_mm = 5;
-  device.camera->hole_diameter_um = 1e-6;
+  device.camera->position_mm = {0, 0, -20};
+  auto& pinhole = std::get<PinholeSpec>(device.camera->optics);
+  pinhole.hole_to_sensor_mm = 5;
+  pinhole.hole_diameter_um = 1e-6;
   EXPECT_NEAR(ImageScale(device).point_width(), 1.0, 1e-9);
-  device.camera->hole_diameter_um =
-      4 * device.camera->pixel_pitch_um / 1.25;  // the shadow of the hole is 1 + 5/20 wide
+  pinhole.hole_diameter_um = 4 * device.camera->pixel_pitch_um / 1.25;  // the shadow of the hole is 1 + 5/20 wide
   EXPECT_NEAR(ImageScale(device).point_width(), std::sqrt(13.0), 1e-9);
 }
 

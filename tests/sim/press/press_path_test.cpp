@@ -25,7 +25,7 @@ using ::touchstone::test::TemporaryFolder;
 DeviceSpec device() {
   DeviceSpec device;
   device.name = "small";
-  device.gel.size_x_mm = device.gel.size_y_mm = 8.0;
+  device.gel.shape = SlabSpec{.size_x_mm = 8.0, .size_y_mm = 8.0};
   device.gel.thickness_mm = 3.0;
   device.gel.youngs_modulus_MPa = 0.3;
   device.mesh.fine_mm = 1.4;

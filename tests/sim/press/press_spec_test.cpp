@@ -25,7 +25,7 @@ ObjectSpec ball(double radius_mm) {
 
 GelSpec slab() {
   GelSpec gel;
-  gel.size_x_mm = gel.size_y_mm = 20.0;
+  gel.shape = SlabSpec{.size_x_mm = 20.0, .size_y_mm = 20.0};
   gel.thickness_mm = 4.0;
   return gel;
 }
@@ -34,9 +34,7 @@ GelSpec slab() {
 TEST(PressSpec, FirstTouchIsExactForSpheres) {
   EXPECT_DOUBLE_EQ(first_touch({.place_mm = {1, 2}}, ball(3), slab()), 3.0);
   GelSpec dome;
-  dome.shape = GelShape::dome;
-  dome.sphere_radius_mm = 20.0;
-  dome.base_radius_mm = 8.0;
+  dome.shape = DomeSpec{.sphere_radius_mm = 20.0, .base_radius_mm = 8.0};
   EXPECT_NEAR(first_touch({.place_mm = {4, 3}}, ball(3), dome), std::sqrt(23.0 * 23.0 - 25.0) - 20.0, 1e-6);
 }
 

@@ -161,9 +161,7 @@ TEST(TouchHeight, IsThatOfClosedForms) {
   // Half of the ball beside the gel: what is over its edge touches at the ball's lowest line there.
   EXPECT_NEAR(first_touch(device().gel, fem::SphereShape{2.0}, {7, 0}, level), std::sqrt(3.0), 1e-3);
   GelSpec dome;
-  dome.shape = GelShape::dome;
-  dome.sphere_radius_mm = 20;
-  dome.base_radius_mm = 10;
+  dome.shape = DomeSpec{.sphere_radius_mm = 20, .base_radius_mm = 10};
   EXPECT_NEAR(first_touch(dome, fem::SphereShape{3}, {4, 3}, level), std::sqrt(23.0 * 23.0 - 25.0) - 20.0, 1e-6);
   EXPECT_THAT(test::message_of([&] {
                 first_touch(device().gel, fem::SphereShape{1}, {20, 0}, level);

@@ -92,9 +92,7 @@ TEST(ScatteredPrint, ATinyDiscHoldsWhatFits) {
 
 TEST(AlongSurface, KeepsAreasOfAFingertip) {
   GelSpec gel;
-  gel.shape = GelShape::fingertip;
-  gel.radius_mm = 8;
-  gel.length_mm = 10;
+  gel.shape = FingertipSpec{.radius_mm = 8, .length_mm = 10};
   // Area of the plane's disc is that of the surface above the point: of the cap, the hemisphere, and part of the side.
   for (const double angle : {0.2, 0.8, kPi / 2}) {
     const Eigen::Vector3d point(0, 8 * std::sin(angle), 8 * std::cos(angle) - 8);
@@ -109,7 +107,7 @@ TEST(AlongSurface, KeepsAreasOfAFingertip) {
   // Near the apex lengths are kept as well.
   EXPECT_NEAR((along_surface(gel, {0.1, 0.05, std::sqrt(64 - 0.0125) - 8}) - Eigen::Vector2d(0.1, 0.05)).norm(), 0.0,
               1e-5);
-  gel.shape = GelShape::slab;
+  gel.shape = SlabSpec{};
   EXPECT_EQ(along_surface(gel, {3, 4, 0}), Eigen::Vector2d(3, 4));
 }
 

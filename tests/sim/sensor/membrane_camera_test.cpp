@@ -177,7 +177,7 @@ std::string refusal(const Change& change) {
 TEST(MembraneCamera, RefusesWhatItCannotShow) {
   EXPECT_THAT(refusal([](DeviceSpec& d) { d.camera.reset(); }), HasSubstr("no camera"));
   EXPECT_THAT(refusal([](DeviceSpec& d) { d.camera->bayer = render::BayerPattern::rggb; }), HasSubstr("colours"));
-  EXPECT_THAT(refusal([](DeviceSpec& d) { d.gel.shape = GelShape::dome; }), HasSubstr("isn't a slab"));
+  EXPECT_THAT(refusal([](DeviceSpec& d) { d.gel.shape = DomeSpec{}; }), HasSubstr("isn't a slab"));
   EXPECT_THAT(refusal([](DeviceSpec& d) { d.lamps.emplace_back(); }), HasSubstr("has lamps"));
   EXPECT_THAT(refusal([](DeviceSpec& d) { d.coating.emplace(); }), HasSubstr("a coating, beads or films"));
   EXPECT_THAT(refusal([](DeviceSpec& d) { d.band_wavelengths_nm = {610, 540, 455}; }), HasSubstr("several bands"));

@@ -224,11 +224,11 @@ TEST(VirtualCamera, BeadsThatHardlyMoveAreTracedAgain) {
 TEST(VirtualCamera, ThePartialFrameAgreesWithTheWholeOneThroughALens) {
   Played p = play("  - {frames: 2, z: {force_N: 1}}\n");
   CameraSpec& camera = *p.scene.device.camera;
-  camera.type = CameraType::lens;
-  camera.focal_length_mm = 4.0;
-  camera.f_number = 8.0;
-  camera.focus_distance_mm = 16.0;
-  camera.distortion = {-0.1, 0.0, 0.001, 0.0};
+  auto& lens = camera.optics.emplace<LensSpec>();
+  lens.focal_length_mm = 4.0;
+  lens.f_number = 8.0;
+  lens.focus_distance_mm = 16.0;
+  lens.distortion = {-0.1, 0.0, 0.001, 0.0};
   camera.exposure_us = 20.0;
   expect_partial_frame_agrees(p, 2);
 }
@@ -310,12 +310,12 @@ TEST(VirtualCamera, SharedPathsAreRefusedWhereTheyDoNotHold) {
   };
   const std::string keys = "  - {frames: 2, z: {force_N: 1}}\n";
   EXPECT_THAT(message(small_scene(keys)), HasSubstr("effects.shared_paths: on, but the camera's hole makes points"));
-  SceneSpec lens = small_scene(keys);
-  lens.device.camera->type = CameraType::lens;
-  lens.device.camera->focal_length_mm = 4.0;
-  lens.device.camera->f_number = 8.0;
-  lens.device.camera->focus_distance_mm = 16.0;
-  EXPECT_THAT(message(lens), HasSubstr("through a lens"));
+  SceneSpec through_lens = small_scene(keys);
+  auto& lens = through_lens.device.camera->optics.emplace<LensSpec>();
+  lens.focal_length_mm = 4.0;
+  lens.f_number = 8.0;
+  lens.focus_distance_mm = 16.0;
+  EXPECT_THAT(message(through_lens), HasSubstr("through a lens"));
   EXPECT_EQ(message(play_behind_a_wide_hole(keys).scene), "no error");
 }
 

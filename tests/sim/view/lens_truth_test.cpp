@@ -45,9 +45,9 @@ TEST(LensTruth, AnUndistortedLensInThePinholesPlaceHasItsLayers) {
   DeviceSpec device = p.scene.device;
   const render::Camera hole = camera_of(*device.camera);
   make_lens(*device.camera);
-  device.camera->distortion.clear();
+  std::get<LensSpec>(device.camera->optics).distortion.clear();
   const double focal = 5.0 / 0.018;
-  device.camera->camera_matrix = Eigen::Vector4d(focal, focal, 79.5, 59.5);
+  std::get<LensSpec>(device.camera->optics).camera_matrix = Eigen::Vector4d(focal, focal, 79.5, 59.5);
   const render::Camera lens = camera_of(*device.camera);
 
   const auto by_hole = render::first_hits(seen.inside, render::make_ready(hole));
@@ -67,7 +67,7 @@ TEST(LensTruth, AnUndistortedLensInThePinholesPlaceHasItsLayers) {
 TEST(LensTruth, DepthOfAFlatGelBeforeATiltedLensIsThatOfTheBentRay) {
   const PlayedTruth& p = bare();
   DeviceSpec device = p.scene.device;
-  device.camera->hole_position_mm = {3.0, -2.0, -16.0};
+  device.camera->position_mm = {3.0, -2.0, -16.0};
   const render::LensCamera lens = lens_of(device);
   const SeenGeometry seen = seen_of(p, p.truths.front().press);
   const cv::Mat depth = channel(pixel_truth(seen, lens, all_layers()), "depth.Z");
@@ -138,7 +138,7 @@ TEST(LensTruth, WhatLiesBeyondTheDistortionsFoldHasNoFlow) {
   DeviceSpec device = p.scene.device;
   const cv::Mat folded = channel(pixel_truth(seen, lens_of(device), all_layers()), "flow.X");
   EXPECT_EQ(cv::countNonZero(folded == folded), 0) << "NaN is unlike itself";
-  device.camera->distortion.clear();
+  std::get<LensSpec>(device.camera->optics).distortion.clear();
   const cv::Mat plain = channel(pixel_truth(seen, lens_of(device), all_layers()), "flow.X");
   EXPECT_EQ(cv::countNonZero(plain < -200.0f), 160 * 120);
 }
@@ -175,10 +175,10 @@ TEST(LensTruth, ARolledCamerasLayersAreTurnedAsItsPictureIs) {
   const SeenGeometry seen = seen_of(p, p.truths.back().press);
   DeviceSpec device = p.scene.device;
   make_lens(*device.camera);
-  device.camera->distortion.clear();
+  std::get<LensSpec>(device.camera->optics).distortion.clear();
   device.camera->width = device.camera->height = 120;
   const double focal = 5.0 / 0.018;
-  device.camera->camera_matrix = Eigen::Vector4d(focal, focal, 59.5, 59.5);
+  std::get<LensSpec>(device.camera->optics).camera_matrix = Eigen::Vector4d(focal, focal, 59.5, 59.5);
   const LinearImage upright = pixel_truth(seen, camera_of(*device.camera), all_layers());
   device.camera->roll_deg = 90.0;
   const LinearImage rolled = pixel_truth(seen, camera_of(*device.camera), all_layers());

@@ -72,11 +72,11 @@ inline cv::Mat channel(const LinearImage& image, const std::string& name) {
 
 /// A lens of strong barrel distortion whose axis isn't the picture's middle, where the pinhole was.
 inline void make_lens(CameraSpec& camera) {
-  camera.type = CameraType::lens;
-  camera.camera_matrix = Eigen::Vector4d(281.0, 274.0, 83.0, 56.0);
-  camera.distortion = {-0.3, 0.0, 0.0, 0.0};
-  camera.f_number = 4.0;
-  camera.focus_distance_mm = 17.0;
+  auto& lens = camera.optics.emplace<LensSpec>();
+  lens.camera_matrix = Eigen::Vector4d(281.0, 274.0, 83.0, 56.0);
+  lens.distortion = {-0.3, 0.0, 0.0, 0.0};
+  lens.f_number = 4.0;
+  lens.focus_distance_mm = 17.0;
 }
 
 /// Where a point appears to a camera that looks straight up: the angle in air by bisection, on the sum of the layers'
@@ -84,7 +84,7 @@ inline void make_lens(CameraSpec& camera) {
 inline Eigen::Vector2d projected_by_bisection(const DeviceSpec& device, const Eigen::Vector3d& point) {
   const CameraSpec& camera = *device.camera;
   const double glass_low = -device.gel.thickness_mm - device.plate.thickness_mm;
-  const double air = glass_low - camera.hole_position_mm.z();
+  const double air = glass_low - camera.position_mm.z();
   const double r = point.head<2>().norm();
   double low = 0.0, high = 1.5;
   for (int i = 0; i < 200; ++i) {
@@ -96,12 +96,12 @@ inline Eigen::Vector2d projected_by_bisection(const DeviceSpec& device, const Ei
     (offset < r ? low : high) = angle;
   }
   const Eigen::Vector2d tangents = std::tan(low) / std::max(r, 1e-12) * point.head<2>();
-  if (camera.type == CameraType::lens) {
-    const Eigen::Vector4d& matrix = *camera.camera_matrix;  // whole numbers are OpenCV's pixel centres
-    const Eigen::Vector2d distorted = (1.0 + camera.distortion[0] * tangents.squaredNorm()) * tangents;
+  if (const auto* lens = std::get_if<LensSpec>(&camera.optics)) {
+    const Eigen::Vector4d& matrix = *lens->camera_matrix;  // whole numbers are OpenCV's pixel centres
+    const Eigen::Vector2d distorted = (1.0 + lens->distortion[0] * tangents.squaredNorm()) * tangents;
     return {matrix[0] * distorted.x() + matrix[2] + 0.5, matrix[1] * distorted.y() + matrix[3] + 0.5};
   }
-  const double scale = camera.hole_to_sensor_mm / (camera.pixel_pitch_um * 1e-3);
+  const double scale = std::get<PinholeSpec>(camera.optics).hole_to_sensor_mm / (camera.pixel_pitch_um * 1e-3);
   return {0.5 * camera.width + scale * tangents.x(), 0.5 * camera.height + scale * tangents.y()};
 }
 
