@@ -8,6 +8,7 @@
 #include <opencv2/core.hpp>
 #include <tuple>
 
+#include "sim/press/play_motion.h"
 #include "sim/sensor/event_picture.h"
 #include "sim/sensor/light_sequence.h"
 #include "tests/sim/press/moving_scene.h"
