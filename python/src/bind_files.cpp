@@ -2,6 +2,9 @@
 
 #include <tbb/global_control.h>
 
+#include <filesystem>
+#include <opencv2/core.hpp>
+
 #include "core/error.h"
 #include "core/field_error.h"
 #include "core/hdf5_file.h"
@@ -12,6 +15,8 @@
 
 namespace touchstone::python {
 namespace {
+
+constexpr int kMostThreads = 4096;  // as the command's --threads
 
 void set_error(const Error& error, const std::string& field) {
   const py::object type = py::module_::import("touchstone._errors").attr("Error");
@@ -59,7 +64,12 @@ py::dict dict_of(const datasets::GenerateReport& report) {
 
 py::dict generate(const std::string& job, const std::string& out, int threads, bool timings, const std::string& cache,
                   const std::string& shard, const py::object& progress) {
-  if (threads < 0) fail("threads: {} is not allowed; allowed is at least 0 (0: as many as the machine has)", threads);
+  if (threads < 0 || threads > kMostThreads) {
+    fail("threads: {} is not allowed; allowed is from 0 to {} (0: as many as the machine has)", threads, kMostThreads);
+  }
+  checked_path(job, "job");
+  checked_path(out, "out");
+  checked_path(cache, "cache");
   const Progress listener = progress_to(progress);
   datasets::GenerateOptions how =
       datasets::simulated(cache.empty() ? sim::default_cache_folder() : std::filesystem::path(cache));
@@ -70,6 +80,8 @@ py::dict generate(const std::string& job, const std::string& out, int threads, b
 }
 
 py::dict merge(const std::string& job, const std::string& out, const py::object& progress) {
+  checked_path(job, "job");
+  checked_path(out, "out");
   const Progress listener = progress_to(progress);
   return dict_of(unlocked([&] { return datasets::merge(job, out, listener); }));
 }
@@ -84,6 +96,14 @@ void bind_errors(py::module_&) {
       set_error(error, error.field());
     } catch (const Error& error) {
       set_error(error, "");
+    } catch (const std::filesystem::filesystem_error& error) {
+      set_error(Error(fmt::format("{}: {}", error.path1().string(), error.code().message())), "");
+    } catch (const cv::Exception& error) {
+      if (error.code == cv::Error::StsNoMem) {
+        PyErr_SetString(PyExc_MemoryError, error.err.c_str());
+      } else {
+        set_error(Error(fmt::format("OpenCV refuses it: {}", error.err)), "");
+      }
     }
   });
   set_hdf5_guard([]() -> std::shared_ptr<void> { return std::make_shared<Hdf5Lock>(); });
@@ -94,11 +114,16 @@ void bind_files(py::module_& module) {
       "scenes_folder", [] { return datasets::scenes_folder().string(); },
       "Where the shipped devices, objects and scenes lie.");
   module.def(
-      "read_image", [](const std::string& path) { return array_of(unlocked([&] { return sim::read_image(path); })); },
+      "read_image",
+      [](const std::string& path) {
+        checked_path(path, "path");
+        return array_of(unlocked([&] { return sim::read_image(path); }));
+      },
       py::arg("path"), "Reads a picture as it is stored: uint8 or uint16, grey or BGR.");
   module.def(
       "write_png",
       [](const std::string& path, const py::object& image) {
+        checked_path(path, "path");
         const Picture picture = picture_from(image, "image");
         unlocked([&] { sim::write_png(path, picture.mat); });
       },

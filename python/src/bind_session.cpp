@@ -111,7 +111,7 @@ void bind_session(py::module_& module) {
       .def(
           "look",
           [](Session& self, std::uint64_t noise_seed, std::optional<int> frame, bool picture, bool truth) {
-            return self.look({picture, truth, noise_seed, frame.value_or(0)}, !frame);
+            return self.look({picture, truth, noise_seed, checked_frame(frame.value_or(0))}, !frame);
           },
           py::kw_only(), py::arg("noise_seed") = 0, py::arg("frame") = py::none(), py::arg("picture") = true,
           py::arg("truth") = true,
