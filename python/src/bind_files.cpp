@@ -18,12 +18,18 @@ namespace {
 
 constexpr int kMostThreads = 4096;  // as the command's --threads
 
+/// A message may name a file whose name isn't UTF-8.
+py::object text_or_none(const std::string& text) {
+  if (text.empty()) return py::none();
+  const auto size = static_cast<py::ssize_t>(text.size());
+  return py::reinterpret_steal<py::object>(PyUnicode_DecodeUTF8(text.data(), size, "backslashreplace"));
+}
+
 void set_error(const Error& error, const std::string& field) {
   const py::object type = py::module_::import("touchstone._errors").attr("Error");
   const SourceLocation& where = error.where();
-  const py::object instance = type(error.what(), where.file.empty() ? py::object(py::none()) : py::str(where.file),
-                                   where.line <= 0 ? py::object(py::none()) : py::int_(where.line),
-                                   field.empty() ? py::object(py::none()) : py::str(field));
+  const py::object line = where.line <= 0 ? py::object(py::none()) : py::int_(where.line);
+  const py::object instance = type(text_or_none(error.what()), text_or_none(where.file), line, text_or_none(field));
   PyErr_SetObject(type.ptr(), instance.ptr());
 }
 

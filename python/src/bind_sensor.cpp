@@ -57,8 +57,13 @@ Spec spec_from(const py::handle& value, const char* folder) {
     return parse_yaml<Spec>(json_of(value), "dict");
   }
   const py::module_ os = py::module_::import("os");
-  const py::object path = os.attr("fsencode")(os.attr("fspath")(value));
-  return read_yaml<Spec>(named_file(path.cast<std::string>(), folder));
+  const py::object path = os.attr("fspath")(value);
+  try {
+    return read_yaml<Spec>(named_file(os.attr("fsencode")(path).cast<std::string>(), folder));
+  } catch (const py::error_already_set& error) {
+    if (!error.matches(PyExc_UnicodeError)) throw;
+    fail("{}: can't be a path", std::string(py::str(py::module_::import("builtins").attr("ascii")(path))));
+  }
 }
 
 std::shared_ptr<Sensor> make_sensor(const py::object& device, std::uint64_t unit, double deepest_mm, double widest_mm,
