@@ -321,8 +321,9 @@ std::optional<PressSnapshot> Press::Parts::walk(const Path& path, int halvings, 
     }
     const double wanted = std::ceil(motion.norm() / tolerance.largest_motion - 1e-9);
     if (wanted > kMostParts) {
-      fail("the object goes {:.4g} mm in a step, in parts of {:.4g} mm: allowed are {} parts a step; take shorter steps",
-           motion.norm(), tolerance.largest_motion, kMostParts);
+      fail(
+          "the object goes {:.4g} mm in a step, in parts of {:.4g} mm: allowed are {} parts a step; take shorter steps",
+          motion.norm(), tolerance.largest_motion, kMostParts);
     }
     parts = std::max(parts, static_cast<int>(wanted));
   }
