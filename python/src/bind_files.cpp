@@ -68,13 +68,17 @@ py::dict dict_of(const datasets::GenerateReport& report) {
   return result;
 }
 
+void check_job_and_out(const std::string& job, const std::string& out) {
+  checked_path(job, "job");
+  if (checked_path(out, "out").empty()) fail("out: '' names no folder");
+}
+
 py::dict generate(const std::string& job, const std::string& out, int threads, bool timings, const std::string& cache,
                   const std::string& shard, const py::object& progress) {
   if (threads < 0 || threads > kMostThreads) {
     fail("threads: {} is not allowed; allowed is from 0 to {} (0: as many as the machine has)", threads, kMostThreads);
   }
-  checked_path(job, "job");
-  checked_path(out, "out");
+  check_job_and_out(job, out);
   checked_path(cache, "cache");
   const Progress listener = progress_to(progress);
   datasets::GenerateOptions how =
@@ -86,8 +90,7 @@ py::dict generate(const std::string& job, const std::string& out, int threads, b
 }
 
 py::dict merge(const std::string& job, const std::string& out, const py::object& progress) {
-  checked_path(job, "job");
-  checked_path(out, "out");
+  check_job_and_out(job, out);
   const Progress listener = progress_to(progress);
   return dict_of(unlocked([&] { return datasets::merge(job, out, listener); }));
 }

@@ -34,8 +34,9 @@ def assert_close(estimate, truth, *, allowed, error_bar=0.0, sigmas=2.0, unit=""
     import numpy
     try:
         got, true, bar = (numpy.asarray(value, dtype=float) for value in (estimate, truth, error_bar))
+        allowed, sigmas = float(allowed), float(sigmas)
     except (ValueError, OverflowError) as error:
-        raise Error(f"{what}: numbers are needed as estimate, truth and error_bar ({error})") from None
+        raise Error(f"{what}: numbers are needed ({error})") from None
     if got.shape != true.shape:
         raise Error(f"{what}: the estimate has shape {got.shape}, the truth {true.shape}")
     try:

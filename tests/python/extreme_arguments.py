@@ -1,9 +1,10 @@
 """The whole public API, an argument at a time given extreme values: what test_extreme_arguments.py runs, in children.
 
-    python3 extreme_arguments.py NAME FOLDER [FIRST]
+    python3 extreme_arguments.py NAME FOLDER SHARED [FIRST]
 
 makes all calls of one public name, from number FIRST on, and writes a line of JSON before each and after each. A call
-may succeed or raise what its entry allows; whether it ends at all is for the parent to see.
+may succeed or raise what its entry allows; whether it ends at all is for the parent to see. In FOLDER it may write what
+it likes; data sets are made once in SHARED.
 """
 
 import inspect
@@ -14,6 +15,7 @@ import os
 import pathlib
 import resource
 import sys
+import types
 import warnings
 
 import numpy as np
@@ -56,6 +58,12 @@ def paths(valid):
             "missing/x", "folder", "folder/", f"{valid}/x", "~", "%s{}", pathlib.Path("x"), b"x\xff", 0, NAN, *STRANGE]
 
 
+def bad_paths(valid):
+    """Where a new folder would take its time."""
+    return ["", "\0", f"{valid}\0", "\ud800", "x" * 5000, "x" * 300, "folder/../../x" * 400, f"{valid}/dataset.json/x",
+            b"x\xff" * 999, 0, NAN, *(value for value in STRANGE if value not in ("x", b"x"))]
+
+
 def arrays(valid):
     """In place of an array of numbers."""
     valid = np.asarray(valid, float)
@@ -73,6 +81,18 @@ def arrays(valid):
         one.flat[-1] = number
         values.append(one)
     return values + STRANGE
+
+
+def poses(valid):
+    """In place of a pose: its translation is changed, too, which leaves the rotation one."""
+    values = arrays(valid)
+    for number in (0, -1, 0.01, 10, -10, 900, 1e4, -1e4, 1e5, 1e6, 2.0**31, 2.0**32, 1e9, 1e20, 1e150, 1e160, 1e300, -1e300,
+                   1e308, 1e-300):
+        for axis in range(3):
+            values.append(valid.copy())
+            values[-1][axis, 3] = number
+            values.append(values[-1][:3])
+    return [*values, -valid, valid[:, [1, 0, 2, 3]], valid * (1 + 1e-7)]
 
 
 def pictures(valid):
@@ -188,7 +208,7 @@ QUICK = {"name": "quick", "gel": {"size_x_mm": 12, "size_y_mm": 12, "thickness_m
 SHAPES = [
     {"type": "sphere", "radius_mm": 2}, {"type": "rounded_cylinder", "radius_mm": 2, "height_mm": 5, "edge_radius_mm": 1},
     {"type": "box", "size_mm": [2, 2, 2]}, {"type": "egg", "radius_mm": 2, "blunt_mm": 2, "sharp_mm": 3},
-    {"type": "shell", "axes_mm": [2, 2], "thickness_mm": 0.5, "curvature_per_mm": 0.01},
+    {"type": "shell", "axes_mm": [2, 2], "thickness_mm": 0.5, "curvature_per_mm": [0.01, 0.02]},
     {"type": "hexagon", "across_flats_mm": 2, "length_mm": 4}, {"type": "mesh", "file": "x.glb"}]
 REST = np.array([(160 + 60 * i, 120 + 60 * j) for j in (-1, 0, 1) for i in (-1, 0, 1)], float)
 JOB = """
@@ -243,10 +263,10 @@ def markers_picture(shift=(0.0, 0.0), side=16.0, spacing=40.0, grid=4):
 
 
 class Things:
-    """What is made once a child, when it's first asked for."""
+    """What is made once a child, when it's first asked for; data sets once for all of them, in the folder `shared`."""
 
-    def __init__(self, folder):
-        self.folder = pathlib.Path(folder)
+    def __init__(self, folder, shared="."):
+        self.folder, self.shared = pathlib.Path(folder), pathlib.Path(shared).resolve()
 
     def __getattr__(self, name):
         value = getattr(type(self), "make_" + name)(self)
@@ -342,21 +362,25 @@ class Things:
         ts.write_png("ok.png", markers_picture())
         return "ok.png"
 
+    def job_file(self, name, text):
+        file = self.shared / name
+        if not file.exists():
+            file.write_text(text.format(examples=EXAMPLES))
+        return str(file)
+
     def make_job(self):
-        pathlib.Path("job.yaml").write_text(JOB.format(examples=EXAMPLES))
-        return "job.yaml"
+        return self.job_file("job.yaml", JOB)
 
     def make_draw(self):
-        pathlib.Path("draw.yaml").write_text(DRAW.format(examples=EXAMPLES))
-        return "draw.yaml"
+        return self.job_file("draw.yaml", DRAW)
 
     def make_scene_set(self):
-        ts.generate(self.job, "set")
-        return "set"
+        ts.generate(self.job, self.shared / "set")
+        return str(self.shared / "set")
 
     def make_drawn_set(self):
-        ts.generate(self.draw, "drawn")
-        return "drawn"
+        ts.generate(self.draw, self.shared / "drawn")
+        return str(self.shared / "drawn")
 
     def hue_lists(self, valid):
         """Of samples for calibrate_hue: the last of them changed in each of its parts."""
@@ -440,13 +464,13 @@ def table(t):
                   frame=frame, look=(True, flags), truth=(True, flags)),
             press(force_N=(0.3, numbers), shear_N=((0.01, 0.0), arrays), look=(False, only())),
             press(depth_mm=(0.2, only()), shear_mm=((0.05, 0.0), arrays), look=(False, only())),
-            press(pose=(t.pose, arrays)),
+            press(pose=(t.pose, poses)),
             Call(lambda: t.sensor.press, {"object": touched, "depth_mm": (0.1, only()), "look": (False, only())})],
         "Session": lambda: [Call(lambda: ts.Session, {
             "sensor": (t.sensor, only(*STRANGE)), "object": touched, "largest_step_mm": (5.0, numbers),
             "largest_part_mm": (0.1, numbers)},
             after=lambda session: [session.step(pose, 0.01) for pose in (t.pose[:3], t.pose[:3] - down)])],
-        "Session.step": lambda: [Call(lambda: t.session(pressed).step, {"pose": (t.pose, arrays), "dt_s": (0.01, numbers)})
+        "Session.step": lambda: [Call(lambda pressed=pressed: t.session(pressed).step, {"pose": (t.pose, poses), "dt_s": (0.01, numbers)})
                                  for pressed in (True, False)],
         "Session.look": lambda: [Call(lambda: t.session().look, {
             "noise_seed": seed, "frame": (0, numbers), "picture": (True, flags), "truth": (True, flags)})],
@@ -456,7 +480,7 @@ def table(t):
         "HeightEstimator": lambda: [Call(lambda: ts.HeightEstimator, {
             "model": (t.height_model, only(*STRANGE)), "border": ("free", texts)})],
         "HeightEstimator.estimate": lambda: [
-            Call(lambda: ts.HeightEstimator(t.height_model, border=border).estimate, {"frame": (t.touch.frame, pictures)})
+            Call(lambda border=border: ts.HeightEstimator(t.height_model, border=border).estimate, {"frame": (t.touch.frame, pictures)})
             for border in ("zero", "free")],
         "calibrate_height": lambda: [Call(lambda: ts.calibrate_height, {
             "frames": (t.heights[0][0], lists_of(pictures)), "ball_diameters_mm": (t.heights[0][1], lists_of(numbers)),
@@ -496,7 +520,7 @@ def table(t):
             "form": ("isotropic", texts)}),
             Call(lambda: ts.calibrate_hue, {
                 "rest": (t.reader.rest, only()), "spacing_mm": (3.0, only()), "form": ("best", only()),
-                "samples": (t.hue_samples[:40], only([(t.large_reading, 24, (0, 0, 0), -1), *t.hue_samples[:40]]))})],
+                "samples": (t.hue_samples[::5], only([(t.large_reading, 24, (0, 0, 0), -1), *t.hue_samples[::5]]))})],
         "HueEstimator": lambda: [Call(lambda: ts.HueEstimator, {
             "model": (t.hue_model, only(*STRANGE)),
             "rest": (t.reader.rest, only(t.small_reading, t.large_reading, *STRANGE))})],
@@ -507,7 +531,7 @@ def table(t):
                               for image in (markers_picture(), beads_picture())],
         "scenes_folder": lambda: [Call(lambda: ts.scenes_folder)],
         "generate": lambda: [Call(lambda: ts.generate, {
-            "job": (t.job, paths), "out": (t.scene_set, paths), "threads": (1, numbers), "timings": (True, flags),
+            "job": (t.job, paths), "out": (t.scene_set, bad_paths), "threads": (1, numbers), "timings": (True, flags),
             "cache": (None, paths), "shard": (None, texts_of_shards), "progress": (None, callbacks)},
             allowed=(KeyError,)),
             Call(lambda: ts.generate, {"job": (t.draw, only()), "out": (t.drawn_set, only()),
@@ -556,7 +580,7 @@ def public_names():
     """All that users can call: functions, constructors, methods (those written out with __, too, where Python's own)."""
     def of_class(prefix, cls):
         own = vars(cls)
-        if "__init__" in own:
+        if not isinstance(own.get("__init__"), (type(None), types.WrapperDescriptorType)):  # that of what isn't made
             yield prefix
         for name, member in own.items():
             if isinstance(member, property) or not (inspect.isroutine(member) or isinstance(member, staticmethod)):
@@ -580,6 +604,11 @@ def shown(value):
     if isinstance(value, np.ndarray):
         few = value.ravel()[:3].tolist() if value.size <= 100 else "..."
         return f"array {few} of {value.dtype}, shape {value.shape}"
+    if isinstance(value, ts.ColourMarkerReading):
+        return "reading of {} x {}".format(*value.grid)
+    if isinstance(value, (list, tuple)) and value:
+        few = [shown(item) for item in (value if len(value) <= 4 else (value[0], value[-1]))]
+        return f"[{', '.join(few)}]" if len(value) <= 4 else f"[{few[0]}, ..., {few[1]}] of {len(value)}"
     try:
         text = repr(value)
     except RecursionError:
@@ -601,16 +630,17 @@ def read_all(value):
 
 
 def main():
-    name, folder = sys.argv[1:3]
-    first = int(sys.argv[3]) if len(sys.argv) > 3 else 0
+    name, folder, shared = sys.argv[1:4]
+    first = int(sys.argv[4]) if len(sys.argv) > 4 else 0
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     warnings.simplefilter("ignore")
     os.makedirs(folder, exist_ok=True)
+    shared = os.path.abspath(shared)
     os.chdir(folder)
     os.makedirs("folder", exist_ok=True)
     out = os.fdopen(os.dup(1), "w")
-    things = Things(folder)
+    things = Things(folder, shared)
 
     def tell(**what):
         out.write(json.dumps(what) + "\n")

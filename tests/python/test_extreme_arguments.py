@@ -42,11 +42,11 @@ def lines_of(child):
             yield from (json.loads(line) for line in whole)
 
 
-def faults_of(name, folder):
+def faults_of(name, folder, shared):
     faults, first, done, calls = [], 0, False, 0
     while not done:
         with open(folder / "stderr", "wb") as stderr, subprocess.Popen(
-                [sys.executable, str(CHILD), name, str(folder / "work"), str(first)], stdout=subprocess.PIPE,
+                [sys.executable, str(CHILD), name, str(folder / "work"), str(shared), str(first)], stdout=subprocess.PIPE,
                 stderr=stderr) as child:
             now, hangs = None, False
             for line in lines_of(child):
@@ -71,8 +71,13 @@ def faults_of(name, folder):
     return faults, calls
 
 
+@pytest.fixture(scope="module")
+def shared(tmp_path_factory):
+    return tmp_path_factory.mktemp("shared")
+
+
 @pytest.mark.parametrize("name", NAMES)
-def test_extreme_arguments_are_refused(name, tmp_path):
-    faults, calls = faults_of(name, tmp_path)
+def test_extreme_arguments_are_refused(name, tmp_path, shared):
+    faults, calls = faults_of(name, tmp_path, shared)
     assert not faults, "\n".join(faults)
     assert calls > 0
