@@ -187,12 +187,11 @@ void bind_chroma(py::module_& module) {
       .def_static(
           "load",
           [](const std::string& path) {
-            return std::make_shared<HueModel>(sensors::load_hue_model(checked_path(path, "path")));
+            return std::make_shared<HueModel>(sensors::load_hue_model(needed_path(path, "path")));
           },
           py::arg("path"), "Reads a model file.")
       .def(
-          "save",
-          [](const HueModel& self, const std::string& path) { sensors::save(self, checked_path(path, "path")); },
+          "save", [](const HueModel& self, const std::string& path) { sensors::save(self, needed_path(path, "path")); },
           py::arg("path"), "Writes it, whole or not at all.")
       .def_readonly("spacing_mm", &HueModel::spacing_mm, "Of the grid.")
       .def_readonly("samples", &HueModel::samples, "It was calibrated on.")

@@ -69,8 +69,8 @@ py::dict dict_of(const datasets::GenerateReport& report) {
 }
 
 void check_job_and_out(const std::string& job, const std::string& out) {
-  checked_path(job, "job");
-  if (checked_path(out, "out").empty()) fail("out: '' names no folder");
+  needed_path(job, "job");
+  needed_path(out, "out");
 }
 
 py::dict generate(const std::string& job, const std::string& out, int threads, bool timings, const std::string& cache,
@@ -125,14 +125,14 @@ void bind_files(py::module_& module) {
   module.def(
       "read_image",
       [](const std::string& path) {
-        checked_path(path, "path");
+        needed_path(path, "path");
         return array_of(unlocked([&] { return sim::read_image(path); }));
       },
       py::arg("path"), "Reads a picture as it is stored: uint8 or uint16, grey or BGR.");
   module.def(
       "write_png",
       [](const std::string& path, const py::object& image) {
-        checked_path(path, "path");
+        needed_path(path, "path");
         const Picture picture = picture_from(image, "image");
         unlocked([&] { sim::write_png(path, picture.mat); });
       },

@@ -16,6 +16,7 @@ namespace {
 using sensors::HeightModel;
 using Heights = Guarded<sensors::HeightEstimator>;
 
+constexpr double kLargestPlace_px = 1e6;
 const Allowed kScales = Allowed::within(1e-4, 10.0);            // of a pixel, mm; as the command's --mm-per-px
 const Allowed kBallDiameters = Allowed::above_up_to(0.0, 1e4);  // mm; an object's radius may be as much
 
@@ -53,6 +54,10 @@ py::tuple calibrate_height(const py::object& frames, const py::object& ball_diam
     const py::object circle = outlines[i];
     if (circle.is_none()) continue;
     const Eigen::Vector3d numbers = vector3_from(circle, "circles");
+    if (!(numbers.cwiseAbs().maxCoeff() <= kLargestPlace_px)) {
+      fail("circles: number {} of it is ({:g}, {:g}, {:g}) px; allowed is up to {} each", i, numbers.x(), numbers.y(),
+           numbers.z(), kLargestPlace_px);
+    }
     known[i] = sensors::ContactCircle{numbers.head<2>(), numbers.z()};
   }
   sensors::HeightCalibrationSettings settings;
@@ -116,12 +121,12 @@ void bind_gelsight(py::module_& module) {
       .def_static(
           "load",
           [](const std::string& path) {
-            return std::make_shared<HeightModel>(sensors::load_height_model(checked_path(path, "path")));
+            return std::make_shared<HeightModel>(sensors::load_height_model(needed_path(path, "path")));
           },
           py::arg("path"), "Reads a model file.")
       .def(
           "save",
-          [](const HeightModel& self, const std::string& path) { sensors::save(self, checked_path(path, "path")); },
+          [](const HeightModel& self, const std::string& path) { sensors::save(self, needed_path(path, "path")); },
           py::arg("path"), "Writes it, whole or not at all.")
       .def_readonly("mm_per_px", &HeightModel::mm_per_px, "Of the membrane.")
       .def_readonly("presses", &HeightModel::presses, "That it was made of.")

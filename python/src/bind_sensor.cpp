@@ -341,7 +341,13 @@ void bind_sensor(py::module_& module) {
           "gel_from_pixel",
           [](const Sensor& self, const py::object& pixel) {
             const Eigen::Vector2d at = vector2_from(pixel, "pixel");
-            return small_array(unlocked([&] { return self.virtual_sensor().gel_from_pixel(at); }));
+            return small_array(unlocked([&] {
+              try {
+                return self.virtual_sensor().gel_from_pixel(at);
+              } catch (const Error& error) {
+                fail("pixel: ({:g}, {:g}) has no place on the gel: {}", at.x(), at.y(), error.what());
+              }
+            }));
           },
           py::arg("pixel"),
           "Where on the undeformed membrane a point of the picture lies (mm); pixel centres are at + 0.5.")

@@ -120,13 +120,13 @@ void bind_vhs(py::module_& module) {
       .def_static(
           "load",
           [](const std::string& path) {
-            return std::make_shared<StiffnessForceModel>(sensors::load_stiffness_model(checked_path(path, "path")));
+            return std::make_shared<StiffnessForceModel>(sensors::load_stiffness_model(needed_path(path, "path")));
           },
           py::arg("path"), "Reads a model file.")
       .def(
           "save",
           [](const StiffnessForceModel& self, const std::string& path) {
-            sensors::save(self, checked_path(path, "path"));
+            sensors::save(self, needed_path(path, "path"));
           },
           py::arg("path"), "Writes it, whole or not at all.")
       .def_readonly("grid", &StiffnessForceModel::grid, "Beads a side.")

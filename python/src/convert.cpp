@@ -256,6 +256,11 @@ const std::string& checked_path(const std::string& path, const char* what) {
   return path;
 }
 
+const std::string& needed_path(const std::string& path, const char* what) {
+  if (path.empty()) fail("{}: '' is no path", what);
+  return checked_path(path, what);
+}
+
 int checked_frame(int frame) {
   if (frame < 0) fail("frame: {} is not allowed; allowed is at least 0", frame);
   return frame;

@@ -98,6 +98,8 @@ py::sequence sequence_from(const py::handle& value, const char* what);
 void for_each_item(const py::handle& value, const char* what, const std::function<void(const py::object&)>& use);
 /// A path ends at a zero byte, so that another file would be taken. @throws Error naming `what`
 const std::string& checked_path(const std::string& path, const char* what);
+/// The same of a path that must not be empty.
+const std::string& needed_path(const std::string& path, const char* what);
 /// That chooses the noise. @throws Error
 int checked_frame(int frame);
 

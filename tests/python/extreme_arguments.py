@@ -159,6 +159,14 @@ def with_leaf(value, way, leaf):
     return copy
 
 
+class ChangedDict(dict):
+    """A dict that knows where it was changed."""
+
+    def __init__(self, valid, way, leaf):
+        super().__init__(with_leaf(valid, way, leaf))
+        self.change = f"{'.'.join(str(step) for step in way)} = {leaf!r}"
+
+
 def changed_fields(valid, among=None):
     """The dict with each field in turn changed; `among`: only fields below these."""
     values = []
@@ -167,7 +175,7 @@ def changed_fields(valid, among=None):
             continue
         number = isinstance(leaf, (int, float)) and not isinstance(leaf, bool)
         others = [0, -1, 1e300, 1e-300, NAN, 2**63, "x", None, []] if number else [None, 0, "x", [], {}]
-        values += [with_leaf(valid, way, other) for other in others]
+        values += [ChangedDict(valid, way, other) for other in others]
     return values
 
 
@@ -201,7 +209,7 @@ QUICK = {"name": "quick", "gel": {"size_x_mm": 12, "size_y_mm": 12, "thickness_m
          "mesh": {"fine_mm": 0.5, "coarse_mm": 2, "fine_half_extent_mm": [3, 2.5], "fine_depth_mm": 1},
          "plate": {"thickness_mm": 3, "refractive_index": 1.49}, "coating": {"type": "matt", "albedo": 0.4},
          "lamps": [{"type": "led", "position_mm": [-8, -7, -5.8], "target_mm": [0, 0, 0], "viewing_angle_deg": 120,
-                    "power_W": [0.02, 0, 0]}],
+                    "power_W": [0.02, 0.02, 0.02]}],
          "camera": {"type": "lens", "width": 80, "height": 60, "pixel_pitch_um": 22, "focal_length_mm": 3, "f_number": 4,
                     "focus_distance_mm": 17, "lens_position_mm": [0, 0, -19], "look_at_mm": [0, 0, 0], "exposure_us": 55,
                     "full_well_e": 12000, "read_noise_e": 8, "bayer": "rggb"}}  # quick-sensor.yaml with one lamp
@@ -604,6 +612,8 @@ def shown(value):
     if isinstance(value, np.ndarray):
         few = value.ravel()[:3].tolist() if value.size <= 100 else "..."
         return f"array {few} of {value.dtype}, shape {value.shape}"
+    if isinstance(value, ChangedDict):
+        return f"dict with {value.change}"
     if isinstance(value, ts.ColourMarkerReading):
         return "reading of {} x {}".format(*value.grid)
     if isinstance(value, (list, tuple)) and value:
