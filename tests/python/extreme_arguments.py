@@ -86,8 +86,8 @@ def arrays(valid):
 def poses(valid):
     """In place of a pose: its translation is changed, too, which leaves the rotation one."""
     values = arrays(valid)
-    for number in (0, -1, 0.01, 10, -10, 900, 1e4, -1e4, 1e5, 1e6, 2.0**31, 2.0**32, 1e9, 1e20, 1e150, 1e160, 1e300, -1e300,
-                   1e308, 1e-300):
+    for number in (0, -1, 0.01, 10, -10, 900, 1e4, -1e4, 1e5, 1e6, 2.0**31, 2.0**32, 1e9, 1e20, 1e150, 1e160, 1e300,
+                   -1e300, 1e308, 1e-300):
         for axis in range(3):
             values.append(valid.copy())
             values[-1][axis, 3] = number
@@ -189,7 +189,8 @@ def descriptions(valid):
         less_deep = {"a": less_deep}
     ring = {"name": "ring"}
     ring["shape"] = ring
-    values = [{}, deep, less_deep, ring, {"name": "\ud800"}, {1: 2}, {(1, 2): 3}, {None: None}, {**valid, "x" * 5000: 1},
+    values = [{}, deep, less_deep, ring, {"name": "\ud800"}, {1: 2}, {(1, 2): 3}, {None: None},
+              {**valid, "x" * 5000: 1},
               {**valid, "name": "\U0001f600 \0 \x85 '%{}"}, {**valid, "name": np.float64(1)}, {"name": object()}]
     return values + changed_fields(valid)
 
@@ -210,11 +211,13 @@ QUICK = {"name": "quick", "gel": {"size_x_mm": 12, "size_y_mm": 12, "thickness_m
          "plate": {"thickness_mm": 3, "refractive_index": 1.49}, "coating": {"type": "matt", "albedo": 0.4},
          "lamps": [{"type": "led", "position_mm": [-8, -7, -5.8], "target_mm": [0, 0, 0], "viewing_angle_deg": 120,
                     "power_W": [0.02, 0.02, 0.02]}],
-         "camera": {"type": "lens", "width": 80, "height": 60, "pixel_pitch_um": 22, "focal_length_mm": 3, "f_number": 4,
-                    "focus_distance_mm": 17, "lens_position_mm": [0, 0, -19], "look_at_mm": [0, 0, 0], "exposure_us": 55,
-                    "full_well_e": 12000, "read_noise_e": 8, "bayer": "rggb"}}  # quick-sensor.yaml with one lamp
+         "camera": {"type": "lens", "width": 80, "height": 60, "pixel_pitch_um": 22, "focal_length_mm": 3,
+                    "f_number": 4, "focus_distance_mm": 17, "lens_position_mm": [0, 0, -19], "look_at_mm": [0, 0, 0],
+                    "exposure_us": 55, "full_well_e": 12000,
+                    "read_noise_e": 8, "bayer": "rggb"}}  # quick-sensor.yaml with one lamp
 SHAPES = [
-    {"type": "sphere", "radius_mm": 2}, {"type": "rounded_cylinder", "radius_mm": 2, "height_mm": 5, "edge_radius_mm": 1},
+    {"type": "sphere", "radius_mm": 2},
+    {"type": "rounded_cylinder", "radius_mm": 2, "height_mm": 5, "edge_radius_mm": 1},
     {"type": "box", "size_mm": [2, 2, 2]}, {"type": "egg", "radius_mm": 2, "blunt_mm": 2, "sharp_mm": 3},
     {"type": "shell", "axes_mm": [2, 2], "thickness_mm": 0.5, "curvature_per_mm": [0.01, 0.02]},
     {"type": "hexagon", "across_flats_mm": 2, "length_mm": 4}, {"type": "mesh", "file": "x.glb"}]
@@ -393,7 +396,8 @@ class Things:
     def hue_lists(self, valid):
         """Of samples for calibrate_hue: the last of them changed in each of its parts."""
         reading, marker, displacement, series = valid[-1]
-        changed = [(other, marker, displacement, series) for other in (self.small_reading, self.large_reading, *STRANGE)]
+        changed = [(other, marker, displacement, series)
+                   for other in (self.small_reading, self.large_reading, *STRANGE)]
         changed += [(reading, other, displacement, series) for other in (-1, 15, 16, *numbers(0))]
         changed += [(reading, marker, other, series) for other in arrays(displacement)]
         changed += [(reading, marker, displacement, other) for other in numbers(0)]
@@ -454,11 +458,12 @@ def table(t):
         "Error": lambda: [Call(lambda: ts.Error, {"message": ("x", texts), "file": ("x", texts), "line": (1, numbers),
                                                   "field": ("x", texts)})],
         "Object": lambda: [Call(lambda: ts.Object, {"of": (BALL, described)}, after=pressed_gently),
-                           *(Call(lambda: ts.Object, {"of": ({"name": "it", "shape": shape}, descriptions)}, after=pressed_gently)
-                             for shape in SHAPES[:-1])],
+                           *(Call(lambda: ts.Object, {"of": ({"name": "it", "shape": shape}, descriptions)},
+                                  after=pressed_gently) for shape in SHAPES[:-1])],
         "Sensor": lambda: [Call(lambda: ts.Sensor, {
-            "device": (BARE, described), "unit": (1, numbers), "deepest_mm": (1.2, numbers), "widest_mm": (0.5, numbers),
-            "membrane_um": (40.0, numbers), "cache": ("cache", paths), "progress": (None, callbacks)},
+            "device": (BARE, described), "unit": (1, numbers), "deepest_mm": (1.2, numbers),
+            "widest_mm": (0.5, numbers), "membrane_um": (40.0, numbers), "cache": ("cache", paths),
+            "progress": (None, callbacks)},
             allowed=(KeyError,)),
             Call(lambda: ts.Sensor, {"device": (QUICK, lambda valid: changed_fields(valid, (
                 "name", "coating", "lamps", "camera")))})],
@@ -478,8 +483,8 @@ def table(t):
             "sensor": (t.sensor, only(*STRANGE)), "object": touched, "largest_step_mm": (5.0, numbers),
             "largest_part_mm": (0.1, numbers)},
             after=lambda session: [session.step(pose, 0.01) for pose in (t.pose[:3], t.pose[:3] - down)])],
-        "Session.step": lambda: [Call(lambda pressed=pressed: t.session(pressed).step, {"pose": (t.pose, poses), "dt_s": (0.01, numbers)})
-                                 for pressed in (True, False)],
+        "Session.step": lambda: [Call(lambda pressed=pressed: t.session(pressed).step, {
+            "pose": (t.pose, poses), "dt_s": (0.01, numbers)}) for pressed in (True, False)],
         "Session.look": lambda: [Call(lambda: t.session().look, {
             "noise_seed": seed, "frame": (0, numbers), "picture": (True, flags), "truth": (True, flags)})],
         "Session.restart": lambda: [Call(lambda: t.session().restart)],
@@ -488,8 +493,8 @@ def table(t):
         "HeightEstimator": lambda: [Call(lambda: ts.HeightEstimator, {
             "model": (t.height_model, only(*STRANGE)), "border": ("free", texts)})],
         "HeightEstimator.estimate": lambda: [
-            Call(lambda border=border: ts.HeightEstimator(t.height_model, border=border).estimate, {"frame": (t.touch.frame, pictures)})
-            for border in ("zero", "free")],
+            Call(lambda border=border: ts.HeightEstimator(t.height_model, border=border).estimate, {
+                "frame": (t.touch.frame, pictures)}) for border in ("zero", "free")],
         "calibrate_height": lambda: [Call(lambda: ts.calibrate_height, {
             "frames": (t.heights[0][0], lists_of(pictures)), "ball_diameters_mm": (t.heights[0][1], lists_of(numbers)),
             "background": (t.heights[0][2], lists_of(pictures)), "mm_per_px": (t.sensor.mm_per_px, numbers),
@@ -506,7 +511,8 @@ def table(t):
             "centre_px": ((160, 120), arrays)}, after=lambda tracker: tracker.track(beads_picture(), 0) and None)],
         "BeadTracker.track": lambda: [Call(lambda: t.tracker().track, {
             "frame": (beads_picture(), pictures), "t_us": (1000, numbers)}),
-            Call(lambda: ts.BeadTracker(roi_a_px=200).track, {"frame": (beads_picture(), pictures), "t_us": (0, numbers)})],
+            Call(lambda: ts.BeadTracker(roi_a_px=200).track, {
+                "frame": (beads_picture(), pictures), "t_us": (0, numbers)})],
         "BeadTracker.restart": lambda: [Call(lambda: t.tracker().restart)],
         "StiffnessForceModel.load": lambda: [Call(lambda: ts.StiffnessForceModel.load,
                                                   {"path": (t.stiffness_file, paths)})],
@@ -524,8 +530,8 @@ def table(t):
         "HueModel.save": lambda: [Call(lambda: t.hue_model.save, {"path": ("y", paths)})],
         "calibrate_hue": lambda: [Call(lambda: ts.calibrate_hue, {
             "rest": (t.reader.rest, only(t.small_reading, t.large_reading, *STRANGE)),
-            "samples": (t.hue_samples, t.hue_lists), "spacing_mm": (3.0, numbers), "viewing_distance_mm": (0.0, numbers),
-            "form": ("isotropic", texts)}),
+            "samples": (t.hue_samples, t.hue_lists), "spacing_mm": (3.0, numbers),
+            "viewing_distance_mm": (0.0, numbers), "form": ("isotropic", texts)}),
             Call(lambda: ts.calibrate_hue, {
                 "rest": (t.reader.rest, only()), "spacing_mm": (3.0, only()), "form": ("best", only()),
                 "samples": (t.hue_samples[::5], only([(t.large_reading, 24, (0, 0, 0), -1), *t.hue_samples[::5]]))})],
@@ -585,7 +591,7 @@ def arrays_of_bars(valid):
 
 
 def public_names():
-    """All that users can call: functions, constructors, methods (those written out with __, too, where Python's own)."""
+    """All that users can call: functions, constructors, methods (of those with __ the ones below)."""
     def of_class(prefix, cls):
         own = vars(cls)
         if not isinstance(own.get("__init__"), (type(None), types.WrapperDescriptorType)):  # that of what isn't made

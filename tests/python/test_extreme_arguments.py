@@ -46,8 +46,8 @@ def faults_of(name, folder, shared):
     faults, first, done, calls = [], 0, False, 0
     while not done:
         with open(folder / "stderr", "wb") as stderr, subprocess.Popen(
-                [sys.executable, str(CHILD), name, str(folder / "work"), str(shared), str(first)], stdout=subprocess.PIPE,
-                stderr=stderr) as child:
+                [sys.executable, str(CHILD), name, str(folder / "work"), str(shared), str(first)],
+                stdout=subprocess.PIPE, stderr=stderr) as child:
             now, hangs = None, False
             for line in lines_of(child):
                 hangs = "hangs" in line
