@@ -15,6 +15,7 @@ namespace {
 
 constexpr double kAsGoodAsInfinite = 100.0;  // for an infinite friction whose sets cycle
 constexpr int kBondedHalvings = 1;
+constexpr int kMostParts = 100000;  // of a step: more take minutes
 
 using Kind = AxisControl::Kind;
 
@@ -318,7 +319,13 @@ std::optional<PressSnapshot> Press::Parts::walk(const Path& path, int halvings, 
     for (int a = 0; a < 3; ++a) {
       if (path.to[b].forced[a]) motion[a] = 0.0;
     }
-    parts = std::max(parts, static_cast<int>(std::ceil(motion.norm() / tolerance.largest_motion - 1e-9)));
+    const double wanted = std::ceil(motion.norm() / tolerance.largest_motion - 1e-9);
+    if (wanted > kMostParts) {
+      fail(
+          "the object goes {:.4g} mm in a step, in parts of {:.4g} mm: allowed are {} parts a step; take shorter steps",
+          motion.norm(), tolerance.largest_motion, kMostParts);
+    }
+    parts = std::max(parts, static_cast<int>(wanted));
   }
   PressSnapshot at = path.start;
   for (int part = 0; part < parts; ++part) {

@@ -1,6 +1,9 @@
 // Coloured markers and their displacements: sensors/colour/colour_marker_finder.h, sensors/colour/hue_estimator.h.
 
+#include <limits>
+
 #include "core/error.h"
+#include "core/yaml_reader.h"
 #include "python/src/bindings.h"
 #include "python/src/estimator.h"
 #include "sensors/colour/colour_marker_finder.h"
@@ -25,10 +28,18 @@ struct Finder {
 };
 using Reader = Guarded<Finder>;
 
+// As the command's.
+const Allowed kSides = Allowed::within(2, 64);
+const Allowed kSpacings = Allowed::within(0.01, 100.0);
+const Allowed kViewingDistances = Allowed::within(10.0, 1e6);
+
 std::shared_ptr<Reader> make_reader(const py::object& rest, const py::object& grid) {
   const Picture picture = picture_from(rest, "rest");
   sensors::ColourMarkerAppearance appearance;
   const Eigen::Vector2d sides = vector2_from(grid, "grid");
+  if (!kSides.holds(sides.x()) || !kSides.holds(sides.y())) {
+    fail("grid: ({}, {}) is not allowed; allowed is {} for each", sides.x(), sides.y(), kSides.text());
+  }
   appearance.grid = sides.cast<int>();
   if (appearance.grid.cast<double>() != sides) fail("grid: ({}, {}) are not whole numbers", sides.x(), sides.y());
   return unlocked([&] { return std::make_shared<Reader>(appearance, picture.mat); });
@@ -67,15 +78,26 @@ std::shared_ptr<HueModel> calibrate(const ColourMarkerReading& rest, const py::o
   } else if (form != "isotropic" && form != "best") {
     fail("form: '{}' is not known; allowed is one of: isotropic, polynomial, equation4, best", form);
   }
+  if (!kSpacings.holds(spacing_mm)) {
+    fail("spacing_mm: {} is not allowed; allowed is {}", spacing_mm, kSpacings.text());
+  }
+  if (viewing_distance_mm != 0.0 && !kViewingDistances.holds(viewing_distance_mm)) {
+    fail("viewing_distance_mm: {} is not allowed; allowed is 0 or {}", viewing_distance_mm, kViewingDistances.text());
+  }
   std::vector<sensors::HueSample> all;
-  for (const py::handle one : samples) {
-    const auto parts = py::reinterpret_borrow<py::sequence>(one);
-    if (!py::isinstance<py::sequence>(one) || parts.size() != 4) {
+  for_each_item(samples, "samples", [&](const py::object& one) {
+    const bool is_list = py::isinstance<py::sequence>(one);
+    const auto parts = is_list ? py::reinterpret_borrow<py::sequence>(one) : py::sequence(py::tuple());
+    if (parts.size() != 4 || !py::isinstance<ColourMarkerReading>(parts[0])) {
       fail("samples: sample {} isn't (reading, marker, displacement_mm, series)", all.size());
     }
     const auto& reading = py::object(parts[0]).cast<const ColourMarkerReading&>();
+    if (reading.grid != rest.grid) {
+      fail("samples: sample {} is of a grid of {} x {}, the one at rest has {} x {}", all.size(), reading.grid.x(),
+           reading.grid.y(), rest.grid.x(), rest.grid.y());
+    }
     sensors::HueSample sample;
-    const auto marker = py::object(parts[1]).cast<std::int64_t>();
+    const std::int64_t marker = whole_number_from(parts[1], fmt::format("samples: marker of sample {}", all.size()));
     if (marker < 0 || marker >= static_cast<std::int64_t>(reading.markers.size())) {
       fail("samples: sample {} is of marker {}; allowed is from 0 to {}", all.size(), marker,
            static_cast<std::int64_t>(reading.markers.size()) - 1);
@@ -83,9 +105,14 @@ std::shared_ptr<HueModel> calibrate(const ColourMarkerReading& rest, const py::o
     sample.marker = static_cast<std::size_t>(marker);
     sample.seen = reading.markers[sample.marker];
     sample.displacement_mm = vector3_from(parts[2], "samples: displacement_mm");
-    sample.series = py::object(parts[3]).cast<int>();
+    const std::int64_t series = whole_number_from(parts[3], fmt::format("samples: series of sample {}", all.size()));
+    if (series < std::numeric_limits<int>::min() || series > std::numeric_limits<int>::max()) {
+      fail("samples: series of sample {} is {}; allowed is from {} to {}", all.size(), series,
+           std::numeric_limits<int>::min(), std::numeric_limits<int>::max());
+    }
+    sample.series = static_cast<int>(series);
     all.push_back(std::move(sample));
-  }
+  });
   return unlocked([&] {
     if (form == "best") {
       settings.form = sensors::rank_hue_forms(rest, all, settings, sensors::usual_hue_forms()).front().form;
@@ -158,11 +185,14 @@ void bind_chroma(py::module_& module) {
   py::class_<HueModel, std::shared_ptr<HueModel>>(
       module, "HueModel", "From how a coloured marker looks to how it has moved; see calibrate_hue.")
       .def_static(
-          "load", [](const std::string& path) { return std::make_shared<HueModel>(sensors::load_hue_model(path)); },
+          "load",
+          [](const std::string& path) {
+            return std::make_shared<HueModel>(sensors::load_hue_model(needed_path(path, "path")));
+          },
           py::arg("path"), "Reads a model file.")
       .def(
-          "save", [](const HueModel& self, const std::string& path) { sensors::save(self, path); }, py::arg("path"),
-          "Writes it, whole or not at all.")
+          "save", [](const HueModel& self, const std::string& path) { sensors::save(self, needed_path(path, "path")); },
+          py::arg("path"), "Writes it, whole or not at all.")
       .def_readonly("spacing_mm", &HueModel::spacing_mm, "Of the grid.")
       .def_readonly("samples", &HueModel::samples, "It was calibrated on.")
       .def_readonly("rms_error_mm", &HueModel::rms_error_mm, "On them, of the displacement's length.")

@@ -2,6 +2,9 @@
 
 #include <tbb/global_control.h>
 
+#include <filesystem>
+#include <opencv2/core.hpp>
+
 #include "core/error.h"
 #include "core/field_error.h"
 #include "core/hdf5_file.h"
@@ -13,12 +16,20 @@
 namespace touchstone::python {
 namespace {
 
+constexpr int kMostThreads = 4096;  // as the command's --threads
+
+/// A message may name a file whose name isn't UTF-8.
+py::object text_or_none(const std::string& text) {
+  if (text.empty()) return py::none();
+  const auto size = static_cast<py::ssize_t>(text.size());
+  return py::reinterpret_steal<py::object>(PyUnicode_DecodeUTF8(text.data(), size, "backslashreplace"));
+}
+
 void set_error(const Error& error, const std::string& field) {
   const py::object type = py::module_::import("touchstone._errors").attr("Error");
   const SourceLocation& where = error.where();
-  const py::object instance = type(error.what(), where.file.empty() ? py::object(py::none()) : py::str(where.file),
-                                   where.line <= 0 ? py::object(py::none()) : py::int_(where.line),
-                                   field.empty() ? py::object(py::none()) : py::str(field));
+  const py::object line = where.line <= 0 ? py::object(py::none()) : py::int_(where.line);
+  const py::object instance = type(text_or_none(error.what()), text_or_none(where.file), line, text_or_none(field));
   PyErr_SetObject(type.ptr(), instance.ptr());
 }
 
@@ -57,9 +68,18 @@ py::dict dict_of(const datasets::GenerateReport& report) {
   return result;
 }
 
+void check_job_and_out(const std::string& job, const std::string& out) {
+  needed_path(job, "job");
+  needed_path(out, "out");
+}
+
 py::dict generate(const std::string& job, const std::string& out, int threads, bool timings, const std::string& cache,
                   const std::string& shard, const py::object& progress) {
-  if (threads < 0) fail("threads: {} is not allowed; allowed is at least 0 (0: as many as the machine has)", threads);
+  if (threads < 0 || threads > kMostThreads) {
+    fail("threads: {} is not allowed; allowed is from 0 to {} (0: as many as the machine has)", threads, kMostThreads);
+  }
+  check_job_and_out(job, out);
+  checked_path(cache, "cache");
   const Progress listener = progress_to(progress);
   datasets::GenerateOptions how =
       datasets::simulated(cache.empty() ? sim::default_cache_folder() : std::filesystem::path(cache));
@@ -70,6 +90,7 @@ py::dict generate(const std::string& job, const std::string& out, int threads, b
 }
 
 py::dict merge(const std::string& job, const std::string& out, const py::object& progress) {
+  check_job_and_out(job, out);
   const Progress listener = progress_to(progress);
   return dict_of(unlocked([&] { return datasets::merge(job, out, listener); }));
 }
@@ -84,6 +105,14 @@ void bind_errors(py::module_&) {
       set_error(error, error.field());
     } catch (const Error& error) {
       set_error(error, "");
+    } catch (const std::filesystem::filesystem_error& error) {
+      set_error(Error(fmt::format("{}: {}", error.path1().string(), error.code().message())), "");
+    } catch (const cv::Exception& error) {
+      if (error.code == cv::Error::StsNoMem) {
+        PyErr_SetString(PyExc_MemoryError, error.err.c_str());
+      } else {
+        set_error(Error(fmt::format("OpenCV refuses it: {}", error.err)), "");
+      }
     }
   });
   set_hdf5_guard([]() -> std::shared_ptr<void> { return std::make_shared<Hdf5Lock>(); });
@@ -94,11 +123,16 @@ void bind_files(py::module_& module) {
       "scenes_folder", [] { return datasets::scenes_folder().string(); },
       "Where the shipped devices, objects and scenes lie.");
   module.def(
-      "read_image", [](const std::string& path) { return array_of(unlocked([&] { return sim::read_image(path); })); },
+      "read_image",
+      [](const std::string& path) {
+        needed_path(path, "path");
+        return array_of(unlocked([&] { return sim::read_image(path); }));
+      },
       py::arg("path"), "Reads a picture as it is stored: uint8 or uint16, grey or BGR.");
   module.def(
       "write_png",
       [](const std::string& path, const py::object& image) {
+        needed_path(path, "path");
         const Picture picture = picture_from(image, "image");
         unlocked([&] { sim::write_png(path, picture.mat); });
       },

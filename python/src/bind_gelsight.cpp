@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "core/yaml_reader.h"
 #include "python/src/bindings.h"
 #include "python/src/estimator.h"
 #include "sensors/heights/height_calibration.h"
@@ -14,6 +15,10 @@ namespace {
 
 using sensors::HeightModel;
 using Heights = Guarded<sensors::HeightEstimator>;
+
+constexpr double kLargestPlace_px = 1e6;
+const Allowed kScales = Allowed::within(1e-4, 10.0);            // of a pixel, mm; as the command's --mm-per-px
+const Allowed kBallDiameters = Allowed::above_up_to(0.0, 1e4);  // mm; an object's radius may be as much
 
 std::optional<sensors::LightCorrection> correction_named(const std::string& name) {
   if (name == "best") return std::nullopt;
@@ -28,33 +33,38 @@ py::tuple calibrate_height(const py::object& frames, const py::object& ball_diam
                            double mm_per_px, const py::object& circles, const std::string& correction) {
   const std::vector<Picture> pictures = pictures_from(frames, "frames");
   const std::vector<Picture> rest = pictures_from(background, "background");
-  const auto diameters = ball_diameters_mm.cast<py::sequence>();
+  const py::sequence diameters = sequence_from(ball_diameters_mm, "ball_diameters_mm");
   const bool circles_given = !circles.is_none();
+  const py::sequence outlines = sequence_from(circles_given ? circles : py::object(py::tuple()), "circles");
   if (diameters.size() != pictures.size()) {
     fail("ball_diameters_mm: there are {} for {} frames", diameters.size(), pictures.size());
   }
-  if (circles_given && py::len(circles) != pictures.size()) {
-    fail("circles: there are {} for {} frames", py::len(circles), pictures.size());
+  if (circles_given && outlines.size() != pictures.size()) {
+    fail("circles: there are {} for {} frames", outlines.size(), pictures.size());
   }
   std::vector<std::optional<sensors::ContactCircle>> known(pictures.size());
   std::vector<double> radii_mm;
   for (std::size_t i = 0; i < pictures.size(); ++i) {
-    const auto diameter = py::object(diameters[i]).cast<double>();
-    if (!(diameter > 0.0) || !std::isfinite(diameter)) {
-      fail("ball_diameters_mm: number {} of it is {}; allowed is above 0", i, diameter);
+    const double diameter = number_from(diameters[i], fmt::format("ball_diameters_mm: number {} of it", i));
+    if (!kBallDiameters.holds(diameter)) {
+      fail("ball_diameters_mm: number {} of it is {}; allowed is {}", i, diameter, kBallDiameters.text());
     }
     radii_mm.push_back(0.5 * diameter);
     if (!circles_given) continue;
-    const py::object circle = circles.cast<py::sequence>()[i];
+    const py::object circle = outlines[i];
     if (circle.is_none()) continue;
     const Eigen::Vector3d numbers = vector3_from(circle, "circles");
+    if (!(numbers.cwiseAbs().maxCoeff() <= kLargestPlace_px)) {
+      fail("circles: number {} of it is ({:g}, {:g}, {:g}) px; allowed is up to {} each", i, numbers.x(), numbers.y(),
+           numbers.z(), kLargestPlace_px);
+    }
     known[i] = sensors::ContactCircle{numbers.head<2>(), numbers.z()};
   }
   sensors::HeightCalibrationSettings settings;
   settings.mm_per_px = mm_per_px;
   settings.correction = correction_named(correction);
-  if (!(mm_per_px > 0.0) || !std::isfinite(mm_per_px)) {
-    fail("mm_per_px: {} is not allowed; allowed is above 0", mm_per_px);
+  if (!kScales.holds(mm_per_px)) {
+    fail("mm_per_px: {} is not allowed; allowed is {}", mm_per_px, kScales.text());
   }
   const sensors::HeightCalibration made = unlocked([&] {
     std::vector<cv::Mat> untouched;
@@ -110,11 +120,14 @@ void bind_gelsight(py::module_& module) {
                                                         "What calibrate_height has found of one sensor.")
       .def_static(
           "load",
-          [](const std::string& path) { return std::make_shared<HeightModel>(sensors::load_height_model(path)); },
+          [](const std::string& path) {
+            return std::make_shared<HeightModel>(sensors::load_height_model(needed_path(path, "path")));
+          },
           py::arg("path"), "Reads a model file.")
       .def(
-          "save", [](const HeightModel& self, const std::string& path) { sensors::save(self, path); }, py::arg("path"),
-          "Writes it, whole or not at all.")
+          "save",
+          [](const HeightModel& self, const std::string& path) { sensors::save(self, needed_path(path, "path")); },
+          py::arg("path"), "Writes it, whole or not at all.")
       .def_readonly("mm_per_px", &HeightModel::mm_per_px, "Of the membrane.")
       .def_readonly("presses", &HeightModel::presses, "That it was made of.")
       .def_property_readonly(

@@ -19,15 +19,19 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr double kLongestWatch_s = 100.0;   // event pixels fire without end, even if nothing moves
+constexpr double kLongestShear_mm = 100.0;  // friction's history is stepped in tenths of a mm
+
 /// The file of this name, or the shipped one: "gelsight-flat" is scenes/devices/gelsight-flat.yaml.
 fs::path named_file(const std::string& name, const char* folder) {
-  const fs::path given(name);
-  if (given.has_extension() || given.has_parent_path() || fs::exists(given)) return given;
+  const fs::path given(checked_path(name, folder));
+  std::error_code ignored;
+  if (given.has_extension() || given.has_parent_path() || fs::exists(given, ignored)) return given;
   const fs::path shipped = datasets::scenes_folder() / folder;
   const fs::path file = shipped / (name + ".yaml");
-  if (fs::exists(file)) return file;
+  if (fs::exists(file, ignored)) return file;
   std::vector<std::string> known;
-  for (const auto& entry : fs::directory_iterator(shipped)) {
+  for (const auto& entry : fs::directory_iterator(shipped, ignored)) {
     if (entry.path().extension() == ".yaml") known.push_back(entry.path().stem().string());
   }
   std::sort(known.begin(), known.end());
@@ -35,15 +39,32 @@ fs::path named_file(const std::string& name, const char* folder) {
        fmt::join(known, ", "));
 }
 
+/// A dict as text. What isn't of JSON's types stays a TypeError.
+std::string json_of(const py::handle& value) {
+  try {
+    const py::object dumps = py::module_::import("json").attr("dumps");
+    // YAML knows no halves of a letter (\\ud83d\\ude00), which JSON writes without this.
+    return dumps(value, py::arg("ensure_ascii") = false).attr("encode")("utf-8").cast<std::string>();
+  } catch (const py::error_already_set& error) {
+    if (!error.matches(PyExc_ValueError) && !error.matches(PyExc_RecursionError)) throw;
+    fail("dict: can't be written as JSON ({})", std::string(py::str(error.value())));
+  }
+}
+
 /// From a dict of a file's fields (JSON is YAML), a path, or a shipped file's name.
 template <typename Spec>
 Spec spec_from(const py::handle& value, const char* folder) {
   if (py::isinstance<py::dict>(value)) {
-    const py::object dumps = py::module_::import("json").attr("dumps");
-    return parse_yaml<Spec>(dumps(value).cast<std::string>(), "dict");
+    return parse_yaml<Spec>(json_of(value), "dict");
   }
-  const py::object path = py::module_::import("os").attr("fspath")(value);
-  return read_yaml<Spec>(named_file(path.cast<std::string>(), folder));
+  const py::module_ os = py::module_::import("os");
+  const py::object path = os.attr("fspath")(value);
+  try {
+    return read_yaml<Spec>(named_file(os.attr("fsencode")(path).cast<std::string>(), folder));
+  } catch (const py::error_already_set& error) {
+    if (!error.matches(PyExc_UnicodeError)) throw;
+    fail("{}: can't be a path", std::string(py::str(py::module_::import("builtins").attr("ascii")(path))));
+  }
 }
 
 std::shared_ptr<Sensor> make_sensor(const py::object& device, std::uint64_t unit, double deepest_mm, double widest_mm,
@@ -59,6 +80,7 @@ std::shared_ptr<Sensor> make_sensor(const py::object& device, std::uint64_t unit
   check("deepest_mm", deepest_mm, Allowed::above_up_to(0.0, 100.0));
   check("widest_mm", widest_mm, Allowed::above_up_to(0.0, 100.0));
   check("membrane_um", membrane_um, Allowed::within(1.0, 1000.0));
+  checked_path(cache, "cache");
   const Progress listener = progress_to(progress);
   sim::DeviceSpec spec = spec_from<sim::DeviceSpec>(device, "devices");
   const fs::path folder = cache.empty() ? sim::default_cache_folder() : fs::path(cache);
@@ -88,11 +110,18 @@ std::shared_ptr<Touch> press(const Sensor& sensor, const py::object& touched, st
   }
   if (!shear_mm.is_none()) order.drag_mm = vector2_from(shear_mm, "shear_mm");
   if (!shear_N.is_none()) order.shear_N = vector2_from(shear_N, "shear_N");
+  if (order.drag_mm.norm() > kLongestShear_mm) {
+    fail("shear_mm: ({}, {}) is {:g} mm long; allowed is at most {} mm", order.drag_mm.x(), order.drag_mm.y(),
+         order.drag_mm.norm(), kLongestShear_mm);
+  }
+  const bool events = sensor.device().camera && sensor.device().camera->events;
+  const Allowed times = Allowed::within(1e-6, events ? kLongestWatch_s : 1e6);
+  if (!times.holds(seconds)) fail("seconds is {}; allowed is {}", seconds, times.text());
   order.seconds = seconds;
   sim::check(order);
   const SharedObject object = object_from(touched);
   return unlocked([&] {
-    return std::make_shared<Touch>(sensor.press(object, order, {look, truth, noise_seed, frame}));
+    return std::make_shared<Touch>(sensor.press(object, order, {look, truth, noise_seed, checked_frame(frame)}));
   });
 }
 
@@ -312,7 +341,13 @@ void bind_sensor(py::module_& module) {
           "gel_from_pixel",
           [](const Sensor& self, const py::object& pixel) {
             const Eigen::Vector2d at = vector2_from(pixel, "pixel");
-            return small_array(unlocked([&] { return self.virtual_sensor().gel_from_pixel(at); }));
+            return small_array(unlocked([&] {
+              try {
+                return self.virtual_sensor().gel_from_pixel(at);
+              } catch (const Error& error) {
+                fail("pixel: ({:g}, {:g}) has no place on the gel: {}", at.x(), at.y(), error.what());
+              }
+            }));
           },
           py::arg("pixel"),
           "Where on the undeformed membrane a point of the picture lies (mm); pixel centres are at + 0.5.")
@@ -326,6 +361,7 @@ void bind_sensor(py::module_& module) {
       .def(
           "background",
           [](const Sensor& self, std::uint64_t noise_seed, int frame) {
+            checked_frame(frame);
             return array_of(unlocked([&] { return self.virtual_sensor().background(noise_seed, frame); }));
           },
           py::kw_only(), py::arg("noise_seed") = 0, py::arg("frame") = 0,

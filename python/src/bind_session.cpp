@@ -98,7 +98,7 @@ void bind_session(py::module_& module) {
       "largest_step_mm: a step in contact that goes further is refused as a mistake (metres for millimetres).\n"
       "largest_part_mm: steps are cut into parts of this length, since friction depends on the path.\n"
       "For one thread at a time; sessions of one sensor are independent.")
-      .def(py::init(&make_session), py::arg("sensor"), py::arg("object"), py::kw_only(),
+      .def(py::init(&make_session), py::arg("sensor").none(false), py::arg("object"), py::kw_only(),
            py::arg("largest_step_mm") = 5.0, py::arg("largest_part_mm") = 0.1)
       .def(
           "step",
@@ -111,7 +111,7 @@ void bind_session(py::module_& module) {
       .def(
           "look",
           [](Session& self, std::uint64_t noise_seed, std::optional<int> frame, bool picture, bool truth) {
-            return self.look({picture, truth, noise_seed, frame.value_or(0)}, !frame);
+            return self.look({picture, truth, noise_seed, checked_frame(frame.value_or(0))}, !frame);
           },
           py::kw_only(), py::arg("noise_seed") = 0, py::arg("frame") = py::none(), py::arg("picture") = true,
           py::arg("truth") = true,

@@ -35,7 +35,8 @@ py::dict train(const py::object& rest, const py::object& positions, const py::ob
   sensors::ForceSamples samples;
   samples.grid = grid;
   samples.rest = points2_from(rest, "rest");
-  for (const py::handle one : positions) samples.positions.push_back(points2_from(one, "positions"));
+  for_each_item(positions, "positions",
+                [&](const py::object& one) { samples.positions.push_back(points2_from(one, "positions")); });
   samples.forces = points3_from(forces_N, "forces_N");
   sensors::TrainingSettings settings = sensors::TrainingSettings::to_convergence();
   if (form == "symmetric") {
@@ -119,11 +120,14 @@ void bind_vhs(py::module_& module) {
       .def_static(
           "load",
           [](const std::string& path) {
-            return std::make_shared<StiffnessForceModel>(sensors::load_stiffness_model(path));
+            return std::make_shared<StiffnessForceModel>(sensors::load_stiffness_model(needed_path(path, "path")));
           },
           py::arg("path"), "Reads a model file.")
       .def(
-          "save", [](const StiffnessForceModel& self, const std::string& path) { sensors::save(self, path); },
+          "save",
+          [](const StiffnessForceModel& self, const std::string& path) {
+            sensors::save(self, needed_path(path, "path"));
+          },
           py::arg("path"), "Writes it, whole or not at all.")
       .def_readonly("grid", &StiffnessForceModel::grid, "Beads a side.")
       .def_property_readonly(

@@ -1,6 +1,7 @@
 #include "python/src/convert.h"
 
 #include <cmath>
+#include <new>
 #include <string>
 
 #include "core/error.h"
@@ -14,11 +15,27 @@ std::string shape_text(const py::array& array) {
   return text + ")";
 }
 
+std::string type_text(const py::handle& value) {
+  return py::str(py::type::of(value));
+}
+
+// OpenCV takes pictures of up to so many pixels a side; more of them in all are a mistake rather than a camera.
+constexpr py::ssize_t kLongestSide = py::ssize_t{1} << 20;
+constexpr py::ssize_t kMostPixels = py::ssize_t{1} << 28;
+constexpr py::ssize_t kMostNumbers = py::ssize_t{1} << 28;
+
 py::array_t<double, py::array::c_style | py::array::forcecast> doubles_from(const py::handle& value, const char* what) {
+  if (py::isinstance<py::array>(value)) {
+    // One that repeats a number may be larger than memory.
+    const auto given = py::reinterpret_borrow<py::array>(value);
+    if (given.size() > kMostNumbers) {
+      fail("{}: an array of shape {} is too large; allowed are {} numbers", what, shape_text(given), kMostNumbers);
+    }
+  }
   auto array = py::array_t<double, py::array::c_style | py::array::forcecast>::ensure(value);
   if (!array) {
     PyErr_Clear();
-    fail("{}: an array of numbers is needed, this is a {}", what, std::string(py::str(py::type::of(value))));
+    fail("{}: an array of numbers is needed, this is a {}", what, type_text(value));
   }
   for (py::ssize_t i = 0; i < array.size(); ++i) {
     if (!std::isfinite(array.data()[i])) fail("{}: number {} of it is {}; it must be finite", what, i, array.data()[i]);
@@ -83,7 +100,7 @@ py::object array_on(const cv::Mat& picture, const py::dtype& type) {
 
 Picture picture_from(const py::handle& value, const char* what) {
   if (!py::isinstance<py::array>(value)) {
-    fail("{}: a NumPy array is needed, this is a {}", what, std::string(py::str(py::type::of(value))));
+    fail("{}: a NumPy array is needed, this is a {}", what, type_text(value));
   }
   py::array array = py::reinterpret_borrow<py::array>(value);
   const bool colour = array.ndim() == 3 && array.shape(2) == 3;
@@ -96,10 +113,16 @@ Picture picture_from(const py::handle& value, const char* what) {
         "is {} of shape {}",
         what, std::string(py::str(array.dtype())), shape_text(array));
   }
+  // Of one that repeats its pixels there is no more memory than they take: copied, it would be its full size.
+  if (array.shape(0) > kLongestSide || array.shape(1) > kLongestSide || array.shape(0) * array.shape(1) > kMostPixels) {
+    fail("{}: a picture of shape {} is too large; allowed are {} pixels a side and {} in all", what, shape_text(array),
+         kLongestSide, kMostPixels);
+  }
   const py::ssize_t channels = colour ? 3 : 1;
   const bool packed = array.strides(1) == item * channels && (!colour || array.strides(2) == item) &&
                       array.strides(0) >= array.shape(1) * item * channels;
   if (!packed) array = py::array::ensure(array, py::array::c_style);
+  if (!array) throw std::bad_alloc();
   if (!array.dtype().equal(array.dtype().attr("newbyteorder")("="))) {
     fail("{}: its numbers are in a foreign byte order", what);
   }
@@ -112,7 +135,7 @@ Picture picture_from(const py::handle& value, const char* what) {
 
 std::vector<Picture> pictures_from(const py::handle& value, const char* what) {
   std::vector<Picture> pictures;
-  for (const py::handle one : py::reinterpret_borrow<py::object>(value)) pictures.push_back(picture_from(one, what));
+  for_each_item(value, what, [&](const py::object& one) { pictures.push_back(picture_from(one, what)); });
   if (pictures.empty()) fail("{}: no picture is given", what);
   return pictures;
 }
@@ -192,6 +215,55 @@ RigidTransform pose_from(const py::handle& value, const char* what) {
          row[15]);
   }
   return pose;
+}
+
+double number_from(const py::handle& value, const std::string& what) {
+  const double number = PyFloat_AsDouble(value.ptr());
+  if (PyErr_Occurred() != nullptr) {
+    PyErr_Clear();
+    fail("{}: a number is needed, this is {} of {}", what, std::string(py::repr(value)), type_text(value));
+  }
+  return number;
+}
+
+std::int64_t whole_number_from(const py::handle& value, const std::string& what) {
+  const auto index = py::reinterpret_steal<py::object>(PyNumber_Index(value.ptr()));
+  const std::int64_t number = index ? PyLong_AsLongLong(index.ptr()) : -1;
+  if (PyErr_Occurred() != nullptr) {
+    PyErr_Clear();
+    fail("{}: a whole number is needed, this is {} of {}", what, std::string(py::repr(value)), type_text(value));
+  }
+  return number;
+}
+
+py::sequence sequence_from(const py::handle& value, const char* what) {
+  if (!py::isinstance<py::sequence>(value)) fail("{}: a list is needed, this is a {}", what, type_text(value));
+  return py::reinterpret_borrow<py::sequence>(value);
+}
+
+void for_each_item(const py::handle& value, const char* what, const std::function<void(const py::object&)>& use) {
+  auto iterator = py::reinterpret_steal<py::iterator>(PyObject_GetIter(value.ptr()));
+  if (!iterator) {
+    PyErr_Clear();
+    fail("{}: a list is needed, this is a {}", what, type_text(value));
+  }
+  for (; iterator != py::iterator::sentinel(); ++iterator) use(py::reinterpret_borrow<py::object>(*iterator));
+}
+
+const std::string& checked_path(const std::string& path, const char* what) {
+  if (path.find('\0') != std::string::npos)
+    fail("{}: '{}' has a zero byte, which no path may have", what, path.c_str());
+  return path;
+}
+
+const std::string& needed_path(const std::string& path, const char* what) {
+  if (path.empty()) fail("{}: '' is no path", what);
+  return checked_path(path, what);
+}
+
+int checked_frame(int frame) {
+  if (frame < 0) fail("frame: {} is not allowed; allowed is at least 0", frame);
+  return frame;
 }
 
 Progress progress_to(const py::object& listener) {

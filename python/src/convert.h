@@ -5,9 +5,12 @@
 #include <pybind11/pybind11.h>
 
 #include <Eigen/Core>
+#include <cstdint>
+#include <functional>
 #include <memory>
 #include <opencv2/core/mat.hpp>
 #include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -85,6 +88,20 @@ std::vector<Eigen::Vector2d> points2_from(const py::handle& value, const char* w
 std::vector<Eigen::Vector3d> points3_from(const py::handle& value, const char* what);
 /// 3 x 4 or 4 x 4. Whether it's a rotation is for who moves by it to check.
 RigidTransform pose_from(const py::handle& value, const char* what);
+
+/// What Python's own conversions refuse by an error that doesn't say which argument it is about.
+/// @throws Error naming `what`
+double number_from(const py::handle& value, const std::string& what);
+std::int64_t whole_number_from(const py::handle& value, const std::string& what);
+py::sequence sequence_from(const py::handle& value, const char* what);
+/// Calls `use` for each item of a list, a tuple, an array or whatever else can be gone through.
+void for_each_item(const py::handle& value, const char* what, const std::function<void(const py::object&)>& use);
+/// A path ends at a zero byte, so that another file would be taken. @throws Error naming `what`
+const std::string& checked_path(const std::string& path, const char* what);
+/// The same of a path that must not be empty.
+const std::string& needed_path(const std::string& path, const char* what);
+/// That chooses the noise. @throws Error
+int checked_frame(int frame);
 
 /// Hands progress to a Python function (None: nobody) and looks for Ctrl-C. Works from any thread.
 Progress progress_to(const py::object& listener);

@@ -57,6 +57,9 @@ class SceneFiles(SetFiles):
     def column(self, name, rows):
         if name in _PICTURES:
             import numpy
+            if not rows:
+                first = self.read(name, 0)
+                return numpy.empty((0, *first.shape), first.dtype)
             return numpy.stack([self.read(name, row) for row in rows])
         array = self._array(name)
         return array[()] if len(rows) == array.shape[0] else array[rows]

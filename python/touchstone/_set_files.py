@@ -19,6 +19,8 @@ def read_manifest(folder):
         text = path.read_text(encoding="utf-8")
     except OSError as error:
         raise Error(f"{path}: {error.strerror}; a data set has this file once it is finished", str(path)) from None
+    except ValueError as error:  # a zero byte in the path, or what isn't UTF-8 in the file
+        raise Error(f"{path}: can't be read ({error})", str(path)) from None
     try:
         manifest = json.loads(text)
         # As the checksum is over text, numbers must stay as they were written.

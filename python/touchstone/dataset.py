@@ -1,5 +1,6 @@
 """Reading data sets that `touchstone generate` or touchstone.generate made (docs/file-formats.md, docs/datasets.md)."""
 
+import operator
 import pathlib
 
 from ._drawn_files import DrawnFiles
@@ -85,6 +86,7 @@ class Dataset:
         return len(self._rows)
 
     def __getitem__(self, index):
+        index = operator.index(index)
         if not -len(self) <= index < len(self):
             raise IndexError(f"sample {index} of {len(self)}")
         row = self._rows[index]

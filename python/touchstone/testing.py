@@ -32,9 +32,17 @@ def assert_close(estimate, truth, *, allowed, error_bar=0.0, sigmas=2.0, unit=""
     be compared (an estimate of NaN is an AssertionError).
     """
     import numpy
-    got, true, bar = (numpy.asarray(value, dtype=float) for value in (estimate, truth, error_bar))
+    try:
+        got, true, bar = (numpy.asarray(value, dtype=float) for value in (estimate, truth, error_bar))
+        allowed, sigmas = float(allowed), float(sigmas)
+    except (ValueError, OverflowError) as error:
+        raise Error(f"{what}: numbers are needed ({error})") from None
     if got.shape != true.shape:
         raise Error(f"{what}: the estimate has shape {got.shape}, the truth {true.shape}")
+    try:
+        numpy.broadcast_to(bar, true.shape)
+    except ValueError:
+        raise Error(f"{what}: error_bar has shape {bar.shape}, the truth {true.shape}") from None
     if not (math.isfinite(allowed) and allowed >= 0 and math.isfinite(sigmas) and sigmas >= 0):
         raise Error(f"allowed is {allowed} and sigmas {sigmas}; both must be finite and at least 0")
     if not (numpy.isfinite(bar).all() and (bar >= 0).all()):

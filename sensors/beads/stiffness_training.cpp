@@ -156,6 +156,7 @@ Eigen::VectorXd descend(const AxisForm (&axes)[3], double samples, TrainingRepor
   right = right.cwiseProduct(scale);
   const double largest =
       Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(normal, Eigen::EigenvaluesOnly).eigenvalues().maxCoeff();
+  if (!std::isfinite(largest)) fail("training: the positions are beyond all measure");
   if (!(largest > 0.0)) fail("training: no bead moves in any sample");
 
   const auto record = [&](std::int64_t iteration, const Eigen::VectorXd& at) {

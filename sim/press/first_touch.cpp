@@ -110,7 +110,7 @@ double first_touch(const GelSpec& gel, const fem::ContactShape& shape, const Eig
         for (int i = -half; i <= half; ++i) {
           const Eigen::Vector2d place = around + spacing * Eigen::Vector2d(i, j);
           const double height = height_over(place);
-          if (height <= best) continue;
+          if (!(height > best)) continue;  // NaN isn't better, else there is no end
           best = height;
           middle = place;
           better = true;

@@ -44,6 +44,8 @@ EnumNames<CameraType> enum_names(CameraType) {
   return {{"pinhole", CameraType::pinhole}, {"lens", CameraType::lens}};
 }
 
+constexpr double kFarthestLook_mm = 1e6;  // farther points leave the camera no direction: squares overflow
+
 Allowed part_of_one() {
   return Allowed::within(0.0, 1.0);
 }
@@ -368,8 +370,13 @@ void fields(YamlReader& in, CameraSpec& camera) {
     fail_at(in.where("row_time_us"), "row_time_us: {} for each of {} rows is longer than a frame of {} us at {} Hz",
             camera.row_time_us, camera.height, frame_us, camera.frame_rate_Hz);
   }
-  if ((camera.look_at_mm - camera.position_mm).norm() < 1e-6) {
+  const double distance_mm = (camera.look_at_mm - camera.position_mm).norm();
+  if (distance_mm < 1e-6) {
     fail_at(in.where("look_at_mm"), "camera.look_at_mm: is the camera's own position; the camera has no direction");
+  }
+  if (!(distance_mm <= kFarthestLook_mm)) {
+    fail_at(in.where("look_at_mm"), "camera.look_at_mm: is {:.4g} mm from the camera; allowed is at most {} mm",
+            distance_mm, kFarthestLook_mm);
   }
   try {
     camera_of(camera);

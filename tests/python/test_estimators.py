@@ -108,6 +108,11 @@ def test_coloured_markers_are_read_and_their_motion_learnt(tmp_path):
     assert abs(still.displacement_mm).max() < 1e-12
     with pytest.raises(ts.Error, match="marker 16"):
         ts.calibrate_hue(rest, [(rest, 16, (0, 0, 0), 0)], spacing_mm=3.0)
+    larger = ts.ColourMarkerReader(markers_picture(grid=5), grid=(5, 5)).rest
+    with pytest.raises(ts.Error, match="samples: sample 0 is of a grid of 5 x 5, the one at rest has 4 x 4"):
+        ts.calibrate_hue(rest, [(larger, 24, (0, 0, 0), -1), *samples], spacing_mm=3.0, form="best")
+    with pytest.raises(ts.Error, match="viewing_distance_mm: 1 is not allowed; allowed is 0 or from 10 to"):
+        ts.calibrate_hue(rest, samples, spacing_mm=3.0, viewing_distance_mm=1)
 
 
 def test_heights_are_checked_and_shared_between_threads(sensor, ball):
@@ -139,10 +144,14 @@ def test_heights_are_checked_and_shared_between_threads(sensor, ball):
     for diameter in (0.0, -1.0, float("nan"), float("inf")):
         with pytest.raises(ts.Error, match="ball_diameters_mm: number 0 of it is"):
             ts.calibrate_height([frame], [diameter], background, mm_per_px=0.1)
-    for scale in (0.0, -1.0, float("nan"), float("inf")):
+    for scale in (0.0, -1.0, 1e-9, 11.0, float("nan"), float("inf")):
         with pytest.raises(ts.Error, match="mm_per_px: .* is not allowed"):
             ts.calibrate_height([frame], [3.0], background, mm_per_px=scale)
-    with pytest.raises(ts.Error, match="mm_per_px 1e-09: with it the ball's radius is"):
-        ts.calibrate_height([frame], [3.0], background, mm_per_px=1e-9)
+    with pytest.raises(ts.Error, match="mm_per_px 0.001: with it the ball's radius is"):
+        ts.calibrate_height([frame], [3.0], background, mm_per_px=1e-3)
+    with pytest.raises(ts.Error, match="ball_diameters_mm: number 0 of it: a number is needed, this is 'x'"):
+        ts.calibrate_height([frame], ["x"], background, mm_per_px=0.1)
+    with pytest.raises(ts.Error, match="frames: a picture of shape .* is too large"):
+        ts.calibrate_height([np.broadcast_to(np.uint8(1), (2**31, 2**20, 3))], [3.0], background, mm_per_px=0.1)
     with pytest.raises(ts.Error, match="border: 'open' is not known"):
         ts.HeightEstimator(model, border="open")

@@ -132,6 +132,8 @@ BALL = {"name": "ball", "shape": {"type": "sphere", "radius_mm": 2}}
     ({"force_N": 0.3, "shear_N": (0.1, 0)}, "gross slip"),
     ({"depth_mm": 1.8}, "beyond the 1.2 mm in"),
     ({"depth_mm": 0.1, "seconds": 0}, "seconds is 0"),
+    ({"depth_mm": 0.1, "frame": -1}, "frame: -1 is not allowed; allowed is at least 0"),
+    ({"depth_mm": 0.1, "shear_mm": (1e6, 0)}, "shear_mm: (1000000, 0) is 1e+06 mm long; allowed is at most 100 mm"),
 ])
 def test_a_bad_press_is_refused(sensor, how, message):
     with pytest.raises(ts.Error) as caught:
@@ -208,6 +210,12 @@ def test_a_session_steps_slips_and_refuses(sensor, ball):
         session.step(np.diag([1, 1, 1, 1]) + np.array([[0, 0, 0, 30], [0] * 4, [0] * 4, [0] * 4]), 0.01)
     with pytest.raises(ts.Error, match="finite time above 0"):
         session.step(pose, 0)
+    far = pose.copy()
+    far[2, 3] = 1e6
+    with pytest.raises(ts.Error, match="allowed are 100000 parts a step"):
+        session.step(far, 0.01)
+    with pytest.raises(TypeError):
+        ts.Session(None, ball)
     assert session.reading.step == reading.step
     session.restart()
     assert session.reading.step == 0

@@ -99,6 +99,7 @@ TEST(DeviceCamera, WhatDoesntFitIsRefused) {
   EXPECT_THAT(error_of(with("f_number: 2.8", "f_number: 2.8\nhole_diameter_um: 100")), HasSubstr("hole_diameter_um"));
   EXPECT_THAT(error_of(with("type: lens", "type: pinhole")), HasSubstr("hole_diameter_um"));
   EXPECT_THAT(error_of(with("look_at_mm: [1, 2, 0]", "look_at_mm: [1, 2, -30]")), HasSubstr("no direction"));
+  EXPECT_THAT(error_of(with("look_at_mm: [1, 2, 0]", "look_at_mm: [1, 2, 1e300]")), HasSubstr("mm from the camera"));
   EXPECT_EQ(error_of(with("full_well_e", "bits: 1\nfull_well_e")), "");
   EXPECT_THAT(error_of(with("full_well_e", "bits: 0\nfull_well_e")), HasSubstr("bits"));
 }
