@@ -27,7 +27,7 @@ enum class View { kDesign, kVga, kSmallInLarge, kLarge };
 
 /// Pictures of a grid of 10 x 10 markers that shear and are pressed, each differently.
 Clip make_clip(View view) {
-  test::ColourPicture picture;
+  fixtures::ColourPicture picture;
   picture.noise = 2.0;
   picture.samples = 4;
   if (view == View::kVga) {
@@ -38,7 +38,7 @@ Clip make_clip(View view) {
     picture.middle_px = {320.4, 239.7};
   }
   const auto paint = [&] {
-    const cv::Mat small = test::paint_colour_markers(picture);
+    const cv::Mat small = fixtures::paint_colour_markers(picture);
     cv::Mat image = small;
     if (view == View::kSmallInLarge) {
       cv::copyMakeBorder(small, image, 2352, 2352, 3676, 3676, cv::BORDER_REPLICATE);
@@ -56,7 +56,7 @@ Clip make_clip(View view) {
       const double far = (picture.rest(i) - picture.middle_px).norm() / (4.0 * picture.spacing_px);
       displacements.push_back(std::exp(-far * far) * Eigen::Vector3d(0.2 * frame, -0.1 * frame, -0.5 * frame));
     }
-    test::displace(picture, displacements);
+    fixtures::displace(picture, displacements);
     picture.seed = static_cast<std::uint64_t>(2 + frame);
     clip.frames.push_back(paint());
   }

@@ -29,7 +29,7 @@ struct Scene {
 
 const Scene& scene() {
   static const Scene one = [] {
-    test::GelPainter painter(kWidth, kHeight, kScale, {.fall_off = 0.2});
+    fixtures::GelPainter painter(kWidth, kHeight, kScale, {.fall_off = 0.2});
     HeightCalibrationSettings settings;
     settings.mm_per_px = kScale;
     settings.correction = LightCorrection::fitted;

@@ -20,10 +20,10 @@ constexpr int kFrames = 16;
 std::vector<cv::Mat> make_clip() {
   std::vector<cv::Mat> clip;
   for (int frame = 0; frame < kFrames; ++frame) {
-    auto places = test::marker_grid();
+    auto places = fixtures::marker_grid();
     const double phase = 2.0 * 3.14159265358979323846 * frame / kFrames;
     for (Eigen::Vector2d& place : places) place += 3.0 * Eigen::Vector2d(1.0 - std::cos(phase), std::sin(phase));
-    clip.push_back(test::paint_markers({.noise = 2.0}, places, static_cast<std::uint64_t>(1 + frame)));
+    clip.push_back(fixtures::paint_markers({.noise = 2.0}, places, static_cast<std::uint64_t>(1 + frame)));
   }
   return clip;
 }

@@ -43,7 +43,7 @@ std::vector<MarkerField> make_clip(const MarkerCompliance& map) {
 /// Arguments: patches a side; whether a marker is missing, another one in each frame.
 void invert(benchmark::State& state) {
   const auto patches = static_cast<int>(state.range(0));
-  const MarkerCompliance map = test::half_space_markers(10, patches, 31.0 / patches);
+  const MarkerCompliance map = fixtures::half_space_markers(10, patches, 31.0 / patches);
   std::vector<MarkerField> clip = make_clip(map);
   if (state.range(1) != 0) {
     for (std::size_t k = 0; k < clip.size(); ++k) clip[k].measured[5 * k + 3] = 0;
