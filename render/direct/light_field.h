@@ -21,7 +21,7 @@ struct LightFieldSettings {
   GuideCut guides;         ///< into what beams light guides are cut
   int guide_points = 3;    ///< guide_beam_flows, 1 to 16
   int most_beams = 64;     ///< of all lamps together, see LightField; a direct renderer takes no more
-  int most_nodes = 400000;
+  int most_nodes = 1000000;
 };
 
 /// Which beams of the same guide lie beside a beam; -1 where there is none.
