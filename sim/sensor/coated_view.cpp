@@ -24,15 +24,29 @@ constexpr double kClearance_mm = 0.1;  // of the judged ball before its press
 constexpr int kRaysAPixel[] = {1};     // of direct light: some milliseconds a frame
 constexpr int kPathsAPixel = 256;      // where a device is unfit for direct light
 
+/// What part of the depth a point of the surface can be pressed in by: a fingertip's sides, which begin on the plate
+/// that it is bonded to, hardly move. 1 on flat gels and domes.
+double pressed_part(const GelSpec& gel, double z_mm) {
+  const FingertipSpec* const fingertip = gel.fingertip();
+  if (fingertip == nullptr) return 1.0;
+  const double held_mm = gel.thickness_mm - fingertip->sleeve_mm;
+  return std::clamp((z_mm + held_mm) / std::max(held_mm - fingertip->radius_mm, 1e-3), 0.0, 1.0);
+}
+
 /// States that go as far as the light has to reach: pushed flat to the side and in.
-std::vector<Truth> farthest_states(const fem::PressState& rest, const VirtualSensorSettings& settings) {
+std::vector<Truth> farthest_states(const fem::PressState& rest, const VirtualSensorSettings& settings,
+                                   const fem::Compliance& compliance, const GelSpec& gel) {
   std::vector<Truth> states;
   for (const double side : {-1.0, 1.0}) {
     Truth truth;
     truth.press = rest;
     truth.press.surface_displacement.col(0).setConstant(side * settings.widest_mm);
     truth.press.surface_displacement.col(1).setConstant(side * settings.widest_mm);
-    truth.press.surface_displacement.col(2).setConstant(side < 0 ? -settings.deepest_mm : 0.1 * settings.deepest_mm);
+    const double depth_mm = side < 0 ? -settings.deepest_mm : 0.1 * settings.deepest_mm;
+    for (std::size_t i = 0; i < compliance.vertices.size(); ++i) {
+      truth.press.surface_displacement(static_cast<Eigen::Index>(i), 2) =
+          depth_mm * pressed_part(gel, compliance.vertices[i].z());
+    }
     states.push_back(std::move(truth));
   }
   return states;
@@ -120,7 +134,7 @@ class CoatedView final : public SensorView {
       if (found) {
         direct_ = std::make_unique<const DirectLight>(*judged_, camera_, rest_, std::move(*found), settings_.edge_side);
       } else {
-        std::vector<Truth> states = farthest_states(rest_, settings_);
+        std::vector<Truth> states = farthest_states(rest_, settings_, gel_, device_.gel);
         states.push_back(play(straight_press(above, radius - 0.5 * settings_.deepest_mm)).back());
         direct_ = std::make_unique<const DirectLight>(*judged_, camera_, states, kRaysAPixel, settings_.edge_side,
                                                       settings_.guides);
