@@ -49,8 +49,7 @@ sensors::Background read_background(const std::vector<fs::path>& files) {
   return sensors::mean_background(frames);
 }
 
-std::vector<sensors::BallPress> read_ball_presses(const std::vector<AnnotatedPress>& table,
-                                                  const sensors::Background& background, double mm_per_px) {
+std::vector<sensors::BallPress> read_ball_presses(const std::vector<AnnotatedPress>& table) {
   std::vector<sensors::BallPress> presses;
   for (const AnnotatedPress& annotated : table) {
     try {
@@ -58,9 +57,7 @@ std::vector<sensors::BallPress> read_ball_presses(const std::vector<AnnotatedPre
       press.name = annotated.file.filename().string();
       press.frame = sim::read_image(annotated.file);
       press.ball_radius_mm = 0.5 * annotated.ball_diameter_mm;
-      press.circle = annotated.circle ? *annotated.circle
-                                      : sensors::find_contact_circle(press.frame, background, press.ball_radius_mm,
-                                                                     mm_per_px, press.name);
+      press.circle = annotated.circle;
       presses.push_back(std::move(press));
     } catch (const Error& error) {
       fail_at(annotated.where, "{}", error.what());

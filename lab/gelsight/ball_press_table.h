@@ -28,9 +28,7 @@ std::vector<AnnotatedPress> read_ball_press_table(const std::filesystem::path& f
 /// The mean of some pictures of the untouched gel. @throws Error naming the picture that's unfit
 sensors::Background read_background(const std::vector<std::filesystem::path>& files);
 
-/// Reads the pictures of the table; where no circle is given it is found.
-/// @throws Error with the table's line: a picture that can't be read or is unfit, or a circle that isn't found
-std::vector<sensors::BallPress> read_ball_presses(const std::vector<AnnotatedPress>& table,
-                                                  const sensors::Background& background, double mm_per_px);
+/// Reads the pictures of the table. @throws Error with the table's line for a picture that can't be read
+std::vector<sensors::BallPress> read_ball_presses(const std::vector<AnnotatedPress>& table);
 
 }  // namespace touchstone::lab

@@ -112,7 +112,6 @@ DomeHeights measure_dome_heights(const sim::VirtualSensor& sensor, const Calibra
                                  sensors::LightCorrection correction, std::uint64_t seed) {
   CalibrationPresses exact = presses;  // the dome's circles are the truth's: the finder can't be held against it
   exact.annotation_px = 0.0;
-  exact.most_saturated = sensors::PressSampling{}.most_saturated;
   sensors::HeightEstimator estimator(calibrate_heights(sensor, exact, correction, seed).calibration.model);
   DomeHeights heights;
   constexpr std::uint64_t kTestNoise = 1'000'000;  // seeds that calibration never saw

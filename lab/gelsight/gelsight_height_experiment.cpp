@@ -91,12 +91,14 @@ HeightCalibrationResult calibrate_heights(const sim::VirtualSensor& sensor, cons
       press.name = fmt::format("press {}", presses.size() + 1);
       press.frame = touch.frame;
       press.ball_radius_mm = kind.radius_mm;
-      press.circle.centre = centre + how.annotation_px * normal_pair(hand);
-      press.circle.radius = std::sqrt(contact.m00 / kPi) + how.annotation_px * hand.normal();
+      press.circle.emplace();
+      press.circle->centre = centre + how.annotation_px * normal_pair(hand);
+      press.circle->radius = std::sqrt(contact.m00 / kPi) + how.annotation_px * hand.normal();
       presses.push_back(press);
       try {
         const sensors::ContactCircle found =
-            sensors::find_contact_circle(press.frame, background, press.ball_radius_mm, mm_per_px, press.name);
+            sensors::find_contact_circle(sensors::difference_to(background, press.frame), background,
+                                         press.ball_radius_mm, {.mm_per_px = mm_per_px}, press.name);
         ++result.found_circles;
         if (&kind == &kinds.back() && how.wide_ball_depth_mm > 0.0) continue;
         squares += (found.centre - centre).squaredNorm();
@@ -110,8 +112,9 @@ HeightCalibrationResult calibrate_heights(const sim::VirtualSensor& sensor, cons
   sensors::HeightCalibrationSettings settings;
   settings.mm_per_px = mm_per_px;
   settings.correction = correction;
-  settings.sampling.most_saturated = how.most_saturated;
+  settings.most_lost = how.most_lost;
   result.calibration = sensors::calibrate_height(presses, background, settings);
+  sensors::require_all_used(result.calibration);
   result.circle_error_px = small_ones > 0 ? std::sqrt(squares / small_ones) : 0.0;
   return result;
 }

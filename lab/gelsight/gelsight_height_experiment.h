@@ -31,8 +31,8 @@ struct CalibrationPresses {
   double wide_ball_diameter_mm = 10.0;  ///< sec. 2.2.2: a larger one has more pixels
   double wide_ball_depth_mm = 0.3;      ///< 0: without the wide ball
   int background_frames = 8;
-  double annotation_px = 0.3;   ///< standard deviation of each coordinate and of the radius
-  double most_saturated = 0.5;  ///< of a press's pixels
+  double annotation_px = 0.3;  ///< standard deviation of each coordinate and of the radius
+  double most_lost = 0.5;      ///< of a press's pixels: two channels at 255
 };
 /// A calibration, and how well its circles were found.
 struct HeightCalibrationResult {
@@ -42,7 +42,7 @@ struct HeightCalibrationResult {
   double circle_error_px = 0.0;  ///< of the small ball's: RMS distance from the contact's centre
 };
 /// `correction`: absent, the one that errs least on presses that are left out (HeightCalibrationSettings).
-/// @throws Error as sensors::calibrate_height
+/// @throws Error as sensors::calibrate_height, or if a press can't be used
 HeightCalibrationResult calibrate_heights(const sim::VirtualSensor& sensor, const CalibrationPresses& presses,
                                           std::optional<sensors::LightCorrection> correction, std::uint64_t noise_seed);
 

@@ -148,14 +148,14 @@ sensors::HeightModel calibrate_view(const sim::VirtualSensor& sensor, std::uint6
                                        {.truth = false, .noise_seed = noise_seed + balls.size() + 1})
                                 .frame);
       press.ball_radius_mm = 0.5 * kBall_mm;
-      press.circle =
-          sensors::find_contact_circle(press.frame, background, press.ball_radius_mm, sensor.mm_per_px(), press.name);
       balls.push_back(std::move(press));
     }
   }
   sensors::HeightCalibrationSettings settings;
   settings.mm_per_px = sensor.mm_per_px();
-  return sensors::calibrate_height(balls, background, settings).model;
+  sensors::HeightCalibration calibration = sensors::calibrate_height(balls, background, settings);
+  sensors::require_all_used(calibration);
+  return std::move(calibration.model);
 }
 
 HeightsOf estimated_heights(const sim::VirtualSensor& sensor, const sensors::HeightModel& model,

@@ -18,6 +18,7 @@ using Heights = Guarded<sensors::HeightEstimator>;
 
 constexpr double kLargestPlace_px = 1e6;
 const Allowed kScales = Allowed::within(1e-4, 10.0);            // of a pixel, mm; as the command's --mm-per-px
+const Allowed kThicknesses = Allowed::within(0.01, 1000.0);     // mm
 const Allowed kBallDiameters = Allowed::above_up_to(0.0, 1e4);  // mm; an object's radius may be as much
 
 std::optional<sensors::LightCorrection> correction_named(const std::string& name) {
@@ -28,9 +29,17 @@ std::optional<sensors::LightCorrection> correction_named(const std::string& name
   fail("correction: '{}' is not known; allowed is one of: best, none, background, fitted", name);
 }
 
+sensors::SlopeRegressor regressor_named(const std::string& name) {
+  if (name == "best") return sensors::SlopeRegressor::best;
+  if (name == "table") return sensors::SlopeRegressor::table;
+  if (name == "network") return sensors::SlopeRegressor::network;
+  fail("slopes: '{}' is not known; allowed is one of: best, table, network", name);
+}
+
 /// Frames of pressed balls, each with the outline (u, v, radius in pixels) of its touched part, or None to look for it.
 py::tuple calibrate_height(const py::object& frames, const py::object& ball_diameters_mm, const py::object& background,
-                           double mm_per_px, const py::object& circles, const std::string& correction) {
+                           double mm_per_px, const py::object& circles, const std::string& correction,
+                           const std::string& slopes, double gel_thickness_mm) {
   const std::vector<Picture> pictures = pictures_from(frames, "frames");
   const std::vector<Picture> rest = pictures_from(background, "background");
   const py::sequence diameters = sequence_from(ball_diameters_mm, "ball_diameters_mm");
@@ -63,6 +72,11 @@ py::tuple calibrate_height(const py::object& frames, const py::object& ball_diam
   sensors::HeightCalibrationSettings settings;
   settings.mm_per_px = mm_per_px;
   settings.correction = correction_named(correction);
+  settings.slopes = regressor_named(slopes);
+  settings.gel_thickness_mm = gel_thickness_mm;
+  if (!kThicknesses.holds(gel_thickness_mm)) {
+    fail("gel_thickness_mm: {} is not allowed; allowed is {}", gel_thickness_mm, kThicknesses.text());
+  }
   if (!kScales.holds(mm_per_px)) {
     fail("mm_per_px: {} is not allowed; allowed is {}", mm_per_px, kScales.text());
   }
@@ -76,9 +90,7 @@ py::tuple calibrate_height(const py::object& frames, const py::object& ball_diam
       press.name = fmt::format("frame {}", i);
       press.frame = pictures[i].mat;
       press.ball_radius_mm = radii_mm[i];
-      press.circle = known[i]
-                         ? *known[i]
-                         : sensors::find_contact_circle(press.frame, mean, press.ball_radius_mm, mm_per_px, press.name);
+      press.circle = known[i];
       presses.push_back(std::move(press));
     }
     return sensors::calibrate_height(presses, mean, settings);
@@ -88,6 +100,12 @@ py::tuple calibrate_height(const py::object& frames, const py::object& ball_diam
   report["rms_slope_error"] = made.rms_slope_error;
   report["correction"] = sensors::name_of(made.model.correction);
   report["steepest_slope"] = made.coverage.steepest_slope;
+  report["slopes"] = made.model.network ? "network" : "table";
+  py::dict left_out;
+  for (const sensors::PressUse& use : made.presses) {
+    if (!use.flaw.empty()) left_out[py::str(use.name)] = use.flaw;
+  }
+  report["left_out"] = left_out;
   return py::make_tuple(std::make_shared<HeightModel>(made.model), report);
 }
 
@@ -137,10 +155,14 @@ void bind_gelsight(py::module_& module) {
   module.def(
       "calibrate_height", &calibrate_height, py::arg("frames"), py::arg("ball_diameters_mm"), py::arg("background"),
       py::kw_only(), py::arg("mm_per_px"), py::arg("circles") = py::none(), py::arg("correction") = "best",
+      py::arg("slopes") = "best", py::arg("gel_thickness_mm") = 4.0,
       "Learns from frames of pressed balls: returns (HeightModel, report).\n\n"
       "frames: pictures, uint8, BGR. ball_diameters_mm: one each. background: frames of the untouched gel.\n"
       "mm_per_px: of the membrane. circles: for each frame (u, v, radius) in pixels of the touched part, or None to "
-      "look for it.\ncorrection: of colours for the place: 'none', 'background', 'fitted' lamps or the 'best'.");
+      "look for it.\ncorrection: of colours for the place: 'none', 'background', 'fitted' lamps or the 'best'.\n"
+      "slopes: read by a 'table', a 'network' or the 'best' on presses that were left out. gel_thickness_mm: says how "
+      "far "
+      "the gel sinks round a ball.\nFrames that can't be used are left out: report['left_out'] says which and why.");
 
   py::class_<HeightResult>(module, "HeightResult", "What one frame gives; arrays are its own memory.")
       .def_property_readonly(
@@ -156,7 +178,11 @@ void bind_gelsight(py::module_& module) {
           "bool: higher than floor and share of the highest point.")
       .def_readonly("contact_pixels", &HeightResult::contact_pixels, "In contact.")
       .def_readonly("saturated_share", &HeightResult::saturated_share, "Of the pixels.")
+      .def_readonly("lost_share", &HeightResult::lost_share, "Of the pixels: two channels are at 255.")
       .def_readonly("dark_share", &HeightResult::dark_share, "Of the pixels.")
+      .def_property_readonly(
+          "gain", [](const HeightResult& self) { return py::make_tuple(self.gain[0], self.gain[1], self.gain[2]); },
+          "(blue, green, red): what the frame's channels were stronger by than the background's.")
       .def_readonly("contact_at_border", &HeightResult::contact_at_border, "The contact runs out of the picture.")
       .def_property_readonly("trusted", &HeightResult::trusted, "Neither overexposed nor dark nor of one colour.");
   py::class_<Heights, std::shared_ptr<Heights>>(
@@ -170,7 +196,16 @@ void bind_gelsight(py::module_& module) {
             const Picture picture = picture_from(frame, "frame");
             return self.with([&](auto& estimator) { return copy_of(estimator.estimate(picture.mat)); });
           },
-          py::arg("frame"), "The HeightResult of a frame, uint8, BGR, of the model's size.");
+          py::arg("frame"), "The HeightResult of a frame, uint8, BGR, of the model's size.")
+      .def(
+          "doubts",
+          [](Heights& self, const py::object& frame) {
+            const Picture picture = picture_from(frame, "frame");
+            return self.with([&](auto& estimator) { return array_of(estimator.doubts(picture.mat)); });
+          },
+          py::arg("frame"),
+          "uint8: for each pixel the sum of 1 (one channel is at 255), 2 (two are, or all are 0), 4 (calibration has "
+          "seen no colour like it), 8 (steeper than what it has seen).");
 }
 
 }  // namespace touchstone::python

@@ -30,9 +30,7 @@ double saturated_share(const cv::Mat& frame) {
   std::int64_t count = 0;
   for (int v = 0; v < frame.rows; ++v) {
     const auto* row = frame.ptr<cv::Vec3b>(v);
-    count += std::count_if(row, row + frame.cols, [](const cv::Vec3b& pixel) {
-      return pixel[0] == 255 || pixel[1] == 255 || pixel[2] == 255;
-    });
+    count += std::count_if(row, row + frame.cols, [](const cv::Vec3b& pixel) { return saturated_channels(pixel) > 0; });
   }
   return static_cast<double>(count) / static_cast<double>(frame.total());
 }
@@ -71,12 +69,15 @@ Background mean_background(std::span<const cv::Mat> frames) {
   return background;
 }
 
-cv::Mat difference_to(const Background& background, const cv::Mat& frame) {
+cv::Mat difference_to(const Background& background, const cv::Mat& frame, const cv::Vec3d& gain) {
   TS_ASSERT(background.mean.type() == CV_32FC3);
   const std::string fault = frame_fault(frame, background.mean.size());
   if (!fault.empty()) fail("the frame {}", fault);
   cv::Mat difference;
   frame.convertTo(difference, CV_32F);
+  if (gain != cv::Vec3d(1.0, 1.0, 1.0)) {
+    cv::multiply(difference, cv::Scalar(1.0 / gain[0], 1.0 / gain[1], 1.0 / gain[2]), difference);
+  }
   difference -= background.mean;
   return difference;
 }

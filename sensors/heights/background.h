@@ -23,10 +23,16 @@ std::string frame_fault(const cv::Mat& frame, const cv::Size& size);
 /// frame's pixels are saturated (a difference to 255 shows nothing)
 Background mean_background(std::span<const cv::Mat> frames);
 
-/// frame - background with its sign, CV_32FC3. @throws Error naming what makes the frame unfit
-cv::Mat difference_to(const Background& background, const cv::Mat& frame);
+/// frame / gain - background with its sign, CV_32FC3. `gain` is what the frame's channels are stronger by
+/// (frame_gain.h). @throws Error naming what makes the frame unfit
+cv::Mat difference_to(const Background& background, const cv::Mat& frame, const cv::Vec3d& gain = {1.0, 1.0, 1.0});
 
 /// The share of pixels with a channel at 255.
 double saturated_share(const cv::Mat& frame);
+
+/// How many of a pixel's channels are cut off at 255. One leaves two that still show a slope; two leave none.
+inline int saturated_channels(const cv::Vec3b& pixel) {
+  return (pixel[0] == 255 ? 1 : 0) + (pixel[1] == 255 ? 1 : 0) + (pixel[2] == 255 ? 1 : 0);
+}
 
 }  // namespace touchstone::sensors

@@ -1,13 +1,13 @@
 #include "sensors/heights/ball_press.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
+#include <tuple>
 
 #include "core/error.h"
 #include "core/units.h"
+#include "sensors/heights/ball_search.h"
 
 namespace touchstone::sensors {
 namespace {
@@ -17,18 +17,19 @@ constexpr double kWidestBall = 10.0;  // radius by the frame's larger side: of a
 constexpr double kSmallestRadius_px = 4.0;
 constexpr double kFaintest_percent = 15.0;  // less is no contact
 constexpr float kDarkest_DN = 10.0F;        // a darker background doesn't count for less
-constexpr double kStrongPart = 0.5;         // of a contact's own brightening, which marks others
-constexpr double kSecondArea = 0.15;        // of the first contact, from which a second counts
-constexpr double kSurroundings = 1.1;       // ball radii: nothing nearer is another ball
-constexpr double kWidest = 3.4;             // ball radii: what one ball can brighten
-constexpr double kFitPart = 0.85;           // of the contact's radius: where colours are compared with a ball's,
-constexpr double kFitPartOfBall = 0.5;      // and of the ball's: steeper parts may lie in a lamp's shadow
+constexpr double kSecond = 0.3;             // of the first contact's energy, from which there is a second one
+// Of the search for the circle:
+constexpr double kLineBall_px = 60.0;  // ball radius: larger pictures are shrunk
+constexpr double kFine_px = 1.0;       // the line's blur
+constexpr double kBroad_px = 3.0;      // what is taken off, and no line
+constexpr double kAround = 0.22;       // ball radii that the centre may lie off the first guess
+constexpr double kNarrowest = 0.72;    // radii that are tried, by the first guess's
+constexpr double kWidest = 1.3;
+constexpr double kMostOfBall = 0.97;  // contact radius by the ball's
 
-enum class Change { brighter, either };
-
-/// By how many percent of the background a pixel has changed, summed over the channels, smoothed against noise. Flanks
+/// By how many percent of the background a pixel is brighter, summed over the channels, smoothed against noise. Flanks
 /// are brighter in the colour of the lamp that they face; the shadows that a contact casts are only darker.
-cv::Mat change_of(const cv::Mat& difference, const Background& background, Change kind) {
+cv::Mat brightening_of(const cv::Mat& difference, const Background& background) {
   cv::Mat change(difference.size(), CV_32FC1);
   for (int v = 0; v < difference.rows; ++v) {
     const auto* in = difference.ptr<cv::Vec3f>(v);
@@ -37,8 +38,7 @@ cv::Mat change_of(const cv::Mat& difference, const Background& background, Chang
     for (int u = 0; u < difference.cols; ++u) {
       out[u] = 0.0F;
       for (int c = 0; c < 3; ++c) {
-        const float part = kind == Change::either ? std::abs(in[u][c]) : std::max(in[u][c], 0.0F);
-        out[u] += 100.0F * part / std::max(rest[u][c], kDarkest_DN);
+        out[u] += 100.0F * std::max(in[u][c], 0.0F) / std::max(rest[u][c], kDarkest_DN);
       }
     }
   }
@@ -69,98 +69,131 @@ float quantile(std::vector<float> values, double share) {
   return *at;
 }
 
-/// @throws Error if there's a second contact: two balls of one size touch the gel at least their diameter apart
-void refuse_second_contact(const cv::Mat& brightening, const ContactCircle& circle, double ball_px, float strong,
-                           const std::string& name) {
-  cv::Mat marks = brightening > kStrongPart * static_cast<double>(strong);
-  for_each_pixel(marks.size(), circle.centre, kSurroundings * ball_px,
-                 [&](int u, int v, const Eigen::Vector2d&) { marks.at<unsigned char>(v, u) = 0; });
-  cv::Mat labels;
-  cv::Mat statistics;
-  cv::Mat centroids;
-  const int count = cv::connectedComponentsWithStats(marks, labels, statistics, centroids);
-  for (int i = 1; i < count; ++i) {
-    if (statistics.at<int>(i, cv::CC_STAT_AREA) > kSecondArea * kPi * circle.radius * circle.radius) {
-      fail("{}: there's a second contact near pixel ({:.0f}, {:.0f}); calibrate with one ball a frame", name,
-           centroids.at<double>(i, 0), centroids.at<double>(i, 1));
+/// Where the picture is a fine bright line in some channel: its relative change less the same more blurred.
+cv::Mat lines_of(const cv::Mat& difference, const Background& background, double shrink) {
+  cv::Mat change(difference.size(), CV_32FC3);
+  for (int v = 0; v < difference.rows; ++v) {
+    const auto* in = difference.ptr<cv::Vec3f>(v);
+    const auto* rest = background.mean.ptr<cv::Vec3f>(v);
+    auto* out = change.ptr<cv::Vec3f>(v);
+    for (int u = 0; u < difference.cols; ++u) {
+      for (int c = 0; c < 3; ++c) out[u][c] = in[u][c] / std::max(rest[u][c], kDarkest_DN);
     }
   }
+  if (shrink > 1.0) cv::resize(change, change, {}, 1.0 / shrink, 1.0 / shrink, cv::INTER_AREA);
+  cv::Mat fine;
+  cv::Mat broad;
+  cv::GaussianBlur(change, fine, {}, kFine_px, kFine_px, cv::BORDER_REPLICATE);
+  cv::GaussianBlur(change, broad, {}, kBroad_px, kBroad_px, cv::BORDER_REPLICATE);
+  fine -= broad;
+  cv::Mat lines(fine.size(), CV_32FC1);
+  for (int v = 0; v < fine.rows; ++v) {
+    for (int u = 0; u < fine.cols; ++u) {
+      const auto& pixel = fine.at<cv::Vec3f>(v, u);
+      lines.at<float>(v, u) = std::max({pixel[0], pixel[1], pixel[2]});
+    }
+  }
+  return lines;
 }
 
-/// What is left of the colours within the circle after the best matt shading of a ball at `centre`: sum of squares a
-/// pixel.
-double shading_misfit(const cv::Mat& difference, const Eigen::Vector2d& centre, double radius_px, double ball_px) {
-  // Regress the three channels on the ball's normals.
-  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
-  Eigen::Matrix3d right = Eigen::Matrix3d::Zero();
-  double squares = 0.0;
-  double weights = 0.0;
-  for_each_pixel(difference.size(), centre, radius_px, [&](int u, int v, const Eigen::Vector2d& offset) {
-    // Fades out towards the rim, so that the misfit doesn't jump when a pixel comes in.
-    const double weight = 1.0 - offset.squaredNorm() / (radius_px * radius_px);
-    const double depth = std::sqrt(ball_px * ball_px - offset.squaredNorm());
-    const Eigen::Vector3d tilt(offset.x() / ball_px, offset.y() / ball_px, depth / ball_px - 1.0);
-    const cv::Vec3f& pixel = difference.at<cv::Vec3f>(v, u);
-    const Eigen::Vector3d colour(pixel[0], pixel[1], pixel[2]);
-    normal += weight * tilt * tilt.transpose();
-    right += weight * tilt * colour.transpose();
-    squares += weight * colour.squaredNorm();
-    weights += weight;
-  });
-  if (weights <= 0.0) return INFINITY;
-  normal.diagonal().array() += 1e-9;
-  const Eigen::Matrix3d solution = normal.ldlt().solve(right);
-  return (squares - (solution.transpose() * right).trace()) / weights;
+/// The mean of an image along a circle, between pixels bilinear, beyond its edge 0.
+double mean_along(const cv::Mat& image, const ContactCircle& circle) {
+  constexpr int kPoints = 180;
+  double sum = 0.0;
+  for (int i = 0; i < kPoints; ++i) {
+    const double angle = 2.0 * kPi * i / kPoints;
+    const double x = circle.centre.x() + circle.radius * std::cos(angle) - 0.5;
+    const double y = circle.centre.y() + circle.radius * std::sin(angle) - 0.5;
+    const int u = static_cast<int>(std::floor(x));
+    const int v = static_cast<int>(std::floor(y));
+    if (u < 0 || v < 0 || u + 1 >= image.cols || v + 1 >= image.rows) continue;
+    const double s = x - u;
+    const double t = y - v;
+    sum += (1.0 - t) * ((1.0 - s) * image.at<float>(v, u) + s * image.at<float>(v, u + 1)) +
+           t * ((1.0 - s) * image.at<float>(v + 1, u) + s * image.at<float>(v + 1, u + 1));
+  }
+  return sum / kPoints;
 }
 
-/// Moves the centre to the least misfit by a pattern search down to a hundredth of a pixel.
-Eigen::Vector2d best_centre(const cv::Mat& difference, Eigen::Vector2d centre, double radius_px, double ball_px) {
-  double best = shading_misfit(difference, centre, radius_px, ball_px);
-  for (double step = 2.0; step > 0.01;) {
+/// The circle along which the lines are strongest, first on whole pixels, then by a pattern search.
+ContactCircle strongest_circle(const cv::Mat& lines, const ContactCircle& first, double around, double largest) {
+  ContactCircle best = first;
+  double strongest = -1.0;
+  const double low = std::max(2.0, kNarrowest * first.radius);
+  const double high = std::min(kWidest * first.radius, largest);
+  const int reach = std::max(2, static_cast<int>(around));
+  for (double radius = low; radius <= high; radius += 1.0) {
+    for (int dv = -reach; dv <= reach; ++dv) {
+      for (int du = -reach; du <= reach; ++du) {
+        const ContactCircle tried{first.centre + Eigen::Vector2d(du, dv), radius};
+        if (const double here = mean_along(lines, tried); here > strongest) {
+          strongest = here;
+          best = tried;
+        }
+      }
+    }
+  }
+  for (double step = 0.5; step > 0.02;) {
     bool moved = false;
-    for (const auto& [du, dv] : {std::pair{1, 0}, {-1, 0}, {0, 1}, {0, -1}}) {
-      const Eigen::Vector2d tried = centre + step * Eigen::Vector2d(du, dv);
-      if (const double misfit = shading_misfit(difference, tried, radius_px, ball_px); misfit < best) {
-        best = misfit;
-        centre = tried;
+    for (const auto& [du, dv, dr] : {std::tuple{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}}) {
+      const ContactCircle tried{best.centre + step * Eigen::Vector2d(du, dv),
+                                std::min(best.radius + step * dr, largest)};
+      if (const double here = mean_along(lines, tried); here > strongest) {
+        strongest = here;
+        best = tried;
         moved = true;
         break;
       }
     }
     if (!moved) step *= 0.5;
   }
-  return centre;
+  return best;
 }
 
-/// Where circles round `centre` have changed most in the mean: contact ends there and the slope falls off again.
-double rim_radius(const cv::Mat& change, const Eigen::Vector2d& centre, double largest) {
-  constexpr double kBin = 0.5;
-  std::vector<double> sums(static_cast<std::size_t>(largest / kBin) + 1, 0.0);
-  std::vector<double> counts(sums.size(), 0.0);
-  for_each_pixel(change.size(), centre, largest, [&](int u, int v, const Eigen::Vector2d& offset) {
-    const auto bin = std::min(static_cast<std::size_t>(offset.norm() / kBin), sums.size() - 1);
-    sums[bin] += change.at<float>(v, u);
-    counts[bin] += 1.0;
-  });
-  const auto ring = [&](std::size_t i) {  // over three bins, against the grid's own unevenness
-    double sum = 0.0;
-    double count = 0.0;
-    for (std::size_t j = i > 0 ? i - 1 : 0; j <= std::min(i + 1, sums.size() - 1); ++j) {
-      sum += sums[j];
-      count += counts[j];
-    }
-    return count > 0.0 ? sum / count : 0.0;
-  };
-  std::size_t best = 0;
-  for (std::size_t i = 0; i < sums.size(); ++i) {
-    if (ring(i) > ring(best)) best = i;
+/// @throws Error for a scale or a ball that can't be, by itself or with the picture's size
+void require_possible_ball(const cv::Size& size, double ball_radius_mm, const PressSettings& settings,
+                           const std::string& name) {
+  if (!(ball_radius_mm > 0.0) || !std::isfinite(ball_radius_mm)) {
+    fail("{}: ball radius {} mm: it must be above 0", name, ball_radius_mm);
   }
-  double shift = 0.0;
-  if (best > 0 && best + 1 < sums.size()) {
-    const double bend = ring(best - 1) - 2.0 * ring(best) + ring(best + 1);
-    if (bend < 0.0) shift = 0.5 * (ring(best - 1) - ring(best + 1)) / bend;
+  if (!(settings.gel_thickness_mm > 0.0) || !std::isfinite(settings.gel_thickness_mm)) {
+    fail("{}: gel_thickness_mm {}: it must be above 0", name, settings.gel_thickness_mm);
   }
-  return kBin * (static_cast<double>(best) + 0.5 + shift);
+  const double widest_px = kWidestBall * std::max(size.width, size.height);
+  if (!(settings.mm_per_px > 0.0) || !(ball_radius_mm / settings.mm_per_px <= widest_px)) {
+    fail(
+        "{}: mm_per_px {}: with it the ball's radius is {:.3g} px; allowed are at most {:.0f} px, {:.0f} times the "
+        "frame",
+        name, settings.mm_per_px, ball_radius_mm / settings.mm_per_px, widest_px, kWidestBall);
+  }
+}
+
+/// @throws Error for a circle that isn't whole in the picture or can't be the ball's
+void require_possible_circle(const BallPress& press, const PressSettings& settings) {
+  const ContactCircle& circle = *press.circle;
+  if (!circle.centre.allFinite() || !std::isfinite(circle.radius)) fail("{}: the circle isn't finite", press.name);
+  if (circle.radius < kSmallestRadius_px) {
+    fail("{}: contact radius {:.1f} px: at least {:.0f} are needed to estimate slopes", press.name, circle.radius,
+         kSmallestRadius_px);
+  }
+  if (circle.radius * settings.mm_per_px >= press.ball_radius_mm) {
+    fail("{}: the contact's radius, {:.1f} px = {:.3f} mm, must be below the ball's, {:.3f} mm", press.name,
+         circle.radius, circle.radius * settings.mm_per_px, press.ball_radius_mm);
+  }
+  const double right = press.frame.cols - circle.centre.x();
+  const double below = press.frame.rows - circle.centre.y();
+  if (std::min({circle.centre.x(), circle.centre.y(), right, below}) < circle.radius) {
+    fail("{}: the press at ({:.1f}, {:.1f}) of radius {:.1f} px reaches over the edge of the picture of {} x {}",
+         press.name, circle.centre.x(), circle.centre.y(), circle.radius, press.frame.cols, press.frame.rows);
+  }
+}
+
+/// What 90 % of the circle's pixels are brighter by, at most.
+float strength_of(const cv::Mat& brightening, const ContactCircle& circle) {
+  std::vector<float> within;
+  for_each_pixel(brightening.size(), circle.centre, circle.radius,
+                 [&](int u, int v, const Eigen::Vector2d&) { within.push_back(brightening.at<float>(v, u)); });
+  return within.empty() ? 0.0F : quantile(std::move(within), 0.9);
 }
 
 }  // namespace
@@ -171,133 +204,85 @@ Eigen::Vector2d ball_slope(const Eigen::Vector2d& offset_mm, double ball_radius_
   return -offset_mm / std::sqrt(rest);
 }
 
-std::vector<ColourSample> samples_of(const BallPress& press, const Background& background, double mm_per_px,
-                                     const PressSampling& how) {
-  TS_ASSERT(mm_per_px > 0.0);
-  const std::string fault = frame_fault(press.frame, background.mean.size());
-  if (!fault.empty()) fail("{}: the frame {}", press.name, fault);
-  const ContactCircle& circle = press.circle;
-  if (!circle.centre.allFinite() || !std::isfinite(circle.radius)) fail("{}: the circle isn't finite", press.name);
-  if (!(press.ball_radius_mm > 0.0) || !std::isfinite(press.ball_radius_mm)) {
-    fail("{}: ball radius {} mm: it must be above 0", press.name, press.ball_radius_mm);
+ContactCircle find_contact_circle(const cv::Mat& difference, const Background& background, double ball_radius_mm,
+                                  const PressSettings& settings, const std::string& name) {
+  require_possible_ball(difference.size(), ball_radius_mm, settings, name);
+  const double ball_px = ball_radius_mm / settings.mm_per_px;
+  const BallSearch search(difference.size(), ball_px, settings.gel_thickness_mm / settings.mm_per_px);
+  const BallSighting seen = search.find(difference);
+  const double shrink = std::max(1.0, ball_px / kLineBall_px);
+  const ContactCircle guess{seen.centre / shrink, seen.contact * ball_px / shrink};
+  ContactCircle circle = strongest_circle(lines_of(difference, background, shrink), guess, kAround * ball_px / shrink,
+                                          kMostOfBall * ball_px / shrink);
+  circle.centre *= shrink;
+  circle.radius *= shrink;
+  if (strength_of(brightening_of(difference, background), circle) < kFaintest_percent) {
+    fail("{}: no contact is seen: the frame is as the background", name);
   }
   if (circle.radius < kSmallestRadius_px) {
-    fail("{}: contact radius {:.1f} px: at least {:.0f} are needed to estimate slopes", press.name, circle.radius,
+    fail("{}: the contact's radius is {:.1f} px; at least {:.0f} are needed: press deeper", name, circle.radius,
          kSmallestRadius_px);
   }
-  if (circle.radius * mm_per_px >= press.ball_radius_mm) {
-    fail("{}: the contact's radius, {:.1f} px = {:.3f} mm, must be below the ball's, {:.3f} mm", press.name,
-         circle.radius, circle.radius * mm_per_px, press.ball_radius_mm);
+  const double to_edge = std::min(
+      {circle.centre.x(), circle.centre.y(), difference.cols - circle.centre.x(), difference.rows - circle.centre.y()});
+  if (to_edge < circle.radius) {
+    fail("{}: the contact touches the edge of the picture; press where all of it is seen", name);
   }
-  const double right = press.frame.cols - circle.centre.x();
-  const double below = press.frame.rows - circle.centre.y();
-  if (std::min({circle.centre.x(), circle.centre.y(), right, below}) < circle.radius) {
-    fail("{}: the press at ({:.1f}, {:.1f}) of radius {:.1f} px reaches over the edge of the picture of {} x {}",
-         press.name, circle.centre.x(), circle.centre.y(), circle.radius, press.frame.cols, press.frame.rows);
-  }
+  return circle;
+}
 
-  const cv::Mat difference = difference_to(background, press.frame);
-  const cv::Mat brightening = change_of(difference, background, Change::brighter);
-  std::vector<float> within;
-  for_each_pixel(brightening.size(), circle.centre, circle.radius,
-                 [&](int u, int v, const Eigen::Vector2d&) { within.push_back(brightening.at<float>(v, u)); });
-  const float strong = quantile(within, 0.9);
-  if (strong < kFaintest_percent)
+SeenPress see_press(const BallPress& press, const Background& background, const cv::Vec3d& gain,
+                    const PressSettings& settings) {
+  const std::string fault = frame_fault(press.frame, background.mean.size());
+  if (!fault.empty()) fail("{}: the frame {}", press.name, fault);
+  require_possible_ball(press.frame.size(), press.ball_radius_mm, settings, press.name);
+  SeenPress seen;
+  if (press.circle) require_possible_circle(press, settings);
+  seen.difference = difference_to(background, press.frame, gain);
+  seen.found = !press.circle.has_value();
+  seen.circle = press.circle
+                    ? *press.circle
+                    : find_contact_circle(seen.difference, background, press.ball_radius_mm, settings, press.name);
+  if (strength_of(brightening_of(seen.difference, background), seen.circle) < kFaintest_percent) {
     fail("{}: nothing is pressed at ({:.0f}, {:.0f}): the frame is as the background there", press.name,
-         circle.centre.x(), circle.centre.y());
-  refuse_second_contact(brightening, circle, press.ball_radius_mm / mm_per_px, strong, press.name);
+         seen.circle.centre.x(), seen.circle.centre.y());
+  }
+  const BallSearch search(press.frame.size(), press.ball_radius_mm / settings.mm_per_px,
+                          settings.gel_thickness_mm / settings.mm_per_px);
+  const BallSighting first = search.look_at(seen.difference, seen.circle.centre);
+  const BallSighting second = search.find_second(seen.difference, first);
+  if (second.energy > kSecond * first.energy) {
+    fail("{}: there's a second contact near pixel ({:.0f}, {:.0f}); calibrate with one ball a frame", press.name,
+         second.centre.x(), second.centre.y());
+  }
+  return seen;
+}
 
+std::vector<ColourSample> samples_of(const BallPress& press, const SeenPress& seen, const PressSettings& settings) {
   std::vector<ColourSample> samples;
-  int saturated = 0;
+  int lost = 0;
   int pixels = 0;
-  for_each_pixel(press.frame.size(), circle.centre, circle.radius - how.rim_px,
+  for_each_pixel(press.frame.size(), seen.circle.centre, seen.circle.radius - settings.rim_px,
                  [&](int u, int v, const Eigen::Vector2d& offset) {
                    ++pixels;
-                   const auto& raw = press.frame.at<cv::Vec3b>(v, u);
-                   if (raw[0] == 255 || raw[1] == 255 || raw[2] == 255) {
-                     ++saturated;
+                   const int saturated = saturated_channels(press.frame.at<cv::Vec3b>(v, u));
+                   if (saturated > 1) {
+                     ++lost;
                      return;
                    }
-                   const auto& pixel = difference.at<cv::Vec3f>(v, u);
+                   const auto& pixel = seen.difference.at<cv::Vec3f>(v, u);
                    ColourSample sample;
                    sample.place = Eigen::Vector2d(u + 0.5, v + 0.5).cast<float>();
                    sample.colour = {pixel[0], pixel[1], pixel[2]};
-                   sample.slope = ball_slope(offset * mm_per_px, press.ball_radius_mm).cast<float>();
+                   sample.slope = ball_slope(offset * settings.mm_per_px, press.ball_radius_mm).cast<float>();
+                   sample.saturated = saturated > 0;
                    samples.push_back(sample);
                  });
-  if (saturated > how.most_saturated * pixels) {
-    fail("{}: {:.0f} % of the contact's pixels are saturated; at most {:.0f} % may be: lower exposure or gain",
-         press.name, 100.0 * saturated / pixels, 100.0 * how.most_saturated);
+  if (lost > settings.most_lost * pixels) {
+    fail("{}: {:.0f} % of the contact's pixels have two channels at 255; at most {:.0f} % may: lower exposure or gain",
+         press.name, 100.0 * lost / pixels, 100.0 * settings.most_lost);
   }
   return samples;
-}
-
-ContactCircle find_contact_circle(const cv::Mat& frame, const Background& background, double ball_radius_mm,
-                                  double mm_per_px, const std::string& name) {
-  const std::string fault = frame_fault(frame, background.mean.size());
-  if (!fault.empty()) fail("{}: the frame {}", name, fault);
-  if (!(ball_radius_mm > 0.0) || !std::isfinite(ball_radius_mm)) {
-    fail("{}: ball radius {} mm: it must be above 0", name, ball_radius_mm);
-  }
-  const double widest_px = kWidestBall * std::max(frame.cols, frame.rows);
-  if (!(mm_per_px > 0.0) || !(ball_radius_mm / mm_per_px <= widest_px)) {
-    fail(
-        "{}: mm_per_px {}: with it the ball's radius is {:.3g} px; allowed are at most {:.0f} px, {:.0f} times the "
-        "frame",
-        name, mm_per_px, ball_radius_mm / mm_per_px, widest_px, kWidestBall);
-  }
-  const cv::Mat difference = difference_to(background, frame);
-  const cv::Mat brightening = change_of(difference, background, Change::brighter);
-  const cv::Mat change = change_of(difference, background, Change::either);
-  double highest = 0.0;
-  cv::minMaxLoc(brightening, nullptr, &highest);
-  if (highest < kFaintest_percent) fail("{}: no contact is seen: the frame is as the background", name);
-
-  cv::Mat marks = brightening > 0.35 * highest;
-  std::vector<std::vector<cv::Point>> outlines;
-  // A ball's middle is as bright as the gel at rest: only outlines count, and gaps in the ring are closed.
-  const double ball_px = ball_radius_mm / mm_per_px;
-  const int closing = std::max(3, 2 * static_cast<int>(0.1 * ball_px) + 1);
-  cv::morphologyEx(marks, marks, cv::MORPH_CLOSE, cv::getStructuringElement(cv::MORPH_ELLIPSE, {closing, closing}));
-  cv::findContours(marks, outlines, cv::RETR_EXTERNAL, cv::CHAIN_APPROX_NONE);
-  std::vector<cv::Point> all;
-  // Sickles of one ball belong together: they lie within the ball's own outline.
-  const auto largest = std::max_element(outlines.begin(), outlines.end(), [](const auto& a, const auto& b) {
-    return cv::contourArea(a) < cv::contourArea(b);
-  });
-  TS_ASSERT(largest != outlines.end());
-  const cv::Rect main = cv::boundingRect(*largest);
-  const Eigen::Vector2d main_centre(main.x + 0.5 * main.width, main.y + 0.5 * main.height);
-  for (const auto& outline : outlines) {
-    const cv::Rect box = cv::boundingRect(outline);
-    const Eigen::Vector2d centre(box.x + 0.5 * box.width, box.y + 0.5 * box.height);
-    if ((centre - main_centre).norm() < 1.5 * ball_px) all.insert(all.end(), outline.begin(), outline.end());
-  }
-  const cv::Rect box = cv::boundingRect(all);
-  if (box.x == 0 || box.y == 0 || box.x + box.width == frame.cols || box.y + box.height == frame.rows) {
-    fail("{}: the contact touches the edge of the picture; press where all of it is seen", name);
-  }
-  if (std::max(box.width, box.height) > kWidest * ball_px) {
-    fail("{}: the contact is {} x {} px, more than a ball of {:.2f} mm radius can make: is there more than one?", name,
-         box.width, box.height, ball_radius_mm);
-  }
-  ContactCircle circle;
-  circle.centre = {box.x + 0.5 * box.width, box.y + 0.5 * box.height};
-  circle.radius = std::min(0.25 * (box.width + box.height), 0.95 * ball_px);
-  for (int pass = 0; pass < 3; ++pass) {  // each makes the other better
-    circle.centre =
-        best_centre(difference, circle.centre, std::min(kFitPart * circle.radius, kFitPartOfBall * ball_px), ball_px);
-    circle.radius = std::min(rim_radius(change, circle.centre, 0.98 * ball_px), 0.97 * ball_px);
-    if (circle.radius < kSmallestRadius_px) {
-      fail("{}: the contact's radius is {:.1f} px; at least {:.0f} are needed: press deeper", name, circle.radius,
-           kSmallestRadius_px);
-    }
-  }
-  std::vector<float> within;
-  for_each_pixel(brightening.size(), circle.centre, circle.radius,
-                 [&](int u, int v, const Eigen::Vector2d&) { within.push_back(brightening.at<float>(v, u)); });
-  refuse_second_contact(brightening, circle, ball_px, quantile(within, 0.9), name);
-  return circle;
 }
 
 }  // namespace touchstone::sensors

@@ -20,6 +20,7 @@ constexpr int kBandRows = 4;
 static_assert(ColourCorrection::kLargestGain / static_cast<double>(kFinestStep_DN) <=
               std::min(32767.0 / (1 << kCoefficientBits), 32767.0 / (1 << kCellBits) / 256.0));
 constexpr float kClearly_DN = 12.0F;  // summed over the channels
+constexpr int kGainBits = 15;
 
 /// Is every pixel the first one's like? A frame of a gel differs from it in its first few.
 bool is_flat(const cv::Mat& frame) {
@@ -54,29 +55,50 @@ inline std::int16_t cell_along(const ChannelCells& channel, int u, std::int16_t 
   return above > channel.last ? channel.last : above;
 }
 
-TS_WIDE_CLONES void find_cells(const unsigned char* const* planes, const std::int16_t* const* rest,
-                               const ChannelCells* channels, const int* sides, int count, std::int32_t* cells) {
-  const unsigned char* const blue = planes[0];
-  const unsigned char* const green = planes[1];
-  const unsigned char* const red = planes[2];
-  const std::int16_t* const rest_blue = rest[0];
-  const std::int16_t* const rest_green = rest[1];
-  const std::int16_t* const rest_red = rest[2];
-  const ChannelCells along_blue = channels[0];
-  const ChannelCells along_green = channels[1];
-  const ChannelCells along_red = channels[2];
-  const std::int32_t side_green = sides[1];
-  const std::int32_t side_red = sides[2];
+/// A row's colours, and what stands for rest and the table.
+struct CellRow {
+  const unsigned char* const* planes;
+  const std::int16_t* const* rest;
+  const ChannelCells* channels;
+  const int* sides;
+  const std::int32_t* shares;  ///< by the channels' gains, in units of 2^-kGainBits; read if they are scaled
+};
+
+template <bool kScaled>
+inline __attribute__((always_inline)) void find_cells_of(const CellRow& row, int count, std::int32_t* cells) {
+  const unsigned char* const blue = row.planes[0];
+  const unsigned char* const green = row.planes[1];
+  const unsigned char* const red = row.planes[2];
+  const std::int16_t* const rest_blue = row.rest[0];
+  const std::int16_t* const rest_green = row.rest[1];
+  const std::int16_t* const rest_red = row.rest[2];
+  const ChannelCells along_blue = row.channels[0];
+  const ChannelCells along_green = row.channels[1];
+  const ChannelCells along_red = row.channels[2];
+  const std::int32_t side_green = row.sides[1];
+  const std::int32_t side_red = row.sides[2];
+  const auto fixed = [&](unsigned char value, int channel) -> std::int16_t {
+    if constexpr (!kScaled) return static_cast<std::int16_t>(value << kColourBits);
+    const std::int32_t scaled = (value * row.shares[channel]) >> (kGainBits - kColourBits);
+    return static_cast<std::int16_t>(scaled > 32767 ? 32767 : scaled);
+  };
 #pragma GCC ivdep
   for (int u = 0; u < count; ++u) {
-    const auto b = static_cast<std::int16_t>((blue[u] << kColourBits) - rest_blue[u]);
-    const auto g = static_cast<std::int16_t>((green[u] << kColourBits) - rest_green[u]);
-    const auto r = static_cast<std::int16_t>((red[u] << kColourBits) - rest_red[u]);
+    const auto b = static_cast<std::int16_t>(fixed(blue[u], 0) - rest_blue[u]);
+    const auto g = static_cast<std::int16_t>(fixed(green[u], 1) - rest_green[u]);
+    const auto r = static_cast<std::int16_t>(fixed(red[u], 2) - rest_red[u]);
     const std::int32_t cell_b = cell_along(along_blue, u, b, g, r);
     const std::int32_t cell_g = cell_along(along_green, u, b, g, r);
     const std::int32_t cell_r = cell_along(along_red, u, b, g, r);
     cells[u] = (cell_b * side_green + cell_g) * side_red + cell_r;
   }
+}
+
+TS_WIDE_CLONES void find_cells(const CellRow& row, int count, std::int32_t* cells) {
+  find_cells_of<false>(row, count, cells);
+}
+TS_WIDE_CLONES void find_scaled_cells(const CellRow& row, int count, std::int32_t* cells) {
+  find_cells_of<true>(row, count, cells);
 }
 
 void fetch_slopes(const Eigen::Vector2f* table, const std::int32_t* cells, int count, float* slope_u, float* slope_v) {
@@ -89,18 +111,22 @@ void fetch_slopes(const Eigen::Vector2f* table, const std::int32_t* cells, int c
 
 struct Extremes {
   int saturated = 0;
+  int lost = 0;
   int dark = 0;
 };
 
 TS_WIDE_CLONES Extremes count_extremes(const unsigned char* blue, const unsigned char* green, const unsigned char* red,
                                        int count) {
   int saturated = 0;
+  int lost = 0;
   int dark = 0;
   for (int u = 0; u < count; ++u) {
-    saturated += (blue[u] == 255) | (green[u] == 255) | (red[u] == 255) ? 1 : 0;
+    const int cut = (blue[u] == 255 ? 1 : 0) + (green[u] == 255 ? 1 : 0) + (red[u] == 255 ? 1 : 0);
+    saturated += cut > 0 ? 1 : 0;
+    lost += cut > 1 ? 1 : 0;
     dark += (blue[u] | green[u] | red[u]) == 0 ? 1 : 0;
   }
-  return {saturated, dark};
+  return {saturated, lost, dark};
 }
 
 const HeightModel& checked(const HeightModel& model) {
@@ -119,8 +145,10 @@ bool touches_border(const cv::Mat& mask) {
 HeightEstimator::HeightEstimator(const HeightModel& model, const HeightSettings& settings)
     : model_(checked(model)),
       settings_(settings),
-      poisson_(model.background.mean.cols, model.background.mean.rows, settings.border) {
+      poisson_(model.background.mean.cols, model.background.mean.rows, settings.border),
+      gains_(model.background) {
   const cv::Mat& mean = model_.background.mean;
+  if (model_.network) reader_.emplace(*model_.network, mean.size(), model_.mm_per_px);
   const int width = mean.cols;
   const int height = mean.rows;
   const auto pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
@@ -161,10 +189,12 @@ HeightEstimator::HeightEstimator(const HeightModel& model, const HeightSettings&
 }
 
 void HeightEstimator::look_up_slopes(const cv::Mat& frame) {
-  cv::split(frame, planes_);
   const int width = frame.cols;
   const auto pixels = static_cast<long>(frame.total());
-  Extremes extremes;
+  std::int32_t shares[3];
+  for (int c = 0; c < 3; ++c) {
+    shares[c] = static_cast<std::int32_t>(std::lround((1 << kGainBits) / result_.gain[c]));
+  }
   for (int v = 0; v < frame.rows; ++v) {
     const unsigned char* const planes[] = {planes_[0].ptr(v), planes_[1].ptr(v), planes_[2].ptr(v)};
     const long row = static_cast<long>(v) * width;
@@ -177,34 +207,78 @@ void HeightEstimator::look_up_slopes(const cv::Mat& frame) {
       channels[c] = {mine, mine + width, mine + 2L * width, offset_[c],
                      static_cast<std::int16_t>(model_.table.cells[static_cast<std::size_t>(c)] - 1)};
     }
-    find_cells(planes, rest, channels, model_.table.cells.data(), width, cell_.data());
+    const CellRow cells{planes, rest, channels, model_.table.cells.data(), shares};
+    (model_.white_balance ? find_scaled_cells : find_cells)(cells, width, cell_.data());
     fetch_slopes(model_.table.slopes.data(), cell_.data(), width, result_.slope_u.ptr<float>(v),
                  result_.slope_v.ptr<float>(v));
-    const Extremes here = count_extremes(planes[0], planes[1], planes[2], width);
+  }
+}
+
+void HeightEstimator::count_shares(const cv::Mat& frame) {
+  cv::split(frame, planes_);
+  Extremes extremes;
+  for (int v = 0; v < frame.rows; ++v) {
+    const Extremes here = count_extremes(planes_[0].ptr(v), planes_[1].ptr(v), planes_[2].ptr(v), frame.cols);
     extremes.saturated += here.saturated;
+    extremes.lost += here.lost;
     extremes.dark += here.dark;
   }
-  result_.saturated_share = static_cast<double>(extremes.saturated) / static_cast<double>(pixels);
-  result_.dark_share = static_cast<double>(extremes.dark) / static_cast<double>(pixels);
+  const auto pixels = static_cast<double>(frame.total());
+  result_.saturated_share = extremes.saturated / pixels;
+  result_.lost_share = extremes.lost / pixels;
+  result_.dark_share = extremes.dark / pixels;
+}
+
+void HeightEstimator::find_slopes(const cv::Mat& frame) {
+  const std::string fault = frame_fault(frame, model_.background.mean.size());
+  if (!fault.empty()) fail("the frame {}", fault);
+  if (model_.white_balance) result_.gain = gains_.find(frame).gain;
+  count_shares(frame);
+  if (!reader_) {
+    look_up_slopes(frame);
+    return;
+  }
+  reader_->read(difference_to(model_.background, frame, result_.gain), result_.slope_u, result_.slope_v);
 }
 
 const HeightResult& HeightEstimator::estimate(const cv::Mat& frame) {
-  const std::string fault = frame_fault(frame, model_.background.mean.size());
-  if (!fault.empty()) fail("the frame {}", fault);
-  look_up_slopes(frame);
+  find_slopes(frame);
   poisson_.integrate(result_.slope_u, result_.slope_v, model_.mm_per_px, result_.height_mm);
   if (settings_.border == HeightBorder::free) level_by_border(result_.height_mm);
   result_.contact_pixels = mark_contact(result_.height_mm, settings_.contact, result_.contact);
-  result_.overexposed = result_.saturated_share > settings_.most_saturated;
+  result_.overexposed = result_.lost_share > settings_.most_lost;
   result_.dark = result_.dark_share > settings_.most_dark;
   result_.flat = is_flat(frame);
   result_.contact_at_border = touches_border(result_.contact);
   return result_;
 }
 
-FrameCoverage HeightEstimator::coverage(const cv::Mat& frame) const {
-  const cv::Mat difference = difference_to(model_.background, frame);
+cv::Mat HeightEstimator::doubts(const cv::Mat& frame) {
+  find_slopes(frame);
+  const cv::Mat difference = difference_to(model_.background, frame, result_.gain);
   const ColourCorrection correction = correction_of(model_);
+  const auto steepest = static_cast<float>(model_.steepest_calibrated);
+  cv::Mat doubts(frame.size(), CV_8UC1);
+  for (int v = 0; v < frame.rows; ++v) {
+    for (int u = 0; u < frame.cols; ++u) {
+      const auto& raw = frame.at<cv::Vec3b>(v, u);
+      const auto& pixel = difference.at<cv::Vec3f>(v, u);
+      const Eigen::Matrix3f matrix = correction.at({u + 0.5, v + 0.5}).cast<float>();
+      const Eigen::Vector3f colour = matrix * Eigen::Vector3f(pixel[0], pixel[1], pixel[2]);
+      const int cut = saturated_channels(raw);
+      int bits = cut == 1 ? kSaturated : 0;
+      if (cut > 1 || (raw[0] | raw[1] | raw[2]) == 0) bits |= kLost;
+      if (!model_.table.measured_near(colour)) bits |= kUnseen;
+      if (std::hypot(result_.slope_u.at<float>(v, u), result_.slope_v.at<float>(v, u)) > steepest) bits |= kSteep;
+      doubts.at<unsigned char>(v, u) = static_cast<unsigned char>(bits);
+    }
+  }
+  return doubts;
+}
+
+FrameCoverage HeightEstimator::coverage(const cv::Mat& frame) {
+  const cv::Mat bits = doubts(frame);
+  const cv::Mat difference = difference_to(model_.background, frame, result_.gain);
   std::int64_t measured = 0;
   std::int64_t clear = 0;
   std::int64_t clear_measured = 0;
@@ -212,16 +286,14 @@ FrameCoverage HeightEstimator::coverage(const cv::Mat& frame) const {
   for (int v = 0; v < difference.rows; ++v) {
     for (int u = 0; u < difference.cols; ++u) {
       const auto& pixel = difference.at<cv::Vec3f>(v, u);
-      const Eigen::Vector3f colour(pixel[0], pixel[1], pixel[2]);
-      const Eigen::Matrix3f matrix = correction.at({u + 0.5, v + 0.5}).cast<float>();
-      const std::size_t cell = model_.table.index_of(matrix * colour);
-      const bool hit = model_.table.measured_near(matrix * colour);
+      const int doubt = bits.at<unsigned char>(v, u);
+      const bool hit = (doubt & kUnseen) == 0;
       measured += hit ? 1 : 0;
-      if (colour.lpNorm<1>() > kClearly_DN) {
+      if (std::abs(pixel[0]) + std::abs(pixel[1]) + std::abs(pixel[2]) > kClearly_DN) {
         ++clear;
         clear_measured += hit ? 1 : 0;
       }
-      steep += model_.table.slopes[cell].norm() > model_.steepest_calibrated ? 1 : 0;
+      steep += (doubt & kSteep) != 0 ? 1 : 0;
     }
   }
   const auto share = [](std::int64_t part, std::int64_t whole) {

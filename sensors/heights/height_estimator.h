@@ -3,10 +3,13 @@
 
 #include <cstdint>
 #include <opencv2/core/mat.hpp>
+#include <optional>
 #include <vector>
 
+#include "sensors/heights/frame_gain.h"
 #include "sensors/heights/height_map.h"
 #include "sensors/heights/height_model.h"
+#include "sensors/heights/slope_network.h"
 #include "sensors/numerics/poisson_solver.h"
 
 namespace touchstone::sensors {
@@ -15,8 +18,16 @@ namespace touchstone::sensors {
 struct HeightSettings {
   HeightBorder border = HeightBorder::zero;
   ContactRule contact{};
-  double most_saturated = 0.02;  ///< share of saturated pixels from which a frame is flagged
-  double most_dark = 0.5;        ///< share of black pixels, likewise
+  double most_lost = 0.02;  ///< share of pixels with two channels at 255 from which a frame is flagged
+  double most_dark = 0.5;   ///< share of black pixels, likewise
+};
+
+/// Why a pixel's slope is to be doubted: bits of HeightEstimator::doubts.
+enum SlopeDoubt : std::uint8_t {
+  kSaturated = 1,  ///< one channel is at 255: the slope is from two
+  kLost = 2,       ///< two or three are, or all are 0
+  kUnseen = 4,     ///< calibration has seen no colour like this
+  kSteep = 8       ///< steeper than 99 % of the calibration's pixels
 };
 
 /// What one frame gives. The images stay valid until the estimator's next frame.
@@ -25,9 +36,11 @@ struct HeightResult {
   cv::Mat slope_u, slope_v;  ///< CV_32FC1, as looked up
   cv::Mat contact;           ///< CV_8UC1: 255 where ContactRule says contact
   int contact_pixels = 0;
+  cv::Vec3d gain{1.0, 1.0, 1.0};   ///< of the frame's channels, BGR, which was taken out; 1 without white balance
   double saturated_share = 0.0;    ///< of the pixels: a channel is at 255
+  double lost_share = 0.0;         ///< of the pixels: two or three channels are
   double dark_share = 0.0;         ///< all channels are 0
-  bool overexposed = false;        ///< more saturated pixels than the settings allow: heights there are too flat
+  bool overexposed = false;        ///< more lost pixels than the settings allow: heights there are too flat
   bool dark = false;               ///< more black pixels than the settings allow: no light, or a covered camera
   bool flat = false;               ///< all pixels are alike: no camera that sees a gel delivers that
   bool contact_at_border = false;  ///< the contact runs out of the picture: use HeightBorder::free, and mind the level
@@ -42,8 +55,8 @@ struct FrameCoverage {
   double steep_share = 0.0;             ///< of the pixels: steeper than 99 % of the calibration's, so extrapolated
 };
 
-/// Made once for a model; then every frame costs the same and allocates nothing. Not for two threads at once.
-/// Colours and slopes are looked up at places that are corrected in bands of four rows.
+/// Made once for a model; then every frame costs the same and, read by the table, allocates nothing. Not for two
+/// threads at once. Colours and slopes are looked up at places that are corrected in bands of four rows.
 class HeightEstimator {
  public:
   /// @throws Error if the model is faulty
@@ -53,14 +66,21 @@ class HeightEstimator {
   const HeightResult& estimate(const cv::Mat& frame);
 
   /// @throws Error as estimate
-  FrameCoverage coverage(const cv::Mat& frame) const;
+  FrameCoverage coverage(const cv::Mat& frame);
+
+  /// SlopeDoubt bits of each pixel, CV_8UC1. @throws Error as estimate
+  cv::Mat doubts(const cv::Mat& frame);
 
  private:
+  void find_slopes(const cv::Mat& frame);  ///< fills the result's slopes, gain and shares
   void look_up_slopes(const cv::Mat& frame);
+  void count_shares(const cv::Mat& frame);
 
   HeightModel model_;
   HeightSettings settings_;
   PoissonSolver poisson_;
+  GainFinder gains_;
+  std::optional<SlopeReader> reader_;
   HeightResult result_;
   cv::Mat planes_[3];
   std::vector<std::int16_t> rest_;    ///< 3 planes: the background in 128ths

@@ -48,6 +48,9 @@ std::string fault_of(const HeightModel& model) {
   if (!(model.steepest_calibrated >= 0.0) || !std::isfinite(model.steepest_calibrated)) {
     return "the steepest calibrated slope isn't a number from 0 on";
   }
+  if (model.network) {
+    if (std::string fault = fault_of(*model.network); !fault.empty()) return "the network: " + fault;
+  }
   if (model.presses < 1) return "it is made of no press";
   return {};
 }

@@ -1,10 +1,12 @@
 #pragma once
 // What a height estimator knows of one sensor: everything that calibration has found.
 
+#include <optional>
 #include <string>
 
 #include "sensors/heights/background.h"
 #include "sensors/heights/lamp_model.h"
+#include "sensors/heights/slope_network.h"
 #include "sensors/heights/slope_table.h"
 
 namespace touchstone::sensors {
@@ -19,11 +21,13 @@ inline constexpr int kMostNodes = 64;
 struct HeightModel {
   double mm_per_px = 0.0;
   Background background;
+  bool white_balance = false;  ///< frames' own gains are found and taken out (frame_gain.h)
   LightCorrection correction = LightCorrection::none;
-  LampModel lamps;  ///< corrects places if `correction` is fitted; always there
-  SlopeTable table;
-  double steepest_calibrated = 0.0;  ///< slope that 99 % of the calibration's pixels are below
-  int presses = 0;                   ///< that it was made of
+  LampModel lamps;                      ///< corrects places if `correction` is fitted; always there
+  SlopeTable table;                     ///< always there: it also knows which colours calibration has seen
+  std::optional<SlopeNetwork> network;  ///< if there, slopes are its
+  double steepest_calibrated = 0.0;     ///< slope that 99 % of the calibration's pixels are below
+  int presses = 0;                      ///< that it was made of
 };
 
 /// What is wrong with a model, or the empty string: sizes that don't fit, figures that aren't finite or are out of

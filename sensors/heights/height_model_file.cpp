@@ -5,13 +5,14 @@
 
 #include "core/error.h"
 #include "core/whole_file.h"
+#include "sensors/learning/network_json.h"
 #include "sensors/models/json_payload.h"
 
 namespace touchstone::sensors {
 namespace {
 
 constexpr const char* kFormat = "touchstone.height_model";
-constexpr int kVersion = 2;  // 2: lamps at nodes; 1 had a polynomial
+constexpr int kVersion = 3;  // 3: white balance and network; 2 had neither; 1 had a polynomial for lamps
 constexpr int kLargestSide = 8192;
 constexpr int kMostCells = 1024;
 
@@ -26,6 +27,17 @@ Eigen::Matrix3d square_of(const JsonField& field) {
   Eigen::Matrix3d matrix;
   matrix << rows[0].transpose(), rows[1].transpose(), rows[2].transpose();
   return matrix;
+}
+
+SlopeNetwork slope_network_of(const JsonField& field) {
+  field.expect_map({"sigmoid", "layers", "neighbourhoods_mm"});
+  SlopeNetwork network;
+  const Eigen::Vector3d sizes = field.at("neighbourhoods_mm").vector<3>();
+  for (std::size_t i = 0; i < 3; ++i) network.neighbourhoods_mm[i] = sizes[static_cast<Eigen::Index>(i)];
+  Json plain = field.value;
+  plain.erase("neighbourhoods_mm");
+  network.network = network_of({plain, field.path, field.file});
+  return network;
 }
 
 }  // namespace
@@ -52,6 +64,12 @@ std::string to_bytes(const HeightModel& model) {
   json["background_noise_DN"] = nullptr;
   if (const auto& noise = model.background.noise_DN)
     json["background_noise_DN"] = {(*noise)[0], (*noise)[1], (*noise)[2]};
+  json["white_balance"] = model.white_balance;
+  json["network"] = nullptr;
+  if (model.network) {
+    json["network"] = json_of(model.network->network);
+    json["network"]["neighbourhoods_mm"] = model.network->neighbourhoods_mm;
+  }
   json["correction"] = name_of(model.correction);
   json["lamps"] = Json::array();
   for (const Eigen::Matrix3d& node : model.lamps.nodes) json["lamps"].push_back(matrix_to_json(node));
@@ -73,8 +91,8 @@ HeightModel height_model_from_bytes(std::string_view bytes, const std::string& n
   }
   root.expect_format(kFormat, kVersion);
   root.expect_map({"format", "version", "width_px", "height_px", "mm_per_px", "presses", "steepest_calibrated",
-                   "background_frames", "background_noise_DN", "correction", "lamps", "lamp_columns", "lamp_rows",
-                   "table_cells", "table_lowest_DN", "table_step_DN", "sha256"});
+                   "background_frames", "background_noise_DN", "white_balance", "network", "correction", "lamps",
+                   "lamp_columns", "lamp_rows", "table_cells", "table_lowest_DN", "table_step_DN", "sha256"});
   constexpr int kMany = std::numeric_limits<int>::max();
   HeightModel model;
   const auto width = static_cast<int>(root.at("width_px").whole_number(2, kLargestSide));
@@ -87,6 +105,8 @@ HeightModel height_model_from_bytes(std::string_view bytes, const std::string& n
     const Eigen::Vector3d values = noise.vector<3>();
     model.background.noise_DN = cv::Vec3d(values[0], values[1], values[2]);
   }
+  model.white_balance = root.at("white_balance").truth();
+  if (const JsonField network = root.at("network"); !network.value.is_null()) model.network = slope_network_of(network);
   model.correction =
       root.at("correction")
           .name_among(std::array{LightCorrection::none, LightCorrection::background, LightCorrection::fitted});

@@ -8,10 +8,10 @@
 
 namespace touchstone::sensors {
 
-/// The model as bytes (format "touchstone.height_model", version 1): a line of JSON with sizes, scale, lamps and the
-/// SHA-256 of what follows; then, little-endian, the background (float32, row by row, BGR), the table's slopes
-/// (float32, u and v) and its hits (uint16). Reading gives the same bits. @throws Error if the model is faulty
-/// (fault_of)
+/// The model as bytes (format "touchstone.height_model", version 3): a line of JSON with sizes, scale, lamps, the
+/// network if there is one, and the SHA-256 of what follows; then, little-endian, the background (float32, row by row,
+/// BGR), the table's slopes (float32, u and v) and its hits (uint16). Reading gives the same bits. @throws Error if the
+/// model is faulty (fault_of)
 std::string to_bytes(const HeightModel& model);
 
 /// Reads what to_bytes wrote; `name` stands for the file in messages.

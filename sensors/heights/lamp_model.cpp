@@ -119,7 +119,7 @@ LampModel fit_lamps(std::span<const ColourSample> samples, const cv::Size& size,
   std::vector<Sums> bins(static_cast<std::size_t>(kBins * bins_down));
   Sums all;
   for (const ColourSample& sample : samples) {
-    if (static_cast<double>(sample.slope.norm()) > how.steepest) continue;
+    if (sample.saturated || static_cast<double>(sample.slope.norm()) > how.steepest) continue;
     const Eigen::Vector2d place = sample.place.cast<double>();
     const int i = std::clamp(static_cast<int>(place.x() / bin_px), 0, kBins - 1);
     const int j = std::clamp(static_cast<int>(place.y() / bin_px), 0, bins_down - 1);

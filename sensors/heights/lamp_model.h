@@ -15,6 +15,7 @@ struct ColourSample {
   Eigen::Vector2f place = Eigen::Vector2f::Zero();   ///< px
   Eigen::Vector3f colour = Eigen::Vector3f::Zero();  ///< BGR, frame - background, digital numbers
   Eigen::Vector2f slope = Eigen::Vector2f::Zero();   ///< see height_map.h
+  bool saturated = false;  ///< one of its channels is cut off at 255: of no use for shading, which is linear
 };
 
 /// Which differences between places are taken out of the colours before they are looked up.
@@ -52,10 +53,10 @@ struct LampFit {
 /// The same lamps everywhere: a single node, for which all samples count alike.
 inline constexpr LampFit kEvenLamps{1, 1};
 
-/// Least squares fit at each node to the samples with slopes up to `how.steepest`: lamps that change linearly over the
-/// samples near the node. The weight of a sample falls off with its distance, less that of the nearest sample, so that
-/// no node is without samples; nodes outside of the rectangle that holds all samples take the lamps of its nearest
-/// point, so that nothing is extrapolated.
+/// Least squares fit at each node to the samples with slopes up to `how.steepest` that aren't saturated: lamps that
+/// change linearly over the samples near the node. The weight of a sample falls off with its distance, less that of the
+/// nearest sample, so that no node is without samples; nodes outside of the rectangle that holds all samples take the
+/// lamps of its nearest point, so that nothing is extrapolated.
 /// @throws Error if there are too few samples, their slopes all have one direction, or `how` has a figure not above 0
 LampModel fit_lamps(std::span<const ColourSample> samples, const cv::Size& size, const LampFit& how);
 

@@ -108,6 +108,12 @@ struct JsonField {
     return value.get<std::int64_t>();
   }
 
+  /// true or false.
+  bool truth() const {
+    if (!value.is_boolean()) refuse("must be true or false");
+    return value.get<bool>();
+  }
+
   /// A string.
   std::string text() const {
     if (!value.is_string()) refuse("is a {}, text is needed", value.type_name());

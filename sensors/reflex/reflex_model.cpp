@@ -37,8 +37,7 @@ ContactTree tree_of(const JsonField& json) {
     ContactTreeNode node;
     if (one.value.is_object() && one.value.contains("force_present")) {
       one.expect_map({"force_present"});
-      if (!one.value["force_present"].is_boolean()) one.at("force_present").refuse("must be true or false");
-      node.force_present = one.value["force_present"].get<bool>();
+      node.force_present = one.at("force_present").truth();
     } else {
       one.expect_map({"feature", "threshold", "above", "below"});
       node.feature = one.at("feature").name_among(kChipFeatures);

@@ -495,10 +495,13 @@ def table(t):
         "HeightEstimator.estimate": lambda: [
             Call(lambda border=border: ts.HeightEstimator(t.height_model, border=border).estimate, {
                 "frame": (t.touch.frame, pictures)}) for border in ("zero", "free")],
+        "HeightEstimator.doubts": lambda: [Call(lambda: ts.HeightEstimator(t.height_model).doubts, {
+            "frame": (t.touch.frame, pictures)})],
         "calibrate_height": lambda: [Call(lambda: ts.calibrate_height, {
             "frames": (t.heights[0][0], lists_of(pictures)), "ball_diameters_mm": (t.heights[0][1], lists_of(numbers)),
             "background": (t.heights[0][2], lists_of(pictures)), "mm_per_px": (t.sensor.mm_per_px, numbers),
-            "circles": (circles, lists_of(arrays)), "correction": ("none", texts)})
+            "circles": (circles, lists_of(arrays)), "correction": ("none", texts), "slopes": ("table", texts),
+            "gel_thickness_mm": (4.0, numbers)})
             for circles in ([t.circle],)] + [
             Call(lambda: ts.calibrate_height, {
                 "frames": (t.heights[0][0], lists_of(pictures)), "ball_diameters_mm": ([diameter], lists_of(numbers)),

@@ -24,11 +24,19 @@ class BallPressTest : public ::testing::Test {
   fixtures::Ball ball_{{5.2, 4.1}, kRadius, 0.7};
   BallPress press_ = painter_.press(ball_);
 
+  PressSettings settings_{.mm_per_px = kScale};
+
+  std::vector<ColourSample> samples(const BallPress& press) const {
+    return samples_of(press, see_press(press, background_, {1.0, 1.0, 1.0}, settings_), settings_);
+  }
   auto taking_samples(const BallPress& press) {
-    return [this, press] { samples_of(press, background_, kScale); };
+    return [this, press] { samples(press); };
+  }
+  ContactCircle found(const cv::Mat& frame) const {
+    return find_contact_circle(difference_to(background_, frame), background_, kRadius, settings_, "frame 3");
   }
   auto finding(const cv::Mat& frame) {
-    return [this, frame] { find_contact_circle(frame, background_, kRadius, kScale, "frame 3"); };
+    return [this, frame] { found(frame); };
   }
 };
 
@@ -44,10 +52,10 @@ TEST(BallSlope, IsTheSpheresDerivative) {
 }
 
 TEST_F(BallPressTest, SamplesAreTheTouchedPartOnly) {
-  const std::vector<ColourSample> samples = samples_of(press_, background_, kScale);
+  const std::vector<ColourSample> taken = samples(press_);
   const double radius_px = 0.7 / kScale - 1.0;
-  EXPECT_NEAR(static_cast<double>(samples.size()), kPi * radius_px * radius_px, 25.0);
-  for (const ColourSample& sample : samples) {
+  EXPECT_NEAR(static_cast<double>(taken.size()), kPi * radius_px * radius_px, 25.0);
+  for (const ColourSample& sample : taken) {
     const fixtures::Relief truth = ball_.at(kScale * sample.place.cast<double>());
     EXPECT_LT((truth.slope - sample.slope.cast<double>()).norm(), 1e-4);
   }
@@ -57,10 +65,9 @@ TEST_F(BallPressTest, CircleIsFoundWhereverItIs) {
   for (const Eigen::Vector2d& centre : {Eigen::Vector2d(5.2, 4.1), {2.5, 2.0}, {8.03, 6.27}}) {
     for (const double contact : {0.45, 0.6, 0.8}) {
       const BallPress press = painter_.press({centre, kRadius, contact});
-      const ContactCircle found = find_contact_circle(press.frame, background_, kRadius, kScale, "frame");
-      EXPECT_LT((found.centre - press.circle.centre).norm(), 0.15) << centre.transpose() << ", " << contact;
-      EXPECT_GT(found.radius, press.circle.radius - 1.5) << centre.transpose() << ", " << contact;
-      EXPECT_LT(found.radius, press.circle.radius + 0.5) << centre.transpose() << ", " << contact;
+      const ContactCircle circle = found(press.frame);
+      EXPECT_LT((circle.centre - press.circle->centre).norm(), 0.6) << centre.transpose() << ", " << contact;
+      EXPECT_NEAR(circle.radius, press.circle->radius, 1.2) << centre.transpose() << ", " << contact;
     }
   }
 }
@@ -80,8 +87,10 @@ TEST_F(BallPressTest, TwoBallsAreRefused) {
       const fixtures::Relief b = other.at(place);
       return a.height > b.height ? a : b;
     });
-    EXPECT_THROW(find_contact_circle(press_.frame, background_, kRadius, kScale, "frame"), Error) << distance;
     EXPECT_THAT(taking_samples(press_), ThrowsMessage<Error>(HasSubstr("second contact"))) << distance;
+    BallPress without = press_;
+    without.circle.reset();
+    EXPECT_THROW(samples(without), Error) << distance;
   }
 }
 
@@ -97,10 +106,10 @@ TEST_F(BallPressTest, UnfitFiguresAreNamed) {
     change(press);
     return taking_samples(press);
   };
-  EXPECT_THAT(with([](BallPress& p) { p.circle.radius = 20.0; }),
+  EXPECT_THAT(with([](BallPress& p) { p.circle->radius = 20.0; }),
               ThrowsMessage<Error>(HasSubstr("must be below the ball's")));
-  EXPECT_THAT(with([](BallPress& p) { p.circle.radius = 2.0; }), ThrowsMessage<Error>(HasSubstr("at least 4")));
-  EXPECT_THAT(with([](BallPress& p) { p.circle.radius = NAN; }), ThrowsMessage<Error>(HasSubstr("isn't finite")));
+  EXPECT_THAT(with([](BallPress& p) { p.circle->radius = 2.0; }), ThrowsMessage<Error>(HasSubstr("at least 4")));
+  EXPECT_THAT(with([](BallPress& p) { p.circle->radius = NAN; }), ThrowsMessage<Error>(HasSubstr("isn't finite")));
   EXPECT_THAT(with([](BallPress& p) { p.ball_radius_mm = 0.0; }), ThrowsMessage<Error>(HasSubstr("above 0")));
   EXPECT_THAT(with([](BallPress& p) { cv::extractChannel(p.frame, p.frame, 0); }),
               ThrowsMessage<Error>(HasSubstr("grey")));
@@ -108,16 +117,23 @@ TEST_F(BallPressTest, UnfitFiguresAreNamed) {
               ThrowsMessage<Error>(HasSubstr("200 x 100 px")));
 }
 
-TEST_F(BallPressTest, SaturatedPixelsAreLeftOutOrTooMany) {
+TEST_F(BallPressTest, PixelsWithTwoSaturatedChannelsAreLeftOutOrTooMany) {
   BallPress press = press_;
-  const int u = static_cast<int>(press.circle.centre.x());
-  const int v = static_cast<int>(press.circle.centre.y());
-  const std::size_t all = samples_of(press, background_, kScale).size();
-  press.frame = press_.frame.clone();
-  cv::rectangle(press.frame, cv::Rect(u - 2, v - 2, 4, 4), cv::Scalar(255, 90, 90), cv::FILLED);
-  EXPECT_EQ(samples_of(press, background_, kScale).size(), all - 16);
-  cv::rectangle(press.frame, cv::Rect(u - 6, v - 6, 12, 12), cv::Scalar(255, 90, 90), cv::FILLED);
-  EXPECT_THAT(taking_samples(press), ThrowsMessage<Error>(HasSubstr("are saturated; at most 20 %")));
+  const int u = static_cast<int>(press.circle->centre.x());
+  const int v = static_cast<int>(press.circle->centre.y());
+  const std::size_t all = samples(press).size();
+  const auto paint = [&](int half, const cv::Scalar& colour) {
+    press.frame = press_.frame.clone();
+    cv::rectangle(press.frame, cv::Rect(u - half, v - half, 2 * half, 2 * half), colour, cv::FILLED);
+  };
+  paint(2, {255, 255, 90});
+  EXPECT_EQ(samples(press).size(), all - 16);
+  paint(2, {255, 90, 90});  // one channel: the others still show the slope
+  const std::vector<ColourSample> kept = samples(press);
+  EXPECT_EQ(kept.size(), all);
+  EXPECT_EQ(std::count_if(kept.begin(), kept.end(), [](const ColourSample& one) { return one.saturated; }), 16);
+  paint(9, {255, 255, 90});
+  EXPECT_THAT(taking_samples(press), ThrowsMessage<Error>(HasSubstr("two channels at 255; at most 50 %")));
 }
 
 }  // namespace

@@ -96,7 +96,7 @@ class GelPainter {
     BallPress result;
     result.name = "press";
     result.frame = paint([&](const Eigen::Vector2d& place) { return ball.at(place); });
-    result.circle = {ball.centre_mm / mm_per_px_, ball.contact_mm / mm_per_px_};
+    result.circle = ContactCircle{ball.centre_mm / mm_per_px_, ball.contact_mm / mm_per_px_};
     result.ball_radius_mm = ball.radius_mm;
     return result;
   }
