@@ -26,6 +26,8 @@ constexpr double kAround = 0.22;       // ball radii that the centre may lie off
 constexpr double kNarrowest = 0.72;    // radii that are tried, by the first guess's
 constexpr double kWidest = 1.3;
 constexpr double kMostOfBall = 0.97;  // contact radius by the ball's
+// Of the ball's radius: samples farther out have slopes above 2, which a pixel changes much.
+constexpr double kFarthestOut = 0.9;
 
 /// By how many percent of the background a pixel is brighter, summed over the channels, smoothed against noise. Flanks
 /// are brighter in the colour of the lamp that they face; the shadows that a contact casts are only darker.
@@ -69,7 +71,9 @@ float quantile(std::vector<float> values, double share) {
   return *at;
 }
 
-/// Where the picture is a fine bright line in some channel: its relative change less the same more blurred.
+/// Where the picture is a fine line: its relative change less the same more blurred. In real light the rim is bright in
+/// all channels, in matt shading it's bright or dark, by the side; so the brightest channel counts, and all of them
+/// whatever their sign. The root lets a whole circle count for more than a bright arc.
 cv::Mat lines_of(const cv::Mat& difference, const Background& background, double shrink) {
   cv::Mat change(difference.size(), CV_32FC3);
   for (int v = 0; v < difference.rows; ++v) {
@@ -90,16 +94,20 @@ cv::Mat lines_of(const cv::Mat& difference, const Background& background, double
   for (int v = 0; v < fine.rows; ++v) {
     for (int u = 0; u < fine.cols; ++u) {
       const auto& pixel = fine.at<cv::Vec3f>(v, u);
-      lines.at<float>(v, u) = std::max({pixel[0], pixel[1], pixel[2]});
+      const float brightest = std::max({pixel[0], pixel[1], pixel[2]});
+      const float all = std::abs(pixel[0]) + std::abs(pixel[1]) + std::abs(pixel[2]);
+      lines.at<float>(v, u) = std::sqrt(std::max(brightest + all, 0.0F));
     }
   }
   return lines;
 }
 
-/// The mean of an image along a circle, between pixels bilinear, beyond its edge 0.
+/// The mean of an image along the part of a circle that lies in it, between pixels bilinear; 0 if that's less than
+/// half.
 double mean_along(const cv::Mat& image, const ContactCircle& circle) {
   constexpr int kPoints = 180;
   double sum = 0.0;
+  int inside = 0;
   for (int i = 0; i < kPoints; ++i) {
     const double angle = 2.0 * kPi * i / kPoints;
     const double x = circle.centre.x() + circle.radius * std::cos(angle) - 0.5;
@@ -107,12 +115,13 @@ double mean_along(const cv::Mat& image, const ContactCircle& circle) {
     const int u = static_cast<int>(std::floor(x));
     const int v = static_cast<int>(std::floor(y));
     if (u < 0 || v < 0 || u + 1 >= image.cols || v + 1 >= image.rows) continue;
+    ++inside;
     const double s = x - u;
     const double t = y - v;
     sum += (1.0 - t) * ((1.0 - s) * image.at<float>(v, u) + s * image.at<float>(v, u + 1)) +
            t * ((1.0 - s) * image.at<float>(v + 1, u) + s * image.at<float>(v + 1, u + 1));
   }
-  return sum / kPoints;
+  return 2 * inside > kPoints ? sum / inside : 0.0;
 }
 
 /// The circle along which the lines are strongest, first on whole pixels, then by a pattern search.
@@ -264,6 +273,7 @@ std::vector<ColourSample> samples_of(const BallPress& press, const SeenPress& se
   int pixels = 0;
   for_each_pixel(press.frame.size(), seen.circle.centre, seen.circle.radius - settings.rim_px,
                  [&](int u, int v, const Eigen::Vector2d& offset) {
+                   if (offset.norm() > kFarthestOut * press.ball_radius_mm / settings.mm_per_px) return;
                    ++pixels;
                    const int saturated = saturated_channels(press.frame.at<cv::Vec3b>(v, u));
                    if (saturated > 1) {

@@ -53,12 +53,13 @@ struct SeenPress {
 SeenPress see_press(const BallPress& press, const Background& background, const cv::Vec3d& gain,
                     const PressSettings& settings);
 
-/// The pixels of the touched part, colours as in the press's difference, not corrected for the place.
+/// The pixels of the touched part within 0.9 of the ball's radius, colours as in the press's difference, not corrected
+/// for the place.
 /// @throws Error naming the press if too many are saturated
 std::vector<ColourSample> samples_of(const BallPress& press, const SeenPress& seen, const PressSettings& settings);
 
 /// Looks for the one ball that a picture shows: first where matt shading of its imprint explains most (BallSearch),
-/// then the circle along which the picture is most a fine bright line: there the touched part ends, and the membrane's
+/// then the circle along which the picture is most a fine line: there the touched part ends, and the membrane's
 /// slope falls at once. On 20 recorded presses of one ball on a GelSight Mini the radii came out within 1.5 px (RMS) of
 /// their mean of 40; centres lie 2 to 3 px RMS from those drawn by hand.
 /// @param difference to the background, CV_32FC3, without the frame's gain

@@ -119,7 +119,7 @@ bool find_gains(std::span<const BallPress> presses, const Background& background
         use.flaw = fmt::format(
             "{}: only {:.0f} % of the picture is as the untouched gel's, at least {:.0f} % are needed: is it of "
             "another "
-            "sensor or unit, upside down, or all contact?",
+            "sensor or unit, upside down, or of several contacts?",
             press.name, 100.0 * use.gain.alike, 100.0 * kLeastAlike);
       } else {
         for (int c = 0; c < 3; ++c) squares += std::pow(std::log(use.gain.gain[c]), 2);

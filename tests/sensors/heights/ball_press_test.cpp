@@ -67,7 +67,7 @@ TEST_F(BallPressTest, CircleIsFoundWhereverItIs) {
       const BallPress press = painter_.press({centre, kRadius, contact});
       const ContactCircle circle = found(press.frame);
       EXPECT_LT((circle.centre - press.circle->centre).norm(), 0.6) << centre.transpose() << ", " << contact;
-      EXPECT_NEAR(circle.radius, press.circle->radius, 1.2) << centre.transpose() << ", " << contact;
+      EXPECT_NEAR(circle.radius, press.circle->radius, 1.0) << centre.transpose() << ", " << contact;
     }
   }
 }
