@@ -1,0 +1,71 @@
+#pragma once
+// A ball of known size pressed into a gel that shows depth as darkness: where it touches, the membrane is the ball's
+// cap. Outside it isn't: the gel sinks round the ball if it is thick, and bulges if it is thin and bonded.
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "sensors/heights/ball_press.h"
+#include "sensors/heights/darkening.h"
+
+namespace touchstone::sensors {
+
+/// The pixels of a contact that are equally far from its centre.
+struct PressRing {
+  double cap_mm = 0.0;     ///< how much less deep the ball is there than in its middle, so at most 0
+  double darkening = 0.0;  ///< mean of the middle half of the pixels: dust doesn't move it
+  int pixels = 0;
+};
+
+/// The pixels of a contact whose offset from its centre has a part along this angle (from u towards v, radians), or
+/// all.
+using HalfOfContact = std::optional<double>;
+
+/// A measured frame of one press.
+struct DarkPress {
+  std::string name;      ///< for messages
+  cv::Mat map;           ///< CV_32FC1, darkening
+  cv::Mat usable;        ///< CV_8UC1: 255 where neither saturated nor unlit
+  ContactCircle circle;  ///< px
+  double ball_radius_mm = 0.0;
+};
+
+/// Looks for the one ball that a frame shows. The centre is where the darkening depends on the distance alone; contact
+/// ends where the darkening falls off most steeply, since there a ball's slope ends to grow.
+/// @throws Error naming `name`: an unfit frame; nothing darker than at rest; brighter instead of darker (frame and rest
+///   picture changed over); more than one contact, or one that isn't round; one that reaches the picture's edge or is
+///   wider than the ball
+ContactCircle find_dark_circle(const cv::Mat& frame, const RestPicture& rest, const DarkeningSettings& settings,
+                               double ball_radius_mm, double mm_per_px, const std::string& name);
+
+/// Measures a press whose circle is known. @throws Error as find_dark_circle
+DarkPress measure_press(const BallPress& press, const RestPicture& rest, const DarkeningSettings& settings,
+                        double mm_per_px);
+
+/// Calls `use(u, v, distance_px, cap_mm)` for the pixels of the contact, without those at its rim, where the membrane
+/// leaves the ball and the milky layer mixes what is inside with what is outside.
+template <typename Use>
+void for_each_contact_pixel(const DarkPress& press, double mm_per_px, const HalfOfContact& half, Use use) {
+  constexpr double kRimPart = 0.03;  // of the radius
+  const double radius = press.circle.radius - std::max(1.0, kRimPart * press.circle.radius);
+  const double ball_px = press.ball_radius_mm / mm_per_px;
+  const Eigen::Vector2d towards = half ? Eigen::Vector2d(std::cos(*half), std::sin(*half)) : Eigen::Vector2d::Zero();
+  const auto first = [](double place) { return std::max(0, static_cast<int>(place)); };
+  const Eigen::Vector2d& centre = press.circle.centre;
+  for (int v = first(centre.y() - radius); v < press.map.rows && v < centre.y() + radius; ++v) {
+    for (int u = first(centre.x() - radius); u < press.map.cols && u < centre.x() + radius; ++u) {
+      const Eigen::Vector2d offset = Eigen::Vector2d(u + 0.5, v + 0.5) - centre;
+      const double distance = offset.norm();
+      if (distance > radius || (half && offset.dot(towards) <= 0.0)) continue;
+      use(u, v, distance, mm_per_px * (std::sqrt(ball_px * ball_px - distance * distance) - ball_px));
+    }
+  }
+}
+
+/// The contact as rings one pixel wide, from the middle outwards, without its rim.
+std::vector<PressRing> rings_of(const DarkPress& press, double mm_per_px, const HalfOfContact& half = {});
+
+}  // namespace touchstone::sensors
