@@ -15,8 +15,7 @@ namespace {
 // slope may well change by kBend times its mean, while rings are off by kRingError of the whole height.
 constexpr double kBend = 3.0;
 constexpr double kRingError = 0.01;
-constexpr int kFullRing = 20;         // pixels, from which a ring counts fully
-constexpr double kBelowRest = -0.01;  // darkening that the curve reaches down to at least, so that noise keeps its mean
+constexpr int kFullRing = 20;  // pixels, from which a ring counts fully
 
 struct Fit {
   DarknessCurve curve;
@@ -35,16 +34,14 @@ void add_height(double darkening, int first, Eigen::VectorXd& row) {
 
 /// Least squares over all rings for the curve's increments, at least 0, and the depths.
 Fit fit_curve(const std::vector<std::vector<PressRing>>& presses) {
-  double brightest = kBelowRest;
   double darkest = 0.0;
   for (const std::vector<PressRing>& rings : presses) {
     for (const PressRing& ring : rings) {
-      brightest = std::min(brightest, ring.darkening);
       darkest = std::max(darkest, ring.darkening);
     }
   }
   Fit fit;
-  fit.curve.first = static_cast<int>(std::floor(brightest / DarknessCurve::kStep));
+  fit.curve.first = static_cast<int>(std::lround(kBrightest / DarknessCurve::kStep));  // noise at rest keeps its mean
   const int last = std::max(1, static_cast<int>(std::ceil(darkest / DarknessCurve::kStep)));
   const int intervals = last - fit.curve.first;
   const auto unknowns = static_cast<Eigen::Index>(intervals + static_cast<int>(presses.size()));

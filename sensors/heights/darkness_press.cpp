@@ -21,6 +21,7 @@ constexpr double kSurroundings = 1.1;    // ball radii: nothing nearer is anothe
 constexpr double kStrongPart = 0.4;      // of a contact's own darkening, which marks others
 constexpr double kSecondArea = 0.1;      // of the first contact, from which a second counts
 constexpr double kMostUneven = 0.08;     // RMS about the rings' means by the peak: more isn't one ball
+constexpr double kRimPart = 0.03;        // of a contact's radius, at least a pixel: not learnt from
 constexpr double kLeastUsable = 0.8;     // of a contact's pixels
 
 using Bends = Eigen::Matrix<double, 5, 1>;  // a polynomial in the squared distance
@@ -275,6 +276,17 @@ DarkPress measure_press(const BallPress& given, const RestPicture& rest, const D
   const cv::Mat smooth = smoothed(press.map);
   peak_of(smooth, press.name);
   check_one_ball(press, smooth, given.ball_radius_mm / mm_per_px);
+  press.learnt_radius = press.circle.radius - std::max(1.0, kRimPart * press.circle.radius);
+  const std::vector<double> means = ring_means(press.map, press.circle.centre, press.learnt_radius);
+  const auto brighter =
+      std::find_if(means.begin(), means.end(), [](double darkening) { return darkening < kBrightest; });
+  press.learnt_radius = std::min(press.learnt_radius, static_cast<double>(brighter - means.begin()));
+  if (press.learnt_radius < kSmallestRadius_px - 1.0) {
+    fail(
+        "{}: the contact at ({:.0f}, {:.0f}) is brighter than the rest picture {:.0f} px from its middle already; it "
+        "must be darker over {:.0f} px at least",
+        press.name, press.circle.centre.x(), press.circle.centre.y(), press.learnt_radius, kSmallestRadius_px);
+  }
   int usable = 0;
   int pixels = 0;
   for_each_contact_pixel(press, mm_per_px, {}, [&](int u, int v, double, double) {

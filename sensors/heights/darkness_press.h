@@ -24,12 +24,18 @@ struct PressRing {
 /// all.
 using HalfOfContact = std::optional<double>;
 
+/// Darkening below which nothing is learnt. A gel that bulges beside a ball is brighter than that, but how bright a
+/// bulge is, no ball shows; heights there are held, and must not be held far below rest.
+inline constexpr double kBrightest = -0.01;
+
 /// A measured frame of one press.
 struct DarkPress {
-  std::string name;      ///< for messages
-  cv::Mat map;           ///< CV_32FC1, darkening
-  cv::Mat usable;        ///< CV_8UC1: 255 where neither saturated nor unlit
-  ContactCircle circle;  ///< px
+  std::string name;            ///< for messages
+  cv::Mat map;                 ///< CV_32FC1, darkening
+  cv::Mat usable;              ///< CV_8UC1: 255 where neither saturated nor unlit
+  ContactCircle circle;        ///< px
+  double learnt_radius = 0.0;  ///< px: without the rim, where the membrane leaves the ball and the milky layer mixes
+                               ///< what is inside with what is outside, and without what is brighter than kBrightest
   double ball_radius_mm = 0.0;
 };
 
@@ -45,12 +51,10 @@ ContactCircle find_dark_circle(const cv::Mat& frame, const RestPicture& rest, co
 DarkPress measure_press(const BallPress& press, const RestPicture& rest, const DarkeningSettings& settings,
                         double mm_per_px);
 
-/// Calls `use(u, v, distance_px, cap_mm)` for the pixels of the contact, without those at its rim, where the membrane
-/// leaves the ball and the milky layer mixes what is inside with what is outside.
+/// Calls `use(u, v, distance_px, cap_mm)` for the pixels of the contact that are learnt from.
 template <typename Use>
 void for_each_contact_pixel(const DarkPress& press, double mm_per_px, const HalfOfContact& half, Use use) {
-  constexpr double kRimPart = 0.03;  // of the radius
-  const double radius = press.circle.radius - std::max(1.0, kRimPart * press.circle.radius);
+  const double radius = press.learnt_radius;
   const double ball_px = press.ball_radius_mm / mm_per_px;
   const Eigen::Vector2d towards = half ? Eigen::Vector2d(std::cos(*half), std::sin(*half)) : Eigen::Vector2d::Zero();
   const auto first = [](double place) { return std::max(0, static_cast<int>(place)); };
@@ -65,7 +69,7 @@ void for_each_contact_pixel(const DarkPress& press, double mm_per_px, const Half
   }
 }
 
-/// The contact as rings one pixel wide, from the middle outwards, without its rim.
+/// The pixels that are learnt from as rings one pixel wide, from the middle outwards.
 std::vector<PressRing> rings_of(const DarkPress& press, double mm_per_px, const HalfOfContact& half = {});
 
 }  // namespace touchstone::sensors
