@@ -17,6 +17,9 @@ constexpr double kWidestBall = 10.0;     // radius by the frame's larger side
 constexpr double kWidestContact = 0.95;  // of the ball's radius: nearer to its equator the cap is too steep to use
 constexpr double kWidestFall = 1.15;     // likewise: where the darkening of a deep press may end, the milk blurs it
 constexpr double kFinding_px = 2.0;      // smoothing while a contact is looked for
+constexpr double kDust = 0.1;            // darkening off the median round it, from which a pixel is dust
+constexpr double kDustPart = 0.15;       // of the ball's radius: side of that median's window
+constexpr int kWidestDust_px = 11;       // likewise, at most: the smallest contacts aren't dust
 constexpr double kSurroundings = 1.1;    // ball radii: nothing nearer is another ball
 constexpr double kStrongPart = 0.4;      // of a contact's own darkening, which marks others
 constexpr double kSecondArea = 0.1;      // of the first contact, from which a second counts
@@ -123,8 +126,19 @@ void check_sizes(double ball_radius_mm, double mm_per_px, const cv::Size& size, 
   }
 }
 
+/// Specks that lay on the rest picture or on the frame, or moved, get the median of what is round them.
+void remove_dust(cv::Mat& map, double ball_px) {
+  cv::Mat levels;
+  map.convertTo(levels, CV_8U, 127.5, 127.5);
+  const int half = std::clamp(static_cast<int>(0.5 * kDustPart * ball_px), 2, kWidestDust_px / 2);
+  cv::medianBlur(levels, levels, 2 * half + 1);
+  cv::Mat median;
+  levels.convertTo(median, CV_32F, 1.0 / 127.5, -1.0);
+  median.copyTo(map, cv::abs(map - median) > kDust);
+}
+
 /// The darkening and where it counts.
-DarkPress measured(const cv::Mat& frame, const RestPicture& rest, const DarkeningSettings& settings,
+DarkPress measured(const cv::Mat& frame, const RestPicture& rest, const DarkeningSettings& settings, double ball_px,
                    const std::string& name) {
   if (const std::string fault = unfit_frame(frame, rest); !fault.empty()) fail("{}: the frame {}", name, fault);
   DarkeningMeter meter(rest, settings);
@@ -132,6 +146,7 @@ DarkPress measured(const cv::Mat& frame, const RestPicture& rest, const Darkenin
   DarkPress press;
   press.name = name;
   press.map = darkening.map.clone();
+  remove_dust(press.map, ball_px);
   press.usable = ~(darkening.saturated | meter.unlit());
   return press;
 }
@@ -243,12 +258,11 @@ ContactCircle rough_circle(const cv::Mat& smooth, double peak, double ball_px, c
 ContactCircle find_dark_circle(const cv::Mat& frame, const RestPicture& rest, const DarkeningSettings& settings,
                                double ball_radius_mm, double mm_per_px, const std::string& name) {
   check_sizes(ball_radius_mm, mm_per_px, frame.size(), name);
-  DarkPress press = measured(frame, rest, settings, name);
+  const double ball_px = ball_radius_mm / mm_per_px;
+  DarkPress press = measured(frame, rest, settings, ball_px, name);
   press.ball_radius_mm = ball_radius_mm;
   const cv::Mat smooth = smoothed(press.map);
-  const double peak = peak_of(smooth, name);
-  const double ball_px = ball_radius_mm / mm_per_px;
-  press.circle = rough_circle(smooth, peak, ball_px, name);
+  press.circle = rough_circle(smooth, peak_of(smooth, name), ball_px, name);
   for (int pass = 0; pass < 3; ++pass) {  // each makes the other better
     press.circle.centre = evenest_centre(smooth, press.circle.centre, press.circle.radius);
     const std::vector<double> means = ring_means(press.map, press.circle.centre, 1.3 * ball_px);
@@ -269,13 +283,14 @@ ContactCircle find_dark_circle(const cv::Mat& frame, const RestPicture& rest, co
 DarkPress measure_press(const BallPress& given, const RestPicture& rest, const DarkeningSettings& settings,
                         double mm_per_px) {
   check_sizes(given.ball_radius_mm, mm_per_px, given.frame.size(), given.name);
-  DarkPress press = measured(given.frame, rest, settings, given.name);
+  const double ball_px = given.ball_radius_mm / mm_per_px;
+  DarkPress press = measured(given.frame, rest, settings, ball_px, given.name);
   press.circle = given.circle;
   press.ball_radius_mm = given.ball_radius_mm;
   check_circle(press, mm_per_px);
   const cv::Mat smooth = smoothed(press.map);
   peak_of(smooth, press.name);
-  check_one_ball(press, smooth, given.ball_radius_mm / mm_per_px);
+  check_one_ball(press, smooth, ball_px);
   press.learnt_radius = press.circle.radius - std::max(1.0, kRimPart * press.circle.radius);
   const std::vector<double> means = ring_means(press.map, press.circle.centre, press.learnt_radius);
   const auto brighter =

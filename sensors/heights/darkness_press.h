@@ -31,7 +31,7 @@ inline constexpr double kBrightest = -0.01;
 /// A measured frame of one press.
 struct DarkPress {
   std::string name;            ///< for messages
-  cv::Mat map;                 ///< CV_32FC1, darkening
+  cv::Mat map;                 ///< CV_32FC1, darkening; dust is removed
   cv::Mat usable;              ///< CV_8UC1: 255 where neither saturated nor unlit
   ContactCircle circle;        ///< px
   double learnt_radius = 0.0;  ///< px: without the rim, where the membrane leaves the ball and the milky layer mixes

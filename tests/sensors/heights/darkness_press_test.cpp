@@ -52,6 +52,18 @@ TEST_F(DarknessPress, ExposureMovesNoCircle) {
   EXPECT_NEAR(as_it_is.radius, darker.radius, 0.5);
 }
 
+TEST_F(DarknessPress, DustThatMovedHidesNoBall) {
+  cv::Mat before = painter_.rest();
+  cv::Mat after = painter_.press(ball_).frame;
+  for (const cv::Point& speck : {cv::Point(40, 40), {250, 60}, {60, 200}, {150, 120}, {280, 210}}) {
+    before(cv::Rect(speck, cv::Size(3, 3))).setTo(cv::Scalar(40, 40, 40));
+    after(cv::Rect(speck + cv::Point(2, 1), cv::Size(3, 3))).setTo(cv::Scalar(40, 40, 40));
+  }
+  const ContactCircle found = find_dark_circle(after, rest_of(before), {}, 4.0, scale_, "dusty");
+  EXPECT_LT((found.centre - ball_.centre / scale_).norm(), 1.0);
+  EXPECT_NEAR(found.radius, ball_.contact_radius() / scale_, 3.0);
+}
+
 TEST_F(DarknessPress, RingsHoldTheCapAndItsDarkening) {
   DarkPress press = measure_press(painter_.press(ball_), rest_, {}, scale_);
   const std::vector<PressRing> rings = rings_of(press, scale_);
