@@ -57,10 +57,12 @@ py::tuple calibrate_darkness(const py::object& frames, const py::object& ball_di
   for (const sensors::BallPress& press : presses) {
     used.append(py::make_tuple(press.circle.centre.x(), press.circle.centre.y(), press.circle.radius));
   }
+  py::list depths;
+  for (const double depth : made.depths_mm) depths.append(depth);
   py::dict report;
   report["pixels"] = made.pixels;
   report["circles"] = used;
-  report["depths_mm"] = made.depths_mm;
+  report["depths_mm"] = depths;
   report["nearest_to_rest"] = made.nearest_to_rest;
   report["fitted"] = dict_of(made.fitted);
   report["held_out"] = dict_of(*made.held_out);

@@ -537,10 +537,11 @@ def table(t):
         "calibrate_darkness": lambda: [Call(lambda: ts.calibrate_darkness, {
             "frames": (t.darkness[0][0], lists_of(pictures)),
             "ball_diameters_mm": ([diameter], lists_of(numbers)), "rest": (t.darkness[0][2], lists_of(pictures)),
-            "mm_per_px": (scale, numbers), "circles": (circles, lists_of(arrays)), "smoothing_px": (1.5, numbers),
+            "mm_per_px": (scale, numbers), "circles": (circles, changed), "smoothing_px": (1.5, numbers),
             "follow_exposure": (True, flags)}, refused=diameter != 4.0)
-            for diameter, scale, circles in ((4.0, 0.05, [(60.0, 44.0, 32.0)]), (4.0, 0.05, [None]),
-                                             (1e-170, 1e-172, [(60.0, 44.0, 32.0)]), (1e300, 1e300, [None]))],
+            for diameter, scale, circles, changed in (
+                (4.0, 0.05, [(60.0, 44.0, 32.0)], lists_of(arrays)), (4.0, 0.05, [None], only(None)),
+                (1e-170, 1e-172, [(60.0, 44.0, 32.0)], lists_of(arrays)), (1e300, 1e300, [None], only(None)))],
         "BeadTracker": lambda: [Call(lambda: ts.BeadTracker, {
             "grid": (3, numbers), "roi_a_px": (200, numbers), "roi_b_px": (30, numbers), "polarity": ("dark", texts),
             "centre_px": ((160, 120), arrays)}, after=lambda tracker: tracker.track(beads_picture(), 0) and None)],
