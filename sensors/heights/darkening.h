@@ -33,6 +33,7 @@ RestPicture mean_rest(std::span<const cv::Mat> frames);
 /// What makes a picture unfit as a frame of the sensor that `rest` shows, or the empty string.
 std::string unfit_frame(const cv::Mat& frame, const RestPicture& rest);
 
+/// Largest DarkeningSettings::smoothing_px.
 inline constexpr double kMostSmoothing_px = 10.0;
 
 /// What is done before a frame is held against the rest picture.
