@@ -1,4 +1,5 @@
 #include <memory>
+#include <optional>
 
 #include "apps/command.h"
 #include "lab/dtact/dark_presses.h"
@@ -15,6 +16,7 @@ struct CalibrateOptions {
   fs::path annotations;
   std::vector<fs::path> rest;
   double mm_per_px = 0.0;
+  std::optional<double> camera_distance_mm;
   double smoothing_px = sensors::DarkeningSettings{}.smoothing_px;
   bool locked_exposure = false;
   fs::path out;
@@ -40,14 +42,15 @@ void print_error(const char* of, const sensors::ProfileError& error) {
 void calibrate(const CalibrateOptions& options) {
   require_writable_place(options.out);
   sensors::DarknessCalibrationSettings settings;
-  settings.mm_per_px = options.mm_per_px;
+  settings.scale.mm_per_px = options.mm_per_px;
+  if (options.camera_distance_mm) settings.scale.camera_distance_mm = *options.camera_distance_mm;
   settings.darkening.smoothing_px = options.smoothing_px;
   settings.darkening.follow_exposure = !options.locked_exposure;
   settings.cross_validate = true;
   const std::vector<lab::AnnotatedPress> table = lab::read_ball_press_table(options.frames, options.annotations);
   const sensors::RestPicture rest = lab::read_rest_picture(rest_files(options));
   const std::vector<sensors::BallPress> presses =
-      lab::read_dark_presses(table, rest, settings.darkening, options.mm_per_px);
+      lab::read_dark_presses(table, rest, settings.darkening, settings.scale);
   const sensors::DarknessCalibration result = sensors::calibrate_darkness(presses, rest, settings);
   sensors::save(result.model, options.out);
 
@@ -86,6 +89,12 @@ void add_9dtact_calibration(CLI::App& calibrations, const GlobalOptions&, Action
   command->add_option("--mm-per-px", options->mm_per_px, "Size of a pixel on the gel, mm")
       ->required()
       ->check(CLI::Range(1e-4, 10.0));
+  command
+      ->add_option(
+          "--camera-distance-mm", options->camera_distance_mm,
+          "How far before the gel the camera seems to stand (focal length in pixels times --mm-per-px): what is "
+          "pressed in looks larger. Without it that is left out")
+      ->check(CLI::Range(1.0, 1e6));
   command
       ->add_option("--smoothing-px", options->smoothing_px,
                    "Standard deviation of the Gaussian that pictures are smoothed by, px; 0 is none")

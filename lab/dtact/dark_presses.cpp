@@ -1,6 +1,5 @@
 #include "lab/dtact/dark_presses.h"
 
-#include "sensors/heights/darkness_press.h"
 #include "sim/files/image_file.h"
 
 namespace touchstone::lab {
@@ -26,7 +25,8 @@ sensors::RestPicture read_rest_picture(const std::vector<fs::path>& files) {
 
 std::vector<sensors::BallPress> read_dark_presses(const std::vector<AnnotatedPress>& table,
                                                   const sensors::RestPicture& rest,
-                                                  const sensors::DarkeningSettings& settings, double mm_per_px) {
+                                                  const sensors::DarkeningSettings& settings,
+                                                  const sensors::PressScale& scale) {
   std::vector<sensors::BallPress> presses;
   for (const AnnotatedPress& annotated : table) {
     try {
@@ -36,7 +36,7 @@ std::vector<sensors::BallPress> read_dark_presses(const std::vector<AnnotatedPre
       press.ball_radius_mm = 0.5 * annotated.ball_diameter_mm;
       press.circle = annotated.circle ? *annotated.circle
                                       : sensors::find_dark_circle(press.frame, rest, settings, press.ball_radius_mm,
-                                                                  mm_per_px, press.name);
+                                                                  scale, press.name);
       presses.push_back(std::move(press));
     } catch (const Error& error) {
       fail_at(annotated.where, "{}", error.what());

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "lab/gelsight/ball_press_table.h"
-#include "sensors/heights/darkening.h"
+#include "sensors/heights/darkness_press.h"
 
 namespace touchstone::lab {
 
@@ -16,6 +16,7 @@ sensors::RestPicture read_rest_picture(const std::vector<std::filesystem::path>&
 /// @throws Error with the table's line: a picture that can't be read or is unfit, or a circle that isn't found
 std::vector<sensors::BallPress> read_dark_presses(const std::vector<AnnotatedPress>& table,
                                                   const sensors::RestPicture& rest,
-                                                  const sensors::DarkeningSettings& settings, double mm_per_px);
+                                                  const sensors::DarkeningSettings& settings,
+                                                  const sensors::PressScale& scale);
 
 }  // namespace touchstone::lab

@@ -1,5 +1,7 @@
 // Heights from frames of a gel that shows depth as darkness: sensors/heights/darkness_estimator.h.
 
+#include <pybind11/stl.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -17,6 +19,8 @@ namespace {
 
 using sensors::DarknessModel;
 using sensors::DarknessResult;
+const Allowed kCameraDistances = Allowed::within(1.0, 1e6);  // mm; as the command's --camera-distance-mm
+
 using Darkness = Guarded<sensors::DarknessEstimator>;
 
 py::dict dict_of(const sensors::ProfileError& error) {
@@ -30,7 +34,8 @@ py::dict dict_of(const sensors::ProfileError& error) {
 
 /// Frames of pressed balls, each with the outline (u, v, radius in pixels) of its touched part, or None to look for it.
 py::tuple calibrate_darkness(const py::object& frames, const py::object& ball_diameters_mm, const py::object& rest,
-                             double mm_per_px, const py::object& circles, double smoothing_px, bool follow_exposure) {
+                             double mm_per_px, const py::object& circles, std::optional<double> camera_distance_mm,
+                             double smoothing_px, bool follow_exposure) {
   const Allowed smoothings = Allowed::within(0.0, sensors::kMostSmoothing_px);
   const GivenPresses given = presses_from(frames, ball_diameters_mm, circles);
   const std::vector<Picture> untouched = pictures_from(rest, "rest");
@@ -38,8 +43,12 @@ py::tuple calibrate_darkness(const py::object& frames, const py::object& ball_di
   if (!smoothings.holds(smoothing_px)) {
     fail("smoothing_px: {} is not allowed; allowed is {}", smoothing_px, smoothings.text());
   }
+  if (camera_distance_mm && !kCameraDistances.holds(*camera_distance_mm)) {
+    fail("camera_distance_mm: {} is not allowed; allowed is {}", *camera_distance_mm, kCameraDistances.text());
+  }
   sensors::DarknessCalibrationSettings settings;
-  settings.mm_per_px = mm_per_px;
+  settings.scale.mm_per_px = mm_per_px;
+  if (camera_distance_mm) settings.scale.camera_distance_mm = *camera_distance_mm;
   settings.darkening = {follow_exposure, smoothing_px};
   settings.cross_validate = true;
   std::vector<sensors::BallPress> presses;
@@ -48,7 +57,7 @@ py::tuple calibrate_darkness(const py::object& frames, const py::object& ball_di
     for (const Picture& picture : untouched) pictures.push_back(picture.mat);
     const sensors::RestPicture mean = sensors::mean_rest(pictures);
     presses = given.presses([&](const sensors::BallPress& press) {
-      return sensors::find_dark_circle(press.frame, mean, settings.darkening, press.ball_radius_mm, mm_per_px,
+      return sensors::find_dark_circle(press.frame, mean, settings.darkening, press.ball_radius_mm, settings.scale,
                                        press.name);
     });
     return sensors::calibrate_darkness(presses, mean, settings);
@@ -111,12 +120,15 @@ void bind_dtact(py::module_& module) {
           py::arg("darkening"), "mm, of a place whose brightness is 1 - darkening times that at rest.");
   module.def(
       "calibrate_darkness", &calibrate_darkness, py::arg("frames"), py::arg("ball_diameters_mm"), py::arg("rest"),
-      py::kw_only(), py::arg("mm_per_px"), py::arg("circles") = py::none(),
+      py::kw_only(), py::arg("mm_per_px"), py::arg("circles") = py::none(), py::arg("camera_distance_mm") = py::none(),
       py::arg("smoothing_px") = sensors::DarkeningSettings{}.smoothing_px, py::arg("follow_exposure") = true,
       "Learns from frames of pressed balls how darkness shows depth: returns (DarknessModel, report).\n\n"
       "frames: pictures, uint8, BGR. ball_diameters_mm: one each. rest: frames of the untouched gel.\n"
       "mm_per_px: of the gel. circles: for each frame (u, v, radius) in pixels of the touched part, or None to look "
-      "for it.\nsmoothing_px: of pictures, a Gaussian's standard deviation. follow_exposure: read it from each "
+      "for it.\ncamera_distance_mm: how far before the gel the camera seems to stand; what is pressed in looks larger. "
+      "None "
+      "leaves that out.\nsmoothing_px: of pictures, a Gaussian's standard deviation. follow_exposure: read it from "
+      "each "
       "picture's border; not for presses that cover most of it.");
 
   py::class_<DarknessResult>(module, "DarknessResult", "What one frame gives; arrays are its own memory.")

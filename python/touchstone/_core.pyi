@@ -187,7 +187,7 @@ class DarknessEstimator:
 
 def calibrate_darkness(frames: Sequence[Picture], ball_diameters_mm: Sequence[float], rest: Sequence[Picture], *,
                        mm_per_px: float, circles: Optional[Sequence[Optional[ArrayLike]]] = ...,
-                       smoothing_px: float = ...,
+                       camera_distance_mm: Optional[float] = ..., smoothing_px: float = ...,
                        follow_exposure: bool = ...) -> Tuple[DarknessModel, Dict[str, Any]]: ...
 
 class HeightModel:

@@ -15,7 +15,8 @@ namespace {
 // slope may well change by kBend times its mean, while rings are off by kRingError of the whole height.
 constexpr double kBend = 3.0;
 constexpr double kRingError = 0.01;
-constexpr int kFullRing = 20;  // pixels, from which a ring counts fully
+constexpr int kDepthPasses = 4;  // where things are on a ball depends a little on its depth
+constexpr int kFullRing = 20;    // pixels, from which a ring counts fully
 
 struct Fit {
   DarknessCurve curve;
@@ -102,13 +103,12 @@ struct ErrorSums {
   }
 };
 
-void add_errors(const Fit& fit, const std::vector<DarkPress>& presses, double mm_per_px, const HalfOfContact& half,
-                ErrorSums& sums) {
+void add_errors(const Fit& fit, const std::vector<DarkPress>& presses, const HalfOfContact& half, ErrorSums& sums) {
   for (std::size_t p = 0; p < presses.size(); ++p) {
-    for (const PressRing& ring : rings_of(presses[p], mm_per_px, half)) {
+    for (const PressRing& ring : rings_of(presses[p], half)) {
       sums.add_ring(fit.curve.height_at(ring.darkening) - (fit.depths_mm[p] + ring.cap_mm));
     }
-    for_each_contact_pixel(presses[p], mm_per_px, half, [&](int u, int v, double, double cap_mm) {
+    for_each_contact_pixel(presses[p], half, [&](int u, int v, double, double cap_mm) {
       if (presses[p].usable.at<unsigned char>(v, u) == 0) return;
       const double height = fit.curve.height_at(static_cast<double>(presses[p].map.at<float>(v, u)));
       sums.pixel_squares += std::pow(height - (fit.depths_mm[p] + cap_mm), 2.0);
@@ -117,21 +117,20 @@ void add_errors(const Fit& fit, const std::vector<DarkPress>& presses, double mm
   }
 }
 
-std::vector<std::vector<PressRing>> all_rings(const std::vector<DarkPress>& presses, double mm_per_px,
-                                              const HalfOfContact& half) {
+std::vector<std::vector<PressRing>> all_rings(const std::vector<DarkPress>& presses, const HalfOfContact& half) {
   std::vector<std::vector<PressRing>> rings;
-  for (const DarkPress& press : presses) rings.push_back(rings_of(press, mm_per_px, half));
+  for (const DarkPress& press : presses) rings.push_back(rings_of(press, half));
   return rings;
 }
 
 /// How far single pixels are off near each knot; where there are none, as all are.
-std::vector<double> spread_of(const Fit& fit, const std::vector<DarkPress>& presses, double mm_per_px) {
+std::vector<double> spread_of(const Fit& fit, const std::vector<DarkPress>& presses) {
   const std::size_t knots = fit.curve.heights_mm.size();
   std::vector<double> squares(knots, 0.0);
   std::vector<double> counts(knots, 0.0);
   const auto last = static_cast<double>(knots - 1);
   for (std::size_t p = 0; p < presses.size(); ++p) {
-    for_each_contact_pixel(presses[p], mm_per_px, {}, [&](int u, int v, double, double cap_mm) {
+    for_each_contact_pixel(presses[p], {}, [&](int u, int v, double, double cap_mm) {
       if (presses[p].usable.at<unsigned char>(v, u) == 0) return;
       const double darkening = static_cast<double>(presses[p].map.at<float>(v, u));
       const double place = std::clamp(darkening / DarknessCurve::kStep - fit.curve.first, 0.0, last);
@@ -157,14 +156,21 @@ std::vector<double> spread_of(const Fit& fit, const std::vector<DarkPress>& pres
 
 DarknessCalibration calibrate_darkness(std::span<const BallPress> given, const RestPicture& rest,
                                        const DarknessCalibrationSettings& settings) {
-  const double mm_per_px = settings.mm_per_px;
+  const double mm_per_px = settings.scale.mm_per_px;
   if (!(mm_per_px > 0.0) || !std::isfinite(mm_per_px)) fail("mm_per_px is {}; it must be above 0", mm_per_px);
   if (given.empty()) fail("no presses: at least one frame of a pressed ball is needed");
   std::vector<DarkPress> presses;
-  for (const BallPress& press : given) presses.push_back(measure_press(press, rest, settings.darkening, mm_per_px));
+  for (const BallPress& press : given)
+    presses.push_back(measure_press(press, rest, settings.darkening, settings.scale));
 
   DarknessCalibration result;
-  const std::vector<std::vector<PressRing>> rings = all_rings(presses, mm_per_px, {});
+  std::vector<std::vector<PressRing>> rings = all_rings(presses, {});
+  Fit fit = fit_curve(rings);
+  for (int pass = 0; pass < kDepthPasses && std::isfinite(settings.scale.camera_distance_mm); ++pass) {
+    for (std::size_t p = 0; p < presses.size(); ++p) set_depth(presses[p], fit.depths_mm[p]);
+    rings = all_rings(presses, {});
+    fit = fit_curve(rings);
+  }
   double nearest = 1.0;
   for (const std::vector<PressRing>& press : rings) {
     for (const PressRing& ring : press) {
@@ -173,16 +179,15 @@ DarknessCalibration calibrate_darkness(std::span<const BallPress> given, const R
     }
   }
   result.nearest_to_rest = nearest;
-  Fit fit = fit_curve(rings);
-  fit.curve.spread_mm = spread_of(fit, presses, mm_per_px);
+  fit.curve.spread_mm = spread_of(fit, presses);
   ErrorSums sums;
-  add_errors(fit, presses, mm_per_px, {}, sums);
+  add_errors(fit, presses, {}, sums);
   result.fitted = sums.result();
   if (settings.cross_validate) {
     ErrorSums left_out;
     for (int i = 0; i < 8; ++i) {
       const double angle = kPi * i / 4.0;
-      add_errors(fit_curve(all_rings(presses, mm_per_px, angle)), presses, mm_per_px, angle + kPi, left_out);
+      add_errors(fit_curve(all_rings(presses, angle)), presses, angle + kPi, left_out);
     }
     result.held_out = left_out.result();
   }

@@ -17,7 +17,7 @@ namespace touchstone::sensors {
 
 /// The pixels' size, how frames are measured, and whether halves are held out.
 struct DarknessCalibrationSettings {
-  double mm_per_px = 0.0;
+  PressScale scale{};
   DarkeningSettings darkening{};
   bool cross_validate = false;  ///< fill DarknessCalibration::held_out
 };

@@ -29,19 +29,21 @@ constexpr double kLeastUsable = 0.8;     // of a contact's pixels
 
 using Bends = Eigen::Matrix<double, 5, 1>;  // a polynomial in the squared distance
 
-/// What is left of the darkening within the circle after the best function of the distance: RMS.
-double unevenness(const cv::Mat& map, const Eigen::Vector2d& centre, double radius) {
+/// What is left of the darkening within the press's circle after the best function of the distance: RMS.
+double unevenness(const cv::Mat& map, const DarkPress& press) {
   Eigen::Matrix<double, 5, 5> normal = Eigen::Matrix<double, 5, 5>::Zero();
   Bends right = Bends::Zero();
   double squares = 0.0;
   double weights = 0.0;
+  const Eigen::Vector2d& centre = press.circle.centre;
+  const double radius = press.circle.radius;
   const int v0 = std::max(0, static_cast<int>(centre.y() - radius));
   const int v1 = std::min(map.rows - 1, static_cast<int>(centre.y() + radius));
   const int u0 = std::max(0, static_cast<int>(centre.x() - radius));
   const int u1 = std::min(map.cols - 1, static_cast<int>(centre.x() + radius));
   for (int v = v0; v <= v1; ++v) {
     for (int u = u0; u <= u1; ++u) {
-      const double place = (Eigen::Vector2d(u + 0.5, v + 0.5) - centre).squaredNorm() / (radius * radius);
+      const double place = std::pow(press.distance_of({u + 0.5, v + 0.5}) / radius, 2.0);
       if (place >= 1.0) continue;
       const double weight = 1.0 - place;  // fades out, so that nothing jumps when a pixel comes in
       Bends powers;
@@ -59,23 +61,23 @@ double unevenness(const cv::Mat& map, const Eigen::Vector2d& centre, double radi
   return std::sqrt(std::max(0.0, squares - right.dot(normal.ldlt().solve(right))) / weights);
 }
 
-/// Moves the centre to the least unevenness by a pattern search.
-Eigen::Vector2d evenest_centre(const cv::Mat& map, Eigen::Vector2d centre, double radius) {
-  double best = unevenness(map, centre, radius);
+/// Moves the press's centre to the least unevenness by a pattern search.
+void move_to_evenest(const cv::Mat& map, DarkPress& press) {
+  double best = unevenness(map, press);
   for (double step = 4.0; step > 0.02;) {
     bool moved = false;
     for (const auto& [du, dv] : {std::pair{1, 0}, {-1, 0}, {0, 1}, {0, -1}}) {
-      const Eigen::Vector2d tried = centre + step * Eigen::Vector2d(du, dv);
-      if (const double value = unevenness(map, tried, radius); value < best) {
+      DarkPress tried = press;  // pictures are shared
+      tried.circle.centre += step * Eigen::Vector2d(du, dv);
+      if (const double value = unevenness(map, tried); value < best) {
         best = value;
-        centre = tried;
+        press.circle.centre = tried.circle.centre;
         moved = true;
         break;
       }
     }
     if (!moved) step *= 0.5;
   }
-  return centre;
 }
 
 /// Mean darkening of rings one pixel wide.
@@ -113,7 +115,8 @@ std::optional<double> steepest_distance(const std::vector<double>& means) {
   return static_cast<double>(best) + 0.5 + shift;
 }
 
-void check_sizes(double ball_radius_mm, double mm_per_px, const cv::Size& size, const std::string& name) {
+void check_sizes(double ball_radius_mm, const PressScale& scale, const cv::Size& size, const std::string& name) {
+  const double mm_per_px = scale.mm_per_px;
   if (!(ball_radius_mm > 0.0) || !std::isfinite(ball_radius_mm)) {
     fail("{}: ball radius {} mm: it must be above 0", name, ball_radius_mm);
   }
@@ -123,6 +126,10 @@ void check_sizes(double ball_radius_mm, double mm_per_px, const cv::Size& size, 
         "{}: mm_per_px {}: with it the ball's radius is {:.3g} px; allowed are at most {:.0f} px, {:.0f} times the "
         "frame",
         name, mm_per_px, ball_radius_mm / mm_per_px, widest_px, kWidestBall);
+  }
+  if (!(scale.camera_distance_mm >= 2.0 * ball_radius_mm)) {
+    fail("{}: camera_distance_mm {}: it must be at least the ball's diameter, {} mm", name, scale.camera_distance_mm,
+         2.0 * ball_radius_mm);
   }
 }
 
@@ -198,7 +205,7 @@ void check_one_ball(const DarkPress& press, const cv::Mat& smooth, double ball_p
            centroids.at<double>(i, 0), centroids.at<double>(i, 1));
     }
   }
-  if (const double uneven = unevenness(smooth, circle.centre, circle.radius); uneven > kMostUneven * peak) {
+  if (const double uneven = unevenness(smooth, press); uneven > kMostUneven * peak) {
     fail(
         "{}: the contact at ({:.0f}, {:.0f}) isn't round: its darkening differs by {:.0f} % at equal distances from "
         "its middle; at most {:.0f} % may be: is it one ball, pressed straight?",
@@ -206,7 +213,8 @@ void check_one_ball(const DarkPress& press, const cv::Mat& smooth, double ball_p
   }
 }
 
-void check_circle(const DarkPress& press, double mm_per_px) {
+void check_circle(const DarkPress& press) {
+  const double mm_per_px = press.scale.mm_per_px;
   const ContactCircle& circle = press.circle;
   if (!circle.centre.allFinite() || !std::isfinite(circle.radius)) fail("{}: the circle isn't finite", press.name);
   if (circle.radius < kSmallestRadius_px) {
@@ -220,6 +228,13 @@ void check_circle(const DarkPress& press, double mm_per_px) {
   const double right = press.map.cols - circle.centre.x();
   const double below = press.map.rows - circle.centre.y();
   if (std::min({circle.centre.x(), circle.centre.y(), right, below}) < circle.radius) fail_at_edge(press.name);
+}
+
+/// Of a ball whose rim of contact is at rest, mm.
+double cap_depth(const DarkPress& press) {
+  const double rim_mm = press.circle.radius * press.scale.mm_per_px;
+  const double radius = press.ball_radius_mm;
+  return radius - std::sqrt(std::max(0.0, radius * radius - rim_mm * rim_mm));
 }
 
 cv::Mat smoothed(const cv::Mat& map) {
@@ -255,16 +270,43 @@ ContactCircle rough_circle(const cv::Mat& smooth, double peak, double ball_px, c
 
 }  // namespace
 
+double DarkPress::distance_of(const Eigen::Vector2d& place) const {
+  const double apparent = (place - circle.centre).norm();
+  if (!std::isfinite(scale.camera_distance_mm)) return apparent;
+  const Eigen::Vector2d axis(0.5 * map.cols, 0.5 * map.rows);
+  const double ball = ball_radius_mm / scale.mm_per_px;
+  const double depth = depth_mm / scale.mm_per_px;
+  const double camera = scale.camera_distance_mm / scale.mm_per_px;
+  double distance = apparent;
+  for (int pass = 0; pass < 6; ++pass) {  // the height depends on the distance; each pass errs an eighth of the last
+    const double height = depth - ball + std::sqrt(std::max(0.0, ball * ball - distance * distance));
+    const Eigen::Vector2d at_rest = axis + (1.0 - std::max(0.0, height) / camera) * (place - axis);
+    distance = (at_rest - circle.centre).norm();
+  }
+  return distance;
+}
+
+void set_depth(DarkPress& press, double depth_mm) {
+  press.depth_mm = depth_mm;
+  if (std::isfinite(press.scale.camera_distance_mm)) move_to_evenest(smoothed(press.map), press);
+  press.learnt_radius = press.circle.radius - std::max(1.0, kRimPart * press.circle.radius);
+  for (const PressRing& ring : rings_of(press)) {
+    if (ring.darkening < kBrightest) press.learnt_radius = std::min(press.learnt_radius, ring.inner_px);
+  }
+}
+
 ContactCircle find_dark_circle(const cv::Mat& frame, const RestPicture& rest, const DarkeningSettings& settings,
-                               double ball_radius_mm, double mm_per_px, const std::string& name) {
-  check_sizes(ball_radius_mm, mm_per_px, frame.size(), name);
-  const double ball_px = ball_radius_mm / mm_per_px;
+                               double ball_radius_mm, const PressScale& scale, const std::string& name) {
+  check_sizes(ball_radius_mm, scale, frame.size(), name);
+  const double ball_px = ball_radius_mm / scale.mm_per_px;
   DarkPress press = measured(frame, rest, settings, ball_px, name);
   press.ball_radius_mm = ball_radius_mm;
+  press.scale = scale;
   const cv::Mat smooth = smoothed(press.map);
   press.circle = rough_circle(smooth, peak_of(smooth, name), ball_px, name);
   for (int pass = 0; pass < 3; ++pass) {  // each makes the other better
-    press.circle.centre = evenest_centre(smooth, press.circle.centre, press.circle.radius);
+    press.depth_mm = cap_depth(press);
+    move_to_evenest(smooth, press);
     const std::vector<double> means = ring_means(press.map, press.circle.centre, 1.3 * ball_px);
     const std::optional<double> rim = steepest_distance(means);
     if (!rim || *rim > kWidestFall * ball_px) {
@@ -275,27 +317,24 @@ ContactCircle find_dark_circle(const cv::Mat& frame, const RestPicture& rest, co
     }
     press.circle.radius = std::min(*rim, kWidestContact * ball_px);
   }
-  check_circle(press, mm_per_px);
+  check_circle(press);
   check_one_ball(press, smooth, ball_px);
   return press.circle;
 }
 
 DarkPress measure_press(const BallPress& given, const RestPicture& rest, const DarkeningSettings& settings,
-                        double mm_per_px) {
-  check_sizes(given.ball_radius_mm, mm_per_px, given.frame.size(), given.name);
-  const double ball_px = given.ball_radius_mm / mm_per_px;
+                        const PressScale& scale) {
+  check_sizes(given.ball_radius_mm, scale, given.frame.size(), given.name);
+  const double ball_px = given.ball_radius_mm / scale.mm_per_px;
   DarkPress press = measured(given.frame, rest, settings, ball_px, given.name);
   press.circle = given.circle;
   press.ball_radius_mm = given.ball_radius_mm;
-  check_circle(press, mm_per_px);
+  press.scale = scale;
+  check_circle(press);
   const cv::Mat smooth = smoothed(press.map);
   peak_of(smooth, press.name);
   check_one_ball(press, smooth, ball_px);
-  press.learnt_radius = press.circle.radius - std::max(1.0, kRimPart * press.circle.radius);
-  const std::vector<double> means = ring_means(press.map, press.circle.centre, press.learnt_radius);
-  const auto brighter =
-      std::find_if(means.begin(), means.end(), [](double darkening) { return darkening < kBrightest; });
-  press.learnt_radius = std::min(press.learnt_radius, static_cast<double>(brighter - means.begin()));
+  set_depth(press, cap_depth(press));
   if (press.learnt_radius < kSmallestRadius_px - 1.0) {
     fail(
         "{}: the contact at ({:.0f}, {:.0f}) is brighter than the rest picture {:.0f} px from its middle already; it "
@@ -304,7 +343,7 @@ DarkPress measure_press(const BallPress& given, const RestPicture& rest, const D
   }
   int usable = 0;
   int pixels = 0;
-  for_each_contact_pixel(press, mm_per_px, {}, [&](int u, int v, double, double) {
+  for_each_contact_pixel(press, {}, [&](int u, int v, double, double) {
     usable += press.usable.at<unsigned char>(v, u) != 0 ? 1 : 0;
     ++pixels;
   });
@@ -315,10 +354,10 @@ DarkPress measure_press(const BallPress& given, const RestPicture& rest, const D
   return press;
 }
 
-std::vector<PressRing> rings_of(const DarkPress& press, double mm_per_px, const HalfOfContact& half) {
+std::vector<PressRing> rings_of(const DarkPress& press, const HalfOfContact& half) {
   std::vector<std::vector<float>> values(static_cast<std::size_t>(press.circle.radius) + 1);
   std::vector<double> caps(values.size(), 0.0);
-  for_each_contact_pixel(press, mm_per_px, half, [&](int u, int v, double distance, double cap_mm) {
+  for_each_contact_pixel(press, half, [&](int u, int v, double distance, double cap_mm) {
     if (press.usable.at<unsigned char>(v, u) == 0) return;
     const auto ring = static_cast<std::size_t>(distance);
     values[ring].push_back(press.map.at<float>(v, u));
@@ -332,8 +371,8 @@ std::vector<PressRing> rings_of(const DarkPress& press, double mm_per_px, const 
     const std::size_t cut = ring.size() / 4;
     double sum = 0.0;
     for (std::size_t k = cut; k < ring.size() - cut; ++k) sum += static_cast<double>(ring[k]);
-    rings.push_back({caps[i] / static_cast<double>(ring.size()), sum / static_cast<double>(ring.size() - 2 * cut),
-                     static_cast<int>(ring.size())});
+    rings.push_back({static_cast<double>(i), caps[i] / static_cast<double>(ring.size()),
+                     sum / static_cast<double>(ring.size() - 2 * cut), static_cast<int>(ring.size())});
   }
   return rings;
 }

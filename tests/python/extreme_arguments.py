@@ -537,7 +537,8 @@ def table(t):
         "calibrate_darkness": lambda: [Call(lambda: ts.calibrate_darkness, {
             "frames": (t.darkness[0][0], lists_of(pictures)),
             "ball_diameters_mm": ([diameter], lists_of(numbers)), "rest": (t.darkness[0][2], lists_of(pictures)),
-            "mm_per_px": (scale, numbers), "circles": (circles, changed), "smoothing_px": (1.5, numbers),
+            "mm_per_px": (scale, numbers), "circles": (circles, changed), "camera_distance_mm": (17.0, numbers),
+            "smoothing_px": (1.5, numbers),
             "follow_exposure": (True, flags)}, refused=diameter != 4.0)
             for diameter, scale, circles, changed in (
                 (4.0, 0.05, [(60.0, 44.0, 32.0)], lists_of(arrays)), (4.0, 0.05, [None], only(None)),

@@ -148,6 +148,10 @@ def test_darkness_gives_heights(tmp_path):
         estimator.estimate(grey[1])
     with pytest.raises(ts.Error, match="frame 0: where it's touched it is brighter than the rest picture"):
         ts.calibrate_darkness([rest], [4.0], [pressed], mm_per_px=0.05)
+    near = ts.calibrate_darkness([pressed], [4.0], [rest], mm_per_px=0.05, camera_distance_mm=40)[1]
+    assert near["held_out"]["rms_mm"] > report["held_out"]["rms_mm"], "this picture has no camera that is near"
+    with pytest.raises(ts.Error, match="camera_distance_mm: 0.5 is not allowed"):
+        ts.calibrate_darkness([pressed], [4.0], [rest], mm_per_px=0.05, camera_distance_mm=0.5)
     with pytest.raises(ts.Error, match="smoothing_px: 11 is not allowed"):
         ts.calibrate_darkness([pressed], [4.0], [rest], mm_per_px=0.05, smoothing_px=11)
     with pytest.raises(ts.Error, match="circles: there are 2 for 1 frames"):

@@ -22,7 +22,8 @@ class DarknessCalibrationTest : public ::testing::Test {
                                 bool follow_exposure = true) {
     const RestPicture rest = mean_rest(std::vector<cv::Mat>{painter_.rest()});
     DarknessCalibrationSettings settings;
-    settings.mm_per_px = painter_.mm_per_px;
+    settings.scale.mm_per_px = painter_.mm_per_px;
+    settings.scale.camera_distance_mm = camera_distance_mm_;
     settings.cross_validate = cross_validate;
     settings.darkening.follow_exposure = follow_exposure;
     return calibrate_darkness(presses, rest, settings);
@@ -36,6 +37,7 @@ class DarknessCalibrationTest : public ::testing::Test {
     return largest;
   }
   fixtures::DarknessPainter painter_;
+  double camera_distance_mm_ = INFINITY;
 };
 
 TEST_F(DarknessCalibrationTest, OnePressOfAThinGelFindsTheLaw) {
@@ -67,6 +69,23 @@ TEST_F(DarknessCalibrationTest, PressesOfAThickGelFindTheLevelTogether) {
   const DarknessCalibration alone = calibrate({presses[3]}, false, false);
   EXPECT_NEAR(alone.depths_mm[0], 1.1, 0.05);
   EXPECT_NEAR(alone.nearest_to_rest, painter_.darkening_of(0.5), 0.02);
+}
+
+TEST_F(DarknessCalibrationTest, ANearCameraIsTakenIntoAccount) {
+  painter_.camera_distance_mm = 17.0;
+  const RestPicture rest = mean_rest(std::vector<cv::Mat>{painter_.rest()});
+  const auto found = [&](double distance_mm) {
+    BallPress press = painter_.press({{9.6, 7.1}, 4.0, 1.6, Layer::thin});
+    press.circle = find_dark_circle(press.frame, rest, {}, 4.0, {painter_.mm_per_px, distance_mm}, press.name);
+    camera_distance_mm_ = distance_mm;
+    return calibrate({press}, true);
+  };
+  const DarknessCalibration left_out = found(INFINITY);
+  const DarknessCalibration known = found(17.0);
+  EXPECT_LT(curve_error(known.model.curve, 0.0, 1.6), 0.03);
+  EXPECT_GT(curve_error(left_out.model.curve, 0.0, 1.6), 0.05);
+  EXPECT_LT(known.held_out->rms_mm, 0.6 * left_out.held_out->rms_mm);
+  EXPECT_THAT([&] { found(7.0); }, ThrowsMessage<Error>(HasSubstr("camera_distance_mm 7: it must be at least")));
 }
 
 TEST_F(DarknessCalibrationTest, CurvesNeverFallAndAreZeroAtRest) {

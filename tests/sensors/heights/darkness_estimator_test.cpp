@@ -22,7 +22,7 @@ class DarknessEstimatorTest : public ::testing::Test {
   DarknessModel model(bool follow_exposure = true) {
     const RestPicture rest = mean_rest(std::vector<cv::Mat>{painter_.rest()});
     DarknessCalibrationSettings settings;
-    settings.mm_per_px = painter_.mm_per_px;
+    settings.scale.mm_per_px = painter_.mm_per_px;
     settings.darkening.follow_exposure = follow_exposure;
     const std::vector presses{painter_.press({{8.1, 5.9}, 4.0, 1.4, Layer::thin})};
     return calibrate_darkness(presses, rest, settings).model;

@@ -24,7 +24,7 @@ class DarknessModelFile : public ::testing::Test {
     painter.width = 160;
     painter.height = 120;
     DarknessCalibrationSettings settings;
-    settings.mm_per_px = painter.mm_per_px;
+    settings.scale.mm_per_px = painter.mm_per_px;
     const std::vector presses{painter.press({{4.1, 2.9}, 2.0, 0.7, fixtures::Layer::thin})};
     const std::vector<cv::Mat> rest{painter.rest(1), painter.rest(2)};
     model_ = calibrate_darkness(presses, mean_rest(rest), settings).model;

@@ -19,7 +19,7 @@ using ::testing::ThrowsMessage;
 class DarknessPress : public ::testing::Test {
  protected:
   RestPicture rest_of(const cv::Mat& frame) { return mean_rest(std::vector<cv::Mat>{frame}); }
-  ContactCircle find(const cv::Mat& frame) { return find_dark_circle(frame, rest_, {}, 4.0, scale_, "frame 3"); }
+  ContactCircle find(const cv::Mat& frame) { return find_dark_circle(frame, rest_, {}, 4.0, {scale_}, "frame 3"); }
   auto finding(const cv::Mat& frame) {
     return [this, frame] { find(frame); };
   }
@@ -59,14 +59,14 @@ TEST_F(DarknessPress, DustThatMovedHidesNoBall) {
     before(cv::Rect(speck, cv::Size(3, 3))).setTo(cv::Scalar(40, 40, 40));
     after(cv::Rect(speck + cv::Point(2, 1), cv::Size(3, 3))).setTo(cv::Scalar(40, 40, 40));
   }
-  const ContactCircle found = find_dark_circle(after, rest_of(before), {}, 4.0, scale_, "dusty");
+  const ContactCircle found = find_dark_circle(after, rest_of(before), {}, 4.0, {scale_}, "dusty");
   EXPECT_LT((found.centre - ball_.centre / scale_).norm(), 1.0);
   EXPECT_NEAR(found.radius, ball_.contact_radius() / scale_, 3.0);
 }
 
 TEST_F(DarknessPress, RingsHoldTheCapAndItsDarkening) {
-  DarkPress press = measure_press(painter_.press(ball_), rest_, {}, scale_);
-  const std::vector<PressRing> rings = rings_of(press, scale_);
+  DarkPress press = measure_press(painter_.press(ball_), rest_, {}, {scale_});
+  const std::vector<PressRing> rings = rings_of(press);
   ASSERT_GT(rings.size(), 40U);
   for (const PressRing& ring : rings) {
     EXPECT_NEAR(ring.darkening, painter_.darkening_of(ball_.depth + ring.cap_mm), 0.006);
@@ -78,14 +78,14 @@ TEST_F(DarknessPress, RingsHoldTheCapAndItsDarkening) {
       if (std::abs(std::atan2(offset.y(), offset.x())) < 0.3) press.map.at<float>(v, u) = 0.9F;
     }
   }
-  for (const PressRing& ring : rings_of(press, scale_)) {
+  for (const PressRing& ring : rings_of(press)) {
     if (ring.pixels >= 20) EXPECT_NEAR(ring.darkening, painter_.darkening_of(ball_.depth + ring.cap_mm), 0.01);
   }
   std::size_t all = 0;
   std::size_t halves = 0;
-  for (const PressRing& ring : rings_of(press, scale_)) all += static_cast<std::size_t>(ring.pixels);
+  for (const PressRing& ring : rings_of(press)) all += static_cast<std::size_t>(ring.pixels);
   for (const double angle : {0.3, 0.3 + CV_PI}) {
-    for (const PressRing& ring : rings_of(press, scale_, angle)) halves += static_cast<std::size_t>(ring.pixels);
+    for (const PressRing& ring : rings_of(press, angle)) halves += static_cast<std::size_t>(ring.pixels);
   }
   EXPECT_EQ(halves, all);
 }
@@ -93,7 +93,7 @@ TEST_F(DarknessPress, RingsHoldTheCapAndItsDarkening) {
 TEST_F(DarknessPress, BadFramesAreNamed) {
   EXPECT_THAT(finding(painter_.rest(4)), ThrowsMessage<Error>(HasSubstr("frame 3: no contact is seen")));
   const RestPicture pressed = rest_of(painter_.press(ball_).frame);
-  EXPECT_THAT([&] { find_dark_circle(painter_.rest(), pressed, {}, 4.0, scale_, "x"); },
+  EXPECT_THAT([&] { find_dark_circle(painter_.rest(), pressed, {}, 4.0, {scale_}, "x"); },
               ThrowsMessage<Error>(HasSubstr("x: where it's touched it is brighter than the rest picture")));
   EXPECT_THAT(finding(two_balls({{4.0, 6.0}, 2.0, 0.5, Layer::thin}, {{11.5, 6.0}, 2.0, 0.5, Layer::thin})),
               ThrowsMessage<Error>(HasSubstr("second contact near pixel")));
@@ -106,14 +106,14 @@ TEST_F(DarknessPress, BadFramesAreNamed) {
               ThrowsMessage<Error>(HasSubstr("reaches the edge of the picture")));
   EXPECT_THAT(
       [&] {
-        find_dark_circle(painter_.press({{8.0, 6.0}, 30.0, 2.0, Layer::thin}).frame, rest_, {}, 30.0, scale_, "wide");
+        find_dark_circle(painter_.press({{8.0, 6.0}, 30.0, 2.0, Layer::thin}).frame, rest_, {}, 30.0, {scale_}, "wide");
       },
       ThrowsMessage<Error>(HasSubstr("wide: the contact reaches the edge of the picture")));
-  EXPECT_THAT([&] { find_dark_circle(painter_.press(ball_).frame, rest_, {}, 1.0, scale_, "x"); },
+  EXPECT_THAT([&] { find_dark_circle(painter_.press(ball_).frame, rest_, {}, 1.0, {scale_}, "x"); },
               ThrowsMessage<Error>(HasSubstr("more than the ball's 40 px across")));
-  EXPECT_THAT([&] { find_dark_circle(painter_.press(ball_).frame, rest_, {}, 2.0, scale_, "x"); },
+  EXPECT_THAT([&] { find_dark_circle(painter_.press(ball_).frame, rest_, {}, 2.0, {scale_}, "x"); },
               ThrowsMessage<Error>(HasSubstr("doesn't end within the ball's radius of 40 px")));
-  EXPECT_THAT([&] { find_dark_circle(painter_.press(ball_).frame, rest_, {}, 4.0, 1e-7, "x"); },
+  EXPECT_THAT([&] { find_dark_circle(painter_.press(ball_).frame, rest_, {}, 4.0, {1e-7}, "x"); },
               ThrowsMessage<Error>(HasSubstr("mm_per_px 1e-07")));
 }
 
@@ -123,7 +123,7 @@ TEST_F(DarknessPress, GivenCirclesAreChecked) {
       BallPress press = painter_.press(ball_);
       press.circle = {{u, v}, radius};
       press.ball_radius_mm = ball_mm;
-      measure_press(press, rest_, {}, scale_);
+      measure_press(press, rest_, {}, {scale_});
     };
   };
   EXPECT_NO_THROW(measuring(144.0, 128.0, 52.0)());

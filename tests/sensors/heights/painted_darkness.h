@@ -53,6 +53,7 @@ class DarknessPainter {
   double brightness = 160.0;  ///< DN, of the middle
   double noise_DN = 1.5;
   int channels = 3;
+  double camera_distance_mm = INFINITY;  ///< of a pinhole over the picture's middle: nearer places look larger
 
   /// The law that calibration should find.
   double darkening_of(double height_mm) const { return strength * (1.0 - std::exp(-height_mm / soft_mm)); }
@@ -67,8 +68,13 @@ class DarknessPainter {
     for (int v = 0; v < height; ++v) {
       for (int u = 0; u < width; ++u) {
         const Eigen::Vector2d place(u + 0.5, v + 0.5);
+        double height_seen = height_mm(mm_per_px * place);
+        for (int pass = 0; pass < 8 && std::isfinite(camera_distance_mm); ++pass) {
+          const double nearer = 1.0 - height_seen / camera_distance_mm;
+          height_seen = height_mm(mm_per_px * (middle + nearer * (place - middle)));
+        }
         const double lamps = brightness * (1.0 - fall_off * (place - middle).squaredNorm() / middle.squaredNorm());
-        const double light = exposure * lamps * (1.0 - darkening_of(height_mm(mm_per_px * place)));
+        const double light = exposure * lamps * (1.0 - darkening_of(height_seen));
         for (int c = 0; c < channels; ++c) {
           picture.ptr<unsigned char>(v)[u * channels + c] =
               cv::saturate_cast<unsigned char>(tints[c] * light + random.gaussian(noise_DN));
