@@ -148,8 +148,8 @@ def test_darkness_gives_heights(tmp_path):
         estimator.estimate(grey[1])
     with pytest.raises(ts.Error, match="frame 0: where it's touched it is brighter than the rest picture"):
         ts.calibrate_darkness([rest], [4.0], [pressed], mm_per_px=0.05)
-    near = ts.calibrate_darkness([pressed], [4.0], [rest], mm_per_px=0.05, camera_distance_mm=40)[1]
-    assert near["held_out"]["rms_mm"] > report["held_out"]["rms_mm"], "this picture has no camera that is near"
+    near = ts.calibrate_darkness([pressed], [4.0], [rest], mm_per_px=0.05, camera_distance_mm=20)[0]
+    assert near.height_at(0.08) > model.height_at(0.08) + 0.005, "before a near camera what is pressed in looks larger"
     with pytest.raises(ts.Error, match="camera_distance_mm: 0.5 is not allowed"):
         ts.calibrate_darkness([pressed], [4.0], [rest], mm_per_px=0.05, camera_distance_mm=0.5)
     with pytest.raises(ts.Error, match="smoothing_px: 11 is not allowed"):
