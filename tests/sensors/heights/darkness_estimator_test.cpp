@@ -117,7 +117,7 @@ TEST_F(DarknessEstimatorTest, DoubtNamesItsReasons) {
   EXPECT_EQ(result.doubt.at<unsigned char>(120, 140 + static_cast<int>(1.4 * rim)), kBulged);
   EXPECT_GT(result.deeper_share, 0.01);
   EXPECT_GT(result.bulged_share, 0.05);
-  EXPECT_NEAR(result.saturated_share, 100.0 / frame.total(), 1e-4);
+  EXPECT_NEAR(result.saturated_share, 100.0 / (320.0 * 240.0), 1e-4);
   EXPECT_FALSE(estimator.estimate(painter_.frame([](const Eigen::Vector2d&) { return 0.0; }, 2.5)).trusted());
   EXPECT_FALSE(estimator.estimate(cv::Mat::zeros(240, 320, CV_8UC3)).trusted());
 }
