@@ -13,6 +13,7 @@ void require_writable_place(const std::filesystem::path& file) {
 void add_calibrate_command(CLI::App& app, const GlobalOptions& global, Action& action) {
   CLI::App* command = app.add_subcommand("calibrate", "Make a sensor's model from frames, simulated or recorded");
   command->require_subcommand(1);
+  add_9dtact_calibration(*command, global, action);
   add_chroma_calibration(*command, global, action);
   add_gelsight_calibration(*command, global, action);
   add_vhs_calibration(*command, global, action);
@@ -21,6 +22,7 @@ void add_calibrate_command(CLI::App& app, const GlobalOptions& global, Action& a
 void add_estimate_command(CLI::App& app, const GlobalOptions& global, Action& action) {
   CLI::App* command = app.add_subcommand("estimate", "What a sensor's frames show, by a model that `calibrate` made");
   command->require_subcommand(1);
+  add_9dtact_estimation(*command, global, action);
   add_chroma_estimation(*command, global, action);
   add_gelsight_estimation(*command, global, action);
   add_vhs_estimation(*command, global, action);

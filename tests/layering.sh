@@ -62,6 +62,7 @@ lab/light: core closed_forms render/paths render/imager lab/validation
 lab/device: core render/imager sim/scene sim/plan sim/view sim/sensor datasets/sets
 lab/vhs: core closed_forms fem/elements fem/contact render/materials render/scene render/cameras sensors/learning sensors/beads sensors/colour sensors/tractions sensors/events sensors/skin sim/files sim/scene sim/plan sim/press sim/view sim/sensor sim/grasp datasets/jobs datasets/sets lab/statistics lab/validation lab/press lab/mechanics
 lab/gelsight: core closed_forms fem/shapes fem/contact sensors/heights sensors/touch_map sensors/texture sensors/markers sim/files sim/scene sim/sensor sim/grasp datasets/sets datasets/inspection lab/validation
+lab/dtact: core sensors/heights sim/files datasets/sets datasets/inspection lab/gelsight
 lab/chroma: core plots fem/contact fem/finite_strain render/spectra render/scene render/cameras render/paths render/imager sensors/colour sensors/tractions sim/scene sim/plan sim/press sim/view sim/sensor datasets/sets datasets/inspection lab/statistics lab/validation lab/press lab/gelsight
 lab/dvs: core render/membrane render/events sensors/learning sensors/events sim/scene sim/press sim/sensor sim/grasp datasets/sets lab/validation
 lab/reflex: core fem/contact fem/finite_strain render/cameras render/paths render/direct render/imager sensors/reflex sim/scene sim/plan sim/press sim/view datasets/sets lab/validation
@@ -69,7 +70,7 @@ lab/studies: core plots fem/mesh fem/elements fem/shapes fem/contact render/samp
 lab/bench: core plots fem/mesh fem/elements fem/contact render/imager sim/scene sim/plan sim/press sim/view sim/sensor datasets/sets lab/statistics lab/studies
 lab/fit: core render/imager sim/files sim/relief sim/scene sim/press sim/view sim/sensor datasets/jobs datasets/inspection lab/validation lab/studies
 lab/schema: core sim/scene datasets/jobs lab/vhs lab/studies lab/fit
-apps: core plots sensors/beads sensors/heights sensors/colour sensors/tractions sensors/events sim/files sim/scene sim/plan sim/press sim/view sim/sensor datasets/jobs datasets/sets datasets/exports datasets/inspection lab/validation lab/press lab/device lab/vhs lab/gelsight lab/chroma lab/dvs lab/studies lab/bench lab/fit lab/schema
+apps: core plots sensors/beads sensors/heights sensors/colour sensors/tractions sensors/events sim/files sim/scene sim/plan sim/press sim/view sim/sensor datasets/jobs datasets/sets datasets/exports datasets/inspection lab/validation lab/press lab/device lab/vhs lab/gelsight lab/dtact lab/chroma lab/dvs lab/studies lab/bench lab/fit lab/schema
 python: core sensors/beads sensors/heights sensors/colour sim/files sim/scene sim/press sim/sensor datasets/jobs datasets/sets
 testing: core sim/files sim/press sim/sensor datasets/jobs lab/device
 END

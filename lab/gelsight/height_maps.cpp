@@ -17,18 +17,6 @@ namespace fs = std::filesystem;
 constexpr double kLevelsPerMm = 10000.0;
 constexpr double kZeroLevel = 10000.0;
 
-void write_map(const cv::Mat& height_mm, fs::path file, HeightFormat format) {
-  if (format == HeightFormat::exr) {
-    sim::write_exr(file.replace_extension(".exr"), height_mm, {"height_mm"});
-    return;
-  }
-  cv::Mat levels;
-  height_mm.convertTo(levels, CV_16U, kLevelsPerMm, kZeroLevel);
-  sim::write_png(
-      file.replace_extension(".png"), levels,
-      {{"mm_per_level", fmt::format("{}", 1.0 / kLevelsPerMm)}, {"zero_level", fmt::format("{}", kZeroLevel)}});
-}
-
 std::string csv_of(const std::vector<HeightRecord>& records) {
   std::string csv = "file,highest_mm,volume_mm3,contact_mm2,saturated_percent,trusted,contact_at_border\n";
   for (const HeightRecord& record : records) {
@@ -41,9 +29,19 @@ std::string csv_of(const std::vector<HeightRecord>& records) {
 
 }  // namespace
 
-std::vector<HeightRecord> write_height_maps(const sensors::HeightModel& model, const sensors::HeightSettings& settings,
-                                            const std::vector<fs::path>& frames, const fs::path& folder,
-                                            HeightFormat format, const Progress& progress) {
+void write_height_map(const cv::Mat& height_mm, fs::path file, HeightFormat format) {
+  if (format == HeightFormat::exr) {
+    sim::write_exr(file.replace_extension(".exr"), height_mm, {"height_mm"});
+    return;
+  }
+  cv::Mat levels;
+  height_mm.convertTo(levels, CV_16U, kLevelsPerMm, kZeroLevel);
+  sim::write_png(
+      file.replace_extension(".png"), levels,
+      {{"mm_per_level", fmt::format("{}", 1.0 / kLevelsPerMm)}, {"zero_level", fmt::format("{}", kZeroLevel)}});
+}
+
+void require_stems_apart(const std::vector<fs::path>& frames) {
   std::set<std::string> stems;
   for (const fs::path& frame : frames) {
     if (!stems.insert(frame.stem().string()).second) {
@@ -51,6 +49,12 @@ std::vector<HeightRecord> write_height_maps(const sensors::HeightModel& model, c
            frame.stem().string());
     }
   }
+}
+
+std::vector<HeightRecord> write_height_maps(const sensors::HeightModel& model, const sensors::HeightSettings& settings,
+                                            const std::vector<fs::path>& frames, const fs::path& folder,
+                                            HeightFormat format, const Progress& progress) {
+  require_stems_apart(frames);
   sensors::HeightEstimator estimator(model, settings);
   fs::create_directories(folder);
   const double pixel_mm2 = model.mm_per_px * model.mm_per_px;
@@ -66,7 +70,7 @@ std::vector<HeightRecord> write_height_maps(const sensors::HeightModel& model, c
       record.saturated_percent = 100.0 * result.saturated_share;
       record.trusted = result.trusted();
       record.contact_at_border = result.contact_at_border;
-      write_map(result.height_mm, folder / frame.filename(), format);
+      write_height_map(result.height_mm, folder / frame.filename(), format);
       records.push_back(record);
     });
     if (progress) progress("heights", std::ssize(records), std::ssize(frames));

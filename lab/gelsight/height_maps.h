@@ -16,6 +16,12 @@ enum class HeightFormat {
   png16  ///< 16 bit grey: level 10000 is 0 mm, a level is 0.1 um: -1 to 5.55 mm
 };
 
+/// Writes a height map (CV_32FC1, mm) beside `file`: the same name with .exr or .png.
+void write_height_map(const cv::Mat& height_mm, std::filesystem::path file, HeightFormat format);
+
+/// @throws Error if two frames have one stem: their maps would be one file
+void require_stems_apart(const std::vector<std::filesystem::path>& frames);
+
 /// A line of the summary.
 struct HeightRecord {
   std::string file;

@@ -1,9 +1,7 @@
 // Heights from frames of a coated gel: sensors/heights/height_estimator.h.
 
-#include <cmath>
-
 #include "core/error.h"
-#include "core/yaml_reader.h"
+#include "python/src/ball_presses.h"
 #include "python/src/bindings.h"
 #include "python/src/estimator.h"
 #include "sensors/heights/height_calibration.h"
@@ -16,11 +14,7 @@ namespace {
 using sensors::HeightModel;
 using Heights = Guarded<sensors::HeightEstimator>;
 
-constexpr double kLargestPlace_px = 1e6;
-const Allowed kScales = Allowed::within(1e-4, 10.0);            // of a pixel, mm; as the command's --mm-per-px
-const Allowed kThicknesses = Allowed::within(0.01, 1000.0);     // mm
-const Allowed kBallDiameters = Allowed::above_up_to(0.0, 1e4);  // mm; an object's radius may be as much
-
+const Allowed kThicknesses = Allowed::within(0.01, 1000.0);  // mm
 std::optional<sensors::LightCorrection> correction_named(const std::string& name) {
   if (name == "best") return std::nullopt;
   if (name == "none") return sensors::LightCorrection::none;
@@ -40,35 +34,8 @@ sensors::SlopeRegressor regressor_named(const std::string& name) {
 py::tuple calibrate_height(const py::object& frames, const py::object& ball_diameters_mm, const py::object& background,
                            double mm_per_px, const py::object& circles, const std::string& correction,
                            const std::string& slopes, double gel_thickness_mm) {
-  const std::vector<Picture> pictures = pictures_from(frames, "frames");
+  const GivenPresses given = presses_from(frames, ball_diameters_mm, circles);
   const std::vector<Picture> rest = pictures_from(background, "background");
-  const py::sequence diameters = sequence_from(ball_diameters_mm, "ball_diameters_mm");
-  const bool circles_given = !circles.is_none();
-  const py::sequence outlines = sequence_from(circles_given ? circles : py::object(py::tuple()), "circles");
-  if (diameters.size() != pictures.size()) {
-    fail("ball_diameters_mm: there are {} for {} frames", diameters.size(), pictures.size());
-  }
-  if (circles_given && outlines.size() != pictures.size()) {
-    fail("circles: there are {} for {} frames", outlines.size(), pictures.size());
-  }
-  std::vector<std::optional<sensors::ContactCircle>> known(pictures.size());
-  std::vector<double> radii_mm;
-  for (std::size_t i = 0; i < pictures.size(); ++i) {
-    const double diameter = number_from(diameters[i], fmt::format("ball_diameters_mm: number {} of it", i));
-    if (!kBallDiameters.holds(diameter)) {
-      fail("ball_diameters_mm: number {} of it is {}; allowed is {}", i, diameter, kBallDiameters.text());
-    }
-    radii_mm.push_back(0.5 * diameter);
-    if (!circles_given) continue;
-    const py::object circle = outlines[i];
-    if (circle.is_none()) continue;
-    const Eigen::Vector3d numbers = vector3_from(circle, "circles");
-    if (!(numbers.cwiseAbs().maxCoeff() <= kLargestPlace_px)) {
-      fail("circles: number {} of it is ({:g}, {:g}, {:g}) px; allowed is up to {} each", i, numbers.x(), numbers.y(),
-           numbers.z(), kLargestPlace_px);
-    }
-    known[i] = sensors::ContactCircle{numbers.head<2>(), numbers.z()};
-  }
   sensors::HeightCalibrationSettings settings;
   settings.mm_per_px = mm_per_px;
   settings.correction = correction_named(correction);
@@ -77,22 +44,12 @@ py::tuple calibrate_height(const py::object& frames, const py::object& ball_diam
   if (!kThicknesses.holds(gel_thickness_mm)) {
     fail("gel_thickness_mm: {} is not allowed; allowed is {}", gel_thickness_mm, kThicknesses.text());
   }
-  if (!kScales.holds(mm_per_px)) {
-    fail("mm_per_px: {} is not allowed; allowed is {}", mm_per_px, kScales.text());
-  }
+  require_scale(mm_per_px);
   const sensors::HeightCalibration made = unlocked([&] {
     std::vector<cv::Mat> untouched;
     for (const Picture& picture : rest) untouched.push_back(picture.mat);
     const sensors::Background mean = sensors::mean_background(untouched);
-    std::vector<sensors::BallPress> presses;
-    for (std::size_t i = 0; i < pictures.size(); ++i) {
-      sensors::BallPress press;
-      press.name = fmt::format("frame {}", i);
-      press.frame = pictures[i].mat;
-      press.ball_radius_mm = radii_mm[i];
-      press.circle = known[i];
-      presses.push_back(std::move(press));
-    }
+    const std::vector<sensors::BallPress> presses = given.presses();
     return sensors::calibrate_height(presses, mean, settings);
   });
   py::dict report;

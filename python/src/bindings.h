@@ -14,6 +14,7 @@ void bind_files(py::module_& module);
 void bind_sensor(py::module_& module);
 void bind_session(py::module_& module);
 void bind_gelsight(py::module_& module);
+void bind_dtact(py::module_& module);
 void bind_vhs(py::module_& module);
 void bind_chroma(py::module_& module);
 

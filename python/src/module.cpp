@@ -17,6 +17,7 @@ PYBIND11_MODULE(_core, module) {
   python::bind_sensor(module);
   python::bind_session(module);
   python::bind_gelsight(module);
+  python::bind_dtact(module);
   python::bind_vhs(module);
   python::bind_chroma(module);
 }

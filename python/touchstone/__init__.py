@@ -19,6 +19,9 @@ from ._core import (
     BeadTracker,
     ColourMarkerReader,
     ColourMarkerReading,
+    DarknessEstimator,
+    DarknessModel,
+    DarknessResult,
     ForceEstimate,
     HeightEstimator,
     HeightModel,
@@ -33,6 +36,7 @@ from ._core import (
     StiffnessForceModel,
     Touch,
     TrackedBeads,
+    calibrate_darkness,
     calibrate_height,
     calibrate_hue,
     read_image,
@@ -93,8 +97,9 @@ def merge(job, out, *, progress=None):
 
 
 __all__ = [
-    "BeadTracker", "ColourMarkerReader", "ColourMarkerReading", "Dataset", "Error", "ForceEstimate", "HeightEstimator",
-    "HeightModel", "HeightResult", "HueEstimator", "HueField", "HueModel", "Object", "Reading", "Sensor", "Session",
-    "StiffnessForceModel", "Touch", "TrackedBeads", "calibrate_height", "calibrate_hue", "generate", "merge",
-    "read_image", "scenes_folder", "train_stiffness", "write_png",
+    "BeadTracker", "ColourMarkerReader", "ColourMarkerReading", "DarknessEstimator", "DarknessModel", "DarknessResult",
+    "Dataset", "Error", "ForceEstimate", "HeightEstimator", "HeightModel", "HeightResult", "HueEstimator", "HueField",
+    "HueModel", "Object", "Reading", "Sensor", "Session", "StiffnessForceModel", "Touch", "TrackedBeads",
+    "calibrate_darkness", "calibrate_height", "calibrate_hue", "generate", "merge", "read_image", "scenes_folder",
+    "train_stiffness", "write_png",
 ]

@@ -12,6 +12,7 @@
 #include "sensors/events/event_file.h"
 #include "sensors/events/material_classifier_file.h"
 #include "sensors/events/time_delay_network_file.h"
+#include "sensors/heights/darkness_model_file.h"
 #include "sensors/heights/height_model_file.h"
 #include "sensors/learning/gaussian_process_file.h"
 #include "sensors/markers/gel_force_model.h"
@@ -127,6 +128,15 @@ StiffnessForceModel stiffness() {
   return model;
 }
 
+DarknessModel darkness() {
+  DarknessModel model;
+  model.mm_per_px = 0.05;
+  model.rest = {cv::Mat(2, 3, CV_32FC1, cv::Scalar(100.0)), 3, 2, 1.5};
+  model.curve = {-1, {-0.05, 0.0, 0.05, 0.12}, {0.01, 0.01, 0.01, 0.02}};
+  model.presses = 1;
+  return model;
+}
+
 HeightModel height() {
   HeightModel model;
   model.mm_per_px = 0.05;
@@ -196,6 +206,7 @@ void write_seeds(const std::filesystem::path& corpus) {
   save(classifier(), models / "material_classifier.json");
   save(delays(), models / "time_delay_network.json");
   save(stiffness(), models / "stiffness.json");
+  save(darkness(), models / "darkness.dark");
   save(height(), models / "height.gel");
   save(compliance(), models / "marker_compliance.bin");
   save(map(), models / "tactile.map");

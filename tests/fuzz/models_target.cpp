@@ -11,6 +11,7 @@
 #include "sensors/colour/hue_model_file.h"
 #include "sensors/events/material_classifier_file.h"
 #include "sensors/events/time_delay_network_file.h"
+#include "sensors/heights/darkness_model_file.h"
 #include "sensors/heights/height_model_file.h"
 #include "sensors/learning/gaussian_process_file.h"
 #include "sensors/markers/gel_force_model.h"
@@ -44,7 +45,7 @@ struct Format {
   bool (*comes_back)(const std::string& bytes);
 };
 
-const std::array<Format, 12> kFormats{
+const std::array<Format, 13> kFormats{
     {{"touchstone.explore_model", [](auto& b) { return comes_back(b, explore_model_from_json, to_text); }},
      {"touchstone.gaussian_process", [](auto& b) { return comes_back(b, gaussian_process_from_json, to_text); }},
      {"touchstone.gel_force_model", [](auto& b) { return comes_back(b, gel_force_model_from_json, to_text); }},
@@ -53,6 +54,7 @@ const std::array<Format, 12> kFormats{
      {"touchstone.reflex_model", [](auto& b) { return comes_back(b, reflex_model_from_json, to_text); }},
      {"touchstone.stiffness_force_model", [](auto& b) { return comes_back(b, stiffness_model_from_json, to_text); }},
      {"touchstone.time_delay_network", [](auto& b) { return comes_back(b, time_delay_network_from_json, to_text); }},
+     {"touchstone.darkness_model", [](auto& b) { return comes_back(b, darkness_model_from_bytes, to_binary); }},
      {"touchstone.height_model", [](auto& b) { return comes_back(b, height_model_from_bytes, to_binary); }},
      {"touchstone.marker_compliance", [](auto& b) { return comes_back(b, marker_compliance_from_bytes, to_binary); }},
      {"touchstone.tactile_map", [](auto& b) { return comes_back(b, tactile_map_from_bytes, to_binary); }},

@@ -273,6 +273,15 @@ def markers_picture(shift=(0.0, 0.0), side=16.0, spacing=40.0, grid=4):
     return np.round(white).astype(np.uint8)
 
 
+def darkness_pictures():
+    """As test_estimators.py has them: at rest, and with a ball of radius 2 mm pressed 0.8 mm deep, 0.05 mm a pixel."""
+    rows, columns = 0.05 * (np.mgrid[:90, :120] + 0.5)
+    cap = 0.8 - 2.0 + np.sqrt(np.maximum(0.0, 4.0 - (columns - 3.0)**2 - (rows - 2.2)**2))
+    pressed = 160.0 * (1.0 - 0.2 * np.maximum(cap, 0.0))
+    return [np.repeat(np.round(grey).astype(np.uint8)[..., None], 3, axis=2)
+            for grey in (np.full_like(pressed, 160.0), pressed)]
+
+
 class Things:
     """What is made once a child, when it's first asked for; data sets once for all of them, in the folder `shared`."""
 
@@ -318,6 +327,18 @@ class Things:
         """Frames, diameters, backgrounds, settings."""
         return (([self.touch.frame], [3.0], self.backgrounds),
                 {"mm_per_px": self.sensor.mm_per_px, "circles": [self.circle]})
+
+    def make_darkness(self):
+        """Frames, diameters, frames at rest, settings."""
+        rest, pressed = darkness_pictures()
+        return ([pressed], [4.0], [rest]), {"mm_per_px": 0.05, "circles": [(60.0, 44.0, 32.0)]}
+
+    def make_darkness_model(self):
+        return ts.calibrate_darkness(*self.darkness[0], **self.darkness[1])[0]
+
+    def make_darkness_file(self):
+        self.darkness_model.save("darkness.model")
+        return "darkness.model"
 
     def make_height_model(self):
         return ts.calibrate_height(*self.heights[0], **self.heights[1])[0]
@@ -509,6 +530,22 @@ def table(t):
                 "circles": (circles, only(None, [None]))}, refused=diameter != 3.0)
             for diameter, scale, circles in ((3.0, t.sensor.mm_per_px, None), (1e-170, 1e-172, [t.circle]),
                                              (1e300, 1e300, [t.circle]), (1e300, 1e300, None))],
+        "DarknessModel.load": lambda: [Call(lambda: ts.DarknessModel.load, {"path": (t.darkness_file, paths)})],
+        "DarknessModel.save": lambda: [Call(lambda: t.darkness_model.save, {"path": ("y", paths)})],
+        "DarknessModel.height_at": lambda: [Call(lambda: t.darkness_model.height_at, {"darkening": (0.1, numbers)})],
+        "DarknessEstimator": lambda: [Call(lambda: ts.DarknessEstimator, {
+            "model": (t.darkness_model, only(*STRANGE))})],
+        "DarknessEstimator.estimate": lambda: [Call(lambda: ts.DarknessEstimator(t.darkness_model).estimate, {
+            "frame": (t.darkness[0][0][0], pictures)})],
+        "calibrate_darkness": lambda: [Call(lambda: ts.calibrate_darkness, {
+            "frames": (t.darkness[0][0], lists_of(pictures)),
+            "ball_diameters_mm": ([diameter], lists_of(numbers)), "rest": (t.darkness[0][2], lists_of(pictures)),
+            "mm_per_px": (scale, numbers), "circles": (circles, changed), "camera_distance_mm": (17.0, numbers),
+            "smoothing_px": (1.5, numbers),
+            "follow_exposure": (True, flags)}, refused=diameter != 4.0)
+            for diameter, scale, circles, changed in (
+                (4.0, 0.05, [(60.0, 44.0, 32.0)], lists_of(arrays)), (4.0, 0.05, [None], only(None)),
+                (1e-170, 1e-172, [(60.0, 44.0, 32.0)], lists_of(arrays)), (1e300, 1e300, [None], only(None)))],
         "BeadTracker": lambda: [Call(lambda: ts.BeadTracker, {
             "grid": (3, numbers), "roi_a_px": (200, numbers), "roi_b_px": (30, numbers), "polarity": ("dark", texts),
             "centre_px": ((160, 120), arrays)}, after=lambda tracker: tracker.track(beads_picture(), 0) and None)],

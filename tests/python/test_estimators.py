@@ -115,6 +115,49 @@ def test_coloured_markers_are_read_and_their_motion_learnt(tmp_path):
         ts.calibrate_hue(rest, samples, spacing_mm=3.0, viewing_distance_mm=1)
 
 
+def darkness_pictures(channels=3):
+    """At rest, and with a ball of radius 2 mm pressed 0.8 mm deep, 0.05 mm a pixel."""
+    rows, columns = 0.05 * (np.mgrid[:90, :120] + 0.5)
+    cap = 0.8 - 2.0 + np.sqrt(np.maximum(0.0, 4.0 - (columns - 3.0)**2 - (rows - 2.2)**2))
+    pressed = 160.0 * (1.0 - 0.2 * np.maximum(cap, 0.0))
+    return [np.repeat(np.round(grey).astype(np.uint8)[..., None], channels, axis=2)
+            for grey in (np.full_like(pressed, 160.0), pressed)]
+
+
+def test_darkness_gives_heights(tmp_path):
+    rest, pressed = darkness_pictures()
+    model, report = ts.calibrate_darkness([pressed], [4.0], [rest], mm_per_px=0.05)
+    assert report["depths_mm"][0] == pytest.approx(0.8, abs=0.03)
+    assert report["circles"][0][:2] == pytest.approx((60.0, 44.0), abs=0.5)
+    assert report["fitted"]["rms_mm"] < 0.01 and report["held_out"]["rms_mm"] < 0.03
+    assert model.deepest_mm == pytest.approx(0.8, abs=0.06) and model.picture_shape == (90, 120)
+    assert model.height_at(0.08) == pytest.approx(0.4, abs=0.03) and model.height_at(0.0) == 0.0
+    model.save(str(tmp_path / "m.dark"))
+    estimator = ts.DarknessEstimator(ts.DarknessModel.load(str(tmp_path / "m.dark")))
+    result = estimator.estimate(pressed)
+    assert result.height_mm.dtype == np.float32 and result.height_mm[44, 60] == pytest.approx(0.8, abs=0.03)
+    assert result.contact.dtype == bool and result.contact.sum() == result.contact_pixels > 0
+    assert result.doubt.dtype == np.uint8 and result.exposure_followed and result.exposure == pytest.approx(1.0)
+    assert result.trusted and not result.contact_at_border
+    kept = result.height_mm.copy()
+    assert estimator.estimate(rest).contact_pixels == 0
+    assert np.array_equal(result.height_mm, kept), "a result isn't overwritten by later frames"
+    grey = [picture[..., 0] for picture in (rest, pressed)]
+    assert ts.calibrate_darkness([grey[1]], [4.0], [grey[0]], mm_per_px=0.05)[1]["pixels"] == report["pixels"]
+    with pytest.raises(ts.Error, match="the frame is grey; the rest picture is in colour"):
+        estimator.estimate(grey[1])
+    with pytest.raises(ts.Error, match="frame 0: where it's touched it is brighter than the rest picture"):
+        ts.calibrate_darkness([rest], [4.0], [pressed], mm_per_px=0.05)
+    near = ts.calibrate_darkness([pressed], [4.0], [rest], mm_per_px=0.05, camera_distance_mm=20)[0]
+    assert near.height_at(0.08) > model.height_at(0.08) + 0.005, "before a near camera what is pressed in looks larger"
+    with pytest.raises(ts.Error, match="camera_distance_mm: 0.5 is not allowed"):
+        ts.calibrate_darkness([pressed], [4.0], [rest], mm_per_px=0.05, camera_distance_mm=0.5)
+    with pytest.raises(ts.Error, match="smoothing_px: 11 is not allowed"):
+        ts.calibrate_darkness([pressed], [4.0], [rest], mm_per_px=0.05, smoothing_px=11)
+    with pytest.raises(ts.Error, match="circles: there are 2 for 1 frames"):
+        ts.calibrate_darkness([pressed], [4.0], [rest], mm_per_px=0.05, circles=[None, None])
+
+
 def test_heights_are_checked_and_shared_between_threads(sensor, ball):
     background = [sensor.background(frame=k) for k in range(2)]
     touch = sensor.press(ball, depth_mm=0.4)

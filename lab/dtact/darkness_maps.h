@@ -1,0 +1,37 @@
+#pragma once
+// Height maps on disk, from frames of a gel that shows depth as darkness.
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "core/progress.h"
+#include "lab/gelsight/height_maps.h"
+#include "sensors/heights/darkness_estimator.h"
+
+namespace touchstone::lab {
+
+/// A line of the summary.
+struct DarknessRecord {
+  std::string file;
+  double highest_mm = 0.0;
+  double volume_mm3 = 0.0;  ///< sum of the heights times a pixel's area
+  double contact_mm2 = 0.0;
+  double exposure = 1.0;  ///< the frame's over the rest picture's
+  bool exposure_followed = false;
+  double deeper_percent = 0.0;  ///< of the pixels: sensors::kDeeper
+  double bulged_percent = 0.0;  ///< sensors::kBulged
+  double saturated_percent = 0.0;
+  bool trusted = true;
+  bool contact_at_border = false;
+};
+
+/// Estimates each frame and writes FOLDER/STEM.exr or .png; with `doubt` also FOLDER/STEM-doubt.png (bits of
+/// sensors::Doubt); and FOLDER/heights.csv when all are done. The folder is made if it isn't there.
+/// @throws Error naming the frame that can't be read or estimated, or if two have one stem
+std::vector<DarknessRecord> write_darkness_maps(const sensors::DarknessModel& model,
+                                                const std::vector<std::filesystem::path>& frames,
+                                                const std::filesystem::path& folder, HeightFormat format, bool doubt,
+                                                const Progress& progress = {});
+
+}  // namespace touchstone::lab
