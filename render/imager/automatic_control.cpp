@@ -1,21 +1,24 @@
 #include "render/imager/automatic_control.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 
 #include "core/error.h"
 
 namespace touchstone::render {
 namespace {
 
-// Bins of equal ratio; darker levels are in the first, brighter ones in the last. Only the bin in which the clipping
-// level lies is read as if all of it had its mean: 1/32 of an octave, 2 %, of the pixels that are just there.
-constexpr double kLowest = 0x1p-12;
-constexpr double kBinsAnOctave = 32.0;
+// 32 bins an octave: a float's exponent and the first five bits of its mantissa. Darker levels are in the first,
+// brighter ones in the last. Only the bin in which the clipping level lies is read as if all of it had its mean.
+constexpr float kLowest = 0x1p-12F;
+constexpr int kMantissaBits = 23 - 5;
 
-int bin_of(double level) {
-  if (!(level > kLowest)) return 0;
-  return std::min(Metering::kBins - 1, 1 + static_cast<int>(kBinsAnOctave * std::log2(level / kLowest)));
+int bin_of(float level) {
+  const auto first = static_cast<int>(std::bit_cast<std::uint32_t>(kLowest) >> kMantissaBits);
+  const auto place = static_cast<int>(std::bit_cast<std::uint32_t>(level) >> kMantissaBits);
+  return std::clamp(place - first, 0, Metering::kBins - 1);
 }
 
 /// The exposure that the meter asks for, if it reads this at `factor`.
@@ -79,7 +82,7 @@ Metering metering_of(const cv::Mat& irradiance, const Imager& imager) {
       for (int column = 0; column < irradiance.cols; ++column, light += bands) {
         double level = dark;
         for (int b = 0; b < bands; ++b) level += weights[static_cast<std::size_t>(b)] * static_cast<double>(light[b]);
-        Metering::Bin& bin = bins[static_cast<std::size_t>(bin_of(level))];
+        Metering::Bin& bin = bins[static_cast<std::size_t>(bin_of(static_cast<float>(level)))];
         bin.count += 1.0;
         bin.level += level;
       }
