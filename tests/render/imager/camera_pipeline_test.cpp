@@ -123,27 +123,16 @@ cv::Mat noise_picture(int type) {
   return picture;
 }
 
-// At quality 100 each cosine is kept to 1/2, which is 1/2 of a pixel (root of the sum of squares, 8 x 8 numbers of
-// variance 1/12): a number is right to 1 but for the tail of a normal distribution of deviation 0.29 + rounding, which
-// ends at 2. Colours go through Y, Cb and Cr, each rounded: blue is Y + 1.772 Cb, off by up to
-// (1 + 1.772) / 2 + 1/2 = 1.9 by that alone.
-TEST(JpegLoss, AtQuality100IsWithinOneNumberOfGreyAndTwoOrThreeOfColour) {
+// At quality 100 each cosine is kept to 1/2, which makes a deviation of 0.29 of a number, and numbers are rounded: off
+// by 0 or 1. Colours go through Y, Cb and Cr, each of which is then off by up to about 1: blue, which is Y + 1.772 Cb,
+// by up to 3 and the rounding, on average by half a number.
+TEST(JpegLoss, AtQuality100IsWithinOneNumberOfGreyAndAFewOfColour) {
   const cv::Mat grey = noise_picture(CV_8UC1);
-  cv::Mat off;
-  cv::absdiff(grey, through_jpeg(grey, {.quality = 100}), off);
-  EXPECT_LE(cv::norm(off, cv::NORM_INF), 2.0);
-  EXPECT_LT(cv::countNonZero(off > 1), 0.01 * grey.total());
-  cv::Mat smooth(48, 64, CV_8UC1);
-  for (int y = 0; y < smooth.rows; ++y) {
-    for (int x = 0; x < smooth.cols; ++x) {
-      smooth.at<std::uint8_t>(y, x) = cv::saturate_cast<std::uint8_t>(120 + 80 * std::sin(0.1 * x + 0.07 * y));
-    }
-  }
-  EXPECT_LE(cv::norm(smooth, through_jpeg(smooth, {.quality = 100}), cv::NORM_INF), 1.0);
+  EXPECT_LE(cv::norm(grey, through_jpeg(grey, {.quality = 100}), cv::NORM_INF), 1.0);
   const cv::Mat colours = noise_picture(CV_8UC3);
-  cv::absdiff(colours, through_jpeg(colours, {.quality = 100}), off);
-  EXPECT_LE(cv::norm(off, cv::NORM_INF), 4.0);
-  EXPECT_LT(cv::norm(off, cv::NORM_L1) / (3.0 * colours.total()), 1.0);
+  const cv::Mat left = through_jpeg(colours, {.quality = 100});
+  EXPECT_LE(cv::norm(colours, left, cv::NORM_INF), 4.0);
+  EXPECT_LT(cv::norm(colours, left, cv::NORM_L1) / (3.0 * static_cast<double>(colours.total())), 0.6);
 }
 
 // Columns that are red and blue by turns: with one colour for each 2 x 2 pixels both become their mean.
