@@ -204,7 +204,8 @@ struct VirtualCamera::Parts : SceneView {
     tbb::parallel_for(std::size_t{0}, truths.size(), [&](std::size_t i) { read[i] = metering(truths[i]); });
     render::ControlState state;
     for (std::size_t i = 0; i < truths.size(); ++i) {
-      const double seconds = i == 0 ? 0.0 : (truths[i].t_us - truths[i - 1].t_us) / kMicrosecondsPerSecond;
+      const double seconds =
+          i == 0 ? 0.0 : static_cast<double>(truths[i].t_us - truths[i - 1].t_us) / kMicrosecondsPerSecond;
       state = i == 0 ? render::settled(imager, read[0]) : render::next_state(imager, state, read[i - 1], seconds);
       control[truths[i].t_us] = state;
     }

@@ -75,7 +75,8 @@ TEST(ToneCurve, IsTheSameOfAllNumbersAndHasAnInverse) {
     Imager imager = grey_imager();
     imager.tone_curve = curve;
     cv::Mat raw(256, 256, CV_16UC1);
-    for (int level = 0; level < 65536; ++level) raw.at<std::uint16_t>(level / 256, level % 256) = level;
+    for (int level = 0; level < 65536; ++level)
+      raw.at<std::uint16_t>(level / 256, level % 256) = static_cast<std::uint16_t>(level);
     const cv::Mat shown = develop(raw, imager);
     for (int level = 0; level < 65536; ++level) {
       const double wanted = std::floor(255.0 * delivered(curve, level / 65535.0) + 0.5);
