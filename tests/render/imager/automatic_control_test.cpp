@@ -36,7 +36,8 @@ Imager automatic_imager() {
   return imager;
 }
 
-/// Light that gives the channels these levels, R, G, B, from half of it on the left to one and a half on the right.
+/// Light that gives the channels these levels, R, G, B, from half of it on the left to one and a half on the right, in
+/// 20 steps of two columns: each colour of a mosaic sees the same.
 cv::Mat light_of(const Imager& imager, const Eigen::Vector3d& levels) {
   const QuantumEfficiency per_light = response_of(imager).electrons_per_irradiance;
   cv::Mat light(30, 40, CV_32FC3);
@@ -44,7 +45,7 @@ cv::Mat light_of(const Imager& imager, const Eigen::Vector3d& levels) {
     for (int x = 0; x < light.cols; ++x) {
       for (int c = 0; c < 3; ++c) {
         light.at<cv::Vec3f>(y, x)[c] =
-            static_cast<float>((0.5 + x / 39.0) * levels[c] * imager.full_well_e / per_light(c, c));
+            static_cast<float>((0.5 + x / 2 / 19.0) * levels[c] * imager.full_well_e / per_light(c, c));
       }
     }
   }
@@ -58,8 +59,8 @@ TEST(Metering, ReadsTheMeanLevelsAndHowTheyClip) {
   EXPECT_NEAR(metering.mean(1, 1.0), 0.2, 1e-6);
   EXPECT_NEAR(metering.mean(2, 1.0), 0.4, 1e-6);
   EXPECT_NEAR(metering.mean(1.0), (0.1 + 2.0 * 0.2 + 0.4) / 4.0, 1e-6);
-  // Blue at 2.5 times the exposure is 0.5 to 1.5 evenly: half of it clips at 1, and the mean is 0.5 0.75 + 0.5 = 0.875.
-  EXPECT_NEAR(metering.mean(2, 2.5), 0.875, 0.002);
+  // Blue at 2.5 times the exposure is 0.5 + k / 19: its first ten steps have a mean of 0.7368, the others clip at 1.
+  EXPECT_NEAR(metering.mean(2, 2.5), 0.5 * (0.7368 + 1.0), 1e-4);
   EXPECT_NEAR(metering.mean(2, 1e6), 1.0, 1e-12);
 }
 
@@ -91,17 +92,17 @@ TEST(AutomaticControl, GreyWorldIsOnTopOfTheFixedGains) {
   EXPECT_NEAR(controlled(imager, state).white_balance[0], 2.0, 1e-5);
 }
 
-// The light becomes 3 times as much at t = 0. The exposure's factor goes from f to f / 3 along
-// log(factor) = log(f / 3) + log(3) exp(-t / 0.4 s), whatever the frames' times.
+// The light becomes twice as much at t = 0. The exposure's factor goes from f to f / 2 along
+// log(factor) = log(f / 2) + log(2) exp(-t / 0.4 s), whatever the frames' times.
 TEST(AutomaticControl, FollowsAStepOfLightAlongAnExponential) {
   const Imager imager = automatic_imager();
   const ControlState before = settled(imager, metering_of(light_of(imager, {0.05, 0.1, 0.15}), imager));
-  const Metering after = metering_of(light_of(imager, {0.15, 0.3, 0.45}), imager);  // up to 0.675: nothing clips
+  const Metering after = metering_of(light_of(imager, {0.1, 0.2, 0.3}), imager);  // at f up to 0.9: nothing clips
   for (const double interval_s : {1.0 / 30.0, 0.1}) {
     ControlState state = before;
     for (int frame = 1; frame * interval_s < 2.0; ++frame) {
       state = next_state(imager, state, after, interval_s);
-      const double wanted = before.exposure / 3.0 * std::pow(3.0, std::exp(-frame * interval_s / kTime_s));
+      const double wanted = before.exposure / 2.0 * std::pow(2.0, std::exp(-frame * interval_s / kTime_s));
       ASSERT_NEAR(state.exposure, wanted, 2e-5 * wanted) << frame;
       EXPECT_NEAR(state.gains[0], before.gains[0], 1e-4) << "its colour is the same";
     }
