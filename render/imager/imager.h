@@ -113,8 +113,8 @@ int raw_type(const Imager& imager);
 struct FixedPattern {
   cv::Mat gain;      ///< CV_32FC1 or CV_32FC3, 1 + PRNU, not below 0
   cv::Mat offset_e;  ///< CV_32FC1 or CV_32FC3, DSNU
-  cv::Mat hot_e_per_s =
-      {};  ///< CV_32FC1 or CV_32FC3, hot pixels' dark current, of the others 0; empty without hot pixels
+  /// CV_32FC1 or CV_32FC3: hot pixels' dark current, of the others 0; empty without hot pixels.
+  cv::Mat hot_e_per_s = {};
 };
 
 /// The fixed pattern of the unit `unit_seed`: a pure function of the seed and the pixel's row and column.
