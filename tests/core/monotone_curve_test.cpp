@@ -19,17 +19,17 @@ using Points = std::vector<Eigen::Vector2d>;
 // The answers are those of SciPy 1.10's PchipInterpolator, which has the same slopes.
 TEST(MonotoneCurve, IsWhatSciPysPchipInterpolatorGives) {
   const MonotoneCurve rising(Points{{0, 0}, {0.1, 0.3}, {0.25, 0.5}, {0.6, 0.8}, {1, 1}});
-  EXPECT_NEAR(rising.at(0.02), 0.07207017543859646, 1e-15);
-  EXPECT_NEAR(rising.at(0.05), 0.17214912280701755, 1e-15);
-  EXPECT_NEAR(rising.at(0.2), 0.4453201827121701, 1e-15);
-  EXPECT_NEAR(rising.at(0.4), 0.6473732520726841, 1e-15);
-  EXPECT_NEAR(rising.at(0.75), 0.8896238182773111, 1e-15);
-  EXPECT_NEAR(rising.at(0.95), 0.9830315563725491, 1e-15);
+  EXPECT_NEAR(rising.at(0.02), 0.07207017543859646, 1e-12);
+  EXPECT_NEAR(rising.at(0.05), 0.17214912280701755, 1e-12);
+  EXPECT_NEAR(rising.at(0.2), 0.4453201827121701, 1e-12);
+  EXPECT_NEAR(rising.at(0.4), 0.6473732520726841, 1e-12);
+  EXPECT_NEAR(rising.at(0.75), 0.8896238182773111, 1e-12);
+  EXPECT_NEAR(rising.at(0.95), 0.9830315563725491, 1e-12);
   const MonotoneCurve bent(Points{{0, 1}, {0.3, 0.9}, {0.5, 0.95}, {0.8, 0.95}, {1, 0.4}});
-  EXPECT_NEAR(bent.at(0.1), 0.9437037037037037, 1e-15);
-  EXPECT_NEAR(bent.at(0.29), 0.9001057407407408, 1e-15);
-  EXPECT_NEAR(bent.at(0.4), 0.925, 1e-15);
-  EXPECT_NEAR(bent.at(0.6), 0.95, 1e-15) << "flat between equal points";
+  EXPECT_NEAR(bent.at(0.1), 0.9437037037037037, 1e-12);
+  EXPECT_NEAR(bent.at(0.29), 0.9001057407407408, 1e-12);
+  EXPECT_NEAR(bent.at(0.4), 0.925, 1e-12);
+  EXPECT_NEAR(bent.at(0.6), 0.95, 1e-12) << "flat between equal points";
   EXPECT_NEAR(bent.at(0.99), 0.43873375, 1e-12);
 }
 
