@@ -215,7 +215,9 @@ TEST(HotPixels, HaveTheirDarkCurrentInTheDark) {
     cv::Mat with, without;
     expose(dark, imager, 5, 1).convertTo(with, CV_64F);
     expose(dark, cold, 5, 1).convertTo(without, CV_64F);
-    const cv::Mat excess = (with - without) / imager.gain_DN_per_e;
+    cv::Mat excess;
+    cv::subtract(with, without, excess);
+    excess /= imager.gain_DN_per_e;
     const double electrons = 4e5 * exposure_s;
     const double error = std::sqrt(electrons / cv::countNonZero(is_hot));
     EXPECT_NEAR(cv::mean(excess, is_hot)[0], electrons, 4.0 * error);
