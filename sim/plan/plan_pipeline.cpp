@@ -47,7 +47,7 @@ void plan_pipeline(const SceneSpec& scene, Plan& plan, PlanTable& table) {
                               vignetted         ? "the device's lens has it, beside cos^4"
                               : lens != nullptr ? "the device has no camera.vignetting: cos^4 alone"
                                                 : "the camera has no lens",
-                              "under a thousandth of the rays' time");
+                              "some 20 nanoseconds a ray");
   const bool hot = camera.hot_pixels.share > 0.0;
   plan.hot_pixels = table.add("hot pixels", hot && plan.sensor_noise,
                               !hot ? "the device has no camera.hot_pixels"
@@ -56,7 +56,7 @@ void plan_pipeline(const SceneSpec& scene, Plan& plan, PlanTable& table) {
                                                 100.0 * camera.hot_pixels.share, camera.hot_pixels.dark_current_e_per_s)
                                   : "there is no sensor noise",
                               "under a millisecond a frame");
-  const char* metering = "a preview a frame, which the camera's meter reads, and some milliseconds";
+  const char* metering = "a preview a frame, and 2 milliseconds for the meter that reads it";
   plan.auto_exposure = table.add(
       "auto exposure", camera.auto_exposure && shown,
       !shown ? none
@@ -81,7 +81,7 @@ void plan_pipeline(const SceneSpec& scene, Plan& plan, PlanTable& table) {
   plan.tone_curve =
       table.add("tone curve", !linear && shown,
                 shown ? fmt::format("the camera delivers its numbers {}", tone_in_words(camera.tone_curve)) : none,
-                "a millisecond a frame");
+                "under a millisecond a frame");
   plan.jpeg = table.add("JPEG", camera.jpeg && plan.sensor_noise,
                         camera.jpeg && !plan.sensor_noise
                             ? "there is no sensor noise: ideal pictures have no losses"
@@ -89,7 +89,7 @@ void plan_pipeline(const SceneSpec& scene, Plan& plan, PlanTable& table) {
                                      [](const render::JpegSettings& jpeg) {
                                        return fmt::format("the camera delivers JPEGs of quality {}", jpeg.quality);
                                      }),
-                        "some milliseconds a frame");
+                        "1 to 2 milliseconds a frame");
 }
 
 }  // namespace touchstone::sim
