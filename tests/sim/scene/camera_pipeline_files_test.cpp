@@ -156,7 +156,7 @@ const Effect& effect(const Plan& plan, const std::string& name) {
 }
 
 TEST(CameraPipelinePlan, SaysOfEachStepWhetherTheDeviceStatesIt) {
-  SceneSpec scene = moving_scene("  - {frames: 2, z: 1.6}\n");
+  SceneSpec scene = moving_scene("  - {frames: 2, z: {position_mm: 1.6}}\n");
   const Plan without = make_plan(scene);
   for (const char* name : {"vignetting", "hot pixels", "auto exposure", "auto white balance", "tone curve", "JPEG"}) {
     EXPECT_FALSE(effect(without, name).on) << name;

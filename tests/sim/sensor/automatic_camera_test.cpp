@@ -25,7 +25,7 @@ constexpr double kTime_s = 0.08;  // some eight frames
 
 /// A ball that comes down into a clear gel and makes the picture brighter.
 SceneSpec automatic_scene() {
-  SceneSpec scene = moving_scene("  - {frames: 6, z: 1.5}\n  - {frames: 6, z: 1.5}\n");
+  SceneSpec scene = moving_scene("  - {frames: 6, z: {position_mm: 1.5}}\n  - {frames: 6, z: {position_mm: 1.5}}\n");
   scene.device.camera->auto_exposure =
       render::AutoExposure{.time_constant_s = kTime_s, .mean_level = 0.2, .lowest = 1e-3, .highest = 20.0};
   scene.effects.motion_blur = Switch::off;
