@@ -169,11 +169,9 @@ void check_pipeline(const YamlReader& in, const CameraSpec& camera) {
     fail_at(in.where("auto_exposure"), "camera.auto_exposure: exposure_us is 0, which no factor changes");
   }
   if (longest_us > frame_us) {
-    fail_at(
-        in.where("auto_exposure"),
-        "camera.auto_exposure: exposure_factors go to {}, of exposure_us {} that is {} us, longer than a frame of {} "
-        "us at {} Hz",
-        camera.auto_exposure->highest, camera.exposure_us, longest_us, frame_us, camera.frame_rate_Hz);
+    fail_at(in.where("auto_exposure"),
+            "camera.auto_exposure: exposure_factors go to {}: {} us, which is longer than a frame of {} us at {} Hz",
+            camera.auto_exposure->highest, longest_us, frame_us, camera.frame_rate_Hz);
   }
 }
 
