@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "core/error.h"
-#include "sim/files/jpeg_bytes.h"
+#include "render/imager/jpeg.h"
 
 namespace touchstone::apps {
 namespace {
@@ -83,7 +83,7 @@ std::shared_ptr<const ServedFrame> ServedCamera::frame(std::int64_t number) {
     if (stopped_) return nullptr;
     made->state = state_at(number);
   }
-  made->jpeg = sim::jpeg_bytes(made->state->expose(static_cast<std::uint64_t>(number)), quality_);
+  made->jpeg = render::jpeg_bytes(made->state->expose(static_cast<std::uint64_t>(number)), {.quality = quality_});
   made_ = std::move(made);
   return made_;
 }

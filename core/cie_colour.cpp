@@ -41,6 +41,10 @@ Eigen::Vector3d linear_from_srgb(const Eigen::Vector3d& srgb) {
   return srgb.unaryExpr([](double v) { return v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4); });
 }
 
+double srgb_from_linear(double linear) {
+  return linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1.0 / 2.4) - 0.055;
+}
+
 Eigen::Vector3d xyz_from_linear_srgb(const Eigen::Vector3d& linear) {
   return primaries() * linear;
 }

@@ -11,6 +11,8 @@ inline const Eigen::Vector3d kD65White(0.95047, 1.0, 1.08883);
 
 /// sRGB values, 0 to 1, as parts of the primaries' light, 0 to 1; values beyond are continued (below 0 linearly).
 Eigen::Vector3d linear_from_srgb(const Eigen::Vector3d& srgb);
+/// The inverse, of one value: 12.92 x to x = 0.0031308, then 1.055 x^(1/2.4) - 0.055.
+double srgb_from_linear(double linear);
 
 /// XYZ of light in sRGB's primaries; (1, 1, 1) is kD65White.
 Eigen::Vector3d xyz_from_linear_srgb(const Eigen::Vector3d& linear);

@@ -30,6 +30,7 @@ enum class Purpose : std::uint32_t {
   kFolds = 21,
   kSearch = 22,
   kStudy = 23,
+  kHotPixels = 24,
   kTest = 99,
 };
 

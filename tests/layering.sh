@@ -53,7 +53,7 @@ sim/grasp: core fem/mesh fem/elements fem/contact fem/error fem/fine_relief fem/
 datasets/jobs: core render/lamps sim/relief sim/scene sim/plan sim/press sim/sensor
 datasets/sets: core fem/elements sensors/events sim/files sim/scene sim/plan sim/press sim/view sim/sensor datasets/jobs
 datasets/exports: core sim/files datasets/sets
-datasets/inspection: core plots render/cameras sim/files sim/scene sim/plan sim/view datasets/jobs datasets/sets
+datasets/inspection: core plots render/cameras render/imager sim/files sim/scene sim/plan sim/view datasets/jobs datasets/sets
 lab/statistics: core
 lab/validation: core plots fem/error sim/scene sim/sensor lab/statistics
 lab/press: core fem/elements fem/shapes fem/contact fem/finite_strain render/scene render/cameras sensors/tractions sim/scene
@@ -70,7 +70,7 @@ lab/studies: core plots fem/mesh fem/elements fem/shapes fem/contact render/samp
 lab/bench: core plots fem/mesh fem/elements fem/contact render/imager sim/scene sim/plan sim/press sim/view sim/sensor datasets/sets lab/statistics lab/studies
 lab/fit: core render/imager sim/files sim/relief sim/scene sim/press sim/view sim/sensor datasets/jobs datasets/inspection lab/validation lab/studies
 lab/schema: core sim/scene datasets/jobs lab/vhs lab/studies lab/fit
-apps: core plots sensors/beads sensors/heights sensors/colour sensors/tractions sensors/events sim/files sim/scene sim/plan sim/press sim/view sim/sensor datasets/jobs datasets/sets datasets/exports datasets/inspection lab/validation lab/press lab/device lab/vhs lab/gelsight lab/dtact lab/chroma lab/dvs lab/studies lab/bench lab/fit lab/schema
+apps: core plots render/imager sensors/beads sensors/heights sensors/colour sensors/tractions sensors/events sim/files sim/scene sim/plan sim/press sim/view sim/sensor datasets/jobs datasets/sets datasets/exports datasets/inspection lab/validation lab/press lab/device lab/vhs lab/gelsight lab/dtact lab/chroma lab/dvs lab/studies lab/bench lab/fit lab/schema
 python: core sensors/beads sensors/heights sensors/colour sim/files sim/scene sim/press sim/sensor datasets/jobs datasets/sets
 testing: core sim/files sim/press sim/sensor datasets/jobs lab/device
 END

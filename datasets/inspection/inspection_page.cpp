@@ -14,8 +14,8 @@
 #include "datasets/sets/run_identity.h"
 #include "plots/histogram_plot.h"
 #include "plots/line_plot.h"
+#include "render/imager/jpeg.h"
 #include "sim/files/image_file.h"
-#include "sim/files/jpeg_bytes.h"
 
 namespace touchstone::datasets {
 namespace {
@@ -113,7 +113,7 @@ std::string picture_element(const cv::Mat& picture, const std::string& caption) 
   return fmt::format(
       "<figure><img width=\"{}\" height=\"{}\" alt=\"{}\" src=\"data:image/jpeg;base64,{}\"><figcaption>{}</figcaption>"
       "</figure>\n",
-      picture.cols, picture.rows, words, base64(sim::jpeg_bytes(picture, kJpegQuality)), words);
+      picture.cols, picture.rows, words, base64(render::jpeg_bytes(picture, {.quality = kJpegQuality})), words);
 }
 
 std::string cell(const std::string& text, const char* kind = "td") {

@@ -10,7 +10,7 @@
 #include "core/error.h"
 #include "core/units.h"
 #include "datasets/sets/sample_source.h"
-#include "render/imager/imager.h"
+#include "render/imager/automatic_control.h"
 #include "sim/plan/plan.h"
 #include "sim/scene/device_imager.h"
 #include "sim/view/visible_scene.h"
@@ -66,7 +66,10 @@ SceneFeed feed_of_scene(const sim::SceneSpec& scene_of, const std::filesystem::p
   const auto gel = source.set_up_gel(scene.device, progress);
   const std::vector<sim::Truth> all = source.play_motion(scene, plan, *gel, progress);
   const std::span<const sim::Truth> truths(all.data() + first, static_cast<std::size_t>(count));
-  const datasets::SampleSource::Camera camera = source.set_up_camera(scene, plan, gel, truths);
+  // What a camera that sets itself shows depends on all that it has seen before.
+  const bool automatic = plan.auto_exposure || plan.auto_white_balance;
+  const datasets::SampleSource::Camera camera =
+      source.set_up_camera(scene, plan, gel, automatic ? std::span(all.data(), truths.data() + count) : truths);
 
   auto electronics = std::make_shared<Electronics>();
   electronics->imager = sim::imager(scene.device, plan.bands, plan.sensor_noise);
@@ -83,11 +86,11 @@ SceneFeed feed_of_scene(const sim::SceneSpec& scene_of, const std::filesystem::p
     auto state = std::make_shared<CameraState>();
     take_truth(truths[i], *state);
     state->what = fmt::format("{}, {} in frame {}", scene.device.name, scene.object.name, truths[i].frame);
-    const cv::Mat light = camera(truths[i]).radiance;
-    state->expose = [light, electronics](std::uint64_t noise_seed) {
-      return render::develop(
-          render::expose(light, electronics->imager, electronics->pattern, electronics->seed, noise_seed),
-          electronics->imager);
+    const sim::Capture capture = camera(truths[i]);
+    state->expose = [light = capture.radiance, imager = render::controlled(electronics->imager, capture.control),
+                     electronics](std::uint64_t noise_seed) {
+      return render::develop(render::expose(light, imager, electronics->pattern, electronics->seed, noise_seed),
+                             imager);
     };
     feed.states[i] = std::move(state);
     if (progress) progress("light", ++done, count);

@@ -29,13 +29,15 @@ bool is_of_imager(const std::string& path) {
                                        "bits",
                                        "white_balance",
                                        "black_level_DN",
+                                       "tone_curve",
+                                       "hot_pixels",
                                        "active_area_um2",
                                        "quantum_efficiency_red",
                                        "quantum_efficiency_green",
                                        "quantum_efficiency_blue"};
   return std::any_of(kKeys.begin(), kKeys.end(), [&](const char* key) {
     const std::string whole = std::string("camera.") + key;
-    return path == whole || path.starts_with(whole + "[");
+    return path == whole || path.starts_with(whole + "[") || path.starts_with(whole + ".");
   });
 }
 
@@ -95,6 +97,10 @@ void require_fit(const sim::DeviceSpec& device) {
     fail_at(device.where, "device {}: has `bands`; a fit takes devices with band_wavelengths_nm", device.name);
   }
   if (device.lamps.empty()) fail_at(device.where, "device {}: has no lamps", device.name);
+  if (device.camera->auto_exposure || device.camera->auto_white_balance) {
+    fail_at(device.where, "device {}: its camera sets its {} by itself; a fit takes cameras that don't, fix it",
+            device.name, device.camera->auto_exposure ? "exposure" : "white balance");
+  }
   if (device.room_radiance.largest() > 0.0) {
     fail_at(device.where, "device {}: room_radiance is {}; a fit takes closed devices, whose light is their lamps'",
             device.name, device.room_radiance.largest());

@@ -139,12 +139,31 @@ cv::Mat mean_numbers(const cv::Mat& light, const render::Imager& imager) {
         const Channel& channel = channels[static_cast<std::size_t>(c)];
         double electrons = channel.dark_e;
         for (int b = 0; b < bands; ++b) electrons += channel.electrons_per_light[b] * in[b];
-        out[place_of(c, count)] = channel.number_per_e * electrons;
+        const double linear = std::max(0.0, channel.number_per_e * electrons);
+        out[place_of(c, count)] = kFullScale * render::delivered(imager.tone_curve, linear / kFullScale);
       }
     }
   }
   return numbers;
 }
+
+namespace {
+
+/// The number before the tone curve, and how much what is delivered changes with it.
+struct LinearNumber {
+  double number = 0.0, slope = 1.0;
+};
+
+LinearNumber linear_number(const render::ToneCurve& curve, double delivered) {
+  if (std::holds_alternative<render::LinearTone>(curve)) return {delivered, 1.0};
+  constexpr double kStep = 1e-4;  // of full scale: less than a number, more than what is lost to rounding
+  const double linear = render::linear_of(curve, delivered / kFullScale);
+  const double low = std::max(0.0, linear - kStep);
+  const double rise = render::delivered(curve, linear + kStep) - render::delivered(curve, low);
+  return {kFullScale * linear, rise / (linear + kStep - low)};
+}
+
+}  // namespace
 
 cv::Mat block_noise(const cv::Mat& numbers, const render::Imager& imager, int block_px, int exposures) {
   const std::vector<Channel> channels = channels_of(imager);
@@ -157,12 +176,14 @@ cv::Mat block_noise(const cv::Mat& numbers, const render::Imager& imager, int bl
       for (int c = 0; c < count; ++c) {
         const Channel& channel = channels[static_cast<std::size_t>(c)];
         const int at = place_of(c, count);
-        const double electrons = std::max(0.0, in[at] / channel.number_per_e);
+        const LinearNumber shown = linear_number(imager.tone_curve, in[at]);
+        const double electrons = std::max(0.0, shown.number / channel.number_per_e);
         const double moving = electrons + channel.read_e * channel.read_e;
         const double still = std::pow(channel.prnu * electrons, 2) + channel.dsnu_e * channel.dsnu_e;
-        const double rounding = channel.step * channel.step / 12.0 + (channel.step != 1.0 ? 1.0 / 12.0 : 0.0);
-        const double per_sample = (channel.number_per_e * channel.number_per_e * moving + rounding) / exposures +
-                                  channel.number_per_e * channel.number_per_e * still;
+        const double per_e = shown.slope * channel.number_per_e;
+        const double step = shown.slope * channel.step;
+        const double rounding = step * step / 12.0 + (step != 1.0 ? 1.0 / 12.0 : 0.0);
+        const double per_sample = (per_e * per_e * moving + rounding) / exposures + per_e * per_e * still;
         out[at] = std::sqrt(per_sample / (channel.samples * block_px * block_px));
       }
     }

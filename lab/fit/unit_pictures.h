@@ -32,8 +32,8 @@ BlockPicture mean_picture(const std::vector<BlockPicture>& pictures);
 BlockPicture block_picture(const cv::Mat& picture, const std::string& name, const sim::CameraSpec& camera, int block_px,
                            const SourceLocation& where);
 
-/// What the camera delivers of light (W/m^2 on the sensor, CV_32FC(bands) or CV_64FC(bands)) on average: in proportion
-/// to the light, without noise, rounding or saturation. CV_64FC(1 or 3), in the light's size. With dark current.
+/// What the camera delivers of light (W/m^2 on the sensor, CV_32FC(bands) or CV_64FC(bands)) on average: along its tone
+/// curve, without noise, rounding, saturation or JPEG. CV_64FC(1 or 3), in the light's size. With dark current.
 cv::Mat mean_numbers(const cv::Mat& light, const render::Imager& imager);
 
 /// One standard deviation, from pixel to pixel and exposure to exposure, of the mean over block_px^2 pixels that read

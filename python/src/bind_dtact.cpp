@@ -64,7 +64,7 @@ py::tuple calibrate_darkness(const py::object& frames, const py::object& ball_di
   });
   py::list used;
   for (const sensors::BallPress& press : presses) {
-    used.append(py::make_tuple(press.circle.centre.x(), press.circle.centre.y(), press.circle.radius));
+    used.append(py::make_tuple(press.circle->centre.x(), press.circle->centre.y(), press.circle->radius));
   }
   py::list depths;
   for (const double depth : made.depths_mm) depths.append(depth);

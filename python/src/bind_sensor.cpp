@@ -205,6 +205,12 @@ void bind_sensor(py::module_& module) {
           "ideal", [](const py::object& self) { return array_of(self.cast<Touch&>().ideal); },
           "The frame without noise and fixed pattern.")
       .def_property_readonly(
+          "exposure_factor", [](const Touch& self) { return self.of.control.exposure; },
+          "Of a camera with auto_exposure: what it has made of exposure_us for this frame; else 1.")
+      .def_property_readonly(
+          "gain_factors", [](const Touch& self) { return small_array(self.of.control.gains); },
+          "(3,): of a camera with auto_white_balance: what it has made of its gains of red, green, blue; else 1.")
+      .def_property_readonly(
           "height_mm", of_touch(&sim::Touch::height),
           "float32: how far the membrane that a pixel sees is pressed in, along z; NaN where it sees none.")
       .def_property_readonly(

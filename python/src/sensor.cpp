@@ -26,7 +26,7 @@ Touch Sensor::finished(const sim::TouchObject& by, sim::Touch touch, const sim::
                        const sim::TouchOptions& options) const {
   Touch finished;
   finished.reading = reading;
-  if (options.picture && options.truth) finished.ideal = sensor_.ideal(by, touch.light);
+  if (options.picture && options.truth) finished.ideal = sensor_.ideal(by, touch);
   if (options.picture) finished.light_error = sensor_.light().error;
   if (!touch.contact.empty()) touch.contact.setTo(1, touch.contact != 0);
   finished.of = std::move(touch);

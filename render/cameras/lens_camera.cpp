@@ -24,6 +24,15 @@ Eigen::Vector2d pixel_of(const CameraMatrix& matrix, const Eigen::Vector2d& tang
           matrix.fy * tangents.y() + matrix.cy + kOpenCvHalfPixel};
 }
 
+/// Below 0, too, where the numbers say so.
+double raw_factor(const Vignetting& vignetting, double r) {
+  if (const auto* curve = std::get_if<MonotoneCurve>(&vignetting)) return curve->at(r);
+  const auto& coefficients = std::get<std::vector<double>>(vignetting);
+  double sum = 0.0;
+  for (auto a = coefficients.rbegin(); a != coefficients.rend(); ++a) sum = (sum + *a) * r * r;
+  return 1.0 + sum;
+}
+
 double mean_focal_px(const CameraMatrix& matrix) {
   return std::sqrt(matrix.fx * matrix.fy);
 }
@@ -37,6 +46,43 @@ double furthest_corner(const LensCamera& camera) {
     }
   }
   return furthest;
+}
+
+/// The distance from the principal point by half of the picture's diagonal.
+double vignetting_radius(const LensCamera& camera, double x, double y) {
+  const double away = std::hypot(x - kOpenCvHalfPixel - camera.matrix.cx, y - kOpenCvHalfPixel - camera.matrix.cy);
+  return 2.0 * away / std::hypot(camera.width, camera.height);
+}
+
+void check_vignetting(const LensCamera& camera) {
+  if (!camera.vignetting) return;
+  double corner = 0.0;
+  for (double x : {0.0, static_cast<double>(camera.width)}) {
+    for (double y : {0.0, static_cast<double>(camera.height)}) {
+      corner = std::max(corner, vignetting_radius(camera, x, y));
+    }
+  }
+  if (const auto* curve = std::get_if<MonotoneCurve>(&*camera.vignetting)) {
+    const double first = curve->points().front().x();
+    const double last = curve->points().back().x();
+    constexpr double kSame = 1e-9;
+    if (first != 0.0 || last < corner - kSame) {
+      fail(
+          "camera: vignetting's points go from r = {} to {}; they must go from 0 to the picture's farthest corner, "
+          "{:.4f}",
+          first, last, corner);
+    }
+  }
+  constexpr int kSteps = 256;
+  constexpr double kMost = 10.0;
+  for (int k = 0; k <= kSteps; ++k) {
+    const double r = corner * k / kSteps;
+    const double factor = raw_factor(*camera.vignetting, r);
+    if (!(factor >= 0.0 && factor <= kMost)) {
+      fail("camera: vignetting's factor is {:.4g} at r = {:.4f}; allowed is from 0 to {} in all of the picture", factor,
+           r, kMost);
+    }
+  }
 }
 
 void check_invertible(const LensCamera& camera, const DistortionReach& reach) {
@@ -92,6 +138,7 @@ DistortionReach checked_reach(const LensCamera& camera) {
     fail("camera: aperture_mm is {}; it must be at most {} times the distance to the sensor, {} mm", camera.aperture_mm,
          kWidestAperture, sensor_distance_mm(camera));
   }
+  check_vignetting(camera);
   check_camera_pose(camera.gel_from_camera);
   const DistortionReach reach = radial_reach(camera.distortion);
   check_invertible(camera, reach);
@@ -99,6 +146,10 @@ DistortionReach checked_reach(const LensCamera& camera) {
 }
 
 }  // namespace
+
+double vignetting_at(const Vignetting& vignetting, double r) {
+  return std::max(0.0, raw_factor(vignetting, r));
+}
 
 CameraMatrix matrix_of_lens(double focal_length_mm, double focus_distance_mm, double pixel_pitch_um, int width,
                             int height) {
@@ -160,6 +211,7 @@ CameraRay lens_ray(const PreparedLens& camera, double x, double y, double u, dou
   const double area = 0.25 * kPi * camera.aperture_mm * camera.aperture_mm;
   const double spread = distort_derivative(camera.distortion, *seen).determinant();
   ray.weight = area * camera.sensor_distance * camera.sensor_distance / (from_sensor * from_sensor * spread);
+  if (camera.vignetting) ray.weight *= vignetting_at(*camera.vignetting, vignetting_radius(camera, x, y));
   return ray;
 }
 

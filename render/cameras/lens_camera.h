@@ -4,7 +4,10 @@
 #include <Eigen/Core>
 #include <limits>
 #include <optional>
+#include <variant>
+#include <vector>
 
+#include "core/monotone_curve.h"
 #include "core/transform.h"
 #include "render/cameras/camera_ray.h"
 #include "render/cameras/lens_distortion.h"
@@ -16,6 +19,14 @@ namespace touchstone::render {
 struct CameraMatrix {
   double fx = 0.0, fy = 0.0, cx = 0.0, cy = 0.0;
 };
+
+/// The light that a real lens's rims let through at a distance r from the principal point, beside what the thin lens
+/// has (cos^4): a factor. r is 1 at half of the picture's diagonal. Either 1 + a1 r^2 + a2 r^4 + ... by its
+/// coefficients, as in [Goldman2005], or a curve through measured points (r, factor).
+using Vignetting = std::variant<std::vector<double>, MonotoneCurve>;
+
+/// The factor at r; never below 0.
+double vignetting_at(const Vignetting& vignetting, double r);
 
 /// The camera frame's origin is the lens's centre, +z looks at the scene, the sensor is the plane z = -v with
 /// v = sqrt(fx fy) pitch. The image is turned upright as a pinhole's is. What lies in the plane z = focus_distance_mm
@@ -33,6 +44,7 @@ struct LensCamera {
   double pixel_pitch_um = 3.0;  ///< the root of a pixel's area (fx != fy: pixels of v/fx by v/fy)
   double aperture_mm = 1.0;     ///< D, diameter of the stop: focal length / f-number
   double focus_distance_mm = std::numeric_limits<double>::infinity();  ///< from the lens to what is sharp
+  std::optional<Vignetting> vignetting;                                ///< absent: none
   RigidTransform gel_from_camera;
 };
 

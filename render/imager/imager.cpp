@@ -50,6 +50,15 @@ void require_finite(const char* name, double value, double low, bool low_include
   }
 }
 
+void check_control(const char* name, double time_constant_s, double lowest, double highest) {
+  if (!(time_constant_s > 0.0) || !std::isfinite(time_constant_s)) {
+    fail("imager: {}.time_constant_s is {}; allowed is a finite number above 0", name, time_constant_s);
+  }
+  if (!(lowest > 0.0 && lowest < highest) || !std::isfinite(highest)) {
+    fail("imager: {} keeps its factor from {} to {}; both must be above 0, the second larger", name, lowest, highest);
+  }
+}
+
 double largest_number(const Imager& imager) {
   return static_cast<double>((1 << imager.bits) - 1);
 }
@@ -61,11 +70,13 @@ int samples_per_pixel(const Imager& imager) {
 // How one number comes of a pixel's light: that of a channel.
 struct Sample {
   std::array<double, 16> electrons_per_irradiance{};
+  double exposure_s;
   double dark_e, full_well_e, read_noise_e, gain, black, largest;
   bool ideal;
 
   Sample(const Imager& grey, const QuantumEfficiency& weights)
-      : dark_e(grey.dark_current_e_per_s * grey.exposure_s),
+      : exposure_s(grey.exposure_s),
+        dark_e(grey.dark_current_e_per_s * grey.exposure_s),
         full_well_e(grey.full_well_e),
         read_noise_e(grey.read_noise_e),
         gain(grey.gain_DN_per_e),
@@ -76,10 +87,10 @@ struct Sample {
   }
 
   // Always two draws, whatever the light, so that it doesn't change what the next sample of the pixel draws.
-  int number(double mean_e, float pattern_gain, float pattern_offset, RandomStream& stream) const {
+  int number(double mean_e, float pattern_gain, float pattern_offset, float hot_e_per_s, RandomStream& stream) const {
     double electrons = mean_e;
     if (!ideal) {
-      const double mean = mean_e * pattern_gain + dark_e;
+      const double mean = mean_e * pattern_gain + dark_e + static_cast<double>(hot_e_per_s) * exposure_s;
       const double share = stream.uniform();
       // Far above the well every draw saturates; the test also keeps the mean in a range where counts are exact.
       electrons = mean > 4.0 * full_well_e + 1e4 ? full_well_e : poisson_quantile(mean, share);
@@ -112,6 +123,27 @@ std::vector<Imager> by_channel(const Imager& imager) {
   std::abort();
 }
 
+/// As FixedPattern::hot_e_per_s. A stream of their own keeps the rest of the pattern as it is without them.
+cv::Mat hot_pixels(const HotPixels& hot, cv::Size size, int count, std::uint64_t unit_seed) {
+  if (hot.share == 0.0) return {};
+  cv::Mat current(size, CV_32FC(count), cv::Scalar::all(0.0));
+  tbb::parallel_for(tbb::blocked_range<int>(0, size.height, 16), [&](const tbb::blocked_range<int>& rows) {
+    for (int row = rows.begin(); row != rows.end(); ++row) {
+      float* out = current.ptr<float>(row);
+      for (int column = 0; column < size.width; ++column) {
+        const std::uint64_t pixel = (static_cast<std::uint64_t>(row) << 32) | static_cast<std::uint64_t>(column);
+        RandomStream stream(unit_seed, pixel, Purpose::kHotPixels);
+        for (int i = 0; i < count; ++i, ++out) {
+          const bool is_hot = stream.uniform() < hot.share;
+          const double spread = std::exp(hot.spread * normal_quantile(stream.uniform()));
+          if (is_hot) *out = static_cast<float>(hot.dark_current_e_per_s * spread);
+        }
+      }
+    }
+  });
+  return current;
+}
+
 template <typename Number>
 cv::Mat expose_as(const cv::Mat& irradiance, const Imager& imager, const FixedPattern& pattern, std::uint64_t seed,
                   std::uint64_t frame_index) {
@@ -130,6 +162,7 @@ cv::Mat expose_as(const cv::Mat& irradiance, const Imager& imager, const FixedPa
     const float* light = irradiance.ptr<float>(row);
     const float* gain = imager.ideal ? nullptr : pattern.gain.ptr<float>(row);
     const float* offset = imager.ideal ? nullptr : pattern.offset_e.ptr<float>(row);
+    const float* hot = imager.ideal || pattern.hot_e_per_s.empty() ? nullptr : pattern.hot_e_per_s.ptr<float>(row);
     Number* out = raw.ptr<Number>(row);
     for (int column = 0; column < irradiance.cols; ++column, light += bands) {
       const bool good =
@@ -150,7 +183,8 @@ cv::Mat expose_as(const cv::Mat& irradiance, const Imager& imager, const FixedPa
         }
         const float pixel_gain = gain != nullptr ? *gain++ : 1.0F;
         const float pixel_offset = offset != nullptr ? *offset++ : 0.0F;
-        *out++ = static_cast<Number>(sample.number(mean_e, pixel_gain, pixel_offset, stream));
+        const float pixel_hot = hot != nullptr ? *hot++ : 0.0F;
+        *out++ = static_cast<Number>(sample.number(mean_e, pixel_gain, pixel_offset, pixel_hot, stream));
       }
     }
   };
@@ -204,6 +238,24 @@ void check(const Imager& imager) {
   if (grey && imager.white_balance != Eigen::Vector3d::Ones()) {
     fail("imager: a grey sensor has no white balance; allowed is (1, 1, 1)");
   }
+  if (grey && imager.auto_white_balance) fail("imager: a grey sensor has no auto_white_balance");
+  const HotPixels& hot = imager.hot_pixels;
+  if (!(hot.share >= 0.0 && hot.share <= 1.0)) {
+    fail("imager: hot_pixels.share is {}; allowed is from 0 to 1", hot.share);
+  }
+  require_finite("hot_pixels.dark_current_e_per_s", hot.dark_current_e_per_s, 0.0);
+  require_finite("hot_pixels.spread", hot.spread, 0.0);
+  check(imager.tone_curve);
+  if (imager.jpeg) check(*imager.jpeg);
+  if (const auto& automatic = imager.auto_exposure) {
+    check_control("auto_exposure", automatic->time_constant_s, automatic->lowest, automatic->highest);
+    if (!(automatic->mean_level > 0.0 && automatic->mean_level < 1.0)) {
+      fail("imager: auto_exposure.mean_level is {}; allowed is above 0 and below 1", automatic->mean_level);
+    }
+  }
+  if (const auto& automatic = imager.auto_white_balance) {
+    check_control("auto_white_balance", automatic->time_constant_s, automatic->lowest, automatic->highest);
+  }
 }
 
 int raw_type(const Imager& imager) {
@@ -215,6 +267,7 @@ Imager channel_imager(const Imager& imager, int channel) {
   Imager grey = imager;
   grey.bayer = BayerPattern::none;
   grey.white_balance = Eigen::Vector3d::Ones();
+  grey.auto_white_balance.reset();
   grey.quantum_efficiency = QuantumEfficiency(imager.quantum_efficiency.row(channel));
   if (imager.bayer != BayerPattern::binned) return grey;
   const double parts = channel == 1 ? 2.0 : 1.0;  // of the size that the imager's figures are of; four make the pixel
@@ -232,7 +285,8 @@ FixedPattern fixed_pattern(const Imager& imager, cv::Size size, std::uint64_t un
   check(imager);
   const int count = samples_per_pixel(imager);
   FixedPattern pattern = {.gain = cv::Mat(size, CV_32FC(count), cv::Scalar::all(1.0)),
-                          .offset_e = cv::Mat(size, CV_32FC(count), cv::Scalar::all(0.0))};
+                          .offset_e = cv::Mat(size, CV_32FC(count), cv::Scalar::all(0.0)),
+                          .hot_e_per_s = hot_pixels(imager.hot_pixels, size, count, unit_seed)};
   if (imager.prnu == 0.0 && imager.dsnu_e == 0.0) return pattern;
   const std::vector<Imager> channels = by_channel(imager);
   tbb::parallel_for(tbb::blocked_range<int>(0, size.height, 16), [&](const tbb::blocked_range<int>& rows) {
@@ -269,7 +323,9 @@ cv::Mat expose(const cv::Mat& irradiance, const Imager& imager, const FixedPatte
   if (!imager.ideal) {
     const int type = CV_32FC(samples_per_pixel(imager));
     const bool fits = pattern.gain.size() == irradiance.size() && pattern.offset_e.size() == irradiance.size() &&
-                      pattern.gain.type() == type && pattern.offset_e.type() == type;
+                      pattern.gain.type() == type && pattern.offset_e.type() == type &&
+                      (pattern.hot_e_per_s.empty() ||
+                       (pattern.hot_e_per_s.size() == irradiance.size() && pattern.hot_e_per_s.type() == type));
     if (!fits) {
       fail("the fixed pattern isn't of the irradiance's size, {}x{}, and the imager's {} channels", irradiance.cols,
            irradiance.rows, samples_per_pixel(imager));

@@ -10,13 +10,23 @@
 // so that mean and temporal variance of a pixel below saturation lie on the photon transfer line
 // var_y = K^2 var_d + 1/12 + K (mu_y - mu_dark).
 //
+// What a camera makes of these numbers before it delivers them isn't part of that model, which ends at the linear ones.
+// The order is that of [Ramanath2005, fig. 1], without what we don't simulate (denoising, colour matrix, sharpening):
+//
+//   the lens's vignetting (render/cameras/lens_camera.h), the light on the sensor
+//   expose():  exposure (maybe automatic), photons, hot pixels' dark current, noise, K, rounding to `bits`
+//   develop(): black level off, white balance (maybe automatic), colour filled in, tone curve, rounding to 8 bits, JPEG
+//
 // A pixel of a binned picture has three such numbers, each with electrons, noise and rounding of its own
 // (BayerPattern).
 
 #include <Eigen/Core>
 #include <cstdint>
 #include <opencv2/core/mat.hpp>
+#include <optional>
 
+#include "render/imager/jpeg.h"
+#include "render/imager/tone_curve.h"
 #include "render/spectra/spectrum.h"
 
 namespace touchstone::render {
@@ -35,6 +45,32 @@ enum class BayerPattern : std::uint8_t { none, rggb, bggr, grbg, gbrg, binned };
 /// Quantum efficiency, rows = channels (R, G, B of a colour sensor, else one row), columns = bands; 0 to 1.
 using QuantumEfficiency = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3, 16>;
 
+/// Pixels whose dark current is far above the others'. Which they are, and how hot, is the unit's. Their dark currents
+/// have a log-normal distribution, one of those that fit what is measured of sensors [Baer2006].
+struct HotPixels {
+  double share = 0.0;                 ///< of all pixels; of a binned picture of each colour's; 0: there are none
+  double dark_current_e_per_s = 0.0;  ///< the median of what they have beside the imager's own
+  double spread = 0.0;                ///< standard deviation of its natural logarithm
+};
+
+/// A camera that sets its exposure so that the pictures' mean level becomes `mean_level` (a part of full scale, before
+/// white balance and tone curve), by a factor of the imager's exposure within limits
+/// (render/imager/automatic_control.h).
+struct AutoExposure {
+  double time_constant_s = 0.5;
+  double mean_level = 0.2;
+  double lowest = 0.25;  ///< factor
+  double highest = 4.0;
+};
+
+/// A camera that sets its gains of red and blue so that the pictures' mean becomes grey, by factors of the imager's
+/// white balance within limits.
+struct AutoWhiteBalance {
+  double time_constant_s = 0.5;
+  double lowest = 0.25;  ///< factor
+  double highest = 4.0;
+};
+
 /// A sensor and its read-out.
 struct Imager {
   int bits = 8;                          ///< 1 to 8 give CV_8U (6 bits: 0 to 63), 9 to 16 give CV_16U
@@ -52,9 +88,14 @@ struct Imager {
   double black_level_DN = 0.0;  ///< added before quantisation, taken off again by `develop`
   Eigen::Vector3d white_balance{1, 1,
                                 1};  ///< gains of R, G, B in `develop`; each at least 0; (1,1,1) for a grey sensor
-  /// An ideal image: no shot noise, read noise, dark current, PRNU or DSNU. What stays is the sensor's colour filters,
-  /// the clip at full well and at the largest number, and rounding to the nearest whole number: inside the range
-  /// |y - (black + K mu_e)| <= 1/2.
+  HotPixels hot_pixels;
+  ToneCurve tone_curve;                       ///< of what `develop` delivers
+  std::optional<JpegSettings> jpeg;           ///< `develop` delivers what is left behind it
+  std::optional<AutoExposure> auto_exposure;  ///< expose() and develop() take what controlled() has made of the imager
+  std::optional<AutoWhiteBalance> auto_white_balance;
+  /// An ideal image: no shot noise, read noise, dark current, PRNU, DSNU, hot pixels or JPEG. What stays is the
+  /// sensor's colour filters, the clip at full well and at the largest number, rounding to the nearest whole number
+  /// (inside the range |y - (black + K mu_e)| <= 1/2), white balance and tone curve.
   bool ideal = false;
 };
 
@@ -72,6 +113,8 @@ int raw_type(const Imager& imager);
 struct FixedPattern {
   cv::Mat gain;      ///< CV_32FC1 or CV_32FC3, 1 + PRNU, not below 0
   cv::Mat offset_e;  ///< CV_32FC1 or CV_32FC3, DSNU
+  /// CV_32FC1 or CV_32FC3: hot pixels' dark current, of the others 0; empty without hot pixels.
+  cv::Mat hot_e_per_s = {};
 };
 
 /// The fixed pattern of the unit `unit_seed`: a pure function of the seed and the pixel's row and column.
@@ -91,8 +134,9 @@ cv::Mat expose(const cv::Mat& irradiance, const Imager& imager, std::uint64_t se
 /// How colour is filled in between a mosaic's pixels; nothing is to be filled in of a binned picture.
 enum class Demosaic : std::uint8_t { bilinear, edge_aware };
 
-/// A picture to look at or to track in: black level off, white balance on, full scale to 255, colour filled in; CV_8UC3
-/// in BGR order, or CV_8UC1 of a grey sensor. With 8 bits, no black level and no white balance it changes no number.
+/// A picture to look at or to track in: black level off, white balance on, full scale to 255, colour filled in, tone
+/// curve and JPEG on; CV_8UC3 in BGR order, or CV_8UC1 of a grey sensor. With 8 bits, no black level, no white balance,
+/// a linear tone curve and no JPEG it changes no number.
 /// @throws Error for a raw image of a foreign type, or of a mosaic under 2x2 pixels
 cv::Mat develop(const cv::Mat& raw, const Imager& imager, Demosaic method = Demosaic::bilinear);
 

@@ -1,7 +1,9 @@
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <opencv2/imgproc.hpp>
+#include <vector>
 
 #include "core/error.h"
 #include "render/imager/imager.h"
@@ -63,6 +65,30 @@ cv::Mat balanced(const cv::Mat& raw, const Imager& imager) {
   return linear;
 }
 
+/// The 8 bit numbers of linear ones of 16 bits. The curve rises, so it is enough to find where each number begins.
+cv::Mat toned(const cv::Mat& linear, const ToneCurve& curve) {
+  constexpr int kLevels = 1 << 16;
+  std::vector<std::uint8_t> number(kLevels);
+  const auto number_of = [&](int level) { return std::floor(255.0 * delivered(curve, level / kFullScale) + 0.5); };
+  int first = 0;
+  for (int value = 0; value < 256 && first < kLevels; ++value) {
+    int end = kLevels;  // of the levels that give at most `value`
+    for (int low = first; low < end;) {
+      const int middle = low + (end - low) / 2;
+      number_of(middle) <= value ? low = middle + 1 : end = middle;
+    }
+    std::fill(number.begin() + first, number.begin() + end, static_cast<std::uint8_t>(value));
+    first = end;
+  }
+  cv::Mat out(linear.size(), CV_8UC(linear.channels()));
+  for (int row = 0; row < linear.rows; ++row) {
+    const std::uint16_t* in = linear.ptr<std::uint16_t>(row);
+    std::transform(in, in + static_cast<std::ptrdiff_t>(linear.cols) * linear.channels(), out.ptr<std::uint8_t>(row),
+                   [&](std::uint16_t level) { return number[level]; });
+  }
+  return out;
+}
+
 }  // namespace
 
 cv::Mat develop(const cv::Mat& raw, const Imager& imager, Demosaic method) {
@@ -85,8 +111,12 @@ cv::Mat develop(const cv::Mat& raw, const Imager& imager, Demosaic method) {
     linear = colour_filled_in(linear, opencv_code(imager.bayer, method));
   }
   cv::Mat developed;
-  linear.convertTo(developed, CV_8U, 1.0 / 257.0);
-  return developed;
+  if (std::holds_alternative<LinearTone>(imager.tone_curve)) {
+    linear.convertTo(developed, CV_8U, 1.0 / 257.0);
+  } else {
+    developed = toned(linear, imager.tone_curve);
+  }
+  return imager.jpeg && !imager.ideal ? through_jpeg(developed, *imager.jpeg) : developed;
 }
 
 }  // namespace touchstone::render

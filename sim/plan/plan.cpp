@@ -7,6 +7,7 @@
 #include "fem/fine_relief/smooth_surface.h"
 #include "fem/vibration/vibration.h"
 #include "sim/plan/plan_direct.h"
+#include "sim/plan/plan_pipeline.h"
 #include "sim/plan/plan_table.h"
 #include "sim/plan/plan_time.h"
 #include "sim/plan/scene_bands.h"
@@ -386,6 +387,7 @@ Plan make_plan(const SceneSpec& scene) {
   plan_relief(scene, plan, table);
   plan_light(scene, plan, table);
   if (plan.camera) {
+    plan_pipeline(scene, plan, table);
     plan_time(scene, plan, table);
     plan_direct_light(scene, plan, table);
     plan_shared_paths(scene, plan, table);

@@ -32,6 +32,12 @@ struct Plan {
   bool object_print = false;    ///< what is printed on objects is seen
   bool skin_blanching = false;  ///< and depends on how they are pressed
   bool sensor_noise = false;
+  bool vignetting = false;  ///< these six: of the camera's pipeline (render/imager/imager.h)
+  bool hot_pixels = false;
+  bool auto_exposure = false;
+  bool auto_white_balance = false;
+  bool tone_curve = false;
+  bool jpeg = false;
   SceneBands bands;  ///< of the light; none without a picture
   bool motion_blur = false;
   bool rolling_shutter = false;

@@ -8,6 +8,7 @@
 #include "core/units.h"
 #include "fem/mesh/gel_body.h"
 #include "sim/files/gltf_mesh.h"
+#include "sim/scene/camera_pipeline.h"
 #include "sim/scene/camera_preset.h"
 #include "sim/scene/device_camera.h"
 #include "sim/scene/device_gel.h"
@@ -132,12 +133,63 @@ void lens_fields(YamlReader& in, LensSpec& lens, Eigen::Vector3d& position_mm) {
   in.not_beside("sensor_distance_mm", {"camera_matrix", "focus_distance_mm"});  // either of them tells it
   in.optional("sensor_distance_mm", lens.sensor_distance_mm, length);
   in.optional("distortion", lens.distortion);
+  std::optional<VignettingSpec> vignetting;
+  in.optional("vignetting", vignetting);
+  if (vignetting) lens.vignetting = vignetting->vignetting;
   in.required("lens_position_mm", position_mm);
   const std::size_t numbers = lens.distortion.size();
   if (in.has("distortion") && numbers != 4 && numbers != 5 && numbers != 8) {
     fail_at(in.where("distortion"), "distortion: {} numbers; allowed are 4, 5 or 8: k1 k2 p1 p2 [k3 [k4 k5 k6]]",
             numbers);
   }
+}
+
+/// What a camera makes of its sensor's numbers.
+void pipeline_fields(YamlReader& in, CameraSpec& camera) {
+  std::optional<render::HotPixels> hot;
+  in.optional("hot_pixels", hot);
+  if (hot) camera.hot_pixels = *hot;
+  in.optional("auto_exposure", camera.auto_exposure);
+  in.optional("auto_white_balance", camera.auto_white_balance);
+  std::optional<ToneCurveSpec> tone;
+  in.optional("tone_curve", tone);
+  if (tone) camera.tone_curve = tone->curve;
+  in.optional("jpeg", camera.jpeg);
+}
+
+/// What the pipeline's blocks say together with the rest.
+void check_pipeline(const YamlReader& in, const CameraSpec& camera) {
+  if (camera.auto_white_balance && camera.bayer == render::BayerPattern::none) {
+    fail_at(in.where("auto_white_balance"), "camera.auto_white_balance: the camera is grey (`bayer: none`)");
+  }
+  if (!camera.auto_exposure) return;
+  const double longest_us = camera.auto_exposure->highest * camera.exposure_us;
+  const double frame_us = kMicrosecondsPerSecond / camera.frame_rate_Hz;
+  if (camera.exposure_us == 0.0) {
+    fail_at(in.where("auto_exposure"), "camera.auto_exposure: exposure_us is 0, which no factor changes");
+  }
+  if (longest_us > frame_us) {
+    fail_at(in.where("auto_exposure"),
+            "camera.auto_exposure: exposure_factors go to {}: {} us, which is longer than a frame of {} us at {} Hz",
+            camera.auto_exposure->highest, longest_us, frame_us, camera.frame_rate_Hz);
+  }
+}
+
+/// That the lens or hole can be made.
+void check_optics(const YamlReader& in, const CameraSpec& camera) {
+  const auto check = [](const CameraSpec& one, const SourceLocation& where) {
+    try {
+      camera_of(one);
+    } catch (const Error& error) {
+      fail_at(where, "{}", error.what());
+    }
+  };
+  CameraSpec plain = camera;
+  auto* lens = std::get_if<LensSpec>(&plain.optics);
+  const bool vignetting = lens != nullptr && lens->vignetting;
+  if (vignetting) lens->vignetting.reset();
+  check(plain, in.where());
+  if (vignetting) check(camera, in.where("vignetting"));
 }
 
 }  // namespace
@@ -351,7 +403,9 @@ void fields(YamlReader& in, CameraSpec& camera) {
   in.optional("prnu", camera.prnu, Allowed::within(0.0, 0.5));
   in.optional("dsnu_e", camera.dsnu_e, Allowed::at_least(0.0));
   in.optional("black_level_DN", camera.black_level_DN, Allowed::at_least(0.0));
+  pipeline_fields(in, camera);
   in.optional("motion_chip", camera.motion_chip);
+  in.not_beside("motion_chip", {"tone_curve", "jpeg", "auto_exposure", "auto_white_balance"});  // it has its own
   in.optional("events", camera.events);
   if (camera.motion_chip && (camera.width != kChipSide || camera.height != kChipSide)) {
     fail_at(in.where("motion_chip"), "camera.motion_chip: a picture of {}x{} pixels; the chip has {}x{}", camera.width,
@@ -370,6 +424,7 @@ void fields(YamlReader& in, CameraSpec& camera) {
     fail_at(in.where("row_time_us"), "row_time_us: {} for each of {} rows is longer than a frame of {} us at {} Hz",
             camera.row_time_us, camera.height, frame_us, camera.frame_rate_Hz);
   }
+  check_pipeline(in, camera);
   const double distance_mm = (camera.look_at_mm - camera.position_mm).norm();
   if (distance_mm < 1e-6) {
     fail_at(in.where("look_at_mm"), "camera.look_at_mm: is the camera's own position; the camera has no direction");
@@ -378,11 +433,7 @@ void fields(YamlReader& in, CameraSpec& camera) {
     fail_at(in.where("look_at_mm"), "camera.look_at_mm: is {:.4g} mm from the camera; allowed is at most {} mm",
             distance_mm, kFarthestLook_mm);
   }
-  try {
-    camera_of(camera);
-  } catch (const Error& error) {
-    fail_at(in.where(), "{}", error.what());
-  }
+  check_optics(in, camera);
 }
 
 void fields(YamlReader& in, DeviceSpec& device) {

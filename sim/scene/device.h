@@ -11,6 +11,7 @@
 
 #include "core/yaml_reader.h"
 #include "fem/contact/relaxation.h"
+#include "render/cameras/lens_camera.h"
 #include "render/imager/imager.h"
 #include "render/materials/print.h"
 #include "sim/files/colour.h"
@@ -176,7 +177,8 @@ struct LensSpec {
   double f_number = 0.0;                         ///< focal length / diameter of the stop
   std::optional<double> focus_distance_mm;       ///< to what is sharp, in air
   std::optional<double> sensor_distance_mm;
-  std::vector<double> distortion;  ///< OpenCV's k1 k2 p1 p2 [k3 [k4 k5 k6]]; empty: none
+  std::vector<double> distortion;                ///< OpenCV's k1 k2 p1 p2 [k3 [k4 k5 k6]]; empty: none
+  std::optional<render::Vignetting> vignetting;  ///< beside cos^4; in the file a polynomial or points
 };
 
 /// What an optical mouse's chip does by itself beside exposing its pixels (render/imager/motion_chip.h). Its longest
@@ -218,6 +220,11 @@ struct CameraSpec {
   double prnu = 0.0;  ///< relative
   double dsnu_e = 0.0;
   double black_level_DN = 0.0;
+  render::HotPixels hot_pixels;
+  std::optional<render::AutoExposure> auto_exposure;
+  std::optional<render::AutoWhiteBalance> auto_white_balance;
+  render::ToneCurve tone_curve;
+  std::optional<render::JpegSettings> jpeg;
   std::optional<MotionChipSpec> motion_chip;
   std::optional<EventCameraSpec> events;  ///< its pixels also, or only, report changes of their light
 };

@@ -45,6 +45,7 @@ render::LensCamera lens_camera(const CameraSpec& camera, const LensSpec& lens) {
   out.height = camera.height;
   out.pixel_pitch_um = camera.pixel_pitch_um;
   out.distortion = distortion_of(lens.distortion);
+  out.vignetting = lens.vignetting;
   if (lens.focus_distance_mm) out.focus_distance_mm = *lens.focus_distance_mm;
   if (lens.camera_matrix) {
     const Eigen::Vector4d& matrix = *lens.camera_matrix;

@@ -31,6 +31,11 @@ render::Imager imager(const DeviceSpec& device, const SceneBands& bands, bool wi
   out.dsnu_e = camera.dsnu_e;
   out.bayer = camera.bayer;
   out.black_level_DN = camera.black_level_DN;
+  out.hot_pixels = camera.hot_pixels;
+  out.auto_exposure = camera.auto_exposure;
+  out.auto_white_balance = camera.auto_white_balance;
+  out.tone_curve = camera.tone_curve;
+  out.jpeg = camera.jpeg;
   constexpr double kDecibelsPerDecade = 20.0;
   out.gain_DN_per_e = ((1 << camera.bits) - 1 - camera.black_level_DN) / camera.full_well_e *
                       std::pow(10.0, camera.gain_dB / kDecibelsPerDecade);

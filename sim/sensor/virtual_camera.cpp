@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <map>
 #include <opencv2/imgproc.hpp>
 
 #include "core/random.h"
@@ -30,6 +31,7 @@ constexpr int kFirstFrameSamples = 4;
 // pays where frames are so dense that those next to each other are alike. Where a key needs the most samples there are
 // edges, which other frames don't have in the same place: it gets no more of them than they do.
 constexpr std::size_t kFramesPerKey = 50;
+constexpr int kMeteringSamples = 8;  // a pixel, of a picture that is only metered: the mean of 10^5 pixels has 1e-3
 
 /// The electrons of all channels together, as many as the one that sees most: a lamp of one colour counts even if the
 /// first samples of a pixel never chose it.
@@ -75,8 +77,9 @@ struct VirtualCamera::Parts : SceneView {
   render::RenderSettings settings;
   std::unique_ptr<const DirectLight> direct;  // where it holds; keys are then not needed
   LightChoice choice{false, "paths: the plan has no direct light", {}};
-  std::optional<render::SharedPaths> shared;  // behind a wide hole; keys are then not needed
-  std::vector<KeyFrame> keys;                 // the first frame's, then in the order of time
+  std::optional<render::SharedPaths> shared;             // behind a wide hole; keys are then not needed
+  std::vector<KeyFrame> keys;                            // the first frame's, then in the order of time
+  std::map<std::int64_t, render::ControlState> control;  // by a frame's t_us; of a camera that sets itself
 
   /// The first frame's and those before and after a time: the gel at rest, and what the frame is most like.
   std::vector<const KeyFrame*> keys_about(std::int64_t t_us) const {
@@ -139,7 +142,10 @@ struct VirtualCamera::Parts : SceneView {
     if (scene.outputs.error) add_channel(capture.pixel_truth, error, "error.irradiance");
     capture.paths_traced = static_cast<std::int64_t>(counts.paths);
     capture.pixels_traced = pixels;
-    const auto picture = [&](const render::Imager& sensor) {
+    const bool automatic = plan.auto_exposure || plan.auto_white_balance;
+    if (automatic) capture.control = control_of(truth, irradiance);
+    const auto picture = [&](const render::Imager& fixed) {
+      const render::Imager sensor = automatic ? render::controlled(fixed, capture.control) : fixed;
       return render::develop(
           render::expose(irradiance, sensor, pattern, scene.seed, static_cast<std::uint64_t>(truth.frame)), sensor);
     };
@@ -147,6 +153,62 @@ struct VirtualCamera::Parts : SceneView {
     if (scene.outputs.ideal) capture.ideal = picture(ideal_imager);
     if (scene.outputs.radiance) capture.radiance = irradiance;
     return capture;
+  }
+
+  /// What makes pictures of this motion cheaper than whole ones.
+  void learn_light(std::span<const Truth> truths) {
+    if (plan.direct_light) {
+      auto made = std::make_unique<const DirectLight>(*this, camera, truths);
+      choice = made->choice();
+      if (choice.direct) {
+        direct = std::move(made);
+        return;
+      }
+    }
+    if (plan.shared_paths) {
+      std::vector<render::Scene> examples;
+      for (const Truth* truth : {&truths.front(), &deepest(truths)}) {
+        examples.push_back(seen(truth->press, relief(truth->press)));
+      }
+      shared.emplace(examples, std::get<render::PinholeCamera>(camera), settings);
+      return;
+    }
+    keys.push_back(key_frame(truths.front()));
+    // They lean on the first one alone, so that they can be made at the same time.
+    std::vector<KeyFrame> later((truths.size() - 1) / kFramesPerKey);
+    tbb::parallel_for(std::size_t{0}, later.size(),
+                      [&](std::size_t i) { later[i] = key_frame(truths[(i + 1) * kFramesPerKey]); });
+    std::move(later.begin(), later.end(), std::back_inserter(keys));
+  }
+
+  render::ControlState control_of(const Truth& truth, const cv::Mat& irradiance) const {
+    const auto known = control.find(truth.t_us);
+    return known != control.end() ? known->second : render::settled(imager, render::metering_of(irradiance, imager));
+  }
+
+  /// What the camera's meter reads at a frame's begin.
+  render::Metering metering(const Truth& truth) const {
+    const render::Scene seen_now = seen(truth.press, relief(truth.press));
+    if (direct) {
+      if (const auto image = direct->render(seen_now)) return render::metering_of(image->irradiance, imager);
+    }
+    render::RenderSettings few = settings;
+    few.min_samples = few.max_samples = kMeteringSamples;
+    return render::metering_of(render::Tracer(seen_now).render(camera, few).irradiance, imager);
+  }
+
+  /// Goes through the motion as the camera that sets itself does. Each frame shows what the ones before it led to.
+  void watch(std::span<const Truth> truths) {
+    if (!plan.auto_exposure && !plan.auto_white_balance) return;
+    std::vector<render::Metering> read(truths.size());
+    tbb::parallel_for(std::size_t{0}, truths.size(), [&](std::size_t i) { read[i] = metering(truths[i]); });
+    render::ControlState state;
+    for (std::size_t i = 0; i < truths.size(); ++i) {
+      const double seconds =
+          i == 0 ? 0.0 : static_cast<double>(truths[i].t_us - truths[i - 1].t_us) / kMicrosecondsPerSecond;
+      state = i == 0 ? render::settled(imager, read[0]) : render::next_state(imager, state, read[i - 1], seconds);
+      control[truths[i].t_us] = state;
+    }
   }
 
   Capture take(const Truth& truth, bool whole) const {
@@ -257,34 +319,10 @@ VirtualCamera::VirtualCamera(const SceneSpec& scene, const Plan& plan, const fem
                              std::span<const Truth> truths) {
   TS_ASSERT(plan.camera && scene.device.camera);
   auto parts = std::make_unique<Parts>(scene, plan, gel);
-  if (!scene.outputs.light() || plan.scattering || truths.empty()) {
-    parts_ = std::move(parts);
-    return;
+  if (scene.outputs.light() && !truths.empty()) {
+    if (!plan.scattering) parts->learn_light(truths);
+    parts->watch(truths);
   }
-  if (plan.direct_light) {
-    auto direct = std::make_unique<const DirectLight>(*parts, parts->camera, truths);
-    parts->choice = direct->choice();
-    if (direct->choice().direct) {
-      parts->direct = std::move(direct);
-      parts_ = std::move(parts);
-      return;
-    }
-  }
-  if (plan.shared_paths) {
-    std::vector<render::Scene> examples;
-    for (const Truth* truth : {&truths.front(), &deepest(truths)}) {
-      examples.push_back(parts->seen(truth->press, parts->relief(truth->press)));
-    }
-    parts->shared.emplace(examples, std::get<render::PinholeCamera>(parts->camera), parts->settings);
-    parts_ = std::move(parts);
-    return;
-  }
-  parts->keys.push_back(parts->key_frame(truths.front()));
-  // They lean on the first one alone, so that they can be made at the same time.
-  std::vector<KeyFrame> later((truths.size() - 1) / kFramesPerKey);
-  tbb::parallel_for(std::size_t{0}, later.size(),
-                    [&](std::size_t i) { later[i] = parts->key_frame(truths[(i + 1) * kFramesPerKey]); });
-  std::move(later.begin(), later.end(), std::back_inserter(parts->keys));
   parts_ = std::move(parts);
 }
 

@@ -31,7 +31,37 @@ struct Optics {
   render::Imager imager;  // for light of the untouched device's bands
   render::FixedPattern pattern;
   cv::Mat rest_light;
+  render::ControlState rest_control;
 };
+
+/// As a camera has set itself that has watched this light for long.
+render::ControlState settled_on(const cv::Mat& light, const render::Imager& imager) {
+  if (!render::is_automatic(imager)) return {};
+  return render::settled(imager, render::metering_of(light, imager));
+}
+
+/// As it has set itself `seconds` after `before` turned into `light`.
+render::ControlState after_change(const cv::Mat& before, const cv::Mat& light, const render::Imager& imager,
+                                  double seconds, double frame_rate_Hz) {
+  render::ControlState state = settled_on(before, imager);
+  if (!render::is_automatic(imager) || !(seconds > 0.0)) return state;
+  constexpr double kMostSteps = 1000.0;  // shorter ones matter to a picture alone that clips
+  const double steps = std::clamp(std::round(seconds * frame_rate_Hz), 1.0, kMostSteps);
+  const render::Metering metering = render::metering_of(light, imager);
+  for (int step = 0; step < static_cast<int>(steps); ++step) {
+    state = render::next_state(imager, state, metering, seconds / steps);
+  }
+  return state;
+}
+
+/// From the last state without contact to the end.
+double seconds_of_contact(std::span<const Truth> states) {
+  const auto touched =
+      std::find_if(states.begin(), states.end(), [](const Truth& truth) { return truth.press.contact_vertices > 0; });
+  if (touched == states.end()) return 0.0;
+  const auto before = touched == states.begin() ? touched : touched - 1;
+  return static_cast<double>(states.back().t_us - before->t_us) / kMicrosecondsPerSecond;
+}
 
 /// What is pressed, without pictures.
 SceneSpec unseen_scene(const DeviceSpec& device, const VirtualSensorSettings& settings, const ObjectSpec& object,
@@ -80,6 +110,7 @@ struct VirtualSensor::Parts {
       now->imager = sim::imager(device, bands_of(plan.bands), with_noise(plan));
       now->pattern = render::fixed_pattern(now->imager, {device.camera->width, device.camera->height}, settings.seed);
       now->rest_light = now->view->rest_light(nullptr, Eigen::Vector3d::Zero());
+      now->rest_control = settled_on(now->rest_light, now->imager);
       made = std::move(now);
     });
     return *made;
@@ -105,13 +136,10 @@ struct VirtualSensor::Parts {
     return play_motion(scene, plan, *gel, {}, nullptr, set_up_elastic_objects(scene, plan, cache_folder));
   }
 
+  /// `imager`: as controlled().
   cv::Mat develop(const cv::Mat& irradiance, const render::Imager& imager, std::uint64_t noise_seed, int frame) const {
     return render::develop(
         render::expose(irradiance, imager, optics().pattern, noise_seed, static_cast<std::uint64_t>(frame)), imager);
-  }
-  /// Of light of the untouched device's bands.
-  cv::Mat develop(const cv::Mat& irradiance, std::uint64_t noise_seed, int frame) const {
-    return develop(irradiance, optics().imager, noise_seed, frame);
   }
   SceneBands bands_of(const SeenObject& object) const { return bands_of(optics().view->bands(object)); }
   render::Imager imager_of(const SeenObject& object) const {
@@ -155,10 +183,13 @@ struct VirtualSensor::Parts {
     touch.height = seen.height;
     touch.contact = seen.contact;
     const cv::Mat rest = object.spec.screen ? by.view->rest_light(&object, start) : rest_of(object, start);
-    const render::Imager imager = imager_of(object);
+    const render::Imager fixed = imager_of(object);
+    touch.control = after_change(rest, touch.light, fixed, seconds_of_contact(states), device.camera->frame_rate_Hz);
+    const render::Imager imager = render::controlled(fixed, touch.control);
     touch.expose = [this, light = touch.light, imager](std::uint64_t seed) { return develop(light, imager, seed, 0); };
     touch.frame = develop(touch.light, imager, options.noise_seed, options.frame);
-    touch.background = develop(rest, imager, options.noise_seed ^ kOtherNoise, options.frame);
+    touch.background = develop(rest, render::controlled(fixed, settled_on(rest, fixed)),
+                               options.noise_seed ^ kOtherNoise, options.frame);
     if (has_chip()) {
       std::vector<cv::Mat> lights;
       for (std::size_t k = 1; k + 1 < states.size(); ++k) {
@@ -303,6 +334,7 @@ Touch VirtualSensor::rest(std::uint64_t noise_seed) const {
   Touch touch;
   touch.what = fmt::format("{}, untouched", parts_->device.name);
   touch.light = by.rest_light;
+  touch.control = by.rest_control;
   touch.contact = cv::Mat::zeros(by.rest_light.size(), CV_8U);
   touch.frame = background(noise_seed);
   touch.background = background(noise_seed ^ kOtherNoise);
@@ -317,7 +349,9 @@ Touch VirtualSensor::capture(const TouchObject& object, const fem::PressState& p
   touch.light = seen.light;
   touch.height = seen.height;
   touch.contact = seen.contact;
-  touch.frame = parts_->develop(touch.light, parts_->imager_of(*object.seen_), noise_seed, frame);
+  const render::Imager imager = parts_->imager_of(*object.seen_);
+  touch.control = settled_on(touch.light, imager);
+  touch.frame = parts_->develop(touch.light, render::controlled(imager, touch.control), noise_seed, frame);
   return touch;
 }
 
@@ -334,7 +368,9 @@ const Eigen::MatrixX3d& VirtualSensor::marker_places_mm() const {
 
 cv::Mat VirtualSensor::background(std::uint64_t noise_seed, int frame) const {
   const Optics& by = parts_->optics();
-  if (!parts_->has_chip()) return parts_->develop(by.rest_light, noise_seed, frame);
+  if (!parts_->has_chip()) {
+    return parts_->develop(by.rest_light, render::controlled(by.imager, by.rest_control), noise_seed, frame);
+  }
   const Plan& plan = by.view->plan();
   const render::MotionChipSettings chip =
       motion_chip(parts_->device, parts_->bands_of(plan.bands), parts_->with_noise(plan));
@@ -345,9 +381,10 @@ const cv::Mat& VirtualSensor::background_light() const {
   return parts_->optics().rest_light;
 }
 
-cv::Mat VirtualSensor::ideal(const TouchObject& object, const cv::Mat& light) const {
-  const render::Imager imager = sim::imager(parts_->device, parts_->bands_of(*object.seen_), false);
-  return render::develop(render::expose(light, imager, parts_->optics().pattern, 0, 0), imager);
+cv::Mat VirtualSensor::ideal(const TouchObject& object, const Touch& touch) const {
+  const render::Imager imager =
+      render::controlled(sim::imager(parts_->device, parts_->bands_of(*object.seen_), false), touch.control);
+  return render::develop(render::expose(touch.light, imager, parts_->optics().pattern, 0, 0), imager);
 }
 
 }  // namespace touchstone::sim

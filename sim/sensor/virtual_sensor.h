@@ -67,6 +67,7 @@ struct Touch {
   Eigen::MatrixX3d markers_mm;               ///< printed markers on the undeformed gel (or their middle), a row each
   Eigen::MatrixX3d marker_displacement;      ///< mm, a row a marker: of the material under its middle
   std::vector<Event> events;                 ///< of a device with event pixels: from the press's start to its end
+  render::ControlState control;              ///< how a camera that sets itself has done so for `frame`
   std::optional<ChipStatistics> statistics;  ///< of a device with a motion chip: its last frame's, motion summed
   /// Another frame of the same light, with the noise of another seed; none without pictures. Safe from many threads,
   /// while the sensor lives.
@@ -94,6 +95,11 @@ class TouchObject {
 SceneSpec touch_scene(const DeviceSpec& device, const VirtualSensorSettings& settings, const ObjectSpec& object,
                       const MotionSpec& motion, bool picture = true);
 
+/// A camera that sets itself (auto exposure, auto white balance; render/imager/automatic_control.h) has watched the
+/// untouched device for long when a press begins. It then sees the light of the press's end from the first touch on:
+/// from the last frame without contact to the end, which is PressSpec::seconds, or without them a frame or a few.
+/// rest() and capture() show what it has watched for long.
+///
 /// Safe to use from many threads; the same press and seeds give the same bytes. The gel is set up at once, the light
 /// when it's first needed: a light field for a coated gel (paths where direct light can't draw it), maps for a milky
 /// one, paths for a clear one, which take seconds for an object's first frame. light() says which, and why.
@@ -151,8 +157,8 @@ class VirtualSensor {
   cv::Mat background(std::uint64_t noise_seed, int frame = 0) const;
   /// The light of the untouched device.
   const cv::Mat& background_light() const;
-  /// The frame of a touch's light by this object, without noise and fixed pattern.
-  cv::Mat ideal(const TouchObject& object, const cv::Mat& light) const;
+  /// The frame of a touch by this object, without noise and fixed pattern.
+  cv::Mat ideal(const TouchObject& object, const Touch& touch) const;
 
  private:
   struct Parts;

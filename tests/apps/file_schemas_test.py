@@ -35,6 +35,8 @@ ONLY_READERS = [
     r"gel: the (slab|dome|fingertip)", r"beads: a grid", r"beads.depth_mm: \S+ puts beads",
     r"is not in front of the plate", r"is the lamp's own position", r"is longer than a frame",
     r"the camera has no direction", r"mm from the camera; allowed is at most",
+    r"camera.auto_white_balance: the camera is grey", r"a curve of \d+ points; at least 2", r"point \d+ of a curve is at",
+    r"vignetting's points go from",
     r"camera.motion_chip: a picture of", r"event pixels are single ones",
     r"is sharp beyond that only", r"it must be at least the focal length",
     # how many there are, or which

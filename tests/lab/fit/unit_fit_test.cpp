@@ -10,6 +10,7 @@
 #include "core/whole_file.h"
 #include "lab/fit/unit_fit_experiment.h"
 #include "sim/files/image_file.h"
+#include "sim/scene/device_imager.h"
 #include "sim/sensor/virtual_sensor.h"
 #include "tests/support/message_of.h"
 #include "tests/support/temporary_folder.h"
@@ -196,6 +197,85 @@ TEST(UnitFit, FindsHiddenNumbersWithinItsIntervals) {
   EXPECT_EQ(intervals, 4 * kUnits);
   // Of 24 intervals of 95 % fewer than 20 hold their number by chance once in 400 times, were they independent.
   EXPECT_GE(covered, 20);
+}
+
+/// The small device with a tone curve and fixed gains.
+std::filesystem::path toned_device() {
+  std::string text = kDevice;
+  const std::string gains = "  white_balance: [1, 1, 1]\n";
+  text.replace(text.find(gains), gains.size(),
+               "  bits: 12\n  white_balance: [1.1, 1, 0.9]\n  tone_curve: {type: gamma, gamma: 2}\n");
+  return folder().write("toned.yaml", text);
+}
+
+// Numbers of 0 to 255 behind a gamma: its mean and noise are those of many exposures, also where the curve is steep.
+TEST(UnitPictures, MeanAndNoiseBehindAToneCurveAreAsTheImagerHasThem) {
+  sim::DeviceSpec device = sim::read_device(toned_device());
+  sim::SceneBands bands;
+  bands.centres_nm = Eigen::Array3d(610, 540, 455);
+  render::Imager imager = sim::imager(device, bands, true);
+  imager.prnu = 0.01;
+  for (const float level : {0.02F, 0.2F, 0.6F}) {
+    cv::Mat light(32, 32, CV_32FC3, cv::Scalar::all(0.01));
+    const double full = 255.0 * render::linear_of(imager.tone_curve, cv::mean(mean_numbers(light, imager))[1] / 255.0);
+    light *= level * 255.0 / full;
+    const cv::Mat numbers = mean_numbers(light, imager);
+    const cv::Mat noise = block_noise(numbers, imager, 1, 1);
+    for (int c = 0; c < 3; ++c) {
+      double sum = 0.0, squares = 0.0;
+      int count = 0;
+      for (std::uint64_t unit = 0; unit < 8; ++unit) {
+        const cv::Mat frame = render::develop(render::expose(light, imager, unit, 0), imager);
+        for (int v = 0; v < frame.rows; ++v) {
+          for (int u = 0; u < frame.cols; ++u, ++count) {
+            const double off = frame.at<cv::Vec3b>(v, u)[c] - numbers.at<cv::Vec3d>(v, u)[c];
+            sum += off;
+            squares += off * off;
+          }
+        }
+      }
+      const double wanted = noise.at<cv::Vec3d>(0, 0)[c];
+      EXPECT_NEAR(sum / count, 0.0, 0.1 * wanted) << level;
+      EXPECT_NEAR(std::sqrt(squares / count), wanted, 0.08 * wanted) << level;
+    }
+  }
+}
+
+// Gamma from the shape of the pictures' histogram, gains of red and blue from their colours: with lamps and exposure
+// known all three are identified.
+TEST(UnitFit, FindsGammaAndGainsAgain) {
+  UnitFitSpec spec = small_fit();
+  spec.device = toned_device();
+  spec.presses.resize(2);
+  add_unknown(spec, "camera.tone_curve.gamma", UnknownHow::times, 0.6, 1.6);
+  add_unknown(spec, "camera.white_balance[0]", UnknownHow::times, 0.5, 2.0);
+  add_unknown(spec, "camera.white_balance[2]", UnknownHow::times, 0.5, 2.0);
+  const PreparedFit fit = prepare_fit(spec);
+  ASSERT_EQ(fit.unknowns.size(), 3U);
+  for (const FitUnknown& unknown : fit.unknowns) {
+    EXPECT_EQ(unknown.numbers.front().acts, NumberActs::on_imager) << unknown.name << ": no light is made anew";
+  }
+  const Eigen::VectorXd hidden = vector({std::log(1.2), std::log(0.8), std::log(1.3)});  // gamma 2.4, gains 0.88, 1.17
+  const RecordedUnit unit = record_unit(fit, hidden, 3, 8, cache());
+  const UnitFit found = fit_unit(unit.fit, unit.recording, cache());
+  EXPECT_TRUE(found.converged);
+  EXPECT_TRUE(found.unidentified.empty());
+  for (std::size_t k = 0; k < found.unknowns.size(); ++k) {
+    const FittedUnknown& one = found.unknowns[k];
+    const double truth = hidden_value(fit, hidden, k);
+    EXPECT_TRUE(one.identified) << one.name;
+    EXPECT_NEAR(one.value, truth, 0.02 * truth) << one.name;
+    EXPECT_TRUE(one.low95 <= truth && truth <= one.high95)
+        << one.name << ": " << truth << " isn't in " << one.low95 << " to " << one.high95;
+  }
+}
+
+TEST(UnitFit, RefusesACameraThatSetsItself) {
+  UnitFitSpec spec = small_fit();
+  spec.device = folder().write("automatic.yaml",
+                               std::string(kDevice) + "  auto_exposure: {time_constant_s: 1, mean_level: 0.2}\n");
+  add_unknown(spec, "lamps[*].power_W", UnknownHow::times, 0.5, 2.0);
+  EXPECT_THAT(message_of([&] { prepare_fit(spec); }), AllOf(HasSubstr("automatic.yaml"), HasSubstr("exposure")));
 }
 
 TEST(UnitFit, SaysThatPowerAndExposureAreIdentifiedAsAProductOnly) {

@@ -87,10 +87,8 @@ class DarknessPainter {
     return frame([](const Eigen::Vector2d&) { return 0.0; }, 1.0, seed);
   }
   BallPress press(const DarkBall& ball, double exposure = 1.0, int seed = 2) const {
-    return {"painted",
-            frame([&](const Eigen::Vector2d& place) { return ball.height_at(place); }, exposure, seed),
-            {ball.centre / mm_per_px, ball.contact_radius() / mm_per_px},
-            ball.radius};
+    return {"painted", frame([&](const Eigen::Vector2d& place) { return ball.height_at(place); }, exposure, seed),
+            ContactCircle{ball.centre / mm_per_px, ball.contact_radius() / mm_per_px}, ball.radius};
   }
 };
 
