@@ -1,0 +1,286 @@
+#include "lab/likeness/likeness.h"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <map>
+#include <opencv2/core.hpp>
+
+#include "core/error.h"
+#include "core/units.h"
+#include "lab/gelsight/ball_press_table.h"
+#include "lab/likeness/contact_depth.h"
+#include "lab/likeness/slope_colours.h"
+#include "sim/sensor/virtual_sensor.h"
+
+namespace touchstone::lab {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kFriction = 0.5;         // of steel on silicone
+constexpr double kDeepestOfGel = 0.6;     // of its thickness
+constexpr double kScaleTolerance = 0.01;  // of mm/px
+constexpr double kLeastAlike = 0.45;      // of a frame's pixels with its rest; frames of other sensors have 0.35
+constexpr double kLeastPress = 2.0;       // of what a pixel far away differs by
+constexpr double kLeastPress_DN = 2.0;
+constexpr double kTurnedMargin = 0.2;  // of correlation
+constexpr int kBalls = 100;            // of kinds in a recording
+
+cv::Mat as_float(const cv::Mat& picture) {
+  cv::Mat out;
+  picture.convertTo(out, CV_32F);
+  return out;
+}
+
+/// A picture on which nothing touches the gel inside of the circle is no press.
+void check_pressed(const sensors::BallPress& press, const cv::Mat& difference) {
+  double inside = 0.0;
+  int pixels = 0;
+  std::vector<float> far;
+  for (int v = 0; v < difference.rows; ++v) {
+    for (int u = 0; u < difference.cols; ++u) {
+      const cv::Vec3f off = difference.at<cv::Vec3f>(v, u);
+      const float mean = (std::abs(off[0]) + std::abs(off[1]) + std::abs(off[2])) / 3.0f;
+      const double distance = (Eigen::Vector2d(u + 0.5, v + 0.5) - press.circle.centre).norm();
+      if (distance <= press.circle.radius) {
+        inside += mean;
+        ++pixels;
+      } else if (distance > 2 * press.circle.radius) {
+        far.push_back(mean);
+      }
+    }
+  }
+  if (pixels > 0) inside /= pixels;
+  double usual = 0.0;
+  if (!far.empty()) {
+    std::nth_element(far.begin(), far.begin() + static_cast<std::ptrdiff_t>(far.size() / 2), far.end());
+    usual = far[far.size() / 2];
+  }
+  if (inside >= std::max(kLeastPress_DN, kLeastPress * usual)) return;
+  fail(
+      "{}: nothing is pressed in the circle at ({}, {}) of radius {} px: it differs from rest by {:.1f} numbers of 255 "
+      "on average, the picture far from it by {:.1f}",
+      press.name, press.circle.centre.x(), press.circle.centre.y(), press.circle.radius, inside, usual);
+}
+
+void check_frame(const sensors::BallPress& press, const cv::Mat& rest, FrameGain& gain) {
+  const std::string fault = sensors::frame_fault(press.frame, rest.size());
+  if (!fault.empty()) fail("{}: {}, as the rest frame", press.name, fault);
+  const Eigen::Vector2d& centre = press.circle.centre;
+  if (!(centre.x() >= 0 && centre.y() >= 0 && centre.x() <= rest.cols && centre.y() <= rest.rows)) {
+    fail("{}: the circle's middle ({}, {}) isn't in the picture of {} x {} pixels", press.name, centre.x(), centre.y(),
+         rest.cols, rest.rows);
+  }
+  gain = gain_of(press.frame, rest);
+  if (gain.alike < kLeastAlike) {
+    fail(
+        "{}: isn't of the same sensor as the rest frame, or is turned: of its pixels {:.0f} % are like those of rest, "
+        "{:.0f} % must be",
+        press.name, 100 * gain.alike, 100 * kLeastAlike);
+  }
+  check_pressed(press, balanced(press.frame, gain) - rest);
+}
+
+PictureLikeness likeness_of(const cv::Mat& recorded, const cv::Mat& other, const sensors::ContactCircle& circle) {
+  return {psnr(recorded, other), ssim(recorded, other), region_difference(recorded, other, circle)};
+}
+
+/// Sums for the correlation of recorded and simulated differences about the contact, with the recording as it is,
+/// turned by 180 degrees, mirrored left to right, and top to bottom.
+struct Orientation {
+  static constexpr std::array<const char*, 4> kNames = {"as it is", "turned by 180 degrees", "mirrored left to right",
+                                                        "mirrored top to bottom"};
+  static constexpr std::array<int, 4> kFlips = {2, -1, 1, 0};  // cv::flip's codes; the first isn't one
+  std::array<double, 4> together{}, recorded{}, simulated{};
+
+  void add(const cv::Mat& of_recording, const cv::Mat& of_device, const sensors::ContactCircle& circle) {
+    const int u = static_cast<int>(circle.centre.x()), v = static_cast<int>(circle.centre.y());
+    const int half =
+        std::min({static_cast<int>(2 * circle.radius), u, v, of_recording.cols - 1 - u, of_recording.rows - 1 - v});
+    if (half < 1) return;
+    const cv::Rect window(u - half, v - half, 2 * half + 1, 2 * half + 1);
+    for (std::size_t k = 0; k < kFlips.size(); ++k) {
+      cv::Mat turned = of_recording(window).clone();
+      if (k > 0) cv::flip(turned, turned, kFlips[k]);
+      together[k] += turned.dot(of_device(window));
+      recorded[k] += turned.dot(turned);
+      simulated[k] += of_device(window).dot(of_device(window));
+    }
+  }
+  double correlation(std::size_t k) const {
+    const double norm = std::sqrt(recorded[k] * simulated[k]);
+    return norm > 0.0 ? together[k] / norm : 0.0;
+  }
+  void check(const std::string& device) const {
+    for (std::size_t k = 1; k < kFlips.size(); ++k) {
+      if (correlation(k) < correlation(0) + kTurnedMargin) continue;
+      fail(
+          "the recording looks {}: so its difference pictures correlate with those of {} by {:.2f}, as they are by "
+          "{:.2f}; turn the recording, or see where the device's lamps stand",
+          kNames[k], device, correlation(k), correlation(0));
+    }
+  }
+};
+
+void check_camera(const sim::DeviceSpec& device, const BallRecording& recording) {
+  if (!device.camera) fail("device {}: has no camera", device.name);
+  if (!device.coating) fail("device {}: has no coating; likeness is compared of coated gels", device.name);
+  const cv::Size size = recording.rest.mean.size();
+  const sim::CameraSpec& camera = *device.camera;
+  if (camera.width != size.width || camera.height != size.height) {
+    fail("device {}: its camera has {} x {} pixels, the recording {} x {}; give the device the recording's picture",
+         device.name, camera.width, camera.height, size.width, size.height);
+  }
+  if (camera.bayer == render::BayerPattern::none) {
+    fail("device {}: its camera is grey, the recording has colours; camera.bayer must be set", device.name);
+  }
+}
+
+void check_scale(const sim::VirtualSensor& sensor, const BallRecording& recording) {
+  const double off = sensor.mm_per_px() / recording.mm_per_px - 1.0;
+  if (std::abs(off) <= kScaleTolerance) return;
+  fail("device {}: a pixel of its camera is {:.5f} mm on the gel, one of the recording {:.5f} mm; {:.0f} % are allowed",
+       sensor.device().name, sensor.mm_per_px(), recording.mm_per_px, 100 * kScaleTolerance);
+}
+
+sim::ObjectSpec ball_of(double radius_mm) {
+  sim::ObjectSpec ball;
+  ball.name = fmt::format("ball of {} mm", 2 * radius_mm);
+  ball.shape.radius_mm = radius_mm;
+  ball.friction = kFriction;
+  return ball;
+}
+
+/// A ball and how deep it goes.
+struct KnownBall {
+  sim::TouchObject object;
+  DepthTable depths;
+};
+
+/// The device's side of one press.
+void simulate(const sim::VirtualSensor& sensor, const KnownBall& ball, const sensors::BallPress& press,
+              double deepest_mm, PressLikeness& row, cv::Mat& height) {
+  const std::optional<double> depth = ball.depths.depth_of(press.circle.radius);
+  row.shallow = !depth.has_value();
+  row.depth_mm = depth.value_or(deepest_mm);
+  sim::PressSpec how;
+  how.place_mm = sensor.gel_from_pixel(press.circle.centre);
+  how.depth_mm = row.depth_mm;
+  const sim::Touch touch = sensor.press(ball.object, how);
+  row.simulated_radius_px = std::sqrt(cv::countNonZero(touch.contact) / kPi);
+  row.simulated_frame = sensor.ideal(ball.object, touch.light);
+  height = touch.height;
+}
+
+double median(std::vector<double> values) {
+  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
+  return values[values.size() / 2];
+}
+
+/// The baseline by examples: fills in `table` of all rows.
+void compare_table(const BallRecording& recording, const std::vector<cv::Mat>& slopes, Likeness& likeness) {
+  SlopeColours table;
+  for (std::size_t i = 0; i < slopes.size(); ++i) {
+    if (recording.learned[i]) table.learn(slopes[i], likeness.presses[i].recorded);
+  }
+  table.finish();
+  for (std::size_t i = 0; i < slopes.size(); ++i) {
+    PressLikeness& row = likeness.presses[i];
+    row.table = likeness_of(row.recorded, table.colours(slopes[i]), recording.presses[i].circle);
+  }
+}
+
+}  // namespace
+
+BallRecording read_ball_recording(const LikenessSpec& spec) {
+  if (!(spec.mm_per_px > 0.0)) fail("mm/px: {} must be above 0", spec.mm_per_px);
+  const bool is_folder = fs::is_directory(spec.recording);
+  const fs::path csv = is_folder ? spec.recording / "presses.csv" : spec.recording;
+  const fs::path folder = csv.has_parent_path() ? csv.parent_path() : ".";
+  const std::vector<AnnotatedPress> table = read_ball_press_table(folder, csv);
+  std::vector<fs::path> rest;
+  for (const fs::path& name : spec.rest) rest.push_back(fs::exists(folder / name) ? folder / name : name);
+  BallRecording recording;
+  recording.mm_per_px = spec.mm_per_px;
+  recording.rest = read_background(rest);
+  recording.presses = read_ball_presses(table, recording.rest, spec.mm_per_px);
+  recording.gains.resize(recording.presses.size());
+  for (std::size_t i = 0; i < recording.presses.size(); ++i) {
+    try {
+      check_frame(recording.presses[i], recording.rest.mean, recording.gains[i]);
+    } catch (const Error& error) {
+      fail_at(table[i].where, "{}", error.what());
+    }
+    const std::string& name = recording.presses[i].name;
+    recording.learned.push_back(std::find(spec.learn.begin(), spec.learn.end(), name) != spec.learn.end());
+  }
+  for (const std::string& name : spec.learn) {
+    const auto has_name = [&](const sensors::BallPress& press) { return press.name == name; };
+    if (std::none_of(recording.presses.begin(), recording.presses.end(), has_name)) {
+      fail("--learn: {} isn't a file of {}", name, csv.string());
+    }
+  }
+  return recording;
+}
+
+Likeness compare_likeness(const sim::DeviceSpec& device, const BallRecording& recording, const LikenessSpec& spec,
+                          const fs::path& cache_folder, const Progress& progress) {
+  check_camera(device, recording);
+  sim::VirtualSensorSettings settings;
+  settings.seed = spec.seed;
+  settings.deepest_mm = spec.deepest_mm.value_or(kDeepestOfGel * device.gel.thickness_mm);
+  settings.always_friction = true;
+  const sim::VirtualSensor sensor(device, cache_folder, settings, progress);
+  check_scale(sensor, recording);
+
+  std::map<double, KnownBall> balls;
+  Likeness likeness;
+  likeness.device = device.name;
+  likeness.light = sensor.light().reason;
+  std::vector<double> seconds;
+  std::vector<cv::Mat> slopes;
+  Orientation orientation;
+  cv::Mat rest;
+  for (std::size_t i = 0; i < recording.presses.size(); ++i) {
+    const sensors::BallPress& press = recording.presses[i];
+    auto known = balls.find(press.ball_radius_mm);
+    if (known == balls.end()) {
+      if (balls.size() == kBalls) fail("{}: more than {} sizes of balls", press.name, kBalls);
+      const sim::TouchObject ball = sensor.object(ball_of(press.ball_radius_mm));
+      known = balls
+                  .emplace(press.ball_radius_mm,
+                           KnownBall{ball, measure_depths(sensor, ball, settings.deepest_mm, progress)})
+                  .first;
+      rest = as_float(sensor.ideal(ball, sensor.background_light()));
+    }
+    PressLikeness row;
+    row.name = press.name;
+    row.learned = recording.learned[i];
+    row.radius_px = press.circle.radius;
+    row.gain = recording.gains[i].gain;
+    cv::Mat height;
+    const auto start = std::chrono::steady_clock::now();
+    simulate(sensor, known->second, press, settings.deepest_mm, row, height);
+    seconds.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+    const cv::Mat frame = balanced(press.frame, recording.gains[i]);
+    frame.convertTo(row.frame, CV_8U);
+    row.recorded = frame - recording.rest.mean;
+    row.simulated = as_float(row.simulated_frame) - rest;
+    row.device = likeness_of(row.recorded, row.simulated, press.circle);
+    row.raw = likeness_of(as_float(press.frame) - recording.rest.mean, row.simulated, press.circle);
+    row.rest = likeness_of(row.recorded, cv::Mat::zeros(row.recorded.size(), CV_32FC3), press.circle);
+    orientation.add(row.recorded, row.simulated, press.circle);
+    slopes.push_back(slopes_of(height, recording.mm_per_px));
+    likeness.presses.push_back(std::move(row));
+    if (progress)
+      progress("presses", static_cast<std::int64_t>(i + 1), static_cast<std::int64_t>(recording.presses.size()));
+  }
+  orientation.check(device.name);
+  if (!spec.learn.empty()) compare_table(recording, slopes, likeness);
+  likeness.seconds_a_press = median(seconds);
+  return likeness;
+}
+
+}  // namespace touchstone::lab
