@@ -15,7 +15,7 @@ namespace {
 constexpr double kRange = 255.0;
 constexpr int kWindow = 7;
 constexpr double kAlike = 0.05;  // of the gain
-// Rounding moves a dark number by too much, and what is nearly white may have been cut off.
+// Noise and rounding move a dark number by too much, and what is nearly white may have been cut off.
 constexpr double kDarkest = 8.0;
 constexpr double kWhitest = 250.0;
 constexpr double kWidestLog = 0.6;
@@ -106,12 +106,15 @@ RegionDifference region_difference(const cv::Mat& a, const cv::Mat& b, const sen
 
 FrameGain gain_of(const cv::Mat& frame, const cv::Mat& rest) {
   TS_ASSERT(frame.type() == CV_8UC3 && rest.type() == CV_32FC3 && frame.size() == rest.size());
+  cv::Mat smooth_frame, smooth_rest;
+  cv::boxFilter(frame, smooth_frame, CV_32F, {kWindow, kWindow});
+  cv::boxFilter(rest, smooth_rest, CV_32F, {kWindow, kWindow});
   FrameGain found;
   for (int c = 0; c < 3; ++c) {
     std::vector<double> logs;
     for (int v = 0; v < frame.rows; ++v) {
       for (int u = 0; u < frame.cols; ++u) {
-        const double now = frame.at<cv::Vec3b>(v, u)[c], before = rest.at<cv::Vec3f>(v, u)[c];
+        const double now = smooth_frame.at<cv::Vec3f>(v, u)[c], before = smooth_rest.at<cv::Vec3f>(v, u)[c];
         if (std::min(now, before) < kDarkest || std::max(now, before) > kWhitest) continue;
         logs.push_back(std::log(now / before));
       }
@@ -121,7 +124,7 @@ FrameGain gain_of(const cv::Mat& frame, const cv::Mat& rest) {
     found.gain[c] = std::exp(mode);
     const auto alike = std::count_if(logs.begin(), logs.end(),
                                      [&](double value) { return std::abs(value - mode) < std::log1p(kAlike); });
-    found.alike += static_cast<double>(alike) / (3.0 * static_cast<double>(frame.total()));
+    found.alike += static_cast<double>(alike) / (3.0 * static_cast<double>(logs.size()));
   }
   return found;
 }

@@ -27,10 +27,10 @@ RegionDifference region_difference(const cv::Mat& a, const cv::Mat& b, const sen
 /// How a frame's colours go with those of rest where nothing touches.
 struct FrameGain {
   cv::Vec3d gain{1, 1, 1};  ///< frame over rest, B, G, R: a camera's automatic exposure and white balance
-  double alike = 0.0;       ///< share of pixels within 5 % of it, mean over channels
+  double alike = 0.0;       ///< share of these pixels within 5 % of it, mean over channels
 };
-/// The mode, a channel, of log(frame / rest) over pixels from 8 to 250 in both: of a histogram with bins of 0.002 from
-/// -0.6 to 0.6, smoothed by a Gaussian of 0.01. Gain 1 where no pixel counts.
+/// The mode, a channel, of log(frame / rest), both as means over 7 x 7 pixels and from 8 to 250: of a histogram with
+/// bins of 0.002 from -0.6 to 0.6, smoothed by a Gaussian of 0.01. Gain 1 where no pixel counts.
 /// @pre frame CV_8UC3, rest CV_32FC3, of one size
 FrameGain gain_of(const cv::Mat& frame, const cv::Mat& rest);
 
