@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 #include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "core/error.h"
 #include "core/units.h"
@@ -26,7 +27,8 @@ constexpr double kLeastAlike = 0.45;      // of a frame's pixels with its rest; 
 constexpr double kLeastPress = 2.0;       // of what a pixel far away differs by
 constexpr double kLeastPress_DN = 2.0;
 constexpr double kTurnedMargin = 0.2;  // of correlation
-constexpr int kBalls = 100;            // of kinds in a recording
+constexpr double kNearlyWhite = 249;
+constexpr int kBalls = 100;  // of kinds in a recording
 
 cv::Mat as_float(const cv::Mat& picture) {
   cv::Mat out;
@@ -166,7 +168,7 @@ void simulate(const sim::VirtualSensor& sensor, const KnownBall& ball, const sen
   row.shallow = !depth.has_value();
   row.depth_mm = depth.value_or(deepest_mm);
   sim::PressSpec how;
-  how.place_mm = sensor.gel_from_pixel(press.circle.centre);
+  how.place_mm = row.place_mm = sensor.gel_from_pixel(press.circle.centre);
   how.depth_mm = row.depth_mm;
   const sim::Touch touch = sensor.press(ball.object, how);
   row.simulated_radius_px = std::sqrt(cv::countNonZero(touch.contact) / kPi);
@@ -266,6 +268,9 @@ Likeness compare_likeness(const sim::DeviceSpec& device, const BallRecording& re
     seconds.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
     const cv::Mat frame = balanced(press.frame, recording.gains[i]);
     frame.convertTo(row.frame, CV_8U);
+    cv::Mat white;
+    cv::threshold(press.frame, white, kNearlyWhite, 255, cv::THRESH_BINARY);
+    cv::max(row.frame, white, row.frame);  // what may have been cut off is so for whoever reads it
     row.recorded = frame - recording.rest.mean;
     row.simulated = as_float(row.simulated_frame) - rest;
     row.device = likeness_of(row.recorded, row.simulated, press.circle);

@@ -51,8 +51,9 @@ struct PictureLikeness {
 struct PressLikeness {
   std::string name;
   bool learned = false;
-  double radius_px = 0.0;            ///< annotated
-  double simulated_radius_px = 0.0;  ///< of the simulated contact
+  double radius_px = 0.0;                              ///< annotated
+  double simulated_radius_px = 0.0;                    ///< of the simulated contact
+  Eigen::Vector2d place_mm = Eigen::Vector2d::Zero();  ///< of the ball's middle, gel frame
   double depth_mm = 0.0;
   bool shallow = false;  ///< the annotated radius is beyond what deepest_mm gives: pressed to that
   cv::Vec3d gain;        ///< B, G, R
@@ -60,7 +61,7 @@ struct PressLikeness {
   PictureLikeness device, raw, rest;
   std::optional<PictureLikeness> table;  ///< where presses were learned
   cv::Mat recorded, simulated;           ///< difference pictures, CV_32FC3, balanced
-  cv::Mat frame, simulated_frame;        ///< CV_8UC3, the recorded one balanced
+  cv::Mat frame, simulated_frame;        ///< CV_8UC3, the recorded one balanced; what was 250 or more is 255
 };
 
 /// All presses.

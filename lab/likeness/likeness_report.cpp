@@ -43,10 +43,11 @@ cv::Mat on_grey(const cv::Mat& difference, double factor) {
 }
 
 std::string csv_row(const PressLikeness& press, const char* way, const PictureLikeness& of) {
-  return fmt::format("{},{},{},{:.2f},{:.2f},{:.4f},{},{:.4f},{:.4f},{:.4f},{:.3f},{:.4f},{:.2f},{:.2f}\n", press.name,
-                     press.learned ? "yes" : "no", way, press.radius_px, press.simulated_radius_px, press.depth_mm,
-                     press.shallow ? "yes" : "no", press.gain[2], press.gain[1], press.gain[0], of.psnr, of.ssim,
-                     of.off.inside, of.off.ring);
+  return fmt::format(
+      "{},{},{},{:.2f},{:.2f},{:.4f},{:.4f},{:.4f},{},{:.4f},{:.4f},{:.4f},{:.3f},{:.4f},{:.2f},{:.2f}\n", press.name,
+      press.learned ? "yes" : "no", way, press.radius_px, press.simulated_radius_px, press.place_mm.x(),
+      press.place_mm.y(), press.depth_mm, press.shallow ? "yes" : "no", press.gain[2], press.gain[1], press.gain[0],
+      of.psnr, of.ssim, of.off.inside, of.off.ring);
 }
 
 }  // namespace
@@ -92,7 +93,8 @@ std::string to_text(const LikenessSummary& summary) {
 
 std::string to_csv(const Likeness& likeness) {
   std::string csv =
-      "file,learned,way,radius_px,simulated_radius_px,depth_mm,shallow,gain_red,gain_green,gain_blue,psnr_dB,ssim,"
+      "file,learned,way,radius_px,simulated_radius_px,x_mm,y_mm,depth_mm,shallow,gain_red,gain_green,gain_blue,psnr_dB,"
+      "ssim,"
       "inside_DN,ring_DN\n";
   for (const PressLikeness& press : likeness.presses) {
     for (const Way& way : ways()) {
@@ -108,7 +110,7 @@ std::string to_csv(const Likeness& likeness) {
       return which == std::string("mean") ? range.mean : which == std::string("low") ? range.low : range.high;
     };
     for (const LikenessSummary::Of& row : summary.rows) {
-      csv += fmt::format("{} of {},no,\"{}\",,,,,,,,{:.3f},{:.4f},{:.2f},{:.2f}\n", which, summary.presses, row.what,
+      csv += fmt::format("{} of {},no,\"{}\",,,,,,,,,,{:.3f},{:.4f},{:.2f},{:.2f}\n", which, summary.presses, row.what,
                          pick(row.psnr), pick(row.ssim), pick(row.inside), pick(row.ring));
     }
   }
