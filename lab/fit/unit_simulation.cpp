@@ -100,6 +100,8 @@ struct UnitSimulation::Parts {
     settings.widest_mm = kWidest_mm;
     settings.membrane_um = fit.spec.membrane_um;
     settings.always_friction = true;
+    // With light from the room the whole device has bounced light (sim/plan), so each of its lamps has.
+    if (sources() > fit.device.lamps.size()) settings.interreflection_tolerance = 0.0;
     if (kept.size() == kSensorsKept) kept.erase(kept.begin());
     if (progress) progress("lamps' light", made, made + 1);
     kept.emplace_back(key, std::make_unique<const sim::VirtualSensor>(device_of_lamp(whole, lamp), cache, settings));
