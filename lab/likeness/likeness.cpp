@@ -268,9 +268,8 @@ Likeness compare_likeness(const sim::DeviceSpec& device, const BallRecording& re
     seconds.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
     const cv::Mat frame = balanced(press.frame, recording.gains[i]);
     frame.convertTo(row.frame, CV_8U);
-    cv::Mat white;
-    cv::threshold(press.frame, white, kNearlyWhite, 255, cv::THRESH_BINARY);
-    cv::max(row.frame, white, row.frame);  // what may have been cut off is so for whoever reads it
+    cv::threshold(press.frame, row.fit_frame, kNearlyWhite, 255, cv::THRESH_BINARY);
+    cv::max(row.frame, row.fit_frame, row.fit_frame);
     row.recorded = frame - recording.rest.mean;
     row.simulated = as_float(row.simulated_frame) - rest;
     row.device = likeness_of(row.recorded, row.simulated, press.circle);

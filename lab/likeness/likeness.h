@@ -61,7 +61,8 @@ struct PressLikeness {
   PictureLikeness device, raw, rest;
   std::optional<PictureLikeness> table;  ///< where presses were learned
   cv::Mat recorded, simulated;           ///< difference pictures, CV_32FC3, balanced
-  cv::Mat frame, simulated_frame;        ///< CV_8UC3, the recorded one balanced; what was 250 or more is 255
+  cv::Mat frame, simulated_frame;        ///< CV_8UC3, the recorded one balanced
+  cv::Mat fit_frame;                     ///< as `frame`, but 255 where the recorded number was 250 or more
 };
 
 /// All presses.
@@ -100,7 +101,7 @@ std::string to_csv(const Likeness& likeness);
 /// A row a press: frame, simulated frame, both differences on grey, and simulated less recorded, tenfold.
 cv::Mat likeness_sheet(const Likeness& likeness);
 
-/// Writes likeness.csv and likeness.png, and the recorded frames with balanced colours (NAME-balanced.png), which a fit
+/// Writes likeness.csv and likeness.png, and of each press PressLikeness::fit_frame (NAME-balanced.png), which a fit
 /// takes. @throws Error if the folder can't be written to
 void write_likeness(const Likeness& likeness, const std::filesystem::path& folder);
 

@@ -137,7 +137,7 @@ void write_likeness(const Likeness& likeness, const std::filesystem::path& folde
   sim::write_png(folder / "likeness.png", likeness_sheet(likeness));
   for (const PressLikeness& press : likeness.presses) {
     const std::string stem = std::filesystem::path(press.name).stem().string();
-    sim::write_png(folder / (stem + "-balanced.png"), press.frame);
+    sim::write_png(folder / (stem + "-balanced.png"), press.fit_frame);
   }
 }
 
