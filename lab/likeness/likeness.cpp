@@ -68,7 +68,7 @@ void check_pressed(const sensors::BallPress& press, const cv::Mat& difference) {
 
 void check_frame(const sensors::BallPress& press, const cv::Mat& rest, FrameGain& gain) {
   const std::string fault = sensors::frame_fault(press.frame, rest.size());
-  if (!fault.empty()) fail("{}: {}, as the rest frame", press.name, fault);
+  if (!fault.empty()) fail("{}: doesn't go with the rest frame: {}", press.name, fault);
   const Eigen::Vector2d& centre = press.circle.centre;
   if (!(centre.x() >= 0 && centre.y() >= 0 && centre.x() <= rest.cols && centre.y() <= rest.rows)) {
     fail("{}: the circle's middle ({}, {}) isn't in the picture of {} x {} pixels", press.name, centre.x(), centre.y(),
