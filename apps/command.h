@@ -21,6 +21,7 @@ using Action = std::function<void()>;
 void add_plan_command(CLI::App& app, const GlobalOptions& global, Action& action);
 void add_render_command(CLI::App& app, const GlobalOptions& global, Action& action);
 void add_fit_command(CLI::App& app, const GlobalOptions& global, Action& action);
+void add_compare_command(CLI::App& app, const GlobalOptions& global, Action& action);
 void add_generate_command(CLI::App& app, const GlobalOptions& global, Action& action);
 void add_merge_command(CLI::App& app, const GlobalOptions& global, Action& action);
 void add_calibrate_command(CLI::App& app, const GlobalOptions& global, Action& action);

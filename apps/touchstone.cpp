@@ -68,6 +68,7 @@ int run(int argc, char** argv) {
   add_calibrate_command(app, global, action);
   add_estimate_command(app, global, action);
   add_fit_command(app, global, action);
+  add_compare_command(app, global, action);
   add_validate_command(app, global, action);
   add_inspect_command(app, global, action);
   add_export_command(app, global, action);

@@ -5,6 +5,8 @@
 #include <limits>
 #include <utility>
 
+#include <opencv2/core.hpp>
+
 #include "core/error.h"
 #include "lab/fit/bounded_least_squares.h"
 #include "lab/fit/fit_certainty.h"
@@ -103,14 +105,41 @@ Variables variables_of(const PreparedFit& fit, const std::vector<PressPose>& pos
   return all;
 }
 
-/// One picture of the recording: background (press -1) or press, with its numbers' weights.
+/// One picture of the recording: background (press -1) or press, with what is compared of it. Where a fit asks for
+/// differences these are a press's numbers less the background's, and of the background the mean of each channel.
 struct Compared {
   int press = -1;
   const BlockPicture* recorded = nullptr;
   std::vector<int> at;         // of usable numbers
+  std::vector<double> values;  // that are compared, of the recording
   std::vector<double> noise;   // of these
   Eigen::Index first_row = 0;  // of the residuals
+  bool means = false;          // of channels, in place of a value each
 };
+
+/// What is compared of a picture: `background` is null where the picture itself is.
+std::vector<double> compared_values(const Compared& picture, const cv::Mat& shown, const cv::Mat* background) {
+  const auto* numbers = shown.ptr<double>();
+  std::vector<double> values;
+  if (!picture.means) {
+    for (const int at : picture.at) {
+      values.push_back(numbers[at] - (background == nullptr ? 0.0 : background->ptr<double>()[at]));
+    }
+    return values;
+  }
+  const int channels = shown.channels();
+  for (int c = 0; c < channels; ++c) {
+    double sum = 0.0;
+    int count = 0;
+    for (const int at : picture.at) {
+      if (at % channels != c) continue;
+      sum += numbers[at];
+      ++count;
+    }
+    values.push_back(count > 0 ? sum / count : 0.0);
+  }
+  return values;
+}
 
 /// The fit as least squares.
 struct Comparison {
@@ -136,12 +165,15 @@ struct Comparison {
     return all;
   }
 
-  void put_picture(const Compared& picture, const cv::Mat& shown, Vector& out) const {
-    const auto* simulated = shown.ptr<double>();
-    const auto* recorded = picture.recorded->mean.ptr<double>();
-    for (std::size_t i = 0; i < picture.at.size(); ++i) {
-      const int at = picture.at[i];
-      out[picture.first_row + static_cast<Eigen::Index>(i)] = (simulated[at] - recorded[at]) / picture.noise[i];
+  /// Of a simulated picture beside the simulated background.
+  std::vector<double> values(const Compared& picture, const cv::Mat& shown, const cv::Mat& background) const {
+    return compared_values(picture, shown, fit.spec.differences && picture.press >= 0 ? &background : nullptr);
+  }
+
+  void put_picture(const Compared& picture, const cv::Mat& shown, const cv::Mat& background, Vector& out) const {
+    const std::vector<double> simulated = values(picture, shown, background);
+    for (std::size_t i = 0; i < simulated.size(); ++i) {
+      out[picture.first_row + static_cast<Eigen::Index>(i)] = (simulated[i] - picture.values[i]) / picture.noise[i];
     }
   }
 
@@ -157,7 +189,7 @@ struct Comparison {
   Vector residuals(const Vector& x) const {
     const SimulatedUnit shown = simulation.show(unknowns(x), poses(x));
     Vector out(rows);
-    for (const Compared& picture : pictures) put_picture(picture, picture_in(shown, picture), out);
+    for (const Compared& picture : pictures) put_picture(picture, picture_in(shown, picture), shown.background, out);
     for (std::size_t i = 0; i < forces.size(); ++i) {
       out[first_force + static_cast<Eigen::Index>(i)] = force_row(forces[i], shown.force_N[forces[i]]);
     }
@@ -183,6 +215,7 @@ struct Comparison {
       beside[k] += x[k] + step <= variables.high[k] ? step : -step;
       out.col(k) = (residuals(beside) - at) / (beside[k] - x[k]);
     }
+    const cv::Mat background = variables.poses.empty() ? cv::Mat() : simulation.show(unknowns(x), poses(x)).background;
     for (std::size_t i = 0; i < variables.poses.size(); ++i) {
       const PoseVariable& variable = variables.poses[i];
       const auto k = variables.unknowns + static_cast<Eigen::Index>(i);
@@ -193,7 +226,7 @@ struct Comparison {
       const SimulatedUnit shown = simulation.show_press(unknowns(x), variable.press, pose);
       Vector moved = at;  // of this press alone
       for (const Compared& picture : pictures) {
-        if (picture.press == variable.press) put_picture(picture, shown.presses.front(), moved);
+        if (picture.press == variable.press) put_picture(picture, shown.presses.front(), background, moved);
       }
       for (std::size_t f = 0; f < forces.size(); ++f) {
         if (forces[f] != variable.press) continue;
@@ -214,19 +247,32 @@ struct Comparison {
 /// Weights by the noise that the camera, as it is simulated at the start, has at the recorded numbers.
 void lay_out(Comparison& all, const UnitRecording& recording) {
   const render::Imager imager = all.simulation.imager(Vector::Zero(all.variables.unknowns));
+  const auto noise_of = [&](const BlockPicture& picture) {
+    return block_noise(picture.mean, imager, all.fit.spec.coarse_px, picture.exposures);
+  };
+  const bool differences = all.fit.spec.differences;
   const auto add = [&](int press, const BlockPicture& picture) {
     Compared compared;
     compared.press = press;
     compared.recorded = &picture;
     compared.first_row = all.rows;
-    const cv::Mat noise = block_noise(picture.mean, imager, all.fit.spec.coarse_px, picture.exposures);
+    compared.means = differences && press < 0;
+    const bool less_background = differences && press >= 0;
+    cv::Mat noise = noise_of(picture);
+    if (less_background) cv::magnitude(noise, noise_of(recording.background), noise);
     const auto count = static_cast<int>(picture.mean.total()) * picture.mean.channels();
     for (int i = 0; i < count; ++i) {
       if (picture.usable.ptr<std::uint8_t>()[i] == 0) continue;
+      if (less_background && recording.background.usable.ptr<std::uint8_t>()[i] == 0) continue;
       compared.at.push_back(i);
       compared.noise.push_back(noise.ptr<double>()[i]);
     }
-    all.rows += static_cast<Eigen::Index>(compared.at.size());
+    compared.values = compared_values(compared, picture.mean, less_background ? &recording.background.mean : nullptr);
+    if (compared.means) {
+      const double typical = cv::mean(noise)[0];
+      compared.noise.assign(compared.values.size(), typical / std::sqrt(static_cast<double>(picture.mean.total())));
+    }
+    all.rows += static_cast<Eigen::Index>(compared.values.size());
     all.pictures.push_back(std::move(compared));
   };
   if (!recording.background.mean.empty()) add(-1, recording.background);
@@ -249,6 +295,7 @@ LinearisedFit linearised(const Comparison& all, const LeastSquaresResult& found,
   fit.tile.assign(static_cast<std::size_t>(all.rows), -1);
   fit.patch.assign(static_cast<std::size_t>(all.rows), -1);
   for (const Compared& picture : all.pictures) {
+    if (picture.means) continue;
     const cv::Size size = picture.recorded->mean.size();
     const int channels = picture.recorded->mean.channels();
     for (std::size_t i = 0; i < picture.at.size(); ++i) {
@@ -269,11 +316,10 @@ LinearisedFit linearised(const Comparison& all, const LeastSquaresResult& found,
   const SimulatedUnit other = all.simulation.show_other_light(all.unknowns(found.x), all.poses(found.x));
   fit.light_error = Vector::Zero(all.rows);
   for (const Compared& picture : all.pictures) {
-    const auto* one = all.picture_in(shown, picture).ptr<double>();
-    const auto* two = all.picture_in(other, picture).ptr<double>();
-    for (std::size_t i = 0; i < picture.at.size(); ++i) {
-      const int at = picture.at[i];
-      fit.light_error[picture.first_row + static_cast<Eigen::Index>(i)] = (two[at] - one[at]) / picture.noise[i];
+    const std::vector<double> one = all.values(picture, all.picture_in(shown, picture), shown.background);
+    const std::vector<double> two = all.values(picture, all.picture_in(other, picture), other.background);
+    for (std::size_t i = 0; i < one.size(); ++i) {
+      fit.light_error[picture.first_row + static_cast<Eigen::Index>(i)] = (two[i] - one[i]) / picture.noise[i];
     }
   }
   return fit;
@@ -312,7 +358,7 @@ double root_mean_square(const Vector& of, Eigen::Index first, Eigen::Index count
 std::vector<FitMisfit> misfits_of(const Comparison& all, const Vector& before, const Vector& after) {
   std::vector<FitMisfit> out;
   for (const Compared& picture : all.pictures) {
-    const auto count = static_cast<Eigen::Index>(picture.at.size());
+    const auto count = static_cast<Eigen::Index>(picture.values.size());
     const auto numbers = [&](const Vector& of) {
       double sum = 0.0;
       for (Eigen::Index i = 0; i < count; ++i) {

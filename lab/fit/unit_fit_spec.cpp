@@ -47,6 +47,8 @@ FittedNumber fitted_number(const YamlNumber& number, const sim::GelSpec& gel) {
     fitted.acts = NumberActs::on_imager;
   } else if (number.path == "gel.youngs_modulus_MPa" && gel.layers.empty()) {
     fitted.acts = NumberActs::on_force;
+  } else if (number.path == "room_radiance" || number.path.starts_with("room_radiance[")) {
+    fitted.acts = NumberActs::on_lamp_power;
   } else if (number.path.starts_with("lamps[")) {
     const std::size_t close = number.path.find(']');
     fitted.lamp = std::stoi(number.path.substr(6, close - 6));
@@ -100,10 +102,6 @@ void require_fit(const sim::DeviceSpec& device) {
   if (device.camera->auto_exposure || device.camera->auto_white_balance) {
     fail_at(device.where, "device {}: its camera sets its {} by itself; a fit takes cameras that don't, fix it",
             device.name, device.camera->auto_exposure ? "exposure" : "white balance");
-  }
-  if (device.room_radiance.largest() > 0.0) {
-    fail_at(device.where, "device {}: room_radiance is {}; a fit takes closed devices, whose light is their lamps'",
-            device.name, device.room_radiance.largest());
   }
   for (const sim::LampSpec& lamp : device.lamps) {
     if (lamp.spectrum) fail_at(lamp.where, "lamps: a lamp with a spectrum can't be fitted; give power_W by bands");
@@ -183,6 +181,7 @@ void fields(YamlReader& in, UnitFitSpec& fit) {
   std::vector<std::string> backgrounds;
   in.optional("backgrounds", backgrounds);
   in.required("presses", fit.presses);
+  in.optional("differences", fit.differences);
   in.optional("coarse_px", fit.coarse_px, Allowed::within(1, 32));
   in.optional("deepest_mm", fit.deepest_mm, Allowed::above(0.0));
   in.optional("seed", fit.seed);
@@ -193,6 +192,9 @@ void fields(YamlReader& in, UnitFitSpec& fit) {
   }
   if (fit.unknowns.empty()) fail_at(in.where("unknowns"), "unknowns: has none; at least one is needed");
   if (fit.presses.empty()) fail_at(in.where("presses"), "presses: has none; at least one is needed");
+  if (fit.differences && backgrounds.empty()) {
+    fail_at(in.where("differences"), "differences: true, but there are no `backgrounds` that presses could be less");
+  }
   for (const std::string& name : backgrounds) {
     fit.backgrounds.push_back(in.folder() / name);
     if (!std::filesystem::is_regular_file(fit.backgrounds.back())) {

@@ -53,6 +53,9 @@ struct UnitFitSpec {
   std::vector<UnknownSpec> unknowns;
   std::vector<std::filesystem::path> backgrounds;  ///< of the untouched sensor; their mean is taken
   std::vector<RecordedPress> presses;
+  /// Presses are compared less the background, and of the background the mean of each colour alone: for devices that
+  /// can't show all of what a real sensor's rest shows.
+  bool differences = false;
   int coarse_px = 4;  ///< pixels along a side that are compared, and simulated, as one
   std::optional<double> deepest_mm;
   std::uint64_t seed = 1;     ///< of the simulated light
@@ -68,7 +71,7 @@ void fields(YamlReader& in, UnitFitSpec& fit);
 enum class NumberActs : std::uint8_t {
   on_imager,      ///< what becomes of the light
   on_force,       ///< the modulus of a gel of one material: forces are in proportion, shapes stay
-  on_lamp_power,  ///< light is in proportion
+  on_lamp_power,  ///< light is in proportion: a lamp's, or the room's
   on_lamp,        ///< the light of one lamp
   on_scene        ///< all light, maybe the mechanics
 };

@@ -38,9 +38,8 @@ struct PressedState {
 struct UnitSimulation::Parts {
   Parts(const PreparedFit& of, std::filesystem::path cache_folder, Progress listener, std::uint64_t first_seed)
       : fit(of), cache(std::move(cache_folder)), progress(std::move(listener)), seed(first_seed) {
-    const auto lamps = fit.device.lamps.size();
-    by_lamp.resize(lamps);
-    lights.resize(lamps);
+    by_lamp.resize(sources());
+    lights.resize(sources());
     sim::cache_gel_of_unit_modulus(fit.device, cache);
   }
 
@@ -57,11 +56,22 @@ struct UnitSimulation::Parts {
     return key;
   }
 
-  /// The device with one lamp of 1 W in each band, the modulus that its file says, and blocks for pixels.
+  /// The lamps and, where there is light from it or may be, the room, whose number comes behind theirs.
+  std::size_t sources() const {
+    const bool room = fit.device.room_radiance.largest() > 0.0 ||
+                      std::any_of(fit.unknowns.begin(), fit.unknowns.end(),
+                                  [](const FitUnknown& unknown) { return unknown.path.starts_with("room_radiance"); });
+    return fit.device.lamps.size() + (room ? 1 : 0);
+  }
+
+  /// The device with one lamp of 1 W in each band (or a room of 1 W/m^2/sr), the modulus that its file says, and blocks
+  /// for pixels.
   sim::DeviceSpec device_of_lamp(const sim::DeviceSpec& whole, int lamp) const {
     sim::DeviceSpec device = with_block_camera(whole, fit.spec.coarse_px);
-    device.lamps = {whole.lamps[static_cast<std::size_t>(lamp)]};
-    device.lamps.front().power_W = 1.0;
+    const bool is_room = static_cast<std::size_t>(lamp) == whole.lamps.size();
+    device.lamps = {is_room ? whole.lamps.front() : whole.lamps[static_cast<std::size_t>(lamp)]};
+    device.lamps.front().power_W = is_room ? 0.0 : 1.0;
+    device.room_radiance = is_room ? 1.0 : 0.0;
     device.gel.youngs_modulus_MPa = modulus_of(whole);
     return device;
   }
@@ -90,6 +100,8 @@ struct UnitSimulation::Parts {
     settings.widest_mm = kWidest_mm;
     settings.membrane_um = fit.spec.membrane_um;
     settings.always_friction = true;
+    // With light from the room the whole device has bounced light (sim/plan), so each of its lamps has.
+    if (sources() > fit.device.lamps.size()) settings.interreflection_tolerance = 0.0;
     if (kept.size() == kSensorsKept) kept.erase(kept.begin());
     if (progress) progress("lamps' light", made, made + 1);
     kept.emplace_back(key, std::make_unique<const sim::VirtualSensor>(device_of_lamp(whole, lamp), cache, settings));
@@ -137,14 +149,16 @@ struct UnitSimulation::Parts {
     return kept.emplace(key, on.capture(object, pressed.press, 1, 0, false).light).first->second;
   }
 
-  /// All lamps' light, at their power.
+  /// All lamps' light and the room's, at their power.
   cv::Mat whole_light(const sim::DeviceSpec& whole, const Eigen::VectorXd& x, int press, const PressPose& pose) {
     cv::Mat sum;
-    for (std::size_t lamp = 0; lamp < whole.lamps.size(); ++lamp) {
+    for (std::size_t lamp = 0; lamp < sources(); ++lamp) {
       cv::Mat one;
       light(whole, x, static_cast<int>(lamp), press, pose).convertTo(one, CV_64F);
       const int bands = one.channels();
-      const render::Spectrum power = sim::in_bands(whole.lamps[lamp].power_W, bands_of(whole), "power_W");
+      const render::Spectrum power = lamp < whole.lamps.size()
+                                         ? sim::in_bands(whole.lamps[lamp].power_W, bands_of(whole), "power_W")
+                                         : sim::in_bands(whole.room_radiance, bands_of(whole), "room_radiance");
       for (int v = 0; v < one.rows; ++v) {
         double* at = one.ptr<double>(v);
         for (int i = 0; i < bands * one.cols; ++i) at[i] *= power[i % bands];

@@ -2,9 +2,10 @@
 // What a device with other numbers would have shown and measured of a fit's presses: quickly, by simulating anew only
 // what the numbers act on.
 //
-// Light is in proportion to each lamp's power, so each lamp is simulated alone, with 1 W in each band, and its pictures
-// are added up. What the imager makes of light is a formula. A gel of one material under a rigid body has the same
-// shape at the same depth whatever its modulus, and a force in proportion to it.
+// Light is in proportion to each lamp's power and to the room's radiance, so each is simulated alone, with 1 W (or 1
+// W/m^2/sr) in each band, and their pictures are added up. What the imager makes of light is a formula. A gel of one
+// material under a rigid body has the same shape at the same depth whatever its modulus, and a force in proportion to
+// it.
 
 #include <Eigen/Core>
 #include <filesystem>

@@ -281,6 +281,34 @@ void check_guide(const GuideLamp& guide, const Scene& fixture, const Eigen::Alig
        number);
 }
 
+Eigen::Vector3d nearest_in(const Eigen::AlignedBox3d& box, const Eigen::Vector3d& place) {
+  return place.cwiseMax(box.min()).cwiseMin(box.max());
+}
+
+/// How far a lamp's body stays from the box, mm; 0 or less where it may reach into it. Of a luminous rectangle, whose
+/// strip may lie close beside a wide box, by going to and fro between the two, which converges for convex bodies; of
+/// others by the sphere about them.
+double clearance(const Lamp& lamp, const Eigen::AlignedBox3d& box) {
+  const auto* area = std::get_if<AreaLamp>(&lamp);
+  if (area == nullptr) return box.exteriorDistance(lamp_position(lamp)) - lamp_extent(lamp);
+  constexpr int kMostSteps = 1000;
+  constexpr double kTouching = 1e-3;  // mm; converging slowly where they touch, steps end above 0
+  const Eigen::Vector3d out = area->direction.normalized();
+  const Eigen::Vector3d across = (area->along - area->along.dot(out) * out).normalized();
+  const Eigen::Vector3d up = out.cross(across);
+  Eigen::Vector3d place = area->centre;
+  for (int step = 0; step < kMostSteps; ++step) {
+    const Eigen::Vector3d from_centre = nearest_in(box, place) - area->centre;
+    const Eigen::Vector3d next = area->centre +
+                                 std::clamp(from_centre.dot(across), -0.5 * area->width, 0.5 * area->width) * across +
+                                 std::clamp(from_centre.dot(up), -0.5 * area->height, 0.5 * area->height) * up;
+    const bool settled = (next - place).norm() < 1e-9;
+    place = next;
+    if (settled) break;
+  }
+  return (place - nearest_in(box, place)).norm() - kTouching;
+}
+
 void check_reach(const Scene& fixture, const Eigen::AlignedBox3d& reach) {
   const Eigen::Vector3d size = reach.sizes();
   if (!reach.min().allFinite() || !reach.max().allFinite() || !(size.minCoeff() > 1e-6) || size.maxCoeff() > 1e5) {
@@ -301,7 +329,7 @@ void check_reach(const Scene& fixture, const Eigen::AlignedBox3d& reach) {
     }
     if (is_visible(fixture.lamps[i])) fail("light field: lamp {} is visible; such lamps are for the path tracer", i);
     const Eigen::Vector3d& middle = lamp_position(fixture.lamps[i]);
-    if (reach.exteriorDistance(middle) <= lamp_extent(fixture.lamps[i])) {
+    if (clearance(fixture.lamps[i], reach) <= 0.0) {
       fail("light field: lamp {} at ({}, {}, {}) reaches into the box; the field is endless there", i, middle.x(),
            middle.y(), middle.z());
     }

@@ -264,9 +264,14 @@ void plan_interreflection(const SceneSpec& scene, Plan& plan, PlanTable& table) 
   const std::string why = fmt::format(
       "{} of albedo {:.2g} gives itself {:.1f} % of its light back through the plate; allowed to leave out is {:.1f} %",
       device.coating ? "a coating" : "an object", albedo, 100 * gain, 100 * scene.light.interreflection_tolerance);
-  plan.interreflection = table.add(
-      "interreflection", scene.effects.interreflection, plan.scattering || gain > scene.light.interreflection_tolerance,
-      plan.scattering ? "light is scattered many times in a milky gel" : why, "3 to 5 times the rays");
+  // What the room sends onto a coating is light that only a bounce brings to the camera.
+  const bool lit_by_room = device.coating && device.room_radiance.largest() > 0.0;
+  plan.interreflection = table.add("interreflection", scene.effects.interreflection,
+                                   plan.scattering || lit_by_room || gain > scene.light.interreflection_tolerance,
+                                   plan.scattering ? "light is scattered many times in a milky gel"
+                                   : lit_by_room   ? "the room lights the coating"
+                                                   : why,
+                                   "3 to 5 times the rays");
 }
 
 void plan_print(const SceneSpec& scene, Plan& plan, PlanTable& table) {

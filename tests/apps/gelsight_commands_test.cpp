@@ -116,5 +116,16 @@ TEST_F(GelsightCommands, OtherMistakesAreRefused) {
       "isn't a height model");
 }
 
+TEST_F(GelsightCommands, ComparingRefusesADeviceWithAnotherPicture) {
+  folder_.write("cal/presses.csv", kHeader + lines_[0]);
+  const std::string device = std::string(TOUCHSTONE_SOURCE_DIR) + "/scenes/devices/gelsight-flat.yaml";
+  const std::vector<std::string> words = {"compare", device, in("cal"), "--mm-per-px", "0.053"};
+  test::expect_refused(run_program(words), "its camera has 320 x 240 pixels, the recording 120 x 90");
+  std::vector<std::string> learns = words;
+  learns.insert(learns.end(), {"--learn", "9.png"});
+  test::expect_refused(run_program(learns), "--learn: 9.png isn't a file of");
+  test::expect_refused(run_program({"compare", device, in("new"), "--mm-per-px", "0.053"}), "presses.csv");
+}
+
 }  // namespace
 }  // namespace touchstone

@@ -64,6 +64,7 @@ const test::TemporaryFolder& folder() {
   static const test::TemporaryFolder one;
   static const bool written = [] {
     one.write("device.yaml", kDevice);
+    one.write("lit-room.yaml", std::string(kDevice) + "room_radiance: [6, 5, 5.5]\n");
     one.write("ball.yaml", "name: ball\nshape: {type: sphere, radius_mm: 1.5}\nalbedo: 0.5\nfriction: 0.5\n");
     return true;
   }();
@@ -122,6 +123,31 @@ TEST(UnitSimulation, LampsOneByOneAddUpToAllOfThem) {
   EXPECT_NEAR(cv::mean(shown.background)[1], cv::mean(whole)[1], 0.01 * cv::mean(whole)[1]);
   const sim::TouchObject ball = sensor.object(fit.objects[0]);
   EXPECT_NEAR(shown.force_N[0], sensor.play(ball, straight_down()).back().press.wrench[2], 1e-6 * shown.force_N[0]);
+}
+
+TEST(UnitSimulation, TheRoomsLightIsAddedToTheLamps) {
+  UnitFitSpec spec = small_fit();
+  spec.device = folder().path() / "lit-room.yaml";
+  add_unknown(spec, "room_radiance", UnknownHow::times, 0.5, 2.0);
+  const PreparedFit fit = prepare_fit(spec);
+  const Eigen::VectorXd x = vector({std::log(1.5)});
+  UnitSimulation simulation(fit, cache());
+  const std::vector<PressPose> poses = {{{0, 0}, 0.4}, {{-1.0, 0.8}, 0.4}, {{1.0, -0.9}, 0.4}};
+  const SimulatedUnit shown = simulation.show(x, poses);
+  EXPECT_EQ(simulation.lamp_setups(), 4);
+  sim::VirtualSensorSettings settings;
+  settings.seed = 77;
+  settings.deepest_mm = 0.6;
+  settings.membrane_um = 120.0;
+  settings.always_friction = true;
+  const sim::VirtualSensor sensor(with_block_camera(device_at(fit, x), spec.coarse_px), cache(), settings);
+  const cv::Mat whole = mean_numbers(sensor.background_light(), simulation.imager(x));
+  EXPECT_LT(cv::norm(shown.background, whole, cv::NORM_L2) / cv::norm(whole, cv::NORM_L2), 0.02);
+  UnitFitSpec dark_spec = small_fit();
+  add_unknown(dark_spec, "lamps[*].power_W", UnknownHow::times, 0.5, 2.0, true);
+  const PreparedFit dark_fit = prepare_fit(dark_spec);
+  const cv::Mat dark = UnitSimulation(dark_fit, cache()).show(vector({0.0}), poses).background;
+  EXPECT_GT(cv::mean(shown.background - dark)[2], 0.05 * cv::mean(dark)[2]) << "the room is seen";
 }
 
 TEST(UnitPictures, MeanAndNoiseOfExposuresAreAsTheImagerHasThem) {
@@ -276,6 +302,37 @@ TEST(UnitFit, RefusesACameraThatSetsItself) {
                                std::string(kDevice) + "  auto_exposure: {time_constant_s: 1, mean_level: 0.2}\n");
   add_unknown(spec, "lamps[*].power_W", UnknownHow::times, 0.5, 2.0);
   EXPECT_THAT(message_of([&] { prepare_fit(spec); }), AllOf(HasSubstr("automatic.yaml"), HasSubstr("exposure")));
+}
+
+TEST(UnitFit, FindsLampsAndRoomByDifferencesToRest) {
+  UnitFitSpec spec = small_fit();
+  spec.device = folder().path() / "lit-room.yaml";
+  spec.differences = true;
+  add_unknown(spec, "lamps[*].power_W", UnknownHow::times, 0.5, 2.0);
+  add_unknown(spec, "room_radiance", UnknownHow::times, 0.3, 3.0);
+  const PreparedFit fit = prepare_fit(spec);
+  const Eigen::VectorXd hidden = hidden_unknowns(fit, 0.5, 3);
+  const RecordedUnit unit = record_unit(fit, hidden, 3, 3, cache());
+  const UnitFit found = fit_unit(unit.fit, unit.recording, cache());
+  EXPECT_TRUE(found.converged);
+  for (std::size_t k = 0; k < found.unknowns.size(); ++k) {
+    const double truth = hidden_value(fit, hidden, k);
+    EXPECT_NEAR(found.unknowns[k].value, truth, 0.1 * truth) << found.unknowns[k].name;
+  }
+  // A background's shape isn't looked at: a shade over it and the presses alike changes next to nothing.
+  RecordedUnit shaded = unit;
+  const auto shade = [](cv::Mat& mean) {
+    mean = mean.clone();
+    for (int v = 0; v < mean.rows; ++v) {
+      for (int u = 0; u < mean.cols; ++u) mean.at<cv::Vec3d>(v, u) += cv::Vec3d::all(u < mean.cols / 2 ? 8.0 : -8.0);
+    }
+  };
+  shade(shaded.recording.background.mean);
+  for (BlockPicture& press : shaded.recording.presses) shade(press.mean);
+  const UnitFit again = fit_unit(shaded.fit, shaded.recording, cache());
+  for (std::size_t k = 0; k < found.unknowns.size(); ++k) {
+    EXPECT_NEAR(again.unknowns[k].value, found.unknowns[k].value, 0.02 * found.unknowns[k].value);
+  }
 }
 
 TEST(UnitFit, SaysThatPowerAndExposureAreIdentifiedAsAProductOnly) {

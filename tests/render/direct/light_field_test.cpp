@@ -72,5 +72,29 @@ TEST(LightField, RefusesWhatItCannotHold) {
   EXPECT_THROW(make_light_field(sharp, reach, small), Error);
 }
 
+TEST(LightField, TakesAStripBesideItsBoxAndRefusesOneThatReachesIn) {
+  Scene scene = lit_stack(0.0);
+  const Eigen::AlignedBox3d reach = reach_of_membrane();
+  AreaLamp strip;
+  strip.width = 2.0 * reach.sizes().maxCoeff();  // its bounding sphere holds the box
+  strip.height = 1.0;
+  strip.along = {0, 1, 0};
+  strip.direction = {-1, 0, 0};
+  strip.centre = {reach.max().x() + 2.0, 0, 0.5 * (reach.min().z() + reach.max().z())};
+  strip.power_W = lamp_power(scene.lamps[0]);
+  scene.lamps = {strip};
+  EXPECT_LE(make_light_field(scene, reach, accuracy(2e-2)).error, 2e-2);
+  // Turned by 45 degrees about z it goes through the box's corner.
+  strip.along = {1, 1, 0};
+  strip.direction = {-1, 1, 0};
+  scene.lamps = {strip};
+  EXPECT_THROW(make_light_field(scene, reach, accuracy(2e-2)), Error);
+  strip.along = {0, 1, 0};
+  strip.direction = {-1, 0, 0};
+  strip.centre.x() = reach.max().x();
+  scene.lamps = {strip};
+  EXPECT_THROW(make_light_field(scene, reach, accuracy(2e-2)), Error) << "touches";
+}
+
 }  // namespace
 }  // namespace touchstone::render

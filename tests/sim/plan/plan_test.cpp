@@ -118,6 +118,17 @@ TEST(Plan, ATighterToleranceCallsForInterreflection) {
   EXPECT_TRUE(make_plan(scene).interreflection);
 }
 
+TEST(Plan, ARoomThatLightsACoatingCallsForInterreflection) {
+  SceneSpec scene;
+  scene.device = read_yaml<DeviceSpec>(std::string(TOUCHSTONE_SOURCE_DIR) + "/scenes/devices/gelsight-mini.yaml");
+  scene.object.shape.radius_mm = 2.0;
+  scene.light.interreflection_tolerance = 0.9;
+  EXPECT_TRUE(make_plan(scene).interreflection);
+  EXPECT_EQ(effect(make_plan(scene), "interreflection").why, "the room lights the coating");
+  scene.device.room_radiance = 0.0;
+  EXPECT_FALSE(make_plan(scene).interreflection);
+}
+
 // Side lengths are a slab's only; by them a coated dome or fingertip had no size and no light to give itself.
 TEST(Plan, ACoatedDomeAndFingertipGiveThemselvesLight) {
   const std::filesystem::path devices = std::filesystem::path(TOUCHSTONE_SOURCE_DIR) / "scenes/devices";
