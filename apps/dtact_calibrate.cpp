@@ -55,7 +55,7 @@ void calibrate(const CalibrateOptions& options) {
   sensors::save(result.model, options.out);
 
   for (std::size_t i = 0; i < presses.size(); ++i) {
-    const sensors::ContactCircle& circle = presses[i].circle;
+    const sensors::ContactCircle& circle = presses[i].circle.value();
     fmt::print("{}: contact {} ({:.2f}, {:.2f}), radius {:.2f} px; the ball is {:.3f} mm deep\n", presses[i].name,
                table[i].circle ? "at" : "found at", circle.centre.x(), circle.centre.y(), circle.radius,
                result.depths_mm[i]);

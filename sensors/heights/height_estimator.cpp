@@ -266,10 +266,10 @@ cv::Mat HeightEstimator::doubts(const cv::Mat& frame) {
       const Eigen::Matrix3f matrix = correction.at({u + 0.5, v + 0.5}).cast<float>();
       const Eigen::Vector3f colour = matrix * Eigen::Vector3f(pixel[0], pixel[1], pixel[2]);
       const int cut = saturated_channels(raw);
-      int bits = cut == 1 ? kSaturated : 0;
-      if (cut > 1 || (raw[0] | raw[1] | raw[2]) == 0) bits |= kLost;
-      if (!model_.table.measured_near(colour)) bits |= kUnseen;
-      if (std::hypot(result_.slope_u.at<float>(v, u), result_.slope_v.at<float>(v, u)) > steepest) bits |= kSteep;
+      int bits = cut == 1 ? kSlopeOfTwo : 0;
+      if (cut > 1 || (raw[0] | raw[1] | raw[2]) == 0) bits |= kSlopeLost;
+      if (!model_.table.measured_near(colour)) bits |= kSlopeUnseen;
+      if (std::hypot(result_.slope_u.at<float>(v, u), result_.slope_v.at<float>(v, u)) > steepest) bits |= kSlopeSteep;
       doubts.at<unsigned char>(v, u) = static_cast<unsigned char>(bits);
     }
   }
@@ -287,13 +287,13 @@ FrameCoverage HeightEstimator::coverage(const cv::Mat& frame) {
     for (int u = 0; u < difference.cols; ++u) {
       const auto& pixel = difference.at<cv::Vec3f>(v, u);
       const int doubt = bits.at<unsigned char>(v, u);
-      const bool hit = (doubt & kUnseen) == 0;
+      const bool hit = (doubt & kSlopeUnseen) == 0;
       measured += hit ? 1 : 0;
       if (std::abs(pixel[0]) + std::abs(pixel[1]) + std::abs(pixel[2]) > kClearly_DN) {
         ++clear;
         clear_measured += hit ? 1 : 0;
       }
-      steep += (doubt & kSteep) != 0 ? 1 : 0;
+      steep += (doubt & kSlopeSteep) != 0 ? 1 : 0;
     }
   }
   const auto share = [](std::int64_t part, std::int64_t whole) {

@@ -24,10 +24,10 @@ struct HeightSettings {
 
 /// Why a pixel's slope is to be doubted: bits of HeightEstimator::doubts.
 enum SlopeDoubt : std::uint8_t {
-  kSaturated = 1,  ///< one channel is at 255: the slope is from two
-  kLost = 2,       ///< two or three are, or all are 0
-  kUnseen = 4,     ///< calibration has seen no colour like this
-  kSteep = 8       ///< steeper than 99 % of the calibration's pixels
+  kSlopeOfTwo = 1,   ///< one channel is at 255: the slope is from two
+  kSlopeLost = 2,    ///< two or three are, or all are 0
+  kSlopeUnseen = 4,  ///< calibration has seen no colour like this
+  kSlopeSteep = 8    ///< steeper than 99 % of the calibration's pixels
 };
 
 /// What one frame gives. The images stay valid until the estimator's next frame.

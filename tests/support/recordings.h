@@ -6,7 +6,7 @@
 
 namespace touchstone::test {
 
-/// The folder of a sensor's recordings: in $TOUCHSTONE_RECORDINGS, or in shared/recordings beside the repository. It
+/// The folder of a sensor's recordings: in $TOUCHSTONE_RECORDINGS, or where they lie beside the repository. It
 /// may not be there.
 inline std::filesystem::path recordings_of(const char* sensor) {
   const char* const given = std::getenv("TOUCHSTONE_RECORDINGS");

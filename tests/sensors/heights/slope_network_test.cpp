@@ -202,10 +202,10 @@ TEST_F(OtherBalances, DoubtsAreToldPixelByPixel) {
   cv::rectangle(frame, cv::Rect(60, 20, 10, 10), cv::Scalar(255, 255, 60), cv::FILLED);
   cv::rectangle(frame, cv::Rect(100, 20, 10, 10), cv::Scalar(0, 0, 0), cv::FILLED);
   const cv::Mat doubts = estimator.doubts(frame);
-  EXPECT_EQ(doubts.at<unsigned char>(25, 25) & (kSaturated | kLost), kSaturated);
-  EXPECT_EQ(doubts.at<unsigned char>(25, 65) & (kSaturated | kLost), kLost);
-  EXPECT_EQ(doubts.at<unsigned char>(25, 105) & (kSaturated | kLost), kLost);
-  EXPECT_NE(doubts.at<unsigned char>(25, 65) & kUnseen, 0);
+  EXPECT_EQ(doubts.at<unsigned char>(25, 25) & (kSlopeOfTwo | kSlopeLost), kSlopeOfTwo);
+  EXPECT_EQ(doubts.at<unsigned char>(25, 65) & (kSlopeOfTwo | kSlopeLost), kSlopeLost);
+  EXPECT_EQ(doubts.at<unsigned char>(25, 105) & (kSlopeOfTwo | kSlopeLost), kSlopeLost);
+  EXPECT_NE(doubts.at<unsigned char>(25, 65) & kSlopeUnseen, 0);
   EXPECT_EQ(doubts.at<unsigned char>(100, 100), 0);
 }
 
