@@ -37,8 +37,8 @@ class GelsightCommands : public ::testing::Test {
     for (const sensors::BallPress& press : painter_.presses(2, 2, 1.0, 0.7)) {
       const std::string name = fmt::format("{}.png", number++);
       sim::write_png(folder_.path() / "cal" / name, press.frame);
-      lines_.push_back(
-          fmt::format("{},{},{},{},2\n", name, press.circle.centre.x(), press.circle.centre.y(), press.circle.radius));
+      lines_.push_back(fmt::format("{},{},{},{},2\n", name, press.circle->centre.x(), press.circle->centre.y(),
+                                   press.circle->radius));
     }
     sim::write_png(folder_.path() / "new/ball.png", painter_.press(ball_).frame);
     sim::write_png(folder_.path() / "new/dark.png", cv::Mat(90, 120, CV_8UC3, cv::Scalar(0, 0, 0)));
