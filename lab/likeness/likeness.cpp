@@ -23,7 +23,7 @@ namespace fs = std::filesystem;
 constexpr double kFriction = 0.5;         // of steel on silicone
 constexpr double kDeepestOfGel = 0.6;     // of its thickness
 constexpr double kScaleTolerance = 0.01;  // of mm/px
-constexpr double kLeastAlike = 0.42;      // of a frame's pixels with its rest; frames of other sensors have 0.35
+constexpr double kLeastAlike = 0.4;       // of a frame's pixels with its rest; frames of other sensors have 0.35
 constexpr double kTurnedMargin = 0.2;     // of correlation
 constexpr double kNearlyWhite = 249;
 

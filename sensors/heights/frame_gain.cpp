@@ -2,20 +2,22 @@
 
 #include <algorithm>
 #include <cmath>
+#include <opencv2/imgproc.hpp>
 
 #include "core/error.h"
 
 namespace touchstone::sensors {
 namespace {
 
-constexpr int kAsked = 20000;         // pixels of a frame
-constexpr float kDarkest_DN = 10.0F;  // a darker background has no ratio
+constexpr int kWindow = 7;             // px: means over it, since noise moves a dark pixel by more than kAlike
+constexpr int kAsked = 20000;          // pixels of a frame
+constexpr float kDarkest_DN = 8.0F;    // a darker background has no ratio
+constexpr float kWhitest_DN = 250.0F;  // means above it hold pixels that are cut off
 constexpr float kBrightest_DN = 200.0F;
 constexpr double kLeastCounting = 0.3;  // of the pixels count however bright they are
-constexpr int kBins = 400;              // of the ratio's logarithm,
+constexpr int kBins = 1000;             // of the ratio's logarithm,
 constexpr float kWidest = 1.0F;         // from -1 to 1: gains of 0.37 to 2.7
-constexpr float kBlur_bins = 4.0F;
-constexpr float kWindow = 0.04F;  // of the mean round the commonest
+constexpr float kBlur_bins = 5.0F;
 constexpr float kAlike = 0.08F;
 constexpr int kTooFew = 50;
 
@@ -27,9 +29,10 @@ float quantile(std::vector<float> values, double share) {
 
 }  // namespace
 
-GainFinder::GainFinder(const Background& background) {
-  const cv::Mat& mean = background.mean;
-  TS_ASSERT(mean.type() == CV_32FC3);
+GainFinder::GainFinder(const Background& background) : size_(background.mean.size()) {
+  TS_ASSERT(background.mean.type() == CV_32FC3);
+  cv::Mat mean;
+  cv::boxFilter(background.mean, mean, CV_32F, {kWindow, kWindow});
   std::array<float, 3> limit{};
   for (int c = 0; c < 3; ++c) {
     std::vector<float> values;
@@ -46,75 +49,72 @@ GainFinder::GainFinder(const Background& background) {
       for (std::size_t c = 0; c < 3; ++c) {
         const float value = rest[static_cast<int>(c)];
         sample.log_rest[c] = std::log(std::max(value, kDarkest_DN));
-        sample.counts[c] = value > kDarkest_DN && value <= limit[c];
+        sample.counts[c] = value >= kDarkest_DN && value <= limit[c];
       }
       samples_.push_back(sample);
     }
   }
-  for (int value = 0; value < 256; ++value) logs_.push_back(std::log(std::max(static_cast<float>(value), 1.0F)));
-  for (int i = -12; i <= 12; ++i) {
+  logs_.resize(samples_.size());
+  alike_.resize(samples_.size());
+  constexpr int kHalf = 15;
+  for (int i = -kHalf; i <= kHalf; ++i) {
     kernel_.push_back(std::exp(-0.5F * static_cast<float>(i * i) / (kBlur_bins * kBlur_bins)));
   }
   histogram_.resize(kBins);
   smooth_.resize(kBins);
 }
 
+double GainFinder::commonest() {
+  const int half = static_cast<int>(kernel_.size()) / 2;
+  for (int i = 0; i < kBins; ++i) {
+    float sum = 0.0F;
+    for (int j = std::max(0, i - half); j <= std::min(kBins - 1, i + half); ++j) {
+      sum += kernel_[static_cast<std::size_t>(j - i + half)] * histogram_[static_cast<std::size_t>(j)];
+    }
+    smooth_[static_cast<std::size_t>(i)] = sum;
+  }
+  const auto peak = static_cast<std::size_t>(std::max_element(smooth_.begin(), smooth_.end()) - smooth_.begin());
+  double shift = 0.0;  // of the parabola through the three bins about it
+  if (peak > 0 && peak + 1 < smooth_.size()) {
+    const auto left = static_cast<double>(smooth_[peak - 1]);
+    const auto right = static_cast<double>(smooth_[peak + 1]);
+    const double bend = left - 2.0 * static_cast<double>(smooth_[peak]) + right;
+    if (bend < 0.0) shift = 0.5 * (left - right) / bend;
+  }
+  return (static_cast<double>(peak) + 0.5 + shift) * (2.0 * static_cast<double>(kWidest) / kBins) -
+         static_cast<double>(kWidest);
+}
+
 FrameGain GainFinder::find(const cv::Mat& frame) {
-  TS_ASSERT(frame.type() == CV_8UC3);
+  TS_ASSERT(frame.type() == CV_8UC3 && frame.size() == size_);
+  cv::boxFilter(frame, smooth_frame_, CV_32F, {kWindow, kWindow});
   FrameGain found;
-  std::array<float, 3> log_gain{};
+  std::fill(alike_.begin(), alike_.end(), static_cast<unsigned char>(1));
   for (std::size_t c = 0; c < 3; ++c) {
     const auto channel = static_cast<int>(c);
-    const auto for_each_ratio = [&](auto use) {
-      for (const Sample& sample : samples_) {
-        const unsigned char value = frame.at<cv::Vec3b>(sample.v, sample.u)[channel];
-        if (sample.counts[c] && value > 0 && value < 255) use(logs_[value] - sample.log_rest[c]);
-      }
-    };
     std::fill(histogram_.begin(), histogram_.end(), 0.0F);
     int count = 0;
-    for_each_ratio([&](float ratio) {
-      const auto bin = static_cast<int>((ratio + kWidest) * (kBins / (2.0F * kWidest)));
-      if (bin < 0 || bin >= kBins) return;
+    for (std::size_t i = 0; i < samples_.size(); ++i) {
+      const Sample& sample = samples_[i];
+      const float value = smooth_frame_.at<cv::Vec3f>(sample.v, sample.u)[channel];
+      logs_[i] = std::log(std::max(value, kDarkest_DN)) - sample.log_rest[c];
+      if (!sample.counts[c] || value < kDarkest_DN || value > kWhitest_DN) continue;
+      const auto bin = static_cast<int>((logs_[i] + kWidest) * (kBins / (2.0F * kWidest)));
+      if (bin < 0 || bin >= kBins) continue;
       histogram_[static_cast<std::size_t>(bin)] += 1.0F;
       ++count;
-    });
-    if (count < kTooFew) continue;  // a gain of 1
-    const int half = static_cast<int>(kernel_.size()) / 2;
-    for (int i = 0; i < kBins; ++i) {
-      float sum = 0.0F;
-      for (int j = std::max(0, i - half); j <= std::min(kBins - 1, i + half); ++j) {
-        sum += kernel_[static_cast<std::size_t>(j - i + half)] * histogram_[static_cast<std::size_t>(j)];
-      }
-      smooth_[static_cast<std::size_t>(i)] = sum;
     }
-    const auto peak = std::max_element(smooth_.begin(), smooth_.end()) - smooth_.begin();
-    double at = (static_cast<double>(peak) + 0.5) * (2.0 * kWidest / kBins) - kWidest;
-    for (int pass = 0; pass < 3; ++pass) {
-      double sum = 0.0;
-      double near = 0.0;
-      for_each_ratio([&](float ratio) {
-        const bool within = std::abs(ratio - static_cast<float>(at)) < kWindow;
-        sum += within ? static_cast<double>(ratio) : 0.0;
-        near += within ? 1.0 : 0.0;
-      });
-      if (near > 0.0) at = sum / near;
+    const double log_gain = count < kTooFew ? 0.0 : commonest();
+    found.gain[channel] = std::exp(log_gain);
+    for (std::size_t i = 0; i < samples_.size(); ++i) {
+      const Sample& sample = samples_[i];
+      const float off = logs_[i] - static_cast<float>(log_gain);
+      const bool cut = smooth_frame_.at<cv::Vec3f>(sample.v, sample.u)[channel] > kWhitest_DN;
+      if (std::abs(off) > kAlike && !(cut && off < 0.0F)) alike_[i] = 0;
     }
-    log_gain[c] = static_cast<float>(at);
-    found.gain[channel] = std::exp(at);
   }
-  int alike = 0;
-  for (const Sample& sample : samples_) {
-    const auto& pixel = frame.at<cv::Vec3b>(sample.v, sample.u);
-    bool all = true;
-    for (std::size_t c = 0; c < 3; ++c) {
-      const unsigned char value = pixel[static_cast<int>(c)];
-      const float off = logs_[value] - log_gain[c] - sample.log_rest[c];
-      all = all && (std::abs(off) < kAlike || (value == 255 && off < 0.0F));  // or cut off
-    }
-    alike += all ? 1 : 0;
-  }
-  found.alike = static_cast<double>(alike) / static_cast<double>(samples_.size());
+  found.alike = static_cast<double>(std::count(alike_.begin(), alike_.end(), static_cast<unsigned char>(1))) /
+                static_cast<double>(samples_.size());
   return found;
 }
 

@@ -10,7 +10,7 @@
 namespace touchstone::sensors {
 namespace {
 
-constexpr double kLeastAlike = 0.42;
+constexpr double kLeastAlike = 0.4;
 constexpr double kGainsMove = 0.01;
 constexpr int kPressesToCompare = 3;
 constexpr std::size_t kPressesForNetwork = 5;

@@ -66,7 +66,7 @@ struct HeightCalibration {
 };
 
 /// Presses that can't be used are left out and named in HeightCalibration::presses, for what see_press and samples_of
-/// say, or because less than 0.42 of the picture is the untouched gel's, up to a gain: a frame of another sensor,
+/// say, or because less than 0.4 of the picture is the untouched gel's, up to a gain: a frame of another sensor,
 /// upside down, or of a contact that fills it. White balance is taken out if the gains of the others differ from 1 by
 /// more than 1 % (root mean square).
 /// @throws Error for a scale that isn't above zero, for no press, if none can be used, or as fit_lamps

@@ -63,7 +63,7 @@ class SlopeReader {
   int units_ = 0;
   std::vector<float> weights_;  ///< of each hidden unit: kInputs and its bias; then its weights in both outputs
   std::array<float, 2> bias_{};
-  std::vector<float> inputs_, hidden_;
+  std::vector<float> inputs_;
 };
 
 }  // namespace touchstone::sensors

@@ -102,9 +102,19 @@ TEST_F(GelsightCommands, TablesAreRefusedWithLineAndField) {
   refused(good + "1.png,,30,9,2\n", "table.csv:3: u_px: '' isn't a finite number");
   refused(good + "1.png,30,30,-9,2\n", "table.csv:3: radius_px: -9 must be above 0");
   refused(good + "1.png,30,30,9,0\n", "table.csv:3: ball_diameter_mm: 0 must be above 0");
-  refused(good + "1.png,5,30,9,2\n", "1.png: the press at (5.0, 30.0) of radius 9.0 px reaches over the edge");
-  refused(good + "rest.png,,,,2\n", "table.csv:3: rest.png: no contact is seen");
-  refused(good + "grey.png,60,40,9,2\n", "grey.png: the frame is grey");
+}
+
+TEST_F(GelsightCommands, PressesThatCantBeUsedAreLeftOutAndNamed) {
+  const ProgramRun run =
+      calibrate(kHeader + lines_[0] + "1.png,5,30,9,2\nrest.png,,,,2\ngrey.png,60,40,9,2\n", {"rest.png"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.out,
+              AllOf(HasSubstr("left out: 1.png: the press at (5.0, 30.0) of radius 9.0 px reaches over the edge"),
+                    HasSubstr("left out: rest.png: no contact is seen"),
+                    HasSubstr("left out: grey.png: the frame is grey"), HasSubstr("m.gel: 1 presses")));
+  fs::remove(in("m.gel"));
+  expect_refused(calibrate(kHeader + "rest.png,,,,2\ngrey.png,60,40,9,2\n", {"rest.png"}),
+                 "none of 2 ball presses can be used; the first: rest.png: no contact is seen");
 }
 
 TEST_F(GelsightCommands, OtherMistakesAreRefused) {
