@@ -16,7 +16,7 @@ class MonotoneCurve {
   /// @throws Error for fewer than two points, numbers that aren't finite, or an x that isn't above the one before it
   explicit MonotoneCurve(const std::vector<Eigen::Vector2d>& points);
 
-  double at(double x) const;
+  double at(double x) const;  ///< the curve's y there
   const std::vector<Eigen::Vector2d>& points() const { return points_; }
 
  private:

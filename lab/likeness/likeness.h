@@ -83,9 +83,11 @@ Likeness compare_likeness(const sim::DeviceSpec& device, const BallRecording& re
 
 /// Mean and range over presses that weren't learned (over all, if all were).
 struct LikenessSummary {
+  /// Of one measure.
   struct Range {
     double mean = 0.0, low = 0.0, high = 0.0;
   };
+  /// Of one way to make the pictures.
   struct Of {
     std::string what;  ///< "device", "device, raw", "rest alone", "table of slopes"
     Range psnr, ssim, inside, ring;
@@ -93,6 +95,7 @@ struct LikenessSummary {
   int presses = 0;
   std::vector<Of> rows;
 };
+/// @pre there is a press
 LikenessSummary summary_of(const Likeness& likeness);
 
 /// The summary as a table for people.

@@ -23,6 +23,7 @@ struct FrameGain {
 /// once for a background; then a frame of 320 x 240 costs 0.8 ms. Not for two threads at once.
 class GainFinder {
  public:
+  /// @pre the background's mean is CV_32FC3
   explicit GainFinder(const Background& background);
 
   /// @pre frame is CV_8UC3 of the background's size

@@ -113,7 +113,7 @@ TEST_F(GelsightCommands, PressesThatCantBeUsedAreLeftOutAndNamed) {
                     HasSubstr("left out: rest.png: no contact is seen"),
                     HasSubstr("left out: grey.png: the frame is grey"), HasSubstr("m.gel: 1 presses")));
   fs::remove(in("m.gel"));
-  expect_refused(calibrate(kHeader + "rest.png,,,,2\ngrey.png,60,40,9,2\n", {"rest.png"}),
+  expect_refused(calibrate(std::string(kHeader) + "rest.png,,,,2\ngrey.png,60,40,9,2\n", {"rest.png"}),
                  "none of 2 ball presses can be used; the first: rest.png: no contact is seen");
 }
 

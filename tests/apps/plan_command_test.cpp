@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <filesystem>
 #include <map>
-#include <set>
 
 #include "core/whole_file.h"
 #include "tests/apps/run_program.h"
@@ -43,12 +42,11 @@ std::size_t count_of(const std::string& text, const std::string& part) {
 }
 
 TEST(PlanCommand, PlansEachShippedFileThatSaysWhatWillBeSimulated) {
-  const std::set<fs::path> devices_beside = {kScenes / "studies" / "chroma-gel.yaml",
-                                             kScenes / "gelsight" / "webcam-device.yaml"};
+  const fs::path device_beside_studies = kScenes / "studies" / "chroma-gel.yaml";
   int planned = 0;
   for (const char* folder : {"jobs", "studies", "chroma", "gelsight", "vhs"}) {
     for (const fs::path& file : yaml_files_in(kScenes / folder)) {
-      if (devices_beside.count(file) > 0) continue;
+      if (file == device_beside_studies) continue;
       const ProgramRun run = run_program({"--quiet", "plan", file.string()});
       EXPECT_EQ(run.exit_code, 0) << file << ": " << run.err;
       EXPECT_EQ(run.err, "") << file;

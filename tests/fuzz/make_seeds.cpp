@@ -147,6 +147,10 @@ HeightModel height() {
   model.table.step = 2.0F;
   model.table.slopes.assign(2, Eigen::Vector2f::Zero());
   model.table.hits.assign(2, 1);
+  model.white_balance = true;
+  RandomStream random(1, 0, Purpose::kTest);
+  model.network = SlopeNetwork{
+      random_network({.inputs = SlopeNetwork::kInputs, .hidden_layers = 1, .units = 1, .outputs = 2}, random)};
   model.steepest_calibrated = 0.5;
   model.presses = 1;
   return model;

@@ -21,8 +21,8 @@ def touched(request):
     return request.param, sensor, sensor.press("ball-8mm", force_N=FORCE_N)
 
 
-def test_there_are_ten():
-    assert len(DEVICES) == 10
+def test_there_are_twelve():
+    assert len(DEVICES) == 12
 
 
 def test_a_ball_makes_a_frame_with_its_force(touched):
