@@ -22,7 +22,8 @@ namespace touchstone::render {
 /// imager's own exposure; how it clips at another exposure is worked out from it.
 struct Metering {
   static constexpr int kBins = 512;
-  struct Bin {  ///< of levels
+  /// Pixels whose levels lie close together.
+  struct Bin {
     double count = 0.0;
     double level = 0.0;  ///< mean
   };

@@ -108,6 +108,8 @@ FrameGain GainFinder::find(const cv::Mat& frame) {
     found.gain[channel] = std::exp(log_gain);
     for (std::size_t i = 0; i < samples_.size(); ++i) {
       const Sample& sample = samples_[i];
+      // What rest and gain make too dark can't be judged.
+      if (sample.log_rest[c] + static_cast<float>(std::min(log_gain, 0.0)) <= std::log(kDarkest_DN)) continue;
       const float off = logs_[i] - static_cast<float>(log_gain);
       const bool cut = smooth_frame_.at<cv::Vec3f>(sample.v, sample.u)[channel] > kWhitest_DN;
       if (std::abs(off) > kAlike && !(cut && off < 0.0F)) alike_[i] = 0;

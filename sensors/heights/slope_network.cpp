@@ -101,7 +101,9 @@ Neighbourhoods::Neighbourhoods(const cv::Size& size, double mm_per_px, const std
     Scale& scale = scales_[i];
     scale.small = {std::max(1, static_cast<int>(std::lround(size.width / shrink))),
                    std::max(1, static_cast<int>(std::lround(size.height / shrink)))};
-    scale.sigma = sigma / shrink;
+    // Shrinking takes means over a pixel (variance 1/12), and the way back is linear (1/6).
+    const double spread = sigma / shrink;
+    scale.sigma = shrink > 1.0 ? std::sqrt(spread * spread - 0.25) : spread;
   }
 }
 
