@@ -13,6 +13,7 @@
 #include "lab/gelsight/ball_press_table.h"
 #include "lab/likeness/contact_depth.h"
 #include "lab/likeness/slope_colours.h"
+#include "render/imager/tone_curve.h"
 #include "sim/sensor/virtual_sensor.h"
 
 namespace touchstone::lab {
@@ -26,6 +27,7 @@ constexpr double kScaleTolerance = 0.01;  // of mm/px
 constexpr double kLeastAlike = 0.4;       // of a frame's pixels with its rest; frames of other sensors have 0.35
 constexpr double kTurnedMargin = 0.2;     // of correlation
 constexpr double kNearlyWhite = 249;
+constexpr double kFullScale = 255;
 
 cv::Mat as_float(const cv::Mat& picture) {
   cv::Mat out;
@@ -125,18 +127,75 @@ struct KnownBall {
 };
 
 /// The device's side of one press.
-void simulate(const sim::VirtualSensor& sensor, const KnownBall& ball, const sensors::BallPress& press,
-              double deepest_mm, PressLikeness& row, cv::Mat& height) {
+sim::Touch simulate(const sim::VirtualSensor& sensor, const KnownBall& ball, const sensors::BallPress& press,
+                    double deepest_mm, PressLikeness& row) {
   const std::optional<double> depth = ball.depths.depth_of(press.circle->radius);
   row.shallow = !depth.has_value();
   row.depth_mm = depth.value_or(deepest_mm);
   sim::PressSpec how;
   how.place_mm = row.place_mm = sensor.gel_from_pixel(press.circle->centre);
   how.depth_mm = row.depth_mm;
-  const sim::Touch touch = sensor.press(ball.object, how);
+  sim::Touch touch = sensor.press(ball.object, how);
   row.simulated_radius_px = std::sqrt(cv::countNonZero(touch.contact) / kPi);
   row.simulated_frame = sensor.ideal(ball.object, touch);
-  height = touch.height;
+  return touch;
+}
+
+/// Delivered numbers (CV_32FC3, blue, green, red, of 255) in linear ones, red, green, blue.
+cv::Mat linear_of_delivered(const cv::Mat& numbers, const render::ToneCurve& curve) {
+  const bool is_linear = std::holds_alternative<render::LinearTone>(curve);
+  cv::Mat out(numbers.size(), CV_32FC3);
+  for (int v = 0; v < numbers.rows; ++v) {
+    for (int u = 0; u < numbers.cols; ++u) {
+      const cv::Vec3f from = numbers.at<cv::Vec3f>(v, u);
+      for (int c = 0; c < 3; ++c) {
+        const double number = from[2 - c];
+        out.at<cv::Vec3f>(v, u)[c] = static_cast<float>(
+            is_linear ? number : kFullScale * render::linear_of(curve, std::clamp(number / kFullScale, 0.0, 1.0)));
+      }
+    }
+  }
+  return out;
+}
+
+/// What a press tells a residual map.
+ResidualSample residual_sample(const sim::VirtualSensor& sensor, const sim::Touch& touch,
+                               const sensors::BallPress& press, const BallRecording& recording,
+                               const cv::Mat& balanced) {
+  const render::ToneCurve& curve = sensor.device().camera->tone_curve;
+  ResidualSample sample;
+  sample.name = press.name;
+  sample.height = touch.height;
+  sample.missing = linear_of_delivered(balanced, curve) - linear_of_delivered(recording.rest.mean, curve) -
+                   (sensor.linear_numbers(touch.light) - sensor.linear_numbers(sensor.background_light()));
+  cv::Mat colours;
+  cv::cvtColor(press.frame, colours, cv::COLOR_BGR2RGB);
+  cv::threshold(colours, sample.saturated, kNearlyWhite, 255, cv::THRESH_BINARY);
+  return sample;
+}
+
+/// The device with a residual map: fills in `residual` and `corrected` of all rows. `rest`: the device's ideal one.
+void compare_residual(const sim::VirtualSensor& sensor, const sim::ResidualMap& map, const BallRecording& recording,
+                      const std::vector<sim::Touch>& touches, const std::map<double, KnownBall>& balls,
+                      const cv::Mat& rest, Likeness& likeness) {
+  likeness.residual = sim::in_words(map);
+  for (std::size_t i = 0; i < touches.size(); ++i) {
+    const sensors::BallPress& press = recording.presses[i];
+    sim::Touch touch = touches[i];
+    touch.light = sensor.with_residual(map, touch.light, touch.height);
+    PressLikeness& row = likeness.presses[i];
+    row.corrected = as_float(sensor.ideal(balls.at(press.ball_radius_mm).object, touch)) - rest;
+    row.residual = likeness_of(row.recorded, row.corrected, *press.circle);
+  }
+}
+
+/// For ResidualMap::about.
+std::string about_recording(const LikenessSpec& spec, const std::string& device) {
+  const fs::path folder = fs::is_directory(spec.recording) ? spec.recording : spec.recording.parent_path();
+  std::string names;
+  for (const std::string& name : spec.learn) names += (names.empty() ? "" : ", ") + name;
+  return fmt::format("presses {} of the recording {}, pressed into {}", names,
+                     fs::weakly_canonical(folder).filename().string(), device);
 }
 
 double median(std::vector<double> values) {
@@ -190,9 +249,15 @@ BallRecording read_ball_recording(const LikenessSpec& spec) {
   return recording;
 }
 
-Likeness compare_likeness(const sim::DeviceSpec& device, const BallRecording& recording, const LikenessSpec& spec,
+Likeness compare_likeness(const sim::DeviceSpec& given, const BallRecording& recording, const LikenessSpec& spec,
                           const fs::path& cache_folder, const Progress& progress) {
-  check_camera(device, recording);
+  check_camera(given, recording);
+  if (spec.residual && static_cast<int>(spec.learn.size()) < kFewestResidualPresses) {
+    fail("--residual: {} presses by --learn; a residual map takes at least {}", spec.learn.size(),
+         kFewestResidualPresses);
+  }
+  sim::DeviceSpec device = given;
+  device.residual = nullptr;  // its light is added afterwards, so that both can be compared
   sim::VirtualSensorSettings settings;
   settings.seed = spec.seed;
   settings.deepest_mm = spec.deepest_mm.value_or(kDeepestOfGel * device.gel.thickness_mm);
@@ -206,6 +271,9 @@ Likeness compare_likeness(const sim::DeviceSpec& device, const BallRecording& re
   likeness.light = sensor.light().reason;
   std::vector<double> seconds;
   std::vector<cv::Mat> slopes;
+  std::vector<sim::Touch> touches;
+  std::vector<ResidualSample> samples;
+  const bool corrects = spec.residual || given.residual;
   Orientation orientation;
   cv::Mat rest;
   for (std::size_t i = 0; i < recording.presses.size(); ++i) {
@@ -226,9 +294,8 @@ Likeness compare_likeness(const sim::DeviceSpec& device, const BallRecording& re
     row.learned = recording.learned[i];
     row.radius_px = press.circle->radius;
     row.gain = recording.gains[i].gain;
-    cv::Mat height;
     const auto start = std::chrono::steady_clock::now();
-    simulate(sensor, known->second, press, settings.deepest_mm, row, height);
+    const sim::Touch touch = simulate(sensor, known->second, press, settings.deepest_mm, row);
     seconds.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
     row.recorded = sensors::difference_to(recording.rest, press.frame, row.gain);
     const cv::Mat frame = row.recorded + recording.rest.mean;
@@ -240,13 +307,24 @@ Likeness compare_likeness(const sim::DeviceSpec& device, const BallRecording& re
     row.raw = likeness_of(as_float(press.frame) - recording.rest.mean, row.simulated, *press.circle);
     row.rest = likeness_of(row.recorded, cv::Mat::zeros(row.recorded.size(), CV_32FC3), *press.circle);
     orientation.add(row.recorded, row.simulated, *press.circle);
-    slopes.push_back(slopes_of(height, recording.mm_per_px));
+    slopes.push_back(slopes_of(touch.height, recording.mm_per_px));
+    if (spec.residual && row.learned) {
+      samples.push_back(residual_sample(sensor, touch, press, recording, row.recorded + recording.rest.mean));
+    }
+    if (corrects) touches.push_back(touch);
     likeness.presses.push_back(std::move(row));
     if (progress)
       progress("presses", static_cast<std::int64_t>(i + 1), static_cast<std::int64_t>(recording.presses.size()));
   }
   orientation.check(device.name);
   if (!spec.learn.empty()) compare_table(recording, slopes, likeness);
+  if (spec.residual) {
+    likeness.made_residual = fit_residual(samples, recording.mm_per_px, about_recording(spec, device.name));
+  }
+  if (corrects) {
+    const sim::ResidualMap& map = spec.residual ? likeness.made_residual->map : *given.residual;
+    compare_residual(sensor, map, recording, touches, balls, rest, likeness);
+  }
   likeness.seconds_a_press = median(seconds);
   return likeness;
 }

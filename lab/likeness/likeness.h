@@ -11,6 +11,7 @@
 
 #include "core/progress.h"
 #include "lab/likeness/picture_measures.h"
+#include "lab/likeness/residual_fit.h"
 #include "sensors/heights/background.h"
 #include "sensors/heights/ball_press.h"
 #include "sensors/heights/frame_gain.h"
@@ -26,6 +27,7 @@ struct LikenessSpec {
   std::vector<std::string> learn;           ///< `file` of presses that the device was fitted to
   std::optional<double> deepest_mm;         ///< how deep a press may be; absent: 0.6 of the gel's thickness
   std::uint64_t seed = 1;                   ///< of the simulated light
+  bool residual = false;                    ///< a residual map is made of the learned presses
 };
 
 /// A recording, read and checked by itself.
@@ -60,24 +62,29 @@ struct PressLikeness {
   cv::Vec3d gain;        ///< B, G, R
   // Each against the recorded difference with its colours balanced, but for `raw`.
   PictureLikeness device, raw, rest;
-  std::optional<PictureLikeness> table;  ///< where presses were learned
-  cv::Mat recorded, simulated;           ///< difference pictures, CV_32FC3, balanced
-  cv::Mat frame, simulated_frame;        ///< CV_8UC3, the recorded one balanced
-  cv::Mat fit_frame;                     ///< as `frame`, but 255 where the recorded number was 250 or more
+  std::optional<PictureLikeness> residual;  ///< where there is a residual map: the device with it
+  std::optional<PictureLikeness> table;     ///< where presses were learned
+  cv::Mat recorded, simulated;              ///< difference pictures, CV_32FC3, balanced
+  cv::Mat corrected;                        ///< as `simulated`, with the residual map; empty without
+  cv::Mat frame, simulated_frame;           ///< CV_8UC3, the recorded one balanced
+  cv::Mat fit_frame;                        ///< as `frame`, but 255 where the recorded number was 250 or more
 };
 
 /// All presses.
 struct Likeness {
   std::string device;
   std::vector<PressLikeness> presses;
-  double seconds_a_press = 0.0;  ///< mechanics and light, median
-  std::string light;             ///< how pictures were lit
+  double seconds_a_press = 0.0;              ///< mechanics and light, median
+  std::string light;                         ///< how pictures were lit
+  std::optional<ResidualFit> made_residual;  ///< where one was asked for
+  std::string residual;                      ///< what residual map was used, for people; empty for none
 };
 
-/// Presses and compares. The simulated frames are without noise.
+/// Presses and compares. The simulated frames are without noise. A device's own residual map is left out of `device`
+/// and taken for `residual`, but where a new one is made.
 /// @throws Error for a device whose camera has another size, another kind of picture, or more than 1 % other mm/px than
 /// the recording; for a press whose circle's middle isn't over the device's gel; where the recording turned by 180
-/// degrees or mirrored is more like the device
+/// degrees or mirrored is more like the device; for a residual map of fewer than kFewestResidualPresses presses
 Likeness compare_likeness(const sim::DeviceSpec& device, const BallRecording& recording, const LikenessSpec& spec,
                           const std::filesystem::path& cache_folder, const Progress& progress = {});
 
@@ -89,7 +96,7 @@ struct LikenessSummary {
   };
   /// Of one way to make the pictures.
   struct Of {
-    std::string what;  ///< "device", "device, raw", "rest alone", "table of slopes"
+    std::string what;  ///< "device", "device with residual", "device, raw", "rest alone", "table of slopes"
     Range psnr, ssim, inside, ring;
   };
   int presses = 0;

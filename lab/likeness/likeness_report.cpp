@@ -23,10 +23,12 @@ struct Way {
 };
 
 std::vector<Way> ways() {
-  return {{"device", [](const PressLikeness& press) { return &press.device; }},
-          {"device, raw", [](const PressLikeness& press) { return &press.raw; }},
-          {"rest alone", [](const PressLikeness& press) { return &press.rest; }},
-          {"table of slopes", [](const PressLikeness& press) { return press.table ? &*press.table : nullptr; }}};
+  return {
+      {"device", [](const PressLikeness& press) { return &press.device; }},
+      {"device with residual", [](const PressLikeness& press) { return press.residual ? &*press.residual : nullptr; }},
+      {"device, raw", [](const PressLikeness& press) { return &press.raw; }},
+      {"rest alone", [](const PressLikeness& press) { return &press.rest; }},
+      {"table of slopes", [](const PressLikeness& press) { return press.table ? &*press.table : nullptr; }}};
 }
 
 LikenessSummary::Range range_of(const std::vector<double>& values) {
@@ -79,11 +81,11 @@ LikenessSummary summary_of(const Likeness& likeness) {
 }
 
 std::string to_text(const LikenessSummary& summary) {
-  std::string text = fmt::format("{:<16} {:>22} {:>24} {:>20} {:>20}\n", fmt::format("{} presses", summary.presses),
+  std::string text = fmt::format("{:<20} {:>22} {:>24} {:>20} {:>20}\n", fmt::format("{} presses", summary.presses),
                                  "PSNR, dB", "SSIM", "inside, of 255", "ring, of 255");
   for (const LikenessSummary::Of& row : summary.rows) {
     text += fmt::format(
-        "{:<16} {:6.2f} ({:5.2f} to {:5.2f}) {:7.4f} ({:.4f}-{:.4f}) {:6.2f} ({:4.1f} to {:4.1f}) "
+        "{:<20} {:6.2f} ({:5.2f} to {:5.2f}) {:7.4f} ({:.4f}-{:.4f}) {:6.2f} ({:4.1f} to {:4.1f}) "
         "{:6.2f} ({:4.1f} to {:4.1f})\n",
         row.what, row.psnr.mean, row.psnr.low, row.psnr.high, row.ssim.mean, row.ssim.low, row.ssim.high,
         row.inside.mean, row.inside.low, row.inside.high, row.ring.mean, row.ring.low, row.ring.high);
@@ -120,6 +122,7 @@ std::string to_csv(const Likeness& likeness) {
 cv::Mat likeness_sheet(const Likeness& likeness) {
   std::vector<cv::Mat> images;
   std::vector<std::string> captions;
+  const bool corrected = !likeness.residual.empty();
   for (const PressLikeness& press : likeness.presses) {
     images.insert(images.end(), {press.frame, press.simulated_frame, on_grey(press.recorded, 1.0),
                                  on_grey(press.simulated, 1.0), on_grey(press.simulated - press.recorded, kEnlarged)});
@@ -128,8 +131,13 @@ cv::Mat likeness_sheet(const Likeness& likeness) {
                      fmt::format("{}, {:.2f} mm deep", likeness.device, press.depth_mm), "recorded less rest",
                      fmt::format("simulated: {:.1f} dB, SSIM {:.3f}", press.device.psnr, press.device.ssim),
                      fmt::format("simulated less recorded, x {:.0f}", kEnlarged)});
+    if (!corrected) continue;
+    images.insert(images.end(), {on_grey(press.corrected, 1.0), on_grey(press.corrected - press.recorded, kEnlarged)});
+    captions.insert(captions.end(),
+                    {fmt::format("with residual: {:.1f} dB, SSIM {:.3f}", press.residual->psnr, press.residual->ssim),
+                     fmt::format("the same less recorded, x {:.0f}", kEnlarged)});
   }
-  return datasets::contact_sheet(images, captions, 5, kTileWidth_px);
+  return datasets::contact_sheet(images, captions, corrected ? 7 : 5, kTileWidth_px);
 }
 
 void write_likeness(const Likeness& likeness, const std::filesystem::path& folder) {

@@ -259,6 +259,7 @@ const std::vector<Kind>& kinds() {
       {"study", schema_of<StudySpec>},
       {"palpation", schema_of<PalpationSpec>},
       {"fit", schema_of<UnitFitSpec>},
+      {"residual", schema_of<sim::ResidualMap>},
   };
   return all;
 }

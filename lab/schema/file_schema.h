@@ -8,7 +8,7 @@
 
 namespace touchstone::lab {
 
-/// The kinds of files: device, object, motion, scene, job, study, palpation, fit.
+/// The kinds of files: device, object, motion, scene, job, study, palpation, fit, residual (map).
 std::vector<std::string> file_kinds();
 
 /// The schema of one kind, as text. The same bytes each time. @throws Error for a kind that isn't known

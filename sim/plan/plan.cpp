@@ -351,6 +351,10 @@ void plan_light(const SceneSpec& scene, Plan& plan, PlanTable& table) {
   plan_print(scene, plan, table);
   plan_interreflection(scene, plan, table);
   plan_bands(scene, plan, table);
+  if (scene.device.residual) {
+    table.add("residual map", true, in_words(*scene.device.residual),
+              "a ray a pixel, and two exponentials for each of its centres");
+  }
   const bool noise = scene.outputs.frames;
   plan.sensor_noise =
       table.add("sensor noise", scene.effects.sensor_noise, noise,

@@ -436,6 +436,36 @@ void fields(YamlReader& in, CameraSpec& camera) {
   check_optics(in, camera);
 }
 
+namespace {
+
+void add_residual(DeviceSpec& device, const std::filesystem::path& file, const SourceLocation& where) {
+  std::shared_ptr<const ResidualMap> map;
+  try {
+    map = std::make_shared<const ResidualMap>(read_residual_map(file));
+  } catch (const Error& error) {
+    fail_at(where, "residual: {}", error.what());
+  }
+  try {
+    set_residual(device, std::move(map));
+  } catch (const Error& error) {
+    fail_at(where, "residual: {}: {}", file.string(), error.what());
+  }
+}
+
+}  // namespace
+
+void set_residual(DeviceSpec& device, std::shared_ptr<const ResidualMap> map) {
+  if (!device.coating) fail("is for coated gels, and the device has no coating");
+  if (!device.camera) fail("needs a camera, and the device has none");
+  const CameraSpec& camera = *device.camera;
+  if (camera.bayer == render::BayerPattern::none) fail("is of red, green and blue, and the device's camera is grey");
+  if (camera.width != map->width_px || camera.height != map->height_px) {
+    fail("is of {} x {} pixels, and the device's camera has {} x {}", map->width_px, map->height_px, camera.width,
+         camera.height);
+  }
+  device.residual = std::move(map);
+}
+
 void fields(YamlReader& in, DeviceSpec& device) {
   device.where = in.where();
   in.required("name", device.name);
@@ -452,6 +482,8 @@ void fields(YamlReader& in, DeviceSpec& device) {
   in.optional("room_radiance", device.room_radiance, Allowed::at_least(0.0));
   in.optional("room_radiance_behind", device.room_radiance_behind, Allowed::at_least(0.0));
   in.optional("camera", device.camera);
+  std::string residual;
+  in.optional("residual", residual);
   if (in.describing()) return;  // there is nothing to check
   if (std::ranges::find(render::kBandCounts, static_cast<int>(device.band_wavelengths_nm.size())) ==
       render::kBandCounts.end()) {
@@ -465,6 +497,7 @@ void fields(YamlReader& in, DeviceSpec& device) {
     check_camera_outside(device, in.where("camera"));
   }
   check_lamps_outside(device, in.where("lamps"));
+  if (in.has("residual")) add_residual(device, in.folder() / residual, in.where("residual"));
 }
 
 DeviceSpec read_device(const std::filesystem::path& file) {

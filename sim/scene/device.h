@@ -17,6 +17,7 @@
 #include "sim/files/colour.h"
 #include "sim/scene/device_lamps.h"
 #include "sim/scene/event_camera_spec.h"
+#include "sim/scene/residual_map.h"
 
 namespace touchstone::render {
 EnumNames<BayerPattern> enum_names(BayerPattern);  // of the field `camera.bayer`
@@ -253,6 +254,7 @@ struct DeviceSpec {
   Colour room_radiance = 0.0;                                 ///< W/m^2/sr in each band
   std::optional<Colour> room_radiance_behind;                 ///< of what is behind a clear gel; absent: the same
   std::optional<CameraSpec> camera;
+  std::shared_ptr<const ResidualMap> residual;  ///< in the file its name, relative to the device file; null: none
   SourceLocation where;
 };
 
@@ -273,6 +275,9 @@ void fields(YamlReader& in, BandsSpec& bands);
 void fields(YamlReader& in, MotionChipSpec& chip);
 void fields(YamlReader& in, CameraSpec& camera);
 void fields(YamlReader& in, DeviceSpec& device);
+
+/// Gives the device a residual map. @throws Error if it has no coating or colour camera, or another size of picture
+void set_residual(DeviceSpec& device, std::shared_ptr<const ResidualMap> map);
 
 /// Reads and checks a device file. @throws Error with file and line
 DeviceSpec read_device(const std::filesystem::path& file);

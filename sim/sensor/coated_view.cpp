@@ -1,6 +1,5 @@
 #include "sim/sensor/coated_view.h"
 
-#include <limits>
 #include <utility>
 #include <vector>
 
@@ -12,8 +11,10 @@
 #include "sim/press/play_motion.h"
 #include "sim/scene/device_camera.h"
 #include "sim/scene/device_gel.h"
+#include "sim/scene/device_imager.h"
 #include "sim/sensor/direct_light.h"
 #include "sim/sensor/light_file.h"
+#include "sim/sensor/residual_light.h"
 #include "sim/sensor/virtual_sensor.h"
 #include "sim/view/seen_geometry.h"
 
@@ -143,6 +144,10 @@ class CoatedView final : public SensorView {
       choice_ = direct_->choice();
     }
     rest_light_ = light(*judged_, rest_, {}, rest_seen_);
+    if (device_.residual) {
+      lacking_.emplace(*device_.residual, imager(device_, judged_->plan.bands, false));
+      choice_.reason += "; residual map: " + in_words(*device_.residual);
+    }
   }
 
   const Plan& plan() const override { return judged_->plan; }
@@ -155,16 +160,17 @@ class CoatedView final : public SensorView {
     const SeenGeometry seen = view.geometry(press, relief);
     SeenTouch touch;
     touch.light = light(view, press, relief, seen);
-    if (!truth) return touch;
+    if (!truth && !lacking_) return touch;
     const std::vector<render::FirstHit> hits = render::first_hits(seen.inside, ready_);
-    const Eigen::Vector2i size = render::size_of(camera_);
-    touch.height = cv::Mat(size.y(), size.x(), CV_32F, cv::Scalar(std::numeric_limits<float>::quiet_NaN()));
-    touch.contact = cv::Mat(size.y(), size.x(), CV_8U, cv::Scalar(0));
+    const cv::Mat height = pressed_in(rest_hits_, hits, touch.light.size());
+    if (lacking_) touch.light = lacking_->corrected(touch.light, height);
+    if (!truth) return touch;
+    touch.height = height;
+    touch.contact = cv::Mat(height.size(), CV_8U, cv::Scalar(0));
     for (std::size_t i = 0; i < hits.size(); ++i) {
       const render::FirstHit& now = hits[i];
       const render::FirstHit& before = rest_hits_[i];
       if (now.object != 0 || before.object != 0) continue;
-      touch.height.ptr<float>()[i] = static_cast<float>(before.position.z() - now.position.z());
       if (seen.sheet.touched[static_cast<std::size_t>(now.triangle)] >= 0) touch.contact.ptr<std::uint8_t>()[i] = 255;
     }
     return touch;
@@ -222,6 +228,7 @@ class CoatedView final : public SensorView {
   std::unique_ptr<const DirectLight> direct_;
   LightChoice choice_{false, "paths: the device is unfit for direct light", {}};
   cv::Mat rest_light_;
+  std::optional<ResidualLight> lacking_;  // none at rest
 };
 
 }  // namespace

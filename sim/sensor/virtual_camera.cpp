@@ -8,6 +8,7 @@
 #include <map>
 #include <opencv2/imgproc.hpp>
 
+#include "core/locked_work.h"
 #include "core/random.h"
 #include "core/random_pairs.h"
 #include "core/units.h"
@@ -18,6 +19,7 @@
 #include "sim/scene/device_imager.h"
 #include "sim/sensor/direct_light.h"
 #include "sim/sensor/key_frames.h"
+#include "sim/sensor/residual_light.h"
 #include "sim/view/pixel_truth.h"
 #include "sim/view/scene_view.h"
 
@@ -64,6 +66,7 @@ struct VirtualCamera::Parts : SceneView {
     settings.min_samples = scene.light.min_samples;
     settings.max_samples = scene.light.max_samples;
     settings.noise = noise_target(response, scene.light.noise_fraction);
+    if (scene.device.residual) lacking.emplace(*scene.device.residual, ideal_imager);
   }
 
   ExposureTimes exposure;
@@ -80,6 +83,21 @@ struct VirtualCamera::Parts : SceneView {
   std::optional<render::SharedPaths> shared;             // behind a wide hole; keys are then not needed
   std::vector<KeyFrame> keys;                            // the first frame's, then in the order of time
   std::map<std::int64_t, render::ControlState> control;  // by a frame's t_us; of a camera that sets itself
+  std::optional<ResidualLight> lacking;                  // of a device with a residual map
+  mutable std::mutex seeing_rest;
+  mutable std::vector<render::FirstHit> rest_hits;  // with it, once asked for
+
+  /// Light with what the device's residual map adds to it, if it has one.
+  cv::Mat corrected(const cv::Mat& irradiance, const fem::PressState& press,
+                    const std::optional<fem::ReliefAnswer>& relief) const {
+    if (!lacking) return irradiance;
+    locked_work(seeing_rest, [&] {
+      if (!rest_hits.empty()) return;
+      rest_hits = render::first_hits(SceneView::geometry(at_rest(press), {}).inside, ready);
+    });
+    const std::vector<render::FirstHit> now = render::first_hits(SceneView::geometry(press, relief).inside, ready);
+    return lacking->corrected(irradiance, pressed_in(rest_hits, now, size));
+  }
 
   /// The first frame's and those before and after a time: the gel at rest, and what the frame is most like.
   std::vector<const KeyFrame*> keys_about(std::int64_t t_us) const {
@@ -189,12 +207,15 @@ struct VirtualCamera::Parts : SceneView {
   /// What the camera's meter reads at a frame's begin.
   render::Metering metering(const Truth& truth) const {
     const render::Scene seen_now = seen(truth.press, relief(truth.press));
+    const auto read = [&](const cv::Mat& irradiance) {
+      return render::metering_of(corrected(irradiance, truth.press, relief(truth.press)), imager);
+    };
     if (direct) {
-      if (const auto image = direct->render(seen_now)) return render::metering_of(image->irradiance, imager);
+      if (const auto image = direct->render(seen_now)) return read(image->irradiance);
     }
     render::RenderSettings few = settings;
     few.min_samples = few.max_samples = kMeteringSamples;
-    return render::metering_of(render::Tracer(seen_now).render(camera, few).irradiance, imager);
+    return read(render::Tracer(seen_now).render(camera, few).irradiance);
   }
 
   /// Goes through the motion as the camera that sets itself does. Each frame shows what the ones before it led to.
@@ -233,7 +254,8 @@ struct VirtualCamera::Parts : SceneView {
     const render::Tracer at_once(seen_now);
     if (shared && !whole) {
       const render::RenderedImage image = shared->render(seen_now, at_once, settings, scene.outputs.error);
-      return develop(image.irradiance, image.standard_error, truth, now, image.counts, size.area());
+      return develop(corrected(image.irradiance, truth.press, now), image.standard_error, truth, now, image.counts,
+                     size.area());
     }
     KnownLight light = nothing_known();
     if (!whole) {
@@ -241,10 +263,13 @@ struct VirtualCamera::Parts : SceneView {
       light = known(truth.t_us, {&appearance, 1});
     }
     const int pixels = cv::countNonZero(light.missing);
-    if (pixels == 0) return develop(light.irradiance, light.standard_error, truth, now, {}, 0);
+    if (pixels == 0) {
+      return develop(corrected(light.irradiance, truth.press, now), light.standard_error, truth, now, {}, 0);
+    }
     const render::RenderedImage image = at_once.render(camera, settings, light.missing);
     add_traced(image.irradiance, image.standard_error, light);
-    return develop(light.irradiance, light.standard_error, truth, now, image.counts, pixels);
+    return develop(corrected(light.irradiance, truth.press, now), light.standard_error, truth, now, image.counts,
+                   pixels);
   }
 
   /// By direct light; nothing if at one of the moments the gel has gone where the light field doesn't reach.
@@ -257,11 +282,12 @@ struct VirtualCamera::Parts : SceneView {
     for (std::size_t i = 0; i < times.size(); ++i) {
       const bool later = times[i] > 0.0;
       const fem::PressState press = later ? state_after(truth, times[i]) : truth.press;
-      const auto image = direct->render(seen(press, later ? relief(press) : now));
+      const std::optional<fem::ReliefAnswer> contact = later ? relief(press) : now;
+      const auto image = direct->render(seen(press, contact));
       if (!image) return std::nullopt;
       counts.paths += image->primary;
       counts.primary += image->primary;
-      irradiance = image->irradiance;
+      irradiance = corrected(image->irradiance, press, contact);
       if (sum) sum->add(i, irradiance);
     }
     if (sum) irradiance = sum->irradiance();
@@ -293,7 +319,10 @@ struct VirtualCamera::Parts : SceneView {
     }
     KnownLight light = whole || shares ? nothing_known() : known(truth.t_us, appearances);
     const int pixels = cv::countNonZero(light.missing);
-    if (pixels == 0) return develop(light.irradiance, light.standard_error, truth, now, {}, 0);
+    // Over so short a time the correction is that of its beginning.
+    if (pixels == 0) {
+      return develop(corrected(light.irradiance, truth.press, now), light.standard_error, truth, now, {}, 0);
+    }
     const render::ShutterTiming timing = shutter_timing();
     render::RenderSettings of_moment = settings;
     const double intervals_of_row = timing.exposure_s / times.back() * static_cast<double>(times.size() - 1);
@@ -310,7 +339,7 @@ struct VirtualCamera::Parts : SceneView {
       counts += image.counts;
     }
     add_traced(sum.irradiance(), sum.standard_error(), light);
-    return develop(light.irradiance, light.standard_error, truth, now, counts,
+    return develop(corrected(light.irradiance, truth.press, now), light.standard_error, truth, now, counts,
                    static_cast<std::int64_t>(times.size()) * pixels);
   }
 };

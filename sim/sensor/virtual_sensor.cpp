@@ -16,6 +16,7 @@
 #include "sim/sensor/coated_view.h"
 #include "sim/sensor/milky_view.h"
 #include "sim/sensor/press_events.h"
+#include "sim/sensor/residual_light.h"
 #include "sim/view/marker_motion.h"
 
 namespace touchstone::sim {
@@ -379,6 +380,18 @@ cv::Mat VirtualSensor::background(std::uint64_t noise_seed, int frame) const {
 
 const cv::Mat& VirtualSensor::background_light() const {
   return parts_->optics().rest_light;
+}
+
+cv::Mat VirtualSensor::linear_numbers(const cv::Mat& light) const {
+  return sim::linear_numbers(light, numbers_per_irradiance(parts_->optics().imager));
+}
+
+cv::Mat VirtualSensor::with_residual(const ResidualMap& map, const cv::Mat& light, const cv::Mat& height) const {
+  if (height.size() != light.size() || height.cols != map.width_px || height.rows != map.height_px) {
+    fail("device {}: its picture has {} x {} pixels, the residual map's {} x {}", parts_->device.name, light.cols,
+         light.rows, map.width_px, map.height_px);
+  }
+  return ResidualLight(map, parts_->optics().imager).corrected(light, height);
 }
 
 cv::Mat VirtualSensor::ideal(const TouchObject& object, const Touch& touch) const {

@@ -55,7 +55,7 @@ ONLY_READERS = [
 ]
 
 KIND_OF_FOLDER = {"devices": "device", "objects": "object", "motions": "motion", "jobs": "job", "studies": "study",
-                  "palpation": "palpation", "fits": "fit", "chroma": "scene", "gelsight": "scene", "vhs": "scene"}
+                  "palpation": "palpation", "fits": "fit", "residuals": "residual", "chroma": "scene", "gelsight": "scene", "vhs": "scene"}
 
 
 def plain(node):

@@ -38,6 +38,7 @@ int read_all() {
       {"job", read_job_of_either_sort},
       {"study", [](const std::string& file) { lab::read_study(file); }},
       {"fit", [](const std::string& file) { read_yaml<lab::UnitFitSpec>(file); }},
+      {"residual", [](const std::string& file) { sim::read_residual_map(file); }},
       {"palpation", [](const std::string& file) { lab::read_palpation(file); }},
   };
   std::string kind;

@@ -163,6 +163,37 @@ TEST(Likeness, ADeviceIsAsLikeItsOwnRecordingAsNoiseLets) {
   EXPECT_EQ(sim::read_image(own().folder.path() / "press-0-balanced.png").size(), own().rest.size());
 }
 
+TEST(Likeness, AResidualMapIsComparedBesideTheDeviceAndLeavesItAlone) {
+  LikenessSpec spec = own().spec();
+  const Likeness plain = own().compare(spec);
+  spec.learn = {"press-0.png", "press-1.png", "press-2.png"};
+  spec.residual = true;
+  const Likeness made = own().compare(spec);
+  ASSERT_TRUE(made.made_residual);
+  ASSERT_EQ(made.made_residual->left_out.size(), 3U);
+  EXPECT_THAT(made.residual, HasSubstr("press-0.png, press-1.png, press-2.png"));
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(made.presses[i].device.psnr, plain.presses[i].device.psnr);
+    EXPECT_FALSE(plain.presses[i].residual);
+    // Its own recording is missing nothing but noise.
+    ASSERT_TRUE(made.presses[i].residual);
+    EXPECT_GT(made.presses[i].residual->psnr, made.presses[i].device.psnr - 0.3);
+  }
+  // A device that has the map already: the same figures.
+  sim::DeviceSpec device = own().device;
+  sim::set_residual(device, std::make_shared<const sim::ResidualMap>(made.made_residual->map));
+  spec.residual = false;
+  const Likeness given = compare_likeness(device, read_ball_recording(spec), spec, own().folder.path() / "cache");
+  EXPECT_FALSE(given.made_residual);
+  EXPECT_EQ(given.presses[1].device.psnr, made.presses[1].device.psnr);
+  EXPECT_EQ(given.presses[1].residual->psnr, made.presses[1].residual->psnr);
+  write_likeness(given, own().folder.path());
+  EXPECT_THAT(read_whole_file(own().folder.path() / "likeness.csv"), HasSubstr("\"device with residual\""));
+  spec.learn = {"press-0.png"};
+  spec.residual = true;
+  EXPECT_THAT(message_of([&] { own().compare(spec); }), HasSubstr("--residual: 1 presses by --learn"));
+}
+
 TEST(Likeness, AnotherExposureAndWhiteBalanceAreTakenOut) {
   cv::Mat frame;
   cv::multiply(own().frames[0], cv::Scalar(0.8, 0.9, 0.95), frame);
@@ -276,14 +307,18 @@ TEST(Likeness, GelsightMiniIsLikeItsRecording) {
   spec.rest = {"rest.png"};
   spec.mm_per_px = 0.05107;
   spec.learn = {"press-01.png", "press-03.png", "press-06.png", "press-09.png", "press-12.png", "press-20.png"};
+  spec.residual = true;
   const sim::DeviceSpec device = sim::read_device(source / "scenes/devices/gelsight-mini.yaml");
   const LikenessSummary summary =
       summary_of(compare_likeness(device, read_ball_recording(spec), spec, own().folder.path() / "cache"));
   ASSERT_EQ(summary.presses, 14);
   EXPECT_GT(summary.rows[0].psnr.mean, 31.5);
   EXPECT_GT(summary.rows[0].ssim.mean, 0.940);
-  EXPECT_NEAR(summary.rows[2].psnr.mean, 23.8, 0.1);  // rest alone
-  EXPECT_GT(summary.rows[3].psnr.mean, 32.5);         // the table
+  EXPECT_GT(summary.rows[1].psnr.mean, summary.rows[0].psnr.mean + 2.0);  // with the residual map
+  EXPECT_GT(summary.rows[1].psnr.mean, summary.rows[4].psnr.mean);
+  EXPECT_GT(summary.rows[1].ssim.mean, summary.rows[0].ssim.mean);
+  EXPECT_NEAR(summary.rows[3].psnr.mean, 23.8, 0.1);  // rest alone
+  EXPECT_GT(summary.rows[4].psnr.mean, 32.5);         // the table
 }
 
 }  // namespace
