@@ -19,6 +19,7 @@ OUTPUTS = {
     "dvs-grasp": ["frame", "height", "contact", "events"],
     "reflex": ["frame", "statistics", "markers"],
     "gelsight-markers": ["frame", "height", "contact", "markers"],
+    "gelsight-mini-markers": ["frame", "height", "contact", "markers"],
 }
 OTHERS = ["frame", "height", "contact"]
 JOB = """

@@ -11,7 +11,7 @@ import touchstone as ts
 SCENES = pathlib.Path(os.environ["TOUCHSTONE_SCENES"])
 DEVICES = sorted(path.stem for path in (SCENES / "devices").glob("*.yaml"))
 CLEAR = {"vhs", "vhs-spectral"}
-PRINTED = {"chroma", "chroma-compact", "gelsight-markers", "reflex"}
+PRINTED = {"chroma", "chroma-compact", "gelsight-markers", "gelsight-mini-markers", "reflex"}
 FORCE_N = 0.5
 
 
@@ -21,8 +21,8 @@ def touched(request):
     return request.param, sensor, sensor.press("ball-8mm", force_N=FORCE_N)
 
 
-def test_there_are_twelve():
-    assert len(DEVICES) == 12
+def test_their_number():
+    assert len(DEVICES) == 13
 
 
 def test_a_ball_makes_a_frame_with_its_force(touched):
