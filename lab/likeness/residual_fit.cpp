@@ -25,8 +25,8 @@ constexpr double kRidges[] = {1e-1, 1e-2, 1e-3, 1e-4, 1e-5};
 
 constexpr double kPixelsAPress = 8500.0;  // so many are learned from
 constexpr int kCentreStride = 3;          // of these, centres are chosen among every third
-constexpr int kSaturationSteps = 4;
-constexpr double kJitter = 1e-9;  // keeps equations of centres that nearly coincide solvable
+constexpr int kSaturationSteps = 20;      // three to six are taken
+constexpr double kJitter = 1e-9;          // keeps equations of centres that nearly coincide solvable
 
 using Eigen::Index;
 using Eigen::MatrixXd;
@@ -77,16 +77,22 @@ double mean_square(const Eigen::Matrix3Xd& numbers) {
   return numbers.squaredNorm() / static_cast<double>(numbers.size());
 }
 
-/// What a press adds to the right side by light that its saturated numbers may hide, where the weights ask for it.
-MatrixXd hidden_in_white(const PressEquations& press, const Eigen::Matrix3Xd& weights) {
-  const MatrixXd bumps = press.bumps(Eigen::all, press.saturated_pixels);
-  const Eigen::Matrix3Xd beyond = weights * bumps - press.missing(Eigen::all, press.saturated_pixels);
-  const Eigen::Matrix3Xd hidden = press.saturated(Eigen::all, press.saturated_pixels)
-                                      .select(beyond.cwiseMax(0.0), Eigen::Matrix3Xd::Zero(3, beyond.cols()));
-  return bumps * hidden.transpose();
+/// Of one colour: which of a press's saturated pixels are as bright as `weights` ask for or brighter, so that they tell
+/// nothing. No weights: all of them.
+std::vector<Index> hidden_pixels(const PressEquations& press, int colour, const Eigen::RowVectorXd& weights) {
+  std::vector<Index> hidden;
+  for (const Index pixel : press.saturated_pixels) {
+    if (!press.saturated(colour, pixel)) continue;
+    if (weights.size() == 0 || weights.dot(press.bumps.col(pixel)) > press.missing(colour, pixel)) {
+      hidden.push_back(pixel);
+    }
+  }
+  return hidden;
 }
 
-/// The weights that take what is missing from all presses but one; -1: from all.
+/// The weights that take what is missing from all presses but one; -1: from all. Where a number is saturated, too much
+/// light is no error: a convex problem, quadratic in pieces, so Newton's steps solve it. Each leaves out the pixels
+/// that tell nothing, until these stay the same.
 Eigen::Matrix3Xd weights_without(const std::vector<PressEquations>& presses, int without, const MatrixXd& of_centres,
                                  double ridge) {
   MatrixXd square = MatrixXd::Zero(of_centres.rows(), of_centres.cols());
@@ -102,16 +108,30 @@ Eigen::Matrix3Xd weights_without(const std::vector<PressEquations>& presses, int
     known += press.right;
     pixels += static_cast<double>(press.missing.cols());
   });
-  square = square / pixels + ridge * of_centres;
-  square.diagonal().array() += kJitter;
-  const Eigen::LLT<MatrixXd> solver(square);
-  Eigen::Matrix3Xd weights = Eigen::Matrix3Xd::Zero(3, of_centres.rows());
-  for (int step = 0; step < kSaturationSteps; ++step) {
-    MatrixXd right = known;
-    others([&](const PressEquations& press) {
-      if (!press.saturated_pixels.empty()) right += hidden_in_white(press, weights);
-    });
-    weights = solver.solve(right / pixels).transpose();
+  MatrixXd regular = ridge * of_centres;
+  regular.diagonal().array() += kJitter;
+  Eigen::Matrix3Xd weights(3, of_centres.rows());
+  for (int c = 0; c < 3; ++c) {
+    Eigen::RowVectorXd found;
+    std::vector<std::vector<Index>> hidden;
+    for (int step = 0; step < kSaturationSteps; ++step) {
+      std::vector<std::vector<Index>> now;
+      others([&](const PressEquations& press) { now.push_back(hidden_pixels(press, c, found)); });
+      if (step > 0 && now == hidden) break;
+      hidden = std::move(now);
+      MatrixXd left = square;
+      Eigen::VectorXd right = known.col(c);
+      std::size_t next = 0;
+      others([&](const PressEquations& press) {
+        const std::vector<Index>& out = hidden[next++];
+        if (out.empty()) return;
+        const MatrixXd bumps = press.bumps(Eigen::all, out);
+        left.noalias() -= bumps * bumps.transpose();
+        right -= bumps * press.missing.row(c)(out).transpose();
+      });
+      found = Eigen::LLT<MatrixXd>(left / pixels + regular).solve(right / pixels).transpose();
+    }
+    weights.row(c) = found;
   }
   return weights;
 }
