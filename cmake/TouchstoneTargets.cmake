@@ -1,8 +1,9 @@
 # touchstone_library(NAME sources...) makes the library of one folder: target touchstone_NAME, alias Touchstone::NAME.
 # touchstone_sources(NAME sources...) adds those of one of its subfolders.
-# touchstone_test(NAME LABELS ... SOURCES ... LINKS ... [ALONE]) tells ctest of a test: the GoogleTest cases of its sources. A
-# folder's tests are one program, FOLDER_tests, which ctest runs once for each with its sources' names; a test that's
-# ALONE is a program of its own name.
+# touchstone_test(NAME LABELS ... SOURCES ... LINKS ... [LONG_CASES SUITE.CASE ...] [COST S] [ALONE]) tells ctest of a test: the
+# GoogleTest cases of its sources. A folder's tests are one program, FOLDER_tests, which ctest runs once for each with its
+# sources' names; a test that's ALONE is a program of its own name. Its long cases are a test NAME_long. COST, in seconds,
+# has ctest begin with those that take long, so that no core waits at the end.
 
 add_library(touchstone_options INTERFACE)
 target_compile_features(touchstone_options INTERFACE cxx_std_20)
@@ -97,10 +98,15 @@ function(touchstone_sources name)
   target_sources(touchstone_${name} PRIVATE ${ARGN})
 endfunction()
 
+# What tests do by themselves takes little time, so their own sources have few optimisations: g++ is ready in half of the time.
+# What they call in the libraries has all of them.
+set(TOUCHSTONE_TEST_OPTIONS $<$<CONFIG:Release>:-Og>)
+
 # A program of tests: its target, before or after it has all of its sources.
 function(touchstone_test_program name)
   touchstone_need_gtest()
   add_executable(${name})
+  target_compile_options(${name} PRIVATE ${TOUCHSTONE_TEST_OPTIONS})
   target_link_libraries(${name} PRIVATE GTest::gtest GTest::gmock touchstone_options)
   target_include_directories(${name} PRIVATE "${PROJECT_SOURCE_DIR}")
   target_compile_definitions(${name} PRIVATE
@@ -110,7 +116,7 @@ function(touchstone_test_program name)
       add_library(touchstone_test_pch OBJECT "${PROJECT_SOURCE_DIR}/cmake/pch.cpp")
       target_link_libraries(touchstone_test_pch PRIVATE touchstone_core GTest::gtest GTest::gmock touchstone_options)
       set_target_properties(touchstone_test_pch PROPERTIES POSITION_INDEPENDENT_CODE OFF)
-      target_compile_options(touchstone_test_pch PRIVATE -fPIE)
+      target_compile_options(touchstone_test_pch PRIVATE -fPIE ${TOUCHSTONE_TEST_OPTIONS})
       target_precompile_headers(touchstone_test_pch PRIVATE ${TOUCHSTONE_PCH_HEADERS} <gmock/gmock.h> <gtest/gtest.h>)
     endif()
     target_precompile_headers(${name} REUSE_FROM touchstone_test_pch)
@@ -125,7 +131,7 @@ function(touchstone_test_program name)
 endfunction()
 
 function(touchstone_test name)
-  cmake_parse_arguments(arg "ALONE" "" "LABELS;SOURCES;LINKS" ${ARGN})
+  cmake_parse_arguments(arg "ALONE" "COST" "LABELS;SOURCES;LINKS;LONG_CASES" ${ARGN})
   if(arg_ALONE)
     set(program ${name})
   else()
@@ -142,9 +148,19 @@ function(touchstone_test name)
     add_test(NAME ${name} COMMAND ${name})
   else()
     list(JOIN arg_SOURCES "," sources)
-    add_test(NAME ${name} COMMAND ${program} --sources=${sources})
+    list(JOIN arg_LONG_CASES "," long_cases)
+    set(without)
+    if(arg_LONG_CASES)
+      set(without --without=${long_cases})
+      add_test(NAME ${name}_long COMMAND ${program} --only=${long_cases})
+      set_tests_properties(${name}_long PROPERTIES LABELS long TIMEOUT 3600)
+    endif()
+    add_test(NAME ${name} COMMAND ${program} --sources=${sources} ${without})
   endif()
   set_tests_properties(${name} PROPERTIES LABELS "${arg_LABELS}" TIMEOUT 1500)
+  if(arg_COST)
+    set_tests_properties(${name} PROPERTIES COST ${arg_COST})
+  endif()
   if("fast" IN_LIST arg_LABELS)
     if(NOT TARGET fast_tests)
       add_custom_target(fast_tests)  # what the sanitizers run

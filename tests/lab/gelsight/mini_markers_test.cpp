@@ -11,7 +11,6 @@
 #include "sim/scene/device_camera.h"
 #include "sim/scene/device_faces.h"
 #include "sim/sensor/virtual_sensor.h"
-#include "tests/support/temporary_folder.h"
 
 namespace touchstone::lab {
 namespace {
@@ -27,9 +26,10 @@ sensors::MarkerTrackerSettings tracker_of_the_mini() {
 }
 
 TEST(MiniMarkers, ADragIsFollowedDotByDot) {
-  const test::TemporaryFolder cache;
+  // Its gel takes half a minute to set up, once: the Python tests press it, too.
+  const std::filesystem::path cache = std::filesystem::path(TOUCHSTONE_BINARY_DIR) / "python" / "cache";
   const sim::DeviceSpec device = sim::read_device(kScenes / "devices" / "gelsight-mini-markers.yaml");
-  const sim::VirtualSensor sensor(device, cache.path());
+  const sim::VirtualSensor sensor(device, cache);
   const sim::TouchObject ball = sensor.object(sim::read_object(kScenes / "objects" / "ball-8mm.yaml"));
   const render::Scene layers = sim::clear_layers(device);
   const render::ReadyCamera camera = render::make_ready(sim::camera_of(*device.camera));

@@ -71,7 +71,8 @@ TEST(QuickReflex, MeetsTheTextButForTheContactsError) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Groups, QuickValidation, testing::Values("mechanics", "vibration", "light"));
+INSTANTIATE_TEST_SUITE_P(Groups, QuickValidation, testing::Values("mechanics", "vibration", "light"),
+                         [](const auto& group) { return group.param; });
 
 }  // namespace
 }  // namespace touchstone::lab

@@ -181,8 +181,17 @@ TEST(HeightCalibration, BadFiguresAreRefused) {
 
 class Faults : public ::testing::Test {
  protected:
-  fixtures::GelPainter painter_{kWidth, kHeight, kScale, {}};
-  HeightModel model_ = calibrated(painter_, LightCorrection::none).model;
+  /// A gel and its model, made once.
+  struct Learned {
+    fixtures::GelPainter painter{kWidth, kHeight, kScale, {}};
+    HeightModel model = calibrated(painter, LightCorrection::none).model;
+  };
+  static Learned& learned() {
+    static Learned one;
+    return one;
+  }
+  fixtures::GelPainter& painter_ = learned().painter;
+  HeightModel model_ = learned().model;
   HeightEstimator estimator_{model_};
 };
 
