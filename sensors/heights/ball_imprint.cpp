@@ -8,6 +8,7 @@
 #include <algorithm>
 
 #include "core/error.h"
+#include "core/gauss_rule.h"
 #include "core/units.h"
 
 namespace touchstone::sensors {
@@ -27,29 +28,6 @@ double layer_share(double q) {
   const double e = std::exp(-2.0 * q);
   const double below = 1.0 + e * e + e * (4.0 * q * q + 2.0);
   return (1.0 - e * e - 4.0 * q * e) / below - 1.0;
-}
-
-/// Nodes (in 0 to 1) and weights of Gauss and Legendre's rule, by Newton's steps on the polynomial.
-void gauss_rule(Eigen::VectorXd& nodes, Eigen::VectorXd& weights) {
-  nodes.resize(kNodes);
-  weights.resize(kNodes);
-  for (int i = 0; i < kNodes; ++i) {
-    double x = std::cos(kPi * (i + 0.75) / (kNodes + 0.5));
-    double derivative = 0.0;
-    for (int step = 0; step < 8; ++step) {
-      double p0 = 1.0;
-      double p1 = x;
-      for (int n = 2; n <= kNodes; ++n) {
-        const double p2 = ((2.0 * n - 1.0) * x * p1 - (n - 1.0) * p0) / n;
-        p0 = p1;
-        p1 = p2;
-      }
-      derivative = kNodes * (x * p1 - p0) / (x * x - 1.0);
-      x -= p1 / derivative;
-    }
-    nodes[i] = 0.5 * (1.0 - x);
-    weights[i] = 1.0 / ((1.0 - x * x) * derivative * derivative);
-  }
 }
 
 /// The wave numbers of the layer's share, 1/mm, and what Simpson's rule weighs that share with.
@@ -83,11 +61,9 @@ BallImprint::BallImprint(double ball_radius, double contact_radius, double thick
   TS_ASSERT(contact_radius > 0.0 && contact_radius < ball_radius && thickness > 0.0 && std::isfinite(ball_radius));
   const double layer = std::clamp(thickness, kThinnest * contact_radius, kThickest * contact_radius);
   const Waves waves(layer);
-  Eigen::VectorXd nodes;
-  Eigen::VectorXd weights;
-  gauss_rule(nodes, weights);
-  nodes *= contact_radius;
-  weights *= contact_radius;
+  static const GaussRule rule = gauss_rule(kNodes);
+  const Eigen::VectorXd nodes = contact_radius * rule.nodes;
+  const Eigen::VectorXd weights = contact_radius * rule.weights;
   const Eigen::MatrixXd cosines = (nodes * waves.number.matrix().transpose()).array().cos().matrix();
   const Eigen::MatrixXd kernel = cosines * waves.weight.matrix().asDiagonal() * cosines.transpose();
   const Eigen::MatrixXd matrix = Eigen::MatrixXd::Identity(kNodes, kNodes) + 2.0 / kPi * kernel * weights.asDiagonal();
@@ -96,18 +72,18 @@ BallImprint::BallImprint(double ball_radius, double contact_radius, double thick
   const Eigen::MatrixXd found = matrix.partialPivLu().solve(right);
   // The density anywhere, by the equation itself: its waves are summed over the nodes once.
   const Eigen::MatrixXd sums = cosines.transpose() * weights.asDiagonal() * found;
-  const auto at = [&](double s, int column) {
-    const double layers = ((waves.number * s).cos() * waves.weight * sums.col(column).array()).sum();
-    const double plain = column == 0 ? 1.0 : sphere_density(s, ball_radius);
-    return 2.0 / kPi * (plain - layers);
+  const auto at = [&](double s) -> Eigen::Vector2d {
+    const Eigen::VectorXd wave = ((waves.number * s).cos() * waves.weight).matrix();
+    return 2.0 / kPi * (Eigen::Vector2d(1.0, sphere_density(s, ball_radius)) - sums.transpose() * wave);
   };
-  depth_ = -at(contact_radius, 1) / at(contact_radius, 0);
+  const Eigen::Vector2d at_rim = at(contact_radius);
+  depth_ = -at_rim[1] / at_rim[0];
 
   constexpr int kGrid = 400;
   std::vector<double> density(kGrid + 1);
   for (int i = 0; i <= kGrid; ++i) {
-    const double s = contact_radius * i / kGrid;
-    density[static_cast<std::size_t>(i)] = depth_ * at(s, 0) + at(s, 1);
+    const Eigen::Vector2d both = at(contact_radius * i / kGrid);
+    density[static_cast<std::size_t>(i)] = depth_ * both[0] + both[1];
   }
   const auto density_at = [&](double s) {
     const double place = std::min(s / contact_radius, 1.0) * kGrid;
@@ -117,14 +93,11 @@ BallImprint::BallImprint(double ball_radius, double contact_radius, double thick
   };
   const Eigen::ArrayXd spectrum = waves.weight * (depth_ * sums.col(0) + sums.col(1)).array();
   reach_ = kReach * layer;
-  Eigen::VectorXd unit;
-  Eigen::VectorXd unit_weights;
-  gauss_rule(unit, unit_weights);
   for (int i = 0; i <= kOutside; ++i) {
     const double r = contact_radius + reach_ * i * i / (kOutside * kOutside);
     const double widest = std::asin(contact_radius / r);
     double sum = 0.0;  // of the half-space: s = r sin(angle)
-    for (int n = 0; n < kNodes; ++n) sum += widest * unit_weights[n] * density_at(r * std::sin(widest * unit[n]));
+    for (int n = 0; n < kNodes; ++n) sum += widest * rule.weights[n] * density_at(r * std::sin(widest * rule.nodes[n]));
     for (int k = 0; k <= kWaves; ++k) sum += spectrum[k] * ::j0(waves.number[k] * r);
     outside_.push_back(sum);
   }

@@ -8,6 +8,7 @@
 #include "core/error.h"
 #include "core/units.h"
 #include "sensors/heights/ball_search.h"
+#include "sensors/numerics/quantile.h"
 
 namespace touchstone::sensors {
 namespace {
@@ -61,14 +62,6 @@ void for_each_pixel(const cv::Size& size, const Eigen::Vector2d& centre, double 
       if (offset.norm() <= radius) use(u, v, offset);
     }
   }
-}
-
-/// The value that a share of the values is below.
-float quantile(std::vector<float> values, double share) {
-  TS_ASSERT(!values.empty());
-  const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
 }
 
 /// Where the picture is a fine line: its relative change less the same more blurred. In real light the rim is bright in
@@ -202,7 +195,7 @@ float strength_of(const cv::Mat& brightening, const ContactCircle& circle) {
   std::vector<float> within;
   for_each_pixel(brightening.size(), circle.centre, circle.radius,
                  [&](int u, int v, const Eigen::Vector2d&) { within.push_back(brightening.at<float>(v, u)); });
-  return within.empty() ? 0.0F : quantile(std::move(within), 0.9);
+  return within.empty() ? 0.0F : quantile_of(within, 0.9);
 }
 
 }  // namespace

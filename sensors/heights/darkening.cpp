@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/error.h"
+#include "sensors/numerics/quantile.h"
 #include "sensors/numerics/wide_clones.h"
 
 namespace touchstone::sensors {
@@ -82,13 +83,6 @@ TS_WIDE_CLONES Extremes take_channel(const unsigned char* grey, int count, float
 TS_WIDE_CLONES void darken(const float* sum, const float* inverse, const float* lit, float factor, int count,
                            float* darkening) {
   for (int u = 0; u < count; ++u) darkening[u] = lit[u] - factor * (sum[u] * inverse[u]);
-}
-
-/// Moves the value that `share` of the values are below to its place, and gives it.
-float quantile(std::vector<float>& values, double share) {
-  const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
 }
 
 }  // namespace
@@ -184,8 +178,8 @@ void DarkeningMeter::follow_exposure() {
     if (saturated[pixel] == 0) ratios_.push_back(sum[pixel] * inverse[pixel]);
   }
   if (2 * ratios_.size() < border_.size() || ratios_.empty()) return;
-  const float middle = quantile(ratios_, 0.5);
-  const float apart = quantile(ratios_, 0.75) - quantile(ratios_, 0.25);
+  const float middle = quantile_of(ratios_, 0.5);
+  const float apart = quantile_of(ratios_, 0.75) - quantile_of(ratios_, 0.25);
   if (!(apart <= kMostDisagreement * middle)) return;
   if (!(middle <= kLargestExposure && middle >= 1.0 / kLargestExposure)) return;
   result_.exposure = static_cast<double>(middle);

@@ -55,11 +55,6 @@ const DarknessModel& checked(const DarknessModel& model) {
   return model;
 }
 
-bool touches_border(const cv::Mat& mask) {
-  const auto any = [](const cv::Mat& line) { return cv::countNonZero(line) > 0; };
-  return any(mask.row(0)) || any(mask.row(mask.rows - 1)) || any(mask.col(0)) || any(mask.col(mask.cols - 1));
-}
-
 }  // namespace
 
 DarknessEstimator::DarknessEstimator(const DarknessModel& model, const DarknessSettings& settings)

@@ -5,6 +5,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/error.h"
+#include "sensors/numerics/quantile.h"
 
 namespace touchstone::sensors {
 namespace {
@@ -21,12 +22,6 @@ constexpr float kBlur_bins = 5.0F;
 constexpr float kAlike = 0.08F;
 constexpr int kTooFew = 50;
 
-float quantile(std::vector<float> values, double share) {
-  const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
-}
-
 }  // namespace
 
 GainFinder::GainFinder(const Background& background) : size_(background.mean.size()) {
@@ -39,7 +34,7 @@ GainFinder::GainFinder(const Background& background) : size_(background.mean.siz
     for (int v = 0; v < mean.rows; ++v) {
       for (int u = 0; u < mean.cols; ++u) values.push_back(mean.at<cv::Vec3f>(v, u)[c]);
     }
-    limit[static_cast<std::size_t>(c)] = std::max(kBrightest_DN, quantile(std::move(values), kLeastCounting));
+    limit[static_cast<std::size_t>(c)] = std::max(kBrightest_DN, quantile_of(values, kLeastCounting));
   }
   const int step = std::max(1, static_cast<int>(std::ceil(std::sqrt(static_cast<double>(mean.total()) / kAsked))));
   for (int v = step / 2; v < mean.rows; v += step) {

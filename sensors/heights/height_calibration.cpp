@@ -104,8 +104,8 @@ PressSettings press_settings(const HeightCalibrationSettings& settings) {
 }
 
 /// Fills `uses` but for circles: frames, gains, and what isn't the background's picture. Returns whether gains move.
-bool find_gains(std::span<const BallPress> presses, const Background& background, std::vector<PressUse>& uses) {
-  GainFinder finder(background);
+bool find_gains(std::span<const BallPress> presses, const Background& background, GainFinder& finder,
+                std::vector<PressUse>& uses) {
   double squares = 0.0;
   int count = 0;
   for (const BallPress& press : presses) {
@@ -197,9 +197,9 @@ std::vector<ContactCircle> sharpened_circles(const std::vector<UsedPress>& used,
 /// What a network learns from: each press as it is and, where cameras have a white balance, with another one, since
 /// that cuts off other pixels; last the untouched gel.
 std::vector<LabelledPicture> labelled_pictures(const std::vector<UsedPress>& used, const Background& background,
-                                               const HeightCalibrationSettings& settings, bool white_balance) {
+                                               const HeightCalibrationSettings& settings, bool white_balance,
+                                               GainFinder& finder) {
   const std::vector<ContactCircle> circles = sharpened_circles(used, background, settings);
-  GainFinder finder(background);
   std::vector<LabelledPicture> pictures;
   for (std::size_t i = 0; i < used.size(); ++i) {
     const BallPress& press = *used[i].press;
@@ -248,14 +248,15 @@ double network_left_out_error(const std::vector<UsedPress>& used, const std::vec
 
 /// Gives the model a network, if that's asked for and, under `best`, better than a table that errs by `table_error`.
 void add_network(const std::vector<UsedPress>& used, const Background& background,
-                 const HeightCalibrationSettings& settings, double table_error, HeightCalibration& result) {
+                 const HeightCalibrationSettings& settings, double table_error, GainFinder& finder,
+                 HeightCalibration& result) {
   if (settings.slopes == SlopeRegressor::table) return;
   const bool best = settings.slopes == SlopeRegressor::best;
   if (best && (used.size() < kPressesForNetwork || table_error <= kPoorTable)) return;
   SlopeLearning learning = settings.learning;
   learning.gel_thickness_mm = settings.gel_thickness_mm;
   const std::vector<LabelledPicture> pictures =
-      labelled_pictures(used, background, settings, result.model.white_balance);
+      labelled_pictures(used, background, settings, result.model.white_balance, finder);
   if (used.size() >= kPressesForNetwork) {
     result.network_left_out = network_left_out_error(used, pictures, settings.mm_per_px, learning);
     if (best && *result.network_left_out >= table_error) return;
@@ -273,7 +274,8 @@ HeightCalibration calibrate_height(std::span<const BallPress> presses, const Bac
   if (presses.empty()) fail("no ball press: at least one calibration frame is needed");
   HeightCalibration result;
   HeightModel& model = result.model;
-  model.white_balance = find_gains(presses, background, result.presses);
+  GainFinder finder(background);
+  model.white_balance = find_gains(presses, background, finder, result.presses);
   const std::vector<UsedPress> used = use_presses(presses, background, settings, model.white_balance, result.presses);
   std::vector<Samples> parts;
   Samples all;
@@ -308,7 +310,7 @@ HeightCalibration calibrate_height(std::span<const BallPress> presses, const Bac
   model.table = std::move(learnt.table);
   model.steepest_calibrated = result.coverage.steepest_slope;
   model.presses = static_cast<int>(used.size());
-  add_network(used, background, settings, table_error, result);
+  add_network(used, background, settings, table_error, finder, result);
   const std::string fault = fault_of(model);
   if (!fault.empty()) fail("the calibration gave no usable model: {}", fault);
   return result;

@@ -135,19 +135,14 @@ const HeightModel& checked(const HeightModel& model) {
   return model;
 }
 
-bool touches_border(const cv::Mat& mask) {
-  const auto any = [](const cv::Mat& line) { return cv::countNonZero(line) > 0; };
-  return any(mask.row(0)) || any(mask.row(mask.rows - 1)) || any(mask.col(0)) || any(mask.col(mask.cols - 1));
-}
-
 }  // namespace
 
 HeightEstimator::HeightEstimator(const HeightModel& model, const HeightSettings& settings)
     : model_(checked(model)),
       settings_(settings),
-      poisson_(model.background.mean.cols, model.background.mean.rows, settings.border),
-      gains_(model.background) {
+      poisson_(model.background.mean.cols, model.background.mean.rows, settings.border) {
   const cv::Mat& mean = model_.background.mean;
+  if (model_.white_balance) gains_.emplace(model_.background);
   if (model_.network) reader_.emplace(*model_.network, mean.size(), model_.mm_per_px);
   const int width = mean.cols;
   const int height = mean.rows;
@@ -232,7 +227,7 @@ void HeightEstimator::count_shares(const cv::Mat& frame) {
 void HeightEstimator::find_slopes(const cv::Mat& frame) {
   const std::string fault = frame_fault(frame, model_.background.mean.size());
   if (!fault.empty()) fail("the frame {}", fault);
-  if (model_.white_balance) result_.gain = gains_.find(frame).gain;
+  if (gains_) result_.gain = gains_->find(frame).gain;
   count_shares(frame);
   if (!reader_) {
     look_up_slopes(frame);

@@ -79,7 +79,7 @@ class HeightEstimator {
   HeightModel model_;
   HeightSettings settings_;
   PoissonSolver poisson_;
-  GainFinder gains_;
+  std::optional<GainFinder> gains_;  ///< with white balance
   std::optional<SlopeReader> reader_;
   HeightResult result_;
   cv::Mat planes_[3];

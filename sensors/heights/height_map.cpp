@@ -52,6 +52,12 @@ int mark_contact(const cv::Mat& heights_mm, const ContactRule& rule, cv::Mat& ma
   return pixels;
 }
 
+bool touches_border(const cv::Mat& mask) {
+  TS_ASSERT(mask.type() == CV_8UC1 && !mask.empty());
+  const auto any = [](const cv::Mat& line) { return cv::countNonZero(line) > 0; };
+  return any(mask.row(0)) || any(mask.row(mask.rows - 1)) || any(mask.col(0)) || any(mask.col(mask.cols - 1));
+}
+
 void level_by_border(cv::Mat& heights_mm) {
   TS_ASSERT(heights_mm.type() == CV_32FC1 && !heights_mm.empty());
   const int last_v = heights_mm.rows - 1;

@@ -30,6 +30,9 @@ struct ContactRule {
 /// contact. @pre heights is CV_32FC1
 int mark_contact(const cv::Mat& heights_mm, const ContactRule& rule, cv::Mat& mask);
 
+/// Whether a mask's outermost pixels hold one that isn't 0. @pre mask is CV_8UC1
+bool touches_border(const cv::Mat& mask);
+
 /// Shifts a map so that the mean over its outermost pixels is 0: for heights that are known up to a constant.
 /// @pre heights is CV_32FC1
 void level_by_border(cv::Mat& heights_mm);

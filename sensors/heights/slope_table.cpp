@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "sensors/numerics/quantile.h"
 
 namespace touchstone::sensors {
 namespace {
@@ -171,11 +172,7 @@ TableCoverage coverage_of(const SlopeTable& table, std::span<const ColourSample>
   std::vector<float> lengths;
   lengths.reserve(samples.size());
   for (const ColourSample& sample : samples) lengths.push_back(sample.slope.norm());
-  if (!lengths.empty()) {
-    const auto at = lengths.begin() + static_cast<std::ptrdiff_t>(0.99 * static_cast<double>(lengths.size() - 1));
-    std::nth_element(lengths.begin(), at, lengths.end());
-    coverage.steepest_slope = *at;
-  }
+  if (!lengths.empty()) coverage.steepest_slope = quantile_of(lengths, 0.99);
   return coverage;
 }
 

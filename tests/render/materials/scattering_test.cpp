@@ -6,6 +6,7 @@
 #include <cmath>
 #include <vector>
 
+#include "core/gauss_rule.h"
 #include "core/random.h"
 #include "core/units.h"
 #include "render/materials/scattering.h"
@@ -37,54 +38,28 @@ Scene slab(const Medium& medium, double thickness, double environment) {
   return scene;
 }
 
-/// Gauss and Legendre's nodes and weights on (0, 1), by Newton on the Legendre polynomial.
-struct Quadrature {
-  std::vector<double> node, weight;
-};
-Quadrature gauss(int count) {
-  Quadrature rule;
-  for (int i = 0; i < count; ++i) {
-    double x = std::cos(kPi * (i + 0.75) / (count + 0.5));
-    double slope = 1.0;
-    for (int step = 0; step < 50; ++step) {
-      double p0 = 1.0;
-      double p1 = x;
-      for (int l = 2; l <= count; ++l) {
-        const double p2 = ((2.0 * l - 1.0) * x * p1 - (l - 1.0) * p0) / l;
-        p0 = p1;
-        p1 = p2;
-      }
-      slope = count * (x * p1 - p0) / (x * x - 1.0);
-      x -= p1 / slope;
-    }
-    rule.node.push_back(0.5 * (1.0 - x));
-    rule.weight.push_back(1.0 / ((1.0 - x * x) * slope * slope));
-  }
-  return rule;
-}
-
 /// Chandrasekhar's H for isotropic scattering [Chandrasekhar1960, ch. V], from
 /// 1 / H(mu) = sqrt(1 - albedo) + albedo / 2 int_0^1 x H(x) / (mu + x) dx.
 class ChandrasekharH {
  public:
-  explicit ChandrasekharH(double albedo) : albedo_(albedo), rule_(gauss(64)), at_nodes_(64, 1.0) {
+  explicit ChandrasekharH(double albedo) : albedo_(albedo), rule_(gauss_rule(64)), at_nodes_(64, 1.0) {
     for (int step = 0; step < 2000; ++step) {
       std::vector<double> next;
-      for (double mu : rule_.node) next.push_back((*this)(mu));
+      for (double mu : rule_.nodes) next.push_back((*this)(mu));
       at_nodes_ = next;
     }
   }
   double operator()(double mu) const {
     double sum = std::sqrt(1.0 - albedo_);
     for (std::size_t i = 0; i < at_nodes_.size(); ++i) {
-      sum += 0.5 * albedo_ * rule_.weight[i] * rule_.node[i] * at_nodes_[i] / (mu + rule_.node[i]);
+      sum += 0.5 * albedo_ * rule_.weights[i] * rule_.nodes[i] * at_nodes_[i] / (mu + rule_.nodes[i]);
     }
     return 1.0 / sum;
   }
 
  private:
   double albedo_;
-  Quadrature rule_;
+  GaussRule rule_;
   std::vector<double> at_nodes_;
 };
 
@@ -93,8 +68,8 @@ class ChandrasekharH {
 struct SlabOfSky {
   Eigen::VectorXd reflected, passed;
 };
-SlabOfSky double_up(const Quadrature& rule, double albedo, double g, double thickness) {
-  const int n = static_cast<int>(rule.node.size());
+SlabOfSky double_up(const GaussRule& rule, double albedo, double g, double thickness) {
+  const int n = static_cast<int>(rule.nodes.size());
   const auto phase = [&](double a, double b) {  // mean over azimuth, 4 pi p
     double sum = 0.0;
     double factor = 1.0;
@@ -114,9 +89,9 @@ SlabOfSky double_up(const Quadrature& rule, double albedo, double g, double thic
   Eigen::MatrixXd on(n, n);
   for (int i = 0; i < n; ++i) {
     for (int j = 0; j < n; ++j) {
-      const double share = albedo * thin * rule.weight[j] / (2.0 * rule.node[i]);
-      back(i, j) = share * phase(rule.node[i], -rule.node[j]);
-      on(i, j) = share * phase(rule.node[i], rule.node[j]) + (i == j ? 1.0 - thin / rule.node[i] : 0.0);
+      const double share = albedo * thin * rule.weights[j] / (2.0 * rule.nodes[i]);
+      back(i, j) = share * phase(rule.nodes[i], -rule.nodes[j]);
+      on(i, j) = share * phase(rule.nodes[i], rule.nodes[j]) + (i == j ? 1.0 - thin / rule.nodes[i] : 0.0);
     }
   }
   const Eigen::MatrixXd one = Eigen::MatrixXd::Identity(n, n);
@@ -233,7 +208,7 @@ TEST(ScatteringMedium, HalfSpaceUnderALampFollowsChandrasekhar) {
 }
 
 TEST(ScatteringMedium, SlabUnderASkyFollowsDoubling) {
-  const Quadrature rule = gauss(24);
+  const GaussRule rule = gauss_rule(24);
   struct Case {
     double albedo, g, thickness;
   };
@@ -245,10 +220,10 @@ TEST(ScatteringMedium, SlabUnderASkyFollowsDoubling) {
     Scene lit_below = slab(particles(c.albedo, c.g), c.thickness, 0.0);
     lit_below.surfaces.push_back({square_sheet(1e4, -c.thickness - 0.01), Emitter{grey(1.0)}});
     for (int node : {4, 12, 23}) {
-      const Eigen::Vector3d direction = at_cosine(rule.node[node], false);
+      const Eigen::Vector3d direction = at_cosine(rule.nodes[node], false);
       const Estimate back = view(lit_above, {0, 0, 0.01}, direction, 1000);
       const Estimate through = view(lit_below, {0, 0, 0.01}, direction, 1000);
-      SCOPED_TRACE(testing::Message() << "albedo " << c.albedo << " g " << c.g << " mu " << rule.node[node]);
+      SCOPED_TRACE(testing::Message() << "albedo " << c.albedo << " g " << c.g << " mu " << rule.nodes[node]);
       EXPECT_NEAR(back.mean, expected.reflected[node], 4.0 * back.error + 3e-4);
       EXPECT_NEAR(through.mean, expected.passed[node], 4.0 * through.error + 3e-4);
       EXPECT_LT(std::max(back.error, through.error), 0.005);
