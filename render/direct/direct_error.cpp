@@ -135,6 +135,7 @@ DirectChoice choose_direct(const Scene& rest, const Scene& first, const Camera& 
     LightFieldSettings light;
     light.accuracy = std::clamp(0.5 * settings.tolerance, 1e-4, 1e-2);
     light.guides = settings.guides;
+    light.lit_radius = settings.lit_radius;
     field = make_light_field(direct, reach, light);
   } catch (const Error& error) {
     choice.reason = error.what();

@@ -55,6 +55,7 @@ struct DirectChoiceSettings {
   bool whatever = false;     ///< the error is measured, but any will do
   DirectSettings direct;
   GuideCut guides;
+  double lit_radius = 0.0;  ///< LightFieldSettings::lit_radius
   DirectErrorSettings error;
   RestLightSettings rest;  ///< used where the scene asks for interreflection
 };

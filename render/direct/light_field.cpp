@@ -219,11 +219,14 @@ struct Maker {
     const int all = cells.prod();
     const int stride = std::max(1, all / 1000) | 1;
     const int looked_at = (all + stride - 1) / stride;
-    std::vector<std::array<double, 2>> squares(looked_at);
+    std::vector<std::array<double, 2>> squares(looked_at, {0.0, 0.0});
+    const double lit_radius =
+        settings.lit_radius > 0.0 ? settings.lit_radius + 0.5 * std::hypot(field.step[0], field.step[1]) : INFINITY;
     tbb::parallel_for(0, looked_at, [&](int number) {
       const int cell = number * stride;
       const Eigen::Vector3d at = place(field, cell % cells[0] + offset[0], cell / cells[0] % cells[1] + offset[1],
                                        cell / (cells[0] * cells[1]) + offset[2]);
+      if (at.head<2>().norm() > lit_radius) return;
       std::vector<float> held(4 * static_cast<std::size_t>(beams));
       look_up_flow(field, find_cell(field, float(at.x()), float(at.y()), float(at.z())), held.data());
       const std::vector<Eigen::Vector3d> exact = flows(clear, field, at);
@@ -257,6 +260,9 @@ struct Maker {
 void check_settings(const LightFieldSettings& settings) {
   if (!(settings.accuracy > 0.0 && settings.accuracy <= 1.0)) {
     fail("light field: accuracy is {}; it must be above 0 and at most 1", settings.accuracy);
+  }
+  if (!(settings.lit_radius >= 0.0)) {
+    fail("light field: lit_radius is {} mm; it must be 0 or more", settings.lit_radius);
   }
   if (settings.lens_points < 1 || settings.lens_points > 64) {
     fail("light field: lens_points is {}; it must be from 1 to 64", settings.lens_points);

@@ -22,6 +22,8 @@ struct LightFieldSettings {
   int guide_points = 3;    ///< guide_beam_flows, 1 to 16
   int most_beams = 64;     ///< of all lamps together, see LightField; a direct renderer takes no more
   int most_nodes = 1000000;
+  /// What is lit stays so near to the z axis, mm: only there the grid has to be accurate. 0: in all of the box.
+  double lit_radius = 0.0;
 };
 
 /// Which beams of the same guide lie beside a beam; -1 where there is none.
@@ -48,7 +50,7 @@ struct LightField {
   std::vector<BesideBeam> beside;                ///< by beam
   std::vector<float> flow;  ///< [node][beam][4]: F and its length; node = x + nodes.x (y + nodes.y z)
   std::vector<float> pass;  ///< [node][beam][band], empty where nothing absorbs
-  /// Estimate: root mean square over the middles of cells, where linear interpolation is worst, of |F - exact| summed
+  /// Estimate: root mean square over the middles of cells (that reach into `lit_radius`), where linear interpolation is worst, of |F - exact| summed
   /// over the lamps by power, over the same of |exact|.
   double error = 0.0;
 

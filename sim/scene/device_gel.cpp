@@ -76,4 +76,10 @@ bool is_gentle(const GelSpec& gel) {
          (dome != nullptr && dome->base_radius_mm <= std::sin(fem::kSteepestDome) * dome->sphere_radius_mm);
 }
 
+bool ends_on_plate(const GelSpec& gel) {
+  constexpr double kRounding_mm = 1e-6;
+  const DomeSpec* dome = gel.dome();
+  return dome != nullptr && gel.thickness_mm + rest_height(gel, {dome->base_radius_mm, 0.0}) < kRounding_mm;
+}
+
 }  // namespace touchstone::sim

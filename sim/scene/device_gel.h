@@ -36,4 +36,7 @@ double rest_height(const GelSpec& gel, const Eigen::Vector2d& place);
 /// Is the outer surface flat, or a dome so gentle that fine relief (fem/fine_relief/fine_relief.h) can have it?
 bool is_gentle(const GelSpec& gel);
 
+/// Is the gel a dome whose rim lies on the plate: a cap without a cylinder?
+bool ends_on_plate(const GelSpec& gel);
+
 }  // namespace touchstone::sim

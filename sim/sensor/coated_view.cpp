@@ -1,5 +1,6 @@
 #include "sim/sensor/coated_view.h"
 
+#include <algorithm>
 #include <utility>
 #include <vector>
 
@@ -25,13 +26,14 @@ constexpr double kClearance_mm = 0.1;  // of the judged ball before its press
 constexpr int kRaysAPixel[] = {1};     // of direct light: some milliseconds a frame
 constexpr int kPathsAPixel = 256;      // where a device is unfit for direct light
 
-/// What part of the depth a point of the surface can be pressed in by: a fingertip's sides, which begin on the plate
-/// that it is bonded to, hardly move. 1 on flat gels and domes.
-double pressed_part(const GelSpec& gel, double z_mm) {
+/// How far a point of the surface moves along z where the gel is pressed in by `depth_mm` (negative: inwards). A fingertip's
+/// sides, which begin on the plate that it is bonded to, hardly move; nor does the rim of a dome that ends on the plate.
+double pressed_mm(const GelSpec& gel, double z_mm, double depth_mm) {
+  if (ends_on_plate(gel)) return std::max(depth_mm, std::min(0.0, -0.5 * (z_mm + gel.thickness_mm)));
   const FingertipSpec* const fingertip = gel.fingertip();
-  if (fingertip == nullptr) return 1.0;
+  if (fingertip == nullptr) return depth_mm;
   const double held_mm = gel.thickness_mm - fingertip->sleeve_mm;
-  return std::clamp((z_mm + held_mm) / std::max(held_mm - fingertip->radius_mm, 1e-3), 0.0, 1.0);
+  return depth_mm * std::clamp((z_mm + held_mm) / std::max(held_mm - fingertip->radius_mm, 1e-3), 0.0, 1.0);
 }
 
 /// States that go as far as the light has to reach: pushed flat to the side and in.
@@ -46,7 +48,7 @@ std::vector<Truth> farthest_states(const fem::PressState& rest, const VirtualSen
     const double depth_mm = side < 0 ? -settings.deepest_mm : 0.1 * settings.deepest_mm;
     for (std::size_t i = 0; i < compliance.vertices.size(); ++i) {
       truth.press.surface_displacement(static_cast<Eigen::Index>(i), 2) =
-          depth_mm * pressed_part(gel, compliance.vertices[i].z());
+          pressed_mm(gel, compliance.vertices[i].z(), depth_mm);
     }
     states.push_back(std::move(truth));
   }

@@ -5,12 +5,14 @@
 #include <algorithm>
 
 #include "render/scene/film_screen.h"
+#include "sim/scene/device_gel.h"
 
 namespace touchstone::sim {
 namespace {
 
 constexpr double kSpareReach = 0.25;    // of the widest displacement, for states that weren't looked at
 constexpr double kSpareReachMm = 0.05;  // and for what is laid onto a body
+constexpr double kRounding_mm = 1e-9;   // of a rim that lies on the plate, as the box ends there
 constexpr int kPathsToMeasure = 256;    // a pixel, for a standard error of a tenth of a percent
 
 /// What reflects nothing needs no light: it may stand outside of the light field.
@@ -62,6 +64,14 @@ Eigen::AlignedBox3d reach_of(const render::Scene& rest, const render::Scene& pre
   return box;
 }
 
+/// How far from the axis the gel is lit, where it's a dome that ends on its plate: the corners of its box are next to lamps
+/// in the plate, whose light is steep there. 0 of others.
+double lit_radius(const GelSpec& gel, const Eigen::AlignedBox3d& reach) {
+  if (!ends_on_plate(gel)) return 0.0;
+  const Eigen::Array2d far = reach.min().head<2>().cwiseAbs().cwiseMax(reach.max().head<2>().cwiseAbs());
+  return far.maxCoeff();
+}
+
 std::string with_figures(const std::string& verdict, const render::DirectError& error) {
   return fmt::format("{}: {:.2f} +- {:.2f} % off path tracing (root mean square over {} pixels of the deepest press)",
                      verdict, 100 * error.rms, 100 * error.rms_error, error.pixels);
@@ -86,6 +96,7 @@ DirectLight::DirectLight(const SceneView& view, const render::Camera& camera, st
   settings.direct.seed = settings.error.seed = settings.rest.seed = scene.seed;
   settings.error.samples = kPathsToMeasure;
   const Eigen::AlignedBox3d reach = reach_of(rest, pressed, truths, -scene.device.gel.thickness_mm);
+  settings.lit_radius = lit_radius(scene.device.gel, reach);
   render::DirectChoice chosen;
   for (const int rays : rays_tried) {
     settings.direct.samples = rays;
@@ -150,7 +161,8 @@ std::unique_ptr<render::DirectRenderer> DirectLight::borrow() const {
 std::optional<render::DirectImage> DirectLight::render(render::Scene scene) const {
   TS_ASSERT(choice_.direct);
   const render::Scene direct = with_blacks(std::move(scene));
-  if (!field_.reach.contains(lit_box(direct))) return std::nullopt;
+  const Eigen::AlignedBox3d reach(field_.reach.min().array() - kRounding_mm, field_.reach.max().array() + kRounding_mm);
+  if (!reach.contains(lit_box(direct))) return std::nullopt;
   // Isolated: a thread that waits in here for its own tasks would else begin another picture, and with it a renderer.
   return tbb::this_task_arena::isolate([&] {
     auto renderer = borrow();

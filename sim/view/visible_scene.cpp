@@ -1,11 +1,13 @@
 #include "sim/view/visible_scene.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/random.h"
 #include "core/units.h"
 #include "sim/plan/scene_bands.h"
 #include "sim/scene/device_faces.h"
+#include "sim/scene/device_gel.h"
 #include "sim/scene/device_lamps.h"
 #include "sim/scene/scattered_print.h"
 
@@ -201,6 +203,11 @@ render::Surface coated_surface(const DeviceSpec& device, const SceneBands& bands
   if (coating.print) out.print = print_of(*coating.print, device.gel, bands, sheet.rest);
   out.normals = vertex_normals(sheet.mesh);
   out.mesh = std::move(sheet.mesh);
+  // What is bonded there moves by some hundredths of a micrometre, as displacements are means over the mesh's hats; but
+  // the gel doesn't reach below the plate's face.
+  if (ends_on_plate(device.gel)) {
+    for (Eigen::Vector3d& vertex : out.mesh.vertices) vertex.z() = std::max(vertex.z(), -device.gel.thickness_mm);
+  }
   return out;
 }
 

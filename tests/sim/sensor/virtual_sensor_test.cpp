@@ -9,6 +9,10 @@
 
 #include "core/error.h"
 #include "core/whole_file.h"
+#include "render/direct/direct_error.h"
+#include "sim/plan/plan.h"
+#include "sim/scene/device_camera.h"
+#include "sim/view/scene_view.h"
 #include "tests/support/small_scene.h"
 #include "tests/support/temporary_folder.h"
 
@@ -47,6 +51,65 @@ TEST(VirtualSensor, PlacesAndPixelsAreOneMapInBothDirections) {
   }
   const double step = (sensor().gel_from_pixel({41, 30}) - sensor().gel_from_pixel({40, 30})).norm();
   EXPECT_NEAR(step, sensor().mm_per_px(), 0.01 * step);
+}
+
+/// A cap of 18 mm that ends on its plate, lit by LEDs in the plate, a millimetre and more beside the cap.
+DeviceSpec domed_device() {
+  return parse_yaml<DeviceSpec>(R"(name: domed
+gel: {shape: dome, sphere_radius_mm: 20, base_radius_mm: 9, youngs_modulus_MPa: 0.4, poisson_ratio: 0.49,
+      refractive_index: 1.41}
+mesh: {fine_mm: 0.8, coarse_mm: 2, fine_half_extent_mm: [4, 4], fine_depth_mm: 1}
+plate: {thickness_mm: 6, refractive_index: 1.49}
+coating: {type: matt, albedo: 0.5}
+lamps:
+  - {type: led, position_mm: [7.2, -10.5, -5], target_mm: [0, 0, -5], chip_radius_mm: 0.5, viewing_angle_deg: 71,
+     power_W: [0.02, 0, 0]}
+  - {type: led, position_mm: [-10.2, 0, -3.2], target_mm: [0, 0, -3.2], viewing_angle_deg: 71, power_W: [0, 0.02, 0]}
+  - {type: led, position_mm: [0, 13.5, -5], target_mm: [0, 0, -5], viewing_angle_deg: 71, power_W: [0, 0, 0.02]}
+camera:
+  type: lens
+  width: 48
+  height: 64
+  pixel_pitch_um: 17.5
+  active_area_um2: 3
+  focal_length_mm: 1.08
+  f_number: 3
+  focus_distance_mm: 19
+  lens_position_mm: [0, 0, -21.67]
+  look_at_mm: [0, 0, 0]
+  exposure_us: 8000
+  bayer: binned
+  full_well_e: 5000
+  read_noise_e: 4
+)",
+                               "device.yaml");
+}
+
+TEST(VirtualSensor, ADomeThatEndsOnThePlateIsLitByLampsInThePlate) {
+  const test::TemporaryFolder cache;
+  const DeviceSpec device = domed_device();
+  const VirtualSensor domed(device, cache.path());
+  ASSERT_TRUE(domed.light().direct) << domed.light().reason;
+  const TouchObject object = domed.object(ball(3));
+  const render::Camera camera = camera_of(*device.camera);
+  for (const Eigen::Vector2d& place : {Eigen::Vector2d(0, 0), Eigen::Vector2d(4, -5)}) {
+    PressSpec press;
+    press.place_mm = place;
+    press.depth_mm = 0.4;
+    const Touch touch = domed.press(object, press);
+    EXPECT_GT(touch.force_N().z(), 0.1);
+    EXPECT_GT(cv::countNonZero(touch.contact), 20);
+    // Against path tracing of what is seen.
+    const SceneSpec scene = touch_scene(device, {}, object.spec(), domed.motion_of(object, press));
+    const SceneView view(scene, make_plan(scene), domed.gel());
+    const render::Scene seen = view.seen(touch.press, view.relief(touch.press));
+    double lowest = 0.0;
+    for (const Eigen::Vector3d& vertex : seen.surfaces.front().mesh.vertices) lowest = std::min(lowest, vertex.z());
+    EXPECT_GE(lowest, -device.gel.thickness_mm) << "the gel reaches into the plate";
+    const render::DirectError error = render::measure_direct_error(touch.light, seen, camera, {.samples = 256});
+    EXPECT_LT(error.rms, 0.03 + 2 * error.rms_error) << place.transpose();
+    EXPECT_NEAR(error.mean, 0.0, 0.005 + 2 * error.mean_error) << place.transpose();
+  }
 }
 
 TEST(VirtualSensor, WhatDoesNotTouchLeavesTheBackgroundAndNoHeight) {
