@@ -275,8 +275,8 @@ void check_settings(const LightFieldSettings& settings) {
   if (settings.guide_points < 1 || settings.guide_points > 16) {
     fail("light field: guide_points is {}; it must be from 1 to 16", settings.guide_points);
   }
-  if (settings.most_nodes < 8 || settings.most_nodes > 10000000) {
-    fail("light field: most_nodes is {}; it must be from 8 to 10000000", settings.most_nodes);
+  if (settings.most_flows < 8 || settings.most_flows > 500000000) {
+    fail("light field: most_flows is {}; it must be from 8 to 500000000", settings.most_flows);
   }
 }
 
@@ -378,12 +378,11 @@ LightField make_light_field(const Scene& fixture, const Eigen::AlignedBox3d& rea
   for (int halved = -1;;) {
     field.nodes = cells + 1;
     field.step = size / cells.cast<double>();
-    if (field.nodes.cast<double>().prod() > settings.most_nodes) {
+    if (field.nodes.cast<double>().prod() * field.beam_count() > settings.most_flows) {
       fail(
-          "light field: accuracy {} needs {} nodes or more, most_nodes is {} (the last grid's error is {:.2g}; a "
-          "lobe's "
-          "rim that crosses the box needs a wider soft_angle)",
-          settings.accuracy, field.nodes.prod(), settings.most_nodes, field.error);
+          "light field: accuracy {} needs {} nodes or more of {} beams, most_flows is {} (the last grid's error is "
+          "{:.2g}; a lobe's rim that crosses the box needs a wider soft_angle)",
+          settings.accuracy, field.nodes.prod(), field.beam_count(), settings.most_flows, field.error);
     }
     maker.fill(field, halved);
     field.error = maker.error(field, Eigen::Array3d::Constant(0.5));

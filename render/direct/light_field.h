@@ -21,7 +21,7 @@ struct LightFieldSettings {
   GuideCut guides;         ///< into what beams light guides are cut
   int guide_points = 3;    ///< guide_beam_flows, 1 to 16
   int most_beams = 64;     ///< of all lamps together, see LightField; a direct renderer takes no more
-  int most_nodes = 1000000;
+  int most_flows = 64000000;  ///< nodes times beams, of 16 bytes each
   /// What is lit stays so near to the z axis, mm: only there the grid has to be accurate. 0: in all of the box.
   double lit_radius = 0.0;
 };
@@ -50,8 +50,8 @@ struct LightField {
   std::vector<BesideBeam> beside;                ///< by beam
   std::vector<float> flow;  ///< [node][beam][4]: F and its length; node = x + nodes.x (y + nodes.y z)
   std::vector<float> pass;  ///< [node][beam][band], empty where nothing absorbs
-  /// Estimate: root mean square over the middles of cells (that reach into `lit_radius`), where linear interpolation is worst, of |F - exact| summed
-  /// over the lamps by power, over the same of |exact|.
+  /// Estimate: root mean square over the middles of cells (that reach into `lit_radius`), where linear interpolation is
+  /// worst, of |F - exact| summed over the lamps by power, over the same of |exact|.
   double error = 0.0;
 
   int beam_count() const { return static_cast<int>(intensity.size()); }
@@ -62,7 +62,7 @@ struct LightField {
 /// flat faces. The grid starts coarse and is halved along its worst axis until the estimated error is below
 /// `accuracy`. The same bytes for any number of threads.
 /// @throws Error if the scene is faulty, the box is empty, holds a face or a lamp's lens, lies in a light guide's plate
-/// or beside its exit face's plane, or the accuracy needs more than most_nodes nodes (as a lobe without a soft rim does
+/// or beside its exit face's plane, or the accuracy needs more than most_flows nodes times beams (as a lobe without a soft rim does
 /// whose edge crosses the box)
 LightField make_light_field(const Scene& fixture, const Eigen::AlignedBox3d& reach,
                             const LightFieldSettings& settings = {});

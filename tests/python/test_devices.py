@@ -22,7 +22,7 @@ def touched(request):
 
 
 def test_their_number():
-    assert len(DEVICES) == 13
+    assert len(DEVICES) == 14
 
 
 def test_a_ball_makes_a_frame_with_its_force(touched):

@@ -68,7 +68,7 @@ TEST(LightField, RefusesWhatItCannotHold) {
   std::get<SpotLamp>(sharp.lamps[0]).soft_angle = 0.0;
   std::get<SpotLamp>(sharp.lamps[0]).lens_radius = 0.0;
   LightFieldSettings small = accuracy(1e-4);
-  small.most_nodes = 5000;
+  small.most_flows = 5000;
   EXPECT_THROW(make_light_field(sharp, reach, small), Error);
 }
 
