@@ -9,6 +9,11 @@ import touchstone as ts
 
 pytest_plugins = ["pytester"]
 
+
+def pytest_configure(config):
+    config.addinivalue_line("markers", "long: left out of CI, as ctest's label")
+
+
 EXAMPLES = pathlib.Path(__file__).parents[2] / "python" / "examples"
 
 

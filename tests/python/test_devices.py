@@ -13,16 +13,20 @@ DEVICES = sorted(path.stem for path in (SCENES / "devices").glob("*.yaml"))
 CLEAR = {"vhs", "vhs-spectral"}
 PRINTED = {"chroma", "chroma-compact", "gelsight-markers", "gelsight-mini-markers", "reflex"}
 FORCE_N = 0.5
+# Of each kind at least one whose gel and light are set up in seconds; the others are long tests.
+QUICK = {"chroma-compact", "dvs-grasp", "gelsight-mini-markers", "gelsight-portable", "gelsight-webcam", "reflex",
+         "vhs-spectral"}
 
 
-@pytest.fixture(scope="module", params=DEVICES)
+@pytest.fixture(scope="module", params=[pytest.param(name, marks=() if name in QUICK else pytest.mark.long)
+                                        for name in DEVICES])
 def touched(request):
     sensor = ts.Sensor(request.param)
     return request.param, sensor, sensor.press("ball-8mm", force_N=FORCE_N)
 
 
 def test_their_number():
-    assert len(DEVICES) == 14
+    assert len(DEVICES) == 14 and QUICK < set(DEVICES)
 
 
 def test_a_ball_makes_a_frame_with_its_force(touched):
