@@ -192,6 +192,9 @@ cv::Mat block_noise(const cv::Mat& numbers, const render::Imager& imager, int bl
 }
 
 sim::DeviceSpec with_block_camera(sim::DeviceSpec device, int block_px) {
+  // They would make up for what is wrong with the device's own light.
+  device.background = cv::Mat();
+  device.residual = nullptr;
   sim::CameraSpec& camera = device.camera.value();
   camera.width /= block_px;
   camera.height /= block_px;

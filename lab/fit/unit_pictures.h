@@ -40,7 +40,8 @@ cv::Mat mean_numbers(const cv::Mat& light, const render::Imager& imager);
 /// `numbers` (as mean_numbers): photons, reading, rounding, and the fixed pattern, which `exposures` don't average.
 cv::Mat block_noise(const cv::Mat& numbers, const render::Imager& imager, int block_px, int exposures);
 
-/// The device as it is simulated for the fit: its picture of blocks.
+/// The device as it is simulated for the fit: its picture of blocks, without background and residual map, which would
+/// make up for what is to be found.
 sim::DeviceSpec with_block_camera(sim::DeviceSpec device, int block_px);
 
 }  // namespace touchstone::lab

@@ -13,7 +13,7 @@
 #include "lab/gelsight/ball_press_table.h"
 #include "lab/likeness/contact_depth.h"
 #include "lab/likeness/slope_colours.h"
-#include "render/imager/tone_curve.h"
+#include "sim/sensor/colour_numbers.h"
 #include "sim/sensor/virtual_sensor.h"
 
 namespace touchstone::lab {
@@ -27,11 +27,19 @@ constexpr double kScaleTolerance = 0.01;  // of mm/px
 constexpr double kLeastAlike = 0.4;       // of a frame's pixels with its rest; frames of other sensors have 0.35
 constexpr double kTurnedMargin = 0.2;     // of correlation
 constexpr double kNearlyWhite = 249;
-constexpr double kFullScale = 255;
 
 cv::Mat as_float(const cv::Mat& picture) {
   cv::Mat out;
   picture.convertTo(out, CV_32F);
+  return out;
+}
+
+/// The device's frame as its camera gives it with a recorded frame's gain, which is then taken out of it as of that:
+/// full scale is where the recorded one's is.
+cv::Mat balanced_frame(const sim::VirtualSensor& sensor, const sim::TouchObject& ball, const sim::Touch& touch,
+                       const cv::Vec3d& gain) {
+  cv::Mat out = as_float(sensor.ideal(ball, touch, gain));
+  cv::divide(out, cv::Scalar(gain[0], gain[1], gain[2]), out);
   return out;
 }
 
@@ -137,25 +145,7 @@ sim::Touch simulate(const sim::VirtualSensor& sensor, const KnownBall& ball, con
   how.depth_mm = row.depth_mm;
   sim::Touch touch = sensor.press(ball.object, how);
   row.simulated_radius_px = std::sqrt(cv::countNonZero(touch.contact) / kPi);
-  row.simulated_frame = sensor.ideal(ball.object, touch);
   return touch;
-}
-
-/// Delivered numbers (CV_32FC3, blue, green, red, of 255) in linear ones, red, green, blue.
-cv::Mat linear_of_delivered(const cv::Mat& numbers, const render::ToneCurve& curve) {
-  const bool is_linear = std::holds_alternative<render::LinearTone>(curve);
-  cv::Mat out(numbers.size(), CV_32FC3);
-  for (int v = 0; v < numbers.rows; ++v) {
-    for (int u = 0; u < numbers.cols; ++u) {
-      const cv::Vec3f from = numbers.at<cv::Vec3f>(v, u);
-      for (int c = 0; c < 3; ++c) {
-        const double number = from[2 - c];
-        out.at<cv::Vec3f>(v, u)[c] = static_cast<float>(
-            is_linear ? number : kFullScale * render::linear_of(curve, std::clamp(number / kFullScale, 0.0, 1.0)));
-      }
-    }
-  }
-  return out;
 }
 
 /// What a press tells a residual map.
@@ -166,7 +156,7 @@ ResidualSample residual_sample(const sim::VirtualSensor& sensor, const sim::Touc
   ResidualSample sample;
   sample.name = press.name;
   sample.height = touch.height;
-  sample.missing = linear_of_delivered(balanced, curve) - linear_of_delivered(recording.rest.mean, curve) -
+  sample.missing = sim::linear_of_delivered(balanced, curve) - sim::linear_of_delivered(recording.rest.mean, curve) -
                    (sensor.linear_numbers(touch.light) - sensor.linear_numbers(sensor.background_light()));
   cv::Mat colours;
   cv::cvtColor(press.frame, colours, cv::COLOR_BGR2RGB);
@@ -184,7 +174,7 @@ void compare_residual(const sim::VirtualSensor& sensor, const sim::ResidualMap& 
     sim::Touch touch = touches[i];
     touch.light = sensor.with_residual(map, touch.light, touch.height);
     PressLikeness& row = likeness.presses[i];
-    row.corrected = as_float(sensor.ideal(balls.at(press.ball_radius_mm).object, touch)) - rest;
+    row.corrected = balanced_frame(sensor, balls.at(press.ball_radius_mm).object, touch, row.gain) - rest;
     row.residual = likeness_of(row.recorded, row.corrected, *press.circle);
   }
 }
@@ -302,9 +292,12 @@ Likeness compare_likeness(const sim::DeviceSpec& given, const BallRecording& rec
     frame.convertTo(row.frame, CV_8U);
     cv::threshold(press.frame, row.fit_frame, kNearlyWhite, 255, cv::THRESH_BINARY);
     cv::max(row.frame, row.fit_frame, row.fit_frame);
-    row.simulated = as_float(row.simulated_frame) - rest;
+    const cv::Mat seen = balanced_frame(sensor, known->second.object, touch, row.gain);
+    seen.convertTo(row.simulated_frame, CV_8U);
+    row.simulated = seen - rest;
     row.device = likeness_of(row.recorded, row.simulated, *press.circle);
-    row.raw = likeness_of(as_float(press.frame) - recording.rest.mean, row.simulated, *press.circle);
+    row.raw = likeness_of(as_float(press.frame) - recording.rest.mean,
+                          as_float(sensor.ideal(known->second.object, touch)) - rest, *press.circle);
     row.rest = likeness_of(row.recorded, cv::Mat::zeros(row.recorded.size(), CV_32FC3), *press.circle);
     orientation.add(row.recorded, row.simulated, *press.circle);
     slopes.push_back(slopes_of(touch.height, recording.mm_per_px));

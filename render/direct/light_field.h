@@ -16,11 +16,11 @@ namespace touchstone::render {
 
 /// How fine the grid is made, and how lamps are cut into beams.
 struct LightFieldSettings {
-  double accuracy = 2e-3;  ///< relative RMS error of interpolation to reach, see LightField::error
-  int lens_points = 4;     ///< a lamp's lens is averaged over lens_points^2 places; a point lamp takes one
-  GuideCut guides;         ///< into what beams light guides are cut
-  int guide_points = 3;    ///< guide_beam_flows, 1 to 16
-  int most_beams = 64;     ///< of all lamps together, see LightField; a direct renderer takes no more
+  double accuracy = 2e-3;     ///< relative RMS error of interpolation to reach, see LightField::error
+  int lens_points = 4;        ///< a lamp's lens is averaged over lens_points^2 places; a point lamp takes one
+  GuideCut guides;            ///< into what beams light guides are cut
+  int guide_points = 3;       ///< guide_beam_flows, 1 to 16
+  int most_beams = 64;        ///< of all lamps together, see LightField; a direct renderer takes no more
   int most_flows = 64000000;  ///< nodes times beams, of 16 bytes each
   /// What is lit stays so near to the z axis, mm: only there the grid has to be accurate. 0: in all of the box.
   double lit_radius = 0.0;
@@ -62,8 +62,8 @@ struct LightField {
 /// flat faces. The grid starts coarse and is halved along its worst axis until the estimated error is below
 /// `accuracy`. The same bytes for any number of threads.
 /// @throws Error if the scene is faulty, the box is empty, holds a face or a lamp's lens, lies in a light guide's plate
-/// or beside its exit face's plane, or the accuracy needs more than most_flows nodes times beams (as a lobe without a soft rim does
-/// whose edge crosses the box)
+/// or beside its exit face's plane, or the accuracy needs more than most_flows nodes times beams (as a lobe without a
+/// soft rim does whose edge crosses the box)
 LightField make_light_field(const Scene& fixture, const Eigen::AlignedBox3d& reach,
                             const LightFieldSettings& settings = {});
 

@@ -351,6 +351,11 @@ void plan_light(const SceneSpec& scene, Plan& plan, PlanTable& table) {
   plan_print(scene, plan, table);
   plan_interreflection(scene, plan, table);
   plan_bands(scene, plan, table);
+  if (!scene.device.background.empty()) {
+    table.add("background", true,
+              "the device has a frame of an untouched unit: pictures show it where nothing is pressed",
+              "the untouched device's light once, then nothing");
+  }
   if (scene.device.residual) {
     table.add("residual map", true, in_words(*scene.device.residual),
               "a ray a pixel, and two exponentials for each of its centres");

@@ -18,7 +18,6 @@ std::string unfit_for_direct_light(const SceneSpec& scene, const Plan& plan) {
   for (const LampSpec& lamp : device.lamps) {
     if (lamp.visible) return "a lamp has a body that is seen";
   }
-  if (plan.events) return "event pixels' light is path-traced, and frames beside them are to match it";
   if (scene.outputs.error) return "the standard error of path tracing is asked for";
   return {};
 }

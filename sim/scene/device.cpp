@@ -8,6 +8,7 @@
 #include "core/units.h"
 #include "fem/mesh/gel_body.h"
 #include "sim/files/gltf_mesh.h"
+#include "sim/files/image_file.h"
 #include "sim/scene/camera_pipeline.h"
 #include "sim/scene/camera_preset.h"
 #include "sim/scene/device_camera.h"
@@ -438,6 +439,20 @@ void fields(YamlReader& in, CameraSpec& camera) {
 
 namespace {
 
+void add_background(DeviceSpec& device, const std::filesystem::path& file, const SourceLocation& where) {
+  cv::Mat frame;
+  try {
+    frame = read_image(file);
+  } catch (const Error& error) {
+    fail_at(where, "background: {}", error.what());
+  }
+  try {
+    set_background(device, frame);
+  } catch (const Error& error) {
+    fail_at(where, "background: {}: {}", file.string(), error.what());
+  }
+}
+
 void add_residual(DeviceSpec& device, const std::filesystem::path& file, const SourceLocation& where) {
   std::shared_ptr<const ResidualMap> map;
   try {
@@ -452,17 +467,29 @@ void add_residual(DeviceSpec& device, const std::filesystem::path& file, const S
   }
 }
 
-}  // namespace
-
-void set_residual(DeviceSpec& device, std::shared_ptr<const ResidualMap> map) {
+/// What is learned from a unit's frames is for coated gels and colour cameras with their pictures' size.
+void check_from_unit(const DeviceSpec& device, int width_px, int height_px) {
   if (!device.coating) fail("is for coated gels, and the device has no coating");
   if (!device.camera) fail("needs a camera, and the device has none");
   const CameraSpec& camera = *device.camera;
   if (camera.bayer == render::BayerPattern::none) fail("is of red, green and blue, and the device's camera is grey");
-  if (camera.width != map->width_px || camera.height != map->height_px) {
-    fail("is of {} x {} pixels, and the device's camera has {} x {}", map->width_px, map->height_px, camera.width,
-         camera.height);
+  if (camera.width != width_px || camera.height != height_px) {
+    fail("is of {} x {} pixels, and the device's camera has {} x {}", width_px, height_px, camera.width, camera.height);
   }
+}
+
+}  // namespace
+
+void set_background(DeviceSpec& device, const cv::Mat& frame) {
+  if (frame.type() != CV_8UC3) {
+    fail("has {} channels of {} bits; a background has 3 of 8 bits", frame.channels(), 8 * frame.elemSize1());
+  }
+  check_from_unit(device, frame.cols, frame.rows);
+  device.background = frame;
+}
+
+void set_residual(DeviceSpec& device, std::shared_ptr<const ResidualMap> map) {
+  check_from_unit(device, map->width_px, map->height_px);
   device.residual = std::move(map);
 }
 
@@ -482,7 +509,8 @@ void fields(YamlReader& in, DeviceSpec& device) {
   in.optional("room_radiance", device.room_radiance, Allowed::at_least(0.0));
   in.optional("room_radiance_behind", device.room_radiance_behind, Allowed::at_least(0.0));
   in.optional("camera", device.camera);
-  std::string residual;
+  std::string background, residual;
+  in.optional("background", background);
   in.optional("residual", residual);
   if (in.describing()) return;  // there is nothing to check
   if (std::ranges::find(render::kBandCounts, static_cast<int>(device.band_wavelengths_nm.size())) ==
@@ -497,6 +525,7 @@ void fields(YamlReader& in, DeviceSpec& device) {
     check_camera_outside(device, in.where("camera"));
   }
   check_lamps_outside(device, in.where("lamps"));
+  if (in.has("background")) add_background(device, in.folder() / background, in.where("background"));
   if (in.has("residual")) add_residual(device, in.folder() / residual, in.where("residual"));
 }
 

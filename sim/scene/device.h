@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <filesystem>
 #include <memory>
+#include <opencv2/core/mat.hpp>
 #include <optional>
 #include <string>
 #include <variant>
@@ -254,6 +255,9 @@ struct DeviceSpec {
   Colour room_radiance = 0.0;                                 ///< W/m^2/sr in each band
   std::optional<Colour> room_radiance_behind;                 ///< of what is behind a clear gel; absent: the same
   std::optional<CameraSpec> camera;
+  /// A frame of the untouched unit, CV_8UC3 (blue, green, red); in the file its name, relative to the device file.
+  /// Empty: none. Pictures then show what it shows where nothing is pressed (sim/sensor/background_light.h).
+  cv::Mat background;
   std::shared_ptr<const ResidualMap> residual;  ///< in the file its name, relative to the device file; null: none
   SourceLocation where;
 };
@@ -275,6 +279,10 @@ void fields(YamlReader& in, BandsSpec& bands);
 void fields(YamlReader& in, MotionChipSpec& chip);
 void fields(YamlReader& in, CameraSpec& camera);
 void fields(YamlReader& in, DeviceSpec& device);
+
+/// Gives the device a frame of the untouched unit. @throws Error if it has no coating or colour camera, or the frame
+/// another size or kind
+void set_background(DeviceSpec& device, const cv::Mat& frame);
 
 /// Gives the device a residual map. @throws Error if it has no coating or colour camera, or another size of picture
 void set_residual(DeviceSpec& device, std::shared_ptr<const ResidualMap> map);

@@ -13,6 +13,8 @@
 #include "sim/scene/device_camera.h"
 #include "sim/scene/device_gel.h"
 #include "sim/scene/device_imager.h"
+#include "sim/sensor/background_light.h"
+#include "sim/sensor/colour_numbers.h"
 #include "sim/sensor/direct_light.h"
 #include "sim/sensor/light_file.h"
 #include "sim/sensor/residual_light.h"
@@ -26,8 +28,9 @@ constexpr double kClearance_mm = 0.1;  // of the judged ball before its press
 constexpr int kRaysAPixel[] = {1};     // of direct light: some milliseconds a frame
 constexpr int kPathsAPixel = 256;      // where a device is unfit for direct light
 
-/// How far a point of the surface moves along z where the gel is pressed in by `depth_mm` (negative: inwards). A fingertip's
-/// sides, which begin on the plate that it is bonded to, hardly move; nor does the rim of a dome that ends on the plate.
+/// How far a point of the surface moves along z where the gel is pressed in by `depth_mm` (negative: inwards). A
+/// fingertip's sides, which begin on the plate that it is bonded to, hardly move; nor does the rim of a dome that ends
+/// on the plate.
 double pressed_mm(const GelSpec& gel, double z_mm, double depth_mm) {
   if (ends_on_plate(gel)) return std::max(depth_mm, std::min(0.0, -0.5 * (z_mm + gel.thickness_mm)));
   const FingertipSpec* const fingertip = gel.fingertip();
@@ -145,7 +148,13 @@ class CoatedView final : public SensorView {
       }
       choice_ = direct_->choice();
     }
-    rest_light_ = light(*judged_, rest_, {}, rest_seen_);
+    const cv::Mat own = light(*judged_, rest_, {}, rest_seen_);
+    if (!device_.background.empty()) {
+      const render::Imager ideal = imager(device_, judged_->plan.bands, false);
+      irradiance_per_number_ = irradiance_per_number(ideal);
+      lacking_at_rest_ = lacking_at_rest(device_.background, own, ideal);
+    }
+    rest_light_ = with_background(own);
     if (device_.residual) {
       lacking_.emplace(*device_.residual, imager(device_, judged_->plan.bands, false));
       choice_.reason += "; residual map: " + in_words(*device_.residual);
@@ -161,7 +170,7 @@ class CoatedView final : public SensorView {
     const auto relief = view.relief(press);
     const SeenGeometry seen = view.geometry(press, relief);
     SeenTouch touch;
-    touch.light = light(view, press, relief, seen);
+    touch.light = with_background(light(view, press, relief, seen));
     if (!truth && !lacking_) return touch;
     const std::vector<render::FirstHit> hits = render::first_hits(seen.inside, ready_);
     const cv::Mat height = pressed_in(rest_hits_, hits, touch.light.size());
@@ -192,6 +201,10 @@ class CoatedView final : public SensorView {
       object.view = std::make_shared<const SceneView>(scene, make_plan(scene), gel_, *judged_);
     });
     return *object.view;
+  }
+
+  cv::Mat with_background(const cv::Mat& light) const {
+    return lacking_at_rest_.empty() ? light : with_numbers(light, lacking_at_rest_, irradiance_per_number_);
   }
 
   SceneSpec scene_with(const ObjectSpec& object, const MotionSpec& motion) const {
@@ -230,6 +243,8 @@ class CoatedView final : public SensorView {
   std::unique_ptr<const DirectLight> direct_;
   LightChoice choice_{false, "paths: the device is unfit for direct light", {}};
   cv::Mat rest_light_;
+  cv::Mat lacking_at_rest_;  // of a device with a background
+  Eigen::MatrixX3d irradiance_per_number_;
   std::optional<ResidualLight> lacking_;  // none at rest
 };
 

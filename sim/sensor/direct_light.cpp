@@ -64,8 +64,8 @@ Eigen::AlignedBox3d reach_of(const render::Scene& rest, const render::Scene& pre
   return box;
 }
 
-/// How far from the axis the gel is lit, where it's a dome that ends on its plate: the corners of its box are next to lamps
-/// in the plate, whose light is steep there. 0 of others.
+/// How far from the axis the gel is lit, where it's a dome that ends on its plate: the corners of its box are next to
+/// lamps in the plate, whose light is steep there. 0 of others.
 double lit_radius(const GelSpec& gel, const Eigen::AlignedBox3d& reach) {
   if (!ends_on_plate(gel)) return 0.0;
   const Eigen::Array2d far = reach.min().head<2>().cwiseAbs().cwiseMax(reach.max().head<2>().cwiseAbs());

@@ -2,13 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <opencv2/core.hpp>
 
 #include "core/units.h"
 #include "render/events/event_pixels.h"
+#include "sim/press/play_motion.h"
 #include "sim/press/played_states.h"
 #include "sim/press/state_between.h"
+#include "sim/scene/device_camera.h"
 #include "sim/sensor/light_sequence.h"
+#include "sim/view/scene_view.h"
 
 namespace touchstone::sim {
 namespace {
@@ -26,12 +30,12 @@ struct Moment {
 class EventWatch {
  public:
   EventWatch(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel, std::uint64_t noise_seed,
-             const EventSink& sink)
+             std::shared_ptr<const DirectLight> direct, const EventSink& sink)
       : pixels_(scene.device.camera->events.value().pixels, {scene.device.camera->width, scene.device.camera->height},
                 scene.seed, noise_seed),
         smallest_threshold_(pixels_.smallest_threshold()),
         step_(scene.light.event_step * smallest_threshold_),
-        light_(scene, plan, gel, smallest_threshold_),
+        light_(scene, plan, gel, smallest_threshold_, std::move(direct)),
         sink_(sink) {}
 
   void begin(Moment& moment) {
@@ -108,6 +112,17 @@ class EventWatch {
   EventStreamReport report_;
 };
 
+/// Direct light of a scene, where the plan has it and it holds; null: paths.
+std::shared_ptr<const DirectLight> direct_light(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel,
+                                                const fem::GelVibration* vibration,
+                                                const std::vector<std::shared_ptr<const fem::Compliance>>& elastic) {
+  if (!plan.direct_light) return nullptr;
+  const std::vector<Truth> truths = play_motion(scene, plan, gel, {}, vibration, elastic);
+  const SceneView view(scene, plan, gel);
+  auto direct = std::make_shared<const DirectLight>(view, camera_of(*scene.device.camera), truths);
+  return direct->choice().direct ? direct : nullptr;
+}
+
 }  // namespace
 
 EventStreamReport watch_events(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel,
@@ -115,7 +130,7 @@ EventStreamReport watch_events(const SceneSpec& scene, const Plan& plan, const f
                                const fem::GelVibration* vibration,
                                const std::vector<std::shared_ptr<const fem::Compliance>>& elastic) {
   TS_ASSERT(plan.events);
-  EventWatch watch(scene, plan, gel, noise_seed, sink);
+  EventWatch watch(scene, plan, gel, noise_seed, direct_light(scene, plan, gel, vibration, elastic), sink);
   Moment last;
   play_states(scene, plan, gel, vibration, elastic, [&](int frame, int part, const fem::PressState& state) {
     const double frames = frame - 1 + static_cast<double>(part) / plan.states_a_frame;

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
+#include <utility>
 
 #include "core/error.h"
 #include "render/imager/imager.h"
@@ -34,8 +35,10 @@ double photocurrent(const render::QuantumEfficiency& per_irradiance, int channel
 }  // namespace
 
 struct LightSequence::Parts {
-  Parts(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel, double smallest_threshold)
-      : view(scene, plan, gel),
+  Parts(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel, double smallest_threshold,
+        std::shared_ptr<const DirectLight> direct_of)
+      : direct(std::move(direct_of)),
+        view(scene, plan, gel),
         camera(camera_of(*scene.device.camera)),
         size(render::size_of(camera).x(), render::size_of(camera).y()),
         imager(electron_counter(scene.device, plan.bands)),
@@ -50,6 +53,7 @@ struct LightSequence::Parts {
     blur_px = blur_radius_px(camera, nearest);
   }
 
+  std::shared_ptr<const DirectLight> direct;
   SceneView view;
   render::Camera camera;
   cv::Size size;
@@ -114,10 +118,21 @@ struct LightSequence::Parts {
     return mask;
   }
 
-  void put_light(const render::RenderedImage& image, const cv::Mat& mask, SequencePicture& picture) const {
-    const int bands = image.irradiance.channels();
+  /// The whole picture by direct light.
+  SequencePicture direct_picture(const fem::PressState& press) const {
+    const auto image = direct->render(view.seen(press, view.relief(press)));
+    if (!image) fail("events: the gel has gone where the light field of direct light doesn't reach");
+    SequencePicture picture;
+    picture.photocurrent = cv::Mat(size, CV_32FC1, cv::Scalar(0.0));
+    put_light(image->irradiance, cv::Mat(size, CV_8U, cv::Scalar(255)), picture);
+    picture.paths_traced = static_cast<std::int64_t>(image->primary);
+    return picture;
+  }
+
+  void put_light(const cv::Mat& irradiance, const cv::Mat& mask, SequencePicture& picture) const {
+    const int bands = irradiance.channels();
     for (int row = 0; row < size.height; ++row) {
-      const auto* light = image.irradiance.ptr<float>(row);
+      const auto* light = irradiance.ptr<float>(row);
       const auto* set = mask.ptr<unsigned char>(row);
       auto* current = picture.photocurrent.ptr<float>(row);
       for (int column = 0; column < size.width; ++column) {
@@ -127,14 +142,15 @@ struct LightSequence::Parts {
       }
     }
     picture.log_photocurrent = render::log_intensity(picture.photocurrent, pixels);
-    picture.paths_traced = static_cast<std::int64_t>(image.counts.paths);
     picture.pixels_traced = cv::countNonZero(mask);
   }
 };
 
 LightSequence::LightSequence(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel,
-                             double smallest_threshold)
-    : parts_(std::make_unique<const Parts>(scene, plan, gel, smallest_threshold)) {}
+                             double smallest_threshold, std::shared_ptr<const DirectLight> direct)
+    : parts_(std::make_unique<const Parts>(scene, plan, gel, smallest_threshold, std::move(direct))) {
+  TS_ASSERT(!parts_->direct || parts_->direct->choice().direct);
+}
 
 LightSequence::~LightSequence() = default;
 
@@ -147,18 +163,26 @@ double LightSequence::motion(const fem::PressState& from, const fem::PressState&
 }
 
 SequencePicture LightSequence::first(const fem::PressState& press) const {
+  if (parts_->direct) return parts_->direct_picture(press);
   const render::Tracer tracer = parts_->view.tracer(press);
   SequencePicture picture;
   picture.photocurrent = cv::Mat(parts_->size, CV_32FC1, cv::Scalar(0.0));
   picture.preview = parts_->log_preview(tracer);
   picture.traced_at_px = cv::Mat(parts_->size, CV_64FC1, cv::Scalar(0.0));
   const cv::Mat all(parts_->size, CV_8U, cv::Scalar(255));
-  parts_->put_light(tracer.render(parts_->camera, parts_->settings), all, picture);
+  const render::RenderedImage image = tracer.render(parts_->camera, parts_->settings);
+  parts_->put_light(image.irradiance, all, picture);
+  picture.paths_traced = static_cast<std::int64_t>(image.counts.paths);
   return picture;
 }
 
 SequencePicture LightSequence::next(const SequencePicture& before, const fem::PressState& press,
                                     double moved_px) const {
+  if (parts_->direct) {
+    SequencePicture picture = parts_->direct_picture(press);
+    picture.moved_px = before.moved_px + moved_px;
+    return picture;
+  }
   SequencePicture picture = before;
   picture.pixels_traced = picture.paths_traced = 0;
   picture.moved_px = before.moved_px + moved_px;
@@ -171,7 +195,9 @@ SequencePicture LightSequence::next(const SequencePicture& before, const fem::Pr
   preview.copyTo(picture.preview, mask);
   picture.traced_at_px = before.traced_at_px.clone();
   picture.traced_at_px.setTo(picture.moved_px, mask);
-  parts_->put_light(tracer.render(parts_->camera, parts_->settings, mask), mask, picture);
+  const render::RenderedImage image = tracer.render(parts_->camera, parts_->settings, mask);
+  parts_->put_light(image.irradiance, mask, picture);
+  picture.paths_traced = static_cast<std::int64_t>(image.counts.paths);
   return picture;
 }
 

@@ -2,7 +2,6 @@
 
 #include <tbb/parallel_for.h>
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -10,12 +9,12 @@
 #include <utility>
 
 #include "core/error.h"
+#include "sim/sensor/colour_numbers.h"
 
 namespace touchstone::sim {
 namespace {
 
 constexpr int kPixelsATask = 512;
-constexpr double kLeastDeterminant = 1e-9;  // of colours' correlations: 1 where they're orthogonal
 
 double clamped(const cv::Mat& height, int v, int u) {
   return height.at<float>(std::clamp(v, 0, height.rows - 1), std::clamp(u, 0, height.cols - 1));
@@ -107,65 +106,12 @@ cv::Mat residual_numbers(const ResidualMap& map, const cv::Mat& height) {
   return numbers;
 }
 
-Eigen::Matrix3Xd numbers_per_irradiance(const render::Imager& imager) {
-  if (imager.quantum_efficiency.rows() != 3) fail("a residual map is for a colour camera, and this one is grey");
-  constexpr double kDelivered = 255.0;
-  const double full_scale = std::pow(2.0, imager.bits) - 1.0 - imager.black_level_DN;
-  Eigen::Matrix3Xd out(3, imager.quantum_efficiency.cols());
-  for (int c = 0; c < 3; ++c) {
-    const render::Imager channel = render::channel_imager(imager, c);
-    const render::ImagerResponse response = render::response_of(channel);
-    out.row(c) = imager.white_balance[c] * channel.gain_DN_per_e * kDelivered / full_scale *
-                 response.electrons_per_irradiance.row(0);
-  }
-  return out;
-}
-
-cv::Mat linear_numbers(const cv::Mat& light, const Eigen::Matrix3Xd& numbers_per_irradiance) {
-  TS_ASSERT(light.depth() == CV_32F && light.channels() == numbers_per_irradiance.cols());
-  cv::Mat numbers(light.size(), CV_32FC3);
-  const int bands = light.channels();
-  for (int v = 0; v < light.rows; ++v) {
-    const float* from = light.ptr<float>(v);
-    float* to = numbers.ptr<float>(v);
-    for (int u = 0; u < light.cols; ++u) {
-      for (int c = 0; c < 3; ++c) {
-        double sum = 0.0;
-        for (int b = 0; b < bands; ++b) sum += numbers_per_irradiance(c, b) * double(from[u * bands + b]);
-        to[3 * u + c] = static_cast<float>(sum);
-      }
-    }
-  }
-  return numbers;
-}
-
-ResidualLight::ResidualLight(ResidualMap map, const render::Imager& imager) : map_(std::move(map)) {
-  const Eigen::Matrix3Xd numbers = numbers_per_irradiance(imager);
-  const Eigen::Matrix3d square = numbers * numbers.transpose();
-  const double scale = square.diagonal().prod();
-  if (!(square.determinant() > kLeastDeterminant * scale)) {
-    fail("residual map: the camera's three colours don't tell the device's {} bands apart", numbers.cols());
-  }
-  irradiance_per_number_ = numbers.transpose() * square.inverse();
-}
+ResidualLight::ResidualLight(ResidualMap map, const render::Imager& imager)
+    : map_(std::move(map)), irradiance_per_number_(irradiance_per_number(imager)) {}
 
 cv::Mat ResidualLight::corrected(const cv::Mat& light, const cv::Mat& height) const {
-  TS_ASSERT(light.size() == height.size() && light.channels() == irradiance_per_number_.rows());
-  const cv::Mat numbers = residual_numbers(map_, height);
-  cv::Mat out = light.clone();
-  const int bands = light.channels();
-  for (int v = 0; v < out.rows; ++v) {
-    const float* from = numbers.ptr<float>(v);
-    float* to = out.ptr<float>(v);
-    for (int u = 0; u < out.cols; ++u) {
-      for (int b = 0; b < bands; ++b) {
-        double sum = double(to[u * bands + b]);
-        for (int c = 0; c < 3; ++c) sum += irradiance_per_number_(b, c) * double(from[3 * u + c]);
-        to[u * bands + b] = static_cast<float>(std::max(sum, 0.0));
-      }
-    }
-  }
-  return out;
+  TS_ASSERT(light.size() == height.size());
+  return with_numbers(light, residual_numbers(map_, height), irradiance_per_number_);
 }
 
 cv::Mat pressed_in(const std::vector<render::FirstHit>& rest, const std::vector<render::FirstHit>& now, cv::Size size) {

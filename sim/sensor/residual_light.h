@@ -22,16 +22,9 @@ Eigen::MatrixXd residual_features(const ResidualMap& map, const cv::Mat& height,
 Eigen::MatrixXd residual_bumps(const Eigen::MatrixXd& centres, const Eigen::MatrixXd& features, bool place);
 
 /// The correction of each pixel: CV_32FC3, red, green, blue, in numbers of 255 of linear light behind white balance,
-/// before the tone curve. The same bytes for any number of threads. @pre height is CV_32FC1 of the map's size
+/// before the tone curve (colour_numbers.h). The same bytes for any number of threads. @pre height is CV_32FC1 of the
+/// map's size
 cv::Mat residual_numbers(const ResidualMap& map, const cv::Mat& height);
-
-/// What a colour camera's numbers are of light: 3 x bands, red, green, blue, numbers of 255 a W/m^2, linear (no limits,
-/// no rounding), behind white balance, before the tone curve; without black level.
-/// @throws Error if the imager is grey
-Eigen::Matrix3Xd numbers_per_irradiance(const render::Imager& imager);
-
-/// `light` (CV_32FC(bands)) in such numbers, CV_32FC3, red, green, blue.
-cv::Mat linear_numbers(const cv::Mat& light, const Eigen::Matrix3Xd& numbers_per_irradiance);
 
 /// A map for one camera.
 class ResidualLight {

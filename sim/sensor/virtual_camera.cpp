@@ -17,6 +17,8 @@
 #include "sim/press/exposure_times.h"
 #include "sim/scene/device_camera.h"
 #include "sim/scene/device_imager.h"
+#include "sim/sensor/background_light.h"
+#include "sim/sensor/colour_numbers.h"
 #include "sim/sensor/direct_light.h"
 #include "sim/sensor/key_frames.h"
 #include "sim/sensor/residual_light.h"
@@ -86,17 +88,39 @@ struct VirtualCamera::Parts : SceneView {
   std::optional<ResidualLight> lacking;                  // of a device with a residual map
   mutable std::mutex seeing_rest;
   mutable std::vector<render::FirstHit> rest_hits;  // with it, once asked for
+  mutable cv::Mat lacking_there;                    // of a device with a background, once asked for
+  mutable Eigen::MatrixX3d of_number;               // irradiance_per_number, with it
 
-  /// Light with what the device's residual map adds to it, if it has one.
+  /// The untouched device's light.
+  cv::Mat light_at_rest(const fem::PressState& press) const {
+    const render::Scene rest = seen(at_rest(press), {});
+    if (direct) {
+      if (const auto image = direct->render(rest)) return image->irradiance;
+    }
+    render::RenderSettings well = settings;
+    well.noise = noise_target(response, kKeyFrameFraction * scene.light.noise_fraction);
+    well.max_samples *= kFirstFrameSamples;
+    return render::Tracer(rest).render(camera, well).irradiance;
+  }
+
+  /// Light with what the device's background and residual map add to it, if it has one.
   cv::Mat corrected(const cv::Mat& irradiance, const fem::PressState& press,
                     const std::optional<fem::ReliefAnswer>& relief) const {
-    if (!lacking) return irradiance;
+    const bool has_background = !scene.device.background.empty();
+    if (!lacking && !has_background) return irradiance;
     locked_work(seeing_rest, [&] {
-      if (!rest_hits.empty()) return;
-      rest_hits = render::first_hits(SceneView::geometry(at_rest(press), {}).inside, ready);
+      if (lacking && rest_hits.empty()) {
+        rest_hits = render::first_hits(SceneView::geometry(at_rest(press), {}).inside, ready);
+      }
+      if (has_background && lacking_there.empty()) {
+        of_number = irradiance_per_number(ideal_imager);
+        lacking_there = lacking_at_rest(scene.device.background, light_at_rest(press), ideal_imager);
+      }
     });
+    const cv::Mat on_background = has_background ? with_numbers(irradiance, lacking_there, of_number) : irradiance;
+    if (!lacking) return on_background;
     const std::vector<render::FirstHit> now = render::first_hits(SceneView::geometry(press, relief).inside, ready);
-    return lacking->corrected(irradiance, pressed_in(rest_hits, now, size));
+    return lacking->corrected(on_background, pressed_in(rest_hits, now, size));
   }
 
   /// The first frame's and those before and after a time: the gel at rest, and what the frame is most like.

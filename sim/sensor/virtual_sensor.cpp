@@ -14,6 +14,7 @@
 #include "sim/scene/device_imager.h"
 #include "sim/sensor/clear_view.h"
 #include "sim/sensor/coated_view.h"
+#include "sim/sensor/colour_numbers.h"
 #include "sim/sensor/milky_view.h"
 #include "sim/sensor/press_events.h"
 #include "sim/sensor/residual_light.h"
@@ -394,9 +395,16 @@ cv::Mat VirtualSensor::with_residual(const ResidualMap& map, const cv::Mat& ligh
   return ResidualLight(map, parts_->optics().imager).corrected(light, height);
 }
 
-cv::Mat VirtualSensor::ideal(const TouchObject& object, const Touch& touch) const {
-  const render::Imager imager =
+cv::Mat VirtualSensor::ideal(const TouchObject& object, const Touch& touch, const cv::Vec3d& exposure) const {
+  render::Imager imager =
       render::controlled(sim::imager(parts_->device, parts_->bands_of(*object.seen_), false), touch.control);
+  // The longest exposure for all, of which the others' colours see a part.
+  const double longest = std::max({exposure[0], exposure[1], exposure[2]});
+  imager.exposure_s *= longest;
+  const Eigen::Index channels = imager.quantum_efficiency.rows();
+  for (Eigen::Index channel = 0; channel < channels; ++channel) {
+    imager.quantum_efficiency.row(channel) *= exposure[static_cast<int>(channels - 1 - channel)] / longest;
+  }
   return render::develop(render::expose(touch.light, imager, parts_->optics().pattern, 0, 0), imager);
 }
 

@@ -157,10 +157,11 @@ class VirtualSensor {
   cv::Mat background(std::uint64_t noise_seed, int frame = 0) const;
   /// The light of the untouched device.
   const cv::Mat& background_light() const;
-  /// The frame of a touch by this object, without noise and fixed pattern.
-  cv::Mat ideal(const TouchObject& object, const Touch& touch) const;
+  /// The frame of a touch by this object, without noise and fixed pattern. `exposure`: what the camera's exposure is
+  /// multiplied by, a colour (blue, green, red); full scale stays.
+  cv::Mat ideal(const TouchObject& object, const Touch& touch, const cv::Vec3d& exposure = {1, 1, 1}) const;
   /// Light (Touch::light) in the camera's numbers without noise, limits, rounding and tone curve: CV_32FC3, red, green,
-  /// blue, of 255, behind white balance (sim/sensor/residual_light.h). @throws Error for a grey camera
+  /// blue, of 255, behind white balance (sim/sensor/colour_numbers.h). @throws Error for a grey camera
   cv::Mat linear_numbers(const cv::Mat& light) const;
   /// The light with what `map` says is missing where the membrane is pressed in so (Touch::height). A device with a
   /// map of its own has it in Touch::light already. @throws Error as ResidualLight, or for pictures of another size

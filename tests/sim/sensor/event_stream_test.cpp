@@ -8,10 +8,13 @@
 #include <opencv2/core.hpp>
 #include <tuple>
 
+#include "sim/press/gel_setup.h"
 #include "sim/press/play_motion.h"
+#include "sim/scene/scene.h"
 #include "sim/sensor/event_picture.h"
 #include "sim/sensor/light_sequence.h"
 #include "tests/sim/press/moving_scene.h"
+#include "tests/support/temporary_folder.h"
 
 namespace touchstone::sim {
 namespace {
@@ -140,6 +143,54 @@ TEST(EventStream, ItsPictureIsRedWhereLightGrew) {
   EXPECT_EQ(picture.at<cv::Vec3b>(0, 2)[0], 255);
   EXPECT_LT(picture.at<cv::Vec3b>(0, 2)[2], picture.at<cv::Vec3b>(0, 1)[0]) << "two events are more than one";
   EXPECT_EQ(picture.at<cv::Vec3b>(0, 3), cv::Vec3b(128, 128, 128));
+}
+
+/// Event pixels behind a coated gel with dots.
+constexpr const char* kCoated = R"(name: coated
+gel: {size_x_mm: 12, size_y_mm: 12, thickness_mm: 3, youngs_modulus_MPa: 0.3, poisson_ratio: 0.49, refractive_index: 1.41}
+mesh: {fine_mm: 0.8, coarse_mm: 2, fine_half_extent_mm: [3, 3], fine_depth_mm: 1}
+plate: {thickness_mm: 1, refractive_index: 1.5}
+camera: {type: lens, width: 32, height: 24, pixel_pitch_um: 80, focal_length_mm: 6, f_number: 8, focus_distance_mm: 27,
+  lens_position_mm: [0, 0, -28], look_at_mm: [0, 0, 0], exposure_us: 100, active_area_um2: 6000, full_well_e: 100000,
+  events: {on_threshold: 0.05, off_threshold: 0.05, dark_e_per_s: 1000}}
+coating: {type: matt, albedo: 0.5, print: {grid: [4, 4], spacing_mm: [2, 2], diameter_mm: 0.8, colour: 0.05}}
+lamps:
+  - {position_mm: [-9, 0, -14], target_mm: [0, 0, 0], lens_radius_mm: 0.5, half_angle_deg: 40, power_W: 0.03}
+band_wavelengths_nm: [580]
+)";
+
+TEST(EventStream, ACoatedGelsEventsByDirectLightAddUpToTheChangeThatPathsSee) {
+  const test::TemporaryFolder folder;
+  folder.write("device.yaml", kCoated);
+  folder.write("ball.yaml", "{name: ball, shape: {type: sphere, radius_mm: 3}, albedo: 0.4, friction: 0.5}");
+  folder.write("press.yaml",
+               "start_mm: [0, 0, 3.05]\nframe_rate_Hz: 100\nkeys:\n  - {frames: 2, z: {position_mm: 2.4}}\n");
+  const SceneSpec scene = read_scene(
+      folder.write("scene.yaml",
+                   "device: device.yaml\nobject: ball.yaml\nmotion: press.yaml\noutputs: {events: true}\nseed: 4\n"
+                   "light: {max_samples: 4096}\n"));
+  const Plan plan = make_plan(scene);
+  ASSERT_TRUE(plan.direct_light);
+  const auto gel = set_up_gel(scene.device, folder.path());
+  Stream stream;
+  stream.report = watch_events(scene, plan, *gel, 3, [&](std::span<const Event> some) {
+    stream.events.insert(stream.events.end(), some.begin(), some.end());
+  });
+  ASSERT_GT(stream.events.size(), 200u);
+  EXPECT_EQ(stream.report.pixels_traced, stream.report.pictures * 32 * 24);
+
+  cv::Mat net(24, 32, CV_32F, cv::Scalar(0));
+  for (const Event& event : stream.events) net.at<float>(event.y, event.x) += event.on ? 1.0f : -1.0f;
+  constexpr double kThreshold = 0.05;
+  const auto truths = play_motion(scene, plan, *gel);
+  const LightSequence paths(scene, plan, *gel, kThreshold);
+  const cv::Mat change =
+      paths.first(truths.back().press).log_photocurrent - paths.first(truths.front().press).log_photocurrent;
+  const cv::Mat off = kThreshold * net - change;
+  // A pixel's events lag by a threshold at most; paths have noise of 1 %, direct light errs by some percent.
+  EXPECT_LT(cv::norm(off, cv::NORM_L2) / std::sqrt(24.0 * 32), kThreshold);
+  EXPECT_LT(cv::norm(off, cv::NORM_INF), 4 * kThreshold);
+  EXPECT_LT(std::abs(cv::mean(off)[0]), 0.2 * kThreshold);
 }
 
 }  // namespace

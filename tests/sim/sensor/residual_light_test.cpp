@@ -14,6 +14,7 @@
 #include "sim/press/play_motion.h"
 #include "sim/scene/device_imager.h"
 #include "sim/scene/scene.h"
+#include "sim/sensor/colour_numbers.h"
 #include "sim/sensor/virtual_camera.h"
 #include "sim/sensor/virtual_sensor.h"
 #include "tests/support/message_of.h"

@@ -82,7 +82,7 @@ camera:
   full_well_e: 5000
   read_noise_e: 4
 )",
-                               "device.yaml");
+                                "device.yaml");
 }
 
 TEST(VirtualSensor, ADomeThatEndsOnThePlateIsLitByLampsInThePlate) {
