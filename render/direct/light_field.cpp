@@ -14,6 +14,8 @@
 namespace touchstone::render {
 namespace {
 
+constexpr double kMostNodes = 2.5e6;  // some 5 s on two cores; a light that takes more has an edge in the box
+
 /// The fixture with unit intensity in one band, with the absorption of one band (or none for a negative number).
 Scene single_band(const Scene& fixture, int band) {
   Scene scene;
@@ -378,11 +380,12 @@ LightField make_light_field(const Scene& fixture, const Eigen::AlignedBox3d& rea
   for (int halved = -1;;) {
     field.nodes = cells + 1;
     field.step = size / cells.cast<double>();
-    if (field.nodes.cast<double>().prod() * field.beam_count() > settings.most_flows) {
+    const double nodes = field.nodes.cast<double>().prod();
+    if (nodes > kMostNodes || nodes * field.beam_count() > settings.most_flows) {
       fail(
-          "light field: accuracy {} needs {} nodes or more of {} beams, most_flows is {} (the last grid's error is "
-          "{:.2g}; a lobe's rim that crosses the box needs a wider soft_angle)",
-          settings.accuracy, field.nodes.prod(), field.beam_count(), settings.most_flows, field.error);
+          "light field: accuracy {} needs {} nodes or more of {} beams; {} nodes and {} of both are allowed (the last "
+          "grid's error is {:.2g}; a lobe's rim that crosses the box needs a wider soft_angle)",
+          settings.accuracy, nodes, field.beam_count(), kMostNodes, settings.most_flows, field.error);
     }
     maker.fill(field, halved);
     field.error = maker.error(field, Eigen::Array3d::Constant(0.5));
