@@ -28,7 +28,7 @@ void fit(const std::filesystem::path& file, const std::filesystem::path& out, co
   for (const lab::UnidentifiableCombination& combination : result.unidentified)
     fmt::print("not identified: {}\n", combination.words);
   fmt::print("misfit {:.2f} -> {:.2f} of the noise\n", result.misfit_before, result.misfit_after);
-  if (!result.converged) spdlog::warn("the fit hasn't converged; take its intervals with care");
+  for (const std::string& doubt : result.doubts) spdlog::warn("{}", doubt);
   fmt::print("{}: the fitted device, the report and its pictures\n", out.string());
 }
 

@@ -85,6 +85,7 @@ LeastSquaresResult least_squares(const LeastSquaresProblem& problem, const Eigen
         result.x = x;
         result.residuals = residuals;
         ++result.steps;
+        if (problem.on_step) problem.on_step(result.x, result.residuals, result.steps);
         break;
       }
       damping *= growth;

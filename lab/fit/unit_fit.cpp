@@ -388,18 +388,22 @@ UnitRecording read_recording(const PreparedFit& fit) {
   }
   if (!backgrounds.empty()) recording.background = mean_picture(backgrounds);
   for (const RecordedPress& press : fit.spec.presses) {
-    recording.presses.push_back(read_block_picture(press.picture, *fit.device.camera, fit.spec.coarse_px, press.where));
+    recording.presses.push_back(
+        press.frame.empty()
+            ? read_block_picture(press.picture, *fit.device.camera, fit.spec.coarse_px, press.where)
+            : block_picture(press.frame, press.picture.string(), *fit.device.camera, fit.spec.coarse_px, press.where));
   }
   return recording;
 }
 
 UnitFit fit_unit(const PreparedFit& fit, const UnitRecording& recording, const std::filesystem::path& cache_folder,
-                 const Progress& progress) {
+                 const Progress& progress, const FitStep& on_step) {
   UnitSimulation simulation(fit, cache_folder, progress);
-  return fit_unit(fit, recording, simulation);
+  return fit_unit(fit, recording, simulation, on_step);
 }
 
-UnitFit fit_unit(const PreparedFit& fit, const UnitRecording& recording, UnitSimulation& simulation) {
+UnitFit fit_unit(const PreparedFit& fit, const UnitRecording& recording, UnitSimulation& simulation,
+                 const FitStep& on_step) {
   TS_ASSERT(recording.presses.size() == fit.spec.presses.size());
   const std::vector<PressPose> labelled = labelled_poses(fit, simulation);
   const Variables variables = variables_of(fit, labelled);
@@ -411,6 +415,11 @@ UnitFit fit_unit(const PreparedFit& fit, const UnitRecording& recording, UnitSim
   problem.jacobian = [&](const Vector& x, const Vector& at) { return all.jacobian(x, at); };
   problem.low = variables.low;
   problem.high = variables.high;
+  if (on_step) {
+    problem.on_step = [&](const Vector& x, const Vector& at, int step) {
+      on_step(step, root_mean_square(at, 0, all.rows), text_at(fit, all.unknowns(x)));
+    };
+  }
   const Vector before = all.residuals(variables.start);
   const LeastSquaresResult found = least_squares(problem, variables.start);
   const SimulatedUnit shown = simulation.show(all.unknowns(found.x), all.poses(found.x));
@@ -437,9 +446,12 @@ UnitFit fit_unit(const PreparedFit& fit, const UnitRecording& recording, UnitSim
     const auto at = variables.unknowns + static_cast<Eigen::Index>(k);
     FittedPress& press = out.presses[static_cast<std::size_t>(variables.poses[k].press)];
     const double deviation = variables.scale[at] * certainty.deviation[at];
+    const bool at_end = found.x[at] <= variables.low[at] || found.x[at] >= variables.high[at];
     if (variables.poses[k].of == PoseVariable::Of::depth) {
       press.depth_deviation_mm = deviation;
+      press.depth_at_end = at_end;
     } else {
+      press.place_at_end = press.place_at_end || at_end;
       press.place_deviation_mm = std::max(press.place_deviation_mm, deviation);
     }
   }
@@ -451,6 +463,7 @@ UnitFit fit_unit(const PreparedFit& fit, const UnitRecording& recording, UnitSim
   out.converged = found.converged;
   out.lamp_setups = simulation.lamp_setups();
   out.device_text = text_at(fit, all.unknowns(found.x));
+  out.doubts = doubts_of(fit, out);
   if (!recording.background.mean.empty()) out.shown.push_back(shown.background);
   out.shown.insert(out.shown.end(), shown.presses.begin(), shown.presses.end());
   return out;

@@ -3,6 +3,7 @@
 // recorded with it, how well they are known, and what can't be identified. docs/calibration.md describes the method.
 
 #include <filesystem>
+#include <functional>
 #include <opencv2/core/mat.hpp>
 #include <string>
 #include <vector>
@@ -60,6 +61,7 @@ struct FittedPress {
   double x_mm = 0.0, y_mm = 0.0, depth_mm = 0.0;
   double place_deviation_mm = 0.0, depth_deviation_mm = 0.0;  ///< 0 where they were given as known
   double force_N = 0.0;                                       ///< that the simulation has there
+  bool place_at_end = false, depth_at_end = false;            ///< at an end of the range that their labels allow
 };
 
 /// The fitted numbers, how sure they are, and how well the recordings are met.
@@ -72,18 +74,24 @@ struct UnitFit {
   std::int64_t residuals = 0;
   int steps = 0;
   bool converged = false;
-  int lamp_setups = 0;         ///< lamps' light that was set up
-  std::string device_text;     ///< the device's file with the fitted numbers
-  std::vector<cv::Mat> shown;  ///< simulated in the end, CV_64F: background if there is one, then presses
+  int lamp_setups = 0;              ///< lamps' light that was set up
+  std::vector<std::string> doubts;  ///< doubts_of it
+  std::string device_text;          ///< the device's file with the fitted numbers
+  std::vector<cv::Mat> shown;       ///< simulated in the end, CV_64F: background if there is one, then presses
 };
+
+/// Told of each step of a fit: its number from 1, the misfit (standard deviations of the noise) and the device's file
+/// as it is then.
+using FitStep = std::function<void(int step, double misfit, const std::string& device_text)>;
 
 /// The same fit gives the same numbers, whatever the threads. @throws Error if what is to be simulated can't be
 UnitFit fit_unit(const PreparedFit& fit, const UnitRecording& recording, const std::filesystem::path& cache_folder,
-                 const Progress& progress = {});
+                 const Progress& progress = {}, const FitStep& on_step = {});
 
 /// The same with a simulation that may have been used before, for several fits of one design. `simulation` is of a fit
 /// that differs from this one in labels and pictures alone.
-UnitFit fit_unit(const PreparedFit& fit, const UnitRecording& recording, UnitSimulation& simulation);
+UnitFit fit_unit(const PreparedFit& fit, const UnitRecording& recording, UnitSimulation& simulation,
+                 const FitStep& on_step = {});
 
 /// The report for people, Markdown.
 std::string to_markdown(const PreparedFit& fit, const UnitFit& result);
@@ -93,7 +101,11 @@ std::string to_json(const PreparedFit& fit, const UnitFit& result);
 /// Recorded, simulated and their difference (grey is none, tenfold) of each picture, side by side: CV_8UC3.
 cv::Mat misfit_sheet(const UnitRecording& recording, const UnitFit& result);
 
+/// What stands at an end of what was allowed, or else gives reason to doubt the fit: sentences for people.
+std::vector<std::string> doubts_of(const PreparedFit& fit, const UnitFit& result);
+
 /// Fits and puts NAME.md, NAME.json, NAME.yaml (the device) and NAME.png (misfit_sheet) into a folder, which is made.
+/// While it works, NAME.so-far.yaml is the device of the last step.
 /// @throws Error for anything wrong with the fit's file, or a folder that can't be made
 UnitFit run_unit_fit(const std::filesystem::path& file, const std::filesystem::path& folder,
                      const std::filesystem::path& cache_folder, const Progress& progress = {});

@@ -44,7 +44,7 @@ UnitFitSpec flat_gelsight_fit(const std::filesystem::path& scenes, int coarse_px
 }
 
 void add_unknown(UnitFitSpec& spec, const std::string& path, UnknownHow how, double low, double high, bool together) {
-  spec.unknowns.push_back({path, how, low, high, together, {}});
+  spec.unknowns.push_back({path, {path}, how, low, high, together, {}});
 }
 
 RecordedUnit record_unit(const PreparedFit& fit, const Eigen::VectorXd& hidden, int backgrounds, std::uint64_t seed,

@@ -7,6 +7,7 @@
 #include "core/error.h"
 #include "core/whole_file.h"
 #include "datasets/inspection/contact_sheet.h"
+#include "lab/fit/recorded_balls.h"
 #include "lab/fit/unit_fit.h"
 #include "lab/studies/study.h"
 #include "sim/files/image_file.h"
@@ -47,6 +48,32 @@ cv::Mat eight_bits(const cv::Mat& picture, double factor, double offset) {
 
 }  // namespace
 
+std::vector<std::string> doubts_of(const PreparedFit& fit, const UnitFit& result) {
+  std::vector<std::string> doubts;
+  if (!result.converged) doubts.emplace_back("the fit hasn't converged: take its intervals with care");
+  for (const FittedUnknown& unknown : result.unknowns) {
+    if (!unknown.at_end) continue;
+    doubts.push_back(
+        fmt::format("{}: {:.5g} is an end of its allowed range; a wider one may fit better, or the device's file "
+                    "is wrong elsewhere",
+                    unknown.name, unknown.value));
+  }
+  for (std::size_t i = 0; i < result.presses.size(); ++i) {
+    const FittedPress& press = result.presses[i];
+    const std::string name = fit.spec.presses[i].picture.filename().string();
+    if (press.depth_at_end) {
+      doubts.push_back(
+          fmt::format("{}: its depth, {:.4g} mm, is an end of what its label and deepest_mm ({:.4g} mm) allow", name,
+                      press.depth_mm, fit.deepest_mm));
+    }
+    if (press.place_at_end) {
+      doubts.push_back(fmt::format("{}: its place, ({:.4g}, {:.4g}) mm, is an end of what its label allows", name,
+                                   press.x_mm, press.y_mm));
+    }
+  }
+  return doubts;
+}
+
 std::string to_markdown(const PreparedFit& fit, const UnitFit& result) {
   std::string text = fmt::format(
       "# {}\n\nThe device {} fitted to {} presses{}: {} numbers of blocks of {} x {} pixels, {} steps, {}.\n\n"
@@ -84,6 +111,9 @@ std::string to_markdown(const PreparedFit& fit, const UnitFit& result) {
         "value, "
         "or leave it out of `unknowns`.\n";
   }
+  text += "\n## Doubts\n\n";
+  if (result.doubts.empty()) text += "None: it has converged, and nothing stands at an end of what was allowed.\n";
+  for (const std::string& doubt : result.doubts) text += "- " + doubt + "\n";
   text +=
       "\n## Misfit\n\n| what | before | after | before | after |\n|---|---|---|---|---|\n| | of the noise | of the "
       "noise | "
@@ -145,12 +175,15 @@ std::string to_json(const PreparedFit& fit, const UnitFit& result) {
                               {"before_numbers", number(misfit.before_numbers)},
                               {"after_numbers", number(misfit.after_numbers)}});
   }
+  all["doubts"] = result.doubts;
   all["presses"] = Json::array();
   for (const FittedPress& press : result.presses) {
     all["presses"].push_back({{"place_mm", {press.x_mm, press.y_mm}},
                               {"place_standard_error_mm", number(press.place_deviation_mm)},
                               {"depth_mm", number(press.depth_mm)},
                               {"depth_standard_error_mm", number(press.depth_deviation_mm)},
+                              {"place_at_end", press.place_at_end},
+                              {"depth_at_end", press.depth_at_end},
                               {"simulated_force_N", number(press.force_N)}});
   }
   return all.dump(1) + "\n";
@@ -176,15 +209,20 @@ cv::Mat misfit_sheet(const UnitRecording& recording, const UnitFit& result) {
 
 UnitFit run_unit_fit(const std::filesystem::path& file, const std::filesystem::path& folder,
                      const std::filesystem::path& cache_folder, const Progress& progress) {
-  const PreparedFit fit = prepare_fit(file);
+  const PreparedFit fit = prepare_fit(with_recording(read_yaml<UnitFitSpec>(file), cache_folder, progress));
   const UnitRecording recording = read_recording(fit);
   make_study_folder(folder);  // before minutes of work that couldn't be kept
-  UnitFit result = fit_unit(fit, recording, cache_folder, progress);
   const auto path = [&](const char* ending) { return folder / (fit.spec.name + ending); };
+  const FitStep on_step = [&](int step, double misfit, const std::string& device_text) {
+    write_whole_file(path(".so-far.yaml"), device_text);
+    if (progress) progress(fmt::format("step {}, misfit {:.2f} of the noise", step, misfit), 1, 1);
+  };
+  UnitFit result = fit_unit(fit, recording, cache_folder, progress, on_step);
   write_whole_file(path(".md"), to_markdown(fit, result));
   write_whole_file(path(".json"), to_json(fit, result));
   write_whole_file(path(".yaml"), result.device_text);
   sim::write_png(path(".png"), misfit_sheet(recording, result));
+  std::filesystem::remove(path(".so-far.yaml"));
   return result;
 }
 

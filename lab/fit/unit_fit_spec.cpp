@@ -64,8 +64,12 @@ std::vector<FitUnknown> unknowns_of(const UnitFitSpec& spec, const std::string& 
   std::set<std::string> taken;
   for (const UnknownSpec& asked : spec.unknowns) {
     std::vector<FitUnknown> found;
-    for (const std::vector<YamlNumber>& group :
-         find_yaml_numbers(text, spec.device.string(), asked.path, asked.where)) {
+    std::vector<std::vector<YamlNumber>> groups;
+    for (const std::string& path : asked.paths) {
+      const auto more = find_yaml_numbers(text, spec.device.string(), path, asked.where);
+      groups.insert(groups.end(), more.begin(), more.end());
+    }
+    for (const std::vector<YamlNumber>& group : groups) {
       if (found.empty() || !asked.together) {
         const std::string& first = group.front().path;
         const std::string own = group.size() > 1 ? first.substr(0, first.rfind('[')) : first;  // a list's own name
@@ -127,7 +131,9 @@ void require_identifiable(const FitUnknown& unknown, const UnitFitSpec& spec, co
 
 void fields(YamlReader& in, UnknownSpec& unknown) {
   unknown.where = in.where();
-  in.required("path", unknown.path);
+  in.exactly_one_of({"path", "paths"});
+  in.optional("path", unknown.path);
+  in.optional("paths", unknown.paths);
   in.exactly_one_of({"times", "plus"});
   std::vector<double> range;
   for (const auto& [name, how] : {std::pair{"times", UnknownHow::times}, std::pair{"plus", UnknownHow::plus}}) {
@@ -137,6 +143,16 @@ void fields(YamlReader& in, UnknownSpec& unknown) {
   }
   in.optional("together", unknown.together);
   if (in.describing()) return;
+  if (in.has("paths")) {
+    if (unknown.paths.size() < 2) {
+      fail_at(in.where("paths"), "{}paths: has {}; it names two or more, one alone is a `path`", in.context(),
+              unknown.paths.size());
+    }
+    unknown.together = true;
+    for (const std::string& path : unknown.paths) unknown.path += (unknown.path.empty() ? "" : ", ") + path;
+  } else {
+    unknown.paths = {unknown.path};
+  }
   const bool times = unknown.how == UnknownHow::times;
   const double still = times ? 1.0 : 0.0;
   if (range.size() != 2 || !(range[0] <= still && still <= range[1] && range[0] < range[1])) {
@@ -173,6 +189,25 @@ void fields(YamlReader& in, RecordedPress& press) {
   }
 }
 
+void fields(YamlReader& in, RecordingSpec& recording) {
+  recording.where = in.where();
+  std::string folder;
+  in.required("folder", folder);
+  recording.folder = in.folder() / folder;
+  recording.rest = {"rest.png"};
+  in.optional("rest", recording.rest);
+  in.required("mm_per_px", recording.mm_per_px, Allowed::above(0.0));
+  in.optional("presses", recording.presses);
+  in.optional("radius_sd_px", recording.radius_sd_px, Allowed::at_least(0.0));
+  if (in.describing()) return;
+  if (recording.rest.empty()) fail_at(in.where("rest"), "recording.rest: has none; at least one is needed");
+  for (const std::string& name : {std::string("presses.csv"), recording.rest.front()}) {
+    if (!std::filesystem::is_regular_file(recording.folder / name)) {
+      fail_at(in.where("folder"), "recording.folder: there is no file {}", (recording.folder / name).string());
+    }
+  }
+}
+
 void fields(YamlReader& in, UnitFitSpec& fit) {
   fit.where = in.where();
   in.required("name", fit.name);
@@ -180,7 +215,10 @@ void fields(YamlReader& in, UnitFitSpec& fit) {
   in.required("unknowns", fit.unknowns);
   std::vector<std::string> backgrounds;
   in.optional("backgrounds", backgrounds);
-  in.required("presses", fit.presses);
+  in.exactly_one_of({"presses", "recording"});
+  in.optional("presses", fit.presses);
+  in.optional("recording", fit.recording);
+  in.not_beside("recording", {"backgrounds"});  // which it has
   in.optional("differences", fit.differences);
   in.optional("coarse_px", fit.coarse_px, Allowed::within(1, 32));
   in.optional("deepest_mm", fit.deepest_mm, Allowed::above(0.0));
@@ -191,8 +229,8 @@ void fields(YamlReader& in, UnitFitSpec& fit) {
     fail_at(in.where("name"), "name: '{}' can't name files; allowed are up to 100 letters, digits, - and _", fit.name);
   }
   if (fit.unknowns.empty()) fail_at(in.where("unknowns"), "unknowns: has none; at least one is needed");
-  if (fit.presses.empty()) fail_at(in.where("presses"), "presses: has none; at least one is needed");
-  if (fit.differences && backgrounds.empty()) {
+  if (fit.presses.empty() && !fit.recording) fail_at(in.where("presses"), "presses: has none; at least one is needed");
+  if (fit.differences && backgrounds.empty() && !fit.recording) {
     fail_at(in.where("differences"), "differences: true, but there are no `backgrounds` that presses could be less");
   }
   for (const std::string& name : backgrounds) {
@@ -261,7 +299,7 @@ PreparedFit prepare_fit(const UnitFitSpec& spec) {
   double deepest = 0.0;
   bool all_known = true;
   for (const RecordedPress& press : spec.presses) {
-    fit.objects.push_back(sim::read_object(press.object));
+    fit.objects.push_back(press.body ? *press.body : sim::read_object(press.object));
     if (fit.objects.back().elastic) {
       fail_at(press.where, "object {}: is elastic; a fit takes rigid ones", fit.objects.back().name);
     }

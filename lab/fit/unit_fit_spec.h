@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <filesystem>
+#include <opencv2/core/mat.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -25,7 +26,8 @@ enum class UnknownHow : std::uint8_t {
 /// Numbers of the device's file that aren't known. Each place that the path leads to is an unknown of its own
 /// (core/edited_yaml.h), unless they go `together`; numbers of one list always go together.
 struct UnknownSpec {
-  std::string path;
+  std::string path;                ///< of `paths` all, with commas between them
+  std::vector<std::string> paths;  ///< `path` alone, or several whose numbers all change together
   UnknownHow how = UnknownHow::times;
   double low = 0.0, high = 0.0;  ///< the factors, or what is added, that are allowed
   bool together = false;
@@ -34,8 +36,10 @@ struct UnknownSpec {
 
 /// One recorded press.
 struct RecordedPress {
-  std::filesystem::path picture;
-  std::filesystem::path object;
+  std::filesystem::path picture;  ///< of a RecordingSpec's presses the name alone
+  std::filesystem::path object;   ///< empty where `body` says what is pressed
+  cv::Mat frame;                  ///< in place of the picture's file; empty: that is read
+  std::optional<sim::ObjectSpec> body;
   Eigen::Vector2d place_mm = Eigen::Vector2d::Zero();    ///< of the object's origin, gel frame
   Eigen::Vector3d angles_deg = Eigen::Vector3d::Zero();  ///< about the fixed axes x, then y, then z
   double place_sd_mm = 0.0;                              ///< of each coordinate; 0: it's known
@@ -46,6 +50,17 @@ struct RecordedPress {
   SourceLocation where;
 };
 
+/// Presses of balls as `touchstone compare` reads them: a table of pictures and contacts' circles. Places come of the
+/// circles' middles, depths of their radii by the device's own mechanics, each frame's own white balance is taken out.
+struct RecordingSpec {
+  std::filesystem::path folder;      ///< with presses.csv (lab/gelsight/ball_press_table.h)
+  std::vector<std::string> rest;     ///< pictures in it of the untouched sensor
+  double mm_per_px = 0.0;            ///< on the gel
+  std::vector<std::string> presses;  ///< `file` of those that are taken; empty: all
+  double radius_sd_px = 0.0;         ///< one standard deviation of a circle's radius; 0: depths are taken as known
+  SourceLocation where;
+};
+
 /// All of a fit's file, checked.
 struct UnitFitSpec {
   std::string name;  ///< of its files; letters, digits, - and _
@@ -53,6 +68,7 @@ struct UnitFitSpec {
   std::vector<UnknownSpec> unknowns;
   std::vector<std::filesystem::path> backgrounds;  ///< of the untouched sensor; their mean is taken
   std::vector<RecordedPress> presses;
+  std::optional<RecordingSpec> recording;  ///< in place of backgrounds and presses, see with_recording
   /// Presses are compared less the background, and of the background the mean of each colour alone: for devices that
   /// can't show all of what a real sensor's rest shows.
   bool differences = false;
@@ -65,6 +81,7 @@ struct UnitFitSpec {
 
 void fields(YamlReader& in, UnknownSpec& unknown);
 void fields(YamlReader& in, RecordedPress& press);
+void fields(YamlReader& in, RecordingSpec& recording);
 void fields(YamlReader& in, UnitFitSpec& fit);
 
 /// On what a number of a device's file acts, and so what has to be simulated anew when it changes.

@@ -99,35 +99,6 @@ struct Orientation {
   }
 };
 
-void check_camera(const sim::DeviceSpec& device, const BallRecording& recording) {
-  if (!device.camera) fail("device {}: has no camera", device.name);
-  if (!device.coating) fail("device {}: has no coating; likeness is compared of coated gels", device.name);
-  const cv::Size size = recording.rest.mean.size();
-  const sim::CameraSpec& camera = *device.camera;
-  if (camera.width != size.width || camera.height != size.height) {
-    fail("device {}: its camera has {} x {} pixels, the recording {} x {}; give the device the recording's picture",
-         device.name, camera.width, camera.height, size.width, size.height);
-  }
-  if (camera.bayer == render::BayerPattern::none) {
-    fail("device {}: its camera is grey, the recording has colours; camera.bayer must be set", device.name);
-  }
-}
-
-void check_scale(const sim::VirtualSensor& sensor, const BallRecording& recording) {
-  const double off = sensor.mm_per_px() / recording.mm_per_px - 1.0;
-  if (std::abs(off) <= kScaleTolerance) return;
-  fail("device {}: a pixel of its camera is {:.5f} mm on the gel, one of the recording {:.5f} mm; {:.0f} % are allowed",
-       sensor.device().name, sensor.mm_per_px(), recording.mm_per_px, 100 * kScaleTolerance);
-}
-
-sim::ObjectSpec ball_of(double radius_mm) {
-  sim::ObjectSpec ball;
-  ball.name = fmt::format("ball of {} mm", 2 * radius_mm);
-  ball.shape.radius_mm = radius_mm;
-  ball.friction = kFriction;
-  return ball;
-}
-
 /// A ball and how deep it goes.
 struct KnownBall {
   sim::TouchObject object;
@@ -208,6 +179,46 @@ void compare_table(const BallRecording& recording, const std::vector<cv::Mat>& s
 
 }  // namespace
 
+void check_recorded_by(const sim::DeviceSpec& device, const BallRecording& recording) {
+  if (!device.camera) fail("device {}: has no camera", device.name);
+  if (!device.coating) fail("device {}: has no coating; likeness is compared of coated gels", device.name);
+  const cv::Size size = recording.rest.mean.size();
+  const sim::CameraSpec& camera = *device.camera;
+  if (camera.width != size.width || camera.height != size.height) {
+    fail("device {}: its camera has {} x {} pixels, the recording {} x {}; give the device the recording's picture",
+         device.name, camera.width, camera.height, size.width, size.height);
+  }
+  if (camera.bayer == render::BayerPattern::none) {
+    fail("device {}: its camera is grey, the recording has colours; camera.bayer must be set", device.name);
+  }
+}
+
+void check_scale(const sim::VirtualSensor& sensor, const BallRecording& recording) {
+  const double off = sensor.mm_per_px() / recording.mm_per_px - 1.0;
+  if (std::abs(off) <= kScaleTolerance) return;
+  fail("device {}: a pixel of its camera is {:.5f} mm on the gel, one of the recording {:.5f} mm; {:.0f} % are allowed",
+       sensor.device().name, sensor.mm_per_px(), recording.mm_per_px, 100 * kScaleTolerance);
+}
+
+sim::ObjectSpec recorded_ball(double radius_mm) {
+  sim::ObjectSpec ball;
+  ball.name = fmt::format("ball of {} mm", 2 * radius_mm);
+  ball.shape.radius_mm = radius_mm;
+  ball.friction = kFriction;
+  return ball;
+}
+
+cv::Mat frame_for_fit(const BallRecording& recording, std::size_t press) {
+  const cv::Mat& recorded = recording.presses[press].frame;
+  const cv::Mat balanced =
+      sensors::difference_to(recording.rest, recorded, recording.gains[press].gain) + recording.rest.mean;
+  cv::Mat frame, white;
+  balanced.convertTo(frame, CV_8U);
+  cv::threshold(recorded, white, kNearlyWhite, 255, cv::THRESH_BINARY);
+  cv::max(frame, white, frame);
+  return frame;
+}
+
 BallRecording read_ball_recording(const LikenessSpec& spec) {
   if (!(spec.mm_per_px > 0.0)) fail("mm/px: {} must be above 0", spec.mm_per_px);
   const bool is_folder = fs::is_directory(spec.recording);
@@ -241,7 +252,7 @@ BallRecording read_ball_recording(const LikenessSpec& spec) {
 
 Likeness compare_likeness(const sim::DeviceSpec& given, const BallRecording& recording, const LikenessSpec& spec,
                           const fs::path& cache_folder, const Progress& progress) {
-  check_camera(given, recording);
+  check_recorded_by(given, recording);
   if (spec.residual && static_cast<int>(spec.learn.size()) < kFewestResidualPresses) {
     fail("--residual: {} presses by --learn; a residual map takes at least {}", spec.learn.size(),
          kFewestResidualPresses);
@@ -270,7 +281,7 @@ Likeness compare_likeness(const sim::DeviceSpec& given, const BallRecording& rec
     const sensors::BallPress& press = recording.presses[i];
     auto known = balls.find(press.ball_radius_mm);
     if (known == balls.end()) {
-      const sim::TouchObject ball = sensor.object(ball_of(press.ball_radius_mm));
+      const sim::TouchObject ball = sensor.object(recorded_ball(press.ball_radius_mm));
       known = balls
                   .emplace(press.ball_radius_mm,
                            KnownBall{ball, measure_depths(sensor, ball, settings.deepest_mm, progress)})
@@ -290,8 +301,7 @@ Likeness compare_likeness(const sim::DeviceSpec& given, const BallRecording& rec
     row.recorded = sensors::difference_to(recording.rest, press.frame, row.gain);
     const cv::Mat frame = row.recorded + recording.rest.mean;
     frame.convertTo(row.frame, CV_8U);
-    cv::threshold(press.frame, row.fit_frame, kNearlyWhite, 255, cv::THRESH_BINARY);
-    cv::max(row.frame, row.fit_frame, row.fit_frame);
+    row.fit_frame = frame_for_fit(recording, i);
     const cv::Mat seen = balanced_frame(sensor, known->second.object, touch, row.gain);
     seen.convertTo(row.simulated_frame, CV_8U);
     row.simulated = seen - rest;

@@ -16,6 +16,8 @@
 #include "sensors/heights/ball_press.h"
 #include "sensors/heights/frame_gain.h"
 #include "sim/scene/device.h"
+#include "sim/scene/object.h"
+#include "sim/sensor/virtual_sensor.h"
 
 namespace touchstone::lab {
 
@@ -42,6 +44,16 @@ struct BallRecording {
 /// @throws Error with file and line for a bad table; naming the picture for one of another size, one that isn't of the
 /// same sensor as the rest frame, and one in whose circle nothing is pressed; naming a `learn` that no press has
 BallRecording read_ball_recording(const LikenessSpec& spec);
+
+/// @throws Error if the device has no coating, or its camera another picture than the recording's
+void check_recorded_by(const sim::DeviceSpec& device, const BallRecording& recording);
+/// @throws Error if a pixel of the device's camera isn't as wide on the gel as one of the recording, to 1 %
+void check_scale(const sim::VirtualSensor& sensor, const BallRecording& recording);
+/// A steel ball, as recordings have them.
+sim::ObjectSpec recorded_ball(double radius_mm);
+/// A press's frame as a fit takes it: its colours balanced to those of rest, CV_8UC3, and 255 where the recorded number
+/// was 250 or more.
+cv::Mat frame_for_fit(const BallRecording& recording, std::size_t press);
 
 /// How far one way to make a press's difference picture is from the recorded one.
 struct PictureLikeness {

@@ -15,17 +15,19 @@ namespace {
 
 /// Where the text is taken to stand: files that it names are found from there.
 constexpr const char* kPlace = TOUCHSTONE_SOURCE_DIR "/scenes/vhs/fuzz.yaml";
+constexpr const char* kPlaceOfDevices = TOUCHSTONE_SOURCE_DIR "/scenes/devices/fuzz.yaml";
 
 template <typename Spec>
-bool parses(const std::string& text) {
-  return gives_result([&] { parse_yaml<Spec>(text, kPlace); });
+bool parses(const std::string& text, const char* place = kPlace) {
+  return gives_result([&] { parse_yaml<Spec>(text, place); });
 }
 
 }  // namespace
 
 bool reads(std::string_view bytes) {
   const std::string text(bytes);
-  const bool of_a_scene = parses<sim::DeviceSpec>(text) | parses<sim::ObjectSpec>(text) | parses<sim::SceneSpec>(text);
+  const bool of_a_scene =
+      parses<sim::DeviceSpec>(text, kPlaceOfDevices) | parses<sim::ObjectSpec>(text) | parses<sim::SceneSpec>(text);
   const bool motion = gives_result([&] { TS_ASSERT(parse_yaml<sim::MotionSpec>(text, kPlace).frame_count() > 0); });
   return of_a_scene | motion | parses<datasets::Job>(text) | parses<datasets::DrawJob>(text) |
          parses<lab::PalpationSpec>(text);

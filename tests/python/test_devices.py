@@ -13,9 +13,8 @@ DEVICES = sorted(path.stem for path in (SCENES / "devices").glob("*.yaml"))
 CLEAR = {"vhs", "vhs-spectral"}
 PRINTED = {"chroma", "chroma-compact", "gelsight-markers", "gelsight-mini-markers", "reflex"}
 FORCE_N = 0.5
-# Of each kind at least one whose gel and light are set up in seconds; the others are long tests.
-QUICK = {"chroma-compact", "dvs-grasp", "gelsight-mini-markers", "gelsight-portable", "gelsight-webcam", "reflex",
-         "vhs-spectral"}
+# Of each kind at least one; others are long tests. (Devices that differ in optics alone share a gel.)
+QUICK = {"dvs-grasp", "gelsight-portable", "gelsight-webcam", "reflex", "vhs-spectral"}
 
 
 @pytest.fixture(scope="module", params=[pytest.param(name, marks=() if name in QUICK else pytest.mark.long)

@@ -8,6 +8,7 @@
 #include <opencv2/core.hpp>
 
 #include "core/whole_file.h"
+#include "lab/fit/recorded_balls.h"
 #include "lab/fit/unit_fit_experiment.h"
 #include "sim/files/image_file.h"
 #include "sim/scene/device_imager.h"
@@ -464,6 +465,88 @@ TEST(UnitFitFiles, MistakesNameFileLineFieldAndWhatIsAllowed) {
   EXPECT_THAT(with_picture("white.png"), AllOf(HasSubstr("white.png"), HasSubstr("expose less")));
   EXPECT_THAT(with_picture("grey.png"), AllOf(HasSubstr("grey.png"), HasSubstr("channels")));
   EXPECT_THAT(with_picture("none.png"), AllOf(HasSubstr("presses[0]: picture"), HasSubstr("there is no file")));
+}
+
+TEST(UnitFitFiles, SeveralPathsAreOneUnknown) {
+  const test::TemporaryFolder in;
+  const auto prepared = [&](const std::string& unknowns) { return prepare_fit(written_fit(in, unknowns)); };
+  const PreparedFit fit =
+      prepared("  - {paths: ['lamps[0].position_mm[2]', 'lamps[1].position_mm[2]'], plus: [-0.2, 0.2]}");
+  ASSERT_EQ(fit.unknowns.size(), 1u);
+  EXPECT_EQ(fit.unknowns[0].name, "lamps[0].position_mm[2], lamps[1].position_mm[2]");
+  ASSERT_EQ(fit.unknowns[0].numbers.size(), 2u);
+  const sim::DeviceSpec moved = device_at(fit, Eigen::VectorXd::Constant(1, 0.1));
+  for (int lamp : {0, 1}) {
+    EXPECT_NEAR(moved.lamps[lamp].position_mm.z() - fit.device.lamps[lamp].position_mm.z(), 0.1, 1e-9);
+  }
+  EXPECT_THAT(message_of([&] { prepared("  - {paths: ['lamps[0].power_W'], times: [0.5, 2]}"); }),
+              AllOf(HasSubstr("fit.yaml:8"), HasSubstr("paths: has 1")));
+  EXPECT_THAT(
+      message_of([&] {
+        prepared("  - {path: 'lamps[0].power_W', paths: ['lamps[0].power_W', 'lamps[1].power_W'], times: [0.5, 2]}");
+      }),
+      HasSubstr("paths"));
+}
+
+TEST(UnitFitFiles, SaysWhatStandsAtAnEnd) {
+  UnitFitSpec spec = small_fit();
+  add_unknown(spec, "lamps[*].power_W", UnknownHow::times, 0.99, 1.01);
+  const PreparedFit fit = prepare_fit(spec);
+  UnitFitSpec wide = small_fit();
+  add_unknown(wide, "lamps[*].power_W", UnknownHow::times, 0.5, 2.0);
+  const PreparedFit truth = prepare_fit(wide);
+  Eigen::VectorXd hidden = Eigen::VectorXd::Constant(static_cast<Eigen::Index>(truth.unknowns.size()), std::log(1.3));
+  const RecordedUnit unit = record_unit(truth, hidden, 1, 3, cache());
+  PreparedFit narrow = fit;
+  narrow.spec.presses = unit.fit.spec.presses;
+  int steps = 0;
+  UnitSimulation simulation(narrow, cache());
+  const UnitFit found =
+      fit_unit(narrow, unit.recording, simulation, [&](int step, double misfit, const std::string& text) {
+        EXPECT_EQ(step, ++steps);
+        EXPECT_GT(misfit, 0.0);
+        EXPECT_THAT(text, HasSubstr("power_W"));
+      });
+  EXPECT_EQ(steps, found.steps);
+  ASSERT_GE(found.doubts.size(), found.unknowns.size());
+  EXPECT_THAT(found.doubts.front(), AllOf(HasSubstr("lamps[0].power_W"), HasSubstr("an end of its allowed range")));
+}
+
+/// A real recording: circles and frames that set their own white balance, in place of poses.
+TEST(UnitFitFiles, ARecordingOfBallsGivesPlacesDepthsAndBalancedFrames) {
+  const std::filesystem::path source = TOUCHSTONE_SOURCE_DIR;
+  const auto recording = std::filesystem::weakly_canonical(source / ".." / "shared" / "recordings" / "gelsight-mini");
+  if (!std::filesystem::exists(recording)) GTEST_SKIP() << "there is no recording " << recording;
+  const test::TemporaryFolder in;
+  const auto file =
+      in.write("fit.yaml",
+               fmt::format("name: mini\ndevice: {}/scenes/devices/gelsight-mini.yaml\nunknowns:\n"
+                           "  - {{path: exposure, times: [0.5, 2]}}\nrecording:\n  folder: {}\n  mm_per_px: 0.05107\n"
+                           "  presses: [press-02.png, press-09.png]\n  radius_sd_px: 1\n"
+                           "differences: true\ndeepest_mm: 2.45\n",
+                           source.string(), recording.string()));
+  const std::filesystem::path gels = TOUCHSTONE_BINARY_DIR "/python/cache";  // the Mini's gel is there for other tests
+  const UnitFitSpec spec = with_recording(read_yaml<UnitFitSpec>(file), gels);
+  ASSERT_EQ(spec.presses.size(), 2u);
+  ASSERT_EQ(spec.backgrounds.size(), 1u);
+  const RecordedPress& press = spec.presses[0];
+  EXPECT_EQ(press.picture, "press-02.png");
+  EXPECT_EQ(press.frame.size(), cv::Size(240, 320));
+  EXPECT_NEAR(*press.depth_mm, 2.0, 0.05);  // as `compare` has it
+  EXPECT_GT(press.depth_sd_mm, 0.02);
+  EXPECT_LT(press.depth_sd_mm, 0.15);
+  EXPECT_EQ(*spec.presses[1].depth_mm, 2.45) << "wider than the deepest";
+  EXPECT_EQ(spec.presses[1].depth_sd_mm, 0.0);
+  const cv::Mat rest = sim::read_image(recording / "rest.png");
+  // Far from the ball the frame is rest's, where as recorded it's some tens brighter or darker.
+  const cv::Rect corner(0, 280, 240, 40);
+  EXPECT_LT(cv::norm(cv::mean(press.frame(corner)) - cv::mean(rest(corner))), 4.0);
+  EXPECT_THAT(message_of([&] {
+                UnitFitSpec other = read_yaml<UnitFitSpec>(file);
+                other.recording->presses = {"press-77.png"};
+                with_recording(other, gels);
+              }),
+              AllOf(HasSubstr("fit.yaml:6"), HasSubstr("press-77.png")));
 }
 
 }  // namespace
