@@ -1,7 +1,5 @@
 #include "lab/fit/recorded_balls.h"
 
-#include <spdlog/spdlog.h>
-
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -78,8 +76,9 @@ UnitFitSpec with_recording(UnitFitSpec spec, const std::filesystem::path& cache_
       press.depth_mm = *depth;
     } else {
       press.depth_mm = settings.deepest_mm;
-      spdlog::warn("{}: the contact of {:.1f} px takes more than the {:.3g} mm that it's pressed in by", seen.name,
-                   seen.circle->radius, settings.deepest_mm);
+      spec.doubts.push_back(
+          fmt::format("{}: the contact of {:.1f} px takes more than the {:.3g} mm that it's pressed in by", seen.name,
+                      seen.circle->radius, settings.deepest_mm));
     }
     if (from.radius_sd_px > 0.0) {
       // Three of them stay within what is deepest.

@@ -49,7 +49,7 @@ cv::Mat eight_bits(const cv::Mat& picture, double factor, double offset) {
 }  // namespace
 
 std::vector<std::string> doubts_of(const PreparedFit& fit, const UnitFit& result) {
-  std::vector<std::string> doubts;
+  std::vector<std::string> doubts = fit.spec.doubts;
   if (!result.converged) doubts.emplace_back("the fit hasn't converged: take its intervals with care");
   for (const FittedUnknown& unknown : result.unknowns) {
     if (!unknown.at_end) continue;

@@ -36,10 +36,10 @@ struct UnknownSpec {
 
 /// One recorded press.
 struct RecordedPress {
-  std::filesystem::path picture;  ///< of a RecordingSpec's presses the name alone
-  std::filesystem::path object;   ///< empty where `body` says what is pressed
-  cv::Mat frame;                  ///< in place of the picture's file; empty: that is read
-  std::optional<sim::ObjectSpec> body;
+  std::filesystem::path picture;                         ///< of a RecordingSpec's presses the name alone
+  std::filesystem::path object;                          ///< empty where `body` says what is pressed
+  cv::Mat frame;                                         ///< in place of the picture's file; empty: that is read
+  std::optional<sim::ObjectSpec> body;                   ///< in place of the file `object`
   Eigen::Vector2d place_mm = Eigen::Vector2d::Zero();    ///< of the object's origin, gel frame
   Eigen::Vector3d angles_deg = Eigen::Vector3d::Zero();  ///< about the fixed axes x, then y, then z
   double place_sd_mm = 0.0;                              ///< of each coordinate; 0: it's known
@@ -69,6 +69,7 @@ struct UnitFitSpec {
   std::vector<std::filesystem::path> backgrounds;  ///< of the untouched sensor; their mean is taken
   std::vector<RecordedPress> presses;
   std::optional<RecordingSpec> recording;  ///< in place of backgrounds and presses, see with_recording
+  std::vector<std::string> doubts;         ///< what with_recording found to doubt, sentences for people
   /// Presses are compared less the background, and of the background the mean of each colour alone: for devices that
   /// can't show all of what a real sensor's rest shows.
   bool differences = false;
