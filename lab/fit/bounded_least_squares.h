@@ -17,7 +17,7 @@ struct LeastSquaresProblem {
   /// Rows as the residuals, columns as x. `at` is what residuals(x) gave.
   std::function<Eigen::MatrixXd(const Eigen::VectorXd& x, const Eigen::VectorXd& at)> jacobian;
   Eigen::VectorXd low, high;  ///< of x
-  /// Told of each step that is taken: where it led, the residuals there, and the step's number from 1. May be empty.
+  /// Called after each step: where it led, the residuals there, and the step's number from 1. May be empty.
   std::function<void(const Eigen::VectorXd& x, const Eigen::VectorXd& at, int step)> on_step;
 };
 

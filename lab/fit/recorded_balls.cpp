@@ -11,13 +11,7 @@
 namespace touchstone::lab {
 namespace {
 
-constexpr double kDeepestOfGel = 0.6;  // of its thickness, where the fit doesn't say
-constexpr double kSpare = 1e-6;        // mm, of a depth that an error is kept off the deepest by
-
-struct KnownBall {
-  sim::ObjectSpec body;
-  DepthTable depths;
-};
+constexpr double kSpare = 1e-6;  // mm, of a depth that an error is kept off the deepest by
 
 /// One standard deviation of a depth: by how much it changes with the contact's radius.
 double depth_deviation(const DepthTable& depths, double radius_px, double deviation_px) {
@@ -47,30 +41,22 @@ UnitFitSpec with_recording(UnitFitSpec spec, const std::filesystem::path& cache_
     fail_at(from.where, "recording: {}", error.what());
   }
   check_recorded_by(device, recording);
-  sim::VirtualSensorSettings settings;
-  settings.seed = spec.seed;
-  settings.deepest_mm = spec.deepest_mm.value_or(kDeepestOfGel * device.gel.thickness_mm);
-  settings.always_friction = true;
+  const sim::VirtualSensorSettings settings = settings_for_recordings(device, spec.seed, spec.deepest_mm);
   const sim::VirtualSensor sensor(device, cache_folder, settings, progress);
   check_scale(sensor, recording);
 
   for (const std::string& name : from.rest) spec.backgrounds.push_back(from.folder / name);
-  std::map<double, KnownBall> balls;
+  std::map<double, RecordedBall> balls;
   for (std::size_t i = 0; i < recording.presses.size(); ++i) {
     if (!from.presses.empty() && !recording.learned[i]) continue;
     const sensors::BallPress& seen = recording.presses[i];
-    auto ball = balls.find(seen.ball_radius_mm);
-    if (ball == balls.end()) {
-      const sim::ObjectSpec body = recorded_ball(seen.ball_radius_mm);
-      const DepthTable depths = measure_depths(sensor, sensor.object(body), settings.deepest_mm, progress);
-      ball = balls.emplace(seen.ball_radius_mm, KnownBall{body, depths}).first;
-    }
-    const DepthTable& depths = ball->second.depths;
+    const RecordedBall& ball = recorded_ball(balls, sensor, seen.ball_radius_mm, settings.deepest_mm, progress);
+    const DepthTable& depths = ball.depths;
     RecordedPress press;
     press.where = from.where;
     press.picture = seen.name;
     press.frame = frame_for_fit(recording, i);
-    press.body = ball->second.body;
+    press.body = ball.object.spec();
     press.place_mm = sensor.gel_from_pixel(seen.circle->centre);
     if (const auto depth = depths.depth_of(seen.circle->radius)) {
       press.depth_mm = *depth;

@@ -80,8 +80,8 @@ struct UnitFit {
   std::vector<cv::Mat> shown;       ///< simulated in the end, CV_64F: background if there is one, then presses
 };
 
-/// Told of each step of a fit: its number from 1, the misfit (standard deviations of the noise) and the device's file
-/// as it is then.
+/// Called after each step of a fit: its number from 1, the misfit (standard deviations of the noise) and the device's
+/// file as it is then.
 using FitStep = std::function<void(int step, double misfit, const std::string& device_text)>;
 
 /// The same fit gives the same numbers, whatever the threads. @throws Error if what is to be simulated can't be

@@ -11,6 +11,7 @@ namespace touchstone::lab {
 namespace {
 
 constexpr int kSteps = 16;
+constexpr double kFriction = 0.5;  // of steel on silicone
 
 }  // namespace
 
@@ -44,6 +45,19 @@ DepthTable measure_depths(const sim::VirtualSensor& sensor, const sim::TouchObje
          deepest_mm);
   }
   return table;
+}
+
+const RecordedBall& recorded_ball(std::map<double, RecordedBall>& balls, const sim::VirtualSensor& sensor,
+                                  double radius_mm, double deepest_mm, const Progress& progress) {
+  const auto known = balls.find(radius_mm);
+  if (known != balls.end()) return known->second;
+  sim::ObjectSpec ball;
+  ball.name = fmt::format("ball of {} mm", 2 * radius_mm);
+  ball.shape.radius_mm = radius_mm;
+  ball.friction = kFriction;
+  const sim::TouchObject object = sensor.object(ball);
+  return balls.emplace(radius_mm, RecordedBall{object, measure_depths(sensor, object, deepest_mm, progress)})
+      .first->second;
 }
 
 }  // namespace touchstone::lab

@@ -2,6 +2,7 @@
 // How deep a device's ball has to be pressed for a contact of a wanted width, by the device's own mechanics: the gel
 // sinks round a ball, so the ball's cap alone doesn't say.
 
+#include <map>
 #include <optional>
 #include <vector>
 
@@ -24,5 +25,15 @@ struct DepthTable {
 /// @throws Error as VirtualSensor::press, or where the camera sees nothing of the deepest contact
 DepthTable measure_depths(const sim::VirtualSensor& sensor, const sim::TouchObject& ball, double deepest_mm,
                           const Progress& progress = {});
+
+/// A ball of a recording and how deep it goes.
+struct RecordedBall {
+  sim::TouchObject object;
+  DepthTable depths;
+};
+
+/// The steel ball of this radius; measured (measure_depths) where it isn't among `balls` yet, by radius, mm.
+const RecordedBall& recorded_ball(std::map<double, RecordedBall>& balls, const sim::VirtualSensor& sensor,
+                                  double radius_mm, double deepest_mm, const Progress& progress = {});
 
 }  // namespace touchstone::lab

@@ -21,7 +21,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kFriction = 0.5;         // of steel on silicone
 constexpr double kDeepestOfGel = 0.6;     // of its thickness
 constexpr double kScaleTolerance = 0.01;  // of mm/px
 constexpr double kLeastAlike = 0.4;       // of a frame's pixels with its rest; frames of other sensors have 0.35
@@ -99,14 +98,8 @@ struct Orientation {
   }
 };
 
-/// A ball and how deep it goes.
-struct KnownBall {
-  sim::TouchObject object;
-  DepthTable depths;
-};
-
 /// The device's side of one press.
-sim::Touch simulate(const sim::VirtualSensor& sensor, const KnownBall& ball, const sensors::BallPress& press,
+sim::Touch simulate(const sim::VirtualSensor& sensor, const RecordedBall& ball, const sensors::BallPress& press,
                     double deepest_mm, PressLikeness& row) {
   const std::optional<double> depth = ball.depths.depth_of(press.circle->radius);
   row.shallow = !depth.has_value();
@@ -137,7 +130,7 @@ ResidualSample residual_sample(const sim::VirtualSensor& sensor, const sim::Touc
 
 /// The device with a residual map: fills in `residual` and `corrected` of all rows. `rest`: the device's ideal one.
 void compare_residual(const sim::VirtualSensor& sensor, const sim::ResidualMap& map, const BallRecording& recording,
-                      const std::vector<sim::Touch>& touches, const std::map<double, KnownBall>& balls,
+                      const std::vector<sim::Touch>& touches, const std::map<double, RecordedBall>& balls,
                       const cv::Mat& rest, Likeness& likeness) {
   likeness.residual = sim::in_words(map);
   for (std::size_t i = 0; i < touches.size(); ++i) {
@@ -200,12 +193,13 @@ void check_scale(const sim::VirtualSensor& sensor, const BallRecording& recordin
        sensor.device().name, sensor.mm_per_px(), recording.mm_per_px, 100 * kScaleTolerance);
 }
 
-sim::ObjectSpec recorded_ball(double radius_mm) {
-  sim::ObjectSpec ball;
-  ball.name = fmt::format("ball of {} mm", 2 * radius_mm);
-  ball.shape.radius_mm = radius_mm;
-  ball.friction = kFriction;
-  return ball;
+sim::VirtualSensorSettings settings_for_recordings(const sim::DeviceSpec& device, std::uint64_t seed,
+                                                   std::optional<double> deepest_mm) {
+  sim::VirtualSensorSettings settings;
+  settings.seed = seed;
+  settings.deepest_mm = deepest_mm.value_or(kDeepestOfGel * device.gel.thickness_mm);
+  settings.always_friction = true;
+  return settings;
 }
 
 cv::Mat frame_for_fit(const BallRecording& recording, std::size_t press) {
@@ -259,14 +253,11 @@ Likeness compare_likeness(const sim::DeviceSpec& given, const BallRecording& rec
   }
   sim::DeviceSpec device = given;
   device.residual = nullptr;  // its light is added afterwards, so that both can be compared
-  sim::VirtualSensorSettings settings;
-  settings.seed = spec.seed;
-  settings.deepest_mm = spec.deepest_mm.value_or(kDeepestOfGel * device.gel.thickness_mm);
-  settings.always_friction = true;
+  const sim::VirtualSensorSettings settings = settings_for_recordings(device, spec.seed, spec.deepest_mm);
   const sim::VirtualSensor sensor(device, cache_folder, settings, progress);
   check_scale(sensor, recording);
 
-  std::map<double, KnownBall> balls;
+  std::map<double, RecordedBall> balls;
   Likeness likeness;
   likeness.device = device.name;
   likeness.light = sensor.light().reason;
@@ -279,16 +270,11 @@ Likeness compare_likeness(const sim::DeviceSpec& given, const BallRecording& rec
   cv::Mat rest;
   for (std::size_t i = 0; i < recording.presses.size(); ++i) {
     const sensors::BallPress& press = recording.presses[i];
-    auto known = balls.find(press.ball_radius_mm);
-    if (known == balls.end()) {
-      const sim::TouchObject ball = sensor.object(recorded_ball(press.ball_radius_mm));
-      known = balls
-                  .emplace(press.ball_radius_mm,
-                           KnownBall{ball, measure_depths(sensor, ball, settings.deepest_mm, progress)})
-                  .first;
+    const RecordedBall& known = recorded_ball(balls, sensor, press.ball_radius_mm, settings.deepest_mm, progress);
+    if (rest.empty()) {
       sim::Touch untouched;
       untouched.light = sensor.background_light();
-      rest = as_float(sensor.ideal(ball, untouched));
+      rest = as_float(sensor.ideal(known.object, untouched));
     }
     PressLikeness row;
     row.name = press.name;
@@ -296,18 +282,18 @@ Likeness compare_likeness(const sim::DeviceSpec& given, const BallRecording& rec
     row.radius_px = press.circle->radius;
     row.gain = recording.gains[i].gain;
     const auto start = std::chrono::steady_clock::now();
-    const sim::Touch touch = simulate(sensor, known->second, press, settings.deepest_mm, row);
+    const sim::Touch touch = simulate(sensor, known, press, settings.deepest_mm, row);
     seconds.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
     row.recorded = sensors::difference_to(recording.rest, press.frame, row.gain);
     const cv::Mat frame = row.recorded + recording.rest.mean;
     frame.convertTo(row.frame, CV_8U);
     row.fit_frame = frame_for_fit(recording, i);
-    const cv::Mat seen = balanced_frame(sensor, known->second.object, touch, row.gain);
+    const cv::Mat seen = balanced_frame(sensor, known.object, touch, row.gain);
     seen.convertTo(row.simulated_frame, CV_8U);
     row.simulated = seen - rest;
     row.device = likeness_of(row.recorded, row.simulated, *press.circle);
     row.raw = likeness_of(as_float(press.frame) - recording.rest.mean,
-                          as_float(sensor.ideal(known->second.object, touch)) - rest, *press.circle);
+                          as_float(sensor.ideal(known.object, touch)) - rest, *press.circle);
     row.rest = likeness_of(row.recorded, cv::Mat::zeros(row.recorded.size(), CV_32FC3), *press.circle);
     orientation.add(row.recorded, row.simulated, *press.circle);
     slopes.push_back(slopes_of(touch.height, recording.mm_per_px));

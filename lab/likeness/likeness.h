@@ -16,7 +16,6 @@
 #include "sensors/heights/ball_press.h"
 #include "sensors/heights/frame_gain.h"
 #include "sim/scene/device.h"
-#include "sim/scene/object.h"
 #include "sim/sensor/virtual_sensor.h"
 
 namespace touchstone::lab {
@@ -49,8 +48,9 @@ BallRecording read_ball_recording(const LikenessSpec& spec);
 void check_recorded_by(const sim::DeviceSpec& device, const BallRecording& recording);
 /// @throws Error if a pixel of the device's camera isn't as wide on the gel as one of the recording, to 1 %
 void check_scale(const sim::VirtualSensor& sensor, const BallRecording& recording);
-/// A steel ball, as recordings have them.
-sim::ObjectSpec recorded_ball(double radius_mm);
+/// Of a sensor that recorded presses are pressed into. `deepest_mm`: absent for 0.6 of the gel's thickness
+sim::VirtualSensorSettings settings_for_recordings(const sim::DeviceSpec& device, std::uint64_t seed,
+                                                   std::optional<double> deepest_mm);
 /// A press's frame as a fit takes it: its colours balanced to those of rest, CV_8UC3, and 255 where the recorded number
 /// was 250 or more.
 cv::Mat frame_for_fit(const BallRecording& recording, std::size_t press);

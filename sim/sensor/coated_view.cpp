@@ -152,7 +152,7 @@ class CoatedView final : public SensorView {
     if (!device_.background.empty()) {
       const render::Imager ideal = imager(device_, judged_->plan.bands, false);
       irradiance_per_number_ = irradiance_per_number(ideal);
-      lacking_at_rest_ = lacking_at_rest(device_.background, own, ideal);
+      missing_at_rest_ = missing_at_rest(device_.background, own, ideal);
     }
     rest_light_ = with_background(own);
     if (device_.residual) {
@@ -204,7 +204,7 @@ class CoatedView final : public SensorView {
   }
 
   cv::Mat with_background(const cv::Mat& light) const {
-    return lacking_at_rest_.empty() ? light : with_numbers(light, lacking_at_rest_, irradiance_per_number_);
+    return missing_at_rest_.empty() ? light : with_numbers(light, missing_at_rest_, irradiance_per_number_);
   }
 
   SceneSpec scene_with(const ObjectSpec& object, const MotionSpec& motion) const {
@@ -243,7 +243,7 @@ class CoatedView final : public SensorView {
   std::unique_ptr<const DirectLight> direct_;
   LightChoice choice_{false, "paths: the device is unfit for direct light", {}};
   cv::Mat rest_light_;
-  cv::Mat lacking_at_rest_;  // of a device with a background
+  cv::Mat missing_at_rest_;  // of a device with a background
   Eigen::MatrixX3d irradiance_per_number_;
   std::optional<ResidualLight> lacking_;  // none at rest
 };

@@ -88,7 +88,7 @@ struct VirtualCamera::Parts : SceneView {
   std::optional<ResidualLight> lacking;                  // of a device with a residual map
   mutable std::mutex seeing_rest;
   mutable std::vector<render::FirstHit> rest_hits;  // with it, once asked for
-  mutable cv::Mat lacking_there;                    // of a device with a background, once asked for
+  mutable cv::Mat missing_there;                    // of a device with a background, once asked for
   mutable Eigen::MatrixX3d of_number;               // irradiance_per_number, with it
 
   /// The untouched device's light.
@@ -112,12 +112,12 @@ struct VirtualCamera::Parts : SceneView {
       if (lacking && rest_hits.empty()) {
         rest_hits = render::first_hits(SceneView::geometry(at_rest(press), {}).inside, ready);
       }
-      if (has_background && lacking_there.empty()) {
+      if (has_background && missing_there.empty()) {
         of_number = irradiance_per_number(ideal_imager);
-        lacking_there = lacking_at_rest(scene.device.background, light_at_rest(press), ideal_imager);
+        missing_there = missing_at_rest(scene.device.background, light_at_rest(press), ideal_imager);
       }
     });
-    const cv::Mat on_background = has_background ? with_numbers(irradiance, lacking_there, of_number) : irradiance;
+    const cv::Mat on_background = has_background ? with_numbers(irradiance, missing_there, of_number) : irradiance;
     if (!lacking) return on_background;
     const std::vector<render::FirstHit> now = render::first_hits(SceneView::geometry(press, relief).inside, ready);
     return lacking->corrected(on_background, pressed_in(rest_hits, now, size));

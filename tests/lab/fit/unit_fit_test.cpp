@@ -14,6 +14,7 @@
 #include "sim/scene/device_imager.h"
 #include "sim/sensor/virtual_sensor.h"
 #include "tests/support/message_of.h"
+#include "tests/support/recordings.h"
 #include "tests/support/temporary_folder.h"
 
 namespace touchstone::lab {
@@ -515,8 +516,8 @@ TEST(UnitFitFiles, SaysWhatStandsAtAnEnd) {
 /// A real recording: circles and frames that set their own white balance, in place of poses.
 TEST(UnitFitFiles, ARecordingOfBallsGivesPlacesDepthsAndBalancedFrames) {
   const std::filesystem::path source = TOUCHSTONE_SOURCE_DIR;
-  const auto recording = std::filesystem::weakly_canonical(source / ".." / "shared" / "recordings" / "gelsight-mini");
-  if (!std::filesystem::exists(recording)) GTEST_SKIP() << "there is no recording " << recording;
+  const std::filesystem::path recording = test::recordings_of("gelsight-mini");
+  TS_NEEDS_RECORDINGS(recording);
   const test::TemporaryFolder in;
   const auto file =
       in.write("fit.yaml",

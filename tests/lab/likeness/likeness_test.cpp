@@ -13,6 +13,7 @@
 #include "sim/files/image_file.h"
 #include "sim/sensor/virtual_sensor.h"
 #include "tests/support/message_of.h"
+#include "tests/support/recordings.h"
 #include "tests/support/temporary_folder.h"
 
 namespace touchstone::lab {
@@ -300,8 +301,8 @@ TEST(DepthTable, IsLinearBetweenRowsAndEnds) {
 /// The real sensor: twenty presses of a ball, six of which its device was fitted to.
 TEST(Likeness, GelsightMiniIsLikeItsRecording) {
   const fs::path source = TOUCHSTONE_SOURCE_DIR;
-  const fs::path recording = fs::weakly_canonical(source / ".." / "shared" / "recordings" / "gelsight-mini");
-  if (!fs::exists(recording)) GTEST_SKIP() << "there is no recording " << recording;
+  const std::filesystem::path recording = test::recordings_of("gelsight-mini");
+  TS_NEEDS_RECORDINGS(recording);
   LikenessSpec spec;
   spec.recording = recording;
   spec.rest = {"rest.png"};

@@ -119,12 +119,12 @@ TEST(Background, FullScaleSaysOnlyThatThereIsAtLeastSoMuchLight) {
   const Eigen::MatrixX3d of_number = irradiance_per_number(camera);
   const cv::Mat nothing = cv::Mat::zeros(24, 32, CV_32FC3);
   cv::Mat light = with_numbers(nothing, cv::Mat(24, 32, CV_32FC3, cv::Scalar(150, 300, 120)), of_number);
-  const cv::Vec3f bright = lacking_at_rest(frame, light, camera).at<cv::Vec3f>(3, 4);  // red, green, blue
+  const cv::Vec3f bright = missing_at_rest(frame, light, camera).at<cv::Vec3f>(3, 4);  // red, green, blue
   EXPECT_NEAR(bright[0], 50, 1e-2);
   EXPECT_EQ(bright[1], 0);
   EXPECT_NEAR(bright[2], -20, 1e-2);
   light = with_numbers(nothing, cv::Mat(24, 32, CV_32FC3, cv::Scalar(150, 200, 120)), of_number);
-  EXPECT_NEAR(lacking_at_rest(frame, light, camera).at<cv::Vec3f>(3, 4)[1], 55, 1e-2);
+  EXPECT_NEAR(missing_at_rest(frame, light, camera).at<cv::Vec3f>(3, 4)[1], 55, 1e-2);
 }
 
 TEST(Background, ADeviceThatItIsNotForIsNamed) {
