@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "core/error.h"
 #include "fem/contact/patch_motion.h"
@@ -101,9 +102,10 @@ void move_as_a_whole(const Compliance& gel, const PressState& press, SplineField
 }
 
 /// Gap per pixel from the undeformed surface plus `rest` up to the object, looked up where the gel has moved to along
-/// the surface. Endless beside a dome.
-std::vector<double> gaps(const SmoothSurface& surface, const PixelGrid& grid, const SmoothDisplacement& coarse,
-                         const ContactShape& shape, const RigidTransform& gel_from_object) {
+/// the surface. Endless beside a dome. `along` and `rest`: the coarse displacement's parts at the pixels.
+std::vector<double> gaps(const SmoothSurface& surface, const PixelGrid& grid, const Eigen::MatrixX3d& along,
+                         const Eigen::MatrixX3d& rest, const ContactShape& shape,
+                         const RigidTransform& gel_from_object) {
   const RigidTransform object_from_gel = gel_from_object.inverse();
   const Eigen::Vector3d up = object_from_gel.turn(Eigen::Vector3d::UnitZ());
   const BoundingBall ball = bounding_ball(shape);
@@ -113,12 +115,11 @@ std::vector<double> gaps(const SmoothSurface& surface, const PixelGrid& grid, co
     for (int i = 0; i < grid.nx; ++i) {
       const Eigen::Vector2d at = grid.centre(i, j);
       if (at.squaredNorm() > surface.rim_radius() * surface.rim_radius()) continue;
-      const Eigen::Vector3d moved = coarse.along.at(at);
-      const Eigen::Vector3d point(at.x() + moved.x(), at.y() + moved.y(), surface.rest_height(at));
+      const std::size_t k = grid.at(i, j);
+      const auto row = static_cast<Eigen::Index>(k);
+      const Eigen::Vector3d point(at.x() + along(row, 0), at.y() + along(row, 1), surface.rest_height(at));
       if ((point - centre).head<2>().squaredNorm() > ball.radius * ball.radius) continue;
-      if (const auto entry = first_entry(shape, object_from_gel * point, up)) {
-        gap[grid.at(i, j)] = *entry - coarse.rest.at(at).z();
-      }
+      if (const auto entry = first_entry(shape, object_from_gel * point, up)) gap[k] = *entry - rest(row, 2);
     }
   });
   return gap;
@@ -188,6 +189,7 @@ ReliefAnswer solve_fine_relief(const SmoothSurface& surface, const PressState& p
   if (!settings.follow_surface) move_as_a_whole(gel, press, coarse.along);
   answer.along = coarse.along;
   answer.rest = coarse.rest;
+  answer.layer = std::move(coarse.layer);
   answer.coarse_force = coarse.force;
   answer.misfit = coarse.largest_misfit;
   answer.solved.converged = true;
@@ -197,11 +199,14 @@ ReliefAnswer solve_fine_relief(const SmoothSurface& surface, const PressState& p
   const PixelBox whole = whole_surface(gel, settings.pitch);
   PixelBox box = of_kept_size(common(pressed_box(gel, press, margin, settings.pitch), whole), whole);
   std::vector<double> start;
+  Eigen::MatrixX3d rest;
   for (int widening = 0;; ++widening) {
     const PixelGrid grid = box.grid(settings.pitch);
     check(grid);
     const auto layer = surface.response(grid.nx, grid.ny, grid.pitch);
-    const std::vector<double> gap = gaps(surface, grid, coarse, shape, press.gel_from_object);
+    rest = coarse.rest.on_lattice(grid.columns_x(), grid.rows_y());
+    const std::vector<double> gap = gaps(surface, grid, coarse.along.on_lattice(grid.columns_x(), grid.rows_y()), rest,
+                                         shape, press.gel_from_object);
     PixelContact contact{gap, {}};
     if (settings.control == ReliefControl::force) contact.force = coarse.force;
     start = carried_over(answer.grid.size() > 0 ? &answer : previous, grid);
@@ -216,7 +221,6 @@ ReliefAnswer solve_fine_relief(const SmoothSurface& surface, const PressState& p
   const PixelGrid& grid = answer.grid;
   answer.height = std::move(answer.solved.displacement);
   answer.contact.assign(grid.size(), 0);
-  const Eigen::MatrixX3d rest = coarse.rest.on_lattice(grid.columns_x(), grid.rows_y());
   for (int j = 0; j < grid.ny; ++j) {
     for (int i = 0; i < grid.nx; ++i) {
       const std::size_t k = grid.at(i, j);
@@ -237,7 +241,7 @@ HeightField::HeightField(const SmoothSurface& surface, const PressState& press, 
     coarse_ = surface.normal_displacement(press);
     return;
   }
-  coarse_ = surface.normal_displacement(fine->rest, fine->grid, fine->pressure);
+  coarse_ = surface.normal_displacement(press, fine->rest, fine->layer, fine->grid, fine->pressure);
   fine_grid_ = fine->grid;
   fine_ = fine->height;
 }

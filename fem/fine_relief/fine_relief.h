@@ -45,6 +45,7 @@ struct ReliefAnswer {
   std::vector<char> contact;     ///< 1: in contact
   SplineField along;             ///< components x and y: the tangential displacement, mm
   SplineField rest;              ///< as SmoothDisplacement::rest
+  std::vector<double> layer;     ///< as SmoothDisplacement::layer
   PixelContactAnswer solved;     ///< shift, residuals, work; its pressure and displacement are moved into the above
   double coarse_force = 0.0;     ///< N
   double misfit = 0.0;           ///< mm, see SmoothDisplacement::largest_misfit

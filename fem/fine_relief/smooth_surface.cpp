@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "core/error.h"
 #include "core/units.h"
@@ -14,6 +15,7 @@ namespace {
 constexpr double kFlatness = 1e-9;  // of the surface's width
 constexpr double kPixelsAnEdge = 8.0;
 constexpr int kMostReferencePixels = 768;  // a side
+constexpr int kMostWidenings = 2;          // of reference pixels, for a difference of pressures seen from afar
 constexpr double kKnotsAThickness = 4.0;
 constexpr double kEdgesAKnot = 2.5;
 constexpr double kKnotsAWave = 4.0;       // the wavelength that the fit follows by half
@@ -103,6 +105,38 @@ std::vector<double> gathered(const PixelGrid& fine, std::span<const double> pres
   return result;
 }
 
+/// Values at wide pixels, bilinearly at others.
+std::vector<double> spread_out(const PixelGrid& wide, const std::vector<double>& values, const PixelGrid& fine) {
+  struct Place {
+    int low, high;
+    double share;
+  };
+  const auto places = [](const std::vector<double>& at, double first, double pitch, int count) {
+    std::vector<Place> all;
+    for (const double one : at) {
+      const double x = std::clamp((one - first) / pitch, 0.0, count - 1.0);
+      const int low = std::min(static_cast<int>(x), std::max(0, count - 2));
+      all.push_back({low, std::min(low + 1, count - 1), x - low});
+    }
+    return all;
+  };
+  const std::vector<Place> columns = places(fine.columns_x(), wide.first.x(), wide.pitch, wide.nx);
+  const std::vector<Place> rows = places(fine.rows_y(), wide.first.y(), wide.pitch, wide.ny);
+  std::vector<double> result(fine.size());
+  for (int j = 0; j < fine.ny; ++j) {
+    const double* const below = values.data() + wide.at(0, rows[j].low);
+    const double* const above = values.data() + wide.at(0, rows[j].high);
+    const double up = rows[j].share;
+    for (int i = 0; i < fine.nx; ++i) {
+      const auto& [low, high, along] = columns[i];
+      const double at_low = below[low] + along * (below[high] - below[low]);
+      const double at_high = above[low] + along * (above[high] - above[low]);
+      result[fine.at(i, j)] = at_low + up * (at_high - at_low);
+    }
+  }
+  return result;
+}
+
 }  // namespace
 
 SmoothSurface::SmoothSurface(const Compliance& gel, double sphere_radius)
@@ -176,7 +210,9 @@ std::vector<double> SmoothSurface::layer_answer(std::span<const double> pressure
 }
 
 SmoothDisplacement SmoothSurface::displacement(const PressState& press) const {
-  const std::vector<double> layer = layer_answer(coarse_pressure(press));
+  SmoothDisplacement result;
+  result.layer = layer_answer(coarse_pressure(press));
+  const std::vector<double>& layer = result.layer;
   const Eigen::Map<const Eigen::VectorXd> into(layer.data(), static_cast<Eigen::Index>(layer.size()));
   Eigen::MatrixX3d means = gel_.mass * press.surface_displacement;
   means = weight_.cwiseInverse().asDiagonal() * means;
@@ -184,7 +220,6 @@ SmoothDisplacement SmoothSurface::displacement(const PressState& press) const {
       reference_grid().pixel_area() * (hats_.transpose() * into).cwiseQuotient(pixel_weight_);
   means.col(2) += layer_means;
 
-  SmoothDisplacement result;
   Eigen::MatrixX3d part = means;
   part.col(2).setZero();
   result.along = along_fit_->fit(part);
@@ -207,12 +242,24 @@ std::vector<double> SmoothSurface::less_layer(const SplineField& rest, std::vect
 }
 
 std::vector<double> SmoothSurface::normal_displacement(const PressState& press) const {
-  return less_layer(displacement(press).rest, layer_answer(coarse_pressure(press)));
+  SmoothDisplacement coarse = displacement(press);
+  return less_layer(coarse.rest, std::move(coarse.layer));
 }
 
-std::vector<double> SmoothSurface::normal_displacement(const SplineField& rest, const PixelGrid& fine,
+std::vector<double> SmoothSurface::normal_displacement(const PressState& press, const SplineField& rest,
+                                                       std::span<const double> layer, const PixelGrid& fine,
                                                        std::span<const double> pressure) const {
-  return less_layer(rest, layer_answer(gathered(fine, pressure, reference_grid())));
+  const LayerResponse* wide = layer_.get();
+  for (int k = 0; k < kMostWidenings && 2.0 * wide->grid().pitch <= kWidestPixel * wide->thickness(); ++k) {
+    wide = &wide->on_wider_pixels();
+  }
+  std::vector<double> difference = gathered(fine, pressure, wide->grid());
+  const std::vector<double> coarse = gathered(reference_grid(), coarse_pressure(press), wide->grid());
+  for (std::size_t k = 0; k < difference.size(); ++k) difference[k] -= coarse[k];
+  wide->apply(difference, difference, *wide->make_scratch());
+  std::vector<double> answer = spread_out(wide->grid(), difference, reference_grid());
+  for (std::size_t k = 0; k < answer.size(); ++k) answer[k] += layer[k];
+  return less_layer(rest, std::move(answer));
 }
 
 std::shared_ptr<const LayerResponse> SmoothSurface::response(int nx, int ny, double pitch) const {

@@ -23,6 +23,8 @@ struct SmoothDisplacement {
   SplineField along;  ///< components x and y: the surface's tangential displacement, mm
   SplineField rest;   ///< component z: the normal displacement less what the endless layer does under the coarse
                       ///< pressure alone (sides of the pad, layers below, friction's pull), mm
+  std::vector<double> layer;    ///< mm, into the gel: what the endless layer does under the coarse pressure, at the
+                                ///< pixels of SmoothSurface::reference_grid()
   double largest_misfit = 0.0;  ///< mm, of `rest.z` to the mesh's hat means where there's pressure: the mesh's wiggles
   double force = 0.0;           ///< N, of the coarse pressure
 };
@@ -54,10 +56,12 @@ class SmoothSurface {
   SmoothDisplacement displacement(const PressState& press) const;
 
   /// Normal displacement (mm, negative under pressure) at the pixels of reference_grid(): the rest, and what the
-  /// endless layer does under the coarse pressure; or the `rest` of a SmoothDisplacement, and what it does under a
-  /// finer pressure. As smooth as the pressure.
+  /// endless layer does under the coarse pressure. As smooth as the pressure.
   std::vector<double> normal_displacement(const PressState& press) const;
-  std::vector<double> normal_displacement(const SplineField& rest, const PixelGrid& fine,
+  /// The same under a finer pressure, at some distance from it: the two pressures' difference, which has no detail left
+  /// there, is answered on pixels of up to four times the width. `rest` and `layer` of the press's SmoothDisplacement.
+  std::vector<double> normal_displacement(const PressState& press, const SplineField& rest,
+                                          std::span<const double> layer, const PixelGrid& fine,
                                           std::span<const double> pressure) const;
   const PixelGrid& reference_grid() const { return layer_->grid(); }
 

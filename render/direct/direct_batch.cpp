@@ -45,6 +45,8 @@ void DirectBatch::intersect(std::span<const RayPacket> rays, DirectCounts& count
   for (std::size_t number = 0; number < rays.size(); ++number) {
     const RayPacket& packet = rays[number];
     frame_.tree.intersect(packet, hits);
+    if (frame_.sheet != nullptr) meet_sheet(packet, hits);
+    beams_found_ = false;
     for (int k = 0; k < kPacket; ++k) {
       const int lane = static_cast<int>(number) * kPacket + k;
       Lane& one = lanes_[lane];
@@ -95,6 +97,30 @@ void DirectBatch::intersect(std::span<const RayPacket> rays, DirectCounts& count
   }
 }
 
+/// Where rays meet the first surface before anything else. No shadow ray will start there, so nothing is lifted.
+void DirectBatch::meet_sheet(const RayPacket& packet, PacketHits& hits) const {
+  const Surface& surface = *frame_.first;
+  for (int k = 0; k < kPacket; ++k) {
+    if (packet.valid[k] == 0) continue;
+    const Eigen::Vector3d origin(packet.origin[0][k], packet.origin[1][k], packet.origin[2][k]);
+    const Eigen::Vector3d direction(packet.direction[0][k], packet.direction[1][k], packet.direction[2][k]);
+    const double far = hits.object[k] < 0 ? packet.far[k] : hits.distance[k];
+    const auto hit = frame_.sheet->first(origin, direction, far);
+    if (!hit) continue;
+    const SheetNormals normals = normals_at(surface, *hit);
+    hits.object[k] = 0;
+    hits.triangle[k] = hit->triangle;
+    hits.u[k] = static_cast<float>(hit->u);
+    hits.v[k] = static_cast<float>(hit->v);
+    hits.distance[k] = static_cast<float>(hit->distance);
+    for (int axis = 0; axis < 3; ++axis) {
+      hits.normal[axis][k] = static_cast<float>(normals.face[axis]);
+      hits.shading[axis][k] = static_cast<float>(normals.shading[axis]);
+      hits.lift[axis][k] = 0.0f;
+    }
+  }
+}
+
 /// The share of a camera ray that meets film within the given distance.
 float DirectBatch::film_before(const RayPacket& packet, int slot, float distance) const {
   const FilmScreen& films = fixture_.films;
@@ -126,6 +152,9 @@ void DirectBatch::light_lane(int lane, DirectCounts& counts) {
     Eigen::Map<Four>(flow + group * 12 + 8) = z;
     Eigen::Map<Four>(amount + group * 4) = (-(one.normal[0] * x + one.normal[1] * y + one.normal[2] * z)).max(0.0f);
   }
+  if (frame_.horizons != nullptr && one.object == 0 && frame_.horizons->any(one.place[0], one.place[1])) {
+    dim_by_horizons(lane);
+  }
   if (frame_.shadow_reach != nullptr) {
     one.doubt = frame_.shadow_reach->doubtful(one.place[0], one.place[1], one.object);
   }
@@ -152,6 +181,100 @@ void DirectBatch::light_lane(int lane, DirectCounts& counts) {
   for (int corner = 0; corner < 8; ++corner) {
     const float* from = fixture_.pass.data() + cell.node[corner] * pass_width;
     for (std::size_t k = 0; k < pass_width; ++k) pass[k] += cell.weight[corner] * from[k];
+  }
+}
+
+/// The tangents of elevation between which a lamp that isn't cut into beams goes down behind a horizon.
+float DirectBatch::soft_width(int lane, int lamp, float tangent) const {
+  constexpr float kSharp = 0.02f;
+  const Lane& one = lanes_[lane];
+  const Eigen::Vector3d place(one.place[0], one.place[1], one.place[2]);
+  const auto distance = static_cast<float>((lamp_position(field_.lamp(lamp)) - place).norm());
+  const auto radius = static_cast<float>(fixture_.lens_radii[lamp]);
+  return std::max(kSharp, 2.0f * radius * (1.0f + tangent * tangent) / std::max(distance, 1e-3f));
+}
+
+/// A beam reaches half way to the flatter and the steeper one beside it, one at the rim as far outwards as inwards;
+/// aside a sector is looked at in two places, half way to where it ends.
+void DirectBatch::find_beams(int lane) {
+  beams_found_ = true;
+  float tangents[kMostDirectLamps];
+  const float* flow = flows_.data() + static_cast<std::size_t>(lane) * stride_ * 3;
+  for (int group = 0; group < fixture_.groups; ++group) {
+    const Four x = four(flow + group * 12);
+    const Four y = four(flow + group * 12 + 4);
+    const Four z = four(flow + group * 12 + 8);
+    Eigen::Map<Four>(tangents + group * 4) = z.abs() / (x * x + y * y).max(1e-30f).sqrt();
+  }
+  const auto azimuth_of = [&](int lamp) {
+    const float* from = flow + lamp / 4 * 12 + lamp % 4;
+    return SheetHorizons::azimuth(-from[0], -from[4]);
+  };
+  sectors_.clear();
+  lowest_.resize(static_cast<std::size_t>(lamps_));
+  highest_.resize(static_cast<std::size_t>(lamps_));
+  for (int head = 0; head < lamps_; ++head) {
+    if (fixture_.flattest[head] != head) continue;
+    const float azimuth = azimuth_of(head);
+    const auto turn_to = [&](int other) {
+      if (other < 0) return 0.0f;
+      const float turn = azimuth_of(other) - azimuth;
+      return turn > 2.0f ? turn - 4.0f : turn < -2.0f ? turn + 4.0f : turn;
+    };
+    const BesideBeam& aside = field_.beside[head];
+    float left = 0.25f * turn_to(aside.left);
+    float right = 0.25f * turn_to(aside.right);
+    if (aside.left < 0) left = -right;
+    if (aside.right < 0) right = -left;
+    const auto look = [](float towards) {
+      const Eigen::Vector2f unit = SheetHorizons::heading(towards);
+      return Look{towards, unit.x(), unit.y()};
+    };
+    sectors_.push_back({head, look(azimuth + left), look(azimuth + right)});
+    for (int lamp = head; lamp >= 0; lamp = field_.beside[lamp].steeper) {
+      const int flatter = field_.beside[lamp].flatter;
+      const int steeper = field_.beside[lamp].steeper;
+      const float tangent = tangents[lamp];
+      float down = flatter >= 0 ? 0.5f * (tangent - tangents[flatter]) : 0.0f;
+      float up = steeper >= 0 ? 0.5f * (tangents[steeper] - tangent) : 0.0f;
+      if (flatter < 0 && steeper < 0) down = up = 0.5f * soft_width(lane, lamp, tangent);
+      if (flatter < 0) down = up;
+      if (steeper < 0) up = down;
+      lowest_[static_cast<std::size_t>(lamp)] = tangent - down;
+      highest_[static_cast<std::size_t>(lamp)] = tangent + up;
+    }
+  }
+}
+
+/// Of each beam the part that is steeper than the horizon gets through, of what is above the place's own plane: what is
+/// below is in the amount already.
+void DirectBatch::dim_by_horizons(int lane) {
+  if (!beams_found_) find_beams(lane);
+  const Lane& here = lanes_[lane];
+  float horizons[SheetHorizons::kAround];
+  frame_.horizons->at(here.place[0], here.place[1], horizons);
+  // How steeply the place itself rises towards the light, across. Its normal faces the camera and so the light's side.
+  const float per_z = 1.0f / std::max(std::abs(here.normal[2]), 1e-6f);
+  const float rise_x = -here.normal[0] * per_z;
+  const float rise_y = -here.normal[1] * per_z;
+  float* amount = amounts(lane);
+  for (const Sector& sector : sectors_) {
+    const float one = SheetHorizons::towards(horizons, sector.one.azimuth);
+    const float other = SheetHorizons::towards(horizons, sector.other.azimuth);
+    const float most = std::max(one, other);
+    const float one_rise = rise_x * sector.one.x + rise_y * sector.one.y;
+    const float other_rise = rise_x * sector.other.x + rise_y * sector.other.y;
+    for (int lamp = sector.head; lamp >= 0; lamp = field_.beside[lamp].steeper) {
+      const float lowest = lowest_[static_cast<std::size_t>(lamp)];
+      if (most <= lowest) break;  // steeper ones are free, too
+      const float highest = highest_[static_cast<std::size_t>(lamp)];
+      const auto hidden = [&](float horizon, float rise) {
+        const float from = std::max(lowest, rise);
+        if (!(horizon > from && highest > from)) return 0.0f;
+        return std::min((horizon - from) / (highest - from), 1.0f);
+      };
+      amount[lamp] *= 1.0f - 0.5f * (hidden(one, one_rise) + hidden(other, other_rise));
+    }
   }
 }
 

@@ -9,7 +9,9 @@
 #include "render/cameras/camera_rays.h"
 #include "render/direct/direct_fixture.h"
 #include "render/direct/direct_material.h"
+#include "render/direct/sheet_horizons.h"
 #include "render/scene/packet_scene.h"
+#include "render/scene/sheet_index.h"
 
 namespace touchstone::render {
 
@@ -17,7 +19,10 @@ namespace touchstone::render {
 struct DirectFrame {
   const DirectFixture& fixture;
   const PacketScene& tree;
-  const ShadowReach* shadow_reach;               ///< null: nothing casts a shadow
+  const SheetIndex* sheet;                       ///< of the first surface, where that isn't in the tree; else null
+  const Surface* first;                          ///< the first surface; null without any
+  const ShadowReach* shadow_reach;               ///< null: no shadow is asked for by rays
+  const SheetHorizons* horizons;                 ///< of the first object, where it alone casts shadows; else null
   const std::vector<DirectMaterial>& materials;  ///< by object
 };
 
@@ -81,8 +86,12 @@ class DirectBatch {
   Eigen::Vector3f direction_to(int lane, int lamp) const;
   Eigen::Vector3f towards(int lane, int lamp) const;
   void set_flow(int lane, int lamp, const Eigen::Vector3f& flow);
+  void meet_sheet(const RayPacket& packet, PacketHits& hits) const;
   float film_before(const RayPacket& packet, int slot, float distance) const;
   void light_lane(int lane, DirectCounts& counts);
+  void find_beams(int lane);
+  void dim_by_horizons(int lane);
+  float soft_width(int lane, int lamp, float tangent) const;
   void reflect_through_films(int lane, float* sum) const;
   bool shadow_ray(int lane, int lamp, int slot);
   void trace_shadows(int lamp, const int* lanes, int count, DirectCounts& counts);
@@ -102,6 +111,20 @@ class DirectBatch {
       directions_;  // likewise, where shadows are in doubt: unit vectors against the flows, 0 where there's none
   std::vector<float> pass_;  // [lane][band][lamp], empty where nothing absorbs
   RayPacket shadow_;
+
+  /// What horizons are held against, once for the places of a packet, which lie close together: where sectors of beams
+  /// are looked at, and between which tangents of elevation a beam goes down.
+  struct Look {
+    float azimuth;
+    float x, y;  // its unit vector
+  };
+  struct Sector {
+    int head;
+    Look one, other;
+  };
+  bool beams_found_ = false;
+  std::vector<Sector> sectors_;
+  std::vector<float> lowest_, highest_;  // by beam
 };
 
 }  // namespace touchstone::render

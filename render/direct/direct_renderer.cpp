@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <iterator>
+#include <limits>
 #include <map>
 #include <opencv2/core.hpp>
 #include <optional>
@@ -18,6 +19,7 @@
 #include "render/direct/direct_batch.h"
 #include "render/direct/direct_fitness.h"
 #include "render/direct/shadow_reach.h"
+#include "render/direct/sheet_horizons.h"
 #include "render/materials/ggx.h"
 #include "render/sampling/sample_sequence.h"
 #include "render/scene/film_screen.h"
@@ -27,9 +29,10 @@ namespace touchstone::render {
 namespace {
 
 constexpr int kTilesATask = 2 * DirectBatch::kMostPackets;
-constexpr int kBlocksAcross = 20;    // of the footprint
-constexpr double kLampSpread = 0.5;  // of the films' distance: standard deviation of where lamps' light crosses them
-constexpr double kSharp = 4.0;       // pixels: a wider blur takes the mean of a dozen rays anyway
+constexpr int kBlocksAcross = 20;      // of the footprint
+constexpr double kLampSpread = 0.5;    // of the films' distance: standard deviation of where lamps' light crosses them
+constexpr float kWidestPitch = 0.06f;  // mm, of horizons: contacts cast shadows of some tenths of a millimetre
+constexpr double kSharp = 4.0;         // pixels: a wider blur takes the mean of a dozen rays anyway
 
 void check_settings(const DirectSettings& settings) {
   if (settings.samples < 1 || settings.samples > 64) {
@@ -46,12 +49,28 @@ void check_settings(const DirectSettings& settings) {
   }
 }
 
+/// The scene with nothing of its first surface.
+Scene without_first(const Scene& scene) {
+  Scene rest;
+  rest.environment = scene.environment;
+  rest.surfaces.reserve(scene.surfaces.size());
+  rest.surfaces.push_back({{}, scene.surfaces[0].material});
+  rest.surfaces.insert(rest.surfaces.end(), scene.surfaces.begin() + 1, scene.surfaces.end());
+  rest.balls = scene.balls;
+  return rest;
+}
+
 }  // namespace
 
 struct DirectRenderer::Parts {
   DirectFixture fixture;
   ReadyCamera camera;
   DirectSettings settings;
+  float pixel_mm;                // between the rays of pixels beside each other, in the middle of the field's box
+  Eigen::AlignedBox2d seen_box;  // x and y of all that rays to the field's layer pass between its lowest and highest
+  std::optional<HorizonSettings> horizon_settings;  // where one sample is taken and light comes from one side
+  bool lone_sheet;  // the first surface alone casts shadows: asked for by SheetIndex and SheetHorizons, not in `tree`
+  std::vector<TriangleMesh> others;  // of a lone sheet: all but the first surface, at rest
   PacketScene tree;
   std::vector<Surface> films;
   bool connected;        // the first surface
@@ -70,9 +89,16 @@ struct DirectRenderer::Parts {
       : fixture(field, settings_of.samples > 1),
         camera(make_ready(camera_of)),
         settings(settings_of),
-        tree(rest),
+        pixel_mm(find_pixel()),
+        seen_box(find_seen_box()),
+        horizon_settings(find_horizon_settings()),
+        lone_sheet(is_lone_sheet(rest)),
+        tree(lone_sheet ? without_first(rest) : rest),
         connected(!rest.surfaces.empty() && is_connected(rest.surfaces[0].mesh)),
         spreads(settings.samples == 1 && settings.blur) {
+    if (lone_sheet) {
+      for (std::size_t i = 1; i < rest.surfaces.size(); ++i) others.push_back(rest.surfaces[i].mesh);
+    }
     ImageGrid grid = pixel_grid(camera);
     if (spreads) {
       find_footprint(rest);
@@ -95,6 +121,18 @@ struct DirectRenderer::Parts {
 
   int width() const { return size_of_grid(pixel_grid(camera)).x(); }
   int height() const { return size_of_grid(pixel_grid(camera)).y(); }
+
+  bool is_lone_sheet(const Scene& scene) const {
+    return horizon_settings.has_value() && is_sheet_alone(fixture.bearings, scene);
+  }
+  /// Does all but the first surface stand where it stood at rest?
+  bool stands_still(const Scene& scene) const {
+    return scene.balls.empty() && scene.surfaces.size() == others.size() + 1 &&
+           std::equal(others.begin(), others.end(), scene.surfaces.begin() + 1,
+                      [](const TriangleMesh& one, const Surface& other) {
+                        return one.vertices == other.mesh.vertices && one.triangles == other.mesh.triangles;
+                      });
+  }
 
   /// Casts the rays and shades what they meet: into `radiance`, or into the picture where nothing is spread.
   void cast(const DirectFrame& frame, DirectImage& image);
@@ -140,6 +178,11 @@ struct DirectRenderer::Parts {
     const LightField& field = fixture.field;
     const int block = std::max(8, 8 * ((width() + 4 * kBlocksAcross) / (8 * kBlocksAcross)));
     const std::vector<Eigen::Vector2d> middles = footprint_blocks(camera, block);
+    std::optional<SheetIndex> sheet;
+    if (lone_sheet) {
+      const Eigen::Vector2d endless = Eigen::Vector2d::Constant(std::numeric_limits<double>::max());
+      sheet.emplace(rest.surfaces[0].mesh, Eigen::AlignedBox2d(Eigen::Vector2d(-endless), endless));
+    }
     std::vector<double> surface_z;
     for (const Eigen::Vector2d& middle : middles) {
       surface_z.push_back(field.reach.center().z());
@@ -155,10 +198,63 @@ struct DirectRenderer::Parts {
       packet.valid[0] = -1;
       PacketHits hits;
       tree.intersect(packet, hits);
+      if (sheet) {
+        const double far = hits.object[0] < 0 ? ray->far : double(hits.distance[0]);
+        if (const auto hit = sheet->first(ray->origin, ray->direction, far)) {
+          hits.object[0] = 0;
+          hits.distance[0] = static_cast<float>(hit->distance);
+        }
+      }
       if (hits.object[0] < 0 || hits.object[0] >= static_cast<int>(rest.surfaces.size())) continue;
       surface_z.back() = ray->origin.z() + double(hits.distance[0]) * ray->direction.z();
     }
     footprint = make_footprint(field.fixture, camera, field.layer, surface_z, block, settings.rays_across_blur);
+  }
+
+  std::optional<HorizonSettings> find_horizon_settings() const {
+    if (settings.samples != 1 || seen_box.isEmpty()) return std::nullopt;
+    std::optional<HorizonSettings> found = flattest_light(fixture.field, seen_box);
+    if (!found) return found;
+    found->pitch = std::min(pixel_mm, kWidestPitch);
+    found->seen = seen_box;
+    return found;
+  }
+
+  /// Of a coarse grid of pixels, with what lies beside the outermost by half its spacing and by the blur.
+  Eigen::AlignedBox2d find_seen_box() const {
+    constexpr int kAsked = 16;  // along a side
+    const LightField& field = fixture.field;
+    Eigen::AlignedBox2d box;
+    for (int j = 0; j <= kAsked; ++j) {
+      for (int i = 0; i <= kAsked; ++i) {
+        const auto ray = ray_in_layer(field.fixture, camera, field.layer, double(width()) * i / kAsked,
+                                      double(height()) * j / kAsked, 0.5, 0.5);
+        if (!ray) continue;
+        for (const double z : {field.reach.min().z(), field.reach.max().z()}) {
+          box.extend(
+              Eigen::Vector2d((ray->origin + (z - ray->origin.z()) / ray->direction.z() * ray->direction).head<2>()));
+        }
+      }
+    }
+    if (box.isEmpty()) return box;
+    const Eigen::Vector2d wider = Eigen::Vector2d::Constant(2.0 * box.sizes().maxCoeff() / kAsked);
+    return {box.min() - wider, box.max() + wider};
+  }
+
+  float find_pixel() const {
+    constexpr float kUnseen = 0.05f;
+    const LightField& field = fixture.field;
+    const auto place = [&](double x) -> std::optional<Eigen::Vector2d> {
+      const auto ray = ray_in_layer(field.fixture, camera, field.layer, x, 0.5 * height(), 0.5, 0.5);
+      if (!ray) return std::nullopt;
+      const double along = (field.reach.center().z() - ray->origin.z()) / ray->direction.z();
+      return Eigen::Vector2d((ray->origin + along * ray->direction).head<2>());
+    };
+    const auto one = place(0.5 * width());
+    const auto next = place(0.5 * width() + 1.0);
+    if (!one || !next) return kUnseen;
+    const auto apart = static_cast<float>((*next - *one).norm());
+    return std::isfinite(apart) && apart > 0.0f ? apart : kUnseen;
   }
 
   void keep_by_pixel(const CameraRays& pixels, const std::vector<float>& from, std::vector<float>& to) const {
@@ -220,7 +316,7 @@ void DirectRenderer::Parts::cast(const DirectFrame& frame, DirectImage& image) {
             if (column < columns && row < rays.grid.rows) work(lane, row, column);
           }
         };
-        if (settings.shadows && samples > 1) {
+        if (frame.shadow_reach != nullptr && samples > 1) {
           for_lanes([&](int lane, int row, int column) {
             SampleSequence numbers(settings.seed,
                                    static_cast<std::uint64_t>(row) * std::uint64_t(columns) + std::uint64_t(column),
@@ -230,7 +326,7 @@ void DirectRenderer::Parts::cast(const DirectFrame& frame, DirectImage& image) {
             batch.choose_lens_points(lane, u, v);
           });
         }
-        if (settings.shadows) batch.cast_shadows(counts);
+        if (frame.shadow_reach != nullptr) batch.cast_shadows(counts);
         for_lanes([&](int lane, int row, int column) {
           const std::size_t point = static_cast<std::size_t>(row) * columns + column;
           const float* ambient = bounced.empty() ? nullptr : bounced.data() + point * bands;
@@ -238,7 +334,7 @@ void DirectRenderer::Parts::cast(const DirectFrame& frame, DirectImage& image) {
             float out[kMaxBands] = {};
             batch.add(lane, whole.data(), ambient, out);
             for (int band = 0; band < bands; ++band) radiance[band * points + point] = out[band];
-            if (!seen.empty()) seen[point] = batch.visibility(lane);
+            if (!seen.empty() && frame.shadow_reach != nullptr) seen[point] = batch.visibility(lane);
             return;
           }
           float* out = image.irradiance.ptr<float>(row) + bands * column;
@@ -296,7 +392,7 @@ void DirectRenderer::Parts::refine(const DirectFrame& frame, DirectImage& image)
     }
     DirectBatch batch(frame);
     batch.intersect(packets, task_counts[task]);
-    if (settings.shadows) {
+    if (frame.shadow_reach != nullptr) {
       for (int k = 0; k < count; ++k) {
         const DirectBatch::Visibility known = known_round(edges[first + k]);
         for (int ray = 0; ray < rays_a_point; ++ray) batch.take_as_known(k * rays_a_point + ray, known);
@@ -386,8 +482,15 @@ DirectImage DirectRenderer::render(const Scene& scene) {
   if (!std::ranges::equal(films, parts.films, same_film)) {
     fail("direct renderer: the scene's films aren't those that it was made for");
   }
+  std::optional<SheetIndex> sheet;
+  std::optional<SheetHorizons> horizons;
+  if (parts.lone_sheet && parts.stands_still(scene)) {
+    const TriangleMesh& mesh = scene.surfaces[0].mesh;
+    if (parts.settings.shadows) horizons = SheetHorizons::find(mesh, *parts.horizon_settings);
+    if (horizons || !parts.settings.shadows) sheet.emplace(mesh, parts.seen_box);
+  }
   std::optional<PacketScene> other;
-  if (!parts.tree.move_to(scene)) other.emplace(scene);
+  if (!sheet && (parts.lone_sheet || !parts.tree.move_to(scene))) other.emplace(scene);
   const PacketScene& tree = other ? *other : parts.tree;
 
   std::vector<DirectMaterial> materials;
@@ -398,14 +501,21 @@ DirectImage DirectRenderer::render(const Scene& scene) {
   }
   for (const Ball& ball : scene.balls) materials.push_back(direct_material(ball.material, parts.conductors));
   std::optional<ShadowReach> shadow_reach;
-  if (parts.settings.shadows) {
+  if (parts.settings.shadows && !horizons) {
     shadow_reach.emplace(parts.fixture.bearings, scene,
                          other ? !scene.surfaces.empty() && is_connected(scene.surfaces[0].mesh) : parts.connected);
   }
 
   DirectImage image;
   image.irradiance = cv::Mat::zeros(parts.height(), parts.width(), CV_32FC(parts.rays.bands));
-  const DirectFrame frame{parts.fixture, tree, shadow_reach ? &*shadow_reach : nullptr, materials};
+  const Surface* const first = scene.surfaces.empty() ? nullptr : &scene.surfaces[0];
+  const DirectFrame frame{parts.fixture,
+                          tree,
+                          sheet ? &*sheet : nullptr,
+                          first,
+                          shadow_reach ? &*shadow_reach : nullptr,
+                          horizons ? &*horizons : nullptr,
+                          materials};
   parts.cast(frame, image);
   if (parts.spreads) {
     if (parts.refines) parts.refine(frame, image);

@@ -110,7 +110,48 @@ std::vector<float> widened(const LampBearings& map, const std::vector<float>& fr
   return along(along(from, map.columns, 1, map.rows, map.columns), map.rows, map.columns, map.columns, 1);
 }
 
+Eigen::AlignedBox3d box_of(const TriangleMesh& mesh) {
+  Eigen::AlignedBox3d box;
+  for (const auto& vertex : mesh.vertices) box.extend(vertex);
+  return box;
+}
+
+/// Tells what stands round the sheet, seen along z and less a rim that pressing moves, and so can't hide guides within.
+class WallsRound {
+ public:
+  WallsRound(const LampBearings& bearings, const Eigen::AlignedBox3d& sheet)
+      : inner_(Eigen::Vector2d(sheet.min().head<2>().array() + kRim),
+               Eigen::Vector2d(sheet.max().head<2>().array() - kRim)) {
+    const Eigen::AlignedBox2d outer(Eigen::Vector2d(sheet.min().head<2>().array() - kRim),
+                                    Eigen::Vector2d(sheet.max().head<2>().array() + kRim));
+    enclosed_ = !bearings.guides.isEmpty() && !inner_.isEmpty() && outer.contains(bearings.guides);
+  }
+
+  bool contain(const Eigen::AlignedBox3d& part) const {
+    return enclosed_ && ((part.max().head<2>().array() <= inner_.min().array()).any() ||
+                         (part.min().head<2>().array() >= inner_.max().array()).any());
+  }
+
+ private:
+  static constexpr double kRim = 0.05;  // mm
+  Eigen::AlignedBox2d inner_;
+  bool enclosed_ = false;
+};
+
 }  // namespace
+
+bool is_sheet_alone(const LampBearings& bearings, const Scene& scene) {
+  if (scene.surfaces.empty() || !scene.balls.empty()) return false;
+  const WallsRound walls(bearings, box_of(scene.surfaces[0].mesh));
+  return std::all_of(scene.surfaces.begin() + 1, scene.surfaces.end(), [&](const Surface& surface) {
+    if (is_film(surface)) return true;
+    return std::ranges::all_of(surface.mesh.triangles, [&](const std::array<int, 3>& t) {
+      Eigen::AlignedBox3d part;
+      for (int corner : t) part.extend(surface.mesh.vertices[corner]);
+      return walls.contain(part);
+    });
+  });
+}
 
 bool is_connected(const TriangleMesh& mesh) {
   std::vector<int> above(mesh.vertices.size());
@@ -241,21 +282,8 @@ int LampBearings::slab_at(float z) const {
 
 ShadowReach::ShadowReach(const LampBearings& bearings, const Scene& scene, bool connected)
     : bearings_(bearings), all_(bearings.lamps == 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << bearings.lamps) - 1) {
-  Eigen::AlignedBox3d sheet;
-  if (!scene.surfaces.empty()) {
-    for (const auto& vertex : scene.surfaces[0].mesh.vertices) sheet.extend(vertex);
-  }
-  // The sheet seen along z, less a rim that pressing moves.
-  constexpr double kRim = 0.05;  // mm
-  const Eigen::AlignedBox2d inner(Eigen::Vector2d(sheet.min().head<2>().array() + kRim),
-                                  Eigen::Vector2d(sheet.max().head<2>().array() - kRim));
-  const Eigen::AlignedBox2d outer(Eigen::Vector2d(sheet.min().head<2>().array() - kRim),
-                                  Eigen::Vector2d(sheet.max().head<2>().array() + kRim));
-  const bool enclosed = !bearings.guides.isEmpty() && !inner.isEmpty() && outer.contains(bearings.guides);
-  const auto is_wall_round_it = [&](const Eigen::AlignedBox3d& part) {
-    return enclosed && ((part.max().head<2>().array() <= inner.min().array()).any() ||
-                        (part.min().head<2>().array() >= inner.max().array()).any());
-  };
+  const Eigen::AlignedBox3d sheet = scene.surfaces.empty() ? Eigen::AlignedBox3d() : box_of(scene.surfaces[0].mesh);
+  const WallsRound walls(bearings, sheet);
   // Of the sheet and what stands on the map for columns, and of everything.
   Eigen::AlignedBox3d solid = sheet;
   for (std::size_t i = 1; i < scene.surfaces.size(); ++i) {
@@ -264,7 +292,7 @@ ShadowReach::ShadowReach(const LampBearings& bearings, const Scene& scene, bool 
     for (const auto& t : other.triangles) {
       Eigen::AlignedBox3d part;
       for (int corner : t) part.extend(other.vertices[corner]);
-      if (!is_wall_round_it(part)) solid.extend(part);
+      if (!walls.contain(part)) solid.extend(part);
     }
   }
   Eigen::AlignedBox3d everything = solid;
@@ -287,7 +315,7 @@ ShadowReach::ShadowReach(const LampBearings& bearings, const Scene& scene, bool 
     for (const auto& t : other.triangles) {
       Eigen::AlignedBox3d part;
       for (int corner : t) part.extend(other.vertices[corner]);
-      if (is_wall_round_it(part)) continue;
+      if (walls.contain(part)) continue;
       only_sheet_ = false;
       over_cells(map, part.min().x(), part.max().x(), part.min().y(), part.max().y(),
                  [&](std::size_t cell) { ground.slope[cell] = kEndless; });

@@ -77,6 +77,10 @@ class ShadowReach {
   std::vector<std::uint64_t> doubt_;  // by cell
 };
 
+/// Is the first surface alone in what can hide a lamp from it? So it is without balls, where other surfaces are films,
+/// or walls round it with light guides for lamps that stand within them.
+bool is_sheet_alone(const LampBearings& bearings, const Scene& scene);
+
 /// Are the triangles connected by common vertices? True without any.
 bool is_connected(const TriangleMesh& mesh);
 

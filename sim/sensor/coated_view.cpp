@@ -8,6 +8,7 @@
 #include "core/locked_work.h"
 #include "core/sha256.h"
 #include "render/cameras/first_hits.h"
+#include "render/cameras/still_view.h"
 #include "sim/plan/plan_direct.h"
 #include "sim/press/play_motion.h"
 #include "sim/scene/device_camera.h"
@@ -132,7 +133,8 @@ class CoatedView final : public SensorView {
     camera_ = camera_of(*device_.camera);
     ready_ = render::make_ready(camera_);
     rest_seen_ = judged_->geometry(rest_, {});
-    rest_hits_ = render::first_hits(rest_seen_.inside, ready_);
+    still_ = std::make_unique<const render::StillView>(rest_seen_.inside, ready_);
+    rest_hits_ = still_->first_hits(rest_seen_.inside.surfaces[0]);
     if (judged_->plan.direct_light) {
       const std::string key = cache_folder.empty() ? "" : light_key(settings_);
       std::optional<FoundLight> found;
@@ -172,7 +174,7 @@ class CoatedView final : public SensorView {
     SeenTouch touch;
     touch.light = with_background(light(view, press, relief, seen));
     if (!truth && !lacking_) return touch;
-    const std::vector<render::FirstHit> hits = render::first_hits(seen.inside, ready_);
+    const std::vector<render::FirstHit> hits = still_->first_hits(seen.inside.surfaces[0]);
     const cv::Mat height = pressed_in(rest_hits_, hits, touch.light.size());
     if (lacking_) touch.light = lacking_->corrected(touch.light, height);
     if (!truth) return touch;
@@ -239,6 +241,7 @@ class CoatedView final : public SensorView {
   render::Camera camera_;
   render::ReadyCamera ready_;
   SeenGeometry rest_seen_;
+  std::unique_ptr<const render::StillView> still_;
   std::vector<render::FirstHit> rest_hits_;
   std::unique_ptr<const DirectLight> direct_;
   LightChoice choice_{false, "paths: the device is unfit for direct light", {}};

@@ -1,0 +1,51 @@
+#pragma once
+// Where a ray first meets a sheet whose every frame has other triangles.
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <optional>
+#include <vector>
+
+#include "core/triangle_mesh.h"
+#include "render/scene/scene.h"
+
+namespace touchstone::render {
+
+/// The triangles by the cells of a grid over x and y. It's made in a tenth of the time that a ray tree takes, and a
+/// camera's rays, which are steep, pass few cells between the sheet's lowest and highest point. Any mesh is right; one
+/// of many layers is slow. Immutable: many threads may ask.
+class SheetIndex {
+ public:
+  /// The mesh must outlive this. What lies beside `seen` (x, y) in all of its height isn't met.
+  SheetIndex(const TriangleMesh& mesh, const Eigen::AlignedBox2d& seen);
+
+  /// On a triangle a b c the place is (1 - u - v) a + u b + v c.
+  struct Hit {
+    int triangle;
+    double u, v;
+    double distance;
+  };
+  /// The nearest hit ahead of the origin and not beyond `far`. @pre `direction` is a unit vector
+  std::optional<Hit> first(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double far) const;
+
+ private:
+  struct Heights {
+    float low, high;
+  };
+
+  const TriangleMesh& mesh_;
+  double left_ = 0.0, bottom_ = 0.0, cell_ = 1.0;
+  int columns_ = 0, rows_ = 0;
+  double low_ = 0.0, high_ = 0.0;  // of all that is in the grid
+  std::vector<int> first_;         // of a cell's triangles, and of the one behind the last
+  std::vector<int> triangles_;
+  std::vector<Heights> heights_;  // of a cell's triangles
+};
+
+/// Normals of a place on a surface: its triangle's, not of unit length, and the one to shade with, as Surface has it.
+struct SheetNormals {
+  Eigen::Vector3d face, shading;
+};
+SheetNormals normals_at(const Surface& surface, const SheetIndex::Hit& hit);
+
+}  // namespace touchstone::render
