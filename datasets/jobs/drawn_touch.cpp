@@ -67,7 +67,9 @@ void require_outputs(const sim::DeviceSpec& device, const DrawJob& job) {
     refuse("height", "coating, and what its camera sees first isn't its outer face");
   }
   if (wanted.beads && !device.beads) refuse("beads", "beads");
-  if (wanted.markers && !(device.coating && device.coating->print)) refuse("markers", "printed coating");
+  if (wanted.markers && !device.pins && !(device.coating && device.coating->print)) {
+    refuse("markers", "printed coating and no pins");
+  }
   if (wanted.events && !device.camera->events) refuse("events", "event pixels (camera: events:)");
   if (wanted.statistics && !device.camera->motion_chip) refuse("statistics", "motion chip (camera: motion_chip:)");
 }

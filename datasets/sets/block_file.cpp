@@ -156,8 +156,9 @@ void write_fields(Hdf5Writer& file, Columns& columns, const DrawnOutputs& wanted
     field("bead_displacement", "mm", "beads", "of the beads", sensor.bead_places_mm.rows(), &BlockRecord::beads_mm);
   }
   if (wanted.markers) {
-    write_places(file, "marker_places", "markers", "of the printed markers' middles at rest", sensor.marker_places_mm);
-    field("marker_displacement", "mm", "markers", "of the gel under each printed marker's middle",
+    write_places(file, "marker_places", "markers", "of the printed markers' middles, or the pins' tips, at rest",
+                 sensor.marker_places_mm);
+    field("marker_displacement", "mm", "markers", "of the gel under each printed marker's middle, or of each pin's tip",
           sensor.marker_places_mm.rows(), &BlockRecord::markers_mm);
   }
   if (wanted.traction) {

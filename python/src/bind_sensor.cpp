@@ -266,11 +266,11 @@ void bind_sensor(py::module_& module) {
           "The untouched device's frame, with other noise; of a clear gel the object stands just above it.")
       .def_property_readonly(
           "markers_mm", [](const py::object& self) { return rows_of(self.cast<Touch&>().of.markers_mm, self); },
-          "(m, 3): the middles of printed markers on the undeformed gel, or None without a print.")
+          "(m, 3): the middles of printed markers, or of pins' tips, on the undeformed gel, or None without either.")
       .def_property_readonly(
           "marker_displacement_mm",
           [](const py::object& self) { return rows_of(self.cast<Touch&>().of.marker_displacement, self); },
-          "(m, 3): how far the gel under each marker's middle has gone, or None.")
+          "(m, 3): how far the gel under each marker's middle has gone, or the middle of each pin's tip, or None.")
       .def_property_readonly(
           "events",
           [](const Touch& self) -> py::object {

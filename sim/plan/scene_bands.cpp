@@ -27,6 +27,7 @@ std::vector<NamedColour> reflecting(const SceneSpec& scene) {
         {device.coating->albedo, device.coating->type == CoatingType::matt ? "coating.albedo" : "coating.reflectance"});
     if (device.coating->print) all.push_back({device.coating->print->colour, "coating.print.colour"});
   }
+  if (device.pins) all.push_back({device.pins->colour, "pins.colour"});
   if (!device.coating) {  // a coating hides the objects
     for (const MovedObject& moved : moved_objects(scene)) {
       all.push_back({moved.object.albedo, "albedo"});

@@ -13,6 +13,7 @@
 #include "sim/scene/camera_preset.h"
 #include "sim/scene/device_camera.h"
 #include "sim/scene/device_gel.h"
+#include "sim/scene/device_pins.h"
 #include "sim/scene/scattered_print.h"
 
 namespace touchstone::render {
@@ -338,6 +339,15 @@ void fields(YamlReader& in, CoatingSpec& coating) {
   in.optional("print", coating.print);
 }
 
+void fields(YamlReader& in, PinSpec& pins) {
+  in.required("rings", pins.rings, Allowed::within(0, kMostPinRings));
+  in.required("first_ring_mm", pins.first_ring_mm, Allowed::above(0.0));
+  in.required("diameter_mm", pins.diameter_mm, Allowed::above(0.0));
+  in.required("height_mm", pins.height_mm, Allowed::above(0.0));
+  in.required("tip_mm", pins.tip_mm, Allowed::above_up_to(0.0, pins.height_mm));
+  in.optional("colour", pins.colour, part_of_one());
+}
+
 void fields(YamlReader& in, FilmSpec& films) {
   in.required("grid", films.grid, Allowed::within(1, 1000));
   in.required("spacing_mm", films.spacing_mm, Allowed::above(0.0));
@@ -502,6 +512,7 @@ void fields(YamlReader& in, DeviceSpec& device) {
   in.optional("plate", device.plate);
   in.optional("lamps", device.lamps);
   in.optional("coating", device.coating);
+  in.optional("pins", device.pins);
   in.optional("films", device.films);
   in.optional("bands", device.bands);
   in.optional("band_wavelengths_nm", device.band_wavelengths_nm, Allowed::within(300.0, 1200.0));
@@ -520,6 +531,7 @@ void fields(YamlReader& in, DeviceSpec& device) {
   }
   check_gel(device, in.where("gel"));
   if (device.beads) check_beads_fit(device, in.where("beads"));
+  if (device.pins) check_pins(device, in.where("pins"));
   if (device.camera) {
     if (!in.has("plate")) fail_at(device.where, "{}'plate' is missing, through which the camera looks", in.context());
     check_camera_outside(device, in.where("camera"));

@@ -154,6 +154,19 @@ struct CoatingSpec {
   std::optional<PrintSpec> print;
 };
 
+/// Pins on the inside of a coated gel's skin, as a TacTip's [TacTipGenerator]: black, with a white tip. One stands in
+/// the middle, 6 k in the k-th ring round it (sim/scene/device_pins.h). The skin is the gel's first layer; without
+/// layers pins stand on the coating. For mechanics they aren't there (sim/view/skin_pins.h).
+struct PinSpec {
+  int rings = 0;
+  double first_ring_mm = 0.0;  ///< from the gel's axis to the feet of the first ring; the k-th stands k times as far
+                               ///< off, on a dome or a fingertip in angle
+  double diameter_mm = 0.0;
+  double height_mm = 0.0;  ///< with the tip, over the skin's inner face
+  double tip_mm = 0.0;     ///< of the height, white
+  Colour colour = 0.8;     ///< albedo of the tips, which are matt
+};
+
 /// Squares of a clear coloured film between plate and gel, as yellow filters over markers. Wetted on both sides.
 struct FilmSpec {
   Eigen::Vector2i grid = {1, 1};
@@ -248,6 +261,7 @@ struct DeviceSpec {
   std::optional<BeadSpec> beads;
   PlateSpec plate;
   std::optional<CoatingSpec> coating;
+  std::optional<PinSpec> pins;  ///< beside a coating without print
   std::optional<FilmSpec> films;
   std::vector<LampSpec> lamps;
   std::optional<BandsSpec> bands;                             ///< for spectra; else:
@@ -274,6 +288,7 @@ void fields(YamlReader& in, BeadSpec& beads);
 void fields(YamlReader& in, PlateSpec& plate);
 void fields(YamlReader& in, PrintSpec& print);
 void fields(YamlReader& in, CoatingSpec& coating);
+void fields(YamlReader& in, PinSpec& pins);
 void fields(YamlReader& in, FilmSpec& films);
 void fields(YamlReader& in, BandsSpec& bands);
 void fields(YamlReader& in, MotionChipSpec& chip);

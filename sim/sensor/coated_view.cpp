@@ -31,13 +31,15 @@ constexpr int kPathsAPixel = 256;      // where a device is unfit for direct lig
 
 /// How far a point of the surface moves along z where the gel is pressed in by `depth_mm` (negative: inwards). A
 /// fingertip's sides, which begin on the plate that it is bonded to, hardly move; nor does the rim of a dome that ends
-/// on the plate.
+/// on the plate, or of a fingertip that is held up to its hemisphere.
 double pressed_mm(const GelSpec& gel, double z_mm, double depth_mm) {
   if (ends_on_plate(gel)) return std::max(depth_mm, std::min(0.0, -0.5 * (z_mm + gel.thickness_mm)));
   const FingertipSpec* const fingertip = gel.fingertip();
   if (fingertip == nullptr) return depth_mm;
   const double held_mm = gel.thickness_mm - fingertip->sleeve_mm;
-  return depth_mm * std::clamp((z_mm + held_mm) / std::max(held_mm - fingertip->radius_mm, 1e-3), 0.0, 1.0);
+  constexpr double kRounding_mm = 1e-6;
+  if (held_mm <= fingertip->radius_mm + kRounding_mm) return std::max(depth_mm, std::min(0.0, -0.5 * (z_mm + held_mm)));
+  return depth_mm * std::clamp((z_mm + held_mm) / (held_mm - fingertip->radius_mm), 0.0, 1.0);
 }
 
 /// States that go as far as the light has to reach: pushed flat to the side and in.

@@ -64,8 +64,8 @@ struct Touch {
   cv::Mat contact;        ///< CV_8UC1, 255 where the pixel sees gel that lies on the object
   fem::PressState press;  ///< pose, wrench, tractions, displacement of gel and beads
   fem::PressError error;  ///< one standard error of what the mesh makes of it
-  Eigen::MatrixX3d markers_mm;               ///< printed markers on the undeformed gel (or their middle), a row each
-  Eigen::MatrixX3d marker_displacement;      ///< mm, a row a marker: of the material under its middle
+  Eigen::MatrixX3d markers_mm;  ///< middles of printed markers, or of pins' tips, on the undeformed gel, a row each
+  Eigen::MatrixX3d marker_displacement;      ///< mm, a row a marker: of the material under its middle, or of the tip
   std::vector<Event> events;                 ///< of a device with event pixels: from the press's start to its end
   render::ControlState control;              ///< how a camera that sets itself has done so for `frame`
   std::optional<ChipStatistics> statistics;  ///< of a device with a motion chip: its last frame's, motion summed

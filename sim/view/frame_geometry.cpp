@@ -4,6 +4,7 @@
 
 #include "sim/scene/device_camera.h"
 #include "sim/scene/device_gel.h"
+#include "sim/view/skin_pins.h"
 #include "sim/view/visible_scene.h"
 
 namespace touchstone::sim {
@@ -45,6 +46,10 @@ FrameGeometry frame_geometry(const SceneSpec& scene, const fem::Compliance& gel,
   const std::vector<PlacedShape> shapes = placed_shapes(objects, press);
   add_gel(VisibleGel(gel, gel_body(scene.device)).sheet(press, shapes), out.parts);
   if (scene.device.beads) add_beads(*scene.device.beads, press, out.parts);
+  if (scene.device.pins) {
+    out.parts.push_back(
+        {"pin tips", SkinPins(scene.device, gel).tips(press), display_colour(scene.device.pins->colour)});
+  }
   for (std::size_t k = 0; k < objects.size(); ++k) {
     const ObjectSpec& object = all[k].object;
     out.parts.push_back(

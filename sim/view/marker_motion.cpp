@@ -10,6 +10,11 @@ namespace touchstone::sim {
 MarkerPlaces marker_places(const DeviceSpec& device, const fem::Compliance& gel) {
   MarkerPlaces places;
   places.rest_mm.resize(0, 3);
+  if (device.pins) {
+    places.pins = SkinPins(device, gel);
+    places.rest_mm = places.pins.rest_mm();
+    return places;
+  }
   if (!device.coating || !device.coating->print) return places;
   const PrintSpec& print = *device.coating->print;
   const std::vector<Eigen::Vector2d> at = print_coordinates(print, device.gel, gel.vertices);
@@ -43,6 +48,7 @@ MarkerPlaces marker_places(const DeviceSpec& device, const fem::Compliance& gel)
 
 Eigen::MatrixX3d marker_displacement(const MarkerPlaces& places, const fem::Compliance& gel,
                                      const fem::PressState& press) {
+  if (!places.pins.empty()) return places.pins.tips_mm(press) - places.rest_mm;
   Eigen::MatrixX3d moved = Eigen::MatrixX3d::Zero(places.rest_mm.rows(), 3);
   if (press.surface_displacement.rows() == 0) return moved;
   for (std::size_t k = 0; k < places.triangle.size(); ++k) {

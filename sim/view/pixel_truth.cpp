@@ -9,6 +9,7 @@
 
 #include "core/error.h"
 #include "render/cameras/first_hits.h"
+#include "sim/view/skin_pins.h"
 
 namespace touchstone::sim {
 namespace {
@@ -44,6 +45,13 @@ SeenPoint inside_point(const SeenGeometry& seen, const render::FirstHit& hit) {
     point.rest = at_hit(seen.sheet.rest);
     const int marker = seen.print.empty() ? -1 : seen.markers.mark_at(at_hit(seen.print));
     if (marker >= 0) point.id = PixelId::kFirstMarker + marker;
+  } else if (hit.object == 2) {
+    const auto& t = seen.inside.surfaces[2].mesh.triangles[static_cast<std::size_t>(hit.triangle)];
+    const auto rest = [&](int corner) -> const Eigen::Vector3d& {
+      return seen.pins_rest[static_cast<std::size_t>(t[corner])];
+    };
+    point.id = PixelId::kFirstMarker + hit.triangle / SkinPins::kTriangles;
+    point.rest = (1.0 - hit.u - hit.v) * rest(0) + hit.u * rest(1) + hit.v * rest(2);
   }
   return point;
 }

@@ -30,7 +30,7 @@ struct PixelId {
   static constexpr int kFirstObject = 1'000;
   static constexpr int kFirstScreen = 2'000;
   static constexpr int kFirstBead = 10'000;
-  static constexpr int kFirstMarker = 20'000;  ///< of a coating's print; also where the gel lies on an object
+  static constexpr int kFirstMarker = 20'000;  ///< of a print, also where the gel lies on an object; pins' tips
 };
 
 /// The layers that `outputs` asks for, in the order of the table, but for `error`. Pure.

@@ -9,6 +9,7 @@
 #include "sim/scene/scene.h"
 #include "sim/view/membrane.h"
 #include "sim/view/seen_geometry.h"
+#include "sim/view/skin_pins.h"
 #include "sim/view/visible_gel.h"
 #include "sim/view/visible_scene.h"
 
@@ -38,8 +39,12 @@ struct SceneView {
   SceneSpec scene;
   Plan plan;
   VisibleGel gel;
+  SkinPins pins;                             ///< none of a device without
   std::unique_ptr<const Membrane> membrane;  ///< for the fine contact and height maps; null where neither is wanted
   std::vector<VisibleObject> objects;
+
+ private:
+  render::Scene with_pins(render::Scene seen, const fem::PressState& press) const;
 };
 
 /// The gel of `press` as nothing presses it.

@@ -21,15 +21,16 @@ struct SeenBody {
 
 /// Unlike in visible_scene, the gel's outer surface is whole: where it lies on an object it is still the gel's.
 struct SeenGeometry {
-  /// What can be seen before the outer surface: surfaces[0] is that surface, surfaces[1] the gel's frame; the balls are
-  /// the beads.
+  /// What can be seen before the outer surface: surfaces[0] is that surface, surfaces[1] the gel's frame, surfaces[2]
+  /// the pins' tips (sim/view/skin_pins.h), if SceneView added any; the balls are the beads.
   render::Scene inside;
-  render::Scene beyond;                ///< the objects and their screens; no gel
-  std::vector<SeenBody> bodies;        ///< what each of `beyond.surfaces` is
-  GelSheet sheet;                      ///< surfaces[0] of `inside` with its meaning
-  Eigen::MatrixX3d bead_displacement;  ///< m x 3, mm
-  render::PrintIndex markers;          ///< printed on the outer surface; none without a coating
-  std::vector<Eigen::Vector2d> print;  ///< material coordinates of the sheet's vertices, where there's a print
+  render::Scene beyond;                    ///< the objects and their screens; no gel
+  std::vector<SeenBody> bodies;            ///< what each of `beyond.surfaces` is
+  GelSheet sheet;                          ///< surfaces[0] of `inside` with its meaning
+  Eigen::MatrixX3d bead_displacement;      ///< m x 3, mm
+  render::PrintIndex markers;              ///< printed on the outer surface; none without a coating
+  std::vector<Eigen::Vector2d> print;      ///< material coordinates of the sheet's vertices, where there's a print
+  std::vector<Eigen::Vector3d> pins_rest;  ///< the vertices of the pins' tips on the undeformed gel; none without pins
 };
 
 /// As the elements' surface has it. @pre the gel is a slab

@@ -18,6 +18,7 @@ OUTPUTS = {
     "chroma-compact": ["frame", "height", "contact", "markers", "traction"],
     "dvs-grasp": ["frame", "height", "contact", "events"],
     "reflex": ["frame", "statistics", "markers"],
+    "tactip": ["frame", "height", "contact", "markers"],
     "gelsight-markers": ["frame", "height", "contact", "markers"],
     "gelsight-mini-markers": ["frame", "height", "contact", "markers"],
 }

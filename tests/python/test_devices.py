@@ -11,7 +11,7 @@ import touchstone as ts
 SCENES = pathlib.Path(os.environ["TOUCHSTONE_SCENES"])
 DEVICES = sorted(path.stem for path in (SCENES / "devices").glob("*.yaml"))
 CLEAR = {"vhs", "vhs-spectral"}
-PRINTED = {"chroma", "chroma-compact", "gelsight-markers", "gelsight-mini-markers", "reflex"}
+PRINTED = {"chroma", "chroma-compact", "gelsight-markers", "gelsight-mini-markers", "reflex", "tactip"}
 FORCE_N = 0.5
 # Of each kind at least one; others are long tests. (Devices that differ in optics alone share a gel.)
 QUICK = {"dvs-grasp", "gelsight-portable", "gelsight-webcam", "reflex", "vhs-spectral"}
@@ -25,7 +25,7 @@ def touched(request):
 
 
 def test_their_number():
-    assert len(DEVICES) == 14 and QUICK < set(DEVICES)
+    assert len(DEVICES) == 15 and QUICK < set(DEVICES)
 
 
 def test_a_ball_makes_a_frame_with_its_force(touched):
@@ -56,11 +56,12 @@ def test_truth_of_its_kind(touched):
         assert np.nanmax(touch.height_mm) > 0.02
     assert (touch.markers_mm is not None) == (name in PRINTED)
     if name in PRINTED:
-        # The marker nearest to the ball goes in, and all go with the gel: none further than the deepest vertex.
+        # The marker nearest to the ball goes in, and all go with the gel: none further than the deepest vertex (a pin's foot is
+        # fitted to vertices, to rounding under a ball).
         nearest = np.argmin(np.linalg.norm(touch.markers_mm[:, :2], axis=1))
-        deepest = -touch.surface_displacement_mm[:, 2].min()
+        deepest = -touch.surface_displacement_mm[:, 2].min() * (1 + 1e-4)
         assert 0 < -touch.marker_displacement_mm[nearest, 2] <= deepest
-        assert np.abs(touch.marker_displacement_mm).max() <= np.abs(touch.surface_displacement_mm).max()
+        assert np.abs(touch.marker_displacement_mm).max() <= np.abs(touch.surface_displacement_mm).max() * (1 + 1e-4)
 
 
 def test_events_of_the_press(touched):

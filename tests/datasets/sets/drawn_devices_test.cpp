@@ -221,7 +221,7 @@ TEST_F(DrawnDevices, WhatADeviceCannotGiveIsRefusedByName) {
   EXPECT_THAT(refused("name: pad" + gel(), "frame"), HasSubstr("'frame' can't be had of device pad: it has no camera"));
   EXPECT_THAT(refused(clear_device(), "height"), HasSubstr("'height' can't be had of device clear: it has no coating"));
   EXPECT_THAT(refused(milky_device(), "beads"), HasSubstr("'beads' can't be had of device milky: it has no beads"));
-  EXPECT_THAT(refused(clear_device(), "markers"), HasSubstr("it has no printed coating"));
+  EXPECT_THAT(refused(clear_device(), "markers"), HasSubstr("it has no printed coating and no pins"));
   EXPECT_THAT(refused(clear_device(), "events"), HasSubstr("it has no event pixels"));
   EXPECT_THAT(refused(clear_device(), "statistics"), HasSubstr("it has no motion chip"));
   EXPECT_THAT(refused(clear_device(), "frames"), HasSubstr("'frames'"));
