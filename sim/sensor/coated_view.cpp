@@ -135,8 +135,11 @@ class CoatedView final : public SensorView {
     camera_ = camera_of(*device_.camera);
     ready_ = render::make_ready(camera_);
     rest_seen_ = judged_->geometry(rest_, {});
-    still_ = std::make_unique<const render::StillView>(rest_seen_.inside, ready_);
-    rest_hits_ = still_->first_hits(rest_seen_.inside.surfaces[0]);
+    // Sheet and frame: then the sheet alone moves.
+    if (rest_seen_.inside.surfaces.size() == 2 && rest_seen_.inside.balls.empty()) {
+      still_ = std::make_unique<const render::StillView>(rest_seen_.inside, ready_);
+    }
+    rest_hits_ = first_hits(rest_seen_.inside);
     if (judged_->plan.direct_light) {
       const std::string key = cache_folder.empty() ? "" : light_key(settings_);
       std::optional<FoundLight> found;
@@ -176,7 +179,7 @@ class CoatedView final : public SensorView {
     SeenTouch touch;
     touch.light = with_background(light(view, press, relief, seen));
     if (!truth && !lacking_) return touch;
-    const std::vector<render::FirstHit> hits = still_->first_hits(seen.inside.surfaces[0]);
+    const std::vector<render::FirstHit> hits = first_hits(seen.inside);
     const cv::Mat height = pressed_in(rest_hits_, hits, touch.light.size());
     if (lacking_) touch.light = lacking_->corrected(touch.light, height);
     if (!truth) return touch;
@@ -220,6 +223,10 @@ class CoatedView final : public SensorView {
     return play_motion(scene, make_plan(scene), gel_);
   }
 
+  std::vector<render::FirstHit> first_hits(const render::Scene& inside) const {
+    return still_ ? still_->first_hits(inside.surfaces[0]) : render::first_hits(inside, ready_);
+  }
+
   /// Irradiance on the sensor. `seen` and `relief` as the view's geometry() and relief() gave them.
   cv::Mat light(const SceneView& view, const fem::PressState& press, const std::optional<fem::ReliefAnswer>& relief,
                 const SeenGeometry& seen) const {
@@ -243,7 +250,7 @@ class CoatedView final : public SensorView {
   render::Camera camera_;
   render::ReadyCamera ready_;
   SeenGeometry rest_seen_;
-  std::unique_ptr<const render::StillView> still_;
+  std::unique_ptr<const render::StillView> still_;  // null where more than the sheet moves
   std::vector<render::FirstHit> rest_hits_;
   std::unique_ptr<const DirectLight> direct_;
   LightChoice choice_{false, "paths: the device is unfit for direct light", {}};
