@@ -18,8 +18,9 @@ constexpr double kPoorTable = 0.08;  // slope error from which a network is trie
 constexpr std::size_t kFolds = 5;
 constexpr double kSteepestRim = 0.9;      // contact radius by the ball's, of circles that a network learns from
 constexpr double kSameCircle = 0.25;      // of the radius: how far a found circle may lie from the given one
-constexpr double kWeakestBalance = 0.85;  // of the other white balances that a network is shown
-constexpr double kStrongestBalance = 1.2;
+constexpr double kWeakestBalance = 0.78;  // of the other white balances that a network is shown
+constexpr double kStrongestBalance = 1.25;
+constexpr int kBalances = 3;                        // of each press, beside its own
 constexpr std::size_t kCellsToCompare = 1U << 17U;  // coarser tables serve to compare corrections
 
 using Samples = std::vector<ColourSample>;
@@ -194,8 +195,8 @@ std::vector<ContactCircle> sharpened_circles(const std::vector<UsedPress>& used,
   return circles;
 }
 
-/// What a network learns from: each press as it is and, where cameras have a white balance, with another one, since
-/// that cuts off other pixels; last the untouched gel.
+/// What a network learns from: each press as it is and, where cameras have a white balance, with some others, since
+/// they cut off other pixels; last the untouched gel.
 std::vector<LabelledPicture> labelled_pictures(const std::vector<UsedPress>& used, const Background& background,
                                                const HeightCalibrationSettings& settings, bool white_balance,
                                                GainFinder& finder) {
@@ -206,14 +207,16 @@ std::vector<LabelledPicture> labelled_pictures(const std::vector<UsedPress>& use
     pictures.push_back({used[i].seen.difference, press.frame, circles[i], press.ball_radius_mm});
     if (!white_balance) continue;
     RandomStream random(settings.learning.seed, i, Purpose::kSearch);
-    cv::Scalar factors;
-    for (int c = 0; c < 3; ++c) {
-      factors[c] = kWeakestBalance + (kStrongestBalance - kWeakestBalance) * random.uniform();
+    for (int balance = 0; balance < kBalances; ++balance) {
+      cv::Scalar factors;
+      for (int c = 0; c < 3; ++c) {
+        factors[c] = kWeakestBalance + (kStrongestBalance - kWeakestBalance) * random.uniform();
+      }
+      cv::Mat other;
+      cv::multiply(press.frame, factors, other);
+      const cv::Mat difference = difference_to(background, other, finder.find(other).gain);
+      pictures.push_back({difference, other, circles[i], press.ball_radius_mm});
     }
-    cv::Mat other;
-    cv::multiply(press.frame, factors, other);
-    const cv::Mat difference = difference_to(background, other, finder.find(other).gain);
-    pictures.push_back({difference, other, circles[i], press.ball_radius_mm});
   }
   pictures.push_back({cv::Mat::zeros(background.mean.size(), CV_32FC3), {}, {}, 0.0});
   return pictures;

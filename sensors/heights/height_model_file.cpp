@@ -12,7 +12,9 @@ namespace touchstone::sensors {
 namespace {
 
 constexpr const char* kFormat = "touchstone.height_model";
-constexpr int kVersion = 3;  // 3: white balance and network; 2 had neither; 1 had a polynomial for lamps
+// 4: a network sees to its pixel's sides; 3 had means round it only; 2 had no network and no white balance; 1 had a
+// polynomial for lamps.
+constexpr int kVersion = 4;
 constexpr int kLargestSide = 8192;
 constexpr int kMostCells = 1024;
 
@@ -27,17 +29,6 @@ Eigen::Matrix3d square_of(const JsonField& field) {
   Eigen::Matrix3d matrix;
   matrix << rows[0].transpose(), rows[1].transpose(), rows[2].transpose();
   return matrix;
-}
-
-SlopeNetwork slope_network_of(const JsonField& field) {
-  field.expect_map({"sigmoid", "layers", "neighbourhoods_mm"});
-  SlopeNetwork network;
-  const Eigen::Vector3d sizes = field.at("neighbourhoods_mm").vector<3>();
-  for (std::size_t i = 0; i < 3; ++i) network.neighbourhoods_mm[i] = sizes[static_cast<Eigen::Index>(i)];
-  Json plain = field.value;
-  plain.erase("neighbourhoods_mm");
-  network.network = network_of({plain, field.path, field.file});
-  return network;
 }
 
 }  // namespace
@@ -66,10 +57,7 @@ std::string to_bytes(const HeightModel& model) {
     json["background_noise_DN"] = {(*noise)[0], (*noise)[1], (*noise)[2]};
   json["white_balance"] = model.white_balance;
   json["network"] = nullptr;
-  if (model.network) {
-    json["network"] = json_of(model.network->network);
-    json["network"]["neighbourhoods_mm"] = model.network->neighbourhoods_mm;
-  }
+  if (model.network) json["network"] = json_of(model.network->network);
   json["correction"] = name_of(model.correction);
   json["lamps"] = Json::array();
   for (const Eigen::Matrix3d& node : model.lamps.nodes) json["lamps"].push_back(matrix_to_json(node));
@@ -106,7 +94,8 @@ HeightModel height_model_from_bytes(std::string_view bytes, const std::string& n
     model.background.noise_DN = cv::Vec3d(values[0], values[1], values[2]);
   }
   model.white_balance = root.at("white_balance").truth();
-  if (const JsonField network = root.at("network"); !network.value.is_null()) model.network = slope_network_of(network);
+  if (const JsonField network = root.at("network"); !network.value.is_null())
+    model.network = SlopeNetwork{network_of(network)};
   model.correction =
       root.at("correction")
           .name_among(std::array{LightCorrection::none, LightCorrection::background, LightCorrection::fitted});

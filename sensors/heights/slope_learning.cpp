@@ -17,7 +17,7 @@ namespace {
 constexpr double kNear = 1.3;     // contact radii: where a quarter of the samples is from
 constexpr double kRimFrom = 0.7;  // likewise
 constexpr double kRimTo = 1.2;
-constexpr Eigen::Index kBatch = 64;
+constexpr Eigen::Index kBatch = 256;
 
 /// The slope of a press's imprint at a pixel's centre.
 Eigen::Vector2d slope_at(const BallImprint& imprint, const Eigen::Vector2d& centre, int u, int v, double mm_per_px) {
@@ -71,7 +71,7 @@ Samples draw_samples(std::span<const LabelledPicture> pictures, double mm_per_px
   TS_ASSERT(pressed > 0);
   const double rest = untouched > 0 ? how.rest_share : 0.0;
   const cv::Size size = pictures.front().difference.size();
-  Neighbourhoods neighbourhoods(size, mm_per_px, SlopeNetwork{}.neighbourhoods_mm);
+  Neighbourhoods neighbourhoods(size, mm_per_px);
   std::vector<float> row(static_cast<std::size_t>(SlopeNetwork::kInputs * size.width));
   Samples samples;
   for (std::size_t i = 0; i < pictures.size(); ++i) {

@@ -25,14 +25,14 @@ struct SlopeLearning {
   int units = 20;            ///< hidden
   int samples = 40'000;      ///< pixels, of all pictures together
   int epochs = 60;           ///< how often each is learnt from
-  double rate = 0.02;        ///< of the first steps; it falls to zero along half a cosine
+  double rate = 0.03;        ///< of the first steps; it falls to zero along half a cosine
   double decay = 1e-5;       ///< weight of the parameters' squares beside the mean squared error
   double rest_share = 0.15;  ///< of the samples: from untouched pictures, if there are any
   double gel_thickness_mm = 4.0;
   std::uint64_t seed = 1;
 };
 
-/// Learns by Adam's steps [Kingma2015, alg. 1] of 64 pixels, drawn at random: a quarter of a press's round the rim of
+/// Learns by Adam's steps [Kingma2015, alg. 1] of 256 pixels, drawn at random: a quarter of a press's round the rim of
 /// its contact, a quarter within 1.3 contact radii, half anywhere. The same bits for the same pictures and seed. (With
 /// Levenberg and Marquardt's steps, which lower the error on the same pixels faster, presses that were left out came
 /// out twice as bad; scaled conjugate gradients took eight times as long for the same.)

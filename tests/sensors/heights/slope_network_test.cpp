@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <opencv2/imgproc.hpp>
 
 #include "core/error.h"
@@ -43,7 +45,7 @@ TEST(SlopeReader, IsTheNetworkPixelByPixel) {
   cv::Mat slope_u;
   cv::Mat slope_v;
   reader.read(difference, slope_u, slope_v);
-  Neighbourhoods neighbourhoods(size, kScale, network.neighbourhoods_mm);
+  Neighbourhoods neighbourhoods(size, kScale);
   neighbourhoods.take(difference);
   std::vector<float> row(static_cast<std::size_t>(SlopeNetwork::kInputs * size.width));
   for (int v = 0; v < size.height; ++v) {
@@ -60,25 +62,43 @@ TEST(SlopeReader, IsTheNetworkPixelByPixel) {
   }
 }
 
-TEST(Neighbourhoods, AreGaussianMeans) {
-  // A single bright pixel of 64 DN: the mean at distance r is exp(-r^2 / 2 sigma^2) / (2 pi sigma^2).
-  const cv::Size size(81, 81);
-  cv::Mat difference = cv::Mat::zeros(size, CV_32FC3);
-  difference.at<cv::Vec3f>(40, 40) = {64.0F, 0.0F, 0.0F};
-  const std::array<double, 3> sizes_mm = {2.0 * kScale, 2.4 * kScale, 9.0 * kScale};
-  Neighbourhoods neighbourhoods(size, kScale, sizes_mm);
-  neighbourhoods.take(difference);
-  std::vector<float> row(static_cast<std::size_t>(SlopeNetwork::kInputs * size.width));
-  neighbourhoods.inputs_of_row(difference, 40, row.data());
-  for (std::size_t k = 0; k < 3; ++k) {
-    const double sigma = sizes_mm[k] / kScale;
-    const double peak = 1.0 / (2.0 * kPi * sigma * sigma);
-    for (const int u : {40, 42, 46}) {
-      const double r = u - 40;
-      EXPECT_NEAR(row[(3 + 3 * k) * 81 + static_cast<std::size_t>(u)], peak * std::exp(-0.5 * r * r / (sigma * sigma)),
-                  0.06 * peak)
-          << k << ", " << u;
+/// Blue light of a Gaussian's shape in a square picture's middle, and the inputs of row v there.
+std::vector<float> inputs_by_a_blob(int side, double mm_per_px, double blob_mm, int v) {
+  cv::Mat difference = cv::Mat::zeros(side, side, CV_32FC3);
+  for (int y = 0; y < side; ++y) {
+    for (int x = 0; x < side; ++x) {
+      const double r = mm_per_px * std::hypot(x + 0.5 - 0.5 * side, y + 0.5 - 0.5 * side);
+      difference.at<cv::Vec3f>(y, x)[0] =
+          static_cast<float>(SlopeNetwork::kColourUnit_DN * std::exp(-0.5 * r * r / (blob_mm * blob_mm)));
     }
+  }
+  Neighbourhoods neighbourhoods(difference.size(), mm_per_px);
+  neighbourhoods.take(difference);
+  std::vector<float> row(static_cast<std::size_t>(SlopeNetwork::kInputs * side));
+  neighbourhoods.inputs_of_row(difference, v, row.data());
+  return row;
+}
+
+TEST(Neighbourhoods, AreGaussianMeans) {
+  // The mean of a Gaussian over a Gaussian is one again: their variances add up.
+  constexpr int kSide = 240;
+  constexpr double kBlob_mm = 0.4;
+  constexpr int kRow = 112;
+  const std::vector<float> row = inputs_by_a_blob(kSide, kScale, kBlob_mm, kRow);
+  const auto expect = [&](int input, double width_mm, const Eigen::Vector2d& off_mm) {
+    const double variance = width_mm * width_mm + kBlob_mm * kBlob_mm;
+    const double peak = kBlob_mm * kBlob_mm / variance;
+    for (int u = 60; u < 180; u += 7) {
+      const Eigen::Vector2d at = kScale * Eigen::Vector2d(u + 0.5 - 0.5 * kSide, kRow + 0.5 - 0.5 * kSide) + off_mm;
+      EXPECT_NEAR(row[static_cast<std::size_t>(input * kSide + u)], peak * std::exp(-0.5 * at.squaredNorm() / variance),
+                  0.03 * peak)
+          << input << ", " << u;
+    }
+  };
+  expect(3, SlopeNetwork::kFine_mm, {0.0, 0.0});
+  for (std::size_t i = 0; i < SlopeNetwork::kContext.size(); ++i) {
+    const SlopeNetwork::Mean& mean = SlopeNetwork::kContext[i];
+    expect(SlopeNetwork::kNear + 3 * static_cast<int>(i), mean.width_mm, {mean.right_mm, mean.down_mm});
   }
 }
 
@@ -92,8 +112,6 @@ TEST(SlopeReader, FaultyNetworksAreRefused) {
               ThrowsMessage<Error>(HasSubstr("one hidden layer of tanh")));
   EXPECT_THAT(with([](SlopeNetwork& n) { n.network.weights[0](1, 1) = NAN; }),
               ThrowsMessage<Error>(HasSubstr("finite")));
-  EXPECT_THAT(with([](SlopeNetwork& n) { n.neighbourhoods_mm[1] = -1.0; }),
-              ThrowsMessage<Error>(HasSubstr("neighbourhood")));
   EXPECT_THAT(with([](SlopeNetwork& n) { n.network.weights[0].conservativeResize(Eigen::NoChange, 3); }),
               ThrowsMessage<Error>(HasSubstr("3 inputs")));
 }
