@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include "core/error.h"
 #include "core/units.h"
@@ -13,9 +14,8 @@
 namespace touchstone::sim {
 namespace {
 
-/// `count` vertices, nearest first.
-std::vector<int> nearest_vertices(const std::vector<Eigen::Vector3d>& vertices, const Eigen::Vector3d& point,
-                                  int count) {
+/// All vertices, nearest first.
+std::vector<int> by_distance(const std::vector<Eigen::Vector3d>& vertices, const Eigen::Vector3d& point) {
   std::vector<int> order(vertices.size());
   std::iota(order.begin(), order.end(), 0);
   const auto nearer = [&](int a, int b) {
@@ -23,8 +23,7 @@ std::vector<int> nearest_vertices(const std::vector<Eigen::Vector3d>& vertices, 
     const double to_b = (vertices[static_cast<std::size_t>(b)] - point).squaredNorm();
     return to_a != to_b ? to_a < to_b : a < b;
   };
-  std::partial_sort(order.begin(), order.begin() + count, order.end(), nearer);
-  order.resize(static_cast<std::size_t>(count));
+  std::sort(order.begin(), order.end(), nearer);
   return order;
 }
 
@@ -38,9 +37,9 @@ SkinPins::SkinPins(const DeviceSpec& device, const fem::Compliance& gel) {
   // A regular polygon's area is that of a circle of this much less radius.
   const double corner = 2.0 * kPi / kSides;
   radius_mm_ = 0.5 * spec.diameter_mm * std::sqrt(corner / std::sin(corner));
-  if (gel.vertices.size() <= static_cast<std::size_t>(kVertices)) {
+  if (gel.vertices.size() <= static_cast<std::size_t>(kLeastVertices)) {
     fail("device {}: its outer surface has {} vertices; pins need more than {}: a finer mesh", device.name,
-         gel.vertices.size(), kVertices);
+         gel.vertices.size(), kLeastVertices);
   }
   for (const PinPlace& place : pin_places(device)) {
     Pin pin;
@@ -48,17 +47,21 @@ SkinPins::SkinPins(const DeviceSpec& device, const fem::Compliance& gel) {
     pin.out = -place.inward;
     pin.along_1 = pin.out.unitOrthogonal();
     pin.along_2 = pin.out.cross(pin.along_1);
-    const std::vector<int> near = nearest_vertices(gel.vertices, pin.skin, kVertices + 1);
-    // Weights fade to nothing at the next vertex, so that no vertex counts by being the twelfth and not the thirteenth.
+    const std::vector<int> near = by_distance(gel.vertices, pin.skin);
     const auto offset = [&](int vertex) -> Eigen::Vector3d {
       return gel.vertices[static_cast<std::size_t>(vertex)] - pin.skin;
     };
-    const double far = offset(near.back()).norm();
-    Eigen::Matrix<double, kVertices, 6> terms;
-    Eigen::Matrix<double, kVertices, 1> importance;
-    for (int i = 0; i < kVertices; ++i) {
-      pin.vertex[static_cast<std::size_t>(i)] = near[static_cast<std::size_t>(i)];
-      const Eigen::Vector3d to = offset(near[static_cast<std::size_t>(i)]);
+    // Weights fade to nothing at the first vertex that is left out, or before.
+    const double far =
+        std::max(offset(near[kLeastVertices]).norm(), kSmoothing * (pin_reach_mm(device) - spec.height_mm));
+    for (const int vertex : near) {
+      if (offset(vertex).norm() < far) pin.vertex.push_back(vertex);
+    }
+    const auto count = static_cast<Eigen::Index>(pin.vertex.size());
+    Eigen::MatrixXd terms(count, 6);
+    Eigen::VectorXd importance(count);
+    for (Eigen::Index i = 0; i < count; ++i) {
+      const Eigen::Vector3d to = offset(pin.vertex[static_cast<std::size_t>(i)]);
       const double x = to.dot(pin.along_1);
       const double y = to.dot(pin.along_2);
       const double part = to.norm() / far;
@@ -68,7 +71,7 @@ SkinPins::SkinPins(const DeviceSpec& device, const fem::Compliance& gel) {
     const Eigen::MatrixXd inverse =
         (importance.asDiagonal() * terms).completeOrthogonalDecomposition().pseudoInverse() * importance.asDiagonal();
     pin.weights = inverse.topRows<3>();
-    pins_.push_back(pin);
+    pins_.push_back(std::move(pin));
   }
   rest_mm_ = tips_mm({});
 }
@@ -76,7 +79,7 @@ SkinPins::SkinPins(const DeviceSpec& device, const fem::Compliance& gel) {
 SkinPins::Pose SkinPins::pose(const Pin& pin, const fem::PressState& press) const {
   if (press.surface_displacement.rows() == 0) return {pin.skin, pin.out};
   Eigen::Matrix3d moved = Eigen::Matrix3d::Zero();  // rows: the displacement, its slopes
-  for (int i = 0; i < kVertices; ++i) {
+  for (Eigen::Index i = 0; i < pin.weights.cols(); ++i) {
     moved += pin.weights.col(i) * press.surface_displacement.row(pin.vertex[static_cast<std::size_t>(i)]);
   }
   const Eigen::Vector3d along_1 = pin.along_1 + moved.row(1).transpose();

@@ -2,7 +2,6 @@
 // A device's pins on a pressed gel: where they are, which way they point, and what is seen of them.
 
 #include <Eigen/Core>
-#include <array>
 #include <vector>
 
 #include "core/triangle_mesh.h"
@@ -12,12 +11,13 @@
 
 namespace touchstone::sim {
 
-/// Pins are rigid and stand upright on a skin that is thin and doesn't change its thickness: a line through skin and
-/// pin goes with the outer surface's point and turns with its normal. So a pin's tip moves aside where the skin tilts,
-/// which is what a TacTip is read by. What the gel between pins does to them is left out.
+/// Pins are rigid and stand upright on a skin that doesn't change its thickness: a line through skin and pin goes with
+/// the outer surface's point and turns with its normal. So a pin's tip moves aside where the skin tilts, which is what
+/// a TacTip is read by. What the gel between pins does to them is left out.
 ///
-/// The displacement that mechanics gives at the mesh's vertices is made smooth round each pin: a quadratic in the
-/// tangent plane's coordinates, by weighted least squares over the nearest vertices. Made once a gel; for many threads.
+/// Inside the skin all is smoother than at its face. So the displacement that mechanics gives at the mesh's vertices is
+/// made smooth round each pin: a quadratic in the tangent plane's coordinates, by weighted least squares over the
+/// vertices within kSmoothing thicknesses of the skin (at least the 12 nearest). Made once a gel; for many threads.
 class SkinPins {
  public:
   SkinPins() = default;  ///< none
@@ -36,13 +36,15 @@ class SkinPins {
   static constexpr int kTriangles = 3 * kSides;  ///< of a tip
 
  private:
-  static constexpr int kVertices = 12;  // nearest to a pin
+  static constexpr int kLeastVertices = 12;
+  // Found where tips come nearest to those of lines of material inside the tactip's skin (docs/sensors/tactip.md).
+  static constexpr double kSmoothing = 2.8;
 
   struct Pin {
     Eigen::Vector3d skin;                   // on the undeformed outer surface
     Eigen::Vector3d out, along_1, along_2;  // right-handed: along_1 x along_2 = out
-    std::array<int, kVertices> vertex;
-    Eigen::Matrix<double, 3, kVertices> weights;  // of displacements: the value, and its slopes along_1 and along_2
+    std::vector<int> vertex;
+    Eigen::Matrix3Xd weights;  // of displacements, a column a vertex: the value, its slopes along_1 and along_2
   };
   struct Pose {
     Eigen::Vector3d skin, out;

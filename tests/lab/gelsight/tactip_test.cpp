@@ -22,7 +22,8 @@ sensors::MarkerTrackerSettings tracker_of_pins() {
   sensors::MarkerTrackerSettings settings;
   settings.appearance.diameter_px = 12.0;  // in the middle of the picture
   settings.appearance.spacing_px = 26.0;
-  settings.appearance.darkness = 0.85;  // of the negative: the outer tips are a third as bright as the middle ones
+  settings.appearance.darkness =
+      0.85;  // of the negative: the outer tips are well under half as bright as the middle ones
   return settings;
 }
 

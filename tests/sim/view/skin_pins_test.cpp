@@ -143,7 +143,8 @@ TEST(SkinPins, TurnWithARigidlyTurnedDome) {
   const Eigen::MatrixX3d now = skin.tips_mm(press);
   for (Eigen::Index i = 0; i < now.rows(); ++i) {
     const Eigen::Vector3d rest = skin.rest_mm().row(i);
-    EXPECT_LT((now.row(i).transpose() - (turn * rest + step)).norm(), 1e-4) << "pin " << i;
+    EXPECT_LT((now.row(i).transpose() - (turn * rest + step)).norm(), 2e-4)
+        << "pin " << i;  // what a quadratic misses of the sphere
   }
   // The mesh goes with them: each tip's vertices have the tip's size and their middle where the tip is.
   const TriangleMesh mesh = skin.tips(press);
