@@ -74,7 +74,7 @@ std::vector<FirstHit> StillView::first_hits(const Surface& sheet) const {
     }
   }
   std::vector<FirstHit> hits(rays_.size());
-  const SheetIndex index(sheet.mesh, seen);
+  const SheetIndex index(sheet, seen);
   constexpr std::size_t kRaysATask = 1024;
   const std::size_t tasks = (rays_.size() + kRaysATask - 1) / kRaysATask;
   tbb::parallel_for(std::size_t{0}, tasks, [&](std::size_t task) {
@@ -89,7 +89,7 @@ std::vector<FirstHit> StillView::first_hits(const Surface& sheet) const {
                  hit->u,
                  hit->v,
                  ray.origin + hit->distance * ray.direction,
-                 normals_at(sheet, *hit).shading.normalized()};
+                 index.normals_at(*hit).shading.normalized()};
     }
   });
   return hits;

@@ -20,7 +20,6 @@ struct DirectFrame {
   const DirectFixture& fixture;
   const PacketScene& tree;
   const SheetIndex* sheet;                       ///< of the first surface, where that isn't in the tree; else null
-  const Surface* first;                          ///< the first surface; null without any
   const ShadowReach* shadow_reach;               ///< null: no shadow is asked for by rays
   const SheetHorizons* horizons;                 ///< of the first object, where it alone casts shadows; else null
   const std::vector<DirectMaterial>& materials;  ///< by object
@@ -78,10 +77,13 @@ class DirectBatch {
     float film;                      // the part of the camera's rays to it that goes through film
   };
 
+  using Four = Eigen::Array4f;
+  static Eigen::Map<const Four> four(const float* from) { return Eigen::Map<const Four>(from); }
+
   const RayPacket& packet_of(int lane) const { return rays_[lane / kPacket]; }
   float* amounts(int lane) { return amounts_.data() + static_cast<std::size_t>(lane) * stride_; }
   const float* amounts(int lane) const { return amounts_.data() + static_cast<std::size_t>(lane) * stride_; }
-  Eigen::Array4f passing(int lane, int group, int band) const;
+  Four passing(int lane, int group, int band) const;
   Eigen::Vector3f flow_of(int lane, int lamp) const;
   Eigen::Vector3f direction_to(int lane, int lamp) const;
   Eigen::Vector3f towards(int lane, int lamp) const;

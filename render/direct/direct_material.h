@@ -16,6 +16,11 @@ namespace touchstone::render {
 /// The materials that direct light knows: a Lambertian, a RoughConductor, an Emitter, a Black.
 enum class DirectKind { kMatt, kMetal, kLuminous, kBlack };
 
+/// Does light from lamps come back from it?
+inline bool is_lit(DirectKind kind) {
+  return kind == DirectKind::kMatt || kind == DirectKind::kMetal;
+}
+
 /// What is printed on a surface (print.h), as long as its scene lives.
 struct DirectPrint {
   const std::vector<Eigen::Vector2d>* material_mm = nullptr;

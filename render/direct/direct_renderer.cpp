@@ -49,6 +49,11 @@ void check_settings(const DirectSettings& settings) {
   }
 }
 
+/// x and y of where a ray has the height z.
+Eigen::Vector2d place_at_height(const LayerRay& ray, double z) {
+  return (ray.origin + (z - ray.origin.z()) / ray.direction.z() * ray.direction).head<2>();
+}
+
 /// The scene with nothing of its first surface.
 Scene without_first(const Scene& scene) {
   Scene rest;
@@ -160,7 +165,7 @@ struct DirectRenderer::Parts {
       const auto at = [&](double u, double v) -> std::optional<Eigen::Vector2d> {
         const auto ray = ray_in_layer(field.fixture, camera, field.layer, 0.5 * width(), 0.5 * height(), u, v);
         if (!ray) return std::nullopt;
-        return (ray->origin + (z - ray->origin.z()) / ray->direction.z() * ray->direction).head<2>();
+        return place_at_height(*ray, z);
       };
       const auto middle = at(0.5, 0.5);
       constexpr double kRim = 1.0 - 1e-6;
@@ -181,7 +186,7 @@ struct DirectRenderer::Parts {
     std::optional<SheetIndex> sheet;
     if (lone_sheet) {
       const Eigen::Vector2d endless = Eigen::Vector2d::Constant(std::numeric_limits<double>::max());
-      sheet.emplace(rest.surfaces[0].mesh, Eigen::AlignedBox2d(Eigen::Vector2d(-endless), endless));
+      sheet.emplace(rest.surfaces[0], Eigen::AlignedBox2d(Eigen::Vector2d(-endless), endless));
     }
     std::vector<double> surface_z;
     for (const Eigen::Vector2d& middle : middles) {
@@ -231,8 +236,7 @@ struct DirectRenderer::Parts {
                                       double(height()) * j / kAsked, 0.5, 0.5);
         if (!ray) continue;
         for (const double z : {field.reach.min().z(), field.reach.max().z()}) {
-          box.extend(
-              Eigen::Vector2d((ray->origin + (z - ray->origin.z()) / ray->direction.z() * ray->direction).head<2>()));
+          box.extend(place_at_height(*ray, z));
         }
       }
     }
@@ -247,8 +251,7 @@ struct DirectRenderer::Parts {
     const auto place = [&](double x) -> std::optional<Eigen::Vector2d> {
       const auto ray = ray_in_layer(field.fixture, camera, field.layer, x, 0.5 * height(), 0.5, 0.5);
       if (!ray) return std::nullopt;
-      const double along = (field.reach.center().z() - ray->origin.z()) / ray->direction.z();
-      return Eigen::Vector2d((ray->origin + along * ray->direction).head<2>());
+      return place_at_height(*ray, field.reach.center().z());
     };
     const auto one = place(0.5 * width());
     const auto next = place(0.5 * width() + 1.0);
@@ -485,9 +488,9 @@ DirectImage DirectRenderer::render(const Scene& scene) {
   std::optional<SheetIndex> sheet;
   std::optional<SheetHorizons> horizons;
   if (parts.lone_sheet && parts.stands_still(scene)) {
-    const TriangleMesh& mesh = scene.surfaces[0].mesh;
-    if (parts.settings.shadows) horizons = SheetHorizons::find(mesh, *parts.horizon_settings);
-    if (horizons || !parts.settings.shadows) sheet.emplace(mesh, parts.seen_box);
+    const Surface& first = scene.surfaces[0];
+    if (parts.settings.shadows) horizons = SheetHorizons::find(first.mesh, *parts.horizon_settings);
+    if (horizons || !parts.settings.shadows) sheet.emplace(first, parts.seen_box);
   }
   std::optional<PacketScene> other;
   if (!sheet && (parts.lone_sheet || !parts.tree.move_to(scene))) other.emplace(scene);
@@ -508,11 +511,9 @@ DirectImage DirectRenderer::render(const Scene& scene) {
 
   DirectImage image;
   image.irradiance = cv::Mat::zeros(parts.height(), parts.width(), CV_32FC(parts.rays.bands));
-  const Surface* const first = scene.surfaces.empty() ? nullptr : &scene.surfaces[0];
   const DirectFrame frame{parts.fixture,
                           tree,
                           sheet ? &*sheet : nullptr,
-                          first,
                           shadow_reach ? &*shadow_reach : nullptr,
                           horizons ? &*horizons : nullptr,
                           materials};

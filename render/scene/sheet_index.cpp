@@ -28,7 +28,8 @@ double median_edge(const TriangleMesh& mesh) {
 
 }  // namespace
 
-SheetIndex::SheetIndex(const TriangleMesh& mesh, const Eigen::AlignedBox2d& seen) : mesh_(mesh) {
+SheetIndex::SheetIndex(const Surface& surface, const Eigen::AlignedBox2d& seen) : surface_(surface) {
+  const TriangleMesh& mesh = surface.mesh;
   Eigen::AlignedBox2d all;
   for (const auto& v : mesh.vertices) all.extend(Eigen::Vector2d(v.head<2>()));
   const Eigen::AlignedBox2d box = all.intersection(seen);
@@ -93,6 +94,7 @@ SheetIndex::SheetIndex(const TriangleMesh& mesh, const Eigen::AlignedBox2d& seen
 std::optional<SheetIndex::Hit> SheetIndex::first(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
                                                  double far) const {
   if (columns_ == 0) return std::nullopt;
+  const TriangleMesh& mesh = surface_.mesh;
   // The part of the ray that is as high as the sheet, and over the grid.
   double from = 0.0;
   double to = far;
@@ -136,10 +138,10 @@ std::optional<SheetIndex::Hit> SheetIndex::first(const Eigen::Vector3d& origin, 
     if (std::max(z0, z1) >= double(heights_[cell].low) && std::min(z0, z1) <= double(heights_[cell].high)) {
       for (int k = first_[cell]; k < first_[cell + 1]; ++k) {
         const int triangle = triangles_[static_cast<std::size_t>(k)];
-        const auto& t = mesh_.triangles[static_cast<std::size_t>(triangle)];
-        const Eigen::Vector3d& a = mesh_.vertices[t[0]];
-        const Eigen::Vector3d e1 = mesh_.vertices[t[1]] - a;
-        const Eigen::Vector3d e2 = mesh_.vertices[t[2]] - a;
+        const auto& t = mesh.triangles[static_cast<std::size_t>(triangle)];
+        const Eigen::Vector3d& a = mesh.vertices[t[0]];
+        const Eigen::Vector3d e1 = mesh.vertices[t[1]] - a;
+        const Eigen::Vector3d e2 = mesh.vertices[t[2]] - a;
         // [Moeller1997]
         const Eigen::Vector3d p = direction.cross(e2);
         const double det = e1.dot(p);
@@ -172,16 +174,16 @@ std::optional<SheetIndex::Hit> SheetIndex::first(const Eigen::Vector3d& origin, 
   }
 }
 
-SheetNormals normals_at(const Surface& surface, const SheetIndex::Hit& hit) {
-  const auto& corners = surface.mesh.triangles[static_cast<std::size_t>(hit.triangle)];
-  const Eigen::Vector3d& a = surface.mesh.vertices[corners[0]];
-  SheetNormals found;
-  found.face = (surface.mesh.vertices[corners[1]] - a).cross(surface.mesh.vertices[corners[2]] - a);
+SheetIndex::Normals SheetIndex::normals_at(const Hit& hit) const {
+  const auto& corners = surface_.mesh.triangles[static_cast<std::size_t>(hit.triangle)];
+  const Eigen::Vector3d& a = surface_.mesh.vertices[corners[0]];
+  Normals found;
+  found.face = (surface_.mesh.vertices[corners[1]] - a).cross(surface_.mesh.vertices[corners[2]] - a);
   found.shading = found.face;
-  if (surface.normals.empty()) return found;
-  const Eigen::Vector3d smooth = (1.0 - hit.u - hit.v) * surface.normals[corners[0]] +
-                                 hit.u * surface.normals[corners[1]] + hit.v * surface.normals[corners[2]];
-  // As RayScene has it: a fold sharper than that isn't a smooth surface.
+  if (surface_.normals.empty()) return found;
+  const Eigen::Vector3d smooth = (1.0 - hit.u - hit.v) * surface_.normals[corners[0]] +
+                                 hit.u * surface_.normals[corners[1]] + hit.v * surface_.normals[corners[2]];
+  // As RayScene has it: a fold sharper than that isn't a smooth surface_.
   const double length = smooth.norm();
   if (length > 0.1 && smooth.dot(found.face) > 0.5 * length * found.face.norm()) found.shading = smooth;
   return found;

@@ -6,7 +6,6 @@
 #include <optional>
 #include <vector>
 
-#include "core/triangle_mesh.h"
 #include "render/scene/scene.h"
 
 namespace touchstone::render {
@@ -16,8 +15,8 @@ namespace touchstone::render {
 /// of many layers is slow. Immutable: many threads may ask.
 class SheetIndex {
  public:
-  /// The mesh must outlive this. What lies beside `seen` (x, y) in all of its height isn't met.
-  SheetIndex(const TriangleMesh& mesh, const Eigen::AlignedBox2d& seen);
+  /// The surface must outlive this. What lies beside `seen` (x, y) in all of its height isn't met.
+  SheetIndex(const Surface& surface, const Eigen::AlignedBox2d& seen);
 
   /// On a triangle a b c the place is (1 - u - v) a + u b + v c.
   struct Hit {
@@ -28,12 +27,18 @@ class SheetIndex {
   /// The nearest hit ahead of the origin and not beyond `far`. @pre `direction` is a unit vector
   std::optional<Hit> first(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double far) const;
 
+  /// Normals of a hit: its triangle's, not of unit length, and the one to shade with, as Surface has it.
+  struct Normals {
+    Eigen::Vector3d face, shading;
+  };
+  Normals normals_at(const Hit& hit) const;
+
  private:
   struct Heights {
     float low, high;
   };
 
-  const TriangleMesh& mesh_;
+  const Surface& surface_;
   double left_ = 0.0, bottom_ = 0.0, cell_ = 1.0;
   int columns_ = 0, rows_ = 0;
   double low_ = 0.0, high_ = 0.0;  // of all that is in the grid
@@ -41,11 +46,5 @@ class SheetIndex {
   std::vector<int> triangles_;
   std::vector<Heights> heights_;  // of a cell's triangles
 };
-
-/// Normals of a place on a surface: its triangle's, not of unit length, and the one to shade with, as Surface has it.
-struct SheetNormals {
-  Eigen::Vector3d face, shading;
-};
-SheetNormals normals_at(const Surface& surface, const SheetIndex::Hit& hit);
 
 }  // namespace touchstone::render

@@ -152,11 +152,14 @@ Print markers_of(const TriangleMesh& flat) {
   return print;
 }
 
-DirectError error_of(const Scene& scene, int pixels) {
+LightField field_of(const Scene& scene, double accuracy) {
   LightFieldSettings settings;
-  settings.accuracy = 1e-2;
-  Scene fixture = scene;
-  const LightField field = make_light_field(fixture, sheet_reach(), settings);
+  settings.accuracy = accuracy;
+  return make_light_field(scene, sheet_reach(), settings);
+}
+
+DirectError error_of(const Scene& scene, int pixels) {
+  const LightField field = field_of(scene, 1e-2);
   const PinholeCamera camera = small_camera(96, 72);
   DirectSettings direct;
   const cv::Mat picture = DirectRenderer(field, camera, scene, direct).render(scene).irradiance;
@@ -177,9 +180,7 @@ TEST(DirectGuides, ShadeAndShadowADentAsPathsDo) {
 
 TEST(DirectGuides, CastShadowsThatMatter) {
   const Scene scene = dented_guide_scene(0.9);
-  LightFieldSettings settings;
-  settings.accuracy = 1e-2;
-  const LightField field = make_light_field(scene, sheet_reach(), settings);
+  const LightField field = field_of(scene, 1e-2);
   const PinholeCamera camera = small_camera(96, 72);
   DirectSettings bare;
   bare.shadows = false;
@@ -217,9 +218,7 @@ double raster_of(const cv::Mat& with, const cv::Mat& without) {
 // ball far aside makes the membrane one of several things, whose shadows are asked for by rays.
 TEST(DirectGuides, LeaveNoRasterInSoftShadows) {
   Scene scene = dented_guide_scene(0.9);
-  LightFieldSettings settings;
-  settings.accuracy = 1e-2;
-  const LightField field = make_light_field(scene, sheet_reach(), settings);
+  const LightField field = field_of(scene, 1e-2);
   const PinholeCamera camera = small_camera(384, 288);
   DirectSettings sharp;
   sharp.blur = false;
@@ -249,9 +248,7 @@ TEST(DirectPrints, InkTakesThePlaceOfTheSurfacesColour) {
   Scene inked = scene;
   scene.surfaces[0].print = markers_of(dented_sheet(0.0));
   scene.surfaces[0].print->inks = {grey(0.5)};  // that of the surface itself
-  LightFieldSettings settings;
-  settings.accuracy = 1e-1;
-  const LightField field = make_light_field(scene, sheet_reach(), settings);
+  const LightField field = field_of(scene, 1e-1);
   const PinholeCamera camera = small_camera(48, 36);
   const cv::Mat printed = DirectRenderer(field, camera, scene).render(scene).irradiance;
   const cv::Mat plain = DirectRenderer(field, camera, inked).render(inked).irradiance;
@@ -264,13 +261,11 @@ TEST(DirectPrints, InkTakesThePlaceOfTheSurfacesColour) {
 
 TEST(DirectGuides, SameBytesForAnyThreads) {
   const Scene scene = dented_guide_scene(0.9);
-  LightFieldSettings settings;
-  settings.accuracy = 3e-2;
   const PinholeCamera camera = small_camera(48, 36);
   cv::Mat pictures[2];
   for (int k = 0; k < 2; ++k) {
     const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, k == 0 ? 1 : 4);
-    const LightField field = make_light_field(scene, sheet_reach(), settings);
+    const LightField field = field_of(scene, 3e-2);
     pictures[k] = DirectRenderer(field, camera, scene).render(scene).irradiance;
   }
   EXPECT_EQ(cv::norm(pictures[0], pictures[1], cv::NORM_INF), 0.0);

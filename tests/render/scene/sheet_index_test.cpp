@@ -33,11 +33,10 @@ Scene scene_of(const TriangleMesh& sheet) {
 }
 
 TEST(SheetIndex, RaysMeetWhatTheTreeSays) {
-  const TriangleMesh sheet = rough_sheet();
-  const Scene scene = scene_of(sheet);
+  const Scene scene = scene_of(rough_sheet());
   const RayScene tree(scene);
   Eigen::AlignedBox2d seen(Eigen::Vector2d(-10, -10), Eigen::Vector2d(10, 10));
-  const SheetIndex index(sheet, seen);
+  const SheetIndex index(scene.surfaces[0], seen);
   std::mt19937 random(3);
   std::uniform_real_distribution<double> unit(-1.0, 1.0);
   int met = 0;
@@ -53,7 +52,7 @@ TEST(SheetIndex, RaysMeetWhatTheTreeSays) {
     if (!hits) continue;
     ++met;
     EXPECT_NEAR(found->distance, expected.distance, 2e-5) << k;
-    const Eigen::Vector3d normal = normals_at(scene.surfaces[0], *found).face.normalized();
+    const Eigen::Vector3d normal = index.normals_at(*found).face.normalized();
     if (found->triangle == expected.triangle) {
       EXPECT_LT((normal - expected.normal).norm(), 1e-9);
     }
@@ -63,13 +62,13 @@ TEST(SheetIndex, RaysMeetWhatTheTreeSays) {
 }
 
 TEST(SheetIndex, NothingIsMetBesideWhatIsSeenOrOfNothing) {
-  const TriangleMesh sheet = rough_sheet();
+  const Surface sheet{rough_sheet(), Black{}};
   const SheetIndex part(sheet, {Eigen::Vector2d(-1, -1), Eigen::Vector2d(0, 0)});
   EXPECT_TRUE(part.first({-0.5, -0.5, -4}, {0, 0, 1}, 10.0));
   EXPECT_FALSE(part.first({2.5, 2.5, -4}, {0, 0, 1}, 10.0));
   const SheetIndex beside(sheet, {Eigen::Vector2d(20, 20), Eigen::Vector2d(21, 21)});
   EXPECT_FALSE(beside.first({20.5, 20.5, -4}, {0, 0, 1}, 10.0));
-  const TriangleMesh none;
+  const Surface none{{}, Black{}};
   EXPECT_FALSE(SheetIndex(none, {Eigen::Vector2d(-1, -1), Eigen::Vector2d(1, 1)}).first({0, 0, -4}, {0, 0, 1}, 10.0));
 }
 
@@ -102,8 +101,9 @@ TEST(StillView, AMovedSheetIsSeenAsFirstHitsSeesIt) {
       on_wall += found[k].object == 1;
       if (found[k].object < 0) continue;
       EXPECT_LT((found[k].position - expected[k].position).norm(), 5e-5) << k;
-      if (found[k].triangle == expected[k].triangle)
+      if (found[k].triangle == expected[k].triangle) {
         EXPECT_LT((found[k].normal - expected[k].normal).norm(), 1e-4) << k;
+      }
     }
     EXPECT_GT(on_sheet, 3000);
     EXPECT_GT(on_wall, 300);
