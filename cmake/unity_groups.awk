@@ -1,13 +1,14 @@
 # Which sources may be compiled as one: prints "GROUP FILE" for each .cpp file given. Files of a group declare no name twice in
 # their anonymous namespaces, where each thinks itself alone. A file stays alone where a header that is given defines a
-# constant or an inline function of a name that it uses for its own. -v most=N: files of a group at most.
+# constant or an inline function of a name that it uses for its own, in the same namespace: names of outer ones are
+# hidden by the file's. -v most=N: files of a group at most.
 #
 # What counts as declared: at a line's begin within "namespace {" ... "}  // namespace", the name of a type, an alias, a
 # function or its operator's, variables, and the members of an enum that isn't a class; of GoogleTest's TEST(A, B) the
-# class that it makes. Files may say "using a::b" of the same a::b.
+# class that it makes. Files may say "using a::b" of the same a::b, and give the same alias to the same type or namespace.
 function declare(name) {
   if (name != "" && !((FILENAME, name) in declared)) {
-    declared[FILENAME, name] = 1
+    declared[FILENAME, name] = space
     names[FILENAME] = names[FILENAME] " " name
   }
 }
@@ -19,18 +20,20 @@ function declare_all(text,    word) {
   }
 }
 function clash(group, name,    part) {
-  if (split(name, part, "|") == 3) return ((group, part[2]) in used) && used[group, part[2]] != part[3]
+  if (split(name, part, "|") == 3) return (group, part[2]) in taken && taken[group, part[2]] != part[3]
   return (group, name) in taken
 }
 function take(group, name,    part) {
-  if (split(name, part, "|") == 3) used[group, part[2]] = part[3]
-  else taken[group, name] = 1
+  if (split(name, part, "|") == 3) taken[group, part[2]] = part[3]
+  else taken[group, name] = ""
 }
+FNR == 1 { space = "" }
+/^namespace [A-Za-z_0-9:]+ \{/ && !inside { space = $2 }
 FILENAME ~ /\.h$/ {
   if (match($0, /^inline constexpr [^=({]*[ >]k[A-Z][A-Za-z_0-9]*/)) {
-    name = substr($0, RSTART, RLENGTH); sub(/.*[^A-Za-z_0-9]/, "", name); public[name] = 1
+    name = substr($0, RSTART, RLENGTH); sub(/.*[^A-Za-z_0-9]/, "", name); public[space, name] = 1
   } else if (/^inline [^(={]*\(/) {
-    name = $0; sub(/\(.*/, "", name); sub(/.*[^A-Za-z_0-9]/, "", name); public[name] = 1
+    name = $0; sub(/\(.*/, "", name); sub(/.*[^A-Za-z_0-9]/, "", name); public[space, name] = 1
   }
   next
 }
@@ -39,6 +42,7 @@ FNR == 1 { inside = 0; in_enum = 0; files[++count] = FILENAME }
 /^\}  \/\/ namespace$/ { inside = 0; next }
 !inside { next }
 in_enum { line = $0; sub(/\/\/.*/, "", line); if (line ~ /\}/) in_enum = 0; declare_all(line); next }
+/^static_assert/ { next }
 /^[A-Za-z_]/ {
   line = $0
   sub(/\/\/.*/, "", line)
@@ -48,7 +52,11 @@ in_enum { line = $0; sub(/\/\/.*/, "", line); if (line ~ /\}/) in_enum = 0; decl
     match(line, /^[A-Za-z_0-9]+/); declare(substr(line, RSTART, RLENGTH)); next
   }
   if (line ~ /^enum /) { in_enum = line !~ /\}/; sub(/^enum /, "", line); sub(/:[^{]*/, "", line); declare_all(line); next }
-  if (line ~ /^using [A-Za-z_0-9]+ *=/ || line ~ /^namespace /) { split(line, word, /[ =]+/); declare(word[2]); next }
+  if (line ~ /^(using|namespace) [A-Za-z_0-9]+ *=/) {
+    whole = line ~ /;/
+    sub(/^(using|namespace) /, "", line); sub(/;.*/, "", line); gsub(/ /, "_", line)
+    name = line; sub(/_*=.*/, "", name); sub(/^[^=]*=/, "=", line); declare(whole ? "using|" name "|" line : name); next
+  }
   if (line ~ /^using /) {
     sub(/;.*/, "", line); sub(/^using +(::)?(touchstone::)?/, "", line); gsub(/ /, "_", line)
     name = line; sub(/.*:/, "", name); declare("using|" name "|" line); next
@@ -71,7 +79,7 @@ END {
   for (f = 1; f <= count; ++f) {
     n = split(names[files[f]], own, " ")
     alone = 0
-    for (i = 1; i <= n; ++i) if (own[i] in public) alone = 1
+    for (i = 1; i <= n; ++i) if ((declared[files[f], own[i]], own[i]) in public) alone = 1
     if (alone) { print "alone" f, files[f]; continue }
     for (g = 1; ; ++g) {
       if (size[g] >= most) continue

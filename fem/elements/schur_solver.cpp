@@ -9,6 +9,7 @@
 #include <numeric>
 
 #include "core/error.h"
+#include "core/seconds_since.h"
 
 extern "C" {
 void openblas_set_num_threads(int);
@@ -40,10 +41,6 @@ class OneBlasThread {
  private:
   int before_;
 };
-
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
 
 /// One instance of MUMPS. MUMPS has global state, so only one lives at a time.
 class Mumps {

@@ -34,7 +34,7 @@ constexpr double kStays = 0.2;
 constexpr double kSkins_percent = 95.0;
 constexpr std::uint64_t kSeed = 9;
 
-cv::Mat grey(const cv::Mat& frame) {
+cv::Mat grey_picture(const cv::Mat& frame) {
   cv::Mat out;
   cv::cvtColor(frame, out, cv::COLOR_BGR2GRAY);
   out.convertTo(out, CV_32F);
@@ -117,7 +117,7 @@ std::vector<TestScale> scales_from(const std::vector<double>& pitches, std::size
 }
 
 bool is_read(const cv::Mat& frame, const VhsView& view, const TestScale& scale) {
-  const RuleProfile seen = scale_profile(grey(frame), view, scale, kScaleHalf_mm);
+  const RuleProfile seen = scale_profile(grey_picture(frame), view, scale, kScaleHalf_mm);
   const RuleReading reading = read_rule(seen, kSlowest_per_mm, kFastest_per_mm);
   return reads(reading, seen, scale.pitch_mm, 0.0) && reading.contrast >= kLeastLeft * printed_contrast();
 }

@@ -21,7 +21,7 @@ constexpr int kParts = 256;                    // walks are shared out in parts,
 constexpr double kFinestAnnulus = 1.0 / 80.0;  // of the thickness
 constexpr double kEvenAnnuli = 1.0;            // up to this many thicknesses; then wider and wider
 constexpr double kWidening = 1.06;
-constexpr double kFarthest = 30.0;  // thicknesses of membrane and plate
+constexpr double kFarthestInThicknesses = 30.0;  // of membrane and plate together
 constexpr double kLightWalk = 0.05;
 
 void check(const MembraneOptics& optics, const MembraneWalkSettings& settings) {
@@ -41,7 +41,7 @@ void check(const MembraneOptics& optics, const MembraneWalkSettings& settings) {
 
 std::vector<double> annuli(const MembraneOptics& optics) {
   const double finest = kFinestAnnulus * optics.thickness_mm;
-  const double farthest = kFarthest * (optics.thickness_mm + optics.plate_thickness_mm);
+  const double farthest = kFarthestInThicknesses * (optics.thickness_mm + optics.plate_thickness_mm);
   std::vector<double> radii;
   double radius = 0.0;
   double width = finest;

@@ -44,7 +44,7 @@ Json rows_of(const Matrix& matrix) {
   return rows;
 }
 
-Json json_of(const HueLine& line) {
+Json hue_json(const HueLine& line) {
   return {{"hue_slope_rad_per_mm", line.hue_slope},
           {"hue_offset_rad", line.hue_offset},
           {"gain_slope_per_mm", line.gain_slope},
@@ -52,7 +52,7 @@ Json json_of(const HueLine& line) {
           {"centroid", line.of_ink ? "ink" : "all"}};
 }
 
-Json json_of(const HueFeatures& features) {
+Json hue_json(const HueFeatures& features) {
   Json names = Json::array();
   for (const auto& [name, member] : feature_names()) {
     if (features.*member) names.push_back(name);
@@ -60,16 +60,16 @@ Json json_of(const HueFeatures& features) {
   return names;
 }
 
-Json json_of(const HueIsotropic& isotropic) {
-  return {{"features", json_of(isotropic.features)},
+Json hue_json(const HueIsotropic& isotropic) {
+  return {{"features", hue_json(isotropic.features)},
           {"degree", isotropic.degree},
           {"scale", list_of(isotropic.scale)},
           {"press_mm", list_of(isotropic.press)},
           {"lateral_mm", list_of(isotropic.lateral)}};
 }
 
-Json json_of(const HuePolynomial& polynomial) {
-  return {{"features", json_of(polynomial.features)},
+Json hue_json(const HuePolynomial& polynomial) {
+  return {{"features", hue_json(polynomial.features)},
           {"degree", polynomial.degree},
           {"scale", list_of(polynomial.scale)},
           {"coefficients_mm", rows_of(polynomial.coefficients)}};
@@ -176,9 +176,9 @@ std::string to_json(const HueModel& model) {
   json["spacing_mm"] = model.spacing_mm;
   json["viewing_distance_mm"] = model.parallax.viewing_distance_mm;
   json["view_axis_mm"] = list_of(model.parallax.axis_mm);
-  if (model.form == HueForm::kEquation4) json["line"] = json_of(model.line);
-  if (model.form == HueForm::kIsotropic) json["isotropic"] = json_of(model.isotropic);
-  if (model.form == HueForm::kPolynomial) json["polynomial"] = json_of(model.polynomial);
+  if (model.form == HueForm::kEquation4) json["line"] = hue_json(model.line);
+  if (model.form == HueForm::kIsotropic) json["isotropic"] = hue_json(model.isotropic);
+  if (model.form == HueForm::kPolynomial) json["polynomial"] = hue_json(model.polynomial);
   json["gains"] = gains;
   json["range"] = {{"lowest_hue_rad", range.lowest_hue},         {"highest_hue_rad", range.highest_hue},
                    {"largest_shift_mm", range.largest_shift_mm}, {"largest_ink_shift_mm", range.largest_ink_shift_mm},

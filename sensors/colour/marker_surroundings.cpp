@@ -9,7 +9,7 @@ namespace touchstone::sensors {
 
 namespace {
 
-bool is_sound(const ColourMarkerReading& rest, const ColourMarkerReading& reading, std::size_t marker) {
+bool is_usable(const ColourMarkerReading& rest, const ColourMarkerReading& reading, std::size_t marker) {
   return rest.markers[marker].flaw == MarkerFlaw::kNone && reading.markers[marker].flaw == MarkerFlaw::kNone;
 }
 
@@ -23,7 +23,7 @@ void find_surroundings(const ColourMarkerReading& rest, ColourMarkerReading& rea
     const auto marker = static_cast<std::size_t>(i);
     MarkerSurroundings& found = reading.markers[marker].surroundings;
     found = {};
-    if (!is_sound(rest, reading, marker)) continue;
+    if (!is_usable(rest, reading, marker)) continue;
     const Eigen::Vector2i place(i % columns, i / columns);
     Eigen::Matrix2d cell_at_rest;
     Eigen::Matrix2d cell;
@@ -38,7 +38,7 @@ void find_surroundings(const ColourMarkerReading& rest, ColourMarkerReading& rea
         const int along = place[axis] + (side == 0 ? -1 : 1);
         if (along < 0 || along >= reading.grid[axis]) continue;
         const auto neighbour = static_cast<std::size_t>(i + (side == 0 ? -1 : 1) * (axis == 0 ? 1 : columns));
-        if (!is_sound(rest, reading, neighbour)) continue;
+        if (!is_usable(rest, reading, neighbour)) continue;
         ends[side] = neighbour;
         ++steps;
         ++neighbours;

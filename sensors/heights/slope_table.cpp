@@ -35,7 +35,7 @@ struct Between {
   int low, high;
   float share;
 };
-Between between(int fine, int coarse_cells) {
+Between between_cells(int fine, int coarse_cells) {
   const float at = std::clamp((static_cast<float>(fine) - 0.5F) / 2.0F, 0.0F, static_cast<float>(coarse_cells - 1));
   const int low = std::min(static_cast<int>(at), coarse_cells - 1);
   return {low, std::min(low + 1, coarse_cells - 1), at - static_cast<float>(low)};
@@ -48,8 +48,8 @@ void blend(Level& fine, const Level* coarse, float prior) {
       for (int r = 0; r < fine.cells[2]; ++r) {
         Eigen::Vector2f around = Eigen::Vector2f::Zero();
         if (coarse != nullptr) {
-          const Between along[] = {between(b, coarse->cells[0]), between(g, coarse->cells[1]),
-                                   between(r, coarse->cells[2])};
+          const Between along[] = {between_cells(b, coarse->cells[0]), between_cells(g, coarse->cells[1]),
+                                   between_cells(r, coarse->cells[2])};
           for (int corner = 0; corner < 8; ++corner) {
             float weight = 1.0F;
             std::array<int, 3> at{};

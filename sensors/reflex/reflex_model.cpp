@@ -12,9 +12,9 @@ namespace {
 
 constexpr const char* kFormat = "touchstone.reflex_model";
 constexpr int kVersion = 1;
-constexpr std::int64_t kMostNodes = 1 << 20;
+constexpr std::int64_t kMostTreeNodes = 1 << 20;
 
-Json json_of(const ContactTree& tree) {
+Json tree_json(const ContactTree& tree) {
   Json nodes = Json::array();
   for (const ContactTreeNode& node : tree.nodes) {
     if (node.above == 0) {
@@ -42,8 +42,8 @@ ContactTree tree_of(const JsonField& json) {
       one.expect_map({"feature", "threshold", "above", "below"});
       node.feature = one.at("feature").name_among(kChipFeatures);
       node.threshold = one.at("threshold").number();
-      node.above = static_cast<int>(one.at("above").whole_number(1, kMostNodes));
-      node.below = static_cast<int>(one.at("below").whole_number(1, kMostNodes));
+      node.above = static_cast<int>(one.at("above").whole_number(1, kMostTreeNodes));
+      node.below = static_cast<int>(one.at("below").whole_number(1, kMostTreeNodes));
     }
     tree.nodes.push_back(node);
   }
@@ -72,7 +72,7 @@ std::string to_json(const ReflexModel& model) {
   Json json = {{"format", kFormat},
                {"version", kVersion},
                {"rule", rule_of(model.tree)},
-               {"tree", json_of(model.tree)},
+               {"tree", tree_json(model.tree)},
                {"force",
                 {{"degree", model.force.degree},
                  {"coefficients_N", json_of(Eigen::VectorXd(coefficients))},
