@@ -685,9 +685,8 @@ def read_all(value):
             repr(one)
 
 
-def main():
-    name, folder, shared = sys.argv[1:4]
-    first = int(sys.argv[4]) if len(sys.argv) > 4 else 0
+def make_calls(name, folder, shared, first, out):
+    """All calls of one public name, from number `first` on. Changes the process: its limits and its working folder."""
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     warnings.simplefilter("ignore")
@@ -695,7 +694,6 @@ def main():
     shared = os.path.abspath(shared)
     os.chdir(folder)
     os.makedirs("folder", exist_ok=True)
-    out = os.fdopen(os.dup(1), "w")
     things = Things(folder, shared)
 
     def tell(**what):
@@ -731,4 +729,4 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    make_calls(*sys.argv[1:4], int(sys.argv[4]) if len(sys.argv) > 4 else 0, os.fdopen(os.dup(1), "w"))
