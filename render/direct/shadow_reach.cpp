@@ -116,7 +116,21 @@ Eigen::AlignedBox3d box_of(const TriangleMesh& mesh) {
   return box;
 }
 
-/// Tells what stands round the sheet, seen along z and less a rim that pressing moves, and so can't hide guides within.
+/// The box round a lamp's luminous face, seen along z.
+Eigen::AlignedBox2d outline(const Lamp& lamp) {
+  const Eigen::Vector2d middle = lamp_position(lamp).head<2>();
+  Eigen::Vector2d half = Eigen::Vector2d::Constant(lamp_extent(lamp));
+  if (const auto* guide = std::get_if<GuideLamp>(&lamp)) {
+    const Eigen::Vector2d ahead = guide->direction.head<2>().normalized();
+    half = 0.5 * guide->width * Eigen::Vector2d(std::abs(ahead.y()), std::abs(ahead.x()));
+  } else if (disc_radius(lamp) > 0.0) {
+    const Eigen::Vector3d out = lamp_direction(lamp).normalized();
+    half = disc_radius(lamp) * (1.0 - out.head<2>().array().square()).max(0.0).sqrt();
+  }
+  return {Eigen::Vector2d(middle - half), Eigen::Vector2d(middle + half)};
+}
+
+/// Tells what stands round the sheet, seen along z and less a rim that pressing moves, and so can't hide lamps within.
 class WallsRound {
  public:
   WallsRound(const LampBearings& bearings, const Eigen::AlignedBox3d& sheet)
@@ -124,7 +138,7 @@ class WallsRound {
                Eigen::Vector2d(sheet.max().head<2>().array() - kRim)) {
     const Eigen::AlignedBox2d outer(Eigen::Vector2d(sheet.min().head<2>().array() - kRim),
                                     Eigen::Vector2d(sheet.max().head<2>().array() + kRim));
-    enclosed_ = !bearings.guides.isEmpty() && !inner_.isEmpty() && outer.contains(bearings.guides);
+    enclosed_ = !bearings.shining.isEmpty() && !inner_.isEmpty() && outer.contains(bearings.shining);
   }
 
   bool contain(const Eigen::AlignedBox3d& part) const {
@@ -185,17 +199,7 @@ LampBearings::LampBearings(const LightField& field, bool soft)
   slabs = std::clamp(static_cast<int>(std::ceil(size.z() / (0.5 * double(cell)))), 1, kMostSlabs);
   slab = static_cast<float>(size.z() / slabs);
   bearings.resize(static_cast<std::size_t>(slabs) * columns * rows * lamps);
-  for (const Lamp& lamp : field.fixture.lamps) {
-    const auto* guide = std::get_if<GuideLamp>(&lamp);
-    if (guide == nullptr) {
-      guides.setEmpty();
-      break;
-    }
-    const Eigen::Vector2d ahead = guide->direction.head<2>().normalized();
-    const Eigen::Vector2d aside(-ahead.y(), ahead.x());
-    guides.extend(Eigen::Vector2d(guide->centre.head<2>() + 0.5 * guide->width * aside));
-    guides.extend(Eigen::Vector2d(guide->centre.head<2>() - 0.5 * guide->width * aside));
-  }
+  for (const Lamp& lamp : field.fixture.lamps) shining.extend(outline(lamp));
   // A ray to another point of a lens takes the field's direction at a place that is set off by up to the lens's radius
   // and what it takes along a slanting ray (DirectBatch::choose_lens_points).
   std::vector<float> set_off(lamps, 0.0f);

@@ -30,9 +30,9 @@ struct LampBearings {
   int slabs = 1;
   std::vector<Bearing> bearings;  ///< [slab][row][column][lamp]
   std::vector<float> longest;     ///< by lamp: the most of length + spread, infinite if that isn't known everywhere
-  /// Round all lamps' places, where they are light guides: their light runs straight in the level plane, out of a plate
-  /// and into the layer. Empty if some lamp isn't one.
-  Eigen::AlignedBox2d guides;
+  /// Round all lamps' luminous faces, seen along z. Faces of layers are level, so light that passes them keeps its azimuth:
+  /// from lamp to place it runs straight in the level plane.
+  Eigen::AlignedBox2d shining;
 
   /// `soft`: shadow rays will go to all points of each lens, not to its middle only.
   LampBearings(const LightField& field, bool soft);
@@ -50,7 +50,7 @@ struct LampBearings {
 /// Where the first surface is a connected sheet whose triangles all face the same side along z (a height field), a ray
 /// that leaves it and climbs faster than the sheet does anywhere under its path can't meet it, and a ball hides a lamp
 /// only from the places that lie in its shadow. Other surfaces are taken for columns along z over the cells they
-/// cover, but for walls round a sheet and guides that stand within them: what runs straight from guide to sheet doesn't
+/// cover, but for walls round a sheet and lamps that stand within them: what runs straight from lamp to sheet doesn't
 /// meet those. All answers are safe: a lamp that something hides is never left out.
 class ShadowReach {
  public:
