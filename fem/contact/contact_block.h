@@ -17,25 +17,31 @@ class ContactBlock {
   ContactBlock(const Compliance& gel, const ContactSurface& surface);
 
   /// Makes the block hold `needed` (vertex indices, rising, unique). An old block that holds them and isn't far too
-  /// large is kept as it is. True if the block changed.
+  /// large is kept as it is; one that grows keeps what it has. True if the block changed.
   bool hold(const std::vector<int>& needed);
 
   const std::vector<int>& vertices() const { return vertices_; }
   /// Place of a surface vertex in the block, -1 if it isn't in it.
   int place(int vertex) const { return place_[vertex]; }
   /// 3 m x 3 m
-  const Eigen::MatrixXd& compliance() const { return compliance_; }
+  Eigen::Ref<const Eigen::MatrixXd> compliance() const { return in_axes(); }
   /// m x m: its normal rows and columns
   const Eigen::MatrixXd& normal_compliance() const { return normal_compliance_; }
   /// Columns are the vertex's own axes in the gel frame.
   const Eigen::Matrix3d& axes(int vertex) const { return axes_[vertex]; }
 
  private:
+  Eigen::Map<const Eigen::MatrixXd> in_axes() const {
+    const auto rows = static_cast<Eigen::Index>(3 * vertices_.size());
+    return {compliance_.data(), rows, rows};
+  }
+  void make_room(Eigen::Index m);
+
   const Compliance& gel_;
   std::vector<Eigen::Matrix3d> axes_;
   std::vector<int> vertices_;
   std::vector<int> place_;
-  Eigen::MatrixXd compliance_;
+  Eigen::VectorXd compliance_;  // 3 m x 3 m, by column, and room for more
   Eigen::MatrixXd normal_compliance_;
 };
 

@@ -10,6 +10,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "fem/elements/dense_factor.h"
@@ -20,9 +21,9 @@ namespace touchstone::fem {
 /// (without friction every vertex in contact slides).
 enum class NodeState : std::uint8_t { open = 0, stick = 1, slip = 2 };
 
-/// One contact problem. `compliance` is A, symmetric positive definite, (c m) x (c m), mm^3 per MPa.
+/// One contact problem. `compliance` is A (it must outlive this), symmetric positive definite, (c m) x (c m), mm^3 per MPa.
 struct ContactProblem {
-  const Eigen::MatrixXd* compliance = nullptr;
+  std::optional<Eigen::Ref<const Eigen::MatrixXd>> compliance;
   int components = 1;        ///< c: 1 or 3
   Eigen::VectorXd gap;       ///< m, mm^3; infinity: can't touch
   Eigen::VectorXd drag;      ///< 2 m, mm^3; with friction only

@@ -325,7 +325,7 @@ class FrictionalNewton {
 
   const ContactProblem& problem_;
   ContactMemory& memory_;
-  const Eigen::MatrixXd& a_;
+  const Eigen::Ref<const Eigen::MatrixXd>& a_;
   const int m_;
   const int k_;
   Eigen::VectorXd slack_;
@@ -345,7 +345,7 @@ ContactAnswer frictionless_start(const ContactProblem& problem) {
   const Eigen::MatrixXd compliance = (*problem.compliance)(normals, normals);
   const auto pushing = static_cast<Eigen::Index>(columns.size());
   ContactProblem part;
-  part.compliance = &compliance;
+  part.compliance.emplace(compliance);
   part.gap = problem.gap;
   part.border.resize(m, pushing);
   part.force.resize(pushing);

@@ -36,7 +36,7 @@ bool somebody_carries(const ContactProblem& problem, std::vector<char>& active) 
 
 ContactAnswer solve_frictionless(const ContactProblem& problem, const Eigen::VectorXd& start, ContactMemory& memory) {
   TS_ASSERT(problem.components == 1);
-  const Eigen::MatrixXd& a = *problem.compliance;
+  const Eigen::Ref<const Eigen::MatrixXd>& a = *problem.compliance;
   const auto m = static_cast<int>(problem.gap.size());
   const auto k = static_cast<int>(problem.border.cols());
   ContactAnswer answer;

@@ -21,7 +21,7 @@ constexpr double kLargestTurn = 0.1;  // radians an update, under torque control
 constexpr double kMostTurn = 0.8;     // radians in all
 
 /// Turns an answer without friction into one with three components a vertex.
-void widen(ContactAnswer& answer, const Eigen::MatrixXd& compliance) {
+void widen(ContactAnswer& answer, const Eigen::Ref<const Eigen::MatrixXd>& compliance) {
   const Eigen::VectorXd p = answer.z;
   answer.z = Eigen::VectorXd::Zero(3 * p.size());
   answer.response = Eigen::VectorXd::Zero(3 * p.size());
@@ -183,7 +183,11 @@ ContactProblem PartSolver::problem(const PressSnapshot& from, const std::vector<
   for (const PartTarget& target : targets) {
     if (target.turned[0] || target.turned[1] || target.turned[2]) memory_.forget();  // its border changes
   }
-  result.compliance = c == 3 ? &compliance() : elastic_ ? &combined_normal_ : &block_.normal_compliance();
+  if (c == 3) {
+    result.compliance.emplace(compliance());
+  } else {
+    result.compliance.emplace(elastic_ ? combined_normal_ : block_.normal_compliance());
+  }
   result.gap.resize(m);
   for (Eigen::Index j = 0; j < m; ++j) result.gap[j] = now.gap(vertices[j]);
   if (c == 3) {

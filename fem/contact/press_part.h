@@ -127,7 +127,9 @@ class PartSolver {
   PatchMotion motion_of(const std::vector<int>& vertices, const std::vector<Eigen::Vector3d>& displacements,
                         const std::vector<double>& pressures) const;
   Eigen::Vector3d relative_at(const PressSnapshot& snapshot, int vertex) const;
-  const Eigen::MatrixXd& compliance() const { return elastic_ ? combined_ : block_.compliance(); }
+  Eigen::Ref<const Eigen::MatrixXd> compliance() const {
+    return elastic_ ? Eigen::Ref<const Eigen::MatrixXd>(combined_) : block_.compliance();
+  }
   void refuse_too_deep(double deepest) const;
 
   const Compliance& gel_;

@@ -266,7 +266,7 @@ bool FinitePartSolver::find_step(const FiniteSnapshot& from, const PartTarget& t
       for (const auto& [i, x] : laws.rows[r]) ahead[static_cast<Eigen::Index>(r)] += scales.length * x * back[i];
     }
     ContactProblem contact;
-    contact.compliance = &compliance;
+    contact.compliance.emplace(compliance);
     contact.components = c;
     contact.friction = Eigen::VectorXd::Constant(m, friction_);
     contact.gap.resize(m);

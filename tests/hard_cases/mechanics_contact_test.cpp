@@ -289,7 +289,7 @@ TEST(HardCase21, AUniformPressureComesBackAsUniformMultipliers) {
   const Eigen::MatrixXd normal =
       gel().surface.view()(Eigen::seqN(2, n, Eigen::fix<3>), Eigen::seqN(2, n, Eigen::fix<3>));
   ContactProblem problem;
-  problem.compliance = &normal;
+  problem.compliance.emplace(normal);
   problem.gap = -(normal * Eigen::VectorXd::Constant(n, pressure));
   problem.border.resize(n, 0);
   problem.force.resize(0);

@@ -30,7 +30,7 @@ Eigen::VectorXd random_vector(int size, std::uint64_t seed) {
 
 ContactProblem frictionless(const Eigen::MatrixXd& a, const Eigen::VectorXd& gap) {
   ContactProblem problem;
-  problem.compliance = &a;
+  problem.compliance.emplace(a);
   problem.gap = gap;
   problem.border.resize(gap.size(), 0);
   problem.force.resize(0);
@@ -125,7 +125,7 @@ struct Patch {
     }
   }
   ContactAnswer solve(double tolerance = 1e-12) {
-    problem.compliance = &a;
+    problem.compliance.emplace(a);
     ContactMemory memory;
     return solve_frictional(problem, {}, tolerance, memory);
   }

@@ -161,6 +161,60 @@ TEST(DirectRenderer, AgreesWithThePathTracerUnderLedAndAreaLamps) {
   EXPECT_THROW(make_light_field(scene, reach_of_membrane(), accuracy(5e-3)), Error);
 }
 
+/// Upright walls from the gel's floor to z = 0, `half` mm before the middle on all four sides.
+TriangleMesh walls_round(double half) {
+  TriangleMesh mesh;
+  for (const double z : {-5.0, 0.0}) {
+    for (const auto& [x, y] : {std::pair{-half, -half}, {half, -half}, {half, half}, {-half, half}}) {
+      mesh.vertices.emplace_back(x, y, z);
+    }
+  }
+  for (int k = 0; k < 4; ++k) {
+    const int next = (k + 1) % 4;
+    mesh.triangles.push_back({k, next, 4 + next});
+    mesh.triangles.push_back({k, 4 + next, 4 + k});
+  }
+  return mesh;
+}
+
+// Seen along z light runs straight, so walls hide no lamp that stands within them: the membrane alone casts shadows, and
+// no ray asks for them. A ball far aside makes it one of several things that may.
+TEST(DirectRenderer, WallsHideNoLampWithinThem) {
+  Scene scene = dented_scene(0.0, Lambertian{grey(0.7)});
+  scene.media[1].index = scene.media[2].index;  // flat light isn't mirrored back into the plate
+  LedLamp led;
+  led.position = {-6.6, 0.5, -5.8};
+  led.direction = {1, 0, 0.3};
+  led.radius = 0.3;
+  led.power_W = grey(1.0);
+  scene.lamps = {led};
+  led.position = {1.0, 6.5, -5.8};
+  led.direction = {0, -1, 0.3};
+  scene.lamps.push_back(led);
+  scene.surfaces.push_back({walls_round(7.0), Black{}});
+  expect_equal_light(scene, "LEDs within walls");
+
+  const LightField field = make_light_field(scene, reach_of_membrane(), accuracy(2e-3));
+  const PinholeCamera camera = small_camera(96, 72);
+  const DirectImage alone = DirectRenderer(field, camera, scene).render(scene);
+  EXPECT_EQ(alone.shadow_rays, 0u);
+  DirectSettings bare;
+  bare.shadows = false;
+  const cv::Mat without = DirectRenderer(field, camera, scene, bare).render(scene).irradiance;
+  EXPECT_GT(cv::norm(without - alone.irradiance), 0.03 * cv::norm(without)) << "no shadow that matters";
+  scene.balls.push_back({{6.5, -6.5, -0.5}, 0.01, Black{}});
+  const DirectImage by_rays = DirectRenderer(field, camera, scene).render(scene);
+  EXPECT_GT(by_rays.shadow_rays, 0u);
+  EXPECT_LT(cv::norm(by_rays.irradiance - alone.irradiance), 0.02 * cv::norm(alone.irradiance));
+  scene.balls.clear();
+
+  // Walls between lamp and membrane do hide it.
+  std::get<LedLamp>(scene.lamps[0]).position.x() = -9.0;
+  const LightField beyond = make_light_field(scene, reach_of_membrane(), accuracy(2e-3));
+  EXPECT_GT(DirectRenderer(beyond, camera, scene).render(scene).shadow_rays, 0u);
+  expect_equal_light(scene, "an LED beyond a wall");
+}
+
 TEST(DirectRenderer, BandsAreIndependent) {
   Scene scene = dented_scene(0.0, Lambertian{grey(0.7)});
   scene.media[2].absorption = grey(0.1);
