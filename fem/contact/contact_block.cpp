@@ -21,7 +21,7 @@ ContactBlock::ContactBlock(const Compliance& gel, const ContactSurface& surface)
 /// Space for m vertices, with what is there kept. A block grows some times in a press; more than is needed is asked for, since
 /// memory that is new costs as much as what is written to it.
 void ContactBlock::make_room(Eigen::Index m) {
-  constexpr double kMore = 1.25;
+  constexpr double kMore = 2.5;  // memory that nothing was written to costs nothing
   const Eigen::Index needed = 9 * m * m;
   if (needed <= compliance_.size()) return;
   Eigen::VectorXd wider(static_cast<Eigen::Index>(kMore * static_cast<double>(needed)));
