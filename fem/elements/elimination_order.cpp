@@ -4,6 +4,7 @@
 #include <array>
 #include <initializer_list>
 #include <limits>
+#include <optional>
 #include <span>
 
 #include "core/error.h"
@@ -96,15 +97,16 @@ class Dissection {
       });
       for (const double part : kCuts) {
         const auto cut = static_cast<std::size_t>(part * static_cast<double>(nodes.size()));
-        std::vector<int> separator = cover(nodes, cut);
         // Eliminating a separator costs its cube; a lopsided cut leaves more to be cut.
         const double lopsided = std::abs(part - 0.5);
-        const double cost = static_cast<double>(separator.size()) * (1.0 + lopsided);
-        if (cost < best_cost) {
-          best_cost = cost;
+        const auto cost = [&](std::size_t size) { return static_cast<double>(size) * (1.0 + lopsided); };
+        std::optional<std::vector<int>> separator =
+            cover(nodes, cut, [&](std::size_t size) { return cost(size) < best_cost; });
+        if (separator) {
+          best_cost = cost(separator->size());
           best_nodes = nodes;
           best_cut = cut;
-          best_separator = std::move(separator);
+          best_separator = std::move(*separator);
         }
       }
     }
@@ -129,8 +131,10 @@ class Dissection {
   }
 
  private:
-  /// Fewest nodes that cover every edge between nodes[0..cut) and the rest.
-  std::vector<int> cover(const std::vector<int>& nodes, std::size_t cut) {
+  /// Fewest nodes that cover every edge between nodes[0..cut) and the rest; nothing where they are too many, as
+  /// worth(size) says.
+  template <typename Worth>
+  std::optional<std::vector<int>> cover(const std::vector<int>& nodes, std::size_t cut, const Worth& worth) {
     for (std::size_t i = 0; i < nodes.size(); ++i) {
       side_[nodes[i]] = i < cut ? Side::low : Side::high;
     }
@@ -141,60 +145,35 @@ class Dissection {
         left.push_back(nodes[i]);
       }
     }
-    // A largest matching by augmenting paths; most nodes are matched greedily.
+    // A largest matching ([Pothen1990]): most nodes are matched greedily; then each phase
+    // lengthens it by paths that share no node, until none is left.
+    std::size_t matched = 0;
     for (const int node : left) {
-      for (const int other : graph_.around(node)) {
-        if (side_[other] == Side::high && match_[other] < 0) {
-          match_[other] = node;
-          match_[node] = other;
-          break;
+      matched += match_free(node) ? 1 : 0;
+    }
+    bool grown = true;
+    while (grown && worth(matched)) {
+      forget_visits();
+      grown = false;
+      for (const int node : left) {
+        if (match_[node] < 0 && augment(node)) {
+          ++matched;
+          grown = true;
         }
       }
     }
-    for (const int node : left) {
-      if (match_[node] < 0) {
-        visited_.clear();
-        augment(node);
-        forget_visits();
-      }
-    }
-    // Koenig: from the unmatched left nodes along alternating paths; the cover is the left nodes not reached and the
-    // right nodes reached.
-    visited_.clear();
-    std::vector<int> stack;
-    for (const int node : left) {
-      if (match_[node] < 0) {
-        visit(node);
-        stack.push_back(node);
-      }
-    }
-    while (!stack.empty()) {
-      const int node = stack.back();
-      stack.pop_back();
-      for (const int other : graph_.around(node)) {
-        if (side_[other] == Side::high && !seen_[other]) {
-          visit(other);
-          const int next = match_[other];
-          TS_ASSERT(next >= 0);  // else the matching could grow
-          if (!seen_[next]) {
-            visit(next);
-            stack.push_back(next);
-          }
+    std::optional<std::vector<int>> result;
+    if (worth(matched)) {
+      // Koenig: what the last phase visited are the right nodes on alternating paths from unmatched left ones. They are
+      // the cover, with the matched left nodes off these paths. It's the same for each largest matching.
+      result = visited_;
+      for (const int node : left) {
+        if (match_[node] >= 0 && !seen_[match_[node]]) {
+          result->push_back(node);
         }
       }
+      std::sort(result->begin(), result->end());
     }
-    std::vector<int> result;
-    for (const int node : left) {
-      if (!seen_[node]) {
-        result.push_back(node);
-      }
-    }
-    for (const int node : visited_) {
-      if (side_[node] == Side::high) {
-        result.push_back(node);
-      }
-    }
-    std::sort(result.begin(), result.end());
     forget_visits();
     for (const int node : left) {
       if (match_[node] >= 0) {
@@ -208,6 +187,19 @@ class Dissection {
     return result;
   }
 
+  /// Matches a node of the low side with one across that has no match yet, if there is one.
+  bool match_free(int node) {
+    for (const int other : graph_.around(node)) {
+      if (side_[other] == Side::high && match_[other] < 0) {
+        match_[other] = node;
+        match_[node] = other;
+        return true;
+      }
+    }
+    return false;
+  }
+
+  /// Matches a node of the low side, and others anew, along a path of nodes not visited yet, if there is one.
   bool augment(int node) {
     for (const int other : graph_.around(node)) {
       if (side_[other] != Side::high || seen_[other]) {
