@@ -135,6 +135,12 @@ void render(const RenderOptions& options, const GlobalOptions& global) {
       summary =
           fmt::format("{} events from {} pictures; {} times a pixel passed more than a threshold from one to the next",
                       report.events, report.pictures, report.coarse_steps);
+      if (report.keys > 0) {
+        summary += fmt::format(
+            "; {} states were drawn in full, the pictures moved from them: at the next one they were up "
+            "to {:.2g} % off (root mean square)",
+            report.keys, 100.0 * report.worst_key_rms);
+      }
     }
     warning = gel->report.note;
   }

@@ -61,6 +61,9 @@ void DirectBatch::intersect(std::span<const RayPacket> rays, DirectCounts& count
         one.colour = one.material->print->colour_at(hits.triangle[k], hits.u[k], hits.v[k], one.colour);
       }
       one.distance = hits.distance[k];
+      one.triangle = hits.triangle[k];
+      one.u = hits.u[k];
+      one.v = hits.v[k];
       float along = 0.0f;
       float shading_along = 0.0f;
       for (int a = 0; a < 3; ++a) {
@@ -221,6 +224,37 @@ void DirectBatch::add(int lane, const float* through, const float* ambient, floa
   for (int band = 0; band < bands_; ++band) {
     if (ambient != nullptr) sum[band] += one.colour[band] * kPerPi * ambient[band];
     out[band] += dimmed[band] * sum[band] * per_index2;
+  }
+}
+
+std::optional<DirectBatch::SheetPlace> DirectBatch::sheet_place(int lane) const {
+  const Lane& one = lanes_[lane];
+  if (packet_of(lane).valid[lane % kPacket] == 0 || one.material == nullptr) return std::nullopt;
+  if (one.object != 0 || one.material->kind != DirectKind::kMatt) return std::nullopt;
+  return SheetPlace{one.place, one.normal, one.triangle, one.u, one.v};
+}
+
+void DirectBatch::white_light(int lane, const float* ambient, float* out) const {
+  const Lane& one = lanes_[lane];
+  const Eigen::Vector3f normal(one.normal);
+  const auto per_index2 = static_cast<float>(1.0 / (field_.index * field_.index));
+  for (int band = 0; band < bands_; ++band) {
+    Eigen::Vector3f flow = Eigen::Vector3f::Zero();
+    for (int lamp = 0; lamp < lamps_; ++lamp) {
+      const float amount = amounts(lane)[lamp];
+      if (!(amount > 0.0f)) continue;
+      const Eigen::Vector3f from = flow_of(lane, lamp);
+      // What of it gets through to the place: less what stands in its way.
+      const float through = amount / std::max(-normal.dot(from), 1e-30f);
+      const float intensity = fixture_.intensity[static_cast<std::size_t>(band) * stride_ + lamp];
+      const float passing =
+          pass_.empty() ? 1.0f : pass_[(static_cast<std::size_t>(lane) * bands_ + band) * stride_ + lamp];
+      flow -= std::min(through, 1.0f) * intensity * passing * from;
+    }
+    float scale = kPerPi * per_index2;
+    if (fixture_.absorbs) scale *= std::exp(-fixture_.absorption[band] * one.distance);
+    for (int axis = 0; axis < 3; ++axis) out[4 * band + axis] = scale * flow[axis];
+    out[4 * band + 3] = ambient == nullptr ? 0.0f : scale * ambient[band];
   }
 }
 

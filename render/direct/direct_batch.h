@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -59,6 +60,18 @@ class DirectBatch {
   /// What the lane has found; lamps that its surface turns away from are in neither.
   Visibility visibility(int lane) const;
 
+  /// Where a lane has met the first surface, if that is matt there; else nothing. As long as the lane's rays are kept.
+  struct SheetPlace {
+    const float* place;   ///< mm
+    const float* normal;  ///< the one that it is shaded by: unit, facing the camera's ray
+    int triangle;
+    float u, v;
+  };
+  std::optional<SheetPlace> sheet_place(int lane) const;
+  /// What a white sheet in the place of a lane's would show, as SheetPoints::values has it: 4 floats a band. `ambient`
+  /// as in add(). @pre sheet_place(lane); no films
+  void white_light(int lane, const float* ambient, float* out) const;
+
   /// Adds a lane's light to `out`, a number a band: `through` (that of CameraRays) times basic radiance. `ambient`, if
   /// any, is an irradiance from everywhere, W/m^2 a band, that comes on top.
   void add(int lane, const float* through, const float* ambient, float* out) const;
@@ -74,6 +87,8 @@ class DirectBatch {
     const float* colour;             // the material's, or that of the ink
     std::uint64_t doubt;             // see ShadowReach
     float spread[2];                 // where in the beams of guides shadow rays go, each -1/2 to 1/2
+    int triangle;                    // met
+    float u, v;                      // on it
     float film;                      // the part of the camera's rays to it that goes through film
   };
 

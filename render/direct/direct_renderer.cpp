@@ -145,6 +145,17 @@ struct DirectRenderer::Parts {
   void refine(const DirectFrame& frame, DirectImage& image);
   /// From `radiance` to the picture.
   void spread(DirectImage& image) const;
+  DirectImage dark() const {
+    DirectImage image;
+    image.irradiance = cv::Mat::zeros(height(), width(), CV_32FC(rays.bands));
+    return image;
+  }
+
+  struct Prepared;
+  /// Looks a scene over and gets all ready that its rays will ask for. @throws Error as render
+  std::unique_ptr<Prepared> prepare(const Scene& scene);
+  /// What the rays of one picture meet of the sheet, its first surface.
+  SheetPoints points_of(const DirectFrame& frame, const Surface& sheet) const;
 
  private:
   DirectBatch::Visibility known_round(int point) const;
@@ -353,6 +364,67 @@ void DirectRenderer::Parts::cast(const DirectFrame& frame, DirectImage& image) {
   count_up(task_counts, image);
 }
 
+SheetPoints DirectRenderer::Parts::points_of(const DirectFrame& frame, const Surface& sheet) const {
+  const int bands = rays.bands;
+  const std::vector<Eigen::Vector2d>& material = sheet.print->material_mm;
+  SheetPoints out;
+  out.grid = rays.grid;
+  out.bands = bands;
+  const std::size_t count = out.count();
+  const int stride = out.stride();
+  out.values.assign(count * stride, 0.0f);
+  out.places.assign(count * 3, 0.0f);
+  out.directions.assign(count * 3, 0.0f);
+  out.on_sheet.assign(count, 0);
+  out.others.assign(count * bands, 0.0f);
+  const std::vector<float> whole(bands, 1.0f);
+  const int tasks = (rays.tiles + kTilesATask - 1) / kTilesATask;
+  tbb::parallel_for(0, tasks, [&](int task) {
+    DirectBatch batch(frame);
+    DirectCounts counts;
+    const int task_end = std::min(rays.tiles, (task + 1) * kTilesATask);
+    for (int first = task * kTilesATask; first < task_end; first += DirectBatch::kMostPackets) {
+      const int packets = std::min(DirectBatch::kMostPackets, task_end - first);
+      batch.intersect({rays.packets.data() + first, static_cast<std::size_t>(packets)}, counts);
+      if (frame.shadow_reach != nullptr) batch.cast_shadows(counts);
+      for (int lane = 0; lane < packets * kPacket; ++lane) {
+        const int tile = first + lane / kPacket;
+        const int row = tile / rays.tiles_across * CameraRays::kSide + lane % kPacket / CameraRays::kSide;
+        const int column = tile % rays.tiles_across * CameraRays::kSide + lane % CameraRays::kSide;
+        if (column >= rays.grid.columns || row >= rays.grid.rows) continue;
+        const std::size_t point = static_cast<std::size_t>(row) * rays.grid.columns + column;
+        const float* ambient = bounced.empty() ? nullptr : bounced.data() + point * bands;
+        const auto met = batch.sheet_place(lane);
+        if (!met) {
+          std::array<float, kMaxBands> other{};
+          batch.add(lane, whole.data(), ambient, other.data());
+          for (int band = 0; band < bands; ++band) out.others[band * count + point] = other[band];
+          continue;
+        }
+        out.on_sheet[point] = 1;
+        const auto& corners = sheet.mesh.triangles[met->triangle];
+        const double u = met->u;
+        const double v = met->v;
+        const Eigen::Vector2d at =
+            (1.0 - u - v) * material[corners[0]] + u * material[corners[1]] + v * material[corners[2]];
+        float* values = out.values.data() + point * stride;
+        values[0] = static_cast<float>(at.x());
+        values[1] = static_cast<float>(at.y());
+        const float down = std::max(-met->normal[2], 1e-6f);
+        values[2] = met->normal[0] / down;
+        values[3] = met->normal[1] / down;
+        batch.white_light(lane, ambient, values + SheetPoints::kGeometry);
+        const RayPacket& packet = rays.packets[tile];
+        for (int axis = 0; axis < 3; ++axis) {
+          out.places[3 * point + axis] = met->place[axis];
+          out.directions[3 * point + axis] = packet.direction[axis][lane % kPacket];
+        }
+      }
+    }
+  });
+  return out;
+}
+
 /// A lamp that is seen, or hidden, from a point and all eight next ones is taken to be so from all between them.
 DirectBatch::Visibility DirectRenderer::Parts::known_round(int point) const {
   const int columns = rays.grid.columns;
@@ -474,55 +546,78 @@ void DirectRenderer::set_bounced_light(const cv::Mat& irradiance) {
   }
 }
 
-DirectImage DirectRenderer::render(const Scene& scene) {
-  Parts& parts = *parts_;
-  const LightField& field = parts.fixture.field;
-  check_scene(scene);
-  const std::string fault = unfit_for_direct(field, scene, !parts.bounced.empty());
-  if (!fault.empty()) fail("direct renderer: {}", fault);
-  std::vector<Surface> films;
-  std::ranges::copy_if(scene.surfaces, std::back_inserter(films), is_film);
-  if (!std::ranges::equal(films, parts.films, same_film)) {
-    fail("direct renderer: the scene's films aren't those that it was made for");
-  }
+/// All that a frame's drawing needs, in one place that stays.
+struct DirectRenderer::Parts::Prepared {
   std::optional<SheetIndex> sheet;
   std::optional<SheetHorizons> horizons;
-  if (parts.lone_sheet && parts.stands_still(scene)) {
-    const Surface& first = scene.surfaces[0];
-    if (parts.settings.shadows) horizons = SheetHorizons::find(first.mesh, *parts.horizon_settings);
-    if (horizons || !parts.settings.shadows) sheet.emplace(first, parts.seen_box);
-  }
   std::optional<PacketScene> other;
-  if (!sheet && (parts.lone_sheet || !parts.tree.move_to(scene))) other.emplace(scene);
-  const PacketScene& tree = other ? *other : parts.tree;
-
   std::vector<DirectMaterial> materials;
   std::vector<std::unique_ptr<const DirectPrint>> prints;
-  for (const Surface& surface : scene.surfaces) {
-    materials.push_back(direct_material(surface.material, parts.conductors));
-    if (surface.print) materials.back().print = prints.emplace_back(new DirectPrint(surface)).get();
-  }
-  for (const Ball& ball : scene.balls) materials.push_back(direct_material(ball.material, parts.conductors));
   std::optional<ShadowReach> shadow_reach;
-  if (parts.settings.shadows && !horizons) {
-    shadow_reach.emplace(parts.fixture.bearings, scene,
-                         other ? !scene.surfaces.empty() && is_connected(scene.surfaces[0].mesh) : parts.connected);
-  }
+  std::optional<DirectFrame> frame;
+};
 
-  DirectImage image;
-  image.irradiance = cv::Mat::zeros(parts.height(), parts.width(), CV_32FC(parts.rays.bands));
-  const DirectFrame frame{parts.fixture,
-                          tree,
-                          sheet ? &*sheet : nullptr,
-                          shadow_reach ? &*shadow_reach : nullptr,
-                          horizons ? &*horizons : nullptr,
-                          materials};
-  parts.cast(frame, image);
+std::unique_ptr<DirectRenderer::Parts::Prepared> DirectRenderer::Parts::prepare(const Scene& scene) {
+  check_scene(scene);
+  const std::string fault = unfit_for_direct(fixture.field, scene, !bounced.empty());
+  if (!fault.empty()) fail("direct renderer: {}", fault);
+  std::vector<Surface> scene_films;
+  std::ranges::copy_if(scene.surfaces, std::back_inserter(scene_films), is_film);
+  if (!std::ranges::equal(scene_films, films, same_film)) {
+    fail("direct renderer: the scene's films aren't those that it was made for");
+  }
+  auto made = std::make_unique<Prepared>();
+  if (lone_sheet && stands_still(scene)) {
+    const Surface& first = scene.surfaces[0];
+    if (settings.shadows) made->horizons = SheetHorizons::find(first.mesh, *horizon_settings);
+    if (made->horizons || !settings.shadows) made->sheet.emplace(first, seen_box);
+  }
+  if (!made->sheet && (lone_sheet || !tree.move_to(scene))) made->other.emplace(scene);
+
+  for (const Surface& surface : scene.surfaces) {
+    made->materials.push_back(direct_material(surface.material, conductors));
+    if (surface.print) made->materials.back().print = made->prints.emplace_back(new DirectPrint(surface)).get();
+  }
+  for (const Ball& ball : scene.balls) made->materials.push_back(direct_material(ball.material, conductors));
+  if (settings.shadows && !made->horizons) {
+    made->shadow_reach.emplace(
+        fixture.bearings, scene,
+        made->other ? !scene.surfaces.empty() && is_connected(scene.surfaces[0].mesh) : connected);
+  }
+  made->frame.emplace(DirectFrame{fixture, made->other ? *made->other : tree, made->sheet ? &*made->sheet : nullptr,
+                                  made->shadow_reach ? &*made->shadow_reach : nullptr,
+                                  made->horizons ? &*made->horizons : nullptr, made->materials});
+  return made;
+}
+
+DirectImage DirectRenderer::render(const Scene& scene) {
+  Parts& parts = *parts_;
+  const auto prepared = parts.prepare(scene);
+  DirectImage image = parts.dark();
+  parts.cast(*prepared->frame, image);
   if (parts.spreads) {
-    if (parts.refines) parts.refine(frame, image);
+    if (parts.refines) parts.refine(*prepared->frame, image);
     parts.spread(image);
   }
   return image;
+}
+
+std::optional<SheetPoints> DirectRenderer::sheet_points(const Scene& scene) {
+  Parts& parts = *parts_;
+  if (!parts.spreads || !parts.films.empty() || scene.surfaces.empty() || !scene.surfaces[0].print) return std::nullopt;
+  if (!std::holds_alternative<Lambertian>(scene.surfaces[0].material)) return std::nullopt;
+  const auto prepared = parts.prepare(scene);
+  return parts.points_of(*prepared->frame, scene.surfaces[0]);
+}
+
+void DirectRenderer::picture_of(std::vector<float>& radiance, cv::Mat& irradiance) {
+  Parts& parts = *parts_;
+  TS_ASSERT(parts.spreads && radiance.size() == parts.radiance.size());
+  std::swap(parts.radiance, radiance);
+  irradiance.create(parts.height(), parts.width(), CV_32FC(parts.rays.bands));
+  DirectImage image;
+  image.irradiance = irradiance;
+  parts.spread(image);
 }
 
 }  // namespace touchstone::render

@@ -4,10 +4,13 @@
 #include <cstdint>
 #include <memory>
 #include <opencv2/core/mat.hpp>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "render/cameras/camera.h"
 #include "render/direct/light_field.h"
+#include "render/direct/sheet_points.h"
 #include "render/scene/scene.h"
 
 namespace touchstone::render {
@@ -65,6 +68,14 @@ class DirectRenderer {
   /// scattering media; films other than `rest`'s or than film_screen.h takes; or things outside of the field's layer,
   /// or lit ones outside of its box
   DirectImage render(const Scene& scene);
+
+  /// What the first surface of a scene shows ray by ray, to be moved by SheetBetween; nothing where that can't be had:
+  /// with several samples a pixel, without blur, of a sheet that isn't Lambertian or has no print (of no marks, at
+  /// least) to say where its material was, or of a scene with films. @throws Error as render
+  std::optional<SheetPoints> sheet_points(const Scene& scene);
+  /// The picture of a radiance for each of sheet_points' points, [band][point], as DirectImage::irradiance, whose
+  /// memory is used again. The radiance is taken, and memory of the same size is left in its place.
+  void picture_of(std::vector<float>& radiance, cv::Mat& irradiance);
 
   /// Irradiance that reaches what each pixel shows from everywhere, on top of the lamps' (rest_light.h): W/m^2,
   /// CV_32FC(bands) of the camera's size, or empty for none. With it scenes may ask for interreflection.

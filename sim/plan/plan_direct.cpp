@@ -25,7 +25,7 @@ std::string unfit_for_direct_light(const SceneSpec& scene, const Plan& plan) {
 void plan_direct_light(const SceneSpec& scene, Plan& plan, PlanTable& table) {
   const std::string name = "direct light";
   const Switch forced = scene.effects.direct_light;
-  if (!scene.outputs.light()) {
+  if (!scene.outputs.light() && !scene.outputs.events) {
     table.add(name, false, "no picture is asked for", "");
     return;
   }

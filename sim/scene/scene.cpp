@@ -64,6 +64,7 @@ void fields(YamlReader& in, LightSpec& light) {
   in.optional("change_tolerance", light.change_tolerance, Allowed::at_least(0.0));
   in.optional("direct_tolerance", light.direct_tolerance, Allowed::above_up_to(0.0, 1.0));
   in.optional("event_step", light.event_step, Allowed::above_up_to(0.0, 10.0));
+  in.optional("event_reach_px", light.event_reach_px, Allowed::within(0.0, 100.0));
 }
 
 void fields(YamlReader& in, EffectSwitches& effects) {

@@ -54,6 +54,9 @@ struct LightSpec {
   double change_tolerance = 0.25;   ///< a pixel that changed by less than this part of the noise keeps its old light
   double direct_tolerance = 0.015;  ///< RMS difference from path tracing that direct light may have, relative
   double event_step = 0.5;          ///< of the smallest threshold: what event pixels may change by between two pictures
+  /// How far something may move in an event camera's picture until it is drawn in full again
+  /// (sim/sensor/light_between.h); 0: each picture is.
+  double event_reach_px = 1.0;
 };
 
 /// Pixels of the fine contact and of the height map: square, the map centred on the gel's origin.

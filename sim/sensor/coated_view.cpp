@@ -194,6 +194,14 @@ class CoatedView final : public SensorView {
     return touch;
   }
 
+  std::optional<LightOfKeys> light_of_keys(const SeenObject& object) const override {
+    if (!choice_.direct || !direct_->has_points()) return std::nullopt;
+    if (!missing_at_rest_.empty() || lacking_) return std::nullopt;
+    const SceneView& view = view_of(object);
+    if (!unfit_for_light_between(view.scene, view.plan).empty()) return std::nullopt;
+    return LightOfKeys{view, *direct_, {}};
+  }
+
   cv::Mat rest_light(const SeenObject*, const Eigen::Vector3d&) const override { return rest_light_; }
 
   std::optional<Eigen::Vector2d> pixel_of(const Eigen::Vector3d& point) const override {

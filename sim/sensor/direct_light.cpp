@@ -158,18 +158,42 @@ std::unique_ptr<render::DirectRenderer> DirectLight::borrow() const {
   return renderer;
 }
 
-std::optional<render::DirectImage> DirectLight::render(render::Scene scene) const {
-  TS_ASSERT(choice_.direct);
-  const render::Scene direct = with_blacks(std::move(scene));
+bool DirectLight::is_within_reach(const render::Scene& direct) const {
   const Eigen::AlignedBox3d reach(field_.reach.min().array() - kRounding_mm, field_.reach.max().array() + kRounding_mm);
-  if (!reach.contains(lit_box(direct))) return std::nullopt;
+  return reach.contains(lit_box(direct));
+}
+
+template <typename Work>
+auto DirectLight::with_renderer(const Work& work) const {
   // Isolated: a thread that waits in here for its own tasks would else begin another picture, and with it a renderer.
   return tbb::this_task_arena::isolate([&] {
     auto renderer = borrow();
-    render::DirectImage image = renderer->render(direct);
+    auto made = work(*renderer);
     const std::lock_guard lock(mutex_);
     idle_.push_back(std::move(renderer));
-    return image;
+    return made;
+  });
+}
+
+std::optional<render::DirectImage> DirectLight::render(render::Scene scene) const {
+  TS_ASSERT(choice_.direct);
+  const render::Scene direct = with_blacks(std::move(scene));
+  if (!is_within_reach(direct)) return std::nullopt;
+  return with_renderer([&](render::DirectRenderer& renderer) { return renderer.render(direct); });
+}
+
+std::optional<render::SheetPoints> DirectLight::points(const render::Scene& scene) const {
+  TS_ASSERT(has_points());
+  const render::Scene direct = with_blacks(scene);
+  if (!is_within_reach(direct)) return std::nullopt;
+  return with_renderer([&](render::DirectRenderer& renderer) { return renderer.sheet_points(direct); });
+}
+
+void DirectLight::picture_of(std::vector<float>& radiance, cv::Mat& irradiance) const {
+  TS_ASSERT(has_points());
+  with_renderer([&](render::DirectRenderer& renderer) {
+    renderer.picture_of(radiance, irradiance);
+    return true;
   });
 }
 

@@ -50,7 +50,19 @@ class DirectLight {
   /// reach. @pre choice().direct
   std::optional<render::DirectImage> render(render::Scene scene) const;
 
+  /// Have its pictures points that can be moved (DirectRenderer::sheet_points)? Those of one ray a pixel have.
+  bool has_points() const { return choice_.direct && settings_.samples == 1; }
+  /// The points of a scene; nothing where the gel has gone too far, as render, or the renderer has none for it.
+  /// @pre has_points()
+  std::optional<render::SheetPoints> points(const render::Scene& scene) const;
+  /// The picture of their radiance, as DirectRenderer::picture_of. @pre has_points()
+  void picture_of(std::vector<float>& radiance, cv::Mat& irradiance) const;
+
  private:
+  /// `work` with a renderer of this thread's own.
+  template <typename Work>
+  auto with_renderer(const Work& work) const;
+  bool is_within_reach(const render::Scene& direct) const;
   std::unique_ptr<render::DirectRenderer> borrow() const;
 
   LightChoice choice_;

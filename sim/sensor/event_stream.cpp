@@ -11,6 +11,7 @@
 #include "sim/press/played_states.h"
 #include "sim/press/state_between.h"
 #include "sim/scene/device_camera.h"
+#include "sim/sensor/light_between.h"
 #include "sim/sensor/light_sequence.h"
 #include "sim/view/scene_view.h"
 
@@ -112,6 +113,73 @@ class EventWatch {
   EventStreamReport report_;
 };
 
+/// The same by light that is moved from state to state.
+class MovedWatch {
+ public:
+  MovedWatch(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel, std::uint64_t noise_seed,
+             std::shared_ptr<const DirectLight> direct, const EventSink& sink)
+      : pixels_(scene.device.camera->events.value().pixels, {scene.device.camera->width, scene.device.camera->height},
+                scene.seed, noise_seed),
+        dark_(static_cast<float>(scene.device.camera->events->pixels.dark_intensity)),
+        coarse_(static_cast<float>(std::exp(pixels_.smallest_threshold()))),
+        light_(scene, plan, gel, pixels_.smallest_threshold(), std::move(direct)),
+        between_(
+            LightOfKeys{
+                light_.view(), *light_.direct(),
+                [this](const cv::Mat& irradiance, cv::Mat& currents) { light_.pixel_currents(irradiance, currents); }},
+            gel, scene.light.event_reach_px, [this](std::int64_t t_us, const cv::Mat& light) { show(t_us, light); }),
+        steps_(scene),
+        sink_(sink) {}
+
+  void go_on(std::int64_t t_us, const fem::PressState& press) {
+    steps_.go(t_us, press, [this](std::int64_t at_us, const fem::PressState& state) { between_.add(at_us, state); });
+  }
+
+  EventStreamReport finish() {
+    between_.finish();
+    report_.pictures = between_.report().pictures;
+    report_.keys = between_.report().keys;
+    report_.worst_key_rms = between_.report().worst_rms;
+    return report_;
+  }
+
+ private:
+  void show(std::int64_t t_us, const cv::Mat& light) {
+    events_.clear();
+    pixels_.advance(light, t_us, events_);
+    if (!last_.empty()) report_.coarse_steps += coarse_steps(last_, light);
+    light.copyTo(last_);
+    report_.events += static_cast<std::int64_t>(events_.size());
+    if (!events_.empty()) sink_(events_);
+  }
+
+  std::int64_t coarse_steps(const cv::Mat& before, const cv::Mat& now) const {
+    std::int64_t count = 0;
+    for (int row = 0; row < now.rows; ++row) {
+      const auto* a = before.ptr<float>(row);
+      const auto* b = now.ptr<float>(row);
+      int here = 0;
+      for (int column = 0; column < now.cols; ++column) {
+        const float was = a[column] + dark_;
+        const float is = b[column] + dark_;
+        here += static_cast<int>(is > coarse_ * was) | static_cast<int>(was > coarse_ * is);
+      }
+      count += here;
+    }
+    return count;
+  }
+
+  render::EventPixels pixels_;
+  float dark_, coarse_;  // coarse_: a ratio of light
+  LightSequence light_;
+  LightBetween between_;
+  MovedSteps steps_;
+  const EventSink& sink_;
+  std::vector<Event> events_;
+  cv::Mat last_;
+  EventStreamReport report_;
+};
+
 /// Direct light of a scene, where the plan has it and it holds; null: paths.
 std::shared_ptr<const DirectLight> direct_light(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel,
                                                 const fem::GelVibration* vibration,
@@ -130,20 +198,32 @@ EventStreamReport watch_events(const SceneSpec& scene, const Plan& plan, const f
                                const fem::GelVibration* vibration,
                                const std::vector<std::shared_ptr<const fem::Compliance>>& elastic) {
   TS_ASSERT(plan.events);
-  EventWatch watch(scene, plan, gel, noise_seed, direct_light(scene, plan, gel, vibration, elastic), sink);
+  const auto play = [&](const auto& visit) {
+    play_states(scene, plan, gel, vibration, elastic, [&](int frame, int part, const fem::PressState& state) {
+      const double frames = frame - 1 + static_cast<double>(part) / plan.states_a_frame;
+      visit(frame == 0, std::llround(frames * kMicrosecondsPerSecond / scene.motion.frame_rate_Hz), state);
+      if (progress && part == plan.states_a_frame) progress("events", frame + 1, scene.motion.frame_count());
+    });
+  };
+  std::shared_ptr<const DirectLight> direct = direct_light(scene, plan, gel, vibration, elastic);
+  const bool moved = direct && direct->has_points() && unfit_for_light_between(scene, plan).empty();
+  if (moved) {
+    MovedWatch watch(scene, plan, gel, noise_seed, std::move(direct), sink);
+    play([&](bool, std::int64_t t_us, const fem::PressState& state) { watch.go_on(t_us, state); });
+    return watch.finish();
+  }
+  EventWatch watch(scene, plan, gel, noise_seed, std::move(direct), sink);
   Moment last;
-  play_states(scene, plan, gel, vibration, elastic, [&](int frame, int part, const fem::PressState& state) {
-    const double frames = frame - 1 + static_cast<double>(part) / plan.states_a_frame;
+  play([&](bool first, std::int64_t t_us, const fem::PressState& state) {
     Moment now;
-    now.t_us = std::llround(frames * kMicrosecondsPerSecond / scene.motion.frame_rate_Hz);
+    now.t_us = t_us;
     now.press = state;
-    if (frame == 0) {
+    if (first) {
       watch.begin(now);
     } else {
       watch.go_on(last, now);
     }
     last = std::move(now);
-    if (progress && part == plan.states_a_frame) progress("events", frame + 1, scene.motion.frame_count());
   });
   return watch.report();
 }

@@ -25,6 +25,8 @@ struct EventStreamReport {
   std::int64_t pictures = 0;
   std::int64_t pixels_traced = 0;
   std::int64_t paths_traced = 0;
+  std::int64_t keys = 0;          ///< pictures drawn in full, where the others are moved from them; else 0
+  double worst_key_rms = 0.0;     ///< LightBetweenReport::worst_rms
   std::int64_t coarse_steps = 0;  ///< how often a pixel passed more than the smallest threshold between two pictures
 };
 
@@ -35,6 +37,10 @@ struct EventStreamReport {
 /// of them, as densely as no pixel changes by light.event_step of the smallest threshold from one to the next; but no
 /// denser than a motion of 0.02 pixels, which the paths of a pixel can't resolve, or a microsecond. Between pictures
 /// the logarithm runs straight.
+///
+/// Before a coated gel most pictures are moved from a few that are drawn in full (sim/sensor/light_between.h), where
+/// that can be had. There is then one for each state that is played, and as many between two as nothing moves by
+/// kMovedStep_px from one to the next. A reach of 0 draws all of them in full.
 ///
 /// Thresholds belong to the unit, the scene's seed; `noise_seed` is of the noise in time. The same for any number of
 /// threads. `vibration` and `elastic` as in play_motion.

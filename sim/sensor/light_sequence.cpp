@@ -1,5 +1,7 @@
 #include "sim/sensor/light_sequence.h"
 
+#include <tbb/parallel_for.h>
+
 #include <cmath>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
@@ -129,6 +131,24 @@ struct LightSequence::Parts {
     return picture;
   }
 
+  /// All pixels' photocurrents.
+  void put_current(const cv::Mat& irradiance, cv::Mat& current) const {
+    const int bands = irradiance.channels();
+    tbb::parallel_for(0, size.height, [&](int row) {
+      const auto* light = irradiance.ptr<float>(row);
+      auto* out = current.ptr<float>(row);
+      if (bands == 1 && per_irradiance.rows() == 1) {
+        const auto scale = static_cast<float>(per_irradiance(0, 0));
+        for (int column = 0; column < size.width; ++column) out[column] = scale * light[column];
+        return;
+      }
+      for (int column = 0; column < size.width; ++column) {
+        const int channel = render::channel_of(imager.bayer, column, row);
+        out[column] = static_cast<float>(photocurrent(per_irradiance, channel, light + column * bands));
+      }
+    });
+  }
+
   void put_light(const cv::Mat& irradiance, const cv::Mat& mask, SequencePicture& picture) const {
     const int bands = irradiance.channels();
     for (int row = 0; row < size.height; ++row) {
@@ -160,6 +180,19 @@ cv::Size LightSequence::size() const {
 
 double LightSequence::motion(const fem::PressState& from, const fem::PressState& to) const {
   return image_motion(parts_->scale, from, to, parts_->object_radius_mm);
+}
+
+const SceneView& LightSequence::view() const {
+  return parts_->view;
+}
+
+const DirectLight* LightSequence::direct() const {
+  return parts_->direct.get();
+}
+
+void LightSequence::pixel_currents(const cv::Mat& irradiance, cv::Mat& currents) const {
+  currents.create(parts_->size, CV_32FC1);
+  parts_->put_current(irradiance, currents);
 }
 
 SequencePicture LightSequence::first(const fem::PressState& press) const {

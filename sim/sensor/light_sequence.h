@@ -49,6 +49,12 @@ class LightSequence {
   /// How far the image moves between two states, pixels (sim/plan/image_motion.h).
   double motion(const fem::PressState& from, const fem::PressState& to) const;
 
+  /// What is seen of the scene, and by which direct light (null: paths).
+  const SceneView& view() const;
+  const DirectLight* direct() const;
+  /// What irradiance frees in each pixel, CV_32FC1, electrons a second; the argument's memory is used again.
+  void pixel_currents(const cv::Mat& irradiance, cv::Mat& currents) const;
+
   /// The first picture: all pixels are traced. @throws Error, as `next` does, where direct light doesn't reach
   SequencePicture first(const fem::PressState& press) const;
   /// A later one, `moved_px` of image motion after `before`.

@@ -42,6 +42,24 @@ std::vector<Event> events_of_press(std::span<const Truth> states, const Photocur
   return events;
 }
 
+std::vector<Event> events_of_press(std::span<const Truth> states, const LightOfKeys& light, const fem::Compliance& gel,
+                                   const render::EventPixelSettings& pixels, std::uint64_t unit_seed,
+                                   std::uint64_t noise_seed) {
+  TS_ASSERT(!states.empty());
+  std::vector<Event> events;
+  const SceneSpec& scene = light.view.scene;
+  render::EventPixels watch(pixels, {scene.device.camera->width, scene.device.camera->height}, unit_seed, noise_seed);
+  LightBetween between(light, gel, scene.light.event_reach_px,
+                       [&](std::int64_t t_us, const cv::Mat& currents) { watch.advance(currents, t_us, events); });
+  MovedSteps steps(scene);
+  for (const Truth& state : states) {
+    steps.go(state.t_us, state.press,
+             [&](std::int64_t t_us, const fem::PressState& press) { between.add(t_us, press); });
+  }
+  between.finish();
+  return events;
+}
+
 ChipTouch chip_touch(const render::MotionChipSettings& settings, const cv::Mat& rest_light,
                      std::span<const cv::Mat> lights, std::uint64_t unit_seed, std::uint64_t noise_seed) {
   render::MotionChip chip(settings, unit_seed, noise_seed);

@@ -9,9 +9,11 @@
 
 #include "core/frame.h"
 #include "core/motion_chip.h"
+#include "fem/elements/compliance.h"
 #include "render/events/event_pixels.h"
 #include "render/imager/motion_chip.h"
 #include "sim/press/truth.h"
+#include "sim/sensor/light_between.h"
 
 namespace touchstone::sim {
 
@@ -23,6 +25,12 @@ using Photocurrent = std::function<cv::Mat(const fem::PressState& press)>;
 /// state_between); between pictures the logarithm runs straight. The same bytes for any number of threads.
 /// @pre at least one state, times rising
 std::vector<Event> events_of_press(std::span<const Truth> states, const Photocurrent& light,
+                                   const render::EventPixelSettings& pixels, std::uint64_t unit_seed,
+                                   std::uint64_t noise_seed);
+
+/// The same by pictures that are moved from state to state (sim/sensor/light_between.h), as watch_events has them: one
+/// for each state, and as many between two as nothing moves by kMovedStep_px from one to the next.
+std::vector<Event> events_of_press(std::span<const Truth> states, const LightOfKeys& light, const fem::Compliance& gel,
                                    const render::EventPixelSettings& pixels, std::uint64_t unit_seed,
                                    std::uint64_t noise_seed);
 

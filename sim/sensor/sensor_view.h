@@ -11,6 +11,7 @@
 #include "fem/contact/press.h"
 #include "render/cameras/camera.h"
 #include "sim/scene/object.h"
+#include "sim/sensor/light_between.h"
 #include "sim/sensor/virtual_camera.h"
 #include "sim/view/scene_view.h"
 
@@ -49,6 +50,9 @@ class SensorView {
   /// @throws Error if the gel went beyond what the light was set up for
   virtual SeenTouch see(const SeenObject& object, const fem::PressState& press, const Eigen::Vector3d& start_mm,
                         bool truth) const = 0;
+  /// By what an object's states can be drawn so that their pictures can be moved to states between them
+  /// (sim/sensor/light_between.h), without `currents`; nothing where they can't.
+  virtual std::optional<LightOfKeys> light_of_keys(const SeenObject& /*object*/) const { return std::nullopt; }
   /// The light of the untouched device; of a clear one with the object (if any) standing at `start_mm`.
   virtual cv::Mat rest_light(const SeenObject* object, const Eigen::Vector3d& start_mm) const = 0;
   /// Where the camera sees a point of the gel frame; nothing where it doesn't.

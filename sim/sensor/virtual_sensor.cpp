@@ -211,10 +211,16 @@ struct VirtualSensor::Parts {
       render::Imager counter = sim::imager(device, bands_of(object), false);
       counter.exposure_s = 1.0;
       const render::ImagerResponse response = render::response_of(counter);
-      const auto light = [&](const fem::PressState& press) {
-        return photocurrent(by.view->see(object, press, start, false).light, response);
-      };
-      touch.events = events_of_press(states, light, device.camera->events->pixels, settings.seed, options.noise_seed);
+      const render::EventPixelSettings& pixels = device.camera->events->pixels;
+      if (std::optional<LightOfKeys> keys = by.view->light_of_keys(object)) {
+        keys->currents = [&](const cv::Mat& light, cv::Mat& currents) { currents = photocurrent(light, response); };
+        touch.events = events_of_press(states, *keys, *gel, pixels, settings.seed, options.noise_seed);
+      } else {
+        const auto light = [&](const fem::PressState& press) {
+          return photocurrent(by.view->see(object, press, start, false).light, response);
+        };
+        touch.events = events_of_press(states, light, pixels, settings.seed, options.noise_seed);
+      }
     }
   }
 

@@ -20,6 +20,7 @@ OUTPUTS = {
     "reflex": ["frame", "statistics", "markers"],
     "tactip": ["frame", "height", "contact", "markers"],
     "gelsight-markers": ["frame", "height", "contact", "markers"],
+    "evetac": ["frame", "height", "contact", "markers", "events"],
     "gelsight-mini-markers": ["frame", "height", "contact", "markers"],
 }
 OTHERS = ["frame", "height", "contact"]

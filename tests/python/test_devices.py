@@ -11,7 +11,8 @@ import touchstone as ts
 SCENES = pathlib.Path(os.environ["TOUCHSTONE_SCENES"])
 DEVICES = sorted(path.stem for path in (SCENES / "devices").glob("*.yaml"))
 CLEAR = {"vhs", "vhs-spectral"}
-PRINTED = {"chroma", "chroma-compact", "gelsight-markers", "gelsight-mini-markers", "reflex", "tactip"}
+PRINTED = {"chroma", "chroma-compact", "evetac", "gelsight-markers", "gelsight-mini-markers", "reflex", "tactip"}
+EVENTS = {"dvs-grasp", "evetac"}
 FORCE_N = 0.5
 # Of each kind at least one; others are long tests. (Devices that differ in optics alone share a gel.)
 QUICK = {"dvs-grasp", "gelsight-portable", "gelsight-webcam", "reflex", "vhs-spectral"}
@@ -25,7 +26,7 @@ def touched(request):
 
 
 def test_their_number():
-    assert len(DEVICES) == 15 and QUICK < set(DEVICES)
+    assert len(DEVICES) == 16 and QUICK < set(DEVICES)
 
 
 def test_a_ball_makes_a_frame_with_its_force(touched):
@@ -65,10 +66,18 @@ def test_truth_of_its_kind(touched):
 
 def test_events_of_the_press(touched):
     name, sensor, touch = touched
-    if name != "dvs-grasp":
+    if name not in EVENTS:
         assert len(touch.events) == 0
         return
     assert (np.diff(touch.events["t_us"]) >= 0).all()
+    if name == "evetac":
+        # Dots go with the gel: most events are at their outlines, 11 pixels from their middles, and near the ball.
+        events = touch.events
+        middles = np.array([sensor.pixel_from_gel(place[:2]) for place in touch.markers_mm])
+        places = np.stack([events["x"], events["y"]], axis=1) + 0.5
+        nearest = np.linalg.norm(places[:, None] - middles[None], axis=2).min(axis=1)
+        assert len(events) > 200 and (np.abs(nearest - 11.4) < 3).mean() > 0.5
+        return
     # A dark ball makes the membrane darker where it touches: OFF events there, and no ON event. (The shipped ball is a
     # light grey one, which changes little; elsewhere there is the pixels' own noise.)
     dark = {"name": "dark", "shape": {"type": "sphere", "radius_mm": 4}, "albedo": 0.04}

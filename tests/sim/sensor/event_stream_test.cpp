@@ -168,7 +168,7 @@ TEST(EventStream, ACoatedGelsEventsByDirectLightAddUpToTheChangeThatPathsSee) {
   const SceneSpec scene = read_scene(
       folder.write("scene.yaml",
                    "device: device.yaml\nobject: ball.yaml\nmotion: press.yaml\noutputs: {events: true}\nseed: 4\n"
-                   "light: {max_samples: 4096}\n"));
+                   "light: {max_samples: 4096, event_reach_px: 0}\n"));
   const Plan plan = make_plan(scene);
   ASSERT_TRUE(plan.direct_light);
   const auto gel = set_up_gel(scene.device, folder.path());

@@ -1,0 +1,188 @@
+#include "sim/sensor/light_between.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "core/error.h"
+#include "render/direct/sheet_between.h"
+#include "sim/press/state_between.h"
+#include "sim/scene/device_gel.h"
+#include "sim/sensor/sheet_motion.h"
+#include "sim/view/scene_view.h"
+
+namespace touchstone::sim {
+namespace {
+
+/// A state drawn in full.
+struct Key {
+  fem::PressState press;
+  render::SheetBetween sheet;
+};
+
+/// A state whose picture waits until it is known which key comes next.
+struct Waiting {
+  std::int64_t t_us = 0;
+  fem::PressState press;
+  cv::Mat light;  ///< moved from the last key
+};
+
+constexpr int kMostSteps = 256;  // from one state to the next
+
+/// The mean square of the difference of two lights' logarithms.
+double mean_square_of_logs(const cv::Mat& one, const cv::Mat& other) {
+  double sum = 0.0;
+  for (int row = 0; row < one.rows; ++row) {
+    const auto* a = one.ptr<float>(row);
+    const auto* b = other.ptr<float>(row);
+    for (int column = 0; column < one.cols; ++column) {
+      if (!(a[column] > 0.0f && b[column] > 0.0f)) continue;
+      const double off = std::log(double(a[column]) / double(b[column]));
+      sum += off * off;
+    }
+  }
+  return sum / static_cast<double>(one.total());
+}
+
+}  // namespace
+
+std::string unfit_for_light_between(const SceneSpec& scene, const Plan& plan) {
+  const DeviceSpec& device = scene.device;
+  if (!plan.direct_light) return "there is no direct light";
+  if (device.coating->type != CoatingType::matt) return "the coating is of metal";
+  if (!is_gentle(device.gel)) return "the gel is neither flat nor a gentle dome";
+  const bool scattered = device.coating->print && device.coating->print->pattern == PrintPattern::scattered;
+  if (scattered && device.gel.dome() != nullptr) return "the print is laid out along a dome";
+  if (device.films) return "there are films before the gel";
+  if (device.pins) return "pins stand before the coating";
+  if (device.beads) return "there are beads in the gel";
+  return {};
+}
+
+MovedSteps::MovedSteps(const SceneSpec& scene)
+    : scale_(scene.device), object_radius_mm_(largest_object_radius(scene)) {}
+
+void MovedSteps::go(std::int64_t t_us, const fem::PressState& press, const Visit& visit) {
+  if (last_) {
+    const auto& [from_us, from] = *last_;
+    const auto span_us = static_cast<double>(t_us - from_us);
+    const double wanted = std::ceil(image_motion(scale_, from, press, object_radius_mm_) / kMovedStep_px);
+    const int steps = std::max(1, static_cast<int>(std::min({wanted, span_us, static_cast<double>(kMostSteps)})));
+    for (int k = 1; k < steps; ++k) {
+      const std::int64_t between_us = from_us + (t_us - from_us) * k / steps;
+      visit(between_us, state_between(from, press, static_cast<double>(between_us - from_us) / span_us));
+    }
+  }
+  visit(t_us, press);
+  last_.emplace(t_us, press);
+}
+
+struct LightBetween::Parts {
+  LightOfKeys light;
+  SheetMotion motion;
+  double reach_px;
+  Show show;
+  LightBetweenReport report;
+  double sum_of_squares = 0.0;
+  std::optional<Key> key;
+  std::vector<Waiting> waiting;
+  // Memory that each state uses again.
+  render::SheetMove move;
+  std::vector<float> radiance;
+  cv::Mat irradiance;
+  std::vector<cv::Mat> spare;  // pictures
+
+  Key make_key(const fem::PressState& press) {
+    ++report.keys;
+    const SceneView& view = light.view;
+    const SeenGeometry geometry = view.geometry(press, view.relief(press));
+    render::Scene scene = view.seen_coating(press, geometry);
+    render::Surface& sheet = scene.surfaces.front();
+    if (!sheet.print) {
+      render::Print& places = sheet.print.emplace();
+      for (const Eigen::Vector3d& rest : geometry.sheet.rest) places.material_mm.emplace_back(rest.head<2>());
+    }
+    std::optional<render::SheetPoints> points = light.direct.points(scene);
+    if (!points) fail("events: the gel has gone where the light field of direct light doesn't reach");
+    return {press, render::SheetBetween(std::move(*points), sheet)};
+  }
+
+  /// The light of a key's sheet moved to another state.
+  cv::Mat moved(const Key& from, const fem::PressState& to, render::SheetReach* reach = nullptr) {
+    motion.between(from.press, to, move);
+    const render::SheetReach gone = from.sheet.radiance(move, radiance);
+    if (reach != nullptr) *reach = gone;
+    light.direct.picture_of(radiance, irradiance);
+    cv::Mat picture;
+    if (!spare.empty()) {
+      picture = std::move(spare.back());
+      spare.pop_back();
+    }
+    light.currents(irradiance, picture);
+    return picture;
+  }
+
+  /// Shows all that waits, going over to the key `next`; null: there is none.
+  void let_go(const Key* next) {
+    for (std::size_t k = 0; k < waiting.size(); ++k) {
+      Waiting& one = waiting[k];
+      if (next != nullptr) {
+        const double part = static_cast<double>(k + 1) / static_cast<double>(waiting.size());
+        const cv::Mat back = moved(*next, one.press);
+        if (k + 1 == waiting.size()) {
+          const double square = mean_square_of_logs(one.light, back);
+          report.worst_rms = std::max(report.worst_rms, std::sqrt(square));
+          sum_of_squares += square;
+          report.mean_rms = std::sqrt(sum_of_squares / static_cast<double>(report.keys - 1));
+        }
+        cv::addWeighted(one.light, 1.0 - part, back, part, 0.0, one.light);
+        spare.push_back(back);
+      }
+      show(one.t_us, one.light);
+      spare.push_back(std::move(one.light));
+    }
+    waiting.clear();
+  }
+};
+
+LightBetween::LightBetween(LightOfKeys light, const fem::Compliance& gel, double reach_px, Show show)
+    : parts_(new Parts{light, SheetMotion(gel, light.view.scene.device.mesh.fine_mm), reach_px, std::move(show)}) {
+  TS_ASSERT(parts_->light.direct.has_points() && reach_px >= 0.0);
+}
+
+LightBetween::~LightBetween() = default;
+
+void LightBetween::add(std::int64_t t_us, const fem::PressState& press) {
+  Parts& parts = *parts_;
+  ++parts.report.pictures;
+  if (!parts.key) {
+    parts.key.emplace(parts.make_key(press));
+    parts.show(t_us, parts.moved(*parts.key, press));
+    return;
+  }
+  render::SheetReach reach;
+  cv::Mat light = parts.moved(*parts.key, press, &reach);
+  parts.waiting.push_back({t_us, press, std::move(light)});
+  if (parts.reach_px == 0.0 || reach.pixels > parts.reach_px || reach.slope > kReachSlope) {
+    Key next = parts.make_key(press);
+    parts.let_go(&next);
+    parts.key.emplace(std::move(next));
+  } else if (parts.waiting.size() >= kMostWaiting) {
+    parts.let_go(nullptr);
+  }
+}
+
+void LightBetween::finish() {
+  parts_->let_go(nullptr);
+}
+
+const LightBetweenReport& LightBetween::report() const {
+  return parts_->report;
+}
+
+}  // namespace touchstone::sim
