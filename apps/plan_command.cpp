@@ -104,6 +104,11 @@ void plan_draw(const std::filesystem::path& file, bool linear_range, const Globa
   if (first.by_maps) {
     fmt::print("\nPictures are made from maps of what touches the milky gel; the plan is of the mechanics alone.\n");
   }
+  if (plans.front().scattering && first.scene.device.coating) {
+    fmt::print(
+        "\nThe gel is milky under a coating: pictures are made from maps of it where these are found to be good "
+        "enough, else by path tracing.\n");
+  }
   print_gel(fmt::format("unit {}'s ", first.unit), first.scene.device, global);
   if (linear_range) print_linear_range(first.scene, global);
 }

@@ -25,7 +25,7 @@ render/lamps: core render/spectra render/sampling render/materials render/scene
 render/cameras: core render/sampling render/materials render/scene
 render/paths: core render/spectra render/sampling render/materials render/scene render/lamps render/cameras
 render/direct: core render/spectra render/sampling render/materials render/scene render/lamps render/cameras render/paths
-render/membrane: core render/sampling render/materials render/scene render/cameras render/paths
+render/membrane: core render/sampling render/materials render/scene render/lamps render/cameras render/paths
 render/imager: core render/spectra render/sampling
 render/events: core
 sensors/numerics: core

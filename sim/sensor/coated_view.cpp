@@ -18,6 +18,7 @@
 #include "sim/sensor/colour_numbers.h"
 #include "sim/sensor/direct_light.h"
 #include "sim/sensor/light_file.h"
+#include "sim/sensor/milky_coat.h"
 #include "sim/sensor/residual_light.h"
 #include "sim/sensor/virtual_sensor.h"
 #include "sim/view/seen_geometry.h"
@@ -25,9 +26,10 @@
 namespace touchstone::sim {
 namespace {
 
-constexpr double kClearance_mm = 0.1;  // of the judged ball before its press
-constexpr int kRaysAPixel[] = {1};     // of direct light: some milliseconds a frame
-constexpr int kPathsAPixel = 256;      // where a device is unfit for direct light
+constexpr double kClearance_mm = 0.1;     // of the judged ball before its press
+constexpr int kRaysAPixel[] = {1};        // of direct light: some milliseconds a frame
+constexpr int kPathsAPixel = 256;         // where a device is unfit for direct light
+constexpr double kMilkyTolerance = 0.05;  // of pictures of a milky slab: beyond it, paths
 
 /// How far a point of the surface moves along z where the gel is pressed in by `depth_mm` (negative: inwards). A
 /// fingertip's sides, which begin on the plate that it is bonded to, hardly move; nor does the rim of a dome that ends
@@ -112,11 +114,12 @@ std::string light_key(const VirtualSensorSettings& settings) {
 }
 
 /// A sensor works as well where its light can't be kept.
-void keep_light(const std::filesystem::path& folder, const std::string& key, const FoundLight& light) {
+template <typename Write>
+void keep(const std::filesystem::path& folder, const Write& write) {
   std::error_code ignored;
   std::filesystem::create_directories(folder, ignored);
   try {
-    write_light(folder, key, light);
+    write();
   } catch (const Error&) {
   }
 }
@@ -151,9 +154,11 @@ class CoatedView final : public SensorView {
         states.push_back(play(straight_press(above, radius - 0.5 * settings_.deepest_mm)).back());
         direct_ = std::make_unique<const DirectLight>(*judged_, camera_, states, kRaysAPixel, settings_.edge_side,
                                                       settings_.guides);
-        if (!key.empty()) keep_light(cache_folder, key, direct_->found());
+        if (!key.empty()) keep(cache_folder, [&] { write_light(cache_folder, key, direct_->found()); });
       }
       choice_ = direct_->choice();
+    } else if (judged_->plan.scattering) {
+      set_up_milky(cache_folder, above);
     }
     const cv::Mat own = light(*judged_, rest_, {}, rest_seen_);
     if (!device_.background.empty()) {
@@ -209,6 +214,38 @@ class CoatedView final : public SensorView {
   }
 
  private:
+  /// Pictures from maps, where they are found to be good enough.
+  void set_up_milky(const std::filesystem::path& cache_folder, double above_mm) {
+    const std::string unfit = unfit_for_milky_coat(device_, judged_->seen(rest_, std::nullopt));
+    if (!unfit.empty()) {
+      choice_.reason = "paths: " + unfit;
+      return;
+    }
+    const std::string key = cache_folder.empty() ? "" : light_key(settings_);
+    std::optional<TracedSlab> traced;
+    if (!key.empty()) traced = read_traced(cache_folder, key);
+    if (traced) {
+      milky_ = std::make_unique<const MilkyCoat>(*judged_, camera_, rest_, settings_.seed, std::move(*traced));
+    } else {
+      auto found = std::make_unique<MilkyCoat>(*judged_, camera_, rest_, settings_.seed);
+      const double lowest = judged_ball().shape.radius_mm - 0.5 * settings_.deepest_mm;
+      const fem::PressState press = play(straight_press(above_mm, lowest)).back().press;
+      found->measure(*judged_, press, judged_->geometry(press, judged_->relief(press)), camera_, settings_.seed);
+      if (!key.empty()) keep(cache_folder, [&] { write_traced(cache_folder, key, found->traced()); });
+      milky_ = std::move(found);
+    }
+    const render::DirectError& error = milky_->traced().error;
+    choice_.error = error;
+    const std::string off =
+        fmt::format("{:.2g} % off path tracing under a ball (+- {:.1g} %)", 100 * error.rms, 100 * error.rms_error);
+    if (render::largest_rms(error) <= kMilkyTolerance) {
+      choice_.reason = "maps: the gel is milky under a coat (sim/sensor/milky_coat.h); " + off;
+    } else {
+      choice_.reason = fmt::format("paths: maps are {}, allowed are {:.2g} %", off, 100 * kMilkyTolerance);
+      milky_.reset();
+    }
+  }
+
   const SceneView& view_of(const SeenObject& object) const {
     locked_work(object.making, [&] {
       if (object.view) return;
@@ -243,6 +280,7 @@ class CoatedView final : public SensorView {
       fail("the gel has gone beyond the {} mm in and {} mm aside that the sensor was set up for", settings_.deepest_mm,
            settings_.widest_mm);
     }
+    if (milky_) return milky_->irradiance(seen.inside.surfaces.front().mesh);
     render::RenderSettings paths;
     paths.seed = settings_.seed;
     paths.min_samples = paths.max_samples = kPathsAPixel;
@@ -261,6 +299,7 @@ class CoatedView final : public SensorView {
   std::unique_ptr<const render::StillView> still_;  // null where more than the sheet moves
   std::vector<render::FirstHit> rest_hits_;
   std::unique_ptr<const DirectLight> direct_;
+  std::unique_ptr<const MilkyCoat> milky_;  // in place of paths
   LightChoice choice_{false, "paths: the device is unfit for direct light", {}};
   cv::Mat rest_light_;
   cv::Mat missing_at_rest_;  // of a device with a background

@@ -18,9 +18,9 @@ namespace touchstone::sim {
 
 /// How a camera's light is computed, and why.
 struct LightChoice {
-  bool direct = false;  ///< from a light field (render/direct/direct_renderer.h); else by path tracing
+  bool direct = false;  ///< from a light field (render/direct/direct_renderer.h); else as `reason` says
   std::string reason;   ///< for people
-  std::optional<render::DirectError> error;  ///< of direct light, where it was measured
+  std::optional<render::DirectError> error;  ///< of what isn't path tracing, where it was measured
 };
 
 /// What a camera makes of one Truth. Pictures that weren't asked for are empty.

@@ -102,7 +102,8 @@ SceneSpec touch_scene(const DeviceSpec& device, const VirtualSensorSettings& set
 ///
 /// Safe to use from many threads; the same press and seeds give the same bytes. The gel is set up at once, the light
 /// when it's first needed: a light field for a coated gel (paths where direct light can't draw it), maps for a milky
-/// one, paths for a clear one, which take seconds for an object's first frame. light() says which, and why.
+/// one (sim/sensor/milky_view.h; under a coat sim/sensor/milky_coat.h), paths for a clear one, which take seconds for
+/// an object's first frame. light() says which, and why.
 class VirtualSensor {
  public:
   /// Sets up the gel, or reads it from the cache. @throws Error for a device or settings that make no sense

@@ -55,7 +55,7 @@ TEST(PlanCommand, PlansEachShippedFileThatSaysWhatWillBeSimulated) {
       ++planned;
     }
   }
-  EXPECT_EQ(planned, 8 + 4 + 1 + 10 + 8);
+  EXPECT_EQ(planned, 9 + 4 + 1 + 10 + 8);
 }
 
 TEST(PlanCommand, SaysWhyItRefusesEachOtherShippedFile) {
