@@ -26,7 +26,7 @@ def touched(request):
 
 
 def test_their_number():
-    assert len(DEVICES) == 16 and QUICK < set(DEVICES)
+    assert len(DEVICES) == 17 and QUICK < set(DEVICES)
 
 
 def test_a_ball_makes_a_frame_with_its_force(touched):
