@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <opencv2/core.hpp>
 #include <optional>
 #include <utility>
@@ -32,7 +33,9 @@ struct Waiting {
   cv::Mat light;  ///< moved from the last key
 };
 
-constexpr int kMostSteps = 256;  // from one state to the next
+constexpr std::size_t kMostKeys = 8;  // that are kept, some 20 MB each
+constexpr double kNear = 0.5;         // of the reach: an older key that is as near is taken again
+constexpr int kMostSteps = 256;       // from one state to the next
 
 /// The mean square of the difference of two lights' logarithms.
 double mean_square_of_logs(const cv::Mat& one, const cv::Mat& other) {
@@ -89,13 +92,38 @@ struct LightBetween::Parts {
   Show show;
   LightBetweenReport report;
   double sum_of_squares = 0.0;
-  std::optional<Key> key;
+  std::shared_ptr<const Key> key;
+  std::vector<std::shared_ptr<const Key>> kept;  // all that are kept, the one used last at the end
   std::vector<Waiting> waiting;
   // Memory that each state uses again.
   render::SheetMove move;
   std::vector<float> radiance;
   cv::Mat irradiance;
   std::vector<cv::Mat> spare;  // pictures
+
+  /// How far a state is from a key, in parts of the reach: above 1 it is too far.
+  double distance(const render::SheetReach& gone) const {
+    return reach_px == 0.0 ? 2.0 : std::max(gone.pixels / reach_px, gone.slope / LightBetween::kReachSlope);
+  }
+
+  /// A key that is near to the state: an older one, or a new one.
+  std::shared_ptr<const Key> key_at(const fem::PressState& press, bool& is_new) {
+    auto best = kept.end();
+    double least = kNear;
+    for (auto it = kept.begin(); it != kept.end(); ++it) {
+      motion.between((*it)->press, press, move);
+      const double far = distance((*it)->sheet.reach(move));
+      if (far >= least) continue;
+      least = far;
+      best = it;
+    }
+    is_new = best == kept.end();
+    std::shared_ptr<const Key> found = is_new ? std::make_shared<const Key>(make_key(press)) : *best;
+    if (!is_new) kept.erase(best);
+    if (kept.size() == kMostKeys) kept.erase(kept.begin());
+    kept.push_back(found);
+    return found;
+  }
 
   Key make_key(const fem::PressState& press) {
     ++report.keys;
@@ -127,14 +155,14 @@ struct LightBetween::Parts {
     return picture;
   }
 
-  /// Shows all that waits, going over to the key `next`; null: there is none.
-  void let_go(const Key* next) {
+  /// Shows all that waits, going over to the key `next`, if there is one: drawn at the last state, or an older one.
+  void let_go(const Key* next, bool is_new) {
     for (std::size_t k = 0; k < waiting.size(); ++k) {
       Waiting& one = waiting[k];
       if (next != nullptr) {
         const double part = static_cast<double>(k + 1) / static_cast<double>(waiting.size());
         const cv::Mat back = moved(*next, one.press);
-        if (k + 1 == waiting.size()) {
+        if (is_new && k + 1 == waiting.size()) {
           const double square = mean_square_of_logs(one.light, back);
           report.worst_rms = std::max(report.worst_rms, std::sqrt(square));
           sum_of_squares += square;
@@ -161,24 +189,26 @@ void LightBetween::add(std::int64_t t_us, const fem::PressState& press) {
   Parts& parts = *parts_;
   ++parts.report.pictures;
   if (!parts.key) {
-    parts.key.emplace(parts.make_key(press));
+    bool is_new = false;
+    parts.key = parts.key_at(press, is_new);
     parts.show(t_us, parts.moved(*parts.key, press));
     return;
   }
   render::SheetReach reach;
   cv::Mat light = parts.moved(*parts.key, press, &reach);
   parts.waiting.push_back({t_us, press, std::move(light)});
-  if (parts.reach_px == 0.0 || reach.pixels > parts.reach_px || reach.slope > kReachSlope) {
-    Key next = parts.make_key(press);
-    parts.let_go(&next);
-    parts.key.emplace(std::move(next));
+  if (parts.distance(reach) > 1.0) {
+    bool is_new = false;
+    std::shared_ptr<const Key> next = parts.key_at(press, is_new);
+    parts.let_go(next.get(), is_new);
+    parts.key = std::move(next);
   } else if (parts.waiting.size() >= kMostWaiting) {
-    parts.let_go(nullptr);
+    parts.let_go(nullptr, false);
   }
 }
 
 void LightBetween::finish() {
-  parts_->let_go(nullptr);
+  parts_->let_go(nullptr, false);
 }
 
 const LightBetweenReport& LightBetween::report() const {

@@ -60,7 +60,8 @@ struct LightOfKeys {
 /// The first state is a key. Later ones show its points moved (render/direct/sheet_between.h). A state to which
 /// something moves by more than `reach_px` in the picture, or whose slope changes by more than kReachSlope, becomes the
 /// next key; between two keys pictures go over from the one, moved on, to the other, moved back, so that none jumps.
-/// Where a motion stays near its key, as a vibration does, there is no other.
+/// Where a motion stays near its key, as a small vibration does, there is no other; to the last eight keys it may come
+/// back.
 ///
 /// The same pictures for any number of threads. Keeps up to kMostWaiting pictures until it is known which key is next.
 class LightBetween {
