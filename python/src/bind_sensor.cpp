@@ -68,12 +68,14 @@ Spec spec_from(const py::handle& value, const char* folder) {
 }
 
 std::shared_ptr<Sensor> make_sensor(const py::object& device, std::uint64_t unit, double deepest_mm, double widest_mm,
-                                    double membrane_um, const std::string& cache, const py::object& progress) {
+                                    double membrane_um, bool friction, const std::string& cache,
+                                    const py::object& progress) {
   sim::VirtualSensorSettings settings;
   settings.seed = unit;
   settings.deepest_mm = deepest_mm;
   settings.widest_mm = widest_mm;
   settings.membrane_um = membrane_um;
+  settings.always_friction = friction;
   const auto check = [](const char* name, double value, const Allowed& allowed) {
     if (!allowed.holds(value)) fail("{}: {} is not allowed; allowed is {}", name, value, allowed.text());
   };
@@ -305,19 +307,22 @@ void bind_sensor(py::module_& module) {
 
   py::class_<Sensor, std::shared_ptr<Sensor>>(
       module, "Sensor",
-      "A virtual device. Sensor(device, *, unit=1, deepest_mm=1.2, widest_mm=0.5, membrane_um=40, cache='', "
-      "progress=None)\n\n"
+      "A virtual device. Sensor(device, *, unit=1, deepest_mm=1.2, widest_mm=0.5, membrane_um=40, "
+      "friction=False, cache='', progress=None)\n\n"
       "device: a dict of a device file's fields, a path, or a shipped device's name ('gelsight-flat').\n"
       "unit: which unit of the design: its imager's fixed pattern.\n"
       "deepest_mm, widest_mm: how far the gel will be pressed in and sheared, which the light has to hold for.\n"
       "membrane_um: pixels of the fine contact.\n"
+      "friction: also in straight presses, where it's left out: then the surface sticks to the object as it does in "
+      "drawn "
+      "sets. It matters to deep presses into thin gels.\n"
       "cache: folder of set-up results; '': $TOUCHSTONE_CACHE or ~/.cache/touchstone.\n"
       "progress: called as progress(stage, done, total).\n\n"
       "Its gel is set up at once (seconds; later from the cache), its light with the first picture. Pictures need a "
       "device with a camera; forces and sessions need none. May be used from several threads.")
       .def(py::init(&make_sensor), py::arg("device"), py::kw_only(), py::arg("unit") = 1, py::arg("deepest_mm") = 1.2,
-           py::arg("widest_mm") = 0.5, py::arg("membrane_um") = 40.0, py::arg("cache") = "",
-           py::arg("progress") = py::none())
+           py::arg("widest_mm") = 0.5, py::arg("membrane_um") = 40.0, py::arg("friction") = false,
+           py::arg("cache") = "", py::arg("progress") = py::none())
       .def_property_readonly(
           "name", [](const Sensor& self) { return self.device().name; }, "As the device file has it.")
       .def_property_readonly(

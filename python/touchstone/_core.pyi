@@ -87,7 +87,8 @@ class Touch:
 
 class Sensor:
     def __init__(self, device: Described, *, unit: int = ..., deepest_mm: float = ..., widest_mm: float = ...,
-                 membrane_um: float = ..., cache: str = ..., progress: Progress = ...) -> None: ...
+                 membrane_um: float = ..., friction: bool = ..., cache: str = ...,
+                 progress: Progress = ...) -> None: ...
     @property
     def name(self) -> str: ...
     @property

@@ -483,8 +483,8 @@ def table(t):
                                   after=pressed_gently) for shape in SHAPES[:-1])],
         "Sensor": lambda: [Call(lambda: ts.Sensor, {
             "device": (BARE, described), "unit": (1, numbers), "deepest_mm": (1.2, numbers),
-            "widest_mm": (0.5, numbers), "membrane_um": (40.0, numbers), "cache": ("cache", paths),
-            "progress": (None, callbacks)},
+            "widest_mm": (0.5, numbers), "membrane_um": (40.0, numbers), "friction": (False, flags),
+            "cache": ("cache", paths), "progress": (None, callbacks)},
             allowed=(KeyError,)),
             Call(lambda: ts.Sensor, {"device": (QUICK, lambda valid: changed_fields(valid, (
                 "name", "coating", "lamps", "camera")))})],

@@ -130,3 +130,18 @@ def test_mechanics_need_no_optics(tmp_path):
     assert touch.force_N[2] == pytest.approx(0.3, rel=1e-4) and touch.frame is None
     with pytest.raises(ts.Error, match="no camera"):
         sensor.press("ball-8mm", force_N=0.3)
+
+
+def test_with_friction_the_gel_sticks_to_a_ball():
+    pad = {
+        "name": "pad",
+        "gel": {"size_x_mm": 14, "size_y_mm": 14, "thickness_mm": 2.5, "youngs_modulus_MPa": 0.2, "poisson_ratio": 0.49},
+        "mesh": {"fine_mm": 0.7, "coarse_mm": 2, "fine_half_extent_mm": [4, 4], "fine_depth_mm": 1},
+    }
+    slid = []
+    for friction in (False, True):
+        sensor = ts.Sensor(pad, friction=friction)
+        touch = sensor.press("ball-8mm", depth_mm=1.0, look=False)
+        middle = np.hypot(*sensor.gel_vertices_mm[:, :2].T) < 1.5
+        slid.append(np.hypot(*touch.surface_displacement_mm[middle, :2].T).max())
+    assert slid[1] < 0.3 * slid[0]
