@@ -18,8 +18,8 @@ ContactBlock::ContactBlock(const Compliance& gel, const ContactSurface& surface)
   }
 }
 
-/// Space for m vertices, with what is there kept. A block grows some times in a press; more than is needed is asked for, since
-/// memory that is new costs as much as what is written to it.
+/// Space for m vertices, with what is there kept. A block grows some times in a press; more than is needed is asked
+/// for, since memory that is new costs as much as what is written to it.
 void ContactBlock::make_room(Eigen::Index m) {
   constexpr double kMore = 2.5;  // memory that nothing was written to costs nothing
   const Eigen::Index needed = 9 * m * m;
@@ -35,8 +35,9 @@ bool ContactBlock::hold(const std::vector<int>& needed) {
   if (held && vertices_.size() <= 2 * needed.size() + 30) return false;
   const auto m = static_cast<Eigen::Index>(needed.size());
   make_room(m);
-  // By vertex of the new block its place in the old one, -1 where it's new. Blocks are sorted, so where the new one holds all
-  // of the old, all that stays moves to higher addresses: done from the end, nothing is overwritten before it has moved.
+  // By vertex of the new block its place in the old one, -1 where it's new. Blocks are sorted, so where the new one
+  // holds all of the old, what stays moves to higher addresses: from the end on nothing is overwritten before it has
+  // moved.
   std::vector<Eigen::Index> before;
   before.reserve(needed.size());
   for (const int v : needed) before.push_back(place_[v]);

@@ -21,7 +21,7 @@ namespace touchstone::fem {
 /// (without friction every vertex in contact slides).
 enum class NodeState : std::uint8_t { open = 0, stick = 1, slip = 2 };
 
-/// One contact problem. `compliance` is A (it must outlive this), symmetric positive definite, (c m) x (c m), mm^3 per MPa.
+/// One contact problem. `compliance`, kept by others, is A: symmetric positive definite, (c m) x (c m), mm^3 per MPa.
 struct ContactProblem {
   std::optional<Eigen::Ref<const Eigen::MatrixXd>> compliance;
   int components = 1;        ///< c: 1 or 3

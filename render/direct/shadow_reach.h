@@ -30,8 +30,8 @@ struct LampBearings {
   int slabs = 1;
   std::vector<Bearing> bearings;  ///< [slab][row][column][lamp]
   std::vector<float> longest;     ///< by lamp: the most of length + spread, infinite if that isn't known everywhere
-  /// Round all lamps' luminous faces, seen along z. Faces of layers are level, so light that passes them keeps its azimuth:
-  /// from lamp to place it runs straight in the level plane.
+  /// Round all lamps' luminous faces, seen along z. Layers have level faces, so light that passes them keeps its
+  /// azimuth: from lamp to place it runs straight in the level plane.
   Eigen::AlignedBox2d shining;
 
   /// `soft`: shadow rays will go to all points of each lens, not to its middle only.

@@ -90,16 +90,16 @@ struct LightBetween::Parts {
   SheetMotion motion;
   double reach_px;
   Show show;
-  LightBetweenReport report;
+  LightBetweenReport report{};
   double sum_of_squares = 0.0;
-  std::shared_ptr<const Key> key;
-  std::vector<std::shared_ptr<const Key>> kept;  // all that are kept, the one used last at the end
-  std::vector<Waiting> waiting;
+  std::shared_ptr<const Key> key{};
+  std::vector<std::shared_ptr<const Key>> kept{};  // all that are kept, the one used last at the end
+  std::vector<Waiting> waiting{};
   // Memory that each state uses again.
-  render::SheetMove move;
-  std::vector<float> radiance;
-  cv::Mat irradiance;
-  std::vector<cv::Mat> spare;  // pictures
+  render::SheetMove move{};
+  std::vector<float> radiance{};
+  cv::Mat irradiance{};
+  std::vector<cv::Mat> spare{};  // pictures
 
   /// How far a state is from a key, in parts of the reach: above 1 it is too far.
   double distance(const render::SheetReach& gone) const {

@@ -138,8 +138,8 @@ struct LightSequence::Parts {
       const auto* light = irradiance.ptr<float>(row);
       auto* out = current.ptr<float>(row);
       if (bands == 1 && per_irradiance.rows() == 1) {
-        const auto scale = static_cast<float>(per_irradiance(0, 0));
-        for (int column = 0; column < size.width; ++column) out[column] = scale * light[column];
+        const auto factor = static_cast<float>(per_irradiance(0, 0));
+        for (int column = 0; column < size.width; ++column) out[column] = factor * light[column];
         return;
       }
       for (int column = 0; column < size.width; ++column) {

@@ -177,10 +177,18 @@ TriangleMesh walls_round(double half) {
   return mesh;
 }
 
-// Seen along z light runs straight, so walls hide no lamp that stands within them: the membrane alone casts shadows, and
-// no ray asks for them. A ball far aside makes it one of several things that may.
+// Seen along z light runs straight, so walls hide no lamp that stands within them: the membrane alone casts
+// shadows, and no ray asks for them. A ball far aside makes it one of several things that may.
 TEST(DirectRenderer, WallsHideNoLampWithinThem) {
-  Scene scene = dented_scene(0.0, Lambertian{grey(0.7)});
+  Scene scene = lit_stack(0.0);
+  const auto dents = [](double x, double y) {
+    double z = 0.0;
+    for (const auto& [u, v] : {std::pair{0.0, 0.0}, {3.0, 0.0}, {-3.0, 0.0}, {0.0, 3.0}, {0.0, -3.0}, {3.0, 3.0}}) {
+      z -= 1.4 * std::exp(-((x - u) * (x - u) + (y - v) * (y - v)) / 1.2);
+    }
+    return z;
+  };
+  scene.surfaces.push_back({square_relief(7.0, 140, dents), Lambertian{grey(0.7)}});
   scene.media[1].index = scene.media[2].index;  // flat light isn't mirrored back into the plate
   LedLamp led;
   led.position = {-6.6, 0.5, -5.8};
@@ -201,15 +209,16 @@ TEST(DirectRenderer, WallsHideNoLampWithinThem) {
   DirectSettings bare;
   bare.shadows = false;
   const cv::Mat without = DirectRenderer(field, camera, scene, bare).render(scene).irradiance;
-  EXPECT_GT(cv::norm(without - alone.irradiance), 0.03 * cv::norm(without)) << "no shadow that matters";
+  const double in_shadow = cv::norm(without - alone.irradiance);
+  EXPECT_GT(in_shadow, 0.03 * cv::norm(without)) << "no shadow that matters";
   scene.balls.push_back({{6.5, -6.5, -0.5}, 0.01, Black{}});
   const DirectImage by_rays = DirectRenderer(field, camera, scene).render(scene);
   EXPECT_GT(by_rays.shadow_rays, 0u);
-  EXPECT_LT(cv::norm(by_rays.irradiance - alone.irradiance), 0.02 * cv::norm(alone.irradiance));
+  EXPECT_LT(cv::norm(by_rays.irradiance - alone.irradiance), 0.2 * in_shadow);
   scene.balls.clear();
 
   // Walls between lamp and membrane do hide it.
-  std::get<LedLamp>(scene.lamps[0]).position.x() = -9.0;
+  std::get<LedLamp>(scene.lamps[0]).position.x() = -7.8;
   const LightField beyond = make_light_field(scene, reach_of_membrane(), accuracy(2e-3));
   EXPECT_GT(DirectRenderer(beyond, camera, scene).render(scene).shadow_rays, 0u);
   expect_equal_light(scene, "an LED beyond a wall");
