@@ -4,8 +4,11 @@
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+
+#include "core/grid_places.h"
 
 namespace touchstone::render {
 namespace {
@@ -54,38 +57,19 @@ Steepest look_over(const TriangleMesh& sheet, const HorizonSettings& settings) {
 std::vector<float> heights_of(const TriangleMesh& sheet, float side, float left, float bottom, float pitch, int columns,
                               int rows) {
   std::vector<float> heights(static_cast<std::size_t>(columns) * rows, kNowhere);
-  constexpr double kOnEdge = 1e-9;
   for (const auto& t : sheet.triangles) {
-    Eigen::Vector2d corner[3];
+    std::array<Eigen::Vector2d, 3> corner;
     for (int k = 0; k < 3; ++k) {
       const Eigen::Vector3d& v = sheet.vertices[t[k]];
       corner[k] = {(v.x() - double(left)) / double(pitch), (v.y() - double(bottom)) / double(pitch)};
     }
-    const double x0 = std::min({corner[0].x(), corner[1].x(), corner[2].x()});
-    const double x1 = std::max({corner[0].x(), corner[1].x(), corner[2].x()});
-    const double y0 = std::min({corner[0].y(), corner[1].y(), corner[2].y()});
-    const double y1 = std::max({corner[0].y(), corner[1].y(), corner[2].y()});
-    if (x1 < 0.0 || y1 < 0.0 || x0 > columns - 1 || y0 > rows - 1) continue;
-    const int first = std::max(0, static_cast<int>(std::ceil(x0 - kOnEdge)));
-    const int last = std::min(columns - 1, static_cast<int>(std::floor(x1 + kOnEdge)));
-    const int top = std::min(rows - 1, static_cast<int>(std::floor(y1 + kOnEdge)));
-    const Eigen::Vector2d e1 = corner[1] - corner[0];
-    const Eigen::Vector2d e2 = corner[2] - corner[0];
-    const double area = e1.x() * e2.y() - e1.y() * e2.x();
-    if (area == 0.0) continue;
     const double z = sheet.vertices[t[0]].z();
     const double z1 = sheet.vertices[t[1]].z() - z;
     const double z2 = sheet.vertices[t[2]].z() - z;
-    for (int j = std::max(0, static_cast<int>(std::ceil(y0 - kOnEdge))); j <= top; ++j) {
-      for (int i = first; i <= last; ++i) {
-        const Eigen::Vector2d d = Eigen::Vector2d(i, j) - corner[0];
-        const double b = (d.x() * e2.y() - d.y() * e2.x()) / area;
-        const double g = (e1.x() * d.y() - e1.y() * d.x()) / area;
-        if (b < -kOnEdge || g < -kOnEdge || b + g > 1.0 + kOnEdge) continue;
-        float& height = heights[static_cast<std::size_t>(j) * columns + i];
-        height = std::max(height, side * static_cast<float>(z + b * z1 + g * z2));
-      }
-    }
+    for_places_in(corner, columns, rows, [&](int i, int j, double b, double c) {
+      float& height = heights[static_cast<std::size_t>(j) * columns + i];
+      height = std::max(height, side * static_cast<float>(z + b * z1 + c * z2));
+    });
   }
   return heights;
 }

@@ -2,11 +2,13 @@
 
 #include <Eigen/QR>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <string_view>
 
 #include "core/error.h"
+#include "core/grid_places.h"
 #include "core/matrix_file.h"
 #include "core/whole_file.h"
 #include "render/cameras/first_hits.h"
@@ -245,30 +247,20 @@ void MilkyCoat::measure(const SceneView& view, const fem::PressState& press, con
 cv::Mat MilkyCoat::thickness(const TriangleMesh& sheet) const {
   const render::FaceGrid& grid = light_->grid();
   cv::Mat map(grid.rows, grid.columns, CV_32FC1, cv::Scalar(INFINITY));
+  const Eigen::Vector2d first(grid.left_mm, grid.top_mm);
   for (const std::array<int, 3>& corners : sheet.triangles) {
-    const Eigen::Vector3d& a = sheet.vertices[corners[0]];
-    const Eigen::Vector3d& b = sheet.vertices[corners[1]];
-    const Eigen::Vector3d& c = sheet.vertices[corners[2]];
-    const auto cell = [&](double place, double first) { return (place - first) / grid.spacing_mm - 0.5; };
-    const Eigen::Vector3d x(cell(a.x(), grid.left_mm), cell(b.x(), grid.left_mm), cell(c.x(), grid.left_mm));
-    const Eigen::Vector3d y(cell(a.y(), grid.top_mm), cell(b.y(), grid.top_mm), cell(c.y(), grid.top_mm));
-    const double area = (x[1] - x[0]) * (y[2] - y[0]) - (x[2] - x[0]) * (y[1] - y[0]);
-    if (area == 0.0) continue;
-    const int left = std::max(0, static_cast<int>(std::ceil(x.minCoeff())));
-    const int right = std::min(grid.columns - 1, static_cast<int>(std::floor(x.maxCoeff())));
-    const int top = std::max(0, static_cast<int>(std::ceil(y.minCoeff())));
-    const int bottom = std::min(grid.rows - 1, static_cast<int>(std::floor(y.maxCoeff())));
-    for (int j = top; j <= bottom; ++j) {
-      for (int i = left; i <= right; ++i) {
-        const double v = ((i - x[0]) * (y[2] - y[0]) - (x[2] - x[0]) * (j - y[0])) / area;
-        const double w = ((x[1] - x[0]) * (j - y[0]) - (i - x[0]) * (y[1] - y[0])) / area;
-        constexpr double kEdge = 1e-9;
-        if (v < -kEdge || w < -kEdge || v + w > 1.0 + kEdge) continue;
-        const double z = a.z() + v * (b.z() - a.z()) + w * (c.z() - a.z()) + thickness_mm_;
-        float& lowest = map.at<float>(j, i);  // of a sheet that folds
-        lowest = std::min(lowest, static_cast<float>(std::max(z, kLeast * thickness_mm_)));
-      }
+    std::array<Eigen::Vector2d, 3> cells;
+    for (int k = 0; k < 3; ++k) {
+      cells[k] = ((sheet.vertices[corners[k]].head<2>() - first) / grid.spacing_mm).array() - 0.5;
     }
+    const double z = sheet.vertices[corners[0]].z();
+    const double z1 = sheet.vertices[corners[1]].z() - z;
+    const double z2 = sheet.vertices[corners[2]].z() - z;
+    for_places_in(cells, grid.columns, grid.rows, [&](int i, int j, double b, double c) {
+      float& lowest = map.at<float>(j, i);  // of a sheet that folds
+      const double here = z + b * z1 + c * z2 + thickness_mm_;
+      lowest = std::min(lowest, static_cast<float>(std::max(here, kLeast * thickness_mm_)));
+    });
   }
   // Beside the sheet, at the rim of a gel that has been dragged aside, it's as at rest.
   map.setTo(thickness_mm_, map == INFINITY);

@@ -3,10 +3,12 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <vector>
 
 #include "core/error.h"
+#include "core/grid_places.h"
 
 namespace touchstone::sim {
 namespace {
@@ -14,7 +16,6 @@ namespace {
 constexpr double kNodesAnEdge = 3.0;
 constexpr int kMostNodes = 512;  // a side
 constexpr int kSmoothings = 2;   // by 1/4, 1/2, 1/4 along both axes: a standard deviation of one node's pitch in all
-constexpr double kInside = 1e-9;
 constexpr int kRowsATask = 2048;
 
 using Weights = Eigen::SparseMatrix<float, Eigen::RowMajor>;
@@ -61,27 +62,16 @@ SheetMotion::SheetMotion(const fem::Compliance& gel, double finest_edge_mm) {
   std::vector<Eigen::Triplet<float>> entries;
   std::vector<char> taken(static_cast<std::size_t>(nodes), 0);
   for (const auto& t : gel.triangles) {
-    Eigen::Vector2d corner[3];
+    std::array<Eigen::Vector2d, 3> corner;
     for (int k = 0; k < 3; ++k) corner[k] = (gel.vertices[t[k]].head<2>() - lattice_.first) / lattice_.pitch;
-    const Eigen::Vector2d one = corner[1] - corner[0];
-    const Eigen::Vector2d other = corner[2] - corner[0];
-    const double twice_area = one.x() * other.y() - one.y() * other.x();
-    if (!(std::abs(twice_area) > 0.0)) continue;
-    const Eigen::Vector2d from = corner[0].cwiseMin(corner[1]).cwiseMin(corner[2]);
-    const Eigen::Vector2d to = corner[0].cwiseMax(corner[1]).cwiseMax(corner[2]);
-    for (int j = static_cast<int>(std::ceil(from.y() - kInside)); j <= to.y() + kInside; ++j) {
-      for (int i = static_cast<int>(std::ceil(from.x() - kInside)); i <= to.x() + kInside; ++i) {
-        const Eigen::Vector2d d = Eigen::Vector2d(i, j) - corner[0];
-        const double b = (d.x() * other.y() - d.y() * other.x()) / twice_area;
-        const double c = (one.x() * d.y() - one.y() * d.x()) / twice_area;
-        const int node = j * lattice_.nx + i;
-        if (b < -kInside || c < -kInside || b + c > 1.0 + kInside || taken[node] != 0) continue;
-        taken[node] = 1;
-        entries.emplace_back(node, t[0], static_cast<float>(1.0 - b - c));
-        entries.emplace_back(node, t[1], static_cast<float>(b));
-        entries.emplace_back(node, t[2], static_cast<float>(c));
-      }
-    }
+    for_places_in(corner, lattice_.nx, lattice_.ny, [&](int i, int j, double b, double c) {
+      const int node = j * lattice_.nx + i;
+      if (taken[node] != 0) return;
+      taken[node] = 1;
+      entries.emplace_back(node, t[0], static_cast<float>(1.0 - b - c));
+      entries.emplace_back(node, t[1], static_cast<float>(b));
+      entries.emplace_back(node, t[2], static_cast<float>(c));
+    });
   }
   for (int node = 0; node < static_cast<int>(nodes); ++node) {  // beside the surface: as the nearest vertex
     if (taken[node] != 0) continue;
