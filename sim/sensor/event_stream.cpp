@@ -28,16 +28,38 @@ struct Moment {
   SequencePicture picture;
 };
 
+/// A scene's event pixels, and where their events go.
+class EventOutput {
+ public:
+  EventOutput(const SceneSpec& scene, std::uint64_t noise_seed, const EventSink& sink)
+      : pixels_(scene.device.camera->events.value().pixels, {scene.device.camera->width, scene.device.camera->height},
+                scene.seed, noise_seed),
+        sink_(sink) {}
+
+  double smallest_threshold() const { return pixels_.smallest_threshold(); }
+
+  /// Shows the light at a time, and counts the events that it gives.
+  void advance(const cv::Mat& photocurrent, std::int64_t t_us, EventStreamReport& report) {
+    events_.clear();
+    pixels_.advance(photocurrent, t_us, events_);
+    report.events += static_cast<std::int64_t>(events_.size());
+    if (!events_.empty()) sink_(events_);
+  }
+
+ private:
+  render::EventPixels pixels_;
+  const EventSink& sink_;
+  std::vector<Event> events_;
+};
+
 class EventWatch {
  public:
   EventWatch(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel, std::uint64_t noise_seed,
              std::shared_ptr<const DirectLight> direct, const EventSink& sink)
-      : pixels_(scene.device.camera->events.value().pixels, {scene.device.camera->width, scene.device.camera->height},
-                scene.seed, noise_seed),
-        smallest_threshold_(pixels_.smallest_threshold()),
+      : output_(scene, noise_seed, sink),
+        smallest_threshold_(output_.smallest_threshold()),
         step_(scene.light.event_step * smallest_threshold_),
-        light_(scene, plan, gel, smallest_threshold_, std::move(direct)),
-        sink_(sink) {}
+        light_(scene, plan, gel, smallest_threshold_, std::move(direct)) {}
 
   void begin(Moment& moment) {
     moment.picture = light_.first(moment.press);
@@ -89,13 +111,10 @@ class EventWatch {
   }
 
   void show(const Moment& before, const Moment& now) {
-    events_.clear();
-    pixels_.advance(now.picture.photocurrent, now.t_us, events_);
+    output_.advance(now.picture.photocurrent, now.t_us, report_);
     cv::Mat change;
     cv::absdiff(before.picture.log_photocurrent, now.picture.log_photocurrent, change);
     report_.coarse_steps += cv::countNonZero(change > smallest_threshold_);
-    report_.events += static_cast<std::int64_t>(events_.size());
-    if (!events_.empty()) sink_(events_);
   }
 
   void count(const SequencePicture& picture) {
@@ -104,12 +123,10 @@ class EventWatch {
     report_.paths_traced += picture.paths_traced;
   }
 
-  render::EventPixels pixels_;
+  EventOutput output_;
   double smallest_threshold_;
   double step_;
   LightSequence light_;
-  const EventSink& sink_;
-  std::vector<Event> events_;
   EventStreamReport report_;
 };
 
@@ -118,22 +135,17 @@ class MovedWatch {
  public:
   MovedWatch(const SceneSpec& scene, const Plan& plan, const fem::Compliance& gel, std::uint64_t noise_seed,
              std::shared_ptr<const DirectLight> direct, const EventSink& sink)
-      : pixels_(scene.device.camera->events.value().pixels, {scene.device.camera->width, scene.device.camera->height},
-                scene.seed, noise_seed),
+      : output_(scene, noise_seed, sink),
         dark_(static_cast<float>(scene.device.camera->events->pixels.dark_intensity)),
-        coarse_(static_cast<float>(std::exp(pixels_.smallest_threshold()))),
-        light_(scene, plan, gel, pixels_.smallest_threshold(), std::move(direct)),
-        between_(
-            LightOfKeys{
-                light_.view(), *light_.direct(),
-                [this](const cv::Mat& irradiance, cv::Mat& currents) { light_.pixel_currents(irradiance, currents); }},
-            gel, scene.light.event_reach_px, [this](std::int64_t t_us, const cv::Mat& light) { show(t_us, light); }),
-        steps_(scene),
-        sink_(sink) {}
+        coarse_(static_cast<float>(std::exp(output_.smallest_threshold()))),
+        light_(scene, plan, gel, output_.smallest_threshold(), std::move(direct)),
+        between_(LightOfKeys{light_.view(), *light_.direct(),
+                             [this](const cv::Mat& irradiance, cv::Mat& currents) {
+                               light_.pixel_currents(irradiance, currents);
+                             }},
+                 gel, [this](std::int64_t t_us, const cv::Mat& light) { show(t_us, light); }) {}
 
-  void go_on(std::int64_t t_us, const fem::PressState& press) {
-    steps_.go(t_us, press, [this](std::int64_t at_us, const fem::PressState& state) { between_.add(at_us, state); });
-  }
+  void go_on(std::int64_t t_us, const fem::PressState& press) { between_.add(t_us, press); }
 
   EventStreamReport finish() {
     between_.finish();
@@ -145,12 +157,9 @@ class MovedWatch {
 
  private:
   void show(std::int64_t t_us, const cv::Mat& light) {
-    events_.clear();
-    pixels_.advance(light, t_us, events_);
+    output_.advance(light, t_us, report_);
     if (!last_.empty()) report_.coarse_steps += coarse_steps(last_, light);
     light.copyTo(last_);
-    report_.events += static_cast<std::int64_t>(events_.size());
-    if (!events_.empty()) sink_(events_);
   }
 
   std::int64_t coarse_steps(const cv::Mat& before, const cv::Mat& now) const {
@@ -169,13 +178,10 @@ class MovedWatch {
     return count;
   }
 
-  render::EventPixels pixels_;
+  EventOutput output_;
   float dark_, coarse_;  // coarse_: a ratio of light
   LightSequence light_;
   LightBetween between_;
-  MovedSteps steps_;
-  const EventSink& sink_;
-  std::vector<Event> events_;
   cv::Mat last_;
   EventStreamReport report_;
 };

@@ -40,7 +40,7 @@ struct EventStreamReport {
 ///
 /// Before a coated gel most pictures are moved from a few that are drawn in full (sim/sensor/light_between.h), where
 /// that can be had. There is then one for each state that is played, and as many between two as nothing moves by
-/// kMovedStep_px from one to the next. A reach of 0 draws all of them in full.
+/// LightBetween::kMovedStep_px from one to the next. A reach of 0 draws all of them in full.
 ///
 /// Thresholds belong to the unit, the scene's seed; `noise_seed` is of the noise in time. The same for any number of
 /// threads. `vibration` and `elastic` as in play_motion.

@@ -12,6 +12,7 @@
 
 #include "core/error.h"
 #include "render/direct/sheet_between.h"
+#include "sim/plan/image_motion.h"
 #include "sim/press/state_between.h"
 #include "sim/scene/device_gel.h"
 #include "sim/sensor/sheet_motion.h"
@@ -35,10 +36,10 @@ struct Waiting {
 
 constexpr std::size_t kMostKeys = 8;  // that are kept, some 20 MB each
 constexpr double kNear = 0.5;         // of the reach: an older key that is as near is taken again
-constexpr int kMostSteps = 256;       // from one state to the next
+constexpr int kMostSteps = 256;       // from one state that is played to the next
 
-/// The mean square of the difference of two lights' logarithms.
-double mean_square_of_logs(const cv::Mat& one, const cv::Mat& other) {
+/// The root of the mean square of the difference of two lights' logarithms.
+double rms_of_logs(const cv::Mat& one, const cv::Mat& other) {
   double sum = 0.0;
   for (int row = 0; row < one.rows; ++row) {
     const auto* a = one.ptr<float>(row);
@@ -49,7 +50,7 @@ double mean_square_of_logs(const cv::Mat& one, const cv::Mat& other) {
       sum += off * off;
     }
   }
-  return sum / static_cast<double>(one.total());
+  return std::sqrt(sum / static_cast<double>(one.total()));
 }
 
 }  // namespace
@@ -67,34 +68,17 @@ std::string unfit_for_light_between(const SceneSpec& scene, const Plan& plan) {
   return {};
 }
 
-MovedSteps::MovedSteps(const SceneSpec& scene)
-    : scale_(scene.device), object_radius_mm_(largest_object_radius(scene)) {}
-
-void MovedSteps::go(std::int64_t t_us, const fem::PressState& press, const Visit& visit) {
-  if (last_) {
-    const auto& [from_us, from] = *last_;
-    const auto span_us = static_cast<double>(t_us - from_us);
-    const double wanted = std::ceil(image_motion(scale_, from, press, object_radius_mm_) / kMovedStep_px);
-    const int steps = std::max(1, static_cast<int>(std::min({wanted, span_us, static_cast<double>(kMostSteps)})));
-    for (int k = 1; k < steps; ++k) {
-      const std::int64_t between_us = from_us + (t_us - from_us) * k / steps;
-      visit(between_us, state_between(from, press, static_cast<double>(between_us - from_us) / span_us));
-    }
-  }
-  visit(t_us, press);
-  last_.emplace(t_us, press);
-}
-
 struct LightBetween::Parts {
   LightOfKeys light;
   SheetMotion motion;
-  double reach_px;
+  ImageScale scale;
+  double object_radius_mm;
   Show show;
   LightBetweenReport report{};
-  double sum_of_squares = 0.0;
   std::shared_ptr<const Key> key{};
   std::vector<std::shared_ptr<const Key>> kept{};  // all that are kept, the one used last at the end
   std::vector<Waiting> waiting{};
+  std::optional<std::pair<std::int64_t, fem::PressState>> last{};  // that was played
   // Memory that each state uses again.
   render::SheetMove move{};
   std::vector<float> radiance{};
@@ -103,6 +87,7 @@ struct LightBetween::Parts {
 
   /// How far a state is from a key, in parts of the reach: above 1 it is too far.
   double distance(const render::SheetReach& gone) const {
+    const double reach_px = light.view.scene.light.event_reach_px;
     return reach_px == 0.0 ? 2.0 : std::max(gone.pixels / reach_px, gone.slope / LightBetween::kReachSlope);
   }
 
@@ -163,10 +148,7 @@ struct LightBetween::Parts {
         const double part = static_cast<double>(k + 1) / static_cast<double>(waiting.size());
         const cv::Mat back = moved(*next, one.press);
         if (is_new && k + 1 == waiting.size()) {
-          const double square = mean_square_of_logs(one.light, back);
-          report.worst_rms = std::max(report.worst_rms, std::sqrt(square));
-          sum_of_squares += square;
-          report.mean_rms = std::sqrt(sum_of_squares / static_cast<double>(report.keys - 1));
+          report.worst_rms = std::max(report.worst_rms, rms_of_logs(one.light, back));
         }
         cv::addWeighted(one.light, 1.0 - part, back, part, 0.0, one.light);
         spare.push_back(back);
@@ -176,35 +158,49 @@ struct LightBetween::Parts {
     }
     waiting.clear();
   }
+
+  void add(std::int64_t t_us, const fem::PressState& press) {
+    ++report.pictures;
+    bool is_new = false;
+    if (!key) {
+      key = key_at(press, is_new);
+      show(t_us, moved(*key, press));
+      return;
+    }
+    render::SheetReach reach;
+    waiting.push_back({t_us, press, moved(*key, press, &reach)});
+    if (distance(reach) > 1.0) {
+      std::shared_ptr<const Key> next = key_at(press, is_new);
+      let_go(next.get(), is_new);
+      key = std::move(next);
+    } else if (waiting.size() >= kMostWaiting) {
+      let_go(nullptr, false);
+    }
+  }
 };
 
-LightBetween::LightBetween(LightOfKeys light, const fem::Compliance& gel, double reach_px, Show show)
-    : parts_(new Parts{light, SheetMotion(gel, light.view.scene.device.mesh.fine_mm), reach_px, std::move(show)}) {
-  TS_ASSERT(parts_->light.direct.has_points() && reach_px >= 0.0);
+LightBetween::LightBetween(LightOfKeys light, const fem::Compliance& gel, Show show)
+    : parts_(new Parts{light, SheetMotion(gel, light.view.scene.device.mesh.fine_mm),
+                       ImageScale(light.view.scene.device), largest_object_radius(light.view.scene), std::move(show)}) {
+  TS_ASSERT(parts_->light.direct.has_points());
 }
 
 LightBetween::~LightBetween() = default;
 
 void LightBetween::add(std::int64_t t_us, const fem::PressState& press) {
   Parts& parts = *parts_;
-  ++parts.report.pictures;
-  if (!parts.key) {
-    bool is_new = false;
-    parts.key = parts.key_at(press, is_new);
-    parts.show(t_us, parts.moved(*parts.key, press));
-    return;
+  if (parts.last) {
+    const auto& [from_us, from] = *parts.last;
+    const auto span_us = static_cast<double>(t_us - from_us);
+    const double wanted = std::ceil(image_motion(parts.scale, from, press, parts.object_radius_mm) / kMovedStep_px);
+    const int steps = std::max(1, static_cast<int>(std::min({wanted, span_us, static_cast<double>(kMostSteps)})));
+    for (int k = 1; k < steps; ++k) {
+      const std::int64_t between_us = from_us + (t_us - from_us) * k / steps;
+      parts.add(between_us, state_between(from, press, static_cast<double>(between_us - from_us) / span_us));
+    }
   }
-  render::SheetReach reach;
-  cv::Mat light = parts.moved(*parts.key, press, &reach);
-  parts.waiting.push_back({t_us, press, std::move(light)});
-  if (parts.distance(reach) > 1.0) {
-    bool is_new = false;
-    std::shared_ptr<const Key> next = parts.key_at(press, is_new);
-    parts.let_go(next.get(), is_new);
-    parts.key = std::move(next);
-  } else if (parts.waiting.size() >= kMostWaiting) {
-    parts.let_go(nullptr, false);
-  }
+  parts.add(t_us, press);
+  parts.last.emplace(t_us, press);
 }
 
 void LightBetween::finish() {

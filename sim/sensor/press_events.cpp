@@ -47,15 +47,11 @@ std::vector<Event> events_of_press(std::span<const Truth> states, const LightOfK
                                    std::uint64_t noise_seed) {
   TS_ASSERT(!states.empty());
   std::vector<Event> events;
-  const SceneSpec& scene = light.view.scene;
-  render::EventPixels watch(pixels, {scene.device.camera->width, scene.device.camera->height}, unit_seed, noise_seed);
-  LightBetween between(light, gel, scene.light.event_reach_px,
+  const CameraSpec& camera = *light.view.scene.device.camera;
+  render::EventPixels watch(pixels, {camera.width, camera.height}, unit_seed, noise_seed);
+  LightBetween between(light, gel,
                        [&](std::int64_t t_us, const cv::Mat& currents) { watch.advance(currents, t_us, events); });
-  MovedSteps steps(scene);
-  for (const Truth& state : states) {
-    steps.go(state.t_us, state.press,
-             [&](std::int64_t t_us, const fem::PressState& press) { between.add(t_us, press); });
-  }
+  for (const Truth& state : states) between.add(state.t_us, state.press);
   between.finish();
   return events;
 }

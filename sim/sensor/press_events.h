@@ -28,8 +28,7 @@ std::vector<Event> events_of_press(std::span<const Truth> states, const Photocur
                                    const render::EventPixelSettings& pixels, std::uint64_t unit_seed,
                                    std::uint64_t noise_seed);
 
-/// The same by pictures that are moved from state to state (sim/sensor/light_between.h), as watch_events has them: one
-/// for each state, and as many between two as nothing moves by kMovedStep_px from one to the next.
+/// The same by pictures that are moved from state to state (sim/sensor/light_between.h), as watch_events has them.
 std::vector<Event> events_of_press(std::span<const Truth> states, const LightOfKeys& light, const fem::Compliance& gel,
                                    const render::EventPixelSettings& pixels, std::uint64_t unit_seed,
                                    std::uint64_t noise_seed);
