@@ -42,8 +42,6 @@ class SheetBetween {
   /// How far the move goes, alone.
   SheetReach reach(const SheetMove& move) const;
 
-  const SheetPoints& points() const { return points_; }
-
  private:
   /// A corner of the picture's squares of kSquare points: from the move to the picture.
   struct Corner {
