@@ -24,17 +24,16 @@ class ContactBlock {
   /// Place of a surface vertex in the block, -1 if it isn't in it.
   int place(int vertex) const { return place_[vertex]; }
   /// 3 m x 3 m
-  Eigen::Ref<const Eigen::MatrixXd> compliance() const { return in_axes(); }
+  Eigen::Ref<const Eigen::MatrixXd> compliance() const {
+    const auto rows = static_cast<Eigen::Index>(3 * vertices_.size());
+    return Eigen::Map<const Eigen::MatrixXd>(compliance_.data(), rows, rows);
+  }
   /// m x m: its normal rows and columns
   const Eigen::MatrixXd& normal_compliance() const { return normal_compliance_; }
   /// Columns are the vertex's own axes in the gel frame.
   const Eigen::Matrix3d& axes(int vertex) const { return axes_[vertex]; }
 
  private:
-  Eigen::Map<const Eigen::MatrixXd> in_axes() const {
-    const auto rows = static_cast<Eigen::Index>(3 * vertices_.size());
-    return {compliance_.data(), rows, rows};
-  }
   void make_room(Eigen::Index m);
 
   const Compliance& gel_;
