@@ -144,6 +144,7 @@ TriangleMesh weld(const TriangleMesh& mesh, double distance, std::vector<int>* k
   };
   const int reach = exact ? 0 : 1;
   std::unordered_map<Cell, std::vector<int>, CellHash> cells;
+  std::unordered_map<Cell, int, CellHash> known;  // by its place: most vertices of an STL file stand in it six times
   TriangleMesh welded;
   std::vector<int> new_index(mesh.vertices.size());
 
@@ -166,14 +167,22 @@ TriangleMesh weld(const TriangleMesh& mesh, double distance, std::vector<int>* k
   for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
     const Eigen::Vector3d& point = mesh.vertices[i];
     const bool finite = point.allFinite();  // what isn't is kept, for fault_of_closed_mesh to find
-    const Cell cell = finite ? cell_of(point) : Cell{};
-    int index = finite ? known_near(point, cell) : -1;
-    if (index < 0) {
-      index = static_cast<int>(welded.vertices.size());
+    if (!finite) {
+      new_index[i] = static_cast<int>(welded.vertices.size());
       welded.vertices.push_back(point);
-      if (finite) cells[cell].push_back(index);
+      continue;
     }
-    new_index[i] = index;
+    const auto [same, is_new] = known.try_emplace(Cell{point.x(), point.y(), point.z()}, -1);
+    if (is_new) {
+      const Cell cell = cell_of(point);
+      same->second = known_near(point, cell);
+      if (same->second < 0) {
+        same->second = static_cast<int>(welded.vertices.size());
+        welded.vertices.push_back(point);
+        cells[cell].push_back(same->second);
+      }
+    }
+    new_index[i] = same->second;
   }
   const auto count = static_cast<int>(mesh.vertices.size());
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
