@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/units.h"
 #include "fem/shapes/line_interval.h"
 
 namespace touchstone::fem {
@@ -50,6 +51,33 @@ void check_one(const ShellShape& shell) {
   for (int a = 0; a < 2; ++a) check_positive(shell.size[a], "the shell's axis");
   check_positive(shell.thickness, "the shell's thickness");
   if (!shell.curvature.allFinite()) fail("the shell's curvatures must be finite");
+}
+
+void check_one(const ConeShape& cone) {
+  if (!(cone.half_angle > 0.0 && cone.half_angle < 0.5 * kPi)) {
+    fail("the cone's half angle is {} radians, it must be above 0 and below pi/2", cone.half_angle);
+  }
+  check_positive(cone.height, "the cone's height");
+  if (!(cone.tip_radius >= 0.0 && cone.tip_height() < cone.height)) {
+    fail("the cone's tip radius is {} mm, it must be at least 0 and below {}", cone.tip_radius,
+         cone.height / (1.0 - std::sin(cone.half_angle)));
+  }
+}
+
+void check_one(const TorusShape& torus) {
+  check_positive(torus.radius, "the torus' radius");
+  check_positive(torus.tube, "the torus' tube");
+  if (torus.tube >= torus.radius) {
+    fail("the torus' tube has a radius of {} mm, it must be below the ring's, {}", torus.tube, torus.radius);
+  }
+}
+
+void check_one(const BarShape& bar) {
+  check_positive(bar.radius, "the bar's radius");
+  check_positive(bar.length, "the bar's length");
+  if (bar.half_cylinder() < 0.0) {
+    fail("the capsule's length is {} mm, it must be at least twice its radius, {}", bar.length, 2.0 * bar.radius);
+  }
 }
 
 void check_one(const ReliefShape& shape) {
@@ -106,6 +134,22 @@ BoundingBall ball_of(const ShellShape& shell) {
   return {{0.0, 0.0, 0.5 * (low + high)}, std::hypot(0.5 * shell.size.maxCoeff(), 0.5 * (high - low))};
 }
 
+BoundingBall ball_of(const ConeShape& cone) {
+  const double base = cone.base_radius();
+  const double centre = std::min(cone.height, (base * base + cone.height * cone.height) / (2.0 * cone.height));
+  // A rounded tip is farthest at its lowest point or where it ends.
+  const double tip = std::hypot(cone.tip_radius * std::cos(cone.half_angle), cone.tip_height() - centre);
+  return {{0.0, 0.0, centre}, std::max({centre, tip, std::hypot(base, cone.height - centre)})};
+}
+
+BoundingBall ball_of(const TorusShape& torus) {
+  return {Eigen::Vector3d::Zero(), torus.radius + torus.tube};
+}
+
+BoundingBall ball_of(const BarShape& bar) {
+  return {Eigen::Vector3d::Zero(), bar.round_ends ? 0.5 * bar.length : std::hypot(0.5 * bar.length, bar.radius)};
+}
+
 BoundingBall ball_of(const ReliefShape& shape) {
   const BoundingBall plain = std::visit([](const auto& body) { return ball_of(body); }, shape.base);
   return {plain.centre, plain.radius + shape.relief->highest()};
@@ -119,7 +163,8 @@ void check_shape(const ContactShape& shape) {
 
 bool is_convex(const ContactShape& shape) {
   return std::holds_alternative<SphereShape>(shape) || std::holds_alternative<RoundedCylinder>(shape) ||
-         std::holds_alternative<BoxShape>(shape) || std::holds_alternative<EggShape>(shape);
+         std::holds_alternative<BoxShape>(shape) || std::holds_alternative<EggShape>(shape) ||
+         std::holds_alternative<ConeShape>(shape) || std::holds_alternative<BarShape>(shape);
 }
 
 std::optional<double> first_entry(const SphereShape& shape, const Eigen::Vector3d& p, const Eigen::Vector3d& d) {

@@ -6,10 +6,13 @@
 #include <optional>
 #include <variant>
 
+#include "fem/shapes/bar_shape.h"
+#include "fem/shapes/cone_shape.h"
 #include "fem/shapes/egg_shape.h"
 #include "fem/shapes/mesh_shape.h"
 #include "fem/shapes/relief_map.h"
 #include "fem/shapes/shell_shape.h"
+#include "fem/shapes/torus_shape.h"
 
 namespace touchstone::fem {
 
@@ -32,7 +35,8 @@ struct BoxShape {
 };
 
 /// The shapes that a relief may lie on.
-using PlainShape = std::variant<SphereShape, RoundedCylinder, BoxShape, MeshShape, EggShape, ShellShape>;
+using PlainShape = std::variant<SphereShape, RoundedCylinder, BoxShape, MeshShape, EggShape, ShellShape, ConeShape,
+                                TorusShape, BarShape>;
 
 /// A body whose lower side bears a relief: at each (x, y) of the object frame the surface that faces -z lies lower
 /// than the plain body's by the map's height. Lines that run up (direction.z > 0) meet the relief; others the plain
@@ -44,12 +48,14 @@ struct ReliefShape {
 };
 
 /// Any shape: a plain one, or one with relief.
-using ContactShape = std::variant<SphereShape, RoundedCylinder, BoxShape, MeshShape, EggShape, ShellShape, ReliefShape>;
+using ContactShape = std::variant<SphereShape, RoundedCylinder, BoxShape, MeshShape, EggShape, ShellShape, ConeShape,
+                                  TorusShape, BarShape, ReliefShape>;
 
 /// Whether the gap over a plane is convex wherever the body stands.
 bool is_convex(const ContactShape& shape);
 
-/// Refuses sizes that aren't finite and positive, and an edge radius above the cylinder's radius or height.
+/// Refuses sizes that aren't finite and positive, and those that don't go together: an edge radius above the cylinder's
+/// radius or height, a cone lower than its rounded tip, a tube as wide as its ring, a capsule shorter than wide.
 /// @throws Error
 void check_shape(const ContactShape& shape);
 

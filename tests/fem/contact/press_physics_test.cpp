@@ -1,11 +1,13 @@
 // Contact on real gels (Taylor-Hood) against closed forms and the layer reference.
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
 
 #include "closed_forms/contact_closed_forms.h"
+#include "core/units.h"
 #include "fem/contact/press.h"
 #include "fem/mesh/slab.h"
 #include "tests/support/press_steps.h"
@@ -86,6 +88,20 @@ TEST_P(ThickGel, AFlatPunchMeetsItsClosedForm) {
   EXPECT_NEAR(state.wrench[2], wanted, 0.035 * wanted);
 }
 
+// F = 2 E tan(a) d^2 / (pi (1 - nu^2)) for a rigid cone of half angle a, the contact's radius 2 d tan(a) / pi
+// [Sneddon1965].
+TEST_P(ThickGel, AConeMeetsSneddon) {
+  const double half_angle = 80.0 * kRadiansPerDegree;
+  const ConeShape cone{half_angle, 3.0, 0.0};
+  for (const double depth : {0.2, 0.3}) {
+    Press press(thick_gel(GetParam()), cone, 0.0);
+    const PressState& state = press.step(target_at(0.013, 0.021, -depth));
+    const double wanted = 2.0 * kModulus / (1.0 - GetParam() * GetParam()) * std::tan(half_angle) * depth * depth / kPi;
+    EXPECT_NEAR(state.wrench[2], wanted, 0.02 * wanted) << depth;
+    RecordProperty(fmt::format("relative_error_{}", depth), fmt::format("{:+.4f}", state.wrench[2] / wanted - 1.0));
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Poisson, ThickGel, testing::Values(0.3, 0.4999));
 
 TEST(ThickGel, NearIncompressibilityDoesNotLock) {
@@ -163,6 +179,19 @@ TEST_P(LayerGel, ARoundedPunchMeetsTheLayerReference) {
   const double force = press.step(target_at(0.013, 0.021, -0.15)).wrench[2];
   const double wanted = closed_forms::profile_on_layer(kModulus, nu, 5.0, slope, 0.15, punch.radius).force;
   EXPECT_NEAR(force, wanted, 0.03 * wanted);
+}
+
+TEST_P(LayerGel, AConeMeetsTheLayerReference) {
+  const double nu = GetParam();
+  const ConeShape cone{80.0 * kRadiansPerDegree, 3.0, 0.0};
+  Press press(layer_gel(nu), cone, 0.0);
+  const double force = press.step(target_at(0.013, 0.021, -0.4)).wrench[2];
+  const double slope = 1.0 / std::tan(cone.half_angle);
+  const double wanted = closed_forms::profile_on_layer(
+                            kModulus, nu, 5.0, [&](double) { return slope; }, 0.4, 10.0)
+                            .force;
+  EXPECT_NEAR(force, wanted, 0.02 * wanted);
+  RecordProperty("relative_error", fmt::format("{:+.4f}", force / wanted - 1.0));
 }
 
 TEST_P(LayerGel, ShearNeedsAboutAsMuchAsBetweenSlipAndBond) {

@@ -85,7 +85,13 @@ std::vector<ContactShape> one_of_each() {
           MeshShape(box_mesh({1.0, 2.0, 3.0})),
           EggShape{1.0, 1.2, 1.5},
           EggShape{2.0, 0.4, 0.7},
-          ShellShape{{3.0, 2.0}, 0.2, {0.4, -0.3}}};
+          ShellShape{{3.0, 2.0}, 0.2, {0.4, -0.3}},
+          ConeShape{0.5, 2.0, 0.0},
+          ConeShape{1.2, 0.8, 1.5},
+          ConeShape{0.3, 1.0, 0.9},
+          TorusShape{1.5, 0.4},
+          BarShape{0.7, 3.0, false},
+          BarShape{0.7, 3.0, true}};
 }
 
 TEST(FirstEntry, DoesNotDependOnWhereTheLineStarts) {
