@@ -145,6 +145,10 @@ macro(touchstone_need_tinygltf)
   touchstone_plain_library(TinyGLTF::Headers libtinygltf-dev tiny_gltf.h tinygltf)
 endmacro()
 
+macro(touchstone_need_assimp)
+  touchstone_plain_library(Assimp::Assimp libassimp-dev assimp/Importer.hpp assimp)
+endmacro()
+
 macro(touchstone_need_turbojpeg)
   touchstone_plain_library(TurboJpeg::TurboJpeg libturbojpeg0-dev turbojpeg.h turbojpeg)
 endmacro()

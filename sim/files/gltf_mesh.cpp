@@ -16,16 +16,15 @@
 #include "core/json_depth.h"
 #include "core/nearest_name.h"
 #include "core/whole_file.h"
+#include "sim/files/closed_solid.h"
 
 namespace touchstone::sim {
 namespace {
 
-constexpr std::size_t kMostTriangles = 20'000'000;
-constexpr double kWeldShare = 1e-6;  // of the diagonal; a float's own step is 1e-7
-
 class GltfSolid {
  public:
   GltfSolid(const std::filesystem::path& path, double mm_per_unit) : name_(path.string()) {
+    check_unit(path, mm_per_unit);
     load(path);
     refuse_extensions();
     visited_.assign(model_.nodes.size(), false);
@@ -315,36 +314,17 @@ class GltfSolid {
   std::vector<std::array<int, 2>> origin_;  // per triangle: material or -1, mesh
 };
 
-GltfSolid read_solid(const std::filesystem::path& path, double mm_per_unit) {
-  if (!(mm_per_unit > 0.0 && std::isfinite(mm_per_unit))) {
-    fail("{}: {} mm per unit; allowed is a finite number above 0", path.string(), mm_per_unit);
-  }
-  GltfSolid solid(path, mm_per_unit);
-  if (solid.mesh().triangles.empty()) fail("{}: holds no triangles", path.string());
-  return solid;
-}
-
-TriangleMesh welded(const GltfSolid& solid, const std::filesystem::path& path, std::vector<int>* kept) {
-  Eigen::AlignedBox3d box;
-  for (const Eigen::Vector3d& vertex : solid.mesh().vertices) box.extend(vertex);
-  TriangleMesh mesh = weld(solid.mesh(), kWeldShare * box.diagonal().norm(), kept);
-  if (const std::string fault = fault_of_closed_mesh(mesh); !fault.empty()) {
-    fail("{}: isn't a closed solid: {}", path.string(), fault);
-  }
-  return mesh;
-}
-
 }  // namespace
 
 TriangleMesh read_gltf_mesh(const std::filesystem::path& path, double mm_per_unit) {
-  return welded(read_solid(path, mm_per_unit), path, nullptr);
+  return closed_solid(GltfSolid(path, mm_per_unit).mesh(), path);
 }
 
 GelSurface read_gltf_gel(const std::filesystem::path& path, double mm_per_unit) {
-  const GltfSolid solid = read_solid(path, mm_per_unit);
+  const GltfSolid solid(path, mm_per_unit);
   std::vector<int> kept;
   GelSurface surface;
-  surface.mesh = welded(solid, path, &kept);
+  surface.mesh = closed_solid(solid.mesh(), path, &kept);
   for (const int triangle : kept) surface.faces.push_back(solid.kind(triangle));
   for (const auto& [kind, name] :
        {std::pair(fem::FaceKind::bonded, "bonded"), std::pair(fem::FaceKind::outer, "outer")}) {

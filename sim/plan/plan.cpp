@@ -50,6 +50,11 @@ double bright_radius(const ObjectSpec& object) {
     case ShapeKind::egg:
     case ShapeKind::shell:
     case ShapeKind::hexagon:
+    case ShapeKind::cone:
+    case ShapeKind::torus:
+    case ShapeKind::capsule:
+    case ShapeKind::lying_cylinder:
+    case ShapeKind::wedge:
       break;
   }
   double radius = 0.0;

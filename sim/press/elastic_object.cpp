@@ -124,6 +124,11 @@ TriangleMesh even_surface(const ShapeSpec& shape, double edge_mm) {
     case ShapeKind::egg:
     case ShapeKind::shell:
     case ShapeKind::hexagon:
+    case ShapeKind::cone:
+    case ShapeKind::torus:
+    case ShapeKind::capsule:
+    case ShapeKind::lying_cylinder:
+    case ShapeKind::wedge:
       break;
   }
   return visible_mesh(shape);

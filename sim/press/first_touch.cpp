@@ -41,6 +41,12 @@ Surface surface_of(const GelSpec& gel) {
   };
 }
 
+/// The unit vector in the plane z = 0 against this one; zero for zero.
+Eigen::Vector3d against(const Eigen::Vector2d& aside) {
+  const double length = aside.norm();
+  return length > 0.0 ? Eigen::Vector3d(-aside.x() / length, -aside.y() / length, 0.0) : Eigen::Vector3d::Zero();
+}
+
 /// The point of a body that lies farthest against the unit vector `up`, object frame; nothing where the shape has no
 /// closed form.
 std::optional<Eigen::Vector3d> lowest_point(const fem::ContactShape& shape, const Eigen::Vector3d& up) {
@@ -58,13 +64,24 @@ std::optional<Eigen::Vector3d> lowest_point(const fem::ContactShape& shape, cons
     return -0.5 * side.cwiseProduct(box->size);
   }
   if (const auto* cylinder = std::get_if<fem::RoundedCylinder>(&shape)) {
-    const double aside = up.head<2>().norm();
-    const Eigen::Vector3d outward =
-        aside > 0.0 ? Eigen::Vector3d(-up.x() / aside, -up.y() / aside, 0.0) : Eigen::Vector3d::Zero();
+    const Eigen::Vector3d outward = against(up.head<2>());
     const double edge = cylinder->edge_radius;
     const Eigen::Vector3d upper = cylinder->radius * outward + cylinder->height * Eigen::Vector3d::UnitZ();
     if (up.z() < 0.0) return upper;
     return (cylinder->radius - edge) * outward + edge * Eigen::Vector3d::UnitZ() - edge * up;
+  }
+  if (const auto* cone = std::get_if<fem::ConeShape>(&shape)) {
+    if (up.z() >= std::sin(cone->half_angle)) return cone->tip_radius * (Eigen::Vector3d::UnitZ() - up);
+    return cone->base_radius() * against(up.head<2>()) + cone->height * Eigen::Vector3d::UnitZ();
+  }
+  if (const auto* torus = std::get_if<fem::TorusShape>(&shape)) {
+    const Eigen::Vector3d outward = up.head<2>().norm() > 0.0 ? against(up.head<2>()) : Eigen::Vector3d::UnitX();
+    return torus->radius * outward - torus->tube * up;
+  }
+  if (const auto* bar = std::get_if<fem::BarShape>(&shape)) {
+    const double end = up.x() > 0.0 ? -1.0 : up.x() < 0.0 ? 1.0 : 0.0;
+    const Eigen::Vector3d side = bar->round_ends ? up : Eigen::Vector3d(0.0, up.y(), up.z()).normalized();
+    return end * bar->half_cylinder() * Eigen::Vector3d::UnitX() - bar->radius * side;
   }
   if (const auto* mesh = std::get_if<fem::MeshShape>(&shape)) {
     const std::vector<Eigen::Vector3d>& vertices = mesh->mesh().vertices;

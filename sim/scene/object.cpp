@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "core/units.h"
-#include "sim/files/gltf_mesh.h"
+#include "sim/files/mesh_file.h"
 
 namespace touchstone::sim {
 namespace {
@@ -97,27 +97,98 @@ fem::ShellShape shell_shape(const ShapeSpec& shape) {
   return {shape.axes_mm, shape.thickness_mm, shape.curvature_per_mm};
 }
 
+/// A convex prism along x, half of it on either side of x = 0, over an outline (y, z) that runs counter-clockwise.
+TriangleMesh prism_mesh(const std::vector<Eigen::Vector2d>& outline, double length) {
+  const auto corners = static_cast<int>(outline.size());
+  TriangleMesh mesh;
+  for (const double x : {-0.5 * length, 0.5 * length}) {
+    for (const Eigen::Vector2d& p : outline) mesh.vertices.emplace_back(x, p.x(), p.y());
+  }
+  for (int k = 0; k < corners; ++k) {
+    const int next = (k + 1) % corners;
+    mesh.triangles.push_back({k, next, corners + next});
+    mesh.triangles.push_back({k, corners + next, corners + k});
+    if (k == 0 || next == 0) continue;
+    mesh.triangles.push_back({0, k + 1, k});
+    mesh.triangles.push_back({corners, corners + k, corners + k + 1});
+  }
+  return mesh;
+}
+
 /// A regular hexagon's prism along x about the origin; one flat faces -z.
 TriangleMesh hexagon_mesh(const ShapeSpec& shape) {
   const double corner = shape.across_flats_mm / std::sqrt(3.0);  // from the axis
   const double flat = 0.5 * shape.across_flats_mm;
-  const std::array<Eigen::Vector2d, 6> outline = {{{-0.5 * corner, -flat},
-                                                   {0.5 * corner, -flat},
-                                                   {corner, 0.0},
-                                                   {0.5 * corner, flat},
-                                                   {-0.5 * corner, flat},
-                                                   {-corner, 0.0}}};
-  TriangleMesh mesh;
-  for (const double x : {-0.5 * shape.length_mm, 0.5 * shape.length_mm}) {
-    for (const Eigen::Vector2d& p : outline) mesh.vertices.emplace_back(x, p.x(), p.y());
+  return prism_mesh({{-0.5 * corner, -flat},
+                     {0.5 * corner, -flat},
+                     {corner, 0.0},
+                     {0.5 * corner, flat},
+                     {-0.5 * corner, flat},
+                     {-corner, 0.0}},
+                    shape.length_mm);
+}
+
+TriangleMesh wedge_mesh(const ShapeSpec& shape) {
+  const double half = shape.height_mm * std::tan(shape.half_angle_deg * kRadiansPerDegree);
+  return prism_mesh({{0.0, 0.0}, {half, shape.height_mm}, {-half, shape.height_mm}}, shape.length_mm);
+}
+
+fem::ConeShape cone_shape(const ShapeSpec& shape) {
+  return {shape.half_angle_deg * kRadiansPerDegree, shape.height_mm, shape.tip_radius_mm};
+}
+
+fem::BarShape bar_shape(const ShapeSpec& shape) {
+  return {shape.radius_mm, shape.length_mm, shape.type == ShapeKind::capsule};
+}
+
+TriangleMesh cone_mesh(const fem::ConeShape& cone) {
+  constexpr int kArc = 24;
+  std::vector<Eigen::Vector2d> profile = {{0.0, 0.0}};
+  const double arc = 0.5 * kPi - cone.half_angle;  // of the tip, from the axis to where the side begins
+  for (int i = 1; i <= kArc && cone.tip_radius > 0.0; ++i) {
+    const double angle = arc * i / kArc;
+    profile.emplace_back(cone.tip_radius * std::sin(angle), cone.tip_radius * (1.0 - std::cos(angle)));
   }
-  for (int k = 0; k < 6; ++k) {
-    const int next = (k + 1) % 6;
-    mesh.triangles.push_back({k, next, 6 + next});
-    mesh.triangles.push_back({k, 6 + next, 6 + k});
-    if (k == 0 || k == 5) continue;
-    mesh.triangles.push_back({0, k + 1, k});
-    mesh.triangles.push_back({6, 6 + k, 6 + k + 1});
+  profile.emplace_back(cone.base_radius(), cone.height);
+  profile.emplace_back(0.0, cone.height);
+  return turned_body(profile);
+}
+
+TriangleMesh bar_mesh(const fem::BarShape& bar) {
+  constexpr int kRings = 24;  // of an end
+  const double half = bar.half_cylinder();
+  std::vector<Eigen::Vector2d> profile = {{0.0, -0.5 * bar.length}};
+  for (int i = 1; i < kRings && bar.round_ends; ++i) {
+    const double angle = 0.5 * kPi * i / kRings;
+    profile.emplace_back(bar.radius * std::sin(angle), -half - bar.radius * std::cos(angle));
+  }
+  profile.emplace_back(bar.radius, -half);
+  for (auto k = static_cast<int>(profile.size()) - 1; k > 0; --k) {  // the other end is its mirror image
+    if (half > 0.0 || profile[k].y() < 0.0) profile.emplace_back(profile[k].x(), -profile[k].y());
+  }
+  profile.emplace_back(0.0, 0.5 * bar.length);
+  TriangleMesh mesh = turned_body(profile);
+  for (Eigen::Vector3d& v : mesh.vertices) v = Eigen::Vector3d(v.z(), v.x(), v.y());  // its axis from z to x
+  return mesh;
+}
+
+TriangleMesh torus_mesh(const fem::TorusShape& torus) {
+  constexpr int kAcross = 48;  // segments of the tube
+  TriangleMesh mesh;
+  for (int i = 0; i < kAround; ++i) {
+    const double angle = 2.0 * kPi * i / kAround;
+    for (int j = 0; j < kAcross; ++j) {
+      const double turn = 2.0 * kPi * j / kAcross;
+      const double rho = torus.radius + torus.tube * std::cos(turn);
+      mesh.vertices.emplace_back(rho * std::cos(angle), rho * std::sin(angle), torus.tube * std::sin(turn));
+    }
+  }
+  const auto at = [](int i, int j) { return i % kAround * kAcross + j % kAcross; };
+  for (int i = 0; i < kAround; ++i) {
+    for (int j = 0; j < kAcross; ++j) {
+      mesh.triangles.push_back({at(i, j), at(i + 1, j), at(i + 1, j + 1)});
+      mesh.triangles.push_back({at(i, j), at(i + 1, j + 1), at(i, j + 1)});
+    }
   }
   return mesh;
 }
@@ -157,15 +228,10 @@ TriangleMesh shell_mesh(const fem::ShellShape& shell) {
   return mesh;
 }
 
-TriangleMesh read_mesh(const ShapeSpec& shape) {
-  if (!std::filesystem::exists(shape.file)) {
-    fail_at(shape.where, "shape.file: there is no file {}", shape.file.string());
-  }
-  try {
-    return read_gltf_mesh(shape.file, shape.mm_per_unit);
-  } catch (const Error& error) {
-    fail_at(shape.where, "shape.file: {}", error.what());
-  }
+/// @pre its file was read, as `fields` does
+const TriangleMesh& mesh_of(const ShapeSpec& shape) {
+  TS_ASSERT(shape.mesh != nullptr);
+  return *shape.mesh;
 }
 
 }  // namespace
@@ -176,10 +242,18 @@ double flat_width_mm(const ShapeSpec& hexagon) {
 }
 
 EnumNames<ShapeKind> enum_names(ShapeKind) {
-  return {{"sphere", ShapeKind::sphere},  {"rounded_cylinder", ShapeKind::rounded_cylinder},
-          {"box", ShapeKind::box},        {"mesh", ShapeKind::mesh},
-          {"egg", ShapeKind::egg},        {"shell", ShapeKind::shell},
-          {"hexagon", ShapeKind::hexagon}};
+  return {{"sphere", ShapeKind::sphere},
+          {"rounded_cylinder", ShapeKind::rounded_cylinder},
+          {"box", ShapeKind::box},
+          {"mesh", ShapeKind::mesh},
+          {"egg", ShapeKind::egg},
+          {"shell", ShapeKind::shell},
+          {"hexagon", ShapeKind::hexagon},
+          {"cone", ShapeKind::cone},
+          {"torus", ShapeKind::torus},
+          {"capsule", ShapeKind::capsule},
+          {"lying_cylinder", ShapeKind::lying_cylinder},
+          {"wedge", ShapeKind::wedge}};
 }
 
 void fields(YamlReader& in, ShapeSpec& shape) {
@@ -204,6 +278,13 @@ void fields(YamlReader& in, ShapeSpec& shape) {
       shape.file = in.folder() / file;
       shape.where = in.where("file");
       in.optional("mm_per_unit", shape.mm_per_unit, Allowed::above(0.0));
+      if (in.describing()) break;
+      try {
+        if (!shape.mm_per_unit) shape.mm_per_unit = usual_mm_per_unit(shape.file);
+        shape.mesh = std::make_shared<const TriangleMesh>(read_mesh_file(shape.file, *shape.mm_per_unit));
+      } catch (const Error& error) {
+        fail_at(shape.where, "shape.file: {}", error.what());
+      }
       break;
     }
     case ShapeKind::egg:
@@ -218,6 +299,32 @@ void fields(YamlReader& in, ShapeSpec& shape) {
       break;
     case ShapeKind::hexagon:
       in.required("across_flats_mm", shape.across_flats_mm, Allowed::above_up_to(0.0, 1e4));
+      in.required("length_mm", shape.length_mm, Allowed::above_up_to(0.0, 1e4));
+      break;
+    case ShapeKind::cone: {
+      in.required("half_angle_deg", shape.half_angle_deg, Allowed::within(1.0, 89.0));
+      in.required("height_mm", shape.height_mm, Allowed::above_up_to(0.0, 1e4));
+      // The tip's ball ends below the base.
+      const double lowered = 1.0 - std::sin(shape.half_angle_deg * kRadiansPerDegree);
+      in.optional("tip_radius_mm", shape.tip_radius_mm,
+                  Allowed{.low = 0.0, .high = shape.height_mm / lowered, .high_included = false});
+      break;
+    }
+    case ShapeKind::torus:
+      in.required("radius_mm", shape.radius_mm, Allowed::above_up_to(0.0, 1e4));
+      in.required("tube_radius_mm", shape.tube_radius_mm,
+                  Allowed{.low = 0.0, .high = shape.radius_mm, .low_included = false, .high_included = false});
+      break;
+    case ShapeKind::capsule:
+    case ShapeKind::lying_cylinder:
+      in.required("radius_mm", shape.radius_mm, Allowed::above_up_to(0.0, 1e4));
+      in.required("length_mm", shape.length_mm,
+                  shape.type == ShapeKind::capsule ? Allowed::within(2.0 * shape.radius_mm, 2e4)
+                                                   : Allowed::above_up_to(0.0, 1e4));
+      break;
+    case ShapeKind::wedge:
+      in.required("half_angle_deg", shape.half_angle_deg, Allowed::within(1.0, 89.0));
+      in.required("height_mm", shape.height_mm, Allowed::above_up_to(0.0, 1e4));
       in.required("length_mm", shape.length_mm, Allowed::above_up_to(0.0, 1e4));
       break;
   }
@@ -268,13 +375,22 @@ fem::ContactShape contact_shape(const ShapeSpec& shape) {
     case ShapeKind::box:
       return fem::BoxShape{shape.size_mm};
     case ShapeKind::mesh:
-      return fem::MeshShape(read_mesh(shape));
+      return fem::MeshShape(mesh_of(shape));
     case ShapeKind::egg:
       return fem::EggShape{shape.radius_mm, shape.blunt_mm, shape.sharp_mm};
     case ShapeKind::shell:
       return shell_shape(shape);
     case ShapeKind::hexagon:
       return fem::MeshShape(hexagon_mesh(shape));
+    case ShapeKind::cone:
+      return cone_shape(shape);
+    case ShapeKind::torus:
+      return fem::TorusShape{shape.radius_mm, shape.tube_radius_mm};
+    case ShapeKind::capsule:
+    case ShapeKind::lying_cylinder:
+      return bar_shape(shape);
+    case ShapeKind::wedge:
+      return fem::MeshShape(wedge_mesh(shape));
   }
   TS_ASSERT(false);
   return {};
@@ -314,13 +430,22 @@ TriangleMesh visible_mesh(const ShapeSpec& shape) {
     case ShapeKind::box:
       return box_mesh(shape.size_mm);
     case ShapeKind::mesh:
-      return read_mesh(shape);
+      return mesh_of(shape);
     case ShapeKind::egg:
       return egg_mesh(shape);
     case ShapeKind::shell:
       return shell_mesh(shell_shape(shape));
     case ShapeKind::hexagon:
       return hexagon_mesh(shape);
+    case ShapeKind::cone:
+      return cone_mesh(cone_shape(shape));
+    case ShapeKind::torus:
+      return torus_mesh({shape.radius_mm, shape.tube_radius_mm});
+    case ShapeKind::capsule:
+    case ShapeKind::lying_cylinder:
+      return bar_mesh(bar_shape(shape));
+    case ShapeKind::wedge:
+      return wedge_mesh(shape);
   }
   TS_ASSERT(false);
   return {};

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -17,25 +18,43 @@
 namespace touchstone::sim {
 
 /// `shape.type` of the file; which fields of ShapeSpec count depends on it.
-enum class ShapeKind { sphere, rounded_cylinder, box, mesh, egg, shell, hexagon };
+enum class ShapeKind {
+  sphere,
+  rounded_cylinder,
+  box,
+  mesh,
+  egg,
+  shell,
+  hexagon,
+  cone,
+  torus,
+  capsule,
+  lying_cylinder,
+  wedge
+};
 EnumNames<ShapeKind> enum_names(ShapeKind);
 
 /// Only the fields that belong to `type` may stand in the file.
 struct ShapeSpec {
   ShapeKind type = ShapeKind::sphere;
-  double radius_mm = 0.0;                                      ///< sphere, rounded_cylinder; egg: of its equator
+  /// sphere, rounded_cylinder, capsule, lying_cylinder; egg: of its equator; torus: of the tube's middle
+  double radius_mm = 0.0;
   double edge_radius_mm = 0.0;                                 ///< rounded_cylinder
-  double height_mm = 0.0;                                      ///< rounded_cylinder
+  double height_mm = 0.0;                                      ///< rounded_cylinder, cone, wedge: along z
   Eigen::Vector3d size_mm = Eigen::Vector3d::Zero();           ///< box
-  std::filesystem::path file;                                  ///< mesh: glTF, relative to the object file
-  double mm_per_unit = 1000.0;                                 ///< mesh: glTF's unit is the metre
+  std::filesystem::path file;                                  ///< mesh: see sim/files/mesh_file.h
+  std::optional<double> mm_per_unit;                           ///< mesh: where not given, usual_mm_per_unit(file)
+  std::shared_ptr<const TriangleMesh> mesh;                    ///< mesh: what its file holds
   double blunt_mm = 0.0;                                       ///< egg: from the equator to its end at -y
   double sharp_mm = 0.0;                                       ///< egg: to its end at +y
   Eigen::Vector2d axes_mm = Eigen::Vector2d::Zero();           ///< shell: whole axes of its outline, an ellipse
   double thickness_mm = 0.0;                                   ///< shell: along z
   Eigen::Vector2d curvature_per_mm = Eigen::Vector2d::Zero();  ///< shell: along x and y, see fem::ShellShape
   double across_flats_mm = 0.0;                                ///< hexagon: a regular prism along x, a flat below
-  double length_mm = 0.0;                                      ///< hexagon: along x
+  double length_mm = 0.0;                                      ///< hexagon, capsule, lying_cylinder, wedge: along x
+  double half_angle_deg = 0.0;                                 ///< cone, wedge: of their tip or edge, which is below
+  double tip_radius_mm = 0.0;                                  ///< cone
+  double tube_radius_mm = 0.0;                                 ///< torus
   SourceLocation where;
 };
 
@@ -85,8 +104,7 @@ void fields(YamlReader& in, ObjectSpec& object);
 /// @throws Error with file and line for what can't be read or isn't allowed
 ObjectSpec read_object(const std::filesystem::path& file);
 
-/// The body as the contact solver sees it. Reads the mesh file if there is one.
-/// @throws Error for a mesh that is missing, open or crosses itself
+/// The body as the contact solver sees it.
 fem::ContactShape contact_shape(const ShapeSpec& shape);
 /// The same with the object's relief on it, in all its detail. @throws Error also for a relief that can't be read
 fem::ContactShape contact_shape(const ObjectSpec& object);

@@ -51,6 +51,41 @@ TEST(PressSpec, FirstTouchOfATiltedDiscIsItsRim) {
   }
 }
 
+// Closed forms of the lowest point, however the body is turned: the mesh that the camera sees has almost the same.
+TEST(PressSpec, FirstTouchOfConesToriAndBarsIsTheirMeshs) {
+  ShapeSpec cone;
+  cone.type = ShapeKind::cone;
+  cone.half_angle_deg = 35.0;
+  cone.height_mm = 3.0;
+  cone.tip_radius_mm = 0.5;
+  ShapeSpec sharp = cone;
+  sharp.tip_radius_mm = 0.0;
+  ShapeSpec torus;
+  torus.type = ShapeKind::torus;
+  torus.radius_mm = 2.0;
+  torus.tube_radius_mm = 0.4;
+  ShapeSpec capsule;
+  capsule.type = ShapeKind::capsule;
+  capsule.radius_mm = 0.7;
+  capsule.length_mm = 4.0;
+  ShapeSpec cylinder = capsule;
+  cylinder.type = ShapeKind::lying_cylinder;
+  for (const ShapeSpec& shape : {cone, sharp, torus, capsule, cylinder}) {
+    const fem::ContactShape exact = contact_shape(shape);
+    const fem::ContactShape seen = fem::MeshShape(visible_mesh(shape));
+    for (const double x : {0.0, 3.0, 20.0, 50.0, 80.0, 100.0, 170.0}) {
+      for (const double y : {0.0, -7.0, 30.0, 60.0}) {
+        const Eigen::Matrix3d turned = rotation_from_xyz(Eigen::Vector3d(x, y, 0.0) * kRadiansPerDegree);
+        const double touch = first_touch(slab(), exact, {0.5, -1.0}, turned);
+        EXPECT_NEAR(touch, first_touch(slab(), seen, {0.5, -1.0}, turned), 0.004) << x << ' ' << y;
+      }
+    }
+  }
+  EXPECT_EQ(first_touch(slab(), contact_shape(sharp), {0, 0}, Eigen::Matrix3d::Identity()), 0.0);
+  EXPECT_EQ(first_touch(slab(), contact_shape(torus), {0, 0}, Eigen::Matrix3d::Identity()), 0.4);
+  EXPECT_EQ(first_touch(slab(), contact_shape(capsule), {0, 0}, Eigen::Matrix3d::Identity()), 0.7);
+}
+
 TEST(PressSpec, FirstTouchOfAReliefIsItsHighestPlace) {
   ObjectSpec disc = ball(0);
   disc.shape.type = ShapeKind::rounded_cylinder;

@@ -277,10 +277,8 @@ TEST(SceneFiles, AMissingFileIsNamedWithTheLineThatAsksForIt) {
 }
 
 TEST(SceneFiles, AMissingMeshIsNamedWithTheLineThatAsksForIt) {
-  const auto object =
-      parse_yaml<ObjectSpec>("name: a\nshape:\n  type: mesh\n  file: nowhere.glb\n", "/tmp/none/object.yaml");
   try {
-    contact_shape(object.shape);
+    parse_yaml<ObjectSpec>("name: a\nshape:\n  type: mesh\n  file: nowhere.glb\n", "/tmp/none/object.yaml");
     FAIL() << "no error";
   } catch (const Error& error) {
     EXPECT_EQ(error.where().line, 4);
@@ -298,6 +296,47 @@ TEST(SceneFiles, AHexagonHasItsOwnFields) {
        {"{type: hexagon, across_flats_mm: 6.5}", "{type: hexagon, across_flats_mm: 0, length_mm: 1}",
         "{type: hexagon, across_flats_mm: 1, length_mm: 1, radius_mm: 1}"}) {
     EXPECT_THROW(parse_yaml<ObjectSpec>("name: a\nshape: " + std::string(wrong) + "\n", "object.yaml"), Error) << wrong;
+  }
+}
+
+TEST(SceneFiles, AMeshFilesUnitIsThatOfItsKindUnlessGiven) {
+  const std::string boxes = std::string(TOUCHSTONE_SOURCE_DIR) + "/tests/fuzz/corpus/plain_mesh/object.yaml";
+  const auto longest = [&](const std::string& fields) {
+    double z = 0.0;
+    const auto shape = parse_yaml<ObjectSpec>("name: a\nshape: {type: mesh, " + fields + "}\n", boxes).shape;
+    for (const Eigen::Vector3d& vertex : visible_mesh(shape).vertices) z = std::max(z, vertex.z());
+    return z;
+  };
+  EXPECT_EQ(longest("file: meshio-binary.stl"), 5.0);
+  EXPECT_EQ(longest("file: meshio-quads.obj"), 5.0);
+  EXPECT_EQ(longest("file: meshio-text.ply, mm_per_unit: 25.4"), 127.0);
+  try {
+    longest("\n  file: ../gltf");
+    FAIL() << "no error";
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("object.yaml:3"));
+    EXPECT_THAT(error.what(), HasSubstr("known are .glb, .gltf, .stl, .obj and .ply"));
+  }
+}
+
+TEST(SceneFiles, ShapesHaveTheirOwnFieldsAndRanges) {
+  const auto read = [](const std::string& shape) {
+    return parse_yaml<ObjectSpec>("name: a\nshape: {type: " + shape + "}\n", "object.yaml");
+  };
+  for (const char* right :
+       {"cone, half_angle_deg: 30, height_mm: 5", "cone, half_angle_deg: 30, height_mm: 5, tip_radius_mm: 9.99",
+        "torus, radius_mm: 3, tube_radius_mm: 2.9", "capsule, radius_mm: 1, length_mm: 2",
+        "lying_cylinder, radius_mm: 1, length_mm: 0.5", "wedge, half_angle_deg: 45, height_mm: 2, length_mm: 9"}) {
+    EXPECT_NO_THROW(fem::check_shape(contact_shape(read(right)))) << right;
+  }
+  for (const char* wrong :
+       {"cone, half_angle_deg: 30", "cone, half_angle_deg: 90, height_mm: 5", "cone, half_angle_deg: 0, height_mm: 5",
+        "cone, half_angle_deg: 30, height_mm: 5, tip_radius_mm: 10.01",
+        "cone, half_angle_deg: 30, height_mm: 5, tip_radius_mm: -1", "torus, radius_mm: 3, tube_radius_mm: 3",
+        "torus, radius_mm: 3, tube_radius_mm: 0", "capsule, radius_mm: 1, length_mm: 1.9",
+        "lying_cylinder, radius_mm: 1, length_mm: 0", "wedge, half_angle_deg: 91, height_mm: 2, length_mm: 9",
+        "capsule, radius_mm: 1, length_mm: 4, height_mm: 1"}) {
+    EXPECT_THROW(read(wrong), Error) << wrong;
   }
 }
 
