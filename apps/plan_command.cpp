@@ -1,3 +1,5 @@
+#include <spdlog/spdlog.h>
+
 #include <algorithm>
 #include <memory>
 
@@ -21,13 +23,15 @@ void print_plan(const sim::Plan& plan) {
   for (const sim::Effect& effect : plan.effects) {
     fmt::print("{:<{}}  {:<3}  {} ({})\n", effect.name, widest, effect.on ? "yes" : "no", effect.why, effect.cost);
   }
+  for (const std::string& warning : plan.warnings) spdlog::warn("{}", warning);
 }
 
 bool equal(const sim::Plan& a, const sim::Plan& b) {
-  return std::equal(a.effects.begin(), a.effects.end(), b.effects.begin(), b.effects.end(),
-                    [](const sim::Effect& x, const sim::Effect& y) {
-                      return x.name == y.name && x.on == y.on && x.why == y.why && x.cost == y.cost;
-                    });
+  return a.warnings == b.warnings && std::equal(a.effects.begin(), a.effects.end(), b.effects.begin(), b.effects.end(),
+                                                [](const sim::Effect& x, const sim::Effect& y) {
+                                                  return x.name == y.name && x.on == y.on && x.why == y.why &&
+                                                         x.cost == y.cost;
+                                                });
 }
 
 void print_linear_range(const sim::SceneSpec& scene, const GlobalOptions& global) {

@@ -114,6 +114,7 @@ void render(const RenderOptions& options, const GlobalOptions& global) {
     fail("--frame {}: the scene {} has frames 0 to {}", frame, options.scene.string(), frames - 1);
   }
   const sim::Plan plan = sim::make_plan(scene);
+  for (const std::string& doubt : plan.warnings) spdlog::warn("{}", doubt);
   sim::Capture capture;
   std::string warning;
   std::string summary;

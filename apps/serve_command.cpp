@@ -145,7 +145,9 @@ class Objects {
     }
     const auto kept = made_.find(name);
     if (kept != made_.end()) return kept->second;
-    return made_.emplace(name, device_.object(sim::read_object(file->second))).first->second;
+    const sim::TouchObject& made = made_.emplace(name, device_.object(sim::read_object(file->second))).first->second;
+    if (!made.warning().empty()) spdlog::warn("{}", made.warning());
+    return made;
   }
 
  private:

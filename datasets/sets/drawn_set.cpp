@@ -15,8 +15,10 @@
 #include "datasets/sets/block_file.h"
 #include "datasets/sets/data_card.h"
 #include "datasets/sets/manifest_parts.h"
+#include "datasets/sets/planned_draw.h"
 #include "datasets/sets/run_folder.h"
 #include "datasets/sets/run_identity.h"
+#include "sim/plan/size_doubt.h"
 
 namespace touchstone::datasets {
 namespace {
@@ -183,6 +185,8 @@ GenerateReport generate_draw(const PreparedDraw& prepared, const fs::path& out, 
     report.was_finished = true;
     return report;
   }
+  for (const PlannedDraw& one : planned_draws(prepared))
+    report.warn(sim::size_doubt(one.scene.device, one.scene.object));
   begin_shared(out, folder.identity);
   std::error_code error;
   fs::create_directories(out / "blocks", error);

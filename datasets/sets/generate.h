@@ -51,7 +51,12 @@ struct GenerateReport {
   std::int64_t kept = 0;      ///< samples that an earlier, unfinished run had made
   std::int64_t damaged_blocks = 0;  ///< of an earlier run, made again
   std::int64_t drawn_again = 0;     ///< touches that couldn't be pressed, among the samples made
-  std::string warning;              ///< what was wrong with the cache of set-up results; it was made anew
+  std::string warning;  ///< of a damaged cache, which was made anew, and of objects' sizes (sim::size_doubt)
+  /// Adds a sentence to `warning`, once; an empty one is none.
+  void warn(const std::string& sentence) {
+    if (sentence.empty() || warning.find(sentence) != std::string::npos) return;
+    warning += (warning.empty() ? "" : "; ") + sentence;
+  }
   double set_up_s = 0.0, press_s = 0.0, write_s = 0.0;  ///< wall times of a drawn set's parts
 };
 

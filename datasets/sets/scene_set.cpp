@@ -87,7 +87,10 @@ class Run {
 
   void mechanics() {
     gel_ = source_.set_up_gel(job_.scenes.front().spec.device, progress_);
-    report_.warning = gel_->report.note;
+    report_.warn(gel_->report.note);
+    for (const PreparedScene& scene : job_.scenes) {
+      for (const std::string& doubt : scene.plan.warnings) report_.warn(doubt);
+    }
     clock_.end("gel");
     truths_.resize(job_.scenes.size());
     Counter counter(progress_, "mechanics", job_.samples);

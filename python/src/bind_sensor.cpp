@@ -121,7 +121,7 @@ std::shared_ptr<Touch> press(const Sensor& sensor, const py::object& touched, st
   if (!times.holds(seconds)) fail("seconds is {}; allowed is {}", seconds, times.text());
   order.seconds = seconds;
   sim::check(order);
-  const SharedObject object = object_from(touched);
+  const SharedObject object = object_for(sensor, touched);
   return unlocked([&] {
     return std::make_shared<Touch>(sensor.press(object, order, {look, truth, noise_seed, checked_frame(frame)}));
   });
@@ -174,6 +174,13 @@ py::array rows_in(const std::vector<Point>& points, py::ssize_t columns, const p
 SharedObject object_from(const py::handle& value) {
   if (py::isinstance<sim::ObjectSpec>(value)) return value.cast<std::shared_ptr<sim::ObjectSpec>>();
   return std::make_shared<const sim::ObjectSpec>(spec_from<sim::ObjectSpec>(value, "objects"));
+}
+
+SharedObject object_for(const Sensor& sensor, const py::handle& value) {
+  const SharedObject object = object_from(value);
+  const std::string warning = unlocked([&] { return sensor.object(object).warning(); });
+  if (!warning.empty() && PyErr_WarnEx(PyExc_UserWarning, warning.c_str(), 1) != 0) throw py::error_already_set();
+  return object;
 }
 
 void bind_sensor(py::module_& module) {

@@ -48,7 +48,7 @@ class Session {
 
 std::shared_ptr<Session> make_session(const std::shared_ptr<Sensor>& sensor, const py::object& touched,
                                       double largest_step_mm, double largest_part_mm) {
-  const SharedObject object = object_from(touched);
+  const SharedObject object = object_for(*sensor, touched);
   sim::TouchSessionSettings settings;
   settings.largest_step_mm = largest_step_mm;
   settings.largest_part_mm = largest_part_mm;

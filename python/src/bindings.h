@@ -8,6 +8,8 @@ namespace touchstone::python {
 
 /// An Object, or what makes one. @throws Error
 SharedObject object_from(const py::handle& value);
+/// The same, for this sensor: with a Python warning where its size is likely a mistake (sim::size_doubt).
+SharedObject object_for(const Sensor& sensor, const py::handle& value);
 
 void bind_errors(py::module_& module);
 void bind_files(py::module_& module);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/units.h"
 #include "fem/fine_relief/smooth_surface.h"
@@ -11,6 +12,7 @@
 #include "sim/plan/plan_table.h"
 #include "sim/plan/plan_time.h"
 #include "sim/plan/scene_bands.h"
+#include "sim/plan/size_doubt.h"
 #include "sim/scene/device_gel.h"
 
 namespace touchstone::sim {
@@ -410,6 +412,10 @@ Plan make_plan(const SceneSpec& scene) {
     plan_time(scene, plan, table);
     plan_direct_light(scene, plan, table);
     plan_shared_paths(scene, plan, table);
+  }
+  for (const MovedObject& moved : moved_objects(scene)) {
+    std::string doubt = size_doubt(scene.device, moved.object);
+    if (!doubt.empty()) plan.warnings.push_back(std::move(doubt));
   }
   return plan;
 }

@@ -46,6 +46,7 @@ struct Plan {
   bool shared_paths = false;    ///< behind a wide hole, where direct light isn't taken
   int states_a_frame = 1;       ///< pressed states that are kept from one frame to the next
   std::vector<Effect> effects;  ///< the same for people, with reasons
+  std::vector<std::string> warnings;  ///< what is likely a mistake, for people (sim/plan/size_doubt.h)
 };
 
 /// Decides each effect from the scene's own content and from the outputs asked for.

@@ -8,6 +8,7 @@
 #include "core/locked_work.h"
 #include "core/units.h"
 #include "render/imager/imager.h"
+#include "sim/plan/size_doubt.h"
 #include "sim/press/elastic_object.h"
 #include "sim/press/gel_setup.h"
 #include "sim/press/play_motion.h"
@@ -296,6 +297,7 @@ TouchObject VirtualSensor::object(const ObjectSpec& spec) const {
   seen->spec = spec;
   seen->shape = coarse_contact_shape(spec, parts_->device.mesh.fine_mm);
   check_shape(seen->shape);
+  seen->warning = size_doubt(parts_->device, spec);
   TouchObject object;
   object.seen_ = std::move(seen);
   return object;

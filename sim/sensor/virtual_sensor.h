@@ -83,6 +83,8 @@ class TouchObject {
   const ObjectSpec& spec() const { return seen_->spec; }
   /// What the gel's mesh can see of it (for fem::Press, step by step).
   const fem::ContactShape& shape() const { return seen_->shape; }
+  /// Whether its size is likely a mistake, for people (sim/plan/size_doubt.h); empty if not.
+  const std::string& warning() const { return seen_->warning; }
 
  private:
   friend class VirtualSensor;
