@@ -214,7 +214,7 @@ constexpr char kMesh = 'M', kRefused = 'R';
 TriangleMesh mesh_of(std::string_view bytes, double mm_per_unit) {
   const auto take = [&](void* data, std::size_t size) {
     TS_ASSERT(size <= bytes.size());
-    std::memcpy(data, bytes.data(), size);
+    std::copy_n(bytes.data(), size, static_cast<char*>(data));  // also of nothing to nowhere
     bytes.remove_prefix(size);
   };
   Counts counts;
