@@ -33,7 +33,7 @@ double longest_side(const GelSpec& gel) {
 }
 
 std::string in_words(const Eigen::Vector3d& size) {
-  return fmt::format("{:.4g} x {:.4g} x {:.4g}", size.x(), size.y(), size.z());
+  return fmt::format("{:.5g} x {:.5g} x {:.5g}", size.x(), size.y(), size.z());
 }
 
 }  // namespace
@@ -55,7 +55,7 @@ std::string size_doubt(const DeviceSpec& device, const ObjectSpec& object) {
   std::string text = fmt::format("object {}: it is {} mm, {}", object.name, in_words(size), against);
   if (object.shape.type == ShapeKind::mesh) {
     const double unit = object.shape.mm_per_unit.value_or(1.0);
-    text += fmt::format("; {} is {} of its own units, and shape.mm_per_unit says that one is {:.4g} mm",
+    text += fmt::format("; {} is {} of its own units, each of which is taken for {:.5g} mm (shape.mm_per_unit)",
                         object.shape.file.filename().string(), in_words(size / unit), unit);
   } else {
     text += ": are its lengths in mm?";

@@ -38,12 +38,12 @@ TEST(SizeDoubt, MetresInPlaceOfMillimetresAreNamed) {
   EXPECT_EQ(size_doubt(device(), box_file("")), "");
   EXPECT_EQ(
       size_doubt(device(), box_file(", mm_per_unit: 1000")),
-      "object part: it is 6000 x 8000 x 1e+04 mm, more than 10 times as long as the gel, 20 mm; meshio-binary.stl is "
-      "6 x 8 x 10 of its own units, and shape.mm_per_unit says that one is 1000 mm");
+      "object part: it is 6000 x 8000 x 10000 mm, more than 10 times as long as the gel, 20 mm; meshio-binary.stl "
+      "is 6 x 8 x 10 of its own units, each of which is taken for 1000 mm (shape.mm_per_unit)");
   EXPECT_EQ(
       size_doubt(device(), box_file(", mm_per_unit: 0.001")),
-      "object part: it is 0.006 x 0.008 x 0.01 mm, less than one edge of the gel's mesh, 0.5 mm; meshio-binary.stl is "
-      "6 x 8 x 10 of its own units, and shape.mm_per_unit says that one is 0.001 mm");
+      "object part: it is 0.006 x 0.008 x 0.01 mm, less than one edge of the gel's mesh, 0.5 mm; meshio-binary.stl "
+      "is 6 x 8 x 10 of its own units, each of which is taken for 0.001 mm (shape.mm_per_unit)");
 }
 
 TEST(SizeDoubt, StartsAtTenGelsAndAtOneEdge) {
