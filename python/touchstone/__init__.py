@@ -79,8 +79,8 @@ def generate(job, out, *, threads=0, timings=True, cache=None, shard=None, progr
     progress: called as progress(stage, done, total), also from other threads; what it raises ends the run.
 
     Returns a dict: was_finished, samples (of the job or the shard), made (by this call), kept (of earlier ones),
-    warning (of a damaged cache; empty), damaged_blocks (files of a drawn set made again) and drawn_again (touches that
-    couldn't be pressed).
+    warning (of a damaged cache and of objects' sizes; empty), damaged_blocks (files of a drawn set made again) and
+    drawn_again (touches that couldn't be pressed).
     Raises Error for a mistake in the job, a folder with anything else in it, a full disk.
     """
     return _core.generate(_os.fspath(job), _os.fspath(out), threads=threads, timings=timings,
