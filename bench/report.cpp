@@ -26,8 +26,12 @@ Report::Report(std::string name, std::filesystem::path folder, bool quick, const
   std::fflush(stdout);
 }
 
-void Report::take(const ResultTable& table) {
+void Report::keep(const ResultTable& table) const {
   write_files(table, where_, folder_);
+}
+
+void Report::take(const ResultTable& table) {
+  keep(table);
   const std::string text = to_markdown(table);
   page_ += text;
   fmt::print("{}", text);

@@ -26,6 +26,8 @@ class Report {
   bool quick() const { return quick_; }
   /// Prints the table, adds it to the page and writes its files.
   void take(const ResultTable& table);
+  /// Writes its files alone.
+  void keep(const ResultTable& table) const;
   /// Writes <folder>/<name>.md.
   void finish() const;
 
