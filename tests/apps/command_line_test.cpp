@@ -148,7 +148,7 @@ class BadMesh : public BadInput {
 
 TEST_F(BadMesh, Missing) {
   change("object.yaml", "{type: sphere, radius_mm: 2}", "{type: mesh, file: none.glb}");
-  expect_refused_mesh("there is no file");
+  expect_refused_mesh("No such file");
 }
 
 /// A glTF file with its buffer beside it. Three numbers a vertex, three indices a triangle.
