@@ -107,14 +107,11 @@ ResultTable totals_table(const Presses& presses, bool kept, double set_up_s, dou
           presses.gels.front().reference_edges),
       "A bar is the standard error that the program tells a user (fem::estimate_error; for depths divided by the "
       "stiffness of the press). Within two bars: at most twice the root of the sum of the squares of the gel's own bar "
-      "and "
-      "the reference's. Where nothing touches the gel's own mesh, its bar is zero.",
+      "and the reference's. Where nothing touches the gel's own mesh, its bar is zero.",
       fmt::format("{} bodies have no reference: it doesn't touch either, or its press fails.", blank),
       "Where a pattern's plate stays clear of the gel, the reference presses the pattern under a plate 2 mm farther "
-      "away: "
-      "the same problem, on which a plate that is near can't mislead it. Else the reference is made by the same "
-      "contact, "
-      "and a bias that finer edges don't lessen isn't seen."};
+      "away: the same problem, on which a plate that is near can't mislead it. Else the reference is made by the same "
+      "contact, and a bias that finer edges don't lessen isn't seen."};
   return table;
 }
 

@@ -185,8 +185,9 @@ GenerateReport generate_draw(const PreparedDraw& prepared, const fs::path& out, 
     report.was_finished = true;
     return report;
   }
-  for (const PlannedDraw& one : planned_draws(prepared))
+  for (const PlannedDraw& one : planned_draws(prepared)) {
     report.warn(sim::size_doubt(one.scene.device, one.scene.object));
+  }
   begin_shared(out, folder.identity);
   std::error_code error;
   fs::create_directories(out / "blocks", error);

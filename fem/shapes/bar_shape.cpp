@@ -20,10 +20,8 @@ std::optional<double> first_entry(const BarShape& bar, const Eigen::Vector3d& po
       common(inside_cylinder(bar.radius, along_z(p), along_z(d)), between(-half, half, p.x(), d.x()));
   if (!side.empty()) enter = side.enter;
   for (int end = -1; end <= 1 && bar.round_ends; end += 2) {
-    const Eigen::Vector3d from_centre = p - end * half * Eigen::Vector3d::UnitX();
-    const double middle = -from_centre.dot(d);
-    const double rest = bar.radius * bar.radius - (from_centre + middle * d).squaredNorm();
-    if (rest >= 0.0) enter = std::min(enter, middle - std::sqrt(rest));
+    const LineInterval ball = inside_ball(bar.radius, p - end * half * Eigen::Vector3d::UnitX(), d);
+    if (!ball.empty()) enter = std::min(enter, ball.enter);
   }
   if (enter == kInfinity) return std::nullopt;
   return shift + enter;

@@ -61,14 +61,9 @@ std::optional<double> first_entry(const ConeShape& cone, const Eigen::Vector3d& 
                                    between(cone.tip_height(), cone.height, p.z(), d.z()));
   if (!side.empty()) enter = side.enter;
   if (cone.tip_radius > 0.0) {
-    const Eigen::Vector3d from_centre = p - cone.tip_radius * Eigen::Vector3d::UnitZ();
-    const double middle = -from_centre.dot(d);
-    const double rest = cone.tip_radius * cone.tip_radius - (from_centre + middle * d).squaredNorm();
-    if (rest >= 0.0) {
-      const double half = std::sqrt(rest);
-      const LineInterval tip = common({middle - half, middle + half}, between(-kInfinity, cone.height, p.z(), d.z()));
-      if (!tip.empty()) enter = std::min(enter, tip.enter);
-    }
+    const LineInterval tip = common(inside_ball(cone.tip_radius, p - cone.tip_radius * Eigen::Vector3d::UnitZ(), d),
+                                    between(-kInfinity, cone.height, p.z(), d.z()));
+    if (!tip.empty()) enter = std::min(enter, tip.enter);
   }
   if (enter == kInfinity) return std::nullopt;
   return shift + enter;

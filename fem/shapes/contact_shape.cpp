@@ -168,10 +168,9 @@ bool is_convex(const ContactShape& shape) {
 }
 
 std::optional<double> first_entry(const SphereShape& shape, const Eigen::Vector3d& p, const Eigen::Vector3d& d) {
-  const double along = p.dot(d);
-  const double rest = shape.radius * shape.radius - (p - along * d).squaredNorm();
-  if (rest < 0.0) return std::nullopt;
-  return -along - std::sqrt(rest);
+  const LineInterval inside = inside_ball(shape.radius, p, d);
+  if (inside.empty()) return std::nullopt;
+  return inside.enter;
 }
 
 std::optional<double> first_entry(const BoxShape& shape, const Eigen::Vector3d& p, const Eigen::Vector3d& d) {

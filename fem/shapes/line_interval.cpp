@@ -18,6 +18,14 @@ LineInterval between(double low, double high, double start, double slope) {
   return {a, b};
 }
 
+LineInterval inside_ball(double radius, const Eigen::Vector3d& p, const Eigen::Vector3d& d) {
+  const double middle = -p.dot(d);
+  const double rest = radius * radius - (p + middle * d).squaredNorm();
+  if (rest < 0.0) return {1.0, 0.0};
+  const double half = std::sqrt(rest);
+  return {middle - half, middle + half};
+}
+
 LineInterval inside_cylinder(double radius, const Eigen::Vector3d& p, const Eigen::Vector3d& d) {
   const double across2 = d.x() * d.x() + d.y() * d.y();
   const double along = p.x() * d.x() + p.y() * d.y();

@@ -19,6 +19,9 @@ LineInterval common(const LineInterval& a, const LineInterval& b);
 /// Where low <= coordinate <= high, for a coordinate start + t slope.
 LineInterval between(double low, double high, double start, double slope);
 
+/// Inside the ball of `radius` about the origin. @pre d is a unit vector
+LineInterval inside_ball(double radius, const Eigen::Vector3d& p, const Eigen::Vector3d& d);
+
 /// Inside the endless cylinder of `radius` about z.
 LineInterval inside_cylinder(double radius, const Eigen::Vector3d& p, const Eigen::Vector3d& d);
 

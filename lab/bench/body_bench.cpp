@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/seconds_since.h"
 #include "fem/contact/press.h"
 #include "fem/error/press_error.h"
 #include "sim/press/first_touch.h"
@@ -104,7 +105,7 @@ std::optional<ForcePress> press_by_force(const BodyTrial& trial, const fem::Comp
 double seconds_of(const std::function<void()>& work) {
   const auto begun = std::chrono::steady_clock::now();
   work();
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+  return seconds_since(begun);
 }
 
 }  // namespace

@@ -130,34 +130,41 @@ TrialBody letter(Draw& draw) {
                   height, [&](double h) { return letter_on_plate(sign, stroke, h, kPlate_mm); });
 }
 
-TrialBody studs(Draw& draw) {
-  const int count = draw.whole(2, 5);
-  const double pitch = draw.size(0.6, 6.0 / count);
+/// What is raised in rows on a plate.
+struct Rows {
+  int count;
+  double pitch, width, height;
+  double outer;  ///< from the middle to the last one's outer side
+};
+
+Rows rows(Draw& draw, int most, double least_pitch) {
+  const int count = draw.whole(2, most);
+  const double pitch = draw.size(least_pitch, 6.0 / count);
   const double width = std::round(1000.0 * pitch * draw.between(0.35, 0.7)) / 1000.0;
   const double height = draw.size(0.05, 1.0);
-  const double outer = 0.5 * (count - 1) * pitch + 0.5 * width;
+  return {count, pitch, width, height, 0.5 * (count - 1) * pitch + 0.5 * width};
+}
+
+TrialBody studs(Draw& draw) {
+  const auto [count, pitch, width, height, outer] = rows(draw, 5, 0.6);
   return on_plate({"studs on plate",
                    fmt::format("{0} x {0}, {1} wide, {2} apart, {3} high", count, width, pitch, height),
                    {},
                    width,
                    std::numbers::sqrt2 * outer,
                    side_at(outer)},
-                  height, [&](double h) { return studs_on_plate(count, width, pitch, h, kPlate_mm); });
+                  height, [=](double h) { return studs_on_plate(count, width, pitch, h, kPlate_mm); });
 }
 
 TrialBody ridges(Draw& draw) {
-  const int count = draw.whole(2, 6);
-  const double pitch = draw.size(0.5, 6.0 / count);
-  const double width = std::round(1000.0 * pitch * draw.between(0.35, 0.7)) / 1000.0;
-  const double height = draw.size(0.05, 1.0);
-  const double outer = 0.5 * (count - 1) * pitch + 0.5 * width;
+  const auto [count, pitch, width, height, outer] = rows(draw, 6, 0.5);
   return on_plate({"ridges on plate",
                    fmt::format("{}, {} wide, {} apart, {} high, 5 long", count, width, pitch, height),
                    {},
                    width,
                    std::hypot(outer, 2.5),
                    side_at(outer)},
-                  height, [&](double h) { return ridges_on_plate(count, width, pitch, 5.0, h, kPlate_mm); });
+                  height, [=](double h) { return ridges_on_plate(count, width, pitch, 5.0, h, kPlate_mm); });
 }
 
 TrialBody ring(Draw& draw) {
@@ -241,10 +248,11 @@ Candidate pick(Draw& draw, const std::vector<std::pair<double, Candidate>>& by_d
   for (const auto& [distance, candidate] : by_distance) {
     if (distance <= farthest) near.push_back(candidate);
   }
-  if (near.empty())
+  if (near.empty()) {
     return std::min_element(by_distance.begin(), by_distance.end(),
                             [](const auto& a, const auto& b) { return a.first < b.first; })
         ->second;
+  }
   return draw.one_of(near);
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <optional>
 #include <string>
 
 #include "core/error.h"
@@ -11,16 +12,15 @@
 namespace touchstone::sim {
 namespace {
 
-enum class MeshFormat { gltf, stl, obj, ply };
-
-MeshFormat format_of(const std::filesystem::path& path) {
+/// None: glTF.
+std::optional<PlainMeshFormat> plain_format_of(const std::filesystem::path& path) {
   std::string suffix = path.extension().string();
   std::transform(suffix.begin(), suffix.end(), suffix.begin(),
                  [](unsigned char letter) { return static_cast<char>(std::tolower(letter)); });
-  if (suffix == ".glb" || suffix == ".gltf") return MeshFormat::gltf;
-  if (suffix == ".stl") return MeshFormat::stl;
-  if (suffix == ".obj") return MeshFormat::obj;
-  if (suffix == ".ply") return MeshFormat::ply;
+  if (suffix == ".glb" || suffix == ".gltf") return std::nullopt;
+  if (suffix == ".stl") return PlainMeshFormat::stl;
+  if (suffix == ".obj") return PlainMeshFormat::obj;
+  if (suffix == ".ply") return PlainMeshFormat::ply;
   fail("{}: no mesh is read from files that end in '{}'; known are .glb, .gltf, .stl, .obj and .ply", path.string(),
        path.extension().string());
 }
@@ -28,22 +28,12 @@ MeshFormat format_of(const std::filesystem::path& path) {
 }  // namespace
 
 double usual_mm_per_unit(const std::filesystem::path& path) {
-  return format_of(path) == MeshFormat::gltf ? 1000.0 : 1.0;
+  return plain_format_of(path) ? 1.0 : 1000.0;
 }
 
 TriangleMesh read_mesh_file(const std::filesystem::path& path, double mm_per_unit) {
-  switch (format_of(path)) {
-    case MeshFormat::gltf:
-      return read_gltf_mesh(path, mm_per_unit);
-    case MeshFormat::stl:
-      return read_plain_mesh(path, PlainMeshFormat::stl, mm_per_unit);
-    case MeshFormat::obj:
-      return read_plain_mesh(path, PlainMeshFormat::obj, mm_per_unit);
-    case MeshFormat::ply:
-      return read_plain_mesh(path, PlainMeshFormat::ply, mm_per_unit);
-  }
-  TS_ASSERT(false);
-  return {};
+  const std::optional<PlainMeshFormat> plain = plain_format_of(path);
+  return plain ? read_plain_mesh(path, *plain, mm_per_unit) : read_gltf_mesh(path, mm_per_unit);
 }
 
 }  // namespace touchstone::sim

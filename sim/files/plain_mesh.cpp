@@ -36,6 +36,7 @@ constexpr unsigned kMostCorners = 1000;  // of a face
 constexpr std::size_t kLongestReason = 100;
 constexpr int kWaitPerSecond = 20;  // other work may hold the cores
 
+/// For people; the library takes it as a suffix, too, as capital letters don't matter to it.
 const char* name_of(PlainMeshFormat format) {
   switch (format) {
     case PlainMeshFormat::stl:
@@ -44,18 +45,6 @@ const char* name_of(PlainMeshFormat format) {
       return "OBJ";
     case PlainMeshFormat::ply:
       return "PLY";
-  }
-  return "";
-}
-
-const char* suffix_of(PlainMeshFormat format) {
-  switch (format) {
-    case PlainMeshFormat::stl:
-      return ".stl";
-    case PlainMeshFormat::obj:
-      return ".obj";
-    case PlainMeshFormat::ply:
-      return ".ply";
   }
   return "";
 }
@@ -185,7 +174,7 @@ std::string read_by_assimp(const std::string& content, PlainMeshFormat format) {
   // It knows of this one file only, so that materials' files aren't opened.
   importer.SetIOHandler(
       new Assimp::MemoryIOSystem(reinterpret_cast<const std::uint8_t*>(content.data()), content.size(), nullptr));
-  const std::string name = std::string(AI_MEMORYIO_MAGIC_FILENAME) + suffix_of(format);
+  const std::string name = std::string(AI_MEMORYIO_MAGIC_FILENAME) + "." + name_of(format);
   const auto refuse = [&] {
     std::string why = importer.GetErrorString();
     if (const std::size_t at = why.find(name); at != std::string::npos) why.replace(at, name.size(), "it");

@@ -21,8 +21,9 @@ std::vector<Eigen::Vector2d> seen_flat(std::span<const Eigen::Vector3d> corners)
   const Eigen::Vector3d u = normal.normalized().unitOrthogonal();
   const Eigen::Vector3d v = normal.normalized().cross(u);
   std::vector<Eigen::Vector2d> flat;
-  for (const Eigen::Vector3d& corner : corners)
+  for (const Eigen::Vector3d& corner : corners) {
     flat.emplace_back(u.dot(corner - corners[0]), v.dot(corner - corners[0]));
+  }
   return flat;
 }
 

@@ -15,6 +15,12 @@ namespace {
 
 constexpr double kMuchLonger = 10.0;
 
+Eigen::Vector3d extent_of(const TriangleMesh& mesh) {
+  Eigen::AlignedBox3d box;
+  for (const Eigen::Vector3d& vertex : mesh.vertices) box.extend(vertex);
+  return box.sizes();
+}
+
 /// The gel's longest side, mm.
 double longest_side(const GelSpec& gel) {
   return std::visit(
@@ -25,9 +31,7 @@ double longest_side(const GelSpec& gel) {
                  [](const FingertipSpec& tip) { return std::max(2.0 * tip.radius_mm, tip.radius_mm + tip.length_mm); },
                  [](const GelMeshSpec& mesh) {
                    if (!mesh.surface) return std::numeric_limits<double>::infinity();  // it wasn't read
-                   Eigen::AlignedBox3d box;
-                   for (const Eigen::Vector3d& vertex : mesh.surface->mesh.vertices) box.extend(vertex);
-                   return box.sizes().maxCoeff();
+                   return extent_of(mesh.surface->mesh).maxCoeff();
                  }},
       gel.shape);
 }
@@ -39,9 +43,7 @@ std::string in_words(const Eigen::Vector3d& size) {
 }  // namespace
 
 std::string size_doubt(const DeviceSpec& device, const ObjectSpec& object) {
-  Eigen::AlignedBox3d box;
-  for (const Eigen::Vector3d& vertex : visible_mesh(object.shape).vertices) box.extend(vertex);
-  const Eigen::Vector3d size = box.sizes();
+  const Eigen::Vector3d size = extent_of(visible_mesh(object.shape));
   const double longest = size.maxCoeff();
   const double gel = longest_side(device.gel);
   std::string against;
