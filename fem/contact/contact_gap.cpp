@@ -15,13 +15,12 @@ constexpr int kSilhouetteSplits = 2;  // levels of splitting on the silhouette
 constexpr int kBisections = 34;       // of a cell's edge: a quarter of a triangle's to 1e-11
 constexpr int kFalsePositions = 40;   // likewise, where the distance to the silhouette is known: some 5 do
 constexpr double kSteep = 2.0;        // rise within a triangle, in its size, from which the body's side is seen
-constexpr double kCutShare = 0.06;    // covered share of a cut hat under which it begins to stay open
-constexpr double kCutFade = 0.03;     // and over which
 constexpr double kBent = 0.1;         // of a triangle's range of gaps: off its corners' plane by more, it may hold a step
 constexpr double kFlat = 1e-6;        // of a triangle's size: ranges below it hold no step
 constexpr double kMixedPiece = 1e-3;  // of a triangle: larger pieces don't lie on both sides of a step
 constexpr double kBulge = 0.5;      // of the depth: the gel doesn't rise higher beside a contact
 constexpr double kCutMargin = 0.5;  // of a triangle's size, on top
+constexpr double kLeastStraddling = 1.0 / 200.0;  // likewise, where the gap changes its sign
 constexpr double kLeastPiece = 1e-9;  // of a triangle
 constexpr int kStepBisections = 8;
 constexpr double kStepLeft = 0.6;  // of a difference, left where the interval is so much smaller: a step
@@ -76,6 +75,7 @@ class TriangleGap {
     } else {
       cell(Eigen::Matrix3d::Identity(), splits, kSilhouetteSplits);
     }
+    is_crossed = is_crossed || crossed.bend > kBent;
     if (!is_crossed) crossed.pieces.clear();
   }
 
@@ -125,7 +125,7 @@ class TriangleGap {
       for (int k = 0; k < 3; ++k) reach2 = std::max(reach2, (points_ * (corners.col(k) - middle)).squaredNorm());
       const double inside = silhouette(middle);
       if (inside * inside > reach2) {
-        if (inside > 0.0) whole(corners);
+        if (inside > 0.0 && !(collect_ && bent_cell(corners, silhouette_splits))) whole(corners);
         return;
       }
       for (int k = 0; k < 3; ++k) corner_hits += corner_hit[k] = silhouette(corners.col(k)) >= 0.0;
@@ -138,9 +138,8 @@ class TriangleGap {
         hits += value[k].has_value();
       }
       if (hits + corner_hits == 0) return;
-      const bool bent = collect_ && hits + corner_hits == 10 && is_bent(corners, value);
-      if (bent && silhouette_splits == 0 && cut_at_step(corners)) return;
-      if (hits + corner_hits == 10 && !(bent && silhouette_splits > 0)) {
+      if (collect_ && hits + corner_hits == 10 && bent_cell(corners, silhouette_splits)) return;
+      if (hits + corner_hits == 10) {
         const double area = area_ * std::abs(corners.determinant());
         if (collect_) keep(corners);
         for (int k = 0; k < 7; ++k) {
@@ -222,19 +221,35 @@ class TriangleGap {
     crossed.outline.push_back({ends[0], ends[1]});
   }
 
-  /// Whether a cell that hits all over is so far from plane that there may be a step in it.
-  bool is_bent(const Eigen::Matrix3d& corners, const std::array<std::optional<double>, 7>& value) const {
+  /// A cell that hits all over, where the gap isn't plane: split further, and cut at the step if that is it. False: it
+  /// is to be taken as it is.
+  bool bent_cell(const Eigen::Matrix3d& corners, int splits) {
+    double low = kInfinity;
+    double high = -kInfinity;
+    const double bend = bend_of(corners, low, high);
+    if (corners.isIdentity(0.0) && low < 0.0 && high > 0.0) crossed.bend = bend;
+    if (bend <= kBent) return false;
+    if (splits > 0) {
+      split(corners, 0, splits - 1);
+      return true;
+    }
+    return cut_at_step(corners);
+  }
+
+  /// How far the gap is from plane, of its range; 0 where that is next to nothing.
+  double bend_of(const Eigen::Matrix3d& corners, double& low, double& high) const {
     Eigen::Vector3d at_corner;
-    for (int k = 0; k < 3; ++k) at_corner[k] = *at(corners.col(k));
-    double low = at_corner.minCoeff();
-    double high = at_corner.maxCoeff();
+    for (int k = 0; k < 3; ++k) at_corner[k] = at(corners.col(k)).value_or(0.0);
+    low = at_corner.minCoeff();
+    high = at_corner.maxCoeff();
     double off = 0.0;
     for (int k = 0; k < 7; ++k) {
-      low = std::min(low, *value[k]);
-      high = std::max(high, *value[k]);
-      off = std::max(off, std::abs(*value[k] - at_corner.dot(radon_rule().points[k])));
+      const double value = at(corners * radon_rule().points[k]).value_or(0.0);
+      low = std::min(low, value);
+      high = std::max(high, value);
+      off = std::max(off, std::abs(value - at_corner.dot(radon_rule().points[k])));
     }
-    return off > kBent * (high - low) && high - low > kFlat * body_radius_;
+    return high - low > kFlat * body_radius_ ? off / (high - low) : 0.0;
   }
 
   /// Cuts a small cell at the step that crosses it; false if it's only bent.
@@ -322,6 +337,11 @@ class TriangleGap {
       return;
     }
     piece.value /= weight;
+    set_overlap(piece, low, high);
+    if (crossed.bend > kBent && share > kLeastStraddling && piece.overlap > 0.0 && piece.overlap < 1.0) {
+      for (const Eigen::Matrix3d& part : quarters_of(corners)) keep(part);
+      return;
+    }
     crossed.pieces.push_back(piece);
   }
 
@@ -519,10 +539,9 @@ WeightedGap weighted_gap(const ContactSurface& surface, const ContactShape& shap
     const double share = result.cuts->share[static_cast<Eigen::Index>(k)];
     const double gap = result.cuts->gap[static_cast<Eigen::Index>(k)];
     if (skipped[i]) continue;
-    const bool far = !std::isfinite(gap) || share < kCutShare - kCutFade;
-    result.plain[i] = far ? kInfinity : surface.weight[i] * gap;
-    result.edge[i] = far ? 0.0 : surface.weight[i] * std::max(0.0, kCutShare - share) / kCutFade;
-    result.weighted[i] = result.plain[i] + result.edge[i] * depth;
+    const bool far = !std::isfinite(gap) || share < kLeastPiece;
+    result.plain[i] = result.weighted[i] = far ? kInfinity : surface.weight[i] * gap;
+    result.edge[i] = 0.0;
     if (far) result.lowest[i] = kInfinity;
   }
   return result;

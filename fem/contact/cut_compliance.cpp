@@ -258,6 +258,8 @@ class SmoothRest {
   Eigen::Matrix<double, 6, 9> coefficients_;
 };
 
+constexpr double kSliver = 0.02;    // share of a hat at which what bears is held off by as much as it gives way
+constexpr double kStiffest = 1e8;
 constexpr double kReplaced = 1.3;  // edges: among cut hats that are nearer, the elements' response is replaced
 
 }  // namespace
@@ -344,6 +346,14 @@ void add_cut_compliance(Eigen::MatrixXd& compliance, const CutHats& cuts, const 
         cut_response.block<3, 3>(column, row) += change.transpose();
       }
     }
+  }
+  // A sliver's traction goes to nothing as the body leaves its hat, so that no vertex switches on or off by its share.
+  for (std::size_t k = 0; k < cuts.vertices.size(); ++k) {
+    const Eigen::Index row = 3 * place[cuts.vertices[k]];
+    const double share = cuts.share[static_cast<Eigen::Index>(k)];
+    if (row < 0 || share <= 0.0) continue;
+    const double more = std::min(kStiffest, std::pow(kSliver / share, 2));
+    for (int a = 0; a < (normal_only ? 1 : 3); ++a) cut_response(row + a, row + a) += more * compliance(row + a, row + a);
   }
   compliance += cut_response - whole_response;
 }

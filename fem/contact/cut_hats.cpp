@@ -18,6 +18,8 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr int kAlong = 4;               // cells along an edge
 constexpr double kSingularReach = 0.5;  // of an edge: how far from an edge the pressure rises
 constexpr double kNearEdge = 3.0;       // of a piece's own size: nearer than that its rise is averaged over points
+constexpr double kBentFrom = 0.1;       // bend from which what doesn't overlap begins to be left out
+constexpr double kBentTo = 0.2;         // and is left out
 constexpr double kLeastBearing = 0.02;  // of a hat: less than this below a step doesn't bear
 
 /// The triangles that a triangle falls into when each edge is cut into so many; barycentric corners as columns.
@@ -68,6 +70,8 @@ struct Piece {
   Vector3d at;
   double area;
   double value;
+  double overlap;
+  double within;
   Vector3d plain;
   Vector3d raised;
 };
@@ -123,6 +127,7 @@ class Builder {
       }
       result.triangles.push_back({triangle, std::move(list)});
     }
+    result.by_overlap = by_overlap_;
     return result;
   }
 
@@ -140,10 +145,23 @@ class Builder {
       for (const CoveredPiece& piece : crossed->second->pieces) list.push_back(piece_of(triangle, piece));
     } else {
       for (const Matrix3d& corners : quarters()) {
-        list.push_back(piece_of(triangle, {corners, gap_at_(triangle, corners.rowwise().mean())}));
+        list.push_back(piece_of(triangle, covered_by(triangle, corners)));
       }
     }
     return pieces_.emplace(triangle, std::move(list)).first->second;
+  }
+
+  CoveredPiece covered_by(int triangle, const Matrix3d& corners) const {
+    CoveredPiece piece{corners, gap_at_(triangle, corners.rowwise().mean())};
+    double low = piece.value;
+    double high = piece.value;
+    for (int k = 0; k < 3; ++k) {
+      const double value = gap_at_(triangle, corners.col(k));
+      low = std::min(low, value);
+      if (std::isfinite(value)) high = std::max(high, value);
+    }
+    set_overlap(piece, low, high);
+    return piece;
   }
 
   std::vector<const Stretch*> stretches_near(int triangle) const {
@@ -165,6 +183,8 @@ class Builder {
     const Vector3d middle = covered.corners.rowwise().mean();
     Piece piece;
     piece.value = covered.value;
+    piece.overlap = covered.overlap;
+    piece.within = covered.within;
     piece.area = surface_.triangle_area[triangle] * std::abs(covered.corners.determinant());
     piece.at = corners * middle;
     piece.plain = piece.raised = piece.area * middle;
@@ -199,25 +219,41 @@ class Builder {
       if (found != crossed_.end()) threshold = std::min(threshold, found->second->threshold);
     }
     const double weight = surface_.weight[vertex];
+    double bend = 0.0;
+    for (const int t : surface_.triangles_of[vertex]) {
+      const auto found = crossed_.find(t);
+      if (found != crossed_.end()) bend = std::max(bend, found->second->bend);
+    }
+    const double beyond = 1.0 - std::clamp((bend - kBentFrom) / (kBentTo - kBentFrom), 0.0, 1.0);
+    by_overlap_ = by_overlap_ || beyond < 1.0;
+    // How much of a piece bears, and the gap there.
+    const auto bearing = [&](const Piece& piece) { return piece.overlap + beyond * (1.0 - piece.overlap); };
+    const auto gap_of = [&](const Piece& piece) {
+      const double part = bearing(piece);
+      if (part >= 1.0 || part <= 0.0) return piece.value;
+      // The mean is that over the overlap and over what is beyond it.
+      return (piece.overlap * piece.within + beyond * (piece.value - piece.overlap * piece.within)) / part;
+    };
     double low = 0.0;
     double all = 0.0;
     for_pieces(vertex, [&](int, int corner, std::size_t, const Piece& piece) {
       if (!std::isfinite(piece.value)) return;
-      all += piece.plain[corner];
-      if (piece.value <= threshold) low += piece.plain[corner];
+      all += bearing(piece) * piece.plain[corner];
+      if (piece.value <= threshold) low += bearing(piece) * piece.plain[corner];
     });
     const bool only_high = std::isfinite(threshold) && low < kLeastBearing * weight;
-    const auto bears = [&](const Piece& piece) {
-      return std::isfinite(piece.value) && (only_high || piece.value <= threshold);
+    const auto density_of = [&](const Piece& piece, int corner) {
+      if (!std::isfinite(piece.value) || !(only_high || piece.value <= threshold)) return 0.0;
+      return bearing(piece) * (only_high ? piece.plain[corner] : piece.raised[corner]);
     };
     const double share = (only_high ? all : low) / weight;
     double sum = 0.0;
     double moment = 0.0;
     for_pieces(vertex, [&](int, int corner, std::size_t, const Piece& piece) {
-      if (!bears(piece)) return;
-      const double density = only_high ? piece.plain[corner] : piece.raised[corner];
+      const double density = density_of(piece, corner);
+      if (density <= 0.0) return;
       sum += density;
-      moment += density * piece.value;
+      moment += density * gap_of(piece);
     });
     const double scale = sum > 0.0 ? weight / sum : 0.0;
     for (const int t : surface_.triangles_of[vertex]) cells.try_emplace(t);  // also where an outline leaves no piece
@@ -226,7 +262,7 @@ class Builder {
       if (list.empty()) {
         for (const Piece& each : pieces(triangle)) list.push_back({each.at, each.area, Vector3d::Zero()});
       }
-      if (bears(piece)) list[k].density[corner] = scale * (only_high ? piece.plain[corner] : piece.raised[corner]);
+      list[k].density[corner] = scale * density_of(piece, corner);
     });
     return {sum > 0.0 ? moment / sum : kInfinity, share};
   }
@@ -246,6 +282,7 @@ class Builder {
   std::map<int, const CrossedTriangle*> crossed_;
   std::map<int, std::vector<Stretch>> stretches_;
   std::map<int, std::vector<Piece>> pieces_;
+  bool by_overlap_ = false;
 };
 
 }  // namespace
@@ -259,6 +296,11 @@ std::vector<DensityCell> whole_cells(const ContactSurface& surface, int triangle
     result.push_back({corners * middle, area, area * middle});
   }
   return result;
+}
+
+void set_overlap(CoveredPiece& piece, double low, double high) {
+  piece.overlap = high > low ? std::clamp(-low / (high - low), 0.0, 1.0) : (piece.value < 0.0 ? 1.0 : 0.0);
+  piece.within = piece.overlap < 1.0 ? 0.5 * std::min(low, 0.0) : piece.value;
 }
 
 CutHats cut_hats(const ContactSurface& surface, const std::vector<CrossedTriangle>& crossed,

@@ -20,15 +20,20 @@ struct ContactSurface;
 struct CoveredPiece {
   Eigen::Matrix3d corners;  ///< barycentric, one a column
   double value = 0.0;       ///< mm, mean gap
+  double overlap = 1.0;     ///< share of it where the gap is negative
+  double within = 0.0;      ///< mm, mean gap over that share
 };
 
-/// A surface triangle that a body's outline crosses, or a step in the body.
+/// A surface triangle that a body's outline crosses, or a step in the body, or the border of the overlap under a tip or
+/// a ridge that is narrower than the triangle.
 struct CrossedTriangle {
   int triangle = 0;
   std::vector<CoveredPiece> pieces;
   std::vector<std::array<Eigen::Vector3d, 2>> outline;  ///< barycentric ends of its stretches in the triangle
   /// mm: gaps above it are on the far side of a step; infinity: no step crosses it.
   double threshold = std::numeric_limits<double>::infinity();
+  /// How far the gap is from plane over the triangle, of its range, where it changes its sign; 0: it doesn't.
+  double bend = 0.0;
 };
 
 /// A point that stands for a part of a triangle.
@@ -50,13 +55,18 @@ struct CutHats {
   std::vector<int> vertices;           ///< whose hats are cut, rising
   Eigen::VectorXd gap;                 ///< mm, of each of them: the mean over its density; infinity: nothing bears
   Eigen::VectorXd share;               ///< of each: the part of int phi dA that bears
+  bool by_overlap = false;             ///< what bears depends on the depth, too
 };
+
+/// Sets what overlaps of a piece whose gaps (mm) go from `low` to `high`, as if they were linear.
+void set_overlap(CoveredPiece& piece, double low, double high);
 
 /// A triangle's cells where no hat is cut: its split into 16.
 std::vector<DensityCell> whole_cells(const ContactSurface& surface, int triangle);
 
 /// Makes the densities. `gap_at(triangle, barycentric)` is the gap over a triangle that isn't crossed, infinity for a
-/// miss. `crossed` is sorted by triangle.
+/// miss. `crossed` is sorted by triangle. Contact lies within the overlap: where that is narrower than a hat, as `bend`
+/// says, nothing else of the hat bears.
 CutHats cut_hats(const ContactSurface& surface, const std::vector<CrossedTriangle>& crossed,
                  const std::function<double(int, const Eigen::Vector3d&)>& gap_at);
 

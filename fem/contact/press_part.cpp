@@ -310,7 +310,9 @@ bool PartSolver::take_shift(const ContactAnswer& answer, const std::vector<PartT
     }
     body.pose.translation += shift;
     if (shift.squaredNorm() == 0.0) continue;
-    if (!surface_.flat) now.edge_change = std::max(now.edge_change, shift.norm());
+    if (!surface_.flat || (body.gap.cuts && body.gap.cuts->by_overlap)) {
+      now.edge_change = std::max(now.edge_change, shift.norm());
+    }
     for (std::size_t j = 0; j < vertices.size(); ++j) {
       const int v = vertices[j];
       if (now.owner[v] != static_cast<int>(b) || answer.state[j] == NodeState::open) continue;

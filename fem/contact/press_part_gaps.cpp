@@ -48,7 +48,8 @@ WeightedGap PartSolver::gap_of(std::size_t b, const Iterate& now, PartEffort& ef
     cached.gap = weighted_gap(surface_, shape, body.pose, body.lookup, reach, !soft_[b]);
     cached.pose = body.pose;
     cached.lookup = body.lookup;
-    cached.valid = surface_.flat && surface_.normals.front() == Eigen::Vector3d::UnitZ();
+    cached.valid = surface_.flat && surface_.normals.front() == Eigen::Vector3d::UnitZ() &&
+                   !(cached.gap.cuts && cached.gap.cuts->by_overlap);
     cached.has_slopes = false;
     ++effort.geometry_updates;
     return cached.gap;
