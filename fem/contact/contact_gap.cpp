@@ -76,6 +76,14 @@ class TriangleGap {
       cell(Eigen::Matrix3d::Identity(), splits, kSilhouetteSplits);
     }
     is_crossed = is_crossed || crossed.bend > kBent;
+    // Pieces from before a step was found may lie on both sides of it, where it crosses none of their edges or two.
+    for (const CoveredPiece& piece : std::exchange(crossed.pieces, {})) {
+      if (piece.low < crossed.threshold && piece.high > crossed.threshold) {
+        keep(piece.corners);
+      } else {
+        crossed.pieces.push_back(piece);
+      }
+    }
     if (!is_crossed) crossed.pieces.clear();
   }
 
@@ -319,26 +327,23 @@ class TriangleGap {
     }
     CoveredPiece piece;
     piece.corners = corners;
+    piece.low = kInfinity;
+    piece.high = -kInfinity;
     double weight = 0.0;
-    double low = kInfinity;
-    double high = -kInfinity;
     for (int k = 0; k < 7; ++k) {
       if (const auto value = at(corners * radon_rule().points[k])) {
         piece.value += radon_rule().weights[k] * *value;
         weight += radon_rule().weights[k];
-        low = std::min(low, *value);
-        high = std::max(high, *value);
+        piece.low = std::min(piece.low, *value);
+        piece.high = std::max(piece.high, *value);
       }
     }
     if (weight <= 0.0) return;
-    // A step that crosses none of its edges, or two: cut to pieces small enough for it not to matter.
-    if (share > kMixedPiece && high - low > kSteep * std::sqrt(share * area_)) {
-      for (const Eigen::Matrix3d& part : quarters_of(corners)) keep(part);
-      return;
-    }
     piece.value /= weight;
-    set_overlap(piece, low, high);
-    if (crossed.bend > kBent && share > kLeastStraddling && piece.overlap > 0.0 && piece.overlap < 1.0) {
+    set_overlap(piece);
+    const bool straddles = crossed.bend > kBent && piece.overlap > 0.0 && piece.overlap < 1.0;
+    const bool mixed = piece.low < crossed.threshold && piece.high > crossed.threshold;
+    if ((straddles && share > kLeastStraddling) || (mixed && share > kMixedPiece)) {
       for (const Eigen::Matrix3d& part : quarters_of(corners)) keep(part);
       return;
     }

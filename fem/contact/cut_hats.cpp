@@ -20,7 +20,8 @@ constexpr double kSingularReach = 0.5;  // of an edge: how far from an edge the 
 constexpr double kNearEdge = 3.0;       // of a piece's own size: nearer than that its rise is averaged over points
 constexpr double kBentFrom = 0.1;       // bend from which what doesn't overlap begins to be left out
 constexpr double kBentTo = 0.2;         // and is left out
-constexpr double kLeastBearing = 0.02;  // of a hat: less than this below a step doesn't bear
+constexpr double kLowBears = 0.03;      // of a hat: with so much below a step, only that bears
+constexpr double kHighBears = 0.01;     // with less than this, only what is above it
 
 /// The triangles that a triangle falls into when each edge is cut into so many; barycentric corners as columns.
 std::vector<Matrix3d> split_into(int along) {
@@ -152,15 +153,15 @@ class Builder {
   }
 
   CoveredPiece covered_by(int triangle, const Matrix3d& corners) const {
-    CoveredPiece piece{corners, gap_at_(triangle, corners.rowwise().mean())};
-    double low = piece.value;
-    double high = piece.value;
+    CoveredPiece piece;
+    piece.corners = corners;
+    piece.value = piece.low = piece.high = gap_at_(triangle, corners.rowwise().mean());
     for (int k = 0; k < 3; ++k) {
       const double value = gap_at_(triangle, corners.col(k));
-      low = std::min(low, value);
-      if (std::isfinite(value)) high = std::max(high, value);
+      piece.low = std::min(piece.low, value);
+      if (std::isfinite(value)) piece.high = std::max(piece.high, value);
     }
-    set_overlap(piece, low, high);
+    set_overlap(piece);
     return piece;
   }
 
@@ -241,12 +242,15 @@ class Builder {
       all += bearing(piece) * piece.plain[corner];
       if (piece.value <= threshold) low += bearing(piece) * piece.plain[corner];
     });
-    const bool only_high = std::isfinite(threshold) && low < kLeastBearing * weight;
+    const double lower = std::isfinite(threshold)
+                             ? std::clamp((low / weight - kHighBears) / (kLowBears - kHighBears), 0.0, 1.0)
+                             : 1.0;
     const auto density_of = [&](const Piece& piece, int corner) {
-      if (!std::isfinite(piece.value) || !(only_high || piece.value <= threshold)) return 0.0;
-      return bearing(piece) * (only_high ? piece.plain[corner] : piece.raised[corner]);
+      if (!std::isfinite(piece.value)) return 0.0;
+      const double here = piece.value <= threshold ? lower * piece.raised[corner] : 0.0;
+      return bearing(piece) * (here + (1.0 - lower) * piece.plain[corner]);
     };
-    const double share = (only_high ? all : low) / weight;
+    const double share = (lower * low + (1.0 - lower) * all) / weight;
     double sum = 0.0;
     double moment = 0.0;
     for_pieces(vertex, [&](int, int corner, std::size_t, const Piece& piece) {
@@ -298,9 +302,10 @@ std::vector<DensityCell> whole_cells(const ContactSurface& surface, int triangle
   return result;
 }
 
-void set_overlap(CoveredPiece& piece, double low, double high) {
-  piece.overlap = high > low ? std::clamp(-low / (high - low), 0.0, 1.0) : (piece.value < 0.0 ? 1.0 : 0.0);
-  piece.within = piece.overlap < 1.0 ? 0.5 * std::min(low, 0.0) : piece.value;
+void set_overlap(CoveredPiece& piece) {
+  const double range = piece.high - piece.low;
+  piece.overlap = range > 0.0 ? std::clamp(-piece.low / range, 0.0, 1.0) : (piece.value < 0.0 ? 1.0 : 0.0);
+  piece.within = piece.overlap < 1.0 ? 0.5 * std::min(piece.low, 0.0) : piece.value;
 }
 
 CutHats cut_hats(const ContactSurface& surface, const std::vector<CrossedTriangle>& crossed,

@@ -22,6 +22,8 @@ struct CoveredPiece {
   double value = 0.0;       ///< mm, mean gap
   double overlap = 1.0;     ///< share of it where the gap is negative
   double within = 0.0;      ///< mm, mean gap over that share
+  double low = 0.0;         ///< mm, least gap seen in it
+  double high = 0.0;        ///< mm, largest
 };
 
 /// A surface triangle that a body's outline crosses, or a step in the body, or the border of the overlap under a tip or
@@ -58,8 +60,8 @@ struct CutHats {
   bool by_overlap = false;             ///< what bears depends on the depth, too
 };
 
-/// Sets what overlaps of a piece whose gaps (mm) go from `low` to `high`, as if they were linear.
-void set_overlap(CoveredPiece& piece, double low, double high);
+/// Sets what overlaps of a piece, as if its gap were linear.
+void set_overlap(CoveredPiece& piece);
 
 /// A triangle's cells where no hat is cut: its split into 16.
 std::vector<DensityCell> whole_cells(const ContactSurface& surface, int triangle);
