@@ -56,6 +56,8 @@ class TriangleGap {
     collect_ = collect;
     is_crossed = false;
     crossed = {};
+    slope_sum_.setZero();
+    slope_weight_ = 0.0;
     level_ = level;
     steep_ = steep;
     gap.setZero();
@@ -76,9 +78,10 @@ class TriangleGap {
       cell(Eigen::Matrix3d::Identity(), splits, kSilhouetteSplits);
     }
     is_crossed = is_crossed || crossed.bend > kBent;
+    if (slope_weight_ > 0.0) crossed.slope = slope_sum_ / slope_weight_;
     // Pieces from before a step was found may lie on both sides of it, where it crosses none of their edges or two.
     for (const CoveredPiece& piece : std::exchange(crossed.pieces, {})) {
-      if (piece.low < crossed.threshold && piece.high > crossed.threshold) {
+      if (is_mixed(piece)) {
         keep(piece.corners);
       } else {
         crossed.pieces.push_back(piece);
@@ -236,7 +239,17 @@ class TriangleGap {
     double high = -kInfinity;
     const double bend = bend_of(corners, low, high);
     if (corners.isIdentity(0.0) && low < 0.0 && high > 0.0) crossed.bend = bend;
-    if (bend <= kBent) return false;
+    if (bend <= kBent) {
+      // A linear function's values at the triangle's corners from those at the cell's.
+      Eigen::Vector3d at_corner;
+      for (int k = 0; k < 3; ++k) at_corner[k] = at(corners.col(k)).value_or(0.0);
+      const double share = std::abs(corners.determinant());
+      Eigen::Vector3d trend = corners.transpose().inverse() * at_corner;
+      trend.array() -= trend.mean();
+      slope_sum_ += share * trend;
+      slope_weight_ += share;
+      return false;
+    }
     if (splits > 0) {
       split(corners, 0, splits - 1);
       return true;
@@ -264,6 +277,7 @@ class TriangleGap {
   bool cut_at_step(const Eigen::Matrix3d& corners) {
     double threshold = kInfinity;
     double step = 0.0;
+    Eigen::Vector3d place = Eigen::Vector3d::Zero();
     for (int k = 0; k < 3; ++k) {
       Eigen::Vector3d a = corners.col(k);
       Eigen::Vector3d b = corners.col((k + 1) % 3);
@@ -287,11 +301,12 @@ class TriangleGap {
       if (left > kStepLeft * first && left > step) {
         step = left;
         threshold = 0.5 * (at_a + at_b);
+        place = 0.5 * (a + b);
       }
     }
     if (step == 0.0) return false;
     is_crossed = true;
-    crossed.threshold = std::min(crossed.threshold, threshold);
+    crossed.steps.push_back({place, threshold});
     std::array<bool, 3> low;
     int lows = 0;
     for (int k = 0; k < 3; ++k) lows += low[k] = *at(corners.col(k)) < threshold;
@@ -315,6 +330,11 @@ class TriangleGap {
     for (int k = 0; k < 3; ++k) high[k] = !low[k];
     clip_to_hits(corners, high, 3 - lows, side, piece);
     return true;
+  }
+
+  bool is_mixed(const CoveredPiece& piece) const {
+    const double threshold = threshold_at(crossed, piece.corners.rowwise().mean());
+    return piece.low < threshold && piece.high > threshold;
   }
 
   /// Keeps a covered cell in pieces of at most a quarter of an edge.
@@ -342,8 +362,7 @@ class TriangleGap {
     piece.value /= weight;
     set_overlap(piece);
     const bool straddles = crossed.bend > kBent && piece.overlap > 0.0 && piece.overlap < 1.0;
-    const bool mixed = piece.low < crossed.threshold && piece.high > crossed.threshold;
-    if ((straddles && share > kLeastStraddling) || (mixed && share > kMixedPiece)) {
+    if ((straddles && share > kLeastStraddling) || (is_mixed(piece) && share > kMixedPiece)) {
       for (const Eigen::Matrix3d& part : quarters_of(corners)) keep(part);
       return;
     }
@@ -380,6 +399,8 @@ class TriangleGap {
   double level_ = 0.0;
   double steep_ = 1.0;
   bool collect_ = false;
+  Eigen::Vector3d slope_sum_;  // of the trends of plane cells, by their share of the triangle
+  double slope_weight_ = 0.0;
 };
 
 }  // namespace

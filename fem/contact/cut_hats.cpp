@@ -60,10 +60,35 @@ double distance_to(const Vector3d& point, const std::array<Vector3d, 2>& stretch
   return (point - stretch[0] - t * along).norm();
 }
 
-/// A stretch of outline in the gel frame; gaps above `threshold` aren't on its bearing side.
+/// A step's point in the gel frame, with the gap's trend beside it.
+struct Step {
+  Vector3d at;
+  double value;
+  Vector3d gradient;
+
+  double threshold(const Vector3d& point) const { return value + gradient.dot(point - at); }
+};
+
+/// What is nearest of them decides; infinity: there are none.
+double threshold_by(const std::vector<const Step*>& steps, const Vector3d& point) {
+  const Step* nearest = nullptr;
+  for (const Step* step : steps) {
+    if (!nearest || (step->at - point).squaredNorm() < (nearest->at - point).squaredNorm()) nearest = step;
+  }
+  return nearest ? nearest->threshold(point) : kInfinity;
+}
+
+/// In the plane of the corners (columns): of the linear function with these values at them.
+Vector3d gradient_of(const Matrix3d& corners, const Vector3d& values) {
+  Eigen::Matrix<double, 2, 3> edges;
+  edges << (corners.col(1) - corners.col(0)).transpose(), (corners.col(2) - corners.col(0)).transpose();
+  const Eigen::Vector2d rise(values[1] - values[0], values[2] - values[0]);
+  return edges.transpose() * (edges * edges.transpose()).ldlt().solve(rise);
+}
+
+/// A stretch of outline in the gel frame.
 struct Stretch {
   std::array<Vector3d, 2> ends;
-  double threshold;
 };
 
 /// A piece with its integrals against the corners' hats, plain and with the rise towards edges.
@@ -86,7 +111,10 @@ class Builder {
       crossed_[t.triangle] = &t;
       const Matrix3d corners = corners_of(surface, t.triangle);
       std::vector<Stretch>& own = stretches_[t.triangle];
-      for (const auto& ends : t.outline) own.push_back({{corners * ends[0], corners * ends[1]}, t.threshold});
+      for (const auto& ends : t.outline) own.push_back({{corners * ends[0], corners * ends[1]}});
+      if (t.steps.empty()) continue;
+      const Vector3d gradient = gradient_of(corners, t.slope);
+      for (const StepPoint& step : t.steps) steps_[t.triangle].push_back({corners * step.at, step.value, gradient});
     }
   }
 
@@ -179,6 +207,15 @@ class Builder {
     return result;
   }
 
+  /// Of all triangles that share a corner with this one, or have this vertex.
+  void add_steps(const std::vector<int>& triangles, std::vector<const Step*>& steps) const {
+    for (const int t : triangles) {
+      const auto found = steps_.find(t);
+      if (found == steps_.end()) continue;
+      for (const Step& step : found->second) steps.push_back(&step);
+    }
+  }
+
   Piece piece_of(int triangle, const CoveredPiece& covered) const {
     const Matrix3d corners = corners_of(surface_, triangle);
     const Vector3d middle = covered.corners.rowwise().mean();
@@ -191,11 +228,12 @@ class Builder {
     piece.plain = piece.raised = piece.area * middle;
     const double reach = kSingularReach * std::sqrt(surface_.triangle_area[triangle] * 4.0 / std::sqrt(3.0));
     const double size = std::sqrt(piece.area);
+    std::vector<const Step*> steps;
+    for (const int v : surface_.triangles[triangle]) add_steps(surface_.triangles_of[v], steps);
+    if (piece.value > threshold_by(steps, piece.at)) return piece;  // pressure doesn't rise at a step's foot
     std::vector<const Stretch*> near;
     for (const Stretch* stretch : stretches_near(triangle)) {
-      if (piece.value <= stretch->threshold && distance_to(piece.at, stretch->ends) < reach + 2.0 * size) {
-        near.push_back(stretch);
-      }
+      if (distance_to(piece.at, stretch->ends) < reach + 2.0 * size) near.push_back(stretch);
     }
     if (near.empty()) return piece;
     const auto rise = [&](const Vector3d& point, double least) {
@@ -214,11 +252,9 @@ class Builder {
 
   /// Adds a vertex's density; its mean gap (mm) and the share of its hat that bears.
   std::pair<double, double> add_vertex(int vertex, std::map<int, std::vector<DensityCell>>& cells) {
-    double threshold = kInfinity;
-    for (const int t : surface_.triangles_of[vertex]) {
-      const auto found = crossed_.find(t);
-      if (found != crossed_.end()) threshold = std::min(threshold, found->second->threshold);
-    }
+    std::vector<const Step*> steps;
+    add_steps(surface_.triangles_of[vertex], steps);
+    const auto is_low = [&](const Piece& piece) { return piece.value <= threshold_by(steps, piece.at); };
     const double weight = surface_.weight[vertex];
     double bend = 0.0;
     for (const int t : surface_.triangles_of[vertex]) {
@@ -240,14 +276,14 @@ class Builder {
     for_pieces(vertex, [&](int, int corner, std::size_t, const Piece& piece) {
       if (!std::isfinite(piece.value)) return;
       all += bearing(piece) * piece.plain[corner];
-      if (piece.value <= threshold) low += bearing(piece) * piece.plain[corner];
+      if (is_low(piece)) low += bearing(piece) * piece.plain[corner];
     });
-    const double lower = std::isfinite(threshold)
+    const double lower = !steps.empty()
                              ? std::clamp((low / weight - kHighBears) / (kLowBears - kHighBears), 0.0, 1.0)
                              : 1.0;
     const auto density_of = [&](const Piece& piece, int corner) {
       if (!std::isfinite(piece.value)) return 0.0;
-      const double here = piece.value <= threshold ? lower * piece.raised[corner] : 0.0;
+      const double here = is_low(piece) ? lower * piece.raised[corner] : 0.0;
       return bearing(piece) * (here + (1.0 - lower) * piece.plain[corner]);
     };
     const double share = (lower * low + (1.0 - lower) * all) / weight;
@@ -285,6 +321,7 @@ class Builder {
   const std::function<double(int, const Vector3d&)>& gap_at_;
   std::map<int, const CrossedTriangle*> crossed_;
   std::map<int, std::vector<Stretch>> stretches_;
+  std::map<int, std::vector<Step>> steps_;
   std::map<int, std::vector<Piece>> pieces_;
   bool by_overlap_ = false;
 };
@@ -300,6 +337,14 @@ std::vector<DensityCell> whole_cells(const ContactSurface& surface, int triangle
     result.push_back({corners * middle, area, area * middle});
   }
   return result;
+}
+
+double threshold_at(const CrossedTriangle& crossed, const Vector3d& point) {
+  const StepPoint* nearest = nullptr;
+  for (const StepPoint& step : crossed.steps) {
+    if (!nearest || (step.at - point).squaredNorm() < (nearest->at - point).squaredNorm()) nearest = &step;
+  }
+  return nearest ? nearest->value + crossed.slope.dot(point - nearest->at) : kInfinity;
 }
 
 void set_overlap(CoveredPiece& piece) {

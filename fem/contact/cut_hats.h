@@ -26,14 +26,20 @@ struct CoveredPiece {
   double high = 0.0;        ///< mm, largest
 };
 
+/// A point of a step in the body.
+struct StepPoint {
+  Eigen::Vector3d at;  ///< barycentric
+  double value = 0.0;  ///< mm, halfway between the gaps on both sides
+};
+
 /// A surface triangle that a body's outline crosses, or a step in the body, or the border of the overlap under a tip or
 /// a ridge that is narrower than the triangle.
 struct CrossedTriangle {
   int triangle = 0;
   std::vector<CoveredPiece> pieces;
   std::vector<std::array<Eigen::Vector3d, 2>> outline;  ///< barycentric ends of its stretches in the triangle
-  /// mm: gaps above it are on the far side of a step; infinity: no step crosses it.
-  double threshold = std::numeric_limits<double>::infinity();
+  std::vector<StepPoint> steps;                         ///< where steps were found; empty: none
+  Eigen::Vector3d slope = Eigen::Vector3d::Zero();      ///< mm: the gap's trend beside steps, a linear one's corner values
   /// How far the gap is from plane over the triangle, of its range, where it changes its sign; 0: it doesn't.
   double bend = 0.0;
 };
@@ -59,6 +65,9 @@ struct CutHats {
   Eigen::VectorXd share;               ///< of each: the part of int phi dA that bears
   bool by_overlap = false;             ///< what bears depends on the depth, too
 };
+
+/// The gap (mm) at a point (barycentric) beyond which it is on the far side of the nearest step; infinity: no steps.
+double threshold_at(const CrossedTriangle& crossed, const Eigen::Vector3d& point);
 
 /// Sets what overlaps of a piece, as if its gap were linear.
 void set_overlap(CoveredPiece& piece);
