@@ -15,6 +15,15 @@ constexpr int kSilhouetteSplits = 2;  // levels of splitting on the silhouette
 constexpr int kBisections = 34;       // of a cell's edge: a quarter of a triangle's to 1e-11
 constexpr int kFalsePositions = 40;   // likewise, where the distance to the silhouette is known: some 5 do
 constexpr double kSteep = 2.0;        // rise within a triangle, in its size, from which the body's side is seen
+constexpr double kBent = 0.1;         // of a triangle's range of gaps: off its corners' plane by more, it may hold a step
+constexpr double kFlat = 1e-6;        // of a triangle's size: ranges below it hold no step
+constexpr double kMixedPiece = 1e-3;  // of a triangle: larger pieces don't lie on both sides of a step
+constexpr double kBulge = 0.5;      // of the depth: the gel doesn't rise higher beside a contact
+constexpr double kCutMargin = 0.5;  // of a triangle's size, on top
+constexpr double kLeastStraddling = 1.0 / 200.0;  // likewise, where the gap changes its sign
+constexpr double kLeastPiece = 1e-9;  // of a triangle
+constexpr int kStepBisections = 8;
+constexpr double kStepLeft = 0.6;  // of a difference, left where the interval is so much smaller: a step
 constexpr double kBodiesLarge = 4.0;  // bodies larger than this times a triangle can't hide between its corners
 
 /// Integrates over one surface triangle; coordinates inside it are barycentric.
@@ -31,6 +40,9 @@ class TriangleGap {
   Eigen::Vector3d gap;
   Eigen::Vector3d covered;
   double lowest = kInfinity;
+  /// What crosses it, if asked for.
+  CrossedTriangle crossed;
+  bool is_crossed = false;
 
   /// Gap at one surface point.
   double corner_gap(const Eigen::Vector3d& corner, const Eigen::Vector3d& normal) const {
@@ -40,7 +52,12 @@ class TriangleGap {
   /// Where the gap is more than `steep` above `level` the body's side is seen, which doesn't bear: it fades out, up to
   /// twice that.
   void integrate(const std::array<Eigen::Vector3d, 3>& corners, const std::array<Eigen::Vector3d, 3>& normals,
-                 bool one_normal, double area, double level, double steep) {
+                 bool one_normal, double area, double level, double steep, bool collect) {
+    collect_ = collect;
+    is_crossed = false;
+    crossed = {};
+    slope_sum_.setZero();
+    slope_weight_ = 0.0;
     level_ = level;
     steep_ = steep;
     gap.setZero();
@@ -60,7 +77,29 @@ class TriangleGap {
     } else {
       cell(Eigen::Matrix3d::Identity(), splits, kSilhouetteSplits);
     }
+    is_crossed = is_crossed || crossed.bend > kBent;
+    if (slope_weight_ > 0.0) crossed.slope = slope_sum_ / slope_weight_;
+    // Pieces from before a step was found may lie on both sides of it, where it crosses none of their edges or two.
+    for (const CoveredPiece& piece : std::exchange(crossed.pieces, {})) {
+      if (is_mixed(piece)) {
+        keep(piece.corners);
+      } else {
+        crossed.pieces.push_back(piece);
+      }
+    }
+    if (!is_crossed) crossed.pieces.clear();
   }
+
+  /// The gap at a point of the triangle last set up.
+  void set_up(const std::array<Eigen::Vector3d, 3>& corners, const std::array<Eigen::Vector3d, 3>& normals,
+              bool one_normal) {
+    for (int k = 0; k < 3; ++k) {
+      points_.col(k) = object_from_gel_ * corners[k];
+      normals_.col(k) = object_from_gel_.turn(normals[k]);
+    }
+    one_normal_ = one_normal;
+  }
+  double gap_at(const Eigen::Vector3d& b) const { return at(b).value_or(kInfinity); }
 
  private:
   std::optional<double> at(const Eigen::Vector3d& b) const { return entry(points_ * b, direction(b)); }
@@ -97,7 +136,7 @@ class TriangleGap {
       for (int k = 0; k < 3; ++k) reach2 = std::max(reach2, (points_ * (corners.col(k) - middle)).squaredNorm());
       const double inside = silhouette(middle);
       if (inside * inside > reach2) {
-        if (inside > 0.0) whole(corners);
+        if (inside > 0.0 && !(collect_ && bent_cell(corners, silhouette_splits))) whole(corners);
         return;
       }
       for (int k = 0; k < 3; ++k) corner_hits += corner_hit[k] = silhouette(corners.col(k)) >= 0.0;
@@ -110,8 +149,10 @@ class TriangleGap {
         hits += value[k].has_value();
       }
       if (hits + corner_hits == 0) return;
+      if (collect_ && hits + corner_hits == 10 && bent_cell(corners, silhouette_splits)) return;
       if (hits + corner_hits == 10) {
         const double area = area_ * std::abs(corners.determinant());
+        if (collect_) keep(corners);
         for (int k = 0; k < 7; ++k) {
           add(corners * radon_rule().points[k], *value[k], radon_rule().weights[k] * area);
         }
@@ -128,13 +169,15 @@ class TriangleGap {
   }
 
   void split(const Eigen::Matrix3d& c, int forced_splits, int silhouette_splits) {
+    for (const Eigen::Matrix3d& part : quarters_of(c)) cell(part, forced_splits, silhouette_splits);
+  }
+
+  static std::array<Eigen::Matrix3d, 4> quarters_of(const Eigen::Matrix3d& c) {
     const Eigen::Vector3d m01 = 0.5 * (c.col(0) + c.col(1));
     const Eigen::Vector3d m12 = 0.5 * (c.col(1) + c.col(2));
     const Eigen::Vector3d m20 = 0.5 * (c.col(2) + c.col(0));
-    cell(triangle(c.col(0), m01, m20), forced_splits, silhouette_splits);
-    cell(triangle(m01, c.col(1), m12), forced_splits, silhouette_splits);
-    cell(triangle(m20, m12, c.col(2)), forced_splits, silhouette_splits);
-    cell(triangle(m01, m12, m20), forced_splits, silhouette_splits);
+    return {triangle(c.col(0), m01, m20), triangle(m01, c.col(1), m12), triangle(m20, m12, c.col(2)),
+            triangle(m01, m12, m20)};
   }
 
   static Eigen::Matrix3d triangle(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
@@ -176,13 +219,159 @@ class TriangleGap {
   }
 
   void clip(const Eigen::Matrix3d& c, const std::array<bool, 3>& hit, int hits) {
+    std::vector<Eigen::Vector3d> ends;
     clip_to_hits(
-        c, hit, hits, [&](const auto& in, const auto& out) { return crossing(in, out); },
+        c, hit, hits,
+        [&](const auto& in, const auto& out) {
+          ends.push_back(crossing(in, out));
+          return ends.back();
+        },
         [&](const auto& a, const auto& b, const auto& d) { whole(triangle(a, b, d)); });
+    if (!collect_) return;
+    is_crossed = true;
+    crossed.outline.push_back({ends[0], ends[1]});
+  }
+
+  /// A cell that hits all over, where the gap isn't plane: split further, and cut at the step if that is it. False: it
+  /// is to be taken as it is.
+  bool bent_cell(const Eigen::Matrix3d& corners, int splits) {
+    double low = kInfinity;
+    double high = -kInfinity;
+    const double bend = bend_of(corners, low, high);
+    if (corners.isIdentity(0.0) && low < 0.0 && high > 0.0) crossed.bend = bend;
+    if (bend <= kBent) {
+      // A linear function's values at the triangle's corners from those at the cell's.
+      Eigen::Vector3d at_corner;
+      for (int k = 0; k < 3; ++k) at_corner[k] = at(corners.col(k)).value_or(0.0);
+      const double share = std::abs(corners.determinant());
+      Eigen::Vector3d trend = corners.transpose().inverse() * at_corner;
+      trend.array() -= trend.mean();
+      slope_sum_ += share * trend;
+      slope_weight_ += share;
+      return false;
+    }
+    if (splits > 0) {
+      split(corners, 0, splits - 1);
+      return true;
+    }
+    return cut_at_step(corners);
+  }
+
+  /// How far the gap is from plane, of its range; 0 where that is next to nothing.
+  double bend_of(const Eigen::Matrix3d& corners, double& low, double& high) const {
+    Eigen::Vector3d at_corner;
+    for (int k = 0; k < 3; ++k) at_corner[k] = at(corners.col(k)).value_or(0.0);
+    low = at_corner.minCoeff();
+    high = at_corner.maxCoeff();
+    double off = 0.0;
+    for (int k = 0; k < 7; ++k) {
+      const double value = at(corners * radon_rule().points[k]).value_or(0.0);
+      low = std::min(low, value);
+      high = std::max(high, value);
+      off = std::max(off, std::abs(value - at_corner.dot(radon_rule().points[k])));
+    }
+    return high - low > kFlat * body_radius_ ? off / (high - low) : 0.0;
+  }
+
+  /// Cuts a small cell at the step that crosses it; false if it's only bent.
+  bool cut_at_step(const Eigen::Matrix3d& corners) {
+    double threshold = kInfinity;
+    double step = 0.0;
+    Eigen::Vector3d place = Eigen::Vector3d::Zero();
+    for (int k = 0; k < 3; ++k) {
+      Eigen::Vector3d a = corners.col(k);
+      Eigen::Vector3d b = corners.col((k + 1) % 3);
+      double at_a = *at(a);
+      double at_b = *at(b);
+      const double first = std::abs(at_b - at_a);
+      if (first <= kFlat * body_radius_) continue;
+      for (int n = 0; n < kStepBisections; ++n) {
+        const Eigen::Vector3d middle = 0.5 * (a + b);
+        const auto value = at(middle);
+        if (!value) return false;
+        if (std::abs(*value - at_a) > std::abs(at_b - *value)) {
+          b = middle;
+          at_b = *value;
+        } else {
+          a = middle;
+          at_a = *value;
+        }
+      }
+      const double left = std::abs(at_b - at_a);
+      if (left > kStepLeft * first && left > step) {
+        step = left;
+        threshold = 0.5 * (at_a + at_b);
+        place = 0.5 * (a + b);
+      }
+    }
+    if (step == 0.0) return false;
+    is_crossed = true;
+    crossed.steps.push_back({place, threshold});
+    std::array<bool, 3> low;
+    int lows = 0;
+    for (int k = 0; k < 3; ++k) lows += low[k] = *at(corners.col(k)) < threshold;
+    std::vector<Eigen::Vector3d> ends;
+    const auto side = [&](const Eigen::Vector3d& inside, const Eigen::Vector3d& outside) {
+      Eigen::Vector3d in = inside;
+      Eigen::Vector3d out = outside;
+      const bool in_low = *at(in) < threshold;
+      for (int n = 0; n < kBisections; ++n) {
+        const Eigen::Vector3d middle = 0.5 * (in + out);
+        const auto value = at(middle);
+        ((value && *value < threshold) == in_low ? in : out) = middle;
+      }
+      ends.push_back(in);
+      return in;
+    };
+    const auto piece = [&](const auto& a, const auto& b, const auto& d) { whole(triangle(a, b, d)); };
+    clip_to_hits(corners, low, lows, side, piece);
+    crossed.outline.push_back({ends[0], ends[1]});
+    std::array<bool, 3> high;
+    for (int k = 0; k < 3; ++k) high[k] = !low[k];
+    clip_to_hits(corners, high, 3 - lows, side, piece);
+    return true;
+  }
+
+  bool is_mixed(const CoveredPiece& piece) const {
+    const double threshold = threshold_at(crossed, piece.corners.rowwise().mean());
+    return piece.low < threshold && piece.high > threshold;
+  }
+
+  /// Keeps a covered cell in pieces of at most a quarter of an edge.
+  void keep(const Eigen::Matrix3d& corners) {
+    const double share = std::abs(corners.determinant());
+    if (share < kLeastPiece) return;  // an outline along an edge cuts off nothing
+    if (share > 1.5 / 16.0) {
+      for (const Eigen::Matrix3d& part : quarters_of(corners)) keep(part);
+      return;
+    }
+    CoveredPiece piece;
+    piece.corners = corners;
+    piece.low = kInfinity;
+    piece.high = -kInfinity;
+    double weight = 0.0;
+    for (int k = 0; k < 7; ++k) {
+      if (const auto value = at(corners * radon_rule().points[k])) {
+        piece.value += radon_rule().weights[k] * *value;
+        weight += radon_rule().weights[k];
+        piece.low = std::min(piece.low, *value);
+        piece.high = std::max(piece.high, *value);
+      }
+    }
+    if (weight <= 0.0) return;
+    piece.value /= weight;
+    set_overlap(piece);
+    const bool straddles = crossed.bend > kBent && piece.overlap > 0.0 && piece.overlap < 1.0;
+    if ((straddles && share > kLeastStraddling) || (is_mixed(piece) && share > kMixedPiece)) {
+      for (const Eigen::Matrix3d& part : quarters_of(corners)) keep(part);
+      return;
+    }
+    crossed.pieces.push_back(piece);
   }
 
   /// A cell that hits all over, but for slivers at a curved silhouette.
   void whole(const Eigen::Matrix3d& corners) {
+    if (collect_) keep(corners);
     const double area = area_ * std::abs(corners.determinant());
     const RadonRule& rule = radon_rule();
     for (int k = 0; k < 7; ++k) {
@@ -209,6 +398,9 @@ class TriangleGap {
   double area_ = 0.0;
   double level_ = 0.0;
   double steep_ = 1.0;
+  bool collect_ = false;
+  Eigen::Vector3d slope_sum_;  // of the trends of plane cells, by their share of the triangle
+  double slope_weight_ = 0.0;
 };
 
 }  // namespace
@@ -226,7 +418,9 @@ ContactSurface::ContactSurface(std::vector<Eigen::Vector3d> places, std::vector<
   TS_ASSERT(static_cast<std::size_t>(mass.rows()) == n);
   normals.assign(n, Eigen::Vector3d::Zero());
   around.resize(n);
+  triangles_of.resize(n);
   for (const auto& t : triangles) {
+    for (const int v : t) triangles_of[v].push_back(static_cast<int>(triangle_area.size()));
     const Eigen::Vector3d middle = (vertices[t[0]] + vertices[t[1]] + vertices[t[2]]) / 3.0;
     double size = 0.0;
     for (const int v : t) size = std::max(size, (vertices[v] - middle).norm());
@@ -267,7 +461,7 @@ void WeightedGap::move_along_normals(const Eigen::VectorXd& weight, double dista
 }
 
 WeightedGap weighted_gap(const ContactSurface& surface, const ContactShape& shape,
-                         const RigidTransform& gel_from_object, const PatchMotion& lookup, GapReach asked) {
+                         const RigidTransform& gel_from_object, const PatchMotion& lookup, GapReach asked, bool cut) {
   const auto n = static_cast<Eigen::Index>(surface.vertices.size());
   WeightedGap result;
   result.plain = Eigen::VectorXd::Zero(n);
@@ -295,6 +489,8 @@ WeightedGap weighted_gap(const ContactSurface& surface, const ContactShape& shap
           const double least = corner_gap.minCoeff();
           result.reach = std::max(0.0, least) + asked.margin + asked.of_depth * std::max(0.0, -least);
         }
+        std::vector<CrossedTriangle> crossed;
+        std::vector<double> lowest_in(surface.triangles.size(), kInfinity);
         for (std::size_t t = 0; t < surface.triangles.size(); ++t) {
           const auto& index = surface.triangles[t];
           const std::array<Eigen::Vector3d, 3> corners{moved[index[0]], moved[index[1]], moved[index[2]]};
@@ -321,14 +517,35 @@ WeightedGap weighted_gap(const ContactSurface& surface, const ContactShape& shap
             for (const int u : surface.around[index[k]]) least = std::min(least, corner_gap[u]);
           }
           if (!std::isfinite(least)) least = std::numeric_limits<double>::max();  // a small body between the vertices
-          triangle.integrate(corners, normals, one_normal, surface.triangle_area[t], least, kSteep * size);
+          triangle.integrate(corners, normals, one_normal, surface.triangle_area[t], least, kSteep * size, cut);
           for (int k = 0; k < 3; ++k) {
             result.plain[index[k]] += triangle.gap[k];
             covered[index[k]] += triangle.covered[k];
             result.lowest[index[k]] = std::min(result.lowest[index[k]], triangle.lowest);
           }
           result.deepest = std::min(result.deepest, triangle.lowest);
+          if (triangle.is_crossed) {
+            lowest_in[t] = triangle.lowest;
+            crossed.push_back(std::move(triangle.crossed));
+            crossed.back().triangle = static_cast<int>(t);
+          }
         }
+        // What the gel can't reach cuts nothing.
+        const double reached = std::max(0.0, result.deepest) + kBulge * std::max(0.0, -result.deepest);
+        std::erase_if(crossed, [&](const CrossedTriangle& t) {
+          return lowest_in[static_cast<std::size_t>(t.triangle)] >
+                 reached + kCutMargin * surface.triangle_size[static_cast<std::size_t>(t.triangle)];
+        });
+        if (crossed.empty()) return;
+        const auto gap_at = [&](int t, const Eigen::Vector3d& b) {
+          const auto& index = surface.triangles[t];
+          const std::array<Eigen::Vector3d, 3> corners{moved[index[0]], moved[index[1]], moved[index[2]]};
+          const std::array<Eigen::Vector3d, 3> normals{surface.normals[index[0]], surface.normals[index[1]],
+                                                       surface.normals[index[2]]};
+          triangle.set_up(corners, normals, normals[0] == normals[1] && normals[0] == normals[2]);
+          return triangle.gap_at(b);
+        };
+        result.cuts = std::make_shared<const CutHats>(cut_hats(surface, crossed, gap_at));
       },
       shape);
   const double depth = std::max(0.0, -result.deepest);
@@ -342,6 +559,16 @@ WeightedGap weighted_gap(const ContactSurface& surface, const ContactShape& shap
     if (share < kBearingShare) result.edge[i] = surface.weight[i] * (kBearingShare - share) / kBearingFade;
     result.plain[i] *= surface.weight[i] / covered[i];
     result.weighted[i] = result.plain[i] + result.edge[i] * depth;
+  }
+  for (std::size_t k = 0; result.cuts && k < result.cuts->vertices.size(); ++k) {
+    const int i = result.cuts->vertices[k];
+    const double share = result.cuts->share[static_cast<Eigen::Index>(k)];
+    const double gap = result.cuts->gap[static_cast<Eigen::Index>(k)];
+    if (skipped[i]) continue;
+    const bool far = !std::isfinite(gap) || share < kLeastPiece;
+    result.plain[i] = result.weighted[i] = far ? kInfinity : surface.weight[i] * gap;
+    result.edge[i] = 0.0;
+    if (far) result.lowest[i] = kInfinity;
   }
   return result;
 }

@@ -4,9 +4,11 @@
 #include <Eigen/Core>
 #include <array>
 #include <limits>
+#include <memory>
 #include <vector>
 
 #include "core/transform.h"
+#include "fem/contact/cut_hats.h"
 #include "fem/contact/patch_motion.h"
 #include "fem/elements/compliance.h"
 #include "fem/shapes/contact_shape.h"
@@ -29,6 +31,7 @@ struct ContactSurface {
   std::vector<Eigen::Vector3d> normals;  ///< unit, outward, the triangles' mean weighted by area
   Eigen::VectorXd weight;                ///< int phi_i dA, mm^2
   std::vector<std::vector<int>> around;  ///< neighbours of each vertex by edges, rising
+  std::vector<std::vector<int>> triangles_of;  ///< that have the vertex as a corner, rising
   std::vector<double> triangle_size;     ///< mm, from a triangle's middle to its farthest corner
   std::vector<double> triangle_area;     ///< mm^2
   bool flat = true;                      ///< one normal all over
@@ -62,6 +65,7 @@ struct WeightedGap {
   Eigen::VectorXd lowest;    ///< mm, the least gap seen within the hat's support; infinity: far
   double deepest = std::numeric_limits<double>::infinity();  ///< mm, the least gap of all; negative: overlap
   double reach = std::numeric_limits<double>::infinity();  ///< mm: vertices that come nearer than this aren't left out
+  std::shared_ptr<const CutHats> cuts;                     ///< none: no outline crosses the surface
 
   /// The gap after the body has moved by `distance` (mm) along the normal of a flat surface, exactly; `weight` is the
   /// surface's.
@@ -79,6 +83,7 @@ struct GapReach {
 /// body, are split, and the cells on the silhouette clipped at it. The gel is looked up where `lookup` has moved it
 /// along itself.
 WeightedGap weighted_gap(const ContactSurface& surface, const ContactShape& shape,
-                         const RigidTransform& gel_from_object, const PatchMotion& lookup = {}, GapReach reach = {});
+                         const RigidTransform& gel_from_object, const PatchMotion& lookup = {}, GapReach reach = {},
+                         bool cut = false);
 
 }  // namespace touchstone::fem

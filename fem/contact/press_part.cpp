@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "fem/contact/cut_compliance.h"
 #include "fem/contact/press_part_iterate.h"
 
 namespace touchstone::fem {
@@ -154,8 +155,27 @@ ContactProblem PartSolver::problem(const PressSnapshot& from, const std::vector<
   const auto m = static_cast<Eigen::Index>(vertices.size());
   ContactProblem result;
   result.components = c;
-  if (elastic_) {
+  std::vector<std::shared_ptr<const CutHats>> cuts;
+  bool any_cuts = false;
+  for (const Body& body : now.bodies) {
+    cuts.push_back(body.gap.cuts);
+    any_cuts = any_cuts || body.gap.cuts;
+  }
+  std::vector<int> owner;
+  for (const int v : vertices) owner.push_back(now.owner[v]);
+  if (use_combined_ && !elastic_ && cuts == combined_cuts_ && vertices == combined_vertices_ &&
+      owner == combined_owner_) {
+    // It holds as it is.
+  } else if (elastic_ || any_cuts) {
     combined_ = block_.compliance();
+    for (std::size_t b = 0; b < bodies_.size(); ++b) {
+      if (!cuts[b]) continue;
+      add_cut_compliance(combined_, *cuts[b], surface_, gel_, vertices, block_.axes(), c == 1 && surface_.flat);
+    }
+    combined_cuts_ = cuts;
+    combined_vertices_ = vertices;
+    combined_owner_ = owner;
+    use_combined_ = true;
     const auto normals = Eigen::seqN(Eigen::fix<0>, m, Eigen::fix<3>);
     const bool normal_only = !friction_ && surface_.flat;  // what a body does along the surface then matters to nobody
     if (normal_only) combined_normal_ = combined_(normals, normals);
@@ -179,6 +199,9 @@ ContactProblem PartSolver::problem(const PressSnapshot& from, const std::vector<
       combined_normal_ = combined_(normals, normals);
     }
     memory_.forget();
+  } else if (use_combined_) {
+    use_combined_ = false;
+    memory_.forget();
   }
   for (const PartTarget& target : targets) {
     if (target.turned[0] || target.turned[1] || target.turned[2]) memory_.forget();  // its border changes
@@ -186,7 +209,7 @@ ContactProblem PartSolver::problem(const PressSnapshot& from, const std::vector<
   if (c == 3) {
     result.compliance.emplace(compliance());
   } else {
-    result.compliance.emplace(elastic_ ? combined_normal_ : block_.normal_compliance());
+    result.compliance.emplace(use_combined_ ? combined_normal_ : block_.normal_compliance());
   }
   result.gap.resize(m);
   for (Eigen::Index j = 0; j < m; ++j) result.gap[j] = now.gap(vertices[j]);
@@ -287,7 +310,9 @@ bool PartSolver::take_shift(const ContactAnswer& answer, const std::vector<PartT
     }
     body.pose.translation += shift;
     if (shift.squaredNorm() == 0.0) continue;
-    if (!surface_.flat) now.edge_change = std::max(now.edge_change, shift.norm());
+    if (!surface_.flat || (body.gap.cuts && body.gap.cuts->by_overlap)) {
+      now.edge_change = std::max(now.edge_change, shift.norm());
+    }
     for (std::size_t j = 0; j < vertices.size(); ++j) {
       const int v = vertices[j];
       if (now.owner[v] != static_cast<int>(b) || answer.state[j] == NodeState::open) continue;

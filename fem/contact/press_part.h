@@ -128,7 +128,7 @@ class PartSolver {
                         const std::vector<double>& pressures) const;
   Eigen::Vector3d relative_at(const PressSnapshot& snapshot, int vertex) const;
   Eigen::Ref<const Eigen::MatrixXd> compliance() const {
-    return elastic_ ? Eigen::Ref<const Eigen::MatrixXd>(combined_) : block_.compliance();
+    return use_combined_ ? Eigen::Ref<const Eigen::MatrixXd>(combined_) : block_.compliance();
   }
   void refuse_too_deep(double deepest) const;
 
@@ -144,8 +144,12 @@ class PartSolver {
   std::vector<double> mu_;
   ContactSurface surface_;
   ContactBlock block_;
-  Eigen::MatrixXd combined_;         ///< the block's compliance with the elastic bodies' added
+  Eigen::MatrixXd combined_;         ///< the block's compliance with the elastic bodies' and what cut hats change
   Eigen::MatrixXd combined_normal_;  ///< its normal rows and columns
+  bool use_combined_ = false;
+  std::vector<std::shared_ptr<const CutHats>> combined_cuts_;  ///< per body: those in `combined_`
+  std::vector<int> combined_vertices_;                         ///< and the block's vertices
+  std::vector<int> combined_owner_;                            ///< and theirs
   ContactMemory memory_;
   std::vector<std::array<bool, 6>> remembered_axes_;
   struct CachedGap;

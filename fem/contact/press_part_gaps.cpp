@@ -45,10 +45,11 @@ WeightedGap PartSolver::gap_of(std::size_t b, const Iterate& now, PartEffort& ef
   // Some more than what is asked for, so that it serves the next, deeper place, too.
   const GapReach reach = surface_.flat ? GapReach{now.reach + kLeastReach * gel_.thickness, 1.5 * kBulge} : GapReach{};
   const auto evaluate = [&] {
-    cached.gap = weighted_gap(surface_, shape, body.pose, body.lookup, reach);
+    cached.gap = weighted_gap(surface_, shape, body.pose, body.lookup, reach, !soft_[b]);
     cached.pose = body.pose;
     cached.lookup = body.lookup;
-    cached.valid = surface_.flat && surface_.normals.front() == Eigen::Vector3d::UnitZ();
+    cached.valid = surface_.flat && surface_.normals.front() == Eigen::Vector3d::UnitZ() &&
+                   !(cached.gap.cuts && cached.gap.cuts->by_overlap);
     cached.has_slopes = false;
     ++effort.geometry_updates;
     return cached.gap;
@@ -72,7 +73,7 @@ WeightedGap PartSolver::gap_of(std::size_t b, const Iterate& now, PartEffort& ef
       for (int axis = 0; axis < 2; ++axis) {
         RigidTransform beside = cached.pose;
         beside.translation[axis] -= step;
-        const WeightedGap there = weighted_gap(surface_, shape, beside, cached.lookup, reach);
+        const WeightedGap there = weighted_gap(surface_, shape, beside, cached.lookup, reach, !soft_[b]);
         ++effort.geometry_updates;
         for (Eigen::Index v = 0; v < n; ++v) {
           if (!std::isfinite(gap.weighted[v]) || !std::isfinite(there.weighted[v])) continue;

@@ -1,0 +1,361 @@
+#include "fem/contact/cut_compliance.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+namespace touchstone::fem {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+constexpr double kNear = 1.6;  // edges between triangles' middles: nearer ones go cell by cell
+// Mean of 1/r within a disc of area A: 16 / (3 pi radius).
+const double kSelf = 16.0 / (3.0 * std::sqrt(std::numbers::pi));
+// Variance of a triangle's points along an axis, of its area (equilateral).
+constexpr double kSpread = 0.0962;
+
+/// A half-space's displacement by a traction on a cell, in the axes (into the body, first, second tangent).
+struct HalfSpace {
+  explicit HalfSpace(const ElasticMaterial& material)
+      : scale(1.0 / (2.0 * std::numbers::pi * shear_modulus(material))), nu(material.poisson_ratio) {}
+
+  /// Mean of 1/r between two cells, mm^-1.
+  static double inverse_distance(double r2, double area_a, double area_b) {
+    const double largest = kSelf / std::sqrt(std::max(area_a, area_b));
+    if (r2 <= 0.0) return largest;
+    const double near = 1.0 / std::sqrt(r2);
+    return std::min(largest, near + 0.5 * kSpread * (area_a + area_b) * near / r2);
+  }
+
+  /// mm^3/MPa per mm^2 of each density; x, y: from the source to where it is seen.
+  Matrix3d between(double x, double y, double r2, double area_a, double area_b) const {
+    const double k = inverse_distance(r2, area_a, area_b);
+    Matrix3d u;
+    const double flat2 = x * x + y * y;
+    const double shear = flat2 > 0.0 ? 0.5 * (1.0 - 2.0 * nu) * std::min(1.0, flat2 * k * k) / flat2 : 0.0;
+    const double along = flat2 > 0.0 ? nu * k / flat2 : 0.0;
+    u << (1.0 - nu) * k, shear * x, shear * y,                                          //
+        -shear * x, (1.0 - nu) * k + (flat2 > 0.0 ? along * x * x : 0.5 * nu * k), along * x * y,  //
+        -shear * y, along * x * y, (1.0 - nu) * k + (flat2 > 0.0 ? along * y * y : 0.5 * nu * k);
+    return scale * u;
+  }
+
+  double scale;
+  double nu;
+};
+
+/// One triangle among the block's.
+struct Part {
+  Vector3d middle;
+  std::array<int, 3> place;  ///< of its corners in the block, -1: not in it
+  Vector3d first, second;    ///< tangents
+  bool cut = false;
+  std::vector<DensityCell> now;    ///< cut where it is
+  std::vector<DensityCell> whole;
+  std::array<Vector3d, 3> centre_now, centre_whole;  ///< of each corner's density
+  Vector3d mass_now, mass_whole;
+};
+
+void sum_up(const std::vector<DensityCell>& cells, std::array<Vector3d, 3>& centre, Vector3d& mass) {
+  mass.setZero();
+  for (Vector3d& c : centre) c.setZero();
+  for (const DensityCell& cell : cells) {
+    mass += cell.density;
+    for (int a = 0; a < 3; ++a) centre[a] += cell.density[a] * cell.at;
+  }
+  for (int a = 0; a < 3; ++a) {
+    if (mass[a] > 0.0) centre[a] /= mass[a];
+  }
+}
+
+class Adder {
+ public:
+  /// A response is added to `out`.
+  Adder(Eigen::MatrixXd& out, const HalfSpace& half_space, bool normal_only)
+      : out_(out), half_space_(half_space), normal_only_(normal_only) {}
+
+  void pair(const Part& a, const Part& b, bool same, bool near, bool whole) {
+    if (near) {
+      cells(a, whole ? a.whole : a.now, b, whole ? b.whole : b.now, same);
+    } else if (whole) {
+      far(a, a.centre_whole, a.mass_whole, b, b.centre_whole, b.mass_whole);
+    } else {
+      far(a, a.centre_now, a.mass_now, b, b.centre_now, b.mass_now);
+    }
+  }
+
+ private:
+  void add(const Part& a, int i, const Part& b, int j, const Matrix3d& block, bool same) {
+    const int row = a.place[i];
+    const int column = b.place[j];
+    if (row < 0 || column < 0) return;
+    if (normal_only_) {
+      out_(3 * row, 3 * column) += block(0, 0);
+      if (!same) out_(3 * column, 3 * row) += block(0, 0);
+    } else {
+      out_.block<3, 3>(3 * row, 3 * column) += block;
+      if (!same) out_.block<3, 3>(3 * column, 3 * row) += block.transpose();
+    }
+  }
+
+  void cells(const Part& a, const std::vector<DensityCell>& in_a, const Part& b,
+             const std::vector<DensityCell>& in_b, bool same) {
+    if (normal_only_) {
+      Matrix3d sum = Matrix3d::Zero();
+      for (const DensityCell& k : in_a) {
+        Vector3d seen = Vector3d::Zero();
+        for (const DensityCell& l : in_b) {
+          seen += HalfSpace::inverse_distance((k.at - l.at).squaredNorm(), k.area, l.area) * l.density;
+        }
+        sum += k.density * seen.transpose();
+      }
+      const double factor = half_space_.scale * (1.0 - half_space_.nu);
+      for (int i = 0; i < 3; ++i) {
+        for (int j = 0; j < 3; ++j) {
+          Matrix3d block = Matrix3d::Zero();
+          block(0, 0) = factor * sum(i, j);
+          add(a, i, b, j, block, same);
+        }
+      }
+      return;
+    }
+    std::array<std::array<Matrix3d, 3>, 3> sum;
+    for (auto& row : sum) row.fill(Matrix3d::Zero());
+    for (const DensityCell& k : in_a) {
+      std::array<Matrix3d, 3> seen;
+      seen.fill(Matrix3d::Zero());
+      for (const DensityCell& l : in_b) {
+        const Vector3d from = k.at - l.at;
+        const Matrix3d u = half_space_.between(a.first.dot(from), a.second.dot(from), from.squaredNorm(), k.area, l.area);
+        for (int j = 0; j < 3; ++j) seen[j] += l.density[j] * u;
+      }
+      for (int i = 0; i < 3; ++i) {
+        for (int j = 0; j < 3; ++j) sum[i][j] += k.density[i] * seen[j];
+      }
+    }
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) add(a, i, b, j, sum[i][j], same);
+    }
+  }
+
+  void far(const Part& a, const std::array<Vector3d, 3>& centre_a, const Vector3d& mass_a, const Part& b,
+           const std::array<Vector3d, 3>& centre_b, const Vector3d& mass_b) {
+    for (int i = 0; i < 3; ++i) {
+      if (a.place[i] < 0 || !(mass_a[i] > 0.0)) continue;
+      for (int j = 0; j < 3; ++j) {
+        if (b.place[j] < 0 || !(mass_b[j] > 0.0)) continue;
+        const Vector3d from = centre_a[i] - centre_b[j];
+        const double mass = mass_a[i] * mass_b[j];
+        if (normal_only_) {
+          const double u = mass * half_space_.scale * (1.0 - half_space_.nu) / from.norm();
+          out_(3 * a.place[i], 3 * b.place[j]) += u;
+          out_(3 * b.place[j], 3 * a.place[i]) += u;
+        } else {
+          add(a, i, b, j,
+              mass * half_space_.between(a.first.dot(from), a.second.dot(from), from.squaredNorm(), 0.0, 0.0), false);
+        }
+      }
+    }
+  }
+
+  Eigen::MatrixXd& out_;
+  const HalfSpace& half_space_;
+  bool normal_only_;
+};
+
+/// What a gel's response is beyond a half-space's near one of its vertices: smooth, since it comes from the gel's other
+/// faces. Finite elements add an error of a few per cent to a vertex's response to its own hat and to the next ones',
+/// which would let two densities that lie nearly on each other answer as if work could be had from them.
+class SmoothRest {
+ public:
+  SmoothRest(const Compliance& gel, const ContactSurface& surface, const HalfSpace& half_space,
+             const std::vector<Matrix3d>& axes_of_all)
+      : gel_(gel), surface_(surface), half_space_(half_space), axes_(axes_of_all) {}
+
+  /// Fits around a vertex; false where too few others are near.
+  bool fit(int vertex) {
+    vertex_ = vertex;
+    edge_ = edge_at(vertex);
+    std::vector<int> ring;
+    for (int v = 0; v < static_cast<int>(surface_.vertices.size()); ++v) {
+      const double distance = (surface_.vertices[v] - surface_.vertices[vertex]).norm();
+      if (distance > kRingFrom * edge_ && distance < kRingTo * edge_) ring.push_back(v);
+    }
+    if (static_cast<int>(ring.size()) < kLeastRing) return false;
+    Eigen::MatrixXd basis(static_cast<Eigen::Index>(ring.size()), 6);
+    Eigen::MatrixXd rest(basis.rows(), 9);
+    const auto compliance = gel_.surface.view();
+    for (Eigen::Index k = 0; k < basis.rows(); ++k) {
+      const int v = ring[static_cast<std::size_t>(k)];
+      basis.row(k) = terms(v);
+      const Matrix3d own = axes_[v].transpose() * (compliance.block<3, 3>(3 * v, 3 * vertex) * axes_[vertex]);
+      const Matrix3d difference = own / (surface_.weight[v] * surface_.weight[vertex]) - half_space_at(v);
+      rest.row(k) = Eigen::Map<const Eigen::Matrix<double, 1, 9>>(difference.data());
+    }
+    coefficients_ = basis.colPivHouseholderQr().solve(rest);
+    return true;
+  }
+
+  double edge() const { return edge_; }
+
+  /// mm/MPa/mm^2: displacement at a vertex by a unit traction's hat on the fitted one, over both weights.
+  Matrix3d at(int v) const {
+    const Eigen::Matrix<double, 1, 9> row = terms(v) * coefficients_;
+    return Eigen::Map<const Matrix3d>(row.data());
+  }
+
+ private:
+  static constexpr double kRingFrom = 1.6;  // edges
+  static constexpr double kRingTo = 3.3;
+  static constexpr int kLeastRing = 12;
+
+  double edge_at(int vertex) const {
+    double sum = 0.0;
+    for (const int u : surface_.around[vertex]) sum += (surface_.vertices[u] - surface_.vertices[vertex]).norm();
+    return sum / static_cast<double>(surface_.around[vertex].size());
+  }
+
+  Eigen::Vector2d along(int v) const {
+    const Vector3d from = surface_.vertices[v] - surface_.vertices[vertex_];
+    return {axes_[vertex_].col(1).dot(from), axes_[vertex_].col(2).dot(from)};
+  }
+
+  Eigen::Matrix<double, 1, 6> terms(int v) const {
+    const Eigen::Vector2d d = along(v) / edge_;
+    Eigen::Matrix<double, 1, 6> t;
+    t << 1.0, d.x(), d.y(), d.x() * d.x(), d.y() * d.y(), d.x() * d.y();
+    return t;
+  }
+
+  /// A half-space's, hats taken as points with their spread: variance e^2 5/48 along each axis, for regular triangles.
+  Matrix3d half_space_at(int v) const {
+    constexpr double kHatSpread = 5.0 / 48.0;
+    const double e = edge_at(v);
+    const double spread = 0.5 * kHatSpread * (e * e + edge_ * edge_);
+    const Eigen::Vector2d d = along(v);
+    const double r2 = (surface_.vertices[v] - surface_.vertices[vertex_]).squaredNorm();
+    const double r3 = r2 * std::sqrt(r2);
+    Matrix3d u = half_space_.between(d.x(), d.y(), r2, 0.0, 0.0);
+    Matrix3d more = Matrix3d::Identity() * (1.0 - half_space_.nu) / r3;
+    const Eigen::Matrix2d tangent = (2.0 * Eigen::Matrix2d::Identity() - 3.0 * d * d.transpose() / r2) / r3;
+    // The Laplacians of x x / r^3 and x y / r^3; of x / r^2 there is none.
+    more(1, 1) += half_space_.nu * tangent(0, 0);
+    more(2, 2) += half_space_.nu * tangent(1, 1);
+    more(1, 2) += half_space_.nu * (tangent(0, 1));
+    more(2, 1) += half_space_.nu * (tangent(1, 0));
+    return u + half_space_.scale * spread * more;
+  }
+
+  const Compliance& gel_;
+  const ContactSurface& surface_;
+  const HalfSpace& half_space_;
+  const std::vector<Matrix3d>& axes_;
+  int vertex_ = 0;
+  double edge_ = 1.0;
+  Eigen::Matrix<double, 6, 9> coefficients_;
+};
+
+constexpr double kSliver = 0.02;    // share of a hat at which what bears is held off by as much as it gives way
+constexpr double kStiffest = 1e8;
+constexpr double kReplaced = 1.3;  // edges: among cut hats that are nearer, the elements' response is replaced
+
+}  // namespace
+
+void add_cut_compliance(Eigen::MatrixXd& compliance, const CutHats& cuts, const ContactSurface& surface,
+                        const Compliance& gel, const std::vector<int>& vertices,
+                        const std::vector<Matrix3d>& axes_of_all, bool normal_only) {
+  const HalfSpace half_space(gel.material);
+  std::vector<int> place(surface.vertices.size(), -1);
+  for (std::size_t k = 0; k < vertices.size(); ++k) place[vertices[k]] = static_cast<int>(k);
+  std::vector<Part> parts;
+  double mean_area = 0.0;
+  auto next_cut = cuts.triangles.begin();
+  for (int t = 0; t < static_cast<int>(surface.triangles.size()); ++t) {
+    while (next_cut != cuts.triangles.end() && next_cut->triangle < t) ++next_cut;
+    const auto& index = surface.triangles[t];
+    Part part;
+    int own = -1;
+    for (int k = 0; k < 3; ++k) {
+      part.place[k] = place[index[k]];
+      if (part.place[k] >= 0) own = index[k];
+    }
+    if (own < 0) continue;
+    part.middle = (surface.vertices[index[0]] + surface.vertices[index[1]] + surface.vertices[index[2]]) / 3.0;
+    part.first = axes_of_all[own].col(1);
+    part.second = axes_of_all[own].col(2);
+    part.whole = whole_cells(surface, t);
+    part.cut = next_cut != cuts.triangles.end() && next_cut->triangle == t;
+    part.now = part.cut ? next_cut->cells : part.whole;
+    sum_up(part.now, part.centre_now, part.mass_now);
+    sum_up(part.whole, part.centre_whole, part.mass_whole);
+    mean_area += surface.triangle_area[t];
+    parts.push_back(std::move(part));
+  }
+  if (parts.empty()) return;
+  mean_area /= static_cast<double>(parts.size());
+  const double near = kNear * std::sqrt(mean_area * 4.0 / std::sqrt(3.0));
+  Eigen::MatrixXd cut_response = Eigen::MatrixXd::Zero(compliance.rows(), compliance.cols());
+  Eigen::MatrixXd whole_response = cut_response;
+  Adder add_cut(cut_response, half_space, normal_only);
+  Adder add_whole(whole_response, half_space, normal_only);
+  for (std::size_t a = 0; a < parts.size(); ++a) {
+    for (std::size_t b = a; b < parts.size(); ++b) {
+      if (!parts[a].cut && !parts[b].cut) continue;
+      const bool is_near = (parts[a].middle - parts[b].middle).norm() < near;
+      add_cut.pair(parts[a], parts[b], a == b, is_near, false);
+      add_whole.pair(parts[a], parts[b], a == b, is_near, true);
+    }
+  }
+  // Among cut hats near each other: the half-space's response to their densities, and a smooth rest.
+  std::vector<int> cut;
+  for (const int v : cuts.vertices) {
+    if (place[v] >= 0) cut.push_back(v);
+  }
+  SmoothRest rest(gel, surface, half_space, axes_of_all);
+  for (const int i : cut) {
+    if (!rest.fit(i)) continue;
+    std::vector<int> near_ones;
+    Matrix3d level = Matrix3d::Zero();
+    double weights = 0.0;
+    const Eigen::Index column = 3 * place[i];
+    const auto elements = [&](int j) -> Matrix3d {
+      const Eigen::Index row = 3 * place[j];
+      return (compliance.block<3, 3>(row, column) - whole_response.block<3, 3>(row, column)) /
+             (surface.weight[i] * surface.weight[j]);
+    };
+    for (const int j : cut) {
+      if ((surface.vertices[i] - surface.vertices[j]).norm() > kReplaced * rest.edge()) continue;
+      near_ones.push_back(j);
+      level += surface.weight[j] * (elements(j) - rest.at(j));
+      weights += surface.weight[j];
+    }
+    level /= weights;
+    for (const int j : near_ones) {
+      // Half from either end, so that it's symmetric.
+      const Eigen::Index row = 3 * place[j];
+      const Matrix3d change =
+          0.5 * surface.weight[i] * surface.weight[j] * (rest.at(j) + level - elements(j));
+      if (normal_only) {
+        cut_response(row, column) += change(0, 0);
+        cut_response(column, row) += change(0, 0);
+      } else {
+        cut_response.block<3, 3>(row, column) += change;
+        cut_response.block<3, 3>(column, row) += change.transpose();
+      }
+    }
+  }
+  // A sliver's traction goes to nothing as the body leaves its hat, so that no vertex switches on or off by its share.
+  for (std::size_t k = 0; k < cuts.vertices.size(); ++k) {
+    const Eigen::Index row = 3 * place[cuts.vertices[k]];
+    const double share = cuts.share[static_cast<Eigen::Index>(k)];
+    if (row < 0 || share <= 0.0) continue;
+    const double more = std::min(kStiffest, std::pow(kSliver / share, 2));
+    for (int a = 0; a < (normal_only ? 1 : 3); ++a) cut_response(row + a, row + a) += more * compliance(row + a, row + a);
+  }
+  compliance += cut_response - whole_response;
+}
+
+}  // namespace touchstone::fem

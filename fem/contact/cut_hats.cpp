@@ -1,0 +1,361 @@
+#include "fem/contact/cut_hats.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include "fem/contact/contact_gap.h"
+
+namespace touchstone::fem {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr int kAlong = 4;               // cells along an edge
+constexpr double kSingularReach = 0.5;  // of an edge: how far from an edge the pressure rises
+constexpr double kNearEdge = 3.0;       // of a piece's own size: nearer than that its rise is averaged over points
+constexpr double kBentFrom = 0.1;       // bend from which what doesn't overlap begins to be left out
+constexpr double kBentTo = 0.2;         // and is left out
+constexpr double kLowBears = 0.03;      // of a hat: with so much below a step, only that bears
+constexpr double kHighBears = 0.01;     // with less than this, only what is above it
+
+/// The triangles that a triangle falls into when each edge is cut into so many; barycentric corners as columns.
+std::vector<Matrix3d> split_into(int along) {
+  std::vector<Matrix3d> result;
+  const auto corner = [&](int i, int j) -> Vector3d {
+    return Vector3d(i, j, along - i - j) / along;
+  };
+  for (int i = 0; i < along; ++i) {
+    for (int j = 0; i + j < along; ++j) {
+      Matrix3d m;
+      m << corner(i, j), corner(i + 1, j), corner(i, j + 1);
+      result.push_back(m);
+      if (i + j + 2 > along) continue;
+      m << corner(i + 1, j + 1), corner(i, j + 1), corner(i + 1, j);
+      result.push_back(m);
+    }
+  }
+  return result;
+}
+
+const std::vector<Matrix3d>& quarters() {
+  static const std::vector<Matrix3d> made = split_into(kAlong);
+  return made;
+}
+
+Matrix3d corners_of(const ContactSurface& surface, int triangle) {
+  Matrix3d m;
+  for (int k = 0; k < 3; ++k) m.col(k) = surface.vertices[surface.triangles[triangle][k]];
+  return m;
+}
+
+double distance_to(const Vector3d& point, const std::array<Vector3d, 2>& stretch) {
+  const Vector3d along = stretch[1] - stretch[0];
+  const double length2 = along.squaredNorm();
+  const double t = length2 > 0.0 ? std::clamp((point - stretch[0]).dot(along) / length2, 0.0, 1.0) : 0.0;
+  return (point - stretch[0] - t * along).norm();
+}
+
+/// A step's point in the gel frame, with the gap's trend beside it.
+struct Step {
+  Vector3d at;
+  double value;
+  Vector3d gradient;
+
+  double threshold(const Vector3d& point) const { return value + gradient.dot(point - at); }
+};
+
+/// What is nearest of them decides; infinity: there are none.
+double threshold_by(const std::vector<const Step*>& steps, const Vector3d& point) {
+  const Step* nearest = nullptr;
+  for (const Step* step : steps) {
+    if (!nearest || (step->at - point).squaredNorm() < (nearest->at - point).squaredNorm()) nearest = step;
+  }
+  return nearest ? nearest->threshold(point) : kInfinity;
+}
+
+/// In the plane of the corners (columns): of the linear function with these values at them.
+Vector3d gradient_of(const Matrix3d& corners, const Vector3d& values) {
+  Eigen::Matrix<double, 2, 3> edges;
+  edges << (corners.col(1) - corners.col(0)).transpose(), (corners.col(2) - corners.col(0)).transpose();
+  const Eigen::Vector2d rise(values[1] - values[0], values[2] - values[0]);
+  return edges.transpose() * (edges * edges.transpose()).ldlt().solve(rise);
+}
+
+/// A stretch of outline in the gel frame.
+struct Stretch {
+  std::array<Vector3d, 2> ends;
+};
+
+/// A piece with its integrals against the corners' hats, plain and with the rise towards edges.
+struct Piece {
+  Vector3d at;
+  double area;
+  double value;
+  double overlap;
+  double within;
+  Vector3d plain;
+  Vector3d raised;
+};
+
+class Builder {
+ public:
+  Builder(const ContactSurface& surface, const std::vector<CrossedTriangle>& crossed,
+          const std::function<double(int, const Vector3d&)>& gap_at)
+      : surface_(surface), gap_at_(gap_at) {
+    for (const CrossedTriangle& t : crossed) {
+      crossed_[t.triangle] = &t;
+      const Matrix3d corners = corners_of(surface, t.triangle);
+      std::vector<Stretch>& own = stretches_[t.triangle];
+      for (const auto& ends : t.outline) own.push_back({{corners * ends[0], corners * ends[1]}});
+      if (t.steps.empty()) continue;
+      const Vector3d gradient = gradient_of(corners, t.slope);
+      for (const StepPoint& step : t.steps) steps_[t.triangle].push_back({corners * step.at, step.value, gradient});
+    }
+  }
+
+  CutHats build() {
+    // Crossed triangles cut their corners' hats; so does the rise in a neighbour that isn't crossed.
+    std::vector<char> cut(surface_.vertices.size(), 0);
+    std::vector<int> beside;
+    for (const auto& [triangle, unused] : crossed_) {
+      for (const int v : surface_.triangles[triangle]) {
+        cut[v] = 1;
+        for (const int t : surface_.triangles_of[v]) {
+          if (!crossed_.contains(t)) beside.push_back(t);
+        }
+      }
+    }
+    std::sort(beside.begin(), beside.end());
+    beside.erase(std::unique(beside.begin(), beside.end()), beside.end());
+    for (const int t : beside) {
+      if (is_raised(pieces(t))) {
+        for (const int v : surface_.triangles[t]) cut[v] = 1;
+      }
+    }
+    CutHats result;
+    for (int v = 0; v < static_cast<int>(cut.size()); ++v) {
+      if (cut[v]) result.vertices.push_back(v);
+    }
+    result.gap.resize(static_cast<Eigen::Index>(result.vertices.size()));
+    result.share.resize(result.gap.size());
+    std::map<int, std::vector<DensityCell>> cells;
+    for (Eigen::Index k = 0; k < result.gap.size(); ++k) {
+      std::tie(result.gap[k], result.share[k]) = add_vertex(result.vertices[static_cast<std::size_t>(k)], cells);
+    }
+    for (auto& [triangle, list] : cells) {
+      // Hats that stay whole.
+      for (int a = 0; a < 3; ++a) {
+        if (cut[surface_.triangles[triangle][a]]) continue;
+        const std::vector<Piece>& own = pieces(triangle);
+        for (std::size_t k = 0; k < own.size(); ++k) list[k].density[a] = own[k].plain[a];
+      }
+      result.triangles.push_back({triangle, std::move(list)});
+    }
+    result.by_overlap = by_overlap_;
+    return result;
+  }
+
+ private:
+  static bool is_raised(const std::vector<Piece>& list) {
+    return std::any_of(list.begin(), list.end(), [](const Piece& p) { return p.raised != p.plain; });
+  }
+
+  const std::vector<Piece>& pieces(int triangle) {
+    const auto found = pieces_.find(triangle);
+    if (found != pieces_.end()) return found->second;
+    std::vector<Piece> list;
+    const auto crossed = crossed_.find(triangle);
+    if (crossed != crossed_.end()) {
+      for (const CoveredPiece& piece : crossed->second->pieces) list.push_back(piece_of(triangle, piece));
+    } else {
+      for (const Matrix3d& corners : quarters()) {
+        list.push_back(piece_of(triangle, covered_by(triangle, corners)));
+      }
+    }
+    return pieces_.emplace(triangle, std::move(list)).first->second;
+  }
+
+  CoveredPiece covered_by(int triangle, const Matrix3d& corners) const {
+    CoveredPiece piece;
+    piece.corners = corners;
+    piece.value = piece.low = piece.high = gap_at_(triangle, corners.rowwise().mean());
+    for (int k = 0; k < 3; ++k) {
+      const double value = gap_at_(triangle, corners.col(k));
+      piece.low = std::min(piece.low, value);
+      if (std::isfinite(value)) piece.high = std::max(piece.high, value);
+    }
+    set_overlap(piece);
+    return piece;
+  }
+
+  std::vector<const Stretch*> stretches_near(int triangle) const {
+    std::vector<const Stretch*> result;
+    std::vector<int> seen;
+    for (const int v : surface_.triangles[triangle]) {
+      for (const int t : surface_.triangles_of[v]) {
+        const auto found = stretches_.find(t);
+        if (found == stretches_.end() || std::find(seen.begin(), seen.end(), t) != seen.end()) continue;
+        seen.push_back(t);
+        for (const Stretch& stretch : found->second) result.push_back(&stretch);
+      }
+    }
+    return result;
+  }
+
+  /// Of all triangles that share a corner with this one, or have this vertex.
+  void add_steps(const std::vector<int>& triangles, std::vector<const Step*>& steps) const {
+    for (const int t : triangles) {
+      const auto found = steps_.find(t);
+      if (found == steps_.end()) continue;
+      for (const Step& step : found->second) steps.push_back(&step);
+    }
+  }
+
+  Piece piece_of(int triangle, const CoveredPiece& covered) const {
+    const Matrix3d corners = corners_of(surface_, triangle);
+    const Vector3d middle = covered.corners.rowwise().mean();
+    Piece piece;
+    piece.value = covered.value;
+    piece.overlap = covered.overlap;
+    piece.within = covered.within;
+    piece.area = surface_.triangle_area[triangle] * std::abs(covered.corners.determinant());
+    piece.at = corners * middle;
+    piece.plain = piece.raised = piece.area * middle;
+    const double reach = kSingularReach * std::sqrt(surface_.triangle_area[triangle] * 4.0 / std::sqrt(3.0));
+    const double size = std::sqrt(piece.area);
+    std::vector<const Step*> steps;
+    for (const int v : surface_.triangles[triangle]) add_steps(surface_.triangles_of[v], steps);
+    if (piece.value > threshold_by(steps, piece.at)) return piece;  // pressure doesn't rise at a step's foot
+    std::vector<const Stretch*> near;
+    for (const Stretch* stretch : stretches_near(triangle)) {
+      if (distance_to(piece.at, stretch->ends) < reach + 2.0 * size) near.push_back(stretch);
+    }
+    if (near.empty()) return piece;
+    const auto rise = [&](const Vector3d& point, double least) {
+      double distance = kInfinity;
+      for (const Stretch* stretch : near) distance = std::min(distance, distance_to(point, stretch->ends));
+      return std::max(1.0, std::sqrt(reach / std::max(least, distance)));
+    };
+    piece.raised.setZero();
+    const double part = piece.area / static_cast<double>(quarters().size());
+    for (const Matrix3d& quarter : quarters()) {
+      const Vector3d at = covered.corners * quarter.rowwise().mean();
+      piece.raised += part * rise(corners * at, 0.25 * std::sqrt(part)) * at;
+    }
+    return piece;
+  }
+
+  /// Adds a vertex's density; its mean gap (mm) and the share of its hat that bears.
+  std::pair<double, double> add_vertex(int vertex, std::map<int, std::vector<DensityCell>>& cells) {
+    std::vector<const Step*> steps;
+    add_steps(surface_.triangles_of[vertex], steps);
+    const auto is_low = [&](const Piece& piece) { return piece.value <= threshold_by(steps, piece.at); };
+    const double weight = surface_.weight[vertex];
+    double bend = 0.0;
+    for (const int t : surface_.triangles_of[vertex]) {
+      const auto found = crossed_.find(t);
+      if (found != crossed_.end()) bend = std::max(bend, found->second->bend);
+    }
+    const double beyond = 1.0 - std::clamp((bend - kBentFrom) / (kBentTo - kBentFrom), 0.0, 1.0);
+    by_overlap_ = by_overlap_ || beyond < 1.0;
+    // How much of a piece bears, and the gap there.
+    const auto bearing = [&](const Piece& piece) { return piece.overlap + beyond * (1.0 - piece.overlap); };
+    const auto gap_of = [&](const Piece& piece) {
+      const double part = bearing(piece);
+      if (part >= 1.0 || part <= 0.0) return piece.value;
+      // The mean is that over the overlap and over what is beyond it.
+      return (piece.overlap * piece.within + beyond * (piece.value - piece.overlap * piece.within)) / part;
+    };
+    double low = 0.0;
+    double all = 0.0;
+    for_pieces(vertex, [&](int, int corner, std::size_t, const Piece& piece) {
+      if (!std::isfinite(piece.value)) return;
+      all += bearing(piece) * piece.plain[corner];
+      if (is_low(piece)) low += bearing(piece) * piece.plain[corner];
+    });
+    const double lower = !steps.empty()
+                             ? std::clamp((low / weight - kHighBears) / (kLowBears - kHighBears), 0.0, 1.0)
+                             : 1.0;
+    const auto density_of = [&](const Piece& piece, int corner) {
+      if (!std::isfinite(piece.value)) return 0.0;
+      const double here = is_low(piece) ? lower * piece.raised[corner] : 0.0;
+      return bearing(piece) * (here + (1.0 - lower) * piece.plain[corner]);
+    };
+    const double share = (lower * low + (1.0 - lower) * all) / weight;
+    double sum = 0.0;
+    double moment = 0.0;
+    for_pieces(vertex, [&](int, int corner, std::size_t, const Piece& piece) {
+      const double density = density_of(piece, corner);
+      if (density <= 0.0) return;
+      sum += density;
+      moment += density * gap_of(piece);
+    });
+    const double scale = sum > 0.0 ? weight / sum : 0.0;
+    for (const int t : surface_.triangles_of[vertex]) cells.try_emplace(t);  // also where an outline leaves no piece
+    for_pieces(vertex, [&](int triangle, int corner, std::size_t k, const Piece& piece) {
+      std::vector<DensityCell>& list = cells[triangle];
+      if (list.empty()) {
+        for (const Piece& each : pieces(triangle)) list.push_back({each.at, each.area, Vector3d::Zero()});
+      }
+      list[k].density[corner] = scale * density_of(piece, corner);
+    });
+    return {sum > 0.0 ? moment / sum : kInfinity, share};
+  }
+
+  template <typename Visit>
+  void for_pieces(int vertex, const Visit& visit) {
+    for (const int t : surface_.triangles_of[vertex]) {
+      const auto& index = surface_.triangles[t];
+      const int corner = static_cast<int>(std::find(index.begin(), index.end(), vertex) - index.begin());
+      const std::vector<Piece>& list = pieces(t);
+      for (std::size_t k = 0; k < list.size(); ++k) visit(t, corner, k, list[k]);
+    }
+  }
+
+  const ContactSurface& surface_;
+  const std::function<double(int, const Vector3d&)>& gap_at_;
+  std::map<int, const CrossedTriangle*> crossed_;
+  std::map<int, std::vector<Stretch>> stretches_;
+  std::map<int, std::vector<Step>> steps_;
+  std::map<int, std::vector<Piece>> pieces_;
+  bool by_overlap_ = false;
+};
+
+}  // namespace
+
+std::vector<DensityCell> whole_cells(const ContactSurface& surface, int triangle) {
+  const Matrix3d corners = corners_of(surface, triangle);
+  std::vector<DensityCell> result;
+  const double area = surface.triangle_area[triangle] / static_cast<double>(quarters().size());
+  for (const Matrix3d& quarter : quarters()) {
+    const Vector3d middle = quarter.rowwise().mean();
+    result.push_back({corners * middle, area, area * middle});
+  }
+  return result;
+}
+
+double threshold_at(const CrossedTriangle& crossed, const Vector3d& point) {
+  const StepPoint* nearest = nullptr;
+  for (const StepPoint& step : crossed.steps) {
+    if (!nearest || (step.at - point).squaredNorm() < (nearest->at - point).squaredNorm()) nearest = &step;
+  }
+  return nearest ? nearest->value + crossed.slope.dot(point - nearest->at) : kInfinity;
+}
+
+void set_overlap(CoveredPiece& piece) {
+  const double range = piece.high - piece.low;
+  piece.overlap = range > 0.0 ? std::clamp(-piece.low / range, 0.0, 1.0) : (piece.value < 0.0 ? 1.0 : 0.0);
+  piece.within = piece.overlap < 1.0 ? 0.5 * std::min(piece.low, 0.0) : piece.value;
+}
+
+CutHats cut_hats(const ContactSurface& surface, const std::vector<CrossedTriangle>& crossed,
+                 const std::function<double(int, const Vector3d&)>& gap_at) {
+  return Builder(surface, crossed, gap_at).build();
+}
+
+}  // namespace touchstone::fem
