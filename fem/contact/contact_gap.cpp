@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "core/error.h"
@@ -15,15 +16,15 @@ constexpr int kSilhouetteSplits = 2;  // levels of splitting on the silhouette
 constexpr int kBisections = 34;       // of a cell's edge: a quarter of a triangle's to 1e-11
 constexpr int kFalsePositions = 40;   // likewise, where the distance to the silhouette is known: some 5 do
 constexpr double kSteep = 2.0;        // rise within a triangle, in its size, from which the body's side is seen
-constexpr double kBent = 0.1;         // of a triangle's range of gaps: off its corners' plane by more, it may hold a step
-constexpr double kFlat = 1e-6;        // of a triangle's size: ranges below it hold no step
-constexpr double kMixedPiece = 1e-3;  // of a triangle: larger pieces don't lie on both sides of a step
-constexpr double kBulge = 0.5;      // of the depth: the gel doesn't rise higher beside a contact
-constexpr double kCutMargin = 0.5;  // of a triangle's size, on top
+constexpr double kBent = 0.1;   // of a triangle's range of gaps: off its corners' plane by more, it may hold a step
+constexpr double kFlat = 1e-6;  // of a triangle's size: ranges below it hold no step
+constexpr double kMixedPiece = 1e-3;              // of a triangle: larger pieces don't lie on both sides of a step
+constexpr double kBulge = 0.5;                    // of the depth: the gel doesn't rise higher beside a contact
+constexpr double kCutMargin = 0.5;                // of a triangle's size, on top
 constexpr double kLeastStraddling = 1.0 / 200.0;  // likewise, where the gap changes its sign
-constexpr double kLeastPiece = 1e-9;  // of a triangle
+constexpr double kLeastPiece = 1e-9;              // of a triangle
 constexpr int kStepBisections = 8;
-constexpr double kStepLeft = 0.6;  // of a difference, left where the interval is so much smaller: a step
+constexpr double kStepLeft = 0.6;     // of a difference, left where the interval is so much smaller: a step
 constexpr double kBodiesLarge = 4.0;  // bodies larger than this times a triangle can't hide between its corners
 
 /// Integrates over one surface triangle; coordinates inside it are barycentric.
@@ -43,6 +44,8 @@ class TriangleGap {
   /// What crosses it, if asked for.
   CrossedTriangle crossed;
   bool is_crossed = false;
+  /// The least and the largest gap, if it's bent.
+  std::optional<std::array<double, 2>> bent;
 
   /// Gap at one surface point.
   double corner_gap(const Eigen::Vector3d& corner, const Eigen::Vector3d& normal) const {
@@ -55,6 +58,7 @@ class TriangleGap {
                  bool one_normal, double area, double level, double steep, bool collect) {
     collect_ = collect;
     is_crossed = false;
+    bent.reset();
     crossed = {};
     slope_sum_.setZero();
     slope_weight_ = 0.0;
@@ -238,7 +242,10 @@ class TriangleGap {
     double low = kInfinity;
     double high = -kInfinity;
     const double bend = bend_of(corners, low, high);
-    if (corners.isIdentity(0.0) && low < 0.0 && high > 0.0) crossed.bend = bend;
+    if (corners.isIdentity(0.0)) {
+      if (low < 0.0 && high > 0.0) crossed.bend = bend;
+      if (bend > kBent) bent = {low, high};
+    }
     if (bend <= kBent) {
       // A linear function's values at the triangle's corners from those at the cell's.
       Eigen::Vector3d at_corner;
@@ -458,16 +465,27 @@ void WeightedGap::move_along_normals(const Eigen::VectorXd& weight, double dista
     lowest[i] += distance;
     weighted[i] = plain[i] + edge[i] * depth;
   }
+  for (std::array<double, 2>& range : bent) {
+    for (double& gap : range) gap += distance;
+  }
+}
+
+bool WeightedGap::overlap_cuts_after(double distance) const {
+  return (cuts && cuts->by_overlap) || std::any_of(bent.begin(), bent.end(), [&](const std::array<double, 2>& range) {
+           return range[0] + distance < 0.0 && range[1] + distance > 0.0;
+         });
 }
 
 WeightedGap weighted_gap(const ContactSurface& surface, const ContactShape& shape,
-                         const RigidTransform& gel_from_object, const PatchMotion& lookup, GapReach asked, bool cut) {
+                         const RigidTransform& gel_from_object, const PatchMotion& lookup, GapReach asked, bool cut,
+                         std::shared_ptr<const CutHats> kept) {
   const auto n = static_cast<Eigen::Index>(surface.vertices.size());
   WeightedGap result;
   result.plain = Eigen::VectorXd::Zero(n);
   result.lowest = Eigen::VectorXd::Constant(n, kInfinity);
   result.edge = Eigen::VectorXd::Zero(n);
   Eigen::VectorXd covered = Eigen::VectorXd::Zero(n);
+  Eigen::VectorXd cut_gaps;
   std::vector<char> skipped(surface.vertices.size(), 0);  // a triangle of its support is above `reach`
   const BoundingBall ball = bounding_ball(shape);
   const Eigen::Vector3d centre = gel_from_object * ball.centre;
@@ -517,13 +535,15 @@ WeightedGap weighted_gap(const ContactSurface& surface, const ContactShape& shap
             for (const int u : surface.around[index[k]]) least = std::min(least, corner_gap[u]);
           }
           if (!std::isfinite(least)) least = std::numeric_limits<double>::max();  // a small body between the vertices
-          triangle.integrate(corners, normals, one_normal, surface.triangle_area[t], least, kSteep * size, cut);
+          triangle.integrate(corners, normals, one_normal, surface.triangle_area[t], least, kSteep * size,
+                             cut && !kept);
           for (int k = 0; k < 3; ++k) {
             result.plain[index[k]] += triangle.gap[k];
             covered[index[k]] += triangle.covered[k];
             result.lowest[index[k]] = std::min(result.lowest[index[k]], triangle.lowest);
           }
           result.deepest = std::min(result.deepest, triangle.lowest);
+          if (triangle.bent) result.bent.push_back(*triangle.bent);
           if (triangle.is_crossed) {
             lowest_in[t] = triangle.lowest;
             crossed.push_back(std::move(triangle.crossed));
@@ -536,7 +556,7 @@ WeightedGap weighted_gap(const ContactSurface& surface, const ContactShape& shap
           return lowest_in[static_cast<std::size_t>(t.triangle)] >
                  reached + kCutMargin * surface.triangle_size[static_cast<std::size_t>(t.triangle)];
         });
-        if (crossed.empty()) return;
+        if (crossed.empty() && !kept) return;
         const auto gap_at = [&](int t, const Eigen::Vector3d& b) {
           const auto& index = surface.triangles[t];
           const std::array<Eigen::Vector3d, 3> corners{moved[index[0]], moved[index[1]], moved[index[2]]};
@@ -545,7 +565,8 @@ WeightedGap weighted_gap(const ContactSurface& surface, const ContactShape& shap
           triangle.set_up(corners, normals, normals[0] == normals[1] && normals[0] == normals[2]);
           return triangle.gap_at(b);
         };
-        result.cuts = std::make_shared<const CutHats>(cut_hats(surface, crossed, gap_at));
+        result.cuts = kept ? kept : std::make_shared<const CutHats>(cut_hats(surface, crossed, gap_at));
+        cut_gaps = kept ? moved_gaps(surface, *kept, gap_at) : result.cuts->gap;
       },
       shape);
   const double depth = std::max(0.0, -result.deepest);
@@ -563,7 +584,7 @@ WeightedGap weighted_gap(const ContactSurface& surface, const ContactShape& shap
   for (std::size_t k = 0; result.cuts && k < result.cuts->vertices.size(); ++k) {
     const int i = result.cuts->vertices[k];
     const double share = result.cuts->share[static_cast<Eigen::Index>(k)];
-    const double gap = result.cuts->gap[static_cast<Eigen::Index>(k)];
+    const double gap = cut_gaps[static_cast<Eigen::Index>(k)];
     if (skipped[i]) continue;
     const bool far = !std::isfinite(gap) || share < kLeastPiece;
     result.plain[i] = result.weighted[i] = far ? kInfinity : surface.weight[i] * gap;

@@ -37,7 +37,7 @@ struct HalfSpace {
     const double flat2 = x * x + y * y;
     const double shear = flat2 > 0.0 ? 0.5 * (1.0 - 2.0 * nu) * std::min(1.0, flat2 * k * k) / flat2 : 0.0;
     const double along = flat2 > 0.0 ? nu * k / flat2 : 0.0;
-    u << (1.0 - nu) * k, shear * x, shear * y,                                          //
+    u << (1.0 - nu) * k, shear * x, shear * y,                                                     //
         -shear * x, (1.0 - nu) * k + (flat2 > 0.0 ? along * x * x : 0.5 * nu * k), along * x * y,  //
         -shear * y, along * x * y, (1.0 - nu) * k + (flat2 > 0.0 ? along * y * y : 0.5 * nu * k);
     return scale * u;
@@ -53,7 +53,7 @@ struct Part {
   std::array<int, 3> place;  ///< of its corners in the block, -1: not in it
   Vector3d first, second;    ///< tangents
   bool cut = false;
-  std::vector<DensityCell> now;    ///< cut where it is
+  std::vector<DensityCell> now;  ///< cut where it is
   std::vector<DensityCell> whole;
   std::array<Vector3d, 3> centre_now, centre_whole;  ///< of each corner's density
   Vector3d mass_now, mass_whole;
@@ -101,8 +101,8 @@ class Adder {
     }
   }
 
-  void cells(const Part& a, const std::vector<DensityCell>& in_a, const Part& b,
-             const std::vector<DensityCell>& in_b, bool same) {
+  void cells(const Part& a, const std::vector<DensityCell>& in_a, const Part& b, const std::vector<DensityCell>& in_b,
+             bool same) {
     if (normal_only_) {
       Matrix3d sum = Matrix3d::Zero();
       for (const DensityCell& k : in_a) {
@@ -129,7 +129,8 @@ class Adder {
       seen.fill(Matrix3d::Zero());
       for (const DensityCell& l : in_b) {
         const Vector3d from = k.at - l.at;
-        const Matrix3d u = half_space_.between(a.first.dot(from), a.second.dot(from), from.squaredNorm(), k.area, l.area);
+        const Matrix3d u =
+            half_space_.between(a.first.dot(from), a.second.dot(from), from.squaredNorm(), k.area, l.area);
         for (int j = 0; j < 3; ++j) seen[j] += l.density[j] * u;
       }
       for (int i = 0; i < 3; ++i) {
@@ -258,7 +259,7 @@ class SmoothRest {
   Eigen::Matrix<double, 6, 9> coefficients_;
 };
 
-constexpr double kSliver = 0.02;    // share of a hat at which what bears is held off by as much as it gives way
+constexpr double kSliver = 0.02;  // share of a hat at which what bears is held off by as much as it gives way
 constexpr double kStiffest = 1e8;
 constexpr double kReplaced = 1.3;  // edges: among cut hats that are nearer, the elements' response is replaced
 
@@ -336,8 +337,7 @@ void add_cut_compliance(Eigen::MatrixXd& compliance, const CutHats& cuts, const 
     for (const int j : near_ones) {
       // Half from either end, so that it's symmetric.
       const Eigen::Index row = 3 * place[j];
-      const Matrix3d change =
-          0.5 * surface.weight[i] * surface.weight[j] * (rest.at(j) + level - elements(j));
+      const Matrix3d change = 0.5 * surface.weight[i] * surface.weight[j] * (rest.at(j) + level - elements(j));
       if (normal_only) {
         cut_response(row, column) += change(0, 0);
         cut_response(column, row) += change(0, 0);
@@ -353,7 +353,8 @@ void add_cut_compliance(Eigen::MatrixXd& compliance, const CutHats& cuts, const 
     const double share = cuts.share[static_cast<Eigen::Index>(k)];
     if (row < 0 || share <= 0.0) continue;
     const double more = std::min(kStiffest, std::pow(kSliver / share, 2));
-    for (int a = 0; a < (normal_only ? 1 : 3); ++a) cut_response(row + a, row + a) += more * compliance(row + a, row + a);
+    for (int a = 0; a < (normal_only ? 1 : 3); ++a)
+      cut_response(row + a, row + a) += more * compliance(row + a, row + a);
   }
   compliance += cut_response - whole_response;
 }

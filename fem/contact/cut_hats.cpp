@@ -26,9 +26,7 @@ constexpr double kHighBears = 0.01;     // with less than this, only what is abo
 /// The triangles that a triangle falls into when each edge is cut into so many; barycentric corners as columns.
 std::vector<Matrix3d> split_into(int along) {
   std::vector<Matrix3d> result;
-  const auto corner = [&](int i, int j) -> Vector3d {
-    return Vector3d(i, j, along - i - j) / along;
-  };
+  const auto corner = [&](int i, int j) -> Vector3d { return Vector3d(i, j, along - i - j) / along; };
   for (int i = 0; i < along; ++i) {
     for (int j = 0; i + j < along; ++j) {
       Matrix3d m;
@@ -93,6 +91,7 @@ struct Stretch {
 
 /// A piece with its integrals against the corners' hats, plain and with the rise towards edges.
 struct Piece {
+  Vector3d middle;  ///< barycentric
   Vector3d at;
   double area;
   double value;
@@ -220,6 +219,7 @@ class Builder {
     const Matrix3d corners = corners_of(surface_, triangle);
     const Vector3d middle = covered.corners.rowwise().mean();
     Piece piece;
+    piece.middle = middle;
     piece.value = covered.value;
     piece.overlap = covered.overlap;
     piece.within = covered.within;
@@ -278,9 +278,8 @@ class Builder {
       all += bearing(piece) * piece.plain[corner];
       if (is_low(piece)) low += bearing(piece) * piece.plain[corner];
     });
-    const double lower = !steps.empty()
-                             ? std::clamp((low / weight - kHighBears) / (kLowBears - kHighBears), 0.0, 1.0)
-                             : 1.0;
+    const double lower =
+        !steps.empty() ? std::clamp((low / weight - kHighBears) / (kLowBears - kHighBears), 0.0, 1.0) : 1.0;
     const auto density_of = [&](const Piece& piece, int corner) {
       if (!std::isfinite(piece.value)) return 0.0;
       const double here = is_low(piece) ? lower * piece.raised[corner] : 0.0;
@@ -300,7 +299,9 @@ class Builder {
     for_pieces(vertex, [&](int triangle, int corner, std::size_t k, const Piece& piece) {
       std::vector<DensityCell>& list = cells[triangle];
       if (list.empty()) {
-        for (const Piece& each : pieces(triangle)) list.push_back({each.at, each.area, Vector3d::Zero()});
+        for (const Piece& each : pieces(triangle)) {
+          list.push_back({each.middle, gap_at_(triangle, each.middle), each.at, each.area, Vector3d::Zero()});
+        }
       }
       list[k].density[corner] = scale * density_of(piece, corner);
     });
@@ -334,7 +335,7 @@ std::vector<DensityCell> whole_cells(const ContactSurface& surface, int triangle
   const double area = surface.triangle_area[triangle] / static_cast<double>(quarters().size());
   for (const Matrix3d& quarter : quarters()) {
     const Vector3d middle = quarter.rowwise().mean();
-    result.push_back({corners * middle, area, area * middle});
+    result.push_back({middle, 0.0, corners * middle, area, area * middle});
   }
   return result;
 }
@@ -356,6 +357,41 @@ void set_overlap(CoveredPiece& piece) {
 CutHats cut_hats(const ContactSurface& surface, const std::vector<CrossedTriangle>& crossed,
                  const std::function<double(int, const Vector3d&)>& gap_at) {
   return Builder(surface, crossed, gap_at).build();
+}
+
+Eigen::VectorXd moved_gaps(const ContactSurface& surface, const CutHats& cuts,
+                           const std::function<double(int, const Vector3d&)>& gap_at) {
+  // What each cell's gap changed by, for each vertex with the density that it has there.
+  std::map<int, std::vector<std::pair<double, double>>> changes;
+  for (const int v : cuts.vertices) changes[v];
+  for (const CutTriangle& triangle : cuts.triangles) {
+    const auto& index = surface.triangles[triangle.triangle];
+    for (const DensityCell& cell : triangle.cells) {
+      const double change = gap_at(triangle.triangle, cell.corners) - cell.gap;
+      if (!std::isfinite(change)) continue;
+      for (int a = 0; a < 3; ++a) {
+        if (!(cell.density[a] > 0.0)) continue;
+        const auto found = changes.find(index[a]);
+        if (found != changes.end()) found->second.emplace_back(change, cell.density[a]);
+      }
+    }
+  }
+  Eigen::VectorXd result = cuts.gap;
+  for (Eigen::Index k = 0; k < result.size(); ++k) {
+    std::vector<std::pair<double, double>>& own = changes[cuts.vertices[static_cast<std::size_t>(k)]];
+    if (own.empty()) continue;  // the body has left it
+    std::sort(own.begin(), own.end());
+    double half = 0.0;
+    for (const auto& [change, density] : own) half += 0.5 * density;
+    double sum = 0.0;
+    for (const auto& [change, density] : own) {
+      sum += density;
+      if (sum < half) continue;
+      result[k] += change;
+      break;
+    }
+  }
+  return result;
 }
 
 }  // namespace touchstone::fem

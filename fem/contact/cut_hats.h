@@ -39,13 +39,15 @@ struct CrossedTriangle {
   std::vector<CoveredPiece> pieces;
   std::vector<std::array<Eigen::Vector3d, 2>> outline;  ///< barycentric ends of its stretches in the triangle
   std::vector<StepPoint> steps;                         ///< where steps were found; empty: none
-  Eigen::Vector3d slope = Eigen::Vector3d::Zero();      ///< mm: the gap's trend beside steps, a linear one's corner values
+  Eigen::Vector3d slope = Eigen::Vector3d::Zero();  ///< mm: the gap's trend beside steps, a linear one's corner values
   /// How far the gap is from plane over the triangle, of its range, where it changes its sign; 0: it doesn't.
   double bend = 0.0;
 };
 
 /// A point that stands for a part of a triangle.
 struct DensityCell {
+  Eigen::Vector3d corners = Eigen::Vector3d::Zero();  ///< barycentric
+  double gap = 0.0;                                   ///< mm, there, as it was when hats were cut
   Eigen::Vector3d at = Eigen::Vector3d::Zero();       ///< mm, gel frame
   double area = 0.0;                                  ///< mm^2
   Eigen::Vector3d density = Eigen::Vector3d::Zero();  ///< mm^2: its part of each corner's integral
@@ -80,5 +82,11 @@ std::vector<DensityCell> whole_cells(const ContactSurface& surface, int triangle
 /// says, nothing else of the hat bears.
 CutHats cut_hats(const ContactSurface& surface, const std::vector<CrossedTriangle>& crossed,
                  const std::function<double(int, const Eigen::Vector3d&)>& gap_at);
+
+/// The gaps of `cuts`' vertices after a small motion of the body, the hats staying as they were cut: each has changed
+/// by what half of its density changed by at least and half at most. What has come to lie beyond an outline or a step
+/// thus doesn't count.
+Eigen::VectorXd moved_gaps(const ContactSurface& surface, const CutHats& cuts,
+                           const std::function<double(int, const Eigen::Vector3d&)>& gap_at);
 
 }  // namespace touchstone::fem

@@ -310,7 +310,7 @@ bool PartSolver::take_shift(const ContactAnswer& answer, const std::vector<PartT
     }
     body.pose.translation += shift;
     if (shift.squaredNorm() == 0.0) continue;
-    if (!surface_.flat || (body.gap.cuts && body.gap.cuts->by_overlap)) {
+    if (!surface_.flat || body.gap.overlap_cuts_after(surface_.normals.front().dot(shift))) {
       now.edge_change = std::max(now.edge_change, shift.norm());
     }
     for (std::size_t j = 0; j < vertices.size(); ++j) {

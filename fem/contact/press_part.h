@@ -112,6 +112,8 @@ class PartSolver {
  private:
   struct Iterate;
   struct Body;
+  struct CachedGap;
+  bool cuts_hold(const CachedGap& cached, const Body& body) const;
   WeightedGap gap_of(std::size_t body, const Iterate& now, PartEffort& effort);
   void look_up(Iterate& now, const std::vector<PartTarget>& targets, PartEffort& effort);
   std::vector<int> candidates(const Iterate& now, bool z_forced) const;
@@ -152,7 +154,6 @@ class PartSolver {
   std::vector<int> combined_owner_;                            ///< and theirs
   ContactMemory memory_;
   std::vector<std::array<bool, 6>> remembered_axes_;
-  struct CachedGap;
   std::vector<CachedGap> cached_gaps_;  ///< per body: the last gap and where it was looked up
   std::string why_not_;
 };
