@@ -23,6 +23,9 @@ constexpr double kBulge = 0.5;                    // of the depth: the gel doesn
 constexpr double kCutMargin = 0.5;                // of a triangle's size, on top
 constexpr double kLeastStraddling = 1.0 / 200.0;  // likewise, where the gap changes its sign
 constexpr double kLeastPiece = 1e-9;              // of a triangle
+constexpr double kWallSlope = 4.0;                // of a gap along the surface, from which the body's side is seen
+constexpr double kWallRise = 0.15;  // of a triangle's size: lower than this above the body nobody asks for the slope
+constexpr double kWallStep = 1e-4;  // of a triangle
 constexpr int kStepBisections = 8;
 constexpr double kStepLeft = 0.6;     // of a difference, left where the interval is so much smaller: a step
 constexpr double kBodiesLarge = 4.0;  // bodies larger than this times a triangle can't hide between its corners
@@ -57,6 +60,7 @@ class TriangleGap {
   void integrate(const std::array<Eigen::Vector3d, 3>& corners, const std::array<Eigen::Vector3d, 3>& normals,
                  bool one_normal, double area, double level, double steep, bool collect) {
     collect_ = collect;
+    lowest_wall_ = std::min(0.0, level) + kWallRise * steep / kSteep;
     is_crossed = false;
     bent.reset();
     crossed = {};
@@ -102,11 +106,29 @@ class TriangleGap {
       normals_.col(k) = object_from_gel_.turn(normals[k]);
     }
     one_normal_ = one_normal;
+    collect_ = false;
   }
   double gap_at(const Eigen::Vector3d& b) const { return at(b).value_or(kInfinity); }
 
  private:
-  std::optional<double> at(const Eigen::Vector3d& b) const { return entry(points_ * b, direction(b)); }
+  /// Nothing, too, on the body's side where hats are cut: on a curved gel a wall is seen as a steep rise.
+  std::optional<double> at(const Eigen::Vector3d& b) const {
+    const auto found = entry(points_ * b, direction(b));
+    return collect_ && found && *found > lowest_wall_ && is_wall(b, *found) ? std::nullopt : found;
+  }
+  bool is_wall(const Eigen::Vector3d& b, double value) const {
+    const std::array<Eigen::Vector3d, 2> along = {Eigen::Vector3d(-1.0, 1.0, 0.0), Eigen::Vector3d(-1.0, 0.0, 1.0)};
+    Eigen::Matrix<double, 3, 2> edges;
+    Eigen::Vector2d rise;
+    for (int k = 0; k < 2; ++k) {
+      edges.col(k) = points_ * along[k];
+      const Eigen::Vector3d beside = b + kWallStep * along[k];
+      const auto there = entry(points_ * beside, direction(beside));
+      if (!there) return true;
+      rise[k] = (*there - value) / kWallStep;
+    }
+    return rise.dot((edges.transpose() * edges).inverse() * rise) > kWallSlope * kWallSlope;
+  }
   Eigen::Vector3d direction(const Eigen::Vector3d& b) const {
     return one_normal_ ? Eigen::Vector3d(normals_.col(0)) : (normals_ * b).normalized();
   }
@@ -118,7 +140,7 @@ class TriangleGap {
   }
   /// Whether there is an entry.
   bool hits(const Eigen::Vector3d& b) const {
-    if (std::isfinite(farthest_behind_)) return at(b).has_value();
+    if (std::isfinite(farthest_behind_) || collect_) return at(b).has_value();
     return is_hit(shape_, points_ * b, direction(b));
   }
   /// Signed, positive inside.
@@ -290,12 +312,14 @@ class TriangleGap {
       Eigen::Vector3d b = corners.col((k + 1) % 3);
       double at_a = *at(a);
       double at_b = *at(b);
-      const double first = std::abs(at_b - at_a);
-      if (first <= kFlat * body_radius_) continue;
+      double lowest_seen = std::min(at_a, at_b);  // the ends alone may be alike on both flanks of a ridge
+      double highest_seen = std::max(at_a, at_b);
       for (int n = 0; n < kStepBisections; ++n) {
         const Eigen::Vector3d middle = 0.5 * (a + b);
         const auto value = at(middle);
         if (!value) return false;
+        lowest_seen = std::min(lowest_seen, *value);
+        highest_seen = std::max(highest_seen, *value);
         if (std::abs(*value - at_a) > std::abs(at_b - *value)) {
           b = middle;
           at_b = *value;
@@ -305,7 +329,7 @@ class TriangleGap {
         }
       }
       const double left = std::abs(at_b - at_a);
-      if (left > kStepLeft * first && left > step) {
+      if (left > kStepLeft * (highest_seen - lowest_seen) && left > kFlat * body_radius_ && left > step) {
         step = left;
         threshold = 0.5 * (at_a + at_b);
         place = 0.5 * (a + b);
@@ -406,6 +430,7 @@ class TriangleGap {
   double level_ = 0.0;
   double steep_ = 1.0;
   bool collect_ = false;
+  double lowest_wall_ = 0.0;
   Eigen::Vector3d slope_sum_;  // of the trends of plane cells, by their share of the triangle
   double slope_weight_ = 0.0;
 };

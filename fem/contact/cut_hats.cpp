@@ -20,6 +20,8 @@ constexpr double kSingularReach = 0.5;  // of an edge: how far from an edge the 
 constexpr double kNearEdge = 3.0;       // of a piece's own size: nearer than that its rise is averaged over points
 constexpr double kBentFrom = 0.1;       // bend from which what doesn't overlap begins to be left out
 constexpr double kBentTo = 0.2;         // and is left out
+constexpr double kNarrow = 0.5;         // of a hat: overlaps that fill no hat by more than this are all that bears
+constexpr double kWide = 0.8;           // by so much: narrower than no hat
 constexpr double kLowBears = 0.03;      // of a hat: with so much below a step, only that bears
 constexpr double kHighBears = 0.01;     // with less than this, only what is above it
 
@@ -142,6 +144,7 @@ class Builder {
     }
     result.gap.resize(static_cast<Eigen::Index>(result.vertices.size()));
     result.share.resize(result.gap.size());
+    result.moment = Eigen::Matrix3Xd::Zero(3, result.gap.size());
     std::map<int, std::vector<DensityCell>> cells;
     for (Eigen::Index k = 0; k < result.gap.size(); ++k) {
       std::tie(result.gap[k], result.share[k]) = add_vertex(result.vertices[static_cast<std::size_t>(k)], cells);
@@ -154,6 +157,14 @@ class Builder {
         for (std::size_t k = 0; k < own.size(); ++k) list[k].density[a] = own[k].plain[a];
       }
       result.triangles.push_back({triangle, std::move(list)});
+    }
+    for (const CutTriangle& triangle : result.triangles) {
+      for (int a = 0; a < 3; ++a) {
+        const Eigen::Index k = place_in(result, surface_.triangles[triangle.triangle][a]);
+        for (const DensityCell& cell : triangle.cells) {
+          if (k >= 0) result.moment.col(k) += cell.density[a] * cell.at;
+        }
+      }
     }
     result.by_overlap = by_overlap_;
     return result;
@@ -250,6 +261,27 @@ class Builder {
     return piece;
   }
 
+  /// The share of its covered hat that a vertex's overlap fills.
+  double overlap_of(int vertex) {
+    const auto found = overlap_.find(vertex);
+    if (found != overlap_.end()) return found->second;
+    double overlap = 0.0;
+    double covered = 0.0;
+    for_pieces(vertex, [&](int, int corner, std::size_t, const Piece& piece) {
+      if (!std::isfinite(piece.value)) return;
+      covered += piece.plain[corner];
+      overlap += piece.overlap * piece.plain[corner];
+    });
+    return overlap_[vertex] = covered > 0.0 ? overlap / covered : 0.0;
+  }
+
+  /// The largest of those of a vertex and its neighbours; 1 where nothing overlaps: the gel bulges there at most.
+  double fullest_near(int vertex) {
+    double fullest = overlap_of(vertex);
+    for (const int v : surface_.around[vertex]) fullest = std::max(fullest, overlap_of(v));
+    return fullest > 0.0 ? fullest : 1.0;
+  }
+
   /// Adds a vertex's density; its mean gap (mm) and the share of its hat that bears.
   std::pair<double, double> add_vertex(int vertex, std::map<int, std::vector<DensityCell>>& cells) {
     std::vector<const Step*> steps;
@@ -261,7 +293,8 @@ class Builder {
       const auto found = crossed_.find(t);
       if (found != crossed_.end()) bend = std::max(bend, found->second->bend);
     }
-    const double beyond = 1.0 - std::clamp((bend - kBentFrom) / (kBentTo - kBentFrom), 0.0, 1.0);
+    const double narrow = std::clamp((fullest_near(vertex) - kNarrow) / (kWide - kNarrow), 0.0, 1.0);
+    const double beyond = std::min(narrow, 1.0 - std::clamp((bend - kBentFrom) / (kBentTo - kBentFrom), 0.0, 1.0));
     by_overlap_ = by_overlap_ || beyond < 1.0;
     // How much of a piece bears, and the gap there.
     const auto bearing = [&](const Piece& piece) { return piece.overlap + beyond * (1.0 - piece.overlap); };
@@ -324,6 +357,7 @@ class Builder {
   std::map<int, std::vector<Stretch>> stretches_;
   std::map<int, std::vector<Step>> steps_;
   std::map<int, std::vector<Piece>> pieces_;
+  std::map<int, double> overlap_;
   bool by_overlap_ = false;
 };
 
@@ -357,6 +391,11 @@ void set_overlap(CoveredPiece& piece) {
 CutHats cut_hats(const ContactSurface& surface, const std::vector<CrossedTriangle>& crossed,
                  const std::function<double(int, const Vector3d&)>& gap_at) {
   return Builder(surface, crossed, gap_at).build();
+}
+
+Eigen::Index place_in(const CutHats& cuts, int vertex) {
+  const auto found = std::lower_bound(cuts.vertices.begin(), cuts.vertices.end(), vertex);
+  return found != cuts.vertices.end() && *found == vertex ? found - cuts.vertices.begin() : -1;
 }
 
 Eigen::VectorXd moved_gaps(const ContactSurface& surface, const CutHats& cuts,

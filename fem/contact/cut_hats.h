@@ -65,6 +65,7 @@ struct CutHats {
   std::vector<int> vertices;           ///< whose hats are cut, rising
   Eigen::VectorXd gap;                 ///< mm, of each of them: the mean over its density; infinity: nothing bears
   Eigen::VectorXd share;               ///< of each: the part of int phi dA that bears
+  Eigen::Matrix3Xd moment;             ///< mm^3, of each: its density times the place, integrated
   bool by_overlap = false;             ///< what bears depends on the depth, too
 };
 
@@ -82,6 +83,9 @@ std::vector<DensityCell> whole_cells(const ContactSurface& surface, int triangle
 /// says, nothing else of the hat bears.
 CutHats cut_hats(const ContactSurface& surface, const std::vector<CrossedTriangle>& crossed,
                  const std::function<double(int, const Eigen::Vector3d&)>& gap_at);
+
+/// Where a vertex is in `cuts.vertices`; -1: its hat is whole.
+Eigen::Index place_in(const CutHats& cuts, int vertex);
 
 /// The gaps of `cuts`' vertices after a small motion of the body, the hats staying as they were cut: each has changed
 /// by what half of its density changed by at least and half at most. What has come to lie beyond an outline or a step

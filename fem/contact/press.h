@@ -87,8 +87,10 @@ struct PressState {
   Eigen::MatrixX3d traction;                                                 ///< n x 3, MPa, on the gel, P1
   Eigen::MatrixX3d surface_displacement;  ///< n x 3, mm: the L2 projection on P1, mass^-1 * surface * traction; fields
   Eigen::MatrixX3d bead_displacement;     ///< m x 3, mm
-  std::vector<NodeState> node_state;      ///< n
-  std::vector<int> node_owner;            ///< n, the body that a vertex touches, -1 where open
+  Eigen::VectorXd bearing_share;      ///< n: the part of a vertex's hat that the body covers and that bears, 1 where
+                                      ///< no outline cuts it (see cut_hats.h); empty: not told
+  std::vector<NodeState> node_state;  ///< n
+  std::vector<int> node_owner;        ///< n, the body that a vertex touches, -1 where open
 
   double largest_penetration = 0.0;  ///< mm, weighted gap over weight
   double largest_tension = 0.0;      ///< MPa
@@ -101,7 +103,7 @@ struct PressState {
                                      ///< fields
   double largest_strain = 0.0;       ///< the larger of largest_gradient and |normal displacement| / thickness. Linear
                                      ///< elasticity is first-order in it: above some 0.2, don't trust percents; fields
-  double contact_area = 0.0;         ///< mm^2: weights of the vertices in contact
+  double contact_area = 0.0;         ///< mm^2: weights of the vertices in contact, times what bears of them
   int contact_vertices = 0;
   bool under_resolved = false;  ///< overlapping, but in contact with fewer than 13 vertices (a contact radius under
                                 ///< two edges): forces may be several percent off, or zero for a touch between

@@ -172,6 +172,8 @@ ContactProblem PartSolver::problem(const PressSnapshot& from, const std::vector<
       if (!cuts[b]) continue;
       add_cut_compliance(combined_, *cuts[b], surface_, gel_, vertices, block_.axes(), c == 1 && surface_.flat);
     }
+    if (elastic_ && any_cuts) cut_ = combined_;
+    any_cuts_ = any_cuts;
     combined_cuts_ = cuts;
     combined_vertices_ = vertices;
     combined_owner_ = owner;
@@ -200,7 +202,7 @@ ContactProblem PartSolver::problem(const PressSnapshot& from, const std::vector<
     }
     memory_.forget();
   } else if (use_combined_) {
-    use_combined_ = false;
+    use_combined_ = any_cuts_ = false;
     memory_.forget();
   }
   for (const PartTarget& target : targets) {
@@ -249,10 +251,7 @@ ContactProblem PartSolver::problem(const PressSnapshot& from, const std::vector<
         // int phi (the body's motion) dA.
         Eigen::Vector3d moved = surface_.weight[v] * axis;
         if (rotation) {
-          Eigen::Vector3d arm = -surface_.weight[v] * now.bodies[b].pose.translation;
-          for (Eigen::SparseMatrix<double>::InnerIterator it(gel_.mass, v); it; ++it) {
-            arm += it.value() * gel_.vertices[static_cast<std::size_t>(it.row())];
-          }
+          Eigen::Vector3d arm = arm_of(now, v) - surface_.weight[v] * now.bodies[b].pose.translation;
           if (now.weighted.size() == 3 * m) arm += now.weighted.segment<3>(3 * j);
           moved = axis.cross(arm);
         }
@@ -262,6 +261,20 @@ ContactProblem PartSolver::problem(const PressSnapshot& from, const std::vector<
     }
   }
   return result;
+}
+
+/// The place of a vertex's traction times its weight: int phi x dA, or with what bears of its hat.
+Eigen::Vector3d PartSolver::arm_of(const Iterate& now, int vertex) const {
+  if (now.owner[vertex] >= 0) {
+    const auto& cuts = now.bodies[now.owner[vertex]].gap.cuts;
+    const Eigen::Index place = cuts ? place_in(*cuts, vertex) : -1;
+    if (place >= 0) return cuts->moment.col(place);
+  }
+  Eigen::Vector3d arm = Eigen::Vector3d::Zero();
+  for (Eigen::SparseMatrix<double>::InnerIterator it(gel_.mass, vertex); it; ++it) {
+    arm += it.value() * gel_.vertices[static_cast<std::size_t>(it.row())];
+  }
+  return arm;
 }
 
 /// Moves the poses by what forces and torques ask for, no faster than the block can follow. False if a body slides away
@@ -346,7 +359,7 @@ void PartSolver::follow_patches(const ContactAnswer& answer, Iterate& now) const
   if (elastic_) {
     own.setZero();
     for (Eigen::Index j = 0; j < answer.z.size(); ++j) {
-      if (answer.z[j] != 0.0) own += answer.z[j] * block_.compliance().col(j);
+      if (answer.z[j] != 0.0) own += answer.z[j] * gel_compliance().col(j);
     }
     for (Eigen::Index j = 0; j < m; ++j) {
       own.segment<3>(3 * j) -= block_.axes(vertices[j]).transpose() * relaxation_.carried(vertices[j]);

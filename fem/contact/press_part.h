@@ -44,6 +44,7 @@ struct PressSnapshot {
   double penetration = 0.0;      ///< mm, the largest over all vertices
   double lookup_error = 0.0;     ///< mm
   double residual = 0.0;         ///< of the contact laws
+  Eigen::VectorXd share;         ///< n, of each hat: the part that bears (see cut_hats.h)
   RelaxationHistory history;     ///< of (traction; weighted displacement by the unrelaxed gel), 6 n; may be empty
 
   /// Is any body in contact?
@@ -132,6 +133,13 @@ class PartSolver {
   Eigen::Ref<const Eigen::MatrixXd> compliance() const {
     return use_combined_ ? Eigen::Ref<const Eigen::MatrixXd>(combined_) : block_.compliance();
   }
+  /// Of the gel alone, with what cut hats change.
+  Eigen::Ref<const Eigen::MatrixXd> gel_compliance() const {
+    return any_cuts_ && elastic_ ? Eigen::Ref<const Eigen::MatrixXd>(cut_)
+           : elastic_            ? block_.compliance()
+                                 : compliance();
+  }
+  Eigen::Vector3d arm_of(const Iterate& now, int vertex) const;
   void refuse_too_deep(double deepest) const;
 
   const Compliance& gel_;
@@ -149,6 +157,8 @@ class PartSolver {
   Eigen::MatrixXd combined_;         ///< the block's compliance with the elastic bodies' and what cut hats change
   Eigen::MatrixXd combined_normal_;  ///< its normal rows and columns
   bool use_combined_ = false;
+  Eigen::MatrixXd cut_;    ///< beside elastic bodies: the block's compliance with what cut hats change
+  bool any_cuts_ = false;  ///< in `combined_`
   std::vector<std::shared_ptr<const CutHats>> combined_cuts_;  ///< per body: those in `combined_`
   std::vector<int> combined_vertices_;                         ///< and the block's vertices
   std::vector<int> combined_owner_;                            ///< and theirs

@@ -61,6 +61,7 @@ PressState report(const Compliance& gel, const PartSolver& solver, const Surface
   s.wrench = s.bodies.front().wrench;
   s.node_state = snapshot.state;
   s.node_owner = snapshot.owner;
+  s.bearing_share = snapshot.share;
   s.traction.resize(n, 3);
   for (int v = 0; v < n; ++v) s.traction.row(v) = snapshot.traction.segment<3>(3 * v);
   s.largest_penetration = snapshot.penetration;
@@ -82,9 +83,10 @@ PressState report(const Compliance& gel, const PartSolver& solver, const Surface
     const double pressure = -surface.normals[v].dot(t);
     largest_pressure = std::max(largest_pressure, pressure);
     s.largest_tension = std::max(s.largest_tension, -pressure);
-    s.contact_area += surface.weight[v];
+    const double area = surface.weight[v] * snapshot.share[v];
+    s.contact_area += area;
     ++s.contact_vertices;
-    s.bodies[snapshot.owner[v]].contact_area += surface.weight[v];
+    s.bodies[snapshot.owner[v]].contact_area += area;
     ++s.bodies[snapshot.owner[v]].contact_vertices;
   }
   for (int v = 0; v < n && largest_pressure > 0.0; ++v) {
