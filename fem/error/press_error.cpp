@@ -21,6 +21,8 @@ constexpr double kSharpBorder = 1.0;
 /// Their errors grow by this power of the radius on top of the table's.
 constexpr double kFewVertices = 1.0;
 constexpr double kFewVerticesOrder = 3.0;
+/// Of a patch's force, on hats that an outline cuts: from so much on the body is a sharp one.
+constexpr double kSharpByOutline = 0.5;
 
 /// Vertices in contact that are connected by triangles, as lists of vertices.
 std::vector<std::vector<int>> patches_of(const Compliance& gel, const PressState& state) {
@@ -57,6 +59,7 @@ struct Patch {
   double area = 0.0;
   double radius_per_edge = 0.0;
   double sharpness = 0.0;              ///< 0 smooth, 1 sharp
+  double by_outline = 0.0;             ///< likewise, as far as outlines are seen below the mesh's size
   Vector3d force = Vector3d::Zero();   ///< on the gel
   Vector3d normal = Vector3d::Zero();  ///< unit: the direction of the pressure's force on the object
 };
@@ -69,14 +72,20 @@ Patch describe(const Compliance& gel, const PressState& state, const Eigen::Vect
   double border_area = 0.0;
   double border_force = 0.0;
   double all_force = 0.0;
+  double cut_force = 0.0;
+  double hats = 0.0;
+  const auto share_of = [&](int v) { return state.bearing_share.size() > 0 ? state.bearing_share[v] : 1.0; };
   for (const int v : vertices) {
     const Vector3d traction = state.traction.row(v);
     const double pressure = -normals[v].dot(traction) * weight[v];
-    patch.area += weight[v];
+    const double area = weight[v] * share_of(v);
+    hats += weight[v];
+    patch.area += area;
     patch.force += weight[v] * traction;
     patch.normal += std::max(0.0, pressure) * normals[v];
-    centre += weight[v] * gel.vertices[v];
+    centre += area * gel.vertices[v];
     all_force += pressure;
+    if (share_of(v) < 1.0) cut_force += pressure;
     if (border[v]) {
       border_area += weight[v];
       border_force += pressure;
@@ -87,17 +96,20 @@ Patch describe(const Compliance& gel, const PressState& state, const Eigen::Vect
   Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
   for (const int v : vertices) {
     const Vector3d from = gel.vertices[v] - centre;
-    spread += weight[v] / patch.area * from * from.transpose();
+    spread += weight[v] * share_of(v) / patch.area * from * from.transpose();
   }
   // The largest is along the patch, the next across it, the last through it. A vertex stands for a disc of its area.
   const double mean_area = patch.area / static_cast<double>(vertices.size());
+  const double mean_hat = hats / static_cast<double>(vertices.size());
   const double across = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread, Eigen::EigenvaluesOnly).eigenvalues()[1];
   const double by_spread = 2.0 * std::sqrt(std::max(0.0, across) + mean_area / (4.0 * std::numbers::pi));
   const double by_area = std::sqrt(patch.area / std::numbers::pi);
-  const double edge = std::sqrt(mean_area * 2.0 / std::sqrt(3.0));  // of equilateral triangles
+  const double edge = std::sqrt(mean_hat * 2.0 / std::sqrt(3.0));  // of equilateral triangles
   patch.radius_per_edge = std::min(by_spread, by_area) / edge;
   const double ratio = all_force > 0.0 && border_area > 0.0 ? border_force / border_area * patch.area / all_force : 1.0;
-  patch.sharpness = std::clamp((ratio - kSmoothBorder) / (kSharpBorder - kSmoothBorder), 0.0, 1.0);
+  patch.by_outline = all_force > 0.0 ? std::clamp(cut_force / all_force / kSharpByOutline, 0.0, 1.0) : 0.0;
+  const double by_pressure = std::clamp((ratio - kSmoothBorder) / (kSharpBorder - kSmoothBorder), 0.0, 1.0);
+  patch.sharpness = std::max(by_pressure, patch.by_outline);
   return patch;
 }
 
@@ -126,7 +138,8 @@ PressError estimate_error(const Compliance& gel, const PressState& state) {
   double area = 0.0;
   for (const std::vector<int>& vertices : patches) {
     const Patch patch = describe(gel, state, weight, border, normals, vertices);
-    const double few = std::pow(std::max(1.0, kFewVertices / patch.radius_per_edge), kFewVerticesOrder);
+    const double few =
+        std::pow(std::max(1.0, kFewVertices / patch.radius_per_edge), kFewVerticesOrder * (1.0 - patch.by_outline));
     const RelativeErrors smooth = errors_at(gel.mesh_error.smooth, patch.radius_per_edge);
     const RelativeErrors sharp = errors_at(gel.mesh_error.sharp, patch.radius_per_edge);
     const auto of = [&](ErrorOf kind) {
