@@ -64,6 +64,7 @@ class TriangleGap {
     is_crossed = false;
     bent.reset();
     crossed = {};
+    to_keep_.clear();
     slope_sum_.setZero();
     slope_weight_ = 0.0;
     level_ = level;
@@ -86,16 +87,7 @@ class TriangleGap {
       cell(Eigen::Matrix3d::Identity(), splits, kSilhouetteSplits);
     }
     is_crossed = is_crossed || crossed.bend > kBent;
-    if (slope_weight_ > 0.0) crossed.slope = slope_sum_ / slope_weight_;
-    // Pieces from before a step was found may lie on both sides of it, where it crosses none of their edges or two.
-    for (const CoveredPiece& piece : std::exchange(crossed.pieces, {})) {
-      if (is_mixed(piece)) {
-        keep(piece.corners);
-      } else {
-        crossed.pieces.push_back(piece);
-      }
-    }
-    if (!is_crossed) crossed.pieces.clear();
+    if (is_crossed) make_pieces();
   }
 
   /// The gap at a point of the triangle last set up.
@@ -143,6 +135,23 @@ class TriangleGap {
     if (std::isfinite(farthest_behind_) || collect_) return at(b).has_value();
     return is_hit(shape_, points_ * b, direction(b));
   }
+  /// The values at a cell's corners and at the rule's points in it; nothing for a miss.
+  struct CellGaps {
+    std::array<std::optional<double>, 3> corner;
+    std::array<std::optional<double>, 7> inner;
+  };
+  std::array<std::optional<double>, 7> inner_gaps(const Eigen::Matrix3d& corners) const {
+    std::array<std::optional<double>, 7> result;
+    for (int k = 0; k < 7; ++k) result[k] = at(corners * radon_rule().points[k]);
+    return result;
+  }
+  CellGaps gaps_in(const Eigen::Matrix3d& corners) const {
+    CellGaps result;
+    for (int k = 0; k < 3; ++k) result.corner[k] = at(corners.col(k));
+    result.inner = inner_gaps(corners);
+    return result;
+  }
+
   /// Signed, positive inside.
   double silhouette(const Eigen::Vector3d& b) const {
     return *silhouette_distance(shape_, points_ * b, normals_.col(0));
@@ -162,26 +171,21 @@ class TriangleGap {
       for (int k = 0; k < 3; ++k) reach2 = std::max(reach2, (points_ * (corners.col(k) - middle)).squaredNorm());
       const double inside = silhouette(middle);
       if (inside * inside > reach2) {
-        if (inside > 0.0 && !(collect_ && bent_cell(corners, silhouette_splits))) whole(corners);
+        if (inside <= 0.0) return;
+        if (!collect_) return whole(corners);
+        const CellGaps gaps = gaps_in(corners);
+        if (!bent_cell(corners, gaps, silhouette_splits)) whole(corners, gaps.inner);
         return;
       }
       for (int k = 0; k < 3; ++k) corner_hits += corner_hit[k] = silhouette(corners.col(k)) >= 0.0;
     } else {
+      const CellGaps gaps = gaps_in(corners);
       int hits = 0;
-      for (int k = 0; k < 3; ++k) corner_hits += corner_hit[k] = at(corners.col(k)).has_value();
-      std::array<std::optional<double>, 7> value;
-      for (int k = 0; k < 7; ++k) {
-        value[k] = at(corners * radon_rule().points[k]);
-        hits += value[k].has_value();
-      }
+      for (int k = 0; k < 3; ++k) corner_hits += corner_hit[k] = gaps.corner[k].has_value();
+      for (const auto& value : gaps.inner) hits += value.has_value();
       if (hits + corner_hits == 0) return;
-      if (collect_ && hits + corner_hits == 10 && bent_cell(corners, silhouette_splits)) return;
       if (hits + corner_hits == 10) {
-        const double area = area_ * std::abs(corners.determinant());
-        if (collect_) keep(corners);
-        for (int k = 0; k < 7; ++k) {
-          add(corners * radon_rule().points[k], *value[k], radon_rule().weights[k] * area);
-        }
+        if (!(collect_ && bent_cell(corners, gaps, silhouette_splits))) whole(corners, gaps.inner);
         return;
       }
     }
@@ -260,18 +264,18 @@ class TriangleGap {
 
   /// A cell that hits all over, where the gap isn't plane: split further, and cut at the step if that is it. False: it
   /// is to be taken as it is.
-  bool bent_cell(const Eigen::Matrix3d& corners, int splits) {
-    double low = kInfinity;
-    double high = -kInfinity;
-    const double bend = bend_of(corners, low, high);
+  bool bent_cell(const Eigen::Matrix3d& corners, const CellGaps& gaps, int splits) {
+    Eigen::Vector3d at_corner;
+    for (int k = 0; k < 3; ++k) at_corner[k] = gaps.corner[k].value_or(0.0);
+    double low = at_corner.minCoeff();
+    double high = at_corner.maxCoeff();
+    const double bend = bend_of(at_corner, gaps.inner, low, high);
     if (corners.isIdentity(0.0)) {
       if (low < 0.0 && high > 0.0) crossed.bend = bend;
       if (bend > kBent) bent = {low, high};
     }
     if (bend <= kBent) {
       // A linear function's values at the triangle's corners from those at the cell's.
-      Eigen::Vector3d at_corner;
-      for (int k = 0; k < 3; ++k) at_corner[k] = at(corners.col(k)).value_or(0.0);
       const double share = std::abs(corners.determinant());
       Eigen::Vector3d trend = corners.transpose().inverse() * at_corner;
       trend.array() -= trend.mean();
@@ -286,15 +290,12 @@ class TriangleGap {
     return cut_at_step(corners);
   }
 
-  /// How far the gap is from plane, of its range; 0 where that is next to nothing.
-  double bend_of(const Eigen::Matrix3d& corners, double& low, double& high) const {
-    Eigen::Vector3d at_corner;
-    for (int k = 0; k < 3; ++k) at_corner[k] = at(corners.col(k)).value_or(0.0);
-    low = at_corner.minCoeff();
-    high = at_corner.maxCoeff();
+  /// How far the gap is from plane, of its range, which is widened; 0 where that is next to nothing.
+  double bend_of(const Eigen::Vector3d& at_corner, const std::array<std::optional<double>, 7>& inner, double& low,
+                 double& high) const {
     double off = 0.0;
     for (int k = 0; k < 7; ++k) {
-      const double value = at(corners * radon_rule().points[k]).value_or(0.0);
+      const double value = inner[k].value_or(0.0);
       low = std::min(low, value);
       high = std::max(high, value);
       off = std::max(off, std::abs(value - at_corner.dot(radon_rule().points[k])));
@@ -368,21 +369,48 @@ class TriangleGap {
     return piece.low < threshold && piece.high > threshold;
   }
 
-  /// Keeps a covered cell in pieces of at most a quarter of an edge.
-  void keep(const Eigen::Matrix3d& corners) {
+  /// A covered cell whose pieces are made once it is known that the triangle is crossed: most aren't.
+  struct CellToKeep {
+    Eigen::Matrix3d corners;
+    std::array<std::optional<double>, 7> gaps;
+    std::size_t steps;  ///< so many had been found
+  };
+
+  void make_pieces() {
+    const std::vector<StepPoint> steps = std::exchange(crossed.steps, {});
+    for (const CellToKeep& cell : to_keep_) {
+      crossed.steps.assign(steps.begin(), steps.begin() + static_cast<std::ptrdiff_t>(cell.steps));
+      keep(cell.corners, &cell.gaps);
+    }
+    crossed.steps = steps;
+    if (slope_weight_ > 0.0) crossed.slope = slope_sum_ / slope_weight_;
+    // Pieces from before a step was found may lie on both sides of it, where it crosses none of their edges or two.
+    for (const CoveredPiece& piece : std::exchange(crossed.pieces, {})) {
+      if (is_mixed(piece) && std::abs(piece.corners.determinant()) > kMixedPiece) {
+        keep_quarters(piece.corners);
+      } else {
+        crossed.pieces.push_back(piece);
+      }
+    }
+  }
+
+  void keep_quarters(const Eigen::Matrix3d& corners) {
+    for (const Eigen::Matrix3d& part : quarters_of(corners)) keep(part);
+  }
+
+  /// Keeps a covered cell in pieces of at most a quarter of an edge. `gaps`: at the rule's points, if they are known.
+  void keep(const Eigen::Matrix3d& corners, const std::array<std::optional<double>, 7>* gaps = nullptr) {
     const double share = std::abs(corners.determinant());
     if (share < kLeastPiece) return;  // an outline along an edge cuts off nothing
-    if (share > 1.5 / 16.0) {
-      for (const Eigen::Matrix3d& part : quarters_of(corners)) keep(part);
-      return;
-    }
+    if (share > 1.5 / 16.0) return keep_quarters(corners);
     CoveredPiece piece;
     piece.corners = corners;
     piece.low = kInfinity;
     piece.high = -kInfinity;
     double weight = 0.0;
+    const auto inner = gaps ? *gaps : inner_gaps(corners);
     for (int k = 0; k < 7; ++k) {
-      if (const auto value = at(corners * radon_rule().points[k])) {
+      if (const auto& value = inner[k]) {
         piece.value += radon_rule().weights[k] * *value;
         weight += radon_rule().weights[k];
         piece.low = std::min(piece.low, *value);
@@ -394,20 +422,19 @@ class TriangleGap {
     set_overlap(piece);
     const bool straddles = crossed.bend > kBent && piece.overlap > 0.0 && piece.overlap < 1.0;
     if ((straddles && share > kLeastStraddling) || (is_mixed(piece) && share > kMixedPiece)) {
-      for (const Eigen::Matrix3d& part : quarters_of(corners)) keep(part);
-      return;
+      return keep_quarters(corners);
     }
     crossed.pieces.push_back(piece);
   }
 
   /// A cell that hits all over, but for slivers at a curved silhouette.
-  void whole(const Eigen::Matrix3d& corners) {
-    if (collect_) keep(corners);
+  void whole(const Eigen::Matrix3d& corners) { whole(corners, inner_gaps(corners)); }
+  void whole(const Eigen::Matrix3d& corners, const std::array<std::optional<double>, 7>& inner) {
+    if (collect_) to_keep_.push_back({corners, inner, crossed.steps.size()});
     const double area = area_ * std::abs(corners.determinant());
     const RadonRule& rule = radon_rule();
     for (int k = 0; k < 7; ++k) {
-      const Eigen::Vector3d point = corners * rule.points[k];
-      if (const auto value = at(point)) add(point, *value, rule.weights[k] * area);
+      if (inner[k]) add(corners * rule.points[k], *inner[k], rule.weights[k] * area);
     }
   }
 
@@ -433,6 +460,7 @@ class TriangleGap {
   double lowest_wall_ = 0.0;
   Eigen::Vector3d slope_sum_;  // of the trends of plane cells, by their share of the triangle
   double slope_weight_ = 0.0;
+  std::vector<CellToKeep> to_keep_;
 };
 
 }  // namespace
@@ -582,7 +610,10 @@ WeightedGap weighted_gap(const ContactSurface& surface, const ContactShape& shap
                  reached + kCutMargin * surface.triangle_size[static_cast<std::size_t>(t.triangle)];
         });
         if (crossed.empty() && !kept) return;
+        int set_up = -1;
         const auto gap_at = [&](int t, const Eigen::Vector3d& b) {
+          if (set_up == t) return triangle.gap_at(b);
+          set_up = t;
           const auto& index = surface.triangles[t];
           const std::array<Eigen::Vector3d, 3> corners{moved[index[0]], moved[index[1]], moved[index[2]]};
           const std::array<Eigen::Vector3d, 3> normals{surface.normals[index[0]], surface.normals[index[1]],

@@ -47,14 +47,38 @@ struct HalfSpace {
   double nu;
 };
 
+/// Cells side by side, so that loops over them run on several numbers at once.
+struct Cells {
+  explicit Cells(const std::vector<DensityCell>& list = {}) {
+    const auto n = static_cast<Eigen::Index>(list.size());
+    at.resize(n, 3);
+    area.resize(n);
+    density.resize(n, 3);
+    for (Eigen::Index k = 0; k < n; ++k) {
+      const DensityCell& cell = list[static_cast<std::size_t>(k)];
+      at.row(k) = cell.at;
+      area[k] = cell.area;
+      density.row(k) = cell.density;
+    }
+    largest = kSelf / area.sqrt();
+  }
+
+  Eigen::Index size() const { return area.size(); }
+
+  Eigen::ArrayX3d at;        ///< mm
+  Eigen::ArrayXd area;       ///< mm^2
+  Eigen::ArrayXd largest;    ///< mm^-1: mean of 1/r within each
+  Eigen::MatrixX3d density;  ///< mm^2
+};
+
 /// One triangle among the block's.
 struct Part {
   Vector3d middle;
   std::array<int, 3> place;  ///< of its corners in the block, -1: not in it
   Vector3d first, second;    ///< tangents
   bool cut = false;
-  std::vector<DensityCell> now;  ///< cut where it is
-  std::vector<DensityCell> whole;
+  Cells now;  ///< cut where it is
+  Cells whole;
   std::array<Vector3d, 3> centre_now, centre_whole;  ///< of each corner's density
   Vector3d mass_now, mass_whole;
 };
@@ -73,7 +97,7 @@ void sum_up(const std::vector<DensityCell>& cells, std::array<Vector3d, 3>& cent
 
 class Adder {
  public:
-  /// A response is added to `out`.
+  /// A response is added to `out`, a row for each vertex if `normal_only`, else three.
   Adder(Eigen::MatrixXd& out, const HalfSpace& half_space, bool normal_only)
       : out_(out), half_space_(half_space), normal_only_(normal_only) {}
 
@@ -92,54 +116,82 @@ class Adder {
     const int row = a.place[i];
     const int column = b.place[j];
     if (row < 0 || column < 0) return;
-    if (normal_only_) {
-      out_(3 * row, 3 * column) += block(0, 0);
-      if (!same) out_(3 * column, 3 * row) += block(0, 0);
-    } else {
-      out_.block<3, 3>(3 * row, 3 * column) += block;
-      if (!same) out_.block<3, 3>(3 * column, 3 * row) += block.transpose();
-    }
+    out_.block<3, 3>(3 * row, 3 * column) += block;
+    if (!same) out_.block<3, 3>(3 * column, 3 * row) += block.transpose();
   }
 
-  void cells(const Part& a, const std::vector<DensityCell>& in_a, const Part& b, const std::vector<DensityCell>& in_b,
-             bool same) {
+  /// Means of 1/r between a cell and all of others, and where it is from them.
+  void see(const Cells& in_a, Eigen::Index k, const Cells& in_b) {
+    for (int axis = 0; axis < 3; ++axis) from_[axis] = in_a.at(k, axis) - in_b.at.col(axis);
+    r2_ = from_[0].square() + from_[1].square() + from_[2].square();
+    near_ = r2_.sqrt().inverse();  // of a cell and itself: infinity
+    inverse_ =
+        (near_ + (0.5 * kSpread) * (in_a.area[k] + in_b.area) * near_.cube()).min(in_b.largest).min(in_a.largest[k]);
+  }
+
+  /// What a cell sees of each density.
+  static Eigen::RowVector3d seen(const Eigen::ArrayXd& term, const Cells& in_b) {
+    Eigen::RowVector3d result;
+    for (int j = 0; j < 3; ++j) result[j] = term.matrix().dot(in_b.density.col(j));
+    return result;
+  }
+
+  void cells(const Part& a, const Cells& in_a, const Part& b, const Cells& in_b, bool same) {
     if (normal_only_) {
       Matrix3d sum = Matrix3d::Zero();
-      for (const DensityCell& k : in_a) {
-        Vector3d seen = Vector3d::Zero();
-        for (const DensityCell& l : in_b) {
-          seen += HalfSpace::inverse_distance((k.at - l.at).squaredNorm(), k.area, l.area) * l.density;
-        }
-        sum += k.density * seen.transpose();
+      for (Eigen::Index k = 0; k < in_a.size(); ++k) {
+        see(in_a, k, in_b);
+        sum += in_a.density.row(k).transpose() * seen(inverse_, in_b);
       }
-      const double factor = half_space_.scale * (1.0 - half_space_.nu);
+      sum *= half_space_.scale * (1.0 - half_space_.nu);
       for (int i = 0; i < 3; ++i) {
-        for (int j = 0; j < 3; ++j) {
-          Matrix3d block = Matrix3d::Zero();
-          block(0, 0) = factor * sum(i, j);
-          add(a, i, b, j, block, same);
-        }
+        for (int j = 0; j < 3; ++j) add_normal(a.place[i], b.place[j], sum(i, j), same);
       }
       return;
     }
-    std::array<std::array<Matrix3d, 3>, 3> sum;
-    for (auto& row : sum) row.fill(Matrix3d::Zero());
-    for (const DensityCell& k : in_a) {
-      std::array<Matrix3d, 3> seen;
-      seen.fill(Matrix3d::Zero());
-      for (const DensityCell& l : in_b) {
-        const Vector3d from = k.at - l.at;
-        const Matrix3d u =
-            half_space_.between(a.first.dot(from), a.second.dot(from), from.squaredNorm(), k.area, l.area);
-        for (int j = 0; j < 3; ++j) seen[j] += l.density[j] * u;
-      }
-      for (int i = 0; i < 3; ++i) {
-        for (int j = 0; j < 3; ++j) sum[i][j] += k.density[i] * seen[j];
+    std::array<Matrix3d, kTerms> sum;
+    sum.fill(Matrix3d::Zero());
+    for (Eigen::Index k = 0; k < in_a.size(); ++k) {
+      see(in_a, k, in_b);
+      see_terms(a, same ? k : -1);
+      for (int term = 0; term < kTerms; ++term) {
+        sum[term] += in_a.density.row(k).transpose() * seen(terms_[term], in_b);
       }
     }
     for (int i = 0; i < 3; ++i) {
-      for (int j = 0; j < 3; ++j) add(a, i, b, j, sum[i][j], same);
+      for (int j = 0; j < 3; ++j) {
+        std::array<double, kTerms> u;
+        for (int term = 0; term < kTerms; ++term) u[term] = half_space_.scale * sum[term](i, j);
+        Matrix3d block;
+        block << u[0], u[1], u[2], -u[1], u[0] + u[3], u[4], -u[2], u[4], u[0] + u[5];
+        add(a, i, b, j, block, same);
+      }
     }
+  }
+
+  /// What `HalfSpace::between` is made of: of a normal traction by a normal one, along either tangent by a normal one,
+  /// and what tangential ones have beyond the first. `self`: the cell that is the seeing one itself.
+  void see_terms(const Part& a, Eigen::Index self) {
+    const double nu = half_space_.nu;
+    x_ = a.first[0] * from_[0] + a.first[1] * from_[1] + a.first[2] * from_[2];
+    y_ = a.second[0] * from_[0] + a.second[1] * from_[1] + a.second[2] * from_[2];
+    flat2_ = x_.square() + y_.square();
+    over_flat2_ = flat2_.max(1e-100).inverse();
+    shear_ = (0.5 - nu) * (flat2_ * inverse_.square()).min(1.0) * over_flat2_;
+    along_ = nu * inverse_ * over_flat2_;
+    terms_[0] = (1.0 - nu) * inverse_;
+    terms_[1] = shear_ * x_;
+    terms_[2] = shear_ * y_;
+    terms_[3] = along_ * x_.square();
+    terms_[4] = along_ * x_ * y_;
+    terms_[5] = along_ * y_.square();
+    if (self >= 0) terms_[3][self] = terms_[5][self] = 0.5 * nu * inverse_[self];
+  }
+
+  void add_normal(int row, int column, double u, bool same) {
+    if (row < 0 || column < 0) return;
+    out_(row, column) += u;
+    if (!same) out_(column, row) += u;
   }
 
   void far(const Part& a, const std::array<Vector3d, 3>& centre_a, const Vector3d& mass_a, const Part& b,
@@ -152,8 +204,7 @@ class Adder {
         const double mass = mass_a[i] * mass_b[j];
         if (normal_only_) {
           const double u = mass * half_space_.scale * (1.0 - half_space_.nu) / from.norm();
-          out_(3 * a.place[i], 3 * b.place[j]) += u;
-          out_(3 * b.place[j], 3 * a.place[i]) += u;
+          add_normal(a.place[i], b.place[j], u, false);
         } else {
           add(a, i, b, j,
               mass * half_space_.between(a.first.dot(from), a.second.dot(from), from.squaredNorm(), 0.0, 0.0), false);
@@ -162,9 +213,15 @@ class Adder {
     }
   }
 
+  static constexpr int kTerms = 6;
+
   Eigen::MatrixXd& out_;
   const HalfSpace& half_space_;
   bool normal_only_;
+  // For each cell that is seen.
+  std::array<Eigen::ArrayXd, 3> from_;
+  Eigen::ArrayXd r2_, near_, inverse_, x_, y_, flat2_, over_flat2_, shear_, along_;
+  std::array<Eigen::ArrayXd, kTerms> terms_;
 };
 
 /// What a gel's response is beyond a half-space's near one of its vertices: smooth, since it comes from the gel's other
@@ -287,18 +344,22 @@ void add_cut_compliance(Eigen::MatrixXd& compliance, const CutHats& cuts, const 
     part.middle = (surface.vertices[index[0]] + surface.vertices[index[1]] + surface.vertices[index[2]]) / 3.0;
     part.first = axes_of_all[own].col(1);
     part.second = axes_of_all[own].col(2);
-    part.whole = whole_cells(surface, t);
+    const std::vector<DensityCell> whole = whole_cells(surface, t);
     part.cut = next_cut != cuts.triangles.end() && next_cut->triangle == t;
-    part.now = part.cut ? next_cut->cells : part.whole;
-    sum_up(part.now, part.centre_now, part.mass_now);
-    sum_up(part.whole, part.centre_whole, part.mass_whole);
+    const std::vector<DensityCell>& now = part.cut ? next_cut->cells : whole;
+    part.whole = Cells(whole);
+    part.now = Cells(now);
+    sum_up(now, part.centre_now, part.mass_now);
+    sum_up(whole, part.centre_whole, part.mass_whole);
     mean_area += surface.triangle_area[t];
     parts.push_back(std::move(part));
   }
   if (parts.empty()) return;
   mean_area /= static_cast<double>(parts.size());
   const double near = kNear * std::sqrt(mean_area * 4.0 / std::sqrt(3.0));
-  Eigen::MatrixXd cut_response = Eigen::MatrixXd::Zero(compliance.rows(), compliance.cols());
+  const Eigen::Index each = normal_only ? 1 : 3;  // rows of a vertex in the responses
+  const Eigen::Index rows = each * static_cast<Eigen::Index>(vertices.size());
+  Eigen::MatrixXd cut_response = Eigen::MatrixXd::Zero(rows, rows);
   Eigen::MatrixXd whole_response = cut_response;
   Adder add_cut(cut_response, half_space, normal_only);
   Adder add_whole(whole_response, half_space, normal_only);
@@ -321,11 +382,11 @@ void add_cut_compliance(Eigen::MatrixXd& compliance, const CutHats& cuts, const 
     std::vector<int> near_ones;
     Matrix3d level = Matrix3d::Zero();
     double weights = 0.0;
-    const Eigen::Index column = 3 * place[i];
+    const Eigen::Index column = each * place[i];
     const auto elements = [&](int j) -> Matrix3d {
-      const Eigen::Index row = 3 * place[j];
-      return (compliance.block<3, 3>(row, column) - whole_response.block<3, 3>(row, column)) /
-             (surface.weight[i] * surface.weight[j]);
+      Matrix3d block = compliance.block<3, 3>(3 * place[j], 3 * place[i]);
+      block.topLeftCorner(each, each) -= whole_response.block(each * place[j], column, each, each);
+      return block / (surface.weight[i] * surface.weight[j]);
     };
     for (const int j : cut) {
       if ((surface.vertices[i] - surface.vertices[j]).norm() > kReplaced * rest.edge()) continue;
@@ -336,27 +397,25 @@ void add_cut_compliance(Eigen::MatrixXd& compliance, const CutHats& cuts, const 
     level /= weights;
     for (const int j : near_ones) {
       // Half from either end, so that it's symmetric.
-      const Eigen::Index row = 3 * place[j];
+      const Eigen::Index row = each * place[j];
       const Matrix3d change = 0.5 * surface.weight[i] * surface.weight[j] * (rest.at(j) + level - elements(j));
-      if (normal_only) {
-        cut_response(row, column) += change(0, 0);
-        cut_response(column, row) += change(0, 0);
-      } else {
-        cut_response.block<3, 3>(row, column) += change;
-        cut_response.block<3, 3>(column, row) += change.transpose();
-      }
+      const auto part = change.topLeftCorner(each, each);
+      cut_response.block(row, column, each, each) += part;
+      cut_response.block(column, row, each, each) += part.transpose();
     }
   }
   // A sliver's traction goes to nothing as the body leaves its hat, so that no vertex switches on or off by its share.
   for (std::size_t k = 0; k < cuts.vertices.size(); ++k) {
-    const Eigen::Index row = 3 * place[cuts.vertices[k]];
+    const int row = place[cuts.vertices[k]];
     const double share = cuts.share[static_cast<Eigen::Index>(k)];
     if (row < 0 || share <= 0.0) continue;
     const double more = std::min(kStiffest, std::pow(kSliver / share, 2));
-    for (int a = 0; a < (normal_only ? 1 : 3); ++a)
-      cut_response(row + a, row + a) += more * compliance(row + a, row + a);
+    for (Eigen::Index a = 0; a < each; ++a) {
+      cut_response(each * row + a, each * row + a) += more * compliance(3 * row + a, 3 * row + a);
+    }
   }
-  compliance += cut_response - whole_response;
+  const auto changed = Eigen::seqN(Eigen::fix<0>, rows, 3 / each);
+  compliance(changed, changed) += cut_response - whole_response;
 }
 
 }  // namespace touchstone::fem

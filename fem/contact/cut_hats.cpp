@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <utility>
 
 #include "fem/contact/contact_gap.h"
@@ -53,12 +54,20 @@ Matrix3d corners_of(const ContactSurface& surface, int triangle) {
   return m;
 }
 
-double distance_to(const Vector3d& point, const std::array<Vector3d, 2>& stretch) {
-  const Vector3d along = stretch[1] - stretch[0];
-  const double length2 = along.squaredNorm();
-  const double t = length2 > 0.0 ? std::clamp((point - stretch[0]).dot(along) / length2, 0.0, 1.0) : 0.0;
-  return (point - stretch[0] - t * along).norm();
-}
+/// A stretch of outline in the gel frame.
+struct Stretch {
+  Stretch(const Vector3d& a, const Vector3d& b)
+      : from(a), along(b - a), per_length2(a != b ? 1.0 / along.squaredNorm() : 0.0) {}
+
+  double squared_distance(const Vector3d& point) const {
+    const Vector3d there = point - from;
+    const double t = std::clamp(there.dot(along) * per_length2, 0.0, 1.0);
+    return (there - t * along).squaredNorm();
+  }
+
+  Vector3d from, along;
+  double per_length2;  ///< mm^-2; 0: a point
+};
 
 /// A step's point in the gel frame, with the gap's trend beside it.
 struct Step {
@@ -86,11 +95,6 @@ Vector3d gradient_of(const Matrix3d& corners, const Vector3d& values) {
   return edges.transpose() * (edges * edges.transpose()).ldlt().solve(rise);
 }
 
-/// A stretch of outline in the gel frame.
-struct Stretch {
-  std::array<Vector3d, 2> ends;
-};
-
 /// A piece with its integrals against the corners' hats, plain and with the rise towards edges.
 struct Piece {
   Vector3d middle;  ///< barycentric
@@ -112,7 +116,7 @@ class Builder {
       crossed_[t.triangle] = &t;
       const Matrix3d corners = corners_of(surface, t.triangle);
       std::vector<Stretch>& own = stretches_[t.triangle];
-      for (const auto& ends : t.outline) own.push_back({{corners * ends[0], corners * ends[1]}});
+      for (const auto& ends : t.outline) own.emplace_back(corners * ends[0], corners * ends[1]);
       if (t.steps.empty()) continue;
       const Vector3d gradient = gradient_of(corners, t.slope);
       for (const StepPoint& step : t.steps) steps_[t.triangle].push_back({corners * step.at, step.value, gradient});
@@ -179,23 +183,32 @@ class Builder {
     const auto found = pieces_.find(triangle);
     if (found != pieces_.end()) return found->second;
     std::vector<Piece> list;
+    const Beside beside = what_is_beside(triangle);
     const auto crossed = crossed_.find(triangle);
     if (crossed != crossed_.end()) {
-      for (const CoveredPiece& piece : crossed->second->pieces) list.push_back(piece_of(triangle, piece));
+      for (const CoveredPiece& piece : crossed->second->pieces) list.push_back(piece_of(triangle, piece, beside));
     } else {
+      // Quarters share their corners.
+      std::array<std::array<std::optional<double>, kAlong + 1>, kAlong + 1> known;
+      const auto gap_at_corner = [&](const Vector3d& b) {
+        std::optional<double>& value = known[static_cast<int>(kAlong * b[0])][static_cast<int>(kAlong * b[1])];
+        if (!value) value = gap_at_(triangle, b);
+        return *value;
+      };
       for (const Matrix3d& corners : quarters()) {
-        list.push_back(piece_of(triangle, covered_by(triangle, corners)));
+        list.push_back(piece_of(triangle, covered_by(triangle, corners, gap_at_corner), beside));
       }
     }
     return pieces_.emplace(triangle, std::move(list)).first->second;
   }
 
-  CoveredPiece covered_by(int triangle, const Matrix3d& corners) const {
+  template <typename AtCorner>
+  CoveredPiece covered_by(int triangle, const Matrix3d& corners, const AtCorner& gap_at_corner) const {
     CoveredPiece piece;
     piece.corners = corners;
     piece.value = piece.low = piece.high = gap_at_(triangle, corners.rowwise().mean());
     for (int k = 0; k < 3; ++k) {
-      const double value = gap_at_(triangle, corners.col(k));
+      const double value = gap_at_corner(corners.col(k));
       piece.low = std::min(piece.low, value);
       if (std::isfinite(value)) piece.high = std::max(piece.high, value);
     }
@@ -203,15 +216,22 @@ class Builder {
     return piece;
   }
 
-  std::vector<const Stretch*> stretches_near(int triangle) const {
-    std::vector<const Stretch*> result;
+  /// What is in a triangle and in those that share a corner with it.
+  struct Beside {
+    std::vector<Stretch> stretches;
+    std::vector<const Step*> steps;
+  };
+
+  Beside what_is_beside(int triangle) const {
+    Beside result;
     std::vector<int> seen;
     for (const int v : surface_.triangles[triangle]) {
+      add_steps(surface_.triangles_of[v], result.steps);
       for (const int t : surface_.triangles_of[v]) {
         const auto found = stretches_.find(t);
         if (found == stretches_.end() || std::find(seen.begin(), seen.end(), t) != seen.end()) continue;
         seen.push_back(t);
-        for (const Stretch& stretch : found->second) result.push_back(&stretch);
+        result.stretches.insert(result.stretches.end(), found->second.begin(), found->second.end());
       }
     }
     return result;
@@ -226,7 +246,7 @@ class Builder {
     }
   }
 
-  Piece piece_of(int triangle, const CoveredPiece& covered) const {
+  Piece piece_of(int triangle, const CoveredPiece& covered, const Beside& beside) const {
     const Matrix3d corners = corners_of(surface_, triangle);
     const Vector3d middle = covered.corners.rowwise().mean();
     Piece piece;
@@ -239,18 +259,17 @@ class Builder {
     piece.plain = piece.raised = piece.area * middle;
     const double reach = kSingularReach * std::sqrt(surface_.triangle_area[triangle] * 4.0 / std::sqrt(3.0));
     const double size = std::sqrt(piece.area);
-    std::vector<const Step*> steps;
-    for (const int v : surface_.triangles[triangle]) add_steps(surface_.triangles_of[v], steps);
-    if (piece.value > threshold_by(steps, piece.at)) return piece;  // pressure doesn't rise at a step's foot
-    std::vector<const Stretch*> near;
-    for (const Stretch* stretch : stretches_near(triangle)) {
-      if (distance_to(piece.at, stretch->ends) < reach + 2.0 * size) near.push_back(stretch);
+    if (piece.value > threshold_by(beside.steps, piece.at)) return piece;  // pressure doesn't rise at a step's foot
+    std::vector<Stretch> near;
+    const double farthest = reach + 2.0 * size;
+    for (const Stretch& stretch : beside.stretches) {
+      if (stretch.squared_distance(piece.at) < farthest * farthest) near.push_back(stretch);
     }
     if (near.empty()) return piece;
     const auto rise = [&](const Vector3d& point, double least) {
-      double distance = kInfinity;
-      for (const Stretch* stretch : near) distance = std::min(distance, distance_to(point, stretch->ends));
-      return std::max(1.0, std::sqrt(reach / std::max(least, distance)));
+      double distance2 = kInfinity;
+      for (const Stretch& stretch : near) distance2 = std::min(distance2, stretch.squared_distance(point));
+      return std::max(1.0, std::sqrt(reach / std::max(least, std::sqrt(distance2))));
     };
     piece.raised.setZero();
     const double part = piece.area / static_cast<double>(quarters().size());

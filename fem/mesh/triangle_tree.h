@@ -24,23 +24,34 @@ class TriangleTree {
   /// nothing if the line misses. A line through an edge or a vertex hits all triangles that share it (edge tests are
   /// inclusive and exactly antisymmetric), so no line slips between two of them.
   std::optional<Hit> first_crossing(const Eigen::Vector3d& point, const Eigen::Vector3d& direction) const;
+  /// Whether the line crosses any triangle.
+  bool is_crossed(const Eigen::Vector3d& point, const Eigen::Vector3d& direction) const;
 
   const std::vector<Eigen::Vector3d>& vertices() const { return vertices_; }
   const std::vector<std::array<int, 3>>& triangles() const { return triangles_; }
 
  private:
-  /// A box of the tree. Leaves hold triangles [first, first + count); inner nodes have children `first`, `first + 1`.
-  struct Node {
-    Eigen::Array3d low, high;
+  /// What a box holds: the triangles [first, first + count), or, with a count of 0, the node `first`.
+  struct Content {
     int first = 0;
     int count = 0;
   };
-  void build(int node, int begin, int end, const std::vector<Eigen::Vector3d>& centroids);
+  /// Two boxes, tested together. The second is farther along `axis`.
+  struct Node {
+    std::array<Eigen::Array2d, 3> low, high;  ///< per axis
+    std::array<Content, 2> holds;
+    int axis = 0;
+  };
+  Hit nearest(const Eigen::Vector3d& point, const Eigen::Vector3d& direction, bool any) const;
+  Content build(int begin, int end, const std::vector<Eigen::Vector3d>& centroids);
+  std::array<Eigen::Array3d, 2> bounds(int begin, int end) const;
 
   std::vector<Eigen::Vector3d> vertices_;
   std::vector<std::array<int, 3>> triangles_;
   std::vector<int> order_;
+  std::vector<std::array<Eigen::Vector3d, 3>> corners_;  ///< of the triangles, as `order_` has them
   std::vector<Node> nodes_;
+  Content all_;
 };
 
 }  // namespace touchstone::fem
