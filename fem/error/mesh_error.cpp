@@ -189,8 +189,7 @@ bool is_force(int kind) {
 struct Sample {
   double radius = 0.0;  ///< of the contact, over level 0's edge
   double factor = 1.0;
-  double mean = 0.0;     ///< signed
-  double scatter = 0.0;  ///< about the mean, of a sharp body's forces; else the root mean square
+  double scatter = 0.0;  ///< root mean square
 };
 
 /// How a stiffness goes with the radius at each radius: d log(stiffness) / d log(radius), at least 1.
@@ -303,13 +302,11 @@ BodyErrors measure_body(const std::vector<Level>& levels, const LadderGel& ladde
     stiffness[static_cast<std::size_t>(ErrorOf::shear_force)].push_back(shear);
     for (std::size_t i = 1; i < levels.size(); ++i) {
       if (radius < kLeastRadius * levels[i].factor) continue;
-      RelativeErrors sums;
       RelativeErrors squares;
       std::array<int, kErrorKinds> counts{};
       for (std::size_t k = 0; k < places.size(); ++k) {
         const RelativeErrors one = difference(gel, weight, places[k], bodies[k].reach, readings[0][k], readings[i][k]);
         for (int kind = 0; kind < kErrorKinds; ++kind) {
-          sums.values[kind] += one.values[kind];
           squares.values[kind] += one.values[kind] * one.values[kind];
           counts[kind] += one.values[kind] != 0.0;
         }
@@ -317,10 +314,8 @@ BodyErrors measure_body(const std::vector<Level>& levels, const LadderGel& ladde
       for (int kind = 0; kind < kErrorKinds; ++kind) {
         const double n = counts[kind];
         if (n < 2.0) continue;
-        Sample sample{contact, levels[i].factor, sums.values[kind] / n, 0.0};
-        sample.scatter = sharp && is_force(kind)
-                             ? std::sqrt(std::max(0.0, squares.values[kind] - n * std::pow(sample.mean, 2)) / (n - 1.0))
-                             : std::sqrt(squares.values[kind] / n);
+        Sample sample{contact, levels[i].factor, 0.0};
+        sample.scatter = std::sqrt(squares.values[kind] / n);
         if (sample.scatter > 0.0) samples[kind].push_back(sample);
       }
     }
