@@ -41,21 +41,22 @@ TriangleTree::TriangleTree(std::vector<Eigen::Vector3d> vertices, std::vector<st
     for (const int corner : v) TS_ASSERT(corner >= 0 && corner < static_cast<int>(vertices_.size()));
     centroids[t] = (vertices_[v[0]] + vertices_[v[1]] + vertices_[v[2]]) / 3.0;
   }
-  order_.resize(n);
-  std::iota(order_.begin(), order_.end(), 0);
+  std::vector<int> order(n);
+  std::iota(order.begin(), order.end(), 0);
   nodes_.reserve(2 * static_cast<std::size_t>(n) / kLeafTriangles + 2);
-  all_ = build(0, n, centroids);
-  corners_.reserve(order_.size());
-  for (const int t : order_) {
-    corners_.push_back({vertices_[triangles_[t][0]], vertices_[triangles_[t][1]], vertices_[triangles_[t][2]]});
+  build(order, 0, centroids);
+  leaves_.reserve(n);
+  for (const int t : order) {
+    const auto& v = triangles_[t];
+    leaves_.push_back({{vertices_[v[0]], vertices_[v[1]], vertices_[v[2]]}, t});
   }
 }
 
-std::array<Eigen::Array3d, 2> TriangleTree::bounds(int begin, int end) const {
+std::array<Eigen::Array3d, 2> TriangleTree::bounds(std::span<const int> some) const {
   Eigen::Array3d low = Eigen::Array3d::Constant(kInfinity);
   Eigen::Array3d high = -low;
-  for (int k = begin; k < end; ++k) {
-    for (const int v : triangles_[order_[k]]) {
+  for (const int t : some) {
+    for (const int v : triangles_[t]) {
       low = low.min(vertices_[v].array());
       high = high.max(vertices_[v].array());
     }
@@ -63,28 +64,31 @@ std::array<Eigen::Array3d, 2> TriangleTree::bounds(int begin, int end) const {
   return {low, high};
 }
 
-TriangleTree::Content TriangleTree::build(int begin, int end, const std::vector<Eigen::Vector3d>& centroids) {
-  if (end - begin <= kLeafTriangles) return {begin, end - begin};
-  const auto [low, high] = bounds(begin, end);
+/// Of these triangles, which are put in the tree's order; the first of them is number `first` in it.
+TriangleTree::Content TriangleTree::build(std::span<int> order, int first,
+                                          const std::vector<Eigen::Vector3d>& centroids) {
+  const int n = static_cast<int>(order.size());
+  if (n <= kLeafTriangles) return {first, n};
+  const auto [low, high] = bounds(order);
   int axis = 0;
   (high - low).maxCoeff(&axis);
-  const int middle = begin + (end - begin) / 2;
-  std::nth_element(order_.begin() + begin, order_.begin() + middle, order_.begin() + end, [&](int a, int b) {
+  const int half = n / 2;
+  std::nth_element(order.begin(), order.begin() + half, order.end(), [&](int a, int b) {
     return centroids[a][axis] != centroids[b][axis] ? centroids[a][axis] < centroids[b][axis] : a < b;
   });
   const int node = static_cast<int>(nodes_.size());
   nodes_.emplace_back();
   nodes_[node].axis = axis;
-  const std::array<int, 3> parts{begin, middle, end};
   for (int side = 0; side < 2; ++side) {
-    const auto [least, most] = bounds(parts[side], parts[side + 1]);
+    const std::span<int> part = side == 0 ? order.first(half) : order.subspan(half);
+    const auto [least, most] = bounds(part);
     // A line through a face of a box must not miss it by rounding.
     const double slack = 1e-12 * (1.0 + std::max(least.abs().maxCoeff(), most.abs().maxCoeff()));
     for (int a = 0; a < 3; ++a) {
       nodes_[node].low[a][side] = least[a] - slack;
       nodes_[node].high[a][side] = most[a] + slack;
     }
-    const Content inner = build(parts[side], parts[side + 1], centroids);
+    const Content inner = build(part, side == 0 ? first : first + half, centroids);
     nodes_[node].holds[side] = inner;
   }
   return {node, 0};
@@ -118,7 +122,8 @@ TriangleTree::Hit TriangleTree::nearest(const Eigen::Vector3d& point, const Eige
       if (enter[side] <= leave[side]) stack[depth++] = {enter[side], node.holds[side]};
     }
   };
-  if (!order_.empty()) stack[depth++] = {-kInfinity, all_};
+  const int all = static_cast<int>(leaves_.size());
+  if (all > 0) stack[depth++] = {-kInfinity, nodes_.empty() ? Content{0, all} : Content{0, 0}};
   while (depth > 0) {
     const auto [enter, holds] = stack[--depth];
     if (enter > nearest.along) continue;
@@ -127,7 +132,7 @@ TriangleTree::Hit TriangleTree::nearest(const Eigen::Vector3d& point, const Eige
       continue;
     }
     for (int k = holds.first; k < holds.first + holds.count; ++k) {
-      const std::array<Eigen::Vector3d, 3>& corners = corners_[k];
+      const std::array<Eigen::Vector3d, 3>& corners = leaves_[k].corners;
       std::array<double, 3> x, y;
       for (int c = 0; c < 3; ++c) {
         x[c] = b1.dot(corners[c]) - px;
@@ -142,7 +147,7 @@ TriangleTree::Hit TriangleTree::nearest(const Eigen::Vector3d& point, const Eige
       const double along = (e0 * direction.dot(corners[0] - point) + e1 * direction.dot(corners[1] - point) +
                             e2 * direction.dot(corners[2] - point)) /
                            sum;
-      if (along < nearest.along) nearest = {along, order_[k], Eigen::Vector3d(e0, e1, e2) / sum};
+      if (along < nearest.along) nearest = {along, leaves_[k].triangle, Eigen::Vector3d(e0, e1, e2) / sum};
       if (any) return nearest;
     }
   }

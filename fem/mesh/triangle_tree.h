@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <optional>
+#include <span>
 #include <vector>
 
 namespace touchstone::fem {
@@ -36,6 +37,10 @@ class TriangleTree {
     int first = 0;
     int count = 0;
   };
+  struct Leaf {
+    std::array<Eigen::Vector3d, 3> corners;
+    int triangle = 0;
+  };
   /// Two boxes, tested together. The second is farther along `axis`.
   struct Node {
     std::array<Eigen::Array2d, 3> low, high;  ///< per axis
@@ -43,15 +48,13 @@ class TriangleTree {
     int axis = 0;
   };
   Hit nearest(const Eigen::Vector3d& point, const Eigen::Vector3d& direction, bool any) const;
-  Content build(int begin, int end, const std::vector<Eigen::Vector3d>& centroids);
-  std::array<Eigen::Array3d, 2> bounds(int begin, int end) const;
+  Content build(std::span<int> order, int first, const std::vector<Eigen::Vector3d>& centroids);
+  std::array<Eigen::Array3d, 2> bounds(std::span<const int> some) const;
 
   std::vector<Eigen::Vector3d> vertices_;
   std::vector<std::array<int, 3>> triangles_;
-  std::vector<int> order_;
-  std::vector<std::array<Eigen::Vector3d, 3>> corners_;  ///< of the triangles, as `order_` has them
-  std::vector<Node> nodes_;
-  Content all_;
+  std::vector<Leaf> leaves_;  ///< in the tree's order
+  std::vector<Node> nodes_;   ///< from the root on; none: all triangles are one leaf's
 };
 
 }  // namespace touchstone::fem
