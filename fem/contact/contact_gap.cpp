@@ -337,11 +337,12 @@ class TriangleGap {
       }
     }
     if (step == 0.0) return false;
-    is_crossed = true;
-    crossed.steps.push_back({place, threshold});
     std::array<bool, 3> low;
     int lows = 0;
     for (int k = 0; k < 3; ++k) lows += low[k] = *at(corners.col(k)) < threshold;
+    if (lows == 0 || lows == 3) return false;  // something narrower than the cell stands within it
+    is_crossed = true;
+    crossed.steps.push_back({place, threshold});
     std::vector<Eigen::Vector3d> ends;
     const auto side = [&](const Eigen::Vector3d& inside, const Eigen::Vector3d& outside) {
       Eigen::Vector3d in = inside;
