@@ -114,7 +114,7 @@ class PartSolver {
   struct Iterate;
   struct Body;
   struct CachedGap;
-  bool cuts_hold(const CachedGap& cached, const Body& body) const;
+  bool cuts_hold(const CachedGap& cached, const Body& body, double part) const;
   WeightedGap gap_of(std::size_t body, const Iterate& now, PartEffort& effort);
   void look_up(Iterate& now, const std::vector<PartTarget>& targets, PartEffort& effort);
   std::vector<int> candidates(const Iterate& now, bool z_forced) const;

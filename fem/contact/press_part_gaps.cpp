@@ -15,7 +15,8 @@ constexpr std::size_t kFirstCandidates = 12;
 // little, aren't looked at. It is checked at the answer, and widened where it doesn't hold.
 constexpr double kBulge = 0.5;
 constexpr double kCutsHold = 0.03;      // of a triangle, or of the depth: a body moved by less cuts hats as it did
-constexpr int kCutUpdates = 12;         // after these hats stay as they are cut
+constexpr double kCutsHoldLate = 0.5;
+constexpr int kCutUpdates = 12;  // after these the latter holds: what goes to and fro comes to rest
 constexpr double kSharpestCurve = 0.3;  // of a triangle: radius down to which a gap counts as smooth
 constexpr double kSlopeStep = 3e-4;     // of a triangle
 
@@ -39,8 +40,9 @@ Eigen::Vector3d PartSolver::relative_at(const PressSnapshot& snapshot, int verte
                                 : weighted_at(snapshot, vertex);
 }
 
-/// Whether the body has moved so little since the hats were cut that they may stay as they are.
-bool PartSolver::cuts_hold(const CachedGap& cached, const Body& body) const {
+/// Whether the body has moved by no more than this part of a triangle, and of the depth where the overlap cuts, since
+/// the hats were cut.
+bool PartSolver::cuts_hold(const CachedGap& cached, const Body& body, double part) const {
   for (const int v : cached.gap.cuts->vertices) {
     const Eigen::Vector3d& x = surface_.vertices[v];
     const Eigen::Vector3d& normal = surface_.normals[v];
@@ -48,8 +50,8 @@ bool PartSolver::cuts_hold(const CachedGap& cached, const Body& body) const {
     const Eigen::Vector3d then = cached.cut_pose * (body.pose.inverse() * (x + body.lookup.displacement(x)));
     const Eigen::Vector3d moved = then - x - cached.cut_lookup.displacement(x);
     const double away = normal.dot(moved);
-    if ((moved - away * normal).norm() > kCutsHold * size_) return false;
-    if (cached.gap.cuts->by_overlap && std::abs(away) > kCutsHold * cached.cut_depth) return false;
+    if ((moved - away * normal).norm() > part * size_) return false;
+    if (cached.gap.cuts->by_overlap && std::abs(away) > part * cached.cut_depth) return false;
   }
   return true;
 }
@@ -62,7 +64,8 @@ WeightedGap PartSolver::gap_of(std::size_t b, const Iterate& now, PartEffort& ef
   // Some more than what is asked for, so that it serves the next, deeper place, too.
   const GapReach reach = surface_.flat ? GapReach{now.reach + kLeastReach * gel_.thickness, 1.5 * kBulge} : GapReach{};
   const auto evaluate = [&] {
-    const bool kept = now.updates > 0 && cached.gap.cuts && (now.updates >= kCutUpdates || cuts_hold(cached, body));
+    const double hold = now.updates < kCutUpdates ? kCutsHold : kCutsHoldLate;
+    const bool kept = now.updates > 0 && cached.gap.cuts && cuts_hold(cached, body, hold);
     std::vector<std::array<double, 2>> bent = std::move(cached.gap.bent);
     const double away = surface_.normals.front().dot(body.pose.translation - cached.pose.translation);
     cached.gap =
