@@ -23,6 +23,9 @@ constexpr double kFewVertices = 1.0;
 constexpr double kFewVerticesOrder = 3.0;
 /// Of a patch's force, on hats that an outline cuts: from so much on the body is a sharp one.
 constexpr double kSharpByOutline = 0.5;
+/// Edges: of a smooth contact of this radius nearly all of the error is the gel's, the shape of its mesh, and is a
+/// sharp one's as well. Added after bodies on a fingertip had been seen (bench/bodies).
+constexpr double kGelsOwn = 3.0;
 
 /// Vertices in contact that are connected by triangles, as lists of vertices.
 std::vector<std::vector<int>> patches_of(const Compliance& gel, const PressState& state) {
@@ -142,8 +145,10 @@ PressError estimate_error(const Compliance& gel, const PressState& state) {
         std::pow(std::max(1.0, kFewVertices / patch.radius_per_edge), kFewVerticesOrder * (1.0 - patch.by_outline));
     const RelativeErrors smooth = errors_at(gel.mesh_error.smooth, patch.radius_per_edge);
     const RelativeErrors sharp = errors_at(gel.mesh_error.sharp, patch.radius_per_edge);
+    const RelativeErrors own = errors_at(gel.mesh_error.smooth, std::max(kGelsOwn, patch.radius_per_edge));
     const auto of = [&](ErrorOf kind) {
-      return std::min(1.0, few * ((1.0 - patch.sharpness) * smooth[kind] + patch.sharpness * sharp[kind]));
+      return std::min(
+          1.0, few * ((1.0 - patch.sharpness) * smooth[kind] + patch.sharpness * std::hypot(sharp[kind], own[kind])));
     };
     const double pressed = std::abs(patch.force.dot(patch.normal));
     const Vector3d sheared = patch.force - patch.force.dot(patch.normal) * patch.normal;
