@@ -280,18 +280,15 @@ class Builder {
     return piece;
   }
 
-  /// The share of its covered hat that a vertex's overlap fills.
+  /// The share of its hat that the overlap fills.
   double overlap_of(int vertex) {
     const auto found = overlap_.find(vertex);
     if (found != overlap_.end()) return found->second;
     double overlap = 0.0;
-    double covered = 0.0;
     for_pieces(vertex, [&](int, int corner, std::size_t, const Piece& piece) {
-      if (!std::isfinite(piece.value)) return;
-      covered += piece.plain[corner];
-      overlap += piece.overlap * piece.plain[corner];
+      if (std::isfinite(piece.value)) overlap += piece.overlap * piece.plain[corner];
     });
-    return overlap_[vertex] = covered > 0.0 ? overlap / covered : 0.0;
+    return overlap_[vertex] = overlap / surface_.weight[vertex];
   }
 
   /// The largest of those of a vertex and its neighbours; 1 where nothing overlaps: the gel bulges there at most.
@@ -314,7 +311,6 @@ class Builder {
     }
     const double narrow = std::clamp((fullest_near(vertex) - kNarrow) / (kWide - kNarrow), 0.0, 1.0);
     const double beyond = std::min(narrow, 1.0 - std::clamp((bend - kBentFrom) / (kBentTo - kBentFrom), 0.0, 1.0));
-    by_overlap_ = by_overlap_ || beyond < 1.0;
     // How much of a piece bears, and the gap there.
     const auto bearing = [&](const Piece& piece) { return piece.overlap + beyond * (1.0 - piece.overlap); };
     const auto gap_of = [&](const Piece& piece) {
@@ -327,6 +323,7 @@ class Builder {
     double all = 0.0;
     for_pieces(vertex, [&](int, int corner, std::size_t, const Piece& piece) {
       if (!std::isfinite(piece.value)) return;
+      by_overlap_ = by_overlap_ || bearing(piece) < 1.0;
       all += bearing(piece) * piece.plain[corner];
       if (is_low(piece)) low += bearing(piece) * piece.plain[corner];
     });
@@ -450,6 +447,64 @@ Eigen::VectorXd moved_gaps(const ContactSurface& surface, const CutHats& cuts,
     }
   }
   return result;
+}
+
+std::shared_ptr<const CutHats> joint_cuts(const ContactSurface& surface,
+                                          const std::vector<std::shared_ptr<const CutHats>>& of_bodies,
+                                          const std::vector<int>& owner) {
+  std::vector<std::shared_ptr<const CutHats>> cutting;
+  for (const auto& cuts : of_bodies) {
+    if (cuts) cutting.push_back(cuts);
+  }
+  if (cutting.empty()) return nullptr;
+  if (of_bodies.size() == 1) return cutting.front();
+  auto joint = std::make_shared<CutHats>();
+  std::map<int, int> body_of;  // the body that cuts a vertex's hat
+  std::map<int, double> share_of;
+  for (std::size_t b = 0; b < of_bodies.size(); ++b) {
+    if (!of_bodies[b]) continue;
+    for (std::size_t k = 0; k < of_bodies[b]->vertices.size(); ++k) {
+      const int v = of_bodies[b]->vertices[k];
+      if (owner[v] != static_cast<int>(b)) continue;
+      body_of[v] = static_cast<int>(b);
+      share_of[v] = of_bodies[b]->share[static_cast<Eigen::Index>(k)];
+    }
+  }
+  joint->share.resize(static_cast<Eigen::Index>(body_of.size()));
+  std::vector<int> triangles;
+  for (const auto& [v, unused] : body_of) {
+    joint->share[static_cast<Eigen::Index>(joint->vertices.size())] = share_of[v];
+    joint->vertices.push_back(v);
+    triangles.insert(triangles.end(), surface.triangles_of[v].begin(), surface.triangles_of[v].end());
+  }
+  std::sort(triangles.begin(), triangles.end());
+  triangles.erase(std::unique(triangles.begin(), triangles.end()), triangles.end());
+  for (const int t : triangles) {
+    CutTriangle triangle{t, {}};
+    // Cells of one body, or whole ones, of which the corners' densities are taken that are its own.
+    const auto take = [&](const std::vector<DensityCell>& cells, int body) {
+      std::array<bool, 3> own{};
+      for (int a = 0; a < 3; ++a) {
+        const auto found = body_of.find(surface.triangles[t][a]);
+        own[a] = (found == body_of.end() ? -1 : found->second) == body;
+      }
+      if (std::none_of(own.begin(), own.end(), [](bool x) { return x; })) return;
+      for (DensityCell cell : cells) {
+        for (int a = 0; a < 3; ++a) cell.density[a] = own[a] ? cell.density[a] : 0.0;
+        triangle.cells.push_back(cell);
+      }
+    };
+    for (std::size_t b = 0; b < of_bodies.size(); ++b) {
+      if (!of_bodies[b]) continue;
+      const auto& list = of_bodies[b]->triangles;
+      const auto found = std::lower_bound(list.begin(), list.end(), t,
+                                          [](const CutTriangle& one, int index) { return one.triangle < index; });
+      if (found != list.end() && found->triangle == t) take(found->cells, static_cast<int>(b));
+    }
+    take(whole_cells(surface, t), -1);
+    joint->triangles.push_back(std::move(triangle));
+  }
+  return joint;
 }
 
 }  // namespace touchstone::fem

@@ -168,9 +168,8 @@ ContactProblem PartSolver::problem(const PressSnapshot& from, const std::vector<
     // It holds as it is.
   } else if (elastic_ || any_cuts) {
     combined_ = block_.compliance();
-    for (std::size_t b = 0; b < bodies_.size(); ++b) {
-      if (!cuts[b]) continue;
-      add_cut_compliance(combined_, *cuts[b], surface_, gel_, vertices, block_.axes(), c == 1 && surface_.flat);
+    if (const auto joint = joint_cuts(surface_, cuts, now.owner)) {
+      add_cut_compliance(combined_, *joint, surface_, gel_, vertices, block_.axes(), c == 1 && surface_.flat);
     }
     if (elastic_ && any_cuts) cut_ = combined_;
     any_cuts_ = any_cuts;
