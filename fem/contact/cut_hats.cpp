@@ -21,8 +21,8 @@ constexpr double kSingularReach = 0.5;  // of an edge: how far from an edge the 
 constexpr double kNearEdge = 3.0;       // of a piece's own size: nearer than that its rise is averaged over points
 constexpr double kBentFrom = 0.1;       // bend from which what doesn't overlap begins to be left out
 constexpr double kBentTo = 0.2;         // and is left out
-constexpr double kNarrow = 0.5;         // of a hat: overlaps that fill no hat by more than this are all that bears
-constexpr double kWide = 0.8;           // by so much: narrower than no hat
+constexpr double kNarrow = 0.85;        // of a hat: overlaps that fill no hat by more than this are all that bears
+constexpr double kWide = 1.0;           // by so much: narrower than no hat
 constexpr double kLowBears = 0.03;      // of a hat: with so much below a step, only that bears
 constexpr double kHighBears = 0.01;     // with less than this, only what is above it
 
