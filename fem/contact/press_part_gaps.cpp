@@ -14,7 +14,7 @@ constexpr std::size_t kFirstCandidates = 12;
 // The gel bulges beside a contact by less than this part of the depth; vertices further from a body than that, and a
 // little, aren't looked at. It is checked at the answer, and widened where it doesn't hold.
 constexpr double kBulge = 0.5;
-constexpr double kCutsHold = 0.03;  // of a triangle, or of the depth: a body moved by less cuts hats as it did
+constexpr double kCutsHold = 0.005;  // of a triangle, or of the depth: a body moved by less cuts hats as it did
 constexpr double kCutsHoldLate = 0.5;
 constexpr int kCutUpdates = 12;         // after these the latter holds: what goes to and fro comes to rest
 constexpr double kSharpestCurve = 0.3;  // of a triangle: radius down to which a gap counts as smooth
