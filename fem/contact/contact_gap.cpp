@@ -599,6 +599,9 @@ WeightedGap weighted_gap(const ContactSurface& surface, const ContactShape& shap
           result.deepest = std::min(result.deepest, triangle.lowest);
           if (triangle.bent) result.bent.push_back(*triangle.bent);
           if (triangle.is_crossed) {
+            for (const CoveredPiece& piece : triangle.crossed.pieces) {
+              result.deepest = std::min(result.deepest, piece.low);
+            }
             lowest_in[t] = triangle.lowest;
             crossed.push_back(std::move(triangle.crossed));
             crossed.back().triangle = static_cast<int>(t);

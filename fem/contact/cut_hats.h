@@ -85,8 +85,8 @@ std::vector<DensityCell> whole_cells(const ContactSurface& surface, int triangle
 CutHats cut_hats(const ContactSurface& surface, const std::vector<CrossedTriangle>& crossed,
                  const std::function<double(int, const Eigen::Vector3d&)>& gap_at);
 
-/// The hats of a surface under several bodies, each as the body cuts it that `owner` says of its vertex; null: cuts none.
-/// Gaps and moments are left out.
+/// The hats of a surface under several bodies, each as the body cuts it that `owner` says of its vertex; null: cuts
+/// none. Gaps and moments are left out.
 std::shared_ptr<const CutHats> joint_cuts(const ContactSurface& surface,
                                           const std::vector<std::shared_ptr<const CutHats>>& of_bodies,
                                           const std::vector<int>& owner);

@@ -110,7 +110,7 @@ struct Press::Parts {
 
   double friction(std::size_t body) const { return solver.bodies()[body].friction; }
   double deepest_at(std::size_t body, const RigidTransform& pose) const {
-    return weighted_gap(solver.surface(), solver.bodies()[body].shape, pose).deepest;
+    return weighted_gap(solver.surface(), solver.bodies()[body].shape, pose, {}, {}, true).deepest;
   }
   std::optional<RigidTransform> straight_above(std::size_t body, RigidTransform pose) const;
   std::optional<RigidTransform> before_touch(std::size_t body, const PressTarget& target, RigidTransform& to,

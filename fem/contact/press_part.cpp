@@ -357,8 +357,9 @@ void PartSolver::follow_patches(const ContactAnswer& answer, Iterate& now) const
   Eigen::VectorXd own = answer.response;
   if (elastic_) {
     own.setZero();
+    const Eigen::Ref<const Eigen::MatrixXd> gel = gel_compliance();
     for (Eigen::Index j = 0; j < answer.z.size(); ++j) {
-      if (answer.z[j] != 0.0) own += answer.z[j] * gel_compliance().col(j);
+      if (answer.z[j] != 0.0) own += answer.z[j] * gel.col(j);
     }
     for (Eigen::Index j = 0; j < m; ++j) {
       own.segment<3>(3 * j) -= block_.axes(vertices[j]).transpose() * relaxation_.carried(vertices[j]);

@@ -68,8 +68,7 @@ WeightedGap PartSolver::gap_of(std::size_t b, const Iterate& now, PartEffort& ef
     const bool kept = now.updates > 0 && cached.gap.cuts && cuts_hold(cached, body, hold);
     std::vector<std::array<double, 2>> bent = std::move(cached.gap.bent);
     const double away = surface_.normals.front().dot(body.pose.translation - cached.pose.translation);
-    cached.gap =
-        weighted_gap(surface_, shape, body.pose, body.lookup, reach, !soft_[b], kept ? cached.gap.cuts : nullptr);
+    cached.gap = weighted_gap(surface_, shape, body.pose, body.lookup, reach, true, kept ? cached.gap.cuts : nullptr);
     if (kept) {  // not asked for again
       cached.gap.bent = std::move(bent);
       for (auto& range : cached.gap.bent) range = {range[0] + away, range[1] + away};
@@ -106,8 +105,7 @@ WeightedGap PartSolver::gap_of(std::size_t b, const Iterate& now, PartEffort& ef
       for (int axis = 0; axis < 2; ++axis) {
         RigidTransform beside = cached.pose;
         beside.translation[axis] -= step;
-        const WeightedGap there =
-            weighted_gap(surface_, shape, beside, cached.lookup, reach, !soft_[b], cached.gap.cuts);
+        const WeightedGap there = weighted_gap(surface_, shape, beside, cached.lookup, reach, true, cached.gap.cuts);
         ++effort.geometry_updates;
         for (Eigen::Index v = 0; v < n; ++v) {
           if (!std::isfinite(gap.weighted[v]) || !std::isfinite(there.weighted[v])) continue;

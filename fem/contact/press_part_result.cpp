@@ -134,10 +134,11 @@ void PartSolver::remember(const PressSnapshot& from, PressSnapshot& next) const 
     elastic.noalias() += gel_.surface.view().middleCols<3>(3 * v) * next.traction.segment<3>(3 * v);
   }
   // What bears of a cut hat gives way otherwise than the whole of it.
+  const Eigen::Ref<const Eigen::MatrixXd> cut = gel_compliance();
   for (std::size_t k = 0; next.touching() && any_cuts_ && k < block_.vertices().size(); ++k) {
     const int v = block_.vertices()[k];
     Eigen::Vector3d own = Eigen::Vector3d::Zero();
-    const auto rows = gel_compliance().middleCols<3>(3 * static_cast<Eigen::Index>(k));  // symmetric
+    const auto rows = cut.middleCols<3>(3 * static_cast<Eigen::Index>(k));  // symmetric
     for (std::size_t l = 0; l < block_.vertices().size(); ++l) {
       const int u = block_.vertices()[l];
       if (next.state[u] == NodeState::open) continue;
