@@ -413,6 +413,7 @@ class TriangleGap {
     for (int k = 0; k < 7; ++k) {
       if (const auto& value = inner[k]) {
         piece.value += radon_rule().weights[k] * *value;
+        piece.weighted += radon_rule().weights[k] * *value * (corners * radon_rule().points[k]);
         weight += radon_rule().weights[k];
         piece.low = std::min(piece.low, *value);
         piece.high = std::max(piece.high, *value);
@@ -420,6 +421,7 @@ class TriangleGap {
     }
     if (weight <= 0.0) return;
     piece.value /= weight;
+    piece.weighted /= weight;
     set_overlap(piece);
     const bool straddles = crossed.bend > kBent && piece.overlap > 0.0 && piece.overlap < 1.0;
     if ((straddles && share > kLeastStraddling) || (is_mixed(piece) && share > kMixedPiece)) {

@@ -1,5 +1,6 @@
 #include "fem/contact/cut_compliance.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -318,7 +319,71 @@ class SmoothRest {
 
 constexpr double kSliver = 0.02;  // share of a hat at which what bears is held off by as much as it gives way
 constexpr double kStiffest = 1e8;
-constexpr double kReplaced = 1.3;  // edges: among cut hats that are nearer, the elements' response is replaced
+constexpr double kOwnPart = 0.01;   // of a cut hat's response: so much at least is what no others can do
+constexpr double kCutInFull = 0.1;  // of a hat: it counts as cut in full from where so much of it has another density
+constexpr double kCovered = 1e-6;   // of a triangle: what may be missing, from where it is covered
+constexpr double kReplaced = 1.3;   // edges: among cut hats that are nearer, the elements' response is replaced
+
+/// How much each vertex of `cuts` is cut, 0 to 1: nearly 0 where a hat only begins to be, so that nothing changes at
+/// once.
+Eigen::VectorXd how_cut(const CutHats& cuts, const ContactSurface& surface) {
+  Eigen::VectorXd same = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(cuts.vertices.size()));
+  for (const CutTriangle& triangle : cuts.triangles) {
+    for (int a = 0; a < 3; ++a) {
+      const Eigen::Index k = place_in(cuts, surface.triangles[triangle.triangle][a]);
+      for (const DensityCell& cell : triangle.cells) {
+        if (k >= 0) same[k] += std::min(cell.density[a], cell.area * cell.corners[a]);
+      }
+    }
+  }
+  for (Eigen::Index k = 0; k < same.size(); ++k) {
+    same[k] =
+        std::clamp((1.0 - same[k] / surface.weight[cuts.vertices[static_cast<std::size_t>(k)]]) / kCutInFull, 0.0, 1.0);
+  }
+  return same;
+}
+
+/// A triangle's cells where no hat is cut: the same, if they cover it, so that what isn't cut makes no difference.
+std::vector<DensityCell> uncut(const ContactSurface& surface, const CutTriangle& triangle) {
+  std::vector<DensityCell> cells = triangle.cells;
+  double area = 0.0;
+  for (DensityCell& cell : cells) {
+    cell.density = cell.area * cell.corners;
+    area += cell.area;
+  }
+  const double missing = std::abs(surface.triangle_area[triangle.triangle] - area);
+  return missing < kCovered * surface.triangle_area[triangle.triangle] ? cells
+                                                                       : whole_cells(surface, triangle.triangle);
+}
+
+double share_of(const CutHats& cuts, int vertex) {
+  return cuts.share[place_in(cuts, vertex)];
+}
+
+/// Softens cut hats that are all but the same as what others can do together, the smallest last, so that the compliance
+/// of them and of the whole hats beside them stays positive definite; rows of the compliance. A half-space isn't what
+/// elements answer as, where a mesh is coarse and irregular or the gel ends, and work could then be had from the
+/// difference of two densities that lie nearly on each other.
+void keep_definite(Eigen::MatrixXd& compliance, const std::vector<Eigen::Index>& whole,
+                   const std::vector<Eigen::Index>& cut) {
+  Eigen::MatrixXd left = compliance(cut, cut);
+  if (!whole.empty()) {
+    const Eigen::LLT<Eigen::MatrixXd> factor(compliance(whole, whole));
+    if (factor.info() != Eigen::Success) return;  // not by what cuts changed
+    const Eigen::MatrixXd through = factor.matrixL().solve(Eigen::MatrixXd(compliance(whole, cut)));
+    left.noalias() -= through.transpose() * through;
+  }
+  // Cholesky's factor takes the place of `left`'s lower half, column by column.
+  const Eigen::Index n = left.rows();
+  for (Eigen::Index j = 0; j < n; ++j) {
+    const Eigen::Index row = cut[static_cast<std::size_t>(j)];
+    left.col(j).tail(n - j).noalias() -= left.bottomLeftCorner(n - j, j) * left.row(j).head(j).transpose();
+    const double more = std::max(0.0, kOwnPart * std::abs(compliance(row, row)) - left(j, j));
+    compliance(row, row) += more;
+    left(j, j) += more;
+    left.col(j).tail(n - j) /= std::sqrt(left(j, j));
+  }
+}
 
 }  // namespace
 
@@ -344,8 +409,8 @@ void add_cut_compliance(Eigen::MatrixXd& compliance, const CutHats& cuts, const 
     part.middle = (surface.vertices[index[0]] + surface.vertices[index[1]] + surface.vertices[index[2]]) / 3.0;
     part.first = axes_of_all[own].col(1);
     part.second = axes_of_all[own].col(2);
-    const std::vector<DensityCell> whole = whole_cells(surface, t);
     part.cut = next_cut != cuts.triangles.end() && next_cut->triangle == t;
+    const std::vector<DensityCell> whole = part.cut ? uncut(surface, *next_cut) : whole_cells(surface, t);
     const std::vector<DensityCell>& now = part.cut ? next_cut->cells : whole;
     part.whole = Cells(whole);
     part.now = Cells(now);
@@ -376,9 +441,11 @@ void add_cut_compliance(Eigen::MatrixXd& compliance, const CutHats& cuts, const 
   for (const int v : cuts.vertices) {
     if (place[v] >= 0) cut.push_back(v);
   }
+  const Eigen::VectorXd how = how_cut(cuts, surface);
+  const auto how_of = [&](int v) { return how[place_in(cuts, v)]; };
   SmoothRest rest(gel, surface, half_space, axes_of_all);
   for (const int i : cut) {
-    if (!rest.fit(i)) continue;
+    if (how_of(i) <= 0.0 || !rest.fit(i)) continue;
     std::vector<int> near_ones;
     Matrix3d level = Matrix3d::Zero();
     double weights = 0.0;
@@ -391,14 +458,15 @@ void add_cut_compliance(Eigen::MatrixXd& compliance, const CutHats& cuts, const 
     for (const int j : cut) {
       if ((surface.vertices[i] - surface.vertices[j]).norm() > kReplaced * rest.edge()) continue;
       near_ones.push_back(j);
-      level += surface.weight[j] * (elements(j) - rest.at(j));
-      weights += surface.weight[j];
+      level += how_of(j) * surface.weight[j] * (elements(j) - rest.at(j));
+      weights += how_of(j) * surface.weight[j];
     }
     level /= weights;
     for (const int j : near_ones) {
       // Half from either end, so that it's symmetric.
       const Eigen::Index row = each * place[j];
-      const Matrix3d change = 0.5 * surface.weight[i] * surface.weight[j] * (rest.at(j) + level - elements(j));
+      const Matrix3d change =
+          0.5 * how_of(i) * how_of(j) * surface.weight[i] * surface.weight[j] * (rest.at(j) + level - elements(j));
       const auto part = change.topLeftCorner(each, each);
       cut_response.block(row, column, each, each) += part;
       cut_response.block(column, row, each, each) += part.transpose();
@@ -416,6 +484,25 @@ void add_cut_compliance(Eigen::MatrixXd& compliance, const CutHats& cuts, const 
   }
   const auto changed = Eigen::seqN(Eigen::fix<0>, rows, 3 / each);
   compliance(changed, changed) += cut_response - whole_response;
+  // What bears nothing asks for nothing.
+  std::erase_if(cut, [&](int v) { return share_of(cuts, v) <= 0.0; });
+  std::stable_sort(cut.begin(), cut.end(), [&](int a, int b) { return share_of(cuts, a) > share_of(cuts, b); });
+  std::vector<int> beside;
+  for (const CutTriangle& triangle : cuts.triangles) {
+    for (const int v : surface.triangles[triangle.triangle]) {
+      if (place[v] >= 0 && place_in(cuts, v) < 0) beside.push_back(v);
+    }
+  }
+  std::sort(beside.begin(), beside.end());
+  beside.erase(std::unique(beside.begin(), beside.end()), beside.end());
+  const auto rows_of = [&](const std::vector<int>& list) {
+    std::vector<Eigen::Index> of_list;
+    for (const int v : list) {
+      for (Eigen::Index a = 0; a < each; ++a) of_list.push_back(3 * place[v] + a);
+    }
+    return of_list;
+  };
+  keep_definite(compliance, rows_of(beside), rows_of(cut));
 }
 
 }  // namespace touchstone::fem

@@ -21,10 +21,11 @@ constexpr double kSingularReach = 0.5;  // of an edge: how far from an edge the 
 constexpr double kNearEdge = 3.0;       // of a piece's own size: nearer than that its rise is averaged over points
 constexpr double kBentFrom = 0.1;       // bend from which what doesn't overlap begins to be left out
 constexpr double kBentTo = 0.2;         // and is left out
-constexpr double kNarrow = 0.85;        // of a hat: overlaps that fill no hat by more than this are all that bears
-constexpr double kWide = 1.0;           // by so much: narrower than no hat
-constexpr double kLowBears = 0.03;      // of a hat: with so much below a step, only that bears
-constexpr double kHighBears = 0.01;     // with less than this, only what is above it
+constexpr double kStraddles = 0.05;  // of a triangle: overlapping share times the rest from which that counts in full
+constexpr double kNarrow = 0.85;     // of a hat: overlaps that fill no hat by more than this are all that bears
+constexpr double kWide = 1.0;        // by so much: narrower than no hat
+constexpr double kLowBears = 0.03;   // of a hat: with so much below a step, only that bears
+constexpr double kHighBears = 0.01;  // with less than this, only what is above it
 
 /// The triangles that a triangle falls into when each edge is cut into so many; barycentric corners as columns.
 std::vector<Matrix3d> split_into(int along) {
@@ -101,6 +102,7 @@ struct Piece {
   Vector3d at;
   double area;
   double value;
+  Vector3d off = Vector3d::Zero();  ///< mm: by how much more the gap is where each hat weighs it
   double overlap;
   double within;
   Vector3d plain;
@@ -179,6 +181,22 @@ class Builder {
     return std::any_of(list.begin(), list.end(), [](const Piece& p) { return p.raised != p.plain; });
   }
 
+  /// How much the border of the overlap in a triangle leaves out what doesn't overlap: not at all where it only begins
+  /// to cross it, so that nothing changes at once.
+  static double bent_part(const CrossedTriangle& crossed) {
+    double whole = 0.0;
+    double overlap = 0.0;
+    for (const CoveredPiece& piece : crossed.pieces) {
+      const double share = std::abs(piece.corners.determinant());
+      whole += share;
+      overlap += share * piece.overlap;
+    }
+    if (whole <= 0.0) return 0.0;
+    const double part = overlap / whole;
+    return std::clamp((crossed.bend - kBentFrom) / (kBentTo - kBentFrom), 0.0, 1.0) *
+           std::min(1.0, part * (1.0 - part) / kStraddles);
+  }
+
   const std::vector<Piece>& pieces(int triangle) {
     const auto found = pieces_.find(triangle);
     if (found != pieces_.end()) return found->second;
@@ -206,11 +224,16 @@ class Builder {
   CoveredPiece covered_by(int triangle, const Matrix3d& corners, const AtCorner& gap_at_corner) const {
     CoveredPiece piece;
     piece.corners = corners;
-    piece.value = piece.low = piece.high = gap_at_(triangle, corners.rowwise().mean());
+    const Vector3d middle = corners.rowwise().mean();
+    piece.value = piece.low = piece.high = gap_at_(triangle, middle);
+    piece.weighted = piece.value * middle;
     for (int k = 0; k < 3; ++k) {
       const double value = gap_at_corner(corners.col(k));
       piece.low = std::min(piece.low, value);
-      if (std::isfinite(value)) piece.high = std::max(piece.high, value);
+      if (!std::isfinite(value)) continue;
+      piece.high = std::max(piece.high, value);
+      // Products of linear functions over a triangle.
+      piece.weighted += (value - piece.value) / 12.0 * (corners.col(k) - middle);
     }
     set_overlap(piece);
     return piece;
@@ -252,6 +275,7 @@ class Builder {
     Piece piece;
     piece.middle = middle;
     piece.value = covered.value;
+    if (std::isfinite(covered.value)) piece.off = covered.weighted.cwiseQuotient(middle).array() - covered.value;
     piece.overlap = covered.overlap;
     piece.within = covered.within;
     piece.area = surface_.triangle_area[triangle] * std::abs(covered.corners.determinant());
@@ -304,20 +328,21 @@ class Builder {
     add_steps(surface_.triangles_of[vertex], steps);
     const auto is_low = [&](const Piece& piece) { return piece.value <= threshold_by(steps, piece.at); };
     const double weight = surface_.weight[vertex];
-    double bend = 0.0;
+    double bent = 0.0;
     for (const int t : surface_.triangles_of[vertex]) {
       const auto found = crossed_.find(t);
-      if (found != crossed_.end()) bend = std::max(bend, found->second->bend);
+      if (found != crossed_.end()) bent = std::max(bent, bent_part(*found->second));
     }
     const double narrow = std::clamp((fullest_near(vertex) - kNarrow) / (kWide - kNarrow), 0.0, 1.0);
-    const double beyond = std::min(narrow, 1.0 - std::clamp((bend - kBentFrom) / (kBentTo - kBentFrom), 0.0, 1.0));
+    const double beyond = std::min(narrow, 1.0 - bent);
     // How much of a piece bears, and the gap there.
     const auto bearing = [&](const Piece& piece) { return piece.overlap + beyond * (1.0 - piece.overlap); };
-    const auto gap_of = [&](const Piece& piece) {
+    const auto gap_of = [&](const Piece& piece, int corner) {
       const double part = bearing(piece);
-      if (part >= 1.0 || part <= 0.0) return piece.value;
+      const double off = part * piece.off[corner];
+      if (part >= 1.0 || part <= 0.0) return piece.value + off;
       // The mean is that over the overlap and over what is beyond it.
-      return (piece.overlap * piece.within + beyond * (piece.value - piece.overlap * piece.within)) / part;
+      return (piece.overlap * piece.within + beyond * (piece.value - piece.overlap * piece.within)) / part + off;
     };
     double low = 0.0;
     double all = 0.0;
@@ -341,7 +366,7 @@ class Builder {
       const double density = density_of(piece, corner);
       if (density <= 0.0) return;
       sum += density;
-      moment += density * gap_of(piece);
+      moment += density * gap_of(piece, corner);
     });
     const double scale = sum > 0.0 ? weight / sum : 0.0;
     for (const int t : surface_.triangles_of[vertex]) cells.try_emplace(t);  // also where an outline leaves no piece

@@ -19,12 +19,13 @@ struct ContactSurface;
 
 /// A part of a surface triangle that a body covers, itself a triangle.
 struct CoveredPiece {
-  Eigen::Matrix3d corners;  ///< barycentric, one a column
-  double value = 0.0;       ///< mm, mean gap
-  double overlap = 1.0;     ///< share of it where the gap is negative
-  double within = 0.0;      ///< mm, mean gap over that share
-  double low = 0.0;         ///< mm, least gap seen in it
-  double high = 0.0;        ///< mm, largest
+  Eigen::Matrix3d corners;                             ///< barycentric, one a column
+  double value = 0.0;                                  ///< mm, mean gap
+  Eigen::Vector3d weighted = Eigen::Vector3d::Zero();  ///< mm, mean of the gap times each hat
+  double overlap = 1.0;                                ///< share of it where the gap is negative
+  double within = 0.0;                                 ///< mm, mean gap over that share
+  double low = 0.0;                                    ///< mm, least gap seen in it
+  double high = 0.0;                                   ///< mm, largest
 };
 
 /// A point of a step in the body.

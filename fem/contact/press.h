@@ -61,6 +61,8 @@ struct PressTolerance {
       std::numeric_limits<double>::infinity();  ///< mm: steps with friction are cut into equal parts
                                                 ///< whose translations are no longer than this
   int most_halvings = 7;                        ///< of a step that doesn't converge
+  bool outlines = true;                         ///< hats are cut by what bodies cover (see cut_hats.h); false: they are
+                                                ///< whole, as at finite strain, for comparisons with that
   int most_factorisations = 300;                ///< of the whole gel in a step at finite strain, which then gives up
 };
 
@@ -88,7 +90,7 @@ struct PressState {
   Eigen::MatrixX3d surface_displacement;  ///< n x 3, mm: the L2 projection on P1, mass^-1 * surface * traction; fields
   Eigen::MatrixX3d bead_displacement;     ///< m x 3, mm
   Eigen::VectorXd bearing_share;      ///< n: the part of a vertex's hat that the body covers and that bears, 1 where
-                                      ///< no outline cuts it (see cut_hats.h); empty: not told
+                                      ///< no outline cuts it (see cut_hats.h); empty: hats are whole
   std::vector<NodeState> node_state;  ///< n
   std::vector<int> node_owner;        ///< n, the body that a vertex touches, -1 where open
 

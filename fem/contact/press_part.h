@@ -85,13 +85,15 @@ struct PartEffort {
 class PartSolver {
  public:
   /// `lookup_mm`: how well the place where the gap is looked up follows the contact patch. `traction`: relative
-  /// residual of the contact laws. `relaxation`: the compliance is that of the instantaneous modulus.
-  PartSolver(const Compliance& gel, std::vector<PressBody> bodies, double lookup_mm, double traction,
+  /// residual of the contact laws. `outlines`: as in PressTolerance. `relaxation`: the compliance is that of the
+  /// instantaneous modulus.
+  PartSolver(const Compliance& gel, std::vector<PressBody> bodies, double lookup_mm, double traction, bool outlines,
              PronySeries relaxation);
   ~PartSolver();
 
   const ContactSurface& surface() const { return surface_; }
   const std::vector<PressBody>& bodies() const { return bodies_; }
+  bool outlines() const { return outlines_; }  ///< see PressTolerance
 
   /// The friction to solve with from now on, for each body.
   void set_friction(const std::vector<double>& friction);
@@ -149,6 +151,7 @@ class PartSolver {
   bool friction_ = false;  ///< any body has some
   double lookup_mm_;
   double traction_;
+  bool outlines_;
   double size_ = 1.0;  ///< mm, of a mean triangle
   PartRelaxation relaxation_;
   std::vector<double> mu_;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/error.h"
 #include "fem/contact/press_part_iterate.h"
@@ -17,6 +18,7 @@ constexpr double kBulge = 0.5;
 constexpr double kCutsHold = 0.005;  // of a triangle, or of the depth: a body moved by less cuts hats as it did
 constexpr double kCutsHoldLate = 0.5;
 constexpr int kCutUpdates = 12;         // after these the latter holds: what goes to and fro comes to rest
+constexpr double kOwnersAlike = 0.05;   // of a triangle: bodies whose gaps at a vertex differ by less are equally near
 constexpr double kSharpestCurve = 0.3;  // of a triangle: radius down to which a gap counts as smooth
 constexpr double kSlopeStep = 3e-4;     // of a triangle
 
@@ -68,7 +70,8 @@ WeightedGap PartSolver::gap_of(std::size_t b, const Iterate& now, PartEffort& ef
     const bool kept = now.updates > 0 && cached.gap.cuts && cuts_hold(cached, body, hold);
     std::vector<std::array<double, 2>> bent = std::move(cached.gap.bent);
     const double away = surface_.normals.front().dot(body.pose.translation - cached.pose.translation);
-    cached.gap = weighted_gap(surface_, shape, body.pose, body.lookup, reach, true, kept ? cached.gap.cuts : nullptr);
+    cached.gap =
+        weighted_gap(surface_, shape, body.pose, body.lookup, reach, outlines_, kept ? cached.gap.cuts : nullptr);
     if (kept) {  // not asked for again
       cached.gap.bent = std::move(bent);
       for (auto& range : cached.gap.bent) range = {range[0] + away, range[1] + away};
@@ -105,7 +108,8 @@ WeightedGap PartSolver::gap_of(std::size_t b, const Iterate& now, PartEffort& ef
       for (int axis = 0; axis < 2; ++axis) {
         RigidTransform beside = cached.pose;
         beside.translation[axis] -= step;
-        const WeightedGap there = weighted_gap(surface_, shape, beside, cached.lookup, reach, true, cached.gap.cuts);
+        const WeightedGap there =
+            weighted_gap(surface_, shape, beside, cached.lookup, reach, outlines_, cached.gap.cuts);
         ++effort.geometry_updates;
         for (Eigen::Index v = 0; v < n; ++v) {
           if (!std::isfinite(gap.weighted[v]) || !std::isfinite(there.weighted[v])) continue;
@@ -130,6 +134,7 @@ WeightedGap PartSolver::gap_of(std::size_t b, const Iterate& now, PartEffort& ef
 /// The gaps of all bodies, and which body each vertex faces.
 void PartSolver::look_up(Iterate& now, const std::vector<PartTarget>& targets, PartEffort& effort) {
   const int n = static_cast<int>(gel_.vertices.size());
+  const std::vector<int> before = std::move(now.owner);
   now.owner.assign(n, -1);
   now.deepest = std::numeric_limits<double>::infinity();
   for (std::size_t b = 0; b < now.bodies.size(); ++b) {
@@ -144,6 +149,12 @@ void PartSolver::look_up(Iterate& now, const std::vector<PartTarget>& targets, P
     for (int v = 0; v < n; ++v) {
       if (body.gap.weighted[v] < now.gap(v)) now.owner[v] = static_cast<int>(b);
     }
+  }
+  // Between two bodies a vertex may go to and fro; it comes to rest at the one that it had.
+  for (int v = 0; v < n && now.updates >= kCutUpdates && now.bodies.size() > 1; ++v) {
+    if (now.owner[v] < 0 || before[v] < 0) continue;
+    const double had = now.bodies[before[v]].gap.weighted[v];
+    if (had - now.gap(v) < kOwnersAlike * size_ * surface_.weight[v]) now.owner[v] = before[v];
   }
 }
 

@@ -61,7 +61,7 @@ PressState report(const Compliance& gel, const PartSolver& solver, const Surface
   s.wrench = s.bodies.front().wrench;
   s.node_state = snapshot.state;
   s.node_owner = snapshot.owner;
-  s.bearing_share = snapshot.share;
+  if (solver.outlines()) s.bearing_share = snapshot.share;
   s.traction.resize(n, 3);
   for (int v = 0; v < n; ++v) s.traction.row(v) = snapshot.traction.segment<3>(3 * v);
   s.largest_penetration = snapshot.penetration;
