@@ -476,7 +476,12 @@ void add_cut_compliance(Eigen::MatrixXd& compliance, const CutHats& cuts, const 
   for (std::size_t k = 0; k < cuts.vertices.size(); ++k) {
     const int row = place[cuts.vertices[k]];
     const double share = cuts.share[static_cast<Eigen::Index>(k)];
-    if (row < 0 || share <= 0.0) continue;
+    if (row < 0) continue;
+    if (share <= 0.0) {  // what bears nothing stays as it is
+      cut_response.middleRows(each * row, each) = whole_response.middleRows(each * row, each);
+      cut_response.middleCols(each * row, each) = whole_response.middleCols(each * row, each);
+      continue;
+    }
     const double more = std::min(kStiffest, std::pow(kSliver / share, 2));
     for (Eigen::Index a = 0; a < each; ++a) {
       cut_response(each * row + a, each * row + a) += more * compliance(3 * row + a, 3 * row + a);

@@ -29,6 +29,8 @@
 
 namespace touchstone::fem {
 
+struct CutHats;
+
 /// What one translation axis of the object is commanded: its position (mm, the object frame's origin in the gel frame)
 /// or the force on the object (N, gel frame; pressing gives Fz > 0).
 struct AxisControl {
@@ -89,10 +91,11 @@ struct PressState {
   Eigen::MatrixX3d traction;                                                 ///< n x 3, MPa, on the gel, P1
   Eigen::MatrixX3d surface_displacement;  ///< n x 3, mm: the L2 projection on P1, mass^-1 * surface * traction; fields
   Eigen::MatrixX3d bead_displacement;     ///< m x 3, mm
-  Eigen::VectorXd bearing_share;      ///< n: the part of a vertex's hat that the body covers and that bears, 1 where
-                                      ///< no outline cuts it (see cut_hats.h); empty: hats are whole
-  std::vector<NodeState> node_state;  ///< n
-  std::vector<int> node_owner;        ///< n, the body that a vertex touches, -1 where open
+  Eigen::VectorXd bearing_share;        ///< n: the part of a vertex's hat that the body covers and that bears, 1 where
+                                        ///< no outline cuts it (see cut_hats.h); empty: hats are whole
+  std::shared_ptr<const CutHats> cuts;  ///< how they are cut; null: all are whole
+  std::vector<NodeState> node_state;    ///< n
+  std::vector<int> node_owner;          ///< n, the body that a vertex touches, -1 where open
 
   double largest_penetration = 0.0;  ///< mm, weighted gap over weight
   double largest_tension = 0.0;      ///< MPa

@@ -170,8 +170,9 @@ ContactProblem PartSolver::problem(const PressSnapshot& from, const std::vector<
     // It holds as it is.
   } else if (elastic_ || any_cuts) {
     combined_ = block_.compliance();
-    if (const auto joint = joint_cuts(surface_, cuts, now.owner)) {
-      add_cut_compliance(combined_, *joint, surface_, gel_, vertices, block_.axes(), c == 1 && surface_.flat);
+    joint_cuts_ = joint_cuts(surface_, cuts, now.owner);
+    if (joint_cuts_) {
+      add_cut_compliance(combined_, *joint_cuts_, surface_, gel_, vertices, block_.axes(), c == 1 && surface_.flat);
     }
     if (elastic_ && any_cuts) cut_ = combined_;
     any_cuts_ = any_cuts;
@@ -205,6 +206,7 @@ ContactProblem PartSolver::problem(const PressSnapshot& from, const std::vector<
     memory_.forget();
   } else if (use_combined_) {
     use_combined_ = any_cuts_ = false;
+    joint_cuts_.reset();
     memory_.forget();
   }
   for (const PartTarget& target : targets) {

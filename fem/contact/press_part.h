@@ -38,14 +38,15 @@ struct PressSnapshot {
   /// 3 n, mm^3, where `known`: int phi u dA of the gel, and of the gel relative to the elastic body that touches it.
   Eigen::VectorXd weighted;
   Eigen::VectorXd relative;
-  std::vector<char> known;       ///< n
-  std::vector<NodeState> state;  ///< n
-  std::vector<int> owner;        ///< n, the body that touches; -1 where open
-  double penetration = 0.0;      ///< mm, the largest over all vertices
-  double lookup_error = 0.0;     ///< mm
-  double residual = 0.0;         ///< of the contact laws
-  Eigen::VectorXd share;         ///< n, of each hat: the part that bears (see cut_hats.h)
-  RelaxationHistory history;     ///< of (traction; weighted displacement by the unrelaxed gel), 6 n; may be empty
+  std::vector<char> known;              ///< n
+  std::vector<NodeState> state;         ///< n
+  std::vector<int> owner;               ///< n, the body that touches; -1 where open
+  double penetration = 0.0;             ///< mm, the largest over all vertices
+  double lookup_error = 0.0;            ///< mm
+  double residual = 0.0;                ///< of the contact laws
+  Eigen::VectorXd share;                ///< n, of each hat: the part that bears (see cut_hats.h)
+  std::shared_ptr<const CutHats> cuts;  ///< by all bodies; null: all hats are whole
+  RelaxationHistory history;  ///< of (traction; weighted displacement by the unrelaxed gel), 6 n; may be empty
 
   /// Is any body in contact?
   bool touching() const;
@@ -163,6 +164,7 @@ class PartSolver {
   Eigen::MatrixXd cut_;    ///< beside elastic bodies: the block's compliance with what cut hats change
   bool any_cuts_ = false;  ///< in `combined_`
   std::vector<std::shared_ptr<const CutHats>> combined_cuts_;  ///< per body: those in `combined_`
+  std::shared_ptr<const CutHats> joint_cuts_;                  ///< of all bodies, by the vertices that each is over
   std::vector<int> combined_vertices_;                         ///< and the block's vertices
   std::vector<int> combined_owner_;                            ///< and theirs
   ContactMemory memory_;

@@ -58,6 +58,7 @@ std::optional<PressSnapshot> PartSolver::accept(const ContactAnswer& answer, con
   }
   PressSnapshot next = untouched(std::move(bodies), n);
   next.known.assign(n, 0);
+  next.cuts = joint_cuts_;
   for (std::size_t b = 0; b < now.bodies.size(); ++b) {
     next.bodies[b].overlapping = now.bodies[b].gap.deepest < 0.0;
     refuse_too_deep(now.bodies[b].gap.deepest);
