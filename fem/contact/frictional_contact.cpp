@@ -89,7 +89,10 @@ class FrictionalNewton {
     }
     set_.clear();
     for (int i = 0; i < m_; ++i) {
-      if (answer.state[i] != NodeState::open) set_.push_back(i);
+      if (answer.state[i] == NodeState::open) continue;
+      set_.push_back(i);
+      // Where the others' tractions, which are gone now, were all that moved it, it has no direction to slide in.
+      if (answer.state[i] == NodeState::slip && predicted(i).isZero(0.0)) answer.state[i] = NodeState::stick;
     }
     const bool remembered = answer.state == memory_.state;
     if (!(keep && remembered) && !factorise()) return false;

@@ -17,8 +17,9 @@ constexpr int kStrictUpdates = 8;    // after these the lookup may be a hundred 
 constexpr int kPlainUpdates = 5;     // after these the fixed point is relaxed
 constexpr double kHoldFades = 0.25;  // an update, after the first few
 constexpr int kHeldUpdates = 2;
-constexpr double kLargestTurn = 0.1;  // radians an update, under torque control
-constexpr double kMostTurn = 0.8;     // radians in all
+constexpr double kLargestTurn = 0.1;     // radians an update, under torque control
+constexpr double kMostTurn = 0.8;        // radians in all
+constexpr double kJustTouching = 1e-12;  // of the thickness: an overlap of rounding is none
 
 /// Turns an answer without friction into one with three components a vertex.
 void widen(ContactAnswer& answer, const Eigen::Ref<const Eigen::MatrixXd>& compliance) {
@@ -411,7 +412,8 @@ std::optional<PressSnapshot> PartSolver::solve(const PressSnapshot& from, const 
   for (now.updates = 0; now.updates < kMostUpdates; ++now.updates) {
     look_up(now, targets, effort);
     const bool alone = std::none_of(now.active.begin(), now.active.end(), [](char x) { return x != 0; });
-    if (!z_forced && alone && now.deepest >= 0.0 && !bulges_into(now)) return out_of_contact();
+    if (!z_forced && alone && now.deepest >= -kJustTouching * gel_.thickness && !bulges_into(now))
+      return out_of_contact();
     for (int v = 0; v < n; ++v) {
       if (now.owner[v] < 0) now.active[v] = now.required[v] = 0;
     }

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -185,6 +186,30 @@ TEST(Frictional, InfiniteFrictionIsTheBondedLimitOfLargeFriction) {
   ASSERT_TRUE(b.converged);
   EXPECT_LT((a.z - b.z).norm(), 1e-2 * a.z.norm());
   for (const NodeState s : a.state) EXPECT_NE(s, NodeState::slip);
+}
+
+TEST(Frictional, AStartThatLetsGoAtOnceIsNoObstacle) {
+  // By force, from tractions on vertices that the body has left: once they are open nothing moves what begins to touch,
+  // so that it has no direction to slide in.
+  Patch patch(0.5, 0.0);
+  const auto m = patch.problem.gap.size();
+  const auto deepest = std::min_element(patch.problem.gap.begin(), patch.problem.gap.end()) - patch.problem.gap.begin();
+  const Eigen::VectorXd weight = Eigen::VectorXd::Constant(m, 0.03);
+  patch.problem.border = Eigen::MatrixXd::Zero(3 * m, 1);
+  for (Eigen::Index i = 0; i < m; ++i) patch.problem.border(3 * i, 0) = weight[i];
+  patch.problem.force = Eigen::VectorXd::Constant(1, 0.02);
+  patch.problem.compliance.emplace(patch.a);
+  ContactMemory none;
+  const ContactAnswer wanted = solve_frictional(patch.problem, {}, 1e-12, none);
+  ASSERT_TRUE(wanted.converged);
+  Eigen::VectorXd start = Eigen::VectorXd::Zero(3 * m);
+  for (Eigen::Index i = 0; i < m; ++i) {
+    if (i != deepest && patch.problem.gap[i] > 0.0) start[3 * i] = 1e-3;
+  }
+  ContactMemory memory;
+  const ContactAnswer answer = solve_frictional(patch.problem, start, 1e-12, memory);
+  ASSERT_TRUE(answer.converged) << answer.residual;
+  EXPECT_LT((answer.z - wanted.z).norm(), 1e-8 * wanted.z.norm());
 }
 
 TEST(Frictional, AMirroredDragGivesTheMirroredTraction) {
