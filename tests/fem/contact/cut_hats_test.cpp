@@ -112,9 +112,9 @@ TEST(CutHats, ABlockUnderAPlateThatDoesntTouchIsTheBlockAlone) {
   for (const double width : {2.0, 4.2}) {
     for (const double degrees : {0.0, 17.0, 45.0}) {
       const auto target = [&](double z) {
-        PressTarget target = target_at(0.13, degrees == 0.0 ? 0.0 : -0.21, z);
-        target.rotation = Eigen::AngleAxisd(degrees * kRadiansPerDegree, Eigen::Vector3d::UnitZ()).toRotationMatrix();
-        return target;
+        PressTarget turned = target_at(0.13, degrees == 0.0 ? 0.0 : -0.21, z);
+        turned.rotation = Eigen::AngleAxisd(degrees * kRadiansPerDegree, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+        return turned;
       };
       const double alone = force_at(Press(gel(), BoxShape{{width, width, 2.0}}, 0.0), target(0.95));
       for (const double height : {0.2, 0.5, 1.0, 2.0}) {
