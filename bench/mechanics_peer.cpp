@@ -31,7 +31,7 @@ OurAnswer work_of_pressure(const fem::Compliance& gel, double radius) {
     traction[3 * static_cast<Eigen::Index>(i) + 2] =
         -std::max(0.0, 1.0 - gel.vertices[i].head<2>().squaredNorm() / (radius * radius));
   }
-  return {traction.dot(gel.surface.view() * traction), watch.seconds()};
+  return {traction.dot(gel.surface.times(traction)), watch.seconds()};
 }
 
 OurAnswer ours(const LadderStep& step, const PeerProblem& problem) {

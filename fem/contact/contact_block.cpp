@@ -48,7 +48,6 @@ bool ContactBlock::hold(const std::vector<int>& needed) {
   for (const int v : vertices_) place_[v] = -1;
   vertices_ = needed;
   double* const all = compliance_.data();
-  const SharedMatrix::View surface_compliance = gel_.surface.view();
   for (Eigen::Index j = m - 1; j >= 0; --j) {
     const int vj = vertices_[j];
     place_[vj] = static_cast<int>(j);
@@ -62,14 +61,31 @@ bool ContactBlock::hold(const std::vector<int>& needed) {
     }
   }
   Eigen::Map<Eigen::MatrixXd> compliance(all, 3 * m, 3 * m);
-  for (Eigen::Index j = 0; j < m; ++j) {
-    const int vj = vertices_[j];
-    for (Eigen::Index i = 0; i < m; ++i) {
-      if (before[i] >= 0 && before[j] >= 0) continue;
-      const int vi = vertices_[i];
-      compliance.block<3, 3>(3 * i, 3 * j).noalias() =
-          axes_[vi].transpose() * (surface_compliance.block<3, 3>(3 * vi, 3 * vj) * axes_[vj]);
+  const auto fill = [&](const auto& own) {
+    for (Eigen::Index j = 0; j < m; ++j) {
+      for (Eigen::Index i = 0; i < m; ++i) {
+        if (before[i] >= 0 && before[j] >= 0) continue;
+        compliance.block<3, 3>(3 * i, 3 * j).noalias() =
+            axes_[vertices_[i]].transpose() * (own(i, j) * axes_[vertices_[j]]);
+      }
     }
+  };
+  if (const SharedMatrix* const whole = gel_.surface.whole()) {
+    const SharedMatrix::View view = whole->view();
+    fill([&](Eigen::Index i, Eigen::Index j) { return view.block<3, 3>(3 * vertices_[i], 3 * vertices_[j]); });
+  } else {
+    std::vector<int> added;
+    std::vector<Eigen::Index> column(needed.size(), -1);
+    for (Eigen::Index j = 0; j < m; ++j) {
+      if (before[j] >= 0) continue;
+      column[j] = std::ssize(added);
+      added.push_back(vertices_[j]);
+    }
+    const Eigen::MatrixXd block = gel_.surface.block(needed, added);
+    fill([&](Eigen::Index i, Eigen::Index j) -> Eigen::Matrix3d {
+      if (column[j] >= 0) return block.block<3, 3>(3 * i, 3 * column[j]);
+      return block.block<3, 3>(3 * j, 3 * column[i]).transpose();
+    });
   }
   const auto normals = Eigen::seqN(Eigen::fix<0>, m, Eigen::fix<3>);
   normal_compliance_ = compliance(normals, normals);

@@ -246,11 +246,11 @@ class SmoothRest {
     if (static_cast<int>(ring.size()) < kLeastRing) return false;
     Eigen::MatrixXd basis(static_cast<Eigen::Index>(ring.size()), 6);
     Eigen::MatrixXd rest(basis.rows(), 9);
-    const auto compliance = gel_.surface.view();
+    const Eigen::MatrixXd compliance = gel_.surface.block(ring, std::array{vertex});
     for (Eigen::Index k = 0; k < basis.rows(); ++k) {
       const int v = ring[static_cast<std::size_t>(k)];
       basis.row(k) = terms(v);
-      const Matrix3d own = axes_[v].transpose() * (compliance.block<3, 3>(3 * v, 3 * vertex) * axes_[vertex]);
+      const Matrix3d own = axes_[v].transpose() * (compliance.middleRows<3>(3 * k) * axes_[vertex]);
       const Matrix3d difference = own / (surface_.weight[v] * surface_.weight[vertex]) - half_space_at(v);
       rest.row(k) = Eigen::Map<const Eigen::Matrix<double, 1, 9>>(difference.data());
     }

@@ -86,11 +86,11 @@ void ElasticBody::add_normal_to(Eigen::MatrixXd& compliance, double scale, const
   std::vector<int> met;
   const Eigen::SparseMatrix<double> onto = coupling(surface, vertices, mine, gel_from_object, lookup, cuts, met);
   const Eigen::Vector3d along = gel_from_object.rotation.transpose() * normal;
-  const auto h = body_.surface.view();
+  const Eigen::MatrixXd h = body_.surface.block(met, met);
   const auto count = static_cast<Eigen::Index>(met.size());
   Eigen::MatrixXd own(count, count);
   for (Eigen::Index j = 0; j < count; ++j) {
-    for (Eigen::Index i = 0; i < count; ++i) own(i, j) = along.dot(h.block<3, 3>(3 * met[i], 3 * met[j]) * along);
+    for (Eigen::Index i = 0; i < count; ++i) own(i, j) = along.dot(h.block<3, 3>(3 * i, 3 * j) * along);
   }
   const Eigen::MatrixXd left = onto * own;
   compliance.noalias() += scale * (onto * left.transpose()).transpose();
@@ -106,13 +106,13 @@ void ElasticBody::add_to(Eigen::MatrixXd& compliance, double scale, const Contac
   const auto count = static_cast<Eigen::Index>(met.size());
 
   // One pair of components at a time: onto * H_ab * onto^T, turned from the object's axes into the vertices'.
-  const auto h = body_.surface.view();
+  const Eigen::MatrixXd h = body_.surface.block(met, met);
   std::array<std::array<Eigen::MatrixXd, 3>, 3> seen;
   for (int a = 0; a < 3; ++a) {
     for (int b = 0; b < 3; ++b) {
       Eigen::MatrixXd own(count, count);
       for (Eigen::Index j = 0; j < count; ++j) {
-        for (Eigen::Index i = 0; i < count; ++i) own(i, j) = h(3 * met[i] + a, 3 * met[j] + b);
+        for (Eigen::Index i = 0; i < count; ++i) own(i, j) = h(3 * i + a, 3 * j + b);
       }
       const Eigen::MatrixXd left = onto * own;
       seen[a][b] = (onto * left.transpose()).transpose();

@@ -30,14 +30,13 @@ PressState PressFields::with_fields(PressState state) const {
     state.surface_displacement = Eigen::MatrixX3d::Zero(n, 3);
     return state;
   }
-  Eigen::VectorXd weighted = Eigen::VectorXd::Zero(3 * n);
-  const auto compliance = parts_->gel.surface.view();
+  Eigen::VectorXd bearing = Eigen::VectorXd::Zero(3 * n);
   for (Eigen::Index v = 0; v < n; ++v) {
-    if (state.node_state[static_cast<std::size_t>(v)] == NodeState::open) continue;
-    const Eigen::Vector3d traction = state.traction.row(v);
-    weighted.noalias() += compliance.middleCols<3>(3 * v) * traction;
+    if (state.node_state[static_cast<std::size_t>(v)] != NodeState::open) {
+      bearing.segment<3>(3 * v) = state.traction.row(v).transpose();
+    }
   }
-  add_displacement(parts_->gel, parts_->surface, parts_->mass, weighted, state);
+  add_displacement(parts_->gel, parts_->surface, parts_->mass, parts_->gel.surface.times(bearing), state);
   return state;
 }
 

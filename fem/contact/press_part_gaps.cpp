@@ -1,6 +1,7 @@
 // Where the bodies are over the gel, and which vertices may touch.
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -26,12 +27,14 @@ constexpr double kSlopeStep = 3e-4;     // of a triangle
 
 Eigen::Vector3d PartSolver::weighted_at(const PressSnapshot& snapshot, int vertex) const {
   if (snapshot.known[vertex]) return snapshot.weighted.segment<3>(3 * vertex);
-  const auto rows = gel_.surface.view().middleCols<3>(3 * vertex);  // symmetric
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  std::vector<int> bearing;
   for (std::size_t v = 0; v < snapshot.state.size(); ++v) {
-    if (snapshot.state[v] == NodeState::open) continue;
-    const auto at = static_cast<Eigen::Index>(3 * v);
-    sum += rows.middleRows<3>(at).transpose() * snapshot.traction.segment<3>(at);
+    if (snapshot.state[v] != NodeState::open) bearing.push_back(static_cast<int>(v));
+  }
+  const Eigen::MatrixXd rows = gel_.surface.block(bearing, std::array{vertex});  // symmetric
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (std::size_t k = 0; k < bearing.size(); ++k) {
+    sum += rows.middleRows<3>(3 * static_cast<Eigen::Index>(k)).transpose() * snapshot.traction.segment<3>(3 * bearing[k]);
   }
   return sum;
 }

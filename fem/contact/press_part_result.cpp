@@ -129,11 +129,11 @@ std::optional<PressSnapshot> PartSolver::accept(const ContactAnswer& answer, con
 void PartSolver::remember(const PressSnapshot& from, PressSnapshot& next) const {
   if (!relaxation_.on() || (from.history.empty() && !next.touching())) return;
   const auto n = static_cast<Eigen::Index>(gel_.vertices.size());
-  Eigen::VectorXd elastic = Eigen::VectorXd::Zero(3 * n);
+  Eigen::VectorXd bearing = next.traction;
   for (Eigen::Index v = 0; v < n; ++v) {
-    if (next.state[static_cast<std::size_t>(v)] == NodeState::open) continue;
-    elastic.noalias() += gel_.surface.view().middleCols<3>(3 * v) * next.traction.segment<3>(3 * v);
+    if (next.state[static_cast<std::size_t>(v)] == NodeState::open) bearing.segment<3>(3 * v).setZero();
   }
+  Eigen::VectorXd elastic = gel_.surface.times(bearing);
   // What bears of a cut hat gives way otherwise than the whole of it.
   const Eigen::Ref<const Eigen::MatrixXd> cut = gel_compliance();
   for (std::size_t k = 0; next.touching() && any_cuts_ && k < block_.vertices().size(); ++k) {

@@ -25,14 +25,7 @@ void add_fields(const Compliance& gel, const ContactSurface& surface, const Surf
   s.surface_displacement = Eigen::MatrixX3d::Zero(n, 3);
   if (!snapshot.touching() && snapshot.history.empty()) return;
   // `snapshot.weighted` is what cut hats see of it.
-  const Eigen::VectorXd moving = moving_traction(snapshot);
-  const auto compliance = gel.surface.view();
-  Eigen::VectorXd response = Eigen::VectorXd::Zero(3 * n);
-  for (int v = 0; v < n; ++v) {
-    const Eigen::Vector3d t = moving.segment<3>(3 * v);
-    if (!t.isZero(0.0)) response.noalias() += compliance.middleCols<3>(3 * v) * t;
-  }
-  add_displacement(gel, surface, mass, response, s);
+  add_displacement(gel, surface, mass, gel.surface.times(moving_traction(snapshot)), s);
 }
 
 }  // namespace

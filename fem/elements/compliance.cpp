@@ -1,8 +1,12 @@
 #include "fem/elements/compliance.h"
 
 #include <cmath>
+#include <cstdint>
 #include <numbers>
 #include <optional>
+#include <random>
+#include <span>
+#include <utility>
 
 #include "core/error.h"
 #include "fem/elements/element.h"
@@ -28,6 +32,82 @@ void add_border(const Eigen::SparseMatrix<double>& rows, double scale, int first
   }
 }
 
+/// The surface's compliance with its far parts compressed, and the beads' rows.
+struct CompressedBorder {
+  SurfaceCompliance surface;
+  Eigen::MatrixXd beads;
+  double error = 0.0;  ///< see ComplianceReport::compression_error
+};
+
+/// `system` has `beads` rows of beads after those of the surface. Some rows more are random combinations of the
+/// surface's: the elimination keeps them whole, and so tells what x^T S y is for each two of them. The mean square of
+/// how far the compressed matrix is off is the square of its error's Frobenius norm.
+CompressedBorder compress_border(ElementSystem system, const Eigen::SparseMatrix<double>& surface_rows,
+                                 double surface_scale, const TetMesh& mesh, const OuterSurface& surface, int beads,
+                                 FactorReport& factor) {
+  constexpr int kProbes = 8;
+  constexpr double kTolerance = 1e-3;   // of the mean diagonal entry
+  constexpr double kLargestError = 1e-2;  // likewise
+  const int n = static_cast<int>(surface.mesh_vertex.size());
+  std::mt19937_64 random;
+  Eigen::MatrixXd probes(3 * n, kProbes);
+  for (double& sign : probes.reshaped()) sign = (random() & 1) != 0 ? 1.0 : -1.0;
+  for (int node = 0; node < surface_rows.outerSize(); ++node) {
+    if (system.displacement[node] < 0) continue;
+    Eigen::Matrix<double, 3, kProbes> sum = Eigen::Matrix<double, 3, kProbes>::Zero();
+    for (Eigen::SparseMatrix<double>::InnerIterator entry(surface_rows, node); entry; ++entry) {
+      sum += surface_scale * entry.value() * probes.middleRows<3>(3 * entry.row());
+    }
+    if (sum.isZero(0.0)) continue;
+    for (int k = 0; k < kProbes; ++k) {
+      for (int a = 0; a < 3; ++a) {
+        system.matrix.add(system.displacement[node] + a, system.matrix.size + k, sum(a, k));
+      }
+    }
+  }
+  const int whole = 3 * beads + kProbes;
+  system.matrix.size += kProbes;
+  const std::optional<CompressedSchur> schur =
+      compressed_schur(system.matrix, 3 * n + whole, whole, system.tree, &factor);
+  if (!schur) {
+    fail("the elimination of a gel of {} surface vertices failed; to pivot, at most {} are allowed", n,
+         kMostWholeVertices);
+  }
+  system = {};
+  std::vector<Eigen::Vector3d> vertices;
+  for (const int vertex : surface.mesh_vertex) vertices.push_back(mesh.vertices[vertex]);
+  double diagonal = 0.0;
+  const auto columns_of = [&](std::span<const int> asked) {
+    std::vector<int> unknowns;
+    for (const int v : asked) {
+      for (int a = 0; a < 3; ++a) unknowns.push_back(3 * v + a);
+    }
+    return schur->compressed.columns(unknowns);
+  };
+  constexpr int kSampled = 64;
+  std::vector<int> sampled;
+  for (int k = 0; k < kSampled; ++k) sampled.push_back(static_cast<int>(static_cast<std::int64_t>(n) * k / kSampled));
+  const Eigen::MatrixXd columns = columns_of(sampled);
+  for (int k = 0; k < kSampled; ++k) {
+    for (int a = 0; a < 3; ++a) diagonal += std::abs(columns(3 * sampled[k] + a, 3 * k + a)) / (3.0 * kSampled);
+  }
+  const FarFieldMatrix found(vertices, columns_of, kTolerance * diagonal);
+  Eigen::MatrixXd seen(3 * n, kProbes);
+  for (int k = 0; k < kProbes; ++k) seen.col(k) = found.times(probes.col(k));
+  const Eigen::MatrixXd off = probes.transpose() * seen - schur->whole.bottomRightCorner(kProbes, kProbes);
+  double squares = 0.0;
+  for (int i = 0; i < kProbes; ++i) {
+    for (int j = 0; j < i; ++j) squares += off(i, j) * off(i, j);
+  }
+  CompressedBorder result{found, schur->whole.topLeftCorner(3 * beads, 3 * n), 0.0};
+  result.error = std::sqrt(squares / (0.5 * kProbes * (kProbes - 1.0))) / diagonal;
+  if (!(result.error < kLargestError)) {
+    fail("compressing the compliance of {} surface vertices left out {:.1e} of its mean diagonal, {:.0e} are allowed", n,
+         result.error, kLargestError);
+  }
+  return result;
+}
+
 }  // namespace
 
 Compliance compute_compliance(const TetMesh& mesh, const ElasticMaterial& material, std::span<const Bead> beads,
@@ -43,7 +123,7 @@ Compliance compute_compliance(const TetMesh& mesh, std::span<const ElasticMateri
 
 Compliance compute_compliance(const TetMesh& mesh, std::span<const ElasticMaterial> materials,
                               std::span<const Bead> beads, double thickness, Element element,
-                              const Progress& progress) {
+                              const Progress& progress, int most_whole) {
   const auto tell = [&](int step) {
     if (progress) {
       progress("elasticity", step, 3);
@@ -58,12 +138,11 @@ Compliance compute_compliance(const TetMesh& mesh, std::span<const ElasticMateri
   const OuterSurface surface = outer_surface(mesh);
   const int n = static_cast<int>(surface.mesh_vertex.size());
   const int m = static_cast<int>(beads.size());
-  if (std::sqrt(static_cast<double>(n) * (n + m)) > kMostSurfaceVertices) {
-    fail(
-        "the gel's outer surface has {} vertices and there are {} beads: their compliance would take {:.0f} MB; "
-        "at most {:.0f} are allowed: mesh the surface coarser",
-        n, m, 72e-6 * n * (static_cast<double>(n) + m), 72e-6 * kMostSurfaceVertices * kMostSurfaceVertices);
+  if (n > kMostSurfaceVertices) {
+    fail("the gel's outer surface has {} vertices; at most {} are allowed: mesh the surface coarser", n,
+         kMostSurfaceVertices);
   }
+  if (m > kMostBeads) fail("there are {} beads; at most {} are allowed", m, kMostBeads);
 
   // Without units, a surface row is int phi_i u / length^2, a bead's row a mean. Both are scaled so that the border is
   // of the order of one beside the elements' blocks.
@@ -71,20 +150,33 @@ Compliance compute_compliance(const TetMesh& mesh, std::span<const ElasticMateri
   const double surface_scale = 1.0 / (scales.length * scales.length * edge);
   ElementSystem system = make_system(space, scales, materials, element);
   const int unknowns = system.matrix.size;
-  add_border(over_nodes_of(element, space, surface_coupling(space, surface)), surface_scale, unknowns, system);
+  const Eigen::SparseMatrix<double> surface_rows = over_nodes_of(element, space, surface_coupling(space, surface));
+  add_border(surface_rows, surface_scale, unknowns, system);
   add_border(over_nodes_of(element, space, bead_means(space, beads)), 1.0, unknowns + 3 * n, system);
   system.matrix.size = unknowns + 3 * (n + m);
   tell(1);
 
   FactorReport factor;
-  std::optional<Eigen::MatrixXd> found = quasi_definite_schur(system.matrix, 3 * (n + m), system.tree, &factor);
-  if (!found) {  // slower, but it can pivot
-    found = schur_complement(system.matrix, 3 * (n + m), system.tree.order, &factor);
+  Compliance gel;
+  // A nodal traction loads the displacements by its coupling row: a border row over surface_scale.
+  const double displacement_per_traction = scales.length / scales.stress / (scales.length * scales.length);
+  const double surface_factor = -displacement_per_traction / (surface_scale * surface_scale);
+  const double bead_factor = -displacement_per_traction / surface_scale;
+  if (std::sqrt(static_cast<double>(n) * (n + m)) <= most_whole) {
+    std::optional<Eigen::MatrixXd> found = quasi_definite_schur(system.matrix, 3 * (n + m), system.tree, &factor);
+    if (!found) {  // slower, but it can pivot
+      found = schur_complement(system.matrix, 3 * (n + m), system.tree.order, &factor);
+    }
+    gel.surface = Eigen::MatrixXd(found->topLeftCorner(3 * n, 3 * n) * surface_factor);
+    gel.beads = Eigen::MatrixXd(found->bottomLeftCorner(3 * m, 3 * n) * bead_factor);
+  } else {
+    CompressedBorder found = compress_border(std::move(system), surface_rows, surface_scale, mesh, surface, m, factor);
+    gel.surface = found.surface.scaled(surface_factor);
+    gel.beads = Eigen::MatrixXd(found.beads * bead_factor);
+    gel.report.compression_error = found.error;
   }
-  const Eigen::MatrixXd& schur = *found;
   tell(2);
 
-  Compliance gel;
   gel.thickness = thickness;
   gel.material = materials.front();
   for (const int vertex : surface.mesh_vertex) {
@@ -92,11 +184,6 @@ Compliance compute_compliance(const TetMesh& mesh, std::span<const ElasticMateri
   }
   gel.triangles = surface.triangles;
   gel.mass = surface_mass(mesh, surface);
-  // A nodal traction loads the displacements by its coupling row: a border row over surface_scale.
-  const double displacement_per_traction = scales.length / scales.stress / (scales.length * scales.length);
-  gel.surface = Eigen::MatrixXd(schur.topLeftCorner(3 * n, 3 * n) *
-                                (-displacement_per_traction / (surface_scale * surface_scale)));
-  gel.beads = Eigen::MatrixXd(schur.bottomLeftCorner(3 * m, 3 * n) * (-displacement_per_traction / surface_scale));
 
   gel.report.tetrahedra = static_cast<int>(mesh.tetrahedra.size());
   gel.report.unknowns = unknowns;
@@ -113,7 +200,7 @@ Compliance with_modulus(const Compliance& body, double youngs_modulus) {
   Compliance other = body;
   const double softer = body.material.youngs_modulus / youngs_modulus;
   other.material.youngs_modulus = youngs_modulus;
-  other.surface = SharedMatrix(Eigen::MatrixXd(softer * body.surface.view()));
+  other.surface = body.surface.scaled(softer);
   other.beads = SharedMatrix(Eigen::MatrixXd(softer * body.beads.view()));
   return other;
 }

@@ -12,6 +12,7 @@
 #include "fem/elements/elastic_material.h"
 #include "fem/elements/mesh_error_table.h"
 #include "fem/elements/shared_matrix.h"
+#include "fem/elements/surface_compliance.h"
 #include "fem/mesh/tet_mesh.h"
 
 namespace touchstone::fem {
@@ -31,6 +32,8 @@ struct ComplianceReport {
   double factor_entries = 0.0;
   double operations = 0.0;  ///< floating-point operations of the elimination
   double memory_mb = 0.0;   ///< of the elimination on one thread
+  double compression_error = 0.0;  ///< of a surface compliance whose far parts are compressed: Frobenius norm of what
+                                   ///< that left out, over the mean diagonal entry, measured
   std::string note;         ///< from the cache: empty, or what was wrong with the file there; not stored
 };
 
@@ -42,7 +45,7 @@ struct Compliance {
   std::vector<Eigen::Vector3d> vertices;      ///< n vertices of the outer surface, mm
   std::vector<std::array<int, 3>> triangles;  ///< over `vertices`, normal out
   Eigen::SparseMatrix<double> mass;  ///< n x n: int phi_i phi_j dA, mm^2 (P1 hats); its row sums are the weights
-  SharedMatrix surface;  ///< 3n x 3n, symmetric positive definite: int phi_i u_a dA (mm^3) per traction (MPa)
+  SurfaceCompliance surface;  ///< 3n x 3n, symmetric positive definite: int phi_i u_a dA (mm^3) per traction (MPa)
   SharedMatrix beads;    ///< 3m x 3n: mean displacement of a bead's surface (mm) per traction (MPa)
   ComplianceReport report;
   MeshErrorTable mesh_error;  ///< empty if it wasn't measured (see fem/error/mesh_error.h)
@@ -52,9 +55,10 @@ struct Compliance {
 /// is asked for (int phi_i u_a over the outer surface; the mean over each bead's surface); the Schur complement of
 /// [K C^T; C 0] on the border is -C K^-1 C^T. A bead is a rigid sphere that moves with the gel and doesn't stiffen it:
 /// it goes where the gel's mean over its surface goes (Faxen's law [Faxen1922] for a sphere without a force on it). The
-/// vertices keep the mesh's order. `materials` has one entry for each region of the mesh. `thickness` is copied.
+/// vertices keep the mesh's order. Of a large surface the far parts are compressed: what that leaves out is measured and
+/// in the report. `materials` has one entry for each region of the mesh. `thickness` is copied.
 /// @throws Error for an unfit mesh (see fault_of) or material, for a bead that isn't wholly inside the gel, for more
-/// vertices and beads than kMostSurfaceVertices allows, or if memory runs out
+/// vertices or beads than are allowed, or if memory runs out
 Compliance compute_compliance(const TetMesh& mesh, std::span<const ElasticMaterial> materials,
                               std::span<const Bead> beads, double thickness, const Progress& progress = {});
 Compliance compute_compliance(const TetMesh& mesh, const ElasticMaterial& material, std::span<const Bead> beads,
@@ -64,7 +68,11 @@ Compliance compute_compliance(const TetMesh& mesh, const ElasticMaterial& materi
 /// divides by it. @throws Error unless the modulus is finite and above zero
 Compliance with_modulus(const Compliance& body, double youngs_modulus);
 
-/// Vertices n and beads m may have sqrt(n (n + m)) up to this: the compliance then takes 487 MB.
-inline constexpr int kMostSurfaceVertices = 2600;
+/// Vertices n and beads m with sqrt(n (n + m)) up to this have their compliance whole, which then takes 487 MB; of
+/// larger surfaces the far parts are compressed.
+inline constexpr int kMostWholeVertices = 2600;
+/// More vertices, or more beads, are refused.
+inline constexpr int kMostSurfaceVertices = 8000;
+inline constexpr int kMostBeads = 1000;
 
 }  // namespace touchstone::fem

@@ -10,8 +10,10 @@
 #include <cstring>
 #include <fstream>
 #include <memory>
+#include <optional>
 #include <string_view>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "core/error.h"
@@ -141,6 +143,44 @@ BodyErrors read_errors(Reader& in) {
   return body;
 }
 
+/// How the numbers of a compressed compliance belong together.
+void write_layout(const FarFieldMatrix& matrix, const ComplianceReport& report, Writer& out) {
+  const FarFieldMatrix::Parts& parts = matrix.parts();
+  out.value(report.compression_error);
+  out.value(matrix.factor());
+  out.array(parts.order.data(), parts.order.size());
+  out.value(static_cast<std::uint64_t>(parts.clusters.size()));
+  for (const FarFieldMatrix::Cluster& c : parts.clusters) {
+    for (const int number : {c.parent, c.halves[0], c.halves[1], c.first, c.last, c.rank}) out.value(number);
+    out.value(static_cast<std::uint64_t>(c.basis));
+  }
+  out.value(static_cast<std::uint64_t>(parts.blocks.size()));
+  for (const FarFieldMatrix::Block& b : parts.blocks) {
+    for (const int number : {b.row, b.column, static_cast<int>(b.far)}) out.value(number);
+    out.value(static_cast<std::uint64_t>(b.numbers));
+  }
+}
+
+FarFieldMatrix::Parts read_layout(Reader& in) {
+  FarFieldMatrix::Parts parts;
+  parts.order = in.array<int>();
+  parts.clusters.resize(in.count(6 * sizeof(int) + sizeof(std::uint64_t)));
+  for (FarFieldMatrix::Cluster& c : parts.clusters) {
+    for (int* const number : {&c.parent, &c.halves[0], &c.halves[1], &c.first, &c.last, &c.rank}) {
+      *number = in.value<int>();
+    }
+    c.basis = in.value<std::uint64_t>();
+  }
+  parts.blocks.resize(in.count(3 * sizeof(int) + sizeof(std::uint64_t)));
+  for (FarFieldMatrix::Block& b : parts.blocks) {
+    b.row = in.value<int>();
+    b.column = in.value<int>();
+    b.far = in.value<int>() != 0;
+    b.numbers = in.value<std::uint64_t>();
+  }
+  return parts;
+}
+
 void write_body(const Compliance& gel, Writer& out) {
   out.value(gel.thickness);
   out.value(gel.material.youngs_modulus);
@@ -161,9 +201,11 @@ void write_body(const Compliance& gel, Writer& out) {
   out.value(report.memory_mb);
   write_errors(gel.mesh_error.smooth, out);
   write_errors(gel.mesh_error.sharp, out);
+  if (const FarFieldMatrix* const compressed = gel.surface.compressed()) write_layout(*compressed, report, out);
 }
 
-Compliance read_body(Reader& in) {
+/// `far`: the layout of a compressed compliance is there, too, and goes there, with its factor.
+Compliance read_body(Reader& in, std::optional<std::pair<FarFieldMatrix::Parts, double>>& far) {
   Compliance gel;
   gel.thickness = in.value<double>();
   gel.material.youngs_modulus = in.value<double>();
@@ -199,6 +241,11 @@ Compliance read_body(Reader& in) {
   gel.report.memory_mb = in.value<double>();
   gel.mesh_error.smooth = read_errors(in);
   gel.mesh_error.sharp = read_errors(in);
+  if (far) {
+    gel.report.compression_error = in.value<double>();
+    far->second = in.value<double>();
+    far->first = read_layout(in);
+  }
   if (!in.bytes.empty()) {
     fail("it is longer than it should be");
   }
@@ -235,8 +282,10 @@ void write_compliance(const std::filesystem::path& path, const std::string& key,
   const auto place = [](const SharedMatrix& matrix, std::uint64_t offset) {
     return MatrixPlace{offset, static_cast<std::uint64_t>(matrix.rows()), static_cast<std::uint64_t>(matrix.cols())};
   };
-  header.surface = place(gel.surface, next_page(header.body_offset + header.body_size));
-  header.beads = place(gel.beads, next_page(header.surface.offset + bytes_of(gel.surface)));
+  const FarFieldMatrix* const compressed = gel.surface.compressed();
+  const SharedMatrix& surface = compressed != nullptr ? compressed->parts().numbers : *gel.surface.whole();
+  header.surface = place(surface, next_page(header.body_offset + header.body_size));
+  header.beads = place(gel.beads, next_page(header.surface.offset + bytes_of(surface)));
   header.file_size = header.beads.offset + bytes_of(gel.beads);
 
   const std::string zeros(kPage, '\0');
@@ -248,7 +297,7 @@ void write_compliance(const std::filesystem::path& path, const std::string& key,
     end = offset + size;
   };
   put(header.body_offset, body.bytes.data(), body.bytes.size());
-  put(header.surface.offset, gel.surface.view().data(), bytes_of(gel.surface));
+  put(header.surface.offset, surface.view().data(), bytes_of(surface));
   put(header.beads.offset, gel.beads.view().data(), bytes_of(gel.beads));
 
   Checksum sum;
@@ -287,9 +336,18 @@ Compliance read_compliance(const std::filesystem::path& path, const std::string&
     fail("it ends early");
   }
   Reader body{bytes.substr(header.body_offset, header.body_size)};
-  Compliance gel = read_body(body);
+  // A surface matrix of one column is the numbers of a compressed one.
+  std::optional<std::pair<FarFieldMatrix::Parts, double>> far;
+  if (header.surface.columns == 1) far.emplace();
+  Compliance gel = read_body(body, far);
   const std::uint64_t unknowns = 3 * gel.vertices.size();
-  gel.surface = matrix_at(file, header.surface, unknowns, unknowns);
+  if (far) {
+    far->first.numbers = matrix_at(file, header.surface, header.surface.rows, 1);
+    if (far->first.order.size() != gel.vertices.size()) fail("its matrices don't fit its vertices");
+    gel.surface = FarFieldMatrix(std::move(far->first), far->second);
+  } else {
+    gel.surface = matrix_at(file, header.surface, unknowns, unknowns);
+  }
   gel.beads = matrix_at(file, header.beads, header.beads.rows, unknowns);
   return gel;
 }

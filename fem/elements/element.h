@@ -43,10 +43,10 @@ ElementSystem make_system(const TaylorHoodSpace& space, const Scales& scales,
 Eigen::SparseMatrix<double> over_nodes_of(Element element, const TaylorHoodSpace& space,
                                           const Eigen::SparseMatrix<double>& rows);
 
-/// compute_compliance() with another element. @throws Error as there, and for an element that isn't taylor_hood if its
-/// elimination fails
+/// compute_compliance() with another element, and with other surfaces compressed: those of more vertices than
+/// `most_whole`. @throws Error as there, and for an element that isn't taylor_hood if its elimination fails
 Compliance compute_compliance(const TetMesh& mesh, std::span<const ElasticMaterial> materials,
                               std::span<const Bead> beads, double thickness, Element element,
-                              const Progress& progress = {});
+                              const Progress& progress = {}, int most_whole = kMostWholeVertices);
 
 }  // namespace touchstone::fem

@@ -17,6 +17,7 @@
 
 #include "core/error.h"
 #include "fem/elements/front.h"
+#include "fem/elements/row_skeleton.h"
 
 extern "C" {
 void openblas_set_num_threads(int);
@@ -100,12 +101,37 @@ struct Group {
   std::size_t entries = 0;  ///< its part of the entries sorted by group
   std::size_t entries_end = 0;
   double work = 0.0;  ///< operations of its branch
+  std::ptrdiff_t size = 0;  ///< of its front
+  std::ptrdiff_t left = 0;  ///< rows of what it leaves to its parent
+};
+
+/// From so many rows of the border on a front's are compressed.
+constexpr std::ptrdiff_t kLeastCompressed = 256;
+/// Of the later unknowns: fewer rows than that aren't combinations of much fewer.
+constexpr double kFewLater = 0.45;
+/// Parts of the rows; where more are needed they are left as they are.
+constexpr double kWorthCompressing = 0.8;
+/// Of the root of the largest diagonal entry: what compressing a front's rows leaves out, its later unknowns being
+/// scaled to a diagonal of one.
+constexpr double kLeftOut = 1e-4;
+
+/// What compressing at one group took out of the elimination.
+struct Compressed {
+  std::vector<int> members;  ///< places of the border, then of basis vectors
+  Eigen::MatrixXf core;
+  Eigen::MatrixXd whole;  ///< rows that stay whole x members
+  RowSkeleton skeleton;
 };
 
 class Elimination {
  public:
-  Elimination(const SymmetricEntries& matrix, int last, const EliminationTree& tree)
-      : matrix_(matrix), free_(matrix.size - last), groups_(tree.parent.size()) {
+  /// `whole`: of the border's last unknowns, whose rows stay as they are while the others' are compressed.
+  Elimination(const SymmetricEntries& matrix, int last, const EliminationTree& tree, std::optional<int> whole = {})
+      : matrix_(matrix),
+        free_(matrix.size - last),
+        whole_from_(matrix.size - whole.value_or(0)),
+        compresses_(whole.has_value()),
+        groups_(tree.parent.size()) {
     place_unknowns(tree);
     sort_entries(tree);
     for (std::size_t g = 0; g < groups_.size(); ++g) {
@@ -116,7 +142,19 @@ class Elimination {
         groups_[tree.parent[g]].children.push_back(static_cast<int>(g));
       }
     }
-    for (Group& group : groups_) find_rows(group);
+    for (Group& group : groups_) {
+      find_rows(group);
+      group.size = std::ssize(group.rows);
+      group.left = group.size - group.positive - group.negative;
+    }
+    if (!compresses_) return;
+    compressed_.resize(groups_.size());
+    // Basis vectors have places behind all unknowns.
+    int next = matrix.size;
+    for (const Group& group : groups_) {
+      first_basis_.push_back(next);
+      next += static_cast<int>(group.rows.end() - std::lower_bound(group.rows.begin(), group.rows.end(), free_));
+    }
   }
 
   /// The Schur complement's lower half; false if a pivot failed.
@@ -136,6 +174,24 @@ class Elimination {
     }
     return true;
   }
+
+  /// As run(), with what was compressed taken out by groups; `whole` is the last unknowns' own complement.
+  bool run_compressed(Eigen::MatrixXd& whole) {
+    TS_ASSERT(border_entries_ == sorted_.size());
+    for (const int root : roots_) {
+      const Update update = eliminate(root);
+      if (failed_) return false;
+      const auto size = static_cast<std::ptrdiff_t>(update.rows.size());
+      const double* value = update.values.get();
+      for (std::ptrdiff_t j = 0; j < size; ++j) {
+        for (std::ptrdiff_t i = j; i < size; ++i) {
+          whole(update.rows[i] - whole_from_, update.rows[j] - whole_from_) += *value++;
+        }
+      }
+    }
+    return true;
+  }
+  HierarchicalMatrix compressed(Eigen::MatrixXd& whole_rows);
 
   void describe(FactorReport& report) const {
     for (const Group& group : groups_) {
@@ -232,7 +288,7 @@ class Elimination {
   }
 
   Update eliminate(int number) {
-    const Group& group = groups_[number];
+    Group& group = groups_[number];
     std::vector<Update> updates(group.children.size());
     const auto one_child = [&](std::size_t k) { updates[k] = eliminate(group.children[k]); };
     // A branch of little work isn't worth a task.
@@ -242,8 +298,10 @@ class Elimination {
       for (std::size_t k = 0; k < updates.size(); ++k) one_child(k);
     }
     if (failed_) return {};
+    if (compresses_) find_compressed_rows(group, updates);
 
     const auto size = static_cast<std::ptrdiff_t>(group.rows.size());
+    group.size = size;
     Numbers memory = pool_.take(static_cast<std::size_t>(size * size));
     double* const front = memory.get();
     each(size, [&](std::ptrdiff_t j) { std::fill(front + j * size + j, front + (j + 1) * size, 0.0); });
@@ -265,7 +323,88 @@ class Elimination {
     if (!eliminate_front(front, static_cast<int>(size), group.positive, group.negative)) failed_ = true;
     Update result = left_over(group, front, size);
     pool_.give_back(std::move(memory));
+    if (compresses_ && !failed_) compress(number, result);
+    group.left = std::ssize(result.rows);
     return result;
+  }
+
+  /// Its rows once it is known what its children's were compressed to.
+  void find_compressed_rows(Group& group, const std::vector<Update>& updates) const {
+    const int pivots = group.positive + group.negative;
+    std::vector<int> later;
+    for (std::size_t k = group.entries; k < group.entries_end; ++k) {
+      const auto [row, column] = places_of(sorted_[k]);
+      if (std::max(row, column) >= group.first + pivots) later.push_back(std::max(row, column));
+    }
+    for (const Update& update : updates) {
+      for (const int row : update.rows) {
+        if (row >= group.first + pivots) later.push_back(row);
+      }
+    }
+    std::sort(later.begin(), later.end());
+    later.erase(std::unique(later.begin(), later.end()), later.end());
+    group.rows.resize(static_cast<std::size_t>(pivots));
+    group.rows.insert(group.rows.end(), later.begin(), later.end());
+  }
+
+  /// Takes the border's own complement out of what a group leaves, and leaves few combinations of the border's rows.
+  void compress(int number, Update& update) {
+    std::vector<std::ptrdiff_t> kept;     // later unknowns, then whole rows of the border
+    std::vector<std::ptrdiff_t> members;  // rows to be compressed
+    std::ptrdiff_t later = 0;
+    for (std::ptrdiff_t i = 0; i < std::ssize(update.rows); ++i) {
+      const int row = update.rows[i];
+      later += row < free_;
+      const bool stays = row < free_ || (row >= whole_from_ && row < matrix_.size);
+      (stays ? kept : members).push_back(i);
+    }
+    const auto count = std::ssize(members);
+    const auto keep = std::ssize(kept);
+    if (count == 0 || (later > 0 && (count < kLeastCompressed || static_cast<double>(count) < kFewLater * static_cast<double>(later)))) return;
+    const std::ptrdiff_t size = std::ssize(update.rows);
+    const auto value = [&](std::ptrdiff_t i, std::ptrdiff_t j) {
+      const auto [low, high] = std::minmax(i, j);
+      return update.values.get()[low * size - low * (low - 1) / 2 + high - low];
+    };
+    Compressed found;
+    RowSkeleton& few = found.skeleton;
+    if (later > 0) {
+      double largest = 0.0;
+      for (const std::ptrdiff_t k : members) largest = std::max(largest, std::abs(value(k, k)));
+      Eigen::MatrixXd rows(count, later);
+      Eigen::VectorXd scale(later);
+      for (std::ptrdiff_t j = 0; j < later; ++j) {
+        scale[j] = std::abs(value(kept[j], kept[j]));
+        for (std::ptrdiff_t i = 0; i < count; ++i) rows(i, j) = value(members[i], kept[j]);
+      }
+      scale = scale.cwiseMax(1e-6 * scale.maxCoeff()).cwiseSqrt();
+      few = row_skeleton(rows, scale, kLeftOut * std::sqrt(largest));
+      if (static_cast<double>(few.kept.size()) > kWorthCompressing * static_cast<double>(count)) return;
+    }
+    found.core.resize(count, count);
+    for (std::ptrdiff_t j = 0; j < count; ++j) {
+      for (std::ptrdiff_t i = 0; i < count; ++i) {
+        found.core(i, j) = static_cast<float>(value(members[i], members[j]));
+      }
+    }
+    found.whole.resize(keep - later, count);
+    for (std::ptrdiff_t j = 0; j < count; ++j) {
+      for (std::ptrdiff_t i = later; i < keep; ++i) found.whole(i - later, j) = value(kept[i], members[j]);
+    }
+    for (const std::ptrdiff_t k : members) found.members.push_back(update.rows[k]);
+    const auto rank = std::ssize(few.kept);
+    Update less;
+    for (const std::ptrdiff_t k : kept) less.rows.push_back(update.rows[k]);
+    for (std::ptrdiff_t k = 0; k < rank; ++k) less.rows.push_back(first_basis_[number] + static_cast<int>(k));
+    less.values = pool_.take(static_cast<std::size_t>(packed(keep + rank)));
+    double* to = less.values.get();
+    for (std::ptrdiff_t j = 0; j < keep + rank; ++j) {
+      for (std::ptrdiff_t i = j; i < keep; ++i) *to++ = value(kept[i], kept[j]);
+      for (std::ptrdiff_t i = std::max(j, keep); i < keep + rank; ++i) *to++ = j < later ? value(members[few.kept[i - keep]], kept[j]) : 0.0;
+    }
+    compressed_[number] = std::move(found);
+    pool_.give_back(std::move(update.values));
+    update = std::move(less);
   }
 
   /// Adds a child's update to its parent's front.
@@ -313,23 +452,69 @@ class Elimination {
     for (const int child : group.children) {
       most = std::max(most, kept + peak(child));
       const Group& below = groups_[child];
-      kept +=
-          static_cast<double>(packed(static_cast<std::ptrdiff_t>(below.rows.size()) - below.positive - below.negative));
+      kept += static_cast<double>(packed(below.left));
     }
-    return std::max(most, kept + std::pow(static_cast<double>(group.rows.size()), 2));
+    return std::max(most, kept + std::pow(static_cast<double>(group.size), 2));
   }
 
   const SymmetricEntries& matrix_;
   int free_;
+  int whole_from_;
+  bool compresses_;
   std::vector<Group> groups_;
   std::vector<int> roots_;
   std::vector<int> place_;     ///< of each unknown in the order of elimination
   std::vector<int> group_of_;  ///< of each place
   std::vector<std::size_t> sorted_;
   std::size_t border_entries_ = 0;  ///< from here on in `sorted_`
+  std::vector<int> first_basis_;  ///< place of each group's first basis vector
+  std::vector<std::optional<Compressed>> compressed_;
   Pool pool_;
   std::atomic<bool> failed_{false};
 };
+
+/// Rows of a front that wait for a parent that compresses are members of the next group above that does.
+HierarchicalMatrix Elimination::compressed(Eigen::MatrixXd& whole_rows) {
+  std::vector<HierarchicalMatrix::Node> nodes;
+  std::vector<Eigen::MatrixXd> whole;
+  std::vector<int> node_of(groups_.size(), -1);
+  std::vector<float> numbers;
+  const auto keep = [&](const Eigen::MatrixXf& block) {
+    const std::size_t at = numbers.size();
+    numbers.insert(numbers.end(), block.data(), block.data() + block.size());
+    return at;
+  };
+  for (std::size_t g = 0; g < groups_.size(); ++g) {
+    if (!compressed_[g]) continue;
+    Compressed& found = *compressed_[g];
+    HierarchicalMatrix::Node node;
+    const int number = static_cast<int>(nodes.size());
+    node.members = static_cast<int>(found.members.size());
+    node.rank = static_cast<int>(found.skeleton.kept.size());
+    for (int k = 0; k < node.members; ++k) {
+      const int place = found.members[k];
+      if (place < matrix_.size) {
+        node.unknowns.push_back(place - free_);
+        continue;
+      }
+      const auto from = std::upper_bound(first_basis_.begin(), first_basis_.end(), place) - first_basis_.begin() - 1;
+      if (place > first_basis_[from]) continue;
+      nodes[node_of[from]].parent = number;
+      nodes[node_of[from]].place = k;
+    }
+    node.core = keep(found.core);
+    if (node.rank > 0) node.from = keep(found.skeleton.from.cast<float>());
+    node.kept = std::move(found.skeleton.kept);
+    node.others = std::move(found.skeleton.others);
+    node_of[g] = number;
+    nodes.push_back(std::move(node));
+    whole.push_back(found.whole);
+    compressed_[g].reset();
+  }
+  HierarchicalMatrix result(whole_from_ - free_, std::move(nodes), std::move(numbers));
+  whole_rows = result.by_unknowns(whole);
+  return result;
+}
 
 }  // namespace
 
@@ -349,6 +534,29 @@ std::optional<Eigen::MatrixXd> quasi_definite_schur(const SymmetricEntries& matr
     report->factor_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - middle).count();
   }
   return schur;
+}
+
+std::optional<CompressedSchur> compressed_schur(const SymmetricEntries& matrix, int last, int whole,
+                                                const EliminationTree& tree, FactorReport* report) {
+  const auto start = std::chrono::steady_clock::now();
+  if (openblas_get_num_threads() != 1) openblas_set_num_threads(1);
+  Elimination elimination(matrix, last, tree, whole);
+  const auto middle = std::chrono::steady_clock::now();
+  CompressedSchur result;
+  result.whole = Eigen::MatrixXd::Zero(whole, last);
+  Eigen::MatrixXd own = Eigen::MatrixXd::Zero(whole, whole);
+  if (!elimination.run_compressed(own)) return std::nullopt;
+  Eigen::MatrixXd rows;
+  result.compressed = elimination.compressed(rows);
+  result.whole.leftCols(last - whole) = rows;
+  result.whole.rightCols(whole) = own.selfadjointView<Eigen::Lower>();
+  if (report != nullptr) {
+    *report = {};
+    elimination.describe(*report);
+    report->analysis_seconds = std::chrono::duration<double>(middle - start).count();
+    report->factor_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - middle).count();
+  }
+  return result;
 }
 
 }  // namespace touchstone::fem

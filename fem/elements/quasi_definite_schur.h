@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "fem/elements/elimination_order.h"
+#include "fem/elements/hierarchical_matrix.h"
 #include "fem/elements/schur_solver.h"
 
 namespace touchstone::fem {
@@ -16,5 +17,18 @@ namespace touchstone::fem {
 /// pivoting is needed.
 std::optional<Eigen::MatrixXd> quasi_definite_schur(const SymmetricEntries& matrix, int last,
                                                     const EliminationTree& tree, FactorReport* report = nullptr);
+
+/// A Schur complement of which most rows and columns are compressed.
+struct CompressedSchur {
+  HierarchicalMatrix compressed;  ///< all but the last `whole` unknowns
+  Eigen::MatrixXd whole;          ///< rows of the last `whole`: whole x last
+};
+
+/// The same Schur complement, never made whole: as fronts go up the tree, the border's rows in them are replaced by few
+/// combinations of them ([Xia2009], without compressing the pivots), and the border's own complement is kept where it
+/// arises. What is left out is some 1e-7 of it: measure it by random rows among the last `whole`, whose complement among
+/// themselves is exact. No two unknowns of the border may meet in `matrix`.
+std::optional<CompressedSchur> compressed_schur(const SymmetricEntries& matrix, int last, int whole,
+                                                const EliminationTree& tree, FactorReport* report = nullptr);
 
 }  // namespace touchstone::fem

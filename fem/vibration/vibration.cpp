@@ -106,7 +106,7 @@ struct StuckPatch::Parts {
         rigid(3 * j + a, a) = weight[v];
       }
     }
-    Eigen::MatrixXd block = gel.surface.view()(rows, rows);
+    Eigen::MatrixXd block = gel.surface.block(vertices, vertices);
     if (cuts != nullptr) block += changed_by(*cuts, gel, vertices);
     DenseCholesky factor;
     if (!factor.compute(block)) fail("the gel's surface compliance isn't positive definite");
@@ -154,11 +154,11 @@ SteadyVibration StuckPatch::Parts::answer(const Eigen::Vector3d& amplitude, doub
   for (std::size_t j = 0; j < rows.size(); ++j) all[rows[j]] = traction[static_cast<Eigen::Index>(j)];
   steady.traction = by_rows(all);
   steady.force = -(rigid.transpose().cast<Complex>() * traction);
-  Eigen::VectorXcd surface = Eigen::VectorXcd::Zero(gel.surface.rows());
+  const Eigen::VectorXcd moving = all / s;
+  Eigen::VectorXcd surface = gel.surface.times(moving.real()) + Complex(0.0, 1.0) * gel.surface.times(moving.imag());
   Eigen::VectorXcd beads = Eigen::VectorXcd::Zero(gel.beads.rows());
   for (std::size_t j = 0; j < rows.size(); ++j) {
     const Complex t = traction[static_cast<Eigen::Index>(j)] / s;
-    surface += t * gel.surface.view().col(rows[j]);
     beads += t * gel.beads.view().col(rows[j]);
   }
   if (turn > 0.0) {

@@ -148,7 +148,7 @@ double point_force(const MechanicsGels& gels, double edge, int axis,
   }
   Eigen::VectorXd traction = Eigen::VectorXd::Zero(3 * n);
   traction[3 * source + axis] = (axis == 2 ? -1.0 : 1.0) / weight[source];
-  const Eigen::VectorXd response = gel.surface.view() * traction;
+  const Eigen::VectorXd response = gel.surface.times(traction);
   Eigen::MatrixX3d difference(n, 3);
   Eigen::MatrixX3d expected(n, 3);
   int rows = 0;

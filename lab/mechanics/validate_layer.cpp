@@ -136,7 +136,7 @@ double response_in_the_middle(const fem::Compliance& gel, int axis,
   Eigen::VectorXd nodal(n);
   Eigen::VectorXd traction = Eigen::VectorXd::Zero(3 * n);
   for (Eigen::Index i = 0; i < n; ++i) traction[3 * i + axis] = nodal[i] = load(gel.vertices[i]);
-  const Eigen::VectorXd response = gel.surface.view() * traction;
+  const Eigen::VectorXd response = gel.surface.times(traction);
   const Eigen::VectorXd means = gel.mass * nodal;  // of the load, over the hats
   double product = 0.0;
   double square = 0.0;

@@ -225,7 +225,7 @@ sensors::MarkerCompliance marker_compliance(const fem::Compliance& gel, const Su
   const Eigen::MatrixXd& fewer = by_markers ? of_markers : of_patches;
   const Eigen::MatrixXd& more = by_markers ? of_patches : of_markers;
   for (int a = 0; a < 3; ++a) {
-    const Eigen::MatrixXd answer = along_axis(gel.surface, a) * fewer;  // 3n x fewer
+    const Eigen::MatrixXd answer = gel.surface.times_along(a, fewer);  // 3n x fewer
     for (int b = 0; b < 3; ++b) {
       const Eigen::Map<const Eigen::MatrixXd, 0, Eigen::Stride<Eigen::Dynamic, Eigen::Dynamic>> component(
           answer.data() + b, n, answer.cols(), {3 * n, 3});

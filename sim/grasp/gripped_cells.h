@@ -57,23 +57,15 @@ class PieceAnswer {
 
   /// Displacement (gel frame, mm) of the piece's surface over each vertex, under a force (gel frame, N) at each.
   std::vector<Eigen::Vector3d> displacements(const std::vector<Eigen::Vector3d>& forces) const {
-    Eigen::VectorXd traction = Eigen::VectorXd::Zero(body_.surface.cols());
-    std::vector<char> loaded(body_.vertices.size(), 0);
+    Eigen::VectorXd traction = Eigen::VectorXd::Zero(body_.surface.rows());
     for (std::size_t k = 0; k < hits_.size(); ++k) {
       if (!hits_[k] || forces[k].isZero(0.0)) continue;
       for (int c = 0; c < 3; ++c) {
         const int u = body_.triangles[static_cast<std::size_t>(hits_[k]->triangle)][static_cast<std::size_t>(c)];
         traction.segment<3>(3 * u) += hits_[k]->barycentric[c] / weight_[u] * (turn_.transpose() * forces[k]);
-        loaded[static_cast<std::size_t>(u)] = 1;
       }
     }
-    const auto compliance = body_.surface.view();
-    Eigen::VectorXd weighted = Eigen::VectorXd::Zero(compliance.rows());
-    for (std::size_t u = 0; u < loaded.size(); ++u) {
-      if (!loaded[u]) continue;
-      const auto column = static_cast<Eigen::Index>(3 * u);
-      weighted.noalias() += compliance.middleCols<3>(column) * traction.segment<3>(column);
-    }
+    const Eigen::VectorXd weighted = body_.surface.times(traction);
     std::vector<Eigen::Vector3d> result(hits_.size(), Eigen::Vector3d::Zero());
     for (std::size_t k = 0; k < hits_.size(); ++k) {
       if (!hits_[k]) continue;

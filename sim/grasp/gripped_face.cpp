@@ -52,15 +52,9 @@ void check_settings(const GrippedFaceSettings& s, const GrippedPose& pose) {
 
 /// Mean displacement along y, per N of shear, of the gel under tractions along y in proportion to the pressure.
 double shear_compliance_of(const fem::Compliance& gel, const Eigen::VectorXd& pressure, double force) {
-  const auto h = gel.surface.view();
-  double work = 0.0;
-  for (Eigen::Index j = 0; j < pressure.size(); ++j) {
-    if (pressure[j] == 0.0) continue;
-    for (Eigen::Index i = 0; i < pressure.size(); ++i) {
-      if (pressure[i] != 0.0) work += pressure[i] * h(3 * i + 1, 3 * j + 1) * pressure[j];
-    }
-  }
-  return work / (force * force);
+  Eigen::VectorXd traction = Eigen::VectorXd::Zero(3 * pressure.size());
+  for (Eigen::Index v = 0; v < pressure.size(); ++v) traction[3 * v + 1] = pressure[v];
+  return traction.dot(gel.surface.times(traction)) / (force * force);
 }
 
 }  // namespace

@@ -168,11 +168,7 @@ fem::Compliance turned_back(fem::Compliance solid, double lowest) {
   for (Eigen::Vector3d& vertex : solid.vertices) {
     vertex = kHalfTurn.cwiseProduct(vertex) + Eigen::Vector3d(0.0, 0.0, lowest);
   }
-  Eigen::MatrixXd surface = solid.surface.view();
-  for (Eigen::Index j = 0; j < surface.cols(); ++j) {
-    for (Eigen::Index i = 0; i < surface.rows(); ++i) surface(i, j) *= kHalfTurn[i % 3] * kHalfTurn[j % 3];
-  }
-  solid.surface = fem::SharedMatrix(std::move(surface));
+  solid.surface = solid.surface.mirrored(kHalfTurn);
   return solid;
 }
 
