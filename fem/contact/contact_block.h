@@ -32,6 +32,7 @@ class ContactBlock {
   const Eigen::MatrixXd& normal_compliance() const { return normal_compliance_; }
   /// Columns are the vertex's own axes in the gel frame.
   const Eigen::Matrix3d& axes(int vertex) const { return axes_[vertex]; }
+  const std::vector<Eigen::Matrix3d>& axes() const { return axes_; }  ///< of all vertices of the surface
 
  private:
   void make_room(Eigen::Index m);

@@ -2,214 +2,20 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "core/error.h"
-#include "fem/contact/covered_triangle.h"
+#include "fem/contact/triangle_gap.h"
 
 namespace touchstone::fem {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr int kSilhouetteSplits = 2;  // levels of splitting on the silhouette
-constexpr int kBisections = 34;       // of a cell's edge: a quarter of a triangle's to 1e-11
-constexpr int kFalsePositions = 40;   // likewise, where the distance to the silhouette is known: some 5 do
-constexpr double kSteep = 2.0;        // rise within a triangle, in its size, from which the body's side is seen
-constexpr double kBodiesLarge = 4.0;  // bodies larger than this times a triangle can't hide between its corners
-
-/// Integrates over one surface triangle; coordinates inside it are barycentric.
-template <typename Shape>
-class TriangleGap {
- public:
-  TriangleGap(const Shape& shape, const RigidTransform& object_from_gel, double body_radius, double farthest_behind)
-      : shape_(shape),
-        object_from_gel_(object_from_gel),
-        body_radius_(body_radius),
-        farthest_behind_(farthest_behind) {}
-
-  /// int phi_k gap dA, int phi_k dA over the part that hits, and the least gap.
-  Eigen::Vector3d gap;
-  Eigen::Vector3d covered;
-  double lowest = kInfinity;
-
-  /// Gap at one surface point.
-  double corner_gap(const Eigen::Vector3d& corner, const Eigen::Vector3d& normal) const {
-    return entry(object_from_gel_ * corner, object_from_gel_.turn(normal)).value_or(kInfinity);
-  }
-
-  /// Where the gap is more than `steep` above `level` the body's side is seen, which doesn't bear: it fades out, up to
-  /// twice that.
-  void integrate(const std::array<Eigen::Vector3d, 3>& corners, const std::array<Eigen::Vector3d, 3>& normals,
-                 bool one_normal, double area, double level, double steep) {
-    level_ = level;
-    steep_ = steep;
-    gap.setZero();
-    covered.setZero();
-    lowest = kInfinity;
-    for (int k = 0; k < 3; ++k) {
-      points_.col(k) = object_from_gel_ * corners[k];
-      normals_.col(k) = object_from_gel_.turn(normals[k]);
-    }
-    one_normal_ = one_normal;
-    area_ = area;
-    has_silhouette_ = one_normal_ && silhouette_distance(shape_, points_.col(0), normals_.col(0)).has_value();
-    // Bodies smaller than the triangle must not fall between its points.
-    const int splits = splits_for_body(area_, body_radius_);
-    if (has_silhouette_) {
-      cell(Eigen::Matrix3d::Identity(), 0, splits + kSilhouetteSplits);
-    } else {
-      cell(Eigen::Matrix3d::Identity(), splits, kSilhouetteSplits);
-    }
-  }
-
- private:
-  std::optional<double> at(const Eigen::Vector3d& b) const { return entry(points_ * b, direction(b)); }
-  Eigen::Vector3d direction(const Eigen::Vector3d& b) const {
-    return one_normal_ ? Eigen::Vector3d(normals_.col(0)) : (normals_ * b).normalized();
-  }
-  std::optional<double> entry(const Eigen::Vector3d& point, const Eigen::Vector3d& normal) const {
-    const auto found = first_entry(shape_, point, normal);
-    if (!found || *found >= -farthest_behind_) return found;
-    const auto back = first_entry(shape_, point, -normal);  // where the line leaves the body, seen from outside
-    return back && -*back < -farthest_behind_ ? std::nullopt : found;
-  }
-  /// Whether there is an entry.
-  bool hits(const Eigen::Vector3d& b) const {
-    if (std::isfinite(farthest_behind_)) return at(b).has_value();
-    return is_hit(shape_, points_ * b, direction(b));
-  }
-  /// Signed, positive inside.
-  double silhouette(const Eigen::Vector3d& b) const {
-    return *silhouette_distance(shape_, points_ * b, normals_.col(0));
-  }
-
-  /// `cell` holds the barycentric corners as columns.
-  void cell(const Eigen::Matrix3d& corners, int forced_splits, int silhouette_splits) {
-    if (forced_splits > 0) {
-      split(corners, forced_splits - 1, silhouette_splits);
-      return;
-    }
-    std::array<bool, 3> corner_hit;
-    int corner_hits = 0;
-    if (has_silhouette_) {
-      const Eigen::Vector3d middle = corners.rowwise().mean();
-      double reach2 = 0.0;
-      for (int k = 0; k < 3; ++k) reach2 = std::max(reach2, (points_ * (corners.col(k) - middle)).squaredNorm());
-      const double inside = silhouette(middle);
-      if (inside * inside > reach2) {
-        if (inside > 0.0) whole(corners);
-        return;
-      }
-      for (int k = 0; k < 3; ++k) corner_hits += corner_hit[k] = silhouette(corners.col(k)) >= 0.0;
-    } else {
-      int hits = 0;
-      for (int k = 0; k < 3; ++k) corner_hits += corner_hit[k] = at(corners.col(k)).has_value();
-      std::array<std::optional<double>, 7> value;
-      for (int k = 0; k < 7; ++k) {
-        value[k] = at(corners * radon_rule().points[k]);
-        hits += value[k].has_value();
-      }
-      if (hits + corner_hits == 0) return;
-      if (hits + corner_hits == 10) {
-        const double area = area_ * std::abs(corners.determinant());
-        for (int k = 0; k < 7; ++k) {
-          add(corners * radon_rule().points[k], *value[k], radon_rule().weights[k] * area);
-        }
-        return;
-      }
-    }
-    if (silhouette_splits > 0) {
-      split(corners, 0, silhouette_splits - 1);
-    } else if (corner_hits == 3) {
-      whole(corners);
-    } else if (corner_hits > 0) {
-      clip(corners, corner_hit, corner_hits);
-    }
-  }
-
-  void split(const Eigen::Matrix3d& c, int forced_splits, int silhouette_splits) {
-    const Eigen::Vector3d m01 = 0.5 * (c.col(0) + c.col(1));
-    const Eigen::Vector3d m12 = 0.5 * (c.col(1) + c.col(2));
-    const Eigen::Vector3d m20 = 0.5 * (c.col(2) + c.col(0));
-    cell(triangle(c.col(0), m01, m20), forced_splits, silhouette_splits);
-    cell(triangle(m01, c.col(1), m12), forced_splits, silhouette_splits);
-    cell(triangle(m20, m12, c.col(2)), forced_splits, silhouette_splits);
-    cell(triangle(m01, m12, m20), forced_splits, silhouette_splits);
-  }
-
-  static Eigen::Matrix3d triangle(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
-    Eigen::Matrix3d m;
-    m << a, b, c;
-    return m;
-  }
-
-  /// The point on the edge from a hit to a miss where the silhouette crosses it.
-  Eigen::Vector3d crossing(Eigen::Vector3d hit, Eigen::Vector3d miss) const {
-    if (!has_silhouette_) {
-      for (int k = 0; k < kBisections; ++k) {
-        const Eigen::Vector3d middle = 0.5 * (hit + miss);
-        (hits(middle) ? hit : miss) = middle;
-      }
-      return hit;
-    }
-    // False position with the Illinois rule: the kept end's value is halved when it is kept twice.
-    double at_hit = silhouette(hit);
-    double at_miss = silhouette(miss);
-    int kept = 0;
-    for (int k = 0; k < kFalsePositions; ++k) {
-      const Eigen::Vector3d middle = hit + at_hit / (at_hit - at_miss) * (miss - hit);
-      const double value = silhouette(middle);
-      if (std::abs(value) <= 1e-14 * body_radius_ || middle == hit || middle == miss) return middle;
-      if (value > 0.0) {
-        hit = middle;
-        at_hit = value;
-        if (kept == 1) at_miss *= 0.5;
-        kept = 1;
-      } else {
-        miss = middle;
-        at_miss = value;
-        if (kept == -1) at_hit *= 0.5;
-        kept = -1;
-      }
-    }
-    return hit;
-  }
-
-  void clip(const Eigen::Matrix3d& c, const std::array<bool, 3>& hit, int hits) {
-    clip_to_hits(
-        c, hit, hits, [&](const auto& in, const auto& out) { return crossing(in, out); },
-        [&](const auto& a, const auto& b, const auto& d) { whole(triangle(a, b, d)); });
-  }
-
-  /// A cell that hits all over, but for slivers at a curved silhouette.
-  void whole(const Eigen::Matrix3d& corners) {
-    const double area = area_ * std::abs(corners.determinant());
-    const RadonRule& rule = radon_rule();
-    for (int k = 0; k < 7; ++k) {
-      const Eigen::Vector3d point = corners * rule.points[k];
-      if (const auto value = at(point)) add(point, *value, rule.weights[k] * area);
-    }
-  }
-
-  void add(const Eigen::Vector3d& b, double value, double weight) {
-    weight *= std::clamp(2.0 - (value - level_) / steep_, 0.0, 1.0);
-    gap += weight * value * b;
-    covered += weight * b;
-    lowest = std::min(lowest, value);
-  }
-
-  const Shape& shape_;
-  const RigidTransform object_from_gel_;
-  const double body_radius_;
-  const double farthest_behind_;
-  Eigen::Matrix3d points_;
-  Eigen::Matrix3d normals_;
-  bool one_normal_ = true;
-  bool has_silhouette_ = false;
-  double area_ = 0.0;
-  double level_ = 0.0;
-  double steep_ = 1.0;
-};
+constexpr double kBulge = 0.5;           // of the depth: the gel doesn't rise higher beside a contact
+constexpr double kCutMargin = 0.5;       // of a triangle's size, on top
+constexpr double kLeastCutShare = 1e-9;  // of a hat's support
+constexpr double kBodiesLarge = 4.0;     // bodies larger than this times a triangle can't hide between its corners
 
 }  // namespace
 
@@ -226,7 +32,9 @@ ContactSurface::ContactSurface(std::vector<Eigen::Vector3d> places, std::vector<
   TS_ASSERT(static_cast<std::size_t>(mass.rows()) == n);
   normals.assign(n, Eigen::Vector3d::Zero());
   around.resize(n);
+  triangles_of.resize(n);
   for (const auto& t : triangles) {
+    for (const int v : t) triangles_of[v].push_back(static_cast<int>(triangle_area.size()));
     const Eigen::Vector3d middle = (vertices[t[0]] + vertices[t[1]] + vertices[t[2]]) / 3.0;
     double size = 0.0;
     for (const int v : t) size = std::max(size, (vertices[v] - middle).norm());
@@ -264,16 +72,27 @@ void WeightedGap::move_along_normals(const Eigen::VectorXd& weight, double dista
     lowest[i] += distance;
     weighted[i] = plain[i] + edge[i] * depth;
   }
+  for (std::array<double, 2>& range : bent) {
+    for (double& gap : range) gap += distance;
+  }
+}
+
+bool WeightedGap::overlap_cuts_after(double distance) const {
+  return (cuts && cuts->by_overlap) || std::any_of(bent.begin(), bent.end(), [&](const std::array<double, 2>& range) {
+           return range[0] + distance < 0.0 && range[1] + distance > 0.0;
+         });
 }
 
 WeightedGap weighted_gap(const ContactSurface& surface, const ContactShape& shape,
-                         const RigidTransform& gel_from_object, const PatchMotion& lookup, GapReach asked) {
+                         const RigidTransform& gel_from_object, const PatchMotion& lookup, GapReach asked, bool cut,
+                         std::shared_ptr<const CutHats> kept) {
   const auto n = static_cast<Eigen::Index>(surface.vertices.size());
   WeightedGap result;
   result.plain = Eigen::VectorXd::Zero(n);
   result.lowest = Eigen::VectorXd::Constant(n, kInfinity);
   result.edge = Eigen::VectorXd::Zero(n);
   Eigen::VectorXd covered = Eigen::VectorXd::Zero(n);
+  Eigen::VectorXd cut_gaps;
   std::vector<char> skipped(surface.vertices.size(), 0);  // a triangle of its support is above `reach`
   const BoundingBall ball = bounding_ball(shape);
   const Eigen::Vector3d centre = gel_from_object * ball.centre;
@@ -295,6 +114,8 @@ WeightedGap weighted_gap(const ContactSurface& surface, const ContactShape& shap
           const double least = corner_gap.minCoeff();
           result.reach = std::max(0.0, least) + asked.margin + asked.of_depth * std::max(0.0, -least);
         }
+        std::vector<CrossedTriangle> crossed;
+        std::vector<double> lowest_in(surface.triangles.size(), kInfinity);
         for (std::size_t t = 0; t < surface.triangles.size(); ++t) {
           const auto& index = surface.triangles[t];
           const std::array<Eigen::Vector3d, 3> corners{moved[index[0]], moved[index[1]], moved[index[2]]};
@@ -321,14 +142,43 @@ WeightedGap weighted_gap(const ContactSurface& surface, const ContactShape& shap
             for (const int u : surface.around[index[k]]) least = std::min(least, corner_gap[u]);
           }
           if (!std::isfinite(least)) least = std::numeric_limits<double>::max();  // a small body between the vertices
-          triangle.integrate(corners, normals, one_normal, surface.triangle_area[t], least, kSteep * size);
+          triangle.integrate(corners, normals, one_normal, surface.triangle_area[t], least, size, cut && !kept);
           for (int k = 0; k < 3; ++k) {
             result.plain[index[k]] += triangle.gap[k];
             covered[index[k]] += triangle.covered[k];
             result.lowest[index[k]] = std::min(result.lowest[index[k]], triangle.lowest);
           }
           result.deepest = std::min(result.deepest, triangle.lowest);
+          if (triangle.bent) result.bent.push_back(*triangle.bent);
+          if (triangle.is_crossed) {
+            for (const CoveredPiece& piece : triangle.crossed.pieces) {
+              result.deepest = std::min(result.deepest, piece.low);
+            }
+            lowest_in[t] = triangle.lowest;
+            crossed.push_back(std::move(triangle.crossed));
+            crossed.back().triangle = static_cast<int>(t);
+          }
         }
+        // What the gel can't reach cuts nothing.
+        const double reached = std::max(0.0, result.deepest) + kBulge * std::max(0.0, -result.deepest);
+        std::erase_if(crossed, [&](const CrossedTriangle& t) {
+          return lowest_in[static_cast<std::size_t>(t.triangle)] >
+                 reached + kCutMargin * surface.triangle_size[static_cast<std::size_t>(t.triangle)];
+        });
+        if (crossed.empty() && !kept) return;
+        int set_up = -1;
+        const auto gap_at = [&](int t, const Eigen::Vector3d& b) {
+          if (set_up == t) return triangle.gap_at(b);
+          set_up = t;
+          const auto& index = surface.triangles[t];
+          const std::array<Eigen::Vector3d, 3> corners{moved[index[0]], moved[index[1]], moved[index[2]]};
+          const std::array<Eigen::Vector3d, 3> normals{surface.normals[index[0]], surface.normals[index[1]],
+                                                       surface.normals[index[2]]};
+          triangle.set_up(corners, normals, normals[0] == normals[1] && normals[0] == normals[2]);
+          return triangle.gap_at(b);
+        };
+        result.cuts = kept ? kept : std::make_shared<const CutHats>(cut_hats(surface, crossed, gap_at));
+        cut_gaps = kept ? moved_gaps(surface, *kept, gap_at) : result.cuts->gap;
       },
       shape);
   const double depth = std::max(0.0, -result.deepest);
@@ -342,6 +192,16 @@ WeightedGap weighted_gap(const ContactSurface& surface, const ContactShape& shap
     if (share < kBearingShare) result.edge[i] = surface.weight[i] * (kBearingShare - share) / kBearingFade;
     result.plain[i] *= surface.weight[i] / covered[i];
     result.weighted[i] = result.plain[i] + result.edge[i] * depth;
+  }
+  for (std::size_t k = 0; result.cuts && k < result.cuts->vertices.size(); ++k) {
+    const int i = result.cuts->vertices[k];
+    const double share = result.cuts->share[static_cast<Eigen::Index>(k)];
+    const double gap = cut_gaps[static_cast<Eigen::Index>(k)];
+    if (skipped[i]) continue;
+    const bool far = !std::isfinite(gap) || share < kLeastCutShare;
+    result.plain[i] = result.weighted[i] = far ? kInfinity : surface.weight[i] * gap;
+    result.edge[i] = 0.0;
+    if (far) result.lowest[i] = kInfinity;
   }
   return result;
 }

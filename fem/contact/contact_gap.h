@@ -4,9 +4,11 @@
 #include <Eigen/Core>
 #include <array>
 #include <limits>
+#include <memory>
 #include <vector>
 
 #include "core/transform.h"
+#include "fem/contact/cut_hats.h"
 #include "fem/contact/patch_motion.h"
 #include "fem/elements/compliance.h"
 #include "fem/shapes/contact_shape.h"
@@ -26,12 +28,13 @@ struct ContactSurface {
 
   std::vector<Eigen::Vector3d> vertices;
   std::vector<std::array<int, 3>> triangles;
-  std::vector<Eigen::Vector3d> normals;  ///< unit, outward, the triangles' mean weighted by area
-  Eigen::VectorXd weight;                ///< int phi_i dA, mm^2
-  std::vector<std::vector<int>> around;  ///< neighbours of each vertex by edges, rising
-  std::vector<double> triangle_size;     ///< mm, from a triangle's middle to its farthest corner
-  std::vector<double> triangle_area;     ///< mm^2
-  bool flat = true;                      ///< one normal all over
+  std::vector<Eigen::Vector3d> normals;        ///< unit, outward, the triangles' mean weighted by area
+  Eigen::VectorXd weight;                      ///< int phi_i dA, mm^2
+  std::vector<std::vector<int>> around;        ///< neighbours of each vertex by edges, rising
+  std::vector<std::vector<int>> triangles_of;  ///< that have the vertex as a corner, rising
+  std::vector<double> triangle_size;           ///< mm, from a triangle's middle to its farthest corner
+  std::vector<double> triangle_area;           ///< mm^2
+  bool flat = true;                            ///< one normal all over
   /// mm: of a curved gel the line through a surface point leaves it again on its far side; a body that lies wholly more
   /// than this behind the point is there and not in contact here. Half the gel's thickness, infinite for a flat gel.
   double farthest_behind = std::numeric_limits<double>::infinity();
@@ -62,10 +65,16 @@ struct WeightedGap {
   Eigen::VectorXd lowest;    ///< mm, the least gap seen within the hat's support; infinity: far
   double deepest = std::numeric_limits<double>::infinity();  ///< mm, the least gap of all; negative: overlap
   double reach = std::numeric_limits<double>::infinity();  ///< mm: vertices that come nearer than this aren't left out
+  std::shared_ptr<const CutHats> cuts;                     ///< none: no outline crosses the surface
+  /// mm: the least and the largest gap in each triangle over which the gap is bent, as under a tip or a ridge.
+  std::vector<std::array<double, 2>> bent;
 
   /// The gap after the body has moved by `distance` (mm) along the normal of a flat surface, exactly; `weight` is the
   /// surface's.
   void move_along_normals(const Eigen::VectorXd& weight, double distance);
+
+  /// Whether after such a motion hats are to be cut by the border of the overlap, or were before it.
+  bool overlap_cuts_after(double distance) const;
 };
 
 /// Which vertices are asked for: those whose gap is under max(least gap, 0) + `margin` + `of_depth` * depth. Others may
@@ -77,8 +86,10 @@ struct GapReach {
 
 /// Integrates by the 7-point rule of degree 5; triangles that the silhouette crosses, or that are large beside the
 /// body, are split, and the cells on the silhouette clipped at it. The gel is looked up where `lookup` has moved it
-/// along itself.
+/// along itself. With `cut`, hats are cut by the body's outline (see cut_hats.h), or are taken as `kept` has them if
+/// that is given: the body has moved but a little since.
 WeightedGap weighted_gap(const ContactSurface& surface, const ContactShape& shape,
-                         const RigidTransform& gel_from_object, const PatchMotion& lookup = {}, GapReach reach = {});
+                         const RigidTransform& gel_from_object, const PatchMotion& lookup = {}, GapReach reach = {},
+                         bool cut = false, std::shared_ptr<const CutHats> kept = nullptr);
 
 }  // namespace touchstone::fem

@@ -21,7 +21,8 @@ ElasticBody::ElasticBody(const Compliance& body)
 
 Eigen::SparseMatrix<double> ElasticBody::coupling(const ContactSurface& surface, const std::vector<int>& vertices,
                                                   const std::vector<char>& mine, const RigidTransform& gel_from_object,
-                                                  const PatchMotion& lookup, std::vector<int>& met) const {
+                                                  const PatchMotion& lookup, const CutHats* cuts,
+                                                  std::vector<int>& met) const {
   TS_ASSERT(mine.size() == vertices.size());
   static const std::vector<SimplexPoint<3>> rule = triangle_rule(kRuleDegree);
   const RigidTransform object_from_gel = gel_from_object.inverse();
@@ -32,32 +33,42 @@ Eigen::SparseMatrix<double> ElasticBody::coupling(const ContactSurface& surface,
   std::map<int, int> column_of;
   met.clear();
   std::vector<Eigen::Triplet<double>> entries;
-  for (std::size_t t = 0; t < surface.triangles.size(); ++t) {
+  const auto add = [&](int triangle, const Eigen::Vector3d& barycentric, const Eigen::Vector3d& density) {
+    const auto& index = surface.triangles[triangle];
+    Eigen::Vector3d at = Eigen::Vector3d::Zero();
+    Eigen::Vector3d normal = Eigen::Vector3d::Zero();
+    for (int k = 0; k < 3; ++k) {
+      at += barycentric[k] * surface.vertices[index[k]];
+      normal += barycentric[k] * surface.normals[index[k]];
+    }
+    normal.normalize();
+    const Eigen::Vector3d carried = lookup.displacement(at);
+    at += carried - normal.dot(carried) * normal;
+    const auto hit = outer_.first_crossing(object_from_gel * at, object_from_gel.turn(normal));
+    if (!hit) return;
+    for (int k = 0; k < 3; ++k) {
+      const int row = place[index[k]];
+      if (row < 0 || density[k] == 0.0) continue;
+      for (int j = 0; j < 3; ++j) {
+        const int vertex = body_.triangles[hit->triangle][j];
+        const auto [column, is_new] = column_of.try_emplace(vertex, static_cast<int>(met.size()));
+        if (is_new) met.push_back(vertex);
+        entries.emplace_back(row, column->second, density[k] * hit->barycentric[j] / weight_[vertex]);
+      }
+    }
+  };
+  static const std::vector<CutTriangle> none;
+  const std::vector<CutTriangle>& cut = cuts != nullptr ? cuts->triangles : none;
+  auto next_cut = cut.begin();
+  for (int t = 0; t < static_cast<int>(surface.triangles.size()); ++t) {
+    while (next_cut != cut.end() && next_cut->triangle < t) ++next_cut;
     const auto& index = surface.triangles[t];
     if (place[index[0]] < 0 && place[index[1]] < 0 && place[index[2]] < 0) continue;
-    for (const SimplexPoint<3>& point : rule) {
-      Eigen::Vector3d at = Eigen::Vector3d::Zero();
-      Eigen::Vector3d normal = Eigen::Vector3d::Zero();
-      for (int k = 0; k < 3; ++k) {
-        at += point.barycentric[k] * surface.vertices[index[k]];
-        normal += point.barycentric[k] * surface.normals[index[k]];
-      }
-      normal.normalize();
-      const Eigen::Vector3d carried = lookup.displacement(at);
-      at += carried - normal.dot(carried) * normal;
-      const auto hit = outer_.first_crossing(object_from_gel * at, object_from_gel.turn(normal));
-      if (!hit) continue;
-      for (int k = 0; k < 3; ++k) {
-        const int row = place[index[k]];
-        if (row < 0) continue;
-        for (int j = 0; j < 3; ++j) {
-          const int vertex = body_.triangles[hit->triangle][j];
-          const auto [column, is_new] = column_of.try_emplace(vertex, static_cast<int>(met.size()));
-          if (is_new) met.push_back(vertex);
-          entries.emplace_back(
-              row, column->second,
-              surface.triangle_area[t] * point.weight * point.barycentric[k] * hit->barycentric[j] / weight_[vertex]);
-        }
+    if (next_cut != cut.end() && next_cut->triangle == t) {
+      for (const DensityCell& cell : next_cut->cells) add(t, cell.corners, cell.density);
+    } else {
+      for (const SimplexPoint<3>& point : rule) {
+        add(t, point.barycentric, surface.triangle_area[t] * point.weight * point.barycentric);
       }
     }
   }
@@ -71,9 +82,9 @@ Eigen::SparseMatrix<double> ElasticBody::coupling(const ContactSurface& surface,
 void ElasticBody::add_normal_to(Eigen::MatrixXd& compliance, double scale, const ContactSurface& surface,
                                 const std::vector<int>& vertices, const std::vector<char>& mine,
                                 const Eigen::Vector3d& normal, const RigidTransform& gel_from_object,
-                                const PatchMotion& lookup) const {
+                                const PatchMotion& lookup, const CutHats* cuts) const {
   std::vector<int> met;
-  const Eigen::SparseMatrix<double> onto = coupling(surface, vertices, mine, gel_from_object, lookup, met);
+  const Eigen::SparseMatrix<double> onto = coupling(surface, vertices, mine, gel_from_object, lookup, cuts, met);
   const Eigen::Vector3d along = gel_from_object.rotation.transpose() * normal;
   const auto h = body_.surface.view();
   const auto count = static_cast<Eigen::Index>(met.size());
@@ -88,9 +99,9 @@ void ElasticBody::add_normal_to(Eigen::MatrixXd& compliance, double scale, const
 void ElasticBody::add_to(Eigen::MatrixXd& compliance, double scale, const ContactSurface& surface,
                          const std::vector<int>& vertices, const std::vector<char>& mine,
                          const std::vector<Eigen::Matrix3d>& axes, const RigidTransform& gel_from_object,
-                         const PatchMotion& lookup) const {
+                         const PatchMotion& lookup, const CutHats* cuts) const {
   std::vector<int> met;
-  const Eigen::SparseMatrix<double> onto = coupling(surface, vertices, mine, gel_from_object, lookup, met);
+  const Eigen::SparseMatrix<double> onto = coupling(surface, vertices, mine, gel_from_object, lookup, cuts, met);
   const auto m = static_cast<Eigen::Index>(vertices.size());
   const auto count = static_cast<Eigen::Index>(met.size());
 

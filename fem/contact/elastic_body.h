@@ -16,7 +16,8 @@ namespace touchstone::fem {
 /// B_ij = int phi_i psi_j dA over the gel's surface (points are carried over along the gel's normal), equal and
 /// opposite tractions on the two surfaces make the body's surface move by B W^-1 H W^-1 B^T seen by the gel's hats: H
 /// is the body's compliance, W its hats' weights (a mortar coupling with lumped mass [Wohlmuth2011, sec. 3]). It is
-/// symmetric, and forces and torques are handed over whole wherever the gel's hats lie on the body's surface.
+/// symmetric, and forces and torques are handed over whole wherever the gel's hats lie on the body's surface. Where the
+/// body's outline cuts a hat, phi_i is what is left of it (`cuts`; null: none is cut).
 class ElasticBody {
  public:
   /// `body`: in the object's frame, bonded where the object is held; it must outlive this.
@@ -26,18 +27,18 @@ class ElasticBody {
   /// `axes`). `mine` is a flag per entry of `vertices`: those that touch this body.
   void add_to(Eigen::MatrixXd& compliance, double scale, const ContactSurface& surface,
               const std::vector<int>& vertices, const std::vector<char>& mine, const std::vector<Eigen::Matrix3d>& axes,
-              const RigidTransform& gel_from_object, const PatchMotion& lookup) const;
+              const RigidTransform& gel_from_object, const PatchMotion& lookup, const CutHats* cuts) const;
   /// The same for the normal components alone (m x m), of a flat gel whose normal is `normal`: all that contact without
   /// friction asks for, at a ninth of the price.
   void add_normal_to(Eigen::MatrixXd& compliance, double scale, const ContactSurface& surface,
                      const std::vector<int>& vertices, const std::vector<char>& mine, const Eigen::Vector3d& normal,
-                     const RigidTransform& gel_from_object, const PatchMotion& lookup) const;
+                     const RigidTransform& gel_from_object, const PatchMotion& lookup, const CutHats* cuts) const;
 
  private:
   /// B W^-1, its columns over the body's vertices that are met, which it gives in `met`.
   Eigen::SparseMatrix<double> coupling(const ContactSurface& surface, const std::vector<int>& vertices,
                                        const std::vector<char>& mine, const RigidTransform& gel_from_object,
-                                       const PatchMotion& lookup, std::vector<int>& met) const;
+                                       const PatchMotion& lookup, const CutHats* cuts, std::vector<int>& met) const;
 
   const Compliance& body_;
   TriangleTree outer_;

@@ -87,7 +87,7 @@ struct Press::Parts {
       : gel(compliance),
         tolerance(wanted),
         output(what),
-        solver(gel, std::move(bodies), wanted.lookup_mm, wanted.traction, std::move(relaxation)),
+        solver(gel, std::move(bodies), wanted.lookup_mm, wanted.traction, wanted.outlines, std::move(relaxation)),
         n(static_cast<int>(gel.vertices.size())),
         placed(solver.bodies().size(), 0) {
     if (output == PressOutput::fields) {
@@ -110,7 +110,7 @@ struct Press::Parts {
 
   double friction(std::size_t body) const { return solver.bodies()[body].friction; }
   double deepest_at(std::size_t body, const RigidTransform& pose) const {
-    return weighted_gap(solver.surface(), solver.bodies()[body].shape, pose).deepest;
+    return weighted_gap(solver.surface(), solver.bodies()[body].shape, pose, {}, {}, tolerance.outlines).deepest;
   }
   std::optional<RigidTransform> straight_above(std::size_t body, RigidTransform pose) const;
   std::optional<RigidTransform> before_touch(std::size_t body, const PressTarget& target, RigidTransform& to,

@@ -29,6 +29,8 @@
 
 namespace touchstone::fem {
 
+struct CutHats;
+
 /// What one translation axis of the object is commanded: its position (mm, the object frame's origin in the gel frame)
 /// or the force on the object (N, gel frame; pressing gives Fz > 0).
 struct AxisControl {
@@ -61,6 +63,8 @@ struct PressTolerance {
       std::numeric_limits<double>::infinity();  ///< mm: steps with friction are cut into equal parts
                                                 ///< whose translations are no longer than this
   int most_halvings = 7;                        ///< of a step that doesn't converge
+  bool outlines = true;                         ///< hats are cut by what bodies cover (see cut_hats.h); false: they are
+                                                ///< whole, as at finite strain, for comparisons with that
   int most_factorisations = 300;                ///< of the whole gel in a step at finite strain, which then gives up
 };
 
@@ -87,8 +91,11 @@ struct PressState {
   Eigen::MatrixX3d traction;                                                 ///< n x 3, MPa, on the gel, P1
   Eigen::MatrixX3d surface_displacement;  ///< n x 3, mm: the L2 projection on P1, mass^-1 * surface * traction; fields
   Eigen::MatrixX3d bead_displacement;     ///< m x 3, mm
-  std::vector<NodeState> node_state;      ///< n
-  std::vector<int> node_owner;            ///< n, the body that a vertex touches, -1 where open
+  Eigen::VectorXd bearing_share;        ///< n: the part of a vertex's hat that the body covers and that bears, 1 where
+                                        ///< no outline cuts it (see cut_hats.h); empty: hats are whole
+  std::shared_ptr<const CutHats> cuts;  ///< how they are cut; null: all are whole
+  std::vector<NodeState> node_state;    ///< n
+  std::vector<int> node_owner;          ///< n, the body that a vertex touches, -1 where open
 
   double largest_penetration = 0.0;  ///< mm, weighted gap over weight
   double largest_tension = 0.0;      ///< MPa
@@ -101,7 +108,7 @@ struct PressState {
                                      ///< fields
   double largest_strain = 0.0;       ///< the larger of largest_gradient and |normal displacement| / thickness. Linear
                                      ///< elasticity is first-order in it: above some 0.2, don't trust percents; fields
-  double contact_area = 0.0;         ///< mm^2: weights of the vertices in contact
+  double contact_area = 0.0;         ///< mm^2: weights of the vertices in contact, times what bears of them
   int contact_vertices = 0;
   bool under_resolved = false;  ///< overlapping, but in contact with fewer than 13 vertices (a contact radius under
                                 ///< two edges): forces may be several percent off, or zero for a touch between

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "fem/contact/cut_compliance.h"
 #include "fem/contact/press_part_iterate.h"
 
 namespace touchstone::fem {
@@ -41,11 +42,12 @@ Eigen::Matrix3d turned_by(const Eigen::Vector3d& turn) {
 }  // namespace
 
 PartSolver::PartSolver(const Compliance& gel, std::vector<PressBody> bodies, double lookup_mm, double traction,
-                       PronySeries relaxation)
+                       bool outlines, PronySeries relaxation)
     : gel_(gel),
       bodies_(std::move(bodies)),
       lookup_mm_(lookup_mm),
       traction_(traction),
+      outlines_(outlines),
       relaxation_(std::move(relaxation)),
       mu_(bodies_.size(), 0.0),
       surface_(gel),
@@ -155,8 +157,29 @@ ContactProblem PartSolver::problem(const PressSnapshot& from, const std::vector<
   const auto m = static_cast<Eigen::Index>(vertices.size());
   ContactProblem result;
   result.components = c;
-  if (elastic_) {
+  std::vector<std::shared_ptr<const CutHats>> cuts;
+  bool any_cuts = false;
+  for (const Body& body : now.bodies) {
+    cuts.push_back(body.gap.cuts);
+    any_cuts = any_cuts || body.gap.cuts;
+  }
+  std::vector<int> owner;
+  for (const int v : vertices) owner.push_back(now.owner[v]);
+  if (use_combined_ && !elastic_ && cuts == combined_cuts_ && vertices == combined_vertices_ &&
+      owner == combined_owner_) {
+    // It holds as it is.
+  } else if (elastic_ || any_cuts) {
     combined_ = block_.compliance();
+    joint_cuts_ = joint_cuts(surface_, cuts, now.owner);
+    if (joint_cuts_) {
+      add_cut_compliance(combined_, *joint_cuts_, surface_, gel_, vertices, block_.axes(), c == 1 && surface_.flat);
+    }
+    if (elastic_ && any_cuts) cut_ = combined_;
+    any_cuts_ = any_cuts;
+    combined_cuts_ = cuts;
+    combined_vertices_ = vertices;
+    combined_owner_ = owner;
+    use_combined_ = true;
     const auto normals = Eigen::seqN(Eigen::fix<0>, m, Eigen::fix<3>);
     const bool normal_only = !friction_ && surface_.flat;  // what a body does along the surface then matters to nobody
     if (normal_only) combined_normal_ = combined_(normals, normals);
@@ -169,9 +192,10 @@ ContactProblem PartSolver::problem(const PressSnapshot& from, const std::vector<
       const Body& body = now.bodies[b];
       if (normal_only) {
         soft_[b]->add_normal_to(combined_normal_, relaxation_.stiffness(), surface_, vertices, mine,
-                                surface_.normals.front(), body.pose, body.lookup);
+                                surface_.normals.front(), body.pose, body.lookup, body.gap.cuts.get());
       } else {
-        soft_[b]->add_to(combined_, relaxation_.stiffness(), surface_, vertices, mine, axes, body.pose, body.lookup);
+        soft_[b]->add_to(combined_, relaxation_.stiffness(), surface_, vertices, mine, axes, body.pose, body.lookup,
+                         body.gap.cuts.get());
       }
     }
     if (normal_only) {
@@ -180,6 +204,10 @@ ContactProblem PartSolver::problem(const PressSnapshot& from, const std::vector<
       combined_normal_ = combined_(normals, normals);
     }
     memory_.forget();
+  } else if (use_combined_) {
+    use_combined_ = any_cuts_ = false;
+    joint_cuts_.reset();
+    memory_.forget();
   }
   for (const PartTarget& target : targets) {
     if (target.turned[0] || target.turned[1] || target.turned[2]) memory_.forget();  // its border changes
@@ -187,7 +215,7 @@ ContactProblem PartSolver::problem(const PressSnapshot& from, const std::vector<
   if (c == 3) {
     result.compliance.emplace(compliance());
   } else {
-    result.compliance.emplace(elastic_ ? combined_normal_ : block_.normal_compliance());
+    result.compliance.emplace(use_combined_ ? combined_normal_ : block_.normal_compliance());
   }
   result.gap.resize(m);
   for (Eigen::Index j = 0; j < m; ++j) result.gap[j] = now.gap(vertices[j]);
@@ -227,10 +255,7 @@ ContactProblem PartSolver::problem(const PressSnapshot& from, const std::vector<
         // int phi (the body's motion) dA.
         Eigen::Vector3d moved = surface_.weight[v] * axis;
         if (rotation) {
-          Eigen::Vector3d arm = -surface_.weight[v] * now.bodies[b].pose.translation;
-          for (Eigen::SparseMatrix<double>::InnerIterator it(gel_.mass, v); it; ++it) {
-            arm += it.value() * gel_.vertices[static_cast<std::size_t>(it.row())];
-          }
+          Eigen::Vector3d arm = arm_of(now, v) - surface_.weight[v] * now.bodies[b].pose.translation;
           if (now.weighted.size() == 3 * m) arm += now.weighted.segment<3>(3 * j);
           moved = axis.cross(arm);
         }
@@ -240,6 +265,20 @@ ContactProblem PartSolver::problem(const PressSnapshot& from, const std::vector<
     }
   }
   return result;
+}
+
+/// The place of a vertex's traction times its weight: int phi x dA, or with what bears of its hat.
+Eigen::Vector3d PartSolver::arm_of(const Iterate& now, int vertex) const {
+  if (now.owner[vertex] >= 0) {
+    const auto& cuts = now.bodies[now.owner[vertex]].gap.cuts;
+    const Eigen::Index place = cuts ? place_in(*cuts, vertex) : -1;
+    if (place >= 0) return cuts->moment.col(place);
+  }
+  Eigen::Vector3d arm = Eigen::Vector3d::Zero();
+  for (Eigen::SparseMatrix<double>::InnerIterator it(gel_.mass, vertex); it; ++it) {
+    arm += it.value() * gel_.vertices[static_cast<std::size_t>(it.row())];
+  }
+  return arm;
 }
 
 /// Moves the poses by what forces and torques ask for, no faster than the block can follow. False if a body slides away
@@ -288,7 +327,9 @@ bool PartSolver::take_shift(const ContactAnswer& answer, const std::vector<PartT
     }
     body.pose.translation += shift;
     if (shift.squaredNorm() == 0.0) continue;
-    if (!surface_.flat) now.edge_change = std::max(now.edge_change, shift.norm());
+    if (!surface_.flat || body.gap.overlap_cuts_after(surface_.normals.front().dot(shift))) {
+      now.edge_change = std::max(now.edge_change, shift.norm());
+    }
     for (std::size_t j = 0; j < vertices.size(); ++j) {
       const int v = vertices[j];
       if (now.owner[v] != static_cast<int>(b) || answer.state[j] == NodeState::open) continue;
@@ -321,8 +362,9 @@ void PartSolver::follow_patches(const ContactAnswer& answer, Iterate& now) const
   Eigen::VectorXd own = answer.response;
   if (elastic_) {
     own.setZero();
+    const Eigen::Ref<const Eigen::MatrixXd> gel = gel_compliance();
     for (Eigen::Index j = 0; j < answer.z.size(); ++j) {
-      if (answer.z[j] != 0.0) own += answer.z[j] * block_.compliance().col(j);
+      if (answer.z[j] != 0.0) own += answer.z[j] * gel.col(j);
     }
     for (Eigen::Index j = 0; j < m; ++j) {
       own.segment<3>(3 * j) -= block_.axes(vertices[j]).transpose() * relaxation_.carried(vertices[j]);

@@ -38,13 +38,15 @@ struct PressSnapshot {
   /// 3 n, mm^3, where `known`: int phi u dA of the gel, and of the gel relative to the elastic body that touches it.
   Eigen::VectorXd weighted;
   Eigen::VectorXd relative;
-  std::vector<char> known;       ///< n
-  std::vector<NodeState> state;  ///< n
-  std::vector<int> owner;        ///< n, the body that touches; -1 where open
-  double penetration = 0.0;      ///< mm, the largest over all vertices
-  double lookup_error = 0.0;     ///< mm
-  double residual = 0.0;         ///< of the contact laws
-  RelaxationHistory history;     ///< of (traction; weighted displacement by the unrelaxed gel), 6 n; may be empty
+  std::vector<char> known;              ///< n
+  std::vector<NodeState> state;         ///< n
+  std::vector<int> owner;               ///< n, the body that touches; -1 where open
+  double penetration = 0.0;             ///< mm, the largest over all vertices
+  double lookup_error = 0.0;            ///< mm
+  double residual = 0.0;                ///< of the contact laws
+  Eigen::VectorXd share;                ///< n, of each hat: the part that bears (see cut_hats.h)
+  std::shared_ptr<const CutHats> cuts;  ///< by all bodies; null: all hats are whole
+  RelaxationHistory history;  ///< of (traction; weighted displacement by the unrelaxed gel), 6 n; may be empty
 
   /// Is any body in contact?
   bool touching() const;
@@ -84,13 +86,15 @@ struct PartEffort {
 class PartSolver {
  public:
   /// `lookup_mm`: how well the place where the gap is looked up follows the contact patch. `traction`: relative
-  /// residual of the contact laws. `relaxation`: the compliance is that of the instantaneous modulus.
-  PartSolver(const Compliance& gel, std::vector<PressBody> bodies, double lookup_mm, double traction,
+  /// residual of the contact laws. `outlines`: as in PressTolerance. `relaxation`: the compliance is that of the
+  /// instantaneous modulus.
+  PartSolver(const Compliance& gel, std::vector<PressBody> bodies, double lookup_mm, double traction, bool outlines,
              PronySeries relaxation);
   ~PartSolver();
 
   const ContactSurface& surface() const { return surface_; }
   const std::vector<PressBody>& bodies() const { return bodies_; }
+  bool outlines() const { return outlines_; }  ///< see PressTolerance
 
   /// The friction to solve with from now on, for each body.
   void set_friction(const std::vector<double>& friction);
@@ -112,6 +116,8 @@ class PartSolver {
  private:
   struct Iterate;
   struct Body;
+  struct CachedGap;
+  bool cuts_hold(const CachedGap& cached, const Body& body, double part) const;
   WeightedGap gap_of(std::size_t body, const Iterate& now, PartEffort& effort);
   void look_up(Iterate& now, const std::vector<PartTarget>& targets, PartEffort& effort);
   std::vector<int> candidates(const Iterate& now, bool z_forced) const;
@@ -128,8 +134,15 @@ class PartSolver {
                         const std::vector<double>& pressures) const;
   Eigen::Vector3d relative_at(const PressSnapshot& snapshot, int vertex) const;
   Eigen::Ref<const Eigen::MatrixXd> compliance() const {
-    return elastic_ ? Eigen::Ref<const Eigen::MatrixXd>(combined_) : block_.compliance();
+    return use_combined_ ? Eigen::Ref<const Eigen::MatrixXd>(combined_) : block_.compliance();
   }
+  /// Of the gel alone, with what cut hats change.
+  Eigen::Ref<const Eigen::MatrixXd> gel_compliance() const {
+    return any_cuts_ && elastic_ ? Eigen::Ref<const Eigen::MatrixXd>(cut_)
+           : elastic_            ? block_.compliance()
+                                 : compliance();
+  }
+  Eigen::Vector3d arm_of(const Iterate& now, int vertex) const;
   void refuse_too_deep(double deepest) const;
 
   const Compliance& gel_;
@@ -139,16 +152,23 @@ class PartSolver {
   bool friction_ = false;  ///< any body has some
   double lookup_mm_;
   double traction_;
+  bool outlines_;
   double size_ = 1.0;  ///< mm, of a mean triangle
   PartRelaxation relaxation_;
   std::vector<double> mu_;
   ContactSurface surface_;
   ContactBlock block_;
-  Eigen::MatrixXd combined_;         ///< the block's compliance with the elastic bodies' added
+  Eigen::MatrixXd combined_;         ///< the block's compliance with the elastic bodies' and what cut hats change
   Eigen::MatrixXd combined_normal_;  ///< its normal rows and columns
+  bool use_combined_ = false;
+  Eigen::MatrixXd cut_;    ///< beside elastic bodies: the block's compliance with what cut hats change
+  bool any_cuts_ = false;  ///< in `combined_`
+  std::vector<std::shared_ptr<const CutHats>> combined_cuts_;  ///< per body: those in `combined_`
+  std::shared_ptr<const CutHats> joint_cuts_;                  ///< of all bodies, by the vertices that each is over
+  std::vector<int> combined_vertices_;                         ///< and the block's vertices
+  std::vector<int> combined_owner_;                            ///< and theirs
   ContactMemory memory_;
   std::vector<std::array<bool, 6>> remembered_axes_;
-  struct CachedGap;
   std::vector<CachedGap> cached_gaps_;  ///< per body: the last gap and where it was looked up
   std::string why_not_;
 };

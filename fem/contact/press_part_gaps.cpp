@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/error.h"
 #include "fem/contact/press_part_iterate.h"
@@ -14,6 +15,10 @@ constexpr std::size_t kFirstCandidates = 12;
 // The gel bulges beside a contact by less than this part of the depth; vertices further from a body than that, and a
 // little, aren't looked at. It is checked at the answer, and widened where it doesn't hold.
 constexpr double kBulge = 0.5;
+constexpr double kCutsHold = 0.005;  // of a triangle, or of the depth: a body moved by less cuts hats as it did
+constexpr double kCutsHoldLate = 0.5;
+constexpr int kCutUpdates = 12;         // after these the latter holds: what goes to and fro comes to rest
+constexpr double kOwnersAlike = 0.05;   // of a triangle: bodies whose gaps at a vertex differ by less are equally near
 constexpr double kSharpestCurve = 0.3;  // of a triangle: radius down to which a gap counts as smooth
 constexpr double kSlopeStep = 3e-4;     // of a triangle
 
@@ -37,6 +42,22 @@ Eigen::Vector3d PartSolver::relative_at(const PressSnapshot& snapshot, int verte
                                 : weighted_at(snapshot, vertex);
 }
 
+/// Whether the body has moved by no more than this part of a triangle, and of the depth where the overlap cuts, since
+/// the hats were cut.
+bool PartSolver::cuts_hold(const CachedGap& cached, const Body& body, double part) const {
+  for (const int v : cached.gap.cuts->vertices) {
+    const Eigen::Vector3d& x = surface_.vertices[v];
+    const Eigen::Vector3d& normal = surface_.normals[v];
+    // Where what is now over the point was then.
+    const Eigen::Vector3d then = cached.cut_pose * (body.pose.inverse() * (x + body.lookup.displacement(x)));
+    const Eigen::Vector3d moved = then - x - cached.cut_lookup.displacement(x);
+    const double away = normal.dot(moved);
+    if ((moved - away * normal).norm() > part * size_) return false;
+    if (cached.gap.cuts->by_overlap && std::abs(away) > part * cached.cut_depth) return false;
+  }
+  return true;
+}
+
 /// The gap of one body at its pose, looked up or carried over from a place nearby.
 WeightedGap PartSolver::gap_of(std::size_t b, const Iterate& now, PartEffort& effort) {
   const Body& body = now.bodies[b];
@@ -45,7 +66,21 @@ WeightedGap PartSolver::gap_of(std::size_t b, const Iterate& now, PartEffort& ef
   // Some more than what is asked for, so that it serves the next, deeper place, too.
   const GapReach reach = surface_.flat ? GapReach{now.reach + kLeastReach * gel_.thickness, 1.5 * kBulge} : GapReach{};
   const auto evaluate = [&] {
-    cached.gap = weighted_gap(surface_, shape, body.pose, body.lookup, reach);
+    const double hold = now.updates < kCutUpdates ? kCutsHold : kCutsHoldLate;
+    const bool kept = now.updates > 0 && cached.gap.cuts && cuts_hold(cached, body, hold);
+    std::vector<std::array<double, 2>> bent = std::move(cached.gap.bent);
+    const double away = surface_.normals.front().dot(body.pose.translation - cached.pose.translation);
+    cached.gap =
+        weighted_gap(surface_, shape, body.pose, body.lookup, reach, outlines_, kept ? cached.gap.cuts : nullptr);
+    if (kept) {  // not asked for again
+      cached.gap.bent = std::move(bent);
+      for (auto& range : cached.gap.bent) range = {range[0] + away, range[1] + away};
+    }
+    if (!kept) {
+      cached.cut_pose = body.pose;
+      cached.cut_lookup = body.lookup;
+      cached.cut_depth = std::max(0.0, -cached.gap.deepest);
+    }
     cached.pose = body.pose;
     cached.lookup = body.lookup;
     cached.valid = surface_.flat && surface_.normals.front() == Eigen::Vector3d::UnitZ();
@@ -55,6 +90,7 @@ WeightedGap PartSolver::gap_of(std::size_t b, const Iterate& now, PartEffort& ef
   };
   if (!cached.valid || cached.pose.rotation != body.pose.rotation) return evaluate();
   const Eigen::Vector3d motion = body.pose.translation - cached.pose.translation;
+  if (motion.z() != 0.0 && cached.gap.overlap_cuts_after(motion.z())) return evaluate();
   const auto n = static_cast<Eigen::Index>(gel_.vertices.size());
   Eigen::MatrixX2d slid = Eigen::MatrixX2d::Zero(n, 2);  // of the gel under the body
   for (Eigen::Index v = 0; v < n; ++v) {
@@ -72,7 +108,8 @@ WeightedGap PartSolver::gap_of(std::size_t b, const Iterate& now, PartEffort& ef
       for (int axis = 0; axis < 2; ++axis) {
         RigidTransform beside = cached.pose;
         beside.translation[axis] -= step;
-        const WeightedGap there = weighted_gap(surface_, shape, beside, cached.lookup, reach);
+        const WeightedGap there =
+            weighted_gap(surface_, shape, beside, cached.lookup, reach, outlines_, cached.gap.cuts);
         ++effort.geometry_updates;
         for (Eigen::Index v = 0; v < n; ++v) {
           if (!std::isfinite(gap.weighted[v]) || !std::isfinite(there.weighted[v])) continue;
@@ -97,6 +134,7 @@ WeightedGap PartSolver::gap_of(std::size_t b, const Iterate& now, PartEffort& ef
 /// The gaps of all bodies, and which body each vertex faces.
 void PartSolver::look_up(Iterate& now, const std::vector<PartTarget>& targets, PartEffort& effort) {
   const int n = static_cast<int>(gel_.vertices.size());
+  const std::vector<int> before = std::move(now.owner);
   now.owner.assign(n, -1);
   now.deepest = std::numeric_limits<double>::infinity();
   for (std::size_t b = 0; b < now.bodies.size(); ++b) {
@@ -111,6 +149,12 @@ void PartSolver::look_up(Iterate& now, const std::vector<PartTarget>& targets, P
     for (int v = 0; v < n; ++v) {
       if (body.gap.weighted[v] < now.gap(v)) now.owner[v] = static_cast<int>(b);
     }
+  }
+  // Between two bodies a vertex may go to and fro; it comes to rest at the one that it had.
+  for (int v = 0; v < n && now.updates >= kCutUpdates && now.bodies.size() > 1; ++v) {
+    if (now.owner[v] < 0 || before[v] < 0) continue;
+    const double had = now.bodies[before[v]].gap.weighted[v];
+    if (had - now.gap(v) < kOwnersAlike * size_ * surface_.weight[v]) now.owner[v] = before[v];
   }
 }
 

@@ -18,6 +18,9 @@ struct PartSolver::CachedGap {
   RigidTransform pose;
   PatchMotion lookup;
   WeightedGap gap;
+  RigidTransform cut_pose;  ///< where gap.cuts were made
+  PatchMotion cut_lookup;
+  double cut_depth = 0.0;  ///< mm
   bool has_slopes = false;
   Eigen::MatrixX2d plain_slope;  ///< n x 2: change of gap.plain per mm that the gel goes along x, y
   Eigen::MatrixX2d edge_slope;

@@ -36,6 +36,7 @@ PressSnapshot untouched(std::vector<BodySnapshot> bodies, int n) {
     body.touching = body.overlapping = false;
   }
   s.traction = Eigen::VectorXd::Zero(3 * n);
+  s.share = Eigen::VectorXd::Ones(n);
   s.weighted = Eigen::VectorXd::Zero(3 * n);
   s.relative = Eigen::VectorXd::Zero(3 * n);
   s.known.assign(n, 1);
@@ -57,6 +58,7 @@ std::optional<PressSnapshot> PartSolver::accept(const ContactAnswer& answer, con
   }
   PressSnapshot next = untouched(std::move(bodies), n);
   next.known.assign(n, 0);
+  next.cuts = joint_cuts_;
   for (std::size_t b = 0; b < now.bodies.size(); ++b) {
     next.bodies[b].overlapping = now.bodies[b].gap.deepest < 0.0;
     refuse_too_deep(now.bodies[b].gap.deepest);
@@ -80,11 +82,11 @@ std::optional<PressSnapshot> PartSolver::accept(const ContactAnswer& answer, con
     next.traction.segment<3>(3 * v) = traction;
     body.force -= surface_.weight[v] * traction;
     // int phi (x + u) dA, exactly.
-    Eigen::Vector3d arm = now.weighted.segment<3>(3 * j);
-    for (Eigen::SparseMatrix<double>::InnerIterator it(gel_.mass, v); it; ++it) {
-      arm += it.value() * gel_.vertices[static_cast<std::size_t>(it.row())];
-    }
+    const Eigen::Vector3d arm = arm_of(now, v) + now.weighted.segment<3>(3 * j);
     body.moment -= arm.cross(traction);
+    const auto& cuts = now.bodies[now.owner[v]].gap.cuts;
+    const Eigen::Index cut = cuts ? place_in(*cuts, v) : -1;
+    if (cut >= 0) next.share[v] = cuts->share[cut];
     body.touching = true;
   }
   remember(from, next);
@@ -131,6 +133,20 @@ void PartSolver::remember(const PressSnapshot& from, PressSnapshot& next) const 
   for (Eigen::Index v = 0; v < n; ++v) {
     if (next.state[static_cast<std::size_t>(v)] == NodeState::open) continue;
     elastic.noalias() += gel_.surface.view().middleCols<3>(3 * v) * next.traction.segment<3>(3 * v);
+  }
+  // What bears of a cut hat gives way otherwise than the whole of it.
+  const Eigen::Ref<const Eigen::MatrixXd> cut = gel_compliance();
+  for (std::size_t k = 0; next.touching() && any_cuts_ && k < block_.vertices().size(); ++k) {
+    const int v = block_.vertices()[k];
+    Eigen::Vector3d own = Eigen::Vector3d::Zero();
+    const auto rows = cut.middleCols<3>(3 * static_cast<Eigen::Index>(k));  // symmetric
+    for (std::size_t l = 0; l < block_.vertices().size(); ++l) {
+      const int u = block_.vertices()[l];
+      if (next.state[u] == NodeState::open) continue;
+      own += rows.middleRows<3>(3 * static_cast<Eigen::Index>(l)).transpose() *
+             (block_.axes(u).transpose() * next.traction.segment<3>(3 * u));
+    }
+    elastic.segment<3>(3 * v) = block_.axes(v) * own;
   }
   next.history = relaxation_.after(from.history, next.traction, elastic);
   next.weighted = next.history.elastic.tail(3 * n);

@@ -11,20 +11,26 @@ namespace {
 
 constexpr int kResolvedVertices = 13;
 
+/// The traction that displaces the gel. One that relaxes is displaced as by its pseudo-elastic traction, also where
+/// nothing touches it any more.
+Eigen::VectorXd moving_traction(const PressSnapshot& snapshot) {
+  return snapshot.history.empty() ? snapshot.traction
+                                  : Eigen::VectorXd(snapshot.history.elastic.head(snapshot.traction.size()));
+}
+
 /// Displacements of the whole surface, and the strain measures.
 void add_fields(const Compliance& gel, const ContactSurface& surface, const SurfaceMassFactor& mass,
                 const PressSnapshot& snapshot, PressState& s) {
   const int n = static_cast<int>(gel.vertices.size());
   s.surface_displacement = Eigen::MatrixX3d::Zero(n, 3);
   if (!snapshot.touching() && snapshot.history.empty()) return;
-  Eigen::VectorXd response = snapshot.weighted;
-  if (snapshot.history.empty()) {
-    const auto compliance = gel.surface.view();
-    response.setZero();
-    for (int v = 0; v < n; ++v) {
-      if (snapshot.state[v] == NodeState::open) continue;
-      response.noalias() += compliance.middleCols<3>(3 * v) * snapshot.traction.segment<3>(3 * v);
-    }
+  // `snapshot.weighted` is what cut hats see of it.
+  const Eigen::VectorXd moving = moving_traction(snapshot);
+  const auto compliance = gel.surface.view();
+  Eigen::VectorXd response = Eigen::VectorXd::Zero(3 * n);
+  for (int v = 0; v < n; ++v) {
+    const Eigen::Vector3d t = moving.segment<3>(3 * v);
+    if (!t.isZero(0.0)) response.noalias() += compliance.middleCols<3>(3 * v) * t;
   }
   add_displacement(gel, surface, mass, response, s);
 }
@@ -61,6 +67,8 @@ PressState report(const Compliance& gel, const PartSolver& solver, const Surface
   s.wrench = s.bodies.front().wrench;
   s.node_state = snapshot.state;
   s.node_owner = snapshot.owner;
+  if (solver.outlines()) s.bearing_share = snapshot.share;
+  s.cuts = snapshot.cuts;
   s.traction.resize(n, 3);
   for (int v = 0; v < n; ++v) s.traction.row(v) = snapshot.traction.segment<3>(3 * v);
   s.largest_penetration = snapshot.penetration;
@@ -69,8 +77,7 @@ PressState report(const Compliance& gel, const PartSolver& solver, const Surface
 
   const auto bead_compliance = gel.beads.view();
   Eigen::VectorXd beads = Eigen::VectorXd::Zero(gel.beads.rows());
-  // A gel that relaxes is displaced as by its pseudo-elastic traction, also where nothing touches it any more.
-  const Eigen::VectorXd& moving = snapshot.history.empty() ? snapshot.traction : snapshot.history.elastic;
+  const Eigen::VectorXd moving = moving_traction(snapshot);
   for (int v = 0; v < n && beads.size() > 0; ++v) {
     const Eigen::Vector3d t = moving.segment<3>(3 * v);
     if (!t.isZero(0.0)) beads += bead_compliance.middleCols<3>(3 * v) * t;
@@ -82,9 +89,10 @@ PressState report(const Compliance& gel, const PartSolver& solver, const Surface
     const double pressure = -surface.normals[v].dot(t);
     largest_pressure = std::max(largest_pressure, pressure);
     s.largest_tension = std::max(s.largest_tension, -pressure);
-    s.contact_area += surface.weight[v];
+    const double area = surface.weight[v] * snapshot.share[v];
+    s.contact_area += area;
     ++s.contact_vertices;
-    s.bodies[snapshot.owner[v]].contact_area += surface.weight[v];
+    s.bodies[snapshot.owner[v]].contact_area += area;
     ++s.bodies[snapshot.owner[v]].contact_vertices;
   }
   for (int v = 0; v < n && largest_pressure > 0.0; ++v) {

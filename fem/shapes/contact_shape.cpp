@@ -294,6 +294,10 @@ bool is_hit(const RoundedCylinder& shape, const Eigen::Vector3d& p, const Eigen:
   return false;
 }
 
+bool is_hit(const MeshShape& shape, const Eigen::Vector3d& p, const Eigen::Vector3d& d) {
+  return shape.is_hit(p, d);
+}
+
 bool is_hit(const ReliefShape& shape, const Eigen::Vector3d& p, const Eigen::Vector3d& d) {
   return std::visit([&](const auto& base) { return is_hit(base, p, d); }, shape.base);
 }

@@ -76,6 +76,7 @@ std::optional<double> first_entry(const ContactShape& shape, const Eigen::Vector
 
 /// Whether the line hits: whether first_entry() has an answer, for less where that takes a search.
 bool is_hit(const RoundedCylinder& shape, const Eigen::Vector3d& point, const Eigen::Vector3d& direction);
+bool is_hit(const MeshShape& shape, const Eigen::Vector3d& point, const Eigen::Vector3d& direction);
 bool is_hit(const ReliefShape& shape, const Eigen::Vector3d& point, const Eigen::Vector3d& direction);
 template <typename Shape>
 bool is_hit(const Shape& shape, const Eigen::Vector3d& point, const Eigen::Vector3d& direction) {

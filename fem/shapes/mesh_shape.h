@@ -20,6 +20,10 @@ class MeshShape {
   /// Signed distance from `point` along the unit vector `direction` to the first crossing of the whole line (from minus
   /// infinity) with the surface; nothing if the line misses (see TriangleTree::first_crossing).
   std::optional<double> first_entry(const Eigen::Vector3d& point, const Eigen::Vector3d& direction) const;
+  /// Whether the line hits.
+  bool is_hit(const Eigen::Vector3d& point, const Eigen::Vector3d& direction) const {
+    return tree_.is_crossed(point, direction);
+  }
 
  private:
   TriangleMesh mesh_;

@@ -6,6 +6,8 @@
 
 #include "core/error.h"
 #include "core/units.h"
+#include "fem/contact/contact_block.h"
+#include "fem/contact/cut_compliance.h"
 #include "fem/elements/dense_factor.h"
 #include "fem/elements/surface_coupling.h"
 #include "fem/vibration/eigenmodes.h"
@@ -31,6 +33,27 @@ Eigen::MatrixX3cd by_rows(const Eigen::VectorXcd& stacked) {
   Eigen::MatrixX3cd rows(stacked.size() / 3, 3);
   for (Eigen::Index i = 0; i < rows.rows(); ++i) rows.row(i) = stacked.segment<3>(3 * i).transpose();
   return rows;
+}
+
+/// What cut hats change in the compliance among these vertices, in the gel's axes. It is near them alone, where inertia
+/// has no say.
+Eigen::MatrixXd changed_by(const CutHats& cuts, const Compliance& gel, const std::vector<int>& vertices) {
+  const ContactSurface surface(gel);
+  ContactBlock block(gel, surface);
+  block.hold(vertices);
+  Eigen::MatrixXd own = block.compliance();
+  add_cut_compliance(own, cuts, surface, gel, vertices, block.axes(), false);
+  own -= block.compliance();
+  Eigen::MatrixXd change(own.rows(), own.cols());
+  for (std::size_t i = 0; i < vertices.size(); ++i) {
+    for (std::size_t j = 0; j < vertices.size(); ++j) {
+      const auto row = static_cast<Eigen::Index>(3 * i);
+      const auto column = static_cast<Eigen::Index>(3 * j);
+      change.block<3, 3>(row, column) =
+          block.axes(vertices[i]) * own.block<3, 3>(row, column) * block.axes(vertices[j]).transpose();
+    }
+  }
+  return change;
 }
 
 /// A real matrix times a complex vector.
@@ -69,7 +92,7 @@ double layer_shear_frequency(const ElasticMaterial& material, double density, do
 }
 
 struct StuckPatch::Parts {
-  Parts(const Compliance& compliance, const GelVibration& modes, const std::vector<int>& vertices)
+  Parts(const Compliance& compliance, const GelVibration& modes, const std::vector<int>& vertices, const CutHats* cuts)
       : gel(compliance), vibration(modes) {
     if (vertices.empty()) fail("a body that shakes the gel must stick to at least one vertex of its surface");
     const Eigen::VectorXd weight = gel.mass * Eigen::VectorXd::Ones(gel.mass.rows());
@@ -83,7 +106,8 @@ struct StuckPatch::Parts {
         rigid(3 * j + a, a) = weight[v];
       }
     }
-    const Eigen::MatrixXd block = gel.surface.view()(rows, rows);
+    Eigen::MatrixXd block = gel.surface.view()(rows, rows);
+    if (cuts != nullptr) block += changed_by(*cuts, gel, vertices);
     DenseCholesky factor;
     if (!factor.compute(block)) fail("the gel's surface compliance isn't positive definite");
     modal = vibration.surface(rows, Eigen::all);
@@ -158,8 +182,9 @@ SteadyVibration StuckPatch::Parts::answer(const Eigen::Vector3d& amplitude, doub
   return steady;
 }
 
-StuckPatch::StuckPatch(const Compliance& gel, const GelVibration& vibration, std::vector<int> vertices)
-    : parts_(std::make_unique<const Parts>(gel, vibration, vertices)) {}
+StuckPatch::StuckPatch(const Compliance& gel, const GelVibration& vibration, std::vector<int> vertices,
+                       const CutHats* cuts)
+    : parts_(std::make_unique<const Parts>(gel, vibration, vertices, cuts)) {}
 StuckPatch::~StuckPatch() = default;
 StuckPatch::StuckPatch(StuckPatch&&) noexcept = default;
 StuckPatch& StuckPatch::operator=(StuckPatch&&) noexcept = default;

@@ -16,6 +16,7 @@
 #include <string>
 #include <vector>
 
+#include "fem/contact/cut_hats.h"
 #include "fem/contact/relaxation.h"
 #include "fem/elements/compliance.h"
 
@@ -59,8 +60,10 @@ struct SteadyVibration {
 /// A rigid body that sticks to the given surface vertices and shakes without turning.
 class StuckPatch {
  public:
-  /// The gel and its vibration must outlive this. @throws Error if there is no vertex
-  StuckPatch(const Compliance& gel, const GelVibration& vibration, std::vector<int> vertices);
+  /// The gel and its vibration must outlive this. `vertices` rise. `cuts`: what the body's outline makes of their hats
+  /// (PressState::cuts); null: they are whole. @throws Error if there is no vertex
+  StuckPatch(const Compliance& gel, const GelVibration& vibration, std::vector<int> vertices,
+             const CutHats* cuts = nullptr);
   ~StuckPatch();
   StuckPatch(StuckPatch&&) noexcept;
   StuckPatch& operator=(StuckPatch&&) noexcept;

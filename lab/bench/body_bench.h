@@ -9,8 +9,8 @@
 // reference's edges the reference says little.
 //
 // The reference has one advantage more. Where a pattern stands out from its plate so far that the gel can't reach the
-// plate, the reference presses it under a plate that is 2 mm farther away: the same problem, but today's contact sees a
-// plate that is near as if it made the pattern's rim less steep, on the reference's mesh too.
+// plate, the reference presses it under a plate that is 2 mm farther away: the same problem, without what a near plate
+// might do to the reference's own contact.
 
 #include <filesystem>
 #include <optional>

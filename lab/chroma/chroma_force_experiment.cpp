@@ -326,7 +326,9 @@ std::vector<LargeStrainRow> large_strain_ladder(const ForceSetup& setup, const f
   const TruthReader truth(*setup.truth_gel, setup.markers);
   sensors::TractionInversion inversion(setup.compliance, setup.inversion);
   fem::FinitePress large(finite, contact_shape(probe), probe.friction);
-  fem::Press linear(*setup.truth_gel, contact_shape(probe), probe.friction);
+  fem::PressTolerance alike;
+  alike.outlines = false;  // as at finite strain: they differ by what the strain makes of the forces alone
+  fem::Press linear(*setup.truth_gel, contact_shape(probe), probe.friction, alike);
   std::vector<LargeStrainRow> rows;
   for (std::size_t k = 0; k < depths_mm.size(); ++k) {
     probe.depth_mm = depths_mm[k];

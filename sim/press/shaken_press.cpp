@@ -24,6 +24,7 @@ struct ShakenPress::Parts {
 
   // The answer to a vibration with amplitude 1 on the last patch.
   std::vector<int> vertices;
+  std::shared_ptr<const fem::CutHats> cuts;
   std::optional<fem::StuckPatch> patch;
 
   fem::SteadyVibration answer(const fem::PressState& mean, const VibrationSpec& shaking);
@@ -36,9 +37,10 @@ fem::SteadyVibration ShakenPress::Parts::answer(const fem::PressState& mean, con
   for (std::size_t v = 0; v < mean.node_state.size(); ++v) {
     if (mean.node_state[v] != fem::NodeState::open) touching.push_back(static_cast<int>(v));
   }
-  if (!patch || touching != vertices) {
+  if (!patch || touching != vertices || mean.cuts != cuts) {
     vertices = touching;
-    patch.emplace(gel, vibration, touching);
+    cuts = mean.cuts;
+    patch.emplace(gel, vibration, touching, cuts.get());
   }
   Eigen::Vector3d amplitude = Eigen::Vector3d::Zero();
   amplitude[static_cast<int>(shaking.axis)] = shaking.amplitude_mm;

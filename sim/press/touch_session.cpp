@@ -48,7 +48,9 @@ TouchReading reading_of(const fem::Compliance& gel, const Eigen::VectorXd& weigh
     const double load = weight[row] * state.traction.row(row).norm();
     pressed += load;
     moment += load * gel.vertices[v];
-    if (state.node_state[v] == fem::NodeState::slip) slipping += weight[row];
+    if (state.node_state[v] == fem::NodeState::slip) {
+      slipping += weight[row] * (state.bearing_share.size() > 0 ? state.bearing_share[row] : 1.0);
+    }
   }
   if (pressed > 0.0) next.centre_mm = moment / pressed;
   next.slipping_share = std::min(1.0, slipping / state.contact_area);

@@ -199,9 +199,12 @@ TEST_F(DrawnDevices, MechanicsAloneNeedNeitherPlateNorCamera) {
 }
 
 TEST_F(DrawnDevices, ElasticObjectsArePressed) {
+  // Edges that the contact is wide beside: on a single vertex one force makes one depth, whatever presses.
+  std::string device = "name: pad" + gel();
+  device.replace(device.find("fine_mm: 0.8"), 12, "fine_mm: 0.4");
   const auto of = [&](const char* name, const std::string& more) {
     folder_.write(name, "name: ball\nshape: {type: sphere, radius_mm: 1.5}\n" + more);
-    return job("name: pad" + gel(), "", name);
+    return job(device, "", name);
   };
   const auto depth = [&](const std::filesystem::path& job, const std::string& out) {
     generate(job, out);
@@ -209,9 +212,11 @@ TEST_F(DrawnDevices, ElasticObjectsArePressed) {
   };
   const double rigid = depth(of("rigid.yaml", ""), "rigid");
   const double soft =
-      depth(of("soft.yaml", "elastic: {youngs_modulus_MPa: 0.2, poisson_ratio: 0.45, mesh_mm: 0.6}\n"), "soft");
-  EXPECT_LT(soft, 0.95 * rigid) << "a soft ball spreads the same force over more of the gel";
-  EXPECT_GT(soft, 0.2 * rigid);
+      depth(of("soft.yaml", "elastic: {youngs_modulus_MPa: 0.2, poisson_ratio: 0.45, mesh_mm: 0.4}\n"), "soft");
+  // A soft ball spreads the same force over more of the gel: 0.79 of the depth between half-spaces [Hertz1882], 0.76
+  // here.
+  EXPECT_LT(soft, 0.85 * rigid);
+  EXPECT_GT(soft, 0.65 * rigid);
 }
 
 TEST_F(DrawnDevices, WhatADeviceCannotGiveIsRefusedByName) {

@@ -128,9 +128,9 @@ TEST(ElasticBody, ItsNormalPartIsThatOfTheWhole) {
   pose.translation = {0.1, -0.2, 0.9};
   const auto m = static_cast<Eigen::Index>(vertices.size());
   Eigen::MatrixXd whole = Eigen::MatrixXd::Zero(3 * m, 3 * m);
-  body.add_to(whole, 1.5, surface, vertices, mine, axes, pose, {});
+  body.add_to(whole, 1.5, surface, vertices, mine, axes, pose, {}, nullptr);
   Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(m, m);
-  body.add_normal_to(normal, 1.5, surface, vertices, mine, Eigen::Vector3d::UnitZ(), pose, {});
+  body.add_normal_to(normal, 1.5, surface, vertices, mine, Eigen::Vector3d::UnitZ(), pose, {}, nullptr);
   const auto normals = Eigen::seqN(Eigen::fix<0>, m, Eigen::fix<3>);
   const Eigen::MatrixXd expected = whole(normals, normals);
   EXPECT_GT(expected.norm(), 0.0);

@@ -142,6 +142,7 @@ TEST(PressError, PatchesApartAreJudgedEachByItself) {
   const PressState right = punched(1.5, 0.1);
   PressState both = left;
   both.traction += right.traction;
+  both.bearing_share = left.bearing_share.cwiseMin(right.bearing_share);
   both.surface_displacement += right.surface_displacement;
   both.bead_displacement += right.bead_displacement;
   for (std::size_t v = 0; v < both.node_state.size(); ++v) {

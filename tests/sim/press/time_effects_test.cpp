@@ -147,7 +147,7 @@ TEST(TimeEffects, AFastVibrationIsTheGelsSteadyAnswer) {
     if (truths[2].press.node_state[v] != fem::NodeState::open) touching.push_back(static_cast<int>(v));
   }
   const double omega = 2.0 * kPi * 350.0;
-  const fem::StuckPatch patch(*gel, *vibration, touching);
+  const fem::StuckPatch patch(*gel, *vibration, touching, truths[2].press.cuts.get());
   const auto wanted = patch.answer({0.004, 0, 0}, omega, prony_series(scene.device.gel));
   const auto force = harmonic(truths, 20, 350.0, [](const fem::PressState& s) { return s.wrench[0]; });
   EXPECT_LT(std::abs(force - wanted.force.x()), 1e-3 * std::abs(wanted.force.x()));

@@ -68,8 +68,11 @@ TEST(PlayMotion, ForcesFollowTheKeys) {
 }
 
 TEST(PlayMotion, FiniteStrainChangesALargePressAndHardlyASmallOne) {
-  const std::string keys = "  - {frames: 1, z: {position_mm: -0.02}}\n  - {frames: 1, z: {position_mm: -0.6}}\n";
+  // Under a plate wider than the pad: at finite strain outlines don't cut hats, which would be most of a difference.
+  const std::string keys = "  - {frames: 1, z: {position_mm: 0.98}}\n  - {frames: 1, z: {position_mm: 0.4}}\n";
   SceneSpec scene = small_scene(keys);
+  scene.object.shape = parse_yaml<ShapeSpec>("{type: box, size_mm: [30, 30, 2]}", "plate.yaml");
+  scene.motion.start_mm = {0, 0, 1.5};
   scene.device.mesh.fine_mm = 1.6;
   scene.device.mesh.coarse_mm = 3.0;
   const auto gel = set_up_gel(scene.device, cache().path());
@@ -289,7 +292,7 @@ TEST(VirtualCamera, BehindAWideHolePixelsShareTheirPaths) {
 // Of a moving frame each moment shares its paths.
 TEST(VirtualCamera, MotionBlurBehindAWideHole) {
   Played p =
-      play_behind_a_wide_hole("  - {frames: 2, z: {position_mm: -0.3}}\n  - {frames: 2, x: {position_mm: 0.3}}\n");
+      play_behind_a_wide_hole("  - {frames: 2, z: {position_mm: -0.3}}\n  - {frames: 2, x: {position_mm: 0.6}}\n");
   p.scene.effects.motion_blur = Switch::on;
   p.plan = make_plan(p.scene);
   const std::vector<Truth> truths = play_motion(p.scene, p.plan, *p.gel);
