@@ -192,12 +192,22 @@ WeightedGap weighted_gap(const ContactSurface& surface, const ContactShape& shap
     result.plain[i] *= surface.weight[i] / covered[i];
     result.weighted[i] = result.plain[i] + result.edge[i] * depth;
   }
+  const auto bears = [&](std::size_t k) {
+    const auto at = static_cast<Eigen::Index>(k);
+    return std::isfinite(cut_gaps[at]) && result.cuts->share[at] >= kLeastCutShare;
+  };
+  if (result.cuts) {
+    // A tip that only just touches covers nothing: its hats aren't cut, or a press by force would find nothing to
+    // press on.
+    bool any = false;
+    for (std::size_t k = 0; k < result.cuts->vertices.size(); ++k) any = any || bears(k);
+    if (!any) result.cuts = nullptr;
+  }
   for (std::size_t k = 0; result.cuts && k < result.cuts->vertices.size(); ++k) {
     const int i = result.cuts->vertices[k];
-    const double share = result.cuts->share[static_cast<Eigen::Index>(k)];
     const double gap = cut_gaps[static_cast<Eigen::Index>(k)];
     if (skipped[i]) continue;
-    const bool far = !std::isfinite(gap) || share < kLeastCutShare;
+    const bool far = !bears(k);
     result.plain[i] = result.weighted[i] = far ? kInfinity : surface.weight[i] * gap;
     result.edge[i] = 0.0;
     if (far) result.lowest[i] = kInfinity;

@@ -46,7 +46,7 @@ Eigen::Vector3d PartSolver::relative_at(const PressSnapshot& snapshot, int verte
 }
 
 /// Whether the body has moved by no more than this part of a triangle, and of the depth where the overlap cuts, since
-/// the hats were cut.
+/// the hats were cut. Where it doesn't, half the depth is allowed.
 bool PartSolver::cuts_hold(const CachedGap& cached, const Body& body, double part) const {
   for (const int v : cached.gap.cuts->vertices) {
     const Eigen::Vector3d& x = surface_.vertices[v];
@@ -56,7 +56,9 @@ bool PartSolver::cuts_hold(const CachedGap& cached, const Body& body, double par
     const Eigen::Vector3d moved = then - x - cached.cut_lookup.displacement(x);
     const double away = normal.dot(moved);
     if ((moved - away * normal).norm() > part * size_) return false;
-    if (cached.gap.cuts->by_overlap && std::abs(away) > part * cached.cut_depth) return false;
+    // Cut where the body hardly touched, hats don't know yet what the overlap will cut.
+    const double most = cached.gap.cuts->by_overlap ? part * cached.cut_depth : part * size_ + 0.5 * cached.cut_depth;
+    if (std::abs(away) > most) return false;
   }
   return true;
 }

@@ -109,10 +109,12 @@ class TriangleGap {
   static constexpr int kStepBisections = 8;
   static constexpr double kStepLeft = 0.6;  // of a difference, left where the interval is so much smaller: a step
 
-  /// Nothing, too, on the body's side where hats are cut: on a curved gel a wall is seen as a steep rise.
+  /// Nothing, too, on the body's side where hats are cut: on a curved gel a wall is seen as a steep rise. On a flat
+  /// one, where the silhouette is known, lines miss a wall, and what is steep is the flank of a needle.
   std::optional<double> at(const Eigen::Vector3d& b) const {
     const auto found = entry(points_ * b, direction(b));
-    return collect_ && found && *found > lowest_wall_ && is_wall(b, *found) ? std::nullopt : found;
+    const bool may_be_wall = collect_ && !has_silhouette_ && found && *found > lowest_wall_;
+    return may_be_wall && is_wall(b, *found) ? std::nullopt : found;
   }
   bool is_wall(const Eigen::Vector3d& b, double value) const {
     const std::array<Eigen::Vector3d, 2> along = {Eigen::Vector3d(-1.0, 1.0, 0.0), Eigen::Vector3d(-1.0, 0.0, 1.0)};

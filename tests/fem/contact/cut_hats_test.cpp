@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "closed_forms/contact_closed_forms.h"
@@ -150,8 +151,9 @@ TEST(CutHats, TheStiffnessOfAFlatPunchIsTheSameAtAllLoads) {
     target.axis[2] = AxisControl::with_force(newton);
     stiffness.push_back(newton / -press.step(target).gel_from_object.translation.z());
   }
-  EXPECT_NEAR(stiffness[1], stiffness[0], 1e-6 * stiffness[0]);
-  EXPECT_NEAR(stiffness[2], stiffness[0], 1e-6 * stiffness[0]);
+  // The gel under the punch moves along itself with the load, by 0.00025 mm at 0.4 N, and the hats are cut there.
+  EXPECT_NEAR(stiffness[1], stiffness[0], 1e-4 * stiffness[0]);
+  EXPECT_NEAR(stiffness[2], stiffness[0], 1e-4 * stiffness[0]);
 }
 
 TEST(CutHats, AMovedBodyChangesItsForceWithoutJumps) {
@@ -240,6 +242,34 @@ TEST(CutHats, ANeedleNarrowerThanAnEdgeIsTouchedWhereverItStands) {
     const double force =
         force_at(Press(gel(), SphereShape{radius}, 0.0), target_at(place[0], place[1], radius - depth));
     EXPECT_NEAR(force, wanted, 0.25 * wanted) << place[0] << ' ' << place[1];
+  }
+}
+
+TEST(CutHats, SteepTipsArePressedByDepthAndByForceWhereverTheyStand) {
+  // A press by force begins where the body just touches: there a tip covers nothing, and hats that are cut by the
+  // cone's far base say nothing of what the tip will cut. Without friction, with friction, and some edges of 0.6 mm
+  // from the silhouette.
+  struct Row {
+    ConeShape cone;
+    double spread;  // of the forces at the places; measured when it was written: 0.081 and 0.043
+  };
+  for (const Row& row : {Row{{0.23, 2.0, 0.15}, 0.1}, Row{{0.9, 2.0, 0.0}, 0.06}}) {
+    for (const double friction : {0.0, 0.5}) {
+      double least = std::numeric_limits<double>::infinity();
+      double most = 0.0;
+      for (const auto& place : kPlaces) {
+        PressTarget target = target_at(place[0], place[1], -0.3);
+        const double newton = force_at(Press(gel(), row.cone, friction), target);
+        least = std::min(least, newton);
+        most = std::max(most, newton);
+        ASSERT_GT(newton, 0.0) << place[0] << ' ' << place[1];
+        target.axis[2] = AxisControl::with_force(newton);
+        Press press(gel(), row.cone, friction);
+        EXPECT_NEAR(press.step(target).gel_from_object.translation.z(), -0.3, 0.003)
+            << place[0] << ' ' << place[1] << ", mu " << friction;
+      }
+      EXPECT_LT(most - least, row.spread * least) << friction;
+    }
   }
 }
 
