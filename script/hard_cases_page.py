@@ -66,6 +66,22 @@ CASES = [
          "Gives no events in the dark, counts a step's events by its logarithm, and refuses impossible thresholds."),
     Case("An estimator given frames that are black, saturated, constant or of another size",
          "Reports it, keeps its last result, and goes on with the next good frame."),
+    # 38 to 40
+    Case("Excitation at the gel's resonance without damping",
+         "Grows beside it as an oscillator in closed form; at it, where there is no steady answer, refuses it by name: never "
+         "NaN, nor an amplitude that rounding made."),
+    Case("Relaxation times 10^6 apart, in steps far longer than the shortest",
+         "Gives the closed form's relaxation and creep, in steps of any length."),
+    Case("10^4 cycles of stick and slip", "Gives the force of the tenth cycle in the last, and keeps the laws of contact in each."),
+    # 43 to 46
+    Case("Fits whose rows repeat: a Gaussian process with duplicate rows, one class, one kind of row, too low a rank",
+         "Gives the regularised or least-norm answer, or refuses and names what is missing."),
+    Case("Time stamps that are equal or go backward",
+         "Refuses them by name with its state kept, or says what they mean: no division by zero, no garbage."),
+    Case("Lamps that flicker with the mains before event pixels",
+         "Gives the events of the swing's logarithm, and no force that is wrong because of them without saying so."),
+    Case("Light at the critical angle, exactly and last digits beside it",
+         "Is finite and conserves energy, continuous from both sides, for rays, lamps, rough faces and light guides."),
 ]
 
 STYLE = """
