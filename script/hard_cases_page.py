@@ -66,6 +66,25 @@ CASES = [
          "Gives no events in the dark, counts a step's events by its logarithm, and refuses impossible thresholds."),
     Case("An estimator given frames that are black, saturated, constant or of another size",
          "Reports it, keeps its last result, and goes on with the next good frame."),
+    Case("A thin layer (a tenth of the contact's radius) with Poisson's ratio from 0.45 to 0.5",
+         "Meets the thin layer's theory from the compressible to the incompressible end; elements don't lock and pressure doesn't oscillate; a layer "
+         "that is too thin for a mesh is refused."),
+    Case("Stick-slip and reversal at finite strain",
+         "Converges as the steps are halved, keeps the friction cone in each, and only dissipates."),
+    Case("A sharp flat punch at finite strain, to a fifth of the thickness",
+         "Tends to the small-strain answer at small depth, stiffens as it goes deeper, and converges with the mesh."),
+    Case("A stiff skin on a soft gel, shortened until it wrinkles",
+         "Answers, and says from which strain on the skin would wrinkle, which no press computes."),
+    Case("A socket that fits the gel, with a clearance down to none",
+         "Converges to a finite force, keeps the laws of contact, and agrees with a finer mesh."),
+    Case("Needle, cone and knife edge", "Gives a finite force that converges with the mesh to the theory's, and says where the mesh doesn't resolve the contact."),
+    Case("A gel that folds onto itself or reaches into the object's side",
+         "Says so, or refuses it: contact of the gel with itself isn't solved."),
+    # 38 to 40
+    Case("An object a thousandth as stiff as the gel", "Tends to the force of that object on a rigid plane."),
+    Case("A plate led by torque that rocks onto its edge",
+         "Meets force and moment, turns continuously until it stands on its edge, and refuses what no edge can hold."),
+    # 43 to 46
 ]
 
 STYLE = """
