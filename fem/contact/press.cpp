@@ -9,13 +9,15 @@
 #include "core/error.h"
 #include "fem/contact/press_part.h"
 #include "fem/contact/press_report.h"
+#include "fem/contact/tip_gap.h"
 
 namespace touchstone::fem {
 namespace {
 
 constexpr double kAsGoodAsInfinite = 100.0;  // for an infinite friction whose sets cycle
 constexpr int kBondedHalvings = 1;
-constexpr int kMostParts = 100000;  // of a step: more take minutes
+constexpr int kMostParts = 100000;   // of a step: more take minutes
+constexpr double kNoOverlap = 1e-9;  // of the thickness: an overlap of rounding is none
 
 using Kind = AxisControl::Kind;
 
@@ -362,6 +364,12 @@ const PressState& Press::Parts::step(std::span<const PressTarget> targets) {
         torque_residual = std::max(torque_residual, std::abs(torque_on(body)[a] - *targets[b].torque[a]));
       }
     }
+  }
+  for (std::size_t b = 0; b < targets.size(); ++b) {
+    BodySnapshot& body = next.bodies[b];
+    if (body.touching || body.overlapping || solver.relaxes()) continue;
+    // A tip that stands between all lines gives no force, but that is no miss.
+    body.overlapping = tip_gap(solver.surface(), solver.bodies()[b].shape, body.pose) < -kNoOverlap * gel.thickness;
   }
   now = std::move(next);
   placed.assign(placed.size(), 1);
