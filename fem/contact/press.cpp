@@ -244,6 +244,18 @@ double Press::Parts::add_segment(std::size_t b, const PressTarget& target, Path&
     fail("gross slip: a shear force of {:.6g} N is wanted without friction", shear);
   }
 
+  // No contact is farther from the body's origin than the body reaches, and none gives more than the normal force and
+  // the friction by it.
+  const BoundingBall ball = bounding_ball(solver.bodies()[b].shape);
+  const double arm = ball.centre.norm() + ball.radius;
+  const double most = arm * to.force[2] * std::hypot(1.0, friction(b));
+  if (solver.surface().flat && to.forced[2] && to.force[2] > 0.0 && to.torque.norm() > most) {
+    fail(
+        "the object turns over: a torque of {:.6g} N mm is wanted, but a normal force of {:.6g} N with a friction of "
+        "{:.4g} within {:.4g} mm of its origin holds at most {:.6g} N mm",
+        to.torque.norm(), to.force[2], friction(b), arm, most);
+  }
+
   const bool no_force = to.forced[2] && to.force[2] == 0.0;
   bool meets = here.touching && !no_force;
   if (!meets) {

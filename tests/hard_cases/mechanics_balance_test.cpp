@@ -1,25 +1,33 @@
-// Hard case 41: an object far softer than the gel. What a good program does with it stands in
-// script/hard_cases_page.py.
+// The hard cases of what presses back: 41 (an object far softer than the gel) and 42 (a plate led by torque until it
+// stands on its edge). What a good program does with each stands in script/hard_cases_page.py.
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <memory>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "closed_forms/contact_closed_forms.h"
 #include "fem/contact/press.h"
 #include "fem/mesh/gel_body.h"
 #include "tests/hard_cases/hard_case.h"
+#include "tests/support/half_space_gel.h"
 #include "tests/support/press_steps.h"
 
 namespace touchstone::fem {
 namespace {
 
 using test::did;
+using test::press_refusal;
+using test::refused;
 using test::target_at;
 using test::Worst;
+using ::testing::HasSubstr;
 
 constexpr double kBall = 20.0;
 constexpr double kBallNu = 0.4;
@@ -114,6 +122,117 @@ TEST(HardCase41, TheGelsPartVanishesAsTheRatioOfModuliDoes) {
   }
   EXPECT_LT(before, 2e-4);
   did("they differ by {}", series.text("relative"));
+}
+
+constexpr double kForce = 0.2;  // N
+constexpr double kHalf = 1.0;   // mm, of the plate's width
+
+constexpr double kPlaceError = 1e-4;  // mm, of the contact patch where a press's iteration doesn't settle (see
+                                      // PressTolerance::lookup_mm): what a force may be off its place by
+
+const Compliance& half_space() {
+  static const Compliance made = test::half_space_gel(2.5, 0.25, {1.0, 0.49}, 10.0);
+  return made;
+}
+
+/// A plate under a force.
+class Plate {
+ public:
+  explicit Plate(double friction) : press_(half_space(), BoxShape{{2.0 * kHalf, 2.0 * kHalf, 0.4}}, friction) {
+    target_ = target_at(0.03, 0.02, 0.3);
+    target_.axis[2] = AxisControl::with_force(kForce);
+  }
+  /// Leads the torque about x. Why it can't be; empty if it can.
+  std::string lead(double torque) {
+    target_.torque = {torque, 0.0, std::nullopt};
+    return press_refusal(press_, target_);
+  }
+  /// Turns it about x instead. The torque that it takes.
+  double turn(double angle) {
+    target_.rotation = Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitX()).toRotationMatrix();
+    press_.step(target_);
+    return torque();
+  }
+  const PressState& state() const { return press_.state(); }
+  double angle() const { return Eigen::AngleAxisd(state().gel_from_object.rotation).angle(); }
+  /// On the plate about its middle.
+  double torque() const {
+    const Eigen::Vector3d force = state().wrench.head<3>();
+    return state().wrench[3] - state().gel_from_object.translation.cross(force).x();
+  }
+
+ private:
+  Press press_;
+  PressTarget target_;
+};
+
+/// The most torque that any angle gives, by leading the angle: as the plate tilts, its edge comes nearer to its middle.
+double most_torque() {
+  double most = 0.0;
+  Plate plate(0.0);
+  for (double angle = 0.04; angle < 0.45; angle += 0.02) most = std::max(most, std::abs(plate.turn(-angle)));
+  return most;
+}
+
+TEST(HardCase42, APlateLedByTorqueRocksOntoItsEdgeContinuously) {
+  const double most = most_torque();
+  EXPECT_GT(most, 0.7 * kForce * kHalf);
+  EXPECT_LT(most, kForce * kHalf);
+  did("a plate of {} mm half width under {} N, turned by angles: its torque is at most {:.3g} N mm, the force {:.3g} "
+      "mm "
+      "from its middle",
+      kHalf, kForce, most, most / kForce);
+  Worst force{1e-6};
+  Worst torque{kForce * kPlaceError};
+  Worst led{1e-3};
+  std::vector<double> largest_jump;
+  for (const int steps : {8, 16, 32}) {
+    Plate plate(0.0);
+    ASSERT_EQ(plate.lead(0.0), "");
+    double before = plate.angle();
+    double jump = 0.0;
+    for (int k = 1; k <= steps; ++k) {
+      const double wanted = 0.97 * most * k / steps;
+      ASSERT_EQ(plate.lead(wanted), "") << steps << ' ' << k;
+      EXPECT_LT(force(std::abs(plate.state().wrench[2] - kForce)), force.bar);
+      EXPECT_LT(torque(std::abs(plate.torque() - wanted)), torque.bar);
+      EXPECT_LT(plate.state().largest_penetration, kPlaceError);
+      EXPECT_GT(plate.angle(), before) << steps << ' ' << k;
+      jump = std::max(jump, plate.angle() - before);
+      before = plate.angle();
+    }
+    largest_jump.push_back(jump);
+    // Turned to that angle, it takes that torque.
+    Plate turned(0.0);
+    const double there = turned.turn(-before);
+    EXPECT_LT(led(std::abs(std::abs(there) / (0.97 * most) - 1.0)), led.bar);
+    did("torque led to 0.97 of that in {} steps: the angle grows to {:.4g} rad, by at most {:.2g} rad a step", steps,
+        before, jump);
+  }
+  // Continuous: with half as large steps little more than half the largest change of angle.
+  EXPECT_LT(largest_jump[1], 0.8 * largest_jump[0]);
+  EXPECT_LT(largest_jump[2], 0.8 * largest_jump[1]);
+  did("force is met to {}, torque to {}; a plate that is turned to the last angle takes the same torque to {}",
+      force.text("N"), torque.text("N mm"), led.text("relative"));
+}
+
+TEST(HardCase42, BeyondItsEdgeItIsRefused) {
+  const double most = most_torque();
+  Plate plate(0.0);
+  ASSERT_EQ(plate.lead(0.9 * most), "");
+  const double angle = plate.angle();
+  const std::string beyond = plate.lead(1.03 * most);
+  EXPECT_THAT(beyond, HasSubstr("turns over"));
+  EXPECT_EQ(plate.angle(), angle);  // as before
+  EXPECT_NEAR(plate.torque(), 0.9 * most, kForce * kPlaceError);
+  did("1.03 of the most torque that any angle gives: {}", refused(beyond));
+  for (const double friction : {0.0, 0.5}) {
+    Plate other(friction);
+    const std::string at_once = other.lead(2.0 * kForce * kHalf);
+    EXPECT_THAT(at_once, HasSubstr("the object turns over: a torque of 0.4 N mm is wanted"));
+    EXPECT_EQ(other.state().wrench.norm(), 0.0);
+    if (friction > 0.0) did("twice what its edge could hold, at once, with mu = {}: {}", friction, refused(at_once));
+  }
 }
 
 }  // namespace

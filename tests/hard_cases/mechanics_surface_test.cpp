@@ -4,18 +4,18 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <Eigen/Geometry>
 #include <cmath>
 #include <limits>
 #include <string>
-#include <tuple>
 #include <vector>
 
 #include "closed_forms/contact_closed_forms.h"
+#include "core/error.h"
 #include "core/units.h"
-#include "fem/contact/press.h"
 #include "fem/contact/surface_check.h"
+#include "fem/finite_strain/finite_press.h"
 #include "fem/mesh/gel_body.h"
+#include "tests/fem/mesh/box_mesh.h"
 #include "tests/hard_cases/hard_case.h"
 #include "tests/support/press_steps.h"
 
@@ -141,6 +141,31 @@ TEST(HardCase37, OrdinaryPressesRaiseNoDoubt) {
     did("{} {} mm deep: nothing folds, the free surface lies at most {:.2g} edges within it", what, depth,
         check.into_object > 0.0 ? check.into_object / check.edge : 0.0);
   }
+}
+
+TEST(HardCase37, AtFiniteStrainAFoldIsSaidOrThePressRefused) {
+  const FiniteGel gel(fixtures::box_mesh({8, 8, 3}, 6, 6, 2), kPlain, {}, 3.0);
+  const ContactShape punch = RoundedCylinder{1.6, 0.2, 2.0};
+  const ContactShape* const body = &punch;
+  FinitePress press(gel, punch, kInfinity);
+  const auto doubts = [&](const PressState& state) {
+    return surface_doubts(check_surface(gel.rest.vertices, gel.rest.triangles, {&body, 1}, state), kPlain);
+  };
+  EXPECT_THAT(doubts(press.step(target_at(0, 0, -0.2))), IsEmpty());
+  std::string found;
+  double reached = 0.0;
+  while (reached < 5.0 && found.empty()) {
+    reached += 0.6;
+    try {
+      const auto said = doubts(press.step(target_at(reached, 0, -0.2)));
+      if (!said.empty()) found = "it says \"" + said.front() + '"';
+    } catch (const Error& error) {
+      found = test::refused(error.what());
+    }
+  }
+  EXPECT_NE(found, "");
+  EXPECT_GT(reached, 0.6);  // what doesn't fold is answered
+  did("at finite strain, a punch of 1.6 mm radius that sticks, drawn along by {:.2g} mm: {}", reached, found);
 }
 
 }  // namespace
