@@ -17,6 +17,7 @@ constexpr std::size_t kFirstCandidates = 12;
 constexpr double kBulge = 0.5;
 constexpr double kCutsHold = 0.005;  // of a triangle, or of the depth: a body moved by less cuts hats as it did
 constexpr double kCutsHoldLate = 0.5;
+constexpr double kNoOverlapYet = 0.5;   // of the depth, by which it may change where the overlap doesn't cut
 constexpr int kCutUpdates = 12;         // after these the latter holds: what goes to and fro comes to rest
 constexpr double kOwnersAlike = 0.05;   // of a triangle: bodies whose gaps at a vertex differ by less are equally near
 constexpr double kSharpestCurve = 0.3;  // of a triangle: radius down to which a gap counts as smooth
@@ -54,7 +55,8 @@ bool PartSolver::cuts_hold(const CachedGap& cached, const Body& body, double par
     const double away = normal.dot(moved);
     if ((moved - away * normal).norm() > part * size_) return false;
     // Cut where the body hardly touched, hats don't know yet what the overlap will cut.
-    const double most = cached.gap.cuts->by_overlap ? part * cached.cut_depth : part * size_ + 0.5 * cached.cut_depth;
+    const double most =
+        cached.gap.cuts->by_overlap ? part * cached.cut_depth : part * size_ + kNoOverlapYet * cached.cut_depth;
     if (std::abs(away) > most) return false;
   }
   return true;

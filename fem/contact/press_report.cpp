@@ -20,12 +20,11 @@ Eigen::VectorXd moving_traction(const PressSnapshot& snapshot) {
 
 /// Displacements of the whole surface, and the strain measures.
 void add_fields(const Compliance& gel, const ContactSurface& surface, const SurfaceMassFactor& mass,
-                const PressSnapshot& snapshot, PressState& s) {
+                const PressSnapshot& snapshot, const Eigen::VectorXd& moving, PressState& s) {
   const int n = static_cast<int>(gel.vertices.size());
   s.surface_displacement = Eigen::MatrixX3d::Zero(n, 3);
   if (!snapshot.touching() && snapshot.history.empty()) return;
   // `snapshot.weighted` is what cut hats see of it.
-  const Eigen::VectorXd moving = moving_traction(snapshot);
   const auto compliance = gel.surface.view();
   Eigen::VectorXd response = Eigen::VectorXd::Zero(3 * n);
   for (int v = 0; v < n; ++v) {
@@ -118,7 +117,7 @@ PressState report(const Compliance& gel, const PartSolver& solver, const Surface
   }
   s.bead_displacement.resize(gel.beads.rows() / 3, 3);
   for (Eigen::Index b = 0; b < s.bead_displacement.rows(); ++b) s.bead_displacement.row(b) = beads.segment<3>(3 * b);
-  if (output == PressOutput::fields) add_fields(gel, surface, mass, snapshot, s);
+  if (output == PressOutput::fields) add_fields(gel, surface, mass, snapshot, moving, s);
   for (std::size_t b = 0; b < snapshot.bodies.size(); ++b) {
     const BodySnapshot& body = snapshot.bodies[b];
     s.under_resolved = s.under_resolved || ((body.touching || body.overlapping) &&

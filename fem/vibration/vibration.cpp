@@ -38,25 +38,24 @@ Eigen::MatrixX3cd by_rows(const Eigen::VectorXcd& stacked) {
   return rows;
 }
 
-/// What cut hats change in the compliance among these vertices, in the gel's axes. It is near them alone, where inertia
-/// has no say.
-Eigen::MatrixXd changed_by(const CutHats& cuts, const Compliance& gel, const std::vector<int>& vertices) {
+/// The compliance among these vertices with what cut hats change in it, in the gel's axes. That is near them alone,
+/// where inertia has no say.
+Eigen::MatrixXd compliance_among(const std::vector<int>& vertices, const CutHats& cuts, const Compliance& gel) {
   const ContactSurface surface(gel);
   ContactBlock block(gel, surface);
   block.hold(vertices);
   Eigen::MatrixXd own = block.compliance();
   add_cut_compliance(own, cuts, surface, gel, vertices, block.axes(), false);
-  own -= block.compliance();
-  Eigen::MatrixXd change(own.rows(), own.cols());
+  Eigen::MatrixXd result(own.rows(), own.cols());
   for (std::size_t i = 0; i < vertices.size(); ++i) {
     for (std::size_t j = 0; j < vertices.size(); ++j) {
       const auto row = static_cast<Eigen::Index>(3 * i);
       const auto column = static_cast<Eigen::Index>(3 * j);
-      change.block<3, 3>(row, column) =
+      result.block<3, 3>(row, column) =
           block.axes(vertices[i]) * own.block<3, 3>(row, column) * block.axes(vertices[j]).transpose();
     }
   }
-  return change;
+  return result;
 }
 
 /// A real matrix times a complex vector.
@@ -109,8 +108,8 @@ struct StuckPatch::Parts {
         rigid(3 * j + a, a) = weight[v];
       }
     }
-    Eigen::MatrixXd block = gel.surface.view()(rows, rows);
-    if (cuts != nullptr) block += changed_by(*cuts, gel, vertices);
+    const Eigen::MatrixXd block =
+        cuts != nullptr ? compliance_among(vertices, *cuts, gel) : Eigen::MatrixXd(gel.surface.view()(rows, rows));
     DenseCholesky factor;
     if (!factor.compute(block)) fail("the gel's surface compliance isn't positive definite");
     modal = vibration.surface(rows, Eigen::all);

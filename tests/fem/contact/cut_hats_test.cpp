@@ -247,8 +247,7 @@ TEST(CutHats, ANeedleNarrowerThanAnEdgeIsTouchedWhereverItStands) {
 
 TEST(CutHats, SteepTipsArePressedByDepthAndByForceWhereverTheyStand) {
   // A press by force begins where the body just touches: there a tip covers nothing, and hats that are cut by the
-  // cone's far base say nothing of what the tip will cut. Without friction, with friction, and some edges of 0.6 mm
-  // from the silhouette.
+  // cone's base say nothing of what the tip will cut.
   struct Row {
     ConeShape cone;
     double spread;  // of the forces at the places; measured when it was written: 0.081 and 0.043
