@@ -16,6 +16,7 @@
 #include "sim/press/elastic_object.h"
 #include "sim/press/gel_setup.h"
 #include "sim/press/play_motion.h"
+#include "sim/press/touch_doubts.h"
 #include "sim/press/truth.h"
 #include "sim/scene/scene.h"
 #include "sim/sensor/event_picture.h"
@@ -118,6 +119,7 @@ void render(const RenderOptions& options, const GlobalOptions& global) {
   sim::Capture capture;
   std::string warning;
   std::string summary;
+  std::vector<std::string> doubts;
   {
     ProgressBar bar(global.quiet);
     const Progress progress = bar.listener();
@@ -126,6 +128,7 @@ void render(const RenderOptions& options, const GlobalOptions& global) {
     const auto elastic = sim::set_up_elastic_objects(scene, plan, global.cache);
     const std::vector<sim::Truth> truths = sim::play_motion(scene, plan, *gel, progress, vibration.get(), elastic);
     const sim::Truth& wanted = truths[static_cast<std::size_t>(frame)];
+    doubts = sim::touch_doubts(scene, *gel, wanted.press);
     if (picture || truth) capture = sim::VirtualCamera(scene, plan, *gel, truths).capture(wanted);
     if (!options.gltf.empty()) {
       const sim::FrameGeometry geometry = sim::frame_geometry(scene, *gel, wanted.press);
@@ -146,6 +149,7 @@ void render(const RenderOptions& options, const GlobalOptions& global) {
     warning = gel->report.note;
   }
   if (!warning.empty()) spdlog::warn("{}", warning);
+  for (const std::string& doubt : doubts) spdlog::warn("frame {}: {}", frame, doubt);
   if (!summary.empty()) spdlog::info("{}", summary);
   if (!capture.light.empty()) spdlog::info("{}", capture.light);
   if (truth) sim::write_exr(options.truth, capture.pixel_truth.image, capture.pixel_truth.channel_names);

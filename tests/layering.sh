@@ -96,7 +96,7 @@ while IFS=: read -r folder names; do
   below[$top]="${below[$top]:- core closed_forms } $top/ $(printf '%s\n' $names | sed 's#/.*##; s#$#/#' | tr '\n' ' ')"
 done <<<"$rows"
 
-declare -A tests_of=([golden]=" core render/ sim/ " [hard_cases]=" core closed_forms fem/ render/ sensors/ "
+declare -A tests_of=([golden]=" core render/ sim/ " [hard_cases]=" core closed_forms fem/ render/ sensors/ sim/ "
   [fuzz]=" core sensors/ sim/ datasets/ lab/ " [support]=" core fem/ sim/ datasets/ ")
 
 # What `folder` may include, if `target` is that.

@@ -103,7 +103,13 @@ WeightedGap weighted_gap(const ContactSurface& surface, const ContactShape& shap
   }
   std::visit(
       [&](const auto& body) {
-        TriangleGap triangle(body, gel_from_object.inverse(), ball.radius, surface.farthest_behind);
+        double narrowest = ball.radius;  // a needle is seen as wide as it is, not as long
+        if (surface.flat) {
+          const Eigen::Vector3d along = gel_from_object.rotation.transpose() * surface.normals.front();
+          const double middle = silhouette_distance(body, ball.centre, along).value_or(ball.radius);
+          if (middle > 0.0) narrowest = std::min(narrowest, middle);
+        }
+        TriangleGap triangle(body, gel_from_object.inverse(), ball.radius, narrowest, surface.farthest_behind);
         Eigen::VectorXd corner_gap(n);
         for (std::size_t v = 0; v < moved.size(); ++v) {
           corner_gap[static_cast<Eigen::Index>(v)] = triangle.corner_gap(moved[v], surface.normals[v]);

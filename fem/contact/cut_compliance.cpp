@@ -18,10 +18,20 @@ const double kSelf = 16.0 / (3.0 * std::sqrt(std::numbers::pi));
 // Variance of a triangle's points along an axis, of its area (equilateral).
 constexpr double kSpread = 0.0962;
 
-/// A half-space's displacement by a traction on a cell, in the axes (into the body, first, second tangent).
+constexpr double kThin = 4.0;   // edges: the base under a gel thinner than this is felt among the hats
+constexpr double kFades = 0.4;  // of the thickness: how far a load is felt on a thin layer
+
+/// A half-space's displacement by a traction on a cell, in the axes (into the body, first, second tangent). On a gel
+/// that is thin beside its edges it fades as exp(-r / 0.4 thickness): a load is felt about as far on a bonded layer,
+/// for the transform of exp(-r / l) / r, 1 / sqrt(k^2 + 1 / l^2), goes as the layer's kernel over k. It stays positive
+/// definite, being the product of two that are.
 struct HalfSpace {
-  explicit HalfSpace(const ElasticMaterial& material)
-      : scale(1.0 / (2.0 * std::numbers::pi * shear_modulus(material))), nu(material.poisson_ratio) {}
+  HalfSpace(const ElasticMaterial& material, double thickness, double edge)
+      : scale(1.0 / (2.0 * std::numbers::pi * shear_modulus(material))),
+        nu(material.poisson_ratio),
+        fade(thickness < kThin * edge ? 1.0 / (kFades * thickness) : 0.0) {}
+
+  double faded(double r) const { return fade > 0.0 ? std::exp(-fade * r) : 1.0; }
 
   /// Mean of 1/r between two cells, mm^-1.
   static double inverse_distance(double r2, double area_a, double area_b) {
@@ -41,11 +51,12 @@ struct HalfSpace {
     u << (1.0 - nu) * k, shear * x, shear * y,                                                     //
         -shear * x, (1.0 - nu) * k + (flat2 > 0.0 ? along * x * x : 0.5 * nu * k), along * x * y,  //
         -shear * y, along * x * y, (1.0 - nu) * k + (flat2 > 0.0 ? along * y * y : 0.5 * nu * k);
-    return scale * u;
+    return scale * faded(std::sqrt(r2)) * u;
   }
 
   double scale;
   double nu;
+  double fade;  ///< 1/mm; 0: it doesn't
 };
 
 /// Cells side by side, so that loops over them run on several numbers at once.
@@ -142,6 +153,7 @@ class Adder {
       Matrix3d sum = Matrix3d::Zero();
       for (Eigen::Index k = 0; k < in_a.size(); ++k) {
         see(in_a, k, in_b);
+        if (half_space_.fade > 0.0) inverse_ *= (-half_space_.fade * r2_.sqrt()).exp();
         sum += in_a.density.row(k).transpose() * seen(inverse_, in_b);
       }
       sum *= half_space_.scale * (1.0 - half_space_.nu);
@@ -187,6 +199,9 @@ class Adder {
     terms_[4] = along_ * x_ * y_;
     terms_[5] = along_ * y_.square();
     if (self >= 0) terms_[3][self] = terms_[5][self] = 0.5 * nu * inverse_[self];
+    if (half_space_.fade > 0.0) {
+      for (Eigen::ArrayXd& term : terms_) term *= (-half_space_.fade * r2_.sqrt()).exp();
+    }
   }
 
   void add_normal(int row, int column, double u, bool same) {
@@ -204,7 +219,8 @@ class Adder {
         const Vector3d from = centre_a[i] - centre_b[j];
         const double mass = mass_a[i] * mass_b[j];
         if (normal_only_) {
-          const double u = mass * half_space_.scale * (1.0 - half_space_.nu) / from.norm();
+          const double u =
+              mass * half_space_.scale * (1.0 - half_space_.nu) * half_space_.faded(from.norm()) / from.norm();
           add_normal(a.place[i], b.place[j], u, false);
         } else {
           add(a, i, b, j,
@@ -305,7 +321,7 @@ class SmoothRest {
     more(2, 2) += half_space_.nu * tangent(1, 1);
     more(1, 2) += half_space_.nu * (tangent(0, 1));
     more(2, 1) += half_space_.nu * (tangent(1, 0));
-    return u + half_space_.scale * spread * more;
+    return u + half_space_.scale * half_space_.faded(std::sqrt(r2)) * spread * more;
   }
 
   const Compliance& gel_;
@@ -390,7 +406,6 @@ void keep_definite(Eigen::MatrixXd& compliance, const std::vector<Eigen::Index>&
 void add_cut_compliance(Eigen::MatrixXd& compliance, const CutHats& cuts, const ContactSurface& surface,
                         const Compliance& gel, const std::vector<int>& vertices,
                         const std::vector<Matrix3d>& axes_of_all, bool normal_only) {
-  const HalfSpace half_space(gel.material);
   std::vector<int> place(surface.vertices.size(), -1);
   for (std::size_t k = 0; k < vertices.size(); ++k) place[vertices[k]] = static_cast<int>(k);
   std::vector<Part> parts;
@@ -421,7 +436,9 @@ void add_cut_compliance(Eigen::MatrixXd& compliance, const CutHats& cuts, const 
   }
   if (parts.empty()) return;
   mean_area /= static_cast<double>(parts.size());
-  const double near = kNear * std::sqrt(mean_area * 4.0 / std::sqrt(3.0));
+  const double edge = std::sqrt(mean_area * 4.0 / std::sqrt(3.0));
+  const double near = kNear * edge;
+  const HalfSpace half_space(gel.material, gel.thickness, edge);
   const Eigen::Index each = normal_only ? 1 : 3;  // rows of a vertex in the responses
   const Eigen::Index rows = each * static_cast<Eigen::Index>(vertices.size());
   Eigen::MatrixXd cut_response = Eigen::MatrixXd::Zero(rows, rows);

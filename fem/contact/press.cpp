@@ -9,13 +9,15 @@
 #include "core/error.h"
 #include "fem/contact/press_part.h"
 #include "fem/contact/press_report.h"
+#include "fem/contact/tip_gap.h"
 
 namespace touchstone::fem {
 namespace {
 
 constexpr double kAsGoodAsInfinite = 100.0;  // for an infinite friction whose sets cycle
 constexpr int kBondedHalvings = 1;
-constexpr int kMostParts = 100000;  // of a step: more take minutes
+constexpr int kMostParts = 100000;   // of a step: more take minutes
+constexpr double kNoOverlap = 1e-9;  // of the thickness: an overlap of rounding is none
 
 using Kind = AxisControl::Kind;
 
@@ -242,6 +244,18 @@ double Press::Parts::add_segment(std::size_t b, const PressTarget& target, Path&
     fail("gross slip: a shear force of {:.6g} N is wanted without friction", shear);
   }
 
+  // No contact is farther from the body's origin than the body reaches, and none gives more than the normal force and
+  // the friction by it.
+  const BoundingBall ball = bounding_ball(solver.bodies()[b].shape);
+  const double arm = ball.centre.norm() + ball.radius;
+  const double most = arm * to.force[2] * std::hypot(1.0, friction(b));
+  if (solver.surface().flat && to.forced[2] && to.force[2] > 0.0 && to.torque.norm() > most) {
+    fail(
+        "the object turns over: a torque of {:.6g} N mm is wanted, but a normal force of {:.6g} N with a friction of "
+        "{:.4g} within {:.4g} mm of its origin holds at most {:.6g} N mm",
+        to.torque.norm(), to.force[2], friction(b), arm, most);
+  }
+
   const bool no_force = to.forced[2] && to.force[2] == 0.0;
   bool meets = here.touching && !no_force;
   if (!meets) {
@@ -362,6 +376,12 @@ const PressState& Press::Parts::step(std::span<const PressTarget> targets) {
         torque_residual = std::max(torque_residual, std::abs(torque_on(body)[a] - *targets[b].torque[a]));
       }
     }
+  }
+  for (std::size_t b = 0; b < targets.size(); ++b) {
+    BodySnapshot& body = next.bodies[b];
+    if (body.touching || body.overlapping || solver.relaxes()) continue;
+    // A tip that stands between all lines gives no force, but that is no miss.
+    body.overlapping = tip_gap(solver.surface(), solver.bodies()[b].shape, body.pose) < -kNoOverlap * gel.thickness;
   }
   now = std::move(next);
   placed.assign(placed.size(), 1);

@@ -45,6 +45,18 @@ void add_displacement(const Compliance& gel, const ContactSurface& surface, cons
   state.largest_strain = std::max(state.largest_gradient, deepest / gel.thickness);
 }
 
+bool is_resolved(const ContactSurface& surface, const std::vector<int>& owner, int body) {
+  int vertices = 0;
+  bool surrounded = false;
+  for (std::size_t v = 0; v < owner.size(); ++v) {
+    if (owner[v] != body) continue;
+    ++vertices;
+    const auto& around = surface.around[v];
+    surrounded = surrounded || std::all_of(around.begin(), around.end(), [&](int u) { return owner[u] == body; });
+  }
+  return surrounded && vertices >= kResolvedVertices;
+}
+
 PressState report(const Compliance& gel, const PartSolver& solver, const SurfaceMassFactor& mass, PressOutput output,
                   const PressSnapshot& snapshot) {
   const ContactSurface& surface = solver.surface();
@@ -102,8 +114,8 @@ PressState report(const Compliance& gel, const PartSolver& solver, const Surface
   if (output == PressOutput::fields) add_fields(gel, surface, mass, snapshot, moving, s);
   for (std::size_t b = 0; b < snapshot.bodies.size(); ++b) {
     const BodySnapshot& body = snapshot.bodies[b];
-    s.under_resolved =
-        s.under_resolved || ((body.touching || body.overlapping) && s.bodies[b].contact_vertices < kResolvedVertices);
+    s.under_resolved = s.under_resolved || ((body.touching || body.overlapping) &&
+                                            !is_resolved(surface, snapshot.owner, static_cast<int>(b)));
   }
   return s;
 }

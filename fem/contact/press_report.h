@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/SparseCholesky>
+#include <vector>
 
 #include "fem/contact/press.h"
 #include "fem/contact/press_part.h"
@@ -17,5 +18,10 @@ PressState report(const Compliance& gel, const PartSolver& solver, const Surface
 /// The surface's displacement and the strain measures, of the weighted one (3n: int phi_i u_a dA, mm^3).
 void add_displacement(const Compliance& gel, const ContactSurface& surface, const SurfaceMassFactor& mass,
                       const Eigen::VectorXd& weighted, PressState& state);
+
+/// Whether a body's contact is wider than an edge or two all round: with fewer than 13 vertices, or none that has only
+/// touching ones beside it (as along a knife's edge), forces may be several percent off. `owner` as in
+/// PressState::node_owner.
+bool is_resolved(const ContactSurface& surface, const std::vector<int>& owner, int body);
 
 }  // namespace touchstone::fem

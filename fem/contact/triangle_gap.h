@@ -22,10 +22,13 @@ namespace touchstone::fem {
 template <typename Shape>
 class TriangleGap {
  public:
-  TriangleGap(const Shape& shape, const RigidTransform& object_from_gel, double body_radius, double farthest_behind)
+  /// `narrowest`: how wide the body is seen along the normals of a flat gel, from its middle to its outline.
+  TriangleGap(const Shape& shape, const RigidTransform& object_from_gel, double body_radius, double narrowest,
+              double farthest_behind)
       : shape_(shape),
         object_from_gel_(object_from_gel),
         body_radius_(body_radius),
+        narrowest_(narrowest),
         farthest_behind_(farthest_behind) {}
 
   /// int phi_k gap dA, int phi_k dA over the part that hits, and the least gap.
@@ -68,7 +71,7 @@ class TriangleGap {
     area_ = area;
     has_silhouette_ = one_normal_ && silhouette_distance(shape_, points_.col(0), normals_.col(0)).has_value();
     // Bodies smaller than the triangle must not fall between its points.
-    const int splits = splits_for_body(area_, body_radius_);
+    const int splits = splits_for_body(area_, has_silhouette_ ? narrowest_ : body_radius_);
     if (has_silhouette_) {
       cell(Eigen::Matrix3d::Identity(), 0, splits + kSilhouetteSplits);
     } else {
@@ -459,6 +462,7 @@ class TriangleGap {
   const Shape& shape_;
   const RigidTransform object_from_gel_;
   const double body_radius_;
+  const double narrowest_;
   const double farthest_behind_;
   Eigen::Matrix3d points_;
   Eigen::Matrix3d normals_;

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "fem/contact/tip_gap.h"
 #include "fem/finite_strain/finite_system.h"
 
 namespace touchstone::fem {
@@ -111,6 +112,10 @@ FinitePartSolver::FinitePartSolver(const FiniteGel& gel, ContactShape shape, dou
 
 double FinitePartSolver::overlap(const RigidTransform& pose) const {
   return -weighted_gap(gel_.rest, shape_, pose).deepest;
+}
+
+double FinitePartSolver::tip_overlap(const RigidTransform& pose) const {
+  return -tip_gap(gel_.rest, shape_, pose);
 }
 
 /// Gap, forces and residual at the iterate's state; along the lines given, or new ones.

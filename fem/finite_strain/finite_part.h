@@ -46,6 +46,8 @@ class FinitePartSolver {
 
   /// How deep the object reaches under the undeformed surface, mm; minus infinity if it isn't over it.
   double overlap(const RigidTransform& pose) const;
+  /// The same of the object's lowest corner (fem/contact/tip_gap.h).
+  double tip_overlap(const RigidTransform& pose) const;
 
   /// The state at the end of the part, or nothing if Newton's method doesn't get there; why_not() then says why.
   std::optional<FiniteSnapshot> solve(const FiniteSnapshot& from, const PartTarget& target, PartEffort& effort);

@@ -16,9 +16,8 @@
 namespace touchstone::fem {
 namespace {
 
-constexpr double kLargestPart = 0.1;   // of the thickness: the motion in one part
-constexpr double kFirstTouch = 0.02;   // of the thickness: where a force-controlled press begins
-constexpr int kResolvedVertices = 13;  // as in press_report.cpp
+constexpr double kLargestPart = 0.1;  // of the thickness: the motion in one part
+constexpr double kFirstTouch = 0.02;  // of the thickness: where a force-controlled press begins
 
 struct Effort {
   PartEffort part;
@@ -263,7 +262,8 @@ PressState FinitePress::Parts::report(const FiniteSnapshot& at) const {
     if (at.state[v] != NodeState::open) s.node_owner[v] = 0;
   }
   s.bodies = {{s.gel_from_object, s.wrench, s.contact_area, s.contact_vertices}};
-  s.under_resolved = (at.touching || overlap(at.pose) > 0.0) && s.contact_vertices < kResolvedVertices;
+  const auto overlaps = [&] { return overlap(at.pose) > 0.0 || solver.tip_overlap(at.pose) > 0.0; };
+  s.under_resolved = (at.touching || overlaps()) && !is_resolved(gel.rest, s.node_owner, 0);
   return s;
 }
 

@@ -17,6 +17,9 @@ namespace {
 
 using Complex = std::complex<double>;
 
+/// Reciprocal condition below which an answer has lost ten digits: nearer to an undamped resonance it is rounding.
+constexpr double kLeastCondition = 1e-10;
+
 /// Rows over nodes, times modes: three rows of the result for each.
 Eigen::MatrixXd seen_by(const Eigen::SparseMatrix<double>& rows, const Eigen::MatrixXd& displacement) {
   Eigen::MatrixXd seen(3 * rows.rows(), displacement.cols());
@@ -144,8 +147,19 @@ SteadyVibration StuckPatch::Parts::answer(const Eigen::Vector3d& amplitude, doub
   if (turn > 0.0 && squares.size() > 0) {
     Eigen::MatrixXcd inner = overlap.cast<Complex>();
     inner.diagonal().array() += squares * (s * squares - turn) / turn;
+    // Modes of one size, or the condition would be that of their frequencies.
+    const Eigen::VectorXd scale =
+        (overlap.diagonal().array().abs() + (squares * (std::abs(s) * squares + turn) / turn)).sqrt().inverse();
+    inner = (scale.asDiagonal() * inner * scale.asDiagonal()).eval();
+    const Eigen::PartialPivLU<Eigen::MatrixXcd> factor(inner);
+    if (!(factor.rcond() > kLeastCondition)) {
+      fail(
+          "at {:.6g} Hz the gel under the body that sticks to it resonates and nothing damps it: there is no steady "
+          "vibration. Allowed is another frequency, or a gel that relaxes",
+          omega / (2.0 * kPi));
+    }
     const Eigen::VectorXd push = modal.transpose() * still;
-    weights = inner.partialPivLu().solve(push.cast<Complex>());
+    weights = scale.asDiagonal() * factor.solve((scale.asDiagonal() * push).cast<Complex>());
     traction -= s * times(from_modal, weights);
   }
   SteadyVibration steady;

@@ -68,7 +68,9 @@ class StuckPatch {
   StuckPatch(StuckPatch&&) noexcept;
   StuckPatch& operator=(StuckPatch&&) noexcept;
 
-  /// The answer to the body's displacement amplitude * exp(i omega t). mm, omega >= 0 in rad/s
+  /// The answer to the body's displacement amplitude * exp(i omega t). mm, omega >= 0 in rad/s. Near a resonance of the
+  /// gel under the body that nothing damps the amplitudes grow as 1 / (omega_h^2 - omega^2).
+  /// @throws Error that names the frequency, at such a resonance (to some ten digits): there is no steady answer
   SteadyVibration answer(const Eigen::Vector3d& amplitude, double angular_frequency,
                          const PronySeries& relaxation) const;
   /// The same without inertia: what a quasi-static press takes for it.

@@ -260,6 +260,10 @@ void bind_sensor(py::module_& module) {
           "under_resolved", [](const Touch& self) { return self.of.press.under_resolved; },
           "Too few vertices touch for a force exact to a percent.")
       .def_property_readonly(
+          "doubts", [](const Touch& self) { return self.doubts; },
+          "list of str: what the gel's surface does that no press computes: it folds, wrinkles under its skin, or "
+          "reaches into the object. Empty if nothing.")
+      .def_property_readonly(
           "surface_displacement_mm",
           [](const py::object& self) { return rows_of(self.cast<Touch&>().of.press.surface_displacement, self); },
           "(n, 3): of the gel's surface vertices (Sensor.gel_vertices_mm).")

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "sim/press/touch_doubts.h"
+
 namespace touchstone::python {
 namespace {
 
@@ -26,6 +28,8 @@ Touch Sensor::finished(const sim::TouchObject& by, sim::Touch touch, const sim::
                        const sim::TouchOptions& options) const {
   Touch finished;
   finished.reading = reading;
+  const auto* const shape = by.spec().elastic ? nullptr : &by.shape();
+  finished.doubts = sim::touch_doubts(device().gel, gel(), {&shape, 1}, touch.press);
   if (options.picture && options.truth) finished.ideal = sensor_.ideal(by, touch);
   if (options.picture) finished.light_error = sensor_.light().error;
   if (!touch.contact.empty()) touch.contact.setTo(1, touch.contact != 0);

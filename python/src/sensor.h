@@ -7,7 +7,9 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "core/progress.h"
 #include "sim/press/touch_session.h"
@@ -24,6 +26,7 @@ struct Touch {
   sim::TouchReading reading;  ///< what its contact does
   cv::Mat ideal;              ///< sim::VirtualSensor::ideal; empty without truth
   std::optional<render::DirectError> light_error;
+  std::vector<std::string> doubts;  ///< sim::touch_doubts
 };
 
 /// A device with the objects that touched it last.

@@ -10,8 +10,9 @@ namespace touchstone::render {
 
 std::vector<double> exposure_shares(const std::vector<double>& times_s, double from_s, double to_s) {
   if (times_s.empty()) fail("exposure: there is no instant to take light from");
-  for (std::size_t i = 1; i < times_s.size(); ++i) {
-    if (!(times_s[i] > times_s[i - 1])) {
+  for (std::size_t i = 0; i < times_s.size(); ++i) {
+    if (!std::isfinite(times_s[i])) fail("exposure: instant {} is at {} s; it must be finite", i, times_s[i]);
+    if (i > 0 && !(times_s[i] > times_s[i - 1])) {
       fail("exposure: instant {} is at {} s, after one at {} s; times must grow", i, times_s[i], times_s[i - 1]);
     }
   }

@@ -22,7 +22,7 @@ struct ShutterTiming {
 /// The share of each instant in the mean over [from_s, to_s] of what runs straight from instant to instant: the
 /// integral of that instant's hat function, divided by the span; with from_s = to_s the hat functions' values. They sum
 /// to 1.
-/// @throws Error if the times don't grow or don't cover the span
+/// @throws Error if the times aren't finite, don't grow or don't cover the span
 std::vector<double> exposure_shares(const std::vector<double>& times_s, double from_s, double to_s);
 
 /// The same as rolling_exposure for instants that are handed over one by one and not kept.

@@ -1,5 +1,6 @@
 #include "sensors/events/time_delay_network.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -91,6 +92,7 @@ TimeDelayEstimator::TimeDelayEstimator(TimeDelayNetwork model) : model_(std::mov
 void TimeDelayEstimator::begin() {
   const Eigen::Index features = model_.features.size();
   for (Eigen::Index i = 0; i < inputs_.size(); ++i) inputs_[i] = model_.features.scaled(i % features, 0.0);
+  strange_windows_ = 0;
 }
 
 double TimeDelayEstimator::next(std::span<const double> features) {
@@ -102,8 +104,11 @@ double TimeDelayEstimator::next(std::span<const double> features) {
     if (!std::isfinite(feature)) fail("time delay network: a feature is {}, it must be finite", feature);
   }
   for (Eigen::Index i = inputs_.size() - 1; i >= size; --i) inputs_[i] = inputs_[i - size];
+  strange_windows_ = std::max(0, strange_windows_ - 1);
   for (Eigen::Index i = 0; i < size; ++i) {
-    inputs_[i] = model_.features.scaled(i, features[static_cast<std::size_t>(i)]);
+    const double feature = features[static_cast<std::size_t>(i)];
+    inputs_[i] = model_.features.scaled(i, feature);
+    if (feature < model_.features.low[i] || feature > model_.features.high[i]) strange_windows_ = model_.delays;
   }
   return model_.force_N.unscaled(0, runner_.run(model_.network, inputs_)[0]);
 }

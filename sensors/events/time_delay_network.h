@@ -64,11 +64,16 @@ class TimeDelayEstimator {
   /// Takes the next window's features, gives its force in N. @throws Error for another number of features than the
   /// model's, or one that isn't finite; it then counts as not given
   double next(std::span<const double> features);
+  /// Whether one of the windows that the last force is from has a feature outside of its range in training, as more
+  /// events than any grasp had: that force is then no more than a guess. What flicker adds to the counts may stay
+  /// within the ranges; that is seen before the touch (sensors/events/mains_flicker.h).
+  bool extrapolates() const { return strange_windows_ > 0; }
 
  private:
   TimeDelayNetwork model_;
   NetworkRunner runner_;
   Eigen::VectorXd inputs_;
+  int strange_windows_ = 0;  ///< for so many windows on, one that is outside of the ranges is looked at
 };
 
 /// Force of each window (row) of a whole grasp, N: the same as that of TimeDelayEstimator. @throws Error as it does

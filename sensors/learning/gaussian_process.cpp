@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <utility>
 
@@ -91,7 +92,14 @@ GaussianProcess condition(const GaussianProcessParameters& parameters, const Eig
         signal_square * (-0.5 * squared_distances(inputs, j, inputs.row(j), parameters.lengths)).exp();
     process.factor(j, j) += parameters.noise * parameters.noise;
   }
-  if (!factorise_in_place(process.factor)) {
+  // A pivot is what a sample's variance has beside the samples before it. Of samples that repeat each other only the
+  // noise is left of it, and rounding of the whole may be more than that.
+  const auto is_lost_in_rounding = [&] {
+    constexpr double kPerSample = 100.0 * std::numeric_limits<double>::epsilon();
+    const double least = process.factor.diagonal().minCoeff();
+    return !(least * least > kPerSample * static_cast<double>(n) * signal_square);
+  };
+  if (!factorise_in_place(process.factor) || is_lost_in_rounding()) {
     fail(
         "Gaussian process: with a noise of {} beside a signal of {} the samples' covariance can't be factorised; more "
         "noise is needed",

@@ -39,7 +39,8 @@ inline constexpr Eigen::Index kMostGaussianProcessSamples = 20'000;
 
 /// Takes samples^3 / 3 multiplications: 1848 samples 0.1 to 0.2 s, 7000 5 to 10 s a core, by processor.
 /// @throws Error for no or too many samples, sizes that don't fit, a value that isn't finite, parameters that aren't
-/// above 0, or a noise so small that rounding leaves no factor
+/// above 0, or a noise so small that rounding leaves no factor, or none that is good to a percent (of samples that
+/// repeat each other: below some 1e-6 of the signal)
 GaussianProcess condition(const GaussianProcessParameters& parameters, const Eigen::MatrixXd& inputs,
                           const Eigen::VectorXd& targets);
 

@@ -19,6 +19,7 @@ ScaledConjugateGradientEnd minimise_by_scaled_conjugate_gradient(
        "above 0 and at most 1");
   need(settings.least_gradient >= 0.0, "least_gradient", settings.least_gradient, "at least 0");
   need(settings.most_steps >= 1, "most_steps", settings.most_steps, "at least 1");
+  if (x.size() == 0) fail("scaled conjugate gradient: there is nothing to vary; at least one number is needed");
   constexpr double kMostLambda = 1e50;
 
   ScaledConjugateGradientEnd end;

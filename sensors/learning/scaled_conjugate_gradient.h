@@ -30,7 +30,7 @@ struct ScaledConjugateGradientEnd {
 /// fails.
 /// @param watch is called after each step that didn't fail: its number, x and the value there; if it returns true, that
 /// is the end
-/// @throws Error if a setting is out of its range, or value or gradient aren't finite at the first place
+/// @throws Error if a setting is out of its range, x is empty, or value or gradient aren't finite at the first place
 ScaledConjugateGradientEnd minimise_by_scaled_conjugate_gradient(
     const ValueAndGradient& function, Eigen::VectorXd& x, const ScaledConjugateGradientSettings& settings = {},
     const std::function<bool(int step, const Eigen::VectorXd& x, double value)>& watch = {});

@@ -23,8 +23,10 @@ LinearForce fit_linear_force(std::span<const double> measure, std::span<const do
   }
   const auto [low, high] = std::minmax_element(measure.begin(), measure.end());
   const auto [least_force, most_force] = std::minmax_element(force_N.begin(), force_N.end());
-  if (*low == *high) fail("force fit: all measures are {}, a line needs two", *low);
-  if (*least_force == *most_force) fail("force fit: all forces are {} N, a line needs two", *least_force);
+  // Numbers that differ by what rounding left of their sums are one number: the line through them is anything.
+  const auto are_one = [](double a, double b) { return b - a <= 1e-12 * std::max(std::abs(a), std::abs(b)); };
+  if (are_one(*low, *high)) fail("force fit: all measures are {}, a line needs two", *low);
+  if (are_one(*least_force, *most_force)) fail("force fit: all forces are {} N, a line needs two", *least_force);
 
   const double x0 = line == FitLine::kFree ? measure_mean : 0.0;
   const double y0 = line == FitLine::kFree ? force_mean : 0.0;

@@ -31,7 +31,7 @@ enum class FitLine {
 };
 
 /// Least squares in the force. @throws Error for lists of unequal lengths, fewer than three samples, a value that isn't
-/// finite, or measures (or forces) that are all equal
+/// finite, or measures (or forces) that are all equal to 12 digits
 LinearForce fit_linear_force(std::span<const double> measure, std::span<const double> force_N, FitLine line);
 
 /// Shear force (N, along the picture's u and v) of a mean marker displacement (mm) by a gel's line for shear. It has

@@ -28,9 +28,10 @@ TouchReader::TouchReader(const TouchCalibration& calibration, const TouchReaderS
 const TouchReading& TouchReader::read(const Frame& frame) {
   const double diameter_px = calibration_.markers.appearance.diameter_px;
   const double mm_per_px = calibration_.height.mm_per_px;
-  reading_ = {};
+  // Either refuses a frame that can't be taken; until then the last reading stays.
   const MotionRatio motion = motion_ratio(calibration_.background, before_, frame.image, settings_.motion, &contact_);
   const TrackedMarkers& markers = tracker_.track(frame);
+  reading_ = {};
   reading_.light = markers.light;
   const bool lit = markers.light == FrameLight::kNormal;
   if (lit) frame.image.copyTo(before_);  // the next frame's motion is that since the gel was seen

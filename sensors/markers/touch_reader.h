@@ -57,7 +57,8 @@ class TouchReader {
   /// followed; for settings out of their range
   explicit TouchReader(const TouchCalibration& calibration, const TouchReaderSettings& settings = {});
 
-  /// @throws Error for a frame of another size or kind than the background, or that isn't later than the one before
+  /// @throws Error for a frame of another size or kind than the background, or that isn't later than the one before;
+  /// reader and last reading are then as they were
   const TouchReading& read(const Frame& frame);
 
   /// The rim's detector forgets the frames before: for who has just answered slip, since the answer moves the contact,

@@ -176,8 +176,20 @@ void ExploreTracker::hold(PictureFault fault) {
 }
 
 const ExploreReading& ExploreTracker::next(const Frame& frame) {
+  constexpr std::int64_t kLargestTime_us = std::int64_t{1} << 61;
+  if (frame.t_us < -kLargestTime_us || frame.t_us > kLargestTime_us) {
+    fail("explore tracker: the picture's time is {} us; allowed is {} to {}", frame.t_us, -kLargestTime_us,
+         kLargestTime_us);
+  }
+  const std::int64_t t_us = frame.t_us + static_cast<std::int64_t>(std::llround(1e6 * middle_s_));
+  if (has_begun_ && t_us <= reading_.t_us) {
+    const std::int64_t before_us = frame.t_us - (t_us - reading_.t_us);
+    fail("explore tracker: a picture at t = {} us follows one at t = {} us; times must increase", frame.t_us,
+         before_us);
+  }
   const ExploreMode mode_before = reading_.mode;
-  reading_.t_us = frame.t_us + static_cast<std::int64_t>(std::llround(1e6 * middle_s_));
+  has_begun_ = true;
+  reading_.t_us = t_us;
   reading_.correlation = reading_.overlap = reading_.step_correlation = 0.0;
   reading_.fault = find_fault(frame.image);
   if (reading_.fault != PictureFault::none) {

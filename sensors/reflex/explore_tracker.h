@@ -80,6 +80,7 @@ class ExploreTracker {
   ExploreTracker(const cv::Mat& rest, const ExploreSettings& settings);
 
   /// Takes the next picture (CV_8UC1). Its time is that of its first pixel. Never throws for what a camera shows.
+  /// @throws Error for a time that isn't after that of the picture before, or beyond 2^61 us; nothing has then changed
   const ExploreReading& next(const Frame& frame);
 
   const ExploreReading& last() const { return reading_; }
@@ -100,6 +101,7 @@ class ExploreTracker {
   double middle_s_ = 0.0;
   DotsPicture rest_;
   Key key_, last_;
+  bool has_begun_ = false;  // a picture was taken, with or without fault: reading_ has its time
   std::int64_t last_t_us_ = 0;
   bool has_last_ = false;   // of the frame before this one, without fault
   DotsMotion before_last_;  // for where the motion is going

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/QR>
+#include <algorithm>
 #include <limits>
 
 #include "core/error.h"
@@ -42,10 +43,18 @@ ExponentialForce fit_exponential_force(std::span<const PressSample> samples) {
   constexpr double kLeastRate = 1e-3, kMostRate = 10.0;  // per mm
   constexpr int kPlaces = 400;
   if (samples.size() < 4) fail("exponential law: {} samples, at least 4 are needed", samples.size());
+  double least_mm = std::numeric_limits<double>::infinity(), most_mm = 0.0;  // of what presses
   for (const PressSample& one : samples) {
     if (!std::isfinite(one.press_mm) || !std::isfinite(one.force_N)) {
       fail("exponential law: a sample is ({} mm, {} N); finite numbers are needed", one.press_mm, one.force_N);
     }
+    if (one.press_mm <= 0.0) continue;
+    least_mm = std::min(least_mm, one.press_mm);
+    most_mm = std::max(most_mm, one.press_mm);
+  }
+  if (!(most_mm > 0.0)) fail("exponential law: no press is above 0 mm; two different ones are needed");
+  if (most_mm - least_mm <= 1e-9 * most_mm) {
+    fail("exponential law: all presses above 0 are {} mm; two different ones are needed", most_mm);
   }
   // For a given rate the scale is linear; the rate is sought on a grid first, so that the best of all is found.
   const auto law_of = [&](double rate) {

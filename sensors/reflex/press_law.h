@@ -48,9 +48,9 @@ struct PressSample {
   double force_N = 0.0;
 };
 
-/// Least squares in the force, over both figures. @throws Error for fewer than 4 samples, values that aren't finite, or
-/// samples that no law with a rate of 0.001/mm to 10/mm fits better than its neighbours (as forces that fall with the
-/// press)
+/// Least squares in the force, over both figures. @throws Error for fewer than 4 samples, values that aren't finite,
+/// fewer than two different presses above 0, or samples that no law with a rate of 0.001/mm to 10/mm fits better than
+/// its neighbours (as forces that fall with the press)
 ExponentialForce fit_exponential_force(std::span<const PressSample> samples);
 
 }  // namespace touchstone::sensors

@@ -50,8 +50,11 @@ fem::SteadyVibration ShakenPress::Parts::answer(const fem::PressState& mean, con
 void ShakenPress::Parts::refuse_unless_it_holds(const fem::PressState& mean, const fem::SteadyVibration& steady,
                                                 const VibrationSpec& shaking) const {
   if (steady.truncation > kMostTruncation) {
-    fail("a vibration at {:.4g} Hz is too fast for the gel's {} modes, which end at {:.4g} Hz", shaking.frequency_Hz,
-         vibration.angular_frequency.size(), vibration.angular_frequency.tail<1>()[0] / (2.0 * kPi));
+    fail(
+        "a vibration at {:.4g} Hz is too fast for the gel's {} modes, which end at {:.4g} Hz, or too near a resonance: "
+        "those that are left out would change its force by {:.2g} of it; allowed is {}",
+        shaking.frequency_Hz, vibration.angular_frequency.size(),
+        vibration.angular_frequency.tail<1>()[0] / (2.0 * kPi), steady.truncation, kMostTruncation);
   }
   const Eigen::Vector3d shaken = steady.force.cwiseAbs();
   if (shaken.z() >= mean.wrench[2]) {

@@ -20,8 +20,9 @@ class ShakenPress {
 
   /// The state at `seconds` since the vibration's start: pose, force, torque, tractions and displacements. What tells
   /// of the contact laws (residuals, states of nodes, area) stays the mean press's.
-  /// @throws Error if the force's amplitude would lift the body off the gel or make it slide, or if the frequency is
-  /// too high for the modes (a truncation over 5 % of the force)
+  /// @throws Error if the force's amplitude would lift the body off the gel or make it slide, if the frequency is too
+  /// high for the modes or too near a resonance for them (a truncation over 5 % of the force), or at a resonance that
+  /// nothing damps (StuckPatch::answer)
   fem::PressState at(const fem::PressState& mean, const VibrationSpec& vibration, double seconds);
 
  private:

@@ -12,13 +12,13 @@
 
 #include "sensors/beads/bead_tracker.h"
 #include "sensors/colour/colour_marker_finder.h"
-#include "sensors/heights/height_calibration.h"
 #include "sensors/heights/height_estimator.h"
 #include "sensors/markers/marker_tracker.h"
 #include "sensors/markers/touch_reader.h"
 #include "sensors/reflex/explore_tracker.h"
 #include "sensors/reflex/reflex_loop.h"
 #include "tests/hard_cases/hard_case.h"
+#include "tests/hard_cases/small_height_model.h"
 #include "tests/sensors/beads/rendered_beads.h"
 #include "tests/sensors/colour/painted_colour_markers.h"
 #include "tests/sensors/heights/painted_gel.h"
@@ -71,24 +71,11 @@ TEST(HardCase30, TheBeadTrackerSaysSoAndHoldsItsBeads) {
   EXPECT_EQ(after.found(), 9);
 }
 
-constexpr int kWidth = 240;
-constexpr int kHeight = 180;
-constexpr double kScale_mm = 0.053;
-
-HeightModel height_model(fixtures::GelPainter& painter) {
-  HeightCalibrationSettings settings;
-  settings.mm_per_px = kScale_mm;
-  settings.table.most_cells = 1U << 15U;  // a smaller table than the default's, to be quick
-  settings.correction = LightCorrection::none;
-  settings.cross_validate = false;
-  return calibrate_height(painter.presses(2, 2, 1.0, 0.75), painter.background(), settings).model;
-}
-
 TEST(HardCase30, TheHeightEstimatorSaysSo) {
-  fixtures::GelPainter painter(kWidth, kHeight, kScale_mm, {});
-  HeightEstimator estimator(height_model(painter));
+  fixtures::GelPainter painter(kGelWidth, kGelHeight, kGelScale_mm, {});
+  HeightEstimator estimator(small_height_model(painter));
   for (const auto& [name, value, light] : kBadLights) {
-    const HeightResult& result = estimator.estimate(even({kWidth, kHeight}, CV_8UC3, value));
+    const HeightResult& result = estimator.estimate(even({kGelWidth, kGelHeight}, CV_8UC3, value));
     EXPECT_FALSE(result.trusted()) << name;
     EXPECT_EQ(result.dark, light == FrameLight::kDark) << name;
     EXPECT_EQ(result.overexposed, light == FrameLight::kSaturated) << name;
@@ -100,7 +87,7 @@ TEST(HardCase30, TheHeightEstimatorSaysSo) {
         : result.flat        ? ", as flat"
                              : "");
   }
-  const std::string said = message_of([&] { estimator.estimate(even({kWidth, 100}, CV_8UC3, 90)); });
+  const std::string said = message_of([&] { estimator.estimate(even({kGelWidth, 100}, CV_8UC3, 90)); });
   EXPECT_THAT(said, HasSubstr("240 x 100"));
   did("gelsight, height estimator: a frame of another size is {}", refused(said));
   EXPECT_TRUE(estimator.estimate(painter.rest()).trusted());
@@ -129,34 +116,19 @@ TEST(HardCase30, TheMarkerTrackerSaysSoAndHoldsItsMarkers) {
 }
 
 TEST(HardCase30, TheTouchReaderSaysSoAndTakesNoSlipFromIt) {
-  fixtures::GelPainter painter(kWidth, kHeight, kScale_mm, {});
-  TouchCalibration calibration;
-  calibration.height = height_model(painter);
-  calibration.normal.newton_per_unit = 0.1;
-  calibration.shear.newton_per_unit = 2.0;
-  const std::vector<Eigen::Vector2d> markers = fixtures::marker_grid(22.6, kWidth, kHeight);
-  const cv::Mat ink =
-      fixtures::paint_markers({.width = kWidth, .height = kHeight, .brightness = 255, .shading = 0}, markers);
-  const auto frame = [&](const fixtures::Field& field) {
-    cv::Mat picture = painter.paint(field);
-    cv::multiply(picture, ink, picture, 1.0 / 255);
-    return picture;
-  };
-  const fixtures::Ball ball{kScale_mm * Eigen::Vector2d(120, 90), 6.0, 2.2};
-  const auto pressed = [&](const Eigen::Vector2d& place) { return ball.at(place); };
-  calibration.background = frame([](const Eigen::Vector2d&) { return fixtures::Relief{}; });
-  TouchReader reader(calibration);
+  MarkedGel gel;
+  TouchReader reader(gel.calibration());
   std::int64_t t_us = 0;
-  const double force_N = reader.read({frame(pressed), ++t_us}).normal_N;
+  const double force_N = reader.read({gel.pressed(), ++t_us}).normal_N;
   for (const auto& [name, value, light] : kBadLights) {
-    const TouchReading& reading = reader.read({even({kWidth, kHeight}, CV_8UC3, value), ++t_us});
+    const TouchReading& reading = reader.read({even({kGelWidth, kGelHeight}, CV_8UC3, value), ++t_us});
     EXPECT_EQ(reading.light, light) << name;
     EXPECT_EQ(reading.markers_found, 0) << name;
     EXPECT_FALSE(reading.rule_slip || reading.rim.slips()) << name;
     did("gelsight, touch reader: a {} frame is called {}, {} of {} markers found, no slip", name,
-        name_of(reading.light), reading.markers_found, markers.size());
+        name_of(reading.light), reading.markers_found, gel.markers.size());
   }
-  const TouchReading& after = reader.read({frame(pressed), ++t_us});
+  const TouchReading& after = reader.read({gel.pressed(), ++t_us});
   Worst away{0.01};
   EXPECT_EQ(after.light, FrameLight::kNormal);
   EXPECT_LT(away(std::abs(after.normal_N / force_N - 1.0)), away.bar);
