@@ -35,7 +35,8 @@ Eigen::Vector3d PartSolver::weighted_at(const PressSnapshot& snapshot, int verte
   const Eigen::MatrixXd rows = gel_.surface.block(bearing, std::array{vertex});  // symmetric
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (std::size_t k = 0; k < bearing.size(); ++k) {
-    sum += rows.middleRows<3>(3 * static_cast<Eigen::Index>(k)).transpose() * snapshot.traction.segment<3>(3 * bearing[k]);
+    sum +=
+        rows.middleRows<3>(3 * static_cast<Eigen::Index>(k)).transpose() * snapshot.traction.segment<3>(3 * bearing[k]);
   }
   return sum;
 }

@@ -46,7 +46,7 @@ CompressedBorder compress_border(ElementSystem system, const Eigen::SparseMatrix
                                  double surface_scale, const TetMesh& mesh, const OuterSurface& surface, int beads,
                                  FactorReport& factor) {
   constexpr int kProbes = 8;
-  constexpr double kTolerance = 1e-3;   // of the mean diagonal entry
+  constexpr double kTolerance = 1e-3;     // of the mean diagonal entry
   constexpr double kLargestError = 1e-2;  // likewise
   const int n = static_cast<int>(surface.mesh_vertex.size());
   std::mt19937_64 random;
@@ -102,8 +102,8 @@ CompressedBorder compress_border(ElementSystem system, const Eigen::SparseMatrix
   CompressedBorder result{found, schur->whole.topLeftCorner(3 * beads, 3 * n), 0.0};
   result.error = std::sqrt(squares / (0.5 * kProbes * (kProbes - 1.0))) / diagonal;
   if (!(result.error < kLargestError)) {
-    fail("compressing the compliance of {} surface vertices left out {:.1e} of its mean diagonal, {:.0e} are allowed", n,
-         result.error, kLargestError);
+    fail("compressing the compliance of {} surface vertices left out {:.1e} of its mean diagonal, {:.0e} are allowed",
+         n, result.error, kLargestError);
   }
   return result;
 }
@@ -122,8 +122,8 @@ Compliance compute_compliance(const TetMesh& mesh, std::span<const ElasticMateri
 }
 
 Compliance compute_compliance(const TetMesh& mesh, std::span<const ElasticMaterial> materials,
-                              std::span<const Bead> beads, double thickness, Element element,
-                              const Progress& progress, int most_whole) {
+                              std::span<const Bead> beads, double thickness, Element element, const Progress& progress,
+                              int most_whole) {
   const auto tell = [&](int step) {
     if (progress) {
       progress("elasticity", step, 3);

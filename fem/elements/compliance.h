@@ -30,11 +30,11 @@ struct ComplianceReport {
   double smallest_dihedral_deg = 0.0;  ///< under some 5 degrees, expect loss of accuracy, but in flat prisms of layers
   double fine_edge = 0.0;              ///< mm, where contact is made; 0 if who asked for the mesh didn't say
   double factor_entries = 0.0;
-  double operations = 0.0;  ///< floating-point operations of the elimination
-  double memory_mb = 0.0;   ///< of the elimination on one thread
+  double operations = 0.0;         ///< floating-point operations of the elimination
+  double memory_mb = 0.0;          ///< of the elimination on one thread
   double compression_error = 0.0;  ///< of a surface compliance whose far parts are compressed: Frobenius norm of what
                                    ///< that left out, over the mean diagonal entry, measured
-  std::string note;         ///< from the cache: empty, or what was wrong with the file there; not stored
+  std::string note;                ///< from the cache: empty, or what was wrong with the file there; not stored
 };
 
 /// Linear response of the gel to tractions on its outer surface, which are P1 on its triangles. Degree of freedom
@@ -46,7 +46,7 @@ struct Compliance {
   std::vector<std::array<int, 3>> triangles;  ///< over `vertices`, normal out
   Eigen::SparseMatrix<double> mass;  ///< n x n: int phi_i phi_j dA, mm^2 (P1 hats); its row sums are the weights
   SurfaceCompliance surface;  ///< 3n x 3n, symmetric positive definite: int phi_i u_a dA (mm^3) per traction (MPa)
-  SharedMatrix beads;    ///< 3m x 3n: mean displacement of a bead's surface (mm) per traction (MPa)
+  SharedMatrix beads;         ///< 3m x 3n: mean displacement of a bead's surface (mm) per traction (MPa)
   ComplianceReport report;
   MeshErrorTable mesh_error;  ///< empty if it wasn't measured (see fem/error/mesh_error.h)
 };
@@ -55,8 +55,8 @@ struct Compliance {
 /// is asked for (int phi_i u_a over the outer surface; the mean over each bead's surface); the Schur complement of
 /// [K C^T; C 0] on the border is -C K^-1 C^T. A bead is a rigid sphere that moves with the gel and doesn't stiffen it:
 /// it goes where the gel's mean over its surface goes (Faxen's law [Faxen1922] for a sphere without a force on it). The
-/// vertices keep the mesh's order. Of a large surface the far parts are compressed: what that leaves out is measured and
-/// in the report. `materials` has one entry for each region of the mesh. `thickness` is copied.
+/// vertices keep the mesh's order. Of a large surface the far parts are compressed: what that leaves out is measured
+/// and in the report. `materials` has one entry for each region of the mesh. `thickness` is copied.
 /// @throws Error for an unfit mesh (see fault_of) or material, for a bead that isn't wholly inside the gel, for more
 /// vertices or beads than are allowed, or if memory runs out
 Compliance compute_compliance(const TetMesh& mesh, std::span<const ElasticMaterial> materials,

@@ -9,8 +9,9 @@
 //         the same of `beads`. The two matrices begin at multiples of 4096, column after column of doubles
 //         (a `surface` of one column is the numbers of a compliance with compressed far parts)
 //   152   XXH3, 128 bits, canonical (big-endian): of all before it and of all after it
-// The body holds what is small: geometry, mass matrix, report, the layout of compressed parts. (XXH3: Y. Collet's xxHash 0.8; it isn't cryptographic
-// and needn't be: it guards against faults, and 42 MB take 4 ms where SHA-256 took 96.)
+// The body holds what is small: geometry, mass matrix, report, the layout of compressed parts. (XXH3: Y. Collet's
+// xxHash 0.8; it isn't cryptographic and needn't be: it guards against faults, and 42 MB take 4 ms where SHA-256
+// took 96.)
 
 #include <filesystem>
 #include <string>

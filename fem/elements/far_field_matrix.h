@@ -47,8 +47,8 @@ class FarFieldMatrix {
   FarFieldMatrix() = default;
   /// From what was stored. @throws Error if the parts don't fit together
   explicit FarFieldMatrix(Parts parts, double factor = 1.0);
-  /// `columns_of(vertices)`: three columns of the matrix for each vertex; it is called from several threads. What far blocks leave out is, all in all,
-  /// about `tolerance` (Frobenius).
+  /// `columns_of(vertices)`: three columns of the matrix for each vertex; it is called from several threads. What far
+  /// blocks leave out is, all in all, about `tolerance` (Frobenius).
   FarFieldMatrix(std::span<const Eigen::Vector3d> vertices,
                  const std::function<Eigen::MatrixXd(std::span<const int>)>& columns_of, double tolerance);
 

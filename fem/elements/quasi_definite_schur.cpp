@@ -1,22 +1,19 @@
 #include "fem/elements/quasi_definite_schur.h"
 
-#include <sys/mman.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
-#include <array>
 #include <atomic>
-#include <bit>
 #include <chrono>
 #include <cmath>
-#include <mutex>
-#include <new>
 #include <utility>
 #include <vector>
 
 #include "core/error.h"
+#include "fem/elements/elimination_groups.h"
 #include "fem/elements/front.h"
+#include "fem/elements/number_pool.h"
 #include "fem/elements/row_skeleton.h"
 
 extern "C" {
@@ -27,82 +24,11 @@ int openblas_get_num_threads(void);
 namespace touchstone::fem {
 namespace {
 
-/// Memory for doubles, straight from the system: pages that are never touched are never there.
-class Numbers {
- public:
-  Numbers() = default;
-  explicit Numbers(std::size_t count) : count_(count) {
-    void* const memory = mmap(nullptr, bytes(), PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
-    if (memory == MAP_FAILED) throw std::bad_alloc();
-    data_ = static_cast<double*>(memory);
-  }
-  Numbers(Numbers&& other) noexcept
-      : data_(std::exchange(other.data_, nullptr)), count_(std::exchange(other.count_, 0)) {}
-  Numbers& operator=(Numbers&& other) noexcept {
-    std::swap(data_, other.data_);
-    std::swap(count_, other.count_);
-    return *this;
-  }
-  ~Numbers() {
-    if (data_ != nullptr) munmap(data_, bytes());
-  }
-
-  double* get() const { return data_; }
-  std::size_t bytes() const { return count_ * sizeof(double); }
-
- private:
-  double* data_ = nullptr;
-  std::size_t count_ = 0;
-};
-
-/// Memory that is used again and again: to take fresh pages for each front cost a fifth of the time.
-class Pool {
- public:
-  /// At least `count` doubles of any value.
-  Numbers take(std::size_t count) {
-    const std::size_t size = std::bit_ceil(std::max(count, kSmallest));
-    {
-      const std::lock_guard lock(gate_);
-      auto& kept = free_[static_cast<std::size_t>(std::countr_zero(size))];
-      if (!kept.empty()) {
-        Numbers numbers = std::move(kept.back());
-        kept.pop_back();
-        return numbers;
-      }
-    }
-    return Numbers(size);
-  }
-  void give_back(Numbers numbers) {
-    if (numbers.get() == nullptr || numbers.bytes() > kLargestKept) return;
-    const std::lock_guard lock(gate_);
-    free_[static_cast<std::size_t>(std::countr_zero(numbers.bytes() / sizeof(double)))].push_back(std::move(numbers));
-  }
-
- private:
-  static constexpr std::size_t kSmallest = std::size_t{1} << 14;
-  static constexpr std::size_t kLargestKept = std::size_t{1} << 26;
-  std::mutex gate_;
-  std::array<std::vector<Numbers>, 64> free_;
-};
-
 /// What a group of unknowns leaves to its parent: the rows of its front that weren't eliminated, and the lower half of
 /// their Schur complement, column after column.
 struct Update {
   std::vector<int> rows;
   Numbers values;
-};
-
-struct Group {
-  int first = 0;     ///< its pivots' places are first .. first + positive + negative - 1
-  int positive = 0;  ///< come before the negative ones
-  int negative = 0;
-  std::vector<int> children;
-  std::vector<int> rows;    ///< places of its front: the pivots, then what they meet later, rising
-  std::size_t entries = 0;  ///< its part of the entries sorted by group
-  std::size_t entries_end = 0;
-  double work = 0.0;  ///< operations of its branch
-  std::ptrdiff_t size = 0;  ///< of its front
-  std::ptrdiff_t left = 0;  ///< rows of what it leaves to its parent
 };
 
 /// From so many rows of the border on a front's are compressed.
@@ -131,27 +57,13 @@ class Elimination {
         free_(matrix.size - last),
         whole_from_(matrix.size - whole.value_or(0)),
         compresses_(whole.has_value()),
-        groups_(tree.parent.size()) {
-    place_unknowns(tree);
-    sort_entries(tree);
-    for (std::size_t g = 0; g < groups_.size(); ++g) {
-      if (tree.parent[g] < 0) {
-        roots_.push_back(static_cast<int>(g));
-      } else {
-        TS_ASSERT(tree.parent[g] > static_cast<int>(g));
-        groups_[tree.parent[g]].children.push_back(static_cast<int>(g));
-      }
-    }
-    for (Group& group : groups_) {
-      find_rows(group);
-      group.size = std::ssize(group.rows);
-      group.left = group.size - group.positive - group.negative;
-    }
+        plan_(matrix, last, tree),
+        groups_(plan_.groups()) {
     if (!compresses_) return;
     compressed_.resize(groups_.size());
     // Basis vectors have places behind all unknowns.
     int next = matrix.size;
-    for (const Group& group : groups_) {
+    for (const EliminationGroup& group : groups_) {
       first_basis_.push_back(next);
       next += static_cast<int>(group.rows.end() - std::lower_bound(group.rows.begin(), group.rows.end(), free_));
     }
@@ -159,7 +71,7 @@ class Elimination {
 
   /// The Schur complement's lower half; false if a pivot failed.
   bool run(Eigen::MatrixXd& schur) {
-    for (const int root : roots_) {
+    for (const int root : plan_.roots()) {
       const Update update = eliminate(root);
       if (failed_) return false;
       const auto size = static_cast<std::ptrdiff_t>(update.rows.size());
@@ -168,17 +80,17 @@ class Elimination {
         for (std::ptrdiff_t i = j; i < size; ++i) schur(update.rows[i] - free_, update.rows[j] - free_) += *value++;
       }
     }
-    for (std::size_t k = border_entries_; k < sorted_.size(); ++k) {
-      const auto [row, column] = places_of(sorted_[k]);
-      schur(std::max(row, column) - free_, std::min(row, column) - free_) += matrix_.values[sorted_[k]];
+    for (const std::size_t entry : plan_.border_entries()) {
+      const auto [row, column] = plan_.places_of(entry);
+      schur(std::max(row, column) - free_, std::min(row, column) - free_) += matrix_.values[entry];
     }
     return true;
   }
 
   /// As run(), with what was compressed taken out by groups; `whole` is the last unknowns' own complement.
   bool run_compressed(Eigen::MatrixXd& whole) {
-    TS_ASSERT(border_entries_ == sorted_.size());
-    for (const int root : roots_) {
+    TS_ASSERT(plan_.border_entries().empty());
+    for (const int root : plan_.roots()) {
       const Update update = eliminate(root);
       if (failed_) return false;
       const auto size = static_cast<std::ptrdiff_t>(update.rows.size());
@@ -194,101 +106,21 @@ class Elimination {
   HierarchicalMatrix compressed(Eigen::MatrixXd& whole_rows);
 
   void describe(FactorReport& report) const {
-    for (const Group& group : groups_) {
+    for (const EliminationGroup& group : groups_) {
       const double n = static_cast<double>(group.rows.size());
       const double k = group.positive + group.negative;
       report.factor_entries += static_cast<std::int64_t>(k * n - k * (k - 1.0) / 2.0);
       report.negative_pivots += group.negative;
     }
-    for (const int root : roots_) {
+    for (const int root : plan_.roots()) {
       report.operations += groups_[root].work;
       report.memory_mb = std::max(report.memory_mb, sizeof(double) * peak(root) / 1e6);
     }
   }
 
  private:
-  /// Places in the order of elimination; within a group those of a positive diagonal come first.
-  void place_unknowns(const EliminationTree& tree) {
-    std::vector<double> diagonal(matrix_.size, 0.0);
-    for (std::size_t k = 0; k < matrix_.rows.size(); ++k) {
-      if (matrix_.rows[k] == matrix_.columns[k]) diagonal[matrix_.rows[k]] += matrix_.values[k];
-    }
-    TS_ASSERT(static_cast<int>(tree.order.size()) == free_);
-    place_.assign(matrix_.size, -1);
-    group_of_.resize(free_);
-    int next = 0;
-    for (std::size_t g = 0; g < groups_.size(); ++g) {
-      Group& group = groups_[g];
-      group.first = next;
-      const int end = tree.end[g];
-      const int begin = next;
-      for (const bool positive : {true, false}) {
-        for (int k = begin; k < end; ++k) {
-          const int unknown = tree.order[k];
-          if ((diagonal[unknown] > 0.0) != positive) continue;
-          TS_ASSERT(unknown < free_ && place_[unknown] < 0);
-          group_of_[next] = static_cast<int>(g);
-          place_[unknown] = next++;
-          ++(positive ? group.positive : group.negative);
-        }
-      }
-    }
-    TS_ASSERT(next == free_);
-    for (int border = free_; border < matrix_.size; ++border) place_[border] = border;
-  }
-
-  std::pair<int, int> places_of(std::size_t entry) const {
-    return {place_[matrix_.rows[entry]], place_[matrix_.columns[entry]]};
-  }
-
-  /// Each entry belongs to the group that eliminates the earlier of its two unknowns; those of the border to none.
-  void sort_entries(const EliminationTree& tree) {
-    const std::size_t none = tree.parent.size();
-    std::vector<std::size_t> count(none + 2, 0);
-    const auto owner = [&](std::size_t entry) {
-      const auto [row, column] = places_of(entry);
-      const int earlier = std::min(row, column);
-      return earlier < free_ ? static_cast<std::size_t>(group_of_[earlier]) : none;
-    };
-    for (std::size_t k = 0; k < matrix_.rows.size(); ++k) ++count[owner(k) + 1];
-    for (std::size_t g = 0; g <= none; ++g) count[g + 1] += count[g];
-    for (std::size_t g = 0; g < none; ++g) {
-      groups_[g].entries = count[g];
-      groups_[g].entries_end = count[g + 1];
-    }
-    border_entries_ = count[none];
-    sorted_.resize(matrix_.rows.size());
-    for (std::size_t k = 0; k < sorted_.size(); ++k) sorted_[count[owner(k)]++] = k;
-  }
-
-  /// Children come before parents.
-  void find_rows(Group& group) {
-    const int pivots = group.positive + group.negative;
-    const int end = group.first + pivots;
-    std::vector<int> later;
-    for (std::size_t k = group.entries; k < group.entries_end; ++k) {
-      const auto [row, column] = places_of(sorted_[k]);
-      if (std::max(row, column) >= end) later.push_back(std::max(row, column));
-    }
-    for (const int child : group.children) {
-      const Group& below = groups_[child];
-      for (std::size_t i = static_cast<std::size_t>(below.positive + below.negative); i < below.rows.size(); ++i) {
-        if (below.rows[i] >= end) later.push_back(below.rows[i]);
-      }
-      group.work += below.work;
-    }
-    std::sort(later.begin(), later.end());
-    later.erase(std::unique(later.begin(), later.end()), later.end());
-    group.rows.resize(pivots);
-    for (int k = 0; k < pivots; ++k) group.rows[k] = group.first + k;
-    group.rows.insert(group.rows.end(), later.begin(), later.end());
-    const double n = static_cast<double>(group.rows.size());
-    const double rest = n - pivots;
-    group.work += (n * n * n - rest * rest * rest) / 3.0;
-  }
-
   Update eliminate(int number) {
-    Group& group = groups_[number];
+    EliminationGroup& group = groups_[number];
     std::vector<Update> updates(group.children.size());
     const auto one_child = [&](std::size_t k) { updates[k] = eliminate(group.children[k]); };
     // A branch of little work isn't worth a task.
@@ -298,7 +130,11 @@ class Elimination {
       for (std::size_t k = 0; k < updates.size(); ++k) one_child(k);
     }
     if (failed_) return {};
-    if (compresses_) find_compressed_rows(group, updates);
+    if (compresses_) {  // it is known only now what its children's rows were compressed to
+      std::vector<int> later;
+      for (const Update& update : updates) later.insert(later.end(), update.rows.begin(), update.rows.end());
+      plan_.set_rows(group, std::move(later));
+    }
 
     const auto size = static_cast<std::ptrdiff_t>(group.rows.size());
     group.size = size;
@@ -310,11 +146,11 @@ class Elimination {
       if (place < group.first + pivots) return static_cast<std::ptrdiff_t>(place - group.first);
       return std::lower_bound(group.rows.begin() + pivots, group.rows.end(), place) - group.rows.begin();
     };
-    for (std::size_t k = group.entries; k < group.entries_end; ++k) {
-      const auto [row, column] = places_of(sorted_[k]);
+    for (const std::size_t entry : plan_.entries_of(group)) {
+      const auto [row, column] = plan_.places_of(entry);
       const std::ptrdiff_t i = place_in_front(std::max(row, column));
       const std::ptrdiff_t j = place_in_front(std::min(row, column));
-      front[i + j * size] += matrix_.values[sorted_[k]];
+      front[i + j * size] += matrix_.values[entry];
     }
     for (Update& update : updates) {
       add(update, place_in_front, front, size);
@@ -326,25 +162,6 @@ class Elimination {
     if (compresses_ && !failed_) compress(number, result);
     group.left = std::ssize(result.rows);
     return result;
-  }
-
-  /// Its rows once it is known what its children's were compressed to.
-  void find_compressed_rows(Group& group, const std::vector<Update>& updates) const {
-    const int pivots = group.positive + group.negative;
-    std::vector<int> later;
-    for (std::size_t k = group.entries; k < group.entries_end; ++k) {
-      const auto [row, column] = places_of(sorted_[k]);
-      if (std::max(row, column) >= group.first + pivots) later.push_back(std::max(row, column));
-    }
-    for (const Update& update : updates) {
-      for (const int row : update.rows) {
-        if (row >= group.first + pivots) later.push_back(row);
-      }
-    }
-    std::sort(later.begin(), later.end());
-    later.erase(std::unique(later.begin(), later.end()), later.end());
-    group.rows.resize(static_cast<std::size_t>(pivots));
-    group.rows.insert(group.rows.end(), later.begin(), later.end());
   }
 
   /// Takes the border's own complement out of what a group leaves, and leaves few combinations of the border's rows.
@@ -360,7 +177,9 @@ class Elimination {
     }
     const auto count = std::ssize(members);
     const auto keep = std::ssize(kept);
-    if (count == 0 || (later > 0 && (count < kLeastCompressed || static_cast<double>(count) < kFewLater * static_cast<double>(later)))) return;
+    if (count == 0 || (later > 0 && (count < kLeastCompressed ||
+                                     static_cast<double>(count) < kFewLater * static_cast<double>(later))))
+      return;
     const std::ptrdiff_t size = std::ssize(update.rows);
     const auto value = [&](std::ptrdiff_t i, std::ptrdiff_t j) {
       const auto [low, high] = std::minmax(i, j);
@@ -400,7 +219,8 @@ class Elimination {
     double* to = less.values.get();
     for (std::ptrdiff_t j = 0; j < keep + rank; ++j) {
       for (std::ptrdiff_t i = j; i < keep; ++i) *to++ = value(kept[i], kept[j]);
-      for (std::ptrdiff_t i = std::max(j, keep); i < keep + rank; ++i) *to++ = j < later ? value(members[few.kept[i - keep]], kept[j]) : 0.0;
+      for (std::ptrdiff_t i = std::max(j, keep); i < keep + rank; ++i)
+        *to++ = j < later ? value(members[few.kept[i - keep]], kept[j]) : 0.0;
     }
     compressed_[number] = std::move(found);
     pool_.give_back(std::move(update.values));
@@ -420,7 +240,7 @@ class Elimination {
     });
   }
 
-  Update left_over(const Group& group, const double* front, std::ptrdiff_t size) {
+  Update left_over(const EliminationGroup& group, const double* front, std::ptrdiff_t size) {
     const auto pivots = static_cast<std::ptrdiff_t>(group.positive + group.negative);
     const std::ptrdiff_t count = size - pivots;
     Update result;
@@ -446,12 +266,12 @@ class Elimination {
 
   /// Doubles at the peak of a branch that is eliminated by itself, one front at a time.
   double peak(int number) const {
-    const Group& group = groups_[number];
+    const EliminationGroup& group = groups_[number];
     double kept = 0.0;
     double most = 0.0;
     for (const int child : group.children) {
       most = std::max(most, kept + peak(child));
-      const Group& below = groups_[child];
+      const EliminationGroup& below = groups_[child];
       kept += static_cast<double>(packed(below.left));
     }
     return std::max(most, kept + std::pow(static_cast<double>(group.size), 2));
@@ -461,15 +281,11 @@ class Elimination {
   int free_;
   int whole_from_;
   bool compresses_;
-  std::vector<Group> groups_;
-  std::vector<int> roots_;
-  std::vector<int> place_;     ///< of each unknown in the order of elimination
-  std::vector<int> group_of_;  ///< of each place
-  std::vector<std::size_t> sorted_;
-  std::size_t border_entries_ = 0;  ///< from here on in `sorted_`
+  EliminationGroups plan_;
+  std::vector<EliminationGroup>& groups_;
   std::vector<int> first_basis_;  ///< place of each group's first basis vector
   std::vector<std::optional<Compressed>> compressed_;
-  Pool pool_;
+  NumberPool pool_;
   std::atomic<bool> failed_{false};
 };
 

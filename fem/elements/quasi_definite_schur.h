@@ -26,8 +26,8 @@ struct CompressedSchur {
 
 /// The same Schur complement, never made whole: as fronts go up the tree, the border's rows in them are replaced by few
 /// combinations of them ([Xia2009], without compressing the pivots), and the border's own complement is kept where it
-/// arises. What is left out is some 1e-7 of it: measure it by random rows among the last `whole`, whose complement among
-/// themselves is exact. No two unknowns of the border may meet in `matrix`.
+/// arises. What is left out is some 1e-7 of it: measure it by random rows among the last `whole`, whose complement
+/// among themselves is exact. No two unknowns of the border may meet in `matrix`.
 std::optional<CompressedSchur> compressed_schur(const SymmetricEntries& matrix, int last, int whole,
                                                 const EliminationTree& tree, FactorReport* report = nullptr);
 

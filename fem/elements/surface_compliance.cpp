@@ -68,7 +68,8 @@ SurfaceCompliance SurfaceCompliance::mirrored(const Eigen::Vector3d& signs) cons
 }
 
 double SurfaceCompliance::bytes() const {
-  return sizeof(double) * static_cast<double>(whole() != nullptr ? whole()->size() : compressed()->parts().numbers.size());
+  return sizeof(double) *
+         static_cast<double>(whole() != nullptr ? whole()->size() : compressed()->parts().numbers.size());
 }
 
 }  // namespace touchstone::fem

@@ -15,9 +15,9 @@ class SurfaceCompliance {
  public:
   /// Of size 0.
   SurfaceCompliance() = default;
-  SurfaceCompliance(SharedMatrix whole) : matrix_(std::move(whole)) {}               // NOLINT: a matrix is one of these
+  SurfaceCompliance(SharedMatrix whole) : matrix_(std::move(whole)) {}  // NOLINT: a matrix is one of these
   SurfaceCompliance(Eigen::MatrixXd whole) : matrix_(SharedMatrix(std::move(whole))) {}  // NOLINT: likewise
-  SurfaceCompliance(FarFieldMatrix compressed) : matrix_(std::move(compressed)) {}   // NOLINT: likewise
+  SurfaceCompliance(FarFieldMatrix compressed) : matrix_(std::move(compressed)) {}       // NOLINT: likewise
 
   /// Three for each vertex.
   Eigen::Index rows() const;

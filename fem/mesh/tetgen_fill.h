@@ -43,7 +43,7 @@ TetMesh fill_with_tetrahedra(const FillInput& input, const std::string& what);
 inline constexpr double kTetrahedraPerCube = 8.0;
 
 /// More tetrahedra than this are refused before they are made: the elimination would take some 6 GB and a minute.
-inline constexpr double kMostTetrahedra = 400000.0;
+inline constexpr double kMostTetrahedra = 160000.0;
 
 /// Refuses them by an estimate: `what` is the body in words, `fine_part` what its fine edges (`fine`, mm) fill.
 /// @throws Error if there would be more than kMostTetrahedra, or the estimate isn't a number
