@@ -162,7 +162,7 @@ Compliance compute_compliance(const TetMesh& mesh, std::span<const ElasticMateri
   const double displacement_per_traction = scales.length / scales.stress / (scales.length * scales.length);
   const double surface_factor = -displacement_per_traction / (surface_scale * surface_scale);
   const double bead_factor = -displacement_per_traction / surface_scale;
-  if (std::sqrt(static_cast<double>(n) * (n + m)) <= most_whole) {
+  if (is_kept_whole(n, m, most_whole)) {
     std::optional<Eigen::MatrixXd> found = quasi_definite_schur(system.matrix, 3 * (n + m), system.tree, &factor);
     if (!found) {  // slower, but it can pivot
       found = schur_complement(system.matrix, 3 * (n + m), system.tree.order, &factor);
@@ -193,6 +193,10 @@ Compliance compute_compliance(const TetMesh& mesh, std::span<const ElasticMateri
   gel.report.memory_mb = factor.memory_mb;
   tell(3);
   return gel;
+}
+
+bool is_kept_whole(int vertices, int beads, int most_whole) {
+  return std::sqrt(static_cast<double>(vertices) * (vertices + beads)) <= most_whole;
 }
 
 Compliance with_modulus(const Compliance& body, double youngs_modulus) {

@@ -71,6 +71,8 @@ Compliance with_modulus(const Compliance& body, double youngs_modulus);
 /// Vertices n and beads m with sqrt(n (n + m)) up to this have their compliance whole, which then takes 487 MB; of
 /// larger surfaces the far parts are compressed.
 inline constexpr int kMostWholeVertices = 2600;
+/// Whether this many have it whole.
+bool is_kept_whole(int vertices, int beads, int most_whole = kMostWholeVertices);
 /// More vertices, or more beads, are refused.
 inline constexpr int kMostSurfaceVertices = 8000;
 inline constexpr int kMostBeads = 1000;

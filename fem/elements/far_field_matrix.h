@@ -14,7 +14,7 @@
 
 namespace touchstone::fem {
 
-/// A symmetric matrix, three rows a vertex, in the form called H^2 ([Hackbusch2002]; [Boerm2010, sec. 3]): vertices are
+/// A symmetric matrix, three rows a vertex, in the form called H^2 ([Hackbusch2002]; [Boerm2010, ch. 3]): vertices are
 /// halved to clusters; blocks between clusters that are near are kept whole, blocks between clusters that are farther
 /// from each other than they are large are basis x coupling x basis^T; a cluster's basis is made of its halves'.
 class FarFieldMatrix {

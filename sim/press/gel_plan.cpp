@@ -24,6 +24,7 @@ GelPlan plan_gel(const DeviceSpec& device, const std::filesystem::path& cache_fo
       plan.ready = true;
       edge = gel.report.fine_edge;
       plan.surface_vertices = static_cast<double>(gel.vertices.size());
+      plan.compression_error = gel.report.compression_error;
       plan.file_mb = static_cast<double>(std::filesystem::file_size(plan.file)) / 1e6;
       const double radius_per_edge = 1.0 / edge;
       plan.smooth_error = fem::errors_at(gel.mesh_error.smooth, radius_per_edge)[fem::ErrorOf::normal_force];
@@ -46,17 +47,26 @@ GelPlan plan_gel(const DeviceSpec& device, const std::filesystem::path& cache_fo
 std::string describe(const GelPlan& plan) {
   const std::string file = plan.file.string();
   if (plan.ready) {
+    const std::string compressed =
+        plan.compression_error > 0.0
+            ? fmt::format(
+                  "     far parts of its compliance are compressed; all in all that leaves out {:.1g} of its mean "
+                  "diagonal\n",
+                  plan.compression_error)
+            : "";
     return fmt::format(
         "gel: is set up, {:.0f} surface vertices, in {} ({:.0f} MB, shared by all processes)\n"
+        "{}"
         "     the mesh makes a force err by {:.2g} % under a sphere and {:.2g} % under a sharp punch, at 1 mm of "
         "contact radius\n"
         "     a press takes up to {:.0f} MB more\n",
-        plan.surface_vertices, file, plan.file_mb, 100.0 * plan.smooth_error, 100.0 * plan.sharp_error, plan.press_mb);
+        plan.surface_vertices, file, plan.file_mb, compressed, 100.0 * plan.smooth_error, 100.0 * plan.sharp_error,
+        plan.press_mb);
   }
   if (!plan.sized) {
     return fmt::format(
         "gel: will be set up once, with a mesh whose size isn't known before, and kept in {} (at most {:.0f} MB)\n",
-        file, 72e-6 * fem::kMostSurfaceVertices * fem::kMostSurfaceVertices);
+        file, 72e-6 * fem::kMostWholeVertices * fem::kMostWholeVertices);
   }
   return fmt::format(
       "gel: will be set up once, about {:.0f} surface vertices, with some {:.0f} MB of memory, and kept in {} (about "

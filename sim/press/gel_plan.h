@@ -13,6 +13,7 @@ struct GelPlan {
   bool ready = false;          ///< a sound one is there: nothing will be set up
   bool sized = true;           ///< false: the mesh is found at set-up by its error, and only `file_mb`'s limit is known
   double surface_vertices = 0.0;
+  double compression_error = 0.0;  ///< see fem::ComplianceReport; 0 of a gel whose compliance is kept whole
   double file_mb = 0.0;
   double setup_mb = 0.0;
   double press_mb = 0.0;      ///< beside the mapped file, with all of the finely meshed box in contact

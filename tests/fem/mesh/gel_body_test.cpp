@@ -313,7 +313,7 @@ TEST(GelBody, ShapesThatCannotBeAreRefused) {
   dome = {};
   dome.fine = 0.05;
   dome.coarse = 0.1;
-  EXPECT_THAT(error_of(dome), HasSubstr("at most 60000 are allowed"));
+  EXPECT_THAT(error_of(dome), HasSubstr("at most 160000 are allowed"));
   FingertipGel tip;
   tip.sleeve = 9.0;
   EXPECT_THAT(error_of(tip), HasSubstr("sleeve is 9 mm long; it must not be longer than its cylinder, 8 mm"));

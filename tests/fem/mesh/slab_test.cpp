@@ -160,9 +160,9 @@ TEST(Slab, BadInputIsRefusedBeforeTetGenSeesIt) {
 TEST(Slab, TooManyTetrahedraAreRefused) {
   SlabMesh slab = small_slab();
   slab.fine = 0.01;
-  EXPECT_THAT(error_of(slab), HasSubstr("at most 60000 are allowed"));
+  EXPECT_THAT(error_of(slab), HasSubstr("at most 160000 are allowed"));
   slab.fine = 1e-300;
-  EXPECT_THAT(error_of(slab), HasSubstr("at most 60000 are allowed"));
+  EXPECT_THAT(error_of(slab), HasSubstr("at most 160000 are allowed"));
 }
 
 TEST(Slab, AspectOf1000IsRefused) {
@@ -173,7 +173,7 @@ TEST(Slab, AspectOf1000IsRefused) {
   slab.size_x = slab.size_y = 100.0;  // aspect 100: meshed no longer than thick, over the budget
   slab.coarse = 100.0;
   slab.thickness = 0.6;
-  EXPECT_THAT(error_of(slab), HasSubstr("at most 60000 are allowed"));
+  EXPECT_THAT(error_of(slab), HasSubstr("at most 160000 are allowed"));
 }
 
 }  // namespace
