@@ -1,10 +1,12 @@
 #include "fem/contact/cut_compliance.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 namespace touchstone::fem {
 namespace {
@@ -18,18 +20,19 @@ const double kSelf = 16.0 / (3.0 * std::sqrt(std::numbers::pi));
 // Variance of a triangle's points along an axis, of its area (equilateral).
 constexpr double kSpread = 0.0962;
 
-constexpr double kThin = 4.0;   // edges: the base under a gel thinner than this is felt among the hats
+constexpr double kThin = 4.0;   // edges: the base under a gel thinner than this begins to be felt among the hats
 constexpr double kFades = 0.4;  // of the thickness: how far a load is felt on a thin layer
 
 /// A half-space's displacement by a traction on a cell, in the axes (into the body, first, second tangent). On a gel
 /// that is thin beside its edges it fades as exp(-r / 0.4 thickness): a load is felt about as far on a bonded layer,
 /// for the transform of exp(-r / l) / r, 1 / sqrt(k^2 + 1 / l^2), goes as the layer's kernel over k. It stays positive
-/// definite, being the product of two that are.
+/// definite, being the product of two that are. It sets in gradually from four edges to three: the edge is the mean of
+/// those in contact, and a force mustn't jump as that grows.
 struct HalfSpace {
   HalfSpace(const ElasticMaterial& material, double thickness, double edge)
       : scale(1.0 / (2.0 * std::numbers::pi * shear_modulus(material))),
         nu(material.poisson_ratio),
-        fade(thickness < kThin * edge ? 1.0 / (kFades * thickness) : 0.0) {}
+        fade(std::clamp(kThin - thickness / edge, 0.0, 1.0) / (kFades * thickness)) {}
 
   double faded(double r) const { return fade > 0.0 ? std::exp(-fade * r) : 1.0; }
 
@@ -250,7 +253,8 @@ class SmoothRest {
              const std::vector<Matrix3d>& axes_of_all)
       : gel_(gel), surface_(surface), half_space_(half_space), axes_(axes_of_all) {}
 
-  /// Fits around a vertex; false where too few others are near.
+  /// Fits around a vertex; false where too few others are near, or none on one side: where the gel ends its response
+  /// isn't smooth, and a fit to one side says nothing of the other.
   bool fit(int vertex) {
     vertex_ = vertex;
     edge_ = edge_at(vertex);
@@ -260,6 +264,9 @@ class SmoothRest {
       if (distance > kRingFrom * edge_ && distance < kRingTo * edge_) ring.push_back(v);
     }
     if (static_cast<int>(ring.size()) < kLeastRing) return false;
+    Eigen::Vector2d middle = Eigen::Vector2d::Zero();
+    for (const int v : ring) middle += along(v) / static_cast<double>(ring.size());
+    if (middle.norm() > kOneSided * edge_) return false;
     Eigen::MatrixXd basis(static_cast<Eigen::Index>(ring.size()), 6);
     Eigen::MatrixXd rest(basis.rows(), 9);
     const Eigen::MatrixXd compliance = gel_.surface.block(ring, std::array{vertex});
@@ -286,6 +293,7 @@ class SmoothRest {
   static constexpr double kRingFrom = 1.6;  // edges
   static constexpr double kRingTo = 3.3;
   static constexpr int kLeastRing = 12;
+  static constexpr double kOneSided = 0.5;  // edges: a ring's middle that is farther away than that isn't all round
 
   double edge_at(int vertex) const {
     double sum = 0.0;
@@ -376,6 +384,31 @@ double share_of(const CutHats& cuts, int vertex) {
   return cuts.share[place_in(cuts, vertex)];
 }
 
+/// What must be added to the diagonal so that each pivot of a Cholesky factor is at least this: nothing where one would
+/// have to be more than doubled, for then the factor's numbers grow from pivot to pivot without bound.
+std::optional<Eigen::VectorXd> softened_one_by_one(Eigen::MatrixXd left, const Eigen::VectorXd& least) {
+  const Eigen::Index n = left.rows();
+  Eigen::VectorXd more(n);
+  // The factor takes the place of the lower half, column by column.
+  for (Eigen::Index j = 0; j < n; ++j) {
+    left.col(j).tail(n - j).noalias() -= left.bottomLeftCorner(n - j, j) * left.row(j).head(j).transpose();
+    more[j] = std::max(0.0, least[j] - left(j, j));
+    if (!(more[j] < least[j] / kOwnPart)) return std::nullopt;
+    left(j, j) += more[j];
+    left.col(j).tail(n - j) /= std::sqrt(left(j, j));
+  }
+  return more;
+}
+
+/// What must be added so that no eigenvalue is smaller than this, rows and columns being scaled by its root.
+Eigen::MatrixXd softened_together(const Eigen::MatrixXd& left, const Eigen::VectorXd& least) {
+  const Eigen::VectorXd scale = least.cwiseSqrt();
+  const Eigen::MatrixXd scaled = scale.cwiseInverse().asDiagonal() * left * scale.cwiseInverse().asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> modes(scaled);
+  const Eigen::MatrixXd vectors = scale.asDiagonal() * modes.eigenvectors();
+  return vectors * (1.0 - modes.eigenvalues().array()).max(0.0).matrix().asDiagonal() * vectors.transpose();
+}
+
 /// Softens cut hats that are all but the same as what others can do together, the smallest last, so that the compliance
 /// of them and of the whole hats beside them stays positive definite; rows of the compliance. A half-space isn't what
 /// elements answer as, where a mesh is coarse and irregular or the gel ends, and work could then be had from the
@@ -389,15 +422,17 @@ void keep_definite(Eigen::MatrixXd& compliance, const std::vector<Eigen::Index>&
     const Eigen::MatrixXd through = factor.matrixL().solve(Eigen::MatrixXd(compliance(whole, cut)));
     left.noalias() -= through.transpose() * through;
   }
-  // Cholesky's factor takes the place of `left`'s lower half, column by column.
-  const Eigen::Index n = left.rows();
-  for (Eigen::Index j = 0; j < n; ++j) {
+  Eigen::VectorXd least(left.rows());
+  for (Eigen::Index j = 0; j < least.size(); ++j) {
     const Eigen::Index row = cut[static_cast<std::size_t>(j)];
-    left.col(j).tail(n - j).noalias() -= left.bottomLeftCorner(n - j, j) * left.row(j).head(j).transpose();
-    const double more = std::max(0.0, kOwnPart * std::abs(compliance(row, row)) - left(j, j));
-    compliance(row, row) += more;
-    left(j, j) += more;
-    left.col(j).tail(n - j) /= std::sqrt(left(j, j));
+    least[j] = kOwnPart * std::abs(compliance(row, row));
+  }
+  if (const std::optional<Eigen::VectorXd> more = softened_one_by_one(left, least)) {
+    for (Eigen::Index j = 0; j < least.size(); ++j) {
+      compliance(cut[static_cast<std::size_t>(j)], cut[static_cast<std::size_t>(j)]) += (*more)[j];
+    }
+  } else {
+    compliance(cut, cut) += softened_together(left, least);
   }
 }
 

@@ -272,5 +272,31 @@ TEST(CutHats, SteepTipsArePressedByDepthAndByForceWhereverTheyStand) {
   }
 }
 
+TEST(CutHats, APlateAsLargeAsTheGelIsPressedAndShearedWithFriction) {
+  // Where the gel ends it answers softer than a half-space: a plate whose outline lies near the gel's own found no
+  // answer with friction.
+  for (const double edge : {0.9, 0.6}) {
+    const Compliance pad =
+        compute_compliance(mesh_slab({8.0, 8.0, 2.0, edge, edge, 4.0, 4.0, edge}), {1.0, 0.45}, {}, 2.0);
+    for (const double friction : {0.5, 50.0}) {
+      double before = 0.0;
+      for (const double side : {6.5, 7.0, 7.5, 7.9, 8.0, 9.0}) {
+        Press press(pad, BoxShape{{side, side, 2.0}}, friction);
+        const double force = press.step(target_at(0.013, 0.009, 0.95)).wrench[2];
+        const double aside = -press.step(target_at(0.033, 0.009, 0.95)).wrench[0];
+        // A wider plate never takes less, but for 1.0 % between one that ends at the gel's end and one that covers all:
+        // measured when it was written.
+        EXPECT_GT(force, 0.985 * before) << edge << ' ' << friction << ' ' << side;
+        if (side > 8.0) {
+          EXPECT_NEAR(force, before, 0.015 * before);
+        }
+        EXPECT_GT(aside, 0.03 * force);
+        EXPECT_LT(aside, 0.09 * force);
+        before = force;
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace touchstone::fem

@@ -93,9 +93,8 @@ TEST(SeveralBodies, AFlatOneLeavesTheOtherItsFirstContact) {
 
 /// The slab turned over, as the compliance of a box of its size: outer face down, bonded on top.
 PressBody elastic_box(double stiffness, double friction) {
-  auto soft = std::make_shared<Compliance>(slab_gel());
+  auto soft = std::make_shared<Compliance>(with_modulus(slab_gel(), stiffness * slab_gel().material.youngs_modulus));
   for (Eigen::Vector3d& vertex : soft->vertices) vertex.z() += 0.5 * soft->thickness;
-  soft->surface = SharedMatrix(slab_gel().surface.view() / stiffness);
   return {BoxShape{{8.0, 8.0, 2.0}}, friction, soft};
 }
 
@@ -152,8 +151,7 @@ TEST(ElasticBody, VeryStiffIsRigid) {
 TEST(ElasticBody, AndGelMayExchangeTheirRoles) {
   // A soft gel under a hard body, and the hard one under the soft one: pressed, and sheared while all sticks.
   Press usual(slab_gel(), std::vector<PressBody>{elastic_box(20.0, 50.0)});
-  Compliance hard = slab_gel();
-  hard.surface = SharedMatrix(slab_gel().surface.view() / 20.0);
+  const Compliance hard = with_modulus(slab_gel(), 20.0 * slab_gel().material.youngs_modulus);
   Press exchanged(hard, std::vector<PressBody>{elastic_box(1.0, 50.0)});
   for (const double x : {0.0, 0.02}) {
     PressTarget target = target_at(x, 0, 1.0 - 0.05);

@@ -374,7 +374,9 @@ TEST(UnitFit, AlbedoPowerAndExposureAllFreeAreReportedAsUnidentified) {
 
 TEST(UnitFit, DepthsThatWereNotReadAreFoundInThePictures) {
   UnitFitSpec spec = small_fit();
-
+  // On a membrane of 120 um the pictures change in jumps with depth: depths came out 3 um too deep (2.9 to 3.2 of the
+  // deviations that derivatives over 5 um gave), with 60 um 1 um off.
+  spec.membrane_um = 60.0;
   add_unknown(spec, "gel.youngs_modulus_MPa", UnknownHow::times, 0.4, 2.5);
   const PreparedFit fit = prepare_fit(spec);
   const Eigen::VectorXd hidden = vector({std::log(1.4)});
