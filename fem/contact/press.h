@@ -111,8 +111,8 @@ struct PressState {
   double contact_area = 0.0;         ///< mm^2: weights of the vertices in contact, times what bears of them
   int contact_vertices = 0;
   bool under_resolved = false;  ///< overlapping, but in contact with fewer than 13 vertices (a contact radius under
-                                ///< two edges): forces may be several percent off, or zero for a touch between
-                                ///< vertices
+                                ///< two edges) or with none that only others in contact surround (as a knife's edge):
+                                ///< forces may be several percent off
   int candidates = 0;           ///< vertices in the dense block
   int geometry_updates = 0;     ///< gap evaluations, over all parts of the step
   int solves = 0;               ///< linear systems solved

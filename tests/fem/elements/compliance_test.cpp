@@ -237,7 +237,7 @@ TEST(Compliance, SameInputGivesTheSameBytes) {
 TEST(Compliance, NeedsNoBeads) {
   const Compliance gel = compute_compliance(small_mesh(), kSoft, {}, 1.0);
   EXPECT_EQ(gel.beads.rows(), 0);
-  EXPECT_EQ(gel.beads.cols(), gel.surface.cols());
+  EXPECT_EQ(gel.beads.cols(), gel.surface.rows());
 }
 
 TEST(Compliance, ReportsItsMesh) {

@@ -26,7 +26,7 @@ TEST(VhsGel, IsSoundAndNearTheInfiniteLayer) {
   EXPECT_GE(gel.vertices.size(), 600u);
   EXPECT_LE(gel.vertices.size(), 1200u);
   EXPECT_GT(gel.report.smallest_dihedral_deg, 5.0);
-  EXPECT_LT(gel.surface.size() * sizeof(double), 500e6);
+  EXPECT_LT(gel.surface.bytes(), 500e6);
   EXPECT_EQ(Eigen::LLT<Eigen::MatrixXd>(gel.surface.view()).info(), Eigen::Success);
   // Pads of this width are 1 % softer than the infinite layer.
   const double ratio =

@@ -264,7 +264,7 @@ TEST_F(ComplianceCache, DISABLED_OneOfSeveralMakers) {
   ASSERT_NE(shared, nullptr);
   const Compliance one = cached_compliance(slab, material, beads, shared);
   EXPECT_EQ(one.report.note, "");
-  EXPECT_GT(one.surface.size(), 0);
+  EXPECT_GT(one.surface.rows(), 0);
 }
 
 /// Makers in one process. AddressSanitizer's allocator (of gcc 12) isn't safe over fork(), as glibc's is:
