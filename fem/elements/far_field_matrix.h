@@ -48,7 +48,7 @@ class FarFieldMatrix {
   /// From what was stored. @throws Error if the parts don't fit together
   explicit FarFieldMatrix(Parts parts, double factor = 1.0);
   /// `columns_of(vertices)`: three columns of the matrix for each vertex; it is called from several threads. What far
-  /// blocks leave out is, all in all, about `tolerance` (Frobenius).
+  /// blocks leave out is, all in all, about `tolerance` (Frobenius), as far as row_skeleton() tells.
   FarFieldMatrix(std::span<const Eigen::Vector3d> vertices,
                  const std::function<Eigen::MatrixXd(std::span<const int>)>& columns_of, double tolerance);
 

@@ -206,9 +206,11 @@ class Elimination {
         found.core(i, j) = static_cast<float>(value(members[i], members[j]));
       }
     }
-    found.whole.resize(keep - later, count);
-    for (std::ptrdiff_t j = 0; j < count; ++j) {
-      for (std::ptrdiff_t i = later; i < keep; ++i) found.whole(i - later, j) = value(kept[i], members[j]);
+    // Not all of them meet this front.
+    found.whole = Eigen::MatrixXd::Zero(matrix_.size - whole_from_, count);
+    for (std::ptrdiff_t i = later; i < keep; ++i) {
+      const int row = update.rows[kept[i]] - whole_from_;
+      for (std::ptrdiff_t j = 0; j < count; ++j) found.whole(row, j) = value(kept[i], members[j]);
     }
     for (const std::ptrdiff_t k : members) found.members.push_back(update.rows[k]);
     const auto rank = std::ssize(few.kept);
