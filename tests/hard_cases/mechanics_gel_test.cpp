@@ -197,7 +197,7 @@ TEST(HardCase17, AnAspectOf1000IsRefused) {
   SolidGel wide = box_gel({100, 100, 1});
   wide.fine = 0.3;
   wide.coarse = 100.0;
-  EXPECT_THAT(refusal_of("100 x 100 x 1 mm in edges of 0.3 mm", wide), HasSubstr("at most 160000 are allowed"));
+  EXPECT_THAT(refusal_of("100 x 100 x 1 mm in edges of 0.3 mm", wide), HasSubstr("at most 40000 are allowed"));
 }
 
 TEST(HardCase18, AnOpenOrNonManifoldSurfaceIsRefused) {
