@@ -9,8 +9,8 @@
 #include <span>
 
 #include "core/error.h"
+#include "core/wide_clones.h"
 #include "sensors/image/grey_pixels.h"
-#include "sensors/numerics/wide_clones.h"
 
 #if defined(__SSE2__)
 #include <emmintrin.h>

@@ -4,7 +4,7 @@
 #include <bit>
 #include <cmath>
 
-#include "sensors/numerics/wide_clones.h"
+#include "core/wide_clones.h"
 
 namespace touchstone::sensors {
 

@@ -7,8 +7,8 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/error.h"
+#include "core/wide_clones.h"
 #include "sensors/numerics/quantile.h"
-#include "sensors/numerics/wide_clones.h"
 
 namespace touchstone::sensors {
 namespace {

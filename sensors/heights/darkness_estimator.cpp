@@ -5,7 +5,7 @@
 #include <opencv2/core.hpp>
 
 #include "core/error.h"
-#include "sensors/numerics/wide_clones.h"
+#include "core/wide_clones.h"
 
 namespace touchstone::sensors {
 namespace {

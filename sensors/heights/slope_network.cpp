@@ -7,7 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/error.h"
-#include "sensors/numerics/wide_clones.h"
+#include "core/wide_clones.h"
 
 namespace touchstone::sensors {
 namespace {

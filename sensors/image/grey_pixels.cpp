@@ -7,7 +7,7 @@
 #include <cstring>
 #include <limits>
 
-#include "sensors/numerics/wide_clones.h"
+#include "core/wide_clones.h"
 
 #if defined(__x86_64__) && defined(__GNUC__)
 #include <immintrin.h>

@@ -6,7 +6,7 @@
 
 #include "core/error.h"
 #include "core/units.h"
-#include "sensors/numerics/wide_clones.h"
+#include "core/wide_clones.h"
 
 namespace touchstone::sensors {
 namespace {
