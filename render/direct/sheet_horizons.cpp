@@ -1,5 +1,6 @@
 #include "render/direct/sheet_horizons.h"
 
+#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
 #include <Eigen/Core>
@@ -157,13 +158,27 @@ SheetHorizons::Grid::Grid(const TriangleMesh& sheet, const HorizonSettings& sett
       rows(2 + static_cast<int>(box.sizes().y() / double(pitch))) {
   const std::vector<float> heights = heights_of(sheet, settings.side, left, bottom, pitch, columns, rows);
   const std::size_t places = heights.size();
-  horizons.assign(places * kAzimuths, 0.0f);
-  tbb::parallel_for(0, kAzimuths, [&](int number) { sweep(heights, number); });
+  std::vector<float> planes(places * kAzimuths);  // [azimuth][place], as they are found
+  tbb::parallel_for(0, kAzimuths, [&](int number) { sweep(heights, number, planes.data() + number * places); });
+  horizons.resize(planes.size());
   std::vector<char> high(places, 0);
-  for (std::size_t place = 0; place < places; ++place) {
-    const float* const from = horizons.data() + place * kAzimuths;
-    high[place] = *std::max_element(from, from + kAzimuths) > settings.flattest;
-  }
+  // Some places at a time, as many as lie side by side in a cache line of a plane.
+  constexpr std::size_t kTogether = 16;
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, (places + kTogether - 1) / kTogether, 64),
+                    [&](const auto& range) {
+                      for (std::size_t first = range.begin() * kTogether;
+                           first < std::min(places, range.end() * kTogether); first += kTogether) {
+                        const std::size_t count = std::min(kTogether, places - first);
+                        for (std::size_t number = 0; number < kAzimuths; ++number) {
+                          const float* const from = planes.data() + number * places + first;
+                          float* const to = horizons.data() + first * kAzimuths + number;
+                          for (std::size_t k = 0; k < count; ++k) {
+                            to[k * kAzimuths] = from[k];
+                            high[first + k] |= from[k] > settings.flattest;
+                          }
+                        }
+                      }
+                    });
   shaded.assign(places, 0);
   for (int j = 0; j < rows; ++j) {
     for (int i = 0; i < columns; ++i) {
@@ -188,7 +203,7 @@ Eigen::Vector2f SheetHorizons::heading(float azimuth) {
 
 /// Along the axis that the heading is nearer to a line has a sample a place, between two of the other axis. A place
 /// lies between two lines.
-void SheetHorizons::Grid::sweep(const std::vector<float>& heights, int number) {
+void SheetHorizons::Grid::sweep(const std::vector<float>& heights, int number, float* plane) const {
   const Eigen::Vector2f to = heading(4.0f * static_cast<float>(number) / kAzimuths);
   const bool along_x = std::abs(to.x()) >= std::abs(to.y());
   const int count = along_x ? columns : rows;
@@ -235,13 +250,21 @@ void SheetHorizons::Grid::sweep(const std::vector<float>& heights, int number) {
       hull[corners++] = {i, height};
     }
   }
-  for (int i = 0; i < count; ++i) {
+  const auto settle = [&](int i, int j) {
+    const float line = static_cast<float>(j - first) - aside * static_cast<float>(i);
+    const int low = std::clamp(static_cast<int>(line), 0, lines - 2);
+    const float share = line - static_cast<float>(low);
+    const float* const from = found.data() + static_cast<std::size_t>(low) * count + i;
+    plane[index(i, j)] = from[0] + share * (from[count] - from[0]);
+  };
+  // In the order in which the places stand.
+  if (along_x) {
     for (int j = 0; j < across; ++j) {
-      const float line = static_cast<float>(j - first) - aside * static_cast<float>(i);
-      const int low = std::clamp(static_cast<int>(line), 0, lines - 2);
-      const float share = line - static_cast<float>(low);
-      const float* const from = found.data() + static_cast<std::size_t>(low) * count + i;
-      horizons[index(i, j) * kAzimuths + number] = from[0] + share * (from[count] - from[0]);
+      for (int i = 0; i < count; ++i) settle(i, j);
+    }
+  } else {
+    for (int i = 0; i < count; ++i) {
+      for (int j = 0; j < across; ++j) settle(i, j);
     }
   }
 }

@@ -92,7 +92,8 @@ class SheetHorizons {
       return static_cast<std::size_t>((y - bottom) / pitch + 0.5f) * static_cast<std::size_t>(columns) +
              static_cast<std::size_t>((x - left) / pitch + 0.5f);
     }
-    void sweep(const std::vector<float>& heights, int number);
+    /// One azimuth's horizons, at all places.
+    void sweep(const std::vector<float>& heights, int number, float* plane) const;
   };
 
   Grid near_, far_;
