@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 #include <utility>
 
 #include "core/error.h"
 #include "fem/contact/triangle_gap.h"
+#include "fem/shapes/mesh_lines.h"
 
 namespace touchstone::fem {
 namespace {
@@ -101,88 +103,95 @@ WeightedGap weighted_gap(const ContactSurface& surface, const ContactShape& shap
     const Eigen::Vector3d displacement = lookup.displacement(moved[v]);
     moved[v] += displacement - normal.dot(displacement) * normal;
   }
+  const Eigen::Vector3d along = gel_from_object.inverse().turn(surface.normals.front());
+  const auto integrate = [&](const auto& body) {
+    double narrowest = ball.radius;  // a needle is seen as wide as it is, not as long
+    if (surface.flat) {
+      const double middle = silhouette_distance(body, ball.centre, along).value_or(ball.radius);
+      if (middle > 0.0) narrowest = std::min(narrowest, middle);
+    }
+    TriangleGap triangle(body, gel_from_object.inverse(), ball.radius, narrowest, surface.farthest_behind);
+    Eigen::VectorXd corner_gap(n);
+    for (std::size_t v = 0; v < moved.size(); ++v) {
+      corner_gap[static_cast<Eigen::Index>(v)] = triangle.corner_gap(moved[v], surface.normals[v]);
+    }
+    if (may_skip) {
+      const double least = corner_gap.minCoeff();
+      result.reach = std::max(0.0, least) + asked.margin + asked.of_depth * std::max(0.0, -least);
+    }
+    std::vector<CrossedTriangle> crossed;
+    std::vector<double> lowest_in(surface.triangles.size(), kInfinity);
+    for (std::size_t t = 0; t < surface.triangles.size(); ++t) {
+      const auto& index = surface.triangles[t];
+      const std::array<Eigen::Vector3d, 3> corners{moved[index[0]], moved[index[1]], moved[index[2]]};
+      const std::array<Eigen::Vector3d, 3> normals{surface.normals[index[0]], surface.normals[index[1]],
+                                                   surface.normals[index[2]]};
+      const double size = surface.triangle_size[t];
+      const bool one_normal = normals[0] == normals[1] && normals[0] == normals[2];
+      if (one_normal) {
+        const Eigen::Vector3d away = centre - (corners[0] + corners[1] + corners[2]) / 3.0;
+        const double limit = size + ball.radius;
+        if (away.squaredNorm() - std::pow(away.dot(normals[0]), 2) > limit * limit) continue;
+      }
+      double least = std::min({corner_gap[index[0]], corner_gap[index[1]], corner_gap[index[2]]});
+      if (may_skip && ball.radius > kBodiesLarge * size) {
+        // A convex body's gap is convex along the surface; steeper than 45 degrees it is beside the contact.
+        const double most = std::max({corner_gap[index[0]], corner_gap[index[1]], corner_gap[index[2]]});
+        if (std::isfinite(most) && least > result.reach + size) {
+          for (const int v : index) skipped[v] = 1;
+          continue;
+        }
+      }
+      // Integrals over the undeformed surface: the moved triangle only says where to look.
+      for (int k = 0; k < 3 && !std::isfinite(least); ++k) {
+        for (const int u : surface.around[index[k]]) least = std::min(least, corner_gap[u]);
+      }
+      if (!std::isfinite(least)) least = std::numeric_limits<double>::max();  // a small body between the vertices
+      triangle.integrate(corners, normals, one_normal, surface.triangle_area[t], least, size, cut && !kept);
+      for (int k = 0; k < 3; ++k) {
+        result.plain[index[k]] += triangle.gap[k];
+        covered[index[k]] += triangle.covered[k];
+        result.lowest[index[k]] = std::min(result.lowest[index[k]], triangle.lowest);
+      }
+      result.deepest = std::min(result.deepest, triangle.lowest);
+      if (triangle.bent) result.bent.push_back(*triangle.bent);
+      if (triangle.is_crossed) {
+        for (const CoveredPiece& piece : triangle.crossed.pieces) {
+          result.deepest = std::min(result.deepest, piece.low);
+        }
+        lowest_in[t] = triangle.lowest;
+        crossed.push_back(std::move(triangle.crossed));
+        crossed.back().triangle = static_cast<int>(t);
+      }
+    }
+    // What the gel can't reach cuts nothing.
+    const double reached = std::max(0.0, result.deepest) + kBulge * std::max(0.0, -result.deepest);
+    std::erase_if(crossed, [&](const CrossedTriangle& t) {
+      return lowest_in[static_cast<std::size_t>(t.triangle)] >
+             reached + kCutMargin * surface.triangle_size[static_cast<std::size_t>(t.triangle)];
+    });
+    if (crossed.empty() && !kept) return;
+    int set_up = -1;
+    const auto gap_at = [&](int t, const Eigen::Vector3d& b) {
+      if (set_up == t) return triangle.gap_at(b);
+      set_up = t;
+      const auto& index = surface.triangles[t];
+      const std::array<Eigen::Vector3d, 3> corners{moved[index[0]], moved[index[1]], moved[index[2]]};
+      const std::array<Eigen::Vector3d, 3> normals{surface.normals[index[0]], surface.normals[index[1]],
+                                                   surface.normals[index[2]]};
+      triangle.set_up(corners, normals, normals[0] == normals[1] && normals[0] == normals[2]);
+      return triangle.gap_at(b);
+    };
+    result.cuts = kept ? kept : std::make_shared<const CutHats>(cut_hats(surface, crossed, gap_at));
+    cut_gaps = kept ? moved_gaps(surface, *kept, gap_at) : result.cuts->gap;
+  };
   std::visit(
       [&](const auto& body) {
-        double narrowest = ball.radius;  // a needle is seen as wide as it is, not as long
-        if (surface.flat) {
-          const Eigen::Vector3d along = gel_from_object.rotation.transpose() * surface.normals.front();
-          const double middle = silhouette_distance(body, ball.centre, along).value_or(ball.radius);
-          if (middle > 0.0) narrowest = std::min(narrowest, middle);
+        if constexpr (std::is_same_v<std::decay_t<decltype(body)>, MeshShape>) {
+          integrate(MeshLines(body, along));
+        } else {
+          integrate(body);
         }
-        TriangleGap triangle(body, gel_from_object.inverse(), ball.radius, narrowest, surface.farthest_behind);
-        Eigen::VectorXd corner_gap(n);
-        for (std::size_t v = 0; v < moved.size(); ++v) {
-          corner_gap[static_cast<Eigen::Index>(v)] = triangle.corner_gap(moved[v], surface.normals[v]);
-        }
-        if (may_skip) {
-          const double least = corner_gap.minCoeff();
-          result.reach = std::max(0.0, least) + asked.margin + asked.of_depth * std::max(0.0, -least);
-        }
-        std::vector<CrossedTriangle> crossed;
-        std::vector<double> lowest_in(surface.triangles.size(), kInfinity);
-        for (std::size_t t = 0; t < surface.triangles.size(); ++t) {
-          const auto& index = surface.triangles[t];
-          const std::array<Eigen::Vector3d, 3> corners{moved[index[0]], moved[index[1]], moved[index[2]]};
-          const std::array<Eigen::Vector3d, 3> normals{surface.normals[index[0]], surface.normals[index[1]],
-                                                       surface.normals[index[2]]};
-          const double size = surface.triangle_size[t];
-          const bool one_normal = normals[0] == normals[1] && normals[0] == normals[2];
-          if (one_normal) {
-            const Eigen::Vector3d away = centre - (corners[0] + corners[1] + corners[2]) / 3.0;
-            const double limit = size + ball.radius;
-            if (away.squaredNorm() - std::pow(away.dot(normals[0]), 2) > limit * limit) continue;
-          }
-          double least = std::min({corner_gap[index[0]], corner_gap[index[1]], corner_gap[index[2]]});
-          if (may_skip && ball.radius > kBodiesLarge * size) {
-            // A convex body's gap is convex along the surface; steeper than 45 degrees it is beside the contact.
-            const double most = std::max({corner_gap[index[0]], corner_gap[index[1]], corner_gap[index[2]]});
-            if (std::isfinite(most) && least > result.reach + size) {
-              for (const int v : index) skipped[v] = 1;
-              continue;
-            }
-          }
-          // Integrals over the undeformed surface: the moved triangle only says where to look.
-          for (int k = 0; k < 3 && !std::isfinite(least); ++k) {
-            for (const int u : surface.around[index[k]]) least = std::min(least, corner_gap[u]);
-          }
-          if (!std::isfinite(least)) least = std::numeric_limits<double>::max();  // a small body between the vertices
-          triangle.integrate(corners, normals, one_normal, surface.triangle_area[t], least, size, cut && !kept);
-          for (int k = 0; k < 3; ++k) {
-            result.plain[index[k]] += triangle.gap[k];
-            covered[index[k]] += triangle.covered[k];
-            result.lowest[index[k]] = std::min(result.lowest[index[k]], triangle.lowest);
-          }
-          result.deepest = std::min(result.deepest, triangle.lowest);
-          if (triangle.bent) result.bent.push_back(*triangle.bent);
-          if (triangle.is_crossed) {
-            for (const CoveredPiece& piece : triangle.crossed.pieces) {
-              result.deepest = std::min(result.deepest, piece.low);
-            }
-            lowest_in[t] = triangle.lowest;
-            crossed.push_back(std::move(triangle.crossed));
-            crossed.back().triangle = static_cast<int>(t);
-          }
-        }
-        // What the gel can't reach cuts nothing.
-        const double reached = std::max(0.0, result.deepest) + kBulge * std::max(0.0, -result.deepest);
-        std::erase_if(crossed, [&](const CrossedTriangle& t) {
-          return lowest_in[static_cast<std::size_t>(t.triangle)] >
-                 reached + kCutMargin * surface.triangle_size[static_cast<std::size_t>(t.triangle)];
-        });
-        if (crossed.empty() && !kept) return;
-        int set_up = -1;
-        const auto gap_at = [&](int t, const Eigen::Vector3d& b) {
-          if (set_up == t) return triangle.gap_at(b);
-          set_up = t;
-          const auto& index = surface.triangles[t];
-          const std::array<Eigen::Vector3d, 3> corners{moved[index[0]], moved[index[1]], moved[index[2]]};
-          const std::array<Eigen::Vector3d, 3> normals{surface.normals[index[0]], surface.normals[index[1]],
-                                                       surface.normals[index[2]]};
-          triangle.set_up(corners, normals, normals[0] == normals[1] && normals[0] == normals[2]);
-          return triangle.gap_at(b);
-        };
-        result.cuts = kept ? kept : std::make_shared<const CutHats>(cut_hats(surface, crossed, gap_at));
-        cut_gaps = kept ? moved_gaps(surface, *kept, gap_at) : result.cuts->gap;
       },
       shape);
   const double depth = std::max(0.0, -result.deepest);

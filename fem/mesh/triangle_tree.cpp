@@ -1,6 +1,5 @@
 #include "fem/mesh/triangle_tree.h"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -8,6 +7,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "fem/mesh/line_hit.h"
 
 namespace touchstone::fem {
 namespace {
@@ -20,14 +20,6 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 Eigen::Vector3d inverse_of(const Eigen::Vector3d& direction) {
   constexpr double kLarge = 1e200;
   return direction.unaryExpr([](double x) { return std::abs(x) > 1.0 / kLarge ? 1.0 / x : kLarge; });
-}
-
-/// Two unit vectors across `direction`.
-std::pair<Eigen::Vector3d, Eigen::Vector3d> across(const Eigen::Vector3d& direction) {
-  int smallest = 0;
-  direction.cwiseAbs().minCoeff(&smallest);
-  const Eigen::Vector3d first = direction.cross(Eigen::Vector3d::Unit(smallest)).normalized();
-  return {first, direction.cross(first)};
 }
 
 }  // namespace
@@ -138,16 +130,10 @@ TriangleTree::Hit TriangleTree::nearest(const Eigen::Vector3d& point, const Eige
         x[c] = b1.dot(corners[c]) - px;
         y[c] = b2.dot(corners[c]) - py;
       }
-      const double e0 = x[1] * y[2] - y[1] * x[2];
-      const double e1 = x[2] * y[0] - y[2] * x[0];
-      const double e2 = x[0] * y[1] - y[0] * x[1];
-      const bool inside = (e0 >= 0 && e1 >= 0 && e2 >= 0) || (e0 <= 0 && e1 <= 0 && e2 <= 0);
-      const double sum = e0 + e1 + e2;
-      if (!inside || sum == 0.0) continue;  // seen edge-on: its neighbours are hit
-      const double along = (e0 * direction.dot(corners[0] - point) + e1 * direction.dot(corners[1] - point) +
-                            e2 * direction.dot(corners[2] - point)) /
-                           sum;
-      if (along < nearest.along) nearest = {along, leaves_[k].triangle, Eigen::Vector3d(e0, e1, e2) / sum};
+      const auto hit = hit_in(x, y);
+      if (!hit) continue;
+      const double along = distance_to(*hit, corners, point, direction);
+      if (along < nearest.along) nearest = {along, leaves_[k].triangle, hit->areas / hit->sum};
       if (any) return nearest;
     }
   }
