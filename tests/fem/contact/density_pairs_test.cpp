@@ -1,0 +1,117 @@
+#include "fem/contact/density_pairs.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "fem/elements/elastic_material.h"
+
+namespace touchstone::fem {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+/// Cells of a triangle's split into 16, each with the hats' values in its middle; `lift` bends the triangle.
+std::vector<DensityCell> cells_of(const std::array<Vector3d, 3>& corners, double factor) {
+  std::vector<DensityCell> cells;
+  const double area = 0.5 * (corners[1] - corners[0]).cross(corners[2] - corners[0]).norm() / 16.0;
+  for (int i = 0; i < 4; ++i) {
+    for (int j = 0; i + j < 4; ++j) {
+      for (int upside = 0; upside < (i + j < 3 ? 2 : 1); ++upside) {
+        DensityCell cell;
+        const double shift = upside ? 2.0 / 3.0 : 1.0 / 3.0;
+        cell.corners = Vector3d(i + shift, j + shift, 4.0 - i - j - 2.0 * shift) / 4.0;
+        cell.at = cell.corners[0] * corners[0] + cell.corners[1] * corners[1] + cell.corners[2] * corners[2];
+        cell.area = area;
+        cell.density = area * (cell.corners.array() * (1.0 + factor * cell.corners[0])).matrix();
+        cells.push_back(cell);
+      }
+    }
+  }
+  return cells;
+}
+
+DensityTriangle triangle_at(const Vector3d& from, double factor, int place, bool plain) {
+  const std::array<Vector3d, 3> corners{from, from + Vector3d(1.0, 0.0, 0.05), from + Vector3d(0.4, 0.9, -0.03)};
+  DensityTriangle triangle(cells_of(corners, plain ? 0.0 : factor), cells_of(corners, 0.0));
+  triangle.is_cut = true;
+  triangle.first = Vector3d(0.8, 0.6, 0.0);
+  triangle.second = Vector3d(-0.6, 0.8, 0.0);
+  triangle.place = {place, place + 1, place + 2};
+  return triangle;
+}
+
+// The sum over all pairs of cells of Boussinesq's and Cerruti's point responses, plain loops.
+Matrix3d summed(const HalfSpaceResponse& half_space, const DensityTriangle& a, int i, const DensityTriangle& b, int j) {
+  constexpr double kSpread = 0.0962;
+  const CellColumns& in_a = a.now.cells;
+  const CellColumns& in_b = b.now.cells;
+  Matrix3d sum = Matrix3d::Zero();
+  for (int k = 0; k < in_a.size(); ++k) {
+    for (int l = 0; l < in_b.size(); ++l) {
+      const Vector3d from = (in_a.at.row(k) - in_b.at.row(l)).matrix().transpose();
+      const double x = a.first.dot(from);
+      const double y = a.second.dot(from);
+      const double r2 = from.squaredNorm();
+      const double mass = in_a.density(k, i) * in_b.density(l, j);
+      // A point's, with 1/r of the mean over both cells: the normal part is as 1/r, the rest nearly so.
+      const double wider = 1.0 + 0.5 * kSpread * (in_a.area[k] + in_b.area[l]) / r2;
+      sum += mass * wider * half_space.between(x, y, r2);
+    }
+  }
+  return sum;
+}
+
+TEST(DensityPairs, AreTheSumOfPointResponses) {
+  const HalfSpaceResponse half_space({.youngs_modulus = 0.2, .poisson_ratio = 0.35}, 100.0, 1.0);
+  const DensityTriangle a = triangle_at(Vector3d::Zero(), 0.7, 0, false);
+  const DensityTriangle b = triangle_at(Vector3d(1.1, 0.8, 0.1), -0.3, 3, false);
+  DensityPairs pairs(half_space, 6, false);
+  pairs.add(a, b, true);
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) {
+      const Matrix3d found = pairs.cut.block<3, 3>(3 * i, 3 * (3 + j));
+      const Matrix3d expected = summed(half_space, a, i, b, j);
+      EXPECT_NEAR(found(0, 0), expected(0, 0), 1e-12 * std::abs(expected(0, 0)));
+      EXPECT_LT((found - expected).norm(), 2e-3 * expected.norm()) << found << "\n\n" << expected;
+    }
+  }
+  EXPECT_EQ(pairs.cut, Eigen::MatrixXd(pairs.cut.transpose())) << "Betti's reciprocity";
+}
+
+TEST(DensityPairs, NormalRowsAloneAreThoseOfAll) {
+  const HalfSpaceResponse half_space({.youngs_modulus = 0.2, .poisson_ratio = 0.45}, 2.0, 0.9);  // fades
+  ASSERT_GT(half_space.fade, 0.0);
+  const DensityTriangle a = triangle_at(Vector3d::Zero(), 0.7, 0, false);
+  const DensityTriangle b = triangle_at(Vector3d(1.1, 0.8, 0.1), -0.3, 3, false);
+  DensityPairs all(half_space, 6, false);
+  DensityPairs normal(half_space, 6, true);
+  for (DensityPairs* pairs : {&all, &normal}) {
+    pairs->add(a, a, true);
+    pairs->add(a, b, true);
+    pairs->add(b, b, true);
+  }
+  for (int i = 0; i < 6; ++i) {
+    for (int j = 0; j < 6; ++j) {
+      EXPECT_NEAR(normal.cut(i, j), all.cut(3 * i, 3 * j), 1e-14 * all.cut(0, 0));
+      EXPECT_NEAR(normal.whole(i, j), all.whole(3 * i, 3 * j), 1e-14 * all.whole(0, 0));
+    }
+  }
+}
+
+TEST(DensityPairs, WhatIsNotCutDiffersNot) {
+  const HalfSpaceResponse half_space({.youngs_modulus = 0.2, .poisson_ratio = 0.5}, 100.0, 1.0);
+  const DensityTriangle a = triangle_at(Vector3d::Zero(), 0.0, 0, true);
+  const DensityTriangle b = triangle_at(Vector3d(1.1, 0.8, 0.1), 0.0, 3, true);
+  ASSERT_TRUE(a.same_cells);
+  DensityPairs pairs(half_space, 6, false);
+  pairs.add(a, a, true);
+  pairs.add(a, b, true);
+  pairs.add(b, a, false);
+  EXPECT_EQ(pairs.cut, pairs.whole);
+}
+
+}  // namespace
+}  // namespace touchstone::fem
