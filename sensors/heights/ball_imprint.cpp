@@ -1,6 +1,6 @@
 #include "sensors/heights/ball_imprint.h"
 
-#include <math.h>  // ::j0 of POSIX: libc++ lacks std::cyl_bessel_j
+#include <math.h>  // ::j0 of POSIX: libc++ has no std::cyl_bessel_j
 #include <cmath>
 
 #include <Eigen/Core>

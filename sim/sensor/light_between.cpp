@@ -141,7 +141,7 @@ struct LightBetween::Parts {
   }
 
   /// Shows all that waits, going over to the key `next`, if there is one: drawn at the last state, or an older one.
-  void let_go(const Key* next, bool is_new) {
+  void release(const Key* next, bool is_new) {
     for (std::size_t k = 0; k < waiting.size(); ++k) {
       Waiting& one = waiting[k];
       if (next != nullptr) {
@@ -171,10 +171,10 @@ struct LightBetween::Parts {
     waiting.push_back({t_us, press, moved(*key, press, &reach)});
     if (distance(reach) > 1.0) {
       std::shared_ptr<const Key> next = key_at(press, is_new);
-      let_go(next.get(), is_new);
+      release(next.get(), is_new);
       key = std::move(next);
     } else if (waiting.size() >= kMostWaiting) {
-      let_go(nullptr, false);
+      release(nullptr, false);
     }
   }
 };
@@ -204,7 +204,7 @@ void LightBetween::add(std::int64_t t_us, const fem::PressState& press) {
 }
 
 void LightBetween::finish() {
-  parts_->let_go(nullptr, false);
+  parts_->release(nullptr, false);
 }
 
 const LightBetweenReport& LightBetween::report() const {

@@ -135,7 +135,7 @@ TEST(HardCase36, AConeMeetsTheLayersTheoryAsTheMeshGetsFiner) {
   EXPECT_LT(before, 0.05);
 }
 
-/// Contact far narrower than an edge: an answer that is finite and says that it's coarse. A needle is felt wherever it
+/// Contact far narrower than an edge: an answer that is finite and says that it's coarse. A needle is loaded wherever it
 /// stands; a sharp tip may get no force between the lines along which gaps are looked up, and is marked even then.
 TEST(HardCase36, NeedlesAndSteepConesAreMarked) {
   const Compliance gel = slab_gel(0.5);
@@ -145,7 +145,7 @@ TEST(HardCase36, NeedlesAndSteepConesAreMarked) {
   for (const auto& [what, shape] : {std::pair{"a needle of 0.02 mm radius", needle},
                                     {"a cone of 10 degrees", cone},
                                     {"a quill of 5 degrees", quill}}) {
-    int felt = 0;
+    int loaded = 0;
     int presses = 0;
     double least = 1e9;
     double most = 0.0;
@@ -163,7 +163,7 @@ TEST(HardCase36, NeedlesAndSteepConesAreMarked) {
           EXPECT_GE(state.wrench[2], before) << what << ' ' << k << ' ' << tilt << ' ' << depth;
           before = state.wrench[2];
           ++presses;
-          felt += state.wrench[2] > 0.0;
+          loaded += state.wrench[2] > 0.0;
         }
         if (tilt == 0.0) {
           least = std::min(least, before);
@@ -172,11 +172,11 @@ TEST(HardCase36, NeedlesAndSteepConesAreMarked) {
       }
     }
     if (std::holds_alternative<RoundedCylinder>(shape)) {
-      EXPECT_EQ(felt, presses);
+      EXPECT_EQ(loaded, presses);
     }
     did("{} at {} places, upright and tilted by 0.2 rad: all {} presses are marked as under-resolved, {} have a force; "
         "upright and 0.2 mm deep {:.2g} to {:.2g} N",
-        what, kPlaces, presses, felt, least, most);
+        what, kPlaces, presses, loaded, least, most);
   }
   did("theory: {:.2g} N under the needle, {:.2g} N under the cone",
       closed_forms::flat_punch_on_layer(1.0, kNu, kThickness, 0.02, 0.2).force,
