@@ -1,9 +1,15 @@
 #include "fem/contact/patch_motion.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 
 namespace touchstone::fem {
+namespace {
+
+constexpr double kStill = 2.0;  // points that don't spin
+
+}  // namespace
 
 Eigen::Vector3d PatchMotion::displacement(const Eigen::Vector3d& point) const {
   if (spin == 0.0) return translation;
@@ -15,11 +21,13 @@ PatchMotion mean_patch_motion(std::span<const Eigen::Vector3d> points, std::span
                               std::span<const Eigen::Vector3d> displacements, std::span<const double> weights) {
   PatchMotion motion;
   double sum = 0.0;
+  double squares = 0.0;
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();
   for (std::size_t k = 0; k < points.size(); ++k) {
     sum += weights[k];
+    squares += weights[k] * weights[k];
     centre += weights[k] * points[k];
     normal += weights[k] * normals[k];
     translation += weights[k] * displacements[k];
@@ -29,7 +37,9 @@ PatchMotion mean_patch_motion(std::span<const Eigen::Vector3d> points, std::span
   motion.normal = normal.normalized();
   translation /= sum;
   motion.translation = translation - motion.normal.dot(translation) * motion.normal;
-  if (points.size() < 3) return motion;
+  // As many as they would be with equal weights.
+  const double several = std::clamp(sum * sum / squares - kStill, 0.0, 1.0);
+  if (several == 0.0) return motion;
   // Least squares over the angle of |R a - a - (u - mean u)|^2, exactly: tan(angle) from the sums of a x b and a . b,
   // b = a + u - mean u being where the arm a has gone.
   double sine = 0.0;
@@ -42,7 +52,7 @@ PatchMotion mean_patch_motion(std::span<const Eigen::Vector3d> points, std::span
     sine += weights[k] * motion.normal.dot(arm.cross(gone));
     cosine += weights[k] * arm.dot(gone);
   }
-  if (cosine > 0.0) motion.spin = std::atan2(sine, cosine);
+  if (cosine > 0.0) motion.spin = several * std::atan2(sine, cosine);
   return motion;
 }
 

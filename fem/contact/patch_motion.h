@@ -18,8 +18,8 @@ struct PatchMotion {
   bool operator==(const PatchMotion&) const = default;
 };
 
-/// The rigid motion that fits the displacements (mm) of the points best in the weighted square mean. Weights >= 0; if
-/// all are zero the motion is none. Fewer than three points don't spin.
+/// The rigid motion that fits the points' displacements (mm) best in the weighted square mean. Weights >= 0; if all are
+/// 0 it is none. Two points don't spin, three of equal weight do; the spin comes with the third one's weight.
 PatchMotion mean_patch_motion(std::span<const Eigen::Vector3d> points, std::span<const Eigen::Vector3d> normals,
                               std::span<const Eigen::Vector3d> displacements, std::span<const double> weights);
 

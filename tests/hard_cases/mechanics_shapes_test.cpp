@@ -135,8 +135,8 @@ TEST(HardCase36, AConeMeetsTheLayersTheoryAsTheMeshGetsFiner) {
   EXPECT_LT(before, 0.05);
 }
 
-/// Contact far narrower than an edge: an answer that is finite and says that it's coarse. A needle is loaded wherever it
-/// stands; a sharp tip may get no force between the lines along which gaps are looked up, and is marked even then.
+/// Contact far narrower than an edge: an answer that is finite and says that it's coarse. A needle is loaded wherever
+/// it stands; a sharp tip may get no force between the lines along which gaps are looked up, and is marked even then.
 TEST(HardCase36, NeedlesAndSteepConesAreMarked) {
   const Compliance gel = slab_gel(0.5);
   const ContactShape needle = RoundedCylinder{0.02, 0.0, 4.0};

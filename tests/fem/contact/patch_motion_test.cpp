@@ -39,6 +39,23 @@ TEST(PatchMotion, FindsARigidMotionExactly) {
   }
 }
 
+// A third vertex that begins to bear mustn't turn the patch at once: presses with two or three of them went to and fro.
+TEST(PatchMotion, TheThirdPointsWeightBringsTheSpin) {
+  const std::vector<Eigen::Vector3d> points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  const std::vector<Eigen::Vector3d> normals(3, Eigen::Vector3d::UnitZ());
+  std::vector<Eigen::Vector3d> displacements;
+  for (const auto& p : points) displacements.emplace_back(-0.1 * p.y(), 0.1 * p.x(), 0.0);
+  double last = 0.0;
+  for (const double third : {0.0, 1e-9, 0.01, 0.1, 0.5, 1.0}) {
+    const std::vector<double> weights = {1.0, 1.0, third};
+    const double spin = mean_patch_motion(points, normals, displacements, weights).spin;
+    EXPECT_GE(spin, last);
+    EXPECT_LE(spin - last, 0.25 * third);
+    last = spin;
+  }
+  EXPECT_NEAR(last, std::atan(0.1), 1e-14);
+}
+
 TEST(PatchMotion, IgnoresStretchAndSinking) {
   Patch patch = random_patch(40);
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
