@@ -130,18 +130,19 @@ void DensityPairs::add(const DensityTriangle& a, const DensityTriangle& b, bool 
     add_far(a, a.whole, b, b.whole, whole);
     return;
   }
-  const Weighed as_cut{a.now.cells.density, b.now.cells.density, cut};
-  const Weighed as_whole{a.whole.cells.density, b.whole.cells.density, whole};
+  const std::array<Weighed, 2> sets{Weighed{a.now.cells.density, b.now.cells.density, cut},
+                                    Weighed{a.whole.cells.density, b.whole.cells.density, whole}};
+  const std::span<const Weighed> all(sets);
   if (a.same_cells && b.same_cells) {
-    add_cells(a, a.now.cells, b, b.now.cells, {as_cut, as_whole});
+    add_cells(a, a.now.cells, b, b.now.cells, all);
   } else {
-    add_cells(a, a.now.cells, b, b.now.cells, {as_cut});
-    add_cells(a, a.whole.cells, b, b.whole.cells, {as_whole});
+    add_cells(a, a.now.cells, b, b.now.cells, all.first(1));
+    add_cells(a, a.whole.cells, b, b.whole.cells, all.last(1));
   }
 }
 
 void DensityPairs::add_cells(const DensityTriangle& a, const CellColumns& in_a, const DensityTriangle& b,
-                             const CellColumns& in_b, const std::vector<Weighed>& sets) {
+                             const CellColumns& in_b, std::span<const Weighed> sets) {
   const bool same = &a == &b;
   const int count = in_b.size();
   const auto n = static_cast<std::size_t>(count);

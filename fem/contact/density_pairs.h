@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <span>
 #include <vector>
 
 #include "fem/contact/cut_hats.h"
@@ -12,7 +13,7 @@ namespace touchstone::fem {
 
 /// Cells side by side, so that loops over them run on several numbers at once.
 struct CellColumns {
-  explicit CellColumns(const std::vector<DensityCell>& list = {});
+  explicit CellColumns(const std::vector<DensityCell>& list);
 
   int size() const { return static_cast<int>(area.size()); }
 
@@ -62,13 +63,14 @@ class DensityPairs {
  private:
   static constexpr int kTerms = 6;
 
+  /// The densities of two triangles' cells, and where their response goes.
   struct Weighed {
     const Eigen::MatrixX3d& a;
     const Eigen::MatrixX3d& b;
     Eigen::MatrixXd& out;
   };
   void add_cells(const DensityTriangle& a, const CellColumns& in_a, const DensityTriangle& b, const CellColumns& in_b,
-                 const std::vector<Weighed>& sets);
+                 std::span<const Weighed> sets);
   void add_far(const DensityTriangle& a, const TriangleDensity& of_a, const DensityTriangle& b,
                const TriangleDensity& of_b, Eigen::MatrixXd& out);
   void add_block(Eigen::MatrixXd& out, int row, int column, const Eigen::Matrix3d& block, bool mirrored);

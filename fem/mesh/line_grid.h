@@ -16,8 +16,6 @@ class LineGrid {
   LineGrid(const std::vector<Eigen::Vector3d>& vertices, const std::vector<std::array<int, 3>>& triangles,
            const Eigen::Vector3d& direction);
 
-  const Eigen::Vector3d& direction() const { return direction_; }
-
   /// Signed distance from `point` to the first crossing of the whole line (from minus infinity); nothing if it misses.
   std::optional<double> first_entry(const Eigen::Vector3d& point) const { return nearest(point, false); }
   /// Whether the line crosses any triangle.

@@ -2,8 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
+#include <array>
 #include <cmath>
-#include <numbers>
 
 #include "fem/elements/elastic_material.h"
 
@@ -13,7 +14,8 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-/// Cells of a triangle's split into 16, each with the hats' values in its middle; `lift` bends the triangle.
+/// Cells of a triangle's split into 16, each with the hats' values in its middle; `factor`: of a slope of the
+/// density over the first corner's hat.
 std::vector<DensityCell> cells_of(const std::array<Vector3d, 3>& corners, double factor) {
   std::vector<DensityCell> cells;
   const double area = 0.5 * (corners[1] - corners[0]).cross(corners[2] - corners[0]).norm() / 16.0;

@@ -179,7 +179,7 @@ TEST_F(DsecEvents, DamageInTheOlderLayoutEndsNoProcess) {
   EXPECT_EQ(read_events(file_).events.size(), 3u);
   const std::string bytes = read_whole_file(file_);
   int refused = 0;
-  for (std::size_t i = 0; i < bytes.size(); i += 307) {  // each is read in a process of its own
+  for (std::size_t i = 0; i < bytes.size(); i += 61) {
     std::string flipped = bytes;
     flipped[i] = static_cast<char>(flipped[i] ^ (1 << (i % 8)));
     const auto file = folder_.write("flipped.h5", flipped);
@@ -188,7 +188,7 @@ TEST_F(DsecEvents, DamageInTheOlderLayoutEndsNoProcess) {
     EXPECT_THAT(message, HasSubstr("flipped.h5"));
     ++refused;
   }
-  EXPECT_GT(refused, 1);
+  EXPECT_GT(refused, 5);
 }
 
 TEST_F(DsecEvents, AFilterThatIsntThereIsNamed) {
