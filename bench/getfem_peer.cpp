@@ -1,5 +1,7 @@
 #include "bench/getfem_peer.h"
 
+#include <fmt/format.h>
+
 #include <array>
 #include <nlohmann/json.hpp>
 

@@ -1,7 +1,10 @@
 #include "core/error.h"
 
+#include <fmt/format.h>
+
 #include <cstdio>
 #include <cstdlib>
+#include <utility>
 
 namespace touchstone {
 namespace {
@@ -18,6 +21,14 @@ Error::Error(const std::string& message) : std::runtime_error(message) {}
 
 Error::Error(SourceLocation where, const std::string& message)
     : std::runtime_error(at(where, message)), where_(std::move(where)) {}
+
+void fail_with(fmt::string_view format, fmt::format_args args) {
+  throw Error(fmt::vformat(format, args));
+}
+
+void fail_with(const SourceLocation& where, fmt::string_view format, fmt::format_args args) {
+  throw Error(where, fmt::vformat(format, args));
+}
 
 void assertion_failed(const char* expression, const char* file, int line) {
   std::fprintf(stderr, "%s:%d: this should hold and doesn't: %s\n", file, line, expression);

@@ -1,11 +1,10 @@
 #pragma once
 // What goes wrong: a user's mistake is an Error that says where; a bug of ours is a failed TS_ASSERT.
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <stdexcept>
 #include <string>
-#include <utility>
 
 namespace touchstone {
 
@@ -29,16 +28,20 @@ class Error : public std::runtime_error {
   SourceLocation where_;
 };
 
+/// What fail() and fail_at() call: compiled once, not for each list of arguments.
+[[noreturn]] void fail_with(fmt::string_view format, fmt::format_args args);
+[[noreturn]] void fail_with(const SourceLocation& where, fmt::string_view format, fmt::format_args args);
+
 /// Throws an Error whose message is formatted by {fmt}.
 template <typename... Args>
 [[noreturn]] void fail(fmt::format_string<Args...> format, Args&&... args) {
-  throw Error(fmt::format(format, std::forward<Args>(args)...));
+  fail_with(format, fmt::make_format_args(args...));
 }
 
 /// The same, with the place in an input file at which it went wrong.
 template <typename... Args>
 [[noreturn]] void fail_at(const SourceLocation& where, fmt::format_string<Args...> format, Args&&... args) {
-  throw Error(where, fmt::format(format, std::forward<Args>(args)...));
+  fail_with(where, format, fmt::make_format_args(args...));
 }
 
 /// Prints the broken claim and aborts. Called by TS_ASSERT.

@@ -1,5 +1,7 @@
 #include "core/yaml_reader.h"
 
+#include <fmt/format.h>
+
 #include <yaml-cpp/eventhandler.h>
 #include <yaml-cpp/yaml.h>
 

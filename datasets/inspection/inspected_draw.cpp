@@ -1,5 +1,7 @@
 #include "datasets/inspection/inspected_draw.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>

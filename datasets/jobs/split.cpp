@@ -1,5 +1,7 @@
 #include "datasets/jobs/split.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numeric>

@@ -1,5 +1,7 @@
 #include "datasets/jobs/spread.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 

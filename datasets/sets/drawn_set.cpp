@@ -1,5 +1,7 @@
 #include "datasets/sets/drawn_set.h"
 
+#include <fmt/format.h>
+
 #include <tbb/parallel_for.h>
 
 #include <algorithm>

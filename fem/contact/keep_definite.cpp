@@ -1,10 +1,10 @@
 #include "fem/contact/keep_definite.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <optional>
+
+#include "core/dense_solvers.h"
 
 namespace touchstone::fem {
 namespace {

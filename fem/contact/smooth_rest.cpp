@@ -1,8 +1,9 @@
 #include "fem/contact/smooth_rest.h"
 
-#include <Eigen/QR>
 #include <array>
 #include <cmath>
+
+#include "core/dense_solvers.h"
 
 namespace touchstone::fem {
 namespace {
@@ -39,7 +40,7 @@ bool SmoothRest::fit(int vertex) {
     const Matrix3d difference = own / (surface_.weight[v] * surface_.weight[vertex]) - half_space_at(v);
     rest.row(k) = Eigen::Map<const Eigen::Matrix<double, 1, 9>>(difference.data());
   }
-  coefficients_ = basis.colPivHouseholderQr().solve(rest);
+  coefficients_ = Eigen::MatrixXd(basis.colPivHouseholderQr().solve(rest));
   return true;
 }
 

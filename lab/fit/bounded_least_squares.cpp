@@ -1,10 +1,10 @@
 #include "lab/fit/bounded_least_squares.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
+#include "core/dense_solvers.h"
 #include "core/error.h"
 
 namespace touchstone::lab {

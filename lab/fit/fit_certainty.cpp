@@ -1,14 +1,12 @@
 #include "lab/fit/fit_certainty.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
-#include <Eigen/QR>
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <map>
 
+#include "core/dense_solvers.h"
 #include "core/error.h"
 #include "lab/validation/validation.h"
 
@@ -44,7 +42,7 @@ Vector jackknife(const LinearisedFit& fit, double misfit) {
   Vector variance = Vector::Zero(n);
   if (shared == 0) return variance;
   const Matrix own = fit.jacobian.leftCols(shared);
-  const Eigen::SelfAdjointEigenSolver<Matrix> parts(own.transpose() * own);
+  const Eigen::SelfAdjointEigenSolver<Matrix> parts(Matrix(own.transpose() * own));
   std::vector<Eigen::Index> known;
   for (Eigen::Index k = 0; k < shared; ++k) {
     if (std::sqrt(std::max(0.0, parts.eigenvalues()[k])) > kNormal95 * misfit) known.push_back(k);

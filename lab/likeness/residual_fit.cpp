@@ -1,12 +1,12 @@
 #include "lab/likeness/residual_fit.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <optional>
 #include <utility>
 
+#include "core/dense_solvers.h"
 #include "core/error.h"
 #include "sim/sensor/residual_light.h"
 
@@ -129,7 +129,8 @@ Eigen::Matrix3Xd weights_without(const std::vector<PressEquations>& presses, int
         left.noalias() -= bumps * bumps.transpose();
         right -= bumps * press.missing.row(c)(out).transpose();
       });
-      found = Eigen::LLT<MatrixXd>(left / pixels + regular).solve(right / pixels).transpose();
+      found =
+          Eigen::LLT<MatrixXd>(MatrixXd(left / pixels + regular)).solve(Eigen::VectorXd(right / pixels)).transpose();
     }
     weights.row(c) = found;
   }

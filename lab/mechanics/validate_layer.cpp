@@ -1,5 +1,7 @@
 // Layers of gel bonded to a plate: contact, loads all over the face, and blocks between two plates.
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>

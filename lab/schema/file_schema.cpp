@@ -1,5 +1,7 @@
 #include "lab/schema/file_schema.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <functional>

@@ -1,14 +1,16 @@
 #include "lab/studies/design_table.h"
 
+#include <fmt/format.h>
+
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
-#include <Eigen/QR>
 
 #include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <limits>
 
+#include "core/dense_solvers.h"
 #include "core/nearest_name.h"
 #include "plots/heat_map.h"
 #include "plots/line_plot.h"

@@ -1,10 +1,10 @@
 #include "lab/studies/force_bound.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "core/dense_solvers.h"
 #include "core/error.h"
 #include "fem/contact/press.h"
 
@@ -95,7 +95,7 @@ Eigen::VectorXd least_deviations(const Eigen::MatrixXd& sensitivity, const Eigen
     if (!(scale[k] > 0.0)) scale[k] = 1.0;
   }
   const Eigen::MatrixXd scaled = weighted * scale.cwiseInverse().asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled.transpose() * scaled);
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(Eigen::MatrixXd(scaled.transpose() * scaled));
   const double least = kUndetermined * std::max(eigen.eigenvalues().maxCoeff(), 1e-300);
   Eigen::VectorXd variance = Eigen::VectorXd::Zero(n);
   for (Eigen::Index k = 0; k < n; ++k) {

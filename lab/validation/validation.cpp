@@ -1,5 +1,7 @@
 #include "lab/validation/validation.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>

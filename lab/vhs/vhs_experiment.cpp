@@ -2,12 +2,12 @@
 
 #include <tbb/parallel_for.h>
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <map>
 
+#include "core/dense_solvers.h"
 #include "core/error.h"
 #include "sim/files/image_file.h"
 

@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <pybind11/stl.h>
 
 #include <algorithm>

@@ -1,9 +1,9 @@
 #include "sensors/beads/stiffness_training.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
+#include "core/dense_solvers.h"
 #include "core/error.h"
 
 namespace touchstone::sensors {

@@ -1,9 +1,9 @@
 #include "sensors/heights/darkness_calibration.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
+#include "core/dense_solvers.h"
 #include "core/error.h"
 #include "core/units.h"
 #include "sensors/numerics/nonnegative_minimum.h"

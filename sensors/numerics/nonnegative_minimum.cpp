@@ -32,7 +32,7 @@ Eigen::VectorXd with_few_free(const Eigen::MatrixXd& H, const Eigen::VectorXd& b
                               const std::vector<Eigen::Index>& free) {
   Eigen::VectorXd part(static_cast<Eigen::Index>(free.size()));
   for (std::size_t k = 0; k < free.size(); ++k) part[static_cast<Eigen::Index>(k)] = b[free[k]];
-  const Eigen::VectorXd solved = Eigen::LLT<Eigen::MatrixXd>(H(free, free)).solve(part);
+  const Eigen::VectorXd solved = Eigen::LLT<Eigen::MatrixXd>(Eigen::MatrixXd(H(free, free))).solve(part);
   Eigen::VectorXd x = Eigen::VectorXd::Zero(b.size());
   for (std::size_t k = 0; k < free.size(); ++k) x[free[k]] = solved[static_cast<Eigen::Index>(k)];
   return x;

@@ -1,9 +1,10 @@
 #pragma once
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <cstdint>
 #include <vector>
+
+#include "core/dense_solvers.h"
 
 namespace touchstone::sensors {
 

@@ -1,9 +1,9 @@
 #include "sensors/numerics/wide_cholesky.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
+#include "core/dense_solvers.h"
 #include "core/error.h"
 #include "sensors/numerics/wide_product.h"
 #if defined(__SSE2__)
@@ -51,7 +51,7 @@ bool factorise_in_place(Eigen::MatrixXd& a) {
       if (below > 0)
         subtract_product(a.block(k + size, k, below, size), a.block(k + size, 0, below, k), a.block(k, 0, size, k));
     }
-    const Eigen::LLT<Eigen::MatrixXd> diagonal(a.block(k, k, size, size));
+    const Eigen::LLT<Eigen::MatrixXd> diagonal(Eigen::MatrixXd(a.block(k, k, size, size)));
     if (diagonal.info() != Eigen::Success) return false;
     a.block(k, k, size, size) = diagonal.matrixL();
     if (!a.block(k, k, size, size).diagonal().allFinite()) return false;

@@ -1,10 +1,9 @@
 #include "sensors/reflex/dots_flow.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
+#include "core/dense_solvers.h"
 #include "core/error.h"
 
 namespace touchstone::sensors {
@@ -51,9 +50,9 @@ std::optional<Unknowns> solve(const DotsPicture& before, const DotsPicture& now,
   constexpr double kLeastPart = 1e-3;
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> gradients(normal.topLeftCorner<3, 3>());
   if (gradients.eigenvalues()[0] < std::max(kLeastGradient, kLeastPart * gradients.eigenvalues()[2])) return {};
-  const Eigen::LDLT<Eigen::MatrixXd> factors(normal.topLeftCorner(size, size));
+  const Eigen::LDLT<Eigen::MatrixXd> factors(Eigen::MatrixXd(normal.topLeftCorner(size, size)));
   Unknowns solution = Unknowns::Zero();
-  solution.head(size) = factors.solve(right.head(size));
+  solution.head(size) = factors.solve(Eigen::VectorXd(right.head(size)));
   if (!solution.allFinite()) return {};
   solution[0] /= half;
   return solution;

@@ -1,8 +1,8 @@
 #include "sensors/reflex/explore_model.h"
 
-#include <Eigen/QR>
 #include <cmath>
 
+#include "core/dense_solvers.h"
 #include "core/error.h"
 #include "core/whole_file.h"
 #include "sensors/reflex/shear_law_json.h"

@@ -1,10 +1,10 @@
 #include "sensors/reflex/press_law.h"
 
 #include <Eigen/Core>
-#include <Eigen/QR>
 #include <algorithm>
 #include <limits>
 
+#include "core/dense_solvers.h"
 #include "core/error.h"
 
 namespace touchstone::sensors {

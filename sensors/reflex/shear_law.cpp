@@ -1,8 +1,8 @@
 #include "sensors/reflex/shear_law.h"
 
-#include <Eigen/QR>
 #include <cmath>
 
+#include "core/dense_solvers.h"
 #include "core/error.h"
 
 namespace touchstone::sensors {

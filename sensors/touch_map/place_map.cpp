@@ -1,9 +1,9 @@
 #include "sensors/touch_map/place_map.h"
 
-#include <Eigen/Dense>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "core/dense_solvers.h"
 #include "core/error.h"
 
 namespace touchstone::sensors {

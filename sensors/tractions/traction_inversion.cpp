@@ -2,13 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <utility>
 
+#include "core/dense_solvers.h"
 #include "core/error.h"
 #include "sensors/numerics/nonnegative_minimum.h"
 
@@ -95,7 +95,7 @@ struct TractionInversion::Candidate {
   std::vector<int> patches;
   Eigen::VectorXd x;  ///< 3 patches
   /// Of the information on all of them. Made of something, since a fresh LLT has indeterminate members to copy.
-  Eigen::LLT<Eigen::MatrixXd> factor{Eigen::MatrixXd::Identity(1, 1)};
+  Eigen::LLT<Eigen::MatrixXd> factor{Eigen::MatrixXd(Eigen::MatrixXd::Identity(1, 1))};
   Vector6d wrench = Vector6d::Zero();
   double misfit_square = 0.0;  ///< sum over the measured displacements, over the noise
   double score = 0.0;          ///< -2 log evidence, but for a constant
@@ -135,7 +135,7 @@ TractionInversion::TractionInversion(MarkerCompliance compliance, const Traction
     fail("correlation is {}: so smooth that tractions on patches of {} mm can't be separated", settings_.correlation,
          compliance_.patch_side);
   }
-  inverse_correlation_ = factor.solve(Eigen::MatrixXd::Identity(patches, patches));
+  inverse_correlation_ = factor.solve(Eigen::MatrixXd(Eigen::MatrixXd::Identity(patches, patches)));
   share_ = shares_of_patches(compliance_);
 
   all_weighted_ = compliance_.displacement;
@@ -214,11 +214,12 @@ TractionInversion::Candidate TractionInversion::solve(const std::vector<int>& pa
   result.misfit_square = result.score = data_square;
   if (patches.empty()) return result;
   const std::vector<int> rows = unknowns(patches);
-  const Eigen::LLT<Eigen::MatrixXd> correlation(correlation_(patches, patches));
+  const Eigen::LLT<Eigen::MatrixXd> correlation(Eigen::MatrixXd(correlation_(patches, patches)));
   TS_ASSERT(correlation.info() == Eigen::Success);
   const auto count = static_cast<Eigen::Index>(patches.size());
   const double scale = settings_.scale * compliance_.youngs_modulus;
-  const Eigen::MatrixXd stiff = correlation.solve(Eigen::MatrixXd::Identity(count, count)) / (scale * scale);
+  const Eigen::MatrixXd stiff =
+      correlation.solve(Eigen::MatrixXd(Eigen::MatrixXd::Identity(count, count))) / (scale * scale);
   const Eigen::MatrixXd normal = normal_(rows, rows);
   Eigen::MatrixXd information = normal;
   for (Eigen::Index i = 0; i < count; ++i) {
@@ -333,7 +334,8 @@ void TractionInversion::describe(const std::vector<Candidate>& tried, std::size_
     rows = unknowns(chosen.patches);
     const Eigen::MatrixXd normal = normal_(rows, rows);
     used = chosen.factor.solve(normal).trace();
-    const Eigen::MatrixXd answer = chosen.factor.solve(wrench_of(compliance_, chosen.patches).transpose());
+    const Eigen::MatrixXd answer =
+        chosen.factor.solve(Eigen::MatrixXd(wrench_of(compliance_, chosen.patches).transpose()));
     result.noise = answer.transpose() * normal * answer;
   }
   result.misfit = std::sqrt(std::max(0.0, chosen.misfit_square) / std::max(1.0, values - used));

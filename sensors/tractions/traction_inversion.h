@@ -21,11 +21,11 @@
 // Signs: tractions are those on the gel, wrenches those on the object that touches it (a press has Fz > 0), both in the
 // gel frame, as fem::PressState gives them.
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <cstdint>
 #include <vector>
 
+#include "core/dense_solvers.h"
 #include "sensors/markers/marker_field.h"
 #include "sensors/tractions/marker_compliance.h"
 
@@ -123,7 +123,7 @@ class TractionInversion {
   Eigen::MatrixXd first_load_;    ///< of data over the noise: patches x 3 markers
   Eigen::MatrixXd first_normal_;  ///< patches x patches
   /// Made of something, since a fresh LLT has indeterminate members to copy.
-  Eigen::LLT<Eigen::MatrixXd> first_factor_{Eigen::MatrixXd::Identity(1, 1)};
+  Eigen::LLT<Eigen::MatrixXd> first_factor_{Eigen::MatrixXd(Eigen::MatrixXd::Identity(1, 1))};
 };
 
 }  // namespace touchstone::sensors

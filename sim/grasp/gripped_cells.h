@@ -1,7 +1,6 @@
 #pragma once
 // How a gripped face's contact is solved on cells, from what the press did; for gripped_face.cpp only.
 
-#include <Eigen/QR>
 #include <Eigen/SparseCore>
 #include <algorithm>
 #include <array>
@@ -11,6 +10,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/dense_solvers.h"
 #include "core/transform.h"
 #include "fem/elements/compliance.h"
 #include "fem/fine_relief/pixel_contact.h"

@@ -1,12 +1,12 @@
 #include "sim/sensor/milky_coat.h"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <string_view>
 
+#include "core/dense_solvers.h"
 #include "core/error.h"
 #include "core/grid_places.h"
 #include "core/matrix_file.h"

@@ -1,5 +1,7 @@
 #include "tests/golden/golden_scenes.h"
 
+#include <fmt/format.h>
+
 #include <array>
 #include <cmath>
 #include <functional>

@@ -1,0 +1,3 @@
+#include "core/dense_solvers.h"
+
+TS_DENSE_SOLVERS();
