@@ -26,7 +26,8 @@ DirectBatch::DirectBatch(const DirectFrame& frame)
       amounts_(lanes_.size() * stride_),
       flows_(lanes_.size() * stride_ * 3),
       directions_(frame.shadow_reach != nullptr ? flows_.size() : 0),
-      pass_(field_.pass.empty() ? 0 : lanes_.size() * stride_ * bands_) {}
+      pass_(field_.pass.empty() ? 0 : lanes_.size() * stride_ * bands_),
+      shares_(frame.horizons != nullptr ? static_cast<std::size_t>(lamps_) * kPacket : 0) {}
 
 void DirectBatch::intersect(std::span<const RayPacket> rays, DirectCounts& counts) {
   TS_ASSERT(rays.size() <= kMostPackets);
@@ -36,7 +37,6 @@ void DirectBatch::intersect(std::span<const RayPacket> rays, DirectCounts& count
     const RayPacket& packet = rays[number];
     frame_.tree.intersect(packet, hits);
     if (frame_.sheet != nullptr) meet_sheet(packet, hits);
-    beams_found_ = false;
     for (int k = 0; k < kPacket; ++k) {
       const int lane = static_cast<int>(number) * kPacket + k;
       Lane& one = lanes_[lane];
@@ -87,6 +87,7 @@ void DirectBatch::intersect(std::span<const RayPacket> rays, DirectCounts& count
       for (int a = 0; a < 3; ++a) one.leave[a] = one.place[a] + hits.lift[a][k] + off * one.normal[a];
       if (is_lit(one.material->kind)) light_lane(lane, counts);
     }
+    if (frame_.horizons != nullptr) dim_by_horizons(static_cast<int>(number));
   }
 }
 
@@ -143,9 +144,6 @@ void DirectBatch::light_lane(int lane, DirectCounts& counts) {
     Eigen::Map<Four>(flow + group * 12 + 4) = y;
     Eigen::Map<Four>(flow + group * 12 + 8) = z;
     Eigen::Map<Four>(amount + group * 4) = (-(one.normal[0] * x + one.normal[1] * y + one.normal[2] * z)).max(0.0f);
-  }
-  if (frame_.horizons != nullptr && one.object == 0 && frame_.horizons->any(one.place[0], one.place[1])) {
-    dim_by_horizons(lane);
   }
   if (frame_.shadow_reach != nullptr) {
     one.doubt = frame_.shadow_reach->doubtful(one.place[0], one.place[1], one.object);

@@ -10,6 +10,7 @@
 #include "render/cameras/camera_rays.h"
 #include "render/direct/direct_fixture.h"
 #include "render/direct/direct_material.h"
+#include "render/direct/packet_horizons.h"
 #include "render/direct/sheet_horizons.h"
 #include "render/scene/packet_scene.h"
 #include "render/scene/sheet_index.h"
@@ -107,7 +108,7 @@ class DirectBatch {
   float film_before(const RayPacket& packet, int slot, float distance) const;
   void light_lane(int lane, DirectCounts& counts);
   void find_beams(int lane);
-  void dim_by_horizons(int lane);
+  void dim_by_horizons(int packet);
   float soft_width(int lane, int lamp, float tangent) const;
   void reflect_through_films(int lane, float* sum) const;
   bool shadow_ray(int lane, int lamp, int slot);
@@ -128,20 +129,9 @@ class DirectBatch {
       directions_;  // likewise, where shadows are in doubt: unit vectors against the flows, 0 where there's none
   std::vector<float> pass_;  // [lane][band][lamp], empty where nothing absorbs
   RayPacket shadow_;
-
-  /// What horizons are held against, once for the places of a packet, which lie close together: where sectors of beams
-  /// are looked at, and between which tangents of elevation a beam goes down.
-  struct Look {
-    float azimuth;
-    float x, y;  // its unit vector
-  };
-  struct Sector {
-    int head;
-    Look one, other;
-  };
-  bool beams_found_ = false;
-  std::vector<Sector> sectors_;
-  std::vector<float> lowest_, highest_;  // by beam
+  BeamElevations beams_;  // once for the places of a packet, which lie close together
+  PacketHorizons around_{};
+  std::vector<float> shares_;  // [beam][lane of a packet]
 };
 
 }  // namespace touchstone::render

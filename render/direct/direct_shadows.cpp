@@ -22,7 +22,6 @@ float DirectBatch::soft_width(int lane, int lamp, float tangent) const {
 /// A beam reaches half way to the flatter and the steeper one beside it, one at the rim as far outwards as inwards;
 /// aside a sector is looked at in two places, half way to where it ends.
 void DirectBatch::find_beams(int lane) {
-  beams_found_ = true;
   float tangents[kMostDirectLamps];
   const float* flow = flows_.data() + static_cast<std::size_t>(lane) * stride_ * 3;
   for (int group = 0; group < fixture_.groups; ++group) {
@@ -35,9 +34,9 @@ void DirectBatch::find_beams(int lane) {
     const float* from = flow + lamp / 4 * 12 + lamp % 4;
     return SheetHorizons::azimuth(-from[0], -from[4]);
   };
-  sectors_.clear();
-  lowest_.resize(static_cast<std::size_t>(lamps_));
-  highest_.resize(static_cast<std::size_t>(lamps_));
+  beams_.sectors.clear();
+  beams_.lowest.resize(static_cast<std::size_t>(lamps_));
+  beams_.highest.resize(static_cast<std::size_t>(lamps_));
   for (int head = 0; head < lamps_; ++head) {
     if (fixture_.flattest[head] != head) continue;
     const float azimuth = azimuth_of(head);
@@ -53,9 +52,9 @@ void DirectBatch::find_beams(int lane) {
     if (aside.right < 0) right = -left;
     const auto look = [](float towards) {
       const Eigen::Vector2f unit = SheetHorizons::heading(towards);
-      return Look{towards, unit.x(), unit.y()};
+      return BeamSector::Look{towards, unit.x(), unit.y()};
     };
-    sectors_.push_back({head, look(azimuth + left), look(azimuth + right)});
+    beams_.sectors.push_back({head, look(azimuth + left), look(azimuth + right)});
     for (int lamp = head; lamp >= 0; lamp = field_.beside[lamp].steeper) {
       const int flatter = field_.beside[lamp].flatter;
       const int steeper = field_.beside[lamp].steeper;
@@ -65,40 +64,42 @@ void DirectBatch::find_beams(int lane) {
       if (flatter < 0 && steeper < 0) down = up = 0.5f * soft_width(lane, lamp, tangent);
       if (flatter < 0) down = up;
       if (steeper < 0) up = down;
-      lowest_[static_cast<std::size_t>(lamp)] = tangent - down;
-      highest_[static_cast<std::size_t>(lamp)] = tangent + up;
+      beams_.lowest[static_cast<std::size_t>(lamp)] = tangent - down;
+      beams_.highest[static_cast<std::size_t>(lamp)] = tangent + up;
     }
   }
 }
 
-/// Of each beam the part that is steeper than the horizon gets through, of what is above the place's own plane: what is
-/// below is in the amount already.
-void DirectBatch::dim_by_horizons(int lane) {
-  if (!beams_found_) find_beams(lane);
-  const Lane& here = lanes_[lane];
-  float horizons[SheetHorizons::kAround];
-  frame_.horizons->at(here.place[0], here.place[1], horizons);
-  // How steeply the place itself rises towards the light, across. Its normal faces the camera and so the light's side.
-  const float per_z = 1.0f / std::max(std::abs(here.normal[2]), 1e-6f);
-  const float rise_x = -here.normal[0] * per_z;
-  const float rise_y = -here.normal[1] * per_z;
-  float* amount = amounts(lane);
-  for (const Sector& sector : sectors_) {
-    const float one = SheetHorizons::towards(horizons, sector.one.azimuth);
-    const float other = SheetHorizons::towards(horizons, sector.other.azimuth);
-    const float most = std::max(one, other);
-    const float one_rise = rise_x * sector.one.x + rise_y * sector.one.y;
-    const float other_rise = rise_x * sector.other.x + rise_y * sector.other.y;
-    for (int lamp = sector.head; lamp >= 0; lamp = field_.beside[lamp].steeper) {
-      const float lowest = lowest_[static_cast<std::size_t>(lamp)];
-      if (most <= lowest) break;  // steeper ones are free, too
-      const float highest = highest_[static_cast<std::size_t>(lamp)];
-      const auto hidden = [&](float horizon, float rise) {
-        const float from = std::max(lowest, rise);
-        if (!(horizon > from && highest > from)) return 0.0f;
-        return std::min((horizon - from) / (highest - from), 1.0f);
-      };
-      amount[lamp] *= 1.0f - 0.5f * (hidden(one, one_rise) + hidden(other, other_rise));
+/// Of the lanes that the first surface's own horizons may shade.
+void DirectBatch::dim_by_horizons(int packet) {
+  const int first = packet * kPacket;
+  unsigned shaded = 0;
+  for (int k = 0; k < kPacket; ++k) {
+    const Lane& one = lanes_[first + k];
+    const bool lit = packet_of(first + k).valid[k] != 0 && one.material != nullptr && is_lit(one.material->kind);
+    if (lit && one.object == 0 && frame_.horizons->any(one.place[0], one.place[1])) shaded |= 1u << k;
+  }
+  if (shaded == 0) return;
+  find_beams(first + std::countr_zero(shaded));
+  for (int k = 0; k < kPacket; ++k) {
+    float horizons[SheetHorizons::kAround] = {};
+    around_.rise_x[k] = around_.rise_y[k] = 0.0f;
+    if ((shaded >> k & 1u) != 0) {
+      const Lane& here = lanes_[first + k];
+      frame_.horizons->at(here.place[0], here.place[1], horizons);
+      // Across; the place's normal faces the camera and so the light's side.
+      const float per_z = 1.0f / std::max(std::abs(here.normal[2]), 1e-6f);
+      around_.rise_x[k] = -here.normal[0] * per_z;
+      around_.rise_y[k] = -here.normal[1] * per_z;
+    }
+    for (int number = 0; number < SheetHorizons::kAround; ++number) around_.tangents[number][k] = horizons[number];
+  }
+  const std::uint64_t touched = shares_over_horizons(around_, beams_, field_.beside, shares_.data());
+  for (std::uint64_t rest = touched; rest != 0; rest &= rest - 1) {
+    const int lamp = std::countr_zero(rest);
+    const float* const share = shares_.data() + static_cast<std::size_t>(lamp) * kPacket;
+    for (int k = 0; k < kPacket; ++k) {
+      if ((shaded >> k & 1u) != 0) amounts(first + k)[lamp] *= share[k];
     }
   }
 }

@@ -75,6 +75,33 @@ std::vector<float> heights_of(const TriangleMesh& sheet, float side, float left,
   return heights;
 }
 
+/// `from` is [lines][places], `to` [places][lines].
+void transpose(const float* from, int lines, int places, float* to) {
+  constexpr int kBlock = 16;  // of either: what a cache line holds
+  for (int line = 0; line < lines; line += kBlock) {
+    for (int place = 0; place < places; place += kBlock) {
+      for (int l = line; l < std::min(lines, line + kBlock); ++l) {
+        for (int p = place; p < std::min(places, place + kBlock); ++p) {
+          to[static_cast<std::size_t>(p) * lines + l] = from[static_cast<std::size_t>(l) * places + p];
+        }
+      }
+    }
+  }
+}
+
+/// [lines][places] with each line's first and last place once more before and behind it.
+std::vector<float> with_ends(const std::vector<float>& from, int lines, int places) {
+  std::vector<float> to;
+  to.reserve(static_cast<std::size_t>(lines) * (static_cast<std::size_t>(places) + 2));
+  for (int line = 0; line < lines; ++line) {
+    const float* const first = from.data() + static_cast<std::size_t>(line) * places;
+    to.push_back(first[0]);
+    to.insert(to.end(), first, first + places);
+    to.push_back(first[places - 1]);
+  }
+  return to;
+}
+
 }  // namespace
 
 std::optional<HorizonSettings> flattest_light(const LightField& field, const Eigen::AlignedBox2d& seen) {
@@ -156,8 +183,11 @@ SheetHorizons::Grid::Grid(const TriangleMesh& sheet, const HorizonSettings& sett
       pitch(std::max(pitch_mm, static_cast<float>(box.sizes().maxCoeff() / (settings.most_places - 1)))),
       columns(2 + static_cast<int>(box.sizes().x() / double(pitch))),
       rows(2 + static_cast<int>(box.sizes().y() / double(pitch))) {
-  const std::vector<float> heights = heights_of(sheet, settings.side, left, bottom, pitch, columns, rows);
-  const std::size_t places = heights.size();
+  const std::vector<float> by_place = heights_of(sheet, settings.side, left, bottom, pitch, columns, rows);
+  std::vector<float> by_column(by_place.size());
+  transpose(by_place.data(), rows, columns, by_column.data());
+  const Heights heights = {with_ends(by_place, rows, columns), with_ends(by_column, columns, rows)};
+  const std::size_t places = by_place.size();
   std::vector<float> planes(places * kAzimuths);  // [azimuth][place], as they are found
   tbb::parallel_for(0, kAzimuths, [&](int number) { sweep(heights, number, planes.data() + number * places); });
   horizons.resize(planes.size());
@@ -201,9 +231,10 @@ Eigen::Vector2f SheetHorizons::heading(float azimuth) {
   return ((1.0f - share) * from[quarter] + share * from[(quarter + 1) % 4]).normalized();
 }
 
-/// Along the axis that the heading is nearer to a line has a sample a place, between two of the other axis. A place
-/// lies between two lines.
-void SheetHorizons::Grid::sweep(const std::vector<float>& heights, int number, float* plane) const {
+/// Along the axis that the heading is nearer to a line has a sample a place, between two of the other axis; a place
+/// lies between two lines. All lines' samples of one step lie equally between the other axis's places, which stand
+/// beside each other in memory: what isn't the hull's own runs over them.
+void SheetHorizons::Grid::sweep(const Heights& heights, int number, float* plane) const {
   const Eigen::Vector2f to = heading(4.0f * static_cast<float>(number) / kAzimuths);
   const bool along_x = std::abs(to.x()) >= std::abs(to.y());
   const int count = along_x ? columns : rows;
@@ -211,62 +242,62 @@ void SheetHorizons::Grid::sweep(const std::vector<float>& heights, int number, f
   const float ahead = along_x ? to.x() : to.y();
   const float aside = (along_x ? to.y() : to.x()) / std::abs(ahead);  // places a step
   const float step = pitch * std::sqrt(1.0f + aside * aside);
-  const auto index = [&](int i, int j) {
-    const int k = ahead > 0.0f ? i : count - 1 - i;
-    return along_x ? static_cast<std::size_t>(j) * columns + k : static_cast<std::size_t>(k) * columns + j;
-  };
+  const std::vector<float>& by_step =
+      along_x ? heights.by_column : heights.by_row;  // [step][place, one more each side]
+  const std::size_t stride = static_cast<std::size_t>(across) + 2;
+  // Line l is at place first + l + aside i of step i: low places on, and a share of the way to the next.
   const float drift = aside * static_cast<float>(count - 1);
   const int first = static_cast<int>(std::floor(std::min(0.0f, -drift)));
   const int last = across + static_cast<int>(std::ceil(std::max(0.0f, -drift)));
   const int lines = last - first + 1;
-  std::vector<float> found(static_cast<std::size_t>(lines) * count, 0.0f);  // [line][sample]
+  std::vector<float> by_column(along_x ? static_cast<std::size_t>(columns) * rows : 0);
+  float* const made = along_x ? by_column.data() : plane;  // [step][place]
   struct Corner {
     int at;
     float height;
   };
-  std::vector<Corner> hull(static_cast<std::size_t>(count));
-  for (int line = 0; line < lines; ++line) {
-    int corners = 0;
-    float* const out = found.data() + static_cast<std::size_t>(line) * count;
-    for (int i = count - 1; i >= 0; --i) {
-      const float j = static_cast<float>(first + line) + aside * static_cast<float>(i);
-      if (!(j > -1.0f && j < static_cast<float>(across))) continue;
-      const float inside = std::clamp(j, 0.0f, static_cast<float>(across - 1));
-      const int low = std::min(static_cast<int>(inside), across - 2);
-      const float share = inside - static_cast<float>(low);
-      const float at_low = heights[index(i, low)];
-      const float at_high = heights[index(i, low + 1)];
-      const float height = share == 0.0f ? at_low : share == 1.0f ? at_high : at_low + share * (at_high - at_low);
-      if (!(height > kNowhere)) continue;                                  // beside the sheet
+  std::vector<Corner> hulls(static_cast<std::size_t>(lines) * count);
+  std::vector<int> corners(static_cast<std::size_t>(lines), 0);
+  std::vector<float> height(static_cast<std::size_t>(lines));
+  std::vector<float> of_lines(static_cast<std::size_t>(lines) + 2, 0.0f);
+  float* const found = of_lines.data() + 1;  // by line
+  for (int i = count - 1; i >= 0; --i) {
+    const int k = ahead > 0.0f ? i : count - 1 - i;
+    const float moved = aside * static_cast<float>(i);
+    const auto low = static_cast<int>(std::floor(moved));
+    const float share = moved - static_cast<float>(low);
+    // Lines that pass the grid at this step: from just before its first place to just behind its last.
+    const int from = std::max(0, -1 - first - low);
+    const int end = std::min(lines, across - first - low);
+    const float* const row = by_step.data() + static_cast<std::size_t>(k) * stride + 1 + first + low;
+    for (int line = from; line < end; ++line) {
+      // Beside the sheet heights are infinite, and 0 of infinity isn't 0.
+      const float rise = share == 0.0f ? 0.0f : share * (row[line + 1] - row[line]);
+      height[static_cast<std::size_t>(line)] = row[line] + rise;
+    }
+    std::fill_n(found, lines, 0.0f);
+    for (int line = from; line < end; ++line) {
+      const float here = height[static_cast<std::size_t>(line)];
+      if (!(here > kNowhere)) continue;  // beside the sheet
+      Corner* const hull = hulls.data() + static_cast<std::size_t>(line) * count;
+      int& size = corners[static_cast<std::size_t>(line)];
       const auto is_below = [&](const Corner& one, const Corner& other) {  // as seen from here
-        return (one.height - height) * static_cast<float>(other.at - i) <=
-               (other.height - height) * static_cast<float>(one.at - i);
+        return (one.height - here) * static_cast<float>(other.at - i) <=
+               (other.height - here) * static_cast<float>(one.at - i);
       };
-      while (corners > 1 && is_below(hull[corners - 1], hull[corners - 2])) --corners;
-      if (corners > 0) {
-        const Corner& seen = hull[corners - 1];
-        out[i] = std::max(0.0f, (seen.height - height) / (step * static_cast<float>(seen.at - i)));
+      while (size > 1 && is_below(hull[size - 1], hull[size - 2])) --size;
+      if (size > 0) {
+        const Corner& seen = hull[size - 1];
+        found[line] = std::max(0.0f, (seen.height - here) / (step * static_cast<float>(seen.at - i)));
       }
-      hull[corners++] = {i, height};
+      hull[size++] = {i, here};
     }
+    // Place j lies between lines j - first - low - 1 and the next one, but for a share of 0, where it is on the next.
+    const float* const at = found + (-first - low - 1);
+    float* const out = made + static_cast<std::size_t>(k) * across;
+    for (int j = 0; j < across; ++j) out[j] = at[j + 1] + share * (at[j] - at[j + 1]);
   }
-  const auto settle = [&](int i, int j) {
-    const float line = static_cast<float>(j - first) - aside * static_cast<float>(i);
-    const int low = std::clamp(static_cast<int>(line), 0, lines - 2);
-    const float share = line - static_cast<float>(low);
-    const float* const from = found.data() + static_cast<std::size_t>(low) * count + i;
-    plane[index(i, j)] = from[0] + share * (from[count] - from[0]);
-  };
-  // In the order in which the places stand.
-  if (along_x) {
-    for (int j = 0; j < across; ++j) {
-      for (int i = 0; i < count; ++i) settle(i, j);
-    }
-  } else {
-    for (int i = 0; i < count; ++i) {
-      for (int j = 0; j < across; ++j) settle(i, j);
-    }
-  }
+  if (along_x) transpose(made, columns, rows, plane);
 }
 
 void SheetHorizons::at(float x, float y, float* out) const {

@@ -58,21 +58,34 @@ class SheetHorizons {
   /// The unit vector of an azimuth from -4 to 8.
   static Eigen::Vector2f heading(float azimuth);
 
-  /// Between those of the azimuths round it, by cubic splines through them ([Catmull1974]): what stands out from the
-  /// sheet is as narrow as a few azimuths, and straight lines would cut its top off. `horizons` as at() gave them,
-  /// `azimuth` from -4 to 8.
-  static float towards(const float* horizons, float azimuth) {
+  /// Where an azimuth lies between those that horizons are found for: the first of four of at()'s numbers round it, and
+  /// its share of the way from the second to the third.
+  struct Between {
+    int low;
+    float share;
+  };
+  /// @pre `azimuth` from -4 to 8
+  static Between between(float azimuth) {
     float place = azimuth * (0.25f * kAzimuths);
     if (place < 0.0f) place += kAzimuths;
     if (place >= kAzimuths) place -= kAzimuths;
     int low = static_cast<int>(place);
     if (low < 0) low = 0;
     if (low > kAzimuths - 1) low = kAzimuths - 1;
-    const float t = place - static_cast<float>(low);
-    const float* const p = horizons + low;
-    return p[1] + 0.5f * t *
-                      (p[2] - p[0] +
-                       t * (2.0f * p[0] - 5.0f * p[1] + 4.0f * p[2] - p[3] + t * (3.0f * (p[1] - p[2]) + p[3] - p[0])));
+    return {low, place - static_cast<float>(low)};
+  }
+
+  /// Cubic splines through the horizons of four azimuths ([Catmull1974]): what stands out from the sheet is as narrow
+  /// as a few azimuths, and straight lines would cut its top off.
+  static float spline(float p0, float p1, float p2, float p3, float t) {
+    return p1 + 0.5f * t * (p2 - p0 + t * (2.0f * p0 - 5.0f * p1 + 4.0f * p2 - p3 + t * (3.0f * (p1 - p2) + p3 - p0)));
+  }
+
+  /// The horizon's tangent at any azimuth. `horizons` as at() gave them.
+  static float towards(const float* horizons, float azimuth) {
+    const Between at = between(azimuth);
+    const float* const p = horizons + at.low;
+    return spline(p[0], p[1], p[2], p[3], at.share);
   }
 
  private:
@@ -92,8 +105,12 @@ class SheetHorizons {
       return static_cast<std::size_t>((y - bottom) / pitch + 0.5f) * static_cast<std::size_t>(columns) +
              static_cast<std::size_t>((x - left) / pitch + 0.5f);
     }
+    /// Heights at the places, each line with its ends once more: [row][column], [column][row].
+    struct Heights {
+      std::vector<float> by_row, by_column;
+    };
     /// One azimuth's horizons, at all places.
-    void sweep(const std::vector<float>& heights, int number, float* plane) const;
+    void sweep(const Heights& heights, int number, float* plane) const;
   };
 
   Grid near_, far_;
