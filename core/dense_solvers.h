@@ -26,4 +26,6 @@
   how template Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>&                                                         \
   Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>::compute(const Eigen::EigenBase<Eigen::MatrixXd>&, int)
 
+/// @cond
 TS_DENSE_SOLVERS(extern);
+/// @endcond

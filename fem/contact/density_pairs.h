@@ -13,7 +13,7 @@ namespace touchstone::fem {
 
 /// Cells side by side, so that loops over them run on several numbers at once.
 struct CellColumns {
-  explicit CellColumns(const std::vector<DensityCell>& list);
+  explicit CellColumns(const std::vector<DensityCell>& list);  ///< in their order
 
   int size() const { return static_cast<int>(area.size()); }
 
@@ -25,7 +25,7 @@ struct CellColumns {
 
 /// A triangle's cells with what they add up to.
 struct TriangleDensity {
-  explicit TriangleDensity(const std::vector<DensityCell>& list);
+  explicit TriangleDensity(const std::vector<DensityCell>& list);  ///< of these
 
   CellColumns cells;
   std::array<Eigen::Vector3d, 3> centre;  ///< mm, of each corner's density

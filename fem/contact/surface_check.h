@@ -40,6 +40,6 @@ double wrinkling_strain(const ElasticMaterial& film, const ElasticMaterial& body
 /// object from `kIntoObject` edges on: nearer to its outline the mesh can't say.
 std::vector<std::string> surface_doubts(const SurfaceCheck& check, std::span<const ElasticMaterial> materials);
 
-inline constexpr double kIntoObject = 0.5;
+inline constexpr double kIntoObject = 0.5;  ///< edges of the gel, see above
 
 }  // namespace touchstone::fem

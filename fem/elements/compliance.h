@@ -75,6 +75,6 @@ inline constexpr int kMostWholeVertices = 2600;
 bool is_kept_whole(int vertices, int beads, int most_whole = kMostWholeVertices);
 /// More vertices, or more beads, are refused.
 inline constexpr int kMostSurfaceVertices = 8000;
-inline constexpr int kMostBeads = 1000;
+inline constexpr int kMostBeads = 1000;  ///< likewise
 
 }  // namespace touchstone::fem

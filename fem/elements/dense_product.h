@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 
 namespace touchstone::fem {
-
+/// Which of a product's factors is.
 enum class Transposed { none, first, second };
 
 /// a b, a^T b or a b^T, on one thread: the same input gives the same bytes. Each column's numbers lie one after the

@@ -18,12 +18,12 @@ namespace touchstone::fem {
 class Numbers {
  public:
   Numbers() = default;
-  explicit Numbers(std::size_t count) : count_(count) {
+  explicit Numbers(std::size_t count) : count_(count) {  ///< zeros. @throws std::bad_alloc
     void* const memory = mmap(nullptr, bytes(), PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
     if (memory == MAP_FAILED) throw std::bad_alloc();
     data_ = static_cast<double*>(memory);
   }
-  Numbers(Numbers&& other) noexcept
+  Numbers(Numbers&& other) noexcept  ///< `other` has none then
       : data_(std::exchange(other.data_, nullptr)), count_(std::exchange(other.count_, 0)) {}
   Numbers& operator=(Numbers&& other) noexcept {
     std::swap(data_, other.data_);
@@ -59,7 +59,7 @@ class NumberPool {
     }
     return Numbers(size);
   }
-  void give_back(Numbers numbers) {
+  void give_back(Numbers numbers) {  ///< for the next who takes as many
     if (numbers.get() == nullptr || numbers.bytes() > kLargestKept) return;
     const std::lock_guard lock(gate_);
     free_[static_cast<std::size_t>(std::countr_zero(numbers.bytes() / sizeof(double)))].push_back(std::move(numbers));

@@ -16,10 +16,11 @@ class MeshLines {
   /// Keeps the reference.
   MeshLines(const MeshShape& shape, const Eigen::Vector3d& direction) : shape_(shape), direction_(direction) {}
 
-  std::optional<double> first_entry(const Eigen::Vector3d& point, const Eigen::Vector3d& direction) const {
+  std::optional<double> first_entry(const Eigen::Vector3d& point,
+                                    const Eigen::Vector3d& direction) const {  ///< its own
     return use_grid(direction) ? grid_->first_entry(point) : shape_.first_entry(point, direction);
   }
-  bool is_hit(const Eigen::Vector3d& point, const Eigen::Vector3d& direction) const {
+  bool is_hit(const Eigen::Vector3d& point, const Eigen::Vector3d& direction) const {  ///< as is_hit of the shape
     return use_grid(direction) ? grid_->is_hit(point) : shape_.is_hit(point, direction);
   }
 
@@ -39,14 +40,16 @@ class MeshLines {
   mutable std::size_t asked_ = 0;
   mutable std::optional<LineGrid> grid_;  // what is found doesn't depend on it
 };
-
+/// As of the mesh's shape.
 inline std::optional<double> first_entry(const MeshLines& lines, const Eigen::Vector3d& point,
                                          const Eigen::Vector3d& direction) {
   return lines.first_entry(point, direction);
 }
-inline bool is_hit(const MeshLines& lines, const Eigen::Vector3d& point, const Eigen::Vector3d& direction) {
+inline bool is_hit(const MeshLines& lines, const Eigen::Vector3d& point,
+                   const Eigen::Vector3d& direction) {  ///< likewise
   return lines.is_hit(point, direction);
 }
+/// Not known for meshes.
 inline std::optional<double> silhouette_distance(const MeshLines&, const Eigen::Vector3d&, const Eigen::Vector3d&) {
   return std::nullopt;
 }

@@ -45,7 +45,7 @@ enum class BodyPlace {
   on_axis,    ///< its axis on the gel's axis of symmetry
   along_edge  ///< a side of it over an edge of the mesh; its axis on a node if it has no straight side
 };
-std::string name_of(BodyPlace place);
+std::string name_of(BodyPlace place);  ///< as it is declared, with spaces
 
 /// One body pressed on one gel.
 struct BodyTrial {

@@ -68,7 +68,7 @@ class DirectBatch {
     int triangle;
     float u, v;
   };
-  std::optional<SheetPlace> sheet_place(int lane) const;
+  std::optional<SheetPlace> sheet_place(int lane) const;  ///< see above
   /// What a white sheet in the place of a lane's would show, as SheetPoints::values has it: 4 floats a band. `ambient`
   /// as in add(). @pre sheet_place(lane); no films
   void white_light(int lane, const float* ambient, float* out) const;

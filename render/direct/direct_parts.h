@@ -19,7 +19,7 @@
 #include "render/scene/packet_scene.h"
 
 namespace touchstone::render {
-
+/// All that a renderer keeps from frame to frame.
 struct DirectRenderer::Parts {
   DirectFixture fixture;
   ReadyCamera camera;
@@ -43,11 +43,12 @@ struct DirectRenderer::Parts {
   std::vector<float> bounced;                 // [grid point][band], irradiance; empty for none
   std::map<double, GgxAlbedo> conductors;     // by roughness
 
-  Parts(const LightField& field, const Camera& camera_of, const Scene& rest, const DirectSettings& settings_of);
+  Parts(const LightField& field, const Camera& camera_of, const Scene& rest,
+        const DirectSettings& settings_of);  ///< as DirectRenderer's
 
   int width() const { return size_of_grid(pixel_grid(camera)).x(); }
   int height() const { return size_of_grid(pixel_grid(camera)).y(); }
-
+  /// Does the first surface alone cast shadows, and do horizons say where?
   bool is_lone_sheet(const Scene& scene) const {
     return horizon_settings.has_value() && is_sheet_alone(fixture.bearings, scene);
   }

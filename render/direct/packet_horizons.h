@@ -19,6 +19,7 @@ struct PacketHorizons {
 /// Beams of one azimuth, from the flattest on, and from where horizons are held against them: two azimuths, half way to
 /// where the sector ends.
 struct BeamSector {
+  /// Where horizons are looked up.
   struct Look {
     float azimuth;
     float x, y;  ///< its unit vector

@@ -48,7 +48,7 @@ class SheetHorizons {
   /// The horizons' tangents at a place, by azimuth. `out` has space for kAround.
   void at(float x, float y, float* out) const;
 
-  static float azimuth(float x, float y) {
+  static float azimuth(float x, float y) {  ///< of a direction, 0 to 4
     const float across = (x < 0.0f ? -x : x) + (y < 0.0f ? -y : y);
     const float share = across > 0.0f ? y / across : 0.0f;
     if (x < 0.0f) return 2.0f - share;

@@ -40,8 +40,8 @@ std::vector<LampArrival> arrivals_at_back(const Scene& fixture, double z, const 
 
 /// The quarter, in azimuth, that light comes from: 0 +x, 1 +y, 2 -x, 3 -y.
 inline constexpr int kLightSides = 4;
-int side_of(const Eigen::Vector3d& direction);
-
+int side_of(const Eigen::Vector3d& direction);  ///< as above
+/// How many walks are made, and of which stream.
 struct CoatWalkSettings {
   std::uint64_t seed = 1;
   int drawn = 1 << 18;    ///< camera walks for each side of light; of all their ways to lamps

@@ -31,7 +31,7 @@ class SheetIndex {
   struct Normals {
     Eigen::Vector3d face, shading;
   };
-  Normals normals_at(const Hit& hit) const;
+  Normals normals_at(const Hit& hit) const;  ///< see above
 
  private:
   struct Heights {

@@ -33,7 +33,7 @@ class MainsFlickerMeter {
  public:
   /// @throws Error naming the event (its number since the beginning) whose time goes backwards; those before it count
   void add(std::span<const Event> events);
-  MainsFlicker flicker() const;
+  MainsFlicker flicker() const;  ///< what the events so far say
 
  private:
   static constexpr std::array<double, 2> kFrequencies_Hz = {100.0, 120.0};

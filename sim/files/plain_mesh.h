@@ -5,7 +5,7 @@
 #include "core/triangle_mesh.h"
 
 namespace touchstone::sim {
-
+/// What a file's ending says.
 enum class PlainMeshFormat { stl, obj, ply };
 
 /// Reads the solid in an STL, OBJ or PLY file, text or binary: all of its triangles, scaled by `mm_per_unit`, vertices

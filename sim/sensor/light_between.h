@@ -63,7 +63,7 @@ class LightBetween {
   /// After the last state.
   void finish();
 
-  const LightBetweenReport& report() const;
+  const LightBetweenReport& report() const;  ///< of the states so far
 
  private:
   struct Parts;

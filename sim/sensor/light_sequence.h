@@ -51,7 +51,7 @@ class LightSequence {
 
   /// What is seen of the scene, and by which direct light (null: paths).
   const SceneView& view() const;
-  const DirectLight* direct() const;
+  const DirectLight* direct() const;  ///< likewise
   /// What irradiance frees in each pixel, CV_32FC1, electrons a second; the argument's memory is used again.
   void pixel_currents(const cv::Mat& irradiance, cv::Mat& currents) const;
 

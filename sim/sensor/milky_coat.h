@@ -63,6 +63,6 @@ class MilkyCoat {
 
 /// Keeps what was traced under a key, as light_file does; and reads it: nothing where there is none that's whole.
 void write_traced(const std::filesystem::path& folder, const std::string& key, const TracedSlab& traced);
-std::optional<TracedSlab> read_traced(const std::filesystem::path& folder, const std::string& key);
+std::optional<TracedSlab> read_traced(const std::filesystem::path& folder, const std::string& key);  ///< see above
 
 }  // namespace touchstone::sim

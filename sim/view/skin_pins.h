@@ -20,8 +20,8 @@ namespace touchstone::sim {
 /// vertices within kSmoothing thicknesses of the skin (at least the 12 nearest). Made once a gel; for many threads.
 class SkinPins {
  public:
-  SkinPins() = default;  ///< none
-  SkinPins(const DeviceSpec& device, const fem::Compliance& gel);
+  SkinPins() = default;                                            ///< none
+  SkinPins(const DeviceSpec& device, const fem::Compliance& gel);  ///< those of the device's skin
 
   bool empty() const { return pins_.empty(); }
   /// Middles of the white tips on the undeformed gel, mm, a row a pin (sim/scene/device_pins.h).
