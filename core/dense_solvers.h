@@ -8,6 +8,7 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/QR>
 
+// NOLINTBEGIN(bugprone-macro-parentheses): a keyword can't stand in any
 /// What dense_solvers.cpp defines (`how` empty) and everybody else takes from there (`how` is extern).
 #define TS_DENSE_SOLVERS(how)                                                                                          \
   how template Eigen::LLT<Eigen::MatrixXd>& Eigen::LLT<Eigen::MatrixXd>::compute(                                      \
@@ -25,6 +26,7 @@
       const;                                                                                                           \
   how template Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>&                                                         \
   Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>::compute(const Eigen::EigenBase<Eigen::MatrixXd>&, int)
+// NOLINTEND(bugprone-macro-parentheses)
 
 /// @cond
 TS_DENSE_SOLVERS(extern);
