@@ -14,6 +14,7 @@
 
 #include "core/error.h"
 #include "core/nearest_name.h"
+#include "core/short_text.h"
 #include "plots/line_plot.h"
 
 namespace touchstone::apps {
@@ -142,7 +143,7 @@ struct FrameServer::Parts {
   static Requested values_of(const httplib::Request& request) {
     Requested values;
     for (const auto& [name, value] : request.params) {
-      if (!values.emplace(name, value).second) fail("{}: stands twice in the request", name);
+      if (!values.emplace(name, value).second) fail("{}: stands twice in the request", short_text(name));
     }
     return values;
   }
@@ -193,7 +194,15 @@ double number_of(const Requested& requested, const std::string& name, std::optio
   double value = 0.0;
   const char* end = at->second.data() + at->second.size();
   const auto [stop, error] = std::from_chars(at->second.data(), end, value);
-  if (error != std::errc() || stop != end || !std::isfinite(value)) fail("{}: '{}' isn't a number", name, at->second);
+  if (error != std::errc() || stop != end || !std::isfinite(value))
+    fail("{}: '{}' isn't a number", name, short_text(at->second));
+  return value;
+}
+
+double angle_of(const Requested& requested, const std::string& name) {
+  constexpr double kMost_deg = 360.0;
+  const double value = number_of(requested, name, 0.0);
+  if (std::abs(value) > kMost_deg) fail("{}: {:g} isn't allowed; {:g} to {:g} is", name, value, -kMost_deg, kMost_deg);
   return value;
 }
 
@@ -208,8 +217,8 @@ int count_of(const Requested& requested, const std::string& name) {
 void allow_only(const Requested& requested, const std::vector<std::string>& allowed) {
   for (const auto& [name, value] : requested) {
     if (std::find(allowed.begin(), allowed.end(), name) != allowed.end()) continue;
-    if (allowed.empty()) fail("{}: isn't known; nothing is to be given here", name);
-    fail("{}: isn't known{}; allowed are: {}", name, did_you_mean(name, allowed), fmt::join(allowed, ", "));
+    if (allowed.empty()) fail("{}: isn't known; nothing is to be given here", short_text(name));
+    fail("{}: isn't known{}; allowed are: {}", short_text(name), did_you_mean(name, allowed), fmt::join(allowed, ", "));
   }
 }
 

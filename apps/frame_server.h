@@ -46,6 +46,8 @@ class FrameServer {
 
 /// One of the values as a number. @throws Error naming it if it isn't one or, without `otherwise`, isn't there
 double number_of(const Requested& requested, const std::string& name, std::optional<double> otherwise = std::nullopt);
+/// The same, degrees from -360 to 360; 0 where it isn't there.
+double angle_of(const Requested& requested, const std::string& name);
 /// The same, a whole one from 0.
 int count_of(const Requested& requested, const std::string& name);
 /// @throws Error naming a value that isn't among `allowed`

@@ -15,6 +15,7 @@
 #include "apps/progress_bar.h"
 #include "core/error.h"
 #include "core/nearest_name.h"
+#include "core/short_text.h"
 #include "core/yaml_reader.h"
 #include "datasets/jobs/scenes_folder.h"
 #include "lab/device/camera_feed.h"
@@ -141,7 +142,8 @@ class Objects {
     if (file == files_.end()) {
       std::vector<std::string> known;
       for (const auto& [one, ignored] : files_) known.push_back(one);
-      fail("object: '{}' isn't known{}; there are: {}", name, did_you_mean(name, known), fmt::join(known, ", "));
+      fail("object: '{}' isn't known{}; there are: {}", short_text(name), did_you_mean(name, known),
+           fmt::join(known, ", "));
     }
     const auto kept = made_.find(name);
     if (kept != made_.end()) return kept->second;
@@ -159,8 +161,8 @@ class Objects {
 sim::PressSpec press_of(const Requested& requested) {
   sim::PressSpec press;
   press.place_mm = {number_of(requested, "x_mm", 0.0), number_of(requested, "y_mm", 0.0)};
-  press.angles_deg = {number_of(requested, "turn_x_deg", 0.0), number_of(requested, "turn_y_deg", 0.0),
-                      number_of(requested, "turn_z_deg", 0.0)};
+  press.angles_deg = {angle_of(requested, "turn_x_deg"), angle_of(requested, "turn_y_deg"),
+                      angle_of(requested, "turn_z_deg")};
   press.drag_mm = {number_of(requested, "drag_x_mm", 0.0), number_of(requested, "drag_y_mm", 0.0)};
   if (requested.count("force_N") > 0) press.force_N = number_of(requested, "force_N");
   if (requested.count("depth_mm") > 0) press.depth_mm = number_of(requested, "depth_mm");

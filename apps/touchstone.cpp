@@ -2,12 +2,18 @@
 
 #include <fmt/format.h>
 
+#include <fcntl.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 #include <tbb/global_control.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
+#include <csignal>
 #include <cstdio>
+#include <cstring>
+#include <iostream>
 #include <new>
 #include <optional>
 
@@ -24,6 +30,16 @@ namespace {
 constexpr int kDone = 0;
 constexpr int kInternalFailure = 1;
 constexpr int kUserMistake = 2;
+
+/// Opens what is closed of descriptors 0 to 2: else the next file to be opened would be one of them, and what is
+/// printed would go into it.
+void hold_standard_descriptors() {
+  int descriptor = 0;
+  do {
+    descriptor = open("/dev/null", O_RDWR);
+  } while (descriptor >= 0 && descriptor <= STDERR_FILENO);
+  if (descriptor > STDERR_FILENO) close(descriptor);
+}
 
 int complain(int code, const std::string& message) {
   std::string line = message;
@@ -56,12 +72,11 @@ int run(int argc, char** argv) {
   app.require_subcommand(1);
   app.fallthrough();
   GlobalOptions global;
-  global.cache = sim::default_cache_folder();
   app.add_option("--threads", global.threads, "At most so many threads (default: all of the machine)")
       ->check(CLI::Range(1, 4096));
   app.add_flag("--quiet", global.quiet, "No progress on stderr");
-  app.add_option("--cache", global.cache,
-                 "Folder of set-up results (default: $TOUCHSTONE_CACHE or ~/.cache/touchstone)");
+  const CLI::Option* cache = app.add_option(
+      "--cache", global.cache, "Folder of set-up results (default: $TOUCHSTONE_CACHE or ~/.cache/touchstone)");
   Action action;
   add_plan_command(app, global, action);
   add_render_command(app, global, action);
@@ -91,6 +106,7 @@ int run(int argc, char** argv) {
   if (global.threads > 0) {
     limit.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(global.threads));
   }
+  if (cache->empty()) global.cache = sim::default_cache_folder();
   action();
   return kDone;
 }
@@ -103,18 +119,30 @@ int guarded_run(int argc, char** argv) {
   } catch (const std::bad_alloc&) {
     return complain(kInternalFailure, "there isn't enough memory");
   } catch (const std::exception& error) {
+    if (std::ferror(stdout) != 0) return complain(kInternalFailure, std::string("stdout: ") + error.what());
     return complain(kInternalFailure, std::string("internal failure: ") + error.what());
   } catch (...) {
     return complain(kInternalFailure, "internal failure of an unknown kind");
   }
 }
 
+/// What was printed may still be in memory: only now a full disk shows.
+int end_output(int code) {
+  errno = 0;
+  std::cout.flush();
+  if ((std::fflush(stdout) == 0 && std::ferror(stdout) == 0) || code != kDone) return code;
+  const char* const why = errno != 0 ? std::strerror(errno) : "some of it is lost";
+  return complain(kInternalFailure, fmt::format("stdout: can't be written ({})", why));
+}
+
 }  // namespace
 }  // namespace touchstone::apps
 
 int main(int argc, char** argv) {
+  touchstone::apps::hold_standard_descriptors();
+  std::signal(SIGXFSZ, SIG_IGN);  // writing beyond a limit of file size is then an error that names the file
   spdlog::set_default_logger(spdlog::stderr_color_mt("touchstone"));
   spdlog::set_pattern("touchstone: %l: %v");
   touchstone::apps::choose_blas_kind(argv);
-  return touchstone::apps::guarded_run(argc, argv);
+  return touchstone::apps::end_output(touchstone::apps::guarded_run(argc, argv));
 }

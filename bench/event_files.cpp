@@ -3,7 +3,6 @@
 //   build/dev/bench/bench_event_files
 
 #include <benchmark/benchmark.h>
-#include <unistd.h>
 
 #include <array>
 #include <cstdint>
@@ -12,6 +11,7 @@
 #include <vector>
 
 #include "sensors/events/event_file.h"
+#include "tests/support/temporary_folder.h"
 
 namespace touchstone::sensors {
 namespace {
@@ -47,8 +47,8 @@ const std::vector<Event>& events_of(bool bursts) {
 }
 
 std::filesystem::path file_of(const benchmark::State& state) {
-  return std::filesystem::temp_directory_path() /
-         ("touchstone_bench_" + std::to_string(getpid()) + kEndings[static_cast<std::size_t>(state.range(0))]);
+  static const test::TemporaryFolder folder;
+  return folder.path() / (std::string("events") + kEndings[static_cast<std::size_t>(state.range(0))]);
 }
 
 void write_file(const std::filesystem::path& file, const std::vector<Event>& events) {

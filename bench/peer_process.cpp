@@ -1,11 +1,12 @@
 #include "bench/peer_process.h"
 
 #include <fcntl.h>
-#include <fmt/format.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <cstdlib>
+
+#include "core/error.h"
 
 namespace touchstone::bench {
 
@@ -33,9 +34,10 @@ int probe(const std::vector<std::string>& command) {
   return run_to_end(command, "/dev/null");
 }
 
-ScratchFolder::ScratchFolder()
-    : path_(std::filesystem::temp_directory_path() / fmt::format("touchstone-bench-{}", getpid())) {
-  std::filesystem::create_directories(path_);
+ScratchFolder::ScratchFolder() {
+  std::string name = (std::filesystem::temp_directory_path() / "touchstone-bench-XXXXXX").string();
+  if (mkdtemp(name.data()) == nullptr) fail("{}: can't be made", name);
+  path_ = name;
 }
 
 ScratchFolder::~ScratchFolder() {

@@ -1,10 +1,10 @@
 // Mechanics of the vhs gel: set-up from nothing, loading it from the cache, and presses, with and without friction.
 //   build/dev/bench/bench_press
 #include <benchmark/benchmark.h>
-#include <unistd.h>
 
 #include "fem/contact/press.h"
 #include "sim/press/gel_setup.h"
+#include "tests/support/temporary_folder.h"
 
 namespace {
 
@@ -21,12 +21,12 @@ std::shared_ptr<const fem::Compliance> gel() {
 }
 
 void SetUp(benchmark::State& state) {
-  const auto folder = std::filesystem::temp_directory_path() / ("touchstone-bench-" + std::to_string(getpid()));
+  const test::TemporaryFolder scratch;
+  const auto folder = scratch.path() / "cache";
   for (auto _ : state) {
     std::filesystem::remove_all(folder);
     benchmark::DoNotOptimize(sim::set_up_gel(device(), folder));
   }
-  std::filesystem::remove_all(folder);
 }
 BENCHMARK(SetUp)->Unit(benchmark::kMillisecond)->Iterations(1);
 

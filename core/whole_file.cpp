@@ -1,15 +1,75 @@
 #include "core/whole_file.h"
 
+#include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <atomic>
-#include <fstream>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <random>
+#include <utility>
 
 #include "core/error.h"
 #include "core/input_file.h"
 
 namespace touchstone {
+namespace {
+
+std::string unguessable_digits() {
+  std::random_device device;
+  return fmt::format("{:08x}{:08x}", device(), device());
+}
+
+/// A file that stands beside `path` until it takes its name. Nobody else can have put it, or a link, there before: its
+/// name can't be guessed, and it's made or it's an error. Its ending is `path`'s, because writers choose a format by
+/// it.
+class TemporaryFile {
+ public:
+  explicit TemporaryFile(const std::filesystem::path& path)
+      : path_(path),
+        name_(path.parent_path() /
+              fmt::format(".{}.{}.part{}", path.stem().string(), unguessable_digits(), path.extension().string())),
+        descriptor_(open(name_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666)) {
+    if (descriptor_ < 0) fail("{}: can't be written ({})", path_.string(), std::strerror(errno));
+  }
+  ~TemporaryFile() {
+    if (descriptor_ >= 0) close(descriptor_);
+    if (!named_) unlink(name_.c_str());
+  }
+  TemporaryFile(const TemporaryFile&) = delete;
+  TemporaryFile& operator=(const TemporaryFile&) = delete;
+
+  const std::filesystem::path& name() const { return name_; }
+  std::size_t size() const {
+    struct stat about {};
+    return fstat(descriptor_, &about) == 0 ? static_cast<std::size_t>(about.st_size) : 0;
+  }
+  void append(std::string_view bytes) const {
+    while (!bytes.empty()) {
+      const ssize_t count = ::write(descriptor_, bytes.data(), bytes.size());
+      if (count < 0 && errno == EINTR) continue;
+      if (count < 0) fail("{}: can't be written ({})", path_.string(), std::strerror(errno));
+      bytes.remove_prefix(static_cast<std::size_t>(count));
+    }
+  }
+  void take_its_name() {
+    // Over a network some faults of writing come with closing.
+    if (close(std::exchange(descriptor_, -1)) != 0 || std::rename(name_.c_str(), path_.c_str()) != 0) {
+      fail("{}: can't be written ({})", path_.string(), std::strerror(errno));
+    }
+    named_ = true;
+  }
+
+ private:
+  std::filesystem::path path_;
+  std::filesystem::path name_;
+  int descriptor_ = -1;
+  bool named_ = false;
+};
+
+}  // namespace
 
 std::string read_whole_file(const std::filesystem::path& path) {
   InputFile file(path);
@@ -25,33 +85,35 @@ std::string read_whole_file(const std::filesystem::path& path) {
 
 void write_whole_file(const std::filesystem::path& path,
                       const std::function<void(const std::filesystem::path& temporary)>& write) {
-  static std::atomic<unsigned> serial{0};
-  // Two processes may write the same file at once: each has a temporary name of its own, the last rename wins whole.
-  // The ending stays last, because writers choose a format by it.
-  const std::filesystem::path temporary =
-      path.parent_path() /
-      fmt::format(".{}.{}.{}.part{}", path.stem().string(), getpid(), serial++, path.extension().string());
-  try {
-    write(temporary);
-    std::filesystem::rename(temporary, path);
-  } catch (const std::filesystem::filesystem_error& error) {
-    std::error_code ignored;
-    std::filesystem::remove(temporary, ignored);
-    fail("{}: can't be written ({})", path.string(), error.code().message());
-  } catch (...) {
-    std::error_code ignored;
-    std::filesystem::remove(temporary, ignored);
-    throw;
-  }
+  TemporaryFile file(path);
+  write(file.name());
+  if (file.size() == 0) fail("{}: can't be written (nothing was)", path.string());
+  file.take_its_name();
 }
 
 void write_whole_file(const std::filesystem::path& path, std::string_view content) {
-  write_whole_file(path, [&](const std::filesystem::path& temporary) {
-    std::ofstream out(temporary, std::ios::binary);
-    out.write(content.data(), static_cast<std::streamsize>(content.size()));
-    out.close();
-    if (!out) fail("{}: can't be written", path.string());
-  });
+  TemporaryFile file(path);
+  file.append(content);
+  file.take_its_name();
+}
+
+void write_lasting_file(const std::filesystem::path& path, std::string_view content) {
+  {
+    TemporaryFile file(path);
+    file.append(content);
+    wait_for_disk(file.name());
+    file.take_its_name();
+  }
+  wait_for_disk(path.has_parent_path() ? path.parent_path() : ".");
+}
+
+void wait_for_disk(const std::filesystem::path& path) {
+  const int descriptor = open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+  if (descriptor < 0) fail("{}: can't be read ({})", path.string(), std::strerror(errno));
+  // Some file systems, mostly those over a network, take no such wish for a folder.
+  const int why = fsync(descriptor) == 0 || errno == EINVAL || errno == ENOTSUP ? 0 : errno;
+  close(descriptor);
+  if (why != 0) fail("{}: can't be written ({})", path.string(), std::strerror(why));
 }
 
 }  // namespace touchstone

@@ -13,6 +13,7 @@
 
 #include "core/field_error.h"
 #include "core/nearest_name.h"
+#include "core/short_text.h"
 #include "core/whole_file.h"
 #include "core/yaml_description.h"
 
@@ -105,6 +106,12 @@ class OneDocument : public YAML::EventHandler {
   int documents_ = 0;
 };
 
+/// Reading takes some 200 bytes of memory for each byte of a list of numbers.
+void refuse_too_large(std::uintmax_t bytes, const std::string& name) {
+  constexpr std::uintmax_t kMost = 4'000'000;
+  if (bytes > kMost) throw Error({name, 0}, fmt::format("has {} bytes; a YAML file may have {}", bytes, kMost));
+}
+
 /// The text's one document. Not by YAML::LoadAll, which makes documents until memory is gone of what can't begin one
 /// (", a").
 YAML::Node only_document(const std::string& text, const std::string& name) {
@@ -125,10 +132,15 @@ YAML::Node only_document(const std::string& text, const std::string& name) {
 }  // namespace
 
 YamlReader YamlReader::open(const std::filesystem::path& file) {
+  std::error_code ignored;  // reading says what is wrong
+  if (std::filesystem::is_regular_file(file, ignored)) {
+    refuse_too_large(std::filesystem::file_size(file, ignored), file.string());
+  }
   return parse(read_whole_file(file), file.string());
 }
 
 YamlReader YamlReader::parse(const std::string& text, const std::string& name) {
+  refuse_too_large(text.size(), name);
   auto node = std::make_shared<Node>();
   node->file = name;
   node->yaml = only_document(text, name);
@@ -276,9 +288,9 @@ double YamlReader::number(Allowed allowed) const {
   const std::string text = scalar("a number");
   const auto value = whole_number<double>(text);
   if (!value || !std::isfinite(*value)) {
-    node_->refuse("'{}' isn't a finite number; allowed is {}", text, allowed.text());
+    node_->refuse("'{}' isn't a finite number; allowed is {}", short_text(text), allowed.text());
   }
-  if (!allowed.holds(*value)) node_->refuse("{} is not allowed; allowed is {}", text, allowed.text());
+  if (!allowed.holds(*value)) node_->refuse("{} is not allowed; allowed is {}", short_text(text), allowed.text());
   return *value;
 }
 
@@ -286,9 +298,9 @@ std::int64_t YamlReader::integer(Allowed allowed) const {
   if (describing()) return node_->place->integer(allowed);
   const std::string text = scalar("a whole number");
   const auto value = whole_number<std::int64_t>(text);
-  if (!value) node_->refuse("'{}' isn't a whole number", text);
+  if (!value) node_->refuse("'{}' isn't a whole number", short_text(text));
   if (!allowed.holds(static_cast<double>(*value))) {
-    node_->refuse("{} is not allowed; allowed is {}", text, allowed.text());
+    node_->refuse("{} is not allowed; allowed is {}", short_text(text), allowed.text());
   }
   return *value;
 }
@@ -309,9 +321,9 @@ std::uint64_t YamlReader::unsigned_integer(Allowed allowed) const {
   }
   const std::string text = scalar("a whole number");
   const auto value = whole_number<std::uint64_t>(text);
-  if (!value) node_->refuse("'{}' isn't a whole number from 0 up", text);
+  if (!value) node_->refuse("'{}' isn't a whole number from 0 up", short_text(text));
   if (!allowed.holds(static_cast<double>(*value))) {
-    node_->refuse("{} is not allowed; allowed is {}", text, allowed.text());
+    node_->refuse("{} is not allowed; allowed is {}", short_text(text), allowed.text());
   }
   return *value;
 }
@@ -322,7 +334,7 @@ void YamlReader::read(bool& value, Allowed) {
     return;
   }
   const std::string text = scalar("true or false");
-  if (text != "true" && text != "false") node_->refuse("'{}' is neither true nor false", text);
+  if (text != "true" && text != "false") node_->refuse("'{}' is neither true nor false", short_text(text));
   value = text == "true";
 }
 
@@ -333,12 +345,12 @@ void YamlReader::finish() const {
     if (!entry.first.IsScalar()) node_->refuse_at(line, node_->path, "a key must be a plain word");
     const std::string key = entry.first.Scalar();
     if (std::find(seen.begin(), seen.end(), key) != seen.end()) {
-      node_->refuse_at(line, node_->path_of(key), fmt::format("'{}' stands here a second time", key));
+      node_->refuse_at(line, node_->path_of(key), fmt::format("'{}' stands here a second time", short_text(key)));
     }
     seen.push_back(key);
     if (std::find(node_->asked.begin(), node_->asked.end(), key) == node_->asked.end()) {
       node_->refuse_at(line, node_->path_of(key),
-                       fmt::format("unknown key '{}'{}", key, did_you_mean(key, node_->asked)));
+                       fmt::format("unknown key '{}'{}", short_text(key), did_you_mean(key, node_->asked)));
     }
   }
 }
@@ -352,7 +364,7 @@ void YamlReader::refuse_nearly(const std::string& key) const {
         nearest_name(there, wanted)) {
       const int line = entry.first.Mark().is_null() ? 0 : entry.first.Mark().line + 1;
       node_->refuse_at(line, node_->path_of(there),
-                       fmt::format("unknown key '{}'{}", there, did_you_mean(there, wanted)));
+                       fmt::format("unknown key '{}'{}", short_text(there), did_you_mean(there, wanted)));
     }
   }
 }
@@ -398,7 +410,7 @@ std::size_t YamlReader::name_index(const std::vector<std::string>& known) const 
   const std::string name = scalar("a name");
   const auto found = std::find(known.begin(), known.end(), name);
   if (found == known.end()) {
-    node_->refuse("'{}' is not known{}; allowed is one of: {}", name, did_you_mean(name, known),
+    node_->refuse("'{}' is not known{}; allowed is one of: {}", short_text(name), did_you_mean(name, known),
                   fmt::join(known, ", "));
   }
   return static_cast<std::size_t>(found - known.begin());

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/error.h"
+#include "core/short_text.h"
 #include "datasets/jobs/input_files.h"
 #include "datasets/jobs/job.h"
 
@@ -83,14 +84,14 @@ void fields(YamlReader& in, DrawSpec& draw) {
   in.optional("units", draw.units);
   in.required("objects", draw.objects);
   in.required("place_mm", draw.place_mm);
-  in.optional("turn_deg", draw.turn_deg);
+  in.optional("turn_deg", draw.turn_deg, Allowed::within(-360.0, 360.0));
   in.optional("tilt_deg", draw.tilt_deg, Allowed::within(0.0, kLargestTilt_deg));
-  in.optional("tilt_axis_deg", draw.tilt_axis_deg);
+  in.optional("tilt_axis_deg", draw.tilt_axis_deg, Allowed::within(-360.0, 360.0));
   in.optional("force_N", draw.force_N, Allowed::above(0.0));
   in.optional("depth_mm", draw.depth_mm, Allowed::above(0.0));
   in.exactly_one_of({"force_N", "depth_mm"});
   in.optional("drag_mm", draw.drag_mm, Allowed::at_least(0.0));
-  in.optional("drag_toward_deg", draw.drag_toward_deg);
+  in.optional("drag_toward_deg", draw.drag_toward_deg, Allowed::within(-360.0, 360.0));
   in.optional("deepest_mm", draw.deepest_mm, Allowed::above(0.0));
   if (draw.objects.empty()) fail_at(in.where("objects"), "draw.objects: has no object; at least one is needed");
 }
@@ -99,7 +100,8 @@ void fields(YamlReader& in, DrawJob& job) {
   job.where = in.where();
   in.required("name", job.name);
   if (!is_folder_name(job.name)) {
-    fail_at(in.where("name"), "name: '{}' isn't a name; allowed are up to 100 letters, digits, - and _", job.name);
+    fail_at(in.where("name"), "name: '{}' isn't a name; allowed are up to 100 letters, digits, - and _",
+            short_text(job.name));
   }
   in.required("seed", job.seed);
   in.required("samples", job.samples, Allowed::at_least(1));

@@ -4,6 +4,8 @@
 #include <cctype>
 #include <set>
 
+#include "core/short_text.h"
+
 namespace touchstone::datasets {
 bool is_folder_name(const std::string& name) {
   return !name.empty() && name.size() <= 100 && std::all_of(name.begin(), name.end(), [](unsigned char letter) {
@@ -16,7 +18,7 @@ void fields(YamlReader& in, JobScene& scene) {
   in.required("name", scene.name);
   if (!is_folder_name(scene.name)) {
     fail_at(in.where("name"), "name: '{}' can't name a folder; allowed are up to 100 letters, digits, - and _",
-            scene.name);
+            short_text(scene.name));
   }
   std::string file;
   in.required("scene", file);

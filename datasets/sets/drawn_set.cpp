@@ -148,7 +148,7 @@ void merge(const PreparedDraw& prepared, const Folder& folder, const Progress& p
   const std::string card = data_card(prepared, figures);
   write_whole_file(folder.out / "README.md", card);
   files.push_back({"README.md", sha256_of(card), static_cast<std::int64_t>(card.size())});
-  write_whole_file(folder.out / "dataset.json", text_of_manifest(prepared, folder, figures, files));
+  write_manifest(folder.out, text_of_manifest(prepared, folder, figures, files), files);
   finish_folder(folder.out);
 }
 

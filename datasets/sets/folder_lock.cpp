@@ -39,7 +39,7 @@ bool is_still_there(int descriptor, const std::filesystem::path& file) {
 
 FolderLock::FolderLock(const std::filesystem::path& file) {
   for (;;) {
-    const int descriptor = open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+    const int descriptor = open(file.c_str(), O_RDWR | O_CREAT | O_NOFOLLOW | O_CLOEXEC, 0644);
     if (descriptor < 0) fail("{}: can't be made ({})", file.string(), std::strerror(errno));
     if (flock(descriptor, LOCK_EX | LOCK_NB) != 0) {
       const int why = errno;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <set>
 #include <string>
 
 #include "core/error.h"
@@ -14,11 +15,6 @@ namespace touchstone::datasets {
 namespace {
 
 namespace fs = std::filesystem;
-
-bool is_number(const std::string& text) {
-  return !text.empty() &&
-         std::all_of(text.begin(), text.end(), [](char digit) { return digit >= '0' && digit <= '9'; });
-}
 
 fs::path topmost_missing(const fs::path& folder) {
   fs::path missing;
@@ -43,15 +39,14 @@ void refuse_unless_equal(const fs::path& out, const RunIdentity& identity) {
 }  // namespace
 
 bool is_temporary_file(const fs::path& file) {
+  constexpr std::size_t kDigits = 16;
   const std::string name = file.filename().string();
   const std::size_t part = name.rfind(".part");
-  if (!name.starts_with('.') || part == 0 || part == std::string::npos) return false;
+  if (part == std::string::npos || part < kDigits + 2) return false;  // .name.digits
   if (part + 5 != name.size() && name[part + 5] != '.') return false;
-  const std::size_t serial = name.rfind('.', part - 1);
-  if (serial == 0 || serial == std::string::npos) return false;
-  const std::size_t process = name.rfind('.', serial - 1);
-  return process != 0 && process != std::string::npos && is_number(name.substr(process + 1, serial - process - 1)) &&
-         is_number(name.substr(serial + 1, part - serial - 1));
+  const std::size_t digits = part - kDigits;
+  return name.starts_with('.') && name[digits - 1] == '.' && digits > 1 &&
+         name.find_first_not_of("0123456789abcdef", digits) == part;
 }
 
 FolderState state_of_folder(const fs::path& out, const RunIdentity& identity) {
@@ -88,8 +83,16 @@ void begin_shared(const fs::path& out, const RunIdentity& identity) {
   fs::create_directories(out / kUnfinished, error);
   if (error) fail("{}: can't be made ({})", (out / kUnfinished).string(), error.message());
   // Before all else, as it says whose the folder is.
-  write_whole_file(out / kUnfinished / "run.json", to_json(identity));
+  write_lasting_file(out / kUnfinished / "run.json", to_json(identity));
   state_of_folder(out, identity);  // another job's run may have begun here at the same time: the last record counts
+}
+
+void write_manifest(const fs::path& out, const std::string& text, std::span<const WrittenFile> files) {
+  std::set<fs::path> folders;
+  for (const WrittenFile& file : files) folders.insert((out / file.name).parent_path());
+  tbb::parallel_for(std::size_t{0}, files.size(), [&](std::size_t i) { wait_for_disk(out / files[i].name); });
+  for (const fs::path& folder : folders) wait_for_disk(folder);
+  write_lasting_file(out / "dataset.json", text);
 }
 
 void finish_folder(const fs::path& out) {
@@ -115,7 +118,7 @@ RunFolder::RunFolder(const fs::path& out, const RunIdentity& identity) : out_(ou
   lock_ = std::make_unique<FolderLock>(out / kUnfinished / "lock");
   // Another run may have begun or ended here in the meantime.
   if (state_of_folder(out, identity) == FolderState::absent) {
-    write_whole_file(out / kUnfinished / "run.json", to_json(identity));
+    write_lasting_file(out / kUnfinished / "run.json", to_json(identity));
   } else {
     keep_ = true;
   }

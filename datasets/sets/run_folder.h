@@ -3,6 +3,8 @@
 
 #include <filesystem>
 #include <memory>
+#include <span>
+#include <string>
 #include <vector>
 
 #include "datasets/sets/folder_lock.h"
@@ -15,7 +17,7 @@ namespace touchstone::datasets {
 /// Records of a run that isn't finished lie in this folder of the data set; it goes when the set is whole.
 inline constexpr const char* kUnfinished = ".unfinished";
 
-/// Has it a name that core/whole_file.h gives to files that aren't whole: .name.process.serial.part.ending?
+/// Has it a name that core/whole_file.h gives to files that aren't whole: .name.<16 hexadecimal digits>.part.ending?
 bool is_temporary_file(const std::filesystem::path& file);
 
 /// What is found at the place where a data set is wanted.
@@ -31,6 +33,10 @@ FolderState state_of_folder(const std::filesystem::path& out, const RunIdentity&
 /// Records whose the folder is that many runs will write into, and makes it if needed.
 /// @throws Error as state_of_folder, or if it can't be written
 void begin_shared(const std::filesystem::path& out, const RunIdentity& identity);
+
+/// Writes the manifest, dataset.json, once the files that it names are on the disk, so that it's true also after a loss
+/// of power. @throws Error if that can't be done
+void write_manifest(const std::filesystem::path& out, const std::string& text, std::span<const WrittenFile> files);
 
 /// Removes temporary files that killed runs left, and the records: the set is whole. @throws Error if it can't
 void finish_folder(const std::filesystem::path& out);

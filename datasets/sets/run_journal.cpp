@@ -63,7 +63,7 @@ RunJournal::RunJournal(const std::filesystem::path& file, const std::vector<Fram
   std::string text;
   for (const FrameRecord& record : kept) text += line_of(record);
   write_whole_file(file, text);
-  descriptor_ = open(file.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC);
+  descriptor_ = open(file.c_str(), O_WRONLY | O_APPEND | O_NOFOLLOW | O_CLOEXEC);
   if (descriptor_ < 0) fail("{}: can't be written ({})", name_, std::strerror(errno));
 }
 

@@ -183,8 +183,9 @@ class Run {
     timings.stages = clock_.stages;
     timings.threads = options.threads > 0 ? options.threads : tbb::info::default_concurrency();
     timings.samples_made = report_.made;
-    write_whole_file(out_ / "dataset.json", scene_manifest(job_, identity, gel_->report, arrays_, files, work,
-                                                           options.timings ? &timings : nullptr));
+    write_manifest(
+        out_, scene_manifest(job_, identity, gel_->report, arrays_, files, work, options.timings ? &timings : nullptr),
+        files);
   }
 
   GenerateReport report() const {

@@ -12,6 +12,7 @@
 #include <fstream>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string_view>
 #include <type_traits>
 #include <utility>
@@ -226,7 +227,16 @@ Compliance read_body(Reader& in, std::optional<std::pair<FarFieldMatrix::Parts, 
   const auto within = [](const std::vector<std::int32_t>& numbers, std::int64_t most) {
     return std::all_of(numbers.begin(), numbers.end(), [&](std::int64_t i) { return i >= 0 && i < most; });
   };
-  if (static_cast<std::int64_t>(columns.size()) != n + 1 || rows.size() != values.size() || columns.front() != 0 ||
+  const auto finite = [](std::span<const double> numbers) {
+    return std::all_of(numbers.begin(), numbers.end(), [](double number) { return std::isfinite(number); });
+  };
+  if (!(gel.thickness > 0.0) || !(gel.material.youngs_modulus > 0.0) || !std::isfinite(gel.thickness) ||
+      !std::isfinite(gel.material.youngs_modulus) || !std::isfinite(gel.material.poisson_ratio) ||
+      !finite(coordinates) || !finite(values)) {
+    fail("it has numbers that aren't a gel's");
+  }
+  if (coordinates.size() % 3 != 0 || corners.size() % 3 != 0 || static_cast<std::int64_t>(columns.size()) != n + 1 ||
+      rows.size() != values.size() || columns.front() != 0 ||
       columns.back() != static_cast<std::int32_t>(rows.size()) || !std::is_sorted(columns.begin(), columns.end()) ||
       !within(rows, n) || !within(corners, n)) {
     fail("its matrices don't fit its vertices");
@@ -350,6 +360,12 @@ Compliance read_compliance(const std::filesystem::path& path, const std::string&
     gel.surface = matrix_at(file, header.surface, unknowns, unknowns);
   }
   gel.beads = matrix_at(file, header.beads, header.beads.rows, unknowns);
+  if (header.beads.rows % 3 != 0) fail("its matrices don't fit its vertices");
+  const SharedMatrix* const whole = gel.surface.whole();
+  if (!(whole != nullptr ? *whole : gel.surface.compressed()->parts().numbers).view().allFinite() ||
+      !gel.beads.view().allFinite() || (far && !std::isfinite(far->second))) {
+    fail("it has numbers that aren't a gel's");
+  }
   return gel;
 }
 

@@ -97,6 +97,10 @@ struct StuckPatch::Parts {
   Parts(const Compliance& compliance, const GelVibration& modes, const std::vector<int>& vertices, const CutHats* cuts)
       : gel(compliance), vibration(modes) {
     if (vertices.empty()) fail("a body that shakes the gel must stick to at least one vertex of its surface");
+    if (vibration.surface.rows() != gel.surface.rows()) {
+      fail("the modes have {} rows and the gel's surface {}: they are of different gels", vibration.surface.rows(),
+           gel.surface.rows());
+    }
     const Eigen::VectorXd weight = gel.mass * Eigen::VectorXd::Ones(gel.mass.rows());
     const auto p = static_cast<Eigen::Index>(vertices.size());
     rigid = Eigen::MatrixX3d::Zero(3 * p, 3);

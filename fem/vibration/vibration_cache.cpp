@@ -1,5 +1,6 @@
 #include "fem/vibration/vibration_cache.h"
 
+#include <iterator>
 #include <string_view>
 #include <system_error>
 
@@ -28,7 +29,7 @@ std::string file_of(const std::string& key, const GelVibration& vibration) {
 }
 
 /// @throws Error that says, as the second half of a sentence, why the file can't be used
-GelVibration read_file(const std::filesystem::path& path, const std::string& key, int count) {
+GelVibration read_file(const std::filesystem::path& path, const std::string& key, Eigen::Index beads, int count) {
   const std::string content = read_whole_file(path);
   MatrixFile matrices(content, kMagic, "a gel's modes", key, "gel");
   GelVibration vibration;
@@ -39,8 +40,13 @@ GelVibration read_file(const std::filesystem::path& path, const std::string& key
   const Eigen::MatrixXd mass = matrices.take();
   if (!matrices.rest().empty() || frequency.cols() != 1 || frequency.rows() != count ||
       vibration.surface.cols() != count || vibration.beads.cols() != count ||
-      vibration.effective_mass.cols() != count || mass.size() != 1) {
+      vibration.effective_mass.cols() != count || mass.size() != 1 || vibration.surface.rows() % 3 != 0 ||
+      vibration.beads.rows() != 3 * beads || vibration.effective_mass.rows() != 3) {
     fail("its matrices don't fit each other");
+  }
+  if (!(frequency.array() > 0.0).all() || !frequency.allFinite() || !vibration.surface.allFinite() ||
+      !vibration.beads.allFinite() || !vibration.effective_mass.allFinite() || !mass.allFinite()) {
+    fail("it has numbers that aren't a vibration's");
   }
   vibration.angular_frequency = frequency;
   vibration.mass = mass(0, 0);
@@ -64,7 +70,7 @@ GelVibration cached_vibration(const std::string& gel_key, const std::function<Te
   std::error_code ignored;
   if (keep && std::filesystem::exists(path, ignored)) {
     try {
-      return read_file(path, key, count);
+      return read_file(path, key, std::ssize(beads), count);
     } catch (const Error& error) {
       note = fmt::format("the cached modes {} were made anew: {}", path.string(), error.what());
     }

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "core/error.h"
+#include "core/short_text.h"
 #include "core/whole_file.h"
 #include "datasets/jobs/input_files.h"
 #include "datasets/jobs/job.h"
@@ -171,7 +172,7 @@ void fields(YamlReader& in, RecordedPress& press) {
   press.picture = datasets::existing_file(in, "picture");
   press.object = datasets::existing_file(in, "object");
   in.required("place_mm", press.place_mm);
-  in.optional("angles_deg", press.angles_deg);
+  in.optional("angles_deg", press.angles_deg, Allowed::within(-360.0, 360.0));
   in.optional("place_sd_mm", press.place_sd_mm, Allowed::at_least(0.0));
   in.optional("depth_mm", press.depth_mm, Allowed::above(0.0));
   in.optional("depth_sd_mm", press.depth_sd_mm, Allowed::at_least(0.0));
@@ -226,7 +227,8 @@ void fields(YamlReader& in, UnitFitSpec& fit) {
   in.optional("membrane_um", fit.membrane_um, Allowed::within(1.0, 1000.0));
   if (in.describing()) return;
   if (!datasets::is_folder_name(fit.name)) {
-    fail_at(in.where("name"), "name: '{}' can't name files; allowed are up to 100 letters, digits, - and _", fit.name);
+    fail_at(in.where("name"), "name: '{}' can't name files; allowed are up to 100 letters, digits, - and _",
+            short_text(fit.name));
   }
   if (fit.unknowns.empty()) fail_at(in.where("unknowns"), "unknowns: has none; at least one is needed");
   if (fit.presses.empty() && !fit.recording) fail_at(in.where("presses"), "presses: has none; at least one is needed");

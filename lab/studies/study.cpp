@@ -1,6 +1,7 @@
 #include "lab/studies/study.h"
 
 #include "core/error.h"
+#include "core/short_text.h"
 #include "core/whole_file.h"
 #include "datasets/jobs/job.h"
 
@@ -21,7 +22,7 @@ void fields(YamlReader& in, StudySpec& study) {
   in.required("name", study.name);
   if (!datasets::is_folder_name(study.name)) {
     fail_at(in.where("name"), "name: '{}' can't name files; allowed are up to 100 letters, digits, - and _",
-            study.name);
+            short_text(study.name));
   }
   KindName kind = KindName::apparent_change;
   in.required("kind", kind);

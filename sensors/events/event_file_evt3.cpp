@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/short_text.h"
 
 namespace touchstone::sensors {
 namespace {
@@ -63,28 +64,30 @@ void Evt3EventReader::take_header_line(const std::string& keyword, const std::st
   const SourceLocation where{name_, line};
   const auto side = [&](std::string_view text, int& to) {
     if (!read_number(text, to) || to < 1 || to > kLargestSide) {
-      fail_at(where, "{}: '{}' isn't a number of pixels; allowed is 1 to {}", keyword, text, kLargestSide);
+      fail_at(where, "{}: '{}' isn't a number of pixels; allowed is 1 to {}", keyword, short_text(text), kLargestSide);
     }
   };
   if (keyword == "evt") {
-    if (value != "3.0") fail_at(where, "evt: '{}' isn't an encoding that is read; allowed is 3.0", value);
+    if (value != "3.0") fail_at(where, "evt: '{}' isn't an encoding that is read; allowed is 3.0", short_text(value));
     is_evt3_ = true;
   } else if (keyword == "format") {  // EVT3;height=720;width=1280
     std::string_view rest = value;
     for (bool first = true; first || !rest.empty(); first = false) {
       const std::string_view part = rest.substr(0, rest.find(';'));
       rest.remove_prefix(std::min(rest.size(), part.size() + 1));
-      if (first && part != "EVT3") fail_at(where, "format: '{}' isn't an encoding that is read; allowed is EVT3", part);
+      if (first && part != "EVT3")
+        fail_at(where, "format: '{}' isn't an encoding that is read; allowed is EVT3", short_text(part));
       if (part.starts_with("width=")) side(part.substr(6), width_);
       if (part.starts_with("height=")) side(part.substr(7), height_);
       if (part.starts_with("endianness=") && part.substr(11) != "little") {
-        fail_at(where, "format: '{}' isn't read; allowed is little", part);
+        fail_at(where, "format: '{}' isn't read; allowed is little", short_text(part));
       }
     }
     is_evt3_ = true;
   } else if (keyword == "geometry") {  // 1280x720
     const std::size_t cross = value.find('x');
-    if (cross == std::string::npos) fail_at(where, "geometry: '{}' isn't a size; allowed is 1280x720", value);
+    if (cross == std::string::npos)
+      fail_at(where, "geometry: '{}' isn't a size; allowed is 1280x720", short_text(value));
     side(std::string_view(value).substr(0, cross), width_);
     side(std::string_view(value).substr(cross + 1), height_);
   } else if (keyword == "width") {
@@ -92,11 +95,12 @@ void Evt3EventReader::take_header_line(const std::string& keyword, const std::st
   } else if (keyword == "height") {
     side(value, height_);
   } else if (keyword == "endianness") {
-    if (value != "little") fail_at(where, "endianness: '{}' isn't read; allowed is little", value);
+    if (value != "little") fail_at(where, "endianness: '{}' isn't read; allowed is little", short_text(value));
   } else if (keyword == kOffsetKeyword) {
     if (!read_number(value, offset_us_) || offset_us_ % kWrapUs != 0 || offset_us_ < -kMostOffsetUs ||
         offset_us_ > kMostOffsetUs) {
-      fail_at(where, "{}: '{}' isn't a multiple of {} us of at most {}", keyword, value, kWrapUs, kMostOffsetUs);
+      fail_at(where, "{}: '{}' isn't a multiple of {} us of at most {}", keyword, short_text(value), kWrapUs,
+              kMostOffsetUs);
     }
   }
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cctype>
 
+#include "core/short_text.h"
 #include "sim/files/srgb_reflectance.h"
 
 namespace touchstone::sim {
@@ -14,9 +15,10 @@ Eigen::Vector3d srgb_of(const YamlReader& in, const std::string& text, Allowed a
   constexpr std::size_t kLength = 7;
   const bool sound = text.size() == kLength &&
                      std::all_of(text.begin() + 1, text.end(), [](unsigned char c) { return std::isxdigit(c) != 0; });
-  if (!sound) fail_at(in.where(), "{}is '{}'; an sRGB colour is # and six hexadecimal digits", in.context(), text);
+  if (!sound)
+    fail_at(in.where(), "{}is '{}'; an sRGB colour is # and six hexadecimal digits", in.context(), short_text(text));
   if (allowed.high != 1.0) {
-    fail_at(in.where(), "{}is '{}'; only what reflects can have an sRGB colour", in.context(), text);
+    fail_at(in.where(), "{}is '{}'; only what reflects can have an sRGB colour", in.context(), short_text(text));
   }
   Eigen::Vector3d srgb;
   for (int k = 0; k < 3; ++k)

@@ -1,5 +1,8 @@
 #include "sim/press/gel_setup.h"
 
+#include <sys/stat.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
@@ -22,15 +25,36 @@ std::optional<fem::ErrorGoal> goal_of(const MeshSpec& mesh) {
   return fem::ErrorGoal{*mesh.force_error, mesh.contact_radius_mm, mesh.sharp_bodies};
 }
 
+/// The folder, made if it can be. @throws Error if it is another user's, or others may write into it
+std::filesystem::path own_folder(const std::filesystem::path& folder) {
+  std::filesystem::path at;
+  for (const std::filesystem::path& part : folder) mkdir((at /= part).c_str(), S_IRWXU);  // what's there stays
+  struct stat link {};
+  struct stat about {};
+  // Where it can't be had, results aren't kept, and the gel's report says so.
+  if (lstat(folder.c_str(), &link) != 0 || stat(folder.c_str(), &about) != 0) return folder;
+  const char* reason = nullptr;
+  for (const struct stat& one : {link, about}) {
+    if (one.st_uid != geteuid() && one.st_uid != 0) reason = "belongs to another user";
+  }
+  if ((about.st_mode & (S_IWGRP | S_IWOTH)) != 0) reason = "may be written by others (chmod go-w changes that)";
+  if (reason != nullptr) {
+    fail("{}: this folder of set-up results {}; if it's meant to be used, name it by --cache or TOUCHSTONE_CACHE",
+         folder.string(), reason);
+  }
+  return folder;
+}
+
 }  // namespace
 
 std::filesystem::path default_cache_folder() {
-  for (const auto& [variable, below] : {std::pair{"TOUCHSTONE_CACHE", ""}, std::pair{"XDG_CACHE_HOME", "touchstone"},
-                                        std::pair{"HOME", ".cache/touchstone"}}) {
+  if (const char* given = std::getenv("TOUCHSTONE_CACHE"); given != nullptr && *given != '\0') return given;
+  for (const auto& [variable, below] :
+       {std::pair{"XDG_CACHE_HOME", "touchstone"}, std::pair{"HOME", ".cache/touchstone"}}) {
     const char* value = std::getenv(variable);
-    if (value != nullptr && *value != '\0') return std::filesystem::path(value) / below;
+    if (value != nullptr && *value != '\0') return own_folder(std::filesystem::path(value) / below);
   }
-  return std::filesystem::temp_directory_path() / "touchstone-cache";
+  return own_folder(std::filesystem::temp_directory_path() / fmt::format("touchstone-cache-{}", geteuid()));
 }
 
 std::shared_ptr<const fem::FiniteGel> set_up_finite_gel(const DeviceSpec& device) {

@@ -17,7 +17,9 @@
 namespace touchstone::sim {
 
 /// Where set-up results are kept between runs: $TOUCHSTONE_CACHE, else $XDG_CACHE_HOME/touchstone, else
-/// ~/.cache/touchstone.
+/// ~/.cache/touchstone, else touchstone-cache-<user's number> in the system's temporary folder. TOUCHSTONE_CACHE is
+/// taken as it is. The others are this user's own: made for nobody else (0700) where they aren't there.
+/// @throws Error if one of the others belongs to another user than this one and root, or may be written by others
 std::filesystem::path default_cache_folder();
 
 /// A device set up for pressing. Set-up is shared by all scenes with the same gel, mesh and beads.

@@ -13,6 +13,8 @@ namespace {
 // A matrix file (core/matrix_file.h) of one column a state; after the matrices why the path stopped.
 constexpr std::string_view kMagic = "TSPRPATH";
 constexpr int kScalars = 34;
+constexpr int kCounts = 8;  // of them, at the end
+constexpr double kMostCount = 1e9;
 
 /// Takes each number of the state to or from a column, in one order. `visit` gets a reference.
 template <typename State, typename Visit>
@@ -114,6 +116,11 @@ PlayedPath read_press_path(const std::filesystem::path& file, const std::string&
       contact.cols() != count || traction.rows() != surface.rows() || traction.rows() != 3 * contact.rows() ||
       beads.rows() % 3 != 0) {
     fail("its matrices don't fit each other");
+  }
+  if (!scalars.allFinite() || !traction.allFinite() || !surface.allFinite() || !beads.allFinite() ||
+      !(scalars.bottomRows(kCounts).array().abs() <= kMostCount).all() ||
+      !(contact.array() == 0.0 || contact.array() == 1.0 || contact.array() == 2.0).all()) {
+    fail("it has numbers that aren't a press's");
   }
   PlayedPath played;
   played.stopped = std::string(matrices.rest());

@@ -16,6 +16,7 @@ constexpr int kStepsDown = 3;           // where friction has a history
 constexpr double kDragStep_mm = 0.1;    // friction's history is stepped so finely
 constexpr int kFewestSteps = 2;         // of a drag
 constexpr int kShearSteps = 5;
+constexpr double kMostTurn_deg = 360.0;
 
 bool goes_aside(const PressSpec& press) {
   return press.shear_N.has_value() || !press.drag_mm.isZero(0.0);
@@ -38,6 +39,11 @@ void check(const PressSpec& press) {
   if (!press.place_mm.allFinite() || !press.angles_deg.allFinite() || !press.drag_mm.allFinite() ||
       (press.shear_N && !press.shear_N->allFinite())) {
     fail("a press's place_mm, angles_deg, drag_mm and shear_N must be finite");
+  }
+  for (const double angle : press.angles_deg) {
+    if (std::abs(angle) > kMostTurn_deg) {
+      fail("angles_deg has {:g}; allowed is from {:g} to {:g}", angle, -kMostTurn_deg, kMostTurn_deg);
+    }
   }
   if (press.shear_N && !press.drag_mm.isZero(0.0)) fail("a press has both drag_mm and shear_N; give one of them");
 }

@@ -25,8 +25,8 @@ struct PressSpec {
   std::optional<double> seconds = {};
 };
 
-/// @throws Error for a press with none or several of force, depth and height, with drag and shear, or with numbers that
-/// aren't finite or not above 0
+/// @throws Error for a press with none or several of force, depth and height, with drag and shear, angles beyond 360
+/// degrees, or numbers that aren't finite or not above 0
 void check(const PressSpec& press);
 
 /// "at (0, 0) mm with 2 N dragged by (0.1, 0) mm", for messages.

@@ -407,7 +407,7 @@ void fields(YamlReader& in, CameraSpec& camera) {
     efficiency->where = in.where(key);
   }
   in.optional("white_balance", camera.white_balance, Allowed::above(0.0));
-  needed("full_well_e", camera.full_well_e, Allowed::above(0.0));
+  needed("full_well_e", camera.full_well_e, Allowed::within(1.0, 1e9));
   in.optional("gain_dB", camera.gain_dB, Allowed::within(0.0, 48.0));
   in.optional("read_noise_e", camera.read_noise_e, Allowed::at_least(0.0));
   in.optional("dark_current_e_per_s", camera.dark_current_e_per_s, Allowed::at_least(0.0));

@@ -113,6 +113,17 @@ std::string light_key(const VirtualSensorSettings& settings) {
                                settings.guides.sectors, settings.guides.slices, settings.light_key));
 }
 
+/// What `made` makes of what was kept; nothing where nothing was, or where it's another sensor's: then it's made anew.
+template <typename Light, typename Found, typename Make>
+std::unique_ptr<const Light> kept(std::optional<Found> found, const Make& made) {
+  if (!found) return nullptr;
+  try {
+    return made(*found);
+  } catch (const Error&) {
+    return nullptr;
+  }
+}
+
 /// A sensor works as well where its light can't be kept.
 template <typename Write>
 void keep(const std::filesystem::path& folder, const Write& write) {
@@ -145,11 +156,12 @@ class CoatedView final : public SensorView {
     rest_hits_ = first_hits(rest_seen_.inside);
     if (judged_->plan.direct_light) {
       const std::string key = cache_folder.empty() ? "" : light_key(settings_);
-      std::optional<FoundLight> found;
-      if (!key.empty()) found = read_light(cache_folder, key);
-      if (found) {
-        direct_ = std::make_unique<const DirectLight>(*judged_, camera_, rest_, std::move(*found), settings_.edge_side);
-      } else {
+      if (!key.empty()) {
+        direct_ = kept<DirectLight>(read_light(cache_folder, key), [&](FoundLight& found) {
+          return std::make_unique<const DirectLight>(*judged_, camera_, rest_, std::move(found), settings_.edge_side);
+        });
+      }
+      if (direct_ == nullptr) {
         std::vector<Truth> states = farthest_states(rest_, settings_, gel_, device_.gel);
         states.push_back(play(straight_press(above, radius - 0.5 * settings_.deepest_mm)).back());
         direct_ = std::make_unique<const DirectLight>(*judged_, camera_, states, kRaysAPixel, settings_.edge_side,
@@ -222,11 +234,12 @@ class CoatedView final : public SensorView {
       return;
     }
     const std::string key = cache_folder.empty() ? "" : light_key(settings_);
-    std::optional<TracedSlab> traced;
-    if (!key.empty()) traced = read_traced(cache_folder, key);
-    if (traced) {
-      milky_ = std::make_unique<const MilkyCoat>(*judged_, camera_, rest_, settings_.seed, std::move(*traced));
-    } else {
+    if (!key.empty()) {
+      milky_ = kept<MilkyCoat>(read_traced(cache_folder, key), [&](TracedSlab& traced) {
+        return std::make_unique<const MilkyCoat>(*judged_, camera_, rest_, settings_.seed, std::move(traced));
+      });
+    }
+    if (milky_ == nullptr) {
       auto found = std::make_unique<MilkyCoat>(*judged_, camera_, rest_, settings_.seed);
       const double lowest = judged_ball().shape.radius_mm - 0.5 * settings_.deepest_mm;
       const fem::PressState press = play(straight_press(above_mm, lowest)).back().press;

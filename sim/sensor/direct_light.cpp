@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "core/error.h"
 #include "render/scene/film_screen.h"
 #include "sim/scene/device_gel.h"
 
@@ -136,6 +137,15 @@ DirectLight::DirectLight(const SceneView& view, const render::Camera& camera, co
   field_.fixture.surfaces.clear();
   field_.fixture.balls.clear();
   rest_.interreflection = false;
+  const Eigen::Index bands = rest_.environment.size();
+  const auto lamps = static_cast<int>(rest_.lamps.size());
+  const Eigen::Vector2i size = render::size_of(camera);
+  if (field_.layer < 0 || field_.layer > static_cast<int>(rest_.faces.size()) ||
+      std::any_of(field_.lamp_of.begin(), field_.lamp_of.end(), [&](int lamp) { return lamp < 0 || lamp >= lamps; }) ||
+      std::any_of(field_.intensity.begin(), field_.intensity.end(), [&](const auto& i) { return i.size() != bands; }) ||
+      (!bounced_.empty() && (bounced_.cols != size.x() || bounced_.rows != size.y() || bounced_.channels() != bands))) {
+    fail("the light that was found before is another scene's or camera's");
+  }
 }
 
 FoundLight DirectLight::found() const {

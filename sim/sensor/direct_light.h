@@ -39,6 +39,7 @@ class DirectLight {
               const render::GuideCut& guides = {});
 
   /// As it was found before, of the same scene and camera and with the same edge_side. `still`: the gel untouched.
+  /// @throws Error if its lamps, bands or pixels aren't the scene's and the camera's
   DirectLight(const SceneView& view, const render::Camera& camera, const fem::PressState& still, FoundLight found,
               int edge_side);
 

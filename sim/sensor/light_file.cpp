@@ -1,11 +1,14 @@
 #include "sim/sensor/light_file.h"
 
+#include <cmath>
 #include <opencv2/core.hpp>
 #include <string_view>
+#include <type_traits>
 
 #include "core/error.h"
 #include "core/matrix_file.h"
 #include "core/whole_file.h"
+#include "render/direct/shadow_reach.h"
 
 namespace touchstone::sim {
 namespace {
@@ -15,6 +18,8 @@ namespace {
 constexpr std::string_view kMark = "TSLIGHT1";
 constexpr int kScalars = 25;
 constexpr int kBesides = 5;  // numbers of a beam before its intensities
+constexpr int kMostNumber = 1'000'000'000;
+constexpr int kMostNodes = 1'000'000;  // along an axis
 
 /// Takes each number to or from a column, in one order. `visit` gets a reference.
 template <typename Light, typename Error, typename Visit>
@@ -36,6 +41,14 @@ void each_scalar(Light& light, Error& error, const Visit& visit) {
     visit(field.reach.min()[a]);
     visit(field.reach.max()[a]);
   }
+}
+
+/// A whole number as it's stored. @throws Error if it isn't one, or out of range
+int index_from(double stored, int least, int most) {
+  if (!(stored >= least && stored <= most) || stored != std::floor(stored)) {
+    fail("it has {} where a whole number from {} to {} should be", stored, least, most);
+  }
+  return static_cast<int>(stored);
 }
 
 template <typename T>
@@ -65,26 +78,44 @@ FoundLight light_in(const std::string& content, const std::string& key) {
   FoundLight light;
   render::DirectError error;
   Eigen::Index row = 0;
+  for (const Eigen::MatrixXd* numbers : {&scalars, &beams, &flow, &pass, &bounced}) {
+    if (!numbers->allFinite()) fail("it has numbers that aren't finite");
+  }
   each_scalar(light, error, [&](auto& value) {
-    value = static_cast<std::remove_reference_t<decltype(value)>>(scalars.data()[row++]);
+    using Value = std::remove_reference_t<decltype(value)>;
+    if constexpr (std::is_same_v<Value, int>) {
+      value = index_from(scalars.data()[row++], 0, kMostNumber);
+    } else {
+      value = static_cast<Value>(scalars.data()[row++]);
+    }
   });
-  const int channels = static_cast<int>(scalars.data()[row++]);
+  const int channels = index_from(scalars.data()[row++], 0, CV_CN_MAX);
   const bool measured = scalars.data()[row++] != 0.0;
   TS_ASSERT(row == kScalars - 1);
-  const int bands = static_cast<int>(scalars.data()[row]);
+  const int bands = index_from(scalars.data()[row], 0, CV_CN_MAX);
   if (measured) light.choice.error = error;
   light.choice.reason = std::string(matrices.rest());
   render::LightField& field = light.field;
-  const Eigen::Index nodes = field.nodes.prod();
   const Eigen::Index count = beams.cols();
+  const Eigen::Index nodes = field.nodes.cast<Eigen::Index>().prod();
+  if (light.rays < 1 || (count > 0 && (field.nodes < 2).any()) || (field.nodes > kMostNodes).any() ||
+      count > render::kMostDirectLamps || (count > 0 && !(field.step > 0.0).all())) {
+    fail("its grid isn't one");
+  }
   if (beams.rows() != kBesides + bands || flow.rows() != 4 * count || (count > 0 && flow.cols() != nodes) ||
       (pass.size() > 0 && (pass.rows() != bands * count || pass.cols() != nodes))) {
     fail("its matrices don't fit each other");
   }
   for (Eigen::Index k = 0; k < count; ++k) {
-    field.lamp_of.push_back(static_cast<int>(beams(0, k)));
-    field.beside.push_back({static_cast<int>(beams(1, k)), static_cast<int>(beams(2, k)), static_cast<int>(beams(3, k)),
-                            static_cast<int>(beams(4, k))});
+    const int beam = static_cast<int>(k);
+    const int last = static_cast<int>(count) - 1;
+    field.lamp_of.push_back(index_from(beams(0, k), 0, kMostNumber));
+    // A flatter beam stands before, a steeper one after: who follows them comes to an end.
+    field.beside.push_back({index_from(beams(1, k), -1, beam - 1), index_from(beams(2, k), -1, last),
+                            index_from(beams(3, k), -1, last), index_from(beams(4, k), -1, last)});
+    if (const int steeper = field.beside.back().steeper; steeper >= 0 && steeper <= beam) {
+      fail("its beams don't fit each other");
+    }
     field.intensity.emplace_back(beams.col(k).tail(bands).array());
   }
   field.flow = floats_of(flow);

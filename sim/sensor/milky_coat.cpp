@@ -31,6 +31,7 @@ constexpr int kPolynomial = 4;             // of the light at rest: what averagi
 constexpr double kReach = 3.2;             // thicknesses: how far aside walks are followed
 constexpr int kColumns = 9, kRows = 7;     // places where lamps' light is looked at
 constexpr double kLeast = 1e-3;            // thicknesses: of what is pressed through
+constexpr double kMostPixels = 1e9;        // that an error is measured on
 
 cv::Size size_of_camera(const render::Camera& camera) {
   const Eigen::Vector2i size = render::size_of(camera);
@@ -187,6 +188,11 @@ MilkyCoat::MilkyCoat(const SceneView& view, const render::Camera& camera, const 
 MilkyCoat::MilkyCoat(const SceneView& view, const render::Camera& camera, const fem::PressState& rest,
                      std::uint64_t seed, TracedSlab traced)
     : traced_(std::move(traced)) {
+  const Eigen::Index bands = view.seen(rest, std::nullopt).environment.size();
+  if (traced_.rest.size() != size_of_camera(camera) || traced_.rest.channels() != bands) {
+    fail("the light that was traced has {} x {} pixels of {} bands; it is another camera's", traced_.rest.cols,
+         traced_.rest.rows, traced_.rest.channels());
+  }
   set_up(view, camera, rest, seed);
   learn();
 }
@@ -312,7 +318,8 @@ std::optional<TracedSlab> read_traced(const std::filesystem::path& folder, const
     const Eigen::MatrixXd error = matrices.take();
     const auto bands = static_cast<int>(shares.cols());
     if (bands < 1 || rest.rows() % bands != 0 || shares.rows() != static_cast<Eigen::Index>(std::size(kFlatStates)) ||
-        error.size() != 5) {
+        error.size() != 5 || !rest.allFinite() || !shares.allFinite() || !error.allFinite() ||
+        std::abs(error(4)) > kMostPixels || bands > CV_CN_MAX) {
       return std::nullopt;
     }
     TracedSlab traced;

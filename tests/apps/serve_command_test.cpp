@@ -249,6 +249,9 @@ TEST(Serve, ADeviceIsPressedOnRequest) {
   const auto error = [&](const std::string& path) { return served.ask_json(path, "POST")["error"].get<std::string>(); };
   EXPECT_THAT(error("/press?force_N=0.2&object=bal"), HasSubstr("object: 'bal' isn't known"));
   EXPECT_THAT(error("/press?force_N=heavy"), HasSubstr("force_N: 'heavy' isn't a number"));
+  EXPECT_THAT(error("/press?force_N=0.2&object=%00"), HasSubstr(R"(object: '\x00' isn't known)"));
+  EXPECT_LT(error("/press?force_N=0.2&object=" + std::string(5000, 'x')).size(), 2000u);
+  EXPECT_THAT(error("/press?force_N=0.2&turn_x_deg=1e308"), HasSubstr("turn_x_deg: 1e+308 isn't allowed"));
   EXPECT_THAT(error("/press"), HasSubstr("none of force_N, depth_mm and height_mm"));
   EXPECT_THAT(error("/press?force_N=1&x_mm=50"), HasSubstr("isn't over the gel"));
   EXPECT_EQ(served.ask_json("/status.json")["force_N"][2], held["force_N"][2]) << "a refused press changes nothing";

@@ -1,9 +1,11 @@
 #include "core/whole_file.h"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <fstream>
+#include <set>
 #include <thread>
 #include <vector>
 
@@ -63,6 +65,54 @@ TEST_F(WholeFile, TheTemporaryFileStandsBesideWithTheSameEnding) {
   EXPECT_EQ(seen.parent_path(), folder_);
   EXPECT_EQ(seen.extension(), ".png");
   EXPECT_FALSE(fs::exists(seen));
+}
+
+// The names were .a.<process>.<number>.part.bin once: whoever may write into the folder could put links there.
+TEST_F(WholeFile, LinksThatLieInWaitArentFollowed) {
+  write_whole_file(folder_ / "victim", "precious");
+  for (int serial = 0; serial < 1000; ++serial) {
+    fs::create_symlink(folder_ / "victim",
+                       folder_ / (".a." + std::to_string(getpid()) + "." + std::to_string(serial) + ".part.bin"));
+  }
+  write_whole_file(folder_ / "a.bin", "new");
+  EXPECT_EQ(read_whole_file(folder_ / "victim"), "precious");
+  EXPECT_EQ(read_whole_file(folder_ / "a.bin"), "new");
+}
+
+TEST_F(WholeFile, ALinkInTheFilesPlaceIsReplacedNotFollowed) {
+  write_whole_file(folder_ / "victim", "precious");
+  fs::create_symlink(folder_ / "victim", folder_ / "a.bin");
+  write_whole_file(folder_ / "a.bin", "new");
+  EXPECT_EQ(read_whole_file(folder_ / "victim"), "precious");
+  EXPECT_TRUE(fs::is_regular_file(fs::symlink_status(folder_ / "a.bin")));
+}
+
+TEST_F(WholeFile, NoTwoTemporaryNamesAreAlikeAndTheFileIsThere) {
+  std::set<fs::path> names;
+  for (int i = 0; i < 100; ++i) {
+    write_whole_file(folder_ / "a.bin", [&](const fs::path& temporary) {
+      EXPECT_TRUE(fs::is_regular_file(fs::symlink_status(temporary)));
+      EXPECT_EQ(fs::file_size(temporary), 0u);
+      EXPECT_TRUE(names.insert(temporary).second);
+      std::ofstream(temporary) << "x";
+    });
+  }
+}
+
+TEST_F(WholeFile, ItsModeIsTheUmasks) {
+  const mode_t before = umask(027);
+  write_whole_file(folder_ / "a.txt", "x");
+  umask(before);
+  EXPECT_EQ(fs::status(folder_ / "a.txt").permissions(), fs::perms(0640));
+}
+
+TEST_F(WholeFile, LastingOnesAreWrittenAsOthersAre) {
+  write_lasting_file(folder_ / "a.txt", "x");
+  write_lasting_file(folder_ / "a.txt", "longer");
+  EXPECT_EQ(read_whole_file(folder_ / "a.txt"), "longer");
+  EXPECT_EQ(entries(), 1);
+  EXPECT_THROW(write_lasting_file(folder_ / "missing" / "a.txt", "x"), Error);
+  EXPECT_THROW(wait_for_disk(folder_ / "missing.txt"), Error);
 }
 
 TEST_F(WholeFile, WriterThatWritesNothingIsAnError) {

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "core/whole_file.h"
+#include "tests/support/message_of.h"
 
 namespace touchstone {
 namespace {
@@ -164,6 +165,16 @@ TEST(YamlReader, WhatIsNotYamlIsRefusedWithTheLine) {
   expect_error("poisson_ratio: 0.4\n---\npoisson_ratio: 0.3\n", 3, {"second document"});
   expect_error(std::string(100000, '['), 1, {"isn't YAML"});
   expect_error(", a\n", 1, {"second document"});  // one that YAML::LoadAll makes endlessly many of
+}
+
+TEST(YamlReader, LargeOnesAreRefusedBeforeTheyAreRead) {
+  const std::string large = "count: 1" + std::string(4'000'000, ' ');
+  const std::string refusal = "has 4000008 bytes; a YAML file may have 4000000";
+  const auto path = std::filesystem::path(testing::TempDir()) / "touchstone_large.yaml";
+  write_whole_file(path, large);
+  EXPECT_EQ(test::message_of([&] { YamlReader::open(path); }), path.string() + ": " + refusal);
+  EXPECT_EQ(test::message_of([&] { YamlReader::parse(large, "text"); }), "text: " + refusal);
+  std::filesystem::remove(path);
 }
 
 TEST(YamlReader, RangesSayThemselves) {

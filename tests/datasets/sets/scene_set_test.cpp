@@ -255,8 +255,8 @@ TEST_F(DataSet, ABrokenOffJournalLineAndTemporaryFilesDoNoHarm) {
   const fs::path journal = out_ / kUnfinished / "frames.log";
   const std::size_t lines = read_journal(journal).size();
   fs::resize_file(journal, fs::file_size(journal) - 30);
-  std::ofstream(out_ / "frames/middle/.000003.123.0.part.png") << "half";
-  std::ofstream(out_ / ".truth.123.4.part.h5") << "half";
+  std::ofstream(out_ / "frames/middle/.000003.0123456789abcdef.part.png") << "half";
+  std::ofstream(out_ / ".truth.00000000000000ff.part.h5") << "half";
   const GenerateReport report = run();
   EXPECT_EQ(report.kept, static_cast<std::int64_t>(lines) - 1);
   EXPECT_EQ(contents_of(out_), whole);
@@ -277,7 +277,7 @@ TEST_F(DataSet, KilledBeforeClearingUpIsFinishedByTheNextRun) {
   const auto whole = whole_set();
   run();
   fs::create_directories(out_ / kUnfinished);
-  std::ofstream(out_ / ".dataset.1.1.part.json") << "half";
+  std::ofstream(out_ / ".dataset.0123456789abcdef.part.json") << "half";
   EXPECT_TRUE(run().was_finished);
   EXPECT_EQ(contents_of(out_), whole);
 }

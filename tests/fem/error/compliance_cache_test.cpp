@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
+#include <limits>
 #include <set>
 #include <thread>
 
@@ -41,6 +42,7 @@ class ComplianceCache : public ::testing::Test {
   // Places in the file (fem/elements/compliance_file.h).
   static constexpr std::size_t kFormatAt = 8;
   static constexpr std::size_t kFileSizeAt = 80;
+  static constexpr std::size_t kSurfaceAt = 104;  // its offset
   static constexpr std::size_t kChecksumAt = 152;
   static constexpr std::size_t kHeaderSize = 168;
 
@@ -240,6 +242,21 @@ TEST_F(ComplianceCache, SoundSealOnAnUnsoundHeaderIsMadeAnew) {
     off[place] = static_cast<char>(off[place] + 8);
     write_whole_file(file(), sealed(off));
     EXPECT_THROW(read_compliance(file(), compliance_key(slab, material, beads)), Error) << place;
+  }
+}
+
+// Whoever may write into the folder can seal a file as the program does.
+TEST_F(ComplianceCache, SoundSealOnNumbersThatArentAGelsIsMadeAnew) {
+  get();
+  const std::string content = read_whole_file(file());
+  const double bad = std::numeric_limits<double>::quiet_NaN();
+  std::uint64_t surface = 0;
+  std::memcpy(&surface, content.data() + kSurfaceAt, sizeof(surface));
+  constexpr std::size_t kFirstVertexAt = kHeaderSize + 4 * 8;
+  for (const std::size_t place : {kHeaderSize, kHeaderSize + 8, kHeaderSize + 16, kFirstVertexAt, surface + 80}) {
+    std::string spoilt = content;
+    std::memcpy(spoilt.data() + place, &bad, sizeof(bad));
+    expect_rebuilt(sealed(spoilt), "it has numbers that aren't a gel's");
   }
 }
 

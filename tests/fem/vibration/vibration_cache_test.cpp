@@ -3,6 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+
+#include "core/matrix_file.h"
 #include "core/whole_file.h"
 #include "tests/fem/mesh/box_mesh.h"
 #include "tests/support/temporary_folder.h"
@@ -71,6 +74,33 @@ TEST(VibrationCache, AFileThatIsTruncatedOrChangedIsNeverUsed) {
   write_whole_file(file, content);
   std::filesystem::copy_file(file, vibration_file(folder.path(), "other", kDensity, kCount));
   EXPECT_THAT(made(folder, "other").vibration.note, HasSubstr("another gel"));
+}
+
+// Whoever may write into the folder can seal a file as the program does.
+TEST(VibrationCache, SoundSealOnAnotherGelsNumbersIsMadeAnew) {
+  const touchstone::test::TemporaryFolder folder;
+  const GelVibration sound = made(folder).vibration;
+  const auto file = vibration_file(folder.path(), "key", kDensity, kCount);
+  const std::string content = read_whole_file(file);
+  const std::string key = content.substr(8, 64);
+  const auto expect_made_anew = [&](const GelVibration& bad, const std::string& why) {
+    write_whole_file(file, matrix_file("TSVIBRAT", key,
+                                       {bad.angular_frequency, bad.surface, bad.beads, bad.effective_mass,
+                                        Eigen::MatrixXd::Constant(1, 1, bad.mass)}));
+    const Made again = made(folder);
+    EXPECT_EQ(again.meshes, 1) << why;
+    EXPECT_THAT(again.vibration.note, HasSubstr(why));
+    EXPECT_EQ(read_whole_file(file), content) << "the file wasn't replaced";
+  };
+  GelVibration bad = sound;
+  bad.angular_frequency[0] = std::nan("");
+  expect_made_anew(bad, "aren't a vibration's");
+  bad = sound;
+  bad.beads = Eigen::MatrixXd::Zero(6, kCount);
+  expect_made_anew(bad, "don't fit");
+  bad = sound;
+  bad.effective_mass = Eigen::MatrixXd::Zero(2, kCount);
+  expect_made_anew(bad, "don't fit");
 }
 
 TEST(VibrationCache, WithoutAFolderNothingIsKept) {

@@ -22,6 +22,7 @@ namespace touchstone::sim {
 namespace {
 
 namespace fs = std::filesystem;
+using testing::AllOf;
 using testing::HasSubstr;
 
 cv::Mat pattern(int type, int width = 37, int height = 23) {
@@ -184,6 +185,12 @@ TEST_F(ImageFile, DamagedFilesAreRefusedByName) {
   write_exr(folder_ / "a.exr", cv::Mat(2, 2, CV_32FC1, cv::Scalar(1)), {"Y"});
   EXPECT_THAT(complaint(folder_ / "a.exr"), HasSubstr("floats"));
   EXPECT_THROW(read_exr(folder_ / "a.png"), Error);
+}
+
+TEST_F(ImageFile, MorePixelsThanAreReadAreRefusedByName) {
+  write_png(folder_ / "large.png", cv::Mat(10001, 10000, CV_8UC1, cv::Scalar(0)));
+  EXPECT_THAT(complaint(folder_ / "large.png"),
+              AllOf(HasSubstr("large.png"), HasSubstr("10000x10001 pixels; at most 100000000 are read")));
 }
 
 // The promise that commands which touch no image file don't pay for OpenImageIO.

@@ -13,6 +13,7 @@
 #include "fem/finite_strain/finite_press.h"
 #include "sim/press/force_law.h"
 #include "sim/press/gel_setup.h"
+#include "sim/press/press_path_file.h"
 #include "tests/support/message_of.h"
 #include "tests/support/temporary_folder.h"
 
@@ -94,6 +95,28 @@ TEST(PressPath, BetweenTwoStatesAllRunsStraight) {
   EXPECT_NE(message_of([&] { played.state(1.1); }).find("goes from 0 to 1"), std::string::npos);
   EXPECT_NE(message_of([&] { played.state(std::nan("")); }).find("isn't on the path"), std::string::npos);
   EXPECT_NE(message_of([&] { PlayedPath{}.state(0.0); }).find("has no states"), std::string::npos);
+}
+
+// The checksum is right: whoever may write into the folder can seal a file as the program does.
+TEST(PressPath, AKeptFileWithNumbersThatNoPressHasIsRefused) {
+  const test::TemporaryFolder folder;
+  const std::string key(64, 'a');
+  PlayedPath played;
+  played.at = {0.0};
+  fem::PressState& state = played.states.emplace_back();
+  state.traction = state.surface_displacement = Eigen::MatrixX3d::Zero(1, 3);
+  state.bead_displacement = Eigen::MatrixX3d::Zero(0, 3);
+  state.node_state = {fem::NodeState::slip};
+  const auto message = [&] {
+    write_press_path(folder.path() / "path.bin", key, played);
+    return message_of([&] { read_press_path(folder.path() / "path.bin", key); });
+  };
+  EXPECT_EQ(message(), "no error");
+  state.node_state = {static_cast<fem::NodeState>(7)};
+  EXPECT_EQ(message(), "it has numbers that aren't a press's");
+  state.node_state = {fem::NodeState::slip};
+  state.traction(0, 1) = std::nan("");
+  EXPECT_EQ(message(), "it has numbers that aren't a press's");
 }
 
 TEST(PressPath, WhatIsDeeperThanTheGelEndsIt) {

@@ -38,6 +38,14 @@ TEST(PressSpec, FirstTouchIsExactForSpheres) {
   EXPECT_NEAR(first_touch({.place_mm = {4, 3}}, ball(3), dome), std::sqrt(23.0 * 23.0 - 25.0) - 20.0, 1e-6);
 }
 
+TEST(PressSpec, AnglesBeyondATurnAreRefused) {
+  EXPECT_EQ(message_of([] { check({.angles_deg = {0, 0, -360}, .force_N = 1.0}); }), "no error");
+  EXPECT_THAT(message_of([] {
+                check({.angles_deg = {1e308, 0, 0}, .force_N = 1.0});
+              }),
+              HasSubstr("angles_deg has 1e+308; allowed is from -360 to 360"));
+}
+
 // The rim of a flat disc of radius a, tilted by t, is a sin t below its middle.
 TEST(PressSpec, FirstTouchOfATiltedDiscIsItsRim) {
   ObjectSpec disc = ball(0);

@@ -9,6 +9,7 @@
 #include <fstream>
 #include <opencv2/core.hpp>
 
+#include "core/error.h"
 #include "core/whole_file.h"
 #include "sim/press/gel_setup.h"
 #include "sim/press/play_motion.h"
@@ -123,6 +124,9 @@ TEST(MilkyCoat, PressesLookAsTracedShallowDeepAndAtTheEdge) {
   const MilkyCoat read(*pressed.view, camera, pressed.rest, 1, std::move(*again));
   EXPECT_EQ(cv::norm(read.irradiance(sheet), coat->irradiance(sheet), cv::NORM_INF), 0.0);
   EXPECT_FALSE(read_traced(cache.path(), std::string(64, 'b')));
+  TracedSlab smaller = coat->traced();
+  smaller.rest = smaller.rest.rowRange(1, smaller.rest.rows).clone();
+  EXPECT_THROW(MilkyCoat(*pressed.view, camera, pressed.rest, 1, std::move(smaller)), Error);
   std::string bytes = read_whole_file(light_file(cache.path(), key));
   bytes[bytes.size() / 2] ^= 1;
   write_whole_file(light_file(cache.path(), key), bytes);

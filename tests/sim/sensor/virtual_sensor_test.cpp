@@ -12,6 +12,7 @@
 #include "render/direct/direct_error.h"
 #include "sim/plan/plan.h"
 #include "sim/scene/device_camera.h"
+#include "sim/sensor/light_file.h"
 #include "sim/view/scene_view.h"
 #include "tests/support/small_scene.h"
 #include "tests/support/temporary_folder.h"
@@ -182,6 +183,23 @@ TEST(VirtualSensor, LightThatWasKeptMakesTheSameFrames) {
   const VirtualSensor third(test::small_coated_device(), cache.path(), settings);
   EXPECT_EQ(cv::norm(light, frame_of(third), cv::NORM_INF), 0.0) << "a damaged file is made anew";
   EXPECT_NE(read_whole_file(kept().front()), content);
+
+  // A sound file with the light of another sensor, whose camera is larger or whose lamps are more.
+  const std::string key = kept().front().stem().string().substr(std::string("light-").size());
+  const FoundLight own = read_light(cache.path(), key).value();
+  FoundLight others = own;
+  others.field.lamp_of.back() = 99;
+  const auto expect_made_anew = [&](const FoundLight& other) {
+    write_light(cache.path(), key, other);
+    const std::string sealed = read_whole_file(kept().front());
+    const VirtualSensor one(test::small_coated_device(), cache.path(), settings);
+    EXPECT_EQ(cv::norm(light, frame_of(one), cv::NORM_INF), 0.0);
+    EXPECT_NE(read_whole_file(kept().front()), sealed);
+  };
+  expect_made_anew(others);
+  others = own;
+  others.bounced = cv::Mat(3, 4, CV_32FC3, cv::Scalar::all(1.0));
+  expect_made_anew(others);
 
   settings.deepest_mm *= 0.9;
   const VirtualSensor fourth(test::small_coated_device(), cache.path(), settings);
