@@ -87,7 +87,7 @@ void write_whole_file(const std::filesystem::path& path,
                       const std::function<void(const std::filesystem::path& temporary)>& write) {
   TemporaryFile file(path);
   write(file.name());
-  if (file.size() == 0) fail("{}: can't be written (nothing was)", path.string());
+  if (file.size() == 0) fail("{}: can't be written (nothing was written)", path.string());
   file.take_its_name();
 }
 
