@@ -1,5 +1,6 @@
-"""Attacks on the built program: attacks_test.py PROGRAM SOURCE [CLASS]."""
+"""Attacks on the built program: attacks_test.py PROGRAM WRITE_LOG SOURCE [CLASS]."""
 
+import json
 import os
 import pathlib
 import resource
@@ -11,6 +12,7 @@ import time
 import unittest
 
 PROGRAM = ""
+WRITE_LOG = ""
 SOURCE = pathlib.Path()
 NOBODY = 65534
 PATIENCE_S = 120
@@ -132,6 +134,28 @@ class FullOutput(Attack):
         self.assertEqual(list((self.folder / "schemas").glob(".*")), [])
 
 
+class LossOfPower(Attack):
+    def test_a_manifest_has_its_name_when_all_is_on_the_disk(self):
+        out = self.folder / "set"
+        environment = {
+            "HOME": str(self.folder),
+            "LD_PRELOAD": WRITE_LOG,
+            "ASAN_OPTIONS": "verify_asan_link_order=0",
+            "TOUCHSTONE_WRITE_LOG": str(self.folder / "log"),
+        }
+        run = self.run_program("--quiet", "generate", self.scenes / "beads.yaml", "-o", out, environment=environment)
+        self.assertEqual(run.returncode, 0, run.stderr)
+        log = [line.split("\t") for line in (self.folder / "log").read_text().splitlines()]
+        named = next(i for i, line in enumerate(log) if line[0] == "renamed" and line[2] == str(out / "dataset.json"))
+        before = {line[1] for line in log[:named] if line[0] == "on disk"}
+        wanted = {log[named][1]}  # its own bytes
+        for file in json.loads((out / "dataset.json").read_text())["files"]:
+            wanted |= {str(out / file["file"]), str((out / file["file"]).parent)}
+        self.assertGreater(len(wanted), 10)
+        self.assertEqual(wanted - before, set())
+        self.assertIn(["on disk", str(out)], log[named:])
+
+
 class Refusals(Attack):
     def change(self, name, old, new):
         text = (self.scenes / name).read_text()
@@ -165,5 +189,5 @@ class Refusals(Attack):
 
 
 if __name__ == "__main__":
-    PROGRAM, SOURCE = sys.argv[1], pathlib.Path(sys.argv[2])
-    unittest.main(argv=sys.argv[:1] + sys.argv[3:], verbosity=1)
+    PROGRAM, WRITE_LOG, SOURCE = sys.argv[1], sys.argv[2], pathlib.Path(sys.argv[3])
+    unittest.main(argv=sys.argv[:1] + sys.argv[4:], verbosity=1)

@@ -262,9 +262,10 @@ TEST(Vibration, AWideLayerShearsAtAQuarterWave) {
   EXPECT_GT(vibration.angular_frequency[0], 0.95 * wanted);
 }
 
-TEST(Vibration, APatchWithoutVerticesIsRefused) {
+TEST(Vibration, APatchWithoutVerticesAndAnotherGelsModesAreRefused) {
   const GelVibration vibration = small_gel().vibration(2);
   EXPECT_THROW(StuckPatch(small_gel().compliance, vibration, {}), Error);
+  EXPECT_THROW(StuckPatch(small_gel().compliance, column().vibration(3), {0}), Error) << "modes of another gel";
 }
 
 }  // namespace
