@@ -1,8 +1,7 @@
 // The one command. Exit codes: 0 done, 2 a mistake in what was given (one line on stderr says where), 1 anything else.
 
-#include <fmt/format.h>
-
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 #include <tbb/global_control.h>

@@ -1,7 +1,6 @@
 #include "core/yaml_reader.h"
 
 #include <fmt/format.h>
-
 #include <yaml-cpp/eventhandler.h>
 #include <yaml-cpp/yaml.h>
 

@@ -1,7 +1,6 @@
 #include "datasets/exports/webdataset.h"
 
 #include <fmt/format.h>
-
 #include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
 

@@ -1,7 +1,6 @@
 #include "datasets/sets/drawn_set.h"
 
 #include <fmt/format.h>
-
 #include <tbb/parallel_for.h>
 
 #include <algorithm>

@@ -1,7 +1,6 @@
 #include "lab/studies/design_table.h"
 
 #include <fmt/format.h>
-
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
