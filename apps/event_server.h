@@ -20,12 +20,14 @@ struct EventLoop {
   cv::Size size;               ///< of the camera, px
 };
 
-/// Each client has a thread that sends what has happened since it last sent; a slow one lags behind, loses nothing and
-/// holds nobody else.
+/// Each client has a thread that sends what has happened since it last sent. One that is more than 2 s behind goes on
+/// from now: its stream's time jumps by more than that, where otherwise a time comes every few milliseconds. One that
+/// takes nothing for the patience is ended, after a second already if its place is wanted; when all 64 places are of
+/// clients that read, a further one gets a header whose line "error" says so.
 class EventServer {
  public:
   /// @param port 0: any free one @throws Error if it can't be had, or EVT 3.0 can't hold such a camera
-  EventServer(EventLoop loop, const std::string& address, int port);
+  EventServer(EventLoop loop, const std::string& address, int port, double patience_s);
   /// Ends all connections.
   ~EventServer();
   EventServer(const EventServer&) = delete;

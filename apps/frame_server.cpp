@@ -4,14 +4,18 @@
 #include <httplib.h>
 #include <sys/socket.h>
 
+#include <algorithm>
+#include <array>
 #include <atomic>
 #include <cerrno>
 #include <charconv>
 #include <cmath>
 #include <cstring>
 #include <nlohmann/json.hpp>
+#include <string_view>
 #include <thread>
 
+#include "apps/whole_request_server.h"
 #include "core/error.h"
 #include "core/nearest_name.h"
 #include "core/short_text.h"
@@ -21,11 +25,13 @@ namespace touchstone::apps {
 namespace {
 
 constexpr int kMostStreams = 24;
-constexpr int kThreads = 32;             // what streams leave over answers the rest
+constexpr int kMostCommands = 8;         // at once; a press takes seconds, and the next one waits for it
+constexpr int kThreads = 40;             // what streams and commands leave over answers the rest
 constexpr int kSendBuffer = 256 * 1024;  // old frames that wait for a slow client
-constexpr int kWriteTimeout_s = 5;       // a client that takes nothing for so long is given up
 constexpr const char* kBoundary = "touchstone-frame";
 constexpr const char* kFrameHeader = "X-Touchstone-Frame";
+constexpr const char* kForm = "application/x-www-form-urlencoded";
+constexpr std::array<std::string_view, 5> kPages = {"/", "/frame.jpg", "/status.json", "/stream.mjpg", "/truth.json"};
 
 /// httplib's own way shares a port between servers.
 void set_socket(int socket) {
@@ -47,14 +53,40 @@ std::string page(const std::string& title) {
          "<a href=\"/status.json\">its truth</a></p></html>\n";
 }
 
+/// Counts what is done at once.
+class Share {
+ public:
+  Share(std::atomic<int>& count, int most) : count_(&count) {
+    if (++count > most) release();
+  }
+  Share(const Share&) = delete;
+  Share& operator=(const Share&) = delete;
+  ~Share() { release(); }
+  bool had() const { return count_ != nullptr; }
+
+ private:
+  void release() {
+    if (count_ != nullptr) --*count_;
+    count_ = nullptr;
+  }
+  std::atomic<int>* count_;
+};
+
 }  // namespace
 
 struct FrameServer::Parts {
-  Parts(ServedCamera& shown, Settings how) : camera(shown), settings(std::move(how)) {
-    server.new_task_queue = [] { return new httplib::ThreadPool(kThreads); };
+  using Handled = httplib::Server::HandlerResponse;
+
+  Parts(ServedCamera& shown, Settings how)
+      : camera(shown), settings(std::move(how)), server(kThreads, settings.patience_s) {
     server.set_socket_options(&set_socket);
-    server.set_keep_alive_timeout(1);
-    server.set_write_timeout(kWriteTimeout_s);
+    server.set_pre_routing_handler([this](const auto& request, auto& response) {
+      return check_request(request, response) ? Handled::Unhandled : Handled::Handled;
+    });
+    server.set_error_handler([](const httplib::Request&, httplib::Response& response) {
+      // What httplib refuses itself it says nothing about.
+      if (response.body.empty()) answer_error(response, response.status, "the request can't be read");
+    });
     server.Get("/", [this](const auto&, auto& response) { response.set_content(page(settings.title), "text/html"); });
     server.Get("/frame.jpg", [this](const auto&, auto& response) { one(response); });
     server.Get("/stream.mjpg", [this](const auto&, auto& response) { stream(response); });
@@ -65,6 +97,49 @@ struct FrameServer::Parts {
         carry_out(command, request, response);
       });
     }
+  }
+
+  /// Answers what isn't for this server. @returns whether the request may go on
+  bool check_request(const httplib::Request& request, httplib::Response& response) const {
+    const auto refuse = [&](int status, const std::string& message) {
+      answer_error(response, status, message);
+      return false;
+    };
+    const std::string host = request.get_header_value("Host");
+    if (request.get_header_value_count("Host") > 1 || request.get_header_value_count("Origin") > 1) {
+      return refuse(400, "Host and Origin may each stand once in a request");
+    }
+    if (!host_is_allowed(host, settings.sources)) {
+      return refuse(
+          421, fmt::format("Host: '{}' isn't answered; an address, localhost and the names given by --host are", host));
+    }
+    if (request.has_header("Origin")) {
+      const std::string origin = request.get_header_value("Origin");
+      if (!origin_is_allowed(origin, host, settings.sources)) {
+        return refuse(403,
+                      fmt::format("Origin: '{}' may not use this server; --allow-origin {} allows it", origin, origin));
+      }
+      response.set_header("Access-Control-Allow-Origin", origin);
+    }
+    const bool is_command = settings.commands.contains(request.path);
+    if (!is_command && std::find(kPages.begin(), kPages.end(), request.path) == kPages.end()) {
+      std::vector<std::string> all(kPages.begin(), kPages.end());
+      for (const auto& [path, ignored] : settings.commands) all.push_back(path);
+      return refuse(404, fmt::format("there is no {}; there are: {}", request.path, fmt::join(all, ", ")));
+    }
+    const bool fits = is_command ? request.method == "POST" : request.method == "GET" || request.method == "HEAD";
+    if (!fits) {
+      response.set_header("Allow", is_command ? "POST" : "GET, HEAD");
+      return refuse(
+          405, is_command ? fmt::format("{} wants POST, not {}: curl -d '{}' http://{}{}", request.path, request.method,
+                                        settings.commands.at(request.path).example, host, request.path)
+                          : fmt::format("{} wants GET, not {}", request.path, request.method));
+    }
+    const std::string type = request.get_header_value("Content-Type");
+    if (request.get_header_value("Content-Length") != "0" && !type.starts_with(kForm)) {
+      return refuse(415, fmt::format("Content-Type: '{}' isn't taken; a body has to be {}", type, kForm));
+    }
+    return true;
   }
 
   void one(httplib::Response& response) {
@@ -121,10 +196,17 @@ struct FrameServer::Parts {
     }
   }
 
-  void carry_out(const std::function<void(const Requested&)>& command, const httplib::Request& request,
-                 httplib::Response& response) {
+  void carry_out(const Command& command, const httplib::Request& request, httplib::Response& response) {
+    const Share share(running, kMostCommands);
+    if (!share.had()) {
+      return answer_error(response, 503, fmt::format("{} commands are being carried out; no more are", kMostCommands));
+    }
     try {
-      command(values_of(request));
+      const Requested values = values_of(request);
+      if (values.empty() && !command.example.empty()) {
+        fail("nothing is asked for; for example, as a body or after '?': {}", command.example);
+      }
+      command.carry_out(values);
       // It holds from the next frame on.
       status_after_change(response);
     } catch (const Error& error) {
@@ -150,8 +232,9 @@ struct FrameServer::Parts {
 
   ServedCamera& camera;
   Settings settings;
-  httplib::Server server;
   std::atomic<int> streams{0};
+  std::atomic<int> running{0};
+  WholeRequestServer server;
   int port = 0;
   std::atomic<bool> ended{false};
   std::thread listener;

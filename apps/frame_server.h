@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 
+#include "apps/request_source.h"
 #include "apps/served_camera.h"
 
 namespace touchstone::apps {
@@ -13,21 +14,26 @@ namespace touchstone::apps {
 /// The values that a request gave, by name.
 using Requested = std::map<std::string, std::string>;
 
-/// | request                | answer | | GET /                  | a page that shows the stream | | GET /stream.mjpg |
-/// multipart/x-mixed-replace, a JPEG a frame; frames that a client is too slow for are left out | | GET /frame.jpg |
-/// the frame that is due                                                                    | | GET /status.json | the
-/// frame that is due: its number and truth; rate, clients                               | | GET /truth.json?frame=N|
-/// the truth of frame number N (each picture has its own as the header X-Touchstone-Frame)  | | POST ... | what
-/// `commands` has                                                                      | A mistake in a request is
-/// answered by 400 and {"error": "..."}.
+/// What a POST request does.
+struct Command {
+  std::function<void(const Requested&)> carry_out;  ///< what it throws as Error is the client's mistake
+  std::string example = "";                         ///< of what it wants to be given; empty: nothing
+};
+
+/// GET answers / (a page that shows the stream), /stream.mjpg (multipart/x-mixed-replace, a JPEG a frame; frames that a
+/// client is too slow for are left out), /frame.jpg and /status.json (the frame that is due: its picture, with its
+/// number as the header X-Touchstone-Frame; its number and truth, the rate, the clients) and /truth.json?frame=N (the
+/// truth of frame number N); POST answers what `commands` has. A mistake is answered by 4xx and {"error": "..."}, more
+/// than can be done at once by 503.
 class FrameServer {
  public:
   struct Settings {
     std::string address = "127.0.0.1";
     int port = 0;  ///< 0: any free one
     std::string title;
-    /// POST requests by path ("/hold"). What they throw as Error is the client's mistake.
-    std::map<std::string, std::function<void(const Requested&)>> commands;
+    AllowedSources sources;
+    double patience_s = 10.0;                 ///< for a client to send a request, and to take a frame
+    std::map<std::string, Command> commands;  ///< by path ("/hold")
   };
 
   /// Listens; requests are answered from threads of its own. @throws Error if the port can't be had

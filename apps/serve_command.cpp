@@ -1,4 +1,5 @@
 #include <fmt/ranges.h>
+#include <malloc.h>
 #include <signal.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
@@ -36,6 +37,8 @@ struct ServeOptions {
   double rate_Hz = 0.0;
   int quality = 95;
   std::vector<int> frames;
+  AllowedSources sources;
+  double patience_s = 10.0;
 };
 
 // A signal's handler may only write to this.
@@ -100,22 +103,23 @@ void serve_scene(const ServeOptions& options, const GlobalOptions& global) {
   }
   const double rate = options.rate_Hz > 0.0 ? options.rate_Hz : feed.frame_rate_Hz;
   ServedCamera camera(feed.states, rate, options.quality);
-  FrameServer::Settings settings{options.address, options.port, feed.device, {}};
+  FrameServer::Settings settings{options.address, options.port, feed.device, options.sources, options.patience_s, {}};
   if (!feed.has_events) {  // events can't stand still
-    settings.commands["/hold"] = [&](const Requested& requested) {
-      allow_only(requested, {"frame"});
-      camera.hold(count_of(requested, "frame"));
-    };
-    settings.commands["/run"] = [&](const Requested& requested) {
+    settings.commands["/hold"] = {[&](const Requested& requested) {
+                                    allow_only(requested, {"frame"});
+                                    camera.hold(count_of(requested, "frame"));
+                                  },
+                                  "frame=0"};
+    settings.commands["/run"] = {[&](const Requested& requested) {
       allow_only(requested, {});
       camera.hold(std::nullopt);
-    };
+    }};
   }
   std::unique_ptr<EventServer> events;
   if (feed.has_events) {
     events = std::make_unique<EventServer>(
         EventLoop{std::move(feed.events), feed.period_us, rate / feed.frame_rate_Hz, feed.size}, options.address,
-        options.events_port.value_or(options.port == 0 ? 0 : options.port + 1));
+        options.events_port.value_or(options.port == 0 ? 0 : options.port + 1), options.patience_s);
   }
   const FrameServer server(camera, settings);
   say_where(options, server);
@@ -180,8 +184,9 @@ void serve_device(const ServeOptions& options, const GlobalOptions& global) {
   const double rate = options.rate_Hz > 0.0 ? options.rate_Hz : spec.camera->frame_rate_Hz;
   ServedCamera camera(rest, rate, options.quality);
   std::mutex pressing;  // one after the other
-  FrameServer::Settings settings{options.address, options.port, spec.name, {}};
-  settings.commands["/press"] = [&](const Requested& requested) {
+  FrameServer::Settings settings{options.address, options.port, spec.name, options.sources, options.patience_s, {}};
+  const std::string example = fmt::format("object={}&x_mm=0&y_mm=0&force_N=1", usual);
+  const auto press = [&](const Requested& requested) {
     allow_only(requested, {"object", "x_mm", "y_mm", "turn_x_deg", "turn_y_deg", "turn_z_deg", "force_N", "depth_mm",
                            "drag_x_mm", "drag_y_mm"});
     const auto name = requested.find("object");
@@ -190,20 +195,23 @@ void serve_device(const ServeOptions& options, const GlobalOptions& global) {
         device.press(objects.named(name == requested.end() ? usual : name->second), press_of(requested));
     camera.show({std::make_shared<const lab::CameraState>(lab::camera_state(held))});
   };
-  settings.commands["/release"] = [&](const Requested& requested) {
+  settings.commands["/press"] = {press, example};
+  settings.commands["/release"] = {[&](const Requested& requested) {
     allow_only(requested, {});
     const std::lock_guard<std::mutex> lock(pressing);
     camera.show(rest);
-  };
+  }};
   const FrameServer server(camera, settings);
   say_where(options, server);
-  // -X POST alone sends no Content-Length, and the server then waits for a body until it gives up.
-  fmt::print("press: curl -d '' 'http://{}:{}/press?object={}&x_mm=0&y_mm=0&force_N=1' (/release)\n", options.address,
-             server.port(), usual);
+  fmt::print("press: curl -d '{}' http://{}:{}/press (/release)\n", example, options.address, server.port());
   wait_until_stopped(fmt::format("{}, untouched, at {:g} Hz", spec.name, rate));
 }
 
 void serve(const ServeOptions& options, const GlobalOptions& global) {
+  check(options.sources);
+  // What a press takes for a moment is kept for the next one by each arena, of which all threads together would
+  // have 16.
+  ::mallopt(M_ARENA_MAX, 1);
   const YamlReader file = YamlReader::open(options.what);
   if (file.has("gel")) return serve_device(options, global);
   if (file.has("device")) return serve_scene(options, global);
@@ -229,6 +237,16 @@ void add_serve_command(CLI::App& app, const GlobalOptions& global, Action& actio
       ->check(CLI::Range(0.01, 10000.0));
   command->add_option("--quality", options->quality, "Of the JPEGs")->check(CLI::Range(1, 100))->capture_default_str();
   command->add_option("--frames", options->frames, "A scene's: only from the first to the last of these")->expected(2);
+  command->add_option("--host", options->sources.hosts,
+                      "A name under which requests may ask for this machine, as sensor.local; addresses and localhost "
+                      "always may");
+  command->add_option("--allow-origin", options->sources.origins,
+                      "A web page that may use the server, as http://localhost:3000; no other may");
+  command
+      ->add_option("--patience", options->patience_s,
+                   "Seconds that a client may take to send a request or to take a frame")
+      ->check(CLI::Range(0.1, 3600.0))
+      ->capture_default_str();
   command->callback([&action, &global, options] { action = [options, &global] { serve(*options, global); }; });
 }
 

@@ -14,6 +14,17 @@ using Clock = std::chrono::steady_clock;
 
 constexpr std::size_t kMostChanges = 1000;  // remembered, for who asks what an earlier frame showed
 
+/// What can still be asked of frames that nobody exposes any more.
+std::shared_ptr<const ServedCamera::States> without_light(const ServedCamera::States& states) {
+  auto truths = std::make_shared<ServedCamera::States>();
+  for (const auto& state : states) {
+    auto truth = std::make_shared<lab::CameraState>(*state);
+    truth->expose = nullptr;
+    truths->push_back(std::move(truth));
+  }
+  return truths;
+}
+
 }  // namespace
 
 ServedCamera::ServedCamera(States states, double rate_Hz, int jpeg_quality)
@@ -50,6 +61,11 @@ void ServedCamera::change(std::shared_ptr<const States> states, std::optional<in
   const std::int64_t from = due() + 1;
   while (!changes_.empty() && changes_.back().from >= from) changes_.pop_back();
   if (changes_.size() >= kMostChanges) changes_.erase(changes_.begin());
+  // The frame that is due is of the last change or, until then, of the one before.
+  for (std::size_t i = 0; i + 1 < changes_.size(); ++i) {
+    auto& old = changes_[i].states;
+    if (old != states && old->front()->expose) old = without_light(*old);
+  }
   changes_.push_back({from, std::move(states), held});
 }
 
@@ -77,13 +93,13 @@ std::shared_ptr<const ServedFrame> ServedCamera::frame(std::int64_t number) {
   const std::lock_guard<std::mutex> making(making_);
   if (made_ && made_->number >= number) return made_;
   auto made = std::make_shared<ServedFrame>();
-  made->number = number;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (stopped_) return nullptr;
-    made->state = state_at(number);
+    made->number = std::max(number, due());  // while others made theirs, an earlier one may have lost its light
+    made->state = state_at(made->number);
   }
-  made->jpeg = render::jpeg_bytes(made->state->expose(static_cast<std::uint64_t>(number)), {.quality = quality_});
+  made->jpeg = render::jpeg_bytes(made->state->expose(static_cast<std::uint64_t>(made->number)), {.quality = quality_});
   made_ = std::move(made);
   return made_;
 }

@@ -109,7 +109,7 @@ class Served {
   /// Head and body of the answer.
   std::string ask(const std::string& path, const std::string& method = "GET") const {
     const Connection to(port_);
-    to.send(method + " " + path + " HTTP/1.1\r\nHost: x\r\nContent-Length: 0\r\nConnection: close\r\n\r\n");
+    to.send(method + " " + path + " HTTP/1.1\r\nHost: localhost\r\nContent-Length: 0\r\nConnection: close\r\n\r\n");
     return to.receive();
   }
   json ask_json(const std::string& path, const std::string& method = "GET") const {
@@ -199,7 +199,7 @@ TEST_F(ServeScene, CanBeHeldAtAFrameWhoseForceIsKnown) {
 
 TEST_F(ServeScene, AClientThatTakesNothingHoldsNobody) {
   const Connection lazy(served_->port());
-  lazy.send("GET /stream.mjpg HTTP/1.1\r\nHost: x\r\n\r\n");
+  lazy.send("GET /stream.mjpg HTTP/1.1\r\nHost: localhost\r\n\r\n");
   EXPECT_THAT(lazy.receive(100), HasSubstr("multipart/x-mixed-replace"));
   std::vector<cv::VideoCapture> cameras;
   cameras.reserve(3);
@@ -231,6 +231,8 @@ TEST(Serve, RefusesWhatItCannotShow) {
   refused("scene.yaml", {"--frames", "2", "9"}, "the scene has frames 0 to 5");
   refused("scene.yaml", {"--events-port", "1"}, "the scene's outputs have no events");
   refused("device.yaml", {"--frames", "0", "1"}, "is a device and has no frames");
+  refused("device.yaml", {"--host", "sensor.local:80"}, "--host sensor.local:80: must be a name without a port");
+  refused("device.yaml", {"--allow-origin", "lab"}, "--allow-origin lab: must be as http://localhost:3000");
   folder.write("blind.yaml", test::kSmallDevice);
   refused("blind.yaml", {}, "has no camera");
 }
@@ -252,12 +254,12 @@ TEST(Serve, ADeviceIsPressedOnRequest) {
   EXPECT_THAT(error("/press?force_N=0.2&object=%00"), HasSubstr(R"(object: '\x00' isn't known)"));
   EXPECT_LT(error("/press?force_N=0.2&object=" + std::string(5000, 'x')).size(), 2000u);
   EXPECT_THAT(error("/press?force_N=0.2&turn_x_deg=1e308"), HasSubstr("turn_x_deg: 1e+308 isn't allowed"));
-  EXPECT_THAT(error("/press"), HasSubstr("none of force_N, depth_mm and height_mm"));
+  EXPECT_THAT(error("/press"), HasSubstr("for example, as a body or after '?': object=object&"));
   EXPECT_THAT(error("/press?force_N=1&x_mm=50"), HasSubstr("isn't over the gel"));
   EXPECT_EQ(served.ask_json("/status.json")["force_N"][2], held["force_N"][2]) << "a refused press changes nothing";
   EXPECT_EQ(served.ask_json("/release", "POST")["force_N"][2], 0.0);
   const Connection watching(served.port());
-  watching.send("GET /stream.mjpg HTTP/1.1\r\nHost: x\r\n\r\n");
+  watching.send("GET /stream.mjpg HTTP/1.1\r\nHost: localhost\r\n\r\n");
   EXPECT_GT(watching.receive(2000).size(), 1000u);
   EXPECT_EQ(served.stop(SIGTERM), 0) << "with a client on it";
 }
