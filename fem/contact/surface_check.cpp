@@ -14,6 +14,7 @@ namespace touchstone::fem {
 namespace {
 
 constexpr double kNoArea = 1e-12;  // of the undeformed triangle's
+constexpr double kNoTilt = 1e-12;  // one less the cosine between triangles of one plane
 
 /// How far a point is within the body, along the nearest of the frame's six directions; 0 outside.
 double depth_within(const ContactShape& shape, const Eigen::Vector3d& point, const Eigen::Matrix3d& frame) {
@@ -28,20 +29,27 @@ double depth_within(const ContactShape& shape, const Eigen::Vector3d& point, con
   return depth;
 }
 
-/// By which part of it a line in the triangle is shorter, at most.
-double shortening_of(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& was_a,
-                     const Eigen::Vector3d& was_b) {
-  const Eigen::Vector3d x = was_a.normalized();
-  const Eigen::Vector3d y = was_a.cross(was_b).cross(was_a).normalized();
+/// How a triangle is deformed.
+struct Deformed {
+  double shortening;  // by which part of it a line in it is shorter, at most
+  double aside;       // norm of the gradient of its displacement along its own plane
+};
+
+Deformed deformed(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& was_a,
+                  const Eigen::Vector3d& was_b) {
+  Eigen::Matrix<double, 3, 2> axes;
+  axes.col(0) = was_a.normalized();
+  axes.col(1) = was_a.cross(was_b).cross(was_a).normalized();
   Eigen::Matrix2d before;
-  before << was_a.dot(x), was_b.dot(x), was_a.dot(y), was_b.dot(y);
+  before << axes.transpose() * was_a, axes.transpose() * was_b;
   Eigen::Matrix<double, 3, 2> after;
   after << a, b;
   const Eigen::Matrix<double, 3, 2> gradient = after * before.inverse();
   const Eigen::Matrix2d square = gradient.transpose() * gradient;
   const double half_trace = 0.5 * square.trace();
   const double root = std::sqrt(std::max(0.0, half_trace * half_trace - square.determinant()));
-  return 1.0 - std::sqrt(std::max(0.0, half_trace - root));
+  return {1.0 - std::sqrt(std::max(0.0, half_trace - root)),
+          (axes.transpose() * gradient - Eigen::Matrix2d::Identity()).norm()};
 }
 
 }  // namespace
@@ -56,6 +64,9 @@ SurfaceCheck check_surface(std::span<const Eigen::Vector3d> vertices, std::span<
     moved.vertices.push_back(vertices[v] + displacement);
   }
   std::vector<int> number;
+  Eigen::Vector3d plane = Eigen::Vector3d::Zero();  // normal of the first triangle
+  bool flat = true;
+  double aside = 0.0;
   std::vector<double> edge(vertices.size(), 0.0);
   for (std::size_t t = 0; t < triangles.size(); ++t) {
     const auto& corner = triangles[t];
@@ -70,12 +81,20 @@ SurfaceCheck check_surface(std::span<const Eigen::Vector3d> vertices, std::span<
       moved.triangles.push_back(corner);
       number.push_back(static_cast<int>(t));
     }
-    result.shortening = std::max(result.shortening, shortening_of(a, b, was_a, was_b));
+    const Deformed here = deformed(a, b, was_a, was_b);
+    result.shortening = std::max(result.shortening, here.shortening);
+    aside = std::max(aside, here.aside);
+    if (t == 0) plane = was;
+    flat = flat && was.dot(plane) > (1.0 - kNoTilt) * was.norm() * plane.norm();
     const double longest = std::max({was_a.norm(), was_b.norm(), (was_b - was_a).norm()});
     for (const int v : corner) edge[v] = std::max(edge[v], longest);
   }
-  if (const auto crossing = first_crossing(moved)) {
-    result.crossing = std::pair(number[crossing->first], number[crossing->second]);
+  // Flat gels are slabs, whose outer face is convex: two of its points stay apart even as seen along its normal if
+  // neither is displaced along it by as much as they are apart.
+  if (!(flat && aside < 1.0)) {
+    if (const auto crossing = first_crossing(moved)) {
+      result.crossing = std::pair(number[crossing->first], number[crossing->second]);
+    }
   }
   for (std::size_t b = 0; b < bodies.size() && b < state.bodies.size(); ++b) {
     if (bodies[b] == nullptr) continue;

@@ -9,31 +9,15 @@
 
 #include "core/error.h"
 #include "fem/contact/patch_motion.h"
+#include "fem/fine_relief/pixel_box.h"
+#include "fem/fine_relief/pixel_part.h"
 
 namespace touchstone::fem {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr int kMostWidenings = 8;
-constexpr int kBorder = 4;  // pixels: contact nearer to the grid's border than this widens it
-
-struct PixelBox {
-  int left, bottom, right, top;  // whole pixels of the lattice whose centres stand at (i + 0.5) * pitch; inclusive
-
-  PixelGrid grid(double pitch) const {
-    return {right - left + 1, top - bottom + 1, pitch, pitch * Eigen::Vector2d(left + 0.5, bottom + 0.5)};
-  }
-  bool operator==(const PixelBox&) const = default;
-};
-
-PixelBox box_around(const Eigen::Vector2d& low, const Eigen::Vector2d& high, double pitch) {
-  const auto pixel = [&](double x) { return static_cast<int>(std::floor(std::clamp(x / pitch, -1e8, 1e8))); };
-  return {pixel(low.x()), pixel(low.y()), pixel(high.x()), pixel(high.y())};
-}
-
-PixelBox common(const PixelBox& a, const PixelBox& b) {
-  return {std::max(a.left, b.left), std::max(a.bottom, b.bottom), std::min(a.right, b.right), std::min(a.top, b.top)};
-}
+constexpr double kPartMargin = 0.5;  // of an edge, round the vertices with pressure, where contact is looked for first
 
 PixelBox whole_surface(const Compliance& gel, double pitch) {
   Eigen::Vector2d low = gel.vertices.front().head<2>();
@@ -46,31 +30,15 @@ PixelBox whole_surface(const Compliance& gel, double pitch) {
   return box_around(low + (0.5 + 1e-9) * half, high - (0.5 + 1e-9) * half, pitch);
 }
 
-/// The box widened to one of few sizes, each a sixth more than the one before, so that their responses are kept from
-/// press to press (SmoothSurface::response); not beyond `whole`.
-PixelBox of_kept_size(const PixelBox& box, const PixelBox& whole) {
-  const auto widen = [](int& low, int& high, int least, int most) {
-    int size = 24;
-    while (size < high - low + 1) size += (size + 5) / 6;
-    size = std::min(size, most - least + 1);
-    low = std::max(least, low - (size - (high - low + 1)) / 2);
-    high = std::min(most, low + size - 1);
-    low = high - size + 1;
-  };
-  PixelBox wide = box;
-  widen(wide.left, wide.right, whole.left, whole.right);
-  widen(wide.bottom, wide.top, whole.bottom, whole.top);
-  return wide;
-}
-
-/// The vertices with pressure and their neighbours' reach.
-PixelBox pressed_box(const Compliance& gel, const PressState& press, double margin, double pitch) {
+/// The vertices with pressure, and with `neighbours` all that their triangles reach.
+PixelBox pressed_box(const Compliance& gel, const PressState& press, bool neighbours, double margin, double pitch) {
   Eigen::Vector2d low = Eigen::Vector2d::Constant(kInfinity);
   Eigen::Vector2d high = -low;
+  const auto pressed = [&](int v) { return press.traction(v, 2) != 0.0; };
   for (const auto& t : gel.triangles) {
-    const bool pressed = std::any_of(t.begin(), t.end(), [&](int v) { return press.traction(v, 2) != 0.0; });
-    if (!pressed) continue;
+    if (std::none_of(t.begin(), t.end(), pressed)) continue;
     for (const int v : t) {
+      if (!neighbours && !pressed(v)) continue;
       low = low.cwiseMin(gel.vertices[v].head<2>());
       high = high.cwiseMax(gel.vertices[v].head<2>());
     }
@@ -128,38 +96,7 @@ std::vector<double> gaps(const SmoothSurface& surface, const PixelGrid& grid, co
 /// The previous answer's pressure on a grid of the same lattice.
 std::vector<double> carried_over(const ReliefAnswer* previous, const PixelGrid& grid) {
   if (previous == nullptr || previous->grid.size() == 0 || previous->grid.pitch != grid.pitch) return {};
-  const Eigen::Vector2d offset = (grid.first - previous->grid.first) / grid.pitch;
-  const auto di = static_cast<int>(std::lround(offset.x()));
-  const auto dj = static_cast<int>(std::lround(offset.y()));
-  std::vector<double> pressure(grid.size(), 0.0);
-  for (int j = 0; j < grid.ny; ++j) {
-    for (int i = 0; i < grid.nx; ++i) {
-      if (i + di < 0 || i + di >= previous->grid.nx || j + dj < 0 || j + dj >= previous->grid.ny) continue;
-      pressure[grid.at(i, j)] = previous->pressure[previous->grid.at(i + di, j + dj)];
-    }
-  }
-  return pressure;
-}
-
-/// The box with those sides moved out that contact has come near to.
-PixelBox widened(const PixelBox& box, const PixelGrid& grid, const std::vector<double>& pressure) {
-  PixelBox wider = box;
-  const auto pressed = [&](int i, int j) { return pressure[grid.at(i, j)] > 0.0; };
-  const int step_x = std::max(16, grid.nx / 4);
-  const int step_y = std::max(16, grid.ny / 4);
-  for (int j = 0; j < grid.ny; ++j) {
-    for (int i = 0; i < std::min(kBorder, grid.nx); ++i) {
-      if (pressed(i, j)) wider.left = box.left - step_x;
-      if (pressed(grid.nx - 1 - i, j)) wider.right = box.right + step_x;
-    }
-  }
-  for (int i = 0; i < grid.nx; ++i) {
-    for (int j = 0; j < std::min(kBorder, grid.ny); ++j) {
-      if (pressed(i, j)) wider.bottom = box.bottom - step_y;
-      if (pressed(i, grid.ny - 1 - j)) wider.top = box.top + step_y;
-    }
-  }
-  return wider;
+  return on_grid(previous->grid, previous->pressure, grid, 0.0);
 }
 
 double interpolated(const PixelGrid& grid, const std::vector<double>& values, const Eigen::Vector2d& place) {
@@ -197,20 +134,22 @@ ReliefAnswer solve_fine_relief(const SmoothSurface& surface, const PressState& p
 
   const double margin = settings.margin >= 0.0 ? settings.margin : std::max(2.0 * surface.edge(), 0.25 * gel.thickness);
   const PixelBox whole = whole_surface(gel, settings.pitch);
-  PixelBox box = of_kept_size(common(pressed_box(gel, press, margin, settings.pitch), whole), whole);
+  PixelBox box = of_kept_size(common(pressed_box(gel, press, true, margin, settings.pitch), whole), whole);
+  const PixelBox pressed = pressed_box(gel, press, false, kPartMargin * surface.edge(), settings.pitch);
   std::vector<double> start;
   Eigen::MatrixX3d rest;
   for (int widening = 0;; ++widening) {
     const PixelGrid grid = box.grid(settings.pitch);
     check(grid);
-    const auto layer = surface.response(grid.nx, grid.ny, grid.pitch);
     rest = coarse.rest.on_lattice(grid.columns_x(), grid.rows_y());
     const std::vector<double> gap = gaps(surface, grid, coarse.along.on_lattice(grid.columns_x(), grid.rows_y()), rest,
                                          shape, press.gel_from_object);
     PixelContact contact{gap, {}};
     if (settings.control == ReliefControl::force) contact.force = coarse.force;
     start = carried_over(answer.grid.size() > 0 ? &answer : previous, grid);
-    answer.solved = solve_pixel_contact(*layer, contact, settings.tolerance, start);
+    const auto response = [&](const PixelGrid& of) { return surface.response(of.nx, of.ny, of.pitch); };
+    answer.solved =
+        solve_in_part(response, box, common(pressed, box), settings.pitch, contact, settings.tolerance, start);
     answer.grid = grid;
     answer.pressure = std::move(answer.solved.pressure);
     const PixelBox wider = common(widened(box, grid, answer.pressure), whole);

@@ -6,12 +6,14 @@
 #include <cmath>
 #include <limits>
 
+#include "core/error.h"
 #include "render/scene/flat_faces.h"
 #include "render/scene/ray_scene.h"
-#include "render/scene/sheet_index.h"
 
 namespace touchstone::render {
 namespace {
+
+constexpr double kPassing = 1e-3;  // of a triangle's sides, beside it: some hundred times what single precision loses
 
 int layer_of_sheet(const Scene& scene) {
   double highest = -std::numeric_limits<double>::infinity();
@@ -57,8 +59,8 @@ StillView::StillView(const Scene& scene, const ReadyCamera& camera) {
   });
 }
 
-std::vector<FirstHit> StillView::first_hits(const Surface& sheet) const {
-  // What rays pass of the sheet's heights.
+/// What rays pass of the sheet's heights.
+Eigen::AlignedBox2d StillView::seen_of(const Surface& sheet) const {
   double low = std::numeric_limits<double>::infinity();
   double high = -low;
   for (const Eigen::Vector3d& vertex : sheet.mesh.vertices) {
@@ -73,23 +75,48 @@ std::vector<FirstHit> StillView::first_hits(const Surface& sheet) const {
       seen.extend(Eigen::Vector2d((ray.origin + along * ray.direction).head<2>()));
     }
   }
+  return seen;
+}
+
+FirstHit StillView::hit_of(const Ray& ray, const SheetHit& hit, const Surface& sheet) {
+  return {0,
+          hit.triangle,
+          hit.u,
+          hit.v,
+          ray.origin + hit.distance * ray.direction,
+          normals_at(sheet, hit).shading.normalized()};
+}
+
+std::vector<FirstHit> StillView::first_hits(const Surface& sheet, std::span<const std::int32_t> known) const {
+  TS_ASSERT(known.empty() || known.size() == rays_.size());
   std::vector<FirstHit> hits(rays_.size());
-  const SheetIndex index(sheet, seen);
+  std::vector<std::uint8_t> open(rays_.size(), 0);  // not known
   constexpr std::size_t kRaysATask = 1024;
   const std::size_t tasks = (rays_.size() + kRaysATask - 1) / kRaysATask;
-  tbb::parallel_for(std::size_t{0}, tasks, [&](std::size_t task) {
-    for (std::size_t k = task * kRaysATask; k < std::min(rays_.size(), (task + 1) * kRaysATask); ++k) {
-      const Ray& ray = rays_[k];
-      hits[k] = ray.still;
-      if (ray.far < 0.0) continue;
-      const auto hit = index.first(ray.origin, ray.direction, ray.far);
-      if (!hit) continue;
-      hits[k] = {0,
-                 hit->triangle,
-                 hit->u,
-                 hit->v,
-                 ray.origin + hit->distance * ray.direction,
-                 index.normals_at(*hit).shading.normalized()};
+  const auto for_rays = [&](const auto& work) {
+    tbb::parallel_for(std::size_t{0}, tasks, [&](std::size_t task) {
+      for (std::size_t k = task * kRaysATask; k < std::min(rays_.size(), (task + 1) * kRaysATask); ++k) work(k);
+    });
+  };
+  for_rays([&](std::size_t k) {
+    const Ray& ray = rays_[k];
+    hits[k] = ray.still;
+    if (ray.far < 0.0) return;
+    if (!known.empty() && known[k] >= 0) {
+      const auto hit = meet_triangle(sheet.mesh, known[k], ray.origin, ray.direction, kPassing);
+      if (hit && hit->distance >= 0.0 && hit->distance <= ray.far) {
+        hits[k] = hit_of(ray, *hit, sheet);
+        return;
+      }
+    }
+    open[k] = 1;
+  });
+  if (std::ranges::find(open, std::uint8_t{1}) == open.end()) return hits;
+  const SheetIndex index(sheet, seen_of(sheet));
+  for_rays([&](std::size_t k) {
+    if (open[k] == 0) return;
+    if (const auto hit = index.first(rays_[k].origin, rays_[k].direction, rays_[k].far)) {
+      hits[k] = hit_of(rays_[k], *hit, sheet);
     }
   });
   return hits;

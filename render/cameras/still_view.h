@@ -2,9 +2,13 @@
 // First hits of a camera before which a sheet moves and all else stands still.
 
 #include <Eigen/Geometry>
+#include <cstdint>
+#include <optional>
+#include <span>
 #include <vector>
 
 #include "render/cameras/first_hits.h"
+#include "render/scene/sheet_index.h"
 
 namespace touchstone::render {
 
@@ -16,8 +20,10 @@ class StillView {
   /// its highest point, in every frame. @throws Error as check_scene
   StillView(const Scene& scene, const ReadyCamera& camera);
 
-  /// What first_hits says of the scene with this first surface.
-  std::vector<FirstHit> first_hits(const Surface& sheet) const;
+  /// What first_hits says of the scene with this first surface. `known`, if it isn't empty, names for each pixel the
+  /// triangle of the sheet that its ray meets first, as it was found with the same ray in less precision; -1 where that
+  /// isn't known. A triangle that the ray passes by more than that explains is searched for anew.
+  std::vector<FirstHit> first_hits(const Surface& sheet, std::span<const std::int32_t> known = {}) const;
 
  private:
   struct Ray {
@@ -26,6 +32,9 @@ class StillView {
     FirstHit still;
   };
   std::vector<Ray> rays_;
+
+  static FirstHit hit_of(const Ray& ray, const SheetHit& hit, const Surface& sheet);
+  Eigen::AlignedBox2d seen_of(const Surface& sheet) const;
 };
 
 }  // namespace touchstone::render

@@ -100,7 +100,7 @@ void DirectBatch::meet_sheet(const RayPacket& packet, PacketHits& hits) const {
     const double far = hits.object[k] < 0 ? packet.far[k] : hits.distance[k];
     const auto hit = frame_.sheet->first(origin, direction, far);
     if (!hit) continue;
-    const SheetIndex::Normals normals = frame_.sheet->normals_at(*hit);
+    const SheetNormals normals = normals_at(frame_.sheet->surface(), *hit);
     hits.object[k] = 0;
     hits.triangle[k] = hit->triangle;
     hits.u[k] = static_cast<float>(hit->u);

@@ -69,6 +69,12 @@ class DirectBatch {
     float u, v;
   };
   std::optional<SheetPlace> sheet_place(int lane) const;  ///< see above
+  /// The triangle of the first surface that a lane's ray met; -1 where it met something else, or nothing.
+  int sheet_triangle(int lane) const {
+    const Lane& one = lanes_[lane];
+    const bool met = packet_of(lane).valid[lane % kPacket] != 0 && one.material != nullptr && one.object == 0;
+    return met ? one.triangle : -1;
+  }
   /// What a white sheet in the place of a lane's would show, as SheetPoints::values has it: 4 floats a band. `ambient`
   /// as in add(). @pre sheet_place(lane); no films
   void white_light(int lane, const float* ambient, float* out) const;
@@ -97,6 +103,11 @@ class DirectBatch {
   static Eigen::Map<const Four> four(const float* from) { return Eigen::Map<const Four>(from); }
 
   const RayPacket& packet_of(int lane) const { return rays_[lane / kPacket]; }
+  /// Has the lane's ray met something that lamps light?
+  bool takes_light(int lane) const {
+    const Lane& one = lanes_[lane];
+    return packet_of(lane).valid[lane % kPacket] != 0 && one.material != nullptr && is_lit(one.material->kind);
+  }
   float* amounts(int lane) { return amounts_.data() + static_cast<std::size_t>(lane) * stride_; }
   const float* amounts(int lane) const { return amounts_.data() + static_cast<std::size_t>(lane) * stride_; }
   Four passing(int lane, int group, int band) const;

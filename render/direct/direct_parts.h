@@ -40,6 +40,7 @@ struct DirectRenderer::Parts {
   std::vector<float> through, veil;
   std::vector<float> radiance;                // [band][grid point], memory for a frame
   std::vector<DirectBatch::Visibility> seen;  // by grid point, where edges get more rays
+  std::vector<std::int32_t> sheet_triangles;  // by grid point, the first surface's triangle or -1; memory for a frame
   std::vector<float> bounced;                 // [grid point][band], irradiance; empty for none
   std::map<double, GgxAlbedo> conductors;     // by roughness
 
@@ -59,6 +60,8 @@ struct DirectRenderer::Parts {
   void cast(const DirectFrame& frame, DirectImage& image);
   /// Casts more rays where `radiance` has edges.
   void refine(const DirectFrame& frame, DirectImage& image);
+  /// From `sheet_triangles` to pixels; nothing where grid points aren't pixels.
+  std::vector<std::int32_t> triangles_by_pixel() const;
   /// From `radiance` to the picture.
   void spread(DirectImage& image) const;
 

@@ -67,6 +67,7 @@ void DirectRenderer::Parts::cast(const DirectFrame& frame, DirectImage& image) {
   const int columns = rays.grid.columns;
   const int tasks = (rays.tiles + kTilesATask - 1) / kTilesATask;
   const std::size_t points = static_cast<std::size_t>(columns) * rays.grid.rows;
+  if (samples == 1) sheet_triangles.assign(points, -1);
   const std::array<float, kMaxBands> whole = [] {
     std::array<float, kMaxBands> ones;
     ones.fill(1.0f);
@@ -96,6 +97,7 @@ void DirectRenderer::Parts::cast(const DirectFrame& frame, DirectImage& image) {
         if (frame.shadow_reach != nullptr) batch.cast_shadows(counts);
         for_lanes([&](int lane, int row, int column) {
           const std::size_t point = static_cast<std::size_t>(row) * columns + column;
+          if (samples == 1) sheet_triangles[point] = batch.sheet_triangle(lane);
           const float* ambient = bounced.empty() ? nullptr : bounced.data() + point * bands;
           if (spreads) {
             float out[kMaxBands] = {};
@@ -172,6 +174,20 @@ SheetPoints DirectRenderer::Parts::points_of(const DirectFrame& frame, const Sur
     }
   });
   return out;
+}
+
+std::vector<std::int32_t> DirectRenderer::Parts::triangles_by_pixel() const {
+  if (settings.samples != 1 || rays.grid.spacing != 1.0) return {};
+  const auto first = [](double at) { return static_cast<int>(std::lround(0.5 - at)); };
+  std::vector<std::int32_t> by_pixel;
+  by_pixel.reserve(static_cast<std::size_t>(width()) * height());
+  for (int row = 0; row < height(); ++row) {
+    const auto from = sheet_triangles.begin() +
+                      static_cast<std::ptrdiff_t>(first(rays.grid.top) + row) * rays.grid.columns +
+                      first(rays.grid.left);
+    by_pixel.insert(by_pixel.end(), from, from + width());
+  }
+  return by_pixel;
 }
 
 /// A lamp that is seen, or hidden, from a point and all eight next ones is taken to be so from all between them.
@@ -345,6 +361,7 @@ DirectImage DirectRenderer::render(const Scene& scene) {
   DirectImage image;
   image.irradiance = cv::Mat::zeros(parts.height(), parts.width(), CV_32FC(parts.rays.bands));
   parts.cast(*prepared->frame, image);
+  image.sheet_triangle = parts.triangles_by_pixel();
   if (parts.spreads) {
     if (parts.refines) parts.refine(*prepared->frame, image);
     parts.spread(image);

@@ -41,6 +41,9 @@ struct DirectImage {
   std::uint64_t shadow_rays = 0;    ///< traced
   std::uint64_t shadow_spared = 0;  ///< lamp connections that nothing could stand in the way of
   std::uint64_t edge_pixels = 0;    ///< that got more rays than one
+  /// By pixel: the triangle of the first surface that the ray through its middle met, or -1; empty where no such ray
+  /// was cast for each pixel.
+  std::vector<std::int32_t> sheet_triangle;
 };
 
 /// Tier 1 of the renderers: what Scene::interreflection = false means, from a light field. For a static fixture (faces,

@@ -76,8 +76,8 @@ void DirectBatch::dim_by_horizons(int packet) {
   unsigned shaded = 0;
   for (int k = 0; k < kPacket; ++k) {
     const Lane& one = lanes_[first + k];
-    const bool lit = packet_of(first + k).valid[k] != 0 && one.material != nullptr && is_lit(one.material->kind);
-    if (lit && one.object == 0 && frame_.horizons->any(one.place[0], one.place[1])) shaded |= 1u << k;
+    if (takes_light(first + k) && one.object == 0 && frame_.horizons->any(one.place[0], one.place[1]))
+      shaded |= 1u << k;
   }
   if (shaded == 0) return;
   find_beams(first + std::countr_zero(shaded));
@@ -124,7 +124,7 @@ void DirectBatch::choose_lens_points(int lane, double u, double v) {
   Lane& one = lanes_[lane];
   one.spread[0] = static_cast<float>(u - 0.5);
   one.spread[1] = static_cast<float>(v - 0.5);
-  if (one.material == nullptr || !is_lit(one.material->kind)) return;
+  if (!takes_light(lane)) return;
   const bool metal = one.material->kind == DirectKind::kMetal;
   for (int lamp = 0; lamp < lamps_; ++lamp) {
     // Shadows are softened by round lenses and chips; those of other lamps fall as from the middle of their light.
@@ -153,7 +153,7 @@ void DirectBatch::choose_lens_points(int lane, double u, double v) {
 
 void DirectBatch::take_as_known(int lane, const Visibility& known) {
   Lane& one = lanes_[lane];
-  if (one.material == nullptr || !is_lit(one.material->kind)) return;
+  if (!takes_light(lane)) return;
   for (std::uint64_t rest = one.doubt & known.hidden; rest != 0; rest &= rest - 1) {
     amounts(lane)[std::countr_zero(rest)] = 0.0f;
   }
@@ -163,8 +163,7 @@ void DirectBatch::take_as_known(int lane, const Visibility& known) {
 DirectBatch::Visibility DirectBatch::visibility(int lane) const {
   const Lane& one = lanes_[lane];
   Visibility found;
-  if (packet_of(lane).valid[lane % kPacket] == 0 || one.material == nullptr || !is_lit(one.material->kind))
-    return found;
+  if (!takes_light(lane)) return found;
   for (int lamp = 0; lamp < lamps_; ++lamp) {
     found.open |= std::uint64_t{amounts(lane)[lamp] > 0.0f} << lamp;
   }

@@ -81,13 +81,6 @@ class SheetHorizons {
     return p1 + 0.5f * t * (p2 - p0 + t * (2.0f * p0 - 5.0f * p1 + 4.0f * p2 - p3 + t * (3.0f * (p1 - p2) + p3 - p0)));
   }
 
-  /// The horizon's tangent at any azimuth. `horizons` as at() gave them.
-  static float towards(const float* horizons, float azimuth) {
-    const Between at = between(azimuth);
-    const float* const p = horizons + at.low;
-    return spline(p[0], p[1], p[2], p[3], at.share);
-  }
-
  private:
   struct Grid {
     float left = 0.0f, bottom = 0.0f, pitch = 1.0f;

@@ -5,10 +5,7 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
-#include <cfloat>
 #include <cmath>
-#include <limits>
 #include <opencv2/core.hpp>
 #include <string_view>
 #include <vector>
@@ -22,7 +19,6 @@ namespace {
 
 constexpr double kPlanck_Js = 6.62607015e-34;
 constexpr double kLightSpeed_m_per_s = 299792458.0;
-constexpr int kLongestSide = 1 << 16;  // a pixel's row and column share 32 bits of its random stream's index
 constexpr std::array<std::string_view, 3> kChannelNames = {"red", "green", "blue"};
 
 // Channels of the 2x2 pixels, row by row; R 0, G 1, B 2.
@@ -67,60 +63,12 @@ int samples_per_pixel(const Imager& imager) {
   return CV_MAT_CN(raw_type(imager));
 }
 
-// How one number comes of a pixel's light: that of a channel.
-struct Sample {
-  std::array<double, 16> electrons_per_irradiance{};
-  double exposure_s;
-  double dark_e, full_well_e, read_noise_e, gain, black, largest;
-  bool ideal;
-
-  Sample(const Imager& grey, const QuantumEfficiency& weights)
-      : exposure_s(grey.exposure_s),
-        dark_e(grey.dark_current_e_per_s * grey.exposure_s),
-        full_well_e(grey.full_well_e),
-        read_noise_e(grey.read_noise_e),
-        gain(grey.gain_DN_per_e),
-        black(grey.black_level_DN),
-        largest(largest_number(grey)),
-        ideal(grey.ideal) {
-    for (Eigen::Index band = 0; band < weights.cols(); ++band) electrons_per_irradiance[band] = weights(0, band);
-  }
-
-  // Always two draws, whatever the light, so that it doesn't change what the next sample of the pixel draws.
-  int number(double mean_e, float pattern_gain, float pattern_offset, float hot_e_per_s, RandomStream& stream) const {
-    double electrons = mean_e;
-    if (!ideal) {
-      const double mean = mean_e * pattern_gain + dark_e + static_cast<double>(hot_e_per_s) * exposure_s;
-      const double share = stream.uniform();
-      // Far above the well every draw saturates; the test also keeps the mean in a range where counts are exact.
-      electrons = mean > 4.0 * full_well_e + 1e4 ? full_well_e : poisson_quantile(mean, share);
-    }
-    electrons = std::min(electrons, full_well_e);
-    if (!ideal) electrons += pattern_offset + read_noise_e * normal_quantile(stream.uniform());
-    // Truncation rounds down because the number is positive by then.
-    return static_cast<int>(std::clamp(black + gain * electrons, 0.0, largest) + 0.5);
-  }
-};
-
 std::vector<Imager> by_channel(const Imager& imager) {
   std::vector<Imager> channels;
   for (int channel = 0; channel < imager.quantum_efficiency.rows(); ++channel) {
     channels.push_back(channel_imager(imager, channel));
   }
   return channels;
-}
-
-[[noreturn]] void refuse_irradiance(const cv::Mat& irradiance, int row) {
-  const int bands = irradiance.channels();
-  const float* values = irradiance.ptr<float>(row);
-  for (int i = 0; i < irradiance.cols * bands; ++i) {
-    if (!(values[i] >= 0.0F && values[i] <= FLT_MAX)) {
-      fail("irradiance of pixel (column {}, row {}), band {} is {}; allowed is a finite number from 0", i / bands, row,
-           i % bands, values[i]);
-    }
-  }
-  TS_ASSERT(false && "the row holds a bad irradiance");
-  std::abort();
 }
 
 /// As FixedPattern::hot_e_per_s. A stream of their own keeps the rest of the pattern as it is without them.
@@ -142,57 +90,6 @@ cv::Mat hot_pixels(const HotPixels& hot, cv::Size size, int count, std::uint64_t
     }
   });
   return current;
-}
-
-template <typename Number>
-cv::Mat expose_as(const cv::Mat& irradiance, const Imager& imager, const FixedPattern& pattern, std::uint64_t seed,
-                  std::uint64_t frame_index) {
-  std::vector<Sample> samples;
-  const QuantumEfficiency weights = response_of(imager).electrons_per_irradiance;
-  for (const Imager& channel : by_channel(imager)) {
-    samples.emplace_back(channel, weights.row(static_cast<Eigen::Index>(samples.size())));
-  }
-  const int bands = irradiance.channels();
-  const int count = samples_per_pixel(imager);
-  const std::array<int, 4> mosaic = channels_of(imager.bayer);
-  cv::Mat raw(irradiance.size(), raw_type(imager));
-  std::atomic<int> first_bad_row = std::numeric_limits<int>::max();
-
-  const auto expose_row = [&](int row) {
-    const float* light = irradiance.ptr<float>(row);
-    const float* gain = imager.ideal ? nullptr : pattern.gain.ptr<float>(row);
-    const float* offset = imager.ideal ? nullptr : pattern.offset_e.ptr<float>(row);
-    const float* hot = imager.ideal || pattern.hot_e_per_s.empty() ? nullptr : pattern.hot_e_per_s.ptr<float>(row);
-    Number* out = raw.ptr<Number>(row);
-    for (int column = 0; column < irradiance.cols; ++column, light += bands) {
-      const bool good =
-          std::all_of(light, light + bands, [](float value) { return value >= 0.0F && value <= FLT_MAX; });
-      if (!good) {
-        int known = first_bad_row.load();
-        while (row < known && !first_bad_row.compare_exchange_weak(known, row)) {
-        }
-        return;
-      }
-      const std::uint64_t pixel = (static_cast<std::uint64_t>(row) << 16) | static_cast<std::uint64_t>(column);
-      RandomStream stream(seed, (frame_index << 32) | pixel, Purpose::kImagerNoise);
-      for (int i = 0; i < count; ++i) {
-        const Sample& sample = samples[count > 1 ? i : mosaic[2 * (row & 1) + (column & 1)]];
-        double mean_e = 0.0;
-        for (int band = 0; band < bands; ++band) {
-          mean_e += sample.electrons_per_irradiance[band] * static_cast<double>(light[band]);
-        }
-        const float pixel_gain = gain != nullptr ? *gain++ : 1.0F;
-        const float pixel_offset = offset != nullptr ? *offset++ : 0.0F;
-        const float pixel_hot = hot != nullptr ? *hot++ : 0.0F;
-        *out++ = static_cast<Number>(sample.number(mean_e, pixel_gain, pixel_offset, pixel_hot, stream));
-      }
-    }
-  };
-  tbb::parallel_for(tbb::blocked_range<int>(0, irradiance.rows, 16), [&](const tbb::blocked_range<int>& rows) {
-    for (int row = rows.begin(); row != rows.end(); ++row) expose_row(row);
-  });
-  if (first_bad_row.load() < irradiance.rows) refuse_irradiance(irradiance, first_bad_row.load());
-  return raw;
 }
 
 }  // namespace
@@ -305,39 +202,6 @@ FixedPattern fixed_pattern(const Imager& imager, cv::Size size, std::uint64_t un
     }
   });
   return pattern;
-}
-
-cv::Mat expose(const cv::Mat& irradiance, const Imager& imager, const FixedPattern& pattern, std::uint64_t seed,
-               std::uint64_t frame_index) {
-  check(imager);
-  TS_ASSERT(frame_index <= 0xffffffffu);
-  if (irradiance.empty() || irradiance.depth() != CV_32F || irradiance.dims != 2) {
-    fail("irradiance must be a picture of 32 bit floats that isn't empty");
-  }
-  if (irradiance.cols > kLongestSide || irradiance.rows > kLongestSide) {
-    fail("irradiance has {}x{} pixels; allowed is up to {} each", irradiance.cols, irradiance.rows, kLongestSide);
-  }
-  if (irradiance.channels() != imager.wavelengths_nm.size()) {
-    fail("irradiance has {} bands, the imager has {}", irradiance.channels(), imager.wavelengths_nm.size());
-  }
-  if (!imager.ideal) {
-    const int type = CV_32FC(samples_per_pixel(imager));
-    const bool fits = pattern.gain.size() == irradiance.size() && pattern.offset_e.size() == irradiance.size() &&
-                      pattern.gain.type() == type && pattern.offset_e.type() == type &&
-                      (pattern.hot_e_per_s.empty() ||
-                       (pattern.hot_e_per_s.size() == irradiance.size() && pattern.hot_e_per_s.type() == type));
-    if (!fits) {
-      fail("the fixed pattern isn't of the irradiance's size, {}x{}, and the imager's {} channels", irradiance.cols,
-           irradiance.rows, samples_per_pixel(imager));
-    }
-  }
-  return imager.bits <= 8 ? expose_as<std::uint8_t>(irradiance, imager, pattern, seed, frame_index)
-                          : expose_as<std::uint16_t>(irradiance, imager, pattern, seed, frame_index);
-}
-
-cv::Mat expose(const cv::Mat& irradiance, const Imager& imager, std::uint64_t seed, std::uint64_t frame_index) {
-  const FixedPattern pattern = imager.ideal ? FixedPattern{} : fixed_pattern(imager, irradiance.size(), seed);
-  return expose(irradiance, imager, pattern, seed, frame_index);
 }
 
 ImagerResponse response_of(const Imager& imager) {

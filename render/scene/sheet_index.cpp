@@ -9,6 +9,7 @@ namespace {
 
 constexpr double kOnEdge = 1e-9;     // a ray between two triangles meets both
 constexpr float kPad = 1e-5f;        // mm: heights of a cell are kept in single precision
+constexpr double kOnceOnly = 0.9;    // of the squared product of slopes at which a ray would run along the sheet
 constexpr double kEdgesACell = 1.5;  // of the median edge
 constexpr int kMostCells = 1024;     // a side
 
@@ -26,7 +27,34 @@ double median_edge(const TriangleMesh& mesh) {
   return *middle;
 }
 
+/// meet_triangle without its optional, for the loop over a cell's triangles. [Moeller1997]
+inline bool meet(const TriangleMesh& mesh, int triangle, const Eigen::Vector3d& origin,
+                 const Eigen::Vector3d& direction, double beside, SheetHit& hit) {
+  const auto& t = mesh.triangles[static_cast<std::size_t>(triangle)];
+  const Eigen::Vector3d& a = mesh.vertices[t[0]];
+  const Eigen::Vector3d e1 = mesh.vertices[t[1]] - a;
+  const Eigen::Vector3d e2 = mesh.vertices[t[2]] - a;
+  const Eigen::Vector3d p = direction.cross(e2);
+  const double det = e1.dot(p);
+  if (det == 0.0) return false;
+  const Eigen::Vector3d s = origin - a;
+  const double u = s.dot(p) / det;
+  if (!(u >= -beside && u <= 1.0 + beside)) return false;
+  const Eigen::Vector3d q = s.cross(e1);
+  const double v = direction.dot(q) / det;
+  if (!(v >= -beside && u + v <= 1.0 + beside)) return false;
+  hit = {triangle, u, v, e2.dot(q) / det};
+  return true;
+}
+
 }  // namespace
+
+std::optional<SheetHit> meet_triangle(const TriangleMesh& mesh, int triangle, const Eigen::Vector3d& origin,
+                                      const Eigen::Vector3d& direction, double beside) {
+  SheetHit hit;
+  if (!meet(mesh, triangle, origin, direction, beside, hit)) return std::nullopt;
+  return hit;
+}
 
 SheetIndex::SheetIndex(const Surface& surface, const Eigen::AlignedBox2d& seen) : surface_(surface) {
   const TriangleMesh& mesh = surface.mesh;
@@ -49,6 +77,7 @@ SheetIndex::SheetIndex(const Surface& surface, const Eigen::AlignedBox2d& seen) 
   first_.assign(static_cast<std::size_t>(columns_) * rows_ + 1, 0);
   low_ = std::numeric_limits<double>::infinity();
   high_ = -low_;
+  bool up = false, down = false;
   for (std::size_t k = 0; k < mesh.triangles.size(); ++k) {
     const auto& t = mesh.triangles[k];
     const Eigen::Vector3d& a = mesh.vertices[t[0]];
@@ -62,6 +91,12 @@ SheetIndex::SheetIndex(const Surface& surface, const Eigen::AlignedBox2d& seen) 
       of[k] = {0, -1, 0, -1};
       continue;
     }
+    const Eigen::Vector3d normal = (b - a).cross(c - a);
+    (normal.z() < 0.0 ? down : up) |= normal.z() != 0.0;
+    const double across2 = normal.head<2>().squaredNorm();
+    if (across2 > steepest2_ * (normal.z() * normal.z())) {
+      steepest2_ = normal.z() != 0.0 ? across2 / (normal.z() * normal.z()) : std::numeric_limits<double>::infinity();
+    }
     low_ = std::min({low_, a.z(), b.z(), c.z()});
     high_ = std::max({high_, a.z(), b.z(), c.z()});
     of[k] = {std::max(0, static_cast<int>(x0)), std::min(columns_ - 1, static_cast<int>(x1)),
@@ -70,6 +105,7 @@ SheetIndex::SheetIndex(const Surface& surface, const Eigen::AlignedBox2d& seen) 
       for (int i = of[k].i0; i <= of[k].i1; ++i) ++first_[static_cast<std::size_t>(j) * columns_ + i + 1];
     }
   }
+  if (up && down) steepest2_ = std::numeric_limits<double>::infinity();
   for (std::size_t cell = 1; cell < first_.size(); ++cell) first_[cell] += first_[cell - 1];
   triangles_.resize(static_cast<std::size_t>(first_.back()));
   heights_.assign(first_.size() - 1, {std::numeric_limits<float>::infinity(), -std::numeric_limits<float>::infinity()});
@@ -91,8 +127,8 @@ SheetIndex::SheetIndex(const Surface& surface, const Eigen::AlignedBox2d& seen) 
   }
 }
 
-std::optional<SheetIndex::Hit> SheetIndex::first(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
-                                                 double far) const {
+std::optional<SheetHit> SheetIndex::first(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
+                                          double far) const {
   if (columns_ == 0) return std::nullopt;
   const TriangleMesh& mesh = surface_.mesh;
   // The part of the ray that is as high as the sheet, and over the grid.
@@ -128,7 +164,9 @@ std::optional<SheetIndex::Hit> SheetIndex::first(const Eigen::Vector3d& origin, 
   const double stride_i = direction.x() == 0.0 ? kNever : cell_ / std::abs(direction.x());
   const double stride_j = direction.y() == 0.0 ? kNever : cell_ / std::abs(direction.y());
 
-  std::optional<Hit> nearest;
+  // A height field that is nowhere as steep as the ray is met once.
+  const bool once = direction.head<2>().squaredNorm() * steepest2_ < kOnceOnly * direction.z() * direction.z();
+  std::optional<SheetHit> nearest;
   double most = to;
   for (double here = from;;) {
     const double leave = std::min({next_i, next_j, to});
@@ -138,25 +176,13 @@ std::optional<SheetIndex::Hit> SheetIndex::first(const Eigen::Vector3d& origin, 
     if (std::max(z0, z1) >= double(heights_[cell].low) && std::min(z0, z1) <= double(heights_[cell].high)) {
       for (int k = first_[cell]; k < first_[cell + 1]; ++k) {
         const int triangle = triangles_[static_cast<std::size_t>(k)];
-        const auto& t = mesh.triangles[static_cast<std::size_t>(triangle)];
-        const Eigen::Vector3d& a = mesh.vertices[t[0]];
-        const Eigen::Vector3d e1 = mesh.vertices[t[1]] - a;
-        const Eigen::Vector3d e2 = mesh.vertices[t[2]] - a;
-        // [Moeller1997]
-        const Eigen::Vector3d p = direction.cross(e2);
-        const double det = e1.dot(p);
-        if (det == 0.0) continue;
-        const Eigen::Vector3d s = origin - a;
-        const double u = s.dot(p) / det;
-        if (!(u >= -kOnEdge && u <= 1.0 + kOnEdge)) continue;
-        const Eigen::Vector3d q = s.cross(e1);
-        const double v = direction.dot(q) / det;
-        if (!(v >= -kOnEdge && u + v <= 1.0 + kOnEdge)) continue;
-        const double distance = e2.dot(q) / det;
-        if (!(distance >= 0.0 && distance <= most)) continue;
-        if (nearest && distance == most) continue;  // of two that share the place the first
-        most = distance;
-        nearest = Hit{triangle, u, v, distance};
+        SheetHit hit;
+        if (!meet(mesh, triangle, origin, direction, kOnEdge, hit)) continue;
+        if (!(hit.distance >= 0.0 && hit.distance <= most)) continue;
+        if (nearest && hit.distance == most) continue;  // of two that share the place the first
+        most = hit.distance;
+        nearest = hit;
+        if (once) return nearest;
       }
     }
     // What is met in a later cell is farther away.
@@ -174,16 +200,16 @@ std::optional<SheetIndex::Hit> SheetIndex::first(const Eigen::Vector3d& origin, 
   }
 }
 
-SheetIndex::Normals SheetIndex::normals_at(const Hit& hit) const {
-  const auto& corners = surface_.mesh.triangles[static_cast<std::size_t>(hit.triangle)];
-  const Eigen::Vector3d& a = surface_.mesh.vertices[corners[0]];
-  Normals found;
-  found.face = (surface_.mesh.vertices[corners[1]] - a).cross(surface_.mesh.vertices[corners[2]] - a);
+SheetNormals normals_at(const Surface& surface, const SheetHit& hit) {
+  const auto& corners = surface.mesh.triangles[static_cast<std::size_t>(hit.triangle)];
+  const Eigen::Vector3d& a = surface.mesh.vertices[corners[0]];
+  SheetNormals found;
+  found.face = (surface.mesh.vertices[corners[1]] - a).cross(surface.mesh.vertices[corners[2]] - a);
   found.shading = found.face;
-  if (surface_.normals.empty()) return found;
-  const Eigen::Vector3d smooth = (1.0 - hit.u - hit.v) * surface_.normals[corners[0]] +
-                                 hit.u * surface_.normals[corners[1]] + hit.v * surface_.normals[corners[2]];
-  // As RayScene has it: a fold sharper than that isn't a smooth surface_.
+  if (surface.normals.empty()) return found;
+  const Eigen::Vector3d smooth = (1.0 - hit.u - hit.v) * surface.normals[corners[0]] +
+                                 hit.u * surface.normals[corners[1]] + hit.v * surface.normals[corners[2]];
+  // As RayScene has it: a fold sharper than that isn't a smooth surface.
   const double length = smooth.norm();
   if (length > 0.1 && smooth.dot(found.face) > 0.5 * length * found.face.norm()) found.shading = smooth;
   return found;

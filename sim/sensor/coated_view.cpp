@@ -1,6 +1,7 @@
 #include "sim/sensor/coated_view.h"
 
 #include <algorithm>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -172,7 +173,7 @@ class CoatedView final : public SensorView {
     } else if (judged_->plan.scattering) {
       set_up_milky(cache_folder, above);
     }
-    const cv::Mat own = light(*judged_, rest_, {}, rest_seen_);
+    const cv::Mat own = light(*judged_, rest_, {}, rest_seen_).irradiance;
     if (!device_.background.empty()) {
       const render::Imager ideal = imager(device_, judged_->plan.bands, false);
       irradiance_per_number_ = irradiance_per_number(ideal);
@@ -194,9 +195,10 @@ class CoatedView final : public SensorView {
     const auto relief = view.relief(press);
     const SeenGeometry seen = view.geometry(press, relief);
     SeenTouch touch;
-    touch.light = with_background(light(view, press, relief, seen));
+    const render::DirectImage image = light(view, press, relief, seen);
+    touch.light = with_background(image.irradiance);
     if (!truth && !lacking_) return touch;
-    const std::vector<render::FirstHit> hits = first_hits(seen.inside);
+    const std::vector<render::FirstHit> hits = first_hits(seen.inside, image.sheet_triangle);
     const cv::Mat height = pressed_in(rest_hits_, hits, touch.light.size());
     if (lacking_) touch.light = lacking_->corrected(touch.light, height);
     if (!truth) return touch;
@@ -281,23 +283,30 @@ class CoatedView final : public SensorView {
     return play_motion(scene, make_plan(scene), gel_);
   }
 
-  std::vector<render::FirstHit> first_hits(const render::Scene& inside) const {
-    return still_ ? still_->first_hits(inside.surfaces[0]) : render::first_hits(inside, ready_);
+  /// `sheet_triangle`: what the light met of the sheet, the same as in `inside`; may be empty.
+  std::vector<render::FirstHit> first_hits(const render::Scene& inside,
+                                           std::span<const std::int32_t> sheet_triangle = {}) const {
+    return still_ ? still_->first_hits(inside.surfaces[0], sheet_triangle) : render::first_hits(inside, ready_);
   }
 
   /// Irradiance on the sensor. `seen` and `relief` as the view's geometry() and relief() gave them.
-  cv::Mat light(const SceneView& view, const fem::PressState& press, const std::optional<fem::ReliefAnswer>& relief,
-                const SeenGeometry& seen) const {
+  render::DirectImage light(const SceneView& view, const fem::PressState& press,
+                            const std::optional<fem::ReliefAnswer>& relief, const SeenGeometry& seen) const {
     if (choice_.direct) {
-      if (auto image = direct_->render(view.seen_coating(press, seen))) return image->irradiance;
+      if (auto image = direct_->render(view.seen_coating(press, seen))) return std::move(*image);
       fail("the gel has gone beyond the {} mm in and {} mm aside that the sensor was set up for", settings_.deepest_mm,
            settings_.widest_mm);
     }
-    if (milky_) return milky_->irradiance(seen.inside.surfaces.front().mesh);
+    render::DirectImage image;
+    if (milky_) {
+      image.irradiance = milky_->irradiance(seen.inside.surfaces.front().mesh);
+      return image;
+    }
     render::RenderSettings paths;
     paths.seed = settings_.seed;
     paths.min_samples = paths.max_samples = kPathsAPixel;
-    return view.tracer(press, relief).render(camera_, paths).irradiance;
+    image.irradiance = view.tracer(press, relief).render(camera_, paths).irradiance;
+    return image;
   }
 
   DeviceSpec device_;

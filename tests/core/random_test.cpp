@@ -1,5 +1,6 @@
 #include "core/random.h"
 #include "core/random_pairs.h"
+#include "core/uniform_pairs.h"
 
 #include <gtest/gtest.h>
 
@@ -117,6 +118,24 @@ TEST(RandomStream, PoissonRefusesAMeanThatIsNone) {
   RandomStream stream(1, 1, Purpose::kTest);
   EXPECT_DEATH(stream.poisson(-1.0), "mean >= 0");
   EXPECT_DEATH(stream.poisson(std::nan("")), "mean >= 0");
+}
+
+// Of any number of streams, and where the index runs over into its upper word.
+TEST(UniformPairs, AreTheStreamsOwnNumbers) {
+  for (const std::uint64_t first : {std::uint64_t{0}, std::uint64_t{77}, (std::uint64_t{3} << 32) - 40}) {
+    for (const std::size_t count : {std::size_t{1}, std::size_t{63}, std::size_t{64}, std::size_t{333}}) {
+      for (const std::uint32_t number : {0u, 1u, 5u}) {
+        std::vector<double> one(count), other(count);
+        uniform_pairs(0x123456789abcdef0u, first, Purpose::kTest, number, one, other);
+        for (std::size_t k = 0; k < count; ++k) {
+          RandomStream stream(0x123456789abcdef0u, first + k, Purpose::kTest);
+          for (std::uint32_t skipped = 0; skipped < 2 * number; ++skipped) stream.uniform();
+          ASSERT_EQ(one[k], stream.uniform()) << first << " " << k;
+          ASSERT_EQ(other[k], stream.uniform()) << first << " " << k;
+        }
+      }
+    }
+  }
 }
 
 TEST(RandomPairs, HaveAFixedOrder) {

@@ -42,7 +42,9 @@ double bump(double x, double y, double side) {
 float horizon(const SheetHorizons& horizons, const Eigen::Vector2d& place, const Eigen::Vector2d& to) {
   float all[SheetHorizons::kAround];
   horizons.at(float(place.x()), float(place.y()), all);
-  return SheetHorizons::towards(all, SheetHorizons::azimuth(float(to.x()), float(to.y())));
+  const SheetHorizons::Between at = SheetHorizons::between(SheetHorizons::azimuth(float(to.x()), float(to.y())));
+  const float* const p = all + at.low;
+  return SheetHorizons::spline(p[0], p[1], p[2], p[3], at.share);
 }
 
 // From D beside its middle the bump's horizon is where a line touches it: at x = D - sqrt(D^2 - R^2) from the middle,

@@ -52,13 +52,39 @@ TEST(SheetIndex, RaysMeetWhatTheTreeSays) {
     if (!hits) continue;
     ++met;
     EXPECT_NEAR(found->distance, expected.distance, 2e-5) << k;
-    const Eigen::Vector3d normal = index.normals_at(*found).face.normalized();
+    const Eigen::Vector3d normal = normals_at(index.surface(), *found).face.normalized();
     if (found->triangle == expected.triangle) {
       EXPECT_LT((normal - expected.normal).norm(), 1e-9);
     }
     EXPECT_FALSE(index.first(origin, direction, found->distance - 1e-6)) << k;
   }
   EXPECT_GT(met, 15000);
+}
+
+// Rays less steep than some of its slopes meet it up to three times.
+TEST(SheetIndex, AHeightFieldIsMetFirstByFlatRaysToo) {
+  TriangleMesh mesh = square_relief(5.0, 150, [](double x, double y) {
+    return 0.4 * std::sin(2.5 * x) * std::cos(1.5 * y) - 0.1 * std::exp(-4.0 * (x * x + y * y));
+  });
+  const Scene scene = scene_of(mesh);
+  const RayScene tree(scene);
+  const SheetIndex index(scene.surfaces[0], {Eigen::Vector2d(-10, -10), Eigen::Vector2d(10, 10)});
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> unit(-1.0, 1.0);
+  int met = 0;
+  for (int k = 0; k < 20000; ++k) {
+    const Eigen::Vector3d origin(6.0 * unit(random), 6.0 * unit(random), -2.0);
+    const double flat = k % 3 == 0 ? 4.0 : 0.6;  // slopes reach 1
+    const Eigen::Vector3d direction = Eigen::Vector3d(flat * unit(random), flat * unit(random), 1.0).normalized();
+    RayHit expected;
+    const bool hits = tree.intersect(origin, direction, 100.0, expected);
+    const auto found = index.first(origin, direction, 100.0);
+    ASSERT_EQ(found.has_value(), hits) << k;
+    if (!hits) continue;
+    ++met;
+    EXPECT_NEAR(found->distance, expected.distance, 2e-5) << k;
+  }
+  EXPECT_GT(met, 10000);
 }
 
 TEST(SheetIndex, NothingIsMetBesideWhatIsSeenOrOfNothing) {
@@ -104,6 +130,18 @@ TEST(StillView, AMovedSheetIsSeenAsFirstHitsSeesIt) {
       if (found[k].triangle == expected[k].triangle) {
         EXPECT_LT((found[k].normal - expected[k].normal).norm(), 1e-4) << k;
       }
+    }
+    // With what another search found: right of most pixels, of every ninth another triangle, of every tenth unknown.
+    std::vector<std::int32_t> known(found.size(), -1);
+    for (std::size_t k = 0; k < known.size(); ++k) {
+      if (expected[k].object == 0 && k % 10 != 0) known[k] = expected[k].triangle;
+      if (k % 9 == 0) known[k] = static_cast<std::int32_t>(k % scene.surfaces[0].mesh.triangles.size());
+    }
+    const std::vector<FirstHit> by_known = view.first_hits(scene.surfaces[0], known);
+    for (std::size_t k = 0; k < found.size(); ++k) {
+      ASSERT_EQ(by_known[k].object, expected[k].object) << k;
+      if (found[k].object < 0) continue;
+      EXPECT_LT((by_known[k].position - found[k].position).norm(), 5e-5) << k;
     }
     EXPECT_GT(on_sheet, 3000);
     EXPECT_GT(on_wall, 300);
