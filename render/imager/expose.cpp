@@ -5,6 +5,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cfloat>
 #include <cmath>
@@ -49,6 +50,16 @@ struct Row {
   explicit Row(int width) : mean_e(width), electrons(width), share(width), read_share(width), normal(width) {}
   int width() const { return static_cast<int>(mean_e.size()); }
 };
+
+/// Electrons of one band, by the columns' parity.
+TS_WIDE_CLONES void add_light(const float* light, int stride, const std::array<double, 2>& weight, int width,
+                              double* mean_e) {
+  for (int k = 0; k + 1 < width; k += 2) {
+    mean_e[k] += weight[0] * static_cast<double>(light[k * stride]);
+    mean_e[k + 1] += weight[1] * static_cast<double>(light[(k + 1) * stride]);
+  }
+  if (width % 2 != 0) mean_e[width - 1] += weight[0] * static_cast<double>(light[(width - 1) * stride]);
+}
 
 /// Of a row's channel; every `stride`-th number.
 struct RowPattern {
@@ -150,12 +161,10 @@ cv::Mat expose_as(const cv::Mat& irradiance, const Imager& imager, const FixedPa
       const Sample& sample = samples[i];
       const int channels[2] = {count_of > 1 ? i : channel_of(imager.bayer, 0, number),
                                count_of > 1 ? i : channel_of(imager.bayer, 1, number)};
-      for (int k = 0; k < width; ++k) {
-        double mean_e = 0.0;
-        for (int band = 0; band < bands; ++band) {
-          mean_e += weights(channels[k & 1], band) * static_cast<double>(light[k * bands + band]);
-        }
-        row.mean_e[k] = mean_e;
+      std::ranges::fill(row.mean_e, 0.0);
+      for (int band = 0; band < bands; ++band) {
+        add_light(light + band, bands, {weights(channels[0], band), weights(channels[1], band)}, width,
+                  row.mean_e.data());
       }
       if (imager.ideal) {
         for (int k = 0; k < width; ++k) row.electrons[k] = std::min(row.mean_e[k], sample.full_well_e);
