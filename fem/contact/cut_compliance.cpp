@@ -93,13 +93,14 @@ void add_cut_compliance(Eigen::MatrixXd& compliance, const CutHats& cuts, const 
   const HalfSpaceResponse half_space(gel.material, gel.thickness, edge);
   const Eigen::Index each = normal_only ? 1 : 3;  // rows of a vertex in the responses
   const Eigen::Index rows = each * static_cast<Eigen::Index>(vertices.size());
-  DensityPairs response(half_space, static_cast<int>(vertices.size()), normal_only);
+  DensityPairs pairs(half_space, static_cast<int>(vertices.size()), normal_only);
   for (std::size_t a = 0; a < parts.size(); ++a) {
     for (std::size_t b = a; b < parts.size(); ++b) {
       if (!parts[a].is_cut && !parts[b].is_cut) continue;
-      response.add(parts[a], parts[b], (parts[a].middle - parts[b].middle).norm() < near);
+      pairs.add(parts[a], parts[b], (parts[a].middle - parts[b].middle).norm() < near);
     }
   }
+  DensityPairs::Responses response = pairs.take();
   Eigen::MatrixXd& cut_response = response.cut;
   const Eigen::MatrixXd& whole_response = response.whole;
   // Among cut hats near each other: the half-space's response to their densities, and a smooth rest.

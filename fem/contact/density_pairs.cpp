@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "core/wide_clones.h"
 
@@ -121,17 +122,25 @@ DensityTriangle::DensityTriangle(const std::vector<DensityCell>& with_cut, const
 DensityPairs::DensityPairs(const HalfSpaceResponse& half_space, int vertices, bool normal_only)
     : half_space_(half_space), normal_only_(normal_only) {
   const Eigen::Index rows = (normal_only ? 1 : 3) * static_cast<Eigen::Index>(vertices);
-  cut = whole = Eigen::MatrixXd::Zero(rows, rows);
+  near_.cut = near_.whole = Eigen::MatrixXd::Zero(rows, rows);
+  for (Far* far : {&far_cut_, &far_whole_}) {
+    far->columns = Eigen::MatrixXd::Zero(rows, normal_only ? 3 : 9);
+    far->sum = Eigen::MatrixXd::Zero(rows, rows);
+  }
 }
 
 void DensityPairs::add(const DensityTriangle& a, const DensityTriangle& b, bool near) {
   if (!near) {
-    add_far(a, a.now, b, b.now, cut);
-    add_far(a, a.whole, b, b.whole, whole);
+    if (at_ != &a) {
+      gather();
+      at_ = &a;
+    }
+    add_far(a, a.now, b, b.now, far_cut_.columns);
+    add_far(a, a.whole, b, b.whole, far_whole_.columns);
     return;
   }
-  const std::array<Weighed, 2> sets{Weighed{a.now.cells.density, b.now.cells.density, cut},
-                                    Weighed{a.whole.cells.density, b.whole.cells.density, whole}};
+  const std::array<Weighed, 2> sets{Weighed{a.now.cells.density, b.now.cells.density, near_.cut},
+                                    Weighed{a.whole.cells.density, b.whole.cells.density, near_.whole}};
   const std::span<const Weighed> all(sets);
   if (a.same_cells && b.same_cells) {
     add_cells(a, a.now.cells, b, b.now.cells, all);
@@ -198,22 +207,41 @@ void DensityPairs::add_cells(const DensityTriangle& a, const CellColumns& in_a, 
 }
 
 void DensityPairs::add_far(const DensityTriangle& a, const TriangleDensity& of_a, const DensityTriangle& b,
-                           const TriangleDensity& of_b, Eigen::MatrixXd& out) {
+                           const TriangleDensity& of_b, Eigen::MatrixXd& columns) {
   for (int i = 0; i < 3; ++i) {
     if (a.place[i] < 0 || !(of_a.mass[i] > 0.0)) continue;
     for (int j = 0; j < 3; ++j) {
       if (b.place[j] < 0 || !(of_b.mass[j] > 0.0)) continue;
       const Vector3d from = of_a.centre[i] - of_b.centre[j];
       const double mass = of_a.mass[i] * of_b.mass[j];
-      Matrix3d block;
       if (normal_only_) {
-        block(0, 0) = mass * half_space_.scale * (1.0 - half_space_.nu) * half_space_.faded(from.norm()) / from.norm();
+        columns(b.place[j], i) +=
+            mass * half_space_.scale * (1.0 - half_space_.nu) * half_space_.faded(from.norm()) / from.norm();
       } else {
-        block = mass * half_space_.between(a.first.dot(from), a.second.dot(from), from.squaredNorm());
+        columns.block<3, 3>(3 * b.place[j], 3 * i) +=
+            mass * half_space_.between(a.first.dot(from), a.second.dot(from), from.squaredNorm()).transpose();
       }
-      add_block(out, a.place[i], b.place[j], block, true);
     }
   }
+}
+
+void DensityPairs::gather() {
+  if (at_ == nullptr) return;
+  const Eigen::Index each = normal_only_ ? 1 : 3;
+  for (Far* far : {&far_cut_, &far_whole_}) {
+    for (int i = 0; i < 3; ++i) {
+      if (at_->place[i] < 0) continue;
+      far->sum.middleCols(each * at_->place[i], each) += far->columns.middleCols(each * i, each);
+    }
+    far->columns.setZero();
+  }
+}
+
+DensityPairs::Responses DensityPairs::take() {
+  gather();
+  near_.cut += far_cut_.sum + far_cut_.sum.transpose();
+  near_.whole += far_whole_.sum + far_whole_.sum.transpose();
+  return std::move(near_);
 }
 
 /// `mirrored`: to the other place, too. Of the block only its first row and column if there are normal rows alone.

@@ -47,18 +47,23 @@ struct DensityTriangle {
 };
 
 /// Adds up a half-space's responses to densities, with hats cut and whole: mm^3/MPa, a row for each vertex if
-/// `normal_only`, else three (pressure and two tangents).
+/// `normal_only`, else three (pressure and two tangents). Of many triangles nearly all pairs are far: what one of them
+/// and the others do is gathered in a few columns, which a processor's cache holds, before it goes into the whole.
 class DensityPairs {
  public:
   /// Keeps the reference.
   DensityPairs(const HalfSpaceResponse& half_space, int vertices, bool normal_only);
 
   /// Of two triangles, each on the other, or of one on itself if they are the same object. `near`: cell by cell, else
-  /// by the densities' centres.
+  /// by the densities' centres. Pairs of the same `a` should follow each other.
   void add(const DensityTriangle& a, const DensityTriangle& b, bool near);
 
-  Eigen::MatrixXd cut;
-  Eigen::MatrixXd whole;
+  /// All that was added. Ends the adding.
+  struct Responses {
+    Eigen::MatrixXd cut;
+    Eigen::MatrixXd whole;
+  };
+  Responses take();
 
  private:
   static constexpr int kTerms = 6;
@@ -72,11 +77,22 @@ class DensityPairs {
   void add_cells(const DensityTriangle& a, const CellColumns& in_a, const DensityTriangle& b, const CellColumns& in_b,
                  std::span<const Weighed> sets);
   void add_far(const DensityTriangle& a, const TriangleDensity& of_a, const DensityTriangle& b,
-               const TriangleDensity& of_b, Eigen::MatrixXd& out);
+               const TriangleDensity& of_b, Eigen::MatrixXd& columns);
   void add_block(Eigen::MatrixXd& out, int row, int column, const Eigen::Matrix3d& block, bool mirrored);
+
+  void gather();
+
+  /// What far pairs do at one of their ends, the other's is its transpose.
+  struct Far {
+    Eigen::MatrixXd columns;  ///< of the corners of `at_`: as many as of three vertices
+    Eigen::MatrixXd sum;      ///< what was gathered
+  };
 
   const HalfSpaceResponse& half_space_;
   bool normal_only_;
+  Responses near_;
+  Far far_cut_, far_whole_;
+  const DensityTriangle* at_ = nullptr;                ///< whose far pairs stand in the columns
   std::vector<double> from_, inverse_, terms_, sums_;  // for each cell that is seen
 };
 

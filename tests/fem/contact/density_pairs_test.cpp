@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "fem/elements/elastic_material.h"
 
@@ -70,8 +71,9 @@ TEST(DensityPairs, AreTheSumOfPointResponses) {
   const HalfSpaceResponse half_space({.youngs_modulus = 0.2, .poisson_ratio = 0.35}, 100.0, 1.0);
   const DensityTriangle a = triangle_at(Vector3d::Zero(), 0.7, 0, false);
   const DensityTriangle b = triangle_at(Vector3d(1.1, 0.8, 0.1), -0.3, 3, false);
-  DensityPairs pairs(half_space, 6, false);
-  pairs.add(a, b, true);
+  DensityPairs adding(half_space, 6, false);
+  adding.add(a, b, true);
+  const DensityPairs::Responses pairs = adding.take();
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) {
       const Matrix3d found = pairs.cut.block<3, 3>(3 * i, 3 * (3 + j));
@@ -83,20 +85,55 @@ TEST(DensityPairs, AreTheSumOfPointResponses) {
   EXPECT_EQ(pairs.cut, Eigen::MatrixXd(pairs.cut.transpose())) << "Betti's reciprocity";
 }
 
+// Whatever their order: the response of one density's centre to the other's mass, and its transpose.
+TEST(DensityPairs, FarOnesActBetweenTheirCentres) {
+  const HalfSpaceResponse half_space({.youngs_modulus = 0.2, .poisson_ratio = 0.35}, 100.0, 1.0);
+  const std::array<DensityTriangle, 3> triangles{triangle_at(Vector3d::Zero(), 0.7, 0, false),
+                                                 triangle_at(Vector3d(5.0, 1.0, 0.2), -0.3, 3, false),
+                                                 triangle_at(Vector3d(-4.0, 6.0, 0.0), 0.5, 6, false)};
+  DensityPairs adding(half_space, 9, false);
+  const std::array<std::pair<int, int>, 4> order{{{0, 1}, {2, 1}, {0, 2}, {0, 1}}};
+  for (const auto& [a, b] : order) adding.add(triangles[a], triangles[b], false);
+  const DensityPairs::Responses pairs = adding.take();
+  Eigen::MatrixXd expected = Eigen::MatrixXd::Zero(27, 27);
+  for (const auto& [a, b] : order) {
+    const TriangleDensity& one = triangles[a].now;
+    const TriangleDensity& other = triangles[b].now;
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) {
+        const Vector3d from = one.centre[i] - other.centre[j];
+        const Matrix3d block =
+            one.mass[i] * other.mass[j] *
+            half_space.between(triangles[a].first.dot(from), triangles[a].second.dot(from), from.squaredNorm());
+        const int row = 3 * triangles[a].place[i];
+        const int column = 3 * triangles[b].place[j];
+        expected.block<3, 3>(row, column) += block;
+        expected.block<3, 3>(column, row) += block.transpose();
+      }
+    }
+  }
+  EXPECT_LT((pairs.cut - expected).cwiseAbs().maxCoeff(), 1e-14 * expected.cwiseAbs().maxCoeff());
+}
+
 TEST(DensityPairs, NormalRowsAloneAreThoseOfAll) {
   const HalfSpaceResponse half_space({.youngs_modulus = 0.2, .poisson_ratio = 0.45}, 2.0, 0.9);  // fades
   ASSERT_GT(half_space.fade, 0.0);
   const DensityTriangle a = triangle_at(Vector3d::Zero(), 0.7, 0, false);
   const DensityTriangle b = triangle_at(Vector3d(1.1, 0.8, 0.1), -0.3, 3, false);
-  DensityPairs all(half_space, 6, false);
-  DensityPairs normal(half_space, 6, true);
-  for (DensityPairs* pairs : {&all, &normal}) {
-    pairs->add(a, a, true);
-    pairs->add(a, b, true);
-    pairs->add(b, b, true);
+  const DensityTriangle c = triangle_at(Vector3d(9.0, -2.0, 0.0), 0.4, 6, false);
+  DensityPairs::Responses found[2];
+  for (const bool normal_only : {false, true}) {
+    DensityPairs pairs(half_space, 9, normal_only);
+    pairs.add(a, a, true);
+    pairs.add(a, b, true);
+    pairs.add(b, b, true);
+    pairs.add(a, c, false);
+    pairs.add(b, c, false);
+    found[normal_only] = pairs.take();
   }
-  for (int i = 0; i < 6; ++i) {
-    for (int j = 0; j < 6; ++j) {
+  const auto& [all, normal] = found;
+  for (int i = 0; i < 9; ++i) {
+    for (int j = 0; j < 9; ++j) {
       EXPECT_NEAR(normal.cut(i, j), all.cut(3 * i, 3 * j), 1e-14 * all.cut(0, 0));
       EXPECT_NEAR(normal.whole(i, j), all.whole(3 * i, 3 * j), 1e-14 * all.whole(0, 0));
     }
@@ -108,10 +145,11 @@ TEST(DensityPairs, WhatIsNotCutDiffersNot) {
   const DensityTriangle a = triangle_at(Vector3d::Zero(), 0.0, 0, true);
   const DensityTriangle b = triangle_at(Vector3d(1.1, 0.8, 0.1), 0.0, 3, true);
   ASSERT_TRUE(a.same_cells);
-  DensityPairs pairs(half_space, 6, false);
-  pairs.add(a, a, true);
-  pairs.add(a, b, true);
-  pairs.add(b, a, false);
+  DensityPairs adding(half_space, 6, false);
+  adding.add(a, a, true);
+  adding.add(a, b, true);
+  adding.add(b, a, false);
+  const DensityPairs::Responses pairs = adding.take();
   EXPECT_EQ(pairs.cut, pairs.whole);
 }
 
