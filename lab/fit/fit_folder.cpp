@@ -110,6 +110,7 @@ datasets::RunIdentity identity_of_fit(const fs::path& file, const std::optional<
 
 FitFolder::FitFolder(fs::path folder, std::string name, datasets::RunIdentity identity)
     : folder_(std::move(folder)), name_(std::move(name)), identity_(std::move(identity)) {
+  made_ = !fs::exists(folder_);
   make_study_folder(folder_);
   const fs::path report = file(".json");
   if (fs::is_regular_file(report) && !fs::exists(kept())) {
@@ -138,6 +139,7 @@ FitFolder::~FitFolder() {
   std::error_code ignored;
   fs::remove(kept().parent_path() / "lock", ignored);
   fs::remove(kept().parent_path(), ignored);  // while nothing is kept in it
+  if (made_) fs::remove(folder_, ignored);    // likewise
 }
 
 std::optional<FitSoFar> FitFolder::so_far() const {

@@ -30,7 +30,7 @@ struct FitSoFar {
 datasets::RunIdentity identity_of_fit(const std::filesystem::path& file, const std::optional<RecordingSpec>& recording);
 
 /// The right to write a fit into a folder, held while it lives. `.unfinished/NAME.bin` is what was kept so far, whole;
-/// it goes with the end of the fit.
+/// it goes with the end of the fit. A folder that was made and holds nothing in the end goes, too.
 class FitFolder {
  public:
   /// Makes the folder if needed. @throws Error if it can't be made or another run holds it, or if it holds a fit of
@@ -57,6 +57,7 @@ class FitFolder {
   std::filesystem::path folder_;
   std::string name_;
   datasets::RunIdentity identity_;
+  bool made_ = false;  // by this run
   std::unique_ptr<datasets::FolderLock> lock_;
 };
 

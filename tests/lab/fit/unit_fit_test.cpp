@@ -618,7 +618,11 @@ TEST(UnitFitFiles, AFitThatWasBrokenOffGoesOnToTheSameBytes) {
   EXPECT_FALSE(std::filesystem::exists(broken / ".unfinished"));
   EXPECT_FALSE(std::filesystem::exists(broken / "mine.so-far.yaml"));
   EXPECT_TRUE(run_unit_fit(file, broken, cache()).was_finished);
-  in.write("fit.yaml", read_whole_file(file) + "seed: 7\n");
+  const std::string sound = read_whole_file(file);
+  const auto faulty = written_fit(in, "  - {path: 'lamps[*].powr_W', times: [0.5, 2]}");
+  EXPECT_THAT(message_of([&] { run_unit_fit(faulty, out.path() / "faulty", cache()); }), HasSubstr("powr_W"));
+  EXPECT_FALSE(std::filesystem::exists(out.path() / "faulty")) << "nothing is worth keeping";
+  in.write("fit.yaml", sound + "seed: 7\n");
   EXPECT_THAT(message_of([&] { run_unit_fit(file, broken, cache()); }),
               AllOf(HasSubstr("finished fit mine"), HasSubstr("the fit file has changed")));
 }
