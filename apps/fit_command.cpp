@@ -1,4 +1,5 @@
 #include <spdlog/spdlog.h>
+#include <unistd.h>
 
 #include <memory>
 
@@ -18,12 +19,29 @@ void print(const lab::FittedUnknown& unknown) {
   }
 }
 
+/// Of what is known beforehand: how many steps it will take isn't.
+void print_plan(const lab::FitPlan& plan) {
+  if (isatty(STDERR_FILENO) == 1) fmt::print(stderr, "\r\x1b[K");  // in the place of the bar
+  if (plan.step_s > 0.0) {
+    fmt::print(stderr, "a step takes some {}, {} steps at most; then {} for the intervals\n",
+               duration_text(plan.step_s), plan.most_steps, duration_text(plan.last_s));
+  } else {
+    fmt::print(stderr, "takes some {} more\n", duration_text(plan.last_s));
+  }
+}
+
 void fit(const std::filesystem::path& file, const std::filesystem::path& out, const GlobalOptions& global) {
-  lab::UnitFit result;
+  lab::UnitFitRun run;
   {
     ProgressBar bar(global.quiet);
-    result = lab::run_unit_fit(file, out, global.cache, bar.listener());
+    run = lab::run_unit_fit(file, out, global.cache, bar.listener(), global.quiet ? nullptr : print_plan);
   }
+  if (run.was_finished) {
+    fmt::print("{}: holds this fit, finished\n", out.string());
+    return;
+  }
+  if (run.gone_on_from) fmt::print("went on behind step {} of a run that was broken off\n", *run.gone_on_from);
+  const lab::UnitFit& result = run.fit;
   for (const lab::FittedUnknown& unknown : result.unknowns) print(unknown);
   for (const lab::UnidentifiableCombination& combination : result.unidentified)
     fmt::print("not identified: {}\n", combination.words);
@@ -36,7 +54,9 @@ void fit(const std::filesystem::path& file, const std::filesystem::path& out, co
 
 void add_fit_command(CLI::App& app, const GlobalOptions& global, Action& action) {
   CLI::App* command = app.add_subcommand(
-      "fit", "Find the numbers of a device's file with which it shows and feels what a real sensor's presses did");
+      "fit",
+      "Find the numbers of a device's file with which it shows and feels what a real sensor's presses did; the same "
+      "command goes on with a fit that was broken off");
   auto file = std::make_shared<std::filesystem::path>();
   auto out = std::make_shared<std::filesystem::path>();
   command->add_option("FIT", *file, "Fit file: device, unknowns and recorded presses (docs/calibration.md)")

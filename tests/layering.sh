@@ -69,7 +69,7 @@ lab/reflex: core fem/contact fem/finite_strain render/cameras render/paths rende
 lab/studies: core plots fem/mesh fem/elements fem/shapes fem/contact render/sampling render/imager sensors/beads sensors/tractions sim/scene sim/plan sim/press sim/view sim/sensor datasets/jobs lab/validation lab/press lab/vhs lab/chroma
 lab/bench: core plots fem/mesh fem/elements fem/shapes fem/contact fem/error render/imager sim/scene sim/plan sim/press sim/view sim/sensor datasets/sets lab/statistics lab/studies
 lab/likeness: core render/imager sensors/heights sim/files sim/scene sim/sensor datasets/inspection lab/gelsight
-lab/fit: core render/imager sensors/heights sim/files sim/relief sim/scene sim/press sim/view sim/sensor datasets/jobs datasets/inspection lab/validation lab/studies lab/likeness
+lab/fit: core render/imager sensors/heights sim/files sim/relief sim/scene sim/press sim/view sim/sensor datasets/jobs datasets/sets datasets/inspection lab/validation lab/gelsight lab/studies lab/likeness
 lab/schema: core sim/scene datasets/jobs lab/vhs lab/studies lab/fit
 apps: core plots render/imager sensors/beads sensors/heights sensors/colour sensors/tractions sensors/events sim/files sim/scene sim/plan sim/press sim/view sim/sensor datasets/jobs datasets/sets datasets/exports datasets/inspection lab/validation lab/press lab/device lab/vhs lab/gelsight lab/dtact lab/chroma lab/dvs lab/studies lab/bench lab/likeness lab/fit lab/schema
 python: core sensors/beads sensors/heights sensors/colour sim/files sim/scene sim/press sim/sensor datasets/jobs datasets/sets

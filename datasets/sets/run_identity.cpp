@@ -45,9 +45,9 @@ RunIdentity identity_of(const PreparedJob& job) {
   return identity_of(job.text, job.inputs);
 }
 
-std::string difference(const RunIdentity& before, const RunIdentity& now) {
-  if (before.job_sha256 != now.job_sha256) return "the job file";
-  if (before.inputs_sha256 != now.inputs_sha256) return "a file that the job names";
+std::string difference(const RunIdentity& before, const RunIdentity& now, const std::string& what) {
+  if (before.job_sha256 != now.job_sha256) return fmt::format("the {} file", what);
+  if (before.inputs_sha256 != now.inputs_sha256) return fmt::format("a file that the {} names", what);
   if (before.version != now.version) {
     return fmt::format("the program's version ({} before, {} now)", before.version, now.version);
   }

@@ -26,8 +26,8 @@ RunIdentity identity_of(const std::string& job_text, const std::vector<InputFile
 RunIdentity identity_of(const PreparedJob& job);
 
 /// What differs between two identities ("the job file", "the program's version (0.1.0 before, 0.2.0 now)"), or the
-/// empty string.
-std::string difference(const RunIdentity& before, const RunIdentity& now);
+/// empty string. `what` the run is of.
+std::string difference(const RunIdentity& before, const RunIdentity& now, const std::string& what = "job");
 
 /// As run_identity_from_json reads it back.
 std::string to_json(const RunIdentity& identity);

@@ -10,7 +10,8 @@
 namespace touchstone::lab {
 namespace {
 
-constexpr double kMostDamping = 1e12;  // times the largest diagonal entry: no step is left
+constexpr double kMostDamping = 1e12;     // times the largest diagonal entry: no step is left
+constexpr double kLeastOfPromise = 0.25;  // LeastSquaresSettings::rough_within
 
 /// Which variables aren't held at a bound that the gradient pulls them beyond.
 std::vector<Eigen::Index> free_variables(const LeastSquaresProblem& problem, const Eigen::VectorXd& x,
@@ -49,52 +50,73 @@ double promised(const Eigen::MatrixXd& hessian, const Eigen::VectorXd& gradient,
 
 }  // namespace
 
-LeastSquaresResult least_squares(const LeastSquaresProblem& problem, const Eigen::VectorXd& start,
+LeastSquaresResult least_squares(const LeastSquaresProblem& problem, LeastSquaresState at,
                                  const LeastSquaresSettings& settings) {
-  TS_ASSERT(start.allFinite() && (start.array() >= problem.low.array()).all() &&
-            (start.array() <= problem.high.array()).all());
-  LeastSquaresResult result;
-  result.x = start;
-  result.residuals = problem.residuals(start);
-  TS_ASSERT(result.residuals.allFinite());
-  double damping = -1.0;
-  double growth = 2.0;
-  while (result.steps < settings.most_steps) {
-    result.jacobian = problem.jacobian(result.x, result.residuals);
-    const Eigen::MatrixXd hessian = result.jacobian.transpose() * result.jacobian;
-    const Eigen::VectorXd gradient = result.jacobian.transpose() * result.residuals;
+  TS_ASSERT(at.x.allFinite() && (at.x.array() >= problem.low.array()).all() &&
+            (at.x.array() <= problem.high.array()).all());
+  const auto keep = [&] {
+    if (problem.on_state) problem.on_state(at);
+  };
+  const auto settled = [&](const Eigen::VectorXd& x) { return problem.settled ? problem.settled(x) : x; };
+  if (at.residuals.size() == 0) {
+    at.x = settled(at.x);
+    at.residuals = problem.residuals(at.x);
+    TS_ASSERT(at.residuals.allFinite());
+    keep();
+  }
+  const auto result = [&](bool converged) {
+    return LeastSquaresResult{at.x, at.residuals, at.jacobian, at.steps, converged};
+  };
+  for (;;) {
+    const double squares = at.residuals.squaredNorm();
+    const double mean_square =
+        std::max(settings.least_square, squares / static_cast<double>(std::max<Eigen::Index>(1, at.residuals.size())));
+    if (at.jacobian.size() == 0) {
+      at.jacobian = problem.jacobian(at.x, at.residuals);
+      keep();
+    }
+    const Eigen::MatrixXd hessian = at.jacobian.transpose() * at.jacobian;
+    const Eigen::VectorXd gradient = at.jacobian.transpose() * at.residuals;
     const double largest = std::max(hessian.diagonal().maxCoeff(), 1e-300);
-    if (damping < 0.0) damping = settings.first_damping * largest;
-    const double squares = result.residuals.squaredNorm();
-    const double enough =
-        settings.least_gain * squares / static_cast<double>(std::max<Eigen::Index>(1, result.residuals.size()));
+    if (at.damping < 0.0) at.damping = settings.first_damping * largest;
+    const double enough = settings.least_gain * mean_square;
     // With much damping any step is small: a nearly free one tells what is left to gain.
     const Eigen::VectorXd whole =
-        step_within(problem, result.x, hessian, gradient, std::min(damping, settings.first_damping * largest));
-    result.converged = promised(hessian, gradient, whole) <= enough;
-    if (result.converged) return result;
+        step_within(problem, at.x, hessian, gradient, std::min(at.damping, settings.first_damping * largest));
+    if (at.arrived || promised(hessian, gradient, whole) <= enough) return result(true);
+    if (at.steps >= settings.most_steps) return result(false);
+    const bool near = whole.cwiseAbs().maxCoeff() <= settings.rough_within;
+    Eigen::VectorXd step = step_within(problem, at.x, hessian, gradient, at.damping);
     for (;;) {
-      const Eigen::VectorXd step = step_within(problem, result.x, hessian, gradient, damping);
-      const Eigen::VectorXd x = result.x + step;
+      const double promise = promised(hessian, gradient, step);
+      const bool refused = at.growth > 2.0;  // since the last step
+      // What the model promises doesn't come true.
+      if (refused && (near || promise <= enough)) return result(near);
+      if (at.damping > kMostDamping * largest) return result(false);
+      const Eigen::VectorXd x = settled(at.x + step);
       const Eigen::VectorXd residuals = problem.residuals(x);
       const double gain = squares - residuals.squaredNorm();
       if (gain > 0.0) {  // false of NaN, too
-        const double ratio = gain / promised(hessian, gradient, step);
-        damping *= std::max(1.0 / 3.0, 1.0 - std::pow(2.0 * ratio - 1.0, 3));
-        growth = 2.0;
-        result.x = x;
-        result.residuals = residuals;
-        ++result.steps;
-        if (problem.on_step) problem.on_step(result.x, result.residuals, result.steps);
+        at.damping *= std::max(1.0 / 3.0, 1.0 - std::pow(2.0 * gain / promise - 1.0, 3));
+        at.growth = 2.0;
+        at.x = x;
+        at.residuals = residuals;
+        at.jacobian.resize(0, 0);
+        at.arrived = near && gain < kLeastOfPromise * promise;
+        ++at.steps;
+        keep();
         break;
       }
-      damping *= growth;
-      growth *= 2.0;
-      if (damping > kMostDamping * largest) return result;  // stuck: what the model promises doesn't come true
+      // Little damping changes nothing, and each trial is expensive: on to a step of half the length.
+      const double half = 0.5 * step.norm();
+      do {
+        at.damping *= at.growth;
+        at.growth *= 2.0;
+        step = step_within(problem, at.x, hessian, gradient, at.damping);
+      } while (step.norm() > half && at.damping <= kMostDamping * largest);
+      keep();
     }
   }
-  result.jacobian = problem.jacobian(result.x, result.residuals);
-  return result;
 }
 
 }  // namespace touchstone::lab

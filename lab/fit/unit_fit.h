@@ -5,21 +5,18 @@
 #include <filesystem>
 #include <functional>
 #include <opencv2/core/mat.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "core/progress.h"
+#include "datasets/sets/run_identity.h"
+#include "lab/fit/fit_folder.h"
+#include "lab/fit/unit_comparison.h"
 #include "lab/fit/unit_fit_spec.h"
-#include "lab/fit/unit_pictures.h"
 #include "lab/fit/unit_simulation.h"
 
 namespace touchstone::lab {
-
-/// What was recorded, as it is compared. Without a background of its own `background.mean` is empty.
-struct UnitRecording {
-  BlockPicture background;
-  std::vector<BlockPicture> presses;
-};
 
 /// Reads a fit's pictures. @throws Error with the place in the fit's file
 UnitRecording read_recording(const PreparedFit& fit);
@@ -80,23 +77,36 @@ struct UnitFit {
   std::vector<cv::Mat> shown;       ///< simulated in the end, CV_64F: background if there is one, then presses
 };
 
-/// Called after each step of a fit: its number from 1, the misfit (standard deviations of the noise) and the device's
-/// file as it is then.
-using FitStep = std::function<void(int step, double misfit, const std::string& device_text)>;
+/// How long a fit will take, as its first pictures have taken.
+struct FitPlan {
+  double step_s = 0.0;  ///< a step; 0 where all is a formula
+  double last_s = 0.0;  ///< the pictures with other light, at the end
+  int most_steps = 0;   ///< of each accuracy of the light field
+};
 
-/// The same fit gives the same numbers, whatever the threads. @throws Error if what is to be simulated can't be
+/// What a fit says while it works, and what it goes on from. All may be empty.
+struct FitCourse {
+  std::function<void(const FitPlan& plan)> on_plan;  ///< once, after the first pictures
+  /// After each step: its number from 1, the misfit (standard deviations of the noise) and the device's file.
+  std::function<void(int step, double misfit, const std::string& device_text)> on_step;
+  std::function<void(const FitSoFar& so_far)> keep;  ///< after all that took long
+  std::optional<FitSoFar> from;                      ///< what `keep` was given of this very fit
+};
+
+/// The same fit gives the same numbers, whatever the threads, and wherever it was broken off and gone on with.
+/// @throws Error if what is to be simulated can't be, or `from` is of another fit
 UnitFit fit_unit(const PreparedFit& fit, const UnitRecording& recording, const std::filesystem::path& cache_folder,
-                 const Progress& progress = {}, const FitStep& on_step = {});
+                 const Progress& progress = {}, const FitCourse& course = {});
 
 /// The same with a simulation that may have been used before, for several fits of one design. `simulation` is of a fit
 /// that differs from this one in labels and pictures alone.
 UnitFit fit_unit(const PreparedFit& fit, const UnitRecording& recording, UnitSimulation& simulation,
-                 const FitStep& on_step = {});
+                 const FitCourse& course = {});
 
 /// The report for people, Markdown.
 std::string to_markdown(const PreparedFit& fit, const UnitFit& result);
-/// The same for programs.
-std::string to_json(const PreparedFit& fit, const UnitFit& result);
+/// The same for programs, with what it was made of.
+std::string to_json(const PreparedFit& fit, const UnitFit& result, const datasets::RunIdentity& made_of);
 
 /// Recorded, simulated and their difference (grey is none, tenfold) of each picture, side by side: CV_8UC3.
 cv::Mat misfit_sheet(const UnitRecording& recording, const UnitFit& result);
@@ -104,10 +114,19 @@ cv::Mat misfit_sheet(const UnitRecording& recording, const UnitFit& result);
 /// What stands at an end of what was allowed, or else gives reason to doubt the fit: sentences for people.
 std::vector<std::string> doubts_of(const PreparedFit& fit, const UnitFit& result);
 
+/// What run_unit_fit did.
+struct UnitFitRun {
+  bool was_finished = false;        ///< the folder held this very fit, finished: nothing was done, `fit` is empty
+  std::optional<int> gone_on_from;  ///< steps that an earlier run had made, which was broken off
+  UnitFit fit;
+};
+
 /// Fits and puts NAME.md, NAME.json, NAME.yaml (the device) and NAME.png (misfit_sheet) into a folder, which is made.
-/// While it works, NAME.so-far.yaml is the device of the last step.
-/// @throws Error for anything wrong with the fit's file, or a folder that can't be made
-UnitFit run_unit_fit(const std::filesystem::path& file, const std::filesystem::path& folder,
-                     const std::filesystem::path& cache_folder, const Progress& progress = {});
+/// While it works, NAME.so-far.yaml is the device of the last step, and FitFolder keeps what a run that is broken off
+/// has found: the next one goes on from there, to the same bytes.
+/// @throws Error for anything wrong with the fit's file, and as FitFolder
+UnitFitRun run_unit_fit(const std::filesystem::path& file, const std::filesystem::path& folder,
+                        const std::filesystem::path& cache_folder, const Progress& progress = {},
+                        const std::function<void(const FitPlan& plan)>& on_plan = {});
 
 }  // namespace touchstone::lab

@@ -7,9 +7,9 @@
 #include "core/error.h"
 #include "core/whole_file.h"
 #include "datasets/inspection/contact_sheet.h"
+#include "lab/fit/fit_folder.h"
 #include "lab/fit/recorded_balls.h"
 #include "lab/fit/unit_fit.h"
-#include "lab/studies/study.h"
 #include "sim/files/image_file.h"
 
 namespace touchstone::lab {
@@ -135,14 +135,17 @@ std::string to_markdown(const PreparedFit& fit, const UnitFit& result) {
   return text;
 }
 
-std::string to_json(const PreparedFit& fit, const UnitFit& result) {
-  Json all = {{"name", fit.spec.name},
-              {"device", fit.device.name},
-              {"residuals", result.residuals},
-              {"steps", result.steps},
-              {"converged", result.converged},
-              {"misfit_before", number(result.misfit_before)},
-              {"misfit_after", number(result.misfit_after)}};
+std::string to_json(const PreparedFit& fit, const UnitFit& result, const datasets::RunIdentity& made_of) {
+  Json all = {
+      {"name", fit.spec.name},
+      {"device", fit.device.name},
+      {"residuals", result.residuals},
+      {"steps", result.steps},
+      {"converged", result.converged},
+      {"misfit_before", number(result.misfit_before)},
+      {"misfit_after", number(result.misfit_after)},
+      {"made_of",
+       {{"fit_sha256", made_of.job_sha256}, {"inputs_sha256", made_of.inputs_sha256}, {"version", made_of.version}}}};
   all["unknowns"] = Json::array();
   for (const FittedUnknown& unknown : result.unknowns) {
     all["unknowns"].push_back({{"name", unknown.name},
@@ -207,23 +210,32 @@ cv::Mat misfit_sheet(const UnitRecording& recording, const UnitFit& result) {
   return datasets::contact_sheet(images, captions, 3, kTileWidth_px);
 }
 
-UnitFit run_unit_fit(const std::filesystem::path& file, const std::filesystem::path& folder,
-                     const std::filesystem::path& cache_folder, const Progress& progress) {
-  const PreparedFit fit = prepare_fit(with_recording(read_yaml<UnitFitSpec>(file), cache_folder, progress));
+UnitFitRun run_unit_fit(const std::filesystem::path& file, const std::filesystem::path& folder,
+                        const std::filesystem::path& cache_folder, const Progress& progress,
+                        const std::function<void(const FitPlan& plan)>& on_plan) {
+  const auto asked = read_yaml<UnitFitSpec>(file);
+  UnitFitRun run;
+  FitFolder place(folder, asked.name, identity_of_fit(file, asked.recording));  // before minutes of work
+  run.was_finished = place.is_finished();
+  if (run.was_finished) return run;
+  const PreparedFit fit = prepare_fit(with_recording(asked, cache_folder, progress));
   const UnitRecording recording = read_recording(fit);
-  make_study_folder(folder);  // before minutes of work that couldn't be kept
-  const auto path = [&](const char* ending) { return folder / (fit.spec.name + ending); };
-  const FitStep on_step = [&](int step, double misfit, const std::string& device_text) {
-    write_whole_file(path(".so-far.yaml"), device_text);
-    if (progress) progress(fmt::format("step {}, misfit {:.2f} of the noise", step, misfit), 1, 1);
+  FitCourse course;
+  course.on_plan = on_plan;
+  course.on_step = [&](int, double, const std::string& device_text) {
+    write_whole_file(place.file(".so-far.yaml"), device_text);
   };
-  UnitFit result = fit_unit(fit, recording, cache_folder, progress, on_step);
-  write_whole_file(path(".md"), to_markdown(fit, result));
-  write_whole_file(path(".json"), to_json(fit, result));
-  write_whole_file(path(".yaml"), result.device_text);
-  sim::write_png(path(".png"), misfit_sheet(recording, result));
-  std::filesystem::remove(path(".so-far.yaml"));
-  return result;
+  course.keep = [&](const FitSoFar& so_far) { place.keep(so_far); };
+  course.from = place.so_far();
+  if (course.from) run.gone_on_from = course.from->search.steps;
+  run.fit = fit_unit(fit, recording, cache_folder, progress, course);
+  write_whole_file(place.file(".md"), to_markdown(fit, run.fit));
+  write_whole_file(place.file(".yaml"), run.fit.device_text);
+  sim::write_png(place.file(".png"), misfit_sheet(recording, run.fit));
+  write_whole_file(place.file(".json"), to_json(fit, run.fit, place.identity()));  // the last: with it all is there
+  std::filesystem::remove(place.file(".so-far.yaml"));
+  place.finish();
+  return run;
 }
 
 }  // namespace touchstone::lab

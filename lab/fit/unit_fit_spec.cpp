@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <set>
 
 #include "core/error.h"
@@ -16,7 +17,8 @@ namespace touchstone::lab {
 namespace {
 
 constexpr double kDeepestShare = 0.4;  // of the gel's thickness, where no depth is known
-constexpr double kSpareDepth = 1.2;    // beyond the deepest press, while depths are looked for
+constexpr double kFinestField = 1e-4, kCoarsestField = 0.2;
+constexpr double kSpareDepth = 1.2;  // beyond the deepest press, while depths are looked for
 
 /// What the imager makes of light; all else of `camera` changes the light itself.
 bool is_of_imager(const std::string& path) {
@@ -224,11 +226,16 @@ void fields(YamlReader& in, UnitFitSpec& fit) {
   in.optional("coarse_px", fit.coarse_px, Allowed::within(1, 32));
   in.optional("deepest_mm", fit.deepest_mm, Allowed::above(0.0));
   in.optional("seed", fit.seed);
+  in.optional("field_accuracy", fit.field_accuracy, Allowed::within(kFinestField, kCoarsestField));
   in.optional("membrane_um", fit.membrane_um, Allowed::within(1.0, 1000.0));
   if (in.describing()) return;
   if (!datasets::is_folder_name(fit.name)) {
     fail_at(in.where("name"), "name: '{}' can't name files; allowed are up to 100 letters, digits, - and _",
             short_text(fit.name));
+  }
+  if (fit.field_accuracy.empty() || std::adjacent_find(fit.field_accuracy.begin(), fit.field_accuracy.end(),
+                                                       std::less_equal<>()) != fit.field_accuracy.end()) {
+    fail_at(in.where("field_accuracy"), "field_accuracy: must be one number or several, each less than the one before");
   }
   if (fit.unknowns.empty()) fail_at(in.where("unknowns"), "unknowns: has none; at least one is needed");
   if (fit.presses.empty() && !fit.recording) fail_at(in.where("presses"), "presses: has none; at least one is needed");

@@ -75,7 +75,10 @@ struct UnitFitSpec {
   bool differences = false;
   int coarse_px = 4;  ///< pixels along a side that are compared, and simulated, as one
   std::optional<double> deepest_mm;
-  std::uint64_t seed = 1;     ///< of the simulated light
+  std::uint64_t seed = 1;  ///< of the simulated light
+  /// Of the light field (sim::VirtualSensorSettings::field_accuracy), one after the other: where the fit by one has
+  /// ended, that by the next begins. Each is less than the one before.
+  std::vector<double> field_accuracy = {0.0075};
   double membrane_um = 40.0;  ///< sim::VirtualSensorSettings::membrane_um
   SourceLocation where;
 };

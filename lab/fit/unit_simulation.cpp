@@ -37,7 +37,11 @@ struct PressedState {
 
 struct UnitSimulation::Parts {
   Parts(const PreparedFit& of, std::filesystem::path cache_folder, Progress listener, std::uint64_t first_seed)
-      : fit(of), cache(std::move(cache_folder)), progress(std::move(listener)), seed(first_seed) {
+      : fit(of),
+        cache(std::move(cache_folder)),
+        progress(std::move(listener)),
+        seed(first_seed),
+        field_accuracy(of.spec.field_accuracy.front()) {
     by_lamp.resize(sources());
     lights.resize(sources());
     sim::cache_gel_of_unit_modulus(fit.device, cache);
@@ -103,10 +107,10 @@ struct UnitSimulation::Parts {
     // With light from the room the whole device has bounced light (sim/plan), so each of its lamps has.
     if (sources() > fit.device.lamps.size()) settings.interreflection_tolerance = 0.0;
     if (kept.size() == kSensorsKept) kept.erase(kept.begin());
-    if (progress) progress("lamps' light", made, made + 1);
+    settings.field_accuracy = field_accuracy;
+    if (progress) progress(stage, drawn, std::max(drawn + 1, expected));
     kept.emplace_back(key, std::make_unique<const sim::VirtualSensor>(device_of_lamp(whole, lamp), cache, settings));
     ++made;
-    if (progress) progress("lamps' light", made, made);
     return *kept.back().second;
   }
 
@@ -143,10 +147,17 @@ struct UnitSimulation::Parts {
     if (known != kept.end()) return known->second;
     if (kept.size() * bytes_of_picture(whole) > kMostKept) kept.clear();
     const sim::VirtualSensor& on = sensor(whole, own, lamp);
-    if (press < 0) return kept.emplace(key, on.background_light()).first->second;
-    const PressedState& pressed = state(on, scene, press, pose);
-    const sim::TouchObject object = on.object(fit.objects[static_cast<std::size_t>(press)]);
-    return kept.emplace(key, on.capture(object, pressed.press, 1, 0, false).light).first->second;
+    cv::Mat drawing;
+    if (press < 0) {
+      drawing = on.background_light();
+    } else {
+      const PressedState& pressed = state(on, scene, press, pose);
+      const sim::TouchObject object = on.object(fit.objects[static_cast<std::size_t>(press)]);
+      drawing = on.capture(object, pressed.press, 1, 0, false).light;
+    }
+    ++drawn;
+    if (progress) progress(stage, drawn, std::max(drawn, expected));
+    return kept.emplace(key, drawing).first->second;
   }
 
   /// All lamps' light and the room's, at their power.
@@ -168,6 +179,25 @@ struct UnitSimulation::Parts {
     return sum;
   }
 
+  /// One press alone.
+  SimulatedUnit shown(const sim::DeviceSpec& whole, const render::Imager& imager, const Eigen::VectorXd& x, int press,
+                      const PressPose& pose) {
+    SimulatedUnit one;
+    one.presses = {mean_numbers(whole_light(whole, x, press, pose), imager)};
+    const Key scene = key_of(x, -1);
+    auto known = states.find(with_pose(scene, press, pose));
+    if (known == states.end()) {
+      state(sensor(whole, key_of(x, 0), 0), scene, press, pose);
+      known = states.find(with_pose(scene, press, pose));
+    }
+    const double share = whole.gel.youngs_modulus_MPa / modulus_of(whole);
+    one.force_N = Eigen::VectorXd::Constant(1, share * known->second.force_N);
+    one.force_error_N = Eigen::VectorXd::Constant(1, share * known->second.error_N);
+    return one;
+  }
+
+  static render::Imager imager_of(const sim::DeviceSpec& whole) { return sim::imager(whole, bands_of(whole), true); }
+
   std::size_t bytes_of_picture(const sim::DeviceSpec& whole) const {
     const auto pixels = static_cast<std::size_t>(whole.camera->width) * static_cast<std::size_t>(whole.camera->height);
     const auto block = static_cast<std::size_t>(fit.spec.coarse_px);
@@ -183,7 +213,10 @@ struct UnitSimulation::Parts {
   std::filesystem::path cache;
   Progress progress;
   std::uint64_t seed;
+  double field_accuracy;
   int made = 0;
+  std::string stage;
+  std::int64_t drawn = 0, expected = 0;                                                         // of the stage
   std::vector<std::vector<std::pair<Key, std::unique_ptr<const sim::VirtualSensor>>>> by_lamp;  // by lamp
   std::vector<std::map<Key, cv::Mat>> lights;                                                   // by lamp
   std::map<Key, PressedState> states;
@@ -196,29 +229,19 @@ UnitSimulation::~UnitSimulation() = default;
 
 SimulatedUnit UnitSimulation::show_press(const Eigen::VectorXd& x, int press, const PressPose& pose) {
   const sim::DeviceSpec whole = device_at(parts_->fit, x);
-  SimulatedUnit shown;
-  shown.presses = {mean_numbers(parts_->whole_light(whole, x, press, pose), imager(x))};
-  const Key scene = parts_->key_of(x, -1);
-  auto known = parts_->states.find(with_pose(scene, press, pose));
-  if (known == parts_->states.end()) {
-    parts_->state(parts_->sensor(whole, parts_->key_of(x, 0), 0), scene, press, pose);
-    known = parts_->states.find(with_pose(scene, press, pose));
-  }
-  const double share = whole.gel.youngs_modulus_MPa / parts_->modulus_of(whole);
-  shown.force_N = Eigen::VectorXd::Constant(1, share * known->second.force_N);
-  shown.force_error_N = Eigen::VectorXd::Constant(1, share * known->second.error_N);
-  return shown;
+  return parts_->shown(whole, Parts::imager_of(whole), x, press, pose);
 }
 
 SimulatedUnit UnitSimulation::show(const Eigen::VectorXd& x, const std::vector<PressPose>& poses) {
   const sim::DeviceSpec whole = device_at(parts_->fit, x);
+  const render::Imager imager = Parts::imager_of(whole);
   TS_ASSERT(poses.size() == parts_->fit.spec.presses.size());
   SimulatedUnit shown;
-  shown.background = mean_numbers(parts_->whole_light(whole, x, -1, {}), imager(x));
+  shown.background = mean_numbers(parts_->whole_light(whole, x, -1, {}), imager);
   shown.force_N.resize(static_cast<Eigen::Index>(poses.size()));
   shown.force_error_N.resize(static_cast<Eigen::Index>(poses.size()));
   for (std::size_t i = 0; i < poses.size(); ++i) {
-    const SimulatedUnit one = show_press(x, static_cast<int>(i), poses[i]);
+    const SimulatedUnit one = parts_->shown(whole, imager, x, static_cast<int>(i), poses[i]);
     shown.presses.push_back(one.presses.front());
     shown.force_N[static_cast<Eigen::Index>(i)] = one.force_N[0];
     shown.force_error_N[static_cast<Eigen::Index>(i)] = one.force_error_N[0];
@@ -231,6 +254,8 @@ SimulatedUnit UnitSimulation::show_other_light(const Eigen::VectorXd& x, const s
     other_.reset(new UnitSimulation(
         std::make_unique<Parts>(parts_->fit, parts_->cache, parts_->progress, parts_->seed + kOtherLight)));
   }
+  other_->set_field_accuracy(parts_->field_accuracy);
+  other_->expect(parts_->stage, parts_->expected);
   return other_->show(x, poses);
 }
 
@@ -247,8 +272,24 @@ double UnitSimulation::depth_of_force(const Eigen::VectorXd& x, int press, const
 }
 
 render::Imager UnitSimulation::imager(const Eigen::VectorXd& x) const {
-  const sim::DeviceSpec whole = device_at(parts_->fit, x);
-  return sim::imager(whole, Parts::bands_of(whole), true);
+  return Parts::imager_of(device_at(parts_->fit, x));
+}
+
+void UnitSimulation::set_field_accuracy(double accuracy) {
+  if (accuracy == parts_->field_accuracy) return;
+  parts_->field_accuracy = accuracy;
+  for (auto& kept : parts_->by_lamp) kept.clear();
+  for (auto& kept : parts_->lights) kept.clear();
+}
+
+void UnitSimulation::expect(const std::string& stage, std::int64_t pictures) {
+  parts_->stage = stage;
+  parts_->drawn = 0;
+  parts_->expected = pictures;
+}
+
+int UnitSimulation::sources() const {
+  return static_cast<int>(parts_->sources());
 }
 
 int UnitSimulation::lamp_setups() const {

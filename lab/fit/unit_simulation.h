@@ -8,9 +8,11 @@
 // it.
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <opencv2/core/mat.hpp>
+#include <string>
 #include <vector>
 
 #include "core/progress.h"
@@ -56,6 +58,12 @@ class UnitSimulation {
   /// The device's imager with the numbers of x.
   render::Imager imager(const Eigen::VectorXd& x) const;
   int lamp_setups() const;  ///< lamps' light set up so far: what takes longest
+  int sources() const;      ///< of light: lamps, and the room
+
+  /// UnitFitSpec::field_accuracy, of which the first holds to begin with. What was drawn with another is forgotten.
+  void set_field_accuracy(double accuracy);
+  /// Names the work to come and how many pictures, each of one source, it will take: for the progress.
+  void expect(const std::string& stage, std::int64_t pictures);
 
  private:
   struct Parts;

@@ -133,7 +133,8 @@ DirectChoice choose_direct(const Scene& rest, const Scene& first, const Camera& 
   LightField field;
   try {
     LightFieldSettings light;
-    light.accuracy = std::clamp(0.5 * settings.tolerance, 1e-4, 1e-2);
+    light.accuracy =
+        settings.field_accuracy > 0.0 ? settings.field_accuracy : std::clamp(0.5 * settings.tolerance, 1e-4, 1e-2);
     light.guides = settings.guides;
     light.lit_radius = settings.lit_radius;
     field = make_light_field(direct, reach, light);

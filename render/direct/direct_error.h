@@ -55,7 +55,8 @@ struct DirectChoiceSettings {
   bool whatever = false;     ///< the error is measured, but any will do
   DirectSettings direct;
   GuideCut guides;
-  double lit_radius = 0.0;  ///< LightFieldSettings::lit_radius
+  double field_accuracy = 0.0;  ///< LightFieldSettings::accuracy; 0: half of the tolerance, 1e-4 to 1e-2
+  double lit_radius = 0.0;      ///< LightFieldSettings::lit_radius
   DirectErrorSettings error;
   RestLightSettings rest;  ///< used where the scene asks for interreflection
 };

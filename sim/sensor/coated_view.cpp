@@ -108,10 +108,11 @@ bool is_fit_for_direct_light(const DeviceSpec& device, const VirtualSensorSettin
 /// Empty where the light isn't to be kept.
 std::string light_key(const VirtualSensorSettings& settings) {
   if (settings.light_key.empty()) return {};
-  return sha256_of(fmt::format("touchstone light, format {}, {} {} {} {} {} {} {} {} {}\n{}", kLightFormat,
+  return sha256_of(fmt::format("touchstone light, format {}, {} {} {} {} {} {} {} {} {} {}\n{}", kLightFormat,
                                settings.seed, settings.deepest_mm, settings.widest_mm, settings.membrane_um,
                                settings.interreflection_tolerance, settings.always_friction, settings.edge_side,
-                               settings.guides.sectors, settings.guides.slices, settings.light_key));
+                               settings.guides.sectors, settings.guides.slices, settings.field_accuracy,
+                               settings.light_key));
 }
 
 /// What `made` makes of what was kept; nothing where nothing was, or where it's another sensor's: then it's made anew.
@@ -166,7 +167,7 @@ class CoatedView final : public SensorView {
         std::vector<Truth> states = farthest_states(rest_, settings_, gel_, device_.gel);
         states.push_back(play(straight_press(above, radius - 0.5 * settings_.deepest_mm)).back());
         direct_ = std::make_unique<const DirectLight>(*judged_, camera_, states, kRaysAPixel, settings_.edge_side,
-                                                      settings_.guides);
+                                                      settings_.guides, settings_.field_accuracy);
         if (!key.empty()) keep(cache_folder, [&] { write_light(cache_folder, key, direct_->found()); });
       }
       choice_ = direct_->choice();

@@ -81,7 +81,8 @@ std::string with_figures(const std::string& verdict, const render::DirectError& 
 }  // namespace
 
 DirectLight::DirectLight(const SceneView& view, const render::Camera& camera, std::span<const Truth> truths,
-                         std::span<const int> rays_tried, int edge_side, const render::GuideCut& guides)
+                         std::span<const int> rays_tried, int edge_side, const render::GuideCut& guides,
+                         double field_accuracy)
     : camera_(camera) {
   TS_ASSERT(view.plan.direct_light && !truths.empty() && !rays_tried.empty());
   const SceneSpec& scene = view.scene;
@@ -94,6 +95,7 @@ DirectLight::DirectLight(const SceneView& view, const render::Camera& camera, st
   settings.tolerance = scene.light.direct_tolerance;
   settings.direct.edge_side = edge_side;
   settings.guides = guides;
+  settings.field_accuracy = field_accuracy;
   settings.direct.seed = settings.error.seed = settings.rest.seed = scene.seed;
   settings.error.samples = kPathsToMeasure;
   const Eigen::AlignedBox3d reach = reach_of(rest, pressed, truths, -scene.device.gel.thickness_mm);

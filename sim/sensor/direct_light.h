@@ -31,12 +31,13 @@ class DirectLight {
  public:
   /// Measures on the state of `truths` that is pressed deepest, with ever more rays a pixel until the scene's tolerance
   /// holds; `choice` then says what became of it. Where the scene switches direct light on, the last is taken.
-  /// `edge_side` is DirectSettings::edge_side, `guides` is LightFieldSettings::guides.
+  /// `edge_side` is DirectSettings::edge_side, `guides` is LightFieldSettings::guides, `field_accuracy`
+  /// DirectChoiceSettings::field_accuracy.
   /// @pre the plan has direct light, `truths` isn't empty
   /// @throws Error with the scene's place if the scene switches direct light on and it can't be had
   DirectLight(const SceneView& view, const render::Camera& camera, std::span<const Truth> truths,
               std::span<const int> rays_tried = kRaysTried, int edge_side = render::DirectSettings{}.edge_side,
-              const render::GuideCut& guides = {});
+              const render::GuideCut& guides = {}, double field_accuracy = 0.0);
 
   /// As it was found before, of the same scene and camera and with the same edge_side. `still`: the gel untouched.
   /// @throws Error if its lamps, bands or pixels aren't the scene's and the camera's

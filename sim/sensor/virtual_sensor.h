@@ -38,6 +38,8 @@ struct VirtualSensorSettings {
   int edge_side = 4;  ///< rays along a side of pixels that differ from those beside them (render::DirectSettings): on a
                       ///< rough object these are all pixels
   render::GuideCut guides;  ///< light guides' light in the light field; fewer beams are quicker and a little less right
+  /// Of a coated gel's light field (render::LightFieldSettings::accuracy); 0: half of what its direct light may be off.
+  double field_accuracy = 0.0;
   /// All that the light depends on besides these settings, such as the device's file and the program's checksum. Where
   /// it is given, what was found about the light is kept with the gel and read back; empty: it's found anew each time.
   std::string light_key;

@@ -4,6 +4,7 @@
 
 #include <Eigen/Cholesky>
 #include <cmath>
+#include <vector>
 
 #include "core/random.h"
 #include "lab/fit/bounded_least_squares.h"
@@ -14,6 +15,12 @@ namespace {
 
 using Vector = Eigen::VectorXd;
 using Matrix = Eigen::MatrixXd;
+
+LeastSquaresState begun_at(const Vector& x) {
+  LeastSquaresState state;
+  state.x = x;
+  return state;
+}
 
 TEST(BoundedLeastSquares, FindsRosenbrocksMinimum) {
   LeastSquaresProblem problem;
@@ -27,7 +34,7 @@ TEST(BoundedLeastSquares, FindsRosenbrocksMinimum) {
   problem.high = Vector::Constant(2, 5.0);
   LeastSquaresSettings settings;
   settings.most_steps = 200;
-  const LeastSquaresResult found = least_squares(problem, Eigen::Vector2d(-1.2, 1.0), settings);
+  const LeastSquaresResult found = least_squares(problem, begun_at(Eigen::Vector2d(-1.2, 1.0)), settings);
   EXPECT_TRUE(found.converged);
   EXPECT_NEAR((found.x - Vector::Ones(2)).norm(), 0.0, 1e-3);
 }
@@ -45,10 +52,74 @@ TEST(BoundedLeastSquares, StopsAtABoundAndMinimisesTheRest) {
   problem.high = Vector::Constant(2, 1.0);
   LeastSquaresSettings settings;
   settings.least_gain = 1e-8;
-  const LeastSquaresResult found = least_squares(problem, Eigen::Vector2d(-1.0, -0.5), settings);
+  const LeastSquaresResult found = least_squares(problem, begun_at(Eigen::Vector2d(-1.0, -0.5)), settings);
   EXPECT_TRUE(found.converged);
   EXPECT_EQ(found.x[0], 1.0);
   EXPECT_NEAR(found.x[1], 0.0, 1e-3);
+}
+
+// Rosenbrock's valley with a third variable that is settled each time, and a step that is refused now and then.
+TEST(BoundedLeastSquares, GoesOnFromEachStateToTheSameEnd) {
+  LeastSquaresProblem problem;
+  problem.residuals = [](const Vector& x) {
+    return Vector(Eigen::Vector3d(10.0 * (x[1] - x[0] * x[0]), 1.0 - x[0], x[2] - x[0]));
+  };
+  problem.jacobian = [&](const Vector& x, const Vector& at) {
+    Matrix J(3, 3);
+    for (int k = 0; k < 3; ++k) J.col(k) = (problem.residuals(x + 1e-3 * Vector::Unit(3, k)) - at) / 1e-3;
+    return J;
+  };
+  problem.settled = [](const Vector& x) { return Vector(Eigen::Vector3d(x[0], x[1], x[0])); };
+  problem.low = Vector::Constant(3, -5.0);
+  problem.high = Vector::Constant(3, 5.0);
+  std::vector<LeastSquaresState> states;
+  problem.on_state = [&](const LeastSquaresState& state) { states.push_back(state); };
+  LeastSquaresSettings settings;
+  settings.most_steps = 200;
+  const LeastSquaresResult whole = least_squares(problem, begun_at(Eigen::Vector3d(-1.2, 1.0, 3.0)), settings);
+  ASSERT_TRUE(whole.converged);
+  EXPECT_NEAR((whole.x - Vector::Ones(3)).norm(), 0.0, 1e-2);
+  EXPECT_EQ(whole.x[2], whole.x[0]);
+  ASSERT_GT(states.size(), static_cast<std::size_t>(2 * whole.steps)) << "some step was refused";
+  problem.on_state = nullptr;
+  for (const LeastSquaresState& state : states) {
+    const LeastSquaresResult rest = least_squares(problem, state, settings);
+    EXPECT_EQ(rest.x, whole.x);
+    EXPECT_EQ(rest.residuals, whole.residuals);
+    EXPECT_EQ(rest.jacobian, whole.jacobian);
+    EXPECT_EQ(rest.steps, whole.steps);
+    EXPECT_TRUE(rest.converged);
+  }
+}
+
+// What is simulated is rough. Where a step that is no longer than differences are taken over gains nothing, the search
+// has arrived; a Jacobian that is wrong all over leads nowhere.
+TEST(BoundedLeastSquares, RoughResidualsConvergeAndWrongJacobiansDoNot) {
+  static constexpr double kDifference = 2e-2;
+  const auto found_with = [](double slope_error) {
+    LeastSquaresProblem problem;
+    problem.residuals = [](const Vector& x) {
+      Vector out(50);
+      for (int i = 0; i < 50; ++i) {
+        out[i] = (i % 2 == 0 ? 1.0 : -1.0) + 40.0 * (x[0] - 0.3) + 0.3 * std::sin(1e4 * x[0] + 0.1 * i);
+      }
+      return out;
+    };
+    problem.jacobian = [&](const Vector& x, const Vector& at) {
+      const Vector other = problem.residuals(x + Vector::Constant(1, kDifference));
+      return Matrix(slope_error * (other - at) / kDifference);
+    };
+    problem.low = Vector::Constant(1, -1.0);
+    problem.high = Vector::Constant(1, 1.0);
+    LeastSquaresSettings settings;
+    settings.rough_within = kDifference;
+    return least_squares(problem, begun_at(Vector::Zero(1)), settings);
+  };
+  const LeastSquaresResult found = found_with(1.0);
+  EXPECT_TRUE(found.converged);
+  EXPECT_LE(found.steps, 4);
+  EXPECT_NEAR(found.x[0], 0.3, 0.01);
+  EXPECT_FALSE(found_with(-1.0).converged);
 }
 
 /// A linear problem of two variables over a picture of tiles, whose noise is white and, per tile, alike.
