@@ -156,6 +156,32 @@ class LossOfPower(Attack):
         self.assertIn(["on disk", str(out)], log[named:])
 
 
+class Memory(Attack):
+    """Limits of address space: refused by name before work begins, never waited at."""
+
+    def render(self, megabytes):
+        def limit():
+            resource.setrlimit(resource.RLIMIT_AS, (megabytes * 10**6, megabytes * 10**6))
+
+        words = ["--threads", "2", "--cache", self.folder / "cache", "render", SOURCE / "scenes/vhs/ball-press.yaml"]
+        return self.run_program(*words, "--frame", "0", "-o", self.folder / "frame.png", preexec_fn=limit)
+
+    def test_too_little_to_begin_is_said(self):
+        for megabytes in (300, 354, 450):
+            self.expect_refused(self.render(megabytes), "500 MB of address space", "ulimit -v")
+
+    def test_too_little_for_threads_and_for_a_gel_is_said_with_both_amounts(self):
+        self.expect_refused(self.render(614), "2 threads", "needs about 420 MB", "are left by the address space")
+        for megabytes in (920, 1020):  # what is mapped at first differs by a buffer of 131 MB
+            self.expect_refused(self.render(megabytes), "tetrahedra needs about 772 MB", "are left by the address space")
+
+    def test_a_job_of_too_many_files_is_refused(self):
+        job = self.scenes / "draw.yaml"
+        text = job.read_text().replace("../../scenes", str(SOURCE / "scenes"))
+        job.write_text(text.replace("samples: 20", "samples: 2000000000"))
+        self.expect_refused(self.run_program("plan", job), "draw.yaml:", "samples: 2000000000", "allowed are 900000 files")
+
+
 class Refusals(Attack):
     def change(self, name, old, new):
         text = (self.scenes / name).read_text()
