@@ -195,6 +195,12 @@ class Refusals(Attack):
         self.change("beads-device.yaml", "full_well_e: 50000", "full_well_e: 1e-300")
         self.expect_refused(self.plan(), "beads-device.yaml:", "full_well_e: 1e-300", "from 1 to")
 
+    def test_pixels_smaller_than_light_or_larger_than_a_sensor(self):
+        for pitch in ("1e-300", "1e300"):
+            shutil.copy(SOURCE / "tests/jobs/beads-device.yaml", self.scenes)
+            self.change("beads-device.yaml", "pixel_pitch_um: 30", f"pixel_pitch_um: {pitch}")
+            self.expect_refused(self.plan(), "beads-device.yaml:", f"pixel_pitch_um: {pitch}", "from 0.01 to 10000")
+
     def test_long_values_are_cut(self):
         for long in ("x" * 1000000, "1" * 1000000, "\u00e4" * 500000):
             shutil.copy(SOURCE / "tests/jobs/beads-device.yaml", self.scenes)
