@@ -195,6 +195,18 @@ class Refusals(Attack):
         self.change("beads-device.yaml", "full_well_e: 50000", "full_well_e: 1e-300")
         self.expect_refused(self.plan(), "beads-device.yaml:", "full_well_e: 1e-300", "from 1 to")
 
+    def test_pipes_and_devices_in_the_place_of_files(self):
+        self.expect_refused(self.run_program("plan", "/dev/zero"), "/dev/zero: can't be read", "only files are read")
+        for name in ("beads-device.yaml", "probe.yaml", "beads-motion.yaml", "beads-scene.yaml"):
+            (self.scenes / name).unlink()
+            os.mkfifo(self.scenes / name)
+            self.expect_refused(self.plan(), name)
+            (self.scenes / name).unlink()
+            shutil.copy(SOURCE / "tests/jobs" / name, self.scenes)
+        os.mkfifo(self.scenes / "body.stl")
+        self.change("probe.yaml", "shape: {", "shape: {type: mesh, file: body.stl} #")
+        self.expect_refused(self.plan(), "probe.yaml:2: shape.file:", "body.stl: can't be read", "only files are read")
+
     def test_pixels_smaller_than_light_or_larger_than_a_sensor(self):
         for pitch in ("1e-300", "1e300"):
             shutil.copy(SOURCE / "tests/jobs/beads-device.yaml", self.scenes)
