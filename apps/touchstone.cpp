@@ -12,7 +12,6 @@
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
-#include <cstdlib>
 #include <cstring>
 #include <iostream>
 #include <new>
@@ -48,9 +47,8 @@ void hold_standard_descriptors() {
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // which take terabytes of it
 /// Runs before any library's own start: OpenBLAS' waits for ever where it can't have a buffer. Nothing of C++ is ready.
 void require_address_space() {
-  // 346 MB are mapped at last. Threads of OpenBLAS' own, which aren't used, would take 140 MB more each.
+  // 346 MB are mapped at last on 2 processors; on more, 8 MB each for OpenBLAS' own threads.
   constexpr rlim_t kLeast = 500'000'000;
-  setenv("OPENBLAS_NUM_THREADS", "1", 1);
   rlimit limit{};
   if (getrlimit(RLIMIT_AS, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY || limit.rlim_cur >= kLeast) return;
   constexpr std::string_view kWhy =
