@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
+#include <sys/resource.h>
 #include <tbb/global_control.h>
 #include <unistd.h>
 
@@ -15,11 +16,14 @@
 #include <iostream>
 #include <new>
 #include <optional>
+#include <string_view>
 
 #include "apps/blas_kind.h"
 #include "apps/command.h"
 #include "core/error.h"
+#include "core/memory_left.h"
 #include "core/nearest_name.h"
+#include "datasets/sets/processor.h"
 #include "datasets/sets/run_identity.h"
 #include "sim/press/gel_setup.h"
 
@@ -39,6 +43,21 @@ void hold_standard_descriptors() {
   } while (descriptor >= 0 && descriptor <= STDERR_FILENO);
   if (descriptor > STDERR_FILENO) close(descriptor);
 }
+
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // which take terabytes of it
+/// Runs before any library's own start: OpenBLAS' waits for ever where it can't have a buffer. Nothing of C++ is ready.
+void require_address_space() {
+  // 346 MB are mapped at last on 2 processors; on more, 8 MB each for OpenBLAS' own threads.
+  constexpr rlim_t kLeast = 500'000'000;
+  rlimit limit{};
+  if (getrlimit(RLIMIT_AS, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY || limit.rlim_cur >= kLeast) return;
+  constexpr std::string_view kWhy =
+      "touchstone: to begin takes 500 MB of address space; the limit of it (ulimit -v) is lower\n";
+  if (write(STDERR_FILENO, kWhy.data(), kWhy.size()) < 0) _exit(kInternalFailure);
+  _exit(kUserMistake);
+}
+[[gnu::section(".preinit_array"), gnu::used]] void (*const kFirst)() = require_address_space;
+#endif
 
 int complain(int code, const std::string& message) {
   std::string line = message;
@@ -106,6 +125,7 @@ int run(int argc, char** argv) {
     limit.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(global.threads));
   }
   if (cache->empty()) global.cache = sim::default_cache_folder();
+  datasets::reserve_blas_buffers();
   action();
   return kDone;
 }
@@ -116,7 +136,9 @@ int guarded_run(int argc, char** argv) {
   } catch (const Error& error) {
     return complain(kUserMistake, error.what());
   } catch (const std::bad_alloc&) {
-    return complain(kInternalFailure, "there isn't enough memory");
+    const MemoryLeft left = memory_left();
+    return complain(kInternalFailure,
+                    fmt::format("there isn't enough memory: {:.0f} MB are left by {}", left.bytes / 1e6, left.by));
   } catch (const std::exception& error) {
     if (std::ferror(stdout) != 0) return complain(kInternalFailure, std::string("stdout: ") + error.what());
     return complain(kInternalFailure, std::string("internal failure: ") + error.what());

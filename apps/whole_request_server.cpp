@@ -11,10 +11,12 @@
 #include <cerrno>
 #include <charconv>
 #include <cstring>
+#include <nlohmann/json.hpp>
 #include <string_view>
 #include <utility>
 
 #include "core/error.h"
+#include "core/short_text.h"
 
 namespace touchstone::apps {
 namespace {
@@ -102,23 +104,13 @@ std::string_view trimmed(std::string_view text) {
   return text.substr(first, text.find_last_not_of(" \t") - first + 1);
 }
 
-/// The start of what a client sent, safe to show.
-std::string shown(std::string_view text) {
-  constexpr std::size_t kMost = 40;
-  std::string all(text.substr(0, kMost));
-  for (char& letter : all) {
-    if (letter < ' ' || letter > '~' || letter == '"' || letter == '\\') letter = '?';
-  }
-  return text.size() > kMost ? all + "..." : all;
-}
-
 /// A lone line feed would be the end of a line to httplib. @throws Refusal
 void refuse_control_characters(std::string_view line) {
   constexpr unsigned char kDelete = 0x7f;
   for (const char letter : line) {
     const auto code = static_cast<unsigned char>(letter);
     if ((code < ' ' && code != '\t') || code == kDelete) {
-      throw Refusal{400, fmt::format("the line '{}' has a control character; only tabs are allowed", shown(line))};
+      throw Refusal{400, fmt::format("the line '{}' has a control character; only tabs are allowed", short_text(line))};
     }
   }
 }
@@ -137,14 +129,14 @@ Head read_head(std::string_view text) {
     refuse_control_characters(line);
     const std::size_t colon = line.find(':');
     if (colon == std::string_view::npos || colon == 0 || line.find_first_of(" \t") < colon) {
-      throw Refusal{400, fmt::format("the header line '{}' isn't 'Name: value'", shown(line))};
+      throw Refusal{400, fmt::format("the header line '{}' isn't 'Name: value'", short_text(line))};
     }
     const std::string name = lower(line.substr(0, colon));
     const std::string_view value = trimmed(line.substr(colon + 1));
     if (name == "transfer-encoding") {
       throw Refusal{411,
                     fmt::format("Transfer-Encoding: '{}' isn't taken; a body's length must be given by Content-Length",
-                                shown(value))};
+                                short_text(value))};
     }
     if (name == "content-length") {
       const char* last = value.data() + value.size();
@@ -152,11 +144,12 @@ Head read_head(std::string_view text) {
       const auto [stop, error] = std::from_chars(value.data(), last, size);
       const bool digits = !value.empty() && stop == last;
       if (has_length || !digits || (error != std::errc() && error != std::errc::result_out_of_range)) {
-        throw Refusal{400, fmt::format("Content-Length: '{}' isn't allowed; one whole number from 0 is", shown(value))};
+        throw Refusal{400,
+                      fmt::format("Content-Length: '{}' isn't allowed; one whole number from 0 is", short_text(value))};
       }
       if (error != std::errc() || size > kMostBody) {
-        throw Refusal{413,
-                      fmt::format("Content-Length: {} bytes are too many; {} are allowed", shown(value), kMostBody)};
+        throw Refusal{
+            413, fmt::format("Content-Length: {} bytes are too many; {} are allowed", short_text(value), kMostBody)};
       }
       has_length = true;
       head.body_size = size;
@@ -304,8 +297,8 @@ bool WholeRequestServer::examine(Connection& connection, std::size_t seen) {
   std::string& bytes = connection.bytes;
   if (connection.head.empty()) {
     if (!std::isupper(static_cast<unsigned char>(bytes.front()))) {
-      throw Refusal{
-          400, fmt::format("a request starts with a method, such as GET, not with '{}'", shown(bytes.substr(0, 1)))};
+      throw Refusal{400, fmt::format("a request starts with a method, such as GET, not with '{}'",
+                                     short_text(bytes.substr(0, 1)))};
     }
     const std::size_t end = bytes.find(kHeadEnd, seen - std::min(seen, kHeadEnd.size() - 1));
     if (std::min(end, bytes.size()) > kMostHead) {
@@ -327,7 +320,9 @@ bool WholeRequestServer::examine(Connection& connection, std::size_t seen) {
 
 /// Answers. A socket that is closed while bytes are unread takes the answer with it, so what comes is read for a while.
 bool WholeRequestServer::refuse(Connection& connection, int status, const std::string& message) {
-  const std::string body = fmt::format("{{\"error\":\"{}\"}}\n", message);
+  // What isn't UTF-8 of what it sent is replaced.
+  const nlohmann::json sentence = {{"error", message}};
+  const std::string body = sentence.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace) + "\n";
   const std::string answer = fmt::format(
       "HTTP/1.1 {} {}\r\nContent-Type: application/json\r\nContent-Length: {}\r\nConnection: close\r\n\r\n{}", status,
       reason(status), body.size(), body);

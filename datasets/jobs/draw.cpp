@@ -12,7 +12,8 @@ namespace {
 
 constexpr int kMostUnits = 100'000;
 constexpr double kMostPieces = 1e9;
-constexpr int kMostSamplesAFile = 1000;  // all of a file's samples are in memory at once
+constexpr int kMostSamplesAFile = 1000;       // all of a file's samples are in memory at once
+constexpr std::int64_t kMostFiles = 900'000;  // their names and checksums are in memory at once
 constexpr double kLargestTilt_deg = 60.0;
 
 bool& wanted_of(DrawnOutputs& outputs, DrawnOutput output) {
@@ -124,6 +125,10 @@ void fields(YamlReader& in, DrawJob& job) {
   in.optional("edge_side", job.edge_side);
   if (job.edge_side != 1 && job.edge_side != 2 && job.edge_side != 4) {
     fail_at(in.where("edge_side"), "edge_side: {} is not allowed; allowed is one of: 1, 2, 4", job.edge_side);
+  }
+  if (job.samples / job.samples_per_file > kMostFiles) {
+    fail_at(in.where("samples"), "samples: {} samples, {} a file; allowed are {} files", job.samples,
+            job.samples_per_file, kMostFiles);
   }
   if (job.draw.units.count > job.samples) {
     fail_at(in.where("samples"), "samples: {} samples of {} units; each unit needs one at least", job.samples,

@@ -20,7 +20,6 @@ constexpr double kDeepestShare = 0.4;  // of the gel's thickness, where the job 
 constexpr double kLeastWidest_mm = 0.5;
 constexpr double kSpareWidth_mm = 0.2;
 constexpr std::int64_t kPiecesChecked = 20;
-constexpr double kMostSamples = 1e12;  // so that products with units stay whole numbers
 
 /// Applies what is to be varied, in order, each to what the ones before it left.
 std::string varied(std::string text, const std::string& name, const std::vector<NumberVariation>& all,
@@ -115,8 +114,6 @@ PreparedDraw prepare_draw(const std::filesystem::path& file) {
   prepared.job = read_draw_job(file);
   prepared.text = read_whole_file(file);
   const DrawJob& job = prepared.job;
-  if (static_cast<double>(job.samples) > kMostSamples)
-    fail_at(job.where, "samples: at most {} are allowed", kMostSamples);
   prepared.device_text = read_whole_file(job.draw.device);
   for (const DrawnObjectSpec& object : job.draw.objects) prepared.object_texts.push_back(read_whole_file(object.file));
   prepared.blocks = blocks_of(job);

@@ -8,7 +8,7 @@
 namespace touchstone::datasets {
 namespace {
 
-constexpr std::int64_t kSamplesSearched = 10'000;  // some milliseconds; jobs may have 1e12
+constexpr std::int64_t kSamplesSearched = 10'000;  // some milliseconds; jobs may have 1e9
 
 /// The outputs of a scene that has what a sample has: a sensor lights and exposes a frame for each sample that asks its
 /// camera for anything, and reads height and contact from what each pixel's ray hits first.

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/memory_left.h"
 #include "fem/elements/element.h"
 #include "fem/elements/quasi_definite_schur.h"
 #include "fem/elements/surface_coupling.h"
@@ -132,6 +133,8 @@ Compliance compute_compliance(const TetMesh& mesh, std::span<const ElasticMateri
   if (!std::isfinite(thickness) || thickness <= 0.0) {
     fail("the gel's thickness is {} mm; it must be finite and above zero", thickness);
   }
+  const std::size_t tetrahedra = mesh.tetrahedra.size();
+  require_memory(setup_bytes(static_cast<double>(tetrahedra)), fmt::format("to set up {} tetrahedra", tetrahedra));
   tell(0);
   const TaylorHoodSpace space = make_space(mesh, materials);
   const Scales scales = make_scales(mesh, materials);
@@ -193,6 +196,11 @@ Compliance compute_compliance(const TetMesh& mesh, std::span<const ElasticMateri
   gel.report.memory_mb = factor.memory_mb;
   tell(3);
   return gel;
+}
+
+double setup_bytes(double tetrahedra) {
+  constexpr double kPerTetrahedron = 50e3;  // fronts at the elimination's peak, and what they leave to each other
+  return kPerTetrahedron * tetrahedra;
 }
 
 bool is_kept_whole(int vertices, int beads, int most_whole) {

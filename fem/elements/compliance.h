@@ -58,11 +58,14 @@ struct Compliance {
 /// vertices keep the mesh's order. Of a large surface the far parts are compressed: what that leaves out is measured
 /// and in the report. `materials` has one entry for each region of the mesh. `thickness` is copied.
 /// @throws Error for an unfit mesh (see fault_of) or material, for a bead that isn't wholly inside the gel, for more
-/// vertices or beads than are allowed, or if memory runs out
+/// vertices or beads than are allowed, or, before it begins, if less memory is left than setup_bytes()
 Compliance compute_compliance(const TetMesh& mesh, std::span<const ElasticMaterial> materials,
                               std::span<const Bead> beads, double thickness, const Progress& progress = {});
 Compliance compute_compliance(const TetMesh& mesh, const ElasticMaterial& material, std::span<const Bead> beads,
                               double thickness, const Progress& progress = {});  ///< the same in all regions
+
+/// Bytes that this takes at the most for so many tetrahedra, on four threads, within some 40 %.
+double setup_bytes(double tetrahedra);
 
 /// The same body with all its moduli times one number, so that its (first) material's is this: linear elasticity only
 /// divides by it. @throws Error unless the modulus is finite and above zero

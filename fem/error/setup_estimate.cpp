@@ -3,13 +3,12 @@
 #include <cmath>
 #include <numbers>
 
+#include "fem/elements/compliance.h"
 #include "fem/elements/compliance_file.h"
 
 namespace touchstone::fem {
 namespace {
 
-/// Bytes at the elimination's peak per tetrahedron: fronts and what they leave to each other.
-constexpr double kSetupBytesPerTetrahedron = 50e3;
 /// Bytes per pair of vertices in contact: two dense blocks of three unknowns each.
 constexpr double kPressBytesPerPair = 2.0 * 72.0;
 
@@ -20,7 +19,7 @@ SetupEstimate estimate_setup(const SlabMesh& slab, int beads) {
   estimate.tetrahedra = estimated_tetrahedra(slab);
   estimate.surface_vertices = estimated_surface_vertices(slab);
   estimate.file_bytes = compliance_file_bytes(static_cast<int>(std::lround(estimate.surface_vertices)), beads);
-  estimate.setup_bytes = kSetupBytesPerTetrahedron * estimate.tetrahedra;
+  estimate.setup_bytes = fem::setup_bytes(estimate.tetrahedra);
   return estimate;
 }
 

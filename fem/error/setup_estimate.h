@@ -9,7 +9,7 @@ struct SetupEstimate {
   double tetrahedra = 0.0;
   double surface_vertices = 0.0;
   double file_bytes = 0.0;   ///< of the compliance in the cache
-  double setup_bytes = 0.0;  ///< at the most, on four threads
+  double setup_bytes = 0.0;  ///< see fem::setup_bytes()
 };
 
 /// From the size field; measured on slabs of 8,000 to 46,000 tetrahedra: vertices within 10 %, the file within 20 %,

@@ -3,7 +3,7 @@
 import bisect
 
 from ._errors import Error
-from ._set_files import SPLITS, SetFiles, import_h5py, open_h5, text_of
+from ._set_files import SPLITS, SetFiles, errors_of, import_h5py, open_h5, text_of
 
 _MOST_OPEN = 64  # blocks that a process keeps open
 _KEPT_ROW_BYTES = 1024  # columns of smaller rows are read whole and kept, of others (pictures) a row
@@ -30,7 +30,9 @@ class _Block:
     def _whole(self, name):
         """A column of small rows, or what the block has once, read at the first use."""
         if name not in self._kept:
-            self._kept[name] = self.array(name)[()]
+            array = self.array(name)
+            with errors_of(self.file.filename):
+                self._kept[name] = array[()]
         return self._kept[name]
 
     def events(self, k):
@@ -41,17 +43,19 @@ class _Block:
         dtype = [("t_us", "i8"), ("x", "u2"), ("y", "u2"), ("on", "?")]
         records = numpy.empty(end - first, dtype)
         for name, _ in dtype:
-            records[name] = self.array(f"events/{name}")[first:end]
+            array = self.array(f"events/{name}")
+            with errors_of(self.file.filename):
+                records[name] = array[first:end]
         return records
 
     def row(self, name, k):
         if name == "events":
             return self.events(k)
         array = self.array(name)
-        if name == "frame":
-            return _as_opencv(array[k])
-        if array.nbytes > _KEPT_ROW_BYTES * array.shape[0]:
-            return array[k]
+        if name == "frame" or array.nbytes > _KEPT_ROW_BYTES * array.shape[0]:
+            with errors_of(self.file.filename):
+                row = array[k]
+            return _as_opencv(row) if name == "frame" else row
         return self._whole(name)[k].copy()
 
     def background(self):
@@ -85,7 +89,7 @@ class DrawnFiles(SetFiles):
 
     def _block(self, number):
         handles = self.handles()
-        block = handles.pop(number, None) or _Block(self.folder / self._blocks[number]["file"])
+        block = handles.pop(number, None) or _Block(self.checked(self._blocks[number]["file"]))
         handles[number] = block  # the last used stands last
         if len(handles) > _MOST_OPEN:
             handles.pop(next(iter(handles)), None)

@@ -2,7 +2,7 @@
 
 from ._core import read_image
 from ._errors import Error
-from ._set_files import SetFiles, open_h5, text_of
+from ._set_files import SetFiles, errors_of, open_h5, text_of
 
 _PICTURES = {"frame": "frames", "ideal": "ideal"}  # what samples call them, and the folders they are in
 
@@ -35,8 +35,14 @@ class SceneFiles(SetFiles):
             raise self.no_array(name)
         handles = self.handles()
         if "truth.h5" not in handles:
-            handles["truth.h5"] = open_h5(self.folder / "truth.h5")
-        return handles["truth.h5"][name]
+            handles["truth.h5"] = open_h5(self.checked("truth.h5"))
+        with errors_of(self.folder / "truth.h5"):
+            return handles["truth.h5"][name]
+
+    def _values(self, name, rows):
+        array = self._array(name)
+        with errors_of(self.folder / "truth.h5"):
+            return array[rows]
 
     def check_column(self, name):
         if name in _PICTURES:
@@ -50,9 +56,9 @@ class SceneFiles(SetFiles):
 
     def read(self, name, row):
         if name not in _PICTURES:
-            return self._array(name)[row]
+            return self._values(name, row)
         scene, frame = self._place[row]
-        return read_image(str(self.folder / _PICTURES[name] / self._scenes[scene]["name"] / f"{frame:06d}.png"))
+        return read_image(str(self.checked(f"{_PICTURES[name]}/{self._scenes[scene]['name']}/{frame:06d}.png")))
 
     def column(self, name, rows):
         if name in _PICTURES:
@@ -61,11 +67,10 @@ class SceneFiles(SetFiles):
                 first = self.read(name, 0)
                 return numpy.empty((0, *first.shape), first.dtype)
             return numpy.stack([self.read(name, row) for row in rows])
-        array = self._array(name)
-        return array[()] if len(rows) == array.shape[0] else array[rows]
+        return self._values(name, () if len(rows) == self._array(name).shape[0] else rows)
 
     def constant(self, name):
-        return self._array(name)[()]
+        return self._values(name, ())
 
     def unit(self, name):
         return text_of(self._array(name), "unit")

@@ -1,10 +1,12 @@
 """What all data sets have on disk: a manifest that knows every file's checksum (docs/file-formats.md)."""
 
+import contextlib
 import hashlib
 import json
 import os
 import pathlib
 import re
+import stat
 
 from ._errors import Error
 
@@ -46,6 +48,32 @@ def import_h5py():
     return h5py
 
 
+def sha256_of(path):
+    """Of a file's bytes. Raises Error that names it if it can't be read, or is a pipe or a device."""
+    digest = hashlib.sha256()
+    try:
+        # Non-blocking: a pipe that nobody writes into is opened at once, and can be refused.
+        with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as file:
+            if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+                raise Error(f"{path}: is a pipe or a device; only files are read", str(path))
+            for block in iter(lambda: file.read(1 << 20), b""):
+                digest.update(block)
+    except OSError as error:
+        raise Error(f"{path}: {error.strerror}", str(path)) from None
+    return digest.hexdigest()
+
+
+@contextlib.contextmanager
+def errors_of(path):
+    """What HDF5 says of a file that it can't read becomes an Error that names the file."""
+    try:
+        yield
+    except Error:
+        raise
+    except (OSError, RuntimeError, KeyError, ValueError, TypeError) as error:
+        raise Error(f"{path}: can't be read: {error}", str(path)) from None
+
+
 def open_h5(path):
     """An h5py.File for reading. Raises Error that names the file."""
     h5py = import_h5py()
@@ -74,6 +102,22 @@ class SetFiles:
         self.manifest = manifest
         self._open = None
         self._process = None
+        self._digests = None
+        self._checked = set()  # names of files that met their checksums
+
+    def checked(self, name):
+        """The path of one of the set's files, compared with its SHA-256 in the manifest at its first use. Raises Error
+        that names the file if it isn't there, isn't a file, or differs."""
+        path = self.folder / name
+        if name not in self._checked:
+            if self._digests is None:
+                self._digests = {one["file"]: one["sha256"] for one in self.manifest["files"]}
+            if name not in self._digests:
+                raise Error(f"{path}: isn't one of the files in dataset.json", str(path))
+            if sha256_of(path) != self._digests[name]:
+                raise Error(f"{path}: doesn't meet its checksum in dataset.json", str(path))
+            self._checked.add(name)
+        return path
 
     def handles(self):
         """This process's open files, in a dict by path: a forked worker must not share its parent's."""
@@ -94,12 +138,5 @@ class SetFiles:
         """Compares every file with its SHA-256 in the manifest. Raises Error that names the first that differs."""
         for one in self.manifest["files"]:
             path = self.folder / one["file"]
-            digest = hashlib.sha256()
-            try:
-                with open(path, "rb") as file:
-                    for block in iter(lambda: file.read(1 << 20), b""):
-                        digest.update(block)
-            except OSError as error:
-                raise Error(f"{path}: {error.strerror}", str(path)) from None
-            if digest.hexdigest() != one["sha256"]:
+            if sha256_of(path) != one["sha256"]:
                 raise Error(f"{path}: doesn't meet its checksum in dataset.json", str(path))

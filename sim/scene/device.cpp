@@ -384,7 +384,7 @@ void fields(YamlReader& in, CameraSpec& camera) {
   needed("width", camera.width, Allowed::within(1, 8192));
   needed("height", camera.height, Allowed::within(1, 8192));
   in.optional("frame_rate_Hz", camera.frame_rate_Hz, Allowed::above(0.0));
-  needed("pixel_pitch_um", camera.pixel_pitch_um, Allowed::above(0.0));
+  needed("pixel_pitch_um", camera.pixel_pitch_um, Allowed::within(0.01, 10'000.0));
   const double whole_area = camera.pixel_pitch_um * camera.pixel_pitch_um;
   if (!preset || in.has("pixel_pitch_um")) camera.active_area_um2 = whole_area;
   in.optional("active_area_um2", camera.active_area_um2, Allowed::above_up_to(0.0, whole_area));

@@ -156,6 +156,32 @@ class LossOfPower(Attack):
         self.assertIn(["on disk", str(out)], log[named:])
 
 
+class Memory(Attack):
+    """Limits of address space: refused by name before work begins, never waited at."""
+
+    def render(self, megabytes):
+        def limit():
+            resource.setrlimit(resource.RLIMIT_AS, (megabytes * 10**6, megabytes * 10**6))
+
+        words = ["--threads", "2", "--cache", self.folder / "cache", "render", SOURCE / "scenes/vhs/ball-press.yaml"]
+        return self.run_program(*words, "--frame", "0", "-o", self.folder / "frame.png", preexec_fn=limit)
+
+    def test_too_little_to_begin_is_said(self):
+        for megabytes in (300, 354, 450):
+            self.expect_refused(self.render(megabytes), "500 MB of address space", "ulimit -v")
+
+    def test_too_little_for_threads_and_for_a_gel_is_said_with_both_amounts(self):
+        self.expect_refused(self.render(614), "2 threads", "needs about 420 MB", "are left by the address space")
+        for megabytes in (920, 1020):  # what is mapped at first differs by a buffer of 131 MB
+            self.expect_refused(self.render(megabytes), "tetrahedra needs about 772 MB", "are left by the address space")
+
+    def test_a_job_of_too_many_files_is_refused(self):
+        job = self.scenes / "draw.yaml"
+        text = job.read_text().replace("../../scenes", str(SOURCE / "scenes"))
+        job.write_text(text.replace("samples: 20", "samples: 2000000000"))
+        self.expect_refused(self.run_program("plan", job), "draw.yaml:", "samples: 2000000000", "allowed are 900000 files")
+
+
 class Refusals(Attack):
     def change(self, name, old, new):
         text = (self.scenes / name).read_text()
@@ -168,6 +194,24 @@ class Refusals(Attack):
     def test_a_pixel_that_holds_no_electron(self):
         self.change("beads-device.yaml", "full_well_e: 50000", "full_well_e: 1e-300")
         self.expect_refused(self.plan(), "beads-device.yaml:", "full_well_e: 1e-300", "from 1 to")
+
+    def test_pipes_and_devices_in_the_place_of_files(self):
+        self.expect_refused(self.run_program("plan", "/dev/zero"), "/dev/zero: can't be read", "only files are read")
+        for name in ("beads-device.yaml", "probe.yaml", "beads-motion.yaml", "beads-scene.yaml"):
+            (self.scenes / name).unlink()
+            os.mkfifo(self.scenes / name)
+            self.expect_refused(self.plan(), name)
+            (self.scenes / name).unlink()
+            shutil.copy(SOURCE / "tests/jobs" / name, self.scenes)
+        os.mkfifo(self.scenes / "body.stl")
+        self.change("probe.yaml", "shape: {", "shape: {type: mesh, file: body.stl} #")
+        self.expect_refused(self.plan(), "probe.yaml:2: shape.file:", "body.stl: can't be read", "only files are read")
+
+    def test_pixels_smaller_than_light_or_larger_than_a_sensor(self):
+        for pitch in ("1e-300", "1e300"):
+            shutil.copy(SOURCE / "tests/jobs/beads-device.yaml", self.scenes)
+            self.change("beads-device.yaml", "pixel_pitch_um: 30", f"pixel_pitch_um: {pitch}")
+            self.expect_refused(self.plan(), "beads-device.yaml:", f"pixel_pitch_um: {pitch}", "from 0.01 to 10000")
 
     def test_long_values_are_cut(self):
         for long in ("x" * 1000000, "1" * 1000000, "\u00e4" * 500000):

@@ -227,6 +227,8 @@ class Bodies(Attack):
     def test_heads_that_are_none_are_refused(self):
         self.expect(self.server.answer("GET / HTTP/1.1\r\n" + "X: y\r\n" * 4000), 431, "16384")
         self.expect(self.server.answer("GET / HTTP/1.1\r\nno colon\r\n\r\n"), 400, "'no colon'")
+        self.expect(self.server.answer('GET / HTTP/1.1\r\n"quoted\\"\r\n\r\n'), 400, '\'"quoted\\"\'')
+        self.expect(self.server.answer(b"GET / HTTP/1.1\r\n\xe4\xff\r\n\r\n"), 400, "'\ufffd\ufffd'")
         self.expect(self.server.answer("GET / HTTP/1.1\r\n folded: line\r\n\r\n"), 400, "Name: value")
         for letter in ["\0", "\n", "\r", "\x7f"]:
             self.expect(self.server.answer(f"GET / HTTP/1.1\r\nHost: 127.0.0.1{letter}Range: bytes=0-\r\n\r\n"), 400, "control character")

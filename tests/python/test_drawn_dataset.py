@@ -1,4 +1,7 @@
 
+import os
+import shutil
+
 import numpy as np
 import pytest
 
@@ -164,7 +167,7 @@ def test_mistakes_and_damage_are_named(folder, job, tmp_path, examples):
     with pytest.raises(ts.Error, match="000002.h5: doesn't meet its checksum"):
         ts.Dataset(copy).verify()
     block.write_bytes(b"short")
-    with pytest.raises(ts.Error, match="000002.h5: can't be read") as caught:
+    with pytest.raises(ts.Error, match="000002.h5: doesn't meet its checksum") as caught:
         ts.Dataset(copy)[6]
     assert caught.value.file == str(block)
     manifest = copy / "dataset.json"
@@ -184,3 +187,23 @@ def test_torch_takes_a_drawn_set(folder):
     loader = torch.utils.data.DataLoader(ts.Dataset(folder, "test"), batch_size=5, shuffle=True, num_workers=2)
     (batch,) = list(loader)
     assert tuple(batch["frame"].shape) == (5, 60, 80, 3) and tuple(batch["wrench"].shape) == (5, 6)
+
+
+def test_no_flipped_bit_gives_numbers(folder, tmp_path):
+    """A block is compared with its checksum at its first use, whatever the bit."""
+    copy = tmp_path / "copy"
+    shutil.copytree(folder, copy)
+    block = copy / "blocks/000001.h5"
+    whole = block.read_bytes()
+    for k in range(40):
+        damaged = bytearray(whole)
+        damaged[(2 * k + 1) * len(whole) // 80] ^= 1 << k % 8
+        block.write_bytes(damaged)
+        data = ts.Dataset(copy, columns=("frame", "wrench", "background"))
+        assert data[0]["frame"].size > 0, "another block is as it was"
+        with pytest.raises(ts.Error, match="000001.h5: doesn't meet its checksum"):
+            data[3]
+    block.unlink()
+    os.mkfifo(block)
+    with pytest.raises(ts.Error, match="000001.h5: is a pipe or a device"):
+        ts.Dataset(copy).array("wrench")
