@@ -10,6 +10,7 @@
 #include "core/units.h"
 #include "datasets/jobs/scenes_folder.h"
 #include "python/src/bindings.h"
+#include "python/src/named_objects.h"
 #include "python/src/sensor.h"
 #include "sim/press/first_touch.h"
 #include "sim/press/gel_setup.h"
@@ -52,20 +53,23 @@ std::string json_of(const py::handle& value) {
   }
 }
 
-/// From a dict of a file's fields (JSON is YAML), a path, or a shipped file's name.
-template <typename Spec>
-Spec spec_from(const py::handle& value, const char* folder) {
-  if (py::isinstance<py::dict>(value)) {
-    return parse_yaml<Spec>(json_of(value), "dict");
-  }
+/// The file of a path, or of a shipped file's name.
+fs::path file_from(const py::handle& value, const char* folder) {
   const py::module_ os = py::module_::import("os");
   const py::object path = os.attr("fspath")(value);
   try {
-    return read_yaml<Spec>(named_file(os.attr("fsencode")(path).cast<std::string>(), folder));
+    return named_file(os.attr("fsencode")(path).cast<std::string>(), folder);
   } catch (const py::error_already_set& error) {
     if (!error.matches(PyExc_UnicodeError)) throw;
     fail("{}: can't be a path", std::string(py::str(py::module_::import("builtins").attr("ascii")(path))));
   }
+}
+
+/// From a dict of a file's fields (JSON is YAML), a path, or a shipped file's name.
+template <typename Spec>
+Spec spec_from(const py::handle& value, const char* folder) {
+  if (py::isinstance<py::dict>(value)) return parse_yaml<Spec>(json_of(value), "dict");
+  return read_yaml<Spec>(file_from(value, folder));
 }
 
 std::shared_ptr<Sensor> make_sensor(const py::object& device, std::uint64_t unit, double deepest_mm, double widest_mm,
@@ -174,7 +178,11 @@ py::array rows_in(const std::vector<Point>& points, py::ssize_t columns, const p
 
 SharedObject object_from(const py::handle& value) {
   if (py::isinstance<sim::ObjectSpec>(value)) return value.cast<std::shared_ptr<sim::ObjectSpec>>();
-  return std::make_shared<const sim::ObjectSpec>(spec_from<sim::ObjectSpec>(value, "objects"));
+  if (py::isinstance<py::dict>(value)) {
+    return std::make_shared<const sim::ObjectSpec>(parse_yaml<sim::ObjectSpec>(json_of(value), "dict"));
+  }
+  static NamedObjects named;
+  return named.of(file_from(value, "objects"));
 }
 
 SharedObject object_for(const Sensor& sensor, const py::handle& value) {

@@ -1,9 +1,11 @@
 import gc
 import os
 import pathlib
+import struct
 import subprocess
 import sys
 import threading
+import zlib
 
 import numpy as np
 import pytest
@@ -281,3 +283,47 @@ def test_a_sensors_own_arrays_cant_be_written(sensor, ball):
     again = sensor.press(ball, force_N=0.3)
     assert np.array_equal(again.force_N, before) and again.frame.max() > 0 and np.nanmax(again.height_mm) > 0
     assert np.abs(again.surface_displacement_mm).max() > 0 and sensor.background().max() > 0
+
+
+def _grey_png(file, grey):
+    """A picture of 8 x 8 pixels."""
+    def chunk(kind, data):
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+    rows = b"".join(b"\0" + bytes([grey] * 4 + [0] * 4) for _ in range(8))
+    file.write_bytes(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", 8, 8, 8, 0, 0, 0, 0)) +
+                     chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b""))
+
+
+def _changed(file, write):
+    """Written by `write`, at a time that differs."""
+    was = file.stat().st_mtime_ns
+    write()
+    os.utime(file, ns=(was + 10**9, was + 10**9))
+
+
+def test_a_named_object_is_read_again_once_its_files_change(sensor, tmp_path):
+    picture, file = tmp_path / "steps.png", tmp_path / "stamp.yaml"
+    text = ("name: stamp\nshape: {{type: cylinder, radius_mm: {}, height_mm: 4}}\n"
+            "relief: {{type: image, file: steps.png, size_mm: [4, 4], amplitude_um: 100}}\n")
+    _grey_png(picture, 255)
+    file.write_text(text.format(2))
+
+    def pressed(of):
+        return sensor.press(of, depth_mm=0.1).height_mm
+
+    def same(one, other):
+        return np.array_equal(one, other, equal_nan=True)
+
+    first = pressed(file)
+    assert same(pressed(str(file)), first)
+    _changed(picture, lambda: _grey_png(picture, 60))
+    second = pressed(file)
+    assert not same(second, first)
+    assert same(second, pressed(ts.Object(file)))
+    _changed(file, lambda: file.write_text(text.format(1)))
+    third = pressed(file)
+    assert not same(third, second)
+    assert same(third, pressed(ts.Object(file)))
+    file.unlink()
+    with pytest.raises(ts.Error, match="stamp.yaml"):
+        pressed(file)
