@@ -303,7 +303,7 @@ def _changed(file, write):
 
 def test_a_named_object_is_read_again_once_its_files_change(sensor, tmp_path):
     picture, file = tmp_path / "steps.png", tmp_path / "stamp.yaml"
-    text = ("name: stamp\nshape: {{type: cylinder, radius_mm: {}, height_mm: 4}}\n"
+    text = ("name: stamp\nshape: {{type: sphere, radius_mm: {}}}\n"
             "relief: {{type: image, file: steps.png, size_mm: [4, 4], amplitude_um: 100}}\n")
     _grey_png(picture, 255)
     file.write_text(text.format(2))
