@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
@@ -60,8 +61,9 @@ void require_address_space() {
 #endif
 
 int complain(int code, const std::string& message) {
-  std::string line = message;
-  std::replace(line.begin(), line.end(), '\n', ' ');
+  std::string line = message;  // of what a file holds, it may hold anything
+  std::ranges::replace_if(
+      line, [](unsigned char c) { return std::iscntrl(c) != 0; }, ' ');
   std::fputs(("touchstone: " + line + "\n").c_str(), stderr);  // fmt would throw where stderr can't be written
   return code;
 }

@@ -63,7 +63,7 @@ class DensityPairs {
     Eigen::MatrixXd cut;
     Eigen::MatrixXd whole;
   };
-  Responses take();
+  Responses take();  ///< see above
 
  private:
   static constexpr int kTerms = 6;

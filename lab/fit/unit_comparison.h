@@ -23,6 +23,7 @@ struct UnitRecording {
 /// A variable of the fit beside the unknowns: something of one press.
 struct PoseVariable {
   int press = 0;
+  /// Of its place, or how deep it is.
   enum class Of : std::uint8_t { x, y, depth } of = Of::depth;
   double label = 0.0, deviation = 0.0;  // deviation 0: nothing was labelled
 };
@@ -71,17 +72,19 @@ class UnitComparison {
 
   /// Of the variables' values.
   Eigen::VectorXd unknowns(const Eigen::VectorXd& x) const;
-  std::vector<PressPose> poses(const Eigen::VectorXd& x) const;
+  std::vector<PressPose> poses(const Eigen::VectorXd& x) const;  ///< likewise
   /// What is compared of a simulated picture beside the simulated background.
   std::vector<double> values(const Compared& picture, const cv::Mat& shown, const cv::Mat& background) const;
+  /// The simulated picture that belongs to it.
   static const cv::Mat& picture_in(const SimulatedUnit& shown, const Compared& picture);
 
+  /// Pictures, then forces, then labels, each over its noise: `rows()` numbers.
   Eigen::VectorXd residuals(const Eigen::VectorXd& x) const;
   /// How many pictures, each of one source of light, are drawn for a first place, for another one, and for the
   /// derivatives there.
   std::int64_t pictures_of_all() const;
-  std::int64_t pictures_of_place() const;
-  std::int64_t pictures_of_derivatives() const;
+  std::int64_t pictures_of_place() const;        ///< see above
+  std::int64_t pictures_of_derivatives() const;  ///< see above
 
   /// Unknowns that cost no light (powers, the imager's, a modulus) are settled at each place.
   LeastSquaresProblem problem() const;

@@ -22,7 +22,7 @@ struct DirectFrame {
   const DirectFixture& fixture;
   const PacketScene& tree;
   const SheetIndex* sheet;                       ///< of the first surface, where that isn't in the tree; else null
-  const ShadowReach* shadow_reach;               ///< null: no shadow is asked for by rays
+  const ShadowReach* shadow_reach;               ///< null: no shadow is asked for by rays; of what is in the tree
   const SheetHorizons* horizons;                 ///< of the first object, where it alone casts shadows; else null
   const std::vector<DirectMaterial>& materials;  ///< by object
 };
@@ -37,6 +37,7 @@ struct DirectCounts {
 class DirectBatch {
  public:
   static constexpr int kMostPackets = 16;
+  static constexpr int kTilesATask = 2 * kMostPackets;  ///< packets that a thread takes on at a time
 
   /// Allocates kMostPackets packets. The frame must outlive this.
   explicit DirectBatch(const DirectFrame& frame);
@@ -54,6 +55,9 @@ class DirectBatch {
   };
   /// Takes that for a lane, so that no shadow ray asks.
   void take_as_known(int lane, const Visibility& known);
+  /// Takes for a lane which share of each lamp's light what is in the tree lets through: between two such lists, of
+  /// 255, `part` of the way from the first to the second.
+  void take_shares(int lane, const std::uint8_t* one, const std::uint8_t* other, float part);
 
   /// Takes away what doesn't get through.
   void cast_shadows(DirectCounts& counts);
@@ -69,6 +73,11 @@ class DirectBatch {
     float u, v;
   };
   std::optional<SheetPlace> sheet_place(int lane) const;  ///< see above
+  /// Where a lane has met the first surface, mm, if lamps light it; null where it hasn't. As long as the lane's rays
+  /// are kept.
+  const float* lit_sheet_place(int lane) const {
+    return takes_light(lane) && lanes_[lane].object == 0 ? lanes_[lane].place : nullptr;
+  }
   /// The triangle of the first surface that a lane's ray met; -1 where it met something else, or nothing.
   int sheet_triangle(int lane) const {
     const Lane& one = lanes_[lane];
@@ -144,5 +153,16 @@ class DirectBatch {
   PacketHorizons around_{};
   std::vector<float> shares_;  // [beam][lane of a packet]
 };
+
+/// work(lane, row, column) of the packets' lanes that lie on the grid.
+template <typename Work>
+void for_lanes_on_grid(const CameraRays& rays, int first_tile, int packets, const Work& work) {
+  for (int lane = 0; lane < packets * kPacket; ++lane) {
+    const int tile = first_tile + lane / kPacket;
+    const int row = tile / rays.tiles_across * CameraRays::kSide + lane % kPacket / CameraRays::kSide;
+    const int column = tile % rays.tiles_across * CameraRays::kSide + lane % CameraRays::kSide;
+    if (column < rays.grid.columns && row < rays.grid.rows) work(lane, row, column);
+  }
+}
 
 }  // namespace touchstone::render

@@ -23,17 +23,6 @@ Eigen::Vector2d place_at_height(const LayerRay& ray, double z) {
   return (ray.origin + (z - ray.origin.z()) / ray.direction.z() * ray.direction).head<2>();
 }
 
-/// The scene with nothing of its first surface.
-Scene without_first(const Scene& scene) {
-  Scene rest;
-  rest.environment = scene.environment;
-  rest.surfaces.reserve(scene.surfaces.size());
-  rest.surfaces.push_back({{}, scene.surfaces[0].material});
-  rest.surfaces.insert(rest.surfaces.end(), scene.surfaces.begin() + 1, scene.surfaces.end());
-  rest.balls = scene.balls;
-  return rest;
-}
-
 }  // namespace
 
 DirectRenderer::Parts::Parts(const LightField& field, const Camera& camera_of, const Scene& rest,
@@ -45,7 +34,7 @@ DirectRenderer::Parts::Parts(const LightField& field, const Camera& camera_of, c
       seen_box(find_seen_box()),
       horizon_settings(find_horizon_settings()),
       lone_sheet(is_lone_sheet(rest)),
-      tree(lone_sheet ? without_first(rest) : rest),
+      tree(lone_sheet ? still_things(rest) : rest),
       connected(!rest.surfaces.empty() && is_connected(rest.surfaces[0].mesh)),
       spreads(settings.samples == 1 && settings.blur) {
   if (lone_sheet) {
@@ -58,6 +47,8 @@ DirectRenderer::Parts::Parts(const LightField& field, const Camera& camera_of, c
   }
   set_up_films(rest);
   rays = trace_to_layer(field.fixture, camera, grid, field.layer, settings.samples, settings.seed);
+  if (lone_sheet && settings.shadows && !is_sheet_alone(fixture.bearings, rest))
+    still.emplace(find_still_shadows(rest));
   if (!spreads) return;
   radiance.resize(static_cast<std::size_t>(grid.columns) * grid.rows * rays.bands);
   refines = footprint.narrowest < kSharp && settings.edge_side > 1;

@@ -2,6 +2,7 @@
 // What a DirectRenderer keeps from frame to frame, and how it is set up (direct_parts.cpp); direct_renderer.cpp draws.
 
 #include <Eigen/Geometry>
+#include <array>
 #include <map>
 #include <memory>
 #include <optional>
@@ -13,12 +14,25 @@
 #include "render/direct/direct_batch.h"
 #include "render/direct/direct_fixture.h"
 #include "render/direct/direct_renderer.h"
+#include "render/direct/shadow_reach.h"
 #include "render/direct/sheet_horizons.h"
 #include "render/direct/sheet_points.h"
 #include "render/materials/ggx.h"
 #include "render/scene/packet_scene.h"
 
 namespace touchstone::render {
+/// The light that still things keep from a sheet which moves before them. What a pixel sees of it lies on the pixel's
+/// ray, so it's known from some heights of the sheet, whatever the sheet's shape.
+struct StillShadows {
+  ShadowReach reach;  ///< of the still things
+  /// One height of the sheet.
+  struct Level {
+    std::vector<float> z;              ///< by grid point, where its ray met the sheet, mm; infinite where it didn't
+    std::vector<std::uint8_t> shares;  ///< [grid point][lamp]: of 255, what gets through to there
+  };
+  std::vector<Level> levels;  ///< the sheet at rest, moved along z: from outside inwards
+};
+
 /// All that a renderer keeps from frame to frame.
 struct DirectRenderer::Parts {
   DirectFixture fixture;
@@ -27,13 +41,14 @@ struct DirectRenderer::Parts {
   float pixel_mm;                // between the rays of pixels beside each other, in the middle of the field's box
   Eigen::AlignedBox2d seen_box;  // x and y of all that rays to the field's layer pass between its lowest and highest
   std::optional<HorizonSettings> horizon_settings;  // where one sample is taken and light comes from one side
-  bool lone_sheet;  // the first surface alone casts shadows: asked for by SheetIndex and SheetHorizons, not in `tree`
+  bool lone_sheet;  // the first surface alone moves: asked for by SheetIndex and SheetHorizons, not in `tree`
   std::vector<TriangleMesh> others;  // of a lone sheet: all but the first surface, at rest
   PacketScene tree;
   std::vector<Surface> films;
-  bool connected;        // the first surface
-  bool spreads;          // central rays, then the footprint
-  bool refines = false;  // more rays at edges
+  std::optional<StillShadows> still;  // where a lone sheet isn't alone in casting shadows
+  bool connected;                     // the first surface
+  bool spreads;                       // central rays, then the footprint
+  bool refines = false;               // more rays at edges
   CameraFootprint footprint;
   CameraRays rays;
   // By pixel and band, where central rays are spread; see CameraRays.
@@ -49,13 +64,13 @@ struct DirectRenderer::Parts {
 
   int width() const { return size_of_grid(pixel_grid(camera)).x(); }
   int height() const { return size_of_grid(pixel_grid(camera)).y(); }
-  /// Does the first surface alone cast shadows, and do horizons say where?
-  bool is_lone_sheet(const Scene& scene) const {
-    return horizon_settings.has_value() && is_sheet_alone(fixture.bearings, scene);
-  }
+  /// Does the first surface alone move, as far as a scene at rest says, and do horizons say where it casts shadows?
+  bool is_lone_sheet(const Scene& rest) const;
   /// Does all but the first surface stand where it stood at rest?
   bool stands_still(const Scene& scene) const;
 
+  /// What is known of a lane's shadows by still things is taken, if the frame's sheet is asked for horizons.
+  void take_still(const DirectFrame& frame, DirectBatch& batch, int lane, std::size_t point) const;
   /// Casts the rays and shades what they meet: into `radiance`, or into the picture where nothing is spread.
   void cast(const DirectFrame& frame, DirectImage& image);
   /// Casts more rays where `radiance` has edges.
@@ -84,6 +99,12 @@ struct DirectRenderer::Parts {
   void find_footprint(const Scene& rest);
 
   std::optional<HorizonSettings> find_horizon_settings() const;
+
+  /// The scene with nothing of its first surface.
+  static Scene still_things(const Scene& rest);
+  StillShadows find_still_shadows(const Scene& rest);
+  StillShadows::Level find_still_level(const ShadowReach& reach, const Surface& sheet,
+                                       const std::vector<DirectMaterial>& materials) const;
 
   /// Of a coarse grid of pixels, with what lies beside the outermost by half its spacing and by the blur.
   Eigen::AlignedBox2d find_seen_box() const;

@@ -23,8 +23,6 @@
 namespace touchstone::render {
 namespace {
 
-constexpr int kTilesATask = 2 * DirectBatch::kMostPackets;
-
 void check_settings(const DirectSettings& settings) {
   if (settings.samples < 1 || settings.samples > 64) {
     fail("direct renderer: samples is {}; it must be from 1 to 64", settings.samples);
@@ -48,24 +46,13 @@ void count_up(const std::vector<DirectCounts>& task_counts, DirectImage& image) 
   }
 }
 
-/// work(lane, row, column) of the packets' lanes that lie on the grid.
-template <typename Work>
-void for_lanes_on_grid(const CameraRays& rays, int first_tile, int packets, const Work& work) {
-  for (int lane = 0; lane < packets * kPacket; ++lane) {
-    const int tile = first_tile + lane / kPacket;
-    const int row = tile / rays.tiles_across * CameraRays::kSide + lane % kPacket / CameraRays::kSide;
-    const int column = tile % rays.tiles_across * CameraRays::kSide + lane % CameraRays::kSide;
-    if (column < rays.grid.columns && row < rays.grid.rows) work(lane, row, column);
-  }
-}
-
 }  // namespace
 
 void DirectRenderer::Parts::cast(const DirectFrame& frame, DirectImage& image) {
   const int bands = rays.bands;
   const int samples = settings.samples;
   const int columns = rays.grid.columns;
-  const int tasks = (rays.tiles + kTilesATask - 1) / kTilesATask;
+  const int tasks = (rays.tiles + DirectBatch::kTilesATask - 1) / DirectBatch::kTilesATask;
   const std::size_t points = static_cast<std::size_t>(columns) * rays.grid.rows;
   if (samples == 1) sheet_triangles.assign(points, -1);
   const std::array<float, kMaxBands> whole = [] {
@@ -77,8 +64,8 @@ void DirectRenderer::Parts::cast(const DirectFrame& frame, DirectImage& image) {
   tbb::parallel_for(0, tasks, [&](int task) {
     DirectBatch batch(frame);
     DirectCounts& counts = task_counts[task];
-    const int task_end = std::min(rays.tiles, (task + 1) * kTilesATask);
-    for (int first = task * kTilesATask; first < task_end; first += DirectBatch::kMostPackets) {
+    const int task_end = std::min(rays.tiles, (task + 1) * DirectBatch::kTilesATask);
+    for (int first = task * DirectBatch::kTilesATask; first < task_end; first += DirectBatch::kMostPackets) {
       const int packets = std::min(DirectBatch::kMostPackets, task_end - first);
       for (int sample = 0; sample < samples; ++sample) {
         const std::size_t number = static_cast<std::size_t>(sample) * rays.tiles + first;
@@ -94,6 +81,9 @@ void DirectRenderer::Parts::cast(const DirectFrame& frame, DirectImage& image) {
             batch.choose_lens_points(lane, u, v);
           });
         }
+        for_lanes([&](int lane, int row, int column) {
+          take_still(frame, batch, lane, static_cast<std::size_t>(row) * columns + column);
+        });
         if (frame.shadow_reach != nullptr) batch.cast_shadows(counts);
         for_lanes([&](int lane, int row, int column) {
           const std::size_t point = static_cast<std::size_t>(row) * columns + column;
@@ -133,14 +123,17 @@ SheetPoints DirectRenderer::Parts::points_of(const DirectFrame& frame, const Sur
   out.on_sheet.assign(count, 0);
   out.others.assign(count * bands, 0.0f);
   const std::vector<float> whole(bands, 1.0f);
-  const int tasks = (rays.tiles + kTilesATask - 1) / kTilesATask;
+  const int tasks = (rays.tiles + DirectBatch::kTilesATask - 1) / DirectBatch::kTilesATask;
   tbb::parallel_for(0, tasks, [&](int task) {
     DirectBatch batch(frame);
     DirectCounts counts;
-    const int task_end = std::min(rays.tiles, (task + 1) * kTilesATask);
-    for (int first = task * kTilesATask; first < task_end; first += DirectBatch::kMostPackets) {
+    const int task_end = std::min(rays.tiles, (task + 1) * DirectBatch::kTilesATask);
+    for (int first = task * DirectBatch::kTilesATask; first < task_end; first += DirectBatch::kMostPackets) {
       const int packets = std::min(DirectBatch::kMostPackets, task_end - first);
       batch.intersect({rays.packets.data() + first, static_cast<std::size_t>(packets)}, counts);
+      for_lanes_on_grid(rays, first, packets, [&](int lane, int row, int column) {
+        take_still(frame, batch, lane, static_cast<std::size_t>(row) * rays.grid.columns + column);
+      });
       if (frame.shadow_reach != nullptr) batch.cast_shadows(counts);
       for_lanes_on_grid(rays, first, packets, [&](int lane, int row, int column) {
         const std::size_t point = static_cast<std::size_t>(row) * rays.grid.columns + column;
@@ -235,7 +228,10 @@ void DirectRenderer::Parts::refine(const DirectFrame& frame, DirectImage& image)
     if (frame.shadow_reach != nullptr) {
       for (int k = 0; k < count; ++k) {
         const DirectBatch::Visibility known = known_round(edges[first + k]);
-        for (int ray = 0; ray < rays_a_point; ++ray) batch.take_as_known(k * rays_a_point + ray, known);
+        for (int ray = 0; ray < rays_a_point; ++ray) {
+          take_still(frame, batch, k * rays_a_point + ray, static_cast<std::size_t>(edges[first + k]));
+          batch.take_as_known(k * rays_a_point + ray, known);
+        }
       }
       batch.cast_shadows(task_counts[task]);
     }
@@ -349,9 +345,10 @@ std::unique_ptr<DirectRenderer::Parts::Prepared> DirectRenderer::Parts::prepare(
         fixture.bearings, scene,
         made->other ? !scene.surfaces.empty() && is_connected(scene.surfaces[0].mesh) : connected);
   }
+  const ShadowReach* reach = made->shadow_reach ? &*made->shadow_reach : nullptr;
+  if (made->horizons && still) reach = &still->reach;
   made->frame.emplace(DirectFrame{fixture, made->other ? *made->other : tree, made->sheet ? &*made->sheet : nullptr,
-                                  made->shadow_reach ? &*made->shadow_reach : nullptr,
-                                  made->horizons ? &*made->horizons : nullptr, made->materials});
+                                  reach, made->horizons ? &*made->horizons : nullptr, made->materials});
   return made;
 }
 

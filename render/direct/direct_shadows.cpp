@@ -160,6 +160,17 @@ void DirectBatch::take_as_known(int lane, const Visibility& known) {
   one.doubt &= ~(known.open | known.hidden);
 }
 
+void DirectBatch::take_shares(int lane, const std::uint8_t* one, const std::uint8_t* other, float part) {
+  if (!takes_light(lane)) return;
+  float* const amount = amounts(lane);
+  for (std::uint64_t rest = lanes_[lane].doubt; rest != 0; rest &= rest - 1) {
+    const int lamp = std::countr_zero(rest);
+    const auto from = static_cast<float>(one[lamp]);
+    amount[lamp] *= (from + part * (static_cast<float>(other[lamp]) - from)) / 255.0f;
+  }
+  lanes_[lane].doubt = 0;
+}
+
 DirectBatch::Visibility DirectBatch::visibility(int lane) const {
   const Lane& one = lanes_[lane];
   Visibility found;

@@ -50,7 +50,7 @@ ONLY_READERS = [
     r"isn't a name", r"can't name (a folder|files)", r"relief.text: there's no letter", r"an sRGB colour is #",
     # one value against another
     r"leads that axis to a force", r"the numbers must rise", r"can't be shifted by", r"the first must not be the larger", r"draws go from",
-    r"leave nothing of cells", r"there's no grit", r"each level needs one", r"add up to", r"each unit needs one", r"that differ in nothing",
+    r"leave nothing of cells", r"there's no grit", r"each level needs one", r"add up to", r"samples, \d+ a file; allowed are", r"each unit needs one", r"that differ in nothing",
     # studies of designs
     r"a number that is to be changed must stand there", r"is varied twice", r"(values|vary): is empty", r"values: \S+ after \S+, they must rise",
     r"'plate' is missing, through which", r"'from' is missing", r"needs two depths or more", r"it must be at least load_N",

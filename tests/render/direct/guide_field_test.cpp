@@ -234,6 +234,48 @@ TEST(DirectGuides, LeaveNoRasterInSoftShadows) {
   EXPECT_LT(cv::norm(with - by_rays, cv::NORM_L2), 0.015 * cv::norm(with, cv::NORM_L2));
 }
 
+/// A black wall across the view, between the first guide and most of the sheet.
+Surface wall_at(double x) {
+  TriangleMesh mesh;
+  mesh.vertices = {{x, -8, -1.1}, {x, 8, -1.1}, {x, 8, -0.4}, {x, -8, -0.4}};
+  mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
+  return {mesh, Black{}};
+}
+
+// The sheet's own shadows by horizons, the wall's as they are at rest where the sheet stays, else by rays: all as by
+// rays alone, which a ball far aside brings about. A wall that moves after all is seen where it is.
+TEST(DirectGuides, AWallBesideTheSheetHidesThemAsByRays) {
+  Scene rest = dented_guide_scene(0.0);
+  Scene scene = dented_guide_scene(0.9);
+  const LightField field = field_of(scene, 1e-2);
+  const PinholeCamera camera = small_camera(192, 144);
+  const cv::Mat open = DirectRenderer(field, camera, scene).render(scene).irradiance;
+  rest.surfaces.push_back(wall_at(-3.0));
+  scene.surfaces.push_back(wall_at(-3.0));
+  Scene moved = scene;
+  moved.surfaces[1] = wall_at(-2.0);
+  const auto by_rays = [&](Scene with) {
+    with.balls.push_back({{7.5, -7.5, -0.5}, 0.01, Black{}});
+    return DirectRenderer(field, camera, with).render(with);
+  };
+  DirectRenderer renderer(field, camera, rest);
+  const auto off = [&](const Scene& one) {
+    const cv::Mat found = renderer.render(one).irradiance;
+    const cv::Mat expected = by_rays(one).irradiance;
+    return cv::norm(found - expected, cv::NORM_L2) / cv::norm(expected, cv::NORM_L2);
+  };
+  const double all = cv::norm(open, cv::NORM_L2);
+  EXPECT_GT(cv::norm(open - by_rays(scene).irradiance, cv::NORM_L2), 0.1 * all) << "the wall hides nothing";
+  const double rest_off = off(rest);
+  const double dent_off = off(scene);
+  RecordProperty("rest_1e-6", static_cast<int>(1e6 * rest_off));
+  RecordProperty("dent_1e-6", static_cast<int>(1e6 * dent_off));
+  EXPECT_LT(rest_off, 0.015);
+  EXPECT_LT(dent_off, 0.025);  // light is interpolated between heights of the sheet
+  const DirectImage after = by_rays(moved);
+  EXPECT_LT(cv::norm(renderer.render(moved).irradiance - after.irradiance, cv::NORM_L2), 1e-3 * all);
+}
+
 TEST(DirectPrints, EqualThePathTracersPicture) {
   Scene scene = dented_guide_scene(0.9);
   scene.surfaces[0].print = markers_of(dented_sheet(0.0));
