@@ -21,6 +21,12 @@ constexpr int kLevels = 7;
 constexpr double kLevelStep_mm = 0.25;
 constexpr double kOutermost_mm = kLevelStep_mm;  // the gel rises beside a contact; the second is that of rest
 
+bool is_curved(const Surface& sheet) {
+  constexpr double kFlat_mm = 0.05;
+  const auto [low, high] = std::ranges::minmax(sheet.mesh.vertices, {}, [](const Eigen::Vector3d& v) { return v.z(); });
+  return high.z() - low.z() > kFlat_mm;
+}
+
 /// Shares of 255 of what the points of a square round each see. Shadow rays of 4 x 4 points beside each other go to
 /// sixteen parts of a beam; with these weights each part counts alike.
 std::vector<std::uint8_t> shares_around(const std::vector<DirectBatch::Visibility>& seen, const ImageGrid& grid,
@@ -67,8 +73,9 @@ Scene DirectRenderer::Parts::still_things(const Scene& rest) {
 bool DirectRenderer::Parts::is_lone_sheet(const Scene& rest) const {
   if (!horizon_settings) return false;
   if (is_sheet_alone(fixture.bearings, rest)) return true;
-  // A sheet and its frame; of more things some may move.
-  return rest.surfaces.size() == 2 && rest.balls.empty() && !is_film(rest.surfaces[1]) &&
+  // A sheet and its frame; of more things some may move. Of a flat sheet few places are in doubt, and rays are as
+  // quick.
+  return rest.surfaces.size() == 2 && rest.balls.empty() && !is_film(rest.surfaces[1]) && is_curved(rest.surfaces[0]) &&
          SheetHorizons::find(rest.surfaces[0].mesh, *horizon_settings).has_value();
 }
 
