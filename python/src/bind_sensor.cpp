@@ -179,7 +179,7 @@ py::array rows_in(const std::vector<Point>& points, py::ssize_t columns, const p
 SharedObject object_from(const py::handle& value) {
   if (py::isinstance<sim::ObjectSpec>(value)) return value.cast<std::shared_ptr<sim::ObjectSpec>>();
   if (py::isinstance<py::dict>(value)) {
-    return std::make_shared<const sim::ObjectSpec>(parse_yaml<sim::ObjectSpec>(json_of(value), "dict"));
+    return std::make_shared<const sim::ObjectSpec>(spec_from<sim::ObjectSpec>(value, "objects"));
   }
   static NamedObjects named;
   return named.of(file_from(value, "objects"));

@@ -7,8 +7,6 @@
 namespace touchstone::python {
 namespace {
 
-constexpr std::size_t kKept = 8;  // as many as a sensor keeps
-
 /// What an object's own file names.
 std::vector<std::filesystem::path> files_named_by(const sim::ObjectSpec& object) {
   std::vector<std::filesystem::path> files;
@@ -51,7 +49,7 @@ SharedObject NamedObjects::of(const std::filesystem::path& file) {
     if (state) files.push_back(*state);
   }
   if (!all) return object;
-  if (known_.size() >= kKept) known_.erase(known_.begin());
+  if (known_.size() >= kObjectsKept) known_.erase(known_.begin());
   known_.push_back({place, std::move(files), object});
   return object;
 }

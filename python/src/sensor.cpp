@@ -5,12 +5,6 @@
 #include "sim/press/touch_doubts.h"
 
 namespace touchstone::python {
-namespace {
-
-constexpr std::size_t kObjectsKept = 8;
-
-}  // namespace
-
 sim::TouchObject Sensor::object(const SharedObject& object) const {
   {
     const std::lock_guard<std::mutex> lock(mutex_);

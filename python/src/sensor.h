@@ -20,6 +20,9 @@ namespace touchstone::python {
 /// A touched object; sensors know it by its address.
 using SharedObject = std::shared_ptr<const sim::ObjectSpec>;
 
+/// As many of the objects named last are kept, each with what a sensor made of it.
+inline constexpr std::size_t kObjectsKept = 8;
+
 /// One touch: what the sensor delivers and what is true of it.
 struct Touch {
   sim::Touch of;              ///< contact: 0 and 1

@@ -37,7 +37,6 @@ struct DirectCounts {
 class DirectBatch {
  public:
   static constexpr int kMostPackets = 16;
-  static constexpr int kTilesATask = 2 * kMostPackets;  ///< packets that a thread takes on at a time
 
   /// Allocates kMostPackets packets. The frame must outlive this.
   explicit DirectBatch(const DirectFrame& frame);
@@ -153,16 +152,5 @@ class DirectBatch {
   PacketHorizons around_{};
   std::vector<float> shares_;  // [beam][lane of a packet]
 };
-
-/// work(lane, row, column) of the packets' lanes that lie on the grid.
-template <typename Work>
-void for_lanes_on_grid(const CameraRays& rays, int first_tile, int packets, const Work& work) {
-  for (int lane = 0; lane < packets * kPacket; ++lane) {
-    const int tile = first_tile + lane / kPacket;
-    const int row = tile / rays.tiles_across * CameraRays::kSide + lane % kPacket / CameraRays::kSide;
-    const int column = tile % rays.tiles_across * CameraRays::kSide + lane % CameraRays::kSide;
-    if (column < rays.grid.columns && row < rays.grid.rows) work(lane, row, column);
-  }
-}
 
 }  // namespace touchstone::render

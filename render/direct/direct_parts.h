@@ -69,8 +69,10 @@ struct DirectRenderer::Parts {
   /// Does all but the first surface stand where it stood at rest?
   bool stands_still(const Scene& scene) const;
 
-  /// What is known of a lane's shadows by still things is taken, if the frame's sheet is asked for horizons.
-  void take_still(const DirectFrame& frame, DirectBatch& batch, int lane, std::size_t point) const;
+  /// Are still things' shadows on the frame's sheet known? Then each lane takes them before it asks by rays.
+  bool knows_still(const DirectFrame& frame) const { return still && frame.horizons != nullptr; }
+  void take_still(DirectBatch& batch, int first_tile, int packets) const;  ///< all lanes of a batch
+  void take_still(DirectBatch& batch, int lane, std::size_t point) const;  ///< a lane that sees near a grid point
   /// Casts the rays and shades what they meet: into `radiance`, or into the picture where nothing is spread.
   void cast(const DirectFrame& frame, DirectImage& image);
   /// Casts more rays where `radiance` has edges.

@@ -15,6 +15,7 @@
 #include "render/cameras/edge_rays.h"
 #include "render/direct/direct_fitness.h"
 #include "render/direct/direct_parts.h"
+#include "render/direct/grid_batches.h"
 #include "render/direct/shadow_reach.h"
 #include "render/sampling/sample_sequence.h"
 #include "render/scene/film_screen.h"
@@ -52,7 +53,6 @@ void DirectRenderer::Parts::cast(const DirectFrame& frame, DirectImage& image) {
   const int bands = rays.bands;
   const int samples = settings.samples;
   const int columns = rays.grid.columns;
-  const int tasks = (rays.tiles + DirectBatch::kTilesATask - 1) / DirectBatch::kTilesATask;
   const std::size_t points = static_cast<std::size_t>(columns) * rays.grid.rows;
   if (samples == 1) sheet_triangles.assign(points, -1);
   const std::array<float, kMaxBands> whole = [] {
@@ -60,53 +60,44 @@ void DirectRenderer::Parts::cast(const DirectFrame& frame, DirectImage& image) {
     ones.fill(1.0f);
     return ones;
   }();
-  std::vector<DirectCounts> task_counts(tasks);
-  tbb::parallel_for(0, tasks, [&](int task) {
-    DirectBatch batch(frame);
-    DirectCounts& counts = task_counts[task];
-    const int task_end = std::min(rays.tiles, (task + 1) * DirectBatch::kTilesATask);
-    for (int first = task * DirectBatch::kTilesATask; first < task_end; first += DirectBatch::kMostPackets) {
-      const int packets = std::min(DirectBatch::kMostPackets, task_end - first);
-      for (int sample = 0; sample < samples; ++sample) {
-        const std::size_t number = static_cast<std::size_t>(sample) * rays.tiles + first;
-        batch.intersect({rays.packets.data() + number, static_cast<std::size_t>(packets)}, counts);
-        const auto for_lanes = [&](const auto& work) { for_lanes_on_grid(rays, first, packets, work); };
-        if (frame.shadow_reach != nullptr && samples > 1) {
-          for_lanes([&](int lane, int row, int column) {
-            SampleSequence numbers(settings.seed,
-                                   static_cast<std::uint64_t>(row) * std::uint64_t(columns) + std::uint64_t(column),
-                                   static_cast<std::uint32_t>(sample));
-            for (int drawn = 0; drawn < 3; ++drawn) numbers.next_pair();  // as a path's: pixel, hole, lamp
-            const auto [u, v] = numbers.next_pair();
-            batch.choose_lens_points(lane, u, v);
-          });
-        }
+  const auto counted = for_batches(rays, frame, [&](DirectBatch& batch, int first, int packets, DirectCounts& counts) {
+    for (int sample = 0; sample < samples; ++sample) {
+      const std::size_t number = static_cast<std::size_t>(sample) * rays.tiles + first;
+      batch.intersect({rays.packets.data() + number, static_cast<std::size_t>(packets)}, counts);
+      const auto for_lanes = [&](const auto& work) { for_lanes_on_grid(rays, first, packets, work); };
+      if (frame.shadow_reach != nullptr && samples > 1) {
         for_lanes([&](int lane, int row, int column) {
-          take_still(frame, batch, lane, static_cast<std::size_t>(row) * columns + column);
-        });
-        if (frame.shadow_reach != nullptr) batch.cast_shadows(counts);
-        for_lanes([&](int lane, int row, int column) {
-          const std::size_t point = static_cast<std::size_t>(row) * columns + column;
-          if (samples == 1) sheet_triangles[point] = batch.sheet_triangle(lane);
-          const float* ambient = bounced.empty() ? nullptr : bounced.data() + point * bands;
-          if (spreads) {
-            float out[kMaxBands] = {};
-            batch.add(lane, whole.data(), ambient, out);
-            for (int band = 0; band < bands; ++band) radiance[band * points + point] = out[band];
-            if (!seen.empty() && frame.shadow_reach != nullptr) seen[point] = batch.visibility(lane);
-            return;
-          }
-          float* out = image.irradiance.ptr<float>(row) + bands * column;
-          const std::size_t slot = (number * kPacket + lane) * bands;
-          if (!rays.veil.empty()) {
-            for (int band = 0; band < bands; ++band) out[band] += rays.veil[slot + band];
-          }
-          batch.add(lane, rays.through.data() + slot, ambient, out);
+          SampleSequence numbers(settings.seed,
+                                 static_cast<std::uint64_t>(row) * std::uint64_t(columns) + std::uint64_t(column),
+                                 static_cast<std::uint32_t>(sample));
+          for (int drawn = 0; drawn < 3; ++drawn) numbers.next_pair();  // as a path's: pixel, hole, lamp
+          const auto [u, v] = numbers.next_pair();
+          batch.choose_lens_points(lane, u, v);
         });
       }
+      if (knows_still(frame)) take_still(batch, first, packets);
+      if (frame.shadow_reach != nullptr) batch.cast_shadows(counts);
+      for_lanes([&](int lane, int row, int column) {
+        const std::size_t point = static_cast<std::size_t>(row) * columns + column;
+        if (samples == 1) sheet_triangles[point] = batch.sheet_triangle(lane);
+        const float* ambient = bounced.empty() ? nullptr : bounced.data() + point * bands;
+        if (spreads) {
+          float out[kMaxBands] = {};
+          batch.add(lane, whole.data(), ambient, out);
+          for (int band = 0; band < bands; ++band) radiance[band * points + point] = out[band];
+          if (!seen.empty() && frame.shadow_reach != nullptr) seen[point] = batch.visibility(lane);
+          return;
+        }
+        float* out = image.irradiance.ptr<float>(row) + bands * column;
+        const std::size_t slot = (number * kPacket + lane) * bands;
+        if (!rays.veil.empty()) {
+          for (int band = 0; band < bands; ++band) out[band] += rays.veil[slot + band];
+        }
+        batch.add(lane, rays.through.data() + slot, ambient, out);
+      });
     }
   });
-  count_up(task_counts, image);
+  count_up(counted, image);
 }
 
 SheetPoints DirectRenderer::Parts::points_of(const DirectFrame& frame, const Surface& sheet) const {
@@ -123,48 +114,39 @@ SheetPoints DirectRenderer::Parts::points_of(const DirectFrame& frame, const Sur
   out.on_sheet.assign(count, 0);
   out.others.assign(count * bands, 0.0f);
   const std::vector<float> whole(bands, 1.0f);
-  const int tasks = (rays.tiles + DirectBatch::kTilesATask - 1) / DirectBatch::kTilesATask;
-  tbb::parallel_for(0, tasks, [&](int task) {
-    DirectBatch batch(frame);
-    DirectCounts counts;
-    const int task_end = std::min(rays.tiles, (task + 1) * DirectBatch::kTilesATask);
-    for (int first = task * DirectBatch::kTilesATask; first < task_end; first += DirectBatch::kMostPackets) {
-      const int packets = std::min(DirectBatch::kMostPackets, task_end - first);
-      batch.intersect({rays.packets.data() + first, static_cast<std::size_t>(packets)}, counts);
-      for_lanes_on_grid(rays, first, packets, [&](int lane, int row, int column) {
-        take_still(frame, batch, lane, static_cast<std::size_t>(row) * rays.grid.columns + column);
-      });
-      if (frame.shadow_reach != nullptr) batch.cast_shadows(counts);
-      for_lanes_on_grid(rays, first, packets, [&](int lane, int row, int column) {
-        const std::size_t point = static_cast<std::size_t>(row) * rays.grid.columns + column;
-        const float* ambient = bounced.empty() ? nullptr : bounced.data() + point * bands;
-        const auto met = batch.sheet_place(lane);
-        if (!met) {
-          std::array<float, kMaxBands> other{};
-          batch.add(lane, whole.data(), ambient, other.data());
-          for (int band = 0; band < bands; ++band) out.others[band * count + point] = other[band];
-          return;
-        }
-        out.on_sheet[point] = 1;
-        const auto& corners = sheet.mesh.triangles[met->triangle];
-        const double u = met->u;
-        const double v = met->v;
-        const Eigen::Vector2d at =
-            (1.0 - u - v) * material[corners[0]] + u * material[corners[1]] + v * material[corners[2]];
-        float* values = out.values.data() + point * stride;
-        values[0] = static_cast<float>(at.x());
-        values[1] = static_cast<float>(at.y());
-        const float down = std::max(-met->normal[2], 1e-6f);
-        values[2] = met->normal[0] / down;
-        values[3] = met->normal[1] / down;
-        batch.white_light(lane, ambient, values + SheetPoints::kGeometry);
-        const RayPacket& packet = rays.packets[first + lane / kPacket];
-        for (int axis = 0; axis < 3; ++axis) {
-          out.places[3 * point + axis] = met->place[axis];
-          out.directions[3 * point + axis] = packet.direction[axis][lane % kPacket];
-        }
-      });
-    }
+  for_batches(rays, frame, [&](DirectBatch& batch, int first, int packets, DirectCounts& counts) {
+    batch.intersect({rays.packets.data() + first, static_cast<std::size_t>(packets)}, counts);
+    if (knows_still(frame)) take_still(batch, first, packets);
+    if (frame.shadow_reach != nullptr) batch.cast_shadows(counts);
+    for_lanes_on_grid(rays, first, packets, [&](int lane, int row, int column) {
+      const std::size_t point = static_cast<std::size_t>(row) * rays.grid.columns + column;
+      const float* ambient = bounced.empty() ? nullptr : bounced.data() + point * bands;
+      const auto met = batch.sheet_place(lane);
+      if (!met) {
+        std::array<float, kMaxBands> other{};
+        batch.add(lane, whole.data(), ambient, other.data());
+        for (int band = 0; band < bands; ++band) out.others[band * count + point] = other[band];
+        return;
+      }
+      out.on_sheet[point] = 1;
+      const auto& corners = sheet.mesh.triangles[met->triangle];
+      const double u = met->u;
+      const double v = met->v;
+      const Eigen::Vector2d at =
+          (1.0 - u - v) * material[corners[0]] + u * material[corners[1]] + v * material[corners[2]];
+      float* values = out.values.data() + point * stride;
+      values[0] = static_cast<float>(at.x());
+      values[1] = static_cast<float>(at.y());
+      const float down = std::max(-met->normal[2], 1e-6f);
+      values[2] = met->normal[0] / down;
+      values[3] = met->normal[1] / down;
+      batch.white_light(lane, ambient, values + SheetPoints::kGeometry);
+      const RayPacket& packet = rays.packets[first + lane / kPacket];
+      for (int axis = 0; axis < 3; ++axis) {
+        out.places[3 * point + axis] = met->place[axis];
+        out.directions[3 * point + axis] = packet.direction[axis][lane % kPacket];
+      }
+    });
   });
   return out;
 }
@@ -229,7 +211,9 @@ void DirectRenderer::Parts::refine(const DirectFrame& frame, DirectImage& image)
       for (int k = 0; k < count; ++k) {
         const DirectBatch::Visibility known = known_round(edges[first + k]);
         for (int ray = 0; ray < rays_a_point; ++ray) {
-          take_still(frame, batch, k * rays_a_point + ray, static_cast<std::size_t>(edges[first + k]));
+          if (knows_still(frame)) {
+            take_still(batch, k * rays_a_point + ray, static_cast<std::size_t>(edges[first + k]));
+          }
           batch.take_as_known(k * rays_a_point + ray, known);
         }
       }

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "render/direct/direct_parts.h"
+#include "render/direct/grid_batches.h"
 #include "render/scene/film_screen.h"
 #include "render/scene/sheet_index.h"
 
@@ -103,30 +104,28 @@ StillShadows::Level DirectRenderer::Parts::find_still_level(const ShadowReach& r
   std::vector<DirectBatch::Visibility> visible(points);
   const SheetIndex sheet(sheet_of, seen_box);
   const DirectFrame frame{fixture, tree, &sheet, &reach, nullptr, materials};
-  tbb::parallel_for(0, (rays.tiles + DirectBatch::kTilesATask - 1) / DirectBatch::kTilesATask, [&](int task) {
-    DirectBatch batch(frame);
-    DirectCounts counts;
-    const int task_end = std::min(rays.tiles, (task + 1) * DirectBatch::kTilesATask);
-    for (int first = task * DirectBatch::kTilesATask; first < task_end; first += DirectBatch::kMostPackets) {
-      const int packets = std::min(DirectBatch::kMostPackets, task_end - first);
-      batch.intersect({rays.packets.data() + first, static_cast<std::size_t>(packets)}, counts);
-      batch.cast_shadows(counts);
-      for_lanes_on_grid(rays, first, packets, [&](int lane, int row, int column) {
-        const float* const place = batch.lit_sheet_place(lane);
-        if (place == nullptr) return;
-        const std::size_t point = static_cast<std::size_t>(row) * rays.grid.columns + column;
-        level.z[point] = place[2];
-        visible[point] = batch.visibility(lane);
-      });
-    }
+  for_batches(rays, frame, [&](DirectBatch& batch, int first, int packets, DirectCounts& counts) {
+    batch.intersect({rays.packets.data() + first, static_cast<std::size_t>(packets)}, counts);
+    batch.cast_shadows(counts);
+    for_lanes_on_grid(rays, first, packets, [&](int lane, int row, int column) {
+      const float* const place = batch.lit_sheet_place(lane);
+      if (place == nullptr) return;
+      const std::size_t point = static_cast<std::size_t>(row) * rays.grid.columns + column;
+      level.z[point] = place[2];
+      visible[point] = batch.visibility(lane);
+    });
   });
   level.shares = shares_around(visible, rays.grid, fixture.field.beam_count());
   return level;
 }
 
-void DirectRenderer::Parts::take_still(const DirectFrame& frame, DirectBatch& batch, int lane,
-                                       std::size_t point) const {
-  if (!still || frame.horizons == nullptr) return;
+void DirectRenderer::Parts::take_still(DirectBatch& batch, int first_tile, int packets) const {
+  for_lanes_on_grid(rays, first_tile, packets, [&](int lane, int row, int column) {
+    take_still(batch, lane, static_cast<std::size_t>(row) * rays.grid.columns + column);
+  });
+}
+
+void DirectRenderer::Parts::take_still(DirectBatch& batch, int lane, std::size_t point) const {
   const float* const place = batch.lit_sheet_place(lane);
   if (place == nullptr) return;
   const std::size_t first_share = point * static_cast<std::size_t>(fixture.field.beam_count());
